@@ -139,6 +139,24 @@ codes! {
     ClippedObject "matte.clipped_object" "A part of the object is overexposed"
     Moved "matte.moved" "The object moved between two photos and was aligned"
     SimilarScreens "matte.similar_screens" "The screens do not differ in a channel"
+    // Dataset.
+    UnreadableFile "dataset.unreadable_file" "A file is missing or cannot be read"
+    BadDataYaml "dataset.bad_data_yaml" "data.yaml lacks a key or has a wrong value"
+    NoImages "dataset.no_images" "A part of the dataset has no images"
+    SmallImage "dataset.small_image" "An image is smaller than trainers accept"
+    DuplicateImage "dataset.duplicate_image" "Two images have the same bytes"
+    Leak "dataset.leak" "An image for validation looks like one for training"
+    MissingLabel "dataset.missing_label" "An image has no label file"
+    OrphanLabel "dataset.orphan_label" "A label file has no image"
+    BadLabelRow "dataset.bad_label_row" "A row of a label file cannot be read by trainers"
+    DuplicateLabelRow "dataset.duplicate_label_row" "A label file has the same row twice"
+    BadJournalLine "dataset.bad_journal_line" "A line of index.jsonl is damaged"
+    ChangedFile "dataset.changed_file" "A file differs from what was written"
+    UnlistedImage "dataset.unlisted_image" "An image is not in index.jsonl"
+    UnsupportedObject "dataset.unsupported_object" "Nothing holds an object up"
+    ClassWithoutLabels "dataset.class_without_labels" "A class has no label in one part"
+    RareClass "dataset.rare_class" "A class has few labels"
+    TinyBoxes "dataset.tiny_boxes" "Boxes are very small"
 }
 
 impl Code {

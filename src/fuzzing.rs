@@ -17,7 +17,7 @@ pub fn recipe(bytes: &[u8]) {
     let Ok(text) = std::str::from_utf8(bytes) else {
         return;
     };
-    if let Ok(setup) = io::parse_toml::<dataset::Setup>(text) {
+    if let Ok(setup) = io::parse_toml::<dataset::DatasetConfig>(text) {
         let _ = setup.scene.check();
     }
 }
@@ -44,7 +44,7 @@ pub fn data_yaml(bytes: &[u8]) {
         return;
     };
     let (yaml, _) = dataset::DataYaml::read(text);
-    let _ = (yaml.classes(), yaml.root(std::path::Path::new("a")));
+    let _ = (yaml.class_count(), yaml.root(std::path::Path::new("a")));
 }
 
 /// What stands between the truth and the detections that the functions below take.
@@ -75,7 +75,7 @@ fn two(bytes: &[u8]) -> Option<(&str, &str)> {
 }
 
 /// Everything that is made of truth and detections.
-fn score(sheets: &[eval::Sheet]) {
+fn score(sheets: &[eval::EvalImage]) {
     let options = eval::ConfusionOptions::default();
     let all = eval::coco(sheets, &[]);
     let scores = [

@@ -5,9 +5,9 @@
 use petcomp::DeepImage;
 use petcomp::camera::Camera;
 use petcomp::dataset::{
-    LabelSetup, Numbers, Obstructed, PictureFormat, Pictures, Plan, Progress, Record, Report,
-    Sample, Setup, Shard, SheetOptions, Sidecar, Split, SplitOrder, Studio, Times, Writer, Yolo,
-    YoloTask, check, contact_sheet_of, generate, mend, merge,
+    ContactSheetOptions, DatasetConfig, DatasetCounts, LabelConfig, Obstructed, PictureFormat,
+    Pictures, Pipeline, Plan, Progress, Sample, SampleRange, SampleRecord, Shard, Sidecar, Split,
+    SplitOrder, Times, Writer, Yolo, YoloTask, check, contact_sheet_of, generate, merge, repair,
 };
 use petcomp::geom::BBox;
 use petcomp::geom::{Point2, Pose, UnitQuaternion, Vector2};
@@ -110,7 +110,7 @@ fn plan(folder: &Path, count: u64) -> Plan {
     Plan {
         folder: folder.into(),
         count,
-        numbers: Numbers::All,
+        range: SampleRange::All,
         seed: 7,
         recipe: serde_json::json!({ "objects": { "count": [5, 30] }, "hue_deg": 0.1 }),
         classes: ["cap_label", "cap", "label"].map(String::from).to_vec(),
@@ -129,7 +129,7 @@ fn plan(folder: &Path, count: u64) -> Plan {
 fn full_plan(folder: &Path, count: u64) -> Plan {
     let formats = r#"formats = ["yolo", "coco", "voc", "webdataset", "layers"]
         webdataset = { samples = 3 }"#;
-    let labels: LabelSetup = toml::from_str(formats).unwrap();
+    let labels: LabelConfig = toml::from_str(formats).unwrap();
     let mut plan = plan(folder, count);
     plan.writers.truncate(1);
     plan.writers.push(Box::new(Sidecar));
@@ -137,7 +137,7 @@ fn full_plan(folder: &Path, count: u64) -> Plan {
     plan
 }
 
-fn make(plan: &Plan) -> Result<Report> {
+fn make(plan: &Plan) -> Result<DatasetCounts> {
     generate(plan, sample, &|_| {}, &AtomicBool::new(false))
 }
 
@@ -178,7 +178,7 @@ fn text(folder: &Path, name: &str) -> String {
 fn faults(folder: &Path) -> Vec<String> {
     check(folder)
         .unwrap()
-        .faults
+        .findings
         .iter()
         .map(ToString::to_string)
         .collect()
@@ -270,7 +270,7 @@ fn a_stopped_run_goes_on_to_the_same_bytes() {
     );
     assert_eq!(
         report,
-        Report {
+        DatasetCounts {
             made: report.made,
             ..make(&full_plan(whole.path(), 30)).unwrap()
         }
@@ -471,7 +471,7 @@ fn objects_in_a_circle_are_counted_and_none_of_them_is_on_top() {
     )
     .unwrap();
     assert_eq!((report.knotted, report.objects, report.labelled), (6, 8, 2));
-    let record: Record = io::read_json(dir.path().join("scenes/train/000001.json")).unwrap();
+    let record: SampleRecord = io::read_json(dir.path().join("scenes/train/000001.json")).unwrap();
     assert_eq!(
         (record.knotted, record.topmost),
         ([1, 2, 3].map(ObjectId).to_vec(), vec![ObjectId(4)])
@@ -530,7 +530,7 @@ fn segments_hold_borders_and_jpegs_are_accepted() {
 fn a_sidecar_reads_back_bit_by_bit() {
     let dir = tempfile::tempdir().unwrap();
     make(&plan(dir.path(), 4)).unwrap();
-    let record: Record = io::read_json(dir.path().join("scenes/train/000003.json")).unwrap();
+    let record: SampleRecord = io::read_json(dir.path().join("scenes/train/000003.json")).unwrap();
     let made = sample(3).unwrap();
     assert_eq!(
         (record.scene, record.labels, record.drawn),
@@ -583,12 +583,12 @@ fn a_check_finds_every_fault_and_its_place() {
     for expected in [
         "labels/train/000001.txt:2: 4 columns, expected 5",
         "labels/train/000001.txt:3: class 3, but data.yaml has 3 classes, from 0",
-        "labels/train/000001.txt:4: the same row stands above",
+        "labels/train/000001.txt:4: the same row stands above [dataset.duplicate_label_row]",
         "labels/train/000002.txt:1: 1.1, expected a share of the image, 0 to 1",
         "labels/train/000002.txt:2: a box of 0 x 0.1, expected sides above 0",
-        "labels/train/000002.txt:3: class 0.5, expected a whole number from 0",
+        "labels/train/000002.txt:3: class 0.5, expected an integer from 0 [dataset.bad_label_row]",
         "labels/train/000002.txt:4: \"a\", expected a number",
-        "labels/train/000002.txt:5: class -1, expected a whole number from 0",
+        "labels/train/000002.txt:5: class -1, expected an integer from 0",
         "labels/train/000003.txt:1: 5 columns, expected a class and at least 3 pairs",
         "labels/train/000004.txt: missing",
         "labels/train/000099.txt: no image of this name",
@@ -650,7 +650,8 @@ fn an_object_that_nothing_holds_up_is_a_fault_of_its_picture() {
             .filter(|fault| fault.contains("nothing holds"));
         found.collect::<Vec<_>>()
     };
-    let expected = "scenes/train/000001.json: nothing holds object 3 (\"bottle\"), 0.27 m up: make this picture again";
+    let expected = "scenes/train/000001.json: nothing holds object 3 (\"bottle\"), 0.27 m up: make this picture again \
+                    [dataset.unsupported_object]";
     assert_eq!(found("{}"), [expected]);
     // Nothing falls in a recipe that lays its objects.
     assert!(found(r#"{ "scene": { "settle": { "mode": "flat" } } }"#).is_empty());
@@ -671,10 +672,10 @@ fn an_empty_folder_fails_the_check() {
 fn a_contact_sheet_shows_the_pictures_asked_for() {
     let dir = tempfile::tempdir().unwrap();
     make(&plan(dir.path(), 12)).unwrap();
-    let options = SheetOptions {
+    let options = ContactSheetOptions {
         title: "twelve".into(),
         columns: 3,
-        ..SheetOptions::default()
+        ..ContactSheetOptions::default()
     };
     let six = contact_sheet_of(dir.path(), 6, &options).unwrap();
     let all = contact_sheet_of(dir.path(), 100, &options).unwrap();
@@ -722,7 +723,7 @@ fn a_writer_of_one_s_own_takes_part() {
 fn trainers_are_shown_files_that_are_there() {
     let shown = |formats: &str| {
         let dir = tempfile::tempdir().unwrap();
-        let labels: LabelSetup = toml::from_str(formats).unwrap();
+        let labels: LabelConfig = toml::from_str(formats).unwrap();
         let report = make(&Plan {
             writers: labels.writers(&Pictures::default()),
             ..plan(dir.path(), 6)
@@ -764,7 +765,7 @@ fn trainers_are_shown_files_that_are_there() {
 
 fn shard(folder: &Path, count: u64, index: u64, of: u64) -> Plan {
     Plan {
-        numbers: Numbers::Shard(Shard::new(index, of).unwrap()),
+        range: SampleRange::Shard(Shard::new(index, of).unwrap()),
         ..full_plan(folder, count)
     }
 }
@@ -778,7 +779,7 @@ fn shards(dir: &Path) -> Vec<PathBuf> {
     folders
 }
 
-fn joined(shards: &[PathBuf], folder: &Path) -> Result<Report> {
+fn joined(shards: &[PathBuf], folder: &Path) -> Result<DatasetCounts> {
     merge(shards, folder, &|_| {}, &AtomicBool::new(false))
 }
 
@@ -956,7 +957,7 @@ fn edited_lines_are_refused_by_a_merge_and_made_again_by_a_run() {
             refused.contains("shard-2/index.jsonl: line 1: ") && refused.ends_with("--resume"),
             "{refused}"
         );
-        assert_eq!(mend(&folders[1]).unwrap(), (6, 1), "{from}");
+        assert_eq!(repair(&folders[1]).unwrap(), (6, 1), "{from}");
         assert_eq!(make(&shard(&folders[1], 20, 2, 3)).unwrap().made, 1);
         assert_eq!(before, bytes(&folders[1]));
         edit_journal(&folders[1], from, to, false);
@@ -1014,7 +1015,7 @@ fn one_sample_of_a_great_many_is_made_at_once() {
     let dir = tempfile::tempdir().unwrap();
     let last = 999_999_999;
     let one = Plan {
-        numbers: Numbers::One(last),
+        range: SampleRange::One(last),
         ..plan(dir.path(), last + 1)
     };
     assert_eq!(make(&one).unwrap().made, 1);
@@ -1040,7 +1041,7 @@ fn fewer_than_there_are_is_refused_and_nothing_is_lost() {
     assert_eq!(before, bytes(dir.path()));
     // One of them is made again, and the lists of all of them stay.
     let one = Plan {
-        numbers: Numbers::One(3),
+        range: SampleRange::One(3),
         ..full_plan(dir.path(), 4)
     };
     assert_eq!(make(&one).unwrap().images, 12);
@@ -1065,10 +1066,10 @@ fn a_dataset_of_an_older_program_is_read_and_not_continued() {
     .unwrap();
     let before = bytes(dir.path());
     assert_eq!(faults(dir.path()), [""; 0]);
-    assert!(contact_sheet_of(dir.path(), 3, &SheetOptions::default()).is_ok());
+    assert!(contact_sheet_of(dir.path(), 3, &ContactSheetOptions::default()).is_ok());
     for refused in [
         make(&plan(dir.path(), 12)).map(|_| ()),
-        mend(dir.path()).map(|_| ()),
+        repair(dir.path()).map(|_| ()),
     ] {
         let said = refused.unwrap_err().to_string();
         assert!(
@@ -1123,7 +1124,7 @@ fn one_sample_is_made_again_alone_and_the_others_are_left() {
         sample(k)
     };
     let one = Plan {
-        numbers: Numbers::One(7),
+        range: SampleRange::One(7),
         ..plan(dir.path(), 12)
     };
     generate(&one, counted, &|_| {}, &AtomicBool::new(false)).unwrap();
@@ -1140,11 +1141,11 @@ fn what_was_damaged_at_its_size_is_found_and_made_again() {
     let image = dir.path().join("images/train/000002.png");
     let size = std::fs::metadata(&image).unwrap().len();
     std::fs::write(&image, vec![0; size as usize]).unwrap();
-    assert_eq!(mend(dir.path()).unwrap(), (599, 1));
+    assert_eq!(repair(dir.path()).unwrap(), (599, 1));
     assert_eq!(make(&plan(dir.path(), 600)).unwrap().made, 1);
     assert_eq!(before, bytes(dir.path()));
     assert!(
-        mend(&dir.path().join("images"))
+        repair(&dir.path().join("images"))
             .unwrap_err()
             .to_string()
             .contains("begun before")
@@ -1175,11 +1176,11 @@ fn the_classes_balance_and_box_sizes_are_counted() {
     assert_eq!(table.rows[0][4], "18.8 / 18.8 / 18.8 %");
     assert!(
         checked
-            .remarks()
+            .notes()
             .iter()
-            .all(|remark| remark.starts_with("class ")),
+            .all(|note| note.message.starts_with("class ")),
         "{:?}",
-        checked.remarks()
+        checked.notes()
     );
 }
 
@@ -1296,8 +1297,8 @@ fn whatever_decides_a_picture_or_a_label_is_compared_before_a_dataset_goes_on() 
     let (world, out) = (dir.path().join("world"), dir.path().join("out"));
     write_world(&world);
     let run = |count: u64| {
-        let setup = Setup::read(world.join("recipe.toml"), &[])?;
-        make(&Studio::open(setup)?.plan(count, 1, &out)?)
+        let setup = DatasetConfig::read(world.join("recipe.toml"), &[])?;
+        make(&Pipeline::open(setup)?.plan(count, 1, &out)?)
     };
     run(2).unwrap();
     assert_eq!(run(3).unwrap().made, 1, "nothing has changed");
@@ -1415,7 +1416,7 @@ fn a_photo_that_a_label_or_a_manifest_names_is_one_of_its_folder() {
         let (place, away) = (world.join(file), dir.path().join("away"));
         std::fs::rename(&place, &away).unwrap();
         std::os::unix::fs::symlink(&away, &place).unwrap();
-        let said = Studio::open(Setup::read(world.join("recipe.toml"), &[]).unwrap())
+        let said = Pipeline::open(DatasetConfig::read(world.join("recipe.toml"), &[]).unwrap())
             .unwrap_err()
             .to_string();
         std::fs::rename(&away, &place).unwrap();

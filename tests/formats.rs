@@ -8,7 +8,7 @@
 use petcomp::asset::Texture;
 use petcomp::camera::Camera;
 use petcomp::dataset::{
-    LabelSetup, Numbers, Obstructed, Pictures, Plan, Sample, Sidecar, Split, Times, generate,
+    LabelConfig, Obstructed, Pictures, Plan, Sample, SampleRange, Sidecar, Split, Times, generate,
 };
 use petcomp::filter::Pyramid;
 use petcomp::geom::{Point2, Pose, Quad, UnitQuaternion, Vector2, Vector3};
@@ -129,12 +129,12 @@ fn classes() -> Vec<String> {
 /// Makes 12 samples with the formats and settings of a table `[labels]`.
 fn made(labels: &str) -> tempfile::TempDir {
     let dir = tempfile::tempdir().unwrap();
-    let setup: LabelSetup = toml::from_str(labels).unwrap();
+    let setup: LabelConfig = toml::from_str(labels).unwrap();
     let pictures = Pictures::default();
     let mut plan = Plan {
         folder: dir.path().into(),
         count: 12,
-        numbers: Numbers::All,
+        range: SampleRange::All,
         seed: 3,
         recipe: serde_json::json!({}),
         classes: setup.obstructed.classes(&classes()).unwrap(),

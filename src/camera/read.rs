@@ -83,12 +83,23 @@ pub fn read_label(path: impl AsRef<Path>) -> Result<Label> {
 pub fn read_labels(path: impl AsRef<Path>, size: Option<[f64; 2]>) -> Result<Vec<LabelledPhoto>> {
     let path = path.as_ref();
     let text = label_text(path)?;
-    let labels = match import::annotations(&text).map_err(|e| e.in_file(path))? {
+    let annotations = import::annotations(&text).map_err(|e| e.in_file(path))?;
+    labels_of(path, &text, annotations, size)
+}
+
+/// The labels of a file that was read: another program's, or else ours.
+fn labels_of(
+    path: &Path,
+    text: &str,
+    annotations: Option<Vec<import::Annotation>>,
+    size: Option<[f64; 2]>,
+) -> Result<Vec<LabelledPhoto>> {
+    let labels = match annotations {
         Some(annotations) => annotations
             .iter()
             .map(|annotation| imported_label(annotation, path))
             .collect::<Result<Vec<_>>>()?,
-        None => own_labels(&text, path)?,
+        None => own_labels(text, path)?,
     };
     if labels.is_empty() {
         return Err(Error::file(path, "no label, expected at least one"));
@@ -107,7 +118,11 @@ pub fn read_labels(path: impl AsRef<Path>, size: Option<[f64; 2]>) -> Result<Vec
 pub(crate) fn labels_in(folder: &Path, size: Option<[f64; 2]>) -> Result<Vec<LabelledPhoto>> {
     let mut found: Vec<LabelledPhoto> = Vec::new();
     for path in label_paths(folder)? {
-        for labelled in read_labels(&path, size)? {
+        let Some(labels) = labels_if_any(&path, size)? else {
+            log::info!("{}: no label", path.display());
+            continue;
+        };
+        for labelled in labels {
             match found.iter().find(|other| other.name == labelled.name) {
                 None => found.push(labelled),
                 Some(ours) if ours.is_ours() => {
@@ -127,7 +142,7 @@ pub(crate) fn labels_in(folder: &Path, size: Option<[f64; 2]>) -> Result<Vec<Lab
     Ok(found)
 }
 
-/// The files of a folder that hold labels, ours first: what is read later does not replace it.
+/// The files of a folder that may hold labels, ours first: what is read later does not replace it.
 fn label_paths(folder: &Path) -> Result<Vec<PathBuf>> {
     let entries = std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
     let mut paths: Vec<PathBuf> = entries
@@ -136,13 +151,6 @@ fn label_paths(folder: &Path) -> Result<Vec<PathBuf>> {
         .filter(|path| may_be_label(path))
         .collect();
     paths.sort_by_key(|path| (!ends_with(path, LABEL_SUFFIX), path.clone()));
-    paths.retain(|path| {
-        let is_label = ends_with(path, LABEL_SUFFIX) || is_annotated(path);
-        if !is_label {
-            log::info!("{}: no label", path.display());
-        }
-        is_label
-    });
     Ok(paths)
 }
 
@@ -155,9 +163,22 @@ fn may_be_label(path: &Path) -> bool {
     (ends_with(path, ".json") && !ends_with(path, CAMERA_SUFFIX)) || ends_with(path, ".xml")
 }
 
-/// Another program's labels are in a file, well or badly formed.
-fn is_annotated(path: &Path) -> bool {
-    io::read_text(path).is_ok_and(|text| !matches!(import::annotations(&text), Ok(None)))
+/// The labels of a file; none where it is not called a label and holds nothing of another program.
+///
+/// # Errors
+/// Labels of another program that are badly formed; as [`read_labels`] for a file that is called a label.
+fn labels_if_any(path: &Path, size: Option<[f64; 2]>) -> Result<Option<Vec<LabelledPhoto>>> {
+    let is_ours = ends_with(path, LABEL_SUFFIX);
+    let text = match label_text(path) {
+        Ok(text) => text,
+        Err(e) if is_ours => return Err(e),
+        Err(_) => return Ok(None),
+    };
+    let annotations = import::annotations(&text).map_err(|e| e.in_file(path))?;
+    if annotations.is_none() && !is_ours {
+        return Ok(None);
+    }
+    labels_of(path, &text, annotations, size).map(Some)
 }
 
 /// The text of a label; for a photo instead of one, the error says what to do.

@@ -1,7 +1,7 @@
 //! Labels as COCO writes them: one JSON document for each part of the dataset.
 
 use crate::dataset::formats::is_exact;
-use crate::dataset::{Entry, Extent, Labelled, Part, PictureFormat, Writer, Written};
+use crate::dataset::{Entry, Extent, LabelledObject, Part, PictureFormat, Writer, Written};
 use crate::error::{Error, Result};
 use crate::io;
 use crate::label::{RleMask, trace};
@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 const IDS_PER_IMAGE: u64 = 1 << 16;
 
 /// Folder of the parts that are joined.
-const KIND: &str = "coco";
+const PARTS_FOLDER: &str = "coco";
 
 /// Folder of the documents.
 const ANNOTATIONS: &str = "annotations";
@@ -57,7 +57,7 @@ pub enum CocoMask {
 
 /// One image's share of the document.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-struct Share {
+struct ImageShare {
     image: CocoImage,
     annotations: Vec<Annotation>,
 }
@@ -98,11 +98,11 @@ impl Writer for Coco {
     fn begin(&self, folder: &Path, _classes: &[String]) -> Result<()> {
         Part::ALL
             .iter()
-            .try_for_each(|part| io::create_folder(folder.join(KIND).join(part.name())))
+            .try_for_each(|part| io::create_folder(folder.join(PARTS_FOLDER).join(part.name())))
     }
 
     fn write(&self, folder: &Path, entry: &Entry<'_>) -> Result<Vec<PathBuf>> {
-        let path = entry.path(KIND, "json");
+        let path = entry.path(PARTS_FOLDER, "json");
         io::write_json(folder.join(&path), &self.share(entry)?)?;
         Ok(vec![path])
     }
@@ -122,7 +122,7 @@ impl Writer for Coco {
 }
 
 impl Coco {
-    fn share(&self, entry: &Entry<'_>) -> Result<Share> {
+    fn share(&self, entry: &Entry<'_>) -> Result<ImageShare> {
         let [width, height] = entry.sample.labels.image;
         let file_name = format!("{:06}.{}", entry.k, self.pictures.extension());
         let image = CocoImage {
@@ -135,14 +135,14 @@ impl Coco {
             .labelled
             .iter()
             .filter_map(|label| self.annotation(entry.k, label).transpose());
-        Ok(Share {
+        Ok(ImageShare {
             image,
             annotations: annotations.collect::<Result<_>>()?,
         })
     }
 
     /// None for an object without a box.
-    fn annotation(&self, k: u64, label: &Labelled<'_>) -> Result<Option<Annotation>> {
+    fn annotation(&self, k: u64, label: &LabelledObject<'_>) -> Result<Option<Annotation>> {
         let object = label.object;
         let (b, mask) = self.boxes.of(object);
         if b.is_empty() {
@@ -200,25 +200,15 @@ fn join<'a>(
     classes: &[String],
     samples: impl Iterator<Item = &'a Written>,
 ) -> std::io::Result<()> {
-    writeln!(
-        out,
-        "{{\"info\":{{\"description\":\"petcomp {}\"}},",
-        env!("CARGO_PKG_VERSION")
-    )?;
-    let category =
-        |(i, name)| serde_json::json!({ "id": i + 1, "name": name, "supercategory": "object" });
-    let categories: Vec<_> = classes.iter().enumerate().map(category).collect();
-    writeln!(
-        out,
-        "\"categories\":{},",
-        serde_json::Value::from(categories)
-    )?;
+    let version = env!("CARGO_PKG_VERSION");
+    writeln!(out, "{{\"info\":{{\"description\":\"petcomp {version}\"}},")?;
+    writeln!(out, "\"categories\":{},", categories(classes))?;
     let mut images = Vec::new();
     write!(out, "\"annotations\":[")?;
     let mut comma = "\n";
     for sample in samples {
-        let file = io::inside(folder, sample.file(KIND)?).map_err(std::io::Error::other)?;
-        let share: Share = io::read_json(file).map_err(std::io::Error::other)?;
+        let file = io::inside(folder, sample.file(PARTS_FOLDER)?).map_err(std::io::Error::other)?;
+        let share: ImageShare = io::read_json(file).map_err(std::io::Error::other)?;
         images.push(share.image);
         for annotation in &share.annotations {
             write!(out, "{comma}{}", serde_json::to_string(annotation)?)?;
@@ -232,4 +222,13 @@ fn join<'a>(
         comma = ",\n";
     }
     writeln!(out, "]}}")
+}
+
+fn categories(classes: &[String]) -> serde_json::Value {
+    (1..)
+        .zip(classes)
+        .map(|(id, name): (u64, _)| {
+            serde_json::json!({ "id": id, "name": name, "supercategory": "object" })
+        })
+        .collect()
 }

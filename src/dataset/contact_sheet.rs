@@ -1,11 +1,12 @@
 //! A sheet of small pictures with their labels: the first look at a dataset.
 
 use crate::color::to_srgb8;
-use crate::dataset::folder::{self, IDENTITY};
-use crate::dataset::journal::{Line, lines_of};
-use crate::dataset::{Part, Record};
+use crate::dataset::folder;
+use crate::dataset::journal::lines_of;
+use crate::dataset::journal_line::JournalLine;
+use crate::dataset::{Part, SampleRecord};
 use crate::draw::{self, TextSize};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::filter::resize;
 use crate::image::Image;
 use crate::io;
@@ -20,17 +21,17 @@ const INK: Srgb8 = draw::rgb(0xF2, 0xF2, 0xF2);
 const PALE_INK: Srgb8 = draw::rgb(0xA8, 0xAD, 0xB5);
 
 /// Pixels around the sheet.
-const MARGIN: usize = 28;
+const MARGIN_PX: usize = 28;
 
 /// Pixels between pictures.
-const GAP: usize = 16;
+const GAP_PX: usize = 16;
 
 /// Pixels between a picture and its caption.
-const CAPTION_GAP: usize = 4;
+const CAPTION_GAP_PX: usize = 4;
 
 /// How a sheet is laid out.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct SheetOptions {
+pub struct ContactSheetOptions {
     /// A line at the top. Default: none.
     pub title: String,
     /// Widest a picture may be, pixels; larger ones are made smaller. Default: 320.
@@ -39,7 +40,7 @@ pub struct SheetOptions {
     pub columns: usize,
 }
 
-impl Default for SheetOptions {
+impl Default for ContactSheetOptions {
     fn default() -> Self {
         Self {
             title: String::new(),
@@ -51,7 +52,7 @@ impl Default for SheetOptions {
 
 /// A picture of a sheet.
 #[derive(Clone, Debug)]
-pub struct Tile {
+pub struct ContactTile {
     /// The picture, of any size.
     pub picture: Image<LinearRgb>,
     /// What is where in it, in pixels of the size that the labels name.
@@ -62,7 +63,7 @@ pub struct Tile {
     pub caption: String,
 }
 
-impl Tile {
+impl ContactTile {
     /// A tile no wider than `width`, made smaller in linear light.
     pub fn new(
         picture: &Image<LinearRgb>,
@@ -97,32 +98,26 @@ impl Tile {
 }
 
 /// Lays out pictures in rows, each with its boxes and a caption, under a title and a legend of the classes.
-pub fn contact_sheet(tiles: &[Tile], classes: &[String], options: &SheetOptions) -> Image<Srgb8> {
-    let layout = Layout::of(tiles, classes, options);
+pub fn contact_sheet(
+    tiles: &[ContactTile],
+    classes: &[String],
+    options: &ContactSheetOptions,
+) -> Image<Srgb8> {
+    let layout = SheetLayout::new(tiles, classes, options);
     let mut sheet = Image::filled(layout.width, layout.height, PAPER);
-    let mut y = MARGIN as isize;
+    let mut y = MARGIN_PX as isize;
     if !options.title.is_empty() {
-        draw::text(
-            &mut sheet,
-            [MARGIN as isize, y],
-            &options.title,
-            INK,
-            TextSize::Large,
-        );
-        y += (TextSize::Large.height() + GAP / 2) as isize;
+        let at = [MARGIN_PX as isize, y];
+        draw::text(&mut sheet, at, &options.title, INK, TextSize::Large);
+        y += (TextSize::Large.height() + GAP_PX / 2) as isize;
     }
-    legend(&mut sheet, y, &layout.legend);
+    draw_legend(&mut sheet, y, &layout.legend);
     for (i, tile) in tiles.iter().enumerate() {
         let [x, y] = layout.place(i);
         draw::paste(&mut sheet, [x, y], &tile.drawn());
         let below = y + layout.cell[1] - TextSize::Small.height();
-        draw::text(
-            &mut sheet,
-            [x as isize, below as isize],
-            &tile.caption,
-            PALE_INK,
-            TextSize::Small,
-        );
+        let at = [x as isize, below as isize];
+        draw::text(&mut sheet, at, &tile.caption, PALE_INK, TextSize::Small);
     }
     sheet
 }
@@ -135,28 +130,23 @@ pub fn contact_sheet(tiles: &[Tile], classes: &[String], options: &SheetOptions)
 pub fn contact_sheet_of(
     folder: &Path,
     most: usize,
-    options: &SheetOptions,
+    options: &ContactSheetOptions,
 ) -> Result<Image<Srgb8>> {
-    let identity = folder::identity(folder)?;
-    let identity = identity
-        .ok_or_else(|| Error::file(folder, format!("no {IDENTITY}, expected a dataset")))?;
+    let identity = folder::known_identity(folder)?;
     let classes: Vec<String> =
         serde_json::from_value(identity["classes"].clone()).unwrap_or_default();
     let lines = lines_of(folder)?;
     let shown = most.min(lines.len());
-    let chosen: Vec<&Line> = (0..shown)
-        .map(|i| &lines[i * lines.len() / shown])
-        .collect();
-    let tiles: Result<Vec<_>> = chosen
-        .par_iter()
-        .map(|line| tile(folder, line, options))
-        .collect();
-    Ok(contact_sheet(&tiles?, &classes, options))
+    let tiles: Vec<ContactTile> = (0..shown)
+        .into_par_iter()
+        .map(|i| tile(folder, &lines[i * lines.len() / shown], options))
+        .collect::<Result<_>>()?;
+    Ok(contact_sheet(&tiles, &classes, options))
 }
 
-fn tile(folder: &Path, line: &Line, options: &SheetOptions) -> Result<Tile> {
+fn tile(folder: &Path, line: &JournalLine, options: &ContactSheetOptions) -> Result<ContactTile> {
     let picture = io::read::<LinearRgb>(line.file(folder, "images/")?)?;
-    let record: Record = io::read_json(line.file(folder, "scenes/")?)?;
+    let record: SampleRecord = io::read_json(line.file(folder, "scenes/")?)?;
     let part = if line.part == Part::Val {
         "val  "
     } else {
@@ -164,7 +154,7 @@ fn tile(folder: &Path, line: &Line, options: &SheetOptions) -> Result<Tile> {
     };
     let (labelled, all) = (record.labelled.len(), record.labels.objects.len());
     let caption = format!("{:06} {part} {labelled}/{all} labelled", line.k);
-    Ok(Tile::new(
+    Ok(ContactTile::new(
         &picture,
         record.labels,
         record.labelled,
@@ -174,7 +164,7 @@ fn tile(folder: &Path, line: &Line, options: &SheetOptions) -> Result<Tile> {
 }
 
 /// Where everything is on a sheet, pixels.
-struct Layout {
+struct SheetLayout {
     width: usize,
     height: usize,
     columns: usize,
@@ -185,36 +175,28 @@ struct Layout {
     legend: Vec<LegendEntry>,
 }
 
-impl Layout {
-    fn of(tiles: &[Tile], classes: &[String], options: &SheetOptions) -> Self {
-        let text = TextSize::Small;
-        let widest = tiles
-            .iter()
-            .map(|t| t.picture.width().max(text.width(&t.caption)))
-            .max()
-            .unwrap_or(0);
-        let highest = tiles.iter().map(|t| t.picture.height()).max().unwrap_or(0);
-        let cell = [widest, highest + CAPTION_GAP + text.height()];
+impl SheetLayout {
+    fn new(tiles: &[ContactTile], classes: &[String], options: &ContactSheetOptions) -> Self {
+        let cell = cell_size(tiles);
         let columns = match options.columns {
             0 => pleasing_columns(tiles.len(), cell),
             n => n.min(tiles.len().max(1)),
         };
-        let row = (columns * (cell[0] + GAP)).saturating_sub(GAP);
+        let row = (columns * (cell[0] + GAP_PX)).saturating_sub(GAP_PX);
         let title = TextSize::Large.width(&options.title);
-        let legend = entries(classes, tiles, row.max(title));
-        let wide = legend.iter().map(|e| e.x + e.width()).max().unwrap_or(0);
+        let legend = legend_entries(classes, tiles, row.max(title));
+        let legend_width = legend.iter().map(LegendEntry::end).max().unwrap_or(0);
+        let legend_lines = legend.last().map_or(0, |e| e.line + 1);
         let title_height = if options.title.is_empty() {
             0
         } else {
-            TextSize::Large.height() + GAP / 2
+            TextSize::Large.height() + GAP_PX / 2
         };
-        let legend_lines = legend.last().map_or(0, |e| e.line + 1);
-        let top = MARGIN + title_height + legend_lines * LEGEND_LINE + GAP;
+        let top = MARGIN_PX + title_height + legend_lines * LEGEND_LINE_PX + GAP_PX;
         let rows = tiles.len().div_ceil(columns);
-        let height = top + rows * (cell[1] + GAP) + MARGIN - GAP;
         Self {
-            width: row.max(title).max(wide) + 2 * MARGIN,
-            height,
+            width: row.max(title).max(legend_width) + 2 * MARGIN_PX,
+            height: top + rows * (cell[1] + GAP_PX) + MARGIN_PX - GAP_PX,
             columns,
             cell,
             top,
@@ -226,10 +208,23 @@ impl Layout {
     fn place(&self, i: usize) -> [usize; 2] {
         let [column, row] = [i % self.columns, i / self.columns];
         [
-            MARGIN + column * (self.cell[0] + GAP),
-            self.top + row * (self.cell[1] + GAP),
+            MARGIN_PX + column * (self.cell[0] + GAP_PX),
+            self.top + row * (self.cell[1] + GAP_PX),
         ]
     }
+}
+
+/// Size of the largest picture with its caption.
+fn cell_size(tiles: &[ContactTile]) -> [usize; 2] {
+    let text = TextSize::Small;
+    let widths = tiles
+        .iter()
+        .map(|tile| tile.picture.width().max(text.width(&tile.caption)));
+    let heights = tiles.iter().map(|tile| tile.picture.height());
+    [
+        widths.max().unwrap_or(0),
+        heights.max().unwrap_or(0) + CAPTION_GAP_PX + text.height(),
+    ]
 }
 
 /// The number of columns with which a sheet comes closest to 3:2, the shape of screens; an empty place at its end weighs
@@ -238,14 +233,14 @@ fn pleasing_columns(count: usize, [w, h]: [usize; 2]) -> usize {
     let off = |columns: &usize| {
         let rows = count.div_ceil(*columns);
         let empty = columns * rows - count;
-        (2 * columns * (w + GAP)).abs_diff(3 * rows * (h + GAP)) + 4 * empty * (w + GAP)
+        (2 * columns * (w + GAP_PX)).abs_diff(3 * rows * (h + GAP_PX)) + 4 * empty * (w + GAP_PX)
     };
     (1..=count.max(1)).min_by_key(off).unwrap_or(1)
 }
 
 /// Height of a line of the legend, and of its colour mark.
-const LEGEND_LINE: usize = 24;
-const MARK: usize = 12;
+const LEGEND_LINE_PX: usize = 24;
+const MARK_PX: usize = 12;
 
 struct LegendEntry {
     color: Srgb8,
@@ -257,58 +252,72 @@ struct LegendEntry {
 
 impl LegendEntry {
     fn width(&self) -> usize {
-        MARK + 8 + TextSize::Small.width(&self.text)
+        MARK_PX + 8 + TextSize::Small.width(&self.text)
+    }
+
+    /// Where it ends, pixels from the margin.
+    fn end(&self) -> usize {
+        self.x + self.width()
     }
 }
 
 /// The legend's entries, in as many lines as they need within a width.
-fn entries(classes: &[String], tiles: &[Tile], width: usize) -> Vec<LegendEntry> {
-    let count = |keep: &dyn Fn(&ObjectLabel, bool) -> bool| {
-        let objects = tiles.iter().flat_map(|t| {
-            t.labels
-                .objects
-                .iter()
-                .map(|o| (o, t.labelled.contains(&o.id)))
-        });
-        objects.filter(|&(o, has)| keep(o, has)).count()
-    };
-    let class = |(i, name): (usize, &String)| {
-        let n = count(&|o, has| has && o.class as usize == i);
-        (draw::class_color(i as u32), format!("{name} ({n})"))
-    };
-    let unlabelled = count(&|_, has| !has);
-    let last = (
-        UNLABELLED,
-        format!("no label, another lies over it ({unlabelled})"),
-    );
+fn legend_entries(classes: &[String], tiles: &[ContactTile], width: usize) -> Vec<LegendEntry> {
+    let (labelled, unlabelled) = count_objects(classes.len(), tiles);
+    let mut entries: Vec<(Srgb8, String)> = (0..)
+        .zip(classes.iter().zip(labelled))
+        .map(|(class, (name, n))| (draw::class_color(class), format!("{name} ({n})")))
+        .collect();
+    let text = format!("no label, another lies over it ({unlabelled})");
+    entries.push((UNLABELLED, text));
+    place_entries(entries, width)
+}
+
+/// Objects with a label for each class, and objects without one.
+fn count_objects(class_count: usize, tiles: &[ContactTile]) -> (Vec<usize>, usize) {
+    let (mut labelled, mut unlabelled) = (vec![0; class_count], 0);
+    for tile in tiles {
+        for object in &tile.labels.objects {
+            if !tile.labelled.contains(&object.id) {
+                unlabelled += 1;
+            } else if let Some(count) = labelled.get_mut(object.class as usize) {
+                *count += 1;
+            }
+        }
+    }
+    (labelled, unlabelled)
+}
+
+/// Places entries beside each other, and in the next line where the width ends.
+fn place_entries(entries: Vec<(Srgb8, String)>, width: usize) -> Vec<LegendEntry> {
     let mut placed: Vec<LegendEntry> = Vec::new();
-    for (color, text) in classes.iter().enumerate().map(class).chain([last]) {
-        let next = placed
+    for (color, text) in entries {
+        let (x, line) = placed
             .last()
-            .map_or((0, 0), |e| (e.x + e.width() + 2 * GAP, e.line));
+            .map_or((0, 0), |e| (e.end() + 2 * GAP_PX, e.line));
         let mut entry = LegendEntry {
             color,
             text,
-            x: next.0,
-            line: next.1,
+            x,
+            line,
         };
-        if entry.x > 0 && entry.x + entry.width() > width {
-            (entry.x, entry.line) = (0, next.1 + 1);
+        if x > 0 && entry.end() > width {
+            (entry.x, entry.line) = (0, line + 1);
         }
         placed.push(entry);
     }
     placed
 }
 
-fn legend(sheet: &mut Image<Srgb8>, top: isize, entries: &[LegendEntry]) {
+fn draw_legend(sheet: &mut Image<Srgb8>, top: isize, entries: &[LegendEntry]) {
     for entry in entries {
-        let x = (MARGIN + entry.x) as isize;
-        let y = top + (entry.line * LEGEND_LINE) as isize;
-        let down = ((TextSize::Small.height() - MARK) / 2) as isize;
-        draw::fill(sheet, [x, y + down], [MARK, MARK], entry.color);
+        let x = (MARGIN_PX + entry.x) as isize;
+        let y = top + (entry.line * LEGEND_LINE_PX) as isize;
+        let down = ((TextSize::Small.height() - MARK_PX) / 2) as isize;
+        draw::fill(sheet, [x, y + down], [MARK_PX, MARK_PX], entry.color);
         draw::text(
             sheet,
-            [x + MARK as isize + 8, y],
+            [x + MARK_PX as isize + 8, y],
             &entry.text,
             INK,
             TextSize::Small,
@@ -330,7 +339,7 @@ mod tests {
 
     #[test]
     fn a_sheet_without_pictures_still_has_its_legend() {
-        let sheet = contact_sheet(&[], &["cap".into()], &SheetOptions::default());
+        let sheet = contact_sheet(&[], &["cap".into()], &ContactSheetOptions::default());
         assert!(sheet.pixels().contains(&draw::class_color(0)));
     }
 
@@ -338,7 +347,7 @@ mod tests {
     fn a_small_picture_is_not_made_larger() {
         let picture = Image::filled(40, 30, LinearRgb::WHITE);
         let tile = |width| {
-            Tile::new(
+            ContactTile::new(
                 &picture,
                 Labels::default(),
                 Vec::new(),
@@ -353,7 +362,7 @@ mod tests {
     #[test]
     fn a_narrow_legend_goes_on_in_the_next_line() {
         let classes = ["cap_label", "cap", "label", "none"].map(String::from);
-        let narrow = entries(&classes, &[], 250);
+        let narrow = legend_entries(&classes, &[], 250);
         assert!(narrow.iter().all(|e| e.x == 0 || e.x + e.width() <= 250));
         assert!(narrow.last().expect("five entries").line >= 2);
     }

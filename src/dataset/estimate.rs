@@ -5,9 +5,9 @@ use std::fmt;
 use std::time::Duration;
 
 /// A job that takes longer is one to be asked about first.
-const LONG: Duration = Duration::from_secs(3600);
+const LONG_RUN: Duration = Duration::from_secs(3600);
 /// The first seconds of a run are not like the rest: files are read, caches are cold.
-const TELLING: Duration = Duration::from_secs(5);
+const MIN_ELAPSED: Duration = Duration::from_secs(5);
 
 /// A run that would take longer than an hour.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,7 +31,7 @@ impl LongRun {
         let left = progress.count.saturating_sub(progress.done);
         let (made, threads) = (progress.made, threads.max(1) as u64);
         let at_least = made < threads;
-        if elapsed < TELLING || left == 0 {
+        if elapsed < MIN_ELAPSED || left == 0 {
             return None;
         }
         let each = elapsed.as_secs_f64() / if at_least { threads } else { made } as f64;
@@ -41,7 +41,7 @@ impl LongRun {
             each,
             at_least,
         };
-        (run.seconds > LONG.as_secs_f64()).then_some(run)
+        (run.seconds > LONG_RUN.as_secs_f64()).then_some(run)
     }
 }
 

@@ -1,9 +1,9 @@
 //! What a dataset is made from, by content: all that decides a picture or a label.
 
 use crate::asset::{Asset, Library, Photo};
-use crate::dataset::place::Place;
-use crate::dataset::surroundings::Surroundings;
-use crate::dataset::{Inputs, Setup};
+use crate::dataset::background_photo::BackgroundPhoto;
+use crate::dataset::environment_maps::EnvironmentMaps;
+use crate::dataset::{DatasetConfig, Inputs};
 use crate::error::Result;
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -18,18 +18,18 @@ use std::path::Path;
 /// # Errors
 /// A photo or an environment map that cannot be read.
 pub(super) fn fingerprint(
-    setup: &Setup,
+    config: &DatasetConfig,
     library: &Library,
-    places: &[Place],
-    surroundings: &Surroundings,
+    places: &[BackgroundPhoto],
+    surroundings: &EnvironmentMaps,
     inputs: &mut Inputs,
 ) -> Result<Value> {
-    let Setup {
+    let DatasetConfig {
         scene,
         render,
         labels,
         ..
-    } = setup;
+    } = config;
     let assets: Vec<Value> = library.assets.iter().map(of_asset).collect();
     Ok(json!({
         "scene": scene,
@@ -62,7 +62,7 @@ fn of_photo(photo: &Photo) -> Value {
     })
 }
 
-fn of_places(places: &[Place], inputs: &mut Inputs) -> Result<Vec<Value>> {
+fn of_places(places: &[BackgroundPhoto], inputs: &mut Inputs) -> Result<Vec<Value>> {
     let files: Vec<(String, &Path)> = places
         .iter()
         .map(|place| {
@@ -73,7 +73,7 @@ fn of_places(places: &[Place], inputs: &mut Inputs) -> Result<Vec<Value>> {
         })
         .collect();
     let photos = inputs.checksums(&files)?;
-    let of_place = |(place, photo): (&Place, u32)| {
+    let of_place = |(place, photo): (&BackgroundPhoto, u32)| {
         let background = &place.background;
         json!({
             "name": background.name,
@@ -86,14 +86,14 @@ fn of_places(places: &[Place], inputs: &mut Inputs) -> Result<Vec<Value>> {
 }
 
 /// What a person should know of the backgrounds, by their names: the report shows it.
-fn notes(places: &[Place]) -> BTreeMap<&str, &[String]> {
+fn notes(places: &[BackgroundPhoto]) -> BTreeMap<&str, &[String]> {
     let noted = places.iter().filter(|place| !place.notes.is_empty());
     noted
         .map(|place| (place.background.name.as_str(), place.notes.as_slice()))
         .collect()
 }
 
-fn of_surroundings(surroundings: &Surroundings, inputs: &mut Inputs) -> Result<Vec<Value>> {
+fn of_surroundings(surroundings: &EnvironmentMaps, inputs: &mut Inputs) -> Result<Vec<Value>> {
     let files: Vec<_> = surroundings.files().collect();
     let named: Vec<(String, &Path)> = files
         .iter()

@@ -1,8 +1,7 @@
 //! A dataset's folder: claimed by one run at a time, and only for the plan that it was begun with.
 
-use crate::dataset::journal::JOURNAL;
 use crate::dataset::times::RUNS;
-use crate::dataset::{Numbers, Plan, Shard, SplitOrder};
+use crate::dataset::{Plan, SampleRange, Shard, SplitOrder};
 use crate::error::{Error, Result};
 use crate::io;
 use serde_json::{Map, Value, json};
@@ -12,11 +11,14 @@ use std::path::Path;
 /// Name of the file that says what a dataset was made from.
 pub(crate) const IDENTITY: &str = "dataset.json";
 
+/// Name of the journal in a dataset's folder.
+pub const JOURNAL: &str = "index.jsonl";
+
 /// Locked while a run writes; empty.
 const LOCK: &str = ".lock";
 
 /// Version of [`IDENTITY`] and of the journal: 2 records every input, and the lines of the journal have checksums.
-const FORMAT: u64 = 2;
+const FORMAT_VERSION: u64 = 2;
 
 /// A claimed folder; free again when this is dropped.
 pub(crate) struct Claim {
@@ -34,29 +36,32 @@ pub(crate) fn claim(plan: &Plan) -> Result<Claim> {
     }
     let before = identity(folder)?;
     if before.is_none() && holds_something(folder)? {
-        return Err(Error::file(
-            folder,
-            format!("is not empty and has no {IDENTITY}, expected a new or empty folder"),
-        ));
+        let what = format!("is not empty and has no {IDENTITY}, expected a new or empty folder");
+        return Err(Error::file(folder, what));
     }
     io::create_folder(folder)?;
     io::refuse_links(folder)?;
-    [LOCK, JOURNAL, RUNS]
-        .iter()
-        .try_for_each(|name| io::refuse_foreign(&folder.join(name)))?;
+    for name in [LOCK, JOURNAL, RUNS] {
+        io::refuse_foreign(&folder.join(name))?;
+    }
     let lock = lock(folder)?;
     let now = plan_identity(plan)?;
     if let Some(before) = before {
-        of_this_format(&before, folder)?;
-        same(&before, &now, "")
-            .map_err(|(at, what)| Error::value(at, what).in_file(folder.join(IDENTITY)))?;
+        check_same_plan(&before, &now, folder)?;
     }
     sweep(folder)?;
     io::write_json(folder.join(IDENTITY), &now)?;
-    plan.writers
-        .iter()
-        .try_for_each(|writer| writer.begin(folder, &plan.classes))?;
+    for writer in &plan.writers {
+        writer.begin(folder, &plan.classes)?;
+    }
     Ok(Claim { _lock: lock })
+}
+
+/// Fails where the folder was begun with another plan, naming the field.
+fn check_same_plan(before: &Value, now: &Value, folder: &Path) -> Result<()> {
+    of_this_format(before, folder)?;
+    same(before, now, "")
+        .map_err(|(at, what)| Error::value(at, what).in_file(folder.join(IDENTITY)))
 }
 
 /// Claims the folder of a dataset that was begun before.
@@ -77,7 +82,7 @@ pub(crate) fn reclaim(folder: &Path) -> Result<Claim> {
 
 /// The folder was begun before every input was recorded and lines had checksums.
 pub(crate) fn is_older(folder: &Path) -> Result<bool> {
-    Ok(identity(folder)?.is_some_and(|before| format_of(&before) < FORMAT))
+    Ok(identity(folder)?.is_some_and(|before| format_of(&before) < FORMAT_VERSION))
 }
 
 fn format_of(identity: &Value) -> u64 {
@@ -87,8 +92,8 @@ fn format_of(identity: &Value) -> u64 {
 /// Refuses what another petcomp recorded otherwise: nobody could tell whether its inputs are still the same.
 pub(crate) fn of_this_format(identity: &Value, folder: &Path) -> Result<()> {
     let (what, others) = match format_of(identity) {
-        FORMAT => return Ok(()),
-        ..FORMAT => (
+        FORMAT_VERSION => return Ok(()),
+        ..FORMAT_VERSION => (
             "was begun by an older petcomp, which did not record every input",
             "older",
         ),
@@ -104,6 +109,15 @@ pub(crate) fn identity(folder: &Path) -> Result<Option<Value>> {
         Err(_) => Ok(None),
         Ok(_) => io::read_json(io::inside(folder, IDENTITY)?).map(Some),
     }
+}
+
+/// What a dataset was made from.
+///
+/// # Errors
+/// A folder that is no dataset.
+pub(crate) fn known_identity(folder: &Path) -> Result<Value> {
+    let identity = identity(folder)?;
+    identity.ok_or_else(|| Error::file(folder, format!("no {IDENTITY}, expected a dataset")))
 }
 
 fn holds_something(folder: &Path) -> Result<bool> {
@@ -150,7 +164,7 @@ fn sweep(folder: &Path) -> Result<()> {
 /// Everything that decides the bytes of a dataset's samples, as it reads back from a file.
 fn plan_identity(plan: &Plan) -> Result<Value> {
     let mut identity = json!({
-        "format": FORMAT,
+        "format": FORMAT_VERSION,
         "petcomp": env!("CARGO_PKG_VERSION"),
         "seed": plan.seed,
         "classes": plan.classes,
@@ -159,7 +173,7 @@ fn plan_identity(plan: &Plan) -> Result<Value> {
         "writers": plan.writers.iter().map(|writer| writer.settings()).collect::<Vec<_>>(),
         "recipe": plan.recipe,
     });
-    if let Numbers::Shard(Shard { index, of }) = plan.numbers {
+    if let SampleRange::Shard(Shard { index, of }) = plan.range {
         identity["shard"] = json!({ "index": index, "of": of, "count": plan.count });
     }
     if plan.split.order == SplitOrder::Consecutive {
@@ -203,17 +217,12 @@ fn same_entries(a: &[Value], b: &[Value], at: &str) -> std::result::Result<(), (
             _ => same(before, now, &format!("{at}[{i}]"))?,
         }
     }
-    match a.len() == b.len() {
-        true => Ok(()),
-        false => {
-            let what = format!(
-                "the dataset was begun with {} entries, this run has {}",
-                a.len(),
-                b.len()
-            );
-            Err((at.to_owned(), what))
-        }
+    let (before, now) = (a.len(), b.len());
+    if before == now {
+        return Ok(());
     }
+    let what = format!("the dataset was begun with {before} entries, this run has {now}");
+    Err((at.to_owned(), what))
 }
 
 /// What an entry of a list is called.
@@ -224,11 +233,11 @@ fn name_of(entry: &Value) -> Option<&str> {
 }
 
 /// Longest value that a message shows whole, letters.
-const BRIEF: usize = 80;
+const MAX_SHOWN_LETTERS: usize = 80;
 
 fn brief(value: &Value) -> String {
     let text = value.to_string();
-    match text.char_indices().nth(BRIEF) {
+    match text.char_indices().nth(MAX_SHOWN_LETTERS) {
         Some((end, _)) => format!("{}..", &text[..end]),
         None => text,
     }

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 /// How labels are made and written: the table `[labels]` of a recipe.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct LabelSetup {
+pub struct LabelConfig {
     /// What happens to the labels of objects that something lies over: `drop`, `keep`, `ignore` or `class`. Default:
     /// `drop`, as in the paper.
     pub obstructed: Obstructed,
@@ -75,7 +75,7 @@ impl Extent {
     }
 }
 
-impl Default for LabelSetup {
+impl Default for LabelConfig {
     fn default() -> Self {
         let LabelOptions {
             amodal,
@@ -98,7 +98,7 @@ impl Default for LabelSetup {
     }
 }
 
-impl LabelSetup {
+impl LabelConfig {
     /// # Errors
     /// [`Error::Value`](crate::Error::Value) for the first number that cannot be right.
     pub fn check(&self) -> Result<()> {
@@ -164,9 +164,9 @@ mod tests {
     #[test]
     fn a_tolerance_reaches_the_formats_with_polygons_and_none_is_not_told() {
         let told = |recipe: &str| {
-            let setup: LabelSetup = toml::from_str(recipe).unwrap();
-            setup.check().unwrap();
-            setup
+            let config: LabelConfig = toml::from_str(recipe).unwrap();
+            config.check().unwrap();
+            config
                 .writers(&Pictures::default())
                 .iter()
                 .map(|w| w.settings().to_string())
@@ -189,7 +189,7 @@ mod tests {
             ("alpha_threshold = 2", "alpha_threshold: 2"),
             ("overlap_iou = nan", "overlap_iou: NaN"),
         ] {
-            let e = toml::from_str::<LabelSetup>(recipe)
+            let e = toml::from_str::<LabelConfig>(recipe)
                 .unwrap()
                 .check()
                 .unwrap_err()
@@ -197,14 +197,14 @@ mod tests {
             assert!(e.contains(at), "{e}");
         }
         assert!(
-            toml::from_str::<LabelSetup>("yolo = { simplify = 1 }").is_err(),
+            toml::from_str::<LabelConfig>("yolo = { simplify = 1 }").is_err(),
             "one place to say it"
         );
     }
 
     #[test]
     fn formats_are_written_once_and_archives_last() {
-        let asked: LabelSetup =
+        let asked: LabelConfig =
             toml::from_str(r#"formats = ["webdataset", "coco", "yolo", "coco"]"#).unwrap();
         let names = asked
             .writers(&Pictures::default())
@@ -220,6 +220,6 @@ mod tests {
 
     #[test]
     fn the_defaults_of_the_table_are_those_of_the_labels() {
-        assert_eq!(LabelSetup::default().options(), LabelOptions::default());
+        assert_eq!(LabelConfig::default().options(), LabelOptions::default());
     }
 }

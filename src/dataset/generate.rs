@@ -1,9 +1,11 @@
 //! Makes a dataset, many samples at a time, in a folder that survives any interruption.
 
-use crate::dataset::journal::Line;
+use crate::dataset::journal_line::JournalLine;
 use crate::dataset::run::{Progress, run};
 use crate::dataset::times::{Times, timed};
-use crate::dataset::{Entry, Inputs, Numbers, Obstructed, Report, Sample, Split, Writer};
+use crate::dataset::{
+    DatasetCounts, Entry, Inputs, Obstructed, Sample, SampleRange, Split, Writer,
+};
 use crate::error::{Error, Result};
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
@@ -15,7 +17,7 @@ pub struct Plan {
     /// Number of samples of the whole dataset.
     pub count: u64,
     /// Which of them this run makes.
-    pub numbers: Numbers,
+    pub range: SampleRange,
     /// Seed, as it is told in the files; the samples come from the closure.
     pub seed: u64,
     /// Everything else that decides what a sample is: a run into a folder that was made from another is refused.
@@ -62,7 +64,7 @@ pub fn generate(
     make: impl Fn(u64) -> Result<Sample> + Sync,
     progress: &(dyn Fn(Progress) + Sync),
     stop: &AtomicBool,
-) -> Result<Report> {
+) -> Result<DatasetCounts> {
     let recipe_hash = plan.recipe_hash();
     let write = |k| {
         let sample = make(k)?;
@@ -79,7 +81,7 @@ pub fn generate(
 }
 
 /// Writes the files of a sample.
-fn write(plan: &Plan, recipe_hash: &str, k: u64, sample: &Sample) -> Result<Line> {
+fn write(plan: &Plan, recipe_hash: &str, k: u64, sample: &Sample) -> Result<JournalLine> {
     let Plan {
         folder,
         seed,
@@ -102,7 +104,7 @@ fn write(plan: &Plan, recipe_hash: &str, k: u64, sample: &Sample) -> Result<Line
     for writer in &plan.writers {
         files.extend(writer.write(folder, &entry)?);
     }
-    Line::of(&entry, folder, &files)
+    JournalLine::new(&entry, folder, &files)
 }
 
 /// Meets what the writers take for granted.

@@ -14,7 +14,7 @@ pub(crate) const INPUTS: &str = ".inputs.json";
 
 /// A file that changed less than this ago may change again within the same tick of its file system's clock (2 s on FAT),
 /// so nothing is concluded from its time.
-const SETTLED: Duration = Duration::from_secs(2);
+const SETTLED_AGE: Duration = Duration::from_secs(2);
 
 /// Checksums of a dataset's input files, kept in its folder from one run to the next.
 ///
@@ -134,7 +134,10 @@ fn is_settled(meta: &Metadata, now: SystemTime) -> bool {
         .into_iter()
         .flatten()
         .max();
-    latest.is_some_and(|latest| now.duration_since(latest).is_ok_and(|age| age > SETTLED))
+    latest.is_some_and(|latest| {
+        now.duration_since(latest)
+            .is_ok_and(|age| age > SETTLED_AGE)
+    })
 }
 
 /// When a file's content or its names changed last: a time that nobody can set back.

@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::io;
 use crate::io::exr::write_channels;
 use crate::label::LabelOptions;
-use crate::pixel::{LinearRgb, ObjectId};
+use crate::pixel::{LinearRgb, ObjectId, PremulRgba};
 use crate::render::Cryptomatte;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -35,7 +35,7 @@ pub struct Layers {
 const KIND: &str = "layers";
 
 /// A channel's name and samples.
-type Plane = (String, Vec<f32>);
+type NamedChannel = (String, Vec<f32>);
 
 impl Writer for Layers {
     fn settings(&self) -> serde_json::Value {
@@ -50,32 +50,23 @@ impl Writer for Layers {
 
     fn write(&self, folder: &Path, entry: &Entry<'_>) -> Result<Vec<PathBuf>> {
         let (path, sample) = (entry.path(KIND, "exr"), entry.sample);
-        let names: Vec<_> = sample
-            .labels
-            .objects
+        let objects = &sample.labels.objects;
+        let names: Vec<_> = objects
             .iter()
             .map(|o| (o.id, name(o.id, o.class, entry.classes)))
             .collect();
         let ids = Cryptomatte::new(&sample.deep, "CryptoObject", &names);
-        let mut planes = picture(entry);
-        planes.extend(ids.channels);
+        let mut channels = picture(entry);
+        channels.extend(ids.channels);
         if self.cards {
-            planes.extend(
-                sample
-                    .labels
-                    .objects
-                    .iter()
-                    .flat_map(|object| card(&sample.deep, object.id)),
-            );
+            channels.extend(objects.iter().flat_map(|o| card(&sample.deep, o.id)));
         }
-        let borrowed: Vec<_> = planes
+        let borrowed: Vec<_> = channels
             .iter()
-            .map(|(name, plane)| (name.as_str(), plane.as_slice()))
+            .map(|(name, values)| (name.as_str(), values.as_slice()))
             .collect();
         let mut notes = ids.metadata;
-        notes.push(("petcomp:recipe".into(), entry.recipe_hash.into()));
-        notes.push(("petcomp:seed".into(), entry.seed.to_string()));
-        notes.push(("petcomp:sample".into(), entry.k.to_string()));
+        notes.extend(provenance(entry));
         write_channels(folder.join(&path), sample.frame.size(), &borrowed, &notes)?;
         Ok(vec![path])
     }
@@ -89,24 +80,39 @@ fn name(id: ObjectId, class: u32, classes: &[String]) -> String {
     format!("object{:03}_{class}", id.0)
 }
 
+/// What the file says of where it comes from.
+fn provenance(entry: &Entry<'_>) -> [(String, String); 3] {
+    [
+        ("petcomp:recipe".into(), entry.recipe_hash.into()),
+        ("petcomp:seed".into(), entry.seed.to_string()),
+        ("petcomp:sample".into(), entry.k.to_string()),
+    ]
+}
+
 /// The picture, its depth and its shadows.
-fn picture(entry: &Entry<'_>) -> Vec<Plane> {
+fn picture(entry: &Entry<'_>) -> Vec<NamedChannel> {
     let (frame, deep) = (&entry.sample.frame, &entry.sample.deep);
-    let of = |f: &dyn Fn(usize) -> f32| (0..frame.pixels().len()).map(f).collect::<Vec<f32>>();
-    let at = |i: usize| frame.pixels()[i];
-    let mut planes: Vec<Plane> = vec![
-        ("R".into(), of(&|i| at(i).r)),
-        ("G".into(), of(&|i| at(i).g)),
-        ("B".into(), of(&|i| at(i).b)),
-        ("A".into(), of(&|i| at(i).a)),
-        ("Z".into(), each(deep, nearest)),
+    let color: [(&str, fn(&PremulRgba) -> f32); 4] = [
+        ("R", |p| p.r),
+        ("G", |p| p.g),
+        ("B", |p| p.b),
+        ("A", |p| p.a),
     ];
-    let shadow: [fn(LinearRgb) -> f32; 3] = [|s| s.r, |s| s.g, |s| s.b];
-    for (channel, value) in ["R", "G", "B"].into_iter().zip(shadow) {
-        let plane = deep.shadow().pixels().iter().map(|&s| value(s)).collect();
-        planes.push((format!("shadow.{channel}"), plane));
+    let shadow: [(&str, fn(&LinearRgb) -> f32); 3] = [
+        ("shadow.R", |s| s.r),
+        ("shadow.G", |s| s.g),
+        ("shadow.B", |s| s.b),
+    ];
+    let mut channels: Vec<NamedChannel> = Vec::new();
+    for (name, value) in color {
+        channels.push((name.into(), frame.pixels().iter().map(value).collect()));
     }
-    planes
+    channels.push(("Z".into(), each(deep, nearest)));
+    for (name, value) in shadow {
+        let values = deep.shadow().pixels().iter().map(value).collect();
+        channels.push((name.into(), values));
+    }
+    channels
 }
 
 /// Depth of the first sample of a pixel of which enough is seen to belong to a mask.
@@ -119,7 +125,7 @@ fn nearest(samples: &[DeepSample]) -> f32 {
 }
 
 /// One channel of an object.
-struct Channel {
+struct ObjectChannel {
     layer: &'static str,
     name: &'static str,
     value: fn(&DeepSample) -> f32,
@@ -128,38 +134,38 @@ struct Channel {
 }
 
 /// The channels of an object.
-const CARD: [Channel; 6] = [
-    Channel {
+const OBJECT_CHANNELS: [ObjectChannel; 6] = [
+    ObjectChannel {
         layer: "object",
         name: "R",
         value: |s| s.light.r,
         none: 0.0,
     },
-    Channel {
+    ObjectChannel {
         layer: "object",
         name: "G",
         value: |s| s.light.g,
         none: 0.0,
     },
-    Channel {
+    ObjectChannel {
         layer: "object",
         name: "B",
         value: |s| s.light.b,
         none: 0.0,
     },
-    Channel {
+    ObjectChannel {
         layer: "object",
         name: "A",
         value: |s| s.visible,
         none: 0.0,
     },
-    Channel {
+    ObjectChannel {
         layer: "object",
         name: "Z",
         value: |s| s.depth.0,
         none: f32::INFINITY,
     },
-    Channel {
+    ObjectChannel {
         layer: "amodal",
         name: "A",
         value: |s| s.alpha,
@@ -167,18 +173,18 @@ const CARD: [Channel; 6] = [
     },
 ];
 
-fn card(deep: &DeepImage, id: ObjectId) -> Vec<Plane> {
-    let plane = |Channel {
+fn card(deep: &DeepImage, id: ObjectId) -> Vec<NamedChannel> {
+    let plane = |ObjectChannel {
                      layer,
                      name,
                      value,
                      none,
-                 }: &Channel| {
+                 }: &ObjectChannel| {
         let own =
             |samples: &[DeepSample]| samples.iter().find(|s| s.object == id).map_or(*none, value);
         (format!("{layer}{:03}.{name}", id.0), each(deep, own))
     };
-    CARD.iter().map(plane).collect()
+    OBJECT_CHANNELS.iter().map(plane).collect()
 }
 
 /// One value for each pixel.

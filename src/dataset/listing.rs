@@ -1,7 +1,7 @@
 //! The images of a dataset, part by part, and a choice of them: lists that trainers read, without copies.
 
 use crate::dataset::yolo_yaml::DataYaml;
-use crate::dataset::{Part, Record};
+use crate::dataset::{Part, SampleRecord};
 use crate::error::{Error, Result};
 use crate::io;
 use std::path::{Path, PathBuf};
@@ -25,13 +25,9 @@ impl Listing {
     pub fn read(folder: &Path) -> Result<Self> {
         let folder = std::path::absolute(folder).map_err(|e| Error::file(folder, e))?;
         let (yaml, _) = DataYaml::read(&io::read_text(folder.join("data.yaml"))?);
-        let images = |part| {
-            yaml.folder(part)
-                .map_or(Ok(Vec::new()), |part| images(&folder, part))
-        };
         Ok(Self {
-            train: images(Part::Train)?,
-            val: images(Part::Val)?,
+            train: images_of(&folder, yaml.folders(Part::Train))?,
+            val: images_of(&folder, yaml.folders(Part::Val))?,
             classes: yaml.names().to_vec(),
         })
     }
@@ -55,11 +51,9 @@ impl Listing {
                 format!("{share}, expected a share, 0 to 1"),
             ));
         }
-        let head =
-            |images: &[PathBuf]| images[..(images.len() as f64 * share).round() as usize].to_vec();
         Ok(Self {
-            train: head(&self.train),
-            val: head(&self.val),
+            train: first_share(&self.train, share),
+            val: first_share(&self.val, share),
             classes: self.classes.clone(),
         })
     }
@@ -86,8 +80,17 @@ impl Listing {
     }
 }
 
-/// The images of a part.
-fn images(folder: &Path, part: &str) -> Result<Vec<PathBuf>> {
+/// The images of the folders or lists of a part.
+fn images_of(folder: &Path, parts: &[String]) -> Result<Vec<PathBuf>> {
+    let images: Vec<_> = parts
+        .iter()
+        .map(|part| images_in(folder, part))
+        .collect::<Result<_>>()?;
+    Ok(images.concat())
+}
+
+/// The images of a folder, or those that a list names.
+fn images_in(folder: &Path, part: &str) -> Result<Vec<PathBuf>> {
     let path = folder.join(part);
     if part.ends_with(".txt") {
         let from = path.parent().unwrap_or(folder).to_path_buf();
@@ -95,7 +98,7 @@ fn images(folder: &Path, part: &str) -> Result<Vec<PathBuf>> {
         return Ok(text
             .lines()
             .filter(|line| !line.is_empty())
-            .map(|line| plain(&from.join(line)))
+            .map(|line| without_dots(&from.join(line)))
             .collect());
     }
     let entries = std::fs::read_dir(&path).map_err(|e| Error::file(&path, e))?;
@@ -108,8 +111,12 @@ fn images(folder: &Path, part: &str) -> Result<Vec<PathBuf>> {
     Ok(images)
 }
 
+fn first_share(images: &[PathBuf], share: f64) -> Vec<PathBuf> {
+    images[..(images.len() as f64 * share).round() as usize].to_vec()
+}
+
 /// The same path without `.` and `..`.
-fn plain(path: &Path) -> PathBuf {
+fn without_dots(path: &Path) -> PathBuf {
     let mut plain = PathBuf::new();
     for step in path.components() {
         match step {
@@ -130,7 +137,7 @@ pub(crate) fn is_image(path: &Path) -> bool {
 ///
 /// # Errors
 /// When there is none beside it.
-pub(crate) fn record_of(image: &Path) -> Result<Record> {
+pub(crate) fn record_of(image: &Path) -> Result<SampleRecord> {
     let swapped: PathBuf = image
         .iter()
         .map(|step| {

@@ -1,10 +1,13 @@
 //! Joins the shards of a dataset: the folder that a single run would have made.
 
-use crate::dataset::folder::{self, IDENTITY};
-use crate::dataset::journal::{Finished, JOURNAL, Line, numbered_lines_of};
+use crate::dataset::folder::{self, IDENTITY, JOURNAL};
+use crate::dataset::journal::numbered_lines;
+use crate::dataset::journal_line::{JournalLine, WrittenFile};
 use crate::dataset::run::{Progress, check_count, run};
 use crate::dataset::times::Times;
-use crate::dataset::{Inputs, LabelSetup, Numbers, Pictures, Plan, Report, Shard, Sidecar, Writer};
+use crate::dataset::{
+    DatasetCounts, Inputs, LabelConfig, Pictures, Plan, SampleRange, Shard, Sidecar, Writer,
+};
 use crate::error::{Error, Result};
 use crate::io;
 use serde_json::{Map, Value, json};
@@ -30,62 +33,50 @@ pub fn merge(
     folder: &Path,
     progress: &(dyn Fn(Progress) + Sync),
     stop: &AtomicBool,
-) -> Result<Report> {
-    let identity = common(shards)?;
-    let count = identity.count;
-    let mut lines = BTreeMap::new();
-    for (shard, share) in shards.iter().zip(&identity.shares) {
-        lines.extend(
-            lines_in(shard, *share, count)?
-                .into_iter()
-                .map(|line| (line.k, (shard, line))),
-        );
-    }
-    if let Some(k) = (0..count).find(|k| !lines.contains_key(k)) {
-        let shard = shards
-            .iter()
-            .zip(&identity.shares)
-            .find(|(_, share)| share.contains(k));
-        let shard = shard.map_or(folder, |(shard, _)| shard);
+) -> Result<DatasetCounts> {
+    let dataset = ShardedDataset::open(shards)?;
+    let lines = dataset.lines(shards)?;
+    if let Some(k) = (0..dataset.count).find(|k| !lines.contains_key(k)) {
+        let shard = dataset.shard_of(k, shards).unwrap_or(folder);
         return Err(Error::file(
             shard,
             format!("sample {k} is missing: finish this shard first"),
         ));
     }
-    let plan = plan(identity.document, count, folder)?;
-    let copy = |k| {
-        let (shard, line): &(&PathBuf, Line) = &lines[&k];
-        line.files
-            .iter()
-            .try_for_each(|file| copy(shard, folder, file))?;
+    let plan = plan(dataset.document, dataset.count, folder)?;
+    let copy_sample = |k| {
+        let (shard, line): &(&PathBuf, JournalLine) = &lines[&k];
+        for file in &line.files {
+            copy(shard, folder, file)?;
+        }
         Ok((line.clone(), Times::default()))
     };
-    run(&plan, copy, progress, stop)
+    run(&plan, copy_sample, progress, stop)
 }
 
 /// The lines of a shard's journal, all of them as they were written.
-fn lines_in(folder: &Path, shard: Shard, count: u64) -> Result<Vec<Line>> {
-    let wrong = |i, what: String| Error::file(folder.join(JOURNAL), format!("line {i}: {what}"));
-    let mend = "run this shard again with --resume";
-    let checked = |(i, line): (usize, std::result::Result<Line, String>)| match line {
-        Err(what) => Err(wrong(i, format!("{what}; {mend}"))),
-        Ok(line) if line.k >= count || !shard.contains(line.k) => Err(wrong(
-            i,
-            format!(
+fn lines_in(folder: &Path, shard: Shard, count: u64) -> Result<Vec<JournalLine>> {
+    let mut lines = Vec::new();
+    for (i, line) in numbered_lines(folder)? {
+        let problem = match line {
+            Ok(line) if line.k < count && shard.contains(line.k) => {
+                lines.push(line);
+                continue;
+            }
+            Ok(line) => format!(
                 "sample {} is none of shard {shard} of {count} samples",
                 line.k
             ),
-        )),
-        Ok(line) => Ok(line),
-    };
-    numbered_lines_of(folder)?
-        .into_iter()
-        .map(checked)
-        .collect()
+            Err(what) => format!("{what}; run this shard again with --resume"),
+        };
+        let what = format!("line {i}: {problem}");
+        return Err(Error::file(folder.join(JOURNAL), what));
+    }
+    Ok(lines)
 }
 
 /// What all shards say of themselves.
-struct Common {
+struct ShardedDataset {
     /// What the dataset was made from, without the shard.
     document: Map<String, Value>,
     count: u64,
@@ -93,53 +84,90 @@ struct Common {
     shares: Vec<Shard>,
 }
 
-fn common(shards: &[PathBuf]) -> Result<Common> {
-    let mut first: Option<(Value, u64, u64)> = None;
-    let (mut places, mut shares) = (BTreeMap::new(), Vec::new());
-    for (i, path) in shards.iter().enumerate() {
-        let (document, Share { shard, count }) = open(path)?;
-        if let Some((before, of, of_count)) = &first {
-            let said = json!({ "of": of, "count": of_count, "dataset": before });
-            let says = json!({ "of": shard.of, "count": count, "dataset": document });
-            folder::same(&said, &says, "").map_err(|(at, what)| {
-                Error::value(at.trim_start_matches("dataset."), what).in_file(path.join(IDENTITY))
-            })?;
-        } else {
-            first = Some((document, shard.of, count));
+impl ShardedDataset {
+    /// Opens shards, which must be all of one dataset.
+    fn open(folders: &[PathBuf]) -> Result<Self> {
+        let opened: Vec<(Value, ShardShare)> = folders
+            .iter()
+            .map(|folder| open(folder))
+            .collect::<Result<_>>()?;
+        let Some((first, share)) = opened.first() else {
+            return Err(Error::value("shards", "none, expected their folders"));
+        };
+        let (of, count) = (share.shard.of, share.count);
+        for (folder, (document, share)) in folders.iter().zip(&opened) {
+            check_same_dataset((first, of, count), (document, share), folder)?;
         }
-        if let Some(twin) = places.insert(shard.index, i) {
-            return Err(Error::file(
-                path,
-                format!("is shard {shard}, as {} is", shards[twin].display()),
-            ));
-        }
-        shares.push(shard);
+        let shares: Vec<Shard> = opened.iter().map(|(_, share)| share.shard).collect();
+        check_complete(folders, &shares, of)?;
+        Ok(Self {
+            document: first.as_object().cloned().unwrap_or_default(),
+            count,
+            shares,
+        })
     }
-    let (document, of, count) =
-        first.ok_or_else(|| Error::value("shards", "none, expected their folders"))?;
-    if let Some(index) = (1..=of).find(|index| !places.contains_key(index)) {
-        return Err(Error::value(
+
+    /// The lines of all journals by number, each with its shard's folder.
+    fn lines<'a>(
+        &self,
+        folders: &'a [PathBuf],
+    ) -> Result<BTreeMap<u64, (&'a PathBuf, JournalLine)>> {
+        let mut lines = BTreeMap::new();
+        for (folder, share) in folders.iter().zip(&self.shares) {
+            for line in lines_in(folder, *share, self.count)? {
+                lines.insert(line.k, (folder, line));
+            }
+        }
+        Ok(lines)
+    }
+
+    /// The folder of the shard that a sample belongs to.
+    fn shard_of<'a>(&self, k: u64, folders: &'a [PathBuf]) -> Option<&'a Path> {
+        let place = self.shares.iter().position(|share| share.contains(k))?;
+        Some(&folders[place])
+    }
+}
+
+/// Fails where a shard is there twice or not at all.
+fn check_complete(folders: &[PathBuf], shares: &[Shard], of: u64) -> Result<()> {
+    let mut places = BTreeMap::new();
+    for (i, shard) in shares.iter().enumerate() {
+        if let Some(twin) = places.insert(shard.index, i) {
+            let what = format!("is shard {shard}, as {} is", folders[twin].display());
+            return Err(Error::file(&folders[i], what));
+        }
+    }
+    match (1..=of).find(|index| !places.contains_key(index)) {
+        None => Ok(()),
+        Some(index) => Err(Error::value(
             "shards",
             format!("shard {index}/{of} is missing"),
-        ));
+        )),
     }
-    let document = document.as_object().cloned().unwrap_or_default();
-    Ok(Common {
-        document,
-        count,
-        shares,
+}
+
+/// Fails on the first field in which a shard's dataset is not the first shard's.
+fn check_same_dataset(
+    (first, of, count): (&Value, u64, u64),
+    (document, share): (&Value, &ShardShare),
+    folder: &Path,
+) -> Result<()> {
+    let expected = json!({ "of": of, "count": count, "dataset": first });
+    let found = json!({ "of": share.shard.of, "count": share.count, "dataset": document });
+    folder::same(&expected, &found, "").map_err(|(at, what)| {
+        Error::value(at.trim_start_matches("dataset."), what).in_file(folder.join(IDENTITY))
     })
 }
 
 /// What the folder of a shard says of its share.
 #[derive(serde::Deserialize)]
-struct Share {
+struct ShardShare {
     #[serde(flatten)]
     shard: Shard,
     count: u64,
 }
 
-impl Share {
+impl ShardShare {
     /// Fails where there can be no such share.
     fn check(self) -> Result<Self> {
         Shard::new(self.shard.index, self.shard.of)?;
@@ -149,7 +177,7 @@ impl Share {
 }
 
 /// What a shard's folder was made from, and which share it is.
-fn open(path: &Path) -> Result<(Value, Share)> {
+fn open(path: &Path) -> Result<(Value, ShardShare)> {
     let document = folder::identity(path)?;
     let mut document =
         document.ok_or_else(|| Error::file(path, format!("no {IDENTITY}, expected a shard")))?;
@@ -158,34 +186,32 @@ fn open(path: &Path) -> Result<(Value, Share)> {
     folder::of_this_format(&document, path)?;
     let share = serde_json::from_value(share)
         .map_err(|e| Error::value("shard", e))
-        .and_then(Share::check);
+        .and_then(ShardShare::check);
     Ok((document, share.map_err(|e| e.in_file(path.join(IDENTITY)))?))
 }
 
 /// The plan that a dataset was made with, but for where its samples come from.
 fn plan(mut document: Map<String, Value>, count: u64, folder: &Path) -> Result<Plan> {
-    let said: Vec<Map<String, Value>> = field(&mut document, "writers")?;
-    let pictures = match said
-        .iter()
-        .find(|settings| settings.contains_key("pictures"))
-    {
-        Some(settings) => field(&mut settings.clone(), "pictures")?,
+    let settings: Vec<Map<String, Value>> = field(&mut document, "writers")?;
+    let pictures = match settings.iter().find(|map| map.contains_key("pictures")) {
+        Some(map) => field(&mut map.clone(), "pictures")?,
         None => Pictures::default(),
     };
-    let writers = said
+    let writers = settings
         .into_iter()
         .flatten()
-        .map(|(name, settings)| writer(&name, settings, &pictures));
+        .map(|(name, settings)| writer(&name, settings, &pictures))
+        .collect::<Result<_>>()?;
     Ok(Plan {
         folder: folder.into(),
         count,
-        numbers: Numbers::All,
+        range: SampleRange::All,
         seed: field(&mut document, "seed")?,
         recipe: field(&mut document, "recipe")?,
         classes: field(&mut document, "classes")?,
         split: field(&mut document, "split")?,
         obstructed: field(&mut document, "obstructed")?,
-        writers: writers.collect::<Result<_>>()?,
+        writers,
         inputs: Inputs::default(),
     })
 }
@@ -205,13 +231,13 @@ fn writer(name: &str, settings: Value, pictures: &Pictures) -> Result<Box<dyn Wr
         "pictures" => Ok(Box::new(*pictures)),
         "sidecar" => Ok(Box::new(Sidecar)),
         format => {
-            let mut setup = json!({ "formats": [format] });
+            let mut config = json!({ "formats": [format] });
             if settings.as_object().is_some_and(|map| !map.is_empty()) {
-                setup[format] = settings;
+                config[format] = settings;
             }
-            let setup: LabelSetup = serde_json::from_value(setup).map_err(wrong)?;
+            let config: LabelConfig = serde_json::from_value(config).map_err(wrong)?;
             let unknown = || Error::value(format!("writers.{name}"), "no such layout");
-            setup
+            config
                 .writers(pictures)
                 .into_iter()
                 .next()
@@ -221,7 +247,7 @@ fn writer(name: &str, settings: Value, pictures: &Pictures) -> Result<Box<dyn Wr
 }
 
 /// Copies a file, if it is as it was written.
-fn copy(shard: &Path, folder: &Path, file: &Finished) -> Result<()> {
+fn copy(shard: &Path, folder: &Path, file: &WrittenFile) -> Result<()> {
     let (from, to) = (
         io::inside(shard, &file.path)?,
         io::below(folder, &file.path)?,

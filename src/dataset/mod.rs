@@ -1,6 +1,6 @@
 //! Dataset: images and labels in the layouts that trainers read.
 //!
-//! A [`Studio`] opens what a recipe file ([`Setup`]) names and makes sample `k` of it: draws the scene, lets it settle,
+//! A [`Pipeline`] opens what a recipe file ([`DatasetConfig`]) names and makes sample `k` of it: draws the scene, lets it settle,
 //! lights, renders and labels it.
 //!
 //! [`generate`] makes samples, many at a time, and hands each to [`Writer`]s: [`Pictures`] writes the images, [`Sidecar`]
@@ -16,37 +16,38 @@
 //! index.jsonl                    one line for each finished sample
 //! ```
 
+mod background_photo;
 mod check;
 mod coco;
+mod config;
 mod contact_sheet;
+mod counts;
+mod environment_maps;
 mod estimate;
+mod finding;
 mod fingerprint;
 mod folder;
 mod formats;
 mod generate;
-#[cfg(feature = "settle")]
-mod hanging;
 mod inputs;
 mod journal;
+mod journal_line;
 mod layers;
 mod listing;
 mod merge;
-mod near;
+mod near_duplicates;
 mod obstructed;
 pub mod page;
+mod partition;
 mod pictures;
-mod place;
+mod pipeline;
 mod quality;
 mod run;
-mod scene_setup;
-mod setup;
+mod scene_config;
 mod shard;
-mod sharing;
 mod sidecar;
 mod split;
-mod studio;
 mod summary;
-mod surroundings;
 mod times;
 mod voc;
 mod webdataset;
@@ -54,33 +55,35 @@ mod yolo;
 mod yolo_set;
 mod yolo_yaml;
 
-pub use check::{Checked, Fault, check};
+pub use check::{Checked, check};
 pub use coco::{Coco, CocoMask};
-pub use contact_sheet::{SheetOptions, Tile, contact_sheet, contact_sheet_of};
+pub use config::DatasetConfig;
+pub use contact_sheet::{ContactSheetOptions, ContactTile, contact_sheet, contact_sheet_of};
+pub use counts::{ClassCount, DatasetCounts};
 pub use estimate::LongRun;
-pub use formats::{Extent, Format, LabelSetup};
+pub use finding::Finding;
+#[doc(hidden)]
+pub use folder::JOURNAL;
+pub use formats::{Extent, Format, LabelConfig};
 pub use generate::{Plan, generate};
 pub use inputs::Inputs;
-#[doc(hidden)]
-pub use journal::JOURNAL;
 #[cfg(feature = "fuzzing")]
-pub(crate) use journal::read as journal_lines;
-pub use journal::{ClassCount, Report, mend};
+pub(crate) use journal::read_lines as journal_lines;
+pub use journal::repair;
 pub use layers::Layers;
 pub use listing::Listing;
 pub(crate) use listing::is_image;
 pub use merge::merge;
-pub use near::{NEAR_CODES, Near};
-pub use obstructed::{Labelled, OBSTRUCTED, Obstructed};
+pub use near_duplicates::{NEAR_DUPLICATE_RMS, NearDuplicate};
+pub use obstructed::{LabelledObject, OBSTRUCTED, Obstructed};
+pub use partition::{Group, Leakage, Partition};
 pub use pictures::{PictureFormat, Pictures};
+pub use pipeline::Pipeline;
 pub use run::Progress;
-pub use setup::Setup;
-pub use shard::{Numbers, Shard, ShardChoice};
-pub use sharing::{Group, Leaks, Sharing};
-pub use sidecar::{Record, Sidecar};
+pub use shard::{SampleRange, Shard, ShardChoice};
+pub use sidecar::{SampleRecord, Sidecar};
 pub use split::{Part, Split, SplitOrder};
-pub use studio::Studio;
-pub use summary::{Glance, NoLabel, Shown, Summary};
+pub use summary::{SampleSummary, ShownSample, Summary, UnlabelledReason};
 pub use times::Times;
 pub use voc::Voc;
 pub use webdataset::WebDataset;
@@ -106,13 +109,13 @@ pub struct Sample {
     pub deep: DeepImage,
     /// What is where in it.
     pub labels: Labels,
-    /// What was drawn: objects still in the air, exposure still open.
+    /// What was drawn: objects not settled yet, exposure still open.
     pub drawn: Scene,
     /// What that became, with nothing left open.
     pub scene: Scene,
-    /// Seed that the scene was drawn with: the dataset's own, unless scenes were thrown away.
+    /// Seed that the scene was drawn with: the dataset's own, unless scenes were rejected.
     pub scene_seed: u64,
-    /// Why each scene that was drawn before this one was thrown away.
+    /// Why each scene that was drawn before this one was rejected.
     pub rejected: Vec<String>,
     /// Every draw that the scene was made with, in order.
     pub draws: Vec<Drawn>,
@@ -136,7 +139,7 @@ pub struct Entry<'a> {
     /// The sample.
     pub sample: &'a Sample,
     /// The objects that get a label, in order of id.
-    pub labelled: &'a [Labelled<'a>],
+    pub labelled: &'a [LabelledObject<'a>],
 }
 
 impl Entry<'_> {

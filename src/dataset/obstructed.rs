@@ -25,7 +25,7 @@ pub enum Obstructed {
 
 /// An object that gets a label.
 #[derive(Clone, Copy, Debug)]
-pub struct Labelled<'a> {
+pub struct LabelledObject<'a> {
     /// The object.
     pub object: &'a ObjectLabel,
     /// Class that it is labelled as.
@@ -54,7 +54,7 @@ impl Obstructed {
     }
 
     /// The objects that get a label, `class_count` classes of labels being there.
-    pub fn labelled(self, labels: &Labels, class_count: usize) -> Vec<Labelled<'_>> {
+    pub fn labelled(self, labels: &Labels, class_count: usize) -> Vec<LabelledObject<'_>> {
         labels
             .objects
             .iter()
@@ -62,8 +62,8 @@ impl Obstructed {
             .collect()
     }
 
-    fn label(self, object: &ObjectLabel, class_count: usize) -> Option<Labelled<'_>> {
-        let plain = Labelled {
+    fn label(self, object: &ObjectLabel, class_count: usize) -> Option<LabelledObject<'_>> {
+        let plain = LabelledObject {
             object,
             class: object.class,
             ignored: false,
@@ -72,11 +72,11 @@ impl Obstructed {
             _ if object.is_topmost() => Some(plain),
             Self::Drop => None,
             Self::Keep => Some(plain),
-            Self::Ignore => Some(Labelled {
+            Self::Ignore => Some(LabelledObject {
                 ignored: true,
                 ..plain
             }),
-            Self::Class => Some(Labelled {
+            Self::Class => Some(LabelledObject {
                 class: class_count.saturating_sub(1) as u32,
                 ..plain
             }),

@@ -5,7 +5,7 @@
 //! gained: colour transfer, the keyer, labels (masks and boxes), and the camera, which is solved to its end in a fifth of a
 //! millisecond.
 
-use crate::dataset::{Pictures, Setup};
+use crate::dataset::{DatasetConfig, Pictures};
 use crate::error::{Error, Result};
 use crate::matte::{CutOutOptions, SegmentOptions};
 use crate::plot::Table;
@@ -19,24 +19,24 @@ impl Quality {
         self.into()
     }
 
-    /// Settle options with the solver's steps changed; what a fall is, and what is believed of its end, stay.
+    /// Settle options with the solver's steps changed; what a fall is, and when it ends, stay.
     pub fn settle(self, options: SettleOptions) -> SettleOptions {
-        let usual = SettleOptions::default();
-        let step = self.of([1.0 / 240.0, usual.step, 1.0 / 1920.0]);
-        let iterations = self.of([4, usual.iterations, 8]);
+        let default = SettleOptions::default();
+        let step = self.of([1.0 / 240.0, default.step, 1.0 / 1920.0]);
+        let iterations = self.of([4, default.iterations, 8]);
         SettleOptions {
             step,
             iterations,
-            ccd: usual.ccd,
+            ccd: default.ccd,
             ..options
         }
     }
 
     /// Cut-out options with the sizes of the searched photo and of the cut-out changed.
     pub fn cut_out(self, options: CutOutOptions) -> CutOutOptions {
-        let usual = CutOutOptions::default();
-        let working_size = self.of([320, usual.segment.working_size, 1280]);
-        let longest_side = self.of([1024, usual.longest_side, 4096]);
+        let default = CutOutOptions::default();
+        let working_size = self.of([320, default.segment.working_size, 1280]);
+        let longest_side = self.of([1024, default.longest_side, 4096]);
         CutOutOptions {
             segment: SegmentOptions {
                 working_size,
@@ -55,12 +55,12 @@ impl Quality {
         }
     }
 
-    /// A dataset's setup with every approximate stage of a run at this quality.
-    pub fn setup(self, mut setup: Setup) -> Setup {
-        setup.render = self.render();
-        setup.scene.settle = self.settle(setup.scene.settle);
-        setup.pictures = self.pictures(setup.pictures);
-        setup
+    /// A dataset's config with every approximate stage of a run at this quality.
+    pub fn config(self, mut config: DatasetConfig) -> DatasetConfig {
+        config.render = self.render();
+        config.scene.settle = self.settle(config.scene.settle);
+        config.pictures = self.pictures(config.pictures);
+        config
     }
 
     /// The setting of each stage: a row a setting, a column a quality.
@@ -72,49 +72,69 @@ impl Quality {
             "normal (the default)",
             "reference",
         ]);
-        let mut row = |stage: &str, setting: &str, value: &dyn Fn(Self) -> String| {
-            let values = Self::ALL.map(value);
+        for (stage, setting, value) in SETTINGS {
+            let values = Self::ALL.map(|quality| value(&StageSettings::new(quality)));
             table.push([stage, setting].map(String::from).into_iter().chain(values));
-        };
-        let cut_out = |q: Self| q.cut_out(CutOutOptions::default());
-        let settle = |q: Self| q.settle(SettleOptions::default());
-        row("matte", "longer side that is searched, px", &|q| {
-            cut_out(q).segment.working_size.to_string()
-        });
-        row("matte", "longer side of a cut-out, px", &|q| {
-            cut_out(q).longest_side.to_string()
-        });
-        row("settle", "time step, s", &|q| {
-            format!("1/{}", libm::round(1.0 / settle(q).step))
-        });
-        row("settle", "iterations in a step", &|q| {
-            settle(q).iterations.to_string()
-        });
-        row("light, shadow", "samples of a light", &|q| {
-            square(q.render().light_samples)
-        });
-        row("light, shadow", "directions of the sky", &|q| {
-            q.render().ambient_samples.to_string()
-        });
-        row(
-            "light, shadow",
-            "distance of irradiance samples, px",
-            &|q| q.render().cell_px.to_string(),
-        );
-        row("render", "samples of a pixel", &|q| {
-            square(q.render().subsamples)
-        });
-        row("encode", "files of a picture", &|q| {
-            if q.pictures(Pictures::default()).exr {
-                "PNG of 8 bits, EXR of half floats"
-            } else {
-                "PNG of 8 bits"
-            }
-            .into()
-        });
+        }
         table
     }
 }
+
+/// The options of every approximate stage at one quality.
+struct StageSettings {
+    cut_out: CutOutOptions,
+    settle: SettleOptions,
+    render: RenderOptions,
+    pictures: Pictures,
+}
+
+impl StageSettings {
+    fn new(quality: Quality) -> Self {
+        Self {
+            cut_out: quality.cut_out(CutOutOptions::default()),
+            settle: quality.settle(SettleOptions::default()),
+            render: quality.render(),
+            pictures: quality.pictures(Pictures::default()),
+        }
+    }
+}
+
+/// Stage, name and value of a setting.
+type Setting = (&'static str, &'static str, fn(&StageSettings) -> String);
+
+const SETTINGS: [Setting; 9] = [
+    ("matte", "longer side that is searched, px", |s| {
+        s.cut_out.segment.working_size.to_string()
+    }),
+    ("matte", "longer side of a cut-out, px", |s| {
+        s.cut_out.longest_side.to_string()
+    }),
+    ("settle", "time step, s", |s| {
+        format!("1/{}", libm::round(1.0 / s.settle.step))
+    }),
+    ("settle", "iterations in a step", |s| {
+        s.settle.iterations.to_string()
+    }),
+    ("light, shadow", "samples of a light", |s| {
+        square(s.render.light_samples)
+    }),
+    ("light, shadow", "directions of the sky", |s| {
+        s.render.ambient_samples.to_string()
+    }),
+    ("light, shadow", "distance of irradiance samples, px", |s| {
+        s.render.cell_px.to_string()
+    }),
+    ("render", "samples of a pixel", |s| {
+        square(s.render.subsamples)
+    }),
+    ("encode", "files of a picture", |s| {
+        if s.pictures.exr {
+            "PNG of 8 bits, EXR of half floats".into()
+        } else {
+            "PNG of 8 bits".into()
+        }
+    }),
+];
 
 fn square(side: usize) -> String {
     format!("{side} x {side}")
@@ -145,7 +165,10 @@ mod tests {
     #[test]
     fn normal_is_the_default_of_every_stage() {
         assert_eq!(Quality::default(), Quality::Normal);
-        assert_eq!(Quality::Normal.setup(Setup::default()), Setup::default());
+        assert_eq!(
+            Quality::Normal.config(DatasetConfig::default()),
+            DatasetConfig::default()
+        );
         assert_eq!(
             Quality::Normal.cut_out(CutOutOptions::default()),
             CutOutOptions::default()
@@ -164,13 +187,13 @@ mod tests {
             (settled.gravity, settled.attempts),
             (odd.gravity, odd.attempts)
         );
-        let mut setup = Setup::default();
-        setup.scene.objects = crate::scene::Range::fixed(3.0);
-        setup.pictures.exr = true;
-        let draft = Quality::Draft.setup(setup.clone());
+        let mut config = DatasetConfig::default();
+        config.scene.objects = crate::scene::Range::fixed(3.0);
+        config.pictures.exr = true;
+        let draft = Quality::Draft.config(config.clone());
         assert_eq!(
             (draft.scene.objects, draft.labels.clone(), draft.pictures),
-            (setup.scene.objects, setup.labels, setup.pictures)
+            (config.scene.objects, config.labels, config.pictures)
         );
         assert_eq!(draft.render, Quality::Draft.render());
     }
@@ -201,19 +224,19 @@ mod tests {
                 .map(|row| row[2 + quality].clone())
         };
         for (i, quality) in Quality::ALL.into_iter().enumerate() {
-            let setup = quality.setup(Setup::default());
-            let sides = setup.render.subsamples;
+            let config = quality.config(DatasetConfig::default());
+            let sides = config.render.subsamples;
             assert_eq!(
                 cell("samples of a pixel", i),
                 Some(format!("{sides} x {sides}"))
             );
             assert_eq!(
                 cell("iterations in a step", i),
-                Some(setup.scene.settle.iterations.to_string())
+                Some(config.scene.settle.iterations.to_string())
             );
             assert_eq!(
                 cell("files of a picture", i).map(|t| t.contains("EXR")),
-                Some(setup.pictures.exr)
+                Some(config.pictures.exr)
             );
         }
     }

@@ -1,9 +1,10 @@
 //! One run over a dataset's folder: many samples at a time, each entered in the journal when its files are there.
 
 use crate::dataset::folder;
-use crate::dataset::journal::{Journal, Line};
+use crate::dataset::journal::Journal;
+use crate::dataset::journal_line::JournalLine;
 use crate::dataset::times::Times;
-use crate::dataset::{Numbers, Plan, Report};
+use crate::dataset::{DatasetCounts, Plan, SampleRange};
 use crate::error::{Error, Result};
 use crate::io;
 use crate::work;
@@ -12,7 +13,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 /// Samples between two calls that bring everything to the disk.
-const SYNC_EVERY: u64 = 256;
+const SAMPLES_PER_SYNC: u64 = 256;
 
 /// How far a run is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,15 +27,15 @@ pub struct Progress {
 }
 
 /// Most samples that a dataset may have: a number above is a slip of the finger, and no sum of counts can overflow.
-const MOST_SAMPLES: u64 = 1_000_000_000;
+const MAX_SAMPLES: u64 = 1_000_000_000;
 
 /// Fails for a number of samples that nobody can mean.
 pub(super) fn check_count(count: u64) -> Result<()> {
-    match count <= MOST_SAMPLES {
+    match count <= MAX_SAMPLES {
         true => Ok(()),
         false => Err(Error::value(
             "count",
-            format!("{count} samples, expected at most {MOST_SAMPLES}"),
+            format!("{count} samples, expected at most {MAX_SAMPLES}"),
         )),
     }
 }
@@ -43,60 +44,48 @@ pub(super) fn check_count(count: u64) -> Result<()> {
 /// files of a sample in their places.
 pub(super) fn run(
     plan: &Plan,
-    write: impl Fn(u64) -> Result<(Line, Times)> + Sync,
+    write: impl Fn(u64) -> Result<(JournalLine, Times)> + Sync,
     progress: &(dyn Fn(Progress) + Sync),
     stop: &AtomicBool,
-) -> Result<Report> {
+) -> Result<DatasetCounts> {
     check_count(plan.count)?;
     let _lock = folder::claim(plan)?;
     plan.inputs.keep(&plan.folder);
     let journal = Journal::open(&plan.folder)?;
-    let again = matches!(plan.numbers, Numbers::One(_));
+    let again = matches!(plan.range, SampleRange::One(_));
     // One sample is made again whatever the number of the others.
     let count = if again {
         plan.count.max(journal.end())
     } else {
         plan.count
     };
-    nothing_beyond(&journal, count, plan)?;
-    let done = journal.count(count, |k| plan.numbers.contains(k));
-    let asked = plan.numbers.count_below(count);
-    let missing = if again {
-        asked
-    } else {
-        asked.saturating_sub(done)
-    };
-    let next = Mutex::new(plan.numbers.below(count));
-    let progressed = Progress {
-        done,
-        count: asked,
-        made: 0,
-    };
-    let books = Mutex::new(Books {
-        journal,
-        progressed,
-        times: Times::default(),
-        failure: None,
-    });
+    check_nothing_beyond(&journal, count, plan)?;
     let run = Run {
         plan,
         count,
         write,
         progress,
         stop,
-        books,
+        state: Mutex::new(RunState::new(journal, plan, count)),
         began: Instant::now(),
     };
-    run.tell(&run.books());
+    run.report(&run.state());
+    let Progress { done, count, .. } = run.state().progress;
+    let missing = if again {
+        count
+    } else {
+        count - done.min(count)
+    };
+    let next = Mutex::new(plan.range.below(run.count));
     run.work(missing, || {
         let mut next = next.lock().unwrap_or_else(PoisonError::into_inner);
-        next.find(|&k| again || !run.books().journal.has(k))
+        next.find(|&k| again || !run.state().journal.has(k))
     })?;
     run.finish()
 }
 
 /// Fails where the folder holds more than is asked for: trainers read all that is there.
-fn nothing_beyond(journal: &Journal, count: u64, plan: &Plan) -> Result<()> {
+fn check_nothing_beyond(journal: &Journal, count: u64, plan: &Plan) -> Result<()> {
     let end = journal.end();
     if end <= count {
         return Ok(());
@@ -117,117 +106,141 @@ struct Run<'a, F> {
     write: F,
     progress: &'a (dyn Fn(Progress) + Sync),
     stop: &'a AtomicBool,
-    books: Mutex<Books>,
+    state: Mutex<RunState>,
     began: Instant,
 }
 
 /// What is done, and what went wrong first (in order of number).
-struct Books {
+struct RunState {
     journal: Journal,
-    progressed: Progress,
+    progress: Progress,
     times: Times,
     failure: Option<(u64, Error)>,
 }
 
-impl<F: Fn(u64) -> Result<(Line, Times)> + Sync> Run<'_, F> {
+impl<F: Fn(u64) -> Result<(JournalLine, Times)> + Sync> Run<'_, F> {
     /// Makes samples until `next` has none, of the `missing` ones, or there is a reason to stop.
     fn work(&self, missing: u64, next: impl Fn() -> Option<u64> + Sync) -> Result<()> {
         let threads = rayon::current_num_threads();
         let workers = threads.min(usize::try_from(missing).unwrap_or(threads));
-        let pool = |_| work::pool(threads / workers.max(1));
-        let pools: std::io::Result<Vec<_>> = (0..workers).map(pool).collect();
-        let pools = pools.map_err(|e| Error::value("threads", e))?;
-        let take = || if self.goes_on() { next() } else { None };
+        let pools = (0..workers)
+            .map(|_| work::pool(threads / workers.max(1)))
+            .collect::<std::io::Result<Vec<_>>>()
+            .map_err(|e| Error::value("threads", e))?;
         std::thread::scope(|scope| {
             for pool in &pools {
-                scope.spawn(|| pool.install(|| std::iter::from_fn(take).for_each(|k| self.one(k))));
+                scope.spawn(|| {
+                    pool.install(|| {
+                        while let Some(k) = self.goes_on().then(&next).flatten() {
+                            self.make_one(k);
+                        }
+                    });
+                });
             }
         });
         Ok(())
     }
 
     fn goes_on(&self) -> bool {
-        !self.stop.load(Ordering::Relaxed) && self.books().failure.is_none()
+        !self.stop.load(Ordering::Relaxed) && self.state().failure.is_none()
     }
 
-    /// Writes one sample, then enters it in the books.
-    fn one(&self, k: u64) {
+    /// Writes one sample, then enters it in the state.
+    fn make_one(&self, k: u64) {
         let written = (self.write)(k);
-        let mut books = self.books();
-        match written.and_then(|(line, times)| books.enter(line, times)) {
+        let mut state = self.state();
+        match written.and_then(|(line, times)| state.enter(line, times)) {
             Ok(()) => {
-                self.tell(&books);
-                let due = books.progressed.made.is_multiple_of(SYNC_EVERY);
-                drop(books);
+                self.report(&state);
+                let due = state.progress.made.is_multiple_of(SAMPLES_PER_SYNC);
+                drop(state);
                 if due {
                     io::sync(&self.plan.folder);
                 }
             }
             // Not this sample's fault: it is made by the run that goes on.
             Err(Error::Interrupted { .. }) if self.stop.load(Ordering::Relaxed) => {}
-            Err(e) if books.failure.as_ref().is_none_or(|(first, _)| k < *first) => {
-                books.failure = Some((k, e))
+            Err(e) if state.failure.as_ref().is_none_or(|(first, _)| k < *first) => {
+                state.failure = Some((k, e))
             }
             Err(_) => {}
         }
     }
 
-    fn tell(&self, books: &Books) {
-        (self.progress)(books.progressed);
+    fn report(&self, state: &RunState) {
+        (self.progress)(state.progress);
     }
 
-    fn books(&self) -> MutexGuard<'_, Books> {
-        // A thread that panicked left the books as they were: every entry is one step.
-        self.books.lock().unwrap_or_else(PoisonError::into_inner)
+    fn state(&self) -> MutexGuard<'_, RunState> {
+        // A thread that panicked left the state as it was: every entry is one step.
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Closes the books, whatever happened, then says what did.
-    fn finish(self) -> Result<Report> {
+    /// Closes the state, whatever happened, then says what did.
+    fn finish(self) -> Result<DatasetCounts> {
         let (plan, count, wall) = (self.plan, self.count, self.began.elapsed());
-        let Books {
+        let RunState {
             journal,
-            progressed: Progress { made, .. },
+            progress: Progress { made, .. },
             times,
             failure,
         } = self
-            .books
+            .state
             .into_inner()
             .unwrap_or_else(PoisonError::into_inner);
         io::sync(&plan.folder);
         times.append(&plan.folder, made, wall);
-        let (done, asked) = (
-            journal.count(count, |k| plan.numbers.contains(k)),
-            plan.numbers.count_below(count),
-        );
-        let state = format!(
+        let done = journal.count(count, |k| plan.range.contains(k));
+        let asked = plan.range.count_below(count);
+        let status = format!(
             "{done} of {asked} samples are in {}; the same command goes on",
             plan.folder.display()
         );
         let closed = journal.close(count);
         if let Some((k, error)) = failure {
-            log::warn!("sample {k} failed; {state}");
+            log::warn!("sample {k} failed; {status}");
             return Err(error);
         }
         let lines = closed?;
         if done < asked {
-            return Err(Error::Interrupted { what: state });
+            return Err(Error::Interrupted { what: status });
         }
         if lines.len() as u64 == count {
-            let samples: Vec<_> = lines.iter().map(Line::written).collect();
-            plan.writers
-                .iter()
-                .try_for_each(|writer| writer.finish(&plan.folder, &plan.classes, &samples))?;
+            join_samples(plan, &lines)?;
         }
-        Ok(Report::of(&lines, plan, count, made))
+        Ok(DatasetCounts::new(&lines, plan, count, made))
     }
 }
 
-impl Books {
-    fn enter(&mut self, line: Line, times: Times) -> Result<()> {
-        let Progress { done, count, made } = self.progressed;
+/// Writes the files that hold many samples.
+fn join_samples(plan: &Plan, lines: &[JournalLine]) -> Result<()> {
+    let samples: Vec<_> = lines.iter().map(JournalLine::written).collect();
+    plan.writers
+        .iter()
+        .try_for_each(|writer| writer.finish(&plan.folder, &plan.classes, &samples))
+}
+
+impl RunState {
+    /// The state before a run's first sample.
+    fn new(journal: Journal, plan: &Plan, count: u64) -> Self {
+        let progress = Progress {
+            done: journal.count(count, |k| plan.range.contains(k)),
+            count: plan.range.count_below(count),
+            made: 0,
+        };
+        Self {
+            journal,
+            progress,
+            times: Times::default(),
+            failure: None,
+        }
+    }
+
+    fn enter(&mut self, line: JournalLine, times: Times) -> Result<()> {
+        let Progress { done, count, made } = self.progress;
         let new = u64::from(!self.journal.has(line.k));
         self.journal.add(line)?;
-        self.progressed = Progress {
+        self.progress = Progress {
             done: done + new,
             count,
             made: made + 1,

@@ -7,7 +7,7 @@ use std::str::FromStr;
 
 /// Which samples of a dataset a run makes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Numbers {
+pub enum SampleRange {
     /// All that are missing.
     #[default]
     All,
@@ -17,7 +17,7 @@ pub enum Numbers {
     One(u64),
 }
 
-impl Numbers {
+impl SampleRange {
     /// Sample `k` is one of them.
     pub fn contains(self, k: u64) -> bool {
         match self {
@@ -227,12 +227,12 @@ mod tests {
 
     #[test]
     fn numbers_are_counted_without_counting() {
-        let shard = |index, of| Numbers::Shard(Shard { index, of });
+        let shard = |index, of| SampleRange::Shard(Shard { index, of });
         for numbers in [
-            Numbers::All,
-            Numbers::One(0),
-            Numbers::One(7),
-            Numbers::One(49),
+            SampleRange::All,
+            SampleRange::One(0),
+            SampleRange::One(7),
+            SampleRange::One(49),
             shard(1, 3),
             shard(3, 3),
             shard(9, 9),
@@ -252,13 +252,13 @@ mod tests {
             }
         }
         assert_eq!(
-            Numbers::One(u64::MAX - 1)
+            SampleRange::One(u64::MAX - 1)
                 .below(u64::MAX)
                 .collect::<Vec<_>>(),
             [u64::MAX - 1]
         );
         assert_eq!(
-            Numbers::Shard(Shard {
+            SampleRange::Shard(Shard {
                 index: 2,
                 of: u64::MAX
             })

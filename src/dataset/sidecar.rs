@@ -10,21 +10,21 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Writes `scenes/{train,val}/NNNNNN.json`, a [`Record`] each: label formats forget most of what is known of a picture,
+/// Writes `scenes/{train,val}/NNNNNN.json`, a [`SampleRecord`] each: label formats forget most of what is known of a picture,
 /// this one nothing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Sidecar;
 
 /// What a sidecar file says.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Record {
+pub struct SampleRecord {
     /// Version of the program that made the sample.
     pub petcomp: String,
     /// Hash of the recipe and of the files it names.
     pub recipe_hash: String,
     /// Seed of the dataset.
     pub seed: u64,
-    /// Seed that the scene was drawn with: the dataset's own, unless scenes were thrown away.
+    /// Seed that the scene was drawn with: the dataset's own, unless scenes were rejected.
     pub scene_seed: u64,
     /// Number of the sample.
     pub index: u64,
@@ -34,15 +34,15 @@ pub struct Record {
     pub labelled: Vec<ObjectId>,
     /// Objects that nothing lies over, by the topmost rule.
     pub topmost: Vec<ObjectId>,
-    /// Objects that lie over each other in a circle.
+    /// Objects in cyclic overlap.
     pub knotted: Vec<ObjectId>,
-    /// Why each scene that was drawn before this one was thrown away.
+    /// Why each scene that was drawn before this one was rejected.
     pub rejected: Vec<String>,
     /// Every drawn value by the name of its draw.
     pub draws: BTreeMap<String, f64>,
     /// What is where in the picture.
     pub labels: Labels,
-    /// What the draws gave: objects still in the air, exposure still open.
+    /// What the draws gave: objects not settled yet, exposure still open.
     pub drawn: Scene,
     /// What the picture was made from: camera, resting poses, lights, exposure.
     pub scene: Scene,
@@ -62,12 +62,12 @@ impl Writer for Sidecar {
 
     fn write(&self, folder: &Path, entry: &Entry<'_>) -> Result<Vec<PathBuf>> {
         let path = entry.path("scenes", "json");
-        io::write_json(folder.join(&path), &Record::of(entry))?;
+        io::write_json(folder.join(&path), &SampleRecord::of(entry))?;
         Ok(vec![path])
     }
 }
 
-impl Record {
+impl SampleRecord {
     /// What there is to say of an entry.
     fn of(entry: &Entry<'_>) -> Self {
         let Sample {

@@ -1,14 +1,15 @@
 //! Everything a dataset on disk tells of itself, gathered for a report.
 
-use crate::dataset::folder::{self, IDENTITY};
-use crate::dataset::journal::{Line, lines_of};
+use crate::dataset::folder;
+use crate::dataset::journal::lines_of;
+use crate::dataset::journal_line::JournalLine;
 use crate::dataset::times::{RunTimes, runs_of};
-use crate::dataset::{Part, Record};
-use crate::error::{Error, Result};
+use crate::dataset::{Part, SampleRecord};
+use crate::error::Result;
 use crate::geom::BBox;
 use crate::io;
 use crate::label::ObjectLabel;
-use crate::scene::Recipe;
+use crate::scene::{Recipe, Scene};
 use rayon::prelude::*;
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -33,21 +34,21 @@ pub struct Summary {
     pub boxes: Vec<[f64; 2]>,
     /// Objects and labels of each class, of both parts.
     pub balance: Vec<[[u64; 2]; 2]>,
-    /// Scenes thrown away: number of the sample, and why.
+    /// Rejected scenes: number of the sample, and why.
     pub rejected: Vec<(u64, String)>,
     /// The runs that wrote it.
     pub(crate) runs: Vec<RunTimes>,
     /// How many objects have no label, by the reason.
-    pub unlabelled: BTreeMap<NoLabel, u64>,
+    pub unlabelled: BTreeMap<UnlabelledReason, u64>,
     /// Seen share of each object without a label, 0 to 1.
     pub unlabelled_visible: Vec<f64>,
     /// All samples, in order of number.
-    pub glances: Vec<Glance>,
+    pub glances: Vec<SampleSummary>,
 }
 
 /// What a sample is like in a few numbers.
 #[derive(Clone, Debug)]
-pub struct Glance {
+pub struct SampleSummary {
     /// Its number.
     pub index: u64,
     /// The part that it belongs to.
@@ -62,13 +63,13 @@ pub struct Glance {
     pub labels: Vec<(u32, BBox)>,
     /// Seen share of the object with a label that is seen least; 1 where there is none.
     pub least_visible: f64,
-    /// How many scenes were thrown away before this one.
+    /// How many scenes were rejected before this one.
     pub rejected: usize,
 }
 
 /// Why an object has no label.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum NoLabel {
+pub enum UnlabelledReason {
     /// Another lies over it, by the topmost rule.
     Covered,
     /// Nothing of it lies in the picture.
@@ -77,9 +78,18 @@ pub enum NoLabel {
     LeftOut,
 }
 
-impl NoLabel {
+impl UnlabelledReason {
+    /// In words.
+    pub(crate) fn description(self) -> &'static str {
+        match self {
+            Self::Covered => "another object lies over it",
+            Self::Outside => "nothing of it lies in the picture",
+            Self::LeftOut => "left out by the recipe",
+        }
+    }
+
     /// None for an object with a label.
-    pub fn of(object: &ObjectLabel, record: &Record) -> Option<Self> {
+    pub fn of(object: &ObjectLabel, record: &SampleRecord) -> Option<Self> {
         let labelled = record.labelled.contains(&object.id);
         match (labelled, object.amodal_box.is_empty(), object.is_topmost()) {
             (_, true, _) => Some(Self::Outside),
@@ -92,18 +102,20 @@ impl NoLabel {
 
 /// A sample to look at.
 #[derive(Clone, Debug)]
-pub struct Shown {
+pub struct ShownSample {
     /// Its picture.
     pub picture: PathBuf,
     /// What is known of it.
-    pub record: Record,
+    pub record: SampleRecord,
 }
 
-/// What one sample adds.
-struct Told {
+/// One sample of the dataset.
+struct ReadSample {
     k: u64,
     part: Part,
-    record: Record,
+    record: SampleRecord,
+    /// Its picture and its record below the dataset's folder.
+    files: [String; 2],
 }
 
 impl Summary {
@@ -112,14 +124,31 @@ impl Summary {
     /// # Errors
     /// A folder that is no dataset, or was written without its sidecars.
     pub fn read(folder: &Path) -> Result<Self> {
-        let identity = folder::identity(folder)?;
-        let identity = identity
-            .ok_or_else(|| Error::file(folder, format!("no {IDENTITY}, expected a dataset")))?;
+        let mut summary = Self::empty(folder)?;
         let lines = lines_of(folder)?;
+        summary.images =
+            Part::ALL.map(|part| lines.iter().filter(|line| line.part == part).count());
+        // In batches, so that no more records are in memory than threads can read at a time.
+        for batch in lines.chunks(RECORDS_PER_BATCH) {
+            let samples: Vec<ReadSample> = batch
+                .par_iter()
+                .map(|line| ReadSample::read(folder, line))
+                .collect::<Result<_>>()?;
+            for (sample, line) in samples.into_iter().zip(batch) {
+                summary.add(&sample, line);
+                summary.glances.push(SampleSummary::new(sample));
+            }
+        }
+        Ok(summary)
+    }
+
+    /// A dataset of which no sample was read yet.
+    fn empty(folder: &Path) -> Result<Self> {
+        let identity = folder::known_identity(folder)?;
         let classes: Vec<String> =
             serde_json::from_value(identity["classes"].clone()).unwrap_or_default();
-        let mut summary = Self {
-            images: Part::ALL.map(|part| lines.iter().filter(|line| line.part == part).count()),
+        Ok(Self {
+            images: [0; 2],
             balance: vec![[[0; 2]; 2]; classes.len()],
             identity,
             classes,
@@ -131,105 +160,102 @@ impl Summary {
             runs: runs_of(folder),
             unlabelled: BTreeMap::new(),
             unlabelled_visible: Vec::new(),
-            glances: Vec::with_capacity(lines.len()),
-        };
-        // In steps, so that no more records are in memory than threads can read at a time.
-        for part in lines.chunks(STEP) {
-            let told: Result<Vec<_>> = part.par_iter().map(|line| told(folder, line)).collect();
-            for (told, line) in told?.into_iter().zip(part) {
-                summary.add(&told, line);
-                let files = [
-                    name(folder, line, "images/")?,
-                    name(folder, line, "scenes/")?,
-                ];
-                summary.glances.push(Glance::of(&told, files));
-            }
-        }
-        Ok(summary)
+            glances: Vec::new(),
+        })
     }
 
     /// A sample to look at, by its place among the glances.
     ///
     /// # Errors
     /// A record that cannot be read.
-    pub fn shown(&self, folder: &Path, place: usize) -> Result<Shown> {
+    pub fn shown(&self, folder: &Path, place: usize) -> Result<ShownSample> {
         let [picture, record] = self.glances[place]
             .files
             .each_ref()
             .map(|file| folder.join(file));
-        Ok(Shown {
+        Ok(ShownSample {
             picture,
             record: io::read_json(record)?,
         })
     }
 
-    /// The distribution of a drawn number: least and greatest value, and whether it is a whole number.
+    /// The distribution of a drawn number: least and greatest value, and whether it is an integer.
     pub fn range(&self, key: &str) -> Option<([f64; 2], bool)> {
         let recipe: Recipe =
             serde_json::from_value(self.identity["recipe"]["scene"].clone()).ok()?;
         let recipe = serde_json::to_value(recipe.narrowed()).ok()?;
         let pointer = format!("/{}", key.replace(['.', '['], "/").replace(']', ""));
-        let value = recipe.pointer(&pointer)?;
-        let number = |value: &Value| value.as_f64();
-        let range = match value {
-            Value::Array(ends) if ends.len() == 2 => [number(&ends[0])?, number(&ends[1])?],
-            fixed => [number(fixed)?; 2],
+        let range = match recipe.pointer(&pointer)? {
+            Value::Array(ends) if ends.len() == 2 => [ends[0].as_f64()?, ends[1].as_f64()?],
+            fixed => [fixed.as_f64()?; 2],
         };
         Some((range, key == "objects"))
     }
 
-    fn add(&mut self, told: &Told, line: &Line) {
-        let Told { k, part, record } = told;
+    fn add(&mut self, sample: &ReadSample, line: &JournalLine) {
+        let record = &sample.record;
         for (path, &value) in &record.draws {
             if let Some(key) = key(path) {
                 self.drawn.entry(key).or_default().push(value);
             }
         }
-        let mut count = |what, name: String| {
-            *self
-                .chosen
-                .entry(what)
-                .or_default()
-                .entry(name)
-                .or_default() += 1
-        };
-        count("background", record.drawn.plate.clone());
-        for object in &record.drawn.objects {
-            count("asset", object.asset.clone());
-            count("photo of the asset", object.photo.to_string());
-        }
+        self.add_choices(&record.drawn);
         for object in &record.labels.objects {
-            self.visible.push(object.visible_fraction);
-            if let Some(reason) = NoLabel::of(object, record) {
-                *self.unlabelled.entry(reason).or_default() += 1;
-                self.unlabelled_visible.push(object.visible_fraction);
-            } else {
-                self.boxes
-                    .push([object.amodal_box.width(), object.amodal_box.height()]);
-            }
+            self.add_object(object, record);
         }
-        for (class, counts) in self.balance.iter_mut().zip(&line.classes) {
-            let of = &mut class[usize::from(*part == Part::Val)];
-            *of = [of[0] + u64::from(counts[0]), of[1] + u64::from(counts[1])];
+        let part = usize::from(sample.part == Part::Val);
+        for (class, [objects, labels]) in self.balance.iter_mut().zip(&line.classes) {
+            class[part][0] += u64::from(*objects);
+            class[part][1] += u64::from(*labels);
         }
-        self.rejected
-            .extend(record.rejected.iter().map(|why| (*k, why.clone())));
+        let rejected = record.rejected.iter().map(|why| (sample.k, why.clone()));
+        self.rejected.extend(rejected);
+    }
+
+    /// Counts what was chosen from lists.
+    fn add_choices(&mut self, drawn: &Scene) {
+        self.count("background", drawn.plate.clone());
+        for object in &drawn.objects {
+            self.count("asset", object.asset.clone());
+            self.count("photo of the asset", object.photo.to_string());
+        }
+    }
+
+    fn count(&mut self, what: &'static str, name: String) {
+        let counts = self.chosen.entry(what).or_default();
+        *counts.entry(name).or_default() += 1;
+    }
+
+    fn add_object(&mut self, object: &ObjectLabel, record: &SampleRecord) {
+        self.visible.push(object.visible_fraction);
+        if let Some(reason) = UnlabelledReason::of(object, record) {
+            *self.unlabelled.entry(reason).or_default() += 1;
+            self.unlabelled_visible.push(object.visible_fraction);
+        } else {
+            let bbox = object.amodal_box;
+            self.boxes.push([bbox.width(), bbox.height()]);
+        }
     }
 }
 
-impl Glance {
-    fn of(told: &Told, files: [String; 2]) -> Self {
-        let Told { k, part, record } = told;
+impl SampleSummary {
+    fn new(sample: ReadSample) -> Self {
+        let ReadSample {
+            k,
+            part,
+            record,
+            files,
+        } = sample;
         let labelled = || {
             record
                 .labels
                 .objects
                 .iter()
-                .filter(|object| NoLabel::of(object, record).is_none())
+                .filter(|object| UnlabelledReason::of(object, &record).is_none())
         };
         Self {
-            index: *k,
-            part: *part,
+            index: k,
+            part,
             files,
             image: record.labels.image,
             objects: record.labels.objects.len(),
@@ -245,25 +271,21 @@ impl Glance {
 }
 
 /// Records that are read at a time.
-const STEP: usize = 256;
+const RECORDS_PER_BATCH: usize = 256;
 
-fn told(folder: &Path, line: &Line) -> Result<Told> {
-    Ok(Told {
-        k: line.k,
-        part: line.part,
-        record: io::read_json(line.file(folder, "scenes/")?)?,
-    })
+impl ReadSample {
+    fn read(folder: &Path, line: &JournalLine) -> Result<Self> {
+        let name = |kind| line.file_name(folder, kind).map(str::to_owned);
+        Ok(Self {
+            k: line.k,
+            part: line.part,
+            record: io::read_json(line.file(folder, "scenes/")?)?,
+            files: [name("images/")?, name("scenes/")?],
+        })
+    }
 }
 
-/// The file of a sample in one of the dataset's folders, as the journal has it.
-fn name(folder: &Path, line: &Line, kind: &str) -> Result<String> {
-    line.file(folder, kind)?;
-    let file = line.files.iter().find(|file| file.path.starts_with(kind));
-    file.map(|file| file.path.clone())
-        .ok_or_else(|| Error::file(folder, format!("sample {} has no {kind}", line.k)))
-}
-
-/// The key in the recipe of a draw's distribution; none for a choice from a list and for a turn that was drawn again.
+/// The key in the recipe of a draw's distribution; none for a choice from a list and for a rotation that was resampled.
 fn key(path: &str) -> Option<String> {
     let choice = path == "background"
         || path.ends_with(".asset")

@@ -1,6 +1,6 @@
 //! Labels as Pascal VOC writes them: one XML file for each image, and lists of images.
 
-use crate::dataset::{Entry, Extent, Labelled, Part, PictureFormat, Writer, Written};
+use crate::dataset::{Entry, Extent, LabelledObject, Part, PictureFormat, Writer, Written};
 use crate::error::Result;
 use crate::geom::BBox;
 use crate::io;
@@ -80,7 +80,7 @@ impl Voc {
     }
 
     /// Nothing for an object without a box.
-    fn object(&self, entry: &Entry<'_>, label: &Labelled<'_>) -> String {
+    fn object(&self, entry: &Entry<'_>, label: &LabelledObject<'_>) -> String {
         let (b, _) = self.boxes.of(label.object);
         if b.is_empty() {
             return String::new();

@@ -29,7 +29,7 @@ impl Default for WebDataset {
 const KIND: &str = "webdataset";
 
 /// Everyone may read, the owner may write.
-const MODE: u32 = 0o644;
+const FILE_MODE: u32 = 0o644;
 
 impl Writer for WebDataset {
     fn settings(&self) -> serde_json::Value {
@@ -91,7 +91,7 @@ fn pack(out: &mut dyn Write, folder: &Path, samples: &[&Written]) -> std::io::Re
                 .map_err(|e| std::io::Error::other(Error::file(&file, e)))?;
             let mut header = tar::Header::new_ustar();
             header.set_size(file.metadata()?.len());
-            header.set_mode(MODE);
+            header.set_mode(FILE_MODE);
             header.set_mtime(0);
             tar.append_data(&mut header, name, file)?;
         }

@@ -2,7 +2,7 @@
 
 use crate::dataset::formats::is_exact;
 use crate::dataset::yolo_yaml::DataYaml;
-use crate::dataset::{Entry, Extent, Labelled, Part, Writer};
+use crate::dataset::{Entry, Extent, LabelledObject, Part, Writer};
 use crate::error::{Error, Result};
 use crate::geom::BBox;
 use crate::geom::Point2;
@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 const DATA_YAML: &str = "data.yaml";
 
 /// Least side of an image, pixels: trainers refuse smaller ones.
-pub(crate) const LEAST_SIDE_PX: u32 = 10;
+pub(crate) const MIN_SIDE_PX: u32 = 10;
 
 /// Writes `labels/{train,val}/NNNNNN.txt` and `data.yaml`.
 ///
@@ -69,10 +69,10 @@ impl Writer for Yolo {
 
     fn write(&self, folder: &Path, entry: &Entry<'_>) -> Result<Vec<PathBuf>> {
         let [w, h] = entry.sample.labels.image;
-        if w.min(h) < LEAST_SIDE_PX {
+        if w.min(h) < MIN_SIDE_PX {
             return Err(Error::value(
                 "image",
-                format!("{w} x {h} pixels, expected at least {LEAST_SIDE_PX} a side for YOLO"),
+                format!("{w} x {h} pixels, expected at least {MIN_SIDE_PX} a side for YOLO"),
             ));
         }
         let path = entry.path("labels", "txt");
@@ -101,7 +101,7 @@ impl Yolo {
 
     fn row_of(
         &self,
-        &Labelled { object, class, .. }: &Labelled<'_>,
+        &LabelledObject { object, class, .. }: &LabelledObject<'_>,
         image: [f64; 2],
     ) -> Option<String> {
         let (chosen, mask) = self.boxes.of(object);

@@ -1,7 +1,7 @@
 //! A YOLO dataset on disk, of petcomp's or of the user's own: which images, which classes.
 
-use super::Part;
-use super::yolo_yaml::DataYaml;
+use crate::dataset::Part;
+use crate::dataset::yolo_yaml::DataYaml;
 use crate::error::{Error, Result};
 use crate::io;
 use std::path::{Path, PathBuf};
@@ -25,17 +25,16 @@ impl YoloSet {
     /// [`Error::File`] for a missing `data.yaml`, one without classes, or a part without images.
     pub fn open(folder: &Path) -> Result<Self> {
         let path = folder.join("data.yaml");
-        let (yaml, faults) = DataYaml::read(&io::read_text(&path)?);
-        if let Some((line, what)) = faults.into_iter().next() {
+        let (yaml, problems) = DataYaml::read(&io::read_text(&path)?);
+        if let Some((line, what)) = problems.into_iter().next() {
             let line = line.map(|n| format!("line {n}: ")).unwrap_or_default();
             return Err(Error::file(path, format!("{line}{what}")));
         }
         let root = yaml.root(folder);
-        let part = |part| images(&root.join(yaml.folder(part).unwrap_or_default()));
         Ok(Self {
             classes: yaml.names().to_vec(),
-            train: part(Part::Train)?,
-            val: part(Part::Val)?,
+            train: images_of(&root, yaml.folders(Part::Train))?,
+            val: images_of(&root, yaml.folders(Part::Val))?,
         })
     }
 
@@ -51,20 +50,26 @@ impl YoloSet {
     }
 }
 
-fn images(place: &Path) -> Result<Vec<PathBuf>> {
-    let found = if place.extension().is_some_and(|e| e == "txt") {
-        listed(place)?
-    } else {
-        inside(place)?
-    };
-    if found.is_empty() {
-        return Err(Error::file(place, "no images, expected at least one"));
+/// The images of the folders or lists of a part, at least one in each.
+fn images_of(root: &Path, parts: &[String]) -> Result<Vec<PathBuf>> {
+    let mut images = Vec::new();
+    for part in parts {
+        let path = root.join(part);
+        let found = if path.extension().is_some_and(|e| e == "txt") {
+            listed_in(&path)?
+        } else {
+            images_in(&path)?
+        };
+        if found.is_empty() {
+            return Err(Error::file(path, "no images, expected at least one"));
+        }
+        images.extend(found);
     }
-    Ok(found)
+    Ok(images)
 }
 
 /// The lines of a list; `./` is the list's own folder, as for YOLOv5.
-fn listed(list: &Path) -> Result<Vec<PathBuf>> {
+fn listed_in(list: &Path) -> Result<Vec<PathBuf>> {
     let text = io::read_text(list)?;
     let folder = list.parent().unwrap_or(Path::new(""));
     let lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
@@ -76,7 +81,7 @@ fn listed(list: &Path) -> Result<Vec<PathBuf>> {
         .collect())
 }
 
-fn inside(folder: &Path) -> Result<Vec<PathBuf>> {
+fn images_in(folder: &Path) -> Result<Vec<PathBuf>> {
     let entries = std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
     let mut images = Vec::new();
     for entry in entries {

@@ -1,27 +1,32 @@
-//! `data.yaml`: the part of YAML that describes a YOLO dataset, written and read.
+//! `data.yaml`: the description of a YOLO dataset, written and read.
+//!
+//! It is read event by event with `saphyr-parser`: values that nobody asks for are skipped without being built, aliases
+//! are followed for texts and lists of texts alone, and findings name their line.
 
 use crate::dataset::Part;
+use saphyr_parser::{Event, Parser, ScalarStyle, ScanError, Span, StrInput};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// What a `data.yaml` says.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct DataYaml {
     path: Option<String>,
-    train: Option<String>,
-    val: Option<String>,
+    train: Vec<String>,
+    val: Vec<String>,
     nc: Option<usize>,
     names: Vec<String>,
 }
 
-/// A fault and its line.
-type Fault = (Option<usize>, String);
+/// A line, where it is known, and what is wrong there.
+type Problem = (Option<usize>, String);
 
 impl DataYaml {
-    /// The folder of a part's images, below the dataset's.
-    pub(crate) fn folder(&self, part: Part) -> Option<&str> {
+    /// The folders (or lists) of a part's images, below the dataset's.
+    pub(crate) fn folders(&self, part: Part) -> &[String] {
         match part {
-            Part::Train => self.train.as_deref(),
-            Part::Val => self.val.as_deref(),
+            Part::Train => &self.train,
+            Part::Val => &self.val,
         }
     }
 
@@ -32,8 +37,8 @@ impl DataYaml {
             .map_or_else(|| folder.to_path_buf(), |path| folder.join(path))
     }
 
-    /// Number of classes: of names that are there, whatever `nc` claims.
-    pub(crate) fn classes(&self) -> Option<usize> {
+    /// Number of classes that have a name, whatever `nc` claims; none without names.
+    pub(crate) fn class_count(&self) -> Option<usize> {
         Some(self.names.len()).filter(|&n| n > 0)
     }
 
@@ -63,67 +68,54 @@ impl DataYaml {
         yaml
     }
 
-    /// Reads plain keys, and names as `0: a`, as `- a`, or as `[a, b]`; lists of folders, anchors and the like are not
-    /// understood.
-    pub(crate) fn read(text: &str) -> (Self, Vec<Fault>) {
-        let mut yaml = Self::default();
-        let mut faults = Vec::new();
-        for (i, line) in text.lines().enumerate() {
-            let bare = line.trim();
-            if bare.is_empty() || bare.starts_with('#') {
-                continue;
+    /// Reads the keys that trainers need; all others are skipped. What could be read stays, whatever else is wrong.
+    pub(crate) fn read(text: &str) -> (Self, Vec<Problem>) {
+        let (mut yaml, mut problems) = (Self::default(), Vec::new());
+        if let Err(problem) = Reader::new(text).read_keys(|key, line, value| {
+            if let Err((value_line, what)) = yaml.set(key, value) {
+                problems.push((Some(value_line.unwrap_or(line)), what));
             }
-            if let Err(what) = yaml.take(line, bare) {
-                faults.push((Some(i + 1), what));
-            }
+        }) {
+            problems.push(problem);
         }
-        faults.extend(yaml.missing().into_iter().map(|what| (None, what)));
-        (yaml, faults)
+        problems.extend(yaml.missing().into_iter().map(|what| (None, what)));
+        (yaml, problems)
     }
 
-    fn take(&mut self, line: &str, bare: &str) -> Result<(), String> {
-        if let Some(name) = bare.strip_prefix("- ") {
-            self.names.push(unquoted(name));
-            return Ok(());
-        }
-        let (key, value) = bare
-            .split_once(':')
-            .ok_or_else(|| format!("\"{bare}\", expected a key and a value"))?;
-        let value = value.trim();
-        if line.starts_with(' ') {
-            let expected = self.names.len();
-            self.names.push(unquoted(value));
-            return if key == expected.to_string() {
-                Ok(())
-            } else {
-                Err(format!("class {key}, expected {expected}"))
-            };
-        }
+    fn set(&mut self, key: &str, value: Value) -> Result<(), Problem> {
         match key {
-            "path" => self.path = Some(unquoted(value)),
-            "train" => self.train = Some(unquoted(value)),
-            "val" => self.val = Some(unquoted(value)),
-            "nc" => {
-                self.nc = Some(
-                    value
-                        .parse()
-                        .map_err(|_| format!("nc: {value}, expected a number"))?,
-                )
-            }
-            "names" => self.names.extend(inline(value)),
+            "path" => self.path = value.texts(key)?.pop(),
+            "train" => self.train = value.texts(key)?,
+            "val" => self.val = value.texts(key)?,
+            "nc" => self.nc = Some(value.count(key)?),
+            "names" => return self.set_names(value),
             _ => {}
         }
         Ok(())
     }
 
-    fn missing(&self) -> Vec<String> {
-        let mut missing = Vec::new();
-        for part in Part::ALL
-            .iter()
-            .filter(|&&part| self.folder(part).is_none())
-        {
-            missing.push(format!("no {}:, which trainers require", part.name()));
+    /// Names as `[a, b]` or as `0: a`, whose numbers must be in order.
+    fn set_names(&mut self, value: Value) -> Result<(), Problem> {
+        let Value::Map(entries) = value else {
+            self.names = value.texts("names")?;
+            return Ok(());
+        };
+        let mut wrong = Ok(());
+        for (expected, (line, key, name)) in entries.into_iter().enumerate() {
+            if wrong.is_ok() && key != expected.to_string() {
+                wrong = Err((Some(line), format!("class {key}, expected {expected}")));
+            }
+            self.names.push(name);
         }
+        wrong
+    }
+
+    fn missing(&self) -> Vec<String> {
+        let mut missing: Vec<String> = Part::ALL
+            .into_iter()
+            .filter(|&part| self.folders(part).is_empty())
+            .map(|part| format!("no {}:, which trainers require", part.name()))
+            .collect();
         if self.names.is_empty() {
             missing.push("no names, expected one for each class".into());
         } else if let Some(nc) = self.nc.filter(|&nc| nc != self.names.len()) {
@@ -136,20 +128,221 @@ impl DataYaml {
     }
 }
 
-fn inline(value: &str) -> Vec<String> {
-    let list = value
-        .strip_prefix('[')
-        .and_then(|v| v.strip_suffix(']'))
-        .unwrap_or_default();
-    list.split(',')
-        .map(unquoted)
-        .filter(|name| !name.is_empty())
-        .collect()
+/// A value of the document, as far as a `data.yaml` needs one.
+#[derive(Clone, Debug)]
+enum Value {
+    /// Nothing, or `null`.
+    Null,
+    Text(String),
+    List(Vec<String>),
+    /// Line, key and value of each entry.
+    Map(Vec<(usize, String, String)>),
+    /// Lists of lists and the like.
+    Other,
 }
 
-fn unquoted(text: &str) -> String {
-    let text = text.trim();
-    serde_json::from_str(text).unwrap_or_else(|_| text.trim_matches('\'').to_owned())
+impl Value {
+    /// One text or a list of texts.
+    fn texts(self, key: &str) -> Result<Vec<String>, Problem> {
+        match self {
+            Self::Null => Ok(Vec::new()),
+            Self::Text(text) => Ok(vec![text]),
+            Self::List(texts) => Ok(texts),
+            Self::Map(_) | Self::Other => Err((
+                None,
+                format!("{key}: not understood, expected a text or a list of texts"),
+            )),
+        }
+    }
+
+    fn count(&self, key: &str) -> Result<usize, Problem> {
+        let expected = |found: &str| (None, format!("{key}: {found}, expected a number"));
+        match self {
+            Self::Text(text) => text.parse().map_err(|_| expected(text)),
+            _ => Err(expected("no number")),
+        }
+    }
+
+    fn bytes(&self) -> usize {
+        match self {
+            Self::Null | Self::Other => 0,
+            Self::Text(text) => text.len(),
+            Self::List(texts) => texts.iter().map(|text| text.len() + 1).sum(),
+            Self::Map(entries) => entries.iter().map(|(_, k, v)| k.len() + v.len() + 1).sum(),
+        }
+    }
+}
+
+/// Deeper documents are refused: a parser's work grows with the square of the depth.
+const MAX_DEPTH: usize = 64;
+
+/// Aliases may add so many times the document's length: "billion laughs" ends there.
+const MAX_ALIAS_GROWTH: usize = 4;
+
+/// The events of a document.
+struct Reader<'a> {
+    parser: Parser<'a, StrInput<'a>>,
+    anchors: BTreeMap<usize, Value>,
+    /// Bytes that aliases may still add.
+    alias_budget: usize,
+}
+
+impl<'a> Reader<'a> {
+    fn new(text: &'a str) -> Self {
+        Self {
+            parser: Parser::new_from_str(text),
+            anchors: BTreeMap::new(),
+            alias_budget: MAX_ALIAS_GROWTH * text.len(),
+        }
+    }
+
+    /// Hands over each key of the first document with its line and value.
+    fn read_keys(&mut self, mut set: impl FnMut(&str, usize, Value)) -> Result<(), Problem> {
+        loop {
+            match self.next()?.0 {
+                Event::MappingStart(..) => break,
+                Event::StreamEnd | Event::DocumentEnd => return Ok(()),
+                Event::Scalar(..) | Event::SequenceStart(..) | Event::Alias(_) => {
+                    return Err((None, "expected keys and values".into()));
+                }
+                _ => {}
+            }
+        }
+        loop {
+            let (event, span) = self.next()?;
+            if matches!(event, Event::MappingEnd) {
+                return Ok(());
+            }
+            let key = self.value(event)?;
+            let (event, _) = self.next()?;
+            let value = self.value(event)?;
+            if let Value::Text(key) = key {
+                set(&key, span.start.line(), value);
+            }
+        }
+    }
+
+    fn next(&mut self) -> Result<(Event<'a>, Span), Problem> {
+        match self.parser.next_event() {
+            Some(Ok(event)) => Ok(event),
+            Some(Err(e)) => Err(not_yaml(&e)),
+            None => Ok((Event::StreamEnd, Span::default())),
+        }
+    }
+
+    /// The value that an event begins.
+    fn value(&mut self, event: Event<'a>) -> Result<Value, Problem> {
+        let (anchor, value) = match event {
+            Event::Alias(anchor) => return self.alias(anchor),
+            Event::Scalar(text, style, anchor, _) => (anchor, scalar(&text, style)),
+            Event::SequenceStart(anchor, _) => (anchor, self.list()?),
+            Event::MappingStart(anchor, _) => (anchor, self.map()?),
+            _ => return Ok(Value::Null),
+        };
+        if anchor > 0 {
+            self.anchors.insert(anchor, value.clone());
+        }
+        Ok(value)
+    }
+
+    fn alias(&mut self, anchor: usize) -> Result<Value, Problem> {
+        let value = self.anchors.get(&anchor).cloned().unwrap_or(Value::Other);
+        match self.alias_budget.checked_sub(value.bytes()) {
+            Some(left) => self.alias_budget = left,
+            None => return Err((None, "aliases repeat too much text".into())),
+        }
+        Ok(value)
+    }
+
+    /// The rest of a list; one of other things than texts is [`Value::Other`].
+    fn list(&mut self) -> Result<Value, Problem> {
+        let (mut texts, mut is_plain) = (Vec::new(), true);
+        loop {
+            let (event, _) = self.next()?;
+            if matches!(event, Event::SequenceEnd | Event::StreamEnd) {
+                break;
+            }
+            match self.text(event)? {
+                Some(text) => texts.push(text),
+                None => is_plain = false,
+            }
+        }
+        Ok(if is_plain {
+            Value::List(texts)
+        } else {
+            Value::Other
+        })
+    }
+
+    /// The rest of a mapping; one of other things than texts is [`Value::Other`].
+    fn map(&mut self) -> Result<Value, Problem> {
+        let (mut entries, mut is_plain) = (Vec::new(), true);
+        loop {
+            let (event, span) = self.next()?;
+            if matches!(event, Event::MappingEnd | Event::StreamEnd) {
+                break;
+            }
+            let key = self.text(event)?;
+            let (event, _) = self.next()?;
+            match key.zip(self.text(event)?) {
+                Some((key, text)) => entries.push((span.start.line(), key, text)),
+                None => is_plain = false,
+            }
+        }
+        Ok(if is_plain {
+            Value::Map(entries)
+        } else {
+            Value::Other
+        })
+    }
+
+    /// The text that an event is or refers to; none, skipping it, for anything else.
+    fn text(&mut self, event: Event<'a>) -> Result<Option<String>, Problem> {
+        let is_collection = matches!(event, Event::SequenceStart(..) | Event::MappingStart(..));
+        if is_collection {
+            self.skip()?;
+            return Ok(None);
+        }
+        Ok(match self.value(event)? {
+            Value::Text(text) => Some(text),
+            Value::Null => Some(String::new()),
+            _ => None,
+        })
+    }
+
+    /// Skips the rest of a list or mapping.
+    fn skip(&mut self) -> Result<(), Problem> {
+        let mut depth = 1;
+        while depth > 0 {
+            let (event, span) = self.next()?;
+            match event {
+                Event::SequenceStart(..) | Event::MappingStart(..) => depth += 1,
+                Event::SequenceEnd | Event::MappingEnd => depth -= 1,
+                Event::StreamEnd => return Ok(()),
+                _ => {}
+            }
+            if depth > MAX_DEPTH {
+                let what = format!("more than {MAX_DEPTH} levels");
+                return Err((Some(span.start.line()), what));
+            }
+        }
+        Ok(())
+    }
+}
+
+fn scalar(text: &str, style: ScalarStyle) -> Value {
+    let is_null =
+        style == ScalarStyle::Plain && matches!(text, "" | "~" | "null" | "Null" | "NULL");
+    if is_null {
+        Value::Null
+    } else {
+        Value::Text(text.to_owned())
+    }
+}
+
+fn not_yaml(error: &ScanError) -> Problem {
+    let what = format!("not YAML: {}", error.info());
+    (Some(error.marker().line()), what)
 }
 
 #[cfg(test)]
@@ -161,7 +354,7 @@ mod tests {
         let classes = ["cap_label", "yes", "a: \"b\" # c", "ö"].map(String::from);
         let (yaml, faults) = DataYaml::read(&DataYaml::write(&classes));
         assert_eq!((yaml.names, faults), (classes.to_vec(), vec![]));
-        assert_eq!(yaml.train.as_deref(), Some("images/train"));
+        assert_eq!(yaml.train, ["images/train"]);
     }
 
     #[test]
@@ -181,5 +374,66 @@ mod tests {
         assert_eq!(faults[0], (Some(2), "nc: two, expected a number".into()));
         assert_eq!(faults[1], (Some(5), "class 2, expected 1".into()));
         assert_eq!(faults[2], (None, "no val:, which trainers require".into()));
+    }
+
+    #[test]
+    fn files_of_other_programs_are_read() {
+        let ultralytics = "# COCO8 by Ultralytics\npath: ../datasets/coco8 # dataset root dir\n\
+            train: images/train\nval: images/val\ntest: # optional\n\nnames:\n  0: person\n  1: bicycle\n\n\
+            download: |\n  names: [x]\n  0: y\n";
+        let (yaml, problems) = DataYaml::read(ultralytics);
+        assert_eq!(problems, []);
+        assert_eq!(
+            yaml.root(Path::new("/d")),
+            Path::new("/d/../datasets/coco8")
+        );
+        assert_eq!(yaml.names, ["person", "bicycle"]);
+        let roboflow = "train: ../train/images\nval: ../valid/images\n\nnc: 2\nnames: ['cap', \"la, bel\"]\n\n\
+            roboflow:\n  workspace: w\n  version: 3\n  tags: [a, [b]]\n";
+        let (yaml, problems) = DataYaml::read(roboflow);
+        assert_eq!(
+            (problems, yaml.names),
+            (vec![], vec!["cap".into(), "la, bel".into()])
+        );
+    }
+
+    #[test]
+    fn lists_of_folders_and_anchors_are_followed() {
+        let text = "train: &both\n  - a.txt\n  - b.txt\nval: *both\nnames: [&n cap, *n]\n";
+        let (yaml, problems) = DataYaml::read(text);
+        assert_eq!(problems, []);
+        assert_eq!(
+            (yaml.val, yaml.names),
+            (vec!["a.txt".into(), "b.txt".into()], vec!["cap".into(); 2])
+        );
+    }
+
+    #[test]
+    fn hostile_documents_end_soon() {
+        let deep_flow = format!("x: {}", "[".repeat(1 << 20));
+        assert!(!DataYaml::read(&deep_flow).1.is_empty());
+        let deep_block = format!("x:\n{}a", "- ".repeat(1 << 20));
+        let problems = DataYaml::read(&deep_block).1;
+        assert!(problems[0].1.contains("levels"), "{:?}", problems[0]);
+        let laughs = format!(
+            "a: &a {}\nnames: [{}]\n",
+            "x".repeat(1 << 16),
+            "*a, ".repeat(1 << 16)
+        );
+        let (yaml, problems) = DataYaml::read(&laughs);
+        assert!(problems[0].1.contains("aliases"), "{:?}", problems[0]);
+        assert!(yaml.names.is_empty());
+        for text in [
+            "[",
+            "- a",
+            "a",
+            "{",
+            "? [a]: b",
+            "names: *nowhere",
+            "\u{0}",
+            "a: b: c",
+        ] {
+            assert!(!DataYaml::read(text).1.is_empty(), "{text}");
+        }
     }
 }

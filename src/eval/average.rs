@@ -3,7 +3,7 @@
 use super::rank::Running;
 
 /// Where precision is read: recalls of 0, 0.01 .. 1.
-pub(super) const POINTS: usize = 101;
+pub(super) const RECALL_POINTS: usize = 101;
 
 /// The area under the interpolated precision envelope, by trapezoids over 101 recalls.
 ///
@@ -12,24 +12,24 @@ pub(super) const POINTS: usize = 101;
 /// # Method
 /// As YOLOv5 computes it (its file `utils/metrics.py`, function `compute_ap`, method `interp`).
 pub(super) fn trapezoid(recall: &[f64], precision: &[f64]) -> f64 {
-    let xs: Vec<f64> = [0.0].iter().chain(recall).chain(&[1.0]).copied().collect();
-    let mut ys: Vec<f64> = [1.0]
-        .iter()
-        .chain(precision)
-        .chain(&[0.0])
-        .copied()
-        .collect();
-    falling(&mut ys);
+    let xs = with_ends(0.0, recall, 1.0);
+    let mut ys = with_ends(1.0, precision, 0.0);
+    make_envelope(&mut ys);
     let mut after = 0;
-    let read: [f64; POINTS] = std::array::from_fn(|i| {
+    let read: [f64; RECALL_POINTS] = std::array::from_fn(|i| {
         after += xs[after..]
             .iter()
             .take_while(|&&at| at <= recall_at(i))
             .count();
         between(recall_at(i), after, &xs, &ys)
     });
-    let strip = |i: usize| (recall_at(i + 1) - recall_at(i)) * (read[i + 1] + read[i]) / 2.0;
-    (0..POINTS - 1).map(strip).sum()
+    (0..RECALL_POINTS - 1)
+        .map(|i| (recall_at(i + 1) - recall_at(i)) * (read[i + 1] + read[i]) / 2.0)
+        .sum()
+}
+
+fn with_ends(first: f64, values: &[f64], last: f64) -> Vec<f64> {
+    [&[first], values, &[last]].concat()
 }
 
 /// The mean of the precision envelope at 101 recalls, each read at the first detection that reaches it.
@@ -37,13 +37,13 @@ pub(super) fn trapezoid(recall: &[f64], precision: &[f64]) -> f64 {
 /// # Method
 /// As the COCO tools compute it (`COCOeval.accumulate`).
 pub(super) fn mean_of_samples(recall: &[f64], precision: &[f64]) -> f64 {
-    samples(recall, precision).into_iter().sum::<f64>() / POINTS as f64
+    samples(recall, precision).into_iter().sum::<f64>() / RECALL_POINTS as f64
 }
 
 /// The precision envelope at recalls of 0, 0.01 .. 1.
-pub(super) fn samples(recall: &[f64], precision: &[f64]) -> [f64; POINTS] {
+pub(super) fn samples(recall: &[f64], precision: &[f64]) -> [f64; RECALL_POINTS] {
     let mut ys = precision.to_vec();
-    falling(&mut ys);
+    make_envelope(&mut ys);
     std::array::from_fn(|i| {
         ys.get(recall.partition_point(|&r| r < recall_at(i)))
             .copied()
@@ -87,7 +87,7 @@ fn between(x: f64, after: usize, xs: &[f64], ys: &[f64]) -> f64 {
 }
 
 /// Makes values the greatest of those that follow.
-fn falling(values: &mut [f64]) {
+fn make_envelope(values: &mut [f64]) {
     let mut best = f64::NEG_INFINITY;
     for value in values.iter_mut().rev() {
         best = best.max(*value);
@@ -96,7 +96,7 @@ fn falling(values: &mut [f64]) {
 }
 
 pub(super) fn recall_at(i: usize) -> f64 {
-    if i + 1 == POINTS {
+    if i + 1 == RECALL_POINTS {
         1.0
     } else {
         i as f64 * 0.01
@@ -119,7 +119,7 @@ mod tests {
     #[test]
     fn precision_later_on_lifts_what_was_before() {
         let mut values = [0.1, 0.5, 0.2, 0.3];
-        falling(&mut values);
+        make_envelope(&mut values);
         assert_eq!(values, [0.5, 0.5, 0.3, 0.3]);
     }
 

@@ -1,6 +1,6 @@
 //! How much a score would move if other images had been taken.
 
-use super::{Definition, Matches, Sheet};
+use super::{Definition, EvalImage, Matches};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use rayon::prelude::*;
@@ -24,7 +24,12 @@ pub struct Interval {
 /// [Efron 1979], percentile interval.
 ///
 /// [Efron 1979]: https://doi.org/10.1214/aos/1176344552
-pub fn bootstrap(sheets: &[Sheet], definition: Definition, rounds: usize, seed: u64) -> Interval {
+pub fn bootstrap(
+    sheets: &[EvalImage],
+    definition: Definition,
+    rounds: usize,
+    seed: u64,
+) -> Interval {
     Matches::new(sheets, definition).bootstrap(rounds, seed)
 }
 
@@ -39,12 +44,6 @@ impl Matches {
 
 /// The percentile interval of resampled values; the value itself where there are none.
 pub(crate) fn interval(value: f64, mut values: Vec<f64>) -> Interval {
-    values.sort_by(f64::total_cmp);
-    let quantile = |q: f64| {
-        let place = q * values.len().saturating_sub(1) as f64;
-        let (low, high) = (place as usize, (place as usize + 1).min(values.len() - 1));
-        values[low] + (values[high] - values[low]) * (place - low as f64)
-    };
     if values.is_empty() {
         return Interval {
             value,
@@ -52,11 +51,19 @@ pub(crate) fn interval(value: f64, mut values: Vec<f64>) -> Interval {
             high: value,
         };
     }
+    values.sort_by(f64::total_cmp);
     Interval {
         value,
-        low: quantile(0.025),
-        high: quantile(0.975),
+        low: quantile(&values, 0.025),
+        high: quantile(&values, 0.975),
     }
+}
+
+/// A quantile of sorted values, between two of them where need be.
+fn quantile(values: &[f64], q: f64) -> f64 {
+    let place = q * values.len().saturating_sub(1) as f64;
+    let (low, high) = (place as usize, (place as usize + 1).min(values.len() - 1));
+    values[low] + (values[high] - values[low]) * (place - low as f64)
 }
 
 /// How often each of `count` things is drawn in `count` draws.
@@ -86,7 +93,7 @@ mod tests {
     #[test]
     fn an_interval_holds_its_value_and_shrinks_with_more_images() {
         let b = bbox(0.0, 0.0, 10.0, 10.0);
-        let some = |n: usize| -> Vec<Sheet> {
+        let some = |n: usize| -> Vec<EvalImage> {
             let seen = |i: usize| {
                 if i.is_multiple_of(3) {
                     vec![]

@@ -1,11 +1,11 @@
 //! The boxes of every class, image by image: each box is looked at once, however many classes there are.
 
-use super::{FoundBox, Sheet, TrueBox};
+use super::{Detection, EvalImage, GroundTruth};
 use rayon::prelude::*;
 
 /// Where a box stands.
 #[derive(Clone, Copy)]
-struct Place {
+struct BoxPlace {
     class: u32,
     sheet: usize,
     index: usize,
@@ -13,17 +13,17 @@ struct Place {
 
 /// All boxes in order of class, image and, of detections, confidence.
 pub(super) struct ByClass<'a> {
-    sheets: &'a [Sheet],
-    truth: Vec<Place>,
-    found: Vec<Place>,
+    sheets: &'a [EvalImage],
+    truth: Vec<BoxPlace>,
+    found: Vec<BoxPlace>,
 }
 
 /// The boxes of a class.
 pub(super) struct ClassBoxes<'a> {
     pub(super) class: u32,
-    sheets: &'a [Sheet],
-    truth: &'a [Place],
-    found: &'a [Place],
+    sheets: &'a [EvalImage],
+    truth: &'a [BoxPlace],
+    found: &'a [BoxPlace],
 }
 
 /// What an image has of a class.
@@ -31,32 +31,46 @@ pub(super) struct ImageBoxes<'a> {
     /// Which sheet.
     pub(super) sheet: usize,
     /// In the sheet's order.
-    pub(super) truth: Vec<&'a TrueBox>,
+    pub(super) truth: Vec<&'a GroundTruth>,
     /// The surest first; equal ones in the sheet's order.
-    pub(super) found: Vec<&'a FoundBox>,
+    pub(super) found: Vec<&'a Detection>,
 }
 
-impl<'a> ByClass<'a> {
-    pub(super) fn new(sheets: &'a [Sheet]) -> Self {
-        let at = |sheet| {
-            move |(index, class)| Place {
+impl<'a> ImageBoxes<'a> {
+    fn new(sheet: usize, boxes: &'a EvalImage, truth: &[BoxPlace], found: &[BoxPlace]) -> Self {
+        Self {
+            sheet,
+            truth: truth.iter().map(|p| &boxes.truth[p.index]).collect(),
+            found: found.iter().map(|p| &boxes.found[p.index]).collect(),
+        }
+    }
+}
+
+/// The places of all boxes that have these classes, image by image.
+fn places<'a, C: Iterator<Item = u32>>(
+    sheets: &'a [EvalImage],
+    classes: impl Fn(&'a EvalImage) -> C,
+) -> Vec<BoxPlace> {
+    let mut places = Vec::new();
+    for (sheet, boxes) in sheets.iter().enumerate() {
+        for (index, class) in classes(boxes).enumerate() {
+            places.push(BoxPlace {
                 class,
                 sheet,
                 index,
-            }
-        };
-        let each = || sheets.iter().enumerate();
-        let truth =
-            |(i, s): (usize, &'a Sheet)| s.truth.iter().map(|t| t.class).enumerate().map(at(i));
-        let found =
-            |(i, s): (usize, &'a Sheet)| s.found.iter().map(|f| f.class).enumerate().map(at(i));
-        let (mut truth, mut found): (Vec<_>, Vec<_>) = (
-            each().flat_map(truth).collect(),
-            each().flat_map(found).collect(),
-        );
+            });
+        }
+    }
+    places
+}
+
+impl<'a> ByClass<'a> {
+    pub(super) fn new(sheets: &'a [EvalImage]) -> Self {
+        let mut truth = places(sheets, |sheet| sheet.truth.iter().map(|t| t.class));
+        let mut found = places(sheets, |sheet| sheet.found.iter().map(|f| f.class));
         // Both sorts keep the order of equal ones.
         truth.par_sort_by_key(|p| p.class);
-        let confidence = |p: &Place| sheets[p.sheet].found[p.index].confidence;
+        let confidence = |p: &BoxPlace| sheets[p.sheet].found[p.index].confidence;
         found.par_sort_by(|a, b| {
             (a.class, a.sheet)
                 .cmp(&(b.class, b.sheet))
@@ -71,38 +85,31 @@ impl<'a> ByClass<'a> {
 
     /// The classes that occur in the truth, in order.
     pub(super) fn classes<'s>(&'s self) -> Vec<ClassBoxes<'s>> {
-        let boxes = |truth: &'s [Place]| {
-            let class = truth[0].class;
-            let [first, last] = [class, class.saturating_add(1)]
-                .map(|c| self.found.partition_point(|p| p.class < c));
-            // The greatest class has no next one.
-            let last = if class == u32::MAX {
-                self.found.len()
-            } else {
-                last
-            };
-            ClassBoxes {
-                class,
-                sheets: self.sheets,
-                truth,
-                found: &self.found[first..last],
-            }
-        };
         self.truth
             .chunk_by(|a, b| a.class == b.class)
-            .map(boxes)
+            .map(|truth| ClassBoxes {
+                class: truth[0].class,
+                sheets: self.sheets,
+                truth,
+                found: self.found_of(truth[0].class),
+            })
             .collect()
+    }
+
+    /// The detections of a class.
+    fn found_of(&self, class: u32) -> &[BoxPlace] {
+        let first = self.found.partition_point(|p| p.class < class);
+        let last = self.found.partition_point(|p| p.class <= class);
+        &self.found[first..last]
     }
 }
 
 impl<'a> ClassBoxes<'a> {
     /// The images with boxes of the class, in order.
     pub(super) fn images(&self) -> Vec<ImageBoxes<'a>> {
-        let same = |a: &Place, b: &Place| a.sheet == b.sheet;
-        let (mut truth, mut found) = (
-            self.truth.chunk_by(same).peekable(),
-            self.found.chunk_by(same).peekable(),
-        );
+        let same = |a: &BoxPlace, b: &BoxPlace| a.sheet == b.sheet;
+        let mut truth = self.truth.chunk_by(same).peekable();
+        let mut found = self.found.chunk_by(same).peekable();
         let mut images = Vec::new();
         loop {
             let next = [truth.peek(), found.peek()]
@@ -111,17 +118,10 @@ impl<'a> ClassBoxes<'a> {
                 .map(|places| places[0].sheet)
                 .min();
             let Some(sheet) = next else { return images };
-            let here = |places: &&[Place]| places[0].sheet == sheet;
-            let (truth, found) = (
-                truth.next_if(here).unwrap_or_default(),
-                found.next_if(here).unwrap_or_default(),
-            );
-            let boxes = &self.sheets[sheet];
-            images.push(ImageBoxes {
-                sheet,
-                truth: truth.iter().map(|p| &boxes.truth[p.index]).collect(),
-                found: found.iter().map(|p| &boxes.found[p.index]).collect(),
-            });
+            let is_next = |places: &&[BoxPlace]| places[0].sheet == sheet;
+            let truth = truth.next_if(is_next).unwrap_or_default();
+            let found = found.next_if(is_next).unwrap_or_default();
+            images.push(ImageBoxes::new(sheet, &self.sheets[sheet], truth, found));
         }
     }
 }

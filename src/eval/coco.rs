@@ -5,7 +5,8 @@ use super::by_class::{ByClass, ClassBoxes, ImageBoxes};
 use super::overlap::{BoxIndex, area, intersection, share};
 use super::rank::{Hit, Marks, Ranking};
 use super::{
-    ClassScores, Definition, FoundBox, Scores, Sheet, THRESHOLDS, TrueBox, mean, thresholds,
+    ClassScores, Definition, Detection, EvalImage, GroundTruth, Scores, THRESHOLDS, mean,
+    thresholds,
 };
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -13,11 +14,11 @@ use serde::{Deserialize, Serialize};
 /// No more detections of a class than this count in an image: the surest.
 pub const MAX_DETECTIONS: [usize; 3] = [1, 10, 100];
 /// Keeps a precision defined: the distance of 1 to the next number, as in the original.
-const EPSILON: f64 = f64::EPSILON;
+const PRECISION_EPSILON: f64 = f64::EPSILON;
 /// No overlap reaches 1 for sure.
-const ALMOST_ONE: f64 = 1.0 - 1e-10;
+const MAX_THRESHOLD: f64 = 1.0 - 1e-10;
 
-/// Objects of which size are looked for; the others count for nobody.
+/// Objects of which size are looked for; the others are ignored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum AreaRange {
@@ -70,7 +71,7 @@ impl AreaRange {
 ///
 /// # Panics
 /// When there are weights and not one per sheet.
-pub fn coco(sheets: &[Sheet], weights: &[u32]) -> CocoScores {
+pub fn coco(sheets: &[EvalImage], weights: &[u32]) -> CocoScores {
     assert!(
         weights.is_empty() || weights.len() == sheets.len(),
         "one weight per sheet"
@@ -94,7 +95,7 @@ pub fn coco(sheets: &[Sheet], weights: &[u32]) -> CocoScores {
 
 /// The detections of every class with something to find, the surest 100 of each image.
 pub(super) fn rankings(classes: &ByClass<'_>, range: AreaRange) -> Vec<Ranking> {
-    let ranking = |boxes: &ClassBoxes<'_>| Ranking::new(boxes, |image| held_against(image, range));
+    let ranking = |boxes: &ClassBoxes<'_>| Ranking::new(boxes, |image| match_image(image, range));
     classes.classes().par_iter().map(ranking).collect()
 }
 
@@ -141,7 +142,7 @@ impl<'a> Measured<'a> {
         let turns = ranking.turns(weights);
         let curves = turns
             .each_ref()
-            .map(|sums| recall_and_precision(sums, truths, [0.0, EPSILON]));
+            .map(|sums| recall_and_precision(sums, truths, [0.0, PRECISION_EPSILON]));
         let last = |values: &[f64]| values.last().copied().unwrap_or(0.0);
         Some(Self {
             ranking,
@@ -194,44 +195,54 @@ impl<'a> Measured<'a> {
 
 /// A box of the truth as one range of sizes sees it.
 struct Target<'a> {
-    truth: &'a TrueBox,
-    /// It counts for nobody.
+    truth: &'a GroundTruth,
+    /// It is ignored.
     ignored: bool,
     taken: Marks,
 }
 
-/// The detections of a class in one image, and how many boxes there are to be found.
-fn held_against(image: &ImageBoxes<'_>, range: AreaRange) -> (Vec<Hit>, usize) {
-    let target = |&truth| Target {
-        truth,
-        ignored: truth.crowd || !range.holds(truth.area),
-        taken: 0,
-    };
-    let mut targets: Vec<Target<'_>> = image.truth.iter().map(target).collect();
+/// The detections of a class in one image, matched with its boxes, and how many boxes there are to be found.
+fn match_image(image: &ImageBoxes<'_>, range: AreaRange) -> (Vec<Hit>, usize) {
+    let mut targets: Vec<Target<'_>> = image
+        .truth
+        .iter()
+        .map(|&truth| Target::new(truth, range))
+        .collect();
     // Those that count come first: a detection takes an ignored box only where none of them is left.
     targets.sort_by_key(|t| t.ignored);
     let index = BoxIndex::new(targets.iter().map(|t| t.truth.bbox));
-    let surest = image.found.iter().take(MAX_DETECTIONS[2]).enumerate();
-    let hits = surest.map(|(place, found)| {
-        let overlap = |k: usize| (k, overlap(found, targets[k].truth));
-        let overlaps: Vec<(usize, f64)> =
-            index.near(&found.bbox).into_iter().map(overlap).collect();
+    let mut hits = Vec::new();
+    for (place, found) in image.found.iter().take(MAX_DETECTIONS[2]).enumerate() {
+        let overlaps: Vec<(usize, f64)> = index
+            .near(&found.bbox)
+            .into_iter()
+            .map(|k| (k, overlap(found, targets[k].truth)))
+            .collect();
         let (right, ignored) = marks(found, &mut targets, &overlaps, range);
-        Hit {
+        hits.push(Hit {
             confidence: found.confidence,
             sheet: image.sheet,
             place: place as u32,
             right,
             ignored,
-        }
-    });
-    let hits = hits.collect();
+        });
+    }
     (hits, targets.iter().filter(|t| !t.ignored).count())
 }
 
-/// Thresholds at which a detection finds something, and at which it counts for nobody.
+impl<'a> Target<'a> {
+    fn new(truth: &'a GroundTruth, range: AreaRange) -> Self {
+        Self {
+            truth,
+            ignored: truth.crowd || !range.holds(truth.area),
+            taken: 0,
+        }
+    }
+}
+
+/// Thresholds at which a detection finds something, and at which it is ignored.
 fn marks(
-    found: &FoundBox,
+    found: &Detection,
     targets: &mut [Target<'_>],
     overlaps: &[(usize, f64)],
     range: AreaRange,
@@ -263,7 +274,7 @@ fn nearest(
     threshold: f64,
     bit: Marks,
 ) -> Option<usize> {
-    let mut least = threshold.min(ALMOST_ONE);
+    let mut least = threshold.min(MAX_THRESHOLD);
     let mut best: Option<usize> = None;
     for &(k, overlap) in overlaps {
         let target = &targets[k];
@@ -281,7 +292,7 @@ fn nearest(
 }
 
 /// Intersection over union; over the detection's own area where the truth is a crowd.
-fn overlap(found: &FoundBox, truth: &TrueBox) -> f64 {
+fn overlap(found: &Detection, truth: &GroundTruth) -> f64 {
     let shared = intersection(&found.bbox, &truth.bbox);
     let whole = if truth.crowd {
         area(&found.bbox)
@@ -305,7 +316,7 @@ mod tests {
         ];
         let truth = vec![
             there(0, b),
-            TrueBox {
+            GroundTruth {
                 crowd: true,
                 ..there(0, crowd)
             },

@@ -1,6 +1,6 @@
 //! Reads truth and detections from COCO JSON.
 
-use super::{FARTHEST_PX, FoundBox, Picture, Sheet, TrueBox};
+use super::{Detection, EvalImage, FARTHEST_PX, GroundTruth, Picture};
 use crate::error::{Error, Result};
 use crate::geom::BBox;
 use crate::io;
@@ -9,12 +9,12 @@ use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
 
 #[derive(Deserialize)]
-struct Document {
+struct CocoDocument {
     images: Vec<ImageRecord>,
     #[serde(default)]
-    annotations: Vec<Annotation>,
+    annotations: Vec<CocoAnnotation>,
     #[serde(default)]
-    categories: Vec<Category>,
+    categories: Vec<CocoCategory>,
 }
 
 #[derive(Deserialize)]
@@ -30,13 +30,13 @@ struct ImageRecord {
 }
 
 #[derive(Deserialize)]
-struct Category {
+struct CocoCategory {
     id: i64,
     name: String,
 }
 
 #[derive(Deserialize)]
-struct Annotation {
+struct CocoAnnotation {
     image_id: i64,
     category_id: i64,
     bbox: [f64; 4],
@@ -46,7 +46,7 @@ struct Annotation {
 }
 
 #[derive(Deserialize)]
-struct Detection {
+struct CocoDetection {
     image_id: i64,
     category_id: i64,
     bbox: [f64; 4],
@@ -57,7 +57,7 @@ struct Detection {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CocoTruth {
     /// One per image, in order of their ids.
-    pub sheets: Vec<Sheet>,
+    pub sheets: Vec<EvalImage>,
     /// Names of the categories, in order of their ids; a class is a place in this list.
     pub classes: Vec<String>,
     /// File name of each image, and its width and height where they are told.
@@ -81,66 +81,73 @@ pub fn read_coco_truth(path: &Path) -> Result<CocoTruth> {
 /// As [`read_coco_truth`].
 pub fn read_coco_results(path: &Path, truth: &mut CocoTruth) -> Result<()> {
     truth
-        .add(&io::read_json_data::<Vec<Detection>>(path)?)
+        .add(&io::read_json_data::<Vec<CocoDetection>>(path)?)
         .map_err(|e| e.in_file(path))
 }
 
 /// What documents of truth and of detections give, for the fuzzers.
 #[cfg(feature = "fuzzing")]
-pub(crate) fn sheets_of(truth: &str, found: &str) -> Result<Vec<Sheet>> {
+#[cfg(feature = "fuzzing")]
+pub(crate) fn sheets_of(truth: &str, found: &str) -> Result<Vec<EvalImage>> {
     let mut truth = CocoTruth::new(&io::parse_json(truth)?)?;
-    truth.add(&io::parse_json::<Vec<Detection>>(found)?)?;
+    truth.add(&io::parse_json::<Vec<CocoDetection>>(found)?)?;
     Ok(truth.sheets)
 }
 
 impl CocoTruth {
-    fn new(document: &Document) -> Result<Self> {
+    fn new(document: &CocoDocument) -> Result<Self> {
         let images = places("images", document.images.iter().map(|image| image.id))?;
         let categories = places("categories", document.categories.iter().map(|c| c.id))?;
-        let name = |&i: &usize| document.categories[i].name.clone();
+        let records = || images.values().map(|&i| &document.images[i]);
         let mut truth = Self {
-            sheets: images
-                .values()
-                .map(|&i| Sheet::new(document.images[i].name(), Vec::new()))
+            sheets: records()
+                .map(|image| EvalImage::new(image.name(), Vec::new()))
                 .collect(),
-            classes: categories.values().map(name).collect(),
-            files: images
+            classes: categories
                 .values()
-                .map(|&i| document.images[i].file())
+                .map(|&i| document.categories[i].name.clone())
                 .collect(),
-            images: images.into_keys().zip(0..).collect(),
+            files: records().map(ImageRecord::file).collect(),
+            images: images.keys().copied().zip(0..).collect(),
             categories: categories.into_keys().zip(0..).collect(),
         };
-        for (i, a) in document.annotations.iter().enumerate() {
-            let at = || format!("annotations[{i}]");
-            let (image, class) = truth
-                .place(a.image_id, a.category_id)
-                .map_err(|e| e.within(&at()))?;
-            let bbox = corners(a.bbox).map_err(|e| e.within(&at()))?;
-            let area = a.area.unwrap_or(a.bbox[2] * a.bbox[3]);
-            truth.sheets[image].truth.push(TrueBox {
-                class,
-                bbox,
-                area,
-                crowd: a.iscrowd != 0,
-            });
+        for (i, annotation) in document.annotations.iter().enumerate() {
+            truth
+                .add_annotation(annotation)
+                .map_err(|e| e.within(&format!("annotations[{i}]")))?;
         }
         Ok(truth)
     }
 
-    fn add(&mut self, found: &[Detection]) -> Result<()> {
-        for (i, d) in found.iter().enumerate() {
-            let at = || format!("[{i}]");
-            let (image, class) = self
-                .place(d.image_id, d.category_id)
-                .map_err(|e| e.within(&at()))?;
-            let bbox = corners(d.bbox).map_err(|e| e.within(&at()))?;
-            self.sheets[image].found.push(FoundBox {
-                class,
-                bbox,
-                confidence: d.score,
-            });
+    fn add_annotation(&mut self, annotation: &CocoAnnotation) -> Result<()> {
+        let (image, class) = self.place(annotation.image_id, annotation.category_id)?;
+        let bbox = corners(annotation.bbox)?;
+        let [_, _, width, height] = annotation.bbox;
+        self.sheets[image].truth.push(GroundTruth {
+            class,
+            bbox,
+            area: annotation.area.unwrap_or(width * height),
+            crowd: annotation.iscrowd != 0,
+        });
+        Ok(())
+    }
+
+    fn add(&mut self, found: &[CocoDetection]) -> Result<()> {
+        for (i, detection) in found.iter().enumerate() {
+            self.add_detection(detection)
+                .map_err(|e| e.within(&format!("[{i}]")))?;
         }
+        Ok(())
+    }
+
+    fn add_detection(&mut self, detection: &CocoDetection) -> Result<()> {
+        let (image, class) = self.place(detection.image_id, detection.category_id)?;
+        let bbox = corners(detection.bbox)?;
+        self.sheets[image].found.push(Detection {
+            class,
+            bbox,
+            confidence: detection.score,
+        });
         Ok(())
     }
 
@@ -161,44 +168,49 @@ impl CocoTruth {
     /// Where the images are: in `folder`, or where COCO and petcomp have them for a document at `path`. A file name that
     /// leads out of a folder leads nowhere.
     pub fn pictures(&self, path: &Path, folder: Option<&Path>) -> Vec<Option<Picture>> {
-        let roots = folder.map_or_else(|| beside(path), |folder| vec![folder.to_path_buf()]);
-        let picture = |(name, size): &(String, Option<[f64; 2]>)| {
-            let below = Path::new(name)
-                .components()
-                .all(|part| matches!(part, Component::Normal(_)));
-            let path = roots
-                .iter()
-                .map(|root| root.join(name))
-                .find(|path| below && path.is_file())?;
-            let size = size.or_else(|| {
-                io::read_header(&path)
-                    .ok()
-                    .map(|h| [h.width as f64, h.height as f64])
-            })?;
-            Some(Picture { path, size })
-        };
-        self.files.iter().map(picture).collect()
+        let roots = folder.map_or_else(|| image_folders(path), |folder| vec![folder.to_path_buf()]);
+        self.files
+            .iter()
+            .map(|(name, size)| find_picture(&roots, name, *size))
+            .collect()
     }
 }
 
 /// Folders that may hold the images of `annotations/instances_val2017.json`.
-fn beside(path: &Path) -> Vec<PathBuf> {
-    let here = path.parent().unwrap_or(Path::new(""));
-    let above = here.join("..");
+fn image_folders(path: &Path) -> Vec<PathBuf> {
+    let folder = path.parent().unwrap_or(Path::new(""));
     let stem = path
         .file_stem()
         .map(|n| n.to_string_lossy().into_owned())
         .unwrap_or_default();
-    let part = stem.rsplit('_').next().unwrap_or_default().to_owned();
-    let roots = |root: &Path| {
-        [
-            root.to_path_buf(),
-            root.join("images"),
-            root.join(&part),
-            root.join("images").join(&part),
-        ]
-    };
-    [roots(here), roots(&above)].concat()
+    let part = stem.rsplit('_').next().unwrap_or_default();
+    [folder.to_path_buf(), folder.join("..")]
+        .iter()
+        .flat_map(|root| {
+            [
+                root.clone(),
+                root.join("images"),
+                root.join(part),
+                root.join("images").join(part),
+            ]
+        })
+        .collect()
+}
+
+/// The image of this name below one of the folders, and its size where that is known.
+fn find_picture(roots: &[PathBuf], name: &str, size: Option<[f64; 2]>) -> Option<Picture> {
+    let is_below = Path::new(name)
+        .components()
+        .all(|part| matches!(part, Component::Normal(_)));
+    let path = roots
+        .iter()
+        .map(|root| root.join(name))
+        .find(|path| is_below && path.is_file())?;
+    let size = size.or_else(|| {
+        let header = io::read_header(&path).ok()?;
+        Some([header.width as f64, header.height as f64])
+    })?;
+    Some(Picture { path, size })
 }
 
 /// Places in the document by id, in order of the ids.

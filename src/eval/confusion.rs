@@ -1,6 +1,6 @@
-//! Which class is taken for which.
+//! Which class is found where which is true.
 
-use super::Sheet;
+use super::EvalImage;
 use super::pairing::pairs;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
@@ -33,8 +33,8 @@ impl Default for ConfusionOptions {
 
 impl Confusion {
     /// Counts over all images, whatever the classes of two boxes that overlap. Pairs are made from the greatest overlap
-    /// down; crowds, and detections in them, count for nobody.
-    pub fn new(sheets: &[Sheet], options: &ConfusionOptions) -> Self {
+    /// down; crowds, and detections in them, are ignored.
+    pub fn new(sheets: &[EvalImage], options: &ConfusionOptions) -> Self {
         let mut confusion = Self::default();
         for sheet in sheets {
             for pair in pairs(sheet, options) {
@@ -58,17 +58,17 @@ impl Confusion {
         self.counts.keys().flatten().flatten().copied().collect()
     }
 
-    /// The classes that occur, those first with the most boxes missed, found where nothing is, or taken for another class;
+    /// The classes that occur, those first with the most boxes missed, found where nothing is, or confused with another class;
     /// of equal ones those first with the most boxes.
     pub fn worst(&self) -> Vec<u32> {
         let mut sums: BTreeMap<u32, [u64; 2]> = BTreeMap::new();
         for (&[found, truth], &count) in &self.counts {
             let wrong = if found == truth { 0 } else { count };
-            let of = BTreeSet::from([found, truth]);
-            of.into_iter().flatten().for_each(|class| {
-                let sums = sums.entry(class).or_default();
-                *sums = [sums[0] + wrong, sums[1] + count];
-            });
+            for class in BTreeSet::from([found, truth]).into_iter().flatten() {
+                let [all_wrong, all] = sums.entry(class).or_default();
+                *all_wrong += wrong;
+                *all += count;
+            }
         }
         let mut classes: Vec<(u32, [u64; 2])> = sums.into_iter().collect();
         classes.sort_by_key(|&(_, sums)| std::cmp::Reverse(sums));

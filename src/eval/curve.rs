@@ -1,9 +1,9 @@
 //! Curves over confidence and over recall, at threshold 0.5.
 
-use super::average::{self, POINTS};
+use super::average::{self, RECALL_POINTS};
 use super::rank::Ranking;
-use super::yolov5::{self, CONFIDENCES, Ranked, best_confidence, confidence};
-use super::{Definition, Matches, Sheet, mean};
+use super::yolov5::{self, CONFIDENCE_STEPS, Ranked, best_confidence, confidence};
+use super::{Definition, EvalImage, Matches, mean};
 
 /// Curves of every class that occurs in the truth.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -24,11 +24,11 @@ pub struct Curves {
 
 /// Precision over recall, and F1 over confidence, at intersection over union 0.5, matched as by
 /// [`yolov5`](super::yolov5()).
-pub fn curves(sheets: &[Sheet]) -> Curves {
+pub fn curves(sheets: &[EvalImage]) -> Curves {
     Matches::new(sheets, Definition::Yolov5).curves()
 }
 
-pub(super) fn of(rankings: &[Ranking]) -> Curves {
+pub(super) fn from_rankings(rankings: &[Ranking]) -> Curves {
     let ranked = yolov5::ranked(rankings, &[]);
     let f1: Vec<_> = ranked.iter().map(f1).collect();
     Curves {
@@ -49,7 +49,7 @@ fn precision_recall(ranked: &Ranked<'_>) -> Vec<[f64; 2]> {
         .map(|(&r, &p)| [r, p])
         .collect();
     let last = all.len().saturating_sub(1);
-    let step = all.len().div_ceil(POINTS).max(1);
+    let step = all.len().div_ceil(RECALL_POINTS).max(1);
     all.into_iter()
         .enumerate()
         .filter(|(i, _)| i % step == 0 || *i == last)
@@ -81,8 +81,8 @@ fn mean_over(curves: &[Vec<[f64; 2]>]) -> Vec<[f64; 2]> {
 
 fn f1(ranked: &Ranked<'_>) -> Vec<[f64; 2]> {
     let at = |i| [confidence(i), ranked.f1_at(confidence(i))];
-    (0..CONFIDENCES)
-        .step_by(CONFIDENCES / POINTS)
+    (0..CONFIDENCE_STEPS)
+        .step_by(CONFIDENCE_STEPS / RECALL_POINTS)
         .map(at)
         .collect()
 }

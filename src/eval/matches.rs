@@ -3,10 +3,10 @@
 use super::by_class::ByClass;
 use super::coco::{self, AreaRange};
 use super::rank::Ranking;
-use super::{Curves, Definition, Scores, Sheet, curve, mean, yolov5};
+use super::{Curves, Definition, EvalImage, Scores, curve, mean, yolov5};
 use rayon::prelude::*;
 
-/// Detections held against the truth once, which is what takes long: they can be scored for any weights of the images.
+/// Detections matched with the truth once, which is what takes long: they can be scored for any weights of the images.
 #[derive(Clone, Debug)]
 pub struct Matches {
     definition: Definition,
@@ -15,8 +15,8 @@ pub struct Matches {
 }
 
 impl Matches {
-    /// Holds all detections against the truth.
-    pub fn new(sheets: &[Sheet], definition: Definition) -> Self {
+    /// Matches all detections with the truth.
+    pub fn new(sheets: &[EvalImage], definition: Definition) -> Self {
         let rankings = match definition {
             Definition::Yolov5 => yolov5::rankings(sheets),
             Definition::Coco => coco::rankings(&ByClass::new(sheets), AreaRange::All),
@@ -66,7 +66,7 @@ impl Matches {
 
     /// As [`curves`](super::curves()), matched by this definition.
     pub fn curves(&self) -> Curves {
-        curve::of(&self.rankings)
+        curve::from_rankings(&self.rankings)
     }
 
     fn check(&self, weights: &[u32]) {
@@ -92,7 +92,7 @@ mod tests {
                 .collect();
             sheet((0..3).map(|class| there(class, near(0))).collect(), seen)
         };
-        let sheets: Vec<Sheet> = (0..6).map(one).collect();
+        let sheets: Vec<EvalImage> = (0..6).map(one).collect();
         for definition in [Definition::Yolov5, Definition::Coco] {
             let matches = Matches::new(&sheets, definition);
             for weights in [&[][..], &[1, 0, 3, 1, 2, 1], &[0, 0, 0, 0, 0, 5], &[0; 6]] {

@@ -1,14 +1,14 @@
 //! What a detector got wrong, box by box.
 
 use super::overlap::{BoxIndex, iou};
-use super::pairing::{Pair, pairs};
-use super::{ConfusionOptions, Sheet};
+use super::pairing::pairs;
+use super::{ConfusionOptions, EvalImage};
 use rayon::prelude::*;
 use std::cmp::Ordering;
 
 /// How a detection or a box is wrong.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Kind {
+pub enum MistakeKind {
     /// A detection where nothing is, or the second one of a box.
     FalseAlarm,
     /// A detection of a box of another class.
@@ -23,7 +23,7 @@ pub struct Mistake {
     /// Which sheet.
     pub sheet: usize,
     /// What is wrong.
-    pub kind: Kind,
+    pub kind: MistakeKind,
     /// The detection: of a miss the one that overlaps it most, however unsure, if any does.
     pub found: Option<usize>,
     /// The box of the truth: of a false alarm the one that it overlaps most, if any.
@@ -34,93 +34,108 @@ pub struct Mistake {
 
 /// All mistakes by the pairs that a [`Confusion`](super::Confusion) counts, the worst first: of detections the surest,
 /// of misses the box with the most area that no detection covers.
-pub fn mistakes(sheets: &[Sheet], options: &ConfusionOptions) -> Vec<Mistake> {
-    let of_sheet = |(i, sheet): (usize, &Sheet)| -> Vec<(f64, Mistake)> {
-        let mistakes = in_sheet(i, sheet, options);
-        mistakes
-            .into_iter()
-            .map(|m| (badness(sheet, &m), m))
-            .collect()
-    };
+pub fn mistakes(sheets: &[EvalImage], options: &ConfusionOptions) -> Vec<Mistake> {
     let mut all: Vec<(f64, Mistake)> = sheets
         .par_iter()
         .enumerate()
-        .flat_map_iter(of_sheet)
+        .flat_map_iter(|(i, sheet)| {
+            let mistakes = MistakeFinder::new(i, sheet).find(options);
+            mistakes.into_iter().map(|m| (severity(sheet, &m), m))
+        })
         .collect();
-    let worse = |a: &(f64, Mistake), b: &(f64, Mistake)| -> Ordering {
-        (a.1.kind == Kind::Missed)
-            .cmp(&(b.1.kind == Kind::Missed))
-            .then(b.0.total_cmp(&a.0))
-    };
-    all.sort_by(worse);
+    all.sort_by(worst_first);
     all.into_iter().map(|(_, mistake)| mistake).collect()
 }
 
-fn in_sheet(place: usize, sheet: &Sheet, options: &ConfusionOptions) -> Vec<Mistake> {
-    let truth = BoxIndex::new(sheet.truth.iter().map(|t| t.bbox));
-    let found = BoxIndex::new(sheet.found.iter().map(|f| f.bbox));
-    let overlap = |f: usize, t: usize| iou(&sheet.found[f].bbox, &sheet.truth[t].bbox);
-    let most = |near: Vec<usize>, overlap: &dyn Fn(usize) -> f64| -> Option<(usize, f64)> {
-        near.into_iter()
-            .map(|i| (i, overlap(i)))
-            .max_by(|a, b| a.1.total_cmp(&b.1))
-    };
-    let mistake = |pair: Pair| match pair {
-        Pair {
-            found: Some(f),
-            truth: Some(t),
-        } => {
-            let wrong = sheet.found[f].class != sheet.truth[t].class;
-            wrong.then(|| Mistake {
-                sheet: place,
-                kind: Kind::WrongClass,
-                found: Some(f),
-                truth: Some(t),
-                iou: overlap(f, t),
-            })
-        }
-        Pair {
-            found: Some(f),
-            truth: None,
-        } => {
-            let nearest = most(truth.near(&sheet.found[f].bbox), &|t| overlap(f, t));
-            let (truth, iou) = nearest.map_or((None, 0.0), |(t, iou)| (Some(t), iou));
-            Some(Mistake {
-                sheet: place,
-                kind: Kind::FalseAlarm,
-                found: Some(f),
-                truth,
-                iou,
-            })
-        }
-        Pair {
-            found: None,
-            truth: Some(t),
-        } => {
-            let nearest = most(found.near(&sheet.truth[t].bbox), &|f| overlap(f, t));
-            let (found, iou) = nearest.map_or((None, 0.0), |(f, iou)| (Some(f), iou));
-            Some(Mistake {
-                sheet: place,
-                kind: Kind::Missed,
-                found,
-                truth: Some(t),
-                iou,
-            })
-        }
-        Pair {
-            found: None,
-            truth: None,
-        } => None,
-    };
-    pairs(sheet, options)
-        .into_iter()
-        .filter_map(mistake)
-        .collect()
+/// Detections before misses; of each kind the most severe first.
+fn worst_first(a: &(f64, Mistake), b: &(f64, Mistake)) -> Ordering {
+    let is_missed = |mistake: &Mistake| mistake.kind == MistakeKind::Missed;
+    is_missed(&a.1)
+        .cmp(&is_missed(&b.1))
+        .then(b.0.total_cmp(&a.0))
 }
 
-fn badness(sheet: &Sheet, mistake: &Mistake) -> f64 {
+/// Finds the mistakes of one image.
+struct MistakeFinder<'a> {
+    place: usize,
+    sheet: &'a EvalImage,
+    truth: BoxIndex,
+    found: BoxIndex,
+}
+
+impl<'a> MistakeFinder<'a> {
+    fn new(place: usize, sheet: &'a EvalImage) -> Self {
+        Self {
+            place,
+            sheet,
+            truth: BoxIndex::new(sheet.truth.iter().map(|t| t.bbox)),
+            found: BoxIndex::new(sheet.found.iter().map(|f| f.bbox)),
+        }
+    }
+
+    fn find(&self, options: &ConfusionOptions) -> Vec<Mistake> {
+        pairs(self.sheet, options)
+            .into_iter()
+            .filter_map(|pair| match (pair.found, pair.truth) {
+                (Some(f), Some(t)) => self.wrong_class(f, t),
+                (Some(f), None) => Some(self.false_alarm(f)),
+                (None, Some(t)) => Some(self.missed(t)),
+                (None, None) => None,
+            })
+            .collect()
+    }
+
+    fn wrong_class(&self, f: usize, t: usize) -> Option<Mistake> {
+        let is_wrong = self.sheet.found[f].class != self.sheet.truth[t].class;
+        is_wrong.then(|| Mistake {
+            sheet: self.place,
+            kind: MistakeKind::WrongClass,
+            found: Some(f),
+            truth: Some(t),
+            iou: self.overlap(f, t),
+        })
+    }
+
+    fn false_alarm(&self, f: usize) -> Mistake {
+        let near = self.truth.near(&self.sheet.found[f].bbox);
+        let nearest = greatest(near, |t| self.overlap(f, t));
+        Mistake {
+            sheet: self.place,
+            kind: MistakeKind::FalseAlarm,
+            found: Some(f),
+            truth: nearest.map(|(t, _)| t),
+            iou: nearest.map_or(0.0, |(_, iou)| iou),
+        }
+    }
+
+    fn missed(&self, t: usize) -> Mistake {
+        let near = self.found.near(&self.sheet.truth[t].bbox);
+        let nearest = greatest(near, |f| self.overlap(f, t));
+        Mistake {
+            sheet: self.place,
+            kind: MistakeKind::Missed,
+            found: nearest.map(|(f, _)| f),
+            truth: Some(t),
+            iou: nearest.map_or(0.0, |(_, iou)| iou),
+        }
+    }
+
+    fn overlap(&self, f: usize, t: usize) -> f64 {
+        iou(&self.sheet.found[f].bbox, &self.sheet.truth[t].bbox)
+    }
+}
+
+/// The box with the greatest overlap, the last of equal ones.
+fn greatest(boxes: Vec<usize>, overlap: impl Fn(usize) -> f64) -> Option<(usize, f64)> {
+    boxes
+        .into_iter()
+        .map(|i| (i, overlap(i)))
+        .max_by(|a, b| a.1.total_cmp(&b.1))
+}
+
+fn severity(sheet: &EvalImage, mistake: &Mistake) -> f64 {
     match (mistake.kind, mistake.truth, mistake.found) {
-        (Kind::Missed, Some(t), _) => sheet.truth[t].area * (1.0 - mistake.iou),
+        (MistakeKind::Missed, Some(t), _) => sheet.truth[t].area * (1.0 - mistake.iou),
         (_, _, Some(f)) => sheet.found[f].confidence,
         _ => 0.0,
     }
@@ -148,10 +163,10 @@ mod tests {
         assert_eq!(
             all.iter().map(told).collect::<Vec<_>>(),
             [
-                (Kind::WrongClass, Some(1), Some(0)),
-                (Kind::FalseAlarm, Some(0), None),
-                (Kind::FalseAlarm, Some(2), Some(1)),
-                (Kind::Missed, Some(2), Some(1)),
+                (MistakeKind::WrongClass, Some(1), Some(0)),
+                (MistakeKind::FalseAlarm, Some(0), None),
+                (MistakeKind::FalseAlarm, Some(2), Some(1)),
+                (MistakeKind::Missed, Some(2), Some(1)),
             ]
         );
         assert!((all[3].iou - 400.0 / 2800.0).abs() < 1e-12);

@@ -2,8 +2,8 @@
 //!
 //! Average precision has two definitions in use, and they differ by more than rounding: [`Definition::Yolov5`]
 //! integrates a precision curve over 101 points, [`Definition::Coco`] averages 101 readings of it, looks at no more
-//! than 100 detections an image and knows boxes that count for nobody. Both are computed here from the same
-//! [`Sheet`]s, one per image.
+//! than 100 detections an image and knows boxes that are ignored. Both are computed here from the same
+//! [`EvalImage`]s, one per image.
 
 mod average;
 mod bootstrap;
@@ -32,13 +32,13 @@ pub use coco_json::{CocoTruth, read_coco_results, read_coco_truth};
 pub use confusion::{Confusion, ConfusionOptions};
 pub use curve::{Curves, curves};
 pub use matches::Matches;
-pub use mistake::{Kind, Mistake, mistakes};
+pub use mistake::{Mistake, MistakeKind, mistakes};
 pub use overlap::iou;
 pub(crate) use picture::class_name;
-pub use picture::{CURVES_SHOWN, confusion_picture, f1_picture, precision_recall_picture};
+pub use picture::{MAX_CURVES, confusion_picture, f1_picture, precision_recall_picture};
 pub use tag::{Tags, read_tags};
 pub(crate) use yolo::sheet_of as yolo_sheet;
-pub use yolo::{YoloTruth, read_yolo_found, read_yolo_truth};
+pub use yolo::{YoloTruth, read_yolo_detections, read_yolo_truth};
 pub use yolov5::yolov5;
 
 use crate::geom::BBox;
@@ -50,7 +50,7 @@ pub const THRESHOLDS: usize = 10;
 
 /// A box of the truth.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TrueBox {
+pub struct GroundTruth {
     /// Index into the class list.
     pub class: u32,
     /// Where, pixels.
@@ -63,7 +63,7 @@ pub struct TrueBox {
 
 /// A box that a detector found.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FoundBox {
+pub struct Detection {
     /// Index into the class list.
     pub class: u32,
     /// Where, pixels.
@@ -74,18 +74,18 @@ pub struct FoundBox {
 
 /// What is in an image and what was found in it.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Sheet {
+pub struct EvalImage {
     /// Name of the image, without folder and extension.
     pub image: String,
     /// What there is.
-    pub truth: Vec<TrueBox>,
+    pub truth: Vec<GroundTruth>,
     /// What was found, in any order.
-    pub found: Vec<FoundBox>,
+    pub found: Vec<Detection>,
 }
 
-impl Sheet {
+impl EvalImage {
     /// An image in which nothing was found yet.
-    pub fn new(image: impl Into<String>, truth: Vec<TrueBox>) -> Self {
+    pub fn new(image: impl Into<String>, truth: Vec<GroundTruth>) -> Self {
         Self {
             image: image.into(),
             truth,
@@ -170,7 +170,7 @@ impl ClassScores {
 ///
 /// # Panics
 /// When there are weights and not one per sheet.
-pub fn evaluate(sheets: &[Sheet], definition: Definition, weights: &[u32]) -> Scores {
+pub fn evaluate(sheets: &[EvalImage], definition: Definition, weights: &[u32]) -> Scores {
     Matches::new(sheets, definition).scores(weights)
 }
 
@@ -210,8 +210,8 @@ pub(crate) mod tests {
         }
     }
 
-    pub(crate) fn there(class: u32, bbox: BBox) -> TrueBox {
-        TrueBox {
+    pub(crate) fn there(class: u32, bbox: BBox) -> GroundTruth {
+        GroundTruth {
             class,
             bbox,
             area: bbox.width() * bbox.height(),
@@ -219,16 +219,16 @@ pub(crate) mod tests {
         }
     }
 
-    pub(crate) fn found(class: u32, bbox: BBox, confidence: f64) -> FoundBox {
-        FoundBox {
+    pub(crate) fn found(class: u32, bbox: BBox, confidence: f64) -> Detection {
+        Detection {
             class,
             bbox,
             confidence,
         }
     }
 
-    pub(crate) fn sheet(truth: Vec<TrueBox>, found: Vec<FoundBox>) -> Sheet {
-        Sheet {
+    pub(crate) fn sheet(truth: Vec<GroundTruth>, found: Vec<Detection>) -> EvalImage {
+        EvalImage {
             image: String::new(),
             truth,
             found,

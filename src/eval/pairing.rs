@@ -1,47 +1,34 @@
 //! Which detection names which box, whatever their classes.
 
 use super::overlap::{BoxIndex, area, intersection, iou, share};
-use super::{ConfusionOptions, Sheet};
+use super::{ConfusionOptions, EvalImage};
 use std::collections::BinaryHeap;
 
 /// A detection and the box that it names, by their places in the sheet: without a box it is a false alarm, without a
 /// detection a miss.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Pair {
+pub(super) struct BoxPair {
     pub(super) found: Option<usize>,
     pub(super) truth: Option<usize>,
 }
 
 /// Every detection and every box that counts, once. Pairs are made from the greatest overlap down; detections in a
-/// crowd count for nobody.
-pub(super) fn pairs(sheet: &Sheet, options: &ConfusionOptions) -> Vec<Pair> {
-    let mut search = Search::new(sheet, options);
-    let sure = |&f: &usize| sheet.found[f].confidence > options.confidence;
-    let found: Vec<usize> = (0..sheet.found.len()).filter(sure).collect();
-    let mut open: BinaryHeap<Candidate> = found.iter().filter_map(|&f| search.best(f)).collect();
-    let mut names = vec![None; sheet.found.len()];
-    while let Some(Candidate { truth, found, .. }) = open.pop() {
-        if search.taken[truth] {
-            // What it would have named has been named; boxes only get fewer, so its next one is no better than this was.
-            open.extend(search.best(found));
-        } else {
-            search.taken[truth] = true;
-            names[found] = Some(truth);
-        }
-    }
-    let missed = (0..sheet.truth.len()).filter(|&t| !search.taken[t] && !sheet.truth[t].crowd);
-    let missed = missed.map(|t| Pair {
-        found: None,
-        truth: Some(t),
-    });
-    let seen = found.iter().map(|&f| Pair {
-        found: Some(f),
-        truth: names[f],
-    });
-    let mut pairs: Vec<Pair> = seen
-        .filter(|p| p.truth.is_some() || !search.in_crowd(p.found))
+/// crowd are ignored.
+pub(super) fn pairs(sheet: &EvalImage, options: &ConfusionOptions) -> Vec<BoxPair> {
+    let mut search = PairSearch::new(sheet, options);
+    let sure: Vec<usize> = (0..sheet.found.len())
+        .filter(|&f| sheet.found[f].confidence > options.confidence)
         .collect();
-    pairs.extend(missed);
+    let matched = search.match_boxes(&sure);
+    let mut pairs: Vec<BoxPair> = sure
+        .iter()
+        .map(|&f| BoxPair {
+            found: Some(f),
+            truth: matched[f],
+        })
+        .filter(|pair| pair.truth.is_some() || !search.in_crowd(pair.found))
+        .collect();
+    pairs.extend(search.missed());
     pairs
 }
 
@@ -69,39 +56,62 @@ impl PartialOrd for Candidate {
     }
 }
 
-struct Search<'a> {
-    sheet: &'a Sheet,
+struct PairSearch<'a> {
+    sheet: &'a EvalImage,
     index: BoxIndex,
     taken: Vec<bool>,
-    least: f64,
+    min_iou: f64,
 }
 
-impl<'a> Search<'a> {
-    fn new(sheet: &'a Sheet, options: &ConfusionOptions) -> Self {
+impl<'a> PairSearch<'a> {
+    fn new(sheet: &'a EvalImage, options: &ConfusionOptions) -> Self {
         let index = BoxIndex::new(sheet.truth.iter().map(|t| t.bbox));
         Self {
             sheet,
             index,
             taken: vec![false; sheet.truth.len()],
-            least: options.iou,
+            min_iou: options.iou,
         }
+    }
+
+    /// The box that each detection names.
+    fn match_boxes(&mut self, found: &[usize]) -> Vec<Option<usize>> {
+        let mut open: BinaryHeap<Candidate> = found.iter().filter_map(|&f| self.best(f)).collect();
+        let mut matched = vec![None; self.sheet.found.len()];
+        while let Some(Candidate { truth, found, .. }) = open.pop() {
+            if self.taken[truth] {
+                // Its box has been taken; boxes only get fewer, so its next one is no better than this was.
+                open.extend(self.best(found));
+            } else {
+                self.taken[truth] = true;
+                matched[found] = Some(truth);
+            }
+        }
+        matched
+    }
+
+    /// The boxes that no detection names.
+    fn missed(&self) -> impl Iterator<Item = BoxPair> {
+        (0..self.sheet.truth.len())
+            .filter(|&t| !self.taken[t] && !self.sheet.truth[t].crowd)
+            .map(|t| BoxPair {
+                found: None,
+                truth: Some(t),
+            })
     }
 
     fn best(&self, found: usize) -> Option<Candidate> {
         let bbox = &self.sheet.found[found].bbox;
-        let free = |&t: &usize| !self.taken[t] && !self.sheet.truth[t].crowd;
-        let candidate = |t: usize| Candidate {
-            overlap: iou(&self.sheet.truth[t].bbox, bbox),
-            truth: t,
-            found,
-        };
-        let near = self
-            .index
+        self.index
             .near(bbox)
             .into_iter()
-            .filter(free)
-            .map(candidate);
-        near.filter(|candidate| candidate.overlap > self.least)
+            .filter(|&t| !self.taken[t] && !self.sheet.truth[t].crowd)
+            .map(|t| Candidate {
+                overlap: iou(&self.sheet.truth[t].bbox, bbox),
+                truth: t,
+                found,
+            })
+            .filter(|candidate| candidate.overlap > self.min_iou)
             .max()
     }
 
@@ -109,13 +119,10 @@ impl<'a> Search<'a> {
     fn in_crowd(&self, found: Option<usize>) -> bool {
         found.is_some_and(|f| {
             let bbox = &self.sheet.found[f].bbox;
-            let inside = |t: usize| {
-                share(intersection(bbox, &self.sheet.truth[t].bbox), area(bbox)) > self.least
-            };
-            self.index
-                .near(bbox)
-                .into_iter()
-                .any(|t| self.sheet.truth[t].crowd && inside(t))
+            self.index.near(bbox).into_iter().any(|t| {
+                let truth = &self.sheet.truth[t];
+                truth.crowd && share(intersection(bbox, &truth.bbox), area(bbox)) > self.min_iou
+            })
         })
     }
 }
@@ -123,12 +130,12 @@ impl<'a> Search<'a> {
 #[cfg(test)]
 mod tests {
     use super::super::tests::{bbox, found, sheet, there};
-    use super::super::{FoundBox, TrueBox};
+    use super::super::{Detection, GroundTruth};
     use super::*;
     use proptest::prelude::*;
 
     /// All pairs in order of overlap: what the search above saves.
-    fn by_sorting(sheet: &Sheet, least: f64) -> Vec<(usize, usize)> {
+    fn by_sorting(sheet: &EvalImage, least: f64) -> Vec<(usize, usize)> {
         let each = (0..sheet.truth.len()).flat_map(|t| (0..sheet.found.len()).map(move |f| (t, f)));
         let mut all: Vec<_> = each
             .map(|(t, f)| (iou(&sheet.truth[t].bbox, &sheet.found[f].bbox), t, f))
@@ -156,8 +163,8 @@ mod tests {
             seen in prop::collection::vec([0_u8..30, 0..30, 1..20, 1..20], 0..40),
         ) {
             let made = |[x, y, w, h]: [u8; 4]| bbox(x.into(), y.into(), w.into(), h.into());
-            let truth: Vec<TrueBox> = truth.into_iter().map(|b| there(0, made(b))).collect();
-            let seen: Vec<FoundBox> = seen.into_iter().map(|b| found(0, made(b), 0.9)).collect();
+            let truth: Vec<GroundTruth> = truth.into_iter().map(|b| there(0, made(b))).collect();
+            let seen: Vec<Detection> = seen.into_iter().map(|b| found(0, made(b), 0.9)).collect();
             let sheet = sheet(truth, seen);
             let mut made: Vec<_> = pairs(&sheet, &Default::default())
                 .iter().filter_map(|p| p.truth.zip(p.found)).collect();
@@ -176,7 +183,7 @@ mod tests {
         let all = sheet(
             vec![
                 there(0, b),
-                TrueBox {
+                GroundTruth {
                     crowd: true,
                     ..there(0, crowd)
                 },
@@ -184,11 +191,11 @@ mod tests {
             seen,
         );
         let expected = [
-            Pair {
+            BoxPair {
                 found: Some(1),
                 truth: None,
             },
-            Pair {
+            BoxPair {
                 found: None,
                 truth: Some(0),
             },

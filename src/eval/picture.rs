@@ -7,15 +7,15 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 
 /// Widest and narrowest side of a cell of the matrix, what all of them may take, and room for names, in SVG units.
-const CELL: [f64; 2] = [26.0, 56.0];
-const CELLS: f64 = 900.0;
-const NAMES: f64 = 150.0;
+const CELL_SIDES: [f64; 2] = [26.0, 56.0];
+const MAX_MATRIX_SIDE: f64 = 900.0;
+const NAME_ROOM: f64 = 150.0;
 
 /// So many letters of a name have room beside the matrix, and beside a chart.
-const LETTERS: usize = 20;
+const MAX_NAME_LETTERS: usize = 20;
 
 /// So many classes have a curve of their own beside the mean: colours are not told apart beyond.
-pub const CURVES_SHOWN: usize = 7;
+pub const MAX_CURVES: usize = 7;
 
 /// Precision over recall: the mean of all classes, and the first of the classes to be `shown`.
 pub fn precision_recall_picture(curves: &Curves, names: &[String], shown: &[u32]) -> String {
@@ -46,12 +46,12 @@ pub fn f1_picture(curves: &Curves, names: &[String], shown: &[u32]) -> String {
     )
 }
 
-type Line = Vec<[f64; 2]>;
+type CurvePoints = Vec<[f64; 2]>;
 
 fn picture(
     title: &str,
     axes: [&str; 2],
-    (mean, lines): (&Line, &[Line]),
+    (mean, lines): (&CurvePoints, &[CurvePoints]),
     curves: &Curves,
     names: &[String],
     shown: &[u32],
@@ -61,8 +61,6 @@ fn picture(
         range: [0.0, 1.0],
         logarithmic: false,
     });
-    let place = |class: &u32| curves.classes.binary_search(class).ok();
-    let places: Vec<usize> = shown.iter().filter_map(place).take(CURVES_SHOWN).collect();
     let mut chart = Chart {
         title: title.into(),
         across,
@@ -70,15 +68,16 @@ fn picture(
         ..Default::default()
     };
     if curves.classes.len() > 1 {
-        chart
-            .names
-            .push(format!("mean of {} classes", curves.classes.len()));
+        let name = format!("mean of {} classes", curves.classes.len());
+        chart.names.push(name);
         chart.curves.push(mean.clone());
     }
-    for place in places {
-        chart
-            .names
-            .push(clipped(&class_name(curves.classes[place], names), LETTERS));
+    let places = shown
+        .iter()
+        .filter_map(|class| curves.classes.binary_search(class).ok());
+    for place in places.take(MAX_CURVES) {
+        let name = class_name(curves.classes[place], names);
+        chart.names.push(clipped(&name, MAX_NAME_LETTERS));
         chart.curves.push(lines[place].clone());
     }
     Chart::row(&[chart])
@@ -87,34 +86,46 @@ fn picture(
 /// Found against true classes, those to be `shown`: each column's shares as shades, counts in words. Others share a row
 /// and a column, and so does the background.
 pub fn confusion_picture(confusion: &Confusion, names: &[String], shown: &[u32]) -> String {
-    let matrix = Matrix::new(confusion, names, shown);
+    let matrix = ConfusionTable::new(confusion, names, shown);
     let n = matrix.titles.len();
-    let cell = (CELLS / n as f64).clamp(CELL[0], CELL[1]);
-    let side = NAMES + cell * n as f64;
+    let cell = (MAX_MATRIX_SIDE / n as f64).clamp(CELL_SIDES[0], CELL_SIDES[1]);
+    let side = NAME_ROOM + cell * n as f64;
     // The turned name of the last column reaches beyond it.
-    let width = side + NAMES / 2.0;
+    let width = side + NAME_ROOM / 2.0;
     let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {side}\" width=\"{width}\" height=\"{side}\" \
          font-family=\"sans-serif\" font-size=\"{:.1}\">\n<rect width=\"{width}\" height=\"{side}\" fill=\"white\"/>\n",
         (0.42 * cell).min(12.0)
     );
     svg += &word([8.0, 20.0], "start", "found, down; true, across", "");
-    for (i, title) in matrix.titles.iter().enumerate() {
-        let (middle, short) = (NAMES + cell * (i as f64 + 0.5), clipped(title, LETTERS));
-        svg += &word([NAMES - 8.0, middle + 4.0], "end", &short, "");
-        let turned = format!(" transform=\"rotate(-40 {middle:.1} {})\"", NAMES - 8.0);
-        svg += &word([middle, NAMES - 8.0], "start", &short, &turned);
-    }
+    svg += &matrix.names(cell);
     svg += &matrix.lines(cell);
-    matrix
-        .counts
-        .iter()
-        .for_each(|(&at, &count)| svg += &matrix.cell(at, count, cell));
+    for (&at, &count) in &matrix.counts {
+        svg += &matrix.cell(at, count, cell);
+    }
     svg + "</svg>\n"
 }
 
+/// The classes to be shown, the others as one, and the background.
+fn titles(confusion: &Confusion, names: &[String], shown: &[u32]) -> Vec<String> {
+    let mut titles: Vec<String> = shown
+        .iter()
+        .map(|&class| class_name(class, names))
+        .collect();
+    let others = confusion
+        .classes()
+        .iter()
+        .filter(|class| !shown.contains(class))
+        .count();
+    if others > 0 {
+        titles.push(format!("{others} others"));
+    }
+    titles.push("background".into());
+    titles
+}
+
 /// A confusion as a table that is not longer than can be shown.
-struct Matrix {
+struct ConfusionTable {
     /// What the rows and columns are.
     titles: Vec<String>,
     /// By column and row; what never happened is left out.
@@ -123,21 +134,9 @@ struct Matrix {
     sums: Vec<u64>,
 }
 
-impl Matrix {
+impl ConfusionTable {
     fn new(confusion: &Confusion, names: &[String], shown: &[u32]) -> Self {
-        let mut titles: Vec<String> = shown
-            .iter()
-            .map(|&class| class_name(class, names))
-            .collect();
-        let others = confusion
-            .classes()
-            .iter()
-            .filter(|class| !shown.contains(class))
-            .count();
-        if others > 0 {
-            titles.push(format!("{others} others"));
-        }
-        titles.push("background".into());
+        let titles = titles(confusion, names, shown);
         let places: BTreeMap<u32, usize> = shown.iter().copied().zip(0..).collect();
         let background = titles.len() - 1;
         let place = |class: Option<u32>| match class {
@@ -156,12 +155,26 @@ impl Matrix {
         }
     }
 
+    /// The names of the rows and columns.
+    fn names(&self, cell: f64) -> String {
+        let mut svg = String::new();
+        let edge = NAME_ROOM - 8.0;
+        for (i, title) in self.titles.iter().enumerate() {
+            let middle = NAME_ROOM + cell * (i as f64 + 0.5);
+            let short = clipped(title, MAX_NAME_LETTERS);
+            svg += &word([edge, middle + 4.0], "end", &short, "");
+            let turned = format!(" transform=\"rotate(-40 {middle:.1} {edge})\"");
+            svg += &word([middle, edge], "start", &short, &turned);
+        }
+        svg
+    }
+
     fn lines(&self, cell: f64) -> String {
         let n = self.titles.len();
         let all = cell * n as f64;
         let line = |i: usize| {
-            let at = NAMES + cell * i as f64;
-            format!("M{at:.1} {NAMES}v{all:.1}M{NAMES} {at:.1}h{all:.1}")
+            let at = NAME_ROOM + cell * i as f64;
+            format!("M{at:.1} {NAME_ROOM}v{all:.1}M{NAME_ROOM} {at:.1}h{all:.1}")
         };
         let lines: String = (0..=n).map(line).collect();
         format!("<path d=\"{lines}\" stroke=\"#ddd\" fill=\"none\"/>\n")
@@ -169,7 +182,7 @@ impl Matrix {
 
     fn cell(&self, [column, row]: [usize; 2], count: u64, cell: f64) -> String {
         let share = count as f64 / self.sums[column] as f64;
-        let [x, y] = [column, row].map(|i| NAMES + cell * i as f64);
+        let [x, y] = [column, row].map(|i| NAME_ROOM + cell * i as f64);
         let light = 255.0 - 200.0 * share;
         let ink = if share > 0.6 { " fill=\"white\"" } else { "" };
         let mut svg = String::new();
@@ -239,7 +252,7 @@ mod tests {
         let many: Vec<_> = (0..2000)
             .map(|class| ([Some(class), Some(class)], 1))
             .collect();
-        let matrix = Matrix::new(&confusion(&many), &[], &[7, 1999]);
+        let matrix = ConfusionTable::new(&confusion(&many), &[], &[7, 1999]);
         assert_eq!(
             matrix.titles,
             ["class 7", "class 1999", "1998 others", "background"]
@@ -277,7 +290,7 @@ mod tests {
             ..Default::default()
         };
         let svg = precision_recall_picture(&curves, &[], &(0..50).collect::<Vec<_>>());
-        assert_eq!(svg.matches("<polyline").count(), 1 + CURVES_SHOWN);
+        assert_eq!(svg.matches("<polyline").count(), 1 + MAX_CURVES);
         assert!(svg.contains("mean of 1000 classes"));
     }
 }

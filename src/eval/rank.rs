@@ -7,7 +7,7 @@ use rayon::prelude::*;
 /// Bits, one per threshold.
 pub(super) type Marks = u16;
 
-/// A detection after it was held against the truth.
+/// A detection after it was matched with the truth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Hit {
     pub(super) confidence: f64,
@@ -17,7 +17,7 @@ pub(super) struct Hit {
     pub(super) place: u32,
     /// Thresholds at which it found something.
     pub(super) right: Marks,
-    /// Thresholds at which it counts for nobody.
+    /// Thresholds at which it is ignored.
     pub(super) ignored: Marks,
 }
 
@@ -28,7 +28,7 @@ pub(super) struct Running {
     pub(super) wrong: Vec<f64>,
 }
 
-/// The detections of a class, held against the truth once: they can be counted for any weights of the images.
+/// The detections of a class, matched with the truth once: they can be counted for any weights of the images.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Ranking {
     pub(super) class: u32,
@@ -39,13 +39,13 @@ pub(super) struct Ranking {
 }
 
 impl Ranking {
-    /// `held` gives the detections of an image, held against its boxes, and how many of those there are to be found.
+    /// `match_image` gives the detections of an image, matched with its boxes, and how many of those there are to be found.
     pub(super) fn new(
         boxes: &ClassBoxes<'_>,
-        held: impl Fn(&ImageBoxes<'_>) -> (Vec<Hit>, usize) + Send + Sync,
+        match_image: impl Fn(&ImageBoxes<'_>) -> (Vec<Hit>, usize) + Send + Sync,
     ) -> Self {
         let images = boxes.images();
-        let each: Vec<(Vec<Hit>, usize)> = images.par_iter().map(held).collect();
+        let each: Vec<(Vec<Hit>, usize)> = images.par_iter().map(match_image).collect();
         let counted = images
             .iter()
             .zip(&each)
@@ -110,8 +110,8 @@ impl Ranking {
             }
             all += count;
         }
-        for t in 0..THRESHOLDS {
-            sums[t].turn(right[t], all - right[t] - ignored[t]);
+        for (t, sums) in sums.iter_mut().enumerate() {
+            sums.turn(right[t], all - right[t] - ignored[t]);
         }
         sums
     }

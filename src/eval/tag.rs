@@ -16,7 +16,7 @@ pub struct Tags {
 /// Reads a CSV whose first column is the image's name and whose others are factors; its first line names them.
 ///
 /// # Errors
-/// [`Error::File`] for a file without a line of names, a line of another length, or an image told twice.
+/// [`Error::File`] for a file without a line of names, a line of another length, or an image listed twice.
 pub fn read_tags(path: &Path) -> Result<Tags> {
     let text = io::read_text(path)?;
     parse(&text).map_err(|what| Error::file(path, what))
@@ -27,11 +27,6 @@ fn parse(text: &str) -> std::result::Result<Tags, String> {
         .lines()
         .enumerate()
         .filter(|(_, line)| !line.trim().is_empty());
-    let cells = |line: &str| {
-        line.split(',')
-            .map(|cell| cell.trim().to_owned())
-            .collect::<Vec<_>>()
-    };
     let titles = lines
         .next()
         .map(|(_, line)| cells(line))
@@ -44,31 +39,33 @@ fn parse(text: &str) -> std::result::Result<Tags, String> {
         levels: BTreeMap::new(),
     };
     for (i, line) in lines {
-        let row = cells(line);
-        if row.len() != titles.len() {
-            return Err(format!(
-                "line {}: {} cells, expected {}",
-                i + 1,
-                row.len(),
-                titles.len()
-            ));
+        tags.add(cells(line))
+            .map_err(|what| format!("line {}: {what}", i + 1))?;
+    }
+    Ok(tags)
+}
+
+fn cells(line: &str) -> Vec<String> {
+    line.split(',').map(|cell| cell.trim().to_owned()).collect()
+}
+
+impl Tags {
+    /// Adds a line: the image and its level of each factor.
+    fn add(&mut self, row: Vec<String>) -> std::result::Result<(), String> {
+        let expected = 1 + self.factors.len();
+        if row.len() != expected {
+            return Err(format!("{} cells, expected {expected}", row.len()));
         }
         let stem = Path::new(&row[0])
             .file_stem()
             .map(|n| n.to_string_lossy().into_owned())
             .unwrap_or_default();
-        if tags.levels.insert(stem, row[1..].to_vec()).is_some() {
-            return Err(format!(
-                "line {}: image \"{}\" is told twice",
-                i + 1,
-                row[0]
-            ));
+        match self.levels.insert(stem, row[1..].to_vec()) {
+            None => Ok(()),
+            Some(_) => Err(format!("image \"{}\" is listed twice", row[0])),
         }
     }
-    Ok(tags)
-}
 
-impl Tags {
     /// What a factor is for an image; none for an image without tags.
     pub fn of(&self, image: &str, factor: usize) -> Option<&str> {
         self.levels.get(image)?.get(factor).map(String::as_str)
@@ -111,7 +108,7 @@ mod tests {
         assert!(
             parse("image,light\na,dim\na.png,dim\n")
                 .unwrap_err()
-                .contains("told twice")
+                .contains("listed twice")
         );
     }
 }

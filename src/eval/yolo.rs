@@ -1,8 +1,8 @@
 //! Reads truth and detections from folders of YOLO text files.
 
-use super::{FoundBox, Picture, Sheet, TrueBox};
+use super::{Detection, EvalImage, GroundTruth, Picture};
 use crate::error::{Error, Result};
-use crate::geom::BBox;
+use crate::geom::{BBox, Point2};
 use crate::io;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct YoloTruth {
     /// In order of the images' names.
-    pub sheets: Vec<Sheet>,
+    pub sheets: Vec<EvalImage>,
     /// Width and height of each image, pixels.
     pub sizes: Vec<[u32; 2]>,
     /// The images, where they are found.
@@ -28,20 +28,10 @@ pub struct YoloTruth {
 /// # Errors
 /// [`Error::File`] for a folder without labels, a label without an image where no `size` is given, or a bad line.
 pub fn read_yolo_truth(labels: &Path, size: Option<[u32; 2]>) -> Result<YoloTruth> {
-    let one = |(name, path): (&String, &PathBuf)| {
-        let image = image_of(labels, name);
-        let size = size.map_or_else(|| image_size(labels, name, image.as_deref()), Ok)?;
-        let boxes = rows(path, 0)?
-            .into_iter()
-            .map(|row| row.truth(size))
-            .collect();
-        let picture = image.map(|path| Picture {
-            path,
-            size: size.map(f64::from),
-        });
-        Ok((Sheet::new(name, boxes), size, picture))
-    };
-    let all: Vec<_> = texts(labels)?.par_iter().map(one).collect::<Result<_>>()?;
+    let all: Vec<_> = text_files(labels)?
+        .par_iter()
+        .map(|(name, path)| read_labels(labels, name, path, size))
+        .collect::<Result<_>>()?;
     if all.is_empty() {
         return Err(Error::file(labels, "no label files, expected NAME.txt"));
     }
@@ -54,40 +44,59 @@ pub fn read_yolo_truth(labels: &Path, size: Option<[u32; 2]>) -> Result<YoloTrut
     Ok(truth)
 }
 
+/// The truth of one image, its size, and the image where it is found.
+fn read_labels(
+    labels: &Path,
+    name: &str,
+    path: &Path,
+    size: Option<[u32; 2]>,
+) -> Result<(EvalImage, [u32; 2], Option<Picture>)> {
+    let image = image_of(labels, name);
+    let size = size.map_or_else(|| image_size(labels, name, image.as_deref()), Ok)?;
+    let boxes = read_rows(path, 0)?
+        .into_iter()
+        .map(|row| row.truth(size))
+        .collect();
+    let picture = image.map(|path| Picture {
+        path,
+        size: size.map(f64::from),
+    });
+    Ok((EvalImage::new(name, boxes), size, picture))
+}
+
 /// Adds what a detector found, from `NAME.txt` of a folder: `class cx cy w h confidence`.
 ///
 /// An image without a file has no detections; a file without an image is refused, as it may be a misspelt name.
 ///
 /// # Errors
 /// [`Error::File`] for a folder that cannot be read, a name that the truth does not have, or a bad line.
-pub fn read_yolo_found(folder: &Path, truth: &mut YoloTruth) -> Result<()> {
-    let known: BTreeMap<String, usize> = truth
+pub fn read_yolo_detections(folder: &Path, truth: &mut YoloTruth) -> Result<()> {
+    let known: BTreeMap<&str, usize> = truth
         .sheets
         .iter()
         .enumerate()
-        .map(|(i, s)| (s.image.clone(), i))
+        .map(|(i, sheet)| (sheet.image.as_str(), i))
         .collect();
-    let one = |(name, path): (&String, &PathBuf)| {
-        let Some(&i) = known.get(name) else {
-            return Err(Error::file(
-                path,
-                format!("no image \"{name}\" in the truth of {} images", known.len()),
-            ));
-        };
-        Ok((
-            i,
-            rows(path, 1)?
-                .into_iter()
-                .map(|row| row.found(truth.sizes[i]))
-                .collect(),
-        ))
-    };
-    let found: Vec<(usize, Vec<FoundBox>)> =
-        texts(folder)?.par_iter().map(one).collect::<Result<_>>()?;
-    found
-        .into_iter()
-        .for_each(|(i, found)| truth.sheets[i].found = found);
+    let found: Vec<(usize, Vec<Detection>)> = text_files(folder)?
+        .par_iter()
+        .map(|(name, path)| {
+            let Some(&i) = known.get(name.as_str()) else {
+                let count = known.len();
+                let what = format!("no image \"{name}\" in the truth of {count} images");
+                return Err(Error::file(path, what));
+            };
+            Ok((i, read_detections(path, truth.sizes[i])?))
+        })
+        .collect::<Result<_>>()?;
+    for (i, found) in found {
+        truth.sheets[i].found = found;
+    }
     Ok(())
+}
+
+fn read_detections(path: &Path, size: [u32; 2]) -> Result<Vec<Detection>> {
+    let rows = read_rows(path, 1)?;
+    Ok(rows.into_iter().map(|row| row.found(size)).collect())
 }
 
 /// What a text of labels and one of detections give, for the fuzzers.
@@ -95,23 +104,23 @@ pub(crate) fn sheet_of(
     truth: &str,
     found: &str,
     size: [u32; 2],
-) -> std::result::Result<Sheet, String> {
-    let truth = rows_of(truth, 0)?
+) -> std::result::Result<EvalImage, String> {
+    let truth = parse_rows(truth, 0)?
         .into_iter()
         .map(|row| row.truth(size))
         .collect();
-    let found = rows_of(found, 1)?
+    let found = parse_rows(found, 1)?
         .into_iter()
         .map(|row| row.found(size))
         .collect();
-    Ok(Sheet {
+    Ok(EvalImage {
         found,
-        ..Sheet::new("", truth)
+        ..EvalImage::new("", truth)
     })
 }
 
 /// The text files of a folder by their names without extension, in order.
-fn texts(folder: &Path) -> Result<BTreeMap<String, PathBuf>> {
+fn text_files(folder: &Path) -> Result<BTreeMap<String, PathBuf>> {
     let entries = std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
     let mut texts = BTreeMap::new();
     for entry in entries {
@@ -162,72 +171,88 @@ fn image_size(labels: &Path, name: &str, image: Option<&Path>) -> Result<[u32; 2
 }
 
 /// A line: class, box in shares of the image, and what stands behind.
-struct Row {
+struct LabelRow {
     class: u32,
     shares: BBox,
     confidence: f64,
 }
 
 /// Boxes may reach beyond the image, but not so many times its side.
-const FARTHEST: f64 = 10.0;
+const MAX_SHARE: f64 = 10.0;
 
 /// The lines of a file, with `extra` numbers (a confidence or nothing) at their ends.
-fn rows(path: &Path, extra: usize) -> Result<Vec<Row>> {
-    rows_of(&io::read_text(path)?, extra).map_err(|what| Error::file(path, what))
+fn read_rows(path: &Path, extra: usize) -> Result<Vec<LabelRow>> {
+    parse_rows(&io::read_text(path)?, extra).map_err(|what| Error::file(path, what))
 }
 
-fn rows_of(text: &str, extra: usize) -> std::result::Result<Vec<Row>, String> {
+fn parse_rows(text: &str, extra: usize) -> std::result::Result<Vec<LabelRow>, String> {
     let lines = text
         .lines()
         .enumerate()
         .filter(|(_, line)| !line.trim().is_empty());
     lines
-        .map(|(i, line)| row(line, extra).map_err(|what| format!("line {}: {what}", i + 1)))
+        .map(|(i, line)| parse_row(line, extra).map_err(|what| format!("line {}: {what}", i + 1)))
         .collect()
 }
 
-fn row(line: &str, extra: usize) -> std::result::Result<Row, String> {
+fn parse_row(line: &str, extra: usize) -> std::result::Result<LabelRow, String> {
     let mut words = line.split_ascii_whitespace();
     let class = words.next().unwrap_or_default();
     let class = class
         .parse::<u32>()
         .map_err(|_| format!("class \"{class}\", expected 0, 1, .."))?;
-    let number = |word: &str| match word.parse::<f64>() {
-        Ok(v) if v.is_finite() => Ok(v),
-        _ => Err(format!("\"{word}\", expected a number")),
-    };
-    let numbers: Vec<f64> = words.map(number).collect::<std::result::Result<_, _>>()?;
+    let numbers: Vec<f64> = words
+        .map(parse_finite)
+        .collect::<std::result::Result<_, _>>()?;
     let Some(count) = numbers.len().checked_sub(extra) else {
         return Err(too_few(&numbers, extra));
     };
-    let (place, behind) = numbers.split_at(count);
-    if let Some(far) = place.iter().find(|share| share.abs() > FARTHEST) {
+    let (place, rest) = numbers.split_at(count);
+    check_shares(place)?;
+    let shares = box_around(place).ok_or_else(|| too_few(&numbers, extra))?;
+    Ok(LabelRow {
+        class,
+        shares,
+        confidence: rest.first().copied().unwrap_or(1.0),
+    })
+}
+
+fn parse_finite(word: &str) -> std::result::Result<f64, String> {
+    match word.parse::<f64>() {
+        Ok(v) if v.is_finite() => Ok(v),
+        _ => Err(format!("\"{word}\", expected a number")),
+    }
+}
+
+/// Fails for pixels in place of shares, and for a box with a negative side.
+fn check_shares(place: &[f64]) -> std::result::Result<(), String> {
+    if let Some(far) = place.iter().find(|share| share.abs() > MAX_SHARE) {
         return Err(format!(
             "{far}, expected a share of the image, 0 to 1; is it in pixels?"
         ));
     }
-    let shares = match place {
-        &[_, _, w, h] if w < 0.0 || h < 0.0 => {
-            return Err(format!("a box of {w} x {h}, expected sides of at least 0"));
+    match *place {
+        [_, _, w, h] if w < 0.0 || h < 0.0 => {
+            Err(format!("a box of {w} x {h}, expected sides of at least 0"))
         }
-        &[cx, cy, w, h] => BBox {
+        _ => Ok(()),
+    }
+}
+
+/// The box of `cx cy w h`, or around an outline; none for any other count of numbers.
+fn box_around(place: &[f64]) -> Option<BBox> {
+    match *place {
+        [cx, cy, w, h] => Some(BBox {
             x0: cx - w / 2.0,
             y0: cy - h / 2.0,
             x1: cx + w / 2.0,
             y1: cy + h / 2.0,
-        },
-        outline if outline.len() >= 6 && outline.len().is_multiple_of(2) => BBox::around(
-            outline
-                .chunks_exact(2)
-                .map(|p| crate::geom::Point2::new(p[0], p[1])),
-        ),
-        _ => return Err(too_few(&numbers, extra)),
-    };
-    Ok(Row {
-        class,
-        shares,
-        confidence: behind.first().copied().unwrap_or(1.0),
-    })
+        }),
+        _ if place.len() >= 6 && place.len().is_multiple_of(2) => Some(BBox::around(
+            place.chunks_exact(2).map(|p| Point2::new(p[0], p[1])),
+        )),
+        _ => None,
+    }
 }
 
 fn too_few(numbers: &[f64], extra: usize) -> String {
@@ -242,7 +267,7 @@ fn too_few(numbers: &[f64], extra: usize) -> String {
     )
 }
 
-impl Row {
+impl LabelRow {
     fn bbox(&self, [w, h]: [u32; 2]) -> BBox {
         let (w, h, s) = (f64::from(w), f64::from(h), self.shares);
         BBox {
@@ -253,9 +278,9 @@ impl Row {
         }
     }
 
-    fn truth(&self, size: [u32; 2]) -> TrueBox {
+    fn truth(&self, size: [u32; 2]) -> GroundTruth {
         let bbox = self.bbox(size);
-        TrueBox {
+        GroundTruth {
             class: self.class,
             bbox,
             area: bbox.width() * bbox.height(),
@@ -263,8 +288,8 @@ impl Row {
         }
     }
 
-    fn found(&self, size: [u32; 2]) -> FoundBox {
-        FoundBox {
+    fn found(&self, size: [u32; 2]) -> Detection {
+        Detection {
             class: self.class,
             bbox: self.bbox(size),
             confidence: self.confidence,
@@ -323,7 +348,7 @@ mod tests {
         ]);
         let mut truth = read_yolo_truth(labels.path(), Some([100, 200])).unwrap();
         let found = folder(&[("b.txt", "0 0.5 0.5 1 1 0.25\n")]);
-        read_yolo_found(found.path(), &mut truth).unwrap();
+        read_yolo_detections(found.path(), &mut truth).unwrap();
         assert_eq!(
             (
                 truth.sheets[0].found.len(),
@@ -362,7 +387,7 @@ mod tests {
     fn a_detection_for_an_unknown_image_is_refused() {
         let labels = folder(&[("a.txt", "")]);
         let mut truth = read_yolo_truth(labels.path(), Some([9, 9])).unwrap();
-        let said = read_yolo_found(folder(&[("c.txt", "")]).path(), &mut truth)
+        let said = read_yolo_detections(folder(&[("c.txt", "")]).path(), &mut truth)
             .unwrap_err()
             .to_string();
         assert!(said.contains("no image \"c\""), "{said}");

@@ -4,18 +4,18 @@ use super::average::{interpolated, recall_and_precision, trapezoid};
 use super::by_class::{ByClass, ImageBoxes};
 use super::overlap::BoxIndex;
 use super::rank::{Hit, Marks, Ranking, Running};
-use super::{ClassScores, Definition, FoundBox, Scores, Sheet, THRESHOLDS};
+use super::{ClassScores, Definition, Detection, EvalImage, Scores, THRESHOLDS};
 use crate::geom::BBox;
 use rayon::prelude::*;
 
 /// Confidences at which precision, recall and F1 are read.
-pub(super) const CONFIDENCES: usize = 1000;
+pub(super) const CONFIDENCE_STEPS: usize = 1000;
 /// Keeps recall and F1 defined, as in the original.
-const EPSILON: f64 = 1e-16;
+const RATIO_EPSILON: f64 = 1e-16;
 /// Keeps an intersection over union defined, square pixels, as in the original.
 const AREA_EPSILON: f32 = 1e-7;
 /// Half the width, in readings, of the window that F1 is smoothed with before its best confidence is taken.
-const SMOOTHING: usize = 50;
+const SMOOTHING_READINGS: usize = 50;
 
 /// Average precision by the definition of YOLOv5, with precision and recall at the confidence of the best F1.
 ///
@@ -29,7 +29,7 @@ const SMOOTHING: usize = 50;
 ///
 /// # Panics
 /// When there are weights and not one per sheet.
-pub fn yolov5(sheets: &[Sheet], weights: &[u32]) -> Scores {
+pub fn yolov5(sheets: &[EvalImage], weights: &[u32]) -> Scores {
     assert!(
         weights.is_empty() || weights.len() == sheets.len(),
         "one weight per sheet"
@@ -38,11 +38,11 @@ pub fn yolov5(sheets: &[Sheet], weights: &[u32]) -> Scores {
 }
 
 /// The detections of every class with something to find.
-pub(super) fn rankings(sheets: &[Sheet]) -> Vec<Ranking> {
+pub(super) fn rankings(sheets: &[EvalImage]) -> Vec<Ranking> {
     ByClass::new(sheets)
         .classes()
         .par_iter()
-        .map(|boxes| Ranking::new(boxes, held_against))
+        .map(|boxes| Ranking::new(boxes, match_image))
         .collect()
 }
 
@@ -135,35 +135,33 @@ impl<'a> Ranked<'a> {
 
     pub(super) fn f1_at(&self, confidence: f64) -> f64 {
         let (p, r) = (self.precision_at(confidence), self.recall_at(confidence));
-        2.0 * p * r / (p + r + EPSILON)
+        2.0 * p * r / (p + r + RATIO_EPSILON)
     }
 }
 
 fn curve(sums: &Running, truths: f64) -> (Vec<f64>, Vec<f64>) {
-    recall_and_precision(sums, truths, [EPSILON, 0.0])
+    recall_and_precision(sums, truths, [RATIO_EPSILON, 0.0])
 }
 
-/// Reading `i` of [`CONFIDENCES`], 0 to 1.
+/// Reading `i` of [`CONFIDENCE_STEPS`], 0 to 1.
 pub(super) fn confidence(i: usize) -> f64 {
-    i as f64 / (CONFIDENCES - 1) as f64
+    i as f64 / (CONFIDENCE_STEPS - 1) as f64
 }
 
 /// Where the smoothed mean F1 of the classes is greatest.
 pub(super) fn best_confidence(classes: &[Ranked<'_>]) -> usize {
-    let f1 = |i| {
-        classes
-            .iter()
-            .map(|class| class.f1_at(confidence(i)))
-            .sum::<f64>()
-    };
-    let f1: Vec<f64> = (0..CONFIDENCES).into_par_iter().map(f1).collect();
-    let at = |i: isize| f1[i.clamp(0, CONFIDENCES as isize - 1) as usize];
-    let window = |i: usize| -> f64 {
-        let (i, reach) = (i as isize, SMOOTHING as isize);
-        (i - reach..=i + reach).map(at).sum()
-    };
+    let f1: Vec<f64> = (0..CONFIDENCE_STEPS)
+        .into_par_iter()
+        .map(|i| {
+            classes
+                .iter()
+                .map(|class| class.f1_at(confidence(i)))
+                .sum::<f64>()
+        })
+        .collect();
     let mut best = (0, f64::NEG_INFINITY);
-    for (i, value) in (0..CONFIDENCES).map(|i| (i, window(i))) {
+    for i in 0..CONFIDENCE_STEPS {
+        let value = window_sum(&f1, i);
         if value > best.1 {
             best = (i, value);
         }
@@ -171,35 +169,45 @@ pub(super) fn best_confidence(classes: &[Ranked<'_>]) -> usize {
     best.0
 }
 
+/// Sum of the readings around one; the ends go on as they are.
+fn window_sum(values: &[f64], i: usize) -> f64 {
+    let (i, reach) = (i as isize, SMOOTHING_READINGS as isize);
+    (i - reach..=i + reach)
+        .map(|i| values[i.clamp(0, values.len() as isize - 1) as usize])
+        .sum()
+}
+
 /// The detections of a class in one image, marked right where they found something, and how many boxes there are.
-fn held_against(image: &ImageBoxes<'_>) -> (Vec<Hit>, usize) {
+fn match_image(image: &ImageBoxes<'_>) -> (Vec<Hit>, usize) {
     let index = BoxIndex::new(image.truth.iter().map(|t| t.bbox));
     let mut taken: Vec<Marks> = vec![0; image.truth.len()];
-    let hit = |(place, f): (usize, &&FoundBox)| {
-        let overlaps = index
-            .near(&f.bbox)
-            .into_iter()
-            .map(|t| (t, overlap(&image.truth[t].bbox, &f.bbox)));
-        // Of equal overlaps the last: that is how the original's descending sort leaves them.
-        let nearest = overlaps.max_by(|a, b| a.1.total_cmp(&b.1));
-        let right = nearest.map_or(0, |(nearest, most)| {
-            let reached = reached(most);
+    let mut hits = Vec::new();
+    for (place, found) in image.found.iter().enumerate() {
+        let right = nearest(image, &index, found).map_or(0, |(nearest, overlap)| {
+            let reached = reached(overlap);
             let right = reached & !taken[nearest];
             taken[nearest] |= reached;
             right
         });
-        Hit {
-            confidence: f.confidence,
+        hits.push(Hit {
+            confidence: found.confidence,
             sheet: image.sheet,
             place: place as u32,
             right,
             ignored: 0,
-        }
-    };
-    (
-        image.found.iter().enumerate().map(hit).collect(),
-        image.truth.len(),
-    )
+        });
+    }
+    (hits, image.truth.len())
+}
+
+/// The box that a detection overlaps most; of equal overlaps the last: that is how the original's descending sort leaves
+/// them.
+fn nearest(image: &ImageBoxes<'_>, index: &BoxIndex, found: &Detection) -> Option<(usize, f32)> {
+    index
+        .near(&found.bbox)
+        .into_iter()
+        .map(|t| (t, overlap(&image.truth[t].bbox, &found.bbox)))
+        .max_by(|a, b| a.1.total_cmp(&b.1))
 }
 
 /// Intersection over union in single precision.

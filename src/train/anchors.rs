@@ -6,9 +6,9 @@ use serde::{Deserialize, Serialize};
 
 /// A box is within an anchor's reach when no side differs from the anchor's by this factor or more: what equation 1 can
 /// decode, and YOLOv5's default.
-pub const THRESHOLD: f64 = 4.0;
+pub const MAX_SIDE_RATIO: f64 = 4.0;
 /// Rounds of the clustering; it rests after a few dozen.
-const ROUNDS: usize = 300;
+const MAX_ROUNDS: usize = 300;
 
 /// Widths and heights that stand for a dataset's.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -17,7 +17,7 @@ pub struct Anchors {
     pub sizes: Vec<[f64; 2]>,
     /// Mean intersection over union of a box with the anchor that fits it best, both about one centre.
     pub mean_iou: f64,
-    /// Share of the boxes within reach of some anchor ([`THRESHOLD`]).
+    /// Share of the boxes within reach of some anchor ([`MAX_SIDE_RATIO`]).
     pub best_possible_recall: f64,
 }
 
@@ -39,22 +39,9 @@ pub fn anchors(boxes: &[[f64; 2]], count: usize, seed: u64) -> Anchors {
     if boxes.is_empty() || count == 0 {
         return Anchors::default();
     }
-    let mut sizes = spread(
-        &boxes,
-        count.min(boxes.len()),
-        &mut ChaCha8Rng::seed_from_u64(seed),
-    );
-    let mut before = Vec::new();
-    for _ in 0..ROUNDS {
-        let nearest: Vec<usize> = boxes.iter().map(|b| nearest(b, &sizes).0).collect();
-        if nearest == before {
-            break;
-        }
-        sizes = (0..sizes.len())
-            .map(|k| mean_of(&boxes, &nearest, k).unwrap_or(sizes[k]))
-            .collect();
-        before = nearest;
-    }
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let first = spread(&boxes, count.min(boxes.len()), &mut rng);
+    let mut sizes = cluster(&boxes, first);
     sizes.sort_by(|a, b| (a[0] * a[1]).total_cmp(&(b[0] * b[1])));
     let mean_iou = boxes.iter().map(|b| nearest(b, &sizes).1).sum::<f64>() / boxes.len() as f64;
     let reached = boxes
@@ -66,6 +53,22 @@ pub fn anchors(boxes: &[[f64; 2]], count: usize, seed: u64) -> Anchors {
         mean_iou,
         best_possible_recall: reached as f64 / boxes.len() as f64,
     }
+}
+
+/// Moves each anchor to the mean of the boxes that are nearest to it, until they stay.
+fn cluster(boxes: &[[f64; 2]], mut sizes: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
+    let mut before = Vec::new();
+    for _ in 0..MAX_ROUNDS {
+        let nearest: Vec<usize> = boxes.iter().map(|b| nearest(b, &sizes).0).collect();
+        if nearest == before {
+            break;
+        }
+        sizes = (0..sizes.len())
+            .map(|k| mean_of(boxes, &nearest, k).unwrap_or(sizes[k]))
+            .collect();
+        before = nearest;
+    }
+    sizes
 }
 
 /// Starting points far from each other: each drawn with the square of its distance to those before.
@@ -112,8 +115,8 @@ fn mean_of(boxes: &[[f64; 2]], nearest: &[usize], k: usize) -> Option<[f64; 2]> 
     (count > 0.0).then(|| sum.map(|s| s / count))
 }
 
-pub(super) fn in_reach(b: &[f64; 2], anchor: &[f64; 2]) -> bool {
-    (0..2).all(|i| (b[i] / anchor[i]).max(anchor[i] / b[i]) < THRESHOLD)
+fn in_reach(b: &[f64; 2], anchor: &[f64; 2]) -> bool {
+    (0..2).all(|i| (b[i] / anchor[i]).max(anchor[i] / b[i]) < MAX_SIDE_RATIO)
 }
 
 #[cfg(test)]

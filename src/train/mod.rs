@@ -11,7 +11,7 @@ mod decode;
 pub mod kit;
 mod updates;
 
-pub use anchors::{Anchors, THRESHOLD, anchors};
+pub use anchors::{Anchors, MAX_SIDE_RATIO, anchors};
 pub use balance::{Balance, Weights};
 pub use batches::{Batch, BatchOptions, Source, batches};
 pub use decode::{decode, encode};

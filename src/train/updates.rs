@@ -16,7 +16,7 @@ pub struct Updates {
 
 impl Updates {
     /// Those of `epochs` over `images` in batches of `batch`.
-    pub fn of(images: u64, batch: u64, epochs: u64) -> Self {
+    pub fn new(images: u64, batch: u64, epochs: u64) -> Self {
         let batches = batches_per_epoch(images, batch);
         Self {
             batches,
@@ -36,7 +36,7 @@ mod tests {
 
     #[test]
     fn the_numbers_of_the_paper() {
-        let concatenated = Updates::of(1624 + 4000, 32, 300);
+        let concatenated = Updates::new(1624 + 4000, 32, 300);
         assert_eq!((concatenated.batches, concatenated.total), (176, 52_800));
         assert_eq!(
             (batches_per_epoch(4000, 32), batches_per_epoch(1624, 32)),

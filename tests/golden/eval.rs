@@ -1,7 +1,7 @@
 //! Average precision against the values of pycocotools and of YOLOv5's own code.
 
 use crate::case::Case;
-use petcomp::eval::{self, FoundBox, Scores, Sheet, TrueBox};
+use petcomp::eval::{self, Detection, EvalImage, GroundTruth, Scores};
 use petcomp::geom::BBox;
 use serde::Deserialize;
 use std::path::Path;
@@ -52,8 +52,8 @@ fn json<T: for<'a> Deserialize<'a>>(path: &Path) -> Result<T, String> {
     serde_json::from_str(&text).map_err(|e| format!("{}: {e}", path.display()))
 }
 
-fn sheets(boxes: &Boxes) -> Vec<Sheet> {
-    let mut sheets = vec![Sheet::default(); boxes.images];
+fn sheets(boxes: &Boxes) -> Vec<EvalImage> {
+    let mut sheets = vec![EvalImage::default(); boxes.images];
     let bbox = |x, y, w, h| BBox {
         x0: x,
         y0: y,
@@ -61,7 +61,7 @@ fn sheets(boxes: &Boxes) -> Vec<Sheet> {
         y1: y + h,
     };
     for &(i, class, x, y, w, h, crowd) in &boxes.truth {
-        sheets[i].truth.push(TrueBox {
+        sheets[i].truth.push(GroundTruth {
             class,
             bbox: bbox(x, y, w, h),
             area: w * h,
@@ -69,7 +69,7 @@ fn sheets(boxes: &Boxes) -> Vec<Sheet> {
         });
     }
     for &(i, class, x, y, w, h, confidence) in &boxes.found {
-        sheets[i].found.push(FoundBox {
+        sheets[i].found.push(Detection {
             class,
             bbox: bbox(x, y, w, h),
             confidence,
@@ -78,7 +78,7 @@ fn sheets(boxes: &Boxes) -> Vec<Sheet> {
     sheets
 }
 
-fn coco(sheets: &[Sheet], theirs: &Coco, fail: f64) -> Result<(), String> {
+fn coco(sheets: &[EvalImage], theirs: &Coco, fail: f64) -> Result<(), String> {
     let ours = eval::coco(sheets, &[]);
     let some = |v: Option<f64>| v.unwrap_or(-1.0);
     let over = |value: f64| {
@@ -119,7 +119,7 @@ fn coco(sheets: &[Sheet], theirs: &Coco, fail: f64) -> Result<(), String> {
     )
 }
 
-fn yolov5(sheets: &[Sheet], theirs: &Yolov5, fail: f64) -> Result<(), String> {
+fn yolov5(sheets: &[EvalImage], theirs: &Yolov5, fail: f64) -> Result<(), String> {
     let ours = eval::yolov5(sheets, &[]);
     per_class(
         "yolov5",

@@ -3,7 +3,7 @@
 use crate::print;
 use clap::builder::RangedU64ValueParser;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use petcomp::dataset::{Setup, Studio};
+use petcomp::dataset::{DatasetConfig, Pipeline};
 use petcomp::io::{Fallback, LimitOverride, Limits, Override, ReadOptions};
 use petcomp::{Diagnostic, Result, Scene, Severity, io, printable};
 use serde::de::DeserializeOwned;
@@ -210,13 +210,13 @@ pub(crate) struct RecipeArgs {
 
 impl RecipeArgs {
     /// Reads the recipe.
-    pub(crate) fn setup(&self) -> anyhow::Result<Setup> {
-        Ok(Setup::read(&self.recipe, &self.overrides)?)
+    pub(crate) fn config(&self) -> anyhow::Result<DatasetConfig> {
+        Ok(DatasetConfig::read(&self.recipe, &self.overrides)?)
     }
 
     /// Opens the folders that the recipe names.
-    pub(crate) fn studio(&self) -> anyhow::Result<Studio> {
-        Ok(Studio::open(self.setup()?)?)
+    pub(crate) fn pipeline(&self) -> anyhow::Result<Pipeline> {
+        Ok(Pipeline::open(self.config()?)?)
     }
 }
 
@@ -239,11 +239,11 @@ impl SceneArgs {
         Ok(io::read_document(&self.path)?)
     }
 
-    /// The recipe's setup or, without a recipe, that which the scene brings.
-    pub(crate) fn setup_for(&self, scene: &Scene) -> anyhow::Result<Setup> {
+    /// The recipe's config or, without a recipe, that which the scene brings.
+    pub(crate) fn config_for(&self, scene: &Scene) -> anyhow::Result<DatasetConfig> {
         Ok(match &self.recipe {
-            Some(recipe) => Setup::read(recipe, &self.overrides)?,
-            None => Setup::for_scene(scene, &self.path, &self.overrides)?,
+            Some(recipe) => DatasetConfig::read(recipe, &self.overrides)?,
+            None => DatasetConfig::for_scene(scene, &self.path, &self.overrides)?,
         })
     }
 }

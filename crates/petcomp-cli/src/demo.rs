@@ -3,7 +3,7 @@
 use crate::common::Common;
 use crate::print;
 use crate::{asset, dataset};
-use petcomp::dataset::{Setup, Studio, contact_sheet_of};
+use petcomp::dataset::{DatasetConfig, Pipeline, contact_sheet_of};
 use petcomp::{Error, io};
 use std::path::{Path, PathBuf};
 
@@ -35,10 +35,10 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
     let recipe = write_recipe(args)?;
     let library = asset::build(&list, &args.output.join("assets"), common)?;
     let folder = args.output.join("dataset");
-    let studio = Studio::with_library(Setup::read(&recipe, &[])?, library)?;
+    let pipeline = Pipeline::with_library(DatasetConfig::read(&recipe, &[])?, library)?;
     let report = dataset::make(
-        &studio,
-        &studio.plan(args.count, args.seed, &folder)?,
+        &pipeline,
+        &pipeline.plan(args.count, args.seed, &folder)?,
         &args.consent,
         common,
     )?;

@@ -5,8 +5,8 @@ use crate::print;
 use petcomp::dataset::YoloSet;
 use petcomp::eval::page::{self, EvalReportOptions, Run};
 use petcomp::eval::{
-    ConfusionOptions, Sheet, Tags, read_coco_results, read_coco_truth, read_tags, read_yolo_found,
-    read_yolo_truth,
+    ConfusionOptions, EvalImage, Tags, read_coco_results, read_coco_truth, read_tags,
+    read_yolo_detections, read_yolo_truth,
 };
 use std::path::{Path, PathBuf};
 
@@ -107,7 +107,7 @@ fn sheets(
     truth: &Path,
     args: &Args,
     options: &mut EvalReportOptions,
-) -> anyhow::Result<Vec<Sheet>> {
+) -> anyhow::Result<Vec<EvalImage>> {
     let classes = &mut options.classes;
     if truth.extension().is_some_and(|e| e == "json") {
         let mut all = read_coco_truth(truth)?;
@@ -119,7 +119,7 @@ fn sheets(
         return Ok(all.sheets);
     }
     let mut all = read_yolo_truth(truth, args.size)?;
-    read_yolo_found(found, &mut all)?;
+    read_yolo_detections(found, &mut all)?;
     if classes.is_empty() {
         // labels/val of a dataset lie two folders below its data.yaml.
         let set = truth

@@ -1,7 +1,7 @@
 //! `petcomp label`: scene -> outlines, boxes, visibility.
 
 use crate::common::{Common, SceneArgs};
-use petcomp::dataset::Studio;
+use petcomp::dataset::Pipeline;
 use petcomp::{io, label};
 use std::path::PathBuf;
 
@@ -28,18 +28,18 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
     } else {
         scene.unlit()
     };
-    let studio = Studio::open_for(args.scene.setup_for(&scene)?, &scene)?;
+    let pipeline = Pipeline::open_for(args.scene.config_for(&scene)?, &scene)?;
     let labels = match &args.overlay {
-        None => studio
+        None => pipeline
             .label(scene)
             .map_err(|e| e.in_file(&args.scene.path))?,
         Some(path) => {
-            let sample = studio
+            let sample = pipeline
                 .take(scene)
                 .map_err(|e| e.in_file(&args.scene.path))?;
             io::write(
                 path,
-                &label::overlay(&sample.frame, &sample.labels, &studio.library().classes),
+                &label::overlay(&sample.frame, &sample.labels, &pipeline.library().classes),
             )?;
             sample.labels
         }
@@ -48,7 +48,7 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
     if let Some(path) = &args.polygons {
         io::write_json(
             path,
-            &label::borders(&labels, studio.setup().labels.simplify),
+            &label::borders(&labels, pipeline.config().labels.simplify),
         )?;
     }
     let objects = &labels.objects;

@@ -30,15 +30,15 @@ pub(crate) struct Args {
 
 pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
     let scene = args.scene.read()?;
-    let mut setup = args.scene.setup_for(&scene)?;
+    let mut config = args.scene.config_for(&scene)?;
     if let Some(quality) = args.quality {
-        setup = quality.setup(setup);
+        config = quality.config(config);
     }
-    let studio = petcomp::dataset::Studio::open_for(setup, &scene)?;
-    let (scene, shot) = studio
+    let pipeline = petcomp::dataset::Pipeline::open_for(config, &scene)?;
+    let (scene, shot) = pipeline
         .resolve(scene)
         .map_err(|e| e.in_file(&args.scene.path))?;
-    let (deep, frame) = studio.shoot(&scene, &shot);
+    let (deep, frame) = pipeline.shoot(&scene, &shot);
     match args.aov.as_slice() {
         [] => write(&args.output, &frame)?,
         aovs => {
@@ -56,7 +56,7 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
         io::write(path, &displayed(&frame))?;
     }
     if let Some(path) = &args.resolved {
-        let scene = studio.setup().with_files(scene.clone(), path)?;
+        let scene = pipeline.config().with_files(scene.clone(), path)?;
         io::write_document(path, &scene)?;
     }
     let (w, h) = frame.size();

@@ -57,9 +57,9 @@ pub(crate) struct Draw {
 pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
     match command {
         Command::Draw(args) => {
-            let studio = args.recipe.studio()?;
-            let scene = studio.draw(args.seed, args.index)?;
-            let scene = studio.setup().with_files(scene, &args.output)?;
+            let pipeline = args.recipe.pipeline()?;
+            let scene = pipeline.draw(args.seed, args.index)?;
+            let scene = pipeline.config().with_files(scene, &args.output)?;
             io::write_document(&args.output, &scene)?;
             common.say(format_args!(
                 "{}: {} objects over {}",
@@ -83,7 +83,7 @@ fn export(args: &Export, common: &Common) -> anyhow::Result<()> {
     let Renderer::Cycles = args.to;
     let (scene, shot) = args
         .recipe
-        .studio()?
+        .pipeline()?
         .resolve(scene)
         .map_err(|e| e.in_file(&args.scene))?;
     cycles::export(&shot, scene.surface.size, &args.folder)?;

@@ -256,7 +256,7 @@ fn quiet_leaves_the_answer() {
     );
     assert!(!scores.contains("look at"), "{scores}");
     assert!(said(&["diff", "a.png", "a.png"]).contains("PASS"));
-    assert!(said(&["dataset", "check", "set"]).contains("set: 2 images, 4 labels, no fault"));
+    assert!(said(&["dataset", "check", "set"]).contains("set: 2 images, 4 labels, no errors"));
     assert!(said(&["dataset", "anchors", "set", "-n", "1"]).contains("mean IoU"));
     assert_eq!(said(&["dataset", "init", "recipe.toml"]), "");
 }

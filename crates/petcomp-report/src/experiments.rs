@@ -160,7 +160,7 @@ pub fn updates_table(real: u64, synthetic: u64, batch: u64, epochs: u64) -> Tabl
         "epochs for as many updates",
         "paper",
     ]);
-    let both = Updates::of(real + synthetic, batch, epochs);
+    let both = Updates::new(real + synthetic, batch, epochs);
     let row = |name: &str, images, paper: String| {
         let batches = batches_per_epoch(images, batch);
         [

@@ -11,7 +11,7 @@ mod world;
 
 use cases::{Asked, Case, cases};
 use petcomp::PremulRgba;
-use petcomp::dataset::{Studio, generate};
+use petcomp::dataset::{Pipeline, generate};
 use petcomp::plot::Table;
 use petcomp::work::{self, Kind, LARGE_BYTES, Work};
 use petcomp::{Error, Result, io};
@@ -86,19 +86,19 @@ fn counted<T: Send>(job: impl FnOnce() -> T + Send) -> Result<(T, Work)> {
 /// Makes what a case asks for and writes it into a folder.
 fn make(world: &World, case: &Case, folder: &Path) -> Result<()> {
     let scene = case.scene.clone();
-    let studio = Studio::open_for(world.setup(), &scene)?;
+    let pipeline = Pipeline::open_for(world.setup(), &scene)?;
     match case.asked {
         Asked::Picture => {
-            let (scene, shot) = studio.resolve(scene)?;
-            let (_, frame) = studio.shoot(&scene, &shot);
+            let (scene, shot) = pipeline.resolve(scene)?;
+            let (_, frame) = pipeline.shoot(&scene, &shot);
             io::write(folder.join("picture.png"), &frame.map(PremulRgba::color))
         }
-        Asked::Labels => io::write_json(folder.join("labels.json"), &studio.label(scene)?),
+        Asked::Labels => io::write_json(folder.join("labels.json"), &pipeline.label(scene)?),
         Asked::Dataset => {
-            let plan = studio.plan(1, 0, folder)?;
+            let plan = pipeline.plan(1, 0, folder)?;
             generate(
                 &plan,
-                |_| studio.take(scene.clone()),
+                |_| pipeline.take(scene.clone()),
                 &|_| {},
                 &AtomicBool::new(false),
             )

@@ -22,11 +22,11 @@ pub(crate) struct Outlier {
 /// From so many deviations on a value is unlike the others ([Iglewicz and Hoaglin 1993]).
 ///
 /// [Iglewicz and Hoaglin 1993]: https://www.itl.nist.gov/div898/handbook/eda/section3/eda35h.htm
-const FAR: f64 = 3.5;
+const MIN_DEVIATIONS: f64 = 3.5;
 
 /// A normal distribution's standard deviation over its median and its mean absolute deviation.
-const OF_MEDIAN: f64 = 1.4826;
-const OF_MEAN: f64 = 1.2533;
+const SIGMA_PER_MEDIAN_DEVIATION: f64 = 1.4826;
+const SIGMA_PER_MEAN_DEVIATION: f64 = 1.2533;
 
 /// The rows that are unlike the others by at least one feature, the strangest first.
 ///
@@ -36,26 +36,14 @@ const OF_MEAN: f64 = 1.2533;
 pub(crate) fn outliers(features: &[Feature<'_>]) -> Vec<Outlier> {
     let mut worst: Vec<Option<Outlier>> = Vec::new();
     for feature in features {
-        let Some((middle, scale)) = middle_and_scale(&feature.values) else {
-            continue;
-        };
         worst.resize(worst.len().max(feature.values.len()), None);
-        for (row, value) in feature.values.iter().enumerate() {
-            let deviations = (value - middle).abs() / scale;
-            // What a reader cannot tell apart is not unlike.
-            let (shown, usual) = (short(*value), short(middle));
-            if shown != usual
-                && deviations > FAR
-                && worst[row]
-                    .as_ref()
-                    .is_none_or(|known| deviations > known.deviations)
+        for outlier in feature.outliers() {
+            let known = &mut worst[outlier.row];
+            if known
+                .as_ref()
+                .is_none_or(|known| outlier.deviations > known.deviations)
             {
-                let why = format!("{} {shown}, as a rule {usual}", feature.name);
-                worst[row] = Some(Outlier {
-                    row,
-                    deviations,
-                    why,
-                });
+                *known = Some(outlier);
             }
         }
     }
@@ -64,15 +52,39 @@ pub(crate) fn outliers(features: &[Feature<'_>]) -> Vec<Outlier> {
     all
 }
 
+impl Feature<'_> {
+    /// The rows that are unlike the others by this feature.
+    fn outliers(&self) -> Vec<Outlier> {
+        let Some((median, scale)) = median_and_scale(&self.values) else {
+            return Vec::new();
+        };
+        let typical = short(median);
+        let mut outliers = Vec::new();
+        for (row, value) in self.values.iter().enumerate() {
+            let deviations = (value - median).abs() / scale;
+            let shown = short(*value);
+            // What reads the same is not unlike.
+            if shown != typical && deviations > MIN_DEVIATIONS {
+                outliers.push(Outlier {
+                    row,
+                    deviations,
+                    why: format!("{} {shown}, as a rule {typical}", self.name),
+                });
+            }
+        }
+        outliers
+    }
+}
+
 /// Median and robust standard deviation; none where all values are the same.
-fn middle_and_scale(values: &[f64]) -> Option<(f64, f64)> {
+fn median_and_scale(values: &[f64]) -> Option<(f64, f64)> {
     let finite: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
     let middle = median(finite.clone())?;
     let off: Vec<f64> = finite.iter().map(|v| (v - middle).abs()).collect();
     let mean = off.iter().sum::<f64>() / off.len() as f64;
-    let scale = Some(OF_MEDIAN * median(off)?)
+    let scale = Some(SIGMA_PER_MEDIAN_DEVIATION * median(off)?)
         .filter(|&scale| scale > 0.0)
-        .unwrap_or(OF_MEAN * mean);
+        .unwrap_or(SIGMA_PER_MEAN_DEVIATION * mean);
     (scale > 0.0).then_some((middle, scale))
 }
 

@@ -1,7 +1,7 @@
 //! What a detector got wrong, as a table and as pictures, the worst first.
 
 use super::{EvalReportOptions, Run};
-use crate::eval::{FoundBox, Kind, Mistake, Picture, Sheet, TrueBox, class_name};
+use crate::eval::{Detection, EvalImage, GroundTruth, Mistake, MistakeKind, Picture, class_name};
 use crate::geom::BBox;
 use crate::label::gallery::{self, Figure, gallery, marked_box};
 use crate::plot::{Page, Table};
@@ -19,10 +19,10 @@ const DASHED: &str = "stroke-width=\"1.5\" stroke-dasharray=\"5 3\"";
 const THICK_DASHED: &str = "stroke-width=\"3\" stroke-dasharray=\"7 4\"";
 
 /// What is seen around a box: so many times its longer side, but at least this share of the picture's.
-const AROUND: f64 = 3.0;
-const LEAST_SHARE: f64 = 0.15;
+const VIEW_SCALE: f64 = 3.0;
+const MIN_VIEW_SHARE: f64 = 0.15;
 /// Boxes that a picture shows beside those that it is about: more would hide it, and make the page grow without end.
-const MOST_OTHERS: usize = 100;
+const MAX_OTHER_BOXES: usize = 100;
 
 /// All mistakes of a run, one a row.
 pub(crate) fn table(run: &Run, mistakes: &[Mistake], options: &EvalReportOptions) -> Table {
@@ -40,41 +40,25 @@ pub(crate) fn table(run: &Run, mistakes: &[Mistake], options: &EvalReportOptions
     ];
     let mut table = Table::new(columns);
     for mistake in mistakes {
-        let case = Case::of(run, mistake);
-        let name = |class: Option<u32>| {
-            class
-                .map(|class| class_name(class, &options.classes))
-                .unwrap_or_default()
-        };
-        let number = |value: f64, digits: usize| format!("{value:.digits$}");
-        let b = case.wrong();
-        table.push([
-            case.sheet.image.clone(),
-            word(mistake.kind).to_owned(),
-            name(case.truth.map(|t| t.class)),
-            name(case.found.map(|f| f.class)),
-            case.found
-                .map(|f| number(f.confidence, 4))
-                .unwrap_or_default(),
-            number(mistake.iou, 3),
-            number(b.x0, 1),
-            number(b.y0, 1),
-            number(b.x1, 1),
-            number(b.y1, 1),
-        ]);
+        table.push(ShownMistake::new(run, mistake).row(options));
     }
     table
 }
 
 /// The worst mistakes as pictures.
-pub(crate) fn put_on(
+pub(crate) fn add_to(
     page: &mut Page,
     run: &Run,
     mistakes: &[Mistake],
     options: &EvalReportOptions,
 ) {
     let count = |kind| mistakes.iter().filter(|m| m.kind == kind).count();
-    let [alarms, wrong, missed] = [Kind::FalseAlarm, Kind::WrongClass, Kind::Missed].map(count);
+    let [alarms, wrong, missed] = [
+        MistakeKind::FalseAlarm,
+        MistakeKind::WrongClass,
+        MistakeKind::Missed,
+    ]
+    .map(count);
     page.heading("Mistakes").text(&format!(
         "{alarms} false alarms, {wrong} of another class than the box that they name, {missed} boxes missed; detections \
          surer than {} that overlap a box by more than {}. All of them, the worst first, are in mistakes.csv.",
@@ -88,8 +72,8 @@ pub(crate) fn put_on(
     }
     page.html(gallery::STYLE).html(&legend());
     let (misses, detections): (Vec<&Mistake>, Vec<&Mistake>) =
-        mistakes.iter().partition(|m| m.kind == Kind::Missed);
-    put_those(
+        mistakes.iter().partition(|m| m.kind == MistakeKind::Missed);
+    add_figures(
         page,
         "alarm",
         "False alarms and wrong classes, the surest first",
@@ -97,7 +81,7 @@ pub(crate) fn put_on(
         &detections,
         options,
     );
-    put_those(
+    add_figures(
         page,
         "miss",
         "Boxes that were missed, the largest first",
@@ -107,7 +91,7 @@ pub(crate) fn put_on(
     );
 }
 
-fn put_those(
+fn add_figures(
     page: &mut Page,
     name: &str,
     title: &str,
@@ -138,27 +122,51 @@ fn put_those(
 
 /// None for a picture that cannot be read, which is only warned of: the scores do not depend on it.
 fn figure(run: &Run, mistake: &Mistake, options: &EvalReportOptions) -> Option<Figure> {
-    let case = Case::of(run, mistake);
+    let shown = ShownMistake::new(run, mistake);
     let Picture { path, size } = options.pictures.get(mistake.sheet)?.as_ref()?;
-    let view = case.view(*size);
+    let view = shown.view(*size);
     let mut figure = Figure::cropped(path, *size, view)
         .inspect_err(|error| log::warn!("{error}"))
         .ok()?;
-    figure.drawing = case.drawing(&view, figure.letter_height(), figure.top(), options);
-    figure.caption = case.caption(options);
+    let canvas = Canvas {
+        letter: figure.letter_height(),
+        top: figure.top(),
+        options,
+    };
+    figure.drawing = shown.drawing(&view, &canvas);
+    figure.caption = shown.caption(options);
     Some(figure)
 }
 
-/// A mistake with the boxes that it is about.
-struct Case<'a> {
-    mistake: &'a Mistake,
-    sheet: &'a Sheet,
-    truth: Option<&'a TrueBox>,
-    found: Option<&'a FoundBox>,
+/// What all marks of a figure have in common.
+struct Canvas<'a> {
+    /// Height of its letters, in pixels of the picture.
+    letter: f64,
+    /// Upper edge of what is seen.
+    top: f64,
+    options: &'a EvalReportOptions,
 }
 
-impl<'a> Case<'a> {
-    fn of(run: &'a Run, mistake: &'a Mistake) -> Self {
+impl Canvas<'_> {
+    fn marked(&self, bbox: &BBox, words: &str, color: &str, style: &str) -> String {
+        marked_box(bbox, words, self.letter, self.top, color, style)
+    }
+
+    fn class_name(&self, class: u32) -> String {
+        gallery::clipped(&class_name(class, &self.options.classes), 24)
+    }
+}
+
+/// A mistake with the boxes that it is about.
+struct ShownMistake<'a> {
+    mistake: &'a Mistake,
+    sheet: &'a EvalImage,
+    truth: Option<&'a GroundTruth>,
+    found: Option<&'a Detection>,
+}
+
+impl<'a> ShownMistake<'a> {
+    fn new(run: &'a Run, mistake: &'a Mistake) -> Self {
         let sheet = &run.sheets[mistake.sheet];
         let (truth, found) = (
             mistake.truth.map(|t| &sheet.truth[t]),
@@ -173,7 +181,7 @@ impl<'a> Case<'a> {
     }
 
     fn is_miss(&self) -> bool {
-        self.mistake.kind == Kind::Missed
+        self.mistake.kind == MistakeKind::Missed
     }
 
     /// The box that is wrong.
@@ -190,12 +198,11 @@ impl<'a> Case<'a> {
             .flatten()
             .reduce(BBox::hull)
             .unwrap_or_default();
-        let side = (AROUND * both.width().max(both.height())).max(LEAST_SHARE * width.max(height));
+        let side =
+            (VIEW_SCALE * both.width().max(both.height())).max(MIN_VIEW_SHARE * width.max(height));
         let (w, h, middle) = (side.min(width), side.min(height), both.center());
-        let (x0, y0) = (
-            (middle.x - w / 2.0).clamp(0.0, width - w),
-            (middle.y - h / 2.0).clamp(0.0, height - h),
-        );
+        let x0 = (middle.x - w / 2.0).clamp(0.0, width - w);
+        let y0 = (middle.y - h / 2.0).clamp(0.0, height - h);
         BBox {
             x0,
             y0,
@@ -204,75 +211,94 @@ impl<'a> Case<'a> {
         }
     }
 
-    fn drawing(&self, view: &BBox, letter: f64, top: f64, options: &EvalReportOptions) -> String {
+    fn drawing(&self, view: &BBox, canvas: &Canvas<'_>) -> String {
         let mut svg = String::new();
         for truth in self.other_boxes(view) {
             let color = if truth.crowd { CROWD } else { TRUTH };
-            svg += &marked_box(&truth.bbox, "", letter, top, color, THIN);
+            svg += &canvas.marked(&truth.bbox, "", color, THIN);
         }
-        for found in self.other_detections(view, options.confusion.confidence) {
-            svg += &marked_box(&found.bbox, "", letter, top, FOUND, DASHED);
+        for found in self.other_detections(view, canvas.options.confusion.confidence) {
+            svg += &canvas.marked(&found.bbox, "", FOUND, DASHED);
         }
-        let name = |class: u32| gallery::clipped(&class_name(class, &options.classes), 24);
         if let Some(truth) = self.truth {
-            let (color, style) = if self.is_miss() {
-                (WRONG, THICK)
-            } else {
-                (TRUTH, THICK)
-            };
-            svg += &marked_box(
-                &truth.bbox,
-                &format!("true: {}", name(truth.class)),
-                letter,
-                top,
-                color,
-                style,
-            );
+            svg += &self.truth_mark(truth, canvas);
         }
         if let Some(found) = self.found {
-            let (color, style) = if self.is_miss() {
-                (FOUND, DASHED)
-            } else {
-                (WRONG, THICK_DASHED)
-            };
-            let words = format!("{} {:.2}", name(found.class), found.confidence);
-            // Beside the words of the truth, which stand at the upper corner.
-            let below = BBox {
-                y0: found.bbox.y1 + 1.2 * letter,
-                ..found.bbox
-            };
-            svg += &marked_box(&found.bbox, "", letter, top, color, style);
-            svg += &gallery::words([below.x0, below.y0], &words, letter, color);
+            svg += &self.found_mark(found, canvas);
         }
         svg
     }
 
+    fn truth_mark(&self, truth: &GroundTruth, canvas: &Canvas<'_>) -> String {
+        let color = if self.is_miss() { WRONG } else { TRUTH };
+        let words = format!("true: {}", canvas.class_name(truth.class));
+        canvas.marked(&truth.bbox, &words, color, THICK)
+    }
+
+    fn found_mark(&self, found: &Detection, canvas: &Canvas<'_>) -> String {
+        let (color, style) = if self.is_miss() {
+            (FOUND, DASHED)
+        } else {
+            (WRONG, THICK_DASHED)
+        };
+        let words = format!("{} {:.2}", canvas.class_name(found.class), found.confidence);
+        // Apart from the words of the truth, which stand at the upper corner.
+        let at = [found.bbox.x0, found.bbox.y1 + 1.2 * canvas.letter];
+        canvas.marked(&found.bbox, "", color, style)
+            + &gallery::words(at, &words, canvas.letter, color)
+    }
+
+    /// Its row in the table of mistakes.
+    fn row(&self, options: &EvalReportOptions) -> [String; 10] {
+        let name = |class: Option<u32>| {
+            class
+                .map(|class| class_name(class, &options.classes))
+                .unwrap_or_default()
+        };
+        let wrong = self.wrong();
+        let [x0, y0, x1, y1] = [wrong.x0, wrong.y0, wrong.x1, wrong.y1].map(|v| format!("{v:.1}"));
+        [
+            self.sheet.image.clone(),
+            word(self.mistake.kind).to_owned(),
+            name(self.truth.map(|t| t.class)),
+            name(self.found.map(|f| f.class)),
+            self.found
+                .map(|f| format!("{:.4}", f.confidence))
+                .unwrap_or_default(),
+            format!("{:.3}", self.mistake.iou),
+            x0,
+            y0,
+            x1,
+            y1,
+        ]
+    }
+
     /// Boxes of the truth in the view that the mistake is not about.
-    fn other_boxes(&self, view: &BBox) -> Vec<&'a TrueBox> {
-        let other = |t: &&TrueBox| !self.truth.is_some_and(|own| std::ptr::eq(own, *t));
+    fn other_boxes(&self, view: &BBox) -> Vec<&'a GroundTruth> {
+        let other = |t: &&GroundTruth| !self.truth.is_some_and(|own| std::ptr::eq(own, *t));
         self.sheet
             .truth
             .iter()
             .filter(other)
             .filter(|t| t.bbox.overlaps(view))
-            .take(MOST_OTHERS)
+            .take(MAX_OTHER_BOXES)
             .collect()
     }
 
     /// Detections in the view that the mistake is not about, the surest ones.
-    fn other_detections(&self, view: &BBox, confidence: f64) -> Vec<&'a FoundBox> {
-        let other = |f: &&FoundBox| !self.found.is_some_and(|own| std::ptr::eq(own, *f));
+    fn other_detections(&self, view: &BBox, confidence: f64) -> Vec<&'a Detection> {
+        let other = |f: &&Detection| !self.found.is_some_and(|own| std::ptr::eq(own, *f));
         let sure = self
             .sheet
             .found
             .iter()
             .filter(|f| f.confidence > confidence);
-        let mut seen: Vec<&FoundBox> = sure
+        let mut seen: Vec<&Detection> = sure
             .filter(other)
             .filter(|f| f.bbox.overlaps(view))
             .collect();
         seen.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
-        seen.truncate(MOST_OTHERS);
+        seen.truncate(MAX_OTHER_BOXES);
         seen
     }
 
@@ -285,11 +311,11 @@ impl<'a> Case<'a> {
         let truth = self.truth.map(|t| name(t.class)).unwrap_or_default();
         let iou = self.mistake.iou;
         let what = match (self.mistake.kind, self.truth, self.found) {
-            (Kind::Missed, _, Some(_)) => {
+            (MistakeKind::Missed, _, Some(_)) => {
                 format!("{truth} missed; nearest detection: {found}, IoU {iou:.2}")
             }
-            (Kind::Missed, ..) => format!("{truth} missed; no detection near"),
-            (Kind::WrongClass, ..) => format!("{found} for {truth}, IoU {iou:.2}"),
+            (MistakeKind::Missed, ..) => format!("{truth} missed; no detection near"),
+            (MistakeKind::WrongClass, ..) => format!("{found} for {truth}, IoU {iou:.2}"),
             (_, Some(_), _) => format!("false alarm: {found}; nearest box: {truth}, IoU {iou:.2}"),
             _ => format!("false alarm: {found}; no box near"),
         };
@@ -297,11 +323,11 @@ impl<'a> Case<'a> {
     }
 }
 
-fn word(kind: Kind) -> &'static str {
+fn word(kind: MistakeKind) -> &'static str {
     match kind {
-        Kind::FalseAlarm => "false alarm",
-        Kind::WrongClass => "wrong class",
-        Kind::Missed => "missed",
+        MistakeKind::FalseAlarm => "false alarm",
+        MistakeKind::WrongClass => "wrong class",
+        MistakeKind::Missed => "missed",
     }
 }
 
@@ -338,20 +364,20 @@ mod tests {
             x1: i as f64 + 2.0,
             y1: 2.0,
         };
-        let found = |i: usize| FoundBox {
+        let found = |i: usize| Detection {
             class: 0,
             bbox: at(i),
             confidence: 0.3 + (i % 7) as f64 / 10.0,
         };
         let truth = (0..300)
-            .map(|i| TrueBox {
+            .map(|i| GroundTruth {
                 class: 0,
                 bbox: at(i),
                 area: 4.0,
                 crowd: false,
             })
             .collect();
-        let sheet = Sheet {
+        let sheet = EvalImage {
             image: "a".into(),
             truth,
             found: (0..5_000).map(found).collect(),
@@ -362,20 +388,26 @@ mod tests {
         };
         let mistake = Mistake {
             sheet: 0,
-            kind: Kind::FalseAlarm,
+            kind: MistakeKind::FalseAlarm,
             found: Some(3),
             truth: None,
             iou: 0.0,
         };
-        let case = Case::of(&run, &mistake);
+        let shown = ShownMistake::new(&run, &mistake);
         let view = BBox {
             x0: 100.0,
             y0: 0.0,
             x1: 1_400.0,
             y1: 2.0,
         };
-        let (boxes, detections) = (case.other_boxes(&view), case.other_detections(&view, 0.25));
-        assert_eq!((boxes.len(), detections.len()), (MOST_OTHERS, MOST_OTHERS));
+        let (boxes, detections) = (
+            shown.other_boxes(&view),
+            shown.other_detections(&view, 0.25),
+        );
+        assert_eq!(
+            (boxes.len(), detections.len()),
+            (MAX_OTHER_BOXES, MAX_OTHER_BOXES)
+        );
         assert!(boxes.iter().all(|t| t.bbox.overlaps(&view)));
         assert!(
             detections

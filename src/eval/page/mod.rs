@@ -4,8 +4,8 @@ mod mistakes;
 
 use crate::error::Result;
 use crate::eval::{
-    self, ClassScores, CocoScores, Confusion, ConfusionOptions, Definition, Interval, Matches,
-    Picture, Scores, Sheet, THRESHOLDS, Tags, thresholds,
+    self, ClassScores, CocoScores, Confusion, ConfusionOptions, Definition, EvalImage, Interval,
+    Matches, Picture, Scores, THRESHOLDS, Tags, thresholds,
 };
 use crate::io;
 use crate::plot::{Page, Table};
@@ -19,7 +19,7 @@ pub struct Run {
     /// Its name: the folder or file of its predictions.
     pub name: String,
     /// Images with truth and detections.
-    pub sheets: Vec<Sheet>,
+    pub sheets: Vec<EvalImage>,
 }
 
 /// What is asked of the report.
@@ -27,7 +27,7 @@ pub struct Run {
 pub struct EvalReportOptions {
     /// Names of the classes; unnamed ones are called by number.
     pub classes: Vec<String>,
-    /// Light, camera position, ..: scores are told for each.
+    /// Light, camera position, ..: scores are given for each.
     pub tags: Tags,
     /// Rounds of the bootstrap over images. Default: 200.
     pub rounds: usize,
@@ -126,6 +126,19 @@ impl Metrics {
         }
     }
 
+    fn scores_row(&self, definition: &str, scores: &Scores, interval: String) -> [String; 7] {
+        let [half, strict] = [0, 5].map(|t| share(scores.map_at(t)));
+        [
+            self.run.clone(),
+            self.images.to_string(),
+            definition.to_owned(),
+            half,
+            strict,
+            share(scores.map()),
+            interval,
+        ]
+    }
+
     /// The scores of a class; none of one that is not in the truth.
     fn class(&self, class: u32) -> Option<&ClassScores> {
         let classes = &self.yolov5.classes;
@@ -145,6 +158,36 @@ impl Metrics {
 pub fn write(folder: &Path, runs: &[Run], options: &EvalReportOptions) -> Result<Vec<Metrics>> {
     let all: Vec<Metrics> = runs.iter().map(|run| Metrics::of(run, options)).collect();
     io::create_folder(folder)?;
+    write_metrics(folder, &all)?;
+    let confusion = runs
+        .first()
+        .map(|run| Confusion::new(&run.sheets, &options.confusion))
+        .unwrap_or_default();
+    let shown = shown_classes(&all, &confusion);
+    let mut page = Page::new("Detections against the truth");
+    let scores = scores_table(&all, options);
+    add_table(&mut page, folder, "Scores", "scores.csv", [&scores; 2])?;
+    let classes = classes_table(&all, options);
+    let classes_shown = classes_among(&all, options, &shown);
+    let title = classes_title(&all, &shown);
+    add_table(
+        &mut page,
+        folder,
+        &title,
+        "classes.csv",
+        [&classes, &classes_shown],
+    )?;
+    let factors = factors_table(runs, options);
+    add_table(&mut page, folder, "Factors", "factors.csv", [&factors; 2])?;
+    if let Some(run) = runs.first() {
+        add_run(folder, &mut page, run, &confusion, &shown, options)?;
+    }
+    io::write_text(folder.join("eval.html"), &page.document())?;
+    Ok(all)
+}
+
+/// `metrics.json` of one run, or `1-NAME.json` and so on of several.
+fn write_metrics(folder: &Path, all: &[Metrics]) -> Result<()> {
     for (i, metrics) in all.iter().enumerate() {
         let name = if all.len() == 1 {
             "metrics.json".into()
@@ -153,47 +196,32 @@ pub fn write(folder: &Path, runs: &[Run], options: &EvalReportOptions) -> Result
         };
         io::write_json(folder.join(name), metrics)?;
     }
-    let mut page = Page::new("Detections against the truth");
-    let mut section = |title: &str, file: &str, table: &Table, shown: &Table| -> Result<()> {
-        if !table.rows.is_empty() {
-            io::write_text(folder.join(file), &table.csv())?;
-            page.heading(title).beginning(shown, MOST_ROWS, file);
-        }
-        Ok(())
-    };
-    let (scores, classes, factors) = (
-        scores_table(&all, options),
-        classes_table(&all, options),
-        factors_table(runs, options),
-    );
-    let confusion = runs
-        .first()
-        .map(|run| Confusion::new(&run.sheets, &options.confusion))
-        .unwrap_or_default();
-    let shown = shown_classes(&all, &confusion);
-    section("Scores", "scores.csv", &scores, &scores)?;
-    section(
-        &classes_title(&all, &shown),
-        "classes.csv",
-        &classes,
-        &classes_among(&all, options, &shown),
-    )?;
-    section("Factors", "factors.csv", &factors, &factors)?;
-    if let Some(run) = runs.first() {
-        put_run(folder, &mut page, run, &confusion, &shown, options)?;
+    Ok(())
+}
+
+/// Writes a table that is not empty, and adds what is shown of it to the page.
+fn add_table(
+    page: &mut Page,
+    folder: &Path,
+    title: &str,
+    file: &str,
+    [table, shown]: [&Table; 2],
+) -> Result<()> {
+    if !table.rows.is_empty() {
+        io::write_text(folder.join(file), &table.csv())?;
+        page.heading(title).beginning(shown, MAX_SHOWN_ROWS, file);
     }
-    io::write_text(folder.join("eval.html"), &page.document())?;
-    Ok(all)
+    Ok(())
 }
 
 /// So many classes are shown on the page and on a terminal; the tables (CSV) have all of them.
-const MOST_CLASSES: usize = 50;
+const MAX_SHOWN_CLASSES: usize = 50;
 
 /// So many rows of a table are shown on the page.
-const MOST_ROWS: usize = 200;
+const MAX_SHOWN_ROWS: usize = 200;
 
 /// The charts, the confusion and the mistakes of a run.
-fn put_run(
+fn add_run(
     folder: &Path,
     page: &mut Page,
     run: &Run,
@@ -214,7 +242,7 @@ fn put_run(
         folder.join("mistakes.csv"),
         &mistakes::table(run, &mistakes, options).csv(),
     )?;
-    mistakes::put_on(page, run, &mistakes, options);
+    mistakes::add_to(page, run, &mistakes, options);
     Ok(())
 }
 
@@ -225,10 +253,14 @@ fn shown_classes(all: &[Metrics], confusion: &Confusion) -> Vec<u32> {
         .flat_map(|m| m.yolov5.classes.iter().map(|c| c.class))
         .chain(confusion.classes());
     let known: BTreeSet<u32> = known.collect();
-    if known.len() <= MOST_CLASSES {
+    if known.len() <= MAX_SHOWN_CLASSES {
         known.into_iter().collect()
     } else {
-        confusion.worst().into_iter().take(MOST_CLASSES).collect()
+        confusion
+            .worst()
+            .into_iter()
+            .take(MAX_SHOWN_CLASSES)
+            .collect()
     }
 }
 
@@ -272,46 +304,29 @@ pub fn scores_table(all: &[Metrics], options: &EvalReportOptions) -> Table {
         "mAP@0.5:0.95",
         "95 % interval",
     ]);
-    for m in all {
-        let yolov5 = format!("{} to {}", share(m.map.low), share(m.map.high));
-        for (name, scores, interval) in [
-            ("yolov5", &m.yolov5, yolov5),
-            ("coco", &m.coco.scores, String::new()),
-        ] {
-            let [half, strict] = [0, 5].map(|t| share(scores.map_at(t)));
-            table.push([
-                &m.run,
-                &m.images.to_string(),
-                name,
-                &half,
-                &strict,
-                &share(scores.map()),
-                &interval,
-            ]);
-        }
+    for metrics in all {
+        let interval = range_text(&metrics.map);
+        table.push(metrics.scores_row("yolov5", &metrics.yolov5, interval));
+        table.push(metrics.scores_row("coco", &metrics.coco.scores, String::new()));
     }
     if all.len() > 1 {
-        let spread = Spread::of(
-            &all.iter().map(|m| m.yolov5.map()).collect::<Vec<_>>(),
-            options.seed,
-        );
-        let interval = format!(
-            "{} to {}",
-            share(spread.interval.low),
-            share(spread.interval.high)
-        );
-        let mean = format!("{} +- {}", share(spread.mean), share(spread.std));
+        let maps: Vec<f64> = all.iter().map(|m| m.yolov5.map()).collect();
+        let spread = Spread::of(&maps, options.seed);
         table.push([
             "mean +- std",
             &format!("{} runs", spread.runs),
             "yolov5",
             "",
             "",
-            &mean,
-            &interval,
+            &format!("{} +- {}", share(spread.mean), share(spread.std)),
+            &range_text(&spread.interval),
         ]);
     }
     table
+}
+
+fn range_text(interval: &Interval) -> String {
+    format!("{} to {}", share(interval.low), share(interval.high))
 }
 
 /// Average precision per class and threshold by the definition of YOLOv5.
@@ -325,19 +340,25 @@ pub fn classes_table(all: &[Metrics], options: &EvalReportOptions) -> Table {
 
 /// The same for a terminal: of many classes those with the lowest average precision, and how many others there are.
 pub fn classes_in_brief(all: &[Metrics], options: &EvalReportOptions) -> (Table, usize) {
-    let mut classes: BTreeMap<u32, f64> = BTreeMap::new();
+    let order = classes_by_precision(all);
+    let others = order.len().saturating_sub(MAX_SHOWN_CLASSES);
+    let mut shown: Vec<u32> = order.into_iter().take(MAX_SHOWN_CLASSES).collect();
+    if others == 0 {
+        shown.sort_unstable();
+    }
+    (classes_among(all, options, &shown), others)
+}
+
+/// The classes by the lowest average precision of any run.
+fn classes_by_precision(all: &[Metrics]) -> Vec<u32> {
+    let mut lowest: BTreeMap<u32, f64> = BTreeMap::new();
     for class in all.iter().flat_map(|m| &m.yolov5.classes) {
-        let least = classes.entry(class.class).or_insert(f64::INFINITY);
+        let least = lowest.entry(class.class).or_insert(f64::INFINITY);
         *least = least.min(class.mean());
     }
-    let mut order: Vec<(u32, f64)> = classes.into_iter().collect();
-    let others = order.len().saturating_sub(MOST_CLASSES);
-    if others > 0 {
-        order.sort_by(|a, b| a.1.total_cmp(&b.1));
-        order.truncate(MOST_CLASSES);
-    }
-    let order: Vec<u32> = order.into_iter().map(|(class, _)| class).collect();
-    (classes_among(all, options, &order), others)
+    let mut order: Vec<(u32, f64)> = lowest.into_iter().collect();
+    order.sort_by(|a, b| a.1.total_cmp(&b.1));
+    order.into_iter().map(|(class, _)| class).collect()
 }
 
 fn classes_among(all: &[Metrics], options: &EvalReportOptions, classes: &[u32]) -> Table {
@@ -350,30 +371,27 @@ fn classes_among(all: &[Metrics], options: &EvalReportOptions, classes: &[u32]) 
         "AP@0.5:0.95",
     ]
     .map(String::from);
-    let at = thresholds().map(|t| format!("AP@{t:.2}"));
+    let thresholds = thresholds().map(|t| format!("AP@{t:.2}"));
     let mut table = Table {
-        columns: columns.into_iter().chain(at).collect(),
+        columns: columns.into_iter().chain(thresholds).collect(),
         rows: Vec::new(),
     };
-    for m in all {
-        for class in classes.iter().filter_map(|&class| m.class(class)) {
-            let name = options
-                .classes
-                .get(class.class as usize)
-                .cloned()
-                .unwrap_or_else(|| class.class.to_string());
-            let numbers = [class.precision, class.recall, class.mean()]
-                .into_iter()
-                .chain(class.ap)
-                .map(share);
-            table.push(
-                [m.run.clone(), name, class.truths.to_string()]
-                    .into_iter()
-                    .chain(numbers),
-            );
+    for metrics in all {
+        for class in classes.iter().filter_map(|&class| metrics.class(class)) {
+            table.push(class_row(&metrics.run, class, options));
         }
     }
     table
+}
+
+fn class_row(run: &str, class: &ClassScores, options: &EvalReportOptions) -> Vec<String> {
+    let name = options.classes.get(class.class as usize).cloned();
+    let name = name.unwrap_or_else(|| class.class.to_string());
+    let scores = [class.precision, class.recall, class.mean()];
+    [run.to_owned(), name, class.truths.to_string()]
+        .into_iter()
+        .chain(scores.into_iter().chain(class.ap).map(share))
+        .collect()
 }
 
 /// mAP per level of every factor; empty without tags.
@@ -386,33 +404,36 @@ pub fn factors_table(runs: &[Run], options: &EvalReportOptions) -> Table {
         "yolov5 mAP@0.5:0.95",
         "coco mAP@0.5:0.95",
     ]);
-    if options.tags.factors.is_empty() {
+    let tags = &options.tags;
+    if tags.factors.is_empty() {
         return table;
     }
-    let definitions = [Definition::Yolov5, Definition::Coco];
-    let matches: Vec<_> = runs
-        .iter()
-        .map(|run| definitions.map(|d| Matches::new(&run.sheets, d)))
-        .collect();
-    for (i, factor) in options.tags.factors.iter().enumerate() {
-        for level in options.tags.levels(i) {
+    let matches: Vec<[Matches; 2]> = runs.iter().map(match_both).collect();
+    for (i, factor) in tags.factors.iter().enumerate() {
+        for level in tags.levels(i) {
             for (run, matches) in runs.iter().zip(&matches) {
-                let inside = |s: &Sheet| u32::from(options.tags.of(&s.image, i) == Some(level));
-                let weights: Vec<u32> = run.sheets.iter().map(inside).collect();
+                let weights = level_weights(run, tags, i, level);
                 let images = weights.iter().filter(|weight| **weight > 0).count();
-                let [ours, theirs] = matches.each_ref().map(|m| share(m.map(&weights)));
-                table.push([
-                    &run.name,
-                    factor,
-                    level,
-                    &images.to_string(),
-                    &ours,
-                    &theirs,
-                ]);
+                let [yolov5, coco] = matches.each_ref().map(|m| share(m.map(&weights)));
+                let images = images.to_string();
+                table.push([&run.name, factor, level, &images, &yolov5, &coco]);
             }
         }
     }
     table
+}
+
+/// The detections of a run matched by both definitions.
+fn match_both(run: &Run) -> [Matches; 2] {
+    [Definition::Yolov5, Definition::Coco].map(|d| Matches::new(&run.sheets, d))
+}
+
+/// 1 for each image at a level of a factor, 0 for the others.
+fn level_weights(run: &Run, tags: &Tags, factor: usize, level: &str) -> Vec<u32> {
+    run.sheets
+        .iter()
+        .map(|sheet| u32::from(tags.of(&sheet.image, factor) == Some(level)))
+        .collect()
 }
 
 /// Name, caption and SVG of each chart of a run.
@@ -425,13 +446,13 @@ fn pictures(
     let (curves, names) = (eval::curves(&run.sheets), &options.classes);
     let ConfusionOptions { confidence, iou } = options.confusion;
     let told = format!(
-        "Which class is taken for which; detections surer than {confidence} that overlap a box by more than {iou}. \
+        "Which class is found where which is true; detections surer than {confidence} that overlap a box by more than {iou}. \
          Shades are shares of a column. All counts are in confusion.csv."
     );
     let few = match curves.classes.len() {
-        n if n > eval::CURVES_SHOWN => format!(
+        n if n > eval::MAX_CURVES => format!(
             " The mean of {n} classes, and {} of them.",
-            eval::CURVES_SHOWN
+            eval::MAX_CURVES
         ),
         _ => String::new(),
     };
@@ -463,7 +484,7 @@ const _: () = assert!(THRESHOLDS > 5, "mAP@0.75 is the sixth threshold");
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::eval::{FoundBox, TrueBox};
+    use crate::eval::{Detection, GroundTruth};
     use crate::geom::BBox;
 
     fn run(name: &str, confidence: f64) -> Run {
@@ -473,18 +494,18 @@ mod tests {
             x1: 50.0,
             y1: 40.0,
         };
-        let truth = TrueBox {
+        let truth = GroundTruth {
             class: 0,
             bbox,
             area: 2000.0,
             crowd: false,
         };
-        let sheet = |image: &str, found: &[f64]| Sheet {
+        let sheet = |image: &str, found: &[f64]| EvalImage {
             image: image.into(),
             truth: vec![truth],
             found: found
                 .iter()
-                .map(|&confidence| FoundBox {
+                .map(|&confidence| Detection {
                     class: 0,
                     bbox,
                     confidence,

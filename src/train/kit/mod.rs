@@ -86,38 +86,16 @@ const VARIANTS: [Variant; 5] = [
 /// # Errors
 /// Those of [`YoloSet::open`] and [`Balance::weights`]; [`Error::Value`] when the two datasets name other classes.
 pub fn write(folder: &Path, options: &KitOptions) -> Result<()> {
-    let [real, synthetic] = [&options.real, &options.synthetic].map(|set| opened(set));
-    let (real, synthetic) = (real?, synthetic?);
-    if real.classes != synthetic.classes {
-        let what = format!(
-            "{:?} in {}, expected {:?} as in {}",
-            synthetic.classes,
-            options.synthetic.display(),
-            real.classes,
-            options.real.display()
-        );
-        return Err(Error::value("classes", what));
-    }
+    let real = open_set(&options.real)?;
+    let synthetic = open_set(&options.synthetic)?;
+    check_classes(&real, &synthetic, options)?;
     let counts = [real.train.len() as u64, synthetic.train.len() as u64];
     let weights = options.balance.weights(counts[0], counts[1])?;
     io::create_folder(folder)?;
-    for (name, images) in [
-        ("real_train", &real.train),
-        ("real_val", &real.val),
-        ("synthetic_train", &synthetic.train),
-        ("synthetic_val", &synthetic.val),
-    ] {
-        let lines: String = images
-            .iter()
-            .map(|path| format!("{}\n", path.display()))
-            .collect();
-        io::write_text(folder.join(format!("{name}.txt")), &lines)?;
-    }
+    write_lists(folder, &real, &synthetic)?;
     for variant in &VARIANTS {
-        io::write_text(
-            folder.join(format!("{}.yaml", variant.name)),
-            &variant.yaml(&real.classes),
-        )?;
+        let path = folder.join(format!("{}.yaml", variant.name));
+        io::write_text(path, &variant.yaml(&real.classes))?;
     }
     let balance = serde_json::json!({
         "alpha": options.balance.alpha, "normalize": options.balance.normalize,
@@ -129,7 +107,43 @@ pub fn write(folder: &Path, options: &KitOptions) -> Result<()> {
     io::write_text(folder.join("commands.sh"), &commands(options, counts))
 }
 
-fn opened(folder: &Path) -> Result<YoloSet> {
+/// A list of the images of each part of both datasets.
+fn write_lists(folder: &Path, real: &YoloSet, synthetic: &YoloSet) -> Result<()> {
+    for (name, images) in [
+        ("real_train", &real.train),
+        ("real_val", &real.val),
+        ("synthetic_train", &synthetic.train),
+        ("synthetic_val", &synthetic.val),
+    ] {
+        write_list(&folder.join(format!("{name}.txt")), images)?;
+    }
+    Ok(())
+}
+
+/// Fails where the two datasets name other classes.
+fn check_classes(real: &YoloSet, synthetic: &YoloSet, options: &KitOptions) -> Result<()> {
+    if real.classes == synthetic.classes {
+        return Ok(());
+    }
+    let what = format!(
+        "{:?} in {}, expected {:?} as in {}",
+        synthetic.classes,
+        options.synthetic.display(),
+        real.classes,
+        options.real.display()
+    );
+    Err(Error::value("classes", what))
+}
+
+fn write_list(path: &Path, images: &[PathBuf]) -> Result<()> {
+    let lines: String = images
+        .iter()
+        .map(|path| format!("{}\n", path.display()))
+        .collect();
+    io::write_text(path, &lines)
+}
+
+fn open_set(folder: &Path) -> Result<YoloSet> {
     let whole = std::fs::canonicalize(folder).map_err(|e| Error::file(folder, e))?;
     YoloSet::open(&whole)
 }
@@ -165,7 +179,7 @@ fn commands(options: &KitOptions, [real, synthetic]: [u64; 2]) -> String {
         batch,
         ..
     } = options;
-    let combined = Updates::of(real + synthetic, *batch, *epochs);
+    let combined = Updates::new(real + synthetic, *batch, *epochs);
     let equal = |images| combined.epochs_of(batches_per_epoch(images, *batch));
     let mut text = format!(
         "#!/bin/sh\n# Start in this folder. YOLOV5 is the folder of a clone of YOLOv5; combined trainings need Ultralytics.\n\

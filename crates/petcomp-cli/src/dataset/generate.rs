@@ -3,8 +3,8 @@
 use crate::common::{Common, RecipeArgs, interruption};
 use crate::print;
 use petcomp::dataset::{
-    self, LongRun, Numbers, Obstructed, Plan, Progress, Report, Setup, ShardChoice, Studio,
-    contact_sheet_of,
+    self, DatasetConfig, DatasetCounts, LongRun, Obstructed, Pipeline, Plan, Progress, SampleRange,
+    ShardChoice, contact_sheet_of,
 };
 use petcomp::{Error, Quality, io};
 use std::path::{Path, PathBuf};
@@ -84,36 +84,36 @@ pub(crate) struct Merge {
 }
 
 pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
-    let mut setup = args.recipe.setup()?;
+    let mut config = args.recipe.config()?;
     if let Some(quality) = args.quality {
-        setup = quality.setup(setup);
+        config = quality.config(config);
     }
     if args.preview.is_some() {
-        setup = setup.preview();
+        config = config.preview();
     }
     let count = args
         .count
         .or(args.preview)
         .unwrap_or_else(|| args.only.map_or(0, |k| k.saturating_add(1)));
     let count = args.preview.map_or(count, |first| first.min(count));
-    let numbers = numbers(args)?;
-    let folder = match numbers {
-        Numbers::Shard(shard) => args.output.join(shard.folder()),
+    let range = sample_range(args)?;
+    let folder = match range {
+        SampleRange::Shard(shard) => args.output.join(shard.folder()),
         _ => args.output.clone(),
     };
     if args.resume {
-        let (good, bad) = dataset::mend(&folder)?;
+        let (good, bad) = dataset::repair(&folder)?;
         print::line(format_args!(
             "{}: {good} images are as they were written, {bad} are made again",
             folder.display()
         ));
     }
-    let studio = Studio::open(setup)?.stopped_by(interruption());
+    let pipeline = Pipeline::open(config)?.stopped_by(interruption());
     let plan = Plan {
-        numbers,
-        ..studio.plan(count, args.seed, &folder)?
+        range,
+        ..pipeline.plan(count, args.seed, &folder)?
     };
-    let report = make(&studio, &plan, &args.consent, common)?;
+    let report = make(&pipeline, &plan, &args.consent, common)?;
     tell(&report);
     if args.preview.is_some() {
         let sheet = folder.join("sheet.png");
@@ -129,27 +129,28 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn numbers(args: &Args) -> petcomp::Result<Numbers> {
+fn sample_range(args: &Args) -> petcomp::Result<SampleRange> {
     match (args.only, args.shard) {
-        (Some(k), _) => Ok(Numbers::One(k)),
+        (Some(k), _) => Ok(SampleRange::One(k)),
         (None, Some(choice)) => choice
             .within(|name| std::env::var(name).ok())
-            .map(Numbers::Shard),
-        (None, None) => Ok(Numbers::All),
+            .map(SampleRange::Shard),
+        (None, None) => Ok(SampleRange::All),
     }
 }
 
 pub(crate) fn ablate(args: &Ablate, common: &Common) -> anyhow::Result<()> {
-    for (ablation, setup) in args.recipe.setup()?.ablations() {
+    for (ablation, config) in args.recipe.config()?.ablations() {
         let folder = args.output.join(ablation.name);
         io::create_folder(&folder)?;
         let recipe = folder.join("recipe.toml");
-        setup.write(&recipe)?;
+        config.write(&recipe)?;
         print::line(recipe.display());
         if args.count > 0 {
-            let studio = Studio::open(Setup::read(&recipe, &[])?)?.stopped_by(interruption());
-            let plan = studio.plan(args.count, args.seed, folder.join("dataset"))?;
-            tell(&make(&studio, &plan, &args.consent, common)?);
+            let pipeline =
+                Pipeline::open(DatasetConfig::read(&recipe, &[])?)?.stopped_by(interruption());
+            let plan = pipeline.plan(args.count, args.seed, folder.join("dataset"))?;
+            tell(&make(&pipeline, &plan, &args.consent, common)?);
         }
     }
     Ok(())
@@ -174,13 +175,13 @@ pub(crate) fn merge(args: &Merge, common: &Common) -> anyhow::Result<()> {
 /// Makes the dataset, showing progress, and stops between two pictures when interrupted, or when the first ones tell that
 /// it takes longer than an hour and nobody has agreed to that.
 pub(crate) fn make(
-    studio: &Studio,
+    pipeline: &Pipeline,
     plan: &Plan,
     consent: &Consent,
     common: &Common,
-) -> anyhow::Result<Report> {
+) -> anyhow::Result<DatasetCounts> {
     let progress = common.progress("pictures");
-    let sample = |k| studio.sample(plan.seed, k);
+    let sample = |k| pipeline.sample(plan.seed, k);
     let (last, done) = (Mutex::new(None), AtomicBool::new(false));
     let show = |p: Progress| {
         progress.at(p.done, p.count);
@@ -226,8 +227,8 @@ fn watch(last: &Mutex<Option<Progress>>, done: &AtomicBool) -> Option<LongRun> {
 }
 
 /// Prints what is in the folder: a result, so also where quiet is asked for.
-pub(crate) fn tell(report: &Report) {
-    let Report {
+pub(crate) fn tell(report: &DatasetCounts) {
+    let DatasetCounts {
         images,
         val,
         made,
@@ -238,7 +239,7 @@ pub(crate) fn tell(report: &Report) {
         ..
     } = report;
     print::line(format_args!(
-        "images       {images} ({val} for validation), {made} made now, {retries} scenes drawn again"
+        "images       {images} ({val} for validation), {made} made now, {retries} scenes resampled"
     ));
     print::line(format_args!(
         "objects      {objects}, {labelled} labelled, {obstructed} obstructed ({})",
@@ -263,7 +264,7 @@ fn labels_of(policy: Obstructed) -> &'static str {
 }
 
 /// What a dataset's trainers are given: the files that name all others, or the folder where there are none.
-pub(crate) fn for_trainers(report: &Report, folder: &Path) -> Vec<PathBuf> {
+pub(crate) fn for_trainers(report: &DatasetCounts, folder: &Path) -> Vec<PathBuf> {
     match report.for_trainers.as_slice() {
         [] => vec![folder.into()],
         files => files.iter().map(|file| folder.join(file)).collect(),

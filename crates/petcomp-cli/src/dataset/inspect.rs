@@ -46,17 +46,19 @@ pub(crate) struct Sheet {
 pub(crate) fn check(args: &Check, common: &Common) -> anyhow::Result<()> {
     let folder = args.folder.display();
     let checked = dataset::check(&args.folder)?;
-    let Checked { faults, images, .. } = &checked;
+    let Checked {
+        findings, images, ..
+    } = &checked;
     print::text(checked.balance().markdown());
-    let notes = checked.remarks();
+    let notes = checked.notes();
     notes
         .iter()
-        .for_each(|note| common.say(format_args!("note: {note}")));
-    faults.iter().for_each(print::line);
-    anyhow::ensure!(faults.is_empty(), "{folder}: {} faults", faults.len());
+        .for_each(|note| common.say(format_args!("note: {note} [{}]", note.code)));
+    findings.iter().for_each(print::line);
+    anyhow::ensure!(findings.is_empty(), "{folder}: {} errors", findings.len());
     let rows: usize = checked.rows.iter().sum();
     print::line(format_args!(
-        "{folder}: {images} images, {rows} labels, no fault"
+        "{folder}: {images} images, {rows} labels, no errors"
     ));
     match notes.len() {
         n if args.strict && n > 0 => Err(NeedsReview(format!("{folder}: {n} notes")).into()),

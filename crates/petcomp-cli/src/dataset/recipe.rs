@@ -2,7 +2,7 @@
 
 use crate::common::{Common, RecipeArgs};
 use crate::print;
-use petcomp::dataset::Setup;
+use petcomp::dataset::DatasetConfig;
 use petcomp::scene::Drawn;
 use petcomp::{Error, Scene, io};
 use std::path::PathBuf;
@@ -30,16 +30,16 @@ pub(crate) fn init(args: &Init, common: &Common) -> anyhow::Result<()> {
     if args.recipe.exists() {
         return Err(Error::file(&args.recipe, "is there already, expected a new file").into());
     }
-    io::write_text(&args.recipe, Setup::template())?;
+    io::write_text(&args.recipe, DatasetConfig::template())?;
     common.say(args.recipe.display());
     Ok(())
 }
 
 /// Makes the image to know which of its scenes came to rest, and prints the draws of that one.
 pub(crate) fn explain(args: &Explain) -> anyhow::Result<()> {
-    let sample = args.recipe.studio()?.sample(args.seed, args.index)?;
+    let sample = args.recipe.pipeline()?.sample(args.seed, args.index)?;
     for reason in &sample.rejected {
-        print::line(format_args!("# a scene was thrown away: {reason}"));
+        print::line(format_args!("# rejected a scene: {reason}"));
     }
     if !sample.rejected.is_empty() {
         print::line(format_args!(

@@ -3,7 +3,7 @@
 use crate::common::Common;
 use crate::print;
 use petcomp::Error;
-use petcomp::dataset::{Group, Leaks, Listing, NEAR_CODES, Sharing};
+use petcomp::dataset::{Group, Leakage, Listing, NEAR_DUPLICATE_RMS, Partition};
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
@@ -51,11 +51,11 @@ pub(crate) struct Subset {
 
 pub(crate) fn split(args: &Split, common: &Common) -> anyhow::Result<()> {
     let how = match args.by {
-        How::Consecutive => Sharing::Consecutive { guard: args.guard },
-        How::Grouped => Sharing::Grouped(args.group),
-        How::Random => Sharing::Random,
+        How::Consecutive => Partition::Consecutive { guard: args.guard },
+        How::Grouped => Partition::Grouped(args.group),
+        How::Random => Partition::Random,
     };
-    let shared = Listing::read(&args.folder)?.shared(how, args.ratio, args.seed)?;
+    let shared = Listing::read(&args.folder)?.partitioned(how, args.ratio, args.seed)?;
     if shared.train.is_empty() || shared.val.is_empty() {
         let what = format!(
             "{} images for training and {} for validation",
@@ -65,7 +65,7 @@ pub(crate) fn split(args: &Split, common: &Common) -> anyhow::Result<()> {
         return Err(Error::value("split", format!("{what}: too few groups for this ratio")).into());
     }
     write(&shared, &args.output, common)?;
-    tell(&shared.leaks(NEAR_CODES)?);
+    tell(&shared.leakage(NEAR_DUPLICATE_RMS)?);
     Ok(())
 }
 
@@ -87,17 +87,17 @@ fn write(listing: &Listing, folder: &std::path::Path, common: &Common) -> anyhow
     Ok(())
 }
 
-fn tell(leaks: &Leaks) {
-    for (group, [all, shared]) in &leaks.groups {
+fn tell(leakage: &Leakage) {
+    for (group, [all, shared]) in &leakage.groups {
         print::line(format_args!(
             "leak: {shared} of {all} {group}s of the validation images are also trained on"
         ));
     }
     print::line(format_args!(
         "leak: {} validation images look like one that is trained on",
-        leaks.near.len()
+        leakage.near_duplicates.len()
     ));
-    for near in leaks.near.iter().take(10) {
+    for near in leakage.near_duplicates.iter().take(10) {
         let (val, train) = (near.val.display(), near.train.display());
         print::line(format_args!(
             "  {val} and {train} differ by {:.2} codes",

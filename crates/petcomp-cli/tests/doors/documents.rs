@@ -6,7 +6,7 @@ use crate::world::{LIST, World};
 use petcomp::asset::{self, Library, List};
 use petcomp::camera::{self, CameraFile, ColmapModel, SolveOptions};
 use petcomp::dataset::page::DatasetReportOptions;
-use petcomp::dataset::{self, Listing, Setup, Sharing, Studio, YoloSet};
+use petcomp::dataset::{self, DatasetConfig, Listing, Partition, Pipeline, YoloSet};
 use petcomp::eval::page::{EvalReportOptions, Metrics, Run};
 use petcomp::eval::{self, Tags};
 use petcomp::filter::Pyramid;
@@ -195,7 +195,7 @@ fn given(door: &Door, world: &World) {
 
 /// Every key of a recipe, so that each can be changed.
 fn full_recipe() -> String {
-    let mut setup: Setup = toml::from_str(Setup::template()).unwrap();
+    let mut setup: DatasetConfig = toml::from_str(DatasetConfig::template()).unwrap();
     setup.scene.image = [64, 48];
     setup.scene.objects = petcomp::scene::Range::new(1.0, 3.0);
     setup.scene.surface_albedo = Some(0.5);
@@ -286,23 +286,23 @@ fn falls_soon(scene: &Scene, settle: &SettleOptions) -> bool {
 }
 
 fn recipe(world: &World) {
-    let Some(setup) = ends(Setup::read(world.path("recipe.toml"), &[])) else {
+    let Some(setup) = ends(DatasetConfig::read(world.path("recipe.toml"), &[])) else {
         return;
     };
-    let Some(studio) = ends(Studio::open(setup)) else {
+    let Some(pipeline) = ends(Pipeline::open(setup)) else {
         return;
     };
     for k in [0, 1, u64::MAX] {
-        let Some(scene) = ends(studio.draw(k, k)) else {
+        let Some(scene) = ends(pipeline.draw(k, k)) else {
             return;
         };
-        let small = is_small(studio.setup().scene.image, &studio.setup().render);
+        let small = is_small(pipeline.config().scene.image, &pipeline.config().render);
         if k == 1
             && small
             && scene.lights.len() < 4
-            && falls_soon(&scene, &studio.setup().scene.settle)
+            && falls_soon(&scene, &pipeline.config().scene.settle)
         {
-            ends(studio.take(scene));
+            ends(pipeline.take(scene));
         }
     }
 }
@@ -318,21 +318,21 @@ fn scene(world: &World, file: &str) {
     {
         return;
     }
-    let setup: Setup = toml::from_str("").unwrap();
+    let setup: DatasetConfig = toml::from_str("").unwrap();
     let folders = |folder: &str| world.path(folder);
-    let setup = Setup {
+    let setup = DatasetConfig {
         assets: folders("assets"),
         backgrounds: folders("backgrounds"),
         ..setup
     };
-    let Some(studio) = ends(Studio::open_for(setup, &scene)) else {
+    let Some(pipeline) = ends(Pipeline::open_for(setup, &scene)) else {
         return;
     };
     if is_small(scene.image, &RenderOptions::default()) && scene.objects.len() <= 4 {
-        let Some(sample) = ends(studio.take(scene)) else {
+        let Some(sample) = ends(pipeline.take(scene)) else {
             return;
         };
-        label::overlay(&sample.frame, &sample.labels, &studio.library().classes);
+        label::overlay(&sample.frame, &sample.labels, &pipeline.library().classes);
     }
 }
 
@@ -362,14 +362,14 @@ fn label_file(world: &World) {
             solution.fit.px_per_metre,
         ));
     }
-    ends(Studio::open(world_setup(world)));
+    ends(Pipeline::open(world_setup(world)));
 }
 
-fn world_setup(world: &World) -> Setup {
-    Setup {
+fn world_setup(world: &World) -> DatasetConfig {
+    DatasetConfig {
         assets: world.path("assets"),
         backgrounds: world.path("backgrounds"),
-        ..Setup::default()
+        ..DatasetConfig::default()
     }
 }
 
@@ -401,8 +401,8 @@ fn manifest(world: &World) {
     if photos < 10 {
         asset::contact_sheet(&library);
     }
-    if let Some(studio) = ends(Studio::open(world_setup(world))) {
-        ends(studio.draw(0, 0));
+    if let Some(pipeline) = ends(Pipeline::open(world_setup(world))) {
+        ends(pipeline.draw(0, 0));
     }
 }
 
@@ -463,18 +463,18 @@ fn dataset_folder(world: &World) {
         )
         .map(|page| page.document()),
     );
-    ends(dataset::check(&folder).map(|checked| (checked.balance(), checked.remarks())));
+    ends(dataset::check(&folder).map(|checked| (checked.balance(), checked.notes())));
     ends(
         Listing::read(&folder)
-            .and_then(|all| all.shared(Sharing::Grouped(dataset::Group::Selection), 0.5, 1)),
+            .and_then(|all| all.partitioned(Partition::Grouped(dataset::Group::Selection), 0.5, 1)),
     );
-    if let Some(record) = ends(io::read_json::<dataset::Record>(
+    if let Some(record) = ends(io::read_json::<dataset::SampleRecord>(
         folder.join("scenes/val/000000.json"),
     )) {
         sound_labels(&record.labels);
     }
     let journal = world.read("dataset/index.jsonl");
-    ends(dataset::mend(&folder));
+    ends(dataset::repair(&folder));
     world.write("dataset/index.jsonl", &journal);
 }
 
@@ -508,12 +508,12 @@ fn yolo_set(world: &World) {
     ends(YoloSet::open(&folder));
     ends(
         Listing::read(&folder)
-            .and_then(|all| all.shared(Sharing::Consecutive { guard: 1 }, 0.5, 1)),
+            .and_then(|all| all.partitioned(Partition::Consecutive { guard: 1 }, 0.5, 1)),
     );
-    ends(dataset::check(&folder).map(|checked| (checked.balance(), checked.remarks())));
+    ends(dataset::check(&folder).map(|checked| (checked.balance(), checked.notes())));
 }
 
-fn evaluated(world: &World, sheets: Vec<eval::Sheet>) {
+fn evaluated(world: &World, sheets: Vec<eval::EvalImage>) {
     let options = EvalReportOptions {
         rounds: 3,
         ..Default::default()
@@ -529,7 +529,7 @@ fn evaluated(world: &World, sheets: Vec<eval::Sheet>) {
 fn yolo_eval(world: &World) {
     let truth = eval::read_yolo_truth(&world.path("dataset/labels/val"), None);
     let Some(mut truth) = ends(truth) else { return };
-    if ends(eval::read_yolo_found(&world.path("found"), &mut truth)).is_some() {
+    if ends(eval::read_yolo_detections(&world.path("found"), &mut truth)).is_some() {
         evaluated(world, truth.sheets);
     }
 }
@@ -552,7 +552,7 @@ fn tags(world: &World) {
     let Some(tags) = ends(eval::read_tags(&world.path("tags.csv"))) else {
         return;
     };
-    let sheets = vec![eval::Sheet {
+    let sheets = vec![eval::EvalImage {
         image: "000000".into(),
         ..Default::default()
     }];
@@ -605,5 +605,5 @@ fn overrides(world: &World) {
                 .map(|k| k.cutout);
     }
     ends(io::from_overrides::<FilmOptions>("film", &of("film.")));
-    ends(Setup::read(world.path("recipe.toml"), &given));
+    ends(DatasetConfig::read(world.path("recipe.toml"), &given));
 }

@@ -1,7 +1,7 @@
 //! A small world of valid files: photos, assets, a label, a recipe, a scene, a dataset and its shards.
 
 use petcomp::asset::{self, PhotoEntry, Scale};
-use petcomp::dataset::{Numbers, Setup, Shard, Studio, generate};
+use petcomp::dataset::{DatasetConfig, Pipeline, SampleRange, Shard, generate};
 use petcomp::scene::cycles;
 use petcomp::{Image, LinearRgb, io};
 use std::path::{Path, PathBuf};
@@ -78,30 +78,30 @@ impl World {
     /// A dataset in all formats, the shards of another, and a scene of it for the reference renderer.
     fn dataset(&self) {
         let formats = "labels.formats=[\"yolo\", \"coco\"]".parse().unwrap();
-        let setup = Setup::read(self.path("recipe.toml"), &[formats]).unwrap();
-        let studio = Studio::open(setup).unwrap();
-        let make = |folder: &str, numbers: Numbers| {
-            let mut plan = studio.plan(3, 0, self.path(folder)).unwrap();
-            plan.numbers = numbers;
+        let setup = DatasetConfig::read(self.path("recipe.toml"), &[formats]).unwrap();
+        let pipeline = Pipeline::open(setup).unwrap();
+        let make = |folder: &str, range: SampleRange| {
+            let mut plan = pipeline.plan(3, 0, self.path(folder)).unwrap();
+            plan.range = range;
             generate(
                 &plan,
-                |k| studio.sample(0, k),
+                |k| pipeline.sample(0, k),
                 &|_| {},
                 &AtomicBool::new(false),
             )
             .unwrap();
         };
-        make("dataset", Numbers::All);
+        make("dataset", SampleRange::All);
         for index in [1, 2] {
             make(
                 &format!("shard-{index}"),
-                Numbers::Shard(Shard::new(index, 2).unwrap()),
+                SampleRange::Shard(Shard::new(index, 2).unwrap()),
             );
         }
-        let sample = studio.sample(0, 1).unwrap();
+        let sample = pipeline.sample(0, 1).unwrap();
         io::write_toml(self.path("scene.toml"), &sample.drawn).unwrap();
         io::write_json(self.path("rest.json"), &sample.scene).unwrap();
-        let (scene, shot) = studio.resolve(sample.scene).unwrap();
+        let (scene, shot) = pipeline.resolve(sample.scene).unwrap();
         cycles::export(&shot, scene.surface.size, self.path("cycles")).unwrap();
     }
 

@@ -8,7 +8,7 @@ use petcomp::DeepImage;
 use petcomp::asset::Texture;
 use petcomp::camera::Camera;
 use petcomp::dataset::{
-    Numbers, Obstructed, Pictures, Plan, Sample, Sidecar, Split, Times, Writer, Yolo, generate,
+    Obstructed, Pictures, Plan, Sample, SampleRange, Sidecar, Split, Times, Writer, Yolo, generate,
 };
 use petcomp::geom::{Point2, Pose, UnitQuaternion, Vector2, Vector3};
 use petcomp::label::{LabelOptions, label};
@@ -175,7 +175,7 @@ fn plan(folder: &std::path::Path, count: u64) -> Plan {
     Plan {
         folder: folder.into(),
         count,
-        numbers: Numbers::All,
+        range: SampleRange::All,
         seed: 0,
         recipe: serde_json::json!({ "made": "in code" }),
         classes: vec!["bottle".into()],

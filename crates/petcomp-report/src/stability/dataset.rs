@@ -4,8 +4,8 @@ use super::staged::{above, grey, level, scene};
 use super::{Case, Outcome};
 use petcomp::composite;
 use petcomp::dataset::{
-    Format, JOURNAL, LabelSetup, Numbers, Obstructed, Part, Pictures, Plan, Sample, Shard, Sidecar,
-    Split, SplitOrder, Times, Writer, check, generate, mend,
+    Format, JOURNAL, LabelConfig, Obstructed, Part, Pictures, Plan, Sample, SampleRange, Shard,
+    Sidecar, Split, SplitOrder, Times, Writer, check, generate, repair,
 };
 use petcomp::io;
 use petcomp::label::{LabelOptions, label};
@@ -109,16 +109,16 @@ impl Made {
         let mut writers: Vec<Box<dyn Writer>> =
             vec![Box::new(Pictures::default()), Box::new(Sidecar)];
         writers.extend(
-            LabelSetup {
+            LabelConfig {
                 formats,
-                ..LabelSetup::default()
+                ..LabelConfig::default()
             }
             .writers(&Pictures::default()),
         );
         Plan {
             folder: self.path().into(),
             count: self.count,
-            numbers: Numbers::All,
+            range: SampleRange::All,
             seed: 0,
             recipe: serde_json::json!({}),
             classes: vec!["bottle".into()],
@@ -131,8 +131,8 @@ impl Made {
 
     /// Everything wrong with it, without the faults that small sets of like pictures have.
     fn faults(&self) -> Result<Vec<String>> {
-        let faults = check(self.path())?.faults;
-        let told = faults.iter().map(|fault| fault.what.clone());
+        let faults = check(self.path())?.findings;
+        let told = faults.iter().map(|fault| fault.diagnostic.message.clone());
         Ok(told
             .filter(|what| !what.contains("looks like") && !what.contains("same bytes"))
             .collect())
@@ -273,7 +273,7 @@ fn lost_picture() -> Case {
             let half = std::fs::read(picture(2)).map_err(|e| Error::file(picture(2), e))?;
             std::fs::write(picture(2), &half[..half.len() / 2])
                 .map_err(|e| Error::file(picture(2), e))?;
-            let (good, lost) = mend(made.path())?;
+            let (good, lost) = repair(made.path())?;
             let again = made.go_on(|k| taken(&with_a_card(k, 0.1)))?;
             let faults = made.faults()?;
             let told = format!(

@@ -3,8 +3,8 @@
 use super::{Case, Outcome};
 use petcomp::Result;
 use petcomp::eval::{
-    Confusion, ConfusionOptions, Definition, FoundBox, Scores, Sheet, TrueBox, bootstrap, coco,
-    curves, evaluate, iou,
+    Confusion, ConfusionOptions, Definition, Detection, EvalImage, GroundTruth, Scores, bootstrap,
+    coco, curves, evaluate, iou,
 };
 use petcomp::geom::BBox;
 
@@ -87,7 +87,7 @@ pub(super) fn cases() -> Result<Vec<Case>> {
                 perfect,
                 || {
                     let mut one = sheet(1, 1, equal);
-                    one.found.push(FoundBox {
+                    one.found.push(Detection {
                         confidence: 0.4,
                         ..one.found[0]
                     });
@@ -124,7 +124,7 @@ fn equal(_: usize) -> f64 {
 }
 
 /// Boxes of 10 x 10 pixels side by side, so many true, so many found in the same places.
-fn sheet(truths: usize, found: usize, confidence: fn(usize) -> f64) -> Sheet {
+fn sheet(truths: usize, found: usize, confidence: fn(usize) -> f64) -> EvalImage {
     let place = |i: usize| {
         let (x, y) = (20.0 * (i % 100) as f64, 20.0 * (i / 100) as f64);
         BBox {
@@ -135,7 +135,7 @@ fn sheet(truths: usize, found: usize, confidence: fn(usize) -> f64) -> Sheet {
         }
     };
     let truth = (0..truths)
-        .map(|i| TrueBox {
+        .map(|i| GroundTruth {
             class: 0,
             bbox: place(i),
             area: 100.0,
@@ -143,20 +143,20 @@ fn sheet(truths: usize, found: usize, confidence: fn(usize) -> f64) -> Sheet {
         })
         .collect();
     let found = (0..found)
-        .map(|i| FoundBox {
+        .map(|i| Detection {
             class: 0,
             bbox: place(i),
             confidence: confidence(i),
         })
         .collect();
-    Sheet {
+    EvalImage {
         image: String::new(),
         truth,
         found,
     }
 }
 
-fn points() -> Vec<Sheet> {
+fn points() -> Vec<EvalImage> {
     let mut sheet = sheet(3, 3, equal);
     sheet
         .truth
@@ -175,7 +175,7 @@ fn scored(
     what: &str,
     input: &str,
     expected: f64,
-    sheets: impl Fn() -> Vec<Sheet> + Send + Sync + 'static,
+    sheets: impl Fn() -> Vec<EvalImage> + Send + Sync + 'static,
 ) -> Case {
     let promise = format!("mAP {expected}, to 1e-9");
     Case::new(format!("{name}: {what}"), input, promise, move || {
@@ -223,7 +223,7 @@ fn half_right() -> Case {
         "equal ones keep their order, the right ones first: mAP 1, to 1e-9",
         || {
             let mut half = sheet(50, 50, equal);
-            let away = |f: &FoundBox| FoundBox {
+            let away = |f: &Detection| Detection {
                 bbox: BBox {
                     x0: f.bbox.x0 + 1e4,
                     x1: f.bbox.x1 + 1e4,
@@ -231,7 +231,7 @@ fn half_right() -> Case {
                 },
                 ..*f
             };
-            let wrong: Vec<FoundBox> = half.found.iter().map(away).collect();
+            let wrong: Vec<Detection> = half.found.iter().map(away).collect();
             half.found.extend(wrong);
             Ok(Outcome::near(
                 evaluate(&[half], Definition::Coco, &[]).map(),

@@ -3,7 +3,7 @@
 use super::world::dropped;
 use super::*;
 use petcomp::LinearRgb;
-use petcomp::dataset::{Progress, Setup};
+use petcomp::dataset::{DatasetConfig, Progress};
 use petcomp::scene::{AreaLight, Noise, PostProcess, Scene};
 use petcomp::work::Kind::*;
 use std::collections::BTreeMap;
@@ -60,12 +60,12 @@ fn a_scene_reads_the_files_that_it_names_and_no_others() {
 }
 
 /// What the program writes for a scene: the picture as it is displayed and its scene-linear values.
-fn made(world: &World, setup: &Setup, scene: &Scene) -> (Vec<u8>, Work) {
+fn made(world: &World, setup: &DatasetConfig, scene: &Scene) -> (Vec<u8>, Work) {
     let folder = tempfile::tempdir().unwrap();
     let (_, work) = counted(|| {
-        let studio = Studio::open_for(setup.clone(), scene).unwrap();
-        let (scene, shot) = studio.resolve(scene.clone()).unwrap();
-        let (_, frame) = studio.shoot(&scene, &shot);
+        let pipeline = Pipeline::open_for(setup.clone(), scene).unwrap();
+        let (scene, shot) = pipeline.resolve(scene.clone()).unwrap();
+        let (_, frame) = pipeline.shoot(&scene, &shot);
         io::write(folder.path().join("a.png"), &frame.map(PremulRgba::color)).unwrap();
         io::write(folder.path().join("a.exr"), &frame).unwrap();
     })
@@ -154,7 +154,7 @@ fn idle_switches_leave_every_byte_and_cost_nothing() {
 fn quality_where_it_does_not_apply_changes_nothing() {
     let world = World::make().unwrap();
     let scene = world.scene();
-    let with = |change: fn(&mut Setup), scene: &Scene| {
+    let with = |change: fn(&mut DatasetConfig), scene: &Scene| {
         let mut setup = world.setup();
         change(&mut setup);
         made(&world, &setup, scene)
@@ -173,10 +173,10 @@ fn quality_where_it_does_not_apply_changes_nothing() {
         objects: vec![],
         ..scene.clone()
     };
-    let finest = |setup: &mut Setup| setup.render = petcomp::Quality::Reference.render();
+    let finest = |setup: &mut DatasetConfig| setup.render = petcomp::Quality::Reference.render();
     assert!(with(finest, &no_cards) == with(|_| {}, &no_cards));
     // How cards fall does not matter to cards that lie.
-    let longer = |setup: &mut Setup| setup.scene.settle.time_limit *= 2.0;
+    let longer = |setup: &mut DatasetConfig| setup.scene.settle.time_limit *= 2.0;
     assert!(with(longer, &scene) == with(|_| {}, &scene));
     assert!(
         with(finest, &scene).0 != with(|_| {}, &scene).0,
@@ -191,9 +191,9 @@ fn dataset(
     progress: &(dyn Fn(Progress) + Sync),
 ) -> BTreeMap<PathBuf, Vec<u8>> {
     let folder = tempfile::tempdir().unwrap();
-    let studio = Studio::open(world.setup()).unwrap();
-    let plan = studio.plan(3, 0, folder.path()).unwrap();
-    let make = |_| studio.take(dropped(world.scene()));
+    let pipeline = Pipeline::open(world.setup()).unwrap();
+    let plan = pipeline.plan(3, 0, folder.path()).unwrap();
+    let make = |_| pipeline.take(dropped(world.scene()));
     let pool = petcomp::work::pool(threads).unwrap();
     pool.install(|| generate(&plan, make, progress, &AtomicBool::new(false)))
         .unwrap();
@@ -239,11 +239,11 @@ fn jobs_and_progress_leave_every_byte() {
 fn labels_without_a_picture_are_those_with_one() {
     let world = World::make().unwrap();
     for case in cases(&world) {
-        let studio = Studio::open(world.setup()).unwrap();
-        let labels = studio.label(case.scene.clone()).unwrap();
+        let pipeline = Pipeline::open(world.setup()).unwrap();
+        let labels = pipeline.label(case.scene.clone()).unwrap();
         assert_eq!(
             labels,
-            studio.take(case.scene).unwrap().labels,
+            pipeline.take(case.scene).unwrap().labels,
             "{}",
             case.name
         );
@@ -253,13 +253,15 @@ fn labels_without_a_picture_are_those_with_one() {
 #[test]
 fn parts_of_a_picture_that_are_asked_for_leave_the_picture_alone() {
     let world = World::make().unwrap();
-    let studio = Studio::open(world.setup()).unwrap();
-    let (scene, shot) = studio.resolve(world.scene()).unwrap();
-    let (deep, frame) = studio.shoot(&scene, &shot);
+    let pipeline = Pipeline::open(world.setup()).unwrap();
+    let (scene, shot) = pipeline.resolve(world.scene()).unwrap();
+    let (deep, frame) = pipeline.shoot(&scene, &shot);
     let before = frame.clone();
     let all = petcomp::composite::Aov::ALL.map(|(_, aov)| aov);
     let (parts, work) = counted(|| petcomp::composite::parts(&all, &deep, &shot, &frame)).unwrap();
-    assert!(parts.len() >= all.len() && frame == before && studio.shoot(&scene, &shot).1 == before);
+    assert!(
+        parts.len() >= all.len() && frame == before && pipeline.shoot(&scene, &shot).1 == before
+    );
     assert_eq!(
         (work[ShadowRays], work[TextureSamples], work[LabelSamples]),
         (0, 0, 0),

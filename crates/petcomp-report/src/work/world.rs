@@ -3,7 +3,7 @@
 use crate::pile::lamp;
 use petcomp::asset::{Asset, Manifest, PhotoRecord};
 use petcomp::camera::Label;
-use petcomp::dataset::Setup;
+use petcomp::dataset::DatasetConfig;
 use petcomp::geom::{Pose, UnitQuaternion, Vector3};
 use petcomp::scene::{
     AreaLight, CameraSource, Environment, Exposure, Grade, Object, Placement, Recipe, Scene,
@@ -83,18 +83,18 @@ impl World {
     }
 
     /// The recipe that names the folders.
-    pub(super) fn setup(&self) -> Setup {
+    pub(super) fn setup(&self) -> DatasetConfig {
         let [assets, backgrounds] = ["assets", "photos"].map(|kind| self.folder.path().join(kind));
         let scene = Recipe {
             image: IMAGE,
             ..Recipe::default()
         };
-        Setup {
+        DatasetConfig {
             folder: self.folder.path().into(),
             assets,
             backgrounds,
             scene,
-            ..Setup::default()
+            ..DatasetConfig::default()
         }
     }
 

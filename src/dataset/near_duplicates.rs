@@ -11,7 +11,7 @@ use std::path::PathBuf;
 
 /// Two images that are nearly the same.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Near {
+pub struct NearDuplicate {
     /// The one for validation.
     pub val: PathBuf,
     /// The one for training that it is nearest to.
@@ -23,21 +23,21 @@ pub struct Near {
 /// Images that differ by less than this, in 8-bit grey values, are nearly the same: photos of a scene that nobody
 /// touched differ by noise, which the small copies average to below one code; an object of 1 % of the picture and a tenth
 /// of the full scale of contrast, moved, changes it by 3.
-pub const NEAR_CODES: f64 = 2.0;
+pub const NEAR_DUPLICATE_RMS: f64 = 2.0;
 
 /// Sides of the small copies, pixels.
-const SMALL: [usize; 2] = [32, 24];
+const THUMBNAIL_PX: [usize; 2] = [32, 24];
 
 /// The small grey copy of a picture.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Thumbnail(Vec<u8>);
 
 impl Thumbnail {
-    pub(crate) fn of(picture: &Image<LinearRgb>) -> Self {
+    pub(crate) fn new(picture: &Image<LinearRgb>) -> Self {
         let grey =
             |[r, g, b]: [u8; 3]| ((u16::from(r) + 2 * u16::from(g) + u16::from(b)) / 4) as u8;
         Self(
-            to_srgb8(&resize(picture, SMALL[0], SMALL[1]))
+            to_srgb8(&resize(picture, THUMBNAIL_PX[0], THUMBNAIL_PX[1]))
                 .pixels()
                 .iter()
                 .map(|p| grey([p.r, p.g, p.b]))
@@ -72,14 +72,18 @@ pub(crate) fn nearest(
 }
 
 /// The images of `val` that are nearly the same as one of `train`.
-pub(crate) fn near_pairs(train: &[PathBuf], val: &[PathBuf], codes: f64) -> Result<Vec<Near>> {
+pub(crate) fn near_pairs(
+    train: &[PathBuf],
+    val: &[PathBuf],
+    codes: f64,
+) -> Result<Vec<NearDuplicate>> {
     let small = |images: &[PathBuf]| -> Result<Vec<Thumbnail>> {
         images
             .par_iter()
-            .map(|path| Ok(Thumbnail::of(&io::read::<LinearRgb>(path)?)))
+            .map(|path| Ok(Thumbnail::new(&io::read::<LinearRgb>(path)?)))
             .collect()
     };
-    let pair = |(i, j, codes): (usize, usize, f64)| Near {
+    let pair = |(i, j, codes): (usize, usize, f64)| NearDuplicate {
         val: val[i].clone(),
         train: train[j].clone(),
         codes,
@@ -100,14 +104,17 @@ mod tests {
             let grain = ((x * 7919 + y * 104_729) % 97) as f32 / 97.0 - 0.5;
             LinearRgb::grey(if object { 0.5 } else { 0.2 } + noise * grain)
         };
-        Thumbnail::of(&Image::from_fn(320, 240, of))
+        Thumbnail::new(&Image::from_fn(320, 240, of))
     }
 
     #[test]
     fn noise_is_near_and_a_moved_object_is_not() {
         let scenes = [scene(0, 0.0), scene(0, 0.05), scene(60, 0.0)];
-        assert!(scenes[0].codes_from(&scenes[1]) < NEAR_CODES);
-        assert!(scenes[0].codes_from(&scenes[2]) > 3.0 * NEAR_CODES);
-        assert_eq!(nearest(&scenes[..1], &scenes[1..], NEAR_CODES).len(), 1);
+        assert!(scenes[0].codes_from(&scenes[1]) < NEAR_DUPLICATE_RMS);
+        assert!(scenes[0].codes_from(&scenes[2]) > 3.0 * NEAR_DUPLICATE_RMS);
+        assert_eq!(
+            nearest(&scenes[..1], &scenes[1..], NEAR_DUPLICATE_RMS).len(),
+            1
+        );
     }
 }

@@ -4,11 +4,11 @@ use crate::allowance::Allowance;
 use crate::asset::{Library, Panorama};
 use crate::bounds::LEAST_OBJECT_PX;
 use crate::composite;
+use crate::dataset::background_photo::{BackgroundOptions, BackgroundPhoto};
+use crate::dataset::environment_maps::EnvironmentMaps;
 use crate::dataset::fingerprint::fingerprint;
-use crate::dataset::place::{Place, PlaceOptions};
-use crate::dataset::surroundings::Surroundings;
 use crate::dataset::times::timed;
-use crate::dataset::{Inputs, Numbers, Plan, Sample, Setup, Sidecar, Times, Writer};
+use crate::dataset::{DatasetConfig, Inputs, Plan, Sample, SampleRange, Sidecar, Times, Writer};
 use crate::deep::DeepImage;
 use crate::error::{Error, Result};
 use crate::image::Image;
@@ -25,56 +25,56 @@ use std::sync::atomic::AtomicBool;
 
 /// Everything that pictures are made from, opened once: assets, labelled photos, options.
 #[derive(Debug)]
-pub struct Studio {
-    setup: Setup,
+pub struct Pipeline {
+    config: DatasetConfig,
     library: Library,
-    places: Vec<Place>,
+    places: Vec<BackgroundPhoto>,
     backgrounds: Vec<Background>,
     catalog: Vec<AssetVariant>,
-    surroundings: Surroundings,
+    surroundings: EnvironmentMaps,
     /// Turns true when no picture is to be finished any more.
     stop: &'static AtomicBool,
 }
 
-/// Nobody stops a studio by itself.
+/// Nobody stops a pipeline by itself.
 static NEVER: AtomicBool = AtomicBool::new(false);
 
-/// Scenes that will not settle are drawn again this often.
-const REDRAWS: usize = 8;
+/// Scenes that do not settle are resampled this often.
+const MAX_RESAMPLES: usize = 8;
 
-impl Studio {
-    /// Opens the folders that a setup names.
+impl Pipeline {
+    /// Opens the folders that a config names.
     ///
     /// # Errors
     /// A folder, manifest, label or cut-out that cannot be used; each names the file, the field and what was expected.
-    pub fn open(setup: Setup) -> Result<Self> {
-        let library = Library::open(&setup.assets)?;
-        Self::with_library(setup, library)
+    pub fn open(config: DatasetConfig) -> Result<Self> {
+        let library = Library::open(&config.assets)?;
+        Self::with_library(config, library)
     }
 
     /// The same with the assets in memory, which [`build`](crate::asset::build) returns.
     ///
     /// # Errors
     /// As [`open`](Self::open).
-    pub fn with_library(setup: Setup, library: Library) -> Result<Self> {
-        let places = labelled_places(&setup)?;
-        let studio = Self::new(setup, library, places)?;
-        studio
+    pub fn with_library(config: DatasetConfig, library: Library) -> Result<Self> {
+        let places = open_backgrounds(&config)?;
+        let pipeline = Self::new(config, library, places)?;
+        pipeline
             .places
             .iter()
-            .try_for_each(|place| studio.check_size_in(place))?;
-        Ok(studio)
+            .try_for_each(|place| pipeline.check_size_in(place))?;
+        Ok(pipeline)
     }
 
     /// Refuses a place in whose pictures the median object is too small to have an outline: a length is in another unit.
-    fn check_size_in(&self, place: &Place) -> Result<()> {
+    fn check_size_in(&self, place: &BackgroundPhoto) -> Result<()> {
         let photos = self.library.assets.iter().flat_map(|asset| &asset.photos);
         let mut lengths: Vec<f64> = photos.map(|photo| photo.record.object_m[0]).collect();
         lengths.sort_by(f64::total_cmp);
         let Some(&median) = lengths.get(lengths.len() / 2) else {
             return Ok(());
         };
-        let (median, factor) = (median, self.setup.scene.scale.middle().min);
+        let (median, factor) = (median, self.config.scene.scale.middle().min);
         let CameraSource::Known(camera) = &place.background.camera else {
             return Ok(());
         };
@@ -82,7 +82,7 @@ impl Studio {
         if px >= LEAST_OBJECT_PX {
             return Ok(());
         }
-        let [w, h] = self.setup.scene.image;
+        let [w, h] = self.config.scene.image;
         let what = format!(
             "the median object of {median:.3} m is {px:.1} px long in pictures of {w} x {h}, expected at least \
              {LEAST_OBJECT_PX}; are width_m and height_m in metres?"
@@ -94,26 +94,26 @@ impl Studio {
     ///
     /// # Errors
     /// As [`open`](Self::open).
-    pub fn open_for(setup: Setup, scene: &Scene) -> Result<Self> {
+    pub fn open_for(config: DatasetConfig, scene: &Scene) -> Result<Self> {
         let is_named = |name: &str| scene.objects.iter().any(|object| object.asset == name);
-        let library = Library::open_some(&setup.assets, is_named)?;
+        let library = Library::open_some(&config.assets, is_named)?;
         let places = if scene.plate.is_empty() {
             Vec::new()
         } else {
-            labelled_places(&setup)?
+            open_backgrounds(&config)?
         };
-        Self::new(setup, library, places)
+        Self::new(config, library, places)
     }
 
-    fn new(setup: Setup, library: Library, places: Vec<Place>) -> Result<Self> {
+    fn new(config: DatasetConfig, library: Library, places: Vec<BackgroundPhoto>) -> Result<Self> {
         let backgrounds = places
             .iter()
             .map(|place| place.background.clone())
             .collect();
         let catalog = catalog(&library);
-        let surroundings = Surroundings::of(&setup);
+        let surroundings = EnvironmentMaps::of(&config);
         Ok(Self {
-            setup,
+            config,
             library,
             places,
             backgrounds,
@@ -129,8 +129,8 @@ impl Studio {
     }
 
     /// What it was opened from.
-    pub fn setup(&self) -> &Setup {
-        &self.setup
+    pub fn config(&self) -> &DatasetConfig {
+        &self.config
     }
 
     /// The assets.
@@ -138,42 +138,42 @@ impl Studio {
         &self.library
     }
 
-    /// A dataset of `count` pictures to be made in `folder` with the setup's formats.
+    /// A dataset of `count` pictures to be made in `folder` with the config's formats.
     ///
     /// # Errors
-    /// Classes that the setup's policy for obstructed objects cannot add to; an asset that fits between the walls of some
+    /// Classes that the config's policy for obstructed objects cannot add to; an asset that fits between the walls of some
     /// background in no direction; a photo or an environment map that cannot be read.
     pub fn plan(&self, count: u64, seed: u64, folder: impl Into<PathBuf>) -> Result<Plan> {
-        self.setup
+        self.config
             .scene
             .check_room(&self.backgrounds, &self.catalog)
             .map_err(|e| e.within("scene"))?;
-        let (folder, labels) = (folder.into(), &self.setup.labels);
+        let (folder, labels) = (folder.into(), &self.config.labels);
         let mut inputs = Inputs::kept(&folder);
         let mut writers: Vec<Box<dyn Writer>> =
-            vec![Box::new(self.setup.pictures), Box::new(Sidecar)];
-        writers.extend(labels.writers(&self.setup.pictures));
+            vec![Box::new(self.config.pictures), Box::new(Sidecar)];
+        writers.extend(labels.writers(&self.config.pictures));
         Ok(Plan {
             folder,
             count,
-            numbers: Numbers::All,
+            range: SampleRange::All,
             seed,
             recipe: fingerprint(
-                &self.setup,
+                &self.config,
                 &self.library,
                 &self.places,
                 &self.surroundings,
                 &mut inputs,
             )?,
             classes: labels.obstructed.classes(&self.library.classes)?,
-            split: self.setup.split,
+            split: self.config.split,
             obstructed: labels.obstructed,
             writers,
             inputs,
         })
     }
 
-    /// Scene `k` as the recipe draws it: objects still in the air, exposure still open.
+    /// Scene `k` as the recipe draws it: objects not settled yet, exposure still open.
     ///
     /// # Errors
     /// As [`Recipe::scene`](crate::scene::Recipe::scene).
@@ -186,7 +186,7 @@ impl Studio {
     /// # Errors
     /// As [`draw`](Self::draw).
     pub fn explain(&self, seed: u64, k: u64) -> Result<(Scene, Vec<Drawn>)> {
-        self.setup
+        self.config
             .scene
             .explained(seed, k, &self.backgrounds, &self.catalog)
     }
@@ -211,9 +211,9 @@ impl Studio {
                     });
                 }
                 Err(Error::Unsettled { what })
-                    if rejected.len() < REDRAWS && !allowance.is_spent() =>
+                    if rejected.len() < MAX_RESAMPLES && !allowance.is_spent() =>
                 {
-                    log::info!("scene {k} is drawn again: {what}");
+                    log::info!("scene {k} is resampled: {what}");
                     rejected.push(what);
                 }
                 Err(error) => return Err(error),
@@ -234,7 +234,7 @@ impl Studio {
         let (resolved, settle) = timed(|| self.resolve_within(scene, allowance));
         let (scene, shot) = resolved?;
         let ((deep, frame), render) = timed(|| self.shoot(&scene, &shot));
-        let (labels, label) = timed(|| label::label(&deep, &shot, &self.setup.labels.options()));
+        let (labels, label) = timed(|| label::label(&deep, &shot, &self.config.labels.options()));
         let times = Times {
             settle,
             render,
@@ -263,15 +263,15 @@ impl Studio {
     pub fn label(&self, scene: Scene) -> Result<Labels> {
         let (_, shot) = self.resolve(scene.unlit())?;
         Ok(label::label(
-            &render::render_coverage(&shot, &self.setup.render),
+            &render::render_coverage(&shot, &self.config.render),
             &shot,
-            &self.setup.labels.options(),
+            &self.config.labels.options(),
         ))
     }
 
     /// Renders a shot and finishes its frame as the scene asks.
     pub fn shoot(&self, scene: &Scene, shot: &Shot) -> (DeepImage, Image<PremulRgba>) {
-        let deep = render::render(shot, &self.setup.render);
+        let deep = render::render(shot, &self.config.render);
         let frame = composite::frame(&deep, shot.plate.as_deref());
         let frame = composite::finish(frame, &deep, shot.plate.as_deref(), &scene.finish);
         (deep, frame)
@@ -287,7 +287,7 @@ impl Studio {
 
     /// What one picture may take.
     fn allowance(&self) -> Allowance<'static> {
-        Allowance::new(self.setup.scene.settle.most_work).stopped_by(self.stop)
+        Allowance::new(self.config.scene.settle.most_work).stopped_by(self.stop)
     }
 
     fn resolve_within(&self, scene: Scene, allowance: &Allowance) -> Result<(Scene, Shot)> {
@@ -306,7 +306,7 @@ impl Studio {
 
     #[cfg(feature = "settle")]
     fn rest(&self, scene: Scene, allowance: &Allowance) -> Result<Scene> {
-        crate::settle::settle_within(scene, &self.setup.scene.settle, 0, allowance)?
+        crate::settle::settle_within(scene, &self.config.scene.settle, 0, allowance)?
             .0
             .into_scene()
     }
@@ -345,14 +345,14 @@ impl Studio {
     }
 }
 
-/// The labelled photos that a setup names.
-fn labelled_places(setup: &Setup) -> Result<Vec<Place>> {
-    let options = PlaceOptions {
-        image: setup.scene.image,
-        surface_size: setup.surface_size,
-        force: setup.force_cameras,
+/// The labelled photos that a config names.
+fn open_backgrounds(config: &DatasetConfig) -> Result<Vec<BackgroundPhoto>> {
+    let options = BackgroundOptions {
+        image: config.scene.image,
+        surface_size: config.surface_size,
+        force: config.force_cameras,
     };
-    Place::all(&setup.backgrounds, options)
+    BackgroundPhoto::all(&config.backgrounds, options)
 }
 
 /// The seed of the `n`-th try of scene `k`: the first is the dataset's own.

@@ -1,7 +1,7 @@
 //! Pictures of the surroundings that recipes and scenes name, decoded once.
 
 use crate::asset::Panorama;
-use crate::dataset::Setup;
+use crate::dataset::DatasetConfig;
 use crate::error::{Error, Result};
 use crate::io;
 use std::path::{Path, PathBuf};
@@ -12,7 +12,7 @@ const KEPT_BYTES: usize = 1 << 30;
 
 /// The environment maps of a recipe.
 #[derive(Debug)]
-pub(crate) struct Surroundings {
+pub(crate) struct EnvironmentMaps {
     /// Folder of the recipe.
     folder: PathBuf,
     /// What the recipe lists.
@@ -21,11 +21,11 @@ pub(crate) struct Surroundings {
     kept: Mutex<Vec<(String, Arc<Panorama>)>>,
 }
 
-impl Surroundings {
-    pub(crate) fn of(setup: &Setup) -> Self {
-        let listed = setup.scene.environment.files.clone();
+impl EnvironmentMaps {
+    pub(crate) fn of(config: &DatasetConfig) -> Self {
+        let listed = config.scene.environment.files.clone();
         Self {
-            folder: setup.folder.clone(),
+            folder: config.folder.clone(),
             listed,
             kept: Mutex::default(),
         }
@@ -114,7 +114,7 @@ mod tests {
     use crate::image::Image;
     use crate::pixel::LinearRgb;
 
-    fn folder() -> (tempfile::TempDir, Setup) {
+    fn folder() -> (tempfile::TempDir, DatasetConfig) {
         let dir = tempfile::tempdir().unwrap();
         io::create_folder(dir.path().join("own")).unwrap();
         for name in ["far.exr", "own/near.exr"] {
@@ -124,18 +124,18 @@ mod tests {
             )
             .unwrap();
         }
-        let mut setup = Setup {
+        let mut config = DatasetConfig {
             folder: dir.path().join("own"),
-            ..Setup::default()
+            ..DatasetConfig::default()
         };
-        setup.scene.environment.files = vec!["../far.exr".into()];
-        (dir, setup)
+        config.scene.environment.files = vec!["../far.exr".into()];
+        (dir, config)
     }
 
     #[test]
     fn a_picture_is_decoded_once() {
-        let (_dir, setup) = folder();
-        let surroundings = Surroundings::of(&setup);
+        let (_dir, config) = folder();
+        let surroundings = EnvironmentMaps::of(&config);
         let [first, second] = [0, 1].map(|_| surroundings.picture("near.exr").unwrap());
         assert!(Arc::ptr_eq(&first, &second));
         assert!(!Arc::ptr_eq(
@@ -150,14 +150,14 @@ mod tests {
 
     #[test]
     fn a_scene_names_pictures_of_the_recipe_or_of_its_folder() {
-        let (dir, setup) = folder();
+        let (dir, config) = folder();
         assert!(
-            Surroundings::of(&setup).picture("../far.exr").is_ok(),
+            EnvironmentMaps::of(&config).picture("../far.exr").is_ok(),
             "listed"
         );
-        let surroundings = Surroundings::of(&Setup {
+        let surroundings = EnvironmentMaps::of(&DatasetConfig {
             scene: Default::default(),
-            ..setup
+            ..config
         });
         let refused = |name: &str| surroundings.picture(name).unwrap_err().to_string();
         let absolute = dir.path().join("far.exr").to_string_lossy().into_owned();

@@ -3,7 +3,7 @@
 use crate::camera::{self, Camera, LabelledPhoto, PhotoCamera};
 use crate::error::{Error, Result};
 use crate::filter;
-use crate::geom::Point3;
+use crate::geom::{Point2, Point3};
 use crate::image::{Image, Roi};
 use crate::io;
 use crate::pixel::LinearRgb;
@@ -12,13 +12,13 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
 /// A part of a photo so small is worth a warning where only that fits into the pictures' shape.
-const SMALL_PART: f64 = 0.75;
+const SMALL_SHOWN_SHARE: f64 = 0.75;
 /// A rectangle whose corner is cut off by more than this part of a picture's side is not all there any more.
-const CUT_OFF: f64 = 0.02;
+const CUT_OFF_SHARE: f64 = 0.02;
 
 /// A labelled photo: its camera is found once, its pixels are read when a picture first needs them.
 #[derive(Debug)]
-pub(crate) struct Place {
+pub(crate) struct BackgroundPhoto {
     /// What a recipe sees of it.
     pub(crate) background: Background,
     /// The file that labels it.
@@ -27,7 +27,7 @@ pub(crate) struct Place {
     pub(crate) photo: PathBuf,
     /// The part of it that is seen.
     pub(crate) kept: Roi,
-    /// What a person should know of it, said where it was solved and in the report.
+    /// What a person should know of it, warn_of_cameras where it was solved and in the report.
     pub(crate) notes: Vec<String>,
     taken: [u32; 2],
     image: [u32; 2],
@@ -36,7 +36,7 @@ pub(crate) struct Place {
 
 /// How labelled photos are opened.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct PlaceOptions {
+pub(crate) struct BackgroundOptions {
     /// Width and height of the pictures to be made, pixels.
     pub(crate) image: [u32; 2],
     /// Width and height of the rectangle, metres, for labels that do not say them.
@@ -45,56 +45,48 @@ pub(crate) struct PlaceOptions {
     pub(crate) force: bool,
 }
 
-impl Place {
+impl BackgroundPhoto {
     /// The labelled photos of a folder in order of name.
-    pub(crate) fn all(folder: &Path, options: PlaceOptions) -> Result<Vec<Self>> {
+    pub(crate) fn all(folder: &Path, options: BackgroundOptions) -> Result<Vec<Self>> {
         let labels = camera::labels_in(folder, options.surface_size)?;
         if labels.is_empty() {
             let what = "no label found, expected at least one NAME.label.json, or a file of LabelMe, CVAT or Label Studio";
             return Err(Error::file(folder, what));
         }
         let sightings = camera::photo_cameras(&labels, options.force)?;
-        said(&labels, &sightings);
+        warn_of_cameras(&labels, &sightings);
         let opened = labels
             .iter()
             .zip(&sightings)
             .map(|(label, seen)| Self::open(label, seen, options.image));
         let places = opened.collect::<Result<Vec<_>>>()?;
-        said_of_shapes(&places);
+        warn_of_shapes(&places);
         Ok(places)
     }
 
     fn open(labelled: &LabelledPhoto, seen: &PhotoCamera, image: [u32; 2]) -> Result<Self> {
         let taken = labelled.label.image_size();
-        let kept = middle(taken, image);
+        let kept = middle_part(taken, image);
         let camera = cropped(seen.camera, kept).resized(image);
-        let background = Background {
-            name: labelled.name.clone(),
-            size: seen.size,
-            camera: CameraSource::Known(camera),
-        };
-        let folder = labelled.source.parent().unwrap_or(Path::new(""));
-        let inside = |e: Error| e.within("image").in_file(&labelled.source);
-        let photo = io::inside(folder, &labelled.label.image.file).map_err(inside)?;
+        let photo = photo_path(labelled)?;
         camera::check_distance(&seen.camera).map_err(|e| e.in_file(&labelled.source))?;
-        let (label, notes, plate) = (labelled.source.clone(), Vec::new(), OnceLock::new());
-        let mut place = Self {
-            background,
-            label,
+        let mut background = Self {
+            background: Background {
+                name: labelled.name.clone(),
+                size: seen.size,
+                camera: CameraSource::Known(camera),
+            },
+            label: labelled.source.clone(),
             photo,
-            notes,
+            notes: seen.warnings.iter().map(ToString::to_string).collect(),
             taken,
             kept,
             image,
-            plate,
+            plate: OnceLock::new(),
         };
-        place.notes = seen
-            .warnings
-            .iter()
-            .map(ToString::to_string)
-            .chain(place.shape_note())
-            .collect();
-        Ok(place)
+        let shape_note = background.shape_note();
+        background.notes.extend(shape_note);
+        Ok(background)
     }
 
     /// The part of the photo that pictures show.
@@ -115,7 +107,7 @@ impl Place {
             ""
         };
         Some(format!(
-            "of {w} x {h} pixels the middle {width} x {height} are shown{rectangle}"
+            "of {w} x {h} pixels the middle_part {width} x {height} are shown{rectangle}"
         ))
     }
 
@@ -125,18 +117,18 @@ impl Place {
             return false;
         };
         let [x, y] = self.background.size.map(|side| side / 2.0);
-        let [w, h] = self.image.map(f64::from);
-        let grown = [
-            self.taken[0] as f64 / self.kept.width as f64,
-            self.taken[1] as f64 / self.kept.height as f64,
+        let size = self.image.map(f64::from);
+        let whole = [
+            size[0] * (self.taken[0] as f64 / self.kept.width as f64),
+            size[1] * (self.taken[1] as f64 / self.kept.height as f64),
         ];
-        let inside = |v: f64, middle: f64, side: f64| (v - middle).abs() < (0.5 + CUT_OFF) * side;
-        let corners = [[-x, y], [x, y], [x, -y], [-x, -y]]
-            .map(|[x, y]| camera.project(Point3::new(x, y, 0.0)));
-        corners.into_iter().flatten().any(|(px, _)| {
-            let whole = inside(px.x, w / 2.0, w * grown[0]) && inside(px.y, h / 2.0, h * grown[1]);
-            whole && !(inside(px.x, w / 2.0, w) && inside(px.y, h / 2.0, h))
-        })
+        [[-x, y], [x, y], [x, -y], [-x, -y]]
+            .into_iter()
+            .filter_map(|[x, y]| camera.project(Point3::new(x, y, 0.0)))
+            .any(|(px, _)| {
+                let shows = |seen| is_within(px, size, seen);
+                shows(whole) && !shows(size)
+            })
     }
 
     /// The photo at the picture's size, scene-linear; read once.
@@ -158,9 +150,9 @@ impl Place {
     }
 }
 
-/// Says what is odd about cameras: that some are not used, each; what was said where it was solved not again; and of those
-/// solved now, only where to read it.
-fn said(labels: &[LabelledPhoto], sightings: &[PhotoCamera]) {
+/// Warns of cameras: of each that is stale and not used; of those solved now that have warnings, once for all. What was
+/// reported where a camera was solved is not repeated.
+fn warn_of_cameras(labels: &[LabelledPhoto], sightings: &[PhotoCamera]) {
     for stale in sightings.iter().filter_map(|seen| seen.stale.as_ref()) {
         log::warn!("{stale}");
     }
@@ -185,10 +177,10 @@ fn said(labels: &[LabelledPhoto], sightings: &[PhotoCamera]) {
 }
 
 /// Says, once for all, that photos are of another shape than the pictures, where that costs much of them.
-fn said_of_shapes(places: &[Place]) {
-    let odd: Vec<&Place> = places
+fn warn_of_shapes(places: &[BackgroundPhoto]) {
+    let odd: Vec<&BackgroundPhoto> = places
         .iter()
-        .filter(|place| place.part() < SMALL_PART || place.cuts_off())
+        .filter(|place| place.part() < SMALL_SHOWN_SHARE || place.cuts_off())
         .collect();
     let least = odd.iter().min_by(|a, b| a.part().total_cmp(&b.part()));
     let Some((least, note)) = least.and_then(|place| Some((place, place.shape_note()?))) else {
@@ -203,8 +195,15 @@ fn said_of_shapes(places: &[Place]) {
     );
 }
 
+/// The photo that a label names, in the label's folder.
+fn photo_path(labelled: &LabelledPhoto) -> Result<PathBuf> {
+    let folder = labelled.source.parent().unwrap_or(Path::new(""));
+    io::inside(folder, &labelled.label.image.file)
+        .map_err(|e| e.within("image").in_file(&labelled.source))
+}
+
 /// The largest middle part of a photo that has the shape of the picture.
-fn middle(photo: [u32; 2], image: [u32; 2]) -> Roi {
+fn middle_part(photo: [u32; 2], image: [u32; 2]) -> Roi {
     let [w, h] = photo.map(u64::from);
     let [iw, ih] = image.map(u64::from);
     let width = w.min((h * iw).div_ceil(ih)) as usize;
@@ -215,6 +214,13 @@ fn middle(photo: [u32; 2], image: [u32; 2]) -> Roi {
         width,
         height,
     }
+}
+
+/// A pixel lies in a frame of size `seen` about the middle of a picture of size `size`, or close to it.
+fn is_within(px: Point2<f64>, size: [f64; 2], seen: [f64; 2]) -> bool {
+    let inside =
+        |v: f64, size: f64, seen: f64| (v - size / 2.0).abs() < (0.5 + CUT_OFF_SHARE) * seen;
+    inside(px.x, size[0], seen[0]) && inside(px.y, size[1], seen[1])
 }
 
 /// The camera of a part of its picture.
@@ -234,7 +240,7 @@ mod tests {
     #[test]
     fn a_photo_of_the_picture_s_shape_is_kept_whole() {
         assert_eq!(
-            middle([1280, 960], [640, 480]),
+            middle_part([1280, 960], [640, 480]),
             Roi {
                 x: 0,
                 y: 0,
@@ -247,7 +253,7 @@ mod tests {
     #[test]
     fn a_wider_photo_loses_its_sides() {
         assert_eq!(
-            middle([1920, 960], [640, 480]),
+            middle_part([1920, 960], [640, 480]),
             Roi {
                 x: 320,
                 y: 0,
@@ -260,7 +266,7 @@ mod tests {
     #[test]
     fn a_portrait_photo_loses_top_and_bottom() {
         assert_eq!(
-            middle([600, 1000], [640, 480]),
+            middle_part([600, 1000], [640, 480]),
             Roi {
                 x: 0,
                 y: 275,

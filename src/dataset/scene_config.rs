@@ -1,6 +1,6 @@
-//! The setup that a scene file brings by itself, and what it takes to bring one.
+//! The config that a scene file brings by itself, and what it takes to bring one.
 
-use crate::dataset::Setup;
+use crate::dataset::DatasetConfig;
 use crate::error::{Error, Result};
 use crate::io;
 use crate::scene::{Scene, SceneFiles, SceneSettings, relative_to_file};
@@ -16,8 +16,8 @@ const SCENE_KEYS: [&str; 5] = [
     "force_cameras",
 ];
 
-impl Setup {
-    /// The setup that a scene read from `path` brings by itself, some of its values replaced: its
+impl DatasetConfig {
+    /// The config that a scene read from `path` brings by itself, some of its values replaced: its
     /// [`files`](Scene::files) and [`settings`](Scene::settings), and nothing else but defaults.
     ///
     /// # Errors
@@ -28,11 +28,11 @@ impl Setup {
         overrides: &[io::Override],
     ) -> Result<Self> {
         let path = path.as_ref();
-        let mut setup = Self::from_settings(&scene.settings, overrides)
-            .and_then(|setup| setup.with_scene_folders(scene, path))
+        let mut config = Self::from_settings(&scene.settings, overrides)
+            .and_then(|config| config.with_scene_folders(scene, path))
             .map_err(|e| e.in_file(path))?;
-        setup.scene.image = scene.image;
-        Ok(setup)
+        config.scene.image = scene.image;
+        Ok(config)
     }
 
     /// The defaults with the settings of a scene.
@@ -40,10 +40,10 @@ impl Setup {
     /// # Errors
     /// Settings that no recipe can have.
     pub fn from_settings(settings: &SceneSettings, overrides: &[io::Override]) -> Result<Self> {
-        let setup: Self = io::from_table_with(settings.to_table(), overrides)
+        let config: Self = io::from_table_with(settings.to_table(), overrides)
             .map_err(|e| e.within("settings"))?;
-        setup.check().map_err(|e| e.within("settings"))?;
-        Ok(setup)
+        config.check().map_err(|e| e.within("settings"))?;
+        Ok(config)
     }
 
     fn with_scene_folders(mut self, scene: &Scene, path: &Path) -> Result<Self> {
@@ -74,7 +74,7 @@ impl Setup {
         Ok(self)
     }
 
-    /// A scene of this setup with all that it takes to render it from a file at `path` alone.
+    /// A scene of this config with all that it takes to render it from a file at `path` alone.
     ///
     /// # Errors
     /// Without a working folder.
@@ -120,8 +120,8 @@ fn required<'a>(folder: &'a Option<PathBuf>, key: &str, content: &str) -> Result
     })
 }
 
-fn as_table(setup: &Setup) -> Result<Table> {
-    Table::try_from(setup).map_err(|e| Error::value("settings", e.to_string()))
+fn as_table(config: &DatasetConfig) -> Result<Table> {
+    Table::try_from(config).map_err(|e| Error::value("settings", e.to_string()))
 }
 
 /// The value at a path of keys.
@@ -195,42 +195,47 @@ mod tests {
 
     #[test]
     fn a_scene_brings_the_setup_that_it_was_written_with() {
-        let mut setup = Setup {
+        let mut config = DatasetConfig {
             assets: "job/assets".into(),
             backgrounds: "photos".into(),
             folder: "job".into(),
-            ..Setup::default()
+            ..DatasetConfig::default()
         };
-        setup.render.subsamples += 1;
-        setup.scene.settle.attempts = 3;
-        setup.scene.image = [64, 48];
+        config.render.subsamples += 1;
+        config.scene.settle.attempts = 3;
+        config.scene.image = [64, 48];
         let map = Environment {
             file: "../sky.exr".into(),
             rotation_deg: 0.0,
             strength: 1.0,
         };
-        setup.scene.environment.files = vec![map.file.clone()];
+        config.scene.environment.files = vec![map.file.clone()];
         let scene = Scene {
             environment: Some(map),
             ..scene()
         };
-        let written = setup.with_files(scene, "out/scene.toml").unwrap();
+        let written = config.with_files(scene, "out/scene.toml").unwrap();
         let text = toml::to_string(&written).unwrap();
         let read: Scene = toml::from_str(&text).unwrap();
         assert_eq!(read, written, "{text}");
-        let brought = Setup::for_scene(&read, "out/scene.toml", &[]).unwrap();
-        let expected = Setup {
+        let brought = DatasetConfig::for_scene(&read, "out/scene.toml", &[]).unwrap();
+        let expected = DatasetConfig {
             assets: "out/../job/assets".into(),
             backgrounds: "out/../photos".into(),
             folder: "out/../job".into(),
-            ..setup
+            ..config
         };
         assert_eq!(brought, expected);
     }
 
     #[test]
     fn defaults_are_not_written() {
-        assert!(Setup::default().scene_settings().unwrap().is_empty());
+        assert!(
+            DatasetConfig::default()
+                .scene_settings()
+                .unwrap()
+                .is_empty()
+        );
         let text = toml::to_string(&scene()).unwrap();
         assert!(
             !text.contains("settings") && !text.contains("files"),
@@ -241,7 +246,7 @@ mod tests {
     #[test]
     fn a_missing_folder_is_named() {
         let error = |scene: &Scene| {
-            Setup::for_scene(scene, "scene.toml", &[])
+            DatasetConfig::for_scene(scene, "scene.toml", &[])
                 .unwrap_err()
                 .to_string()
         };

@@ -1,8 +1,8 @@
 //! The file that a dataset is made from.
 
-use crate::dataset::surroundings::seen_from;
-use crate::dataset::yolo::LEAST_SIDE_PX;
-use crate::dataset::{LabelSetup, Pictures, Split};
+use crate::dataset::environment_maps::seen_from;
+use crate::dataset::yolo::MIN_SIDE_PX;
+use crate::dataset::{LabelConfig, Pictures, Split};
 use crate::error::{Error, Result};
 use crate::io;
 use crate::render::RenderOptions;
@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 /// What a dataset is made from and how: the recipe file. It only says what it wants otherwise than by default.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct Setup {
+pub struct DatasetConfig {
     /// Folder that the recipe lies in, which names of files in it are relative to; in no file. Default: the working folder.
     #[serde(skip)]
     pub folder: PathBuf,
@@ -32,14 +32,14 @@ pub struct Setup {
     /// How finely pictures are sampled.
     pub render: RenderOptions,
     /// How labels are made and written.
-    pub labels: LabelSetup,
+    pub labels: LabelConfig,
     /// Which pictures are for validation.
     pub split: Split,
     /// Format of the pictures.
     pub pictures: Pictures,
 }
 
-impl Default for Setup {
+impl Default for DatasetConfig {
     fn default() -> Self {
         Self {
             folder: PathBuf::new(),
@@ -49,14 +49,14 @@ impl Default for Setup {
             force_cameras: false,
             scene: Recipe::default(),
             render: RenderOptions::default(),
-            labels: LabelSetup::default(),
+            labels: LabelConfig::default(),
             split: Split::default(),
             pictures: Pictures::default(),
         }
     }
 }
 
-impl Setup {
+impl DatasetConfig {
     /// Reads a recipe file, some of its values replaced, and checks it; its folders become relative to the working
     /// folder.
     ///
@@ -66,13 +66,13 @@ impl Setup {
     /// A file that cannot be read; an unknown key; a range that cannot be right.
     pub fn read(path: impl AsRef<Path>, overrides: &[io::Override]) -> Result<Self> {
         let path = path.as_ref();
-        let mut setup: Self = io::read_toml_with(path, overrides)?;
-        setup.check().map_err(|e| e.in_file(path))?;
+        let mut config: Self = io::read_toml_with(path, overrides)?;
+        config.check().map_err(|e| e.in_file(path))?;
         let folder = path.parent().unwrap_or(Path::new(""));
-        setup.assets = folder.join(&setup.assets);
-        setup.backgrounds = folder.join(&setup.backgrounds);
-        setup.folder = folder.into();
-        Ok(setup)
+        config.assets = folder.join(&config.assets);
+        config.backgrounds = folder.join(&config.backgrounds);
+        config.folder = folder.into();
+        Ok(config)
     }
 
     /// Fails on the first value that cannot be right, by its path: `render.subsamples`.
@@ -92,7 +92,7 @@ impl Setup {
         include_str!("template.toml")
     }
 
-    /// Writes a recipe file that gives this setup when it is read.
+    /// Writes a recipe file that gives this config when it is read.
     ///
     /// # Errors
     /// When it cannot be written.
@@ -100,18 +100,18 @@ impl Setup {
         let path = path.as_ref();
         let absolute = |path: &Path| std::path::absolute(path).map_err(|e| Error::file(path, e));
         let folder = absolute(path.parent().unwrap_or(Path::new("")))?;
-        let mut setup = self.clone();
-        setup.assets = io::relative(&absolute(&setup.assets)?, &folder);
-        setup.backgrounds = io::relative(&absolute(&setup.backgrounds)?, &folder);
-        for file in &mut setup.scene.environment.files {
+        let mut config = self.clone();
+        config.assets = io::relative(&absolute(&config.assets)?, &folder);
+        config.backgrounds = io::relative(&absolute(&config.backgrounds)?, &folder);
+        for file in &mut config.scene.environment.files {
             *file = seen_from(&folder, &self.folder, file)?;
         }
-        io::write_toml(path, &setup)
+        io::write_toml(path, &config)
     }
 
     /// The same in pictures of half the width and height, for a first look: the same scenes.
     pub fn preview(mut self) -> Self {
-        self.scene.image = self.scene.image.map(|side| (side / 2).max(LEAST_SIDE_PX));
+        self.scene.image = self.scene.image.map(|side| (side / 2).max(MIN_SIDE_PX));
         self
     }
 
@@ -119,11 +119,11 @@ impl Setup {
     /// in pairs.
     pub fn ablations(&self) -> impl Iterator<Item = (Ablation, Self)> {
         Ablation::PAPER.into_iter().map(|ablation| {
-            let mut setup = self.clone();
-            setup.scene.off.extend(ablation.off);
-            setup.scene.off.sort();
-            setup.scene.off.dedup();
-            (ablation, setup)
+            let mut config = self.clone();
+            config.scene.off.extend(ablation.off);
+            config.scene.off.sort();
+            config.scene.off.dedup();
+            (ablation, config)
         })
     }
 }
@@ -185,9 +185,9 @@ mod tests {
                 .filter(|rest| rest.starts_with(|c: char| c.is_ascii_lowercase()));
             key.unwrap_or(line).to_owned()
         };
-        let template: Vec<String> = Setup::template().lines().map(bare).collect();
+        let template: Vec<String> = DatasetConfig::template().lines().map(bare).collect();
         let told: Table = template.join("\n").parse().unwrap();
-        let all = Table::try_from(Setup::default()).unwrap();
+        let all = Table::try_from(DatasetConfig::default()).unwrap();
         assert_eq!(
             missing(&told, &all, ""),
             [""; 0],
@@ -195,15 +195,15 @@ mod tests {
         );
         assert_eq!(missing(&all, &told, ""), [""; 0], "only in template.toml");
         assert_eq!(
-            toml::from_str::<Setup>(Setup::template()).unwrap(),
-            Setup::default()
+            toml::from_str::<DatasetConfig>(DatasetConfig::template()).unwrap(),
+            DatasetConfig::default()
         );
     }
 
     /// What the template says a key may be: its path, and the ends of "A to B" in its comment.
     fn told_bounds() -> Vec<(String, [f64; 2])> {
         let (mut table, mut comment, mut told) = (String::new(), String::new(), Vec::new());
-        for line in Setup::template().lines() {
+        for line in DatasetConfig::template().lines() {
             if let Some(header) = line.strip_prefix('[') {
                 table = header
                     .trim_matches(['[', ']'])
@@ -243,9 +243,9 @@ mod tests {
     fn the_template_tells_the_bounds_that_are_checked() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("recipe.toml");
-        io::write_text(&path, Setup::template()).unwrap();
+        io::write_text(&path, DatasetConfig::template()).unwrap();
         let with = |key: &str, value: f64| {
-            Setup::read(&path, &[format!("{key}={value}").parse().unwrap()])
+            DatasetConfig::read(&path, &[format!("{key}={value}").parse().unwrap()])
         };
         let told = told_bounds();
         assert!(told.len() > 35, "{told:?}");
@@ -273,21 +273,21 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let recipe = "assets = 'a/b'\n[scene]\nobjects = 3\noff = ['light']\nenvironment = { files = ['sky.hdr'] }\n";
         io::write_text(dir.path().join("recipe.toml"), recipe).unwrap();
-        let setup = Setup::read(dir.path().join("recipe.toml"), &[]).unwrap();
+        let config = DatasetConfig::read(dir.path().join("recipe.toml"), &[]).unwrap();
         io::create_folder(dir.path().join("x/y")).unwrap();
-        setup.write(dir.path().join("x/y/recipe.toml")).unwrap();
+        config.write(dir.path().join("x/y/recipe.toml")).unwrap();
         let text = io::read_text(dir.path().join("x/y/recipe.toml")).unwrap();
         assert!(text.contains("assets = \"../../a/b\""), "{text}");
-        let again = Setup::read(dir.path().join("x/y/recipe.toml"), &[]).unwrap();
+        let again = DatasetConfig::read(dir.path().join("x/y/recipe.toml"), &[]).unwrap();
         assert_eq!(
             (&again.scene.objects, &again.labels),
-            (&setup.scene.objects, &setup.labels)
+            (&config.scene.objects, &config.labels)
         );
         assert_eq!(again.scene.environment.files, ["../../sky.hdr"]);
-        let same = |setup: &Setup| {
-            setup
+        let same = |config: &DatasetConfig| {
+            config
                 .folder
-                .join(&setup.scene.environment.files[0])
+                .join(&config.scene.environment.files[0])
                 .to_string_lossy()
                 .into_owned()
         };
@@ -299,10 +299,10 @@ mod tests {
 
     #[test]
     fn the_ablations_are_the_paper_s() {
-        let base = Setup::default();
+        let base = DatasetConfig::default();
         let names: Vec<_> = base
             .ablations()
-            .map(|(ablation, setup)| (ablation.name, setup.scene.off.len()))
+            .map(|(ablation, config)| (ablation.name, config.scene.off.len()))
             .collect();
         assert_eq!(names.len(), 7);
         assert_eq!((names[0], names[6]), (("all", 0), ("all_off", 5)));
@@ -312,7 +312,7 @@ mod tests {
     fn a_wrong_key_is_answered_with_the_right_one() {
         let dir = tempfile::tempdir().unwrap();
         io::write_text(dir.path().join("recipe.toml"), "[scene]\nobject = 3\n").unwrap();
-        let told = Setup::read(dir.path().join("recipe.toml"), &[])
+        let told = DatasetConfig::read(dir.path().join("recipe.toml"), &[])
             .unwrap_err()
             .to_string();
         assert!(

@@ -1,17 +1,17 @@
-//! Sharing images out for training and validation, and what leaks from one to the other.
+//! Partitioning images for training and validation, and what leaks from one to the other.
 
 use crate::dataset::listing::{Listing, record_of};
-use crate::dataset::near::{Near, near_pairs};
+use crate::dataset::near_duplicates::{NearDuplicate, near_pairs};
 use crate::error::{Error, Result};
-use crate::scene::Draws;
+use crate::scene::{Draws, Scene};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::str::FromStr;
 
-/// How images are shared out.
+/// How images are partitioned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Sharing {
+pub enum Partition {
     /// The first ones for training, the last for validation, as the paper does with series of photos; so many between
     /// them for neither.
     Consecutive {
@@ -46,6 +46,24 @@ impl Group {
     }
 }
 
+impl Group {
+    /// What a scene has in common with the others of its group.
+    fn of(self, scene: &Scene) -> String {
+        match self {
+            Self::Background => scene.plate.clone(),
+            Self::Selection => {
+                let mut photos: Vec<String> = scene
+                    .objects
+                    .iter()
+                    .map(|object| format!("{}/{}", object.asset, object.photo))
+                    .collect();
+                photos.sort();
+                photos.join(" ")
+            }
+        }
+    }
+}
+
 impl FromStr for Group {
     type Err = Error;
 
@@ -62,12 +80,12 @@ impl FromStr for Group {
 
 /// What training and validation have in common.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Leaks {
+pub struct Leakage {
     /// For each [`Group`] that is known of the images: groups of the images for validation, and how many of them also
     /// occur in training.
     pub groups: Vec<(&'static str, [usize; 2])>,
     /// Images for validation that look like one for training.
-    pub near: Vec<Near>,
+    pub near_duplicates: Vec<NearDuplicate>,
 }
 
 impl Listing {
@@ -75,7 +93,7 @@ impl Listing {
     ///
     /// # Errors
     /// A ratio outside 0..1; groups of images without sidecars.
-    pub fn shared(&self, how: Sharing, ratio: f64, seed: u64) -> Result<Self> {
+    pub fn partitioned(&self, how: Partition, ratio: f64, seed: u64) -> Result<Self> {
         if !(ratio > 0.0 && ratio < 1.0) {
             return Err(Error::value(
                 "ratio",
@@ -83,24 +101,18 @@ impl Listing {
             ));
         }
         let all = self.series();
-        let train = (all.len() as f64 * ratio).round() as usize;
-        let parts = match how {
-            Sharing::Consecutive { guard } => [
-                all[..train].to_vec(),
-                all[train.saturating_add(guard).min(all.len())..].to_vec(),
-            ],
-            Sharing::Random => {
-                let own = |i: usize| i.to_string();
-                grouped(
-                    &all,
-                    &(0..all.len()).map(own).collect::<Vec<_>>(),
-                    train,
-                    seed,
-                )
+        let count = (all.len() as f64 * ratio).round() as usize;
+        let [train, val] = match how {
+            Partition::Consecutive { guard } => {
+                let first_val = count.saturating_add(guard).min(all.len());
+                [all[..count].to_vec(), all[first_val..].to_vec()]
             }
-            Sharing::Grouped(group) => grouped(&all, &groups(&all, group)?, train, seed),
+            Partition::Random => {
+                let each_alone: Vec<String> = (0..all.len()).map(|i| i.to_string()).collect();
+                grouped(&all, &each_alone, count, seed)
+            }
+            Partition::Grouped(group) => grouped(&all, &groups(&all, group)?, count, seed),
         };
-        let [train, val] = parts;
         Ok(Self {
             train,
             val,
@@ -108,12 +120,12 @@ impl Listing {
         })
     }
 
-    /// What leaks from training to validation; images are near when they differ by less than `near_codes` (root mean
+    /// What leaks from training to validation; images are near when they differ by less than `max_codes` (root mean
     /// square of 8-bit grey values of a small copy).
     ///
     /// # Errors
     /// An image that cannot be read.
-    pub fn leaks(&self, near_codes: f64) -> Result<Leaks> {
+    pub fn leakage(&self, max_codes: f64) -> Result<Leakage> {
         let shared = |group: Group| {
             let of = |images: &[PathBuf]| groups(images, group).map(BTreeSet::from_iter);
             let (train, val): (BTreeSet<String>, BTreeSet<String>) =
@@ -121,44 +133,40 @@ impl Listing {
             Some((group.name(), [val.len(), val.intersection(&train).count()]))
         };
         let groups = Group::ALL.into_iter().filter_map(shared).collect();
-        Ok(Leaks {
+        Ok(Leakage {
             groups,
-            near: near_pairs(&self.train, &self.val, near_codes)?,
+            near_duplicates: near_pairs(&self.train, &self.val, max_codes)?,
         })
     }
 }
 
 /// The group of each image.
 fn groups(images: &[PathBuf], group: Group) -> Result<Vec<String>> {
-    let of = |image: &PathBuf| -> Result<String> {
-        let scene = record_of(image)?.drawn;
-        Ok(match group {
-            Group::Background => scene.plate,
-            Group::Selection => {
-                let mut things: Vec<_> = scene
-                    .objects
-                    .iter()
-                    .map(|o| format!("{}/{}", o.asset, o.photo))
-                    .collect();
-                things.sort();
-                things.join(" ")
-            }
-        })
-    };
-    images.par_iter().map(of).collect()
+    images
+        .par_iter()
+        .map(|image| Ok(group.of(&record_of(image)?.drawn)))
+        .collect()
 }
 
-/// Groups in an order of chance go to validation until it has its share; the rest is for training.
+/// Groups in a random order go to validation until it has its share; the rest is for training.
 fn grouped(images: &[PathBuf], groups: &[String], train: usize, seed: u64) -> [Vec<PathBuf>; 2] {
+    let val = groups_for_validation(groups, images.len() - train, seed);
+    let mut parts = [Vec::new(), Vec::new()];
+    for (image, group) in images.iter().zip(groups) {
+        parts[usize::from(val.contains(group.as_str()))].push(image.clone());
+    }
+    parts
+}
+
+/// Groups in a random order, until they have about so many images.
+fn groups_for_validation(groups: &[String], wanted: usize, seed: u64) -> BTreeSet<&str> {
     let mut sizes: BTreeMap<&str, usize> = BTreeMap::new();
-    groups
-        .iter()
-        .for_each(|group| *sizes.entry(group).or_default() += 1);
+    for group in groups {
+        *sizes.entry(group).or_default() += 1;
+    }
     let mut order: Vec<(&str, usize)> = sizes.into_iter().collect();
     order.sort_by_key(|(group, _)| Draws::new(seed, 0).bits(&format!("split.{group}")));
-    let wanted = images.len() - train;
-    let mut val = BTreeSet::new();
-    let mut taken = 0;
+    let (mut val, mut taken) = (BTreeSet::new(), 0);
     for (group, size) in order {
         // A group is taken when the share comes closer by it.
         if taken < wanted && (taken + size).abs_diff(wanted) <= wanted - taken {
@@ -166,14 +174,7 @@ fn grouped(images: &[PathBuf], groups: &[String], train: usize, seed: u64) -> [V
             val.insert(group);
         }
     }
-    let of = |want: bool| {
-        let pairs = images.iter().zip(groups);
-        pairs
-            .filter(|(_, group)| val.contains(group.as_str()) == want)
-            .map(|(image, _)| image.clone())
-            .collect()
-    };
-    [of(false), of(true)]
+    val
 }
 
 #[cfg(test)]
@@ -192,20 +193,24 @@ mod tests {
     #[test]
     fn the_paper_s_series_is_cut_once() {
         let cut = listing(2031)
-            .shared(Sharing::Consecutive { guard: 0 }, 0.8, 0)
+            .partitioned(Partition::Consecutive { guard: 0 }, 0.8, 0)
             .unwrap();
         // 80 % of 2031 is 1624.8; the paper says 1624 or, rounded, 1625.
         assert_eq!((cut.train.len(), cut.val.len()), (1625, 406));
         assert!(cut.train.last() < cut.val.first());
         let guarded = listing(100)
-            .shared(Sharing::Consecutive { guard: 5 }, 0.8, 0)
+            .partitioned(Partition::Consecutive { guard: 5 }, 0.8, 0)
             .unwrap();
         assert_eq!((guarded.train.len(), guarded.val.len()), (80, 15));
     }
 
     #[test]
     fn a_random_split_depends_on_the_seed_alone() {
-        let split = |seed| listing(200).shared(Sharing::Random, 0.75, seed).unwrap();
+        let split = |seed| {
+            listing(200)
+                .partitioned(Partition::Random, 0.75, seed)
+                .unwrap()
+        };
         assert_eq!((split(1).train.len(), split(1).val.len()), (150, 50));
         assert_eq!(split(1), split(1));
         assert_ne!(split(1).val, split(2).val);
@@ -226,13 +231,14 @@ mod tests {
     #[test]
     fn the_head_is_taken_of_both_parts() {
         let split = listing(100)
-            .shared(Sharing::Consecutive { guard: 0 }, 0.8, 0)
+            .partitioned(Partition::Consecutive { guard: 0 }, 0.8, 0)
             .unwrap()
             .head(0.25)
             .unwrap();
         assert_eq!((split.train.len(), split.val.len()), (20, 5));
         assert!(
-            listing(3).head(1.5).is_err() && listing(3).shared(Sharing::Random, 1.0, 0).is_err()
+            listing(3).head(1.5).is_err()
+                && listing(3).partitioned(Partition::Random, 1.0, 0).is_err()
         );
     }
 

@@ -1,0 +1,109 @@
+//! How many labels each class has, and how large its boxes are.
+
+use super::{Checked, CheckedBox};
+use crate::dataset::Part;
+use crate::diagnostic::{Code, Diagnostic};
+use crate::plot::Table;
+
+/// Boxes with a side below this share of the image's are reported as very small.
+const TINY_SIDE_SHARE: f64 = 0.01;
+
+/// A class with less than this share of the labels is reported as rare.
+const RARE_LABEL_SHARE: f64 = 0.02;
+
+impl Checked {
+    /// For each class its labels in both parts and the sizes of its boxes.
+    pub fn balance(&self) -> Table {
+        let mut table = Table::new(["class", "train", "val", "share", "box width", "box height"]);
+        for class in 0..self.rows.len() {
+            let share = 100.0 * self.rows[class] as f64 / self.boxes.len().max(1) as f64;
+            let name = self.classes.get(class).cloned();
+            let [width, height] = [0, 1].map(|side| self.side_range(class, side));
+            table.push([
+                name.unwrap_or_else(|| class.to_string()),
+                self.count(class, Part::Train).to_string(),
+                self.count(class, Part::Val).to_string(),
+                format!("{share:.1} %"),
+                width,
+                height,
+            ]);
+        }
+        table
+    }
+
+    /// Labels of a class in a part.
+    fn count(&self, class: usize, part: Part) -> usize {
+        self.boxes
+            .iter()
+            .filter(|b| b.class == class && b.part == part)
+            .count()
+    }
+
+    /// Smallest, median and largest side of a class's boxes, percent of the image.
+    fn side_range(&self, class: usize, side: usize) -> String {
+        let mut sides: Vec<f64> = self
+            .boxes
+            .iter()
+            .filter(|b| b.class == class)
+            .filter_map(|b| b.sides)
+            .map(|sides| 100.0 * sides[side])
+            .collect();
+        sides.sort_by(f64::total_cmp);
+        match sides.as_slice() {
+            [] => "-".into(),
+            [min, ..] => format!(
+                "{min:.1} / {:.1} / {:.1} %",
+                sides[sides.len() / 2],
+                sides[sides.len() - 1]
+            ),
+        }
+    }
+
+    /// What is not wrong but good to know: classes with no labels or few, boxes that are very small.
+    pub fn notes(&self) -> Vec<Diagnostic> {
+        let mut notes = Vec::new();
+        for class in 0..self.classes.len() {
+            notes.extend(self.parts_without_label(class));
+            notes.extend(self.rare_class(class));
+        }
+        notes.extend(self.tiny_boxes());
+        notes
+    }
+
+    fn parts_without_label(&self, class: usize) -> impl Iterator<Item = Diagnostic> {
+        let name = &self.classes[class];
+        Part::ALL
+            .into_iter()
+            .filter(move |&part| self.count(class, part) == 0)
+            .map(move |part| {
+                let message = format!("class \"{name}\" has no label in {}", part.name());
+                Diagnostic::note(Code::ClassWithoutLabels, message)
+            })
+    }
+
+    fn rare_class(&self, class: usize) -> Option<Diagnostic> {
+        let (rows, all) = (*self.rows.get(class)?, self.boxes.len());
+        let is_rare = rows > 0 && (rows as f64) < RARE_LABEL_SHARE * all as f64;
+        is_rare.then(|| {
+            let name = &self.classes[class];
+            let message = format!("class \"{name}\" has only {rows} of {all} labels");
+            Diagnostic::note(Code::RareClass, message)
+        })
+    }
+
+    fn tiny_boxes(&self) -> Option<Diagnostic> {
+        let count = self.boxes.iter().filter(|b| b.is_tiny()).count();
+        (count > 0).then(|| {
+            let percent = 100.0 * TINY_SIDE_SHARE;
+            let message = format!("{count} boxes are below {percent:.0} % of the image's side");
+            Diagnostic::note(Code::TinyBoxes, message)
+        })
+    }
+}
+
+impl CheckedBox {
+    fn is_tiny(&self) -> bool {
+        self.sides
+            .is_some_and(|sides| sides.iter().any(|side| *side < TINY_SIDE_SHARE))
+    }
+}

@@ -1,0 +1,86 @@
+//! One image of a dataset and its label file.
+
+use super::label_rows::{LabelRow, read_rows};
+use crate::dataset::finding::Finding;
+use crate::dataset::near_duplicates::Thumbnail;
+use crate::dataset::yolo::MIN_SIDE_PX;
+use crate::dataset::{Part, YoloSet};
+use crate::diagnostic::Code;
+use crate::io;
+use crate::pixel::PremulRgba;
+use std::path::{Path, PathBuf};
+
+/// What an image and its labels are like.
+pub(super) struct CheckedImage {
+    pub(super) path: PathBuf,
+    pub(super) part: Part,
+    pub(super) findings: Vec<Finding>,
+    /// The good rows of its label file.
+    pub(super) rows: Vec<LabelRow>,
+    /// It has a label file without rows.
+    pub(super) is_empty: bool,
+    /// None where it cannot be read.
+    pub(super) thumbnail: Option<Thumbnail>,
+    /// Size and checksum of its file.
+    pub(super) checksum: Option<(u64, u32)>,
+}
+
+impl CheckedImage {
+    /// Reads an image of the dataset in `folder` and its label file.
+    pub(super) fn read(
+        folder: &Path,
+        path: PathBuf,
+        part: Part,
+        class_count: Option<usize>,
+    ) -> Self {
+        let checksum = io::Checksum::from_file(folder.join(&path))
+            .ok()
+            .map(|sum| (sum.bytes, sum.crc32));
+        let mut image = Self {
+            path,
+            part,
+            findings: Vec::new(),
+            rows: Vec::new(),
+            is_empty: false,
+            thumbnail: None,
+            checksum,
+        };
+        image.read_pixels(folder);
+        image.read_labels(folder, class_count);
+        image
+    }
+
+    fn read_pixels(&mut self, folder: &Path) {
+        let picture = match io::read::<PremulRgba>(folder.join(&self.path)) {
+            Ok(picture) => picture,
+            Err(e) => {
+                let finding = Finding::unreadable(folder, &self.path, &e);
+                return self.findings.push(finding);
+            }
+        };
+        let (w, h) = picture.size();
+        if w.min(h) < MIN_SIDE_PX as usize {
+            self.findings.push(Finding::in_file(
+                &self.path,
+                Code::SmallImage,
+                format!("{w} x {h} pixels, expected at least {MIN_SIDE_PX} a side"),
+            ));
+        } else {
+            self.thumbnail = Some(Thumbnail::new(&picture.map(|p| p.color())));
+        }
+    }
+
+    fn read_labels(&mut self, folder: &Path, class_count: Option<usize>) {
+        let label = YoloSet::label_of(&self.path);
+        let Ok(text) = io::read_text(folder.join(&label)) else {
+            let message = format!("missing or not text, but there is {}", self.path.display());
+            return self
+                .findings
+                .push(Finding::in_file(label, Code::MissingLabel, message));
+        };
+        self.is_empty = text.trim().is_empty();
+        let (rows, findings) = read_rows(&label, &text, class_count);
+        self.rows = rows;
+        self.findings.extend(findings);
+    }
+}

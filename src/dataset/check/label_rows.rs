@@ -1,0 +1,123 @@
+//! The rows of a YOLO label file, checked as strictly as any trainer does.
+
+use crate::dataset::finding::Finding;
+use crate::diagnostic::Code;
+use std::path::Path;
+
+/// Class of a row, and the sides of its box; none of an outline.
+pub(super) type LabelRow = (usize, Option<[f64; 2]>);
+
+/// A row with more columns makes its file one of outlines, as trainers have it.
+const MAX_BOX_COLUMNS: usize = 6;
+
+/// The good rows of a label file, and what is wrong with the others. Without a number of classes there are no good rows.
+pub(super) fn read_rows(
+    path: &Path,
+    text: &str,
+    class_count: Option<usize>,
+) -> (Vec<LabelRow>, Vec<Finding>) {
+    let rows = split_rows(text);
+    let format = RowFormat {
+        outlines: rows.iter().any(|(_, row)| row.len() > MAX_BOX_COLUMNS),
+        class_count,
+    };
+    let (mut good, mut findings) = (Vec::new(), Vec::new());
+    let mut known: Vec<Vec<f64>> = Vec::new();
+    for (line, row) in rows {
+        let (code, message) = match format.parse(&row) {
+            Ok(values) if !known.contains(&values) => {
+                good.extend(class_count.map(|_| format.label(&values)));
+                known.push(values);
+                continue;
+            }
+            Ok(_) => (Code::DuplicateLabelRow, "the same row stands above".into()),
+            Err(message) => (Code::BadLabelRow, message),
+        };
+        findings.push(Finding::in_line(path, line, code, message));
+    }
+    (good, findings)
+}
+
+/// The columns of each row that is not empty, with its line.
+fn split_rows(text: &str) -> Vec<(usize, Vec<&str>)> {
+    text.lines()
+        .map(|line| line.split_whitespace().collect::<Vec<_>>())
+        .enumerate()
+        .filter(|(_, row)| !row.is_empty())
+        .map(|(i, row)| (i + 1, row))
+        .collect()
+}
+
+/// What the rows of a file must look like.
+struct RowFormat {
+    /// Rows are outlines, not boxes.
+    outlines: bool,
+    class_count: Option<usize>,
+}
+
+impl RowFormat {
+    /// The numbers of a row, or what is wrong with it.
+    fn parse(&self, row: &[&str]) -> Result<Vec<f64>, String> {
+        self.check_columns(row.len())?;
+        let values = row
+            .iter()
+            .map(|text| parse_number(text))
+            .collect::<Result<Vec<f64>, String>>()?;
+        self.check_class(row[0])?;
+        check_shares(row, &values)?;
+        if !self.outlines && (values[3] <= 0.0 || values[4] <= 0.0) {
+            return Err(format!(
+                "a box of {} x {}, expected sides above 0",
+                row[3], row[4]
+            ));
+        }
+        Ok(values)
+    }
+
+    fn check_columns(&self, count: usize) -> Result<(), String> {
+        match self.outlines {
+            false if count == 5 => Ok(()),
+            false => Err(format!("{count} columns, expected 5")),
+            true if count >= 7 && count % 2 == 1 => Ok(()),
+            true => Err(format!(
+                "{count} columns, expected a class and at least 3 pairs as in the file's other rows"
+            )),
+        }
+    }
+
+    fn check_class(&self, text: &str) -> Result<(), String> {
+        let class = text
+            .parse::<usize>()
+            .map_err(|_| format!("class {text}, expected an integer from 0"))?;
+        match self.class_count {
+            Some(count) if class >= count => Err(format!(
+                "class {class}, but data.yaml has {count} classes, from 0"
+            )),
+            _ => Ok(()),
+        }
+    }
+
+    fn label(&self, values: &[f64]) -> LabelRow {
+        let sides = (!self.outlines).then(|| [values[3], values[4]]);
+        (values[0] as usize, sides)
+    }
+}
+
+fn parse_number(text: &str) -> Result<f64, String> {
+    text.parse()
+        .map_err(|_| format!("\"{text}\", expected a number"))
+}
+
+fn check_shares(row: &[&str], values: &[f64]) -> Result<(), String> {
+    let outside = values
+        .iter()
+        .skip(1)
+        .position(|share| !(0.0..=1.0).contains(share));
+    match outside {
+        Some(i) => Err(format!(
+            "{}, expected a share of the image, 0 to 1",
+            row[1 + i]
+        )),
+        None => Ok(()),
+    }
+}

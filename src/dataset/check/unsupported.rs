@@ -1,0 +1,71 @@
+//! Objects of a finished dataset that nothing holds up, by the scenes in its sidecar files.
+
+use super::list_files;
+use crate::dataset::finding::Finding;
+use crate::dataset::folder;
+use crate::diagnostic::Code;
+use crate::error::Result;
+use crate::io;
+use crate::scene::{Object, Placement, Scene, SettleOptions};
+use crate::settle;
+use rayon::prelude::*;
+use serde::Deserialize;
+use std::path::{Path, PathBuf};
+
+/// The scene of a sidecar file before and after its objects settled.
+#[derive(Deserialize)]
+struct SettledScene {
+    drawn: Scene,
+    scene: Scene,
+}
+
+/// A finding for each sidecar file with objects that hang in the air, and for each that cannot be read.
+pub(super) fn find(dataset: &Path) -> Vec<Finding> {
+    let options = settle_options(dataset);
+    let files: Vec<PathBuf> = ["scenes/train", "scenes/val"]
+        .iter()
+        .flat_map(|part| list_files(dataset, part))
+        .filter(|path| path.extension().is_some_and(|e| e == "json"))
+        .collect();
+    files
+        .into_par_iter()
+        .filter_map(
+            |path| match unsupported_in(&dataset.join(&path), &options) {
+                Err(e) => Some(Finding::unreadable(dataset, path, &e)),
+                Ok(objects) if objects.is_empty() => None,
+                Ok(objects) => {
+                    let objects = objects.join(", ");
+                    let message = format!("nothing holds {objects}: make this picture again");
+                    Some(Finding::in_file(path, Code::UnsupportedObject, message))
+                }
+            },
+        )
+        .collect()
+}
+
+/// How the dataset's objects fell; the defaults where that is not known.
+fn settle_options(dataset: &Path) -> SettleOptions {
+    let identity = folder::identity(dataset).ok().flatten();
+    identity
+        .and_then(|identity| identity.pointer("/recipe/scene/settle").cloned())
+        .and_then(|settle| serde_json::from_value(settle).ok())
+        .unwrap_or_default()
+}
+
+/// The objects of a sidecar file that nothing holds up.
+fn unsupported_in(path: &Path, options: &SettleOptions) -> Result<Vec<String>> {
+    let SettledScene { drawn, scene } = io::read_json(path)?;
+    let ids = settle::hanging(&drawn, &scene, options)?;
+    Ok(ids
+        .iter()
+        .map(|id| describe(*id, &scene.objects[id - 1]))
+        .collect())
+}
+
+fn describe(id: usize, object: &Object) -> String {
+    let height = match object.placement {
+        Placement::At(pose) => pose.translation.z,
+        Placement::Drop { height, .. } => height,
+    };
+    format!("object {id} (\"{}\"), {height:.2} m up", object.asset)
+}

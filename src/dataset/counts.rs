@@ -1,0 +1,103 @@
+//! How many images, objects and labels a dataset holds.
+
+use crate::dataset::journal_line::JournalLine;
+use crate::dataset::{Obstructed, Part, Plan};
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+
+/// What a dataset holds.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct DatasetCounts {
+    /// Images asked for.
+    pub asked: u64,
+    /// Images in the folder.
+    pub images: u64,
+    /// Of these, images for validation.
+    pub val: u64,
+    /// Images made by this run; the others were there.
+    pub made: u64,
+    /// Objects in the images, labelled or not.
+    pub objects: u64,
+    /// Objects that have a label.
+    pub labelled: u64,
+    /// Objects that something lies over, labelled or not.
+    pub obstructed: u64,
+    /// Objects in cyclic overlap: none of them is on top.
+    pub knotted: u64,
+    /// Scenes that were drawn and rejected.
+    pub retries: u64,
+    /// The same by class, in order.
+    pub classes: Vec<ClassCount>,
+    /// What became of the labels of objects that something lies over.
+    pub policy: Obstructed,
+    /// Files below the folder that trainers are given, as far as they are there.
+    pub for_trainers: Vec<PathBuf>,
+}
+
+/// Objects of one class.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ClassCount {
+    /// Name of the class.
+    pub name: String,
+    /// Objects in the images, labelled or not.
+    pub objects: u64,
+    /// Objects that have a label.
+    pub labelled: u64,
+}
+
+impl DatasetCounts {
+    /// Objects that got no label.
+    pub fn dropped(&self) -> u64 {
+        self.objects.saturating_sub(self.labelled)
+    }
+
+    /// Counts what the lines of a plan's journal say; `made` of the `asked` images are this run's.
+    pub(crate) fn new(lines: &[JournalLine], plan: &Plan, asked: u64, made: u64) -> Self {
+        let sum =
+            |count: fn(&JournalLine) -> u32| lines.iter().map(|line| u64::from(count(line))).sum();
+        let classes = ClassCount::of_all(&plan.classes, lines);
+        Self {
+            asked,
+            images: lines.len() as u64,
+            val: lines.iter().filter(|line| line.part == Part::Val).count() as u64,
+            made,
+            objects: classes.iter().map(|c| c.objects).sum(),
+            labelled: classes.iter().map(|c| c.labelled).sum(),
+            obstructed: sum(|line| line.obstructed),
+            knotted: sum(|line| line.knotted),
+            retries: sum(|line| line.retries),
+            classes,
+            policy: plan.obstructed,
+            for_trainers: files_for_trainers(plan),
+        }
+    }
+}
+
+impl ClassCount {
+    fn of_all(names: &[String], lines: &[JournalLine]) -> Vec<Self> {
+        names
+            .iter()
+            .enumerate()
+            .map(|(class, name)| {
+                let counts = lines.iter().filter_map(|line| line.classes.get(class));
+                let [objects, labelled] = counts.fold([0; 2], |[a, b], &[c, d]| {
+                    [a + u64::from(c), b + u64::from(d)]
+                });
+                Self {
+                    name: name.clone(),
+                    objects,
+                    labelled,
+                }
+            })
+            .collect()
+    }
+}
+
+/// The files that trainers are given, as far as they are there.
+fn files_for_trainers(plan: &Plan) -> Vec<PathBuf> {
+    plan.writers
+        .iter()
+        .flat_map(|writer| writer.for_trainers())
+        .filter(|path| plan.folder.join(path).exists())
+        .collect()
+}

@@ -1,0 +1,88 @@
+//! A list of all pictures, read from the dataset's folder when somebody opens it.
+
+use super::color_of;
+use crate::dataset::{SampleSummary, Summary};
+use crate::io;
+use crate::plot::Page;
+use std::collections::BTreeMap;
+use std::fmt::Write;
+use std::path::Path;
+
+/// So many pictures stand behind one heading, and so many are listed: a page stays below a few MB.
+const PICTURES_PER_HEADING: usize = 100;
+const MAX_LISTED_PICTURES: usize = 5_000;
+
+/// Adds every picture, a hundred behind each heading, for a page in `page_folder`.
+pub(super) fn add_all(page: &mut Page, folder: &Path, summary: &Summary, page_folder: &Path) {
+    let absolute = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
+    let root = io::relative(&absolute(folder), &absolute(page_folder));
+    page.subheading("All pictures").text(
+        "What stands behind these headings is not on this page: pictures are read from the dataset's folder when a heading \
+         is opened, and each leads to its file.",
+    );
+    let count = summary.glances.len().min(MAX_LISTED_PICTURES);
+    for samples in summary.glances[..count].chunks(PICTURES_PER_HEADING) {
+        page.html(&listed_together(samples, &root));
+    }
+    let more = summary.glances.len() - count;
+    if more > 0 {
+        let address = address(&root.join("images"));
+        page.html(&format!(
+            "<p>{more} more are in <a href=\"{address}\">images</a>.</p>\n"
+        ));
+    }
+}
+
+fn listed_together(samples: &[SampleSummary], root: &Path) -> String {
+    let index = |sample: Option<&SampleSummary>| sample.map_or(0, |sample| sample.index);
+    let (first, last) = (index(samples.first()), index(samples.last()));
+    let items: String = samples.iter().map(|sample| listed(sample, root)).collect();
+    format!(
+        "<details><summary>{first:06} to {last:06}</summary><div class=\"all\">\n{items}</div></details>\n"
+    )
+}
+
+fn listed(sample: &SampleSummary, root: &Path) -> String {
+    let address = address(&root.join(&sample.files[0]));
+    let boxes = boxes_by_class(sample);
+    let [w, h] = sample.image;
+    let (index, part, count) = (sample.index, sample.part.name(), sample.labels.len());
+    format!(
+        "<a href=\"{address}\"><img loading=\"lazy\" width=\"{w}\" height=\"{h}\" alt=\"\" src=\"{address}\">\
+         <svg viewBox=\"0 0 {w} {h}\">{boxes}</svg>{index:06} {part}: {count} of {}</a>\n",
+        sample.objects
+    )
+}
+
+/// The boxes of each class as one path.
+fn boxes_by_class(sample: &SampleSummary) -> String {
+    let mut paths: BTreeMap<u32, String> = BTreeMap::new();
+    for (class, b) in &sample.labels {
+        let [x, y, w, h] = [b.x0, b.y0, b.width(), b.height()].map(|v| v.round());
+        let _ = write!(paths.entry(*class).or_default(), "M{x} {y}h{w}v{h}h-{w}z");
+    }
+    paths
+        .iter()
+        .map(|(class, path)| {
+            let color = color_of(*class);
+            format!("<path d=\"{path}\" fill=\"none\" stroke=\"{color}\" vector-effect=\"non-scaling-stroke\"/>")
+        })
+        .collect()
+}
+
+/// A relative path as an address, every byte that means something in one written out.
+fn address(path: &Path) -> String {
+    let byte = |b: u8| match b {
+        b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'/' | b'.' | b'-' | b'_' => {
+            char::from(b).to_string()
+        }
+        b => format!("%{b:02X}"),
+    };
+    let text: String = path.to_string_lossy().bytes().map(byte).collect();
+    // Before a colon would stand a scheme.
+    if text.starts_with('/') {
+        text
+    } else {
+        format!("./{text}")
+    }
+}

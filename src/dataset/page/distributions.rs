@@ -1,0 +1,174 @@
+//! What was drawn and what can be seen, as histograms.
+
+use super::labelled_pictures::LabelledSet;
+use crate::dataset::{SampleSummary, Summary};
+use crate::label::gallery;
+use crate::plot::heat::heat_map;
+use crate::plot::{Histogram, Page, Table};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Bins of a histogram of numbers.
+const HISTOGRAM_BINS: usize = 20;
+/// Most bars of a histogram of integers.
+const MAX_BARS: f64 = 100.0;
+/// Most bins of a histogram of counts.
+const MAX_COUNT_BINS: usize = 60;
+/// Most classes that have a map of their own.
+const MAX_CLASS_MAPS: usize = 12;
+
+/// Adds every drawn value against its distribution.
+pub(super) fn add_drawn(page: &mut Page, summary: &Summary) {
+    page.heading("What was drawn").text(
+        "Bars: values in the dataset. Dashed line: the recipe's distribution; about one bar in twenty lies outside the \
+         band around it by chance. What does not vary is in the table below.",
+    );
+    let mut fixed = Table::new(["not varying", "value"]);
+    let mut charts = Vec::new();
+    for (key, values) in &summary.drawn {
+        match summary.range(key) {
+            Some(([low, high], _)) if low == high => fixed.push([key.clone(), low.to_string()]),
+            range => charts.push(drawn_histogram(key, values, range)),
+        }
+    }
+    charts.extend(
+        summary
+            .chosen
+            .iter()
+            .map(|(what, counts)| choice_histogram(what, counts)),
+    );
+    add_histograms(page, &charts);
+    if !fixed.rows.is_empty() {
+        page.table(&fixed);
+    }
+}
+
+/// Values of one draw, against its range in the recipe and whether it draws integers.
+fn drawn_histogram(key: &str, values: &[f64], range: Option<([f64; 2], bool)>) -> Histogram {
+    match range {
+        Some(([low, high], true)) => {
+            let ends = [low - 0.5, high + 0.5];
+            let mut histogram =
+                Histogram::new(key, values, ends, integer_bars([low, high])).uniform();
+            histogram.ends = [low.to_string(), high.to_string()];
+            histogram
+        }
+        Some((range, false)) => Histogram::new(key, values, range, HISTOGRAM_BINS).uniform(),
+        None => Histogram::new(key, values, extremes(values), HISTOGRAM_BINS),
+    }
+}
+
+/// A bar for each integer, as long as they can be distinguished.
+fn integer_bars([low, high]: [f64; 2]) -> usize {
+    let numbers = high - low + 1.0;
+    if numbers <= MAX_BARS {
+        numbers as usize
+    } else {
+        HISTOGRAM_BINS
+    }
+}
+
+fn choice_histogram(what: &str, counts: &BTreeMap<String, u64>) -> Histogram {
+    let name =
+        |entry: Option<(&String, &u64)>| entry.map_or(String::new(), |(name, _)| name.clone());
+    let histogram = Histogram {
+        title: format!("{what} ({} of them)", counts.len()),
+        ends: [
+            name(counts.first_key_value()),
+            name(counts.last_key_value()),
+        ],
+        counts: counts.values().copied().collect(),
+        expected: None,
+    };
+    if what == "photo of the asset" {
+        histogram
+    } else {
+        histogram.uniform()
+    }
+}
+
+fn extremes(values: &[f64]) -> [f64; 2] {
+    let [low, high] = values
+        .iter()
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| {
+            [v.min(a), v.max(b)]
+        });
+    if low < high {
+        [low, high]
+    } else {
+        [low - 0.5, low + 0.5]
+    }
+}
+
+/// Adds what can be seen, and how large it is.
+pub(super) fn add_seen(page: &mut Page, summary: &Summary) {
+    page.heading("What is seen");
+    add_histograms(
+        page,
+        &[
+            count_histogram("objects in a picture", &summary.glances, |s| s.objects),
+            count_histogram("labels in a picture", &summary.glances, |s| s.labels.len()),
+            visible_histogram("seen share of an object", &summary.visible),
+            side_histogram("width of labelled boxes, pixels", &summary.boxes, 0),
+            side_histogram("height of labelled boxes, pixels", &summary.boxes, 1),
+        ],
+    );
+    add_heat_maps(page, summary);
+}
+
+fn count_histogram(
+    title: &str,
+    samples: &[SampleSummary],
+    count: fn(&SampleSummary) -> usize,
+) -> Histogram {
+    let counts: Vec<f64> = samples.iter().map(|sample| count(sample) as f64).collect();
+    let most = counts.iter().copied().fold(1.0, f64::max);
+    let bins = (most as usize + 1).min(MAX_COUNT_BINS);
+    let mut histogram = Histogram::new(title, &counts, [-0.5, most + 0.5], bins);
+    histogram.ends = ["0".into(), most.to_string()];
+    histogram
+}
+
+/// Seen shares of objects.
+pub(super) fn visible_histogram(title: &str, shares: &[f64]) -> Histogram {
+    Histogram::new(title, shares, [0.0, 1.0], HISTOGRAM_BINS)
+}
+
+fn side_histogram(title: &str, boxes: &[[f64; 2]], side: usize) -> Histogram {
+    let sides: Vec<f64> = boxes.iter().map(|sides| sides[side]).collect();
+    let largest = boxes.iter().flatten().copied().fold(1.0, f64::max);
+    Histogram::new(title, &sides, [0.0, largest], HISTOGRAM_BINS)
+}
+
+/// Adds where the labels are, all of them and those of each class that is not too many.
+fn add_heat_maps(page: &mut Page, summary: &Summary) {
+    let set = LabelledSet::from_summary(Path::new(""), summary);
+    let mut maps = heat_map("centres of all labels", &set.centres());
+    if summary.classes.len() > 1 {
+        for (class, name) in (0..).zip(&summary.classes).take(MAX_CLASS_MAPS) {
+            let title = format!("centres of {}", gallery::clipped(name, 30));
+            maps += &heat_map(&title, &set.centres_of(class));
+        }
+    }
+    page.html(&format!("<div class=\"histograms\">\n{maps}</div>\n"));
+}
+
+/// Adds charts beside each other.
+pub(super) fn add_histograms(page: &mut Page, charts: &[Histogram]) {
+    let all: String = charts.iter().map(Histogram::svg).collect();
+    page.html(&format!("<div class=\"histograms\">\n{all}</div>\n"));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whole_numbers_have_bars_of_their_own_until_there_are_too_many() {
+        assert_eq!(integer_bars([4.0, 12.0]), 9);
+        assert_eq!(integer_bars([0.0, 99.0]), 100);
+        assert_eq!(integer_bars([0.0, 100.0]), HISTOGRAM_BINS);
+        assert_eq!(integer_bars([0.0, 9007199254740991.0]), HISTOGRAM_BINS);
+        assert_eq!(integer_bars([0.0, f64::INFINITY]), HISTOGRAM_BINS);
+    }
+}

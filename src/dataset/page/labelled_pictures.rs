@@ -1,0 +1,212 @@
+//! Pictures with boxes, of this dataset or of the user.
+
+use crate::dataset::{Listing, SampleSummary, Summary, YoloSet, is_image};
+use crate::error::{Error, Result};
+use crate::eval::{self, GroundTruth};
+use crate::io;
+use rayon::prelude::*;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+/// More images than this are no folder of one's own pictures, but a whole disk.
+const MAX_IMAGES: usize = 200_000;
+
+/// Pictures with boxes, from wherever.
+#[derive(Default)]
+pub(super) struct LabelledSet {
+    /// Names of the classes, in order; may be fewer than occur.
+    pub(super) classes: Vec<String>,
+    pub(super) pictures: Vec<LabelledPicture>,
+}
+
+/// Class of a box, and its centre, width and height as shares of the picture's.
+pub(super) type ShareBox = (u32, [f64; 4]);
+
+/// A picture and its boxes.
+#[derive(Clone)]
+pub(super) struct LabelledPicture {
+    pub(super) path: PathBuf,
+    /// None for a picture without a label file.
+    pub(super) boxes: Option<Vec<ShareBox>>,
+}
+
+impl LabelledSet {
+    /// A YOLO dataset, or a folder with images that have YOLO labels beside them or in `labels` instead of `images`.
+    ///
+    /// # Errors
+    /// A folder without images; a label that cannot be read.
+    pub(super) fn read(folder: &Path) -> Result<Self> {
+        let (classes, images) = if folder.join("data.yaml").is_file() {
+            let listing = Listing::read(folder)?;
+            (listing.classes.clone(), listing.series())
+        } else {
+            let mut images = Vec::new();
+            collect_images(folder, &mut BTreeSet::new(), &mut images)?;
+            images.sort();
+            (Vec::new(), images)
+        };
+        if images.is_empty() {
+            return Err(Error::file(
+                folder,
+                "no images, expected a YOLO dataset or a folder of images with labels",
+            ));
+        }
+        let pictures = images
+            .into_par_iter()
+            .map(LabelledPicture::read)
+            .collect::<Result<_>>()?;
+        Ok(Self { classes, pictures })
+    }
+
+    /// The pictures of a dataset that petcomp made.
+    pub(super) fn from_summary(folder: &Path, summary: &Summary) -> Self {
+        Self {
+            classes: summary.classes.clone(),
+            pictures: summary
+                .glances
+                .iter()
+                .map(|sample| LabelledPicture::from_sample(folder, sample))
+                .collect(),
+        }
+    }
+
+    pub(super) fn name(&self, class: u32) -> String {
+        eval::class_name(class, &self.classes)
+    }
+
+    pub(super) fn boxes(&self) -> impl Iterator<Item = &ShareBox> {
+        self.pictures
+            .iter()
+            .filter_map(|picture| picture.boxes.as_ref())
+            .flatten()
+    }
+
+    pub(super) fn centres(&self) -> Vec<[f64; 2]> {
+        self.boxes().map(|(_, [x, y, ..])| [*x, *y]).collect()
+    }
+
+    pub(super) fn centres_of(&self, class: u32) -> Vec<[f64; 2]> {
+        self.boxes()
+            .filter(|(own, _)| *own == class)
+            .map(|(_, [x, y, ..])| [*x, *y])
+            .collect()
+    }
+
+    /// Some of the pictures, evenly spread.
+    pub(super) fn spread(&self, max_count: usize) -> Vec<&LabelledPicture> {
+        let count = max_count.min(self.pictures.len());
+        (0..count)
+            .map(|i| &self.pictures[i * self.pictures.len() / count])
+            .collect()
+    }
+}
+
+impl LabelledPicture {
+    fn read(path: PathBuf) -> Result<Self> {
+        let candidates = [YoloSet::label_of(&path), path.with_extension("txt")];
+        let Some(label) = candidates.iter().find(|label| label.is_file()) else {
+            return Ok(Self { path, boxes: None });
+        };
+        // In a picture of one pixel, pixels are shares.
+        let image = eval::yolo_sheet(&io::read_text(label)?, "", [1, 1])
+            .map_err(|what| Error::file(label, what))?;
+        let boxes = Some(image.truth.iter().map(share_box).collect());
+        Ok(Self { path, boxes })
+    }
+
+    fn from_sample(folder: &Path, sample: &SampleSummary) -> Self {
+        let [w, h] = sample.image.map(f64::from);
+        let boxes = sample.labels.iter().map(|(class, b)| {
+            let center = b.center();
+            let shares = [center.x / w, center.y / h, b.width() / w, b.height() / h];
+            (*class, shares)
+        });
+        Self {
+            path: folder.join(&sample.files[0]),
+            boxes: Some(boxes.collect()),
+        }
+    }
+}
+
+fn share_box(truth: &GroundTruth) -> ShareBox {
+    let center = truth.bbox.center();
+    let shares = [center.x, center.y, truth.bbox.width(), truth.bbox.height()];
+    (truth.class, shares)
+}
+
+/// The images of a folder and of those below it, each folder once: links may lead in circles.
+fn collect_images(
+    folder: &Path,
+    seen: &mut BTreeSet<PathBuf>,
+    images: &mut Vec<PathBuf>,
+) -> Result<()> {
+    let failed = |e| Error::file(folder, e);
+    if !seen.insert(folder.canonicalize().map_err(failed)?) {
+        return Ok(());
+    }
+    for entry in std::fs::read_dir(folder).map_err(failed)?.flatten() {
+        let path = entry.path();
+        if path.is_dir() {
+            collect_images(&path, seen, images)?;
+        } else if path.is_file() && is_image(&path) {
+            images.push(path);
+        }
+        if images.len() > MAX_IMAGES {
+            return Err(Error::file(
+                folder,
+                format!("more than {MAX_IMAGES} images, expected fewer"),
+            ));
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::Image;
+    use crate::pixel::LinearRgb;
+
+    #[test]
+    fn images_are_found_with_labels_in_either_place() {
+        let root = tempfile::tempdir().unwrap();
+        let grey = Image::filled(8, 6, LinearRgb::grey(0.2));
+        for (file, label) in [
+            (
+                "images/a.png",
+                Some(("labels/a.txt", "1 0.5 0.25 0.5 0.5\n")),
+            ),
+            ("images/deep/b.jpg", Some(("images/deep/b.txt", ""))),
+            ("images/c.png", None),
+        ] {
+            for path in [file].into_iter().chain(label.map(|l| l.0)) {
+                std::fs::create_dir_all(root.path().join(path).parent().unwrap()).unwrap();
+            }
+            io::write(root.path().join(file), &grey).unwrap();
+            if let Some((path, text)) = label {
+                std::fs::write(root.path().join(path), text).unwrap();
+            }
+        }
+        let set = LabelledSet::read(root.path()).unwrap();
+        let boxes: Vec<_> = set.pictures.iter().map(|p| p.boxes.clone()).collect();
+        assert_eq!(
+            boxes,
+            [Some(vec![(1, [0.5, 0.25, 0.5, 0.5])]), None, Some(vec![])]
+        );
+        std::fs::write(root.path().join("labels/a.txt"), "x\n").unwrap();
+        assert!(
+            LabelledSet::read(root.path())
+                .err()
+                .unwrap()
+                .to_string()
+                .contains("a.txt: line 1")
+        );
+        assert!(
+            LabelledSet::read(&root.path().join("labels"))
+                .err()
+                .unwrap()
+                .to_string()
+                .contains("no images")
+        );
+    }
+}

@@ -1,0 +1,260 @@
+//! Pictures of a dataset with their labels over them.
+
+use super::color_of;
+use super::outlier::{Feature, outliers};
+use crate::dataset::{SampleSummary, ShownSample, Summary, UnlabelledReason};
+use crate::error::Result;
+use crate::eval::class_name;
+use crate::geom::{BBox, Point2};
+use crate::label::gallery::{self, Figure, gallery};
+use crate::label::{ObjectLabel, trace};
+use crate::plot::{Page, escaped};
+use rayon::prelude::*;
+use std::fmt::Write;
+
+/// Boxes and masks are shown and hidden without a script: a ticked box decides what its neighbours look like. Words over
+/// the objects are for enlarged pictures; the list of all pictures loads what is seen of it.
+pub(super) const SAMPLES_STYLE: &str = "<style>.samples text{display:none}.samples figure:target text{display:block}\
+    #boxes:not(:checked)~.samples .boxes,#masks:not(:checked)~.samples .masks,#others:not(:checked)~.samples .others\
+    {display:none}.histograms{display:flex;flex-wrap:wrap;gap:10px}\
+    .all{display:grid;grid-template-columns:repeat(auto-fill,minmax(130px,1fr));gap:6px;margin:6px 0}\
+    .all a{position:relative;display:block;font-size:12px;min-width:0}.all img{display:block;width:100%;height:auto;background:#eee}\
+    .all svg{position:absolute;left:0;top:0;width:100%;height:auto}.key{white-space:nowrap;margin-right:1.3em}\
+    .key i{display:inline-block;width:1em;height:1em;margin-right:.4em;vertical-align:-.15em;border:1px solid #888}</style>\n";
+
+/// The switches over the samples.
+const SWITCHES: [(&str, &str, bool); 3] = [
+    ("boxes", "boxes of labelled objects", true),
+    ("masks", "what is seen of them", false),
+    ("others", "outlines of objects without a label", true),
+];
+
+/// Colour of outlines without a label: seen on light and dark.
+const UNLABELLED: &str = "#c8c8c8";
+
+/// Adds the pictures and the switches over them.
+pub(super) fn add_samples(
+    page: &mut Page,
+    summary: &Summary,
+    folder: &std::path::Path,
+    count: usize,
+) -> Result<()> {
+    page.heading("Pictures")
+        .html(&legend(summary))
+        .html("<div>\n");
+    for (id, text, on) in SWITCHES {
+        let checked = if on { " checked" } else { "" };
+        page.html(&format!(
+            "<input type=\"checkbox\" id=\"{id}\"{checked}><label for=\"{id}\">{text}</label>\n"
+        ));
+    }
+    let selected = select_samples(&summary.glances, count);
+    let outliers = selected
+        .iter()
+        .filter(|sample| sample.why.is_some())
+        .count();
+    page.text(&format!(
+        "{} of {} pictures: first {outliers} that are unlike the others, with what sets them apart, then others evenly \
+         spread. Click one to enlarge it; Escape and the arrow keys work too.",
+        selected.len(),
+        summary.glances.len()
+    ));
+    let figures: Vec<Figure> = selected
+        .par_iter()
+        .map(|sample| {
+            let shown = summary.shown(folder, sample.row)?;
+            figure(&shown, &summary.classes, sample.why.as_deref())
+        })
+        .collect::<Result<_>>()?;
+    page.html("<div class=\"samples\">\n")
+        .html(&gallery("picture", &figures))
+        .html("</div>\n</div>\n");
+    Ok(())
+}
+
+/// Colours of the classes and kinds of lines.
+fn legend(summary: &Summary) -> String {
+    let classes: String = (0..)
+        .zip(&summary.classes)
+        .map(|(class, name)| legend_key(&color_of(class), name))
+        .collect();
+    format!(
+        "<p>{classes}{}</p>\n",
+        legend_key(UNLABELLED, "outline of an object without a label")
+    )
+}
+
+fn legend_key(fill: &str, text: &str) -> String {
+    format!(
+        "<span class=\"key\"><i style=\"background:{fill}\"></i>{}</span>\n",
+        escaped(text)
+    )
+}
+
+/// A picture to show.
+struct SelectedSample {
+    /// Its place among all samples.
+    row: usize,
+    /// What sets it apart from the others, if anything does.
+    why: Option<String>,
+}
+
+/// Pictures to show: those unlike the others, at most half, then others evenly spread.
+fn select_samples(samples: &[SampleSummary], count: usize) -> Vec<SelectedSample> {
+    let mut selected: Vec<SelectedSample> = outliers(&features(samples))
+        .into_iter()
+        .take(count / 2)
+        .map(|outlier| SelectedSample {
+            row: outlier.row,
+            why: Some(outlier.why),
+        })
+        .collect();
+    let known: Vec<usize> = selected.iter().map(|sample| sample.row).collect();
+    let rest: Vec<usize> = (0..samples.len())
+        .filter(|row| !known.contains(row))
+        .collect();
+    let count = (count - selected.len()).min(rest.len());
+    selected.extend((0..count).map(|i| SelectedSample {
+        row: rest[i * rest.len() / count],
+        why: None,
+    }));
+    selected
+}
+
+/// What may set a picture apart.
+fn features(samples: &[SampleSummary]) -> [Feature<'static>; 7] {
+    let measures: [(&str, fn(&SampleSummary) -> f64); 7] = [
+        ("objects", |s| s.objects as f64),
+        ("labels", |s| s.labels.len() as f64),
+        ("objects without a label", |s| {
+            (s.objects - s.labels.len()) as f64
+        }),
+        ("least seen label, %", |s| 100.0 * s.least_visible),
+        ("largest box, px", |s| {
+            longer_sides(s).fold(f64::NAN, f64::max)
+        }),
+        ("smallest box, px", |s| {
+            longer_sides(s).fold(f64::NAN, f64::min)
+        }),
+        ("rejected scenes", |s| s.rejected as f64),
+    ];
+    measures.map(|(name, value)| Feature {
+        name,
+        values: samples.iter().map(value).collect(),
+    })
+}
+
+/// The longer side of each labelled box.
+fn longer_sides(sample: &SampleSummary) -> impl Iterator<Item = f64> {
+    sample.labels.iter().map(|(_, b)| b.width().max(b.height()))
+}
+
+/// A picture and its labels over it.
+fn figure(shown: &ShownSample, classes: &[String], why: Option<&str>) -> Result<Figure> {
+    let record = &shown.record;
+    let mut figure = Figure::whole(&shown.picture, record.labels.image.map(f64::from))?;
+    let letter = figure.letter_height();
+    let (mut boxes, mut masks, mut others) = (String::new(), String::new(), String::new());
+    let mut labelled = 0;
+    for object in &record.labels.objects {
+        match UnlabelledReason::of(object, record) {
+            None => {
+                labelled += 1;
+                boxes += &box_of(object, classes, letter);
+                masks += &mask_of(object);
+            }
+            Some(reason) => others += &outline_of(object, classes, reason, letter),
+        }
+    }
+    figure.drawing = format!(
+        "<g class=\"masks\">{masks}</g><g class=\"others\">{others}</g><g class=\"boxes\">{boxes}</g>"
+    );
+    let why = why.map_or(String::new(), |why| format!("; {why}"));
+    let (index, part) = (record.index, record.part.name());
+    figure.caption = format!(
+        "{index:06} {part}: {labelled} of {} objects labelled{why}",
+        record.labels.objects.len()
+    );
+    Ok(figure)
+}
+
+fn box_of(object: &ObjectLabel, classes: &[String], letter: f64) -> String {
+    let bbox = object.amodal_box;
+    let BBox { x0, y0, .. } = bbox;
+    let (width, height, color) = (bbox.width(), bbox.height(), color_of(object.class));
+    let (id, name) = (object.id.0, class_name(object.class, classes));
+    let rectangle = format!(
+        "<rect x=\"{x0}\" y=\"{y0}\" width=\"{width}\" height=\"{height}\" fill=\"none\" pointer-events=\"all\" \
+         stroke=\"{color}\" stroke-width=\"2\"><title>{id} {}: {:.0} % seen</title></rect>",
+        escaped(&name),
+        100.0 * object.visible_fraction
+    );
+    rectangle + &gallery::words([x0, y0 + letter], &format!("{id} {name}"), letter, "#222")
+}
+
+fn mask_of(object: &ObjectLabel) -> String {
+    let mut path = String::new();
+    for polygon in trace::polygons(&object.visible_mask, 0.0) {
+        for (i, p) in polygon.iter().enumerate() {
+            let _ = write!(path, "{}{} {}", if i == 0 { "M" } else { "L" }, p.x, p.y);
+        }
+        path.push('z');
+    }
+    format!(
+        "<path d=\"{path}\" fill=\"{}\" fill-opacity=\"0.45\"/>",
+        color_of(object.class)
+    )
+}
+
+/// An outline with the reason why it has no label.
+fn outline_of(
+    object: &ObjectLabel,
+    classes: &[String],
+    reason: UnlabelledReason,
+    letter: f64,
+) -> String {
+    if object.outline_px.is_empty() {
+        return String::new();
+    }
+    let why = why_unlabelled(object, reason);
+    let id = object.id.0;
+    let title = format!(
+        "{id} {}: no label, {why}; {:.0} % seen",
+        class_name(object.class, classes),
+        100.0 * object.visible_fraction
+    );
+    let rings: String = object
+        .outline_px
+        .iter()
+        .map(|ring| titled_polygon(ring, &escaped(&title)))
+        .collect();
+    let center = object.amodal_box.center();
+    let at = [center.x - 2.0 * letter, center.y];
+    rings + &gallery::words(at, &format!("{id} {why}"), 0.7 * letter, "#555")
+}
+
+fn why_unlabelled(object: &ObjectLabel, reason: UnlabelledReason) -> String {
+    match reason {
+        UnlabelledReason::Covered => {
+            let above: Vec<String> = object
+                .covered_by
+                .iter()
+                .map(|id| id.0.to_string())
+                .collect();
+            format!("under {}", above.join(", "))
+        }
+        reason => reason.description().to_owned(),
+    }
+}
+
+fn titled_polygon(ring: &[Point2<f64>], title: &str) -> String {
+    let points: String = ring
+        .iter()
+        .map(|p| format!("{:.1},{:.1} ", p.x, p.y))
+        .collect();
+    format!(
+        "<polygon points=\"{}\" fill=\"none\" pointer-events=\"all\" stroke=\"{UNLABELLED}\" stroke-width=\"1.5\">\
+         <title>{title}</title></polygon>",
+        points.trim_end()
+    )
+}
