@@ -17,8 +17,8 @@ pub fn recipe(bytes: &[u8]) {
     let Ok(text) = std::str::from_utf8(bytes) else {
         return;
     };
-    if let Ok(setup) = io::parse_toml::<dataset::DatasetConfig>(text) {
-        let _ = setup.scene.check();
+    if let Ok(config) = io::parse_toml::<dataset::DatasetConfig>(text) {
+        let _ = config.scene.check();
     }
 }
 

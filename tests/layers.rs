@@ -100,7 +100,7 @@ fn collect(folder: &Path, at: &Module, files: &mut BTreeMap<Module, String>) {
     for entry in fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
         let name = path.file_stem().unwrap().to_string_lossy().into_owned();
-        let inner = [at.as_slice(), &[name.clone()]].concat();
+        let inner = [at.as_slice(), std::slice::from_ref(&name)].concat();
         if path.is_dir() && name != "tests" {
             collect(&path, &inner, files);
         } else if path.extension().is_some_and(|e| e == "rs")
@@ -172,7 +172,7 @@ fn resolved(path: &Module, from: &Module, known: &BTreeSet<Module>) -> Option<Mo
             at.pop();
             continue;
         }
-        let inner = [at.as_slice(), &[name.clone()]].concat();
+        let inner = [at.as_slice(), std::slice::from_ref(name)].concat();
         if !known.contains(&inner) {
             break;
         }

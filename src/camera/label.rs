@@ -8,7 +8,7 @@ use serde_json::Value;
 /// The corners of a flat rectangle of known size in a photo, and what is known of the camera that took it.
 ///
 /// In files an unknown key is an error, except where it starts with `_`: those are comments. Values are as a person
-/// wrote them; [`solve`](super::solve) checks them.
+/// wrote them; [`camera::solve`](crate::camera::solve) checks them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(remote = "Self", deny_unknown_fields)]
 pub struct Label {

@@ -202,10 +202,10 @@ impl SolverUnits {
 
     /// The rectangle as a camera without distortion would show it.
     fn projected(&self, corners_px: &[Point2<f64>; 4], kappa: f64) -> ProjectedRectangle {
-        ProjectedRectangle::new(&corners_px.map(|c| undistorted(self.from_px(c), kappa)))
+        ProjectedRectangle::new(&corners_px.map(|c| undistorted(self.normalized(c), kappa)))
     }
 
-    fn from_px(&self, px: Point2<f64>) -> Vector2<f64> {
+    fn normalized(&self, px: Point2<f64>) -> Vector2<f64> {
         (px - self.principal_px) / self.unit_px
     }
 
@@ -255,7 +255,7 @@ impl SolverUnits {
         Observation {
             point,
             rigid: false,
-            seen: self.from_px(px),
+            seen: self.normalized(px),
             weight: self.unit_px / sigma_px,
         }
     }

@@ -89,16 +89,19 @@ fn provenance(entry: &Entry<'_>) -> [(String, String); 3] {
     ]
 }
 
+/// The name of a channel and how a pixel gives its value.
+type Channel<P> = (&'static str, fn(&P) -> f32);
+
 /// The picture, its depth and its shadows.
 fn picture(entry: &Entry<'_>) -> Vec<NamedChannel> {
     let (frame, deep) = (&entry.sample.frame, &entry.sample.deep);
-    let color: [(&str, fn(&PremulRgba) -> f32); 4] = [
+    let color: [Channel<PremulRgba>; 4] = [
         ("R", |p| p.r),
         ("G", |p| p.g),
         ("B", |p| p.b),
         ("A", |p| p.a),
     ];
-    let shadow: [(&str, fn(&LinearRgb) -> f32); 3] = [
+    let shadow: [Channel<LinearRgb>; 3] = [
         ("shadow.R", |s| s.r),
         ("shadow.G", |s| s.g),
         ("shadow.B", |s| s.b),

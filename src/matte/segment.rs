@@ -100,8 +100,8 @@ impl SegmentStep {
 ///   the edges is taken, and how well it agrees is its [`Confidence`];
 /// * what the edges enclose, gaps bridged, is the object, and its outline is moved to where the photo itself changes.
 /// # Errors
-/// [`Error::Photo`] when there is nothing, only a speck, more than one object, or no background around the object;
-/// [`Error::Value`] for an option that cannot be right.
+/// [`Error::Photo`](crate::Error::Photo) when there is nothing, only a speck, more than one object, or no background around the object;
+/// [`Error::Value`](crate::Error::Value) for an option that cannot be right.
 ///
 /// [Burt and Adelson 1983]: https://doi.org/10.1109/TCOM.1983.1095851
 pub fn segment(photo: &Image<LinearRgb>, opts: &SegmentOptions) -> Result<Segmentation> {

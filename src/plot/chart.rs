@@ -378,11 +378,11 @@ fn labels_beside(labels: Vec<([f64; 2], &str)>, points: Vec<[f64; 2]>, frame: Ar
 }
 
 /// Where the words that have room begin, first come, first served.
-fn free_places<'a>(
-    labels: Vec<([f64; 2], &'a str)>,
+fn free_places(
+    labels: Vec<([f64; 2], &str)>,
     mut taken: Vec<Area>,
     frame: Area,
-) -> Vec<([f64; 2], &'a str)> {
+) -> Vec<([f64; 2], &str)> {
     let mut placed = Vec::new();
     for (point, word) in labels {
         let width = POINT_LABEL_LETTER_WIDTH * word.chars().count() as f64;

@@ -46,6 +46,8 @@ fn shift_colors(texels: &mut [Float4], hue_deg: f32, saturation: f32, value: f32
         for (lane, t) in run.iter().enumerate() {
             (0..3).for_each(|c| colors[c][lane] = t.0[c]);
         }
+        // By index: three arrays are read and written at the same lane, and vectorised.
+        #[allow(clippy::needless_range_loop)]
         for lane in 0..SIMD_LANES {
             let color = LinearRgb::new(colors[0][lane], colors[1][lane], colors[2][lane]);
             let LinearRgb { r, g, b } = crate::color::shift_hsv(color, hue_deg, saturation, value);

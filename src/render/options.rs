@@ -71,7 +71,7 @@ impl RenderOptions {
     /// Fails on the first number that has no use: none at all, or so many that a picture takes hours.
     ///
     /// # Errors
-    /// [`Error::Value`] with the option's name.
+    /// [`Error::Value`](crate::Error::Value) with the option's name.
     pub fn check(&self) -> Result<()> {
         SUBSAMPLES.check("subsamples", self.subsamples as f64)?;
         LIGHT_SAMPLES.check("light_samples", self.light_samples as f64)?;

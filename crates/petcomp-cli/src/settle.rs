@@ -1,7 +1,7 @@
 //! `petcomp settle`: dropped objects come to rest.
 
 use crate::common::Common;
-use petcomp::dataset::Setup;
+use petcomp::dataset::DatasetConfig;
 use petcomp::settle::{SettleOptions, preview, settle_traced, trace_csv};
 use petcomp::{Quality, Scene, io};
 use std::path::{Path, PathBuf};
@@ -61,8 +61,8 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
 }
 
 fn scene_options(scene: &Scene, path: &Path) -> petcomp::Result<SettleOptions> {
-    let setup = Setup::from_settings(&scene.settings, &[]).map_err(|e| e.in_file(path))?;
-    Ok(setup.scene.settle)
+    let config = DatasetConfig::from_settings(&scene.settings, &[]).map_err(|e| e.in_file(path))?;
+    Ok(config.scene.settle)
 }
 
 fn read_options(path: &Path) -> petcomp::Result<SettleOptions> {

@@ -86,7 +86,7 @@ fn counted<T: Send>(job: impl FnOnce() -> T + Send) -> Result<(T, Work)> {
 /// Makes what a case asks for and writes it into a folder.
 fn make(world: &World, case: &Case, folder: &Path) -> Result<()> {
     let scene = case.scene.clone();
-    let pipeline = Pipeline::open_for(world.setup(), &scene)?;
+    let pipeline = Pipeline::open_for(world.config(), &scene)?;
     match case.asked {
         Asked::Picture => {
             let (scene, shot) = pipeline.resolve(scene)?;

@@ -110,13 +110,16 @@ fn measure_boxes(set: &LabelledSet) -> [Measure; 6] {
     ]
 }
 
+/// The title of a measure and how the statistics of a picture give it.
+type PixelMeasure = (&'static str, fn(&PixelStatistics) -> f64);
+
 fn measure_pixels(set: &LabelledSet) -> [Measure; 4] {
     let statistics: Vec<PixelStatistics> = set
         .spread(MAX_MEASURED_PICTURES)
         .into_par_iter()
         .filter_map(|picture| PixelStatistics::read(&picture.path))
         .collect();
-    let measures: [(&'static str, fn(&PixelStatistics) -> f64); 4] = [
+    let measures: [PixelMeasure; 4] = [
         ("brightness of a picture, mean code", |s| s.brightness),
         ("contrast of a picture, standard deviation of codes", |s| {
             s.contrast

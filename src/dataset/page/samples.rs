@@ -121,9 +121,12 @@ fn select_samples(samples: &[SampleSummary], count: usize) -> Vec<SelectedSample
     selected
 }
 
+/// The title of a measure and how the summary of a sample gives it.
+type SampleMeasure = (&'static str, fn(&SampleSummary) -> f64);
+
 /// What may set a picture apart.
 fn features(samples: &[SampleSummary]) -> [Feature<'static>; 7] {
-    let measures: [(&str, fn(&SampleSummary) -> f64); 7] = [
+    let measures: [SampleMeasure; 7] = [
         ("objects", |s| s.objects as f64),
         ("labels", |s| s.labels.len() as f64),
         ("objects without a label", |s| {

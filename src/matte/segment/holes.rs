@@ -75,7 +75,7 @@ fn without_holes(picture: &Image<LinearRgb>, inside: &Mask, background: &Mask) -
     let unlike = smooth.zip_map(&plate.image, is_unlike_screen);
     candidates
         .iter()
-        .map(|core| Hole::new(core))
+        .map(Hole::new)
         .filter(|hole| hole.has_opaque_rim(inside, &unlike))
         .fold(inside.clone(), |kept, hole| {
             kept.zip_map(&hole.area, |kept, hole| kept && !hole)

@@ -60,10 +60,10 @@ fn a_scene_reads_the_files_that_it_names_and_no_others() {
 }
 
 /// What the program writes for a scene: the picture as it is displayed and its scene-linear values.
-fn made(world: &World, setup: &DatasetConfig, scene: &Scene) -> (Vec<u8>, Work) {
+fn made(world: &World, config: &DatasetConfig, scene: &Scene) -> (Vec<u8>, Work) {
     let folder = tempfile::tempdir().unwrap();
     let (_, work) = counted(|| {
-        let pipeline = Pipeline::open_for(setup.clone(), scene).unwrap();
+        let pipeline = Pipeline::open_for(config.clone(), scene).unwrap();
         let (scene, shot) = pipeline.resolve(scene.clone()).unwrap();
         let (_, frame) = pipeline.shoot(&scene, &shot);
         io::write(folder.path().join("a.png"), &frame.map(PremulRgba::color)).unwrap();
@@ -71,15 +71,15 @@ fn made(world: &World, setup: &DatasetConfig, scene: &Scene) -> (Vec<u8>, Work) 
     })
     .unwrap();
     let bytes = ["a.png", "a.exr"].map(|file| std::fs::read(folder.path().join(file)).unwrap());
-    assert!(world.setup().assets.exists());
+    assert!(world.config().assets.exists());
     (bytes.concat(), work)
 }
 
 #[test]
 fn idle_switches_leave_every_byte_and_cost_nothing() {
     let world = World::make().unwrap();
-    let (setup, scene) = (world.setup(), world.scene());
-    let usual = made(&world, &setup, &scene);
+    let (config, scene) = (world.config(), world.scene());
+    let usual = made(&world, &config, &scene);
     let out = AreaLight {
         power: 0.0,
         ..scene.lights[0]
@@ -144,7 +144,7 @@ fn idle_switches_leave_every_byte_and_cost_nothing() {
     ];
     for (what, scene) in &idle {
         assert!(
-            made(&world, &setup, scene) == usual,
+            made(&world, &config, scene) == usual,
             "{what} changes bytes or costs work"
         );
     }
@@ -155,28 +155,28 @@ fn quality_where_it_does_not_apply_changes_nothing() {
     let world = World::make().unwrap();
     let scene = world.scene();
     let with = |change: fn(&mut DatasetConfig), scene: &Scene| {
-        let mut setup = world.setup();
-        change(&mut setup);
-        made(&world, &setup, scene)
+        let mut config = world.config();
+        change(&mut config);
+        made(&world, &config, scene)
     };
     let no_lamp = Scene {
         lights: vec![],
         ..scene.clone()
     };
-    assert!(with(|setup| setup.render.light_samples = 9, &no_lamp) == with(|_| {}, &no_lamp));
+    assert!(with(|config| config.render.light_samples = 9, &no_lamp) == with(|_| {}, &no_lamp));
     let no_sky = Scene {
         ambient: LinearRgb::BLACK,
         ..scene.clone()
     };
-    assert!(with(|setup| setup.render.ambient_samples = 99, &no_sky) == with(|_| {}, &no_sky));
+    assert!(with(|config| config.render.ambient_samples = 99, &no_sky) == with(|_| {}, &no_sky));
     let no_cards = Scene {
         objects: vec![],
         ..scene.clone()
     };
-    let finest = |setup: &mut DatasetConfig| setup.render = petcomp::Quality::Reference.render();
+    let finest = |config: &mut DatasetConfig| config.render = petcomp::Quality::Reference.render();
     assert!(with(finest, &no_cards) == with(|_| {}, &no_cards));
     // How cards fall does not matter to cards that lie.
-    let longer = |setup: &mut DatasetConfig| setup.scene.settle.time_limit *= 2.0;
+    let longer = |config: &mut DatasetConfig| config.scene.settle.time_limit *= 2.0;
     assert!(with(longer, &scene) == with(|_| {}, &scene));
     assert!(
         with(finest, &scene).0 != with(|_| {}, &scene).0,
@@ -191,7 +191,7 @@ fn dataset(
     progress: &(dyn Fn(Progress) + Sync),
 ) -> BTreeMap<PathBuf, Vec<u8>> {
     let folder = tempfile::tempdir().unwrap();
-    let pipeline = Pipeline::open(world.setup()).unwrap();
+    let pipeline = Pipeline::open(world.config()).unwrap();
     let plan = pipeline.plan(3, 0, folder.path()).unwrap();
     let make = |_| pipeline.take(dropped(world.scene()));
     let pool = petcomp::work::pool(threads).unwrap();
@@ -239,7 +239,7 @@ fn jobs_and_progress_leave_every_byte() {
 fn labels_without_a_picture_are_those_with_one() {
     let world = World::make().unwrap();
     for case in cases(&world) {
-        let pipeline = Pipeline::open(world.setup()).unwrap();
+        let pipeline = Pipeline::open(world.config()).unwrap();
         let labels = pipeline.label(case.scene.clone()).unwrap();
         assert_eq!(
             labels,
@@ -253,7 +253,7 @@ fn labels_without_a_picture_are_those_with_one() {
 #[test]
 fn parts_of_a_picture_that_are_asked_for_leave_the_picture_alone() {
     let world = World::make().unwrap();
-    let pipeline = Pipeline::open(world.setup()).unwrap();
+    let pipeline = Pipeline::open(world.config()).unwrap();
     let (scene, shot) = pipeline.resolve(world.scene()).unwrap();
     let (deep, frame) = pipeline.shoot(&scene, &shot);
     let before = frame.clone();

@@ -83,7 +83,7 @@ impl World {
     }
 
     /// The recipe that names the folders.
-    pub(super) fn setup(&self) -> DatasetConfig {
+    pub(super) fn config(&self) -> DatasetConfig {
         let [assets, backgrounds] = ["assets", "photos"].map(|kind| self.folder.path().join(kind));
         let scene = Recipe {
             image: IMAGE,
