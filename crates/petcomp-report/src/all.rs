@@ -173,7 +173,7 @@ fn qualities() -> Section {
         .table("quality", Quality::table())
 }
 
-fn beside_others(comparisons: &[peers::Comparison], folder: &Path) -> Section {
+fn beside_others(comparisons: &[peers::PeerComparison], folder: &Path) -> Section {
     let section = Section::new("Other programs");
     if comparisons.is_empty() {
         let folder = folder.display();
@@ -190,7 +190,7 @@ fn beside_others(comparisons: &[peers::Comparison], folder: &Path) -> Section {
     });
     let drawn: Vec<Diagram> = comparisons
         .iter()
-        .map(peers::Comparison::diagram)
+        .map(peers::PeerComparison::diagram)
         .filter(|d| !d.points.is_empty())
         .collect();
     section
