@@ -1,5 +1,6 @@
 //! The four corners of a coloured screen that is seen as a whole.
 
+use super::median::median;
 use super::outline::Outline;
 use super::prepared::{longer_side, refused};
 use super::screen::is_keyable;
@@ -100,28 +101,32 @@ fn refined(
     corners: &[Point2<f64>; 4],
     scale: f64,
 ) -> Result<ScreenCorners> {
-    let sides = sides(photo, corners, scale)?;
-    let mut corners_px = *corners;
-    for (i, corner) in corners_px.iter_mut().enumerate() {
-        let meeting = sides[(i + 3) % 4].line.meeting(&sides[i].line);
-        *corner =
-            meeting.ok_or_else(|| not_found("two of its sides are parallel that should meet"))?;
-    }
-    let sigma_px = sides
-        .iter()
-        .map(|side| side.off_px)
-        .fold(NOISE_PX, f64::max);
+    let sides = fitted_sides(photo, corners, scale)?;
     Ok(ScreenCorners {
-        corners_px,
-        sigma_px,
+        corners_px: corners_between(&sides)
+            .ok_or_else(|| not_found("two of its sides are parallel that should meet"))?,
+        sigma_px: sides
+            .iter()
+            .map(|side| side.off_px)
+            .fold(NOISE_PX, f64::max),
     })
+}
+
+/// Where neighbouring sides meet, the first corner between the last side and the first.
+fn corners_between(sides: &[ScreenSide; 4]) -> Option<[Point2<f64>; 4]> {
+    let mut corners = [Point2::origin(); 4];
+    for (i, corner) in corners.iter_mut().enumerate() {
+        *corner = sides[(i + 3) % 4].line.meeting(&sides[i].line)?;
+    }
+    Some(corners)
 }
 
 /// The same ring of corners, begun with the one that is nearest to the picture's top left.
 pub(crate) fn from_top_left(corners: [Point2<f64>; 4]) -> [Point2<f64>; 4] {
+    let from_corner = corners.map(|p| p.x + p.y);
     let first = (0..4)
-        .min_by(|&i, &j| (corners[i].x + corners[i].y).total_cmp(&(corners[j].x + corners[j].y)));
-    let first = first.unwrap_or_default();
+        .min_by(|&i, &j| from_corner[i].total_cmp(&from_corner[j]))
+        .unwrap_or_default();
     [0, 1, 2, 3].map(|i| corners[(first + i) % 4])
 }
 
@@ -145,10 +150,7 @@ struct HueRegion {
 
 /// The region that is a screen.
 fn screen_region(picture: &Image<LinearRgb>) -> Result<HueRegion> {
-    let least = MIN_SCREEN_SHARE * picture.pixels().len() as f64;
-    let mut regions = hue_regions(picture);
-    regions.retain(|region| region.pixels as f64 >= least);
-    regions.sort_by_key(|region| std::cmp::Reverse(region.pixels));
+    let mut regions = large_hue_regions(picture);
     let is_cut = regions.iter().any(|region| region.is_cut);
     regions.retain(|region| !region.is_cut);
     // A box on a screen that is not seen as a whole has four corners, too, but nothing lies on it.
@@ -162,6 +164,15 @@ fn screen_region(picture: &Image<LinearRgb>) -> Result<HueRegion> {
         .into_iter()
         .next()
         .ok_or_else(|| not_found("no tenth of the photo has one colour such as green or blue"))
+}
+
+/// The regions that are large enough for a screen, largest first.
+fn large_hue_regions(picture: &Image<LinearRgb>) -> Vec<HueRegion> {
+    let least = MIN_SCREEN_SHARE * picture.pixels().len() as f64;
+    let mut regions = hue_regions(picture);
+    regions.retain(|region| region.pixels as f64 >= least);
+    regions.sort_by_key(|region| std::cmp::Reverse(region.pixels));
+    regions
 }
 
 /// The largest region of each hue.
@@ -188,7 +199,7 @@ fn is_of_hue(hue: usize, common_hue: usize, common: &[usize]) -> bool {
 
 /// The step of the circle of hues; none for a grey.
 fn hue_step(p: LinearRgb) -> Option<usize> {
-    let has_hue = is_keyable(p) && p.r.max(p.g).max(p.b) >= MIN_BRIGHTNESS;
+    let has_hue = is_keyable(p) && p.max_channel() >= MIN_BRIGHTNESS;
     has_hue.then(|| (rgb_to_hsv(p).h * HUE_STEPS as f32) as usize % HUE_STEPS)
 }
 
@@ -207,11 +218,7 @@ fn common_hues(hues: &Image<Option<usize>>) -> Vec<usize> {
     let least = MIN_SCREEN_SHARE * hues.pixels().len() as f64;
     let mut common = Vec::new();
     while common.len() < MAX_HUES {
-        // Of windows that hold the same pixels the one around the highest count.
-        let windows = (0..HUE_STEPS).map(|hue| (window_count(&counts, hue), counts[hue], hue));
-        let Some((count, _, hue)) = windows.max() else {
-            break;
-        };
+        let (count, hue) = fullest_window(&counts);
         if (count as f64) < least {
             break;
         }
@@ -219,6 +226,13 @@ fn common_hues(hues: &Image<Option<usize>>) -> Vec<usize> {
         same_hues(hue).for_each(|other| counts[other] = 0);
     }
     common
+}
+
+/// The number of pixels that are nearly of one hue, and that hue.
+fn fullest_window(counts: &[usize; HUE_STEPS]) -> (usize, usize) {
+    // Of windows that hold the same pixels the one around the highest count.
+    let windows = (0..HUE_STEPS).map(|hue| (window_count(counts, hue), counts[hue], hue));
+    windows.max().map_or((0, 0), |(count, _, hue)| (count, hue))
 }
 
 /// The steps that are one hue.
@@ -253,12 +267,16 @@ fn reaches_border(set: &Mask) -> bool {
 /// Something lies within the hull of a region, away from its border.
 fn is_covered(region: &Mask, hull: &[Point2<f64>]) -> bool {
     let (w, h) = region.size();
-    let within = Outline::from_ring(hull.to_vec())
-        .coverage(w, h)
-        .map(|c| c.0 > 0.5);
+    let coverage = Outline::from_ring(hull.to_vec()).coverage(w, h);
+    let within = coverage.map(|c| c.0 > 0.5);
     let free = filter::erode(&within, RIM_PX).zip_map(region, |inside, screen| inside && !screen);
-    let largest = PixelGroups::new(&free).sizes(&free).into_iter().max();
-    largest.unwrap_or(0) as f64 > MIN_OBJECT_SHARE * within.count() as f64
+    largest_group(&free) as f64 > MIN_OBJECT_SHARE * within.count() as f64
+}
+
+/// Pixels of the largest connected group of a set.
+fn largest_group(set: &Mask) -> usize {
+    let sizes = PixelGroups::new(set).sizes(set);
+    sizes.into_iter().max().unwrap_or(0)
 }
 
 /// The four points of a convex polygon that enclose the most of it, in its order.
@@ -296,7 +314,7 @@ struct ScreenSide {
     off_px: f64,
 }
 
-fn sides(
+fn fitted_sides(
     photo: &Image<LinearRgb>,
     corners: &[Point2<f64>; 4],
     scale: f64,
@@ -305,15 +323,19 @@ fn sides(
     let found: Vec<ScreenSide> = (0..4)
         .filter_map(|i| ScreenSide::near(photo, [corners[i], corners[(i + 1) % 4]], reach))
         .collect();
-    let found: [ScreenSide; 4] = found
+    let sides = found
         .try_into()
         .map_err(|_| not_found("a side of it shows no straight border"))?;
-    match found.iter().find(|side| side.off_px > CROOKED_PX * scale) {
-        Some(side) => Err(not_found(format!(
-            "a side of it is crooked by {:.1} pixels",
-            side.off_px
+    check_straight(&sides, CROOKED_PX * scale)?;
+    Ok(sides)
+}
+
+fn check_straight(sides: &[ScreenSide; 4], limit_px: f64) -> Result<()> {
+    match sides.iter().find(|side| side.off_px > limit_px) {
+        Some(ScreenSide { off_px, .. }) => Err(not_found(format!(
+            "a side of it is crooked by {off_px:.1} pixels"
         ))),
-        None => Ok(found),
+        None => Ok(()),
     }
 }
 
@@ -325,13 +347,17 @@ impl ScreenSide {
             drop_outliers(&mut points)?;
         }
         let line = Line::through(&points)?;
-        let squares: f64 = points
-            .iter()
-            .map(|p| line.distance(*p) * line.distance(*p))
-            .sum();
-        let off_px = (squares / points.len() as f64).sqrt();
+        let off_px = rms_distance(&line, &points);
         (points.len() >= PROBE_COUNT / 2).then_some(Self { line, off_px })
     }
+}
+
+fn rms_distance(line: &Line, points: &[Point2<f64>]) -> f64 {
+    let squares: f64 = points
+        .iter()
+        .map(|p| line.distance(*p) * line.distance(*p))
+        .sum();
+    (squares / points.len() as f64).sqrt()
 }
 
 /// Where probes along the way from one corner to the next find a border.
@@ -343,10 +369,9 @@ fn border_points(
     let along = to - from;
     let outward = Vector2::new(along.y, -along.x).try_normalize(0.0)?;
     let points = (0..PROBE_COUNT).filter_map(|i| {
-        let part = CORNER_PART + (1.0 - 2.0 * CORNER_PART) * (i as f64 + 0.5) / PROBE_COUNT as f64;
         let probe = BorderProbe {
             photo,
-            foot: from + along * part,
+            foot: from + along * probe_part(i),
             outward,
         };
         probe.border(reach)
@@ -354,12 +379,16 @@ fn border_points(
     Some(points.collect())
 }
 
+/// Where a probe stands on its side, 0 to 1.
+fn probe_part(i: usize) -> f64 {
+    CORNER_PART + (1.0 - 2.0 * CORNER_PART) * (i as f64 + 0.5) / PROBE_COUNT as f64
+}
+
 /// Drops the points that are far from the line through all.
 fn drop_outliers(points: &mut Vec<Point2<f64>>) -> Option<()> {
     let line = Line::through(points)?;
-    let mut off: Vec<f64> = points.iter().map(|p| line.distance(*p).abs()).collect();
-    let (_, median, _) = off.select_nth_unstable_by(points.len() / 2, f64::total_cmp);
-    let most = OUTLIER_FACTOR * median.max(NOISE_PX);
+    let off = points.iter().map(|p| line.distance(*p).abs());
+    let most = OUTLIER_FACTOR * median(off, f64::total_cmp)?.max(NOISE_PX);
     points.retain(|p| line.distance(*p).abs() <= most);
     Some(())
 }

@@ -247,11 +247,8 @@ impl<'a, P: Photo> Keying<'a, P> {
         let screen = filled
             .as_ref()
             .map_or(self.screen, |f| Screen::Plate(&f.plate));
-        let stream = Stream::new(
-            Keying { screen, ..*self },
-            filled.as_ref().map(|f| f.channel),
-            opts,
-        );
+        let channel = filled.as_ref().map(|f| f.channel);
+        let stream = Stream::new(Keying { screen, ..*self }, channel, opts);
         let deviations = stream.compute_plane(plane, matte, cutout);
         Ok(Deviations {
             filled_plate: filled.as_ref().map_or(0, |f| f.count),
@@ -265,11 +262,10 @@ impl<'a, P: Photo> Keying<'a, P> {
         self.check_size("garbage", self.garbage.map(Image::size))?;
         self.check_size("core", self.core.map(Image::size))?;
         match self.screen {
-            Screen::Color(c) if !c.is_finite() => Err(Error::value(
-                "screen",
-                format!("{:?}, expected finite numbers", <[f32; 3]>::from(c)),
-            )),
-            Screen::Color(c) => robust::check_color(c, opts),
+            Screen::Color(c) => {
+                check_finite(c)?;
+                robust::check_color(c, opts)
+            }
             Screen::Plate(plate) => self.check_size("plate", Some(plate.size())),
         }
     }
@@ -285,6 +281,14 @@ impl<'a, P: Photo> Keying<'a, P> {
             _ => Ok(()),
         }
     }
+}
+
+fn check_finite(screen: LinearRgb) -> Result<()> {
+    if screen.is_finite() {
+        return Ok(());
+    }
+    let what = format!("{:?}, expected finite numbers", <[f32; 3]>::from(screen));
+    Err(Error::value("screen", what))
 }
 
 impl std::fmt::Display for Deviations {

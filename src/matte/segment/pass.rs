@@ -62,19 +62,13 @@ impl Search {
     /// Splits a picture into bands, `deepest` of them.
     pub(super) fn new(picture: &Image<LinearRgb>, opts: &SegmentOptions, deepest: usize) -> Self {
         let bands = Bands::new(picture, opts.tone, deepest);
-        let finest = &bands.finest;
-        let threshold = opts
-            .finest_threshold
-            .of_band(finest)
-            .max(opts.least_contrast);
-        let finest_binary = finest.map(|v| v > threshold);
-        let strongest = band::largest_around(finest, SMEAR_PX);
-        let ridges = finest.zip_map(&strongest, |v, most| v >= opts.ridge * most);
+        let otsu_or_given = opts.finest_threshold.of_band(&bands.finest);
+        let threshold = otsu_or_given.max(opts.least_contrast);
         Self {
+            finest_binary: bands.finest.map(|v| v > threshold),
+            ridges: ridges(&bands.finest, opts.ridge),
             bands,
             threshold,
-            finest_binary,
-            ridges,
         }
     }
 
@@ -102,15 +96,13 @@ impl Search {
 
     /// Where both bands have an edge, thinned, without groups of fewer pixels than a speck.
     fn thin_edges(&self, finest: &Mask, coarsest: &Mask, speck: usize) -> Mask {
-        let both = finest.zip_map(coarsest, |a, b| a && b);
-        let thin = both.zip_map(&self.ridges, |both, ridge| both && ridge);
+        let thin = both(&both(finest, coarsest), &self.ridges);
         cluster::without_specks(&thin, speck)
     }
 
     fn pass(&self, levels: usize, finest_binary: &Mask, opts: &SegmentOptions) -> Result<Pass> {
         let coarsest = self.bands.at_full_size(levels);
-        let threshold = opts.coarsest_threshold.of_band(&coarsest);
-        let coarsest_binary = coarsest.map(|v| v > threshold);
+        let coarsest_binary = opts.coarsest_threshold.binarised(&coarsest);
         let edges = self.thin_edges(finest_binary, &coarsest_binary, opts.speck);
         let join_px = (opts.join * longer_side(&edges) as f64).max(MIN_JOIN_PX);
         let (object, diagnostics) = main_object(&edges, join_px)?;
@@ -129,6 +121,17 @@ impl Search {
             diagnostics,
         })
     }
+}
+
+/// What two sets have in common.
+fn both(a: &Mask, b: &Mask) -> Mask {
+    a.zip_map(b, |a, b| a && b)
+}
+
+/// Where a band has at least a share of the strongest value nearby.
+fn ridges(band: &Image<f32>, share: f32) -> Mask {
+    let strongest = band::largest_around(band, SMEAR_PX);
+    band.zip_map(&strongest, |v, most| v >= share * most)
 }
 
 /// Two clusters are two objects when the smaller one has at least this share of the larger one's edge pixels.
@@ -156,24 +159,19 @@ impl<'a> EdgeClusters<'a> {
         let groups = PixelGroups::new(&filter::dilate(edges, join_px / 2.0));
         let sizes = groups.sizes(edges);
         let main = (0..sizes.len()).max_by_key(|&i| (sizes[i], Reverse(i)))?;
-        let mut clusters = Self {
+        let hull = under_hull(&both(&groups.only(|i| i == main), edges), 0.0);
+        Some(Self {
             edges,
+            sizes_inside: groups.sizes(&both(edges, &hull)),
             groups,
             sizes,
             main,
-            sizes_inside: Vec::new(),
-        };
-        let hull = under_hull(&clusters.only(|i| i == main), 0.0);
-        let inside = edges.zip_map(&hull, |edge, inside| edge && inside);
-        clusters.sizes_inside = clusters.groups.sizes(&inside);
-        Some(clusters)
+        })
     }
 
     /// The edge pixels of the clusters for which a claim holds.
     fn only(&self, holds: impl Fn(usize) -> bool) -> Mask {
-        self.groups
-            .only(holds)
-            .zip_map(self.edges, |near, edge| near && edge)
+        both(&self.groups.only(holds), self.edges)
     }
 
     /// Where the main cluster and another one are, in words.
@@ -184,6 +182,27 @@ impl<'a> EdgeClusters<'a> {
     /// At least half of a cluster lies within the hull of the main one, or it is that.
     fn belongs(&self, cluster: usize) -> bool {
         cluster == self.main || 2 * self.sizes_inside[cluster] >= self.sizes[cluster]
+    }
+
+    /// The warnings about what is left out.
+    ///
+    /// # Errors
+    /// [`Error::Photo`] where it could be an object of its own.
+    fn judge_others(&self) -> Result<Vec<Diagnostic>> {
+        let mut diagnostics = Vec::new();
+        let mut specks = 0;
+        for (i, share) in self.others() {
+            if share >= RIVAL_SHARE {
+                return Err(two_objects(&self.places(i)));
+            }
+            if share >= REMNANT_SHARE {
+                diagnostics.push(left_out(&self.places(i)));
+            } else {
+                specks += 1;
+            }
+        }
+        diagnostics.extend((specks >= SPECK_COUNT).then(|| specks_on_screen(specks)));
+        Ok(diagnostics)
     }
 
     /// The clusters that do not belong to the main one, and their sizes as shares of its size.
@@ -199,24 +218,12 @@ impl<'a> EdgeClusters<'a> {
 /// Edges nearer to each other than `join_px` form a cluster; the object is the cluster of most edge pixels and what
 /// lies inside its hull. A cluster outside it is an error if it could be an object of its own, else it is left out.
 fn main_object(edges: &Mask, join_px: f64) -> Result<(Mask, Vec<Diagnostic>)> {
-    let Some(clusters) = EdgeClusters::new(edges, join_px) else {
-        return Err(refused(
+    let clusters = EdgeClusters::new(edges, join_px).ok_or_else(|| {
+        refused(
             "nothing stands out from what is along the borders; is there an object, in focus, with background all around it?",
-        ));
-    };
-    let mut diagnostics = Vec::new();
-    let mut specks = 0;
-    for (i, share) in clusters.others() {
-        if share >= RIVAL_SHARE {
-            return Err(two_objects(&clusters.places(i)));
-        }
-        if share >= REMNANT_SHARE {
-            diagnostics.push(left_out(&clusters.places(i)));
-        } else {
-            specks += 1;
-        }
-    }
-    diagnostics.extend((specks >= SPECK_COUNT).then(|| specks_on_screen(specks)));
+        )
+    })?;
+    let mut diagnostics = clusters.judge_others()?;
     let object = clusters.only(|i| clusters.belongs(i));
     diagnostics.extend(possibly_two_objects(&object, CLOSER_JOIN_SHARE * join_px));
     Ok((object, diagnostics))
@@ -281,7 +288,7 @@ fn mean_percent(coordinates: impl ExactSizeIterator<Item = f64>, len: usize) -> 
     (100.0 * coordinates.sum::<f64>() / n / len as f64).round()
 }
 
-/// The area may grow by this factor when twice the gap is bridged; by more, and it had leaked.
+/// The area may grow by this factor when twice the gap is bridged; if it grows by more, it had leaked.
 const LEAK_AREA_RATIO: f64 = 1.1;
 
 /// The area inside the hull that the edges enclose, gaps up to twice `join_px` bridged; wider ones while that makes the
@@ -328,17 +335,22 @@ fn is_any_set(set: &Mask, columns: Range<usize>, mut rows: Range<usize>) -> bool
 const MIN_OBJECT_LENGTH: f64 = 0.05;
 
 fn check_object(hull: &[Point2<f64>], touches: [bool; 4], (w, h): (usize, usize)) -> Result<()> {
-    let [left, top, right, bottom] = hull::sides(hull);
-    let (width, height) = ((right - left).max(0.0), (bottom - top).max(0.0));
+    let [width, height] = box_size(hull);
     if hull.is_empty() || width.max(height) < MIN_OBJECT_LENGTH * w.max(h) as f64 {
         return Err(refused(format!(
             "the largest thing found is {width:.0} x {height:.0} of {w} x {h} pixels; is there an object, and is it in focus?"
         )));
     }
     if touches == [true; 4] {
-        return Err(refused(
-            "the object reaches all four borders; photograph it with background all around it",
-        ));
+        let what =
+            "the object reaches all four borders; photograph it with background all around it";
+        return Err(refused(what));
     }
     Ok(())
+}
+
+/// Width and height of a polygon; 0 without corners.
+fn box_size(polygon: &[Point2<f64>]) -> [f64; 2] {
+    let [left, top, right, bottom] = hull::sides(polygon);
+    [(right - left).max(0.0), (bottom - top).max(0.0)]
 }
