@@ -173,18 +173,17 @@ impl Bundle {
         let mut equations = self.linearized(states)?;
         let mut damping = INITIAL_DAMPING;
         for _ in 0..MAX_ITERATIONS {
-            match self.lower_neighbour(&equations, damping) {
-                Some(next) => {
-                    let fall = (equations.cost - next.cost) / equations.cost;
-                    equations = next;
-                    damping *= DAMPING_DECREASE;
-                    if fall < COST_TOLERANCE {
-                        break;
-                    }
+            let Some(next) = self.lower_neighbour(&equations, damping) else {
+                damping *= DAMPING_INCREASE;
+                if damping > MAX_DAMPING {
+                    break;
                 }
-                None => damping *= DAMPING_INCREASE,
-            }
-            if damping > MAX_DAMPING {
+                continue;
+            };
+            let fall = (equations.cost - next.cost) / equations.cost;
+            equations = next;
+            damping *= DAMPING_DECREASE;
+            if fall < COST_TOLERANCE {
                 break;
             }
         }
@@ -229,13 +228,11 @@ impl Bundle {
 
     /// The shared system after every pose has been eliminated.
     fn reduced(&self, equations: &BundleEquations, damping: f64) -> Option<ReducedSystem> {
-        let mut shared = self.prior_system(&equations.states);
         let photos: Vec<PhotoBlock> = (0..equations.normals.len())
             .map(|photo| self.photo_block(equations, photo))
             .collect();
-        for photo in &photos {
-            shared.add(photo);
-        }
+        let mut shared = self.prior_system(&equations.states);
+        photos.iter().for_each(|photo| shared.add(photo));
         damp_diagonal(&mut shared.matrix, damping);
         for photo in &photos {
             shared.eliminate_pose(photo, damping)?;

@@ -150,7 +150,7 @@ impl Problem {
             framing: self.framing,
             focal_source: self.focal_source(minimum, &uncertainty.focal),
             focal: self.focal_finding(&uncertainty.focal),
-            rms_px: (per_corner_px.iter().map(|d| d * d).sum::<f64>() / 4.0).sqrt(),
+            rms_px: root_mean_square(&per_corner_px),
             fit: self.fit(minimum, &camera, per_corner_px, uncertainty.condition),
             sigma: self.sigma(minimum, uncertainty, options.height_of_objects(size)),
             warnings: self.warnings.clone(),
@@ -398,6 +398,10 @@ fn is_finite_camera(camera: &Camera) -> bool {
             .iter()
             .chain(center.iter())
             .all(|value| value.is_finite())
+}
+
+fn root_mean_square(distances: &[f64; 4]) -> f64 {
+    (distances.iter().map(|d| d * d).sum::<f64>() / 4.0).sqrt()
 }
 
 /// Depth of the farthest corner of a rectangle over that of the nearest.
