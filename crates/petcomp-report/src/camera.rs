@@ -6,7 +6,7 @@
 mod coverage;
 mod diagram;
 
-pub use coverage::Coverage;
+pub use coverage::StatedErrors;
 pub use diagram::diagrams;
 
 use super::clock::cpu_seconds;
@@ -53,7 +53,7 @@ pub enum Lens {
 
 /// How a camera is found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Method {
+pub enum SolveMethod {
     /// The closed form and so many steps of refinement.
     Steps(usize),
     /// Every start, to the end, with covariance.
@@ -64,7 +64,7 @@ pub enum Method {
 
 /// Errors and run time of a method over many views.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Row {
+pub struct CameraRow {
     /// The kind of camera.
     pub lens: Lens,
     /// Noise of the corners, pixels.
@@ -72,7 +72,7 @@ pub struct Row {
     /// Angle from straight above, degrees.
     pub tilt_deg: f64,
     /// How the camera was found.
-    pub method: Method,
+    pub method: SolveMethod,
     /// How many views there were, and how many of them gave no camera; those count as infinitely wrong.
     pub views: usize,
     /// See [`views`](Self::views).
@@ -108,10 +108,10 @@ impl Lens {
         }
     }
 
-    fn priors(self, method: Method) -> Priors {
+    fn priors(self, method: SolveMethod) -> Priors {
         match (self, method) {
             (Self::Ideal, _) => Priors::ideal().with_free_focal(),
-            (Self::Realistic, Method::Joint) => Priors {
+            (Self::Realistic, SolveMethod::Joint) => Priors {
                 kappa_sigma: 0.01,
                 ..Priors::default()
             },
@@ -120,7 +120,7 @@ impl Lens {
     }
 }
 
-impl Method {
+impl SolveMethod {
     /// All of them, the quickest first.
     pub const ALL: [Self; 8] = [
         Self::Steps(0),
@@ -182,7 +182,7 @@ impl Method {
 /// Measures every method on every kind of view; `progress` hears of each step and of how many there are.
 ///
 /// One thread, so that run times mean something: about twenty seconds for 100 views on one core of a desktop of 2020.
-pub fn measure(options: &CameraReportOptions, progress: impl Fn(u64, u64)) -> Vec<Row> {
+pub fn measure(options: &CameraReportOptions, progress: impl Fn(u64, u64)) -> Vec<CameraRow> {
     let mut rows = Vec::new();
     let total = (Lens::ALL.len() * NOISES.len() * TILTS.len()) as u64;
     for (lens, noise_px) in Lens::ALL
@@ -190,14 +190,14 @@ pub fn measure(options: &CameraReportOptions, progress: impl Fn(u64, u64)) -> Ve
         .flat_map(|lens| NOISES.map(|noise| (lens, noise)))
     {
         for tilt_deg in TILTS {
-            progress((rows.len() / Method::ALL.len()) as u64, total);
-            let cell = Cell {
+            progress((rows.len() / SolveMethod::ALL.len()) as u64, total);
+            let cell = ViewKind {
                 lens,
                 noise_px,
                 tilt_deg,
             };
             let photos: Vec<_> = (0..options.views).map(|k| cell.photos(k)).collect();
-            rows.extend(Method::ALL.map(|method| cell.row(method, &photos)));
+            rows.extend(SolveMethod::ALL.map(|method| cell.row(method, &photos)));
         }
     }
     rows
@@ -205,13 +205,13 @@ pub fn measure(options: &CameraReportOptions, progress: impl Fn(u64, u64)) -> Ve
 
 /// A kind of view.
 #[derive(Clone, Copy)]
-struct Cell {
+struct ViewKind {
     lens: Lens,
     noise_px: f64,
     tilt_deg: f64,
 }
 
-impl Cell {
+impl ViewKind {
     /// Photos of camera `k`.
     fn photos(&self, k: u64) -> Vec<View> {
         let scenario = self.lens.scenario(self.noise_px);
@@ -222,7 +222,7 @@ impl Cell {
         views
     }
 
-    fn row(&self, method: Method, photos: &[Vec<View>]) -> Row {
+    fn row(&self, method: SolveMethod, photos: &[Vec<View>]) -> CameraRow {
         let options = method.options(self.lens);
         let (mut focal, mut height, mut times) = (Vec::new(), Vec::new(), Vec::new());
         for views in photos {
@@ -241,7 +241,7 @@ impl Cell {
             );
         }
         let failed = focal.iter().filter(|e| e.is_infinite()).count();
-        Row {
+        CameraRow {
             lens: self.lens,
             noise_px: self.noise_px,
             tilt_deg: self.tilt_deg,
@@ -292,7 +292,7 @@ pub fn write(
     folder: &Path,
     options: &CameraReportOptions,
     progress: impl Fn(u64, u64),
-) -> Result<Vec<Row>> {
+) -> Result<Vec<CameraRow>> {
     if options.views == 0 {
         return Err(Error::value("views", "0, expected at least 1"));
     }
@@ -309,9 +309,9 @@ pub fn write(
         &(markdown(&rows) + &coverage::markdown(&coverage)),
     )?;
     for lens in Lens::ALL {
-        let of_lens: Vec<Row> = rows.iter().filter(|r| r.lens == lens).copied().collect();
-        let focal = |r: &Row| r.focal_percent[0];
-        let height = |r: &Row| r.height_px[0];
+        let of_lens: Vec<CameraRow> = rows.iter().filter(|r| r.lens == lens).copied().collect();
+        let focal = |r: &CameraRow| r.focal_percent[0];
+        let height = |r: &CameraRow| r.height_px[0];
         let name = |what: &str| folder.join(format!("camera_{what}_{}.svg", lens.name()));
         io::write_text(
             name("tilt"),
@@ -326,10 +326,10 @@ pub fn write(
     Ok(rows)
 }
 
-fn csv(rows: &[Row]) -> String {
+fn csv(rows: &[CameraRow]) -> String {
     let head = "lens,noise_px,tilt_deg,method,views,failed,focal_median_percent,focal_95_percent,height_median_px,\
                 height_95_px,time_us\n";
-    let line = |r: &Row| {
+    let line = |r: &CameraRow| {
         let ([f, f95], [h, h95]) = (r.focal_percent, r.height_px);
         let (lens, method) = (r.lens.name(), r.method.name().replace(", ", " of "));
         let kind = format!(
@@ -342,7 +342,7 @@ fn csv(rows: &[Row]) -> String {
 }
 
 /// A table per kind of camera and noise: a line per tilt, a column per method.
-fn markdown(rows: &[Row]) -> String {
+fn markdown(rows: &[CameraRow]) -> String {
     let mut text =
         "# Error of the camera solver\n\nFocal length, error in %: median / 95 %. Below: median run time per photo.\n"
             .to_owned();
@@ -352,8 +352,10 @@ fn markdown(rows: &[Row]) -> String {
             table[0].lens.name(),
             table[0].noise_px
         );
-        text += &Method::ALL.map(|m| format!(" {} |", m.name())).concat();
-        text += &format!("\n|{}\n", " --- |".repeat(Method::ALL.len() + 1));
+        text += &SolveMethod::ALL
+            .map(|m| format!(" {} |", m.name()))
+            .concat();
+        text += &format!("\n|{}\n", " --- |".repeat(SolveMethod::ALL.len() + 1));
         for line in table.chunk_by(|a, b| a.tilt_deg == b.tilt_deg) {
             let cells = line.iter().map(|r| {
                 format!(
@@ -375,7 +377,7 @@ fn markdown(rows: &[Row]) -> String {
         };
         text += &format!(
             "| us |{}\n",
-            Method::ALL
+            SolveMethod::ALL
                 .map(|m| format!(" {} |", three(time(m))))
                 .concat()
         );
@@ -394,7 +396,7 @@ fn three(value: f64) -> String {
 }
 
 /// A chart per noise, a curve per method.
-fn against_tilt(rows: &[Row], title: &str, error: impl Fn(&Row) -> f64) -> String {
+fn against_tilt(rows: &[CameraRow], title: &str, error: impl Fn(&CameraRow) -> f64) -> String {
     let up = Axis::over_decades(title, rows.iter().map(&error));
     let across = Axis {
         title: "tilt, degrees".into(),
@@ -410,10 +412,10 @@ fn against_tilt(rows: &[Row], title: &str, error: impl Fn(&Row) -> f64) -> Strin
         };
         Chart {
             title: format!("corners to {noise_px} px"),
-            names: Method::ALL.map(Method::name).into(),
+            names: SolveMethod::ALL.map(SolveMethod::name).into(),
             across: across.clone(),
             up: up.clone(),
-            curves: Method::ALL.map(curve).into(),
+            curves: SolveMethod::ALL.map(curve).into(),
             defaults: Vec::new(),
         }
     };
@@ -421,8 +423,8 @@ fn against_tilt(rows: &[Row], title: &str, error: impl Fn(&Row) -> f64) -> Strin
 }
 
 /// A chart per tilt, a curve per noise along the methods.
-fn against_time(rows: &[Row]) -> String {
-    let error = |r: &Row| r.focal_percent[0];
+fn against_time(rows: &[CameraRow]) -> String {
+    let error = |r: &CameraRow| r.focal_percent[0];
     let up = Axis::over_decades("focal length, median error, %", rows.iter().map(error));
     let across = Axis::over_decades(
         "run time per photo, microseconds",
@@ -443,7 +445,7 @@ fn against_time(rows: &[Row]) -> String {
             curves: NOISES.map(curve).into(),
             defaults: rows
                 .iter()
-                .filter(|r| r.tilt_deg == tilt_deg && r.method == Method::Whole)
+                .filter(|r| r.tilt_deg == tilt_deg && r.method == SolveMethod::Whole)
                 .map(|r| [r.time_us, error(r)])
                 .collect(),
         }
@@ -455,8 +457,8 @@ fn against_time(rows: &[Row]) -> String {
 mod tests {
     use super::*;
 
-    fn rows(lens: Lens, noise_px: f64, tilt_deg: f64, methods: &[Method]) -> Vec<Row> {
-        let cell = Cell {
+    fn rows(lens: Lens, noise_px: f64, tilt_deg: f64, methods: &[SolveMethod]) -> Vec<CameraRow> {
+        let cell = ViewKind {
             lens,
             noise_px,
             tilt_deg,
@@ -472,7 +474,11 @@ mod tests {
             Lens::Ideal,
             1.0,
             20.0,
-            &[Method::Steps(0), Method::Steps(5), Method::Whole],
+            &[
+                SolveMethod::Steps(0),
+                SolveMethod::Steps(5),
+                SolveMethod::Whole,
+            ],
         );
         let [closed, five, whole] = [0, 1, 2].map(|i| found[i].focal_percent);
         assert!((0.5..1.0).contains(&whole[0]), "{whole:?}");
@@ -492,7 +498,11 @@ mod tests {
             Lens::Realistic,
             1.0,
             10.0,
-            &[Method::Steps(0), Method::Whole, Method::Joint],
+            &[
+                SolveMethod::Steps(0),
+                SolveMethod::Whole,
+                SolveMethod::Joint,
+            ],
         );
         let [closed, whole, joint] = [0, 1, 2].map(|i| found[i].focal_percent);
         assert!(closed[1] > 1.2 * whole[1], "{closed:?} {whole:?}");
@@ -503,7 +513,7 @@ mod tests {
     #[test]
     fn errors_are_the_same_every_time() {
         let errors = || {
-            rows(Lens::Realistic, 0.5, 5.0, &[Method::Whole])
+            rows(Lens::Realistic, 0.5, 5.0, &[SolveMethod::Whole])
                 .into_iter()
                 .map(|r| (r.focal_percent, r.height_px))
         };

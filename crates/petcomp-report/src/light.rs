@@ -35,7 +35,7 @@ const UNSEEN: f64 = 0.004;
 
 /// Which light there is.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Kind {
+enum LightKind {
     Area,
     Sky,
 }
@@ -45,26 +45,29 @@ enum Kind {
 /// # Errors
 /// A thread that cannot be had.
 pub fn diagrams() -> Result<Vec<Diagram>> {
-    [Kind::Area, Kind::Sky].map(diagram).into_iter().collect()
+    [LightKind::Area, LightKind::Sky]
+        .map(diagram)
+        .into_iter()
+        .collect()
 }
 
-fn diagram(kind: Kind) -> Result<Diagram> {
+fn diagram(kind: LightKind) -> Result<Diagram> {
     let shot = shot(kind);
     let exact = exact(&shot, kind);
     let usual = RenderOptions::default();
     let sampled = |n: usize| match kind {
-        Kind::Area => RenderOptions {
+        LightKind::Area => RenderOptions {
             light_samples: n,
             ..usual
         },
-        Kind::Sky => RenderOptions {
+        LightKind::Sky => RenderOptions {
             ambient_samples: n,
             ..usual
         },
     };
-    let counts = if kind == Kind::Area { LIGHT } else { SKY };
+    let counts = if kind == LightKind::Area { LIGHT } else { SKY };
     let name = |n: usize| {
-        if kind == Kind::Area {
+        if kind == LightKind::Area {
             format!("{n} x {n}")
         } else {
             n.to_string()
@@ -118,14 +121,14 @@ fn diagram(kind: Kind) -> Result<Diagram> {
     Ok(told(kind, points))
 }
 
-fn told(kind: Kind, points: Vec<Point>) -> Diagram {
+fn told(kind: LightKind, points: Vec<Point>) -> Diagram {
     let (file, title, reference) = match kind {
-        Kind::Area => (
+        LightKind::Area => (
             "shadow_light",
             "shadow: a card under an area light",
             "Lambert's formula for the part of the light that is seen (closed form)",
         ),
-        Kind::Sky => (
+        LightKind::Sky => (
             "shadow_sky",
             "shadow: a card under an even sky",
             "form factor of the card (closed form)",
@@ -172,7 +175,7 @@ fn measured(
     )
 }
 
-fn shot(kind: Kind) -> Shot {
+fn shot(kind: LightKind) -> Shot {
     let rotation = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), TURN);
     let card = Card {
         id: ObjectId(1),
@@ -189,8 +192,8 @@ fn shot(kind: Kind) -> Shot {
     };
     let shot = Shot::new(above(SIZE, 0.6)).with_card(card);
     match kind {
-        Kind::Sky => shot.with_ambient(LinearRgb::WHITE),
-        Kind::Area => shot.with_light(AreaLight {
+        LightKind::Sky => shot.with_ambient(LinearRgb::WHITE),
+        LightKind::Area => shot.with_light(AreaLight {
             shape: LightShape::Rectangle,
             position: [0.3, 0.2, 0.8],
             target: [0.0; 3],
@@ -202,7 +205,7 @@ fn shot(kind: Kind) -> Shot {
 }
 
 /// What the card leaves of the light at each pixel's centre; nothing where the card itself is seen, or near its border.
-fn exact(shot: &Shot, kind: Kind) -> Vec<Option<f64>> {
+fn exact(shot: &Shot, kind: LightKind) -> Vec<Option<f64>> {
     let quad = &shot.cards[0].quad;
     // A tenth more to each side, for the pixels of its border.
     let around = Quad {
@@ -223,10 +226,10 @@ fn exact(shot: &Shot, kind: Kind) -> Vec<Option<f64>> {
     (0..w * h).map(at).collect()
 }
 
-fn share(shot: &Shot, kind: Kind, card: &[Point3<f64>; 4], point: Point3<f64>) -> f64 {
+fn share(shot: &Shot, kind: LightKind, card: &[Point3<f64>; 4], point: Point3<f64>) -> f64 {
     match kind {
-        Kind::Sky => 1.0 - polygon_irradiance(card, point, Vector3::z()) / PI,
-        Kind::Area => {
+        LightKind::Sky => 1.0 - polygon_irradiance(card, point, Vector3::z()) / PI,
+        LightKind::Area => {
             let light = &shot.lights[0];
             let face = frame(light).corners(light.size);
             let hidden = shadowed(&face, card, point);
@@ -298,7 +301,7 @@ mod tests {
 
     #[test]
     fn the_closed_form_is_what_many_rays_find() {
-        let shot = shot(Kind::Area);
+        let shot = shot(LightKind::Area);
         let card = shot.cards[0].quad.corners();
         for [x, y] in [
             [0.0, 0.0],
@@ -309,7 +312,7 @@ mod tests {
         ] {
             let point = Point3::new(x, y, 0.0);
             let (exact, found) = (
-                share(&shot, Kind::Area, &card, point),
+                share(&shot, LightKind::Area, &card, point),
                 brute_force(&shot, point),
             );
             assert!((exact - found).abs() < 0.01, "{x} {y}: {exact} {found}");
@@ -318,8 +321,8 @@ mod tests {
 
     #[test]
     fn more_samples_come_nearer_and_the_default_is_near() {
-        let shot = shot(Kind::Area);
-        let exact = exact(&shot, Kind::Area);
+        let shot = shot(LightKind::Area);
+        let exact = exact(&shot, LightKind::Area);
         let error = |options: RenderOptions| {
             measured(("", String::new()), &shot, &exact, &options, render)
                 .unwrap()
@@ -334,12 +337,12 @@ mod tests {
 
     #[test]
     fn a_card_far_from_the_light_hides_nothing() {
-        let shot = shot(Kind::Area);
+        let shot = shot(LightKind::Area);
         let card = shot.cards[0].quad.corners();
         assert_eq!(
-            share(&shot, Kind::Area, &card, Point3::new(2.0, 2.0, 0.0)),
+            share(&shot, LightKind::Area, &card, Point3::new(2.0, 2.0, 0.0)),
             1.0
         );
-        assert!(share(&shot, Kind::Sky, &card, Point3::new(50.0, 0.0, 0.0)) > 0.999_99);
+        assert!(share(&shot, LightKind::Sky, &card, Point3::new(50.0, 0.0, 0.0)) > 0.999_99);
     }
 }

@@ -15,9 +15,9 @@ mod process;
 mod run;
 mod show;
 
-pub use fit::{Fit, Model};
+pub use fit::{CostFit, CostModel};
 pub use forecast::{Forecast, forecast};
-pub use grid::Case;
+pub use grid::ScaleCase;
 pub use run::run;
 pub use show::{charts, tables};
 
@@ -49,9 +49,9 @@ impl Default for ScaleOptions {
 
 /// What a dataset of one kind of picture took.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Point {
+pub struct ScalePoint {
     /// What was asked for.
-    pub case: Case,
+    pub case: ScaleCase,
     /// Cards over a pixel, the mean over all pixels: deep samples by pixels.
     pub layers: f64,
     /// Pictures made after the first.
@@ -66,9 +66,9 @@ pub struct Point {
 
 /// Everything that was measured.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Measured {
+pub struct ScaleMeasurements {
     /// Points on one thread and on more.
-    pub points: Vec<Point>,
+    pub points: Vec<ScalePoint>,
     /// Cards that fall together, and seconds that it takes them.
     pub falls: Vec<(usize, f64)>,
 }
@@ -78,9 +78,9 @@ pub struct Measured {
 /// # Errors
 /// A program that cannot be run or does not tell its point; where the system does not tell time and memory of a process
 /// (it must have Linux's `/proc`).
-pub fn measure(options: &ScaleOptions, progress: impl Fn(u64, u64)) -> Result<Measured> {
+pub fn measure(options: &ScaleOptions, progress: impl Fn(u64, u64)) -> Result<ScaleMeasurements> {
     let cases = grid::cases(options.threads);
-    let of = |(i, case): (usize, &Case)| {
+    let of = |(i, case): (usize, &ScaleCase)| {
         progress(i as u64, cases.len() as u64);
         process::in_a_child(&options.program, case, options.seconds)
     };
@@ -89,7 +89,7 @@ pub fn measure(options: &ScaleOptions, progress: impl Fn(u64, u64)) -> Result<Me
         .iter()
         .map(|&cards| Ok((cards, run::fall_seconds(cards)?)))
         .collect::<Result<_>>()?;
-    Ok(Measured { points, falls })
+    Ok(ScaleMeasurements { points, falls })
 }
 
 /// Measures and writes `scale.csv`, `scale.md` and charts (SVG) into a folder.
@@ -100,7 +100,7 @@ pub fn write(
     folder: impl AsRef<Path>,
     options: &ScaleOptions,
     progress: impl Fn(u64, u64),
-) -> Result<Measured> {
+) -> Result<ScaleMeasurements> {
     let folder = folder.as_ref();
     io::create_folder(folder)?;
     let measured = measure(options, progress)?;

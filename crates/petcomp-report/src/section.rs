@@ -11,11 +11,11 @@ use std::path::Path;
 pub struct Section {
     /// What it is about.
     pub title: String,
-    parts: Vec<Part>,
+    parts: Vec<SectionPart>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
-enum Part {
+enum SectionPart {
     Text(String),
     Table {
         file: String,
@@ -42,7 +42,7 @@ impl Section {
     pub fn text(mut self, text: impl Into<String>) -> Self {
         let text = text.into();
         if !text.is_empty() {
-            self.parts.push(Part::Text(text));
+            self.parts.push(SectionPart::Text(text));
         }
         self
     }
@@ -50,7 +50,7 @@ impl Section {
     /// A table, also written as `<file>.csv`; one without rows is left out.
     pub fn table(mut self, file: impl Into<String>, table: Table) -> Self {
         if !table.rows.is_empty() {
-            self.parts.push(Part::Table {
+            self.parts.push(SectionPart::Table {
                 file: file.into(),
                 table,
             });
@@ -66,7 +66,7 @@ impl Section {
         caption: impl Into<String>,
         data: Table,
     ) -> Self {
-        self.parts.push(Part::Figure {
+        self.parts.push(SectionPart::Figure {
             file: file.into(),
             svg,
             caption: caption.into(),
@@ -127,7 +127,11 @@ impl Document {
         let mut text = format!("# {}\n", self.title);
         for section in &self.sections {
             text += &format!("\n## {}\n", section.title);
-            text += &section.parts.iter().map(Part::markdown).collect::<String>();
+            text += &section
+                .parts
+                .iter()
+                .map(SectionPart::markdown)
+                .collect::<String>();
         }
         text
     }
@@ -139,8 +143,8 @@ impl Document {
     pub fn write(&self, folder: &Path) -> Result<()> {
         io::create_folder(folder)?;
         for part in self.sections.iter().flat_map(|section| &section.parts) {
-            if let Part::Table { file, table }
-            | Part::Figure {
+            if let SectionPart::Table { file, table }
+            | SectionPart::Figure {
                 file, data: table, ..
             } = part
             {
@@ -152,7 +156,7 @@ impl Document {
     }
 }
 
-impl Part {
+impl SectionPart {
     fn put_on(&self, page: &mut Page) {
         match self {
             Self::Text(text) => page.html(&format!("<p>{}</p>\n", with_code(text))),

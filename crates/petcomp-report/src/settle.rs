@@ -51,7 +51,7 @@ impl Default for SettleReportOptions {
 
 /// What a setting of the solver gives.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Row {
+pub struct SettleRow {
     /// Time steps in a second.
     pub rate: u32,
     /// Solver iterations in a step.
@@ -79,7 +79,10 @@ pub struct Row {
 ///
 /// # Errors
 /// None that a caller can cause: the scenes are made here.
-pub fn measure(options: &SettleReportOptions, progress: impl Fn(u64, u64)) -> Result<Vec<Row>> {
+pub fn measure(
+    options: &SettleReportOptions,
+    progress: impl Fn(u64, u64),
+) -> Result<Vec<SettleRow>> {
     let settings = settings();
     let heaps = (0..options.heaps)
         .map(|k| heap(k, CARDS))
@@ -111,7 +114,7 @@ fn settings() -> Vec<SettleOptions> {
     swept.chain(stops).collect()
 }
 
-fn row(options: &SettleOptions, heaps: &[Scene]) -> Result<Row> {
+fn row(options: &SettleOptions, heaps: &[Scene]) -> Result<SettleRow> {
     let (mut ends, mut times) = (Vec::new(), Vec::new());
     for scene in heaps {
         let start = cpu_seconds();
@@ -122,7 +125,7 @@ fn row(options: &SettleOptions, heaps: &[Scene]) -> Result<Row> {
         .iter()
         .map(|slope| slides_rightly(*slope, options))
         .collect::<Result<Vec<_>>>()?;
-    Ok(Row {
+    Ok(SettleRow {
         rate: libm::round(1.0 / options.step) as u32,
         iterations: options.iterations,
         ccd: options.ccd,
@@ -222,7 +225,7 @@ fn slides_rightly(share: f64, options: &SettleOptions) -> Result<bool> {
 }
 
 /// The sweep as a table.
-pub fn table(rows: &[Row]) -> Table {
+pub fn table(rows: &[SettleRow]) -> Table {
     let mut table = Table::new([
         "steps per s",
         "iterations",
@@ -249,10 +252,10 @@ pub fn table(rows: &[Row]) -> Table {
 }
 
 /// The sweep as charts against run time: worst overlap, energy rise, and error of the stack; a ring where the default is.
-pub fn charts(rows: &[Row]) -> Vec<Chart> {
-    type Error = fn(&Row) -> f64;
+pub fn charts(rows: &[SettleRow]) -> Vec<Chart> {
+    type Error = fn(&SettleRow) -> f64;
     let usual = SettleOptions::default();
-    let swept: Vec<&Row> = rows.iter().filter(|r| r.ccd == usual.ccd).collect();
+    let swept: Vec<&SettleRow> = rows.iter().filter(|r| r.ccd == usual.ccd).collect();
     let across = Axis::over_decades("time of a heap of 20, ms", swept.iter().map(|r| r.cpu_ms));
     let errors: [(&str, Error); 3] = [
         ("worst overlap, mm", |r| r.overlap_mm[1]),
@@ -341,7 +344,7 @@ pub fn write(
     folder: &Path,
     options: &SettleReportOptions,
     progress: impl Fn(u64, u64),
-) -> Result<Vec<Row>> {
+) -> Result<Vec<SettleRow>> {
     if options.heaps == 0 {
         return Err(Error::value("heaps", "0, expected at least 1"));
     }

@@ -16,7 +16,7 @@ const SEED: u64 = 7;
 
 /// Errors of one kind of view, and what was stated of them.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Coverage {
+pub struct StatedErrors {
     /// Distance of the principal point from the picture's middle, in longer sides.
     pub off_center: f64,
     /// Noise of the corners, pixels.
@@ -38,7 +38,7 @@ pub struct Coverage {
 }
 
 /// Measures whole pictures under every word on them, and cropped ones under those that are not lies.
-pub(super) fn measure(views: u64) -> Vec<Coverage> {
+pub(super) fn measure(views: u64) -> Vec<StatedErrors> {
     let kinds = NOISES
         .into_iter()
         .flat_map(|noise_px| OFF_CENTER.map(|off_center| (noise_px, off_center)));
@@ -50,7 +50,7 @@ pub(super) fn measure(views: u64) -> Vec<Coverage> {
     kinds.flat_map(told).collect()
 }
 
-fn coverage(off_center: f64, noise_px: f64, told: Framing, views: u64) -> Coverage {
+fn coverage(off_center: f64, noise_px: f64, told: Framing, views: u64) -> StatedErrors {
     let (mut focal, mut height, mut sigmas, mut refused) =
         ([vec![], vec![]], [vec![], vec![]], Vec::new(), 0);
     for k in 0..views {
@@ -84,7 +84,7 @@ fn coverage(off_center: f64, noise_px: f64, told: Framing, views: u64) -> Covera
     let part = |limit: f64| {
         sigmas.iter().filter(|s| **s < limit).count() as f64 / sigmas.len().max(1) as f64
     };
-    Coverage {
+    StatedErrors {
         off_center,
         noise_px,
         told,
@@ -106,10 +106,10 @@ fn words(told: Framing) -> &'static str {
     }
 }
 
-pub(super) fn csv(rows: &[Coverage]) -> String {
+pub(super) fn csv(rows: &[StatedErrors]) -> String {
     let head = "off_center,noise_px,told,views,refused,focal_median_percent,focal_sigma_percent,height_median_px,\
                 height_sigma_px,within_1,within_2,within_3,worst_sigmas\n";
-    let line = |r: &Coverage| {
+    let line = |r: &StatedErrors| {
         let ([f, fs], [h, hs], [a, b, c]) = (r.focal_percent, r.height_px, r.within);
         let kind = format!(
             "{},{},{:?},{},{}",
@@ -124,7 +124,7 @@ pub(super) fn csv(rows: &[Coverage]) -> String {
     head.to_owned() + &rows.iter().map(line).collect::<String>()
 }
 
-pub(super) fn markdown(rows: &[Coverage]) -> String {
+pub(super) fn markdown(rows: &[StatedErrors]) -> String {
     let mut text = "\n## Is the stated error true?\n\n\
         Principal points in the middle of the picture, as of whole ones, and so much of its longer side beside it, as of \
         cropped ones; tilts of 5 to 60 degrees; nothing is known of the focal length. Focal length: median error, median of \

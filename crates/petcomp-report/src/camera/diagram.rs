@@ -1,6 +1,6 @@
 //! The camera solver's steps: error against run time.
 
-use super::{Cell, Lens, Method, Row};
+use super::{CameraRow, Lens, SolveMethod, ViewKind};
 use crate::{Diagram, Point};
 
 /// Noise of the corners.
@@ -14,7 +14,7 @@ pub fn diagrams(views: u64) -> Vec<Diagram> {
 }
 
 fn diagram(tilt_deg: f64, views: u64) -> Diagram {
-    let cell = Cell {
+    let cell = ViewKind {
         lens: Lens::Realistic,
         noise_px: NOISE_PX,
         tilt_deg,
@@ -27,7 +27,7 @@ fn diagram(tilt_deg: f64, views: u64) -> Diagram {
         error: "focal length, median error, %".into(),
         cost: "CPU microseconds per photo".into(),
         reference: "the cameras that the views were drawn with (closed form)".into(),
-        points: Method::ALL.map(|method| point(&cell.row(method, &photos))).into(),
+        points: SolveMethod::ALL.map(|method| point(&cell.row(method, &photos))).into(),
         why: "The whole refinement is the default at every quality: it alone tells its own uncertainty and tries every start, \
               and it takes less than a hundredth of the time that rendering a picture does."
             .into(),
@@ -35,14 +35,14 @@ fn diagram(tilt_deg: f64, views: u64) -> Diagram {
     }
 }
 
-fn point(row: &Row) -> Point {
-    let curve = if row.method == Method::Joint {
+fn point(row: &CameraRow) -> Point {
+    let curve = if row.method == SolveMethod::Joint {
         "several photos"
     } else {
         "one photo"
     };
     Point::new(curve, row.method.name(), row.time_us, row.focal_percent[0])
-        .used_where(|_| row.method == Method::Whole)
+        .used_where(|_| row.method == SolveMethod::Whole)
 }
 
 #[cfg(test)]
@@ -52,7 +52,7 @@ mod tests {
     #[test]
     fn every_tilt_has_every_method_and_one_default() {
         for found in diagrams(3) {
-            assert_eq!(found.points.len(), Method::ALL.len());
+            assert_eq!(found.points.len(), SolveMethod::ALL.len());
             assert_eq!(found.points.iter().filter(|p| p.is_default()).count(), 1);
         }
     }

@@ -1,12 +1,12 @@
 //! A cost as a sum of what things cost each: least squares without negative prices.
 
-use super::{Measured, Point, missing};
+use super::{ScaleMeasurements, ScalePoint, missing};
 use nalgebra::{DMatrix, DVector};
 use petcomp::Result;
 
 /// What each thing costs, and how far measurements are from that.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Fit {
+pub struct CostFit {
     /// What is paid for.
     pub terms: Vec<&'static str>,
     /// The price of each; 0 for what does not show.
@@ -19,11 +19,11 @@ pub struct Fit {
 
 /// Time and memory of a picture.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Model {
+pub struct CostModel {
     /// Seconds of a processor per picture, of points on one thread.
-    pub time: Fit,
+    pub time: CostFit,
     /// Most bytes of a process, of all points.
-    pub memory: Fit,
+    pub memory: CostFit,
 }
 
 /// Light is looked up on a lattice that is finest along the sides of cards, however small these are in the picture, and every
@@ -46,7 +46,7 @@ const MEMORY: [&str; 5] = [
 ];
 
 /// What a picture has of each term of its time.
-fn time_terms(point: &Point) -> Vec<f64> {
+fn time_terms(point: &ScalePoint) -> Vec<f64> {
     let (pixels, cards, layers) = (
         point.case.megapixels(),
         point.case.cards as f64,
@@ -63,7 +63,7 @@ fn time_terms(point: &Point) -> Vec<f64> {
 }
 
 /// What a process has of each term of its memory.
-fn memory_terms(point: &Point) -> Vec<f64> {
+fn memory_terms(point: &ScalePoint) -> Vec<f64> {
     let (pixels, overlaps) = (
         point.case.megapixels(),
         point.case.cards as f64 * point.layers,
@@ -74,29 +74,29 @@ fn memory_terms(point: &Point) -> Vec<f64> {
 }
 
 /// Thousands of pixels along the sides of all cards, were each a square: the root of each card's megapixels.
-fn sides(point: &Point) -> f64 {
+fn sides(point: &ScalePoint) -> f64 {
     let cards = point.case.cards as f64;
     cards * (point.case.megapixels() * point.layers / cards.max(1.0)).sqrt()
 }
 
-fn pairs(point: &Point) -> f64 {
+fn pairs(point: &ScalePoint) -> f64 {
     let cards = point.case.cards as f64;
     0.5 * cards * (cards - 1.0)
 }
 
-impl Model {
+impl CostModel {
     /// Fits both costs.
     ///
     /// # Errors
     /// Without points, or none on one thread.
-    pub fn of(measured: &Measured) -> Result<Self> {
+    pub fn fit(measured: &ScaleMeasurements) -> Result<Self> {
         let of = |terms: &[&'static str],
-                  row: fn(&Point) -> Vec<f64>,
-                  value: fn(&Point) -> f64,
-                  points: Vec<&Point>| {
+                  row: fn(&ScalePoint) -> Vec<f64>,
+                  value: fn(&ScalePoint) -> f64,
+                  points: Vec<&ScalePoint>| {
             let rows: Vec<_> = points.iter().map(|point| row(point)).collect();
             let values: Vec<_> = points.iter().map(|point| value(point)).collect();
-            Fit::of(terms, &rows, &values).ok_or_else(|| missing("no points to fit"))
+            CostFit::new(terms, &rows, &values).ok_or_else(|| missing("no points to fit"))
         };
         let alone = measured
             .points
@@ -115,24 +115,24 @@ impl Model {
     }
 
     /// Seconds of a processor for a picture like a point's.
-    pub fn seconds(&self, point: &Point) -> f64 {
+    pub fn seconds(&self, point: &ScalePoint) -> f64 {
         self.time.at(&time_terms(point))
     }
 
     /// Most bytes of a process that makes pictures like a point's.
-    pub fn bytes(&self, point: &Point) -> f64 {
+    pub fn bytes(&self, point: &ScalePoint) -> f64 {
         self.memory.at(&memory_terms(point))
     }
 }
 
-impl Fit {
+impl CostFit {
     /// Fits prices to measured costs, a row for each of how much it has of each term; none without a measurement above 0.
     ///
     /// # Method
     /// Non-negative least squares of relative errors, since costs span decades. The best fit with some prices at 0 and the
     /// others free is looked for among all sets of prices, of which there are few; that it exists is a theorem of Lawson
     /// and Hanson ("Solving Least Squares Problems", 1974, chapter 23).
-    pub fn of(terms: &[&'static str], rows: &[Vec<f64>], values: &[f64]) -> Option<Self> {
+    pub fn new(terms: &[&'static str], rows: &[Vec<f64>], values: &[f64]) -> Option<Self> {
         let sound: Vec<usize> = (0..values.len()).filter(|&i| values[i] > 0.0).collect();
         let prices = prices(rows, values, &sound)?;
         let off = |prices: &[f64], i: usize| values[i] / dot(prices, &rows[i]) - 1.0;
@@ -225,7 +225,7 @@ mod tests {
             .iter()
             .map(|row| dot(&[0.5, 2e-4, 3.0], row))
             .collect();
-        let fit = Fit::of(&NAMES, &rows(), &values).unwrap();
+        let fit = CostFit::new(&NAMES, &rows(), &values).unwrap();
         assert!(
             fit.prices
                 .iter()
@@ -240,7 +240,7 @@ mod tests {
     #[test]
     fn nothing_has_a_negative_price() {
         let values: Vec<_> = rows().iter().map(|row| 5.0 - 0.2 * row[1]).collect();
-        let fit = Fit::of(&NAMES, &rows(), &values).unwrap();
+        let fit = CostFit::new(&NAMES, &rows(), &values).unwrap();
         assert!(fit.prices.iter().all(|p| *p >= 0.0) && fit.prices[0] > 0.0);
         assert!(
             fit.residuals.iter().any(|r| r.abs() > 0.1),
@@ -256,7 +256,7 @@ mod tests {
             .enumerate()
             .map(|(i, row)| noisy(i) * (1.0 + row[1]))
             .collect();
-        let fit = Fit::of(&NAMES, &rows(), &values).unwrap();
+        let fit = CostFit::new(&NAMES, &rows(), &values).unwrap();
         assert!((0.05..0.5).contains(&fit.spread()), "{}", fit.spread());
         let seen = fit.residuals.iter().map(|r| r * r).sum::<f64>();
         assert!(fit.unseen.iter().map(|r| r * r).sum::<f64>() > seen);
@@ -264,8 +264,8 @@ mod tests {
 
     #[test]
     fn too_little_to_fit_is_told() {
-        assert!(Fit::of(&NAMES, &[], &[]).is_none());
-        let one = Fit::of(&NAMES, &rows()[1..2], &[3.0]).unwrap();
+        assert!(CostFit::new(&NAMES, &[], &[]).is_none());
+        let one = CostFit::new(&NAMES, &rows()[1..2], &[3.0]).unwrap();
         assert!(one.residuals[0].abs() < 1e-9 && one.spread() == f64::INFINITY);
     }
 }

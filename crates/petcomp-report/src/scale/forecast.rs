@@ -1,6 +1,6 @@
 //! What many pictures take on many machines, from the model of one.
 
-use super::{Case, Measured, Model, Point, grid, missing};
+use super::{CostModel, ScaleCase, ScaleMeasurements, ScalePoint, grid, missing};
 use petcomp::Result;
 
 /// What a dataset of usual pictures is expected to take.
@@ -9,7 +9,7 @@ pub struct Forecast {
     /// Pictures.
     pub images: f64,
     /// Kind of the pictures.
-    pub case: Case,
+    pub case: ScaleCase,
     /// Seconds of a processor per picture, its cards already lying: what the model says, and between what nine in ten lie.
     pub picture_seconds: [f64; 3],
     /// Seconds of a processor until its cards lie.
@@ -27,11 +27,11 @@ pub struct Forecast {
 /// Forecasts a dataset of the usual pictures: 640 x 480 pixels, 12 cards that fall first.
 ///
 /// # Errors
-/// As [`Model::of`]; without a point of that kind.
-pub fn forecast(measured: &Measured, images: f64) -> Result<Forecast> {
-    let model = Model::of(measured)?;
-    let usual = |point: &&Point| {
-        Case {
+/// As [`CostModel::fit`]; without a point of that kind.
+pub fn forecast(measured: &ScaleMeasurements, images: f64) -> Result<Forecast> {
+    let model = CostModel::fit(measured)?;
+    let usual = |point: &&ScalePoint| {
+        ScaleCase {
             threads: 1,
             ..point.case
         } == grid::USUAL
@@ -102,8 +102,8 @@ pub(super) mod tests {
     use super::*;
 
     /// Measurements of a machine that is exactly as the model says, and half as good on two threads.
-    pub(in super::super) fn measured() -> Measured {
-        let point = |case: Case| {
+    pub(in super::super) fn measured() -> ScaleMeasurements {
+        let point = |case: ScaleCase| {
             let layers = 0.01 * case.cards as f64 * case.scale * case.scale;
             let in_hand = case.megapixels() * case.threads as f64;
             let cpu_seconds =
@@ -113,7 +113,7 @@ pub(super) mod tests {
             } else {
                 1.0 / cpu_seconds
             };
-            Point {
+            ScalePoint {
                 case,
                 layers,
                 pictures: 3,
@@ -122,7 +122,7 @@ pub(super) mod tests {
                 peak_bytes: 1e7 + in_hand * (1e8 + 5e7 * layers),
             }
         };
-        Measured {
+        ScaleMeasurements {
             points: grid::cases(2).into_iter().map(point).collect(),
             falls: vec![(10, 0.1), (20, 0.3)],
         }
@@ -171,7 +171,7 @@ pub(super) mod tests {
     fn nothing_measured_is_no_forecast() {
         assert!(
             forecast(
-                &Measured {
+                &ScaleMeasurements {
                     points: vec![],
                     falls: vec![]
                 },

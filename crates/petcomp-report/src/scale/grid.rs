@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 /// Pictures of one kind, and how many are made at once.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Case {
+pub struct ScaleCase {
     /// Threads, of which each makes a picture of its own.
     pub threads: usize,
     /// Width and height, pixels.
@@ -17,7 +17,7 @@ pub struct Case {
 }
 
 /// The picture of a usual dataset: that of the recipe's defaults, with its most cards.
-pub(super) const USUAL: Case = Case {
+pub(super) const USUAL: ScaleCase = ScaleCase {
     threads: 1,
     image: [640, 480],
     cards: 12,
@@ -59,21 +59,21 @@ const CORNERS: [([u32; 2], usize, f64); 4] = [
 pub(super) const FALLS: [usize; 5] = [1, 5, 12, 20, 40];
 
 /// Every case: the usual picture on 1, 2, 4 ... threads, then sizes, cards and corners on one.
-pub(super) fn cases(threads: usize) -> Vec<Case> {
+pub(super) fn cases(threads: usize) -> Vec<ScaleCase> {
     let powers = std::iter::successors(Some(1), |n| Some(2 * n)).take_while(|n| *n < threads);
     let threads = powers
         .chain([threads.max(1)])
-        .map(|threads| Case { threads, ..USUAL });
+        .map(|threads| ScaleCase { threads, ..USUAL });
     let sizes = IMAGES
         .into_iter()
         .skip(1)
-        .map(|image| Case { image, ..USUAL });
-    let cards = CARDS.into_iter().map(|(cards, scale)| Case {
+        .map(|image| ScaleCase { image, ..USUAL });
+    let cards = CARDS.into_iter().map(|(cards, scale)| ScaleCase {
         cards,
         scale,
         ..USUAL
     });
-    let corners = CORNERS.into_iter().map(|(image, cards, scale)| Case {
+    let corners = CORNERS.into_iter().map(|(image, cards, scale)| ScaleCase {
         image,
         cards,
         scale,
@@ -82,7 +82,7 @@ pub(super) fn cases(threads: usize) -> Vec<Case> {
     threads.chain(sizes).chain(cards).chain(corners).collect()
 }
 
-impl Case {
+impl ScaleCase {
     /// Millions of pixels in a picture.
     pub fn megapixels(&self) -> f64 {
         f64::from(self.image[0]) * f64::from(self.image[1]) * 1e-6
@@ -112,7 +112,7 @@ mod tests {
     #[test]
     fn the_grid_spans_what_the_report_promises() {
         let cases = cases(1);
-        let span = |of: fn(&Case) -> f64| {
+        let span = |of: fn(&ScaleCase) -> f64| {
             cases
                 .iter()
                 .map(of)
@@ -120,7 +120,7 @@ mod tests {
                     [v.min(low), v.max(high)]
                 })
         };
-        assert!(span(Case::megapixels)[0] < 0.3 && span(Case::megapixels)[1] > 33.0);
+        assert!(span(ScaleCase::megapixels)[0] < 0.3 && span(ScaleCase::megapixels)[1] > 33.0);
         assert_eq!(span(|case| case.cards as f64), [1.0, 300.0]);
     }
 }

@@ -1,13 +1,13 @@
 //! Time and memory of a whole process, and points that are measured in one of their own.
 
-use super::{Case, Point};
+use super::{ScaleCase, ScalePoint};
 use petcomp::{Error, Result};
 use rustix::time::{ClockId, clock_gettime};
 use std::path::Path;
 use std::process::Command;
 
 /// A point as another process tells it.
-pub(super) fn in_a_child(program: &Path, case: &Case, seconds: f64) -> Result<Point> {
+pub(super) fn in_a_child(program: &Path, case: &ScaleCase, seconds: f64) -> Result<ScalePoint> {
     let failed = |what: String| Error::file(program, what);
     let case = serde_json::to_string(case).map_err(|e| failed(e.to_string()))?;
     let mut command = Command::new(program);

@@ -1,7 +1,7 @@
 //! One point: a dataset made here and now.
 
 use super::process::{cpu_seconds, peak_bytes};
-use super::{Case, Point};
+use super::{ScaleCase, ScalePoint};
 use crate::pile::{above, lamp};
 use crate::settle::median_and_worst;
 use petcomp::DeepImage;
@@ -45,8 +45,8 @@ const MOST: f64 = 1000.0;
 ///
 /// # Errors
 /// A temporary folder that cannot be written; no threads; a system that does not tell.
-pub fn run(case: &Case, seconds: f64) -> Result<Point> {
-    let world = World::of(case);
+pub fn run(case: &ScaleCase, seconds: f64) -> Result<ScalePoint> {
+    let world = PictureInputs::new(case);
     let pool = work::pool(case.threads).map_err(|e| Error::value("threads", e))?;
     let (first, layers) = Round::of(1, || pool.install(|| world.make(1)))?;
     // A picture that takes all of the time is made once more, others in several rounds.
@@ -58,7 +58,7 @@ pub fn run(case: &Case, seconds: f64) -> Result<Point> {
         (0..rounds).map(|_| Ok(Round::of(pictures, || pool.install(|| world.make(pictures)))?.0));
     let later = later.collect::<Result<Vec<_>>>()?;
     let least = |of: fn(&Round) -> f64| later.iter().map(of).fold(f64::INFINITY, f64::min);
-    Ok(Point {
+    Ok(ScalePoint {
         case: *case,
         layers,
         pictures: pictures * rounds,
@@ -103,13 +103,13 @@ pub(super) fn fall_seconds(cards: usize) -> Result<f64> {
 }
 
 /// What pictures of a kind are made from.
-struct World {
+struct PictureInputs {
     scene: Scene,
     shot: Shot,
 }
 
-impl World {
-    fn of(case: &Case) -> Self {
+impl PictureInputs {
+    fn new(case: &ScaleCase) -> Self {
         let scene = scene(case);
         let textures: Vec<_> = (0..CUT_OUTS).map(|k| Texture::from(cut_out(k))).collect();
         let outline_uv: Arc<[Point2<f64>]> = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]
@@ -195,7 +195,7 @@ fn mean_layers(deep: &DeepImage) -> f64 {
 }
 
 /// Cards in a heap under a lamp and an even sky, seen from above.
-fn scene(case: &Case) -> Scene {
+fn scene(case: &ScaleCase) -> Scene {
     let focal_px = Vector2::repeat(FOCAL_BY_WIDTH * f64::from(case.image[0]));
     let camera = Camera {
         focal_px,
@@ -220,7 +220,7 @@ fn scene(case: &Case) -> Scene {
 
 /// Card `k` of a heap: spread evenly by the plastic number's sequence (Roberts, "The unreasonable effectiveness of
 /// quasirandom sequences", 2018), each a little higher than the one before it.
-fn card(case: &Case, k: usize) -> Object {
+fn card(case: &ScaleCase, k: usize) -> Object {
     const PLASTIC: f64 = 1.324_717_957_244_746;
     let share = |power: i32| (0.5 + (k + 1) as f64 * PLASTIC.powi(-power)).fract() - 0.5;
     let rise = RISE.min(PILE / case.cards as f64);
@@ -269,7 +269,7 @@ fn cut_out(k: usize) -> Image<PremulRgba> {
 mod tests {
     use super::*;
 
-    const SMALL: Case = Case {
+    const SMALL: ScaleCase = ScaleCase {
         threads: 2,
         image: [320, 240],
         cards: 5,
@@ -287,16 +287,16 @@ mod tests {
 
     #[test]
     fn larger_cards_are_more_layers_and_larger_pictures_are_not() {
-        let layers = |case| mean_layers(&World::of(&case).sample().deep);
+        let layers = |case| mean_layers(&PictureInputs::new(&case).sample().deep);
         let usual = layers(SMALL);
         assert!(
-            layers(Case {
+            layers(ScaleCase {
                 scale: 2.0,
                 ..SMALL
             }) > 2.5 * usual
         );
         assert!(
-            (layers(Case {
+            (layers(ScaleCase {
                 image: [640, 480],
                 ..SMALL
             }) / usual

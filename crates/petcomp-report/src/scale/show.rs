@@ -1,6 +1,6 @@
 //! Tables and charts of what was measured, beside what the model says.
 
-use super::{Measured, Model, Point, forecast, grid};
+use super::{CostModel, ScaleMeasurements, ScalePoint, forecast, grid};
 use petcomp::Result;
 use petcomp::plot::{Axis, Chart, Curve, Table};
 
@@ -13,9 +13,9 @@ const MB: f64 = 1e-6;
 /// Tables with their titles: all points and residuals first, then the model, threads, falls, and a million pictures.
 ///
 /// # Errors
-/// As [`Model::of`] and [`forecast()`].
-pub fn tables(measured: &Measured) -> Result<Vec<(String, Table)>> {
-    let model = Model::of(measured)?;
+/// As [`CostModel::fit`] and [`forecast()`].
+pub fn tables(measured: &ScaleMeasurements) -> Result<Vec<(String, Table)>> {
+    let model = CostModel::fit(measured)?;
     let titled = |title: &str, table| (title.to_owned(), table);
     Ok(vec![
         titled("Points", points(measured, &model)),
@@ -26,7 +26,7 @@ pub fn tables(measured: &Measured) -> Result<Vec<(String, Table)>> {
     ])
 }
 
-fn points(measured: &Measured, model: &Model) -> Table {
+fn points(measured: &ScaleMeasurements, model: &CostModel) -> Table {
     let mut table = Table::new([
         "threads",
         "image",
@@ -45,7 +45,7 @@ fn points(measured: &Measured, model: &Model) -> Table {
     let percent = |share: f64| format!("{:+.1}", 100.0 * share);
     let mut alone = model.time.residuals.iter().zip(&model.time.unseen);
     for (point, memory) in measured.points.iter().zip(&model.memory.residuals) {
-        let Point {
+        let ScalePoint {
             case,
             layers,
             cpu_seconds,
@@ -78,7 +78,7 @@ fn points(measured: &Measured, model: &Model) -> Table {
     table
 }
 
-fn prices(model: &Model) -> Table {
+fn prices(model: &CostModel) -> Table {
     let mut table = Table::new(["each", "takes", "of"]);
     let time = model.time.terms.iter().zip(&model.time.prices);
     time.for_each(|(term, price)| {
@@ -108,9 +108,9 @@ fn prices(model: &Model) -> Table {
 }
 
 /// The usual picture on one thread and on more, in their order.
-fn by_threads(measured: &Measured) -> Vec<&Point> {
-    let usual = |point: &&Point| {
-        grid::Case {
+fn by_threads(measured: &ScaleMeasurements) -> Vec<&ScalePoint> {
+    let usual = |point: &&ScalePoint| {
+        grid::ScaleCase {
             threads: 1,
             ..point.case
         } == grid::USUAL
@@ -118,7 +118,7 @@ fn by_threads(measured: &Measured) -> Vec<&Point> {
     measured.points.iter().filter(usual).collect()
 }
 
-fn threads(measured: &Measured) -> Table {
+fn threads(measured: &ScaleMeasurements) -> Table {
     let mut table = Table::new([
         "threads",
         "pictures/s",
@@ -143,7 +143,7 @@ fn threads(measured: &Measured) -> Table {
     table
 }
 
-fn falls(measured: &Measured) -> Table {
+fn falls(measured: &ScaleMeasurements) -> Table {
     let mut table = Table::new(["cards that fall together", "CPU ms until they lie"]);
     measured
         .falls
@@ -152,7 +152,7 @@ fn falls(measured: &Measured) -> Table {
     table
 }
 
-fn million(measured: &Measured) -> Result<Table> {
+fn million(measured: &ScaleMeasurements) -> Result<Table> {
     let told = forecast(measured, MILLION)?;
     let interval = |[value, least, most]: [f64; 3], digits: usize| {
         format!("{value:.digits$} ({least:.digits$} to {most:.digits$})")
@@ -196,9 +196,9 @@ fn million(measured: &Measured) -> Result<Table> {
 /// Charts with what is to be seen in them: rate by threads and memory; time by pixels and by cards.
 ///
 /// # Errors
-/// As [`Model::of`].
-pub fn charts(measured: &Measured) -> Result<Vec<(String, String)>> {
-    let model = Model::of(measured)?;
+/// As [`CostModel::fit`].
+pub fn charts(measured: &ScaleMeasurements) -> Result<Vec<(String, String)>> {
+    let model = CostModel::fit(measured)?;
     let usual = grid::USUAL;
     let alone = || {
         measured
@@ -214,7 +214,7 @@ pub fn charts(measured: &Measured) -> Result<Vec<(String, String)>> {
         .collect();
     let threads = by_threads(measured);
     let one = threads.first().map_or(1.0, |point| point.rate);
-    let pixels = |point: &Point| point.case.megapixels();
+    let pixels = |point: &ScalePoint| point.case.megapixels();
     let rate = both(
         "pictures a second",
         "threads",
@@ -257,12 +257,12 @@ pub fn charts(measured: &Measured) -> Result<Vec<(String, String)>> {
 fn both(
     up: &str,
     across: &str,
-    points: &[&Point],
-    x: impl Fn(&Point) -> f64,
-    measured: impl Fn(&Point) -> f64,
-    expected: impl Fn(&Point) -> f64,
+    points: &[&ScalePoint],
+    x: impl Fn(&ScalePoint) -> f64,
+    measured: impl Fn(&ScalePoint) -> f64,
+    expected: impl Fn(&ScalePoint) -> f64,
 ) -> Chart {
-    let curve = |y: &dyn Fn(&Point) -> f64| -> Curve {
+    let curve = |y: &dyn Fn(&ScalePoint) -> f64| -> Curve {
         let mut curve: Curve = points.iter().map(|point| [x(point), y(point)]).collect();
         curve.sort_by(|a, b| a[0].total_cmp(&b[0]));
         curve

@@ -1,6 +1,6 @@
 //! The physics' steps: errors of heaps at rest against run time.
 
-use super::{CARDS, PLATES, Row};
+use super::{CARDS, PLATES, SettleRow};
 use crate::{Diagram, Point};
 use petcomp::Quality;
 use petcomp::plot::three;
@@ -13,10 +13,10 @@ const PERCENT: f64 = 100.0;
 const SKIN_MM: f64 = 0.4;
 
 /// Worst overlap, worst energy rise and the error of a stack, each against the time of a heap.
-pub fn diagrams(rows: &[Row]) -> Vec<Diagram> {
+pub fn diagrams(rows: &[SettleRow]) -> Vec<Diagram> {
     let usual = SettleOptions::default();
     let heaps = rows.first().map_or(0, |row| row.heaps);
-    let with = |error: fn(&Row) -> f64| Diagram {
+    let with = |error: fn(&SettleRow) -> f64| Diagram {
         input: format!("{heaps} heaps of {CARDS} cards for each setting"),
         cost: "CPU milliseconds per heap, median".into(),
         points: rows.iter().map(|row| point(row, error(row))).collect(),
@@ -55,7 +55,7 @@ pub fn diagrams(rows: &[Row]) -> Vec<Diagram> {
     ]
 }
 
-fn point(row: &Row, error: f64) -> Point {
+fn point(row: &SettleRow, error: f64) -> Point {
     let options = SettleOptions::default();
     let is_usual = row.ccd == options.ccd;
     let curve = if is_usual {
@@ -76,12 +76,12 @@ fn point(row: &Row, error: f64) -> Point {
 }
 
 /// What no single error shows: which settings are right in everything, and which of them costs least.
-fn why(rows: &[Row]) -> String {
+fn why(rows: &[SettleRow]) -> String {
     let usual = SettleOptions::default();
-    let is_default = |row: &&Row| {
+    let is_default = |row: &&SettleRow| {
         row.ccd == usual.ccd && row.iterations == usual.iterations && is_step(row, usual.step)
     };
-    let right: Vec<&Row> = rows.iter().filter(|row| is_right(row)).collect();
+    let right: Vec<&SettleRow> = rows.iter().filter(|row| is_right(row)).collect();
     let best = right.iter().min_by(|a, b| a.cpu_ms.total_cmp(&b.cpu_ms));
     let (Some(best), Some(default)) = (best, rows.iter().find(is_default)) else {
         return String::new();
@@ -104,12 +104,12 @@ fn why(rows: &[Row]) -> String {
     )
 }
 
-fn is_step(row: &Row, step: f64) -> bool {
+fn is_step(row: &SettleRow, step: f64) -> bool {
     step * f64::from(row.rate) == 1.0
 }
 
 /// Every error of a setting is as small as is asked.
-fn is_right(row: &Row) -> bool {
+fn is_right(row: &SettleRow) -> bool {
     let usual = SettleOptions::default();
     let overlap = usual.max_overlap * CARD_MM;
     row.rested == row.heaps
@@ -120,7 +120,7 @@ fn is_right(row: &Row) -> bool {
 }
 
 /// How far the stack is from its thicknesses and skins, millimetres.
-fn stack_error(row: &Row) -> f64 {
+fn stack_error(row: &SettleRow) -> f64 {
     (row.stack_mm - SKIN_MM * PLATES as f64).abs()
 }
 
@@ -128,8 +128,8 @@ fn stack_error(row: &Row) -> f64 {
 mod tests {
     use super::*;
 
-    fn row(rate: u32, iterations: u32, ccd: u32) -> Row {
-        Row {
+    fn row(rate: u32, iterations: u32, ccd: u32) -> SettleRow {
+        SettleRow {
             rate,
             iterations,
             ccd,
@@ -156,7 +156,7 @@ mod tests {
     }
     #[test]
     fn the_cheapest_setting_that_is_right_in_everything_is_told() {
-        let fine = |rate, cpu_ms| Row {
+        let fine = |rate, cpu_ms| SettleRow {
             rested: 4,
             wrong_slopes: 0,
             cpu_ms,
@@ -165,7 +165,7 @@ mod tests {
         let told = why(&[
             fine(480, 20.0),
             fine(240, 10.0),
-            Row {
+            SettleRow {
                 stack_mm: 1.0,
                 ..fine(960, 1.0)
             },
@@ -175,7 +175,7 @@ mod tests {
             "{told}"
         );
         assert!(told.contains("is one of them") && why(&[]).is_empty());
-        let late = Row {
+        let late = SettleRow {
             rested: 3,
             ..fine(480, 20.0)
         };
