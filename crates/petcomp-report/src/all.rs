@@ -180,7 +180,7 @@ fn quality_table() -> Section {
         .table("quality", Quality::table())
 }
 
-fn other_programs(comparisons: &[peers::Comparison], folder: &Path) -> Section {
+fn other_programs(comparisons: &[peers::PeerComparison], folder: &Path) -> Section {
     let section = Section::new("Other programs");
     if comparisons.is_empty() {
         let folder = folder.display();
@@ -198,17 +198,17 @@ fn other_programs(comparisons: &[peers::Comparison], folder: &Path) -> Section {
 }
 
 /// What is missing in a comparison; empty where nothing is.
-fn missing_note(comparison: &peers::Comparison) -> String {
+fn missing_note(comparison: &peers::PeerComparison) -> String {
     match comparison.missing() {
         text if text.is_empty() => text,
         text => format!("{}: {text}", comparison.stage),
     }
 }
 
-fn peer_diagrams(comparisons: &[peers::Comparison]) -> Vec<Diagram> {
+fn peer_diagrams(comparisons: &[peers::PeerComparison]) -> Vec<Diagram> {
     comparisons
         .iter()
-        .map(peers::Comparison::diagram)
+        .map(peers::PeerComparison::diagram)
         .filter(|diagram| !diagram.points.is_empty())
         .collect()
 }

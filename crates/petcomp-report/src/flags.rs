@@ -1,12 +1,12 @@
 //! Flags: whether a cut-out that is wrong says so, and one that is right does not, on photos made harder and harder.
 //!
 //! A person looks at the flagged photos only, so two shares matter: *silently wrong* photos spoil a dataset, *false alarms*
-//! cost a look each. The photos are a renderer's with known outlines; each [`Variant`] makes them harder in one way that
+//! cost a look each. The photos are a renderer's with known outlines; each [`PhotoVariant`] makes them harder in one way that
 //! keeps the outline known.
 
 mod variant;
 
-pub use variant::{Expected, Variant};
+pub use variant::{Expected, PhotoVariant};
 
 use super::matte::score::overlap;
 use super::matte::truth::Truths;
@@ -36,11 +36,11 @@ pub struct Trial {
 
 /// What became of a photo.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Row {
+pub struct FlagRow {
     /// Name of the photo.
     pub photo: String,
     /// How it was made harder.
-    pub variant: Variant,
+    pub variant: PhotoVariant,
     /// Overlap (intersection over union) of the tight outline, and largest error of a side of the hull's box in pixels;
     /// nothing where the photo was refused.
     pub found: Option<[f64; 2]>,
@@ -91,16 +91,16 @@ impl End {
 ///
 /// # Errors
 /// A folder without truth, or files of it that cannot be read.
-pub fn measure(folder: &Path, progress: impl Fn(u64, u64)) -> Result<Vec<Row>> {
+pub fn measure(folder: &Path, progress: impl Fn(u64, u64)) -> Result<Vec<FlagRow>> {
     let truths = Truths::in_folder(folder)?;
     let mut rows = Vec::new();
     for i in 0..truths.len() {
         progress(i as u64, truths.len() as u64);
         let known = truths.read(i)?;
-        let of = |variant: &Variant| {
+        let of = |variant: &PhotoVariant| {
             let trial = variant.of(&known, i as u64)?;
             let (found, end, doubts) = trial.run();
-            Some(Row {
+            Some(FlagRow {
                 photo: known.name.clone(),
                 variant: *variant,
                 found,
@@ -108,7 +108,12 @@ pub fn measure(folder: &Path, progress: impl Fn(u64, u64)) -> Result<Vec<Row>> {
                 doubts,
             })
         };
-        rows.extend(Variant::ALL.par_iter().filter_map(of).collect::<Vec<_>>());
+        rows.extend(
+            PhotoVariant::ALL
+                .par_iter()
+                .filter_map(of)
+                .collect::<Vec<_>>(),
+        );
     }
     Ok(rows)
 }
@@ -170,10 +175,10 @@ fn sides(polygon: &[Point2<f64>]) -> [f64; 4] {
 }
 
 /// How the photos of each variant ended, a line per variant.
-pub fn table(rows: &[Row]) -> Table {
+pub fn table(rows: &[FlagRow]) -> Table {
     let ends = End::ALL.map(End::name);
     let mut table = Table::new(["photos", "made of"].into_iter().chain(ends));
-    for variant in Variant::ALL {
+    for variant in PhotoVariant::ALL {
         let own = || rows.iter().filter(|row| row.variant == variant);
         let count = |end: End| own().filter(|row| row.end == end).count().to_string();
         let head = [variant.name().to_owned(), own().count().to_string()];
@@ -183,7 +188,7 @@ pub fn table(rows: &[Row]) -> Table {
 }
 
 /// Every photo in every variant.
-pub fn details(rows: &[Row]) -> Table {
+pub fn details(rows: &[FlagRow]) -> Table {
     let mut table = Table::new(["photo", "variant", "iou", "box_px", "end", "doubts"]);
     for row in rows {
         let number = |i: usize| {
@@ -257,18 +262,18 @@ mod tests {
         }
     }
 
-    fn end(variant: Variant) -> End {
+    fn end(variant: PhotoVariant) -> End {
         variant.of(&known(), 1).unwrap().run().1
     }
 
     #[test]
     fn a_plain_slab_ends_right_on_any_screen() {
         for variant in [
-            Variant::Plain,
-            Variant::Uneven,
-            Variant::VeryUneven,
-            Variant::OtherScreen,
-            Variant::GreyScreen,
+            PhotoVariant::Plain,
+            PhotoVariant::Uneven,
+            PhotoVariant::VeryUneven,
+            PhotoVariant::OtherScreen,
+            PhotoVariant::GreyScreen,
         ] {
             assert_eq!(end(variant), End::Right, "{}", variant.name());
         }
@@ -277,15 +282,15 @@ mod tests {
     #[test]
     fn what_must_be_told_is_told() {
         for variant in [
-            Variant::OverBorder,
-            Variant::Two,
-            Variant::Empty,
-            Variant::EmptyUneven,
+            PhotoVariant::OverBorder,
+            PhotoVariant::Two,
+            PhotoVariant::Empty,
+            PhotoVariant::EmptyUneven,
         ] {
             assert_eq!(end(variant), End::Right, "{}", variant.name());
         }
         assert!(matches!(
-            end(Variant::Blurred),
+            end(PhotoVariant::Blurred),
             End::RightAndFlagged | End::Told
         ));
     }
@@ -293,9 +298,9 @@ mod tests {
     #[test]
     fn nothing_ends_silently_wrong() {
         // Not yet held: what strong compression rings around a drawn slab is taken for its edge, and nothing says so.
-        for variant in Variant::ALL
+        for variant in PhotoVariant::ALL
             .into_iter()
-            .filter(|variant| *variant != Variant::Jpeg)
+            .filter(|variant| *variant != PhotoVariant::Jpeg)
         {
             assert_ne!(end(variant), End::SilentlyWrong, "{}", variant.name());
         }
@@ -303,7 +308,7 @@ mod tests {
 
     #[test]
     fn a_wrong_outline_without_a_doubt_is_silently_wrong() {
-        let mut trial = Variant::Plain.of(&known(), 1).unwrap();
+        let mut trial = PhotoVariant::Plain.of(&known(), 1).unwrap();
         trial.box_px[2] += 5.0;
         assert_eq!(trial.run().1, End::SilentlyWrong);
         let unexpected = Trial {
@@ -315,7 +320,7 @@ mod tests {
 
     #[test]
     fn rows_become_counts() {
-        let row = |variant, end| Row {
+        let row = |variant, end| FlagRow {
             photo: "a".into(),
             variant,
             found: None,
@@ -323,14 +328,14 @@ mod tests {
             doubts: vec!["x; y".into()],
         };
         let rows = [
-            row(Variant::Plain, End::Right),
-            row(Variant::Plain, End::SilentlyWrong),
+            row(PhotoVariant::Plain, End::Right),
+            row(PhotoVariant::Plain, End::SilentlyWrong),
         ];
         let table = table(&rows);
         assert_eq!(
             (table.rows.len(), &table.rows[0][1..]),
             (
-                Variant::ALL.len(),
+                PhotoVariant::ALL.len(),
                 &["2", "1", "0", "0", "0", "1"].map(String::from)[..]
             )
         );

@@ -9,7 +9,7 @@ mod cases;
 mod tests;
 mod world;
 
-use cases::{Asked, Case, cases};
+use cases::{Asked, WorkCase, cases};
 use petcomp::PremulRgba;
 use petcomp::dataset::{Pipeline, generate};
 use petcomp::plot::Table;
@@ -17,11 +17,11 @@ use petcomp::work::{self, Kind, LARGE_BYTES, Work};
 use petcomp::{Error, Result, io};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
-use world::World;
+use world::FixtureFolder;
 
 /// A scene and the work that it made.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Row {
+pub struct WorkRow {
     /// Name of the scene.
     pub scene: &'static str,
     /// What is in it, and what is asked for.
@@ -32,7 +32,7 @@ pub struct Row {
     pub absent: Vec<Kind>,
 }
 
-impl Row {
+impl WorkRow {
     /// Every promise is kept.
     pub fn is_as_promised(&self) -> bool {
         self.counts
@@ -45,19 +45,19 @@ impl Row {
 ///
 /// # Errors
 /// A temporary folder that cannot be written; no threads.
-pub fn measure(progress: impl Fn(u64, u64)) -> Result<Vec<Row>> {
-    let world = World::make()?;
+pub fn measure(progress: impl Fn(u64, u64)) -> Result<Vec<WorkRow>> {
+    let world = FixtureFolder::make()?;
     let cases = cases(&world);
-    let of = |(i, case): (usize, &Case)| {
+    let of = |(i, case): (usize, &WorkCase)| {
         progress(i as u64, cases.len() as u64);
         row(&world, case)
     };
     cases.iter().enumerate().map(of).collect()
 }
 
-fn row(world: &World, case: &Case) -> Result<Row> {
+fn row(world: &FixtureFolder, case: &WorkCase) -> Result<WorkRow> {
     let counts = counts(&work_of(world, case)?, allocations_are_told()?);
-    Ok(Row {
+    Ok(WorkRow {
         scene: case.name,
         about: case.about,
         counts,
@@ -73,7 +73,7 @@ fn counts(work: &Work, with_allocations: bool) -> Vec<(Kind, u64)> {
 }
 
 /// The work of a scene from its files to what comes out.
-fn work_of(world: &World, case: &Case) -> Result<Work> {
+fn work_of(world: &FixtureFolder, case: &WorkCase) -> Result<Work> {
     let folder = tempfile::tempdir().map_err(|e| Error::value("temporary folder", e))?;
     let (done, work) = counted(|| make(world, case, folder.path()))?;
     done.map(|()| work)
@@ -84,7 +84,7 @@ fn counted<T: Send>(job: impl FnOnce() -> T + Send) -> Result<(T, Work)> {
 }
 
 /// Makes what a case asks for and writes it into a folder.
-fn make(world: &World, case: &Case, folder: &Path) -> Result<()> {
+fn make(world: &FixtureFolder, case: &WorkCase, folder: &Path) -> Result<()> {
     let scene = case.scene.clone();
     let pipeline = Pipeline::open_for(world.config(), &scene)?;
     match case.asked {
@@ -117,7 +117,7 @@ fn allocations_are_told() -> Result<bool> {
 ///
 /// # Errors
 /// As [`measure`]; files that cannot be written.
-pub fn write(folder: impl AsRef<Path>, progress: impl Fn(u64, u64)) -> Result<Vec<Row>> {
+pub fn write(folder: impl AsRef<Path>, progress: impl Fn(u64, u64)) -> Result<Vec<WorkRow>> {
     let folder = folder.as_ref();
     io::create_folder(folder)?;
     let rows = measure(progress)?;
@@ -127,8 +127,8 @@ pub fn write(folder: impl AsRef<Path>, progress: impl Fn(u64, u64)) -> Result<Ve
 }
 
 /// Scenes by kinds of work, in whole numbers; a zero that is promised is marked, and so is a promise that is not kept.
-pub fn table(rows: &[Row]) -> Table {
-    let told = |row: &Row, kind: Kind, count: u64| match (row.absent.contains(&kind), count) {
+pub fn table(rows: &[WorkRow]) -> Table {
+    let told = |row: &WorkRow, kind: Kind, count: u64| match (row.absent.contains(&kind), count) {
         (true, 0) => "0 ✓".to_owned(),
         (true, _) => format!("{count} ✗"),
         (false, _) => count.to_string(),
@@ -137,11 +137,11 @@ pub fn table(rows: &[Row]) -> Table {
 }
 
 /// The same numbers without marks.
-fn csv(rows: &[Row]) -> Table {
+fn csv(rows: &[WorkRow]) -> Table {
     scenes_by_kinds(rows, |_, _, count| count.to_string())
 }
 
-fn scenes_by_kinds(rows: &[Row], told: impl Fn(&Row, Kind, u64) -> String) -> Table {
+fn scenes_by_kinds(rows: &[WorkRow], told: impl Fn(&WorkRow, Kind, u64) -> String) -> Table {
     let kinds: Vec<Kind> = rows.first().map_or(Vec::new(), |row| {
         row.counts.iter().map(|(kind, _)| *kind).collect()
     });
@@ -166,7 +166,7 @@ fn scenes_by_kinds(rows: &[Row], told: impl Fn(&Row, Kind, u64) -> String) -> Ta
 }
 
 /// The table with what it means.
-fn markdown(rows: &[Row]) -> String {
+fn markdown(rows: &[WorkRow]) -> String {
     let kept = rows.iter().filter(|row| row.is_as_promised()).count();
     let head = format!(
         "# What scenes pay for\n\nCounted, not timed; the same numbers at any thread count. ✓ marks a zero that is \

@@ -1,7 +1,7 @@
 //! `petcomp-report scale`: memory and rate, and what a million pictures take.
 
 use super::count;
-use crate::Common;
+use crate::ReportFlags;
 use petcomp_report::scale::{self, ScaleCase, ScaleOptions};
 use std::path::PathBuf;
 
@@ -29,7 +29,7 @@ fn seconds(text: &str) -> Result<f64, String> {
     number.ok_or_else(|| format!("{text}, expected 0 to 3600"))
 }
 
-pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
+pub(crate) fn run(args: &Args, common: &ReportFlags) -> anyhow::Result<()> {
     if let Some(case) = &args.case {
         let case: ScaleCase = serde_json::from_str(case)?;
         println!(

@@ -24,7 +24,7 @@ pub enum Expected {
 
 /// A way in which a photo is harder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Variant {
+pub enum PhotoVariant {
     /// As it was taken.
     Plain,
     /// The light falls off by 15 % over the picture.
@@ -91,7 +91,7 @@ pub enum Variant {
     ScreenEdge,
 }
 
-impl Variant {
+impl PhotoVariant {
     /// All of them.
     pub const ALL: [Self; 32] = [
         Self::Plain,

@@ -6,7 +6,8 @@ use petcomp::DeepImage;
 use petcomp::asset::Texture;
 use petcomp::camera::Camera;
 use petcomp::dataset::{
-    Obstructed, Pictures, Plan, Sample, SampleRange, Sidecar, Split, Times, Writer, Yolo, generate,
+    Obstructed, Pictures, Plan, Provenance, Sample, SampleRange, Sidecar, Split, Writer, Yolo,
+    generate,
 };
 use petcomp::geom::{Pose, UnitQuaternion, Vector2, Vector3};
 use petcomp::label::{LabelOptions, label};
@@ -75,16 +76,12 @@ impl PictureInputs {
 
     fn sample(&self) -> Sample {
         let deep = render(&self.shot, &RenderOptions::default());
+        let frame = composite::frame(&deep, self.shot.plate.as_deref());
+        let labels = label(&deep, &self.shot, &LabelOptions::default());
         Sample {
-            frame: composite::frame(&deep, self.shot.plate.as_deref()),
-            labels: label(&deep, &self.shot, &LabelOptions::default()),
             deep,
-            drawn: self.scene.clone(),
-            scene: self.scene.clone(),
-            scene_seed: 0,
-            rejected: vec![],
-            draws: vec![],
-            times: Times::default(),
+            provenance: Some(Provenance::from_scene(self.scene.clone())),
+            ..Sample::new(frame, labels)
         }
     }
 }

@@ -16,7 +16,7 @@ const TURN: f64 = 0.1;
 
 /// What a photo is taken of, and how.
 #[derive(Clone)]
-pub(super) struct Take {
+pub(super) struct BottlePhoto {
     pub(super) size: (usize, usize),
     pub(super) screen: LinearRgb,
     pub(super) cap: LinearRgb,
@@ -32,7 +32,7 @@ pub(super) struct Take {
     pub(super) length: f64,
 }
 
-impl Default for Take {
+impl Default for BottlePhoto {
     fn default() -> Self {
         let at = vec![[0.5, 0.5]];
         Self {
@@ -98,7 +98,7 @@ fn bottle(x: f64, y: f64, cap: LinearRgb) -> Option<(LinearRgb, f32)> {
     })
 }
 
-impl Take {
+impl BottlePhoto {
     /// Where a pixel's point lies on bottle `i`.
     fn on(&self, i: usize, x: f64, y: f64) -> (f64, f64) {
         let (w, h) = (self.size.0 as f64, self.size.1 as f64);
@@ -152,16 +152,16 @@ impl Take {
     }
 
     /// What is cut out, and how right that is.
-    pub(super) fn cut(&self) -> Result<(CutOut, Likeness)> {
+    pub(super) fn cut(&self) -> Result<(CutOut, OutlineAccuracy)> {
         let (photo, mask) = self.taken();
         let cut = cut_out(&photo, &CutOutOptions::default())?;
-        let likeness = Likeness::of(&cut, &mask);
+        let likeness = OutlineAccuracy::of(&cut, &mask);
         Ok((cut, likeness))
     }
 }
 
 /// How like the truth an outline is.
-pub(super) struct Likeness {
+pub(super) struct OutlineAccuracy {
     /// Intersection over union of the outline.
     pub(super) iou: f64,
     /// The side of the box that is off most, pixels.
@@ -172,7 +172,7 @@ pub(super) struct Likeness {
     pub(super) doubts: Vec<String>,
 }
 
-impl Likeness {
+impl OutlineAccuracy {
     fn of(cut: &CutOut, mask: &Mask) -> Self {
         let found = cut.segmentation.tight.map(|c| c.0 >= 0.5);
         let count = |holds: fn(bool, bool) -> bool| {
@@ -238,7 +238,7 @@ mod tests {
 
     #[test]
     fn a_bottle_is_as_long_as_it_is_said_to_be() {
-        let [left, _, right, _] = sides_of(&Take::default().taken().1);
+        let [left, _, right, _] = sides_of(&BottlePhoto::default().taken().1);
         // Turned by 0.1, its ends 0.08 and 0.24 of its length high.
         let length = 0.8 * 600.0 * libm::cos(TURN);
         assert!(
@@ -249,12 +249,12 @@ mod tests {
 
     #[test]
     fn a_photo_without_noise_of_an_empty_even_screen_is_its_colour() {
-        let take = Take {
+        let take = BottlePhoto {
             at: vec![],
             noise: 0.0,
             uneven: 0.0,
             size: (8, 8),
-            ..Take::default()
+            ..BottlePhoto::default()
         };
         let (photo, mask) = take.taken();
         // Half a code of 8 bits at that brightness.

@@ -1,6 +1,6 @@
 //! Labels that are hard to solve a camera from: nearly no perspective, grazing, tiny, huge, degenerate, wrong.
 
-use super::{Case, Outcome};
+use super::{HardCase, Outcome};
 use petcomp::camera::simulate::{Scenario, View};
 use petcomp::camera::{FocalSource, Label, Priors, Solution, SolveError, SolveOptions, solve};
 use petcomp::{Code, Result};
@@ -8,8 +8,8 @@ use petcomp::{Code, Result};
 /// Views of a kind; the worst of them counts.
 const VIEWS: u64 = 20;
 
-pub(super) fn cases() -> Result<Vec<Case>> {
-    let mut cases: Vec<Case> = [81.0, 85.0, 89.0].map(grazing).into();
+pub(super) fn cases() -> Result<Vec<HardCase>> {
+    let mut cases: Vec<HardCase> = [81.0, 85.0, 89.0].map(grazing).into();
     cases.extend(extremes());
     cases.extend([
         nearly_level(),
@@ -72,8 +72,8 @@ fn is_sound(solution: &Solution) -> bool {
             .any(|v| v.is_nan())
 }
 
-fn grazing(degrees: f64) -> Case {
-    Case::new(
+fn grazing(degrees: f64) -> HardCase {
+    HardCase::new(
         format!("tilted by {degrees} degrees"),
         "exact corners of a 0.6 x 0.4 m rectangle, nothing else known",
         "focal length back to 1e-7, with a warning that the view is grazing",
@@ -94,7 +94,7 @@ fn grazing(degrees: f64) -> Case {
     )
 }
 
-fn extremes() -> Vec<Case> {
+fn extremes() -> Vec<HardCase> {
     let usual = Scenario::default().tilted(25.0);
     let tiny = Scenario {
         image: [20_000, 15_000],
@@ -160,10 +160,10 @@ fn extremes() -> Vec<Case> {
 }
 
 /// Corners are doubles of up to 20 000 px: what perspective they hold, over its size, bounds what can come back.
-fn extreme(name: &str, scenario: Scenario, limit: f64) -> Case {
+fn extreme(name: &str, scenario: Scenario, limit: f64) -> HardCase {
     let input = format!("exact corners of {VIEWS} views at 25 degrees");
     let promise = format!("focal length back to {limit:e}, or two corners told to be one");
-    Case::new(name, input, promise, move || {
+    HardCase::new(name, input, promise, move || {
         let (mut worst, mut refused) = (0.0_f64, 0);
         for k in 0..VIEWS {
             let view = exact(&scenario, k, 1e-4);
@@ -183,8 +183,8 @@ fn extreme(name: &str, scenario: Scenario, limit: f64) -> Case {
     })
 }
 
-fn nearly_level() -> Case {
-    Case::new(
+fn nearly_level() -> HardCase {
+    HardCase::new(
         "tilted by 0.01 degrees",
         format!("exact corners of {VIEWS} views"),
         "corners met to 1e-6 px, sound numbers",
@@ -211,8 +211,8 @@ fn from_infinity() -> Label {
     Label::new([4000, 3000], corners, [0.6, 0.4])
 }
 
-fn without_perspective() -> Case {
-    Case::new(
+fn without_perspective() -> HardCase {
+    HardCase::new(
         "no perspective, nothing known",
         "a rectangle tilted by 30 degrees as seen from infinitely far",
         "focal length at its bound of 100 widths and said to be one; tilt 30 degrees to 0.1",
@@ -234,8 +234,8 @@ fn without_perspective() -> Case {
     )
 }
 
-fn believed() -> Case {
-    Case::new(
+fn believed() -> HardCase {
+    HardCase::new(
         "no perspective, a usual lens believed",
         "the same corners",
         "an answer that is not said to be without bound, sound numbers",
@@ -253,8 +253,8 @@ fn believed() -> Case {
     )
 }
 
-fn inverse_perspective() -> Case {
-    Case::new(
+fn inverse_perspective() -> HardCase {
+    HardCase::new(
         "perspective the wrong way round",
         "corners that no camera can have seen of a rectangle: its square of the focal length is negative",
         "a camera with sound numbers that says how far off it is, or an error",
@@ -293,8 +293,8 @@ const ORDERS: [[usize; 4]; 6] = [
     [0, 3, 2, 1],
 ];
 
-fn order() -> Case {
-    Case::new(
+fn order() -> HardCase {
+    HardCase::new(
         "corners in any order",
         "the same four corners, criss-cross and the other way round",
         "one camera: centres 1e-9 m apart",
@@ -318,7 +318,7 @@ fn order() -> Case {
     )
 }
 
-fn impossible() -> Vec<Case> {
+fn impossible() -> Vec<HardCase> {
     let at = |name: &str, corners: [[f64; 2]; 4], cause: &'static str| {
         refused(name, cause, move |label| {
             label.surface.corners_px = Some(corners)
@@ -400,8 +400,8 @@ fn refused(
     name: &str,
     cause: &'static str,
     spoil: impl Fn(&mut Label) + Send + Sync + 'static,
-) -> Case {
-    Case::new(
+) -> HardCase {
+    HardCase::new(
         name,
         "an else good label",
         format!("refused, by \"{cause}\""),

@@ -1,6 +1,6 @@
 //! A stiff or extreme case of a stage, and what came of it.
 
-use super::Row;
+use super::CaseResult;
 use petcomp::Result;
 use std::any::Any;
 use std::fmt::Display;
@@ -8,7 +8,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Instant;
 
 /// A stiff or extreme case of a stage.
-pub struct Case {
+pub struct HardCase {
     /// What is extreme about it.
     pub name: String,
     /// What goes in.
@@ -29,7 +29,7 @@ pub struct Outcome {
     pub passed: bool,
 }
 
-impl Case {
+impl HardCase {
     /// A case that takes little time.
     pub fn new(
         name: impl Into<String>,
@@ -64,7 +64,7 @@ impl Case {
         }
     }
 
-    pub(super) fn row(&self, stage: &'static str) -> Row {
+    pub(super) fn row(&self, stage: &'static str) -> CaseResult {
         let start = Instant::now();
         let outcome = self.outcome();
         let (name, input, expectation) = (
@@ -72,7 +72,7 @@ impl Case {
             self.input.clone(),
             self.expectation.clone(),
         );
-        Row {
+        CaseResult {
             stage,
             name,
             input,

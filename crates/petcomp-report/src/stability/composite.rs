@@ -1,7 +1,7 @@
 //! Pictures that are hard to put together: very many layers, everything off, values at the ends of their range.
 
 use super::staged::above;
-use super::{Case, Outcome};
+use super::{HardCase, Outcome};
 use petcomp::Image;
 use petcomp::Result;
 use petcomp::composite::{finish, frame};
@@ -12,7 +12,7 @@ use petcomp::{DeepImage, DeepSample};
 use petcomp::{Depth, Film, LinearRgb, ObjectId, PremulRgba};
 use std::sync::Arc;
 
-pub(super) fn cases() -> Result<Vec<Case>> {
+pub(super) fn cases() -> Result<Vec<HardCase>> {
     Ok(vec![
         layers(),
         thousands_of_layers(),
@@ -28,9 +28,9 @@ pub(super) fn cases() -> Result<Vec<Case>> {
     ])
 }
 
-fn layers() -> Case {
+fn layers() -> HardCase {
     let expected = libm::pow(0.97, 200.0);
-    Case::new(
+    HardCase::new(
         "200 films over each other",
         "transmittance 0.97 each, light 0.03, so that they tend to white",
         format!("0.97^200 = {expected:.6} passes and 1 minus that is the light: to 200 roundings"),
@@ -50,8 +50,8 @@ fn layers() -> Case {
     )
 }
 
-fn thousands_of_layers() -> Case {
-    Case::new(
+fn thousands_of_layers() -> HardCase {
+    HardCase::new(
         "10 000 pixels of alpha 1/255 over each other",
         "white",
         "alpha 1 and light 1, to 1e-4, never above 1",
@@ -76,8 +76,8 @@ fn plate(width: usize, height: usize) -> Image<LinearRgb> {
     })
 }
 
-fn everything_off() -> Case {
-    Case::new(
+fn everything_off() -> HardCase {
+    HardCase::new(
         "scene with everything off",
         "a plate; no card, light, ambient, environment, finish",
         "the plate's bits in every pixel, no shadow, no label: 0 differ",
@@ -114,8 +114,8 @@ fn everything_off() -> Case {
     )
 }
 
-fn empty_without_plate() -> Case {
-    Case::new(
+fn empty_without_plate() -> HardCase {
+    HardCase::new(
         "empty scene",
         "no card, no plate",
         "transparent black everywhere: 0 pixels differ",
@@ -154,8 +154,8 @@ fn sample(id: u32, light: f32, visible: f32) -> DeepSample {
     }
 }
 
-fn rounded_up() -> Case {
-    Case::new(
+fn rounded_up() -> HardCase {
+    HardCase::new(
         "shares that add up to a little over 1",
         "300 objects that hide 1/300 of a pixel each, each rounded up, over a plate of 1e5",
         "nothing of the plate passes: 0, not below",
@@ -173,8 +173,8 @@ fn rounded_up() -> Case {
     )
 }
 
-fn bright_beside_dim() -> Case {
-    Case::new(
+fn bright_beside_dim() -> HardCase {
+    HardCase::new(
         "1e5 beside 1e-4",
         "two opaque cards in neighbouring pixels, over a plate of 1e5",
         "1e-4 keeps its bits",
@@ -191,8 +191,8 @@ fn bright_beside_dim() -> Case {
     )
 }
 
-fn broken_plate() -> Case {
-    Case::new(
+fn broken_plate() -> HardCase {
+    HardCase::new(
         "plate with one pixel of NaN",
         "64 x 48 pixels, no card",
         "no more than that pixel is NaN: 1",
@@ -213,8 +213,8 @@ fn broken_plate() -> Case {
     )
 }
 
-fn exposed(ev: f64) -> Case {
-    Case::new(
+fn exposed(ev: f64) -> HardCase {
+    HardCase::new(
         format!("finish: exposure of {ev} EV"),
         "pixels of 0, 1e-4 and 1",
         "black stays 0, order stays, nothing is NaN",
@@ -237,8 +237,8 @@ fn exposed(ev: f64) -> Case {
     )
 }
 
-fn sharpened() -> Case {
-    Case::new(
+fn sharpened() -> HardCase {
+    HardCase::new(
         "finish: sharpening a pixel of 1e5 among 1e-4",
         "an amount of 2",
         "every value in 0..3e5, and 1e-4 kept (to 1e-6) where the window of 4 pixels does not reach",
@@ -263,8 +263,8 @@ fn sharpened() -> Case {
     )
 }
 
-fn one_pixel() -> Case {
-    Case::new(
+fn one_pixel() -> HardCase {
+    HardCase::new(
         "one-pixel image",
         "a film of transmittance 1/2 and light 0.25 over a plate of 1",
         "0.75 exactly",

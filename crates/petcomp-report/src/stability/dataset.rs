@@ -1,11 +1,11 @@
 //! Datasets that are hard to write: of empty pictures, of crowds, cut off in the middle, with numbers at their ends.
 
 use super::staged::{above, grey, level, scene};
-use super::{Case, Outcome};
+use super::{HardCase, Outcome};
 use petcomp::composite;
 use petcomp::dataset::{
-    Format, JOURNAL, LabelConfig, Obstructed, Part, Pictures, Plan, Sample, SampleRange, Shard,
-    Sidecar, Split, SplitOrder, Times, Writer, check, generate, repair,
+    Format, JOURNAL, LabelConfig, Obstructed, Part, Pictures, Plan, Provenance, Sample,
+    SampleRange, Shard, Sidecar, Split, SplitOrder, Writer, check, generate, repair,
 };
 use petcomp::io;
 use petcomp::label::{LabelOptions, label};
@@ -21,7 +21,7 @@ use std::sync::atomic::AtomicBool;
 const CROWD: u32 = 300;
 const IMAGE: [u32; 2] = [64, 48];
 
-pub(super) fn cases() -> Result<Vec<Case>> {
+pub(super) fn cases() -> Result<Vec<HardCase>> {
     let mut cases = vec![
         empty_pictures(),
         crowd(),
@@ -52,18 +52,11 @@ fn taken(shot: &Shot) -> Sample {
 fn sample(shot: &Shot, deep: DeepImage) -> Sample {
     let scene = scene(shot.camera);
     let labels = label(&deep, shot, &LabelOptions::default());
-    let (drawn, rejected, draws, times) = (scene.clone(), Vec::new(), Vec::new(), Times::default());
     let frame = composite::frame(&deep, None).map(|p| p.color().opaque());
     Sample {
-        frame,
         deep,
-        labels,
-        drawn,
-        scene,
-        scene_seed: 0,
-        rejected,
-        draws,
-        times,
+        provenance: Some(Provenance::from_scene(scene)),
+        ..Sample::new(frame, labels)
     }
 }
 
@@ -76,12 +69,12 @@ fn with_a_card(k: u64, size: f64) -> Shot {
 }
 
 /// A dataset in every layout, made and counted.
-struct Made {
+struct TestDataset {
     folder: tempfile::TempDir,
     count: u64,
 }
 
-impl Made {
+impl TestDataset {
     fn of(count: u64, make: impl Fn(u64) -> Sample + Sync) -> Result<Self> {
         let folder = tempfile::tempdir().map_err(|e| Error::file(std::env::temp_dir(), e))?;
         let made = Self { folder, count };
@@ -143,13 +136,13 @@ impl Made {
     }
 }
 
-fn empty_pictures() -> Case {
-    Case::new(
+fn empty_pictures() -> HardCase {
+    HardCase::new(
         "dataset of empty scenes",
         "5 pictures without an object, as YOLO, COCO and VOC",
         "no label, no fault: 0",
         || {
-            let made = Made::of(5, |_| taken(&Shot::new(above(IMAGE, 100.0))))?;
+            let made = TestDataset::of(5, |_| taken(&Shot::new(above(IMAGE, 100.0))))?;
             let (faults, checked) = (made.faults()?, check(made.path())?);
             let rows: usize = checked.rows.iter().sum();
             let told = format!(
@@ -166,13 +159,13 @@ fn empty_pictures() -> Case {
     )
 }
 
-fn crowd() -> Case {
-    Case::new(
+fn crowd() -> HardCase {
+    HardCase::new(
         "300 objects in one pixel",
         "equal boxes of equal class, all labelled",
         "YOLO's equal rows are one; no fault",
         || {
-            let made = Made::of(2, |_| crowded())?;
+            let made = TestDataset::of(2, |_| crowded())?;
             let (rows, faults) = (
                 made.label("train/000001.txt")?.lines().count(),
                 made.faults()?,
@@ -208,26 +201,26 @@ fn crowded() -> Sample {
     sample(&shot, deep)
 }
 
-fn row_of_one_pixel() -> Case {
+fn row_of_one_pixel() -> HardCase {
     const ROW: &str = "0 0.054688 0.052083 0.015625 0.020833\n";
-    Case::new(
+    HardCase::new(
         "YOLO row of one pixel",
         "pixel (3, 2) of 64 x 48",
         format!("3.5/64 2.5/48 1/64 1/48: {}", ROW.trim_end()),
         || {
-            let row = Made::of(2, |_| crowded())?.label("train/000001.txt")?;
+            let row = TestDataset::of(2, |_| crowded())?.label("train/000001.txt")?;
             Ok(Outcome::new(row.trim_end(), row == ROW))
         },
     )
 }
 
-fn too_small() -> Case {
-    Case::new(
+fn too_small() -> HardCase {
+    HardCase::new(
         "one-pixel pictures",
         "1 x 1 pixel, for YOLO",
         "refused: \"expected at least 10 a side\"",
         || {
-            let made = Made::of(1, |_| taken(&Shot::new(above([1, 1], 100.0))));
+            let made = TestDataset::of(1, |_| taken(&Shot::new(above([1, 1], 100.0))));
             Ok(Outcome::refused(
                 made.map(|_| ()),
                 "expected at least 10 a side",
@@ -237,12 +230,12 @@ fn too_small() -> Case {
 }
 
 /// Ten pictures of a card.
-fn of_cards() -> Result<Made> {
-    Made::of(10, |k| taken(&with_a_card(k, 0.1)))
+fn of_cards() -> Result<TestDataset> {
+    TestDataset::of(10, |k| taken(&with_a_card(k, 0.1)))
 }
 
-fn cut_journal() -> Case {
-    Case::new(
+fn cut_journal() -> HardCase {
+    HardCase::new(
         "journal cut off in the middle of a line",
         "10 pictures; the run goes on",
         "only the picture of that line is made again: 1; then no fault",
@@ -261,8 +254,8 @@ fn cut_journal() -> Case {
     )
 }
 
-fn lost_picture() -> Case {
-    Case::new(
+fn lost_picture() -> HardCase {
+    HardCase::new(
         "a picture lost, another cut off",
         "10 pictures; the folder is mended, and the run goes on",
         "8 are good, 2 are made again; then no fault",
@@ -288,13 +281,13 @@ fn lost_picture() -> Case {
     )
 }
 
-fn classes_missing() -> Case {
-    Case::new(
+fn classes_missing() -> HardCase {
+    HardCase::new(
         "object of a class that there is not",
         "class 7 of 1",
         "refused, by \"but there are 1 classes\"",
         || {
-            let made = Made::of(1, |_| {
+            let made = TestDataset::of(1, |_| {
                 let mut sample = taken(&with_a_card(0, 0.1));
                 sample.labels.objects.iter_mut().for_each(|o| o.class = 7);
                 sample
@@ -307,9 +300,9 @@ fn classes_missing() -> Case {
     )
 }
 
-fn splits(percent: u8) -> Case {
+fn splits(percent: u8) -> HardCase {
     let expected = 10 * u64::from(percent);
-    Case::new(
+    HardCase::new(
         format!("{percent} % for validation"),
         "1000 pictures, interleaved and consecutive",
         format!("{expected} for validation, either way"),
@@ -335,8 +328,8 @@ fn splits(percent: u8) -> Case {
     )
 }
 
-fn last_number() -> Case {
-    Case::new(
+fn last_number() -> HardCase {
+    HardCase::new(
         "the last number there is",
         "picture 2^64 - 1 of 2^64 - 1",
         "a part, without overflow",
@@ -353,8 +346,8 @@ fn last_number() -> Case {
     )
 }
 
-fn shards() -> Case {
-    Case::new(
+fn shards() -> HardCase {
+    HardCase::new(
         "more shards than pictures",
         "10 pictures on 1000 machines",
         "each picture on exactly one: 10",
@@ -370,8 +363,8 @@ fn shards() -> Case {
     )
 }
 
-fn no_shard() -> Case {
-    Case::new(
+fn no_shard() -> HardCase {
+    HardCase::new(
         "shard 0, shard 5 of 4, shard 1 of 0",
         "as --shard",
         "refused: 3",
@@ -399,8 +392,8 @@ fn tray() -> Background {
     }
 }
 
-fn negatives() -> Case {
-    Case::new(
+fn negatives() -> HardCase {
+    HardCase::new(
         "recipe of empty scenes alone",
         "negatives = 1, and objects = 0, 20 scenes of each, without a catalog",
         "no object in any: 0",
@@ -431,8 +424,8 @@ fn negatives() -> Case {
     )
 }
 
-fn seeds() -> Case {
-    Case::new(
+fn seeds() -> HardCase {
+    HardCase::new(
         "seeds and numbers at their ends",
         "seeds 0, 1 and 2^64 - 1, scenes 0, 1 and 2^64 - 1",
         "nine different scenes, each the same when it is drawn again",
@@ -465,7 +458,7 @@ fn seeds() -> Case {
     )
 }
 
-fn recipes() -> Vec<Case> {
+fn recipes() -> Vec<HardCase> {
     vec![
         refused("recipe without a background", "background", &[], |_| ()),
         refused("recipe without a catalog", "no asset", &[tray()], |_| ()),
@@ -491,9 +484,14 @@ fn recipes() -> Vec<Case> {
 }
 
 /// A recipe with one thing wrong.
-fn refused(name: &str, cause: &'static str, places: &[Background], spoil: fn(&mut Recipe)) -> Case {
+fn refused(
+    name: &str,
+    cause: &'static str,
+    places: &[Background],
+    spoil: fn(&mut Recipe),
+) -> HardCase {
     let places = places.to_vec();
-    Case::new(
+    HardCase::new(
         name,
         "an else good recipe",
         format!("refused, by \"{cause}\""),

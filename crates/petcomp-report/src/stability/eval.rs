@@ -1,6 +1,6 @@
 //! Detections that are hard to score: none, no truth, all equal, a hundred thousand.
 
-use super::{Case, Outcome};
+use super::{HardCase, Outcome};
 use petcomp::Result;
 use petcomp::eval::{
     Confusion, ConfusionOptions, Definition, Detection, EvalImage, GroundTruth, Scores, bootstrap,
@@ -13,7 +13,7 @@ const MANY: usize = 100_000;
 /// Precision of a detector that makes no error, by YOLOv5's trapezoid, whose curve ends at precision 0.
 const PERFECT_YOLO: f64 = 0.995;
 
-pub(super) fn cases() -> Result<Vec<Case>> {
+pub(super) fn cases() -> Result<Vec<HardCase>> {
     let mut cases = Vec::new();
     for (name, definition, perfect) in [
         ("yolov5", Definition::Yolov5, PERFECT_YOLO),
@@ -176,9 +176,9 @@ fn scored(
     input: &str,
     expected: f64,
     sheets: impl Fn() -> Vec<EvalImage> + Send + Sync + 'static,
-) -> Case {
+) -> HardCase {
     let promise = format!("mAP {expected}, to 1e-9");
-    Case::new(format!("{name}: {what}"), input, promise, move || {
+    HardCase::new(format!("{name}: {what}"), input, promise, move || {
         Ok(Outcome::near(
             Scores::map(&evaluate(&sheets(), definition, &[])),
             expected,
@@ -188,8 +188,8 @@ fn scored(
     })
 }
 
-fn crowded() -> Case {
-    Case::new(
+fn crowded() -> HardCase {
+    HardCase::new(
         "coco: 100 000 boxes in one image",
         "all found; COCO looks at 100 detections",
         "recall 0.001, so that 1 of 101 readings (at recall 0) finds precision 1: 1/101, to 1e-9",
@@ -200,8 +200,8 @@ fn crowded() -> Case {
     )
 }
 
-fn one_image() -> Case {
-    Case::new(
+fn one_image() -> HardCase {
+    HardCase::new(
         "yolov5: 2000 boxes in one image",
         "all found, all of one confidence",
         format!("mAP {PERFECT_YOLO}, to 1e-9"),
@@ -216,8 +216,8 @@ fn one_image() -> Case {
     )
 }
 
-fn half_right() -> Case {
-    Case::new(
+fn half_right() -> HardCase {
+    HardCase::new(
         "coco: equal confidences, half of them wrong",
         "100 found rightly, then 100 where nothing is, all of 0.5",
         "equal ones keep their order, the right ones first: mAP 1, to 1e-9",
@@ -243,8 +243,8 @@ fn half_right() -> Case {
     )
 }
 
-fn no_images() -> Case {
-    Case::new(
+fn no_images() -> HardCase {
+    HardCase::new(
         "interval of no images",
         "a bootstrap of 100 rounds over nothing",
         "0 from 0 to 0; no curve",
@@ -262,8 +262,8 @@ fn no_images() -> Case {
     )
 }
 
-fn confusion() -> Case {
-    Case::new(
+fn confusion() -> HardCase {
+    HardCase::new(
         "confusion: 300 boxes in one place",
         "300 equal true boxes and 300 equal detections of one class",
         "300 pairs, nothing missed, no false alarm",
@@ -281,8 +281,8 @@ fn confusion() -> Case {
     )
 }
 
-fn huge_boxes() -> Case {
-    Case::new(
+fn huge_boxes() -> HardCase {
+    HardCase::new(
         "overlap of boxes of 1e150 pixels",
         "one half of the other; areas of 1e300",
         "intersection over union 1/2, to 1e-12; of infinite ones a number, not NaN",

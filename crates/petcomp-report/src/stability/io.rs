@@ -1,6 +1,6 @@
 //! Files that are hard to write or to read: values beyond a half float, the smallest ones, cut and lying headers, 16k.
 
-use super::{Case, Outcome, memory};
+use super::{HardCase, Outcome, memory};
 use petcomp::Image;
 use petcomp::io::{self, Bits, Limits, ReadOptions, WriteOptions, exr};
 use petcomp::{Coverage, LinearRgb, PremulRgba};
@@ -15,7 +15,7 @@ const HALF_MIN: f32 = 1.0 / (1 << 24) as f32;
 /// Formats that are written.
 const FORMATS: [&str; 4] = ["exr", "png", "tif", "jpg"];
 
-pub(super) fn cases() -> Result<Vec<Case>> {
+pub(super) fn cases() -> Result<Vec<HardCase>> {
     let mut cases = vec![
         half(
             "half float: 65504",
@@ -84,9 +84,9 @@ fn shown(values: &[f32]) -> String {
         .join(", ")
 }
 
-fn half(name: &str, values: &'static [f32], expected: &'static [f32]) -> Case {
+fn half(name: &str, values: &'static [f32], expected: &'static [f32]) -> HardCase {
     let input = format!("{} to a half-float EXR and back", shown(values));
-    Case::new(
+    HardCase::new(
         name,
         input,
         format!("{}: clamped, never infinite", shown(expected)),
@@ -97,8 +97,8 @@ fn half(name: &str, values: &'static [f32], expected: &'static [f32]) -> Case {
     )
 }
 
-fn half_channels() -> Case {
-    Case::new(
+fn half_channels() -> HardCase {
+    HardCase::new(
         "half-float channels above 65504",
         "1e5 and -1e5 in a channel of its own, as cut-outs have",
         "65504 and -65504",
@@ -116,8 +116,8 @@ fn half_channels() -> Case {
     )
 }
 
-fn floats() -> Case {
-    Case::new(
+fn floats() -> HardCase {
+    HardCase::new(
         "float samples at the ends of their range",
         "the smallest denormal, the smallest normal, 1e-4 beside 1e5, the largest, in EXR and TIFF",
         "every bit comes back: 0 differ",
@@ -149,8 +149,8 @@ fn floats() -> Case {
     )
 }
 
-fn codes() -> Case {
-    Case::new(
+fn codes() -> HardCase {
+    HardCase::new(
         "NaN, infinities and negative light in a PNG",
         "NaN, -inf, -1, 1e38, inf in 8 bits",
         "0, 0, 0, 1, 1",
@@ -165,8 +165,8 @@ fn codes() -> Case {
     )
 }
 
-fn one_pixel(format: &'static str) -> Case {
-    Case::new(
+fn one_pixel(format: &'static str) -> HardCase {
+    HardCase::new(
         format!("{format}: one-pixel image"),
         "1 x 1 pixel of green 1/2",
         "1 x 1 pixel back, to 1 code of 255",
@@ -185,8 +185,8 @@ fn one_pixel(format: &'static str) -> Case {
     )
 }
 
-fn empty(format: &'static str) -> Case {
-    Case::new(
+fn empty(format: &'static str) -> HardCase {
+    HardCase::new(
         format!("{format}: no pixel"),
         "0 x 0 and 5 x 0 pixels",
         "refused, and nothing is written",
@@ -222,8 +222,8 @@ fn read_as(path: &Path, bytes: &[u8]) -> Result<Image<PremulRgba>> {
     io::read(path)
 }
 
-fn truncated(format: &'static str) -> Case {
-    Case::new(
+fn truncated(format: &'static str) -> HardCase {
+    HardCase::new(
         format!("{format}: truncated"),
         "17 x 13 pixels, cut at each of 20 places, the first at 0 bytes",
         "refused at every one: 0 read",
@@ -245,11 +245,11 @@ fn lying(
     input: &str,
     limit: &'static str,
     make: impl Fn(&Path) -> Result<PathBuf> + Send + Sync + 'static,
-) -> Case {
+) -> HardCase {
     /// A header, a message and what the decoders keep.
     const FEW_GIB: f64 = 0.064;
     let promise = format!("refused by Limits::{limit}, within 64 MiB");
-    Case::new(name, input, promise, move || {
+    HardCase::new(name, input, promise, move || {
         let (_folder, path) = folder()?;
         let path = make(&path)?;
         let (_, before) = memory::peak_gib(|| ());
@@ -269,7 +269,7 @@ fn strip(message: &str, path: &Path) -> String {
     message.replace(&format!("{}: ", path.display()), "")
 }
 
-fn lying_png() -> Case {
+fn lying_png() -> HardCase {
     lying(
         "png: header of 32767 x 32767 pixels",
         "a PNG of 17 x 13 that says so",
@@ -285,7 +285,7 @@ fn lying_png() -> Case {
     )
 }
 
-fn lying_exr() -> Case {
+fn lying_exr() -> HardCase {
     lying(
         "exr: window of 200 000 pixels a side",
         "an EXR of 17 x 13 that says so",
@@ -309,7 +309,7 @@ fn lying_exr() -> Case {
     )
 }
 
-fn lying_hdr() -> Case {
+fn lying_hdr() -> HardCase {
     lying(
         "hdr: 99999 pixels a side",
         "a header and nothing behind it",
@@ -328,8 +328,8 @@ fn save(path: PathBuf, bytes: &[u8]) -> Result<PathBuf> {
     Ok(path)
 }
 
-fn nothing() -> Case {
-    Case::new(
+fn nothing() -> HardCase {
+    HardCase::new(
         "file of 0 bytes",
         "called .png, .exr, .tif, .jpg",
         "refused: 0 read",
@@ -344,8 +344,8 @@ fn nothing() -> Case {
     )
 }
 
-fn no_file() -> Case {
-    Case::new(
+fn no_file() -> HardCase {
+    HardCase::new(
         "no file",
         "a name that is none",
         "an error that names the file",
@@ -364,8 +364,8 @@ fn no_file() -> Case {
     )
 }
 
-fn nested() -> Case {
-    Case::new(
+fn nested() -> HardCase {
+    HardCase::new(
         "document of 100 000 brackets",
         "[[[[...",
         "refused, not a stack overflow",
@@ -382,8 +382,8 @@ fn nested() -> Case {
     )
 }
 
-fn overlong_number() -> Case {
-    Case::new(
+fn overlong_number() -> HardCase {
+    HardCase::new(
         "document with the number 1e999",
         "[1e999]",
         "refused, not infinity",
@@ -404,8 +404,8 @@ const SIXTEEN_K: usize = 16_384;
 /// The picture in floats once written and once read, its codes and the file, and something on top.
 const SIXTEEN_K_GIB: f64 = 4.0;
 
-fn sixteen_k() -> Case {
-    Case::new(
+fn sixteen_k() -> HardCase {
+    HardCase::new(
         "16k image",
         "a matte of 16384 x 16384 pixels to an 8-bit PNG and back",
         format!("refused by Limits::pixels (128 Mi) until that is raised, then the same; at most {SIXTEEN_K_GIB} GiB"),

@@ -1,6 +1,6 @@
 //! Keys that can hardly work and pixels that are hardly colours, in every profile of the keyer.
 
-use super::{Case, Outcome};
+use super::{HardCase, Outcome};
 use petcomp::Image;
 use petcomp::matte::key::Profile;
 use petcomp::matte::{KeyOptions, Keyed, Keying, Screen, key};
@@ -8,8 +8,8 @@ use petcomp::{Coverage, LinearRgb, PremulRgba};
 
 const GREEN: LinearRgb = LinearRgb::new(0.1, 0.75, 0.2);
 
-pub(super) fn cases() -> Vec<Case> {
-    let mut cases: Vec<Case> = [0.0, 1e-30, 1e-10, 1e-3].map(weak).into();
+pub(super) fn cases() -> Vec<HardCase> {
+    let mut cases: Vec<HardCase> = [0.0, 1e-30, 1e-10, 1e-3].map(weak).into();
     cases.extend([
         pixel("keyer: one-pixel image", [0.3, 0.55, 0.25], 0.609_068_6),
         pixel("keyer: a negative value", [-0.2, 0.3, 0.1], 0.279_411_8),
@@ -51,8 +51,8 @@ fn no_shares(keyed: impl Iterator<Item = Keyed>) -> Outcome {
     Outcome::near(keyed.map(wrong).sum::<usize>() as f64, 0.0, 0.0, "wrong")
 }
 
-fn weak(saturation: f32) -> Case {
-    Case::new(
+fn weak(saturation: f32) -> HardCase {
+    HardCase::new(
         format!("keyer: grey screen, {saturation:e} of colour"),
         "nearly grey pixels against it, in all four profiles",
         "every matte value in 0..1: 0 wrong",
@@ -68,9 +68,9 @@ fn weak(saturation: f32) -> Case {
     )
 }
 
-fn pixel(name: &str, value: [f32; 3], expected: f32) -> Case {
+fn pixel(name: &str, value: [f32; 3], expected: f32) -> HardCase {
     let promise = format!("a matte of {expected}, as Blender 3.4.1 prints it, to 1e-7");
-    Case::new(
+    HardCase::new(
         name,
         format!("{value:?} against {:?}", <[f32; 3]>::from(GREEN)),
         promise,
@@ -90,8 +90,8 @@ fn pixel(name: &str, value: [f32; 3], expected: f32) -> Case {
     )
 }
 
-fn all_of_the_key() -> Case {
-    Case::new(
+fn all_of_the_key() -> HardCase {
+    HardCase::new(
         "keyer: object of the screen's colour",
         "64 x 64 pixels of the key, in all four profiles",
         "nothing is left: matte and cut-out sum to 0",
@@ -122,8 +122,8 @@ fn all_of_the_key() -> Case {
     )
 }
 
-fn extreme_pixels() -> Case {
-    Case::new(
+fn extreme_pixels() -> HardCase {
+    HardCase::new(
         "keyer: values of 1e-42 to 1e30, some negative",
         "17 x 13 pixels, alphas of 0 to 1.5, all stages, all four profiles",
         "no NaN in matte or cut-out: 0",
@@ -158,8 +158,8 @@ fn extreme_pixels() -> Case {
     )
 }
 
-fn no_numbers() -> Case {
-    Case::new(
+fn no_numbers() -> HardCase {
+    HardCase::new(
         "keyer: NaN and infinity, robust profile",
         "9 x 9 pixels, one NaN, one of infinite alpha, a column of NaN in the garbage matte",
         "2 pixels and 9 mattes counted; matte in 0..1, cut-out finite",
@@ -195,8 +195,8 @@ fn no_numbers() -> Case {
     )
 }
 
-fn wide_windows() -> Case {
-    Case::new(
+fn wide_windows() -> HardCase {
+    HardCase::new(
         "keyer: windows of hundreds of pixels",
         "blurs of 300, edges and dilation of 100, in pictures of 1 x 1 to 5 x 1, all four profiles",
         "every matte value in 0..1: 0 wrong",
@@ -223,8 +223,8 @@ fn wide_windows() -> Case {
     )
 }
 
-fn no_pixels() -> Case {
-    Case::new(
+fn no_pixels() -> HardCase {
+    HardCase::new(
         "keyer: no pixel",
         "0 x 0, 0 x 5 and 5 x 0 pixels, all stages",
         "a matte and a cut-out of no pixel: 0",
@@ -245,9 +245,9 @@ fn no_pixels() -> Case {
     )
 }
 
-fn twelve_megapixels() -> Case {
+fn twelve_megapixels() -> HardCase {
     const TILE: usize = 64;
-    Case::new(
+    HardCase::new(
         "keyer: 12 megapixels",
         "4000 x 3000 pixels, a pattern that repeats every 64",
         "the matte repeats, too, away from the border: 0 differ",

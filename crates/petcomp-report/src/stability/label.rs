@@ -1,7 +1,7 @@
 //! Objects that are hard to label: one pixel large, hidden, cut by the border, hundreds in one pixel, none.
 
 use super::staged::{above, card, grey, level, tilted};
-use super::{Case, Outcome};
+use super::{HardCase, Outcome};
 use petcomp::Image;
 use petcomp::Result;
 use petcomp::geom::BBox;
@@ -16,7 +16,7 @@ use std::f64::consts::FRAC_PI_2;
 /// Objects in one pixel, or in one stack.
 const MANY: u32 = 300;
 
-pub(super) fn cases() -> Result<Vec<Case>> {
+pub(super) fn cases() -> Result<Vec<HardCase>> {
     Ok(vec![
         empty(),
         of_one_pixel(),
@@ -76,8 +76,8 @@ fn opaque(id: u32, center: [f64; 3], size: f64) -> Card {
     level(id, center, size, grey(1.0))
 }
 
-fn empty() -> Case {
-    Case::new("no object", "a picture of 64 x 48", "no label: 0", || {
+fn empty() -> HardCase {
+    HardCase::new("no object", "a picture of 64 x 48", "no label: 0", || {
         Ok(Outcome::near(
             labelled(&shot([64, 48], [])).objects.len() as f64,
             0.0,
@@ -95,8 +95,8 @@ const PLACE: BBox = BBox {
     y1: 3.0,
 };
 
-fn of_one_pixel() -> Case {
-    Case::new(
+fn of_one_pixel() -> HardCase {
+    HardCase::new(
         "object of one pixel",
         "pixel (3, 2) alone",
         "box [3, 2] to [4, 3], area 1, wholly seen",
@@ -132,8 +132,8 @@ fn told(objects: &[ObjectLabel], is_right: impl Fn(&ObjectLabel) -> bool) -> Out
     }
 }
 
-fn smaller_than_a_pixel() -> Case {
-    Case::new(
+fn smaller_than_a_pixel() -> HardCase {
+    HardCase::new(
         "object of a hundredth of a pixel",
         "a card of 1 x 1 mm where a pixel is 10 mm",
         "below the threshold of 0.1 in every pixel: no label, 0",
@@ -150,8 +150,8 @@ fn smaller_than_a_pixel() -> Case {
     )
 }
 
-fn many_in_a_pixel() -> Case {
-    Case::new(
+fn many_in_a_pixel() -> HardCase {
+    HardCase::new(
         "300 objects in one pixel",
         "each opaque, each behind the one before it",
         "300 labels of that pixel; the first is seen, the others are not; shares sum to 1",
@@ -175,8 +175,8 @@ fn many_in_a_pixel() -> Case {
     )
 }
 
-fn hidden() -> Case {
-    Case::new(
+fn hidden() -> HardCase {
+    HardCase::new(
         "object that is wholly hidden",
         "an opaque card under a larger one",
         "a label with its whole box, nothing of it seen, covered by the other",
@@ -198,8 +198,8 @@ fn hidden() -> Case {
     )
 }
 
-fn cut_by_the_border() -> Case {
-    Case::new(
+fn cut_by_the_border() -> HardCase {
+    HardCase::new(
         "object cut by the corner of the picture",
         "an opaque card of 20 x 20 px, its middle on the corner [64, 48]",
         "box and outline within the picture: a quarter, 100 px to one row and column",
@@ -218,8 +218,8 @@ fn cut_by_the_border() -> Case {
     )
 }
 
-fn larger_than_the_picture() -> Case {
-    Case::new(
+fn larger_than_the_picture() -> HardCase {
+    HardCase::new(
         "object larger than the picture",
         "an opaque card 1 km across",
         "the picture's own box and all its 3072 pixels",
@@ -240,8 +240,8 @@ fn larger_than_the_picture() -> Case {
     )
 }
 
-fn one_pixel_picture() -> Case {
-    Case::new(
+fn one_pixel_picture() -> HardCase {
+    HardCase::new(
         "one-pixel image",
         "1 x 1 pixel, an opaque card over it",
         "box [0, 0] to [1, 1], 1 px",
@@ -260,8 +260,8 @@ fn one_pixel_picture() -> Case {
     )
 }
 
-fn edge_on() -> Case {
-    Case::new(
+fn edge_on() -> HardCase {
+    HardCase::new(
         "objects out of sight",
         "a card edge-on, one behind the camera, one 3 m away",
         "no label: 0",
@@ -295,8 +295,8 @@ fn edge_on() -> Case {
     )
 }
 
-fn broken_outline() -> Case {
-    Case::new(
+fn broken_outline() -> HardCase {
+    HardCase::new(
         "outline that is none",
         "no corner, one, two, three on a line, one of NaN",
         "the box of the mask all the same, no outline: 5 of 5",
@@ -330,8 +330,8 @@ fn broken_outline() -> Case {
     )
 }
 
-fn deep_stack() -> Case {
-    Case::new(
+fn deep_stack() -> HardCase {
+    HardCase::new(
         "300 cards in a stack",
         "equal opaque cards, each 1 mm above the one before",
         "299 covered, the last on top; visible pixels sum to those of one card",
@@ -356,9 +356,9 @@ fn deep_stack() -> Case {
     )
 }
 
-fn mask_of_16k() -> Case {
+fn mask_of_16k() -> HardCase {
     const SIDE: u32 = 16_384;
-    Case::new(
+    HardCase::new(
         "mask of 16384 x 16384 pixels",
         "every pixel of every other column",
         "2^27 pixels, the whole box but the last column, in 16385 runs",
@@ -378,8 +378,8 @@ fn mask_of_16k() -> Case {
     .for_the_report()
 }
 
-fn threshold() -> Case {
-    Case::new(
+fn threshold() -> HardCase {
+    HardCase::new(
         "coverage at the threshold",
         "a pixel covered by exactly 0.1, and one by the next number above it",
         "a pixel belongs when it is covered by more: 0 and 1 labels",

@@ -2,7 +2,7 @@
 
 use super::render::largest;
 use super::staged::{above, lamp, scene};
-use super::{Case, Outcome};
+use super::{HardCase, Outcome};
 use petcomp::Image;
 use petcomp::LinearRgb;
 use petcomp::Result;
@@ -13,12 +13,12 @@ use petcomp::scene::{AreaLight, EnvironmentMap, Exposure, LightShape, LightTint,
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-pub(super) fn cases() -> Result<Vec<Case>> {
+pub(super) fn cases() -> Result<Vec<HardCase>> {
     let groups = [lamps(), skies(), plates()];
     Ok(groups.into_iter().flatten().collect())
 }
 
-fn lamps() -> Vec<Case> {
+fn lamps() -> Vec<HardCase> {
     let mut cases = Vec::new();
     for shape in [LightShape::Rectangle, LightShape::Ellipse] {
         let name = format!("{shape:?}").to_lowercase();
@@ -73,11 +73,11 @@ fn received(light: &AreaLight) -> f64 {
 }
 
 /// A light that is small from where it is seen: `P cos / (pi r^2)`.
-fn small(shape: &str, light: AreaLight, what: &str) -> Case {
+fn small(shape: &str, light: AreaLight, what: &str) -> HardCase {
     let to = Vector3::from(light.position);
     let expected = light.power * to.normalize().z / (PI * to.norm_squared());
     let promise = format!("a point's irradiance P cos / (pi r^2) = {expected:.4e}, to 0.1 %");
-    Case::new(
+    HardCase::new(
         format!("{shape} {what}"),
         "10 W turned to a level receiver",
         promise,
@@ -93,10 +93,10 @@ fn small(shape: &str, light: AreaLight, what: &str) -> Case {
 }
 
 /// A light that fills the sky: `pi L`.
-fn wide(shape: &str, light: AreaLight, what: &str) -> Case {
+fn wide(shape: &str, light: AreaLight, what: &str) -> HardCase {
     let expected = PI * f64::from(radiance(&light).g);
     let promise = format!("that of a sky as bright, pi L = {expected:.4e}, to 1 %");
-    Case::new(
+    HardCase::new(
         format!("{shape} {what}"),
         "10 W over a level receiver",
         promise,
@@ -111,8 +111,8 @@ fn wide(shape: &str, light: AreaLight, what: &str) -> Case {
     )
 }
 
-fn inside() -> Case {
-    Case::new(
+fn inside() -> HardCase {
+    HardCase::new(
         "receiver in the middle of a light",
         "a light of 1 x 1 m, the point its centre",
         "finite: 0, since it shines away",
@@ -127,9 +127,9 @@ fn inside() -> Case {
     )
 }
 
-fn skies() -> Vec<Case> {
+fn skies() -> Vec<HardCase> {
     let refused = |name: &str, image: fn() -> Image<LinearRgb>, cause: &'static str| {
-        Case::new(
+        HardCase::new(
             name,
             "an environment map",
             format!("refused, by \"{cause}\""),
@@ -169,10 +169,10 @@ fn spotted(value: f32) -> Image<LinearRgb> {
 }
 
 /// An even sky of radiance L gives every receiver `pi L`.
-fn sky(name: &str, image: Image<LinearRgb>, radiance: f32) -> Case {
+fn sky(name: &str, image: Image<LinearRgb>, radiance: f32) -> HardCase {
     let expected = PI * f64::from(radiance);
     let promise = format!("pi L = {expected:.4e} on receivers turned any way, to 0.2 %");
-    Case::new(
+    HardCase::new(
         name,
         format!("{} x {} pixels", image.width(), image.height()),
         promise,
@@ -205,8 +205,8 @@ fn sum_of_pieces(map: &EnvironmentMap, normal: &Vector3<f64>) -> f64 {
         .sum()
 }
 
-fn pieces_add_up() -> Case {
-    Case::new(
+fn pieces_add_up() -> HardCase {
+    HardCase::new(
         "one texel of 1e5 among 1e-4",
         "a map of 64 x 32, cut into 32 pieces, for receivers turned four ways",
         "pieces sum to the irradiance of the whole map, to 1e-5",
@@ -243,7 +243,7 @@ fn flat(value: f32) -> Image<LinearRgb> {
     Image::filled(40, 30, LinearRgb::grey(value))
 }
 
-fn plates() -> Vec<Case> {
+fn plates() -> Vec<HardCase> {
     let lit = LinearRgb::WHITE;
     let one_glint = || {
         Image::from_fn(40, 30, |x, y| {
@@ -305,9 +305,9 @@ fn plates() -> Vec<Case> {
 }
 
 /// Even light of 1 shows white as 1: what the exposure has to be is the plate's white in stops, and 0 where there is none.
-fn exposed(name: &str, plate: Image<LinearRgb>, ambient: LinearRgb, expected_ev: f64) -> Case {
+fn exposed(name: &str, plate: Image<LinearRgb>, ambient: LinearRgb, expected_ev: f64) -> HardCase {
     let promise = format!("an exposure of {expected_ev} EV, to 1e-4");
-    Case::new(
+    HardCase::new(
         format!("exposure: {name}"),
         "matched to the plate's white",
         promise,
@@ -328,8 +328,8 @@ fn exposed(name: &str, plate: Image<LinearRgb>, ambient: LinearRgb, expected_ev:
     )
 }
 
-fn cast_of(name: &str, plate: Image<LinearRgb>) -> Case {
-    Case::new(
+fn cast_of(name: &str, plate: Image<LinearRgb>) -> HardCase {
+    HardCase::new(
         format!("colour of light: {name}"),
         "taken from the surface",
         "white, to 1e-5",
@@ -355,11 +355,11 @@ fn cast_of(name: &str, plate: Image<LinearRgb>) -> Case {
 }
 
 /// The noise of a plate as the standard deviation at mid grey; none where nothing can be told.
-fn noise_of(name: &str, plate: Image<LinearRgb>, expected: Option<f64>) -> Case {
+fn noise_of(name: &str, plate: Image<LinearRgb>, expected: Option<f64>) -> HardCase {
     let promise = expected.map_or("none is told".into(), |sigma| {
         format!("a deviation of {sigma}, to 1e-4")
     });
-    Case::new(format!("noise: {name}"), "measured", promise, move || {
+    HardCase::new(format!("noise: {name}"), "measured", promise, move || {
         Ok(match (plate_noise(&plate), expected) {
             (Noise::Known { shot, read }, Some(sigma)) => {
                 Outcome::near((shot * 0.18 + read * read).sqrt(), sigma, 1e-4, "")

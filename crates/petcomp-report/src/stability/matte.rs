@@ -1,7 +1,7 @@
 //! Photos that are hard to cut out: each must come out right, or say that it may not have.
 
-use super::bottle::{BLUE, GREEN, Likeness, Take};
-use super::{Case, Outcome, keyer};
+use super::bottle::{BLUE, BottlePhoto, GREEN, OutlineAccuracy};
+use super::{HardCase, Outcome, keyer};
 use crate::matte::{GOOD_BOX_PX, GOOD_IOU};
 use petcomp::Image;
 use petcomp::Result;
@@ -11,7 +11,7 @@ use petcomp::matte::{
 };
 use petcomp::{Coverage, LinearRgb};
 
-pub(super) fn cases() -> Result<Vec<Case>> {
+pub(super) fn cases() -> Result<Vec<HardCase>> {
     let mut cases = keyer::cases();
     cases.extend(cut_outs());
     cases.extend(refusals());
@@ -22,7 +22,7 @@ pub(super) fn cases() -> Result<Vec<Case>> {
 
 /// What is promised of a photo.
 #[derive(Clone, Copy)]
-enum Promise {
+enum ExpectedCutOut {
     /// The outline is right and nothing is said against it.
     Right,
     /// The outline is right, or doubted, or the photo is refused.
@@ -31,7 +31,7 @@ enum Promise {
     Doubted(&'static str),
 }
 
-impl Promise {
+impl ExpectedCutOut {
     fn told(self) -> String {
         let right = format!(
             "outline right (IoU {GOOD_IOU}, box to {GOOD_BOX_PX} px of the picture that is searched)"
@@ -45,7 +45,7 @@ impl Promise {
         }
     }
 
-    fn is_kept(self, cut: &CutOut, found: &Likeness) -> bool {
+    fn is_kept(self, cut: &CutOut, found: &OutlineAccuracy) -> bool {
         match self {
             Self::Right => {
                 found.is_right
@@ -67,12 +67,12 @@ fn is_reduced(cut: &CutOut) -> bool {
     cut.film.width().max(cut.film.height()) <= CutOutOptions::default().longest_side
 }
 
-fn cut_out_of(name: &str, promise: Promise, take: Take) -> Case {
+fn cut_out_of(name: &str, promise: ExpectedCutOut, take: BottlePhoto) -> HardCase {
     let input = format!(
         "a bottle on a screen, {} x {} pixels",
         take.size.0, take.size.1
     );
-    Case::new(name, input, promise.told(), move || {
+    HardCase::new(name, input, promise.told(), move || {
         match (take.cut(), promise) {
             (Ok((cut, found)), _) => {
                 let doubts = if found.doubts.is_empty() {
@@ -86,7 +86,7 @@ fn cut_out_of(name: &str, promise: Promise, take: Take) -> Case {
                 );
                 Ok(Outcome::new(told, promise.is_kept(&cut, &found)))
             }
-            (Err(error), Promise::RightOrTold) => {
+            (Err(error), ExpectedCutOut::RightOrTold) => {
                 Ok(Outcome::new(format!("refused: {error}"), true))
             }
             (Err(error), _) => Err(error),
@@ -94,16 +94,16 @@ fn cut_out_of(name: &str, promise: Promise, take: Take) -> Case {
     })
 }
 
-fn cut_outs() -> Vec<Case> {
-    use Promise::{Doubted, Right, RightOrTold};
-    let usual = Take::default;
+fn cut_outs() -> Vec<HardCase> {
+    use ExpectedCutOut::{Doubted, Right, RightOrTold};
+    let usual = BottlePhoto::default;
     let grey = LinearRgb::new(0.5, 0.52, 0.5);
     vec![
         cut_out_of("plain photo, green screen", Right, usual()),
         cut_out_of(
             "plain photo, blue screen",
             Right,
-            Take {
+            BottlePhoto {
                 screen: BLUE,
                 ..usual()
             },
@@ -111,19 +111,19 @@ fn cut_outs() -> Vec<Case> {
         cut_out_of(
             "grey screen",
             Right,
-            Take {
+            BottlePhoto {
                 screen: grey,
                 ..usual()
             },
         ),
-        opaque_on_grey(Take {
+        opaque_on_grey(BottlePhoto {
             screen: grey,
             ..usual()
         }),
         cut_out_of(
             "cap of the screen's hue",
             RightOrTold,
-            Take {
+            BottlePhoto {
                 cap: LinearRgb::new(0.02, 0.25, 0.05),
                 ..usual()
             },
@@ -131,7 +131,7 @@ fn cut_outs() -> Vec<Case> {
         cut_out_of(
             "clipped highlights",
             Right,
-            Take {
+            BottlePhoto {
                 exposure: 1.8,
                 ..usual()
             },
@@ -139,7 +139,7 @@ fn cut_outs() -> Vec<Case> {
         cut_out_of(
             "clipped all over",
             RightOrTold,
-            Take {
+            BottlePhoto {
                 exposure: 3.0,
                 ..usual()
             },
@@ -147,7 +147,7 @@ fn cut_outs() -> Vec<Case> {
         cut_out_of(
             "black photo",
             RightOrTold,
-            Take {
+            BottlePhoto {
                 exposure: 0.0,
                 ..usual()
             },
@@ -155,7 +155,7 @@ fn cut_outs() -> Vec<Case> {
         cut_out_of(
             "noise of 3 %, green screen",
             RightOrTold,
-            Take {
+            BottlePhoto {
                 noise: 0.03,
                 ..usual()
             },
@@ -163,7 +163,7 @@ fn cut_outs() -> Vec<Case> {
         cut_out_of(
             "noise of 3 %, blue screen",
             RightOrTold,
-            Take {
+            BottlePhoto {
                 noise: 0.03,
                 screen: BLUE,
                 ..usual()
@@ -172,7 +172,7 @@ fn cut_outs() -> Vec<Case> {
         cut_out_of(
             "screen uneven by 60 %",
             Right,
-            Take {
+            BottlePhoto {
                 uneven: 0.6,
                 ..usual()
             },
@@ -180,7 +180,7 @@ fn cut_outs() -> Vec<Case> {
         cut_out_of(
             "object over the border",
             Doubted("left border"),
-            Take {
+            BottlePhoto {
                 at: vec![[0.2, 0.5]],
                 ..usual()
             },
@@ -188,7 +188,7 @@ fn cut_outs() -> Vec<Case> {
         cut_out_of(
             "64 x 64 pixels, green screen",
             RightOrTold,
-            Take {
+            BottlePhoto {
                 size: (64, 64),
                 ..usual()
             },
@@ -196,7 +196,7 @@ fn cut_outs() -> Vec<Case> {
         cut_out_of(
             "64 x 64 pixels, blue screen",
             RightOrTold,
-            Take {
+            BottlePhoto {
                 size: (64, 64),
                 screen: BLUE,
                 ..usual()
@@ -205,7 +205,7 @@ fn cut_outs() -> Vec<Case> {
         cut_out_of(
             "12 megapixels",
             Right,
-            Take {
+            BottlePhoto {
                 size: (4000, 3000),
                 ..usual()
             },
@@ -214,8 +214,8 @@ fn cut_outs() -> Vec<Case> {
     ]
 }
 
-fn opaque_on_grey(take: Take) -> Case {
-    Case::new(
+fn opaque_on_grey(take: BottlePhoto) -> HardCase {
+    HardCase::new(
         "grey screen tells nothing of film",
         "the same photo",
         "a guess, and that is a doubt",
@@ -236,16 +236,16 @@ fn opaque_on_grey(take: Take) -> Case {
     )
 }
 
-fn refusals() -> Vec<Case> {
-    let two = Take {
+fn refusals() -> Vec<HardCase> {
+    let two = BottlePhoto {
         at: vec![[0.25, 0.5], [0.75, 0.5]],
         length: 0.4,
-        ..Take::default()
+        ..BottlePhoto::default()
     };
-    let empty = |uneven: f32| Take {
+    let empty = |uneven: f32| BottlePhoto {
         at: vec![],
         uneven,
-        ..Take::default()
+        ..BottlePhoto::default()
     };
     vec![
         refused("two objects", "two objects", move || two.taken().0),
@@ -274,8 +274,8 @@ fn refused(
     name: &str,
     cause: &'static str,
     photo: impl Fn() -> Image<LinearRgb> + Send + Sync + 'static,
-) -> Case {
-    Case::new(
+) -> HardCase {
+    HardCase::new(
         name,
         "to be cut out",
         format!("refused, by \"{cause}\""),
@@ -290,7 +290,7 @@ fn refused(
 
 /// A plain photo with one bad pixel.
 fn spoiled(value: f32) -> Image<LinearRgb> {
-    let mut photo = Take::default().taken().0;
+    let mut photo = BottlePhoto::default().taken().0;
     photo[(300, 160)].r = value;
     photo
 }
@@ -328,7 +328,7 @@ fn on(screen: LinearRgb, exposure: f32) -> Image<LinearRgb> {
     })
 }
 
-fn films() -> Vec<Case> {
+fn films() -> Vec<HardCase> {
     let white = || Image::filled(SIZE.0, SIZE.1, LinearRgb::WHITE);
     vec![
         nothing_extreme(),
@@ -377,14 +377,14 @@ fn film_told(
     photo: fn() -> Image<LinearRgb>,
     screen: LinearRgb,
     cause: &'static str,
-) -> Case {
+) -> HardCase {
     let said = if cause.is_empty() {
         String::new()
     } else {
         format!("; said: \"{cause}\"")
     };
     let promise = format!("opacity in 0..1 and light finite in every pixel{said}");
-    Case::new(name, "neutral film on an even screen", promise, move || {
+    HardCase::new(name, "neutral film on an even screen", promise, move || {
         let found = of_film(&photo(), screen)?;
         let unsound = found.film.pixels().iter().filter(|p| !p.is_sound()).count();
         let remarks = found
@@ -406,9 +406,9 @@ fn film_told(
 }
 
 /// A photo of one colour: nothing passes where it is black, all where it is the screen's.
-fn film_passing(name: &str, photo: fn() -> Image<LinearRgb>, expected: f32) -> Case {
+fn film_passing(name: &str, photo: fn() -> Image<LinearRgb>, expected: f32) -> HardCase {
     let promise = format!("transmittance {expected} in every pixel, to 0.05 on average");
-    Case::new(name, "on an even green screen", promise, move || {
+    HardCase::new(name, "on an even green screen", promise, move || {
         let found = of_film(&photo(), GREEN)?;
         let mask = inside();
         let off = found
@@ -430,9 +430,9 @@ fn inside_area() -> f64 {
 }
 
 /// The well-conditioned neighbour of the others.
-fn nothing_extreme() -> Case {
+fn nothing_extreme() -> HardCase {
     let promise = "transmittance to 0.02 on average";
-    Case::new(
+    HardCase::new(
         "film, nothing extreme",
         "neutral film on an even green screen",
         promise,
@@ -447,11 +447,11 @@ fn nothing_extreme() -> Case {
 }
 
 /// So dark that no code of a picture would tell: the stage counts on the noise of coded pictures.
-fn underexposed() -> Case {
+fn underexposed() -> HardCase {
     const DARK: f32 = 1e-3;
     let promise =
         "transmittance to 0.02 on average, or a mean uncertainty of at least half of its error";
-    Case::new(
+    HardCase::new(
         "film 1000 times underexposed",
         "neutral film on an even green screen",
         promise,
@@ -485,8 +485,8 @@ fn transmittance_error(found: &Image<LinearRgb>) -> f64 {
         / inside_area()
 }
 
-fn empty_mask() -> Case {
-    Case::new(
+fn empty_mask() -> HardCase {
+    HardCase::new(
         "film without an object",
         "a mask of zeros",
         "refused, by \"mask of the object is empty\"",
@@ -498,8 +498,8 @@ fn empty_mask() -> Case {
     )
 }
 
-fn no_background() -> Case {
-    Case::new(
+fn no_background() -> HardCase {
+    HardCase::new(
         "screen without background",
         "no pixel of it to fit to",
         "refused: there is not enough",
@@ -525,10 +525,10 @@ fn triangulated(screens: [LinearRgb; 2], exposure: f32) -> Result<Triangulated> 
     triangulate(&shots, &inside(), &TriangulateOptions::default())
 }
 
-fn two_screens() -> Vec<Case> {
+fn two_screens() -> Vec<HardCase> {
     let exact = |name: &str, screens: [LinearRgb; 2]| {
         let promise = "photo = F + T screen has one solution in green: T to 1e-4 on average";
-        Case::new(
+        HardCase::new(
             name,
             "neutral film on two even screens, no noise",
             promise,
@@ -542,7 +542,7 @@ fn two_screens() -> Vec<Case> {
         )
     };
     let alike = |name: &str, screens: [LinearRgb; 2]| {
-        Case::new(
+        HardCase::new(
             name,
             "neutral film on both",
             "refused, by \"too similar\"",
@@ -560,8 +560,8 @@ fn two_screens() -> Vec<Case> {
     ]
 }
 
-fn saturated() -> Case {
-    Case::new(
+fn saturated() -> HardCase {
+    HardCase::new(
         "two photos clipped all over",
         "film on green and blue, 100 times too bright: screens and photos are white",
         "refused, by \"too similar\"",
@@ -574,8 +574,8 @@ fn saturated() -> Case {
     )
 }
 
-fn clipped_screen() -> Case {
-    Case::new(
+fn clipped_screen() -> HardCase {
+    HardCase::new(
         "two photos with a clipped screen",
         "film on green and blue, 3 times too bright: the green of one screen is cut from 1.26 to 1",
         "T to 0.05 on average, or told: a doubt, or a residual or mean uncertainty above 0.05",
@@ -607,8 +607,8 @@ fn clipped_screen() -> Case {
     )
 }
 
-fn one_screen() -> Case {
-    Case::new(
+fn one_screen() -> HardCase {
+    HardCase::new(
         "triangulation from one photo",
         "film on green",
         "refused, by \"expected at least 2\"",

@@ -21,7 +21,7 @@ mod render_light;
 mod settle;
 mod staged;
 
-pub use case::{Case, Outcome};
+pub use case::{HardCase, Outcome};
 
 use petcomp::io::{create_folder, write_text};
 use petcomp::plot::Table;
@@ -29,7 +29,7 @@ use petcomp::{Error, Result};
 use std::path::Path;
 
 /// Makes the cases of a stage.
-type Cases = fn() -> Result<Vec<Case>>;
+type Cases = fn() -> Result<Vec<HardCase>>;
 
 /// The stages that have cases, in the order of the data.
 const STAGES: &[(&str, Cases)] = &[
@@ -47,7 +47,7 @@ const STAGES: &[(&str, Cases)] = &[
 
 /// How a case ended.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Row {
+pub struct CaseResult {
     /// Whose case it is.
     pub stage: &'static str,
     /// What is extreme about it.
@@ -71,7 +71,7 @@ pub fn stages() -> impl Iterator<Item = &'static str> {
 ///
 /// # Errors
 /// [`Error::Value`] for a stage that has none.
-pub fn cases(stage: &str) -> Result<Vec<(&'static str, Case)>> {
+pub fn cases(stage: &str) -> Result<Vec<(&'static str, HardCase)>> {
     let asked: Vec<_> = STAGES
         .iter()
         .filter(|(name, _)| stage.is_empty() || *name == stage)
@@ -94,13 +94,13 @@ pub fn cases(stage: &str) -> Result<Vec<(&'static str, Case)>> {
 ///
 /// # Errors
 /// None that a caller can cause: cases are made in code.
-pub fn measure(progress: impl Fn(u64, u64)) -> Result<Vec<Row>> {
+pub fn measure(progress: impl Fn(u64, u64)) -> Result<Vec<CaseResult>> {
     Ok(run(&cases("")?, progress))
 }
 
 /// Runs cases one after another; `progress` hears of each and of how many there are.
-pub fn run(cases: &[(&'static str, Case)], progress: impl Fn(u64, u64)) -> Vec<Row> {
-    let row = |(i, (stage, case)): (usize, &(&'static str, Case))| {
+pub fn run(cases: &[(&'static str, HardCase)], progress: impl Fn(u64, u64)) -> Vec<CaseResult> {
+    let row = |(i, (stage, case)): (usize, &(&'static str, HardCase))| {
         progress(i as u64, cases.len() as u64);
         case.row(stage)
     };
@@ -108,7 +108,7 @@ pub fn run(cases: &[(&'static str, Case)], progress: impl Fn(u64, u64)) -> Vec<R
 }
 
 /// Cases as a table, a row each.
-pub fn table(rows: &[Row]) -> Table {
+pub fn table(rows: &[CaseResult]) -> Table {
     let mut table = Table::new([
         "stage",
         "case",
@@ -135,7 +135,7 @@ pub fn table(rows: &[Row]) -> Table {
 }
 
 /// How many cases each stage has and how many of them pass.
-pub fn summary(rows: &[Row]) -> Table {
+pub fn summary(rows: &[CaseResult]) -> Table {
     let mut table = Table::new(["stage", "cases", "pass", "fail"]);
     for stage in stages() {
         let of_stage = || rows.iter().filter(|row| row.stage == stage);
@@ -152,7 +152,7 @@ pub fn summary(rows: &[Row]) -> Table {
 ///
 /// # Errors
 /// As [`cases`]; files that cannot be written. A case that fails is a row, not an error.
-pub fn write(folder: &Path, stage: &str, progress: impl Fn(u64, u64)) -> Result<Vec<Row>> {
+pub fn write(folder: &Path, stage: &str, progress: impl Fn(u64, u64)) -> Result<Vec<CaseResult>> {
     let rows = run(&cases(stage)?, progress);
     create_folder(folder)?;
     write_text(folder.join("stability.csv"), &table(&rows).csv())?;
@@ -196,14 +196,17 @@ mod tests {
     #[test]
     fn a_case_that_panics_or_fails_is_a_row_that_failed() {
         let cases = [
-            ("a", Case::new("panics", "", "", || panic!("index 3 of 2"))),
             (
                 "a",
-                Case::new("errs", "", "", || Err(Error::value("size", "0"))),
+                HardCase::new("panics", "", "", || panic!("index 3 of 2")),
+            ),
+            (
+                "a",
+                HardCase::new("errs", "", "", || Err(Error::value("size", "0"))),
             ),
             (
                 "b",
-                Case::new("good", "", "", || Ok(Outcome::near(1.0, 1.0, 0.0, "m"))),
+                HardCase::new("good", "", "", || Ok(Outcome::near(1.0, 1.0, 0.0, "m"))),
             ),
         ];
         let rows = run(&cases, |_, _| ());

@@ -1,7 +1,7 @@
 //! Shots that are hard to render: very many layers, very near, edge-on, very bright beside very dim, very small and large.
 
 use super::staged::{above, card, grey, lamp, level, looking_at, projected_area, small, tilted};
-use super::{Case, Outcome, memory, render_light};
+use super::{HardCase, Outcome, memory, render_light};
 use crate::render::GOOD;
 use petcomp::DeepImage;
 use petcomp::Image;
@@ -19,7 +19,7 @@ const LAYERS: u32 = 200;
 /// A product or sum of that many single precision numbers is known to this.
 const ROUNDING: f64 = LAYERS as f64 * f32::EPSILON as f64;
 
-pub(super) fn cases() -> Result<Vec<Case>> {
+pub(super) fn cases() -> Result<Vec<HardCase>> {
     let mut cases = vec![
         layers_for_the_eye(),
         layers_for_the_light(),
@@ -60,9 +60,9 @@ fn thin(opacity: LinearRgb) -> Film {
     }
 }
 
-fn layers_for_the_eye() -> Case {
+fn layers_for_the_eye() -> HardCase {
     let expected = libm::pow(0.99, f64::from(LAYERS));
-    Case::new(
+    HardCase::new(
         "200 layers of film before the eye",
         "200 level cards of transmittance 0.99 over one pixel",
         format!("0.99^200 = {expected:.6} passes, to 200 roundings"),
@@ -77,9 +77,9 @@ fn layers_for_the_eye() -> Case {
     )
 }
 
-fn layers_for_the_light() -> Case {
+fn layers_for_the_light() -> HardCase {
     let expected = libm::pow(0.99, f64::from(LAYERS));
-    Case::new(
+    HardCase::new(
         "200 layers of film before the light",
         "the surface under 200 level cards of transmittance 0.99",
         format!("0.99^200 = {expected:.6} of the light arrives, to 200 roundings"),
@@ -98,10 +98,10 @@ fn layers_for_the_light() -> Case {
     )
 }
 
-fn tinted_layers() -> Case {
+fn tinted_layers() -> HardCase {
     let passes = [0.999, 0.99, 0.9];
     let expected = passes.map(|t: f64| libm::pow(t, f64::from(LAYERS)));
-    Case::new(
+    HardCase::new(
         "200 layers of tinted film",
         "200 level cards that pass 0.999, 0.99 and 0.9 of red, green and blue",
         format!(
@@ -135,8 +135,8 @@ fn off_a_full_card(deep: &DeepImage, depth: f64) -> f64 {
     pixels.map(off).fold(0.0, f64::max)
 }
 
-fn near() -> Case {
-    Case::new(
+fn near() -> HardCase {
+    HardCase::new(
         "camera 1 cm above a card",
         "an opaque card of albedo 1/2, 20 cm wide, 1 cm under the eye, under even light of 1",
         "alpha 1, light 1/2 and depth 0.01 m in every pixel, to 1e-5",
@@ -151,8 +151,8 @@ fn near() -> Case {
     )
 }
 
-fn near_and_grazing() -> Case {
-    Case::new(
+fn near_and_grazing() -> HardCase {
+    HardCase::new(
         "camera 1 cm above a card, looking along it",
         "an opaque card 20 m wide, the eye 1 cm over it, tilted by 80 degrees, under even light of 1",
         "below the horizon, 1 pixel away from it, alpha 1 and light 1/2, to 1e-4; above it nothing",
@@ -200,7 +200,7 @@ const PLACES: u32 = 64;
 /// A card that is nearly edge-on: what the picture shows of it, in pixels, is the area of its projected corners.
 ///
 /// Each row of the picture has two samples a pixel: a strip thinner than their distance is met or missed, as it lies.
-fn steep(degrees: f64) -> Case {
+fn steep(degrees: f64) -> HardCase {
     const FOCAL: f64 = 400.0;
     const LENGTH: f64 = 0.2;
     let shown = move |place: u32| {
@@ -221,7 +221,7 @@ fn steep(degrees: f64) -> Case {
     // Places a step apart meet a strip of so many pixels to one of them.
     let width = area / (LENGTH * FOCAL / 0.9);
     let mean_bound = 0.01 + 1.0 / (f64::from(PLACES) * width);
-    Case::new(
+    HardCase::new(
         format!("card turned by {degrees} degrees"),
         format!(
             "an opaque card of which {area:.1} pixels are seen, at {PLACES} places across a pixel"
@@ -259,8 +259,8 @@ fn covered(deep: &DeepImage) -> f64 {
         .sum()
 }
 
-fn one_pixel() -> Case {
-    Case::new(
+fn one_pixel() -> HardCase {
+    HardCase::new(
         "one-pixel image",
         "a tilted card in a shadow of its own, seen by 1 x 1 pixel",
         "the middle pixel of 65 x 65 that the same camera sees, to 1e-5",
@@ -289,8 +289,8 @@ fn one_pixel() -> Case {
     )
 }
 
-fn white_on_white() -> Case {
-    Case::new(
+fn white_on_white() -> HardCase {
+    HardCase::new(
         "light between two white planes",
         "a surface of albedo 1 under a white opaque card, which throws back all that it gets",
         "no more than 20 times as bright (light thrown back is held at 0.95); never infinite",
@@ -338,8 +338,8 @@ const SIXTEEN_K_GIB: f64 = 6.0;
 /// which takes an eighth of a texel off each side.
 const SHOWN: f64 = (2000.0 * (1.0 - 0.25 / 64.0)) * (2000.0 * (1.0 - 0.25 / 64.0));
 
-fn sixteen_k() -> Case {
-    Case::new(
+fn sixteen_k() -> HardCase {
+    HardCase::new(
         "16k image",
         "16384 x 16384 pixels with a card of 2000 x 2000 in the last corner",
         format!("{SHOWN:.0} pixels covered, to 1e-4; the last pixel's plate untouched; at most {SIXTEEN_K_GIB} GiB"),
@@ -363,7 +363,7 @@ fn sixteen_k() -> Case {
 }
 
 /// Shots in which nothing can be seen of the card: no sample in any pixel, and a plate that keeps its bits.
-fn nothing_to_see() -> Vec<Case> {
+fn nothing_to_see() -> Vec<HardCase> {
     let gray = || Image::filled(8, 8, grey(0.8));
     let flat = UnitQuaternion::identity;
     let shots: Vec<(&str, Card)> = vec![
@@ -408,7 +408,7 @@ fn nothing_to_see() -> Vec<Case> {
     ];
     let case = |(name, card): (&str, Card)| {
         let expectation = "no light, no coverage, in either renderer: exactly 0 px";
-        Case::new(name, "alone over a plate", expectation, move || {
+        HardCase::new(name, "alone over a plate", expectation, move || {
             let shot = Shot::new(above([16, 12], 20.0))
                 .with_card(card.clone())
                 .with_ambient(LinearRgb::WHITE);
@@ -432,7 +432,7 @@ fn nothing_to_see() -> Vec<Case> {
 }
 
 /// Shots whose middle pixel has a known coverage.
-fn awkward() -> Vec<Case> {
+fn awkward() -> Vec<HardCase> {
     let base = || Shot::new(above([15, 11], 20.0)).with_light(lamp([0.3, 0.2, 0.9], 0.4, 10.0));
     let flat = UnitQuaternion::identity;
     let one = |center: [f64; 3], texture: Image<PremulRgba>| {
@@ -482,7 +482,7 @@ fn awkward() -> Vec<Case> {
     ]
 }
 
-fn covering(name: &str, shot: Shot, [least, most]: [f64; 2]) -> Case {
+fn covering(name: &str, shot: Shot, [least, most]: [f64; 2]) -> HardCase {
     let coverage = if least == most {
         format!("{least}")
     } else {
@@ -491,7 +491,7 @@ fn covering(name: &str, shot: Shot, [least, most]: [f64; 2]) -> Case {
     let promise = format!(
         "coverage {coverage} in the middle (to 1e-5), light finite, shadows in 0..1, in either renderer"
     );
-    Case::new(name, "under a light of 10 W", promise, move || {
+    HardCase::new(name, "under a light of 10 W", promise, move || {
         let options = RenderOptions::default();
         let ends = [render(&shot, &options), render_reference(&shot, &options)];
         let state = if ends.iter().all(is_sound) {

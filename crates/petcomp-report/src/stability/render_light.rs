@@ -1,7 +1,7 @@
 //! Light that is hard to render: grazing, without size, in the middle of a card, very bright beside very dim.
 
 use super::staged::{above, card, grey, lamp, level, small, tilted};
-use super::{Case, Outcome};
+use super::{HardCase, Outcome};
 use crate::render::{GOOD, HIGH, settings};
 use petcomp::Image;
 use petcomp::asset::{Panorama, uv_to_direction};
@@ -14,8 +14,8 @@ use petcomp::{LinearRgb, PremulRgba};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::sync::Arc;
 
-pub(super) fn cases() -> Vec<Case> {
-    let mut cases: Vec<Case> = [10.0, 1.0, 0.1].map(grazing).into();
+pub(super) fn cases() -> Vec<HardCase> {
+    let mut cases: Vec<HardCase> = [10.0, 1.0, 0.1].map(grazing).into();
     cases.extend([1e-2, 1e-4, 1e-6, 0.0].map(small_light));
     cases.extend(
         settings()
@@ -46,11 +46,11 @@ fn from_a_point(light: &AreaLight) -> f64 {
     light.power * to.normalize().z / (PI * PI * to.norm_squared())
 }
 
-fn grazing(degrees: f64) -> Case {
+fn grazing(degrees: f64) -> HardCase {
     let (sin, cos) = libm::sincos(degrees.to_radians());
     let light = lamp([10.0 * cos, 0.0, 10.0 * sin], 0.001, 1000.0);
     let expected = from_a_point(&light);
-    Case::new(
+    HardCase::new(
         format!("light grazing at {degrees} degrees"),
         "a small light of 1000 W, 10 m away, over a white level card",
         format!("cosine law: {expected:.6e}, to 0.1 %"),
@@ -66,7 +66,7 @@ fn grazing(degrees: f64) -> Case {
     )
 }
 
-fn small_light(side: f64) -> Case {
+fn small_light(side: f64) -> HardCase {
     let light = lamp([0.3, 0.2, 0.9], side, 10.0);
     let expected = from_a_point(&light);
     let name = if side > 0.0 {
@@ -74,7 +74,7 @@ fn small_light(side: f64) -> Case {
     } else {
         "light of no size".into()
     };
-    Case::new(
+    HardCase::new(
         name,
         "10 W, 0.97 m away, over a white level card",
         format!("the limit of small lights, P cos / (pi r)^2 = {expected:.6}: to 0.1 %"),
@@ -89,7 +89,7 @@ fn small_light(side: f64) -> Case {
     )
 }
 
-fn cut_by_the_horizon((quality, options): (&str, RenderOptions)) -> Case {
+fn cut_by_the_horizon((quality, options): (&str, RenderOptions)) -> HardCase {
     let light = lamp([1.0, 0.0, 0.0], 1.0, 10.0);
     let white = f64::from(radiance(&light).g) / PI;
     let expected = polygon_irradiance(
@@ -97,7 +97,7 @@ fn cut_by_the_horizon((quality, options): (&str, RenderOptions)) -> Case {
         Point3::origin(),
         Vector3::z(),
     ) * white;
-    Case::new(
+    HardCase::new(
         format!("light half below the horizon, quality {quality}"),
         "an upright light of 1 x 1 m, 1 m away, half of it under the plane of a white level card",
         format!("Lambert's formula for the upper half, {expected:.6}: to 5 %, 0.07 stops"),
@@ -120,7 +120,7 @@ fn at(x: f64, y: f64, image: [u32; 2]) -> Camera {
     camera
 }
 
-fn through_a_card() -> Case {
+fn through_a_card() -> HardCase {
     let light = lamp([0.0, 0.0, 0.5], 0.2, 10.0);
     let corners = |left: f64| {
         [[left, -0.1], [0.1, -0.1], [0.1, 0.1], [left, 0.1]].map(|[x, y]| Point3::new(x, y, 0.5))
@@ -128,7 +128,7 @@ fn through_a_card() -> Case {
     let from =
         |left: f64| polygon_irradiance(&corners(left), Point3::new(0.3, 0.0, 0.0), Vector3::z());
     let expected = from(0.0) / from(-0.1);
-    Case::new(
+    HardCase::new(
         "light inside a card",
         "an upright opaque card through the middle of a light of 0.2 x 0.2 m; the surface on one side of it",
         format!("that half of the light: {expected:.4} of the irradiance, to 0.02 at quality high"),
@@ -153,10 +153,10 @@ fn through_a_card() -> Case {
     )
 }
 
-fn bright_beside_dim() -> Case {
+fn bright_beside_dim() -> HardCase {
     let [bright, dim] = [1e5, 1e-4].map(|power| lamp([0.3, 0.2, 0.9], 0.001, power));
     let expected = from_a_point(&bright) + from_a_point(&dim);
-    Case::new(
+    HardCase::new(
         "light of 1e5 W beside one of 1e-4 W",
         "both small, in one place, over a white level card",
         format!("their sum: {expected:.1}, to 0.1 %"),
@@ -171,13 +171,13 @@ fn bright_beside_dim() -> Case {
 }
 
 /// What a card throws on the surface where it hides one light and not the other.
-fn dim_in_the_shade() -> Case {
+fn dim_in_the_shade() -> HardCase {
     let (bright, dim) = (
         lamp([0.0, 0.0, 0.9], 0.01, 1e5),
         lamp([0.9, 0.0, 0.9], 0.01, 1e-4),
     );
     let expected = from_a_point(&dim) / (from_a_point(&bright) + from_a_point(&dim));
-    Case::new(
+    HardCase::new(
         "light of 1e-4 W in the shadow of one of 1e5 W",
         "an opaque card hides the bright light from the surface, not the dim one",
         format!(
@@ -232,8 +232,8 @@ fn by_brute_force(map: &EnvironmentMap, counts: impl Fn(&Vector3<f64>) -> bool) 
         .sum()
 }
 
-fn sun() -> Case {
-    Case::new(
+fn sun() -> HardCase {
+    HardCase::new(
         "sun of 1e5 in a sky of 1e-4",
         "a map of 512 x 256 with 4 texels of sun, over a white level card",
         "the midpoint rule over 1 M directions, to 0.5 %",
@@ -246,8 +246,8 @@ fn sun() -> Case {
     )
 }
 
-fn sun_in_the_shade() -> Case {
-    Case::new(
+fn sun_in_the_shade() -> HardCase {
+    HardCase::new(
         "sky of 1e-4 in the shadow of a sun of 1e5",
         "the surface where a small opaque card hides the sun",
         "what the rest of the sky gives, as a share of all, by the midpoint rule: to 1e-4",

@@ -1,6 +1,6 @@
 //! Falls that are hard to settle: very thin and thick cards, very many, very small and large, very unequal, started badly.
 
-use super::{Case, Outcome};
+use super::{HardCase, Outcome};
 use petcomp::Result;
 use petcomp::geom::{UnitQuaternion, Vector3};
 use petcomp::scene::{Object, Placement, Scene, SettleOptions};
@@ -12,7 +12,7 @@ const MANY: usize = 100;
 
 /// What is promised of the end of a fall.
 #[derive(Clone, Copy)]
-enum Promise {
+enum ExpectedEnd {
     /// [`SettleVerdict::Rested`].
     Rests,
     /// Any other verdict, or an error: the scene or its options cannot be right.
@@ -22,15 +22,15 @@ enum Promise {
 }
 
 /// A fall and what is promised of it.
-struct Extreme {
+struct HardFall {
     name: String,
     scene: Scene,
     options: SettleOptions,
-    promise: Promise,
+    promise: ExpectedEnd,
 }
 
 /// Cards are 200 mm long where nothing else is said.
-pub(super) fn cases() -> Result<Vec<Case>> {
+pub(super) fn cases() -> Result<Vec<HardCase>> {
     let groups = [
         thicknesses()?,
         numbers()?,
@@ -40,12 +40,12 @@ pub(super) fn cases() -> Result<Vec<Case>> {
         arrangements()?,
         impossible()?,
     ];
-    let falls = groups.into_iter().flatten().map(Extreme::into_case);
+    let falls = groups.into_iter().flatten().map(HardFall::into_case);
     Ok(falls.chain([empty(), at_rest()?]).collect())
 }
 
-fn empty() -> Case {
-    Case::new(
+fn empty() -> HardCase {
+    HardCase::new(
         "empty scene",
         "no card",
         "the scene as it is, after 0 s",
@@ -60,9 +60,9 @@ fn empty() -> Case {
     )
 }
 
-fn at_rest() -> Result<Case> {
+fn at_rest() -> Result<HardCase> {
     let scene = settle(heap(0, 5)?, &SettleOptions::default())?.into_scene()?;
-    Ok(Case::new(
+    Ok(HardCase::new(
         "everything at rest",
         "5 cards that have come to rest",
         "the scene as it is, after 0 s",
@@ -87,8 +87,8 @@ fn unchanged(scene: &Scene, end: &Settled) -> Outcome {
     )
 }
 
-impl Extreme {
-    fn into_case(self) -> Case {
+impl HardFall {
+    fn into_case(self) -> HardCase {
         let cards = self.scene.objects.len();
         let input = if cards == 1 {
             "1 card".into()
@@ -101,7 +101,7 @@ impl Extreme {
             options,
             promise,
         } = self;
-        let case = Case::new(name, input, promise.told(&options), move || {
+        let case = HardCase::new(name, input, promise.told(&options), move || {
             Ok(promise.outcome(&scene, &options))
         });
         if cards > MANY {
@@ -112,7 +112,7 @@ impl Extreme {
     }
 }
 
-impl Promise {
+impl ExpectedEnd {
     fn told(self, options: &SettleOptions) -> String {
         let [overlap, rise] =
             [options.max_overlap, options.max_energy_rise].map(|share| share * 100.0);
@@ -160,16 +160,16 @@ fn told(end: &Settled, typical: f64) -> String {
     )
 }
 
-fn extreme(name: impl Into<String>, scene: Scene) -> Extreme {
-    Extreme {
+fn extreme(name: impl Into<String>, scene: Scene) -> HardFall {
+    HardFall {
         name: name.into(),
         scene,
         options: SettleOptions::default(),
-        promise: Promise::Rests,
+        promise: ExpectedEnd::Rests,
     }
 }
 
-fn thicknesses() -> Result<Vec<Extreme>> {
+fn thicknesses() -> Result<Vec<HardFall>> {
     let of = |mm: f64| {
         let scene = changed(heap(1, 12)?, mm / 1e3, |_, object| {
             object.thickness = mm / 1e3
@@ -182,12 +182,12 @@ fn thicknesses() -> Result<Vec<Extreme>> {
         .collect()
 }
 
-fn numbers() -> Result<Vec<Extreme>> {
+fn numbers() -> Result<Vec<HardFall>> {
     let of = |n: usize| {
         let usual = extreme(format!("{n} in a heap"), heap(2, n)?);
         // A try of many takes ten seconds.
         let attempts = if n > MANY { 1 } else { usual.options.attempts };
-        Ok(Extreme {
+        Ok(HardFall {
             options: SettleOptions {
                 attempts,
                 ..usual.options
@@ -198,7 +198,7 @@ fn numbers() -> Result<Vec<Extreme>> {
     [1, 20, 60, 300].into_iter().map(of).collect()
 }
 
-fn scales() -> Result<Vec<Extreme>> {
+fn scales() -> Result<Vec<HardFall>> {
     // Of a box 0.6 m long.
     let of = |(name, by): (&str, f64)| Ok(extreme(name, scaled(heap(3, 12)?, by)));
     [
@@ -212,7 +212,7 @@ fn scales() -> Result<Vec<Extreme>> {
     .collect()
 }
 
-fn masses() -> Result<Vec<Extreme>> {
+fn masses() -> Result<Vec<HardFall>> {
     let of = |ratio: f64| {
         let weigh = |i: usize, object: &mut Object| {
             object.mass = if i.is_multiple_of(2) {
@@ -229,13 +229,13 @@ fn masses() -> Result<Vec<Extreme>> {
     [10.0, 1e3, 1e6].into_iter().map(of).collect()
 }
 
-fn gravities() -> Result<Vec<Extreme>> {
-    let with = |name: String, g: [f64; 3]| -> Result<Extreme> {
+fn gravities() -> Result<Vec<HardFall>> {
+    let with = |name: String, g: [f64; 3]| -> Result<HardFall> {
         let options = SettleOptions {
             gravity: g.map(|x| 9.81 * x),
             ..SettleOptions::default()
         };
-        Ok(Extreme {
+        Ok(HardFall {
             options,
             ..extreme(name, heap(3, 12)?)
         })
@@ -252,7 +252,7 @@ fn gravities() -> Result<Vec<Extreme>> {
     Ok(all)
 }
 
-fn arrangements() -> Result<Vec<Extreme>> {
+fn arrangements() -> Result<Vec<HardFall>> {
     let aligned = |i: usize, object: &mut Object| {
         (object.size, object.thickness, object.mass) = ([0.2, 0.08], 0.005, 0.03);
         let (above, height) = ([0.0; 2], 0.01 * (i + 1) as f64);
@@ -282,8 +282,8 @@ fn arrangements() -> Result<Vec<Extreme>> {
         attempts: 2,
         ..SettleOptions::default()
     };
-    let told = |name: &str, scene| Extreme {
-        promise: Promise::IsTold,
+    let told = |name: &str, scene| HardFall {
+        promise: ExpectedEnd::IsTold,
         options: short,
         ..extreme(name, scene)
     };
@@ -308,9 +308,9 @@ fn arrangements() -> Result<Vec<Extreme>> {
     ])
 }
 
-fn impossible() -> Result<Vec<Extreme>> {
-    let refused = |name: &str, scene, options| Extreme {
-        promise: Promise::IsRefused,
+fn impossible() -> Result<Vec<HardFall>> {
+    let refused = |name: &str, scene, options| HardFall {
+        promise: ExpectedEnd::IsRefused,
         options,
         ..extreme(name, scene)
     };
@@ -331,12 +331,12 @@ fn impossible() -> Result<Vec<Extreme>> {
     });
     Ok(vec![
         refused("larger than the box", larger, usual),
-        Extreme {
-            promise: Promise::IsTold,
+        HardFall {
+            promise: ExpectedEnd::IsTold,
             ..extreme("started in one place", in_one_place)
         },
-        Extreme {
-            promise: Promise::IsTold,
+        HardFall {
+            promise: ExpectedEnd::IsTold,
             ..refused("steps twice as long", heap(6, 20)?, longer(2.0))
         },
         refused("steps 4 times too long", heap(6, 20)?, longer(4.0)),

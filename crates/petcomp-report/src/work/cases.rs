@@ -1,6 +1,6 @@
 //! The scenes, and what each of them must not pay for.
 
-use super::world::{FILM, OPAQUE, World, dropped, made_of};
+use super::world::{FILM, FixtureFolder, OPAQUE, dropped, made_of};
 use petcomp::LinearRgb;
 use petcomp::scene::{Noise, PostProcess, Scene};
 use petcomp::work::Kind;
@@ -8,7 +8,7 @@ use petcomp::work::Kind::*;
 
 /// A scene and what is asked of it.
 #[derive(Clone, Debug)]
-pub(super) struct Case {
+pub(super) struct WorkCase {
     /// Its name.
     pub(super) name: &'static str,
     /// What is in it.
@@ -43,7 +43,7 @@ const LABELS: &[Kind] = &[LabelSamples, Masks];
 /// What every scene pays for, or may: what it is read from and written to, and levels of detail where cards are small.
 const FREE: [Kind; 5] = [BytesWritten, FilesRead, BytesRead, Levels, LargeAllocations];
 
-impl Case {
+impl WorkCase {
     /// Work that the scene must not make: all that is not told to be used.
     pub(super) fn absent(&self) -> Vec<Kind> {
         Kind::ALL
@@ -54,14 +54,14 @@ impl Case {
 }
 
 /// Every scene.
-pub(super) fn cases(world: &World) -> Vec<Case> {
+pub(super) fn cases(world: &FixtureFolder) -> Vec<WorkCase> {
     let usual = || world.scene();
     let with_map = |strength| Scene {
         environment: Some(world.environment(strength)),
         ..usual()
     };
     let lit: &[&[Kind]] = &[CARDS, LAMP, LIT, THROUGH, PICTURE];
-    let case = |name, about, scene, asked, used: &[&[Kind]]| Case {
+    let case = |name, about, scene, asked, used: &[&[Kind]]| WorkCase {
         name,
         about,
         scene,

@@ -35,11 +35,11 @@ pub(super) const FILM: &str = "film";
 
 /// The folder; gone when it is dropped.
 #[derive(Debug)]
-pub(super) struct World {
+pub(super) struct FixtureFolder {
     folder: TempDir,
 }
 
-impl World {
+impl FixtureFolder {
     /// Writes all files.
     pub(super) fn make() -> Result<Self> {
         let folder = tempfile::tempdir().map_err(|e| Error::value("temporary folder", e))?;
