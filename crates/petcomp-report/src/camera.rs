@@ -13,6 +13,7 @@ pub use diagram::diagrams;
 pub use method::{Lens, SolveMethod};
 
 use super::clock::cpu_seconds;
+use super::files::write_texts;
 use super::statistics::{median_and_95, quantile};
 use method::PHOTOS_TOGETHER;
 use petcomp::camera::distorted;
@@ -31,7 +32,7 @@ const VIEW_SEED: u64 = 5;
 const ERROR_HEIGHT_M: f64 = 0.05;
 /// Points along each side of the rectangle at which it is measured.
 const ERROR_GRID_SIDE: usize = 4;
-const MICROSECONDS: f64 = 1e6;
+const US_PER_SECOND: f64 = 1e6;
 
 /// Options of the report.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -156,21 +157,25 @@ impl ViewError {
         let solution = method.solve(views, options);
         let seconds = cpu_seconds() - start;
         let [focal_percent, height_px] = solution.map_or([f64::INFINITY; 2], |solution| {
-            [
-                focal_percent(&views[0], &solution),
-                height_error_px(&views[0], &solution),
-            ]
+            focal_and_height_errors(&views[0], &solution)
         });
         Self {
             focal_percent,
             height_px,
-            time_us: seconds * MICROSECONDS / method.photos() as f64,
+            time_us: seconds * US_PER_SECOND / method.photos() as f64,
         }
     }
 
     fn is_failure(&self) -> bool {
         self.focal_percent.is_infinite()
     }
+}
+
+fn focal_and_height_errors(view: &View, solution: &Solution) -> [f64; 2] {
+    [
+        focal_percent(view, solution),
+        height_error_px(view, solution),
+    ]
 }
 
 fn focal_percent(view: &View, solution: &Solution) -> f64 {
@@ -227,14 +232,13 @@ pub fn write(
     }
     let rows = measure(options, progress);
     let coverage = coverage::measure(options.views);
-    io::create_folder(folder)?;
-    io::write_text(folder.join("camera.csv"), &show::csv(&rows))?;
-    io::write_text(
-        folder.join("camera_coverage.csv"),
-        &coverage::csv(&coverage),
-    )?;
     let text = show::markdown(&rows) + &coverage::markdown(&coverage);
-    io::write_text(folder.join("camera.md"), &text)?;
+    let files = [
+        ("camera.csv", &*show::csv(&rows)),
+        ("camera_coverage.csv", &coverage::csv(&coverage)),
+        ("camera.md", &text),
+    ];
+    write_texts(folder, files)?;
     write_charts(folder, &rows)?;
     Ok(rows)
 }

@@ -24,11 +24,11 @@ pub use show::{chart, details, table};
 pub use summary::{MethodSummary, summaries};
 
 use super::clock::cpu_seconds;
-use method::CutOut;
+use super::files::write_texts;
+use method::MethodCutOut;
 use petcomp::Image;
 use petcomp::LinearRgb;
 use petcomp::Result;
-use petcomp::io;
 use petcomp::plot::Page;
 use random::patched_background;
 use std::path::Path;
@@ -131,7 +131,7 @@ impl MattingInputs {
         }
     }
 
-    fn score(&self, cut: &CutOut) -> Score {
+    fn score(&self, cut: &MethodCutOut) -> Score {
         Score::new(cut, &self.known, &self.backgrounds)
     }
 }
@@ -151,12 +151,13 @@ pub fn write(
     let chart = chart(&summaries);
     let mut page = Page::new(TITLE);
     page.table(&table).chart(&chart, CAPTION).table(&details);
-    io::create_folder(folder)?;
-    io::write_text(folder.join("matte.csv"), &details.csv())?;
-    let markdown = format!("# {TITLE}\n\n{}", table.markdown());
-    io::write_text(folder.join("matte.md"), &markdown)?;
-    io::write_text(folder.join("matte.svg"), &chart)?;
-    io::write_text(folder.join("matte.html"), &page.document())?;
+    let files = [
+        ("matte.csv", &*details.csv()),
+        ("matte.md", &format!("# {TITLE}\n\n{}", table.markdown())),
+        ("matte.svg", &chart),
+        ("matte.html", &page.document()),
+    ];
+    write_texts(folder, files)?;
     Ok(summaries)
 }
 

@@ -12,7 +12,8 @@ pub use golden::{GoldenRow, golden};
 pub use show::{charts, golden_table, speed_up, table};
 
 use super::clock::timed;
-use cycles::{CyclesPicture, CyclesPictures};
+use super::files::write_texts;
+use cycles::{CyclesPictures, TimedPicture};
 use petcomp::Image;
 use petcomp::Quality;
 use petcomp::diff::Likeness;
@@ -109,13 +110,15 @@ pub fn write(
     io::create_folder(folder)?;
     let rows = measure(options)?;
     let (golden, sheet) = golden(&options.golden, SHEET_SETTING)?;
-    let text = show::markdown(&rows, &golden, options);
-    io::write_text(folder.join("render.csv"), &table(&rows).csv())?;
-    io::write_text(folder.join("render.md"), &text)?;
-    io::write_text(folder.join("render.svg"), &Chart::row(&charts(&rows)))?;
+    let files = [
+        ("render.csv", &*table(&rows).csv()),
+        ("render.md", &show::markdown(&rows, &golden, options)),
+        ("render.svg", &Chart::row(&charts(&rows))),
+    ];
+    write_texts(folder, files)?;
     if let Some(sheet) = sheet {
         let data = golden_table(&golden).csv();
-        io::write_text(folder.join("render_golden.csv"), &data)?;
+        write_texts(folder, [("render_golden.csv", &data)])?;
         io::write(folder.join("render_golden.png"), &sheet)?;
     }
     Ok((rows, golden))
@@ -173,7 +176,7 @@ impl TimedScene {
         })
     }
 
-    fn cycles_row(&self, others: &CyclesPictures, entry: &CyclesPicture) -> Result<RenderRow> {
+    fn cycles_row(&self, others: &CyclesPictures, entry: &TimedPicture) -> Result<RenderRow> {
         let cycles = if others.is_best(entry) {
             None
         } else {

@@ -5,7 +5,7 @@
 //! reflects some 7 %), and dye takes its share; the screen is seen through the object and lit through it. In folds and rims the
 //! sight meets more plastic, while the light, which comes from all around, does not.
 
-use super::truth::{Known, SensorNoise};
+use super::truth::{Known, PhotoNoise};
 use petcomp::Image;
 use petcomp::{Coverage, LinearRgb};
 
@@ -40,7 +40,7 @@ const STREAK_WIDTH_PX: f64 = 5.0;
 /// The label is so far inside the outline.
 const LABEL_DEPTH_PX: f64 = 12.0;
 /// Noise of a typical camera at base sensitivity.
-const CAMERA_NOISE: SensorNoise = SensorNoise {
+const CAMERA_NOISE: PhotoNoise = PhotoNoise {
     shot: 0.006,
     read: 0.002,
 };
@@ -54,25 +54,39 @@ pub(super) fn photo(i: usize) -> Known {
 
 /// Photo `i` by a camera of so many times the pixels along each side: as sharp, and as noisy in each pixel.
 pub(super) fn enlarged_photo(i: usize, times: usize) -> Known {
-    let (w, h) = (times * SIZE_PX.0, times * SIZE_PX.1);
-    let px = 1.0 / times as f64;
-    let places = Image::from_fn(w, h, |x, y| {
-        bottle_at(i, [x, y].map(|v| (v as f64 + 0.5) * px), px)
-    });
-    let known = Known {
-        name: format!("made {}", i + 1),
-        photo: Image::filled(w, h, LinearRgb::BLACK),
-        foreground: places.map(|p| color_from(p.foreground)),
-        transmittance: places.map(|p| color_from([0, 1, 2].map(|c| p.view[c] * p.lit[c]))),
-        view: places.map(|p| color_from(p.view)),
-        screen: uneven_screen(w, h),
-        mask: places.map(|p| Coverage(p.cover as f32)),
-        box_px: bounds(i).map(|side| side / px),
-        noise: CAMERA_NOISE,
-        paint: SCREEN_COLOR,
-    };
+    let known = truth(i, times);
     let photo = known.on(&known.screen, FIRST_NOISE_SEED + i as u64);
     Known { photo, ..known }
+}
+
+/// All that is known of photo `i`, which is still black.
+fn truth(i: usize, times: usize) -> Known {
+    let pixels = bottle_pixels(i, times);
+    let (w, h) = pixels.size();
+    Known {
+        name: format!("made {}", i + 1),
+        photo: Image::filled(w, h, LinearRgb::BLACK),
+        foreground: pixels.map(|p| color_from(p.foreground)),
+        transmittance: pixels.map(|p| color_from(p.transmittance())),
+        view: pixels.map(|p| color_from(p.view)),
+        screen: uneven_screen(w, h),
+        mask: pixels.map(|p| Coverage(p.cover as f32)),
+        box_px: bounds(i).map(|side| side / pixel_size(times)),
+        noise: CAMERA_NOISE,
+        paint: SCREEN_COLOR,
+    }
+}
+
+/// Size of a pixel in pixels of the smallest photo.
+fn pixel_size(times: usize) -> f64 {
+    1.0 / times as f64
+}
+
+fn bottle_pixels(i: usize, times: usize) -> Image<BottlePixel> {
+    let px = pixel_size(times);
+    Image::from_fn(times * SIZE_PX.0, times * SIZE_PX.1, |x, y| {
+        bottle_at(i, [x, y].map(|v| (v as f64 + 0.5) * px), px)
+    })
 }
 
 fn color_from(channels: [f64; 3]) -> LinearRgb {
@@ -121,6 +135,13 @@ struct BottlePixel {
     lit: [f64; 3],
 }
 
+impl BottlePixel {
+    /// Of the screen's own light, which passes the object twice.
+    fn transmittance(&self) -> [f64; 3] {
+        [0, 1, 2].map(|c| self.view[c] * self.lit[c])
+    }
+}
+
 /// What bottle `i` is like at a place; an edge is as wide as `px`.
 fn bottle_at(i: usize, [x, y]: [f64; 2], px: f64) -> BottlePixel {
     let (along, depth) = body_at(i, x, y);
@@ -128,19 +149,27 @@ fn bottle_at(i: usize, [x, y]: [f64; 2], px: f64) -> BottlePixel {
     let inside = cover * cover * (3.0 - 2.0 * cover);
     let (rim, wrinkle) = (rim(depth), wrinkle(i, x, y));
     let label = label_at(along, depth);
-    let flat = TINTS[i % PHOTO_COUNT].map(|dye| libm::exp(-CLEAR_ABSORBANCE - dye));
+    let flat = flat_walls(i);
     let film = flat.map(|v| libm::pow(v, rim * wrinkle));
     let sheen = SHEEN_LIGHT * rim * wrinkle + streak(x, depth);
-    let foreground = LABEL_COLOR.map(|color| {
-        let paint = color * (0.7 + 0.3 * libm::sin(0.3 * y));
-        inside * (label * paint + (1.0 - label) * sheen)
-    });
+    let light = label_paint(y).map(|paint| label * paint + (1.0 - label) * sheen);
     BottlePixel {
         cover,
-        foreground,
+        foreground: light.map(|v| inside * v),
         view: film.map(|v| 1.0 - inside * (1.0 - (1.0 - label) * v)),
         lit: flat.map(|v| 1.0 - inside * (1.0 - v)),
     }
+}
+
+/// What two walls pass that lie flat.
+fn flat_walls(i: usize) -> [f64; 3] {
+    TINTS[i % PHOTO_COUNT].map(|dye| libm::exp(-CLEAR_ABSORBANCE - dye))
+}
+
+/// The label's light, in stripes.
+fn label_paint(y: f64) -> [f64; 3] {
+    let stripe = 0.7 + 0.3 * libm::sin(0.3 * y);
+    LABEL_COLOR.map(|color| color * stripe)
 }
 
 /// How much thicker the walls look near the outline, where they are seen at a grazing angle.

@@ -26,7 +26,7 @@ pub enum MattingMethod {
 }
 
 /// What a method made of a photo.
-pub(super) struct CutOut {
+pub(super) struct MethodCutOut {
     /// Light and view transmittance.
     pub(super) film: Image<Film>,
     /// Transmittance with the object's own shadow.
@@ -58,7 +58,7 @@ impl MattingMethod {
     }
 
     /// Cuts the object out; `shots` are those of the two-screen method.
-    pub(super) fn run(self, known: &Known, shots: &[Image<LinearRgb>; 2]) -> Result<CutOut> {
+    pub(super) fn run(self, known: &Known, shots: &[Image<LinearRgb>; 2]) -> Result<MethodCutOut> {
         let photo = &known.photo;
         let found = segment(photo, &SegmentOptions::default())?;
         if self == Self::Paper {
@@ -81,11 +81,11 @@ impl MattingMethod {
 }
 
 /// The paper's way.
-fn key_by_color(photo: &Image<LinearRgb>, found: Segmentation) -> Result<CutOut> {
+fn key_by_color(photo: &Image<LinearRgb>, found: Segmentation) -> Result<MethodCutOut> {
     let key = Screen::Color(screen_color(photo, &found.mask)?);
     let keyed = Keying::new(photo, key).run(&KeyOptions::default())?;
     let cut = keyed.cutout.zip_map(&found.mask, |p, m| p.masked(m));
-    Ok(CutOut::from_grey(&cut, found.mask.clone(), found))
+    Ok(MethodCutOut::from_grey(&cut, found.mask.clone(), found))
 }
 
 fn fitted_plate(photo: &Image<LinearRgb>, found: &Segmentation) -> Result<ScreenPlate> {
@@ -101,24 +101,24 @@ struct PreparedPhoto<'a> {
 }
 
 impl PreparedPhoto<'_> {
-    fn key_by_plate(self) -> Result<CutOut> {
+    fn key_by_plate(self) -> Result<MethodCutOut> {
         let screen = Screen::Plate(&self.plate.image);
         let keyed = Keying::new(self.photo, screen).run(&KeyOptions::default())?;
         Ok(self.masked_cut_out(&keyed.cutout))
     }
 
-    fn color_difference(self) -> CutOut {
+    fn color_difference(self) -> MethodCutOut {
         let keyed = self.photo.zip_map(&self.plate.image, color_difference);
         self.masked_cut_out(&keyed)
     }
 
-    fn physical_film(self) -> Result<CutOut> {
+    fn physical_film(self) -> Result<MethodCutOut> {
         let options = FilmOptions::default();
         let solved = film(self.photo, &self.plate, &self.inside, &options)?;
         Ok(self.film_cut_out(solved.film, solved.transmittance))
     }
 
-    fn two_screens(self, shots: &[Image<LinearRgb>; 2]) -> Result<CutOut> {
+    fn two_screens(self, shots: &[Image<LinearRgb>; 2]) -> Result<MethodCutOut> {
         let [first, second] = shots;
         let plates = [
             fitted_plate(first, &self.found)?,
@@ -129,13 +129,13 @@ impl PreparedPhoto<'_> {
         Ok(self.film_cut_out(solved.film, solved.transmittance))
     }
 
-    fn masked_cut_out(self, keyed: &Image<PremulRgba>) -> CutOut {
+    fn masked_cut_out(self, keyed: &Image<PremulRgba>) -> MethodCutOut {
         let cut = keyed.zip_map(&self.inside, |p, m| p.masked(m));
-        CutOut::from_grey(&cut, self.found.tight.clone(), self.found)
+        MethodCutOut::from_grey(&cut, self.found.tight.clone(), self.found)
     }
 
-    fn film_cut_out(self, film: Image<Film>, transmittance: Image<LinearRgb>) -> CutOut {
-        CutOut {
+    fn film_cut_out(self, film: Image<Film>, transmittance: Image<LinearRgb>) -> MethodCutOut {
+        MethodCutOut {
             film,
             transmittance,
             outline: self.found.tight.clone(),
@@ -144,7 +144,7 @@ impl PreparedPhoto<'_> {
     }
 }
 
-impl CutOut {
+impl MethodCutOut {
     /// What is as opaque in every channel.
     fn from_grey(cut: &Image<PremulRgba>, outline: Image<Coverage>, found: Segmentation) -> Self {
         let transmittance = cut.map(|p| LinearRgb::grey(1.0 - p.a.clamp(0.0, 1.0)));

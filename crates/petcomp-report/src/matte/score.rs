@@ -1,6 +1,6 @@
 //! Errors of a cut-out against what is known.
 
-use super::method::CutOut;
+use super::method::MethodCutOut;
 use super::truth::Known;
 use petcomp::Image;
 use petcomp::filter;
@@ -40,16 +40,15 @@ pub struct Score {
 }
 
 impl Score {
-    pub(super) fn new(found: &CutOut, known: &Known, backgrounds: &[Image<LinearRgb>]) -> Self {
+    pub(super) fn new(
+        found: &MethodCutOut,
+        known: &Known,
+        backgrounds: &[Image<LinearRgb>],
+    ) -> Self {
         let alpha = found.film.map(|f| Coverage(f.to_rgba().a));
-        let truth = known.view.map(|v| Coverage(1.0 - (v.r + v.g + v.b) / 3.0));
-        let off = differences(&alpha, &truth);
         let lit = lit_errors(found, known, backgrounds);
         let shaded = shaded_errors(found, known, backgrounds);
         Self {
-            sad: off.iter().map(|d| d.abs()).sum::<f64>() / SUM_UNIT,
-            mse: off.iter().map(|d| d * d).sum::<f64>() / off.len().max(1) as f64,
-            gradient: gradient_error(&alpha, &truth) / SUM_UNIT,
             mae_lit: lit.mean_absolute(),
             psnr_lit: lit.psnr_db(),
             mae_shaded: shaded.mean_absolute(),
@@ -57,8 +56,26 @@ impl Score {
             residue: mean_residue(&alpha, &known.mask),
             iou: overlap(&found.outline, &known.mask),
             box_px: box_error(&found.found.hull, known.box_px),
+            ..Self::from_alpha(&alpha, &known.view.map(true_alpha))
         }
     }
+
+    /// Errors of alpha alone.
+    fn from_alpha(alpha: &Image<Coverage>, truth: &Image<Coverage>) -> Self {
+        let off = differences(alpha, truth);
+        let squared: f64 = off.iter().map(|d| d * d).sum();
+        Self {
+            sad: off.iter().map(|d| d.abs()).sum::<f64>() / SUM_UNIT,
+            mse: squared / off.len().max(1) as f64,
+            gradient: gradient_error(alpha, truth) / SUM_UNIT,
+            ..Self::default()
+        }
+    }
+}
+
+/// Alpha of what passes so much.
+fn true_alpha(view: LinearRgb) -> Coverage {
+    Coverage(1.0 - (view.r + view.g + view.b) / 3.0)
 }
 
 fn differences(a: &Image<Coverage>, b: &Image<Coverage>) -> Vec<f64> {
@@ -96,7 +113,7 @@ fn half_difference(image: &Image<Coverage>, a: [isize; 2], b: [isize; 2]) -> f64
 }
 
 /// Over new backgrounds that are lit by themselves.
-fn lit_errors(found: &CutOut, known: &Known, backgrounds: &[Image<LinearRgb>]) -> ErrorSums {
+fn lit_errors(found: &MethodCutOut, known: &Known, backgrounds: &[Image<LinearRgb>]) -> ErrorSums {
     let film = found.film.pixels();
     recomposite(known, &known.view, backgrounds, |i, behind| {
         film[i].over_color(behind)
@@ -104,7 +121,11 @@ fn lit_errors(found: &CutOut, known: &Known, backgrounds: &[Image<LinearRgb>]) -
 }
 
 /// Over new backgrounds in the object's own shadow.
-fn shaded_errors(found: &CutOut, known: &Known, backgrounds: &[Image<LinearRgb>]) -> ErrorSums {
+fn shaded_errors(
+    found: &MethodCutOut,
+    known: &Known,
+    backgrounds: &[Image<LinearRgb>],
+) -> ErrorSums {
     let (film, passes) = (found.film.pixels(), found.transmittance.pixels());
     recomposite(known, &known.transmittance, backgrounds, |i, behind| {
         film[i].color + passes[i] * behind
@@ -195,7 +216,7 @@ fn extent(values: impl Iterator<Item = f64>) -> [f64; 2] {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{patched_background, truth::SensorNoise};
+    use super::super::{patched_background, truth::PhotoNoise};
     use super::*;
     use petcomp::Film;
     use petcomp::matte::{SegmentOptions, segment};
@@ -231,7 +252,7 @@ mod tests {
         let mask = Image::from_fn(w, h, |x, y| Coverage(f32::from(u8::from(on(x, y)))));
         let (box_px, noise) = (
             [40.0, 30.0, 120.0, 70.0],
-            SensorNoise {
+            PhotoNoise {
                 shot: 0.0,
                 read: 0.0,
             },
@@ -250,8 +271,8 @@ mod tests {
         }
     }
 
-    fn truth(known: &Known) -> CutOut {
-        CutOut {
+    fn truth(known: &Known) -> MethodCutOut {
+        MethodCutOut {
             film: known.foreground.zip_map(&known.view, Film::new),
             transmittance: known.transmittance.clone(),
             outline: known.mask.clone(),

@@ -24,7 +24,7 @@ const TIMED_RUNS: usize = 1;
 
 /// Errors and seconds of one search.
 #[derive(Clone, Copy, Debug, Default)]
-struct SearchResult {
+struct SearchErrors {
     /// 1 - IoU of coverage.
     outline: f64,
     /// The side of the box that is farthest off, pixels of the photo.
@@ -37,7 +37,7 @@ struct MeasuredSearch {
     photo_scale: usize,
     photo_width: usize,
     side: usize,
-    mean: SearchResult,
+    mean: SearchErrors,
 }
 
 /// Overlap of the outline, and the box, each against time, of so many bottles: four, or fewer for a quick report.
@@ -91,7 +91,7 @@ fn measure_photos(bottles: usize, photo_scale: usize) -> Result<Vec<MeasuredSear
 }
 
 impl MeasuredSearch {
-    fn point(&self, error: fn(&SearchResult) -> f64) -> Point {
+    fn point(&self, error: fn(&SearchErrors) -> f64) -> Point {
         let curve = format!("photos {} px wide", self.photo_width);
         let setting = format!("{} px", self.side);
         Point::new(curve, setting, self.mean.seconds, error(&self.mean)).used_where(|quality| {
@@ -106,29 +106,29 @@ fn search_side(quality: Quality) -> usize {
 }
 
 /// Means over the photos.
-fn mean_result(photos: &[Known], working_size: usize) -> Result<SearchResult> {
+fn mean_result(photos: &[Known], working_size: usize) -> Result<SearchErrors> {
     let options = SegmentOptions {
         working_size,
         ..SegmentOptions::default()
     };
-    let found: Vec<SearchResult> = photos
+    let found: Vec<SearchErrors> = photos
         .iter()
         .map(|known| search_photo(known, &options))
         .collect::<Result<_>>()?;
-    Ok(SearchResult {
+    Ok(SearchErrors {
         outline: mean(&found, |f| f.outline),
         box_px: mean(&found, |f| f.box_px),
         seconds: mean(&found, |f| f.seconds),
     })
 }
 
-fn mean(found: &[SearchResult], of: fn(&SearchResult) -> f64) -> f64 {
+fn mean(found: &[SearchErrors], of: fn(&SearchErrors) -> f64) -> f64 {
     found.iter().map(of).sum::<f64>() / found.len().max(1) as f64
 }
 
-fn search_photo(known: &Known, options: &SegmentOptions) -> Result<SearchResult> {
+fn search_photo(known: &Known, options: &SegmentOptions) -> Result<SearchErrors> {
     let (found, seconds) = timed(TIMED_RUNS, || segment(&known.photo, options))?;
-    Ok(SearchResult {
+    Ok(SearchErrors {
         outline: 1.0 - soft_overlap(&found.tight, &known.mask),
         box_px: box_error(&found.hull, known.box_px),
         seconds,
@@ -150,7 +150,7 @@ fn sum_of_pairs(a: &Image<Coverage>, b: &Image<Coverage>, of: fn(f32, f32) -> f3
 fn search_diagram(
     found: &[MeasuredSearch],
     input: &str,
-    error: fn(&SearchResult) -> f64,
+    error: fn(&SearchErrors) -> f64,
 ) -> Diagram {
     Diagram {
         input: input.into(),

@@ -32,16 +32,20 @@ impl MethodSummary {
     fn new(rows: &[MatteRow], method: MattingMethod) -> Self {
         let own: Vec<&MatteRow> = rows.iter().filter(|row| row.method == method).collect();
         let scores: Vec<Score> = own.iter().filter_map(|row| row.score).collect();
-        let good_boxes = scores.iter().filter(|s| s.box_px <= GOOD_BOX_PX).count();
         Self {
             method,
             score: mean_score(&scores),
             failed: own.len() - scores.len(),
-            box_within_2_px: good_boxes as f64 / scores.len().max(1) as f64,
+            box_within_2_px: share_of_good_boxes(&scores),
             silently_wrong: own.iter().filter(|row| row.is_silently_wrong()).count(),
             time_ms: quantile(own.iter().map(|row| row.time_ms), 0.5),
         }
     }
+}
+
+fn share_of_good_boxes(scores: &[Score]) -> f64 {
+    let good = scores.iter().filter(|s| s.box_px <= GOOD_BOX_PX).count();
+    good as f64 / scores.len().max(1) as f64
 }
 
 impl MatteRow {

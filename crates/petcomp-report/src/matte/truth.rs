@@ -26,7 +26,7 @@ pub(crate) struct Known {
     pub(crate) mask: Image<Coverage>,
     /// Left, top, right and bottom of the outline, pixels.
     pub(crate) box_px: [f64; 4],
-    pub(crate) noise: SensorNoise,
+    pub(crate) noise: PhotoNoise,
     /// Colour of the screen's paint.
     pub(crate) paint: LinearRgb,
 }
@@ -45,7 +45,7 @@ struct TruthRecord {
     name: String,
     bbox_px: [f64; 4],
     files: TruthPaths,
-    sensor: SensorNoise,
+    sensor: PhotoNoise,
     screen: ScreenPaint,
 }
 
@@ -66,12 +66,12 @@ struct TruthPaths {
 
 /// Sensor noise: the variance of a value is `shot^2 * value + read^2`.
 #[derive(Clone, Copy, Debug, Deserialize)]
-pub(crate) struct SensorNoise {
+pub(crate) struct PhotoNoise {
     pub(crate) shot: f64,
     pub(crate) read: f64,
 }
 
-impl SensorNoise {
+impl PhotoNoise {
     fn deviation(&self, value: f32) -> f64 {
         (self.shot * self.shot * f64::from(value) + self.read * self.read).sqrt()
     }
@@ -125,16 +125,18 @@ impl Truths {
             transmittance: self
                 .read_color(&files.transmittance)?
                 .zip_map(&mask, one_outside),
-            // Linear in 8 bits, which is how coverage is stored and colour is not.
-            view: self
-                .read_color(&files.transmittance_view)?
-                .map(|p| p.map(linear_to_srgb)),
+            view: self.read_view(&files.transmittance_view)?,
             screen: self.read_color(&files.screen_plate)?,
             mask,
             box_px: record.bbox_px,
             noise: record.sensor,
             paint: record.screen.albedo_linear.into(),
         })
+    }
+
+    fn read_view(&self, name: &Path) -> Result<Image<LinearRgb>> {
+        // Linear in 8 bits, which is how coverage is stored and colour is not.
+        Ok(self.read_color(name)?.map(|p| p.map(linear_to_srgb)))
     }
 
     fn read_color(&self, name: &Path) -> Result<Image<LinearRgb>> {

@@ -14,11 +14,11 @@ pub(super) struct CyclesPictures {
     #[serde(skip)]
     folder: PathBuf,
     pub(super) program: String,
-    pub(super) pictures: Vec<CyclesPicture>,
+    pub(super) pictures: Vec<TimedPicture>,
 }
 
 #[derive(Deserialize)]
-pub(super) struct CyclesPicture {
+pub(super) struct TimedPicture {
     pub(super) samples: u32,
     file: String,
     pub(super) cpu_seconds: f64,
@@ -37,11 +37,11 @@ impl CyclesPictures {
         })
     }
 
-    fn best_entry(&self) -> Option<&CyclesPicture> {
+    fn best_entry(&self) -> Option<&TimedPicture> {
         self.pictures.iter().max_by_key(|entry| entry.samples)
     }
 
-    pub(super) fn is_best(&self, entry: &CyclesPicture) -> bool {
+    pub(super) fn is_best(&self, entry: &TimedPicture) -> bool {
         self.best_entry()
             .is_some_and(|best| best.samples == entry.samples)
     }
@@ -51,7 +51,7 @@ impl CyclesPictures {
         best.map(|entry| self.picture(entry)).transpose()
     }
 
-    pub(super) fn picture(&self, entry: &CyclesPicture) -> Result<Image<LinearRgb>> {
+    pub(super) fn picture(&self, entry: &TimedPicture) -> Result<Image<LinearRgb>> {
         Ok(finished(&io::read(io::inside(&self.folder, &entry.file)?)?))
     }
 }

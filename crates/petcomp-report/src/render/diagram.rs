@@ -58,22 +58,30 @@ fn sample_diagrams(scenes: &[GoldenScene], runs: usize) -> Result<Vec<Diagram>> 
         piles.push(setting.point(of_piles.map(|(_, cost)| cost)));
         all.push(setting.point(&costs));
     }
-    let count = scenes.iter().filter(|scene| scene.is_pile()).count();
+    let pile_count = scenes.iter().filter(|scene| scene.is_pile()).count();
     Ok(vec![
-        Diagram {
-            file: "render_piles".into(),
-            title: "render: samples, piles of bottles".into(),
-            input: format!("{count} golden piles of 5 to 30 bottles"),
-            ..golden_diagram(piles)
-        },
-        Diagram {
-            file: "render_all".into(),
-            title: "render: samples, all scenes".into(),
-            input: format!("{} golden scenes", scenes.len()),
-            why: EDGE_REMARK.into(),
-            ..golden_diagram(all)
-        },
+        pile_diagram(piles, pile_count),
+        all_scenes_diagram(all, scenes.len()),
     ])
+}
+
+fn pile_diagram(points: Vec<Point>, count: usize) -> Diagram {
+    Diagram {
+        file: "render_piles".into(),
+        title: "render: samples, piles of bottles".into(),
+        input: format!("{count} golden piles of 5 to 30 bottles"),
+        ..golden_diagram(points)
+    }
+}
+
+fn all_scenes_diagram(points: Vec<Point>, count: usize) -> Diagram {
+    Diagram {
+        file: "render_all".into(),
+        title: "render: samples, all scenes".into(),
+        input: format!("{count} golden scenes"),
+        why: EDGE_NOTE.into(),
+        ..golden_diagram(points)
+    }
 }
 
 /// Filtered samples and plain ones.
@@ -107,7 +115,7 @@ fn filter_points(scene: &GoldenScene, subsamples: usize, runs: usize) -> Result<
 }
 
 /// Which scenes want more samples.
-const EDGE_REMARK: &str = "Cards of the scenes that are no piles are bare rectangles, whose edges want more samples of a pixel than \
+const EDGE_NOTE: &str = "Cards of the scenes that are no piles are bare rectangles, whose edges want more samples of a pixel than \
     cut-outs do, which end in their own soft alpha.";
 
 /// What all diagrams share.
