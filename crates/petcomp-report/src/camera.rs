@@ -112,9 +112,7 @@ impl ViewKind {
     fn photos(&self, k: u64) -> Vec<View> {
         let scenario = self.lens.scenario(self.noise_px);
         let mut views = scenario.views(VIEW_SEED, k, PHOTOS_TOGETHER, [self.tilt_deg; 2]);
-        for view in &mut views {
-            view.label.surface.id = "tray".into();
-        }
+        views.iter_mut().for_each(name_surface);
         views
     }
 
@@ -142,6 +140,11 @@ impl ViewKind {
             time_us: quantile(solved.iter().map(|e| e.time_us), 0.5),
         }
     }
+}
+
+/// Photos of one camera may be solved together where they show one surface.
+fn name_surface(view: &mut View) {
+    view.label.surface.id = "tray".into();
 }
 
 /// Errors of one photo's camera, infinite where there is none, and what it took.
@@ -199,18 +202,13 @@ fn grid_place(i: usize) -> [f64; 2] {
 }
 
 fn squared_offset_px(view: &View, solution: &Solution, place: [f64; 2]) -> f64 {
-    let found = distorted(
-        &solution.camera,
-        solution.kappa,
-        point_above(place, solution.size),
-    );
+    let expected = point_above(place, solution.size);
+    let found = distorted(&solution.camera, solution.kappa, expected);
     let seen = distorted(&view.camera, view.kappa, point_above(place, view.size));
     let squared = (found - seen).norm_squared();
-    if squared.is_finite() {
-        squared
-    } else {
-        f64::INFINITY
-    }
+    Some(squared)
+        .filter(|v| v.is_finite())
+        .unwrap_or(f64::INFINITY)
 }
 
 fn point_above([x, y]: [f64; 2], [w, h]: [f64; 2]) -> Point3<f64> {

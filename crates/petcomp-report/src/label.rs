@@ -185,21 +185,27 @@ impl LabelPoints {
     }
 
     fn into_diagrams(self) -> Vec<Diagram> {
-        let time = Diagram {
-            file: "label_time".into(),
-            title: "label: polygon and raster, error against time".into(),
-            cost: "CPU seconds of a picture".into(),
-            points: self.by_time,
-            ..label_diagram()
-        };
-        let length = Diagram {
-            file: "label_points".into(),
-            title: "label: polygon and raster, error against points".into(),
-            cost: "corners, or runs of a mask".into(),
-            points: self.by_length,
-            ..label_diagram()
-        };
-        vec![time, length]
+        vec![time_diagram(self.by_time), length_diagram(self.by_length)]
+    }
+}
+
+fn time_diagram(points: Vec<Point>) -> Diagram {
+    Diagram {
+        file: "label_time".into(),
+        title: "label: polygon and raster, error against time".into(),
+        cost: "CPU seconds of a picture".into(),
+        points,
+        ..label_diagram()
+    }
+}
+
+fn length_diagram(points: Vec<Point>) -> Diagram {
+    Diagram {
+        file: "label_points".into(),
+        title: "label: polygon and raster, error against points".into(),
+        cost: "corners, or runs of a mask".into(),
+        points,
+        ..label_diagram()
     }
 }
 

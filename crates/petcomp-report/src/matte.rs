@@ -55,6 +55,7 @@ pub(super) const GOOD_BOX_PX: f64 = 2.0;
 pub(super) const GOOD_IOU: f64 = 0.95;
 /// Shots made of each photo's truth: their noise is drawn from seeds of their own.
 const SHOTS_PER_PHOTO: u64 = 2;
+const MS_PER_SECOND: f64 = 1e3;
 /// New backgrounds per photo.
 const BACKGROUNDS_PER_PHOTO: u64 = 3;
 
@@ -117,9 +118,9 @@ impl MattingInputs {
     fn row(&self, method: MattingMethod) -> MatteRow {
         let start = cpu_seconds();
         let cut = method.run(&self.known, &self.shots);
-        let time_ms = 1e3 * (cpu_seconds() - start);
-        let (score, warnings) = match &cut {
-            Ok(cut) => (Some(self.score(cut)), cut.warnings()),
+        let time_ms = MS_PER_SECOND * (cpu_seconds() - start);
+        let (score, warnings) = match cut {
+            Ok(cut) => (Some(self.score(&cut)), cut.warnings()),
             Err(error) => (None, vec![error.to_string()]),
         };
         MatteRow {

@@ -117,18 +117,20 @@ fn settings() -> Vec<SettleOptions> {
         attempts: 1,
         ..SettleOptions::default()
     };
-    let pairs = RATES
-        .iter()
-        .flat_map(|rate| ITERATIONS.map(|iterations| (*rate, iterations)));
-    let swept = pairs.map(|(rate, iterations)| SettleOptions {
+    let swept = RATES.iter().flat_map(|rate| at_rate(*rate, default));
+    let stops = CCD_STOPS.into_iter().filter(|ccd| *ccd != default.ccd);
+    swept
+        .chain(stops.map(|ccd| SettleOptions { ccd, ..default }))
+        .collect()
+}
+
+/// So many steps a second, with every number of iterations.
+fn at_rate(rate: u32, default: SettleOptions) -> [SettleOptions; 4] {
+    ITERATIONS.map(|iterations| SettleOptions {
         step: 1.0 / f64::from(rate),
         iterations,
         ..default
-    });
-    let others = CCD_STOPS.into_iter().filter(|ccd| *ccd != default.ccd);
-    swept
-        .chain(others.map(|ccd| SettleOptions { ccd, ..default }))
-        .collect()
+    })
 }
 
 fn measure_setting(options: &SettleOptions, heaps: &[Scene]) -> Result<SettleRow> {

@@ -47,10 +47,17 @@ pub(super) fn measure(views: u64) -> Vec<StatedErrors> {
         .into_iter()
         .flat_map(|noise_px| OFF_CENTER.map(|off_center| (off_center, noise_px)));
     kinds
-        .flat_map(|kind| FRAMINGS.map(|framing| (kind, framing)))
-        .filter(|((off_center, _), framing)| *off_center == 0.0 || *framing != Framing::Whole)
-        .map(|((off_center, noise_px), framing)| coverage(off_center, noise_px, framing, views))
+        .flat_map(|(off_center, noise_px)| {
+            true_framings(off_center)
+                .map(move |framing| coverage(off_center, noise_px, framing, views))
+        })
         .collect()
+}
+
+fn true_framings(off_center: f64) -> impl Iterator<Item = Framing> {
+    FRAMINGS
+        .into_iter()
+        .filter(move |framing| off_center == 0.0 || *framing != Framing::Whole)
 }
 
 fn coverage(off_center: f64, noise_px: f64, framing: Framing, views: u64) -> StatedErrors {

@@ -147,17 +147,41 @@ fn bottle_at(i: usize, [x, y]: [f64; 2], px: f64) -> BottlePixel {
     let (along, depth) = body_at(i, x, y);
     let cover = (depth / (EDGE_PX * px) + 0.5).clamp(0.0, 1.0);
     let inside = cover * cover * (3.0 - 2.0 * cover);
-    let (rim, wrinkle) = (rim(depth), wrinkle(i, x, y));
-    let label = label_at(along, depth);
-    let flat = flat_walls(i);
-    let film = flat.map(|v| libm::pow(v, rim * wrinkle));
-    let sheen = SHEEN_LIGHT * rim * wrinkle + streak(x, depth);
-    let light = label_paint(y).map(|paint| label * paint + (1.0 - label) * sheen);
+    let walls = Walls {
+        flat: flat_walls(i),
+        rim: rim(depth),
+        wrinkle: wrinkle(i, x, y),
+        label: label_at(along, depth),
+    };
     BottlePixel {
         cover,
-        foreground: light.map(|v| inside * v),
-        view: film.map(|v| 1.0 - inside * (1.0 - (1.0 - label) * v)),
-        lit: flat.map(|v| 1.0 - inside * (1.0 - v)),
+        foreground: walls.light(x, y, depth).map(|v| inside * v),
+        view: walls.passes().map(|v| 1.0 - inside * (1.0 - v)),
+        lit: walls.flat.map(|v| 1.0 - inside * (1.0 - v)),
+    }
+}
+
+/// Two walls of film at a place.
+struct Walls {
+    /// What they pass where they lie flat.
+    flat: [f64; 3],
+    rim: f64,
+    wrinkle: f64,
+    /// 1 under the label.
+    label: f64,
+}
+
+impl Walls {
+    /// What is seen through them.
+    fn passes(&self) -> [f64; 3] {
+        let film = self.flat.map(|v| libm::pow(v, self.rim * self.wrinkle));
+        film.map(|v| (1.0 - self.label) * v)
+    }
+
+    /// What they and the label throw back.
+    fn light(&self, x: f64, y: f64, depth: f64) -> [f64; 3] {
+        let sheen = SHEEN_LIGHT * self.rim * self.wrinkle + streak(x, depth);
+        label_paint(y).map(|paint| self.label * paint + (1.0 - self.label) * sheen)
     }
 }
 

@@ -36,11 +36,22 @@ pub(super) fn patched_background((w, h): (usize, usize), seed: u64) -> Image<Lin
         let color = random_color(&mut rng);
         let [x, y, across, down] =
             [w, h, MAX_PATCH_PX, MAX_PATCH_PX].map(|below| random_length(&mut rng, below));
-        for row in y..(y + 1 + down).min(h) {
-            image.row_mut(row)[x..(x + 1 + across).min(w)].fill(color);
-        }
+        fill_patch(&mut image, [x, y], [1 + across, 1 + down], color);
     }
     image
+}
+
+/// What is beyond the picture is left out.
+fn fill_patch(
+    image: &mut Image<LinearRgb>,
+    [x, y]: [usize; 2],
+    [width, height]: [usize; 2],
+    color: LinearRgb,
+) {
+    let (w, h) = image.size();
+    for row in y..(y + height).min(h) {
+        image.row_mut(row)[x..(x + width).min(w)].fill(color);
+    }
 }
 
 fn random_color(rng: &mut ChaCha8Rng) -> LinearRgb {

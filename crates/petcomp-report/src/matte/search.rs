@@ -6,6 +6,7 @@ use super::made;
 use super::score::box_error;
 use super::truth::Known;
 use crate::clock::timed;
+use crate::statistics::mean_of;
 use crate::{Diagram, Point};
 use petcomp::Coverage;
 use petcomp::Image;
@@ -72,13 +73,11 @@ fn measure_photos(bottles: usize, photo_scale: usize) -> Result<Vec<MeasuredSear
     let photos: Vec<Known> = (0..bottles)
         .map(|i| made::enlarged_photo(i, photo_scale))
         .collect();
-    let widths = photos.iter().map(|known| known.photo.width());
-    let photo_width = widths.max().unwrap_or(0);
+    let photo_width = largest_width(&photos);
     // A photo is not enlarged to be searched.
-    let sides = SEARCH_SIDES_PX
+    SEARCH_SIDES_PX
         .into_iter()
-        .filter(|side| *side <= photo_width);
-    sides
+        .filter(|side| *side <= photo_width)
         .map(|side| {
             Ok(MeasuredSearch {
                 photo_scale,
@@ -90,13 +89,21 @@ fn measure_photos(bottles: usize, photo_scale: usize) -> Result<Vec<MeasuredSear
         .collect()
 }
 
+fn largest_width(photos: &[Known]) -> usize {
+    let widths = photos.iter().map(|known| known.photo.width());
+    widths.max().unwrap_or(0)
+}
+
 impl MeasuredSearch {
     fn point(&self, error: fn(&SearchErrors) -> f64) -> Point {
         let curve = format!("photos {} px wide", self.photo_width);
         let setting = format!("{} px", self.side);
-        Point::new(curve, setting, self.mean.seconds, error(&self.mean)).used_where(|quality| {
-            self.photo_scale == TYPICAL_PHOTO_SCALE && self.side == search_side(quality)
-        })
+        Point::new(curve, setting, self.mean.seconds, error(&self.mean))
+            .used_where(|quality| self.is_used_by(quality))
+    }
+
+    fn is_used_by(&self, quality: Quality) -> bool {
+        self.photo_scale == TYPICAL_PHOTO_SCALE && self.side == search_side(quality)
     }
 }
 
@@ -116,14 +123,10 @@ fn mean_result(photos: &[Known], working_size: usize) -> Result<SearchErrors> {
         .map(|known| search_photo(known, &options))
         .collect::<Result<_>>()?;
     Ok(SearchErrors {
-        outline: mean(&found, |f| f.outline),
-        box_px: mean(&found, |f| f.box_px),
-        seconds: mean(&found, |f| f.seconds),
+        outline: mean_of(&found, |f| f.outline),
+        box_px: mean_of(&found, |f| f.box_px),
+        seconds: mean_of(&found, |f| f.seconds),
     })
-}
-
-fn mean(found: &[SearchErrors], of: fn(&SearchErrors) -> f64) -> f64 {
-    found.iter().map(of).sum::<f64>() / found.len().max(1) as f64
 }
 
 fn search_photo(known: &Known, options: &SegmentOptions) -> Result<SearchErrors> {

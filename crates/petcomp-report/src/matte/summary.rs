@@ -1,7 +1,7 @@
 //! Errors of a method over all photos.
 
 use super::{GOOD_BOX_PX, GOOD_IOU, MatteRow, MattingMethod, Score};
-use crate::statistics::quantile;
+use crate::statistics::{mean_of, quantile};
 
 /// Errors of a method over all photos.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,19 +63,15 @@ impl Score {
 /// Means; of the outline's overlap the median, of the box the 95 % quantile.
 fn mean_score(scores: &[Score]) -> Score {
     Score {
-        sad: mean(scores, |s| s.sad),
-        mse: mean(scores, |s| s.mse),
-        gradient: mean(scores, |s| s.gradient),
-        mae_lit: mean(scores, |s| s.mae_lit),
-        psnr_lit: mean(scores, |s| s.psnr_lit),
-        mae_shaded: mean(scores, |s| s.mae_shaded),
-        psnr_shaded: mean(scores, |s| s.psnr_shaded),
-        residue: mean(scores, |s| s.residue),
+        sad: mean_of(scores, |s| s.sad),
+        mse: mean_of(scores, |s| s.mse),
+        gradient: mean_of(scores, |s| s.gradient),
+        mae_lit: mean_of(scores, |s| s.mae_lit),
+        psnr_lit: mean_of(scores, |s| s.psnr_lit),
+        mae_shaded: mean_of(scores, |s| s.mae_shaded),
+        psnr_shaded: mean_of(scores, |s| s.psnr_shaded),
+        residue: mean_of(scores, |s| s.residue),
         iou: quantile(scores.iter().map(|s| s.iou), 0.5),
         box_px: quantile(scores.iter().map(|s| s.box_px), 0.95),
     }
-}
-
-fn mean(scores: &[Score], of: fn(&Score) -> f64) -> f64 {
-    scores.iter().map(of).sum::<f64>() / scores.len().max(1) as f64
 }

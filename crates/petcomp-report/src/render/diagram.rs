@@ -6,12 +6,12 @@ use crate::diagram::invisible_error;
 use crate::{Diagram, Point};
 use petcomp::DeepImage;
 use petcomp::Image;
-use petcomp::PremulRgba;
 use petcomp::Quality;
 use petcomp::Result;
 use petcomp::composite;
 use petcomp::render::{RenderOptions, render, render_reference};
 use petcomp::scene::Shot;
+use petcomp::{LinearRgb, PremulRgba};
 use std::path::Path;
 
 /// The curve that the qualities lie on.
@@ -245,10 +245,13 @@ impl GoldenScene {
             return Err(self.size_error(frame.size()));
         }
         let pairs = frame.pixels().iter().zip(self.wanted.pixels());
-        let differences = pairs.flat_map(|(p, q)| [p.r - q.r, p.g - q.g, p.b - q.b]);
-        let sum: f64 = differences.map(|d| f64::from(d).powi(2)).sum();
+        let sum: f64 = pairs.flat_map(|(p, q)| squared_differences(p, q)).sum();
         Ok(sum / (3 * frame.pixels().len()) as f64)
     }
+}
+
+fn squared_differences(a: &PremulRgba, b: &LinearRgb) -> [f64; 3] {
+    [a.r - b.r, a.g - b.g, a.b - b.b].map(|d| f64::from(d).powi(2))
 }
 
 /// Root mean squared error over scenes, all of the same weight, and the CPU seconds of all of them per megapixel.

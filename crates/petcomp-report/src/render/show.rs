@@ -65,12 +65,10 @@ pub fn speed_up(row: &RenderRow, rows: &[RenderRow]) -> Option<f64> {
 
 /// The time at which a falling curve of errors and times has an error.
 fn interpolated_time(curve: &[[f64; 2]], error: f64) -> Option<f64> {
-    let pair = curve
-        .windows(2)
-        .find(|pair| pair[0][0] >= error && error >= pair[1][0])?;
-    let [before, after] = [pair[0], pair[1]];
-    let part = (before[0] - error) / (before[0] - after[0]);
-    Some(before[1] + part * (after[1] - before[1]))
+    let mut pairs = curve.windows(2).map(|pair| [pair[0], pair[1]]);
+    let [[more, before], [less, after]] = pairs.find(|[a, b]| a[0] >= error && error >= b[0])?;
+    let part = (more - error) / (more - less);
+    Some(before + part * (after - before))
 }
 
 /// A measure of likeness that is 0 for equal pictures.

@@ -177,11 +177,15 @@ impl Costs<'_> {
         prices.map_or(f64::INFINITY, |prices| self.residual(&prices, i))
     }
 
+    fn positive(&self) -> Vec<usize> {
+        let all = 0..self.costs.len();
+        all.filter(|&i| self.costs[i] > 0.0).collect()
+    }
+
     /// Prices by all measurements above 0 but one; none without any.
     fn fit_without(&self, left_out: Option<usize>) -> Option<Vec<f64>> {
-        let used: Vec<usize> = (0..self.costs.len())
-            .filter(|&i| self.costs[i] > 0.0 && Some(i) != left_out)
-            .collect();
+        let mut used = self.positive();
+        used.retain(|i| Some(*i) != left_out);
         let terms = self.rows.get(*used.first()?)?.len();
         subsets(terms)
             .filter_map(|free| self.least_squares(&used, &free))

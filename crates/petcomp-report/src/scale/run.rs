@@ -26,10 +26,14 @@ const TIMED_HEAPS: u64 = 5;
 pub fn run(case: &ScaleCase, seconds: f64) -> Result<ScalePoint> {
     let inputs = PictureInputs::new(case);
     let pool = work::pool(case.threads).map_err(|e| Error::value("threads", e))?;
-    let first = pool.install(|| Round::measure(&inputs, 1))?;
+    pool.install(|| measure_point(case, &inputs, seconds))
+}
+
+fn measure_point(case: &ScaleCase, inputs: &PictureInputs, seconds: f64) -> Result<ScalePoint> {
+    let first = Round::measure(inputs, 1)?;
     let (rounds, pictures) = first.plan_more(case.threads, seconds);
     let later = (0..rounds)
-        .map(|_| pool.install(|| Round::measure(&inputs, pictures)))
+        .map(|_| Round::measure(inputs, pictures))
         .collect::<Result<Vec<_>>>()?;
     Ok(ScalePoint {
         case: *case,
