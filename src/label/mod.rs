@@ -11,12 +11,15 @@ pub(crate) mod overlay;
 mod rle;
 mod simplify;
 mod topmost;
+#[doc(hidden)]
 pub mod trace;
 mod visibility;
 
+#[doc(hidden)]
 pub use border::{Border, borders};
 pub(crate) use gallery::clipped;
 pub use mask::RleMask;
+#[doc(hidden)]
 pub use overlay::overlay;
 pub use topmost::cyclic_overlaps;
 pub use visibility::DepthRange;

@@ -91,7 +91,10 @@ mod running_blur;
 mod stream;
 
 pub(super) use chroma::{differences, from_ycc, to_ycc};
-pub use options::{Blur, Falloff, KeyOptions, Profile};
+#[doc(hidden)]
+pub use options::{Blur, Falloff};
+pub use options::{KeyOptions, Profile};
+#[doc(hidden)]
 pub use photo::Photo;
 
 use crate::error::{Error, Result};
@@ -121,6 +124,7 @@ pub struct Keyed {
 }
 
 /// How often the `robust` profile departed from Blender 3.4.
+#[doc(hidden)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Deviations {
@@ -149,6 +153,7 @@ pub fn key(photo: &Image<LinearRgb>, screen: LinearRgb, opts: &KeyOptions) -> Ke
 }
 
 /// A photo to key, its screen, and the mattes that are known of it.
+#[doc(hidden)]
 #[derive(Clone, Copy, Debug)]
 pub struct Keying<'a, P> {
     photo: &'a Image<P>,
