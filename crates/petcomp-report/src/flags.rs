@@ -92,7 +92,7 @@ impl End {
 /// # Errors
 /// A folder without truth, or files of it that cannot be read.
 pub fn measure(folder: &Path, progress: impl Fn(u64, u64)) -> Result<Vec<FlagRow>> {
-    let truths = Truths::of(folder)?;
+    let truths = Truths::in_folder(folder)?;
     let mut rows = Vec::new();
     for i in 0..truths.len() {
         progress(i as u64, truths.len() as u64);
@@ -225,7 +225,7 @@ pub fn write(truth: &Path, folder: &Path, progress: impl Fn(u64, u64)) -> Result
 
 #[cfg(test)]
 mod tests {
-    use super::super::matte::truth::{Known, Noise};
+    use super::super::matte::truth::{Known, SensorNoise};
     use super::*;
 
     const GREEN: LinearRgb = LinearRgb::new(0.04, 0.4, 0.08);
@@ -254,7 +254,7 @@ mod tests {
             screen: Image::filled(w, h, GREEN),
             mask: Image::from_fn(w, h, |x, y| Coverage(f32::from(u8::from(on(x, y))))),
             box_px: [90.0, 60.0, 210.0, 120.0],
-            noise: Noise {
+            noise: SensorNoise {
                 shot: 0.0,
                 read: 0.003,
             },

@@ -2,7 +2,7 @@
 
 use super::count;
 use crate::ReportFlags;
-use petcomp_report::scale::{self, Case, ScaleOptions};
+use petcomp_report::scale::{self, ScaleCase, ScaleOptions};
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
@@ -31,7 +31,7 @@ fn seconds(text: &str) -> Result<f64, String> {
 
 pub(crate) fn run(args: &Args, common: &ReportFlags) -> anyhow::Result<()> {
     if let Some(case) = &args.case {
-        let case: Case = serde_json::from_str(case)?;
+        let case: ScaleCase = serde_json::from_str(case)?;
         println!(
             "{}",
             serde_json::to_string(&scale::run(&case, args.seconds)?)?
