@@ -1,13 +1,13 @@
 //! `petcomp settle`: dropped objects come to rest.
 
-use crate::common::Common;
+use crate::global::GlobalArgs;
 use petcomp::dataset::DatasetConfig;
-use petcomp::settle::{SettleOptions, preview, settle_traced, trace_csv};
+use petcomp::settle::{SettleOptions, Settled, preview, settle_traced, trace_csv};
 use petcomp::{Quality, Scene, io};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 #[derive(clap::Args)]
-pub(crate) struct Args {
+pub(crate) struct SettleArgs {
     /// Scene, TOML or JSON
     scene: PathBuf,
     /// Scene to write, TOML or JSON by its extension
@@ -27,23 +27,13 @@ pub(crate) struct Args {
     preview: Option<PathBuf>,
 }
 
-pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
+/// Steps of the simulation from one line of the trace to the next: 60 lines a second at the default step.
+const TRACE_INTERVAL_STEPS: usize = 8;
+
+pub(crate) fn run(args: &SettleArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     let scene: Scene = io::read_document(&args.scene)?;
-    let options = match &args.options {
-        Some(path) => read_options(path)?,
-        None => scene_options(&scene, &args.scene)?,
-    };
-    let options = args
-        .quality
-        .map_or(options, |quality| quality.settle(options));
-    // 60 a second at the default step.
-    let every = if args.trace.is_some() { 8 } else { 0 };
-    let (settled, samples) =
-        settle_traced(scene, &options, every).map_err(|e| e.in_file(&args.scene))?;
-    // Written for a failed fall too: it shows what went wrong.
-    if let Some(path) = &args.trace {
-        io::write_text(path, &trace_csv(&samples))?;
-    }
+    let options = args.options_for(&scene)?;
+    let settled = args.settle(scene, &options)?;
     let (seconds, rejected) = (settled.seconds, settled.rejected.len());
     let mut rest = settled.into_scene()?;
     if let Some(files) = &rest.files {
@@ -53,20 +43,46 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
     if let Some(path) = &args.preview {
         io::write(path, &preview(&rest, &options))?;
     }
-    common.say(format_args!(
+    global.print_status(format_args!(
         "{}: at rest after {seconds:.2} s, {rejected} attempts rejected",
         args.output.display()
     ));
     Ok(())
 }
 
-fn scene_options(scene: &Scene, path: &Path) -> petcomp::Result<SettleOptions> {
-    let config = DatasetConfig::from_settings(&scene.settings, &[]).map_err(|e| e.in_file(path))?;
-    Ok(config.scene.settle)
-}
+impl SettleArgs {
+    /// Lets the objects fall and writes the trace, for a failed fall too: it shows what went wrong.
+    fn settle(&self, scene: Scene, options: &SettleOptions) -> petcomp::Result<Settled> {
+        let interval = match self.trace {
+            Some(_) => TRACE_INTERVAL_STEPS,
+            None => 0,
+        };
+        let (settled, samples) =
+            settle_traced(scene, options, interval).map_err(|e| e.in_file(&self.scene))?;
+        if let Some(path) = &self.trace {
+            io::write_text(path, &trace_csv(&samples))?;
+        }
+        Ok(settled)
+    }
 
-fn read_options(path: &Path) -> petcomp::Result<SettleOptions> {
-    let options: SettleOptions = io::read_toml(path)?;
-    options.check().map_err(|e| e.in_file(path))?;
-    Ok(options)
+    fn options_for(&self, scene: &Scene) -> petcomp::Result<SettleOptions> {
+        let options = match &self.options {
+            Some(path) => {
+                let options: SettleOptions = io::read_toml(path)?;
+                options.check().map_err(|e| e.in_file(path))?;
+                options
+            }
+            None => self.scene_options(scene)?,
+        };
+        Ok(match self.quality {
+            Some(quality) => quality.settle(options),
+            None => options,
+        })
+    }
+
+    /// Those of the scene's own settings.
+    fn scene_options(&self, scene: &Scene) -> petcomp::Result<SettleOptions> {
+        let config = DatasetConfig::from_settings(&scene.settings, &[]);
+        Ok(config.map_err(|e| e.in_file(&self.scene))?.scene.settle)
+    }
 }
