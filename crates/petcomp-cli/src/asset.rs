@@ -107,17 +107,18 @@ struct ScaleArgs {
 impl ScaleArgs {
     /// The one that is given; `corners` are those of the screen.
     fn scale(&self, corners: Option<[[f64; 2]; 4]>) -> Scale {
-        if let Some(px_per_metre) = self.scale {
-            Scale::PxPerMetre(px_per_metre)
-        } else if let Some(&[w, h]) = self.size.as_deref() {
-            Scale::Size([w.max(h), w.min(h)])
-        } else if let Some(size) = self.screen_size {
-            Scale::Screen(size, corners)
-        } else if let Some(side) = self.marker_size {
-            Scale::Marker(side)
-        } else {
-            Scale::Length(self.length.unwrap_or_default())
-        }
+        let screen = self.screen_size.map(|size| Scale::Screen(size, corners));
+        self.scale
+            .map(Scale::PxPerMetre)
+            .or_else(|| self.object_size())
+            .or(screen)
+            .or(self.marker_size.map(Scale::Marker))
+            .unwrap_or(Scale::Length(self.length.unwrap_or_default()))
+    }
+
+    fn object_size(&self) -> Option<Scale> {
+        let [w, h] = *self.size.as_deref()?.first_chunk()?;
+        Some(Scale::Size([f64::max(w, h), f64::min(w, h)]))
     }
 }
 
@@ -142,15 +143,12 @@ fn check_folder(folder: &Path, strict: bool) -> anyhow::Result<()> {
     let records: Vec<_> = records_of(&library).collect();
     let to_review = records.iter().filter(|record| record.needs_review());
     let to_review = to_review.inspect(|record| list_reasons(record)).count();
+    let (folder, assets, cut_outs) = (folder.display(), library.assets.len(), records.len());
     print::line(format_args!(
-        "{}: {} assets, {} cut-outs, all intact, {to_review} to review",
-        folder.display(),
-        library.assets.len(),
-        records.len(),
+        "{folder}: {assets} assets, {cut_outs} cut-outs, all intact, {to_review} to review"
     ));
     if strict && to_review > 0 {
-        let what = format!("{}: {to_review} cut-outs to review", folder.display());
-        return Err(NeedsReview(what).into());
+        return Err(NeedsReview(format!("{folder}: {to_review} cut-outs to review")).into());
     }
     Ok(())
 }
@@ -194,22 +192,24 @@ fn report_built(built: &Built, folder: &Path, global: &GlobalArgs) {
         report_diagnostics(&record.file, &record.diagnostics);
     }
     let (photos, assets) = (built.photos, built.library.assets.len());
-    global.print_status(format_args!(
-        "{}: {photos} photos, {assets} assets",
-        folder.display()
-    ));
-    let [lengths, errors] = [0, 1].map(|i| extremes_mm(&built.lengths, i));
-    global.print_status(format_args!(
-        "objects are {:.0} to {:.0} mm long, to {:.1} to {:.1} mm; `petcomp asset list` shows each",
-        lengths[0], lengths[1], errors[0], errors[1]
-    ));
+    global.print_written(folder, format_args!("{photos} photos, {assets} assets"));
+    global.print_status(describe_lengths(&built.lengths));
+}
+
+/// Range of the objects' lengths, and of their errors.
+fn describe_lengths(metres: &[[f64; 2]]) -> String {
+    let ([short, long], [fine, coarse]) = (extremes_mm(metres, 0), extremes_mm(metres, 1));
+    format!(
+        "objects are {short:.0} to {long:.0} mm long, to {fine:.1} to {coarse:.1} mm; \
+         `petcomp asset list` shows each"
+    )
 }
 
 /// Writes the contact sheet of a folder.
 fn write_sheet(folder: &Path, library: &Library, global: &GlobalArgs) -> anyhow::Result<()> {
     let path = folder.join(SHEET);
     io::write(&path, &asset::contact_sheet(library))?;
-    global.print_status(format_args!("look at {}", path.display()));
+    global.print_look_at(&path);
     Ok(())
 }
 
@@ -289,12 +289,15 @@ fn list_line(asset: &Asset<PhotoRecord>, photo: &PhotoRecord) -> String {
     let [length, width, error] =
         [photo.object_m[0], photo.object_m[1], photo.error_m].map(|metres| metres * 1e3);
     let outline = photo.outline_confidence;
-    let color = match photo.color_confidence {
-        Some(color) => format!("{color:.2}"),
-        None => "   -".into(),
-    };
+    let (color, file) = (color_column(photo.color_confidence), &photo.file);
     format!(
-        "{name:12} {class:10} {length:4.0} x {width:3.0} mm (+- {error:.1})  {outline:.2}  {color}  {}",
-        photo.file
+        "{name:12} {class:10} {length:4.0} x {width:3.0} mm (+- {error:.1})  {outline:.2}  {color}  {file}"
     )
+}
+
+fn color_column(confidence: Option<f64>) -> String {
+    match confidence {
+        Some(confidence) => format!("{confidence:.2}"),
+        None => "   -".into(),
+    }
 }

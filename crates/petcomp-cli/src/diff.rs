@@ -107,17 +107,10 @@ pub(crate) fn run(args: &DiffArgs, global: &GlobalArgs) -> anyhow::Result<ExitCo
     if let Some(path) = args.difference_path(&report) {
         pair.write_difference(path, args.scale)?;
     }
-    global.print_status(format_args!(
-        "Comparing \"{}\" and \"{}\"",
-        args.a.display(),
-        args.b.display()
-    ));
+    let (a, b) = (args.a.display(), args.b.display());
+    global.print_status(format_args!("Comparing \"{a}\" and \"{b}\""));
     print::text(&report);
-    if !global.is_quiet()
-        && let Some(likeness) = pair.likeness()
-    {
-        global.print_status(format_args!("Scene-linear {likeness}"));
-    }
+    pair.print_likeness(global);
     Ok(ExitCode::from(report.verdict.exit_code()))
 }
 
@@ -153,6 +146,15 @@ impl PicturePair {
     fn write_difference(&self, path: &Path, scale: f32) -> petcomp::Result<()> {
         let [a, b] = self.opaque_rows();
         io::write(path, &absolute_difference(&a, &b, scale))
+    }
+
+    /// It takes long, so nothing is computed that is not shown.
+    fn print_likeness(&self, global: &GlobalArgs) {
+        if !global.is_quiet()
+            && let Some(likeness) = self.likeness()
+        {
+            global.print_status(format_args!("Scene-linear {likeness}"));
+        }
     }
 
     /// How alike the two are to the eye, over black.

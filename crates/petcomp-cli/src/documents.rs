@@ -2,7 +2,7 @@
 
 use petcomp::dataset::{DatasetConfig, Pipeline};
 use petcomp::io::{self, Override};
-use petcomp::{Result, Scene};
+use petcomp::{Quality, Result, Scene};
 use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
 
@@ -59,6 +59,14 @@ impl SceneArgs {
             Some(recipe) => DatasetConfig::read(recipe, &self.overrides)?,
             None => DatasetConfig::for_scene(scene, &self.path, &self.overrides)?,
         })
+    }
+}
+
+/// The config, with everything computed as finely as is asked for.
+pub(crate) fn at_quality(quality: Option<Quality>, config: DatasetConfig) -> DatasetConfig {
+    match quality {
+        Some(quality) => quality.config(config),
+        None => config,
     }
 }
 

@@ -49,18 +49,14 @@ pub(crate) struct EvalArgs {
 pub(crate) fn run(args: &EvalArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     let mut options = args.report_options()?;
     let runs = args.read_runs(&mut options)?;
-    let metrics = match &args.output {
-        Some(folder) => page::write(folder, &runs, &options)?,
-        None => runs.iter().map(|run| Metrics::of(run, &options)).collect(),
-    };
+    let metrics = args.measure(&runs, &options)?;
     print_scores(&metrics, &options, global);
     let factors = page::factors_table(&runs, &options);
     if !factors.rows.is_empty() {
         print::text(factors.markdown());
     }
     if let Some(folder) = &args.output {
-        let page = folder.join("eval.html");
-        global.print_status(format_args!("look at {}", page.display()));
+        global.print_look_at(&folder.join("eval.html"));
     }
     Ok(())
 }
@@ -93,6 +89,14 @@ impl EvalArgs {
         })
     }
 
+    /// Scores of the runs, written where that is asked for.
+    fn measure(&self, runs: &[Run], options: &EvalReportOptions) -> petcomp::Result<Vec<Metrics>> {
+        match &self.output {
+            Some(folder) => page::write(folder, runs, options),
+            None => Ok(runs.iter().map(|run| Metrics::of(run, options)).collect()),
+        }
+    }
+
     /// All runs; the options get the names of classes and the pictures of the truth.
     fn read_runs(&self, options: &mut EvalReportOptions) -> anyhow::Result<Vec<Run>> {
         let Some((truth, predictions)) = self.paths.split_last() else {
@@ -100,13 +104,13 @@ impl EvalArgs {
         };
         let mut runs = Vec::new();
         for path in predictions {
-            runs.push(Run {
-                name: run_name(path),
-                sheets: match truth.extension() {
-                    Some(extension) if extension == "json" => self.read_coco(path, truth, options),
-                    _ => self.read_yolo(path, truth, options),
-                }?,
-            });
+            let sheets = if truth.extension().is_some_and(|e| e == "json") {
+                self.read_coco(path, truth, options)
+            } else {
+                self.read_yolo(path, truth, options)
+            };
+            let (name, sheets) = (run_name(path), sheets?);
+            runs.push(Run { name, sheets });
         }
         Ok(runs)
     }

@@ -8,6 +8,7 @@ use petcomp::io::{Fallback, LimitOverride, Limits, ReadOptions};
 use petcomp::printable;
 use std::fmt::Display;
 use std::io::Write as _;
+use std::path::Path;
 
 /// Flags that mean the same everywhere: explained once, in `petcomp --help`.
 #[derive(clap::Args)]
@@ -96,12 +97,16 @@ impl GlobalArgs {
     }
 
     fn read_options(&self) -> anyhow::Result<ReadOptions> {
-        let mut limits = self.limits.iter();
         Ok(ReadOptions {
-            limits: limits.try_fold(Limits::default(), Limits::with)?,
+            limits: self.limits()?,
             fallback: self.oiio.fallback()?,
             ..Default::default()
         })
+    }
+
+    fn limits(&self) -> petcomp::Result<Limits> {
+        let mut overrides = self.limits.iter();
+        overrides.try_fold(Limits::default(), Limits::with)
     }
 
     /// Only results and errors are asked for.
@@ -115,6 +120,16 @@ impl GlobalArgs {
         if !self.quiet {
             print::line(line);
         }
+    }
+
+    /// Prints what a file that was written holds: `FILE: what`.
+    pub(crate) fn print_written(&self, file: &Path, what: impl Display) {
+        self.print_status(format_args!("{}: {what}", file.display()));
+    }
+
+    /// Points at a picture or page.
+    pub(crate) fn print_look_at(&self, file: &Path) {
+        self.print_status(format_args!("look at {}", file.display()));
     }
 
     /// A progress display: a bar on a terminal, plain lines elsewhere, nothing when quiet; or JSON, where that is asked for.

@@ -31,10 +31,7 @@ pub(crate) fn run(args: &LabelArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     };
     let labels = labels.map_err(|e| e.in_file(&args.scene.path))?;
     io::write_json(&args.output, &labels)?;
-    if let Some(path) = &args.polygons {
-        let polygons = label::borders(&labels, pipeline.config().labels.simplify);
-        io::write_json(path, &polygons)?;
-    }
+    args.write_polygons(&labels, &pipeline)?;
     args.report(&labels, global);
     Ok(())
 }
@@ -49,14 +46,22 @@ impl LabelArgs {
         })
     }
 
+    fn write_polygons(&self, labels: &Labels, pipeline: &Pipeline) -> petcomp::Result<()> {
+        let Some(path) = &self.polygons else {
+            return Ok(());
+        };
+        let simplify = pipeline.config().labels.simplify;
+        io::write_json(path, &label::borders(labels, simplify))
+    }
+
     fn report(&self, labels: &Labels, global: &GlobalArgs) {
         let objects = &labels.objects;
         let topmost = objects.iter().filter(|o| o.is_topmost()).count();
-        global.print_status(format_args!(
-            "{}: {} objects, {topmost} on top",
-            self.output.display(),
-            objects.len()
-        ));
+        let count = objects.len();
+        global.print_written(
+            &self.output,
+            format_args!("{count} objects, {topmost} on top"),
+        );
     }
 }
 

@@ -51,6 +51,19 @@ struct Program {
 enum Verb {
     /// Make a sample dataset from the photographs in the repository
     Demo(demo::DemoArgs),
+    #[command(flatten)]
+    Stage(StageVerb),
+    /// Detections against the truth: average precision, curves, confusion
+    Eval(eval::EvalArgs),
+    /// Compare two pictures, with the flags and exit codes of OpenImageIO's idiff
+    Diff(diff::DiffArgs),
+    /// What this machine has, and whether petcomp works on it
+    Doctor(doctor::DoctorArgs),
+}
+
+/// The stages, in the order of the data.
+#[derive(Subcommand)]
+enum StageVerb {
     /// Photo -> matte and cut-out
     #[command(subcommand)]
     Matte(matte::MatteCommand),
@@ -72,12 +85,6 @@ enum Verb {
     /// Recipe -> images with labels, ready to train on
     #[command(subcommand)]
     Dataset(dataset::DatasetCommand),
-    /// Detections against the truth: average precision, curves, confusion
-    Eval(eval::EvalArgs),
-    /// Compare two pictures, with the flags and exit codes of OpenImageIO's idiff
-    Diff(diff::DiffArgs),
-    /// What this machine has, and whether petcomp works on it
-    Doctor(doctor::DoctorArgs),
 }
 
 fn main() -> ExitCode {
@@ -97,22 +104,29 @@ fn parse_command_line() -> Result<Program, clap::Error> {
 
 impl Program {
     fn start(&self) -> anyhow::Result<ExitCode> {
-        let global = &self.global;
-        global.apply()?;
+        self.global.apply()?;
         match &self.verb {
-            Verb::Demo(args) => demo::run(args, global)?,
-            Verb::Matte(command) => matte::run(command, global)?,
-            Verb::Asset(command) => asset::run(command, global)?,
-            Verb::Camera(command) => camera::run(command, global)?,
-            Verb::Scene(command) => scene::run(command, global)?,
-            Verb::Settle(args) => settle::run(args, global)?,
-            Verb::Render(args) => render::run(args, global)?,
-            Verb::Label(args) => label::run(args, global)?,
-            Verb::Dataset(command) => dataset::run(command, global)?,
-            Verb::Eval(args) => eval::run(args, global)?,
-            Verb::Diff(args) => return diff::run(args, global),
+            Verb::Demo(args) => demo::run(args, &self.global)?,
+            Verb::Stage(stage) => stage.run(&self.global)?,
+            Verb::Eval(args) => eval::run(args, &self.global)?,
+            Verb::Diff(args) => return diff::run(args, &self.global),
             Verb::Doctor(args) => return doctor::run(args),
         }
         Ok(ExitCode::SUCCESS)
+    }
+}
+
+impl StageVerb {
+    fn run(&self, global: &GlobalArgs) -> anyhow::Result<()> {
+        match self {
+            Self::Matte(command) => matte::run(command, global),
+            Self::Asset(command) => asset::run(command, global),
+            Self::Camera(command) => camera::run(command, global),
+            Self::Scene(command) => scene::run(command, global),
+            Self::Settle(args) => settle::run(args, global),
+            Self::Render(args) => render::run(args, global),
+            Self::Label(args) => label::run(args, global),
+            Self::Dataset(command) => dataset::run(command, global),
+        }
     }
 }

@@ -1,6 +1,6 @@
 //! `petcomp render`: scene -> picture.
 
-use crate::documents::SceneArgs;
+use crate::documents::{SceneArgs, at_quality};
 use crate::global::GlobalArgs;
 use anyhow::bail;
 use petcomp::composite::{self, Aov};
@@ -37,33 +37,40 @@ pub(crate) fn run(args: &RenderArgs, global: &GlobalArgs) -> anyhow::Result<()> 
         .resolve(scene)
         .map_err(|e| e.in_file(&args.scene.path))?;
     let (deep, frame) = pipeline.shoot(&scene, &shot);
-    if args.aov.is_empty() {
-        write_picture(&args.output, &frame)?;
-    } else {
-        args.write_parts(&deep, &shot, &frame)?;
-    }
-    if let Some(path) = &args.preview {
-        io::write(path, &displayed(&frame))?;
-    }
-    if let Some(path) = &args.resolved {
-        let scene = pipeline.config().with_files(scene.clone(), path)?;
-        io::write_document(path, &scene)?;
-    }
+    args.write_frame(&deep, &shot, &frame)?;
     let ((w, h), objects) = (frame.size(), scene.objects.len());
-    global.print_status(format_args!(
-        "{}: {w} x {h}, {objects} objects",
-        args.output.display()
-    ));
+    args.write_resolved(scene, pipeline.config())?;
+    global.print_written(&args.output, format_args!("{w} x {h}, {objects} objects"));
     Ok(())
 }
 
 impl RenderArgs {
     fn config_for(&self, scene: &Scene) -> anyhow::Result<DatasetConfig> {
-        let config = self.scene.config_for(scene)?;
-        Ok(match self.quality {
-            Some(quality) => quality.config(config),
-            None => config,
-        })
+        Ok(at_quality(self.quality, self.scene.config_for(scene)?))
+    }
+
+    fn write_frame(
+        &self,
+        deep: &DeepImage,
+        shot: &Shot,
+        frame: &Image<PremulRgba>,
+    ) -> anyhow::Result<()> {
+        if self.aov.is_empty() {
+            write_picture(&self.output, frame)?;
+        } else {
+            self.write_parts(deep, shot, frame)?;
+        }
+        if let Some(path) = &self.preview {
+            io::write(path, &displayed(frame))?;
+        }
+        Ok(())
+    }
+
+    fn write_resolved(&self, scene: Scene, config: &DatasetConfig) -> petcomp::Result<()> {
+        let Some(path) = &self.resolved else {
+            return Ok(());
+        };
+        io::write_document(path, &config.with_files(scene, path)?)
     }
 
     fn write_parts(

@@ -68,12 +68,8 @@ fn draw_scene(args: &DrawArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     let scene = pipeline.draw(args.seed, args.index)?;
     let scene = pipeline.config().with_files(scene, &args.output)?;
     io::write_document(&args.output, &scene)?;
-    global.print_status(format_args!(
-        "{}: {} objects over {}",
-        args.output.display(),
-        scene.objects.len(),
-        scene.plate
-    ));
+    let (objects, plate) = (scene.objects.len(), &scene.plate);
+    global.print_written(&args.output, format_args!("{objects} objects over {plate}"));
     Ok(())
 }
 
@@ -92,12 +88,16 @@ fn export_scene(args: &ExportSceneArgs, global: &GlobalArgs) -> anyhow::Result<(
         .resolve(scene)
         .map_err(|e| e.in_file(&args.scene))?;
     cycles::export(&shot, scene.surface.size, &args.folder)?;
-    let (folder, cards) = (args.folder.display(), shot.cards.len());
-    global.print_status(format_args!("{folder}: {cards} cards; render it with"));
-    global.print_status(format_args!(
-        "  blender -b --factory-startup --python-use-system-env -P {folder}/{} -- \
-         {folder}/scene.json --out {folder}/cycles --preview",
-        cycles::SCRIPT
-    ));
+    let cards = shot.cards.len();
+    global.print_written(&args.folder, format_args!("{cards} cards; render it with"));
+    global.print_status(format_args!("  {}", blender_command(&args.folder)));
     Ok(())
+}
+
+fn blender_command(folder: &Path) -> String {
+    let (folder, script) = (folder.display(), cycles::SCRIPT);
+    format!(
+        "blender -b --factory-startup --python-use-system-env -P {folder}/{script} -- \
+         {folder}/scene.json --out {folder}/cycles --preview"
+    )
 }

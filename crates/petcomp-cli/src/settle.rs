@@ -4,7 +4,7 @@ use crate::global::GlobalArgs;
 use petcomp::dataset::DatasetConfig;
 use petcomp::settle::{SettleOptions, Settled, preview, settle_traced, trace_csv};
 use petcomp::{Quality, Scene, io};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
 pub(crate) struct SettleArgs {
@@ -35,18 +35,12 @@ pub(crate) fn run(args: &SettleArgs, global: &GlobalArgs) -> anyhow::Result<()> 
     let options = args.options_for(&scene)?;
     let settled = args.settle(scene, &options)?;
     let (seconds, rejected) = (settled.seconds, settled.rejected.len());
-    let mut rest = settled.into_scene()?;
-    if let Some(files) = &rest.files {
-        rest.files = Some(files.moved(&args.scene, &args.output)?);
-    }
-    io::write_document(&args.output, &rest)?;
+    let rest = args.write_rest(settled.into_scene()?)?;
     if let Some(path) = &args.preview {
         io::write(path, &preview(&rest, &options))?;
     }
-    global.print_status(format_args!(
-        "{}: at rest after {seconds:.2} s, {rejected} attempts rejected",
-        args.output.display()
-    ));
+    let what = format!("at rest after {seconds:.2} s, {rejected} attempts rejected");
+    global.print_written(&args.output, what);
     Ok(())
 }
 
@@ -65,15 +59,20 @@ impl SettleArgs {
         Ok(settled)
     }
 
+    /// Writes the scene at rest, the files that it names seen from its new place.
+    fn write_rest(&self, mut scene: Scene) -> petcomp::Result<Scene> {
+        if let Some(files) = &scene.files {
+            scene.files = Some(files.moved(&self.scene, &self.output)?);
+        }
+        io::write_document(&self.output, &scene)?;
+        Ok(scene)
+    }
+
     fn options_for(&self, scene: &Scene) -> petcomp::Result<SettleOptions> {
         let options = match &self.options {
-            Some(path) => {
-                let options: SettleOptions = io::read_toml(path)?;
-                options.check().map_err(|e| e.in_file(path))?;
-                options
-            }
-            None => self.scene_options(scene)?,
-        };
+            Some(path) => read_options(path),
+            None => self.scene_options(scene),
+        }?;
         Ok(match self.quality {
             Some(quality) => quality.settle(options),
             None => options,
@@ -85,4 +84,10 @@ impl SettleArgs {
         let config = DatasetConfig::from_settings(&scene.settings, &[]);
         Ok(config.map_err(|e| e.in_file(&self.scene))?.scene.settle)
     }
+}
+
+fn read_options(path: &Path) -> petcomp::Result<SettleOptions> {
+    let options: SettleOptions = io::read_toml(path)?;
+    options.check().map_err(|e| e.in_file(path))?;
+    Ok(options)
 }

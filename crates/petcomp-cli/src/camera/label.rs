@@ -98,11 +98,8 @@ pub(super) fn add_markers(args: &MarkersArgs, global: &GlobalArgs) -> anyhow::Re
     let known = label.points.len();
     let label = with_markers_of(label, &args.photo, &args.map)?;
     io::write_json(&args.output, &label)?;
-    global.print_status(format_args!(
-        "{}: {} marker corners",
-        args.output.display(),
-        label.points.len() - known
-    ));
+    let found = label.points.len() - known;
+    global.print_written(&args.output, format_args!("{found} marker corners"));
     Ok(())
 }
 

@@ -1,7 +1,7 @@
 //! `petcomp dataset generate`: a recipe becomes images with labels.
 
 use super::{LongRunConsent, generate_supervised, print_counts, trainer_inputs};
-use crate::documents::RecipeArgs;
+use crate::documents::{RecipeArgs, at_quality};
 use crate::global::GlobalArgs;
 use crate::interruption::interruption;
 use crate::print;
@@ -71,11 +71,7 @@ pub(crate) fn run(args: &GenerateArgs, global: &GlobalArgs) -> anyhow::Result<()
 impl GenerateArgs {
     /// The recipe as the flags change it.
     fn config(&self) -> anyhow::Result<DatasetConfig> {
-        let config = self.recipe.read_config()?;
-        let config = match self.quality {
-            Some(quality) => quality.config(config),
-            None => config,
-        };
+        let config = at_quality(self.quality, self.recipe.read_config()?);
         Ok(match self.preview {
             Some(_) => config.preview(),
             None => config,
@@ -95,9 +91,10 @@ impl GenerateArgs {
     fn sample_range(&self) -> petcomp::Result<SampleRange> {
         match (self.only, self.shard) {
             (Some(k), _) => Ok(SampleRange::One(k)),
-            (None, Some(choice)) => choice
-                .within(|name| std::env::var(name).ok())
-                .map(SampleRange::Shard),
+            (None, Some(choice)) => {
+                let shard = choice.within(|name| std::env::var(name).ok());
+                shard.map(SampleRange::Shard)
+            }
             (None, None) => Ok(SampleRange::All),
         }
     }

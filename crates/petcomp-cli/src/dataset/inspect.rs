@@ -5,9 +5,19 @@ use crate::exit::NeedsReview;
 use crate::global::GlobalArgs;
 use crate::print;
 use petcomp::dataset::page::DatasetReportOptions;
-use petcomp::dataset::{self, contact_sheet_of};
+use petcomp::dataset::{self, Checked, contact_sheet_of};
 use petcomp::io;
 use std::path::{Path, PathBuf};
+
+#[derive(clap::Subcommand)]
+pub(crate) enum InspectCommand {
+    /// Look for what trainers refuse, and for what makes results too good: duplicates, leaks between the parts
+    Check(CheckArgs),
+    /// Write one HTML page: pictures with their labels, what was drawn, what can be seen, how long it took
+    Report(ReportArgs),
+    /// Draw a sheet of the first pictures with their boxes
+    Sheet(SheetArgs),
+}
 
 #[derive(clap::Args)]
 pub(crate) struct CheckArgs {
@@ -45,7 +55,15 @@ pub(crate) struct SheetArgs {
     most: usize,
 }
 
-pub(crate) fn check_dataset(args: &CheckArgs, global: &GlobalArgs) -> anyhow::Result<()> {
+pub(super) fn run(command: &InspectCommand, global: &GlobalArgs) -> anyhow::Result<()> {
+    match command {
+        InspectCommand::Check(args) => check_dataset(args, global),
+        InspectCommand::Report(args) => write_report(args, global),
+        InspectCommand::Sheet(args) => write_sheet(args, global),
+    }
+}
+
+fn check_dataset(args: &CheckArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     let folder = args.folder.display();
     let checked = dataset::check(&args.folder)?;
     print::text(checked.balance().markdown());
@@ -53,34 +71,43 @@ pub(crate) fn check_dataset(args: &CheckArgs, global: &GlobalArgs) -> anyhow::Re
     for note in &notes {
         global.print_status(located(&folder, note));
     }
-    checked.findings.iter().for_each(print::line);
-    let errors = checked.findings.len();
-    anyhow::ensure!(errors == 0, "{folder}: {errors} errors");
-    let (images, rows) = (checked.images, checked.rows.iter().sum::<usize>());
-    print::line(format_args!(
-        "{folder}: {images} images, {rows} labels, no errors"
-    ));
+    print_findings(&checked, &args.folder)?;
     if args.strict && !notes.is_empty() {
         return Err(NeedsReview(format!("{folder}: {} notes", notes.len())).into());
     }
     Ok(())
 }
 
-pub(crate) fn write_report(args: &ReportArgs, global: &GlobalArgs) -> anyhow::Result<()> {
+/// Prints what is wrong, which is an error, or how much was checked.
+fn print_findings(checked: &Checked, folder: &Path) -> anyhow::Result<()> {
+    let (folder, errors) = (folder.display(), checked.findings.len());
+    checked.findings.iter().for_each(print::line);
+    anyhow::ensure!(errors == 0, "{folder}: {errors} errors");
+    let (images, rows) = (checked.images, checked.rows.iter().sum::<usize>());
+    print::line(format_args!(
+        "{folder}: {images} images, {rows} labels, no errors"
+    ));
+    Ok(())
+}
+
+fn write_report(args: &ReportArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     let output = args.page_path();
-    let folder = output.parent().filter(|path| *path != Path::new(""));
-    let options = DatasetReportOptions {
-        most: args.most,
-        page: Some(folder.unwrap_or(Path::new(".")).into()),
-        beside: args.beside.clone(),
-    };
-    let page = dataset::page::page(&args.folder, &options)?;
+    let page = dataset::page::page(&args.folder, &args.options_for(&output))?;
     io::write_text(&output, &page.document())?;
-    global.print_status(format_args!("look at {}", output.display()));
+    global.print_look_at(&output);
     Ok(())
 }
 
 impl ReportArgs {
+    fn options_for(&self, page: &Path) -> DatasetReportOptions {
+        let folder = page.parent().filter(|path| *path != Path::new(""));
+        DatasetReportOptions {
+            most: self.most,
+            page: Some(folder.unwrap_or(Path::new(".")).into()),
+            beside: self.beside.clone(),
+        }
+    }
+
     fn page_path(&self) -> PathBuf {
         match &self.output {
             Some(path) => path.clone(),
@@ -89,7 +116,7 @@ impl ReportArgs {
     }
 }
 
-pub(crate) fn write_sheet(args: &SheetArgs, global: &GlobalArgs) -> anyhow::Result<()> {
+fn write_sheet(args: &SheetArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     let sheet = contact_sheet_of(&args.folder, args.most, &Default::default())?;
     io::write(&args.output, &sheet)?;
     global.print_status(args.output.display());

@@ -8,6 +8,14 @@ use petcomp::scene::Drawn;
 use petcomp::{Error, Scene, io};
 use std::path::PathBuf;
 
+#[derive(clap::Subcommand)]
+pub(crate) enum RecipeCommand {
+    /// Write a recipe file that explains every default
+    Init(InitRecipeArgs),
+    /// Print every draw that image K is made with
+    Explain(ExplainArgs),
+}
+
 #[derive(clap::Args)]
 pub(crate) struct InitRecipeArgs {
     /// File to write
@@ -27,7 +35,14 @@ pub(crate) struct ExplainArgs {
     seed: u64,
 }
 
-pub(crate) fn init_recipe(args: &InitRecipeArgs, global: &GlobalArgs) -> anyhow::Result<()> {
+pub(super) fn run(command: &RecipeCommand, global: &GlobalArgs) -> anyhow::Result<()> {
+    match command {
+        RecipeCommand::Init(args) => init_recipe(args, global),
+        RecipeCommand::Explain(args) => explain_draws(args),
+    }
+}
+
+fn init_recipe(args: &InitRecipeArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     if args.recipe.exists() {
         return Err(Error::file(&args.recipe, "is there already, expected a new file").into());
     }
@@ -37,7 +52,7 @@ pub(crate) fn init_recipe(args: &InitRecipeArgs, global: &GlobalArgs) -> anyhow:
 }
 
 /// Makes the image to know which of its scenes came to rest, and prints the draws of that one.
-pub(crate) fn explain_draws(args: &ExplainArgs) -> anyhow::Result<()> {
+fn explain_draws(args: &ExplainArgs) -> anyhow::Result<()> {
     let sample = args.recipe.open_pipeline()?.sample(args.seed, args.index)?;
     for reason in &sample.rejected {
         print::line(format_args!("# rejected a scene: {reason}"));

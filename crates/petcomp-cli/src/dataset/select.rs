@@ -3,8 +3,16 @@
 use crate::global::GlobalArgs;
 use crate::print;
 use petcomp::Error;
-use petcomp::dataset::{Group, Leakage, Listing, NEAR_DUPLICATE_RMS, Partition};
+use petcomp::dataset::{Group, Leakage, Listing, NEAR_DUPLICATE_RMS, NearDuplicate, Partition};
 use std::path::{Path, PathBuf};
+
+#[derive(clap::Subcommand)]
+pub(crate) enum SelectCommand {
+    /// Share images out again for training and validation, and report what leaks
+    Split(SplitArgs),
+    /// The first part of the images for training and of those for validation
+    Subset(SubsetArgs),
+}
 
 #[derive(clap::Args)]
 pub(crate) struct SplitArgs {
@@ -52,7 +60,14 @@ pub(crate) struct SubsetArgs {
 /// Most near duplicates that are listed.
 const MAX_LISTED_PAIRS: usize = 10;
 
-pub(crate) fn write_split(args: &SplitArgs, global: &GlobalArgs) -> anyhow::Result<()> {
+pub(super) fn run(command: &SelectCommand, global: &GlobalArgs) -> anyhow::Result<()> {
+    match command {
+        SelectCommand::Split(args) => write_split(args, global),
+        SelectCommand::Subset(args) => write_subset(args, global),
+    }
+}
+
+fn write_split(args: &SplitArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     let listing = Listing::read(&args.folder)?;
     let listing = listing.partitioned(args.partition(), args.ratio, args.seed)?;
     check_both_parts(&listing)?;
@@ -82,7 +97,7 @@ fn check_both_parts(listing: &Listing) -> petcomp::Result<()> {
     Err(Error::value("split", what))
 }
 
-pub(crate) fn write_subset(args: &SubsetArgs, global: &GlobalArgs) -> anyhow::Result<()> {
+fn write_subset(args: &SubsetArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     let listing = Listing::read(&args.folder)?.head(args.head)?;
     write_listing(&listing, &args.output, global)
 }
@@ -90,10 +105,8 @@ pub(crate) fn write_subset(args: &SubsetArgs, global: &GlobalArgs) -> anyhow::Re
 fn write_listing(listing: &Listing, folder: &Path, global: &GlobalArgs) -> anyhow::Result<()> {
     listing.write(folder)?;
     let (train, val) = (listing.train.len(), listing.val.len());
-    global.print_status(format_args!(
-        "{}: {train} images for training, {val} for validation",
-        folder.display()
-    ));
+    let what = format!("{train} images for training, {val} for validation");
+    global.print_written(folder, what);
     Ok(())
 }
 
@@ -108,10 +121,12 @@ fn report_leakage(leakage: &Leakage) {
         "leak: {} validation images look like one that is trained on",
         pairs.len()
     ));
-    for pair in pairs.iter().take(MAX_LISTED_PAIRS) {
-        let (val, train, codes) = (pair.val.display(), pair.train.display(), pair.codes);
-        print::line(format_args!(
-            "  {val} and {train} differ by {codes:.2} codes"
-        ));
-    }
+    pairs.iter().take(MAX_LISTED_PAIRS).for_each(list_pair);
+}
+
+fn list_pair(pair: &NearDuplicate) {
+    let (val, train, codes) = (pair.val.display(), pair.train.display(), pair.codes);
+    print::line(format_args!(
+        "  {val} and {train} differ by {codes:.2} codes"
+    ));
 }

@@ -11,6 +11,16 @@ use petcomp::train::kit::KitOptions;
 use petcomp::train::{self, Balance, Batch, BatchOptions, Source, Weights};
 use std::path::{Path, PathBuf};
 
+#[derive(clap::Subcommand)]
+pub(crate) enum TrainingCommand {
+    /// Plan batches of one source each, with the weight of their loss (equation 2 of the paper)
+    Batches(BatchesArgs),
+    /// Anchors that fit a dataset's boxes, by k-means
+    Anchors(AnchorsArgs),
+    /// Write what the paper's experiments need in YOLOv5 and Ultralytics
+    TrainKit(KitArgs),
+}
+
 #[derive(clap::Args)]
 pub(crate) struct MixedSetArgs {
     /// YOLO dataset of photographs
@@ -84,26 +94,25 @@ pub(crate) struct AnchorsArgs {
     seed: u64,
 }
 
-pub(crate) fn plan_batches(args: &BatchesArgs, global: &GlobalArgs) -> anyhow::Result<()> {
+pub(super) fn run(command: &TrainingCommand, global: &GlobalArgs) -> anyhow::Result<()> {
+    match command {
+        TrainingCommand::Batches(args) => plan_batches(args, global),
+        TrainingCommand::Anchors(args) => fit_anchors(args),
+        TrainingCommand::TrainKit(args) => write_kit(args, global),
+    }
+}
+
+fn plan_batches(args: &BatchesArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     let sets = MixedSets::open(&args.sets)?;
     let options = BatchOptions {
         size: args.sets.batch,
         seed: args.seed,
     };
-    let (real, synthetic) = (sets.real.train.len(), sets.synthetic.train.len());
-    let mut lines = Vec::new();
-    for epoch in 0..args.epochs {
-        let batches = train::batches(real, synthetic, epoch, &options);
-        lines.extend(batches.iter().map(|batch| sets.batch_line(epoch, batch)));
-    }
+    let epochs = (0..args.epochs).flat_map(|epoch| sets.epoch_lines(epoch, &options));
+    let lines: Vec<String> = epochs.collect();
     io::write_text(&args.output, &lines.concat())?;
-    global.print_status(format_args!(
-        "{}: {} batches; weights real {:.4}, synthetic {:.4}",
-        args.output.display(),
-        lines.len(),
-        sets.weights.real,
-        sets.weights.synthetic
-    ));
+    let (batches, weights) = (lines.len(), sets.describe_weights());
+    global.print_written(&args.output, format_args!("{batches} batches; {weights}"));
     Ok(())
 }
 
@@ -125,21 +134,39 @@ impl MixedSets {
         })
     }
 
+    fn describe_weights(&self) -> String {
+        let Weights { real, synthetic } = self.weights;
+        format!("weights real {real:.4}, synthetic {synthetic:.4}")
+    }
+
+    fn epoch_lines(&self, epoch: u64, options: &BatchOptions) -> Vec<String> {
+        let (real, synthetic) = (self.real.train.len(), self.synthetic.train.len());
+        let batches = train::batches(real, synthetic, epoch, options);
+        batches
+            .iter()
+            .map(|batch| self.batch_line(epoch, batch))
+            .collect()
+    }
+
     /// A line of JSON: epoch, source, weight of the loss, images.
     fn batch_line(&self, epoch: u64, batch: &Batch) -> String {
-        let (list, weight) = match batch.source {
-            Source::Real => (&self.real.train, self.weights.real),
-            Source::Synthetic => (&self.synthetic.train, self.weights.synthetic),
-        };
+        let (list, weight) = self.images_and_weight(batch.source);
         let images: Vec<&Path> = batch.images.iter().map(|&i| &*list[i]).collect();
         let line = serde_json::json!({
             "epoch": epoch, "source": batch.source, "weight": weight, "images": images
         });
         format!("{line}\n")
     }
+
+    fn images_and_weight(&self, source: Source) -> (&[PathBuf], f64) {
+        match source {
+            Source::Real => (&self.real.train, self.weights.real),
+            Source::Synthetic => (&self.synthetic.train, self.weights.synthetic),
+        }
+    }
 }
 
-pub(crate) fn write_kit(args: &KitArgs, global: &GlobalArgs) -> anyhow::Result<()> {
+fn write_kit(args: &KitArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     let options = KitOptions {
         balance: args.sets.balance(),
         seeds: args.seeds,
@@ -148,12 +175,11 @@ pub(crate) fn write_kit(args: &KitArgs, global: &GlobalArgs) -> anyhow::Result<(
         ..KitOptions::new(&args.sets.real, &args.sets.synthetic)
     };
     train::kit::write(&args.output, &options)?;
-    let folder = args.output.display();
-    global.print_status(format_args!("{folder}: run commands.sh there"));
+    global.print_written(&args.output, "run commands.sh there");
     Ok(())
 }
 
-pub(crate) fn fit_anchors(args: &AnchorsArgs) -> anyhow::Result<()> {
+fn fit_anchors(args: &AnchorsArgs) -> anyhow::Result<()> {
     let set = YoloSet::open(&args.folder)?;
     let truth = read_yolo_truth(&train_labels(&set), None)?;
     let sides = box_sides(&truth, f64::from(args.side));

@@ -26,10 +26,7 @@ pub(crate) fn run(args: &CutArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     io::write(&args.output, &cut.to_rgba())?;
     report_diagnostics(args.photo.display(), &cut.diagnostics);
     let (w, h) = cut.film.size();
-    global.print_status(format_args!(
-        "{}: {w} x {h}, matte by {}",
-        args.output.display(),
-        cut.method
-    ));
+    let method = cut.method;
+    global.print_written(&args.output, format_args!("{w} x {h}, matte by {method}"));
     Ok(())
 }

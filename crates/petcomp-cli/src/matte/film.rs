@@ -6,7 +6,8 @@ use crate::global::GlobalArgs;
 use anyhow::Result;
 use petcomp::io::{self, Override, from_overrides};
 use petcomp::matte::{
-    PlateOptions, ScreenPlate, SegmentOptions, film, film_planes, segment, triangulate,
+    PlateOptions, ScreenPlate, SegmentOptions, Triangulated, film, film_planes, segment,
+    triangulate,
 };
 use petcomp::{Coverage, Film, Image, LinearRgb};
 use std::path::{Path, PathBuf};
@@ -60,11 +61,9 @@ impl FilmArgs {
         let options = from_overrides("film", &args.settings)?;
         let found = film(&photo, &plate, &inside, &options).map_err(|e| e.in_file(path))?;
         report_diagnostics(path.display(), &found.diagnostics);
-        let planes = film_planes(&found.film, &found.transmittance);
-        args.write_planes(&found.film, &planes)?;
+        args.write_film(&found.film, &found.transmittance)?;
         args.write_extras(&plate, &found.uncertainty)?;
-        let (output, summary) = (args.output.display(), summary(&plate, found.flat));
-        global.print_status(format_args!("{output}: {summary}"));
+        global.print_written(&args.output, describe_plate(&plate, found.flat));
         Ok(())
     }
 }
@@ -75,17 +74,27 @@ impl TriangulateArgs {
         let photos: Vec<Image<LinearRgb>> = paths.iter().map(io::read).collect::<Result<_, _>>()?;
         let inside = args.object_mask(&paths[0], &photos[0])?;
         let plates = self.screen_plates(&photos, &inside)?;
-        let shots: Vec<_> = photos.iter().zip(&plates).collect();
-        let options = from_overrides("film", &args.settings)?;
-        let found = triangulate(&shots, &inside, &options)?;
+        let found = self.triangulate(&photos, &plates, &inside)?;
         report_diagnostics(paths[0].display(), &found.diagnostics);
-        let planes = film_planes(&found.film, &found.transmittance);
-        args.write_planes(&found.film, &planes)?;
+        args.write_film(&found.film, &found.transmittance)?;
         args.write_extras(&plates[0], &found.uncertainty)?;
-        let (output, summary) = (args.output.display(), summary(&plates[0], found.flat));
-        let residual = found.residual;
-        global.print_status(format_args!("{output}: {summary}; residual {residual:.4}"));
+        let (plate, residual) = (describe_plate(&plates[0], found.flat), found.residual);
+        global.print_written(
+            &args.output,
+            format_args!("{plate}; residual {residual:.4}"),
+        );
         Ok(())
+    }
+
+    fn triangulate(
+        &self,
+        photos: &[Image<LinearRgb>],
+        plates: &[ScreenPlate],
+        inside: &Image<Coverage>,
+    ) -> Result<Triangulated> {
+        let shots: Vec<_> = photos.iter().zip(plates).collect();
+        let options = from_overrides("film", &self.options.settings)?;
+        Ok(triangulate(&shots, inside, &options)?)
     }
 
     fn screen_plates(
@@ -130,11 +139,10 @@ impl FilmOptionArgs {
         Ok(plate.map_err(|e| e.in_file(path))?)
     }
 
-    fn write_planes(&self, film: &Image<Film>, planes: &[(&str, Vec<f32>)]) -> Result<()> {
-        let planes: Vec<(&str, &[f32])> = planes
-            .iter()
-            .map(|(name, plane)| (*name, &plane[..]))
-            .collect();
+    fn write_film(&self, film: &Image<Film>, transmittance: &Image<LinearRgb>) -> Result<()> {
+        let planes = film_planes(film, transmittance);
+        let planes = planes.iter().map(|(name, plane)| (*name, &plane[..]));
+        let planes: Vec<(&str, &[f32])> = planes.collect();
         Ok(io::exr::write_channels(
             &self.output,
             film.size(),
@@ -159,7 +167,7 @@ fn check_same_size(mask: &Image<Coverage>, photo: &Image<LinearRgb>) -> Result<(
 }
 
 /// The screen and the plastic in a few words.
-fn summary(plate: &ScreenPlate, flat: LinearRgb) -> String {
+fn describe_plate(plate: &ScreenPlate, flat: LinearRgb) -> String {
     let fitted = match plate.degree {
         Some(degree) => format!("fitted by degree {degree}"),
         None => "photographed".into(),

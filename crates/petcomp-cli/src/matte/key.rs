@@ -5,7 +5,7 @@ use crate::diagnostics::report_diagnostics;
 use crate::values::parse_color;
 use anyhow::Result;
 use petcomp::io::{self, FromFile, Override, Picture};
-use petcomp::matte::key::{Deviations, KeyOptions, Keying, Profile, Screen};
+use petcomp::matte::key::{Deviations, KeyOptions, Keyed, Keying, Profile, Screen};
 use petcomp::matte::{PlateOptions, ScreenPlate, SegmentOptions, segment};
 use petcomp::{Coverage, Image, LinearRgb, PremulRgba};
 use std::path::PathBuf;
@@ -99,26 +99,34 @@ struct KeyerInput {
 }
 
 pub(crate) fn run(args: &KeyArgs) -> Result<()> {
-    let options = KeyOptions {
-        profile: args.profile,
-        ..io::from_overrides("key", &args.settings)?
-    };
+    let options = args.options()?;
     let plate: Option<Image<LinearRgb>> = read_optional(&args.plate)?;
     let input = args.read_input(plate.as_ref())?;
-    let keying = input.keying(match &plate {
-        Some(plate) => Screen::Plate(plate),
-        None => Screen::Color(args.screen.unwrap_or_default()),
-    });
+    let screen = plate.as_ref().map(Screen::Plate);
+    let keying = input.keying(screen.unwrap_or(Screen::Color(args.screen.unwrap_or_default())));
     let keyed = keying.run(&options)?;
     if keyed.deviations != Deviations::default() {
         log::warn!("{}: {}", args.input.display(), keyed.deviations);
     }
-    write_picture(&args.output, &keyed.cutout)?;
-    write_optional(&args.matte, &keyed.matte)?;
+    args.write_keyed(&keyed)?;
     if let Some(path) = &args.edges {
         write_picture(path, &keying.edges(&options)?)?;
     }
     Ok(())
+}
+
+impl KeyArgs {
+    fn options(&self) -> Result<KeyOptions> {
+        Ok(KeyOptions {
+            profile: self.profile,
+            ..io::from_overrides("key", &self.settings)?
+        })
+    }
+
+    fn write_keyed(&self, keyed: &Keyed) -> Result<()> {
+        write_picture(&self.output, &keyed.cutout)?;
+        write_optional(&self.matte, &keyed.matte)
+    }
 }
 
 fn read_optional<P: FromFile>(path: &Option<PathBuf>) -> petcomp::Result<Option<Image<P>>> {

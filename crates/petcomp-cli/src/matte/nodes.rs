@@ -9,7 +9,7 @@ use petcomp::matte::{
     ScreenPoint, channel_key, chroma_key, color_spill, difference_key, keying_screen,
 };
 use petcomp::{Coverage, Image, LinearRgb, PremulRgba, io};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// A picture in, pictures out, settings in between.
 #[derive(clap::Args, Debug)]
@@ -84,13 +84,7 @@ pub(crate) fn run(command: &NodeCommand) -> Result<()> {
         NodeCommand::ChromaKey { pictures, screen } => pictures.write_cut_out(|photo, given| {
             Ok(chroma_key(photo, *screen, &from_overrides("key", given)?))
         }),
-        NodeCommand::DifferenceKey { pictures, clean } => {
-            let clean: Image<PremulRgba> = io::read(clean)?;
-            pictures.write_cut_out(|photo, given| {
-                let options = from_overrides("key", given)?;
-                Ok(difference_key(photo, &clean, &options)?)
-            })
-        }
+        NodeCommand::DifferenceKey { pictures, clean } => pictures.difference_key(clean),
         NodeCommand::ChannelKey(pictures) => pictures.channel_key(),
         NodeCommand::ColorSpill(pictures) => pictures.color_spill(),
         NodeCommand::KeyingScreen(args) => args.run(),
@@ -102,6 +96,14 @@ impl NodePictures {
         let options = from_overrides("key", &self.settings)?;
         let keyed = channel_key(&io::read::<PremulRgba>(&self.input)?, &options);
         self.write_pair(&keyed.cutout, &keyed.matte)
+    }
+
+    fn difference_key(&self, clean: &Path) -> Result<()> {
+        let clean: Image<PremulRgba> = io::read(clean)?;
+        self.write_cut_out(|photo, given| {
+            let options = from_overrides("key", given)?;
+            Ok(difference_key(photo, &clean, &options)?)
+        })
     }
 
     fn color_spill(&self) -> Result<()> {

@@ -5,7 +5,7 @@ use crate::documents::read_options;
 use crate::global::GlobalArgs;
 use petcomp::matte::{PlateOptions, ScreenPlate, SegmentOptions, Segmentation, segment};
 use petcomp::{Coverage, Image, LinearRgb, io};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
 pub(crate) struct SegmentArgs {
@@ -27,9 +27,17 @@ pub(crate) fn run(args: &SegmentArgs, global: &GlobalArgs) -> anyhow::Result<()>
     report_diagnostics(args.photo.display(), &found.diagnostics);
     let mut pictures = search_pictures(&found);
     pictures.extend(keyer_mattes(&photo, &found));
-    for (i, (name, picture)) in pictures.into_iter().enumerate() {
-        let path = args.output.join(format!("{i}_{name}.png"));
-        io::write(&path, &picture)?;
+    write_numbered(&pictures, &args.output, global)
+}
+
+fn write_numbered(
+    pictures: &[NamedPicture],
+    folder: &Path,
+    global: &GlobalArgs,
+) -> anyhow::Result<()> {
+    for (i, (name, picture)) in pictures.iter().enumerate() {
+        let path = folder.join(format!("{i}_{name}.png"));
+        io::write(&path, picture)?;
         global.print_status(path.display());
     }
     Ok(())
