@@ -3,7 +3,7 @@
 use crate::documents::RecipeArgs;
 use crate::global::GlobalArgs;
 use crate::print;
-use petcomp::dataset::DatasetConfig;
+use petcomp::dataset::{DatasetConfig, Provenance};
 use petcomp::scene::Drawn;
 use petcomp::{Error, Scene, io};
 use std::path::PathBuf;
@@ -54,20 +54,27 @@ fn init_recipe(args: &InitRecipeArgs, global: &GlobalArgs) -> anyhow::Result<()>
 /// Makes the image to know which of its scenes came to rest, and prints the draws of that one.
 fn explain_draws(args: &ExplainArgs) -> anyhow::Result<()> {
     let sample = args.recipe.open_pipeline()?.sample(args.seed, args.index)?;
-    for reason in &sample.rejected {
+    if let Some(provenance) = &sample.provenance {
+        print_rejected(provenance);
+        print_draws(provenance);
+    }
+    Ok(())
+}
+
+fn print_rejected(provenance: &Provenance) {
+    for reason in &provenance.rejected {
         print::line(format_args!("# rejected a scene: {reason}"));
     }
-    if !sample.rejected.is_empty() {
-        let seed = sample.scene_seed;
+    if !provenance.rejected.is_empty() {
+        let seed = provenance.scene_seed;
         print::line(format_args!("# what follows was drawn with seed {seed}"));
     }
-    let rows: Vec<_> = sample
-        .draws
-        .iter()
-        .map(|draw| DrawRow::new(draw, &sample.drawn))
-        .collect();
-    print_rows(&rows);
-    Ok(())
+}
+
+fn print_draws(provenance: &Provenance) {
+    let draws = provenance.draws.iter();
+    let rows = draws.map(|draw| DrawRow::new(draw, &provenance.drawn));
+    print_rows(&rows.collect::<Vec<_>>());
 }
 
 /// A draw as it is printed.

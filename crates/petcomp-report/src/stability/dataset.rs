@@ -4,8 +4,8 @@ use super::staged::{above, grey, level, scene};
 use super::{Case, Outcome};
 use petcomp::composite;
 use petcomp::dataset::{
-    Format, JOURNAL, LabelConfig, Obstructed, Part, Pictures, Plan, Sample, SampleRange, Shard,
-    Sidecar, Split, SplitOrder, Times, Writer, check, generate, repair,
+    Format, JOURNAL, LabelConfig, Obstructed, Part, Pictures, Plan, Provenance, Sample,
+    SampleRange, Shard, Sidecar, Split, SplitOrder, Writer, check, generate, repair,
 };
 use petcomp::io;
 use petcomp::label::{LabelOptions, label};
@@ -52,18 +52,11 @@ fn taken(shot: &Shot) -> Sample {
 fn sample(shot: &Shot, deep: DeepImage) -> Sample {
     let scene = scene(shot.camera);
     let labels = label(&deep, shot, &LabelOptions::default());
-    let (drawn, rejected, draws, times) = (scene.clone(), Vec::new(), Vec::new(), Times::default());
     let frame = composite::frame(&deep, None).map(|p| p.color().opaque());
     Sample {
-        frame,
         deep,
-        labels,
-        drawn,
-        scene,
-        scene_seed: 0,
-        rejected,
-        draws,
-        times,
+        provenance: Some(Provenance::from_scene(scene)),
+        ..Sample::new(frame, labels)
     }
 }
 
