@@ -4,6 +4,20 @@
 //! integrates a precision curve over 101 points, [`Definition::Coco`] averages 101 readings of it, looks at no more
 //! than 100 detections an image and knows boxes that are ignored. Both are computed here from the same
 //! [`EvalImage`]s, one per image.
+//!
+//! ```
+//! use petcomp::eval::{Definition, Detection, EvalImage, GroundTruth, evaluate};
+//! use petcomp::geom::BBox;
+//!
+//! let bbox = BBox { x0: 10.0, y0: 10.0, x1: 60.0, y1: 40.0 };
+//! let truth = GroundTruth { class: 0, bbox, area: 1500.0, crowd: false };
+//! let mut image = EvalImage::new("000000", vec![truth]);
+//! let shifted = BBox { x0: 12.0, x1: 62.0, ..bbox };
+//! image.found.push(Detection { class: 0, bbox: shifted, confidence: 0.9 });
+//! let scores = evaluate(&[image], Definition::Coco, &[]);
+//! // The overlap is 48/52: found at nine of the ten thresholds.
+//! assert!((scores.map() - 0.9).abs() < 1e-9);
+//! ```
 
 mod average;
 mod bootstrap;

@@ -2,6 +2,17 @@
 //!
 //! A picture is read by its content, not by its name, and becomes the pixel type that the caller asks for:
 //!
+//! ```
+//! use petcomp::{Image, LinearRgb, io};
+//!
+//! let folder = tempfile::tempdir().unwrap();
+//! let path = folder.path().join("grey.exr");
+//! io::write(&path, &Image::filled(4, 3, LinearRgb::grey(0.25)))?;
+//! let picture: Image<LinearRgb> = io::read(&path)?;
+//! assert_eq!(picture[(3, 2)], LinearRgb::grey(0.25));
+//! # Ok::<(), petcomp::Error>(())
+//! ```
+//!
 //! | samples of the file | colour becomes | alpha | [`Coverage`](crate::Coverage) |
 //! | --- | --- | --- | --- |
 //! | integers (PNG, JPEG, TIFF) | decoded with the exact sRGB curve, unless a PNG states gamma 1 | straight unless a TIFF states otherwise | code / full scale, never decoded |

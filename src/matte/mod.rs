@@ -1,4 +1,19 @@
 //! Matte: a photo on a screen becomes a cut-out.
+//!
+//! ```
+//! use petcomp::matte::{CutOutOptions, cut_out};
+//! use petcomp::{Image, LinearRgb};
+//!
+//! let (screen, object) = (LinearRgb::new(0.05, 0.4, 0.08), LinearRgb::new(0.5, 0.1, 0.1));
+//! let photo = Image::from_fn(160, 120, |x, y| {
+//!     let is_object = (50..110).contains(&x) && (40..80).contains(&y);
+//!     if is_object { object } else { screen }
+//! });
+//! let cut = cut_out(&photo, &CutOutOptions::default())?;
+//! let picture = cut.to_rgba();
+//! assert!(picture[(picture.width() / 2, picture.height() / 2)].a > 0.9);
+//! # Ok::<(), petcomp::Error>(())
+//! ```
 
 mod channel_key;
 mod chroma_key;
