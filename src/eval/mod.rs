@@ -38,6 +38,7 @@ mod tag;
 mod yolo;
 mod yolov5;
 
+#[doc(hidden)]
 pub use bootstrap::{Interval, bootstrap};
 pub(crate) use bootstrap::{drawn, interval};
 #[doc(hidden)]

@@ -153,7 +153,6 @@ pub fn key(photo: &Image<LinearRgb>, screen: LinearRgb, opts: &KeyOptions) -> Ke
 }
 
 /// A photo to key, its screen, and the mattes that are known of it.
-#[doc(hidden)]
 #[derive(Clone, Copy, Debug)]
 pub struct Keying<'a, P> {
     photo: &'a Image<P>,
