@@ -1,6 +1,9 @@
 //! Shots that are hard to render: very many layers, very near, edge-on, very bright beside very dim, very small and large.
 
-use super::staged::{above, card, grey, lamp, level, looking_at, projected_area, small, tilted};
+use super::staged::{
+    camera_above, camera_looking_at, card, grey, lamp, level_card, projected_area, rendered,
+    small_shot, tilted,
+};
 use super::{HardCase, Outcome, memory, render_light};
 use crate::render::GOOD;
 use petcomp::DeepImage;
@@ -39,7 +42,7 @@ pub(super) fn cases() -> Result<Vec<HardCase>> {
 
 /// Level layers between 0.1 and 0.5 m under the camera's metre, larger than what it sees.
 fn stack(texture: &Film) -> Shot {
-    let shot = small().with_light(lamp([0.3, 0.2, 0.9], 0.4, 10.0));
+    let shot = small_shot().with_light(lamp([0.3, 0.2, 0.9], 0.4, 10.0));
     (1..=LAYERS).fold(shot, |shot, id| {
         let center = [0.0, 0.0, 0.1 + 0.002 * f64::from(id)];
         let sheet = Image::filled(8, 8, *texture);
@@ -141,9 +144,9 @@ fn near() -> HardCase {
         "an opaque card of albedo 1/2, 20 cm wide, 1 cm under the eye, under even light of 1",
         "alpha 1, light 1/2 and depth 0.01 m in every pixel, to 1e-5",
         || {
-            let shot = Shot::new(above([64, 48], 60.0)).with_ambient(LinearRgb::WHITE);
+            let shot = Shot::new(camera_above([64, 48], 60.0)).with_ambient(LinearRgb::WHITE);
             let deep = render(
-                &shot.with_card(level(1, [0.0, 0.0, 0.99], 0.2, grey(1.0))),
+                &shot.with_card(level_card(1, [0.0, 0.0, 0.99], 0.2, grey(1.0))),
                 &RenderOptions::default(),
             );
             Ok(Outcome::at_most(off_a_full_card(&deep, 0.01), 1e-5, "off"))
@@ -157,7 +160,7 @@ fn near_and_grazing() -> HardCase {
         "an opaque card 20 m wide, the eye 1 cm over it, tilted by 80 degrees, under even light of 1",
         "below the horizon, 1 pixel away from it, alpha 1 and light 1/2, to 1e-4; above it nothing",
         || {
-            let camera = looking_at(
+            let camera = camera_looking_at(
                 [0.0, 0.0, 0.01],
                 [0.0, 0.01 * libm::tan(80_f64.to_radians()), 0.0],
                 [65, 48],
@@ -165,7 +168,7 @@ fn near_and_grazing() -> HardCase {
             );
             let shot = Shot::new(camera).with_ambient(LinearRgb::WHITE);
             let deep = render(
-                &shot.with_card(level(1, [0.0; 3], 20.0, grey(1.0))),
+                &shot.with_card(level_card(1, [0.0; 3], 20.0, grey(1.0))),
                 &RenderOptions::default(),
             );
             // Where the card ends 10 m away: a hair under the horizon, 60 tan(10 degrees) above the middle.
@@ -214,7 +217,7 @@ fn steep(degrees: f64) -> HardCase {
             [LENGTH; 2],
             texture,
         );
-        Shot::new(above([96, 128], FOCAL)).with_card(sheet)
+        Shot::new(camera_above([96, 128], FOCAL)).with_card(sheet)
     };
     let area = projected_area(&shown(0).cards[0], &shown(0).camera);
     let strip = 0.5 * LENGTH * FOCAL / 0.9;
@@ -266,8 +269,11 @@ fn one_pixel() -> HardCase {
         "the middle pixel of 65 x 65 that the same camera sees, to 1e-5",
         || {
             let seen = |side: u32| {
-                let shot =
-                    Shot::new(above([side; 2], 50.0)).with_light(lamp([0.3, 0.2, 0.9], 0.4, 10.0));
+                let shot = Shot::new(camera_above([side; 2], 50.0)).with_light(lamp(
+                    [0.3, 0.2, 0.9],
+                    0.4,
+                    10.0,
+                ));
                 let sheet = Image::filled(64, 64, grey(0.6));
                 let shot = shot.with_card(card(1, [0.02, 0.0, 0.2], tilted(0.5), [0.3; 2], sheet));
                 let deep = render(&shot, &GOOD);
@@ -295,8 +301,8 @@ fn white_on_white() -> HardCase {
         "a surface of albedo 1 under a white opaque card, which throws back all that it gets",
         "no more than 20 times as bright (light thrown back is held at 0.95); never infinite",
         || {
-            let shot = small().with_ambient(LinearRgb::WHITE);
-            let shot = shot.with_card(level(
+            let shot = small_shot().with_ambient(LinearRgb::WHITE);
+            let shot = shot.with_card(level_card(
                 1,
                 [0.0, 0.0, 0.05],
                 0.5,
@@ -349,8 +355,8 @@ fn sixteen_k() -> HardCase {
             }
             let from_corner = |px: f64| (f64::from(SIXTEEN_K) / 2.0 - px) / 10_000.0;
             let center = [from_corner(1100.0), -from_corner(1100.0), 0.0];
-            let sheet = level(1, center, 0.2, grey(1.0));
-            let shot = Shot::new(above([SIXTEEN_K; 2], 10_000.0)).with_ambient(LinearRgb::WHITE).with_card(sheet);
+            let sheet = level_card(1, center, 0.2, grey(1.0));
+            let shot = Shot::new(camera_above([SIXTEEN_K; 2], 10_000.0)).with_ambient(LinearRgb::WHITE).with_card(sheet);
             let (deep, peak) = memory::peak_gib(|| render(&shot, &Quality::Draft.render()));
             let (found, last) = (covered(&deep), SIXTEEN_K as usize - 1);
             let fits = peak.is_none_or(|peak| peak < SIXTEEN_K_GIB);
@@ -373,7 +379,7 @@ fn nothing_to_see() -> Vec<HardCase> {
         ),
         (
             "card behind the eye",
-            level(1, [0.0, 0.0, 2.0], 0.3, grey(0.8)),
+            level_card(1, [0.0, 0.0, 2.0], 0.3, grey(0.8)),
         ),
         (
             "card without area",
@@ -403,13 +409,13 @@ fn nothing_to_see() -> Vec<HardCase> {
         ),
         (
             "card that is transparent",
-            level(1, [0.0, 0.0, 0.1], 0.2, PremulRgba::TRANSPARENT),
+            level_card(1, [0.0, 0.0, 0.1], 0.2, PremulRgba::TRANSPARENT),
         ),
     ];
     let case = |(name, card): (&str, Card)| {
         let expectation = "no light, no coverage, in either renderer: exactly 0 px";
         HardCase::new(name, "alone over a plate", expectation, move || {
-            let shot = Shot::new(above([16, 12], 20.0))
+            let shot = Shot::new(camera_above([16, 12], 20.0))
                 .with_card(card.clone())
                 .with_ambient(LinearRgb::WHITE);
             let seen = |deep: DeepImage| {
@@ -433,13 +439,15 @@ fn nothing_to_see() -> Vec<HardCase> {
 
 /// Shots whose middle pixel has a known coverage.
 fn awkward() -> Vec<HardCase> {
-    let base = || Shot::new(above([15, 11], 20.0)).with_light(lamp([0.3, 0.2, 0.9], 0.4, 10.0));
+    let base =
+        || Shot::new(camera_above([15, 11], 20.0)).with_light(lamp([0.3, 0.2, 0.9], 0.4, 10.0));
     let flat = UnitQuaternion::identity;
     let one = |center: [f64; 3], texture: Image<PremulRgba>| {
         base().with_card(card(1, center, flat(), [0.4; 2], texture))
     };
     let full = || Image::filled(8, 8, grey(0.8));
-    let twice = one([0.0, 0.0, 0.1], full()).with_card(level(2, [0.0, 0.0, 0.1], 0.4, grey(0.5)));
+    let twice =
+        one([0.0, 0.0, 0.1], full()).with_card(level_card(2, [0.0, 0.0, 0.1], 0.4, grey(0.5)));
     let through = card(
         1,
         [0.01, 0.0, 1.0],

@@ -1,6 +1,6 @@
 //! Light that is hard to render: grazing, without size, in the middle of a card, very bright beside very dim.
 
-use super::staged::{above, card, grey, lamp, level, small, tilted};
+use super::staged::{camera_above, card, grey, lamp, level_card, rendered, small_shot, tilted};
 use super::{HardCase, Outcome};
 use crate::render::{GOOD, HIGH, settings};
 use petcomp::Image;
@@ -36,7 +36,10 @@ pub(super) fn cases() -> Vec<HardCase> {
 /// Light that the middle of a white level card at the origin sends up, in a picture of 5 x 5.
 fn seen(shot: Shot, options: &RenderOptions) -> f64 {
     let white = PremulRgba::new(1.0, 1.0, 1.0, 1.0);
-    let deep = render(&shot.with_card(level(1, [0.0; 3], 1.0, white)), options);
+    let deep = render(
+        &shot.with_card(level_card(1, [0.0; 3], 1.0, white)),
+        options,
+    );
     f64::from(deep.flat(2, 2).color.g)
 }
 
@@ -55,7 +58,7 @@ fn grazing(degrees: f64) -> HardCase {
         "a small light of 1000 W, 10 m away, over a white level card",
         format!("cosine law: {expected:.6e}, to 0.1 %"),
         move || {
-            let found = seen(small().with_light(light), &RenderOptions::default());
+            let found = seen(small_shot().with_light(light), &RenderOptions::default());
             Ok(Outcome::near(
                 found / expected,
                 1.0,
@@ -80,7 +83,7 @@ fn small_light(side: f64) -> HardCase {
         format!("the limit of small lights, P cos / (pi r)^2 = {expected:.6}: to 0.1 %"),
         move || {
             Ok(Outcome::near(
-                seen(small().with_light(light), &RenderOptions::default()) / expected,
+                seen(small_shot().with_light(light), &RenderOptions::default()) / expected,
                 1.0,
                 1e-3,
                 "of it",
@@ -103,7 +106,7 @@ fn cut_by_the_horizon((quality, options): (&str, RenderOptions)) -> HardCase {
         format!("Lambert's formula for the upper half, {expected:.6}: to 5 %, 0.07 stops"),
         move || {
             Ok(Outcome::near(
-                seen(small().with_light(light), &options) / expected,
+                seen(small_shot().with_light(light), &options) / expected,
                 1.0,
                 0.05,
                 "of it",
@@ -114,7 +117,7 @@ fn cut_by_the_horizon((quality, options): (&str, RenderOptions)) -> HardCase {
 
 /// A camera that sees the surface around `x`, `y` from straight above and very near to it.
 fn at(x: f64, y: f64, image: [u32; 2]) -> Camera {
-    let mut camera = above(image, 1e6);
+    let mut camera = camera_above(image, 1e6);
     camera.camera_from_world.translation.vector.x = -x;
     camera.camera_from_world.translation.vector.y = y;
     camera
@@ -162,7 +165,7 @@ fn bright_beside_dim() -> HardCase {
         format!("their sum: {expected:.1}, to 0.1 %"),
         move || {
             let found = seen(
-                small().with_light(bright).with_light(dim),
+                small_shot().with_light(bright).with_light(dim),
                 &RenderOptions::default(),
             );
             Ok(Outcome::near(found / expected, 1.0, 1e-3, "of it"))
@@ -187,7 +190,7 @@ fn dim_in_the_shade() -> HardCase {
             let shot = Shot::new(at(0.0, 0.0, [3, 3]))
                 .with_light(bright)
                 .with_light(dim);
-            let shot = shot.with_card(level(1, [0.0, 0.0, 0.5], 0.2, grey(1.0)));
+            let shot = shot.with_card(level_card(1, [0.0, 0.0, 0.5], 0.2, grey(1.0)));
             let left = f64::from(render(&shot, &RenderOptions::default()).shadow()[(1, 1)].g);
             Ok(Outcome::near(left, expected, f64::from(f32::EPSILON), ""))
         },
@@ -240,7 +243,10 @@ fn sun() -> HardCase {
         || {
             let map = surroundings()?;
             let expected = by_brute_force(&map, |_| true) / PI;
-            let found = seen(small().with_environment(map), &RenderOptions::default());
+            let found = seen(
+                small_shot().with_environment(map),
+                &RenderOptions::default(),
+            );
             Ok(Outcome::near(found / expected, 1.0, 5e-3, "of it"))
         },
     )
