@@ -111,16 +111,18 @@ fn empty_without_plate() -> HardCase {
         "empty scene",
         "no card, no plate",
         "transparent black everywhere: 0 pixels differ",
-        || {
-            let deep = rendered(&default_shot().with_ambient(LinearRgb::WHITE));
-            let out = frame(&deep, None);
-            let drawn = out
-                .pixels()
-                .iter()
-                .filter(|p| **p != PremulRgba::TRANSPARENT);
-            Ok(Outcome::none(drawn.count(), "px"))
-        },
+        composite_empty_shot,
     )
+}
+
+fn composite_empty_shot() -> Result<Outcome> {
+    let deep = rendered(&default_shot().with_ambient(LinearRgb::WHITE));
+    let out = frame(&deep, None);
+    let drawn = out
+        .pixels()
+        .iter()
+        .filter(|p| **p != PremulRgba::TRANSPARENT);
+    Ok(Outcome::none(drawn.count(), "px"))
 }
 
 /// A picture of one row from the samples of its pixels.
@@ -167,13 +169,15 @@ fn bright_beside_dim() -> HardCase {
         "1e5 beside 1e-4",
         "two opaque cards in neighbouring pixels, over a plate of 1e5",
         "1e-4 keeps its bits",
-        || {
-            let [bright, dim] = [deep_sample(1, 1e5, 1.0), deep_sample(2, 1e-4, 1.0)];
-            let deep = deep_row(vec![vec![bright], vec![dim]]);
-            let dimmed = frame(&deep, Some(&even_plate(2, 1e5)))[(1, 0)].g;
-            Ok(Outcome::near(dimmed.into(), 1e-4_f32.into(), 0.0, ""))
-        },
+        composite_bright_beside_dim,
     )
+}
+
+fn composite_bright_beside_dim() -> Result<Outcome> {
+    let [bright, dim] = [deep_sample(1, 1e5, 1.0), deep_sample(2, 1e-4, 1.0)];
+    let deep = deep_row(vec![vec![bright], vec![dim]]);
+    let dimmed = frame(&deep, Some(&even_plate(2, 1e5)))[(1, 0)].g;
+    Ok(Outcome::near(dimmed.into(), 1e-4_f32.into(), 0.0, ""))
 }
 
 fn broken_plate() -> HardCase {
@@ -181,14 +185,16 @@ fn broken_plate() -> HardCase {
         "plate with one pixel of NaN",
         "64 x 48 pixels, no card",
         "no more than that pixel is NaN: 1",
-        || {
-            let mut plate = gradient_plate(64, 48);
-            plate[(20, 30)].g = f32::NAN;
-            let out = frame(&rendered(&default_shot()), Some(&plate));
-            let broken = out.pixels().iter().filter(|p| !p.color().is_finite());
-            Ok(Outcome::count(broken.count(), 1, "px"))
-        },
+        composite_broken_plate,
     )
+}
+
+fn composite_broken_plate() -> Result<Outcome> {
+    let mut plate = gradient_plate(64, 48);
+    plate[(20, 30)].g = f32::NAN;
+    let out = frame(&rendered(&default_shot()), Some(&plate));
+    let broken = out.pixels().iter().filter(|p| !p.color().is_finite());
+    Ok(Outcome::count(broken.count(), 1, "px"))
 }
 
 fn exposed(ev: f64) -> HardCase {
@@ -201,16 +207,24 @@ fn exposed(ev: f64) -> HardCase {
 }
 
 fn expose(exposure_ev: f64) -> Outcome {
-    let pixels = [0.0, 1e-4, 1.0].map(|v| LinearRgb::grey(v).opaque());
-    let picture = Image::from_vec(3, 1, pixels.to_vec());
     let change = PostProcess {
         exposure_ev,
         ..PostProcess::default()
     };
-    let out = finish(picture, &deep_row(vec![vec![]; 3]), None, &change);
+    let out = finish(
+        black_dim_and_bright(),
+        &deep_row(vec![vec![]; 3]),
+        None,
+        &change,
+    );
     let [black, dim, bright] = [0, 1, 2].map(|x| out[(x, 0)].g);
     let passed = black == 0.0 && black <= dim && dim <= bright;
     Outcome::new(format!("{black:e}, {dim:e}, {bright:e}"), passed)
+}
+
+fn black_dim_and_bright() -> Image<PremulRgba> {
+    let pixels = [0.0, 1e-4, 1.0].map(|v| LinearRgb::grey(v).opaque());
+    Image::from_vec(3, 1, pixels.to_vec())
 }
 
 fn sharpened_spot() -> HardCase {
@@ -223,18 +237,21 @@ fn sharpened_spot() -> HardCase {
 }
 
 fn sharpen_spot() -> Outcome {
-    let picture = Image::from_fn(33, 33, |x, y| {
-        LinearRgb::grey(if (x, y) == (16, 16) { 1e5 } else { 1e-4 }).opaque()
-    });
     let change = PostProcess {
         sharpening: 2.0,
         ..PostProcess::default()
     };
-    let out = finish(picture, &deep_row(vec![]), None, &change);
+    let out = finish(bright_spot(), &deep_row(vec![]), None, &change);
     let [least, most] = [f32::min, f32::max].map(|pick| extreme_green(&out, pick));
     let far = f64::from(out[(2, 2)].g);
     let passed = least >= 0.0 && most <= 3e5 && (far / 1e-4 - 1.0).abs() < 1e-6;
     Outcome::new(format!("{least:e} to {most:e}; far away {far:e}"), passed)
+}
+
+fn bright_spot() -> Image<PremulRgba> {
+    let mut picture = Image::filled(33, 33, LinearRgb::grey(1e-4).opaque());
+    picture[(16, 16)] = LinearRgb::grey(1e5).opaque();
+    picture
 }
 
 fn extreme_green(out: &Image<PremulRgba>, pick: fn(f32, f32) -> f32) -> f32 {
@@ -246,10 +263,12 @@ fn one_pixel() -> HardCase {
         "one-pixel image",
         "a film of transmittance 1/2 and light 0.25 over a plate of 1",
         "0.75 exactly",
-        || {
-            let deep = deep_row(vec![vec![deep_sample(1, 0.25, 0.5)]]);
-            let out = frame(&deep, Some(&even_plate(1, 1.0)));
-            Ok(Outcome::near(out[(0, 0)].g.into(), 0.75, 0.0, ""))
-        },
+        composite_one_pixel,
     )
+}
+
+fn composite_one_pixel() -> Result<Outcome> {
+    let deep = deep_row(vec![vec![deep_sample(1, 0.25, 0.5)]]);
+    let out = frame(&deep, Some(&even_plate(1, 1.0)));
+    Ok(Outcome::near(out[(0, 0)].g.into(), 0.75, 0.0, ""))
 }

@@ -190,16 +190,18 @@ fn crowded_pixel() -> HardCase {
         "300 objects in one pixel",
         "equal boxes of equal class, all labelled",
         "YOLO's equal rows are one; no fault",
-        || {
-            let dataset = TestDataset::new(2, |_| crowded_sample())?;
-            let rows = dataset.label("train/000001.txt")?.lines().count();
-            let faults = dataset.faults()?;
-            Ok(Outcome::new(
-                format!("{rows} row, {}", listed(&faults)),
-                rows == 1 && faults.is_empty(),
-            ))
-        },
+        generate_crowded_pictures,
     )
+}
+
+fn generate_crowded_pictures() -> Result<Outcome> {
+    let dataset = TestDataset::new(2, |_| crowded_sample())?;
+    let rows = dataset.label("train/000001.txt")?.lines().count();
+    let faults = dataset.faults()?;
+    Ok(Outcome::new(
+        format!("{rows} row, {}", listed(&faults)),
+        rows == 1 && faults.is_empty(),
+    ))
 }
 
 /// Pixel (3, 2) holds 300 objects, of which the first is visible.
@@ -219,17 +221,21 @@ fn opaque_sample(id: u32) -> DeepSample {
     }
 }
 
+/// A row of class 0 whose box is pixel (3, 2) of 64 x 48.
+const ONE_PIXEL_ROW: &str = "0 0.054688 0.052083 0.015625 0.020833\n";
+
 fn row_of_one_pixel() -> HardCase {
-    const ROW: &str = "0 0.054688 0.052083 0.015625 0.020833\n";
     HardCase::new(
         "YOLO row of one pixel",
         "pixel (3, 2) of 64 x 48",
-        format!("3.5/64 2.5/48 1/64 1/48: {}", ROW.trim_end()),
-        || {
-            let row = TestDataset::new(2, |_| crowded_sample())?.label("train/000001.txt")?;
-            Ok(Outcome::new(row.trim_end(), row == ROW))
-        },
+        format!("3.5/64 2.5/48 1/64 1/48: {}", ONE_PIXEL_ROW.trim_end()),
+        write_row_of_one_pixel,
     )
+}
+
+fn write_row_of_one_pixel() -> Result<Outcome> {
+    let row = TestDataset::new(2, |_| crowded_sample())?.label("train/000001.txt")?;
+    Ok(Outcome::new(row.trim_end(), row == ONE_PIXEL_ROW))
 }
 
 fn too_small() -> HardCase {
@@ -237,12 +243,14 @@ fn too_small() -> HardCase {
         "one-pixel pictures",
         "1 x 1 pixel, for YOLO",
         "refused: \"expected at least 10 a side\"",
-        || {
-            let shot = Shot::new(camera_above([1, 1], 100.0));
-            let attempt = TestDataset::new(1, |_| rendered_sample(&shot));
-            Ok(Outcome::refused(attempt, "expected at least 10 a side"))
-        },
+        generate_too_small,
     )
+}
+
+fn generate_too_small() -> Result<Outcome> {
+    let shot = Shot::new(camera_above([1, 1], 100.0));
+    let attempt = TestDataset::new(1, |_| rendered_sample(&shot));
+    Ok(Outcome::refused(attempt, "expected at least 10 a side"))
 }
 
 /// Ten pictures of a card.
@@ -316,15 +324,17 @@ fn split_counts(percent: u8) -> HardCase {
         format!("{percent} % for validation"),
         "1000 pictures, interleaved and consecutive",
         format!("{expected} for validation, either way"),
-        move || {
-            let found = [SplitOrder::Interleaved, SplitOrder::Consecutive]
-                .map(|order| count_validation(percent, order));
-            Ok(Outcome::new(
-                format!("{} and {}", found[0], found[1]),
-                found == [expected; 2],
-            ))
-        },
+        move || count_splits(percent, expected),
     )
+}
+
+fn count_splits(percent: u8, expected: usize) -> Result<Outcome> {
+    let found = [SplitOrder::Interleaved, SplitOrder::Consecutive]
+        .map(|order| count_validation(percent, order));
+    Ok(Outcome::new(
+        format!("{} and {}", found[0], found[1]),
+        found == [expected; 2],
+    ))
 }
 
 /// Pictures of 1000 that are for validation.
@@ -339,11 +349,13 @@ fn last_index() -> HardCase {
         "the largest index",
         "picture 2^64 - 1 of 2^64 - 1",
         "a part, without overflow",
-        || {
-            let parts = [SplitOrder::Interleaved, SplitOrder::Consecutive].map(part_of_last_index);
-            Ok(Outcome::new(format!("{parts:?}"), parts[1] == Part::Val))
-        },
+        split_last_index,
     )
+}
+
+fn split_last_index() -> Result<Outcome> {
+    let parts = [SplitOrder::Interleaved, SplitOrder::Consecutive].map(part_of_last_index);
+    Ok(Outcome::new(format!("{parts:?}"), parts[1] == Part::Val))
 }
 
 fn part_of_last_index(order: SplitOrder) -> Part {
@@ -359,13 +371,15 @@ fn many_shards() -> HardCase {
         "more shards than pictures",
         "10 pictures on 1000 machines",
         "each picture on exactly one: 10",
-        || {
-            let shards: Result<Vec<_>> = (1..=1000).map(|index| Shard::new(index, 1000)).collect();
-            let shards = shards?;
-            let on_one = (0..10).filter(|&k| count_containing(&shards, k) == 1);
-            Ok(Outcome::count(on_one.count(), 10, ""))
-        },
+        contain_in_shards,
     )
+}
+
+fn contain_in_shards() -> Result<Outcome> {
+    let shards: Result<Vec<_>> = (1..=1000).map(|index| Shard::new(index, 1000)).collect();
+    let shards = shards?;
+    let on_one = (0..10).filter(|&k| count_containing(&shards, k) == 1);
+    Ok(Outcome::count(on_one.count(), 10, ""))
 }
 
 fn count_containing(shards: &[Shard], k: u64) -> usize {
@@ -377,12 +391,14 @@ fn invalid_shards() -> HardCase {
         "shard 0, shard 5 of 4, shard 1 of 0",
         "as --shard",
         "refused: 3",
-        || {
-            let attempts = [(0, 4), (5, 4), (1, 0)].map(|(index, of)| Shard::new(index, of));
-            let refused = attempts.iter().filter(|attempt| attempt.is_err());
-            Ok(Outcome::count(refused.count(), 3, "refused"))
-        },
+        make_invalid_shards,
     )
+}
+
+fn make_invalid_shards() -> Result<Outcome> {
+    let attempts = [(0, 4), (5, 4), (1, 0)].map(|(index, of)| Shard::new(index, of));
+    let refused = attempts.iter().filter(|attempt| attempt.is_err());
+    Ok(Outcome::count(refused.count(), 3, "refused"))
 }
 
 fn tray() -> Background {
@@ -402,15 +418,17 @@ fn empty_scenes() -> HardCase {
         "recipe of empty scenes alone",
         "negatives = 1, and objects = 0, 20 scenes of each, without a catalog",
         "no object in any: 0",
-        || {
-            let negative = Recipe {
-                negatives: 1.0,
-                ..Recipe::default()
-            };
-            let objects = count_objects(&without_objects())? + count_objects(&negative)?;
-            Ok(Outcome::none(objects, "objects"))
-        },
+        draw_empty_scenes,
     )
+}
+
+fn draw_empty_scenes() -> Result<Outcome> {
+    let negative = Recipe {
+        negatives: 1.0,
+        ..Recipe::default()
+    };
+    let objects = count_objects(&without_objects())? + count_objects(&negative)?;
+    Ok(Outcome::none(objects, "objects"))
 }
 
 fn without_objects() -> Recipe {

@@ -193,12 +193,14 @@ fn crowded_image() -> HardCase {
         "coco: 100 000 boxes in one image",
         "all found; COCO looks at 100 detections",
         "recall 0.001, so that 1 of 101 readings (at recall 0) finds precision 1: 1/101, to 1e-9",
-        || {
-            let image = grid_image(MOST_BOXES, 200, falling_confidence);
-            let map = coco(&[image], &[]).scores.map();
-            Ok(Outcome::near(map, 1.0 / 101.0, 1e-9, ""))
-        },
+        score_crowded_image,
     )
+}
+
+fn score_crowded_image() -> Result<Outcome> {
+    let image = grid_image(MOST_BOXES, 200, falling_confidence);
+    let map = coco(&[image], &[]).scores.map();
+    Ok(Outcome::near(map, 1.0 / 101.0, 1e-9, ""))
 }
 
 fn one_image() -> HardCase {
@@ -219,14 +221,16 @@ fn half_right() -> HardCase {
         "coco: equal confidences, half of them wrong",
         "100 found rightly, then 100 where nothing is, all of 0.5",
         "equal ones keep their order, the right ones first: mAP 1, to 1e-9",
-        || {
-            let mut half = grid_image(50, 50, equal_confidence);
-            let wrong: Vec<Detection> = half.found.iter().map(moved_away).collect();
-            half.found.extend(wrong);
-            let map = evaluate(&[half], Definition::Coco, &[]).map();
-            Ok(Outcome::near(map, 1.0, 1e-9, ""))
-        },
+        score_half_right,
     )
+}
+
+fn score_half_right() -> Result<Outcome> {
+    let mut half = grid_image(50, 50, equal_confidence);
+    let wrong: Vec<Detection> = half.found.iter().map(moved_away).collect();
+    half.found.extend(wrong);
+    let map = evaluate(&[half], Definition::Coco, &[]).map();
+    Ok(Outcome::near(map, 1.0, 1e-9, ""))
 }
 
 fn moved_away(found: &Detection) -> Detection {
@@ -241,16 +245,18 @@ fn no_images() -> HardCase {
         "interval of no images",
         "a bootstrap of 100 rounds over nothing",
         "0 from 0 to 0; no curve",
-        || {
-            let interval = bootstrap(&[], Definition::Coco, 100, 1);
-            let found = [interval.low, interval.value, interval.high];
-            let curves = curves(&[]).classes.len();
-            Ok(Outcome::new(
-                format!("{found:?}, {curves} curves"),
-                found == [0.0; 3] && curves == 0,
-            ))
-        },
+        score_no_images,
     )
+}
+
+fn score_no_images() -> Result<Outcome> {
+    let interval = bootstrap(&[], Definition::Coco, 100, 1);
+    let found = [interval.low, interval.value, interval.high];
+    let curves = curves(&[]).classes.len();
+    Ok(Outcome::new(
+        format!("{found:?}, {curves} curves"),
+        found == [0.0; 3] && curves == 0,
+    ))
 }
 
 fn confusion() -> HardCase {
@@ -258,15 +264,17 @@ fn confusion() -> HardCase {
         "confusion: 300 boxes in one place",
         "300 equal true boxes and 300 equal detections of one class",
         "300 pairs, nothing missed, no false alarm",
-        || {
-            let images = [image_of_equal_boxes(300)];
-            let counts = Confusion::new(&images, &ConfusionOptions::default()).counts;
-            Ok(Outcome::new(
-                format!("{counts:?}"),
-                counts.into_iter().eq([([Some(0), Some(0)], 300)]),
-            ))
-        },
+        count_confusion,
     )
+}
+
+fn count_confusion() -> Result<Outcome> {
+    let images = [image_of_equal_boxes(300)];
+    let counts = Confusion::new(&images, &ConfusionOptions::default()).counts;
+    Ok(Outcome::new(
+        format!("{counts:?}"),
+        counts.into_iter().eq([([Some(0), Some(0)], 300)]),
+    ))
 }
 
 fn image_of_equal_boxes(count: usize) -> EvalImage {
@@ -281,16 +289,18 @@ fn huge_boxes() -> HardCase {
         "overlap of boxes of 1e150 pixels",
         "one half of the other; areas of 1e300",
         "intersection over union 1/2, to 1e-12; of infinite ones a number, not NaN",
-        || {
-            let endless = box_of_width(f64::INFINITY);
-            let of_half = iou(&box_of_width(1e150), &box_of_width(0.5e150));
-            let of_endless = iou(&endless, &endless);
-            Ok(Outcome::new(
-                format!("{of_half}, of infinite ones {of_endless}"),
-                (of_half - 0.5).abs() < 1e-12 && !of_endless.is_nan(),
-            ))
-        },
+        overlap_huge_boxes,
     )
+}
+
+fn overlap_huge_boxes() -> Result<Outcome> {
+    let endless = box_of_width(f64::INFINITY);
+    let of_half = iou(&box_of_width(1e150), &box_of_width(0.5e150));
+    let of_endless = iou(&endless, &endless);
+    Ok(Outcome::new(
+        format!("{of_half}, of infinite ones {of_endless}"),
+        (of_half - 0.5).abs() < 1e-12 && !of_endless.is_nan(),
+    ))
 }
 
 fn box_of_width(x1: f64) -> BBox {

@@ -2,7 +2,7 @@
 
 use super::{HardCase, Outcome, memory};
 use petcomp::Image;
-use petcomp::io::{self, Bits, Limits, ReadOptions, WriteOptions, exr};
+use petcomp::io::{self, Bits, ReadOptions, WriteOptions, exr};
 use petcomp::{Coverage, LinearRgb, PremulRgba};
 use petcomp::{Error, Result};
 use serde::de::DeserializeOwned;
@@ -101,9 +101,13 @@ fn half_float(name: &str, values: &'static [f32], expected: &'static [f32]) -> H
     let input = format!("{} to a half-float EXR and back", listed(values));
     let promise = format!("{}: clamped, never infinite", listed(expected));
     HardCase::new(name, input, promise, move || {
-        let found = through_file("a.exr", values, &WriteOptions::default())?;
-        Ok(Outcome::new(listed(&found), found == expected))
+        write_half_floats(values, expected)
     })
+}
+
+fn write_half_floats(values: &[f32], expected: &[f32]) -> Result<Outcome> {
+    let found = through_file("a.exr", values, &WriteOptions::default())?;
+    Ok(Outcome::new(listed(&found), found == expected))
 }
 
 fn half_channels() -> HardCase {
@@ -111,15 +115,17 @@ fn half_channels() -> HardCase {
         "half-float channels above 65504",
         "1e5 and -1e5 in a channel of its own, as cut-outs have",
         "65504 and -65504",
-        || {
-            let folder = CaseFolder::new()?;
-            let path = folder.picture("exr");
-            exr::write_half_channels(&path, (2, 1), &[("TR", &[1e5, -1e5])], &[])?;
-            let (_, channels) = exr::read_channels(&path)?;
-            let found: Vec<f32> = channels.into_iter().flat_map(|c| c.samples).collect();
-            Ok(Outcome::new(listed(&found), found == [HALF_MAX, -HALF_MAX]))
-        },
+        write_half_channels,
     )
+}
+
+fn write_half_channels() -> Result<Outcome> {
+    let folder = CaseFolder::new()?;
+    let path = folder.picture("exr");
+    exr::write_half_channels(&path, (2, 1), &[("TR", &[1e5, -1e5])], &[])?;
+    let (_, channels) = exr::read_channels(&path)?;
+    let found: Vec<f32> = channels.into_iter().flat_map(|c| c.samples).collect();
+    Ok(Outcome::new(listed(&found), found == [HALF_MAX, -HALF_MAX]))
 }
 
 fn exact_floats() -> HardCase {
@@ -135,36 +141,39 @@ fn exact_floats() -> HardCase {
 }
 
 fn count_changed_floats(name: &str) -> Result<usize> {
-    let values = [
-        f32::from_bits(1),
-        f32::MIN_POSITIVE,
-        1e-4,
-        1e5,
-        f32::MAX,
-        -f32::MAX,
-        -0.0,
-    ];
     let options = WriteOptions {
         bits: Some(Bits::Float),
         ..WriteOptions::default()
     };
-    let found = through_file(name, &values, &options)?;
-    let pairs = found.iter().zip(&values);
+    let found = through_file(name, &EXTREME_FLOATS, &options)?;
+    let pairs = found.iter().zip(&EXTREME_FLOATS);
     Ok(pairs.filter(|(a, b)| a.to_bits() != b.to_bits()).count())
 }
+
+const EXTREME_FLOATS: [f32; 7] = [
+    f32::from_bits(1),
+    f32::MIN_POSITIVE,
+    1e-4,
+    1e5,
+    f32::MAX,
+    -f32::MAX,
+    -0.0,
+];
 
 fn clamped_codes() -> HardCase {
     HardCase::new(
         "NaN, infinities and negative light in a PNG",
         "NaN, -inf, -1, 1e38, inf in 8 bits",
         "0, 0, 0, 1, 1",
-        || {
-            let values = [f32::NAN, f32::NEG_INFINITY, -1.0, 1e38, f32::INFINITY];
-            let found = through_file("a.png", &values, &WriteOptions::default())?;
-            let passed = found == [0.0, 0.0, 0.0, 1.0, 1.0];
-            Ok(Outcome::new(listed(&found), passed))
-        },
+        write_clamped_codes,
     )
+}
+
+fn write_clamped_codes() -> Result<Outcome> {
+    let values = [f32::NAN, f32::NEG_INFINITY, -1.0, 1e38, f32::INFINITY];
+    let found = through_file("a.png", &values, &WriteOptions::default())?;
+    let passed = found == [0.0, 0.0, 0.0, 1.0, 1.0];
+    Ok(Outcome::new(listed(&found), passed))
 }
 
 fn one_pixel(format: &'static str) -> HardCase {
@@ -231,15 +240,17 @@ fn truncated_file(format: &'static str) -> HardCase {
         format!("{format}: truncated"),
         "17 x 13 pixels, cut at each of 20 places, the first at 0 bytes",
         "refused at every one: 0 read",
-        move || {
-            let folder = CaseFolder::new()?;
-            let path = folder.picture(format);
-            let whole = picture_bytes(&path)?;
-            let cuts = (0..20).map(|i| &whole[..i * whole.len() / 20]);
-            let read = cuts.filter(|cut| read_as(&path, cut).is_ok()).count();
-            Ok(Outcome::none(read, "read"))
-        },
+        move || read_truncated_files(format),
     )
+}
+
+fn read_truncated_files(format: &str) -> Result<Outcome> {
+    let folder = CaseFolder::new()?;
+    let path = folder.picture(format);
+    let whole = picture_bytes(&path)?;
+    let cuts = (0..20).map(|i| &whole[..i * whole.len() / 20]);
+    let read = cuts.filter(|cut| read_as(&path, cut).is_ok()).count();
+    Ok(Outcome::none(read, "read"))
 }
 
 /// What a header, a message and the decoders' buffers may take, GiB.
@@ -338,13 +349,15 @@ fn empty_file() -> HardCase {
         "file of 0 bytes",
         "called .png, .exr, .tif, .jpg",
         "refused: 0 read",
-        || {
-            let folder = CaseFolder::new()?;
-            let attempts = FORMATS.map(|format| read_as(&folder.picture(format), &[]));
-            let read = attempts.iter().filter(|attempt| attempt.is_ok());
-            Ok(Outcome::none(read.count(), "read"))
-        },
+        read_empty_files,
     )
+}
+
+fn read_empty_files() -> Result<Outcome> {
+    let folder = CaseFolder::new()?;
+    let attempts = FORMATS.map(|format| read_as(&folder.picture(format), &[]));
+    let read = attempts.iter().filter(|attempt| attempt.is_ok());
+    Ok(Outcome::none(read.count(), "read"))
 }
 
 fn missing_file() -> HardCase {
@@ -352,15 +365,17 @@ fn missing_file() -> HardCase {
         "no file",
         "a name that does not exist",
         "an error that names the file",
-        || {
-            let folder = CaseFolder::new()?;
-            let read = io::read::<PremulRgba>(folder.path("none.png"));
-            let outcome = Outcome::refused(read, "none.png");
-            let prefix = format!("{}/", folder.0.path().display());
-            let measured = outcome.measured.replace(&prefix, "");
-            Ok(Outcome::new(measured, outcome.passed))
-        },
+        read_missing_file,
     )
+}
+
+fn read_missing_file() -> Result<Outcome> {
+    let folder = CaseFolder::new()?;
+    let read = io::read::<PremulRgba>(folder.path("none.png"));
+    let outcome = Outcome::refused(read, "none.png");
+    let prefix = format!("{}/", folder.0.path().display());
+    let measured = outcome.measured.replace(&prefix, "");
+    Ok(Outcome::new(measured, outcome.passed))
 }
 
 fn nested_document() -> HardCase {
@@ -430,16 +445,14 @@ fn sixteen_k_through_file(path: &Path) -> Result<[bool; 2]> {
     )?;
     let error = io::read::<Coverage>(path).err();
     let refused = error.is_some_and(|e| e.to_string().contains("Limits::pixels"));
-    let limits = Limits {
-        pixels: 512 << 20,
-        ..Limits::default()
-    };
-    let options = ReadOptions {
-        limits,
-        ..ReadOptions::default()
-    };
-    let back = io::read_with::<Coverage>(path, &options)?;
+    let back = io::read_with::<Coverage>(path, &with_raised_limit())?;
     Ok([refused, is_xor_pattern(&back)])
+}
+
+fn with_raised_limit() -> ReadOptions {
+    let mut options = ReadOptions::default();
+    options.limits.pixels = 512 << 20;
+    options
 }
 
 fn xor_pattern(x: usize, y: usize) -> Coverage {

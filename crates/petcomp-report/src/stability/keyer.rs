@@ -69,13 +69,15 @@ fn weak_screen(saturation: f32) -> HardCase {
         format!("keyer: grey screen, {saturation:e} of colour"),
         "nearly grey pixels against it, in all four profiles",
         "every matte value in 0..1: 0 wrong",
-        move || {
-            let screen = LinearRgb::new(0.5, 0.5 + saturation, 0.5);
-            let photo = nearly_grey_photo();
-            let keyed = profiles().map(|p| key(&photo, screen, &KeyOptions::for_profile(p)));
-            Ok(outside_unit_range(keyed.into_iter()))
-        },
+        move || key_weak_screen(saturation),
     )
+}
+
+fn key_weak_screen(saturation: f32) -> Result<Outcome> {
+    let screen = LinearRgb::new(0.5, 0.5 + saturation, 0.5);
+    let photo = nearly_grey_photo();
+    let keyed = profiles().map(|p| key(&photo, screen, &KeyOptions::for_profile(p)));
+    Ok(outside_unit_range(keyed.into_iter()))
 }
 
 fn nearly_grey_photo() -> Image<LinearRgb> {
@@ -88,10 +90,14 @@ fn known_pixel(name: &str, value: [f32; 3], expected: f32) -> HardCase {
     let input = format!("{value:?} against {:?}", <[f32; 3]>::from(GREEN));
     let promise = format!("a matte of {expected}, as Blender 3.4.1 prints it, to 1e-7");
     HardCase::new(name, input, promise, move || {
-        let photo = Image::filled(1, 1, value.into());
-        let matte = key(&photo, GREEN, &KeyOptions::default()).matte[(0, 0)].0;
-        Ok(Outcome::near(matte.into(), expected.into(), 1e-7, ""))
+        key_known_pixel(value, expected)
     })
+}
+
+fn key_known_pixel(value: [f32; 3], expected: f32) -> Result<Outcome> {
+    let photo = Image::filled(1, 1, value.into());
+    let matte = key(&photo, GREEN, &KeyOptions::default()).matte[(0, 0)].0;
+    Ok(Outcome::near(matte.into(), expected.into(), 1e-7, ""))
 }
 
 fn screen_color() -> HardCase {
@@ -99,21 +105,26 @@ fn screen_color() -> HardCase {
         "keyer: object of the screen's colour",
         "64 x 64 pixels of the key, in all four profiles",
         "nothing is left: matte and cut-out sum to 0",
-        || {
-            let photo = Image::filled(64, 64, GREEN);
-            let keyed = profiles().map(|p| key(&photo, GREEN, &KeyOptions::for_profile(p)));
-            let left = keyed.iter().map(light_and_coverage).sum();
-            Ok(Outcome::near(left, 0.0, 0.0, ""))
-        },
+        key_screen_color,
     )
+}
+
+fn key_screen_color() -> Result<Outcome> {
+    let photo = Image::filled(64, 64, GREEN);
+    let keyed = profiles().map(|p| key(&photo, GREEN, &KeyOptions::for_profile(p)));
+    let left = keyed.iter().map(light_and_coverage).sum();
+    Ok(Outcome::near(left, 0.0, 0.0, ""))
 }
 
 /// The sum of what a matte and a cut-out hold.
 fn light_and_coverage(keyed: &Keyed) -> f64 {
-    let cutout = keyed.cutout.pixels().iter();
-    let light = cutout.map(|p| f64::from(p.r.abs() + p.g.abs() + p.b.abs() + p.a));
+    let cutout = keyed.cutout.pixels().iter().map(absolute_sum);
     let matte = keyed.matte.pixels().iter().map(|m| f64::from(m.0));
-    light.sum::<f64>() + matte.sum::<f64>()
+    cutout.sum::<f64>() + matte.sum::<f64>()
+}
+
+fn absolute_sum(p: &PremulRgba) -> f64 {
+    f64::from(p.r.abs() + p.g.abs() + p.b.abs() + p.a)
 }
 
 fn extreme_pixels() -> HardCase {
@@ -163,8 +174,7 @@ fn non_finite_pixels() -> HardCase {
 }
 
 fn key_non_finite_pixels() -> Result<Outcome> {
-    let mut photo = Image::filled(9, 9, GREEN.opaque());
-    (photo[(4, 4)].b, photo[(5, 4)].a) = (f32::NAN, f32::INFINITY);
+    let photo = non_finite_photo();
     let garbage = Image::from_fn(9, 9, |x, _| Coverage(if x == 0 { f32::NAN } else { 0.0 }));
     let job = Keying::new(&photo, Screen::Color(GREEN)).with_garbage(&garbage);
     let keyed = job.run(&all_stages(Profile::Robust))?;
@@ -175,6 +185,13 @@ fn key_non_finite_pixels() -> Result<Outcome> {
         format!("{pixels} pixels, {mattes} mattes, sound: {is_sound}"),
         (pixels, mattes, is_sound) == (2, 9, true),
     ))
+}
+
+fn non_finite_photo() -> Image<PremulRgba> {
+    let mut photo = Image::filled(9, 9, GREEN.opaque());
+    photo[(4, 4)].b = f32::NAN;
+    photo[(5, 4)].a = f32::INFINITY;
+    photo
 }
 
 /// The matte is in 0..1, the cut-out is finite.
@@ -189,15 +206,17 @@ fn wide_windows() -> HardCase {
         "keyer: windows of hundreds of pixels",
         "blurs of 300, edges and dilation of 100, in pictures of 1 x 1 to 5 x 1, all four profiles",
         "every matte value in 0..1: 0 wrong",
-        || {
-            let photos = [(1, 1), (5, 1), (1, 5), (3, 2)].map(tiny_photo);
-            let runs = profiles()
-                .into_iter()
-                .flat_map(|profile| photos.iter().map(move |photo| (profile, photo)));
-            let keyed = runs.map(|(profile, photo)| key(photo, GREEN, &with_wide_windows(profile)));
-            Ok(outside_unit_range(keyed))
-        },
+        key_with_wide_windows,
     )
+}
+
+fn key_with_wide_windows() -> Result<Outcome> {
+    let photos = [(1, 1), (5, 1), (1, 5), (3, 2)].map(tiny_photo);
+    let runs = profiles()
+        .into_iter()
+        .flat_map(|profile| photos.iter().map(move |photo| (profile, photo)));
+    let keyed = runs.map(|(profile, photo)| key(photo, GREEN, &with_wide_windows(profile)));
+    Ok(outside_unit_range(keyed))
 }
 
 fn tiny_photo((w, h): (usize, usize)) -> Image<LinearRgb> {
@@ -220,14 +239,15 @@ fn no_pixels() -> HardCase {
         "keyer: no pixel",
         "0 x 0, 0 x 5 and 5 x 0 pixels, all stages",
         "a matte and a cut-out of no pixel: 0",
-        || {
-            let options = all_stages(Profile::Blender34);
-            let keyed =
-                [(0, 0), (0, 5), (5, 0)].map(|(w, h)| key(&Image::new(w, h), GREEN, &options));
-            let pixels = keyed.map(|k| k.matte.pixels().len() + k.cutout.pixels().len());
-            Ok(Outcome::none(pixels.iter().sum(), "px"))
-        },
+        key_no_pixels,
     )
+}
+
+fn key_no_pixels() -> Result<Outcome> {
+    let options = all_stages(Profile::Blender34);
+    let keyed = [(0, 0), (0, 5), (5, 0)].map(|(w, h)| key(&Image::new(w, h), GREEN, &options));
+    let pixels = keyed.map(|k| k.matte.pixels().len() + k.cutout.pixels().len());
+    Ok(Outcome::none(pixels.iter().sum(), "px"))
 }
 
 /// Period of the pattern in the largest photo, and how far from the border its matte repeats, pixels.

@@ -102,16 +102,18 @@ fn object_of_one_pixel() -> HardCase {
         "object of one pixel",
         "pixel (3, 2) alone",
         "box [3, 2] to [4, 3], area 1, fully visible",
-        || {
-            let found = labels_of_one_pixel(&[dark_sample(1, 1.0, 1.0)]);
-            Ok(only_object(&found, |o| {
-                o.amodal_box == PIXEL_BOX
-                    && o.visible_box == PIXEL_BOX
-                    && o.amodal_mask.area() == 1
-                    && o.visible_fraction == 1.0
-            }))
-        },
+        label_one_pixel,
     )
+}
+
+fn label_one_pixel() -> Result<Outcome> {
+    let found = labels_of_one_pixel(&[dark_sample(1, 1.0, 1.0)]);
+    Ok(only_object(&found, |o| {
+        o.amodal_box == PIXEL_BOX
+            && o.visible_box == PIXEL_BOX
+            && o.amodal_mask.area() == 1
+            && o.visible_fraction == 1.0
+    }))
 }
 
 /// The only object there is, and whether it is correct.
@@ -149,18 +151,21 @@ fn many_in_a_pixel() -> HardCase {
 }
 
 fn label_many_in_a_pixel() -> Outcome {
-    let samples: Vec<_> = (1..=CROWD_SIZE)
-        .map(|id| dark_sample(id, 1.0, if id == 1 { 1.0 } else { 0.0 }))
-        .collect();
-    let found = labels_of_one_pixel(&samples);
+    let found = labels_of_one_pixel(&crowd_of_samples());
     let seen: f64 = found.iter().map(|o| o.visible_fraction).sum();
     let boxed = found.iter().filter(|o| is_boxed_rightly(o)).count();
-    let passed = found.len() == samples.len() && boxed == found.len() && seen == 1.0;
     let labels = found.len();
     Outcome::new(
         format!("{labels} labels, {boxed} boxed rightly, {seen} seen"),
-        passed,
+        labels == CROWD_SIZE as usize && boxed == labels && seen == 1.0,
     )
+}
+
+/// Opaque, one behind another.
+fn crowd_of_samples() -> Vec<DeepSample> {
+    (1..=CROWD_SIZE)
+        .map(|id| dark_sample(id, 1.0, if id == 1 { 1.0 } else { 0.0 }))
+        .collect()
 }
 
 /// In the pixel, of which only the first object is visible.
@@ -173,14 +178,16 @@ fn hidden_object() -> HardCase {
         "object that is completely hidden",
         "an opaque card under a larger one",
         "a label with its whole box, nothing of it visible, occluded by the other",
-        || {
-            let below = opaque_card(1, [0.0; 3], 0.1);
-            let above = opaque_card(2, [0.0, 0.0, 0.05], 0.3);
-            let mut found = labels_of([64, 48], [below, above]);
-            found.retain(|o| o.id == ObjectId(1));
-            Ok(only_object(&found, is_hidden_by_2))
-        },
+        label_hidden_object,
     )
+}
+
+fn label_hidden_object() -> Result<Outcome> {
+    let below = opaque_card(1, [0.0; 3], 0.1);
+    let above = opaque_card(2, [0.0, 0.0, 0.05], 0.3);
+    let mut found = labels_of([64, 48], [below, above]);
+    found.retain(|o| o.id == ObjectId(1));
+    Ok(only_object(&found, is_hidden_by_2))
 }
 
 /// 10 px across, and nothing of it visible.
@@ -196,14 +203,15 @@ fn cut_by_the_border() -> HardCase {
         "object cut by the corner of the picture",
         "an opaque card of 20 x 20 px, its middle on the corner [64, 48]",
         "box and outline within the picture: a quarter, 100 px to one row and column",
-        || {
-            let found = labels_of([64, 48], [opaque_card(1, [0.32, -0.24, 0.0], 0.2)]);
-            Ok(only_object(&found, |o| {
-                is_in_the_corner(&o.amodal_box)
-                    && o.outline_px.iter().flatten().all(is_in_the_picture)
-            }))
-        },
+        label_cut_object,
     )
+}
+
+fn label_cut_object() -> Result<Outcome> {
+    let found = labels_of([64, 48], [opaque_card(1, [0.32, -0.24, 0.0], 0.2)]);
+    Ok(only_object(&found, |o| {
+        is_in_the_corner(&o.amodal_box) && o.outline_px.iter().flatten().all(is_in_the_picture)
+    }))
 }
 
 fn is_in_the_corner(found: &BBox) -> bool {
@@ -221,15 +229,17 @@ fn larger_than_the_picture() -> HardCase {
         "object larger than the picture",
         "an opaque card 1 km across",
         "the picture's own box and all its 3072 pixels",
-        || {
-            let found = labels_of([64, 48], [opaque_card(1, [0.0; 3], 1000.0)]);
-            Ok(only_object(&found, |o| {
-                o.amodal_box == whole_box([64.0, 48.0])
-                    && o.amodal_mask.area() == 64 * 48
-                    && o.visible_fraction == 1.0
-            }))
-        },
+        label_large_object,
     )
+}
+
+fn label_large_object() -> Result<Outcome> {
+    let found = labels_of([64, 48], [opaque_card(1, [0.0; 3], 1000.0)]);
+    Ok(only_object(&found, |o| {
+        o.amodal_box == whole_box([64.0, 48.0])
+            && o.amodal_mask.area() == 64 * 48
+            && o.visible_fraction == 1.0
+    }))
 }
 
 fn one_pixel_picture() -> HardCase {
@@ -237,13 +247,15 @@ fn one_pixel_picture() -> HardCase {
         "one-pixel image",
         "1 x 1 pixel, an opaque card over it",
         "box [0, 0] to [1, 1], 1 px",
-        || {
-            let found = labels_of([1, 1], [opaque_card(1, [0.0; 3], 0.5)]);
-            Ok(only_object(&found, |o| {
-                o.amodal_box == whole_box([1.0, 1.0]) && o.amodal_mask.area() == 1
-            }))
-        },
+        label_one_pixel_picture,
     )
+}
+
+fn label_one_pixel_picture() -> Result<Outcome> {
+    let found = labels_of([1, 1], [opaque_card(1, [0.0; 3], 0.5)]);
+    Ok(only_object(&found, |o| {
+        o.amodal_box == whole_box([1.0, 1.0]) && o.amodal_mask.area() == 1
+    }))
 }
 
 fn out_of_sight() -> HardCase {
@@ -251,19 +263,21 @@ fn out_of_sight() -> HardCase {
         "objects out of sight",
         "a card edge-on, one behind the camera, one 3 m away",
         "no label: 0",
-        || {
-            let shot = shot_out_of_sight();
-            let deep = rendered(&shot);
-            let found = [AmodalBox::Mask, AmodalBox::Outline].map(|amodal| {
-                let options = LabelOptions {
-                    amodal,
-                    ..LabelOptions::default()
-                };
-                label(&deep, &shot, &options).objects.len()
-            });
-            Ok(Outcome::none(found.iter().sum(), "labels"))
-        },
+        label_out_of_sight,
     )
+}
+
+fn label_out_of_sight() -> Result<Outcome> {
+    let shot = shot_out_of_sight();
+    let deep = rendered(&shot);
+    let found = [AmodalBox::Mask, AmodalBox::Outline].map(|amodal| {
+        let options = LabelOptions {
+            amodal,
+            ..LabelOptions::default()
+        };
+        label(&deep, &shot, &options).objects.len()
+    });
+    Ok(Outcome::none(found.iter().sum(), "labels"))
 }
 
 fn shot_out_of_sight() -> Shot {
@@ -309,12 +323,13 @@ fn deep_stack() -> HardCase {
         "300 cards in a stack",
         "equal opaque cards, each 1 mm above the one before",
         "299 covered, the last on top; visible pixels sum to those of one card",
-        || {
-            let cards =
-                (1..=CROWD_SIZE).map(|id| opaque_card(id, [0.0, 0.0, 0.001 * f64::from(id)], 0.1));
-            Ok(check_stack(&labels_of([64, 48], cards)))
-        },
+        label_deep_stack,
     )
+}
+
+fn label_deep_stack() -> Result<Outcome> {
+    let cards = (1..=CROWD_SIZE).map(|id| opaque_card(id, [0.0, 0.0, 0.001 * f64::from(id)], 0.1));
+    Ok(check_stack(&labels_of([64, 48], cards)))
 }
 
 fn check_stack(found: &[ObjectLabel]) -> Outcome {
@@ -358,14 +373,16 @@ fn at_the_threshold() -> HardCase {
         "coverage at the threshold",
         "a pixel covered by exactly 0.1, and one by the next number above it",
         "a pixel belongs when it is covered by more: 0 and 1 labels",
-        || {
-            let threshold = LabelOptions::default().alpha_threshold;
-            let found = [threshold, threshold.next_up()]
-                .map(|alpha| labels_of_one_pixel(&[dark_sample(1, alpha, alpha)]).len());
-            Ok(Outcome::new(
-                format!("{} and {} labels", found[0], found[1]),
-                found == [0, 1],
-            ))
-        },
+        label_at_the_threshold,
     )
+}
+
+fn label_at_the_threshold() -> Result<Outcome> {
+    let threshold = LabelOptions::default().alpha_threshold;
+    let found = [threshold, threshold.next_up()]
+        .map(|alpha| labels_of_one_pixel(&[dark_sample(1, alpha, alpha)]).len());
+    Ok(Outcome::new(
+        format!("{} and {} labels", found[0], found[1]),
+        found == [0, 1],
+    ))
 }

@@ -136,14 +136,20 @@ fn even_sky(name: &str, (width, height): (usize, usize), radiance: f32) -> HardC
         format!("{width} x {height} pixels"),
         format!("pi L = {expected:.4e} on receivers turned any way, to 0.2 %"),
         move || {
-            let image = Image::filled(width, height, LinearRgb::grey(radiance));
-            let map = EnvironmentMap::new(Arc::new(Panorama::new(image)?));
-            let off = normals().map(|normal| (sum_of_pieces(&map, &normal) - expected).abs());
-            let off = off.into_iter().fold(0.0, largest);
-            let share = if expected > 0.0 { off / expected } else { off };
-            Ok(Outcome::at_most(share, 2e-3, "off"))
+            sum_even_sky(
+                Image::filled(width, height, LinearRgb::grey(radiance)),
+                expected,
+            )
         },
     )
+}
+
+fn sum_even_sky(image: Image<LinearRgb>, expected: f64) -> Result<Outcome> {
+    let map = EnvironmentMap::new(Arc::new(Panorama::new(image)?));
+    let off = normals().map(|normal| (sum_of_pieces(&map, &normal) - expected).abs());
+    let off = off.into_iter().fold(0.0, largest);
+    let share = if expected > 0.0 { off / expected } else { off };
+    Ok(Outcome::at_most(share, 2e-3, "off"))
 }
 
 /// Upwards, to a side, downwards, and between.
@@ -167,16 +173,17 @@ fn pieces_of_sky() -> HardCase {
         "one texel of 1e5 among 1e-4",
         "a map of 64 x 32, cut into 32 pieces, for receivers turned four ways",
         "pieces sum to the irradiance of the whole map, to 1e-5",
-        || {
-            let panorama = Arc::new(Panorama::new(sky_of_one_texel())?);
-            let map = EnvironmentMap::new(panorama.clone());
-            let off = normals().map(|normal| {
-                (sum_of_pieces(&map, &normal) / panorama.irradiance(&normal)[1] - 1.0).abs()
-            });
-            let worst = off.into_iter().fold(0.0, largest);
-            Ok(Outcome::at_most(worst, 1e-5, "off"))
-        },
+        sum_pieces_of_sky,
     )
+}
+
+fn sum_pieces_of_sky() -> Result<Outcome> {
+    let panorama = Arc::new(Panorama::new(sky_of_one_texel())?);
+    let map = EnvironmentMap::new(panorama.clone());
+    let off = normals()
+        .map(|normal| (sum_of_pieces(&map, &normal) / panorama.irradiance(&normal)[1] - 1.0).abs());
+    let worst = off.into_iter().fold(0.0, largest);
+    Ok(Outcome::at_most(worst, 1e-5, "off"))
 }
 
 fn sky_of_one_texel() -> Image<LinearRgb> {
@@ -269,15 +276,17 @@ fn exposed_under(
         format!("exposure: {name}"),
         "matched to the plate's white",
         format!("an exposure of {expected_ev} EV, to 1e-4"),
-        move || {
-            let matched = Exposure::MatchPlate { gain_ev: 0.0 };
-            let scene = unexposed_scene(matched, LightTint::default(), ambient);
-            let Exposure::Ev(ev) = expose(scene, &plate).exposure else {
-                return Ok(Outcome::failed("still unknown"));
-            };
-            Ok(Outcome::near(ev, expected_ev, 1e-4, "EV"))
-        },
+        move || expose_plate(ambient, &plate, expected_ev),
     )
+}
+
+fn expose_plate(ambient: LinearRgb, plate: &Image<LinearRgb>, expected_ev: f64) -> Result<Outcome> {
+    let matched = Exposure::MatchPlate { gain_ev: 0.0 };
+    let scene = unexposed_scene(matched, LightTint::default(), ambient);
+    let Exposure::Ev(ev) = expose(scene, &plate).exposure else {
+        return Ok(Outcome::failed("still unknown"));
+    };
+    Ok(Outcome::near(ev, expected_ev, 1e-4, "EV"))
 }
 
 fn matched_tint(name: &str, plate: Image<LinearRgb>) -> HardCase {

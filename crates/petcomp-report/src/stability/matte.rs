@@ -190,13 +190,15 @@ fn film_on_grey() -> HardCase {
         "film on a grey screen",
         "the same photo",
         "transmittance cannot be measured, and that is flagged",
-        || {
-            let (cut, _) = on_screen(GREY_SCREEN).cut()?;
-            let doubts = review_messages(&cut.diagnostics);
-            let is_flagged = doubts.iter().any(|doubt| doubt.contains("too grey"));
-            Ok(Outcome::new(doubts.join("; "), is_flagged))
-        },
+        cut_out_film_on_grey,
     )
+}
+
+fn cut_out_film_on_grey() -> Result<Outcome> {
+    let (cut, _) = on_screen(GREY_SCREEN).cut()?;
+    let doubts = review_messages(&cut.diagnostics);
+    let is_flagged = doubts.iter().any(|doubt| doubt.contains("too grey"));
+    Ok(Outcome::new(doubts.join("; "), is_flagged))
 }
 
 fn refused_photos() -> Vec<HardCase> {
@@ -356,10 +358,14 @@ fn judge_soundness(found: &FilmMatte, cause: &str) -> Outcome {
 fn even_film(name: &str, color: LinearRgb, expected: f32) -> HardCase {
     let promise = format!("transmittance {expected} in every pixel, to 0.05 on average");
     HardCase::new(name, "on an even green screen", promise, move || {
-        let found = film_matte(&filled(color), GREEN)?.transmittance;
-        let off = mean_error_inside(&found, |_, _| expected);
-        Ok(Outcome::at_most(off, 0.05, "off"))
+        judge_even_film(color, expected)
     })
+}
+
+fn judge_even_film(color: LinearRgb, expected: f32) -> Result<Outcome> {
+    let found = film_matte(&filled(color), GREEN)?.transmittance;
+    let off = mean_error_inside(&found, |_, _| expected);
+    Ok(Outcome::at_most(off, 0.05, "off"))
 }
 
 fn ellipse_area() -> f64 {
@@ -378,31 +384,37 @@ fn ordinary_film() -> HardCase {
         "film, nothing extreme",
         "neutral film on an even green screen",
         "transmittance to 0.02 on average",
-        || {
-            let found = film_matte(&film_on(GREEN, 1.0), GREEN)?;
-            let off = transmittance_error(&found.transmittance);
-            Ok(Outcome::at_most(off, 0.02, "off"))
-        },
+        judge_ordinary_film,
     )
 }
 
+fn judge_ordinary_film() -> Result<Outcome> {
+    let found = film_matte(&film_on(GREEN, 1.0), GREEN)?;
+    let off = transmittance_error(&found.transmittance);
+    Ok(Outcome::at_most(off, 0.02, "off"))
+}
+
+/// Exposure of the underexposed film.
+const DARK_EXPOSURE: f32 = 1e-3;
+
 /// So dark that no code of a picture would show it: the stage expects the noise of coded pictures.
 fn underexposed_film() -> HardCase {
-    const DARK: f32 = 1e-3;
     HardCase::new(
         "film 1000 times underexposed",
         "neutral film on an even green screen",
         "transmittance to 0.02 on average, or a mean uncertainty of at least half of its error",
-        || {
-            let found = film_matte(&film_on(GREEN, DARK), GREEN.scale(DARK))?;
-            let error = transmittance_error(&found.transmittance);
-            let unsure = mean_uncertainty(&found.uncertainty);
-            Ok(Outcome::new(
-                format!("off by {error:.3}, uncertainty {unsure:.3}"),
-                error < 0.02 || unsure > 0.5 * error,
-            ))
-        },
+        judge_underexposed_film,
     )
+}
+
+fn judge_underexposed_film() -> Result<Outcome> {
+    let found = film_matte(&film_on(GREEN, DARK_EXPOSURE), GREEN.scale(DARK_EXPOSURE))?;
+    let error = transmittance_error(&found.transmittance);
+    let unsure = mean_uncertainty(&found.uncertainty);
+    Ok(Outcome::new(
+        format!("off by {error:.3}, uncertainty {unsure:.3}"),
+        error < 0.02 || unsure > 0.5 * error,
+    ))
 }
 
 /// Mean error of the green transmittance inside.

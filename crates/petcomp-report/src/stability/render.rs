@@ -75,11 +75,13 @@ fn layers_before_the_eye() -> HardCase {
         "200 layers of film before the eye",
         "200 level cards of transmittance 0.99 over one pixel",
         format!("0.99^200 = {expected:.6} passes, to 200 roundings"),
-        move || {
-            let passes = f64::from(grey_stack().flat(2, 2).transmittance().g);
-            Ok(Outcome::near(passes, expected, ROUNDING_ERROR, ""))
-        },
+        move || pass_layers_to_the_eye(expected),
     )
+}
+
+fn pass_layers_to_the_eye(expected: f64) -> Result<Outcome> {
+    let passes = f64::from(grey_stack().flat(2, 2).transmittance().g);
+    Ok(Outcome::near(passes, expected, ROUNDING_ERROR, ""))
 }
 
 fn layers_before_the_light() -> HardCase {
@@ -88,11 +90,13 @@ fn layers_before_the_light() -> HardCase {
         "200 layers of film before the light",
         "the surface under 200 level cards of transmittance 0.99",
         format!("0.99^200 = {expected:.6} of the light arrives, to 200 roundings"),
-        move || {
-            let arrives = f64::from(grey_stack().shadow()[(2, 2)].g);
-            Ok(Outcome::near(arrives, expected, ROUNDING_ERROR, ""))
-        },
+        move || pass_layers_to_the_light(expected),
     )
+}
+
+fn pass_layers_to_the_light(expected: f64) -> Result<Outcome> {
+    let arrives = f64::from(grey_stack().shadow()[(2, 2)].g);
+    Ok(Outcome::near(arrives, expected, ROUNDING_ERROR, ""))
 }
 
 /// What a tinted layer passes of red, green and blue.
@@ -145,17 +149,19 @@ fn near_card() -> HardCase {
         "camera 1 cm above a card",
         "an opaque card of albedo 1/2, 20 cm wide, 1 cm under the eye, under even light of 1",
         "alpha 1, light 1/2 and depth 0.01 m in every pixel, to 1e-5",
-        || {
-            let shot = Shot::new(camera_above([64, 48], 60.0)).with_ambient(LinearRgb::WHITE);
-            let card = level_card(1, [0.0, 0.0, 0.99], 0.2, grey(1.0));
-            let deep = rendered(&shot.with_card(card));
-            Ok(Outcome::at_most(
-                error_of_full_card(&deep, 0.01),
-                1e-5,
-                "off",
-            ))
-        },
+        render_near_card,
     )
+}
+
+fn render_near_card() -> Result<Outcome> {
+    let shot = Shot::new(camera_above([64, 48], 60.0)).with_ambient(LinearRgb::WHITE);
+    let card = level_card(1, [0.0, 0.0, 0.99], 0.2, grey(1.0));
+    let deep = rendered(&shot.with_card(card));
+    Ok(Outcome::at_most(
+        error_of_full_card(&deep, 0.01),
+        1e-5,
+        "off",
+    ))
 }
 
 fn near_and_grazing() -> HardCase {
@@ -163,16 +169,18 @@ fn near_and_grazing() -> HardCase {
         "camera 1 cm above a card, looking along it",
         "an opaque card 20 m wide, the eye 1 cm over it, tilted by 80 degrees, under even light of 1",
         "below the horizon, 1 pixel away from it, alpha 1 and light 1/2, to 1e-4; above it nothing",
-        || {
-            let deep = rendered(&grazing_shot());
-            // Where the card ends 10 m away: slightly under the horizon, 60 tan(10 degrees) above the middle.
-            let horizon = 24.0 - 60.0 * libm::tan(10_f64.to_radians());
-            // The window of a pixel is three wide.
-            let rows = (0..48).filter(|&y| (y as f64 + 0.5 - horizon).abs() > 2.0);
-            let off = rows.map(|y| error_of_row(&deep, y, y as f64 > horizon));
-            Ok(Outcome::at_most(off.fold(0.0, f64::max), 1e-4, "off"))
-        },
+        render_near_and_grazing,
     )
+}
+
+fn render_near_and_grazing() -> Result<Outcome> {
+    let deep = rendered(&grazing_shot());
+    // Where the card ends 10 m away: slightly under the horizon, 60 tan(10 degrees) above the middle.
+    let horizon = 24.0 - 60.0 * libm::tan(10_f64.to_radians());
+    // The window of a pixel is three wide.
+    let rows = (0..48).filter(|&y| (y as f64 + 0.5 - horizon).abs() > 2.0);
+    let off = rows.map(|y| error_of_row(&deep, y, y as f64 > horizon));
+    Ok(Outcome::at_most(off.fold(0.0, f64::max), 1e-4, "off"))
 }
 
 fn grazing_shot() -> Shot {
@@ -269,13 +277,15 @@ fn one_pixel() -> HardCase {
         "one-pixel image",
         "a tilted card in a shadow of its own, seen by 1 x 1 pixel",
         "the middle pixel of 65 x 65 that the same camera sees, to 1e-5",
-        || {
-            let (one, many) = (middle_pixel(1), middle_pixel(65));
-            let off = one.iter().zip(&many).map(|(a, b)| (a - b).abs());
-            let worst = off.fold(0.0, f32::max);
-            Ok(Outcome::at_most(worst.into(), 1e-5, "off"))
-        },
+        render_one_pixel,
     )
+}
+
+fn render_one_pixel() -> Result<Outcome> {
+    let (one, many) = (middle_pixel(1), middle_pixel(65));
+    let off = one.iter().zip(&many).map(|(a, b)| (a - b).abs());
+    let worst = off.fold(0.0, f32::max);
+    Ok(Outcome::at_most(worst.into(), 1e-5, "off"))
 }
 
 /// Light, opacity and shadow of the middle pixel of a picture of a tilted card.
@@ -414,12 +424,16 @@ fn texture() -> Image<PremulRgba> {
 fn invisible(name: &str, card: Card) -> HardCase {
     let expectation = "no light, no coverage, in either renderer: exactly 0 px";
     HardCase::new(name, "alone over a plate", expectation, move || {
-        let shot = Shot::new(camera_above([16, 12], 20.0))
-            .with_card(card.clone())
-            .with_ambient(LinearRgb::WHITE);
-        let seen = by_both_renderers(&shot).map(|deep| count_drawn(&deep));
-        Ok(Outcome::none(seen.iter().sum(), "px"))
+        render_invisible(&card)
     })
+}
+
+fn render_invisible(card: &Card) -> Result<Outcome> {
+    let shot = Shot::new(camera_above([16, 12], 20.0))
+        .with_card(card.clone())
+        .with_ambient(LinearRgb::WHITE);
+    let seen = by_both_renderers(&shot).map(|deep| count_drawn(&deep));
+    Ok(Outcome::none(seen.iter().sum(), "px"))
 }
 
 fn by_both_renderers(shot: &Shot) -> [DeepImage; 2] {
@@ -435,26 +449,22 @@ fn count_drawn(deep: &DeepImage) -> usize {
 
 /// Shots whose middle pixel has a known coverage.
 fn awkward_cards() -> Vec<HardCase> {
-    let tilt = UnitQuaternion::from_euler_angles(0.0, 1.2, 0.0);
-    let through = card(1, [0.01, 0.0, 1.0], tilt, [0.5; 2], texture());
     let from_below = card_at_height(0.1).with_light(lamp([0.0, 0.0, -1.0], 0.4, 10.0));
     let twice = card_at_height(0.1).with_card(level_card(2, [0.0, 0.0, 0.1], 0.4, grey(0.5)));
+    let even = [0.8; 2];
     vec![
-        covering("card under the surface", card_at_height(-0.1), [0.8; 2]),
-        covering("card on the surface", card_at_height(0.0), [0.8; 2]),
+        covering("card under the surface", card_at_height(-0.1), even),
+        covering("card on the surface", card_at_height(0.0), even),
         covering("two cards in one place", twice, [1.0 - 0.2 * 0.5; 2]),
-        covering(
-            "card in the plane of the light",
-            card_at_height(0.9),
-            [0.8; 2],
-        ),
-        covering("light below the surface", from_below, [0.8; 2]),
-        covering(
-            "card through the eye",
-            lit_shot().with_card(through),
-            [0.0, 1.0],
-        ),
+        covering("card in the plane of the light", card_at_height(0.9), even),
+        covering("light below the surface", from_below, even),
+        covering("card through the eye", card_through_the_eye(), [0.0, 1.0]),
     ]
+}
+
+fn card_through_the_eye() -> Shot {
+    let tilt = UnitQuaternion::from_euler_angles(0.0, 1.2, 0.0);
+    lit_shot().with_card(card(1, [0.01, 0.0, 1.0], tilt, [0.5; 2], texture()))
 }
 
 /// The same of textures without a neighbouring texel.

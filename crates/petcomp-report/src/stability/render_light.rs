@@ -1,6 +1,6 @@
 //! Light that is hard to render: grazing, without size, in the middle of a card, very bright beside very dim.
 
-use super::staged::{camera_above, card, grey, lamp, level_card, rendered, small_shot, tilted};
+use super::staged::{camera_above, card, grey, lamp, level_card, small_shot, tilted};
 use super::{HardCase, Outcome};
 use crate::render::{GOOD, HIGH, settings};
 use petcomp::asset::{Panorama, uv_to_direction};
@@ -150,12 +150,14 @@ fn bright_beside_dim() -> HardCase {
         "light of 1e5 W beside one of 1e-4 W",
         "both small, in one place, over a white level card",
         format!("their sum: {expected:.1}, to 0.1 %"),
-        move || {
-            let shot = small_shot().with_light(bright).with_light(dim);
-            let found = light_reflected(shot, &RenderOptions::default());
-            Ok(Outcome::ratio(found, expected, 1e-3))
-        },
+        move || reflect_bright_and_dim(bright, dim, expected),
     )
+}
+
+fn reflect_bright_and_dim(bright: AreaLight, dim: AreaLight, expected: f64) -> Result<Outcome> {
+    let shot = small_shot().with_light(bright).with_light(dim);
+    let found = light_reflected(shot, &RenderOptions::default());
+    Ok(Outcome::ratio(found, expected, 1e-3))
 }
 
 /// The shadow of a card on the surface where it hides one light and not the other.
@@ -169,12 +171,14 @@ fn dim_in_the_shade() -> HardCase {
         format!(
             "{expected:.2e} of the light is left, to the rounding of single precision (1.2e-7)"
         ),
-        move || {
-            let shot = shot_in_the_shade(bright, dim);
-            let left = shade_in_the_middle(&shot, &RenderOptions::default());
-            Ok(Outcome::near(left, expected, f64::from(f32::EPSILON), ""))
-        },
+        move || shade_bright_light(bright, dim, expected),
     )
+}
+
+fn shade_bright_light(bright: AreaLight, dim: AreaLight, expected: f64) -> Result<Outcome> {
+    let shot = shot_in_the_shade(bright, dim);
+    let left = shade_in_the_middle(&shot, &RenderOptions::default());
+    Ok(Outcome::near(left, expected, f64::from(f32::EPSILON), ""))
 }
 
 fn shot_in_the_shade(bright: AreaLight, dim: AreaLight) -> Shot {
@@ -234,14 +238,16 @@ fn sun_in_the_sky() -> HardCase {
         "sun of 1e5 in a sky of 1e-4",
         "a map of 512 x 256 with 4 texels of sun, over a white level card",
         "the midpoint rule over 1 M directions, to 0.5 %",
-        || {
-            let map = sunny_map()?;
-            let expected = irradiance_by_brute_force(&map, |_| true) / PI;
-            let shot = small_shot().with_environment(map);
-            let found = light_reflected(shot, &RenderOptions::default());
-            Ok(Outcome::ratio(found, expected, 5e-3))
-        },
+        reflect_sunny_sky,
     )
+}
+
+fn reflect_sunny_sky() -> Result<Outcome> {
+    let map = sunny_map()?;
+    let expected = irradiance_by_brute_force(&map, |_| true) / PI;
+    let shot = small_shot().with_environment(map);
+    let found = light_reflected(shot, &RenderOptions::default());
+    Ok(Outcome::ratio(found, expected, 5e-3))
 }
 
 fn sun_in_the_shade() -> HardCase {
@@ -249,16 +255,18 @@ fn sun_in_the_shade() -> HardCase {
         "sky of 1e-4 in the shadow of a sun of 1e5",
         "the surface where a small opaque card hides the sun",
         "what the rest of the sky gives, as a share of all, by the midpoint rule: to 1e-4",
-        || {
-            let map = sunny_map()?;
-            let expected = share_without_the_sun(&map);
-            let shot = Shot::new(closeup_at(0.0))
-                .with_environment(map)
-                .with_card(card_before_the_sun());
-            let left = shade_in_the_middle(&shot, &GOOD);
-            Ok(Outcome::near(left, expected, 1e-4, ""))
-        },
+        shade_sunny_sky,
     )
+}
+
+fn shade_sunny_sky() -> Result<Outcome> {
+    let map = sunny_map()?;
+    let expected = share_without_the_sun(&map);
+    let shot = Shot::new(closeup_at(0.0))
+        .with_environment(map)
+        .with_card(card_before_the_sun());
+    let left = shade_in_the_middle(&shot, &GOOD);
+    Ok(Outcome::near(left, expected, 1e-4, ""))
 }
 
 fn direction_to_sun() -> Vector3<f64> {

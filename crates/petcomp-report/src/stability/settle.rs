@@ -307,11 +307,7 @@ fn shortened(mut fall: HardFall) -> HardFall {
 
 fn impossible_falls() -> Result<Vec<HardFall>> {
     let larger = changed(heap(6, 3)?, 0.3, |_, object| object.size = [0.9, 0.7]);
-    let in_one_place = changed(heap(6, 12)?, 0.0, |_, object| {
-        if let Placement::Drop { above, height, .. } = &mut object.placement {
-            (*above, *height) = ([0.0; 2], 0.1);
-        }
-    });
+    let in_one_place = changed(heap(6, 12)?, 0.0, drop_in_one_place);
     let mut longer_steps = resting_fall("steps twice as long", heap(6, 20)?).that_ends();
     longer_steps.options = with_step_times(2.0);
     let longest_steps = resting_fall("steps 4 times too long", heap(6, 20)?);
@@ -321,6 +317,12 @@ fn impossible_falls() -> Result<Vec<HardFall>> {
         longer_steps,
         longest_steps.that_is_refused(with_step_times(4.0)),
     ])
+}
+
+fn drop_in_one_place(_: usize, object: &mut Object) {
+    if let Placement::Drop { above, height, .. } = &mut object.placement {
+        (*above, *height) = ([0.0; 2], 0.1);
+    }
 }
 
 fn with_step_times(factor: f64) -> SettleOptions {
