@@ -5,7 +5,7 @@ use super::entry::PhotoEntry;
 use super::files;
 use super::library::{Photo, check_pixels};
 use super::manifest::{Manifest, PhotoRecord};
-use super::measure::Measured;
+use super::measure::MeasuredSize;
 use super::rectified::RectifiedPhoto;
 use super::scale::Scale;
 use super::screen_source::EmptyScreens;
@@ -159,7 +159,7 @@ fn to_review(cut: &CutOut) -> impl Iterator<Item = Diagnostic> {
 /// [`Error::Value`] for a scale that makes the object too short or too long.
 fn record(cut: &CutOut, entry: &PhotoEntry, photo: &RectifiedPhoto) -> Result<PhotoRecord> {
     let scale = entry.scale()?;
-    let measured = Measured::new(cut, scale, photo);
+    let measured = MeasuredSize::new(cut, scale, photo);
     scale.check_length(measured.object_m[0], &entry.source())?;
     let (w, h) = cut.film.size();
     let size_m = [w as f64, h as f64].map(|px| px / measured.px_per_metre);

@@ -8,7 +8,7 @@ use crate::geom::{Point2, Vector2};
 use crate::matte::CutOut;
 
 /// Size of an object from its outline and a scale.
-pub(super) struct Measured {
+pub(super) struct MeasuredSize {
     /// Pixels of the cut-out for a metre.
     pub(super) px_per_metre: f64,
     /// Length and width of the tight outline.
@@ -26,7 +26,7 @@ const SIDE_ERROR_PX: f64 = 0.5;
 /// Given and measured proportions may differ by this share.
 const PROPORTION_SLACK: f64 = 0.05;
 
-impl Measured {
+impl MeasuredSize {
     pub(super) fn new(cut: &CutOut, scale: Scale, photo: &RectifiedPhoto) -> Self {
         let tight = oriented_size(&cut.outline.hull());
         let screen = photo.scale(middle_px(cut)).unwrap_or(ScreenScale {

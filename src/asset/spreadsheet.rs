@@ -6,7 +6,7 @@ use crate::io;
 
 /// A line of a list of photos.
 #[derive(Debug)]
-pub(super) struct Row {
+pub(super) struct SpreadsheetRow {
     /// Its place in the file, from 1.
     pub(super) line: u64,
     /// What stands in it, by column; no empty cells.
@@ -34,7 +34,7 @@ const SEPARATORS: [u8; 3] = [b',', b';', b'\t'];
 ///
 /// # Errors
 /// [`Error::Value`] with the line: a column that no photo has, a cell that is no number, letters in an unknown code.
-pub(super) fn rows(bytes: &[u8]) -> Result<Vec<Row>> {
+pub(super) fn rows(bytes: &[u8]) -> Result<Vec<SpreadsheetRow>> {
     // Else the reader of CSV counts lines wrongly.
     let text = decoded(bytes)?.replace("\r\n", "\n");
     let text = text.trim_start_matches('\u{feff}');
@@ -63,7 +63,7 @@ struct Columns {
 }
 
 impl Columns {
-    fn row(&self, record: &csv::StringRecord) -> Result<Row> {
+    fn row(&self, record: &csv::StringRecord) -> Result<SpreadsheetRow> {
         let line = record.position().map_or(0, csv::Position::line);
         let mut cells = toml::Table::new();
         let filled = self.names.iter().zip(record);
@@ -71,7 +71,7 @@ impl Columns {
             let value = self.value(name, cell).map_err(|e| in_line(e, line))?;
             cells.insert((*name).into(), value);
         }
-        Ok(Row { line, cells })
+        Ok(SpreadsheetRow { line, cells })
     }
 
     fn value(&self, column: &str, cell: &str) -> Result<toml::Value> {

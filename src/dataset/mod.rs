@@ -109,6 +109,15 @@ pub struct Sample {
     pub deep: DeepImage,
     /// What is where in it.
     pub labels: Labels,
+    /// The scene behind it; none for a picture that was made in another way.
+    pub provenance: Option<Provenance>,
+    /// How long it took; in no file of the dataset.
+    pub times: Times,
+}
+
+/// Where a picture comes from: the scene as it was drawn, and what became of it.
+#[derive(Clone, Debug)]
+pub struct Provenance {
     /// What was drawn: objects not settled yet, exposure still open.
     pub drawn: Scene,
     /// What that became, with nothing left open.
@@ -119,8 +128,41 @@ pub struct Sample {
     pub rejected: Vec<String>,
     /// Every draw that the scene was made with, in order.
     pub draws: Vec<Drawn>,
-    /// How long it took; in no file of the dataset.
-    pub times: Times,
+}
+
+impl Provenance {
+    /// Of a scene in which nothing was left to chance.
+    pub fn from_scene(scene: Scene) -> Self {
+        Self {
+            drawn: scene.clone(),
+            scene,
+            scene_seed: 0,
+            rejected: Vec::new(),
+            draws: Vec::new(),
+        }
+    }
+}
+
+impl Sample {
+    /// A picture from anywhere with its labels: all that most layouts need.
+    ///
+    /// [`Layers`] needs `deep` as well, [`Sidecar`] writes a file only where there is a `provenance`.
+    pub fn new(frame: Image<PremulRgba>, labels: Labels) -> Self {
+        Self {
+            frame,
+            deep: DeepImage::default(),
+            labels,
+            provenance: None,
+            times: Times::default(),
+        }
+    }
+
+    /// Scenes that were rejected before this one.
+    pub(crate) fn rejected_scenes(&self) -> usize {
+        self.provenance
+            .as_ref()
+            .map_or(0, |provenance| provenance.rejected.len())
+    }
 }
 
 /// A sample and its place in the dataset: what a [`Writer`] writes.

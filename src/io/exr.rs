@@ -7,7 +7,7 @@ use super::decode::catch_panic;
 use super::format::Format;
 use super::fs::write_bytes;
 use super::options::ReadOptions;
-use super::source::Source;
+use super::source::SourceFile;
 use crate::error::{Error, Result};
 use crate::work::{self, Kind};
 use std::path::Path;
@@ -72,7 +72,7 @@ fn write_encoded(path: &Path, encoded: std::result::Result<Vec<u8>, String>) -> 
 /// [`Limits`](super::Limits).
 pub fn read_channels(path: impl AsRef<Path>) -> Result<((usize, usize), Vec<Channel>)> {
     let (path, limits) = (path.as_ref(), ReadOptions::default().limits);
-    let source = Source::open(path, &limits)?;
+    let source = SourceFile::open(path, &limits)?;
     if source.format != Format::Exr {
         return Err(Error::file(
             path,

@@ -1,7 +1,7 @@
 //! A decoded picture whose pixels are made when they are asked for.
 
 use super::codec::channels::{ChannelMatch, Wanted};
-use super::codec::profile::{ColorDescription, Profile};
+use super::codec::profile::{ColorDescription, DisplayProfile};
 use super::codec::raster::Raster;
 use super::codec::refusal::Refusal;
 use super::codec::{FromFile, jpeg, png, tiff};
@@ -9,7 +9,7 @@ use super::decode::{camera_notes, catch_panic, decode_raster};
 use super::format::Format;
 use super::limits::{Limits, affordable};
 use super::options::ReadOptions;
-use super::source::Source;
+use super::source::SourceFile;
 use crate::error::{Error, Result};
 use crate::image::Image;
 use std::ops::Range;
@@ -23,7 +23,7 @@ pub struct Picture {
     path: PathBuf,
     format: Format,
     raster: Raster,
-    profile: Option<Profile>,
+    profile: Option<DisplayProfile>,
 }
 
 impl Picture {
@@ -40,7 +40,7 @@ impl Picture {
     }
 
     pub(super) fn decode(path: &Path, options: &ReadOptions, wanted: Wanted) -> Result<Self> {
-        let source = Source::open(path, &options.limits)?;
+        let source = SourceFile::open(path, &options.limits)?;
         let raster = decode_raster(&source, options, wanted);
         Self::from_raster(raster, &source, &options.limits, wanted)
     }
@@ -48,7 +48,7 @@ impl Picture {
     /// Finds the meaning of samples, and turns the picture the way the camera was held.
     pub(super) fn from_raster(
         raster: std::result::Result<Raster, Refusal>,
-        source: &Source,
+        source: &SourceFile,
         limits: &Limits,
         wanted: Wanted,
     ) -> Result<Self> {
@@ -127,7 +127,7 @@ impl Picture {
 }
 
 /// The colour profile of display codes, where there is one other than sRGB.
-fn usable_profile(raster: &Raster, source: &Source, limits: &Limits) -> Option<Profile> {
+fn usable_profile(raster: &Raster, source: &SourceFile, limits: &Limits) -> Option<DisplayProfile> {
     let path = source.path.display();
     match catch_panic(|| Ok(embedded_profile(source, limits)?)) {
         Ok(Some(_)) if !raster.display_encoded => {
@@ -146,20 +146,20 @@ fn usable_profile(raster: &Raster, source: &Source, limits: &Limits) -> Option<P
 
 /// The profile in a file, if it is not sRGB anyway; formats of linear light have none.
 fn embedded_profile(
-    source: &Source,
+    source: &SourceFile,
     limits: &Limits,
-) -> std::result::Result<Option<Profile>, String> {
+) -> std::result::Result<Option<DisplayProfile>, String> {
     let description = match source.format {
         Format::Png => png::color_description(&source.bytes, limits),
         Format::Jpeg => jpeg::profile(&source.bytes).map(ColorDescription::Icc),
         Format::Tiff => tiff::profile(&source.bytes, limits).map(ColorDescription::Icc),
         _ => None,
     };
-    description.map_or(Ok(None), Profile::from_description)
+    description.map_or(Ok(None), DisplayProfile::from_description)
 }
 
 /// Infinite depth is where nothing is; elsewhere it is worth a warning.
-fn warn_not_finite(raster: &Raster, source: &Source, wanted: Wanted) {
+fn warn_not_finite(raster: &Raster, source: &SourceFile, wanted: Wanted) {
     if wanted == Wanted::Depth {
         return;
     }
@@ -171,7 +171,7 @@ fn warn_not_finite(raster: &Raster, source: &Source, wanted: Wanted) {
 }
 
 /// Names the channels of a picture that has none of the default names.
-fn warn_unusual_channels(raster: &Raster, source: &Source, wanted: Wanted) {
+fn warn_unusual_channels(raster: &Raster, source: &SourceFile, wanted: Wanted) {
     let path = source.path.display();
     match wanted.choose(&raster.names) {
         Ok((ChannelMatch::Layer, _)) => {

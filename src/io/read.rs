@@ -11,7 +11,7 @@ use super::header::Header;
 use super::options::Fallback;
 use super::options::ReadOptions;
 use super::picture::Picture;
-use super::source::{OpenedSource, Source};
+use super::source::{OpenedSource, SourceFile};
 use crate::error::{Error, Result};
 use crate::image::Image;
 use std::path::Path;
@@ -52,7 +52,7 @@ pub fn read_header(path: impl AsRef<Path>) -> Result<Header> {
     let decoded = catch_panic(|| read_file_header(file, *bytes, *format, &options.limits));
     let (mut header, notes) = match decoded {
         Err(Refusal::Unsupported(what)) => {
-            let source = Source::open(path, &options.limits)?;
+            let source = SourceFile::open(path, &options.limits)?;
             header_elsewhere(&source, what, &options)
         }
         decoded => decoded,
@@ -80,7 +80,7 @@ pub(super) fn read_by<P: FromFile>(
     path: &Path,
     options: &ReadOptions,
 ) -> Result<Image<P>> {
-    let source = Source::open(path, &options.limits)?;
+    let source = SourceFile::open(path, &options.limits)?;
     let options = ReadOptions {
         fallback,
         ..options.clone()

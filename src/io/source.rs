@@ -9,7 +9,7 @@ use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
 /// A whole file in memory, and its kind by its content.
-pub(super) struct Source {
+pub(super) struct SourceFile {
     pub(super) path: PathBuf,
     pub(super) bytes: Vec<u8>,
     pub(super) format: Format,
@@ -37,7 +37,7 @@ impl OpenedSource {
     }
 }
 
-impl Source {
+impl SourceFile {
     /// Reads a picture file that is worth decoding.
     pub(super) fn open(path: &Path, limits: &Limits) -> Result<Self> {
         let OpenedSource {

@@ -58,7 +58,7 @@ pub use trace::{MotionSample, csv as trace_csv};
 pub use crate::allowance::Allowance;
 use crate::error::{Error, Result};
 use crate::scene::{Placement, Scene};
-use attempt::AttemptSeries;
+use attempt::{Attempt, AttemptSeries};
 use bodies::{is_dropped, solids_at_rest, touch_distance};
 
 /// The result of dropping a scene's objects.
@@ -115,6 +115,23 @@ impl Settled {
                 ),
             }),
         }
+    }
+
+    /// The result of the last attempt at a scene, and the motion of that.
+    fn from_attempts(
+        scene: Scene,
+        last: Attempt,
+        rejected: Vec<SettleVerdict>,
+    ) -> (Self, Vec<MotionSample>) {
+        let settled = Self {
+            scene: last.rested.unwrap_or(scene),
+            verdict: last.verdict,
+            rejected,
+            seconds: last.fall.seconds,
+            overlap: last.overlap,
+            energy_rise: last.fall.energy_rise,
+        };
+        (settled, last.fall.samples)
     }
 
     /// A scene in which nothing falls.
@@ -195,15 +212,7 @@ pub fn settle_within(
         allowance,
     };
     let (last, rejected) = series.run()?;
-    let settled = Settled {
-        scene: last.rested.unwrap_or(scene),
-        verdict: last.verdict,
-        rejected,
-        seconds: last.seconds,
-        overlap: last.overlap,
-        energy_rise: last.energy_rise,
-    };
-    Ok((settled, last.samples))
+    Ok(Settled::from_attempts(scene, last, rejected))
 }
 
 /// Ids (index + 1) of objects that are unsupported at the end of a fall: no forces at their
@@ -218,10 +227,7 @@ pub fn hanging(before: &Scene, after: &Scene, options: &SettleOptions) -> Result
     before.check()?;
     after.check()?;
     options.check()?;
-    let (fell, lie) = (before.objects.len(), after.objects.len());
-    if fell != lie {
-        return Err(Error::value("objects", format!("{lie}, but {fell} fell")));
-    }
+    check_same_count(before, after)?;
     if options.mode == SettleMode::Flat || !before.objects.iter().any(is_dropped) {
         return Ok(Vec::new());
     }
@@ -230,14 +236,21 @@ pub fn hanging(before: &Scene, after: &Scene, options: &SettleOptions) -> Result
     Ok(support::unsupported(before, options, &bodies, &touching))
 }
 
+fn check_same_count(before: &Scene, after: &Scene) -> Result<()> {
+    let (fell, lie) = (before.objects.len(), after.objects.len());
+    if fell == lie {
+        return Ok(());
+    }
+    Err(Error::value("objects", format!("{lie}, but {fell} fell")))
+}
+
 /// Fails on the first object that starts outside the walls.
 fn check_starts(scene: &Scene) -> Result<()> {
     let [w, h] = scene.surface.size;
     for (i, object) in scene.objects.iter().enumerate() {
-        let Placement::Drop { above: [x, y], .. } = object.placement else {
-            continue;
-        };
-        if x.abs() > w / 2.0 || y.abs() > h / 2.0 {
+        if let Placement::Drop { above: [x, y], .. } = object.placement
+            && (x.abs() > w / 2.0 || y.abs() > h / 2.0)
+        {
             return Err(Error::value(
                 format!("objects[{i}].placement.drop.above"),
                 format!("[{x}, {y}], expected over the surface of {w} x {h} m around the origin"),

@@ -142,7 +142,7 @@ pub(crate) fn profile(bytes: &[u8]) -> Option<Vec<u8>> {
 }
 
 /// A part of a colour profile and its number.
-fn profile_part(segment: Segment<'_>) -> Option<(u8, &[u8])> {
+fn profile_part(segment: JpegSegment<'_>) -> Option<(u8, &[u8])> {
     let numbered = segment.data.strip_prefix(ICC_SIGNATURE)?;
     let (&[number, _], part) = numbered.split_first_chunk()?;
     Some((number, part))
@@ -173,14 +173,14 @@ pub(crate) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Refusal> {
 }
 
 /// A marker segment of a JPEG file.
-struct Segment<'a> {
+struct JpegSegment<'a> {
     marker: u8,
     data: &'a [u8],
 }
 
 /// The segments in order, scans skipped; ends early where the file does. An EXIF thumbnail, a JPEG in itself, lies inside
 /// a segment and so does not end the file.
-fn segments(bytes: &[u8]) -> impl Iterator<Item = Segment<'_>> {
+fn segments(bytes: &[u8]) -> impl Iterator<Item = JpegSegment<'_>> {
     let mut rest = bytes.get(2..).unwrap_or_default();
     let mut after_scan = false;
     std::iter::from_fn(move || {
@@ -195,7 +195,7 @@ fn segments(bytes: &[u8]) -> impl Iterator<Item = Segment<'_>> {
 }
 
 /// The first segment and what is behind it; behind the end of the picture is nothing.
-fn split_segment(mut bytes: &[u8]) -> Option<(Segment<'_>, &[u8])> {
+fn split_segment(mut bytes: &[u8]) -> Option<(JpegSegment<'_>, &[u8])> {
     while bytes.starts_with(&[0xff, 0xff]) {
         bytes = &bytes[1..];
     }
@@ -203,11 +203,11 @@ fn split_segment(mut bytes: &[u8]) -> Option<(Segment<'_>, &[u8])> {
         return None;
     };
     if marker == EOI {
-        return Some((Segment { marker, data: &[] }, &[]));
+        return Some((JpegSegment { marker, data: &[] }, &[]));
     }
     let length = usize::from(u16::from_be_bytes(*tail.first_chunk()?));
     let data = tail.get(2..length)?;
-    Some((Segment { marker, data }, &tail[length..]))
+    Some((JpegSegment { marker, data }, &tail[length..]))
 }
 
 /// Where the entropy-coded data ends: at a marker that is neither a stuffed byte, a restart nor padding.

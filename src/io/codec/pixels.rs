@@ -4,7 +4,7 @@
 //! the file states otherwise. A matte or a depth is never display-encoded.
 
 use super::channels::Wanted;
-use super::profile::Profile;
+use super::profile::DisplayProfile;
 use super::raster::{Raster, Samples};
 use crate::color::{decode_srgb8, decode_srgb16, srgb_to_linear};
 use crate::image::Image;
@@ -232,7 +232,7 @@ const GREY_TOLERANCE: f32 = 1.01 / 255.0;
 #[derive(Debug)]
 pub struct SampleRows<'a> {
     raster: &'a Raster,
-    profile: Option<&'a Profile>,
+    profile: Option<&'a DisplayProfile>,
     rows: Range<usize>,
 }
 
@@ -420,7 +420,7 @@ impl Raster {
     /// Some rows and what their colours mean.
     pub(crate) fn rows<'a>(
         &'a self,
-        profile: Option<&'a Profile>,
+        profile: Option<&'a DisplayProfile>,
         rows: Range<usize>,
     ) -> SampleRows<'a> {
         SampleRows {
@@ -433,7 +433,7 @@ impl Raster {
     /// The pixels of some rows.
     pub(crate) fn pixels<P: FromFile>(
         &self,
-        profile: Option<&Profile>,
+        profile: Option<&DisplayProfile>,
         rows: Range<usize>,
     ) -> Result<Image<P>, String> {
         let (width, height) = (self.width, rows.len());
@@ -446,7 +446,7 @@ impl Raster {
     /// of the two is there.
     pub(crate) fn into_image<P: FromFile>(
         mut self,
-        profile: Option<&Profile>,
+        profile: Option<&DisplayProfile>,
     ) -> Result<Image<P>, String> {
         let (width, height) = (self.width, self.height);
         let whole = self.rows(profile, 0..height);

@@ -220,7 +220,7 @@ fn add_texts(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::io::codec::profile::Profile;
+    use crate::io::codec::profile::DisplayProfile;
 
     /// Light of a middle grey code, in a file with what `colors` adds to it.
     fn light(colors: impl FnOnce(&mut png::Encoder<'_, &mut Vec<u8>>)) -> [f32; 3] {
@@ -233,7 +233,7 @@ mod tests {
             .write_image_data(&[128])
             .unwrap();
         let profile = super::color_description(&bytes, &Limits::default())
-            .map_or(Ok(None), Profile::from_description)
+            .map_or(Ok(None), DisplayProfile::from_description)
             .unwrap();
         let code = 128.0 / 255.0;
         profile.map_or([crate::color::srgb_to_linear(code); 3], |p| {
@@ -295,7 +295,7 @@ mod tests {
             .write_image_data(&[0])
             .unwrap();
         let profile = color_description(&bytes, &Limits::default())
-            .map(Profile::from_description)
+            .map(DisplayProfile::from_description)
             .unwrap()
             .unwrap()
             .unwrap();

@@ -46,13 +46,13 @@ pub(crate) enum ColorDescription {
 
 /// How display codes become light, where a file describes it itself.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Profile {
+pub(crate) struct DisplayProfile {
     /// Linear light of each 16-bit code, for red, green and blue.
     curves: [Vec<f32>; 3],
     to_rec709: ColorMatrix,
 }
 
-impl Profile {
+impl DisplayProfile {
     /// The profile that a file describes, if it is not sRGB.
     ///
     /// # Errors
@@ -263,8 +263,8 @@ fn gamut_area(space: &RgbSpace) -> f64 {
 mod tests {
     use super::*;
 
-    fn parsed(icc: &ColorProfile) -> Option<Profile> {
-        Profile::from_icc(&icc.encode().unwrap()).unwrap()
+    fn parsed(icc: &ColorProfile) -> Option<DisplayProfile> {
+        DisplayProfile::from_icc(&icc.encode().unwrap()).unwrap()
     }
 
     #[test]
@@ -344,18 +344,18 @@ mod tests {
     #[test]
     fn code_points_other_than_those_of_screens_are_named() {
         assert_eq!(
-            Profile::from_description(ColorDescription::CodePoints(1, 13)),
+            DisplayProfile::from_description(ColorDescription::CodePoints(1, 13)),
             Ok(None)
         );
         assert_eq!(
-            Profile::from_description(ColorDescription::CodePoints(1, 8))
+            DisplayProfile::from_description(ColorDescription::CodePoints(1, 8))
                 .unwrap()
                 .unwrap()
                 .light([0.5; 3])[0],
             32768.0 / 65535.0
         );
         assert_eq!(
-            Profile::from_description(ColorDescription::CodePoints(9, 16)).unwrap_err(),
+            DisplayProfile::from_description(ColorDescription::CodePoints(9, 16)).unwrap_err(),
             "code points 9/16 for its colours"
         );
     }
@@ -398,10 +398,10 @@ mod tests {
         let whole = ColorProfile::new_display_p3().encode().unwrap();
         for length in (0..whole.len()).step_by(7) {
             // A cut may spare everything that counts.
-            let _ = Profile::from_icc(&whole[..length]);
+            let _ = DisplayProfile::from_icc(&whole[..length]);
         }
         assert_eq!(
-            Profile::from_icc(b"profile").unwrap_err(),
+            DisplayProfile::from_icc(b"profile").unwrap_err(),
             "a damaged colour profile"
         );
     }

@@ -1,7 +1,7 @@
 //! OpenImageIO in this process: shapes and samples of files in memory, and pictures to files.
 
 use super::ffi::{self, Layout};
-use super::protocol::{Request, Response, Sample, Shape};
+use super::protocol::{Request, Response, SampleKind, Shape};
 use crate::color::Curve;
 use crate::io::codec::Wanted;
 use crate::io::codec::codes::Bits;
@@ -10,7 +10,7 @@ use crate::io::codec::refusal::Refusal;
 use crate::io::format::Format;
 use crate::io::header::Window;
 use crate::io::limits::{Demand, Limits};
-use crate::io::source::Source;
+use crate::io::source::SourceFile;
 use cxx::UniquePtr;
 use std::ops::Range;
 use std::sync::OnceLock;
@@ -22,7 +22,7 @@ pub(crate) fn version() -> String {
 
 /// Answers a request about a file.
 pub(crate) fn answer(
-    source: &Source,
+    source: &SourceFile,
     limits: &Limits,
     request: Request,
 ) -> Result<Response, Refusal> {
@@ -44,7 +44,7 @@ pub(crate) fn start() -> Result<(), Refusal> {
 }
 
 /// The shape of a picture, without its samples.
-pub(crate) fn shape(source: &Source, limits: &Limits) -> Result<Shape, Refusal> {
+pub(crate) fn shape(source: &SourceFile, limits: &Limits) -> Result<Shape, Refusal> {
     let (_, layout) = open(source, limits)?;
     Ok(Shape {
         width: layout.width as usize,
@@ -57,7 +57,7 @@ pub(crate) fn shape(source: &Source, limits: &Limits) -> Result<Shape, Refusal> 
 
 /// Samples as the file has them, in the window asked for; `reserve` gets the number of their bytes before they are read.
 pub(crate) fn decode(
-    source: &Source,
+    source: &SourceFile,
     limits: &Limits,
     wanted: Wanted,
     window: Window,
@@ -85,7 +85,7 @@ pub(crate) fn decode(
 }
 
 fn open<'a>(
-    source: &'a Source,
+    source: &'a SourceFile,
     limits: &Limits,
 ) -> Result<(UniquePtr<ffi::Reader<'a>>, Layout), Refusal> {
     start()?;
@@ -119,12 +119,12 @@ impl Layout {
         Ok(())
     }
 
-    fn sample(&self) -> Sample {
+    fn sample(&self) -> SampleKind {
         match (self.bytes, self.half) {
-            (1, _) => Sample::U8,
-            (2, false) => Sample::U16,
-            (2, true) => Sample::F16,
-            _ => Sample::F32,
+            (1, _) => SampleKind::U8,
+            (2, false) => SampleKind::U16,
+            (2, true) => SampleKind::F16,
+            _ => SampleKind::F32,
         }
     }
 
@@ -160,10 +160,10 @@ fn read_samples(
     picked: &[usize],
 ) -> Result<Samples, Refusal> {
     Ok(match layout.sample() {
-        Sample::U8 => Samples::U8(windowed(read_data(reader, layout)?, layout, picked)),
-        Sample::U16 => Samples::U16(windowed(read_data(reader, layout)?, layout, picked)),
-        Sample::F16 => Samples::F16(windowed(read_data(reader, layout)?, layout, picked)),
-        Sample::F32 => Samples::F32(windowed(read_data(reader, layout)?, layout, picked)),
+        SampleKind::U8 => Samples::U8(windowed(read_data(reader, layout)?, layout, picked)),
+        SampleKind::U16 => Samples::U16(windowed(read_data(reader, layout)?, layout, picked)),
+        SampleKind::F16 => Samples::F16(windowed(read_data(reader, layout)?, layout, picked)),
+        SampleKind::F32 => Samples::F32(windowed(read_data(reader, layout)?, layout, picked)),
     })
 }
 

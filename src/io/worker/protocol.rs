@@ -10,7 +10,7 @@ use crate::io::codec::refusal::Refusal;
 use crate::io::format::Format;
 use crate::io::header::Window;
 use crate::io::limits::{Demand, Limits};
-use crate::io::source::Source;
+use crate::io::source::SourceFile;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::io::{BufRead, Error, ErrorKind, Read, Result, Write};
@@ -38,7 +38,7 @@ pub(crate) enum Response {
 #[derive(Clone, Copy)]
 pub struct Linked(pub(in crate::io) LinkedAnswer);
 
-type LinkedAnswer = fn(&Source, &Limits, Request) -> std::result::Result<Response, Refusal>;
+type LinkedAnswer = fn(&SourceFile, &Limits, Request) -> std::result::Result<Response, Refusal>;
 
 impl std::fmt::Debug for Linked {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
@@ -81,7 +81,7 @@ pub(crate) struct Shape {
     pub(crate) width: usize,
     pub(crate) height: usize,
     pub(crate) names: Vec<String>,
-    pub(crate) sample: Sample,
+    pub(crate) sample: SampleKind,
     pub(crate) display_encoded: bool,
 }
 
@@ -102,14 +102,14 @@ impl Shape {
 /// How a sample is stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub(crate) enum Sample {
+pub(crate) enum SampleKind {
     U8,
     U16,
     F16,
     F32,
 }
 
-impl Sample {
+impl SampleKind {
     pub(crate) fn bytes(self) -> u32 {
         match self {
             Self::U8 => 1,
@@ -168,7 +168,7 @@ pub(super) fn send_raster(to: &mut impl Write, raster: &Raster) -> Result<()> {
         width: raster.width,
         height: raster.height,
         names: raster.names.clone(),
-        sample: Sample::kind_of(&raster.samples),
+        sample: SampleKind::kind_of(&raster.samples),
         display_encoded: raster.display_encoded,
     };
     send_line(to, &ResponseHead::Picture(shape))?;
@@ -201,10 +201,10 @@ pub(crate) fn receive_shape(
 pub(crate) fn receive_samples(from: &mut impl Read, shape: Shape) -> Result<Raster> {
     let count = shape.width * shape.height * shape.names.len();
     let samples = match shape.sample {
-        Sample::U8 => Samples::U8(read_samples(from, count)?),
-        Sample::U16 => Samples::U16(read_samples(from, count)?),
-        Sample::F16 => Samples::F16(read_samples(from, count)?),
-        Sample::F32 => Samples::F32(read_samples(from, count)?),
+        SampleKind::U8 => Samples::U8(read_samples(from, count)?),
+        SampleKind::U16 => Samples::U16(read_samples(from, count)?),
+        SampleKind::F16 => Samples::F16(read_samples(from, count)?),
+        SampleKind::F32 => Samples::F32(read_samples(from, count)?),
     };
     Ok(Raster {
         width: shape.width,

@@ -2,7 +2,7 @@
 
 use crate::common::{Common, RecipeArgs};
 use crate::print;
-use petcomp::dataset::DatasetConfig;
+use petcomp::dataset::{DatasetConfig, Provenance};
 use petcomp::scene::Drawn;
 use petcomp::{Error, Scene, io};
 use std::path::PathBuf;
@@ -38,17 +38,22 @@ pub(crate) fn init(args: &Init, common: &Common) -> anyhow::Result<()> {
 /// Makes the image to know which of its scenes came to rest, and prints the draws of that one.
 pub(crate) fn explain(args: &Explain) -> anyhow::Result<()> {
     let sample = args.recipe.pipeline()?.sample(args.seed, args.index)?;
-    for reason in &sample.rejected {
+    sample.provenance.iter().for_each(print_draws);
+    Ok(())
+}
+
+fn print_draws(provenance: &Provenance) {
+    for reason in &provenance.rejected {
         print::line(format_args!("# rejected a scene: {reason}"));
     }
-    if !sample.rejected.is_empty() {
+    if !provenance.rejected.is_empty() {
         print::line(format_args!(
             "# what follows was drawn with seed {}",
-            sample.scene_seed
+            provenance.scene_seed
         ));
     }
     let width = |text: &dyn Fn(&Drawn) -> String| {
-        sample
+        provenance
             .draws
             .iter()
             .map(|d| text(d).len())
@@ -56,17 +61,16 @@ pub(crate) fn explain(args: &Explain) -> anyhow::Result<()> {
             .unwrap_or(0)
     };
     let (paths, froms) = (width(&|d| d.path.clone()), width(&|d| d.from.to_string()));
-    for draw in &sample.draws {
+    for draw in &provenance.draws {
         let from = draw.from.to_string();
         let line = format!(
             "{:paths$}  {from:froms$}  {}  {}",
             draw.path,
             draw.value,
-            chosen(draw, &sample.drawn)
+            chosen(draw, &provenance.drawn)
         );
         print::line(line.trim_end());
     }
-    Ok(())
 }
 
 /// The name of what a choice chose.

@@ -8,7 +8,8 @@ use petcomp::DeepImage;
 use petcomp::asset::Texture;
 use petcomp::camera::Camera;
 use petcomp::dataset::{
-    Obstructed, Pictures, Plan, Sample, SampleRange, Sidecar, Split, Times, Writer, Yolo, generate,
+    Obstructed, Pictures, Plan, Provenance, Sample, SampleRange, Sidecar, Split, Writer, Yolo,
+    generate,
 };
 use petcomp::geom::{Point2, Pose, UnitQuaternion, Vector2, Vector3};
 use petcomp::label::{LabelOptions, label};
@@ -153,15 +154,9 @@ impl World {
         let frame = composite::frame(&deep, self.shot.plate.as_deref());
         let labels = label(&deep, &self.shot, &LabelOptions::default());
         Sample {
-            frame,
             deep,
-            labels,
-            drawn: self.scene.clone(),
-            scene: self.scene.clone(),
-            scene_seed: 0,
-            rejected: vec![],
-            draws: vec![],
-            times: Times::default(),
+            provenance: Some(Provenance::from_scene(self.scene.clone())),
+            ..Sample::new(frame, labels)
         }
     }
 }

@@ -4,8 +4,8 @@ use super::staged::{camera_above, empty_scene, grey, level_card, one_deep_pixel,
 use super::{HardCase, Outcome};
 use petcomp::composite;
 use petcomp::dataset::{
-    Format, JOURNAL, LabelConfig, Obstructed, Part, Pictures, Plan, Sample, SampleRange, Shard,
-    Sidecar, Split, SplitOrder, Times, Writer, check, generate, repair,
+    Format, JOURNAL, LabelConfig, Obstructed, Part, Pictures, Plan, Provenance, Sample,
+    SampleRange, Shard, Sidecar, Split, SplitOrder, Writer, check, generate, repair,
 };
 use petcomp::io;
 use petcomp::label::{LabelOptions, label};
@@ -60,15 +60,9 @@ fn sample(shot: &Shot, deep: DeepImage) -> Sample {
     let labels = label(&deep, shot, &LabelOptions::default());
     let frame = composite::frame(&deep, None).map(|p| p.color().opaque());
     Sample {
-        frame,
         deep,
-        labels,
-        drawn: scene.clone(),
-        scene,
-        scene_seed: 0,
-        rejected: Vec::new(),
-        draws: Vec::new(),
-        times: Times::default(),
+        provenance: Some(Provenance::from_scene(scene)),
+        ..Sample::new(frame, labels)
     }
 }
 
