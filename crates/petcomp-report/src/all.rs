@@ -111,7 +111,7 @@ pub fn measure(options: &AllOptions, progress: impl Fn(u64, u64)) -> Result<Docu
         progress(done, steps);
         diagrams.extend(stage(options, &amount)?);
     }
-    let others = peers::read(&options.peers)?;
+    let others = peers::read_comparisons(&options.peers)?;
     let mut sections = vec![
         about(options),
         curves(&diagrams),
@@ -150,7 +150,7 @@ fn about(options: &AllOptions) -> Section {
             "One run of `petcomp-report all` on the machine below. Times are CPU seconds of one thread, medians; errors are \
              the same at every run.{quick}"
         ))
-        .table("machine", machine::machine(&options.date))
+        .table("machine", machine::machine_table(&options.date))
 }
 
 fn curves(diagrams: &[Diagram]) -> Section {
