@@ -16,6 +16,7 @@ pub use parts::{ChannelSamples, Part};
 pub use read::Channel;
 pub use write::Compression;
 
+pub(crate) use ::exr::prelude::FlatSamples;
 pub(crate) use parts::encode_parts;
 pub(crate) use read::{channels, decode, header};
 pub(crate) use runs::encode_runs;
