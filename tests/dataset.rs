@@ -6,8 +6,9 @@ use petcomp::DeepImage;
 use petcomp::camera::Camera;
 use petcomp::dataset::{
     ContactSheetOptions, DatasetConfig, DatasetCounts, LabelConfig, Obstructed, PictureFormat,
-    Pictures, Pipeline, Plan, Progress, Sample, SampleRange, SampleRecord, Shard, Sidecar, Split,
-    SplitOrder, Times, Writer, Yolo, YoloTask, check, contact_sheet_of, generate, merge, repair,
+    Pictures, Pipeline, Plan, Progress, Provenance, Sample, SampleRange, SampleRecord, Shard,
+    Sidecar, Split, SplitOrder, Writer, Yolo, YoloTask, check, contact_sheet_of, generate, merge,
+    repair,
 };
 use petcomp::geom::BBox;
 use petcomp::geom::{Point2, Pose, UnitQuaternion, Vector2};
@@ -94,15 +95,15 @@ fn sample(k: u64) -> Result<Sample> {
     let nothing = Image::filled(IMAGE[0] as usize, IMAGE[1] as usize, LinearRgb::WHITE);
     let deep = DeepImage::from_pixels(nothing, vec![vec![]; frame.pixels().len()]);
     Ok(Sample {
-        frame,
         deep,
-        labels,
-        drawn,
-        scene: scene(k),
-        scene_seed: k ^ 7,
-        rejected,
-        draws: vec![],
-        times: Times::default(),
+        provenance: Some(Provenance {
+            drawn,
+            scene: scene(k),
+            scene_seed: k ^ 7,
+            rejected,
+            draws: vec![],
+        }),
+        ..Sample::new(frame, labels)
     })
 }
 
@@ -532,9 +533,10 @@ fn a_sidecar_reads_back_bit_by_bit() {
     make(&plan(dir.path(), 4)).unwrap();
     let record: SampleRecord = io::read_json(dir.path().join("scenes/train/000003.json")).unwrap();
     let made = sample(3).unwrap();
+    let provenance = made.provenance.unwrap();
     assert_eq!(
         (record.scene, record.labels, record.drawn),
-        (made.scene, made.labels, made.drawn)
+        (provenance.scene, made.labels, provenance.drawn)
     );
     assert_eq!(
         (record.seed, record.index, record.labelled),
@@ -623,10 +625,38 @@ fn with_a_card_up_at(k: u64, height: f64) -> Sample {
             rotation: UnitQuaternion::identity(),
         })
     };
-    sample.drawn.objects = (1..4).map(falls).collect();
+    let provenance = sample.provenance.as_mut().unwrap();
+    provenance.drawn.objects = (1..4).map(falls).collect();
     let lies = |z: f64| card(Placement::At(Pose::translation(0.0, 0.0, z)));
-    sample.scene.objects = [0.0027, 0.0081, height].map(lies).into();
+    provenance.scene.objects = [0.0027, 0.0081, height].map(lies).into();
     sample
+}
+
+#[test]
+fn a_sample_without_a_scene_is_written_and_its_layers_are_refused() {
+    let bare = |k| sample(k).map(|made| Sample::new(made.frame, made.labels));
+    let write = |writers: Vec<Box<dyn Writer>>| {
+        let dir = tempfile::tempdir().unwrap();
+        let classes = ["cap_label", "cap", "label"].map(String::from).to_vec();
+        let plan = Plan {
+            writers,
+            ..Plan::new(dir.path(), 4, classes)
+        };
+        let made = generate(&plan, bare, &|_| (), &AtomicBool::new(false));
+        made.map(|counts| (counts.images, check(dir.path()).unwrap().findings))
+    };
+    let most = write(vec![
+        Box::new(Pictures::default()),
+        Box::new(Sidecar),
+        Box::new(Yolo::default()),
+    ]);
+    assert_eq!(most.unwrap(), (4, vec![]));
+    let e = write(vec![Box::new(petcomp::dataset::Layers::default())]).unwrap_err();
+    assert!(
+        e.to_string()
+            .contains("deep: 0 x 0 pixels, expected the picture's 64 x 48"),
+        "{e}"
+    );
 }
 
 #[test]

@@ -8,7 +8,8 @@
 use petcomp::asset::Texture;
 use petcomp::camera::Camera;
 use petcomp::dataset::{
-    LabelConfig, Obstructed, Pictures, Plan, Sample, SampleRange, Sidecar, Split, Times, generate,
+    LabelConfig, Obstructed, Pictures, Plan, Provenance, Sample, SampleRange, Sidecar, Split,
+    generate,
 };
 use petcomp::filter::Pyramid;
 use petcomp::geom::{Point2, Pose, Quad, UnitQuaternion, Vector2, Vector3};
@@ -109,16 +110,14 @@ fn sample(k: u64) -> Result<Sample> {
         files: None,
         settings: Default::default(),
     };
-    Ok(Sample {
-        frame,
-        deep,
-        labels,
-        drawn: scene.clone(),
-        scene,
+    let provenance = Provenance {
         scene_seed: 3,
-        rejected: vec![],
-        draws: vec![],
-        times: Times::default(),
+        ..Provenance::from_scene(scene)
+    };
+    Ok(Sample {
+        deep,
+        provenance: Some(provenance),
+        ..Sample::new(frame, labels)
     })
 }
 

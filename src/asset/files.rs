@@ -102,14 +102,9 @@ mod tests {
                 LinearRgb::new(1.0 - 0.9 * v, 0.3, v / 3.0),
             )
         });
-        let planes = [
-            ("R", plane(&film, |f| f.color.r)),
-            ("G", plane(&film, |f| f.color.g)),
-            ("B", plane(&film, |f| f.color.b)),
-            ("VR", plane(&film, |f| f.transmittance().r)),
-            ("VG", plane(&film, |f| f.transmittance().g)),
-            ("VB", plane(&film, |f| f.transmittance().b)),
-        ];
+        let color = rgb_planes(["R", "G", "B"], &film, |f| f.color);
+        let seen = rgb_planes(["VR", "VG", "VB"], &film, |f| f.transmittance());
+        let planes = [color, seen].concat();
         let channels: Vec<_> = planes.iter().map(|(n, v)| (*n, v.as_slice())).collect();
         io::exr::write_half_channels(&path, film.size(), &channels, &[]).unwrap();
         assert_eq!(io::read::<Film>(&path).unwrap(), film.map(as_stored));

@@ -35,6 +35,23 @@ pub struct Plan {
 }
 
 impl Plan {
+    /// `count` samples in `folder` with labels of these classes, shared out by the default [`Split`]; its writers
+    /// are still to be named.
+    pub fn new(folder: impl Into<PathBuf>, count: u64, classes: Vec<String>) -> Self {
+        Self {
+            folder: folder.into(),
+            count,
+            range: SampleRange::All,
+            seed: 0,
+            recipe: serde_json::Value::Null,
+            classes,
+            split: Split::default(),
+            obstructed: Obstructed::default(),
+            writers: Vec::new(),
+            inputs: Inputs::default(),
+        }
+    }
+
     /// Hash of everything but the seed that decides what a sample is.
     pub fn recipe_hash(&self) -> String {
         format!(

@@ -55,7 +55,7 @@ impl JournalLine {
             classes: count_by_class(entry),
             obstructed: objects.iter().filter(|object| !object.is_topmost()).count() as u32,
             knotted: cyclic_overlaps(objects).len() as u32,
-            retries: entry.sample.rejected.len() as u32,
+            retries: entry.sample.rejected_scenes() as u32,
             files: files
                 .iter()
                 .map(|path| WrittenFile::read_back(folder, path))

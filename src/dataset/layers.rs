@@ -1,8 +1,8 @@
 //! One EXR file for each image with everything a compositor asks for.
 
-use crate::dataset::{Entry, Part, Writer};
+use crate::dataset::{Entry, Part, Sample, Writer};
 use crate::deep::{DeepImage, DeepSample};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::io;
 use crate::io::exr::write_channels;
 use crate::label::LabelOptions;
@@ -50,6 +50,7 @@ impl Writer for Layers {
 
     fn write(&self, folder: &Path, entry: &Entry<'_>) -> Result<Vec<PathBuf>> {
         let (path, sample) = (entry.path(KIND, "exr"), entry.sample);
+        check_deep(sample)?;
         let objects = &sample.labels.objects;
         let names: Vec<_> = objects
             .iter()
@@ -87,6 +88,19 @@ fn provenance(entry: &Entry<'_>) -> [(String, String); 3] {
         ("petcomp:seed".into(), entry.seed.to_string()),
         ("petcomp:sample".into(), entry.k.to_string()),
     ]
+}
+
+/// Fails for a sample without deep samples: its layers cannot be told apart.
+fn check_deep(sample: &Sample) -> Result<()> {
+    let (w, h) = sample.frame.size();
+    let (deep_w, deep_h) = (sample.deep.width(), sample.deep.height());
+    if (deep_w, deep_h) == (w, h) {
+        return Ok(());
+    }
+    Err(Error::value(
+        "deep",
+        format!("{deep_w} x {deep_h} pixels, expected the picture's {w} x {h}"),
+    ))
 }
 
 /// The name of a channel and how a pixel gives its value.

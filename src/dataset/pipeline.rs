@@ -8,7 +8,9 @@ use crate::dataset::background_photo::{BackgroundOptions, BackgroundPhoto};
 use crate::dataset::environment_maps::EnvironmentMaps;
 use crate::dataset::fingerprint::fingerprint;
 use crate::dataset::times::timed;
-use crate::dataset::{DatasetConfig, Inputs, Plan, Sample, SampleRange, Sidecar, Times, Writer};
+use crate::dataset::{
+    DatasetConfig, Inputs, Plan, Provenance, Sample, SampleRange, Sidecar, Times, Writer,
+};
 use crate::deep::DeepImage;
 use crate::error::{Error, Result};
 use crate::image::Image;
@@ -203,10 +205,14 @@ impl Pipeline {
             let (scene, draws) = self.explain(scene_seed, k)?;
             match self.take_within(scene, &allowance) {
                 Ok(sample) => {
-                    return Ok(Sample {
+                    let provenance = sample.provenance.map(|provenance| Provenance {
                         rejected,
                         draws,
                         scene_seed,
+                        ..provenance
+                    });
+                    return Ok(Sample {
+                        provenance,
                         ..sample
                     });
                 }
@@ -241,15 +247,18 @@ impl Pipeline {
             label,
             ..Times::default()
         };
-        Ok(Sample {
-            frame,
-            deep,
-            labels,
+        let provenance = Provenance {
             drawn,
             scene,
             scene_seed: 0,
             rejected: vec![],
             draws: vec![],
+        };
+        Ok(Sample {
+            frame,
+            deep,
+            labels,
+            provenance: Some(provenance),
             times,
         })
     }

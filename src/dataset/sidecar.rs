@@ -1,6 +1,6 @@
 //! Everything known of a sample, one JSON file beside each image.
 
-use crate::dataset::{Entry, Part, Sample, Writer};
+use crate::dataset::{Entry, Part, Provenance, Writer};
 use crate::error::Result;
 use crate::io;
 use crate::label::{Labels, cyclic_overlaps};
@@ -61,24 +61,26 @@ impl Writer for Sidecar {
     }
 
     fn write(&self, folder: &Path, entry: &Entry<'_>) -> Result<Vec<PathBuf>> {
+        let Some(provenance) = &entry.sample.provenance else {
+            return Ok(Vec::new());
+        };
         let path = entry.path("scenes", "json");
-        io::write_json(folder.join(&path), &SampleRecord::of(entry))?;
+        io::write_json(folder.join(&path), &SampleRecord::new(entry, provenance))?;
         Ok(vec![path])
     }
 }
 
 impl SampleRecord {
-    /// What there is to say of an entry.
-    fn of(entry: &Entry<'_>) -> Self {
-        let Sample {
-            labels,
+    /// Everything known of an entry.
+    fn new(entry: &Entry<'_>, provenance: &Provenance) -> Self {
+        let labels = &entry.sample.labels;
+        let Provenance {
             drawn,
             scene,
             scene_seed,
             rejected,
             draws,
-            ..
-        } = entry.sample;
+        } = provenance;
         Self {
             petcomp: env!("CARGO_PKG_VERSION").to_owned(),
             recipe_hash: entry.recipe_hash.to_owned(),

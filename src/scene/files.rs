@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 use crate::io;
 use serde::{Deserialize, Serialize};
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 /// Where the files of a scene lie, relative to the scene's own file: with it a scene is rendered
 /// without its recipe.
@@ -45,8 +45,13 @@ pub(crate) fn relative_to_file(path: &Path, file: &Path) -> Result<PathBuf> {
     Ok(io::relative(&absolute(path)?, folder))
 }
 
+/// The path from the root. `..` is resolved on the disk, since a link may stand before it.
 fn absolute(path: &Path) -> Result<PathBuf> {
-    std::path::absolute(path).map_err(|e| Error::file(path, e))
+    let climbs = path.components().any(|step| step == Component::ParentDir);
+    match path.canonicalize() {
+        Ok(resolved) if climbs => Ok(resolved),
+        _ => std::path::absolute(path).map_err(|e| Error::file(path, e)),
+    }
 }
 
 /// A path that is named in one file as it is named in another.

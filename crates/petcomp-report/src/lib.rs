@@ -6,6 +6,7 @@ pub mod all;
 pub mod camera;
 mod clock;
 pub mod color;
+mod columns;
 mod diagram;
 pub mod encode;
 pub mod experiments;
@@ -22,6 +23,7 @@ pub mod scale;
 mod section;
 pub mod settle;
 pub mod stability;
+mod statistics;
 pub mod work;
 
 pub use diagram::{Diagram, Point, front};

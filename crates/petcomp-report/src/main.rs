@@ -10,16 +10,16 @@ use std::process::ExitCode;
 /// Measure how good a stage is, on simulated data: tables and plots.
 #[derive(Parser)]
 #[command(version)]
-struct Cli {
+struct ReportCli {
     #[command(flatten)]
-    common: Common,
+    common: ReportFlags,
     #[command(subcommand)]
     command: command::Command,
 }
 
 /// Flags that mean the same for every report.
 #[derive(clap::Args)]
-pub(crate) struct Common {
+pub(crate) struct ReportFlags {
     /// Worker threads; 0 is one per core
     #[arg(
         short = 'j',
@@ -34,7 +34,7 @@ pub(crate) struct Common {
     quiet: bool,
 }
 
-impl Common {
+impl ReportFlags {
     /// Prints a line about the work, unless asked to be quiet.
     pub(crate) fn say(&self, line: impl std::fmt::Display) {
         if !self.quiet {
@@ -43,7 +43,7 @@ impl Common {
     }
 
     /// A progress bar on a terminal, nothing elsewhere.
-    pub(crate) fn progress(&self, job: &'static str) -> Progress {
+    pub(crate) fn progress(&self, job: &'static str) -> ProgressLine {
         let bar = if self.quiet {
             ProgressBar::hidden()
         } else {
@@ -52,14 +52,14 @@ impl Common {
         let style = ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len}  {eta} left");
         bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
         bar.set_message(job);
-        Progress(bar)
+        ProgressLine(bar)
     }
 }
 
 /// How far a measurement is; cleared when dropped.
-pub(crate) struct Progress(ProgressBar);
+pub(crate) struct ProgressLine(ProgressBar);
 
-impl Progress {
+impl ProgressLine {
     /// So many steps of so many are done.
     pub(crate) fn at(&self, done: u64, total: u64) {
         self.0.set_length(total);
@@ -67,14 +67,14 @@ impl Progress {
     }
 }
 
-impl Drop for Progress {
+impl Drop for ProgressLine {
     fn drop(&mut self) {
         self.0.finish_and_clear();
     }
 }
 
 fn main() -> ExitCode {
-    let cli = Cli::parse();
+    let cli = ReportCli::parse();
     // Fails only if a pool exists already, and then that pool serves.
     let _ = rayon::ThreadPoolBuilder::new()
         .num_threads(cli.common.threads)

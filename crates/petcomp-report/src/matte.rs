@@ -13,7 +13,7 @@ mod search;
 pub(super) mod truth;
 
 pub use diagram::diagrams;
-pub use method::Method;
+pub use method::MattingMethod;
 pub use score::Score;
 pub use search::searches;
 
@@ -30,11 +30,11 @@ use truth::{Known, Truths};
 
 /// What a method made of a photo.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Row {
+pub struct MatteRow {
     /// Name of the photo.
     pub photo: String,
     /// The method.
-    pub method: Method,
+    pub method: MattingMethod,
     /// Its errors; nothing where it gave no cut-out.
     pub score: Option<Score>,
     /// Why a person should look at the cut-out, or why there is none.
@@ -45,9 +45,9 @@ pub struct Row {
 
 /// Errors of a method over all photos.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Summary {
+pub struct MethodSummary {
     /// The method.
-    pub method: Method,
+    pub method: MattingMethod,
     /// Means; of the outline's overlap and of the time the median, of the box the 95 % quantile.
     pub score: Score,
     /// Photos without a cut-out.
@@ -75,8 +75,8 @@ const PATCH_PX: usize = 24;
 ///
 /// # Errors
 /// A folder without truth, or files of it that cannot be read.
-pub fn measure(folder: &Path, progress: impl Fn(u64, u64)) -> Result<Vec<Row>> {
-    let truths = Truths::of(folder)?;
+pub fn measure(folder: &Path, progress: impl Fn(u64, u64)) -> Result<Vec<MatteRow>> {
+    let truths = Truths::in_folder(folder)?;
     measure_known(truths.len(), |i| truths.read(i), progress)
 }
 
@@ -85,7 +85,7 @@ fn measure_known(
     count: usize,
     read: impl Fn(usize) -> Result<Known>,
     progress: impl Fn(u64, u64),
-) -> Result<Vec<Row>> {
+) -> Result<Vec<MatteRow>> {
     // One thread, so that run times can be compared.
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build();
     let mut rows = Vec::new();
@@ -97,7 +97,7 @@ fn measure_known(
         let backgrounds: Vec<_> = (0..BACKGROUNDS)
             .map(|k| background(known.photo.size(), k))
             .collect();
-        for method in Method::ALL {
+        for method in MattingMethod::ALL {
             let work = || row(method, &known, &shots, &backgrounds);
             rows.push(
                 one.as_ref()
@@ -109,11 +109,11 @@ fn measure_known(
 }
 
 fn row(
-    method: Method,
+    method: MattingMethod,
     known: &Known,
     shots: &[Image<LinearRgb>; 2],
     backgrounds: &[Image<LinearRgb>],
-) -> Row {
+) -> MatteRow {
     let start = cpu_seconds();
     let cut = method.run(known, shots);
     let time_ms = 1e3 * (cpu_seconds() - start);
@@ -126,11 +126,11 @@ fn row(
                 .filter(|d| d.needs_review())
                 .map(ToString::to_string)
                 .collect();
-            (Some(Score::of(cut, known, backgrounds)), doubts)
+            (Some(Score::new(cut, known, backgrounds)), doubts)
         }
         Err(error) => (None, vec![error.to_string()]),
     };
-    Row {
+    MatteRow {
         photo: known.name.clone(),
         method,
         score,
@@ -167,16 +167,16 @@ pub(super) fn normal(seed: u64) -> impl FnMut() -> f64 {
 }
 
 /// Errors over all photos, a line per method.
-pub fn summaries(rows: &[Row]) -> Vec<Summary> {
-    Method::ALL
+pub fn summaries(rows: &[MatteRow]) -> Vec<MethodSummary> {
+    MattingMethod::ALL
         .into_iter()
         .map(|method| summary(rows, method))
         .collect()
 }
 
-fn summary(rows: &[Row], method: Method) -> Summary {
-    let own: Vec<&Row> = rows.iter().filter(|row| row.method == method).collect();
-    let scored: Vec<(&Row, Score)> = own
+fn summary(rows: &[MatteRow], method: MattingMethod) -> MethodSummary {
+    let own: Vec<&MatteRow> = rows.iter().filter(|row| row.method == method).collect();
+    let scored: Vec<(&MatteRow, Score)> = own
         .iter()
         .filter_map(|row| row.score.map(|score| (*row, score)))
         .collect();
@@ -184,7 +184,7 @@ fn summary(rows: &[Row], method: Method) -> Summary {
     let count = scored.len().max(1) as f64;
     let mean = |of: fn(&Score) -> f64| values(of).sum::<f64>() / count;
     let wrong = |s: &Score| s.box_px > GOOD_BOX_PX || s.iou < GOOD_IOU;
-    Summary {
+    MethodSummary {
         method,
         score: Score {
             sad: mean(|s| s.sad),
@@ -217,7 +217,7 @@ fn quantile(values: impl Iterator<Item = f64>, share: f64) -> f64 {
 }
 
 /// The table method x error x time.
-pub fn table(summaries: &[Summary]) -> Table {
+pub fn table(summaries: &[MethodSummary]) -> Table {
     let mut table = Table::new([
         "method",
         "MAE lit (F+VB)",
@@ -259,7 +259,7 @@ pub fn table(summaries: &[Summary]) -> Table {
 }
 
 /// Every photo with every method.
-pub fn details(rows: &[Row]) -> Table {
+pub fn details(rows: &[MatteRow]) -> Table {
     let mut table = Table::new([
         "photo",
         "method",
@@ -305,7 +305,7 @@ pub fn details(rows: &[Row]) -> Table {
 }
 
 /// Error against run time, a point per method: over backgrounds lit by themselves, and in the object's own shadow.
-pub fn chart(summaries: &[Summary]) -> String {
+pub fn chart(summaries: &[MethodSummary]) -> String {
     type Error = fn(&Score) -> f64;
     let errors: [(&str, Error); 2] = [
         ("new background, lit by itself", |s| s.mae_lit),
@@ -330,7 +330,7 @@ pub fn chart(summaries: &[Summary]) -> String {
             .collect(),
         defaults: summaries
             .iter()
-            .filter(|s| s.method == Method::Physical)
+            .filter(|s| s.method == MattingMethod::Physical)
             .map(|s| [s.time_ms, error(&s.score)])
             .collect(),
     };
@@ -341,7 +341,11 @@ pub fn chart(summaries: &[Summary]) -> String {
 ///
 /// # Errors
 /// Those of [`measure`]; files that cannot be written.
-pub fn write(truth: &Path, folder: &Path, progress: impl Fn(u64, u64)) -> Result<Vec<Summary>> {
+pub fn write(
+    truth: &Path,
+    folder: &Path,
+    progress: impl Fn(u64, u64),
+) -> Result<Vec<MethodSummary>> {
     let rows = measure(truth, progress)?;
     let summaries = summaries(&rows);
     let (table, chart) = (table(&summaries), chart(&summaries));

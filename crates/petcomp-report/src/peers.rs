@@ -16,7 +16,7 @@ const DEFAULT: &str = "default";
 
 /// One stage, by several programs.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
-pub struct Comparison {
+pub struct PeerComparison {
     /// Which stage.
     pub stage: String,
     /// What is processed, with its size.
@@ -33,7 +33,7 @@ pub struct Comparison {
     pub clock: String,
     /// What was measured.
     #[serde(default)]
-    pub points: Vec<Measured>,
+    pub points: Vec<PeerPoint>,
     /// Programs that could not be run here.
     #[serde(default)]
     pub absent: Vec<Absent>,
@@ -41,7 +41,7 @@ pub struct Comparison {
 
 /// A program at a setting.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
-pub struct Measured {
+pub struct PeerPoint {
     /// Its name.
     pub program: String,
     /// Its version.
@@ -76,7 +76,7 @@ pub struct Absent {
 ///
 /// # Errors
 /// A file that is no comparison.
-pub fn read(folder: &Path) -> Result<Vec<Comparison>> {
+pub fn read(folder: &Path) -> Result<Vec<PeerComparison>> {
     if !folder.exists() {
         return Ok(Vec::new());
     }
@@ -87,10 +87,10 @@ pub fn read(folder: &Path) -> Result<Vec<Comparison>> {
     paths.iter().map(io::read_json).collect()
 }
 
-impl Comparison {
+impl PeerComparison {
     /// Error against time, a curve for each program; what has no error is not in it.
     pub fn diagram(&self) -> Diagram {
-        let point = |m: &Measured| {
+        let point = |m: &PeerPoint| {
             let curve = format!("{} {}", m.program, m.version);
             Some(Point::new(curve, m.setting.clone(), m.seconds, m.error?))
         };
@@ -115,7 +115,7 @@ impl Comparison {
     }
 
     /// Our point that another is set beside: the one that it names, or our default, or else our first.
-    fn ours(&self, other: &Measured) -> Option<&Measured> {
+    fn ours(&self, other: &PeerPoint) -> Option<&PeerPoint> {
         let ours = || self.points.iter().filter(|m| m.program == OURS);
         let named = ours().find(|m| !other.beside.is_empty() && m.setting == other.beside);
         named
@@ -149,7 +149,7 @@ fn file_name(stage: &str) -> String {
 }
 
 /// Every program beside petcomp's default: how many times its seconds and its error.
-pub fn ratios(comparisons: &[Comparison]) -> Table {
+pub fn ratios(comparisons: &[PeerComparison]) -> Table {
     let mut table = Table::new([
         "stage",
         "program",
@@ -182,7 +182,7 @@ pub fn ratios(comparisons: &[Comparison]) -> Table {
 }
 
 /// The exact command of every point.
-pub fn commands(comparisons: &[Comparison]) -> Table {
+pub fn commands(comparisons: &[PeerComparison]) -> Table {
     let mut table = Table::new(["stage", "program", "setting", "command"]);
     for comparison in comparisons {
         for m in &comparison.points {

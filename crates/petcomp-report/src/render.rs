@@ -67,7 +67,7 @@ pub fn settings() -> [(&'static str, RenderOptions); 5] {
 
 /// A picture and its error.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Row {
+pub struct RenderRow {
     /// `petcomp` or the other program with its version.
     pub program: String,
     /// Setting, or samples per pixel.
@@ -99,7 +99,7 @@ pub struct GoldenRow {
 pub fn write(
     folder: impl AsRef<Path>,
     options: &RenderReportOptions,
-) -> Result<(Vec<Row>, Vec<GoldenRow>)> {
+) -> Result<(Vec<RenderRow>, Vec<GoldenRow>)> {
     let folder = folder.as_ref();
     io::create_folder(folder)?;
     let rows = measure(options)?;
@@ -121,7 +121,7 @@ pub fn write(
 ///
 /// # Errors
 /// As [`write()`].
-pub fn measure(options: &RenderReportOptions) -> Result<Vec<Row>> {
+pub fn measure(options: &RenderReportOptions) -> Result<Vec<RenderRow>> {
     let shot = cycles::import(&options.scene, Some(options.size))?;
     let small = cycles::import(
         &options.scene,
@@ -136,7 +136,7 @@ pub fn measure(options: &RenderReportOptions) -> Result<Vec<Row>> {
     let mut rows = Vec::new();
     for (name, sampling) in settings() {
         let (picture, cpu_seconds) = timed(options.repeats, || Ok(picture_of(&shot, &sampling)))?;
-        rows.push(Row {
+        rows.push(RenderRow {
             program: "petcomp".into(),
             setting: name.into(),
             cpu_seconds,
@@ -149,7 +149,7 @@ pub fn measure(options: &RenderReportOptions) -> Result<Vec<Row>> {
     for entry in &others.pictures {
         let picture = others.picture(entry)?;
         let is_best = Some(entry.samples) == others.most();
-        rows.push(Row {
+        rows.push(RenderRow {
             program: format!("Cycles {}", others.program),
             setting: format!("{} spp", entry.samples),
             cpu_seconds: entry.cpu_seconds,
@@ -280,7 +280,7 @@ fn stacked(strips: &[Image<LinearRgb>]) -> Option<Image<LinearRgb>> {
 }
 
 /// The measurements as a table.
-pub fn table(rows: &[Row]) -> Table {
+pub fn table(rows: &[RenderRow]) -> Table {
     let mut table = Table::new([
         "program",
         "setting",
@@ -295,7 +295,7 @@ pub fn table(rows: &[Row]) -> Table {
     let number =
         |v: Option<f64>, digits: usize| v.map_or(String::new(), |v| format!("{v:.digits$}"));
     for row in rows {
-        let Row {
+        let RenderRow {
             program,
             setting,
             cpu_seconds,
@@ -319,7 +319,7 @@ pub fn table(rows: &[Row]) -> Table {
 
 /// How many times as long the other program takes for the same error, on a straight line between its pictures in a plot
 /// of logarithms; none beyond its last one.
-pub fn speed_up(row: &Row, rows: &[Row]) -> Option<f64> {
+pub fn speed_up(row: &RenderRow, rows: &[RenderRow]) -> Option<f64> {
     let error = row.cycles?.rmse;
     if row.program != "petcomp" {
         return None;
@@ -340,7 +340,7 @@ pub fn speed_up(row: &Row, rows: &[Row]) -> Option<f64> {
 }
 
 /// RMSE, FLIP and 1 - SSIM against CPU seconds, both programs' curves in each.
-pub fn charts(rows: &[Row]) -> Vec<Chart> {
+pub fn charts(rows: &[RenderRow]) -> Vec<Chart> {
     type Measure = fn(&Likeness) -> f64;
     let measures: [(&str, Measure); 3] = [
         ("RMSE, scene-linear", |l| l.rmse),
@@ -400,7 +400,7 @@ pub fn golden_table(rows: &[GoldenRow]) -> Table {
     table
 }
 
-fn markdown(rows: &[Row], golden: &[GoldenRow], options: &RenderReportOptions) -> String {
+fn markdown(rows: &[RenderRow], golden: &[GoldenRow], options: &RenderReportOptions) -> String {
     let [w, h] = options.size;
     let mut text = format!(
         "# Error of the renderer against run time\n\n{}, {w} x {h}\n\n",
@@ -421,14 +421,14 @@ fn markdown(rows: &[Row], golden: &[GoldenRow], options: &RenderReportOptions) -
 mod tests {
     use super::*;
 
-    fn row(program: &str, cpu_seconds: f64, rmse: f64) -> Row {
+    fn row(program: &str, cpu_seconds: f64, rmse: f64) -> RenderRow {
         let cycles = Some(Likeness {
             rmse,
             bias: 0.0,
             ssim: Some(0.9),
             flip: 0.01,
         });
-        Row {
+        RenderRow {
             program: program.into(),
             setting: "normal".into(),
             cpu_seconds,

@@ -98,7 +98,7 @@ impl World {
                 SampleRange::Shard(Shard::new(index, 2).unwrap()),
             );
         }
-        let sample = pipeline.sample(0, 1).unwrap();
+        let sample = pipeline.sample(0, 1).unwrap().provenance.unwrap();
         io::write_toml(self.path("scene.toml"), &sample.drawn).unwrap();
         io::write_json(self.path("rest.json"), &sample.scene).unwrap();
         let (scene, shot) = pipeline.resolve(sample.scene).unwrap();

@@ -1,6 +1,6 @@
 //! `petcomp-report all`: everything that is measured, on one page.
 
-use crate::Common;
+use crate::ReportFlags;
 use petcomp_report::all::{self, AllOptions};
 use std::path::PathBuf;
 
@@ -31,7 +31,7 @@ pub(crate) struct Args {
     date: String,
 }
 
-pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
+pub(crate) fn run(args: &Args, common: &ReportFlags) -> anyhow::Result<()> {
     let options = AllOptions {
         golden: args.golden.clone(),
         peers: args.peers.clone(),

@@ -1,6 +1,6 @@
 //! `petcomp-report camera`: the camera solver on simulated views.
 
-use crate::Common;
+use crate::ReportFlags;
 use petcomp_report::camera::{self, CameraReportOptions};
 use std::path::PathBuf;
 
@@ -19,7 +19,7 @@ pub(crate) struct Args {
     views: u64,
 }
 
-pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
+pub(crate) fn run(args: &Args, common: &ReportFlags) -> anyhow::Result<()> {
     let progress = common.progress("measuring");
     let rows = camera::write(
         &args.output,

@@ -1,10 +1,10 @@
 //! `petcomp-report flags`: whether a wrong cut-out says so.
 
 use super::TruthArgs;
-use crate::Common;
+use crate::ReportFlags;
 use petcomp_report::flags;
 
-pub(crate) fn run(args: &TruthArgs, common: &Common) -> anyhow::Result<()> {
+pub(crate) fn run(args: &TruthArgs, common: &ReportFlags) -> anyhow::Result<()> {
     let progress = common.progress("cutting out");
     let table = flags::write(&args.truth, &args.output, |done, of| progress.at(done, of))?;
     drop(progress);

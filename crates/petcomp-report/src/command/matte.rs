@@ -1,10 +1,10 @@
 //! `petcomp-report matte`: the matting methods on photos with known mattes.
 
 use super::TruthArgs;
-use crate::Common;
+use crate::ReportFlags;
 use petcomp_report::matte;
 
-pub(crate) fn run(args: &TruthArgs, common: &Common) -> anyhow::Result<()> {
+pub(crate) fn run(args: &TruthArgs, common: &ReportFlags) -> anyhow::Result<()> {
     let progress = common.progress("measuring");
     let summaries = matte::write(&args.truth, &args.output, |done, of| progress.at(done, of))?;
     drop(progress);

@@ -11,7 +11,7 @@ mod settle;
 mod stability;
 mod work;
 
-use crate::Common;
+use crate::ReportFlags;
 use clap::builder::RangedU64ValueParser;
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
@@ -51,7 +51,7 @@ pub(crate) enum Command {
     Scale(scale::Args),
 }
 
-pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
+pub(crate) fn run(command: &Command, common: &ReportFlags) -> anyhow::Result<()> {
     match command {
         Command::All(args) => all::run(args, common),
         Command::Camera(args) => camera::run(args, common),

@@ -1,7 +1,7 @@
 //! `petcomp-report render`: the renderer against Cycles and against the quadrature of its definition.
 
 use super::count;
-use crate::Common;
+use crate::ReportFlags;
 use petcomp_report::render::{self, RenderReportOptions};
 use std::path::PathBuf;
 
@@ -33,7 +33,7 @@ pub(crate) struct Args {
     repeats: usize,
 }
 
-pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
+pub(crate) fn run(args: &Args, common: &ReportFlags) -> anyhow::Result<()> {
     let options = RenderReportOptions {
         scene: args.scene.clone(),
         size: [args.size[0], args.size[1]],

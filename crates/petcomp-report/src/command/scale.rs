@@ -1,8 +1,8 @@
 //! `petcomp-report scale`: memory and rate, and what a million pictures take.
 
 use super::count;
-use crate::Common;
-use petcomp_report::scale::{self, Case, ScaleOptions};
+use crate::ReportFlags;
+use petcomp_report::scale::{self, ScaleCase, ScaleOptions};
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
@@ -29,9 +29,9 @@ fn seconds(text: &str) -> Result<f64, String> {
     number.ok_or_else(|| format!("{text}, expected 0 to 3600"))
 }
 
-pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
+pub(crate) fn run(args: &Args, common: &ReportFlags) -> anyhow::Result<()> {
     if let Some(case) = &args.case {
-        let case: Case = serde_json::from_str(case)?;
+        let case: ScaleCase = serde_json::from_str(case)?;
         println!(
             "{}",
             serde_json::to_string(&scale::run(&case, args.seconds)?)?

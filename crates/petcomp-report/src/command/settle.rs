@@ -1,6 +1,6 @@
 //! `petcomp-report settle`: the settle stage on heaps and closed forms.
 
-use crate::Common;
+use crate::ReportFlags;
 use petcomp::io;
 use petcomp_report::settle::{self, SettleReportOptions};
 use std::path::PathBuf;
@@ -23,7 +23,7 @@ pub(crate) struct Args {
     peers: Option<PathBuf>,
 }
 
-pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
+pub(crate) fn run(args: &Args, common: &ReportFlags) -> anyhow::Result<()> {
     if let Some(path) = &args.peers {
         return Ok(io::write_document(path, &settle::peer_cases()?)?);
     }

@@ -1,6 +1,6 @@
 //! `petcomp-report stability`: every stage on stiff and extreme input.
 
-use crate::Common;
+use crate::ReportFlags;
 use petcomp_report::stability;
 use std::path::PathBuf;
 
@@ -20,7 +20,7 @@ pub(crate) struct Args {
 }
 
 /// Fails where a case fails, after all have been written.
-pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
+pub(crate) fn run(args: &Args, common: &ReportFlags) -> anyhow::Result<()> {
     let progress = common.progress("trying");
     let rows = stability::write(&args.output, &args.stage, |done, of| progress.at(done, of))?;
     drop(progress);

@@ -1,6 +1,6 @@
 //! `petcomp-report work`: what scenes pay for, counted.
 
-use crate::Common;
+use crate::ReportFlags;
 use petcomp_report::work;
 use std::path::PathBuf;
 
@@ -11,7 +11,7 @@ pub(crate) struct Args {
     output: PathBuf,
 }
 
-pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
+pub(crate) fn run(args: &Args, common: &ReportFlags) -> anyhow::Result<()> {
     let progress = common.progress("counting");
     let rows = work::write(&args.output, |done, of| progress.at(done, of))?;
     drop(progress);

@@ -1,6 +1,6 @@
 //! The matting methods: error against run time.
 
-use super::{Method, Score, Summary, made, measure, measure_known, summaries};
+use super::{MattingMethod, MethodSummary, Score, made, measure, measure_known, summaries};
 use crate::{Diagram, Point};
 use petcomp::Result;
 use petcomp::plot::three;
@@ -22,7 +22,7 @@ pub fn diagrams(truth: &Path) -> Result<Vec<Diagram>> {
     } else {
         measure(truth, |_, _| ())?
     };
-    let photos = rows.len() / Method::ALL.len();
+    let photos = rows.len() / MattingMethod::ALL.len();
     let input = match is_made {
         true => format!("{photos} photos of see-through bottles made in code, 600 x 320"),
         false => format!("{photos} photos with known mattes"),
@@ -35,7 +35,7 @@ pub fn diagrams(truth: &Path) -> Result<Vec<Diagram>> {
     Ok(of(&summaries(&rows), &input, source))
 }
 
-fn of(summaries: &[Summary], input: &str, source: &str) -> Vec<Diagram> {
+fn of(summaries: &[MethodSummary], input: &str, source: &str) -> Vec<Diagram> {
     type Error = fn(&Score) -> f64;
     let errors: [(&str, &str, &str, Error); 2] = [
         (
@@ -67,22 +67,22 @@ fn of(summaries: &[Summary], input: &str, source: &str) -> Vec<Diagram> {
 }
 
 /// What the default is worth beside the paper's method.
-fn why(summaries: &[Summary], error: fn(&Score) -> f64) -> String {
+fn why(summaries: &[MethodSummary], error: fn(&Score) -> f64) -> String {
     let of = |method| {
         summaries
             .iter()
             .find(|s| s.method == method)
-            .map_or(0.0, |s: &Summary| error(&s.score))
+            .map_or(0.0, |s: &MethodSummary| error(&s.score))
     };
-    let share = three(of(Method::Physical) / of(Method::Paper));
+    let share = three(of(MattingMethod::Physical) / of(MattingMethod::Paper));
     format!(
         "Times include finding the object. Two screens need a second photo of each object. The default has \
          {share} of the error of the paper's keyer."
     )
 }
 
-fn point(summary: &Summary, error: f64) -> Point {
-    let is_default = summary.method == Method::Physical;
+fn point(summary: &MethodSummary, error: f64) -> Point {
+    let is_default = summary.method == MattingMethod::Physical;
     Point::new(summary.method.name(), "", summary.time_ms * MILLI, error).used_where(|_| is_default)
 }
 
@@ -93,7 +93,11 @@ mod tests {
     #[test]
     fn every_method_is_a_point_and_the_physical_one_has_the_ring() {
         let found = of(&summaries(&[]), "", "");
-        assert!(found.iter().all(|d| d.points.len() == Method::ALL.len()));
+        assert!(
+            found
+                .iter()
+                .all(|d| d.points.len() == MattingMethod::ALL.len())
+        );
         assert!(
             found
                 .iter()

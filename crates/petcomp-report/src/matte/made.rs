@@ -5,7 +5,7 @@
 //! reflects some 7 %), and dye takes its share; the screen is seen through the object and lit through it. In folds and rims the
 //! sight meets more plastic, while the light, which comes from all around, does not.
 
-use super::truth::{Known, Noise};
+use super::truth::{Known, SensorNoise};
 use petcomp::Image;
 use petcomp::{Coverage, LinearRgb};
 
@@ -28,8 +28,8 @@ const SHEEN: f64 = 0.02;
 const AXIS_PX: f64 = 170.0;
 const RADIUS_PX: f64 = 75.0;
 const EDGE_PX: f64 = 1.0;
-/// Noise of a usual camera at base sensitivity.
-const NOISE: Noise = Noise {
+/// Noise of a typical camera at base sensitivity.
+const NOISE: SensorNoise = SensorNoise {
     shot: 0.006,
     read: 0.002,
 };

@@ -12,7 +12,7 @@ use petcomp::{Coverage, Film, LinearRgb, PremulRgba};
 
 /// A way to a cut-out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Method {
+pub enum MattingMethod {
     /// Blender's keyer with the mean colour of the background, masked by the convex hull.
     Paper,
     /// Blender's keyer with a key of its own for every pixel, masked by the tight outline.
@@ -36,7 +36,7 @@ pub(super) struct Cut {
     pub(super) found: Segmentation,
 }
 
-impl Method {
+impl MattingMethod {
     /// All of them, the paper's first.
     pub const ALL: [Self; 5] = [
         Self::Paper,

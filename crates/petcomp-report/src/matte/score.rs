@@ -33,7 +33,7 @@ pub struct Score {
 }
 
 impl Score {
-    pub(super) fn of(found: &Cut, known: &Known, backgrounds: &[Image<LinearRgb>]) -> Self {
+    pub(super) fn new(found: &Cut, known: &Known, backgrounds: &[Image<LinearRgb>]) -> Self {
         let alpha = found.film.map(|f| Coverage(f.to_rgba().a));
         let truth = known.view.map(|v| Coverage(1.0 - (v.r + v.g + v.b) / 3.0));
         let off = |a: Coverage, b: Coverage| f64::from(a.0) - f64::from(b.0);
@@ -162,7 +162,7 @@ pub(super) fn box_error(hull: &[Point2<f64>], truth: [f64; 4]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{background, truth::Noise};
+    use super::super::{background, truth::SensorNoise};
     use super::*;
     use petcomp::matte::{SegmentOptions, segment};
 
@@ -197,7 +197,7 @@ mod tests {
         let mask = Image::from_fn(w, h, |x, y| Coverage(f32::from(u8::from(on(x, y)))));
         let (box_px, noise) = (
             [40.0, 30.0, 120.0, 70.0],
-            Noise {
+            SensorNoise {
                 shot: 0.0,
                 read: 0.0,
             },
@@ -228,7 +228,7 @@ mod tests {
     #[test]
     fn the_truth_has_no_error() {
         let known = known();
-        let score = Score::of(&truth(&known), &known, &[background(known.photo.size(), 1)]);
+        let score = Score::new(&truth(&known), &known, &[background(known.photo.size(), 1)]);
         let all = [
             score.sad,
             score.mse,
@@ -251,7 +251,7 @@ mod tests {
             color: f.color,
             opacity: f.opacity.map(|o| o + 0.1),
         });
-        let score = Score::of(&cut, &known, &[Image::filled(160, 100, LinearRgb::WHITE)]);
+        let score = Score::new(&cut, &known, &[Image::filled(160, 100, LinearRgb::WHITE)]);
         assert!(
             (score.mse - 0.01).abs() < 1e-5 && (score.sad - 1.6).abs() < 1e-3,
             "{score:?}"

@@ -22,7 +22,7 @@ pub(crate) struct Known {
     pub(crate) mask: Image<Coverage>,
     /// Left, top, right and bottom of the outline, pixels.
     pub(crate) box_px: [f64; 4],
-    pub(crate) noise: Noise,
+    pub(crate) noise: SensorNoise,
     /// Colour of the screen's paint.
     pub(crate) paint: LinearRgb,
 }
@@ -34,7 +34,7 @@ const PAINTS: [LinearRgb; 2] = [
 ];
 
 #[derive(Deserialize)]
-struct Document {
+struct TruthFile {
     photos: Vec<Record>,
 }
 
@@ -42,8 +42,8 @@ struct Document {
 struct Record {
     name: String,
     bbox_px: [f64; 4],
-    files: Files,
-    sensor: Noise,
+    files: TruthPaths,
+    sensor: SensorNoise,
     screen: Paint,
 }
 
@@ -53,7 +53,7 @@ struct Paint {
 }
 
 #[derive(Deserialize)]
-struct Files {
+struct TruthPaths {
     photo_png: PathBuf,
     foreground: PathBuf,
     transmittance: PathBuf,
@@ -64,7 +64,7 @@ struct Files {
 
 /// Sensor noise: the variance of a value is `shot^2 * value + read^2`.
 #[derive(Clone, Copy, Debug, Deserialize)]
-pub(crate) struct Noise {
+pub(crate) struct SensorNoise {
     pub(crate) shot: f64,
     pub(crate) read: f64,
 }
@@ -77,14 +77,14 @@ pub(crate) struct Truths {
 
 impl Truths {
     /// Finds the records (`*.json`) of a folder.
-    pub(crate) fn of(folder: &Path) -> Result<Self> {
+    pub(crate) fn in_folder(folder: &Path) -> Result<Self> {
         let entries = std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
         let paths =
             entries.map(|entry| entry.map(|e| e.path()).map_err(|e| Error::file(folder, e)));
         let mut paths: Vec<PathBuf> = paths.collect::<Result<_>>()?;
         paths.retain(|path| path.extension().is_some_and(|e| e == "json"));
         paths.sort();
-        let documents: Vec<Document> = paths.iter().map(io::read_json).collect::<Result<_>>()?;
+        let documents: Vec<TruthFile> = paths.iter().map(io::read_json).collect::<Result<_>>()?;
         let records: Vec<Record> = documents.into_iter().flat_map(|d| d.photos).collect();
         if records.is_empty() {
             return Err(Error::file(

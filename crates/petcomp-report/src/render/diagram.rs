@@ -28,7 +28,7 @@ const SIDES: [usize; 5] = [1, 2, 3, 4, 6];
 const UNSEEN: f64 = 0.004;
 
 /// A golden scene.
-struct Scene {
+struct GoldenScene {
     name: String,
     shot: Shot,
     wanted: Image<LinearRgb>,
@@ -51,7 +51,7 @@ pub fn diagrams(golden: &Path, runs: usize) -> Result<Vec<Diagram>> {
         return Ok(Vec::new());
     }
     let mut found = samples(&scenes, runs)?;
-    let plain: Vec<Scene> = scenes
+    let plain: Vec<GoldenScene> = scenes
         .into_iter()
         .filter(|scene| scene.name == PLAIN)
         .collect();
@@ -62,11 +62,11 @@ pub fn diagrams(golden: &Path, runs: usize) -> Result<Vec<Diagram>> {
 }
 
 /// Every setting, on the piles and on all scenes.
-fn samples(scenes: &[Scene], runs: usize) -> Result<Vec<Diagram>> {
+fn samples(scenes: &[GoldenScene], runs: usize) -> Result<Vec<Diagram>> {
     let (mut all, mut piles) = (Vec::new(), Vec::new());
     for (curve, setting, options) in settings() {
         let costs = measured(scenes, runs, |shot| render(shot, &options))?;
-        let of = |is_in: fn(&Scene) -> bool| {
+        let of = |is_in: fn(&GoldenScene) -> bool| {
             let some = scenes
                 .iter()
                 .zip(&costs)
@@ -74,7 +74,7 @@ fn samples(scenes: &[Scene], runs: usize) -> Result<Vec<Diagram>> {
                 .map(|(_, cost)| cost);
             point(curve, &setting, some).used_where(|q| curve == PRESETS && q.render() == options)
         };
-        piles.push(of(Scene::is_pile));
+        piles.push(of(GoldenScene::is_pile));
         all.push(of(|_| true));
     }
     let count = scenes.iter().filter(|scene| scene.is_pile()).count();
@@ -95,7 +95,7 @@ fn samples(scenes: &[Scene], runs: usize) -> Result<Vec<Diagram>> {
 }
 
 /// Filtered samples and plain ones.
-fn filter(scenes: &[Scene], runs: usize) -> Result<Diagram> {
+fn filter(scenes: &[GoldenScene], runs: usize) -> Result<Diagram> {
     let mut points = Vec::new();
     for subsamples in SIDES {
         let options = RenderOptions {
@@ -197,7 +197,7 @@ fn settings() -> Vec<(&'static str, String, RenderOptions)> {
         .collect()
 }
 
-fn scenes(golden: &Path) -> Result<Vec<Scene>> {
+fn scenes(golden: &Path) -> Result<Vec<GoldenScene>> {
     let entries = std::fs::read_dir(golden)
         .into_iter()
         .flatten()
@@ -216,17 +216,17 @@ fn scenes(golden: &Path) -> Result<Vec<Scene>> {
             cycles::import(folder.join("scene.json"), None)?,
             io::read(folder.join("reference.exr"))?,
         );
-        Ok(Scene { name, shot, wanted })
+        Ok(GoldenScene { name, shot, wanted })
     };
     folders.iter().map(scene).collect()
 }
 
 fn measured(
-    scenes: &[Scene],
+    scenes: &[GoldenScene],
     runs: usize,
     render: impl Fn(&Shot) -> DeepImage + Sync,
 ) -> Result<Vec<Cost>> {
-    let cost = |scene: &Scene| {
+    let cost = |scene: &GoldenScene| {
         let frame = || {
             Ok(composite::frame(
                 &render(&scene.shot),
@@ -256,14 +256,14 @@ fn point<'a>(curve: &str, setting: &str, costs: impl IntoIterator<Item = &'a Cos
     )
 }
 
-impl Scene {
+impl GoldenScene {
     /// Cut-outs of bottles in a heap: what datasets are made of.
     fn is_pile(&self) -> bool {
         self.name.starts_with("pile_of_")
     }
 }
 
-fn mean_square(frame: &Image<PremulRgba>, scene: &Scene) -> Result<f64> {
+fn mean_square(frame: &Image<PremulRgba>, scene: &GoldenScene) -> Result<f64> {
     if frame.size() != scene.wanted.size() {
         let what = format!(
             "{:?} pixels, reference has {:?}",
