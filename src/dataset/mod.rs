@@ -119,7 +119,7 @@ use crate::deep::DeepImage;
 use crate::error::Result;
 use crate::image::Image;
 use crate::label::Labels;
-use crate::pixel::PremulRgba;
+use crate::pixel::{ObjectId, PremulRgba};
 use crate::scene::{Drawn, Scene};
 use std::path::{Path, PathBuf};
 
@@ -180,6 +180,14 @@ impl Sample {
         }
     }
 
+    /// The same with its provenance changed, where it has one.
+    fn with_origin(self, change: impl FnOnce(Provenance) -> Provenance) -> Self {
+        Self {
+            provenance: self.provenance.map(change),
+            ..self
+        }
+    }
+
     /// Scenes that were rejected before this one.
     pub(crate) fn rejected_scenes(&self) -> usize {
         self.provenance
@@ -208,6 +216,11 @@ pub struct Entry<'a> {
 }
 
 impl Entry<'_> {
+    /// The label of an object, if it has one.
+    pub(crate) fn label_of(&self, id: ObjectId) -> Option<&LabelledObject<'_>> {
+        self.labelled.iter().find(|label| label.object.id == id)
+    }
+
     /// Path below the dataset's folder: `images/train/000012.png`.
     pub fn path(&self, kind: &str, extension: &str) -> PathBuf {
         [

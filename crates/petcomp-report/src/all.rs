@@ -121,12 +121,7 @@ pub fn measure(options: &AllOptions, progress: impl Fn(u64, u64)) -> Result<Docu
 }
 
 fn quick_sections(options: &AllOptions, progress: impl Fn(u64)) -> Result<Vec<Section>> {
-    let amount = options.amount();
-    let mut diagrams = Vec::new();
-    for (done, stage) in (0..).zip(STAGES) {
-        progress(done);
-        diagrams.extend(stage(options, &amount)?);
-    }
+    let diagrams = measure_stages(options, progress)?;
     let others = peers::read(&options.peers)?;
     Ok(vec![
         about_report(options),
@@ -134,6 +129,16 @@ fn quick_sections(options: &AllOptions, progress: impl Fn(u64)) -> Result<Vec<Se
         quality_table(),
         other_programs(&others, &options.peers),
     ])
+}
+
+fn measure_stages(options: &AllOptions, progress: impl Fn(u64)) -> Result<Vec<Diagram>> {
+    let amount = options.amount();
+    let mut diagrams = Vec::new();
+    for (done, stage) in (0..).zip(STAGES) {
+        progress(done);
+        diagrams.extend(stage(options, &amount)?);
+    }
+    Ok(diagrams)
 }
 
 /// Measures everything and writes `report.html`, `report.md` and the data of each plot and table (`.csv`) into a folder.

@@ -13,6 +13,7 @@ pub use diagram::diagrams;
 pub use method::{Lens, SolveMethod};
 
 use super::clock::cpu_seconds;
+use super::files::write_texts;
 use super::statistics::{median_and_95, quantile};
 use method::PHOTOS_TOGETHER;
 use petcomp::camera::distorted;
@@ -31,7 +32,7 @@ const VIEW_SEED: u64 = 5;
 const ERROR_HEIGHT_M: f64 = 0.05;
 /// Points along each side of the rectangle at which it is measured.
 const ERROR_GRID_SIDE: usize = 4;
-const MICROSECONDS: f64 = 1e6;
+const US_PER_SECOND: f64 = 1e6;
 
 /// Options of the report.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -111,9 +112,7 @@ impl ViewKind {
     fn photos(&self, k: u64) -> Vec<View> {
         let scenario = self.lens.scenario(self.noise_px);
         let mut views = scenario.views(VIEW_SEED, k, PHOTOS_TOGETHER, [self.tilt_deg; 2]);
-        for view in &mut views {
-            view.label.surface.id = "tray".into();
-        }
+        views.iter_mut().for_each(name_surface);
         views
     }
 
@@ -143,6 +142,11 @@ impl ViewKind {
     }
 }
 
+/// Photos of one camera may be solved together where they show one surface.
+fn name_surface(view: &mut View) {
+    view.label.surface.id = "tray".into();
+}
+
 /// Errors of one photo's camera, infinite where there is none, and what it took.
 struct ViewError {
     focal_percent: f64,
@@ -156,21 +160,25 @@ impl ViewError {
         let solution = method.solve(views, options);
         let seconds = cpu_seconds() - start;
         let [focal_percent, height_px] = solution.map_or([f64::INFINITY; 2], |solution| {
-            [
-                focal_percent(&views[0], &solution),
-                height_error_px(&views[0], &solution),
-            ]
+            focal_and_height_errors(&views[0], &solution)
         });
         Self {
             focal_percent,
             height_px,
-            time_us: seconds * MICROSECONDS / method.photos() as f64,
+            time_us: seconds * US_PER_SECOND / method.photos() as f64,
         }
     }
 
     fn is_failure(&self) -> bool {
         self.focal_percent.is_infinite()
     }
+}
+
+fn focal_and_height_errors(view: &View, solution: &Solution) -> [f64; 2] {
+    [
+        focal_percent(view, solution),
+        height_error_px(view, solution),
+    ]
 }
 
 fn focal_percent(view: &View, solution: &Solution) -> f64 {
@@ -194,18 +202,13 @@ fn grid_place(i: usize) -> [f64; 2] {
 }
 
 fn squared_offset_px(view: &View, solution: &Solution, place: [f64; 2]) -> f64 {
-    let found = distorted(
-        &solution.camera,
-        solution.kappa,
-        point_above(place, solution.size),
-    );
+    let expected = point_above(place, solution.size);
+    let found = distorted(&solution.camera, solution.kappa, expected);
     let seen = distorted(&view.camera, view.kappa, point_above(place, view.size));
     let squared = (found - seen).norm_squared();
-    if squared.is_finite() {
-        squared
-    } else {
-        f64::INFINITY
-    }
+    Some(squared)
+        .filter(|v| v.is_finite())
+        .unwrap_or(f64::INFINITY)
 }
 
 fn point_above([x, y]: [f64; 2], [w, h]: [f64; 2]) -> Point3<f64> {
@@ -227,14 +230,13 @@ pub fn write(
     }
     let rows = measure(options, progress);
     let coverage = coverage::measure(options.views);
-    io::create_folder(folder)?;
-    io::write_text(folder.join("camera.csv"), &show::csv(&rows))?;
-    io::write_text(
-        folder.join("camera_coverage.csv"),
-        &coverage::csv(&coverage),
-    )?;
     let text = show::markdown(&rows) + &coverage::markdown(&coverage);
-    io::write_text(folder.join("camera.md"), &text)?;
+    let files = [
+        ("camera.csv", &*show::csv(&rows)),
+        ("camera_coverage.csv", &coverage::csv(&coverage)),
+        ("camera.md", &text),
+    ];
+    write_texts(folder, files)?;
     write_charts(folder, &rows)?;
     Ok(rows)
 }

@@ -111,6 +111,11 @@ impl Point {
         self.qualities.contains(&Quality::default())
     }
 
+    /// At least as exact, and cheaper by more than noise.
+    fn clearly_beats(&self, other: &Self) -> bool {
+        self.error <= other.error && self.cost * TIMING_NOISE_FACTOR < other.cost
+    }
+
     fn cost_and_error(&self) -> [f64; 2] {
         [self.cost, self.error]
     }
@@ -122,6 +127,11 @@ impl Point {
         } else {
             format!("{} ({})", self.setting, self.curve)
         }
+    }
+
+    /// What it costs, as a share of what another one costs.
+    fn share_of_cost(&self, other: &Self) -> String {
+        three(self.cost / other.cost)
     }
 
     fn short_name(&self) -> &str {
@@ -161,11 +171,7 @@ impl Diagram {
     /// The cheapest setting that is at least as exact as the default, where it is another and cheaper by more than noise.
     pub fn cheaper_than_default(&self) -> Option<&Point> {
         let default = self.default_point()?;
-        let most = default.cost / TIMING_NOISE_FACTOR;
-        cheapest(
-            self.rivals(default)
-                .filter(|p| p.error <= default.error && p.cost < most),
-        )
+        cheapest(self.rivals(default).filter(|p| p.clearly_beats(default)))
     }
 
     /// What a point is compared with: the points of the same input.
@@ -209,7 +215,7 @@ impl Diagram {
             better.name(),
             three(better.error),
             three(default.error),
-            three(better.cost / default.cost)
+            better.share_of_cost(default)
         )
     }
 
@@ -224,8 +230,7 @@ impl Diagram {
         } else if point.cost <= TIMING_NOISE_FACTOR * best.cost {
             format!("The cheapest setting under {bound}.")
         } else {
-            let share = three(best.cost / point.cost);
-            let name = best.name();
+            let (name, share) = (best.name(), best.share_of_cost(point));
             format!("The cheapest setting under {bound} is {name}, at {share} of its cost.")
         }
     }
@@ -282,9 +287,9 @@ impl Diagram {
     /// Each once, in the order of their first points.
     fn curve_names(&self) -> Vec<String> {
         let mut names: Vec<String> = Vec::new();
-        for point in &self.points {
-            if !names.contains(&point.curve) {
-                names.push(point.curve.clone());
+        for name in self.points.iter().map(|point| &point.curve) {
+            if !names.contains(name) {
+                names.push(name.clone());
             }
         }
         names
@@ -402,7 +407,7 @@ impl<'a> DefaultOf<'a> {
         match self.diagram.cheaper_than_default() {
             None => "none: on the front".to_owned(),
             Some(better) => {
-                let share = three(better.cost / self.default.cost);
+                let share = better.share_of_cost(self.default);
                 format!("{}, {share} of the cost", better.name())
             }
         }

@@ -257,7 +257,7 @@ pub fn write(truth: &Path, folder: &Path, progress: impl Fn(u64, u64)) -> Result
 
 #[cfg(test)]
 mod tests {
-    use super::super::matte::truth::{Known, SensorNoise};
+    use super::super::matte::truth::{Known, PhotoNoise};
     use super::*;
 
     const GREEN: LinearRgb = LinearRgb::new(0.04, 0.4, 0.08);
@@ -286,7 +286,7 @@ mod tests {
             screen: Image::filled(w, h, GREEN),
             mask: Image::from_fn(w, h, |x, y| Coverage(f32::from(u8::from(on(x, y))))),
             box_px: [90.0, 60.0, 210.0, 120.0],
-            noise: SensorNoise {
+            noise: PhotoNoise {
                 shot: 0.0,
                 read: 0.003,
             },

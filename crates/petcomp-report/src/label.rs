@@ -32,7 +32,7 @@ const TIMED_RUNS: usize = 7;
 pub fn diagrams() -> Result<Vec<Diagram>> {
     let mut found = LabelPoints::default();
     for size in SIZES_PX {
-        found.add_picture(&LabelledPicture::new(size))?;
+        found.add_picture(&EllipsePicture::new(size))?;
     }
     for corners in CORNERS {
         found.add_outline(corners)?;
@@ -41,14 +41,14 @@ pub fn diagrams() -> Result<Vec<Diagram>> {
 }
 
 /// The ellipse as it is seen in a picture.
-struct LabelledPicture {
+struct EllipsePicture {
     size: [u32; 2],
     ellipse: Ellipse,
     shot: Shot,
     deep: DeepImage,
 }
 
-impl LabelledPicture {
+impl EllipsePicture {
     fn new(size: [u32; 2]) -> Self {
         let ellipse = Ellipse::seen_by(size);
         Self {
@@ -106,6 +106,22 @@ struct MeasuredMask {
     is_default: bool,
 }
 
+impl MeasuredMask {
+    fn point(&self, curve: &str, cost: f64) -> Point {
+        Point::new(curve, &self.name, cost, self.error)
+    }
+
+    /// A point that is the default where the mask is.
+    fn marked(&self, point: Point) -> Point {
+        point.used_where(|_| self.is_default)
+    }
+
+    /// Polygons around the mask, and the seconds that they take.
+    fn measure_polygons(&self, tolerance_px: f64) -> Result<(Vec<Ring>, f64)> {
+        timed(TIMED_RUNS, || Ok(trace::polygons(&self.mask, tolerance_px)))
+    }
+}
+
 /// Points of both diagrams.
 #[derive(Default)]
 struct LabelPoints {
@@ -114,7 +130,7 @@ struct LabelPoints {
 }
 
 impl LabelPoints {
-    fn add_picture(&mut self, picture: &LabelledPicture) -> Result<()> {
+    fn add_picture(&mut self, picture: &EllipsePicture) -> Result<()> {
         for threshold in picture.thresholds() {
             let found = picture.measure_mask(threshold)?;
             self.add_mask(&found)?;
@@ -127,24 +143,21 @@ impl LabelPoints {
 
     /// A mask, as runs and as the polygon along its pixels.
     fn add_mask(&mut self, found: &MeasuredMask) -> Result<()> {
-        let (name, error) = (&found.name, found.error);
-        let (rings, more) = timed(TIMED_RUNS, || Ok(trace::polygons(&found.mask, 0.0)))?;
-        let polygon = |cost| Point::new("polygon along pixels", name, cost, error);
-        let mask = Point::new("mask", name, found.seconds, error);
-        self.by_time.push(mask.used_where(|_| found.is_default));
-        self.by_time.push(polygon(found.seconds + more));
-        self.by_length
-            .push(polygon(count_corners(&rings)).used_where(|_| found.is_default));
-        let runs = found.mask.runs().len() as f64;
-        self.by_length
-            .push(Point::new("mask (runs)", name, runs, error));
+        let (rings, more) = found.measure_polygons(0.0)?;
+        let polygon = [found.seconds + more, count_corners(&rings)]
+            .map(|cost| found.point("polygon along pixels", cost));
+        let [by_time, by_length] = polygon;
+        let mask = found.point("mask", found.seconds);
+        let runs = found.point("mask (runs)", found.mask.runs().len() as f64);
+        self.by_time.extend([found.marked(mask), by_time]);
+        self.by_length.extend([found.marked(by_length), runs]);
         Ok(())
     }
 
     /// Polygons of a mask with fewer corners.
     fn add_simplified(&mut self, found: &MeasuredMask, ellipse: &Ellipse) -> Result<()> {
         for tolerance in TOLERANCES_PX {
-            let (rings, more) = timed(TIMED_RUNS, || Ok(trace::polygons(&found.mask, tolerance)))?;
+            let (rings, more) = found.measure_polygons(tolerance)?;
             let error = 1.0 - ellipse.iou_of_rings(&rings);
             let name = format!("within {tolerance} px");
             let costs = [found.seconds + more, count_corners(&rings)];
@@ -157,10 +170,8 @@ impl LabelPoints {
     fn add_outline(&mut self, corners: usize) -> Result<()> {
         let ellipse = Ellipse::seen_by(DEFAULT_SIZE_PX);
         let shot = ellipse.shot(corners);
-        let projected = || Ok(outline_of(&shot.cards[0], &shot.camera));
-        let (rings, seconds) = timed(TIMED_RUNS, projected)?;
-        let area: f64 = rings.iter().map(|ring| ring_area(ring)).sum();
-        let error = 1.0 - area / ellipse.area();
+        let (rings, seconds) = timed(TIMED_RUNS, || Ok(outline_of(&shot.cards[0], &shot.camera)))?;
+        let error = 1.0 - total_area(&rings) / ellipse.area();
         let name = format!("{corners} corners");
         let costs = [seconds, count_corners(&rings)];
         self.add_polygon("projected outline", &name, costs, error);
@@ -174,21 +185,27 @@ impl LabelPoints {
     }
 
     fn into_diagrams(self) -> Vec<Diagram> {
-        let time = Diagram {
-            file: "label_time".into(),
-            title: "label: polygon and raster, error against time".into(),
-            cost: "CPU seconds of a picture".into(),
-            points: self.by_time,
-            ..label_diagram()
-        };
-        let length = Diagram {
-            file: "label_points".into(),
-            title: "label: polygon and raster, error against points".into(),
-            cost: "corners, or runs of a mask".into(),
-            points: self.by_length,
-            ..label_diagram()
-        };
-        vec![time, length]
+        vec![time_diagram(self.by_time), length_diagram(self.by_length)]
+    }
+}
+
+fn time_diagram(points: Vec<Point>) -> Diagram {
+    Diagram {
+        file: "label_time".into(),
+        title: "label: polygon and raster, error against time".into(),
+        cost: "CPU seconds of a picture".into(),
+        points,
+        ..label_diagram()
+    }
+}
+
+fn length_diagram(points: Vec<Point>) -> Diagram {
+    Diagram {
+        file: "label_points".into(),
+        title: "label: polygon and raster, error against points".into(),
+        cost: "corners, or runs of a mask".into(),
+        points,
+        ..label_diagram()
     }
 }
 
@@ -227,6 +244,10 @@ fn only_mask(labels: &Labels) -> RleMask {
         .first()
         .map(|object| object.amodal_mask.clone())
         .unwrap_or_default()
+}
+
+fn total_area(rings: &[Ring]) -> f64 {
+    rings.iter().map(|ring| ring_area(ring)).sum()
 }
 
 fn count_corners(rings: &[Ring]) -> f64 {

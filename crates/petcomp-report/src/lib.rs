@@ -10,6 +10,7 @@ mod columns;
 mod diagram;
 pub mod encode;
 pub mod experiments;
+mod files;
 pub mod flags;
 pub mod keying;
 pub mod label;

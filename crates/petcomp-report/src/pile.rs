@@ -22,14 +22,18 @@ const CARD_SIZE_M: [f64; 2] = [0.07, 0.21];
 
 /// A camera that looks straight down from so many metres over the origin.
 pub(super) fn camera_above(image: [u32; 2], height_m: f64) -> Camera {
-    let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI);
     let [w, h] = image.map(f64::from);
     Camera {
         image,
         focal_px: Vector2::repeat(FOCAL_WIDTHS * w),
         principal_px: Point2::new(0.5 * w, 0.5 * h),
-        camera_from_world: Pose::from_parts(Vector3::new(0.0, 0.0, height_m).into(), down),
+        camera_from_world: pose_looking_down(height_m),
     }
+}
+
+fn pose_looking_down(height_m: f64) -> Pose {
+    let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI);
+    Pose::from_parts(Vector3::new(0.0, 0.0, height_m).into(), down)
 }
 
 /// A square lamp that shines at the origin from above its right.
@@ -77,20 +81,14 @@ fn bottle_card(k: u32, textures: &[Texture]) -> Card {
 
 /// Spread by sines of incommensurable steps, each a little higher than the last.
 fn scattered_pose(k: f64) -> Pose {
-    let [roll, pitch, yaw] = [
-        0.12 * libm::sin(1.7 * k),
-        0.12 * libm::cos(2.3 * k),
-        2.4 * k,
-    ];
-    let center = Vector3::new(
-        0.17 * libm::sin(3.1 * k),
-        0.1 * libm::cos(4.7 * k),
-        0.02 + 0.004 * k,
-    );
-    Pose::from_parts(
-        center.into(),
-        UnitQuaternion::from_euler_angles(roll, pitch, yaw),
-    )
+    let (x, y) = (0.17 * libm::sin(3.1 * k), 0.1 * libm::cos(4.7 * k));
+    let center = Vector3::new(x, y, 0.02 + 0.004 * k);
+    Pose::from_parts(center.into(), scattered_rotation(k))
+}
+
+fn scattered_rotation(k: f64) -> UnitQuaternion<f64> {
+    let (roll, pitch) = (0.12 * libm::sin(1.7 * k), 0.12 * libm::cos(2.3 * k));
+    UnitQuaternion::from_euler_angles(roll, pitch, 2.4 * k)
 }
 
 /// A bottle with a soft outline, a neck, a label and stripes.
@@ -98,10 +96,12 @@ fn bottle(k: u32) -> Image<PremulRgba> {
     let (w, h) = TEXELS;
     Image::from_fn(w, h, |x, y| {
         let (across, along) = (2.0 * x as f32 / w as f32 - 1.0, y as f32 / h as f32);
-        let alpha = bottle_alpha(across, along);
-        let stripe = 0.5 + 0.4 * libm::sinf(along * 60.0 + k as f32);
-        striped(alpha, stripe)
+        striped(bottle_alpha(across, along), bottle_stripe(k, along))
     })
+}
+
+fn bottle_stripe(k: u32, along: f32) -> f32 {
+    0.5 + 0.4 * libm::sinf(along * 60.0 + k as f32)
 }
 
 fn bottle_alpha(across: f32, along: f32) -> f32 {

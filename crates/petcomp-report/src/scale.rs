@@ -104,22 +104,24 @@ impl ScaleMeasurements {
 /// A program that cannot be run or does not print its point; where the system does not report time and memory of a process
 /// (it must have Linux's `/proc`).
 pub fn measure(options: &ScaleOptions, progress: impl Fn(u64, u64)) -> Result<ScaleMeasurements> {
+    Ok(ScaleMeasurements {
+        points: measure_points(options, progress)?,
+        falls: grid::FALL_SIZES
+            .into_iter()
+            .map(|cards| Ok((cards, run::fall_seconds(cards)?)))
+            .collect::<Result<_>>()?,
+    })
+}
+
+fn measure_points(options: &ScaleOptions, progress: impl Fn(u64, u64)) -> Result<Vec<ScalePoint>> {
     let cases = grid::cases(options.threads);
     let mut points = Vec::new();
     for case in &cases {
         progress(points.len() as u64, cases.len() as u64);
-        points.push(process::run_in_child(
-            &options.program,
-            case,
-            options.seconds,
-        )?);
+        let point = process::run_in_child(&options.program, case, options.seconds)?;
+        points.push(point);
     }
-    let falls = grid::FALL_SIZES.into_iter();
-    let falls = falls.map(|cards| Ok((cards, run::fall_seconds(cards)?)));
-    Ok(ScaleMeasurements {
-        points,
-        falls: falls.collect::<Result<_>>()?,
-    })
+    Ok(points)
 }
 
 /// Measures and writes `scale.csv`, `scale.md` and charts (SVG) into a folder.
@@ -135,10 +137,15 @@ pub fn write(
     io::create_folder(folder)?;
     let measured = measure(options, progress)?;
     write_tables(folder, &tables(&measured)?)?;
-    for (i, (svg, _)) in charts(&measured)?.iter().enumerate() {
+    write_charts(folder, &charts(&measured)?)?;
+    Ok(measured)
+}
+
+fn write_charts(folder: &Path, charts: &[(String, String)]) -> Result<()> {
+    for (i, (svg, _)) in charts.iter().enumerate() {
         io::write_text(folder.join(format!("scale_{}.svg", i + 1)), svg)?;
     }
-    Ok(measured)
+    Ok(())
 }
 
 fn write_tables(folder: &Path, tables: &[(String, Table)]) -> Result<()> {

@@ -19,12 +19,13 @@ pub use peer::{PeerCase, peer_cases};
 pub use show::{charts, table};
 
 use super::clock::cpu_seconds;
+use super::files::write_texts;
 use super::statistics::{median_and_worst, quantile};
 use closed_form::{count_wrong_slopes, stack_error_m};
 use petcomp::plot::Chart;
 use petcomp::scene::{Scene, SettleOptions};
 use petcomp::settle::{SettleVerdict, Settled, heap, settle};
-use petcomp::{Error, Result, io};
+use petcomp::{Error, Result};
 use std::path::Path;
 
 /// Time steps, as the number of them in a second.
@@ -33,7 +34,8 @@ const ITERATIONS: [u32; 4] = [1, 2, 4, 8];
 /// CCD stops in a step, at the default step and iterations.
 const CCD_STOPS: [u32; 3] = [0, 1, 4];
 const HEAP_CARDS: usize = 20;
-const MILLI: f64 = 1e3;
+const MS_PER_SECOND: f64 = 1e3;
+const MM_PER_M: f64 = 1e3;
 
 /// Options of the report.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -115,39 +117,47 @@ fn settings() -> Vec<SettleOptions> {
         attempts: 1,
         ..SettleOptions::default()
     };
-    let pairs = RATES
-        .iter()
-        .flat_map(|rate| ITERATIONS.map(|iterations| (*rate, iterations)));
-    let swept = pairs.map(|(rate, iterations)| SettleOptions {
-        step: 1.0 / f64::from(rate),
-        iterations,
-        ..default
-    });
-    let others = CCD_STOPS.into_iter().filter(|ccd| *ccd != default.ccd);
+    let swept = RATES.iter().flat_map(|rate| at_rate(*rate, default));
+    let stops = CCD_STOPS.into_iter().filter(|ccd| *ccd != default.ccd);
     swept
-        .chain(others.map(|ccd| SettleOptions { ccd, ..default }))
+        .chain(stops.map(|ccd| SettleOptions { ccd, ..default }))
         .collect()
 }
 
+/// So many steps a second, with every number of iterations.
+fn at_rate(rate: u32, default: SettleOptions) -> [SettleOptions; 4] {
+    ITERATIONS.map(|iterations| SettleOptions {
+        step: 1.0 / f64::from(rate),
+        iterations,
+        ..default
+    })
+}
+
 fn measure_setting(options: &SettleOptions, heaps: &[Scene]) -> Result<SettleRow> {
-    let (mut ends, mut times_ms) = (Vec::new(), Vec::new());
-    for scene in heaps {
-        let start = cpu_seconds();
-        ends.push(settle(scene.clone(), options)?);
-        times_ms.push((cpu_seconds() - start) * MILLI);
-    }
+    let (ends, times_ms) = settle_heaps(options, heaps)?;
     Ok(SettleRow {
         rate: libm::round(1.0 / options.step) as u32,
         iterations: options.iterations,
         ccd: options.ccd,
         heaps: ends.len(),
         rested: count_rested(&ends),
-        overlap_mm: median_and_worst(ends.iter().map(|end| end.overlap * MILLI)),
+        overlap_mm: median_and_worst(ends.iter().map(|end| end.overlap * MM_PER_M)),
         energy_percent: median_and_worst(ends.iter().map(|end| end.energy_rise * 100.0)),
-        stack_mm: stack_error_m(options)? * MILLI,
+        stack_mm: stack_error_m(options)? * MM_PER_M,
         wrong_slopes: count_wrong_slopes(options)?,
         cpu_ms: quantile(times_ms, 0.5),
     })
+}
+
+/// The heaps at rest, and the CPU time of each, milliseconds.
+fn settle_heaps(options: &SettleOptions, heaps: &[Scene]) -> Result<(Vec<Settled>, Vec<f64>)> {
+    let (mut ends, mut times_ms) = (Vec::new(), Vec::new());
+    for scene in heaps {
+        let start = cpu_seconds();
+        ends.push(settle(scene.clone(), options)?);
+        times_ms.push((cpu_seconds() - start) * MS_PER_SECOND);
+    }
+    Ok((ends, times_ms))
 }
 
 fn count_rested(ends: &[Settled]) -> usize {
@@ -170,10 +180,12 @@ pub fn write(
     }
     let rows = measure(options, progress)?;
     let table = table(&rows);
-    io::create_folder(folder)?;
-    io::write_text(folder.join("settle.csv"), &table.csv())?;
-    io::write_text(folder.join("settle.md"), &table.markdown())?;
-    io::write_text(folder.join("settle.svg"), &Chart::row(&charts(&rows)))?;
+    let files = [
+        ("settle.csv", &*table.csv()),
+        ("settle.md", &table.markdown()),
+        ("settle.svg", &Chart::row(&charts(&rows))),
+    ];
+    write_texts(folder, files)?;
     Ok(rows)
 }
 

@@ -20,6 +20,11 @@ pub(crate) fn quantiles<const N: usize>(
     })
 }
 
+/// The mean of a number over some things; 0 of nothing.
+pub(crate) fn mean_of<T>(things: &[T], number: impl Fn(&T) -> f64) -> f64 {
+    things.iter().map(number).sum::<f64>() / things.len().max(1) as f64
+}
+
 /// Median and 95 % quantile.
 pub(crate) fn median_and_95(values: impl IntoIterator<Item = f64>) -> [f64; 2] {
     quantiles(values, [0.5, 0.95])

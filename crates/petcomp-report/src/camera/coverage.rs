@@ -47,10 +47,17 @@ pub(super) fn measure(views: u64) -> Vec<StatedErrors> {
         .into_iter()
         .flat_map(|noise_px| OFF_CENTER.map(|off_center| (off_center, noise_px)));
     kinds
-        .flat_map(|kind| FRAMINGS.map(|framing| (kind, framing)))
-        .filter(|((off_center, _), framing)| *off_center == 0.0 || *framing != Framing::Whole)
-        .map(|((off_center, noise_px), framing)| coverage(off_center, noise_px, framing, views))
+        .flat_map(|(off_center, noise_px)| {
+            true_framings(off_center)
+                .map(move |framing| coverage(off_center, noise_px, framing, views))
+        })
         .collect()
+}
+
+fn true_framings(off_center: f64) -> impl Iterator<Item = Framing> {
+    FRAMINGS
+        .into_iter()
+        .filter(move |framing| off_center == 0.0 || *framing != Framing::Whole)
 }
 
 fn coverage(off_center: f64, noise_px: f64, framing: Framing, views: u64) -> StatedErrors {
@@ -68,15 +75,21 @@ fn coverage(off_center: f64, noise_px: f64, framing: Framing, views: u64) -> Sta
         framing,
         views: views as usize,
         refused: views as usize - solved.len(),
-        focal_percent: [0, 1].map(|i| median(&solved, |view| view.focal_percent[i])),
-        height_px: [0, 1].map(|i| median(&solved, |view| view.height_px[i])),
+        focal_percent: medians(&solved, |view| view.focal_percent),
+        height_px: medians(&solved, |view| view.height_px),
         within: SIGMAS.map(|limit| share_within(&solved, limit)),
-        worst: solved.iter().map(|view| view.sigmas).fold(0.0, f64::max),
+        worst: largest_error(&solved),
     }
 }
 
-fn median(solved: &[SolvedView], of: impl Fn(&SolvedView) -> f64) -> f64 {
-    quantile(solved.iter().map(of), 0.5)
+/// Medians of an error and of its stated standard deviation.
+fn medians(solved: &[SolvedView], of: fn(&SolvedView) -> [f64; 2]) -> [f64; 2] {
+    [0, 1].map(|i| quantile(solved.iter().map(|view| of(view)[i]), 0.5))
+}
+
+/// In standard deviations.
+fn largest_error(solved: &[SolvedView]) -> f64 {
+    solved.iter().map(|view| view.sigmas).fold(0.0, f64::max)
 }
 
 fn share_within(solved: &[SolvedView], limit: f64) -> f64 {
@@ -97,11 +110,7 @@ impl SolvedView {
     fn new(scenario: &Scenario, framing: Framing, k: u64) -> Option<Self> {
         let tilt = TILTS_DEG[k as usize % TILTS_DEG.len()];
         let mut view = scenario.tilted(tilt).view(VIEW_SEED, k);
-        view.label.image.cropped = match framing {
-            Framing::Whole => Some(false),
-            Framing::Unknown => None,
-            Framing::Cropped => Some(true),
-        };
+        view.label.image.cropped = is_cropped(framing);
         let solution = solve(&view.label, &SolveOptions::default()).ok()?;
         Some(Self::compare(&view, &solution.fitting().ok()?))
     }
@@ -114,6 +123,14 @@ impl SolvedView {
             height_px: [height_error_px(view, solution), sigma.height_px],
             sigmas: ln_error / sigma.ln_focal,
         }
+    }
+}
+
+fn is_cropped(framing: Framing) -> Option<bool> {
+    match framing {
+        Framing::Whole => Some(false),
+        Framing::Unknown => None,
+        Framing::Cropped => Some(true),
     }
 }
 

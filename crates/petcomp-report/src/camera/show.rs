@@ -170,21 +170,29 @@ fn time_charts(rows: &[CameraRow]) -> String {
 }
 
 fn time_chart(rows: &[CameraRow], tilt_deg: f64) -> Chart {
-    let errors = rows.iter().map(CameraRow::median_focal_percent);
-    let times = rows.iter().map(|row| row.time_us);
     let seen: Vec<&CameraRow> = rows.iter().filter(|r| r.tilt_deg == tilt_deg).collect();
     Chart {
         title: format!("tilt {tilt_deg} degrees: closed form, 1 to 5 steps, full, joint"),
         names: NOISES_PX
             .map(|noise| format!("corners to {noise} px"))
             .into(),
-        across: Axis::over_decades("run time per photo, microseconds", times),
-        up: Axis::over_decades("focal length, median error, %", errors),
+        across: time_axis(rows),
+        up: focal_axis(rows),
         curves: NOISES_PX
             .map(|noise| time_curve(&seen, |row| row.noise_px == noise))
             .into(),
         defaults: time_curve(&seen, |row| row.method == SolveMethod::Whole),
     }
+}
+
+fn time_axis(rows: &[CameraRow]) -> Axis {
+    let times = rows.iter().map(|row| row.time_us);
+    Axis::over_decades("run time per photo, microseconds", times)
+}
+
+fn focal_axis(rows: &[CameraRow]) -> Axis {
+    let errors = rows.iter().map(CameraRow::median_focal_percent);
+    Axis::over_decades("focal length, median error, %", errors)
 }
 
 fn time_curve(rows: &[&CameraRow], is_shown: impl Fn(&CameraRow) -> bool) -> Curve {

@@ -74,10 +74,8 @@ impl Ellipse {
 
     /// 1 on the ellipse, less inside.
     pub(super) fn level(&self, x: f64, y: f64) -> f64 {
-        let (sin, cos) = (libm::sin(TURN_RAD), libm::cos(TURN_RAD));
         // The picture's y runs down, the world's up: the ellipse turns the other way.
-        let (dx, dy) = (x - self.center.x, self.center.y - y);
-        let along = [dx * cos + dy * sin, dy * cos - dx * sin];
+        let along = turned_back(x - self.center.x, self.center.y - y);
         (along[0] / self.half_px[0]).powi(2) + (along[1] / self.half_px[1]).powi(2)
     }
 
@@ -148,12 +146,17 @@ impl Ellipse {
     /// What a perfect renderer sees of it.
     pub(super) fn deep(&self) -> DeepImage {
         let [w, h] = self.image;
+        let white = Image::filled(w as usize, h as usize, LinearRgb::WHITE);
         let pixels = (0..h).flat_map(|y| (0..w).map(move |x| (x, y)));
-        DeepImage::from_pixels(
-            Image::filled(w as usize, h as usize, LinearRgb::WHITE),
-            pixels.map(|(x, y)| deep_samples(self.coverage(x, y) as f32)),
-        )
+        let coverage = pixels.map(|(x, y)| self.coverage(x, y) as f32);
+        DeepImage::from_pixels(white, coverage.map(deep_samples))
     }
+}
+
+/// An offset in the frame of the ellipse's axes.
+fn turned_back(dx: f64, dy: f64) -> [f64; 2] {
+    let (sin, cos) = (libm::sin(TURN_RAD), libm::cos(TURN_RAD));
+    [dx * cos + dy * sin, dy * cos - dx * sin]
 }
 
 /// The card that the ellipse fills.

@@ -33,13 +33,11 @@ pub(super) fn shadow_shot(kind: LightKind) -> Shot {
 }
 
 fn opaque_card() -> Card {
-    let rotation = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), CARD_TURN_RAD);
-    let center = Vector3::new(0.0, 0.0, CARD_HEIGHT_M);
     Card {
         id: ObjectId(1),
         class: 0,
         quad: Quad {
-            world_from_card: Pose::from_parts(center.into(), rotation),
+            world_from_card: card_pose(),
             size: CARD_SIZE_M,
         },
         // So fine that its border, half a texel soft, is a sharp one.
@@ -48,6 +46,11 @@ fn opaque_card() -> Card {
         outline_uv: [].into(),
         grade: Grade::default(),
     }
+}
+
+fn card_pose() -> Pose {
+    let rotation = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), CARD_TURN_RAD);
+    Pose::from_parts(Vector3::new(0.0, 0.0, CARD_HEIGHT_M).into(), rotation)
 }
 
 fn square_light() -> AreaLight {
@@ -77,13 +80,17 @@ pub(super) fn exact_shares(shot: &Shot, kind: LightKind) -> Vec<Option<f64>> {
 fn surface_point(shot: &Shot, pixel: [u32; 2]) -> Option<Point3<f64>> {
     let [x, y] = pixel.map(|v| f64::from(v) + 0.5);
     let ray = shot.camera.ray(Point2::new(x, y));
-    let card = &shot.cards[0].quad;
-    let around = Quad {
+    let point = ray.at(Plane::surface().intersect(&ray)?);
+    let around = with_border(&shot.cards[0].quad);
+    around.intersect(&ray).is_none().then_some(point)
+}
+
+/// A card with the pixels that see its border.
+fn with_border(card: &Quad) -> Quad {
+    Quad {
         size: card.size.map(|side| BORDER_FACTOR * side),
         ..*card
-    };
-    let point = ray.at(Plane::surface().intersect(&ray)?);
-    around.intersect(&ray).is_none().then_some(point)
+    }
 }
 
 /// What a card leaves of the light at a point.
@@ -109,13 +116,17 @@ fn shadowed_part(
     card: &[Point3<f64>; 4],
     point: Point3<f64>,
 ) -> Vec<Point3<f64>> {
-    let sum: Vector3<f64> = card.iter().map(|corner| corner.coords).sum();
-    let middle = Point3::from(sum / card.len() as f64);
+    let middle = middle_of(card);
     polygon_sides(card).fold(face.to_vec(), |kept, (a, b)| {
         let normal = (a - point).cross(&(b - point));
         let inwards = normal * normal.dot(&(middle - point)).signum();
         positive_part(&kept, |p| inwards.dot(&(p - point)))
     })
+}
+
+fn middle_of(corners: &[Point3<f64>; 4]) -> Point3<f64> {
+    let sum: Vector3<f64> = corners.iter().map(|corner| corner.coords).sum();
+    Point3::from(sum / corners.len() as f64)
 }
 
 fn polygon_sides(corners: &[Point3<f64>]) -> impl Iterator<Item = (&Point3<f64>, &Point3<f64>)> {

@@ -177,11 +177,15 @@ impl Costs<'_> {
         prices.map_or(f64::INFINITY, |prices| self.residual(&prices, i))
     }
 
+    fn positive(&self) -> Vec<usize> {
+        let all = 0..self.costs.len();
+        all.filter(|&i| self.costs[i] > 0.0).collect()
+    }
+
     /// Prices by all measurements above 0 but one; none without any.
     fn fit_without(&self, left_out: Option<usize>) -> Option<Vec<f64>> {
-        let used: Vec<usize> = (0..self.costs.len())
-            .filter(|&i| self.costs[i] > 0.0 && Some(i) != left_out)
-            .collect();
+        let mut used = self.positive();
+        used.retain(|i| Some(*i) != left_out);
         let terms = self.rows.get(*used.first()?)?.len();
         subsets(terms)
             .filter_map(|free| self.least_squares(&used, &free))
@@ -192,13 +196,11 @@ impl Costs<'_> {
 
     /// Least squares with some prices free and the others 0.
     fn least_squares(&self, used: &[usize], free: &[usize]) -> Option<PricesAndError> {
-        let shares = DMatrix::from_fn(used.len(), free.len(), |i, k| {
+        let mut shares = DMatrix::from_fn(used.len(), free.len(), |i, k| {
             self.rows[used[i]][free[k]] / self.costs[used[i]]
         });
-        let lengths = column_lengths(&shares);
-        // Columns of one length, so that a term of few per thousand is not mistaken for rounding.
-        let even = DMatrix::from_fn(used.len(), free.len(), |i, k| shares[(i, k)] / lengths[k]);
-        let (x, error) = solve_ones(even)?;
+        let lengths = normalize_columns(&mut shares);
+        let (x, error) = solve_ones(&shares)?;
         let mut prices = vec![0.0; self.rows[used[0]].len()];
         for (&k, (x, length)) in free.iter().zip(x.iter().zip(&lengths)) {
             prices[k] = x / length;
@@ -213,19 +215,24 @@ fn subsets(terms: usize) -> impl Iterator<Item = Vec<usize>> {
     sets.map(move |set| (0..terms).filter(|k| set >> k & 1 == 1).collect())
 }
 
-fn column_lengths(matrix: &DMatrix<f64>) -> Vec<f64> {
-    matrix
-        .column_iter()
-        .map(|column| column.norm().max(f64::MIN_POSITIVE))
+/// Makes columns of length 1, so that a term of few per thousand is not mistaken for rounding; returns their lengths.
+fn normalize_columns(matrix: &mut DMatrix<f64>) -> Vec<f64> {
+    let columns = matrix.column_iter_mut();
+    columns
+        .map(|mut column| {
+            let length = column.norm().max(f64::MIN_POSITIVE);
+            column /= length;
+            length
+        })
         .collect()
 }
 
 /// What a matrix should be multiplied by to give ones, and the squared error that is left.
-fn solve_ones(matrix: DMatrix<f64>) -> Option<(DVector<f64>, f64)> {
+fn solve_ones(matrix: &DMatrix<f64>) -> Option<(DVector<f64>, f64)> {
     let ones = DVector::repeat(matrix.nrows(), 1.0);
     let svd = matrix.clone().svd(true, true);
     let x = svd.solve(&ones, SINGULAR_EPSILON).ok()?;
-    let error = (&matrix * &x - ones).norm_squared();
+    let error = (matrix * &x - ones).norm_squared();
     Some((x, error))
 }
 

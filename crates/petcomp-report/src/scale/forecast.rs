@@ -37,8 +37,7 @@ pub fn forecast(measured: &ScaleMeasurements, images: f64) -> Result<Forecast> {
     let fall_seconds = interpolated_fall(&measured.falls, grid::DEFAULT_PICTURE.cards);
     let efficiency = all.rate / (cores as f64 * one.rate);
     let picture_seconds = interval(model.seconds(one), model.time.spread());
-    let core_hours = picture_seconds
-        .map(|s| images * (s + fall_seconds) / efficiency.min(1.0) / SECONDS_PER_HOUR);
+    let core_hours = picture_seconds.map(|s| core_hours(images, s + fall_seconds, efficiency));
     Ok(Forecast {
         images,
         case: grid::DEFAULT_PICTURE,
@@ -49,6 +48,10 @@ pub fn forecast(measured: &ScaleMeasurements, images: f64) -> Result<Forecast> {
         core_hours,
         bytes: interval(model.bytes(all), model.memory.spread()),
     })
+}
+
+fn core_hours(images: f64, seconds_each: f64, efficiency: f64) -> f64 {
+    images * seconds_each / efficiency.min(1.0) / SECONDS_PER_HOUR
 }
 
 /// The default picture on one thread and on the most.
@@ -73,12 +76,15 @@ fn interpolated_fall(falls: &[(usize, f64)], cards: usize) -> f64 {
     let below = falls.iter().rev().find(|(n, _)| *n <= cards);
     let above = falls.iter().find(|(n, _)| *n >= cards);
     match (below, above) {
-        (Some(&(a, s)), Some(&(b, t))) if b > a => {
-            s + (t - s) * (cards - a) as f64 / (b - a) as f64
-        }
-        (Some(&(_, s)), _) | (None, Some(&(_, s))) => s,
+        (Some(below), Some(above)) if above.0 > below.0 => between(*below, *above, cards),
+        (Some((_, seconds)), _) | (None, Some((_, seconds))) => *seconds,
         (None, None) => 0.0,
     }
+}
+
+/// On the line through two falls.
+fn between((a, s): (usize, f64), (b, t): (usize, f64), cards: usize) -> f64 {
+    s + (t - s) * (cards - a) as f64 / (b - a) as f64
 }
 
 impl Forecast {

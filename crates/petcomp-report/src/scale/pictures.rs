@@ -126,10 +126,13 @@ fn writers() -> Vec<Box<dyn Writer>> {
 }
 
 fn mean_layers(deep: &DeepImage) -> f64 {
-    let (w, h) = (deep.width(), deep.height());
-    let pixels = (0..h).flat_map(|y| (0..w).map(move |x| (x, y)));
-    let samples: usize = pixels.map(|(x, y)| deep.at(x, y).len()).sum();
-    samples as f64 / (w * h) as f64
+    let pixels = deep.width() * deep.height();
+    let samples: usize = (0..deep.height()).map(|y| samples_in_row(deep, y)).sum();
+    samples as f64 / pixels as f64
+}
+
+fn samples_in_row(deep: &DeepImage, y: usize) -> usize {
+    (0..deep.width()).map(|x| deep.at(x, y).len()).sum()
 }
 
 /// Cards in a heap under a lamp and an even sky, seen from above.
@@ -181,11 +184,15 @@ fn heap_card(case: &ScaleCase, k: usize) -> Object {
 /// Spread evenly by the plastic number's sequence (Roberts, "The unreasonable effectiveness of quasirandom sequences",
 /// 2018), each a little higher than the one before it.
 fn heap_pose(k: usize, rise: f64) -> Pose {
-    let [x, y] =
-        [1, 2].map(|power: i32| (0.5 + (k + 1) as f64 * PLASTIC_NUMBER.powi(-power)).fract() - 0.5);
+    let [x, y] = [1, 2].map(|power| plastic_share(k, power));
     let center = Vector3::new(ROOM_M[0] * x, ROOM_M[1] * y, rise * (k + 1) as f64);
     let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), CARD_TURN_RAD * k as f64);
     Pose::from_parts(center.into(), turn)
+}
+
+/// Number `k` of a sequence, from -0.5 to 0.5.
+fn plastic_share(k: usize, power: i32) -> f64 {
+    (0.5 + (k + 1) as f64 * PLASTIC_NUMBER.powi(-power)).fract() - 0.5
 }
 
 /// A bottle of 192 x 576 texels: soft outline, half see-through, striped.

@@ -5,7 +5,7 @@ use petcomp::{Error, Result};
 use std::path::Path;
 use std::process::{Command, Output};
 
-const KIBIBYTE: f64 = 1024.0;
+const BYTES_PER_KIB: f64 = 1024.0;
 
 /// A point as another process prints it.
 pub(super) fn run_in_child(program: &Path, case: &ScaleCase, seconds: f64) -> Result<ScalePoint> {
@@ -30,7 +30,7 @@ pub(super) fn peak_bytes() -> Result<f64> {
     let path = Path::new("/proc/self/status");
     let text = std::fs::read_to_string(path).map_err(|e| Error::file(path, e))?;
     peak_kibibytes(&text)
-        .map(|kibibytes| kibibytes * KIBIBYTE)
+        .map(|kibibytes| kibibytes * BYTES_PER_KIB)
         .ok_or_else(|| Error::file(path, "no VmHWM in it"))
 }
 

@@ -26,41 +26,45 @@ const TIMED_HEAPS: u64 = 5;
 pub fn run(case: &ScaleCase, seconds: f64) -> Result<ScalePoint> {
     let inputs = PictureInputs::new(case);
     let pool = work::pool(case.threads).map_err(|e| Error::value("threads", e))?;
-    let (first, layers) = Round::measure(1, || pool.install(|| inputs.make(1)))?;
+    pool.install(|| measure_point(case, &inputs, seconds))
+}
+
+fn measure_point(case: &ScaleCase, inputs: &PictureInputs, seconds: f64) -> Result<ScalePoint> {
+    let first = Round::measure(inputs, 1)?;
     let (rounds, pictures) = first.plan_more(case.threads, seconds);
     let later = (0..rounds)
-        .map(|_| Round::measure(pictures, || pool.install(|| inputs.make(pictures))))
+        .map(|_| Round::measure(inputs, pictures))
         .collect::<Result<Vec<_>>>()?;
     Ok(ScalePoint {
         case: *case,
-        layers,
+        layers: first.layers,
         pictures: pictures * rounds,
-        cpu_seconds: least(&later, |round| round.cpu).min(first.cpu),
-        rate: 1.0 / least(&later, |round| round.wall),
+        cpu_seconds: least(later.iter().map(|round| round.cpu)).min(first.cpu),
+        rate: 1.0 / least(later.iter().map(|round| round.wall)),
         peak_bytes: peak_bytes()?,
     })
 }
 
-fn least<T>(rounds: &[(Round, T)], seconds: fn(&Round) -> f64) -> f64 {
-    let times = rounds.iter().map(|(round, _)| seconds(round));
-    times.fold(f64::INFINITY, f64::min)
+fn least(seconds: impl Iterator<Item = f64>) -> f64 {
+    seconds.fold(f64::INFINITY, f64::min)
 }
 
-/// Seconds that a picture took in one round, of processors and of the clock.
+/// Seconds that a picture took in one round, of processors and of the clock, and its layers.
 struct Round {
     cpu: f64,
     wall: f64,
+    layers: f64,
 }
 
 impl Round {
-    fn measure<T>(pictures: u64, make: impl FnOnce() -> Result<T>) -> Result<(Self, T)> {
+    fn measure(inputs: &PictureInputs, pictures: u64) -> Result<Self> {
         let (began, before) = (Instant::now(), cpu_seconds());
-        let made = make()?;
-        let round = Self {
+        let layers = inputs.make(pictures)?;
+        Ok(Self {
             cpu: (cpu_seconds() - before) / pictures as f64,
             wall: began.elapsed().as_secs_f64() / pictures as f64,
-        };
-        Ok((round, made))
+            layers,
+        })
     }
 
     /// Rounds, and the pictures of each, that fill so many seconds if pictures take as long as this one.

@@ -75,37 +75,37 @@ fn megabytes(bytes: f64) -> String {
 
 fn points_table(measured: &ScaleMeasurements, model: &CostModel) -> Table {
     let mut single = model.time.residuals.iter().zip(&model.time.unseen);
-    let points = measured.points.iter().zip(&model.memory.residuals);
-    let modelled: Vec<ModelledPoint> = points
-        .map(|(point, memory)| ModelledPoint {
+    let mut modelled = Vec::new();
+    for (point, memory) in measured.points.iter().zip(&model.memory.residuals) {
+        let is_fitted = point.is_single_threaded();
+        let time = if is_fitted { single.next() } else { None };
+        modelled.push(ModelledPoint {
             point: point.clone(),
             seconds: model.seconds(point),
-            time: point
-                .is_single_threaded()
-                .then(|| single.next().map(|(seen, unseen)| [*seen, *unseen]))
-                .flatten(),
+            time: time.map(|(seen, unseen)| [*seen, *unseen]),
             bytes: model.bytes(point),
             memory_residual: *memory,
-        })
-        .collect();
+        });
+    }
     table_of(&POINT_COLUMNS, &modelled)
 }
 
 fn prices_table(model: &CostModel) -> Table {
-    let time = price_lines(&model.time, "CPU time", |price| {
-        format!("{:.4} ms", MS_PER_SECOND * price)
-    });
-    let memory = price_lines(&model.memory, "memory", |price| {
-        format!("{:.3} MB", price * MB_PER_BYTE)
-    });
-    let spreads = [
-        spread_line(&model.time, "CPU time"),
-        spread_line(&model.memory, "memory"),
+    let lines = [
+        price_lines(&model.time, "CPU time", price_in_ms),
+        price_lines(&model.memory, "memory", price_in_mb),
+        vec![spread_line(&model.time, "CPU time")],
+        vec![spread_line(&model.memory, "memory")],
     ];
-    table_from(
-        ["each", "takes", "of"],
-        time.into_iter().chain(memory).chain(spreads),
-    )
+    table_from(["each", "takes", "of"], lines.concat())
+}
+
+fn price_in_ms(seconds: f64) -> String {
+    format!("{:.4} ms", MS_PER_SECOND * seconds)
+}
+
+fn price_in_mb(bytes: f64) -> String {
+    format!("{:.3} MB", bytes * MB_PER_BYTE)
 }
 
 fn price_lines(fit: &CostFit, cost: &str, words: fn(f64) -> String) -> Vec<[String; 3]> {

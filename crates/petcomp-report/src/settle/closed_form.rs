@@ -42,13 +42,18 @@ fn make_plate(object: &mut Object, bottom: f64) {
 
 /// How far the top of a stack of n plates is from n times their thickness, metres; infinite where it does not rest.
 pub(super) fn stack_error_m(options: &SettleOptions) -> Result<f64> {
-    let bottoms: Vec<f64> = (0..PLATE_COUNT)
-        .map(|i| 2.0 * PLATE_THICKNESS_M * i as f64 + PLATE_THICKNESS_M)
-        .collect();
-    let end = settle(level_plates(&bottoms)?, &accepting_any_error(options))?;
+    let end = settle(plate_stack()?, &accepting_any_error(options))?;
     let top = end.scene.objects.last().and_then(rest_position);
     let expected = (PLATE_COUNT as f64 - 0.5) * PLATE_THICKNESS_M;
     Ok(top.map_or(f64::INFINITY, |[_, z]| (z - expected).abs()))
+}
+
+/// With a plate's thickness of air below each.
+fn plate_stack() -> Result<Scene> {
+    let bottoms: Vec<f64> = (0..PLATE_COUNT)
+        .map(|i| 2.0 * PLATE_THICKNESS_M * i as f64 + PLATE_THICKNESS_M)
+        .collect();
+    level_plates(&bottoms)
 }
 
 /// The error is what is measured here, so none is too large.
@@ -70,26 +75,29 @@ fn rest_position(object: &Object) -> Option<[f64; 2]> {
 
 /// Slopes on which a plate slides and should not, or the other way round.
 pub(super) fn count_wrong_slopes(options: &SettleOptions) -> Result<usize> {
-    let right = SLOPES
-        .iter()
-        .map(|slope| slides_rightly(*slope, options))
-        .collect::<Result<Vec<_>>>()?;
-    Ok(right.iter().filter(|right| !**right).count())
+    let mut wrong = 0;
+    for slope in SLOPES {
+        wrong += usize::from(!slides_rightly(slope, options)?);
+    }
+    Ok(wrong)
 }
 
 /// Whether a plate on a slope of so many times the critical one slides if that is more than 1, and else stays.
 fn slides_rightly(share: f64, options: &SettleOptions) -> Result<bool> {
     let scene = plate_on_slope()?;
-    let slope = libm::atan(share * scene.surface.friction);
-    let gravity = [libm::sin(slope), 0.0, -libm::cos(slope)].map(|x| GRAVITY_M_S2 * x);
     let options = SettleOptions {
-        gravity,
+        gravity: gravity_on_slope(libm::atan(share * scene.surface.friction)),
         ..*options
     };
     let end = settle(scene, &options)?;
     let should_slide = share > 1.0;
     let position = end.scene.objects.first().map(rest_position);
     Ok(position.is_some_and(|at| has_slid(at, should_slide)) == should_slide)
+}
+
+/// A slope is a level tray with oblique gravity.
+fn gravity_on_slope(slope: f64) -> [f64; 3] {
+    [libm::sin(slope), 0.0, -libm::cos(slope)].map(|x| GRAVITY_M_S2 * x)
 }
 
 /// A plate that is still moving counts as what it should be.

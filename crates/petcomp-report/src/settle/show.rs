@@ -30,16 +30,18 @@ pub fn table(rows: &[SettleRow]) -> Table {
 
 /// The sweep as charts against run time: worst overlap, energy rise, and error of the stack; a ring where the default is.
 pub fn charts(rows: &[SettleRow]) -> Vec<Chart> {
-    let swept: Vec<SettleRow> = rows
-        .iter()
-        .filter(|row| row.has_default_ccd())
-        .copied()
-        .collect();
+    let swept = with_default_ccd(rows);
     vec![
         error_chart(&swept, "worst overlap, mm", |r| r.overlap_mm[1]),
         error_chart(&swept, "worst energy rise, %", |r| r.energy_percent[1]),
         error_chart(&swept, "error of a stack, mm", |r| r.stack_mm),
     ]
+}
+
+fn with_default_ccd(rows: &[SettleRow]) -> Vec<SettleRow> {
+    let mut rows = rows.to_vec();
+    rows.retain(SettleRow::has_default_ccd);
+    rows
 }
 
 fn error_chart(rows: &[SettleRow], title: &str, error: fn(&SettleRow) -> f64) -> Chart {
