@@ -128,19 +128,22 @@ fn encoding_points(lights: &[f32]) -> Result<Vec<Point>> {
         values: lights,
         exact: encoded,
     };
-    let eight_bits = conversion.point(["table", "8 bits"], encode_by_table, |c| {
-        f64::from(*c) / MAX_CODE_8
-    })?;
     Ok(vec![
-        eight_bits.used_where(|_| true),
-        conversion.point(["table", "16 bits"], encode_by_table_16, |c| {
-            f64::from(*c) / MAX_CODE_16
-        })?,
+        conversion
+            .point(["table", "8 bits"], encode_by_table, value_of_code_8)?
+            .used_where(|_| true),
+        conversion.point(["table", "16 bits"], encode_by_table_16, value_of_code_16)?,
         conversion.point_of_each(["formula", "32-bit float"], linear_to_srgb)?,
-        conversion.point_of_each(["plain power", "gamma 2.2"], |v| {
-            Curve::Gamma(PLAIN_GAMMA).encode(v)
-        })?,
+        conversion.point_of_each(["plain power", "gamma 2.2"], encode_by_power)?,
     ])
+}
+
+fn value_of_code_8(code: &u8) -> f64 {
+    f64::from(*code) / MAX_CODE_8
+}
+
+fn value_of_code_16(code: &u16) -> f64 {
+    f64::from(*code) / MAX_CODE_16
 }
 
 fn encode_by_table(values: &[f32]) -> Vec<u8> {
@@ -177,31 +180,33 @@ fn decoding() -> Result<Diagram> {
 }
 
 fn decoding_points(codes: &[u8]) -> Result<Vec<Point>> {
-    let values: Vec<f32> = codes.iter().map(|c| value_of_code(*c)).collect();
+    let values: Vec<f32> = codes.iter().map(|c| value_of_code_8(c) as f32).collect();
     let conversion = Conversion {
         values: &values,
         exact: decoded,
     };
     // The tables take codes, not values: both stand for the same.
-    let eight_bits =
-        conversion.point(["table", "8 bits"], |_| decode_by_table(codes), to_double)?;
-    let sixteen_bits = conversion.point(
-        ["table", "16 bits"],
-        |_| decode_by_table_16(codes),
-        to_double,
-    )?;
+
     Ok(vec![
-        eight_bits.used_where(|_| true),
-        sixteen_bits,
+        conversion
+            .point(["table", "8 bits"], |_| decode_by_table(codes), to_double)?
+            .used_where(|_| true),
+        conversion.point(
+            ["table", "16 bits"],
+            |_| decode_by_table_16(codes),
+            to_double,
+        )?,
         conversion.point_of_each(["formula", "32-bit float"], srgb_to_linear)?,
-        conversion.point_of_each(["plain power", "gamma 2.2"], |v| {
-            Curve::Gamma(PLAIN_GAMMA).decode(v)
-        })?,
+        conversion.point_of_each(["plain power", "gamma 2.2"], decode_by_power)?,
     ])
 }
 
-fn value_of_code(code: u8) -> f32 {
-    (f64::from(code) / MAX_CODE_8) as f32
+fn encode_by_power(v: f32) -> f32 {
+    Curve::Gamma(PLAIN_GAMMA).encode(v)
+}
+
+fn decode_by_power(v: f32) -> f32 {
+    Curve::Gamma(PLAIN_GAMMA).decode(v)
 }
 
 fn to_double(v: &f32) -> f64 {
