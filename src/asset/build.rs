@@ -3,7 +3,7 @@
 use super::folder::{CutOutWriter, read_or_new};
 use super::library::{Library, Photo};
 use super::list::{List, find_list};
-use super::manifest::Manifest;
+use super::manifest::{Manifest, PhotoRecord};
 use super::screen_source::EmptyScreens;
 use crate::error::{Error, Result};
 use rayon::prelude::*;
@@ -21,8 +21,8 @@ pub struct Built {
     pub lengths: Vec<[f64; 2]>,
     /// Photos that gave no cut-out, and why.
     pub refused: Vec<String>,
-    /// Cut-outs that a person should review, and why.
-    pub needs_review: Vec<String>,
+    /// Cut-outs that a person should review; their diagnostics say why.
+    pub needs_review: Vec<PhotoRecord>,
 }
 
 /// Cuts all photos of a list out, several at a time, into an asset folder, which is made if it is not there.
@@ -59,7 +59,7 @@ pub fn build(
     Ok(Built {
         photos: photos.len(),
         lengths: photos.iter().map(length_and_error).collect(),
-        needs_review: photos.iter().filter_map(review_line).collect(),
+        needs_review: photos.iter().filter_map(record_to_review).collect(),
         refused,
         library: Library::from_manifest(folder, manifest, photos)?,
     })
@@ -120,12 +120,9 @@ fn length_and_error(photo: &Photo) -> [f64; 2] {
     [photo.record.object_m[0], photo.record.error_m]
 }
 
-/// Why a person should review a cut-out, after the name of its file.
-fn review_line(photo: &Photo) -> Option<String> {
+fn record_to_review(photo: &Photo) -> Option<PhotoRecord> {
     let record = &photo.record;
-    record
-        .needs_review()
-        .then(|| format!("{}: {}", record.file, record.review_reasons()))
+    record.needs_review().then(|| record.clone())
 }
 
 #[cfg(test)]
@@ -420,7 +417,8 @@ mod tests {
             built
                 .needs_review
                 .iter()
-                .any(|d| d.contains("two.exr") && d.contains("too grey")),
+                .any(|record| record.file.contains("two.exr")
+                    && record.review_reasons().contains("too grey")),
             "{:?}",
             built.needs_review
         );

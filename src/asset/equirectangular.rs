@@ -6,7 +6,7 @@ use crate::pixel::{LinearRgb, Mix};
 use std::f64::consts::{PI, TAU};
 
 /// Where a direction (of any length but 0) lies in an equirectangular picture, 0 to 1, right and down.
-pub fn direction_to_uv(direction: &Vector3<f64>) -> [f64; 2] {
+pub(crate) fn direction_to_uv(direction: &Vector3<f64>) -> [f64; 2] {
     let u = 0.5 - libm::atan2(direction.y, direction.x) / TAU;
     let v = libm::atan2(direction.xy().norm(), direction.z) / PI;
     [u, v]

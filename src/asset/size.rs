@@ -6,7 +6,7 @@ use crate::geom::{Point2, Vector2};
 ///
 /// # Method
 /// One side of that rectangle lies on a side of the polygon (Freeman and Shapira 1975), so every side is tried.
-pub fn oriented_size(hull: &[Point2<f64>]) -> [f64; 2] {
+pub(crate) fn oriented_size(hull: &[Point2<f64>]) -> [f64; 2] {
     let next = hull.iter().cycle().skip(1);
     let sides = hull
         .iter()

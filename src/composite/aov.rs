@@ -65,9 +65,9 @@ impl FromStr for Aov {
 }
 
 /// Coverage above which an object owns a pixel: that of the reference renderer.
-pub const FRONT_ALPHA: f32 = 0.05;
+pub(crate) const FRONT_ALPHA: f32 = 0.05;
 
-/// The foremost object that covers more than [`FRONT_ALPHA`] of a pixel.
+/// The foremost object that covers more than `FRONT_ALPHA` of a pixel.
 pub fn front(samples: &[DeepSample]) -> Option<&DeepSample> {
     samples.iter().find(|s| s.alpha > FRONT_ALPHA)
 }

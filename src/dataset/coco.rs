@@ -3,6 +3,7 @@
 use crate::dataset::formats::is_exact;
 use crate::dataset::{Entry, Extent, LabelledObject, Part, PictureFormat, Writer, Written};
 use crate::error::{Error, Result};
+use crate::geom::Point2;
 use crate::io;
 use crate::label::{RleMask, trace};
 use serde::{Deserialize, Serialize};
@@ -123,22 +124,22 @@ impl Writer for Coco {
 
 impl Coco {
     fn share(&self, entry: &Entry<'_>) -> Result<ImageShare> {
-        let [width, height] = entry.sample.labels.image;
-        let file_name = format!("{:06}.{}", entry.k, self.pictures.extension());
-        let image = CocoImage {
-            id: entry.k,
-            file_name,
-            width,
-            height,
-        };
-        let annotations = entry
-            .labelled
-            .iter()
-            .filter_map(|label| self.annotation(entry.k, label).transpose());
+        let labels = entry.labelled.iter();
+        let annotations = labels.filter_map(|label| self.annotation(entry.k, label).transpose());
         Ok(ImageShare {
-            image,
+            image: self.image_of(entry),
             annotations: annotations.collect::<Result<_>>()?,
         })
+    }
+
+    fn image_of(&self, entry: &Entry<'_>) -> CocoImage {
+        let [width, height] = entry.sample.labels.image;
+        CocoImage {
+            id: entry.k,
+            file_name: format!("{:06}.{}", entry.k, self.pictures.extension()),
+            width,
+            height,
+        }
     }
 
     /// None for an object without a box.
@@ -168,14 +169,10 @@ impl Coco {
         };
         // Readers do not take a list without polygons.
         if polygons.is_empty() {
-            return Segmentation::Runs(mask.clone());
+            Segmentation::Runs(mask.clone())
+        } else {
+            Segmentation::Polygons(polygons.iter().map(|ring| coordinates_of(ring)).collect())
         }
-        Segmentation::Polygons(
-            polygons
-                .iter()
-                .map(|ring| ring.iter().flat_map(|p| [p.x, p.y]).collect())
-                .collect(),
-        )
     }
 }
 
@@ -193,6 +190,11 @@ fn annotation_id(k: u64, object: u32) -> Result<u64> {
     })
 }
 
+/// x, y, x, y, ..
+fn coordinates_of(ring: &[Point2<f64>]) -> Vec<f64> {
+    ring.iter().flat_map(|p| [p.x, p.y]).collect()
+}
+
 /// Writes the document of a part, one image or annotation a line; holds one image's share at a time.
 fn join<'a>(
     out: &mut dyn Write,
@@ -207,21 +209,34 @@ fn join<'a>(
     write!(out, "\"annotations\":[")?;
     let mut comma = "\n";
     for sample in samples {
-        let file = io::inside(folder, sample.file(PARTS_FOLDER)?).map_err(std::io::Error::other)?;
-        let share: ImageShare = io::read_json(file).map_err(std::io::Error::other)?;
+        let share = read_share(folder, sample)?;
         images.push(share.image);
         for annotation in &share.annotations {
-            write!(out, "{comma}{}", serde_json::to_string(annotation)?)?;
-            comma = ",\n";
+            write_entry(out, &mut comma, annotation)?;
         }
     }
     write!(out, "],\n\"images\":[")?;
     comma = "\n";
     for image in &images {
-        write!(out, "{comma}{}", serde_json::to_string(image)?)?;
-        comma = ",\n";
+        write_entry(out, &mut comma, image)?;
     }
     writeln!(out, "]}}")
+}
+
+fn read_share(folder: &Path, sample: &Written) -> std::io::Result<ImageShare> {
+    let file = io::inside(folder, sample.file(PARTS_FOLDER)?).map_err(std::io::Error::other)?;
+    io::read_json(file).map_err(std::io::Error::other)
+}
+
+/// Writes an entry of a list, each in a line of its own.
+fn write_entry(
+    out: &mut dyn Write,
+    comma: &mut &str,
+    entry: &impl Serialize,
+) -> std::io::Result<()> {
+    write!(out, "{comma}{}", serde_json::to_string(entry)?)?;
+    *comma = ",\n";
+    Ok(())
 }
 
 fn categories(classes: &[String]) -> serde_json::Value {

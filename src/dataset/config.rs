@@ -98,11 +98,10 @@ impl DatasetConfig {
     /// When it cannot be written.
     pub fn write(&self, path: impl AsRef<Path>) -> Result<()> {
         let path = path.as_ref();
-        let absolute = |path: &Path| std::path::absolute(path).map_err(|e| Error::file(path, e));
-        let folder = absolute(path.parent().unwrap_or(Path::new("")))?;
+        let folder = absolute_path(path.parent().unwrap_or(Path::new("")))?;
         let mut config = self.clone();
-        config.assets = io::relative(&absolute(&config.assets)?, &folder);
-        config.backgrounds = io::relative(&absolute(&config.backgrounds)?, &folder);
+        config.assets = io::relative(&absolute_path(&config.assets)?, &folder);
+        config.backgrounds = io::relative(&absolute_path(&config.backgrounds)?, &folder);
         for file in &mut config.scene.environment.files {
             *file = seen_from(&folder, &self.folder, file)?;
         }
@@ -126,6 +125,10 @@ impl DatasetConfig {
             (ablation, config)
         })
     }
+}
+
+fn absolute_path(path: &Path) -> Result<PathBuf> {
+    std::path::absolute(path).map_err(|e| Error::file(path, e))
 }
 
 #[cfg(test)]

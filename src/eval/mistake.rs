@@ -38,21 +38,25 @@ pub fn mistakes(sheets: &[EvalImage], options: &ConfusionOptions) -> Vec<Mistake
     let mut all: Vec<(f64, Mistake)> = sheets
         .par_iter()
         .enumerate()
-        .flat_map_iter(|(i, sheet)| {
-            let mistakes = MistakeFinder::new(i, sheet).find(options);
-            mistakes.into_iter().map(|m| (severity(sheet, &m), m))
-        })
+        .flat_map_iter(|(i, sheet)| rated_mistakes(i, sheet, options))
         .collect();
     all.sort_by(worst_first);
     all.into_iter().map(|(_, mistake)| mistake).collect()
 }
 
+fn rated_mistakes(
+    i: usize,
+    sheet: &EvalImage,
+    options: &ConfusionOptions,
+) -> impl Iterator<Item = (f64, Mistake)> {
+    let mistakes = MistakeFinder::new(i, sheet).find(options);
+    mistakes.into_iter().map(|m| (severity(sheet, &m), m))
+}
+
 /// Detections before misses; of each kind the most severe first.
 fn worst_first(a: &(f64, Mistake), b: &(f64, Mistake)) -> Ordering {
-    let is_missed = |mistake: &Mistake| mistake.kind == MistakeKind::Missed;
-    is_missed(&a.1)
-        .cmp(&is_missed(&b.1))
-        .then(b.0.total_cmp(&a.0))
+    let [a_missed, b_missed] = [a, b].map(|(_, mistake)| mistake.kind == MistakeKind::Missed);
+    a_missed.cmp(&b_missed).then(b.0.total_cmp(&a.0))
 }
 
 /// Finds the mistakes of one image.

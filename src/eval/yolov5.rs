@@ -62,15 +62,18 @@ pub(super) fn scores(rankings: &[Ranking], weights: &[u32]) -> Scores {
 /// Average precision of a class at every threshold; none where there is nothing to find.
 pub(super) fn average_precision(ranking: &Ranking, weights: &[u32]) -> Option<[f64; THRESHOLDS]> {
     let truths = Some(ranking.truths(weights)).filter(|&truths| truths > 0.0)?;
-    let area = |sums: &Running| {
-        let (recall, precision) = curve(sums, truths);
-        if recall.is_empty() {
-            0.0
-        } else {
-            trapezoid(&recall, &precision)
-        }
-    };
-    Some(ranking.turns(weights).each_ref().map(area))
+    let turns = ranking.turns(weights);
+    Some(turns.each_ref().map(|sums| area_below(sums, truths)))
+}
+
+/// Area below the curve of precision over recall.
+fn area_below(sums: &Running, truths: f64) -> f64 {
+    let (recall, precision) = curve(sums, truths);
+    if recall.is_empty() {
+        0.0
+    } else {
+        trapezoid(&recall, &precision)
+    }
 }
 
 /// The classes with something to find, to be read at a confidence.
@@ -181,23 +184,22 @@ fn window_sum(values: &[f64], i: usize) -> f64 {
 fn match_image(image: &ImageBoxes<'_>) -> (Vec<Hit>, usize) {
     let index = BoxIndex::new(image.truth.iter().map(|t| t.bbox));
     let mut taken: Vec<Marks> = vec![0; image.truth.len()];
-    let mut hits = Vec::new();
-    for (place, found) in image.found.iter().enumerate() {
+    let hits = image.found.iter().enumerate().map(|(place, found)| {
         let right = nearest(image, &index, found).map_or(0, |(nearest, overlap)| {
             let reached = reached(overlap);
             let right = reached & !taken[nearest];
             taken[nearest] |= reached;
             right
         });
-        hits.push(Hit {
+        Hit {
             confidence: found.confidence,
             sheet: image.sheet,
             place: place as u32,
             right,
             ignored: 0,
-        });
-    }
-    (hits, image.truth.len())
+        }
+    });
+    (hits.collect(), image.truth.len())
 }
 
 /// The box that a detection overlaps most; of equal overlaps the last: that is how the original's descending sort leaves
@@ -213,25 +215,31 @@ fn nearest(image: &ImageBoxes<'_>, index: &BoxIndex, found: &Detection) -> Optio
 /// Intersection over union in single precision.
 fn overlap(a: &BBox, b: &BBox) -> f32 {
     let [a, b] = [a, b].map(|b| [b.x0, b.y0, b.x1, b.y1].map(|v| v as f32));
-    let area = |b: [f32; 4]| (b[2] - b[0]) * (b[3] - b[1]);
     let shared =
         (a[2].min(b[2]) - a[0].max(b[0])).max(0.0) * (a[3].min(b[3]) - a[1].max(b[1])).max(0.0);
-    shared / (area(a) + area(b) - shared + AREA_EPSILON)
+    shared / (area_of(a) + area_of(b) - shared + AREA_EPSILON)
+}
+
+#[inline]
+fn area_of(b: [f32; 4]) -> f32 {
+    (b[2] - b[0]) * (b[3] - b[1])
 }
 
 fn reached(overlap: f32) -> Marks {
-    let step = (0.95_f32 - 0.5) / (THRESHOLDS - 1) as f32;
-    // From both ends, as PyTorch's `linspace` rounds.
-    let threshold = |i: usize| {
-        if i < THRESHOLDS / 2 {
-            0.5 + step * i as f32
-        } else {
-            0.95 - step * (THRESHOLDS - 1 - i) as f32
-        }
-    };
     (0..THRESHOLDS)
         .filter(|&i| overlap >= threshold(i))
         .fold(0, |marks, i| marks | 1 << i)
+}
+
+/// From both ends, as PyTorch's `linspace` rounds.
+#[inline]
+fn threshold(i: usize) -> f32 {
+    let step = (0.95_f32 - 0.5) / (THRESHOLDS - 1) as f32;
+    if i < THRESHOLDS / 2 {
+        0.5 + step * i as f32
+    } else {
+        0.95 - step * (THRESHOLDS - 1 - i) as f32
+    }
 }
 
 #[cfg(test)]

@@ -73,7 +73,7 @@ pub fn write_with<P: ToFile>(
 ///
 /// # Errors
 /// An image without pixels, or with transparent ones.
-pub fn jpeg_bytes<P: ToFile>(image: &Image<P>, quality: u8) -> Result<Vec<u8>> {
+pub(crate) fn jpeg_bytes<P: ToFile>(image: &Image<P>, quality: u8) -> Result<Vec<u8>> {
     let options = WriteOptions {
         jpeg_quality: quality,
         ..WriteOptions::default()

@@ -12,7 +12,7 @@ const GOLDEN_TURN: f64 = 0.381_966_011_250_105_1;
 ///
 /// # Method
 /// Sunflower spiral on the unit disk, lifted to the hemisphere (Malley).
-pub fn ambient_directions(count: usize) -> Vec<Vector3<f64>> {
+pub(crate) fn ambient_directions(count: usize) -> Vec<Vector3<f64>> {
     (0..count)
         .map(|i| {
             let r2 = (i as f64 + 0.5) / count as f64;

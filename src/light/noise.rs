@@ -17,7 +17,7 @@ const MASK_GAIN: f64 = 6.0;
 const NEARLY_WHITE: f32 = 0.95;
 
 /// Turns [`Noise::MatchPlate`] of a scene's finish into the noise of its plate; any other scene comes back as it is.
-pub fn match_noise(mut scene: Scene, plate: &Image<LinearRgb>) -> Scene {
+pub(crate) fn match_noise(mut scene: Scene, plate: &Image<LinearRgb>) -> Scene {
     if scene.finish.noise == Noise::MatchPlate {
         scene.finish.noise = plate_noise(plate);
     }

@@ -8,7 +8,7 @@ use crate::scene::{CameraSource, LightTint, Scene};
 
 /// The median colour, channel by channel, of the plate where the scene's labelled rectangle is seen; none where the
 /// camera is not known yet, or does not see it.
-pub fn surface_color(scene: &Scene, plate: &Image<LinearRgb>) -> Option<LinearRgb> {
+pub(crate) fn surface_color(scene: &Scene, plate: &Image<LinearRgb>) -> Option<LinearRgb> {
     let CameraSource::Known(camera) = scene.camera else {
         return None;
     };

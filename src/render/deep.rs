@@ -30,7 +30,7 @@ const DENSE_SUBSAMPLES: usize = 4;
 /// Renders a shot: per pixel and card, its light and its coverage; per pixel, what shadows leave of the plate.
 ///
 /// Same bits for any number of threads and any order of the cards. Never fails: cards that cannot be seen are left out, and
-/// numbers in `options` are brought into the range that works. Ask [`check`](super::check) about shots from outside.
+/// numbers in `options` are brought into the range that works. Ask `check` about shots from outside.
 ///
 /// # Method
 /// Everything is planar, so each map between two planes seen from a point is a homography. Irradiance is smooth: it is

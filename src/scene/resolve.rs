@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 /// Extent of the plane that shadows fall on, as a multiple of the surface's sides: that of the
 /// reference scenes.
-pub const CATCHER_RATIO: f64 = 3.0;
+pub(crate) const CATCHER_RATIO: f64 = 3.0;
 
 /// What an object looks like: all that a shot needs from its asset.
 #[derive(Clone, Debug)]
@@ -35,7 +35,7 @@ impl Scene {
     /// `look` finds an object's asset and photo, or nothing; for a library that is
     /// [`Appearance::from_library`]. `plate` is the background at the picture's size; none leaves it
     /// transparent. `panorama` is the picture that the scene's environment names. Object `i` gets id
-    /// `i + 1`; the shadow catcher is the plane of the labelled surface, [`CATCHER_RATIO`] times as
+    /// `i + 1`; the shadow catcher is the plane of the labelled surface, `CATCHER_RATIO` times as
     /// large.
     ///
     /// # Errors

@@ -1,5 +1,6 @@
 //! Our trained models beside the paper's.
 
+use super::files::write_texts;
 use petcomp::eval::page::{Metrics, Spread};
 use petcomp::io;
 use petcomp::plot::{Page, Table};
@@ -287,11 +288,13 @@ impl PaperTraining {
 pub fn write(folder: &Path, of: &Path) -> Result<Table> {
     let table = table(&read_runs(of)?);
     let updates = updates_table(PAPER_TRAINING);
-    io::create_folder(folder)?;
-    io::write_text(folder.join("experiments.csv"), &table.csv())?;
-    io::write_text(folder.join("experiments.md"), &table.markdown())?;
-    io::write_text(folder.join("updates.csv"), &updates.csv())?;
-    io::write_text(folder.join("experiments.html"), &page(&table, &updates))?;
+    let files = [
+        ("experiments.csv", &*table.csv()),
+        ("experiments.md", &table.markdown()),
+        ("updates.csv", &updates.csv()),
+        ("experiments.html", &page(&table, &updates)),
+    ];
+    write_texts(folder, files)?;
     Ok(table)
 }
 

@@ -8,13 +8,14 @@ mod variant;
 
 pub use variant::{Expected, PhotoVariant};
 
+use super::files::write_texts;
 use super::matte::score::overlap;
 use super::matte::truth::{Known, Truths};
 use super::matte::{GOOD_BOX_PX, GOOD_IOU};
 use petcomp::Image;
 use petcomp::Result;
 use petcomp::geom::Point2;
-use petcomp::io;
+
 use petcomp::matte::{CutOut, CutOutOptions, cut_out};
 use petcomp::plot::Table;
 use petcomp::{Coverage, LinearRgb};
@@ -100,7 +101,7 @@ impl End {
 /// # Errors
 /// A folder without truth, or files of it that cannot be read.
 pub fn measure(folder: &Path, progress: impl Fn(u64, u64)) -> Result<Vec<FlagRow>> {
-    let truths = Truths::of(folder)?;
+    let truths = Truths::in_folder(folder)?;
     let mut rows = Vec::new();
     for i in 0..truths.len() {
         progress(i as u64, truths.len() as u64);
@@ -155,9 +156,8 @@ impl Trial {
     }
 
     fn errors(&self, cut: &CutOut) -> [f64; 2] {
-        let sides = bounding_sides(&cut.segmentation.hull).into_iter();
-        let off = sides.zip(self.box_px).map(|(a, b)| (a - b).abs());
-        let box_px = off.fold(0.0, f64::max);
+        let sides = bounding_sides(&cut.segmentation.hull);
+        let box_px = largest_difference(sides, self.box_px);
         [overlap(&cut.segmentation.tight, &self.mask), box_px]
     }
 }
@@ -196,6 +196,11 @@ pub(crate) fn bounding_sides(polygon: &[Point2<f64>]) -> [f64; 4] {
         -least(polygon, |p| -p.x),
         -least(polygon, |p| -p.y),
     ]
+}
+
+pub(crate) fn largest_difference(a: [f64; 4], b: [f64; 4]) -> f64 {
+    let off = a.iter().zip(b).map(|(a, b)| (a - b).abs());
+    off.fold(0.0, f64::max)
 }
 
 fn least(polygon: &[Point2<f64>], along: fn(&Point2<f64>) -> f64) -> f64 {
@@ -260,15 +265,14 @@ pub fn write(truth: &Path, folder: &Path, progress: impl Fn(u64, u64)) -> Result
     let rows = measure(truth, progress)?;
     let table = table(&rows);
     let markdown = format!("# Right, or flagged\n\n{}", table.markdown());
-    io::create_folder(folder)?;
-    io::write_text(folder.join("flags.csv"), &details(&rows).csv())?;
-    io::write_text(folder.join("flags.md"), &markdown)?;
+    let data = details(&rows).csv();
+    write_texts(folder, [("flags.csv", &data), ("flags.md", &markdown)])?;
     Ok(table)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::matte::truth::{Known, Noise};
+    use super::super::matte::truth::{Known, PhotoNoise};
     use super::*;
 
     const GREEN: LinearRgb = LinearRgb::new(0.04, 0.4, 0.08);
@@ -297,7 +301,7 @@ mod tests {
             screen: Image::filled(w, h, GREEN),
             mask: Image::from_fn(w, h, |x, y| Coverage(f32::from(u8::from(on(x, y))))),
             box_px: [90.0, 60.0, 210.0, 120.0],
-            noise: Noise {
+            noise: PhotoNoise {
                 shot: 0.0,
                 read: 0.003,
             },

@@ -8,6 +8,7 @@ mod cases;
 mod tests;
 mod world;
 
+use crate::files::write_texts;
 use cases::{Asked, WorkCase, cases};
 use petcomp::PremulRgba;
 use petcomp::dataset::{Pipeline, generate};
@@ -121,11 +122,10 @@ fn counts_allocations() -> Result<bool> {
 /// # Errors
 /// As [`measure`]; files that cannot be written.
 pub fn write(folder: impl AsRef<Path>, progress: impl Fn(u64, u64)) -> Result<Vec<WorkRow>> {
-    let folder = folder.as_ref();
-    io::create_folder(folder)?;
     let rows = measure(progress)?;
-    io::write_text(folder.join("work.csv"), &csv(&rows).csv())?;
-    io::write_text(folder.join("work.md"), &markdown(&rows))?;
+    let data = csv(&rows).csv();
+    let files = [("work.csv", &*data), ("work.md", &markdown(&rows))];
+    write_texts(folder.as_ref(), files)?;
     Ok(rows)
 }
 

@@ -24,16 +24,13 @@ pub(super) fn read_rows(
     let (mut good, mut findings) = (Vec::new(), Vec::new());
     let mut known: Vec<Vec<f64>> = Vec::new();
     for (line, row) in rows {
-        let (code, message) = match format.parse(&row) {
-            Ok(values) if !known.contains(&values) => {
+        match format.parse_new(&row, &known) {
+            Ok(values) => {
                 good.extend(class_count.map(|_| format.label(&values)));
                 known.push(values);
-                continue;
             }
-            Ok(_) => (Code::DuplicateLabelRow, "the same row stands above".into()),
-            Err(message) => (Code::BadLabelRow, message),
-        };
-        findings.push(Finding::in_line(path, line, code, message));
+            Err((code, message)) => findings.push(Finding::in_line(path, line, code, message)),
+        }
     }
     (good, findings)
 }
@@ -59,17 +56,24 @@ impl RowFormat {
     /// The numbers of a row, or what is wrong with it.
     fn parse(&self, row: &[&str]) -> Result<Vec<f64>, String> {
         self.check_columns(row.len())?;
-        let values = row
-            .iter()
-            .map(|text| parse_number(text))
-            .collect::<Result<Vec<f64>, String>>()?;
+        let values = row.iter().map(|text| parse_number(text));
+        let values: Vec<f64> = values.collect::<Result<_, _>>()?;
         self.check_class(row[0])?;
         check_shares(row, &values)?;
         if !self.outlines && (values[3] <= 0.0 || values[4] <= 0.0) {
-            return Err(format!(
-                "a box of {} x {}, expected sides above 0",
-                row[3], row[4]
-            ));
+            let (w, h) = (row[3], row[4]);
+            return Err(format!("a box of {w} x {h}, expected sides above 0"));
+        }
+        Ok(values)
+    }
+
+    /// The numbers of a row that is none of those before.
+    fn parse_new(&self, row: &[&str], known: &[Vec<f64>]) -> Result<Vec<f64>, (Code, String)> {
+        let values = self.parse(row);
+        let values = values.map_err(|message| (Code::BadLabelRow, message))?;
+        if known.contains(&values) {
+            let message = "the same row stands above".into();
+            return Err((Code::DuplicateLabelRow, message));
         }
         Ok(values)
     }

@@ -1,9 +1,9 @@
 //! Which channels of a file pixels are made from.
 
 /// Channels of a film's measured transmittance: the screen seen through it and in its shadow.
-pub const TRANSMITTANCE: [&str; 3] = ["TR", "TG", "TB"];
+pub(crate) const TRANSMITTANCE: [&str; 3] = ["TR", "TG", "TB"];
 /// Channels of a film's view transmittance: the share of the line of sight that passes.
-pub const VIEW_TRANSMITTANCE: [&str; 3] = ["VR", "VG", "VB"];
+pub(crate) const VIEW_TRANSMITTANCE: [&str; 3] = ["VR", "VG", "VB"];
 
 /// Which channels a kind of pixel is made from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]

@@ -31,7 +31,7 @@ pub fn read_toml<T: DeserializeOwned>(path: impl AsRef<Path>) -> Result<T> {
 ///
 /// # Errors
 /// As [`read_toml`]; an override of a value that cannot be there.
-pub fn read_toml_with<T: DeserializeOwned>(
+pub(crate) fn read_toml_with<T: DeserializeOwned>(
     path: impl AsRef<Path>,
     overrides: &[Override],
 ) -> Result<T> {
@@ -147,7 +147,7 @@ pub fn read_json<T: DeserializeOwned>(path: impl AsRef<Path>) -> Result<T> {
 ///
 /// # Errors
 /// As [`read_toml`].
-pub fn read_json_data<T: DeserializeOwned>(path: impl AsRef<Path>) -> Result<T> {
+pub(crate) fn read_json_data<T: DeserializeOwned>(path: impl AsRef<Path>) -> Result<T> {
     let path = path.as_ref();
     let most = (ReadOptions::default().limits.file_bytes, "file_bytes");
     let text = utf8(path, read_regular(path, most, "text file")?)?;
@@ -212,7 +212,7 @@ pub fn write_text(path: impl AsRef<Path>, text: &str) -> Result<()> {
 ///
 /// # Errors
 /// [`Error::Value`] for what is not TOML, a key twice, a number that is not finite, and values that do not fit.
-pub fn parse_toml<T: DeserializeOwned>(text: &str) -> Result<T> {
+pub(crate) fn parse_toml<T: DeserializeOwned>(text: &str) -> Result<T> {
     parse_toml_lines(text, |byte| Some(line_of(text, byte)))
 }
 
@@ -249,7 +249,7 @@ fn toml_mistake(e: &toml::de::Error, at: String, line: impl Fn(usize) -> Option<
 ///
 /// # Errors
 /// As [`parse_toml`].
-pub fn parse_json<T: DeserializeOwned>(text: &str) -> Result<T> {
+pub(crate) fn parse_json<T: DeserializeOwned>(text: &str) -> Result<T> {
     check_json(text, max_depth()).map_err(|e| json_mistake(&e, String::new()))?;
     deserialize_json(text)
 }

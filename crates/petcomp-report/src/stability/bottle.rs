@@ -1,7 +1,7 @@
 //! Synthetic photos of a bottle whose outline is known: a waisted body of film with a rim, glints, a striped label and a
 //! cap, in its own soft shadow.
 
-use crate::flags::{bounding_sides, is_right};
+use crate::flags::{bounding_sides, is_right, largest_difference};
 use crate::matte::normal;
 use petcomp::LinearRgb;
 use petcomp::Result;
@@ -163,11 +163,15 @@ impl BottlePhoto {
     }
 
     fn light_at(&self, x: f64, y: f64) -> LinearRgb {
-        let shadows = self.on_bottles(x, y).map(soft_shadow);
-        let behind = self.screen.scale(shadows.product());
+        let behind = self.shaded_screen(x, y);
         self.bottle_seen(x, y)
             .map_or(behind, |(f, t)| f + behind.scale(t))
             .scale(self.lamp_falloff(x, y) * self.exposure)
+    }
+
+    fn shaded_screen(&self, x: f64, y: f64) -> LinearRgb {
+        let shadows = self.on_bottles(x, y).map(soft_shadow);
+        self.screen.scale(shadows.product())
     }
 
     fn pixel_at(&self, x: usize, y: usize) -> LinearRgb {
@@ -185,11 +189,15 @@ impl BottlePhoto {
     pub(super) fn photo(&self) -> Image<LinearRgb> {
         let (w, h) = self.size;
         let mut photo = Image::from_fn(w, h, |x, y| self.pixel_at(x, y));
+        self.expose_sensor(&mut photo);
+        photo
+    }
+
+    fn expose_sensor(&self, photo: &mut Image<LinearRgb>) {
         let mut noise = normal(3);
         for p in photo.pixels_mut() {
             *p = p.map(|v| coded_to_8_bits(v + self.noise * noise() as f32));
         }
-        photo
     }
 
     fn mask(&self) -> Mask {
@@ -244,11 +252,6 @@ fn intersection_over_union(tight: &Image<Coverage>, mask: &Mask) -> f64 {
     let pairs: Vec<_> = found.zip(mask.pixels().iter().copied()).collect();
     let shared = pairs.iter().filter(|(a, b)| *a && *b).count();
     shared as f64 / pairs.iter().filter(|(a, b)| *a || *b).count() as f64
-}
-
-fn largest_difference(a: [f64; 4], b: [f64; 4]) -> f64 {
-    let off = a.iter().zip(b).map(|(a, b)| (a - b).abs());
-    off.fold(0.0, f64::max)
 }
 
 /// Left, top, right and bottom of a mask.

@@ -8,7 +8,6 @@ mod blocks;
 mod chroma;
 mod parts;
 mod read;
-mod runs;
 mod samples;
 mod write;
 
@@ -18,6 +17,5 @@ pub use write::Compression;
 
 pub(crate) use parts::encode_parts;
 pub(crate) use read::{channels, decode, header};
-pub(crate) use runs::encode_runs;
-pub(crate) use samples::{float_samples, half_samples, to_halves};
+pub(crate) use samples::{float_samples, half_samples};
 pub(crate) use write::encode;
