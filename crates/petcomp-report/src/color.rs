@@ -97,7 +97,6 @@ impl Conversion<'_> {
 
 fn encoding() -> Result<Diagram> {
     let lights = shuffled_lights();
-    let wrong = count_wrong_codes(&encode_by_table(&lights), &lights);
     let reason = "what rounding to 8 bits costs, and 1 % for the few values";
     Ok(Diagram {
         file: "color_encode".into(),
@@ -106,12 +105,19 @@ fn encoding() -> Result<Diagram> {
         error: "RMS error of the encoded value".into(),
         points: encoding_points(&lights)?,
         limit: Some((1.01 * ROUNDING_RMS / MAX_CODE_8, reason.into())),
-        why: format!(
-            "Pictures have 8 bits, and {wrong} of {} codes differ from the nearest one: the table is the formula, rounded.",
-            lights.len()
-        ),
+        why: why_table(&lights),
         ..color_diagram()
     })
+}
+
+fn why_table(lights: &[f32]) -> String {
+    let (wrong, all) = (
+        count_wrong_codes(&encode_by_table(lights), lights),
+        lights.len(),
+    );
+    format!(
+        "Pictures have 8 bits, and {wrong} of {all} codes differ from the nearest one: the table is the formula, rounded."
+    )
 }
 
 /// What both diagrams share.
@@ -161,9 +167,14 @@ fn encode_by_table_16(values: &[f32]) -> Vec<u16> {
 /// Codes that are not the nearest to what the closed form gives.
 fn count_wrong_codes(codes: &[u8], lights: &[f32]) -> usize {
     let all = codes.iter().zip(lights);
-    // Half a code, and a little for the closed form's own rounding.
-    all.filter(|(c, v)| (f64::from(**c) - MAX_CODE_8 * encoded(f64::from(**v))).abs() > 0.5 + 1e-9)
+    all.filter(|(code, light)| is_wrong_code(**code, **light))
         .count()
+}
+
+fn is_wrong_code(code: u8, light: f32) -> bool {
+    let exact = MAX_CODE_8 * encoded(f64::from(light));
+    // Half a code, and a little for the closed form's own rounding.
+    (f64::from(code) - exact).abs() > 0.5 + 1e-9
 }
 
 fn decoding() -> Result<Diagram> {

@@ -140,15 +140,19 @@ impl From<Spread> for SampleMoments {
 ///
 /// [Welch 1947]: https://doi.org/10.1093/biomet/34.1-2.28
 pub fn welch_test(a: SampleMoments, b: SampleMoments) -> Option<f64> {
-    let (va, vb) = (a.variance_of_mean(), b.variance_of_mean());
-    let sum = va + vb;
+    let sum = a.variance_of_mean() + b.variance_of_mean();
     if a.n < 2 || b.n < 2 || sum <= 0.0 {
         return None;
     }
-    let freedom = sum * sum / (va * va / a.freedom() + vb * vb / b.freedom());
     let t = (a.mean - b.mean).abs() / sum.sqrt();
-    let distribution = StudentsT::new(0.0, 1.0, freedom).ok()?;
+    let distribution = StudentsT::new(0.0, 1.0, welch_freedom(a, b)).ok()?;
     Some(2.0 * distribution.sf(t))
+}
+
+/// Degrees of freedom of the difference of two means.
+fn welch_freedom(a: SampleMoments, b: SampleMoments) -> f64 {
+    let (va, vb) = (a.variance_of_mean(), b.variance_of_mean());
+    (va + vb) * (va + vb) / (va * va / a.freedom() + vb * vb / b.freedom())
 }
 
 /// Our numbers beside the paper's: a row per value of the paper, ours empty where there is no run.

@@ -221,14 +221,14 @@ pub fn table(rows: &[FlagRow]) -> Table {
 
 /// How many photos of a variant there are, and how many ended in each way.
 fn counts_of(rows: &[FlagRow], variant: PhotoVariant) -> impl Iterator<Item = usize> {
-    let ends: Vec<_> = rows
-        .iter()
-        .filter(|row| row.variant == variant)
-        .map(|row| row.judged.end)
-        .collect();
-    let count = ends.len();
-    let each = End::ALL.map(|end| ends.iter().filter(|found| **found == end).count());
-    [count].into_iter().chain(each)
+    let of_variant = rows.iter().filter(|row| row.variant == variant);
+    let ends: Vec<End> = of_variant.map(|row| row.judged.end).collect();
+    let each = End::ALL.map(|end| count_end(&ends, end));
+    [ends.len()].into_iter().chain(each)
+}
+
+fn count_end(ends: &[End], end: End) -> usize {
+    ends.iter().filter(|found| **found == end).count()
 }
 
 /// Every photo in every variant.

@@ -59,16 +59,20 @@ fn has_nan_sigma(solution: &Solution) -> bool {
 }
 
 fn is_camera_sound(camera: &Camera) -> bool {
+    camera_numbers(camera).iter().all(|v| v.is_finite()) && camera.center().z > 0.0
+}
+
+fn camera_numbers(camera: &Camera) -> [f64; 7] {
     let center = camera.center();
-    let numbers = [
+    [
         camera.focal_px.x,
         camera.principal_px.x,
         camera.principal_px.y,
         center.x,
         center.y,
+        center.z,
         camera.tilt(),
-    ];
-    numbers.iter().all(|v| v.is_finite()) && center.z.is_finite() && center.z > 0.0
+    ]
 }
 
 fn is_fit_finite(solution: &Solution) -> bool {
@@ -160,9 +164,8 @@ fn focal_recovery(name: &str, scenario: Scenario, limit: f64) -> HardCase {
 fn recover_focal_lengths(scenario: &Scenario, limit: f64) -> Result<Outcome> {
     let (mut worst, mut refused) = (0.0_f64, 0);
     for k in 0..VIEW_COUNT {
-        let view = exact_view(scenario, k, 1e-4);
-        match solve(&view.label, &without_priors()) {
-            Ok(solution) => worst = worst.max(sound_focal_error(&view, &solution)),
+        match recover_focal_length(&exact_view(scenario, k, 1e-4)) {
+            Ok(error) => worst = worst.max(error),
             Err(SolveError::Coincident { .. }) => refused += 1,
             Err(error) => return Err(error.into()),
         }
@@ -172,12 +175,13 @@ fn recover_focal_lengths(scenario: &Scenario, limit: f64) -> Result<Outcome> {
 }
 
 /// The relative error of the focal length; infinite for an unsound solution.
-fn sound_focal_error(view: &View, solution: &Solution) -> f64 {
-    if is_sound(solution) {
-        focal_error(view, solution)
+fn recover_focal_length(view: &View) -> std::result::Result<f64, SolveError> {
+    let solution = solve(&view.label, &without_priors())?;
+    Ok(if is_sound(&solution) {
+        focal_error(view, &solution)
     } else {
         f64::INFINITY
-    }
+    })
 }
 
 fn nearly_level() -> HardCase {
@@ -256,9 +260,12 @@ fn with_priors() -> HardCase {
 fn solve_with_priors() -> Result<Outcome> {
     let found = solve(&from_infinity(), &SolveOptions::default())?;
     let passed = found.focal_source != FocalSource::Unbounded && is_sound(&found);
-    let focal_px = found.camera.focal_px.x;
-    let measured = format!("{focal_px:.0} px, {:?}", found.focal_source);
-    Ok(Outcome::new(measured, passed))
+    Ok(Outcome::new(focal_and_source(&found), passed))
+}
+
+fn focal_and_source(solution: &Solution) -> String {
+    let focal_px = solution.camera.focal_px.x;
+    format!("{focal_px:.0} px, {:?}", solution.focal_source)
 }
 
 fn inverse_perspective() -> HardCase {

@@ -83,8 +83,12 @@ fn through_file(name: &str, values: &[f32], options: &WriteOptions) -> Result<Ve
     let folder = CaseFolder::new()?;
     let path = folder.path(name);
     io::write_with(&path, &green_row(values), options)?;
-    let back = io::read::<LinearRgb>(&path)?;
-    Ok(back.pixels().iter().map(|p| p.g).collect())
+    read_green(&path)
+}
+
+fn read_green(path: &Path) -> Result<Vec<f32>> {
+    let picture = io::read::<LinearRgb>(path)?;
+    Ok(picture.pixels().iter().map(|p| p.g).collect())
 }
 
 fn green_row(values: &[f32]) -> Image<LinearRgb> {

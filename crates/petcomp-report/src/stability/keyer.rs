@@ -75,9 +75,12 @@ fn weak_screen(saturation: f32) -> HardCase {
 
 fn key_weak_screen(saturation: f32) -> Result<Outcome> {
     let screen = LinearRgb::new(0.5, 0.5 + saturation, 0.5);
-    let photo = nearly_grey_photo();
-    let keyed = profiles().map(|p| key(&photo, screen, &KeyOptions::for_profile(p)));
+    let keyed = key_by_profiles(&nearly_grey_photo(), screen);
     Ok(outside_unit_range(keyed.into_iter()))
+}
+
+fn key_by_profiles(photo: &Image<LinearRgb>, screen: LinearRgb) -> [Keyed; 4] {
+    profiles().map(|p| key(photo, screen, &KeyOptions::for_profile(p)))
 }
 
 fn nearly_grey_photo() -> Image<LinearRgb> {
@@ -95,9 +98,13 @@ fn known_pixel(name: &str, value: [f32; 3], expected: f32) -> HardCase {
 }
 
 fn key_known_pixel(value: [f32; 3], expected: f32) -> Result<Outcome> {
-    let photo = Image::filled(1, 1, value.into());
-    let matte = key(&photo, GREEN, &KeyOptions::default()).matte[(0, 0)].0;
+    let matte = matte_of_pixel(value.into());
     Ok(Outcome::near(matte.into(), expected.into(), 1e-7, ""))
+}
+
+fn matte_of_pixel(value: LinearRgb) -> f32 {
+    let photo = Image::filled(1, 1, value);
+    key(&photo, GREEN, &KeyOptions::default()).matte[(0, 0)].0
 }
 
 fn screen_color() -> HardCase {
@@ -110,8 +117,7 @@ fn screen_color() -> HardCase {
 }
 
 fn key_screen_color() -> Result<Outcome> {
-    let photo = Image::filled(64, 64, GREEN);
-    let keyed = profiles().map(|p| key(&photo, GREEN, &KeyOptions::for_profile(p)));
+    let keyed = key_by_profiles(&Image::filled(64, 64, GREEN), GREEN);
     let left = keyed.iter().map(light_and_coverage).sum();
     Ok(Outcome::near(left, 0.0, 0.0, ""))
 }

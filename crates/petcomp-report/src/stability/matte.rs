@@ -284,13 +284,18 @@ fn folded_film(x: usize, y: usize) -> (f32, f32) {
 fn film_on(screen: LinearRgb, exposure: f32) -> Image<LinearRgb> {
     let mask = ellipse();
     Image::from_fn(SIZE.0, SIZE.1, |x, y| {
-        let (light, passes) = if mask[(x, y)].0 > 0.0 {
-            folded_film(x, y)
-        } else {
-            (0.0, 1.0)
-        };
+        let (light, passes) = film_or_nothing(&mask, x, y);
         screen.map(|k| ((light + passes * k) * exposure).min(1.0))
     })
+}
+
+/// Light and transmittance of the film in the mask, of nothing beside it.
+fn film_or_nothing(mask: &Image<Coverage>, x: usize, y: usize) -> (f32, f32) {
+    if mask[(x, y)].0 > 0.0 {
+        folded_film(x, y)
+    } else {
+        (0.0, 1.0)
+    }
 }
 
 fn filled(color: LinearRgb) -> Image<LinearRgb> {
@@ -434,11 +439,15 @@ fn transmittance_error(found: &Image<LinearRgb>) -> f64 {
 }
 
 fn mean_error_inside(found: &Image<LinearRgb>, expected: impl Fn(usize, usize) -> f32) -> f64 {
-    let mask = ellipse();
-    let pixels = (0..SIZE.1).flat_map(|y| (0..SIZE.0).map(move |x| (x, y)));
-    let inside = pixels.filter(|&at| mask[at].0 > 0.0);
+    let inside = pixels_inside().into_iter();
     let off = inside.map(|(x, y)| f64::from((found[(x, y)].g - expected(x, y)).abs()));
     off.sum::<f64>() / ellipse_area()
+}
+
+fn pixels_inside() -> Vec<(usize, usize)> {
+    let mask = ellipse();
+    let pixels = (0..SIZE.1).flat_map(|y| (0..SIZE.0).map(move |x| (x, y)));
+    pixels.filter(|&at| mask[at].0 > 0.0).collect()
 }
 
 fn empty_mask() -> HardCase {

@@ -39,12 +39,14 @@ pub(super) fn camera_looking_at(
     image: [u32; 2],
     focal_px: f64,
 ) -> Camera {
-    let [eye, target] = [eye, target].map(Point3::from);
-    let world_from_camera = Pose::face_towards(&eye, &target, &-Vector3::z());
     Camera {
-        camera_from_world: world_from_camera.inverse(),
+        camera_from_world: pose_facing(eye.into(), target.into()).inverse(),
         ..camera_above(image, focal_px)
     }
+}
+
+fn pose_facing(eye: Point3<f64>, target: Point3<f64>) -> Pose {
+    Pose::face_towards(&eye, &target, &-Vector3::z())
 }
 
 /// A folder that is removed when it is dropped.

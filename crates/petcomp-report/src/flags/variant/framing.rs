@@ -20,14 +20,17 @@ pub(super) fn cut_off(whole: Trial, share: f64) -> Trial {
 }
 
 fn cropped(whole: Trial, roi: Roi) -> Trial {
-    let (x, y) = (roi.x as f64, roi.y as f64);
-    let [left, top, right, bottom] = whole.box_px;
     Trial {
         photo: whole.photo.crop(roi),
         mask: whole.mask.crop(roi),
-        box_px: [left - x, top - y, right - x, bottom - y],
+        box_px: cropped_box(whole.box_px, roi),
         ..whole
     }
+}
+
+fn cropped_box([left, top, right, bottom]: [f64; 4], roi: Roi) -> [f64; 4] {
+    let (x, y) = (roi.x as f64, roi.y as f64);
+    [left - x, top - y, right - x, bottom - y]
 }
 
 /// The photo and its mirror image beside each other.
@@ -125,9 +128,13 @@ const SMALL_OBJECT_SHARE: f64 = 0.02;
 /// The object scaled down to that share, on the same screen.
 pub(super) fn small_object(known: &Known, whole: Trial) -> Trial {
     let (w, h) = known.photo.size();
-    let covered: f64 = known.mask.pixels().iter().map(|c| f64::from(c.0)).sum();
-    let scale = (SMALL_OBJECT_SHARE * (w * h) as f64 / covered).sqrt();
+    let wanted = SMALL_OBJECT_SHARE * (w * h) as f64;
+    let scale = (wanted / total_coverage(&known.mask)).sqrt();
     shrunk(known, whole, [scale, scale])
+}
+
+fn total_coverage(mask: &Image<Coverage>) -> f64 {
+    mask.pixels().iter().map(|c| f64::from(c.0)).sum()
 }
 
 /// Width of a thin object as a share of what it was.
