@@ -55,7 +55,7 @@ pub struct Judgement {
     /// How it ended.
     pub end: End,
     /// Why the cut-out needs review, or why there is none.
-    pub doubts: Vec<String>,
+    pub reasons: Vec<String>,
 }
 
 /// How a photo ended.
@@ -132,7 +132,7 @@ impl Trial {
             Err(error) => Judgement {
                 errors: None,
                 end: self.end_of_refused(),
-                doubts: vec![error.to_string()],
+                reasons: vec![error.to_string()],
             },
         }
     }
@@ -146,12 +146,12 @@ impl Trial {
     }
 
     fn judge(&self, cut: &CutOut) -> Judgement {
-        let (errors, doubts) = (self.errors(cut), outline_doubts(cut));
+        let (errors, reasons) = (self.errors(cut), outline_reasons(cut));
         let is_right = is_right(errors, cut.segmentation.reduction);
         Judgement {
             errors: Some(errors),
-            end: self.expected.end(is_right, !doubts.is_empty()),
-            doubts,
+            end: self.expected.end(is_right, !reasons.is_empty()),
+            reasons,
         }
     }
 
@@ -180,7 +180,7 @@ pub(crate) fn is_right([iou, box_px]: [f64; 2], reduction: f64) -> bool {
 }
 
 /// Why an outline needs review; its colours are another matter.
-fn outline_doubts(cut: &CutOut) -> Vec<String> {
+fn outline_reasons(cut: &CutOut) -> Vec<String> {
     let of_outline = cut
         .diagnostics
         .iter()
@@ -248,7 +248,7 @@ impl FlagRow {
             four_decimals(iou),
             four_decimals(box_px),
             judged.end.name().into(),
-            judged.doubts.join("; "),
+            judged.reasons.join("; "),
         ]
     }
 }
@@ -373,7 +373,7 @@ mod tests {
             judged: Judgement {
                 errors: None,
                 end,
-                doubts: vec!["x; y".into()],
+                reasons: vec!["x; y".into()],
             },
         };
         let rows = [

@@ -35,7 +35,7 @@ pub struct WorkRow {
 
 impl WorkRow {
     /// Every count that must be zero is.
-    pub fn is_as_promised(&self) -> bool {
+    pub fn is_as_expected(&self) -> bool {
         self.counts
             .iter()
             .all(|(kind, count)| *count == 0 || !self.absent.contains(kind))
@@ -162,7 +162,7 @@ fn scenes_by_kinds(rows: &[WorkRow], shown: impl Fn(&WorkRow, Kind, u64) -> Stri
 
 /// The table with its explanation.
 fn markdown(rows: &[WorkRow]) -> String {
-    let kept = rows.iter().filter(|row| row.is_as_promised()).count();
+    let kept = rows.iter().filter(|row| row.is_as_expected()).count();
     let head = format!(
         "# What scenes pay for\n\nCounted, not timed; the same numbers at any thread count. ✓ marks a zero that is \
          guaranteed and tested. {kept} of {} scenes are as expected.\n\n",

@@ -221,10 +221,10 @@ pub(super) struct OutlineAccuracy {
     pub(super) iou: f64,
     /// The largest error of a side of the box, pixels.
     pub(super) box_px: f64,
-    /// It is within the bounds that are promised.
+    /// It is within the bounds of a good outline.
     pub(super) is_right: bool,
     /// Why the outline needs review; what film cannot know on a screen of its own hue is another matter.
-    pub(super) doubts: Vec<String>,
+    pub(super) reasons: Vec<String>,
 }
 
 impl OutlineAccuracy {
@@ -236,7 +236,7 @@ impl OutlineAccuracy {
             iou,
             box_px,
             is_right: is_right([iou, box_px], found.reduction),
-            doubts: review_messages(&found.diagnostics),
+            reasons: review_messages(&found.diagnostics),
         }
     }
 }

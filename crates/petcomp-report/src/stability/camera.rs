@@ -155,8 +155,9 @@ fn extreme_cameras() -> Vec<HardCase> {
 /// Corners are doubles of up to 20 000 px: the perspective in them, over their size, bounds the accuracy.
 fn focal_recovery(name: &str, scenario: Scenario, limit: f64) -> HardCase {
     let input = format!("exact corners of {VIEW_COUNT} views at 25 degrees");
-    let promise = format!("focal length back to {limit:e}, or two corners reported as coincident");
-    HardCase::new(name, input, promise, move || {
+    let expectation =
+        format!("focal length back to {limit:e}, or two corners reported as coincident");
+    HardCase::new(name, input, expectation, move || {
         recover_focal_lengths(&scenario, limit)
     })
 }

@@ -108,8 +108,8 @@ impl ScoreCases {
         images: fn() -> Vec<EvalImage>,
     ) -> HardCase {
         let name = format!("{}: {what}", self.name);
-        let promise = format!("mAP {expected}, to 1e-9");
-        HardCase::new(name, input, promise, move || {
+        let expectation = format!("mAP {expected}, to 1e-9");
+        HardCase::new(name, input, expectation, move || {
             Ok(compare_map(&images(), self.definition, expected))
         })
     }

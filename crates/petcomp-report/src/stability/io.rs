@@ -103,8 +103,8 @@ fn listed(values: &[f32]) -> String {
 
 fn half_float(name: &str, values: &'static [f32], expected: &'static [f32]) -> HardCase {
     let input = format!("{} to a half-float EXR and back", listed(values));
-    let promise = format!("{}: clamped, never infinite", listed(expected));
-    HardCase::new(name, input, promise, move || {
+    let expectation = format!("{}: clamped, never infinite", listed(expected));
+    HardCase::new(name, input, expectation, move || {
         write_half_floats(values, expected)
     })
 }
@@ -267,8 +267,8 @@ fn lying(
     limit: &'static str,
     make: fn(&Path) -> Result<PathBuf>,
 ) -> HardCase {
-    let promise = format!("refused by Limits::{limit}, within 64 MiB");
-    HardCase::new(name, input, promise, move || {
+    let expectation = format!("refused by Limits::{limit}, within 64 MiB");
+    HardCase::new(name, input, expectation, move || {
         let folder = CaseFolder::new()?;
         Ok(read_lying_file(&make(folder.0.path())?, limit))
     })

@@ -91,8 +91,8 @@ fn nearly_grey_photo() -> Image<LinearRgb> {
 
 fn known_pixel(name: &str, value: [f32; 3], expected: f32) -> HardCase {
     let input = format!("{value:?} against {:?}", <[f32; 3]>::from(GREEN));
-    let promise = format!("a matte of {expected}, as Blender 3.4.1 prints it, to 1e-7");
-    HardCase::new(name, input, promise, move || {
+    let expectation = format!("a matte of {expected}, as Blender 3.4.1 prints it, to 1e-7");
+    HardCase::new(name, input, expectation, move || {
         key_known_pixel(value, expected)
     })
 }

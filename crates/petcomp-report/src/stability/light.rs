@@ -327,12 +327,15 @@ fn tint_of_surface(plate: &Image<LinearRgb>) -> LightTint {
 
 /// The noise of a plate as the standard deviation at mid grey; none where it cannot be measured.
 fn measured_noise(name: &str, plate: Image<LinearRgb>, expected: Option<f64>) -> HardCase {
-    let promise = expected.map_or("none is reported".into(), |sigma| {
+    let expectation = expected.map_or("none is reported".into(), |sigma| {
         format!("a deviation of {sigma}, to 1e-4")
     });
-    HardCase::new(format!("noise: {name}"), "measured", promise, move || {
-        Ok(compare_noise(plate_noise(&plate), expected))
-    })
+    HardCase::new(
+        format!("noise: {name}"),
+        "measured",
+        expectation,
+        move || Ok(compare_noise(plate_noise(&plate), expected)),
+    )
 }
 
 fn compare_noise(found: Noise, expected: Option<f64>) -> Outcome {

@@ -51,11 +51,11 @@ impl ExpectedCutOut {
     }
 
     fn is_met(self, cut: &CutOut, found: &OutlineAccuracy) -> bool {
-        let doubts = &found.doubts;
+        let reasons = &found.reasons;
         match self {
-            Self::Right => found.is_right && doubts.is_empty() && is_clean(cut),
-            Self::RightOrFlagged => found.is_right || !doubts.is_empty(),
-            Self::Flagged(what) => doubts.iter().any(|doubt| doubt.contains(what)),
+            Self::Right => found.is_right && reasons.is_empty() && is_clean(cut),
+            Self::RightOrFlagged => found.is_right || !reasons.is_empty(),
+            Self::Flagged(what) => reasons.iter().any(|reason| reason.contains(what)),
         }
     }
 }
@@ -93,9 +93,9 @@ impl ExpectedCutOut {
 }
 
 fn measured_cut_out(cut: &CutOut, found: &OutlineAccuracy) -> String {
-    let doubts = joined(&found.doubts, "not flagged");
+    let reasons = joined(&found.reasons, "not flagged");
     format!(
-        "IoU {:.4}, box off by {:.2} px, residual matte {:.4}, {doubts}",
+        "IoU {:.4}, box off by {:.2} px, residual matte {:.4}, {reasons}",
         found.iou, found.box_px, cut.residual_matte
     )
 }
@@ -109,7 +109,7 @@ fn joined(messages: &[String], none: &str) -> String {
     }
 }
 
-/// Nearly grey: film cannot be told from such a screen.
+/// Nearly grey: film cannot be distinguished from such a screen.
 const GREY_SCREEN: LinearRgb = LinearRgb::new(0.5, 0.52, 0.5);
 /// A cap of the green screen's hue.
 const GREEN_CAP: LinearRgb = LinearRgb::new(0.02, 0.25, 0.05);
@@ -203,9 +203,9 @@ fn film_on_grey() -> HardCase {
 
 fn cut_out_film_on_grey() -> Result<Outcome> {
     let (cut, _) = on_screen(GREY_SCREEN).cut()?;
-    let doubts = review_messages(&cut.diagnostics);
-    let is_flagged = doubts.iter().any(|doubt| doubt.contains("too grey"));
-    Ok(Outcome::new(doubts.join("; "), is_flagged))
+    let reasons = review_messages(&cut.diagnostics);
+    let is_flagged = reasons.iter().any(|reason| reason.contains("too grey"));
+    Ok(Outcome::new(reasons.join("; "), is_flagged))
 }
 
 fn refused_photos() -> Vec<HardCase> {
@@ -340,7 +340,7 @@ fn film_matte(photo: &Image<LinearRgb>, screen: LinearRgb) -> Result<FilmMatte> 
     film(photo, &plate, &ellipse(), &FilmOptions::default())
 }
 
-/// A photo that tells nothing of the film: sound pixels all the same, and a diagnostic.
+/// A photo without information on the film: sound pixels all the same, and a diagnostic.
 fn flagged_film(
     name: &str,
     photo: Image<LinearRgb>,
@@ -352,10 +352,13 @@ fn flagged_film(
     } else {
         format!("; reported: \"{cause}\"")
     };
-    let promise = format!("opacity in 0..1 and light finite in every pixel{reported}");
-    HardCase::new(name, "neutral film on an even screen", promise, move || {
-        Ok(judge_soundness(&film_matte(&photo, screen)?, cause))
-    })
+    let expectation = format!("opacity in 0..1 and light finite in every pixel{reported}");
+    HardCase::new(
+        name,
+        "neutral film on an even screen",
+        expectation,
+        move || Ok(judge_soundness(&film_matte(&photo, screen)?, cause)),
+    )
 }
 
 fn judge_soundness(found: &FilmMatte, cause: &str) -> Outcome {
@@ -372,8 +375,8 @@ fn reported(diagnostics: &[Diagnostic]) -> String {
 
 /// A photo of one colour: nothing passes where it is black, all where it is the screen's.
 fn even_film(name: &str, color: LinearRgb, expected: f32) -> HardCase {
-    let promise = format!("transmittance {expected} in every pixel, to 0.05 on average");
-    HardCase::new(name, "on an even green screen", promise, move || {
+    let expectation = format!("transmittance {expected} in every pixel, to 0.05 on average");
+    HardCase::new(name, "on an even green screen", expectation, move || {
         judge_even_film(color, expected)
     })
 }

@@ -515,10 +515,10 @@ fn covering(name: &str, shot: Shot, [least, most]: [f64; 2]) -> HardCase {
     } else {
         format!("{least:.2} to {most}")
     };
-    let promise = format!(
+    let expectation = format!(
         "coverage {coverage} in the middle (to 1e-5), light finite, shadows in 0..1, in either renderer"
     );
-    HardCase::new(name, "under a light of 10 W", promise, move || {
+    HardCase::new(name, "under a light of 10 W", expectation, move || {
         Ok(judge_coverage(&by_both_renderers(&shot), [least, most]))
     })
 }
