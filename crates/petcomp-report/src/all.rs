@@ -232,7 +232,7 @@ fn stability_of_stages() -> Result<Section> {
 
 fn counted_work() -> Result<Section> {
     let rows = work::measure(|_, _| ())?;
-    let kept = rows.iter().filter(|row| row.is_as_promised()).count();
+    let kept = rows.iter().filter(|row| row.is_as_expected()).count();
     Ok(Section::new("A scene pays for what it uses")
         .text(format!(
             "Work, counted and not timed: the same at every run and on every machine. A marked zero is promised; {kept} of {} \
