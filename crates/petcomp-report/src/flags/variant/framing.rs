@@ -3,8 +3,8 @@
 use super::super::Trial;
 use super::sensor::noisy;
 use crate::matte::truth::Known;
+use petcomp::Coverage;
 use petcomp::filter;
-use petcomp::{Coverage, Mix};
 use petcomp::{Image, Roi};
 use std::ops::Range;
 
@@ -145,8 +145,10 @@ pub(super) fn thin_object(known: &Known, whole: Trial) -> Trial {
 fn shrunk(known: &Known, whole: Trial, scale: [f64; 2]) -> Trial {
     let (w, h) = known.photo.size();
     let inset = Inset::new(known.photo.size(), scale);
-    let [light, through] = [&known.foreground, &known.transmittance].map(|p| inset.resize(p));
-    let small = inset.resize(&known.mask);
+    let [inner_w, inner_h] = inset.to;
+    let [light, through] = [&known.foreground, &known.transmittance]
+        .map(|picture| filter::resize(picture, inner_w, inner_h));
+    let small = filter::resize(&known.mask, inner_w, inner_h);
     let clean = Image::from_fn(w, h, |x, y| {
         let screen = known.screen[(x, y)];
         inset
@@ -179,10 +181,6 @@ impl Inset {
             to,
             corner: [(w - to[0]) / 2, (h - to[1]) / 2],
         }
-    }
-
-    fn resize<P: Mix + Send + Sync>(&self, picture: &Image<P>) -> Image<P> {
-        filter::resize(picture, self.to[0], self.to[1])
     }
 
     /// The pixel of the smaller picture at a pixel of the frame; nothing beside it.
