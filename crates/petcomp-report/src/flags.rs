@@ -145,12 +145,8 @@ impl Trial {
     }
 
     fn judge(&self, cut: &CutOut) -> Judgement {
-        let errors = self.errors(cut);
-        let [iou, box_px] = errors;
-        // Pixels of a reduced search are that much larger.
-        let is_right =
-            iou >= GOOD_IOU && box_px <= GOOD_BOX_PX * cut.segmentation.reduction.max(1.0);
-        let doubts = outline_doubts(cut);
+        let (errors, doubts) = (self.errors(cut), outline_doubts(cut));
+        let is_right = is_right(errors, cut.segmentation.reduction);
         Judgement {
             errors: Some(errors),
             end: self.expected.end(is_right, !doubts.is_empty()),
@@ -178,6 +174,11 @@ impl Expected {
     }
 }
 
+/// Pixels of a reduced search are that much larger.
+pub(crate) fn is_right([iou, box_px]: [f64; 2], reduction: f64) -> bool {
+    iou >= GOOD_IOU && box_px <= GOOD_BOX_PX * reduction.max(1.0)
+}
+
 /// Why an outline needs review; its colours are another matter.
 fn outline_doubts(cut: &CutOut) -> Vec<String> {
     let of_outline = cut
@@ -188,7 +189,7 @@ fn outline_doubts(cut: &CutOut) -> Vec<String> {
 }
 
 /// Left, top, right and bottom of a polygon.
-fn bounding_sides(polygon: &[Point2<f64>]) -> [f64; 4] {
+pub(crate) fn bounding_sides(polygon: &[Point2<f64>]) -> [f64; 4] {
     [
         least(polygon, |p| p.x),
         least(polygon, |p| p.y),
@@ -206,13 +207,23 @@ pub fn table(rows: &[FlagRow]) -> Table {
     let ends = End::ALL.map(End::name);
     let mut table = Table::new(["photos", "made of"].into_iter().chain(ends));
     for variant in PhotoVariant::ALL {
-        let own: Vec<_> = rows.iter().filter(|row| row.variant == variant).collect();
-        let counts = End::ALL.map(|end| own.iter().filter(|row| row.judged.end == end).count());
-        let counts = [own.len()].into_iter().chain(counts);
-        let name = [variant.name().to_owned()].into_iter();
-        table.push(name.chain(counts.map(|count| count.to_string())));
+        let name = variant.name().to_owned();
+        let counts = counts_of(rows, variant).map(|count| count.to_string());
+        table.push([name].into_iter().chain(counts));
     }
     table
+}
+
+/// How many photos of a variant there are, and how many ended in each way.
+fn counts_of(rows: &[FlagRow], variant: PhotoVariant) -> impl Iterator<Item = usize> {
+    let ends: Vec<_> = rows
+        .iter()
+        .filter(|row| row.variant == variant)
+        .map(|row| row.judged.end)
+        .collect();
+    let count = ends.len();
+    let each = End::ALL.map(|end| ends.iter().filter(|found| **found == end).count());
+    [count].into_iter().chain(each)
 }
 
 /// Every photo in every variant.

@@ -1,6 +1,8 @@
 //! Datasets that are hard to write: of empty pictures, of crowds, cut off in the middle, with numbers at their ends.
 
-use super::staged::{camera_above, empty_scene, grey, level_card, one_deep_pixel, rendered};
+use super::staged::{
+    camera_above, empty_scene, grey, level_card, one_deep_pixel, rendered, temporary_folder,
+};
 use super::{HardCase, Outcome};
 use petcomp::composite;
 use petcomp::dataset::{
@@ -81,7 +83,7 @@ struct TestDataset {
 
 impl TestDataset {
     fn new(count: u64, make: impl Fn(u64) -> Sample + Sync) -> Result<Self> {
-        let folder = tempfile::tempdir().map_err(|e| Error::file(std::env::temp_dir(), e))?;
+        let folder = temporary_folder()?;
         let dataset = Self { folder, count };
         dataset.generate_missing(make)?;
         Ok(dataset)
@@ -118,9 +120,7 @@ impl TestDataset {
         let messages = findings
             .into_iter()
             .map(|finding| finding.diagnostic.message);
-        Ok(messages
-            .filter(|what| !what.contains("looks like") && !what.contains("same bytes"))
-            .collect())
+        Ok(messages.filter(|what| !is_about_similarity(what)).collect())
     }
 
     fn picture(&self, k: u64) -> PathBuf {
@@ -158,6 +158,10 @@ fn all_writers() -> Vec<Box<dyn Writer>> {
 fn listed(faults: &[String]) -> String {
     let text = format!("{} faults {}", faults.len(), faults.join("; "));
     text.trim_end().into()
+}
+
+fn is_about_similarity(message: &str) -> bool {
+    message.contains("looks like") || message.contains("same bytes")
 }
 
 fn empty_pictures() -> HardCase {
@@ -233,18 +237,15 @@ fn write_row_of_one_pixel() -> Result<Outcome> {
 }
 
 fn too_small() -> HardCase {
-    HardCase::new(
+    HardCase::refused(
         "one-pixel pictures",
         "1 x 1 pixel, for YOLO",
-        "refused: \"expected at least 10 a side\"",
-        generate_too_small,
+        "expected at least 10 a side",
+        || {
+            let shot = Shot::new(camera_above([1, 1], 100.0));
+            TestDataset::new(1, |_| rendered_sample(&shot))
+        },
     )
-}
-
-fn generate_too_small() -> Result<Outcome> {
-    let shot = Shot::new(camera_above([1, 1], 100.0));
-    let attempt = TestDataset::new(1, |_| rendered_sample(&shot));
-    Ok(Outcome::refused(attempt, "expected at least 10 a side"))
 }
 
 /// Ten pictures of a card.

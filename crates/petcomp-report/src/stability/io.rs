@@ -1,5 +1,6 @@
 //! Files that are hard to write or to read: values beyond a half float, the smallest ones, cut and lying headers, 16k.
 
+use super::staged::temporary_folder;
 use super::{HardCase, Outcome, memory};
 use petcomp::Image;
 use petcomp::io::{self, Bits, ReadOptions, WriteOptions, exr};
@@ -64,8 +65,7 @@ struct CaseFolder(TempDir);
 
 impl CaseFolder {
     fn new() -> Result<Self> {
-        let folder = tempfile::tempdir().map_err(|e| Error::file(std::env::temp_dir(), e))?;
-        Ok(Self(folder))
+        Ok(Self(temporary_folder()?))
     }
 
     fn path(&self, name: impl AsRef<Path>) -> PathBuf {

@@ -134,11 +134,13 @@ fn smaller_than_a_pixel() -> HardCase {
         "object of a hundredth of a pixel",
         "a card of 1 x 1 mm where a pixel is 10 mm",
         "below the threshold of 0.1 in every pixel: no label, 0",
-        || {
-            let found = labels_of([64, 48], [opaque_card(1, [0.0; 3], 0.001)]);
-            Ok(Outcome::none(found.len(), "labels"))
-        },
+        label_tiny_object,
     )
+}
+
+fn label_tiny_object() -> Result<Outcome> {
+    let found = labels_of([64, 48], [opaque_card(1, [0.0; 3], 0.001)]);
+    Ok(Outcome::none(found.len(), "labels"))
 }
 
 fn many_in_a_pixel() -> HardCase {
@@ -302,11 +304,13 @@ fn broken_outline() -> HardCase {
         "outline without an area",
         "no corner, one, two, three on a line, one of NaN",
         "the box of the mask all the same, no outline: 5 of 5",
-        || {
-            let right = BROKEN_OUTLINES.iter().filter(|o| is_boxed_by_mask(o));
-            Ok(Outcome::count(right.count(), 5, "right"))
-        },
+        label_broken_outlines,
     )
+}
+
+fn label_broken_outlines() -> Result<Outcome> {
+    let right = BROKEN_OUTLINES.iter().filter(|o| is_boxed_by_mask(o));
+    Ok(Outcome::count(right.count(), 5, "right"))
 }
 
 fn is_boxed_by_mask(outline: &[[f64; 2]]) -> bool {

@@ -89,11 +89,13 @@ fn inside_the_lamp() -> HardCase {
         "receiver in the middle of a light",
         "a light of 1 x 1 m, the point its centre",
         "finite: 0, since it shines away",
-        || {
-            let found = received(&lamp([0.0; 3], 1.0, 10.0));
-            Ok(Outcome::near(found, 0.0, 0.0, "W/m2"))
-        },
+        light_inside_the_lamp,
     )
+}
+
+fn light_inside_the_lamp() -> Result<Outcome> {
+    let found = received(&lamp([0.0; 3], 1.0, 10.0));
+    Ok(Outcome::near(found, 0.0, 0.0, "W/m2"))
 }
 
 fn extreme_skies() -> Vec<HardCase> {

@@ -9,7 +9,7 @@ use petcomp::matte::{
     CutOut, CutOutOptions, FilmMatte, FilmOptions, PlateOptions, ScreenPlate, TriangulateOptions,
     Triangulated, cut_out, film, triangulate,
 };
-use petcomp::{Coverage, LinearRgb};
+use petcomp::{Coverage, Diagnostic, LinearRgb};
 
 pub(super) fn cases() -> Result<Vec<HardCase>> {
     let mut cases = keyer::cases();
@@ -51,10 +51,11 @@ impl ExpectedCutOut {
     }
 
     fn is_met(self, cut: &CutOut, found: &OutlineAccuracy) -> bool {
+        let doubts = &found.doubts;
         match self {
-            Self::Right => found.is_right && found.doubts.is_empty() && is_clean(cut),
-            Self::RightOrFlagged => found.is_right || !found.doubts.is_empty(),
-            Self::Flagged(what) => found.doubts.iter().any(|doubt| doubt.contains(what)),
+            Self::Right => found.is_right && doubts.is_empty() && is_clean(cut),
+            Self::RightOrFlagged => found.is_right || !doubts.is_empty(),
+            Self::Flagged(what) => doubts.iter().any(|doubt| doubt.contains(what)),
         }
     }
 }
@@ -72,25 +73,31 @@ fn cut_out_case(name: &str, expected: ExpectedCutOut, photo: BottlePhoto) -> Har
     let (w, h) = photo.size;
     let input = format!("a bottle on a screen, {w} x {h} pixels");
     HardCase::new(name, input, expected.description(), move || {
-        match (photo.cut(), expected) {
-            (Ok((cut, found)), _) => Ok(judge_cut_out(expected, &cut, &found)),
-            (Err(error), ExpectedCutOut::RightOrFlagged) => {
+        expected.outcome(photo.cut())
+    })
+}
+
+impl ExpectedCutOut {
+    fn outcome(self, result: Result<(CutOut, OutlineAccuracy)>) -> Result<Outcome> {
+        match (result, self) {
+            (Ok((cut, found)), _) => {
+                let measured = measured_cut_out(&cut, &found);
+                Ok(Outcome::new(measured, self.is_met(&cut, &found)))
+            }
+            (Err(error), Self::RightOrFlagged) => {
                 Ok(Outcome::new(format!("refused: {error}"), true))
             }
             (Err(error), _) => Err(error),
         }
-    })
+    }
 }
 
-fn judge_cut_out(expected: ExpectedCutOut, cut: &CutOut, found: &OutlineAccuracy) -> Outcome {
-    let measured = format!(
-        "IoU {:.4}, box off by {:.2} px, residual matte {:.4}, {}",
-        found.iou,
-        found.box_px,
-        cut.residual_matte,
-        joined(&found.doubts, "not flagged")
-    );
-    Outcome::new(measured, expected.is_met(cut, found))
+fn measured_cut_out(cut: &CutOut, found: &OutlineAccuracy) -> String {
+    let doubts = joined(&found.doubts, "not flagged");
+    format!(
+        "IoU {:.4}, box off by {:.2} px, residual matte {:.4}, {doubts}",
+        found.iou, found.box_px, cut.residual_matte
+    )
 }
 
 /// Messages in one line; `none` where there are none.
@@ -348,10 +355,14 @@ fn flagged_film(
 
 fn judge_soundness(found: &FilmMatte, cause: &str) -> Outcome {
     let unsound = found.film.pixels().iter().filter(|p| !p.is_sound()).count();
-    let messages: Vec<_> = found.diagnostics.iter().map(ToString::to_string).collect();
-    let reported = joined(&messages, "nothing reported");
+    let reported = reported(&found.diagnostics);
     let passed = unsound == 0 && reported.contains(cause);
     Outcome::new(format!("{unsound} px unsound, {reported}"), passed)
+}
+
+fn reported(diagnostics: &[Diagnostic]) -> String {
+    let messages: Vec<_> = diagnostics.iter().map(ToString::to_string).collect();
+    joined(&messages, "nothing reported")
 }
 
 /// A photo of one colour: nothing passes where it is black, all where it is the screen's.
@@ -435,11 +446,18 @@ fn empty_mask() -> HardCase {
         "film without an object",
         "a mask of zeros",
         "mask of the object is empty",
-        || {
-            let (plate, nothing) = (ScreenPlate::even(GREEN, SIZE), Image::new(SIZE.0, SIZE.1));
-            let photo = film_on(GREEN, 1.0);
-            film(&photo, &plate, &nothing, &FilmOptions::default())
-        },
+        film_without_object,
+    )
+}
+
+fn film_without_object() -> Result<FilmMatte> {
+    let plate = ScreenPlate::even(GREEN, SIZE);
+    let nothing = Image::new(SIZE.0, SIZE.1);
+    film(
+        &film_on(GREEN, 1.0),
+        &plate,
+        &nothing,
+        &FilmOptions::default(),
     )
 }
 
@@ -448,12 +466,14 @@ fn no_background() -> HardCase {
         "screen without background",
         "no pixel of it to fit to",
         "refused: there is not enough",
-        || {
-            let nowhere = Image::filled(SIZE.0, SIZE.1, false);
-            let plate = ScreenPlate::fit(&film_on(GREEN, 1.0), &nowhere, &PlateOptions::default());
-            Ok(Outcome::refused(plate, "background"))
-        },
+        fit_without_background,
     )
+}
+
+fn fit_without_background() -> Result<Outcome> {
+    let nowhere = Image::filled(SIZE.0, SIZE.1, false);
+    let plate = ScreenPlate::fit(&film_on(GREEN, 1.0), &nowhere, &PlateOptions::default());
+    Ok(Outcome::refused(plate, "background"))
 }
 
 /// What an exposure leaves of a screen before the sensor saturates.
@@ -486,11 +506,13 @@ fn exact_screens(name: &str, screens: [LinearRgb; 2]) -> HardCase {
         name,
         "neutral film on two even screens, no noise",
         "photo = F + T screen has one solution in green: T to 1e-4 on average",
-        move || {
-            let found = triangulated(screens, 1.0)?.transmittance;
-            Ok(Outcome::at_most(transmittance_error(&found), 1e-4, ""))
-        },
+        move || judge_exact_screens(screens),
     )
+}
+
+fn judge_exact_screens(screens: [LinearRgb; 2]) -> Result<Outcome> {
+    let found = triangulated(screens, 1.0)?.transmittance;
+    Ok(Outcome::at_most(transmittance_error(&found), 1e-4, ""))
 }
 
 fn similar_screens(name: &str, screens: [LinearRgb; 2]) -> HardCase {
@@ -535,10 +557,12 @@ fn one_screen() -> HardCase {
         "triangulation from one photo",
         "film on green",
         "expected at least 2",
-        || {
-            let (photo, plate) = (film_on(GREEN, 1.0), ScreenPlate::even(GREEN, SIZE));
-            let shots = [(&photo, &plate)];
-            triangulate(&shots, &ellipse(), &TriangulateOptions::default())
-        },
+        triangulate_one_photo,
     )
+}
+
+fn triangulate_one_photo() -> Result<Triangulated> {
+    let (photo, plate) = (film_on(GREEN, 1.0), ScreenPlate::even(GREEN, SIZE));
+    let options = TriangulateOptions::default();
+    triangulate(&[(&photo, &plate)], &ellipse(), &options)
 }

@@ -3,8 +3,8 @@
 use super::super::Trial;
 use super::sensor::noisy;
 use crate::matte::truth::Known;
-use petcomp::Coverage;
 use petcomp::filter;
+use petcomp::{Coverage, LinearRgb};
 use petcomp::{Image, Roi};
 use std::ops::Range;
 
@@ -67,14 +67,17 @@ pub(super) fn huge(whole: &Trial) -> Trial {
 fn resized(whole: &Trial, scale: f64) -> Trial {
     let (w, h) = whole.photo.size();
     let [to_w, to_h] = [w, h].map(|side| (side as f64 * scale).round() as usize);
-    let [sx, sy] = [to_w as f64 / w as f64, to_h as f64 / h as f64];
-    let [left, top, right, bottom] = whole.box_px;
+    let scales = [to_w as f64 / w as f64, to_h as f64 / h as f64];
     Trial {
         photo: filter::resize(&whole.photo, to_w, to_h),
         mask: filter::resize::<Coverage>(&whole.mask, to_w, to_h),
-        box_px: [left * sx, top * sy, right * sx, bottom * sy],
+        box_px: scaled_box(whole.box_px, scales),
         expected: whole.expected,
     }
+}
+
+fn scaled_box([left, top, right, bottom]: [f64; 4], [sx, sy]: [f64; 2]) -> [f64; 4] {
+    [left * sx, top * sy, right * sx, bottom * sy]
 }
 
 /// The photo turned on its side: rows become columns.
@@ -143,24 +146,10 @@ pub(super) fn thin_object(known: &Known, whole: Trial) -> Trial {
 
 /// The object made smaller by factors across and down, in the middle of its screen: `F + T K`, with the sensor's noise.
 fn shrunk(known: &Known, whole: Trial, scale: [f64; 2]) -> Trial {
-    let (w, h) = known.photo.size();
     let inset = Inset::new(known.photo.size(), scale);
-    let [inner_w, inner_h] = inset.to;
-    let [light, through] = [&known.foreground, &known.transmittance]
-        .map(|picture| filter::resize(picture, inner_w, inner_h));
-    let small = filter::resize(&known.mask, inner_w, inner_h);
-    let clean = Image::from_fn(w, h, |x, y| {
-        let screen = known.screen[(x, y)];
-        inset
-            .at(x, y)
-            .map_or(screen, |at| light[at] + through[at] * screen)
-    });
-    let mask = Image::from_fn(w, h, |x, y| {
-        inset.at(x, y).map_or(Coverage(0.0), |at| small[at])
-    });
     Trial {
-        photo: noisy(&clean, known.noise.read as f32, 1),
-        mask,
+        photo: noisy(&inset.photo(known), known.noise.read as f32, 1),
+        mask: inset.mask(known),
         box_px: inset.map_box(known.box_px),
         ..whole
     }
@@ -181,6 +170,29 @@ impl Inset {
             to,
             corner: [(w - to[0]) / 2, (h - to[1]) / 2],
         }
+    }
+
+    fn photo(&self, known: &Known) -> Image<LinearRgb> {
+        let [light, through] = [&known.foreground, &known.transmittance]
+            .map(|picture| filter::resize(picture, self.to[0], self.to[1]));
+        self.image(|x, y, inside| {
+            let screen = known.screen[(x, y)];
+            inside.map_or(screen, |at| light[at] + through[at] * screen)
+        })
+    }
+
+    fn mask(&self, known: &Known) -> Image<Coverage> {
+        let small = filter::resize(&known.mask, self.to[0], self.to[1]);
+        self.image(|_, _, inside| inside.map_or(Coverage(0.0), |at| small[at]))
+    }
+
+    /// A picture of the old frame from the pixels of it and, where there is one, of the smaller picture.
+    fn image<P: Copy + Send + Sync>(
+        &self,
+        pixel: impl Fn(usize, usize, Option<(usize, usize)>) -> P + Sync,
+    ) -> Image<P> {
+        let [w, h] = self.from;
+        Image::from_fn(w, h, |x, y| pixel(x, y, self.at(x, y)))
     }
 
     /// The pixel of the smaller picture at a pixel of the frame; nothing beside it.
