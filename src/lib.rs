@@ -102,6 +102,8 @@ pub use diagnostic::{Code, Diagnostic, Severity};
 pub use error::printable;
 pub use error::{Error, Result};
 pub use image::{Image, Mask, Roi};
+#[doc(hidden)]
+pub use pixel::Mix;
 pub use pixel::{
     Coverage, Depth, Film, LinearRgb, ObjectId, PremulRgba, Srgb8, Srgba8, StraightRgba,
 };

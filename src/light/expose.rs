@@ -34,8 +34,7 @@ pub fn expose(scene: Scene, plate: &Image<LinearRgb>) -> Scene {
         Exposure::Ev(_) => return scene,
         Exposure::MatchPlate { gain_ev } => (f64::from(plate_white(plate)), gain_ev),
         Exposure::MatchSurface { albedo, gain_ev } => {
-            let surface = surface_color(&scene, plate).unwrap_or_default();
-            (f64::from(surface.luminance()) / albedo, gain_ev)
+            (surface_luminance(&scene, plate) / albedo, gain_ev)
         }
     };
     let match_ev = stops_of(wanted / f64::from(white_card(&scene)));
@@ -43,6 +42,12 @@ pub fn expose(scene: Scene, plate: &Image<LinearRgb>) -> Scene {
         exposure: Exposure::Ev(match_ev + gain_ev),
         ..scene
     }
+}
+
+/// Luminance of the surface in the plate; 0 where it is not seen.
+fn surface_luminance(scene: &Scene, plate: &Image<LinearRgb>) -> f64 {
+    let surface = surface_color(scene, plate).unwrap_or_default();
+    f64::from(surface.luminance())
 }
 
 /// A ratio of luminances in stops; 0 for one that cannot be.

@@ -43,9 +43,9 @@ pub use expose::expose;
 pub use expose::match_plate;
 #[doc(hidden)]
 pub use irradiance::irradiance;
-pub(crate) use nodes::nodes_above;
 #[doc(hidden)]
 pub use nodes::{Node, nodes};
+pub(crate) use nodes::{geometry_term, nodes_above};
 pub(crate) use noise::match_noise;
 #[doc(hidden)]
 pub use noise::plate_noise;

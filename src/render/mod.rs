@@ -65,3 +65,10 @@ pub use interreflection::interreflect;
 pub use options::RenderOptions;
 #[doc(hidden)]
 pub use reference::render_reference;
+
+/// Fills a buffer with `n` times a value; it keeps its memory.
+#[inline]
+fn refill<T: Copy>(buffer: &mut Vec<T>, n: usize, value: T) {
+    buffer.clear();
+    buffer.resize(n, value);
+}

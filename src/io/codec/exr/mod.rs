@@ -15,6 +15,7 @@ pub use parts::{ChannelSamples, Part};
 pub use read::Channel;
 pub use write::Compression;
 
+pub(crate) use ::exr::prelude::FlatSamples;
 pub(crate) use parts::encode_parts;
 pub(crate) use read::{channels, decode, header};
 pub(crate) use samples::{float_samples, half_samples};
