@@ -118,7 +118,9 @@ pub fn table(ours: &BTreeMap<String, Vec<f64>>) -> Table {
             (Some(mean), None) => format!("{mean:.1}"),
             _ => String::new(),
         };
-        let spread = ours.get(&row.key).map(|values| Spread::of(values, 0));
+        let spread = ours
+            .get(&row.key)
+            .map(|values| Spread::from_values(values, 0));
         let against_paper = spread
             .zip(theirs)
             .and_then(|(s, b)| welch([s.mean, s.std], s.runs, b, PAPER_RUNS));
@@ -126,7 +128,7 @@ pub fn table(ours: &BTreeMap<String, Vec<f64>>) -> Table {
         let all = ours
             .get(&base)
             .filter(|_| base != row.key)
-            .map(|values| Spread::of(values, 0));
+            .map(|values| Spread::from_values(values, 0));
         let against_all = spread
             .zip(all)
             .and_then(|(s, b)| welch([s.mean, s.std], s.runs, [b.mean, b.std], b.runs));
