@@ -37,6 +37,7 @@ mod listing;
 mod merge;
 mod near_duplicates;
 mod obstructed;
+#[doc(hidden)]
 pub mod page;
 mod partition;
 mod pictures;
@@ -56,38 +57,60 @@ mod yolo_set;
 mod yolo_yaml;
 
 pub use check::{Checked, check};
-pub use coco::{Coco, CocoMask};
+pub use coco::Coco;
+#[doc(hidden)]
+pub use coco::CocoMask;
 pub use config::DatasetConfig;
+#[doc(hidden)]
 pub use contact_sheet::{ContactSheetOptions, ContactTile, contact_sheet, contact_sheet_of};
-pub use counts::{ClassCount, DatasetCounts};
+#[doc(hidden)]
+pub use counts::ClassCount;
+pub use counts::DatasetCounts;
+#[doc(hidden)]
 pub use estimate::LongRun;
 pub use finding::Finding;
 #[doc(hidden)]
 pub use folder::JOURNAL;
-pub use formats::{Extent, Format, LabelConfig};
+#[doc(hidden)]
+pub use formats::Extent;
+pub use formats::{Format, LabelConfig};
 pub use generate::{Plan, generate};
+#[doc(hidden)]
 pub use inputs::Inputs;
 #[cfg(feature = "fuzzing")]
 pub(crate) use journal::read_lines as journal_lines;
+#[doc(hidden)]
 pub use journal::repair;
 pub use layers::Layers;
+#[doc(hidden)]
 pub use listing::Listing;
 pub(crate) use listing::is_image;
 pub use merge::merge;
+#[doc(hidden)]
 pub use near_duplicates::{NEAR_DUPLICATE_RMS, NearDuplicate};
-pub use obstructed::{LabelledObject, OBSTRUCTED, Obstructed};
+pub use obstructed::{LabelledObject, Obstructed};
+#[doc(hidden)]
 pub use partition::{Group, Leakage, Partition};
 pub use pictures::{PictureFormat, Pictures};
 pub use pipeline::Pipeline;
 pub use run::Progress;
-pub use shard::{SampleRange, Shard, ShardChoice};
+#[doc(hidden)]
+pub use shard::ShardChoice;
+pub use shard::{SampleRange, Shard};
 pub use sidecar::{SampleRecord, Sidecar};
-pub use split::{Part, Split, SplitOrder};
+#[doc(hidden)]
+pub use split::SplitOrder;
+pub use split::{Part, Split};
+#[doc(hidden)]
 pub use summary::{SampleSummary, ShownSample, Summary, UnlabelledReason};
+#[doc(hidden)]
 pub use times::Times;
 pub use voc::Voc;
 pub use webdataset::WebDataset;
-pub use yolo::{Yolo, YoloTask};
+pub use yolo::Yolo;
+#[doc(hidden)]
+pub use yolo::YoloTask;
+#[doc(hidden)]
 pub use yolo_set::YoloSet;
 #[cfg(feature = "fuzzing")]
 pub(crate) use yolo_yaml::DataYaml;

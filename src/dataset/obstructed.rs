@@ -5,7 +5,7 @@ use crate::label::{Labels, ObjectLabel};
 use serde::{Deserialize, Serialize};
 
 /// Name of the class of [`Obstructed::Class`].
-pub const OBSTRUCTED: &str = "obstructed";
+pub(crate) const OBSTRUCTED: &str = "obstructed";
 
 /// What happens to the labels of objects that something lies over.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -19,7 +19,7 @@ pub enum Obstructed {
     /// They are labelled as to be ignored where a format can say so (COCO `iscrowd`, Pascal VOC `difficult`): finding
     /// them is neither right nor wrong. YOLO cannot; there they get no label.
     Ignore,
-    /// They are labelled as a class of their own, the last: [`OBSTRUCTED`].
+    /// They are labelled as a class of their own, the last: `obstructed`.
     Class,
 }
 

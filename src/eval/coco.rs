@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// No more detections of a class than this count in an image: the surest.
-pub const MAX_DETECTIONS: [usize; 3] = [1, 10, 100];
+pub(crate) const MAX_DETECTIONS: [usize; 3] = [1, 10, 100];
 /// Keeps a precision defined: the distance of 1 to the next number, as in the original.
 const PRECISION_EPSILON: f64 = f64::EPSILON;
 /// No overlap reaches 1 for sure.

@@ -15,10 +15,10 @@ const NAME_ROOM: f64 = 150.0;
 const MAX_NAME_LETTERS: usize = 20;
 
 /// So many classes have a curve of their own beside the mean: colours are not told apart beyond.
-pub const MAX_CURVES: usize = 7;
+pub(crate) const MAX_CURVES: usize = 7;
 
 /// Precision over recall: the mean of all classes, and the first of the classes to be `shown`.
-pub fn precision_recall_picture(curves: &Curves, names: &[String], shown: &[u32]) -> String {
+pub(crate) fn precision_recall_picture(curves: &Curves, names: &[String], shown: &[u32]) -> String {
     let lines = (&curves.mean_precision, &curves.precision_recall[..]);
     picture(
         "precision and recall at IoU 0.5",
@@ -31,7 +31,7 @@ pub fn precision_recall_picture(curves: &Curves, names: &[String], shown: &[u32]
 }
 
 /// F1 over confidence, for the same classes.
-pub fn f1_picture(curves: &Curves, names: &[String], shown: &[u32]) -> String {
+pub(crate) fn f1_picture(curves: &Curves, names: &[String], shown: &[u32]) -> String {
     let title = format!(
         "F1 at IoU 0.5, best mean at confidence {:.3}",
         curves.best_confidence
@@ -90,7 +90,7 @@ fn empty_chart(title: &str, axes: [&str; 2]) -> Chart {
 
 /// Found against true classes, those to be `shown`: each column's shares as shades, counts in words. Others share a row
 /// and a column, and so does the background.
-pub fn confusion_picture(confusion: &Confusion, names: &[String], shown: &[u32]) -> String {
+pub(crate) fn confusion_picture(confusion: &Confusion, names: &[String], shown: &[u32]) -> String {
     let matrix = ConfusionTable::new(confusion, names, shown);
     let n = matrix.titles.len();
     let cell = (MAX_MATRIX_SIDE / n as f64).clamp(CELL_SIDES[0], CELL_SIDES[1]);

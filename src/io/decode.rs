@@ -10,15 +10,15 @@ use super::limits::Limits;
 #[cfg(feature = "oiio")]
 use super::options::Fallback;
 use super::options::ReadOptions;
-use super::source::Source;
+use super::source::SourceFile;
 #[cfg(feature = "oiio")]
-use super::worker::{self, Request, Response, Sample, Shape};
+use super::worker::{self, Request, Response};
 use std::io::{BufRead, Cursor, Seek};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// Samples by our decoders, or by OpenImageIO where those do not know the kind.
 pub(super) fn decode_raster(
-    source: &Source,
+    source: &SourceFile,
     options: &ReadOptions,
     wanted: Wanted,
 ) -> Result<Raster, Refusal> {
@@ -29,7 +29,11 @@ pub(super) fn decode_raster(
 }
 
 /// Samples by our decoders.
-fn decode_here(source: &Source, options: &ReadOptions, wanted: Wanted) -> Result<Raster, Refusal> {
+fn decode_here(
+    source: &SourceFile,
+    options: &ReadOptions,
+    wanted: Wanted,
+) -> Result<Raster, Refusal> {
     let limits = &options.limits;
     match source.format {
         Format::Exr => exr::decode(&source.bytes, limits, wanted, options.window),
@@ -65,11 +69,15 @@ pub(super) fn read_file_header<R: BufRead + Seek>(
         Format::Jpeg => return read_jpeg_header(file, bytes, limits),
         other => return Err(needs_openimageio(other)),
     };
-    let notes = match format {
+    Ok((header, notes_of_file(file, format)))
+}
+
+/// The notes of a file that may be read from its start again.
+fn notes_of_file(file: &mut (impl BufRead + Seek), format: Format) -> CameraNotes {
+    match format {
         Format::Png | Format::Tiff if file.rewind().is_ok() => CameraNotes::read(file),
         _ => CameraNotes::default(),
-    };
-    Ok((header, notes))
+    }
 }
 
 /// A JPEG has both its header and its notes in front of the first scan.
@@ -84,7 +92,7 @@ fn read_jpeg_header(
 }
 
 /// What the camera noted; EXR and HDR have no room for it.
-pub(super) fn camera_notes(source: &Source) -> CameraNotes {
+pub(super) fn camera_notes(source: &SourceFile) -> CameraNotes {
     match source.format {
         Format::Jpeg | Format::Tiff | Format::Png => {
             catch_panic(|| Ok(CameraNotes::read(Cursor::new(&source.bytes)))).unwrap_or_default()
@@ -96,7 +104,7 @@ pub(super) fn camera_notes(source: &Source) -> CameraNotes {
 /// Another decoder for what ours do not know.
 #[cfg(feature = "oiio")]
 pub(super) fn decode_elsewhere(
-    source: &Source,
+    source: &SourceFile,
     what: String,
     options: &ReadOptions,
     wanted: Wanted,
@@ -114,7 +122,7 @@ pub(super) fn decode_elsewhere(
 
 /// The meaning of alpha in a TIFF comes from the file's own tag: OpenImageIO treats an unspecified one as associated.
 #[cfg(feature = "oiio")]
-fn with_known_alpha(raster: Raster, source: &Source) -> Raster {
+fn with_known_alpha(raster: Raster, source: &SourceFile) -> Raster {
     let premultiplied = match source.format {
         Format::Tiff => CameraNotes::has_associated_alpha(&source.bytes),
         Format::Exr => true,
@@ -129,7 +137,7 @@ fn with_known_alpha(raster: Raster, source: &Source) -> Raster {
 /// A header by the other decoder.
 #[cfg(feature = "oiio")]
 pub(super) fn header_elsewhere(
-    source: &Source,
+    source: &SourceFile,
     what: String,
     options: &ReadOptions,
 ) -> Result<(Header, CameraNotes), Refusal> {
@@ -137,19 +145,12 @@ pub(super) fn header_elsewhere(
     let Response::Shape(shape) = response else {
         return Err("OpenImageIO gave no header".into());
     };
-    let Shape {
-        width,
-        height,
-        names,
-        sample,
-        ..
-    } = shape;
     let header = Header {
         format: source.format,
-        width,
-        height,
-        channels: names,
-        bits: 8 * Sample::bytes(sample),
+        width: shape.width,
+        height: shape.height,
+        bits: 8 * shape.sample.bytes(),
+        channels: shape.names,
         ..Header::default()
     };
     Ok((header, camera_notes(source)))
@@ -157,7 +158,7 @@ pub(super) fn header_elsewhere(
 
 #[cfg(feature = "oiio")]
 fn ask_openimageio(
-    source: &Source,
+    source: &SourceFile,
     what: String,
     options: &ReadOptions,
     request: Request,
@@ -173,7 +174,7 @@ fn ask_openimageio(
 /// Without OpenImageIO there is no other decoder.
 #[cfg(not(feature = "oiio"))]
 fn decode_elsewhere(
-    _: &Source,
+    _: &SourceFile,
     what: String,
     _: &ReadOptions,
     _: Wanted,
@@ -184,7 +185,7 @@ fn decode_elsewhere(
 /// Without OpenImageIO there is no other decoder.
 #[cfg(not(feature = "oiio"))]
 pub(super) fn header_elsewhere(
-    _: &Source,
+    _: &SourceFile,
     what: String,
     _: &ReadOptions,
 ) -> Result<(Header, CameraNotes), Refusal> {

@@ -1,15 +1,15 @@
 //! A decoded picture whose pixels are made when they are asked for.
 
 use super::codec::channels::{ChannelMatch, Wanted};
-use super::codec::profile::{ColorDescription, Profile};
+use super::codec::profile::{ColorDescription, DisplayProfile};
 use super::codec::raster::Raster;
 use super::codec::refusal::Refusal;
 use super::codec::{FromFile, jpeg, png, tiff};
 use super::decode::{camera_notes, catch_panic, decode_raster};
 use super::format::Format;
-use super::limits::{Limits, affordable};
+use super::limits::{Limits, affordable, saturating_product};
 use super::options::ReadOptions;
-use super::source::Source;
+use super::source::SourceFile;
 use crate::error::{Error, Result};
 use crate::image::Image;
 use std::ops::Range;
@@ -23,7 +23,7 @@ pub struct Picture {
     path: PathBuf,
     format: Format,
     raster: Raster,
-    profile: Option<Profile>,
+    profile: Option<DisplayProfile>,
 }
 
 impl Picture {
@@ -40,7 +40,7 @@ impl Picture {
     }
 
     pub(super) fn decode(path: &Path, options: &ReadOptions, wanted: Wanted) -> Result<Self> {
-        let source = Source::open(path, &options.limits)?;
+        let source = SourceFile::open(path, &options.limits)?;
         let raster = decode_raster(&source, options, wanted);
         Self::from_raster(raster, &source, &options.limits, wanted)
     }
@@ -48,22 +48,21 @@ impl Picture {
     /// Finds the meaning of samples, and turns the picture the way the camera was held.
     pub(super) fn from_raster(
         raster: std::result::Result<Raster, Refusal>,
-        source: &Source,
+        source: &SourceFile,
         limits: &Limits,
         wanted: Wanted,
     ) -> Result<Self> {
         let raster = raster.map_err(|e| Error::file(&source.path, e))?;
-        let profile = match wanted {
-            Wanted::Color | Wanted::Film => usable_profile(&raster, source, limits),
-            Wanted::Coverage | Wanted::Depth => None,
-        };
+        let has_colors = matches!(wanted, Wanted::Color | Wanted::Film);
+        let profile = has_colors
+            .then(|| usable_profile(&raster, source, limits))
+            .flatten();
         warn_not_finite(&raster, source, wanted);
         warn_unusual_channels(&raster, source, wanted);
-        let raster = raster.upright(camera_notes(source).orientation);
         Ok(Self {
             path: source.path.clone(),
             format: source.format,
-            raster,
+            raster: raster.upright(camera_notes(source).orientation),
             profile,
         })
     }
@@ -105,61 +104,51 @@ impl Picture {
     /// When the pixels asked for are no colours.
     pub fn pixels<P: FromFile>(&self) -> Result<Image<P>> {
         let rows = 0..self.raster.height;
-        P::check(&self.raster.rows(self.profile.as_ref(), rows.clone()))
-            .map_err(|e| Error::file(&self.path, e))?;
+        let whole = self.raster.rows(self.profile.as_ref(), rows.clone());
+        P::check(&whole).map_err(|e| Error::file(&self.path, e))?;
         Ok(self.rows(rows))
     }
 
     pub(super) fn into_image<P: FromFile>(self) -> Result<Image<P>> {
-        let Self {
-            path,
-            raster,
-            profile,
-            ..
-        } = self;
-        let bytes = [raster.height, size_of::<P>()]
-            .into_iter()
-            .fold(raster.width as u64, |n, m| n.saturating_mul(m as u64));
-        affordable(bytes)
+        let (raster, profile) = (self.raster, self.profile);
+        let sizes = [raster.width, raster.height, size_of::<P>()];
+        affordable(saturating_product(sizes.map(|n| n as u64)))
             .and_then(|()| raster.into_image(profile.as_ref()))
-            .map_err(|e| Error::file(path, e))
+            .map_err(|e| Error::file(self.path, e))
     }
 }
 
 /// The colour profile of display codes, where there is one other than sRGB.
-fn usable_profile(raster: &Raster, source: &Source, limits: &Limits) -> Option<Profile> {
+fn usable_profile(raster: &Raster, source: &SourceFile, limits: &Limits) -> Option<DisplayProfile> {
     let path = source.path.display();
-    match catch_panic(|| Ok(embedded_profile(source, limits)?)) {
-        Ok(Some(_)) if !raster.display_encoded => {
-            log::warn!(
-                "{path}: has a colour profile, but float samples; treated as linear Rec. 709"
-            );
-            None
-        }
-        Ok(profile) => profile,
-        Err(e) => {
-            log::warn!("{path}: has {e}; treated as sRGB");
-            None
-        }
+    let embedded = catch_panic(|| Ok(embedded_profile(source, limits)?));
+    let profile = embedded.unwrap_or_else(|e| {
+        log::warn!("{path}: has {e}; treated as sRGB");
+        None
+    });
+    if profile.is_some() && !raster.display_encoded {
+        log::warn!("{path}: has a colour profile, but float samples; treated as linear Rec. 709");
+        return None;
     }
+    profile
 }
 
 /// The profile in a file, if it is not sRGB anyway; formats of linear light have none.
 fn embedded_profile(
-    source: &Source,
+    source: &SourceFile,
     limits: &Limits,
-) -> std::result::Result<Option<Profile>, String> {
+) -> std::result::Result<Option<DisplayProfile>, String> {
     let description = match source.format {
         Format::Png => png::color_description(&source.bytes, limits),
         Format::Jpeg => jpeg::profile(&source.bytes).map(ColorDescription::Icc),
         Format::Tiff => tiff::profile(&source.bytes, limits).map(ColorDescription::Icc),
         _ => None,
     };
-    description.map_or(Ok(None), Profile::from_description)
+    description.map_or(Ok(None), DisplayProfile::from_description)
 }
 
 /// Infinite depth is where nothing is; elsewhere it is worth a warning.
-fn warn_not_finite(raster: &Raster, source: &Source, wanted: Wanted) {
+fn warn_not_finite(raster: &Raster, source: &SourceFile, wanted: Wanted) {
     if wanted == Wanted::Depth {
         return;
     }
@@ -171,7 +160,7 @@ fn warn_not_finite(raster: &Raster, source: &Source, wanted: Wanted) {
 }
 
 /// Names the channels of a picture that has none of the default names.
-fn warn_unusual_channels(raster: &Raster, source: &Source, wanted: Wanted) {
+fn warn_unusual_channels(raster: &Raster, source: &SourceFile, wanted: Wanted) {
     let path = source.path.display();
     match wanted.choose(&raster.names) {
         Ok((ChannelMatch::Layer, _)) => {

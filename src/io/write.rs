@@ -73,7 +73,7 @@ pub fn write_with<P: ToFile>(
 ///
 /// # Errors
 /// An image without pixels, or with transparent ones.
-pub fn jpeg_bytes<P: ToFile>(image: &Image<P>, quality: u8) -> Result<Vec<u8>> {
+pub(crate) fn jpeg_bytes<P: ToFile>(image: &Image<P>, quality: u8) -> Result<Vec<u8>> {
     let options = WriteOptions {
         jpeg_quality: quality,
         ..WriteOptions::default()
@@ -86,13 +86,7 @@ fn encode<P: ToFile>(
     image: &Image<P>,
     options: &WriteOptions,
 ) -> std::result::Result<Vec<u8>, String> {
-    if image.is_empty() {
-        return Err(format!(
-            "{} x {} pixels, expected at least 1 x 1",
-            image.width(),
-            image.height()
-        ));
-    }
+    check_not_empty(image.size())?;
     work::add(Kind::Encodes, 1);
     let format = Format::from_extension(path);
     let metadata = &options.metadata;
@@ -103,6 +97,15 @@ fn encode<P: ToFile>(
         (Some(Format::Jpeg), _) => encode_jpeg(image, options),
         (_, bits) => png::encode(&CodedImage::new(image, bits), options.png_effort, metadata),
     }
+}
+
+fn check_not_empty((width, height): (usize, usize)) -> std::result::Result<(), String> {
+    if width > 0 && height > 0 {
+        return Ok(());
+    }
+    Err(format!(
+        "{width} x {height} pixels, expected at least 1 x 1"
+    ))
 }
 
 /// The storage of a sample: as asked, or the format's own.
@@ -116,11 +119,8 @@ pub(super) fn sample_storage<P: ToFile>(
         return Ok(bits);
     }
     let possible: Vec<&str> = possible.iter().map(|bits| bits.name()).collect();
-    Err(format!(
-        "{} samples, expected {}",
-        bits.name(),
-        possible.join(" or ")
-    ))
+    let expected = possible.join(" or ");
+    Err(format!("{} samples, expected {expected}", bits.name()))
 }
 
 /// What a format can store of a pixel that means something in integers, or of one that does not; its own choice first.
@@ -128,22 +128,18 @@ fn possible_storage(
     format: Option<Format>,
     coded: bool,
 ) -> std::result::Result<&'static [Bits], String> {
-    Ok(match format {
-        Some(Format::Exr) if coded => &[Bits::Half, Bits::Float],
-        Some(Format::Exr) => &[Bits::Float, Bits::Half],
-        Some(Format::Tiff) if coded => &[Bits::Sixteen, Bits::Eight, Bits::Float],
-        Some(Format::Tiff) => &[Bits::Float],
-        Some(Format::Png | Format::Jpeg) if !coded => {
-            return Err("a depth or a film needs float samples: .exr or .tif".into());
+    match (format, coded) {
+        (Some(Format::Exr), true) => Ok(&[Bits::Half, Bits::Float]),
+        (Some(Format::Exr), false) => Ok(&[Bits::Float, Bits::Half]),
+        (Some(Format::Tiff), true) => Ok(&[Bits::Sixteen, Bits::Eight, Bits::Float]),
+        (Some(Format::Tiff), false) => Ok(&[Bits::Float]),
+        (Some(Format::Png), true) => Ok(&[Bits::Eight, Bits::Sixteen]),
+        (Some(Format::Jpeg), true) => Ok(&[Bits::Eight]),
+        (Some(Format::Png | Format::Jpeg), false) => {
+            Err("a depth or a film needs float samples: .exr or .tif".into())
         }
-        Some(Format::Png) => &[Bits::Eight, Bits::Sixteen],
-        Some(Format::Jpeg) => &[Bits::Eight],
-        _ => {
-            return Err(
-                "cannot be written, expected the extension .exr, .png, .jpg or .tif".into(),
-            );
-        }
-    })
+        _ => Err("cannot be written, expected the extension .exr, .png, .jpg or .tif".into()),
+    }
 }
 
 fn encode_exr<P: ToFile>(
@@ -151,17 +147,23 @@ fn encode_exr<P: ToFile>(
     bits: Bits,
     options: &WriteOptions,
 ) -> std::result::Result<Vec<u8>, String> {
-    let mut planes = Vec::new();
-    for (c, &name) in P::NAMES.iter().enumerate() {
-        let plane: Vec<f32> = image.pixels().par_iter().map(|p| p.linear()[c]).collect();
-        let samples = match bits {
-            Bits::Half => exr::half_samples(&plane),
-            _ => exr::float_samples(plane),
-        };
-        planes.push((name, samples));
-    }
+    let planes = P::NAMES
+        .iter()
+        .enumerate()
+        .map(|(c, &name)| (name, channel_samples(image, c, bits)))
+        .collect();
     let metadata = with_colorspace(&options.metadata);
     exr::encode(image.size(), planes, options.compression, &metadata)
+}
+
+/// One channel of a picture, scene-linear.
+fn channel_samples<P: ToFile>(image: &Image<P>, channel: usize, bits: Bits) -> exr::FlatSamples {
+    let pixels = image.pixels().par_iter();
+    let plane: Vec<f32> = pixels.map(|p| p.linear()[channel]).collect();
+    match bits {
+        Bits::Half => exr::half_samples(&plane),
+        _ => exr::float_samples(plane),
+    }
 }
 
 fn encode_float_tiff<P: ToFile>(

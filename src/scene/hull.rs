@@ -19,14 +19,18 @@ pub(super) fn prism_outline(outline_uv: &[Point2<f64>], size: [f64; 2]) -> Vec<[
     if doubled_area(&ring) < 0.0 {
         ring.reverse();
     }
-    let [w, h] = size;
-    while let Some((least, area)) = least_corner(&ring) {
-        if ring.len() <= MAX_CORNERS && area > MIN_CORNER_AREA_RATIO * w * h {
+    remove_least_corners(&mut ring, MIN_CORNER_AREA_RATIO * size[0] * size[1]);
+    if ring.len() < 3 { Vec::new() } else { ring }
+}
+
+/// Removes corners until [`MAX_CORNERS`] are left, and those of up to this area.
+fn remove_least_corners(ring: &mut Vec<[f64; 2]>, straight_area: f64) {
+    while let Some((least, area)) = least_corner(ring) {
+        if ring.len() <= MAX_CORNERS && area > straight_area {
             break;
         }
         ring.remove(least);
     }
-    if ring.len() < 3 { Vec::new() } else { ring }
 }
 
 /// A point of the texture in the plane of its card, metres.

@@ -1,9 +1,8 @@
 //! Attempts at letting a scene come to rest: from which heights, with which steps, and how each
 //! ended.
 
-use super::bodies::{max_overlap, solids_at_rest, touch_distance, typical_length};
+use super::bodies::{is_dropped, max_overlap, solids_at_rest, touch_distance, typical_length};
 use super::overlap::{self, Solid, Touch};
-use super::trace::MotionSample;
 use super::world::{Drop, Fall};
 use super::{SettleVerdict, columns, level, support};
 use crate::allowance::Allowance;
@@ -34,9 +33,7 @@ pub(super) struct Attempt {
     /// The scene at its end, if it rested.
     pub(super) rested: Option<Scene>,
     pub(super) overlap: f64,
-    pub(super) seconds: f64,
-    pub(super) energy_rise: f64,
-    pub(super) samples: Vec<MotionSample>,
+    pub(super) fall: Fall,
 }
 
 impl AttemptSeries<'_> {
@@ -46,58 +43,67 @@ impl AttemptSeries<'_> {
         let mut halvings = 0;
         loop {
             let attempt = self.attempt(rejected.len(), halvings)?;
-            log::debug!(
-                "settle: attempt {}: {:?}, {} of work",
-                rejected.len() + 1,
-                attempt.verdict,
-                self.allowance.taken()
-            );
+            self.log_verdict(&attempt, rejected.len() + 1);
             if self.is_final(&attempt, rejected.len() + 1) {
                 return Ok((attempt, rejected));
             }
-            halvings += u32::from(self.needs_shorter_steps(&attempt));
-            halvings = halvings.min(MAX_STEP_HALVINGS);
+            halvings = self.next_halvings(&attempt, halvings);
             rejected.push(attempt.verdict);
         }
+    }
+
+    fn log_verdict(&self, attempt: &Attempt, count: usize) {
+        log::debug!(
+            "settle: attempt {count}: {:?}, {} of work",
+            attempt.verdict,
+            self.allowance.taken()
+        );
     }
 
     /// One fall, with a verdict on it.
     fn attempt(&self, number: usize, halvings: u32) -> Result<Attempt> {
         let fall = self.fall(number, halvings)?;
         let end = with_poses(self.scene.clone(), &fall.poses);
-        let (verdict, overlap) = self.judge(&end, fall.rests, fall.energy_rise);
+        let (verdict, overlap) = self.judge(&end, &fall);
+        let rested = (verdict == SettleVerdict::Rested).then_some(end);
         Ok(Attempt {
-            rested: (verdict == SettleVerdict::Rested).then_some(end),
             verdict,
+            rested,
             overlap,
-            seconds: fall.seconds,
-            energy_rise: fall.energy_rise,
-            samples: fall.samples,
+            fall,
         })
     }
 
     fn fall(&self, number: usize, halvings: u32) -> Result<Fall> {
         match self.options.mode {
-            SettleMode::Fall => columns::fall(&Drop {
-                scene: self.scene,
-                options: self.options,
-                heights: &start_heights(self.scene, number),
-                sample_every: self.sample_every,
-                halvings,
-                allowance: self.allowance,
-            }),
-            SettleMode::Flat => Ok(Fall {
-                poses: level::flat(self.scene, self.options, self.allowance)?,
-                rests: true,
-                ..Fall::default()
-            }),
+            SettleMode::Fall => self.simulate(number, halvings),
+            SettleMode::Flat => self.lay_flat(),
         }
+    }
+
+    fn simulate(&self, number: usize, halvings: u32) -> Result<Fall> {
+        columns::fall(&Drop {
+            scene: self.scene,
+            options: self.options,
+            heights: &start_heights(self.scene, number),
+            sample_every: self.sample_every,
+            halvings,
+            allowance: self.allowance,
+        })
+    }
+
+    fn lay_flat(&self) -> Result<Fall> {
+        Ok(Fall {
+            poses: level::flat(self.scene, self.options, self.allowance)?,
+            rests: true,
+            ..Fall::default()
+        })
     }
 
     /// Whether no other attempt follows: it rested, needed no simulation, or was the last allowed.
     fn is_final(&self, attempt: &Attempt, count: usize) -> bool {
         attempt.verdict == SettleVerdict::Rested
-            || attempt.seconds == 0.0
+            || attempt.fall.seconds == 0.0
             || count >= self.options.attempts as usize
     }
 
@@ -109,8 +115,14 @@ impl AttemptSeries<'_> {
         sank || matches!(attempt.verdict, SettleVerdict::Exploded(_))
     }
 
+    /// Times that the next attempt halves the step.
+    fn next_halvings(&self, attempt: &Attempt, halvings: u32) -> u32 {
+        let more = u32::from(self.needs_shorter_steps(attempt));
+        (halvings + more).min(MAX_STEP_HALVINGS)
+    }
+
     /// The verdict on a fall, and the deepest overlap at its end.
-    fn judge(&self, end: &Scene, rests: bool, energy_rise: f64) -> (SettleVerdict, f64) {
+    fn judge(&self, end: &Scene, fall: &Fall) -> (SettleVerdict, f64) {
         let bodies = solids_at_rest(self.scene, end, self.options);
         let escaped = overlap::escaped_ids(&bodies, end.surface.size);
         if !escaped.is_empty() {
@@ -118,16 +130,22 @@ impl AttemptSeries<'_> {
         }
         let touching = overlap::touching_pairs(&bodies, touch_distance(self.scene));
         let depth = overlap::deepest(&bodies, &touching, end.surface.size);
-        let verdict = if !rests {
-            SettleVerdict::TimedOut
-        } else if depth > max_overlap(self.scene, self.options) {
-            SettleVerdict::Penetrating(depth)
-        } else if energy_rise > self.options.max_energy_rise {
-            SettleVerdict::Exploded(energy_rise)
-        } else {
-            self.judge_support(&bodies, &touching)
-        };
+        let failure = self.judge_motion(fall, depth);
+        let verdict = failure.unwrap_or_else(|| self.judge_support(&bodies, &touching));
         (verdict, depth)
+    }
+
+    /// What went wrong in a fall that ended with this overlap, if anything did.
+    fn judge_motion(&self, fall: &Fall, depth: f64) -> Option<SettleVerdict> {
+        if !fall.rests {
+            Some(SettleVerdict::TimedOut)
+        } else if depth > max_overlap(self.scene, self.options) {
+            Some(SettleVerdict::Penetrating(depth))
+        } else if fall.energy_rise > self.options.max_energy_rise {
+            Some(SettleVerdict::Exploded(fall.energy_rise))
+        } else {
+            None
+        }
     }
 
     /// Whether bodies that lie still are supported. What was laid without physics always is.
@@ -149,19 +167,25 @@ impl AttemptSeries<'_> {
 /// stays apart.
 pub(super) fn start_heights(scene: &Scene, attempt: usize) -> Vec<f64> {
     let mut heights: Vec<f64> = scene.objects.iter().map(own_height).collect();
-    if attempt == 0 {
-        return heights;
+    if attempt > 0 {
+        let max_raise = MAX_RAISE_RATIO * typical_length(scene);
+        let draws = Draws::new(RETRY_SEED, attempt as u64);
+        raise_from_lowest(&mut heights, |i| {
+            max_raise * draws.unit(&format!("objects[{i}].raise"))
+        });
     }
-    let draws = Draws::new(RETRY_SEED, attempt as u64);
-    let max_raise = MAX_RAISE_RATIO * typical_length(scene);
+    heights
+}
+
+/// Raises each height by its own amount above the raise of the next lower one.
+fn raise_from_lowest(heights: &mut [f64], amount: impl Fn(usize) -> f64) {
     let mut order: Vec<usize> = (0..heights.len()).collect();
     order.sort_by(|&a, &b| heights[a].total_cmp(&heights[b]));
     let mut raise = 0.0;
     for i in order {
-        raise += max_raise * draws.unit(&format!("objects[{i}].raise"));
+        raise += amount(i);
         heights[i] += raise;
     }
-    heights
 }
 
 fn own_height(object: &Object) -> f64 {
@@ -173,10 +197,7 @@ fn own_height(object: &Object) -> f64 {
 
 /// The scene with these poses for the objects that fall, in their order.
 fn with_poses(mut scene: Scene, poses: &[Pose]) -> Scene {
-    let falling = scene
-        .objects
-        .iter_mut()
-        .filter(|object| matches!(object.placement, Placement::Drop { .. }));
+    let falling = scene.objects.iter_mut().filter(|object| is_dropped(object));
     for (object, pose) in falling.zip(poses) {
         object.placement = Placement::At(*pose);
     }

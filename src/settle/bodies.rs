@@ -49,7 +49,7 @@ pub(super) fn solids_at_rest(start: &Scene, end: &Scene, options: &SettleOptions
 }
 
 /// Where an object is, or from where it falls.
-fn current_pose(object: &Object) -> Pose {
+pub(super) fn current_pose(object: &Object) -> Pose {
     match object.placement {
         Placement::At(pose) => pose,
         Placement::Drop {

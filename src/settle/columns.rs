@@ -7,6 +7,7 @@
 use super::level;
 use super::world::{Drop, Fall};
 use crate::error::Result;
+use crate::geom::Pose;
 use crate::scene::{Scene, SettleOptions};
 
 /// Objects that fall together, and how that ended.
@@ -25,12 +26,18 @@ pub(super) fn fall(drop: &Drop) -> Result<Fall> {
         .map(|members| FallenColumn::drop_members(drop, members))
         .collect::<Result<_>>()?;
     while let Some((i, j)) = first_colliding_pair(&columns) {
-        let mut members = columns.swap_remove(j).members;
-        members.append(&mut columns[i].members);
-        members.sort_unstable();
+        let members = joined_members(&columns[i], &columns[j]);
+        columns.swap_remove(j);
         columns[i] = FallenColumn::drop_members(drop, members)?;
     }
     Ok(merge_columns(columns))
+}
+
+/// The members of two columns, sorted.
+fn joined_members(a: &FallenColumn, b: &FallenColumn) -> Vec<usize> {
+    let mut members = [&a.members[..], &b.members[..]].concat();
+    members.sort_unstable();
+    members
 }
 
 impl FallenColumn {
@@ -77,10 +84,15 @@ fn merge_columns(columns: Vec<FallenColumn>) -> Fall {
         poses.extend(members.into_iter().zip(std::mem::take(&mut fall.poses)));
         all.absorb(fall);
     }
-    poses.sort_by_key(|(i, _)| *i);
-    all.poses = poses.into_iter().map(|(_, pose)| pose).collect();
+    all.poses = sorted_poses(poses);
     all.sort_samples();
     all
+}
+
+/// The poses in the order of their numbers.
+fn sorted_poses(mut numbered: Vec<(usize, Pose)>) -> Vec<Pose> {
+    numbered.sort_by_key(|(i, _)| *i);
+    numbered.into_iter().map(|(_, pose)| pose).collect()
 }
 
 impl Fall {

@@ -22,6 +22,31 @@ pub(super) struct Contact {
     pub(super) rough: bool,
 }
 
+impl Contact {
+    /// With the floor or a wall; walls are smooth.
+    fn with_room(body: usize, point: Vector3<f64>, normal: Vector3<f64>) -> Self {
+        Self {
+            body,
+            by: None,
+            point,
+            normal,
+            rough: normal.z > 0.0,
+        }
+    }
+
+    /// Of two bodies that touch, at one point.
+    fn with_body(touch: &Touch, point: Vector3<f64>) -> Self {
+        let [body, by] = touch.pair;
+        Self {
+            body,
+            by: Some(by),
+            point,
+            normal: -touch.towards,
+            rough: true,
+        }
+    }
+}
+
 /// All contacts of bodies that fell: with the room, and of the pairs that touch. What is nearer than
 /// `reach` (metres) touches.
 pub(super) fn contacts(
@@ -52,21 +77,14 @@ fn room_planes(surface: [f64; 2]) -> [(Vector3<f64>, f64); 5] {
 
 /// Contacts with the floor and the walls.
 fn room_contacts(body: usize, solid: &Solid, surface: [f64; 2], reach: f64) -> Vec<Contact> {
-    let at_plane = |(normal, plane): (Vector3<f64>, f64)| {
-        let touching = solid
-            .corners()
-            .filter(move |corner| corner.dot(&normal) - plane < reach);
-        touching.map(move |point| Contact {
-            body,
-            by: None,
-            point,
-            normal,
-            rough: normal.z > 0.0,
-        })
-    };
     room_planes(surface)
         .into_iter()
-        .flat_map(at_plane)
+        .flat_map(|(normal, distance)| {
+            let touching = solid
+                .corners()
+                .filter(move |corner| corner.dot(&normal) - distance < reach);
+            touching.map(move |point| Contact::with_room(body, point, normal))
+        })
         .collect()
 }
 
@@ -76,13 +94,7 @@ fn pair_contacts(solids: &[Solid], touch: &Touch, reach: f64) -> Vec<Contact> {
     let points = shared_points(&solids[body], &solids[by], &touch.towards, reach);
     points
         .into_iter()
-        .map(|point| Contact {
-            body,
-            by: Some(by),
-            point,
-            normal: -touch.towards,
-            rough: true,
-        })
+        .map(|point| Contact::with_body(touch, point))
         .collect()
 }
 
@@ -121,10 +133,7 @@ struct NearestCorners {
 impl NearestCorners {
     /// Those of a body, to within `reach`.
     fn new(solid: &Solid, towards: &Vector3<f64>, reach: f64) -> Self {
-        let height = solid
-            .corners()
-            .map(|corner| corner.dot(towards))
-            .fold(f64::NEG_INFINITY, f64::max);
+        let height = highest_corner(solid, towards);
         let near = solid
             .corners()
             .filter(|corner| corner.dot(towards) > height - reach);
@@ -140,6 +149,12 @@ impl NearestCorners {
     }
 }
 
+/// How far a body reaches in a direction.
+fn highest_corner(solid: &Solid, direction: &Vector3<f64>) -> f64 {
+    let heights = solid.corners().map(|corner| corner.dot(direction));
+    heights.fold(f64::NEG_INFINITY, f64::max)
+}
+
 /// Twice the area of a triangle, above 0 where it turns left.
 fn turn(a: &Vector2<f64>, b: &Vector2<f64>, c: &Vector2<f64>) -> f64 {
     (b - a).perp(&(c - a))
@@ -150,9 +165,7 @@ fn turn(a: &Vector2<f64>, b: &Vector2<f64>, c: &Vector2<f64>) -> f64 {
 /// # Method
 /// Andrew 1979: the lower and the upper chain of the points in order of x.
 fn convex_hull(points: impl Iterator<Item = Vector2<f64>>) -> Vec<Vector2<f64>> {
-    let mut points: Vec<Vector2<f64>> = points.collect();
-    points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
-    points.dedup();
+    let points = sorted_by_x(points);
     if points.len() < 3 {
         return points;
     }
@@ -160,19 +173,32 @@ fn convex_hull(points: impl Iterator<Item = Vector2<f64>>) -> Vec<Vector2<f64>> 
     [lower, hull_chain(points.iter().rev())].concat()
 }
 
+/// The points in order of x, then of y, each once.
+fn sorted_by_x(points: impl Iterator<Item = Vector2<f64>>) -> Vec<Vector2<f64>> {
+    let mut points: Vec<Vector2<f64>> = points.collect();
+    points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
+    points.dedup();
+    points
+}
+
 /// The chain of a hull along sorted points, without its last one, where the other chain begins.
 fn hull_chain<'a>(points: impl Iterator<Item = &'a Vector2<f64>>) -> Vec<Vector2<f64>> {
-    let mut chain: Vec<Vector2<f64>> = Vec::new();
+    let mut chain = Vec::new();
     for p in points {
-        while let [.., a, b] = chain[..]
-            && turn(&a, &b, p) <= 0.0
-        {
-            chain.pop();
-        }
+        drop_right_turns(&mut chain, p);
         chain.push(*p);
     }
     chain.pop();
     chain
+}
+
+/// Removes the last points of a chain that do not turn left on the way to the next one.
+fn drop_right_turns(chain: &mut Vec<Vector2<f64>>, next: &Vector2<f64>) {
+    while let [.., a, b] = chain[..]
+        && turn(&a, &b, next) <= 0.0
+    {
+        chain.pop();
+    }
 }
 
 /// Corners of what two convex rings share, each widened by `reach`.
@@ -185,18 +211,22 @@ fn shared_corners(a: &[Vector2<f64>], b: &[Vector2<f64>], reach: f64) -> Vec<Vec
 
 /// The sides of a ring; one of two points, none of one.
 fn sides(ring: &[Vector2<f64>]) -> impl Iterator<Item = [Vector2<f64>; 2]> {
-    let count = if ring.len() < 3 {
-        ring.len().saturating_sub(1)
-    } else {
-        ring.len()
+    let count = match ring.len() {
+        0 | 1 => 0,
+        2 => 1,
+        n => n,
     };
     (0..count).map(|i| [ring[i], ring[(i + 1) % ring.len()]])
 }
 
+/// Whether a point lies in a ring.
+fn is_inside(p: &Vector2<f64>, ring: &[Vector2<f64>]) -> bool {
+    ring.len() > 2 && sides(ring).all(|[a, b]| turn(&a, &b, p) >= 0.0)
+}
+
 /// Whether a point lies in a ring, or outside by `reach` at most.
 fn is_near(p: &Vector2<f64>, ring: &[Vector2<f64>], reach: f64) -> bool {
-    let inside = ring.len() > 2 && sides(ring).all(|[a, b]| turn(&a, &b, p) >= 0.0);
-    inside
+    is_inside(p, ring)
         || sides(ring).any(|side| distance_to_side(p, side) <= reach)
         || ring.iter().any(|corner| (corner - p).norm() <= reach)
 }

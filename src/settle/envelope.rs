@@ -57,17 +57,20 @@ impl EnvelopeMatrix {
         let row = &mut rest[0];
         for j in from..i {
             let first = self.first[j];
-            let start = from.max(first);
-            let known = dot(
-                &row[start - from..j - from],
-                &above[j][start - first..j - first],
-            );
+            let known = product_before(j, (from, row), (first, &above[j]));
             row[j - from] = (row[j - from] - known) / above[j][j - first];
         }
         let (entries, diagonal) = row.split_at_mut(i - from);
         let square = diagonal[0] - dot(entries, entries);
         diagonal[0] = square.max(f64::MIN_POSITIVE).sqrt();
     }
+}
+
+/// The product of two rows, each with its first column, up to a column.
+fn product_before(column: usize, a: (usize, &[f64]), b: (usize, &[f64])) -> f64 {
+    let start = a.0.max(b.0);
+    let [a, b] = [a, b].map(|(first, row)| &row[start - first..column - first]);
+    dot(a, b)
 }
 
 /// In four sums, which processors add at once.

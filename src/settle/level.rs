@@ -4,25 +4,32 @@
 //! needs no simulation. The same closed form, each card on top of the highest one it meets, is the
 //! `flat` mode.
 
-use super::bodies::{rectangle, solids};
+use super::bodies::{current_pose, is_dropped, rectangle, solids};
 use super::overlap::{Solid, falling_from_lowest, overlap_depth, past_walls};
 use crate::allowance::Allowance;
 use crate::error::Result;
 use crate::geom::{Pose, UnitQuaternion};
-use crate::scene::{Object, Placement, Scene, SettleOptions, level};
+use crate::scene::{Object, Scene, SettleOptions, level};
 
 /// Where a card comes to rest that falls alone onto the bare surface, clear of the walls and of all
 /// that already lies there; none if it may touch anything.
 pub(super) fn rest_alone(scene: &Scene, options: &SettleOptions, i: usize) -> Option<Pose> {
     let bodies = leveled_solids(scene, options);
-    let straight_down = options.gravity[..2] == [0.0; 2];
-    let meets = bodies
-        .iter()
-        .any(|other| !other.falls && can_touch(&bodies[i], other));
-    let squeezed = past_walls(&bodies[i], scene.surface.size)
-        .iter()
-        .any(|&d| d > 0.0);
-    (straight_down && !meets && !squeezed).then(|| rest_on(&bodies[i], 0.0))
+    let falls_straight = options.gravity[..2] == [0.0; 2];
+    let alone = falls_straight
+        && !meets_standing(&bodies, i)
+        && !is_past_walls(&bodies[i], scene.surface.size);
+    alone.then(|| rest_on(&bodies[i], 0.0))
+}
+
+/// Whether a body can touch one that does not fall.
+fn meets_standing(bodies: &[Solid], i: usize) -> bool {
+    let mut standing = bodies.iter().filter(|other| !other.falls);
+    standing.any(|other| can_touch(&bodies[i], other))
+}
+
+fn is_past_walls(solid: &Solid, surface: [f64; 2]) -> bool {
+    past_walls(solid, surface).iter().any(|&past| past > 0.0)
 }
 
 /// The falling objects, in groups that stand in columns of their own: however they turn in place, no
@@ -72,8 +79,7 @@ pub(super) fn flat(
     allowance: &Allowance,
 ) -> Result<Vec<Pose>> {
     let mut bodies = leveled_solids(scene, options);
-    let at_rest = bodies.iter().filter(|solid| !solid.falls);
-    let mut lying: Vec<Solid> = at_rest.map(upright_box).collect();
+    let mut lying = boxes_at_rest(&bodies);
     for i in falling_from_lowest(&bodies) {
         allowance.take(1 + lying.len() as u64)?;
         let solid = moved_inside(&bodies[i], scene.surface.size);
@@ -82,6 +88,12 @@ pub(super) fn flat(
     }
     let fallen = bodies.iter().filter(|solid| solid.falls);
     Ok(fallen.map(|solid| solid.world_from_body).collect())
+}
+
+/// The upright boxes around what is at rest.
+fn boxes_at_rest(bodies: &[Solid]) -> Vec<Solid> {
+    let at_rest = bodies.iter().filter(|solid| !solid.falls);
+    at_rest.map(upright_box).collect()
 }
 
 /// Height of the highest body that lies under one; 0 is the surface.
@@ -99,14 +111,11 @@ fn leveled_solids(scene: &Scene, options: &SettleOptions) -> Vec<Solid> {
 }
 
 fn leveled_pose(object: &Object) -> Pose {
-    match object.placement {
-        Placement::At(pose) => pose,
-        Placement::Drop {
-            above: [x, y],
-            height,
-            rotation,
-        } => Pose::from_parts([x, y, height].into(), level(&rotation)),
+    let mut pose = current_pose(object);
+    if is_dropped(object) {
+        pose.rotation = level(&pose.rotation);
     }
+    pose
 }
 
 /// The pose with its underside at this height; that of a card at rest is unchanged.
@@ -151,6 +160,7 @@ fn grounded(solid: &Solid) -> Solid {
 mod tests {
     use super::*;
     use crate::geom::Vector3;
+    use crate::scene::Placement;
     use crate::settle::overlap::{deepest, touching_pairs};
     use crate::settle::tests::{dropped, falling};
 

@@ -47,18 +47,22 @@ mod support;
 mod trace;
 mod world;
 
+#[doc(hidden)]
 pub use crate::scene::{SettleMode, SettleOptions};
 #[doc(hidden)]
 pub use bodies::typical_length;
 #[doc(hidden)]
 pub use heap::{heap, octagon};
+#[doc(hidden)]
 pub use preview::preview;
+#[doc(hidden)]
 pub use trace::{MotionSample, csv as trace_csv};
 
+#[doc(hidden)]
 pub use crate::allowance::Allowance;
 use crate::error::{Error, Result};
 use crate::scene::{Placement, Scene};
-use attempt::AttemptSeries;
+use attempt::{Attempt, AttemptSeries};
 use bodies::{is_dropped, solids_at_rest, touch_distance};
 
 /// The result of dropping a scene's objects.
@@ -117,6 +121,23 @@ impl Settled {
         }
     }
 
+    /// The result of the last attempt at a scene, and the motion of that.
+    fn from_attempts(
+        scene: Scene,
+        last: Attempt,
+        rejected: Vec<SettleVerdict>,
+    ) -> (Self, Vec<MotionSample>) {
+        let settled = Self {
+            scene: last.rested.unwrap_or(scene),
+            verdict: last.verdict,
+            rejected,
+            seconds: last.fall.seconds,
+            overlap: last.overlap,
+            energy_rise: last.fall.energy_rise,
+        };
+        (settled, last.fall.samples)
+    }
+
     /// A scene in which nothing falls.
     fn unchanged(scene: Scene) -> Self {
         Self {
@@ -164,6 +185,7 @@ pub fn settle(scene: Scene, options: &SettleOptions) -> Result<Settled> {
 ///
 /// # Errors
 /// As [`settle`].
+#[doc(hidden)]
 pub fn settle_traced(
     scene: Scene,
     options: &SettleOptions,
@@ -176,6 +198,7 @@ pub fn settle_traced(
 ///
 /// # Errors
 /// As [`settle`]; [`Error::Interrupted`] when it is stopped.
+#[doc(hidden)]
 pub fn settle_within(
     scene: Scene,
     options: &SettleOptions,
@@ -195,15 +218,7 @@ pub fn settle_within(
         allowance,
     };
     let (last, rejected) = series.run()?;
-    let settled = Settled {
-        scene: last.rested.unwrap_or(scene),
-        verdict: last.verdict,
-        rejected,
-        seconds: last.seconds,
-        overlap: last.overlap,
-        energy_rise: last.energy_rise,
-    };
-    Ok((settled, last.samples))
+    Ok(Settled::from_attempts(scene, last, rejected))
 }
 
 /// Ids (index + 1) of objects that are unsupported at the end of a fall: no forces at their
@@ -214,14 +229,12 @@ pub fn settle_within(
 ///
 /// # Errors
 /// An impossible scene or option; scenes with different numbers of objects.
+#[doc(hidden)]
 pub fn hanging(before: &Scene, after: &Scene, options: &SettleOptions) -> Result<Vec<usize>> {
     before.check()?;
     after.check()?;
     options.check()?;
-    let (fell, lie) = (before.objects.len(), after.objects.len());
-    if fell != lie {
-        return Err(Error::value("objects", format!("{lie}, but {fell} fell")));
-    }
+    check_same_count(before, after)?;
     if options.mode == SettleMode::Flat || !before.objects.iter().any(is_dropped) {
         return Ok(Vec::new());
     }
@@ -230,14 +243,21 @@ pub fn hanging(before: &Scene, after: &Scene, options: &SettleOptions) -> Result
     Ok(support::unsupported(before, options, &bodies, &touching))
 }
 
+fn check_same_count(before: &Scene, after: &Scene) -> Result<()> {
+    let (fell, lie) = (before.objects.len(), after.objects.len());
+    if fell == lie {
+        return Ok(());
+    }
+    Err(Error::value("objects", format!("{lie}, but {fell} fell")))
+}
+
 /// Fails on the first object that starts outside the walls.
 fn check_starts(scene: &Scene) -> Result<()> {
     let [w, h] = scene.surface.size;
     for (i, object) in scene.objects.iter().enumerate() {
-        let Placement::Drop { above: [x, y], .. } = object.placement else {
-            continue;
-        };
-        if x.abs() > w / 2.0 || y.abs() > h / 2.0 {
+        if let Placement::Drop { above: [x, y], .. } = object.placement
+            && (x.abs() > w / 2.0 || y.abs() > h / 2.0)
+        {
             return Err(Error::value(
                 format!("objects[{i}].placement.drop.above"),
                 format!("[{x}, {y}], expected over the surface of {w} x {h} m around the origin"),

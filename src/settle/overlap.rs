@@ -45,16 +45,27 @@ impl Solid {
         half_extent(&self.world_from_body.rotation, &self.half)
     }
 
+    /// Height of the top of that box, metres.
+    pub(super) fn top(&self) -> f64 {
+        self.center().z + self.extent().z
+    }
+
     /// Its projection onto a direction: from where to where.
     fn projection(&self, axes: &[Vector3<f64>; 3], direction: &Vector3<f64>) -> [f64; 2] {
         let [x, y, z] = axes.map(|axis| axis.dot(direction));
         let at = self.center().dot(direction);
-        let along = self.outline.iter().map(|[a, b]| a * x + b * y);
-        let [low, high] = along.fold([f64::INFINITY, -f64::INFINITY], |[low, high], v| {
-            [low.min(v), high.max(v)]
-        });
+        let [low, high] = self.base_range(x, y);
         let half_height = self.half.z * z.abs();
         [at + low - half_height, at + high + half_height]
+    }
+
+    /// Least and greatest `a * x + b * y` of the corners of its base.
+    #[inline]
+    fn base_range(&self, x: f64, y: f64) -> [f64; 2] {
+        let along = self.outline.iter().map(|[a, b]| a * x + b * y);
+        along.fold([f64::INFINITY, -f64::INFINITY], |[low, high], v| {
+            [low.min(v), high.max(v)]
+        })
     }
 
     /// Unit directions of the edges of its base, each once for opposite sides that are parallel; in
@@ -64,10 +75,7 @@ impl Solid {
         let mut edges: Vec<Vector3<f64>> = Vec::with_capacity(self.outline.len() + 1);
         for (a, b) in self.outline.iter().zip(next) {
             let side = (axes[0] * (b[0] - a[0]) + axes[1] * (b[1] - a[1])).normalize();
-            if edges
-                .iter()
-                .all(|edge| edge.cross(&side).norm() > PARALLEL_SINE)
-            {
+            if edges.iter().all(|edge| are_oblique(edge, &side)) {
                 edges.push(side);
             }
         }
@@ -77,9 +85,21 @@ impl Solid {
 
 /// Indices of the bodies that fall, from the lowest to the highest.
 pub(super) fn falling_from_lowest(solids: &[Solid]) -> Vec<usize> {
-    let mut order: Vec<usize> = (0..solids.len()).filter(|&i| solids[i].falls).collect();
+    let mut order = from_lowest(solids);
+    order.retain(|&i| solids[i].falls);
+    order
+}
+
+/// Indices of all bodies, from the lowest to the highest.
+pub(super) fn from_lowest(solids: &[Solid]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..solids.len()).collect();
     order.sort_by(|&a, &b| solids[a].center().z.total_cmp(&solids[b].center().z));
     order
+}
+
+/// Whether two unit directions are neither parallel nor opposite.
+fn are_oblique(a: &Vector3<f64>, b: &Vector3<f64>) -> bool {
+    a.cross(b).norm() > PARALLEL_SINE
 }
 
 /// Ids (index + 1) of dropped bodies whose centre is not over the surface, below it, or not finite.
@@ -111,11 +131,17 @@ pub(super) fn touching_pairs(solids: &[Solid], reach: f64) -> Vec<Touch> {
     let pairs = (1..solids.len()).flat_map(|i| (0..i).map(move |j| [i, j]));
     pairs
         .filter(|&[i, j]| solids[i].falls || solids[j].falls)
-        .filter_map(|pair @ [i, j]| {
-            let (gap, towards) = separation(&solids[i], &solids[j], reach)?;
-            Some(Touch { pair, gap, towards })
-        })
+        .filter_map(|pair| Touch::between(solids, pair, reach))
         .collect()
+}
+
+impl Touch {
+    /// That of two bodies, if they are apart by less than `reach`.
+    fn between(solids: &[Solid], pair: [usize; 2], reach: f64) -> Option<Self> {
+        let [a, b] = pair.map(|i| &solids[i]);
+        let (gap, towards) = separation(a, b, reach)?;
+        Some(Self { pair, gap, towards })
+    }
 }
 
 /// Deepest overlap of a dropped body with any other, with the floor `z = 0` or with the walls over
@@ -136,14 +162,17 @@ pub(super) fn deepest(solids: &[Solid], touching: &[Touch], surface: [f64; 2]) -
 fn depth_in_room(solid: &Solid, surface: [f64; 2]) -> f64 {
     let axes = solid.axes();
     let [bottom, _] = solid.projection(&axes, &Vector3::z());
-    let past_wall = |direction: Vector3<f64>, length: f64| {
-        let [low, high] = solid.projection(&axes, &direction);
-        high.max(-low) - length / 2.0
-    };
+    let along_x = solid.projection(&axes, &Vector3::x());
+    let along_y = solid.projection(&axes, &Vector3::y());
     (-bottom)
         .max(0.0)
-        .max(past_wall(Vector3::x(), surface[0]))
-        .max(past_wall(Vector3::y(), surface[1]))
+        .max(past_wall(along_x, surface[0]))
+        .max(past_wall(along_y, surface[1]))
+}
+
+/// How far a body reaches beyond the walls at both ends of this length; negative inside.
+fn past_wall([low, high]: [f64; 2], length: f64) -> f64 {
+    high.max(-low) - length / 2.0
 }
 
 /// How far the box of a card reaches beyond the walls along x and along y; negative inside.
@@ -169,21 +198,24 @@ pub(super) fn overlap_depth(a: &Solid, b: &Solid) -> f64 {
 ///
 /// [Gottschalk, Lin and Manocha 1996]: https://doi.org/10.1145/237170.237244
 fn separation(a: &Solid, b: &Solid, reach: f64) -> Option<(f64, Vector3<f64>)> {
-    let apart = b.center() - a.center();
-    if apart.norm() >= a.half.norm() + b.half.norm() + reach {
+    if are_spheres_apart(a, b, reach) {
         return None;
     }
     let (of_a, of_b) = (PrismDirections::new(a), PrismDirections::new(b));
     let mut widest = (f64::NEG_INFINITY, Vector3::z());
     for direction in of_a.separating(&of_b) {
-        let [low_a, high_a] = a.projection(&of_a.axes, &direction);
-        let [low_b, high_b] = b.projection(&of_b.axes, &direction);
-        widest = wider_gap(widest, [low_b - high_a, low_a - high_b], direction);
+        widest = wider_gap(widest, of_a.gaps_to(&of_b, &direction), direction);
         if widest.0 >= reach {
             return None;
         }
     }
     Some(widest)
+}
+
+/// Whether the spheres around the boxes of two cards are apart by `reach` or more.
+fn are_spheres_apart(a: &Solid, b: &Solid, reach: f64) -> bool {
+    let apart = b.center() - a.center();
+    apart.norm() >= a.half.norm() + b.half.norm() + reach
 }
 
 /// The widest gap so far, or one of those ahead and behind along a direction.
@@ -205,18 +237,28 @@ fn wider_gap(
 }
 
 /// Directions of a prism in the world.
-struct PrismDirections {
+struct PrismDirections<'a> {
+    solid: &'a Solid,
     axes: [Vector3<f64>; 3],
     /// Those of the base, then that of the height.
     edges: Vec<Vector3<f64>>,
 }
 
-impl PrismDirections {
-    fn new(solid: &Solid) -> Self {
+impl<'a> PrismDirections<'a> {
+    fn new(solid: &'a Solid) -> Self {
         let axes = solid.axes();
         let mut edges = solid.base_edges(&axes);
         edges.push(axes[2]);
-        Self { axes, edges }
+        Self { solid, axes, edges }
+    }
+
+    /// How far another prism is ahead of this one in a direction, and how far behind it; negative where
+    /// they overlap.
+    #[inline]
+    fn gaps_to(&self, other: &Self, direction: &Vector3<f64>) -> [f64; 2] {
+        let [low, high] = self.solid.projection(&self.axes, direction);
+        let [other_low, other_high] = other.solid.projection(&other.axes, direction);
+        [other_low - high, low - other_high]
     }
 
     fn up(&self) -> Vector3<f64> {
@@ -235,11 +277,14 @@ impl PrismDirections {
             .into_iter()
             .chain(self.side_normals())
             .chain(other.side_normals());
-        let crossed = self
-            .edges
-            .iter()
-            .flat_map(|a| other.edges.iter().map(move |b| a.cross(b)));
-        faces.chain(crossed.filter_map(|normal| normal.try_normalize(PARALLEL_SINE)))
+        faces.chain(self.edge_normals(other))
+    }
+
+    /// Normals of an edge of each of two prisms, where they are not parallel.
+    fn edge_normals(&self, other: &Self) -> impl Iterator<Item = Vector3<f64>> {
+        let edges = self.edges.iter();
+        let crossed = edges.flat_map(|a| other.edges.iter().map(move |b| a.cross(b)));
+        crossed.filter_map(|normal| normal.try_normalize(PARALLEL_SINE))
     }
 }
 

@@ -2,7 +2,7 @@
 //! glance.
 
 use super::bodies::solids_at_rest;
-use super::overlap::Solid;
+use super::overlap::{Solid, from_lowest};
 use crate::draw::{TextSize, class_color, ink_on, outline, rgb, text};
 use crate::geom::{Point2, Point3};
 use crate::image::Image;
@@ -26,9 +26,7 @@ pub fn preview(scene: &Scene, options: &SettleOptions) -> Image<Srgb8> {
     let views = Views::new(scene.surface.size, &bodies);
     let mut canvas = Image::filled(WIDTH_PX, views.height_px(), PAPER_COLOR);
     views.draw_room(&mut canvas);
-    let mut order: Vec<usize> = (0..bodies.len()).collect();
-    order.sort_by(|&a, &b| bodies[a].center().z.total_cmp(&bodies[b].center().z));
-    for i in order {
+    for i in from_lowest(&bodies) {
         views.draw_body(&mut canvas, i, &bodies[i]);
     }
     canvas
@@ -49,13 +47,10 @@ struct Views {
 impl Views {
     fn new([w, h]: [f64; 2], bodies: &[Solid]) -> Self {
         let scale = (WIDTH_PX as f64 - 2.0 * MARGIN_PX) / w;
-        let top = bodies
-            .iter()
-            .map(|body| body.center().z + body.extent().z)
-            .fold(w / MAX_ASPECT_RATIO, f64::max);
+        let tops = bodies.iter().map(Solid::top);
         Self {
             size: [w, h],
-            top,
+            top: tops.fold(w / MAX_ASPECT_RATIO, f64::max),
             scale,
             above_height: h * scale + 2.0 * MARGIN_PX,
         }
@@ -82,23 +77,34 @@ impl Views {
 
     /// The edges of the surface, and the floor with the walls.
     fn draw_room(&self, canvas: &mut Image<Srgb8>) {
+        outline(canvas, &self.surface_edges(), WALL_COLOR);
+        outline(canvas, &self.walls(), WALL_COLOR);
+    }
+
+    fn surface_edges(&self) -> [Point2<f64>; 4] {
         let [x, y] = self.size.map(|side| side / 2.0);
-        let edges = [(-x, -y), (x, -y), (x, y), (-x, y)]
-            .map(|(x, y)| self.seen_from_above(Point3::new(x, y, 0.0)));
-        let walls = [(-x, 0.0), (x, 0.0), (x, self.top), (-x, self.top)]
-            .map(|(x, z)| self.seen_from_front(Point3::new(x, 0.0, z)));
-        outline(canvas, &edges, WALL_COLOR);
-        outline(canvas, &walls, WALL_COLOR);
+        [(-x, -y), (x, -y), (x, y), (-x, y)]
+            .map(|(x, y)| self.seen_from_above(Point3::new(x, y, 0.0)))
+    }
+
+    fn walls(&self) -> [Point2<f64>; 4] {
+        let (x, top) = (self.size[0] / 2.0, self.top);
+        [(-x, 0.0), (x, 0.0), (x, top), (-x, top)]
+            .map(|(x, z)| self.seen_from_front(Point3::new(x, 0.0, z)))
     }
 
     fn draw_body(&self, canvas: &mut Image<Srgb8>, index: usize, body: &Solid) {
         let color = class_color(index as u32);
         draw_faces(canvas, body, color, |p| self.seen_from_above(p));
         draw_faces(canvas, body, color, |p| self.seen_from_front(p));
+        self.draw_id(canvas, index + 1, body);
+    }
+
+    fn draw_id(&self, canvas: &mut Image<Srgb8>, id: usize, body: &Solid) {
         let at = self.seen_from_above(body.center().into());
         let at = [at.x as isize, at.y as isize];
-        let id = (index + 1).to_string();
-        text(canvas, at, &id, ink_on(PAPER_COLOR), TextSize::Small);
+        let ink = ink_on(PAPER_COLOR);
+        text(canvas, at, &id.to_string(), ink, TextSize::Small);
     }
 }
 

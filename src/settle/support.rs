@@ -48,14 +48,7 @@ pub(super) fn unsupported(
 ) -> Vec<usize> {
     let contacts = contacts(solids, touching, scene.surface.size, touch_distance(scene));
     let model = SpringModel::new(scene, options, solids, &contacts);
-    let moved = model.displacement_at_rest();
-    let mut ids: Vec<usize> = model
-        .order
-        .iter()
-        .zip(moved.chunks(DOF_COUNT))
-        .filter(|(_, y)| norm(y) > UNSUPPORTED_SHARE)
-        .map(|(i, _)| i + 1)
-        .collect();
+    let mut ids = model.hanging_ids();
     ids.sort_unstable();
     ids
 }
@@ -93,30 +86,29 @@ impl SpringModel {
         let order = falling_from_lowest(solids);
         let masses = relative_masses(scene, &order);
         let geometry = SpringGeometry::new(solids, &order, typical_length(scene));
-        let friction = FRICTION_FACTOR * scene.surface.friction;
-        let springs = contacts.iter().flat_map(|contact| {
-            let forces = friction_pyramid(contact, friction).into_iter();
-            forces.map(|force| geometry.spring(contact, force))
-        });
         Self {
-            springs: springs.collect(),
+            springs: geometry.springs(contacts, FRICTION_FACTOR * scene.surface.friction),
             weights: weights_along(options.gravity, &masses),
             masses,
             order,
         }
     }
 
+    /// Ids of the bodies that move by more than [`UNSUPPORTED_SHARE`].
+    fn hanging_ids(&self) -> Vec<usize> {
+        let moved = self.displacement_at_rest();
+        let bodies = self.order.iter().zip(moved.chunks(DOF_COUNT));
+        bodies
+            .filter(|(_, y)| norm(y) > UNSUPPORTED_SHARE)
+            .map(|(i, _)| i + 1)
+            .collect()
+    }
+
     /// How far each body moves, in each degree of freedom.
     fn displacement_at_rest(&self) -> Vec<f64> {
         let (mut y, mut energy) = self.start();
         for _ in 0..MAX_NEWTON_STEPS {
-            let pressed: Vec<bool> = self
-                .springs
-                .iter()
-                .map(|spring| spring.stretch(&y) < 0.0)
-                .collect();
-            let to = self.quadratic_minimum(&pressed);
-            let Some((better, less)) = self.line_search(&y, &to, energy) else {
+            let Some((better, less)) = self.newton_step(&y, energy) else {
                 break;
             };
             let gain = energy - less;
@@ -126,6 +118,13 @@ impl SpringModel {
             }
         }
         y
+    }
+
+    /// Towards the minimum that the springs pressed at `y` would have; none where that gains nothing.
+    fn newton_step(&self, y: &[f64], energy: f64) -> Option<(Vec<f64>, f64)> {
+        let stretches = self.springs.iter().map(|spring| spring.stretch(y));
+        let pressed: Vec<bool> = stretches.map(|stretch| stretch < 0.0).collect();
+        self.line_search(y, &self.quadratic_minimum(&pressed), energy)
     }
 
     /// The minimum with all springs pressed, or no displacement where that has less energy.
@@ -141,10 +140,7 @@ impl SpringModel {
 
     /// The minimum if just these springs pushed, and pulled.
     fn quadratic_minimum(&self, pressed: &[bool]) -> Vec<f64> {
-        let mut matrix = EnvelopeMatrix::zeros(self.first_entries());
-        for (i, mass) in self.masses.iter().enumerate() {
-            matrix.add(i, i, *mass);
-        }
+        let mut matrix = self.own_stiffness();
         for (spring, pressed) in self.springs.iter().zip(pressed) {
             if *pressed {
                 spring.add_stiffness(&mut matrix);
@@ -153,43 +149,55 @@ impl SpringModel {
         matrix.solve(self.weights.clone())
     }
 
+    /// That of the bodies' own springs, with room for those of the contacts.
+    fn own_stiffness(&self) -> EnvelopeMatrix {
+        let mut matrix = EnvelopeMatrix::zeros(self.first_entries());
+        for (i, mass) in self.masses.iter().enumerate() {
+            matrix.add(i, i, *mass);
+        }
+        matrix
+    }
+
     /// First entry of each row of the matrix: of the lowest body that the row's body touches.
     fn first_entries(&self) -> Vec<usize> {
-        let mut first: Vec<usize> = (0..self.order.len()).collect();
-        for [a, b] in self.springs.iter().filter_map(Spring::coupled_slots) {
-            let (low, high) = (a.min(b), a.max(b));
-            first[high] = first[high].min(low);
-        }
-        first
-            .into_iter()
+        let slots = self.lowest_coupled().into_iter();
+        slots
             .flat_map(|slot| [DOF_COUNT * slot; DOF_COUNT])
             .collect()
     }
 
+    /// For each body the slot of the lowest that it touches, or its own.
+    fn lowest_coupled(&self) -> Vec<usize> {
+        let mut lowest: Vec<usize> = (0..self.order.len()).collect();
+        for [a, b] in self.springs.iter().filter_map(Spring::coupled_slots) {
+            let (low, high) = (a.min(b), a.max(b));
+            lowest[high] = lowest[high].min(low);
+        }
+        lowest
+    }
+
     fn energy(&self, y: &[f64]) -> f64 {
-        let own: f64 = self
-            .masses
-            .iter()
-            .zip(&self.weights)
-            .zip(y)
-            .map(|((m, w), y)| (0.5 * m * y - w) * y)
-            .sum();
         let compressed = self
             .springs
             .iter()
             .map(|spring| spring.stretch(y).min(0.0).powi(2));
-        own + 0.5 * CONTACT_STIFFNESS * compressed.sum::<f64>()
+        self.own_energy(y) + 0.5 * CONTACT_STIFFNESS * compressed.sum::<f64>()
+    }
+
+    /// Of the bodies' own springs, less what their weights release.
+    fn own_energy(&self, y: &[f64]) -> f64 {
+        let loads = self.masses.iter().zip(&self.weights);
+        loads.zip(y).map(|((m, w), y)| (0.5 * m * y - w) * y).sum()
     }
 
     /// The first point of less energy on the way, halving it; none where there is none.
     fn line_search(&self, from: &[f64], to: &[f64], energy: f64) -> Option<(Vec<f64>, f64)> {
         let shares = std::iter::successors(Some(1.0), |share| Some(share / 2.0));
-        shares
-            .take(MAX_HALVINGS)
-            .map(|share| interpolate(from, to, share))
-            .map(|y| (self.energy(&y), y))
-            .find(|(less, _)| *less < energy)
-            .map(|(less, y)| (y, less))
+        shares.take(MAX_HALVINGS).find_map(|share| {
+            let y = interpolate(from, to, share);
+            let less = self.energy(&y);
+            (less < energy).then_some((y, less))
+        })
     }
 }
 
@@ -228,15 +236,22 @@ struct SpringGeometry {
 
 impl SpringGeometry {
     fn new(solids: &[Solid], order: &[usize], typical_length: f64) -> Self {
-        let mut slots = vec![None; solids.len()];
-        for (slot, &i) in order.iter().enumerate() {
-            slots[i] = Some(slot);
-        }
         Self {
-            slots,
+            slots: slots_of(order, solids.len()),
             centers_of_mass: solids.iter().map(center_of_mass).collect(),
             gyration: GYRATION_RATIO * typical_length,
         }
+    }
+
+    /// The springs of all contacts.
+    fn springs(&self, contacts: &[Contact], friction: f64) -> Vec<Spring> {
+        contacts
+            .iter()
+            .flat_map(|contact| {
+                let forces = friction_pyramid(contact, friction).into_iter();
+                forces.map(|force| self.spring(contact, force))
+            })
+            .collect()
     }
 
     fn spring(&self, contact: &Contact, force: Vector3<f64>) -> Spring {
@@ -260,6 +275,15 @@ impl SpringGeometry {
         let wrench = [force.x, force.y, force.z, moment.x, moment.y, moment.z];
         Some(SpringEnd { slot, wrench })
     }
+}
+
+/// Place in an order of each of so many bodies.
+fn slots_of(order: &[usize], count: usize) -> Vec<Option<usize>> {
+    let mut slots = vec![None; count];
+    for (slot, &i) in order.iter().enumerate() {
+        slots[i] = Some(slot);
+    }
+    slots
 }
 
 impl Spring {
@@ -297,14 +321,19 @@ impl SpringEnd {
     fn couple(&self, other: &Self, matrix: &mut EnvelopeMatrix) {
         let (row, column) = (DOF_COUNT * self.slot, DOF_COUNT * other.slot);
         for (i, a) in self.wrench.iter().enumerate() {
-            let end = if self.slot == other.slot {
-                i + 1
-            } else {
-                DOF_COUNT
-            };
-            for (j, b) in other.wrench[..end].iter().enumerate() {
+            let pushes = other.wrench[..self.row_end(i, other)].iter();
+            for (j, b) in pushes.enumerate() {
                 matrix.add(row + i, column + j, CONTACT_STIFFNESS * a * b);
             }
+        }
+    }
+
+    /// Entries of a row of that block up to the diagonal of the matrix.
+    fn row_end(&self, i: usize, other: &Self) -> usize {
+        if self.slot == other.slot {
+            i + 1
+        } else {
+            DOF_COUNT
         }
     }
 }
@@ -331,6 +360,16 @@ fn center_of_mass(solid: &Solid) -> Vector3<f64> {
 
 /// Centre of mass of a flat convex ring.
 fn centroid(ring: &[[f64; 2]]) -> [f64; 2] {
+    let [area, x, y] = ring_moments(ring);
+    if area > 0.0 {
+        [x, y].map(|moment| moment / (3.0 * area))
+    } else {
+        [0.0; 2]
+    }
+}
+
+/// Twice the area of a ring, and six times its first moments.
+fn ring_moments(ring: &[[f64; 2]]) -> [f64; 3] {
     let next = ring.iter().cycle().skip(1);
     let (mut area, mut x, mut y) = (0.0, 0.0, 0.0);
     for (a, b) in ring.iter().zip(next) {
@@ -339,11 +378,7 @@ fn centroid(ring: &[[f64; 2]]) -> [f64; 2] {
         x += cross * (a[0] + b[0]);
         y += cross * (a[1] + b[1]);
     }
-    if area > 0.0 {
-        [x, y].map(|moment| moment / (3.0 * area))
-    } else {
-        [0.0; 2]
-    }
+    [area, x, y]
 }
 
 #[cfg(test)]

@@ -30,13 +30,19 @@ pub fn csv(samples: &[MotionSample]) -> String {
 }
 
 fn csv_line(sample: &MotionSample) -> String {
-    let (t, q) = (sample.pose.translation, sample.pose.rotation);
-    let pose = [t.x, t.y, t.z, q.w, q.i, q.j, q.k];
-    let motion = [sample.speed, sample.spin, sample.kinetic, sample.potential];
-    let cells: String = pose
-        .iter()
-        .chain(&motion)
-        .map(|x| format!(",{x:.7}"))
-        .collect();
+    let values = sample.values();
+    let cells: String = values.iter().map(|x| format!(",{x:.7}")).collect();
     format!("{:.6},{}{cells}\n", sample.seconds, sample.object)
+}
+
+impl MotionSample {
+    /// Its pose and motion, in the order of [`CSV_HEADER`].
+    fn values(&self) -> [f64; 11] {
+        let (t, q) = (self.pose.translation, self.pose.rotation);
+        let (speed, spin) = (self.speed, self.spin);
+        let (kinetic, potential) = (self.kinetic, self.potential);
+        [
+            t.x, t.y, t.z, q.w, q.i, q.j, q.k, speed, spin, kinetic, potential,
+        ]
+    }
 }

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 /// A box is within an anchor's reach when no side differs from the anchor's by this factor or more: what equation 1 can
 /// decode, and YOLOv5's default.
-pub const MAX_SIDE_RATIO: f64 = 4.0;
+pub(crate) const MAX_SIDE_RATIO: f64 = 4.0;
 /// Rounds of the clustering; it rests after a few dozen.
 const MAX_ROUNDS: usize = 300;
 
@@ -17,7 +17,7 @@ pub struct Anchors {
     pub sizes: Vec<[f64; 2]>,
     /// Mean intersection over union of a box with the anchor that fits it best, both about one centre.
     pub mean_iou: f64,
-    /// Share of the boxes within reach of some anchor ([`MAX_SIDE_RATIO`]).
+    /// Share of the boxes within reach of some anchor (`MAX_SIDE_RATIO`).
     pub best_possible_recall: f64,
 }
 

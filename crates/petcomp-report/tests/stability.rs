@@ -2,7 +2,7 @@
 //! `-- --ignored`.
 
 use libtest_mimic::{Arguments, Failed, Trial};
-use petcomp_report::stability::{Case, cases};
+use petcomp_report::stability::{HardCase, cases};
 
 fn main() {
     // One at a time: some are held to what the whole process takes of memory.
@@ -17,12 +17,12 @@ fn main() {
     libtest_mimic::run(&args, trials.collect()).exit();
 }
 
-fn trial(stage: &str, case: Case) -> Trial {
+fn trial(stage: &str, case: HardCase) -> Trial {
     let (name, report_only) = (format!("{stage}/{}", case.name), case.report_only);
     Trial::test(name, move || held(&case)).with_ignored_flag(report_only)
 }
 
-fn held(case: &Case) -> Result<(), Failed> {
+fn held(case: &HardCase) -> Result<(), Failed> {
     let outcome = case.outcome();
     let told = format!(
         "{}; expected: {}; found: {}",

@@ -39,7 +39,7 @@ pub trait ToFile: Copy + Send + Sync {
     const CODED: bool = true;
     /// Display-encoded straight codes (a matte: as it is); as many as there are names are used.
     #[doc(hidden)]
-    fn codes<C: Code>(self) -> [C; 4];
+    fn codes<C: DisplayCode>(self) -> [C; 4];
     /// Scene-linear channels, colours multiplied by alpha.
     #[doc(hidden)]
     fn linear(self) -> [f32; MAX_CHANNELS];
@@ -58,7 +58,7 @@ const RGB: &[&str] = &["R", "G", "B"];
 const RGBA: &[&str] = &["R", "G", "B", "A"];
 
 /// An integer that stands for 0 to 1: what is outside is clipped, NaN is 0.
-pub trait Code: Copy + Default + Send {
+pub trait DisplayCode: Copy + Default + Send {
     #[doc(hidden)]
     const FULL_SCALE: Self;
     /// The value as it is.
@@ -72,7 +72,7 @@ pub trait Code: Copy + Default + Send {
     fn from_8_bits(code: u8) -> Self;
 }
 
-impl Code for u8 {
+impl DisplayCode for u8 {
     const FULL_SCALE: Self = Self::MAX;
     #[inline]
     fn from_value(v: f32) -> Self {
@@ -89,7 +89,7 @@ impl Code for u8 {
     }
 }
 
-impl Code for u16 {
+impl DisplayCode for u16 {
     const FULL_SCALE: Self = Self::MAX;
     #[inline]
     fn from_value(v: f32) -> Self {
@@ -107,7 +107,7 @@ impl Code for u16 {
 
 impl ToFile for LinearRgb {
     const NAMES: &'static [&'static str] = RGB;
-    fn codes<C: Code>(self) -> [C; 4] {
+    fn codes<C: DisplayCode>(self) -> [C; 4] {
         let [r, g, b] = C::from_light(self);
         [r, g, b, C::FULL_SCALE]
     }
@@ -118,7 +118,7 @@ impl ToFile for LinearRgb {
 
 impl ToFile for StraightRgba {
     const NAMES: &'static [&'static str] = RGBA;
-    fn codes<C: Code>(self) -> [C; 4] {
+    fn codes<C: DisplayCode>(self) -> [C; 4] {
         let [r, g, b] = C::from_light(LinearRgb::new(self.r, self.g, self.b));
         [r, g, b, C::from_value(self.a)]
     }
@@ -129,7 +129,7 @@ impl ToFile for StraightRgba {
 
 impl ToFile for PremulRgba {
     const NAMES: &'static [&'static str] = RGBA;
-    fn codes<C: Code>(self) -> [C; 4] {
+    fn codes<C: DisplayCode>(self) -> [C; 4] {
         self.to_straight().codes()
     }
     fn linear(self) -> [f32; MAX_CHANNELS] {
@@ -141,7 +141,7 @@ impl ToFile for Film {
     /// Programs that know no film see the grey one: `A`.
     const NAMES: &'static [&'static str] = &["R", "G", "B", "A", "TR", "TG", "TB"];
     const CODED: bool = false;
-    fn codes<C: Code>(self) -> [C; 4] {
+    fn codes<C: DisplayCode>(self) -> [C; 4] {
         self.to_rgba().codes()
     }
     fn linear(self) -> [f32; MAX_CHANNELS] {
@@ -152,7 +152,7 @@ impl ToFile for Film {
 
 impl ToFile for Coverage {
     const NAMES: &'static [&'static str] = &["Y"];
-    fn codes<C: Code>(self) -> [C; 4] {
+    fn codes<C: DisplayCode>(self) -> [C; 4] {
         [C::from_value(self.0); 4]
     }
     fn linear(self) -> [f32; MAX_CHANNELS] {
@@ -162,7 +162,7 @@ impl ToFile for Coverage {
 
 impl ToFile for f32 {
     const NAMES: &'static [&'static str] = Coverage::NAMES;
-    fn codes<C: Code>(self) -> [C; 4] {
+    fn codes<C: DisplayCode>(self) -> [C; 4] {
         Coverage(self).codes()
     }
     fn linear(self) -> [f32; MAX_CHANNELS] {
@@ -173,7 +173,7 @@ impl ToFile for f32 {
 impl ToFile for Depth {
     const NAMES: &'static [&'static str] = &["Z"];
     const CODED: bool = false;
-    fn codes<C: Code>(self) -> [C; 4] {
+    fn codes<C: DisplayCode>(self) -> [C; 4] {
         [C::from_value(self.0); 4]
     }
     fn linear(self) -> [f32; MAX_CHANNELS] {
@@ -183,7 +183,7 @@ impl ToFile for Depth {
 
 impl ToFile for Srgb8 {
     const NAMES: &'static [&'static str] = RGB;
-    fn codes<C: Code>(self) -> [C; 4] {
+    fn codes<C: DisplayCode>(self) -> [C; 4] {
         [self.r, self.g, self.b, u8::MAX].map(C::from_8_bits)
     }
     fn linear(self) -> [f32; MAX_CHANNELS] {
@@ -193,7 +193,7 @@ impl ToFile for Srgb8 {
 
 impl ToFile for Srgba8 {
     const NAMES: &'static [&'static str] = RGBA;
-    fn codes<C: Code>(self) -> [C; 4] {
+    fn codes<C: DisplayCode>(self) -> [C; 4] {
         [self.r, self.g, self.b, self.a].map(C::from_8_bits)
     }
     fn linear(self) -> [f32; MAX_CHANNELS] {
@@ -241,9 +241,10 @@ pub(crate) fn interleaved<P: ToFile, T: Copy + Default + Send, const N: usize>(
 ) -> Vec<T> {
     let n = P::NAMES.len();
     let mut out = vec![T::default(); image.pixels().len() * n];
-    let rows = image.width().max(1);
-    out.par_chunks_exact_mut(n)
-        .with_min_len(rows)
+    let slots = out
+        .par_chunks_exact_mut(n)
+        .with_min_len(image.width().max(1));
+    slots
         .zip(image.pixels())
         .for_each(|(slot, &p)| slot.copy_from_slice(&channels(p)[..n]));
     out

@@ -3,14 +3,14 @@
 use crate::error::{Error, one_line};
 
 /// What a parser did not accept, and where.
-pub(super) struct Mistake {
+pub(super) struct DocumentMistake {
     /// Path of the field; empty, `.` or `?` for the document itself.
     pub(super) at: String,
     pub(super) line: Option<usize>,
     pub(super) what: String,
 }
 
-impl Mistake {
+impl DocumentMistake {
     pub(super) fn into_error(self) -> Error {
         let (at, what) = self.place_and_message();
         match (at, self.line) {

@@ -11,7 +11,7 @@ use super::fs::{read_regular, write_bytes};
 use super::options::ReadOptions;
 use crate::error::{Error, Result, one_line};
 use duplicate_keys::{check_json, find_invalid_toml};
-use mistake::Mistake;
+use mistake::DocumentMistake;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::path::Path;
@@ -31,7 +31,7 @@ pub fn read_toml<T: DeserializeOwned>(path: impl AsRef<Path>) -> Result<T> {
 ///
 /// # Errors
 /// As [`read_toml`]; an override of a value that cannot be there.
-pub fn read_toml_with<T: DeserializeOwned>(
+pub(crate) fn read_toml_with<T: DeserializeOwned>(
     path: impl AsRef<Path>,
     overrides: &[Override],
 ) -> Result<T> {
@@ -95,7 +95,7 @@ fn from_value<T: DeserializeOwned>(value: toml::Value, outer: &str) -> Result<T>
     serde_path_to_error::deserialize(value).map_err(|e| {
         let at = format!("{outer}{}", e.path());
         let e: toml::de::Error = e.into_inner();
-        Mistake {
+        DocumentMistake {
             at: at.trim_end_matches('.').into(),
             line: None,
             what: e.message().into(),
@@ -147,7 +147,7 @@ pub fn read_json<T: DeserializeOwned>(path: impl AsRef<Path>) -> Result<T> {
 ///
 /// # Errors
 /// As [`read_toml`].
-pub fn read_json_data<T: DeserializeOwned>(path: impl AsRef<Path>) -> Result<T> {
+pub(crate) fn read_json_data<T: DeserializeOwned>(path: impl AsRef<Path>) -> Result<T> {
     let path = path.as_ref();
     let most = (ReadOptions::default().limits.file_bytes, "file_bytes");
     let text = utf8(path, read_regular(path, most, "text file")?)?;
@@ -212,7 +212,7 @@ pub fn write_text(path: impl AsRef<Path>, text: &str) -> Result<()> {
 ///
 /// # Errors
 /// [`Error::Value`] for what is not TOML, a key twice, a number that is not finite, and values that do not fit.
-pub fn parse_toml<T: DeserializeOwned>(text: &str) -> Result<T> {
+pub(crate) fn parse_toml<T: DeserializeOwned>(text: &str) -> Result<T> {
     parse_toml_lines(text, |byte| Some(line_of(text, byte)))
 }
 
@@ -223,7 +223,7 @@ fn parse_toml_lines<T: DeserializeOwned>(
 ) -> Result<T> {
     let document = DeTable::parse(text).map_err(|e| toml_mistake(&e, String::new(), &line))?;
     if let Some((what, span)) = find_invalid_toml(&document, max_depth()) {
-        return Err(Mistake {
+        return Err(DocumentMistake {
             at: String::new(),
             line: line(span.start),
             what,
@@ -237,7 +237,7 @@ fn parse_toml_lines<T: DeserializeOwned>(
 }
 
 fn toml_mistake(e: &toml::de::Error, at: String, line: impl Fn(usize) -> Option<usize>) -> Error {
-    Mistake {
+    DocumentMistake {
         at,
         line: e.span().and_then(|span| line(span.start)),
         what: e.message().into(),
@@ -249,7 +249,7 @@ fn toml_mistake(e: &toml::de::Error, at: String, line: impl Fn(usize) -> Option<
 ///
 /// # Errors
 /// As [`parse_toml`].
-pub fn parse_json<T: DeserializeOwned>(text: &str) -> Result<T> {
+pub(crate) fn parse_json<T: DeserializeOwned>(text: &str) -> Result<T> {
     check_json(text, max_depth()).map_err(|e| json_mistake(&e, String::new()))?;
     deserialize_json(text)
 }
@@ -269,7 +269,7 @@ fn json_mistake(e: &serde_json::Error, at: String) -> Error {
     let what = message.split(" at line ").next().unwrap_or_default().into();
     // A type that reads itself from a tree of values has no lines.
     let line = Some(e.line()).filter(|&line| line > 0);
-    Mistake { at, line, what }.into_error()
+    DocumentMistake { at, line, what }.into_error()
 }
 
 /// Levels that a document may be nested.

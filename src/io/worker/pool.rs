@@ -11,7 +11,7 @@ use super::timeout::TimedPipe;
 use crate::error::{Error, Result};
 use crate::io::codec::refusal::Refusal;
 use crate::io::limits::Limits;
-use crate::io::source::Source;
+use crate::io::source::SourceFile;
 use std::io::{BufReader, ErrorKind};
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
@@ -43,7 +43,7 @@ static IDLE: WorkerPool = WorkerPool {
 
 /// A worker's response about a file. A strict request is sent to no worker that the system does not sandbox.
 pub(crate) fn ask(
-    source: &Source,
+    source: &SourceFile,
     limits: &Limits,
     strict: bool,
     request: Request,
@@ -98,7 +98,7 @@ impl WorkerPool {
     fn ask(
         &self,
         program: &Path,
-        source: &Source,
+        source: &SourceFile,
         limits: &Limits,
         strict: bool,
         request: Request,
@@ -223,7 +223,7 @@ impl Worker {
 
     fn answer(
         &mut self,
-        source: &Source,
+        source: &SourceFile,
         request: Request,
     ) -> std::result::Result<std::result::Result<Response, Refusal>, Failure> {
         let started = Instant::now();
@@ -245,7 +245,7 @@ impl Worker {
 
     fn ask_shape(
         &mut self,
-        source: &Source,
+        source: &SourceFile,
         request: Request,
     ) -> std::io::Result<std::result::Result<Shape, Refusal>> {
         send_request(&mut self.to, source.format, request, &source.bytes)?;
@@ -384,7 +384,7 @@ mod tests {
             count = count.display()
         );
         write_program(&program, &text);
-        let source = Source {
+        let source = SourceFile {
             path: "a.tif".into(),
             bytes: vec![0; 3],
             format: Format::Tiff,
@@ -485,7 +485,7 @@ mod tests {
 
     #[test]
     fn a_program_that_is_no_worker_is_named() {
-        let source = Source {
+        let source = SourceFile {
             path: "a.tif".into(),
             bytes: vec![0; 3],
             format: Format::Tiff,

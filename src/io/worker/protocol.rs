@@ -5,12 +5,12 @@
 //! that asks trusts nothing: it checks every size itself.
 
 use crate::io::codec::Wanted;
-use crate::io::codec::raster::{Raster, Samples};
+use crate::io::codec::raster::{Raster, SampleKind, Samples};
 use crate::io::codec::refusal::Refusal;
 use crate::io::format::Format;
 use crate::io::header::Window;
 use crate::io::limits::{Demand, Limits};
-use crate::io::source::Source;
+use crate::io::source::SourceFile;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::io::{BufRead, Error, ErrorKind, Read, Result, Write};
@@ -38,7 +38,7 @@ pub(crate) enum Response {
 #[derive(Clone, Copy)]
 pub struct Linked(pub(in crate::io) LinkedAnswer);
 
-type LinkedAnswer = fn(&Source, &Limits, Request) -> std::result::Result<Response, Refusal>;
+type LinkedAnswer = fn(&SourceFile, &Limits, Request) -> std::result::Result<Response, Refusal>;
 
 impl std::fmt::Debug for Linked {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
@@ -81,7 +81,7 @@ pub(crate) struct Shape {
     pub(crate) width: usize,
     pub(crate) height: usize,
     pub(crate) names: Vec<String>,
-    pub(crate) sample: Sample,
+    pub(crate) sample: SampleKind,
     pub(crate) display_encoded: bool,
 }
 
@@ -95,35 +95,6 @@ impl Shape {
             channels,
             bytes_per_pixel: channels * u64::from(self.sample.bytes()),
             file_bytes,
-        }
-    }
-}
-
-/// How a sample is stored.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub(crate) enum Sample {
-    U8,
-    U16,
-    F16,
-    F32,
-}
-
-impl Sample {
-    pub(crate) fn bytes(self) -> u32 {
-        match self {
-            Self::U8 => 1,
-            Self::U16 | Self::F16 => 2,
-            Self::F32 => 4,
-        }
-    }
-
-    fn kind_of(samples: &Samples) -> Self {
-        match samples {
-            Samples::U8(_) => Self::U8,
-            Samples::U16(_) => Self::U16,
-            Samples::F16(_) => Self::F16,
-            Samples::F32(_) => Self::F32,
         }
     }
 }
@@ -168,16 +139,11 @@ pub(super) fn send_raster(to: &mut impl Write, raster: &Raster) -> Result<()> {
         width: raster.width,
         height: raster.height,
         names: raster.names.clone(),
-        sample: Sample::kind_of(&raster.samples),
+        sample: raster.samples.kind(),
         display_encoded: raster.display_encoded,
     };
     send_line(to, &ResponseHead::Picture(shape))?;
-    to.write_all(match &raster.samples {
-        Samples::U8(v) => v,
-        Samples::U16(v) => bytemuck::cast_slice(v),
-        Samples::F16(v) => bytemuck::cast_slice(v),
-        Samples::F32(v) => bytemuck::cast_slice(v),
-    })?;
+    to.write_all(raster.samples.bytes())?;
     to.flush()
 }
 
@@ -200,12 +166,8 @@ pub(crate) fn receive_shape(
 /// Receives the samples of a shape that was checked.
 pub(crate) fn receive_samples(from: &mut impl Read, shape: Shape) -> Result<Raster> {
     let count = shape.width * shape.height * shape.names.len();
-    let samples = match shape.sample {
-        Sample::U8 => Samples::U8(read_samples(from, count)?),
-        Sample::U16 => Samples::U16(read_samples(from, count)?),
-        Sample::F16 => Samples::F16(read_samples(from, count)?),
-        Sample::F32 => Samples::F32(read_samples(from, count)?),
-    };
+    let mut samples = Samples::zeroed(shape.sample, count);
+    from.read_exact(samples.bytes_mut())?;
     Ok(Raster {
         width: shape.width,
         height: shape.height,
@@ -214,12 +176,6 @@ pub(crate) fn receive_samples(from: &mut impl Read, shape: Shape) -> Result<Rast
         display_encoded: shape.display_encoded,
         premultiplied: false,
     })
-}
-
-fn read_samples<T: bytemuck::Pod>(from: &mut impl Read, count: usize) -> Result<Vec<T>> {
-    let mut samples = bytemuck::zeroed_vec(count);
-    from.read_exact(bytemuck::cast_slice_mut(&mut samples))?;
-    Ok(samples)
 }
 
 #[cfg(test)]

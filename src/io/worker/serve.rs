@@ -8,7 +8,7 @@ use super::sandbox::{MemoryLimit, enter_sandbox};
 use crate::io::codec::refusal::Refusal;
 use crate::io::format::Format;
 use crate::io::limits::{Limits, at_most, machine_bytes};
-use crate::io::source::Source;
+use crate::io::source::SourceFile;
 use std::ffi::OsString;
 use std::io::{BufRead, BufReader, Error, Read, Result, Write};
 use std::path::PathBuf;
@@ -65,7 +65,7 @@ impl Server {
         let Some(format) = Format::from_name(&request.format) else {
             return send_refusal(to, &"a format of an unknown name".into());
         };
-        let source = Source {
+        let source = SourceFile {
             path: PathBuf::new(),
             bytes,
             format,
@@ -80,7 +80,12 @@ impl Server {
         Ok(file)
     }
 
-    fn respond_about(&self, source: &Source, request: Request, to: &mut impl Write) -> Result<()> {
+    fn respond_about(
+        &self,
+        source: &SourceFile,
+        request: Request,
+        to: &mut impl Write,
+    ) -> Result<()> {
         let file_bytes = source.bytes.len() as u64;
         match request {
             Request::Header => match openimageio::shape(source, &self.limits) {

@@ -11,7 +11,7 @@ use crate::geom::Vector3;
 use crate::image::Image;
 use crate::io::{self, Bits, WriteOptions};
 use crate::pixel::LinearRgb;
-use crate::scene::{AreaLight, Card, LightShape, Shot};
+use crate::scene::{AreaLight, Card, EnvironmentMap, LightShape, Shot};
 use nalgebra::SMatrix;
 use std::path::Path;
 
@@ -96,11 +96,7 @@ fn cycles_camera(camera: &Camera) -> CyclesCamera {
 }
 
 fn write_card(folder: &Path, card: &Card) -> Result<CyclesQuad> {
-    let id = card.id.0;
-    if !(1..=u32::from(u16::MAX)).contains(&id) {
-        let what = format!("id {id}, expected 1 to {}", u16::MAX);
-        return Err(Error::value("cards", what));
-    }
+    let id = checked_id(card)?;
     let back = card.back.as_ref();
     Ok(CyclesQuad {
         id,
@@ -114,6 +110,16 @@ fn write_card(folder: &Path, card: &Card) -> Result<CyclesQuad> {
         saturation: card.grade.saturation,
         value: card.grade.value,
     })
+}
+
+/// A card's id as Blender can have it.
+fn checked_id(card: &Card) -> Result<u32> {
+    let id = card.id.0;
+    if (1..=u32::from(u16::MAX)).contains(&id) {
+        return Ok(id);
+    }
+    let what = format!("id {id}, expected 1 to {}", u16::MAX);
+    Err(Error::value("cards", what))
 }
 
 fn matrix_rows<const N: usize>(m: SMatrix<f64, N, N>) -> [[f64; N]; N] {
@@ -176,14 +182,17 @@ fn write_environment(folder: &Path, shot: &Shot) -> Result<CyclesEnvironment> {
             rotation_z: 0.0,
         });
     };
-    let both = map
-        .panorama
-        .image()
-        .map(|c: LinearRgb| (c.scale(map.strength) + shot.ambient).scale(shot.exposure));
+    let picture = joined_environment(map, shot.ambient, shot.exposure);
     Ok(CyclesEnvironment {
         color: None,
-        path: Some(write_picture(folder, "environment.exr", &both)?),
+        path: Some(write_picture(folder, "environment.exr", &picture)?),
         strength: 1.0,
         rotation_z: map.rotation.to_degrees(),
     })
+}
+
+/// A map with a constant environment added, times the exposure.
+fn joined_environment(map: &EnvironmentMap, ambient: LinearRgb, exposure: f32) -> Image<LinearRgb> {
+    let picture = map.panorama.image();
+    picture.map(|c: LinearRgb| (c.scale(map.strength) + ambient).scale(exposure))
 }

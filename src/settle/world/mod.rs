@@ -21,7 +21,7 @@ use crate::scene::{Object, Placement, Scene, SettleOptions};
 use crate::work::{self, Kind};
 use rapier3d::prelude::{
     CoefficientCombineRule, ColliderBuilder, IntegrationParameters, PhysicsWorld, RigidBodyBuilder,
-    RigidBodyHandle,
+    RigidBodyHandle, SpringCoefficients,
 };
 use run::{FallRun, Pace};
 use units::{WorldUnits, glam_vector};
@@ -118,6 +118,10 @@ impl Drop<'_> {
         let units = WorldUnits::new(self.scene, self.options);
         let pace = self.pace(members.len());
         self.check_work(members, &units, &pace)?;
+        self.start(members, units, pace).run_to_rest()
+    }
+
+    fn start(&self, members: &[usize], units: WorldUnits, pace: Pace) -> FallRun<'_> {
         let (world, bodies) = self.filled_world(members, &units, pace.step);
         FallRun {
             world,
@@ -128,7 +132,6 @@ impl Drop<'_> {
             work_per_pair: self.work_per_pair(),
             allowance: self.allowance,
         }
-        .run_to_rest()
     }
 
     /// The room, all that stands in it, and what falls: the handles of that.
@@ -140,15 +143,19 @@ impl Drop<'_> {
     ) -> (PhysicsWorld, Vec<RigidBodyHandle>) {
         let mut world = self.empty_world(step);
         self.add_room(&mut world, units, members);
-        let standing = self.scene.objects.iter().filter(|o| !is_dropped(o));
-        for object in standing {
-            self.add_body(&mut world, object, 0.0, units);
-        }
+        self.add_standing(&mut world, units);
         let bodies = members
             .iter()
             .map(|&i| self.add_body(&mut world, &self.scene.objects[i], self.heights[i], units))
             .collect();
         (world, bodies)
+    }
+
+    fn add_standing(&self, world: &mut PhysicsWorld, units: &WorldUnits) {
+        let standing = self.scene.objects.iter().filter(|o| !is_dropped(o));
+        for object in standing {
+            self.add_body(world, object, 0.0, units);
+        }
     }
 
     fn pace(&self, objects: usize) -> Pace {
@@ -169,11 +176,16 @@ impl Drop<'_> {
 
     /// Refuses at once what would take more work than is left even if it rested where it lands.
     fn check_work(&self, members: &[usize], units: &WorldUnits, pace: &Pace) -> Result<()> {
-        let highest = members.iter().map(|&i| self.heights[i]).fold(0.0, f64::max) * units.length;
-        let fall_time = (highest / MAX_SPEED_M_PER_S).min(pace.time_limit);
-        let steps = fall_time / pace.step * MIN_FALL_SHARE;
+        let steps = self.fewest_steps(members, units, pace);
         self.allowance
             .check(steps * members.len() as f64 * self.work_per_pair() as f64)
+    }
+
+    /// Steps of a fall that ends where the highest of these objects lands.
+    fn fewest_steps(&self, members: &[usize], units: &WorldUnits, pace: &Pace) -> f64 {
+        let highest = members.iter().map(|&i| self.heights[i]).fold(0.0, f64::max) * units.length;
+        let fall_time = (highest / MAX_SPEED_M_PER_S).min(pace.time_limit);
+        fall_time / pace.step * MIN_FALL_SHARE
     }
 
     fn empty_world(&self, step: f64) -> PhysicsWorld {
@@ -190,29 +202,24 @@ impl Drop<'_> {
         p.max_ccd_substeps = self.options.ccd as usize;
         p.num_solver_iterations = self.options.iterations as usize;
         p.length_unit = LENGTH_UNIT_M as f32;
-        // The stiffest contacts that still come to rest: a quarter and a half of the rate of solver
-        // iterations.
-        let rate = self.options.iterations as f32 / p.dt;
-        p.contact_softness.natural_frequency = rate / 4.0;
-        p.contact_softness.damping_ratio = CONTACT_DAMPING_RATIO;
-        p.static_contact_softness.natural_frequency = rate / 2.0;
-        p.static_contact_softness.damping_ratio = CONTACT_DAMPING_RATIO;
         p.normalized_max_corrective_velocity = MAX_CORRECTIVE_SPEED;
         p.num_internal_stabilization_iterations = STABILIZATION_ITERATIONS;
         p.normalized_max_linear_velocity = (MAX_SPEED_M_PER_S / LENGTH_UNIT_M) as f32;
+        // The stiffest contacts that still come to rest: a quarter and a half of the rate of solver
+        // iterations.
+        let rate = self.options.iterations as f32 / p.dt;
+        soften(&mut p.contact_softness, rate / 4.0);
+        soften(&mut p.static_contact_softness, rate / 2.0);
     }
 
     /// Adds the floor and four walls, which reach above the highest start. The walls are smooth: what
     /// is invisible supports nothing.
     fn add_room(&self, world: &mut PhysicsWorld, units: &WorldUnits, members: &[usize]) {
-        let half_sides = self
-            .scene
-            .surface
-            .size
-            .map(|length| length * units.length / 2.0);
+        let surface = &self.scene.surface;
+        let half_sides = surface.size.map(|length| length * units.length / 2.0);
         let middle = self.highest_top(members) * units.length / 2.0;
         let [floor, walls @ ..] = room_slabs(half_sides, middle);
-        self.add_slab(world, floor, self.scene.surface.friction);
+        self.add_slab(world, floor, surface.friction);
         for wall in walls {
             self.add_slab(world, wall, 0.0);
         }
@@ -260,10 +267,8 @@ impl Drop<'_> {
 
     /// The shape of an object, of its mass.
     fn colliders(&self, object: &Object, units: &WorldUnits) -> Vec<ColliderBuilder> {
-        let mass = (object.mass * units.mass)
-            .clamp(CARD_MASS_KG / MASS_SPREAD, CARD_MASS_KG * MASS_SPREAD);
         let half = self.options.half_body(object) * units.length;
-        prism::colliders(object, &half, units.length, mass)
+        prism::colliders(object, &half, units.length, body_mass(object, units))
             .into_iter()
             .map(|part| self.with_contacts(part))
             .collect()
@@ -276,6 +281,11 @@ impl Drop<'_> {
             .restitution(surface.restitution as f32)
             .contact_skin(CONTACT_MARGIN_M)
     }
+}
+
+fn soften(contacts: &mut SpringCoefficients<f32>, frequency: f32) {
+    contacts.natural_frequency = frequency;
+    contacts.damping_ratio = CONTACT_DAMPING_RATIO;
 }
 
 /// The floor or a wall: centre and half lengths, metres in the world.
@@ -297,6 +307,11 @@ fn room_slabs([x, y]: [f64; 2], middle: f64) -> [Slab; 5] {
         ([0.0, -y - wall, middle], [wide, wall, high]),
     ]
     .map(|(center, half)| Slab { center, half })
+}
+
+/// Mass of an object in the world, within [`MASS_SPREAD`] of the typical one.
+fn body_mass(object: &Object, units: &WorldUnits) -> f64 {
+    (object.mass * units.mass).clamp(CARD_MASS_KG / MASS_SPREAD, CARD_MASS_KG * MASS_SPREAD)
 }
 
 /// A body that stands or falls, and its pose at the start.

@@ -33,13 +33,13 @@ fn prism_parts(ring: &[[f64; 2]], half_height: f64, mass: f64) -> Option<Vec<Col
         .map(|part| plate(part, half_height))
         .collect::<Option<_>>()?;
     let area = ring_area(ring);
-    (area > 0.0).then(|| {
-        let density = mass / (area * 2.0 * half_height);
-        parts
-            .into_iter()
-            .map(|part| part.density(density as f32))
-            .collect()
-    })
+    let density = mass / (area * 2.0 * half_height);
+    (area > 0.0).then(|| with_density(parts, density as f32))
+}
+
+fn with_density(parts: Vec<ColliderBuilder>, density: f32) -> Vec<ColliderBuilder> {
+    let parts = parts.into_iter();
+    parts.map(|part| part.density(density)).collect()
 }
 
 /// A convex ring cut across into rings of four corners, one of three at the end where they are odd;

@@ -84,6 +84,16 @@ impl FallRun<'_> {
         self.bodies.iter().map(|body| &self.world.bodies[*body])
     }
 
+    fn moving_poses(&self) -> impl Iterator<Item = &RapierPose> {
+        self.moving_bodies().map(RigidBody::position)
+    }
+
+    fn kinetic_energy(&self) -> f64 {
+        self.moving_bodies()
+            .map(|body| f64::from(body.kinetic_energy()))
+            .sum()
+    }
+
     fn trembling_energy(&self) -> f64 {
         self.moving_bodies()
             .map(|body| f64::from(body.mass()) * REST_SPEED_M_PER_S * REST_SPEED_M_PER_S / 2.0)
@@ -93,34 +103,36 @@ impl FallRun<'_> {
     fn extend_swept(&self, swept: &mut [[f64; 2]; 2]) {
         for collider in self.moving_bodies().flat_map(|body| body.colliders()) {
             let around = self.world.colliders[*collider].compute_aabb();
-            for (extent, [low, high]) in swept.iter_mut().zip(horizontal_extents(&around)) {
-                extent[0] = extent[0].min(f64::from(low) / self.units.length);
-                extent[1] = extent[1].max(f64::from(high) / self.units.length);
+            for (extent, ends) in swept.iter_mut().zip(horizontal_extents(&around)) {
+                extend(extent, ends.map(|end| f64::from(end) / self.units.length));
             }
         }
     }
 
     fn record_samples(&self, fall: &mut Fall, step: usize) {
         let every = self.pace.sample_every;
-        if every == 0 || !step.is_multiple_of(every) {
-            return;
+        if every > 0 && step.is_multiple_of(every) {
+            fall.samples.extend(self.samples_at(step));
         }
+    }
+
+    fn samples_at(&self, step: usize) -> impl Iterator<Item = MotionSample> {
         let seconds = step as f64 * self.pace.step / self.units.time;
         let bodies = self.ids.iter().zip(self.moving_bodies());
-        let samples = bodies.map(|(&id, body)| self.motion_sample(id, body, seconds));
-        fall.samples.extend(samples);
+        bodies.map(move |(&id, body)| self.motion_sample(id, body, seconds))
     }
 
     fn motion_sample(&self, object: usize, body: &RigidBody, seconds: f64) -> MotionSample {
         let (per_length, per_time) = (1.0 / self.units.length, self.units.time);
+        let energy = self.units.energy();
         MotionSample {
             seconds,
             object,
             pose: self.units.to_scene(body.position()),
             speed: f64::from(body.linvel().length()) * per_length * per_time,
             spin: f64::from(body.angvel().length()) * per_time,
-            kinetic: f64::from(body.kinetic_energy()) / self.units.energy(),
-            potential: potential_energy(body, &self.world) / self.units.energy(),
+            kinetic: f64::from(body.kinetic_energy()) / energy,
+            potential: potential_energy(body, &self.world) / energy,
         }
     }
 }
@@ -157,13 +169,16 @@ impl FallRecord {
     }
 
     fn finish(mut self, run: &FallRun) -> Fall {
+        let poses = run.moving_poses().map(|pose| run.units.to_scene(pose));
         self.fall.energy_rise = self.energy.relative_rise();
-        self.fall.poses = run
-            .moving_bodies()
-            .map(|body| run.units.to_scene(body.position()))
-            .collect();
+        self.fall.poses = poses.collect();
         self.fall
     }
+}
+
+fn extend(extent: &mut [f64; 2], [low, high]: [f64; 2]) {
+    extent[0] = extent[0].min(low);
+    extent[1] = extent[1].max(high);
 }
 
 /// Least and greatest x, and y.
@@ -180,10 +195,13 @@ fn potential_energy(body: &RigidBody, world: &PhysicsWorld) -> f64 {
         .mass_properties()
         .local_mprops
         .world_com(body.position());
-    let product = |a: f32, b: f32| f64::from(a) * f64::from(b);
     let g = world.gravity;
     -f64::from(body.mass())
         * (product(g.x, center.x) + product(g.y, center.y) + product(g.z, center.z))
+}
+
+fn product(a: f32, b: f32) -> f64 {
+    f64::from(a) * f64::from(b)
 }
 
 /// The energy over a fall, joules in the world.
@@ -209,10 +227,7 @@ impl EnergyTrack {
 
     /// Takes in the energy after a step; returns the kinetic one.
     fn update(&mut self, run: &FallRun) -> f64 {
-        let kinetic: f64 = run
-            .moving_bodies()
-            .map(|body| f64::from(body.kinetic_energy()))
-            .sum();
+        let kinetic = run.kinetic_energy();
         let now = kinetic + potential_of_all(run);
         self.max_rise = self.max_rise.max(now - self.last);
         self.last = now;
@@ -241,16 +256,17 @@ struct Stillness {
 impl Stillness {
     /// Whether no end of a card has moved by [`REST_MOTION_M`] for [`REST_TIME_S`].
     fn lasts(&mut self, run: &FallRun, now: f64) -> bool {
-        let still = self.poses.len() == run.bodies.len()
-            && run
-                .moving_bodies()
-                .zip(&self.poses)
-                .all(|(body, pose)| motion_between(body.position(), pose) < REST_MOTION_M);
+        let still = self.poses.len() == run.bodies.len() && self.is_near(run);
         if !still {
-            self.poses = run.moving_bodies().map(|body| *body.position()).collect();
+            self.poses = run.moving_poses().copied().collect();
             self.since = now;
         }
         still && now - self.since >= REST_TIME_S
+    }
+
+    fn is_near(&self, run: &FallRun) -> bool {
+        let mut poses = run.moving_poses().zip(&self.poses);
+        poses.all(|(now, before)| motion_between(now, before) < REST_MOTION_M)
     }
 }
 

@@ -34,26 +34,29 @@ impl WorldUnits {
     }
 
     pub(super) fn to_world(&self, pose: &Pose) -> RapierPose {
-        let q = pose.rotation;
-        let rotation = Rotation::from_xyzw(q.i as f32, q.j as f32, q.k as f32, q.w as f32);
-        RapierPose::from_parts(
-            glam_vector(&(pose.translation.vector * self.length)),
-            rotation.normalize(),
-        )
+        let translation = glam_vector(&(pose.translation.vector * self.length));
+        RapierPose::from_parts(translation, glam_rotation(&pose.rotation))
     }
 
     pub(super) fn to_scene(&self, pose: &RapierPose) -> Pose {
-        let (t, q) = (pose.translation, pose.rotation);
-        let translation =
-            Vector3::new(f64::from(t.x), f64::from(t.y), f64::from(t.z)) / self.length;
-        let [x, y, z, w] = [q.x, q.y, q.z, q.w].map(f64::from);
-        Pose::from_parts(
-            translation.into(),
-            UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z)),
-        )
+        let translation = nalgebra_vector(pose.translation) / self.length;
+        Pose::from_parts(translation.into(), nalgebra_rotation(pose.rotation))
     }
 }
 
 pub(super) fn glam_vector(v: &Vector3<f64>) -> Vector {
     Vector::new(v.x as f32, v.y as f32, v.z as f32)
+}
+
+fn nalgebra_vector(v: Vector) -> Vector3<f64> {
+    Vector3::new(f64::from(v.x), f64::from(v.y), f64::from(v.z))
+}
+
+fn glam_rotation(q: &UnitQuaternion<f64>) -> Rotation {
+    Rotation::from_xyzw(q.i as f32, q.j as f32, q.k as f32, q.w as f32).normalize()
+}
+
+fn nalgebra_rotation(q: Rotation) -> UnitQuaternion<f64> {
+    let [x, y, z, w] = [q.x, q.y, q.z, q.w].map(f64::from);
+    UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z))
 }

@@ -1,6 +1,6 @@
 //! `petcomp-report all`: everything that is measured, on one page.
 
-use crate::Common;
+use crate::ReportFlags;
 use petcomp_report::all::{self, AllOptions};
 use std::path::PathBuf;
 
@@ -18,10 +18,10 @@ pub(crate) struct Args {
     /// Golden scenes with Cycles' pictures; left out where there are none
     #[arg(long, value_name = "FOLDER", default_value = "golden/render")]
     golden: PathBuf,
-    /// Fewer runs and inputs: a look in half a minute, with noisier times
+    /// Fewer runs and inputs: a preview in half a minute, with noisier times
     #[arg(long)]
     quick: bool,
-    /// When it is made, to be told on the page
+    /// Date to show on the page
     #[arg(
         long,
         value_name = "TEXT",
@@ -31,22 +31,25 @@ pub(crate) struct Args {
     date: String,
 }
 
-pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
-    let options = AllOptions {
-        golden: args.golden.clone(),
-        peers: args.peers.clone(),
-        truth: args.truth.clone().unwrap_or_default(),
-        quick: args.quick,
-        date: args.date.clone(),
-    };
-    // Extreme cases are to be warned of; what comes of them is in the tables.
+pub(crate) fn run(args: &Args, common: &ReportFlags) -> anyhow::Result<()> {
+    // Extreme cases warn as they should; their results are in the tables.
     log::set_max_level(log::LevelFilter::Error);
-    let progress = common.progress("measuring");
-    all::write(&args.output, &options, |done, of| progress.at(done, of))?;
-    drop(progress);
-    common.say(format_args!(
-        "look at {}",
-        args.output.join("report.html").display()
-    ));
+    common.with_progress("measuring", |progress| {
+        all::write(&args.output, &args.options(), progress)
+    })?;
+    let page = args.output.join("report.html");
+    common.say(format_args!("look at {}", page.display()));
     Ok(())
+}
+
+impl Args {
+    fn options(&self) -> AllOptions {
+        AllOptions {
+            golden: self.golden.clone(),
+            peers: self.peers.clone(),
+            truth: self.truth.clone().unwrap_or_default(),
+            quick: self.quick,
+            date: self.date.clone(),
+        }
+    }
 }

@@ -1,6 +1,6 @@
 //! `petcomp-report camera`: the camera solver on simulated views.
 
-use crate::Common;
+use crate::ReportFlags;
 use petcomp_report::camera::{self, CameraReportOptions};
 use std::path::PathBuf;
 
@@ -19,14 +19,11 @@ pub(crate) struct Args {
     views: u64,
 }
 
-pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
-    let progress = common.progress("measuring");
-    let rows = camera::write(
-        &args.output,
-        &CameraReportOptions { views: args.views },
-        |done, of| progress.at(done, of),
-    )?;
-    drop(progress);
+pub(crate) fn run(args: &Args, common: &ReportFlags) -> anyhow::Result<()> {
+    let options = CameraReportOptions { views: args.views };
+    let rows = common.with_progress("measuring", |progress| {
+        camera::write(&args.output, &options, progress)
+    })?;
     common.say(format_args!(
         "{}: camera.csv ({} lines), camera_coverage.csv, camera.md and six plots",
         args.output.display(),

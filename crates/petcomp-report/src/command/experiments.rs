@@ -1,6 +1,6 @@
 //! `petcomp-report experiments`: our trainings beside the paper's.
 
-use crate::Common;
+use crate::ReportFlags;
 use petcomp_report::experiments;
 use std::path::PathBuf;
 
@@ -13,7 +13,7 @@ pub(crate) struct Args {
     output: PathBuf,
 }
 
-pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
+pub(crate) fn run(args: &Args, common: &ReportFlags) -> anyhow::Result<()> {
     let table = experiments::write(&args.output, &args.runs)?;
     println!("{}", table.markdown());
     common.say(args.output.join("experiments.html").display());

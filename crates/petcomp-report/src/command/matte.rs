@@ -1,13 +1,13 @@
 //! `petcomp-report matte`: the matting methods on photos with known mattes.
 
 use super::TruthArgs;
-use crate::Common;
+use crate::ReportFlags;
 use petcomp_report::matte;
 
-pub(crate) fn run(args: &TruthArgs, common: &Common) -> anyhow::Result<()> {
-    let progress = common.progress("measuring");
-    let summaries = matte::write(&args.truth, &args.output, |done, of| progress.at(done, of))?;
-    drop(progress);
+pub(crate) fn run(args: &TruthArgs, common: &ReportFlags) -> anyhow::Result<()> {
+    let summaries = common.with_progress("measuring", |progress| {
+        matte::write(&args.truth, &args.output, progress)
+    })?;
     println!("{}", matte::table(&summaries).markdown().trim_end());
     common.say(format_args!(
         "{}: matte.csv, matte.md, matte.svg and matte.html",

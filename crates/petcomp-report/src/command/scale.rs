@@ -1,8 +1,8 @@
 //! `petcomp-report scale`: memory and rate, and what a million pictures take.
 
 use super::count;
-use crate::Common;
-use petcomp_report::scale::{self, Case, ScaleOptions};
+use crate::ReportFlags;
+use petcomp_report::scale::{self, ScaleOptions};
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
@@ -29,29 +29,34 @@ fn seconds(text: &str) -> Result<f64, String> {
     number.ok_or_else(|| format!("{text}, expected 0 to 3600"))
 }
 
-pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
+pub(crate) fn run(args: &Args, common: &ReportFlags) -> anyhow::Result<()> {
     if let Some(case) = &args.case {
-        let case: Case = serde_json::from_str(case)?;
-        println!(
-            "{}",
-            serde_json::to_string(&scale::run(&case, args.seconds)?)?
-        );
-        return Ok(());
+        return print_measurement(case, args.seconds);
     }
-    let options = ScaleOptions {
-        seconds: args.seconds,
-        threads: args.most_threads,
-        ..ScaleOptions::default()
-    };
-    let progress = common.progress("measuring");
-    let measured = scale::write(&args.output, &options, |done, of| progress.at(done, of))?;
-    drop(progress);
+    let measured = common.with_progress("measuring", |progress| {
+        scale::write(&args.output, &args.options(), progress)
+    })?;
     for (title, table) in scale::tables(&measured)? {
-        println!("{}", format_args!("{title}\n{}", table.markdown()));
+        println!("{title}\n{}", table.markdown());
     }
-    common.say(format_args!(
-        "{}: scale.csv, scale.md and two charts",
-        args.output.display()
-    ));
+    let folder = args.output.display();
+    common.say(format_args!("{folder}: scale.csv, scale.md and two charts"));
     Ok(())
+}
+
+/// Measures one point (JSON) in this process.
+fn print_measurement(case: &str, seconds: f64) -> anyhow::Result<()> {
+    let measured = scale::run(&serde_json::from_str(case)?, seconds)?;
+    println!("{}", serde_json::to_string(&measured)?);
+    Ok(())
+}
+
+impl Args {
+    fn options(&self) -> ScaleOptions {
+        ScaleOptions {
+            seconds: self.seconds,
+            threads: self.most_threads,
+            ..ScaleOptions::default()
+        }
+    }
 }

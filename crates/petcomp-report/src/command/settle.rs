@@ -1,6 +1,6 @@
 //! `petcomp-report settle`: the settle stage on heaps and closed forms.
 
-use crate::Common;
+use crate::ReportFlags;
 use petcomp::io;
 use petcomp_report::settle::{self, SettleReportOptions};
 use std::path::PathBuf;
@@ -23,17 +23,14 @@ pub(crate) struct Args {
     peers: Option<PathBuf>,
 }
 
-pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
+pub(crate) fn run(args: &Args, common: &ReportFlags) -> anyhow::Result<()> {
     if let Some(path) = &args.peers {
         return Ok(io::write_document(path, &settle::peer_cases()?)?);
     }
-    let progress = common.progress("measuring");
-    let rows = settle::write(
-        &args.output,
-        &SettleReportOptions { heaps: args.heaps },
-        |done, of| progress.at(done, of),
-    )?;
-    drop(progress);
+    let options = SettleReportOptions { heaps: args.heaps };
+    let rows = common.with_progress("measuring", |progress| {
+        settle::write(&args.output, &options, progress)
+    })?;
     common.say(format_args!(
         "{}: settle.csv ({} lines), settle.md and a plot",
         args.output.display(),
