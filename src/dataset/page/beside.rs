@@ -1,5 +1,6 @@
 //! A dataset beside the user's own photographs: distributions that should be alike.
 
+use super::distributions::extremes;
 use super::labelled_pictures::{LabelledPicture, LabelledSet};
 use super::outlier::{quantile, short};
 use crate::color::encode_srgb8;
@@ -207,12 +208,9 @@ fn figure(set: &LabelledSet, picture: &LabelledPicture) -> Option<Figure> {
 }
 
 fn in_pixels([x, y, w, h]: [f64; 4], size: [f64; 2]) -> BBox {
-    BBox {
-        x0: (x - w / 2.0) * size[0],
-        y0: (y - h / 2.0) * size[1],
-        x1: (x + w / 2.0) * size[0],
-        y1: (y + h / 2.0) * size[1],
-    }
+    let [x0, x1] = [x - w / 2.0, x + w / 2.0].map(|x| x * size[0]);
+    let [y0, y1] = [y - h / 2.0, y + h / 2.0].map(|y| y * size[1]);
+    BBox { x0, y0, x1, y1 }
 }
 
 fn caption(picture: &LabelledPicture) -> String {
@@ -337,15 +335,7 @@ impl ComparedMeasure {
 
     /// Least and greatest value of both, apart from each other.
     fn range(&self) -> [f64; 2] {
-        let all = self.ours.iter().chain(&self.theirs);
-        let [low, high] = all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| {
-            [low.min(*v), high.max(*v)]
-        });
-        if low < high {
-            [low, high]
-        } else {
-            [low - 0.5, low + 0.5]
-        }
+        extremes(self.ours.iter().chain(&self.theirs))
     }
 }
 
@@ -402,9 +392,8 @@ fn distance(mut a: Vec<f64>, mut b: Vec<f64>) -> f64 {
     a.sort_by(f64::total_cmp);
     b.sort_by(f64::total_cmp);
     let values = a.iter().chain(&b);
-    values
-        .map(|&x| (share_below(&a, x) - share_below(&b, x)).abs())
-        .fold(0.0, f64::max)
+    let gaps = values.map(|&x| share_below(&a, x) - share_below(&b, x));
+    gaps.map(f64::abs).fold(0.0, f64::max)
 }
 
 /// Share of sorted values that are not above `x`.

@@ -82,17 +82,19 @@ fn choice_histogram(what: &str, counts: &BTreeMap<String, u64>) -> Histogram {
     }
 }
 
-fn extremes(values: &[f64]) -> [f64; 2] {
+pub(super) fn extremes<'a>(values: impl IntoIterator<Item = &'a f64>) -> [f64; 2] {
     let [low, high] = values
-        .iter()
-        .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| {
-            [v.min(a), v.max(b)]
-        });
+        .into_iter()
+        .fold([f64::INFINITY, f64::NEG_INFINITY], widened);
     if low < high {
         [low, high]
     } else {
         [low - 0.5, low + 0.5]
     }
+}
+
+fn widened([low, high]: [f64; 2], value: &f64) -> [f64; 2] {
+    [value.min(low), value.max(high)]
 }
 
 /// Adds what can be seen, and how large it is.

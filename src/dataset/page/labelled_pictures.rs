@@ -107,8 +107,8 @@ impl LabelledPicture {
 
     fn from_sample(folder: &Path, sample: &SampleSummary) -> Self {
         let size = sample.image.map(f64::from);
-        let boxes = sample.labels.iter();
-        let boxes = boxes.map(|(class, b)| (*class, shares_of(b, size)));
+        let labels = sample.labels.iter();
+        let boxes = labels.map(|(class, b)| (*class, shares_of(b, size)));
         Self {
             path: folder.join(&sample.files[0]),
             boxes: Some(boxes.collect()),

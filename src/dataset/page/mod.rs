@@ -116,9 +116,7 @@ fn identity_text(summary: &Summary, name: &str) -> String {
 /// Objects of all classes, and how many of them have a label.
 fn object_counts(summary: &Summary) -> [u64; 2] {
     let counts = summary.balance.iter().flatten();
-    counts.fold([0; 2], |[a, b], [objects, labels]| {
-        [a + objects, b + labels]
-    })
+    counts.fold([0; 2], |sums, counts| [0, 1].map(|i| sums[i] + counts[i]))
 }
 
 fn balance(summary: &Summary) -> Table {

@@ -95,9 +95,9 @@ pub(crate) fn median(values: Vec<f64>) -> Option<f64> {
 /// A value that this share of all are below; the upper one of two.
 pub(crate) fn quantile(mut values: Vec<f64>, share: f64) -> Option<f64> {
     values.sort_by(f64::total_cmp);
-    values
-        .get(((values.len() as f64 * share) as usize).min(values.len().saturating_sub(1)))
-        .copied()
+    let place = (values.len() as f64 * share) as usize;
+    let last = values.len().saturating_sub(1);
+    values.get(place.min(last)).copied()
 }
 
 /// A number with two decimals at most.

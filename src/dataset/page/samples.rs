@@ -241,27 +241,18 @@ fn outline_of(
 }
 
 fn why_unlabelled(object: &ObjectLabel, reason: UnlabelledReason) -> String {
-    match reason {
-        UnlabelledReason::Covered => {
-            let above: Vec<String> = object
-                .covered_by
-                .iter()
-                .map(|id| id.0.to_string())
-                .collect();
-            format!("under {}", above.join(", "))
-        }
-        reason => reason.description().to_owned(),
+    if reason != UnlabelledReason::Covered {
+        return reason.description().to_owned();
     }
+    let above = object.covered_by.iter().map(|id| id.0.to_string());
+    format!("under {}", above.collect::<Vec<_>>().join(", "))
 }
 
 fn titled_polygon(ring: &[Point2<f64>], title: &str) -> String {
-    let points: String = ring
-        .iter()
-        .map(|p| format!("{:.1},{:.1} ", p.x, p.y))
-        .collect();
+    let points = ring.iter().map(|p| format!("{:.1},{:.1}", p.x, p.y));
+    let points = points.collect::<Vec<_>>().join(" ");
     format!(
-        "<polygon points=\"{}\" fill=\"none\" pointer-events=\"all\" stroke=\"{UNLABELLED}\" stroke-width=\"1.5\">\
-         <title>{title}</title></polygon>",
-        points.trim_end()
+        "<polygon points=\"{points}\" fill=\"none\" pointer-events=\"all\" stroke=\"{UNLABELLED}\" stroke-width=\"1.5\">\
+         <title>{title}</title></polygon>"
     )
 }

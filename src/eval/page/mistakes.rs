@@ -157,15 +157,11 @@ struct ShownMistake<'a> {
 impl<'a> ShownMistake<'a> {
     fn new(run: &'a Run, mistake: &'a Mistake) -> Self {
         let sheet = &run.sheets[mistake.sheet];
-        let (truth, found) = (
-            mistake.truth.map(|t| &sheet.truth[t]),
-            mistake.found.map(|f| &sheet.found[f]),
-        );
         Self {
             mistake,
             sheet,
-            truth,
-            found,
+            truth: mistake.truth.map(|t| &sheet.truth[t]),
+            found: mistake.found.map(|f| &sheet.found[f]),
         }
     }
 
@@ -175,14 +171,18 @@ impl<'a> ShownMistake<'a> {
 
     /// The box that is wrong.
     fn wrong(&self) -> BBox {
-        let (truth, found) = (self.truth.map(|t| t.bbox), self.found.map(|f| f.bbox));
+        let [truth, found] = self.boxes();
         if self.is_miss() { truth } else { found }.unwrap_or_default()
+    }
+
+    /// Of the truth and of the detection.
+    fn boxes(&self) -> [Option<BBox>; 2] {
+        [self.truth.map(|t| t.bbox), self.found.map(|f| f.bbox)]
     }
 
     /// The part of the picture around it.
     fn view(&self, size: [f64; 2]) -> BBox {
-        let boxes = [self.truth.map(|t| t.bbox), self.found.map(|f| f.bbox)];
-        let both = boxes.into_iter().flatten().reduce(BBox::hull);
+        let both = self.boxes().into_iter().flatten().reduce(BBox::hull);
         square_around(&both.unwrap_or_default(), size)
     }
 
@@ -261,11 +261,8 @@ impl<'a> ShownMistake<'a> {
 
     /// Boxes of the truth in the view that the mistake is not about.
     fn other_boxes(&self, view: &BBox) -> Vec<&'a GroundTruth> {
-        self.sheet
-            .truth
-            .iter()
-            .filter(|&t| !self.truth.is_some_and(|own| std::ptr::eq(own, t)))
-            .filter(|t| t.bbox.overlaps(view))
+        let seen = self.sheet.truth.iter().filter(|t| t.bbox.overlaps(view));
+        seen.filter(|&t| !self.truth.is_some_and(|own| std::ptr::eq(own, t)))
             .take(MAX_OTHER_BOXES)
             .collect()
     }

@@ -178,12 +178,11 @@ fn add_classes(
 
 /// `metrics.json` of one run, or `1-NAME.json` and so on of several.
 fn write_metrics(folder: &Path, all: &[Metrics]) -> Result<()> {
-    for (i, metrics) in all.iter().enumerate() {
-        let name = if all.len() == 1 {
-            "metrics.json".into()
-        } else {
-            format!("{}-{}.json", i + 1, metrics.run)
-        };
+    if let [only] = all {
+        return io::write_json(folder.join("metrics.json"), only);
+    }
+    for (i, metrics) in (1..).zip(all) {
+        let name = format!("{i}-{}.json", metrics.run);
         io::write_json(folder.join(name), metrics)?;
     }
     Ok(())
@@ -319,11 +318,9 @@ fn range_text(interval: &Interval) -> String {
 
 /// Average precision per class and threshold by the definition of YOLOv5.
 pub fn classes_table(all: &[Metrics], options: &EvalReportOptions) -> Table {
-    let classes: BTreeSet<u32> = all
-        .iter()
-        .flat_map(|m| m.yolov5.classes.iter().map(|c| c.class))
-        .collect();
-    classes_among(all, options, &classes.into_iter().collect::<Vec<_>>())
+    let classes = all.iter().flat_map(|metrics| &metrics.yolov5.classes);
+    let classes: BTreeSet<u32> = classes.map(|class| class.class).collect();
+    classes_among(all, options, &Vec::from_iter(classes))
 }
 
 /// The same for a terminal: of many classes those with the lowest average precision, and how many others there are.
@@ -491,12 +488,10 @@ fn resampled_mean(values: &[f64], seed: u64, round: u64) -> f64 {
 
 /// Standard deviation of a sample; 0 of one value.
 fn deviation(values: &[f64], mean: f64) -> f64 {
-    let n = values.len().max(1) as f64;
     let squares: f64 = values.iter().map(|v| (v - mean) * (v - mean)).sum();
-    if n > 1.0 {
-        (squares / (n - 1.0)).sqrt()
-    } else {
-        0.0
+    match values.len() {
+        0 | 1 => 0.0,
+        n => (squares / (n as f64 - 1.0)).sqrt(),
     }
 }
 
