@@ -122,7 +122,7 @@ pub fn measure(options: &AllOptions, progress: impl Fn(u64, u64)) -> Result<Docu
 
 fn quick_sections(options: &AllOptions, progress: impl Fn(u64)) -> Result<Vec<Section>> {
     let diagrams = measure_stages(options, progress)?;
-    let others = peers::read(&options.peers)?;
+    let others = peers::read_comparisons(&options.peers)?;
     Ok(vec![
         about_report(options),
         error_curves(&diagrams),
@@ -162,7 +162,7 @@ fn about_report(options: &AllOptions) -> Section {
             "One run of `petcomp-report all` on the machine below. Times are CPU seconds of one thread, medians; errors are \
              the same at every run.{quick}"
         ))
-        .table("machine", machine::machine(&options.date))
+        .table("machine", machine::machine_table(&options.date))
 }
 
 fn error_curves(diagrams: &[Diagram]) -> Section {

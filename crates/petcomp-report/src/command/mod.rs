@@ -37,11 +37,11 @@ pub(crate) enum Command {
     Settle(settle::Args),
     /// Every stage on stiff and extreme input: stability.csv and stability.md
     Stability(stability::Args),
-    /// Our trainings beside the values of the paper, with intervals and a test
+    /// Our trained models beside the values of the paper, with intervals and a test
     Experiments(experiments::Args),
     /// Error of the matting methods against run time, on photos with known mattes: matte.csv, matte.md, matte.svg, matte.html
     Matte(TruthArgs),
-    /// Whether cut-outs that are wrong say so, on photos with known outlines made harder in many ways: flags.csv, flags.md
+    /// Whether wrong cut-outs are flagged, on photos with known outlines made harder in many ways: flags.csv, flags.md
     Flags(TruthArgs),
     /// Error of the renderer against run time, beside Cycles: render.csv, render.md, a plot and the golden scenes
     Render(render::Args),
@@ -52,17 +52,18 @@ pub(crate) enum Command {
 }
 
 pub(crate) fn run(command: &Command, common: &ReportFlags) -> anyhow::Result<()> {
+    use Command as C;
     match command {
-        Command::All(args) => all::run(args, common),
-        Command::Camera(args) => camera::run(args, common),
-        Command::Settle(args) => settle::run(args, common),
-        Command::Stability(args) => stability::run(args, common),
-        Command::Experiments(args) => experiments::run(args, common),
-        Command::Matte(args) => matte::run(args, common),
-        Command::Flags(args) => flags::run(args, common),
-        Command::Render(args) => render::run(args, common),
-        Command::Work(args) => work::run(args, common),
-        Command::Scale(args) => scale::run(args, common),
+        C::All(args) => all::run(args, common),
+        C::Camera(args) => camera::run(args, common),
+        C::Settle(args) => settle::run(args, common),
+        C::Stability(args) => stability::run(args, common),
+        C::Experiments(args) => experiments::run(args, common),
+        C::Matte(args) => matte::run(args, common),
+        C::Flags(args) => flags::run(args, common),
+        C::Render(args) => render::run(args, common),
+        C::Work(args) => work::run(args, common),
+        C::Scale(args) => scale::run(args, common),
     }
 }
 

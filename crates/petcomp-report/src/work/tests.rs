@@ -12,7 +12,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 #[test]
 fn scenes_pay_for_what_they_use_and_for_nothing_else() {
-    let world = FixtureFolder::make().unwrap();
+    let world = FixtureFolder::new().unwrap();
     for case in cases(&world) {
         let work = work_of(&world, &case).unwrap();
         let paid: Vec<_> = case
@@ -32,7 +32,7 @@ fn scenes_pay_for_what_they_use_and_for_nothing_else() {
 
 #[test]
 fn work_is_the_same_at_any_thread_count_and_beside_other_scenes() {
-    let world = FixtureFolder::make().unwrap();
+    let world = FixtureFolder::new().unwrap();
     let all = || {
         cases(&world)
             .iter()
@@ -47,7 +47,7 @@ fn work_is_the_same_at_any_thread_count_and_beside_other_scenes() {
 
 #[test]
 fn a_scene_reads_the_files_that_it_names_and_no_others() {
-    let world = FixtureFolder::make().unwrap();
+    let world = FixtureFolder::new().unwrap();
     let cases = cases(&world);
     let read = |name: &str| {
         let case = cases.iter().find(|case| case.name == name).unwrap();
@@ -77,7 +77,7 @@ fn made(world: &FixtureFolder, config: &DatasetConfig, scene: &Scene) -> (Vec<u8
 
 #[test]
 fn idle_switches_leave_every_byte_and_cost_nothing() {
-    let world = FixtureFolder::make().unwrap();
+    let world = FixtureFolder::new().unwrap();
     let (config, scene) = (world.config(), world.scene());
     let usual = made(&world, &config, &scene);
     let out = AreaLight {
@@ -152,7 +152,7 @@ fn idle_switches_leave_every_byte_and_cost_nothing() {
 
 #[test]
 fn quality_where_it_does_not_apply_changes_nothing() {
-    let world = FixtureFolder::make().unwrap();
+    let world = FixtureFolder::new().unwrap();
     let scene = world.scene();
     let with = |change: fn(&mut DatasetConfig), scene: &Scene| {
         let mut config = world.config();
@@ -221,7 +221,7 @@ fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
 
 #[test]
 fn jobs_and_progress_leave_every_byte() {
-    let world = FixtureFolder::make().unwrap();
+    let world = FixtureFolder::new().unwrap();
     let alone = dataset(&world, 1, &|_| {});
     let told = AtomicU64::new(0);
     let watched = dataset(&world, 3, &|progress| {
@@ -237,7 +237,7 @@ fn jobs_and_progress_leave_every_byte() {
 
 #[test]
 fn labels_without_a_picture_are_those_with_one() {
-    let world = FixtureFolder::make().unwrap();
+    let world = FixtureFolder::new().unwrap();
     for case in cases(&world) {
         let pipeline = Pipeline::open(world.config()).unwrap();
         let labels = pipeline.label(case.scene.clone()).unwrap();
@@ -252,7 +252,7 @@ fn labels_without_a_picture_are_those_with_one() {
 
 #[test]
 fn parts_of_a_picture_that_are_asked_for_leave_the_picture_alone() {
-    let world = FixtureFolder::make().unwrap();
+    let world = FixtureFolder::new().unwrap();
     let pipeline = Pipeline::open(world.config()).unwrap();
     let (scene, shot) = pipeline.resolve(world.scene()).unwrap();
     let (deep, frame) = pipeline.shoot(&scene, &shot);
