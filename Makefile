@@ -9,6 +9,7 @@ SUDO      := $(shell [ "$$(id -u)" = 0 ] || echo sudo)
 BUILD     := g++ pkg-config libopenimageio-dev
 BLENDER   := blender python3-numpy python3-venv
 OUT       := demo
+EXAMPLES  := target/example-output
 REPORT    := target/report
 PYTHON    := $(CURDIR)/target/python/bin/python
 BENCHES   := $(notdir $(basename $(wildcard tests/benches/*.rs)))
@@ -24,7 +25,7 @@ PEERS        := blender python3-numpy python3-venv openimageio-tools ffmpeg
 PEERS_PYTHON := numpy OpenEXR opencv-python-headless pymatting pybullet pycocotools
 CORE         := 0
 
-.PHONY: peers demo test lint bench golden formats python packages blender soak soak-dataset fuzz
+.PHONY: peers demo test examples lint bench golden formats python packages blender soak soak-dataset fuzz
 
 demo: packages
 	$(CARGO) build --release --locked -p petcomp-cli
@@ -36,6 +37,22 @@ test: packages python
 	  echo "features [$$f] alone"; \
 	  $(CARGO) check --release --locked -p petcomp --no-default-features --features "$$f" --lib --tests --quiet || exit 1; \
 	done
+	$(MAKE) examples
+
+# Every program in examples/, the last one on two scenes of the sample recipe. They are built with the tests, whose
+# features the library then has already.
+examples: packages
+	$(CARGO) test --release --locked --no-run --quiet
+	rm -rf $(EXAMPLES) && mkdir -p $(EXAMPLES)
+	target/release/examples/cut_out tests/samples/bottles/b0002_0.png $(EXAMPLES)/cut_out.exr
+	target/release/examples/key_like_blender
+	target/release/examples/render_shot $(EXAMPLES)/shot.png
+	target/release/examples/own_generator $(EXAMPLES)/own
+	target/release/petcomp demo -q -n 2 -o $(EXAMPLES)/demo
+	for k in 0 1; do \
+	  target/release/petcomp scene draw $(EXAMPLES)/demo/recipe.toml -k $$k -o $(EXAMPLES)/$$k.toml || exit 1; \
+	done
+	target/release/examples/yolo_from_scenes $(EXAMPLES)/scenes $(EXAMPLES)/0.toml $(EXAMPLES)/1.toml
 
 # 100,000 damaged pictures.
 soak: packages

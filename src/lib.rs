@@ -13,7 +13,8 @@
 //!
 //! A generator of its own may begin anywhere: with a scene, or with a shot built in code and one call to
 //! [`composite::picture`]. `examples/` has five programs. Conventions of axes and pixels are in [`geom`], the kinds of
-//! pixels and what may be done with them at [`Image`].
+//! pixels and what may be done with them at [`Image`]. What is public but not listed here serves petcomp's own programs
+//! and may change in any version.
 //!
 //! ```
 //! use petcomp::geom::{Pose, Quad};
@@ -71,6 +72,7 @@ pub mod light;
 pub mod matte;
 mod pixel;
 #[cfg(feature = "pipeline")]
+#[doc(hidden)]
 pub mod plot;
 mod quality;
 #[cfg(feature = "pipeline")]
@@ -81,6 +83,7 @@ pub mod scene;
 pub mod settle;
 mod stopwatch;
 #[cfg(feature = "pipeline")]
+#[doc(hidden)]
 pub mod train;
 #[cfg(feature = "counters")]
 pub mod work;
@@ -88,16 +91,21 @@ pub mod work;
 mod work;
 
 #[cfg(feature = "pipeline")]
+#[doc(hidden)]
 pub use allowance::Allowance;
 #[cfg(feature = "pipeline")]
 pub use camera::Camera;
 #[cfg(feature = "pipeline")]
 pub use deep::{DeepImage, DeepSample};
 pub use diagnostic::{Code, Diagnostic, Severity};
-pub use error::{Error, Result, printable};
+#[doc(hidden)]
+pub use error::printable;
+pub use error::{Error, Result};
 pub use image::{Image, Mask, Roi};
+#[doc(hidden)]
+pub use pixel::Mix;
 pub use pixel::{
-    Coverage, Depth, Film, LinearRgb, Mix, ObjectId, PremulRgba, Srgb8, Srgba8, StraightRgba,
+    Coverage, Depth, Film, LinearRgb, ObjectId, PremulRgba, Srgb8, Srgba8, StraightRgba,
 };
 pub use quality::Quality;
 #[cfg(feature = "pipeline")]

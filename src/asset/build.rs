@@ -1,9 +1,10 @@
 //! Many photos into an asset folder, from a list.
 
+use super::entry::PhotoEntry;
 use super::folder::{CutOutWriter, read_or_new};
 use super::library::{Library, Photo};
 use super::list::{List, find_list};
-use super::manifest::Manifest;
+use super::manifest::{Manifest, PhotoRecord};
 use super::screen_source::EmptyScreens;
 use crate::error::{Error, Result};
 use rayon::prelude::*;
@@ -21,8 +22,8 @@ pub struct Built {
     pub lengths: Vec<[f64; 2]>,
     /// Photos that gave no cut-out, and why.
     pub refused: Vec<String>,
-    /// Cut-outs that a person should review, and why.
-    pub needs_review: Vec<String>,
+    /// Cut-outs that a person should review; their diagnostics say why.
+    pub needs_review: Vec<PhotoRecord>,
 }
 
 /// Cuts all photos of a list out, several at a time, into an asset folder, which is made if it is not there.
@@ -44,25 +45,31 @@ pub fn build(
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Built> {
     let (path, folder) = (find_list(list.as_ref())?, folder.as_ref());
-    let path = path.as_path();
-    let list = List::read(path)?;
+    let list = List::read(&path)?;
     let mut manifest = read_or_new(folder)?;
-    let list = checked(list, path, &mut manifest)?;
+    let list = checked(list, &path, &mut manifest)?;
     let outcomes = cut_out_all(&list, folder, progress);
-    let (photos, refused) =
-        insert_all(&list, outcomes, &mut manifest).map_err(|e| e.in_file(path))?;
+    let inserted = insert_all(&list, outcomes, &mut manifest);
+    let (photos, refused) = inserted.map_err(|e| e.in_file(&path))?;
     if photos.is_empty() {
         let what = format!("no photo gave a cut-out: {}", refused.join("; "));
         return Err(Error::file(path, what));
     }
     manifest.write(folder)?;
-    Ok(Built {
-        photos: photos.len(),
-        lengths: photos.iter().map(length_and_error).collect(),
-        needs_review: photos.iter().filter_map(review_line).collect(),
-        refused,
-        library: Library::from_manifest(folder, manifest, photos)?,
-    })
+    let library = Library::from_manifest(folder, manifest, &photos)?;
+    Ok(Built::new(library, &photos, refused))
+}
+
+impl Built {
+    fn new(library: Library, photos: &[Photo], refused: Vec<String>) -> Self {
+        Self {
+            library,
+            photos: photos.len(),
+            lengths: photos.iter().map(length_and_error).collect(),
+            refused,
+            needs_review: photos.iter().filter_map(record_to_review).collect(),
+        }
+    }
 }
 
 /// A list from a file, whose classes the manifest takes in; its paths are made relative to the working folder.
@@ -102,13 +109,8 @@ fn insert_all(
 ) -> Result<(Vec<Photo>, Vec<String>)> {
     let (mut photos, mut refused) = (Vec::new(), Vec::new());
     for (i, (outcome, entry)) in outcomes.into_iter().zip(&list.photos).enumerate() {
-        match outcome {
-            Ok(photo) => {
-                manifest
-                    .insert(entry.asset_with(photo.record.clone()))
-                    .map_err(|e| e.within(&format!("photos[{i}]")))?;
-                photos.push(photo);
-            }
+        match outcome.and_then(|photo| inserted(photo, entry, manifest)) {
+            Ok(photo) => photos.push(photo),
             Err(refusal @ Error::Photo { .. }) => refused.push(refusal.to_string()),
             Err(error) => return Err(error.within(&format!("photos[{i}]"))),
         }
@@ -116,16 +118,19 @@ fn insert_all(
     Ok((photos, refused))
 }
 
+/// A photo that is now in the manifest.
+fn inserted(photo: Photo, entry: &PhotoEntry, manifest: &mut Manifest) -> Result<Photo> {
+    manifest.insert(entry.asset_with(photo.record.clone()))?;
+    Ok(photo)
+}
+
 fn length_and_error(photo: &Photo) -> [f64; 2] {
     [photo.record.object_m[0], photo.record.error_m]
 }
 
-/// Why a person should review a cut-out, after the name of its file.
-fn review_line(photo: &Photo) -> Option<String> {
+fn record_to_review(photo: &Photo) -> Option<PhotoRecord> {
     let record = &photo.record;
-    record
-        .needs_review()
-        .then(|| format!("{}: {}", record.file, record.review_reasons()))
+    record.needs_review().then(|| record.clone())
 }
 
 #[cfg(test)]
@@ -420,7 +425,8 @@ mod tests {
             built
                 .needs_review
                 .iter()
-                .any(|d| d.contains("two.exr") && d.contains("too grey")),
+                .any(|record| record.file.contains("two.exr")
+                    && record.review_reasons().contains("too grey")),
             "{:?}",
             built.needs_review
         );

@@ -3,6 +3,7 @@
 use super::library::{Library, Photo};
 use super::manifest::PhotoRecord;
 use super::texture::Texture;
+use super::thumbnail::{checkerboard, fitted_size};
 use crate::color::to_srgb8;
 use crate::draw::{self, TextSize};
 use crate::filter;
@@ -19,9 +20,6 @@ const COLUMNS: usize = 2;
 const PAPER: Srgb8 = draw::rgb(0x1C, 0x1E, 0x22);
 const INK: Srgb8 = draw::rgb(0xF2, 0xF2, 0xF2);
 const WARNING: Srgb8 = draw::rgb(0xFF, 0xB0, 0x40);
-/// Side of a square of the checkerboard, pixels, and its two greys, scene-linear.
-const SQUARE_PX: usize = 8;
-const CHECKER_GREYS: [f32; 2] = [0.2, 0.45];
 /// A screen's green, so that what is left of a green screen cannot be seen here and is seen on the others.
 const GREEN: LinearRgb = LinearRgb::new(0.05, 0.45, 0.08);
 
@@ -29,7 +27,7 @@ const GREEN: LinearRgb = LinearRgb::new(0.05, 0.45, 0.08);
 type Background = fn(usize, usize) -> LinearRgb;
 
 const BACKGROUNDS: [Background; 4] = [
-    |x, y| LinearRgb::grey(CHECKER_GREYS[(x / SQUARE_PX + y / SQUARE_PX) % CHECKER_GREYS.len()]),
+    checkerboard,
     |_, _| LinearRgb::BLACK,
     |_, _| LinearRgb::WHITE,
     |_, _| GREEN,
@@ -41,34 +39,24 @@ const STRIP_WIDTH_PX: usize = BACKGROUNDS.len() * (CUT_OUT_SIDE_PX + GAP_PX);
 /// Every cut-out over a checkerboard, black, white and green, with its size, the confidence in outline and colour, and why it
 /// needs a review.
 pub fn contact_sheet(library: &Library) -> Image<Srgb8> {
-    let photos: Vec<&Photo> = library
-        .assets
-        .iter()
-        .flat_map(|asset| &asset.photos)
-        .collect();
+    let assets = library.assets.iter();
+    let photos: Vec<&Photo> = assets.flat_map(|asset| &asset.photos).collect();
     let strips: Vec<Image<Srgb8>> = photos.par_iter().map(|photo| strip(photo)).collect();
     in_columns(&strips)
 }
 
 /// Strips in rows from the top left, each row as high as its highest.
 fn in_columns(strips: &[Image<Srgb8>]) -> Image<Srgb8> {
-    let rows: Vec<_> = strips
-        .chunks(COLUMNS)
-        .map(|row| (row, row_height(row)))
-        .collect();
-    let columns = COLUMNS.min(strips.len().max(1));
     let column_width = STRIP_WIDTH_PX + 2 * GAP_PX;
-    let mut sheet = Image::filled(
-        columns * column_width + GAP_PX,
-        rows.iter().map(|(_, height)| height).sum::<usize>() + GAP_PX,
-        PAPER,
-    );
+    let columns = COLUMNS.min(strips.len().max(1));
+    let heights: usize = strips.chunks(COLUMNS).map(row_height).sum();
+    let mut sheet = Image::filled(columns * column_width + GAP_PX, heights + GAP_PX, PAPER);
     let mut top = GAP_PX;
-    for (row, height) in rows {
+    for row in strips.chunks(COLUMNS) {
         for (i, strip) in row.iter().enumerate() {
             draw::paste(&mut sheet, [GAP_PX + i * column_width, top], strip);
         }
-        top += height;
+        top += row_height(row);
     }
     sheet
 }
@@ -80,17 +68,21 @@ fn row_height(strips: &[Image<Srgb8>]) -> usize {
 /// One cut-out over all backgrounds under lines of text.
 fn strip(photo: &Photo) -> Image<Srgb8> {
     let cutout = small(&photo.texture);
-    let (w, h) = cutout.size();
     let lines = lines_of(&photo.record);
     let text_height = lines.len() * TextSize::Small.height() + GAP_PX / 2;
-    let mut canvas = Image::filled(STRIP_WIDTH_PX, text_height + h, PAPER);
+    let mut canvas = Image::filled(STRIP_WIDTH_PX, text_height + cutout.height(), PAPER);
     write_lines(&mut canvas, &lines);
     for (i, background) in BACKGROUNDS.iter().enumerate() {
-        let over = Image::from_fn(w, h, |x, y| cutout[(x, y)].over_color(background(x, y)));
         let at = [i * (CUT_OUT_SIDE_PX + GAP_PX), text_height];
-        draw::paste(&mut canvas, at, &to_srgb8(&over));
+        draw::paste(&mut canvas, at, &over_background(&cutout, *background));
     }
     canvas
+}
+
+fn over_background(cutout: &Image<Film>, background: Background) -> Image<Srgb8> {
+    to_srgb8(&Image::from_fn(cutout.width(), cutout.height(), |x, y| {
+        cutout[(x, y)].over_color(background(x, y))
+    }))
 }
 
 fn write_lines(canvas: &mut Image<Srgb8>, lines: &[(String, Srgb8)]) {
@@ -102,16 +94,16 @@ fn write_lines(canvas: &mut Image<Srgb8>, lines: &[(String, Srgb8)]) {
 
 /// What is written over a cut-out: its size, and why it needs a review.
 fn lines_of(record: &PhotoRecord) -> Vec<(String, Srgb8)> {
-    let title = title(record);
-    let reasons = record.diagnostics.iter().map(|d| (&d.message, WARNING));
-    std::iter::once((&title, INK))
-        .chain(reasons)
-        .flat_map(|(text, ink)| {
-            draw::wrapped(text, STRIP_WIDTH_PX, TextSize::Small)
-                .into_iter()
-                .map(move |line| (line, ink))
-        })
-        .collect()
+    let title = wrapped_in(INK, &title(record));
+    let messages = record.diagnostics.iter().map(|d| &d.message);
+    let reasons = messages.flat_map(|message| wrapped_in(WARNING, message));
+    title.into_iter().chain(reasons).collect()
+}
+
+/// The lines of a text in one colour.
+fn wrapped_in(ink: Srgb8, text: &str) -> Vec<(String, Srgb8)> {
+    let lines = draw::wrapped(text, STRIP_WIDTH_PX, TextSize::Small);
+    lines.into_iter().map(|line| (line, ink)).collect()
 }
 
 fn title(record: &PhotoRecord) -> String {
@@ -136,10 +128,8 @@ fn small(cutout: &Texture) -> Image<Film> {
 }
 
 fn fitted<P: Mix>(cutout: &Image<P>) -> Image<P> {
-    let (w, h) = cutout.size();
-    let longest = w.max(h).max(CUT_OUT_SIDE_PX);
-    let side = |len: usize| (len * CUT_OUT_SIDE_PX).div_ceil(longest).max(1);
-    filter::resize(cutout, side(w), side(h))
+    let (width, height) = fitted_size(cutout.size(), CUT_OUT_SIDE_PX);
+    filter::resize(cutout, width, height)
 }
 
 #[cfg(test)]

@@ -82,18 +82,22 @@ impl PhotoEntry {
             thickness: DEFAULT_THICKNESS,
             mass: DEFAULT_MASS,
         };
+        entry.set_scale(scale);
+        entry
+    }
+
+    fn set_scale(&mut self, scale: Scale) {
         match scale {
-            Scale::PxPerMetre(scale) => entry.px_per_metre = Some(scale),
-            Scale::Length(length) => entry.length = Some(length),
+            Scale::PxPerMetre(scale) => self.px_per_metre = Some(scale),
+            Scale::Length(length) => self.length = Some(length),
             Scale::Size([length, width]) => {
-                (entry.length, entry.width) = (Some(length), Some(width));
+                (self.length, self.width) = (Some(length), Some(width));
             }
             Scale::Screen(size, corners) => {
-                (entry.screen_size, entry.screen_corners) = (Some(size), corners);
+                (self.screen_size, self.screen_corners) = (Some(size), corners);
             }
-            Scale::Marker(side) => entry.marker_size = Some(side),
+            Scale::Marker(side) => self.marker_size = Some(side),
         }
-        entry
     }
 
     /// The one thing that gives the scale.
@@ -101,13 +105,7 @@ impl PhotoEntry {
     /// # Errors
     /// [`Error::Value`] where nothing gives it, or more than one thing.
     pub fn scale(&self) -> Result<Scale> {
-        if self.screen_corners.is_some() && self.screen_size.is_none() {
-            let what = "missing, expected it beside screen_corners";
-            return Err(Error::value("screen_size", what));
-        }
-        if self.width.is_some() && self.length.is_none() {
-            return Err(Error::value("length", "missing, expected it beside width"));
-        }
+        self.check_companions()?;
         let names = "length, px_per_metre, screen_size or marker_size";
         match self.scales().into_iter().flatten().collect::<Vec<_>>()[..] {
             [scale] => Ok(scale),
@@ -119,18 +117,34 @@ impl PhotoEntry {
         }
     }
 
+    /// Fails on a field that says nothing without another one.
+    fn check_companions(&self) -> Result<()> {
+        if self.screen_corners.is_some() && self.screen_size.is_none() {
+            let what = "missing, expected it beside screen_corners";
+            return Err(Error::value("screen_size", what));
+        }
+        if self.width.is_some() && self.length.is_none() {
+            return Err(Error::value("length", "missing, expected it beside width"));
+        }
+        Ok(())
+    }
+
     fn scales(&self) -> [Option<Scale>; 4] {
-        let of_object = match (self.length, self.width) {
-            (Some(length), Some(width)) => Some(Scale::Size([length, width])),
-            (length, _) => length.map(Scale::Length),
-        };
         [
-            of_object,
+            self.object_scale(),
             self.px_per_metre.map(Scale::PxPerMetre),
             self.screen_size
                 .map(|size| Scale::Screen(size, self.screen_corners)),
             self.marker_size.map(Scale::Marker),
         ]
+    }
+
+    /// The scale by what the object itself measures.
+    fn object_scale(&self) -> Option<Scale> {
+        match (self.length, self.width) {
+            (Some(length), Some(width)) => Some(Scale::Size([length, width])),
+            (length, _) => length.map(Scale::Length),
+        }
     }
 
     /// Checks all values, the class against those of the folder.

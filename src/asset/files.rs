@@ -19,12 +19,8 @@ use std::path::Path;
 pub(super) fn write(path: &Path, cut: &CutOut) -> Result<Image<Film>> {
     let mut watch = Stopwatch::start();
     let channels = channels(cut);
-    let channels: Vec<(&str, &[f32])> = channels
-        .iter()
-        .map(|(name, samples)| (*name, samples.as_slice()))
-        .collect();
     watch.lap("planes");
-    io::exr::write_half_channels(path, cut.film.size(), &channels, &[])?;
+    write_film(path, cut.film.size(), &channels)?;
     watch.lap("film");
     io::write(path.with_extension("png"), &thumbnail(&cut.to_rgba()))?;
     watch.lap("thumbnail");
@@ -34,31 +30,45 @@ pub(super) fn write(path: &Path, cut: &CutOut) -> Result<Image<Film>> {
     Ok(stored)
 }
 
-/// The channels of a cut-out's file; see [`write`].
-fn channels(cut: &CutOut) -> [(&'static str, Vec<f32>); 10] {
-    let (film, measured) = (&cut.film, &cut.transmittance);
-    [
-        ("R", plane(film, |f| f.color.r)),
-        ("G", plane(film, |f| f.color.g)),
-        ("B", plane(film, |f| f.color.b)),
-        ("A", plane(film, |f| f.to_rgba().a)),
-        ("TR", plane(measured, |t| t.r)),
-        ("TG", plane(measured, |t| t.g)),
-        ("TB", plane(measured, |t| t.b)),
-        ("VR", plane(film, |f| f.transmittance().r)),
-        ("VG", plane(film, |f| f.transmittance().g)),
-        ("VB", plane(film, |f| f.transmittance().b)),
-    ]
+fn write_film(path: &Path, size: (usize, usize), channels: &[NamedPlane]) -> Result<()> {
+    let channels: Vec<(&str, &[f32])> = channels
+        .iter()
+        .map(|(name, samples)| (*name, samples.as_slice()))
+        .collect();
+    io::exr::write_half_channels(path, size, &channels, &[])
 }
 
-fn plane<P: Copy>(image: &Image<P>, value: fn(&P) -> f32) -> Vec<f32> {
-    image.pixels().iter().map(value).collect()
+/// A channel's name and samples.
+type NamedPlane = (&'static str, Vec<f32>);
+
+/// The channels of a cut-out's file; see [`write`].
+fn channels(cut: &CutOut) -> Vec<NamedPlane> {
+    let film = &cut.film;
+    let alpha = film.pixels().iter().map(|f| f.to_rgba().a).collect();
+    let mut channels = Vec::from(rgb_planes(["R", "G", "B"], film, |f| f.color));
+    channels.push(("A", alpha));
+    channels.extend(rgb_planes(["TR", "TG", "TB"], &cut.transmittance, |t| *t));
+    channels.extend(rgb_planes(["VR", "VG", "VB"], film, |f| f.transmittance()));
+    channels
+}
+
+fn rgb_planes<P: Copy>(
+    names: [&'static str; 3],
+    image: &Image<P>,
+    color: impl Fn(&P) -> LinearRgb,
+) -> [NamedPlane; 3] {
+    std::array::from_fn(|c| {
+        let pixels = image.pixels().iter();
+        let plane = pixels.map(|p| <[f32; 3]>::from(color(p))[c]).collect();
+        (names[c], plane)
+    })
 }
 
 /// A pixel as it is read back from half floats.
 fn as_stored(film: Film) -> Film {
-    let half = |color: LinearRgb| color.map(through_half);
-    Film::new(half(film.color), half(film.transmittance()))
+    let [color, transmittance] =
+        [film.color, film.transmittance()].map(|color: LinearRgb| color.map(through_half));
+    Film::new(color, transmittance)
 }
 
 /// A number as an EXR of half floats keeps it: what is too large becomes the largest.
@@ -92,14 +102,9 @@ mod tests {
                 LinearRgb::new(1.0 - 0.9 * v, 0.3, v / 3.0),
             )
         });
-        let planes = [
-            ("R", plane(&film, |f| f.color.r)),
-            ("G", plane(&film, |f| f.color.g)),
-            ("B", plane(&film, |f| f.color.b)),
-            ("VR", plane(&film, |f| f.transmittance().r)),
-            ("VG", plane(&film, |f| f.transmittance().g)),
-            ("VB", plane(&film, |f| f.transmittance().b)),
-        ];
+        let color = rgb_planes(["R", "G", "B"], &film, |f| f.color);
+        let seen = rgb_planes(["VR", "VG", "VB"], &film, |f| f.transmittance());
+        let planes = [color, seen].concat();
         let channels: Vec<_> = planes.iter().map(|(n, v)| (*n, v.as_slice())).collect();
         io::exr::write_half_channels(&path, film.size(), &channels, &[]).unwrap();
         assert_eq!(io::read::<Film>(&path).unwrap(), film.map(as_stored));

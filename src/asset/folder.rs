@@ -73,16 +73,26 @@ impl CutOutWriter<'_> {
         let photo = read_rectified(entry).map_err(|e| with_name(e, &entry.file))?;
         let empty = self.empty_screen(entry, &photo)?;
         watch.lap("read");
-        let cut = cut_out_on(&photo.photo, empty.as_deref(), &self.options_for(entry))
-            .map_err(|e| with_name(e, &entry.file))?;
+        let cut = self.cut_out(entry, &photo.photo, empty.as_deref())?;
         watch.lap("cut out");
-        log_diagnostics(&cut, &entry.file);
-        let record = record(&cut, entry, &photo)?;
+        let record = new_record(&cut, entry, &photo)?;
         watch.lap("measure");
         let film = self.write_files(&cut, &record)?;
         watch.lap("write");
         watch.log(entry.file.display());
         Ok(Photo::new(film, record))
+    }
+
+    fn cut_out(
+        &self,
+        entry: &PhotoEntry,
+        photo: &Image<LinearRgb>,
+        empty: Option<&Image<LinearRgb>>,
+    ) -> Result<CutOut> {
+        let cut = cut_out_on(photo, empty, &self.options_for(entry));
+        let cut = cut.map_err(|e| with_name(e, &entry.file))?;
+        log_diagnostics(&cut, &entry.file);
+        Ok(cut)
     }
 
     fn write_files(&self, cut: &CutOut, record: &PhotoRecord) -> Result<Image<Film>> {
@@ -157,18 +167,26 @@ fn to_review(cut: &CutOut) -> impl Iterator<Item = Diagnostic> {
 ///
 /// # Errors
 /// [`Error::Value`] for a scale that makes the object too short or too long.
-fn record(cut: &CutOut, entry: &PhotoEntry, photo: &RectifiedPhoto) -> Result<PhotoRecord> {
+fn new_record(cut: &CutOut, entry: &PhotoEntry, photo: &RectifiedPhoto) -> Result<PhotoRecord> {
     let scale = entry.scale()?;
     let measured = MeasuredSize::new(cut, scale, photo);
     scale.check_length(measured.object_m[0], &entry.source())?;
-    let (w, h) = cut.film.size();
-    let size_m = [w as f64, h as f64].map(|px| px / measured.px_per_metre);
-    let outline_px = cut.hull.iter().map(files::rounded).collect();
     let warnings = measured.size_mismatch.into_iter().chain(photo.diagnostic());
     Ok(PhotoRecord {
         source: entry.source(),
         object_m: measured.object_m,
         error_m: measured.error_m,
+        diagnostics: to_review(cut).chain(warnings).collect(),
+        ..matte_record(cut, entry.cut_out_file(), measured.px_per_metre)
+    })
+}
+
+/// What its matte says of a cut-out, in a file and of a scale.
+fn matte_record(cut: &CutOut, file: String, px_per_metre: f64) -> PhotoRecord {
+    let (w, h) = cut.film.size();
+    let size_m = [w as f64, h as f64].map(|px| px / px_per_metre);
+    let outline_px = cut.hull.iter().map(files::rounded).collect();
+    PhotoRecord {
         screen: cut.screen,
         matte: cut.method,
         residue: f64::from(cut.residual_matte),
@@ -176,12 +194,6 @@ fn record(cut: &CutOut, entry: &PhotoEntry, photo: &RectifiedPhoto) -> Result<Ph
         outline_confidence: cut.segmentation.confidence.value(),
         color_confidence: cut.color_uncertainty.map(ColorUncertainty::confidence),
         truncated: cut.segmentation.touches.contains(&true),
-        diagnostics: to_review(cut).chain(warnings).collect(),
-        ..PhotoRecord::new(
-            entry.cut_out_file(),
-            measured.px_per_metre,
-            size_m,
-            outline_px,
-        )
-    })
+        ..PhotoRecord::new(file, px_per_metre, size_m, outline_px)
+    }
 }

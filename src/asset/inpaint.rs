@@ -33,16 +33,19 @@ impl<'a> CoonsPatch<'a> {
     }
 
     fn at(&self, x: usize, y: usize) -> LinearRgb {
-        let (source, [left, right], [top, bottom]) = (self.source, self.columns, self.rows);
+        let (source, [top, bottom]) = (self.source, self.rows);
         let s = share(x, self.columns);
         let t = share(y, self.rows);
-        let across = mix(source[(left, y)], source[(right, y)], s);
+        let across = self.mixed_row(y, s);
         let down = mix(source[(x, top)], source[(x, bottom)], t);
-        let upper = mix(source[(left, top)], source[(right, top)], s);
-        let lower = mix(source[(left, bottom)], source[(right, bottom)], s);
-        across
-            .add_scaled(1.0, down)
-            .add_scaled(-1.0, mix(upper, lower, t))
+        let corners = mix(self.mixed_row(top, s), self.mixed_row(bottom, s), t);
+        across.add_scaled(1.0, down).add_scaled(-1.0, corners)
+    }
+
+    /// Between the left and the right side in one row.
+    fn mixed_row(&self, y: usize, s: f32) -> LinearRgb {
+        let [left, right] = self.columns;
+        mix(self.source[(left, y)], self.source[(right, y)], s)
     }
 }
 

@@ -50,7 +50,7 @@ impl Library {
     pub fn open_some(folder: impl AsRef<Path>, wanted: impl Fn(&str) -> bool) -> Result<Self> {
         let mut manifest = Manifest::read(&folder)?;
         manifest.assets.retain(|asset| wanted(&asset.name));
-        Self::from_manifest(folder.as_ref(), manifest, Vec::new())
+        Self::from_manifest(folder.as_ref(), manifest, &[])
     }
 
     /// The same with photos that were just [added](super::add_photo), which need not be read.
@@ -59,19 +59,20 @@ impl Library {
     /// As [`open`](Self::open).
     pub fn open_with(folder: impl AsRef<Path>, added: Vec<Photo>) -> Result<Self> {
         let manifest = Manifest::read(&folder)?;
-        Self::from_manifest(folder.as_ref(), manifest, added)
+        Self::from_manifest(folder.as_ref(), manifest, &added)
     }
 
     /// The library of a manifest that was read or written just now, with photos that need not be read.
     pub(super) fn from_manifest(
         folder: &Path,
         manifest: Manifest,
-        added: Vec<Photo>,
+        added: &[Photo],
     ) -> Result<Self> {
-        let mut photos = load_all(folder, &manifest, &added).into_iter();
+        let mut photos = load_all(folder, &manifest, added).into_iter();
         let assets = manifest.assets.into_iter().map(|asset| {
-            let count = asset.photos.len();
-            Ok(asset.with_photos(photos.by_ref().take(count).collect::<Result<_>>()?))
+            let own = photos.by_ref().take(asset.photos.len());
+            let own = own.collect::<Result<_>>()?;
+            Ok(asset.with_photos(own))
         });
         Ok(Self {
             assets: assets.collect::<Result<_>>()?,
@@ -118,38 +119,44 @@ const ROUNDING_PX: f64 = 0.5;
 
 /// Reads the cut-out of a record that stands at a place of the manifest.
 fn load(folder: &Path, record: &PhotoRecord, at: &str) -> Result<Photo> {
-    let in_manifest = |e: Error| e.within(at).in_file(folder.join(MANIFEST));
-    let path = io::inside(folder, &record.file).map_err(in_manifest)?;
+    let path = io::inside(folder, &record.file).map_err(|e| in_manifest(e, folder, at))?;
     let image: Image<Film> = io::read(&path)?;
-    check_size(&image, record).map_err(in_manifest)?;
+    check_size(&image, record).map_err(|e| in_manifest(e, folder, at))?;
     check_pixels(&image).map_err(|what| Error::file(path, what))?;
     Ok(Photo::new(image, record.clone()))
 }
 
+fn in_manifest(error: Error, folder: &Path, at: &str) -> Error {
+    error.within(at).in_file(folder.join(MANIFEST))
+}
+
 fn check_size(image: &Image<Film>, record: &PhotoRecord) -> Result<()> {
     let [w, h] = [image.width() as f64, image.height() as f64];
-    let expected = record.size_px();
-    if (expected[0] - w).abs() <= ROUNDING_PX && (expected[1] - h).abs() <= ROUNDING_PX {
+    let [expected_w, expected_h] = record.size_px();
+    if (expected_w - w).abs() <= ROUNDING_PX && (expected_h - h).abs() <= ROUNDING_PX {
         return Ok(());
     }
     let what = format!(
-        "{:.1} x {:.1} pixels, but {} has {w} x {h}",
-        expected[0], expected[1], record.file
+        "{expected_w:.1} x {expected_h:.1} pixels, but {} has {w} x {h}",
+        record.file
     );
     Err(Error::value("size_m", what))
 }
 
 /// What is wrong with the first pixel that no picture has.
 pub(super) fn check_pixels(image: &Image<Film>) -> std::result::Result<(), String> {
-    let Some(i) = image.pixels().iter().position(|p| !p.is_sound()) else {
-        return Ok(());
-    };
-    let (x, y) = (i % image.width(), i / image.width());
-    let Film { color, opacity } = image.pixels()[i];
-    let [color, opacity] = [color, opacity].map(<[f32; 3]>::from);
-    Err(format!(
+    let unsound = image.pixels().iter().position(|p| !p.is_sound());
+    unsound.map_or(Ok(()), |i| {
+        let at = (i % image.width(), i / image.width());
+        Err(unsound_pixel(&image[at], at))
+    })
+}
+
+fn unsound_pixel(film: &Film, (x, y): (usize, usize)) -> String {
+    let [color, opacity] = [film.color, film.opacity].map(<[f32; 3]>::from);
+    format!(
         "colour {color:?} and opacity {opacity:?} at ({x}, {y}), expected finite colour and opacity from 0 to 1"
-    ))
+    )
 }
 
 impl Photo {
@@ -157,14 +164,12 @@ impl Photo {
     pub fn new(cut_out: impl Into<Texture>, record: PhotoRecord) -> Self {
         let texture = cut_out.into();
         let (w, h) = texture.size();
-        let [w, h] = [w as f64, h as f64];
+        let outline = record.outline_px.iter();
         Self {
-            texture,
-            outline_uv: record
-                .outline_px
-                .iter()
-                .map(|&[x, y]| Point2::new(x / w, y / h))
+            outline_uv: outline
+                .map(|&[x, y]| Point2::new(x / w as f64, y / h as f64))
                 .collect(),
+            texture,
             record,
         }
     }

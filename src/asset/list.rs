@@ -1,7 +1,7 @@
 //! A list of photos, as a person or a spreadsheet writes it.
 
 use super::entry::PhotoEntry;
-use super::manifest::Manifest;
+use super::manifest::{Manifest, check_each};
 use super::screen_source::ScreenSource;
 use super::spreadsheet;
 use crate::error::{Error, Result};
@@ -46,16 +46,12 @@ impl List {
     /// [`Error::File`] for a file that cannot be read or understood, with its line.
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
-        let is_csv = path
-            .extension()
-            .is_some_and(|e| e.eq_ignore_ascii_case("csv"));
-        if !is_csv {
+        if !is_csv(path) {
             return io::read_toml(path);
         }
-        let photos = io::read_bytes(path)
-            .and_then(|bytes| photos_of_csv(&bytes).map_err(|e| e.in_file(path)))?;
+        let bytes = io::read_bytes(path)?;
         Ok(Self {
-            photos,
+            photos: photos_of_csv(&bytes).map_err(|e| e.in_file(path))?,
             ..Self::default()
         })
     }
@@ -66,18 +62,12 @@ impl List {
     /// [`Error::Value`] for the first value that cannot be right, naming the entry.
     pub(super) fn check(&self, manifest: &mut Manifest) -> Result<()> {
         self.cut_out.check().map_err(|e| e.within("cut_out"))?;
-        manifest.add_classes(
-            &self.classes,
-            self.photos.iter().map(|photo| photo.class.as_str()),
-        )?;
+        let classes = self.photos.iter().map(|photo| photo.class.as_str());
+        manifest.add_classes(&self.classes, classes)?;
         if self.photos.is_empty() {
             return Err(Error::value("photos", "empty, expected at least one"));
         }
-        for (i, photo) in self.photos.iter().enumerate() {
-            photo
-                .check(manifest)
-                .map_err(|e| e.within(&format!("photos[{i}]")))?;
-        }
+        check_each(&self.photos, "photos", |photo| photo.check(manifest))?;
         self.check_files()
     }
 
@@ -108,22 +98,24 @@ impl List {
     }
 }
 
+fn is_csv(path: &Path) -> bool {
+    path.extension()
+        .is_some_and(|extension| extension.eq_ignore_ascii_case("csv"))
+}
+
 /// The list itself, or the one in a folder.
 pub(super) fn find_list(path: &Path) -> Result<PathBuf> {
     if !path.is_dir() {
         return Ok(path.into());
     }
-    LIST_NAMES
-        .iter()
-        .map(|name| path.join(name))
-        .find(|list| list.exists())
-        .ok_or_else(|| {
-            let names = LIST_NAMES.join(" or ");
-            Error::file(
-                path,
-                format!("expected {names} in it, a list of the photos"),
-            )
-        })
+    let mut lists = LIST_NAMES.iter().map(|name| path.join(name));
+    lists.find(|list| list.exists()).ok_or_else(|| {
+        let names = LIST_NAMES.join(" or ");
+        Error::file(
+            path,
+            format!("expected {names} in it, a list of the photos"),
+        )
+    })
 }
 
 fn photos_of_csv(bytes: &[u8]) -> Result<Vec<PhotoEntry>> {
@@ -139,34 +131,32 @@ fn with_actual_spelling(path: PathBuf) -> PathBuf {
     if path.exists() {
         return path;
     }
-    let entries = path
-        .parent()
-        .and_then(|folder| std::fs::read_dir(folder).ok())
-        .into_iter()
-        .flatten()
-        .flatten();
-    let mut alike = entries
-        .map(|entry| entry.path())
-        .filter(|other| normalized_name(other) == normalized_name(&path));
+    let mut alike =
+        files_beside(&path).filter(|other| normalized_name(other) == normalized_name(&path));
     match (alike.next(), alike.next()) {
         (Some(only), None) => only,
         _ => path,
     }
 }
 
+/// What is in a file's folder; nothing where that cannot be read.
+fn files_beside(path: &Path) -> impl Iterator<Item = PathBuf> + use<> {
+    let entries = path.parent().and_then(|folder| folder.read_dir().ok());
+    entries
+        .into_iter()
+        .flatten()
+        .flatten()
+        .map(|entry| entry.path())
+}
+
 /// A file's name in small letters, with the short endings of pictures.
 fn normalized_name(path: &Path) -> String {
-    let name = path
-        .file_name()
-        .unwrap_or_default()
-        .to_string_lossy()
-        .to_lowercase();
-    for (long, short) in [(".jpeg", ".jpg"), (".tiff", ".tif")] {
-        if let Some(stem) = name.strip_suffix(long) {
-            return format!("{stem}{short}");
-        }
-    }
-    name
+    let name = path.file_name().unwrap_or_default();
+    let name = name.to_string_lossy().to_lowercase();
+    let short = [(".jpeg", ".jpg"), (".tiff", ".tif")]
+        .into_iter()
+        .find_map(|(long, short)| Some(name.strip_suffix(long)?.to_owned() + short));
+    short.unwrap_or(name)
 }
 
 #[cfg(test)]

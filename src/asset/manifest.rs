@@ -9,6 +9,7 @@ use crate::matte::MatteMethod;
 use crate::pixel::LinearRgb;
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Deserializer, Serialize};
+use std::collections::BTreeSet;
 use std::path::Path;
 
 /// What is in an asset folder, without the pictures.
@@ -94,21 +95,28 @@ pub struct PhotoRecord {
 fn coded_or_plain<'de, D: Deserializer<'de>>(
     input: D,
 ) -> std::result::Result<Vec<Diagnostic>, D::Error> {
-    #[derive(Deserialize)]
-    #[serde(
-        untagged,
-        expecting = "a table of code, severity and message, or a text"
-    )]
-    enum CodedOrPlain {
-        Coded(Diagnostic),
-        Plain(String),
-    }
     let entries = Vec::<CodedOrPlain>::deserialize(input)?;
-    let diagnostics = entries.into_iter().map(|entry| match entry {
-        CodedOrPlain::Coded(diagnostic) => diagnostic,
-        CodedOrPlain::Plain(text) => Diagnostic::warning(Code::Uncoded, text),
-    });
-    Ok(diagnostics.collect())
+    Ok(entries.into_iter().map(Diagnostic::from).collect())
+}
+
+/// A diagnostic of a manifest, or the text that earlier versions wrote in its place.
+#[derive(Deserialize)]
+#[serde(
+    untagged,
+    expecting = "a table of code, severity and message, or a text"
+)]
+enum CodedOrPlain {
+    Coded(Diagnostic),
+    Plain(String),
+}
+
+impl From<CodedOrPlain> for Diagnostic {
+    fn from(entry: CodedOrPlain) -> Self {
+        match entry {
+            CodedOrPlain::Coded(diagnostic) => diagnostic,
+            CodedOrPlain::Plain(text) => Self::warning(Code::Uncoded, text),
+        }
+    }
 }
 
 impl<P> Asset<P> {
@@ -173,27 +181,14 @@ impl Manifest {
     /// # Errors
     /// [`Error::Value`] (`class`) when the asset is known as something else.
     pub fn insert(&mut self, asset: Asset<PhotoRecord>) -> Result<()> {
-        let Some(known) = self
-            .assets
-            .iter_mut()
-            .find(|known| known.name == asset.name)
-        else {
-            self.assets.push(asset);
-            return Ok(());
-        };
-        if known.class != asset.class {
-            let what = format!(
-                "\"{}\", but asset \"{}\" is \"{}\"",
-                asset.class, asset.name, known.class
-            );
-            return Err(Error::value("class", what));
+        let mut known = self.assets.iter_mut();
+        match known.find(|known| known.name == asset.name) {
+            Some(known) => known.merge(asset),
+            None => {
+                self.assets.push(asset);
+                Ok(())
+            }
         }
-        (known.thickness, known.mass) = (asset.thickness, asset.mass);
-        for photo in asset.photos {
-            known.photos.retain(|old| old.file != photo.file);
-            known.photos.push(photo);
-        }
-        Ok(())
     }
 
     /// Takes classes into the list: those that are declared, in that order, or else those in use, behind the ones that are
@@ -211,14 +206,19 @@ impl Manifest {
             return Ok(());
         }
         check_unique("classes", declared.iter().map(String::as_str))?;
-        if !declared.starts_with(&self.classes) {
-            let (declared, known) = (declared.join(", "), self.classes.join(", "));
-            let what =
-                format!("{declared}; expected to begin with those that the folder has: {known}");
-            return Err(Error::value("classes", what));
-        }
+        self.check_order(declared)?;
         self.classes = declared.to_vec();
         Ok(())
+    }
+
+    /// Fails where declared classes do not begin with those that are there.
+    fn check_order(&self, declared: &[String]) -> Result<()> {
+        if declared.starts_with(&self.classes) {
+            return Ok(());
+        }
+        let (declared, known) = (declared.join(", "), self.classes.join(", "));
+        let what = format!("{declared}; expected to begin with those that the folder has: {known}");
+        Err(Error::value("classes", what))
     }
 
     /// Place of a class in the list.
@@ -237,23 +237,34 @@ impl Manifest {
             return Err(Error::value("classes", "empty, expected at least one"));
         }
         check_unique("classes", self.classes.iter().map(String::as_str))?;
-        for (i, class) in self.classes.iter().enumerate() {
-            check_class(class).map_err(|e| e.within(&format!("classes[{i}]")))?;
-        }
-        check_unique(
-            "assets",
-            self.assets.iter().map(|asset| asset.name.as_str()),
-        )?;
-        for (i, asset) in self.assets.iter().enumerate() {
-            let inside = |e: Error| e.within(&format!("assets[{i}]"));
-            asset.check().map_err(inside)?;
-            self.class(&asset.class).map_err(inside)?;
-        }
-        Ok(())
+        check_each(&self.classes, "classes", |class| check_class(class))?;
+        let names = self.assets.iter().map(|asset| asset.name.as_str());
+        check_unique("assets", names)?;
+        check_each(&self.assets, "assets", |asset| {
+            asset.check()?;
+            self.class(&asset.class).map(drop)
+        })
     }
 }
 
 impl Asset<PhotoRecord> {
+    /// Takes in the photos and the body of the same asset.
+    fn merge(&mut self, asset: Self) -> Result<()> {
+        if self.class != asset.class {
+            let what = format!(
+                "\"{}\", but asset \"{}\" is \"{}\"",
+                asset.class, asset.name, self.class
+            );
+            return Err(Error::value("class", what));
+        }
+        (self.thickness, self.mass) = (asset.thickness, asset.mass);
+        for photo in asset.photos {
+            self.photos.retain(|old| old.file != photo.file);
+            self.photos.push(photo);
+        }
+        Ok(())
+    }
+
     fn check(&self) -> Result<()> {
         check_name(&self.name)?;
         THICKNESS.check("thickness", self.thickness)?;
@@ -261,17 +272,20 @@ impl Asset<PhotoRecord> {
         if self.photos.is_empty() {
             return Err(Error::value("photos", "empty, expected at least one"));
         }
-        check_unique(
-            "photos",
-            self.photos.iter().map(|photo| photo.file.as_str()),
-        )?;
-        for (i, photo) in self.photos.iter().enumerate() {
-            photo
-                .check()
-                .map_err(|e| e.within(&format!("photos[{i}]")))?;
-        }
-        Ok(())
+        let files = self.photos.iter().map(|photo| photo.file.as_str());
+        check_unique("photos", files)?;
+        check_each(&self.photos, "photos", PhotoRecord::check)
     }
+}
+
+/// Checks every item of a list; errors name its place: `photos[2]`.
+pub(super) fn check_each<T>(
+    items: &[T],
+    name: &str,
+    check: impl Fn(&T) -> Result<()>,
+) -> Result<()> {
+    let mut numbered = items.iter().enumerate();
+    numbered.try_for_each(|(i, item)| check(item).map_err(|e| e.within(&format!("{name}[{i}]"))))
 }
 
 /// Place of a class in a list of names.
@@ -352,15 +366,21 @@ impl PhotoRecord {
             let what = format!("{} points, expected at least 3", self.outline_px.len());
             return Err(Error::value("outline_px", what));
         }
-        let [w, h] = self.size_px();
-        for (i, [x, y]) in self.outline_px.iter().enumerate() {
-            if !((-1.0..=w + 1.0).contains(x) && (-1.0..=h + 1.0).contains(y)) {
+        let size = self.size_px();
+        match self.outline_px.iter().position(|p| !is_near(*p, size)) {
+            Some(i) => {
+                let ([x, y], [w, h]) = (self.outline_px[i], size);
                 let what = format!("({x}, {y}), expected a point inside {w:.0} x {h:.0} pixels");
-                return Err(Error::value(format!("outline_px[{i}]"), what));
+                Err(Error::value(format!("outline_px[{i}]"), what))
             }
+            None => Ok(()),
         }
-        Ok(())
     }
+}
+
+/// A point is inside a picture of this size, or a pixel outside at most.
+fn is_near([x, y]: [f64; 2], [w, h]: [f64; 2]) -> bool {
+    (-1.0..=w + 1.0).contains(&x) && (-1.0..=h + 1.0).contains(&y)
 }
 
 const CONFIDENCE: Bounds = Bounds::new(0.0, 1.0, "a share");
@@ -370,21 +390,17 @@ const CUT_OUT_SIDE: Bounds = Bounds::metres(1e-4, 20.0, "objects are 5 mm to 5 m
 
 /// A name that is safe as the name of a file: letters and digits of any language.
 pub(super) fn check_name(name: &str) -> Result<()> {
-    let plain = |c: char| c.is_alphanumeric() || "_-.".contains(c);
-    if !name.is_empty()
-        && name.len() <= MAX_NAME_BYTES
-        && name.chars().all(plain)
-        && !name.starts_with('.')
-    {
+    let is_short = !name.is_empty() && name.len() <= MAX_NAME_BYTES;
+    if is_short && name.chars().all(is_name_character) && !name.starts_with('.') {
         return Ok(());
     }
-    Err(Error::value(
-        "name",
-        format!(
-            "\"{}\", expected letters, digits, _ and -",
-            printable_start(name)
-        ),
-    ))
+    let start = printable_start(name);
+    let what = format!("\"{start}\", expected letters, digits, _ and -");
+    Err(Error::value("name", what))
+}
+
+fn is_name_character(c: char) -> bool {
+    c.is_alphanumeric() || "_-.".contains(c)
 }
 
 /// File systems allow 255 bytes with what is put behind.
@@ -392,16 +408,12 @@ const MAX_NAME_BYTES: usize = 120;
 
 /// A name that stands on a line of its own in every format of labels.
 pub(super) fn check_class(name: &str) -> Result<()> {
-    if !name.trim().is_empty()
-        && name.len() <= MAX_NAME_BYTES
-        && !name.chars().any(char::is_control)
-    {
+    let is_short = !name.trim().is_empty() && name.len() <= MAX_NAME_BYTES;
+    if is_short && !name.chars().any(char::is_control) {
         return Ok(());
     }
-    Err(Error::value(
-        "class",
-        format!("\"{}\", expected a name on one line", printable_start(name)),
-    ))
+    let what = format!("\"{}\", expected a name on one line", printable_start(name));
+    Err(Error::value("class", what))
 }
 
 /// The beginning of a name, on one line.
@@ -413,13 +425,11 @@ fn printable_start(name: &str) -> String {
 }
 
 fn check_unique<'a>(at: &str, names: impl Iterator<Item = &'a str>) -> Result<()> {
-    let mut seen = std::collections::BTreeSet::new();
+    let mut seen = BTreeSet::new();
     for (i, name) in names.enumerate() {
         if !seen.insert(name) {
-            return Err(Error::value(
-                format!("{at}[{i}]"),
-                format!("\"{name}\" is there twice"),
-            ));
+            let what = format!("\"{name}\" is there twice");
+            return Err(Error::value(format!("{at}[{i}]"), what));
         }
     }
     Ok(())

@@ -33,20 +33,26 @@ impl MeasuredSize {
             px_per_metre: 1.0,
             sigma: 0.0,
         });
-        let px_per_metre = match scale {
-            Scale::PxPerMetre(scale) => scale * cut.scale,
-            Scale::Screen(..) | Scale::Marker(_) => screen.px_per_metre * cut.scale,
-            Scale::Length(length) => tight[0] / length,
-            Scale::Size(size) => least_squares_scale(tight, size),
-        };
+        let px_per_metre = scale_of_outline(tight, scale, screen.px_per_metre, cut.scale);
         let error_px = outline_error_px(cut, tight);
-        let metres = |px: f64| px / px_per_metre;
+        let object_m = tight.map(|px| px / px_per_metre);
         Self {
             px_per_metre,
-            object_m: tight.map(metres),
-            error_m: libm::hypot(metres(error_px), screen.sigma * metres(tight[0])),
+            object_m,
+            error_m: libm::hypot(error_px / px_per_metre, screen.sigma * object_m[0]),
             size_mismatch: size_mismatch(tight, error_px, scale),
         }
+    }
+}
+
+/// Pixels of a cut-out for a metre, by its tight outline or by the screen's scale; `enlargement` is its scale over the
+/// photo's.
+fn scale_of_outline(tight: [f64; 2], scale: Scale, screen_scale: f64, enlargement: f64) -> f64 {
+    match scale {
+        Scale::PxPerMetre(photo_scale) => photo_scale * enlargement,
+        Scale::Screen(..) | Scale::Marker(_) => screen_scale * enlargement,
+        Scale::Length(length) => tight[0] / length,
+        Scale::Size(size) => least_squares_scale(tight, size),
     }
 }
 
@@ -66,10 +72,8 @@ fn outline_error_px(cut: &CutOut, tight: [f64; 2]) -> f64 {
 /// The middle of the object's hull in pixels of the photo.
 fn middle_px(cut: &CutOut) -> Point2<f64> {
     let count = cut.hull.len().max(1) as f64;
-    let middle = cut
-        .hull
-        .iter()
-        .fold(Vector2::zeros(), |sum, p| sum + p.coords / count);
+    let corners = cut.hull.iter().map(|p| p.coords / count);
+    let middle = corners.fold(Vector2::zeros(), |sum, p| sum + p);
     Point2::from(middle / cut.scale + Vector2::new(cut.roi.x as f64, cut.roi.y as f64))
 }
 
@@ -80,12 +84,12 @@ fn size_mismatch(tight: [f64; 2], error_px: f64, scale: Scale) -> Option<Diagnos
     };
     let (given, seen) = (width / length, tight[1] / tight[0]);
     let slack = PROPORTION_SLACK + error_px / tight[1];
-    ((given / seen - 1.0).abs() > slack).then(|| {
-        let message = format!(
-            "the outline is {:.2} times as long as wide, the given size {:.2} times",
-            1.0 / seen,
-            1.0 / given
-        );
-        Diagnostic::warning(Code::SizeMismatch, message)
-    })
+    ((given / seen - 1.0).abs() > slack).then(|| mismatch_warning(1.0 / seen, 1.0 / given))
+}
+
+/// About lengths over widths.
+fn mismatch_warning(seen: f64, given: f64) -> Diagnostic {
+    let message =
+        format!("the outline is {seen:.2} times as long as wide, the given size {given:.2} times");
+    Diagnostic::warning(Code::SizeMismatch, message)
 }

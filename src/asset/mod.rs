@@ -32,26 +32,35 @@ mod texture;
 mod thumbnail;
 mod top_view;
 
-pub use build::{Built, build};
+#[doc(hidden)]
+pub use build::Built;
+pub use build::build;
+#[doc(hidden)]
 pub use contact_sheet::contact_sheet;
 pub use entry::PhotoEntry;
-pub use equirectangular::{direction_to_uv, uv_to_direction};
+#[cfg(test)]
+pub(crate) use equirectangular::direction_to_uv;
+#[doc(hidden)]
+pub use equirectangular::uv_to_direction;
 pub use folder::add_photo;
 pub use library::{Library, Photo};
 pub use list::List;
-pub use manifest::{Asset, Manifest, PhotoRecord};
+pub use manifest::Asset;
+#[doc(hidden)]
+pub use manifest::{Manifest, PhotoRecord};
+#[doc(hidden)]
 pub use moments::{Moments, Piece};
 pub use panorama::Panorama;
 pub use scale::Scale;
 pub use screen_source::ScreenSource;
-pub use size::oriented_size;
 pub use texture::Texture;
 
 /// Name of the manifest in an asset folder.
-pub const MANIFEST: &str = "assets.toml";
+pub(crate) const MANIFEST: &str = "assets.toml";
 
 /// Thickness of an asset where none is given, metres: the thin box of the paper's colliders.
+#[doc(hidden)]
 pub const DEFAULT_THICKNESS: f64 = 0.005;
 
 /// Mass of an asset where none is given, kilograms: a PET bottle of half a litre to a litre.
-pub const DEFAULT_MASS: f64 = 0.025;
+pub(crate) const DEFAULT_MASS: f64 = 0.025;

@@ -123,18 +123,22 @@ impl LightSums {
     }
 
     fn piece(&self, columns: [usize; 2], rows: [usize; 2]) -> Piece {
-        let at = |i: usize, j: usize| &self.corners[j * (GRID_CELLS[0] + 1) + i];
         let [x0, x1] = columns;
         let [y0, y1] = rows;
-        let moments = at(x1, y1)
-            .plus(at(x0, y1), -1.0)
-            .plus(at(x1, y0), -1.0)
-            .plus(at(x0, y0), 1.0);
+        let moments = self
+            .corner(x1, y1)
+            .plus(self.corner(x0, y1), -1.0)
+            .plus(self.corner(x1, y0), -1.0)
+            .plus(self.corner(x0, y0), 1.0);
         Piece {
             columns,
             rows,
             moments,
         }
+    }
+
+    fn corner(&self, i: usize, j: usize) -> &Moments {
+        &self.corners[j * (GRID_CELLS[0] + 1) + i]
     }
 
     /// Cuts the piece with the largest error where that leaves the least, again and again.
@@ -144,44 +148,40 @@ impl LightSums {
             .map(|rows| self.piece([0, GRID_CELLS[0]], rows))
             .to_vec();
         let mut open = vec![true; 2];
-        while self.cuts.len() + 2 < MAX_PIECES {
-            let Some(worst) = self.worst_piece(&open) else {
-                return;
-            };
-            open[worst] = false;
-            let Some(halves) = self.halves(&self.pieces[worst]) else {
-                continue;
-            };
+        while self.cuts.len() + 2 < MAX_PIECES && self.cut_worst(&mut open) {}
+    }
+
+    /// Cuts the worst of the open pieces, if it has more than one cell; it is open no more. Returns whether there was one.
+    fn cut_worst(&mut self, open: &mut Vec<bool>) -> bool {
+        let Some(worst) = self.worst_piece(open) else {
+            return false;
+        };
+        open[worst] = false;
+        if let Some(halves) = self.halves(&self.pieces[worst]) {
             self.cuts.push(worst);
             self.pieces.extend(halves);
             open.extend([true; 2]);
         }
+        true
     }
 
     /// The first of the open pieces with the largest error; none where there is no error.
     fn worst_piece(&self, open: &[bool]) -> Option<usize> {
-        let error = |k: usize| self.pieces[k].moments.error();
         (0..self.pieces.len())
             .filter(|&k| open[k])
-            .max_by(|&a, &b| error(a).total_cmp(&error(b)).then(b.cmp(&a)))
-            .filter(|&k| error(k) > 0.0)
+            .max_by(|&a, &b| self.error(a).total_cmp(&self.error(b)).then(b.cmp(&a)))
+            .filter(|&k| self.error(k) > 0.0)
+    }
+
+    fn error(&self, piece: usize) -> f64 {
+        self.pieces[piece].moments.error()
     }
 
     /// The cut across either axis that leaves the least error; none for a single cell.
     fn halves(&self, piece: &Piece) -> Option<[Piece; 2]> {
         let ([x0, x1], [y0, y1]) = (piece.columns, piece.rows);
-        let across = (x0 + 1..x1).map(|x| {
-            [
-                self.piece([x0, x], piece.rows),
-                self.piece([x, x1], piece.rows),
-            ]
-        });
-        let along = (y0 + 1..y1).map(|y| {
-            [
-                self.piece(piece.columns, [y0, y]),
-                self.piece(piece.columns, [y, y1]),
-            ]
-        });
+        let across = (x0 + 1..x1).map(|x| [[x0, x], [x, x1]].map(|c| self.piece(c, piece.rows)));
+        let along = (y0 + 1..y1).map(|y| [[y0, y], [y, y1]].map(|r| self.piece(piece.columns, r)));
         across
             .chain(along)
             .min_by(|a, b| total_error(a).total_cmp(&total_error(b)))
@@ -203,19 +203,12 @@ impl LightSums {
     pub(super) fn even(&self, per_side: usize) -> Vec<Piece> {
         let rows = per_side.clamp(1, GRID_CELLS[1]);
         let columns = 2 * rows;
-        let cut = |k: usize, n: usize, all: usize| k * all / n;
-        let span = |k: usize, n: usize, all: usize| [cut(k, n, all), cut(k + 1, n, all)];
-        let row = |j: usize| {
-            (0..columns).map(move |i| {
-                (
-                    span(i, columns, GRID_CELLS[0]),
-                    span(j, rows, GRID_CELLS[1]),
-                )
-            })
-        };
         (0..rows)
-            .flat_map(row)
-            .map(|(x, y)| self.piece(x, y))
+            .flat_map(|j| (0..columns).map(move |i| (i, j)))
+            .map(|(i, j)| {
+                let across = even_span(i, columns, GRID_CELLS[0]);
+                self.piece(across, even_span(j, rows, GRID_CELLS[1]))
+            })
             .collect()
     }
 
@@ -228,6 +221,11 @@ impl LightSums {
         }
         sum
     }
+}
+
+/// Part `k` of `n` even ones of so many cells.
+fn even_span(k: usize, n: usize, cells: usize) -> [usize; 2] {
+    [k, k + 1].map(|k| k * cells / n)
 }
 
 fn total_error(halves: &[Piece; 2]) -> f64 {
@@ -248,26 +246,45 @@ fn summed_area_table(rows: &[Vec<Moments>]) -> Vec<Moments> {
     corners
 }
 
-/// Cells of a row of the grid (in one loop: it visits every texel of a map several times), each the sum over places inside that are denser than the panorama's texels.
+/// Cells of a row of the grid, each the sum over places inside that are denser than the panorama's texels.
 fn grid_row(panorama: &Image<LinearRgb>, j: usize) -> Vec<Moments> {
     let (width, height) = panorama.size();
     let across = 2 * width.div_ceil(GRID_CELLS[0]);
     let down = 2 * height.div_ceil(GRID_CELLS[1]);
     let mut cells = vec![Moments::default(); GRID_CELLS[0]];
     for t in 0..down {
-        let v = |t: f64| (j as f64 + t / down as f64) / GRID_CELLS[1] as f64;
-        let band = libm::cos(PI * v(t as f64)) - libm::cos(PI * v(t as f64 + 1.0));
-        let solid_angle = band * TAU / (GRID_CELLS[0] * across) as f64;
-        let v = v(t as f64 + 0.5);
-        for (i, cell) in cells.iter_mut().enumerate() {
-            for s in 0..across {
-                let u = (i as f64 + (s as f64 + 0.5) / across as f64) / GRID_CELLS[0] as f64;
-                let sample = sample_light(panorama, [u, v], solid_angle);
-                *cell = cell.plus(&sample, 1.0);
-            }
-        }
+        let [top, v, bottom] = [0.0, 0.5, 1.0].map(|part| grid_v(j, t as f64 + part, down));
+        let solid_angle = line_solid_angle([top, bottom], GRID_CELLS[0] * across);
+        add_line(panorama, v, solid_angle, across, &mut cells);
     }
     cells
+}
+
+/// Of one of so many places along a line.
+fn line_solid_angle([top, bottom]: [f64; 2], places: usize) -> f64 {
+    let band = libm::cos(PI * top) - libm::cos(PI * bottom);
+    band * TAU / places as f64
+}
+
+/// The place down the panorama of line `t` of so many in a row of the grid.
+fn grid_v(j: usize, t: f64, lines: usize) -> f64 {
+    (j as f64 + t / lines as f64) / GRID_CELLS[1] as f64
+}
+
+/// Adds places along a line to the cells that they are in, so many to each.
+fn add_line(
+    panorama: &Image<LinearRgb>,
+    v: f64,
+    solid_angle: f64,
+    per_cell: usize,
+    cells: &mut [Moments],
+) {
+    for (i, cell) in cells.iter_mut().enumerate() {
+        for s in 0..per_cell {
+            let u = (i as f64 + (s as f64 + 0.5) / per_cell as f64) / GRID_CELLS[0] as f64;
+            *cell = cell.plus(&sample_light(panorama, [u, v], solid_angle), 1.0);
+        }
+    }
 }
 
 #[inline]
@@ -279,14 +296,11 @@ fn sample_light(panorama: &Image<LinearRgb>, uv: [f64; 2], solid_angle: f64) -> 
 const COARSE_CELL_SIDE: usize = 4;
 
 fn coarse_cells(rows: &[Vec<Moments>]) -> Vec<Moments> {
-    let mut cells = vec![
-        Moments::default();
-        (GRID_CELLS[0] / COARSE_CELL_SIDE) * (GRID_CELLS[1] / COARSE_CELL_SIDE)
-    ];
+    let [width, height] = GRID_CELLS.map(|cells| cells / COARSE_CELL_SIDE);
+    let mut cells = vec![Moments::default(); width * height];
     for (j, row) in rows.iter().enumerate() {
         for (i, cell) in row.iter().enumerate() {
-            let sum = &mut cells[(j / COARSE_CELL_SIDE) * (GRID_CELLS[0] / COARSE_CELL_SIDE)
-                + i / COARSE_CELL_SIDE];
+            let sum = &mut cells[(j / COARSE_CELL_SIDE) * width + i / COARSE_CELL_SIDE];
             *sum = sum.plus(cell, 1.0);
         }
     }

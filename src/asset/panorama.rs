@@ -26,20 +26,7 @@ impl Panorama {
     /// # Errors
     /// [`Error::Value`] for a picture without pixels, or with a value that is negative, NaN or infinite.
     pub fn new(image: Image<LinearRgb>) -> Result<Self> {
-        if image.is_empty() {
-            return Err(Error::value(
-                "environment",
-                "0 pixels, expected at least one",
-            ));
-        }
-        if let Some(i) = image.pixels().iter().position(|c| !is_radiance(c)) {
-            let (x, y) = (i % image.width(), i / image.width());
-            let what = format!(
-                "{:?} at ({x}, {y}), expected numbers of at least 0",
-                <[f32; 3]>::from(image.pixels()[i])
-            );
-            return Err(Error::value("environment", what));
-        }
+        check_radiance(&image).map_err(|what| Error::value("environment", what))?;
         Ok(Self {
             image,
             sums: OnceLock::new(),
@@ -98,6 +85,21 @@ impl Panorama {
         let sums = LightSums::new(&self.image);
         self.sums.get_or_init(|| sums)
     }
+}
+
+/// What is wrong with a picture that cannot be radiance.
+fn check_radiance(image: &Image<LinearRgb>) -> std::result::Result<(), String> {
+    if image.is_empty() {
+        return Err("0 pixels, expected at least one".into());
+    }
+    let impossible = image.pixels().iter().position(|c| !is_radiance(c));
+    impossible.map_or(Ok(()), |i| {
+        let (x, y) = (i % image.width(), i / image.width());
+        let value = <[f32; 3]>::from(image[(x, y)]);
+        Err(format!(
+            "{value:?} at ({x}, {y}), expected numbers of at least 0"
+        ))
+    })
 }
 
 fn is_radiance(c: &LinearRgb) -> bool {

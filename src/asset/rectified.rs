@@ -51,20 +51,14 @@ impl RectifiedPhoto {
         height: f64,
         header: &Header,
     ) -> Result<Self> {
-        let ScreenCorners {
-            corners_px,
-            sigma_px,
-        } = match corners_px {
-            Some(clicked) => ScreenCorners {
-                corners_px: clicked.map(Point2::from),
-                sigma_px: CLICK_SIGMA_PX,
-            },
+        let corners = match corners_px {
+            Some(clicked) => clicked_corners(clicked),
             None => screen_corners(&photo)?,
         };
         let reference = ReferenceRectangle {
             size,
-            corners_px,
-            sigma_px,
+            corners_px: corners.corners_px,
+            sigma_px: corners.sigma_px,
         };
         let pose = ScreenPose::solve(&reference, size_px(&photo), header)?;
         Self::through(TopView::of_screen(pose, height), photo)
@@ -122,21 +116,34 @@ impl RectifiedPhoto {
     /// The warning about a size that is measured by this.
     pub(super) fn diagnostic(&self) -> Option<Diagnostic> {
         let pose = &self.view.as_ref()?.pose;
-        let [w, h] = pose.size;
         if pose.is_poor_fit {
-            let message = format!(
-                "the screen hardly looks like one of {w:.3} x {h:.3} m; are width and height right?"
-            );
-            return Some(Diagnostic::warning(Code::ScreenSizeMismatch, message));
+            Some(poor_fit_warning(pose.size))
+        } else {
+            (pose.swap_error > REVIEWED_SWAP_ERROR).then(|| swap_warning(pose.swap_error))
         }
-        let percent = 100.0 * pose.swap_error;
-        (pose.swap_error > REVIEWED_SWAP_ERROR).then(|| {
-            let message = format!(
-                "the longer side of the screen cannot be identified: lengths may be off by {percent:.0} %"
-            );
-            Diagnostic::warning(Code::ScreenSidesAmbiguous, message)
-        })
     }
+}
+
+fn clicked_corners(corners_px: [[f64; 2]; 4]) -> ScreenCorners {
+    ScreenCorners {
+        corners_px: corners_px.map(Point2::from),
+        sigma_px: CLICK_SIGMA_PX,
+    }
+}
+
+fn poor_fit_warning([w, h]: [f64; 2]) -> Diagnostic {
+    let message = format!(
+        "the screen hardly looks like one of {w:.3} x {h:.3} m; are width and height right?"
+    );
+    Diagnostic::warning(Code::ScreenSizeMismatch, message)
+}
+
+fn swap_warning(error: f64) -> Diagnostic {
+    let percent = 100.0 * error;
+    let message = format!(
+        "the longer side of the screen cannot be identified: lengths may be off by {percent:.0} %"
+    );
+    Diagnostic::warning(Code::ScreenSidesAmbiguous, message)
 }
 
 fn largest_marker(markers: &[Marker]) -> Option<&Marker> {
@@ -169,9 +176,8 @@ fn paper_of(corners: &[Point2<f64>; 4], (w, h): (usize, usize)) -> Roi {
 }
 
 fn span_with_margin(values: [f64; 4], end: usize) -> std::ops::Range<usize> {
-    let (low, high) = values
-        .iter()
-        .fold((f64::MAX, f64::MIN), |(l, h), v| (v.min(l), v.max(h)));
+    let low = values.into_iter().fold(f64::MAX, f64::min);
+    let high = values.into_iter().fold(f64::MIN, f64::max);
     let margin = MARKER_MARGIN * (high - low) + 2.0;
     let [low, high] = [low - margin, high + margin].map(|v| v.clamp(0.0, end as f64) as usize);
     low..high.max(low)

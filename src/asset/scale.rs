@@ -27,15 +27,7 @@ impl Scale {
         match self {
             Self::PxPerMetre(scale) => PX_PER_METRE.check("px_per_metre", scale),
             Self::Length(length) => OBJECT.check("length", length),
-            Self::Size([length, width]) => {
-                OBJECT.check("length", length)?;
-                WIDTH.check("width", width)?;
-                if width <= length {
-                    return Ok(());
-                }
-                let what = format!("{width}, expected at most the length of {length}");
-                Err(Error::value("width", what))
-            }
+            Self::Size(size) => check_object_size(size),
             Self::Screen(size, _) => size
                 .into_iter()
                 .try_for_each(|side| SURFACE.check("screen_size", side)),
@@ -51,15 +43,12 @@ impl Scale {
         if OBJECT.contains(length) {
             return Ok(());
         }
-        let (at, value, question) = match self {
-            Self::Length(_) | Self::Size(_) => return Ok(()),
-            Self::PxPerMetre(scale) => ("px_per_metre", number(scale), question_of_scale(length)),
-            Self::Screen([w, h], _) => (
-                "screen_size",
-                format!("{} x {}", number(w), number(h)),
-                OBJECT.question(length),
-            ),
-            Self::Marker(side) => ("marker_size", number(side), OBJECT.question(length)),
+        let Some((at, value)) = self.measured_field() else {
+            return Ok(());
+        };
+        let question = match self {
+            Self::PxPerMetre(_) => question_of_scale(length),
+            _ => OBJECT.question(length),
         };
         let length = number((1e4 * length).round() / 1e4);
         let what = format!(
@@ -67,6 +56,28 @@ impl Scale {
         );
         Err(Error::value(at, what))
     }
+
+    /// The field of an entry that gives it and its value, where that is something else than the object.
+    fn measured_field(self) -> Option<(&'static str, String)> {
+        match self {
+            Self::Length(_) | Self::Size(_) => None,
+            Self::PxPerMetre(scale) => Some(("px_per_metre", number(scale))),
+            Self::Screen([w, h], _) => {
+                Some(("screen_size", format!("{} x {}", number(w), number(h))))
+            }
+            Self::Marker(side) => Some(("marker_size", number(side))),
+        }
+    }
+}
+
+fn check_object_size([length, width]: [f64; 2]) -> Result<()> {
+    OBJECT.check("length", length)?;
+    WIDTH.check("width", width)?;
+    if width <= length {
+        return Ok(());
+    }
+    let what = format!("{width}, expected at most the length of {length}");
+    Err(Error::value("width", what))
 }
 
 fn question_of_scale(length: f64) -> String {

@@ -47,16 +47,12 @@ impl ScreenPose {
     ) -> Result<Self> {
         let (best, other) = reference.solutions(image, header)?;
         check_fit(&best, reference.size)?;
-        let other = other.filter(|other| other.fit.chi2 < best.fit.chi2 + CHI2_99);
-        let swap_error = other.map_or(0.0, |other| {
-            best.fit.px_per_metre / other.fit.px_per_metre - 1.0
-        });
         Ok(Self {
             camera: best.camera,
             size: best.size,
             corner_sigma: reference.sigma_px / reference.mean_side_px(),
             height_sigma: best.sigma.center[(2, 2)].max(0.0).sqrt() / best.camera.center().z,
-            swap_error: swap_error.abs(),
+            swap_error: other.map_or(0.0, |other| swap_error(&best, &other)),
             is_poor_fit: best.fit.p_value.is_some_and(|p| p < IMPROBABLE_P_VALUE),
         })
     }
@@ -66,14 +62,27 @@ impl ScreenPose {
     /// An error of the corners tilts the plane that they give: its scale is off the more, the farther from them it is
     /// asked for.
     pub(super) fn sigma(&self, place: Point3<f64>) -> f64 {
-        let [w, h] = self.size;
-        let away = libm::hypot(place.x, place.y) / (0.5 * (w + h));
-        let of_corners = self.corner_sigma * libm::hypot(1.0, 2.0 * away);
         let share = place.z / (self.camera.center().z - place.z);
         let of_height = share * libm::hypot(2.0 * HEIGHT_SIGMA, self.height_sigma);
         [of_height, TAPE_SIGMA, self.swap_error]
             .into_iter()
-            .fold(of_corners, libm::hypot)
+            .fold(self.tilt_sigma(place), libm::hypot)
+    }
+
+    /// The part of that error by the corners.
+    fn tilt_sigma(&self, place: Point3<f64>) -> f64 {
+        let [w, h] = self.size;
+        let away = libm::hypot(place.x, place.y) / (0.5 * (w + h));
+        self.corner_sigma * libm::hypot(1.0, 2.0 * away)
+    }
+}
+
+/// By how much lengths differ between two solutions that fit about as well; 0 where the other fits much worse.
+fn swap_error(best: &Solution, other: &Solution) -> f64 {
+    if other.fit.chi2 < best.fit.chi2 + CHI2_99 {
+        (best.fit.px_per_metre / other.fit.px_per_metre - 1.0).abs()
+    } else {
+        0.0
     }
 }
 
@@ -87,14 +96,7 @@ impl ReferenceRectangle {
         } else {
             self.solved([h, w], image, header)
         };
-        match (as_given, swapped) {
-            (Ok(first), Ok(second)) if second.fit.chi2 < first.fit.chi2 => {
-                Ok((second, Some(first)))
-            }
-            (Ok(first), second) => Ok((first, second.ok())),
-            (Err(_), Ok(second)) => Ok((second, None)),
-            (Err(error), Err(_)) => Err(error),
-        }
+        better_first(as_given, swapped)
     }
 
     /// The camera that sees the reference, were its sides of so many metres.
@@ -108,10 +110,8 @@ impl ReferenceRectangle {
 
     fn mean_side_px(&self) -> f64 {
         let corners = self.corners_px;
-        let around: f64 = (0..4)
-            .map(|i| (corners[(i + 1) % 4] - corners[i]).norm())
-            .sum();
-        around / 4.0
+        let sides = (0..4).map(|i| corners[(i + 1) % 4] - corners[i]);
+        sides.map(|side| side.norm()).sum::<f64>() / 4.0
     }
 }
 
@@ -131,5 +131,18 @@ fn check_fit(solution: &Solution, [w, h]: [f64; 2]) -> Result<()> {
             Err(scale_unknown(&what))
         }
         _ => Ok(()),
+    }
+}
+
+/// The solution that fits better, and the other one; the first error where there is none.
+fn better_first(
+    first: Result<Solution>,
+    second: Result<Solution>,
+) -> Result<(Solution, Option<Solution>)> {
+    match (first, second) {
+        (Ok(first), Ok(second)) if second.fit.chi2 < first.fit.chi2 => Ok((second, Some(first))),
+        (Ok(first), second) => Ok((first, second.ok())),
+        (Err(_), Ok(second)) => Ok((second, None)),
+        (Err(error), Err(_)) => Err(error),
     }
 }

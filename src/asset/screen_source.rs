@@ -48,22 +48,27 @@ impl TryFrom<String> for ScreenSource {
     type Error = String;
 
     fn try_from(text: String) -> std::result::Result<Self, String> {
-        if text == "auto" {
-            return Ok(Self::Auto);
+        match text.as_str() {
+            "auto" => Ok(Self::Auto),
+            "" => Err("empty, expected auto, R,G,B or a photo".into()),
+            _ => match numbers(&text) {
+                Some(numbers) => color_of(numbers).map(Self::Color),
+                None => Ok(Self::Photo(text.into())),
+            },
         }
-        if text.is_empty() {
-            return Err("empty, expected auto, R,G,B or a photo".into());
-        }
-        let numbers: std::result::Result<Vec<f32>, _> =
-            text.split(',').map(|n| n.trim().parse()).collect();
-        let Ok(numbers) = numbers else {
-            return Ok(Self::Photo(text.into()));
-        };
-        let channels: std::result::Result<[f32; 3], _> = numbers.try_into();
-        channels
-            .map(|c| Self::Color(c.into()))
-            .map_err(|n| format!("{} numbers, expected auto, R,G,B or a photo", n.len()))
     }
+}
+
+/// The numbers of a text that has nothing else between its commas.
+fn numbers(text: &str) -> Option<Vec<f32>> {
+    text.split(',').map(|n| n.trim().parse().ok()).collect()
+}
+
+fn color_of(channels: Vec<f32>) -> std::result::Result<LinearRgb, String> {
+    let channels: std::result::Result<[f32; 3], _> = channels.try_into();
+    channels
+        .map(LinearRgb::from)
+        .map_err(|n| format!("{} numbers, expected auto, R,G,B or a photo", n.len()))
 }
 
 impl FromStr for ScreenSource {
@@ -96,15 +101,20 @@ pub(super) struct EmptyScreens {
     shared: BTreeMap<PathBuf, Image<LinearRgb>>,
 }
 
+/// How often each photo of an empty screen is named.
+fn use_counts<'a>(screens: impl Iterator<Item = &'a ScreenSource>) -> BTreeMap<&'a Path, usize> {
+    let mut counts = BTreeMap::new();
+    for path in screens.filter_map(ScreenSource::photo) {
+        *counts.entry(path).or_default() += 1;
+    }
+    counts
+}
+
 impl EmptyScreens {
     /// Reads those that are named more than once. One that cannot be read is left to the first photo that needs it, whose
     /// error names it.
     pub(super) fn shared_by<'a>(screens: impl Iterator<Item = &'a ScreenSource>) -> Self {
-        let mut uses: BTreeMap<&Path, usize> = BTreeMap::new();
-        for path in screens.filter_map(ScreenSource::photo) {
-            *uses.entry(path).or_default() += 1;
-        }
-        let shared = uses
+        let shared = use_counts(screens)
             .into_par_iter()
             .filter(|(_, count)| *count > 1)
             .filter_map(|(path, _)| Some((path.to_owned(), io::read(path).ok()?)))

@@ -6,24 +6,22 @@ use crate::geom::{Point2, Vector2};
 ///
 /// # Method
 /// One side of that rectangle lies on a side of the polygon (Freeman and Shapira 1975), so every side is tried.
-pub fn oriented_size(hull: &[Point2<f64>]) -> [f64; 2] {
+pub(crate) fn oriented_size(hull: &[Point2<f64>]) -> [f64; 2] {
     let next = hull.iter().cycle().skip(1);
-    let sides = hull
-        .iter()
-        .zip(next)
-        .map(|(a, b)| b - a)
-        .filter(|side| side.norm() > 0.0);
-    let boxes = sides.map(|side| {
-        let along = side.normalize();
-        [
-            extent(hull, along),
-            extent(hull, Vector2::new(-along.y, along.x)),
-        ]
-    });
+    let sides = hull.iter().zip(next).map(|(a, b)| b - a);
+    let boxes = sides
+        .filter(|side| side.norm() > 0.0)
+        .map(|side| size_along(hull, side.normalize()));
     let [a, b] = boxes
         .min_by(|p, q| (p[0] * p[1]).total_cmp(&(q[0] * q[1])))
         .unwrap_or_default();
     [a.max(b), a.min(b)]
+}
+
+/// Extents along a unit direction and across it.
+fn size_along(hull: &[Point2<f64>], along: Vector2<f64>) -> [f64; 2] {
+    let across = Vector2::new(-along.y, along.x);
+    [along, across].map(|direction| extent(hull, direction))
 }
 
 fn extent(points: &[Point2<f64>], along: Vector2<f64>) -> f64 {

@@ -44,10 +44,7 @@ pub(super) fn rows(bytes: &[u8]) -> Result<Vec<SpreadsheetRow>> {
         .trim(csv::Trim::All)
         .from_reader(text.as_bytes());
     let headers = reader.headers().map_err(|e| csv_error(&e))?;
-    let sheet = Columns {
-        names: headers.iter().map(column_name).collect::<Result<_>>()?,
-        has_decimal_commas: separator != b',',
-    };
+    let sheet = Columns::new(headers, separator)?;
     reader
         .records()
         .map(|record| sheet.row(&record.map_err(|e| csv_error(&e))?))
@@ -63,6 +60,13 @@ struct Columns {
 }
 
 impl Columns {
+    fn new(headers: &csv::StringRecord, separator: u8) -> Result<Self> {
+        Ok(Self {
+            names: headers.iter().map(column_name).collect::<Result<_>>()?,
+            has_decimal_commas: separator != b',',
+        })
+    }
+
     fn row(&self, record: &csv::StringRecord) -> Result<SpreadsheetRow> {
         let line = record.position().map_or(0, csv::Position::line);
         let mut cells = toml::Table::new();
@@ -97,16 +101,17 @@ impl Columns {
     }
 
     fn number(&self, cell: &str) -> Option<toml::Value> {
-        // Between commas a comma in a number may as well separate thousands.
-        let has_decimal_comma =
-            self.has_decimal_commas && !cell.contains('.') && cell.matches(',').count() == 1;
-        let number = if has_decimal_comma {
-            cell.replace(',', ".")
+        let number: f64 = if self.has_decimal_comma(cell) {
+            cell.replace(',', ".").parse().ok()?
         } else {
-            cell.to_owned()
+            cell.parse().ok()?
         };
-        let number: f64 = number.parse().ok()?;
         number.is_finite().then(|| number.into())
+    }
+
+    /// Between commas a comma in a number may as well separate thousands.
+    fn has_decimal_comma(&self, cell: &str) -> bool {
+        self.has_decimal_commas && !cell.contains('.') && cell.matches(',').count() == 1
     }
 }
 
@@ -115,45 +120,43 @@ fn decoded(bytes: &[u8]) -> Result<String> {
     if let Ok(text) = std::str::from_utf8(bytes) {
         return Ok(text.to_owned());
     }
-    let unknown = bytes
-        .iter()
-        .any(|byte| (0x80..0xa0).contains(byte) || *byte == 0);
-    match unknown {
-        true => Err(Error::value(
+    if bytes.iter().any(|&byte| is_control_code(byte)) {
+        return Err(Error::value(
             "document",
             "neither UTF-8 nor Windows-1252, expected a CSV file in UTF-8",
-        )),
-        // Above the control codes that code is Latin-1, whose bytes are the first characters of Unicode.
-        false => Ok(bytes.iter().copied().map(char::from).collect()),
+        ));
     }
+    // Above the control codes that code is Latin-1, whose bytes are the first characters of Unicode.
+    Ok(bytes.iter().copied().map(char::from).collect())
+}
+
+/// A byte that no text has whose letters are single bytes.
+fn is_control_code(byte: u8) -> bool {
+    (0x80..0xa0).contains(&byte) || byte == 0
 }
 
 fn separator(header: &str) -> u8 {
-    let count = |separator: &u8| header.bytes().filter(|byte| byte == separator).count();
     SEPARATORS
         .into_iter()
         .rev()
-        .max_by_key(count)
+        .max_by_key(|separator| header.bytes().filter(|byte| byte == separator).count())
         .unwrap_or(b',')
 }
 
 /// The name of a column, however it is written.
 fn column_name(header: &str) -> Result<&'static str> {
     let plain = header.to_lowercase().replace([' ', '-'], "_");
-    let name = COLUMN_ALIASES
-        .iter()
-        .find(|(alias, _)| *alias == plain)
-        .map_or(plain.as_str(), |(_, name)| name);
+    let alias = COLUMN_ALIASES.iter().find(|(alias, _)| *alias == plain);
+    let name = alias.map_or(plain.as_str(), |(_, name)| name);
     let known = [&WORD_COLUMNS[..], &NUMBER_COLUMNS, &[SIZE_COLUMN]].concat();
-    known
-        .iter()
-        .find(|known| **known == name)
-        .copied()
-        .ok_or_else(|| {
+    match known.iter().find(|known| **known == name) {
+        Some(known) => Ok(known),
+        None => {
             let suggestion = io::suggestion(name, &known);
             let what = format!("unknown column \"{header}\", {suggestion}");
-            Error::value("line 1", what)
-        })
+            Err(Error::value("line 1", what))
+        }
+    }
 }
 
 /// The same error, of a line of the file.
@@ -166,16 +169,18 @@ pub(super) fn in_line(error: Error, line: u64) -> Error {
 }
 
 fn csv_error(error: &csv::Error) -> Error {
-    let line = error
-        .position()
-        .map_or_else(|| "document".to_owned(), |at| format!("line {}", at.line()));
     let what = match error.kind() {
         csv::ErrorKind::UnequalLengths {
             expected_len, len, ..
         } => format!("{len} cells, expected {expected_len}"),
         _ => error.to_string(),
     };
-    Error::value(line, what)
+    Error::value(place_of(error), what)
+}
+
+fn place_of(error: &csv::Error) -> String {
+    let line = error.position().map(csv::Position::line);
+    line.map_or_else(|| "document".to_owned(), |line| format!("line {line}"))
 }
 
 #[cfg(test)]

@@ -13,18 +13,27 @@ const CHECKER_GREYS: [f32; 2] = [0.2, 0.45];
 
 /// The cut-out over a checkerboard, at most 192 pixels a side.
 pub(super) fn thumbnail(cutout: &Image<PremulRgba>) -> Image<LinearRgb> {
-    let (w, h) = cutout.size();
-    let longest = w.max(h).max(1);
-    let side = |len: usize| (len * THUMBNAIL_SIDE_PX).div_ceil(longest);
-    let small = if longest > THUMBNAIL_SIDE_PX {
-        filter::resize(cutout, side(w), side(h))
+    let (width, height) = fitted_size(cutout.size(), THUMBNAIL_SIDE_PX);
+    let small = if cutout.width().max(cutout.height()) > THUMBNAIL_SIDE_PX {
+        filter::resize(cutout, width, height)
     } else {
         cutout.clone()
     };
     Image::from_fn(small.width(), small.height(), |x, y| {
-        let square = LinearRgb::grey(CHECKER_GREYS[(x / SQUARE_PX + y / SQUARE_PX) % 2]);
-        small[(x, y)].over(square.opaque()).color()
+        small[(x, y)].over(checkerboard(x, y).opaque()).color()
     })
+}
+
+/// A size of the same proportions, at most `longest` pixels a side; at least one.
+pub(super) fn fitted_size((w, h): (usize, usize), longest: usize) -> (usize, usize) {
+    let side = w.max(h).max(longest);
+    let [w, h] = [w, h].map(|len| (len * longest).div_ceil(side).max(1));
+    (w, h)
+}
+
+/// The grey of a checkerboard at a pixel.
+pub(super) fn checkerboard(x: usize, y: usize) -> LinearRgb {
+    LinearRgb::grey(CHECKER_GREYS[(x / SQUARE_PX + y / SQUARE_PX) % 2])
 }
 
 #[cfg(test)]

@@ -32,31 +32,21 @@ impl TopView {
         // Lines of sight to a rectangle pass a plane above it in a smaller rectangle, nearer to below the camera.
         let (center, share) = (pose.camera.center(), height / pose.camera.center().z);
         let middle = Vector3::new(center.x * share, center.y * share, height);
-        let size = pose
-            .size
-            .map(|side| (1.0 - share) * (1.0 - 2.0 * SCREEN_INSET) * side);
-        Self::new(
-            pose,
-            Pose::from_parts(middle.into(), UnitQuaternion::identity()),
-            size,
-        )
+        let seen = (1.0 - share) * (1.0 - 2.0 * SCREEN_INSET);
+        let size = pose.size.map(|side| seen * side);
+        let screen_from_view = Pose::from_parts(middle.into(), UnitQuaternion::identity());
+        Self::new(pose, screen_from_view, size)
     }
 
     /// The largest part of a photo that is an upright rectangle in the plane, too.
     pub(super) fn of_photo(pose: ScreenPose, height: f64) -> Result<Self> {
-        let PhotoFootprint { corners, across } = PhotoFootprint::new(&pose.camera, height)
+        let footprint = PhotoFootprint::new(&pose.camera, height)
             .ok_or_else(|| scale_unknown("the camera looks along it; photograph it from above"))?;
-        let turn =
-            UnitQuaternion::from_axis_angle(&Vector3::z_axis(), libm::atan2(across.y, across.x));
-        let corners = corners.map(|corner| turn.inverse() * corner.coords);
-        let [x0, x1] = middle_two(corners.map(|c| c.x));
-        let [y0, y1] = middle_two(corners.map(|c| c.y));
+        let turn = footprint.turn();
+        let [[x0, x1], [y0, y1]] = footprint.inner_rectangle(&turn);
         let middle = turn * Vector3::new((x0 + x1) / 2.0, (y0 + y1) / 2.0, height);
-        Ok(Self::new(
-            pose,
-            Pose::from_parts(middle.into(), turn),
-            [x1 - x0, y1 - y0],
-        ))
+        let screen_from_view = Pose::from_parts(middle.into(), turn);
+        Ok(Self::new(pose, screen_from_view, [x1 - x0, y1 - y0]))
     }
 
     fn new(pose: ScreenPose, screen_from_view: Pose, size: [f64; 2]) -> Self {
@@ -71,20 +61,21 @@ impl TopView {
 
     /// The rectangle as a photo from the same place shows it.
     pub(super) fn rectify(&self, photo: Image<LinearRgb>) -> Result<Image<LinearRgb>> {
-        if self
-            .size
-            .iter()
-            .any(|side| side * self.px_per_metre < MIN_SIDE_PX)
-        {
+        let mut sides_px = self.size.iter().map(|side| side * self.px_per_metre);
+        if sides_px.any(|side| side < MIN_SIDE_PX) {
             return Err(scale_unknown("its corners leave nothing of the photo"));
         }
+        let camera = self.camera().resized(size_px(&photo));
+        rectify(&Pyramid::new(photo), &camera, self.size, self.px_per_metre)
+    }
+
+    /// The camera over the rectangle's own plane.
+    fn camera(&self) -> Camera {
         let camera = &self.pose.camera;
-        let camera = Camera {
+        Camera {
             camera_from_world: camera.camera_from_world * self.screen_from_view,
             ..*camera
-        };
-        let camera = camera.resized(size_px(&photo));
-        rectify(&Pyramid::new(photo), &camera, self.size, self.px_per_metre)
+        }
     }
 
     /// Standard error of a length at a pixel of the view, as a share.
@@ -110,16 +101,29 @@ impl PhotoFootprint {
     /// None where the camera looks along the plane.
     fn new(camera: &Camera, height: f64) -> Option<Self> {
         let [w, h] = camera.image.map(f64::from);
-        let place = |x: f64, y: f64| place_at_height(camera, Point2::new(x, y), height);
-        let corners = [
-            place(0.0, 0.0)?,
-            place(w, 0.0)?,
-            place(w, h)?,
-            place(0.0, h)?,
-        ];
-        let middle = place(w / 2.0, h / 2.0)?;
-        let across = place(w / 2.0 + 1.0, h / 2.0)? - middle;
-        Some(Self { corners, across })
+        let [a, b, c, d] = [[0.0, 0.0], [w, 0.0], [w, h], [0.0, h]]
+            .map(|at| place_at_height(camera, at.into(), height));
+        let [middle, right] = [[w / 2.0, h / 2.0], [w / 2.0 + 1.0, h / 2.0]]
+            .map(|at| place_at_height(camera, at.into(), height));
+        Some(Self {
+            corners: [a?, b?, c?, d?],
+            across: right? - middle?,
+        })
+    }
+
+    /// How far the photo is turned on the plane.
+    fn turn(&self) -> UnitQuaternion<f64> {
+        let angle = libm::atan2(self.across.y, self.across.x);
+        UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle)
+    }
+
+    /// Ends along x and y, in a frame turned so, of the largest rectangle inside.
+    fn inner_rectangle(&self, turn: &UnitQuaternion<f64>) -> [[f64; 2]; 2] {
+        let corners = self.corners.map(|corner| turn.inverse() * corner.coords);
+        [
+            middle_two(corners.map(|c| c.x)),
+            middle_two(corners.map(|c| c.y)),
+        ]
     }
 }
 
@@ -138,18 +142,18 @@ fn middle_two(mut values: [f64; 4]) -> [f64; 2] {
 /// The finer of the photo's scales in the middle of a view, pixels per metre: nothing of the photo is lost.
 fn finest_scale(camera: &Camera, screen_from_view: Pose, size: [f64; 2]) -> f64 {
     let step = SCALE_STEP * size[0].min(size[1]);
-    let pixel = |x: f64, y: f64| {
-        camera
-            .project(screen_from_view * Point3::new(x, y, 0.0))
-            .map_or(Point2::origin(), |(pixel, _)| pixel)
-    };
-    [
-        pixel(step, 0.0) - pixel(-step, 0.0),
-        pixel(0.0, step) - pixel(0.0, -step),
-    ]
-    .map(|along| along.norm() / (2.0 * step))
-    .into_iter()
-    .fold(0.0, f64::max)
+    let steps = [[step, 0.0], [0.0, step]].map(|[x, y]| {
+        let [ahead, behind] =
+            [[x, y], [-x, -y]].map(|at| pixel_over_screen(camera, screen_from_view, at));
+        (ahead - behind).norm() / (2.0 * step)
+    });
+    steps.into_iter().fold(0.0, f64::max)
+}
+
+/// The pixel that shows a point of a view.
+fn pixel_over_screen(camera: &Camera, screen_from_view: Pose, [x, y]: [f64; 2]) -> Point2<f64> {
+    let seen = camera.project(screen_from_view * Point3::new(x, y, 0.0));
+    seen.map_or(Point2::origin(), |(pixel, _)| pixel)
 }
 
 /// Width and height of a photo, pixels.

@@ -41,36 +41,54 @@ mod stored;
 mod uncertainty;
 
 pub(crate) use chi::CHI2_99;
+#[doc(hidden)]
 pub use doctor::doctor;
 pub use error::SolveError;
+#[doc(hidden)]
 pub use exchange::{BlenderCamera, ColmapModel, OpencvCamera, SensorFit};
+pub use file::{CameraFile, FocalPrior};
+#[doc(hidden)]
 pub use file::{
-    CameraFile, CameraFormat, FitRecord, FittedSurface, FocalPrior, FoundCamera, Model,
-    SigmaRecord, SolvedFrom,
+    CameraFormat, FitRecord, FittedSurface, FoundCamera, Model, SigmaRecord, SolvedFrom,
 };
-pub use focal::{FocalSource, focal_from_equivalent};
+pub use focal::FocalSource;
+#[doc(hidden)]
+pub use focal::focal_from_equivalent;
+#[doc(hidden)]
 pub use import::from_labelme;
+#[doc(hidden)]
 pub use init::{commented, init_label};
+#[doc(hidden)]
 pub use joint::{Joint, OutlierPhoto, group_by_camera, solve_joint};
-pub use label::{
-    Artwork, Crop, Framing, Label, LabelCamera, LabelFormat, LabelImage, LabelPoint, LabelSurface,
-    MarkerMap, PixelOrigin,
-};
+#[doc(hidden)]
+pub use label::{Artwork, Crop, Framing, LabelFormat, PixelOrigin};
+pub use label::{Label, LabelCamera, LabelImage, LabelPoint, LabelSurface, MarkerMap};
 pub(crate) use marker::any_markers;
 #[cfg(test)]
 pub(crate) use marker::printed;
-pub use marker::{FAMILY as MARKER_FAMILY, Marker, find_markers, with_markers};
+#[doc(hidden)]
+pub use marker::with_markers;
+pub use marker::{Marker, find_markers};
 pub use options::{CornerOrder, Priors, SolveOptions};
+#[doc(hidden)]
 pub use overlay::overlay;
 pub use pinhole::Camera;
 #[doc(hidden)]
 pub use pinhole::distorted;
-pub use read::{
-    LabelledPhoto, check_distance, check_size, photo_of, read_label, read_labels, with_photo,
-};
+pub use read::read_label;
+#[doc(hidden)]
+pub use read::{LabelledPhoto, check_distance, read_labels};
 pub(crate) use read::{apply_exif, labels_in};
-pub use rectify::{project_picture, rectify, warp};
-pub use solution::{Fit, FocalFinding, Sigma, Solution};
+pub use rectify::warp;
+#[doc(hidden)]
+pub use rectify::{project_picture, rectify};
+pub use solution::{Fit, Solution};
+#[doc(hidden)]
+pub use solution::{FocalFinding, Sigma};
 pub use solve::solve;
-pub use stored::{PhotoCamera, label_checksums, photo_cameras};
+pub use stored::PhotoCamera;
+#[doc(hidden)]
+pub use stored::label_checksums;
+pub(crate) use stored::photo_cameras;
+#[doc(hidden)]
 pub use uncertainty::UNKNOWN_NAMES as UNKNOWNS;

@@ -402,7 +402,7 @@ mod tests {
             &SolveOptions::default(),
         )
         .unwrap();
-        let texts: Vec<String> = entries(&solution)
+        let texts: Vec<String> = legend_entries(&solution)
             .into_iter()
             .map(|entry| entry.text)
             .collect();

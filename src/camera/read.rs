@@ -324,7 +324,7 @@ fn completed(mut labelled: LabelledPhoto, size: Option<[f64; 2]>) -> Result<Labe
 ///
 /// # Errors
 /// A photo that cannot be read, or has another size than the label says.
-pub fn with_photo(mut label: Label, path: impl AsRef<Path>) -> Result<Label> {
+pub(crate) fn with_photo(mut label: Label, path: impl AsRef<Path>) -> Result<Label> {
     let path = path.as_ref();
     let Some(photo) = photo_of(&label, path) else {
         return Ok(label);
@@ -365,7 +365,7 @@ pub(crate) fn apply_exif(label: &mut Label, header: &io::Header) {
 ///
 /// # Errors
 /// [`Error::Value`] that names the side.
-pub fn check_size(label: &Label) -> Result<()> {
+pub(crate) fn check_size(label: &Label) -> Result<()> {
     check_side("surface.width_m", label.surface.width_m)?;
     check_side("surface.height_m", label.surface.height_m)
 }
@@ -392,7 +392,7 @@ pub fn check_distance(camera: &Camera) -> Result<()> {
 }
 
 /// The picture of a label that was read from `path`, where it is there.
-pub fn photo_of(label: &Label, path: impl AsRef<Path>) -> Option<PathBuf> {
+pub(crate) fn photo_of(label: &Label, path: impl AsRef<Path>) -> Option<PathBuf> {
     let photo = path.as_ref().with_file_name(&label.image.file);
     (!label.image.file.is_empty() && photo.is_file()).then_some(photo)
 }

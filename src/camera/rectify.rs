@@ -270,7 +270,7 @@ mod tests {
             (4.0, 1.5, 1.6),
         ] {
             let rotation = nalgebra::Rotation2::new(turn).into_inner();
-            let [long, short] = axes(&(rotation * Matrix2::new(a, 0.0, 0.0, b)));
+            let [long, short] = footprint_axes(&(rotation * Matrix2::new(a, 0.0, 0.0, b)));
             assert!(
                 (long.norm() - a).abs() < 1e-9 && (short.norm() - b).abs() < 1e-6,
                 "{long} {short}"

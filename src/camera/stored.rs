@@ -34,7 +34,7 @@ pub struct PhotoCamera {
 ///
 /// # Errors
 /// A camera file that cannot be right; a label that no camera can have seen, or that none fits.
-pub fn photo_cameras(labels: &[LabelledPhoto], force: bool) -> Result<Vec<PhotoCamera>> {
+pub(crate) fn photo_cameras(labels: &[LabelledPhoto], force: bool) -> Result<Vec<PhotoCamera>> {
     let mut found = Vec::with_capacity(labels.len());
     for labelled in labels {
         let file = read_camera_file(labelled)?;

@@ -15,14 +15,21 @@ mod temperature;
 mod transfer;
 mod ycbcr;
 
+#[doc(hidden)]
 pub use hsv::{Hsv, hsv_to_rgb, rgb_to_hsv, shift_hsv};
+#[doc(hidden)]
 pub use quantize::{
-    decode_row, decode_srgb8, decode_srgb16, encode_row, encode_srgb8, encode_srgb16, from_srgb8,
-    to_srgb8,
+    decode_row, decode_srgb8, decode_srgb16, encode_row, encode_srgb8, encode_srgb16,
 };
-pub use space::{ColorMatrix, RgbSpace, bradford, rgb_from_rgb, rgb_from_xyz, xyz_from_rgb};
+pub use quantize::{from_srgb8, to_srgb8};
+pub use space::RgbSpace;
+pub(crate) use space::rgb_from_xyz;
+#[doc(hidden)]
+pub use space::{ColorMatrix, bradford, rgb_from_rgb, xyz_from_rgb};
+#[doc(hidden)]
 pub use temperature::planckian;
 pub use transfer::{Curve, linear_to_srgb, srgb_to_linear};
+#[doc(hidden)]
 pub use ycbcr::{CodeRange, Ycbcr};
 
 use crate::pixel::LinearRgb;
@@ -33,6 +40,7 @@ use crate::pixel::LinearRgb;
 /// use petcomp::{LinearRgb, color};
 /// assert_eq!(color::expose(LinearRgb::grey(0.25), 2.0), LinearRgb::WHITE);
 /// ```
+#[doc(hidden)]
 #[inline]
 pub fn expose(color: LinearRgb, stops: f32) -> LinearRgb {
     color.scale(libm::exp2f(stops))

@@ -48,7 +48,7 @@ pub fn xyz_from_rgb(space: &RgbSpace) -> Matrix3<f64> {
 }
 
 /// The inverse of [`xyz_from_rgb`]: from XYZ to an RGB space.
-pub fn rgb_from_xyz(space: &RgbSpace) -> Matrix3<f64> {
+pub(crate) fn rgb_from_xyz(space: &RgbSpace) -> Matrix3<f64> {
     inverse(&xyz_from_rgb(space))
 }
 

@@ -65,9 +65,9 @@ impl FromStr for Aov {
 }
 
 /// Coverage above which an object owns a pixel: that of the reference renderer.
-pub const FRONT_ALPHA: f32 = 0.05;
+pub(crate) const FRONT_ALPHA: f32 = 0.05;
 
-/// The foremost object that covers more than [`FRONT_ALPHA`] of a pixel.
+/// The foremost object that covers more than `FRONT_ALPHA` of a pixel.
 pub fn front(samples: &[DeepSample]) -> Option<&DeepSample> {
     samples.iter().find(|s| s.alpha > FRONT_ALPHA)
 }
@@ -90,20 +90,21 @@ struct AovSource<'a> {
 
 impl AovSource<'_> {
     fn parts_of(&self, aov: Aov) -> Vec<Part> {
-        match aov {
-            Aov::Beauty => vec![self.beauty()],
-            Aov::Coverage => vec![self.coverage()],
-            Aov::Shadow => vec![self.shadow()],
-            Aov::Id => vec![self.object_ids()],
-            Aov::Depth => vec![float_part("depth", ["Z"], self.depths())],
-            Aov::Position => vec![float_part("position", ["X", "Y", "Z"], self.positions())],
-            Aov::Uv => vec![float_part("uv", ["U", "V"], self.texture_coordinates())],
-            Aov::Cryptomatte => vec![cryptomatte(self.deep, |id| format!("object.{}", id.0))],
-            Aov::Layers => self.layers(),
-        }
+        let part = match aov {
+            Aov::Beauty => self.beauty_part(),
+            Aov::Coverage => self.coverage_part(),
+            Aov::Shadow => self.shadow_part(),
+            Aov::Id => self.id_part(),
+            Aov::Depth => float_part("depth", ["Z"], self.depths()),
+            Aov::Position => float_part("position", ["X", "Y", "Z"], self.positions()),
+            Aov::Uv => float_part("uv", ["U", "V"], self.texture_coordinates()),
+            Aov::Cryptomatte => cryptomatte(self.deep, |id| format!("object.{}", id.0)),
+            Aov::Layers => return self.layer_parts(),
+        };
+        vec![part]
     }
 
-    fn beauty(&self) -> Part {
+    fn beauty_part(&self) -> Part {
         let pixels = self.frame.pixels().iter();
         float_part(
             "beauty",
@@ -112,17 +113,17 @@ impl AovSource<'_> {
         )
     }
 
-    fn coverage(&self) -> Part {
+    fn coverage_part(&self) -> Part {
         let values = pixels_of(self.deep).map(|(x, y)| [self.deep.flat(x, y).to_rgba().a]);
         float_part("coverage", ["Y"], values)
     }
 
-    fn shadow(&self) -> Part {
+    fn shadow_part(&self) -> Part {
         let factors = self.deep.shadow().pixels().iter();
         float_part("shadow", ["R", "G", "B"], factors.map(|&c| c.into()))
     }
 
-    fn object_ids(&self) -> Part {
+    fn id_part(&self) -> Part {
         let ids = self.fronts().map(|(_, s)| s.map_or(0, |s| s.object.0));
         Part {
             name: "id".into(),
@@ -131,12 +132,10 @@ impl AovSource<'_> {
         }
     }
 
-    fn layers(&self) -> Vec<Part> {
+    fn layer_parts(&self) -> Vec<Part> {
         let tinted = pixels_of(self.deep).any(|(x, y)| !self.deep.tints(x, y).is_empty());
-        let cards = self.shot.cards.iter();
-        cards
-            .map(|card| layer_part(self.deep, card.id, tinted))
-            .collect()
+        let ids = self.shot.cards.iter().map(|card| card.id);
+        ids.map(|id| layer_part(self.deep, id, tinted)).collect()
     }
 
     /// Every pixel with its foremost object.
@@ -164,18 +163,13 @@ impl AovSource<'_> {
 
     /// Texture coordinates that a sample shows at its pixel's centre.
     fn uv_at(&self, at: (usize, usize), sample: &DeepSample) -> Option<[f32; 2]> {
-        let card = self
-            .shot
-            .cards
-            .iter()
-            .find(|card| card.id == sample.object)?;
-        let p = card
-            .quad
-            .world_from_card
-            .inverse_transform_point(&self.world_point(at, sample));
+        let mut cards = self.shot.cards.iter();
+        let quad = &cards.find(|card| card.id == sample.object)?.quad;
+        let point = self.world_point(at, sample);
+        let p = quad.world_from_card.inverse_transform_point(&point);
         Some([
-            (p.x / card.quad.size[0] + 0.5) as f32,
-            (0.5 - p.y / card.quad.size[1]) as f32,
+            (p.x / quad.size[0] + 0.5) as f32,
+            (0.5 - p.y / quad.size[1]) as f32,
         ])
     }
 
@@ -196,25 +190,33 @@ fn layer_part(deep: &DeepImage, id: ObjectId, tinted: bool) -> Part {
         let values = values.map(|(p, _)| [p.r, p.g, p.b, p.a]);
         return float_part(name, ["R", "G", "B", "A"], values);
     }
-    float_part(
-        name,
-        ["R", "G", "B", "A", "TR", "TG", "TB"],
-        values.map(|(p, h)| [p.r, p.g, p.b, p.a, 1.0 - h.r, 1.0 - h.g, 1.0 - h.b]),
-    )
+    let names = ["R", "G", "B", "A", "TR", "TG", "TB"];
+    float_part(name, names, values.map(tinted_values))
+}
+
+/// Light, coverage, and what is let pass per channel.
+fn tinted_values((p, hidden): (PremulRgba, LinearRgb)) -> [f32; 7] {
+    let passes = hidden.map(|h| 1.0 - h);
+    [p.r, p.g, p.b, p.a, passes.r, passes.g, passes.b]
 }
 
 /// Light and coverage of an object in one pixel, and what it hides per channel.
 fn own_light(deep: &DeepImage, (x, y): (usize, usize), id: ObjectId) -> (PremulRgba, LinearRgb) {
     let tints = deep.tints(x, y);
     let (mut sum, mut hidden) = (PremulRgba::TRANSPARENT, LinearRgb::BLACK);
-    for (i, s) in deep.at(x, y).iter().enumerate() {
-        if s.object == id {
-            let tint = tints.get(i).copied();
-            sum = sum.plus(PremulRgba::new(s.light.r, s.light.g, s.light.b, s.visible));
-            hidden = hidden + tint.unwrap_or(LinearRgb::grey(s.visible));
-        }
+    let samples = deep.at(x, y).iter().enumerate();
+    for (i, s) in samples.filter(|(_, s)| s.object == id) {
+        let tint = tints.get(i).copied();
+        sum = sum.plus(seen_light(s));
+        hidden = hidden + tint.unwrap_or(LinearRgb::grey(s.visible));
     }
     (sum, hidden)
+}
+
+/// Light of a sample over what it hides.
+fn seen_light(sample: &DeepSample) -> PremulRgba {
+    let LinearRgb { r, g, b } = sample.light;
+    PremulRgba::new(r, g, b, sample.visible)
 }
 
 #[cfg(test)]

@@ -42,10 +42,8 @@ const CHANNELS: [&str; 2 * RANKS_PER_PIXEL] = [
 pub fn cryptomatte(deep: &DeepImage, name: impl Fn(ObjectId) -> String) -> Part {
     let ranks = pixels_of(deep).map(|(x, y)| ranked_objects(deep.at(x, y), &name));
     let mut part = float_part(NAME, CHANNELS, ranks);
-    let objects: BTreeMap<ObjectId, String> = pixels_of(deep)
-        .flat_map(|(x, y)| deep.at(x, y))
-        .map(|s| (s.object, name(s.object)))
-        .collect();
+    let samples = pixels_of(deep).flat_map(|(x, y)| deep.at(x, y));
+    let objects: BTreeMap<ObjectId, String> = samples.map(|s| (s.object, name(s.object))).collect();
     part.metadata = part_metadata(objects.values());
     part
 }
@@ -55,11 +53,7 @@ fn ranked_objects(
     samples: &[DeepSample],
     name: impl Fn(ObjectId) -> String,
 ) -> [f32; 2 * RANKS_PER_PIXEL] {
-    let mut seen: BTreeMap<ObjectId, f32> = BTreeMap::new();
-    for s in samples.iter().filter(|s| s.visible > 0.0) {
-        *seen.entry(s.object).or_default() += s.visible;
-    }
-    let mut seen: Vec<_> = seen.into_iter().collect();
+    let mut seen: Vec<_> = visible_coverage(samples).into_iter().collect();
     // A stable sort: equally visible objects stay in the order of their ids.
     seen.sort_by(|a, b| b.1.total_cmp(&a.1));
     let mut out = [0.0; 2 * RANKS_PER_PIXEL];
@@ -67,6 +61,15 @@ fn ranked_objects(
         pair.copy_from_slice(&[id_of_name(&name(id)), coverage]);
     }
     out
+}
+
+/// What is seen of each object, by its id.
+fn visible_coverage(samples: &[DeepSample]) -> BTreeMap<ObjectId, f32> {
+    let mut seen = BTreeMap::new();
+    for s in samples.iter().filter(|s| s.visible > 0.0) {
+        *seen.entry(s.object).or_default() += s.visible;
+    }
+    seen
 }
 
 /// The attributes that the specification requires, under the first seven digits of the part's own hash.

@@ -26,14 +26,9 @@ pub fn finish(
     plate: Option<&Image<LinearRgb>>,
     finish: &PostProcess,
 ) -> Image<PremulRgba> {
-    let noisy = match finish.noise {
-        Noise::Known { shot, read } if shot > 0.0 || read > 0.0 => SensorNoise {
-            shot,
-            read,
-            seed: finish.noise_seed,
-        }
-        .add_to(&frame, deep, plate),
-        Noise::Known { .. } | Noise::None | Noise::MatchPlate => frame,
+    let noisy = match SensorNoise::new(finish) {
+        Some(noise) => noise.add_to(&frame, deep, plate),
+        None => frame,
     };
     let exposed = apply_gain(noisy, finish);
     if finish.sharpening == 0.0 {
@@ -44,16 +39,19 @@ pub fn finish(
 
 /// Exposure and white balance.
 fn apply_gain(frame: Image<PremulRgba>, finish: &PostProcess) -> Image<PremulRgba> {
-    // An infinite gain would make NaN of black.
-    let gain = finish
-        .white_balance
-        .scale(libm::exp2(finish.exposure_ev) as f32)
-        .map(|g| g.min(f32::MAX));
+    let gain = channel_gains(finish);
     if gain == LinearRgb::WHITE {
         return frame;
     }
     work::add(Kind::Filters, 1);
     frame.map(|p| with_color(p, p.color() * gain))
+}
+
+/// Finite, since an infinite gain would make NaN of black.
+fn channel_gains(finish: &PostProcess) -> LinearRgb {
+    let brightening = libm::exp2(finish.exposure_ev) as f32;
+    let gains = finish.white_balance.scale(brightening);
+    gains.map(|gain| gain.min(f32::MAX))
 }
 
 /// An unsharp mask.
@@ -101,6 +99,18 @@ fn seen_plate(
 }
 
 impl SensorNoise {
+    /// None where no noise is added.
+    fn new(finish: &PostProcess) -> Option<Self> {
+        match finish.noise {
+            Noise::Known { shot, read } if shot > 0.0 || read > 0.0 => Some(Self {
+                shot,
+                read,
+                seed: finish.noise_seed,
+            }),
+            Noise::Known { .. } | Noise::None | Noise::MatchPlate => None,
+        }
+    }
+
     fn add_to(
         &self,
         frame: &Image<PremulRgba>,
@@ -110,19 +120,30 @@ impl SensorNoise {
         work::add(Kind::NoisyPixels, frame.pixels().len() as u64);
         Image::from_fn(frame.width(), frame.height(), |x, y| {
             let p = frame[(x, y)];
-            let (passes, behind) = seen_plate(deep, plate, (x, y), p);
+            let seen = seen_plate(deep, plate, (x, y), p);
             let index = 3 * (y * frame.width() + x) as u64;
-            let value: [f32; 3] = p.color().into();
-            let noisy: [f32; 3] = std::array::from_fn(|c| {
-                let exposed = ExposedValue {
-                    value: value[c],
-                    passes: passes[c],
-                    plate: behind[c],
-                };
-                self.noisy_value(&exposed, index + c as u64)
-            });
-            with_color(p, noisy.into())
+            with_color(p, self.noisy_color(p.color(), seen, index))
         })
+    }
+
+    /// A colour with noise; `index` is the number of its first channel in the frame.
+    #[inline(always)]
+    fn noisy_color(
+        &self,
+        color: LinearRgb,
+        (passes, behind): ([f32; 3], [f32; 3]),
+        index: u64,
+    ) -> LinearRgb {
+        let value: [f32; 3] = color.into();
+        let noisy: [f32; 3] = std::array::from_fn(|c| {
+            let exposed = ExposedValue {
+                value: value[c],
+                passes: passes[c],
+                plate: behind[c],
+            };
+            self.noisy_value(&exposed, index + c as u64)
+        });
+        noisy.into()
     }
 
     #[inline(always)]

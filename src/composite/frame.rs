@@ -16,17 +16,16 @@ use crate::scene::Shot;
 /// # Panics
 /// When the plate's size is not the picture's.
 pub fn frame(deep: &DeepImage, plate: Option<&Image<LinearRgb>>) -> Image<PremulRgba> {
-    let size = (deep.width(), deep.height());
-    match plate {
-        None => Image::from_fn(size.0, size.1, |x, y| deep.flat(x, y).to_rgba()),
-        Some(plate) => {
-            assert_eq!(plate.size(), size, "plate and picture differ in size");
-            Image::from_fn(size.0, size.1, |x, y| {
-                let behind = deep.shadow()[(x, y)] * plate[(x, y)];
-                deep.flat(x, y).over_color(behind).opaque()
-            })
-        }
-    }
+    let (width, height) = (deep.width(), deep.height());
+    let Some(plate) = plate else {
+        return Image::from_fn(width, height, |x, y| deep.flat(x, y).to_rgba());
+    };
+    let size = (width, height);
+    assert_eq!(plate.size(), size, "plate and picture differ in size");
+    Image::from_fn(width, height, |x, y| {
+        let behind = deep.shadow()[(x, y)] * plate[(x, y)];
+        deep.flat(x, y).over_color(behind).opaque()
+    })
 }
 
 /// The picture of a shot in one call: its deep samples over its plate; scene-linear, premultiplied.

@@ -22,7 +22,11 @@ mod frame;
 mod part;
 mod porter_duff;
 
-pub use aov::{Aov, FRONT_ALPHA, front, parts};
+#[doc(hidden)]
+pub use aov::{Aov, front, parts};
+#[doc(hidden)]
 pub use cryptomatte::cryptomatte;
 pub use finish::finish;
-pub use frame::{film, frame, picture};
+#[doc(hidden)]
+pub use frame::film;
+pub use frame::{frame, picture};

@@ -15,20 +15,23 @@ pub(super) fn float_part<const N: usize>(
     names: [&str; N],
     values: impl Iterator<Item = [f32; N]>,
 ) -> Part {
+    let channels = names.iter().zip(separate_planes(values));
+    Part {
+        name: name.into(),
+        channels: channels
+            .map(|(name, plane)| (name.to_string(), ChannelSamples::Float(plane)))
+            .collect(),
+        metadata: Vec::new(),
+    }
+}
+
+/// The values of each channel.
+fn separate_planes<const N: usize>(values: impl Iterator<Item = [f32; N]>) -> [Vec<f32>; N] {
     let mut planes = [const { Vec::new() }; N];
     for value in values {
         for (plane, v) in planes.iter_mut().zip(value) {
             plane.push(v);
         }
     }
-    let channels = names
-        .iter()
-        .zip(planes)
-        .map(|(name, plane)| (name.to_string(), ChannelSamples::Float(plane)))
-        .collect();
-    Part {
-        name: name.into(),
-        channels,
-        metadata: Vec::new(),
-    }
+    planes
 }

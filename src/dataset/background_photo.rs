@@ -67,14 +67,13 @@ impl BackgroundPhoto {
     fn open(labelled: &LabelledPhoto, seen: &PhotoCamera, image: [u32; 2]) -> Result<Self> {
         let taken = labelled.label.image_size();
         let kept = middle_part(taken, image);
-        let camera = cropped(seen.camera, kept).resized(image);
         let photo = photo_path(labelled)?;
         camera::check_distance(&seen.camera).map_err(|e| e.in_file(&labelled.source))?;
         let mut background = Self {
             background: Background {
                 name: labelled.name.clone(),
                 size: seen.size,
-                camera: CameraSource::Known(camera),
+                camera: CameraSource::Known(cropped(seen.camera, kept).resized(image)),
             },
             label: labelled.source.clone(),
             photo,
@@ -91,8 +90,8 @@ impl BackgroundPhoto {
 
     /// The part of the photo that pictures show.
     fn part(&self) -> f64 {
-        let area = |[w, h]: [f64; 2]| w * h;
-        area([self.kept.width as f64, self.kept.height as f64]) / area(self.taken.map(f64::from))
+        let kept = [self.kept.width as f64, self.kept.height as f64];
+        area(kept) / area(self.taken.map(f64::from))
     }
 
     /// That only a part of the photo fits into the pictures' shape, and what that leaves of its rectangle.
@@ -101,14 +100,18 @@ impl BackgroundPhoto {
             return None;
         }
         let ([w, h], Roi { width, height, .. }) = (self.taken, self.kept);
-        let rectangle = if self.cuts_off() {
+        let rectangle = self.describe_cut();
+        Some(format!(
+            "of {w} x {h} pixels the middle {width} x {height} are shown{rectangle}"
+        ))
+    }
+
+    fn describe_cut(&self) -> &'static str {
+        if self.cuts_off() {
             ", without a part of the rectangle"
         } else {
             ""
-        };
-        Some(format!(
-            "of {w} x {h} pixels the middle_part {width} x {height} are shown{rectangle}"
-        ))
+        }
     }
 
     /// A corner of the rectangle that the photo shows is not in the pictures.
@@ -116,19 +119,32 @@ impl BackgroundPhoto {
         let CameraSource::Known(camera) = self.background.camera else {
             return false;
         };
-        let [x, y] = self.background.size.map(|side| side / 2.0);
-        let size = self.image.map(f64::from);
-        let whole = [
-            size[0] * (self.taken[0] as f64 / self.kept.width as f64),
-            size[1] * (self.taken[1] as f64 / self.kept.height as f64),
-        ];
-        [[-x, y], [x, y], [x, -y], [-x, -y]]
+        let (size, whole) = (self.image.map(f64::from), self.uncropped_size());
+        self.surface_corners()
             .into_iter()
-            .filter_map(|[x, y]| camera.project(Point3::new(x, y, 0.0)))
-            .any(|(px, _)| {
-                let shows = |seen| is_within(px, size, seen);
-                shows(whole) && !shows(size)
-            })
+            .filter_map(|corner| camera.project(corner))
+            .any(|(px, _)| is_within(px, size, whole) && !is_within(px, size, size))
+    }
+
+    /// Little of it is shown, or a part of the surface is not.
+    fn is_misshapen(&self) -> bool {
+        self.part() < SMALL_SHOWN_SHARE || self.cuts_off()
+    }
+
+    /// The whole photo at the scale of the pictures, pixels.
+    fn uncropped_size(&self) -> [f64; 2] {
+        let [w, h] = self.image.map(f64::from);
+        let [taken_w, taken_h] = self.taken.map(f64::from);
+        [
+            w * (taken_w / self.kept.width as f64),
+            h * (taken_h / self.kept.height as f64),
+        ]
+    }
+
+    fn surface_corners(&self) -> [Point3<f64>; 4] {
+        let [x, y] = self.background.size.map(|side| side / 2.0);
+        let corners = [[-x, y], [x, y], [x, -y], [-x, -y]];
+        corners.map(|[x, y]| Point3::new(x, y, 0.0))
     }
 
     /// The photo at the picture's size, scene-linear; read once.
@@ -137,16 +153,19 @@ impl BackgroundPhoto {
             return Ok(plate.clone());
         }
         let photo = io::read::<LinearRgb>(&self.photo)?;
-        let ((w, h), [tw, th]) = (photo.size(), self.taken);
-        if [w, h] != self.taken.map(|side| side as usize) {
-            return Err(Error::file(
-                &self.photo,
-                format!("{w} x {h} pixels, but its label says {tw} x {th}"),
-            ));
-        }
+        self.check_size(photo.size())?;
         let [width, height] = self.image.map(|side| side as usize);
         let plate = Arc::new(filter::resize(&photo.crop(self.kept), width, height));
         Ok(self.plate.get_or_init(|| plate).clone())
+    }
+
+    fn check_size(&self, (w, h): (usize, usize)) -> Result<()> {
+        let [tw, th] = self.taken;
+        if [w, h] == self.taken.map(|side| side as usize) {
+            return Ok(());
+        }
+        let what = format!("{w} x {h} pixels, but its label says {tw} x {th}");
+        Err(Error::file(&self.photo, what))
     }
 }
 
@@ -157,42 +176,43 @@ fn warn_of_cameras(labels: &[LabelledPhoto], sightings: &[PhotoCamera]) {
         log::warn!("{stale}");
     }
     for (labelled, seen) in labels.iter().zip(sightings) {
-        seen.warnings
-            .iter()
-            .for_each(|warning| log::info!("{labelled}: {warning}"));
+        for warning in &seen.warnings {
+            log::info!("{labelled}: {warning}");
+        }
     }
-    let unsaid: Vec<&str> = labels
-        .iter()
-        .zip(sightings)
-        .filter(|(_, seen)| !seen.stored && !seen.warnings.is_empty())
-        .map(|(labelled, _)| labelled.name.as_str())
-        .collect();
-    if let [first, ..] = unsaid.as_slice() {
-        let (count, more) = (unsaid.len(), if unsaid.len() > 1 { ", ..." } else { "" });
+    let unreported = unreported_names(labels, sightings);
+    if let [first, ..] = unreported.as_slice() {
+        let (count, of) = (unreported.len(), labels.len());
+        let more = if count > 1 { ", ..." } else { "" };
         log::warn!(
-            "{count} of {} cameras have warnings ({first}{more}): `petcomp camera doctor` says them",
-            labels.len()
+            "{count} of {of} cameras have warnings ({first}{more}): `petcomp camera doctor` says them"
         );
     }
 }
 
+/// Photos whose cameras have warnings that were not shown when they were solved.
+fn unreported_names<'a>(labels: &'a [LabelledPhoto], sightings: &[PhotoCamera]) -> Vec<&'a str> {
+    let pairs = labels.iter().zip(sightings);
+    pairs
+        .filter(|(_, seen)| !seen.stored && !seen.warnings.is_empty())
+        .map(|(labelled, _)| labelled.name.as_str())
+        .collect()
+}
+
 /// Says, once for all, that photos are of another shape than the pictures, where that costs much of them.
 fn warn_of_shapes(places: &[BackgroundPhoto]) {
-    let odd: Vec<&BackgroundPhoto> = places
-        .iter()
-        .filter(|place| place.part() < SMALL_SHOWN_SHARE || place.cuts_off())
-        .collect();
+    let odd: Vec<_> = places.iter().filter(|place| place.is_misshapen()).collect();
     let least = odd.iter().min_by(|a, b| a.part().total_cmp(&b.part()));
-    let Some((least, note)) = least.and_then(|place| Some((place, place.shape_note()?))) else {
-        return;
-    };
-    let [w, h] = least.image;
-    log::warn!(
-        "{} of {} backgrounds have another shape than the pictures ({w} x {h}): {}: {note}; change scene.image or crop them",
-        odd.len(),
-        places.len(),
-        least.background.name,
-    );
+    if let Some(least) = least
+        && let Some(note) = least.shape_note()
+    {
+        let (count, of, name) = (odd.len(), places.len(), &least.background.name);
+        let [w, h] = least.image;
+        log::warn!(
+            "{count} of {of} backgrounds have another shape than the pictures ({w} x {h}): {name}: {note}; change \
+             scene.image or crop them"
+        );
+    }
 }
 
 /// The photo that a label names, in the label's folder.
@@ -218,9 +238,11 @@ fn middle_part(photo: [u32; 2], image: [u32; 2]) -> Roi {
 
 /// A pixel lies in a frame of size `seen` about the middle of a picture of size `size`, or close to it.
 fn is_within(px: Point2<f64>, size: [f64; 2], seen: [f64; 2]) -> bool {
-    let inside =
-        |v: f64, size: f64, seen: f64| (v - size / 2.0).abs() < (0.5 + CUT_OFF_SHARE) * seen;
-    inside(px.x, size[0], seen[0]) && inside(px.y, size[1], seen[1])
+    is_within_side(px.x, size[0], seen[0]) && is_within_side(px.y, size[1], seen[1])
+}
+
+fn is_within_side(at: f64, size: f64, seen: f64) -> bool {
+    (at - size / 2.0).abs() < (0.5 + CUT_OFF_SHARE) * seen
 }
 
 /// The camera of a part of its picture.
@@ -231,6 +253,10 @@ fn cropped(camera: Camera, kept: Roi) -> Camera {
         principal_px: camera.principal_px - corner,
         ..camera
     }
+}
+
+fn area([w, h]: [f64; 2]) -> f64 {
+    w * h
 }
 
 #[cfg(test)]

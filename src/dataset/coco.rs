@@ -3,9 +3,11 @@
 use crate::dataset::formats::is_exact;
 use crate::dataset::{Entry, Extent, LabelledObject, Part, PictureFormat, Writer, Written};
 use crate::error::{Error, Result};
+use crate::geom::Point2;
 use crate::io;
 use crate::label::{RleMask, trace};
 use serde::{Deserialize, Serialize};
+use serde_json::json;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -123,22 +125,22 @@ impl Writer for Coco {
 
 impl Coco {
     fn share(&self, entry: &Entry<'_>) -> Result<ImageShare> {
-        let [width, height] = entry.sample.labels.image;
-        let file_name = format!("{:06}.{}", entry.k, self.pictures.extension());
-        let image = CocoImage {
-            id: entry.k,
-            file_name,
-            width,
-            height,
-        };
-        let annotations = entry
-            .labelled
-            .iter()
-            .filter_map(|label| self.annotation(entry.k, label).transpose());
+        let labels = entry.labelled.iter();
+        let annotations = labels.filter_map(|label| self.annotation(entry.k, label).transpose());
         Ok(ImageShare {
-            image,
+            image: self.image_of(entry),
             annotations: annotations.collect::<Result<_>>()?,
         })
+    }
+
+    fn image_of(&self, entry: &Entry<'_>) -> CocoImage {
+        let [width, height] = entry.sample.labels.image;
+        CocoImage {
+            id: entry.k,
+            file_name: format!("{:06}.{}", entry.k, self.pictures.extension()),
+            width,
+            height,
+        }
     }
 
     /// None for an object without a box.
@@ -168,29 +170,31 @@ impl Coco {
         };
         // Readers do not take a list without polygons.
         if polygons.is_empty() {
-            return Segmentation::Runs(mask.clone());
+            Segmentation::Runs(mask.clone())
+        } else {
+            Segmentation::Polygons(polygons.iter().map(|ring| coordinates_of(ring)).collect())
         }
-        Segmentation::Polygons(
-            polygons
-                .iter()
-                .map(|ring| ring.iter().flat_map(|p| [p.x, p.y]).collect())
-                .collect(),
-        )
     }
 }
 
 fn annotation_id(k: u64, object: u32) -> Result<u64> {
-    let id = Some(u64::from(object)).filter(|&id| (1..IDS_PER_IMAGE).contains(&id));
-    let id = id.and_then(|id| k.checked_mul(IDS_PER_IMAGE)?.checked_add(id));
-    id.ok_or_else(|| {
-        Error::value(
-            "labels.objects",
-            format!(
-                "object {object}, expected 1 to {} for COCO",
-                IDS_PER_IMAGE - 1
-            ),
-        )
-    })
+    let id = u64::from(object);
+    let first = k.checked_mul(IDS_PER_IMAGE);
+    let unique = first.and_then(|first| first.checked_add(id));
+    unique
+        .filter(|_| (1..IDS_PER_IMAGE).contains(&id))
+        .ok_or_else(|| unusable_id(object))
+}
+
+fn unusable_id(object: u32) -> Error {
+    let most = IDS_PER_IMAGE - 1;
+    let what = format!("object {object}, expected 1 to {most} for COCO");
+    Error::value("labels.objects", what)
+}
+
+/// x, y, x, y, ..
+fn coordinates_of(ring: &[Point2<f64>]) -> Vec<f64> {
+    ring.iter().flat_map(|p| [p.x, p.y]).collect()
 }
 
 /// Writes the document of a part, one image or annotation a line; holds one image's share at a time.
@@ -207,28 +211,39 @@ fn join<'a>(
     write!(out, "\"annotations\":[")?;
     let mut comma = "\n";
     for sample in samples {
-        let file = io::inside(folder, sample.file(PARTS_FOLDER)?).map_err(std::io::Error::other)?;
-        let share: ImageShare = io::read_json(file).map_err(std::io::Error::other)?;
+        let share = read_share(folder, sample)?;
         images.push(share.image);
         for annotation in &share.annotations {
-            write!(out, "{comma}{}", serde_json::to_string(annotation)?)?;
-            comma = ",\n";
+            write_entry(out, &mut comma, annotation)?;
         }
     }
     write!(out, "],\n\"images\":[")?;
     comma = "\n";
     for image in &images {
-        write!(out, "{comma}{}", serde_json::to_string(image)?)?;
-        comma = ",\n";
+        write_entry(out, &mut comma, image)?;
     }
     writeln!(out, "]}}")
 }
 
+fn read_share(folder: &Path, sample: &Written) -> std::io::Result<ImageShare> {
+    let file = io::inside(folder, sample.file(PARTS_FOLDER)?).map_err(std::io::Error::other)?;
+    io::read_json(file).map_err(std::io::Error::other)
+}
+
+/// Writes an entry of a list, each in a line of its own.
+fn write_entry(
+    out: &mut dyn Write,
+    comma: &mut &str,
+    entry: &impl Serialize,
+) -> std::io::Result<()> {
+    write!(out, "{comma}{}", serde_json::to_string(entry)?)?;
+    *comma = ",\n";
+    Ok(())
+}
+
 fn categories(classes: &[String]) -> serde_json::Value {
-    (1..)
-        .zip(classes)
-        .map(|(id, name): (u64, _)| {
-            serde_json::json!({ "id": id, "name": name, "supercategory": "object" })
-        })
+    let numbered = (1_u64..).zip(classes);
+    numbered
+        .map(|(id, name)| json!({ "id": id, "name": name, "supercategory": "object" }))
         .collect()
 }

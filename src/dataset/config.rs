@@ -98,11 +98,10 @@ impl DatasetConfig {
     /// When it cannot be written.
     pub fn write(&self, path: impl AsRef<Path>) -> Result<()> {
         let path = path.as_ref();
-        let absolute = |path: &Path| std::path::absolute(path).map_err(|e| Error::file(path, e));
-        let folder = absolute(path.parent().unwrap_or(Path::new("")))?;
+        let folder = absolute_path(path.parent().unwrap_or(Path::new("")))?;
         let mut config = self.clone();
-        config.assets = io::relative(&absolute(&config.assets)?, &folder);
-        config.backgrounds = io::relative(&absolute(&config.backgrounds)?, &folder);
+        config.assets = io::relative(&absolute_path(&config.assets)?, &folder);
+        config.backgrounds = io::relative(&absolute_path(&config.backgrounds)?, &folder);
         for file in &mut config.scene.environment.files {
             *file = seen_from(&folder, &self.folder, file)?;
         }
@@ -118,14 +117,22 @@ impl DatasetConfig {
     /// The setups of the paper's ablations: this one with one source of variation after another switched off, the scenes
     /// in pairs.
     pub fn ablations(&self) -> impl Iterator<Item = (Ablation, Self)> {
-        Ablation::PAPER.into_iter().map(|ablation| {
-            let mut config = self.clone();
-            config.scene.off.extend(ablation.off);
-            config.scene.off.sort();
-            config.scene.off.dedup();
-            (ablation, config)
-        })
+        let ablations = Ablation::PAPER.into_iter();
+        ablations.map(|ablation| (ablation, self.without(&ablation)))
     }
+
+    /// The recipe with what an ablation switches off.
+    fn without(&self, ablation: &Ablation) -> Self {
+        let mut config = self.clone();
+        config.scene.off.extend(ablation.off);
+        config.scene.off.sort();
+        config.scene.off.dedup();
+        config
+    }
+}
+
+fn absolute_path(path: &Path) -> Result<PathBuf> {
+    std::path::absolute(path).map_err(|e| Error::file(path, e))
 }
 
 #[cfg(test)]

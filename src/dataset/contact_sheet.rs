@@ -1,17 +1,17 @@
 //! A sheet of small pictures with their labels: the first look at a dataset.
 
 use crate::color::to_srgb8;
+use crate::dataset::SampleRecord;
 use crate::dataset::folder;
 use crate::dataset::journal::lines_of;
 use crate::dataset::journal_line::JournalLine;
-use crate::dataset::{Part, SampleRecord};
 use crate::draw::{self, TextSize};
 use crate::error::Result;
 use crate::filter::resize;
 use crate::image::Image;
 use crate::io;
+use crate::label::Labels;
 use crate::label::overlay::{UNLABELLED, draw_labels};
-use crate::label::{Labels, ObjectLabel};
 use crate::pixel::{LinearRgb, ObjectId, Srgb8};
 use rayon::prelude::*;
 use std::path::Path;
@@ -90,7 +90,7 @@ impl ContactTile {
 
     fn drawn(&self) -> Image<Srgb8> {
         let mut canvas = to_srgb8(&self.picture);
-        draw_labels(&mut canvas, &self.labels, |object: &ObjectLabel| {
+        draw_labels(&mut canvas, &self.labels, |object| {
             self.labelled.contains(&object.id)
         });
         canvas
@@ -105,21 +105,22 @@ pub fn contact_sheet(
 ) -> Image<Srgb8> {
     let layout = SheetLayout::new(tiles, classes, options);
     let mut sheet = Image::filled(layout.width, layout.height, PAPER);
-    let mut y = MARGIN_PX as isize;
-    if !options.title.is_empty() {
-        let at = [MARGIN_PX as isize, y];
-        draw::text(&mut sheet, at, &options.title, INK, TextSize::Large);
-        y += (TextSize::Large.height() + GAP_PX / 2) as isize;
-    }
-    draw_legend(&mut sheet, y, &layout.legend);
+    let title_at = [MARGIN_PX as isize; 2];
+    draw::text(&mut sheet, title_at, &options.title, INK, TextSize::Large);
+    let legend_top = MARGIN_PX + title_height(&options.title);
+    draw_legend(&mut sheet, legend_top as isize, &layout.legend);
     for (i, tile) in tiles.iter().enumerate() {
-        let [x, y] = layout.place(i);
-        draw::paste(&mut sheet, [x, y], &tile.drawn());
-        let below = y + layout.cell[1] - TextSize::Small.height();
-        let at = [x as isize, below as isize];
-        draw::text(&mut sheet, at, &tile.caption, PALE_INK, TextSize::Small);
+        layout.draw_tile(&mut sheet, i, tile);
     }
     sheet
+}
+
+/// Height of the title with the room below it.
+fn title_height(title: &str) -> usize {
+    match title {
+        "" => 0,
+        _ => TextSize::Large.height() + GAP_PX / 2,
+    }
 }
 
 /// The contact sheet of a dataset on disk: at most `most` of its pictures, evenly spread.
@@ -132,35 +133,32 @@ pub fn contact_sheet_of(
     most: usize,
     options: &ContactSheetOptions,
 ) -> Result<Image<Srgb8>> {
-    let identity = folder::known_identity(folder)?;
-    let classes: Vec<String> =
-        serde_json::from_value(identity["classes"].clone()).unwrap_or_default();
+    let classes = folder::known_classes(&folder::known_identity(folder)?);
     let lines = lines_of(folder)?;
     let shown = most.min(lines.len());
     let tiles: Vec<ContactTile> = (0..shown)
         .into_par_iter()
-        .map(|i| tile(folder, &lines[i * lines.len() / shown], options))
+        .map(|i| read_tile(folder, &lines[i * lines.len() / shown], options))
         .collect::<Result<_>>()?;
     Ok(contact_sheet(&tiles, &classes, options))
 }
 
-fn tile(folder: &Path, line: &JournalLine, options: &ContactSheetOptions) -> Result<ContactTile> {
+fn read_tile(
+    folder: &Path,
+    line: &JournalLine,
+    options: &ContactSheetOptions,
+) -> Result<ContactTile> {
     let picture = io::read::<LinearRgb>(line.file(folder, "images/")?)?;
     let record: SampleRecord = io::read_json(line.file(folder, "scenes/")?)?;
-    let part = if line.part == Part::Val {
-        "val  "
-    } else {
-        "train"
-    };
+    let caption = tile_caption(line, &record);
+    let (labels, labelled, width) = (record.labels, record.labelled, options.picture_width);
+    Ok(ContactTile::new(&picture, labels, labelled, caption, width))
+}
+
+fn tile_caption(line: &JournalLine, record: &SampleRecord) -> String {
+    let (k, part) = (line.k, line.part.name());
     let (labelled, all) = (record.labelled.len(), record.labels.objects.len());
-    let caption = format!("{:06} {part} {labelled}/{all} labelled", line.k);
-    Ok(ContactTile::new(
-        &picture,
-        record.labels,
-        record.labelled,
-        caption,
-        options.picture_width,
-    ))
+    format!("{k:06} {part:5} {labelled}/{all} labelled")
 }
 
 /// Where everything is on a sheet, pixels.
@@ -183,25 +181,28 @@ impl SheetLayout {
             n => n.min(tiles.len().max(1)),
         };
         let row = (columns * (cell[0] + GAP_PX)).saturating_sub(GAP_PX);
-        let title = TextSize::Large.width(&options.title);
-        let legend = legend_entries(classes, tiles, row.max(title));
-        let legend_width = legend.iter().map(LegendEntry::end).max().unwrap_or(0);
-        let legend_lines = legend.last().map_or(0, |e| e.line + 1);
-        let title_height = if options.title.is_empty() {
-            0
-        } else {
-            TextSize::Large.height() + GAP_PX / 2
-        };
-        let top = MARGIN_PX + title_height + legend_lines * LEGEND_LINE_PX + GAP_PX;
+        let content = row.max(TextSize::Large.width(&options.title));
+        let legend = legend_entries(classes, tiles, content);
+        let [legend_width, legend_height] = legend_size(&legend);
+        let top = MARGIN_PX + title_height(&options.title) + legend_height + GAP_PX;
         let rows = tiles.len().div_ceil(columns);
         Self {
-            width: row.max(title).max(legend_width) + 2 * MARGIN_PX,
+            width: content.max(legend_width) + 2 * MARGIN_PX,
             height: top + rows * (cell[1] + GAP_PX) + MARGIN_PX - GAP_PX,
             columns,
             cell,
             top,
             legend,
         }
+    }
+
+    /// Draws a picture with its boxes and its caption.
+    fn draw_tile(&self, sheet: &mut Image<Srgb8>, i: usize, tile: &ContactTile) {
+        let [x, y] = self.place(i);
+        draw::paste(sheet, [x, y], &tile.drawn());
+        let below = y + self.cell[1] - TextSize::Small.height();
+        let at = [x as isize, below as isize];
+        draw::text(sheet, at, &tile.caption, PALE_INK, TextSize::Small);
     }
 
     /// Top left corner of a picture.
@@ -229,13 +230,16 @@ fn cell_size(tiles: &[ContactTile]) -> [usize; 2] {
 
 /// The number of columns with which a sheet comes closest to 3:2, the shape of screens; an empty place at its end weighs
 /// as much as being too wide by two pictures.
-fn pleasing_columns(count: usize, [w, h]: [usize; 2]) -> usize {
-    let off = |columns: &usize| {
-        let rows = count.div_ceil(*columns);
-        let empty = columns * rows - count;
-        (2 * columns * (w + GAP_PX)).abs_diff(3 * rows * (h + GAP_PX)) + 4 * empty * (w + GAP_PX)
-    };
-    (1..=count.max(1)).min_by_key(off).unwrap_or(1)
+fn pleasing_columns(count: usize, cell: [usize; 2]) -> usize {
+    (1..=count.max(1))
+        .min_by_key(|&columns| shape_error(count, columns, cell))
+        .unwrap_or(1)
+}
+
+fn shape_error(count: usize, columns: usize, [w, h]: [usize; 2]) -> usize {
+    let rows = count.div_ceil(columns);
+    let empty = columns * rows - count;
+    (2 * columns * (w + GAP_PX)).abs_diff(3 * rows * (h + GAP_PX)) + 4 * empty * (w + GAP_PX)
 }
 
 /// Height of a line of the legend, and of its colour mark.
@@ -251,6 +255,25 @@ struct LegendEntry {
 }
 
 impl LegendEntry {
+    /// Beside the entry before it, or in the next line where the width ends.
+    fn after(before: Option<&Self>, color: Srgb8, text: String, width: usize) -> Self {
+        let (x, line) = before.map_or((0, 0), |e| (e.end() + 2 * GAP_PX, e.line));
+        let entry = Self {
+            color,
+            text,
+            x,
+            line,
+        };
+        if x == 0 || entry.end() <= width {
+            return entry;
+        }
+        Self {
+            x: 0,
+            line: line + 1,
+            ..entry
+        }
+    }
+
     fn width(&self) -> usize {
         MARK_PX + 8 + TextSize::Small.width(&self.text)
     }
@@ -264,13 +287,19 @@ impl LegendEntry {
 /// The legend's entries, in as many lines as they need within a width.
 fn legend_entries(classes: &[String], tiles: &[ContactTile], width: usize) -> Vec<LegendEntry> {
     let (labelled, unlabelled) = count_objects(classes.len(), tiles);
-    let mut entries: Vec<(Srgb8, String)> = (0..)
-        .zip(classes.iter().zip(labelled))
-        .map(|(class, (name, n))| (draw::class_color(class), format!("{name} ({n})")))
-        .collect();
+    let named = classes.iter().zip(labelled);
+    let texts = named.map(|(name, count)| format!("{name} ({count})"));
+    let mut entries: Vec<(Srgb8, String)> = (0..).map(draw::class_color).zip(texts).collect();
     let text = format!("no label, another lies over it ({unlabelled})");
     entries.push((UNLABELLED, text));
     place_entries(entries, width)
+}
+
+/// Width and height of the legend, pixels.
+fn legend_size(entries: &[LegendEntry]) -> [usize; 2] {
+    let width = entries.iter().map(LegendEntry::end).max();
+    let lines = entries.last().map_or(0, |entry| entry.line + 1);
+    [width.unwrap_or(0), lines * LEGEND_LINE_PX]
 }
 
 /// Objects with a label for each class, and objects without one.
@@ -290,21 +319,9 @@ fn count_objects(class_count: usize, tiles: &[ContactTile]) -> (Vec<usize>, usiz
 
 /// Places entries beside each other, and in the next line where the width ends.
 fn place_entries(entries: Vec<(Srgb8, String)>, width: usize) -> Vec<LegendEntry> {
-    let mut placed: Vec<LegendEntry> = Vec::new();
+    let mut placed = Vec::new();
     for (color, text) in entries {
-        let (x, line) = placed
-            .last()
-            .map_or((0, 0), |e| (e.end() + 2 * GAP_PX, e.line));
-        let mut entry = LegendEntry {
-            color,
-            text,
-            x,
-            line,
-        };
-        if x > 0 && entry.end() > width {
-            (entry.x, entry.line) = (0, line + 1);
-        }
-        placed.push(entry);
+        placed.push(LegendEntry::after(placed.last(), color, text, width));
     }
     placed
 }
@@ -313,15 +330,10 @@ fn draw_legend(sheet: &mut Image<Srgb8>, top: isize, entries: &[LegendEntry]) {
     for entry in entries {
         let x = (MARGIN_PX + entry.x) as isize;
         let y = top + (entry.line * LEGEND_LINE_PX) as isize;
-        let down = ((TextSize::Small.height() - MARK_PX) / 2) as isize;
-        draw::fill(sheet, [x, y + down], [MARK_PX, MARK_PX], entry.color);
-        draw::text(
-            sheet,
-            [x + MARK_PX as isize + 8, y],
-            &entry.text,
-            INK,
-            TextSize::Small,
-        );
+        let mark = [x, y + ((TextSize::Small.height() - MARK_PX) / 2) as isize];
+        draw::fill(sheet, mark, [MARK_PX, MARK_PX], entry.color);
+        let text = [x + MARK_PX as isize + 8, y];
+        draw::text(sheet, text, &entry.text, INK, TextSize::Small);
     }
 }
 

@@ -53,19 +53,18 @@ impl DatasetCounts {
 
     /// Counts what the lines of a plan's journal say; `made` of the `asked` images are this run's.
     pub(crate) fn new(lines: &[JournalLine], plan: &Plan, asked: u64, made: u64) -> Self {
-        let sum =
-            |count: fn(&JournalLine) -> u32| lines.iter().map(|line| u64::from(count(line))).sum();
-        let classes = ClassCount::of_all(&plan.classes, lines);
+        let classes = ClassCount::for_classes(&plan.classes, lines);
+        let val = lines.iter().filter(|line| line.part == Part::Val);
         Self {
             asked,
             images: lines.len() as u64,
-            val: lines.iter().filter(|line| line.part == Part::Val).count() as u64,
+            val: val.count() as u64,
             made,
             objects: classes.iter().map(|c| c.objects).sum(),
             labelled: classes.iter().map(|c| c.labelled).sum(),
-            obstructed: sum(|line| line.obstructed),
-            knotted: sum(|line| line.knotted),
-            retries: sum(|line| line.retries),
+            obstructed: sum_of(lines, |line| line.obstructed),
+            knotted: sum_of(lines, |line| line.knotted),
+            retries: sum_of(lines, |line| line.retries),
             classes,
             policy: plan.obstructed,
             for_trainers: files_for_trainers(plan),
@@ -74,22 +73,10 @@ impl DatasetCounts {
 }
 
 impl ClassCount {
-    fn of_all(names: &[String], lines: &[JournalLine]) -> Vec<Self> {
-        names
-            .iter()
-            .enumerate()
-            .map(|(class, name)| {
-                let counts = lines.iter().filter_map(|line| line.classes.get(class));
-                let [objects, labelled] = counts.fold([0; 2], |[a, b], &[c, d]| {
-                    [a + u64::from(c), b + u64::from(d)]
-                });
-                Self {
-                    name: name.clone(),
-                    objects,
-                    labelled,
-                }
-            })
-            .collect()
+    fn for_classes(names: &[String], lines: &[JournalLine]) -> Vec<Self> {
+        let counts = (0..).map(|class| count_class(lines, class));
+        let classes = names.iter().cloned().zip(counts);
+        classes.map(Self::from).collect()
     }
 }
 
@@ -100,4 +87,26 @@ fn files_for_trainers(plan: &Plan) -> Vec<PathBuf> {
         .flat_map(|writer| writer.for_trainers())
         .filter(|path| plan.folder.join(path).exists())
         .collect()
+}
+
+fn sum_of(lines: &[JournalLine], count: fn(&JournalLine) -> u32) -> u64 {
+    lines.iter().map(|line| u64::from(count(line))).sum()
+}
+
+/// Objects of a class, and how many of them have a label.
+fn count_class(lines: &[JournalLine], class: usize) -> [u64; 2] {
+    let counts = lines.iter().filter_map(|line| line.classes.get(class));
+    counts.fold([0; 2], |sums, counts| {
+        [0, 1].map(|i| sums[i] + u64::from(counts[i]))
+    })
+}
+
+impl From<(String, [u64; 2])> for ClassCount {
+    fn from((name, [objects, labelled]): (String, [u64; 2])) -> Self {
+        Self {
+            name,
+            objects,
+            labelled,
+        }
+    }
 }

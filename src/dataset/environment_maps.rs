@@ -79,13 +79,7 @@ impl EnvironmentMaps {
         let picture = Arc::new(picture);
         let mut kept = self.kept();
         kept.push((name.to_owned(), picture.clone()));
-        while kept.len() > 1
-            && kept
-                .iter()
-                .map(|(_, picture)| bytes(picture))
-                .sum::<usize>()
-                > KEPT_BYTES
-        {
+        while kept.len() > 1 && total_bytes(&kept) > KEPT_BYTES {
             kept.remove(0);
         }
         picture
@@ -97,8 +91,9 @@ impl EnvironmentMaps {
     }
 }
 
-fn bytes(picture: &Panorama) -> usize {
-    size_of_val(picture.image().pixels())
+fn total_bytes(kept: &[(String, Arc<Panorama>)]) -> usize {
+    let pictures = kept.iter().map(|(_, picture)| picture.image());
+    pictures.map(|image| size_of_val(image.pixels())).sum()
 }
 
 /// A name in a recipe as it is seen from another folder.

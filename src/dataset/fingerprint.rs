@@ -68,21 +68,24 @@ fn of_places(places: &[BackgroundPhoto], inputs: &mut Inputs) -> Result<Vec<Valu
         .map(|place| {
             (
                 format!("background {}", place.background.name),
-                place.photo.as_path(),
+                &*place.photo,
             )
         })
         .collect();
     let photos = inputs.checksums(&files)?;
-    let of_place = |(place, photo): (&BackgroundPhoto, u32)| {
-        let background = &place.background;
-        json!({
-            "name": background.name,
-            "size": background.size,
-            "camera": digest(&(background.camera, [place.kept.x, place.kept.y, place.kept.width, place.kept.height])),
-            "photo": shown(photo),
-        })
-    };
-    Ok(places.iter().zip(photos).map(of_place).collect())
+    let pairs = places.iter().zip(photos);
+    Ok(pairs.map(|(place, photo)| of_place(place, photo)).collect())
+}
+
+fn of_place(place: &BackgroundPhoto, photo: u32) -> Value {
+    let (background, kept) = (&place.background, &place.kept);
+    let kept = [kept.x, kept.y, kept.width, kept.height];
+    json!({
+        "name": background.name,
+        "size": background.size,
+        "camera": digest(&(background.camera, kept)),
+        "photo": shown(photo),
+    })
 }
 
 /// What a person should know of the backgrounds, by their names: the report shows it.
@@ -100,8 +103,10 @@ fn of_surroundings(surroundings: &EnvironmentMaps, inputs: &mut Inputs) -> Resul
         .map(|(name, path)| (format!("environment {name}"), path.as_path()))
         .collect();
     let checksums = inputs.checksums(&named)?;
-    let entry = |((name, _), checksum): (&(&str, _), u32)| json!({ "file": name, "content": shown(checksum) });
-    Ok(files.iter().zip(checksums).map(entry).collect())
+    let pairs = files.iter().zip(checksums);
+    Ok(pairs
+        .map(|((name, _), checksum)| json!({ "file": name, "content": shown(checksum) }))
+        .collect())
 }
 
 /// Checksum of a value by its text: numbers are told to the last bit.

@@ -5,6 +5,7 @@ use crate::dataset::{Plan, SampleRange, Shard, SplitOrder};
 use crate::error::{Error, Result};
 use crate::io;
 use serde_json::{Map, Value, json};
+use std::ffi::OsStr;
 use std::fs::{File, TryLockError};
 use std::path::Path;
 
@@ -28,17 +29,7 @@ pub(crate) struct Claim {
 /// Claims the folder of a plan: makes or checks it, locks it, and lets the writers begin.
 pub(crate) fn claim(plan: &Plan) -> Result<Claim> {
     let folder = plan.folder.as_path();
-    if folder.exists() && !folder.is_dir() {
-        return Err(Error::file(
-            folder,
-            "is a file, expected a folder for the dataset",
-        ));
-    }
-    let before = identity(folder)?;
-    if before.is_none() && holds_something(folder)? {
-        let what = format!("is not empty and has no {IDENTITY}, expected a new or empty folder");
-        return Err(Error::file(folder, what));
-    }
+    let before = claimable_identity(folder)?;
     io::create_folder(folder)?;
     io::refuse_links(folder)?;
     for name in [LOCK, JOURNAL, RUNS] {
@@ -55,6 +46,20 @@ pub(crate) fn claim(plan: &Plan) -> Result<Claim> {
         writer.begin(folder, &plan.classes)?;
     }
     Ok(Claim { _lock: lock })
+}
+
+/// What a folder was made from; fails for one that holds something else.
+fn claimable_identity(folder: &Path) -> Result<Option<Value>> {
+    if folder.exists() && !folder.is_dir() {
+        let what = "is a file, expected a folder for the dataset";
+        return Err(Error::file(folder, what));
+    }
+    let before = identity(folder)?;
+    if before.is_none() && holds_something(folder)? {
+        let what = format!("is not empty and has no {IDENTITY}, expected a new or empty folder");
+        return Err(Error::file(folder, what));
+    }
+    Ok(before)
 }
 
 /// Fails where the folder was begun with another plan, naming the field.
@@ -120,12 +125,21 @@ pub(crate) fn known_identity(folder: &Path) -> Result<Value> {
     identity.ok_or_else(|| Error::file(folder, format!("no {IDENTITY}, expected a dataset")))
 }
 
+/// The names of the classes that an identity records.
+pub(crate) fn known_classes(identity: &Value) -> Vec<String> {
+    serde_json::from_value(identity["classes"].clone()).unwrap_or_default()
+}
+
 fn holds_something(folder: &Path) -> Result<bool> {
     if !folder.exists() {
         return Ok(false);
     }
     let mut entries = std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
-    Ok(entries.any(|entry| entry.is_ok_and(|e| !e.file_name().to_string_lossy().starts_with('.'))))
+    Ok(entries.any(|entry| entry.is_ok_and(|entry| !is_hidden(&entry.file_name()))))
+}
+
+fn is_hidden(name: &OsStr) -> bool {
+    name.to_string_lossy().starts_with('.')
 }
 
 fn lock(folder: &Path) -> Result<File> {
@@ -143,22 +157,22 @@ fn lock(folder: &Path) -> Result<File> {
 
 /// Deletes what a killed run left half-written.
 fn sweep(folder: &Path) -> Result<()> {
-    for entry in std::fs::read_dir(folder)
-        .map_err(|e| Error::file(folder, e))?
-        .flatten()
-    {
-        let name = entry.file_name().to_string_lossy().into_owned();
+    let entries = std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
+    for entry in entries.flatten() {
         match entry.file_type() {
             Ok(kind) if kind.is_dir() => sweep(&entry.path())?,
-            Ok(kind)
-                if kind.is_file() && name.starts_with(".petcomp-") && name.ends_with(".tmp") =>
-            {
+            Ok(kind) if kind.is_file() && is_half_written(&entry.file_name()) => {
                 std::fs::remove_file(entry.path()).map_err(|e| Error::file(entry.path(), e))?;
             }
             _ => {}
         }
     }
     Ok(())
+}
+
+fn is_half_written(name: &OsStr) -> bool {
+    let name = name.to_string_lossy();
+    name.starts_with(".petcomp-") && name.ends_with(".tmp")
 }
 
 /// Everything that decides the bytes of a dataset's samples, as it reads back from a file.
@@ -170,7 +184,7 @@ fn plan_identity(plan: &Plan) -> Result<Value> {
         "classes": plan.classes,
         "split": plan.split,
         "obstructed": plan.obstructed,
-        "writers": plan.writers.iter().map(|writer| writer.settings()).collect::<Vec<_>>(),
+        "writers": writer_settings(plan),
         "recipe": plan.recipe,
     });
     if let SampleRange::Shard(Shard { index, of }) = plan.range {
@@ -182,12 +196,18 @@ fn plan_identity(plan: &Plan) -> Result<Value> {
     serde_json::from_str(&identity.to_string()).map_err(|e| Error::value("recipe", e))
 }
 
+fn writer_settings(plan: &Plan) -> Vec<Value> {
+    plan.writers
+        .iter()
+        .map(|writer| writer.settings())
+        .collect()
+}
+
+/// Where two documents differ, and how, if they do.
+type FieldComparison = std::result::Result<(), (String, String)>;
+
 /// Compares two documents and names the first field in which they differ; entries of lists by their own name or file.
-pub(crate) fn same(
-    before: &Value,
-    now: &Value,
-    at: &str,
-) -> std::result::Result<(), (String, String)> {
+pub(crate) fn same(before: &Value, now: &Value, at: &str) -> FieldComparison {
     match (before, now) {
         (Value::Object(a), Value::Object(b)) => same_keys(a, b, at),
         (Value::Array(a), Value::Array(b)) => same_entries(a, b, at),
@@ -196,16 +216,13 @@ pub(crate) fn same(
     }
 }
 
-fn differ(before: &Value, now: &Value, at: &str) -> std::result::Result<(), (String, String)> {
-    let what = format!(
-        "the dataset was begun with {}, this run has {}",
-        brief(before),
-        brief(now)
-    );
+fn differ(before: &Value, now: &Value, at: &str) -> FieldComparison {
+    let (before, now) = (brief(before), brief(now));
+    let what = format!("the dataset was begun with {before}, this run has {now}");
     Err((at.to_owned(), what))
 }
 
-fn same_entries(a: &[Value], b: &[Value], at: &str) -> std::result::Result<(), (String, String)> {
+fn same_entries(a: &[Value], b: &[Value], at: &str) -> FieldComparison {
     for (i, (before, now)) in a.iter().zip(b).enumerate() {
         match (name_of(before), name_of(now)) {
             (Some(first), Some(second)) if first == second => {
@@ -217,7 +234,10 @@ fn same_entries(a: &[Value], b: &[Value], at: &str) -> std::result::Result<(), (
             _ => same(before, now, &format!("{at}[{i}]"))?,
         }
     }
-    let (before, now) = (a.len(), b.len());
+    same_length(a.len(), b.len(), at)
+}
+
+fn same_length(before: usize, now: usize, at: &str) -> FieldComparison {
     if before == now {
         return Ok(());
     }
@@ -243,26 +263,20 @@ fn brief(value: &Value) -> String {
     }
 }
 
-fn same_keys(
-    a: &Map<String, Value>,
-    b: &Map<String, Value>,
-    at: &str,
-) -> std::result::Result<(), (String, String)> {
-    let none = Value::Null;
+fn same_keys(a: &Map<String, Value>, b: &Map<String, Value>, at: &str) -> FieldComparison {
     let keys = a.keys().chain(b.keys().filter(|key| !a.contains_key(*key)));
     for key in keys {
-        let at = if at.is_empty() {
-            key.clone()
-        } else {
-            format!("{at}.{key}")
-        };
-        same(
-            a.get(key).unwrap_or(&none),
-            b.get(key).unwrap_or(&none),
-            &at,
-        )?;
+        let [before, now] = [a, b].map(|map| map.get(key).unwrap_or(&Value::Null));
+        same(before, now, &field_path(at, key))?;
     }
     Ok(())
+}
+
+fn field_path(at: &str, key: &str) -> String {
+    match at {
+        "" => key.to_owned(),
+        _ => format!("{at}.{key}"),
+    }
 }
 
 #[cfg(test)]

@@ -83,37 +83,36 @@ pub fn generate(
     stop: &AtomicBool,
 ) -> Result<DatasetCounts> {
     let recipe_hash = plan.recipe_hash();
-    let write = |k| {
-        let sample = make(k)?;
-        let (line, write) = timed(|| write(plan, &recipe_hash, k, &sample));
-        Ok((
-            line?,
-            Times {
+    run(
+        plan,
+        |k| {
+            let sample = make(k)?;
+            let (line, write) = timed(|| write_sample(plan, &recipe_hash, k, &sample));
+            let times = Times {
                 write,
                 ..sample.times
-            },
-        ))
-    };
-    run(plan, write, progress, stop)
+            };
+            Ok((line?, times))
+        },
+        progress,
+        stop,
+    )
 }
 
 /// Writes the files of a sample.
-fn write(plan: &Plan, recipe_hash: &str, k: u64, sample: &Sample) -> Result<JournalLine> {
+fn write_sample(plan: &Plan, recipe_hash: &str, k: u64, sample: &Sample) -> Result<JournalLine> {
     let Plan {
-        folder,
-        seed,
-        classes,
-        ..
+        folder, classes, ..
     } = plan;
-    check(sample, classes.len())?;
+    check_image_size(sample)?;
+    check_object_classes(sample, classes.len())?;
     let labelled = plan.obstructed.labelled(&sample.labels, classes.len());
-    let part = plan.split.part(k, plan.count);
     let entry = Entry {
         k,
-        seed: *seed,
+        seed: plan.seed,
         classes,
         recipe_hash,
-        part,
+        part: plan.split.part(k, plan.count),
         sample,
         labelled: &labelled,
     };
@@ -125,28 +124,23 @@ fn write(plan: &Plan, recipe_hash: &str, k: u64, sample: &Sample) -> Result<Jour
 }
 
 /// Meets what the writers take for granted.
-fn check(sample: &Sample, classes: usize) -> Result<()> {
+fn check_image_size(sample: &Sample) -> Result<()> {
     let (w, h) = sample.frame.size();
     let [lw, lh] = sample.labels.image;
-    if (w, h) != (lw as usize, lh as usize) {
-        return Err(Error::value(
-            "labels.image",
-            format!("{lw} x {lh}, but the picture has {w} x {h}"),
-        ));
+    if (w, h) == (lw as usize, lh as usize) {
+        return Ok(());
     }
-    match sample
-        .labels
-        .objects
-        .iter()
-        .position(|object| object.class as usize >= classes)
-    {
-        Some(i) => {
-            let class = sample.labels.objects[i].class;
-            Err(Error::value(
-                format!("labels.objects[{i}].class"),
-                format!("{class}, but there are {classes} classes"),
-            ))
+    let what = format!("{lw} x {lh}, but the picture has {w} x {h}");
+    Err(Error::value("labels.image", what))
+}
+
+fn check_object_classes(sample: &Sample, count: usize) -> Result<()> {
+    for (i, object) in sample.labels.objects.iter().enumerate() {
+        let class = object.class;
+        if class as usize >= count {
+            let what = format!("{class}, but there are {count} classes");
+            return Err(Error::value(format!("labels.objects[{i}].class"), what));
         }
-        None => Ok(()),
     }
+    Ok(())
 }

@@ -65,33 +65,31 @@ impl Inputs {
             .par_iter()
             .map(|(name, path)| self.look(name, path, now))
             .collect();
-        let read: Vec<Input> = read.into_iter().collect::<Result<_>>()?;
-        let checksums = read.iter().map(|input| input.crc32).collect();
-        self.now
-            .extend(files.iter().map(|(name, _)| name.clone()).zip(read));
+        let mut checksums = Vec::new();
+        for (input, (name, _)) in read.into_iter().zip(files) {
+            let input = input?;
+            checksums.push(input.crc32);
+            self.now.insert(name.clone(), input);
+        }
         Ok(checksums)
     }
 
     fn look(&self, name: &str, path: &Path, now: SystemTime) -> Result<Input> {
         let meta = std::fs::metadata(path).map_err(|e| Error::file(path, e))?;
         let stamp = stamp(&meta);
-        match self.before.get(name).filter(|input| input.stamp == stamp) {
-            Some(input) => Ok(input.clone()),
-            None => Ok(Input {
-                stamp,
-                crc32: Checksum::from_file(path)?.crc32,
-                is_settled: is_settled(&meta, now),
-            }),
+        if let Some(known) = self.before.get(name).filter(|input| input.stamp == stamp) {
+            return Ok(known.clone());
         }
+        Ok(Input {
+            stamp,
+            crc32: Checksum::from_file(path)?.crc32,
+            is_settled: is_settled(&meta, now),
+        })
     }
 
     /// Keeps the checksums for the next run. They only save time: a folder without room for them is no error.
     pub(crate) fn keep(&self, folder: &Path) {
-        let settled: BTreeMap<_, _> = self
-            .now
-            .iter()
-            .filter(|(_, input)| input.is_settled)
-            .collect();
+        let settled = self.settled();
         if settled.is_empty() || settled == self.before.iter().collect() {
             return;
         }
@@ -100,6 +98,11 @@ impl Inputs {
         if let Err(e) = io::write_through(&folder.join(INPUTS), |out| out.write_all(&text)) {
             log::debug!("{e}");
         }
+    }
+
+    fn settled(&self) -> BTreeMap<&String, &Input> {
+        let inputs = self.now.iter();
+        inputs.filter(|(_, input)| input.is_settled).collect()
     }
 
     /// Has every file read again by the next run.
@@ -130,14 +133,12 @@ fn stamp(meta: &Metadata) -> String {
 }
 
 fn is_settled(meta: &Metadata, now: SystemTime) -> bool {
-    let latest = [meta.modified().ok(), changed(meta)]
-        .into_iter()
-        .flatten()
-        .max();
-    latest.is_some_and(|latest| {
-        now.duration_since(latest)
-            .is_ok_and(|age| age > SETTLED_AGE)
-    })
+    let times = [meta.modified().ok(), changed(meta)];
+    let Some(latest) = times.into_iter().flatten().max() else {
+        return false;
+    };
+    let age = now.duration_since(latest);
+    age.is_ok_and(|age| age > SETTLED_AGE)
 }
 
 /// When a file's content or its names changed last: a time that nobody can set back.

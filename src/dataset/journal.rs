@@ -32,14 +32,11 @@ impl Journal {
     /// compared by checksum.
     pub(crate) fn open(folder: &Path) -> Result<Self> {
         let path = folder.join(JOURNAL);
-        let fail = |e: std::io::Error| Error::file(&path, e);
         let mut file = io::open_own(&path)?;
-        let read = read_lines(BufReader::new(&file), false).map_err(fail)?;
+        let read = read_journal(&file, &path, false)?;
         let known = whole_lines(read, &path, "their samples are made again");
         let lines = lines_with_files(known, folder);
-        if is_torn(&file).map_err(fail)? {
-            file.write_all(b"\n").map_err(fail)?;
-        }
+        end_last_line(&mut file).map_err(|e| Error::file(&path, e))?;
         Ok(Self { path, file, lines })
     }
 
@@ -92,19 +89,20 @@ fn is_torn(mut file: &File) -> std::io::Result<bool> {
     Ok(last != *b"\n")
 }
 
+fn end_last_line(file: &mut File) -> std::io::Result<()> {
+    if is_torn(file)? {
+        file.write_all(b"\n")?;
+    }
+    Ok(())
+}
+
 /// The lines whose files are there, by number.
 fn lines_with_files(known: Vec<JournalLine>, folder: &Path) -> BTreeMap<u64, JournalLine> {
     let synced = known.len().saturating_sub(UNSYNCED_LINES);
     let held: Vec<JournalLine> = known
         .into_par_iter()
         .enumerate()
-        .filter(|(i, line)| {
-            if *i < synced {
-                line.has_same_sizes(folder)
-            } else {
-                line.has_same_bytes(folder)
-            }
-        })
+        .filter(|(i, line)| line.has_files(folder, *i < synced))
         .map(|(_, line)| line)
         .collect();
     held.into_iter().map(|line| (line.k, line)).collect()
@@ -120,8 +118,7 @@ pub fn repair(folder: &Path) -> Result<(usize, usize)> {
     Inputs::forget(folder);
     let path = folder.join(JOURNAL);
     // Made where it is not there: a run may have ended before its first sample.
-    let file = io::open_own(&path)?;
-    let read = read_lines(BufReader::new(file), false).map_err(|e| Error::file(&path, e))?;
+    let read = read_journal(&io::open_own(&path)?, &path, false)?;
     let all = read.len();
     let lines = by_number(read);
     let good: Vec<&JournalLine> = lines
@@ -146,8 +143,12 @@ pub(crate) type NumberedLines = Vec<(usize, std::result::Result<JournalLine, Str
 pub(crate) fn numbered_lines(folder: &Path) -> Result<NumberedLines> {
     let path = io::inside(folder, JOURNAL)?;
     let is_older = folder::is_older(folder)?;
-    let fail = |e: std::io::Error| Error::file(&path, e);
-    read_lines(BufReader::new(File::open(&path).map_err(fail)?), is_older).map_err(fail)
+    let file = File::open(&path).map_err(|e| Error::file(&path, e))?;
+    read_journal(&file, &path, is_older)
+}
+
+fn read_journal(file: &File, path: &Path, is_older: bool) -> Result<NumberedLines> {
+    read_lines(BufReader::new(file), is_older).map_err(|e| Error::file(path, e))
 }
 
 /// The lines that are not damaged, in the order of the file.
@@ -158,11 +159,8 @@ fn whole_lines(read: NumberedLines, path: &Path, consequence: &str) -> Vec<Journ
 
 /// The lines that are not damaged, in order of number; of one number the last.
 fn by_number(read: NumberedLines) -> Vec<JournalLine> {
-    let lines: BTreeMap<u64, JournalLine> = read
-        .into_iter()
-        .filter_map(|(_, line)| line.ok())
-        .map(|line| (line.k, line))
-        .collect();
+    let good = read.into_iter().filter_map(|(_, line)| line.ok());
+    let lines: BTreeMap<u64, _> = good.map(|line| (line.k, line)).collect();
     lines.into_values().collect()
 }
 
@@ -180,15 +178,9 @@ const MAX_LINE_BYTES: u64 = 1 << 20;
 pub(crate) fn read_lines(mut from: impl BufRead, is_older: bool) -> std::io::Result<NumberedLines> {
     let mut lines = Vec::new();
     for i in 1.. {
-        let mut text = Vec::new();
-        let mut limited = from.by_ref().take(MAX_LINE_BYTES);
-        if limited.read_until(b'\n', &mut text)? == 0 {
+        let text = read_line(&mut from, i)?;
+        if text.is_empty() {
             break;
-        }
-        if text.len() as u64 == MAX_LINE_BYTES {
-            return Err(std::io::Error::other(format!(
-                "line {i} is longer than {MAX_LINE_BYTES} bytes, expected a journal"
-            )));
         }
         let text = text.trim_ascii();
         if !text.is_empty() {
@@ -196,6 +188,18 @@ pub(crate) fn read_lines(mut from: impl BufRead, is_older: bool) -> std::io::Res
         }
     }
     Ok(lines)
+}
+
+/// The next line with its end; nothing at the end of the file.
+fn read_line(from: &mut impl BufRead, i: usize) -> std::io::Result<Vec<u8>> {
+    let mut text = Vec::new();
+    let mut limited = from.by_ref().take(MAX_LINE_BYTES);
+    limited.read_until(b'\n', &mut text)?;
+    if text.len() as u64 == MAX_LINE_BYTES {
+        let what = format!("line {i} is longer than {MAX_LINE_BYTES} bytes, expected a journal");
+        return Err(std::io::Error::other(what));
+    }
+    Ok(text)
 }
 
 /// Writes a journal anew.

@@ -49,31 +49,26 @@ impl JournalLine {
     /// The line of a sample whose files have just been written.
     pub(crate) fn new(entry: &Entry<'_>, folder: &Path, files: &[PathBuf]) -> Result<Self> {
         let objects = &entry.sample.labels.objects;
+        let obstructed = objects.iter().filter(|object| !object.is_topmost());
         Ok(Self {
             k: entry.k,
             part: entry.part,
             classes: count_by_class(entry),
-            obstructed: objects.iter().filter(|object| !object.is_topmost()).count() as u32,
+            obstructed: obstructed.count() as u32,
             knotted: cyclic_overlaps(objects).len() as u32,
             retries: entry.sample.rejected_scenes() as u32,
-            files: files
-                .iter()
-                .map(|path| WrittenFile::read_back(folder, path))
-                .collect::<Result<_>>()?,
+            files: read_back_all(folder, files)?,
         })
     }
 
     /// Reads a line, if it is as it was written; `is_older` says that lines without a checksum are taken as well.
     pub(crate) fn parse(text: &[u8], is_older: bool) -> std::result::Result<Self, String> {
-        let line: Self = match split_seal(text) {
-            Some((body, crc32)) if crc32fast::hash(body) == crc32 => {
-                serde_json::from_slice(&[body, b"}"].concat())
-            }
-            Some(_) => return Err("has other bytes than when it was written".into()),
-            None if is_older => serde_json::from_slice(text),
+        let line = match split_seal(text) {
+            Some(sealed) => unsealed(sealed)?,
+            None if is_older => text.to_vec(),
             None => return Err("has no checksum, or is torn".into()),
-        }
-        .map_err(|e| e.to_string())?;
+        };
+        let line: Self = serde_json::from_slice(&line).map_err(|e| e.to_string())?;
         line.files.iter().try_for_each(WrittenFile::check_path)?;
         Ok(line)
     }
@@ -87,15 +82,11 @@ impl JournalLine {
 
     /// What a writer needs to know to join it with others.
     pub(crate) fn written(&self) -> Written {
-        let files = self
-            .files
-            .iter()
-            .map(|file| file.path.split('/').collect())
-            .collect();
+        let files = self.files.iter();
         Written {
             k: self.k,
             part: self.part,
-            files,
+            files: files.map(|file| file.path.split('/').collect()).collect(),
         }
     }
 
@@ -104,9 +95,10 @@ impl JournalLine {
     /// # Errors
     /// When it has none, or none that lies in the dataset.
     pub(crate) fn file_name(&self, folder: &Path, kind: &str) -> Result<&str> {
-        let file = self.files.iter().find(|file| file.path.starts_with(kind));
-        let file =
-            file.ok_or_else(|| Error::file(folder, format!("sample {} has no {kind}", self.k)))?;
+        let Some(file) = self.files.iter().find(|file| file.path.starts_with(kind)) else {
+            let what = format!("sample {} has no {kind}", self.k);
+            return Err(Error::file(folder, what));
+        };
         io::inside(folder, &file.path)?;
         Ok(&file.path)
     }
@@ -121,16 +113,24 @@ impl JournalLine {
 
     /// Every file is there with its very bytes.
     pub(crate) fn has_same_bytes(&self, folder: &Path) -> bool {
-        self.files
-            .iter()
-            .all(|file| file.difference(folder).is_none())
+        let mut files = self.files.iter();
+        files.all(|file| file.difference(folder).is_none())
     }
 
     /// Every file is there in its full size.
-    pub(crate) fn has_same_sizes(&self, folder: &Path) -> bool {
+    fn has_same_sizes(&self, folder: &Path) -> bool {
         self.files
             .iter()
             .all(|file| file.length(folder) == Some(file.bytes))
+    }
+
+    /// Every file is there: in its full size where it is on the disk for sure, else with its very bytes.
+    pub(crate) fn has_files(&self, folder: &Path, is_synced: bool) -> bool {
+        if is_synced {
+            self.has_same_sizes(folder)
+        } else {
+            self.has_same_bytes(folder)
+        }
     }
 }
 
@@ -138,16 +138,20 @@ impl JournalLine {
 fn count_by_class(entry: &Entry<'_>) -> Vec<[u32; 2]> {
     let mut classes = vec![[0; 2]; entry.classes.len()];
     for object in &entry.sample.labels.objects {
-        let label = entry
-            .labelled
-            .iter()
-            .find(|label| label.object.id == object.id);
+        let label = entry.label_of(object.id);
         let class = label.map_or(object.class, |label| label.class);
         let count = &mut classes[class as usize];
         count[0] += 1;
         count[1] += u32::from(label.is_some());
     }
     classes
+}
+
+fn read_back_all(folder: &Path, files: &[PathBuf]) -> Result<Vec<WrittenFile>> {
+    let files = files.iter();
+    files
+        .map(|path| WrittenFile::read_back(folder, path))
+        .collect()
 }
 
 impl WrittenFile {
@@ -177,17 +181,20 @@ impl WrittenFile {
 
     /// How the file on the disk differs from this.
     pub(crate) fn difference(&self, folder: &Path) -> Option<String> {
-        let Self { path, bytes, crc32 } = self;
+        let Self { path, bytes, .. } = self;
         match self.length(folder) {
             None => Some(format!("{path} is missing")),
-            Some(length) if length != *bytes => {
-                Some(format!("{path} has {length} bytes, expected {bytes}"))
-            }
-            Some(_) => match Self::read_back(folder, Path::new(path)) {
-                Ok(found) if found.crc32 == *crc32 => None,
-                Ok(_) => Some(format!("{path} has other bytes than when it was written")),
-                Err(e) => Some(e.to_string()),
-            },
+            Some(length) if length == *bytes => self.changed_content(folder),
+            Some(length) => Some(format!("{path} has {length} bytes, expected {bytes}")),
+        }
+    }
+
+    fn changed_content(&self, folder: &Path) -> Option<String> {
+        let path = &self.path;
+        match Self::read_back(folder, Path::new(path)) {
+            Ok(found) if found.crc32 == self.crc32 => None,
+            Ok(_) => Some(format!("{path} has other bytes than when it was written")),
+            Err(e) => Some(e.to_string()),
         }
     }
 
@@ -207,6 +214,15 @@ impl WrittenFile {
 
 /// What stands before a line's checksum.
 const SEAL: &str = ",\"crc32\":";
+
+/// A line without its checksum, if that is the checksum of its bytes.
+fn unsealed((body, crc32): (&[u8], u32)) -> std::result::Result<Vec<u8>, String> {
+    if crc32fast::hash(body) == crc32 {
+        Ok([body, b"}"].concat())
+    } else {
+        Err("has other bytes than when it was written".into())
+    }
+}
 
 /// The part of a line that its checksum is of, and the checksum.
 fn split_seal(text: &[u8]) -> Option<(&[u8], u32)> {

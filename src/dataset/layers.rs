@@ -3,6 +3,7 @@
 use crate::dataset::{Entry, Part, Sample, Writer};
 use crate::deep::{DeepImage, DeepSample};
 use crate::error::{Error, Result};
+use crate::image::Image;
 use crate::io;
 use crate::io::exr::write_channels;
 use crate::label::LabelOptions;
@@ -51,24 +52,17 @@ impl Writer for Layers {
     fn write(&self, folder: &Path, entry: &Entry<'_>) -> Result<Vec<PathBuf>> {
         let (path, sample) = (entry.path(KIND, "exr"), entry.sample);
         check_deep(sample)?;
-        let objects = &sample.labels.objects;
-        let names: Vec<_> = objects
-            .iter()
-            .map(|o| (o.id, name(o.id, o.class, entry.classes)))
-            .collect();
-        let ids = Cryptomatte::new(&sample.deep, "CryptoObject", &names);
-        let mut channels = picture(entry);
+        let ids = cryptomatte(entry);
+        let mut channels = picture_channels(&sample.frame, &sample.deep);
         channels.extend(ids.channels);
         if self.cards {
-            channels.extend(objects.iter().flat_map(|o| card(&sample.deep, o.id)));
+            let objects = sample.labels.objects.iter();
+            channels.extend(objects.flat_map(|o| object_channels(&sample.deep, o.id)));
         }
-        let borrowed: Vec<_> = channels
-            .iter()
-            .map(|(name, values)| (name.as_str(), values.as_slice()))
-            .collect();
         let mut notes = ids.metadata;
         notes.extend(provenance(entry));
-        write_channels(folder.join(&path), sample.frame.size(), &borrowed, &notes)?;
+        let size = sample.frame.size();
+        write_channels(folder.join(&path), size, &borrowed(&channels), &notes)?;
         Ok(vec![path])
     }
 }
@@ -97,18 +91,15 @@ fn check_deep(sample: &Sample) -> Result<()> {
     if (deep_w, deep_h) == (w, h) {
         return Ok(());
     }
-    Err(Error::value(
-        "deep",
-        format!("{deep_w} x {deep_h} pixels, expected the picture's {w} x {h}"),
-    ))
+    let what = format!("{deep_w} x {deep_h} pixels, expected the picture's {w} x {h}");
+    Err(Error::value("deep", what))
 }
 
 /// The name of a channel and how a pixel gives its value.
 type Channel<P> = (&'static str, fn(&P) -> f32);
 
 /// The picture, its depth and its shadows.
-fn picture(entry: &Entry<'_>) -> Vec<NamedChannel> {
-    let (frame, deep) = (&entry.sample.frame, &entry.sample.deep);
+fn picture_channels(frame: &Image<PremulRgba>, deep: &DeepImage) -> Vec<NamedChannel> {
     let color: [Channel<PremulRgba>; 4] = [
         ("R", |p| p.r),
         ("G", |p| p.g),
@@ -120,16 +111,32 @@ fn picture(entry: &Entry<'_>) -> Vec<NamedChannel> {
         ("shadow.G", |s| s.g),
         ("shadow.B", |s| s.b),
     ];
-    let mut channels: Vec<NamedChannel> = Vec::new();
-    for (name, value) in color {
-        channels.push((name.into(), frame.pixels().iter().map(value).collect()));
-    }
-    channels.push(("Z".into(), each(deep, nearest)));
-    for (name, value) in shadow {
-        let values = deep.shadow().pixels().iter().map(value).collect();
-        channels.push((name.into(), values));
-    }
+    let mut channels = channels_of(frame, &color);
+    channels.push(("Z".into(), value_per_pixel(deep, nearest)));
+    channels.extend(channels_of(deep.shadow(), &shadow));
     channels
+}
+
+fn channels_of<P: Copy>(image: &Image<P>, channels: &[Channel<P>]) -> Vec<NamedChannel> {
+    let channels = channels.iter();
+    channels
+        .map(|(name, value)| ((*name).into(), image.pixels().iter().map(value).collect()))
+        .collect()
+}
+
+fn borrowed(channels: &[NamedChannel]) -> Vec<(&str, &[f32])> {
+    channels
+        .iter()
+        .map(|(name, values)| (name.as_str(), values.as_slice()))
+        .collect()
+}
+
+fn cryptomatte(entry: &Entry<'_>) -> Cryptomatte {
+    let objects = entry.sample.labels.objects.iter();
+    let names: Vec<_> = objects
+        .map(|o| (o.id, name(o.id, o.class, entry.classes)))
+        .collect();
+    Cryptomatte::new(&entry.sample.deep, "CryptoObject", &names)
 }
 
 /// Depth of the first sample of a pixel of which enough is seen to belong to a mask.
@@ -190,22 +197,27 @@ const OBJECT_CHANNELS: [ObjectChannel; 6] = [
     },
 ];
 
-fn card(deep: &DeepImage, id: ObjectId) -> Vec<NamedChannel> {
-    let plane = |ObjectChannel {
-                     layer,
-                     name,
-                     value,
-                     none,
-                 }: &ObjectChannel| {
-        let own =
-            |samples: &[DeepSample]| samples.iter().find(|s| s.object == id).map_or(*none, value);
-        (format!("{layer}{:03}.{name}", id.0), each(deep, own))
-    };
-    OBJECT_CHANNELS.iter().map(plane).collect()
+fn object_channels(deep: &DeepImage, id: ObjectId) -> Vec<NamedChannel> {
+    let channels = OBJECT_CHANNELS.iter();
+    channels
+        .map(|channel| {
+            let name = format!("{}{:03}.{}", channel.layer, id.0, channel.name);
+            (name, channel.plane(deep, id))
+        })
+        .collect()
+}
+
+impl ObjectChannel {
+    fn plane(&self, deep: &DeepImage, id: ObjectId) -> Vec<f32> {
+        value_per_pixel(deep, |samples| {
+            let own = samples.iter().find(|s| s.object == id);
+            own.map_or(self.none, self.value)
+        })
+    }
 }
 
 /// One value for each pixel.
-fn each(deep: &DeepImage, value: impl Fn(&[DeepSample]) -> f32) -> Vec<f32> {
+fn value_per_pixel(deep: &DeepImage, value: impl Fn(&[DeepSample]) -> f32) -> Vec<f32> {
     let pixels = (0..deep.height()).flat_map(|y| (0..deep.width()).map(move |x| (x, y)));
     pixels.map(|(x, y)| value(deep.at(x, y))).collect()
 }

@@ -4,7 +4,7 @@ use crate::dataset::yolo_yaml::DataYaml;
 use crate::dataset::{Part, SampleRecord};
 use crate::error::{Error, Result};
 use crate::io;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 /// Images for training and for validation, in order; none is a copy.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -23,19 +23,20 @@ impl Listing {
     /// # Errors
     /// No `data.yaml`; a folder or list that cannot be read.
     pub fn read(folder: &Path) -> Result<Self> {
-        let folder = std::path::absolute(folder).map_err(|e| Error::file(folder, e))?;
+        let folder = absolute_path(folder)?;
         let (yaml, _) = DataYaml::read(&io::read_text(folder.join("data.yaml"))?);
+        let [train, val] = Part::ALL.map(|part| images_of(&folder, yaml.folders(part)));
         Ok(Self {
-            train: images_of(&folder, yaml.folders(Part::Train))?,
-            val: images_of(&folder, yaml.folders(Part::Val))?,
+            train: train?,
+            val: val?,
             classes: yaml.names().to_vec(),
         })
     }
 
     /// All images in order of name: the series as it was taken.
     pub fn series(&self) -> Vec<PathBuf> {
-        let mut all: Vec<PathBuf> = self.train.iter().chain(&self.val).cloned().collect();
-        all.sort_by(|a, b| a.file_name().cmp(&b.file_name()).then_with(|| a.cmp(b)));
+        let mut all = [&self.train[..], &self.val[..]].concat();
+        all.sort_by(|a, b| (a.file_name(), a).cmp(&(b.file_name(), b)));
         all
     }
 
@@ -46,10 +47,8 @@ impl Listing {
     /// A share that is not in `0..=1`.
     pub fn head(&self, share: f64) -> Result<Self> {
         if !(0.0..=1.0).contains(&share) {
-            return Err(Error::value(
-                "head",
-                format!("{share}, expected a share, 0 to 1"),
-            ));
+            let what = format!("{share}, expected a share, 0 to 1");
+            return Err(Error::value("head", what));
         }
         Ok(Self {
             train: first_share(&self.train, share),
@@ -64,19 +63,13 @@ impl Listing {
     /// When a file cannot be written.
     pub fn write(&self, folder: &Path) -> Result<()> {
         io::create_folder(folder)?;
-        let folder = std::path::absolute(folder).map_err(|e| Error::file(folder, e))?;
+        let folder = absolute_path(folder)?;
         for (part, images) in Part::ALL.into_iter().zip([&self.train, &self.val]) {
-            // Trainers take `./` for the folder of the list.
-            let line = |path: &PathBuf| format!("./{}\n", io::relative(path, &folder).display());
-            io::write_text(
-                folder.join(format!("{}.txt", part.name())),
-                &images.iter().map(line).collect::<String>(),
-            )?;
+            let list = folder.join(format!("{}.txt", part.name()));
+            io::write_text(list, &list_of(images, &folder))?;
         }
-        io::write_text(
-            folder.join("data.yaml"),
-            &DataYaml::write_with(&self.classes, |part| format!("{part}.txt")),
-        )
+        let yaml = DataYaml::write_with(&self.classes, |part| format!("{part}.txt"));
+        io::write_text(folder.join("data.yaml"), &yaml)
     }
 }
 
@@ -93,22 +86,38 @@ fn images_of(folder: &Path, parts: &[String]) -> Result<Vec<PathBuf>> {
 fn images_in(folder: &Path, part: &str) -> Result<Vec<PathBuf>> {
     let path = folder.join(part);
     if part.ends_with(".txt") {
-        let from = path.parent().unwrap_or(folder).to_path_buf();
-        let text = io::read_text(&path)?;
-        return Ok(text
-            .lines()
-            .filter(|line| !line.is_empty())
-            .map(|line| without_dots(&from.join(line)))
-            .collect());
+        listed_images(&path)
+    } else {
+        images_in_folder(&path)
     }
-    let entries = std::fs::read_dir(&path).map_err(|e| Error::file(&path, e))?;
-    let mut images: Vec<PathBuf> = entries
-        .flatten()
-        .map(|e| e.path())
-        .filter(|path| is_image(path))
-        .collect();
+}
+
+fn listed_images(list: &Path) -> Result<Vec<PathBuf>> {
+    let folder = list.parent().unwrap_or(Path::new(""));
+    let text = io::read_text(list)?;
+    let lines = text.lines().filter(|line| !line.is_empty());
+    Ok(lines.map(|line| without_dots(&folder.join(line))).collect())
+}
+
+/// In order of name.
+fn images_in_folder(folder: &Path) -> Result<Vec<PathBuf>> {
+    let entries = std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
+    let paths = entries.flatten().map(|entry| entry.path());
+    let mut images: Vec<PathBuf> = paths.filter(|path| is_image(path)).collect();
     images.sort();
     Ok(images)
+}
+
+/// Images as lines of a list; trainers take `./` for its folder.
+fn list_of(images: &[PathBuf], folder: &Path) -> String {
+    images
+        .iter()
+        .map(|path| format!("./{}\n", io::relative(path, folder).display()))
+        .collect()
+}
+
+fn absolute_path(path: &Path) -> Result<PathBuf> {
+    std::path::absolute(path).map_err(|e| Error::file(path, e))
 }
 
 fn first_share(images: &[PathBuf], share: f64) -> Vec<PathBuf> {
@@ -120,8 +129,8 @@ fn without_dots(path: &Path) -> PathBuf {
     let mut plain = PathBuf::new();
     for step in path.components() {
         match step {
-            std::path::Component::CurDir => {}
-            std::path::Component::ParentDir => drop(plain.pop()),
+            Component::CurDir => {}
+            Component::ParentDir => drop(plain.pop()),
             step => plain.push(step),
         }
     }
@@ -138,15 +147,10 @@ pub(crate) fn is_image(path: &Path) -> bool {
 /// # Errors
 /// When there is none beside it.
 pub(crate) fn record_of(image: &Path) -> Result<SampleRecord> {
-    let swapped: PathBuf = image
-        .iter()
-        .map(|step| {
-            if step == "images" {
-                "scenes".as_ref()
-            } else {
-                step
-            }
-        })
-        .collect();
-    io::read_json(swapped.with_extension("json"))
+    let steps = image.iter();
+    let swapped = steps.map(|step| match step {
+        step if step == "images" => "scenes".as_ref(),
+        step => step,
+    });
+    io::read_json(swapped.collect::<PathBuf>().with_extension("json"))
 }

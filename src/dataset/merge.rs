@@ -38,41 +38,52 @@ pub fn merge(
     let lines = dataset.lines(shards)?;
     if let Some(k) = (0..dataset.count).find(|k| !lines.contains_key(k)) {
         let shard = dataset.shard_of(k, shards).unwrap_or(folder);
-        return Err(Error::file(
-            shard,
-            format!("sample {k} is missing: finish this shard first"),
-        ));
+        let what = format!("sample {k} is missing: finish this shard first");
+        return Err(Error::file(shard, what));
     }
-    let plan = plan(dataset.document, dataset.count, folder)?;
-    let copy_sample = |k| {
-        let (shard, line): &(&PathBuf, JournalLine) = &lines[&k];
-        for file in &line.files {
-            copy(shard, folder, file)?;
-        }
-        Ok((line.clone(), Times::default()))
-    };
-    run(&plan, copy_sample, progress, stop)
+    let plan = merged_plan(dataset.document, dataset.count, folder)?;
+    run(&plan, |k| copy_sample(&lines[&k], folder), progress, stop)
+}
+
+/// Copies the files of a sample from its shard.
+fn copy_sample(
+    (shard, line): &(&PathBuf, JournalLine),
+    folder: &Path,
+) -> Result<(JournalLine, Times)> {
+    for file in &line.files {
+        copy(shard, folder, file)?;
+    }
+    Ok((line.clone(), Times::default()))
 }
 
 /// The lines of a shard's journal, all of them as they were written.
 fn lines_in(folder: &Path, shard: Shard, count: u64) -> Result<Vec<JournalLine>> {
     let mut lines = Vec::new();
     for (i, line) in numbered_lines(folder)? {
-        let problem = match line {
-            Ok(line) if line.k < count && shard.contains(line.k) => {
-                lines.push(line);
-                continue;
-            }
-            Ok(line) => format!(
-                "sample {} is none of shard {shard} of {count} samples",
-                line.k
-            ),
-            Err(what) => format!("{what}; run this shard again with --resume"),
-        };
-        let what = format!("line {i}: {problem}");
-        return Err(Error::file(folder.join(JOURNAL), what));
+        let line = line.map_err(|what| format!("{what}; run this shard again with --resume"));
+        let line = line.and_then(|line| own_line(line, shard, count));
+        lines.push(line.map_err(|problem| {
+            let what = format!("line {i}: {problem}");
+            Error::file(folder.join(JOURNAL), what)
+        })?);
     }
     Ok(lines)
+}
+
+/// The line, if its sample is one of the shard.
+fn own_line(
+    line: JournalLine,
+    shard: Shard,
+    count: u64,
+) -> std::result::Result<JournalLine, String> {
+    let k = line.k;
+    if k < count && shard.contains(k) {
+        Ok(line)
+    } else {
+        Err(format!(
+            "sample {k} is none of shard {shard} of {count} samples"
+        ))
+    }
 }
 
 /// What all shards say of themselves.
@@ -87,10 +98,8 @@ struct ShardedDataset {
 impl ShardedDataset {
     /// Opens shards, which must be all of one dataset.
     fn open(folders: &[PathBuf]) -> Result<Self> {
-        let opened: Vec<(Value, ShardShare)> = folders
-            .iter()
-            .map(|folder| open(folder))
-            .collect::<Result<_>>()?;
+        let opened = folders.iter().map(|folder| open_shard(folder));
+        let opened: Vec<(Value, ShardShare)> = opened.collect::<Result<_>>()?;
         let Some((first, share)) = opened.first() else {
             return Err(Error::value("shards", "none, expected their folders"));
         };
@@ -137,13 +146,11 @@ fn check_complete(folders: &[PathBuf], shares: &[Shard], of: u64) -> Result<()> 
             return Err(Error::file(&folders[i], what));
         }
     }
-    match (1..=of).find(|index| !places.contains_key(index)) {
-        None => Ok(()),
-        Some(index) => Err(Error::value(
-            "shards",
-            format!("shard {index}/{of} is missing"),
-        )),
-    }
+    let Some(index) = (1..=of).find(|index| !places.contains_key(index)) else {
+        return Ok(());
+    };
+    let what = format!("shard {index}/{of} is missing");
+    Err(Error::value("shards", what))
 }
 
 /// Fails on the first field in which a shard's dataset is not the first shard's.
@@ -168,6 +175,11 @@ struct ShardShare {
 }
 
 impl ShardShare {
+    fn from_value(value: Value) -> Result<Self> {
+        let share: Self = serde_json::from_value(value).map_err(|e| Error::value("shard", e))?;
+        share.check()
+    }
+
     /// Fails where there can be no such share.
     fn check(self) -> Result<Self> {
         Shard::new(self.shard.index, self.shard.of)?;
@@ -177,43 +189,44 @@ impl ShardShare {
 }
 
 /// What a shard's folder was made from, and which share it is.
-fn open(path: &Path) -> Result<(Value, ShardShare)> {
-    let document = folder::identity(path)?;
-    let mut document =
-        document.ok_or_else(|| Error::file(path, format!("no {IDENTITY}, expected a shard")))?;
+fn open_shard(path: &Path) -> Result<(Value, ShardShare)> {
+    let Some(mut document) = folder::identity(path)? else {
+        let what = format!("no {IDENTITY}, expected a shard");
+        return Err(Error::file(path, what));
+    };
     let share = document.as_object_mut().and_then(|map| map.remove("shard"));
     let share = share.ok_or_else(|| Error::file(path, "is a whole dataset, expected a shard"))?;
     folder::of_this_format(&document, path)?;
-    let share = serde_json::from_value(share)
-        .map_err(|e| Error::value("shard", e))
-        .and_then(ShardShare::check);
-    Ok((document, share.map_err(|e| e.in_file(path.join(IDENTITY)))?))
+    let share = ShardShare::from_value(share).map_err(|e| e.in_file(path.join(IDENTITY)))?;
+    Ok((document, share))
 }
 
 /// The plan that a dataset was made with, but for where its samples come from.
-fn plan(mut document: Map<String, Value>, count: u64, folder: &Path) -> Result<Plan> {
-    let settings: Vec<Map<String, Value>> = field(&mut document, "writers")?;
-    let pictures = match settings.iter().find(|map| map.contains_key("pictures")) {
-        Some(map) => field(&mut map.clone(), "pictures")?,
-        None => Pictures::default(),
-    };
-    let writers = settings
-        .into_iter()
-        .flatten()
-        .map(|(name, settings)| writer(&name, settings, &pictures))
-        .collect::<Result<_>>()?;
+fn merged_plan(mut document: Map<String, Value>, count: u64, folder: &Path) -> Result<Plan> {
     Ok(Plan {
         folder: folder.into(),
         count,
         range: SampleRange::All,
+        writers: writers_of(field(&mut document, "writers")?)?,
         seed: field(&mut document, "seed")?,
         recipe: field(&mut document, "recipe")?,
         classes: field(&mut document, "classes")?,
         split: field(&mut document, "split")?,
         obstructed: field(&mut document, "obstructed")?,
-        writers,
         inputs: Inputs::default(),
     })
+}
+
+/// The writers that wrote with these settings.
+fn writers_of(settings: Vec<Map<String, Value>>) -> Result<Vec<Box<dyn Writer>>> {
+    let pictures = match settings.iter().find(|map| map.contains_key("pictures")) {
+        Some(map) => field(&mut map.clone(), "pictures")?,
+        None => Pictures::default(),
+    };
+    let named = settings.into_iter().flatten();
+    named
+        .map(|(name, settings)| writer_of(&name, settings, &pictures))
+        .collect()
 }
 
 fn field<T: serde::de::DeserializeOwned>(
@@ -225,33 +238,33 @@ fn field<T: serde::de::DeserializeOwned>(
 }
 
 /// The writer of a name and settings, as [`Writer::settings`] told them.
-fn writer(name: &str, settings: Value, pictures: &Pictures) -> Result<Box<dyn Writer>> {
-    let wrong = |e: serde_json::Error| Error::value(format!("writers.{name}"), e);
+fn writer_of(name: &str, settings: Value, pictures: &Pictures) -> Result<Box<dyn Writer>> {
     match name {
         "pictures" => Ok(Box::new(*pictures)),
         "sidecar" => Ok(Box::new(Sidecar)),
-        format => {
-            let mut config = json!({ "formats": [format] });
-            if settings.as_object().is_some_and(|map| !map.is_empty()) {
-                config[format] = settings;
-            }
-            let config: LabelConfig = serde_json::from_value(config).map_err(wrong)?;
-            let unknown = || Error::value(format!("writers.{name}"), "no such layout");
-            config
-                .writers(pictures)
-                .into_iter()
-                .next()
-                .ok_or_else(unknown)
-        }
+        format => label_writer(format, settings, pictures)
+            .map_err(|what| Error::value(format!("writers.{name}"), what)),
     }
+}
+
+fn label_writer(
+    format: &str,
+    settings: Value,
+    pictures: &Pictures,
+) -> std::result::Result<Box<dyn Writer>, String> {
+    let mut config = json!({ "formats": [format] });
+    if settings.as_object().is_some_and(|map| !map.is_empty()) {
+        config[format] = settings;
+    }
+    let config: LabelConfig = serde_json::from_value(config).map_err(|e| e.to_string())?;
+    let mut writers = config.writers(pictures).into_iter();
+    writers.next().ok_or_else(|| "no such layout".into())
 }
 
 /// Copies a file, if it is as it was written.
 fn copy(shard: &Path, folder: &Path, file: &WrittenFile) -> Result<()> {
-    let (from, to) = (
-        io::inside(shard, &file.path)?,
-        io::below(folder, &file.path)?,
-    );
+    let from = io::inside(shard, &file.path)?;
+    let to = io::below(folder, &file.path)?;
     io::create_folder(to.parent().unwrap_or(folder))?;
     io::copy(from, to, file.checksum())
 }

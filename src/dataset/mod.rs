@@ -37,6 +37,7 @@ mod listing;
 mod merge;
 mod near_duplicates;
 mod obstructed;
+#[doc(hidden)]
 pub mod page;
 mod partition;
 mod pictures;
@@ -56,38 +57,60 @@ mod yolo_set;
 mod yolo_yaml;
 
 pub use check::{Checked, check};
-pub use coco::{Coco, CocoMask};
+pub use coco::Coco;
+#[doc(hidden)]
+pub use coco::CocoMask;
 pub use config::DatasetConfig;
+#[doc(hidden)]
 pub use contact_sheet::{ContactSheetOptions, ContactTile, contact_sheet, contact_sheet_of};
-pub use counts::{ClassCount, DatasetCounts};
+#[doc(hidden)]
+pub use counts::ClassCount;
+pub use counts::DatasetCounts;
+#[doc(hidden)]
 pub use estimate::LongRun;
 pub use finding::Finding;
 #[doc(hidden)]
 pub use folder::JOURNAL;
-pub use formats::{Extent, Format, LabelConfig};
+#[doc(hidden)]
+pub use formats::Extent;
+pub use formats::{Format, LabelConfig};
 pub use generate::{Plan, generate};
+#[doc(hidden)]
 pub use inputs::Inputs;
 #[cfg(feature = "fuzzing")]
 pub(crate) use journal::read_lines as journal_lines;
+#[doc(hidden)]
 pub use journal::repair;
 pub use layers::Layers;
+#[doc(hidden)]
 pub use listing::Listing;
 pub(crate) use listing::is_image;
 pub use merge::merge;
+#[doc(hidden)]
 pub use near_duplicates::{NEAR_DUPLICATE_RMS, NearDuplicate};
-pub use obstructed::{LabelledObject, OBSTRUCTED, Obstructed};
+pub use obstructed::{LabelledObject, Obstructed};
+#[doc(hidden)]
 pub use partition::{Group, Leakage, Partition};
 pub use pictures::{PictureFormat, Pictures};
 pub use pipeline::Pipeline;
 pub use run::Progress;
-pub use shard::{SampleRange, Shard, ShardChoice};
+#[doc(hidden)]
+pub use shard::ShardChoice;
+pub use shard::{SampleRange, Shard};
 pub use sidecar::{SampleRecord, Sidecar};
-pub use split::{Part, Split, SplitOrder};
+#[doc(hidden)]
+pub use split::SplitOrder;
+pub use split::{Part, Split};
+#[doc(hidden)]
 pub use summary::{SampleSummary, ShownSample, Summary, UnlabelledReason};
+#[doc(hidden)]
 pub use times::Times;
 pub use voc::Voc;
 pub use webdataset::WebDataset;
-pub use yolo::{Yolo, YoloTask};
+pub use yolo::Yolo;
+#[doc(hidden)]
+pub use yolo::YoloTask;
+#[doc(hidden)]
 pub use yolo_set::YoloSet;
 #[cfg(feature = "fuzzing")]
 pub(crate) use yolo_yaml::DataYaml;
@@ -96,7 +119,7 @@ use crate::deep::DeepImage;
 use crate::error::Result;
 use crate::image::Image;
 use crate::label::Labels;
-use crate::pixel::PremulRgba;
+use crate::pixel::{ObjectId, PremulRgba};
 use crate::scene::{Drawn, Scene};
 use std::path::{Path, PathBuf};
 
@@ -157,6 +180,14 @@ impl Sample {
         }
     }
 
+    /// The same with its provenance changed, where it has one.
+    fn with_origin(self, change: impl FnOnce(Provenance) -> Provenance) -> Self {
+        Self {
+            provenance: self.provenance.map(change),
+            ..self
+        }
+    }
+
     /// Scenes that were rejected before this one.
     pub(crate) fn rejected_scenes(&self) -> usize {
         self.provenance
@@ -185,6 +216,11 @@ pub struct Entry<'a> {
 }
 
 impl Entry<'_> {
+    /// The label of an object, if it has one.
+    pub(crate) fn label_of(&self, id: ObjectId) -> Option<&LabelledObject<'_>> {
+        self.labelled.iter().find(|label| label.object.id == id)
+    }
+
     /// Path below the dataset's folder: `images/train/000012.png`.
     pub fn path(&self, kind: &str, extension: &str) -> PathBuf {
         [
@@ -214,14 +250,14 @@ impl Written {
     /// # Errors
     /// When there is none.
     pub fn file(&self, kind: &str) -> std::io::Result<&Path> {
-        let found = self
-            .files
-            .iter()
-            .find(|file| file.starts_with(kind))
-            .map(PathBuf::as_path);
-        found.ok_or_else(|| {
-            std::io::Error::other(format!("sample {} has no file in {kind}", self.k))
-        })
+        let found = self.files.iter().find(|file| file.starts_with(kind));
+        let k = self.k;
+        match found {
+            Some(file) => Ok(file),
+            None => Err(std::io::Error::other(format!(
+                "sample {k} has no file in {kind}"
+            ))),
+        }
     }
 }
 

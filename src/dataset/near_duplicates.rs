@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::filter::resize;
 use crate::image::Image;
 use crate::io;
-use crate::pixel::LinearRgb;
+use crate::pixel::{LinearRgb, Srgb8};
 use rayon::prelude::*;
 use std::path::PathBuf;
 
@@ -34,22 +34,22 @@ pub(crate) struct Thumbnail(Vec<u8>);
 
 impl Thumbnail {
     pub(crate) fn new(picture: &Image<LinearRgb>) -> Self {
-        let grey =
-            |[r, g, b]: [u8; 3]| ((u16::from(r) + 2 * u16::from(g) + u16::from(b)) / 4) as u8;
-        Self(
-            to_srgb8(&resize(picture, THUMBNAIL_PX[0], THUMBNAIL_PX[1]))
-                .pixels()
-                .iter()
-                .map(|p| grey([p.r, p.g, p.b]))
-                .collect(),
-        )
+        let [width, height] = THUMBNAIL_PX;
+        let small = to_srgb8(&resize(picture, width, height));
+        Self(small.pixels().iter().map(grey_code).collect())
     }
 
     /// Root mean square difference, 8-bit codes.
     fn codes_from(&self, other: &Self) -> f64 {
-        let square = |(a, b): (&u8, &u8)| u64::from(a.abs_diff(*b)).pow(2);
-        let sum: u64 = self.0.iter().zip(&other.0).map(square).sum();
+        let pairs = self.0.iter().zip(&other.0);
+        let sum: u64 = pairs.map(|(a, b)| squared_difference(*a, *b)).sum();
         (sum as f64 / self.0.len().max(1) as f64).sqrt()
+    }
+
+    /// The place of the nearest in a list, and how far it is.
+    fn nearest_of(&self, all: &[Self]) -> Option<(usize, f64)> {
+        let distances = all.iter().map(|other| self.codes_from(other)).enumerate();
+        distances.min_by(|a, b| a.1.total_cmp(&b.1))
     }
 }
 
@@ -59,16 +59,13 @@ pub(crate) fn nearest(
     val: &[Thumbnail],
     codes: f64,
 ) -> Vec<(usize, usize, f64)> {
-    let nearest = |(i, own): (usize, &Thumbnail)| {
-        let all = train
-            .iter()
-            .enumerate()
-            .map(|(j, other)| (j, own.codes_from(other)));
-        all.min_by(|a, b| a.1.total_cmp(&b.1))
-            .filter(|(_, d)| *d < codes)
-            .map(|(j, d)| (i, j, d))
-    };
-    val.par_iter().enumerate().filter_map(nearest).collect()
+    val.par_iter()
+        .enumerate()
+        .filter_map(|(i, own)| {
+            let (j, distance) = own.nearest_of(train)?;
+            (distance < codes).then_some((i, j, distance))
+        })
+        .collect()
 }
 
 /// The images of `val` that are nearly the same as one of `train`.
@@ -77,21 +74,29 @@ pub(crate) fn near_pairs(
     val: &[PathBuf],
     codes: f64,
 ) -> Result<Vec<NearDuplicate>> {
-    let small = |images: &[PathBuf]| -> Result<Vec<Thumbnail>> {
-        images
-            .par_iter()
-            .map(|path| Ok(Thumbnail::new(&io::read::<LinearRgb>(path)?)))
-            .collect()
-    };
-    let pair = |(i, j, codes): (usize, usize, f64)| NearDuplicate {
+    let pairs = nearest(&thumbnails(train)?, &thumbnails(val)?, codes);
+    let duplicates = pairs.into_iter().map(|(i, j, codes)| NearDuplicate {
         val: val[i].clone(),
         train: train[j].clone(),
         codes,
-    };
-    Ok(nearest(&small(train)?, &small(val)?, codes)
-        .into_iter()
-        .map(pair)
-        .collect())
+    });
+    Ok(duplicates.collect())
+}
+
+fn thumbnails(images: &[PathBuf]) -> Result<Vec<Thumbnail>> {
+    images
+        .par_iter()
+        .map(|path| Ok(Thumbnail::new(&io::read::<LinearRgb>(path)?)))
+        .collect()
+}
+
+fn grey_code(p: &Srgb8) -> u8 {
+    ((u16::from(p.r) + 2 * u16::from(p.g) + u16::from(p.b)) / 4) as u8
+}
+
+#[inline]
+fn squared_difference(a: u8, b: u8) -> u64 {
+    u64::from(a.abs_diff(b)).pow(2)
 }
 
 #[cfg(test)]

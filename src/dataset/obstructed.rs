@@ -5,7 +5,7 @@ use crate::label::{Labels, ObjectLabel};
 use serde::{Deserialize, Serialize};
 
 /// Name of the class of [`Obstructed::Class`].
-pub const OBSTRUCTED: &str = "obstructed";
+pub(crate) const OBSTRUCTED: &str = "obstructed";
 
 /// What happens to the labels of objects that something lies over.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -19,7 +19,7 @@ pub enum Obstructed {
     /// They are labelled as to be ignored where a format can say so (COCO `iscrowd`, Pascal VOC `difficult`): finding
     /// them is neither right nor wrong. YOLO cannot; there they get no label.
     Ignore,
-    /// They are labelled as a class of their own, the last: [`OBSTRUCTED`].
+    /// They are labelled as a class of their own, the last: `obstructed`.
     Class,
 }
 
@@ -42,12 +42,7 @@ impl Obstructed {
     pub fn classes(self, classes: &[String]) -> Result<Vec<String>> {
         let mut classes = classes.to_vec();
         if self == Self::Class {
-            if classes.iter().any(|name| name == OBSTRUCTED) {
-                let what = format!(
-                    "\"class\" adds a class \"{OBSTRUCTED}\", but the assets have one of that name"
-                );
-                return Err(Error::value("labels.obstructed", what));
-            }
+            check_is_free(&classes)?;
             classes.push(OBSTRUCTED.into());
         }
         Ok(classes)
@@ -82,6 +77,16 @@ impl Obstructed {
             }),
         }
     }
+}
+
+/// Fails where the assets have a class of the name that is added.
+fn check_is_free(classes: &[String]) -> Result<()> {
+    if classes.iter().all(|name| name != OBSTRUCTED) {
+        return Ok(());
+    }
+    let what =
+        format!("\"class\" adds a class \"{OBSTRUCTED}\", but the assets have one of that name");
+    Err(Error::value("labels.obstructed", what))
 }
 
 #[cfg(test)]

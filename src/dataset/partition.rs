@@ -48,18 +48,10 @@ impl Group {
 
 impl Group {
     /// What a scene has in common with the others of its group.
-    fn of(self, scene: &Scene) -> String {
+    fn key_of(self, scene: &Scene) -> String {
         match self {
             Self::Background => scene.plate.clone(),
-            Self::Selection => {
-                let mut photos: Vec<String> = scene
-                    .objects
-                    .iter()
-                    .map(|object| format!("{}/{}", object.asset, object.photo))
-                    .collect();
-                photos.sort();
-                photos.join(" ")
-            }
+            Self::Selection => selection_of(scene),
         }
     }
 }
@@ -70,10 +62,8 @@ impl FromStr for Group {
     fn from_str(text: &str) -> Result<Self> {
         let known = Self::ALL.into_iter().find(|group| group.name() == text);
         known.ok_or_else(|| {
-            Error::value(
-                "group",
-                format!("\"{text}\", expected background or selection"),
-            )
+            let what = format!("\"{text}\", expected background or selection");
+            Error::value("group", what)
         })
     }
 }
@@ -94,12 +84,7 @@ impl Listing {
     /// # Errors
     /// A ratio outside 0..1; groups of images without sidecars.
     pub fn partitioned(&self, how: Partition, ratio: f64, seed: u64) -> Result<Self> {
-        if !(ratio > 0.0 && ratio < 1.0) {
-            return Err(Error::value(
-                "ratio",
-                format!("{ratio}, expected a share between 0 and 1"),
-            ));
-        }
+        check_ratio(ratio)?;
         let all = self.series();
         let count = (all.len() as f64 * ratio).round() as usize;
         let [train, val] = match how {
@@ -113,10 +98,11 @@ impl Listing {
             }
             Partition::Grouped(group) => grouped(&all, &groups(&all, group)?, count, seed),
         };
+        let classes = self.classes.clone();
         Ok(Self {
             train,
             val,
-            classes: self.classes.clone(),
+            classes,
         })
     }
 
@@ -126,17 +112,22 @@ impl Listing {
     /// # Errors
     /// An image that cannot be read.
     pub fn leakage(&self, max_codes: f64) -> Result<Leakage> {
-        let shared = |group: Group| {
-            let of = |images: &[PathBuf]| groups(images, group).map(BTreeSet::from_iter);
-            let (train, val): (BTreeSet<String>, BTreeSet<String>) =
-                (of(&self.train).ok()?, of(&self.val).ok()?);
-            Some((group.name(), [val.len(), val.intersection(&train).count()]))
-        };
-        let groups = Group::ALL.into_iter().filter_map(shared).collect();
+        let groups = Group::ALL.into_iter();
+        let groups = groups.filter_map(|group| Some((group.name(), self.shared_groups(group)?)));
         Ok(Leakage {
-            groups,
+            groups: groups.collect(),
             near_duplicates: near_pairs(&self.train, &self.val, max_codes)?,
         })
+    }
+
+    /// Groups of the images for validation, and how many of them occur in training; none where they are not known.
+    fn shared_groups(&self, group: Group) -> Option<[usize; 2]> {
+        let [train, val] = [&self.train, &self.val].map(|images| groups(images, group));
+        let (train, val) = (
+            BTreeSet::from_iter(train.ok()?),
+            BTreeSet::from_iter(val.ok()?),
+        );
+        Some([val.len(), val.intersection(&train).count()])
     }
 }
 
@@ -144,7 +135,7 @@ impl Listing {
 fn groups(images: &[PathBuf], group: Group) -> Result<Vec<String>> {
     images
         .par_iter()
-        .map(|image| Ok(group.of(&record_of(image)?.drawn)))
+        .map(|image| Ok(group.key_of(&record_of(image)?.drawn)))
         .collect()
 }
 
@@ -160,14 +151,8 @@ fn grouped(images: &[PathBuf], groups: &[String], train: usize, seed: u64) -> [V
 
 /// Groups in a random order, until they have about so many images.
 fn groups_for_validation(groups: &[String], wanted: usize, seed: u64) -> BTreeSet<&str> {
-    let mut sizes: BTreeMap<&str, usize> = BTreeMap::new();
-    for group in groups {
-        *sizes.entry(group).or_default() += 1;
-    }
-    let mut order: Vec<(&str, usize)> = sizes.into_iter().collect();
-    order.sort_by_key(|(group, _)| Draws::new(seed, 0).bits(&format!("split.{group}")));
     let (mut val, mut taken) = (BTreeSet::new(), 0);
-    for (group, size) in order {
+    for (group, size) in shuffled_groups(groups, seed) {
         // A group is taken when the share comes closer by it.
         if taken < wanted && (taken + size).abs_diff(wanted) <= wanted - taken {
             taken += size;
@@ -175,6 +160,34 @@ fn groups_for_validation(groups: &[String], wanted: usize, seed: u64) -> BTreeSe
         }
     }
     val
+}
+
+/// Groups and their sizes, in a random order.
+fn shuffled_groups(groups: &[String], seed: u64) -> Vec<(&str, usize)> {
+    let mut sizes: BTreeMap<&str, usize> = BTreeMap::new();
+    for group in groups {
+        *sizes.entry(group).or_default() += 1;
+    }
+    let mut order: Vec<_> = sizes.into_iter().collect();
+    order.sort_by_key(|(group, _)| Draws::new(seed, 0).bits(&format!("split.{group}")));
+    order
+}
+
+fn check_ratio(ratio: f64) -> Result<()> {
+    if ratio > 0.0 && ratio < 1.0 {
+        return Ok(());
+    }
+    let what = format!("{ratio}, expected a share between 0 and 1");
+    Err(Error::value("ratio", what))
+}
+
+/// The photos of a scene's objects, in an order of their own.
+fn selection_of(scene: &Scene) -> String {
+    let objects = scene.objects.iter();
+    let photos = objects.map(|object| format!("{}/{}", object.asset, object.photo));
+    let mut photos: Vec<String> = photos.collect();
+    photos.sort();
+    photos.join(" ")
 }
 
 #[cfg(test)]

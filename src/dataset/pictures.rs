@@ -57,6 +57,15 @@ impl PictureFormat {
     }
 }
 
+impl Pictures {
+    fn write_options(&self) -> WriteOptions {
+        WriteOptions {
+            jpeg_quality: self.jpeg_quality,
+            ..WriteOptions::default()
+        }
+    }
+}
+
 impl Writer for Pictures {
     fn settings(&self) -> serde_json::Value {
         serde_json::json!({ "pictures": self })
@@ -78,16 +87,10 @@ impl Writer for Pictures {
     }
 
     fn write(&self, folder: &Path, entry: &Entry<'_>) -> Result<Vec<PathBuf>> {
-        let mut paths = vec![entry.path("images", self.format.extension())];
-        let options = WriteOptions {
-            jpeg_quality: self.jpeg_quality,
-            ..WriteOptions::default()
-        };
-        io::write_with(
-            folder.join(&paths[0]),
-            &entry.sample.frame.map(|p| p.color()),
-            &options,
-        )?;
+        let path = entry.path("images", self.format.extension());
+        let displayed = entry.sample.frame.map(|p| p.color());
+        io::write_with(folder.join(&path), &displayed, &self.write_options())?;
+        let mut paths = vec![path];
         if self.exr {
             let exr = entry.path("exr", "exr");
             io::write(folder.join(&exr), &entry.sample.frame)?;

@@ -70,16 +70,12 @@ impl Pipeline {
 
     /// Refuses a place in whose pictures the median object is too small to have an outline: a length is in another unit.
     fn check_size_in(&self, place: &BackgroundPhoto) -> Result<()> {
-        let photos = self.library.assets.iter().flat_map(|asset| &asset.photos);
-        let mut lengths: Vec<f64> = photos.map(|photo| photo.record.object_m[0]).collect();
-        lengths.sort_by(f64::total_cmp);
-        let Some(&median) = lengths.get(lengths.len() / 2) else {
+        let (Some(median), CameraSource::Known(camera)) =
+            (self.median_object_m(), &place.background.camera)
+        else {
             return Ok(());
         };
-        let (median, factor) = (median, self.config.scene.scale.middle().min);
-        let CameraSource::Known(camera) = &place.background.camera else {
-            return Ok(());
-        };
+        let factor = self.config.scene.scale.middle().min;
         let px = camera.focal_px.x * median * factor / camera.center().coords.norm();
         if px >= LEAST_OBJECT_PX {
             return Ok(());
@@ -92,13 +88,23 @@ impl Pipeline {
         Err(Error::value("surface", what).in_file(&place.label))
     }
 
+    /// Median length of the objects in the library.
+    fn median_object_m(&self) -> Option<f64> {
+        let photos = self.library.assets.iter().flat_map(|asset| &asset.photos);
+        let lengths = photos.map(|photo| photo.record.object_m[0]);
+        let mut lengths: Vec<f64> = lengths.collect();
+        lengths.sort_by(f64::total_cmp);
+        lengths.get(lengths.len() / 2).copied()
+    }
+
     /// The same for one scene that is there already: only cut-outs of the assets that it names are read, and known.
     ///
     /// # Errors
     /// As [`open`](Self::open).
     pub fn open_for(config: DatasetConfig, scene: &Scene) -> Result<Self> {
-        let is_named = |name: &str| scene.objects.iter().any(|object| object.asset == name);
-        let library = Library::open_some(&config.assets, is_named)?;
+        let library = Library::open_some(&config.assets, |name: &str| {
+            scene.objects.iter().any(|object| object.asset == name)
+        })?;
         let places = if scene.plate.is_empty() {
             Vec::new()
         } else {
@@ -108,19 +114,14 @@ impl Pipeline {
     }
 
     fn new(config: DatasetConfig, library: Library, places: Vec<BackgroundPhoto>) -> Result<Self> {
-        let backgrounds = places
-            .iter()
-            .map(|place| place.background.clone())
-            .collect();
-        let catalog = catalog(&library);
-        let surroundings = EnvironmentMaps::of(&config);
+        let backgrounds = places.iter().map(|place| place.background.clone());
         Ok(Self {
+            backgrounds: backgrounds.collect(),
+            catalog: catalog(&library),
+            surroundings: EnvironmentMaps::of(&config),
             config,
             library,
             places,
-            backgrounds,
-            catalog,
-            surroundings,
             stop: &NEVER,
         })
     }
@@ -146,33 +147,41 @@ impl Pipeline {
     /// Classes that the config's policy for obstructed objects cannot add to; an asset that fits between the walls of some
     /// background in no direction; a photo or an environment map that cannot be read.
     pub fn plan(&self, count: u64, seed: u64, folder: impl Into<PathBuf>) -> Result<Plan> {
-        self.config
-            .scene
+        let (scene, labels) = (&self.config.scene, &self.config.labels);
+        scene
             .check_room(&self.backgrounds, &self.catalog)
             .map_err(|e| e.within("scene"))?;
-        let (folder, labels) = (folder.into(), &self.config.labels);
+        let folder = folder.into();
         let mut inputs = Inputs::kept(&folder);
-        let mut writers: Vec<Box<dyn Writer>> =
-            vec![Box::new(self.config.pictures), Box::new(Sidecar)];
-        writers.extend(labels.writers(&self.config.pictures));
         Ok(Plan {
             folder,
             count,
             range: SampleRange::All,
             seed,
-            recipe: fingerprint(
-                &self.config,
-                &self.library,
-                &self.places,
-                &self.surroundings,
-                &mut inputs,
-            )?,
+            recipe: self.fingerprint(&mut inputs)?,
             classes: labels.obstructed.classes(&self.library.classes)?,
             split: self.config.split,
             obstructed: labels.obstructed,
-            writers,
+            writers: self.writers(),
             inputs,
         })
+    }
+
+    fn fingerprint(&self, inputs: &mut Inputs) -> Result<serde_json::Value> {
+        fingerprint(
+            &self.config,
+            &self.library,
+            &self.places,
+            &self.surroundings,
+            inputs,
+        )
+    }
+
+    fn writers(&self) -> Vec<Box<dyn Writer>> {
+        let pictures = &self.config.pictures;
+        let mut writers: Vec<Box<dyn Writer>> = vec![Box::new(*pictures), Box::new(Sidecar)];
+        writers.extend(self.config.labels.writers(pictures));
+        writers
     }
 
     /// Scene `k` as the recipe draws it: objects not settled yet, exposure still open.
@@ -205,16 +214,12 @@ impl Pipeline {
             let (scene, draws) = self.explain(scene_seed, k)?;
             match self.take_within(scene, &allowance) {
                 Ok(sample) => {
-                    let provenance = sample.provenance.map(|provenance| Provenance {
+                    return Ok(sample.with_origin(|provenance| Provenance {
                         rejected,
                         draws,
                         scene_seed,
                         ..provenance
-                    });
-                    return Ok(Sample {
-                        provenance,
-                        ..sample
-                    });
+                    }));
                 }
                 Err(Error::Unsettled { what })
                     if rejected.len() < MAX_RESAMPLES && !allowance.is_spent() =>
@@ -241,25 +246,20 @@ impl Pipeline {
         let (scene, shot) = resolved?;
         let ((deep, frame), render) = timed(|| self.shoot(&scene, &shot));
         let (labels, label) = timed(|| label::label(&deep, &shot, &self.config.labels.options()));
-        let times = Times {
-            settle,
-            render,
-            label,
-            ..Times::default()
-        };
-        let provenance = Provenance {
-            drawn,
-            scene,
-            scene_seed: 0,
-            rejected: vec![],
-            draws: vec![],
-        };
         Ok(Sample {
             frame,
             deep,
             labels,
-            provenance: Some(provenance),
-            times,
+            provenance: Some(Provenance {
+                drawn,
+                ..Provenance::from_scene(scene)
+            }),
+            times: Times {
+                settle,
+                render,
+                label,
+                ..Times::default()
+            },
         })
     }
 
@@ -337,20 +337,17 @@ impl Pipeline {
         if name.is_empty() {
             return Ok(None);
         }
-        match self
-            .places
-            .iter()
-            .find(|place| place.background.name == name)
-        {
+        let mut places = self.places.iter();
+        match places.find(|place| place.background.name == name) {
             Some(place) => place.plate().map(Some),
-            None => {
-                let known: Vec<&str> = self.backgrounds.iter().map(|b| b.name.as_str()).collect();
-                Err(Error::value(
-                    "plate",
-                    format!("\"{name}\", expected one of {}", known.join(", ")),
-                ))
-            }
+            None => Err(self.unknown_plate(name)),
         }
+    }
+
+    fn unknown_plate(&self, name: &str) -> Error {
+        let known: Vec<&str> = self.backgrounds.iter().map(|b| b.name.as_str()).collect();
+        let what = format!("\"{name}\", expected one of {}", known.join(", "));
+        Error::value("plate", what)
     }
 }
 

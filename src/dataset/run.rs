@@ -52,15 +52,14 @@ pub(super) fn run(
     let _lock = folder::claim(plan)?;
     plan.inputs.keep(&plan.folder);
     let journal = Journal::open(&plan.folder)?;
-    let again = matches!(plan.range, SampleRange::One(_));
     // One sample is made again whatever the number of the others.
-    let count = if again {
-        plan.count.max(journal.end())
-    } else {
-        plan.count
+    let again = matches!(plan.range, SampleRange::One(_));
+    let count = match plan.range {
+        SampleRange::One(_) => plan.count.max(journal.end()),
+        _ => plan.count,
     };
     check_nothing_beyond(&journal, count, plan)?;
-    let run = Run {
+    let run = DatasetRun {
         plan,
         count,
         write,
@@ -70,18 +69,21 @@ pub(super) fn run(
         began: Instant::now(),
     };
     run.report(&run.state());
-    let Progress { done, count, .. } = run.state().progress;
-    let missing = if again {
-        count
-    } else {
-        count - done.min(count)
-    };
     let next = Mutex::new(plan.range.below(run.count));
-    run.work(missing, || {
+    run.work(run.missing(again), || {
         let mut next = next.lock().unwrap_or_else(PoisonError::into_inner);
         next.find(|&k| again || !run.state().journal.has(k))
     })?;
     run.finish()
+}
+
+/// A pool for each sample that is made at a time.
+fn worker_pools(missing: u64) -> Result<Vec<rayon::ThreadPool>> {
+    let threads = rayon::current_num_threads();
+    let workers = threads.min(usize::try_from(missing).unwrap_or(threads));
+    let pools = (0..workers).map(|_| work::pool(threads / workers.max(1)));
+    let pools: std::io::Result<Vec<_>> = pools.collect();
+    pools.map_err(|e| Error::value("threads", e))
 }
 
 /// Fails where the folder holds more than is asked for: trainers read all that is there.
@@ -99,7 +101,7 @@ fn check_nothing_beyond(journal: &Journal, count: u64, plan: &Plan) -> Result<()
 }
 
 /// What the threads of one run share.
-struct Run<'a, F> {
+struct DatasetRun<'a, F> {
     plan: &'a Plan,
     /// Samples of the whole dataset.
     count: u64,
@@ -118,15 +120,10 @@ struct RunState {
     failure: Option<(u64, Error)>,
 }
 
-impl<F: Fn(u64) -> Result<(JournalLine, Times)> + Sync> Run<'_, F> {
+impl<F: Fn(u64) -> Result<(JournalLine, Times)> + Sync> DatasetRun<'_, F> {
     /// Makes samples until `next` has none, of the `missing` ones, or there is a reason to stop.
     fn work(&self, missing: u64, next: impl Fn() -> Option<u64> + Sync) -> Result<()> {
-        let threads = rayon::current_num_threads();
-        let workers = threads.min(usize::try_from(missing).unwrap_or(threads));
-        let pools = (0..workers)
-            .map(|_| work::pool(threads / workers.max(1)))
-            .collect::<std::io::Result<Vec<_>>>()
-            .map_err(|e| Error::value("threads", e))?;
+        let pools = worker_pools(missing)?;
         std::thread::scope(|scope| {
             for pool in &pools {
                 scope.spawn(|| {
@@ -139,6 +136,16 @@ impl<F: Fn(u64) -> Result<(JournalLine, Times)> + Sync> Run<'_, F> {
             }
         });
         Ok(())
+    }
+
+    /// Samples that are to be made at most.
+    fn missing(&self, again: bool) -> u64 {
+        let Progress { done, count, .. } = self.state().progress;
+        if again {
+            count
+        } else {
+            count - done.min(count)
+        }
     }
 
     fn goes_on(&self) -> bool {
@@ -160,10 +167,7 @@ impl<F: Fn(u64) -> Result<(JournalLine, Times)> + Sync> Run<'_, F> {
             }
             // Not this sample's fault: it is made by the run that goes on.
             Err(Error::Interrupted { .. }) if self.stop.load(Ordering::Relaxed) => {}
-            Err(e) if state.failure.as_ref().is_none_or(|(first, _)| k < *first) => {
-                state.failure = Some((k, e))
-            }
-            Err(_) => {}
+            Err(error) => state.fail(k, error),
         }
     }
 
@@ -179,23 +183,19 @@ impl<F: Fn(u64) -> Result<(JournalLine, Times)> + Sync> Run<'_, F> {
     /// Closes the state, whatever happened, then says what did.
     fn finish(self) -> Result<DatasetCounts> {
         let (plan, count, wall) = (self.plan, self.count, self.began.elapsed());
+        let state = self.state.into_inner();
         let RunState {
             journal,
             progress: Progress { made, .. },
             times,
             failure,
-        } = self
-            .state
-            .into_inner()
-            .unwrap_or_else(PoisonError::into_inner);
+        } = state.unwrap_or_else(PoisonError::into_inner);
         io::sync(&plan.folder);
         times.append(&plan.folder, made, wall);
         let done = journal.count(count, |k| plan.range.contains(k));
         let asked = plan.range.count_below(count);
-        let status = format!(
-            "{done} of {asked} samples are in {}; the same command goes on",
-            plan.folder.display()
-        );
+        let folder = plan.folder.display();
+        let status = format!("{done} of {asked} samples are in {folder}; the same command goes on");
         let closed = journal.close(count);
         if let Some((k, error)) = failure {
             log::warn!("sample {k} failed; {status}");
@@ -236,15 +236,18 @@ impl RunState {
         }
     }
 
+    /// Keeps the error of the sample with the lowest number.
+    fn fail(&mut self, k: u64, error: Error) {
+        if self.failure.as_ref().is_none_or(|(first, _)| k < *first) {
+            self.failure = Some((k, error));
+        }
+    }
+
     fn enter(&mut self, line: JournalLine, times: Times) -> Result<()> {
-        let Progress { done, count, made } = self.progress;
-        let new = u64::from(!self.journal.has(line.k));
+        let is_new = !self.journal.has(line.k);
         self.journal.add(line)?;
-        self.progress = Progress {
-            done: done + new,
-            count,
-            made: made + 1,
-        };
+        self.progress.done += u64::from(is_new);
+        self.progress.made += 1;
         self.times += times;
         Ok(())
     }

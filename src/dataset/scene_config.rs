@@ -47,22 +47,13 @@ impl DatasetConfig {
     }
 
     fn with_scene_folders(mut self, scene: &Scene, path: &Path) -> Result<Self> {
-        let Some(files) = &scene.files else {
-            return Err(Error::value(
-                "files",
-                "missing, expected a table that names the folders of assets and backgrounds, or a \
-                 recipe beside the scene",
-            ));
-        };
+        let files = scene.files.as_ref().ok_or_else(no_files)?;
         let folder = path.parent().unwrap_or(Path::new(""));
         self.assets = folder.join(required(&files.assets, "assets", "the assets")?);
         self.backgrounds = PathBuf::new();
         if !scene.plate.is_empty() {
-            let backgrounds = required(
-                &files.backgrounds,
-                "backgrounds",
-                &format!("the photo \"{}\" and its label", scene.plate),
-            )?;
+            let content = format!("the photo \"{}\" and its label", scene.plate);
+            let backgrounds = required(&files.backgrounds, "backgrounds", &content)?;
             self.backgrounds = folder.join(backgrounds);
         }
         self.folder = folder.into();
@@ -79,23 +70,26 @@ impl DatasetConfig {
     /// # Errors
     /// Without a working folder.
     pub fn with_files(&self, scene: Scene, path: impl AsRef<Path>) -> Result<Scene> {
-        let path = path.as_ref();
-        let named = |folder: &Path| relative_to_file(folder, path).map(Some);
-        let mut files = SceneFiles {
-            assets: named(&self.assets)?,
-            ..SceneFiles::default()
-        };
-        if !scene.plate.is_empty() {
-            files.backgrounds = named(&self.backgrounds)?;
-        }
-        if scene.environment.is_some() {
-            files.environments = named(&self.folder)?;
-        }
         Ok(Scene {
-            files: Some(files),
+            files: Some(self.files_for(&scene, path.as_ref())?),
             settings: self.scene_settings()?,
             ..scene
         })
+    }
+
+    /// The folders of what a scene names, as they are seen from its file.
+    fn files_for(&self, scene: &Scene, path: &Path) -> Result<SceneFiles> {
+        let mut files = SceneFiles {
+            assets: Some(relative_to_file(&self.assets, path)?),
+            ..SceneFiles::default()
+        };
+        if !scene.plate.is_empty() {
+            files.backgrounds = Some(relative_to_file(&self.backgrounds, path)?);
+        }
+        if scene.environment.is_some() {
+            files.environments = Some(relative_to_file(&self.folder, path)?);
+        }
+        Ok(files)
     }
 
     /// The values of [`SCENE_KEYS`] that differ from the defaults.
@@ -113,11 +107,14 @@ impl DatasetConfig {
 
 fn required<'a>(folder: &'a Option<PathBuf>, key: &str, content: &str) -> Result<&'a Path> {
     folder.as_deref().ok_or_else(|| {
-        Error::value(
-            format!("files.{key}"),
-            format!("missing, expected the folder of {content}"),
-        )
+        let what = format!("missing, expected the folder of {content}");
+        Error::value(format!("files.{key}"), what)
     })
+}
+
+fn no_files() -> Error {
+    let what = "missing, expected a table that names the folders of assets and backgrounds, or a recipe beside the scene";
+    Error::value("files", what)
 }
 
 fn as_table(config: &DatasetConfig) -> Result<Table> {
@@ -154,15 +151,20 @@ fn insert(table: &mut Table, path: &str, value: Value) {
 fn difference(value: Option<&Value>, default: Option<&Value>) -> Option<Value> {
     match (value?, default) {
         (Value::Table(own), Some(Value::Table(defaults))) => {
-            let different = own.iter().filter_map(|(key, value)| {
-                difference(Some(value), defaults.get(key)).map(|value| (key.clone(), value))
-            });
-            let table: Table = different.collect();
+            let table = table_difference(own, defaults);
             (!table.is_empty()).then_some(Value::Table(table))
         }
         (value, default) if Some(value) == default => None,
         (value, _) => Some(value.clone()),
     }
+}
+
+fn table_difference(own: &Table, defaults: &Table) -> Table {
+    let entries = own.iter().filter_map(|(key, value)| {
+        let value = difference(Some(value), defaults.get(key));
+        value.map(|value| (key.clone(), value))
+    });
+    entries.collect()
 }
 
 #[cfg(test)]

@@ -118,16 +118,10 @@ impl FromStr for ShardChoice {
     type Err = Error;
 
     fn from_str(text: &str) -> Result<Self> {
-        let wrong = || Error::value("shard", format!("\"{text}\", expected I/N, auto or auto/N"));
-        let number = |digits: &str| digits.parse::<u64>().map_err(|_| wrong());
-        match text.split_once('/') {
-            None if text == "auto" => Ok(Self::Auto { of: None }),
-            None => Err(wrong()),
-            Some(("auto", of)) => Ok(Self::Auto {
-                of: Some(number(of)?),
-            }),
-            Some((index, of)) => Shard::new(number(index)?, number(of)?).map(Self::Given),
-        }
+        parse_choice(text).unwrap_or_else(|| {
+            let what = format!("\"{text}\", expected I/N, auto or auto/N");
+            Err(Error::value("shard", what))
+        })
     }
 }
 
@@ -145,57 +139,82 @@ impl ShardChoice {
             Self::Given(shard) => return Ok(shard),
             Self::Auto { of } => of,
         };
-        let number = |name: &str| -> Result<Option<u64>> {
-            let read = |text: String| {
-                text.trim()
-                    .parse()
-                    .map_err(|_| Error::value(name, format!("\"{text}\", expected a number")))
-            };
-            variable(name).map(read).transpose()
-        };
-        if let Some(id) = number("SLURM_ARRAY_TASK_ID")? {
-            return slurm(id, of, number);
-        }
-        match (number("JOB_COMPLETION_INDEX")?, of) {
-            (Some(index), Some(of)) => Shard::new(index.saturating_add(1), of),
-            (Some(_), None) => Err(Error::value(
-                "shard",
-                "Kubernetes does not tell the number of shards: say auto/N",
-            )),
-            (None, _) => {
-                let what = "auto, but neither SLURM_ARRAY_TASK_ID nor JOB_COMPLETION_INDEX is set";
-                Err(Error::value("shard", what))
-            }
+        let environment = JobEnvironment { variable };
+        match environment.number("SLURM_ARRAY_TASK_ID")? {
+            Some(id) => environment.slurm_shard(id, of),
+            None => environment.kubernetes_shard(of),
         }
     }
 }
 
-/// The share of a task of a Slurm array.
-fn slurm(id: u64, of: Option<u64>, number: impl Fn(&str) -> Result<Option<u64>>) -> Result<Shard> {
-    let first = number("SLURM_ARRAY_TASK_MIN")?.unwrap_or(0);
-    let step = number("SLURM_ARRAY_TASK_STEP")?.unwrap_or(1).max(1);
-    let count = number("SLURM_ARRAY_TASK_COUNT")?;
-    let last = number("SLURM_ARRAY_TASK_MAX")?;
-    if let (Some(count), Some(last)) = (count, last)
-        && (count == 0 || last.checked_sub(first) != (count - 1).checked_mul(step))
-    {
-        let what =
-            format!("{count} tasks from {first} to {last}: tasks are missing, expected all of 1-N");
-        return Err(Error::value("SLURM_ARRAY_TASK_COUNT", what));
-    }
-    let Some(of) = of.or(count) else {
-        return Err(Error::value(
-            "shard",
-            "SLURM_ARRAY_TASK_COUNT is not set: say auto/N",
-        ));
+fn parse_choice(text: &str) -> Option<Result<ShardChoice>> {
+    let Some((index, of)) = text.split_once('/') else {
+        return (text == "auto").then_some(Ok(ShardChoice::Auto { of: None }));
     };
-    match id.checked_sub(first) {
-        Some(past) => Shard::new((past / step).saturating_add(1), of),
-        None => Err(Error::value(
-            "SLURM_ARRAY_TASK_ID",
-            format!("{id}, expected at least {first}"),
-        )),
+    let of = of.parse().ok()?;
+    if index == "auto" {
+        return Some(Ok(ShardChoice::Auto { of: Some(of) }));
     }
+    Some(Shard::new(index.parse().ok()?, of).map(ShardChoice::Given))
+}
+
+/// What a scheduler tells a job by environment variables.
+struct JobEnvironment<V> {
+    variable: V,
+}
+
+impl<V: Fn(&str) -> Option<String>> JobEnvironment<V> {
+    fn number(&self, name: &str) -> Result<Option<u64>> {
+        let Some(text) = (self.variable)(name) else {
+            return Ok(None);
+        };
+        let number = text.trim().parse();
+        let number =
+            number.map_err(|_| Error::value(name, format!("\"{text}\", expected a number")));
+        number.map(Some)
+    }
+
+    fn kubernetes_shard(&self, of: Option<u64>) -> Result<Shard> {
+        let Some(index) = self.number("JOB_COMPLETION_INDEX")? else {
+            let what = "auto, but neither SLURM_ARRAY_TASK_ID nor JOB_COMPLETION_INDEX is set";
+            return Err(Error::value("shard", what));
+        };
+        let of = of.ok_or_else(|| {
+            let what = "Kubernetes does not tell the number of shards: say auto/N";
+            Error::value("shard", what)
+        })?;
+        Shard::new(index.saturating_add(1), of)
+    }
+
+    /// The share of a task of a Slurm array.
+    fn slurm_shard(&self, id: u64, of: Option<u64>) -> Result<Shard> {
+        let first = self.number("SLURM_ARRAY_TASK_MIN")?.unwrap_or(0);
+        let step = self.number("SLURM_ARRAY_TASK_STEP")?.unwrap_or(1).max(1);
+        let count = self.number("SLURM_ARRAY_TASK_COUNT")?;
+        let last = self.number("SLURM_ARRAY_TASK_MAX")?;
+        if let (Some(count), Some(last)) = (count, last) {
+            check_all_tasks(count, first, last, step)?;
+        }
+        let of = of.or(count).ok_or_else(|| {
+            let what = "SLURM_ARRAY_TASK_COUNT is not set: say auto/N";
+            Error::value("shard", what)
+        })?;
+        let past = id.checked_sub(first).ok_or_else(|| {
+            let what = format!("{id}, expected at least {first}");
+            Error::value("SLURM_ARRAY_TASK_ID", what)
+        })?;
+        Shard::new((past / step).saturating_add(1), of)
+    }
+}
+
+/// An array with holes makes no whole dataset.
+fn check_all_tasks(count: u64, first: u64, last: u64, step: u64) -> Result<()> {
+    if count > 0 && last.checked_sub(first) == (count - 1).checked_mul(step) {
+        return Ok(());
+    }
+    let what =
+        format!("{count} tasks from {first} to {last}: tasks are missing, expected all of 1-N");
+    Err(Error::value("SLURM_ARRAY_TASK_COUNT", what))
 }
 
 #[cfg(test)]

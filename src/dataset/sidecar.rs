@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::io;
 use crate::label::{Labels, cyclic_overlaps};
 use crate::pixel::ObjectId;
-use crate::scene::Scene;
+use crate::scene::{Drawn, Scene};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -74,36 +74,30 @@ impl SampleRecord {
     /// Everything known of an entry.
     fn new(entry: &Entry<'_>, provenance: &Provenance) -> Self {
         let labels = &entry.sample.labels;
-        let Provenance {
-            drawn,
-            scene,
-            scene_seed,
-            rejected,
-            draws,
-        } = provenance;
+        let labelled = entry.labelled.iter().map(|label| label.object.id);
+        let topmost = labels.objects.iter().filter(|object| object.is_topmost());
         Self {
             petcomp: env!("CARGO_PKG_VERSION").to_owned(),
             recipe_hash: entry.recipe_hash.to_owned(),
             seed: entry.seed,
-            scene_seed: *scene_seed,
+            scene_seed: provenance.scene_seed,
             index: entry.k,
             part: entry.part,
-            labelled: entry.labelled.iter().map(|label| label.object.id).collect(),
-            topmost: labels
-                .objects
-                .iter()
-                .filter(|object| object.is_topmost())
-                .map(|object| object.id)
-                .collect(),
+            labelled: labelled.collect(),
+            topmost: topmost.map(|object| object.id).collect(),
             knotted: cyclic_overlaps(&labels.objects),
-            rejected: rejected.clone(),
-            draws: draws
-                .iter()
-                .map(|draw| (draw.path.clone(), draw.value))
-                .collect(),
+            rejected: provenance.rejected.clone(),
+            draws: values_by_path(&provenance.draws),
             labels: labels.clone(),
-            drawn: drawn.clone(),
-            scene: scene.clone(),
+            drawn: provenance.drawn.clone(),
+            scene: provenance.scene.clone(),
         }
     }
+}
+
+fn values_by_path(draws: &[Drawn]) -> BTreeMap<String, f64> {
+    draws
+        .iter()
+        .map(|draw| (draw.path.clone(), draw.value))
+        .collect()
 }

@@ -64,13 +64,25 @@ impl Split {
 
     /// The part of sample `k` of `count`.
     pub fn part(&self, k: u64, count: u64) -> Part {
+        if self.is_val(k, count) {
+            Part::Val
+        } else {
+            Part::Train
+        }
+    }
+
+    fn is_val(&self, k: u64, count: u64) -> bool {
+        let next = k.saturating_add(1);
+        match self.order {
+            SplitOrder::Interleaved => self.train_before(next) == self.train_before(k),
+            SplitOrder::Consecutive => u128::from(k) >= self.train_before(count),
+        }
+    }
+
+    /// Samples for training among the first `n`.
+    fn train_before(&self, n: u64) -> u128 {
         let percent = 100 - u128::from(self.val_percent.min(100));
-        let train_before = |n: u64| u128::from(n) * percent / 100;
-        let is_val = match self.order {
-            SplitOrder::Interleaved => train_before(k.saturating_add(1)) == train_before(k),
-            SplitOrder::Consecutive => u128::from(k) >= train_before(count),
-        };
-        if is_val { Part::Val } else { Part::Train }
+        u128::from(n) * percent / 100
     }
 }
 

@@ -126,15 +126,14 @@ impl Summary {
     pub fn read(folder: &Path) -> Result<Self> {
         let mut summary = Self::empty(folder)?;
         let lines = lines_of(folder)?;
-        summary.images =
-            Part::ALL.map(|part| lines.iter().filter(|line| line.part == part).count());
+        summary.images = Part::ALL.map(|part| count_in_part(&lines, part));
         // In batches, so that no more records are in memory than threads can read at a time.
         for batch in lines.chunks(RECORDS_PER_BATCH) {
-            let samples: Vec<ReadSample> = batch
+            let samples: Result<Vec<ReadSample>> = batch
                 .par_iter()
                 .map(|line| ReadSample::read(folder, line))
-                .collect::<Result<_>>()?;
-            for (sample, line) in samples.into_iter().zip(batch) {
+                .collect();
+            for (sample, line) in samples?.into_iter().zip(batch) {
                 summary.add(&sample, line);
                 summary.glances.push(SampleSummary::new(sample));
             }
@@ -145,8 +144,7 @@ impl Summary {
     /// A dataset of which no sample was read yet.
     fn empty(folder: &Path) -> Result<Self> {
         let identity = folder::known_identity(folder)?;
-        let classes: Vec<String> =
-            serde_json::from_value(identity["classes"].clone()).unwrap_or_default();
+        let classes = folder::known_classes(&identity);
         Ok(Self {
             images: [0; 2],
             balance: vec![[[0; 2]; 2]; classes.len()],
@@ -169,23 +167,19 @@ impl Summary {
     /// # Errors
     /// A record that cannot be read.
     pub fn shown(&self, folder: &Path, place: usize) -> Result<ShownSample> {
-        let [picture, record] = self.glances[place]
-            .files
-            .each_ref()
-            .map(|file| folder.join(file));
+        let [picture, record] = &self.glances[place].files;
         Ok(ShownSample {
-            picture,
-            record: io::read_json(record)?,
+            picture: folder.join(picture),
+            record: io::read_json(folder.join(record))?,
         })
     }
 
     /// The distribution of a drawn number: least and greatest value, and whether it is an integer.
     pub fn range(&self, key: &str) -> Option<([f64; 2], bool)> {
-        let recipe: Recipe =
-            serde_json::from_value(self.identity["recipe"]["scene"].clone()).ok()?;
+        let recipe = self.identity["recipe"]["scene"].clone();
+        let recipe: Recipe = serde_json::from_value(recipe).ok()?;
         let recipe = serde_json::to_value(recipe.narrowed()).ok()?;
-        let pointer = format!("/{}", key.replace(['.', '['], "/").replace(']', ""));
-        let range = match recipe.pointer(&pointer)? {
+        let range = match recipe.pointer(&json_pointer(key))? {
             Value::Array(ends) if ends.len() == 2 => [ends[0].as_f64()?, ends[1].as_f64()?],
             fixed => [fixed.as_f64()?; 2],
         };
@@ -203,13 +197,18 @@ impl Summary {
         for object in &record.labels.objects {
             self.add_object(object, record);
         }
-        let part = usize::from(sample.part == Part::Val);
-        for (class, [objects, labels]) in self.balance.iter_mut().zip(&line.classes) {
-            class[part][0] += u64::from(*objects);
-            class[part][1] += u64::from(*labels);
-        }
+        self.add_balance(sample.part, line);
         let rejected = record.rejected.iter().map(|why| (sample.k, why.clone()));
         self.rejected.extend(rejected);
+    }
+
+    fn add_balance(&mut self, part: Part, line: &JournalLine) {
+        let part = usize::from(part == Part::Val);
+        for (class, counts) in self.balance.iter_mut().zip(&line.classes) {
+            for (sum, count) in class[part].iter_mut().zip(counts) {
+                *sum += u64::from(*count);
+            }
+        }
     }
 
     /// Counts what was chosen from lists.
@@ -246,25 +245,19 @@ impl SampleSummary {
             record,
             files,
         } = sample;
-        let labelled = || {
-            record
-                .labels
-                .objects
-                .iter()
-                .filter(|object| UnlabelledReason::of(object, &record).is_none())
-        };
+        let labelled = labelled_objects(&record);
+        let visible = labelled.iter().map(|object| object.visible_fraction);
+        let boxes = labelled
+            .iter()
+            .map(|object| (object.class, object.amodal_box));
         Self {
             index: k,
             part,
             files,
             image: record.labels.image,
             objects: record.labels.objects.len(),
-            labels: labelled()
-                .map(|object| (object.class, object.amodal_box))
-                .collect(),
-            least_visible: labelled()
-                .map(|object| object.visible_fraction)
-                .fold(1.0, f64::min),
+            labels: boxes.collect(),
+            least_visible: visible.fold(1.0, f64::min),
             rejected: record.rejected.len(),
         }
     }
@@ -275,12 +268,14 @@ const RECORDS_PER_BATCH: usize = 256;
 
 impl ReadSample {
     fn read(folder: &Path, line: &JournalLine) -> Result<Self> {
-        let name = |kind| line.file_name(folder, kind).map(str::to_owned);
         Ok(Self {
             k: line.k,
             part: line.part,
             record: io::read_json(line.file(folder, "scenes/")?)?,
-            files: [name("images/")?, name("scenes/")?],
+            files: [
+                line.file_name(folder, "images/")?.to_owned(),
+                line.file_name(folder, "scenes/")?.to_owned(),
+            ],
         })
     }
 }
@@ -303,6 +298,23 @@ fn key(path: &str) -> Option<String> {
             .unwrap_or(path)
             .to_owned(),
     )
+}
+
+/// Objects that have a label and are in the picture.
+fn labelled_objects(record: &SampleRecord) -> Vec<&ObjectLabel> {
+    let objects = record.labels.objects.iter();
+    objects
+        .filter(|object| UnlabelledReason::of(object, record).is_none())
+        .collect()
+}
+
+fn count_in_part(lines: &[JournalLine], part: Part) -> usize {
+    lines.iter().filter(|line| line.part == part).count()
+}
+
+/// `/objects/2/hue` of `objects[2].hue`.
+fn json_pointer(key: &str) -> String {
+    format!("/{}", key.replace(['.', '['], "/").replace(']', ""))
 }
 
 #[cfg(test)]

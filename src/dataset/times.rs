@@ -1,6 +1,6 @@
 //! Where the time of a run goes.
 
-use crate::error::Error;
+use crate::error::{Error, Result};
 use crate::io;
 use serde::{Deserialize, Serialize};
 use std::io::Write as _;
@@ -51,40 +51,41 @@ impl std::ops::AddAssign for Times {
 impl Times {
     /// Adds a line to the folder's list of runs. It is a note, so a disk without room for it is no error.
     pub(crate) fn append(&self, folder: &Path, made: u64, wall: Duration) {
-        if made == 0 {
-            return;
-        }
-        let line = RunTimes {
-            made,
-            threads: rayon::current_num_threads(),
-            wall_s: wall.as_secs_f64(),
-            settle_s: self.settle.as_secs_f64(),
-            render_s: self.render.as_secs_f64(),
-            label_s: self.label.as_secs_f64(),
-            write_s: self.write.as_secs_f64(),
-        };
-        let text = serde_json::to_string(&line)
-            .map(|text| text + "\n")
-            .unwrap_or_default();
-        let path = folder.join(RUNS);
-        let file = io::open_own(&path);
-        if let Err(e) = file.and_then(|mut f| {
-            f.write_all(text.as_bytes())
-                .map_err(|e| Error::file(&path, e))
-        }) {
+        if made > 0
+            && let Err(e) = RunTimes::new(self, made, wall).append(&folder.join(RUNS))
+        {
             log::warn!("{e}");
         }
     }
 }
 
+impl RunTimes {
+    fn new(times: &Times, made: u64, wall: Duration) -> Self {
+        Self {
+            made,
+            threads: rayon::current_num_threads(),
+            wall_s: wall.as_secs_f64(),
+            settle_s: times.settle.as_secs_f64(),
+            render_s: times.render.as_secs_f64(),
+            label_s: times.label.as_secs_f64(),
+            write_s: times.write.as_secs_f64(),
+        }
+    }
+
+    fn append(&self, path: &Path) -> Result<()> {
+        let text = serde_json::to_string(self).map_err(|e| Error::file(path, e))?;
+        let mut file = io::open_own(path)?;
+        let written = file.write_all((text + "\n").as_bytes());
+        written.map_err(|e| Error::file(path, e))
+    }
+}
+
 /// The runs that wrote a folder.
 pub(crate) fn runs_of(folder: &Path) -> Vec<RunTimes> {
-    let text = io::inside(folder, RUNS)
-        .and_then(io::read_text)
-        .unwrap_or_default();
-    text.lines()
-        .filter_map(|line| serde_json::from_str(line).ok())
-        .collect()
+    let text = io::inside(folder, RUNS).and_then(io::read_text);
+    let text = text.unwrap_or_default();
+    let lines = text.lines().map(serde_json::from_str);
+    lines.filter_map(|line| line.ok()).collect()
 }
 
 /// What a closure gives, and how long it took.

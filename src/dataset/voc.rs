@@ -52,12 +52,8 @@ impl Writer for Voc {
     }
 
     fn finish(&self, folder: &Path, _classes: &[String], samples: &[Written]) -> Result<()> {
-        Part::ALL.iter().try_for_each(|&part| {
-            let numbers = samples
-                .iter()
-                .filter(|sample| sample.part == part)
-                .map(|sample| format!("{:06}\n", sample.k));
-            io::write_text(folder.join(list(part)), &numbers.collect::<String>())
+        Part::ALL.into_iter().try_for_each(|part| {
+            io::write_text(folder.join(list(part)), &numbers_of(part, samples))
         })
     }
 }
@@ -66,17 +62,13 @@ impl Voc {
     fn document(&self, entry: &Entry<'_>) -> String {
         let [w, h] = entry.sample.labels.image;
         let (part, k, extension) = (entry.part.name(), entry.k, self.pictures.extension());
-        let mut xml = format!(
-            "<annotation>\n  <folder>images/{part}</folder>\n  <filename>{k:06}.{extension}</filename>\n"
-        );
-        xml += "  <source>\n    <database>petcomp</database>\n  </source>\n";
-        xml += &format!(
-            "  <size>\n    <width>{w}</width>\n    <height>{h}</height>\n    <depth>3</depth>\n  </size>\n"
-        );
-        xml += "  <segmented>0</segmented>\n";
         let objects = entry.labelled.iter().map(|label| self.object(entry, label));
-        xml.extend(objects);
-        xml + "</annotation>\n"
+        let objects: String = objects.collect();
+        format!(
+            "<annotation>\n  <folder>images/{part}</folder>\n  <filename>{k:06}.{extension}</filename>\n  \
+             <source>\n    <database>petcomp</database>\n  </source>\n  <size>\n    <width>{w}</width>\n    \
+             <height>{h}</height>\n    <depth>3</depth>\n  </size>\n  <segmented>0</segmented>\n{objects}</annotation>\n"
+        )
     }
 
     /// Nothing for an object without a box.
@@ -85,14 +77,10 @@ impl Voc {
         if b.is_empty() {
             return String::new();
         }
-        let name = entry
-            .classes
-            .get(label.class as usize)
-            .map_or_else(|| label.class.to_string(), |name| escaped(name));
-        let [w, h] = entry.sample.labels.image.map(f64::from);
-        let is_cut = b.x0 <= 0.0 || b.y0 <= 0.0 || b.x1 >= w || b.y1 >= h;
+        let class = entry.classes.get(label.class as usize);
+        let name = class.map_or_else(|| label.class.to_string(), |name| escaped(name));
         let claims = [
-            ("truncated", is_cut),
+            ("truncated", is_cut(&b, entry.sample.labels.image)),
             ("difficult", label.ignored),
             ("occluded", !label.object.is_topmost()),
         ];
@@ -111,14 +99,26 @@ impl Voc {
 
 /// The first and last pixels that a box touches, counted from 1.
 fn pixels(b: &BBox) -> [(&'static str, u64); 4] {
-    let first = |v: f64| libm::floor(v) as u64 + 1;
-    let last = |v: f64| libm::ceil(v) as u64;
     [
-        ("xmin", first(b.x0)),
-        ("ymin", first(b.y0)),
-        ("xmax", last(b.x1)),
-        ("ymax", last(b.y1)),
+        ("xmin", first_pixel(b.x0)),
+        ("ymin", first_pixel(b.y0)),
+        ("xmax", last_pixel(b.x1)),
+        ("ymax", last_pixel(b.y1)),
     ]
+}
+
+fn first_pixel(edge: f64) -> u64 {
+    libm::floor(edge) as u64 + 1
+}
+
+fn last_pixel(edge: f64) -> u64 {
+    libm::ceil(edge) as u64
+}
+
+/// The object reaches a border of the image.
+fn is_cut(b: &BBox, image: [u32; 2]) -> bool {
+    let [w, h] = image.map(f64::from);
+    b.x0 <= 0.0 || b.y0 <= 0.0 || b.x1 >= w || b.y1 >= h
 }
 
 /// Text that XML does not take for its own; what XML cannot hold at all becomes a space.
@@ -134,6 +134,12 @@ fn escaped(text: &str) -> String {
         }
     }
     xml
+}
+
+/// The samples of a part, a line each.
+fn numbers_of(part: Part, samples: &[Written]) -> String {
+    let samples = samples.iter().filter(|sample| sample.part == part);
+    samples.map(|sample| format!("{:06}\n", sample.k)).collect()
 }
 
 #[cfg(test)]

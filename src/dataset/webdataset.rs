@@ -4,6 +4,7 @@ use crate::dataset::{Entry, Part, Writer, Written};
 use crate::error::{Error, Result};
 use crate::io;
 use serde::{Deserialize, Serialize};
+use std::fs::File;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -56,21 +57,14 @@ impl Writer for WebDataset {
 
     fn finish(&self, folder: &Path, _classes: &[String], samples: &[Written]) -> Result<()> {
         for part in Part::ALL {
-            let of_part: Vec<_> = samples
-                .iter()
-                .filter(|sample| sample.part == part)
-                .collect();
-            let archives: Vec<_> = of_part.chunks(self.samples.max(1)).collect();
-            for (i, samples) in archives.iter().enumerate() {
+            let of_part = samples.iter().filter(|sample| sample.part == part);
+            let of_part: Vec<_> = of_part.collect();
+            let archives = of_part.chunks(self.samples.max(1));
+            let count = archives.len();
+            for (i, samples) in archives.enumerate() {
                 io::write_through(&archive(folder, part, i), |out| pack(out, folder, samples))?;
             }
-            // A dataset that had more samples before.
-            let left_over = (archives.len()..)
-                .map(|i| archive(folder, part, i))
-                .take_while(|path| path.exists());
-            left_over.into_iter().try_for_each(|path| {
-                std::fs::remove_file(&path).map_err(|e| Error::file(&path, e))
-            })?;
+            remove_archives_from(folder, part, count)?;
         }
         Ok(())
     }
@@ -86,17 +80,38 @@ fn pack(out: &mut dyn Write, folder: &Path, samples: &[&Written]) -> std::io::Re
     let mut tar = tar::Builder::new(out);
     for sample in samples {
         for (name, file) in named(sample) {
-            let file = io::inside(folder, file).map_err(std::io::Error::other)?;
-            let file = std::fs::File::open(&file)
-                .map_err(|e| std::io::Error::other(Error::file(&file, e)))?;
-            let mut header = tar::Header::new_ustar();
-            header.set_size(file.metadata()?.len());
-            header.set_mode(FILE_MODE);
-            header.set_mtime(0);
+            let file = open_inside(folder, file)?;
+            let mut header = header_of(&file)?;
             tar.append_data(&mut header, name, file)?;
         }
     }
     tar.finish()
+}
+
+fn open_inside(folder: &Path, file: &Path) -> std::io::Result<File> {
+    let file = io::inside(folder, file).map_err(std::io::Error::other)?;
+    File::open(&file).map_err(|e| std::io::Error::other(Error::file(&file, e)))
+}
+
+/// Without owner and time, so that the same files give the same archive.
+fn header_of(file: &File) -> std::io::Result<tar::Header> {
+    let mut header = tar::Header::new_ustar();
+    header.set_size(file.metadata()?.len());
+    header.set_mode(FILE_MODE);
+    header.set_mtime(0);
+    Ok(header)
+}
+
+/// Removes the archives of a dataset that had more samples before.
+fn remove_archives_from(folder: &Path, part: Part, first: usize) -> Result<()> {
+    for i in first.. {
+        let path = archive(folder, part, i);
+        if !path.exists() {
+            break;
+        }
+        std::fs::remove_file(&path).map_err(|e| Error::file(&path, e))?;
+    }
+    Ok(())
 }
 
 /// The files of a sample and their names in an archive.
@@ -104,17 +119,12 @@ fn named(sample: &Written) -> Vec<(String, &Path)> {
     let mut named: Vec<(String, &Path)> = Vec::new();
     for file in &sample.files {
         let extension = file.extension().unwrap_or_default().to_string_lossy();
-        let short = format!("{:06}.{extension}", sample.k);
-        let kind = file.iter().next().unwrap_or_default().to_string_lossy();
-        let is_taken = named.iter().any(|(name, _)| *name == short);
-        named.push((
-            if is_taken {
-                format!("{:06}.{kind}.{extension}", sample.k)
-            } else {
-                short
-            },
-            file,
-        ));
+        let mut name = format!("{:06}.{extension}", sample.k);
+        if named.iter().any(|(known, _)| *known == name) {
+            let kind = file.iter().next().unwrap_or_default().to_string_lossy();
+            name = format!("{:06}.{kind}.{extension}", sample.k);
+        }
+        named.push((name, file));
     }
     named
 }

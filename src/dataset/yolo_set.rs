@@ -31,10 +31,11 @@ impl YoloSet {
             return Err(Error::file(path, format!("{line}{what}")));
         }
         let root = yaml.root(folder);
+        let [train, val] = Part::ALL.map(|part| images_of(&root, yaml.folders(part)));
         Ok(Self {
             classes: yaml.names().to_vec(),
-            train: images_of(&root, yaml.folders(Part::Train))?,
-            val: images_of(&root, yaml.folders(Part::Val))?,
+            train: train?,
+            val: val?,
         })
     }
 
@@ -82,19 +83,21 @@ fn listed_in(list: &Path) -> Result<Vec<PathBuf>> {
 }
 
 fn images_in(folder: &Path) -> Result<Vec<PathBuf>> {
-    let entries = std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
     let mut images = Vec::new();
-    for entry in entries {
+    for entry in std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))? {
         let path = entry.map_err(|e| Error::file(folder, e))?.path();
-        let extension = path
-            .extension()
-            .map(|e| e.to_string_lossy().to_ascii_lowercase());
-        if extension.is_some_and(|e| ["jpg", "jpeg", "png"].contains(&e.as_str())) {
+        if is_trainable(&path) {
             images.push(path);
         }
     }
     images.sort();
     Ok(images)
+}
+
+/// An image of a format that every trainer reads.
+fn is_trainable(path: &Path) -> bool {
+    let extension = path.extension().unwrap_or_default().to_string_lossy();
+    ["jpg", "jpeg", "png"].contains(&&*extension.to_ascii_lowercase())
 }
 
 #[cfg(test)]

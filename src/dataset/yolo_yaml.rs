@@ -71,13 +71,12 @@ impl DataYaml {
     /// Reads the keys that trainers need; all others are skipped. What could be read stays, whatever else is wrong.
     pub(crate) fn read(text: &str) -> (Self, Vec<Problem>) {
         let (mut yaml, mut problems) = (Self::default(), Vec::new());
-        if let Err(problem) = Reader::new(text).read_keys(|key, line, value| {
+        let read = Reader::new(text).read_keys(|key, line, value| {
             if let Err((value_line, what)) = yaml.set(key, value) {
                 problems.push((Some(value_line.unwrap_or(line)), what));
             }
-        }) {
-            problems.push(problem);
-        }
+        });
+        problems.extend(read.err());
         problems.extend(yaml.missing().into_iter().map(|what| (None, what)));
         (yaml, problems)
     }
@@ -111,20 +110,21 @@ impl DataYaml {
     }
 
     fn missing(&self) -> Vec<String> {
-        let mut missing: Vec<String> = Part::ALL
-            .into_iter()
-            .filter(|&part| self.folders(part).is_empty())
-            .map(|part| format!("no {}:, which trainers require", part.name()))
-            .collect();
-        if self.names.is_empty() {
-            missing.push("no names, expected one for each class".into());
-        } else if let Some(nc) = self.nc.filter(|&nc| nc != self.names.len()) {
-            missing.push(format!(
-                "nc: {nc}, but there are {} names",
-                self.names.len()
-            ));
-        }
+        let parts = Part::ALL.into_iter();
+        let missing = parts.filter(|&part| self.folders(part).is_empty());
         missing
+            .map(|part| format!("no {}:, which trainers require", part.name()))
+            .chain(self.names_problem())
+            .collect()
+    }
+
+    fn names_problem(&self) -> Option<String> {
+        let count = self.names.len();
+        if count == 0 {
+            return Some("no names, expected one for each class".into());
+        }
+        let nc = self.nc.filter(|&nc| nc != count)?;
+        Some(format!("nc: {nc}, but there are {count} names"))
     }
 }
 
@@ -156,11 +156,11 @@ impl Value {
     }
 
     fn count(&self, key: &str) -> Result<usize, Problem> {
-        let expected = |found: &str| (None, format!("{key}: {found}, expected a number"));
-        match self {
-            Self::Text(text) => text.parse().map_err(|_| expected(text)),
-            _ => Err(expected("no number")),
-        }
+        let (found, number) = match self {
+            Self::Text(text) => (text.as_str(), text.parse().ok()),
+            _ => ("no number", None),
+        };
+        number.ok_or_else(|| (None, format!("{key}: {found}, expected a number")))
     }
 
     fn bytes(&self) -> usize {
@@ -198,15 +198,8 @@ impl<'a> Reader<'a> {
 
     /// Hands over each key of the first document with its line and value.
     fn read_keys(&mut self, mut set: impl FnMut(&str, usize, Value)) -> Result<(), Problem> {
-        loop {
-            match self.next()?.0 {
-                Event::MappingStart(..) => break,
-                Event::StreamEnd | Event::DocumentEnd => return Ok(()),
-                Event::Scalar(..) | Event::SequenceStart(..) | Event::Alias(_) => {
-                    return Err((None, "expected keys and values".into()));
-                }
-                _ => {}
-            }
+        if !self.enter_document()? {
+            return Ok(());
         }
         loop {
             let (event, span) = self.next()?;
@@ -218,6 +211,20 @@ impl<'a> Reader<'a> {
             let value = self.value(event)?;
             if let Value::Text(key) = key {
                 set(&key, span.start.line(), value);
+            }
+        }
+    }
+
+    /// Goes to the first key; false where there is none.
+    fn enter_document(&mut self) -> Result<bool, Problem> {
+        loop {
+            match self.next()?.0 {
+                Event::MappingStart(..) => return Ok(true),
+                Event::StreamEnd | Event::DocumentEnd => return Ok(false),
+                Event::Scalar(..) | Event::SequenceStart(..) | Event::Alias(_) => {
+                    return Err((None, "expected keys and values".into()));
+                }
+                _ => {}
             }
         }
     }
@@ -247,10 +254,8 @@ impl<'a> Reader<'a> {
 
     fn alias(&mut self, anchor: usize) -> Result<Value, Problem> {
         let value = self.anchors.get(&anchor).cloned().unwrap_or(Value::Other);
-        match self.alias_budget.checked_sub(value.bytes()) {
-            Some(left) => self.alias_budget = left,
-            None => return Err((None, "aliases repeat too much text".into())),
-        }
+        let left = self.alias_budget.checked_sub(value.bytes());
+        self.alias_budget = left.ok_or((None, "aliases repeat too much text".into()))?;
         Ok(value)
     }
 

@@ -18,11 +18,16 @@ mod ssim;
 mod test_pictures;
 mod view;
 
+#[doc(hidden)]
 pub use bands::{RowSource, RowsFromFn};
 pub use flip::flip;
+#[doc(hidden)]
 pub use likeness::Likeness;
-pub use report::{Comparison, Largest, Verdict};
+pub use report::Comparison;
+#[doc(hidden)]
+pub use report::{Largest, Verdict};
 pub use ssim::ssim;
+#[doc(hidden)]
 pub use view::{absolute_difference, difference, triple};
 
 use crate::pixel::{Coverage, Depth, LinearRgb, PremulRgba, StraightRgba};
@@ -73,6 +78,7 @@ impl Default for Thresholds {
 }
 
 /// Pixels that are a few floats, each with a name.
+#[doc(hidden)]
 pub trait NamedChannels: bytemuck::Pod + Send + Sync {
     /// The names, in order of memory.
     const NAMES: &'static [&'static str];

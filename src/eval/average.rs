@@ -12,20 +12,23 @@ pub(super) const RECALL_POINTS: usize = 101;
 /// # Method
 /// As YOLOv5 computes it (its file `utils/metrics.py`, function `compute_ap`, method `interp`).
 pub(super) fn trapezoid(recall: &[f64], precision: &[f64]) -> f64 {
+    let read = envelope_samples(recall, precision);
+    (0..RECALL_POINTS - 1)
+        .map(|i| (recall_at(i + 1) - recall_at(i)) * (read[i + 1] + read[i]) / 2.0)
+        .sum()
+}
+
+/// The envelope of the precision at each of the recalls, linear between its points.
+fn envelope_samples(recall: &[f64], precision: &[f64]) -> [f64; RECALL_POINTS] {
     let xs = with_ends(0.0, recall, 1.0);
     let mut ys = with_ends(1.0, precision, 0.0);
     make_envelope(&mut ys);
     let mut after = 0;
-    let read: [f64; RECALL_POINTS] = std::array::from_fn(|i| {
-        after += xs[after..]
-            .iter()
-            .take_while(|&&at| at <= recall_at(i))
-            .count();
+    std::array::from_fn(|i| {
+        let later = xs[after..].iter();
+        after += later.take_while(|&&at| at <= recall_at(i)).count();
         between(recall_at(i), after, &xs, &ys)
-    });
-    (0..RECALL_POINTS - 1)
-        .map(|i| (recall_at(i + 1) - recall_at(i)) * (read[i + 1] + read[i]) / 2.0)
-        .sum()
+    })
 }
 
 fn with_ends(first: f64, values: &[f64], last: f64) -> Vec<f64> {

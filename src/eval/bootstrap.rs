@@ -36,9 +36,9 @@ pub fn bootstrap(
 impl Matches {
     /// As [`bootstrap()`].
     pub fn bootstrap(&self, rounds: usize, seed: u64) -> Interval {
-        let round = |k: usize| self.map(&drawn(self.images(), seed, k as u64));
-        let values: Vec<f64> = (0..rounds).into_par_iter().map(round).collect();
-        interval(self.map(&[]), values)
+        let rounds = (0..rounds as u64).into_par_iter();
+        let values = rounds.map(|round| self.map(&drawn(self.images(), seed, round)));
+        interval(self.map(&[]), values.collect())
     }
 }
 
@@ -71,9 +71,11 @@ pub(crate) fn drawn(count: usize, seed: u64, round: u64) -> Vec<u32> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     rng.set_stream(round);
     let mut times = vec![0; count];
-    // Multiply-shift: a bias below 2^-32 for any number of images that fits into memory.
-    let draw = |rng: &mut ChaCha8Rng| ((u128::from(rng.next_u64()) * count as u128) >> 64) as usize;
-    (0..count).for_each(|_| times[draw(&mut rng)] += 1);
+    for _ in 0..count {
+        // Multiply-shift: a bias below 2^-32 for any number of images that fits into memory.
+        let draw = (u128::from(rng.next_u64()) * count as u128) >> 64;
+        times[draw as usize] += 1;
+    }
     times
 }
 

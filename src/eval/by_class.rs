@@ -70,11 +70,10 @@ impl<'a> ByClass<'a> {
         let mut found = places(sheets, |sheet| sheet.found.iter().map(|f| f.class));
         // Both sorts keep the order of equal ones.
         truth.par_sort_by_key(|p| p.class);
-        let confidence = |p: &BoxPlace| sheets[p.sheet].found[p.index].confidence;
         found.par_sort_by(|a, b| {
             (a.class, a.sheet)
                 .cmp(&(b.class, b.sheet))
-                .then_with(|| confidence(b).total_cmp(&confidence(a)))
+                .then_with(|| b.confidence(sheets).total_cmp(&a.confidence(sheets)))
         });
         Self {
             sheets,
@@ -107,23 +106,38 @@ impl<'a> ByClass<'a> {
 impl<'a> ClassBoxes<'a> {
     /// The images with boxes of the class, in order.
     pub(super) fn images(&self) -> Vec<ImageBoxes<'a>> {
-        let same = |a: &BoxPlace, b: &BoxPlace| a.sheet == b.sheet;
-        let mut truth = self.truth.chunk_by(same).peekable();
-        let mut found = self.found.chunk_by(same).peekable();
+        let mut truth = self.truth.chunk_by(BoxPlace::is_on_same_sheet).peekable();
+        let mut found = self.found.chunk_by(BoxPlace::is_on_same_sheet).peekable();
         let mut images = Vec::new();
-        loop {
-            let next = [truth.peek(), found.peek()]
-                .into_iter()
-                .flatten()
-                .map(|places| places[0].sheet)
-                .min();
-            let Some(sheet) = next else { return images };
-            let is_next = |places: &&[BoxPlace]| places[0].sheet == sheet;
-            let truth = truth.next_if(is_next).unwrap_or_default();
-            let found = found.next_if(is_next).unwrap_or_default();
-            images.push(ImageBoxes::new(sheet, &self.sheets[sheet], truth, found));
+        while let Some(sheet) = first_sheet([truth.peek(), found.peek()]) {
+            let truth = truth.next_if(|places| places[0].sheet == sheet);
+            let found = found.next_if(|places| places[0].sheet == sheet);
+            images.push(ImageBoxes::new(
+                sheet,
+                &self.sheets[sheet],
+                truth.unwrap_or_default(),
+                found.unwrap_or_default(),
+            ));
         }
+        images
     }
+}
+
+impl BoxPlace {
+    fn is_on_same_sheet(&self, other: &Self) -> bool {
+        self.sheet == other.sheet
+    }
+
+    /// Of a detection.
+    fn confidence(&self, sheets: &[EvalImage]) -> f64 {
+        sheets[self.sheet].found[self.index].confidence
+    }
+}
+
+/// The first sheet that any of the next boxes lie on.
+fn first_sheet(next: [Option<&&[BoxPlace]>; 2]) -> Option<usize> {
+    let sheets = next.into_iter().flatten().map(|places| places[0].sheet);
+    sheets.min()
 }
 
 #[cfg(test)]

@@ -1,9 +1,9 @@
 //! Average precision and recall as the COCO tools compute them.
 
 use super::average::{mean_of_samples, recall_and_precision};
-use super::by_class::{ByClass, ClassBoxes, ImageBoxes};
+use super::by_class::{ByClass, ImageBoxes};
 use super::overlap::{BoxIndex, area, intersection, share};
-use super::rank::{Hit, Marks, Ranking};
+use super::rank::{Hit, Marks, Ranking, marked};
 use super::{
     ClassScores, Definition, Detection, EvalImage, GroundTruth, Scores, THRESHOLDS, mean,
     thresholds,
@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// No more detections of a class than this count in an image: the surest.
-pub const MAX_DETECTIONS: [usize; 3] = [1, 10, 100];
+pub(crate) const MAX_DETECTIONS: [usize; 3] = [1, 10, 100];
 /// Keeps a precision defined: the distance of 1 to the next number, as in the original.
 const PRECISION_EPSILON: f64 = f64::EPSILON;
 /// No overlap reaches 1 for sure.
@@ -81,10 +81,9 @@ pub fn coco(sheets: &[EvalImage], weights: &[u32]) -> CocoScores {
     let [all, by_area @ ..] = rankings
         .each_ref()
         .map(|rankings| measured(rankings, weights));
-    let recall_within = |count| over(&all, |m| mean(m.recall_within(count)));
     CocoScores {
         ap_by_area: by_area.each_ref().map(|m| over(m, |m| mean(m.ap))),
-        ar_by_count: MAX_DETECTIONS.map(recall_within),
+        ar_by_count: MAX_DETECTIONS.map(|count| over(&all, |m| mean(m.recall_within(count)))),
         ar_by_area: by_area.each_ref().map(|m| over(m, |m| mean(m.recall))),
         scores: Scores {
             definition: Definition::Coco,
@@ -95,8 +94,10 @@ pub fn coco(sheets: &[EvalImage], weights: &[u32]) -> CocoScores {
 
 /// The detections of every class with something to find, the surest 100 of each image.
 pub(super) fn rankings(classes: &ByClass<'_>, range: AreaRange) -> Vec<Ranking> {
-    let ranking = |boxes: &ClassBoxes<'_>| Ranking::new(boxes, |image| match_image(image, range));
-    classes.classes().par_iter().map(ranking).collect()
+    let classes = classes.classes();
+    let rank = classes.par_iter();
+    rank.map(|boxes| Ranking::new(boxes, |image| match_image(image, range)))
+        .collect()
 }
 
 pub(super) fn scores(rankings: &[Ranking], weights: &[u32]) -> Scores {
@@ -143,33 +144,26 @@ impl<'a> Measured<'a> {
         let curves = turns
             .each_ref()
             .map(|sums| recall_and_precision(sums, truths, [0.0, PRECISION_EPSILON]));
-        let last = |values: &[f64]| values.last().copied().unwrap_or(0.0);
+        let curves = curves.each_ref();
         Some(Self {
             ranking,
             weights,
             truths,
-            ap: curves
-                .each_ref()
-                .map(|(recall, precision)| mean_of_samples(recall, precision)),
-            recall: curves.each_ref().map(|(recall, _)| last(recall)),
-            precision: last(&curves[0].1),
+            ap: curves.map(|(recall, precision)| mean_of_samples(recall, precision)),
+            recall: curves.map(|(recall, _)| last_of(recall)),
+            precision: last_of(&curves[0].1),
         })
     }
 
     /// Recall with so many detections an image.
     fn recall_within(&self, count: usize) -> [f64; THRESHOLDS] {
         let mut right = [0.0; THRESHOLDS];
-        for (hit, weight) in self
-            .ranking
-            .counting(self.weights)
-            .filter(|(hit, _)| (hit.place as usize) < count)
-        {
-            let marks = hit.right & !hit.ignored;
-            right
-                .iter_mut()
-                .enumerate()
-                .filter(|(t, _)| marks >> t & 1 == 1)
-                .for_each(|(_, sum)| *sum += weight);
+        for (hit, weight) in self.ranking.counting(self.weights) {
+            if (hit.place as usize) < count {
+                for t in marked(hit.right & !hit.ignored) {
+                    right[t] += weight;
+                }
+            }
         }
         right.map(|sum| sum / self.truths)
     }
@@ -203,19 +197,12 @@ struct Target<'a> {
 
 /// The detections of a class in one image, matched with its boxes, and how many boxes there are to be found.
 fn match_image(image: &ImageBoxes<'_>, range: AreaRange) -> (Vec<Hit>, usize) {
-    let mut targets: Vec<Target<'_>> = image
-        .truth
-        .iter()
-        .map(|&truth| Target::new(truth, range))
-        .collect();
-    // Those that count come first: a detection takes an ignored box only where none of them is left.
-    targets.sort_by_key(|t| t.ignored);
+    let mut targets = targets_of(image, range);
     let index = BoxIndex::new(targets.iter().map(|t| t.truth.bbox));
     let mut hits = Vec::new();
     for (place, found) in image.found.iter().take(MAX_DETECTIONS[2]).enumerate() {
-        let overlaps: Vec<(usize, f64)> = index
-            .near(&found.bbox)
-            .into_iter()
+        let near = index.near(&found.bbox).into_iter();
+        let overlaps: Vec<(usize, f64)> = near
             .map(|k| (k, overlap(found, targets[k].truth)))
             .collect();
         let (right, ignored) = marks(found, &mut targets, &overlaps, range);
@@ -228,6 +215,14 @@ fn match_image(image: &ImageBoxes<'_>, range: AreaRange) -> (Vec<Hit>, usize) {
         });
     }
     (hits, targets.iter().filter(|t| !t.ignored).count())
+}
+
+/// Those that count come first: a detection takes an ignored box only where none of them is left.
+fn targets_of<'a>(image: &ImageBoxes<'a>, range: AreaRange) -> Vec<Target<'a>> {
+    let truth = image.truth.iter();
+    let mut targets: Vec<_> = truth.map(|&truth| Target::new(truth, range)).collect();
+    targets.sort_by_key(|t| t.ignored);
+    targets
 }
 
 impl<'a> Target<'a> {
@@ -294,12 +289,15 @@ fn nearest(
 /// Intersection over union; over the detection's own area where the truth is a crowd.
 fn overlap(found: &Detection, truth: &GroundTruth) -> f64 {
     let shared = intersection(&found.bbox, &truth.bbox);
-    let whole = if truth.crowd {
-        area(&found.bbox)
-    } else {
-        area(&found.bbox) + area(&truth.bbox) - shared
+    let whole = match truth.crowd {
+        true => area(&found.bbox),
+        false => area(&found.bbox) + area(&truth.bbox) - shared,
     };
     share(shared, whole)
+}
+
+fn last_of(values: &[f64]) -> f64 {
+    values.last().copied().unwrap_or(0.0)
 }
 
 #[cfg(test)]

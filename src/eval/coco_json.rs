@@ -98,25 +98,26 @@ impl CocoTruth {
     fn new(document: &CocoDocument) -> Result<Self> {
         let images = places("images", document.images.iter().map(|image| image.id))?;
         let categories = places("categories", document.categories.iter().map(|c| c.id))?;
-        let records = || images.values().map(|&i| &document.images[i]);
+        let records: Vec<&ImageRecord> = images.values().map(|&i| &document.images[i]).collect();
+        let names = categories.values();
+        let names = names.map(|&i| document.categories[i].name.clone());
         let mut truth = Self {
-            sheets: records()
-                .map(|image| EvalImage::new(image.name(), Vec::new()))
-                .collect(),
-            classes: categories
-                .values()
-                .map(|&i| document.categories[i].name.clone())
-                .collect(),
-            files: records().map(ImageRecord::file).collect(),
+            sheets: records.iter().map(|image| image.to_sheet()).collect(),
+            classes: names.collect(),
+            files: records.iter().map(|image| image.file()).collect(),
             images: images.keys().copied().zip(0..).collect(),
             categories: categories.into_keys().zip(0..).collect(),
         };
-        for (i, annotation) in document.annotations.iter().enumerate() {
-            truth
-                .add_annotation(annotation)
+        truth.add_annotations(&document.annotations)?;
+        Ok(truth)
+    }
+
+    fn add_annotations(&mut self, annotations: &[CocoAnnotation]) -> Result<()> {
+        for (i, annotation) in annotations.iter().enumerate() {
+            self.add_annotation(annotation)
                 .map_err(|e| e.within(&format!("annotations[{i}]")))?;
         }
-        Ok(truth)
+        Ok(())
     }
 
     fn add_annotation(&mut self, annotation: &CocoAnnotation) -> Result<()> {
@@ -140,37 +141,35 @@ impl CocoTruth {
         Ok(())
     }
 
-    fn add_detection(&mut self, detection: &CocoDetection) -> Result<()> {
-        let (image, class) = self.place(detection.image_id, detection.category_id)?;
-        let bbox = corners(detection.bbox)?;
-        self.sheets[image].found.push(Detection {
+    fn add_detection(&mut self, found: &CocoDetection) -> Result<()> {
+        let (image, class) = self.place(found.image_id, found.category_id)?;
+        let detection = Detection {
             class,
-            bbox,
-            confidence: detection.score,
-        });
+            bbox: corners(found.bbox)?,
+            confidence: found.score,
+        };
+        self.sheets[image].found.push(detection);
         Ok(())
     }
 
     fn place(&self, image: i64, category: i64) -> Result<(usize, u32)> {
-        let unknown =
-            |at: &str, id| Error::value(at, format!("{id}, expected one that the truth lists"));
-        let image = *self
-            .images
-            .get(&image)
-            .ok_or_else(|| unknown("image_id", image))?;
-        let class = *self
-            .categories
-            .get(&category)
-            .ok_or_else(|| unknown("category_id", category))?;
-        Ok((image, class))
+        let index = self.images.get(&image);
+        let class = self.categories.get(&category);
+        Ok((
+            *index.ok_or_else(|| unlisted("image_id", image))?,
+            *class.ok_or_else(|| unlisted("category_id", category))?,
+        ))
     }
 
     /// Where the images are: in `folder`, or where COCO and petcomp have them for a document at `path`. A file name that
     /// leads out of a folder leads nowhere.
     pub fn pictures(&self, path: &Path, folder: Option<&Path>) -> Vec<Option<Picture>> {
-        let roots = folder.map_or_else(|| image_folders(path), |folder| vec![folder.to_path_buf()]);
-        self.files
-            .iter()
+        let roots = match folder {
+            Some(folder) => vec![folder.to_path_buf()],
+            None => image_folders(path),
+        };
+        let files = self.files.iter();
+        files
             .map(|(name, size)| find_picture(&roots, name, *size))
             .collect()
     }
@@ -179,19 +178,17 @@ impl CocoTruth {
 /// Folders that may hold the images of `annotations/instances_val2017.json`.
 fn image_folders(path: &Path) -> Vec<PathBuf> {
     let folder = path.parent().unwrap_or(Path::new(""));
-    let stem = path
-        .file_stem()
-        .map(|n| n.to_string_lossy().into_owned())
-        .unwrap_or_default();
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     let part = stem.rsplit('_').next().unwrap_or_default();
     [folder.to_path_buf(), folder.join("..")]
         .iter()
         .flat_map(|root| {
+            let images = root.join("images");
             [
                 root.clone(),
-                root.join("images"),
+                images.clone(),
                 root.join(part),
-                root.join("images").join(part),
+                images.join(part),
             ]
         })
         .collect()
@@ -199,18 +196,28 @@ fn image_folders(path: &Path) -> Vec<PathBuf> {
 
 /// The image of this name below one of the folders, and its size where that is known.
 fn find_picture(roots: &[PathBuf], name: &str, size: Option<[f64; 2]>) -> Option<Picture> {
-    let is_below = Path::new(name)
-        .components()
-        .all(|part| matches!(part, Component::Normal(_)));
-    let path = roots
-        .iter()
-        .map(|root| root.join(name))
-        .find(|path| is_below && path.is_file())?;
-    let size = size.or_else(|| {
-        let header = io::read_header(&path).ok()?;
-        Some([header.width as f64, header.height as f64])
-    })?;
+    if !is_below(name) {
+        return None;
+    }
+    let mut paths = roots.iter().map(|root| root.join(name));
+    let path = paths.find(|path| path.is_file())?;
+    let size = size.or_else(|| stored_size(&path))?;
     Some(Picture { path, size })
+}
+
+/// A path that stays below the folder that it is joined to.
+fn is_below(name: &str) -> bool {
+    let mut parts = Path::new(name).components();
+    parts.all(|part| matches!(part, Component::Normal(_)))
+}
+
+fn stored_size(path: &Path) -> Option<[f64; 2]> {
+    let header = io::read_header(path).ok()?;
+    Some([header.width as f64, header.height as f64])
+}
+
+fn unlisted(at: &str, id: i64) -> Error {
+    Error::value(at, format!("{id}, expected one that the truth lists"))
 }
 
 /// Places in the document by id, in order of the ids.
@@ -218,10 +225,8 @@ fn places(list: &str, ids: impl Iterator<Item = i64>) -> Result<BTreeMap<i64, us
     let mut places = BTreeMap::new();
     for (i, id) in ids.enumerate() {
         if let Some(first) = places.insert(id, i) {
-            return Err(Error::value(
-                format!("{list}[{i}].id"),
-                format!("{id}, as of {list}[{first}], expected another"),
-            ));
+            let what = format!("{id}, as of {list}[{first}], expected another");
+            return Err(Error::value(format!("{list}[{i}].id"), what));
         }
     }
     Ok(places)
@@ -229,25 +234,29 @@ fn places(list: &str, ids: impl Iterator<Item = i64>) -> Result<BTreeMap<i64, us
 
 impl ImageRecord {
     fn file(&self) -> (String, Option<[f64; 2]>) {
-        let address = self.coco_url.rsplit('/').next().unwrap_or_default();
-        let name = if self.file_name.is_empty() {
-            address
-        } else {
-            &self.file_name
+        let name = match self.file_name.as_str() {
+            "" => self.coco_url.rsplit('/').next().unwrap_or_default(),
+            name => name,
         };
-        let side = |side: Option<f64>| side.filter(|side| *side >= 1.0);
-        (
-            name.to_owned(),
-            side(self.width).zip(side(self.height)).map(|(w, h)| [w, h]),
-        )
+        (name.to_owned(), self.size())
+    }
+
+    fn size(&self) -> Option<[f64; 2]> {
+        let [width, height] = [self.width?, self.height?];
+        (width >= 1.0 && height >= 1.0).then_some([width, height])
+    }
+
+    fn to_sheet(&self) -> EvalImage {
+        EvalImage::new(self.name(), Vec::new())
     }
 
     /// The file's name without folder and extension; the id of an image without a file.
     fn name(&self) -> String {
         let (file, _) = self.file();
-        Path::new(&file)
-            .file_stem()
-            .map_or_else(|| self.id.to_string(), |n| n.to_string_lossy().into_owned())
+        match Path::new(&file).file_stem() {
+            Some(stem) => stem.to_string_lossy().into_owned(),
+            None => self.id.to_string(),
+        }
     }
 }
 
@@ -258,18 +267,15 @@ fn corners([x, y, w, h]: [f64; 4]) -> Result<BBox> {
         x1: x + w,
         y1: y + h,
     };
-    let near = [bbox.x0, bbox.y0, bbox.x1, bbox.y1]
-        .iter()
-        .all(|v| v.abs() <= FARTHEST_PX);
-    if near && w >= 0.0 && h >= 0.0 {
+    let sides = [bbox.x0, bbox.y0, bbox.x1, bbox.y1];
+    if sides.iter().all(|v| v.abs() <= FARTHEST_PX) && w >= 0.0 && h >= 0.0 {
         return Ok(bbox);
     }
-    let expected =
-        format!("expected x, y, width and height of at least 0, all within {FARTHEST_PX} pixels");
-    Err(Error::value(
-        "bbox",
-        format!("{:?}, {expected}", [x, y, w, h]),
-    ))
+    let what = format!(
+        "{:?}, expected x, y, width and height of at least 0, all within {FARTHEST_PX} pixels",
+        [x, y, w, h]
+    );
+    Err(Error::value("bbox", what))
 }
 
 #[cfg(test)]

@@ -61,18 +61,23 @@ impl Confusion {
     /// The classes that occur, those first with the most boxes missed, found where nothing is, or confused with another class;
     /// of equal ones those first with the most boxes.
     pub fn worst(&self) -> Vec<u32> {
+        let sums = self.sums_by_class();
+        let mut classes: Vec<u32> = sums.keys().copied().collect();
+        classes.sort_by_key(|class| std::cmp::Reverse(sums[class]));
+        classes
+    }
+
+    /// For each class the wrong ones, and all in which it occurs.
+    fn sums_by_class(&self) -> BTreeMap<u32, [u64; 2]> {
         let mut sums: BTreeMap<u32, [u64; 2]> = BTreeMap::new();
         for (&[found, truth], &count) in &self.counts {
-            let wrong = if found == truth { 0 } else { count };
             for class in BTreeSet::from([found, truth]).into_iter().flatten() {
-                let [all_wrong, all] = sums.entry(class).or_default();
-                *all_wrong += wrong;
+                let [wrong, all] = sums.entry(class).or_default();
+                *wrong += if found == truth { 0 } else { count };
                 *all += count;
             }
         }
-        let mut classes: Vec<(u32, [u64; 2])> = sums.into_iter().collect();
-        classes.sort_by_key(|&(_, sums)| std::cmp::Reverse(sums));
-        classes.into_iter().map(|(class, _)| class).collect()
+        sums
     }
 }
 

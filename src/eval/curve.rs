@@ -42,48 +42,40 @@ pub(super) fn from_rankings(rankings: &[Ranking]) -> Curves {
 }
 
 fn precision_recall(ranked: &Ranked<'_>) -> Vec<[f64; 2]> {
-    let all: Vec<[f64; 2]> = ranked
-        .recall
-        .iter()
-        .zip(&ranked.precision)
-        .map(|(&r, &p)| [r, p])
-        .collect();
-    let last = all.len().saturating_sub(1);
-    let step = all.len().div_ceil(RECALL_POINTS).max(1);
-    all.into_iter()
+    let pairs = ranked.recall.iter().zip(&ranked.precision);
+    let count = pairs.len();
+    let step = count.div_ceil(RECALL_POINTS).max(1);
+    pairs
         .enumerate()
-        .filter(|(i, _)| i % step == 0 || *i == last)
-        .map(|(_, p)| p)
+        .filter(|(i, _)| i % step == 0 || i + 1 == count)
+        .map(|(_, (&recall, &precision))| [recall, precision])
         .collect()
 }
 
 fn mean_precision(ranked: &[Ranked<'_>]) -> Vec<[f64; 2]> {
-    let read = |r: &Ranked<'_>| -> Vec<[f64; 2]> {
-        let samples = average::samples(&r.recall, &r.precision);
-        samples
-            .into_iter()
-            .enumerate()
-            .map(|(i, precision)| [average::recall_at(i), precision])
-            .collect()
-    };
-    mean_over(&ranked.iter().map(read).collect::<Vec<_>>())
+    let curves: Vec<_> = ranked.iter().map(sampled_precision).collect();
+    mean_over(&curves)
+}
+
+fn sampled_precision(ranked: &Ranked<'_>) -> Vec<[f64; 2]> {
+    let samples = average::samples(&ranked.recall, &ranked.precision);
+    let recalls = (0..).map(average::recall_at);
+    recalls.zip(samples).map(|(x, y)| [x, y]).collect()
 }
 
 /// The mean of curves with points at the same places.
 fn mean_over(curves: &[Vec<[f64; 2]>]) -> Vec<[f64; 2]> {
-    let Some(first) = curves.first() else {
-        return Vec::new();
-    };
-    let point =
-        |(i, [x, _]): (usize, &[f64; 2])| [*x, mean(curves.iter().map(|curve| curve[i][1]))];
-    first.iter().enumerate().map(point).collect()
+    let first = curves.first().into_iter().flatten();
+    first
+        .enumerate()
+        .map(|(i, [x, _])| [*x, mean(curves.iter().map(|curve| curve[i][1]))])
+        .collect()
 }
 
 fn f1(ranked: &Ranked<'_>) -> Vec<[f64; 2]> {
-    let at = |i| [confidence(i), ranked.f1_at(confidence(i))];
     (0..CONFIDENCE_STEPS)
         .step_by(CONFIDENCE_STEPS / RECALL_POINTS)
-        .map(at)
+        .map(|i| [confidence(i), ranked.f1_at(confidence(i))])
         .collect()
 }
 

@@ -35,24 +35,32 @@ pub struct Mistake {
 /// All mistakes by the pairs that a [`Confusion`](super::Confusion) counts, the worst first: of detections the surest,
 /// of misses the box with the most area that no detection covers.
 pub fn mistakes(sheets: &[EvalImage], options: &ConfusionOptions) -> Vec<Mistake> {
-    let mut all: Vec<(f64, Mistake)> = sheets
-        .par_iter()
-        .enumerate()
-        .flat_map_iter(|(i, sheet)| {
-            let mistakes = MistakeFinder::new(i, sheet).find(options);
-            mistakes.into_iter().map(|m| (severity(sheet, &m), m))
-        })
-        .collect();
+    let numbered = sheets.par_iter().enumerate();
+    let rated = numbered.flat_map_iter(|(i, sheet)| rated_mistakes(i, sheet, options));
+    let mut all: Vec<(f64, Mistake)> = rated.collect();
     all.sort_by(worst_first);
     all.into_iter().map(|(_, mistake)| mistake).collect()
 }
 
+fn rated_mistakes(
+    i: usize,
+    sheet: &EvalImage,
+    options: &ConfusionOptions,
+) -> impl Iterator<Item = (f64, Mistake)> {
+    let mistakes = MistakeFinder::new(i, sheet).find(options);
+    mistakes.into_iter().map(|m| (severity(sheet, &m), m))
+}
+
 /// Detections before misses; of each kind the most severe first.
 fn worst_first(a: &(f64, Mistake), b: &(f64, Mistake)) -> Ordering {
-    let is_missed = |mistake: &Mistake| mistake.kind == MistakeKind::Missed;
-    is_missed(&a.1)
-        .cmp(&is_missed(&b.1))
-        .then(b.0.total_cmp(&a.0))
+    let by_kind = a.1.is_miss().cmp(&b.1.is_miss());
+    by_kind.then(b.0.total_cmp(&a.0))
+}
+
+impl Mistake {
+    fn is_miss(&self) -> bool {
+        self.kind == MistakeKind::Missed
+    }
 }
 
 /// Finds the mistakes of one image.

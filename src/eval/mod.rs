@@ -4,6 +4,20 @@
 //! integrates a precision curve over 101 points, [`Definition::Coco`] averages 101 readings of it, looks at no more
 //! than 100 detections an image and knows boxes that are ignored. Both are computed here from the same
 //! [`EvalImage`]s, one per image.
+//!
+//! ```
+//! use petcomp::eval::{Definition, Detection, EvalImage, GroundTruth, evaluate};
+//! use petcomp::geom::BBox;
+//!
+//! let bbox = BBox { x0: 10.0, y0: 10.0, x1: 60.0, y1: 40.0 };
+//! let truth = GroundTruth { class: 0, bbox, area: 1500.0, crowd: false };
+//! let mut image = EvalImage::new("000000", vec![truth]);
+//! let shifted = BBox { x0: 12.0, x1: 62.0, ..bbox };
+//! image.found.push(Detection { class: 0, bbox: shifted, confidence: 0.9 });
+//! let scores = evaluate(&[image], Definition::Coco, &[]);
+//! // The overlap is 48/52: found at nine of the ten thresholds.
+//! assert!((scores.map() - 0.9).abs() < 1e-9);
+//! ```
 
 mod average;
 mod bootstrap;
@@ -15,6 +29,7 @@ mod curve;
 mod matches;
 mod mistake;
 mod overlap;
+#[doc(hidden)]
 pub mod page;
 mod pairing;
 mod picture;
@@ -23,22 +38,35 @@ mod tag;
 mod yolo;
 mod yolov5;
 
+#[doc(hidden)]
 pub use bootstrap::{Interval, bootstrap};
 pub(crate) use bootstrap::{drawn, interval};
-pub use coco::{AreaRange, CocoScores, MAX_DETECTIONS, coco};
+#[doc(hidden)]
+pub use coco::{AreaRange, CocoScores, coco};
+#[doc(hidden)]
+pub use coco_json::CocoTruth;
 #[cfg(feature = "fuzzing")]
 pub(crate) use coco_json::sheets_of as coco_sheets;
-pub use coco_json::{CocoTruth, read_coco_results, read_coco_truth};
+pub use coco_json::{read_coco_results, read_coco_truth};
+#[doc(hidden)]
 pub use confusion::{Confusion, ConfusionOptions};
+#[doc(hidden)]
 pub use curve::{Curves, curves};
+#[doc(hidden)]
 pub use matches::Matches;
+#[doc(hidden)]
 pub use mistake::{Mistake, MistakeKind, mistakes};
+#[doc(hidden)]
 pub use overlap::iou;
 pub(crate) use picture::class_name;
-pub use picture::{MAX_CURVES, confusion_picture, f1_picture, precision_recall_picture};
+pub(crate) use picture::{MAX_CURVES, confusion_picture, f1_picture, precision_recall_picture};
+#[doc(hidden)]
 pub use tag::{Tags, read_tags};
+#[doc(hidden)]
+pub use yolo::YoloTruth;
 pub(crate) use yolo::sheet_of as yolo_sheet;
-pub use yolo::{YoloTruth, read_yolo_detections, read_yolo_truth};
+pub use yolo::{read_yolo_detections, read_yolo_truth};
+#[doc(hidden)]
 pub use yolov5::yolov5;
 
 use crate::geom::BBox;
@@ -46,6 +74,7 @@ use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
 /// Number of thresholds of intersection over union: 0.50 to 0.95 in steps of 0.05.
+#[doc(hidden)]
 pub const THRESHOLDS: usize = 10;
 
 /// A box of the truth.
@@ -95,6 +124,7 @@ impl EvalImage {
 }
 
 /// Where the picture of a sheet is, to be shown.
+#[doc(hidden)]
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Picture {
     /// The file.
@@ -175,6 +205,7 @@ pub fn evaluate(sheets: &[EvalImage], definition: Definition, weights: &[u32]) -
 }
 
 /// 0.50, 0.55 .. 0.95, as NumPy's `linspace` gives them.
+#[doc(hidden)]
 pub fn thresholds() -> [f64; THRESHOLDS] {
     let step = (0.95 - 0.5) / (THRESHOLDS - 1) as f64;
     std::array::from_fn(|i| {
@@ -187,9 +218,11 @@ pub fn thresholds() -> [f64; THRESHOLDS] {
 }
 
 fn mean(values: impl IntoIterator<Item = f64>) -> f64 {
-    let (sum, count) = values
-        .into_iter()
-        .fold((0.0, 0), |(sum, count), v| (sum + v, count + 1));
+    let (mut sum, mut count) = (0.0, 0_u32);
+    for value in values {
+        sum += value;
+        count += 1;
+    }
     if count == 0 {
         0.0
     } else {

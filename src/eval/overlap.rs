@@ -14,9 +14,12 @@ pub(super) fn area(b: &BBox) -> f64 {
 
 /// Area of what two boxes share.
 pub(super) fn intersection(a: &BBox, b: &BBox) -> f64 {
-    let width = a.x1.min(b.x1) - a.x0.max(b.x0);
-    let height = a.y1.min(b.y1) - a.y0.max(b.y0);
-    width.max(0.0) * height.max(0.0)
+    shared_length([a.x0, a.x1], [b.x0, b.x1]) * shared_length([a.y0, a.y1], [b.y0, b.y1])
+}
+
+#[inline]
+fn shared_length(a: [f64; 2], b: [f64; 2]) -> f64 {
+    (a[1].min(b[1]) - a[0].max(b[0])).max(0.0)
 }
 
 /// A ratio; 0 where there is nothing to share.
@@ -39,40 +42,42 @@ impl BoxIndex {
 
     pub(super) fn new(boxes: impl IntoIterator<Item = BBox>) -> Self {
         let boxes: Vec<BBox> = boxes.into_iter().collect();
-        let mut order: Vec<usize> = if boxes.len() > Self::FEW {
-            (0..boxes.len()).collect()
+        let order = if boxes.len() > Self::FEW {
+            order_by_left(&boxes)
         } else {
             Vec::new()
         };
-        order.sort_by(|&a, &b| boxes[a].x0.total_cmp(&boxes[b].x0));
-        let farthest = |reach: &mut f64, &i: &usize| {
+        let reach = order.iter().scan(f64::NEG_INFINITY, |reach, &i| {
             *reach = reach.max(boxes[i].x1);
             Some(*reach)
-        };
-        let reach = order.iter().scan(f64::NEG_INFINITY, farthest).collect();
+        });
         Self {
-            boxes,
+            reach: reach.collect(),
             order,
-            reach,
+            boxes,
         }
     }
 
     /// Those that share more than an edge with a box, in order.
     pub(super) fn near(&self, b: &BBox) -> Vec<usize> {
-        let overlaps = |i: &usize| self.boxes[*i].overlaps(b);
         if self.order.is_empty() {
-            return (0..self.boxes.len()).filter(overlaps).collect();
+            let all = 0..self.boxes.len();
+            return all.filter(|&i| self.boxes[i].overlaps(b)).collect();
         }
         let end = self.order.partition_point(|&i| self.boxes[i].x0 < b.x1);
         let start = self.reach[..end].partition_point(|&reach| reach <= b.x0);
-        let mut near: Vec<usize> = self.order[start..end]
-            .iter()
-            .copied()
-            .filter(overlaps)
-            .collect();
+        let mut near = self.order[start..end].to_vec();
+        near.retain(|&i| self.boxes[i].overlaps(b));
         near.sort_unstable();
         near
     }
+}
+
+/// Places of the boxes, from the leftmost.
+fn order_by_left(boxes: &[BBox]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..boxes.len()).collect();
+    order.sort_by(|&a, &b| boxes[a].x0.total_cmp(&boxes[b].x0));
+    order
 }
 
 #[cfg(test)]

@@ -20,16 +20,14 @@ pub(super) fn pairs(sheet: &EvalImage, options: &ConfusionOptions) -> Vec<BoxPai
         .filter(|&f| sheet.found[f].confidence > options.confidence)
         .collect();
     let matched = search.match_boxes(&sure);
-    let mut pairs: Vec<BoxPair> = sure
-        .iter()
-        .map(|&f| BoxPair {
-            found: Some(f),
-            truth: matched[f],
-        })
-        .filter(|pair| pair.truth.is_some() || !search.in_crowd(pair.found))
-        .collect();
-    pairs.extend(search.missed());
+    let pairs = sure.iter().map(|&f| BoxPair {
+        found: Some(f),
+        truth: matched[f],
+    });
     pairs
+        .filter(|pair| pair.truth.is_some() || !search.in_crowd(pair.found))
+        .chain(search.missed())
+        .collect()
 }
 
 /// A detection and the free box that it overlaps most. The greatest comes first: of equal overlaps the first box, then

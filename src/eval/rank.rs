@@ -46,13 +46,14 @@ impl Ranking {
     ) -> Self {
         let images = boxes.images();
         let each: Vec<(Vec<Hit>, usize)> = images.par_iter().map(match_image).collect();
-        let counted = images
-            .iter()
-            .zip(&each)
-            .map(|(image, (_, count))| (image.sheet, *count));
-        let truths = counted.filter(|&(_, count)| count > 0).collect();
-        let mut hits: Vec<Hit> = each.into_iter().flat_map(|(hits, _)| hits).collect();
-        hits.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
+        let (mut hits, mut truths) = (Vec::new(), Vec::new());
+        for (image, (found, count)) in images.iter().zip(each) {
+            hits.extend(found);
+            if count > 0 {
+                truths.push((image.sheet, count));
+            }
+        }
+        hits.sort_by(|a: &Hit, b| b.confidence.total_cmp(&a.confidence));
         Self {
             class: boxes.class,
             truths,
@@ -80,11 +81,10 @@ impl Ranking {
     pub(super) fn running(&self, threshold: usize, weights: &[u32]) -> Running {
         debug_assert!(threshold < THRESHOLDS);
         let (mut right, mut wrong, mut sums) = (0.0, 0.0, Running::default());
-        let bit = |marks: Marks| marks >> threshold & 1 == 1;
         for (hit, count) in self.counting(weights) {
-            match (bit(hit.ignored), bit(hit.right)) {
-                (true, _) => {}
-                (_, true) => right += count,
+            match [hit.ignored, hit.right].map(|marks| marks >> threshold & 1 == 1) {
+                [true, _] => {}
+                [_, true] => right += count,
                 _ => wrong += count,
             }
             sums.push(right, wrong);
@@ -125,12 +125,10 @@ impl Running {
 
     /// Adds sums that are others than the last ones.
     fn turn(&mut self, right: f64, wrong: f64) {
-        let last = self
-            .right
-            .last()
-            .copied()
-            .zip(self.wrong.last().copied())
-            .unwrap_or_default();
+        let last = match (self.right.last(), self.wrong.last()) {
+            (Some(right), Some(wrong)) => (*right, *wrong),
+            _ => (0.0, 0.0),
+        };
         if last != (right, wrong) {
             self.push(right, wrong);
         }
@@ -138,7 +136,7 @@ impl Running {
 }
 
 /// The thresholds that are marked.
-fn marked(mut marks: Marks) -> impl Iterator<Item = usize> {
+pub(super) fn marked(mut marks: Marks) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {
         let next = (marks != 0).then(|| marks.trailing_zeros() as usize)?;
         marks &= marks - 1;

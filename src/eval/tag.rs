@@ -23,21 +23,10 @@ pub fn read_tags(path: &Path) -> Result<Tags> {
 }
 
 fn parse(text: &str) -> std::result::Result<Tags, String> {
-    let mut lines = text
-        .lines()
-        .enumerate()
-        .filter(|(_, line)| !line.trim().is_empty());
-    let titles = lines
-        .next()
-        .map(|(_, line)| cells(line))
-        .unwrap_or_default();
-    if titles.len() < 2 {
-        return Err("no factors, expected a first line such as image,light,camera".into());
-    }
-    let mut tags = Tags {
-        factors: titles[1..].to_vec(),
-        levels: BTreeMap::new(),
-    };
+    let lines = text.lines().enumerate();
+    let mut lines = lines.filter(|(_, line)| !line.trim().is_empty());
+    let titles = lines.next().map(|(_, line)| cells(line));
+    let mut tags = Tags::with_titles(&titles.unwrap_or_default())?;
     for (i, line) in lines {
         tags.add(cells(line))
             .map_err(|what| format!("line {}: {what}", i + 1))?;
@@ -56,14 +45,23 @@ impl Tags {
         if row.len() != expected {
             return Err(format!("{} cells, expected {expected}", row.len()));
         }
-        let stem = Path::new(&row[0])
-            .file_stem()
-            .map(|n| n.to_string_lossy().into_owned())
-            .unwrap_or_default();
+        let stem = Path::new(&row[0]).file_stem().unwrap_or_default();
+        let stem = stem.to_string_lossy().into_owned();
         match self.levels.insert(stem, row[1..].to_vec()) {
             None => Ok(()),
             Some(_) => Err(format!("image \"{}\" is listed twice", row[0])),
         }
+    }
+
+    /// No tags yet, for the factors that the first line names behind the image.
+    fn with_titles(titles: &[String]) -> std::result::Result<Self, String> {
+        if titles.len() < 2 {
+            return Err("no factors, expected a first line such as image,light,camera".into());
+        }
+        Ok(Self {
+            factors: titles[1..].to_vec(),
+            levels: BTreeMap::new(),
+        })
     }
 
     /// What a factor is for an image; none for an image without tags.

@@ -52,11 +52,12 @@ fn read_labels(
     size: Option<[u32; 2]>,
 ) -> Result<(EvalImage, [u32; 2], Option<Picture>)> {
     let image = image_of(labels, name);
-    let size = size.map_or_else(|| image_size(labels, name, image.as_deref()), Ok)?;
-    let boxes = read_rows(path, 0)?
-        .into_iter()
-        .map(|row| row.truth(size))
-        .collect();
+    let size = match size {
+        Some(size) => size,
+        None => image_size(labels, name, image.as_deref())?,
+    };
+    let rows = read_rows(path, 0)?.into_iter();
+    let boxes = rows.map(|row| row.truth(size)).collect();
     let picture = image.map(|path| Picture {
         path,
         size: size.map(f64::from),
@@ -71,20 +72,13 @@ fn read_labels(
 /// # Errors
 /// [`Error::File`] for a folder that cannot be read, a name that the truth does not have, or a bad line.
 pub fn read_yolo_detections(folder: &Path, truth: &mut YoloTruth) -> Result<()> {
-    let known: BTreeMap<&str, usize> = truth
-        .sheets
-        .iter()
-        .enumerate()
-        .map(|(i, sheet)| (sheet.image.as_str(), i))
-        .collect();
+    let known = truth.places_by_name();
     let found: Vec<(usize, Vec<Detection>)> = text_files(folder)?
         .par_iter()
         .map(|(name, path)| {
-            let Some(&i) = known.get(name.as_str()) else {
-                let count = known.len();
-                let what = format!("no image \"{name}\" in the truth of {count} images");
-                return Err(Error::file(path, what));
-            };
+            let &i = known
+                .get(name.as_str())
+                .ok_or_else(|| unknown_image(name, path, known.len()))?;
             Ok((i, read_detections(path, truth.sizes[i])?))
         })
         .collect::<Result<_>>()?;
@@ -92,6 +86,18 @@ pub fn read_yolo_detections(folder: &Path, truth: &mut YoloTruth) -> Result<()> 
         truth.sheets[i].found = found;
     }
     Ok(())
+}
+
+impl YoloTruth {
+    fn places_by_name(&self) -> BTreeMap<&str, usize> {
+        let names = self.sheets.iter().map(|sheet| sheet.image.as_str());
+        names.zip(0..).collect()
+    }
+}
+
+fn unknown_image(name: &str, path: &Path, count: usize) -> Error {
+    let what = format!("no image \"{name}\" in the truth of {count} images");
+    Error::file(path, what)
 }
 
 fn read_detections(path: &Path, size: [u32; 2]) -> Result<Vec<Detection>> {
@@ -105,29 +111,23 @@ pub(crate) fn sheet_of(
     found: &str,
     size: [u32; 2],
 ) -> std::result::Result<EvalImage, String> {
-    let truth = parse_rows(truth, 0)?
-        .into_iter()
-        .map(|row| row.truth(size))
-        .collect();
-    let found = parse_rows(found, 1)?
-        .into_iter()
-        .map(|row| row.found(size))
-        .collect();
+    let truth = parse_rows(truth, 0)?.into_iter().map(|row| row.truth(size));
+    let found = parse_rows(found, 1)?.into_iter().map(|row| row.found(size));
     Ok(EvalImage {
-        found,
-        ..EvalImage::new("", truth)
+        found: found.collect(),
+        ..EvalImage::new("", truth.collect())
     })
 }
 
 /// The text files of a folder by their names without extension, in order.
 fn text_files(folder: &Path) -> Result<BTreeMap<String, PathBuf>> {
-    let entries = std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
     let mut texts = BTreeMap::new();
-    for entry in entries {
+    for entry in std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))? {
         let path = entry.map_err(|e| Error::file(folder, e))?.path();
-        let name = path.file_stem().map(|n| n.to_string_lossy().into_owned());
-        if let (Some(name), true) = (name, path.extension().is_some_and(|e| e == "txt")) {
-            texts.insert(name, path);
+        if path.extension().is_some_and(|e| e == "txt")
+            && let Some(name) = path.file_stem()
+        {
+            texts.insert(name.to_string_lossy().into_owned(), path);
         }
     }
     Ok(texts)
@@ -197,24 +197,23 @@ fn parse_rows(text: &str, extra: usize) -> std::result::Result<Vec<LabelRow>, St
 
 fn parse_row(line: &str, extra: usize) -> std::result::Result<LabelRow, String> {
     let mut words = line.split_ascii_whitespace();
-    let class = words.next().unwrap_or_default();
-    let class = class
-        .parse::<u32>()
-        .map_err(|_| format!("class \"{class}\", expected 0, 1, .."))?;
-    let numbers: Vec<f64> = words
-        .map(parse_finite)
-        .collect::<std::result::Result<_, _>>()?;
-    let Some(count) = numbers.len().checked_sub(extra) else {
-        return Err(too_few(&numbers, extra));
-    };
+    let class = parse_class(words.next().unwrap_or_default())?;
+    let numbers = words.map(parse_finite);
+    let numbers: Vec<f64> = numbers.collect::<std::result::Result<_, _>>()?;
+    let count = numbers.len().checked_sub(extra);
+    let count = count.ok_or_else(|| too_few(&numbers, extra))?;
     let (place, rest) = numbers.split_at(count);
     check_shares(place)?;
-    let shares = box_around(place).ok_or_else(|| too_few(&numbers, extra))?;
     Ok(LabelRow {
         class,
-        shares,
+        shares: box_around(place).ok_or_else(|| too_few(&numbers, extra))?,
         confidence: rest.first().copied().unwrap_or(1.0),
     })
+}
+
+fn parse_class(text: &str) -> std::result::Result<u32, String> {
+    text.parse()
+        .map_err(|_| format!("class \"{text}\", expected 0, 1, .."))
 }
 
 fn parse_finite(word: &str) -> std::result::Result<f64, String> {
@@ -248,9 +247,10 @@ fn box_around(place: &[f64]) -> Option<BBox> {
             x1: cx + w / 2.0,
             y1: cy + h / 2.0,
         }),
-        _ if place.len() >= 6 && place.len().is_multiple_of(2) => Some(BBox::around(
-            place.chunks_exact(2).map(|p| Point2::new(p[0], p[1])),
-        )),
+        _ if place.len() >= 6 && place.len().is_multiple_of(2) => {
+            let points = place.chunks_exact(2);
+            Some(BBox::around(points.map(|p| Point2::new(p[0], p[1]))))
+        }
         _ => None,
     }
 }
@@ -268,13 +268,13 @@ fn too_few(numbers: &[f64], extra: usize) -> String {
 }
 
 impl LabelRow {
-    fn bbox(&self, [w, h]: [u32; 2]) -> BBox {
-        let (w, h, s) = (f64::from(w), f64::from(h), self.shares);
+    fn bbox(&self, size: [u32; 2]) -> BBox {
+        let ([w, h], shares) = (size.map(f64::from), self.shares);
         BBox {
-            x0: s.x0 * w,
-            y0: s.y0 * h,
-            x1: s.x1 * w,
-            y1: s.y1 * h,
+            x0: shares.x0 * w,
+            y0: shares.y0 * h,
+            x1: shares.x1 * w,
+            y1: shares.y1 * h,
         }
     }
 

@@ -49,28 +49,28 @@ pub(super) fn rankings(sheets: &[EvalImage]) -> Vec<Ranking> {
 pub(super) fn scores(rankings: &[Ranking], weights: &[u32]) -> Scores {
     let classes = ranked(rankings, weights);
     let best = best_confidence(&classes);
-    let scores = classes
-        .par_iter()
-        .map(|class| class.scores(best, weights))
-        .collect();
+    let scores = classes.par_iter().map(|class| class.scores(best, weights));
     Scores {
         definition: Definition::Yolov5,
-        classes: scores,
+        classes: scores.collect(),
     }
 }
 
 /// Average precision of a class at every threshold; none where there is nothing to find.
 pub(super) fn average_precision(ranking: &Ranking, weights: &[u32]) -> Option<[f64; THRESHOLDS]> {
     let truths = Some(ranking.truths(weights)).filter(|&truths| truths > 0.0)?;
-    let area = |sums: &Running| {
-        let (recall, precision) = curve(sums, truths);
-        if recall.is_empty() {
-            0.0
-        } else {
-            trapezoid(&recall, &precision)
-        }
-    };
-    Some(ranking.turns(weights).each_ref().map(area))
+    let turns = ranking.turns(weights);
+    Some(turns.each_ref().map(|sums| area_below(sums, truths)))
+}
+
+/// Area below the curve of precision over recall.
+fn area_below(sums: &Running, truths: f64) -> f64 {
+    let (recall, precision) = curve(sums, truths);
+    if recall.is_empty() {
+        0.0
+    } else {
+        trapezoid(&recall, &precision)
+    }
 }
 
 /// The classes with something to find, to be read at a confidence.
@@ -171,67 +171,73 @@ pub(super) fn best_confidence(classes: &[Ranked<'_>]) -> usize {
 
 /// Sum of the readings around one; the ends go on as they are.
 fn window_sum(values: &[f64], i: usize) -> f64 {
-    let (i, reach) = (i as isize, SMOOTHING_READINGS as isize);
-    (i - reach..=i + reach)
-        .map(|i| values[i.clamp(0, values.len() as isize - 1) as usize])
-        .sum()
+    let (i, reach, last) = (
+        i as isize,
+        SMOOTHING_READINGS as isize,
+        values.len() as isize - 1,
+    );
+    let window = i - reach..=i + reach;
+    window.map(|i| values[i.clamp(0, last) as usize]).sum()
 }
 
 /// The detections of a class in one image, marked right where they found something, and how many boxes there are.
 fn match_image(image: &ImageBoxes<'_>) -> (Vec<Hit>, usize) {
     let index = BoxIndex::new(image.truth.iter().map(|t| t.bbox));
     let mut taken: Vec<Marks> = vec![0; image.truth.len()];
-    let mut hits = Vec::new();
-    for (place, found) in image.found.iter().enumerate() {
+    let hits = image.found.iter().enumerate().map(|(place, found)| {
         let right = nearest(image, &index, found).map_or(0, |(nearest, overlap)| {
             let reached = reached(overlap);
             let right = reached & !taken[nearest];
             taken[nearest] |= reached;
             right
         });
-        hits.push(Hit {
+        Hit {
             confidence: found.confidence,
             sheet: image.sheet,
             place: place as u32,
             right,
             ignored: 0,
-        });
-    }
-    (hits, image.truth.len())
+        }
+    });
+    (hits.collect(), image.truth.len())
 }
 
 /// The box that a detection overlaps most; of equal overlaps the last: that is how the original's descending sort leaves
 /// them.
 fn nearest(image: &ImageBoxes<'_>, index: &BoxIndex, found: &Detection) -> Option<(usize, f32)> {
-    index
-        .near(&found.bbox)
-        .into_iter()
-        .map(|t| (t, overlap(&image.truth[t].bbox, &found.bbox)))
-        .max_by(|a, b| a.1.total_cmp(&b.1))
+    let near = index.near(&found.bbox).into_iter();
+    let overlaps = near.map(|t| (t, overlap(&image.truth[t].bbox, &found.bbox)));
+    overlaps.max_by(|a, b| a.1.total_cmp(&b.1))
 }
 
 /// Intersection over union in single precision.
 fn overlap(a: &BBox, b: &BBox) -> f32 {
     let [a, b] = [a, b].map(|b| [b.x0, b.y0, b.x1, b.y1].map(|v| v as f32));
-    let area = |b: [f32; 4]| (b[2] - b[0]) * (b[3] - b[1]);
     let shared =
         (a[2].min(b[2]) - a[0].max(b[0])).max(0.0) * (a[3].min(b[3]) - a[1].max(b[1])).max(0.0);
-    shared / (area(a) + area(b) - shared + AREA_EPSILON)
+    shared / (area_of(a) + area_of(b) - shared + AREA_EPSILON)
+}
+
+#[inline]
+fn area_of(b: [f32; 4]) -> f32 {
+    (b[2] - b[0]) * (b[3] - b[1])
 }
 
 fn reached(overlap: f32) -> Marks {
-    let step = (0.95_f32 - 0.5) / (THRESHOLDS - 1) as f32;
-    // From both ends, as PyTorch's `linspace` rounds.
-    let threshold = |i: usize| {
-        if i < THRESHOLDS / 2 {
-            0.5 + step * i as f32
-        } else {
-            0.95 - step * (THRESHOLDS - 1 - i) as f32
-        }
-    };
     (0..THRESHOLDS)
         .filter(|&i| overlap >= threshold(i))
         .fold(0, |marks, i| marks | 1 << i)
+}
+
+/// From both ends, as PyTorch's `linspace` rounds.
+#[inline]
+fn threshold(i: usize) -> f32 {
+    let step = (0.95_f32 - 0.5) / (THRESHOLDS - 1) as f32;
+    if i < THRESHOLDS / 2 {
+        0.5 + step * i as f32
+    } else {
+        0.95 - step * (THRESHOLDS - 1 - i) as f32
+    }
 }
 
 #[cfg(test)]

@@ -1,8 +1,8 @@
-//! Filters on pictures whose pixels may be averaged ([`Mix`](crate::Mix)), and on masks.
+//! Filters on pictures whose pixels may be averaged (`Mix`), and on masks.
 //!
 //! One border rule for all: the window is cut off at the border and what is left of it is averaged (or, of a mask,
 //! looked at). No filter invents pixels outside the picture, so a constant picture stays constant. The exception is
-//! named for it: [`sample_bilinear`], to which the outside is empty.
+//! named for it: `sample_bilinear`, to which the outside is empty.
 //!
 //! Every filter takes a picture of any size, the empty one included, and gives the same bits at any thread count.
 
@@ -14,9 +14,16 @@ mod resize;
 mod sample;
 mod separable;
 
+#[doc(hidden)]
 pub use blur::{box_blur, gaussian_blur};
+#[doc(hidden)]
 pub use distance::depth;
-pub use morphology::{dilate, erode};
-pub use pyramid::{Pyramid, expand, halve, reduce};
+#[doc(hidden)]
+pub use morphology::dilate;
+pub(crate) use morphology::erode;
+pub use pyramid::Pyramid;
+#[doc(hidden)]
+pub use pyramid::{expand, halve, reduce};
+#[doc(hidden)]
 pub use resize::resize;
-pub use sample::{sample_bilinear, sample_bilinear_clamped, sample_nearest};
+pub(crate) use sample::{sample_bilinear, sample_bilinear_clamped, sample_nearest};

@@ -31,7 +31,7 @@ pub fn dilate(mask: &Mask, radius_px: f64) -> Mask {
 /// The mask shrunk by `radius_px`: every pixel of it that is farther than that from every pixel outside it.
 ///
 /// Beyond the picture's border the mask continues. Unchanged where `radius_px` is below 1 or NaN.
-pub fn erode(mask: &Mask, radius_px: f64) -> Mask {
+pub(crate) fn erode(mask: &Mask, radius_px: f64) -> Mask {
     dilate(&mask.complement(), radius_px).complement()
 }
 

@@ -8,7 +8,7 @@ use crate::pixel::Mix;
 /// Pixel `(i, j)` has its centre at `(i + 0.5, j + 0.5)`, where its own value is returned. Towards the outside the
 /// outermost half pixel fades, and half a pixel further out all is 0. A position that is not finite gives 0.
 #[inline]
-pub fn sample_bilinear<P: Mix>(image: &Image<P>, x: f64, y: f64) -> P {
+pub(crate) fn sample_bilinear<P: Mix>(image: &Image<P>, x: f64, y: f64) -> P {
     bilinear(|i, j| pixel_or_empty(image, i, j), x, y)
 }
 
@@ -26,7 +26,7 @@ fn pixel_or_empty<P: Copy + Default>(image: &Image<P>, i: isize, j: isize) -> P 
 /// The bilinear value at `(x, y)` in pixels, going on outside the picture as the nearest pixel inside; 0 in an empty
 /// picture and at a position that is not finite.
 #[inline]
-pub fn sample_bilinear_clamped<P: Mix>(image: &Image<P>, x: f64, y: f64) -> P {
+pub(crate) fn sample_bilinear_clamped<P: Mix>(image: &Image<P>, x: f64, y: f64) -> P {
     if image.is_empty() {
         return P::default();
     }
@@ -35,7 +35,7 @@ pub fn sample_bilinear_clamped<P: Mix>(image: &Image<P>, x: f64, y: f64) -> P {
 
 /// The pixel whose square holds `(x, y)`, for pixels of any kind; `None` outside the picture.
 #[inline]
-pub fn sample_nearest<P: Copy>(image: &Image<P>, x: f64, y: f64) -> Option<P> {
+pub(crate) fn sample_nearest<P: Copy>(image: &Image<P>, x: f64, y: f64) -> Option<P> {
     let inside =
         (0.0..image.width() as f64).contains(&x) && (0.0..image.height() as f64).contains(&y);
     inside.then(|| image[(x as usize, y as usize)])

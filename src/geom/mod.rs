@@ -21,6 +21,7 @@ pub use nalgebra::{Point2, Point3, UnitQuaternion, Vector2, Vector3};
 pub type Pose = nalgebra::Isometry3<f64>;
 
 /// A half line.
+#[doc(hidden)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
     /// Where it starts.
@@ -37,6 +38,7 @@ impl Ray {
 }
 
 /// A plane: the points `p` with `normal . p = offset`.
+#[doc(hidden)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plane {
     /// Unit normal.

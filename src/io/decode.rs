@@ -12,7 +12,7 @@ use super::options::Fallback;
 use super::options::ReadOptions;
 use super::source::SourceFile;
 #[cfg(feature = "oiio")]
-use super::worker::{self, Request, Response, SampleKind, Shape};
+use super::worker::{self, Request, Response};
 use std::io::{BufRead, Cursor, Seek};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -69,11 +69,15 @@ pub(super) fn read_file_header<R: BufRead + Seek>(
         Format::Jpeg => return read_jpeg_header(file, bytes, limits),
         other => return Err(needs_openimageio(other)),
     };
-    let notes = match format {
+    Ok((header, notes_of_file(file, format)))
+}
+
+/// The notes of a file that may be read from its start again.
+fn notes_of_file(file: &mut (impl BufRead + Seek), format: Format) -> CameraNotes {
+    match format {
         Format::Png | Format::Tiff if file.rewind().is_ok() => CameraNotes::read(file),
         _ => CameraNotes::default(),
-    };
-    Ok((header, notes))
+    }
 }
 
 /// A JPEG has both its header and its notes in front of the first scan.
@@ -141,19 +145,12 @@ pub(super) fn header_elsewhere(
     let Response::Shape(shape) = response else {
         return Err("OpenImageIO gave no header".into());
     };
-    let Shape {
-        width,
-        height,
-        names,
-        sample,
-        ..
-    } = shape;
     let header = Header {
         format: source.format,
-        width,
-        height,
-        channels: names,
-        bits: 8 * SampleKind::bytes(sample),
+        width: shape.width,
+        height: shape.height,
+        bits: 8 * shape.sample.bytes(),
+        channels: shape.names,
         ..Header::default()
     };
     Ok((header, camera_notes(source)))

@@ -92,10 +92,8 @@ impl FromStr for LimitOverride {
             .split_once('=')
             .ok_or_else(|| Error::value(text, "no value, expected NAME=NUMBER"))?;
         let value = parse_with_suffix(number).ok_or_else(|| {
-            Error::value(
-                name,
-                format!("{number:?}, expected a number such as 65536 or 4G"),
-            )
+            let what = format!("{number:?}, expected a number such as 65536 or 4G");
+            Error::value(name, what)
         })?;
         let name = name.into();
         let limit = Self { name, value };
@@ -125,9 +123,7 @@ impl Limits {
         let LimitOverride { name, value } = limit;
         let mut named = self.named();
         let Some((_, place, most)) = named.iter_mut().find(|(known, ..)| known == name) else {
-            let known = named.map(|(name, ..)| name).join(", ");
-            let what = format!("no such limit, expected one of {known}");
-            return Err(Error::value(name, what));
+            return Err(unknown_limit(name, named.map(|(name, ..)| name)));
         };
         if *value > *most {
             let what = format!("{value}, expected at most {most}");
@@ -164,6 +160,12 @@ impl Limits {
     }
 }
 
+fn unknown_limit(name: &str, known: [&str; 12]) -> Error {
+    let known = known.join(", ");
+    let what = format!("no such limit, expected one of {known}");
+    Error::value(name, what)
+}
+
 /// What the header of a file asks for.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Demand {
@@ -193,12 +195,15 @@ impl Limits {
         let pixels = width.checked_mul(height).ok_or("size overflows")?;
         at_most(pixels, self.pixels, "pixels", "pixels")?;
         at_most(channels, self.channels, "channels", "channels")?;
-        let bytes = pixels
-            .checked_mul(demand.bytes_per_pixel)
-            .ok_or("size overflows")?;
+        let bytes = pixels.checked_mul(demand.bytes_per_pixel);
+        self.check_bytes(bytes.ok_or("size overflows")?, demand.file_bytes)
+    }
+
+    /// The decoded bytes of a file.
+    fn check_bytes(&self, bytes: u64, file_bytes: u64) -> std::result::Result<(), String> {
         at_most(bytes, self.decoded_bytes, "decoded bytes", "decoded_bytes")?;
         if bytes > RATIO_FREE_BYTES {
-            let ratio = bytes / demand.file_bytes.max(1);
+            let ratio = bytes / file_bytes.max(1);
             let what = "decoded bytes for each byte of the file";
             at_most(ratio, self.ratio, what, "ratio")?;
         }
@@ -223,9 +228,7 @@ impl Limits {
         machine: u64,
         [width, height, channels]: [u64; 3],
     ) -> std::result::Result<(), String> {
-        let need = [height, channels, BYTES_PER_SAMPLE]
-            .into_iter()
-            .fold(width, u64::saturating_mul);
+        let need = saturating_product([width, height, channels, BYTES_PER_SAMPLE]);
         let percent = self.memory_percent;
         if u128::from(need) * 100 <= u128::from(machine) * u128::from(percent) {
             return Ok(());
@@ -236,6 +239,11 @@ impl Limits {
              {percent} % of this machine's {machine} MiB (Limits::memory_percent; --limit memory_percent=N)"
         ))
     }
+}
+
+/// A product of sizes, the largest number where that is too small for it.
+pub(super) fn saturating_product<const N: usize>(sizes: [u64; N]) -> u64 {
+    sizes.into_iter().fold(1, u64::saturating_mul)
 }
 
 /// The memory of this machine, or of the control group that this process is confined to; none where the system does not

@@ -2,6 +2,17 @@
 //!
 //! A picture is read by its content, not by its name, and becomes the pixel type that the caller asks for:
 //!
+//! ```
+//! use petcomp::{Image, LinearRgb, io};
+//!
+//! let folder = tempfile::tempdir().unwrap();
+//! let path = folder.path().join("grey.exr");
+//! io::write(&path, &Image::filled(4, 3, LinearRgb::grey(0.25)))?;
+//! let picture: Image<LinearRgb> = io::read(&path)?;
+//! assert_eq!(picture[(3, 2)], LinearRgb::grey(0.25));
+//! # Ok::<(), petcomp::Error>(())
+//! ```
+//!
 //! | samples of the file | colour becomes | alpha | [`Coverage`](crate::Coverage) |
 //! | --- | --- | --- | --- |
 //! | integers (PNG, JPEG, TIFF) | decoded with the exact sRGB curve, unless a PNG states gamma 1 | straight unless a TIFF states otherwise | code / full scale, never decoded |
@@ -28,7 +39,7 @@
 //!   (Landlock, seccomp, file size 0), start nothing, connect nowhere, has memory for the file in hand, and is killed when it takes more
 //!   than [`Limits::seconds`]. A file on which two workers die is named with the signal. The worker is not trusted either.
 //! * **What is written** stands beside its place first, is put on the disk, and is moved there: whole or not at all. A link in
-//!   its place is replaced, not followed; [`refuse_links`] and [`clean_name`] keep outputs in their folder. No metadata of an input
+//!   its place is replaced, not followed; `refuse_links` keeps outputs in their folder. No metadata of an input
 //!   gets into an output, so neither positions (GPS) nor serial numbers do.
 //! * **Where a document leads.** A path in a document that may come from anywhere (journal and manifest of a dataset or an
 //!   asset folder, label, scene, scene for another renderer) is looked for in the folder of that document alone: [`inside`] refuses `..`, links
@@ -47,6 +58,7 @@
 mod codec;
 mod decode;
 mod document;
+#[doc(hidden)]
 pub mod exr;
 mod format;
 mod fs;
@@ -55,6 +67,7 @@ mod fuzz;
 mod header;
 mod limits;
 #[cfg(feature = "oiio")]
+#[doc(hidden)]
 pub mod oiio;
 mod options;
 mod picture;
@@ -64,27 +77,41 @@ mod source;
 mod worker;
 mod write;
 
+#[doc(hidden)]
 pub use codec::FromFile;
-pub use codec::channels::{TRANSMITTANCE, VIEW_TRANSMITTANCE};
-pub use codec::codes::{Bits, ToFile};
+pub(crate) use codec::channels::{TRANSMITTANCE, VIEW_TRANSMITTANCE};
+pub use codec::codes::Bits;
+#[doc(hidden)]
+pub use codec::codes::ToFile;
 pub use codec::exr::Compression;
 #[doc(hidden)]
 pub use codec::jpeg::through_jpeg;
+#[cfg(feature = "fuzzing")]
+pub(crate) use document::parse_toml;
+#[doc(hidden)]
 pub use document::{
-    Override, from_overrides, parse_json, parse_toml, read_document, read_json, read_json_data,
-    read_text, read_toml, read_toml_with, write_document, write_json, write_text, write_toml,
+    Override, from_overrides, read_json, read_text, read_toml, write_json, write_text, write_toml,
 };
+pub(crate) use document::{parse_json, read_json_data, read_toml_with};
+pub use document::{read_document, write_document};
+#[doc(hidden)]
 pub use format::Format;
-pub use fs::{
-    Checksum, below, clean_name, copy, create_folder, inside, refuse_links, relative, sync,
-    write_through,
-};
-pub use header::{Header, Window};
+#[doc(hidden)]
+pub use fs::{Checksum, below, copy, create_folder, inside, relative, sync};
+pub(crate) use fs::{refuse_links, write_through};
+pub use header::Header;
+#[doc(hidden)]
+pub use header::Window;
+#[doc(hidden)]
 pub use limits::{LimitOverride, Limits};
-pub use options::{Fallback, ReadOptions};
+#[doc(hidden)]
+pub use options::Fallback;
+pub use options::ReadOptions;
+#[doc(hidden)]
 pub use picture::Picture;
 pub use read::{read, read_header, read_with};
-pub use write::{WriteOptions, jpeg_bytes, write, write_with};
+pub(crate) use write::jpeg_bytes;
+pub use write::{WriteOptions, write, write_with};
 
 #[cfg(feature = "oiio")]
 #[doc(hidden)]
@@ -93,6 +120,7 @@ pub use read::read_in_worker;
 #[doc(hidden)]
 pub use worker::serve as serve_worker;
 #[cfg(feature = "oiio")]
+#[doc(hidden)]
 pub use worker::worker_version;
 
 pub(crate) use document::{from_table, from_table_with, read_bytes, suggestion};

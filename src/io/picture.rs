@@ -7,7 +7,7 @@ use super::codec::refusal::Refusal;
 use super::codec::{FromFile, jpeg, png, tiff};
 use super::decode::{camera_notes, catch_panic, decode_raster};
 use super::format::Format;
-use super::limits::{Limits, affordable};
+use super::limits::{Limits, affordable, saturating_product};
 use super::options::ReadOptions;
 use super::source::SourceFile;
 use crate::error::{Error, Result};
@@ -53,17 +53,16 @@ impl Picture {
         wanted: Wanted,
     ) -> Result<Self> {
         let raster = raster.map_err(|e| Error::file(&source.path, e))?;
-        let profile = match wanted {
-            Wanted::Color | Wanted::Film => usable_profile(&raster, source, limits),
-            Wanted::Coverage | Wanted::Depth => None,
-        };
+        let has_colors = matches!(wanted, Wanted::Color | Wanted::Film);
+        let profile = has_colors
+            .then(|| usable_profile(&raster, source, limits))
+            .flatten();
         warn_not_finite(&raster, source, wanted);
         warn_unusual_channels(&raster, source, wanted);
-        let raster = raster.upright(camera_notes(source).orientation);
         Ok(Self {
             path: source.path.clone(),
             format: source.format,
-            raster,
+            raster: raster.upright(camera_notes(source).orientation),
             profile,
         })
     }
@@ -105,43 +104,33 @@ impl Picture {
     /// When the pixels asked for are no colours.
     pub fn pixels<P: FromFile>(&self) -> Result<Image<P>> {
         let rows = 0..self.raster.height;
-        P::check(&self.raster.rows(self.profile.as_ref(), rows.clone()))
-            .map_err(|e| Error::file(&self.path, e))?;
+        let whole = self.raster.rows(self.profile.as_ref(), rows.clone());
+        P::check(&whole).map_err(|e| Error::file(&self.path, e))?;
         Ok(self.rows(rows))
     }
 
     pub(super) fn into_image<P: FromFile>(self) -> Result<Image<P>> {
-        let Self {
-            path,
-            raster,
-            profile,
-            ..
-        } = self;
-        let bytes = [raster.height, size_of::<P>()]
-            .into_iter()
-            .fold(raster.width as u64, |n, m| n.saturating_mul(m as u64));
-        affordable(bytes)
+        let (raster, profile) = (self.raster, self.profile);
+        let sizes = [raster.width, raster.height, size_of::<P>()];
+        affordable(saturating_product(sizes.map(|n| n as u64)))
             .and_then(|()| raster.into_image(profile.as_ref()))
-            .map_err(|e| Error::file(path, e))
+            .map_err(|e| Error::file(self.path, e))
     }
 }
 
 /// The colour profile of display codes, where there is one other than sRGB.
 fn usable_profile(raster: &Raster, source: &SourceFile, limits: &Limits) -> Option<DisplayProfile> {
     let path = source.path.display();
-    match catch_panic(|| Ok(embedded_profile(source, limits)?)) {
-        Ok(Some(_)) if !raster.display_encoded => {
-            log::warn!(
-                "{path}: has a colour profile, but float samples; treated as linear Rec. 709"
-            );
-            None
-        }
-        Ok(profile) => profile,
-        Err(e) => {
-            log::warn!("{path}: has {e}; treated as sRGB");
-            None
-        }
+    let embedded = catch_panic(|| Ok(embedded_profile(source, limits)?));
+    let profile = embedded.unwrap_or_else(|e| {
+        log::warn!("{path}: has {e}; treated as sRGB");
+        None
+    });
+    if profile.is_some() && !raster.display_encoded {
+        log::warn!("{path}: has a colour profile, but float samples; treated as linear Rec. 709");
+        return None;
     }
+    profile
 }
 
 /// The profile in a file, if it is not sRGB anyway; formats of linear light have none.

@@ -43,30 +43,34 @@ pub fn read_with<P: FromFile>(path: impl AsRef<Path>, options: &ReadOptions) -> 
 /// [`Error::File`] as [`read`].
 pub fn read_header(path: impl AsRef<Path>) -> Result<Header> {
     let (path, options) = (path.as_ref(), ReadOptions::default());
-    let mut opened = OpenedSource::open(path, &options.limits)?;
-    let OpenedSource {
-        file,
-        bytes,
-        format,
-    } = &mut opened;
-    let decoded = catch_panic(|| read_file_header(file, *bytes, *format, &options.limits));
-    let (mut header, notes) = match decoded {
+    let opened = OpenedSource::open(path, &options.limits)?;
+    let decoded = match header_of(opened, &options) {
         Err(Refusal::Unsupported(what)) => {
             let source = SourceFile::open(path, &options.limits)?;
             header_elsewhere(&source, what, &options)
         }
         decoded => decoded,
-    }
-    .map_err(|e| Error::file(path, e))?;
+    };
+    let (mut header, notes) = decoded.map_err(|e| Error::file(path, e))?;
     apply_notes(&mut header, &notes);
     Ok(header)
 }
 
+/// By our decoders.
+fn header_of(
+    mut opened: OpenedSource,
+    options: &ReadOptions,
+) -> std::result::Result<(Header, CameraNotes), Refusal> {
+    let (bytes, format) = (opened.bytes, opened.format);
+    catch_panic(|| read_file_header(&mut opened.file, bytes, format, &options.limits))
+}
+
 /// Adds what the camera noted; the size becomes that of the upright picture.
 fn apply_notes(header: &mut Header, notes: &CameraNotes) {
-    header.cropped = notes.has_other_shape([header.width, header.height]);
-    header.whole = notes.has_same_size([header.width, header.height]);
-    (header.width, header.height) = notes.orientation.size((header.width, header.height));
+    let stored = [header.width, header.height];
+    header.cropped = notes.has_other_shape(stored);
+    header.whole = notes.has_same_size(stored);
+    (header.width, header.height) = notes.orientation.size(stored.into());
     if header.data_size == [0; 2] {
         header.data_size = [header.width, header.height];
     }

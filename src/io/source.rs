@@ -65,9 +65,7 @@ fn recognized(path: &Path, start: &[u8]) -> std::result::Result<Format, String> 
         return Err("empty file (0 bytes), expected a picture".into());
     }
     match Format::from_bytes(start) {
-        Some(format @ (Format::Dpx | Format::Cineon))
-            if Format::from_extension(path) != Some(format) =>
-        {
+        Some(format) if is_misnamed_scan(path, format) => {
             let name = format.name();
             Err(format!("is {name} under another name, {EXPECTED_FORMATS}"))
         }
@@ -79,17 +77,23 @@ fn recognized(path: &Path, start: &[u8]) -> std::result::Result<Format, String> 
     }
 }
 
+fn is_misnamed_scan(path: &Path, format: Format) -> bool {
+    let is_scan = matches!(format, Format::Dpx | Format::Cineon);
+    is_scan && Format::from_extension(path) != Some(format)
+}
+
 /// The first bytes in a form that is safe to print on one line: text, or hexadecimal numbers.
 fn printable_start(bytes: &[u8]) -> String {
     let head = &bytes[..bytes.len().min(12)];
     match std::str::from_utf8(head) {
         Ok(text) if text.chars().all(is_text) => format!("{text:?}"),
-        _ => head[..head.len().min(8)]
-            .iter()
-            .map(|b| format!("{b:02x}"))
-            .collect::<Vec<_>>()
-            .join(" "),
+        _ => hexadecimal(&head[..head.len().min(8)]),
     }
+}
+
+fn hexadecimal(bytes: &[u8]) -> String {
+    let digits: Vec<String> = bytes.iter().map(|b| format!("{b:02x}")).collect();
+    digits.join(" ")
 }
 
 fn is_text(c: char) -> bool {

@@ -73,7 +73,7 @@ pub fn write_with<P: ToFile>(
 ///
 /// # Errors
 /// An image without pixels, or with transparent ones.
-pub fn jpeg_bytes<P: ToFile>(image: &Image<P>, quality: u8) -> Result<Vec<u8>> {
+pub(crate) fn jpeg_bytes<P: ToFile>(image: &Image<P>, quality: u8) -> Result<Vec<u8>> {
     let options = WriteOptions {
         jpeg_quality: quality,
         ..WriteOptions::default()
@@ -86,23 +86,39 @@ fn encode<P: ToFile>(
     image: &Image<P>,
     options: &WriteOptions,
 ) -> std::result::Result<Vec<u8>, String> {
-    if image.is_empty() {
-        return Err(format!(
-            "{} x {} pixels, expected at least 1 x 1",
-            image.width(),
-            image.height()
-        ));
-    }
+    check_not_empty(image.size())?;
     work::add(Kind::Encodes, 1);
     let format = Format::from_extension(path);
-    let metadata = &options.metadata;
-    match (format, sample_storage::<P>(format, options.bits)?) {
-        (Some(Format::Exr), bits) => encode_exr(image, bits, options),
-        (Some(Format::Tiff), Bits::Float) => encode_float_tiff(image, metadata),
-        (Some(Format::Tiff), bits) => tiff::encode_codes(&CodedImage::new(image, bits), metadata),
-        (Some(Format::Jpeg), _) => encode_jpeg(image, options),
-        (_, bits) => png::encode(&CodedImage::new(image, bits), options.png_effort, metadata),
+    let bits = sample_storage::<P>(format, options.bits)?;
+    match format {
+        Some(Format::Exr) => encode_exr(image, bits, options),
+        Some(Format::Tiff) => encode_tiff(image, bits, &options.metadata),
+        Some(Format::Jpeg) => encode_jpeg(image, options),
+        _ => {
+            let codes = CodedImage::new(image, bits);
+            png::encode(&codes, options.png_effort, &options.metadata)
+        }
     }
+}
+
+fn encode_tiff<P: ToFile>(
+    image: &Image<P>,
+    bits: Bits,
+    metadata: &[(String, String)],
+) -> std::result::Result<Vec<u8>, String> {
+    match bits {
+        Bits::Float => encode_float_tiff(image, metadata),
+        _ => tiff::encode_codes(&CodedImage::new(image, bits), metadata),
+    }
+}
+
+fn check_not_empty((width, height): (usize, usize)) -> std::result::Result<(), String> {
+    if width > 0 && height > 0 {
+        return Ok(());
+    }
+    Err(format!(
+        "{width} x {height} pixels, expected at least 1 x 1"
+    ))
 }
 
 /// The storage of a sample: as asked, or the format's own.
@@ -116,52 +132,64 @@ pub(super) fn sample_storage<P: ToFile>(
         return Ok(bits);
     }
     let possible: Vec<&str> = possible.iter().map(|bits| bits.name()).collect();
-    Err(format!(
-        "{} samples, expected {}",
-        bits.name(),
-        possible.join(" or ")
-    ))
+    let expected = possible.join(" or ");
+    Err(format!("{} samples, expected {expected}", bits.name()))
 }
 
-/// What a format can store of a pixel that means something in integers, or of one that does not; its own choice first.
+/// What a format can store of a pixel that means something in integers (`coded`), or of one that does not; its own choice
+/// first.
 fn possible_storage(
     format: Option<Format>,
     coded: bool,
 ) -> std::result::Result<&'static [Bits], String> {
-    Ok(match format {
-        Some(Format::Exr) if coded => &[Bits::Half, Bits::Float],
-        Some(Format::Exr) => &[Bits::Float, Bits::Half],
-        Some(Format::Tiff) if coded => &[Bits::Sixteen, Bits::Eight, Bits::Float],
-        Some(Format::Tiff) => &[Bits::Float],
-        Some(Format::Png | Format::Jpeg) if !coded => {
-            return Err("a depth or a film needs float samples: .exr or .tif".into());
+    if coded {
+        return possible_codes(format);
+    }
+    match format {
+        Some(Format::Exr) => Ok(&[Bits::Float, Bits::Half]),
+        Some(Format::Tiff) => Ok(&[Bits::Float]),
+        Some(Format::Png | Format::Jpeg) => {
+            Err("a depth or a film needs float samples: .exr or .tif".into())
         }
-        Some(Format::Png) => &[Bits::Eight, Bits::Sixteen],
-        Some(Format::Jpeg) => &[Bits::Eight],
-        _ => {
-            return Err(
-                "cannot be written, expected the extension .exr, .png, .jpg or .tif".into(),
-            );
-        }
-    })
+        _ => Err(NOT_WRITTEN.into()),
+    }
 }
+
+/// The same for a pixel that means something in integers.
+fn possible_codes(format: Option<Format>) -> std::result::Result<&'static [Bits], String> {
+    match format {
+        Some(Format::Exr) => Ok(&[Bits::Half, Bits::Float]),
+        Some(Format::Tiff) => Ok(&[Bits::Sixteen, Bits::Eight, Bits::Float]),
+        Some(Format::Png) => Ok(&[Bits::Eight, Bits::Sixteen]),
+        Some(Format::Jpeg) => Ok(&[Bits::Eight]),
+        _ => Err(NOT_WRITTEN.into()),
+    }
+}
+
+const NOT_WRITTEN: &str = "cannot be written, expected the extension .exr, .png, .jpg or .tif";
 
 fn encode_exr<P: ToFile>(
     image: &Image<P>,
     bits: Bits,
     options: &WriteOptions,
 ) -> std::result::Result<Vec<u8>, String> {
-    let mut planes = Vec::new();
-    for (c, &name) in P::NAMES.iter().enumerate() {
-        let plane: Vec<f32> = image.pixels().par_iter().map(|p| p.linear()[c]).collect();
-        let samples = match bits {
-            Bits::Half => exr::half_samples(&plane),
-            _ => exr::float_samples(plane),
-        };
-        planes.push((name, samples));
-    }
+    let planes = P::NAMES
+        .iter()
+        .enumerate()
+        .map(|(c, &name)| (name, channel_samples(image, c, bits)))
+        .collect();
     let metadata = with_colorspace(&options.metadata);
     exr::encode(image.size(), planes, options.compression, &metadata)
+}
+
+/// One channel of a picture, scene-linear.
+fn channel_samples<P: ToFile>(image: &Image<P>, channel: usize, bits: Bits) -> exr::FlatSamples {
+    let pixels = image.pixels().par_iter();
+    let plane: Vec<f32> = pixels.map(|p| p.linear()[channel]).collect();
+    match bits {
+        Bits::Half => exr::half_samples(&plane),
+        _ => exr::float_samples(plane),
+    }
 }
 
 fn encode_float_tiff<P: ToFile>(

@@ -2,6 +2,25 @@
 //!
 //! Masks, boxes and visibility are folds over the deep samples, so a label cannot disagree with its picture. Outlines and the
 //! topmost rule are geometry: the cards' outlines as the camera sees them.
+//!
+//! ```
+//! use petcomp::geom::{Pose, Quad};
+//! use petcomp::label::{LabelOptions, label};
+//! use petcomp::render::{RenderOptions, render};
+//! use petcomp::scene::Card;
+//! use petcomp::{Camera, Image, ObjectId, PremulRgba, Shot};
+//!
+//! let card = |id, height| {
+//!     let quad = Quad { world_from_card: Pose::translation(0.0, 0.0, height), size: [0.2, 0.1] };
+//!     Card::new(ObjectId(id), quad, Image::filled(8, 8, PremulRgba::new(0.2, 0.2, 0.2, 1.0)))
+//! };
+//! let shot = Shot::new(Camera::looking_down(1.0, 80.0, [64, 48]))
+//!     .with_card(card(1, 0.01))
+//!     .with_card(card(2, 0.02));
+//! let labels = label(&render(&shot, &RenderOptions::default()), &shot, &LabelOptions::default());
+//! assert_eq!(labels.objects[0].covered_by, [ObjectId(2)]);
+//! assert!(labels.objects[1].is_topmost());
+//! ```
 
 mod border;
 pub(crate) mod gallery;
@@ -11,12 +30,15 @@ pub(crate) mod overlay;
 mod rle;
 mod simplify;
 mod topmost;
+#[doc(hidden)]
 pub mod trace;
 mod visibility;
 
+#[doc(hidden)]
 pub use border::{Border, borders};
 pub(crate) use gallery::clipped;
 pub use mask::RleMask;
+#[doc(hidden)]
 pub use overlay::overlay;
 pub use topmost::cyclic_overlaps;
 pub use visibility::DepthRange;
@@ -134,14 +156,11 @@ pub fn label(deep: &DeepImage, shot: &Shot, options: &LabelOptions) -> Labels {
         (image[0] as usize, image[1] as usize),
         "deep picture and camera differ"
     );
-    let objects: Vec<_> = silhouettes(deep, shot, options)
-        .filter(|s| !s.amodal_box(options.amodal).is_empty())
-        .collect();
+    let mut objects = silhouettes(deep, shot, options);
+    objects.retain(|s| !s.amodal_box(options.amodal).is_empty());
     let occluders = topmost::occluders(&objects, &shot.camera, options.overlap_iou);
-    let labels = objects
-        .into_iter()
-        .zip(occluders)
-        .map(|(object, covered_by)| object.into_label(options.amodal, covered_by));
+    let pairs = objects.into_iter().zip(occluders);
+    let labels = pairs.map(|(object, covered_by)| object.into_label(options.amodal, covered_by));
     Labels {
         image,
         objects: labels.collect(),
@@ -153,19 +172,19 @@ fn silhouettes<'a>(
     deep: &DeepImage,
     shot: &'a Shot,
     options: &LabelOptions,
-) -> impl Iterator<Item = Silhouette<'a>> {
+) -> Vec<Silhouette<'a>> {
     let mut cards: Vec<&Card> = shot.cards.iter().collect();
     cards.sort_by_key(|card| card.id);
     let ids: Vec<_> = cards.iter().map(|card| card.id).collect();
     let visibilities = visibility::fold_samples(deep, &ids, options);
-    cards
-        .into_iter()
-        .zip(visibilities)
+    let pairs = cards.into_iter().zip(visibilities);
+    pairs
         .map(|(card, visibility)| Silhouette {
             card,
             region: outline::region(card, &shot.camera),
             visibility,
         })
+        .collect()
 }
 
 impl Silhouette<'_> {

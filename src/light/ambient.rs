@@ -12,15 +12,16 @@ const GOLDEN_TURN: f64 = 0.381_966_011_250_105_1;
 ///
 /// # Method
 /// Sunflower spiral on the unit disk, lifted to the hemisphere (Malley).
-pub fn ambient_directions(count: usize) -> Vec<Vector3<f64>> {
-    (0..count)
-        .map(|i| {
-            let r2 = (i as f64 + 0.5) / count as f64;
-            let (sin, cos) = libm::sincos(TAU * GOLDEN_TURN * i as f64);
-            let r = r2.sqrt();
-            Vector3::new(r * cos, r * sin, (1.0 - r2).sqrt())
-        })
-        .collect()
+pub(crate) fn ambient_directions(count: usize) -> Vec<Vector3<f64>> {
+    (0..count).map(|i| sunflower_direction(i, count)).collect()
+}
+
+/// Seed `i` of a sunflower of `count`, lifted to the hemisphere.
+fn sunflower_direction(i: usize, count: usize) -> Vector3<f64> {
+    let r2 = (i as f64 + 0.5) / count as f64;
+    let (sin, cos) = libm::sincos(TAU * GOLDEN_TURN * i as f64);
+    let r = r2.sqrt();
+    Vector3::new(r * cos, r * sin, (1.0 - r2).sqrt())
 }
 
 #[cfg(test)]

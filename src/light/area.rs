@@ -25,21 +25,23 @@ pub struct LightFrame {
 /// instead. A light whose target is its own position shines straight down.
 pub fn frame(light: &AreaLight) -> LightFrame {
     let center = Point3::from(light.position);
-    let back = (center - Point3::from(light.target))
-        .try_normalize(1e-9)
-        .unwrap_or_else(Vector3::z);
-    // Within 2.6 degrees of the y axis "towards +y" is undefined; the limit is that of the reference script.
-    let up = if back.y.abs() < 0.999 {
-        Vector3::y()
-    } else {
-        Vector3::x()
-    };
-    let x = up.cross(&back).normalize();
+    let way = center - Point3::from(light.target);
+    let back = way.try_normalize(1e-9).unwrap_or_else(Vector3::z);
+    let x = upwards(&back).cross(&back).normalize();
     LightFrame {
         center,
         x,
         y: back.cross(&x),
         normal: -back,
+    }
+}
+
+/// Within 2.6 degrees of the y axis "towards +y" is undefined; the limit is that of the reference script.
+fn upwards(back: &Vector3<f64>) -> Vector3<f64> {
+    if back.y.abs() < 0.999 {
+        Vector3::y()
+    } else {
+        Vector3::x()
     }
 }
 

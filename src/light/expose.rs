@@ -23,7 +23,7 @@ pub fn match_plate(scene: Scene, plate: &Image<LinearRgb>) -> Scene {
 /// comes back as it is.
 ///
 /// A matte white card (albedo 1) in the middle of the surface, under the scene's lights with nothing in their way, gets
-/// the luminance of [`plate_white`], times `2^gain_ev`.
+/// the luminance of `plate_white`, times `2^gain_ev`.
 ///
 /// This is an assumption, not a measurement: one photograph does not show which of its pixels are white paper. It holds
 /// where the photo was exposed for the place and shows something bright; the surface itself is not used, since a tray
@@ -34,8 +34,7 @@ pub fn expose(scene: Scene, plate: &Image<LinearRgb>) -> Scene {
         Exposure::Ev(_) => return scene,
         Exposure::MatchPlate { gain_ev } => (f64::from(plate_white(plate)), gain_ev),
         Exposure::MatchSurface { albedo, gain_ev } => {
-            let surface = surface_color(&scene, plate).unwrap_or_default();
-            (f64::from(surface.luminance()) / albedo, gain_ev)
+            (surface_luminance(&scene, plate) / albedo, gain_ev)
         }
     };
     let match_ev = stops_of(wanted / f64::from(white_card(&scene)));
@@ -43,6 +42,12 @@ pub fn expose(scene: Scene, plate: &Image<LinearRgb>) -> Scene {
         exposure: Exposure::Ev(match_ev + gain_ev),
         ..scene
     }
+}
+
+/// Luminance of the surface in the plate; 0 where it is not seen.
+fn surface_luminance(scene: &Scene, plate: &Image<LinearRgb>) -> f64 {
+    let surface = surface_color(scene, plate).unwrap_or_default();
+    f64::from(surface.luminance())
 }
 
 /// A ratio of luminances in stops; 0 for one that cannot be.
@@ -57,7 +62,7 @@ fn stops_of(ratio: f64) -> f64 {
 /// Luminance of the plate's white: the 99th percentile over all pixels.
 ///
 /// Pixels that are not finite are left out; 0 for a plate without any other.
-pub fn plate_white(plate: &Image<LinearRgb>) -> f32 {
+pub(crate) fn plate_white(plate: &Image<LinearRgb>) -> f32 {
     let finite = plate.pixels().iter().filter(|c| c.is_finite());
     let mut values: Vec<_> = finite.map(|c| c.luminance()).collect();
     if values.is_empty() {

@@ -24,17 +24,28 @@ pub fn irradiance(light: &AreaLight, point: Point3<f64>, normal: Vector3<f64>) -
         return LinearRgb::BLACK;
     }
     let [a, b] = side_lengths(light);
+    let is_near = (point - frame.center).norm() < a.max(b);
     let factor = match light.shape {
         LightShape::Rectangle => polygon_irradiance(&frame.corners([a, b]), point, normal),
-        LightShape::Ellipse if (point - frame.center).norm() < a.max(b) => {
+        LightShape::Ellipse if is_near => {
             polygon_irradiance(&ellipse_rim(&frame, [a, b]), point, normal)
         }
-        LightShape::Ellipse => nodes(light, ELLIPSE_SAMPLES)
-            .iter()
-            .map(|n| n.irradiance(&frame, point, normal))
-            .sum(),
+        LightShape::Ellipse => sampled_irradiance(light, &frame, point, normal),
     };
     radiance(light).scale(factor as f32)
+}
+
+/// That of unit radiance, by a product rule.
+fn sampled_irradiance(
+    light: &AreaLight,
+    frame: &LightFrame,
+    point: Point3<f64>,
+    normal: Vector3<f64>,
+) -> f64 {
+    nodes(light, ELLIPSE_SAMPLES)
+        .iter()
+        .map(|node| node.irradiance(frame, point, normal))
+        .sum()
 }
 
 /// Corners of a polygon along the ellipse of these diameters, in turn, of the same area.

@@ -1,7 +1,7 @@
 //! Light: area lights, ambient, and the exposure that makes rendered light match a plate.
 //!
-//! There are three questions to a light: how bright it is ([`radiance`]), where it is sampled ([`nodes`]) and, where nothing is
-//! in the way, what it does in closed form ([`polygon_irradiance`], [`irradiance`]). [`match_plate`] is the stage: it
+//! There are three questions to a light: how bright it is (`radiance`), where it is sampled (`nodes`) and, where nothing is
+//! in the way, what it does in closed form ([`polygon_irradiance`], `irradiance`). [`match_plate`] is the stage: it
 //! turns what a scene leaves to its plate (exposure, colour of the light, noise) into numbers.
 //!
 //! ```
@@ -35,15 +35,25 @@ mod quadrature;
 mod sky;
 mod surface;
 
-pub use ambient::ambient_directions;
+pub(crate) use ambient::ambient_directions;
+#[doc(hidden)]
 pub use area::{LightFrame, frame, radiance};
-pub use expose::{expose, match_plate, plate_white};
+#[doc(hidden)]
+pub use expose::expose;
+pub use expose::match_plate;
+#[doc(hidden)]
 pub use irradiance::irradiance;
-pub(crate) use nodes::nodes_above;
+#[doc(hidden)]
 pub use nodes::{Node, nodes};
-pub use noise::{match_noise, plate_noise};
+pub(crate) use nodes::{geometry_term, nodes_above};
+pub(crate) use noise::match_noise;
+#[doc(hidden)]
+pub use noise::plate_noise;
+#[doc(hidden)]
 pub use polygon::polygon_irradiance;
-pub use quadrature::gauss_legendre;
 pub(crate) use sky::sky_cells;
+#[doc(hidden)]
 pub use sky::{SkyPiece, sky_pieces};
-pub use surface::{match_light_tint, surface_color};
+#[doc(hidden)]
+pub use surface::match_light_tint;
+pub(crate) use surface::surface_color;

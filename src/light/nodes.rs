@@ -18,15 +18,19 @@ pub struct Node {
 impl Node {
     /// Irradiance at `point` by unit radiance from this node: `cos cos / r^2 dA`; 0 below either horizon.
     pub fn irradiance(&self, frame: &LightFrame, point: Point3<f64>, normal: Vector3<f64>) -> f64 {
-        let to = self.point - point;
-        let r2 = to.norm_squared();
-        let cosines = normal.dot(&to).max(0.0) * (-frame.normal.dot(&to)).max(0.0);
-        if r2 > 0.0 {
-            cosines / (r2 * r2) * self.area
-        } else {
-            0.0
-        }
+        geometry_term(&(self.point - point), &frame.normal, &normal) * self.area
     }
+}
+
+/// `cos cos / r^2` on the way from a point of unit normal to one of a light's face; 0 below either horizon.
+pub(crate) fn geometry_term(
+    way: &Vector3<f64>,
+    face_normal: &Vector3<f64>,
+    normal: &Vector3<f64>,
+) -> f64 {
+    let r2 = way.norm_squared();
+    let cosines = normal.dot(way).max(0.0) * (-face_normal.dot(way)).max(0.0);
+    if r2 > 0.0 { cosines / (r2 * r2) } else { 0.0 }
 }
 
 /// Sample points of a light, `per_side` (at least 1) along each side.
@@ -44,7 +48,7 @@ pub fn nodes(light: &AreaLight, per_side: usize) -> Vec<Node> {
 
 fn rectangle_nodes(light: &AreaLight, rule: &[(f64, f64)]) -> Vec<Node> {
     let (frame, area) = (frame(light), face_area(light));
-    let [half_x, half_y] = side_lengths(light).map(|s| 0.5 * s);
+    let [half_x, half_y] = half_sides(light);
     let mut nodes = Vec::with_capacity(rule.len() * rule.len());
     for &(y, wy) in rule {
         nodes.extend(rule.iter().map(|&(x, wx)| Node {
@@ -55,15 +59,19 @@ fn rectangle_nodes(light: &AreaLight, rule: &[(f64, f64)]) -> Vec<Node> {
     nodes
 }
 
+fn half_sides(light: &AreaLight) -> [f64; 2] {
+    side_lengths(light).map(|side| 0.5 * side)
+}
+
 fn ellipse_nodes(light: &AreaLight, rule: &[(f64, f64)]) -> Vec<Node> {
     let (frame, area) = (frame(light), face_area(light));
-    let [half_x, half_y] = side_lengths(light).map(|s| 0.5 * s);
+    let half = half_sides(light);
     let steps = 2 * rule.len();
     let mut nodes = Vec::with_capacity(steps * rule.len());
     for (k, &(x, w)) in rule.iter().enumerate() {
-        let radius = (0.5 + 0.5 * x).sqrt();
+        let [a, b] = half.map(|half| (0.5 + 0.5 * x).sqrt() * half);
         nodes.extend(ring_directions(steps, k).map(|(sin, cos)| Node {
-            point: frame.point(radius * half_x * cos, radius * half_y * sin),
+            point: frame.point(a * cos, b * sin),
             area: area * 0.5 * w / steps as f64,
         }));
     }
@@ -89,17 +97,15 @@ pub(crate) fn nodes_above(
     normal: &Vector3<f64>,
 ) -> Vec<Node> {
     let frame = frame(light);
-    let half = side_lengths(light).map(|s| 0.5 * s);
-    let horizon = LightHorizon::new(&frame, half, point, normal);
-    let left = match light.shape {
-        LightShape::Rectangle if horizon.cuts_square() => horizon.strips(per_side.max(1)),
-        LightShape::Ellipse if horizon.cuts_disk() => horizon.chords(per_side.max(1)),
-        _ => return nodes(light, per_side),
+    let [a, b] = half_sides(light);
+    let horizon = LightHorizon::new(&frame, [a, b], point, normal);
+    let Some(left) = horizon.visible_part(light.shape, per_side.max(1)) else {
+        return nodes(light, per_side);
     };
     left.into_iter()
         .map(|([x, y], area)| Node {
-            point: frame.point(x * half[0], y * half[1]),
-            area: area * half[0] * half[1],
+            point: frame.point(x * a, y * b),
+            area: area * a * b,
         })
         .collect()
 }
@@ -122,6 +128,14 @@ impl LightHorizon {
         }
     }
 
+    /// Points and areas of what the plane leaves, with the light's sides running from -1 to 1; none where it cuts nothing.
+    fn visible_part(&self, shape: LightShape, per_side: usize) -> Option<Vec<([f64; 2], f64)>> {
+        match shape {
+            LightShape::Rectangle => self.cuts_square().then(|| self.strips(per_side)),
+            LightShape::Ellipse => self.cuts_disk().then(|| self.chords(per_side)),
+        }
+    }
+
     fn cuts_square(&self) -> bool {
         let [a, b] = self.rise.map(f64::abs);
         self.middle.abs() < a + b
@@ -134,16 +148,12 @@ impl LightHorizon {
 
     /// Points and areas in the square -1..1 above the plane.
     fn strips(&self, n: usize) -> Vec<([f64; 2], f64)> {
-        let (middle, rise) = (self.middle, self.rise);
-        let [outer, inner] = if rise[1].abs() >= rise[0].abs() {
-            [0, 1]
-        } else {
-            [1, 0]
-        };
+        let [outer, inner] = self.axes_by_rise();
+        let [middle, rise, across] = [self.middle, self.rise[outer], self.rise[inner]];
         let rule = gauss_legendre(n);
         let mut points = Vec::with_capacity(n * n);
-        for (a, width) in rule_on(above(middle + rise[inner].abs(), rise[outer]), &rule) {
-            for (b, length) in rule_on(above(middle + rise[outer] * a, rise[inner]), &rule) {
+        for (a, width) in rule_on(above(middle + across.abs(), rise), &rule) {
+            for (b, length) in rule_on(above(middle + rise * a, across), &rule) {
                 let mut point = [0.0; 2];
                 (point[outer], point[inner]) = (a, b);
                 points.push((point, width * length));
@@ -152,23 +162,39 @@ impl LightHorizon {
         points
     }
 
+    /// The side that the plane turns away from fastest, then the other.
+    fn axes_by_rise(&self) -> [usize; 2] {
+        if self.rise[1].abs() >= self.rise[0].abs() {
+            [0, 1]
+        } else {
+            [1, 0]
+        }
+    }
+
     /// Points and areas in the unit disk above the plane.
     fn chords(&self, n: usize) -> Vec<([f64; 2], f64)> {
         let steepest = self.rise[0].hypot(self.rise[1]);
-        let [x, y] = self.rise.map(|r| r / steepest);
+        let up = self.rise.map(|r| r / steepest);
         let widest = libm::acos((-self.middle / steepest).clamp(-1.0, 1.0));
         // Chords of a nearly whole disk grow and shrink again: n of them miss its area by 2 %.
         let (across, along) = (gauss_legendre(2 * n), gauss_legendre(n));
         let mut points = Vec::with_capacity(2 * n * n);
         for (angle, width) in rule_on([0.0, widest], &across) {
             let (half, at) = libm::sincos(angle);
-            points.extend(along.iter().map(|&(t, w)| {
-                let point = [at * x - half * t * y, at * y + half * t * x];
-                (point, width * half * half * w)
-            }));
+            points.extend(
+                along
+                    .iter()
+                    .map(|&(t, w)| (point_on_chord(up, at, half * t), width * half * half * w)),
+            );
         }
         points
     }
+}
+
+/// A point of the chord across a unit direction at a distance from the middle, so far from the chord's own middle.
+#[inline]
+fn point_on_chord([x, y]: [f64; 2], at: f64, along: f64) -> [f64; 2] {
+    [at * x - along * y, at * y + along * x]
 }
 
 /// The part of -1..1 where `start + slope x` is above 0.

@@ -17,7 +17,7 @@ const MASK_GAIN: f64 = 6.0;
 const NEARLY_WHITE: f32 = 0.95;
 
 /// Turns [`Noise::MatchPlate`] of a scene's finish into the noise of its plate; any other scene comes back as it is.
-pub fn match_noise(mut scene: Scene, plate: &Image<LinearRgb>) -> Scene {
+pub(crate) fn match_noise(mut scene: Scene, plate: &Image<LinearRgb>) -> Scene {
     if scene.finish.noise == Noise::MatchPlate {
         scene.finish.noise = plate_noise(plate);
     }
@@ -58,28 +58,27 @@ fn residual_at(plate: &Image<LinearRgb>, x: usize, y: usize) -> Option<(f32, f32
         mean += value / 9.0;
         sum += weight * value;
     }
-    (mean.is_finite() && sum.is_finite() && mean < NEARLY_WHITE).then_some((mean, sum.abs()))
+    let is_clear = mean.is_finite() && sum.is_finite() && mean < NEARLY_WHITE;
+    is_clear.then_some((mean, sum.abs()))
 }
 
 /// Mean brightness and variance of a group.
 fn group_noise(group: &[(f32, f32)]) -> [f64; 2] {
     let mean = group.iter().map(|p| f64::from(p.0)).sum::<f64>() / group.len() as f64;
-    let mut residuals: Vec<f32> = group.iter().map(|p| p.1).collect();
-    let (_, quarter, _) = residuals.select_nth_unstable_by(group.len() / 4, f32::total_cmp);
-    let sigma = f64::from(*quarter) / (QUARTILE_SIGMAS * MASK_GAIN);
+    let sigma = lower_quartile(group) / (QUARTILE_SIGMAS * MASK_GAIN);
     [mean, sigma * sigma]
 }
 
-/// The line of least squares through variances over means, neither part of it negative.
+/// That of the residuals of a group.
+fn lower_quartile(group: &[(f32, f32)]) -> f64 {
+    let mut residuals: Vec<f32> = group.iter().map(|p| p.1).collect();
+    let (_, quarter, _) = residuals.select_nth_unstable_by(group.len() / 4, f32::total_cmp);
+    f64::from(*quarter)
+}
+
+/// The line of least squares through variances over means.
 fn fit_noise(groups: &[[f64; 2]]) -> Noise {
-    let sums = FitSums::new(groups);
-    let slope = sums.slope();
-    let offset = (sums.y - slope * sums.x) / sums.n;
-    let (shot, dark) = match (slope > 0.0, offset > 0.0) {
-        (true, true) => (slope, offset),
-        (true, false) => (sums.xy / sums.xx.max(f64::MIN_POSITIVE), 0.0),
-        (false, _) => (0.0, sums.y / sums.n),
-    };
+    let (shot, dark) = FitSums::new(groups).line();
     Noise::Known {
         shot,
         read: dark.sqrt(),
@@ -112,6 +111,17 @@ impl FitSums {
             (self.n * self.xy - self.x * self.y) / spread
         } else {
             0.0
+        }
+    }
+
+    /// Slope and offset of the line, neither of them negative.
+    fn line(&self) -> (f64, f64) {
+        let slope = self.slope();
+        let offset = (self.y - slope * self.x) / self.n;
+        match (slope > 0.0, offset > 0.0) {
+            (true, true) => (slope, offset),
+            (true, false) => (self.xy / self.xx.max(f64::MIN_POSITIVE), 0.0),
+            (false, _) => (0.0, self.y / self.n),
         }
     }
 }

@@ -39,15 +39,19 @@ fn above_horizon(rays: Vec<Vector3<f64>>, normal: Vector3<f64>) -> Vec<Vector3<f
     let mut kept = Vec::with_capacity(rays.len() + 1);
     for (i, a) in rays.iter().enumerate() {
         let b = &rays[(i + 1) % rays.len()];
-        let (ha, hb) = (normal.dot(a), normal.dot(b));
-        if ha >= 0.0 {
+        let heights = [normal.dot(a), normal.dot(b)];
+        if heights[0] >= 0.0 {
             kept.push(*a);
         }
-        if (ha > 0.0 && hb < 0.0) || (ha < 0.0 && hb > 0.0) {
-            kept.push(a.lerp(b, ha / (ha - hb)));
-        }
+        kept.extend(crossing_share(heights).map(|share| a.lerp(b, share)));
     }
     kept
+}
+
+/// How far along an edge between these heights the height is 0; none where both ends are on one side.
+fn crossing_share([from, to]: [f64; 2]) -> Option<f64> {
+    let crosses = (from > 0.0 && to < 0.0) || (from < 0.0 && to > 0.0);
+    crosses.then(|| from / (from - to))
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 ///
 /// # Method
 /// Newton's iteration on the Legendre polynomial from Tricomi's estimate of its roots.
-pub fn gauss_legendre(n: usize) -> Vec<(f64, f64)> {
+pub(crate) fn gauss_legendre(n: usize) -> Vec<(f64, f64)> {
     (0..n)
         .map(|i| {
             let estimate = libm::cos(PI * (n as f64 - i as f64 - 0.25) / (n as f64 + 0.5));

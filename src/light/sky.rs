@@ -51,11 +51,7 @@ fn scaled_pieces(map: &EnvironmentMap, pieces: &[Piece], normal: &Vector3<f64>) 
     let seen = visible_pieces(pieces, &local, whole);
     let scale = irradiance_scale(&seen, whole, f64::from(map.strength));
     seen.into_iter()
-        .map(|piece| SkyPiece {
-            direction: turned(&piece.direction, -map.rotation),
-            irradiance: std::array::from_fn(|c| (piece.irradiance[c] * scale[c]) as f32).into(),
-            width: piece.width,
-        })
+        .map(|piece| piece.in_world(map.rotation, scale))
         .collect()
 }
 
@@ -100,6 +96,15 @@ struct VisiblePiece {
 }
 
 impl VisiblePiece {
+    /// The same in the world, its light scaled.
+    fn in_world(&self, rotation: f64, scale: [f64; 3]) -> SkyPiece {
+        SkyPiece {
+            direction: turned(&self.direction, -rotation),
+            irradiance: std::array::from_fn(|c| (self.irradiance[c] * scale[c]) as f32).into(),
+            width: self.width,
+        }
+    }
+
     /// None for a piece below a receiver's horizon.
     fn over_horizon(piece: &Piece, normal: &Vector3<f64>) -> Option<Self> {
         let direction = piece.moments.direction()?;

@@ -8,7 +8,7 @@ use crate::scene::{CameraSource, LightTint, Scene};
 
 /// The median colour, channel by channel, of the plate where the scene's labelled rectangle is seen; none where the
 /// camera is not known yet, or does not see it.
-pub fn surface_color(scene: &Scene, plate: &Image<LinearRgb>) -> Option<LinearRgb> {
+pub(crate) fn surface_color(scene: &Scene, plate: &Image<LinearRgb>) -> Option<LinearRgb> {
     let CameraSource::Known(camera) = scene.camera else {
         return None;
     };
@@ -25,15 +25,16 @@ pub fn surface_color(scene: &Scene, plate: &Image<LinearRgb>) -> Option<LinearRg
 
 /// The finite pixels of a plate that show a surface of this size.
 fn surface_pixels(camera: &Camera, size: [f64; 2], plate: &Image<LinearRgb>) -> Vec<LinearRgb> {
-    let [w, h] = size.map(|side| 0.5 * side);
     let places = (0..plate.height()).flat_map(|y| (0..plate.width()).map(move |x| (x, y)));
     places
-        .filter(|&(x, y)| {
-            surface_point(camera, x, y).is_some_and(|p| p.x.abs() <= w && p.y.abs() <= h)
-        })
+        .filter(|&(x, y)| surface_point(camera, x, y).is_some_and(|p| is_on_surface(&p, size)))
         .map(|at| plate[at])
         .filter(|c| c.is_finite())
         .collect()
+}
+
+fn is_on_surface(point: &Point3<f64>, [w, h]: [f64; 2]) -> bool {
+    point.x.abs() <= 0.5 * w && point.y.abs() <= 0.5 * h
 }
 
 /// The point of the plane `z = 0` that a pixel shows.

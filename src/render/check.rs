@@ -3,7 +3,7 @@
 use crate::asset::Texture;
 use crate::error::{Error, Result};
 use crate::pixel::Film;
-use crate::scene::{AreaLight, Card, Shot};
+use crate::scene::{AreaLight, Card, EnvironmentMap, Shot};
 
 /// Is a shot something that can be rendered?
 ///
@@ -16,15 +16,15 @@ use crate::scene::{AreaLight, Card, Shot};
 /// twice; a plate of another size; a light or an exposure that is not finite.
 pub fn check(shot: &Shot) -> Result<()> {
     check_plate(shot)?;
-    shot.lights
-        .iter()
-        .enumerate()
-        .try_for_each(|(i, light)| check_light(i, light))?;
+    for (i, light) in shot.lights.iter().enumerate() {
+        check_light(i, light)?;
+    }
     check_sky(shot)?;
     check_ids(&shot.cards)?;
-    shot.cards.iter().enumerate().try_for_each(|(i, card)| {
-        check_card(card).map_err(|what| Error::value(format!("cards[{i}]"), what))
-    })
+    for (i, card) in shot.cards.iter().enumerate() {
+        check_card(card).map_err(|what| Error::value(format!("cards[{i}]"), what))?;
+    }
+    Ok(())
 }
 
 fn check_plate(shot: &Shot) -> Result<()> {
@@ -40,13 +40,12 @@ fn check_plate(shot: &Shot) -> Result<()> {
 }
 
 fn check_light(i: usize, light: &AreaLight) -> Result<()> {
-    let numbers = light
-        .position
-        .iter()
-        .chain(&light.target)
-        .chain(&light.size)
-        .chain([&light.power]);
-    if numbers.into_iter().all(|v| v.is_finite()) && light.color.is_finite() {
+    let mut lengths = [light.position, light.target]
+        .into_iter()
+        .flatten()
+        .chain(light.size);
+    let finite = lengths.all(f64::is_finite) && light.power.is_finite() && light.color.is_finite();
+    if finite {
         return Ok(());
     }
     Err(Error::value(
@@ -57,21 +56,24 @@ fn check_light(i: usize, light: &AreaLight) -> Result<()> {
 
 /// The environment, constant or a map, and the exposure.
 fn check_sky(shot: &Shot) -> Result<()> {
-    if let Some(map) = &shot.environment
-        && !(map.rotation.is_finite() && map.strength.is_finite() && map.strength >= 0.0)
-    {
-        return Err(Error::value(
-            "environment",
-            "rotation or strength is out of range, expected a finite rotation and a strength of at least 0",
-        ));
+    shot.environment.as_ref().map_or(Ok(()), check_map)?;
+    if shot.exposure.is_finite() && shot.ambient.is_finite() {
+        return Ok(());
     }
-    if !shot.exposure.is_finite() || !shot.ambient.is_finite() {
-        return Err(Error::value(
-            "exposure",
-            "exposure or ambient is not finite, expected numbers",
-        ));
+    Err(Error::value(
+        "exposure",
+        "exposure or ambient is not finite, expected numbers",
+    ))
+}
+
+fn check_map(map: &EnvironmentMap) -> Result<()> {
+    if map.rotation.is_finite() && map.strength.is_finite() && map.strength >= 0.0 {
+        return Ok(());
     }
-    Ok(())
+    Err(Error::value(
+        "environment",
+        "rotation or strength is out of range, expected a finite rotation and a strength of at least 0",
+    ))
 }
 
 fn check_ids(cards: &[Card]) -> Result<()> {

@@ -52,14 +52,20 @@ impl Cryptomatte {
 fn rank_planes(deep: &DeepImage, ids: &[(ObjectId, f32)]) -> Vec<Vec<f32>> {
     let count = CHANNEL_SETS * SET_CHANNELS.len();
     let mut planes = vec![Vec::with_capacity(deep.width() * deep.height()); count];
-    for (x, y) in (0..deep.height()).flat_map(|y| (0..deep.width()).map(move |x| (x, y))) {
-        let ranks = ranked_objects(deep.at(x, y), ids, count / 2);
-        for (pair, (id, coverage)) in planes.chunks_exact_mut(2).zip(ranks) {
-            pair[0].push(id);
-            pair[1].push(coverage);
+    for y in 0..deep.height() {
+        for x in 0..deep.width() {
+            push_ranks(&mut planes, ranked_objects(deep.at(x, y), ids, count / 2));
         }
     }
     planes
+}
+
+/// Adds a pixel to the planes of each rank.
+fn push_ranks(planes: &mut [Vec<f32>], ranks: Vec<(f32, f32)>) {
+    for (pair, (id, coverage)) in planes.chunks_exact_mut(2).zip(ranks) {
+        pair[0].push(id);
+        pair[1].push(coverage);
+    }
 }
 
 /// Ids and visible coverage of a pixel's objects, the most visible first; as many as there are ranks.
@@ -88,20 +94,24 @@ fn channel_name(layer: &str, i: usize) -> String {
 }
 
 fn layer_metadata(layer: &str, names: &[(ObjectId, String)]) -> Vec<(String, String)> {
-    let manifest: serde_json::Map<_, _> = names
-        .iter()
-        .map(|(_, name)| (name.clone(), hex_id(name).into()))
-        .collect();
     let texts = [
         ("name", layer.to_owned()),
         ("hash", "MurmurHash3_32".to_owned()),
         ("conversion", "uint32_to_float32".to_owned()),
-        ("manifest", serde_json::Value::Object(manifest).to_string()),
+        ("manifest", manifest_text(names)),
     ];
     texts
         .into_iter()
         .map(|(what, text)| (attribute_name(layer, what), text))
         .collect()
+}
+
+/// Ids by name, as JSON.
+fn manifest_text(names: &[(ObjectId, String)]) -> String {
+    let ids = names
+        .iter()
+        .map(|(_, name)| (name.clone(), hex_id(name).into()));
+    serde_json::Value::Object(ids.collect()).to_string()
 }
 
 /// Name of a layer's attribute, which has the layer's key in it.
@@ -127,19 +137,20 @@ pub(crate) fn id_of_name(name: &str) -> f32 {
 /// MurmurHash3_x86_32 with seed 0, by Austin Appleby, who put it into the public domain.
 pub(crate) fn murmur3(bytes: &[u8]) -> u32 {
     let words = bytes.chunks_exact(4);
-    let rest = words
-        .remainder()
-        .iter()
-        .rev()
-        .fold(0, |word, &byte| word << 8 | u32::from(byte));
-    let mut hash = words.fold(0_u32, |hash, word| {
+    let rest = words.remainder().iter().rev();
+    let rest = rest.fold(0, |word, &byte| word << 8 | u32::from(byte));
+    let hash = words.fold(0_u32, |hash, word| {
         let word = u32::from_le_bytes([word[0], word[1], word[2], word[3]]);
         (hash ^ mix_word(word))
             .rotate_left(13)
             .wrapping_mul(5)
             .wrapping_add(0xe654_6b64)
     });
-    hash ^= mix_word(rest) ^ bytes.len() as u32;
+    mix_hash(hash ^ mix_word(rest) ^ bytes.len() as u32)
+}
+
+/// Lets every bit of a hash act on every other.
+fn mix_hash(mut hash: u32) -> u32 {
     hash = (hash ^ hash >> 16).wrapping_mul(0x85eb_ca6b);
     hash = (hash ^ hash >> 13).wrapping_mul(0xc2b2_ae35);
     hash ^ hash >> 16

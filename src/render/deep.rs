@@ -30,7 +30,7 @@ const DENSE_SUBSAMPLES: usize = 4;
 /// Renders a shot: per pixel and card, its light and its coverage; per pixel, what shadows leave of the plate.
 ///
 /// Same bits for any number of threads and any order of the cards. Never fails: cards that cannot be seen are left out, and
-/// numbers in `options` are brought into the range that works. Ask [`check`](super::check) about shots from outside.
+/// numbers in `options` are brought into the range that works. Ask `check` about shots from outside.
 ///
 /// # Method
 /// Everything is planar, so each map between two planes seen from a point is a homography. Irradiance is smooth: it is
@@ -55,10 +55,7 @@ fn layer_stack(shot: &Shot, view: &CameraView, options: &RenderOptions) -> Layer
     let offsets = filter_quantiles(options.subsamples);
     let planes = visible_planes(shot);
     let context = LightingContext::new(shot, &planes, view, *options);
-    let cards: Vec<_> = planes
-        .par_iter()
-        .map(|(card, plane)| ProjectedCard::new(card, plane, view, &offsets))
-        .collect();
+    let cards = projected_cards(&planes, view, &offsets);
     let receivers = receivers(&context, &cards);
     let mut maps = irradiance_maps(&receivers);
     let catcher = ShadowCatcher {
@@ -72,6 +69,18 @@ fn layer_stack(shot: &Shot, view: &CameraView, options: &RenderOptions) -> Layer
         exposure: shot.exposure,
         tinted: context.occluders.tinted,
     }
+}
+
+/// The cards in the picture; none for one that is edge-on or outside.
+fn projected_cards<'a>(
+    planes: &[(&'a Card, ScenePlane)],
+    view: &CameraView,
+    offsets: &[f64],
+) -> Vec<Option<ProjectedCard<'a>>> {
+    planes
+        .par_iter()
+        .map(|(card, plane)| ProjectedCard::new(card, plane, view, offsets))
+        .collect()
 }
 
 /// The same without any light: what objects cover and hide, and how far away they are.
@@ -187,9 +196,8 @@ fn visible_side<'a>(
     projected: ProjectedPlane,
     view: &CameraView,
 ) -> (ProjectedPlane, &'a Texture) {
-    let from_behind = plane.normal.dot(&(view.eye - plane.center)) < 0.0;
     match &card.back {
-        Some(back) if from_behind => {
+        Some(back) if plane.is_seen_from_behind(&view.eye) => {
             let mirrored = ProjectedPlane {
                 u: projected.w - projected.u,
                 ..projected
@@ -214,14 +222,18 @@ fn detail_level(
     let texels = (width * height) as f64;
     let per_pixel = projected.cell_metres(view, &plane.center)
         * (texels / (plane.size[0] * plane.size[1])).sqrt();
-    let dense = if offsets.len() >= DENSE_SUBSAMPLES {
+    let level = libm::log2(2.0 * residual_sigma(offsets) * per_pixel) - sharpening(offsets.len());
+    // A NaN from a card that fills the horizon reads the full texture.
+    level.clamp(0.0, 32.0).max(0.0)
+}
+
+/// How much sharper a level many sub-samples a side read.
+fn sharpening(subsamples: usize) -> f64 {
+    if subsamples >= DENSE_SUBSAMPLES {
         0.25
     } else {
         0.0
-    };
-    let level = libm::log2(2.0 * residual_sigma(offsets) * per_pixel) - dense;
-    // A NaN from a card that fills the horizon reads the full texture.
-    level.clamp(0.0, 32.0).max(0.0)
+    }
 }
 
 /// Puts the tiles' pixels in order.
@@ -235,11 +247,17 @@ fn assemble_tiles(view: &CameraView, tiles: &[RenderedTile]) -> DeepImage {
 fn assemble_shadow(view: &CameraView, tiles: &[RenderedTile]) -> Image<LinearRgb> {
     let mut shadow = Image::filled(view.width, view.height, LinearRgb::WHITE);
     for tile in tiles {
-        let Some(values) = &tile.shadow else { continue };
-        let PixelBlock { x, y } = &tile.block;
-        for (y, row) in y.clone().zip(values.chunks_exact(x.len())) {
-            shadow.row_mut(y)[x.clone()].copy_from_slice(row);
+        if let Some(values) = &tile.shadow {
+            copy_block(&tile.block, values, &mut shadow);
         }
     }
     shadow
+}
+
+/// Copies a block's values, row by row, to where it lies in a picture.
+fn copy_block(block: &PixelBlock, values: &[LinearRgb], picture: &mut Image<LinearRgb>) {
+    let rows = values.chunks_exact(block.x.len());
+    for (y, row) in block.y.clone().zip(rows) {
+        picture.row_mut(y)[block.x.clone()].copy_from_slice(row);
+    }
 }

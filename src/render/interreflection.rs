@@ -1,12 +1,14 @@
 //! Light that goes to and fro between the surface and the cards over it.
 
 use crate::deep::DeepImage;
-use crate::filter::gaussian_blur;
+use crate::filter::{gaussian_blur, sample_bilinear};
 use crate::geom::Vector3;
 use crate::image::Image;
 use crate::pixel::{Film, LinearRgb};
 use crate::render::reference::card_texel;
-use crate::render::view::{CameraView, ProjectedPlane, ScenePlane, visible_planes};
+use crate::render::view::{
+    CameraView, ProjectedPlane, ScenePlane, is_on_texture, pixel_center, visible_planes,
+};
 use crate::scene::{Card, Shot};
 
 /// How far light spreads on its way to and fro: the order of a pile's height; 4 to 16 mm do as well.
@@ -31,20 +33,19 @@ const MAX_BOUNCE: f32 = 0.95;
 /// of their colour times the squared transmittance of what lies below, blurred over the surface.
 pub fn interreflect(deep: DeepImage, shot: &Shot, albedo: LinearRgb) -> DeepImage {
     let view = CameraView::from_camera(&shot.camera);
-    let surface = ProjectedPlane::new(&ScenePlane::shadow_catcher(shot.catcher), &view)
-        .filter(|plane| plane.normal.z > 0.0);
+    let surface = ProjectedPlane::from_above(&ScenePlane::shadow_catcher(shot.catcher), &view);
     let (Some(surface), Some(bounce)) = (surface, BounceMap::new(shot)) else {
         return deep;
     };
-    deep.map_shadow(|x, y, factor| {
-        let p = Vector3::new(x as f64 + 0.5, y as f64 + 0.5, 1.0);
-        let w = surface.w.dot(&p);
-        if w <= 0.0 {
-            return factor;
-        }
-        let back = albedo * bounce.at(&(surface.point * p / w));
-        factor * back.map(|b| 1.0 / (1.0 - b.clamp(0.0, MAX_BOUNCE)))
+    deep.map_shadow(|x, y, factor| match surface.point_at(&pixel_center(x, y)) {
+        Some(point) => factor * endless_bounces(albedo * bounce.at(&point)),
+        None => factor,
     })
+}
+
+/// What light becomes that comes back by these shares again and again.
+fn endless_bounces(back: LinearRgb) -> LinearRgb {
+    back.map(|b| 1.0 / (1.0 - b.clamp(0.0, MAX_BOUNCE)))
 }
 
 /// What comes back from above, on a grid over the part of the surface that has cards over it.
@@ -66,16 +67,17 @@ impl BounceMap {
             let (x, y) = (left + i as f64 * step, bottom + j as f64 * step);
             light_from_above(&cards, &Vector3::new(x, y, 0.0))
         });
+        let spread = (BOUNCE_SPREAD_M / step) as f32;
         Some(Self {
             corner: [left, bottom],
             step,
-            back: gaussian_blur(&back, (BOUNCE_SPREAD_M / step) as f32),
+            back: gaussian_blur(&back, spread),
         })
     }
 
     fn at(&self, point: &Vector3<f64>) -> LinearRgb {
         let [x, y] = [0, 1].map(|axis: usize| (point[axis] - self.corner[axis]) / self.step + 0.5);
-        crate::filter::sample_bilinear(&self.back, x, y)
+        sample_bilinear(&self.back, x, y)
     }
 }
 
@@ -92,13 +94,18 @@ fn extent(cards: &[(&Card, ScenePlane)], axis: usize) -> Option<(f64, f64)> {
 
 /// Light that cards straight above a point of the surface send back to it.
 fn light_from_above(cards: &[(&Card, ScenePlane)], point: &Vector3<f64>) -> LinearRgb {
-    let mut hits: Vec<_> = cards
+    let hits = cards
         .iter()
-        .filter_map(|(card, plane)| hit_above(card, plane, point))
-        .collect();
+        .filter_map(|(card, plane)| hit_above(card, plane, point));
+    let mut hits: Vec<_> = hits.collect();
     hits.sort_by(|a, b| a.0.total_cmp(&b.0));
+    reflected_back(hits.into_iter().map(|(_, film)| film))
+}
+
+/// Light that comes back from layers of film, the first one met first.
+fn reflected_back(layers: impl Iterator<Item = Film>) -> LinearRgb {
     let (mut back, mut through) = (LinearRgb::BLACK, LinearRgb::WHITE);
-    for (_, film) in hits {
+    for film in layers {
         back = back + through * through * film.color;
         through = through * film.transmittance();
     }
@@ -109,6 +116,6 @@ fn light_from_above(cards: &[(&Card, ScenePlane)], point: &Vector3<f64>) -> Line
 fn hit_above(card: &Card, plane: &ScenePlane, point: &Vector3<f64>) -> Option<(f64, Film)> {
     let height = plane.normal.dot(&(plane.center - point)) / plane.normal.z;
     let uv = plane.texture_coordinates(&(point + Vector3::z() * height));
-    let inside = height > 0.0 && height.is_finite() && uv.iter().all(|c| (0.0..=1.0).contains(c));
+    let inside = height > 0.0 && height.is_finite() && is_on_texture(uv);
     inside.then(|| (height, card_texel(card, plane, uv, point)))
 }

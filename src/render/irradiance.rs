@@ -2,8 +2,9 @@
 
 use crate::render::float4::Float4;
 use crate::render::lattice::{LatticePosition, coarser_nodes};
-use crate::render::ranges::ranges_meet;
+use crate::render::ranges::{range_overlap, ranges_meet};
 use crate::render::receiver::{Receiver, ReceiverIrradiance, RowBuffers};
+use crate::render::refill;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -24,29 +25,39 @@ pub(super) struct IrradianceMap {
 pub(super) fn irradiance_maps(
     receivers: &[Option<ReceiverIrradiance>],
 ) -> Vec<Option<IrradianceMap>> {
-    let mut soft = maps_of(receivers, |lit| {
-        IrradianceMap::filled(&lit.coarse, Float4::ZERO)
-    });
-    fill_maps(
-        receivers,
-        &mut soft,
-        |lit| &lit.coarse,
-        |_, lit, j, out, buffers| fill_hidden_row(&lit.coarse, j, out, buffers),
-    );
+    let soft = hidden_maps(receivers);
     let mut maps = maps_of(receivers, |lit| {
         IrradianceMap::filled(&lit.fine, lit.unlit_value())
     });
-    fill_maps(
-        receivers,
-        &mut maps,
-        |lit| &lit.fine,
-        |k, lit, j, out, buffers| {
-            if let Some(soft) = &soft[k] {
-                fill_combined_row(lit, soft, j, out, buffers);
-            }
-        },
-    );
+    fill_maps(receivers, &mut maps, |band, j, out, buffers| {
+        if let Some(soft) = &soft[band.number] {
+            fill_combined_row(band.lit, soft, j, out, buffers);
+        }
+    });
     maps
+}
+
+/// What occluders hide of the light with soft shadows, on the coarser lattice.
+fn hidden_maps(receivers: &[Option<ReceiverIrradiance>]) -> Vec<Option<IrradianceMap>> {
+    let mut maps = maps_of(receivers, |lit| {
+        IrradianceMap::filled(&lit.coarse, Float4::ZERO)
+    });
+    fill_maps(receivers, &mut maps, |band, j, out, buffers| {
+        fill_hidden_row(&band.lit.coarse, j, out, buffers);
+    });
+    maps
+}
+
+/// Rows of a receiver's map that one task fills.
+struct MapBand<'a> {
+    /// The receiver's number.
+    number: usize,
+    lit: &'a ReceiverIrradiance,
+    /// Number of the first row.
+    first: usize,
+    /// Nodes of a row.
+    width: usize,
+    values: &'a mut [Float4],
 }
 
 /// A map for each receiver under some light.
@@ -60,29 +71,33 @@ fn maps_of(
         .collect()
 }
 
-/// Fills maps row by row, in parallel bands; `row` gets the receiver's number, the receiver, and the row's number.
+/// Fills maps row by row, in parallel bands; `row` gets the band and the number of the row.
 fn fill_maps(
     receivers: &[Option<ReceiverIrradiance>],
     maps: &mut [Option<IrradianceMap>],
-    part: impl Fn(&ReceiverIrradiance) -> &Receiver + Sync,
-    row: impl Fn(usize, &ReceiverIrradiance, usize, &mut [Float4], &mut RowBuffers) + Sync,
+    row: impl Fn(&MapBand<'_>, usize, &mut [Float4], &mut RowBuffers) + Sync,
 ) {
-    let pairs = receivers
-        .iter()
-        .zip(maps)
-        .enumerate()
-        .filter_map(|(k, (lit, map))| Some((k, lit.as_ref()?, map.as_mut()?)));
-    let bands: Vec<_> = pairs
-        .flat_map(|(k, lit, map)| map.row_bands().map(move |(j, band)| (k, lit, j, band)))
-        .collect();
-    bands
-        .into_par_iter()
-        .for_each_init(RowBuffers::default, |buffers, (k, lit, first, band)| {
-            let rows = band.chunks_exact_mut(part(lit).columns.len());
-            for (n, out) in rows.enumerate() {
-                row(k, lit, first + n, out, buffers);
+    map_bands(receivers, maps).into_par_iter().for_each_init(
+        RowBuffers::default,
+        |buffers, mut band| {
+            let values = std::mem::take(&mut band.values);
+            for (n, out) in values.chunks_exact_mut(band.width).enumerate() {
+                row(&band, band.first + n, out, buffers);
             }
-        });
+        },
+    );
+}
+
+/// The bands of all maps.
+fn map_bands<'a>(
+    receivers: &'a [Option<ReceiverIrradiance>],
+    maps: &'a mut [Option<IrradianceMap>],
+) -> Vec<MapBand<'a>> {
+    let pairs = receivers.iter().zip(maps).enumerate();
+    pairs
+        .filter_map(|(number, (lit, map))| Some((number, lit.as_ref()?, map.as_mut()?)))
+        .flat_map(|(number, lit, map)| map.row_bands(number, lit))
+        .collect()
 }
 
 /// One row of what occluders hide of a receiver's lights.
@@ -112,12 +127,17 @@ fn fill_combined_row(
     let sums = buffers.open.iter().zip(&buffers.hidden);
     for (i, (out, (open, hidden))) in out.iter_mut().zip(sums).enumerate() {
         let soft = between_coarse(&buffers.coarse, asked.start, i);
-        let hidden = hidden.add_scaled(1.0, soft);
-        *out = if lit.relative {
-            remaining_share(open, &hidden)
-        } else {
-            remaining_light(open, &hidden)
-        };
+        *out = remaining(lit.relative, open, &hidden.add_scaled(1.0, soft));
+    }
+}
+
+/// What is left of open irradiance, or that as a share of it.
+#[inline(always)]
+fn remaining(relative: bool, open: &Float4, hidden: &Float4) -> Float4 {
+    if relative {
+        remaining_share(open, hidden)
+    } else {
+        remaining_light(open, hidden)
     }
 }
 
@@ -160,32 +180,34 @@ impl IrradianceMap {
         }
     }
 
-    /// Bands of rows, each with its first row's number.
-    fn row_bands(&mut self) -> impl Iterator<Item = (usize, &mut [Float4])> {
-        let (first, width) = (self.rows.start, self.columns.len().max(1));
-        self.values
-            .chunks_mut(BAND_ROWS * width)
-            .enumerate()
-            .map(move |(k, band)| (first + k * BAND_ROWS, band))
+    /// Bands of rows of the map of a receiver with this number.
+    fn row_bands<'a>(
+        &'a mut self,
+        number: usize,
+        lit: &'a ReceiverIrradiance,
+    ) -> impl Iterator<Item = MapBand<'a>> {
+        let (start, width) = (self.rows.start, self.columns.len());
+        let bands = self.values.chunks_mut(BAND_ROWS * width.max(1));
+        bands.enumerate().map(move |(k, values)| MapBand {
+            number,
+            lit,
+            first: start + k * BAND_ROWS,
+            width,
+            values,
+        })
     }
 
     /// The row of this coarser map that belongs to row `j` of a finer one, at all nodes around `asked`; 0 outside.
     fn enlarge_row(&self, j: usize, asked: &Range<usize>, out: &mut Vec<Float4>) {
-        let (first, end) = (
-            coarser_nodes(asked.start)[0],
-            coarser_nodes(asked.end)[1] + 1,
-        );
-        out.clear();
-        out.resize(end - first, Float4::ZERO);
-        let known = first.max(self.columns.start)..end.min(self.columns.end);
+        let (first, last) = (coarser_nodes(asked.start)[0], coarser_nodes(asked.end)[1]);
+        refill(out, last + 1 - first, Float4::ZERO);
+        let known = range_overlap(&self.columns, &(first..last + 1));
         for row in coarser_nodes(j) {
-            if !self.rows.contains(&row) || known.start >= known.end {
+            if !self.rows.contains(&row) || known.is_empty() {
                 continue;
             }
-            for (o, v) in out[known.start - first..]
-                .iter_mut()
-                .zip(self.nodes_of(row, &known))
-            {
+            let nodes = self.nodes_of(row, &known);
+            for (o, v) in out[known.start - first..].iter_mut().zip(nodes) {
                 *o = o.add_scaled(0.5, *v);
             }
         }
@@ -218,14 +240,17 @@ impl IrradianceMap {
     #[inline(always)]
     pub(super) fn value_at(&self, column: LatticePosition, row: LatticePosition) -> Float4 {
         let width = self.columns.len();
-        let i = (column.0 as usize)
-            .saturating_sub(self.columns.start)
-            .min(width - 2);
-        let j = (row.0 as usize)
-            .saturating_sub(self.rows.start)
-            .min(self.rows.len() - 2);
-        let top = &self.values[j * width + i..][..2];
-        let bottom = &self.values[(j + 1) * width + i..][..2];
+        let start = cell_before(row, &self.rows) * width + cell_before(column, &self.columns);
+        let top = &self.values[start..][..2];
+        let bottom = &self.values[start + width..][..2];
         Float4::bilinear([top[0], top[1]], [bottom[0], bottom[1]], column.1, row.1)
     }
+}
+
+/// Number inside a range of the node before a position, of which another follows.
+#[inline(always)]
+fn cell_before(position: LatticePosition, range: &Range<usize>) -> usize {
+    (position.0 as usize)
+        .saturating_sub(range.start)
+        .min(range.len() - 2)
 }

@@ -13,11 +13,11 @@ use crate::render::grade::channel_mean;
 use crate::render::half_plane::{quad_sides, row_span};
 use crate::render::irradiance::IrradianceMap;
 use crate::render::lattice::LatticePosition;
-use crate::render::ranges::{integer_range, range_overlap, range_union, ranges_meet};
-use crate::render::texel_grid::TexelLine;
+use crate::render::ranges::{integer_range, range_overlap, ranges_meet};
+use crate::render::texel_grid::{TexelLine, texel_line};
 use crate::render::texture::BakedTexture;
 use crate::render::transmittance::{LayerRow, SubsampleRun, Transmittance};
-use crate::render::view::ProjectedPlane;
+use crate::render::view::{ProjectedPlane, pixel_center};
 use crate::work::{self, Kind};
 use std::f32::consts::PI;
 use std::ops::Range;
@@ -99,6 +99,15 @@ pub(super) struct RenderedTile {
 }
 
 impl RenderedTile {
+    /// A tile without samples, its plate unchanged.
+    fn new(block: &PixelBlock, may_be_shadowed: bool) -> Self {
+        Self {
+            samples: TileSamples::default(),
+            shadow: may_be_shadowed.then(|| vec![LinearRgb::WHITE; block.len()]),
+            block: block.clone(),
+        }
+    }
+
     /// The plate's factors of a row of a part of the block.
     fn shadow_row(&mut self, part: &PixelBlock, y: usize) -> Option<&mut [LinearRgb]> {
         let start = (y - self.block.y.start) * self.block.x.len() + part.x.start;
@@ -148,10 +157,14 @@ impl Layer {
         (self.plane.w.dot(p) / self.plane.height) as f32
     }
 
+    /// It is no farther away than another layer.
+    fn is_before(&self, other: &Self, p: &Vector3<f64>) -> bool {
+        self.reciprocal_depth(p) >= other.reciprocal_depth(p)
+    }
+
     /// Depth at a pixel's centre; as far as can be where the plane is behind the camera.
     fn depth_at(&self, x: usize, y: usize) -> Depth {
-        let center = Vector3::new(x as f64 + 0.5, y as f64 + 0.5, 1.0);
-        let w = self.plane.w.dot(&center);
+        let w = self.plane.w.dot(&pixel_center(x, y));
         Depth(if w > 0.0 {
             (self.plane.height / w) as f32
         } else {
@@ -167,11 +180,7 @@ impl LayerStack {
             .filter(|&k| self.layers[k].touches(&block))
             .collect();
         let may_be_shadowed = self.may_be_shadowed(&block);
-        let mut tile = RenderedTile {
-            samples: TileSamples::default(),
-            shadow: may_be_shadowed.then(|| vec![LinearRgb::WHITE; block.len()]),
-            block: block.clone(),
-        };
+        let mut tile = RenderedTile::new(&block, may_be_shadowed);
         if !layers.is_empty() || may_be_shadowed {
             self.render_part(&block, &layers, &mut tile);
         }
@@ -186,9 +195,14 @@ impl LayerStack {
             for half in &part.halves() {
                 self.render_part(half, &layers, tile);
             }
-            return;
+        } else {
+            self.render_sorted(part, &layers, tile);
         }
-        let through = self.render_layers(part, &layers, &mut tile.samples);
+    }
+
+    /// Renders a part of a tile whose layers do not cross.
+    fn render_sorted(&self, part: &PixelBlock, layers: &[usize], tile: &mut RenderedTile) {
+        let through = self.render_layers(part, layers, &mut tile.samples);
         if tile.shadow.is_some() {
             work::add(Kind::ShadowedPixels, part.len() as u64);
             self.shade_catcher(part, &through, tile);
@@ -202,11 +216,8 @@ impl LayerStack {
         corners: &[Vector3<f64>; 4],
         layers: &[usize],
     ) -> Vec<usize> {
-        let mut sorted: Vec<_> = layers
-            .iter()
-            .copied()
-            .filter(|&k| self.layers[k].touches(part))
-            .collect();
+        let touching = layers.iter().filter(|&&k| self.layers[k].touches(part));
+        let mut sorted: Vec<_> = touching.copied().collect();
         let middle = corners.iter().sum::<Vector3<f64>>() / 4.0;
         // A stable sort: cards that coincide stay in the order of their ids.
         sorted.sort_by(|&a, &b| {
@@ -219,9 +230,7 @@ impl LayerStack {
     fn is_sorted_at(&self, layers: &[usize], corners: &[Vector3<f64>; 4]) -> bool {
         layers.windows(2).all(|pair| {
             let [near, far] = [pair[0], pair[1]].map(|k| &self.layers[k]);
-            corners
-                .iter()
-                .all(|p| near.reciprocal_depth(p) >= far.reciprocal_depth(p))
+            corners.iter().all(|p| near.is_before(far, p))
         })
     }
 
@@ -279,11 +288,10 @@ impl LayerStack {
         if pixels.is_empty() {
             return;
         }
-        row.touched = range_union(row.touched.clone(), pixels.clone());
+        row.touch(&pixels);
         if self.samples.per_subsample {
             self.light_subsamples(layer, block, [sx, y * r + sy], &pixels, row);
         }
-        row.read += pixels.len();
         let run = SubsampleRun {
             line: &line.starting_at(0.5 + offset + pixels.start as f32),
             plane: sy * r + sx,
@@ -324,20 +332,34 @@ impl LayerStack {
         let weight = self.samples.sample_weight();
         for i in row.touched.clone().filter(|&i| row.alpha[i] > 0.0) {
             let x = block.x.start + i;
-            let light = self.pixel_light(layer, [x, y], row.light[i], &mut row.lit);
             let hidden = row.hidden_by(i, self.tinted).scale(weight);
-            let alpha = (row.alpha[i] * weight).min(1.0);
-            let sample = DeepSample {
-                object: layer.id,
-                depth: layer.depth_at(x, y),
-                light: light.rgb().scale(weight * self.exposure / PI),
-                alpha,
-                visible: channel_mean(hidden).min(alpha),
-            };
+            let light = self.pixel_light(layer, [x, y], row.light[i], &mut row.lit);
+            let sample = self.deep_sample(layer, [x, y], light, row.alpha[i], hidden);
             out.samples.push((x as u32, y as u32, sample));
             if self.tinted {
                 out.tints.push(hidden.map(|h| h.min(1.0)));
             }
+        }
+    }
+
+    /// What a pixel got from a layer: sums over its sub-samples of light and alpha, and what it hides.
+    #[inline(always)]
+    fn deep_sample(
+        &self,
+        layer: &Layer,
+        [x, y]: [usize; 2],
+        light: Float4,
+        alpha: f32,
+        hidden: LinearRgb,
+    ) -> DeepSample {
+        let weight = self.samples.sample_weight();
+        let alpha = (alpha * weight).min(1.0);
+        DeepSample {
+            object: layer.id,
+            depth: layer.depth_at(x, y),
+            light: light.rgb().scale(weight * self.exposure / PI),
+            alpha,
+            visible: channel_mean(hidden).min(alpha),
         }
     }
 
@@ -421,28 +443,37 @@ impl LayerStack {
     fn mean_share(
         &self,
         map: &IrradianceMap,
-        [x, y]: [usize; 2],
+        at: [usize; 2],
         spans: &CatcherSpans,
         through: impl Iterator<Item = Float4>,
     ) -> LinearRgb {
-        let (r, n) = (
-            self.samples.offsets.len(),
-            self.samples.positions_per_side(),
-        );
         let (mut sum, mut weight) = (Float4::ZERO, Float4::ZERO);
         for (sub, t) in through.enumerate() {
-            let (sx, sy) = (sub % r, sub / r);
-            let share = if !spans.hold_sample(sy, x as f64 + 0.5 + self.samples.offsets[sx]) {
-                Float4::ONE
-            } else if self.samples.per_subsample {
-                self.share_at(map, x * n + sx, y * n + sy)
-            } else {
-                self.share_at(map, x, y)
-            };
+            let share = self.subsample_share(map, at, spans, sub);
             sum = sum.add_scaled(1.0, t.times(share));
             weight = weight.add_scaled(1.0, t);
         }
         weighted_mean(&sum, &weight)
+    }
+
+    /// The share at a sub-sample of a pixel; 1 beyond the end of the surface.
+    #[inline(always)]
+    fn subsample_share(
+        &self,
+        map: &IrradianceMap,
+        [x, y]: [usize; 2],
+        spans: &CatcherSpans,
+        sub: usize,
+    ) -> Float4 {
+        let r = self.samples.offsets.len();
+        let (sx, sy) = (sub % r, sub / r);
+        if !spans.hold_sample(sy, x as f64 + 0.5 + self.samples.offsets[sx]) {
+            Float4::ONE
+        } else if self.samples.per_subsample {
+            self.share_at(map, x * r + sx, y * r + sy)
+        } else {
+            self.share_at(map, x, y)
+        }
     }
 }
 
@@ -456,17 +487,15 @@ struct CatcherSpans {
 
 impl CatcherSpans {
     fn new(samples: &SampleGrid, edges: &[Vector3<f64>; 5], y: usize) -> Self {
-        let rows: Vec<_> = samples
-            .offsets
-            .iter()
+        let offsets = samples.offsets.iter();
+        let rows: Vec<_> = offsets
             .map(|o| row_span(edges, y as f64 + 0.5 + o))
             .collect();
+        let (low, high) = common_span(&rows);
         let reach = samples.reach_px();
-        let low = rows.iter().map(|s| s.0).fold(f64::NEG_INFINITY, f64::max) + reach;
-        let high = rows.iter().map(|s| s.1).fold(f64::INFINITY, f64::min) - reach;
         Self {
             rows,
-            inner: (low, high),
+            inner: (low + reach, high - reach),
         }
     }
 
@@ -480,6 +509,13 @@ impl CatcherSpans {
     fn hold_sample(&self, row: usize, x: f64) -> bool {
         x >= self.rows[row].0 && x <= self.rows[row].1
     }
+}
+
+/// What some spans have in common; reversed where that is nothing.
+fn common_span(spans: &[(f64, f64)]) -> (f64, f64) {
+    let low = spans.iter().map(|s| s.0).fold(f64::NEG_INFINITY, f64::max);
+    let high = spans.iter().map(|s| s.1).fold(f64::INFINITY, f64::min);
+    (low, high)
 }
 
 /// The weighted mean of a share, per channel; 1 for no weight, and exactly 1 where the share is 1 all over.
@@ -506,11 +542,11 @@ impl LayerLine {
         let plane = &layer.plane;
         let (low, high) = row_span(&layer.sides, y);
         let [u, v] = layer.texture.grid.texel_rows(&plane.u, &plane.v, &plane.w);
-        let first = Vector3::new(left as f64, y, 1.0);
+        let left = left as f64;
         Self {
-            low: (low - left as f64) as f32,
-            high: (high - left as f64) as f32,
-            position: [u, v, plane.w].map(|row| (row.dot(&first) as f32, row.x as f32)),
+            low: (low - left) as f32,
+            high: (high - left) as f32,
+            position: texel_line([u, v, plane.w], &Vector3::new(left, y, 1.0)),
         }
     }
 

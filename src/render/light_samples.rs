@@ -117,14 +117,9 @@ impl LightSamples {
 impl LightGroup {
     fn area_light(light: &AreaLight, nodes: Vec<light::Node>) -> Self {
         let normal = light::frame(light).normal;
-        let samples = nodes.into_iter().map(|node| LightSample {
-            at: node.point.to_homogeneous(),
-            width: node.area.sqrt(),
-            kind: SampleKind::Face {
-                normal,
-                area: node.area,
-            },
-        });
+        let samples = nodes
+            .into_iter()
+            .map(|node| LightSample::on_face(node, normal));
         Self {
             radiance: light::radiance(light),
             samples: samples.collect(),
@@ -181,6 +176,16 @@ fn hemisphere_frame(normal: &Vector3<f64>) -> Matrix3<f64> {
 }
 
 impl LightSample {
+    /// A node of a light's face.
+    fn on_face(node: light::Node, normal: Vector3<f64>) -> Self {
+        let area = node.area;
+        Self {
+            at: node.point.to_homogeneous(),
+            width: area.sqrt(),
+            kind: SampleKind::Face { normal, area },
+        }
+    }
+
     /// Cosine times solid angle of a piece of the sky.
     fn sky_share(&self) -> f64 {
         if let SampleKind::Sky { share } = self.kind {
@@ -195,14 +200,7 @@ impl LightSample {
         match self.kind {
             SampleKind::Sky { share } => share,
             SampleKind::Face { normal: face, area } => {
-                let to = self.at.xyz() - point;
-                let r2 = to.norm_squared();
-                let cosines = normal.dot(&to).max(0.0) * (-face.dot(&to)).max(0.0);
-                if r2 > 0.0 {
-                    cosines / (r2 * r2) * area
-                } else {
-                    0.0
-                }
+                light::geometry_term(&(self.at.xyz() - point), &face, normal) * area
             }
         }
     }

@@ -55,10 +55,20 @@ mod texture;
 mod transmittance;
 mod view;
 
+#[doc(hidden)]
 pub use check::check;
 pub use cryptomatte::Cryptomatte;
 pub(crate) use cryptomatte::{attribute_name, hex_id, id_of_name};
 pub use deep::{render, render_coverage};
+#[doc(hidden)]
 pub use interreflection::interreflect;
 pub use options::RenderOptions;
+#[doc(hidden)]
 pub use reference::render_reference;
+
+/// Fills a buffer with `n` times a value; it keeps its memory.
+#[inline]
+fn refill<T: Copy>(buffer: &mut Vec<T>, n: usize, value: T) {
+    buffer.clear();
+    buffer.resize(n, value);
+}

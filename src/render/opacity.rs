@@ -54,9 +54,9 @@ impl<'a> OpacityMips<'a> {
     pub(super) fn level_for(&self, size: [f64; 2], cell: f64, blur: f64) -> Arc<OpacityLevel> {
         let (width, height) = self.texture.size();
         let texel = (size[0] * size[1] / (width * height) as f64).sqrt();
-        let level = libm::log2((cell / texel).max(1.0))
+        let level = halvings_to(cell, texel)
             .floor()
-            .max(libm::log2((blur / texel).max(1.0)).round());
+            .max(halvings_to(blur, texel).round());
         self.halved((level as usize).min(self.levels.len() - 1))
     }
 
@@ -72,6 +72,11 @@ impl<'a> OpacityMips<'a> {
         });
         kept.clone()
     }
+}
+
+/// How often texels must be doubled to reach a length; 0 for a shorter one.
+fn halvings_to(length: f64, texel: f64) -> f64 {
+    libm::log2((length / texel).max(1.0))
 }
 
 /// Opacity of a texture at one level of detail.
@@ -94,14 +99,14 @@ impl OpacityLevel {
             Texture::Rgba(pyramid) => {
                 Self::from_channels(grid, pyramid.level(level), &[&|p: PremulRgba| p.a])
             }
-            Texture::Film(pyramid) => {
-                let graded = pyramid
-                    .level(level)
-                    .map(|p: Film| graded_opacity(p.opacity, grade));
-                let channels: [&dyn Fn(LinearRgb) -> f32; 3] = [&|o| o.r, &|o| o.g, &|o| o.b];
-                Self::from_channels(grid, &graded, &channels)
-            }
+            Texture::Film(pyramid) => Self::from_film(grid, pyramid.level(level), grade),
         }
+    }
+
+    fn from_film(grid: TexelGrid, image: &Image<Film>, grade: &Grade) -> Self {
+        let graded = image.map(|p| graded_opacity(p.opacity, grade));
+        let channels: [&dyn Fn(LinearRgb) -> f32; 3] = [&|o| o.r, &|o| o.g, &|o| o.b];
+        Self::from_channels(grid, &graded, &channels)
     }
 
     fn from_channels<P: Copy>(
@@ -109,18 +114,16 @@ impl OpacityLevel {
         image: &Image<P>,
         channels: &[&dyn Fn(P) -> f32],
     ) -> Self {
+        let planes = channels
+            .iter()
+            .map(|channel| bordered_plane(image, channel));
+        let mut pixels = image.pixels().iter();
         Self {
             grid,
             width: image.width() + 2 * BORDER_TEXELS,
             height: image.height() + 2 * BORDER_TEXELS,
-            planes: channels
-                .iter()
-                .map(|channel| bordered_plane(image, channel))
-                .collect(),
-            opaque: image
-                .pixels()
-                .iter()
-                .all(|&p| channels.iter().all(|channel| channel(p) == 1.0)),
+            planes: planes.collect(),
+            opaque: pixels.all(|&p| channels.iter().all(|channel| channel(p) == 1.0)),
         }
     }
 

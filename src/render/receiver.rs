@@ -5,7 +5,6 @@
 
 use crate::geom::Vector3;
 use crate::pixel::LinearRgb;
-use crate::render::RenderOptions;
 use crate::render::float4::Float4;
 use crate::render::half_plane::{grown_side, quad_sides, row_span};
 use crate::render::lattice::Lattice;
@@ -17,6 +16,7 @@ use crate::render::shadow_ray::{ShadowRay, shadow_rays};
 use crate::render::view::{
     CameraView, HORIZON_M, LatticeArea, ProjectedPlane, ScenePlane, rows_and_columns,
 };
+use crate::render::{RenderOptions, refill};
 use crate::scene::{Card, Shot};
 use crate::work::{self, Kind};
 use std::ops::Range;
@@ -137,25 +137,15 @@ impl<'a> LightingContext<'a> {
         reach: [f64; 2],
         lights: SelectedLights<'_>,
     ) -> Option<Receiver> {
-        let plane = &self.occluders.cards[own].plane;
-        let projected = ProjectedPlane::new(plane, &lattice.view)?;
-        let area = rows_and_columns(plane, reach, &lattice.view);
+        let (view, plane) = (&lattice.view, &self.occluders.cards[own].plane);
+        let projected = ProjectedPlane::new(plane, view)?;
+        let area = rows_and_columns(plane, reach, view);
         if area.0.len() < 2 || area.1.len() < 2 {
             return None;
         }
-        let shadowed = ShadowedReceiver {
-            plane: &projected,
-            area: &area,
-            view: &lattice.view,
-            own: Some(own),
-            cell_m: projected.cell_metres(&lattice.view, &plane.center),
-        };
-        // Two nodes, for the finer lattice's one that lies between them.
-        let outline = quad_sides(&projected.u, &projected.v, &projected.w, reach)
-            .iter()
-            .map(|s| grown_side(s, 2.0))
-            .collect();
+        let shadowed = ShadowedReceiver::new(&projected, &area, view, Some(own), &plane.center);
         let groups = self.ray_groups(&shadowed, lights);
+        let outline = card_outline(&projected, reach);
         Some(self.receiver(projected, groups, lights, (outline, area)))
     }
 
@@ -165,31 +155,21 @@ impl<'a> LightingContext<'a> {
         let [faces, sky] = SelectedLights::split(&lights);
         let fine = self.surface_on(&self.fine, faces)?;
         let coarse = self.surface_on(&self.coarse, sky)?;
-        let view = &self.fine.view;
-        let rows = range_until(finer_union(&fine.rows, &coarse.rows), view.height);
-        let columns = range_until(finer_union(&fine.columns, &coarse.columns), view.width);
-        let is_seen = rows.len() > 1 && columns.len() > 1;
+        let fine = fine.grown_around(&coarse, &self.fine.view);
+        let is_seen = fine.rows.len() > 1 && fine.columns.len() > 1;
         is_seen.then_some(ReceiverIrradiance {
-            fine: Receiver {
-                rows,
-                columns,
-                ..fine
-            },
+            fine,
             coarse,
             relative: true,
         })
     }
 
     fn surface_on(&self, lattice: &Lattice, lights: SelectedLights<'_>) -> Option<Receiver> {
-        let projected = ProjectedPlane::new(&self.occluders.surface, &lattice.view)
-            .filter(|plane| plane.normal.z > 0.0)?;
-        let shadowed = ShadowedReceiver {
-            plane: &projected,
-            area: &(0..lattice.view.height, 0..lattice.view.width),
-            view: &lattice.view,
-            own: None,
-            cell_m: projected.cell_metres(&lattice.view, &Vector3::zeros()),
-        };
+        let view = &lattice.view;
+        let projected = ProjectedPlane::from_above(&self.occluders.surface, view)?;
+        let everywhere = view.whole_area();
+        let origin = Vector3::zeros();
+        let shadowed = ShadowedReceiver::new(&projected, &everywhere, view, None, &origin);
         let groups = self.ray_groups(&shadowed, lights);
         let area = shadowed_area(&groups);
         Some(self.receiver(projected, groups, lights, (vec![projected.w], area)))
@@ -235,6 +215,12 @@ impl<'a> SelectedLights<'a> {
         let open_sky = all.open_sky();
         [&all.faces, &all.sky].map(|groups| Self { groups, open_sky })
     }
+}
+
+/// Sides of a card's nodes that are asked for: two nodes further out, for the finer lattice's one that lies between them.
+fn card_outline(plane: &ProjectedPlane, reach: [f64; 2]) -> Vec<Vector3<f64>> {
+    let sides = quad_sides(&plane.u, &plane.v, &plane.w, reach);
+    sides.iter().map(|s| grown_side(s, 2.0)).collect()
 }
 
 /// Bounds of all shadows on a receiver.
@@ -309,10 +295,7 @@ impl Receiver {
 
     /// Open and hidden irradiance at the asked nodes of a row: the open sky and this receiver's own lights.
     pub(super) fn gather_row(&self, j: usize, asked: &Range<usize>, buffers: &mut RowBuffers) {
-        let n = asked.len();
-        let LinearRgb { r, g, b } = self.open_sky;
-        refill(&mut buffers.open, n, Float4([r, g, b, 0.0]));
-        refill(&mut buffers.hidden, n, Float4::ZERO);
+        buffers.start_row(asked.len(), self.open_sky.into());
         if self.groups.iter().any(RayGroup::has_faces) {
             self.fill_positions(j, asked, &mut buffers.position);
         }
@@ -320,6 +303,17 @@ impl Receiver {
             self.gather_group(group, j, asked, buffers);
         }
         work::add_all(std::mem::take(&mut buffers.counts).into_work());
+    }
+
+    /// With the nodes that a receiver of twice the distance needs around its own, as far as the picture goes.
+    fn grown_around(self, coarse: &Self, view: &CameraView) -> Self {
+        let rows = finer_union(&self.rows, &coarse.rows);
+        let columns = finer_union(&self.columns, &coarse.columns);
+        Self {
+            rows: range_until(rows, view.height),
+            columns: range_until(columns, view.width),
+            ..self
+        }
     }
 
     fn gather_group(
@@ -365,11 +359,7 @@ impl Receiver {
         buffers.counts.shadow += all.len();
         for channel in 0..self.channels {
             buffers.fill_through(ray, channel, j, &all);
-            add_lost(
-                &mut buffers.lost[channel][here.clone()],
-                &buffers.ray[here.clone()],
-                &buffers.through[channel],
-            );
+            buffers.add_lost(channel, here.clone());
         }
         here
     }
@@ -383,15 +373,18 @@ impl Receiver {
         let nearest = plane.height / HORIZON_M;
         for (axis, out) in out.iter_mut().enumerate() {
             out.resize(asked.len(), 0.0);
-            for (i, out) in out.iter_mut().enumerate() {
-                let k = i as f64;
-                *out = ((p[axis] + k * step[axis]) / (w + k * w_step).max(nearest)) as f32;
-            }
+            fill_quotients((p[axis], step[axis]), (w, w_step), nearest, out);
         }
     }
 }
 
 impl RowBuffers {
+    /// Empties what is added up for one row: nothing but the open sky, and nothing hidden.
+    fn start_row(&mut self, n: usize, open_sky: Float4) {
+        refill(&mut self.open, n, open_sky);
+        refill(&mut self.hidden, n, Float4::ZERO);
+    }
+
     /// Empties what is added up for one group.
     fn start_group(&mut self, n: usize, has_faces: bool, channels: usize) {
         refill(&mut self.group, if has_faces { n } else { 0 }, 0.0);
@@ -404,6 +397,15 @@ impl RowBuffers {
     fn add_hidden_light(&mut self, nodes: Range<usize>, channels: usize, radiance: LinearRgb) {
         let lost = [0, 1, 2].map(|c: usize| &self.lost[c.min(channels - 1)][nodes.clone()]);
         add_hidden(&mut self.hidden[nodes.clone()], lost, radiance);
+    }
+
+    /// Adds what a ray loses at some nodes to what its group loses, in one channel.
+    fn add_lost(&mut self, channel: usize, nodes: Range<usize>) {
+        let lost = self.lost[channel][nodes.clone()].iter_mut();
+        let passes = self.ray[nodes].iter().zip(&self.through[channel]);
+        for (lost, (e, t)) in lost.zip(passes) {
+            *lost += e * (1.0 - t);
+        }
     }
 
     /// Adds the open irradiance of a piece of an area light to its group.
@@ -442,14 +444,12 @@ impl RowBuffers {
     }
 }
 
-fn refill<T: Copy>(buffer: &mut Vec<T>, n: usize, value: T) {
-    buffer.clear();
-    buffer.resize(n, value);
-}
-
-fn add_lost(lost: &mut [f32], strength: &[f32], through: &[f32]) {
-    for ((lost, e), t) in lost.iter_mut().zip(strength).zip(through) {
-        *lost += e * (1.0 - t);
+/// Quotients along a row: of two numbers and their steps, the divisor never below a bound.
+#[inline]
+fn fill_quotients(p: (f64, f64), w: (f64, f64), lowest: f64, out: &mut [f32]) {
+    for (i, out) in out.iter_mut().enumerate() {
+        let k = i as f64;
+        *out = ((p.0 + k * p.1) / (w.0 + k * w.1).max(lowest)) as f32;
     }
 }
 

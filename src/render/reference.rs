@@ -5,12 +5,12 @@ use crate::deep::{DeepImage, DeepSample};
 use crate::filter::sample_bilinear;
 use crate::geom::Vector3;
 use crate::image::Image;
-use crate::pixel::{Depth, Film, LinearRgb, Mix};
+use crate::pixel::{Depth, Film, LinearRgb, Mix, ObjectId};
 use crate::render::RenderOptions;
 use crate::render::grade::{channel_mean, graded_opacity};
 use crate::render::light_samples::{LightGroup, LightSample, LightSamples, SampleKind};
 use crate::render::pixel_filter::filter_quantiles;
-use crate::render::view::{CameraView, ProjectedPlane, ScenePlane, visible_planes};
+use crate::render::view::{CameraView, ProjectedPlane, ScenePlane, is_on_texture, visible_planes};
 use crate::scene::{Card, Shot};
 use rayon::prelude::*;
 use std::f32::consts::PI;
@@ -22,21 +22,14 @@ use std::f32::consts::PI;
 pub fn render_reference(shot: &Shot, options: &RenderOptions) -> DeepImage {
     let options = options.clamped();
     let world = ReferenceWorld::new(shot, &options);
-    let offsets = filter_quantiles(options.subsamples);
-    let (width, height) = (world.view.width, world.view.height);
-    let (lists, shadow): (Vec<_>, Vec<_>) = (0..width * height)
-        .into_par_iter()
-        .map(|i| {
-            let (column, row) = (i % width, i / width);
-            world.render_pixel(column as f64 + 0.5, row as f64 + 0.5, &offsets)
-        })
-        .unzip();
+    let (lists, shadow) = world.render_pixels(&filter_quantiles(options.subsamples));
     let tints = if world.tinted {
         lists.iter().flatten().map(|sample| sample.hidden).collect()
     } else {
         Vec::new()
     };
-    deep_image(Image::from_vec(width, height, shadow), lists).with_tints(tints)
+    let shadow = Image::from_vec(world.view.width, world.view.height, shadow);
+    deep_image(shadow, lists).with_tints(tints)
 }
 
 fn deep_image(shadow: Image<LinearRgb>, lists: Vec<Vec<ReferenceSample>>) -> DeepImage {
@@ -50,6 +43,31 @@ fn deep_image(shadow: Image<LinearRgb>, lists: Vec<Vec<ReferenceSample>>) -> Dee
 struct ReferenceSample {
     deep: DeepSample,
     hidden: LinearRgb,
+}
+
+impl ReferenceSample {
+    fn new(object: ObjectId, depth: f64) -> Self {
+        let deep = DeepSample {
+            object,
+            depth: Depth(depth as f32),
+            ..DeepSample::default()
+        };
+        Self {
+            deep,
+            hidden: LinearRgb::BLACK,
+        }
+    }
+
+    /// Adds what film covers, and what it hides of what passes to it.
+    fn add_film(&mut self, weight: f32, film: &Film, through: LinearRgb) {
+        self.deep.alpha += weight * channel_mean(film.opacity);
+        self.hidden = self.hidden.add_scaled(weight, through * film.opacity);
+    }
+
+    /// What is seen of it is what it hides.
+    fn finish(&mut self) {
+        self.deep.visible = channel_mean(self.hidden);
+    }
 }
 
 /// A card with everything that a ray asks of it.
@@ -90,37 +108,44 @@ impl<'a> ReferenceWorld<'a> {
             .into_iter()
             .map(|(card, plane)| ReferenceCard::new(card, plane, &view, (shot, options)))
             .collect();
+        let surface = ScenePlane::shadow_catcher(shot.catcher);
         Self {
             shot,
             view,
-            surface: ProjectedPlane::new(&ScenePlane::shadow_catcher(shot.catcher), &view)
-                .filter(|plane| plane.normal.z > 0.0),
+            surface: ProjectedPlane::from_above(&surface, &view),
             surface_lights: LightSamples::plain(shot, options, &Vector3::z()),
             tinted: cards.iter().any(ReferenceCard::is_film),
             cards,
         }
     }
 
+    /// Samples of every pixel, and the factors on the plate.
+    fn render_pixels(&self, offsets: &[f64]) -> (Vec<Vec<ReferenceSample>>, Vec<LinearRgb>) {
+        let (width, height) = (self.view.width, self.view.height);
+        (0..width * height)
+            .into_par_iter()
+            .map(|i| {
+                let (column, row) = (i % width, i / width);
+                self.render_pixel(column as f64 + 0.5, row as f64 + 0.5, offsets)
+            })
+            .unzip()
+    }
+
     /// Samples of one pixel and the factor on its plate.
     fn render_pixel(&self, x: f64, y: f64, offsets: &[f64]) -> (Vec<ReferenceSample>, LinearRgb) {
         let order = self.depth_order(x, y);
-        let mut samples: Vec<_> = order
-            .iter()
-            .map(|&(k, depth)| self.empty_sample(k, depth))
-            .collect();
+        let mut samples = self.empty_samples(&order);
         let weight = 1.0 / (offsets.len() * offsets.len()) as f32;
         let mut shadow = ShadowRatio::default();
         for oy in offsets {
             for ox in offsets {
                 let at = [x + ox, y + oy];
                 let through = self.trace_cards(at, &order, weight, &mut samples);
-                self.shade_surface(at, through.scale(weight), &mut shadow);
+                shadow.add(through.scale(weight), &self.surface_light(at));
             }
         }
         samples.retain(|sample| sample.deep.alpha > 0.0);
-        for sample in &mut samples {
-            sample.deep.visible = channel_mean(sample.hidden);
-        }
+        samples.iter_mut().for_each(ReferenceSample::finish);
         (samples, shadow.ratio())
     }
 
@@ -136,16 +161,11 @@ impl<'a> ReferenceWorld<'a> {
         order
     }
 
-    fn empty_sample(&self, k: usize, depth: f64) -> ReferenceSample {
-        let deep = DeepSample {
-            object: self.cards[k].card.id,
-            depth: Depth(depth as f32),
-            ..DeepSample::default()
-        };
-        ReferenceSample {
-            deep,
-            hidden: LinearRgb::BLACK,
-        }
+    fn empty_samples(&self, order: &[(usize, f64)]) -> Vec<ReferenceSample> {
+        order
+            .iter()
+            .map(|&(k, depth)| ReferenceSample::new(self.cards[k].card.id, depth))
+            .collect()
     }
 
     /// Adds what the cards do along one ray, front to back; returns what passes through all of them.
@@ -157,39 +177,34 @@ impl<'a> ReferenceWorld<'a> {
         samples: &mut [ReferenceSample],
     ) -> LinearRgb {
         let mut through = LinearRgb::WHITE;
+        let lit_weight = weight * self.shot.exposure / PI;
         for (&(k, _), sample) in order.iter().zip(samples) {
-            let card = &self.cards[k];
-            let Some(hit) = card.intersect_px(x, y) else {
+            let Some(hit) = self.cards[k].intersect_px(x, y) else {
                 continue;
             };
-            let film = card.texel(hit.uv, &self.view.eye);
-            sample.deep.alpha += weight * channel_mean(film.opacity);
-            sample.hidden = sample.hidden.add_scaled(weight, through * film.opacity);
-            let point = self.view.point_at(x, y, hit.depth);
-            let e = self.irradiance(&point, &hit.normal, &card.lights, Some(k));
-            let light = through * film.color * e.shadowed;
-            let weight = weight * self.shot.exposure / PI;
-            sample.deep.light = sample.deep.light.add_scaled(weight, light);
+            let film = self.cards[k].texel(hit.uv, &self.view.eye);
+            sample.add_film(weight, &film, through);
+            let light = through * film.color * self.light_on(k, [x, y], &hit);
+            sample.deep.light = sample.deep.light.add_scaled(lit_weight, light);
             through = through * film.transmittance();
         }
         through
     }
 
-    fn shade_surface(&self, [x, y]: [f64; 2], weight: LinearRgb, shadow: &mut ShadowRatio) {
+    /// Irradiance of a card where a camera ray meets it.
+    fn light_on(&self, k: usize, [x, y]: [f64; 2], hit: &CardHit) -> LinearRgb {
+        let point = self.view.point_at(x, y, hit.depth);
+        let light = self.irradiance(&point, &hit.normal, &self.cards[k].lights, Some(k));
+        light.shadowed
+    }
+
+    /// Irradiance of the surface where a camera ray meets it; none beside it.
+    fn surface_light(&self, [x, y]: [f64; 2]) -> PointIrradiance {
         let hit = self.surface.as_ref().and_then(|s| s.intersect_px(x, y));
-        let light = match hit {
-            None => PointIrradiance::default(),
-            Some((_, depth)) => {
-                let point = self.view.point_at(x, y, depth);
-                self.irradiance(&point, &Vector3::z(), &self.surface_lights, None)
-            }
-        };
-        if hit.is_none() || light.open == LinearRgb::BLACK {
-            shadow.outside = shadow.outside + weight;
-        }
-        shadow.weight = shadow.weight + weight;
-        shadow.open = shadow.open + weight * light.open;
-        shadow.shadowed = shadow.shadowed + weight * light.shadowed;
+        hit.map_or_else(PointIrradiance::default, |(_, depth)| {
+            let point = self.view.point_at(x, y, depth);
+            self.irradiance(&point, &Vector3::z(), &self.surface_lights, None)
+        })
     }
 
     fn irradiance(
@@ -218,22 +233,15 @@ impl<'a> ReferenceWorld<'a> {
         sample: &LightSample,
         own: Option<usize>,
     ) -> LinearRgb {
-        if own.is_some()
-            && matches!(sample.kind, SampleKind::Sky { .. })
-            && self.surface_blocks(p, &sample.at.xyz())
-        {
+        let from_sky = matches!(sample.kind, SampleKind::Sky { .. });
+        if own.is_some() && from_sky && self.surface_blocks(p, &sample.at.xyz()) {
             return LinearRgb::BLACK;
         }
-        let others = self
-            .cards
-            .iter()
-            .enumerate()
-            .filter(|&(k, _)| Some(k) != own);
+        let cards = self.cards.iter().enumerate();
+        let others = cards.filter(|&(k, _)| Some(k) != own);
         others.fold(LinearRgb::WHITE, |through, (_, card)| {
-            match crossing_uv(&card.plane, p, sample) {
-                Some(uv) => through * card.texel(uv, p).transmittance(),
-                None => through,
-            }
+            card.passes(p, sample)
+                .map_or(through, |passes| through * passes)
         })
     }
 
@@ -254,7 +262,7 @@ fn crossing_uv(plane: &ScenePlane, p: &Vector3<f64>, sample: &LightSample) -> Op
     } else {
         f64::INFINITY
     };
-    (s > 0.0 && s < end && uv.iter().all(|c| (0.0..=1.0).contains(c))).then_some(uv)
+    (s > 0.0 && s < end && is_on_texture(uv)).then_some(uv)
 }
 
 impl<'a> ReferenceCard<'a> {
@@ -299,6 +307,12 @@ impl<'a> ReferenceCard<'a> {
         })
     }
 
+    /// Share of a sample's light that it lets through to a point; none where it is not in the way.
+    fn passes(&self, p: &Vector3<f64>, sample: &LightSample) -> Option<LinearRgb> {
+        let uv = crossing_uv(&self.plane, p, sample)?;
+        Some(self.texel(uv, p).transmittance())
+    }
+
     fn texel(&self, uv: [f64; 2], from: &Vector3<f64>) -> Film {
         card_texel(self.card, &self.plane, uv, from)
     }
@@ -311,9 +325,8 @@ pub(super) fn card_texel(
     [u, v]: [f64; 2],
     from: &Vector3<f64>,
 ) -> Film {
-    let from_behind = plane.normal.dot(&(from - plane.center)) < 0.0;
     let film = match &card.back {
-        Some(back) if from_behind => texture_at(back, 1.0 - u, v),
+        Some(back) if plane.is_seen_from_behind(from) => texture_at(back, 1.0 - u, v),
         _ => texture_at(&card.texture, u, v),
     };
     let grade = &card.grade;
@@ -342,22 +355,36 @@ struct ShadowRatio {
 }
 
 impl ShadowRatio {
+    /// Adds what passes to the surface, and the light there; where no light is, the plate stays as it is.
+    fn add(&mut self, weight: LinearRgb, light: &PointIrradiance) {
+        if light.open == LinearRgb::BLACK {
+            self.outside = self.outside + weight;
+        }
+        self.weight = self.weight + weight;
+        self.open = self.open + weight * light.open;
+        self.shadowed = self.shadowed + weight * light.shadowed;
+    }
+
     fn ratio(&self) -> LinearRgb {
         let [shadowed, open, outside, weight] =
             [self.shadowed, self.open, self.outside, self.weight].map(<[f32; 3]>::from);
         let [r, g, b] = [0, 1, 2].map(|c: usize| {
-            let share = if weight[c] > 0.0 {
-                1.0 - outside[c] / weight[c]
-            } else {
-                0.0
-            };
             let lit = open[c] > 0.0 && shadowed[c] != open[c];
             if lit {
-                1.0 + share * (shadowed[c] / open[c] - 1.0)
+                1.0 + share_inside(outside[c], weight[c]) * (shadowed[c] / open[c] - 1.0)
             } else {
                 1.0
             }
         });
         LinearRgb::new(r, g, b)
+    }
+}
+
+/// Share of a weight that is not outside; 0 for no weight.
+fn share_inside(outside: f32, weight: f32) -> f32 {
+    if weight > 0.0 {
+        1.0 - outside / weight
+    } else {
+        0.0
     }
 }

@@ -42,9 +42,7 @@ impl DetailLevel {
         for (row, line) in rows.iter().zip(out.inner_lines()) {
             let average = averages.average(row);
             for (column, out) in columns.iter().zip(line) {
-                *out = column.weighted().fold(Float4::ZERO, |s, (x, weight)| {
-                    s.add_scaled(weight, average[x])
-                });
+                *out = column.weighted_sum(average);
             }
         }
         out
@@ -92,14 +90,19 @@ impl<'a, P: Copy, F: Fn(P) -> Float4> RowAverages<'a, P, F> {
     fn average(&mut self, rows: &TexelWeights) -> &[Float4] {
         self.sum.fill(Float4::ZERO);
         for (y, weight) in rows.weighted() {
-            for (t, &p) in self.line.iter_mut().zip(self.image.row(y)) {
-                *t = (self.texel)(p);
-            }
+            self.read_line(y);
             for (s, t) in self.sum.iter_mut().zip(&self.line) {
                 *s = s.add_scaled(weight, *t);
             }
         }
         &self.sum
+    }
+
+    #[inline]
+    fn read_line(&mut self, y: usize) {
+        for (t, &p) in self.line.iter_mut().zip(self.image.row(y)) {
+            *t = (self.texel)(p);
+        }
     }
 }
 
@@ -118,19 +121,29 @@ fn downsample_axis(len: usize, step: f64) -> Vec<TexelWeights> {
         .collect()
 }
 
+/// How much of a stretch lies on a texel, as a share of the stretch.
+fn share_of_texel(texel: usize, start: f64, end: f64) -> f32 {
+    let at = texel as f64;
+    (((at + 1.0).min(end) - at.max(start)).max(0.0) / (end - start)) as f32
+}
+
 impl TexelWeights {
     fn new(start: f64, end: f64, len: usize) -> Self {
         let first = (start as usize).min(len - 1);
         let count = ((end.ceil() as usize).min(len) - first).min(3);
-        let weights = [0, 1, 2].map(|n| {
-            let at = (first + n) as f64;
-            (((at + 1.0).min(end) - at.max(start)).max(0.0) / (end - start)) as f32
-        });
+        let weights = [0, 1, 2].map(|n| share_of_texel(first + n, start, end));
         Self {
             first,
             weights,
             count,
         }
+    }
+
+    #[inline(always)]
+    fn weighted_sum(&self, texels: &[Float4]) -> Float4 {
+        self.weighted().fold(Float4::ZERO, |sum, (x, weight)| {
+            sum.add_scaled(weight, texels[x])
+        })
     }
 
     #[inline(always)]

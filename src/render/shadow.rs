@@ -6,8 +6,9 @@ use crate::render::light_samples::LightSample;
 use crate::render::occluders::{Occluder, Occluders};
 use crate::render::opacity::OpacityLevel;
 use crate::render::ranges::{integer_range, ranges_meet};
-use crate::render::texel_grid::TexelLine;
+use crate::render::texel_grid::{TexelLine, texel_line};
 use crate::render::view::{CameraView, LatticeArea, ProjectedPlane, ScenePlane, texture_rows};
+use nalgebra::Matrix3;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -35,7 +36,24 @@ pub(super) struct ShadowedReceiver<'a> {
     pub(super) cell_m: f64,
 }
 
-impl ShadowedReceiver<'_> {
+impl<'a> ShadowedReceiver<'a> {
+    /// Card number `own`, or the surface, where its nodes are as far apart as at `target`.
+    pub(super) fn new(
+        plane: &'a ProjectedPlane,
+        area: &'a LatticeArea,
+        view: &'a CameraView,
+        own: Option<usize>,
+        target: &Vector3<f64>,
+    ) -> Self {
+        Self {
+            plane,
+            area,
+            view,
+            own,
+            cell_m: plane.cell_metres(view, target),
+        }
+    }
+
     /// Offset of its plane along its normal.
     pub(super) fn plane_offset(&self) -> f64 {
         self.plane.normal.dot(&self.view.eye) - self.plane.height
@@ -44,9 +62,11 @@ impl ShadowedReceiver<'_> {
     /// Numbers of the other cards that are at least partly above it.
     pub(super) fn cards_above(&self, occluders: &Occluders<'_>) -> Vec<usize> {
         let (normal, offset) = (&self.plane.normal, self.plane_offset());
-        (0..occluders.cards.len())
-            .filter(|&k| Some(k) != self.own)
-            .filter(|&k| occluders.cards[k].is_above(normal, offset, CONTACT_EPSILON_M))
+        let cards = occluders.cards.iter().enumerate();
+        cards
+            .filter(|&(k, _)| Some(k) != self.own)
+            .filter(|(_, card)| card.is_above(normal, offset, CONTACT_EPSILON_M))
+            .map(|(k, _)| k)
             .collect()
     }
 }
@@ -75,6 +95,22 @@ pub(super) struct TexelReads {
     pub(super) see_through: usize,
     /// Of opaque ones, along their edges.
     pub(super) edges: usize,
+}
+
+impl TexelReads {
+    fn see_through(count: usize) -> Self {
+        Self {
+            see_through: count,
+            edges: 0,
+        }
+    }
+
+    fn at_edges(count: usize) -> Self {
+        Self {
+            see_through: 0,
+            edges: count,
+        }
+    }
 }
 
 impl std::ops::AddAssign for TexelReads {
@@ -119,8 +155,7 @@ impl<'a> ShadowProjection<'a> {
     /// The shadow of a card; none where it misses the receiver.
     pub(super) fn project_card(&self, occluder: &Occluder<'_>) -> Option<ProjectedShadow> {
         let plane = &occluder.plane;
-        let (at, q) = (self.sample.at.xyz(), self.sample.at.w);
-        let toward = plane.normal.dot(&at) - q * plane.normal.dot(&plane.center);
+        let toward = self.height_over(plane);
         if toward.abs() <= CONTACT_EPSILON_M {
             return None;
         }
@@ -132,6 +167,12 @@ impl<'a> ShadowProjection<'a> {
         }
         let map = self.card_map(plane, toward, from_behind);
         Some(map.into_shadow(area, self.receiver.plane.w, opacity))
+    }
+
+    /// Height of the sample over a card's plane, metres (a cosine for a direction); negative behind it.
+    fn height_over(&self, plane: &ScenePlane) -> f64 {
+        let (at, q) = (self.sample.at.xyz(), self.sample.at.w);
+        plane.normal.dot(&at) - q * plane.normal.dot(&plane.center)
     }
 
     fn misses(&self, (rows, columns): &LatticeArea) -> bool {
@@ -158,11 +199,9 @@ impl<'a> ShadowProjection<'a> {
     ///
     /// A square of side b has variance `b^2 / 12`, texels of side t read bilinearly have `t^2 / 4`.
     fn blur_m(&self, plane: &ScenePlane) -> f64 {
-        let lowest = plane
-            .corners()
-            .iter()
-            .map(|corner| self.height_of(corner))
-            .fold(f64::INFINITY, f64::min);
+        let corners = plane.corners();
+        let heights = corners.iter().map(|corner| self.height_of(corner));
+        let lowest = heights.fold(f64::INFINITY, f64::min);
         // Cards that lean on the receiver are sharp where they touch it and blurred at the other end.
         let way = 0.5 * (lowest + self.height_of(&plane.center)) / self.height;
         PENUMBRA_BLUR_SHARE * self.sample.width * way * libm::sqrt(4.0 / 12.0)
@@ -188,10 +227,8 @@ impl<'a> ShadowProjection<'a> {
 
     /// Where the way to the light crosses the surface inside of its sides.
     fn surface_sides(&self, surface: &ScenePlane) -> Vec<Vector3<f64>> {
-        let (point, depth) = (&self.receiver.plane.point, &self.receiver.plane.w);
-        let direction = self.sample.at.xyz();
-        let height = point.transpose() * Vector3::z() / -direction.z;
-        let foot = point + direction * height.transpose();
+        let depth = &self.receiver.plane.w;
+        let foot = self.foot_map();
         let mut sides = vec![*depth];
         for (axis, size) in surface.size.into_iter().enumerate() {
             if size.is_finite() {
@@ -202,6 +239,14 @@ impl<'a> ShadowProjection<'a> {
         sides
     }
 
+    /// From the lattice to the point of `z = 0` on the way from the light, times depth.
+    fn foot_map(&self) -> Matrix3<f64> {
+        let point = &self.receiver.plane.point;
+        let direction = self.sample.at.xyz();
+        let height = point.transpose() * Vector3::z() / -direction.z;
+        point + direction * height.transpose()
+    }
+
     /// The light comes from below the surface.
     pub(super) fn comes_from_below(&self) -> bool {
         self.receiver.own.is_some() && self.sample.at.w == 0.0 && self.sample.at.z < 0.0
@@ -210,17 +255,23 @@ impl<'a> ShadowProjection<'a> {
     /// Part of the lattice that a shadow lies in: bounds of the four corners projected onto the receiver.
     fn shadow_area(&self, plane: &ScenePlane) -> LatticeArea {
         let view = self.receiver.view;
-        let mut projected = plane.corners();
-        for corner in &mut projected {
-            let h = self.receiver.plane.normal.dot(corner) - self.plane_offset;
-            let fall = self.height - self.sample.at.w * h;
-            // A corner beside or above the light throws its shadow away from the receiver, the others without end.
-            if fall <= 1e-6 * self.height {
-                return view.whole_area();
+        let mut corners = plane.corners();
+        for corner in &mut corners {
+            match self.shadow_of(corner) {
+                Some(point) => *corner = point,
+                None => return view.whole_area(),
             }
-            *corner = (*corner * self.height - self.sample.at.xyz() * h) / fall;
         }
-        view.area_around(&projected)
+        view.area_around(&corners)
+    }
+
+    /// Where a point throws its shadow on the receiver's plane; none for one beside or above the light, whose shadow falls
+    /// away from it, while those around it fall without end.
+    fn shadow_of(&self, point: &Vector3<f64>) -> Option<Vector3<f64>> {
+        let h = self.receiver.plane.normal.dot(point) - self.plane_offset;
+        let fall = self.height - self.sample.at.w * h;
+        let below = fall > 1e-6 * self.height;
+        below.then(|| (*point * self.height - self.sample.at.xyz() * h) / fall)
     }
 }
 
@@ -274,26 +325,21 @@ impl ProjectedShadow {
             return TexelReads::default();
         };
         let line = self.texel_line(j, nodes);
-        let Some(dark) = self.dark_nodes(j, nodes) else {
+        if let Some(dark) = self.dark_nodes(j, nodes) {
+            through[dark.clone()].fill(0.0);
+            opacity.attenuate(channel, &line, 0, &mut through[..dark.start]);
+            opacity.attenuate(channel, &line, dark.end, &mut through[dark.end..]);
+            TexelReads::at_edges(nodes.len() - dark.len())
+        } else {
             opacity.attenuate(channel, &line, 0, through);
-            return TexelReads {
-                see_through: nodes.len(),
-                edges: 0,
-            };
-        };
-        through[dark.clone()].fill(0.0);
-        opacity.attenuate(channel, &line, 0, &mut through[..dark.start]);
-        opacity.attenuate(channel, &line, dark.end, &mut through[dark.end..]);
-        TexelReads {
-            see_through: 0,
-            edges: nodes.len() - dark.len(),
+            TexelReads::see_through(nodes.len())
         }
     }
 
     /// Positions among the texels along a row, from the first of the nodes on.
     fn texel_line(&self, j: usize, nodes: &Range<usize>) -> TexelLine {
         let first = Vector3::new(nodes.start as f64, j as f64, 1.0);
-        [self.u, self.v, self.w].map(|row| (row.dot(&first) as f32, row.x as f32))
+        texel_line([self.u, self.v, self.w], &first)
     }
 
     /// Where an opaque card surely lets nothing through, counted from the first of the nodes.

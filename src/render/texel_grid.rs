@@ -55,7 +55,13 @@ impl TexelGrid {
 /// Positions along a line over bordered texels: numbers that grow evenly, the third the divisor of the others.
 pub(super) type TexelLine = [(f32, f32); 3];
 
+/// The line from `first` on, one step to the right at a time; `u`, `v` and `w` give positions among bordered texels.
+pub(super) fn texel_line(rows: [Vector3<f64>; 3], first: &Vector3<f64>) -> TexelLine {
+    rows.map(|row| (row.dot(first) as f32, row.x as f32))
+}
+
 /// Bilinear cells that a run of samples falls into: index of the first of the four texels, and the way to the others.
+#[derive(Default)]
 pub(super) struct BilinearCells {
     pub(super) at: [u32; SIMD_LANES],
     pub(super) fx: [f32; SIMD_LANES],
@@ -70,15 +76,8 @@ impl BilinearCells {
         first: f32,
         (width, height): (usize, usize),
     ) -> Self {
-        let mut cells = Self {
-            at: [0; SIMD_LANES],
-            fx: [0.0; SIMD_LANES],
-            fy: [0.0; SIMD_LANES],
-        };
-        let last = [
-            width as f32 - 1.0 - INSET_TEXELS,
-            height as f32 - 1.0 - INSET_TEXELS,
-        ];
+        let mut cells = Self::default();
+        let last = [width, height].map(|texels| texels as f32 - 1.0 - INSET_TEXELS);
         let stride = width as u32;
         for lane in 0..SIMD_LANES {
             let k = first + lane as f32;

@@ -47,7 +47,14 @@ impl BakedTexture {
 
     fn apply_grade(&mut self, grade: &Grade) {
         grade_colors(&mut self.texels, grade);
-        // Film of another hue lets another hue pass; how bright it reflects does not change what passes.
+        self.grade_opacity(grade);
+        for (t, o) in self.texels.iter_mut().zip(&self.opacity) {
+            t.0[3] = channel_mean(o.rgb());
+        }
+    }
+
+    /// Film of another hue lets another hue pass; how bright it reflects does not change what passes.
+    fn grade_opacity(&mut self, grade: &Grade) {
         let through = Grade {
             value: 1.0,
             ..*grade
@@ -56,9 +63,6 @@ impl BakedTexture {
             for o in self.opacity.iter_mut().filter(|o| **o != Float4::ZERO) {
                 *o = graded_opacity(o.rgb(), &through).into();
             }
-        }
-        for (t, o) in self.texels.iter_mut().zip(&self.opacity) {
-            t.0[3] = channel_mean(o.rgb());
         }
     }
 }

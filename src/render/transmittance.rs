@@ -8,6 +8,8 @@ use crate::render::float4::Float4;
 use crate::render::grade::channel_mean;
 use crate::render::irradiance::IrradianceMap;
 use crate::render::lattice::LatticePosition;
+use crate::render::ranges::range_union;
+use crate::render::refill;
 use crate::render::texel_grid::{BilinearCells, SIMD_LANES, TexelLine};
 use crate::render::texture::BakedTexture;
 use crate::work::Kind;
@@ -39,7 +41,7 @@ pub(super) struct LayerRow {
     /// Light on it at the sub-samples under work, where that is not the pixel's.
     irradiance: Vec<Float4>,
     /// Texture readings, and light looked up, for all rows so far.
-    pub(super) read: usize,
+    read: usize,
     /// See `read`.
     pub(super) lit: usize,
 }
@@ -71,13 +73,15 @@ impl LayerRow {
     pub(super) fn start(&mut self, n: usize, tinted: bool) {
         self.touched = 0..0;
         self.irradiance.clear();
-        for fours in [&mut self.light, &mut self.hidden] {
-            fours.clear();
-        }
-        self.light.resize(n, Float4::ZERO);
-        self.hidden.resize(if tinted { n } else { 0 }, Float4::ZERO);
-        self.alpha.clear();
-        self.alpha.resize(n, 0.0);
+        refill(&mut self.light, n, Float4::ZERO);
+        refill(&mut self.hidden, if tinted { n } else { 0 }, Float4::ZERO);
+        refill(&mut self.alpha, n, 0.0);
+    }
+
+    /// Notes that some pixels' sub-samples read the layer's texture.
+    pub(super) fn touch(&mut self, pixels: &Range<usize>) {
+        self.touched = range_union(self.touched.clone(), pixels.clone());
+        self.read += pixels.len();
     }
 
     /// What pixel `i` of the layer hides of all behind it, per channel, added up over sub-samples.
@@ -190,6 +194,8 @@ fn pass_grey(
 }
 
 /// A layer where there is film; `through` and `hidden` are a number for each channel.
+///
+/// Dense since it is the innermost loop where there is film: all that it reads and writes is at hand in one piece.
 fn pass_tinted(
     texture: &BakedTexture,
     line: &TexelLine,

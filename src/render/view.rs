@@ -32,23 +32,42 @@ impl ScenePlane {
     /// A card's plane; none for a card without area or place.
     pub(super) fn from_card(card: &Card) -> Option<Self> {
         let pose = &card.quad.world_from_card;
-        let [w, h] = card.quad.size;
-        let has_area = w > 0.0 && h > 0.0 && w * h > GEOMETRY_EPSILON && (w * h).is_finite();
-        let [x, y, normal] =
-            [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| pose.rotation * axis);
+        let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
+        let [x, y, normal] = axes.map(|axis| pose.rotation * axis);
         let plane = Self {
             center: pose.translation.vector,
             x,
             y,
             normal,
-            size: [w, h],
+            size: card.quad.size,
         };
-        (has_area && plane.is_finite()).then_some(plane)
+        (plane.has_area() && plane.is_finite()).then_some(plane)
+    }
+
+    fn has_area(&self) -> bool {
+        let [w, h] = self.size;
+        w > 0.0 && h > 0.0 && w * h > GEOMETRY_EPSILON && (w * h).is_finite()
     }
 
     fn is_finite(&self) -> bool {
         let vectors = [&self.x, &self.y, &self.normal, &self.center];
         vectors.iter().all(|v| v.iter().all(|c| c.is_finite()))
+    }
+
+    /// The normal on the side of a point, and how far the point is from the plane.
+    fn side_of(&self, point: &Vector3<f64>) -> (Vector3<f64>, f64) {
+        let above = self.normal.dot(&(point - self.center));
+        if above >= 0.0 {
+            (self.normal, above)
+        } else {
+            (-self.normal, -above)
+        }
+    }
+
+    /// A point sees its back.
+    #[inline]
+    pub(super) fn is_seen_from_behind(&self, point: &Vector3<f64>) -> bool {
+        self.normal.dot(&(point - self.center)) < 0.0
     }
 
     /// The plane `z = 0` as far as it receives shadows.
@@ -131,10 +150,13 @@ impl CameraView {
     ) -> Option<[Vector3<f64>; N]> {
         let picture_from_world = self.ray.try_inverse()?;
         let seen = world.map(|point| picture_from_world * (point - self.eye));
-        let in_front = seen
-            .iter()
-            .all(|p| p.z > GEOMETRY_EPSILON && p.iter().all(|c| c.is_finite()));
+        let in_front = seen.iter().all(is_in_front);
         in_front.then(|| seen.map(|p| p / p.z))
+    }
+
+    /// Picture position `(x, y, 1)` of the middle.
+    fn middle_px(&self) -> Vector3<f64> {
+        Vector3::new(0.5 * self.width as f64, 0.5 * self.height as f64, 1.0)
     }
 
     /// All rows and columns.
@@ -147,13 +169,27 @@ impl CameraView {
         let Some(px) = self.project_points(points) else {
             return self.whole_area();
         };
-        let [columns, rows] = [(0, self.width), (1, self.height)].map(|(axis, count)| {
-            let low = px.iter().map(|p| p[axis]).fold(f64::INFINITY, f64::min);
-            let high = px.iter().map(|p| p[axis]).fold(f64::NEG_INFINITY, f64::max);
-            integer_range(low - 2.0, high + 2.0, &(0..count))
-        });
+        let columns = range_around(px.map(|p| p.x), self.width);
+        let rows = range_around(px.map(|p| p.y), self.height);
         (rows, columns)
     }
+}
+
+fn is_in_front(p: &Vector3<f64>) -> bool {
+    p.z > GEOMETRY_EPSILON && p.iter().all(|c| c.is_finite())
+}
+
+/// The integers below `count` between some numbers, and one more on each side.
+fn range_around(numbers: [f64; 4], count: usize) -> Range<usize> {
+    let low = numbers.into_iter().fold(f64::INFINITY, f64::min);
+    let high = numbers.into_iter().fold(f64::NEG_INFINITY, f64::max);
+    integer_range(low - 2.0, high + 2.0, &(0..count))
+}
+
+/// Centre of a pixel, as `(x, y, 1)`.
+#[inline]
+pub(super) fn pixel_center(x: usize, y: usize) -> Vector3<f64> {
+    Vector3::new(x as f64 + 0.5, y as f64 + 0.5, 1.0)
 }
 
 /// Rows and columns of the lattice, or pixels of a picture.
@@ -204,12 +240,7 @@ pub(super) struct ProjectedPlane {
 impl ProjectedPlane {
     /// None for a plane seen edge-on.
     pub(super) fn new(plane: &ScenePlane, view: &CameraView) -> Option<Self> {
-        let above = plane.normal.dot(&(view.eye - plane.center));
-        let (normal, height) = if above >= 0.0 {
-            (plane.normal, above)
-        } else {
-            (-plane.normal, -above)
-        };
+        let (normal, height) = plane.side_of(&view.eye);
         let w = -(view.ray.transpose() * normal);
         let point = view.eye * w.transpose() + view.ray * height;
         let [u, v] = texture_rows(plane, &point, &w);
@@ -223,15 +254,27 @@ impl ProjectedPlane {
         })
     }
 
+    /// None for a plane that is not seen from above, either.
+    pub(super) fn from_above(plane: &ScenePlane, view: &CameraView) -> Option<Self> {
+        Self::new(plane, view).filter(|plane| plane.normal.z > 0.0)
+    }
+
     /// Side of the square that a pixel (or lattice cell) covers on the plane's plane, metres, where it shows `target`; in
     /// the middle of the picture where that is behind the eye.
     pub(super) fn cell_metres(&self, view: &CameraView, target: &Vector3<f64>) -> f64 {
-        let middle = Vector3::new(0.5 * view.width as f64, 0.5 * view.height as f64, 1.0);
-        let p = view.project_points(&[*target]).map_or(middle, |[p]| p);
+        let seen = view.project_points(&[*target]);
+        let p = seen.map_or(view.middle_px(), |[p]| p);
         let w = self.w.dot(&p).max(self.height / HORIZON_M);
         let point = self.point * p / w;
-        let along = |k: usize| (self.point.column(k) - point * self.w[k]) / w;
-        along(0).cross(&along(1)).norm().sqrt()
+        let [along_x, along_y] =
+            [0, 1].map(|k: usize| (self.point.column(k) - point * self.w[k]) / w);
+        along_x.cross(&along_y).norm().sqrt()
+    }
+
+    /// The world point at a pixel position `(x, y, 1)`; none behind the eye.
+    pub(super) fn point_at(&self, p: &Vector3<f64>) -> Option<Vector3<f64>> {
+        let w = self.w.dot(p);
+        (w > 0.0).then(|| self.point * p / w)
     }
 
     /// Texture coordinates and depth at a pixel position; none outside the plane or behind the eye.
@@ -239,9 +282,14 @@ impl ProjectedPlane {
         let p = Vector3::new(x, y, 1.0);
         let w = self.w.dot(&p);
         let uv = [self.u.dot(&p) / w, self.v.dot(&p) / w];
-        let inside = uv.iter().all(|c| (0.0..=1.0).contains(c));
-        (w > 0.0 && inside).then_some((uv, self.height / w))
+        (w > 0.0 && is_on_texture(uv)).then_some((uv, self.height / w))
     }
+}
+
+/// Texture coordinates are those of a point of the texture.
+#[inline]
+pub(super) fn is_on_texture(uv: [f64; 2]) -> bool {
+    uv.iter().all(|c| (0.0..=1.0).contains(c))
 }
 
 /// Rows of the texture coordinates' numerators, for points `point * p / w.p` of a plane's plane.
@@ -250,10 +298,11 @@ pub(super) fn texture_rows(
     point: &Matrix3<f64>,
     w: &Vector3<f64>,
 ) -> [Vector3<f64>; 2] {
-    let along = |axis: &Vector3<f64>| point.transpose() * axis - w * axis.dot(&plane.center);
     let [a, b] = plane.size;
     if a.is_finite() && b.is_finite() {
-        [along(&plane.x) / a + w * 0.5, w * 0.5 - along(&plane.y) / b]
+        let [x, y] =
+            [plane.x, plane.y].map(|axis| point.transpose() * axis - w * axis.dot(&plane.center));
+        [x / a + w * 0.5, w * 0.5 - y / b]
     } else {
         // An endless plane has no edges: everything is its middle.
         [w * 0.5, w * 0.5]

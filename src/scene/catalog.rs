@@ -37,17 +37,18 @@ pub fn catalog(library: &Library) -> Vec<AssetVariant> {
 
 impl From<&Asset<Photo>> for AssetVariant {
     fn from(asset: &Asset<Photo>) -> Self {
-        let photos = || asset.photos.iter();
         Self {
             asset: asset.name.clone(),
-            photo_sizes: photos().map(Photo::size).collect(),
-            photo_outlines: photos()
-                .map(|photo| prism_outline(&photo.outline_uv, photo.size()))
-                .collect(),
+            photo_sizes: asset.photos.iter().map(Photo::size).collect(),
+            photo_outlines: asset.photos.iter().map(collider_outline).collect(),
             thickness: asset.thickness,
             mass: asset.mass,
         }
     }
+}
+
+fn collider_outline(photo: &Photo) -> Vec<[f64; 2]> {
+    prism_outline(&photo.outline_uv, photo.size())
 }
 
 impl Appearance {

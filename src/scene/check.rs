@@ -31,15 +31,19 @@ impl Scene {
         check_camera(&self.camera)?;
         check_count(self.objects.len(), "objects", MAX_OBJECTS)?;
         check_each(&self.objects, "objects", check_object)?;
+        self.check_lights()?;
+        self.finish.check("finish")?;
+        check_exposure(self.exposure)
+    }
+
+    fn check_lights(&self) -> Result<()> {
         check_count(self.lights.len(), "lights", MAX_LIGHTS)?;
         check_each(&self.lights, "lights", check_light)?;
         check_color(self.ambient, "ambient")?;
         if let Some(map) = &self.environment {
             map.check("environment")?;
         }
-        check_cast(&self.cast)?;
-        self.finish.check("finish")?;
-        check_exposure(self.exposure)
+        check_cast(&self.cast)
     }
 }
 
@@ -49,6 +53,11 @@ fn expect(claim: bool, at: &str, found: impl Debug, expected: impl Display) -> R
     } else {
         Err(Error::value(at, format!("{found:?}, expected {expected}")))
     }
+}
+
+/// Path of a field of something: `objects[3].size`.
+pub(super) fn field(at: &str, name: &str) -> String {
+    format!("{at}.{name}")
 }
 
 /// Checks every item of a list by its path: `lights[2]`.
@@ -111,8 +120,8 @@ fn check_rotation(rotation: &UnitQuaternion<f64>, at: &str) -> Result<()> {
 
 fn check_pose(pose: &Pose, at: &str) -> Result<()> {
     let translation = pose.translation.vector;
-    check_within(translation.as_slice(), &format!("{at}.translation"), &PLACE)?;
-    check_rotation(&pose.rotation, &format!("{at}.rotation"))
+    check_within(translation.as_slice(), &field(at, "translation"), &PLACE)?;
+    check_rotation(&pose.rotation, &field(at, "rotation"))
 }
 
 pub(super) fn check_cast(cast: &LightTint) -> Result<()> {
@@ -141,13 +150,18 @@ fn check_camera(camera: &CameraSource) -> Result<()> {
             photo,
             focal_px,
         } => {
-            let corners = corners_px.as_flattened();
-            check_within(corners, "camera.rectangle.corners_px", &PIXEL)?;
-            let sides = photo.map(f64::from);
-            check_within(&sides, "camera.rectangle.photo", &PHOTO_SIDE)?;
+            check_label(corners_px, *photo)?;
             focal_px.map_or(Ok(()), |f| FOCAL.check("camera.rectangle.focal_px", f))
         }
     }
+}
+
+/// The corners of a rectangle in a photo of this size.
+fn check_label(corners_px: &[[f64; 2]; 4], photo: [u32; 2]) -> Result<()> {
+    let corners = corners_px.as_flattened();
+    check_within(corners, "camera.rectangle.corners_px", &PIXEL)?;
+    let sides = photo.map(f64::from);
+    check_within(&sides, "camera.rectangle.photo", &PHOTO_SIDE)
 }
 
 fn check_known_camera(camera: &Camera) -> Result<()> {
@@ -161,38 +175,33 @@ fn check_known_camera(camera: &Camera) -> Result<()> {
 }
 
 fn check_object(object: &Object, at: &str) -> Result<()> {
-    let field = |name: &str| format!("{at}.{name}");
-    expect(
-        !object.asset.is_empty(),
-        &field("asset"),
-        &object.asset,
-        "the name of an asset",
-    )?;
-    check_within(&object.size, &field("size"), &LENGTH)?;
-    LENGTH.check(&field("thickness"), object.thickness)?;
-    check_outline(&object.outline, object.size, &field("outline"))?;
-    MASS.check(&field("mass"), object.mass)?;
-    check_grade(&object.grade, &field("grade"))?;
-    check_placement(&object.placement, &field("placement"))
+    let (asset, is_named) = (&object.asset, !object.asset.is_empty());
+    expect(is_named, &field(at, "asset"), asset, "the name of an asset")?;
+    check_within(&object.size, &field(at, "size"), &LENGTH)?;
+    LENGTH.check(&field(at, "thickness"), object.thickness)?;
+    check_outline(&object.outline, object.size, &field(at, "outline"))?;
+    MASS.check(&field(at, "mass"), object.mass)?;
+    check_grade(&object.grade, &field(at, "grade"))?;
+    check_placement(&object.placement, &field(at, "placement"))
 }
 
 fn check_grade(grade: &Grade, at: &str) -> Result<()> {
-    TURN.check(&format!("{at}.hue_deg"), grade.hue_deg.into())?;
-    GRADE.check(&format!("{at}.saturation"), grade.saturation.into())?;
-    GRADE.check(&format!("{at}.value"), grade.value.into())
+    TURN.check(&field(at, "hue_deg"), grade.hue_deg.into())?;
+    GRADE.check(&field(at, "saturation"), grade.saturation.into())?;
+    GRADE.check(&field(at, "value"), grade.value.into())
 }
 
 fn check_placement(placement: &Placement, at: &str) -> Result<()> {
     match placement {
-        Placement::At(pose) => check_pose(pose, &format!("{at}.at")),
+        Placement::At(pose) => check_pose(pose, &field(at, "at")),
         Placement::Drop {
             above,
             height,
             rotation,
         } => {
-            check_within(above, &format!("{at}.drop.above"), &PLACE)?;
-            LENGTH.check(&format!("{at}.drop.height"), *height)?;
-            check_rotation(rotation, &format!("{at}.drop.rotation"))
+            check_within(above, &field(at, "drop.above"), &PLACE)?;
+            LENGTH.check(&field(at, "drop.height"), *height)?;
+            check_rotation(rotation, &field(at, "drop.rotation"))
         }
     }
 }
@@ -201,9 +210,7 @@ fn check_placement(placement: &Placement, at: &str) -> Result<()> {
 fn check_outline(outline: &[[f64; 2]], size: [f64; 2], at: &str) -> Result<()> {
     check_count(outline.len(), at, MAX_OUTLINE_CORNERS)?;
     let is_polygon = outline.len() != 1 && outline.len() != 2;
-    let is_inside = outline.iter().all(|corner| {
-        (0..2).all(|axis| corner[axis].abs() <= size[axis] * (0.5 + OUTLINE_TOLERANCE))
-    });
+    let is_inside = outline.iter().all(|corner| is_on_card(corner, size));
     let is_convex = (0..outline.len()).all(|i| doubled_corner_area(outline, i) > 0.0);
     expect(
         is_polygon && is_inside && is_convex,
@@ -213,19 +220,22 @@ fn check_outline(outline: &[[f64; 2]], size: [f64; 2], at: &str) -> Result<()> {
     )
 }
 
+fn is_on_card(corner: &[f64; 2], size: [f64; 2]) -> bool {
+    (0..2).all(|axis| corner[axis].abs() <= size[axis] * (0.5 + OUTLINE_TOLERANCE))
+}
+
 fn check_light(light: &AreaLight, at: &str) -> Result<()> {
-    let field = |name: &str| format!("{at}.{name}");
-    check_within(&light.position, &field("position"), &PLACE)?;
-    check_within(&light.target, &field("target"), &PLACE)?;
+    check_within(&light.position, &field(at, "position"), &PLACE)?;
+    check_within(&light.target, &field(at, "target"), &PLACE)?;
     expect(
         light.position != light.target,
-        &field("target"),
+        &field(at, "target"),
         light.target,
         "another point than its position",
     )?;
-    check_within(&light.size, &field("size"), &LENGTH)?;
-    RADIANCE.check(&field("power"), light.power)?;
-    check_color(light.color, &field("color"))
+    check_within(&light.size, &field(at, "size"), &LENGTH)?;
+    RADIANCE.check(&field(at, "power"), light.power)?;
+    check_color(light.color, &field(at, "color"))
 }
 
 #[cfg(test)]

@@ -30,16 +30,10 @@ impl SceneFiles {
     /// # Errors
     /// Without a working folder.
     pub fn moved(&self, from: &Path, to: &Path) -> Result<Self> {
-        let folder = from.parent().unwrap_or(Path::new(""));
-        let moved = |path: &Option<PathBuf>| {
-            path.as_ref()
-                .map(|path| relative_to_file(&folder.join(path), to))
-                .transpose()
-        };
         Ok(Self {
-            assets: moved(&self.assets)?,
-            backgrounds: moved(&self.backgrounds)?,
-            environments: moved(&self.environments)?,
+            assets: moved_path(self.assets.as_deref(), from, to)?,
+            backgrounds: moved_path(self.backgrounds.as_deref(), from, to)?,
+            environments: moved_path(self.environments.as_deref(), from, to)?,
         })
     }
 }
@@ -51,13 +45,33 @@ pub(crate) fn relative_to_file(path: &Path, file: &Path) -> Result<PathBuf> {
     Ok(io::relative(&absolute(path)?, folder))
 }
 
-/// The path from the root. `..` is resolved on the disk, since a link may stand before it.
+/// The path from the root. `..` is resolved on the disk where the path is there, since a link may stand before it.
 fn absolute(path: &Path) -> Result<PathBuf> {
     let climbs = path.components().any(|step| step == Component::ParentDir);
     match path.canonicalize() {
         Ok(resolved) if climbs => Ok(resolved),
-        _ => std::path::absolute(path).map_err(|e| Error::file(path, e)),
+        _ => std::path::absolute(path)
+            .map(|path| without_parent_steps(&path))
+            .map_err(|e| Error::file(path, e)),
     }
+}
+
+fn without_parent_steps(path: &Path) -> PathBuf {
+    path.components().fold(PathBuf::new(), |mut steps, step| {
+        if step == Component::ParentDir {
+            steps.pop();
+        } else {
+            steps.push(step);
+        }
+        steps
+    })
+}
+
+/// A path that is named in one file as it is named in another.
+fn moved_path(path: Option<&Path>, from: &Path, to: &Path) -> Result<Option<PathBuf>> {
+    let folder = from.parent().unwrap_or(Path::new(""));
+    path.map(|path| relative_to_file(&folder.join(path), to))
+        .transpose()
 }
 
 /// Values of a recipe that a scene's picture and labels are made with, by the recipe's keys

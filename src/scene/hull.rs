@@ -19,14 +19,18 @@ pub(super) fn prism_outline(outline_uv: &[Point2<f64>], size: [f64; 2]) -> Vec<[
     if doubled_area(&ring) < 0.0 {
         ring.reverse();
     }
-    let [w, h] = size;
-    while let Some((least, area)) = least_corner(&ring) {
-        if ring.len() <= MAX_CORNERS && area > MIN_CORNER_AREA_RATIO * w * h {
+    remove_least_corners(&mut ring, MIN_CORNER_AREA_RATIO * size[0] * size[1]);
+    if ring.len() < 3 { Vec::new() } else { ring }
+}
+
+/// Removes corners until [`MAX_CORNERS`] are left, and those of up to this area.
+fn remove_least_corners(ring: &mut Vec<[f64; 2]>, straight_area: f64) {
+    while let Some((least, area)) = least_corner(ring) {
+        if ring.len() <= MAX_CORNERS && area > straight_area {
             break;
         }
         ring.remove(least);
     }
-    if ring.len() < 3 { Vec::new() } else { ring }
 }
 
 /// A point of the texture in the plane of its card, metres.
@@ -50,7 +54,8 @@ pub(super) fn doubled_corner_area(ring: &[[f64; 2]], i: usize) -> f64 {
     (b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0])
 }
 
-fn doubled_area(ring: &[[f64; 2]]) -> f64 {
+/// Twice the area of a ring; above 0 where it turns left.
+pub(crate) fn doubled_area(ring: &[[f64; 2]]) -> f64 {
     let next = ring.iter().cycle().skip(1);
     ring.iter()
         .zip(next)

@@ -37,6 +37,7 @@
 pub(crate) mod bounds;
 mod catalog;
 mod check;
+#[doc(hidden)]
 pub mod cycles;
 mod draw;
 mod environment;
@@ -55,25 +56,43 @@ mod stack;
 mod take;
 mod variation;
 
-pub use catalog::{AssetVariant, Background, catalog};
-pub use draw::{Distribution, DrawLog, Drawn, Draws};
+pub use catalog::Background;
+#[doc(hidden)]
+pub use catalog::{AssetVariant, catalog};
+pub use draw::Distribution;
+#[doc(hidden)]
+pub use draw::{DrawLog, Drawn, Draws};
+#[doc(hidden)]
+pub use environment::EnvironmentRanges;
 pub(crate) use environment::turned;
-pub use environment::{Environment, EnvironmentMap, EnvironmentRanges};
-pub use fall::{SettleMode, SettleOptions};
+pub use environment::{Environment, EnvironmentMap};
+#[doc(hidden)]
+pub use fall::SettleMode;
+pub use fall::SettleOptions;
 #[cfg(feature = "settle")]
 pub(crate) use fall::{half_extent, level};
 pub(crate) use files::relative_to_file;
 pub use files::{SceneFiles, SceneSettings};
+#[cfg(feature = "settle")]
+pub(crate) use hull::doubled_area;
 pub use light::{AreaLight, Exposure, LightShape, LightTint};
 pub use locate::locate;
 pub use placement::{Grade, Object, Placement};
-pub use post_process::{Noise, PostProcess, PostProcessRanges, white_balance};
+pub use post_process::{Noise, PostProcess};
+#[doc(hidden)]
+pub use post_process::{PostProcessRanges, white_balance};
 pub use range::Range;
-pub use recipe::{Collider, GradeRanges, LightRanges, Recipe, Selections};
-pub use resolve::{Appearance, CATCHER_RATIO};
+pub use recipe::{Collider, Recipe};
+#[doc(hidden)]
+pub use recipe::{GradeRanges, LightRanges, Selections};
+pub use resolve::Appearance;
+pub(crate) use resolve::CATCHER_RATIO;
 pub use shot::{Card, Shot};
+#[doc(hidden)]
 pub use stack::DropRanges;
+#[doc(hidden)]
 pub use take::Take;
+#[doc(hidden)]
 pub use variation::{Ablation, Variation};
 
 use crate::camera::Camera;

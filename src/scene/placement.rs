@@ -32,6 +32,18 @@ pub struct Object {
     pub grade: Grade,
 }
 
+impl Object {
+    /// Makes it larger by a factor, its mass with its volume.
+    pub(super) fn scale_by(&mut self, factor: f64) {
+        self.size = self.size.map(|length| length * factor);
+        for corner in &mut self.outline {
+            *corner = corner.map(|length| length * factor);
+        }
+        self.thickness *= factor;
+        self.mass *= factor * factor * factor;
+    }
+}
+
 /// Where an object is, or how it gets there.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]

@@ -4,6 +4,7 @@ use crate::color::planckian;
 use crate::error::{Error, Result};
 use crate::pixel::LinearRgb;
 use crate::scene::bounds::{EV, GAIN, KELVIN, NOISE, SHARPENING};
+use crate::scene::check::field;
 use crate::scene::{Draws, Range};
 use serde::{Deserialize, Serialize};
 
@@ -71,16 +72,20 @@ impl PostProcess {
 
     /// Fails on the first impossible value.
     pub(super) fn check(&self, at: &str) -> Result<()> {
-        let field = |name: &str| format!("{at}.{name}");
-        EV.check(&field("exposure_ev"), self.exposure_ev)?;
-        let gains: [f32; 3] = self.white_balance.into();
-        if !gains.iter().all(|gain| GAIN.contains((*gain).into())) {
-            let what = format!("{gains:?}, expected three numbers of {GAIN}");
-            return Err(Error::value(field("white_balance"), what));
-        }
-        SHARPENING.check(&field("sharpening"), self.sharpening)?;
-        self.noise.check(&field("noise"))
+        EV.check(&field(at, "exposure_ev"), self.exposure_ev)?;
+        check_gains(self.white_balance, &field(at, "white_balance"))?;
+        SHARPENING.check(&field(at, "sharpening"), self.sharpening)?;
+        self.noise.check(&field(at, "noise"))
     }
+}
+
+fn check_gains(gains: LinearRgb, at: &str) -> Result<()> {
+    let gains: [f32; 3] = gains.into();
+    if gains.iter().all(|gain| GAIN.contains((*gain).into())) {
+        return Ok(());
+    }
+    let what = format!("{gains:?}, expected three numbers of {GAIN}");
+    Err(Error::value(at, what))
 }
 
 impl Noise {
@@ -127,12 +132,16 @@ impl PostProcessRanges {
             exposure_ev: self.exposure_ev.draw(draws, "finish.exposure_ev"),
             white_balance: white_balance(self.white_k.draw(draws, "finish.white_k")),
             noise: self.noise,
-            noise_seed: if self.noise == Noise::None {
-                0
-            } else {
-                draws.bits("finish.noise") >> 11
-            },
+            noise_seed: self.draw_noise_seed(draws),
             sharpening: self.sharpening.draw(draws, "finish.sharpening"),
+        }
+    }
+
+    fn draw_noise_seed(&self, draws: &Draws) -> u64 {
+        if self.noise == Noise::None {
+            0
+        } else {
+            draws.bits("finish.noise") >> 11
         }
     }
 

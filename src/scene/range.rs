@@ -66,6 +66,11 @@ impl Range {
         value
     }
 
+    /// The value of a field at a path.
+    pub(super) fn draw_field(&self, draws: &Draws, path: &str, field: &str) -> f64 {
+        self.draw(draws, &format!("{path}.{field}"))
+    }
+
     /// The integer at a path, every one of `min..=max` equally likely.
     pub fn draw_count(&self, draws: &Draws, path: &str) -> usize {
         let count = self.min as usize + draws.below(path, (self.max - self.min) as usize + 1);
@@ -86,10 +91,13 @@ impl Range {
         if min < max && bounds.contains(min) && bounds.contains(max) {
             return Ok(());
         }
-        let found = format!("[{}, {}]", number(min), number(max));
-        let question = bounds.question(max);
-        let what = format!("{found}, expected [min, max] within {bounds}{question}");
-        Err(Error::value(at, what))
+        Err(Error::value(at, self.problem(bounds)))
+    }
+
+    fn problem(&self, bounds: &Bounds) -> String {
+        let (min, max) = (number(self.min), number(self.max));
+        let question = bounds.question(self.max);
+        format!("[{min}, {max}], expected [min, max] within {bounds}{question}")
     }
 
     /// Fails unless both ends are integers within bounds.

@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 /// Extent of the plane that shadows fall on, as a multiple of the surface's sides: that of the
 /// reference scenes.
-pub const CATCHER_RATIO: f64 = 3.0;
+pub(crate) const CATCHER_RATIO: f64 = 3.0;
 
 /// What an object looks like: all that a shot needs from its asset.
 #[derive(Clone, Debug)]
@@ -29,13 +29,31 @@ pub struct Appearance {
     pub outline_uv: Arc<[Point2<f64>]>,
 }
 
+impl Appearance {
+    /// An object that looks so, at rest at this pose (`world_from_card`).
+    fn into_card(self, id: ObjectId, object: &Object, world_from_card: Pose) -> Card {
+        Card {
+            id,
+            class: self.class,
+            quad: Quad {
+                world_from_card,
+                size: object.size,
+            },
+            texture: self.texture,
+            back: self.back,
+            outline_uv: self.outline_uv,
+            grade: object.grade,
+        }
+    }
+}
+
 impl Scene {
     /// The shot that this scene describes, once nothing is unknown in it.
     ///
     /// `look` finds an object's asset and photo, or nothing; for a library that is
     /// [`Appearance::from_library`]. `plate` is the background at the picture's size; none leaves it
     /// transparent. `panorama` is the picture that the scene's environment names. Object `i` gets id
-    /// `i + 1`; the shadow catcher is the plane of the labelled surface, [`CATCHER_RATIO`] times as
+    /// `i + 1`; the shadow catcher is the plane of the labelled surface, `CATCHER_RATIO` times as
     /// large.
     ///
     /// # Errors
@@ -71,42 +89,28 @@ impl Scene {
         let numbered = self.objects.iter().enumerate();
         numbered
             .map(|(i, object)| {
-                let world_from_card = rest_pose(i, object)?;
+                let pose = rest_pose(i, object)?;
                 let look = look(object).ok_or_else(|| unknown_asset(i, object))?;
-                Ok(Card {
-                    id: ObjectId(object_id(i)?),
-                    class: look.class,
-                    quad: Quad {
-                        world_from_card,
-                        size: object.size,
-                    },
-                    texture: look.texture,
-                    back: look.back,
-                    outline_uv: look.outline_uv,
-                    grade: object.grade,
-                })
+                Ok(look.into_card(ObjectId(object_id(i)?), object, pose))
             })
             .collect()
     }
 
     fn tinted_lights(&self, tint: LinearRgb) -> Vec<AreaLight> {
-        let tinted = |light: &AreaLight| AreaLight {
-            color: light.color * tint,
-            ..*light
-        };
-        self.lights.iter().map(tinted).collect()
+        let lights = self.lights.iter();
+        lights
+            .map(|light| AreaLight {
+                color: light.color * tint,
+                ..*light
+            })
+            .collect()
     }
 
     fn environment_map(&self, panorama: Option<Arc<Panorama>>) -> Result<Option<EnvironmentMap>> {
         let Some(named) = self.environment.as_ref().filter(|named| named.shines()) else {
             return Ok(None);
         };
-        let panorama = panorama.ok_or_else(|| {
-            Error::value(
-                "environment.file",
-                format!("\"{}\", but its picture was not given", named.file),
-            )
-        })?;
+        let panorama = panorama.ok_or_else(|| missing_panorama(&named.file))?;
         Ok(Some(EnvironmentMap {
             panorama,
             rotation: named.rotation_deg.to_radians(),
@@ -134,26 +138,19 @@ impl Scene {
     fn known_exposure(&self) -> Result<f32> {
         match self.exposure {
             Exposure::Ev(ev) => Ok(libm::exp2(ev) as f32),
-            Exposure::MatchPlate { .. } | Exposure::MatchSurface { .. } => Err(Error::value(
-                "exposure",
-                "still to be matched to the plate; light it first",
-            )),
+            Exposure::MatchPlate { .. } | Exposure::MatchSurface { .. } => {
+                Err(unmatched("exposure"))
+            }
         }
     }
 
     fn known_cast(&self) -> Result<LinearRgb> {
         if self.finish.noise == Noise::MatchPlate {
-            return Err(Error::value(
-                "finish.noise",
-                "still to be matched to the plate; light it first",
-            ));
+            return Err(unmatched("finish.noise"));
         }
         match self.cast {
             LightTint::Known(color) => Ok(color),
-            LightTint::MatchSurface { .. } => Err(Error::value(
-                "cast",
-                "still to be matched to the plate; light it first",
-            )),
+            LightTint::MatchSurface { .. } => Err(unmatched("cast")),
         }
     }
 
@@ -168,6 +165,15 @@ impl Scene {
             format!("{w} x {h} pixels, expected {width} x {height}"),
         ))
     }
+}
+
+fn unmatched(at: &str) -> Error {
+    Error::value(at, "still to be matched to the plate; light it first")
+}
+
+fn missing_panorama(file: &str) -> Error {
+    let what = format!("\"{file}\", but its picture was not given");
+    Error::value("environment.file", what)
 }
 
 fn rest_pose(i: usize, object: &Object) -> Result<Pose> {

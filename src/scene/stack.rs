@@ -86,12 +86,9 @@ impl DropColumn<'_> {
     pub(super) fn stack(&self, objects: &mut [Object]) -> Result<()> {
         let mut top = 0.0;
         for (i, object) in objects.iter_mut().enumerate() {
+            let rotation = self.rotation_of(i, object)?;
+            let extent = half_extent(&rotation, &self.options.half_body(object));
             let path = format!("objects[{i}].start");
-            let half = self.options.half_body(object);
-            let rotation = self.fitting_rotation(&half, &path).ok_or_else(|| {
-                Error::value(format!("objects[{i}].size"), self.fit_problem(object))
-            })?;
-            let extent = half_extent(&rotation, &half);
             let above = self.draw_position(&extent, &path);
             let height = top + self.draw(&self.start.gap, &path, "gap") + extent.z;
             top = height + extent.z;
@@ -104,8 +101,14 @@ impl DropColumn<'_> {
         Ok(())
     }
 
+    fn rotation_of(&self, i: usize, object: &Object) -> Result<UnitQuaternion<f64>> {
+        let half = self.options.half_body(object);
+        self.fitting_rotation(&half, &format!("objects[{i}].start"))
+            .ok_or_else(|| Error::value(format!("objects[{i}].size"), self.fit_problem(object)))
+    }
+
     fn draw(&self, range: &Range, path: &str, name: &str) -> f64 {
-        range.draw(self.draws, &format!("{path}.{name}"))
+        range.draw_field(self.draws, path, name)
     }
 
     /// A point of the surface over which a body of this half extent is between the walls.
@@ -145,43 +148,48 @@ impl DropColumn<'_> {
         } else {
             format!("yaw_deg#{number}")
         };
-        let yaw = self.draw(&self.start.yaw_deg, path, &yaw_name).to_radians();
-        let yaw = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw);
+        let yaw = level_turn(self.draw(&self.start.yaw_deg, path, &yaw_name));
+        self.draw_tilt(path) * yaw
+    }
+
+    /// A tilt about a horizontal axis.
+    fn draw_tilt(&self, path: &str) -> UnitQuaternion<f64> {
         let towards = self.draw(&self.start.tilt_axis_deg, path, "tilt_axis_deg");
-        let towards = towards.to_radians();
-        let axis = Unit::new_unchecked(Vector3::new(libm::cos(towards), libm::sin(towards), 0.0));
-        let tilt = self
-            .draw(&self.start.tilt_deg, path, "tilt_deg")
-            .to_radians();
-        UnitQuaternion::from_axis_angle(&axis, tilt) * yaw
+        let tilt = self.draw(&self.start.tilt_deg, path, "tilt_deg");
+        UnitQuaternion::from_axis_angle(&horizontal_axis(towards), tilt.to_radians())
     }
 }
 
 impl DropRanges {
     /// Whether a card of this size, as thick as it may be, fits between walls in some direction that it may start in.
     pub(super) fn has_room(&self, surface: [f64; 2], [w, h]: [f64; 2]) -> bool {
-        self.level_turns(surface, &(Vector3::new(w, h, 0.0) / 2.0))
-            .next()
-            .is_some()
+        let half = Vector3::new(w, h, 0.0) / 2.0;
+        self.level_turns(surface, &half).next().is_some()
     }
 
-    /// Turns of a level body that fits between the walls so: of whole degrees, and the ends of the
-    /// range.
+    /// Turns with which a level body fits between the walls: the ends of the range, and whole degrees.
     fn level_turns(
         &self,
         surface: [f64; 2],
         half: &Vector3<f64>,
     ) -> impl Iterator<Item = UnitQuaternion<f64>> {
-        let Range { min, max } = self.yaw_deg;
-        let whole = (0..360)
-            .map(move |i| min.ceil() + f64::from(i))
-            .take_while(move |degrees| *degrees < max);
-        [min, max]
-            .into_iter()
-            .chain(whole)
+        whole_degrees(self.yaw_deg)
             .map(level_turn)
             .filter(move |rotation| fits(surface, half, rotation))
     }
+}
+
+/// The ends of a range, then the whole degrees in it, of one turn at most.
+fn whole_degrees(Range { min, max }: Range) -> impl Iterator<Item = f64> {
+    let whole = (0..360)
+        .map(move |i| min.ceil() + f64::from(i))
+        .take_while(move |degrees| *degrees < max);
+    [min, max].into_iter().chain(whole)
+}
+
+fn horizontal_axis(degrees: f64) -> Unit<Vector3<f64>> {
+    let towards = degrees.to_radians();
+    Unit::new_unchecked(Vector3::new(libm::cos(towards), libm::sin(towards), 0.0))
 }
 
 fn level_turn(degrees: f64) -> UnitQuaternion<f64> {

@@ -160,6 +160,7 @@ fn grounded(solid: &Solid) -> Solid {
 mod tests {
     use super::*;
     use crate::geom::Vector3;
+    use crate::scene::Placement;
     use crate::settle::overlap::{deepest, touching_pairs};
     use crate::settle::tests::{dropped, falling};
 

@@ -47,14 +47,18 @@ mod support;
 mod trace;
 mod world;
 
+#[doc(hidden)]
 pub use crate::scene::{SettleMode, SettleOptions};
 #[doc(hidden)]
 pub use bodies::typical_length;
 #[doc(hidden)]
 pub use heap::{heap, octagon};
+#[doc(hidden)]
 pub use preview::preview;
+#[doc(hidden)]
 pub use trace::{MotionSample, csv as trace_csv};
 
+#[doc(hidden)]
 pub use crate::allowance::Allowance;
 use crate::error::{Error, Result};
 use crate::scene::{Placement, Scene};
@@ -181,6 +185,7 @@ pub fn settle(scene: Scene, options: &SettleOptions) -> Result<Settled> {
 ///
 /// # Errors
 /// As [`settle`].
+#[doc(hidden)]
 pub fn settle_traced(
     scene: Scene,
     options: &SettleOptions,
@@ -193,6 +198,7 @@ pub fn settle_traced(
 ///
 /// # Errors
 /// As [`settle`]; [`Error::Interrupted`] when it is stopped.
+#[doc(hidden)]
 pub fn settle_within(
     scene: Scene,
     options: &SettleOptions,
@@ -223,6 +229,7 @@ pub fn settle_within(
 ///
 /// # Errors
 /// An impossible scene or option; scenes with different numbers of objects.
+#[doc(hidden)]
 pub fn hanging(before: &Scene, after: &Scene, options: &SettleOptions) -> Result<Vec<usize>> {
     before.check()?;
     after.check()?;
@@ -251,13 +258,17 @@ fn check_starts(scene: &Scene) -> Result<()> {
         if let Placement::Drop { above: [x, y], .. } = object.placement
             && (x.abs() > w / 2.0 || y.abs() > h / 2.0)
         {
-            return Err(Error::value(
-                format!("objects[{i}].placement.drop.above"),
-                format!("[{x}, {y}], expected over the surface of {w} x {h} m around the origin"),
-            ));
+            return Err(starts_outside(i, [x, y], scene.surface.size));
         }
     }
     Ok(())
+}
+
+fn starts_outside(i: usize, [x, y]: [f64; 2], [w, h]: [f64; 2]) -> Error {
+    Error::value(
+        format!("objects[{i}].placement.drop.above"),
+        format!("[{x}, {y}], expected over the surface of {w} x {h} m around the origin"),
+    )
 }
 
 #[cfg(test)]
@@ -546,6 +557,7 @@ mod tests {
     }
 
     /// The longest that is within bounds.
+    #[cfg(feature = "counters")]
     fn endless() -> SettleOptions {
         let slow = SettleOptions {
             step: 1e-4,

@@ -1,14 +1,19 @@
 //! `petcomp asset`: cut-outs with real size and class, kept in a folder.
 
-use crate::common::{Common, NeedsReview};
+use crate::diagnostics::{located, report_diagnostics};
+use crate::documents::stem_of;
+use crate::exit::NeedsReview;
+use crate::global::GlobalArgs;
 use crate::print;
-use petcomp::asset::{self, Library, Manifest, PhotoEntry, Scale, ScreenSource};
+use crate::values::{parse_corners, parse_metres};
+use petcomp::asset::{self, Asset, Built, Library, Manifest};
+use petcomp::asset::{PhotoEntry, PhotoRecord, Scale, ScreenSource};
 use petcomp::matte::CutOutOptions;
 use petcomp::{Quality, io};
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Subcommand)]
-pub(crate) enum Command {
+pub(crate) enum AssetCommand {
     /// Cut out all photos of a list
     Build {
         /// List (TOML or CSV), or a folder with photos.toml or photos.csv: file, asset, class and length (metres, by a tape
@@ -19,7 +24,7 @@ pub(crate) enum Command {
         output: PathBuf,
     },
     /// Cut out photos of one object
-    Add(Box<Add>),
+    Add(Box<AddPhotoArgs>),
     /// Show what an asset folder holds: name, class, size, how sure outline and colour are (0 to 1), file
     List {
         /// Asset folder
@@ -44,7 +49,7 @@ pub(crate) enum Command {
 }
 
 #[derive(clap::Args)]
-pub(crate) struct Add {
+pub(crate) struct AddPhotoArgs {
     /// Photos of the object
     #[arg(required = true)]
     photos: Vec<PathBuf>,
@@ -66,7 +71,7 @@ pub(crate) struct Add {
     #[command(flatten)]
     scale: ScaleArgs,
     /// Corners of the screen for --screen-size, from the top left clockwise, pixels; by default they are found
-    #[arg(long, value_name = "X,Y X,Y X,Y X,Y", value_parser = corners, requires = "screen_size")]
+    #[arg(long, value_name = "X,Y X,Y X,Y X,Y", value_parser = parse_corners, requires = "screen_size")]
     screen_corners: Option<[[f64; 2]; 4]>,
     /// Thickness of the object as it lies, metres: with --screen-size or --marker-size its size is that at half its height
     #[arg(long, value_name = "METRES", default_value_t = asset::DEFAULT_THICKNESS)]
@@ -76,7 +81,7 @@ pub(crate) struct Add {
     quality: Quality,
 }
 
-/// What tells how large the object is; one of these.
+/// How large the object is, by one of these.
 #[derive(clap::Args)]
 #[group(required = true, multiple = false)]
 struct ScaleArgs {
@@ -91,7 +96,7 @@ struct ScaleArgs {
     scale: Option<f64>,
     /// Or: width and height of the whole screen, metres: it lies on something of another colour, and all four corners are
     /// seen
-    #[arg(long, value_name = "WxH", value_parser = crate::camera::dimensions)]
+    #[arg(long, value_name = "WxH", value_parser = parse_metres)]
     screen_size: Option<[f64; 2]>,
     /// Or: side of the black square of a printed marker on the screen, metres (AprilTag tag36h11 or ArUco DICT_4X4_50); cut
     /// its paper to a white margin of at most a third of that
@@ -100,202 +105,199 @@ struct ScaleArgs {
 }
 
 impl ScaleArgs {
-    /// What is told; `corners` are those of the screen.
+    /// The one that is given; `corners` are those of the screen.
     fn scale(&self, corners: Option<[[f64; 2]; 4]>) -> Scale {
-        match (
-            self.scale,
-            self.size.as_deref(),
-            self.screen_size,
-            self.marker_size,
-        ) {
-            (Some(px_per_metre), ..) => Scale::PxPerMetre(px_per_metre),
-            (None, Some(&[w, h]), ..) => Scale::Size([w.max(h), w.min(h)]),
-            (None, _, Some(size), _) => Scale::Screen(size, corners),
-            (None, _, None, Some(side)) => Scale::Marker(side),
-            (None, _, None, None) => Scale::Length(self.length.unwrap_or_default()),
-        }
+        let screen = self.screen_size.map(|size| Scale::Screen(size, corners));
+        self.scale
+            .map(Scale::PxPerMetre)
+            .or_else(|| self.object_size())
+            .or(screen)
+            .or(self.marker_size.map(Scale::Marker))
+            .unwrap_or(Scale::Length(self.length.unwrap_or_default()))
+    }
+
+    fn object_size(&self) -> Option<Scale> {
+        let [w, h] = *self.size.as_deref()?.first_chunk()?;
+        Some(Scale::Size([f64::max(w, h), f64::min(w, h)]))
     }
 }
 
-/// Four places from `X,Y X,Y X,Y X,Y`.
-fn corners(text: &str) -> Result<[[f64; 2]; 4], String> {
-    let wrong =
-        || format!("\"{text}\", expected four corners as in \"12,8 630,10 628,470 14,466\"");
-    let place = |pair: &str| {
-        let (x, y) = pair.split_once(',')?;
-        Some([x.trim().parse().ok()?, y.trim().parse().ok()?])
-    };
-    let places: Option<Vec<[f64; 2]>> = text.split_whitespace().map(place).collect();
-    places.ok_or_else(wrong)?.try_into().map_err(|_| wrong())
-}
-
-pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
+pub(crate) fn run(command: &AssetCommand, global: &GlobalArgs) -> anyhow::Result<()> {
     match command {
-        Command::Build { list, output } => build(list, output, common).map(|_| ()),
-        Command::Add(args) => add(args, common),
-        Command::List { folder } => list(folder),
-        Command::Check { folder, strict } => check(folder, *strict),
-        Command::Sheet { folder, output } => Ok(io::write(
-            output,
-            &asset::contact_sheet(&Library::open(folder)?),
-        )?),
+        AssetCommand::Build { list, output } => build_library(list, output, global).map(drop),
+        AssetCommand::Add(args) => add_photos(args, global),
+        AssetCommand::List { folder } => list_photos(folder),
+        AssetCommand::Check { folder, strict } => check_folder(folder, *strict),
+        AssetCommand::Sheet { folder, output } => {
+            let sheet = asset::contact_sheet(&Library::open(folder)?);
+            Ok(io::write(output, &sheet)?)
+        }
     }
 }
 
 /// Name of the contact sheet in an asset folder.
 const SHEET: &str = "contact_sheet.png";
 
-fn check(folder: &Path, strict: bool) -> anyhow::Result<()> {
+fn check_folder(folder: &Path, strict: bool) -> anyhow::Result<()> {
     let library = Library::open(folder)?;
-    let photos: Vec<_> = library
-        .assets
-        .iter()
-        .flat_map(|asset| &asset.photos)
-        .collect();
-    let to_review: Vec<_> = photos
-        .iter()
-        .filter(|photo| photo.record.needs_review())
-        .collect();
-    for photo in &to_review {
-        print::line(format_args!(
-            "{}: {}",
-            photo.record.file,
-            photo.record.review_reasons()
-        ));
+    let records: Vec<_> = records_of(&library).collect();
+    let to_review = records.iter().filter(|record| record.needs_review());
+    let to_review = to_review.inspect(|record| list_reasons(record)).count();
+    let (folder, assets, cut_outs) = (folder.display(), library.assets.len(), records.len());
+    print::line(format_args!(
+        "{folder}: {assets} assets, {cut_outs} cut-outs, all intact, {to_review} to review"
+    ));
+    if strict && to_review > 0 {
+        return Err(NeedsReview(format!("{folder}: {to_review} cut-outs to review")).into());
     }
-    let counts = format!(
-        "{} assets, {} cut-outs, all intact, {} to review",
-        library.assets.len(),
-        photos.len(),
-        to_review.len()
-    );
-    print::line(format_args!("{}: {counts}", folder.display()));
-    match to_review.len() {
-        n if strict && n > 0 => {
-            Err(NeedsReview(format!("{}: {n} cut-outs to review", folder.display())).into())
-        }
-        _ => Ok(()),
+    Ok(())
+}
+
+fn records_of(library: &Library) -> impl Iterator<Item = &PhotoRecord> {
+    let photos = library.assets.iter().flat_map(|asset| &asset.photos);
+    photos.map(|photo| &photo.record)
+}
+
+/// Prints why a person should review a cut-out.
+fn list_reasons(record: &PhotoRecord) {
+    for diagnostic in &record.diagnostics {
+        print::line(located(&record.file, diagnostic));
     }
 }
 
 /// Cuts out all photos of a list, showing progress; returns all that the folder holds.
-pub(crate) fn build(list: &Path, folder: &Path, common: &Common) -> anyhow::Result<Library> {
-    let progress = common.progress("cut-outs");
+pub(crate) fn build_library(
+    list: &Path,
+    folder: &Path,
+    global: &GlobalArgs,
+) -> anyhow::Result<Library> {
+    let progress = global.start_progress("cut-outs");
     let built = asset::build(list, folder, &|done, total| {
-        progress.at(done as u64, total as u64)
+        progress.update(done as u64, total as u64)
     })?;
     drop(progress);
+    report_built(&built, folder, global);
     let library = built.library;
-    built
-        .refused
-        .iter()
-        .for_each(|refusal| log::warn!("{refusal}"));
-    built
-        .needs_review
-        .iter()
-        .for_each(|reason| common.say(reason));
-    common.say(format_args!(
-        "{}: {} photos, {} assets",
-        folder.display(),
-        built.photos,
-        library.assets.len()
-    ));
-    let (lengths, errors) = spread(&built.lengths);
-    common.say(format_args!(
-        "objects are {lengths} mm long, to {errors} mm; `petcomp asset list` shows each"
-    ));
-    show_classes(&library.classes, "`classes = [...]` in the list", common);
-    write_sheet(folder, &library, common)?;
+    show_classes(&library.classes, "`classes = [...]` in the list", global);
+    write_sheet(folder, &library, global)?;
     Ok(library)
 }
 
-/// Writes the contact sheet of a folder.
-fn write_sheet(folder: &Path, library: &Library, common: &Common) -> anyhow::Result<()> {
-    let path = folder.join(SHEET);
-    io::write(&path, &asset::contact_sheet(library))?;
-    common.say(format_args!("look at {}", path.display()));
-    Ok(())
-}
-
-fn add(args: &Add, common: &Common) -> anyhow::Result<()> {
-    let scale = args.scale.scale(args.screen_corners);
-    let first = args
-        .photos
-        .first()
-        .and_then(|photo| photo.file_stem())
-        .unwrap_or_default();
-    let name = args
-        .name
-        .clone()
-        .unwrap_or_else(|| first.to_string_lossy().into_owned());
-    let options = args.quality.cut_out(CutOutOptions::default());
-    let mut added = Vec::new();
-    for photo in &args.photos {
-        let entry = PhotoEntry {
-            screen: args.screen.clone(),
-            thickness: args.thickness,
-            ..PhotoEntry::new(photo, &name, &args.class, scale)
-        };
-        let photo = asset::add_photo(&args.output, &entry, &args.classes, &options)?;
-        let record = &photo.record;
-        let ([length, width], error) = (record.object_m.map(|m| m * 1e3), record.error_m * 1e3);
-        common.say(format_args!(
-            "{}: {length:.1} x {width:.1} mm (+- {error:.1})",
-            record.file
-        ));
-        record
-            .diagnostics
-            .iter()
-            .for_each(|diagnostic| common.say(format_args!("{}: {diagnostic}", record.file)));
-        added.push(photo);
+/// Shows what became of the photos of a list.
+fn report_built(built: &Built, folder: &Path, global: &GlobalArgs) {
+    for reason in &built.refused {
+        log::warn!("{reason}");
     }
-    let library = Library::open_with(&args.output, added)?;
-    show_classes(&library.classes, "--classes", common);
-    write_sheet(&args.output, &library, common)
+    for record in &built.needs_review {
+        report_diagnostics(&record.file, &record.diagnostics);
+    }
+    let (photos, assets) = (built.photos, built.library.assets.len());
+    global.print_written(folder, format_args!("{photos} photos, {assets} assets"));
+    global.print_status(describe_lengths(&built.lengths));
 }
 
-/// Smallest and largest of lengths, and the same of their errors, millimetres.
-fn spread(lengths: &[[f64; 2]]) -> (String, String) {
-    let of = |i: usize| {
-        let ends = lengths.iter().fold([f64::MAX, 0.0], |[low, high], l| {
-            [l[i].min(low), l[i].max(high)]
-        });
-        ends.map(|metres| 1e3 * metres)
-    };
-    let ([short, long], [fine, coarse]) = (of(0), of(1));
-    (
-        format!("{short:.0} to {long:.0}"),
-        format!("{fine:.1} to {coarse:.1}"),
+/// Range of the objects' lengths, and of their errors.
+fn describe_lengths(metres: &[[f64; 2]]) -> String {
+    let ([short, long], [fine, coarse]) = (extremes_mm(metres, 0), extremes_mm(metres, 1));
+    format!(
+        "objects are {short:.0} to {long:.0} mm long, to {fine:.1} to {coarse:.1} mm; \
+         `petcomp asset list` shows each"
     )
 }
 
-/// Shows which number each class has, and how to change that.
-fn show_classes(classes: &[String], how: &str, common: &Common) {
-    let numbered = classes
-        .iter()
-        .enumerate()
-        .map(|(i, class)| format!("{i} {class}"));
-    let list = numbered.collect::<Vec<_>>().join(", ");
-    common.say(format_args!("classes {list}; another order: {how}"));
+/// Writes the contact sheet of a folder.
+fn write_sheet(folder: &Path, library: &Library, global: &GlobalArgs) -> anyhow::Result<()> {
+    let path = folder.join(SHEET);
+    io::write(&path, &asset::contact_sheet(library))?;
+    global.print_look_at(&path);
+    Ok(())
 }
 
-fn list(folder: &Path) -> anyhow::Result<()> {
+fn add_photos(args: &AddPhotoArgs, global: &GlobalArgs) -> anyhow::Result<()> {
+    let options = args.quality.cut_out(CutOutOptions::default());
+    let mut added = Vec::new();
+    for photo in &args.photos {
+        let entry = args.entry_for(photo);
+        let photo = asset::add_photo(&args.output, &entry, &args.classes, &options)?;
+        report_added(&photo.record, global);
+        added.push(photo);
+    }
+    let library = Library::open_with(&args.output, added)?;
+    show_classes(&library.classes, "--classes", global);
+    write_sheet(&args.output, &library, global)
+}
+
+fn report_added(record: &PhotoRecord, global: &GlobalArgs) {
+    let [length, width] = record.object_m.map(|m| m * 1e3);
+    global.print_status(format_args!(
+        "{}: {length:.1} x {width:.1} mm (+- {:.1})",
+        record.file,
+        record.error_m * 1e3
+    ));
+    report_diagnostics(&record.file, &record.diagnostics);
+}
+
+impl AddPhotoArgs {
+    fn entry_for(&self, photo: &Path) -> PhotoEntry {
+        let scale = self.scale.scale(self.screen_corners);
+        PhotoEntry {
+            screen: self.screen.clone(),
+            thickness: self.thickness,
+            ..PhotoEntry::new(photo, self.asset_name(), &self.class, scale)
+        }
+    }
+
+    /// The name that is given, or that of the first photo.
+    fn asset_name(&self) -> String {
+        match (&self.name, self.photos.first()) {
+            (Some(name), _) => name.clone(),
+            (None, Some(photo)) => stem_of(photo),
+            (None, None) => String::new(),
+        }
+    }
+}
+
+/// Smallest and largest of the `i`-th numbers, millimetres.
+fn extremes_mm(metres: &[[f64; 2]], i: usize) -> [f64; 2] {
+    let values = metres.iter().map(|pair| pair[i]);
+    let ends = values.fold([f64::MAX, 0.0], |[low, high], value| {
+        [value.min(low), value.max(high)]
+    });
+    ends.map(|metres| 1e3 * metres)
+}
+
+/// Shows which number each class has, and how to change that.
+fn show_classes(classes: &[String], how: &str, global: &GlobalArgs) {
+    let numbered = classes.iter().enumerate();
+    let numbered: Vec<_> = numbered.map(|(i, class)| format!("{i} {class}")).collect();
+    let list = numbered.join(", ");
+    global.print_status(format_args!("classes {list}; another order: {how}"));
+}
+
+fn list_photos(folder: &Path) -> anyhow::Result<()> {
     for asset in Manifest::read(folder)?.assets {
         for photo in &asset.photos {
-            let [length, width] = photo.object_m.map(|m| m * 1e3);
-            let (name, class, sure) = (&asset.name, &asset.class, photo.outline_confidence);
-            let color = photo
-                .color_confidence
-                .map_or_else(|| "   -".into(), |color| format!("{color:.2}"));
-            let size = format!(
-                "{length:4.0} x {width:3.0} mm (+- {:.1})",
-                photo.error_m * 1e3
-            );
-            print::line(format_args!(
-                "{name:12} {class:10} {size}  {sure:.2}  {color}  {}",
-                photo.file
-            ));
+            print::line(list_line(&asset, photo));
         }
     }
     Ok(())
+}
+
+/// Name, class, size, how sure outline and colour are, file.
+fn list_line(asset: &Asset<PhotoRecord>, photo: &PhotoRecord) -> String {
+    let (name, class) = (&asset.name, &asset.class);
+    let [length, width, error] =
+        [photo.object_m[0], photo.object_m[1], photo.error_m].map(|metres| metres * 1e3);
+    let outline = photo.outline_confidence;
+    let (color, file) = (color_column(photo.color_confidence), &photo.file);
+    format!(
+        "{name:12} {class:10} {length:4.0} x {width:3.0} mm (+- {error:.1})  {outline:.2}  {color}  {file}"
+    )
+}
+
+fn color_column(confidence: Option<f64>) -> String {
+    match confidence {
+        Some(confidence) => format!("{confidence:.2}"),
+        None => "   -".into(),
+    }
 }

@@ -1,14 +1,14 @@
 //! `petcomp demo`: a sample dataset from the photographs in the repository.
 
-use crate::common::Common;
+use crate::global::GlobalArgs;
 use crate::print;
 use crate::{asset, dataset};
-use petcomp::dataset::{DatasetConfig, Pipeline, contact_sheet_of};
+use petcomp::dataset::{DatasetConfig, DatasetCounts, Pipeline, contact_sheet_of};
 use petcomp::{Error, io};
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
-pub(crate) struct Args {
+pub(crate) struct DemoArgs {
     /// Folder with bottles/photos.toml and labelled backgrounds/
     #[arg(long, value_name = "FOLDER", default_value = "tests/samples")]
     samples: PathBuf,
@@ -22,51 +22,67 @@ pub(crate) struct Args {
     #[arg(long, default_value_t = 0)]
     seed: u64,
     #[command(flatten)]
-    consent: dataset::Consent,
+    consent: dataset::LongRunConsent,
 }
 
-pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
-    let list = args.samples.join("bottles/photos.toml");
-    if !list.exists() {
-        let what = "no such file; run in petcomp's repository, or say with --samples where its tests/samples folder is";
-        return Err(Error::file(list, what).into());
-    }
+pub(crate) fn run(args: &DemoArgs, global: &GlobalArgs) -> anyhow::Result<()> {
+    let list = args.photo_list()?;
     io::create_folder(&args.output)?;
-    let recipe = write_recipe(args)?;
-    let library = asset::build(&list, &args.output.join("assets"), common)?;
-    let folder = args.output.join("dataset");
-    let pipeline = Pipeline::with_library(DatasetConfig::read(&recipe, &[])?, library)?;
-    let report = dataset::make(
-        &pipeline,
-        &pipeline.plan(args.count, args.seed, &folder)?,
-        &args.consent,
-        common,
-    )?;
-    let sheet = args.output.join("contact_sheet.png");
-    io::write(
-        &sheet,
-        &contact_sheet_of(&folder, args.count as usize, &Default::default())?,
-    )?;
-    dataset::tell(&report);
-    print::line(format_args!("look at      {}", sheet.display()));
-    for path in dataset::for_trainers(&report, &folder) {
-        print::line(format_args!("train with   {}", path.display()));
-    }
-    print::line(format_args!("change       {}", recipe.display()));
+    let recipe = args.write_recipe()?;
+    let library = asset::build_library(&list, &args.output.join("assets"), global)?;
+    let config = DatasetConfig::read(&recipe, &[])?;
+    let pipeline = Pipeline::with_library(config, library)?;
+    let plan = pipeline.plan(args.count, args.seed, args.dataset_folder())?;
+    let counts = dataset::generate_supervised(&pipeline, &plan, &args.consent, global)?;
+    let sheet = args.write_sheet()?;
+    dataset::print_counts(&counts);
+    args.print_files(&sheet, &counts, &recipe);
     Ok(())
 }
 
-/// A recipe file that says nothing but where its folders are.
-fn write_recipe(args: &Args) -> anyhow::Result<PathBuf> {
-    let absolute = |path: &Path| std::path::absolute(path).map_err(|e| Error::file(path, e));
-    let backgrounds = io::relative(
-        &absolute(&args.samples.join("backgrounds"))?,
-        &absolute(&args.output)?,
-    );
-    // A JSON string is a TOML string.
-    let backgrounds = serde_json::Value::from(backgrounds.to_string_lossy());
-    let text = format!("assets = \"assets\"\nbackgrounds = {backgrounds}\n");
-    let path = args.output.join("recipe.toml");
-    io::write_text(&path, &text)?;
-    Ok(path)
+impl DemoArgs {
+    fn photo_list(&self) -> petcomp::Result<PathBuf> {
+        let list = self.samples.join("bottles/photos.toml");
+        if list.exists() {
+            return Ok(list);
+        }
+        let what = "no such file; run in petcomp's repository, or name its tests/samples folder with --samples";
+        Err(Error::file(list, what))
+    }
+
+    fn dataset_folder(&self) -> PathBuf {
+        self.output.join("dataset")
+    }
+
+    /// A recipe file that names its folders and nothing else.
+    fn write_recipe(&self) -> petcomp::Result<PathBuf> {
+        let backgrounds = absolute_path(&self.samples.join("backgrounds"))?;
+        let backgrounds = io::relative(&backgrounds, &absolute_path(&self.output)?);
+        // A JSON string is a TOML string.
+        let backgrounds = serde_json::Value::from(backgrounds.to_string_lossy());
+        let text = format!("assets = \"assets\"\nbackgrounds = {backgrounds}\n");
+        let path = self.output.join("recipe.toml");
+        io::write_text(&path, &text)?;
+        Ok(path)
+    }
+
+    fn write_sheet(&self) -> petcomp::Result<PathBuf> {
+        let path = self.output.join("contact_sheet.png");
+        let count = self.count as usize;
+        let sheet = contact_sheet_of(&self.dataset_folder(), count, &Default::default())?;
+        io::write(&path, &sheet)?;
+        Ok(path)
+    }
+
+    fn print_files(&self, sheet: &Path, counts: &DatasetCounts, recipe: &Path) {
+        print::line(format_args!("look at      {}", sheet.display()));
+        for path in dataset::trainer_inputs(counts, &self.dataset_folder()) {
+            print::line(format_args!("train with   {}", path.display()));
+        }
+        print::line(format_args!("change       {}", recipe.display()));
+    }
+}
+
+fn absolute_path(path: &Path) -> petcomp::Result<PathBuf> {
+    std::path::absolute(path).map_err(|e| Error::file(path, e))
 }

@@ -1,21 +1,21 @@
 //! `petcomp diff`: compares two pictures with the flags and exit codes of OpenImageIO's `idiff`.
 
-use crate::common::Common;
+use crate::global::GlobalArgs;
 use crate::print;
 use petcomp::color::linear_to_srgb;
 use petcomp::diff::{
-    Likeness, RowSource, RowsFromFn, Thresholds, Verdict, absolute_difference, compare,
+    Comparison, Likeness, RowSource, RowsFromFn, Thresholds, Verdict, absolute_difference, compare,
 };
 use petcomp::io::{Format, Picture};
 use petcomp::{Image, LinearRgb, PremulRgba, StraightRgba, io};
 use std::ffi::OsString;
 use std::ops::Range;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Exit status: 0 match, 1 warning, 2 failure, 3 not comparable, 4 a picture cannot be read.
 #[derive(clap::Args)]
-pub(crate) struct Args {
+pub(crate) struct DiffArgs {
     /// First picture
     a: PathBuf,
     /// Second picture
@@ -74,70 +74,97 @@ const SINGLE_DASH: [&str; 11] = [
 ];
 
 /// The command line with `idiff`'s spelling turned into ours, for the `diff` subcommand only.
-pub(crate) fn accept_idiff_spelling(args: impl Iterator<Item = OsString>) -> Vec<OsString> {
-    let mut args: Vec<OsString> = args.collect();
-    if args
-        .iter()
-        .skip(1)
-        .find(|a| !a.as_encoded_bytes().starts_with(b"-"))
-        .is_some_and(|first| first == "diff")
-    {
-        for arg in &mut args {
-            if let Some(known) = SINGLE_DASH.into_iter().find(|known| arg == known) {
-                *arg = format!("-{known}").into();
-            }
-        }
+pub(crate) fn accept_idiff_spelling(words: impl Iterator<Item = OsString>) -> Vec<OsString> {
+    let words: Vec<OsString> = words.collect();
+    let verb = words.iter().skip(1).find(|word| !is_flag(word));
+    if verb.is_some_and(|verb| verb == "diff") {
+        words.into_iter().map(with_two_dashes).collect()
+    } else {
+        words
     }
-    args
 }
 
-pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<ExitCode> {
-    let pictures = Picture::read(&args.a).and_then(|a| Ok((a, Picture::read(&args.b)?)));
-    let (a, b) = match pictures {
-        Ok(pictures) => pictures,
+fn is_flag(word: &OsString) -> bool {
+    word.as_encoded_bytes().starts_with(b"-")
+}
+
+fn with_two_dashes(word: OsString) -> OsString {
+    match SINGLE_DASH.into_iter().find(|flag| word == *flag) {
+        Some(flag) => format!("-{flag}").into(),
+        None => word,
+    }
+}
+
+pub(crate) fn run(args: &DiffArgs, global: &GlobalArgs) -> anyhow::Result<ExitCode> {
+    let pair = match PicturePair::read(args) {
+        Ok(pair) => pair,
         Err(error) => {
             print::aside(format_args!("error: {error}"));
             return Ok(ExitCode::from(Verdict::Unreadable.exit_code()));
         }
     };
-    let thresholds = args.thresholds();
-    // Pictures without alpha have three channels, over which means are taken.
-    let report = match a.has_alpha() || b.has_alpha() {
-        true => compare(&rows(&a, |v| v), &rows(&b, |v| v), &thresholds),
-        false => compare(&rows(&a, opaque), &rows(&b, opaque), &thresholds),
-    };
-    let different = report.max_error > 0.0 && report.verdict != Verdict::Incomparable;
-    if let Some(path) = args
-        .output
-        .as_ref()
-        .filter(|_| different || !args.only_different)
-        && report.verdict != Verdict::Incomparable
-    {
-        io::write(
-            path,
-            &absolute_difference(&rows(&a, opaque), &rows(&b, opaque), args.scale),
-        )?;
+    let report = pair.compare(&args.thresholds());
+    if let Some(path) = args.difference_path(&report) {
+        pair.write_difference(path, args.scale)?;
     }
-    common.say(format_args!(
-        "Comparing \"{}\" and \"{}\"",
-        args.a.display(),
-        args.b.display()
-    ));
+    let (a, b) = (args.a.display(), args.b.display());
+    global.print_status(format_args!("Comparing \"{a}\" and \"{b}\""));
     print::text(&report);
-    if let Some(likeness) = (!common.quiet()).then(|| likeness(&a, &b)).flatten() {
-        common.say(format_args!("Scene-linear {likeness}"));
-    }
+    pair.print_likeness(global);
     Ok(ExitCode::from(report.verdict.exit_code()))
 }
 
-/// What the two are to the eye, over black: the second is what the first should be.
-fn likeness(a: &Picture, b: &Picture) -> Option<Likeness> {
-    let light = |picture: &Picture, rows| picture.rows::<PremulRgba>(rows).map(PremulRgba::color);
-    let [a, b] = [a, b].map(|picture| RowsFromFn {
-        size: picture.size(),
-        make: move |rows| light(picture, rows),
-    });
-    Likeness::measure(&a, &b)
+/// The two pictures: the second is what the first should be.
+struct PicturePair {
+    a: Picture,
+    b: Picture,
+}
+
+impl PicturePair {
+    fn read(args: &DiffArgs) -> petcomp::Result<Self> {
+        Ok(Self {
+            a: Picture::read(&args.a)?,
+            b: Picture::read(&args.b)?,
+        })
+    }
+
+    /// Pictures without alpha have three channels, over which means are taken.
+    fn compare(&self, thresholds: &Thresholds) -> Comparison {
+        if self.a.has_alpha() || self.b.has_alpha() {
+            let [a, b] = [&self.a, &self.b].map(|picture| pixel_rows(picture, |value| value));
+            compare(&a, &b, thresholds)
+        } else {
+            let [a, b] = self.opaque_rows();
+            compare(&a, &b, thresholds)
+        }
+    }
+
+    fn opaque_rows(&self) -> [impl RowSource<LinearRgb>; 2] {
+        [&self.a, &self.b].map(|picture| pixel_rows(picture, opaque))
+    }
+
+    fn write_difference(&self, path: &Path, scale: f32) -> petcomp::Result<()> {
+        let [a, b] = self.opaque_rows();
+        io::write(path, &absolute_difference(&a, &b, scale))
+    }
+
+    /// It takes long, so nothing is computed that is not shown.
+    fn print_likeness(&self, global: &GlobalArgs) {
+        if !global.is_quiet()
+            && let Some(likeness) = self.likeness()
+        {
+            global.print_status(format_args!("Scene-linear {likeness}"));
+        }
+    }
+
+    /// How alike the two are to the eye, over black.
+    fn likeness(&self) -> Option<Likeness> {
+        let [a, b] = [&self.a, &self.b].map(|picture| RowsFromFn {
+            size: picture.size(),
+            make: move |rows| picture.rows::<PremulRgba>(rows).map(PremulRgba::color),
+        });
+        Likeness::measure(&a, &b)
+    }
 }
 
 fn opaque([r, g, b, _]: [f32; 4]) -> LinearRgb {
@@ -145,7 +172,7 @@ fn opaque([r, g, b, _]: [f32; 4]) -> LinearRgb {
 }
 
 /// The values of a picture's rows, made into pixels.
-fn rows<P: Copy + Send>(
+fn pixel_rows<P: Copy + Send>(
     picture: &Picture,
     pixel: impl Fn([f32; 4]) -> P + Sync,
 ) -> impl RowSource<P> {
@@ -163,18 +190,24 @@ fn stored_values(picture: &Picture, rows: Range<usize>) -> Image<[f32; 4]> {
             .rows::<PremulRgba>(rows)
             .map(|p| [p.r, p.g, p.b, p.a]);
     }
-    let shown = |p: StraightRgba| {
-        [
-            linear_to_srgb(p.r),
-            linear_to_srgb(p.g),
-            linear_to_srgb(p.b),
-            p.a,
-        ]
-    };
-    picture.rows::<StraightRgba>(rows).map(shown)
+    picture.rows::<StraightRgba>(rows).map(encoded)
 }
 
-impl Args {
+fn encoded(pixel: StraightRgba) -> [f32; 4] {
+    let [r, g, b] = [pixel.r, pixel.g, pixel.b].map(linear_to_srgb);
+    [r, g, b, pixel.a]
+}
+
+impl DiffArgs {
+    /// Where a picture of the difference goes, if it is wanted and there is one.
+    fn difference_path(&self, report: &Comparison) -> Option<&Path> {
+        let is_comparable = report.verdict != Verdict::Incomparable;
+        let is_wanted = report.max_error > 0.0 || !self.only_different;
+        self.output
+            .as_deref()
+            .filter(|_| is_comparable && is_wanted)
+    }
+
     fn thresholds(&self) -> Thresholds {
         Thresholds {
             fail: self.fail,

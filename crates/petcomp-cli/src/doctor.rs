@@ -5,36 +5,39 @@ use petcomp::{Image, PremulRgba, Srgba8, io};
 use std::process::{Command, ExitCode};
 
 #[derive(clap::Args)]
-pub(crate) struct Args {}
+pub(crate) struct DoctorArgs {}
 
 /// One line per check; the exit status is 1 when something that petcomp needs does not work.
-pub(crate) fn run(_: &Args) -> anyhow::Result<ExitCode> {
+pub(crate) fn run(_: &DoctorArgs) -> anyhow::Result<ExitCode> {
     print::line(format_args!("petcomp {}", env!("CARGO_PKG_VERSION")));
     print::line(format_args!("threads  {}", rayon::current_num_threads()));
+    let blender = version_of("blender");
     print::line(format_args!(
         "blender  {}",
-        version_of("blender").unwrap_or_else(|| "not found (only `make golden` needs it)".into())
+        blender
+            .as_deref()
+            .unwrap_or("not found (only `make golden` needs it)")
     ));
-    let checks: [(&str, anyhow::Result<String>); 3] = [
-        ("oiio", openimageio()),
-        ("png", png_alpha()),
-        ("exr", exr_round_trip()),
+    let outcomes = [
+        report_check("oiio", worker_answers()),
+        report_check("png", png_alpha()),
+        report_check("exr", exr_round_trip()),
     ];
-    let mut healthy = true;
-    for (name, outcome) in checks {
-        match outcome {
-            Ok(found) => print::line(format_args!("{name:8} {found}")),
-            Err(error) => {
-                healthy = false;
-                print::line(format_args!("{name:8} FAILED: {error:#}"));
-            }
-        }
-    }
-    Ok(if healthy {
+    let is_healthy = outcomes.iter().all(|&passed| passed);
+    Ok(if is_healthy {
         ExitCode::SUCCESS
     } else {
         ExitCode::FAILURE
     })
+}
+
+/// Prints what a check found; whether it passed.
+fn report_check(name: &str, outcome: anyhow::Result<String>) -> bool {
+    match &outcome {
+        Ok(found) => print::line(format_args!("{name:8} {found}")),
+        Err(error) => print::line(format_args!("{name:8} FAILED: {error:#}")),
+    }
+    outcome.is_ok()
 }
 
 /// First line of `program --version`.
@@ -47,44 +50,38 @@ fn version_of(program: &str) -> Option<String> {
 }
 
 /// The worker that reads what only OpenImageIO can.
-fn openimageio() -> anyhow::Result<String> {
+fn worker_answers() -> anyhow::Result<String> {
     Ok(io::worker_version()?)
 }
 
-fn temporary() -> petcomp::Result<tempfile::TempDir> {
+fn temporary_folder() -> petcomp::Result<tempfile::TempDir> {
     tempfile::tempdir().map_err(|e| petcomp::Error::file(std::env::temp_dir(), e))
 }
 
+const HALF_WHITE: Srgba8 = Srgba8 {
+    r: 255,
+    g: 255,
+    b: 255,
+    a: 128,
+};
+
 /// Half-transparent white must come back as half of linear white, not of encoded white.
 fn png_alpha() -> anyhow::Result<String> {
-    let folder = temporary()?;
+    let folder = temporary_folder()?;
     let path = folder.path().join("half.png");
-    io::write(
-        &path,
-        &Image::filled(
-            1,
-            1,
-            Srgba8 {
-                r: 255,
-                g: 255,
-                b: 255,
-                a: 128,
-            },
-        ),
-    )?;
+    io::write(&path, &Image::filled(1, 1, HALF_WHITE))?;
     let pixel = io::read::<PremulRgba>(&path)?[(0, 0)];
-    let display = petcomp::color::encode_srgb8(pixel.color());
+    let red = petcomp::color::encode_srgb8(pixel.color()).r;
     anyhow::ensure!(
-        display.r == 188,
-        "half-transparent white reads as {}/255, expected 188",
-        display.r
+        red == 188,
+        "half-transparent white reads as {red}/255, expected 188"
     );
     Ok("alpha is premultiplied in linear light".into())
 }
 
 /// What is written is what is read.
 fn exr_round_trip() -> anyhow::Result<String> {
-    let folder = temporary()?;
+    let folder = temporary_folder()?;
     let path = folder.path().join("value.exr");
     let value = PremulRgba::new(0.25, 3.5, -0.125, 0.5);
     io::write(&path, &Image::filled(2, 2, value))?;

@@ -1,17 +1,19 @@
 //! `petcomp eval`: detections against the truth.
 
-use crate::common::{Common, count};
+use crate::documents::stem_of;
+use crate::global::GlobalArgs;
 use crate::print;
+use crate::values::{count, parse_pixel_size};
 use petcomp::dataset::YoloSet;
-use petcomp::eval::page::{self, EvalReportOptions, Run};
+use petcomp::eval::page::{self, EvalReportOptions, Metrics, Run};
 use petcomp::eval::{
-    ConfusionOptions, EvalImage, Tags, read_coco_results, read_coco_truth, read_tags,
+    ConfusionOptions, EvalImage, read_coco_results, read_coco_truth, read_tags,
     read_yolo_detections, read_yolo_truth,
 };
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
-pub(crate) struct Args {
+pub(crate) struct EvalArgs {
     /// Predictions of one or more runs, then the truth: folders of YOLO labels (`class cx cy w h confidence`) or COCO JSON
     #[arg(required = true, num_args = 2.., value_names = ["PREDICTIONS", "TRUTH"])]
     paths: Vec<PathBuf>,
@@ -22,7 +24,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     classes: Vec<String>,
     /// Width and height of all images in pixels, for YOLO labels without images beside them
-    #[arg(long, value_name = "WxH", value_parser = size)]
+    #[arg(long, value_name = "WxH", value_parser = parse_pixel_size)]
     size: Option<[u32; 2]>,
     /// Where the images of a COCO document are, if not beside it; for pictures of mistakes
     #[arg(long, value_name = "FOLDER")]
@@ -44,110 +46,115 @@ pub(crate) struct Args {
     output: Option<PathBuf>,
 }
 
-pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
-    let (truth, predictions) = args
-        .paths
-        .split_last()
-        .ok_or_else(|| anyhow::anyhow!("expected PREDICTIONS TRUTH"))?;
-    let mut options = EvalReportOptions {
-        classes: args.classes.clone(),
-        tags: args
-            .tags
-            .as_deref()
-            .map_or_else(|| Ok(Tags::default()), read_tags)?,
-        rounds: args.rounds,
-        seed: args.seed,
-        confusion: ConfusionOptions {
-            confidence: args.confidence,
-            ..Default::default()
-        },
-        shown: args.most,
-        pictures: Vec::new(),
-    };
-    let runs: Vec<Run> = predictions
-        .iter()
-        .map(|path| {
-            Ok(Run {
-                name: name(path),
-                sheets: sheets(path, truth, args, &mut options)?,
-            })
-        })
-        .collect::<anyhow::Result<_>>()?;
-    let metrics = match &args.output {
-        Some(folder) => page::write(folder, &runs, &options)?,
-        None => runs
-            .iter()
-            .map(|run| page::Metrics::of(run, &options))
-            .collect(),
-    };
-    print::text(page::scores_table(&metrics, &options).markdown());
-    let (classes, others) = page::classes_in_brief(&metrics, &options);
-    print::text(classes.markdown());
-    if others > 0 {
-        common.say(format_args!(
-            "the classes with the lowest AP; {others} others: -o FOLDER writes classes.csv"
-        ));
-    }
+pub(crate) fn run(args: &EvalArgs, global: &GlobalArgs) -> anyhow::Result<()> {
+    let mut options = args.report_options()?;
+    let runs = args.read_runs(&mut options)?;
+    let metrics = args.measure(&runs, &options)?;
+    print_scores(&metrics, &options, global);
     let factors = page::factors_table(&runs, &options);
     if !factors.rows.is_empty() {
         print::text(factors.markdown());
     }
     if let Some(folder) = &args.output {
-        common.say(format_args!(
-            "look at {}",
-            folder.join("eval.html").display()
-        ));
+        global.print_look_at(&folder.join("eval.html"));
     }
     Ok(())
 }
 
-/// Truth and detections; the options hear of names of classes and of pictures.
-fn sheets(
-    found: &Path,
-    truth: &Path,
-    args: &Args,
-    options: &mut EvalReportOptions,
-) -> anyhow::Result<Vec<EvalImage>> {
-    let classes = &mut options.classes;
-    if truth.extension().is_some_and(|e| e == "json") {
+fn print_scores(metrics: &[Metrics], options: &EvalReportOptions, global: &GlobalArgs) {
+    print::text(page::scores_table(metrics, options).markdown());
+    let (classes, others) = page::classes_in_brief(metrics, options);
+    print::text(classes.markdown());
+    if others > 0 {
+        global.print_status(format_args!(
+            "the classes with the lowest AP; {others} others: -o FOLDER writes classes.csv"
+        ));
+    }
+}
+
+impl EvalArgs {
+    fn report_options(&self) -> anyhow::Result<EvalReportOptions> {
+        let tags = self.tags.as_deref().map(read_tags).transpose()?;
+        Ok(EvalReportOptions {
+            classes: self.classes.clone(),
+            tags: tags.unwrap_or_default(),
+            rounds: self.rounds,
+            seed: self.seed,
+            confusion: ConfusionOptions {
+                confidence: self.confidence,
+                ..Default::default()
+            },
+            shown: self.most,
+            pictures: Vec::new(),
+        })
+    }
+
+    /// Scores of the runs, written where that is asked for.
+    fn measure(&self, runs: &[Run], options: &EvalReportOptions) -> petcomp::Result<Vec<Metrics>> {
+        match &self.output {
+            Some(folder) => page::write(folder, runs, options),
+            None => Ok(runs.iter().map(|run| Metrics::of(run, options)).collect()),
+        }
+    }
+
+    /// All runs; the options get the names of classes and the pictures of the truth.
+    fn read_runs(&self, options: &mut EvalReportOptions) -> anyhow::Result<Vec<Run>> {
+        let Some((truth, predictions)) = self.paths.split_last() else {
+            anyhow::bail!("expected PREDICTIONS TRUTH");
+        };
+        let mut runs = Vec::new();
+        for path in predictions {
+            let sheets = if truth.extension().is_some_and(|e| e == "json") {
+                self.read_coco(path, truth, options)
+            } else {
+                self.read_yolo(path, truth, options)
+            };
+            let (name, sheets) = (run_name(path), sheets?);
+            runs.push(Run { name, sheets });
+        }
+        Ok(runs)
+    }
+
+    fn read_coco(
+        &self,
+        found: &Path,
+        truth: &Path,
+        options: &mut EvalReportOptions,
+    ) -> petcomp::Result<Vec<EvalImage>> {
         let mut all = read_coco_truth(truth)?;
         read_coco_results(found, &mut all)?;
-        if classes.is_empty() {
-            classes.clone_from(&all.classes);
+        if options.classes.is_empty() {
+            options.classes.clone_from(&all.classes);
         }
-        options.pictures = all.pictures(truth, args.images.as_deref());
-        return Ok(all.sheets);
+        options.pictures = all.pictures(truth, self.images.as_deref());
+        Ok(all.sheets)
     }
-    let mut all = read_yolo_truth(truth, args.size)?;
-    read_yolo_detections(found, &mut all)?;
-    if classes.is_empty() {
-        // labels/val of a dataset lie two folders below its data.yaml.
-        let set = truth
-            .parent()
-            .and_then(Path::parent)
-            .and_then(|folder| YoloSet::open(folder).ok());
-        *classes = set.map(|set| set.classes).unwrap_or_default();
+
+    fn read_yolo(
+        &self,
+        found: &Path,
+        truth: &Path,
+        options: &mut EvalReportOptions,
+    ) -> petcomp::Result<Vec<EvalImage>> {
+        let mut all = read_yolo_truth(truth, self.size)?;
+        read_yolo_detections(found, &mut all)?;
+        if options.classes.is_empty() {
+            options.classes = dataset_classes(truth).unwrap_or_default();
+        }
+        options.pictures = all.pictures;
+        Ok(all.sheets)
     }
-    options.pictures = all.pictures;
-    Ok(all.sheets)
 }
 
-fn size(text: &str) -> Result<[u32; 2], String> {
-    let expected = || format!("\"{text}\", expected WIDTHxHEIGHT as in 640x480");
-    let (w, h) = text.split_once(['x', ',']).ok_or_else(expected)?;
-    let side = |side: &str| {
-        side.trim()
-            .parse()
-            .ok()
-            .filter(|&side| side > 0)
-            .ok_or_else(expected)
-    };
-    Ok([side(w)?, side(h)?])
+/// Classes of the dataset that the labels belong to: `labels/val` lies two folders below its data.yaml.
+fn dataset_classes(labels: &Path) -> Option<Vec<String>> {
+    let folder = labels.parent()?.parent()?;
+    Some(YoloSet::open(folder).ok()?.classes)
 }
 
-fn name(path: &Path) -> String {
-    path.file_stem().map_or_else(
-        || path.display().to_string(),
-        |n| n.to_string_lossy().into_owned(),
-    )
+fn run_name(path: &Path) -> String {
+    match path.file_stem() {
+        Some(_) => stem_of(path),
+        None => path.display().to_string(),
+    }
 }

@@ -1,12 +1,14 @@
 //! `petcomp label`: scene -> outlines, boxes, visibility.
 
-use crate::common::{Common, SceneArgs};
+use crate::documents::SceneArgs;
+use crate::global::GlobalArgs;
 use petcomp::dataset::Pipeline;
-use petcomp::{io, label};
-use std::path::PathBuf;
+use petcomp::label::{self, Labels};
+use petcomp::{Scene, io};
+use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
-pub(crate) struct Args {
+pub(crate) struct LabelArgs {
     #[command(flatten)]
     scene: SceneArgs,
     /// Labels to write, JSON
@@ -20,43 +22,56 @@ pub(crate) struct Args {
     polygons: Option<PathBuf>,
 }
 
-pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
-    let scene = args.scene.read()?;
-    // Labels alone need no photo.
-    let scene = if args.overlay.is_some() {
-        scene
-    } else {
-        scene.unlit()
-    };
+pub(crate) fn run(args: &LabelArgs, global: &GlobalArgs) -> anyhow::Result<()> {
+    let scene = args.read_scene()?;
     let pipeline = Pipeline::open_for(args.scene.config_for(&scene)?, &scene)?;
     let labels = match &args.overlay {
-        None => pipeline
-            .label(scene)
-            .map_err(|e| e.in_file(&args.scene.path))?,
-        Some(path) => {
-            let sample = pipeline
-                .take(scene)
-                .map_err(|e| e.in_file(&args.scene.path))?;
-            io::write(
-                path,
-                &label::overlay(&sample.frame, &sample.labels, &pipeline.library().classes),
-            )?;
-            sample.labels
-        }
+        Some(path) => write_overlay(path, &pipeline, scene),
+        None => pipeline.label(scene),
     };
+    let labels = labels.map_err(|e| e.in_file(&args.scene.path))?;
     io::write_json(&args.output, &labels)?;
-    if let Some(path) = &args.polygons {
-        io::write_json(
-            path,
-            &label::borders(&labels, pipeline.config().labels.simplify),
-        )?;
-    }
-    let objects = &labels.objects;
-    let topmost = objects.iter().filter(|o| o.is_topmost()).count();
-    common.say(format_args!(
-        "{}: {} objects, {topmost} on top",
-        args.output.display(),
-        objects.len()
-    ));
+    args.write_polygons(&labels, &pipeline)?;
+    args.report(&labels, global);
     Ok(())
+}
+
+impl LabelArgs {
+    /// Labels alone need no photo.
+    fn read_scene(&self) -> anyhow::Result<Scene> {
+        let scene = self.scene.read_scene()?;
+        Ok(match &self.overlay {
+            Some(_) => scene,
+            None => scene.unlit(),
+        })
+    }
+
+    fn write_polygons(&self, labels: &Labels, pipeline: &Pipeline) -> petcomp::Result<()> {
+        let Some(path) = &self.polygons else {
+            return Ok(());
+        };
+        let simplify = pipeline.config().labels.simplify;
+        io::write_json(path, &label::borders(labels, simplify))
+    }
+
+    fn report(&self, labels: &Labels, global: &GlobalArgs) {
+        let objects = &labels.objects;
+        let topmost = objects.iter().filter(|o| o.is_topmost()).count();
+        let count = objects.len();
+        global.print_written(
+            &self.output,
+            format_args!("{count} objects, {topmost} on top"),
+        );
+    }
+}
+
+/// Takes the picture, and writes it with its labels drawn on it.
+fn write_overlay(path: &Path, pipeline: &Pipeline, scene: Scene) -> petcomp::Result<Labels> {
+    let sample = pipeline.take(scene)?;
+    let classes = &pipeline.library().classes;
+    io::write(
+        path,
+        &label::overlay(&sample.frame, &sample.labels, classes),
+    )?;
+    Ok(sample.labels)
 }

@@ -3,20 +3,29 @@
 #![warn(clippy::unwrap_used, clippy::print_stderr, clippy::print_stdout)]
 
 mod asset;
+mod batch;
 mod camera;
-mod common;
 mod dataset;
 mod demo;
+mod diagnostics;
 mod diff;
 mod doctor;
+mod documents;
 mod eval;
+mod exit;
+mod global;
+mod interruption;
 mod label;
 mod matte;
 mod print;
+mod progress;
 mod render;
 mod scene;
 mod settle;
+mod short_help;
+mod values;
 
+use crate::global::GlobalArgs;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::process::ExitCode;
 
@@ -31,74 +40,93 @@ use std::process::ExitCode;
     propagate_version = true,
     infer_subcommands = false
 )]
-struct Cli {
+struct Program {
     #[command(flatten)]
-    common: common::Common,
+    global: GlobalArgs,
     #[command(subcommand)]
-    stage: Stage,
+    verb: Verb,
 }
 
 #[derive(Subcommand)]
-enum Stage {
+enum Verb {
     /// Make a sample dataset from the photographs in the repository
-    Demo(demo::Args),
+    Demo(demo::DemoArgs),
+    #[command(flatten)]
+    Stage(StageVerb),
+    /// Detections against the truth: average precision, curves, confusion
+    Eval(eval::EvalArgs),
+    /// Compare two pictures, with the flags and exit codes of OpenImageIO's idiff
+    Diff(diff::DiffArgs),
+    /// What this machine has, and whether petcomp works on it
+    Doctor(doctor::DoctorArgs),
+}
+
+/// The stages, in the order of the data.
+#[derive(Subcommand)]
+enum StageVerb {
     /// Photo -> matte and cut-out
     #[command(subcommand)]
-    Matte(matte::Command),
+    Matte(matte::MatteCommand),
     /// Cut-outs with real size and class, kept in a folder
     #[command(subcommand)]
-    Asset(asset::Command),
+    Asset(asset::AssetCommand),
     /// Four labelled corners -> camera
     #[command(subcommand)]
-    Camera(camera::Command),
+    Camera(camera::CameraCommand),
     /// Recipe -> scene
     #[command(subcommand)]
-    Scene(scene::Command),
+    Scene(scene::SceneCommand),
     /// Let a scene's dropped objects come to rest
-    Settle(settle::Args),
+    Settle(settle::SettleArgs),
     /// Scene -> picture
-    Render(render::Args),
+    Render(render::RenderArgs),
     /// Scene -> outlines, boxes, visibility
-    Label(label::Args),
+    Label(label::LabelArgs),
     /// Recipe -> images with labels, ready to train on
     #[command(subcommand)]
-    Dataset(dataset::Command),
-    /// Detections against the truth: average precision, curves, confusion
-    Eval(eval::Args),
-    /// Compare two pictures, with the flags and exit codes of OpenImageIO's idiff
-    Diff(diff::Args),
-    /// What this machine has, and whether petcomp works on it
-    Doctor(doctor::Args),
+    Dataset(dataset::DatasetCommand),
 }
 
 fn main() -> ExitCode {
-    let arguments = diff::accept_idiff_spelling(std::env::args_os());
-    let matches = common::with_short_help(Cli::command()).try_get_matches_from(arguments);
-    let cli = match matches.and_then(|matches| Cli::from_arg_matches(&matches)) {
-        Ok(cli) => cli,
-        Err(said) => return print::usage(&said),
-    };
-    match cli.common.apply().and_then(|()| run(&cli)) {
-        Ok(code) => code,
-        Err(error) => common::report(&error),
+    match parse_command_line() {
+        Ok(program) => program
+            .start()
+            .unwrap_or_else(|error| exit::report_error(&error)),
+        Err(message) => print::usage(&message),
     }
 }
 
-fn run(cli: &Cli) -> anyhow::Result<ExitCode> {
-    let common = &cli.common;
-    match &cli.stage {
-        Stage::Demo(args) => demo::run(args, common)?,
-        Stage::Matte(command) => matte::run(command, common)?,
-        Stage::Asset(command) => asset::run(command, common)?,
-        Stage::Camera(command) => camera::run(command, common)?,
-        Stage::Scene(command) => scene::run(command, common)?,
-        Stage::Settle(args) => settle::run(args, common)?,
-        Stage::Render(args) => render::run(args, common)?,
-        Stage::Label(args) => label::run(args, common)?,
-        Stage::Dataset(command) => dataset::run(command, common)?,
-        Stage::Eval(args) => eval::run(args, common)?,
-        Stage::Diff(args) => return diff::run(args, common),
-        Stage::Doctor(args) => return doctor::run(args),
+fn parse_command_line() -> Result<Program, clap::Error> {
+    let words = diff::accept_idiff_spelling(std::env::args_os());
+    let program = short_help::with_short_help(Program::command());
+    Program::from_arg_matches(&program.try_get_matches_from(words)?)
+}
+
+impl Program {
+    fn start(&self) -> anyhow::Result<ExitCode> {
+        self.global.apply()?;
+        match &self.verb {
+            Verb::Demo(args) => demo::run(args, &self.global)?,
+            Verb::Stage(stage) => stage.run(&self.global)?,
+            Verb::Eval(args) => eval::run(args, &self.global)?,
+            Verb::Diff(args) => return diff::run(args, &self.global),
+            Verb::Doctor(args) => return doctor::run(args),
+        }
+        Ok(ExitCode::SUCCESS)
     }
-    Ok(ExitCode::SUCCESS)
+}
+
+impl StageVerb {
+    fn run(&self, global: &GlobalArgs) -> anyhow::Result<()> {
+        match self {
+            Self::Matte(command) => matte::run(command, global),
+            Self::Asset(command) => asset::run(command, global),
+            Self::Camera(command) => camera::run(command, global),
+            Self::Scene(command) => scene::run(command, global),
+            Self::Settle(args) => settle::run(args, global),
+            Self::Render(args) => render::run(args, global),
+            Self::Label(args) => label::run(args, global),
+            Self::Dataset(command) => dataset::run(command, global),
+        }
+    }
 }

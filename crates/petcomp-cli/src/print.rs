@@ -5,63 +5,61 @@ use std::fmt::Display;
 use std::io::{ErrorKind, Write};
 use std::process::ExitCode;
 
-/// As of a program that SIGPIPE ended.
-const READER_GONE: i32 = 141;
+/// The status of a program that SIGPIPE ended.
+const BROKEN_PIPE_STATUS: i32 = 141;
 
 /// A line on the standard output, whatever is in it.
 pub(crate) fn line(line: impl Display) {
-    out(&(printable(&line.to_string()) + "\n"));
+    write_out(&(printable(&line.to_string()) + "\n"));
 }
 
 /// Lines on the standard output: a table, a script.
 pub(crate) fn text(text: impl Display) {
-    out(&(lines(&text.to_string()) + "\n"));
+    write_out(&(printable_lines(&text.to_string()) + "\n"));
 }
 
-/// A line on the standard error. Where it cannot be written there is nobody to tell that to.
+/// A line on the standard error. Where it cannot be written, nobody can be told.
 pub(crate) fn aside(line: impl Display) {
     let _ = writeln!(std::io::stderr(), "{}", printable(&line.to_string()));
 }
 
-/// What clap has to say, help or a wrong command line, and the exit status that goes with it.
-pub(crate) fn usage(said: &clap::Error) -> ExitCode {
-    let plain = said.render().to_string();
-    let shown = lines(&plain);
-    // With its colours, unless an argument brings some of its own.
-    let done = if shown == plain {
-        said.print()
-    } else {
-        std::io::stderr().write_all(shown.as_bytes())
-    };
-    match done {
-        Err(error) if !said.use_stderr() => gone(&error),
-        _ => ExitCode::from(u8::try_from(said.exit_code()).unwrap_or(u8::MAX)),
+/// Clap's message, help or a wrong command line, and the exit status that goes with it.
+pub(crate) fn usage(message: &clap::Error) -> ExitCode {
+    match print_usage(message) {
+        Err(error) if !message.use_stderr() => exit_unwritable(&error),
+        _ => ExitCode::from(u8::try_from(message.exit_code()).unwrap_or(u8::MAX)),
     }
 }
 
-/// Printable lines.
-fn lines(text: &str) -> String {
-    text.split('\n')
-        .map(printable)
-        .collect::<Vec<_>>()
-        .join("\n")
+/// With its colours, unless an argument brings some of its own.
+fn print_usage(message: &clap::Error) -> std::io::Result<()> {
+    let plain = message.render().to_string();
+    let tame = printable_lines(&plain);
+    if tame == plain {
+        message.print()
+    } else {
+        std::io::stderr().write_all(tame.as_bytes())
+    }
 }
 
-fn out(text: &str) {
+fn printable_lines(text: &str) -> String {
+    let lines: Vec<String> = text.split('\n').map(printable).collect();
+    lines.join("\n")
+}
+
+fn write_out(text: &str) {
     let mut out = std::io::stdout();
     if let Err(error) = out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
-        gone(&error);
+        exit_unwritable(&error);
     }
 }
 
 /// `petcomp ... | head` ends when head does, which is no failure of ours; a full disk is one.
-fn gone(error: &std::io::Error) -> ! {
+fn exit_unwritable(error: &std::io::Error) -> ! {
     if error.kind() == ErrorKind::BrokenPipe {
-        std::process::exit(READER_GONE);
+        std::process::exit(BROKEN_PIPE_STATUS);
     }
-    aside(format_args!(
-        "error: {}",
-        Error::file("standard output", error)
-    ));
-    std::process::exit(crate::common::FILE.into());
+    let error = Error::file("standard output", error);
+    aside(format_args!("error: {error}"));
+    std::process::exit(crate::exit::FILE_STATUS.into());
 }

@@ -1,14 +1,16 @@
 //! `petcomp render`: scene -> picture.
 
-use crate::common::{Common, SceneArgs};
+use crate::documents::{SceneArgs, at_quality};
+use crate::global::GlobalArgs;
 use anyhow::bail;
 use petcomp::composite::{self, Aov};
+use petcomp::dataset::{DatasetConfig, Pipeline};
 use petcomp::io::exr::write_parts;
-use petcomp::{Image, LinearRgb, PremulRgba, Quality, io};
+use petcomp::{DeepImage, Image, LinearRgb, PremulRgba, Quality, Scene, Shot, io};
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
-pub(crate) struct Args {
+pub(crate) struct RenderArgs {
     #[command(flatten)]
     scene: SceneArgs,
     /// Picture to write: .png, .jpg, or .exr for scene-linear values with alpha
@@ -28,48 +30,66 @@ pub(crate) struct Args {
     resolved: Option<PathBuf>,
 }
 
-pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
-    let scene = args.scene.read()?;
-    let mut config = args.scene.config_for(&scene)?;
-    if let Some(quality) = args.quality {
-        config = quality.config(config);
-    }
-    let pipeline = petcomp::dataset::Pipeline::open_for(config, &scene)?;
+pub(crate) fn run(args: &RenderArgs, global: &GlobalArgs) -> anyhow::Result<()> {
+    let scene = args.scene.read_scene()?;
+    let pipeline = Pipeline::open_for(args.config_for(&scene)?, &scene)?;
     let (scene, shot) = pipeline
         .resolve(scene)
         .map_err(|e| e.in_file(&args.scene.path))?;
     let (deep, frame) = pipeline.shoot(&scene, &shot);
-    match args.aov.as_slice() {
-        [] => write(&args.output, &frame)?,
-        aovs => {
-            if extension(&args.output) != "exr" {
-                bail!("{}: parts need a file called .exr", args.output.display());
-            }
-            write_parts(
-                &args.output,
-                frame.size(),
-                &composite::parts(aovs, &deep, &shot, &frame),
-            )?;
-        }
-    }
-    if let Some(path) = &args.preview {
-        io::write(path, &displayed(&frame))?;
-    }
-    if let Some(path) = &args.resolved {
-        let scene = pipeline.config().with_files(scene.clone(), path)?;
-        io::write_document(path, &scene)?;
-    }
-    let (w, h) = frame.size();
-    common.say(format_args!(
-        "{}: {w} x {h}, {} objects",
-        args.output.display(),
-        scene.objects.len()
-    ));
+    args.write_frame(&deep, &shot, &frame)?;
+    let ((w, h), objects) = (frame.size(), scene.objects.len());
+    args.write_resolved(scene, pipeline.config())?;
+    global.print_written(&args.output, format_args!("{w} x {h}, {objects} objects"));
     Ok(())
 }
 
-fn write(path: &Path, frame: &Image<PremulRgba>) -> anyhow::Result<()> {
-    match extension(path).as_str() {
+impl RenderArgs {
+    fn config_for(&self, scene: &Scene) -> anyhow::Result<DatasetConfig> {
+        Ok(at_quality(self.quality, self.scene.config_for(scene)?))
+    }
+
+    fn write_frame(
+        &self,
+        deep: &DeepImage,
+        shot: &Shot,
+        frame: &Image<PremulRgba>,
+    ) -> anyhow::Result<()> {
+        if self.aov.is_empty() {
+            write_picture(&self.output, frame)?;
+        } else {
+            self.write_parts(deep, shot, frame)?;
+        }
+        if let Some(path) = &self.preview {
+            io::write(path, &displayed(frame))?;
+        }
+        Ok(())
+    }
+
+    fn write_resolved(&self, scene: Scene, config: &DatasetConfig) -> petcomp::Result<()> {
+        let Some(path) = &self.resolved else {
+            return Ok(());
+        };
+        io::write_document(path, &config.with_files(scene, path)?)
+    }
+
+    fn write_parts(
+        &self,
+        deep: &DeepImage,
+        shot: &Shot,
+        frame: &Image<PremulRgba>,
+    ) -> anyhow::Result<()> {
+        let path = &self.output;
+        if extension_of(path) != "exr" {
+            bail!("{}: parts need a file called .exr", path.display());
+        }
+        let parts = composite::parts(&self.aov, deep, shot, frame);
+        Ok(write_parts(path, frame.size(), &parts)?)
+    }
+}
+
+fn write_picture(path: &Path, frame: &Image<PremulRgba>) -> anyhow::Result<()> {
+    match extension_of(path).as_str() {
         "exr" | "tif" | "tiff" => io::write(path, frame)?,
         "png" | "jpg" | "jpeg" => io::write(path, &displayed(frame))?,
         _ => bail!(
@@ -85,7 +105,7 @@ fn displayed(frame: &Image<PremulRgba>) -> Image<LinearRgb> {
     frame.map(PremulRgba::color)
 }
 
-fn extension(path: &Path) -> String {
+fn extension_of(path: &Path) -> String {
     path.extension()
         .map(|e| e.to_string_lossy().to_lowercase())
         .unwrap_or_default()

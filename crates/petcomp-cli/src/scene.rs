@@ -1,26 +1,27 @@
 //! `petcomp scene`: recipe -> scene.
 
-use crate::common::{Common, RecipeArgs};
+use crate::documents::RecipeArgs;
+use crate::global::GlobalArgs;
 use crate::print;
 use petcomp::scene::cycles;
 use petcomp::{Scene, io};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 #[derive(clap::Subcommand)]
-pub(crate) enum Command {
+pub(crate) enum SceneCommand {
     /// Draw scene K of a recipe
-    Draw(Draw),
+    Draw(DrawArgs),
     /// Check that a scene file is possible
     Check {
         /// Scene, TOML or JSON
         scene: PathBuf,
     },
     /// Write a scene for another renderer: JSON, plate and textures that Blender renders with one more command
-    Export(Export),
+    Export(ExportSceneArgs),
 }
 
 #[derive(clap::Args)]
-pub(crate) struct Export {
+pub(crate) struct ExportSceneArgs {
     /// Scene, TOML or JSON; what is unknown in it is solved first
     scene: PathBuf,
     #[command(flatten)]
@@ -40,7 +41,7 @@ enum Renderer {
 }
 
 #[derive(clap::Args)]
-pub(crate) struct Draw {
+pub(crate) struct DrawArgs {
     #[command(flatten)]
     recipe: RecipeArgs,
     /// Seed of the dataset
@@ -54,48 +55,49 @@ pub(crate) struct Draw {
     output: PathBuf,
 }
 
-pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
+pub(crate) fn run(command: &SceneCommand, global: &GlobalArgs) -> anyhow::Result<()> {
     match command {
-        Command::Draw(args) => {
-            let pipeline = args.recipe.pipeline()?;
-            let scene = pipeline.draw(args.seed, args.index)?;
-            let scene = pipeline.config().with_files(scene, &args.output)?;
-            io::write_document(&args.output, &scene)?;
-            common.say(format_args!(
-                "{}: {} objects over {}",
-                args.output.display(),
-                scene.objects.len(),
-                scene.plate
-            ));
-        }
-        Command::Check { scene: path } => {
-            let scene: Scene = io::read_document(path)?;
-            scene.check().map_err(|e| e.in_file(path))?;
-            print::line(format_args!("{}: possible", path.display()));
-        }
-        Command::Export(args) => export(args, common)?,
+        SceneCommand::Draw(args) => draw_scene(args, global),
+        SceneCommand::Check { scene } => check_scene(scene),
+        SceneCommand::Export(args) => export_scene(args, global),
     }
+}
+
+fn draw_scene(args: &DrawArgs, global: &GlobalArgs) -> anyhow::Result<()> {
+    let pipeline = args.recipe.open_pipeline()?;
+    let scene = pipeline.draw(args.seed, args.index)?;
+    let scene = pipeline.config().with_files(scene, &args.output)?;
+    io::write_document(&args.output, &scene)?;
+    let (objects, plate) = (scene.objects.len(), &scene.plate);
+    global.print_written(&args.output, format_args!("{objects} objects over {plate}"));
     Ok(())
 }
 
-fn export(args: &Export, common: &Common) -> anyhow::Result<()> {
+fn check_scene(path: &Path) -> anyhow::Result<()> {
+    let scene: Scene = io::read_document(path)?;
+    scene.check().map_err(|e| e.in_file(path))?;
+    print::line(format_args!("{}: possible", path.display()));
+    Ok(())
+}
+
+fn export_scene(args: &ExportSceneArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     let scene: Scene = io::read_document(&args.scene)?;
     let Renderer::Cycles = args.to;
-    let (scene, shot) = args
-        .recipe
-        .pipeline()?
+    let pipeline = args.recipe.open_pipeline()?;
+    let (scene, shot) = pipeline
         .resolve(scene)
         .map_err(|e| e.in_file(&args.scene))?;
     cycles::export(&shot, scene.surface.size, &args.folder)?;
-    let folder = args.folder.display();
-    common.say(format_args!(
-        "{folder}: {} cards; render it with",
-        shot.cards.len()
-    ));
-    common.say(format_args!(
-        "  blender -b --factory-startup --python-use-system-env -P {folder}/{} -- \
-         {folder}/scene.json --out {folder}/cycles --preview",
-        cycles::SCRIPT
-    ));
+    let cards = shot.cards.len();
+    global.print_written(&args.folder, format_args!("{cards} cards; render it with"));
+    global.print_status(format_args!("  {}", blender_command(&args.folder)));
     Ok(())
+}
+
+fn blender_command(folder: &Path) -> String {
+    let (folder, script) = (folder.display(), cycles::SCRIPT);
+    format!(
+        "blender -b --factory-startup --python-use-system-env -P {folder}/{script} -- \
+         {folder}/scene.json --out {folder}/cycles --preview"
+    )
 }

@@ -1,13 +1,13 @@
 //! `petcomp settle`: dropped objects come to rest.
 
-use crate::common::Common;
+use crate::global::GlobalArgs;
 use petcomp::dataset::DatasetConfig;
-use petcomp::settle::{SettleOptions, preview, settle_traced, trace_csv};
+use petcomp::settle::{SettleOptions, Settled, preview, settle_traced, trace_csv};
 use petcomp::{Quality, Scene, io};
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
-pub(crate) struct Args {
+pub(crate) struct SettleArgs {
     /// Scene, TOML or JSON
     scene: PathBuf,
     /// Scene to write, TOML or JSON by its extension
@@ -27,42 +27,63 @@ pub(crate) struct Args {
     preview: Option<PathBuf>,
 }
 
-pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
+/// Steps of the simulation from one line of the trace to the next: 60 lines a second at the default step.
+const TRACE_INTERVAL_STEPS: usize = 8;
+
+pub(crate) fn run(args: &SettleArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     let scene: Scene = io::read_document(&args.scene)?;
-    let options = match &args.options {
-        Some(path) => read_options(path)?,
-        None => scene_options(&scene, &args.scene)?,
-    };
-    let options = args
-        .quality
-        .map_or(options, |quality| quality.settle(options));
-    // 60 a second at the default step.
-    let every = if args.trace.is_some() { 8 } else { 0 };
-    let (settled, samples) =
-        settle_traced(scene, &options, every).map_err(|e| e.in_file(&args.scene))?;
-    // Written for a failed fall too: it shows what went wrong.
-    if let Some(path) = &args.trace {
-        io::write_text(path, &trace_csv(&samples))?;
-    }
+    let options = args.options_for(&scene)?;
+    let settled = args.settle(scene, &options)?;
     let (seconds, rejected) = (settled.seconds, settled.rejected.len());
-    let mut rest = settled.into_scene()?;
-    if let Some(files) = &rest.files {
-        rest.files = Some(files.moved(&args.scene, &args.output)?);
-    }
-    io::write_document(&args.output, &rest)?;
+    let rest = args.write_rest(settled.into_scene()?)?;
     if let Some(path) = &args.preview {
         io::write(path, &preview(&rest, &options))?;
     }
-    common.say(format_args!(
-        "{}: at rest after {seconds:.2} s, {rejected} attempts rejected",
-        args.output.display()
-    ));
+    let what = format!("at rest after {seconds:.2} s, {rejected} attempts rejected");
+    global.print_written(&args.output, what);
     Ok(())
 }
 
-fn scene_options(scene: &Scene, path: &Path) -> petcomp::Result<SettleOptions> {
-    let config = DatasetConfig::from_settings(&scene.settings, &[]).map_err(|e| e.in_file(path))?;
-    Ok(config.scene.settle)
+impl SettleArgs {
+    /// Lets the objects fall and writes the trace, for a failed fall too: it shows what went wrong.
+    fn settle(&self, scene: Scene, options: &SettleOptions) -> petcomp::Result<Settled> {
+        let interval = match self.trace {
+            Some(_) => TRACE_INTERVAL_STEPS,
+            None => 0,
+        };
+        let (settled, samples) =
+            settle_traced(scene, options, interval).map_err(|e| e.in_file(&self.scene))?;
+        if let Some(path) = &self.trace {
+            io::write_text(path, &trace_csv(&samples))?;
+        }
+        Ok(settled)
+    }
+
+    /// Writes the scene at rest, the files that it names seen from its new place.
+    fn write_rest(&self, mut scene: Scene) -> petcomp::Result<Scene> {
+        if let Some(files) = &scene.files {
+            scene.files = Some(files.moved(&self.scene, &self.output)?);
+        }
+        io::write_document(&self.output, &scene)?;
+        Ok(scene)
+    }
+
+    fn options_for(&self, scene: &Scene) -> petcomp::Result<SettleOptions> {
+        let options = match &self.options {
+            Some(path) => read_options(path),
+            None => self.scene_options(scene),
+        }?;
+        Ok(match self.quality {
+            Some(quality) => quality.settle(options),
+            None => options,
+        })
+    }
+
+    /// Those of the scene's own settings.
+    fn scene_options(&self, scene: &Scene) -> petcomp::Result<SettleOptions> {
+        let config = DatasetConfig::from_settings(&scene.settings, &[]);
+        Ok(config.map_err(|e| e.in_file(&self.scene))?.scene.settle)
+    }
 }
 
 fn read_options(path: &Path) -> petcomp::Result<SettleOptions> {

@@ -2,7 +2,7 @@
 //! along those curves, other programs, and extreme cases.
 //!
 //! Inputs are made in code or come with the repository (the golden scenes of Blender's Cycles), so that a fresh clone will
-//! do; photos with known mattes and other programs' measurements are added where they are.
+//! do; photos with known mattes and other programs' measurements are added where they exist.
 
 use super::section::{Document, Section};
 use super::{
@@ -11,6 +11,7 @@ use super::{
 };
 use petcomp::Quality;
 use petcomp::Result;
+use petcomp::plot::Table;
 use std::path::{Path, PathBuf};
 
 /// What the report is made from.
@@ -22,9 +23,9 @@ pub struct AllOptions {
     pub peers: PathBuf,
     /// Folder of photos with known mattes, as the sample world has them; empty = photos made in code. Default: empty.
     pub truth: PathBuf,
-    /// Fewer runs and inputs: a look in half a minute, with noisier times. Default: no.
+    /// Fewer runs and inputs: half a minute, with noisier times. Default: no.
     pub quick: bool,
-    /// When it was made, as it is to be told. Default: nothing.
+    /// When it was made, as the report shows it. Default: nothing.
     pub date: String,
 }
 
@@ -48,22 +49,32 @@ struct Amount {
     runs: usize,
 }
 
+const QUICK_AMOUNT: Amount = Amount {
+    views: 20,
+    bottles: 1,
+    heaps: 2,
+    runs: 1,
+};
+
+const FULL_AMOUNT: Amount = Amount {
+    views: 200,
+    bottles: 4,
+    heaps: 10,
+    runs: 5,
+};
+
 impl AllOptions {
     fn amount(&self) -> Amount {
-        match self.quick {
-            true => Amount {
-                views: 20,
-                bottles: 1,
-                heaps: 2,
-                runs: 1,
-            },
-            false => Amount {
-                views: 200,
-                bottles: 4,
-                heaps: 10,
-                runs: 5,
-            },
+        if self.quick {
+            QUICK_AMOUNT
+        } else {
+            FULL_AMOUNT
         }
+    }
+
+    /// Sections that take their time.
+    fn slow_sections(&self) -> &'static [fn() -> Result<Section>] {
+        if self.quick { &[] } else { &SLOW_SECTIONS }
     }
 }
 
@@ -77,48 +88,28 @@ const STAGES: [Measure; 10] = [
     |_, amount| matte::searches(amount.bottles),
     |_, _| keying::diagrams(),
     |_, amount| Ok(camera::diagrams(amount.views)),
-    |_, amount| {
-        let rows = settle::measure(
-            &settle::SettleReportOptions {
-                heaps: amount.heaps,
-            },
-            |_, _| (),
-        )?;
-        Ok(settle::diagrams(&rows))
-    },
+    |_, amount| settle::measured_diagrams(amount.heaps),
     |_, _| light::diagrams(),
     |options, amount| render::diagrams(&options.golden, amount.runs),
     |_, _| label::diagrams(),
     |_, _| encode::diagrams(),
 ];
 
-/// What follows the diagrams, and takes its time.
-const REST: [fn() -> Result<Section>; 3] = [stability_of_stages, paid_for, memory_and_scale];
+const SLOW_SECTIONS: [fn() -> Result<Section>; 3] =
+    [stability_of_stages, counted_work, memory_and_scale];
 
-/// Measures everything; `progress` hears of each step and of how many there are.
+/// Measures everything; `progress` gets the number of the step and of all steps.
 ///
 /// Times are CPU seconds of one thread. Takes about three minutes on two to four cores, half a minute when it is to be quick, which
 /// leaves out extreme cases, counted work and scale.
 ///
 /// # Errors
-/// An input that cannot be read; a thread or scratch folder that cannot be had; memory and scale need Linux's `/proc`.
+/// An input that cannot be read; a thread or scratch folder that cannot be made; memory and scale need Linux's `/proc`.
 pub fn measure(options: &AllOptions, progress: impl Fn(u64, u64)) -> Result<Document> {
-    let amount = options.amount();
-    let rest = if options.quick { &[][..] } else { &REST };
-    let steps = (STAGES.len() + rest.len()) as u64;
-    let mut diagrams = Vec::new();
-    for (done, stage) in (0..).zip(STAGES) {
-        progress(done, steps);
-        diagrams.extend(stage(options, &amount)?);
-    }
-    let others = peers::read(&options.peers)?;
-    let mut sections = vec![
-        about(options),
-        curves(&diagrams),
-        qualities(),
-        beside_others(&others, &options.peers),
-    ];
-    for (done, section) in (STAGES.len() as u64..).zip(rest) {
+    let slow = options.slow_sections();
+    let steps = (STAGES.len() + slow.len()) as u64;
+    let mut sections = quick_sections(options, |done| progress(done, steps))?;
+    for (done, section) in (STAGES.len() as u64..).zip(slow) {
         progress(done, steps);
         sections.push(section()?);
     }
@@ -127,6 +118,27 @@ pub fn measure(options: &AllOptions, progress: impl Fn(u64, u64)) -> Result<Docu
         title: "petcomp: what it does, how well, and at what cost".into(),
         sections,
     })
+}
+
+fn quick_sections(options: &AllOptions, progress: impl Fn(u64)) -> Result<Vec<Section>> {
+    let diagrams = measure_stages(options, progress)?;
+    let others = peers::read_comparisons(&options.peers)?;
+    Ok(vec![
+        about_report(options),
+        error_curves(&diagrams),
+        quality_table(),
+        other_programs(&others, &options.peers),
+    ])
+}
+
+fn measure_stages(options: &AllOptions, progress: impl Fn(u64)) -> Result<Vec<Diagram>> {
+    let amount = options.amount();
+    let mut diagrams = Vec::new();
+    for (done, stage) in (0..).zip(STAGES) {
+        progress(done);
+        diagrams.extend(stage(options, &amount)?);
+    }
+    Ok(diagrams)
 }
 
 /// Measures everything and writes `report.html`, `report.md` and the data of each plot and table (`.csv`) into a folder.
@@ -139,7 +151,7 @@ pub fn write(folder: &Path, options: &AllOptions, progress: impl Fn(u64, u64)) -
     Ok(document)
 }
 
-fn about(options: &AllOptions) -> Section {
+fn about_report(options: &AllOptions) -> Section {
     let quick = if options.quick {
         " It was made in a hurry (`--quick`): times are of few runs; extreme cases, counted work and scale are left out."
     } else {
@@ -150,10 +162,10 @@ fn about(options: &AllOptions) -> Section {
             "One run of `petcomp-report all` on the machine below. Times are CPU seconds of one thread, medians; errors are \
              the same at every run.{quick}"
         ))
-        .table("machine", machine::machine(&options.date))
+        .table("machine", machine::machine_table(&options.date))
 }
 
-fn curves(diagrams: &[Diagram]) -> Section {
+fn error_curves(diagrams: &[Diagram]) -> Section {
     Section::new("Error against run time")
         .text(
             "Each point is a setting: further left is cheaper, further down is more exact, and what nothing beats in both is \
@@ -163,7 +175,7 @@ fn curves(diagrams: &[Diagram]) -> Section {
         .diagrams(diagrams)
 }
 
-fn qualities() -> Section {
+fn quality_table() -> Section {
     Section::new("Quality")
         .text(
             "`--quality draft|normal|reference` moves every approximate stage of a run along its curve at once. What is not \
@@ -173,31 +185,37 @@ fn qualities() -> Section {
         .table("quality", Quality::table())
 }
 
-fn beside_others(comparisons: &[peers::PeerComparison], folder: &Path) -> Section {
+fn other_programs(comparisons: &[peers::PeerComparison], folder: &Path) -> Section {
     let section = Section::new("Other programs");
     if comparisons.is_empty() {
         let folder = folder.display();
         return section.text(format!(
-            "There are no measurements in {folder}: `make peers` runs the other programs that can be had."
+            "There are no measurements in {folder}: `make peers` runs the other programs that are available."
         ));
     }
-    let notes = comparisons
+    comparisons
         .iter()
-        .map(|c| (c.stage.clone(), c.missing()))
-        .filter(|(_, text)| !text.is_empty());
-    let section = notes.fold(section, |section, (stage, text)| {
-        section.text(format!("{stage}: {text}"))
-    });
-    let drawn: Vec<Diagram> = comparisons
-        .iter()
-        .map(peers::PeerComparison::diagram)
-        .filter(|d| !d.points.is_empty())
-        .collect();
-    section
+        .fold(section, |section, c| section.text(missing_note(c)))
         .text("Measured in one run of `make peers`, on the same cores and the same input.")
         .table("peers", peers::ratios(comparisons))
-        .diagrams(&drawn)
+        .diagrams(&peer_diagrams(comparisons))
         .table("peers_commands", peers::commands(comparisons))
+}
+
+/// What is missing in a comparison; empty where nothing is.
+fn missing_note(comparison: &peers::PeerComparison) -> String {
+    match comparison.missing() {
+        text if text.is_empty() => text,
+        text => format!("{}: {text}", comparison.stage),
+    }
+}
+
+fn peer_diagrams(comparisons: &[peers::PeerComparison]) -> Vec<Diagram> {
+    comparisons
+        .iter()
+        .map(peers::PeerComparison::diagram)
+        .filter(|diagram| !diagram.points.is_empty())
+        .collect()
 }
 
 fn stability_of_stages() -> Result<Section> {
@@ -212,9 +230,9 @@ fn stability_of_stages() -> Result<Section> {
         .table("stability", stability::table(&rows)))
 }
 
-fn paid_for() -> Result<Section> {
+fn counted_work() -> Result<Section> {
     let rows = work::measure(|_, _| ())?;
-    let kept = rows.iter().filter(|row| row.is_as_promised()).count();
+    let kept = rows.iter().filter(|row| row.is_as_expected()).count();
     Ok(Section::new("A scene pays for what it uses")
         .text(format!(
             "Work, counted and not timed: the same at every run and on every machine. A marked zero is promised; {kept} of {} \
@@ -227,22 +245,23 @@ fn paid_for() -> Result<Section> {
 fn memory_and_scale() -> Result<Section> {
     let measured = scale::measure(&scale::ScaleOptions::default(), |_, _| ())?;
     let tables = scale::tables(&measured)?;
-    let data = tables
-        .first()
-        .map(|(_, table)| table.clone())
-        .unwrap_or_default();
-    let section = scale::charts(&measured)?.into_iter().fold(
-        Section::new("Memory and scale"),
-        |section, (svg, caption)| section.figure("scale_points", svg, caption, data.clone()),
-    );
-    Ok(tables.into_iter().fold(section, |section, (title, table)| {
-        section
-            .text(format!("{title}:"))
-            .table(format!("scale_{}", file_name(&title)), table)
-    }))
+    let mut section = Section::new("Memory and scale");
+    for (svg, caption) in scale::charts(&measured)? {
+        section = section.figure("scale_points", svg, caption, first_table(&tables));
+    }
+    Ok(tables.into_iter().fold(section, with_titled_table))
 }
 
-/// A title as a file may be called.
-fn file_name(title: &str) -> String {
-    title.to_lowercase().replace(' ', "_")
+fn first_table(tables: &[(String, Table)]) -> Table {
+    tables
+        .first()
+        .map(|(_, table)| table.clone())
+        .unwrap_or_default()
+}
+
+fn with_titled_table(section: Section, (title, table): (String, Table)) -> Section {
+    let file = title.to_lowercase().replace(' ', "_");
+    section
+        .text(format!("{title}:"))
+        .table(format!("scale_{file}"), table)
 }

@@ -1,4 +1,4 @@
-//! The system's allocator, which tells the library of large pieces, for `petcomp-report work`.
+//! The system's allocator, which reports large allocations to the library, for `petcomp-report work`.
 
 #![expect(
     unsafe_code,
@@ -8,14 +8,14 @@
 use petcomp::work::allocated;
 use std::alloc::{GlobalAlloc, Layout, System};
 
-/// Gives what the system gives.
-struct Telling;
+/// The system's allocator with a counter.
+struct CountingAllocator;
 
 #[global_allocator]
-static ALLOCATOR: Telling = Telling;
+static ALLOCATOR: CountingAllocator = CountingAllocator;
 
-// SAFETY: all promises are those of `System`, which gets the same arguments; counting neither allocates nor panics.
-unsafe impl GlobalAlloc for Telling {
+// SAFETY: all guarantees are those of `System`, which gets the same arguments; counting neither allocates nor panics.
+unsafe impl GlobalAlloc for CountingAllocator {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         allocated(layout.size());
         unsafe { System.alloc(layout) }

@@ -5,29 +5,34 @@
 
 mod coverage;
 mod diagram;
+mod method;
+mod show;
 
-pub use coverage::Coverage;
+pub use coverage::StatedErrors;
 pub use diagram::diagrams;
+pub use method::{Lens, SolveMethod};
 
 use super::clock::cpu_seconds;
+use super::files::write_texts;
+use super::statistics::{median_and_95, quantile};
+use method::PHOTOS_TOGETHER;
 use petcomp::camera::distorted;
-use petcomp::camera::simulate::{Scenario, View};
-use petcomp::camera::{self, Priors, Solution, SolveOptions};
+use petcomp::camera::simulate::View;
+use petcomp::camera::{Solution, SolveOptions};
 use petcomp::geom::Point3;
-use petcomp::plot::{Axis, Chart, Curve};
 use petcomp::{Error, Result, io};
 use std::path::Path;
 
 /// Noise of the corners, pixels.
-const NOISES: [f64; 4] = [0.1, 0.5, 1.0, 2.0];
+const NOISES_PX: [f64; 4] = [0.1, 0.5, 1.0, 2.0];
 /// Angles from straight above, degrees.
-const TILTS: [f64; 10] = [0.0, 2.0, 5.0, 10.0, 15.0, 20.0, 30.0, 45.0, 60.0, 80.0];
-/// Those of them that run time is plotted for.
-const TIMED_TILTS: [f64; 3] = [5.0, 20.0, 45.0];
-const SEED: u64 = 5;
-const PHOTOS_TOGETHER: usize = 8;
+const TILTS_DEG: [f64; 10] = [0.0, 2.0, 5.0, 10.0, 15.0, 20.0, 30.0, 45.0, 60.0, 80.0];
+const VIEW_SEED: u64 = 5;
 /// Height above the surface at which the error in the picture is measured, metres.
-const HEIGHT: f64 = 0.05;
+const ERROR_HEIGHT_M: f64 = 0.05;
+/// Points along each side of the rectangle at which it is measured.
+const ERROR_GRID_SIDE: usize = 4;
+const US_PER_SECOND: f64 = 1e6;
 
 /// Options of the report.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,29 +47,9 @@ impl Default for CameraReportOptions {
     }
 }
 
-/// What the camera is really like, and what is believed of it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Lens {
-    /// A perfect pinhole over a perfect rectangle, and the solver knows; nothing is known of the focal length.
-    Ideal,
-    /// Principal point, distortion and tape measure are as uncertain as they usually are, with the default beliefs.
-    Realistic,
-}
-
-/// How a camera is found.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Method {
-    /// The closed form and so many steps of refinement.
-    Steps(usize),
-    /// Every start, to the end, with covariance.
-    Whole,
-    /// Together with other photos of the same camera.
-    Joint,
-}
-
 /// Errors and run time of a method over many views.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Row {
+pub struct CameraRow {
     /// The kind of camera.
     pub lens: Lens,
     /// Noise of the corners, pixels.
@@ -72,187 +57,128 @@ pub struct Row {
     /// Angle from straight above, degrees.
     pub tilt_deg: f64,
     /// How the camera was found.
-    pub method: Method,
+    pub method: SolveMethod,
     /// How many views there were, and how many of them gave no camera; those count as infinitely wrong.
     pub views: usize,
     /// See [`views`](Self::views).
     pub failed: usize,
     /// Error of the focal length, percent: median and 95 % quantile.
     pub focal_percent: [f64; 2],
-    /// Error of where points 50 mm above the surface are seen, root mean square over the rectangle, pixels; likewise.
+    /// Error of where points 50 mm above the surface are seen, root mean square over the rectangle, pixels: median and 95 % quantile.
     pub height_px: [f64; 2],
     /// Median CPU time of a photo, microseconds.
     pub time_us: f64,
 }
 
-impl Lens {
-    /// Both of them.
-    pub const ALL: [Self; 2] = [Self::Ideal, Self::Realistic];
-
-    /// What it is called in tables.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Ideal => "ideal",
-            Self::Realistic => "realistic",
-        }
-    }
-
-    fn scenario(self, noise_px: f64) -> Scenario {
-        let usual = match self {
-            Self::Ideal => Scenario::default(),
-            Self::Realistic => Scenario::realistic(),
-        };
-        Scenario {
-            corner_sigma_px: noise_px,
-            ..usual
-        }
-    }
-
-    fn priors(self, method: Method) -> Priors {
-        match (self, method) {
-            (Self::Ideal, _) => Priors::ideal().with_free_focal(),
-            (Self::Realistic, Method::Joint) => Priors {
-                kappa_sigma: 0.01,
-                ..Priors::default()
-            },
-            (Self::Realistic, _) => Priors::default(),
-        }
-    }
-}
-
-impl Method {
-    /// All of them, the quickest first.
-    pub const ALL: [Self; 8] = [
-        Self::Steps(0),
-        Self::Steps(1),
-        Self::Steps(2),
-        Self::Steps(3),
-        Self::Steps(4),
-        Self::Steps(5),
-        Self::Whole,
-        Self::Joint,
-    ];
-
-    /// What it is called in tables.
-    pub fn name(self) -> String {
-        match self {
-            Self::Steps(0) => "closed form".into(),
-            Self::Steps(1) => "closed form + 1 step".into(),
-            Self::Steps(n) => format!("closed form + {n} steps"),
-            Self::Whole => "full refinement".into(),
-            Self::Joint => format!("joint, {PHOTOS_TOGETHER} photos"),
-        }
-    }
-
-    fn options(self, lens: Lens) -> SolveOptions {
-        let max_iterations = match self {
-            Self::Steps(limit) => Some(limit),
-            Self::Whole | Self::Joint => None,
-        };
-        SolveOptions {
-            priors: lens.priors(self),
-            max_iterations,
-            ..Default::default()
-        }
-    }
-
-    /// Solves the first of some photos of one camera.
-    fn solve(self, views: &[View], options: &SolveOptions) -> Option<Solution> {
-        if self != Self::Joint {
-            return camera::solve(&views[0].label, options).ok();
-        }
-        let labels: Vec<_> = views.iter().map(|v| v.label.clone()).collect();
-        camera::solve_joint(&labels, options)
-            .ok()?
-            .photos
-            .swap_remove(0)
-            .ok()
-    }
-
-    /// How many photos it looks at for one result.
-    fn photos(self) -> usize {
-        if self == Self::Joint {
-            PHOTOS_TOGETHER
-        } else {
-            1
-        }
-    }
-}
-
-/// Measures every method on every kind of view; `progress` hears of each step and of how many there are.
+/// Measures every method on every kind of view; `progress` gets the number of the step and of all steps.
 ///
 /// One thread, so that run times mean something: about twenty seconds for 100 views on one core of a desktop of 2020.
-pub fn measure(options: &CameraReportOptions, progress: impl Fn(u64, u64)) -> Vec<Row> {
+pub fn measure(options: &CameraReportOptions, progress: impl Fn(u64, u64)) -> Vec<CameraRow> {
+    let kinds = ViewKind::all();
     let mut rows = Vec::new();
-    let total = (Lens::ALL.len() * NOISES.len() * TILTS.len()) as u64;
-    for (lens, noise_px) in Lens::ALL
-        .into_iter()
-        .flat_map(|lens| NOISES.map(|noise| (lens, noise)))
-    {
-        for tilt_deg in TILTS {
-            progress((rows.len() / Method::ALL.len()) as u64, total);
-            let cell = Cell {
-                lens,
-                noise_px,
-                tilt_deg,
-            };
-            let photos: Vec<_> = (0..options.views).map(|k| cell.photos(k)).collect();
-            rows.extend(Method::ALL.map(|method| cell.row(method, &photos)));
-        }
+    for (done, kind) in kinds.iter().enumerate() {
+        progress(done as u64, kinds.len() as u64);
+        rows.extend(kind.rows(&SolveMethod::ALL, options.views));
     }
     rows
 }
 
 /// A kind of view.
 #[derive(Clone, Copy)]
-struct Cell {
+struct ViewKind {
     lens: Lens,
     noise_px: f64,
     tilt_deg: f64,
 }
 
-impl Cell {
+impl ViewKind {
+    /// Every lens with every noise at every tilt.
+    fn all() -> Vec<Self> {
+        let noisy = Lens::ALL
+            .into_iter()
+            .flat_map(|lens| NOISES_PX.map(|noise_px| (lens, noise_px)));
+        noisy
+            .flat_map(|(lens, noise_px)| {
+                TILTS_DEG.map(|tilt_deg| Self {
+                    lens,
+                    noise_px,
+                    tilt_deg,
+                })
+            })
+            .collect()
+    }
+
     /// Photos of camera `k`.
     fn photos(&self, k: u64) -> Vec<View> {
         let scenario = self.lens.scenario(self.noise_px);
-        let mut views = scenario.views(SEED, k, PHOTOS_TOGETHER, [self.tilt_deg; 2]);
-        views
-            .iter_mut()
-            .for_each(|v| v.label.surface.id = "tray".into());
+        let mut views = scenario.views(VIEW_SEED, k, PHOTOS_TOGETHER, [self.tilt_deg; 2]);
+        views.iter_mut().for_each(name_surface);
         views
     }
 
-    fn row(&self, method: Method, photos: &[Vec<View>]) -> Row {
+    /// What each method makes of the same cameras.
+    fn rows(&self, methods: &[SolveMethod], cameras: u64) -> Vec<CameraRow> {
+        let photos: Vec<_> = (0..cameras).map(|k| self.photos(k)).collect();
+        methods.iter().map(|m| self.row(*m, &photos)).collect()
+    }
+
+    fn row(&self, method: SolveMethod, photos: &[Vec<View>]) -> CameraRow {
         let options = method.options(self.lens);
-        let (mut focal, mut height, mut times) = (Vec::new(), Vec::new(), Vec::new());
-        for views in photos {
-            let start = cpu_seconds();
-            let solution = method.solve(views, &options);
-            times.push((cpu_seconds() - start) * 1e6 / method.photos() as f64);
-            focal.push(
-                solution
-                    .as_ref()
-                    .map_or(f64::INFINITY, |s| focal_percent(&views[0], s)),
-            );
-            height.push(
-                solution
-                    .as_ref()
-                    .map_or(f64::INFINITY, |s| height_error_px(&views[0], s)),
-            );
-        }
-        let failed = focal.iter().filter(|e| e.is_infinite()).count();
-        Row {
+        let solved: Vec<ViewError> = photos
+            .iter()
+            .map(|views| ViewError::measure(method, views, &options))
+            .collect();
+        CameraRow {
             lens: self.lens,
             noise_px: self.noise_px,
             tilt_deg: self.tilt_deg,
             method,
             views: photos.len(),
-            failed,
-            focal_percent: spread(focal),
-            height_px: spread(height),
-            time_us: spread(times)[0],
+            failed: solved.iter().filter(|e| e.is_failure()).count(),
+            focal_percent: median_and_95(solved.iter().map(|e| e.focal_percent)),
+            height_px: median_and_95(solved.iter().map(|e| e.height_px)),
+            time_us: quantile(solved.iter().map(|e| e.time_us), 0.5),
         }
     }
+}
+
+/// Photos of one camera may be solved together where they show one surface.
+fn name_surface(view: &mut View) {
+    view.label.surface.id = "tray".into();
+}
+
+/// Errors of one photo's camera, infinite where there is none, and what it took.
+struct ViewError {
+    focal_percent: f64,
+    height_px: f64,
+    time_us: f64,
+}
+
+impl ViewError {
+    fn measure(method: SolveMethod, views: &[View], options: &SolveOptions) -> Self {
+        let start = cpu_seconds();
+        let solution = method.solve(views, options);
+        let seconds = cpu_seconds() - start;
+        let [focal_percent, height_px] = solution.map_or([f64::INFINITY; 2], |solution| {
+            focal_and_height_errors(&views[0], &solution)
+        });
+        Self {
+            focal_percent,
+            height_px,
+            time_us: seconds * US_PER_SECOND / method.photos() as f64,
+        }
+    }
+
+    fn is_failure(&self) -> bool {
+        self.focal_percent.is_infinite()
+    }
+}
+
+fn focal_and_height_errors(view: &View, solution: &Solution) -> [f64; 2] {
+    [
+        focal_percent(view, solution),
+        height_error_px(view, solution),
+    ]
 }
 
 fn focal_percent(view: &View, solution: &Solution) -> f64 {
@@ -262,25 +188,31 @@ fn focal_percent(view: &View, solution: &Solution) -> f64 {
 /// Root mean square over a grid above the rectangle: where the fitted camera sees it, and where the photo shows it; infinite where a point is
 /// behind either.
 fn height_error_px(view: &View, solution: &Solution) -> f64 {
-    const GRID: usize = 4;
-    let part = |i: usize| i as f64 / (GRID - 1) as f64 - 0.5;
-    let off = |i: usize| {
-        let at = |[w, h]: [f64; 2]| Point3::new(part(i % GRID) * w, part(i / GRID) * h, HEIGHT);
-        let found = distorted(&solution.camera, solution.kappa, at(solution.size));
-        let off = (found - distorted(&view.camera, view.kappa, at(view.size))).norm_squared();
-        off.is_finite().then_some(off)
-    };
-    let sum: f64 = (0..GRID * GRID)
-        .map(|i| off(i).unwrap_or(f64::INFINITY))
+    let points = ERROR_GRID_SIDE * ERROR_GRID_SIDE;
+    let sum: f64 = (0..points)
+        .map(|i| squared_offset_px(view, solution, grid_place(i)))
         .sum();
-    (sum / (GRID * GRID) as f64).sqrt()
+    (sum / points as f64).sqrt()
 }
 
-/// Median and 95 % quantile; zero of nothing.
-fn spread(mut values: Vec<f64>) -> [f64; 2] {
-    values.sort_by(f64::total_cmp);
-    let at = |q: f64| values.get(libm::round(values.len().saturating_sub(1) as f64 * q) as usize);
-    [0.5, 0.95].map(|q| at(q).copied().unwrap_or(0.0))
+/// A place of the grid, in sides of the rectangle from its centre.
+fn grid_place(i: usize) -> [f64; 2] {
+    [i % ERROR_GRID_SIDE, i / ERROR_GRID_SIDE]
+        .map(|k| k as f64 / (ERROR_GRID_SIDE - 1) as f64 - 0.5)
+}
+
+fn squared_offset_px(view: &View, solution: &Solution, place: [f64; 2]) -> f64 {
+    let expected = point_above(place, solution.size);
+    let found = distorted(&solution.camera, solution.kappa, expected);
+    let seen = distorted(&view.camera, view.kappa, point_above(place, view.size));
+    let squared = (found - seen).norm_squared();
+    Some(squared)
+        .filter(|v| v.is_finite())
+        .unwrap_or(f64::INFINITY)
+}
+
+fn point_above([x, y]: [f64; 2], [w, h]: [f64; 2]) -> Point3<f64> {
+    Point3::new(x * w, y * h, ERROR_HEIGHT_M)
 }
 
 /// Writes `camera.csv`, `camera_coverage.csv`, `camera.md` and the plots `camera_tilt_LENS.svg`, `camera_height_LENS.svg` and `camera_time_LENS.svg`
@@ -292,177 +224,45 @@ pub fn write(
     folder: &Path,
     options: &CameraReportOptions,
     progress: impl Fn(u64, u64),
-) -> Result<Vec<Row>> {
+) -> Result<Vec<CameraRow>> {
     if options.views == 0 {
         return Err(Error::value("views", "0, expected at least 1"));
     }
     let rows = measure(options, progress);
-    io::create_folder(folder)?;
     let coverage = coverage::measure(options.views);
-    io::write_text(folder.join("camera.csv"), &csv(&rows))?;
-    io::write_text(
-        folder.join("camera_coverage.csv"),
-        &coverage::csv(&coverage),
-    )?;
-    io::write_text(
-        folder.join("camera.md"),
-        &(markdown(&rows) + &coverage::markdown(&coverage)),
-    )?;
-    for lens in Lens::ALL {
-        let of_lens: Vec<Row> = rows.iter().filter(|r| r.lens == lens).copied().collect();
-        let focal = |r: &Row| r.focal_percent[0];
-        let height = |r: &Row| r.height_px[0];
-        let name = |what: &str| folder.join(format!("camera_{what}_{}.svg", lens.name()));
-        io::write_text(
-            name("tilt"),
-            &against_tilt(&of_lens, "focal length, median error, %", focal),
-        )?;
-        io::write_text(
-            name("height"),
-            &against_tilt(&of_lens, "50 mm up, median error, px", height),
-        )?;
-        io::write_text(name("time"), &against_time(&of_lens))?;
-    }
+    let text = show::markdown(&rows) + &coverage::markdown(&coverage);
+    let files = [
+        ("camera.csv", &*show::csv(&rows)),
+        ("camera_coverage.csv", &coverage::csv(&coverage)),
+        ("camera.md", &text),
+    ];
+    write_texts(folder, files)?;
+    write_charts(folder, &rows)?;
     Ok(rows)
 }
 
-fn csv(rows: &[Row]) -> String {
-    let head = "lens,noise_px,tilt_deg,method,views,failed,focal_median_percent,focal_95_percent,height_median_px,\
-                height_95_px,time_us\n";
-    let line = |r: &Row| {
-        let ([f, f95], [h, h95]) = (r.focal_percent, r.height_px);
-        let (lens, method) = (r.lens.name(), r.method.name().replace(", ", " of "));
-        let kind = format!(
-            "{lens},{},{},{method},{},{}",
-            r.noise_px, r.tilt_deg, r.views, r.failed
-        );
-        format!("{kind},{f:.5},{f95:.5},{h:.5},{h95:.5},{:.2}\n", r.time_us)
-    };
-    head.to_owned() + &rows.iter().map(line).collect::<String>()
-}
-
-/// A table per kind of camera and noise: a line per tilt, a column per method.
-fn markdown(rows: &[Row]) -> String {
-    let mut text =
-        "# Error of the camera solver\n\nFocal length, error in %: median / 95 %. Below: median run time per photo.\n"
-            .to_owned();
-    for table in rows.chunk_by(|a, b| (a.lens, a.noise_px) == (b.lens, b.noise_px)) {
-        text += &format!(
-            "\n## {} camera, corners to {} px\n\n| tilt |",
-            table[0].lens.name(),
-            table[0].noise_px
-        );
-        text += &Method::ALL.map(|m| format!(" {} |", m.name())).concat();
-        text += &format!("\n|{}\n", " --- |".repeat(Method::ALL.len() + 1));
-        for line in table.chunk_by(|a, b| a.tilt_deg == b.tilt_deg) {
-            let cells = line.iter().map(|r| {
-                format!(
-                    " {} / {} |",
-                    three(r.focal_percent[0]),
-                    three(r.focal_percent[1])
-                )
-            });
-            text += &format!("| {} |{}\n", line[0].tilt_deg, cells.collect::<String>());
+fn write_charts(folder: &Path, rows: &[CameraRow]) -> Result<()> {
+    for lens in Lens::ALL {
+        let rows: Vec<CameraRow> = rows.iter().filter(|r| r.lens == lens).copied().collect();
+        for (name, svg) in show::charts(&rows) {
+            let file = format!("camera_{name}_{}.svg", lens.name());
+            io::write_text(folder.join(file), &svg)?;
         }
-        let time = |method| {
-            spread(
-                table
-                    .iter()
-                    .filter(|r| r.method == method)
-                    .map(|r| r.time_us)
-                    .collect(),
-            )[0]
-        };
-        text += &format!(
-            "| us |{}\n",
-            Method::ALL
-                .map(|m| format!(" {} |", three(time(m))))
-                .concat()
-        );
     }
-    text
-}
-
-/// Three digits that count.
-fn three(value: f64) -> String {
-    let whole_digits = if value >= 1.0 {
-        (libm::floor(libm::log10(value)) as usize).saturating_add(1)
-    } else {
-        1
-    };
-    format!("{value:.*}", 3_usize.saturating_sub(whole_digits))
-}
-
-/// A chart per noise, a curve per method.
-fn against_tilt(rows: &[Row], title: &str, error: impl Fn(&Row) -> f64) -> String {
-    let up = Axis::over_decades(title, rows.iter().map(&error));
-    let across = Axis {
-        title: "tilt, degrees".into(),
-        range: [0.0, 80.0],
-        logarithmic: false,
-    };
-    let chart = |noise_px| {
-        let curve = |method| -> Curve {
-            let of = rows
-                .iter()
-                .filter(|r| r.noise_px == noise_px && r.method == method);
-            of.map(|r| [r.tilt_deg, error(r)]).collect()
-        };
-        Chart {
-            title: format!("corners to {noise_px} px"),
-            names: Method::ALL.map(Method::name).into(),
-            across: across.clone(),
-            up: up.clone(),
-            curves: Method::ALL.map(curve).into(),
-            defaults: Vec::new(),
-        }
-    };
-    Chart::row(&NOISES.map(chart))
-}
-
-/// A chart per tilt, a curve per noise along the methods.
-fn against_time(rows: &[Row]) -> String {
-    let error = |r: &Row| r.focal_percent[0];
-    let up = Axis::over_decades("focal length, median error, %", rows.iter().map(error));
-    let across = Axis::over_decades(
-        "run time per photo, microseconds",
-        rows.iter().map(|r| r.time_us),
-    );
-    let chart = |tilt_deg: f64| {
-        let curve = |noise_px| -> Curve {
-            let of = rows
-                .iter()
-                .filter(|r| r.noise_px == noise_px && r.tilt_deg == tilt_deg);
-            of.map(|r| [r.time_us, error(r)]).collect()
-        };
-        Chart {
-            title: format!("tilt {tilt_deg} degrees: closed form, 1 to 5 steps, full, joint"),
-            names: NOISES.map(|n| format!("corners to {n} px")).into(),
-            across: across.clone(),
-            up: up.clone(),
-            curves: NOISES.map(curve).into(),
-            defaults: rows
-                .iter()
-                .filter(|r| r.tilt_deg == tilt_deg && r.method == Method::Whole)
-                .map(|r| [r.time_us, error(r)])
-                .collect(),
-        }
-    };
-    Chart::row(&TIMED_TILTS.map(chart))
+    Ok(())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn rows(lens: Lens, noise_px: f64, tilt_deg: f64, methods: &[Method]) -> Vec<Row> {
-        let cell = Cell {
+    fn rows(lens: Lens, noise_px: f64, tilt_deg: f64, methods: &[SolveMethod]) -> Vec<CameraRow> {
+        let kind = ViewKind {
             lens,
             noise_px,
             tilt_deg,
         };
-        let photos: Vec<_> = (0..100).map(|k| cell.photos(k)).collect();
-        methods.iter().map(|&m| cell.row(m, &photos)).collect()
+        kind.rows(methods, 100)
     }
 
     #[test]
@@ -472,7 +272,11 @@ mod tests {
             Lens::Ideal,
             1.0,
             20.0,
-            &[Method::Steps(0), Method::Steps(5), Method::Whole],
+            &[
+                SolveMethod::Steps(0),
+                SolveMethod::Steps(5),
+                SolveMethod::Whole,
+            ],
         );
         let [closed, five, whole] = [0, 1, 2].map(|i| found[i].focal_percent);
         assert!((0.5..1.0).contains(&whole[0]), "{whole:?}");
@@ -487,12 +291,16 @@ mod tests {
     }
 
     #[test]
-    fn a_real_camera_from_above_needs_beliefs_and_more_photos_help() {
+    fn a_real_camera_from_above_needs_priors_and_more_photos_help() {
         let found = rows(
             Lens::Realistic,
             1.0,
             10.0,
-            &[Method::Steps(0), Method::Whole, Method::Joint],
+            &[
+                SolveMethod::Steps(0),
+                SolveMethod::Whole,
+                SolveMethod::Joint,
+            ],
         );
         let [closed, whole, joint] = [0, 1, 2].map(|i| found[i].focal_percent);
         assert!(closed[1] > 1.2 * whole[1], "{closed:?} {whole:?}");
@@ -503,7 +311,7 @@ mod tests {
     #[test]
     fn errors_are_the_same_every_time() {
         let errors = || {
-            rows(Lens::Realistic, 0.5, 5.0, &[Method::Whole])
+            rows(Lens::Realistic, 0.5, 5.0, &[SolveMethod::Whole])
                 .into_iter()
                 .map(|r| (r.focal_percent, r.height_px))
         };
@@ -513,9 +321,9 @@ mod tests {
     #[test]
     fn numbers_have_three_digits_that_count() {
         assert_eq!(
-            [0.01234, 1.234, 12.34, 123.4, 1234.0].map(three),
+            [0.01234, 1.234, 12.34, 123.4, 1234.0].map(show::three),
             ["0.01", "1.23", "12.3", "123", "1234"]
         );
-        assert_eq!(three(f64::INFINITY), "inf");
+        assert_eq!(show::three(f64::INFINITY), "inf");
     }
 }

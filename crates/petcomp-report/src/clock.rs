@@ -1,46 +1,67 @@
 //! How long something takes, on one thread.
 
 use petcomp::{Error, Result};
+use rayon::{ThreadPool, ThreadPoolBuilder};
 use rustix::time::{ClockId, clock_gettime};
+use std::hint::black_box;
 
-/// Nanoseconds in a second.
-const NANO: f64 = 1e-9;
+const SECONDS_PER_NANOSECOND: f64 = 1e-9;
 
 /// CPU seconds that this process has used, all its threads together.
 ///
 /// Unlike the time that passes, it does not depend on what else the machine does (but for caches and clock rates).
 pub(super) fn cpu_seconds() -> f64 {
     let now = clock_gettime(ClockId::ProcessCPUTime);
-    now.tv_sec as f64 + now.tv_nsec as f64 * NANO
+    now.tv_sec as f64 + now.tv_nsec as f64 * SECONDS_PER_NANOSECOND
 }
 
-/// Quicker work than this is timed many times over, seconds: a clock and caches have their say in it.
-const SHORT: f64 = 2e-3;
-/// So many times at most.
+/// Quicker work than this is timed many times over, seconds: the clock's resolution and caches would show in it.
+const MIN_TIMED_SECONDS: f64 = 2e-3;
+/// The largest number of repetitions.
 const MOST_REPEATS: f64 = 1000.0;
 
-/// What `work` gives, and the median CPU seconds of `runs` of it (at least 1); one thread, so that times can be compared.
+/// The result of `work`, and the median CPU seconds of `runs` of it (at least 1); one thread, so that times can be compared.
 ///
 /// # Errors
-/// The first of `work`; a thread that cannot be had.
+/// The first of `work`; a thread that cannot be started.
 pub(super) fn timed<T: Send>(runs: usize, work: impl Fn() -> Result<T> + Sync) -> Result<(T, f64)> {
-    let one = rayon::ThreadPoolBuilder::new()
-        .num_threads(1)
-        .build()
-        .map_err(|e| Error::value("threads", e))?;
-    let start = cpu_seconds();
-    let made = one.install(&work)?;
-    let first = cpu_seconds() - start;
-    let repeats = (SHORT / first.max(f64::MIN_POSITIVE)).clamp(1.0, MOST_REPEATS) as usize;
-    let many =
-        || (0..repeats).try_for_each(|_| work().map(|made| drop(std::hint::black_box(made))));
+    let one = single_thread()?;
+    let (made, first) = seconds_of(|| one.install(&work));
+    let made = made?;
+    let repeats = repeats_for(first);
     let mut times = vec![first];
     for _ in 1..runs {
-        let start = cpu_seconds();
-        one.install(many)?;
-        times.push((cpu_seconds() - start) / repeats as f64);
+        let (repeated, seconds) = seconds_of(|| one.install(|| repeat(repeats, &work)));
+        repeated?;
+        times.push(seconds / repeats as f64);
     }
     Ok((made, median(times)))
+}
+
+fn seconds_of<T>(work: impl FnOnce() -> T) -> (T, f64) {
+    let start = cpu_seconds();
+    let made = work();
+    (made, cpu_seconds() - start)
+}
+
+fn single_thread() -> Result<ThreadPool> {
+    ThreadPoolBuilder::new()
+        .num_threads(1)
+        .build()
+        .map_err(|e| Error::value("threads", e))
+}
+
+/// How often work of so many seconds is repeated to be timed.
+fn repeats_for(seconds: f64) -> usize {
+    let repeats = MIN_TIMED_SECONDS / seconds.max(f64::MIN_POSITIVE);
+    repeats.clamp(1.0, MOST_REPEATS) as usize
+}
+
+fn repeat<T>(times: usize, work: impl Fn() -> Result<T>) -> Result<()> {
+    for _ in 0..times {
+        drop(black_box(work()?));
+    }
+    Ok(())
 }
 
 /// The middle one, the upper of two; 0 of nothing.

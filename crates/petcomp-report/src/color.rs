@@ -12,15 +12,15 @@ use petcomp::color::{
 use petcomp::{LinearRgb, Srgb8};
 
 /// Values that are converted: a megapixel of three channels.
-const VALUES: usize = 3 << 20;
-const RUNS: usize = 5;
+const VALUE_COUNT: usize = 3 << 20;
+const TIMED_RUNS: usize = 5;
 /// A power that is often used in place of the curve.
 const PLAIN_GAMMA: f64 = 2.2;
-/// Codes of 8 and 16 bits.
-const MOST8: f64 = 255.0;
-const MOST16: f64 = 65_535.0;
-/// Half of a code is what rounding may take away: uniformly spread, its root mean square is this share of a code.
-const ROUNDING: f64 = 0.288_675_134_594_812_9;
+/// The largest codes of 8 and 16 bits.
+const MAX_CODE_8: f64 = 255.0;
+const MAX_CODE_16: f64 = 65_535.0;
+/// Rounding changes a value by up to half a code: uniformly distributed, its root mean square is this share of a code.
+const ROUNDING_RMS: f64 = 0.288_675_134_594_812_9;
 
 /// Encoding and decoding, a point for each form.
 ///
@@ -30,13 +30,18 @@ pub fn diagrams() -> Result<Vec<Diagram>> {
     Ok(vec![encoding()?, decoding()?])
 }
 
-/// Light of every brightness from 0 to 1, in an order that no cache or branch can learn.
-fn lights() -> Vec<f32> {
+/// Light of every brightness from 0 to 1, in an order that no cache or branch predictor can learn.
+fn shuffled_lights() -> Vec<f32> {
+    let range = VALUE_COUNT.next_power_of_two();
     // An odd multiplier runs through all numbers of as many bits.
-    let mixed = |i: usize| i.wrapping_mul(2_654_435_761) & (VALUES.next_power_of_two() - 1);
-    (0..VALUES)
-        .map(|i| (mixed(i) as f64 / VALUES.next_power_of_two() as f64) as f32)
-        .collect()
+    let mixed = (0..VALUE_COUNT).map(|i| i.wrapping_mul(2_654_435_761) & (range - 1));
+    mixed.map(|i| (i as f64 / range as f64) as f32).collect()
+}
+
+/// Codes of 8 bits in such an order.
+fn shuffled_codes() -> Vec<u8> {
+    let mixed = (0..VALUE_COUNT).map(|i| i.wrapping_mul(2_654_435_761));
+    mixed.map(|i| (i >> 8) as u8).collect()
 }
 
 fn encoded(light: f64) -> f64 {
@@ -55,147 +60,187 @@ fn decoded(value: f64) -> f64 {
     }
 }
 
-/// Seconds and error of a form that turns values into codes; what those stand for is not timed.
-fn point<T: Send>(
-    [name, setting]: [&str; 2],
-    values: &[f32],
-    right: fn(f64) -> f64,
-    form: impl Fn(&[f32]) -> Vec<T> + Sync,
-    meant: impl Fn(&T) -> f64,
-) -> Result<Point> {
-    let (made, seconds) = timed(RUNS, || Ok(form(values)))?;
-    let squares = made
-        .iter()
-        .zip(values)
-        .map(|(m, v)| (meant(m) - right(f64::from(*v))).powi(2));
-    Ok(Point::new(
-        name,
-        setting,
-        seconds,
-        (squares.sum::<f64>() / values.len() as f64).sqrt(),
-    ))
+/// Values, what they must be converted to, and how the time and error of a form of the conversion are measured.
+struct Conversion<'a> {
+    values: &'a [f32],
+    exact: fn(f64) -> f64,
+}
+
+impl Conversion<'_> {
+    /// Seconds and error of a form; `meaning` of its codes is not timed.
+    fn point<T: Send>(
+        &self,
+        [name, setting]: [&str; 2],
+        form: impl Fn(&[f32]) -> Vec<T> + Sync,
+        meaning: impl Fn(&T) -> f64,
+    ) -> Result<Point> {
+        let (made, seconds) = timed(TIMED_RUNS, || Ok(form(self.values)))?;
+        let found: Vec<f64> = made.iter().map(meaning).collect();
+        Ok(Point::new(name, setting, seconds, self.rms_error(&found)))
+    }
+
+    /// Of a form that converts value by value.
+    fn point_of_each(&self, names: [&str; 2], form: fn(f32) -> f32) -> Result<Point> {
+        self.point(
+            names,
+            |values| values.iter().map(|v| form(*v)).collect(),
+            |v| f64::from(*v),
+        )
+    }
+
+    fn rms_error(&self, found: &[f64]) -> f64 {
+        let pairs = found.iter().zip(self.values);
+        let squares = pairs.map(|(m, v)| (m - (self.exact)(f64::from(*v))).powi(2));
+        (squares.sum::<f64>() / self.values.len() as f64).sqrt()
+    }
 }
 
 fn encoding() -> Result<Diagram> {
-    let lights = lights();
-    let table8 = |values: &[f32]| -> Vec<u8> {
-        let triples = values
-            .chunks_exact(3)
-            .map(|v| encode_srgb8(LinearRgb::new(v[0], v[1], v[2])));
-        triples.flat_map(|c| [c.r, c.g, c.b]).collect()
-    };
-    let table16 = |values: &[f32]| values.iter().map(|v| encode_srgb16(*v)).collect();
-    let each =
-        |f: fn(f32) -> f32| move |values: &[f32]| values.iter().map(|v| f(*v)).collect::<Vec<_>>();
-    let gamma = |v: f32| Curve::Gamma(PLAIN_GAMMA).encode(v);
-    let wrong = wrong_codes(&table8(&lights), &lights);
+    let lights = shuffled_lights();
+    let reason = "what rounding to 8 bits costs, and 1 % for the few values";
     Ok(Diagram {
         file: "color_encode".into(),
         title: "color: light to display values".into(),
         input: "a megapixel of three channels, evenly spread from 0 to 1".into(),
         error: "RMS error of the encoded value".into(),
-        cost: "CPU seconds per megapixel".into(),
-        reference: "closed form of IEC 61966-2-1 in double precision".into(),
-        points: vec![
-            point(["table", "8 bits"], &lights, encoded, table8, |c| {
-                f64::from(*c) / MOST8
-            })?
-            .used_where(|_| true),
-            point(["table", "16 bits"], &lights, encoded, table16, |c| {
-                f64::from(*c) / MOST16
-            })?,
-            point(
-                ["formula", "32-bit float"],
-                &lights,
-                encoded,
-                each(linear_to_srgb),
-                |v| f64::from(*v),
-            )?,
-            point(
-                ["plain power", "gamma 2.2"],
-                &lights,
-                encoded,
-                each(gamma),
-                |v| f64::from(*v),
-            )?,
-        ],
-        limit: Some((
-            1.01 * ROUNDING / MOST8,
-            "what rounding to 8 bits costs, and 1 % for the few values".into(),
-        )),
-        why: format!(
-            "Pictures have 8 bits, and {wrong} of {} codes differ from the nearest one: the table is the formula, rounded.",
-            lights.len()
-        ),
-        ..Diagram::default()
+        points: encoding_points(&lights)?,
+        limit: Some((1.01 * ROUNDING_RMS / MAX_CODE_8, reason.into())),
+        why: why_table(&lights),
+        ..color_diagram()
     })
 }
 
+fn why_table(lights: &[f32]) -> String {
+    let (wrong, all) = (
+        count_wrong_codes(&encode_by_table(lights), lights),
+        lights.len(),
+    );
+    format!(
+        "Pictures have 8 bits, and {wrong} of {all} codes differ from the nearest one: the table is the formula, rounded."
+    )
+}
+
+/// What both diagrams share.
+fn color_diagram() -> Diagram {
+    Diagram {
+        cost: "CPU seconds per megapixel".into(),
+        reference: "closed form of IEC 61966-2-1 in double precision".into(),
+        ..Diagram::default()
+    }
+}
+
+fn encoding_points(lights: &[f32]) -> Result<Vec<Point>> {
+    let conversion = Conversion {
+        values: lights,
+        exact: encoded,
+    };
+    Ok(vec![
+        conversion
+            .point(["table", "8 bits"], encode_by_table, value_of_code_8)?
+            .used_where(|_| true),
+        conversion.point(["table", "16 bits"], encode_by_table_16, value_of_code_16)?,
+        conversion.point_of_each(["formula", "32-bit float"], linear_to_srgb)?,
+        conversion.point_of_each(["plain power", "gamma 2.2"], encode_by_power)?,
+    ])
+}
+
+fn value_of_code_8(code: &u8) -> f64 {
+    f64::from(*code) / MAX_CODE_8
+}
+
+fn value_of_code_16(code: &u16) -> f64 {
+    f64::from(*code) / MAX_CODE_16
+}
+
+fn encode_by_table(values: &[f32]) -> Vec<u8> {
+    let pixels = values.chunks_exact(3);
+    pixels
+        .map(|v| encode_srgb8(LinearRgb::new(v[0], v[1], v[2])))
+        .flat_map(|c| [c.r, c.g, c.b])
+        .collect()
+}
+
+fn encode_by_table_16(values: &[f32]) -> Vec<u16> {
+    values.iter().map(|v| encode_srgb16(*v)).collect()
+}
+
 /// Codes that are not the nearest to what the closed form gives.
-fn wrong_codes(codes: &[u8], lights: &[f32]) -> usize {
+fn count_wrong_codes(codes: &[u8], lights: &[f32]) -> usize {
     let all = codes.iter().zip(lights);
-    // Half a code, and a hair for the closed form's own rounding.
-    all.filter(|(c, v)| (f64::from(**c) - MOST8 * encoded(f64::from(**v))).abs() > 0.5 + 1e-9)
+    all.filter(|(code, light)| is_wrong_code(**code, **light))
         .count()
 }
 
+fn is_wrong_code(code: u8, light: f32) -> bool {
+    let exact = MAX_CODE_8 * encoded(f64::from(light));
+    // Half a code, and a little for the closed form's own rounding.
+    (f64::from(code) - exact).abs() > 0.5 + 1e-9
+}
+
 fn decoding() -> Result<Diagram> {
-    let codes: Vec<u8> = (0..VALUES)
-        .map(|i| (i.wrapping_mul(2_654_435_761) >> 8) as u8)
-        .collect();
-    let values: Vec<f32> = codes
-        .iter()
-        .map(|c| (f64::from(*c) / MOST8) as f32)
-        .collect();
-    // The table takes codes, not values: both stand for the same.
-    let table8 = |_: &[f32]| -> Vec<f32> {
-        let triples = codes.chunks_exact(3).map(|c| {
-            decode_srgb8(Srgb8 {
-                r: c[0],
-                g: c[1],
-                b: c[2],
-            })
-        });
-        triples.flat_map(<[f32; 3]>::from).collect()
-    };
-    let table16 = |_: &[f32]| {
-        codes
-            .iter()
-            .map(|c| decode_srgb16(u16::from(*c) * 257))
-            .collect()
-    };
-    let each =
-        |f: fn(f32) -> f32| move |values: &[f32]| values.iter().map(|v| f(*v)).collect::<Vec<_>>();
-    let gamma = |v: f32| Curve::Gamma(PLAIN_GAMMA).decode(v);
-    let light = |v: &f32| f64::from(*v);
+    let codes = shuffled_codes();
     Ok(Diagram {
         file: "color_decode".into(),
         title: "color: display values to light".into(),
         input: "a megapixel of three channels, every 8-bit code".into(),
         error: "RMS error of the light".into(),
-        cost: "CPU seconds per megapixel".into(),
-        reference: "closed form of IEC 61966-2-1 in double precision".into(),
-        points: vec![
-            point(["table", "8 bits"], &values, decoded, table8, light)?.used_where(|_| true),
-            point(["table", "16 bits"], &values, decoded, table16, light)?,
-            point(
-                ["formula", "32-bit float"],
-                &values,
-                decoded,
-                each(srgb_to_linear),
-                light,
-            )?,
-            point(
-                ["plain power", "gamma 2.2"],
-                &values,
-                decoded,
-                each(gamma),
-                light,
-            )?,
-        ],
+        points: decoding_points(&codes)?,
         limit: Some((f64::from(f32::EPSILON), "rounding of a float".into())),
-        ..Diagram::default()
+        ..color_diagram()
     })
+}
+
+fn decoding_points(codes: &[u8]) -> Result<Vec<Point>> {
+    let values: Vec<f32> = codes.iter().map(|c| value_of_code_8(c) as f32).collect();
+    let conversion = Conversion {
+        values: &values,
+        exact: decoded,
+    };
+    // The tables take codes, not values: both stand for the same.
+
+    Ok(vec![
+        conversion
+            .point(["table", "8 bits"], |_| decode_by_table(codes), to_double)?
+            .used_where(|_| true),
+        conversion.point(
+            ["table", "16 bits"],
+            |_| decode_by_table_16(codes),
+            to_double,
+        )?,
+        conversion.point_of_each(["formula", "32-bit float"], srgb_to_linear)?,
+        conversion.point_of_each(["plain power", "gamma 2.2"], decode_by_power)?,
+    ])
+}
+
+fn encode_by_power(v: f32) -> f32 {
+    Curve::Gamma(PLAIN_GAMMA).encode(v)
+}
+
+fn decode_by_power(v: f32) -> f32 {
+    Curve::Gamma(PLAIN_GAMMA).decode(v)
+}
+
+fn to_double(v: &f32) -> f64 {
+    f64::from(*v)
+}
+
+fn decode_by_table(codes: &[u8]) -> Vec<f32> {
+    let pixels = codes.chunks_exact(3);
+    let triples = pixels.map(|c| {
+        decode_srgb8(Srgb8 {
+            r: c[0],
+            g: c[1],
+            b: c[2],
+        })
+    });
+    triples.flat_map(<[f32; 3]>::from).collect()
+}
+
+fn decode_by_table_16(codes: &[u8]) -> Vec<f32> {
+    codes
+        .iter()
+        .map(|c| decode_srgb16(u16::from(*c) * 257))
+        .collect()
 }
 
 #[cfg(test)]
@@ -213,8 +258,8 @@ mod tests {
 
     #[test]
     fn lights_are_spread_evenly() {
-        let lights = lights();
-        let mean = lights.iter().map(|v| f64::from(*v)).sum::<f64>() / VALUES as f64;
+        let lights = shuffled_lights();
+        let mean = lights.iter().map(|v| f64::from(*v)).sum::<f64>() / VALUE_COUNT as f64;
         assert!(
             (mean - 0.5).abs() < 1e-3 && lights.iter().all(|v| (0.0..1.0).contains(v)),
             "{mean}"
@@ -225,8 +270,11 @@ mod tests {
     fn no_code_of_the_table_is_wrong_and_a_wrong_one_is_counted() {
         let lights = [0.0, 0.2, 1.0];
         let right = encode_srgb8(LinearRgb::from(lights));
-        assert_eq!(wrong_codes(&[right.r, right.g, right.b], &lights), 0);
-        assert_eq!(wrong_codes(&[right.r, right.g + 1, right.b], &lights), 1);
+        assert_eq!(count_wrong_codes(&[right.r, right.g, right.b], &lights), 0);
+        assert_eq!(
+            count_wrong_codes(&[right.r, right.g + 1, right.b], &lights),
+            1
+        );
     }
 
     #[test]
@@ -240,12 +288,15 @@ mod tests {
                 .map(|v| (linear_to_srgb(*v) * 255.0).round())
                 .collect()
         };
-        let found = point(["", ""], &values, encoded, round, |code: &f32| {
-            f64::from(*code) / MOST8
-        })
-        .unwrap();
+        let conversion = Conversion {
+            values: &values,
+            exact: encoded,
+        };
+        let found = conversion
+            .point(["", ""], round, |code: &f32| f64::from(*code) / MAX_CODE_8)
+            .unwrap();
         assert!(
-            (found.error / (ROUNDING / MOST8) - 1.0).abs() < 0.05,
+            (found.error / (ROUNDING_RMS / MAX_CODE_8) - 1.0).abs() < 0.05,
             "{}",
             found.error
         );

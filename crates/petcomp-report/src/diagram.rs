@@ -1,12 +1,15 @@
 //! Work-precision diagrams: the error of a stage against what it costs, a point for each setting.
 
+use crate::columns::table_from;
 use petcomp::Quality;
-use petcomp::plot::Beside;
-use petcomp::plot::three;
-use petcomp::plot::{Axis, Chart, Curve, Table};
+use petcomp::plot::{Axis, Beside, Chart, Curve, Table, three};
 
 /// Costs closer than this are equal: the noise of timings, as a factor.
-const NOISE: f64 = 1.1;
+const TIMING_NOISE_FACTOR: f64 = 1.1;
+/// How far the axis reaches below the least error where some errors are 0: so far that its edge is not read as an error.
+const ZERO_ERROR_ROOM_FACTOR: f64 = 10.0;
+/// The largest invisible error of a picture: half of a code of 8 bits at middle grey.
+const INVISIBLE_ERROR: f64 = 0.004;
 
 /// Error against cost of the settings of a stage, and of other programs that do the same.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -21,7 +24,7 @@ pub struct Diagram {
     pub error: String,
     /// What the cost is, with its unit.
     pub cost: String,
-    /// What results are held against: another program with its version, a closed form, or a converged independent method.
+    /// What results are compared with: another program with its version, a closed form, or a converged independent method.
     pub reference: String,
     /// The settings.
     pub points: Vec<Point>,
@@ -31,7 +34,7 @@ pub struct Diagram {
     pub why: String,
     /// Points of one curve do not follow from each other, so that no line joins them.
     pub apart: bool,
-    /// Curves are of different inputs: a point is held only against those of its own.
+    /// Curves are of different inputs: a point is compared only with those of its own.
     pub inputs: bool,
 }
 
@@ -50,16 +53,34 @@ pub struct Point {
     pub qualities: Vec<Quality>,
 }
 
-/// Which points nobody beats, the cheapest first: no other is at most as costly and at most as wrong, and better in one of
-/// the two. Points are cost and error; what is not finite is never among them.
+/// The efficient front, the cheapest first: points of cost and error with no other that is at most as costly and at most as
+/// wrong, and better in one of the two. What is not finite is never among them.
 pub fn front(points: &[[f64; 2]]) -> Vec<usize> {
-    let finite = |p: &[f64; 2]| p.iter().all(|v| v.is_finite());
-    let beats = |a: &[f64; 2], b: &[f64; 2]| finite(a) && a[0] <= b[0] && a[1] <= b[1] && a != b;
     let mut kept: Vec<usize> = (0..points.len())
-        .filter(|&i| finite(&points[i]) && !points.iter().any(|p| beats(p, &points[i])))
+        .filter(|&i| is_unbeaten(points[i], points))
         .collect();
     kept.sort_by(|&a, &b| points[a][0].total_cmp(&points[b][0]));
     kept
+}
+
+fn is_unbeaten(point: [f64; 2], points: &[[f64; 2]]) -> bool {
+    is_finite(point) && !points.iter().any(|other| beats(*other, point))
+}
+
+fn is_finite(point: [f64; 2]) -> bool {
+    point.iter().all(|v| v.is_finite())
+}
+
+fn beats(a: [f64; 2], b: [f64; 2]) -> bool {
+    is_finite(a) && a[0] <= b[0] && a[1] <= b[1] && a != b
+}
+
+/// The limit of diagrams whose error is one of pixels.
+pub(crate) fn invisible_error() -> Option<(f64, String)> {
+    Some((
+        INVISIBLE_ERROR,
+        "half of an 8-bit code at middle grey".into(),
+    ))
 }
 
 impl Point {
@@ -79,15 +100,24 @@ impl Point {
         }
     }
 
-    /// The same, used by those qualities of which `gives` is true.
-    pub fn used_where(mut self, gives: impl Fn(Quality) -> bool) -> Self {
-        self.qualities = Quality::ALL.into_iter().filter(|q| gives(*q)).collect();
+    /// The same, used by those qualities of which `is_used` is true.
+    pub fn used_where(mut self, is_used: impl Fn(Quality) -> bool) -> Self {
+        self.qualities = Quality::ALL.into_iter().filter(|q| is_used(*q)).collect();
         self
     }
 
     /// What the default uses.
     pub fn is_default(&self) -> bool {
         self.qualities.contains(&Quality::default())
+    }
+
+    /// At least as exact, and cheaper by more than noise.
+    fn clearly_beats(&self, other: &Self) -> bool {
+        self.error <= other.error && self.cost * TIMING_NOISE_FACTOR < other.cost
+    }
+
+    fn cost_and_error(&self) -> [f64; 2] {
+        [self.cost, self.error]
     }
 
     /// Setting and curve; the curve alone where it is all that is set.
@@ -99,22 +129,37 @@ impl Point {
         }
     }
 
-    /// What stands beside it: what is set, and the qualities that use it.
-    fn label(&self) -> String {
-        let set = if self.setting.is_empty() {
+    /// What it costs, as a share of what another one costs.
+    fn share_of_cost(&self, other: &Self) -> String {
+        three(self.cost / other.cost)
+    }
+
+    fn short_name(&self) -> &str {
+        if self.setting.is_empty() {
             &self.curve
         } else {
             &self.setting
-        };
-        match self.qualities.as_slice() {
-            [] => set.clone(),
-            used if used.len() == Quality::ALL.len() => format!("{set} (every quality)"),
-            used => format!(
-                "{set} ({})",
-                used.iter().map(|q| q.name()).collect::<Vec<_>>().join(", ")
-            ),
         }
     }
+
+    fn quality_names(&self) -> String {
+        let names: Vec<&str> = self.qualities.iter().map(|q| q.name()).collect();
+        names.join(", ")
+    }
+
+    /// The words next to it: what is set, and the qualities that use it.
+    fn label(&self) -> String {
+        let name = self.short_name();
+        match self.qualities.len() {
+            0 => name.to_owned(),
+            count if count == Quality::ALL.len() => format!("{name} (every quality)"),
+            _ => format!("{name} ({})", self.quality_names()),
+        }
+    }
+}
+
+fn cheapest<'a>(points: impl Iterator<Item = &'a Point>) -> Option<&'a Point> {
+    points.min_by(|a, b| a.cost.total_cmp(&b.cost))
 }
 
 impl Diagram {
@@ -126,33 +171,25 @@ impl Diagram {
     /// The cheapest setting that is at least as exact as the default, where it is another and cheaper by more than noise.
     pub fn cheaper_than_default(&self) -> Option<&Point> {
         let default = self.default_point()?;
-        let as_exact = self
-            .rivals(default)
-            .filter(|p| p.error <= default.error && p.cost * NOISE < default.cost);
-        as_exact.min_by(|a, b| a.cost.total_cmp(&b.cost))
+        cheapest(self.rivals(default).filter(|p| p.clearly_beats(default)))
     }
 
-    /// What a point is held against: the points of the same input.
+    /// What a point is compared with: the points of the same input.
     fn rivals(&self, point: &Point) -> impl Iterator<Item = &Point> {
         self.points
             .iter()
             .filter(|p| !self.inputs || p.curve == point.curve)
     }
 
-    /// Whether nothing beats a point.
     fn is_on_front(&self, point: &Point) -> bool {
-        let at = |p: &Point| [p.cost, p.error];
-        let rivals: Vec<[f64; 2]> = self.rivals(point).map(at).collect();
-        front(&rivals).into_iter().any(|i| rivals[i] == at(point))
+        let rivals: Vec<_> = self.rivals(point).map(Point::cost_and_error).collect();
+        is_unbeaten(point.cost_and_error(), &rivals)
     }
 
     /// The cheapest setting under the limit.
     pub fn cheapest_under_limit(&self) -> Option<&Point> {
         let (limit, _) = self.limit.as_ref()?;
-        self.points
-            .iter()
-            .filter(|p| p.error <= *limit)
-            .min_by(|a, b| a.cost.total_cmp(&b.cost))
+        cheapest(self.points.iter().filter(|p| p.error <= *limit))
     }
 
     /// In words: where the default is, why, whether it is on the efficient front, and how far from it.
@@ -160,181 +197,220 @@ impl Diagram {
         let Some(default) = self.default_point() else {
             return self.why.clone();
         };
-        let mut said = format!("Default: {}.", default.name());
-        said += &self.beside_limit(default);
-        said += &match self.cheaper_than_default() {
-            None => " It is on the efficient front.".to_owned(),
-            Some(p) => format!(
-                " It is not on the efficient front: {} is at least as exact (error {} beside {}) at {} of its cost.",
-                p.name(),
-                three(p.error),
-                three(default.error),
-                three(p.cost / default.cost)
-            ),
-        };
-        let gap = if self.why.is_empty() { "" } else { " " };
-        said + gap + &self.why
+        paragraph(&[
+            &format!("Default: {}.", default.name()),
+            &self.limit_verdict(default),
+            &self.front_verdict(default),
+            &self.why,
+        ])
     }
 
-    /// How a setting compares with the cheapest one under the limit; nothing without a limit that some setting keeps.
-    fn beside_limit(&self, point: &Point) -> String {
+    /// Whether the default is on the efficient front, and if not, how far from it.
+    fn front_verdict(&self, default: &Point) -> String {
+        let Some(better) = self.cheaper_than_default() else {
+            return "It is on the efficient front.".to_owned();
+        };
+        format!(
+            "It is not on the efficient front: {} is at least as exact (error {} instead of {}) at {} of its cost.",
+            better.name(),
+            three(better.error),
+            three(default.error),
+            better.share_of_cost(default)
+        )
+    }
+
+    /// How a setting compares with the cheapest one under the limit; nothing without a limit that some setting meets.
+    fn limit_verdict(&self, point: &Point) -> String {
         let (Some((limit, why)), Some(best)) = (&self.limit, self.cheapest_under_limit()) else {
             return String::new();
         };
-        let (limit, told) = (*limit, three(*limit));
-        if point.error > limit {
-            return format!(" Above the limit of {told} ({why}).");
+        let bound = format!("{} ({why})", three(*limit));
+        if point.error > *limit {
+            format!("Above the limit of {bound}.")
+        } else if point.cost <= TIMING_NOISE_FACTOR * best.cost {
+            format!("The cheapest setting under {bound}.")
+        } else {
+            let (name, share) = (best.name(), best.share_of_cost(point));
+            format!("The cheapest setting under {bound} is {name}, at {share} of its cost.")
         }
-        if point.cost <= NOISE * best.cost {
-            return format!(" The cheapest setting under {told} ({why}).");
-        }
-        let share = three(best.cost / point.cost);
-        format!(
-            " The cheapest setting under {told} ({why}) is {}, at {share} of its cost.",
-            best.name()
-        )
     }
 
     /// What the diagram shows, against what, and its verdict.
     pub fn caption(&self) -> String {
-        let ring = if self.default_point().is_some() {
-            " Ring: the default."
-        } else {
-            ""
-        };
-        let exact = self.points.iter().any(|p| p.error == 0.0);
-        let floor = if exact {
-            " Points on the lower edge have no error."
-        } else {
-            ""
-        };
-        let verdict = self.verdict();
-        format!(
-            "{}. Input: {}. Reference: {}.{ring}{floor} {verdict}",
-            self.title, self.input, self.reference
-        )
+        paragraph(&[
+            &format!(
+                "{}. Input: {}. Reference: {}.",
+                self.title, self.input, self.reference
+            ),
+            self.legend(),
+            &self.verdict(),
+        ])
+    }
+
+    /// What the marks mean that are in the picture.
+    fn legend(&self) -> &'static str {
+        match (self.default_point().is_some(), self.has_exact_points()) {
+            (true, true) => "Ring: the default. Points on the lower edge have no error.",
+            (true, false) => "Ring: the default.",
+            (false, true) => "Points on the lower edge have no error.",
+            (false, false) => "",
+        }
+    }
+
+    fn has_exact_points(&self) -> bool {
+        self.points.iter().any(|p| p.error == 0.0)
     }
 
     /// The diagram as an SVG document.
     pub fn svg(&self) -> String {
-        let mut names: Vec<String> = Vec::new();
-        for point in &self.points {
-            if !names.contains(&point.curve) {
-                names.push(point.curve.clone());
-            }
-        }
-        let up = self.errors();
-        let lowest = up.range[0];
-        let at = |p: &Point| [p.cost, p.error.max(lowest)];
-        let curve = |name: &String| -> Curve {
-            self.points
-                .iter()
-                .filter(|p| p.curve == *name)
-                .map(at)
-                .collect()
-        };
-        let chart = Chart {
-            title: self.title.clone(),
-            across: Axis::around(&self.cost, self.points.iter().map(|p| p.cost)),
-            curves: names.iter().map(curve).collect(),
-            names,
-            defaults: self
-                .points
-                .iter()
-                .filter(|p| p.is_default())
-                .map(at)
-                .collect(),
-            up,
-        };
-        let labelled = |used: bool| {
-            self.points
-                .iter()
-                .filter(move |p| p.qualities.is_empty() != used)
-        };
-        let labels: Vec<_> = labelled(true)
-            .chain(labelled(false))
-            .map(|p| (at(p), p.label()))
-            .collect();
-        chart.alone(&Beside {
-            labels,
+        self.chart().alone(&Beside {
+            labels: self.labels(),
             apart: self.apart,
         })
     }
 
-    /// The axis of errors; longer below where some are 0.
-    fn errors(&self) -> Axis {
-        /// So far below the least error, as a factor, that no one takes it for one.
-        const BELOW: f64 = 10.0;
-        let mut up = Axis::around(&self.error, self.points.iter().map(|p| p.error));
-        if self.points.iter().any(|p| p.error == 0.0) {
-            up.range[0] /= BELOW;
+    fn chart(&self) -> Chart {
+        let names = self.curve_names();
+        Chart {
+            title: self.title.clone(),
+            across: Axis::around(&self.cost, self.points.iter().map(|p| p.cost)),
+            up: self.error_axis(),
+            curves: names
+                .iter()
+                .map(|name| self.curve_of(|p| p.curve == *name))
+                .collect(),
+            defaults: self.curve_of(Point::is_default),
+            names,
         }
-        up
+    }
+
+    /// Each once, in the order of their first points.
+    fn curve_names(&self) -> Vec<String> {
+        let mut names: Vec<String> = Vec::new();
+        for name in self.points.iter().map(|point| &point.curve) {
+            if !names.contains(name) {
+                names.push(name.clone());
+            }
+        }
+        names
+    }
+
+    fn curve_of(&self, is_shown: impl Fn(&Point) -> bool) -> Curve {
+        let shown = self.points.iter().filter(|p| is_shown(p));
+        shown.map(|p| self.position(p)).collect()
+    }
+
+    /// Where a point stands in the chart: exact ones on its lower edge.
+    fn position(&self, point: &Point) -> [f64; 2] {
+        [point.cost, point.error.max(self.error_axis().range[0])]
+    }
+
+    /// Labels of points. Those of points that a quality uses come first: labels without room are left out.
+    fn labels(&self) -> Vec<([f64; 2], String)> {
+        let (used, unused): (Vec<_>, Vec<_>) =
+            self.points.iter().partition(|p| !p.qualities.is_empty());
+        used.into_iter()
+            .chain(unused)
+            .map(|p| (self.position(p), p.label()))
+            .collect()
+    }
+
+    /// The axis of errors; longer below where some are 0.
+    fn error_axis(&self) -> Axis {
+        let mut axis = Axis::around(&self.error, self.points.iter().map(|p| p.error));
+        if self.has_exact_points() {
+            axis.range[0] /= ZERO_ERROR_ROOM_FACTOR;
+        }
+        axis
     }
 
     /// The points as a table, with the front marked.
     pub fn table(&self) -> Table {
-        let mut table = Table::new([
+        let titles = [
             "form",
             "setting",
             &self.cost,
             &self.error,
             "quality",
             "on the front",
-        ]);
-        for p in &self.points {
-            let used = p
-                .qualities
-                .iter()
-                .map(|q| q.name())
-                .collect::<Vec<_>>()
-                .join(", ");
-            let on_front = if self.is_on_front(p) { "yes" } else { "" };
-            table.push([
-                p.curve.as_str(),
-                &p.setting,
-                &three(p.cost),
-                &three(p.error),
-                &used,
-                on_front,
-            ]);
-        }
-        table
+        ];
+        table_from(titles, self.points.iter().map(|p| self.table_line(p)))
+    }
+
+    fn table_line(&self, point: &Point) -> [String; 6] {
+        let on_front = if self.is_on_front(point) { "yes" } else { "" };
+        [
+            point.curve.clone(),
+            point.setting.clone(),
+            three(point.cost),
+            three(point.error),
+            point.quality_names(),
+            on_front.into(),
+        ]
     }
 
     /// A line for each of some diagrams: the default, its error and cost, and what beats it.
     pub fn summary(diagrams: &[Self]) -> Table {
-        let mut table = Table::new([
-            "stage and what is asked",
-            "held against",
-            "default",
-            "error is",
-            "error",
-            "cost is",
-            "cost",
-            "cheaper and as exact",
-        ]);
-        for diagram in diagrams {
-            let Some(default) = diagram.default_point() else {
-                continue;
-            };
-            let beaten = diagram
-                .cheaper_than_default()
-                .map_or("none: on the front".to_owned(), |p| {
-                    format!("{}, {} of the cost", p.name(), three(p.cost / default.cost))
-                });
-            table.push([
-                diagram.title.clone(),
-                diagram.reference.clone(),
-                default.name(),
-                diagram.error.clone(),
-                three(default.error),
-                diagram.cost.clone(),
-                three(default.cost),
-                beaten,
-            ]);
+        let defaults = diagrams.iter().filter_map(DefaultOf::new);
+        table_from(SUMMARY_TITLES, defaults.map(|of| of.summary_line()))
+    }
+}
+
+/// Sentences with a space between them; empty ones are left out.
+fn paragraph(sentences: &[&str]) -> String {
+    let kept: Vec<&str> = sentences
+        .iter()
+        .copied()
+        .filter(|sentence| !sentence.is_empty())
+        .collect();
+    kept.join(" ")
+}
+
+/// A diagram and its default.
+struct DefaultOf<'a> {
+    diagram: &'a Diagram,
+    default: &'a Point,
+}
+
+const SUMMARY_TITLES: [&str; 8] = [
+    "stage and what is asked",
+    "compared with",
+    "default",
+    "error is",
+    "error",
+    "cost is",
+    "cost",
+    "cheaper and as exact",
+];
+
+impl<'a> DefaultOf<'a> {
+    fn new(diagram: &'a Diagram) -> Option<Self> {
+        let default = diagram.default_point()?;
+        Some(Self { diagram, default })
+    }
+
+    fn summary_line(&self) -> [String; 8] {
+        let (diagram, default) = (self.diagram, self.default);
+        [
+            diagram.title.clone(),
+            diagram.reference.clone(),
+            default.name(),
+            diagram.error.clone(),
+            three(default.error),
+            diagram.cost.clone(),
+            three(default.cost),
+            self.beaten_by(),
+        ]
+    }
+
+    fn beaten_by(&self) -> String {
+        match self.diagram.cheaper_than_default() {
+            None => "none: on the front".to_owned(),
+            Some(better) => {
+                let share = better.share_of_cost(self.default);
+                format!("{}, {share} of the cost", better.name())
+            }
         }
-        table
     }
 }
 
@@ -343,7 +419,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_front_is_what_nobody_beats() {
+    fn the_front_is_what_no_point_beats() {
         let points = [
             [1.0, 9.0],
             [2.0, 4.0],
@@ -393,11 +469,11 @@ mod tests {
             normal(Point::new("a", "2", 4.0, 0.4)),
             Point::new("b", "1", 1.0, 0.3),
         ]);
-        let said = found.verdict();
+        let verdict = found.verdict();
         assert!(
-            said.contains("is 1 (b), at 0.250 of its cost")
-                && said.contains("(error 0.300 beside 0.400)"),
-            "{said}"
+            verdict.contains("is 1 (b), at 0.250 of its cost")
+                && verdict.contains("(error 0.300 instead of 0.400)"),
+            "{verdict}"
         );
     }
 
@@ -441,7 +517,7 @@ mod tests {
     }
 
     #[test]
-    fn exact_points_lie_on_the_lower_edge_and_are_told() {
+    fn exact_points_lie_on_the_lower_edge_and_the_caption_says_so() {
         let found = diagram(vec![
             normal(Point::new("a", "exact", 2.0, 0.0)),
             Point::new("a", "1", 1.0, 0.1),
@@ -449,7 +525,7 @@ mod tests {
         assert!(
             found.svg().matches("r=\"2.5\"").count() == 2 && found.caption().contains("no error")
         );
-        assert!((found.errors().range[0] - 0.01).abs() < 1e-9);
+        assert!((found.error_axis().range[0] - 0.01).abs() < 1e-9);
     }
 
     #[test]

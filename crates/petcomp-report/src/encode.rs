@@ -20,25 +20,25 @@ use std::path::Path;
 use std::sync::Arc;
 
 const SIZE: [u32; 2] = [640, 480];
-const CARDS: u32 = 12;
-const RUNS: usize = 5;
+const CARD_COUNT: u32 = 12;
+const TIMED_RUNS: usize = 5;
 /// Width of the plate's noise, scene-linear: that of a good camera in the middle of its range.
-const GRAIN: f32 = 0.01;
-const JPEG: [u8; 6] = [50, 75, 85, 90, 95, 100];
+const GRAIN_WIDTH: f32 = 0.01;
+const JPEG_QUALITIES: [u8; 6] = [50, 75, 85, 90, 95, 100];
 
 /// Curves with more than one setting.
 const PNG: &str = "PNG, 8 bits";
 const HALF: &str = "EXR, half";
 
 /// A way to store a picture.
-struct Way {
+struct Encoding {
     curve: &'static str,
     setting: String,
     extension: &'static str,
     options: WriteOptions,
 }
 
-/// What it gives.
+/// A stored picture: the time it took, its size and its error.
 struct Stored {
     seconds: f64,
     bytes: u64,
@@ -48,105 +48,98 @@ struct Stored {
 /// Error against time, and error against bytes.
 ///
 /// # Errors
-/// A folder for scratch files that cannot be had or written.
+/// A folder for scratch files that cannot be created or written.
 pub fn diagrams() -> Result<Vec<Diagram>> {
-    let picture = picture();
-    let folder = tempfile::tempdir().map_err(|e| Error::value("scratch folder", e))?;
-    let ways = ways();
-    let stored: Vec<Stored> = ways
-        .iter()
-        .map(|way| way.store(&picture, folder.path()))
-        .collect::<Result<_>>()?;
-    let pixels = picture.pixels().len() as f64;
-    let diagram =
-        |file: &str, title: &str, cost: &str, of: &dyn Fn(&Stored) -> f64, why: &str| Diagram {
-            file: file.into(),
-            title: title.into(),
+    let comparison = EncodingComparison::measure()?;
+    Ok(vec![comparison.time_diagram(), comparison.size_diagram()])
+}
+
+/// A picture in every encoding.
+struct EncodingComparison {
+    picture: Image<LinearRgb>,
+    encodings: Vec<Encoding>,
+    stored: Vec<Stored>,
+}
+
+impl EncodingComparison {
+    fn measure() -> Result<Self> {
+        let picture = noisy_picture();
+        let folder = tempfile::tempdir().map_err(|e| Error::value("scratch folder", e))?;
+        let encodings = encodings();
+        let stored: Result<_> = encodings
+            .iter()
+            .map(|encoding| encoding.store(&picture, folder.path()))
+            .collect();
+        Ok(Self {
+            picture,
+            stored: stored?,
+            encodings,
+        })
+    }
+
+    fn pixels(&self) -> f64 {
+        self.picture.pixels().len() as f64
+    }
+
+    fn time_diagram(&self) -> Diagram {
+        Diagram {
+            file: "encode_time".into(),
+            title: "encode: error against time".into(),
+            cost: "CPU seconds per megapixel, writing".into(),
+            why: self.why_png().unwrap_or_default(),
+            ..self.diagram(|s| s.seconds / self.pixels() * 1e6)
+        }
+    }
+
+    fn size_diagram(&self) -> Diagram {
+        Diagram {
+            file: "encode_bytes".into(),
+            title: "encode: error against size".into(),
+            cost: "bytes per pixel".into(),
+            why: "A dataset is written once and read often: `pictures.format = \"jpg\"` is for those who pay for storage.".into(),
+            ..self.diagram(|s| s.bytes as f64 / self.pixels())
+        }
+    }
+
+    fn diagram(&self, cost: impl Fn(&Stored) -> f64) -> Diagram {
+        let measured = self.encodings.iter().zip(&self.stored);
+        let points = measured.map(|(encoding, s)| encoding.point(cost(s), s.error));
+        let [w, h] = SIZE;
+        let brightest = brightest(&self.picture);
+        Diagram {
             input: format!(
-                "{CARDS} cards over a noisy plate, {} x {}, values up to {:.2}",
-                SIZE[0],
-                SIZE[1],
-                most(&picture)
+                "{CARD_COUNT} cards over a noisy plate, {w} x {h}, values up to {brightest:.2}"
             ),
             error: "RMS error, scene-linear".into(),
-            cost: cost.into(),
             reference: "the picture before it is written".into(),
-            points: ways
-                .iter()
-                .zip(&stored)
-                .map(|(way, s)| way.point(of(s), s.error))
-                .collect(),
-            why: why.into(),
+            points: points.collect(),
             ..Diagram::default()
-        };
-    Ok(vec![
-        diagram(
-            "encode_time",
-            "encode: error against time",
-            "CPU seconds per megapixel, writing",
-            &|s| s.seconds / pixels * 1e6,
-            &beside_jpeg(&ways, &stored),
-        ),
-        diagram(
-            "encode_bytes",
-            "encode: error against size",
-            "bytes per pixel",
-            &|s| s.bytes as f64 / pixels,
-            "A dataset is written once and read often: `pictures.format = \"jpg\"` is for who pays for room.",
-        ),
-    ])
+        }
+    }
+
+    /// Why datasets have PNG: it beside JPEG.
+    fn why_png(&self) -> Option<String> {
+        let png = self.stored_as(PNG, "normal")?;
+        let jpeg = self.stored_as("JPEG", "95")?;
+        Some(format!(
+            "Trainers read files of 8 bits: PNG loses what 8 bits lose, and takes {} of the time of JPEG at 95, which has {} \
+             times its error in {} of its bytes. `reference` keeps half floats beside it.",
+            three(png.seconds / jpeg.seconds),
+            three(jpeg.error / png.error),
+            three(jpeg.bytes as f64 / png.bytes as f64)
+        ))
+    }
+
+    fn stored_as(&self, curve: &str, setting: &str) -> Option<&Stored> {
+        let i = self
+            .encodings
+            .iter()
+            .position(|encoding| encoding.is(curve, setting))?;
+        self.stored.get(i)
+    }
 }
 
-/// Why datasets have PNG.
-fn beside_jpeg(ways: &[Way], stored: &[Stored]) -> String {
-    let of = |curve: &str, setting: &str| {
-        ways.iter()
-            .position(|way| way.curve == curve && way.setting == setting)
-            .map(|i| &stored[i])
-    };
-    let (Some(png), Some(jpeg)) = (of(PNG, "normal"), of("JPEG", "95")) else {
-        return String::new();
-    };
-    format!(
-        "Trainers read files of 8 bits: PNG loses what 8 bits lose, and takes {} of the time of JPEG at 95, which has {} times \
-         its error in {} of its bytes. `reference` keeps half floats beside it.",
-        three(png.seconds / jpeg.seconds),
-        three(jpeg.error / png.error),
-        three(jpeg.bytes as f64 / png.bytes as f64)
-    )
-}
-
-fn ways() -> Vec<Way> {
-    let usual = WriteOptions::default();
-    let exr = |curve, name: &str, bits, compression| Way {
-        curve,
-        setting: name.into(),
-        extension: "exr",
-        options: WriteOptions {
-            bits: Some(bits),
-            compression,
-            ..WriteOptions::default()
-        },
-    };
-    let png = |curve, name: &str, bits, effort| Way {
-        curve,
-        setting: name.into(),
-        extension: "png",
-        options: WriteOptions {
-            bits: Some(bits),
-            png_effort: effort,
-            ..WriteOptions::default()
-        },
-    };
-    let jpeg = JPEG.map(|quality| Way {
-        curve: "JPEG",
-        setting: quality.to_string(),
-        extension: "jpg",
-        options: WriteOptions {
-            jpeg_quality: quality,
-            ..usual.clone()
-        },
-    });
+fn encodings() -> Vec<Encoding> {
     let mut all = vec![
         png(PNG, "draft", Bits::Eight, Quality::Draft),
         png(PNG, "normal", Bits::Eight, Quality::Normal),
@@ -157,71 +150,113 @@ fn ways() -> Vec<Way> {
         exr(HALF, "ZIP", Bits::Half, Compression::Zip),
         exr("EXR, float", "ZIP", Bits::Float, Compression::Zip),
     ];
-    all.extend(jpeg);
+    all.extend(JPEG_QUALITIES.map(jpeg));
     all
 }
 
-impl Way {
+fn exr(curve: &'static str, name: &str, bits: Bits, compression: Compression) -> Encoding {
+    Encoding {
+        curve,
+        setting: name.into(),
+        extension: "exr",
+        options: WriteOptions {
+            bits: Some(bits),
+            compression,
+            ..WriteOptions::default()
+        },
+    }
+}
+
+fn png(curve: &'static str, name: &str, bits: Bits, effort: Quality) -> Encoding {
+    Encoding {
+        curve,
+        setting: name.into(),
+        extension: "png",
+        options: WriteOptions {
+            bits: Some(bits),
+            png_effort: effort,
+            ..WriteOptions::default()
+        },
+    }
+}
+
+fn jpeg(quality: u8) -> Encoding {
+    Encoding {
+        curve: "JPEG",
+        setting: quality.to_string(),
+        extension: "jpg",
+        options: WriteOptions {
+            jpeg_quality: quality,
+            ..WriteOptions::default()
+        },
+    }
+}
+
+impl Encoding {
     fn store(&self, picture: &Image<LinearRgb>, folder: &Path) -> Result<Stored> {
         let path = folder.join("picture").with_extension(self.extension);
-        let ((), seconds) = timed(RUNS, || io::write_with(&path, picture, &self.options))?;
-        let bytes = std::fs::metadata(&path)
-            .map_err(|e| Error::file(&path, e))?
-            .len();
-        let back: Image<LinearRgb> = io::read(&path)?;
+        let ((), seconds) = timed(TIMED_RUNS, || io::write_with(&path, picture, &self.options))?;
+        let file = std::fs::metadata(&path).map_err(|e| Error::file(&path, e))?;
         Ok(Stored {
             seconds,
-            bytes,
-            error: rms(&back, picture),
+            bytes: file.len(),
+            error: rms_difference(&io::read(&path)?, picture),
         })
+    }
+
+    fn is(&self, curve: &str, setting: &str) -> bool {
+        self.curve == curve && self.setting == setting
     }
 
     /// A PNG as datasets have it, or the EXR that a reference has beside it.
     fn point(&self, cost: f64, error: f64) -> Point {
-        let is = |curve, setting| self.curve == curve && self.setting == setting;
         Point::new(self.curve, self.setting.clone(), cost, error).used_where(|quality| {
             let with_exr = quality.pictures(Default::default()).exr;
-            is(PNG, "normal") || with_exr && is(HALF, "ZIP")
+            self.is(PNG, "normal") || with_exr && self.is(HALF, "ZIP")
         })
     }
 }
 
-fn rms(a: &Image<LinearRgb>, b: &Image<LinearRgb>) -> f64 {
+fn rms_difference(a: &Image<LinearRgb>, b: &Image<LinearRgb>) -> f64 {
     let pairs = a.pixels().iter().zip(b.pixels());
-    let squares = pairs
-        .flat_map(|(a, b)| [a.r - b.r, a.g - b.g, a.b - b.b])
-        .map(|d| f64::from(d).powi(2));
+    let differences = pairs.flat_map(|(a, b)| [a.r - b.r, a.g - b.g, a.b - b.b]);
+    let squares = differences.map(|d| f64::from(d).powi(2));
     (squares.sum::<f64>() / (3 * b.pixels().len()) as f64).sqrt()
 }
 
-fn most(picture: &Image<LinearRgb>) -> f32 {
-    picture
-        .pixels()
-        .iter()
-        .map(|c| c.r.max(c.g).max(c.b))
-        .fold(0.0, f32::max)
+fn brightest(picture: &Image<LinearRgb>) -> f32 {
+    let pixels = picture.pixels().iter();
+    pixels.map(|c| c.r.max(c.g).max(c.b)).fold(0.0, f32::max)
 }
 
 /// A rendered pile over a plate with the noise of a camera.
-fn picture() -> Image<LinearRgb> {
-    let (w, h) = (SIZE[0] as usize, SIZE[1] as usize);
-    let mut plate = Image::from_fn(w, h, |x, y| {
-        let tile = if (x / 64 + y / 64).is_multiple_of(2) {
-            0.28
-        } else {
-            0.35
-        };
-        LinearRgb::new(1.0, 0.9, 0.8).scale(tile * (0.8 + 0.2 * x as f32 / w as f32))
-    });
-    let mut rng = ChaCha8Rng::seed_from_u64(1);
-    let mut grain = || GRAIN * (f64::from(rng.next_u32()) / f64::from(u32::MAX) - 0.5) as f32;
-    plate
-        .pixels_mut()
-        .iter_mut()
-        .for_each(|p| *p = *p + LinearRgb::new(grain(), grain(), grain()));
-    let shot: Shot = pile(CARDS, SIZE).with_plate(Arc::new(plate));
+fn noisy_picture() -> Image<LinearRgb> {
+    let mut plate = tiled_plate();
+    add_grain(&mut plate);
+    let shot: Shot = pile(CARD_COUNT, SIZE).with_plate(Arc::new(plate));
     let deep = render(&shot, &Quality::default().render());
     composite::frame(&deep, shot.plate.as_deref()).map(PremulRgba::color)
+}
+
+fn tiled_plate() -> Image<LinearRgb> {
+    let [w, h] = SIZE.map(|side| side as usize);
+    Image::from_fn(w, h, |x, y| {
+        let is_dark = (x / 64 + y / 64).is_multiple_of(2);
+        let tile = if is_dark { 0.28 } else { 0.35 };
+        LinearRgb::new(1.0, 0.9, 0.8).scale(tile * (0.8 + 0.2 * x as f32 / w as f32))
+    })
+}
+
+fn add_grain(plate: &mut Image<LinearRgb>) {
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    for p in plate.pixels_mut() {
+        let [r, g, b] = std::array::from_fn(|_| grain(&mut rng));
+        *p = *p + LinearRgb::new(r, g, b);
+    }
+}
+
+fn grain(rng: &mut ChaCha8Rng) -> f32 {
+    GRAIN_WIDTH * (f64::from(rng.next_u32()) / f64::from(u32::MAX) - 0.5) as f32
 }
 
 #[cfg(test)]
@@ -235,11 +270,11 @@ mod tests {
             LinearRgb::grey((x as f32 + y as f32 / 4.0) / 64.0)
         });
         let error = |curve: &str, setting: &str| {
-            let way = ways()
+            let encoding = encodings()
                 .into_iter()
-                .find(|w| w.curve == curve && w.setting == setting)
+                .find(|e| e.is(curve, setting))
                 .unwrap();
-            way.store(&ramp, folder.path()).unwrap().error
+            encoding.store(&ramp, folder.path()).unwrap().error
         };
         assert_eq!(error("EXR, float", "ZIP"), 0.0);
         assert!(error(HALF, "ZIP") < 1e-3 && error("PNG, 16 bits", "normal") < 1e-4);
@@ -258,12 +293,15 @@ mod tests {
         let picture = Image::from_fn(90, 70, |x, y| {
             LinearRgb::new(x as f32 / 90.0, y as f32 / 70.0, 0.2)
         });
-        let all: Vec<_> = ways().into_iter().filter(|w| w.curve == PNG).collect();
+        let all: Vec<_> = encodings().into_iter().filter(|e| e.curve == PNG).collect();
         let stored: Vec<_> = all
             .iter()
-            .map(|w| w.store(&picture, folder.path()).unwrap())
+            .map(|e| e.store(&picture, folder.path()).unwrap())
             .collect();
         assert!(stored.iter().all(|s| s.error == stored[0].error));
-        assert!(stored[3].bytes <= stored[0].bytes);
+        let [draft, _, reference] = &stored[..] else {
+            panic!("{} qualities", stored.len())
+        };
+        assert!(reference.bytes <= draft.bytes);
     }
 }

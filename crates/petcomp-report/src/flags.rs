@@ -1,27 +1,28 @@
-//! Flags: whether a cut-out that is wrong says so, and one that is right does not, on photos made harder and harder.
+//! Flags: whether a wrong cut-out is flagged for review, and a right one is not, on photos made harder in many ways.
 //!
-//! A person looks at the flagged photos only, so two shares matter: *silently wrong* photos spoil a dataset, *false alarms*
-//! cost a look each. The photos are a renderer's with known outlines; each [`PhotoVariant`] makes them harder in one way that
-//! keeps the outline known.
+//! A person reviews the flagged photos only, so two shares matter: *silently wrong* photos spoil a dataset, *false alarms*
+//! cost a review each. The photos are rendered, with known outlines; each [`PhotoVariant`] makes them harder in one way
+//! that keeps the outline known.
 
 mod variant;
 
 pub use variant::{Expected, PhotoVariant};
 
+use super::files::write_texts;
 use super::matte::score::overlap;
-use super::matte::truth::Truths;
+use super::matte::truth::{Known, Truths};
 use super::matte::{GOOD_BOX_PX, GOOD_IOU};
 use petcomp::Image;
 use petcomp::Result;
 use petcomp::geom::Point2;
-use petcomp::io;
+
 use petcomp::matte::{CutOut, CutOutOptions, cut_out};
 use petcomp::plot::Table;
 use petcomp::{Coverage, LinearRgb};
 use rayon::prelude::*;
 use std::path::Path;
 
-/// A photo whose outline is known, and what should become of it.
+/// A photo whose outline is known, and the expected result.
 #[derive(Clone, Debug)]
 pub struct Trial {
     /// Scene-linear.
@@ -30,38 +31,45 @@ pub struct Trial {
     pub mask: Image<Coverage>,
     /// Left, top, right and bottom of the outline, pixels.
     pub box_px: [f64; 4],
-    /// What should become of it.
+    /// The expected result.
     pub expected: Expected,
 }
 
-/// What became of a photo.
+/// The result of a photo.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FlagRow {
     /// Name of the photo.
     pub photo: String,
     /// How it was made harder.
     pub variant: PhotoVariant,
+    /// Errors, judgement and messages.
+    pub judged: Judgement,
+}
+
+/// How good the cut-out of a photo is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Judgement {
     /// Overlap (intersection over union) of the tight outline, and largest error of a side of the hull's box in pixels;
     /// nothing where the photo was refused.
-    pub found: Option<[f64; 2]>,
+    pub errors: Option<[f64; 2]>,
     /// How it ended.
     pub end: End,
-    /// Why a person should look, or why there is no cut-out.
-    pub doubts: Vec<String>,
+    /// Why the cut-out needs review, or why there is none.
+    pub reasons: Vec<String>,
 }
 
 /// How a photo ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum End {
-    /// As it should, without a doubt.
+    /// As expected, and not flagged.
     Right,
-    /// Right, but a person is asked to look: a false alarm.
+    /// Right, but flagged for review: a false alarm.
     RightAndFlagged,
-    /// Wrong, or not to be known, and said so.
-    Told,
+    /// Wrong, or undecidable, and flagged.
+    WrongAndFlagged,
     /// No cut-out, although there was one object.
     Refused,
-    /// Wrong, and nothing said.
+    /// Wrong, and not flagged.
     SilentlyWrong,
 }
 
@@ -70,7 +78,7 @@ impl End {
     pub const ALL: [Self; 5] = [
         Self::Right,
         Self::RightAndFlagged,
-        Self::Told,
+        Self::WrongAndFlagged,
         Self::Refused,
         Self::SilentlyWrong,
     ];
@@ -80,98 +88,123 @@ impl End {
         match self {
             Self::Right => "right",
             Self::RightAndFlagged => "right, flagged",
-            Self::Told => "wrong, flagged",
+            Self::WrongAndFlagged => "wrong, flagged",
             Self::Refused => "refused",
             Self::SilentlyWrong => "silently wrong",
         }
     }
 }
 
-/// Cuts out every photo of a folder with truth in every variant; `progress` hears of each photo and of how many there are.
+/// Cuts out every photo of a folder with truth in every variant; `progress` is given the number of finished photos and of
+/// all photos.
 ///
 /// # Errors
 /// A folder without truth, or files of it that cannot be read.
 pub fn measure(folder: &Path, progress: impl Fn(u64, u64)) -> Result<Vec<FlagRow>> {
-    let truths = Truths::of(folder)?;
+    let truths = Truths::in_folder(folder)?;
     let mut rows = Vec::new();
     for i in 0..truths.len() {
         progress(i as u64, truths.len() as u64);
-        let known = truths.read(i)?;
-        let of = |variant: &PhotoVariant| {
-            let trial = variant.of(&known, i as u64)?;
-            let (found, end, doubts) = trial.run();
-            Some(FlagRow {
-                photo: known.name.clone(),
-                variant: *variant,
-                found,
-                end,
-                doubts,
-            })
-        };
-        rows.extend(
-            PhotoVariant::ALL
-                .par_iter()
-                .filter_map(of)
-                .collect::<Vec<_>>(),
-        );
+        rows.extend(measure_photo(&truths.read(i)?, i as u64));
     }
     Ok(rows)
 }
 
+/// A row for each variant that can be made of a photo.
+fn measure_photo(known: &Known, seed: u64) -> Vec<FlagRow> {
+    PhotoVariant::ALL
+        .par_iter()
+        .filter_map(|variant| {
+            Some(FlagRow {
+                photo: known.name.clone(),
+                variant: *variant,
+                judged: variant.trial(known, seed)?.run(),
+            })
+        })
+        .collect()
+}
+
 impl Trial {
-    /// Cuts the photo out and judges what came of it.
-    pub fn run(&self) -> (Option<[f64; 2]>, End, Vec<String>) {
-        let cut = match cut_out(&self.photo, &CutOutOptions::default()) {
-            Err(error) => {
-                let end = if self.expected == Expected::Refused {
-                    End::Right
-                } else {
-                    End::Refused
-                };
-                return (None, end, vec![error.to_string()]);
-            }
-            Ok(cut) => cut,
-        };
-        // What is judged is the outline.
-        let of_outline = cut
-            .diagnostics
-            .iter()
-            .filter(|d| d.needs_review() && !d.code.is_about_color());
-        let doubts: Vec<String> = of_outline.map(ToString::to_string).collect();
-        let [iou, box_px] = self.errors(&cut);
-        // Pixels of a reduced search are that much larger.
-        let right = iou >= GOOD_IOU && box_px <= GOOD_BOX_PX * cut.segmentation.reduction.max(1.0);
-        let end = match (self.expected, right, doubts.is_empty()) {
-            (Expected::Right, true, true) => End::Right,
-            (Expected::Right, true, false) => End::RightAndFlagged,
-            (Expected::Flagged, _, false) => End::Right,
-            (_, _, false) => End::Told,
-            (_, _, true) => End::SilentlyWrong,
-        };
-        (Some([iou, box_px]), end, doubts)
+    /// Cuts the photo out and judges the result.
+    pub fn run(&self) -> Judgement {
+        match cut_out(&self.photo, &CutOutOptions::default()) {
+            Ok(cut) => self.judge(&cut),
+            Err(error) => Judgement {
+                errors: None,
+                end: self.end_of_refused(),
+                reasons: vec![error.to_string()],
+            },
+        }
+    }
+
+    fn end_of_refused(&self) -> End {
+        if self.expected == Expected::Refused {
+            End::Right
+        } else {
+            End::Refused
+        }
+    }
+
+    fn judge(&self, cut: &CutOut) -> Judgement {
+        let (errors, reasons) = (self.errors(cut), outline_reasons(cut));
+        let is_right = is_right(errors, cut.segmentation.reduction);
+        Judgement {
+            errors: Some(errors),
+            end: self.expected.end(is_right, !reasons.is_empty()),
+            reasons,
+        }
     }
 
     fn errors(&self, cut: &CutOut) -> [f64; 2] {
-        let found = sides(&cut.segmentation.hull);
-        let box_px = found
-            .iter()
-            .zip(self.box_px)
-            .map(|(a, b)| (a - b).abs())
-            .fold(0.0, f64::max);
+        let sides = bounding_sides(&cut.segmentation.hull);
+        let box_px = largest_difference(sides, self.box_px);
         [overlap(&cut.segmentation.tight, &self.mask), box_px]
     }
 }
 
+impl Expected {
+    /// How a photo of which there is a cut-out ended.
+    fn end(self, is_right: bool, is_flagged: bool) -> End {
+        match (self, is_right, is_flagged) {
+            (Self::Right, true, false) | (Self::Flagged, _, true) => End::Right,
+            (Self::Right, true, true) => End::RightAndFlagged,
+            (_, _, true) => End::WrongAndFlagged,
+            (_, _, false) => End::SilentlyWrong,
+        }
+    }
+}
+
+/// Pixels of a reduced search are that much larger.
+pub(crate) fn is_right([iou, box_px]: [f64; 2], reduction: f64) -> bool {
+    iou >= GOOD_IOU && box_px <= GOOD_BOX_PX * reduction.max(1.0)
+}
+
+/// Why an outline needs review; its colours are another matter.
+fn outline_reasons(cut: &CutOut) -> Vec<String> {
+    let of_outline = cut
+        .diagnostics
+        .iter()
+        .filter(|d| d.needs_review() && !d.code.is_about_color());
+    of_outline.map(ToString::to_string).collect()
+}
+
 /// Left, top, right and bottom of a polygon.
-fn sides(polygon: &[Point2<f64>]) -> [f64; 4] {
-    let least =
-        |along: fn(&Point2<f64>) -> f64| polygon.iter().map(along).fold(f64::INFINITY, f64::min);
+pub(crate) fn bounding_sides(polygon: &[Point2<f64>]) -> [f64; 4] {
     [
-        least(|p| p.x),
-        least(|p| p.y),
-        -least(|p| -p.x),
-        -least(|p| -p.y),
+        least(polygon, |p| p.x),
+        least(polygon, |p| p.y),
+        -least(polygon, |p| -p.x),
+        -least(polygon, |p| -p.y),
     ]
+}
+
+pub(crate) fn largest_difference(a: [f64; 4], b: [f64; 4]) -> f64 {
+    let off = a.iter().zip(b).map(|(a, b)| (a - b).abs());
+    off.fold(0.0, f64::max)
+}
+
+fn least(polygon: &[Point2<f64>], along: fn(&Point2<f64>) -> f64) -> f64 {
+    polygon.iter().map(along).fold(f64::INFINITY, f64::min)
 }
 
 /// How the photos of each variant ended, a line per variant.
@@ -179,32 +212,49 @@ pub fn table(rows: &[FlagRow]) -> Table {
     let ends = End::ALL.map(End::name);
     let mut table = Table::new(["photos", "made of"].into_iter().chain(ends));
     for variant in PhotoVariant::ALL {
-        let own = || rows.iter().filter(|row| row.variant == variant);
-        let count = |end: End| own().filter(|row| row.end == end).count().to_string();
-        let head = [variant.name().to_owned(), own().count().to_string()];
-        table.push(head.into_iter().chain(End::ALL.map(count)));
+        let name = variant.name().to_owned();
+        let counts = counts_of(rows, variant).map(|count| count.to_string());
+        table.push([name].into_iter().chain(counts));
     }
     table
+}
+
+/// How many photos of a variant there are, and how many ended in each way.
+fn counts_of(rows: &[FlagRow], variant: PhotoVariant) -> impl Iterator<Item = usize> {
+    let of_variant = rows.iter().filter(|row| row.variant == variant);
+    let ends: Vec<End> = of_variant.map(|row| row.judged.end).collect();
+    let each = End::ALL.map(|end| count_end(&ends, end));
+    [ends.len()].into_iter().chain(each)
+}
+
+fn count_end(ends: &[End], end: End) -> usize {
+    ends.iter().filter(|found| **found == end).count()
 }
 
 /// Every photo in every variant.
 pub fn details(rows: &[FlagRow]) -> Table {
     let mut table = Table::new(["photo", "variant", "iou", "box_px", "end", "doubts"]);
-    for row in rows {
-        let number = |i: usize| {
-            row.found
-                .map_or_else(String::new, |found| format!("{:.4}", found[i]))
-        };
-        let names = [
-            row.photo.clone(),
-            row.variant.name().into(),
-            number(0),
-            number(1),
-            row.end.name().into(),
-        ];
-        table.push(names.into_iter().chain([row.doubts.join("; ")]));
-    }
+    rows.iter().for_each(|row| table.push(row.cells()));
     table
+}
+
+impl FlagRow {
+    fn cells(&self) -> [String; 6] {
+        let judged = &self.judged;
+        let [iou, box_px] = [0, 1].map(|i| judged.errors.map(|errors| errors[i]));
+        [
+            self.photo.clone(),
+            self.variant.name().into(),
+            four_decimals(iou),
+            four_decimals(box_px),
+            judged.end.name().into(),
+            judged.reasons.join("; "),
+        ]
+    }
+}
+
+fn four_decimals(number: Option<f64>) -> String {
+    number.map_or_else(String::new, |v| format!("{v:.4}"))
 }
 
 /// Measures and writes `flags.csv` and `flags.md` into a folder.
@@ -214,18 +264,15 @@ pub fn details(rows: &[FlagRow]) -> Table {
 pub fn write(truth: &Path, folder: &Path, progress: impl Fn(u64, u64)) -> Result<Table> {
     let rows = measure(truth, progress)?;
     let table = table(&rows);
-    io::create_folder(folder)?;
-    io::write_text(folder.join("flags.csv"), &details(&rows).csv())?;
-    io::write_text(
-        folder.join("flags.md"),
-        &format!("# Right, or flagged\n\n{}", table.markdown()),
-    )?;
+    let markdown = format!("# Right, or flagged\n\n{}", table.markdown());
+    let data = details(&rows).csv();
+    write_texts(folder, [("flags.csv", &data), ("flags.md", &markdown)])?;
     Ok(table)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::matte::truth::{Known, Noise};
+    use super::super::matte::truth::{Known, PhotoNoise};
     use super::*;
 
     const GREEN: LinearRgb = LinearRgb::new(0.04, 0.4, 0.08);
@@ -254,7 +301,7 @@ mod tests {
             screen: Image::filled(w, h, GREEN),
             mask: Image::from_fn(w, h, |x, y| Coverage(f32::from(u8::from(on(x, y))))),
             box_px: [90.0, 60.0, 210.0, 120.0],
-            noise: Noise {
+            noise: PhotoNoise {
                 shot: 0.0,
                 read: 0.003,
             },
@@ -263,7 +310,7 @@ mod tests {
     }
 
     fn end(variant: PhotoVariant) -> End {
-        variant.of(&known(), 1).unwrap().run().1
+        variant.trial(&known(), 1).unwrap().run().end
     }
 
     #[test]
@@ -280,7 +327,7 @@ mod tests {
     }
 
     #[test]
-    fn what_must_be_told_is_told() {
+    fn what_must_be_flagged_is_flagged() {
         for variant in [
             PhotoVariant::OverBorder,
             PhotoVariant::Two,
@@ -291,13 +338,13 @@ mod tests {
         }
         assert!(matches!(
             end(PhotoVariant::Blurred),
-            End::RightAndFlagged | End::Told
+            End::RightAndFlagged | End::WrongAndFlagged
         ));
     }
 
     #[test]
     fn nothing_ends_silently_wrong() {
-        // Not yet held: what strong compression rings around a drawn slab is taken for its edge, and nothing says so.
+        // Not yet met: the ringing of strong compression around a drawn slab is treated as its edge, and not flagged.
         for variant in PhotoVariant::ALL
             .into_iter()
             .filter(|variant| *variant != PhotoVariant::Jpeg)
@@ -308,14 +355,14 @@ mod tests {
 
     #[test]
     fn a_wrong_outline_without_a_doubt_is_silently_wrong() {
-        let mut trial = PhotoVariant::Plain.of(&known(), 1).unwrap();
+        let mut trial = PhotoVariant::Plain.trial(&known(), 1).unwrap();
         trial.box_px[2] += 5.0;
-        assert_eq!(trial.run().1, End::SilentlyWrong);
+        assert_eq!(trial.run().end, End::SilentlyWrong);
         let unexpected = Trial {
             expected: Expected::Refused,
             ..trial
         };
-        assert_eq!(unexpected.run().1, End::SilentlyWrong);
+        assert_eq!(unexpected.run().end, End::SilentlyWrong);
     }
 
     #[test]
@@ -323,9 +370,11 @@ mod tests {
         let row = |variant, end| FlagRow {
             photo: "a".into(),
             variant,
-            found: None,
-            end,
-            doubts: vec!["x; y".into()],
+            judged: Judgement {
+                errors: None,
+                end,
+                reasons: vec!["x; y".into()],
+            },
         };
         let rows = [
             row(PhotoVariant::Plain, End::Right),

@@ -10,112 +10,133 @@ use petcomp::matte::key::Blur;
 use petcomp::matte::{KeyOptions, Keying, Screen};
 use petcomp::plot::three;
 use petcomp::{Coverage, LinearRgb};
+use std::ops::Range;
 
 const SIZE: (usize, usize) = (640, 480);
 /// Sizes of the blur, pixels: a window reaches one pixel less to every side.
-const SIZES: [u32; 4] = [3, 10, 30, 100];
-const RUNS: usize = 5;
+const BLUR_SIZES_PX: [u32; 4] = [3, 10, 30, 100];
+const TIMED_RUNS: usize = 5;
 const SCREEN: LinearRgb = LinearRgb::new(0.1, 0.75, 0.2);
 /// Rows and columns between the pixels that are compared: coprime to all windows.
-const STRIDE: usize = 7;
+const SAMPLE_STRIDE_PX: usize = 7;
+/// The disc in the photo: its radius, the width of its edge and the side of its tiles.
+const DISC_RADIUS_PX: f32 = 160.0;
+const DISC_EDGE_PX: f32 = 8.0;
+const DISC_TILE_PX: usize = 40;
 
 /// Error and time of both ways to blur, at several sizes.
 ///
 /// # Errors
-/// A thread that cannot be had.
+/// A thread that cannot be started.
 pub fn diagrams() -> Result<Vec<Diagram>> {
-    let photo = photo();
+    let photo = disc_photo();
     let job = Keying::new(&photo, Screen::Color(SCREEN));
-    let sharp = job.matte(&KeyOptions::default())?;
-    let mut points = Vec::new();
-    for (blur, name) in [
-        (Blur::Exact, "Blender's order"),
-        (Blur::RunningSum, "running sums"),
-    ] {
-        for size in SIZES {
-            let options = KeyOptions {
-                blur_post: size,
-                blur,
-                ..KeyOptions::default()
-            };
-            let (matte, seconds) = timed(RUNS, || job.matte(&options))?;
-            let error = rms(&matte, &sharp, size as usize - 1);
-            points.push(Point::new(name, format!("size {size}"), seconds, error));
-        }
-    }
-    let ratio = |i: usize| three(points[i].cost / points[SIZES.len() + i].cost);
-    let ratios: Vec<_> = SIZES
-        .iter()
-        .enumerate()
-        .map(|(i, size)| format!("{} at size {size}", ratio(i)))
-        .collect();
-    let why = format!(
-        "Sizes are different work, not different precision: compare the two forms at one size. Blender's order takes {} times \
-         as long as running sums, and is further from the mean. It is the default all the same: its bits are Blender's, and \
-         the default size is 0, which is no blur at all. `blur = \"running_sum\"` is for large sizes.",
-        ratios.join(", ")
-    );
+    let exact = measure_blur(&job, Blur::Exact, "Blender's order")?;
+    let running = measure_blur(&job, Blur::RunningSum, "running sums")?;
+    let (w, h) = SIZE;
     Ok(vec![Diagram {
         file: "matte_blur".into(),
         title: "matte: blur of the keyer".into(),
-        input: format!(
-            "a soft disc before a screen, {} x {}; key and blur",
-            SIZE.0, SIZE.1
-        ),
+        input: format!("a soft disc before a screen, {w} x {h}; key and blur"),
         error: "RMS error of the matte".into(),
         cost: "CPU seconds".into(),
         reference: "mean over the window in double precision (closed form)".into(),
-        points,
-        why,
+        why: why_exact(&exact, &running),
+        points: [exact, running].concat(),
         ..Diagram::default()
     }])
 }
 
+/// A point for each size.
+fn measure_blur(job: &Keying<'_, LinearRgb>, blur: Blur, name: &str) -> Result<Vec<Point>> {
+    let sharp = job.matte(&KeyOptions::default())?;
+    BLUR_SIZES_PX
+        .into_iter()
+        .map(|size| {
+            let options = blurred_by(size, blur);
+            let (matte, seconds) = timed(TIMED_RUNS, || job.matte(&options))?;
+            let error = rms_from_means(&matte, &sharp, size as usize - 1);
+            Ok(Point::new(name, format!("size {size}"), seconds, error))
+        })
+        .collect()
+}
+
+fn blurred_by(blur_post: u32, blur: Blur) -> KeyOptions {
+    KeyOptions {
+        blur_post,
+        blur,
+        ..KeyOptions::default()
+    }
+}
+
+/// Why the slower form is the default.
+fn why_exact(exact: &[Point], running: &[Point]) -> String {
+    let pairs = exact.iter().zip(running).zip(BLUR_SIZES_PX);
+    let ratios: Vec<_> = pairs
+        .map(|((exact, running), size)| {
+            format!("{} at size {size}", three(exact.cost / running.cost))
+        })
+        .collect();
+    format!(
+        "Sizes are different work, not different precision: compare the two forms at one size. Blender's order takes {} times \
+         as long as running sums, and is further from the mean. It is the default all the same: its bits are Blender's, and \
+         the default size is 0, which is no blur at all. `blur = \"running_sum\"` is for large sizes.",
+        ratios.join(", ")
+    )
+}
+
 /// A soft disc of grey and red tiles before a screen with a slope of light.
-fn photo() -> Image<LinearRgb> {
-    const RADIUS: f32 = 160.0;
-    const EDGE: f32 = 8.0;
-    const TILE: usize = 40;
+fn disc_photo() -> Image<LinearRgb> {
     Image::from_fn(SIZE.0, SIZE.1, |x, y| {
-        let (dx, dy) = (
-            x as f32 - SIZE.0 as f32 / 2.0,
-            y as f32 - SIZE.1 as f32 / 2.0,
-        );
-        let cover = ((RADIUS - (dx * dx + dy * dy).sqrt()) / EDGE + 0.5).clamp(0.0, 1.0);
-        let front = if (x / TILE + y / TILE).is_multiple_of(2) {
-            [0.6, 0.3, 0.2]
-        } else {
-            [0.75, 0.72, 0.7]
-        };
+        let cover = disc_coverage(x, y);
         let light = 0.95 + 0.1 * x as f32 / SIZE.0 as f32;
-        (LinearRgb::from(front).scale(cover) + SCREEN.scale(1.0 - cover)).scale(light)
+        (disc_color(x, y).scale(cover) + SCREEN.scale(1.0 - cover)).scale(light)
     })
 }
 
+fn disc_coverage(x: usize, y: usize) -> f32 {
+    let dx = x as f32 - SIZE.0 as f32 / 2.0;
+    let dy = y as f32 - SIZE.1 as f32 / 2.0;
+    let inside = (DISC_RADIUS_PX - (dx * dx + dy * dy).sqrt()) / DISC_EDGE_PX;
+    (inside + 0.5).clamp(0.0, 1.0)
+}
+
+fn disc_color(x: usize, y: usize) -> LinearRgb {
+    if (x / DISC_TILE_PX + y / DISC_TILE_PX).is_multiple_of(2) {
+        LinearRgb::new(0.6, 0.3, 0.2)
+    } else {
+        LinearRgb::new(0.75, 0.72, 0.7)
+    }
+}
+
 /// Root mean squared difference between a blurred matte and the means of the sharp one's windows, cut off at the border.
-fn rms(blurred: &Image<Coverage>, sharp: &Image<Coverage>, radius: usize) -> f64 {
+fn rms_from_means(blurred: &Image<Coverage>, sharp: &Image<Coverage>, radius: usize) -> f64 {
     let (w, h) = sharp.size();
-    let window =
-        |at: usize, length: usize| at.saturating_sub(radius)..(at + radius + 1).min(length);
-    let places = (0..h)
-        .step_by(STRIDE)
-        .flat_map(|y| (0..w).step_by(STRIDE).map(move |x| (x, y)));
     let (mut squares, mut count) = (0.0, 0.0);
-    for (x, y) in places {
-        let (columns, rows) = (window(x, w), window(y, h));
-        let area = (columns.len() * rows.len()) as f64;
-        let sum: f64 = rows
-            .map(|j| {
-                sharp.row(j)[columns.clone()]
-                    .iter()
-                    .map(|c| f64::from(c.0))
-                    .sum::<f64>()
-            })
-            .sum();
-        squares += (f64::from(blurred[(x, y)].0) - sum / area).powi(2);
-        count += 1.0;
+    for y in (0..h).step_by(SAMPLE_STRIDE_PX) {
+        for x in (0..w).step_by(SAMPLE_STRIDE_PX) {
+            let mean = window_mean(sharp, (x, y), radius);
+            squares += (f64::from(blurred[(x, y)].0) - mean).powi(2);
+            count += 1.0;
+        }
     }
     (squares / count).sqrt()
+}
+
+fn window_mean(sharp: &Image<Coverage>, (x, y): (usize, usize), radius: usize) -> f64 {
+    let (w, h) = sharp.size();
+    let (columns, rows) = (window(x, radius, w), window(y, radius, h));
+    let area = (columns.len() * rows.len()) as f64;
+    let sum: f64 = rows.map(|j| row_sum(&sharp.row(j)[columns.clone()])).sum();
+    sum / area
+}
+
+fn window(at: usize, radius: usize, length: usize) -> Range<usize> {
+    at.saturating_sub(radius)..(at + radius + 1).min(length)
+}
+
+fn row_sum(row: &[Coverage]) -> f64 {
+    row.iter().map(|c| f64::from(c.0)).sum()
 }
 
 #[cfg(test)]
@@ -124,7 +145,7 @@ mod tests {
 
     #[test]
     fn both_blurs_are_the_mean_of_the_window() {
-        let photo = photo();
+        let photo = disc_photo();
         let job = Keying::new(&photo, Screen::Color(SCREEN));
         let sharp = job.matte(&KeyOptions::default()).unwrap();
         for blur in [Blur::Exact, Blur::RunningSum] {
@@ -136,13 +157,13 @@ mod tests {
                 })
                 .unwrap();
             assert!(
-                rms(&blurred, &sharp, 9) < 1e-6,
+                rms_from_means(&blurred, &sharp, 9) < 1e-6,
                 "{blur:?}: {}",
-                rms(&blurred, &sharp, 9)
+                rms_from_means(&blurred, &sharp, 9)
             );
             assert!(
-                rms(&blurred, &sharp, 8) > 1e-4,
-                "a window of another size is told apart"
+                rms_from_means(&blurred, &sharp, 8) > 1e-4,
+                "a window of another size is distinguished"
             );
         }
     }

@@ -4,342 +4,224 @@
 //! part of the light that the card does not hide: the light cut by the planes through the point and the card's sides. What
 //! it leaves of an even sky is 1 less the card's form factor. Neither shares anything with the renderer's sampling.
 
+mod shadow;
+
 use super::clock::timed;
-use super::pile::above;
+use super::diagram::invisible_error;
 use super::{Diagram, Point};
 use petcomp::DeepImage;
-use petcomp::Image;
 use petcomp::Quality;
 use petcomp::Result;
-use petcomp::geom::{Plane, Point2, Point3, Pose, Quad, UnitQuaternion, Vector3};
-use petcomp::light::{frame, polygon_irradiance};
 use petcomp::render::{RenderOptions, render, render_reference};
-use petcomp::scene::{AreaLight, Card, Grade, LightShape, Shot};
-use petcomp::{LinearRgb, ObjectId, PremulRgba};
-use std::f64::consts::PI;
+use petcomp::scene::Shot;
+use shadow::{CARD_HEIGHT_M, IMAGE_SIZE_PX, LightKind, exact_shares, shadow_shot};
 
-const SIZE: [u32; 2] = [160, 120];
-/// Size, height and turn of the card, metres and radians.
-const CARD: [f64; 2] = [0.2, 0.08];
-const HEIGHT: f64 = 0.05;
-const TURN: f64 = 0.4;
 /// Samples along each side of the light.
-const LIGHT: [usize; 7] = [1, 2, 3, 4, 6, 8, 12];
-const SKY: [usize; 7] = [4, 12, 32, 64, 100, 200, 400];
-const CELLS: [f64; 5] = [4.0, 2.0, 1.5, 1.0, 0.33];
+const LIGHT_SAMPLES: [usize; 7] = [1, 2, 3, 4, 6, 8, 12];
+/// Directions of the sky.
+const SKY_SAMPLES: [usize; 7] = [4, 12, 32, 64, 100, 200, 400];
+const CELLS_PX: [f64; 5] = [4.0, 2.0, 1.5, 1.0, 0.33];
 /// The plain form takes a thousand times as long, so that it is tried with fewer samples.
-const MOST_PLAIN: usize = 64;
-const RUNS: usize = 5;
-/// Error of the shadow's share of light that nobody sees: half of a code of 8 bits at middle grey.
-const UNSEEN: f64 = 0.004;
-
-/// Which light there is.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Kind {
-    Area,
-    Sky,
-}
+const MAX_PLAIN_SAMPLES: usize = 64;
+const TIMED_RUNS: usize = 5;
 
 /// The shadow of a card under an area light, and under an even sky.
 ///
 /// # Errors
-/// A thread that cannot be had.
+/// A thread that cannot be started.
 pub fn diagrams() -> Result<Vec<Diagram>> {
-    [Kind::Area, Kind::Sky].map(diagram).into_iter().collect()
+    let kinds = [LightKind::Area, LightKind::Sky];
+    kinds.into_iter().map(shadow_diagram).collect()
 }
 
-fn diagram(kind: Kind) -> Result<Diagram> {
-    let shot = shot(kind);
-    let exact = exact(&shot, kind);
-    let usual = RenderOptions::default();
-    let sampled = |n: usize| match kind {
-        Kind::Area => RenderOptions {
-            light_samples: n,
-            ..usual
-        },
-        Kind::Sky => RenderOptions {
-            ambient_samples: n,
-            ..usual
-        },
-    };
-    let counts = if kind == Kind::Area { LIGHT } else { SKY };
-    let name = |n: usize| {
-        if kind == Kind::Area {
-            format!("{n} x {n}")
-        } else {
-            n.to_string()
+fn shadow_diagram(kind: LightKind) -> Result<Diagram> {
+    let shadow = Shadow::new(kind);
+    let points = [
+        shadow.filtered_points()?,
+        shadow.cell_points()?,
+        shadow.plain_points()?,
+        shadow.quality_points()?,
+    ];
+    Ok(Diagram {
+        points: points.concat(),
+        ..kind.empty_diagram()
+    })
+}
+
+impl LightKind {
+    fn sample_counts(self) -> [usize; 7] {
+        match self {
+            Self::Area => LIGHT_SAMPLES,
+            Self::Sky => SKY_SAMPLES,
         }
-    };
-    let mut points = Vec::new();
-    for n in counts {
-        points.push(measured(
-            ("filtered", name(n)),
-            &shot,
-            &exact,
-            &sampled(n),
-            render,
-        )?);
     }
-    for cell_px in CELLS.into_iter().filter(|c| *c != usual.cell_px) {
-        let options = RenderOptions { cell_px, ..usual };
-        points.push(measured(
-            ("filtered, other cells", format!("{cell_px} px")),
-            &shot,
-            &exact,
-            &options,
-            render,
-        )?);
+
+    fn options(self, samples: usize) -> RenderOptions {
+        let default = RenderOptions::default();
+        match self {
+            Self::Area => RenderOptions {
+                light_samples: samples,
+                ..default
+            },
+            Self::Sky => RenderOptions {
+                ambient_samples: samples,
+                ..default
+            },
+        }
     }
-    for n in counts.into_iter().filter(|n| *n <= MOST_PLAIN) {
-        // One sample a pixel: shadows are smooth, and what is compared is the light.
-        let options = RenderOptions {
-            subsamples: 1,
-            ..sampled(n)
-        };
-        points.push(measured(
-            ("plain samples", name(n)),
-            &shot,
-            &exact,
-            &options,
-            render_reference,
-        )?);
+
+    fn setting_name(self, samples: usize) -> String {
+        match self {
+            Self::Area => format!("{samples} x {samples}"),
+            Self::Sky => samples.to_string(),
+        }
     }
-    for quality in [Quality::Draft, Quality::Reference] {
-        let options = quality.render();
-        let point = measured(
-            ("all of a quality", String::new()),
-            &shot,
-            &exact,
-            &options,
-            render,
-        )?;
-        points.push(point.used_where(|q| q == quality));
+
+    /// File, title and reference.
+    fn words(self) -> [&'static str; 3] {
+        match self {
+            Self::Area => [
+                "shadow_light",
+                "shadow: a card under an area light",
+                "Lambert's formula for the part of the light that is seen (closed form)",
+            ],
+            Self::Sky => [
+                "shadow_sky",
+                "shadow: a card under an even sky",
+                "form factor of the card (closed form)",
+            ],
+        }
     }
-    Ok(told(kind, points))
+
+    fn empty_diagram(self) -> Diagram {
+        let [file, title, reference] = self.words().map(String::from);
+        Diagram {
+            file,
+            title,
+            input: input_words(),
+            error: "RMS error of the share of light".into(),
+            cost: "CPU seconds of a picture".into(),
+            reference,
+            limit: invisible_error(),
+            why: "Piles cast many shadows on each other, so the error of a single one should be a fraction of what is visible."
+                .into(),
+            ..Diagram::default()
+        }
+    }
 }
 
-fn told(kind: Kind, points: Vec<Point>) -> Diagram {
-    let (file, title, reference) = match kind {
-        Kind::Area => (
-            "shadow_light",
-            "shadow: a card under an area light",
-            "Lambert's formula for the part of the light that is seen (closed form)",
-        ),
-        Kind::Sky => (
-            "shadow_sky",
-            "shadow: a card under an even sky",
-            "form factor of the card (closed form)",
-        ),
-    };
-    Diagram {
-        file: file.into(),
-        title: title.into(),
-        input: format!("one opaque card {} mm over the surface, {} x {}", HEIGHT * 1e3, SIZE[0], SIZE[1]),
-        error: "RMS error of the share of light".into(),
-        cost: "CPU seconds of a picture".into(),
-        reference: reference.into(),
-        points,
-        limit: Some((UNSEEN, "half of an 8-bit code at middle grey".into())),
-        why: "Piles cast many shadows on each other, so that a single one is held to a fraction of what is seen."
-            .into(),
-        ..Diagram::default()
-    }
+fn input_words() -> String {
+    let ([w, h], height_mm) = (IMAGE_SIZE_PX, CARD_HEIGHT_M * 1e3);
+    format!("one opaque card {height_mm} mm over the surface, {w} x {h}")
 }
 
 type Renderer = fn(&Shot, &RenderOptions) -> DeepImage;
 
-fn measured(
-    (curve, setting): (&str, String),
-    shot: &Shot,
-    exact: &[Option<f64>],
-    options: &RenderOptions,
-    renderer: Renderer,
-) -> Result<Point> {
-    let (deep, seconds) = timed(RUNS, || Ok(renderer(shot, options)))?;
-    let pairs = deep
-        .shadow()
-        .pixels()
-        .iter()
-        .zip(exact)
-        .filter_map(|(p, e)| Some((f64::from(p.g), (*e)?)));
-    let (sum, count) = pairs.fold((0.0, 0.0), |(sum, n), (p, e)| {
-        (sum + (p - e).powi(2), n + 1.0)
-    });
-    let is_default = *options == RenderOptions::default();
-    Ok(
-        Point::new(curve, setting, seconds, (sum / f64::max(count, 1.0)).sqrt())
-            .used_where(|q| is_default && q == Quality::default()),
-    )
+/// A card's shadow, to be rendered, and its closed form.
+struct Shadow {
+    kind: LightKind,
+    shot: Shot,
+    exact: Vec<Option<f64>>,
 }
 
-fn shot(kind: Kind) -> Shot {
-    let rotation = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), TURN);
-    let card = Card {
-        id: ObjectId(1),
-        class: 0,
-        quad: Quad {
-            world_from_card: Pose::from_parts(Vector3::new(0.0, 0.0, HEIGHT).into(), rotation),
-            size: CARD,
-        },
-        // So fine that its border, half a texel soft, is a sharp one.
-        texture: Image::filled(512, 256, PremulRgba::new(0.0, 0.0, 0.0, 1.0)).into(),
-        back: None,
-        outline_uv: [].into(),
-        grade: Grade::default(),
-    };
-    let shot = Shot::new(above(SIZE, 0.6)).with_card(card);
-    match kind {
-        Kind::Sky => shot.with_ambient(LinearRgb::WHITE),
-        Kind::Area => shot.with_light(AreaLight {
-            shape: LightShape::Rectangle,
-            position: [0.3, 0.2, 0.8],
-            target: [0.0; 3],
-            size: [0.3; 2],
-            power: 5.0,
-            color: LinearRgb::WHITE,
-        }),
-    }
-}
-
-/// What the card leaves of the light at each pixel's centre; nothing where the card itself is seen, or near its border.
-fn exact(shot: &Shot, kind: Kind) -> Vec<Option<f64>> {
-    let quad = &shot.cards[0].quad;
-    // A tenth more to each side, for the pixels of its border.
-    let around = Quad {
-        size: quad.size.map(|side| 1.2 * side),
-        ..*quad
-    };
-    let (card, [w, h]) = (quad.corners(), shot.camera.image);
-    let at = |i: u32| {
-        let ray = shot
-            .camera
-            .ray(Point2::new(f64::from(i % w) + 0.5, f64::from(i / w) + 0.5));
-        let point = ray.at(Plane::surface().intersect(&ray)?);
-        around
-            .intersect(&ray)
-            .is_none()
-            .then(|| share(shot, kind, &card, point))
-    };
-    (0..w * h).map(at).collect()
-}
-
-fn share(shot: &Shot, kind: Kind, card: &[Point3<f64>; 4], point: Point3<f64>) -> f64 {
-    match kind {
-        Kind::Sky => 1.0 - polygon_irradiance(card, point, Vector3::z()) / PI,
-        Kind::Area => {
-            let light = &shot.lights[0];
-            let face = frame(light).corners(light.size);
-            let hidden = shadowed(&face, card, point);
-            1.0 - polygon_irradiance(&hidden, point, Vector3::z())
-                / polygon_irradiance(&face, point, Vector3::z())
+impl Shadow {
+    fn new(kind: LightKind) -> Self {
+        let shot = shadow_shot(kind);
+        Self {
+            kind,
+            exact: exact_shares(&shot, kind),
+            shot,
         }
     }
-}
 
-/// The part of a light's face that a card hides from a point: cut by the planes through the point and each side.
-fn shadowed(
-    face: &[Point3<f64>; 4],
-    card: &[Point3<f64>; 4],
-    point: Point3<f64>,
-) -> Vec<Point3<f64>> {
-    let middle =
-        Point3::from(card.iter().map(|c| c.coords).sum::<Vector3<f64>>() / card.len() as f64);
-    let sides = card.iter().zip(card.iter().cycle().skip(1));
-    sides.fold(face.to_vec(), |kept, (a, b)| {
-        let normal = (a - point).cross(&(b - point));
-        let inwards = normal * normal.dot(&(middle - point)).signum();
-        cut(&kept, |p| inwards.dot(&(p - point)))
-    })
-}
-
-/// The part of a polygon on the positive side (Sutherland and Hodgman 1974).
-fn cut(polygon: &[Point3<f64>], side: impl Fn(&Point3<f64>) -> f64) -> Vec<Point3<f64>> {
-    let mut kept = Vec::with_capacity(polygon.len() + 1);
-    for (a, b) in polygon.iter().zip(polygon.iter().cycle().skip(1)) {
-        let (s, t) = (side(a), side(b));
-        if s >= 0.0 {
-            kept.push(*a);
-        }
-        if (s >= 0.0) != (t >= 0.0) {
-            kept.push(a + (b - a) * (s / (s - t)));
-        }
+    fn filtered_points(&self) -> Result<Vec<Point>> {
+        let counts = self.kind.sample_counts().into_iter();
+        counts
+            .map(|n| {
+                let setting = self.kind.setting_name(n);
+                self.measure(["filtered", &setting], &self.kind.options(n), render)
+            })
+            .collect()
     }
-    kept
+
+    fn cell_points(&self) -> Result<Vec<Point>> {
+        let default = RenderOptions::default();
+        let others = CELLS_PX.into_iter().filter(|px| *px != default.cell_px);
+        others
+            .map(|cell_px| {
+                let options = RenderOptions { cell_px, ..default };
+                let setting = format!("{cell_px} px");
+                self.measure(["filtered, other cells", &setting], &options, render)
+            })
+            .collect()
+    }
+
+    fn plain_points(&self) -> Result<Vec<Point>> {
+        let counts = self.kind.sample_counts().into_iter();
+        counts
+            .filter(|n| *n <= MAX_PLAIN_SAMPLES)
+            .map(|n| self.plain_point(n))
+            .collect()
+    }
+
+    fn plain_point(&self, samples: usize) -> Result<Point> {
+        // One sample a pixel: shadows are smooth, and what is compared is the light.
+        let options = RenderOptions {
+            subsamples: 1,
+            ..self.kind.options(samples)
+        };
+        let setting = self.kind.setting_name(samples);
+        self.measure(["plain samples", &setting], &options, render_reference)
+    }
+
+    fn quality_points(&self) -> Result<Vec<Point>> {
+        let others = [Quality::Draft, Quality::Reference];
+        others
+            .into_iter()
+            .map(|quality| {
+                let point = self.measure(["all of a quality", ""], &quality.render(), render)?;
+                Ok(point.used_where(|q| q == quality))
+            })
+            .collect()
+    }
+
+    /// Time and error of a setting of a curve.
+    fn measure(
+        &self,
+        [curve, setting]: [&str; 2],
+        options: &RenderOptions,
+        renderer: Renderer,
+    ) -> Result<Point> {
+        let (deep, seconds) = timed(TIMED_RUNS, || Ok(renderer(&self.shot, options)))?;
+        let is_default = *options == RenderOptions::default();
+        Ok(Point::new(curve, setting, seconds, self.rms_error(&deep))
+            .used_where(|q| is_default && q == Quality::default()))
+    }
+
+    /// Over the pixels for which the closed form holds.
+    fn rms_error(&self, deep: &DeepImage) -> f64 {
+        let shadow = deep.shadow();
+        let pairs = shadow.pixels().iter().zip(&self.exact);
+        let errors = pairs.filter_map(|(pixel, exact)| Some(f64::from(pixel.g) - (*exact)?));
+        let (sum, count) =
+            errors.fold((0.0, 0.0), |(sum, count), e| (sum + e.powi(2), count + 1.0));
+        (sum / f64::max(count, 1.0)).sqrt()
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// The share of the light's points that a point sees past the card, weighted as light is.
-    fn brute_force(shot: &Shot, point: Point3<f64>) -> f64 {
-        const N: usize = 120;
-        let light = &shot.lights[0];
-        let face = frame(light);
-        let place = |i: usize, side: f64| ((i as f64 + 0.5) / N as f64 - 0.5) * side;
-        let (mut open, mut all) = (0.0, 0.0);
-        for i in 0..N * N {
-            let from = face.point(place(i % N, light.size[0]), place(i / N, light.size[1]));
-            let way = from - point;
-            let weight = way.z * -face.normal.dot(&way) / way.norm_squared().powi(2);
-            let ray = petcomp::geom::Ray {
-                origin: point,
-                direction: way,
-            };
-            let is_hidden = shot.cards[0]
-                .quad
-                .intersect(&ray)
-                .is_some_and(|(t, _)| t > 0.0);
-            all += weight;
-            open += if is_hidden { 0.0 } else { weight };
-        }
-        open / all
-    }
-
-    #[test]
-    fn the_closed_form_is_what_many_rays_find() {
-        let shot = shot(Kind::Area);
-        let card = shot.cards[0].quad.corners();
-        for [x, y] in [
-            [0.0, 0.0],
-            [-0.06, -0.03],
-            [-0.1, 0.02],
-            [0.05, -0.08],
-            [0.3, 0.3],
-        ] {
-            let point = Point3::new(x, y, 0.0);
-            let (exact, found) = (
-                share(&shot, Kind::Area, &card, point),
-                brute_force(&shot, point),
-            );
-            assert!((exact - found).abs() < 0.01, "{x} {y}: {exact} {found}");
-        }
-    }
-
     #[test]
     fn more_samples_come_nearer_and_the_default_is_near() {
-        let shot = shot(Kind::Area);
-        let exact = exact(&shot, Kind::Area);
-        let error = |options: RenderOptions| {
-            measured(("", String::new()), &shot, &exact, &options, render)
-                .unwrap()
-                .error
-        };
+        let shadow = Shadow::new(LightKind::Area);
+        let error =
+            |options: RenderOptions| shadow.measure(["", ""], &options, render).unwrap().error;
         let [draft, normal, best] = Quality::ALL.map(|q| error(q.render()));
         assert!(
             draft > normal && normal > best && best < 0.005 && normal < 0.03,
             "{draft} {normal} {best}"
         );
-    }
-
-    #[test]
-    fn a_card_far_from_the_light_hides_nothing() {
-        let shot = shot(Kind::Area);
-        let card = shot.cards[0].quad.corners();
-        assert_eq!(
-            share(&shot, Kind::Area, &card, Point3::new(2.0, 2.0, 0.0)),
-            1.0
-        );
-        assert!(share(&shot, Kind::Sky, &card, Point3::new(50.0, 0.0, 0.0)) > 0.999_99);
     }
 }

@@ -5,58 +5,60 @@ use std::path::Path;
 
 const KIB_PER_GIB: f64 = 1024.0 * 1024.0;
 
-/// The machine and the versions of what runs on it; what cannot be found out is left out, and so is an empty date.
-pub(super) fn machine(date: &str) -> Table {
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+/// The machine and the versions of what runs on it; unknown values and an empty date are left out.
+pub(super) fn machine_table(date: &str) -> Table {
     let mut table = Table::new(["what", "value"]);
-    let rows = [
-        ("petcomp", Some(env!("CARGO_PKG_VERSION").to_owned())),
-        ("processor", line_of("/proc/cpuinfo", "model name")),
-        ("cores", Some(cores.to_string())),
-        (
-            "memory",
-            line_of("/proc/meminfo", "MemTotal").and_then(|text| gib(&text)),
-        ),
-        (
-            "system",
-            line_of("/etc/os-release", "PRETTY_NAME").map(|name| name.trim_matches('"').to_owned()),
-        ),
-        (
-            "kernel",
-            std::fs::read_to_string("/proc/sys/kernel/osrelease")
-                .ok()
-                .map(|text| text.trim().to_owned()),
-        ),
-        ("OpenImageIO", openimageio()),
-        (
-            "date",
-            Some(date.to_owned()).filter(|date| !date.is_empty()),
-        ),
-    ];
-    rows.into_iter()
-        .filter_map(|(what, value)| Some([what.to_owned(), value?]))
-        .for_each(|row| table.push(row));
+    for (what, value) in properties(date) {
+        if let Some(value) = value {
+            table.push([what.to_owned(), value]);
+        }
+    }
     table
 }
 
-/// What stands behind the first line of a file that begins with a name, and a `:` or `=`.
+fn properties(date: &str) -> [(&'static str, Option<String>); 8] {
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    [
+        ("petcomp", Some(env!("CARGO_PKG_VERSION").to_owned())),
+        ("processor", line_of("/proc/cpuinfo", "model name")),
+        ("cores", Some(cores.to_string())),
+        ("memory", memory()),
+        ("system", system_name()),
+        ("kernel", kernel_release()),
+        ("OpenImageIO", petcomp::io::worker_version().ok()),
+        ("date", (!date.is_empty()).then(|| date.to_owned())),
+    ]
+}
+
+fn memory() -> Option<String> {
+    gib(&line_of("/proc/meminfo", "MemTotal")?)
+}
+
+fn system_name() -> Option<String> {
+    let name = line_of("/etc/os-release", "PRETTY_NAME")?;
+    Some(name.trim_matches('"').to_owned())
+}
+
+fn kernel_release() -> Option<String> {
+    let text = std::fs::read_to_string("/proc/sys/kernel/osrelease").ok()?;
+    Some(text.trim().to_owned())
+}
+
+/// The value of the first line of a file that begins with a name, and a `:` or `=`.
 fn line_of(path: impl AsRef<Path>, name: &str) -> Option<String> {
     let text = std::fs::read_to_string(path).ok()?;
-    let value = text.lines().find_map(|line| {
-        line.strip_prefix(name)?
-            .trim_start()
-            .strip_prefix([':', '='])
-    })?;
+    let value = text.lines().find_map(|line| value_of(line, name))?;
     Some(value.trim().to_owned())
+}
+
+fn value_of<'a>(line: &'a str, name: &str) -> Option<&'a str> {
+    let rest = line.strip_prefix(name)?.trim_start();
+    rest.strip_prefix([':', '='])
 }
 
 fn gib(kib: &str) -> Option<String> {
     let kib: f64 = kib.split_whitespace().next()?.parse().ok()?;
     Some(format!("{:.1} GiB", kib / KIB_PER_GIB))
-}
-
-fn openimageio() -> Option<String> {
-    petcomp::io::worker_version().ok()
 }
 
 #[cfg(test)]
@@ -89,7 +91,7 @@ mod tests {
 
     #[test]
     fn a_date_is_there_only_if_it_is_given() {
-        let has_date = |date: &str| machine(date).rows.iter().any(|row| row[0] == "date");
+        let has_date = |date: &str| machine_table(date).rows.iter().any(|row| row[0] == "date");
         assert!(has_date("today") && !has_date(""));
     }
 }

@@ -36,41 +36,42 @@ pub(crate) struct ReportFlags {
 
 impl ReportFlags {
     /// Prints a line about the work, unless asked to be quiet.
-    pub(crate) fn say(&self, line: impl std::fmt::Display) {
+    pub(crate) fn print_line(&self, line: impl std::fmt::Display) {
         if !self.quiet {
             println!("{line}");
         }
     }
 
-    /// A progress bar on a terminal, nothing elsewhere.
-    pub(crate) fn progress(&self, job: &'static str) -> ProgressLine {
+    /// Runs `measure`, which is given what shows the number of finished steps and of all steps on a terminal.
+    pub(crate) fn with_progress<T>(
+        &self,
+        job: &'static str,
+        measure: impl FnOnce(&dyn Fn(u64, u64)) -> T,
+    ) -> T {
+        let bar = self.progress_bar(job);
+        let result = measure(&|done, total| {
+            bar.set_length(total);
+            bar.set_position(done);
+        });
+        bar.finish_and_clear();
+        result
+    }
+
+    fn progress_bar(&self, job: &'static str) -> ProgressBar {
         let bar = if self.quiet {
             ProgressBar::hidden()
         } else {
             ProgressBar::new(0)
         };
-        let style = ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len}  {eta} left");
-        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+        bar.set_style(progress_style());
         bar.set_message(job);
-        ProgressLine(bar)
+        bar
     }
 }
 
-/// How far a measurement is; cleared when dropped.
-pub(crate) struct ProgressLine(ProgressBar);
-
-impl ProgressLine {
-    /// So many steps of so many are done.
-    pub(crate) fn at(&self, done: u64, total: u64) {
-        self.0.set_length(total);
-        self.0.set_position(done);
-    }
-}
-
-impl Drop for ProgressLine {
-    fn drop(&mut self) {
-        self.0.finish_and_clear();
-    }
+fn progress_style() -> ProgressStyle {
+    ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len}  {eta} left")
+        .unwrap_or_else(|_| ProgressStyle::default_bar())
 }
 
 fn main() -> ExitCode {
@@ -79,11 +80,17 @@ fn main() -> ExitCode {
     let _ = rayon::ThreadPoolBuilder::new()
         .num_threads(cli.common.threads)
         .build_global();
-    match command::run(&cli.command, &cli.common) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error:#}");
-            ExitCode::FAILURE
+    cli.run()
+}
+
+impl ReportCli {
+    fn run(&self) -> ExitCode {
+        match command::run(&self.command, &self.common) {
+            Ok(()) => ExitCode::SUCCESS,
+            Err(error) => {
+                eprintln!("error: {error:#}");
+                ExitCode::FAILURE
+            }
         }
     }
 }

@@ -7,7 +7,7 @@ use petcomp::plot::Table;
 use petcomp::plot::three;
 use petcomp::{Error, Result};
 use serde::Deserialize;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Our own name among the programs.
 const OURS: &str = "petcomp";
@@ -76,76 +76,119 @@ pub struct Absent {
 ///
 /// # Errors
 /// A file that is no comparison.
-pub fn read(folder: &Path) -> Result<Vec<PeerComparison>> {
+pub fn read_comparisons(folder: &Path) -> Result<Vec<PeerComparison>> {
     if !folder.exists() {
         return Ok(Vec::new());
     }
+    json_files(folder)?.iter().map(io::read_json).collect()
+}
+
+fn json_files(folder: &Path) -> Result<Vec<PathBuf>> {
     let entries = std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
     let mut paths: Vec<_> = entries.flatten().map(|entry| entry.path()).collect();
     paths.retain(|path| path.extension().is_some_and(|e| e == "json"));
     paths.sort();
-    paths.iter().map(io::read_json).collect()
+    Ok(paths)
+}
+
+impl PeerPoint {
+    /// The program with its version.
+    fn name(&self) -> String {
+        format!("{} {}", self.program, self.version)
+    }
+
+    /// Its place in a diagram; nothing without an error.
+    fn point(&self) -> Option<Point> {
+        let setting = self.setting.clone();
+        Some(Point::new(self.name(), setting, self.seconds, self.error?))
+    }
 }
 
 impl PeerComparison {
     /// Error against time, a curve for each program; what has no error is not in it.
     pub fn diagram(&self) -> Diagram {
-        let point = |m: &PeerPoint| {
-            let curve = format!("{} {}", m.program, m.version);
-            Some(Point::new(curve, m.setting.clone(), m.seconds, m.error?))
-        };
-        let threads = self
-            .threads
-            .map_or(String::new(), |n| format!("; threads: {n}"));
         Diagram {
             file: format!("peers_{}", file_name(&self.stage)),
             title: format!("{}: petcomp and other programs", self.stage),
-            input: format!("{}{threads}", self.input),
+            input: self.input_with_threads(),
             error: self.error.clone(),
-            cost: if self.clock.is_empty() {
-                "seconds, median".into()
-            } else {
-                self.clock.clone()
-            },
+            cost: self.clock_or_default().into(),
             reference: self.reference.clone(),
-            points: self.points.iter().filter_map(point).collect(),
+            points: self.points.iter().filter_map(PeerPoint::point).collect(),
             apart: true,
             ..Diagram::default()
         }
     }
 
-    /// Our point that another is set beside: the one that it names, or our default, or else our first.
-    fn ours(&self, other: &PeerPoint) -> Option<&PeerPoint> {
-        let ours = || self.points.iter().filter(|m| m.program == OURS);
-        let named = ours().find(|m| !other.beside.is_empty() && m.setting == other.beside);
-        named
-            .or_else(|| ours().find(|m| m.setting.contains(DEFAULT)))
-            .or_else(|| ours().next())
+    fn input_with_threads(&self) -> String {
+        let threads = self.threads.map(|n| format!("; threads: {n}"));
+        format!("{}{}", self.input, threads.unwrap_or_default())
+    }
+
+    fn clock_or_default(&self) -> &str {
+        if self.clock.is_empty() {
+            "seconds, median"
+        } else {
+            &self.clock
+        }
+    }
+
+    /// Our point that another is compared with: the one that it names, or our default, or else our first.
+    fn our_counterpart(&self, other: &PeerPoint) -> Option<&PeerPoint> {
+        let ours: Vec<_> = self.points.iter().filter(|m| m.program == OURS).collect();
+        let named = ours
+            .iter()
+            .find(|m| !other.beside.is_empty() && m.setting == other.beside);
+        let default = ours.iter().find(|m| m.setting.contains(DEFAULT));
+        named.or(default).or(ours.first()).copied()
+    }
+
+    /// A program beside petcomp: how many times its seconds and its error.
+    fn ratio_cells(&self, m: &PeerPoint) -> [String; 8] {
+        let ours = self.our_counterpart(m);
+        let seconds = ours.map(|ours| m.seconds / ours.seconds);
+        let error = ours.and_then(|ours| Some(m.error? / ours.error?));
+        [
+            self.stage.clone(),
+            m.name(),
+            m.setting.clone(),
+            three(m.seconds),
+            number_or_empty(seconds),
+            number_or_empty(m.error),
+            number_or_empty(error),
+            m.runs.to_string(),
+        ]
+    }
+
+    fn command_cells(&self, m: &PeerPoint) -> [String; 4] {
+        [
+            self.stage.clone(),
+            m.name(),
+            m.setting.clone(),
+            m.command.clone(),
+        ]
     }
 
     /// Programs that are not in it, in words; nothing where all are.
     pub fn missing(&self) -> String {
-        self.absent
-            .iter()
-            .map(|a| format!("Not here: {} ({}). ", a.program, a.why))
-            .collect::<String>()
-            .trim_end()
-            .into()
+        let absent = self.absent.iter();
+        let sentences: Vec<_> = absent
+            .map(|a| format!("Not here: {} ({}).", a.program, a.why))
+            .collect();
+        sentences.join(" ")
     }
 }
 
 /// A stage's name as a file may be called.
 fn file_name(stage: &str) -> String {
-    stage
-        .chars()
-        .map(|c| {
-            if c.is_ascii_alphanumeric() {
-                c.to_ascii_lowercase()
-            } else {
-                '_'
-            }
-        })
-        .collect()
+    let lower = stage.to_ascii_lowercase();
+    lower.replace(|c: char| !c.is_ascii_alphanumeric(), "_")
+}
+
+fn number_or_empty(number: Option<f64>) -> String {
+    number
+        .filter(|v| v.is_finite())
+        .map_or(String::new(), three)
 }
 
 /// Every program beside petcomp's default: how many times its seconds and its error.
@@ -161,22 +204,8 @@ pub fn ratios(comparisons: &[PeerComparison]) -> Table {
         "runs",
     ]);
     for comparison in comparisons {
-        for m in &comparison.points {
-            let ours = comparison.ours(m);
-            let seconds = ours.map(|ours| m.seconds / ours.seconds);
-            let error = ours.and_then(|ours| Some(m.error? / ours.error?));
-            let number = |v: Option<f64>| v.filter(|v| v.is_finite()).map_or(String::new(), three);
-            table.push([
-                comparison.stage.clone(),
-                format!("{} {}", m.program, m.version),
-                m.setting.clone(),
-                three(m.seconds),
-                number(seconds),
-                number(m.error),
-                number(error),
-                m.runs.to_string(),
-            ]);
-        }
+        let rows = comparison.points.iter().map(|m| comparison.ratio_cells(m));
+        rows.for_each(|row| table.push(row));
     }
     table
 }
@@ -185,14 +214,8 @@ pub fn ratios(comparisons: &[PeerComparison]) -> Table {
 pub fn commands(comparisons: &[PeerComparison]) -> Table {
     let mut table = Table::new(["stage", "program", "setting", "command"]);
     for comparison in comparisons {
-        for m in &comparison.points {
-            table.push([
-                comparison.stage.clone(),
-                format!("{} {}", m.program, m.version),
-                m.setting.clone(),
-                m.command.clone(),
-            ]);
-        }
+        let points = comparison.points.iter();
+        points.for_each(|m| table.push(comparison.command_cells(m)));
     }
     table
 }
@@ -218,7 +241,7 @@ mod tests {
 
     #[test]
     fn programs_stand_beside_our_default() {
-        let found = read(folder().path()).unwrap();
+        let found = read_comparisons(folder().path()).unwrap();
         let ratios = ratios(&found);
         assert_eq!(
             (ratios.rows[2][4].as_str(), ratios.rows[2][6].as_str()),
@@ -237,14 +260,14 @@ mod tests {
 
     #[test]
     fn a_program_may_name_the_setting_that_does_the_same() {
-        let mut found = read(folder().path()).unwrap();
+        let mut found = read_comparisons(folder().path()).unwrap();
         found[0].points[2].beside = "fast".into();
         assert_eq!(ratios(&found).rows[2][4], "8.00");
     }
 
     #[test]
     fn a_folder_that_is_not_there_holds_nothing() {
-        assert_eq!(read(Path::new("nowhere at all")).unwrap(), []);
+        assert_eq!(read_comparisons(Path::new("nowhere at all")).unwrap(), []);
     }
 
     #[test]
@@ -252,7 +275,7 @@ mod tests {
         let folder = folder();
         io::write_text(folder.path().join("bad.json"), "{").unwrap();
         assert!(
-            read(folder.path())
+            read_comparisons(folder.path())
                 .unwrap_err()
                 .to_string()
                 .contains("bad.json")

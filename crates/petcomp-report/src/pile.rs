@@ -10,24 +10,30 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 /// Height of the camera over the surface, metres.
-const HEIGHT: f64 = 1.1;
+pub(super) const CAMERA_HEIGHT_M: f64 = 1.1;
 /// Focal length in widths of the picture.
-const FOCAL: f64 = 1.16;
+const FOCAL_WIDTHS: f64 = 1.16;
 /// Texels of a card.
 const TEXELS: (usize, usize) = (96, 288);
 /// Textures that the cards share.
-const TEXTURES: u32 = 5;
+const TEXTURE_COUNT: u32 = 5;
+/// Size of a card, metres.
+const CARD_SIZE_M: [f64; 2] = [0.07, 0.21];
 
-/// A camera that looks straight down from `height` metres over the origin.
-pub(super) fn above(image: [u32; 2], height: f64) -> Camera {
-    let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI);
+/// A camera that looks straight down from `height_m` over the origin.
+pub(super) fn camera_above(image: [u32; 2], height_m: f64) -> Camera {
     let [w, h] = image.map(f64::from);
     Camera {
         image,
-        focal_px: Vector2::repeat(FOCAL * w),
+        focal_px: Vector2::repeat(FOCAL_WIDTHS * w),
         principal_px: Point2::new(0.5 * w, 0.5 * h),
-        camera_from_world: Pose::from_parts(Vector3::new(0.0, 0.0, height).into(), down),
+        camera_from_world: pose_looking_down(height_m),
     }
+}
+
+fn pose_looking_down(height_m: f64) -> Pose {
+    let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI);
+    Pose::from_parts(Vector3::new(0.0, 0.0, height_m).into(), down)
 }
 
 /// A square lamp that shines at the origin from above its right.
@@ -42,42 +48,47 @@ pub(super) fn lamp(color: LinearRgb) -> AreaLight {
     }
 }
 
-/// So many see-through bottles on and over each other, under one light and a dim sky.
+/// The outline of a card that is full to its corners.
+pub(super) fn whole_card_uv() -> Arc<[Point2<f64>]> {
+    Arc::new([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(Point2::from))
+}
+
+/// See-through bottles on and over each other, under one light and a dim sky.
 pub(super) fn pile(cards: u32, image: [u32; 2]) -> Shot {
-    let shot = Shot::new(above(image, HEIGHT))
+    let shot = Shot::new(camera_above(image, CAMERA_HEIGHT_M))
         .with_light(lamp(LinearRgb::new(1.0, 0.95, 0.85)))
         .with_ambient(LinearRgb::new(0.3, 0.35, 0.4));
-    let textures: Vec<Texture> = (0..TEXTURES).map(|k| bottle(k).into()).collect();
+    let textures: Vec<Texture> = (0..TEXTURE_COUNT).map(|k| bottle(k).into()).collect();
     (0..cards)
-        .map(|k| card(k, &textures))
+        .map(|k| bottle_card(k, &textures))
         .fold(shot, Shot::with_card)
 }
 
-/// Spread by sines of incommensurable steps, each a little higher than the last.
-fn card(k: u32, textures: &[Texture]) -> Card {
-    let f = f64::from(k);
-    let rotation = UnitQuaternion::from_euler_angles(
-        0.12 * libm::sin(1.7 * f),
-        0.12 * libm::cos(2.3 * f),
-        2.4 * f,
-    );
-    let center = Vector3::new(
-        0.17 * libm::sin(3.1 * f),
-        0.1 * libm::cos(4.7 * f),
-        0.02 + 0.004 * f,
-    );
+fn bottle_card(k: u32, textures: &[Texture]) -> Card {
     Card {
         id: ObjectId(k + 1),
         class: 0,
         quad: Quad {
-            world_from_card: Pose::from_parts(center.into(), rotation),
-            size: [0.07, 0.21],
+            world_from_card: scattered_pose(f64::from(k)),
+            size: CARD_SIZE_M,
         },
         texture: textures[k as usize % textures.len()].clone(),
         back: None,
-        outline_uv: Arc::new([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(Point2::from)),
+        outline_uv: whole_card_uv(),
         grade: Grade::default(),
     }
+}
+
+/// Spread by sines of incommensurable steps, each a little higher than the last.
+fn scattered_pose(k: f64) -> Pose {
+    let (x, y) = (0.17 * libm::sin(3.1 * k), 0.1 * libm::cos(4.7 * k));
+    let center = Vector3::new(x, y, 0.02 + 0.004 * k);
+    Pose::from_parts(center.into(), scattered_rotation(k))
+}
+
+fn scattered_rotation(k: f64) -> UnitQuaternion<f64> {
+    let (roll, pitch) = (0.12 * libm::sin(1.7 * k), 0.12 * libm::cos(2.3 * k));
+    UnitQuaternion::from_euler_angles(roll, pitch, 2.4 * k)
 }
 
 /// A bottle with a soft outline, a neck, a label and stripes.
@@ -85,13 +96,24 @@ fn bottle(k: u32) -> Image<PremulRgba> {
     let (w, h) = TEXELS;
     Image::from_fn(w, h, |x, y| {
         let (across, along) = (2.0 * x as f32 / w as f32 - 1.0, y as f32 / h as f32);
-        let half_width = if along < 0.2 { 0.35 } else { 0.9 };
-        let on_label = (0.4..0.6).contains(&along);
-        let alpha = (40.0 * (half_width - across.abs())).clamp(0.0, 1.0)
-            * if on_label { 0.95 } else { 0.5 };
-        let stripe = 0.5 + 0.4 * libm::sinf(along * 60.0 + k as f32);
-        PremulRgba::new(alpha * stripe, alpha * 0.6, alpha * (1.0 - stripe), alpha)
+        striped(bottle_alpha(across, along), bottle_stripe(k, along))
     })
+}
+
+fn bottle_stripe(k: u32, along: f32) -> f32 {
+    0.5 + 0.4 * libm::sinf(along * 60.0 + k as f32)
+}
+
+fn bottle_alpha(across: f32, along: f32) -> f32 {
+    let half_width = if along < 0.2 { 0.35 } else { 0.9 };
+    let is_label = (0.4..0.6).contains(&along);
+    let opacity = if is_label { 0.95 } else { 0.5 };
+    (40.0 * (half_width - across.abs())).clamp(0.0, 1.0) * opacity
+}
+
+/// Red in the stripes, blue between them.
+pub(super) fn striped(alpha: f32, stripe: f32) -> PremulRgba {
+    PremulRgba::new(alpha * stripe, alpha * 0.6, alpha * (1.0 - stripe), alpha)
 }
 
 #[cfg(test)]

@@ -11,11 +11,11 @@ use std::path::Path;
 pub struct Section {
     /// What it is about.
     pub title: String,
-    parts: Vec<Part>,
+    parts: Vec<SectionPart>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
-enum Part {
+enum SectionPart {
     Text(String),
     Table {
         file: String,
@@ -38,41 +38,43 @@ impl Section {
         }
     }
 
-    /// A paragraph; nothing for no text.
-    pub fn text(mut self, text: impl Into<String>) -> Self {
-        let text = text.into();
-        if !text.is_empty() {
-            self.parts.push(Part::Text(text));
-        }
+    fn with_part(mut self, part: SectionPart) -> Self {
+        self.parts.push(part);
         self
     }
 
-    /// A table, also written as `<file>.csv`; one without rows is left out.
-    pub fn table(mut self, file: impl Into<String>, table: Table) -> Self {
-        if !table.rows.is_empty() {
-            self.parts.push(Part::Table {
-                file: file.into(),
-                table,
-            });
+    /// A paragraph; nothing for no text.
+    pub fn text(self, text: impl Into<String>) -> Self {
+        let text = text.into();
+        if text.is_empty() {
+            return self;
         }
-        self
+        self.with_part(SectionPart::Text(text))
+    }
+
+    /// A table, also written as `<file>.csv`; one without rows is left out.
+    pub fn table(self, file: impl Into<String>, table: Table) -> Self {
+        if table.rows.is_empty() {
+            return self;
+        }
+        let file = file.into();
+        self.with_part(SectionPart::Table { file, table })
     }
 
     /// A drawing with its caption and its data, written as `<file>.csv`.
     pub fn figure(
-        mut self,
+        self,
         file: impl Into<String>,
         svg: String,
         caption: impl Into<String>,
         data: Table,
     ) -> Self {
-        self.parts.push(Part::Figure {
+        self.with_part(SectionPart::Figure {
             file: file.into(),
             svg,
             caption: caption.into(),
             data,
-        });
-        self
+        })
     }
 
     /// A work-precision diagram.
@@ -89,6 +91,19 @@ impl Section {
     pub fn diagrams(self, diagrams: &[Diagram]) -> Self {
         diagrams.iter().fold(self, Self::diagram)
     }
+
+    fn put_on(&self, page: &mut Page, number: usize) {
+        let title = escaped(&self.title);
+        page.html(&format!("<h2 id=\"section{number}\">{title}</h2>\n"));
+        for part in &self.parts {
+            page.html(&part.html());
+        }
+    }
+
+    fn markdown(&self) -> String {
+        let parts: String = self.parts.iter().map(SectionPart::markdown).collect();
+        format!("\n## {}\n{parts}", self.title)
+    }
 }
 
 /// A document of sections.
@@ -104,32 +119,27 @@ impl Document {
     /// The whole of it as one HTML page that needs no other file.
     pub fn html(&self) -> String {
         let mut page = Page::new(&self.title);
-        let link = |(i, section): (usize, &Section)| {
-            format!(
-                "<li><a href=\"#section{i}\">{}</a></li>\n",
-                escaped(&section.title)
-            )
-        };
-        let links: String = self.sections.iter().enumerate().map(link).collect();
-        page.html(&format!("<ol>\n{links}</ol>\n"));
-        for (i, section) in self.sections.iter().enumerate() {
-            page.html(&format!(
-                "<h2 id=\"section{i}\">{}</h2>\n",
-                escaped(&section.title)
-            ));
-            section.parts.iter().for_each(|part| part.put_on(&mut page));
+        page.html(&self.contents_html());
+        for (number, section) in self.sections.iter().enumerate() {
+            section.put_on(&mut page, number);
         }
         page.document()
     }
 
+    /// Links to the sections.
+    fn contents_html(&self) -> String {
+        let titles = self.sections.iter().map(|section| escaped(&section.title));
+        let links: String = titles
+            .enumerate()
+            .map(|(i, title)| format!("<li><a href=\"#section{i}\">{title}</a></li>\n"))
+            .collect();
+        format!("<ol>\n{links}</ol>\n")
+    }
+
     /// Its text and tables as Markdown; plots as their captions.
     pub fn markdown(&self) -> String {
-        let mut text = format!("# {}\n", self.title);
-        for section in &self.sections {
-            text += &format!("\n## {}\n", section.title);
-            text += &section.parts.iter().map(Part::markdown).collect::<String>();
-        }
-        text
+        let sections: String = self.sections.iter().map(Section::markdown).collect();
+        format!("# {}\n{sections}", self.title)
     }
 
     /// Writes `report.html`, `report.md` and the data of each table and plot (`.csv`) into a folder; the page comes last.
@@ -138,38 +148,33 @@ impl Document {
     /// Files that cannot be written.
     pub fn write(&self, folder: &Path) -> Result<()> {
         io::create_folder(folder)?;
-        for part in self.sections.iter().flat_map(|section| &section.parts) {
-            if let Part::Table { file, table }
-            | Part::Figure {
-                file, data: table, ..
-            } = part
-            {
-                io::write_text(folder.join(format!("{file}.csv")), &table.csv())?;
-            }
+        let parts = self.sections.iter().flat_map(|section| &section.parts);
+        for (file, table) in parts.filter_map(SectionPart::data_file) {
+            io::write_text(folder.join(format!("{file}.csv")), &table.csv())?;
         }
         io::write_text(folder.join("report.md"), &self.markdown())?;
         io::write_text(folder.join("report.html"), &self.html())
     }
 }
 
-impl Part {
-    fn put_on(&self, page: &mut Page) {
+impl SectionPart {
+    /// The name of the file of data, and the data.
+    fn data_file(&self) -> Option<(&str, &Table)> {
         match self {
-            Self::Text(text) => page.html(&format!("<p>{}</p>\n", with_code(text))),
-            Self::Table { table, .. } => page.table(table),
+            Self::Text(_) => None,
+            Self::Table { file, table } => Some((file, table)),
+            Self::Figure { file, data, .. } => Some((file, data)),
+        }
+    }
+
+    fn html(&self) -> String {
+        match self {
+            Self::Text(text) => format!("<p>{}</p>\n", with_code(text)),
+            Self::Table { table, .. } => format!("<figure>{}</figure>\n", table.html()),
             Self::Figure {
                 svg, caption, data, ..
-            } => {
-                let points = format!(
-                    "<details><summary>Its points</summary>{}</details>\n",
-                    data.html()
-                );
-                let caption = with_code(caption);
-                page.html(&format!(
-                    "<figure>{svg}<figcaption>{caption}</figcaption></figure>\n{points}"
-                ))
-            }
-        };
+            } => figure_html(svg, caption, data),
+        }
     }
 
     fn markdown(&self) -> String {
@@ -181,13 +186,23 @@ impl Part {
     }
 }
 
+fn figure_html(svg: &str, caption: &str, data: &Table) -> String {
+    let (caption, points) = (with_code(caption), data.html());
+    format!(
+        "<figure>{svg}<figcaption>{caption}</figcaption></figure>\n\
+         <details><summary>Its points</summary>{points}</details>\n"
+    )
+}
+
 /// Text for HTML, with what stands between backticks as code.
 fn with_code(text: &str) -> String {
-    let part = |(i, part): (usize, &str)| match i % 2 {
-        0 => escaped(part),
-        _ => format!("<code>{}</code>", escaped(part)),
-    };
-    text.split('`').enumerate().map(part).collect()
+    let pieces = text.split('`').map(escaped).enumerate();
+    pieces
+        .map(|(i, piece)| match i % 2 {
+            0 => piece,
+            _ => format!("<code>{piece}</code>"),
+        })
+        .collect()
 }
 
 #[cfg(test)]

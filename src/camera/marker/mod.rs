@@ -25,7 +25,7 @@ use crate::image::Image;
 use crate::pixel::LinearRgb;
 
 /// The family of markers that is always found.
-pub const FAMILY: &str = "DICT_4X4_50";
+pub(crate) const FAMILY: &str = "DICT_4X4_50";
 /// Least noise of a corner that a label states, pixels: lenses bend and paper is not flat, which no marker by itself shows.
 /// Root mean square on the sample background with markers.
 const MIN_STATED_SIGMA_PX: f64 = 0.15;
@@ -43,7 +43,7 @@ pub struct Marker {
     pub sigma_px: f64,
 }
 
-/// All markers of [`FAMILY`] in a scene-linear photo, in order of number and then of place.
+/// All markers of the family DICT_4X4_50 in a scene-linear photo, in order of number and then of place.
 pub fn find_markers(photo: &Image<LinearRgb>) -> Vec<Marker> {
     let light = photo.map(LinearRgb::luminance);
     let mut found: Vec<Marker> = candidate::quads(photo)

@@ -17,10 +17,9 @@ impl Checked {
         let mut table = Table::new(["class", "train", "val", "share", "box width", "box height"]);
         for class in 0..self.rows.len() {
             let share = 100.0 * self.rows[class] as f64 / self.boxes.len().max(1) as f64;
-            let name = self.classes.get(class).cloned();
             let [width, height] = [0, 1].map(|side| self.side_range(class, side));
             table.push([
-                name.unwrap_or_else(|| class.to_string()),
+                self.class_name(class),
                 self.count(class, Part::Train).to_string(),
                 self.count(class, Part::Val).to_string(),
                 format!("{share:.1} %"),
@@ -29,6 +28,11 @@ impl Checked {
             ]);
         }
         table
+    }
+
+    fn class_name(&self, class: usize) -> String {
+        let name = self.classes.get(class).cloned();
+        name.unwrap_or_else(|| class.to_string())
     }
 
     /// Labels of a class in a part.
@@ -41,22 +45,21 @@ impl Checked {
 
     /// Smallest, median and largest side of a class's boxes, percent of the image.
     fn side_range(&self, class: usize, side: usize) -> String {
-        let mut sides: Vec<f64> = self
-            .boxes
-            .iter()
-            .filter(|b| b.class == class)
-            .filter_map(|b| b.sides)
-            .map(|sides| 100.0 * sides[side])
-            .collect();
+        let sides = self.sides_of(class, side);
+        let Some(max) = sides.last() else {
+            return "-".into();
+        };
+        let (min, median) = (sides[0], sides[sides.len() / 2]);
+        format!("{min:.1} / {median:.1} / {max:.1} %")
+    }
+
+    /// Widths or heights of the boxes of a class, percent of the image, ascending.
+    fn sides_of(&self, class: usize, side: usize) -> Vec<f64> {
+        let boxes = self.boxes.iter().filter(|b| b.class == class);
+        let sides = boxes.filter_map(|b| b.sides);
+        let mut sides: Vec<f64> = sides.map(|sides| 100.0 * sides[side]).collect();
         sides.sort_by(f64::total_cmp);
-        match sides.as_slice() {
-            [] => "-".into(),
-            [min, ..] => format!(
-                "{min:.1} / {:.1} / {:.1} %",
-                sides[sides.len() / 2],
-                sides[sides.len() - 1]
-            ),
-        }
+        sides
     }
 
     /// What is not wrong but good to know: classes with no labels or few, boxes that are very small.
@@ -71,14 +74,16 @@ impl Checked {
     }
 
     fn parts_without_label(&self, class: usize) -> impl Iterator<Item = Diagnostic> {
-        let name = &self.classes[class];
-        Part::ALL
-            .into_iter()
+        let parts = Part::ALL.into_iter();
+        parts
             .filter(move |&part| self.count(class, part) == 0)
-            .map(move |part| {
-                let message = format!("class \"{name}\" has no label in {}", part.name());
-                Diagnostic::note(Code::ClassWithoutLabels, message)
-            })
+            .map(move |part| self.no_label_in(part, class))
+    }
+
+    fn no_label_in(&self, part: Part, class: usize) -> Diagnostic {
+        let (name, part) = (&self.classes[class], part.name());
+        let message = format!("class \"{name}\" has no label in {part}");
+        Diagnostic::note(Code::ClassWithoutLabels, message)
     }
 
     fn rare_class(&self, class: usize) -> Option<Diagnostic> {
@@ -93,11 +98,9 @@ impl Checked {
 
     fn tiny_boxes(&self) -> Option<Diagnostic> {
         let count = self.boxes.iter().filter(|b| b.is_tiny()).count();
-        (count > 0).then(|| {
-            let percent = 100.0 * TINY_SIDE_SHARE;
-            let message = format!("{count} boxes are below {percent:.0} % of the image's side");
-            Diagnostic::note(Code::TinyBoxes, message)
-        })
+        let percent = 100.0 * TINY_SIDE_SHARE;
+        let message = format!("{count} boxes are below {percent:.0} % of the image's side");
+        (count > 0).then(|| Diagnostic::note(Code::TinyBoxes, message))
     }
 }
 

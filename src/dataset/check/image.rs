@@ -6,6 +6,7 @@ use crate::dataset::near_duplicates::Thumbnail;
 use crate::dataset::yolo::MIN_SIDE_PX;
 use crate::dataset::{Part, YoloSet};
 use crate::diagnostic::Code;
+use crate::image::Image;
 use crate::io;
 use crate::pixel::PremulRgba;
 use std::path::{Path, PathBuf};
@@ -51,23 +52,20 @@ impl CheckedImage {
     }
 
     fn read_pixels(&mut self, folder: &Path) {
-        let picture = match io::read::<PremulRgba>(folder.join(&self.path)) {
-            Ok(picture) => picture,
-            Err(e) => {
-                let finding = Finding::unreadable(folder, &self.path, &e);
-                return self.findings.push(finding);
+        let finding = match io::read::<PremulRgba>(folder.join(&self.path)) {
+            Ok(picture) if shorter_side(&picture) >= MIN_SIDE_PX as usize => {
+                self.thumbnail = Some(Thumbnail::new(&picture.map(|p| p.color())));
+                return;
             }
+            Ok(picture) => self.too_small(picture.size()),
+            Err(e) => Finding::unreadable(folder, &self.path, &e),
         };
-        let (w, h) = picture.size();
-        if w.min(h) < MIN_SIDE_PX as usize {
-            self.findings.push(Finding::in_file(
-                &self.path,
-                Code::SmallImage,
-                format!("{w} x {h} pixels, expected at least {MIN_SIDE_PX} a side"),
-            ));
-        } else {
-            self.thumbnail = Some(Thumbnail::new(&picture.map(|p| p.color())));
-        }
+        self.findings.push(finding);
+    }
+
+    fn too_small(&self, (w, h): (usize, usize)) -> Finding {
+        let message = format!("{w} x {h} pixels, expected at least {MIN_SIDE_PX} a side");
+        Finding::in_file(&self.path, Code::SmallImage, message)
     }
 
     fn read_labels(&mut self, folder: &Path, class_count: Option<usize>) {
@@ -83,4 +81,8 @@ impl CheckedImage {
         self.rows = rows;
         self.findings.extend(findings);
     }
+}
+
+fn shorter_side(picture: &Image<PremulRgba>) -> usize {
+    picture.width().min(picture.height())
 }

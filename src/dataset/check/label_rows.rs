@@ -24,27 +24,23 @@ pub(super) fn read_rows(
     let (mut good, mut findings) = (Vec::new(), Vec::new());
     let mut known: Vec<Vec<f64>> = Vec::new();
     for (line, row) in rows {
-        let (code, message) = match format.parse(&row) {
-            Ok(values) if !known.contains(&values) => {
+        match format.parse_new(&row, &known) {
+            Ok(values) => {
                 good.extend(class_count.map(|_| format.label(&values)));
                 known.push(values);
-                continue;
             }
-            Ok(_) => (Code::DuplicateLabelRow, "the same row stands above".into()),
-            Err(message) => (Code::BadLabelRow, message),
-        };
-        findings.push(Finding::in_line(path, line, code, message));
+            Err((code, message)) => findings.push(Finding::in_line(path, line, code, message)),
+        }
     }
     (good, findings)
 }
 
 /// The columns of each row that is not empty, with its line.
 fn split_rows(text: &str) -> Vec<(usize, Vec<&str>)> {
-    text.lines()
-        .map(|line| line.split_whitespace().collect::<Vec<_>>())
-        .enumerate()
-        .filter(|(_, row)| !row.is_empty())
-        .map(|(i, row)| (i + 1, row))
+    let rows = text.lines().map(|line| line.split_whitespace().collect());
+    let numbered = (1..).zip(rows);
+    numbered
+        .filter(|(_, row): &(_, Vec<_>)| !row.is_empty())
         .collect()
 }
 
@@ -59,17 +55,24 @@ impl RowFormat {
     /// The numbers of a row, or what is wrong with it.
     fn parse(&self, row: &[&str]) -> Result<Vec<f64>, String> {
         self.check_columns(row.len())?;
-        let values = row
-            .iter()
-            .map(|text| parse_number(text))
-            .collect::<Result<Vec<f64>, String>>()?;
+        let values = row.iter().map(|text| parse_number(text));
+        let values: Vec<f64> = values.collect::<Result<_, _>>()?;
         self.check_class(row[0])?;
         check_shares(row, &values)?;
         if !self.outlines && (values[3] <= 0.0 || values[4] <= 0.0) {
-            return Err(format!(
-                "a box of {} x {}, expected sides above 0",
-                row[3], row[4]
-            ));
+            let (w, h) = (row[3], row[4]);
+            return Err(format!("a box of {w} x {h}, expected sides above 0"));
+        }
+        Ok(values)
+    }
+
+    /// The numbers of a row that is none of those before.
+    fn parse_new(&self, row: &[&str], known: &[Vec<f64>]) -> Result<Vec<f64>, (Code, String)> {
+        let values = self.parse(row);
+        let values = values.map_err(|message| (Code::BadLabelRow, message))?;
+        if known.contains(&values) {
+            let message = "the same row stands above".into();
+            return Err((Code::DuplicateLabelRow, message));
         }
         Ok(values)
     }
@@ -109,15 +112,9 @@ fn parse_number(text: &str) -> Result<f64, String> {
 }
 
 fn check_shares(row: &[&str], values: &[f64]) -> Result<(), String> {
-    let outside = values
-        .iter()
-        .skip(1)
-        .position(|share| !(0.0..=1.0).contains(share));
-    match outside {
-        Some(i) => Err(format!(
-            "{}, expected a share of the image, 0 to 1",
-            row[1 + i]
-        )),
+    let mut shares = row.iter().zip(values).skip(1);
+    match shares.find(|(_, share)| !(0.0..=1.0).contains(*share)) {
+        Some((text, _)) => Err(format!("{text}, expected a share of the image, 0 to 1")),
         None => Ok(()),
     }
 }

@@ -8,7 +8,7 @@ mod unsupported;
 
 use crate::dataset::finding::Finding;
 use crate::dataset::folder::JOURNAL;
-use crate::dataset::journal::numbered_lines;
+use crate::dataset::journal::{NumberedLines, numbered_lines};
 use crate::dataset::journal_line::JournalLine;
 use crate::dataset::listing::is_image;
 use crate::dataset::near_duplicates::{NEAR_DUPLICATE_RMS, Thumbnail, nearest};
@@ -71,14 +71,7 @@ pub fn check(folder: &Path) -> Result<Checked> {
         findings: Vec::new(),
     };
     let yaml = checker.read_data_yaml();
-    let listed = checker.list_images(&yaml);
-    let mut images: Vec<CheckedImage> = listed
-        .into_par_iter()
-        .map(|(part, path)| CheckedImage::read(folder, path, part, yaml.class_count()))
-        .collect();
-    for image in &mut images {
-        checker.findings.append(&mut image.findings);
-    }
+    let images = checker.read_images(&yaml);
     checker.find_duplicates(&images);
     checker.find_leaks(&images);
     checker.find_orphan_labels(&images, &yaml);
@@ -91,19 +84,12 @@ pub fn check(folder: &Path) -> Result<Checked> {
 
 impl Checked {
     fn new(findings: Vec<Finding>, images: &[CheckedImage], yaml: &DataYaml) -> Self {
+        let boxes: Vec<CheckedBox> = images.iter().flat_map(boxes_of).collect();
         // Only for classes that have a name: `nc` may claim any number of others.
         let mut rows = vec![0; yaml.names().len()];
-        let mut boxes = Vec::new();
-        for image in images {
-            for &(class, sides) in &image.rows {
-                if let Some(count) = rows.get_mut(class) {
-                    *count += 1;
-                }
-                boxes.push(CheckedBox {
-                    part: image.part,
-                    class,
-                    sides,
-                });
+        for class in boxes.iter().map(|b| b.class) {
+            if let Some(count) = rows.get_mut(class) {
+                *count += 1;
             }
         }
         Self {
@@ -122,6 +108,23 @@ struct Checker<'a> {
     findings: Vec<Finding>,
 }
 
+fn boxes_of(image: &CheckedImage) -> impl Iterator<Item = CheckedBox> {
+    image.rows.iter().map(|&(class, sides)| CheckedBox {
+        part: image.part,
+        class,
+        sides,
+    })
+}
+
+/// The label files of a folder of images.
+fn list_labels(dataset: &Path, images: &str) -> Vec<PathBuf> {
+    let label = YoloSet::label_of(&Path::new(images).join("x"));
+    let folder = label.parent().unwrap_or(Path::new(""));
+    let mut labels = list_files(dataset, &folder.to_string_lossy());
+    labels.retain(|path| path.extension().is_some_and(|e| e == "txt"));
+    labels
+}
+
 impl Checker<'_> {
     fn add(&mut self, path: impl AsRef<Path>, code: Code, message: impl std::fmt::Display) {
         self.findings.push(Finding::in_file(path, code, message));
@@ -132,8 +135,7 @@ impl Checker<'_> {
         let text = match io::read_text(self.folder.join(name)) {
             Ok(text) => text,
             Err(e) => {
-                self.findings
-                    .push(Finding::unreadable(self.folder, name, &e));
+                self.add_unreadable(name, &e);
                 return DataYaml::default();
             }
         };
@@ -147,15 +149,30 @@ impl Checker<'_> {
         yaml
     }
 
+    fn add_unreadable(&mut self, path: &str, error: &Error) {
+        let finding = Finding::unreadable(self.folder, path, error);
+        self.findings.push(finding);
+    }
+
+    fn read_images(&mut self, yaml: &DataYaml) -> Vec<CheckedImage> {
+        let listed = self.list_images(yaml);
+        let mut images: Vec<CheckedImage> = listed
+            .into_par_iter()
+            .map(|(part, path)| CheckedImage::read(self.folder, path, part, yaml.class_count()))
+            .collect();
+        for image in &mut images {
+            self.findings.append(&mut image.findings);
+        }
+        images
+    }
+
     /// The images of both parts, each part in order of name.
     fn list_images(&mut self, yaml: &DataYaml) -> Vec<(Part, PathBuf)> {
         let mut images = Vec::new();
         for part in Part::ALL {
             for folder in yaml.folders(part) {
-                let found: Vec<_> = list_files(self.folder, folder)
-                    .into_iter()
-                    .filter(|path| is_image(path))
-                    .collect();
+                let mut found = list_files(self.folder, folder);
+                found.retain(|path| is_image(path));
                 if found.is_empty() {
                     self.add(folder, Code::NoImages, "no images, expected at least one");
                 }
@@ -187,10 +204,8 @@ impl Checker<'_> {
             let (image, twin) = (val[i], train[j]);
             // The same bytes are reported already.
             if image.checksum != twin.checksum {
-                let message = format!(
-                    "leak: differs from {} by {rms:.2} of 255 only",
-                    twin.path.display()
-                );
+                let twin = twin.path.display();
+                let message = format!("leak: differs from {twin} by {rms:.2} of 255 only");
                 self.add(&image.path, Code::Leak, message);
             }
         }
@@ -198,19 +213,13 @@ impl Checker<'_> {
 
     /// Label files that belong to no image.
     fn find_orphan_labels(&mut self, images: &[CheckedImage], yaml: &DataYaml) {
-        let wanted: BTreeSet<PathBuf> = images
-            .iter()
-            .map(|image| YoloSet::label_of(&image.path))
-            .collect();
+        let wanted = images.iter().map(|image| YoloSet::label_of(&image.path));
+        let wanted: BTreeSet<PathBuf> = wanted.collect();
         for folder in Part::ALL.iter().flat_map(|&part| yaml.folders(part)) {
-            let labels = YoloSet::label_of(&Path::new(folder).join("x"));
-            let labels = labels.parent().unwrap_or(Path::new(""));
-            let orphans = list_files(self.folder, &labels.to_string_lossy())
-                .into_iter()
-                .filter(|path| path.extension().is_some_and(|e| e == "txt"))
-                .filter(|path| !wanted.contains(path));
-            for orphan in orphans {
-                self.add(orphan, Code::OrphanLabel, "no image of this name");
+            for label in list_labels(self.folder, folder) {
+                if !wanted.contains(&label) {
+                    self.add(label, Code::OrphanLabel, "no image of this name");
+                }
             }
         }
     }
@@ -221,19 +230,16 @@ impl Checker<'_> {
             return;
         }
         let lines = match numbered_lines(self.folder) {
-            Ok(lines) => lines,
-            Err(e) => {
-                let finding = Finding::unreadable(self.folder, JOURNAL, &e);
-                return self.findings.push(finding);
-            }
+            Ok(lines) => self.good_lines(lines),
+            Err(e) => return self.add_unreadable(JOURNAL, &e),
         };
-        let lines = self.good_lines(lines);
         self.find_changed_files(&lines);
-        let listed: BTreeSet<PathBuf> = lines
-            .iter()
-            .flat_map(|(_, line)| &line.files)
-            .map(|file| PathBuf::from(&file.path))
-            .collect();
+        self.find_unlisted_images(images, &lines);
+    }
+
+    fn find_unlisted_images(&mut self, images: &[CheckedImage], lines: &[(usize, JournalLine)]) {
+        let files = lines.iter().flat_map(|(_, line)| &line.files);
+        let listed: BTreeSet<PathBuf> = files.map(|file| PathBuf::from(&file.path)).collect();
         for image in images.iter().filter(|image| !listed.contains(&image.path)) {
             let message = format!("not in {JOURNAL}");
             self.add(&image.path, Code::UnlistedImage, message);
@@ -241,23 +247,21 @@ impl Checker<'_> {
     }
 
     /// The lines that are as they were written; the others are findings.
-    fn good_lines(
-        &mut self,
-        lines: Vec<(usize, std::result::Result<JournalLine, String>)>,
-    ) -> Vec<(usize, JournalLine)> {
+    fn good_lines(&mut self, lines: NumberedLines) -> Vec<(usize, JournalLine)> {
         let mut good = Vec::new();
         for (i, line) in lines {
             match line {
                 Ok(line) => good.push((i, line)),
-                Err(e) => self.findings.push(Finding::in_line(
-                    JOURNAL,
-                    i,
-                    Code::BadJournalLine,
-                    format!("not a line of a journal: {e}"),
-                )),
+                Err(e) => self.add_damaged_line(i, &e),
             }
         }
         good
+    }
+
+    fn add_damaged_line(&mut self, i: usize, error: &str) {
+        let message = format!("not a line of a journal: {error}");
+        let finding = Finding::in_line(JOURNAL, i, Code::BadJournalLine, message);
+        self.findings.push(finding);
     }
 
     fn find_changed_files(&mut self, lines: &[(usize, JournalLine)]) {

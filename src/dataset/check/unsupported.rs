@@ -22,25 +22,25 @@ struct SettledScene {
 /// A finding for each sidecar file with objects that hang in the air, and for each that cannot be read.
 pub(super) fn find(dataset: &Path) -> Vec<Finding> {
     let options = settle_options(dataset);
-    let files: Vec<PathBuf> = ["scenes/train", "scenes/val"]
-        .iter()
-        .flat_map(|part| list_files(dataset, part))
-        .filter(|path| path.extension().is_some_and(|e| e == "json"))
-        .collect();
+    let folders = ["scenes/train", "scenes/val"].iter();
+    let mut files: Vec<PathBuf> = folders.flat_map(|part| list_files(dataset, part)).collect();
+    files.retain(|path| path.extension().is_some_and(|e| e == "json"));
     files
         .into_par_iter()
-        .filter_map(
-            |path| match unsupported_in(&dataset.join(&path), &options) {
-                Err(e) => Some(Finding::unreadable(dataset, path, &e)),
-                Ok(objects) if objects.is_empty() => None,
-                Ok(objects) => {
-                    let objects = objects.join(", ");
-                    let message = format!("nothing holds {objects}: make this picture again");
-                    Some(Finding::in_file(path, Code::UnsupportedObject, message))
-                }
-            },
-        )
+        .filter_map(|path| find_in(dataset, path, &options))
         .collect()
+}
+
+fn find_in(dataset: &Path, path: PathBuf, options: &SettleOptions) -> Option<Finding> {
+    match unsupported_in(&dataset.join(&path), options) {
+        Err(e) => Some(Finding::unreadable(dataset, path, &e)),
+        Ok(objects) if objects.is_empty() => None,
+        Ok(objects) => {
+            let objects = objects.join(", ");
+            let message = format!("nothing holds {objects}: make this picture again");
+            Some(Finding::in_file(path, Code::UnsupportedObject, message))
+        }
+    }
 }
 
 /// How the dataset's objects fell; the defaults where that is not known.
@@ -55,11 +55,8 @@ fn settle_options(dataset: &Path) -> SettleOptions {
 /// The objects of a sidecar file that nothing holds up.
 fn unsupported_in(path: &Path, options: &SettleOptions) -> Result<Vec<String>> {
     let SettledScene { drawn, scene } = io::read_json(path)?;
-    let ids = settle::hanging(&drawn, &scene, options)?;
-    Ok(ids
-        .iter()
-        .map(|id| describe(*id, &scene.objects[id - 1]))
-        .collect())
+    let ids = settle::hanging(&drawn, &scene, options)?.into_iter();
+    Ok(ids.map(|id| describe(id, &scene.objects[id - 1])).collect())
 }
 
 fn describe(id: usize, object: &Object) -> String {

@@ -1,9 +1,9 @@
 //! Which channels of a file pixels are made from.
 
 /// Channels of a film's measured transmittance: the screen seen through it and in its shadow.
-pub const TRANSMITTANCE: [&str; 3] = ["TR", "TG", "TB"];
+pub(crate) const TRANSMITTANCE: [&str; 3] = ["TR", "TG", "TB"];
 /// Channels of a film's view transmittance: the share of the line of sight that passes.
-pub const VIEW_TRANSMITTANCE: [&str; 3] = ["VR", "VG", "VB"];
+pub(crate) const VIEW_TRANSMITTANCE: [&str; 3] = ["VR", "VG", "VB"];
 
 /// Which channels a kind of pixel is made from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -77,9 +77,9 @@ impl Wanted {
 
 /// Colour, with the transmittance in place of alpha where there is one.
 fn choose_film(names: &[String]) -> Option<Choice> {
+    let (fit, mut picked) = choose_color(names)?;
     let transmittance = all_of_layer(names, "", VIEW_TRANSMITTANCE)
         .or_else(|| all_of_layer(names, "", TRANSMITTANCE));
-    let (fit, mut picked) = choose_color(names)?;
     if let Some(transmittance) = transmittance {
         picked.truncate(3);
         picked.extend(transmittance);
@@ -111,11 +111,15 @@ fn choose_color(names: &[String]) -> Option<Choice> {
     if let Some(picked) = color_of_best_layer(names) {
         return Some((ChannelMatch::Layer, picked));
     }
+    Some((ChannelMatch::Alone, only_visible(names)?))
+}
+
+/// The only channel that can be seen, three times over, and the only alpha.
+fn only_visible(names: &[String]) -> Option<Vec<usize>> {
     let seen = only_index(names, |_| true)
         .or_else(|| only_index(names, |name| !INVISIBLE_CHANNELS.contains(&base_name(name))))?;
     let alpha = only_index(names, |name| base_name(name) == "A").filter(|&a| a != seen);
-    let picked = [seen; 3].into_iter().chain(alpha).collect();
-    Some((ChannelMatch::Alone, picked))
+    Some([seen; 3].into_iter().chain(alpha).collect())
 }
 
 /// Colour of the layer that is called finished, or of the first that has one.
@@ -125,11 +129,9 @@ fn color_of_best_layer(names: &[String]) -> Option<Vec<usize>> {
         .filter_map(|name| Some(&name[..=name.rfind('.')?]))
         .filter_map(|layer| Some((layer, color_of_layer(names, layer)?)))
         .collect();
-    let best = layers
-        .iter()
-        .find(|(layer, _)| is_finished(layer))
-        .or(layers.first())?;
-    Some(best.1.clone())
+    let finished = layers.iter().find(|(layer, _)| is_finished(layer));
+    let (_, color) = finished.or(layers.first())?;
+    Some(color.clone())
 }
 
 /// A layer, with its dot, that holds the finished picture by its name.

@@ -241,9 +241,10 @@ pub(crate) fn interleaved<P: ToFile, T: Copy + Default + Send, const N: usize>(
 ) -> Vec<T> {
     let n = P::NAMES.len();
     let mut out = vec![T::default(); image.pixels().len() * n];
-    let rows = image.width().max(1);
-    out.par_chunks_exact_mut(n)
-        .with_min_len(rows)
+    let slots = out
+        .par_chunks_exact_mut(n)
+        .with_min_len(image.width().max(1));
+    slots
         .zip(image.pixels())
         .for_each(|(slot, &p)| slot.copy_from_slice(&channels(p)[..n]));
     out

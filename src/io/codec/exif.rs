@@ -52,34 +52,22 @@ impl CameraNotes {
     }
 
     fn from_exif(exif: &Exif) -> Self {
-        let orientation = integer(exif, Tag::Orientation)
-            .and_then(|v| u8::try_from(v).ok())
-            .unwrap_or(1);
-        let size = positive(exif, Tag::PixelXDimension)
-            .zip(positive(exif, Tag::PixelYDimension))
-            .map(|(w, h)| [w, h]);
-        // A ratio of 0 means that there was none.
-        let digital_zoom =
-            rational(exif, Tag::DigitalZoomRatio).is_some_and(|zoom| zoom > 0.0 && zoom != 1.0);
-        let focal_35mm = positive(exif, Tag::FocalLengthIn35mmFilm)
-            .or_else(|| focal_35mm_by_sensor(exif, size?));
+        let orientation = integer(exif, Tag::Orientation).and_then(|v| u8::try_from(v).ok());
+        let size = noted_size(exif);
         Self {
-            orientation: Orientation(orientation),
-            focal_35mm,
-            digital_zoom,
+            orientation: Orientation(orientation.unwrap_or(1)),
+            focal_35mm: positive(exif, Tag::FocalLengthIn35mmFilm)
+                .or_else(|| focal_35mm_by_sensor(exif, size?)),
+            digital_zoom: has_digital_zoom(exif),
             size,
         }
     }
 
     /// The camera noted the size that the file has, or an integer multiple of it, whichever way up: nothing was cut away.
     pub(crate) fn has_same_size(&self, stored: [usize; 2]) -> bool {
-        let [long, short] = longer_first(stored.map(|s| s as f64));
-        self.size.map(longer_first).is_some_and(|taken| {
-            let factor = (taken[0] / long).round();
-            factor >= 1.0
-                && (taken[0] / (factor * long) - 1.0).abs() <= SIZE_TOLERANCE
-                && (taken[1] / (factor * short) - 1.0).abs() <= SIZE_TOLERANCE
-        })
+        let stored = longer_first(stored.map(|s| s as f64));
+        let taken = self.size.map(longer_first);
+        taken.is_some_and(|taken| is_multiple(taken, stored))
     }
 
     /// The camera noted a size of another shape than the file has, whichever way up.
@@ -88,6 +76,24 @@ impl CameraNotes {
         self.size
             .is_some_and(|taken| (aspect_ratio(taken) / shape - 1.0).abs() > SHAPE_TOLERANCE)
     }
+}
+
+/// One size is another times an integer, but for [`SIZE_TOLERANCE`].
+fn is_multiple(size: [f64; 2], [long, short]: [f64; 2]) -> bool {
+    let factor = (size[0] / long).round();
+    factor >= 1.0
+        && (size[0] / (factor * long) - 1.0).abs() <= SIZE_TOLERANCE
+        && (size[1] / (factor * short) - 1.0).abs() <= SIZE_TOLERANCE
+}
+
+fn noted_size(exif: &Exif) -> Option<[f64; 2]> {
+    let width = positive(exif, Tag::PixelXDimension)?;
+    Some([width, positive(exif, Tag::PixelYDimension)?])
+}
+
+/// A ratio of 0 means that there was none.
+fn has_digital_zoom(exif: &Exif) -> bool {
+    rational(exif, Tag::DigitalZoomRatio).is_some_and(|zoom| zoom > 0.0 && zoom != 1.0)
 }
 
 fn longer_first([a, b]: [f64; 2]) -> [f64; 2] {
@@ -101,16 +107,21 @@ fn aspect_ratio([w, h]: [f64; 2]) -> f64 {
 
 /// The 35 mm equivalent by the picture's diagonal, from the focal length and the sensor's pixels per length.
 fn focal_35mm_by_sensor(exif: &Exif, size: [f64; 2]) -> Option<f64> {
-    const INCH: u32 = 2;
-    const CENTIMETRE: u32 = 3;
-    let unit_mm = match integer(exif, Tag::FocalPlaneResolutionUnit).unwrap_or(INCH) {
-        INCH => 25.4,
-        CENTIMETRE => 10.0,
-        _ => return None,
-    };
+    let unit_mm = resolution_unit_mm(exif)?;
     let focal_mm = rational(exif, Tag::FocalLength).filter(|&mm| mm > 0.0)?;
     let px_per_unit = rational(exif, Tag::FocalPlaneXResolution).filter(|&r| r > 0.0)?;
     Some(focal_mm * px_per_unit / unit_mm * FILM_DIAGONAL_MM / libm::hypot(size[0], size[1]))
+}
+
+/// The length that pixels of the sensor are counted by; inches where none is named.
+fn resolution_unit_mm(exif: &Exif) -> Option<f64> {
+    const INCH: u32 = 2;
+    const CENTIMETRE: u32 = 3;
+    match integer(exif, Tag::FocalPlaneResolutionUnit) {
+        None | Some(INCH) => Some(25.4),
+        Some(CENTIMETRE) => Some(10.0),
+        Some(_) => None,
+    }
 }
 
 fn integer(exif: &Exif, tag: Tag) -> Option<u32> {

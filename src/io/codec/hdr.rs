@@ -95,22 +95,28 @@ fn resolution(line: &[u8]) -> Result<([u32; 2], Orientation), Refusal> {
 }
 
 fn parsed_resolution(text: &str) -> Option<([u32; 2], Orientation)> {
-    let [rows, height, columns, width] = text.split_whitespace().collect::<Vec<_>>()[..] else {
+    let words: Vec<&str> = text.split_whitespace().collect();
+    let [rows, height, columns, width] = words[..] else {
         return None;
     };
-    let orientation = match (rows, columns) {
-        ("-Y", "+X") => 1,
-        ("-Y", "-X") => 2,
-        ("+Y", "-X") => 3,
-        ("+Y", "+X") => 4,
-        ("+X", "-Y") => 5,
-        ("-X", "-Y") => 6,
-        ("-X", "+Y") => 7,
-        ("+X", "+Y") => 8,
-        _ => return None,
-    };
     let size = [width.parse().ok()?, height.parse().ok()?];
-    Some((size, Orientation(orientation)))
+    Some((size, orientation_of(rows, columns)?))
+}
+
+/// How the picture lies by the axes and senses of rows and columns.
+fn orientation_of(rows: &str, columns: &str) -> Option<Orientation> {
+    let axes = [
+        ("-Y", "+X"),
+        ("-Y", "-X"),
+        ("+Y", "-X"),
+        ("+Y", "+X"),
+        ("+X", "-Y"),
+        ("-X", "-Y"),
+        ("-X", "+Y"),
+        ("+X", "+Y"),
+    ];
+    let number = (1..).zip(axes).find(|(_, known)| *known == (rows, columns));
+    number.map(|(number, _)| Orientation(number))
 }
 
 pub(crate) fn header(
@@ -118,48 +124,45 @@ pub(crate) fn header(
     file_bytes: u64,
     limits: &Limits,
 ) -> Result<Header, Refusal> {
-    let OpenedHdr {
-        decoder,
-        orientation,
-        ..
-    } = open(file.take(limits.metadata_bytes), file_bytes, limits)?;
-    let (width, height) = decoder.dimensions();
-    let (width, height) = orientation.size((width as usize, height as usize));
+    let file = open(file.take(limits.metadata_bytes), file_bytes, limits)?;
+    let (width, height) = file.decoder.dimensions();
+    let (width, height) = file.orientation.size((width as usize, height as usize));
     Ok(Header {
         format: Format::Hdr,
         width,
         height,
         channels: default_names(3).unwrap_or_default(),
         bits: 32,
-        metadata: decoder.metadata().custom_attributes,
+        metadata: file.decoder.metadata().custom_attributes,
         ..Header::default()
     })
 }
 
 pub(crate) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Refusal> {
     check_head_length(bytes, limits)?;
-    let OpenedHdr {
-        decoder,
-        orientation,
-        is_xyz,
-    } = open(Cursor::new(bytes), bytes.len() as u64, limits)?;
-    let (width, height) = decoder.dimensions();
+    let file = open(Cursor::new(bytes), bytes.len() as u64, limits)?;
+    let (orientation, is_xyz) = (file.orientation, file.is_xyz);
+    let (width, height) = file.decoder.dimensions();
     let (width, height) = (width as usize, height as usize);
     limits.check_memory(width, height, 3)?;
-    let mut data = vec![0_f32; width * height * 3];
-    decoder.read_image(bytemuck::cast_slice_mut(&mut data))?;
+    let mut light = vec![0_f32; width * height * 3];
+    file.decoder
+        .read_image(bytemuck::cast_slice_mut(&mut light))?;
     if is_xyz {
-        convert_xyz(&mut data)?;
+        convert_xyz(&mut light)?;
     }
-    let raster = Raster {
+    Ok(light_raster((width, height), light).upright(orientation))
+}
+
+fn light_raster((width, height): (usize, usize), light: Vec<f32>) -> Raster {
+    Raster {
         width,
         height,
         names: default_names(3).unwrap_or_default(),
-        samples: Samples::F32(data),
+        samples: Samples::F32(light),
         display_encoded: false,
         premultiplied: false,
-    };
-    Ok(raster.upright(orientation))
+    }
 }
 
 /// CIE XYZ as light of Rec. 709.

@@ -51,20 +51,26 @@ pub(crate) fn read_before_scan(file: &mut impl Read, limits: &Limits) -> Result<
 /// Reads a marker and its segment behind the bytes that are there; the marker.
 fn append_segment(bytes: &mut Vec<u8>, file: &mut impl Read) -> Result<u8, Refusal> {
     let at = bytes.len();
+    let marker = append_marker(bytes, file)?;
+    append(bytes, file, 2)?;
+    let length = u16::from_be_bytes([bytes[at + 2], bytes[at + 3]]);
+    append(bytes, file, usize::from(length).saturating_sub(2))?;
+    Ok(marker)
+}
+
+/// Reads a marker that a segment follows.
+fn append_marker(bytes: &mut Vec<u8>, file: &mut impl Read) -> Result<u8, Refusal> {
+    let at = bytes.len();
     append(bytes, file, 2)?;
     // Bytes of padding in front of a marker.
     while bytes[at + 1] == 0xff {
         bytes.truncate(at + 1);
         append(bytes, file, 1)?;
     }
-    let marker = bytes[at + 1];
-    if bytes[at] != 0xff || marker == EOI {
-        return Err("damaged JPEG: no picture".into());
+    match bytes[at..] {
+        [0xff, marker] if marker != EOI => Ok(marker),
+        _ => Err("damaged JPEG: no picture".into()),
     }
-    append(bytes, file, 2)?;
-    let length = u16::from_be_bytes([bytes[at + 2], bytes[at + 3]]);
-    append(bytes, file, usize::from(length).saturating_sub(2))?;
-    Ok(marker)
 }
 
 /// Reads so many more bytes.
@@ -110,18 +116,22 @@ fn open<'a>(
 pub(crate) fn header(start: &[u8], file_bytes: u64, limits: &Limits) -> Result<Header, Refusal> {
     let decoder = open(start, file_bytes, limits)?;
     let (width, height) = decoder.dimensions();
-    let comments = segments(start)
-        .filter(|s| s.marker == COM)
-        .map(|s| String::from_utf8_lossy(s.data).into_owned());
     Ok(Header {
         format: Format::Jpeg,
         width: width as usize,
         height: height as usize,
-        channels: default_names(decoder.color_type().channel_count().into()).unwrap_or_default(),
+        channels: channel_names(&decoder).unwrap_or_default(),
         bits: 8,
-        metadata: comments.flat_map(|text| notes_of_lines(&text)).collect(),
+        metadata: notes_of_comments(start),
         ..Header::default()
     })
+}
+
+fn notes_of_comments(bytes: &[u8]) -> Notes {
+    let comments = segments(bytes).filter(|s| s.marker == COM);
+    comments
+        .flat_map(|s| notes_of_lines(&String::from_utf8_lossy(s.data)))
+        .collect()
 }
 
 /// The embedded colour profile, which segments of 64 KiB hold in parts.
@@ -132,13 +142,8 @@ pub(crate) fn profile(bytes: &[u8]) -> Option<Vec<u8>> {
         .filter_map(profile_part)
         .collect();
     parts.sort_by_key(|&(number, _)| number);
-    (!parts.is_empty()).then(|| {
-        parts
-            .into_iter()
-            .flat_map(|(_, part)| part)
-            .copied()
-            .collect()
-    })
+    let parts: Vec<&[u8]> = parts.into_iter().map(|(_, part)| part).collect();
+    (!parts.is_empty()).then(|| parts.concat())
 }
 
 /// A part of a colour profile and its number.
@@ -156,20 +161,16 @@ pub(crate) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Refusal> {
     }
     let decoder = open(bytes, bytes.len() as u64, limits)?;
     let (width, height) = decoder.dimensions();
-    let (width, height) = (width as usize, height as usize);
-    let names = default_names(decoder.color_type().channel_count().into())
-        .ok_or("channels of an unknown kind")?;
-    limits.check_memory(width, height, names.len())?;
+    let size = (width as usize, height as usize);
+    let names = channel_names(&decoder).ok_or("channels of an unknown kind")?;
+    limits.check_memory(size.0, size.1, names.len())?;
     let mut data = vec![0; usize::try_from(decoder.total_bytes()).map_err(|_| "size overflows")?];
     decoder.read_image(&mut data)?;
-    Ok(Raster {
-        width,
-        height,
-        names,
-        samples: Samples::U8(data),
-        display_encoded: true,
-        premultiplied: false,
-    })
+    Ok(Raster::display_codes(size, names, Samples::U8(data)))
+}
+
+fn channel_names(decoder: &impl ImageDecoder) -> Option<Vec<String>> {
+    default_names(decoder.color_type().channel_count().into())
 }
 
 /// A marker segment of a JPEG file.
@@ -230,10 +231,8 @@ pub(crate) fn encode(
     } else {
         ExtendedColorType::Rgb8
     };
-    let (width, height) = u32::try_from(width)
-        .ok()
-        .zip(u32::try_from(height).ok())
-        .ok_or("size overflows")?;
+    let [width, height] = [width, height].map(|side| u32::try_from(side).ok());
+    let (width, height) = width.zip(height).ok_or("size overflows")?;
     let mut bytes = Vec::new();
     JpegEncoder::new_with_quality(&mut bytes, quality)
         .encode(codes, width, height, color)
@@ -250,11 +249,8 @@ pub fn through_jpeg(image: &Image<Srgb8>, quality: u8) -> Option<Image<Srgb8>> {
     let Samples::U8(codes) = raster.samples else {
         return None;
     };
-    Some(Image::from_vec(
-        raster.width,
-        raster.height,
-        bytemuck::pod_collect_to_vec(&codes),
-    ))
+    let pixels = bytemuck::pod_collect_to_vec(&codes);
+    Some(Image::from_vec(raster.width, raster.height, pixels))
 }
 
 /// Puts the notes into a comment segment right behind the start marker.

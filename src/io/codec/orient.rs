@@ -49,17 +49,25 @@ impl Orientation {
         size: (usize, usize),
     ) -> Vec<T> {
         let (width, _) = self.size(size);
-        let (right, bottom) = (size.0 - 1, size.1 - 1);
         let mut out = zeroed_vec(stored.len());
-        out.par_chunks_exact_mut(width * n)
-            .enumerate()
-            .for_each(|(y, row)| {
-                for (x, pixel) in row.chunks_exact_mut(n).enumerate() {
-                    let (i, j) = self.stored(x, y, right, bottom);
-                    pixel.copy_from_slice(&stored[(j * size.0 + i) * n..][..n]);
-                }
-            });
+        let rows = out.par_chunks_exact_mut(width * n).enumerate();
+        rows.for_each(|(y, row)| self.fill_row(stored, size, y, row.chunks_exact_mut(n)));
         out
+    }
+
+    /// Fills the pixels of an upright row.
+    fn fill_row<'a, T: Pod>(
+        self,
+        stored: &[T],
+        (width, height): (usize, usize),
+        y: usize,
+        row: impl Iterator<Item = &'a mut [T]>,
+    ) {
+        for (x, pixel) in row.enumerate() {
+            let (i, j) = self.stored(x, y, width - 1, height - 1);
+            let n = pixel.len();
+            pixel.copy_from_slice(&stored[(j * width + i) * n..][..n]);
+        }
     }
 }
 

@@ -259,23 +259,23 @@ impl SampleRows<'_> {
     /// The channel of the matte. Programs that know no grey write it into `R`, `G` and `B`, with an alpha of 1 or without;
     /// where both could be meant, alpha is.
     fn matte_channel(&self) -> Result<usize, String> {
-        let names = &self.raster.names;
-        let picked = Wanted::Coverage.pick(names)?;
+        let picked = Wanted::Coverage.pick(&self.raster.names)?;
         let &[r, g, b, ref alpha @ ..] = &picked[..] else {
             return Ok(picked[0]);
         };
-        let coloured =
-            self.count_values(|value| channel_spread([r, g, b].map(value)) > GREY_TOLERANCE);
+        let colored = self.count_colored([r, g, b]);
         match alpha.first() {
-            None if coloured == 0 => Ok(r),
-            None => Err(format!(
-                "{coloured} coloured pixels, expected {}",
-                Wanted::Coverage.expected()
-            )),
-            Some(&a) if coloured == 0 && self.count_transparent(a) == 0 => Ok(r),
+            None if colored == 0 => Ok(r),
+            None => Err(not_a_matte(colored)),
+            Some(&a) if colored == 0 && self.count_transparent(a) == 0 => Ok(r),
             Some(&a) if r != g => Ok(a),
-            Some(_) => Err(Wanted::Coverage.missing_among(names)),
+            Some(_) => Err(Wanted::Coverage.missing_among(&self.raster.names)),
         }
+    }
+
+    /// Pixels that are no grey.
+    fn count_colored(&self, rgb: [usize; 3]) -> usize {
+        self.count_values(|value| channel_spread(rgb.map(value)) > GREY_TOLERANCE)
     }
 
     /// Pixels for which a predicate holds, given their channels with full scale 1.
@@ -351,10 +351,9 @@ impl SampleRows<'_> {
     fn fill_grey_films(&self, films: &mut [Film]) -> Result<(), String> {
         let mut rgba = zeroed_vec::<PremulRgba>(films.len());
         self.fill_colors(&mut rgba)?;
-        films
-            .iter_mut()
-            .zip(rgba)
-            .for_each(|(film, rgba)| *film = rgba.into());
+        for (film, rgba) in films.iter_mut().zip(rgba) {
+            *film = rgba.into();
+        }
         Ok(())
     }
 
@@ -402,6 +401,11 @@ impl SampleRows<'_> {
     }
 }
 
+fn not_a_matte(colored: usize) -> String {
+    let expected = Wanted::Coverage.expected();
+    format!("{colored} coloured pixels, expected {expected}")
+}
+
 /// How far apart three channels lie.
 fn channel_spread([r, g, b]: [f32; 3]) -> f32 {
     r.max(g).max(b) - r.min(g).min(b)
@@ -415,6 +419,14 @@ fn unassociated(encoded: [f32; 3], alpha: f32) -> [f32; 3] {
 
 /// Pixels that are made at a time.
 const BAND_PIXELS: usize = 1 << 20;
+
+/// All rows of a picture in bands of about [`BAND_PIXELS`], the last first.
+fn bands_from_bottom(width: usize, height: usize) -> impl Iterator<Item = Range<usize>> {
+    let band_rows = (BAND_PIXELS / width.max(1)).max(1);
+    let ends = std::iter::successors(Some(height), move |end| end.checked_sub(band_rows));
+    ends.take_while(|&end| end > 0)
+        .map(move |end| end.saturating_sub(band_rows)..end)
+}
 
 impl Raster {
     /// Some rows and what their colours mean.
@@ -454,15 +466,11 @@ impl Raster {
         if let Some(channel) = P::channel(&whole)? {
             self = self.narrowed(channel);
         }
-        let row = self.row_samples();
         let mut pixels: Vec<P> = zeroed_vec(width * height);
-        let mut rows = height..height;
-        let band_rows = (BAND_PIXELS / width.max(1)).max(1);
-        while rows.start > 0 {
-            rows = rows.start.saturating_sub(band_rows)..rows.start;
+        for rows in bands_from_bottom(width, height) {
             let band = &mut pixels[rows.start * width..rows.end * width];
             P::fill(&self.rows(profile, rows.clone()), band)?;
-            self.samples.shorten(rows.start * row);
+            self.samples.shorten(rows.start * self.row_samples());
         }
         Ok(Image::from_vec(width, height, pixels))
     }

@@ -10,16 +10,16 @@ use crate::io::header::{Header, Notes, note};
 use crate::io::limits::{Demand, Limits};
 use crate::quality::Quality;
 use png::{BitDepth, ColorType, Transformations};
-use std::io::{BufRead, Cursor, Seek};
+use std::io::{BufRead, Cursor, ErrorKind, Seek};
 
 impl From<png::DecodingError> for Refusal {
     fn from(e: png::DecodingError) -> Self {
-        let cut = matches!(&e, png::DecodingError::IoError(io) if io.kind() == std::io::ErrorKind::UnexpectedEof);
-        Self::Broken(if cut {
-            "truncated PNG".into()
-        } else {
-            format!("damaged PNG: {e}")
-        })
+        match e {
+            png::DecodingError::IoError(e) if e.kind() == ErrorKind::UnexpectedEof => {
+                Self::Broken("truncated PNG".into())
+            }
+            e => Self::Broken(format!("damaged PNG: {e}")),
+        }
     }
 }
 
@@ -36,16 +36,25 @@ fn open<R: BufRead + Seek>(
     decoder.set_transformations(Transformations::EXPAND);
     decoder.read_header_info()?;
     let reader = decoder.read_info()?;
+    limits.check(demand(&reader, file_bytes))?;
+    Ok(reader)
+}
+
+fn demand<R: BufRead + Seek>(reader: &png::Reader<R>, file_bytes: u64) -> Demand {
     let (color, depth) = reader.output_color_type();
     let channels = color.samples() as u64;
-    limits.check(Demand {
+    Demand {
         width: u64::from(reader.info().width),
         height: u64::from(reader.info().height),
         channels,
-        bytes_per_pixel: channels * if depth == BitDepth::Sixteen { 2 } else { 1 },
+        bytes_per_pixel: channels * u64::from(stored_bits(depth) / 8),
         file_bytes,
-    })?;
-    Ok(reader)
+    }
+}
+
+/// Bits of a sample as it is handed over: fewer than 8 are expanded.
+fn stored_bits(depth: BitDepth) -> u32 {
+    if depth == BitDepth::Sixteen { 16 } else { 8 }
 }
 
 pub(crate) fn header(
@@ -60,7 +69,7 @@ pub(crate) fn header(
         width: info.width as usize,
         height: info.height as usize,
         channels: default_names(color.samples()).unwrap_or_default(),
-        bits: if depth == BitDepth::Sixteen { 16 } else { 8 },
+        bits: stored_bits(depth),
         metadata: texts(info),
         ..Header::default()
     })
@@ -84,20 +93,22 @@ pub(crate) fn color_description(bytes: &[u8], limits: &Limits) -> Option<ColorDe
     let reader = open(Cursor::new(bytes), bytes.len() as u64, limits).ok()?;
     let info = reader.info();
     if let Some(cicp) = info.coding_independent_code_points {
-        return Some(ColorDescription::CodePoints(
-            cicp.color_primaries,
-            cicp.transfer_function,
-        ));
+        let (primaries, transfer) = (cicp.color_primaries, cicp.transfer_function);
+        return Some(ColorDescription::CodePoints(primaries, transfer));
     }
     if info.srgb.is_some() {
         return None;
     }
-    if let Some(icc) = &info.icc_profile {
-        return Some(ColorDescription::Icc(icc.to_vec()));
+    match &info.icc_profile {
+        Some(icc) => Some(ColorDescription::Icc(icc.to_vec())),
+        None => described_curve(info),
     }
-    let exponent = info
-        .gama_chunk
-        .map(|gamma| SCALED_ONE / f64::from(gamma.into_scaled()));
+}
+
+/// The exponent and the primaries, where one of them is there.
+fn described_curve(info: &png::Info<'_>) -> Option<ColorDescription> {
+    let gamma = info.gama_chunk.map(|gamma| gamma.into_scaled());
+    let exponent = gamma.map(|gamma| SCALED_ONE / f64::from(gamma));
     let primaries = info.chrm_chunk.map(named_space);
     (exponent.is_some() || primaries.is_some()).then_some(ColorDescription::Curve {
         exponent,
@@ -125,21 +136,19 @@ pub(crate) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Refusal> {
     let (width, height) = (reader.info().width as usize, reader.info().height as usize);
     let names = default_names(color.samples()).ok_or("channels of an unknown kind")?;
     limits.check_memory(width, height, names.len())?;
-    let mut data = vec![0; reader.output_buffer_size().ok_or("size overflows")?];
-    reader.next_frame(&mut data)?;
-    reader.finish()?;
+    let data = read_data(&mut reader)?;
     let samples = match depth {
         BitDepth::Sixteen => Samples::U16(big_endian_codes(&data)),
         _ => Samples::U8(data),
     };
-    Ok(Raster {
-        width,
-        height,
-        names,
-        samples,
-        display_encoded: true,
-        premultiplied: false,
-    })
+    Ok(Raster::display_codes((width, height), names, samples))
+}
+
+fn read_data<R: BufRead + Seek>(reader: &mut png::Reader<R>) -> Result<Vec<u8>, Refusal> {
+    let mut data = vec![0; reader.output_buffer_size().ok_or("size overflows")?];
+    reader.next_frame(&mut data)?;
+    reader.finish()?;
+    Ok(data)
 }
 
 fn big_endian_codes(bytes: &[u8]) -> Vec<u16> {
@@ -182,7 +191,14 @@ fn write(
         encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric);
     }
     add_texts(&mut encoder, metadata)?;
-    match &picture.codes {
+    write_codes(encoder, &picture.codes)
+}
+
+fn write_codes(
+    mut encoder: png::Encoder<'_, &mut Vec<u8>>,
+    codes: &Codes,
+) -> Result<(), png::EncodingError> {
+    match codes {
         Codes::U8(codes) => {
             encoder.set_depth(BitDepth::Eight);
             encoder.write_header()?.write_image_data(codes)

@@ -83,11 +83,7 @@ impl DisplayProfile {
         if exponent.is_none() && matrix.is_none() {
             return Ok(None);
         }
-        let curve = curve_table(|x| match exponent {
-            Some(exponent) => libm::pow(x, exponent),
-            None => f64::from(srgb_to_linear(x as f32)),
-        });
-        let curve = curve.ok_or("a gamma that is not a number")?;
+        let curve = power_or_srgb_table(exponent).ok_or("a gamma that is not a number")?;
         Ok(Some(Self {
             to_rec709: matrix.unwrap_or_else(|| Matrix3::identity().into()),
             ..Self::from_grey_curve(&curve)
@@ -110,10 +106,8 @@ impl DisplayProfile {
                 trc_table(&icc.gray_trc).map(|curve| Self::from_grey_curve(&curve))
             }
             other => {
-                return Err(format!(
-                    "a colour profile for {}",
-                    format!("{other:?}").to_uppercase()
-                ));
+                let space = format!("{other:?}").to_uppercase();
+                return Err(format!("a colour profile for {space}"));
             }
         };
         let profile = profile.ok_or("a colour profile without primaries and curves")?;
@@ -121,17 +115,12 @@ impl DisplayProfile {
     }
 
     fn from_primaries(icc: &ColorProfile) -> Option<Self> {
-        let columns =
-            [icc.red_colorant, icc.green_colorant, icc.blue_colorant].map(|c| [c.x, c.y, c.z]);
-        let xyz_d50_from_rgb = Matrix3::from_columns(&columns.map(Into::into));
-        let matrix = rgb_from_xyz(&RgbSpace::REC709)
-            * bradford(RgbSpace::REC709.white, D50_WHITE)
-            * xyz_d50_from_rgb;
         let curves = [
             trc_table(&icc.red_trc)?,
             trc_table(&icc.green_trc)?,
             trc_table(&icc.blue_trc)?,
         ];
+        let matrix = rec709_from_icc(icc);
         matrix.iter().all(|v| v.is_finite()).then(|| Self {
             curves,
             to_rec709: matrix.into(),
@@ -140,11 +129,8 @@ impl DisplayProfile {
 
     fn is_srgb(&self) -> bool {
         let identity = ColorMatrix::from(Matrix3::identity());
-        let same_primaries = self
-            .to_rec709
-            .rows
-            .iter()
-            .flatten()
+        let numbers = self.to_rec709.rows.iter().flatten();
+        let same_primaries = numbers
             .zip(identity.rows.iter().flatten())
             .all(|(&v, &w)| is_near(v, w));
         same_primaries && self.curves.iter().all(|curve| is_srgb_curve(curve))
@@ -159,6 +145,13 @@ impl DisplayProfile {
         });
         self.to_rec709.apply(light)
     }
+}
+
+fn rec709_from_icc(icc: &ColorProfile) -> Matrix3<f64> {
+    let columns =
+        [icc.red_colorant, icc.green_colorant, icc.blue_colorant].map(|c| [c.x, c.y, c.z]);
+    let xyz_d50_from_rgb = Matrix3::from_columns(&columns.map(Into::into));
+    rgb_from_xyz(&RgbSpace::REC709) * bradford(RgbSpace::REC709.white, D50_WHITE) * xyz_d50_from_rgb
 }
 
 fn is_near(v: f32, w: f32) -> bool {
@@ -176,6 +169,13 @@ fn is_srgb_curve(light: &[f32]) -> bool {
 fn trc_table(curve: &Option<ToneReprCurve>) -> Option<Vec<f32>> {
     let curve = curve.as_ref()?;
     curve_table(|x| evaluate(curve, x))
+}
+
+fn power_or_srgb_table(exponent: Option<f64>) -> Option<Vec<f32>> {
+    curve_table(|x| match exponent {
+        Some(exponent) => libm::pow(x, exponent),
+        None => f64::from(srgb_to_linear(x as f32)),
+    })
 }
 
 fn curve_table(curve: impl Fn(f64) -> f64) -> Option<Vec<f32>> {
@@ -200,7 +200,7 @@ fn evaluate(curve: &ToneReprCurve, x: f64) -> f64 {
     }
 }
 
-/// ICC.1:2022, table 68: a power where `x` is at least a bound, and a straight line below it.
+/// ICC.1:2022, table 68: a power where `x` is at least a bound, and a straight line below it. A row of the table is a line.
 fn evaluate_parametric(parameters: &[f64], x: f64) -> f64 {
     match *parameters {
         [g] => libm::pow(x, g),
@@ -229,18 +229,21 @@ fn interpolated(table: &[u16], x: f64) -> f64 {
 /// For primaries and a white that no colour space has.
 pub(crate) fn to_rec709(named: &RgbSpace) -> Result<Option<ColorMatrix>, String> {
     let (given, ours) = (chromaticities(named), chromaticities(&RgbSpace::REC709));
-    // Primaries may be no colours that can be seen, as those of XYZ and ACES are.
-    let plausible = given.iter().all(|v| v.abs() <= 2.0);
-    if !plausible || gamut_area(named) < SMALLEST_GAMUT || named.white[1] < SMALLEST_GAMUT {
+    if !is_color_space(named) {
         return Err(format!(
             "chromaticities {given:?}, expected those of a colour space"
         ));
     }
-    let same = given
-        .iter()
-        .zip(ours)
-        .all(|(v, w)| (v - w).abs() < CHROMATICITY_TOLERANCE);
+    let mut pairs = given.iter().zip(ours);
+    let same = pairs.all(|(v, w)| (v - w).abs() < CHROMATICITY_TOLERANCE);
     Ok((!same).then(|| rgb_from_rgb(&RgbSpace::REC709, named).into()))
+}
+
+/// Primaries may be no colours that can be seen, as those of XYZ and ACES are.
+fn is_color_space(space: &RgbSpace) -> bool {
+    chromaticities(space).iter().all(|v| v.abs() <= 2.0)
+        && gamut_area(space) >= SMALLEST_GAMUT
+        && space.white[1] >= SMALLEST_GAMUT
 }
 
 /// CIE x, y of the primaries and of white.

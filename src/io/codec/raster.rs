@@ -1,9 +1,12 @@
 //! Decoded samples as a file stores them.
 
 use super::orient::Orientation;
-use bytemuck::Pod;
+use bytemuck::{Pod, zeroed_vec};
+#[cfg(feature = "oiio")]
+use bytemuck::{cast_slice, cast_slice_mut};
 use half::f16;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 /// Samples of a picture, channels interleaved, rows from the top.
 #[derive(Clone, Debug, PartialEq)]
@@ -14,9 +17,91 @@ pub(crate) enum Samples {
     F32(Vec<f32>),
 }
 
+/// How a sample is stored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum SampleKind {
+    U8,
+    U16,
+    F16,
+    F32,
+}
+
+#[cfg(feature = "oiio")]
+impl SampleKind {
+    pub(crate) fn bytes(self) -> u32 {
+        match self {
+            Self::U8 => 1,
+            Self::U16 | Self::F16 => 2,
+            Self::F32 => 4,
+        }
+    }
+}
+
 impl Samples {
+    /// So many zeros.
+    pub(crate) fn zeroed(kind: SampleKind, count: usize) -> Self {
+        match kind {
+            SampleKind::U8 => Self::U8(zeroed_vec(count)),
+            SampleKind::U16 => Self::U16(zeroed_vec(count)),
+            SampleKind::F16 => Self::F16(zeroed_vec(count)),
+            SampleKind::F32 => Self::F32(zeroed_vec(count)),
+        }
+    }
+
+    pub(crate) fn kind(&self) -> SampleKind {
+        match self {
+            Self::U8(_) => SampleKind::U8,
+            Self::U16(_) => SampleKind::U16,
+            Self::F16(_) => SampleKind::F16,
+            Self::F32(_) => SampleKind::F32,
+        }
+    }
+
+    /// The bytes of all samples, in native order.
+    #[cfg(feature = "oiio")]
+    pub(crate) fn bytes(&self) -> &[u8] {
+        match self {
+            Self::U8(v) => v,
+            Self::U16(v) => cast_slice(v),
+            Self::F16(v) => cast_slice(v),
+            Self::F32(v) => cast_slice(v),
+        }
+    }
+
+    /// As [`bytes`](Self::bytes), to be filled.
+    #[cfg(feature = "oiio")]
+    pub(crate) fn bytes_mut(&mut self) -> &mut [u8] {
+        match self {
+            Self::U8(v) => v,
+            Self::U16(v) => cast_slice_mut(v),
+            Self::F16(v) => cast_slice_mut(v),
+            Self::F32(v) => cast_slice_mut(v),
+        }
+    }
+
     pub(crate) fn are_float(&self) -> bool {
         matches!(self, Self::F16(_) | Self::F32(_))
+    }
+
+    /// Those of one of so many channels.
+    fn one_channel(&self, count: usize, channel: usize) -> Self {
+        match self {
+            Self::U8(v) => Self::U8(one_channel(v, count, channel)),
+            Self::U16(v) => Self::U16(one_channel(v, count, channel)),
+            Self::F16(v) => Self::F16(one_channel(v, count, channel)),
+            Self::F32(v) => Self::F32(one_channel(v, count, channel)),
+        }
+    }
+
+    /// Those of the upright picture, `n` to a pixel, where the stored one has this size.
+    fn turned(&self, by: Orientation, n: usize, stored: (usize, usize)) -> Self {
+        match self {
+            Self::U8(v) => Self::U8(by.apply(v, n, stored)),
+            Self::U16(v) => Self::U16(by.apply(v, n, stored)),
+            Self::F16(v) => Self::F16(by.apply(v, n, stored)),
+            Self::F32(v) => Self::F32(by.apply(v, n, stored)),
+        }
     }
 
     /// Gives the memory of the last samples back.
@@ -50,6 +135,22 @@ pub(crate) struct Raster {
 }
 
 impl Raster {
+    /// A picture of display-encoded codes; alpha is straight.
+    pub(crate) fn display_codes(
+        (width, height): (usize, usize),
+        names: Vec<String>,
+        samples: Samples,
+    ) -> Self {
+        Self {
+            width,
+            height,
+            names,
+            samples,
+            display_encoded: true,
+            premultiplied: false,
+        }
+    }
+
     /// Samples of a row.
     pub(crate) fn row_samples(&self) -> usize {
         self.width * self.names.len()
@@ -61,15 +162,9 @@ impl Raster {
         if count == 1 {
             return self;
         }
-        let samples = match &self.samples {
-            Samples::U8(v) => Samples::U8(one_channel(v, count, channel)),
-            Samples::U16(v) => Samples::U16(one_channel(v, count, channel)),
-            Samples::F16(v) => Samples::F16(one_channel(v, count, channel)),
-            Samples::F32(v) => Samples::F32(one_channel(v, count, channel)),
-        };
         Self {
             names: vec![self.names[channel].clone()],
-            samples,
+            samples: self.samples.one_channel(count, channel),
             ..self
         }
     }
@@ -79,18 +174,12 @@ impl Raster {
         if !orientation.turns() {
             return self;
         }
-        let (stored, n) = ((self.width, self.height), self.names.len());
-        let samples = match &self.samples {
-            Samples::U8(v) => Samples::U8(orientation.apply(v, n, stored)),
-            Samples::U16(v) => Samples::U16(orientation.apply(v, n, stored)),
-            Samples::F16(v) => Samples::F16(orientation.apply(v, n, stored)),
-            Samples::F32(v) => Samples::F32(orientation.apply(v, n, stored)),
-        };
+        let stored = (self.width, self.height);
         let (width, height) = orientation.size(stored);
         Self {
             width,
             height,
-            samples,
+            samples: self.samples.turned(orientation, self.names.len(), stored),
             ..self
         }
     }

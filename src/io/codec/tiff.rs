@@ -7,7 +7,6 @@ use super::refusal::Refusal;
 use crate::io::format::Format;
 use crate::io::header::{Header, lines_of_notes, notes_of_lines};
 use crate::io::limits::{Demand, Limits};
-use bytemuck::zeroed_vec;
 use std::io::{Cursor, Read, Seek, SeekFrom};
 use tiff::decoder::{Decoder, DecodingResult};
 use tiff::encoder::{TiffEncoder, TiffValue, colortype};
@@ -60,10 +59,7 @@ fn open<R: Read + Seek>(
     file_bytes: u64,
     limits: &Limits,
 ) -> Result<OpenedTiff<R>, Refusal> {
-    let mut most = metadata_limits(limits);
-    most.decoding_buffer_size = usize::try_from(limits.decoded_bytes).unwrap_or(usize::MAX);
-    most.intermediate_buffer_size = most.decoding_buffer_size;
-    let mut decoder = first_picture(file)?.with_limits(most);
+    let mut decoder = first_picture(file)?.with_limits(decoder_limits(limits));
     let (width, height) = decoder.dimensions()?;
     refuse_missing_palette(&mut decoder)?;
     let (channels, bits) = stored_channels(&mut decoder)?;
@@ -75,16 +71,23 @@ fn open<R: Read + Seek>(
         file_bytes,
     })?;
     let inks = matches!(decoder.colortype()?, ColorType::CMYK(_));
-    let names = default_names(if inks { 3 } else { channels as usize })
-        .ok_or("channels of an unknown kind")?;
+    let names = default_names(if inks { 3 } else { channels as usize });
     Ok(OpenedTiff {
         decoder,
         width: width as usize,
         height: height as usize,
-        names,
+        names: names.ok_or("channels of an unknown kind")?,
         bits,
         inks,
     })
+}
+
+/// The decoder's own limits, with ours on metadata and pixels.
+fn decoder_limits(limits: &Limits) -> tiff::decoder::Limits {
+    let mut most = metadata_limits(limits);
+    most.decoding_buffer_size = usize::try_from(limits.decoded_bytes).unwrap_or(usize::MAX);
+    most.intermediate_buffer_size = most.decoding_buffer_size;
+    most
 }
 
 /// The decoder's own limits, with ours on metadata.
@@ -105,16 +108,17 @@ fn stored_channels(decoder: &mut Decoder<impl Read + Seek>) -> Result<(u64, u8),
         } if is_alpha(&extra) => Ok((2, bit_depth)),
         ColorType::RGB(bits) => Ok((3, bits)),
         ColorType::RGBA(bits) | ColorType::CMYK(bits) => Ok((4, bits)),
-        other => {
-            let kind = format!("{other:?}").to_lowercase().replace(['(', ')'], " ");
-            Err(unsupported(&kind.trim()))
-        }
+        other => Err(unsupported_color(other)),
     }
 }
 
+fn unsupported_color(kind: ColorType) -> Refusal {
+    let name = format!("{kind:?}").to_lowercase().replace(['(', ')'], " ");
+    unsupported(&name.trim())
+}
+
 fn extra_samples(decoder: &mut Decoder<impl Read + Seek>) -> Result<Vec<u16>, TiffError> {
-    let extra = decoder.find_tag_unsigned_vec::<u16>(Tag::ExtraSamples)?;
-    Ok(extra.unwrap_or_default())
+    integers(decoder, Tag::ExtraSamples)
 }
 
 fn is_alpha(extra: &[u16]) -> bool {
@@ -126,10 +130,8 @@ fn is_alpha(extra: &[u16]) -> bool {
 fn first_picture<R: Read + Seek>(mut file: R) -> Result<Decoder<R>, Refusal> {
     let tags = first_tags(&mut file).unwrap_or_default();
     file.rewind().map_err(TiffError::from)?;
-    if [Tag::TileWidth, Tag::StripOffsets]
-        .iter()
-        .all(|tag| tags.contains(&tag.to_u16()))
-    {
+    let mut of_both = [Tag::TileWidth, Tag::StripOffsets].iter();
+    if of_both.all(|tag| tags.contains(&tag.to_u16())) {
         return Err(unsupported(&"tiles under the tags of strips"));
     }
     let mut decoder = Decoder::new(file)?;
@@ -152,12 +154,16 @@ fn first_tags(file: &mut (impl Read + Seek)) -> std::io::Result<Vec<u16>> {
     let directory = read_integer(file, offset, little)?;
     file.seek(SeekFrom::Start(directory))?;
     let entries = read_integer(file, count, little)?.min(u64::from(u16::MAX));
-    let mut tags = Vec::new();
-    for _ in 0..entries {
-        tags.push(read_integer(file, 2, little)? as u16);
-        file.seek_relative(entry - 2)?;
-    }
-    Ok(tags)
+    (0..entries)
+        .map(|_| read_tag(file, entry, little))
+        .collect()
+}
+
+/// The number of an entry of so many bytes, which is passed over.
+fn read_tag(file: &mut (impl Read + Seek), bytes: i64, little: bool) -> std::io::Result<u16> {
+    let tag = read_integer(file, 2, little)? as u16;
+    file.seek_relative(bytes - 2)?;
+    Ok(tag)
 }
 
 /// An integer of at most 8 bytes.
@@ -175,22 +181,20 @@ fn refuse_missing_palette(decoder: &mut Decoder<impl Read + Seek>) -> Result<(),
     if decoder.find_tag_unsigned(Tag::PhotometricInterpretation)? != Some(PALETTE_COLOR) {
         return Ok(());
     }
-    let bits = decoder
-        .find_tag_unsigned_vec::<u16>(Tag::BitsPerSample)?
-        .unwrap_or_default();
-    let colors = bits
-        .first()
-        .and_then(|&bits| 1_usize.checked_shl(bits.into()))
-        .unwrap_or(0);
-    let entries = decoder
-        .find_tag_unsigned_vec::<u16>(Tag::ColorMap)?
-        .unwrap_or_default()
-        .len();
-    if entries == 3 * colors {
+    let bits = integers(decoder, Tag::BitsPerSample)?.first().copied();
+    let colors = bits.and_then(|bits| 1_usize.checked_shl(bits.into()));
+    let expected = 3 * colors.unwrap_or(0);
+    let entries = integers(decoder, Tag::ColorMap)?.len();
+    if entries == expected {
         return Ok(());
     }
-    let expected = 3 * colors;
     Err(format!("damaged TIFF: a palette of {entries} entries, expected {expected}").into())
+}
+
+/// The numbers of a tag; none where it is not there.
+fn integers(decoder: &mut Decoder<impl Read + Seek>, tag: Tag) -> Result<Vec<u16>, TiffError> {
+    let integers = decoder.find_tag_unsigned_vec::<u16>(tag)?;
+    Ok(integers.unwrap_or_default())
 }
 
 /// The embedded colour profile.
@@ -248,13 +252,10 @@ fn refuse_old_lzw(decoder: &mut Decoder<impl Read + Seek>, bytes: &[u8]) -> Resu
     if decoder.find_tag_unsigned(Tag::Compression)? != Some(LZW_COMPRESSION) {
         return Ok(());
     }
-    let strips = decoder
-        .find_tag_unsigned_vec::<u64>(Tag::StripOffsets)?
-        .unwrap_or_default();
-    let first = strips
-        .first()
-        .and_then(|&at| bytes.get(usize::try_from(at).ok()?..)?.first_chunk());
-    match first {
+    let strips = decoder.find_tag_unsigned_vec::<u64>(Tag::StripOffsets)?;
+    let first = strips.unwrap_or_default().first().copied();
+    let codes = first.and_then(|at| bytes.get(usize::try_from(at).ok()?..)?.first_chunk());
+    match codes {
         Some(&[0, second]) if second & 1 == 1 => Err(unsupported(&"old LZW")),
         _ => Ok(()),
     }
@@ -322,12 +323,17 @@ impl ChunkGrid {
         let rows = rows.min(self.height - top);
         for (y, row) in from.chunks_exact(columns * stored).take(rows).enumerate() {
             let at = ((top + y) * self.width + left) * self.channels + plane;
-            if self.planes {
-                let to = to[at..].iter_mut().step_by(self.channels);
-                to.zip(&row[..kept]).for_each(|(to, &from)| *to = from);
-            } else {
-                to[at..][..kept * stored].copy_from_slice(&row[..kept * stored]);
-            }
+            self.put_row(&mut to[at..], &row[..kept * stored]);
+        }
+    }
+
+    /// Puts a row of all channels, or of one, where it begins in the picture.
+    fn put_row<T: Copy>(&self, to: &mut [T], row: &[T]) {
+        if self.planes {
+            let to = to.iter_mut().step_by(self.channels);
+            to.zip(row).for_each(|(to, &from)| *to = from);
+        } else {
+            to[..row.len()].copy_from_slice(row);
         }
     }
 
@@ -359,23 +365,22 @@ fn read_chunks(file: &mut OpenedTiff<impl Read + Seek>) -> Result<Samples, Refus
     let grid = ChunkGrid::new(file)?;
     let mut picture: Option<Samples> = None;
     for index in 0..grid.count_all() {
-        let number = u32::try_from(index).map_err(|_| "damaged TIFF: strips without number")?;
-        let chunk = known_samples(file.decoder.read_chunk(number)?);
-        let (columns, rows) = file.decoder.chunk_data_dimensions(number);
-        let size = [columns as usize, rows as usize];
-        let picture = picture.get_or_insert_with(|| zeros_like(&chunk, grid.samples()));
+        let (chunk, size) = read_chunk(&mut file.decoder, index)?;
+        let picture = picture.get_or_insert_with(|| Samples::zeroed(chunk.kind(), grid.samples()));
         grid.put_samples(picture, &chunk, index, size)?;
     }
     picture.ok_or_else(|| "damaged TIFF: no strips".into())
 }
 
-fn zeros_like(samples: &Samples, count: usize) -> Samples {
-    match samples {
-        Samples::U8(_) => Samples::U8(zeroed_vec(count)),
-        Samples::U16(_) => Samples::U16(zeroed_vec(count)),
-        Samples::F16(_) => Samples::F16(zeroed_vec(count)),
-        Samples::F32(_) => Samples::F32(zeroed_vec(count)),
-    }
+/// A strip or tile, and its columns and rows.
+fn read_chunk(
+    decoder: &mut Decoder<impl Read + Seek>,
+    index: usize,
+) -> Result<(Samples, [usize; 2]), Refusal> {
+    let number = u32::try_from(index).map_err(|_| "damaged TIFF: strips without number")?;
+    let chunk = known_samples(decoder.read_chunk(number)?);
+    let (columns, rows) = decoder.chunk_data_dimensions(number);
+    Ok((chunk, [columns as usize, rows as usize]))
 }
 
 /// Doubles become floats and integers of other kinds 16 bits: full scale stays full scale, and what is below zero becomes
@@ -427,9 +432,8 @@ fn light_left_by_inks(inks: Samples) -> Result<Samples, Refusal> {
 }
 
 fn left_by_inks<T: Copy + Into<u64> + TryFrom<u64> + Default>(inks: &[T], full: u64) -> Vec<T> {
-    inks.as_chunks()
-        .0
-        .iter()
+    let pixels = inks.as_chunks().0.iter();
+    pixels
         .flat_map(|&[cyan, magenta, yellow, black]| {
             [cyan, magenta, yellow].map(|ink| {
                 let product = (full - ink.into()) * (full - black.into());
@@ -446,13 +450,13 @@ pub(crate) fn encode_codes(
 ) -> Result<Vec<u8>, String> {
     let (size, n) = ((picture.width, picture.height), picture.names.len());
     let alpha = (n == 4).then_some(ExtraSamples::UnassociatedAlpha);
-    match (&picture.codes, n) {
-        (Codes::U8(v), 1) => encode::<colortype::Gray8>(size, v, alpha, metadata),
-        (Codes::U8(v), _) => encode::<colortype::RGB8>(size, v, alpha, metadata),
-        (Codes::U16(v), 1) => encode::<colortype::Gray16>(size, v, alpha, metadata),
-        (Codes::U16(v), _) => encode::<colortype::RGB16>(size, v, alpha, metadata),
-    }
-    .map_err(|e| e.to_string())
+    let file = match &picture.codes {
+        Codes::U8(v) if n == 1 => encode::<colortype::Gray8>(size, v, alpha, metadata),
+        Codes::U8(v) => encode::<colortype::RGB8>(size, v, alpha, metadata),
+        Codes::U16(v) if n == 1 => encode::<colortype::Gray16>(size, v, alpha, metadata),
+        Codes::U16(v) => encode::<colortype::RGB16>(size, v, alpha, metadata),
+    };
+    file.map_err(|e| e.to_string())
 }
 
 /// A whole file of scene-linear floats of one, three or four channels; colours are multiplied by alpha.
@@ -486,14 +490,19 @@ where
         image.extra_samples(&[alpha])?;
     }
     if !metadata.is_empty() {
-        let mut text = lines_of_notes(&metadata.to_vec());
-        text.retain(|c| c.is_ascii());
-        image
-            .encoder()
-            .write_tag(Tag::ImageDescription, text.as_str())?;
+        let text = ascii_notes(metadata);
+        let tags = image.encoder();
+        tags.write_tag(Tag::ImageDescription, text.as_str())?;
     }
     image.write_data(samples)?;
     Ok(out.into_inner())
+}
+
+/// Texts in the letters that the format knows.
+fn ascii_notes(metadata: &[(String, String)]) -> String {
+    let mut text = lines_of_notes(&metadata.to_vec());
+    text.retain(|c| c.is_ascii());
+    text
 }
 
 #[cfg(test)]

@@ -6,11 +6,11 @@ mod open;
 mod own_file;
 mod sanitize_path;
 
-pub use atomic::{create_folder, relative, sync, write_through};
+pub use atomic::{create_folder, relative, sync};
 pub use checksum::{Checksum, copy};
-pub use sanitize_path::{below, clean_name, inside, refuse_links};
+pub use sanitize_path::{below, inside};
 
-pub(crate) use atomic::write_bytes;
+pub(crate) use atomic::{write_bytes, write_through};
 pub(crate) use open::{open_regular, read_regular, read_to_end, reason};
 pub(crate) use own_file::{open_own, refuse_foreign};
-pub(crate) use sanitize_path::length_inside;
+pub(crate) use sanitize_path::{length_inside, refuse_links};

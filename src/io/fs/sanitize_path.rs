@@ -5,33 +5,6 @@ use crate::error::{Error, Result};
 use std::fs::{DirEntry, Metadata};
 use std::path::{Component, Path, PathBuf};
 
-/// Longest name that is made, bytes; file systems allow 255 with what is put in front and behind.
-const LONGEST_NAME: usize = 120;
-/// Names that mean devices to some systems, whatever their ending.
-const DEVICE_NAMES: [&str; 4] = ["con", "prn", "aux", "nul"];
-
-/// A file name out of any text: letters, digits, `.`, `_` and `-`, everything else `_`; neither hidden nor a device.
-pub fn clean_name(text: &str) -> String {
-    let name: String = text.chars().map(plain_char).take(LONGEST_NAME).collect();
-    let stem = name
-        .split('.')
-        .next()
-        .unwrap_or_default()
-        .to_ascii_lowercase();
-    match stem.is_empty() || DEVICE_NAMES.contains(&stem.as_str()) {
-        true => format!("_{name}").chars().take(LONGEST_NAME).collect(),
-        false => name,
-    }
-}
-
-fn plain_char(c: char) -> char {
-    if c.is_ascii_alphanumeric() || "._-".contains(c) {
-        c
-    } else {
-        '_'
-    }
-}
-
 /// A file that a document names: below the folder, by its path at least.
 ///
 /// # Errors
@@ -77,12 +50,14 @@ fn found_inside(folder: &Path, file: &Path) -> Result<(PathBuf, Metadata)> {
     match meta.map_err(|e| Error::file(&path, reason(&e)))? {
         Some(meta) if meta.is_file() => Ok((path, meta)),
         Some(_) => Err(Error::file(path, "not a regular file")),
-        None => {
-            let folder = or_working_folder(folder).display();
-            let what = format!("is a link out of {folder}, expected a file in that folder");
-            Err(Error::file(path, what))
-        }
+        None => Err(leads_out(path, folder)),
     }
+}
+
+fn leads_out(path: PathBuf, folder: &Path) -> Error {
+    let folder = or_working_folder(folder).display();
+    let what = format!("is a link out of {folder}, expected a file in that folder");
+    Error::file(path, what)
 }
 
 /// What a file is; none where one of the steps to it from the folder is a link.
@@ -123,7 +98,7 @@ fn or_working_folder(folder: &Path) -> &Path {
 ///
 /// # Errors
 /// [`Error::File`] naming the link, or a folder that cannot be looked into.
-pub fn refuse_links(folder: impl AsRef<Path>) -> Result<()> {
+pub(crate) fn refuse_links(folder: impl AsRef<Path>) -> Result<()> {
     let folder = folder.as_ref();
     let entries = std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
     entries
@@ -149,34 +124,6 @@ fn refuse_linked_entry(folder: &Path, entry: &DirEntry) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn any_text_makes_a_harmless_name() {
-        let names = [
-            "../../etc/passwd",
-            "",
-            ".",
-            "..",
-            "a/b",
-            "C:\\x",
-            "nul",
-            "CON.txt",
-            ".hidden",
-            "ä b",
-            "ok-1_2.png",
-        ];
-        let cleaned = names.map(clean_name);
-        assert_eq!(cleaned[0], "_.._.._etc_passwd");
-        assert_eq!(cleaned[10], "ok-1_2.png");
-        for name in &cleaned {
-            assert!(
-                !name.starts_with('.') && !name.is_empty() && !name.contains(['/', '\\']),
-                "{name}"
-            );
-        }
-        assert_eq!(cleaned[6], "_nul");
-        assert_eq!(clean_name(&"x".repeat(1000)).len(), LONGEST_NAME);
-    }
 
     #[test]
     fn paths_that_leave_their_folder_are_refused() {

@@ -13,6 +13,6 @@ pub use protocol::Linked;
 pub use serve::serve;
 
 pub(crate) use pool::ask;
-pub(crate) use protocol::{Request, Response, SampleKind, Shape};
+pub(crate) use protocol::{Request, Response};
 #[cfg(feature = "fuzzing")]
 pub(crate) use protocol::{receive_samples, receive_shape};

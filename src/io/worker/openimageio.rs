@@ -1,11 +1,11 @@
 //! OpenImageIO in this process: shapes and samples of files in memory, and pictures to files.
 
 use super::ffi::{self, Layout};
-use super::protocol::{Request, Response, SampleKind, Shape};
+use super::protocol::{Request, Response, Shape};
 use crate::color::Curve;
 use crate::io::codec::Wanted;
 use crate::io::codec::codes::Bits;
-use crate::io::codec::raster::{Raster, Samples, overlap};
+use crate::io::codec::raster::{Raster, SampleKind, Samples, overlap};
 use crate::io::codec::refusal::Refusal;
 use crate::io::format::Format;
 use crate::io::header::Window;
@@ -70,13 +70,14 @@ pub(crate) fn decode(
     let mut picked = wanted.pick(&layout.channels)?;
     // Grey is picked three times over for colour, but carried once.
     picked.dedup();
-    limits.check_memory(layout.width as usize, layout.height as usize, picked.len())?;
-    reserve(layout.data_samples() as u64 * u64::from(layout.bytes.unsigned_abs()));
+    let (width, height) = (layout.width as usize, layout.height as usize);
+    limits.check_memory(width, height, picked.len())?;
+    reserve(layout.data_bytes());
     let samples = read_samples(&reader, &layout, &picked)?;
     let (samples, display_encoded) = interpret(samples, source.format, &layout.color_space)?;
     Ok(Raster {
-        width: layout.width as usize,
-        height: layout.height as usize,
+        width,
+        height,
         names: picked.iter().map(|&i| layout.channels[i].clone()).collect(),
         samples,
         display_encoded,
@@ -103,20 +104,21 @@ fn refused(e: cxx::Exception) -> Refusal {
 
 impl Layout {
     fn check(&self, file_bytes: u64, limits: &Limits) -> Result<(), Refusal> {
+        limits.check(self.demand([self.width, self.height], file_bytes))?;
+        let data_size = [self.data_width, self.data_height];
+        Ok(limits.check(self.demand(data_size, file_bytes))?)
+    }
+
+    fn demand(&self, size: [i64; 2], file_bytes: u64) -> Demand {
+        let [width, height] = size.map(|side| u64::try_from(side).unwrap_or(0));
         let channels = self.channels.len() as u64;
-        for (width, height) in [
-            (self.width, self.height),
-            (self.data_width, self.data_height),
-        ] {
-            limits.check(Demand {
-                width: u64::try_from(width).unwrap_or(0),
-                height: u64::try_from(height).unwrap_or(0),
-                channels,
-                bytes_per_pixel: channels * u64::from(self.bytes.unsigned_abs()),
-                file_bytes,
-            })?;
+        Demand {
+            width,
+            height,
+            channels,
+            bytes_per_pixel: channels * u64::from(self.bytes.unsigned_abs()),
+            file_bytes,
         }
-        Ok(())
     }
 
     fn sample(&self) -> SampleKind {
@@ -139,10 +141,21 @@ impl Layout {
         (self.data_width * self.data_height) as usize * self.channels.len()
     }
 
+    fn data_bytes(&self) -> u64 {
+        self.data_samples() as u64 * u64::from(self.bytes.unsigned_abs())
+    }
+
     /// The data window is the display window.
     fn shows_all(&self) -> bool {
         let data = (self.x, self.y, self.data_width, self.data_height);
         data == (0, 0, self.width, self.height)
+    }
+
+    /// Index in the data window of a pixel of the display window that has data.
+    #[inline]
+    fn data_pixel(&self, x: usize, y: usize) -> usize {
+        let row = (y as i64 - self.y) as usize;
+        row * self.data_width as usize + (x as i64 - self.x) as usize
     }
 
     /// Rows and columns of the display window that have data.
@@ -159,41 +172,30 @@ fn read_samples(
     layout: &Layout,
     picked: &[usize],
 ) -> Result<Samples, Refusal> {
-    Ok(match layout.sample() {
-        SampleKind::U8 => Samples::U8(windowed(read_data(reader, layout)?, layout, picked)),
-        SampleKind::U16 => Samples::U16(windowed(read_data(reader, layout)?, layout, picked)),
-        SampleKind::F16 => Samples::F16(windowed(read_data(reader, layout)?, layout, picked)),
-        SampleKind::F32 => Samples::F32(windowed(read_data(reader, layout)?, layout, picked)),
+    let mut samples = Samples::zeroed(layout.sample(), layout.data_samples());
+    ffi::read(reader, samples.bytes_mut()).map_err(refused)?;
+    Ok(match samples {
+        Samples::U8(v) => Samples::U8(windowed(v, layout, picked)),
+        Samples::U16(v) => Samples::U16(windowed(v, layout, picked)),
+        Samples::F16(v) => Samples::F16(windowed(v, layout, picked)),
+        Samples::F32(v) => Samples::F32(windowed(v, layout, picked)),
     })
-}
-
-/// The samples of the data window.
-fn read_data<T: bytemuck::Pod>(
-    reader: &ffi::Reader<'_>,
-    layout: &Layout,
-) -> Result<Vec<T>, Refusal> {
-    let mut samples: Vec<T> = bytemuck::zeroed_vec(layout.data_samples());
-    ffi::read(reader, bytemuck::cast_slice_mut(&mut samples)).map_err(refused)?;
-    Ok(samples)
 }
 
 /// The picked channels, cut or padded with zeros from the data window to the display window.
 fn windowed<T: Copy + Default>(samples: Vec<T>, layout: &Layout, picked: &[usize]) -> Vec<T> {
     let (width, height) = (layout.width as usize, layout.height as usize);
-    let (columns, stride) = (layout.data_width as usize, layout.channels.len());
+    let stride = layout.channels.len();
     if layout.shows_all() && picked.iter().copied().eq(0..stride) {
         return samples;
     }
     let mut out = vec![T::default(); width * height * picked.len()];
     let (ys, xs) = layout.visible();
-    for y in ys {
-        let row = (y as i64 - layout.y) as usize * columns;
-        for x in xs.clone() {
-            let pixel = &samples[(row + (x as i64 - layout.x) as usize) * stride..][..stride];
-            let to = (y * width + x) * picked.len();
-            for (slot, &channel) in out[to..].iter_mut().zip(picked) {
-                *slot = pixel[channel];
-            }
+    for (x, y) in ys.flat_map(|y| xs.clone().map(move |x| (x, y))) {
+        let pixel = &samples[layout.data_pixel(x, y) * stride..][..stride];
+        let to = (y * width + x) * picked.len();
+        for (slot, &channel) in out[to..].iter_mut().zip(picked) {
+            *slot = pixel[channel];
         }
     }
     out
@@ -202,38 +204,34 @@ fn windowed<T: Copy + Default>(samples: Vec<T>, layout: &Layout, picked: &[usize
 /// Samples with their meaning, and whether they are display-encoded: the rule of [`io`](crate::io) for integers and
 /// floats, while film scans name the meaning of their codes themselves.
 fn interpret(samples: Samples, format: Format, space: &str) -> Result<(Samples, bool), Refusal> {
+    let is_scan = matches!(format, Format::Dpx | Format::Cineon);
     let is_integer = !samples.are_float();
-    match (format, space) {
-        (Format::Dpx | Format::Cineon, "Linear" | "linear") => Ok((samples, false)),
-        (Format::Dpx | Format::Cineon, "Rec709") => {
+    match space {
+        "" | "sRGB" => Ok((samples, is_integer)),
+        _ if !is_scan => Ok((samples, is_integer)),
+        "Linear" | "linear" => Ok((samples, false)),
+        "Rec709" => {
             let light = decode_curve(samples, Curve::Rec709);
             Ok((Samples::F32(light), false))
         }
-        (Format::Dpx | Format::Cineon, "" | "sRGB") => Ok((samples, is_integer)),
-        (Format::Dpx | Format::Cineon, other) => Err(Refusal::Broken(format!(
+        other => Err(Refusal::Broken(format!(
             "colour space {other}, expected linear, sRGB or Rec709 (convert it first)"
         ))),
-        _ => Ok((samples, is_integer)),
     }
 }
 
 /// Linear light of display values.
 fn decode_curve(samples: Samples, curve: Curve) -> Vec<f32> {
     match samples {
-        Samples::U8(v) => v
-            .into_iter()
-            .map(|code| curve.decode(f32::from(code) / 255.0))
-            .collect(),
-        Samples::U16(v) => v
-            .into_iter()
-            .map(|code| curve.decode(f32::from(code) / 65_535.0))
-            .collect(),
-        Samples::F16(v) => v
-            .into_iter()
-            .map(|value| curve.decode(value.into()))
-            .collect(),
-        Samples::F32(v) => v.into_iter().map(|value| curve.decode(value)).collect(),
+        Samples::U8(v) => decoded(v, |code| curve.decode(f32::from(code) / 255.0)),
+        Samples::U16(v) => decoded(v, |code| curve.decode(f32::from(code) / 65_535.0)),
+        Samples::F16(v) => decoded(v, |value| curve.decode(value.into())),
+        Samples::F32(v) => decoded(v, |value| curve.decode(value)),
     }
+}
+
+fn decoded<T>(samples: Vec<T>, light: impl Fn(T) -> f32) -> Vec<f32> {
+    samples.into_iter().map(light).collect()
 }
 
 /// The layout of a picture that is to be written.

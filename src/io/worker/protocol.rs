@@ -5,7 +5,7 @@
 //! that asks trusts nothing: it checks every size itself.
 
 use crate::io::codec::Wanted;
-use crate::io::codec::raster::{Raster, Samples};
+use crate::io::codec::raster::{Raster, SampleKind, Samples};
 use crate::io::codec::refusal::Refusal;
 use crate::io::format::Format;
 use crate::io::header::Window;
@@ -99,35 +99,6 @@ impl Shape {
     }
 }
 
-/// How a sample is stored.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub(crate) enum SampleKind {
-    U8,
-    U16,
-    F16,
-    F32,
-}
-
-impl SampleKind {
-    pub(crate) fn bytes(self) -> u32 {
-        match self {
-            Self::U8 => 1,
-            Self::U16 | Self::F16 => 2,
-            Self::F32 => 4,
-        }
-    }
-
-    fn kind_of(samples: &Samples) -> Self {
-        match samples {
-            Samples::U8(_) => Self::U8,
-            Samples::U16(_) => Self::U16,
-            Samples::F16(_) => Self::F16,
-            Samples::F32(_) => Self::F32,
-        }
-    }
-}
-
 /// Sends something as a line.
 pub(super) fn send_line(to: &mut impl Write, what: &impl Serialize) -> Result<()> {
     let mut line = serde_json::to_vec(what)?;
@@ -168,16 +139,11 @@ pub(super) fn send_raster(to: &mut impl Write, raster: &Raster) -> Result<()> {
         width: raster.width,
         height: raster.height,
         names: raster.names.clone(),
-        sample: SampleKind::kind_of(&raster.samples),
+        sample: raster.samples.kind(),
         display_encoded: raster.display_encoded,
     };
     send_line(to, &ResponseHead::Picture(shape))?;
-    to.write_all(match &raster.samples {
-        Samples::U8(v) => v,
-        Samples::U16(v) => bytemuck::cast_slice(v),
-        Samples::F16(v) => bytemuck::cast_slice(v),
-        Samples::F32(v) => bytemuck::cast_slice(v),
-    })?;
+    to.write_all(raster.samples.bytes())?;
     to.flush()
 }
 
@@ -200,12 +166,8 @@ pub(crate) fn receive_shape(
 /// Receives the samples of a shape that was checked.
 pub(crate) fn receive_samples(from: &mut impl Read, shape: Shape) -> Result<Raster> {
     let count = shape.width * shape.height * shape.names.len();
-    let samples = match shape.sample {
-        SampleKind::U8 => Samples::U8(read_samples(from, count)?),
-        SampleKind::U16 => Samples::U16(read_samples(from, count)?),
-        SampleKind::F16 => Samples::F16(read_samples(from, count)?),
-        SampleKind::F32 => Samples::F32(read_samples(from, count)?),
-    };
+    let mut samples = Samples::zeroed(shape.sample, count);
+    from.read_exact(samples.bytes_mut())?;
     Ok(Raster {
         width: shape.width,
         height: shape.height,
@@ -214,12 +176,6 @@ pub(crate) fn receive_samples(from: &mut impl Read, shape: Shape) -> Result<Rast
         display_encoded: shape.display_encoded,
         premultiplied: false,
     })
-}
-
-fn read_samples<T: bytemuck::Pod>(from: &mut impl Read, count: usize) -> Result<Vec<T>> {
-    let mut samples = bytemuck::zeroed_vec(count);
-    from.read_exact(bytemuck::cast_slice_mut(&mut samples))?;
-    Ok(samples)
 }
 
 #[cfg(test)]

@@ -91,7 +91,10 @@ mod running_blur;
 mod stream;
 
 pub(super) use chroma::{differences, from_ycc, to_ycc};
-pub use options::{Blur, Falloff, KeyOptions, Profile};
+#[doc(hidden)]
+pub use options::{Blur, Falloff};
+pub use options::{KeyOptions, Profile};
+#[doc(hidden)]
 pub use photo::Photo;
 
 use crate::error::{Error, Result};
@@ -121,6 +124,7 @@ pub struct Keyed {
 }
 
 /// How often the `robust` profile departed from Blender 3.4.
+#[doc(hidden)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Deviations {

@@ -10,8 +10,8 @@ use crate::error::{Error, Result};
 use crate::geom::Vector3;
 use crate::image::Image;
 use crate::io::{self, Bits, WriteOptions};
-use crate::pixel::LinearRgb;
-use crate::scene::{AreaLight, Card, LightShape, Shot};
+use crate::pixel::{Film, LinearRgb};
+use crate::scene::{AreaLight, Card, EnvironmentMap, LightShape, Shot};
 use nalgebra::SMatrix;
 use std::path::Path;
 
@@ -96,11 +96,7 @@ fn cycles_camera(camera: &Camera) -> CyclesCamera {
 }
 
 fn write_card(folder: &Path, card: &Card) -> Result<CyclesQuad> {
-    let id = card.id.0;
-    if !(1..=u32::from(u16::MAX)).contains(&id) {
-        let what = format!("id {id}, expected 1 to {}", u16::MAX);
-        return Err(Error::value("cards", what));
-    }
+    let id = checked_id(card)?;
     let back = card.back.as_ref();
     Ok(CyclesQuad {
         id,
@@ -116,12 +112,22 @@ fn write_card(folder: &Path, card: &Card) -> Result<CyclesQuad> {
     })
 }
 
+/// A card's id as Blender can have it.
+fn checked_id(card: &Card) -> Result<u32> {
+    let id = card.id.0;
+    if (1..=u32::from(u16::MAX)).contains(&id) {
+        return Ok(id);
+    }
+    let what = format!("id {id}, expected 1 to {}", u16::MAX);
+    Err(Error::value("cards", what))
+}
+
 fn matrix_rows<const N: usize>(m: SMatrix<f64, N, N>) -> [[f64; N]; N] {
     std::array::from_fn(|i| std::array::from_fn(|j| m[(i, j)]))
 }
 
 fn write_side(folder: &Path, name: &str, texture: &Texture) -> Result<CyclesSide> {
-    let (color, opacity) = (format!("{name}.exr"), format!("{name}_opacity.exr"));
+    let color = format!("{name}.exr");
     match texture {
         Texture::Rgba(pyramid) => Ok(CyclesSide {
             texture: write_picture(folder, &color, pyramid.base())?,
@@ -131,14 +137,15 @@ fn write_side(folder: &Path, name: &str, texture: &Texture) -> Result<CyclesSide
             let film = pyramid.base();
             Ok(CyclesSide {
                 texture: write_picture(folder, &color, &film.map(|film| film.to_rgba()))?,
-                film: Some(write_picture(
-                    folder,
-                    &opacity,
-                    &film.map(|film| film.opacity),
-                )?),
+                film: Some(write_opacity(folder, name, film)?),
             })
         }
     }
+}
+
+fn write_opacity(folder: &Path, name: &str, film: &Image<Film>) -> Result<String> {
+    let name = format!("{name}_opacity.exr");
+    write_picture(folder, &name, &film.map(|film| film.opacity))
 }
 
 fn cycles_light(light: &AreaLight, exposure: f32) -> CyclesLight {
@@ -176,14 +183,17 @@ fn write_environment(folder: &Path, shot: &Shot) -> Result<CyclesEnvironment> {
             rotation_z: 0.0,
         });
     };
-    let both = map
-        .panorama
-        .image()
-        .map(|c: LinearRgb| (c.scale(map.strength) + shot.ambient).scale(shot.exposure));
+    let picture = joined_environment(map, shot.ambient, shot.exposure);
     Ok(CyclesEnvironment {
         color: None,
-        path: Some(write_picture(folder, "environment.exr", &both)?),
+        path: Some(write_picture(folder, "environment.exr", &picture)?),
         strength: 1.0,
         rotation_z: map.rotation.to_degrees(),
     })
+}
+
+/// A map with a constant environment added, times the exposure.
+fn joined_environment(map: &EnvironmentMap, ambient: LinearRgb, exposure: f32) -> Image<LinearRgb> {
+    let picture = map.panorama.image();
+    picture.map(|c: LinearRgb| (c.scale(map.strength) + ambient).scale(exposure))
 }

@@ -1,8 +1,6 @@
 //! A shot from a file of the reference renderer.
 
-use super::file::{
-    CyclesEnvironment, CyclesFile, CyclesLight, CyclesQuad, CyclesShape, CyclesSide, CyclesSize,
-};
+use super::file::{CyclesEnvironment, CyclesFile, CyclesLight, CyclesQuad, CyclesSide};
 use crate::asset::{Panorama, Texture};
 use crate::camera::Camera;
 use crate::error::{Error, Result};
@@ -10,7 +8,7 @@ use crate::geom::{Point2, Pose, Quad, UnitQuaternion, Vector2, Vector3};
 use crate::image::Image;
 use crate::io;
 use crate::pixel::{Film, LinearRgb, Mix, ObjectId, PremulRgba};
-use crate::scene::{AreaLight, CATCHER_RATIO, Card, EnvironmentMap, Grade, LightShape, Shot};
+use crate::scene::{AreaLight, CATCHER_RATIO, Card, EnvironmentMap, Shot};
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
@@ -31,12 +29,8 @@ pub fn import(path: impl AsRef<Path>, size: Option<[u32; 2]>) -> Result<Shot> {
         shot = shot.with_plate(Arc::new(folder.read_plate(&plate.path, size)?));
     }
     shot.catcher = catcher_size(&file);
-    shot.lights = file.lights.iter().map(area_light).collect();
     shot.cards = folder.read_cards(&file.quads)?;
-    if let Some(around) = &file.environment {
-        shot.ambient = around.color.unwrap_or_default().scale(around.strength);
-        shot.environment = folder.read_environment(around)?;
-    }
+    folder.light(&mut shot, &file)?;
     Ok(shot)
 }
 
@@ -100,11 +94,7 @@ impl PictureFolder {
         let back = quad.back.as_ref();
         Ok(Card {
             back: back.map(|back| self.read_texture(back)).transpose()?,
-            grade: Grade {
-                hue_deg: quad.hue_shift,
-                saturation: quad.saturation,
-                value: quad.value,
-            },
+            grade: quad.grade(),
             ..Card::new(ObjectId(quad.id), placed, self.read_texture(&quad.front)?)
         })
     }
@@ -114,28 +104,47 @@ impl PictureFolder {
         let Some(film) = &side.film else {
             return Ok(color.into());
         };
-        let film = self.find(film)?;
-        let opacity: Image<PremulRgba> = io::read(&film)?;
-        let (size, expected) = (opacity.size(), color.size());
-        if size != expected {
-            let what = format!("{size:?} pixels, but its colour has {expected:?}");
-            return Err(Error::file(film, what));
-        }
+        let opacity = self.read_opacity(film, color.size())?;
         Ok(color.zip_map(&opacity, film_pixel).into())
+    }
+
+    /// The opacity of a film whose colour has this size.
+    fn read_opacity(&self, name: &str, expected: (usize, usize)) -> Result<Image<PremulRgba>> {
+        let path = self.find(name)?;
+        let opacity: Image<PremulRgba> = io::read(&path)?;
+        let size = opacity.size();
+        if size == expected {
+            return Ok(opacity);
+        }
+        let what = format!("{size:?} pixels, but its colour has {expected:?}");
+        Err(Error::file(path, what))
+    }
+
+    /// Gives a shot the lights and the environment of a file.
+    fn light(&self, shot: &mut Shot, file: &CyclesFile) -> Result<()> {
+        shot.lights = file.lights.iter().map(area_light).collect();
+        if let Some(around) = &file.environment {
+            shot.ambient = around.color.unwrap_or_default().scale(around.strength);
+            shot.environment = self.read_environment(around)?;
+        }
+        Ok(())
     }
 
     fn read_environment(&self, around: &CyclesEnvironment) -> Result<Option<EnvironmentMap>> {
         let Some(path) = &around.path else {
             return Ok(None);
         };
-        let path = self.find(path)?;
-        let photo: Image<PremulRgba> = io::read(&path)?;
-        let panorama = Panorama::new(photo.map(PremulRgba::color)).map_err(|e| e.in_file(path))?;
         Ok(Some(EnvironmentMap {
-            panorama: Arc::new(panorama),
+            panorama: Arc::new(self.read_panorama(path)?),
             rotation: around.rotation_z.to_radians(),
             strength: around.strength,
         }))
+    }
+
+    fn read_panorama(&self, name: &str) -> Result<Panorama> {
+        let path = self.find(name)?;
+        let photo: Image<PremulRgba> = io::read(&path)?;
+        Panorama::new(photo.map(PremulRgba::color)).map_err(|e| e.in_file(path))
     }
 }
 
@@ -180,16 +189,10 @@ fn rotation_from_rows(rows: [[f64; 3]; 3]) -> UnitQuaternion<f64> {
 
 fn area_light(light: &CyclesLight) -> AreaLight {
     AreaLight {
-        shape: match light.shape {
-            CyclesShape::Rectangle | CyclesShape::Square => LightShape::Rectangle,
-            CyclesShape::Disk | CyclesShape::Ellipse => LightShape::Ellipse,
-        },
+        shape: light.shape.into(),
         position: light.position,
         target: light.target,
-        size: match light.size {
-            CyclesSize::One(side) => [side; 2],
-            CyclesSize::Two(sides) => sides,
-        },
+        size: light.size.sides(),
         power: light.power,
         color: light.color,
     }
@@ -205,14 +208,23 @@ fn averaged(photo: &Image<LinearRgb>, [width, height]: [u32; 2]) -> Image<Linear
     let columns = covered_shares(width, photo.width());
     let rows = covered_shares(height, photo.height());
     Image::from_fn(width, height, |x, y| {
-        let mut sum = LinearRgb::BLACK;
-        for &(j, v) in &rows[y] {
-            for &(i, u) in &columns[x] {
-                sum = sum.add_scaled(u * v, photo[(i, j)]);
-            }
-        }
-        sum
+        weighted_mean(photo, &columns[x], &rows[y])
     })
+}
+
+/// The mean over some columns and rows, each with its share.
+fn weighted_mean(
+    photo: &Image<LinearRgb>,
+    columns: &[(usize, f32)],
+    rows: &[(usize, f32)],
+) -> LinearRgb {
+    let mut sum = LinearRgb::BLACK;
+    for &(j, v) in rows {
+        for &(i, u) in columns {
+            sum = sum.add_scaled(u * v, photo[(i, j)]);
+        }
+    }
+    sum
 }
 
 /// The samples that each of `n` equal parts of a line of `len` covers, and their shares of it.
@@ -225,9 +237,11 @@ fn covered_shares(n: usize, len: usize) -> Vec<Vec<(usize, f32)>> {
 
 /// The samples of a line of `len` from one place to another, and their shares of `scale`.
 fn shares_between(start: f64, end: f64, scale: f64, len: usize) -> Vec<(usize, f32)> {
-    let share = |i: usize| (end.min((i + 1) as f64) - start.max(i as f64)) / scale;
     (start as usize..len)
-        .map(|i| (i, share(i) as f32))
+        .map(|i| {
+            let covered = end.min((i + 1) as f64) - start.max(i as f64);
+            (i, (covered / scale) as f32)
+        })
         .take_while(|&(_, share)| share > 0.0)
         .collect()
 }
@@ -237,6 +251,7 @@ mod tests {
     use super::super::{SCRIPT, export};
     use super::*;
     use crate::geom::Quad;
+    use crate::scene::{Grade, LightShape};
 
     #[test]
     fn a_scene_names_pictures_beside_it_and_none_further_away() {

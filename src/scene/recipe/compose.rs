@@ -34,17 +34,26 @@ impl Recipe {
         };
         self.vary_objects(&mut objects, &draws);
         let surface = self.draw_surface(&draws, background.size);
+        self.drop_column(background, surface, &draws)
+            .stack(&mut objects)?;
+        let scene = self.lit_scene(&draws, background, surface, objects);
+        scene.check()?;
+        Ok(scene)
+    }
+
+    fn drop_column<'a>(
+        &'a self,
+        background: &'a Background,
+        surface: Surface,
+        draws: &'a Draws<'a>,
+    ) -> DropColumn<'a> {
         DropColumn {
             background: &background.name,
             surface,
             start: &self.start,
             options: &self.settle,
-            draws: &draws,
+            draws,
         }
-        .stack(&mut objects)?;
-        let scene = self.lit_scene(&draws, background, surface, objects);
-        scene.check()?;
-        Ok(scene)
     }
 
     /// The scene with these objects, its light drawn.
@@ -108,22 +117,16 @@ impl Recipe {
 
     /// Gives an object its scale and its colours.
     fn vary_object(&self, object: &mut Object, draws: &Draws, path: &str) {
-        let scale = self.scale.draw(draws, &format!("{path}.scale"));
-        object.size = object.size.map(|length| length * scale);
-        for corner in &mut object.outline {
-            *corner = corner.map(|length| length * scale);
-        }
-        object.thickness *= scale;
-        object.mass *= scale * scale * scale;
+        object.scale_by(self.scale.draw_field(draws, path, "scale"));
         object.grade = self.draw_grade(draws, path);
     }
 
     fn draw_grade(&self, draws: &Draws, path: &str) -> Grade {
-        let draw = |range: &Range, name: &str| range.draw(draws, &format!("{path}.grade.{name}"));
+        let (grade, path) = (&self.grade, format!("{path}.grade"));
         Grade {
-            hue_deg: draw(&self.grade.hue_deg, "hue_deg") as f32,
-            saturation: draw(&self.grade.saturation, "saturation") as f32,
-            value: draw(&self.grade.value, "value") as f32,
+            hue_deg: grade.hue_deg.draw_field(draws, &path, "hue_deg") as f32,
+            saturation: grade.saturation.draw_field(draws, &path, "saturation") as f32,
+            value: grade.value.draw_field(draws, &path, "value") as f32,
         }
     }
 }
@@ -149,10 +152,13 @@ fn ambient_radiance(lights: &[AreaLight], share: f64) -> LinearRgb {
         return LinearRgb::WHITE.scale(share as f32);
     }
     lights.iter().fold(LinearRgb::BLACK, |sum, light| {
-        let [x, y, h] = light.position;
-        let d = (x * x + y * y + h * h).sqrt();
-        sum + light
-            .color
-            .scale((share * light.power * h / (PI * PI * d * d * d)) as f32)
+        sum + light.color.scale(ambient_factor(light, share) as f32)
     })
+}
+
+/// Radiance all around that gives `share` of the irradiance of a small light at the centre.
+fn ambient_factor(light: &AreaLight, share: f64) -> f64 {
+    let [x, y, h] = light.position;
+    let d = (x * x + y * y + h * h).sqrt();
+    share * light.power * h / (PI * PI * d * d * d)
 }

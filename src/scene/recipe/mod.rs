@@ -167,15 +167,16 @@ impl Recipe {
     /// Fails if a photo of an asset at its largest fits between the walls of a background in no
     /// direction.
     fn check_fit(&self, background: &Background, variant: &AssetVariant) -> Result<()> {
-        for size in self.photos.slice_of(&variant.photo_sizes) {
-            let largest = size.map(|side| side * self.scale.max);
-            if !self.start.has_room(background.size, largest) {
-                let room = background.size;
-                let what = too_large(&variant.asset, largest, &background.name, room);
-                return Err(Error::value("objects", what));
+        let sizes = self.photos.slice_of(&variant.photo_sizes).iter();
+        let mut largest = sizes.map(|size| size.map(|side| side * self.scale.max));
+        let room = background.size;
+        match largest.find(|size| !self.start.has_room(room, *size)) {
+            Some(size) => {
+                let what = too_large(&variant.asset, size, &background.name, room);
+                Err(Error::value("objects", what))
             }
+            None => Ok(()),
         }
-        Ok(())
     }
 
     /// Fails on the first impossible value.

@@ -1,9 +1,11 @@
 //! Ranges of an object's colours and of a light.
 
+use crate::bounds::Bounds;
 use crate::color::planckian;
 use crate::error::Result;
 use crate::pixel::LinearRgb;
 use crate::scene::bounds::{GRADE, KELVIN, LIGHT_HEIGHT, LIGHT_OFFSET, LIGHT_SIZE, RADIANCE, TURN};
+use crate::scene::check::check_each;
 use crate::scene::{AreaLight, Draws, LightShape, Range};
 use serde::{Deserialize, Serialize};
 
@@ -84,29 +86,31 @@ impl GradeRanges {
 
 impl LightRanges {
     pub(super) fn draw(&self, draws: &Draws, path: &str) -> AreaLight {
-        let draw = |range: &Range, name: &str| range.draw(draws, &format!("{path}.{name}"));
-        let offset = draw(&self.offset, "offset");
-        let azimuth = draw(&self.azimuth_deg, "azimuth_deg").to_radians();
+        let [x, y] = self.draw_offset(draws, path);
         let color = self.draw_color(draws, path);
         AreaLight {
             shape: self.shape,
-            position: [
-                offset * libm::cos(azimuth),
-                offset * libm::sin(azimuth),
-                draw(&self.height, "height"),
-            ],
+            position: [x, y, self.height.draw_field(draws, path, "height")],
             target: [0.0; 3],
-            size: [draw(&self.size, "size"); 2],
-            power: draw(&self.power, "power"),
+            size: [self.size.draw_field(draws, path, "size"); 2],
+            power: self.power.draw_field(draws, path, "power"),
             color,
         }
+    }
+
+    /// Position over the surface, from its centre.
+    fn draw_offset(&self, draws: &Draws, path: &str) -> [f64; 2] {
+        let offset = self.offset.draw_field(draws, path, "offset");
+        let azimuth = self.azimuth_deg.draw_field(draws, path, "azimuth_deg");
+        let azimuth = azimuth.to_radians();
+        [offset * libm::cos(azimuth), offset * libm::sin(azimuth)]
     }
 
     fn draw_color(&self, draws: &Draws, path: &str) -> LinearRgb {
         let tint =
             [0, 1, 2].map(|c| self.color[c].draw(draws, &format!("{path}.color[{c}]")) as f32);
         let glow = self.temperature_k.map_or(LinearRgb::WHITE, |range| {
-            planckian(range.draw(draws, &format!("{path}.temperature_k")))
+            planckian(range.draw_field(draws, path, "temperature_k"))
         });
         LinearRgb::from(tint) * glow
     }
@@ -124,19 +128,24 @@ impl LightRanges {
     }
 
     pub(super) fn check(&self, at: &str) -> Result<()> {
-        let ranges = [
-            ("height", &self.height, &LIGHT_HEIGHT),
-            ("offset", &self.offset, &LIGHT_OFFSET),
-            ("azimuth_deg", &self.azimuth_deg, &TURN),
-            ("size", &self.size, &LIGHT_SIZE),
-            ("power", &self.power, &RADIANCE),
-        ];
-        for (name, range, bounds) in ranges {
+        for (name, range, bounds) in self.bounded_ranges() {
             range.check(&format!("{at}.{name}"), bounds)?;
         }
         if let Some(range) = &self.temperature_k {
             range.check(&format!("{at}.temperature_k"), &KELVIN)?;
         }
-        (0..3).try_for_each(|c| self.color[c].check(&format!("{at}.color[{c}]"), &RADIANCE))
+        check_each(&self.color, &format!("{at}.color"), |range, at| {
+            range.check(at, &RADIANCE)
+        })
+    }
+
+    fn bounded_ranges(&self) -> [(&str, &Range, &Bounds); 5] {
+        [
+            ("height", &self.height, &LIGHT_HEIGHT),
+            ("offset", &self.offset, &LIGHT_OFFSET),
+            ("azimuth_deg", &self.azimuth_deg, &TURN),
+            ("size", &self.size, &LIGHT_SIZE),
+            ("power", &self.power, &RADIANCE),
+        ]
     }
 }

@@ -82,12 +82,7 @@ impl Recipe {
         let selection = self.selections.index_for(number.k)?;
         let draws = Draws::new(number.seed, selection).logged(log);
         let count = self.objects.draw_count(&draws, "selection.objects");
-        if count > 0 && catalog.is_empty() {
-            return Err(Error::value(
-                "objects",
-                format!("{count} asked for, but there is no asset to choose from"),
-            ));
-        }
+        check_catalog(count, catalog)?;
         let mut left = Vec::new();
         (0..count)
             .map(|i| {
@@ -97,6 +92,15 @@ impl Recipe {
             })
             .collect()
     }
+}
+
+/// Fails on a catalog without an asset while objects are asked for.
+fn check_catalog(count: usize, catalog: &[AssetVariant]) -> Result<()> {
+    if count == 0 || !catalog.is_empty() {
+        return Ok(());
+    }
+    let what = format!("{count} asked for, but there is no asset to choose from");
+    Err(Error::value("objects", what))
 }
 
 /// A place in a catalog of this length that is still `left`; all of them are once none is.
@@ -116,12 +120,7 @@ impl AssetVariant {
         photos: Take,
         collider: Collider,
     ) -> Result<Object> {
-        if self.photo_sizes.is_empty() {
-            return Err(Error::value(
-                format!("assets.{}", self.asset),
-                "no photo, expected at least one",
-            ));
-        }
+        self.check_photos()?;
         let photo = draws.choose(path, photos.slice_of(&self.photo_sizes).len());
         Ok(Object {
             asset: self.asset.clone(),
@@ -134,6 +133,14 @@ impl AssetVariant {
             placement: DropRanges::unplaced(),
             grade: Grade::default(),
         })
+    }
+
+    fn check_photos(&self) -> Result<()> {
+        if !self.photo_sizes.is_empty() {
+            return Ok(());
+        }
+        let at = format!("assets.{}", self.asset);
+        Err(Error::value(at, "no photo, expected at least one"))
     }
 
     /// Corners of the prism that falls; none where a box does.

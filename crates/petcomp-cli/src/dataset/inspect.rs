@@ -1,14 +1,26 @@
 //! `petcomp dataset check`, `report` and `sheet`: what is in a dataset.
 
-use crate::common::{Common, NeedsReview};
+use crate::diagnostics::located;
+use crate::exit::NeedsReview;
+use crate::global::GlobalArgs;
 use crate::print;
 use petcomp::dataset::page::DatasetReportOptions;
 use petcomp::dataset::{self, Checked, contact_sheet_of};
 use petcomp::io;
 use std::path::{Path, PathBuf};
 
+#[derive(clap::Subcommand)]
+pub(crate) enum InspectCommand {
+    /// Look for what trainers refuse, and for what makes results too good: duplicates, leaks between the parts
+    Check(CheckArgs),
+    /// Write one HTML page: pictures with their labels, what was drawn, what can be seen, how long it took
+    Report(ReportArgs),
+    /// Draw a sheet of the first pictures with their boxes
+    Sheet(SheetArgs),
+}
+
 #[derive(clap::Args)]
-pub(crate) struct Check {
+pub(crate) struct CheckArgs {
     /// Folder of the dataset
     folder: PathBuf,
     /// Exit with status 1 where there is a note, too: classes without labels, very small boxes
@@ -17,7 +29,7 @@ pub(crate) struct Check {
 }
 
 #[derive(clap::Args)]
-pub(crate) struct Report {
+pub(crate) struct ReportArgs {
     /// Folder of the dataset
     folder: PathBuf,
     /// Page to write; by default report.html in the folder
@@ -32,7 +44,7 @@ pub(crate) struct Report {
 }
 
 #[derive(clap::Args)]
-pub(crate) struct Sheet {
+pub(crate) struct SheetArgs {
     /// Folder of the dataset
     folder: PathBuf,
     /// Picture to write
@@ -43,56 +55,70 @@ pub(crate) struct Sheet {
     most: usize,
 }
 
-pub(crate) fn check(args: &Check, common: &Common) -> anyhow::Result<()> {
-    let folder = args.folder.display();
-    let checked = dataset::check(&args.folder)?;
-    let Checked {
-        findings, images, ..
-    } = &checked;
-    print::text(checked.balance().markdown());
-    let notes = checked.notes();
-    notes
-        .iter()
-        .for_each(|note| common.say(format_args!("note: {note} [{}]", note.code)));
-    findings.iter().for_each(print::line);
-    anyhow::ensure!(findings.is_empty(), "{folder}: {} errors", findings.len());
-    let rows: usize = checked.rows.iter().sum();
-    print::line(format_args!(
-        "{folder}: {images} images, {rows} labels, no errors"
-    ));
-    match notes.len() {
-        n if args.strict && n > 0 => Err(NeedsReview(format!("{folder}: {n} notes")).into()),
-        _ => Ok(()),
+pub(super) fn run(command: &InspectCommand, global: &GlobalArgs) -> anyhow::Result<()> {
+    match command {
+        InspectCommand::Check(args) => check_dataset(args, global),
+        InspectCommand::Report(args) => write_report(args, global),
+        InspectCommand::Sheet(args) => write_sheet(args, global),
     }
 }
 
-pub(crate) fn report(args: &Report, common: &Common) -> anyhow::Result<()> {
-    let output = args
-        .output
-        .clone()
-        .unwrap_or_else(|| args.folder.join("report.html"));
-    let folder = output
-        .parent()
-        .filter(|folder| !folder.as_os_str().is_empty())
-        .unwrap_or(Path::new("."));
-    let options = DatasetReportOptions {
-        most: args.most,
-        page: Some(folder.to_path_buf()),
-        beside: args.beside.clone(),
-    };
-    io::write_text(
-        &output,
-        &dataset::page::page(&args.folder, &options)?.document(),
-    )?;
-    common.say(format_args!("look at {}", output.display()));
+fn check_dataset(args: &CheckArgs, global: &GlobalArgs) -> anyhow::Result<()> {
+    let folder = args.folder.display();
+    let checked = dataset::check(&args.folder)?;
+    print::text(checked.balance().markdown());
+    let notes = checked.notes();
+    for note in &notes {
+        global.print_status(located(&folder, note));
+    }
+    print_findings(&checked, &args.folder)?;
+    if args.strict && !notes.is_empty() {
+        return Err(NeedsReview(format!("{folder}: {} notes", notes.len())).into());
+    }
     Ok(())
 }
 
-pub(crate) fn sheet(args: &Sheet, common: &Common) -> anyhow::Result<()> {
-    io::write(
-        &args.output,
-        &contact_sheet_of(&args.folder, args.most, &Default::default())?,
-    )?;
-    common.say(args.output.display());
+/// Prints what is wrong, which is an error, or how much was checked.
+fn print_findings(checked: &Checked, folder: &Path) -> anyhow::Result<()> {
+    let (folder, errors) = (folder.display(), checked.findings.len());
+    checked.findings.iter().for_each(print::line);
+    anyhow::ensure!(errors == 0, "{folder}: {errors} errors");
+    let (images, rows) = (checked.images, checked.rows.iter().sum::<usize>());
+    print::line(format_args!(
+        "{folder}: {images} images, {rows} labels, no errors"
+    ));
+    Ok(())
+}
+
+fn write_report(args: &ReportArgs, global: &GlobalArgs) -> anyhow::Result<()> {
+    let output = args.page_path();
+    let page = dataset::page::page(&args.folder, &args.options_for(&output))?;
+    io::write_text(&output, &page.document())?;
+    global.print_look_at(&output);
+    Ok(())
+}
+
+impl ReportArgs {
+    fn options_for(&self, page: &Path) -> DatasetReportOptions {
+        let folder = page.parent().filter(|path| *path != Path::new(""));
+        DatasetReportOptions {
+            most: self.most,
+            page: Some(folder.unwrap_or(Path::new(".")).into()),
+            beside: self.beside.clone(),
+        }
+    }
+
+    fn page_path(&self) -> PathBuf {
+        match &self.output {
+            Some(path) => path.clone(),
+            None => self.folder.join("report.html"),
+        }
+    }
+}
+
+fn write_sheet(args: &SheetArgs, global: &GlobalArgs) -> anyhow::Result<()> {
+    let sheet = contact_sheet_of(&args.folder, args.most, &Default::default())?;
+    io::write(&args.output, &sheet)?;
+    global.print_status(args.output.display());
     Ok(())
 }

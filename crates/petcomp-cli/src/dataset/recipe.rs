@@ -1,21 +1,30 @@
 //! `petcomp dataset init` and `explain`: recipes to write and to understand.
 
-use crate::common::{Common, RecipeArgs};
+use crate::documents::RecipeArgs;
+use crate::global::GlobalArgs;
 use crate::print;
 use petcomp::dataset::{DatasetConfig, Provenance};
 use petcomp::scene::Drawn;
 use petcomp::{Error, Scene, io};
 use std::path::PathBuf;
 
+#[derive(clap::Subcommand)]
+pub(crate) enum RecipeCommand {
+    /// Write a recipe file that explains every default
+    Init(InitRecipeArgs),
+    /// Print every draw that image K is made with
+    Explain(ExplainArgs),
+}
+
 #[derive(clap::Args)]
-pub(crate) struct Init {
+pub(crate) struct InitRecipeArgs {
     /// File to write
     #[arg(value_name = "RECIPE", default_value = "recipe.toml")]
     recipe: PathBuf,
 }
 
 #[derive(clap::Args)]
-pub(crate) struct Explain {
+pub(crate) struct ExplainArgs {
     #[command(flatten)]
     recipe: RecipeArgs,
     /// Number of the image
@@ -26,62 +35,93 @@ pub(crate) struct Explain {
     seed: u64,
 }
 
-pub(crate) fn init(args: &Init, common: &Common) -> anyhow::Result<()> {
+pub(super) fn run(command: &RecipeCommand, global: &GlobalArgs) -> anyhow::Result<()> {
+    match command {
+        RecipeCommand::Init(args) => init_recipe(args, global),
+        RecipeCommand::Explain(args) => explain_draws(args),
+    }
+}
+
+fn init_recipe(args: &InitRecipeArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     if args.recipe.exists() {
         return Err(Error::file(&args.recipe, "is there already, expected a new file").into());
     }
     io::write_text(&args.recipe, DatasetConfig::template())?;
-    common.say(args.recipe.display());
+    global.print_status(args.recipe.display());
     Ok(())
 }
 
 /// Makes the image to know which of its scenes came to rest, and prints the draws of that one.
-pub(crate) fn explain(args: &Explain) -> anyhow::Result<()> {
-    let sample = args.recipe.pipeline()?.sample(args.seed, args.index)?;
-    sample.provenance.iter().for_each(print_draws);
+fn explain_draws(args: &ExplainArgs) -> anyhow::Result<()> {
+    let sample = args.recipe.open_pipeline()?.sample(args.seed, args.index)?;
+    if let Some(provenance) = &sample.provenance {
+        print_rejected(provenance);
+        print_draws(provenance);
+    }
     Ok(())
 }
 
-fn print_draws(provenance: &Provenance) {
+fn print_rejected(provenance: &Provenance) {
     for reason in &provenance.rejected {
         print::line(format_args!("# rejected a scene: {reason}"));
     }
     if !provenance.rejected.is_empty() {
-        print::line(format_args!(
-            "# what follows was drawn with seed {}",
-            provenance.scene_seed
-        ));
+        let seed = provenance.scene_seed;
+        print::line(format_args!("# what follows was drawn with seed {seed}"));
     }
-    let width = |text: &dyn Fn(&Drawn) -> String| {
-        provenance
-            .draws
-            .iter()
-            .map(|d| text(d).len())
-            .max()
-            .unwrap_or(0)
-    };
-    let (paths, froms) = (width(&|d| d.path.clone()), width(&|d| d.from.to_string()));
-    for draw in &provenance.draws {
-        let from = draw.from.to_string();
-        let line = format!(
-            "{:paths$}  {from:froms$}  {}  {}",
-            draw.path,
-            draw.value,
-            chosen(draw, &provenance.drawn)
-        );
+}
+
+fn print_draws(provenance: &Provenance) {
+    let draws = provenance.draws.iter();
+    let rows = draws.map(|draw| DrawRow::new(draw, &provenance.drawn));
+    print_rows(&rows.collect::<Vec<_>>());
+}
+
+/// A draw as it is printed.
+struct DrawRow<'a> {
+    path: &'a str,
+    /// The distribution.
+    from: String,
+    /// The value, and the name of what a choice chose.
+    outcome: String,
+}
+
+impl<'a> DrawRow<'a> {
+    fn new(draw: &'a Drawn, scene: &Scene) -> Self {
+        Self {
+            path: &draw.path,
+            from: draw.from.to_string(),
+            outcome: format!("{}  {}", draw.value, chosen_name(draw, scene)),
+        }
+    }
+}
+
+/// Prints draws in columns.
+fn print_rows(rows: &[DrawRow]) {
+    let paths = rows.iter().map(|row| row.path.len()).max().unwrap_or(0);
+    let froms = rows.iter().map(|row| row.from.len()).max().unwrap_or(0);
+    for DrawRow {
+        path,
+        from,
+        outcome,
+    } in rows
+    {
+        let line = format!("{path:paths$}  {from:froms$}  {outcome}");
         print::line(line.trim_end());
     }
 }
 
 /// The name of what a choice chose.
-fn chosen<'a>(draw: &Drawn, scene: &'a Scene) -> &'a str {
-    let object = draw
-        .path
-        .strip_prefix("selection[")
-        .and_then(|rest| rest.strip_suffix("].asset"));
-    match object.and_then(|i| i.parse::<usize>().ok()) {
+fn chosen_name<'a>(draw: &Drawn, scene: &'a Scene) -> &'a str {
+    match asset_index(&draw.path) {
         Some(i) => scene.objects.get(i).map_or("", |object| &object.asset),
         None if draw.path == "background" => &scene.plate,
         None => "",
     }
+}
+
+/// `2` of `selection[2].asset`.
+fn asset_index(path: &str) -> Option<usize> {
+    let index = path.strip_prefix("selection[")?.strip_suffix("].asset")?;
+    index.parse().ok()
 }

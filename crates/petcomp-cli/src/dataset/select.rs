@@ -1,13 +1,21 @@
 //! `petcomp dataset split` and `subset`: lists of images, without copies.
 
-use crate::common::Common;
+use crate::global::GlobalArgs;
 use crate::print;
 use petcomp::Error;
-use petcomp::dataset::{Group, Leakage, Listing, NEAR_DUPLICATE_RMS, Partition};
-use std::path::PathBuf;
+use petcomp::dataset::{Group, Leakage, Listing, NEAR_DUPLICATE_RMS, NearDuplicate, Partition};
+use std::path::{Path, PathBuf};
+
+#[derive(clap::Subcommand)]
+pub(crate) enum SelectCommand {
+    /// Share images out again for training and validation, and report what leaks
+    Split(SplitArgs),
+    /// The first part of the images for training and of those for validation
+    Subset(SubsetArgs),
+}
 
 #[derive(clap::Args)]
-pub(crate) struct Split {
+pub(crate) struct SplitArgs {
     /// Folder with a data.yaml
     folder: PathBuf,
     /// Share of the images for training
@@ -15,7 +23,7 @@ pub(crate) struct Split {
     ratio: f64,
     /// How: `consecutive` (the last ones for validation), `grouped` or `random`
     #[arg(long, value_name = "HOW", default_value = "consecutive")]
-    by: How,
+    by: SplitMethod,
     /// What stays together in a grouped split: `background` or `selection`
     #[arg(long, value_name = "GROUP", default_value = "background")]
     group: Group,
@@ -31,14 +39,14 @@ pub(crate) struct Split {
 }
 
 #[derive(Clone, Copy, clap::ValueEnum)]
-enum How {
+enum SplitMethod {
     Consecutive,
     Grouped,
     Random,
 }
 
 #[derive(clap::Args)]
-pub(crate) struct Subset {
+pub(crate) struct SubsetArgs {
     /// Folder with a data.yaml: a dataset or a split of one
     folder: PathBuf,
     /// Share of each part that is kept, from the beginning
@@ -49,59 +57,76 @@ pub(crate) struct Subset {
     output: PathBuf,
 }
 
-pub(crate) fn split(args: &Split, common: &Common) -> anyhow::Result<()> {
-    let how = match args.by {
-        How::Consecutive => Partition::Consecutive { guard: args.guard },
-        How::Grouped => Partition::Grouped(args.group),
-        How::Random => Partition::Random,
-    };
-    let shared = Listing::read(&args.folder)?.partitioned(how, args.ratio, args.seed)?;
-    if shared.train.is_empty() || shared.val.is_empty() {
-        let what = format!(
-            "{} images for training and {} for validation",
-            shared.train.len(),
-            shared.val.len()
-        );
-        return Err(Error::value("split", format!("{what}: too few groups for this ratio")).into());
+/// Most near duplicates that are listed.
+const MAX_LISTED_PAIRS: usize = 10;
+
+pub(super) fn run(command: &SelectCommand, global: &GlobalArgs) -> anyhow::Result<()> {
+    match command {
+        SelectCommand::Split(args) => write_split(args, global),
+        SelectCommand::Subset(args) => write_subset(args, global),
     }
-    write(&shared, &args.output, common)?;
-    tell(&shared.leakage(NEAR_DUPLICATE_RMS)?);
+}
+
+fn write_split(args: &SplitArgs, global: &GlobalArgs) -> anyhow::Result<()> {
+    let listing = Listing::read(&args.folder)?;
+    let listing = listing.partitioned(args.partition(), args.ratio, args.seed)?;
+    check_both_parts(&listing)?;
+    write_listing(&listing, &args.output, global)?;
+    report_leakage(&listing.leakage(NEAR_DUPLICATE_RMS)?);
     Ok(())
 }
 
-pub(crate) fn subset(args: &Subset, common: &Common) -> anyhow::Result<()> {
-    write(
-        &Listing::read(&args.folder)?.head(args.head)?,
-        &args.output,
-        common,
-    )
+impl SplitArgs {
+    fn partition(&self) -> Partition {
+        match self.by {
+            SplitMethod::Consecutive => Partition::Consecutive { guard: self.guard },
+            SplitMethod::Grouped => Partition::Grouped(self.group),
+            SplitMethod::Random => Partition::Random,
+        }
+    }
 }
 
-fn write(listing: &Listing, folder: &std::path::Path, common: &Common) -> anyhow::Result<()> {
+fn check_both_parts(listing: &Listing) -> petcomp::Result<()> {
+    let (train, val) = (listing.train.len(), listing.val.len());
+    if train > 0 && val > 0 {
+        return Ok(());
+    }
+    let what = format!(
+        "{train} images for training and {val} for validation: too few groups for this ratio"
+    );
+    Err(Error::value("split", what))
+}
+
+fn write_subset(args: &SubsetArgs, global: &GlobalArgs) -> anyhow::Result<()> {
+    let listing = Listing::read(&args.folder)?.head(args.head)?;
+    write_listing(&listing, &args.output, global)
+}
+
+fn write_listing(listing: &Listing, folder: &Path, global: &GlobalArgs) -> anyhow::Result<()> {
     listing.write(folder)?;
     let (train, val) = (listing.train.len(), listing.val.len());
-    common.say(format_args!(
-        "{}: {train} images for training, {val} for validation",
-        folder.display()
-    ));
+    let what = format!("{train} images for training, {val} for validation");
+    global.print_written(folder, what);
     Ok(())
 }
 
-fn tell(leakage: &Leakage) {
+fn report_leakage(leakage: &Leakage) {
     for (group, [all, shared]) in &leakage.groups {
         print::line(format_args!(
             "leak: {shared} of {all} {group}s of the validation images are also trained on"
         ));
     }
+    let pairs = &leakage.near_duplicates;
     print::line(format_args!(
         "leak: {} validation images look like one that is trained on",
-        leakage.near_duplicates.len()
+        pairs.len()
     ));
-    for near in leakage.near_duplicates.iter().take(10) {
-        let (val, train) = (near.val.display(), near.train.display());
-        print::line(format_args!(
-            "  {val} and {train} differ by {:.2} codes",
-            near.codes
-        ));
-    }
+    pairs.iter().take(MAX_LISTED_PAIRS).for_each(list_pair);
+}
+
+fn list_pair(pair: &NearDuplicate) {
+    let (val, train, codes) = (pair.val.display(), pair.train.display(), pair.codes);
+    print::line(format_args!(
+        "  {val} and {train} differ by {codes:.2} codes"
+    ));
 }

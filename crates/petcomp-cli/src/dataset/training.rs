@@ -1,17 +1,28 @@
 //! What trainings need of a dataset: batches, anchors, the kit for PyTorch.
 
-use crate::common::{Common, count};
+use crate::global::GlobalArgs;
 use crate::print;
+use crate::values::count;
 use clap::value_parser;
 use petcomp::dataset::YoloSet;
-use petcomp::eval::read_yolo_truth;
+use petcomp::eval::{YoloTruth, read_yolo_truth};
 use petcomp::io;
 use petcomp::train::kit::KitOptions;
-use petcomp::train::{self, Balance, BatchOptions, Source};
+use petcomp::train::{self, Balance, Batch, BatchOptions, Source, Weights};
 use std::path::{Path, PathBuf};
 
+#[derive(clap::Subcommand)]
+pub(crate) enum TrainingCommand {
+    /// Plan batches of one source each, with the weight of their loss (equation 2 of the paper)
+    Batches(BatchesArgs),
+    /// Anchors that fit a dataset's boxes, by k-means
+    Anchors(AnchorsArgs),
+    /// Write what the paper's experiments need in YOLOv5 and Ultralytics
+    TrainKit(KitArgs),
+}
+
 #[derive(clap::Args)]
-pub(crate) struct Sets {
+pub(crate) struct MixedSetArgs {
     /// YOLO dataset of photographs
     #[arg(long, value_name = "FOLDER")]
     real: PathBuf,
@@ -29,7 +40,7 @@ pub(crate) struct Sets {
     batch: usize,
 }
 
-impl Sets {
+impl MixedSetArgs {
     fn balance(&self) -> Balance {
         Balance {
             alpha: self.alpha,
@@ -39,9 +50,9 @@ impl Sets {
 }
 
 #[derive(clap::Args)]
-pub(crate) struct Batches {
+pub(crate) struct BatchesArgs {
     #[command(flatten)]
-    sets: Sets,
+    sets: MixedSetArgs,
     /// Epochs to plan, 1 to 10000
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u64).range(1..=10_000))]
     epochs: u64,
@@ -54,9 +65,9 @@ pub(crate) struct Batches {
 }
 
 #[derive(clap::Args)]
-pub(crate) struct Kit {
+pub(crate) struct KitArgs {
     #[command(flatten)]
-    sets: Sets,
+    sets: MixedSetArgs,
     /// Epochs of a training, 1 to 100000
     #[arg(long, value_name = "N", default_value_t = 300, value_parser = value_parser!(u64).range(1..=100_000))]
     epochs: u64,
@@ -69,7 +80,7 @@ pub(crate) struct Kit {
 }
 
 #[derive(clap::Args)]
-pub(crate) struct Anchors {
+pub(crate) struct AnchorsArgs {
     /// Folder of the dataset
     folder: PathBuf,
     /// Number of anchors, 1 to 1000
@@ -83,43 +94,79 @@ pub(crate) struct Anchors {
     seed: u64,
 }
 
-pub(crate) fn batches(args: &Batches, common: &Common) -> anyhow::Result<()> {
-    let (real, synthetic) = (
-        YoloSet::open(&args.sets.real)?,
-        YoloSet::open(&args.sets.synthetic)?,
-    );
-    let weights = args
-        .sets
-        .balance()
-        .weights(real.train.len() as u64, synthetic.train.len() as u64)?;
+pub(super) fn run(command: &TrainingCommand, global: &GlobalArgs) -> anyhow::Result<()> {
+    match command {
+        TrainingCommand::Batches(args) => plan_batches(args, global),
+        TrainingCommand::Anchors(args) => fit_anchors(args),
+        TrainingCommand::TrainKit(args) => write_kit(args, global),
+    }
+}
+
+fn plan_batches(args: &BatchesArgs, global: &GlobalArgs) -> anyhow::Result<()> {
+    let sets = MixedSets::open(&args.sets)?;
     let options = BatchOptions {
         size: args.sets.batch,
         seed: args.seed,
     };
-    let mut text = String::new();
-    for epoch in 0..args.epochs {
-        for batch in train::batches(real.train.len(), synthetic.train.len(), epoch, &options) {
-            let (list, weight) = match batch.source {
-                Source::Real => (&real.train, weights.real),
-                Source::Synthetic => (&synthetic.train, weights.synthetic),
-            };
-            let images: Vec<&Path> = batch.images.iter().map(|&i| list[i].as_path()).collect();
-            let line = serde_json::json!({ "epoch": epoch, "source": batch.source, "weight": weight, "images": images });
-            text += &format!("{line}\n");
-        }
-    }
-    io::write_text(&args.output, &text)?;
-    common.say(format_args!(
-        "{}: {} batches; weights real {:.4}, synthetic {:.4}",
-        args.output.display(),
-        text.lines().count(),
-        weights.real,
-        weights.synthetic
-    ));
+    let epochs = (0..args.epochs).flat_map(|epoch| sets.epoch_lines(epoch, &options));
+    let lines: Vec<String> = epochs.collect();
+    io::write_text(&args.output, &lines.concat())?;
+    let (batches, weights) = (lines.len(), sets.describe_weights());
+    global.print_written(&args.output, format_args!("{batches} batches; {weights}"));
     Ok(())
 }
 
-pub(crate) fn kit(args: &Kit, common: &Common) -> anyhow::Result<()> {
+/// Two datasets that are trained on together.
+struct MixedSets {
+    real: YoloSet,
+    synthetic: YoloSet,
+    weights: Weights,
+}
+
+impl MixedSets {
+    fn open(args: &MixedSetArgs) -> petcomp::Result<Self> {
+        let (real, synthetic) = (YoloSet::open(&args.real)?, YoloSet::open(&args.synthetic)?);
+        let [in_real, in_synthetic] = [&real, &synthetic].map(|set| set.train.len() as u64);
+        Ok(Self {
+            weights: args.balance().weights(in_real, in_synthetic)?,
+            real,
+            synthetic,
+        })
+    }
+
+    fn describe_weights(&self) -> String {
+        let Weights { real, synthetic } = self.weights;
+        format!("weights real {real:.4}, synthetic {synthetic:.4}")
+    }
+
+    fn epoch_lines(&self, epoch: u64, options: &BatchOptions) -> Vec<String> {
+        let (real, synthetic) = (self.real.train.len(), self.synthetic.train.len());
+        let batches = train::batches(real, synthetic, epoch, options);
+        batches
+            .iter()
+            .map(|batch| self.batch_line(epoch, batch))
+            .collect()
+    }
+
+    /// A line of JSON: epoch, source, weight of the loss, images.
+    fn batch_line(&self, epoch: u64, batch: &Batch) -> String {
+        let (list, weight) = self.images_and_weight(batch.source);
+        let images: Vec<&Path> = batch.images.iter().map(|&i| &*list[i]).collect();
+        let line = serde_json::json!({
+            "epoch": epoch, "source": batch.source, "weight": weight, "images": images
+        });
+        format!("{line}\n")
+    }
+
+    fn images_and_weight(&self, source: Source) -> (&[PathBuf], f64) {
+        match source {
+            Source::Real => (&self.real.train, self.weights.real),
+            Source::Synthetic => (&self.synthetic.train, self.weights.synthetic),
+        }
+    }
+}
+
+fn write_kit(args: &KitArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     let options = KitOptions {
         balance: args.sets.balance(),
         seeds: args.seeds,
@@ -128,32 +175,15 @@ pub(crate) fn kit(args: &Kit, common: &Common) -> anyhow::Result<()> {
         ..KitOptions::new(&args.sets.real, &args.sets.synthetic)
     };
     train::kit::write(&args.output, &options)?;
-    common.say(format_args!(
-        "{}: run commands.sh there",
-        args.output.display()
-    ));
+    global.print_written(&args.output, "run commands.sh there");
     Ok(())
 }
 
-pub(crate) fn anchors(args: &Anchors) -> anyhow::Result<()> {
+fn fit_anchors(args: &AnchorsArgs) -> anyhow::Result<()> {
     let set = YoloSet::open(&args.folder)?;
-    let labels = set
-        .train
-        .first()
-        .and_then(|image| YoloSet::label_of(image).parent().map(Path::to_path_buf));
-    let truth = read_yolo_truth(&labels.unwrap_or_default(), None)?;
-    let scaled = truth
-        .sheets
-        .iter()
-        .zip(&truth.sizes)
-        .flat_map(|(sheet, size)| {
-            let scale = f64::from(args.side) / f64::from(size[0].max(size[1]));
-            sheet
-                .truth
-                .iter()
-                .map(move |t| [t.bbox.width() * scale, t.bbox.height() * scale])
-        });
-    let found = train::anchors(&scaled.collect::<Vec<_>>(), args.count, args.seed);
+    let truth = read_yolo_truth(&train_labels(&set), None)?;
+    let sides = box_sides(&truth, f64::from(args.side));
+    let found = train::anchors(&sides, args.count, args.seed);
     for [w, h] in &found.sizes {
         print::line(format_args!("{w:.1},{h:.1}"));
     }
@@ -162,4 +192,22 @@ pub(crate) fn anchors(args: &Anchors) -> anyhow::Result<()> {
         found.mean_iou, found.best_possible_recall
     ));
     Ok(())
+}
+
+/// The folder of the labels for training.
+fn train_labels(set: &YoloSet) -> PathBuf {
+    let label = set.train.first().map(|image| YoloSet::label_of(image));
+    let folder = label.as_deref().and_then(Path::parent);
+    folder.unwrap_or(Path::new("")).into()
+}
+
+/// Width and height of each box, in images whose longer side has `longer_side` pixels.
+fn box_sides(truth: &YoloTruth, longer_side: f64) -> Vec<[f64; 2]> {
+    let images = truth.sheets.iter().zip(&truth.sizes);
+    let scaled = images.flat_map(|(sheet, size)| {
+        let scale = longer_side / f64::from(size[0].max(size[1]));
+        let boxes = sheet.truth.iter().map(|truth| truth.bbox);
+        boxes.map(move |bbox| [bbox.width() * scale, bbox.height() * scale])
+    });
+    scaled.collect()
 }

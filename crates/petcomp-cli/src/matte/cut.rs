@@ -1,12 +1,14 @@
 //! `petcomp matte cut`: the object without its background.
 
-use crate::common::{Common, options_file, report_diagnostics};
+use crate::diagnostics::report_diagnostics;
+use crate::documents::read_options;
+use crate::global::GlobalArgs;
 use petcomp::matte::{CutOutOptions, cut_out};
 use petcomp::{LinearRgb, io};
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
-pub(crate) struct Args {
+pub(crate) struct CutArgs {
     /// Photo of one object on a uniform screen or board
     photo: PathBuf,
     /// Cut-out to write: .exr (scene-linear, premultiplied) or .png
@@ -17,17 +19,14 @@ pub(crate) struct Args {
     options: Option<PathBuf>,
 }
 
-pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
-    let options: CutOutOptions = options_file(args.options.as_deref())?;
+pub(crate) fn run(args: &CutArgs, global: &GlobalArgs) -> anyhow::Result<()> {
+    let options: CutOutOptions = read_options(args.options.as_deref())?;
     let photo = io::read::<LinearRgb>(&args.photo)?;
     let cut = cut_out(&photo, &options).map_err(|e| e.in_file(&args.photo))?;
     io::write(&args.output, &cut.to_rgba())?;
-    report_diagnostics(&args.photo, &cut.diagnostics);
+    report_diagnostics(args.photo.display(), &cut.diagnostics);
     let (w, h) = cut.film.size();
-    common.say(format_args!(
-        "{}: {w} x {h}, matte by {}",
-        args.output.display(),
-        cut.method
-    ));
+    let method = cut.method;
+    global.print_written(&args.output, format_args!("{w} x {h}, matte by {method}"));
     Ok(())
 }

@@ -1,18 +1,20 @@
 //! `petcomp matte film`, `triangulate`: film from one photo, or from several on different screens.
 
-use super::picture::write_some;
-use crate::common::{Common, report_diagnostics};
+use super::picture_files::write_optional;
+use crate::diagnostics::report_diagnostics;
+use crate::global::GlobalArgs;
 use anyhow::Result;
 use petcomp::io::{self, Override, from_overrides};
 use petcomp::matte::{
-    PlateOptions, ScreenPlate, SegmentOptions, film, film_planes, segment, triangulate,
+    PlateOptions, ScreenPlate, SegmentOptions, Triangulated, film, film_planes, segment,
+    triangulate,
 };
-use petcomp::{Coverage, Film as FilmPixel, Image, LinearRgb};
+use petcomp::{Coverage, Film, Image, LinearRgb};
 use std::path::{Path, PathBuf};
 
-/// What both commands ask and write.
+/// What both commands read and write.
 #[derive(clap::Args)]
-pub(crate) struct Files {
+pub(crate) struct FilmOptionArgs {
     /// Film to write, an EXR: R G B A as seen alone, TR TG TB as measured, VR VG VB along the line of sight
     #[arg(short, long, value_name = "EXR")]
     output: PathBuf,
@@ -34,100 +36,93 @@ pub(crate) struct Files {
 }
 
 #[derive(clap::Args)]
-pub(crate) struct Film {
+pub(crate) struct FilmArgs {
     /// Photo of one object on a coloured screen
     photo: PathBuf,
     #[command(flatten)]
-    files: Files,
+    options: FilmOptionArgs,
 }
 
 #[derive(clap::Args)]
-pub(crate) struct Triangulate {
+pub(crate) struct TriangulateArgs {
     /// Photos of one object that stays where it is, each on another screen
     #[arg(required = true, num_args = 2..)]
     photos: Vec<PathBuf>,
     #[command(flatten)]
-    files: Files,
+    options: FilmOptionArgs,
 }
 
-impl Film {
-    pub(crate) fn run(&self, common: &Common) -> Result<()> {
-        let photo: Image<LinearRgb> = io::read(&self.photo)?;
-        let inside = self.files.inside(&self.photo, &photo)?;
-        let plate = self.files.plate(0, &self.photo, &photo, &inside)?;
-        let options = from_overrides("film", &self.files.settings)?;
-        let found = film(&photo, &plate, &inside, &options).map_err(|e| e.in_file(&self.photo))?;
-        report_diagnostics(&self.photo, &found.diagnostics);
-        self.files.write(
-            &plate,
-            &found.film,
-            &found.transmittance,
-            &found.uncertainty,
-        )?;
-        common.say(format_args!(
-            "{}: {}",
-            self.files.output.display(),
-            summary(&plate, found.flat)
-        ));
+impl FilmArgs {
+    pub(crate) fn run(&self, global: &GlobalArgs) -> Result<()> {
+        let (path, args) = (&self.photo, &self.options);
+        let photo: Image<LinearRgb> = io::read(path)?;
+        let inside = args.object_mask(path, &photo)?;
+        let plate = args.screen_plate(0, path, &photo, &inside)?;
+        let options = from_overrides("film", &args.settings)?;
+        let found = film(&photo, &plate, &inside, &options).map_err(|e| e.in_file(path))?;
+        report_diagnostics(path.display(), &found.diagnostics);
+        args.write_film(&found.film, &found.transmittance)?;
+        args.write_extras(&plate, &found.uncertainty)?;
+        global.print_written(&args.output, describe_plate(&plate, found.flat));
         Ok(())
     }
 }
 
-impl Triangulate {
-    pub(crate) fn run(&self, common: &Common) -> Result<()> {
-        let photos: Vec<Image<LinearRgb>> =
-            self.photos.iter().map(io::read).collect::<Result<_, _>>()?;
-        let inside = self.files.inside(&self.photos[0], &photos[0])?;
-        let plates = self.plates(&photos, &inside)?;
-        let shots: Vec<_> = photos.iter().zip(&plates).collect();
-        let options = from_overrides("film", &self.files.settings)?;
-        let found = triangulate(&shots, &inside, &options)?;
-        report_diagnostics(&self.photos[0], &found.diagnostics);
-        self.files.write(
-            &plates[0],
-            &found.film,
-            &found.transmittance,
-            &found.uncertainty,
-        )?;
-        let residual = found.residual;
-        common.say(format_args!(
-            "{}: {}; residual {residual:.4}",
-            self.files.output.display(),
-            summary(&plates[0], found.flat)
-        ));
+impl TriangulateArgs {
+    pub(crate) fn run(&self, global: &GlobalArgs) -> Result<()> {
+        let (paths, args) = (&self.photos, &self.options);
+        let photos: Vec<Image<LinearRgb>> = paths.iter().map(io::read).collect::<Result<_, _>>()?;
+        let inside = args.object_mask(&paths[0], &photos[0])?;
+        let plates = self.screen_plates(&photos, &inside)?;
+        let found = self.triangulate(&photos, &plates, &inside)?;
+        report_diagnostics(paths[0].display(), &found.diagnostics);
+        args.write_film(&found.film, &found.transmittance)?;
+        args.write_extras(&plates[0], &found.uncertainty)?;
+        let (plate, residual) = (describe_plate(&plates[0], found.flat), found.residual);
+        global.print_written(
+            &args.output,
+            format_args!("{plate}; residual {residual:.4}"),
+        );
         Ok(())
     }
-}
 
-impl Triangulate {
-    fn plates(
+    fn triangulate(
+        &self,
+        photos: &[Image<LinearRgb>],
+        plates: &[ScreenPlate],
+        inside: &Image<Coverage>,
+    ) -> Result<Triangulated> {
+        let shots: Vec<_> = photos.iter().zip(plates).collect();
+        let options = from_overrides("film", &self.options.settings)?;
+        Ok(triangulate(&shots, inside, &options)?)
+    }
+
+    fn screen_plates(
         &self,
         photos: &[Image<LinearRgb>],
         inside: &Image<Coverage>,
     ) -> Result<Vec<ScreenPlate>> {
         let each = self.photos.iter().zip(photos).enumerate();
-        each.map(|(i, (path, photo))| self.files.plate(i, path, photo, inside))
+        each.map(|(i, (path, photo))| self.options.screen_plate(i, path, photo, inside))
             .collect()
     }
 }
 
-impl Files {
-    fn inside(&self, path: &Path, photo: &Image<LinearRgb>) -> Result<Image<Coverage>> {
+impl FilmOptionArgs {
+    /// The mask that is given, or that of the object that is found.
+    fn object_mask(&self, path: &Path, photo: &Image<LinearRgb>) -> Result<Image<Coverage>> {
         if let Some(mask) = &self.mask {
             let mask: Image<Coverage> = io::read(mask)?;
-            let ((w, h), (width, height)) = (mask.size(), photo.size());
-            anyhow::ensure!(
-                [w, h] == [width, height],
-                "--mask: {w} x {h} pixels, expected {width} x {height} as the photo"
-            );
+            check_same_size(&mask, photo)?;
             return Ok(mask);
         }
         let found = segment(photo, &SegmentOptions::default()).map_err(|e| e.in_file(path))?;
-        report_diagnostics(path, &found.diagnostics);
+        report_diagnostics(path.display(), &found.diagnostics);
         Ok(found.tight)
     }
 
-    fn plate(
+    /// From the photo of the empty screen or, where there is none, around the object.
+    fn screen_plate(
         &self,
         i: usize,
         path: &Path,
@@ -144,29 +139,39 @@ impl Files {
         Ok(plate.map_err(|e| e.in_file(path))?)
     }
 
-    fn write(
-        &self,
-        plate: &ScreenPlate,
-        film: &Image<FilmPixel>,
-        transmittance: &Image<LinearRgb>,
-        uncertainty: &Image<f32>,
-    ) -> Result<()> {
+    fn write_film(&self, film: &Image<Film>, transmittance: &Image<LinearRgb>) -> Result<()> {
         let planes = film_planes(film, transmittance);
-        let planes: Vec<(&str, &[f32])> = planes
-            .iter()
-            .map(|(name, plane)| (*name, &plane[..]))
-            .collect();
-        io::exr::write_channels(&self.output, film.size(), &planes, &[])?;
-        write_some(&self.plate_out, &plate.image)?;
-        write_some(&self.uncertainty, uncertainty)
+        let planes = planes.iter().map(|(name, plane)| (*name, &plane[..]));
+        let planes: Vec<(&str, &[f32])> = planes.collect();
+        Ok(io::exr::write_channels(
+            &self.output,
+            film.size(),
+            &planes,
+            &[],
+        )?)
+    }
+
+    fn write_extras(&self, plate: &ScreenPlate, uncertainty: &Image<f32>) -> Result<()> {
+        write_optional(&self.plate_out, &plate.image)?;
+        write_optional(&self.uncertainty, uncertainty)
     }
 }
 
+fn check_same_size(mask: &Image<Coverage>, photo: &Image<LinearRgb>) -> Result<()> {
+    let ((w, h), (width, height)) = (mask.size(), photo.size());
+    anyhow::ensure!(
+        [w, h] == [width, height],
+        "--mask: {w} x {h} pixels, expected {width} x {height} as the photo"
+    );
+    Ok(())
+}
+
 /// The screen and the plastic in a few words.
-fn summary(plate: &ScreenPlate, flat: LinearRgb) -> String {
-    let fitted = plate.degree.map_or("photographed".into(), |degree| {
-        format!("fitted by degree {degree}")
-    });
+fn describe_plate(plate: &ScreenPlate, flat: LinearRgb) -> String {
+    let fitted = match plate.degree {
+        Some(degree) => format!("fitted by degree {degree}"),
+        None => "photographed".into(),
+    };
     let uneven = 100.0 * plate.unevenness;
     format!(
         "screen {fitted}, {uneven:.0} % uneven; flat plastic lets through {:.2} {:.2} {:.2}",

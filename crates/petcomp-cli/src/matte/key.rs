@@ -1,17 +1,18 @@
 //! `petcomp matte key`: Blender's Keying node on one picture.
 
-use super::picture::{color, write, write_some};
-use crate::common::report_diagnostics;
+use super::picture_files::{write_optional, write_picture};
+use crate::diagnostics::report_diagnostics;
+use crate::values::parse_color;
 use anyhow::Result;
-use petcomp::io::{self, Override, Picture};
-use petcomp::matte::key::{Deviations, KeyOptions, Keying, Profile, Screen};
+use petcomp::io::{self, FromFile, Override, Picture};
+use petcomp::matte::key::{Deviations, KeyOptions, Keyed, Keying, Profile, Screen};
 use petcomp::matte::{PlateOptions, ScreenPlate, SegmentOptions, segment};
 use petcomp::{Coverage, Image, LinearRgb, PremulRgba};
 use std::path::PathBuf;
 
 /// Keys a picture against a screen colour or plate, as Blender's Keying node does.
 #[derive(clap::Args, Debug)]
-pub(crate) struct Args {
+pub(crate) struct KeyArgs {
     /// The picture to key; alpha is taken as premultiplied
     input: PathBuf,
     /// Where the premultiplied cut-out goes; an EXR holds 32-bit floats
@@ -24,7 +25,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "FILE")]
     edges: Option<PathBuf>,
     /// Colour of the screen, scene-linear
-    #[arg(long, value_name = "R,G,B", value_parser = color, required_unless_present = "plate", conflicts_with = "plate")]
+    #[arg(long, value_name = "R,G,B", value_parser = parse_color, required_unless_present = "plate", conflicts_with = "plate")]
     screen: Option<LinearRgb>,
     /// A picture of the screen alone: every pixel is keyed against its own colour
     #[arg(long, value_name = "FILE")]
@@ -46,24 +47,27 @@ pub(crate) struct Args {
     settings: Vec<Override>,
 }
 
-impl Args {
+impl KeyArgs {
     /// The input and its mattes, those that there are.
-    fn read(&self, plate: Option<&Image<LinearRgb>>) -> Result<Input> {
+    fn read_input(&self, plate: Option<&Image<LinearRgb>>) -> Result<KeyerInput> {
         if self.auto_mattes {
-            let picture = Picture::read(&self.input)?;
-            let [garbage, core] = self.find_mattes(&picture.pixels()?, plate)?;
-            return Ok(Input {
-                photo: picture.pixels()?,
-                garbage: Some(garbage),
-                core: Some(core),
-            });
+            return self.with_found_mattes(plate);
         }
-        let [garbage, core] =
-            [&self.garbage, &self.core].map(|path| path.as_ref().map(io::read).transpose());
-        Ok(Input {
+        let [garbage, core] = [&self.garbage, &self.core].map(|path| read_optional(path));
+        Ok(KeyerInput {
             photo: io::read(&self.input)?,
             garbage: garbage?,
             core: core?,
+        })
+    }
+
+    fn with_found_mattes(&self, plate: Option<&Image<LinearRgb>>) -> Result<KeyerInput> {
+        let picture = Picture::read(&self.input)?;
+        let [garbage, core] = self.find_mattes(&picture.pixels()?, plate)?;
+        Ok(KeyerInput {
+            photo: picture.pixels()?,
+            garbage: Some(garbage),
+            core: Some(core),
         })
     }
 
@@ -75,7 +79,7 @@ impl Args {
     ) -> Result<[Image<Coverage>; 2]> {
         let found =
             segment(photo, &SegmentOptions::default()).map_err(|e| e.in_file(&self.input))?;
-        report_diagnostics(&self.input, &found.diagnostics);
+        report_diagnostics(self.input.display(), &found.diagnostics);
         Ok(match plate {
             Some(plate) => found.mattes(photo, plate),
             None => {
@@ -88,45 +92,56 @@ impl Args {
 }
 
 /// What is keyed, and where it is sure not to be foreground, or to be foreground.
-struct Input {
+struct KeyerInput {
     photo: Image<PremulRgba>,
     garbage: Option<Image<Coverage>>,
     core: Option<Image<Coverage>>,
 }
 
-pub(crate) fn run(args: &Args) -> Result<()> {
-    let opts = KeyOptions {
-        profile: args.profile,
-        ..io::from_overrides("key", &args.settings)?
-    };
-    let plate: Option<Image<LinearRgb>> = args.plate.as_ref().map(io::read).transpose()?;
-    let input = args.read(plate.as_ref())?;
-    let screen = match &plate {
-        Some(plate) => Screen::Plate(plate),
-        None => Screen::Color(args.screen.unwrap_or_default()),
-    };
-    let job = input.keying(screen);
-    let keyed = job.run(&opts)?;
+pub(crate) fn run(args: &KeyArgs) -> Result<()> {
+    let options = args.options()?;
+    let plate: Option<Image<LinearRgb>> = read_optional(&args.plate)?;
+    let input = args.read_input(plate.as_ref())?;
+    let screen = plate.as_ref().map(Screen::Plate);
+    let keying = input.keying(screen.unwrap_or(Screen::Color(args.screen.unwrap_or_default())));
+    let keyed = keying.run(&options)?;
     if keyed.deviations != Deviations::default() {
         log::warn!("{}: {}", args.input.display(), keyed.deviations);
     }
-    write(&args.output, &keyed.cutout)?;
-    write_some(&args.matte, &keyed.matte)?;
+    args.write_keyed(&keyed)?;
     if let Some(path) = &args.edges {
-        write(path, &job.edges(&opts)?)?;
+        write_picture(path, &keying.edges(&options)?)?;
     }
     Ok(())
 }
 
-impl Input {
+impl KeyArgs {
+    fn options(&self) -> Result<KeyOptions> {
+        Ok(KeyOptions {
+            profile: self.profile,
+            ..io::from_overrides("key", &self.settings)?
+        })
+    }
+
+    fn write_keyed(&self, keyed: &Keyed) -> Result<()> {
+        write_picture(&self.output, &keyed.cutout)?;
+        write_optional(&self.matte, &keyed.matte)
+    }
+}
+
+fn read_optional<P: FromFile>(path: &Option<PathBuf>) -> petcomp::Result<Option<Image<P>>> {
+    path.as_ref().map(io::read).transpose()
+}
+
+impl KeyerInput {
     fn keying<'a>(&'a self, screen: Screen<'a>) -> Keying<'a, PremulRgba> {
-        let mut job = Keying::new(&self.photo, screen);
+        let mut keying = Keying::new(&self.photo, screen);
         if let Some(garbage) = &self.garbage {
-            job = job.with_garbage(garbage);
+            keying = keying.with_garbage(garbage);
         }
         if let Some(core) = &self.core {
-            job = job.with_core(core);
+            keying = keying.with_core(core);
         }
-        job
+        keying
     }
 }

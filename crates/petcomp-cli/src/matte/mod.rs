@@ -4,34 +4,34 @@ mod cut;
 mod film;
 mod key;
 mod nodes;
-mod picture;
+mod picture_files;
 mod segment;
 
-use crate::common::Common;
+use crate::global::GlobalArgs;
 
 #[derive(clap::Subcommand)]
-pub(crate) enum Command {
+pub(crate) enum MatteCommand {
     /// Find the object and write every intermediate picture, and the garbage and core matte that a keyer takes
-    Segment(segment::Args),
+    Segment(segment::SegmentArgs),
     /// Find the object, key it, and write it without its background
-    Cut(cut::Args),
+    Cut(cut::CutArgs),
     /// Key a picture against a screen colour or plate, as Blender's Keying node does
-    Key(Box<key::Args>),
+    Key(Box<key::KeyArgs>),
     /// Solve one photo on a coloured screen for what it reflects and what it lets through
-    Film(film::Film),
+    Film(film::FilmArgs),
     /// The same, exactly, from two or more photos of one object on different screens
-    Triangulate(film::Triangulate),
+    Triangulate(film::TriangulateArgs),
     #[command(flatten)]
-    Node(nodes::Command),
+    Node(nodes::NodeCommand),
 }
 
-pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
+pub(crate) fn run(command: &MatteCommand, global: &GlobalArgs) -> anyhow::Result<()> {
     match command {
-        Command::Segment(args) => segment::run(args, common),
-        Command::Cut(args) => cut::run(args, common),
-        Command::Key(args) => key::run(args),
-        Command::Film(args) => args.run(common),
-        Command::Triangulate(args) => args.run(common),
-        Command::Node(command) => nodes::run(command),
+        MatteCommand::Segment(args) => segment::run(args, global),
+        MatteCommand::Cut(args) => cut::run(args, global),
+        MatteCommand::Key(args) => key::run(args),
+        MatteCommand::Film(args) => args.run(global),
+        MatteCommand::Triangulate(args) => args.run(global),
+        MatteCommand::Node(command) => nodes::run(command),
     }
 }

@@ -1,12 +1,14 @@
 //! `petcomp matte segment`: every step of the search as a picture.
 
-use crate::common::{Common, options_file, report_diagnostics};
+use crate::diagnostics::report_diagnostics;
+use crate::documents::read_options;
+use crate::global::GlobalArgs;
 use petcomp::matte::{PlateOptions, ScreenPlate, SegmentOptions, Segmentation, segment};
-use petcomp::{Image, LinearRgb, io};
-use std::path::PathBuf;
+use petcomp::{Coverage, Image, LinearRgb, io};
+use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
-pub(crate) struct Args {
+pub(crate) struct SegmentArgs {
     /// Photo of one object on a uniform screen or board
     photo: PathBuf,
     /// Folder for the pictures
@@ -17,34 +19,51 @@ pub(crate) struct Args {
     options: Option<PathBuf>,
 }
 
-pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
-    let options: SegmentOptions = options_file(args.options.as_deref())?;
+pub(crate) fn run(args: &SegmentArgs, global: &GlobalArgs) -> anyhow::Result<()> {
+    let options: SegmentOptions = read_options(args.options.as_deref())?;
     let photo: Image<LinearRgb> = io::read(&args.photo)?;
     let found = segment(&photo, &options).map_err(|e| e.in_file(&args.photo))?;
     io::create_folder(&args.output)?;
-    report_diagnostics(&args.photo, &found.diagnostics);
-    for (i, (name, picture)) in pictures(&photo, &found).into_iter().enumerate() {
-        let path = args.output.join(format!("{i}_{name}.png"));
-        io::write(&path, &picture)?;
-        common.say(path.display());
+    report_diagnostics(args.photo.display(), &found.diagnostics);
+    let mut pictures = search_pictures(&found);
+    pictures.extend(keyer_mattes(&photo, &found));
+    write_numbered(&pictures, &args.output, global)
+}
+
+fn write_numbered(
+    pictures: &[NamedPicture],
+    folder: &Path,
+    global: &GlobalArgs,
+) -> anyhow::Result<()> {
+    for (i, (name, picture)) in pictures.iter().enumerate() {
+        let path = folder.join(format!("{i}_{name}.png"));
+        io::write(&path, picture)?;
+        global.print_status(path.display());
     }
     Ok(())
 }
 
-/// The steps of the search, its outcome, and the mattes for a keyer; named, in order.
-fn pictures(photo: &Image<LinearRgb>, found: &Segmentation) -> Vec<(&'static str, Image<f32>)> {
-    let mut all: Vec<_> = found
-        .steps
-        .iter()
-        .map(|step| (step.name, step.shown()))
-        .collect();
-    all.push(("hull", found.mask.map(|c| c.0)));
-    all.push(("outline", found.tight.map(|c| c.0)));
-    // An object that leaves no screen has no plate, and what is opaque of it is unknown.
-    if let Ok(plate) = ScreenPlate::fit_outside(photo, &found.mask, &PlateOptions::default()) {
-        let [garbage, core] = found.mattes(photo, &plate.image);
-        all.push(("garbage", garbage.map(|c| c.0)));
-        all.push(("core", core.map(|c| c.0)));
-    }
-    all
+type NamedPicture = (&'static str, Image<f32>);
+
+/// The steps of the search and its outcome, in order.
+fn search_pictures(found: &Segmentation) -> Vec<NamedPicture> {
+    let steps = found.steps.iter().map(|step| (step.name, step.shown()));
+    let outcome = [("hull", &found.mask), ("outline", &found.tight)];
+    steps
+        .chain(outcome.map(|(name, mask)| (name, shares(mask))))
+        .collect()
+}
+
+/// The mattes for a keyer. An object that leaves no screen has no plate, and what is opaque of it is unknown.
+fn keyer_mattes(photo: &Image<LinearRgb>, found: &Segmentation) -> Vec<NamedPicture> {
+    let plate = ScreenPlate::fit_outside(photo, &found.mask, &PlateOptions::default());
+    let Ok(plate) = plate else {
+        return Vec::new();
+    };
+    let [garbage, core] = found.mattes(photo, &plate.image);
+    vec![("garbage", shares(&garbage)), ("core", shares(&core))]
+}
+
+fn shares(coverage: &Image<Coverage>) -> Image<f32> {
+    coverage.map(|c| c.0)
 }

@@ -1,31 +1,35 @@
-//! How often the truth lies within the stated error, with the principal point in the picture's middle and beside it.
+//! How often the truth lies within the stated error, with the principal point in the middle of the picture and off it.
 
-use super::{focal_percent, height_error_px, spread};
-use petcomp::camera::simulate::Scenario;
-use petcomp::camera::{Framing, SolveOptions, solve};
+use super::show::three;
+use super::{focal_percent, height_error_px};
+use crate::columns::{Column, table_of};
+use crate::statistics::quantile;
+use petcomp::camera::simulate::{Scenario, View};
+use petcomp::camera::{Framing, Solution, SolveOptions, solve};
 
 /// Distances of the principal point from the picture's middle, in longer sides: a whole picture, and cropped ones.
 const OFF_CENTER: [f64; 4] = [0.0, 0.05, 0.1, 0.23];
 /// Noise of the corners, pixels.
-const NOISES: [f64; 2] = [0.5, 1.0];
+const NOISES_PX: [f64; 2] = [0.5, 1.0];
 /// Angles from straight above, degrees, in turn.
-const TILTS: [f64; 6] = [5.0, 10.0, 20.0, 30.0, 45.0, 60.0];
-/// Errors are counted within so many standard deviations.
+const TILTS_DEG: [f64; 6] = [5.0, 10.0, 20.0, 30.0, 45.0, 60.0];
+/// Numbers of standard deviations within which errors are counted.
 const SIGMAS: [f64; 3] = [1.0, 2.0, 3.0];
-const SEED: u64 = 7;
+const VIEW_SEED: u64 = 7;
+const FRAMINGS: [Framing; 3] = [Framing::Whole, Framing::Unknown, Framing::Cropped];
 
 /// Errors of one kind of view, and what was stated of them.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Coverage {
+pub struct StatedErrors {
     /// Distance of the principal point from the picture's middle, in longer sides.
     pub off_center: f64,
     /// Noise of the corners, pixels.
     pub noise_px: f64,
-    /// What the solver is told of the picture.
-    pub told: Framing,
+    /// What the label states about the picture.
+    pub framing: Framing,
     /// Number of views.
     pub views: usize,
-    /// How many of them no camera fits; they count for nothing else.
+    /// How many of them no camera fits; they are left out of all other numbers.
     pub refused: usize,
     /// Median error of the focal length and median of its stated standard deviation, percent.
     pub focal_percent: [f64; 2],
@@ -37,118 +41,154 @@ pub struct Coverage {
     pub worst: f64,
 }
 
-/// Measures whole pictures under every word on them, and cropped ones under those that are not lies.
-pub(super) fn measure(views: u64) -> Vec<Coverage> {
-    let kinds = NOISES
+/// Measures whole pictures with every framing, and cropped ones with those that are true of them.
+pub(super) fn measure(views: u64) -> Vec<StatedErrors> {
+    let kinds = NOISES_PX
         .into_iter()
-        .flat_map(|noise_px| OFF_CENTER.map(|off_center| (noise_px, off_center)));
-    let told = |(noise_px, off_center): (f64, f64)| {
-        let told = [Framing::Whole, Framing::Unknown, Framing::Cropped].into_iter();
-        told.filter(move |t| off_center == 0.0 || *t != Framing::Whole)
-            .map(move |told| coverage(off_center, noise_px, told, views))
-    };
-    kinds.flat_map(told).collect()
+        .flat_map(|noise_px| OFF_CENTER.map(|off_center| (off_center, noise_px)));
+    kinds
+        .flat_map(|(off_center, noise_px)| {
+            true_framings(off_center)
+                .map(move |framing| coverage(off_center, noise_px, framing, views))
+        })
+        .collect()
 }
 
-fn coverage(off_center: f64, noise_px: f64, told: Framing, views: u64) -> Coverage {
-    let (mut focal, mut height, mut sigmas, mut refused) =
-        ([vec![], vec![]], [vec![], vec![]], Vec::new(), 0);
-    for k in 0..views {
-        let tilt = TILTS[k as usize % TILTS.len()];
-        let scenario = Scenario {
-            off_center,
-            corner_sigma_px: noise_px,
-            ..Scenario::default()
-        }
-        .tilted(tilt);
-        let mut view = scenario.view(SEED, k);
-        view.label.image.cropped = match told {
-            Framing::Whole => Some(false),
-            Framing::Unknown => None,
-            Framing::Cropped => Some(true),
-        };
-        let Some(solution) = solve(&view.label, &SolveOptions::default())
-            .ok()
-            .and_then(|s| s.fitting().ok())
-        else {
-            refused += 1;
-            continue;
-        };
-        let off = libm::log(solution.camera.focal_px.x / view.camera.focal_px.x).abs();
-        sigmas.push(off / solution.sigma.ln_focal);
-        focal[0].push(focal_percent(&view, &solution));
-        focal[1].push(100.0 * solution.sigma.ln_focal);
-        height[0].push(height_error_px(&view, &solution));
-        height[1].push(solution.sigma.height_px);
-    }
-    let part = |limit: f64| {
-        sigmas.iter().filter(|s| **s < limit).count() as f64 / sigmas.len().max(1) as f64
+fn true_framings(off_center: f64) -> impl Iterator<Item = Framing> {
+    FRAMINGS
+        .into_iter()
+        .filter(move |framing| off_center == 0.0 || *framing != Framing::Whole)
+}
+
+fn coverage(off_center: f64, noise_px: f64, framing: Framing, views: u64) -> StatedErrors {
+    let scenario = Scenario {
+        off_center,
+        corner_sigma_px: noise_px,
+        ..Scenario::default()
     };
-    Coverage {
+    let solved: Vec<SolvedView> = (0..views)
+        .filter_map(|k| SolvedView::new(&scenario, framing, k))
+        .collect();
+    StatedErrors {
         off_center,
         noise_px,
-        told,
+        framing,
         views: views as usize,
-        refused,
-        focal_percent: focal.map(|values| spread(values)[0]),
-        height_px: height.map(|values| spread(values)[0]),
-        within: SIGMAS.map(part),
-        worst: sigmas.iter().copied().fold(0.0, f64::max),
+        refused: views as usize - solved.len(),
+        focal_percent: medians(&solved, |view| view.focal_percent),
+        height_px: medians(&solved, |view| view.height_px),
+        within: SIGMAS.map(|limit| share_within(&solved, limit)),
+        worst: largest_error(&solved),
     }
 }
 
-/// What a label says of a picture, in its own words.
-fn words(told: Framing) -> &'static str {
-    match told {
+/// Medians of an error and of its stated standard deviation.
+fn medians(solved: &[SolvedView], of: fn(&SolvedView) -> [f64; 2]) -> [f64; 2] {
+    [0, 1].map(|i| quantile(solved.iter().map(|view| of(view)[i]), 0.5))
+}
+
+/// In standard deviations.
+fn largest_error(solved: &[SolvedView]) -> f64 {
+    solved.iter().map(|view| view.sigmas).fold(0.0, f64::max)
+}
+
+fn share_within(solved: &[SolvedView], limit: f64) -> f64 {
+    let within = solved.iter().filter(|view| view.sigmas < limit).count();
+    within as f64 / solved.len().max(1) as f64
+}
+
+/// The errors of one view, each with its stated standard deviation.
+struct SolvedView {
+    focal_percent: [f64; 2],
+    height_px: [f64; 2],
+    /// Error of the focal length, in standard deviations.
+    sigmas: f64,
+}
+
+impl SolvedView {
+    /// View `k`; none where no camera fits it.
+    fn new(scenario: &Scenario, framing: Framing, k: u64) -> Option<Self> {
+        let tilt = TILTS_DEG[k as usize % TILTS_DEG.len()];
+        let mut view = scenario.tilted(tilt).view(VIEW_SEED, k);
+        view.label.image.cropped = is_cropped(framing);
+        let solution = solve(&view.label, &SolveOptions::default()).ok()?;
+        Some(Self::compare(&view, &solution.fitting().ok()?))
+    }
+
+    fn compare(view: &View, solution: &Solution) -> Self {
+        let sigma = &solution.sigma;
+        let ln_error = libm::log(solution.camera.focal_px.x / view.camera.focal_px.x).abs();
+        Self {
+            focal_percent: [focal_percent(view, solution), 100.0 * sigma.ln_focal],
+            height_px: [height_error_px(view, solution), sigma.height_px],
+            sigmas: ln_error / sigma.ln_focal,
+        }
+    }
+}
+
+fn is_cropped(framing: Framing) -> Option<bool> {
+    match framing {
+        Framing::Whole => Some(false),
+        Framing::Unknown => None,
+        Framing::Cropped => Some(true),
+    }
+}
+
+const CSV_COLUMNS: [Column<StatedErrors>; 13] = [
+    ("off_center", |r| r.off_center.to_string()),
+    ("noise_px", |r| r.noise_px.to_string()),
+    ("framing", |r| format!("{:?}", r.framing).to_lowercase()),
+    ("views", |r| r.views.to_string()),
+    ("refused", |r| r.refused.to_string()),
+    ("focal_median_percent", |r| four(r.focal_percent[0])),
+    ("focal_sigma_percent", |r| four(r.focal_percent[1])),
+    ("height_median_px", |r| four(r.height_px[0])),
+    ("height_sigma_px", |r| four(r.height_px[1])),
+    ("within_1", |r| four(r.within[0])),
+    ("within_2", |r| four(r.within[1])),
+    ("within_3", |r| four(r.within[2])),
+    ("worst_sigmas", |r| format!("{:.3}", r.worst)),
+];
+
+fn four(value: f64) -> String {
+    format!("{value:.4}")
+}
+
+pub(super) fn csv(rows: &[StatedErrors]) -> String {
+    table_of(&CSV_COLUMNS, rows).csv()
+}
+
+const MARKDOWN_COLUMNS: [Column<StatedErrors>; 12] = [
+    ("off the middle", |r| format!("{} %", 100.0 * r.off_center)),
+    ("corners to, px", |r| r.noise_px.to_string()),
+    ("label says", |r| label_words(r.framing).to_owned()),
+    ("refused", |r| format!("{} of {}", r.refused, r.views)),
+    ("error, %", |r| three(r.focal_percent[0])),
+    ("stated, %", |r| three(r.focal_percent[1])),
+    ("50 mm up, px", |r| three(r.height_px[0])),
+    ("stated, px", |r| three(r.height_px[1])),
+    ("within 1", |r| format!("{:.2}", r.within[0])),
+    ("within 2", |r| format!("{:.2}", r.within[1])),
+    ("within 3", |r| format!("{:.2}", r.within[2])),
+    ("worst", |r| format!("{:.1}", r.worst)),
+];
+
+/// What a label states about a picture, in its own words.
+fn label_words(framing: Framing) -> &'static str {
+    match framing {
         Framing::Whole => "\"cropped\": false",
         Framing::Unknown => "nothing",
         Framing::Cropped => "\"cropped\": true",
     }
 }
 
-pub(super) fn csv(rows: &[Coverage]) -> String {
-    let head = "off_center,noise_px,told,views,refused,focal_median_percent,focal_sigma_percent,height_median_px,\
-                height_sigma_px,within_1,within_2,within_3,worst_sigmas\n";
-    let line = |r: &Coverage| {
-        let ([f, fs], [h, hs], [a, b, c]) = (r.focal_percent, r.height_px, r.within);
-        let kind = format!(
-            "{},{},{:?},{},{}",
-            r.off_center, r.noise_px, r.told, r.views, r.refused
-        )
-        .to_lowercase();
-        format!(
-            "{kind},{f:.4},{fs:.4},{h:.4},{hs:.4},{a:.4},{b:.4},{c:.4},{:.3}\n",
-            r.worst
-        )
-    };
-    head.to_owned() + &rows.iter().map(line).collect::<String>()
-}
+const EXPLANATION: &str = "\n## Is the stated error true?\n\n\
+    Principal points in the middle of the picture, as in whole ones, and off it by a share of its longer side, as in \
+    cropped ones; tilts of 5 to 60 degrees; nothing is known of the focal length. Focal length: median error, median of \
+    the stated standard deviation, parts within one, two and three of those, and the worst.\n\n";
 
-pub(super) fn markdown(rows: &[Coverage]) -> String {
-    let mut text = "\n## Is the stated error true?\n\n\
-        Principal points in the middle of the picture, as of whole ones, and so much of its longer side beside it, as of \
-        cropped ones; tilts of 5 to 60 degrees; nothing is known of the focal length. Focal length: median error, median of \
-        the stated standard deviation, parts within one, two and three of those, and the worst.\n\n\
-        | beside the middle | corners to, px | label says | refused | error, % | stated, % | 50 mm up, px | stated, px | \
-        within 1 | within 2 | within 3 | worst |\n| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n"
-        .to_owned();
-    for r in rows {
-        let ([f, fs], [h, hs], [a, b, c]) = (r.focal_percent, r.height_px, r.within);
-        let kind = format!(
-            "{} % | {} | {} | {} of {}",
-            100.0 * r.off_center,
-            r.noise_px,
-            words(r.told),
-            r.refused,
-            r.views
-        );
-        let errors = [f, fs, h, hs].map(super::three).join(" | ");
-        text += &format!(
-            "| {kind} | {errors} | {a:.2} | {b:.2} | {c:.2} | {:.1} |\n",
-            r.worst
-        );
-    }
-    text
+pub(super) fn markdown(rows: &[StatedErrors]) -> String {
+    EXPLANATION.to_owned() + &table_of(&MARKDOWN_COLUMNS, rows).markdown()
 }
 
 #[cfg(test)]
@@ -160,7 +200,7 @@ mod tests {
         for row in measure(120) {
             println!("{row:?}");
             assert_eq!(row.refused, 0, "{row:?}");
-            // A normal error is within one standard deviation in 68 % of all cases; beside the middle by 23 % every view is
+            // A normal error is within one standard deviation in 68 % of all cases; off the middle by 23 % every view is
             // one of twice what is expected of a cropped one.
             let extreme = row.off_center > 0.2;
             let least = if extreme {
@@ -180,10 +220,10 @@ mod tests {
     }
 
     #[test]
-    fn whole_pictures_pay_only_where_nobody_says_that_they_are_whole() {
-        for noise_px in NOISES {
-            let [whole, unknown, cropped] = [Framing::Whole, Framing::Unknown, Framing::Cropped]
-                .map(|told| coverage(0.0, noise_px, told, 120));
+    fn whole_pictures_pay_only_where_they_are_not_labelled_whole() {
+        for noise_px in NOISES_PX {
+            let [whole, unknown, cropped] =
+                FRAMINGS.map(|framing| coverage(0.0, noise_px, framing, 120));
             assert!(
                 (unknown.focal_percent[0] / whole.focal_percent[0] - 1.0).abs() < 1e-9,
                 "{whole:?} {unknown:?}"

@@ -1,48 +1,60 @@
 //! The camera solver's steps: error against run time.
 
-use super::{Cell, Lens, Method, Row};
+use super::{CameraRow, Lens, SolveMethod, ViewKind};
 use crate::{Diagram, Point};
 
 /// Noise of the corners.
-const NOISE_PX: f64 = 0.5;
-/// Angles from straight above: a usual one, and one that hardly tells the focal length.
-const TILTS: [f64; 2] = [20.0, 5.0];
+const CORNER_NOISE_PX: f64 = 0.5;
+/// Angles from straight above: a typical one, and one that hardly constrains the focal length.
+const DRAWN_TILTS_DEG: [f64; 2] = [20.0, 5.0];
 
 /// Error of the focal length against time, a diagram per tilt and a point per method; `views` of each.
 pub fn diagrams(views: u64) -> Vec<Diagram> {
-    TILTS.map(|tilt_deg| diagram(tilt_deg, views)).into()
+    DRAWN_TILTS_DEG
+        .map(|tilt_deg| tilt_diagram(tilt_deg, views))
+        .into()
 }
 
-fn diagram(tilt_deg: f64, views: u64) -> Diagram {
-    let cell = Cell {
-        lens: Lens::Realistic,
-        noise_px: NOISE_PX,
-        tilt_deg,
-    };
-    let photos: Vec<_> = (0..views).map(|k| cell.photos(k)).collect();
+fn tilt_diagram(tilt_deg: f64, views: u64) -> Diagram {
     Diagram {
         file: format!("camera_{tilt_deg}_degrees"),
         title: format!("camera: four corners, {tilt_deg} degrees from straight above"),
-        input: format!("{views} simulated views, corners to {NOISE_PX} px, lens and tape measure as uncertain as usual"),
+        input: format!(
+            "{views} simulated views, corners to {CORNER_NOISE_PX} px, lens and tape measure with their typical uncertainty"
+        ),
         error: "focal length, median error, %".into(),
         cost: "CPU microseconds per photo".into(),
         reference: "the cameras that the views were drawn with (closed form)".into(),
-        points: Method::ALL.map(|method| point(&cell.row(method, &photos))).into(),
-        why: "The whole refinement is the default at every quality: it alone tells its own uncertainty and tries every start, \
+        points: points(tilt_deg, views),
+        why: "The whole refinement is the default at every quality: it alone reports its own uncertainty and tries every start, \
               and it takes less than a hundredth of the time that rendering a picture does."
             .into(),
         ..Diagram::default()
     }
 }
 
-fn point(row: &Row) -> Point {
-    let curve = if row.method == Method::Joint {
-        "several photos"
-    } else {
-        "one photo"
+/// A point per method.
+fn points(tilt_deg: f64, views: u64) -> Vec<Point> {
+    let kind = ViewKind {
+        lens: Lens::Realistic,
+        noise_px: CORNER_NOISE_PX,
+        tilt_deg,
     };
-    Point::new(curve, row.method.name(), row.time_us, row.focal_percent[0])
-        .used_where(|_| row.method == Method::Whole)
+    let rows = kind.rows(&SolveMethod::ALL, views);
+    rows.iter().map(CameraRow::point).collect()
+}
+
+impl CameraRow {
+    fn point(&self) -> Point {
+        let curve = if self.method == SolveMethod::Joint {
+            "several photos"
+        } else {
+            "one photo"
+        };
+        let (cost, error) = (self.time_us, self.focal_percent[0]);
+        Point::new(curve, self.method.name(), cost, error)
+            .used_where(|_| self.method == SolveMethod::Whole)
+    }
 }
 
 #[cfg(test)]
@@ -52,7 +64,7 @@ mod tests {
     #[test]
     fn every_tilt_has_every_method_and_one_default() {
         for found in diagrams(3) {
-            assert_eq!(found.points.len(), Method::ALL.len());
+            assert_eq!(found.points.len(), SolveMethod::ALL.len());
             assert_eq!(found.points.iter().filter(|p| p.is_default()).count(), 1);
         }
     }

@@ -18,10 +18,10 @@ pub(crate) struct Args {
     /// Golden scenes with Cycles' pictures; left out where there are none
     #[arg(long, value_name = "FOLDER", default_value = "golden/render")]
     golden: PathBuf,
-    /// Fewer runs and inputs: a look in half a minute, with noisier times
+    /// Fewer runs and inputs: a preview in half a minute, with noisier times
     #[arg(long)]
     quick: bool,
-    /// When it is made, to be told on the page
+    /// Date to show on the page
     #[arg(
         long,
         value_name = "TEXT",
@@ -32,21 +32,24 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: &Args, common: &ReportFlags) -> anyhow::Result<()> {
-    let options = AllOptions {
-        golden: args.golden.clone(),
-        peers: args.peers.clone(),
-        truth: args.truth.clone().unwrap_or_default(),
-        quick: args.quick,
-        date: args.date.clone(),
-    };
-    // Extreme cases are to be warned of; what comes of them is in the tables.
+    // Extreme cases warn as they should; their results are in the tables.
     log::set_max_level(log::LevelFilter::Error);
-    let progress = common.progress("measuring");
-    all::write(&args.output, &options, |done, of| progress.at(done, of))?;
-    drop(progress);
-    common.say(format_args!(
-        "look at {}",
-        args.output.join("report.html").display()
-    ));
+    common.with_progress("measuring", |progress| {
+        all::write(&args.output, &args.options(), progress)
+    })?;
+    let page = args.output.join("report.html");
+    common.print_line(format_args!("look at {}", page.display()));
     Ok(())
+}
+
+impl Args {
+    fn options(&self) -> AllOptions {
+        AllOptions {
+            golden: self.golden.clone(),
+            peers: self.peers.clone(),
+            truth: self.truth.clone().unwrap_or_default(),
+            quick: self.quick,
+            date: self.date.clone(),
+        }
+    }
 }

@@ -20,14 +20,11 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: &Args, common: &ReportFlags) -> anyhow::Result<()> {
-    let progress = common.progress("measuring");
-    let rows = camera::write(
-        &args.output,
-        &CameraReportOptions { views: args.views },
-        |done, of| progress.at(done, of),
-    )?;
-    drop(progress);
-    common.say(format_args!(
+    let options = CameraReportOptions { views: args.views };
+    let rows = common.with_progress("measuring", |progress| {
+        camera::write(&args.output, &options, progress)
+    })?;
+    common.print_line(format_args!(
         "{}: camera.csv ({} lines), camera_coverage.csv, camera.md and six plots",
         args.output.display(),
         rows.len()

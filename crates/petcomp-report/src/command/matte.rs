@@ -5,11 +5,11 @@ use crate::ReportFlags;
 use petcomp_report::matte;
 
 pub(crate) fn run(args: &TruthArgs, common: &ReportFlags) -> anyhow::Result<()> {
-    let progress = common.progress("measuring");
-    let summaries = matte::write(&args.truth, &args.output, |done, of| progress.at(done, of))?;
-    drop(progress);
+    let summaries = common.with_progress("measuring", |progress| {
+        matte::write(&args.truth, &args.output, progress)
+    })?;
     println!("{}", matte::table(&summaries).markdown().trim_end());
-    common.say(format_args!(
+    common.print_line(format_args!(
         "{}: matte.csv, matte.md, matte.svg and matte.html",
         args.output.display()
     ));

@@ -37,11 +37,11 @@ pub(crate) enum Command {
     Settle(settle::Args),
     /// Every stage on stiff and extreme input: stability.csv and stability.md
     Stability(stability::Args),
-    /// Our trainings beside the values of the paper, with intervals and a test
+    /// Our trained models beside the values of the paper, with intervals and a test
     Experiments(experiments::Args),
     /// Error of the matting methods against run time, on photos with known mattes: matte.csv, matte.md, matte.svg, matte.html
     Matte(TruthArgs),
-    /// Whether cut-outs that are wrong say so, on photos with known outlines made harder in many ways: flags.csv, flags.md
+    /// Whether wrong cut-outs are flagged, on photos with known outlines made harder in many ways: flags.csv, flags.md
     Flags(TruthArgs),
     /// Error of the renderer against run time, beside Cycles: render.csv, render.md, a plot and the golden scenes
     Render(render::Args),
@@ -52,17 +52,18 @@ pub(crate) enum Command {
 }
 
 pub(crate) fn run(command: &Command, common: &ReportFlags) -> anyhow::Result<()> {
+    use Command::*;
     match command {
-        Command::All(args) => all::run(args, common),
-        Command::Camera(args) => camera::run(args, common),
-        Command::Settle(args) => settle::run(args, common),
-        Command::Stability(args) => stability::run(args, common),
-        Command::Experiments(args) => experiments::run(args, common),
-        Command::Matte(args) => matte::run(args, common),
-        Command::Flags(args) => flags::run(args, common),
-        Command::Render(args) => render::run(args, common),
-        Command::Work(args) => work::run(args, common),
-        Command::Scale(args) => scale::run(args, common),
+        All(args) => all::run(args, common),
+        Camera(args) => camera::run(args, common),
+        Settle(args) => settle::run(args, common),
+        Stability(args) => stability::run(args, common),
+        Experiments(args) => experiments::run(args, common),
+        Matte(args) => matte::run(args, common),
+        Flags(args) => flags::run(args, common),
+        Render(args) => render::run(args, common),
+        Work(args) => work::run(args, common),
+        Scale(args) => scale::run(args, common),
     }
 }
 

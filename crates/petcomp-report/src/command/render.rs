@@ -28,25 +28,30 @@ pub(crate) struct Args {
     /// Golden scenes to compare as well
     #[arg(long, value_name = "FOLDER", default_value = "golden/render")]
     golden: PathBuf,
-    /// Renderings per preset, of which the median is told, 1 to 1000
+    /// Renderings per preset, of which the median is reported, 1 to 1000
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = count(1..=1000))]
     repeats: usize,
 }
 
 pub(crate) fn run(args: &Args, common: &ReportFlags) -> anyhow::Result<()> {
-    let options = RenderReportOptions {
-        scene: args.scene.clone(),
-        size: [args.size[0], args.size[1]],
-        cycles: args.cycles.clone(),
-        golden: args.golden.clone(),
-        repeats: args.repeats,
-    };
-    let (rows, golden) = render::write(&args.output, &options)?;
+    let (rows, golden) = render::write(&args.output, &args.options())?;
     println!("{}", render::table(&rows).markdown());
-    common.say(format_args!(
+    common.print_line(format_args!(
         "{}: render.csv, render.md, render.svg; {} golden pictures",
         args.output.display(),
         golden.len()
     ));
     Ok(())
+}
+
+impl Args {
+    fn options(&self) -> RenderReportOptions {
+        RenderReportOptions {
+            scene: self.scene.clone(),
+            size: [self.size[0], self.size[1]],
+            cycles: self.cycles.clone(),
+            golden: self.golden.clone(),
+            repeats: self.repeats,
+        }
+    }
 }

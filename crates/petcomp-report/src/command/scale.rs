@@ -2,7 +2,7 @@
 
 use super::count;
 use crate::ReportFlags;
-use petcomp_report::scale::{self, Case, ScaleOptions};
+use petcomp_report::scale::{self, ScaleOptions};
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
@@ -31,27 +31,32 @@ fn seconds(text: &str) -> Result<f64, String> {
 
 pub(crate) fn run(args: &Args, common: &ReportFlags) -> anyhow::Result<()> {
     if let Some(case) = &args.case {
-        let case: Case = serde_json::from_str(case)?;
-        println!(
-            "{}",
-            serde_json::to_string(&scale::run(&case, args.seconds)?)?
-        );
-        return Ok(());
+        return print_measurement(case, args.seconds);
     }
-    let options = ScaleOptions {
-        seconds: args.seconds,
-        threads: args.most_threads,
-        ..ScaleOptions::default()
-    };
-    let progress = common.progress("measuring");
-    let measured = scale::write(&args.output, &options, |done, of| progress.at(done, of))?;
-    drop(progress);
+    let measured = common.with_progress("measuring", |progress| {
+        scale::write(&args.output, &args.options(), progress)
+    })?;
     for (title, table) in scale::tables(&measured)? {
-        println!("{}", format_args!("{title}\n{}", table.markdown()));
+        println!("{title}\n{}", table.markdown());
     }
-    common.say(format_args!(
-        "{}: scale.csv, scale.md and two charts",
-        args.output.display()
-    ));
+    let folder = args.output.display();
+    common.print_line(format_args!("{folder}: scale.csv, scale.md and two charts"));
     Ok(())
+}
+
+/// Measures one point (JSON) in this process.
+fn print_measurement(case: &str, seconds: f64) -> anyhow::Result<()> {
+    let measured = scale::run(&serde_json::from_str(case)?, seconds)?;
+    println!("{}", serde_json::to_string(&measured)?);
+    Ok(())
+}
+
+impl Args {
+    fn options(&self) -> ScaleOptions {
+        ScaleOptions {
+            seconds: self.seconds,
+            threads: self.most_threads,
+            ..ScaleOptions::default()
+        }
+    }
 }

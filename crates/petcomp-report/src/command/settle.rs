@@ -27,14 +27,11 @@ pub(crate) fn run(args: &Args, common: &ReportFlags) -> anyhow::Result<()> {
     if let Some(path) = &args.peers {
         return Ok(io::write_document(path, &settle::peer_cases()?)?);
     }
-    let progress = common.progress("measuring");
-    let rows = settle::write(
-        &args.output,
-        &SettleReportOptions { heaps: args.heaps },
-        |done, of| progress.at(done, of),
-    )?;
-    drop(progress);
-    common.say(format_args!(
+    let options = SettleReportOptions { heaps: args.heaps };
+    let rows = common.with_progress("measuring", |progress| {
+        settle::write(&args.output, &options, progress)
+    })?;
+    common.print_line(format_args!(
         "{}: settle.csv ({} lines), settle.md and a plot",
         args.output.display(),
         rows.len()

@@ -1,7 +1,7 @@
 //! `petcomp-report stability`: every stage on stiff and extreme input.
 
 use crate::ReportFlags;
-use petcomp_report::stability;
+use petcomp_report::stability::{self, CaseResult};
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
@@ -21,31 +21,23 @@ pub(crate) struct Args {
 
 /// Fails where a case fails, after all have been written.
 pub(crate) fn run(args: &Args, common: &ReportFlags) -> anyhow::Result<()> {
-    let progress = common.progress("trying");
-    let rows = stability::write(&args.output, &args.stage, |done, of| progress.at(done, of))?;
-    drop(progress);
-    let failed: Vec<_> = rows.iter().filter(|row| !row.outcome.passed).collect();
-    for row in &failed {
-        println!(
-            "{}",
-            format_args!("FAIL {}: {}: {}", row.stage, row.name, row.outcome.measured)
-        );
-    }
-    let table = args.output.join("stability.md");
-    println!(
-        "{}",
-        format_args!(
-            "{}: {} of {} pass",
-            table.display(),
-            rows.len() - failed.len(),
-            rows.len()
-        )
-    );
-    anyhow::ensure!(
-        failed.is_empty(),
-        "{} of {} cases fail",
-        failed.len(),
-        rows.len()
-    );
+    let rows = common.with_progress("trying", |progress| {
+        stability::write(&args.output, &args.stage, progress)
+    })?;
+    let failed = print_failures(&rows);
+    let (all, table) = (rows.len(), args.output.join("stability.md"));
+    println!("{}: {} of {all} pass", table.display(), all - failed);
+    anyhow::ensure!(failed == 0, "{failed} of {all} cases fail");
     Ok(())
+}
+
+/// How many cases failed.
+fn print_failures(rows: &[CaseResult]) -> usize {
+    let failed = rows.iter().filter(|row| !row.outcome.passed);
+    failed.inspect(|row| print_failure(row)).count()
+}
+
+fn print_failure(row: &CaseResult) {
+    let measured = &row.outcome.measured;
+    println!("FAIL {}: {}: {measured}", row.stage, row.name);
 }

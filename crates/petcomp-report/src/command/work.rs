@@ -12,17 +12,9 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: &Args, common: &ReportFlags) -> anyhow::Result<()> {
-    let progress = common.progress("counting");
-    let rows = work::write(&args.output, |done, of| progress.at(done, of))?;
-    drop(progress);
-    let kept = rows.iter().filter(|row| row.is_as_promised()).count();
-    println!(
-        "{}",
-        format_args!(
-            "{}: {kept} of {} as promised",
-            args.output.join("work.md").display(),
-            rows.len()
-        )
-    );
+    let rows = common.with_progress("counting", |progress| work::write(&args.output, progress))?;
+    let kept = rows.iter().filter(|row| row.is_as_expected()).count();
+    let page = args.output.join("work.md");
+    println!("{}: {kept} of {} as expected", page.display(), rows.len());
     Ok(())
 }

@@ -1,14 +1,15 @@
 //! The matting methods: error against run time.
 
-use super::{Method, Score, Summary, made, measure, measure_known, summaries};
+use super::{
+    MatteRow, MattingMethod, MethodSummary, Score, made, measure, measure_known, summaries,
+};
+use crate::diagram::invisible_error;
 use crate::{Diagram, Point};
 use petcomp::Result;
 use petcomp::plot::three;
 use std::path::Path;
 
-const MILLI: f64 = 1e-3;
-/// An error over a new background that nobody sees: half of a code of 8 bits at middle grey.
-const UNSEEN: f64 = 0.004;
+const SECONDS_PER_MS: f64 = 1e-3;
 
 /// Error over new backgrounds and overlap of the outline, each against time: on photos with truth of a folder, or on made ones
 /// where that is empty.
@@ -16,74 +17,78 @@ const UNSEEN: f64 = 0.004;
 /// # Errors
 /// A folder without truth, or files of it that cannot be read.
 pub fn diagrams(truth: &Path) -> Result<Vec<Diagram>> {
-    let is_made = truth.as_os_str().is_empty();
-    let rows = if is_made {
-        measure_known(made::COUNT, |i| Ok(made::made(i)), |_, _| ())?
+    let (rows, input, source) = if truth.as_os_str().is_empty() {
+        let rows = measure_known(made::PHOTO_COUNT, |i| Ok(made::photo(i)), |_, _| ())?;
+        (rows, MADE_INPUT, "the formula that the photos are made by")
     } else {
-        measure(truth, |_, _| ())?
+        let rows = measure(truth, |_, _| ())?;
+        (rows, KNOWN_INPUT, "what the photos' renderer knows")
     };
-    let photos = rows.len() / Method::ALL.len();
-    let input = match is_made {
-        true => format!("{photos} photos of see-through bottles made in code, 600 x 320"),
-        false => format!("{photos} photos with known mattes"),
-    };
-    let source = if is_made {
-        "the formula that the photos are made by"
-    } else {
-        "what the photos' renderer knows"
-    };
-    Ok(of(&summaries(&rows), &input, source))
+    let input = format!("{} {input}", count_photos(&rows));
+    Ok(summary_diagrams(&summaries(&rows), &input, source))
 }
 
-fn of(summaries: &[Summary], input: &str, source: &str) -> Vec<Diagram> {
-    type Error = fn(&Score) -> f64;
-    let errors: [(&str, &str, &str, Error); 2] = [
-        (
-            "matte_lit",
-            "matte: on new backgrounds",
-            "mean absolute error, scene-linear",
-            |s| s.mae_lit,
-        ),
-        (
-            "matte_shaded",
-            "matte: in the object's own shadow",
-            "mean absolute error, scene-linear",
-            |s| s.mae_shaded,
-        ),
-    ];
-    let diagram = |(file, title, error, of): (&str, &str, &str, Error)| Diagram {
-        file: file.into(),
-        title: title.into(),
-        input: input.into(),
-        error: error.into(),
+const MADE_INPUT: &str = "photos of see-through bottles made in code, 600 x 320";
+const KNOWN_INPUT: &str = "photos with known mattes";
+
+fn count_photos(rows: &[MatteRow]) -> usize {
+    rows.len() / MattingMethod::ALL.len()
+}
+
+fn summary_diagrams(summaries: &[MethodSummary], input: &str, source: &str) -> Vec<Diagram> {
+    let lit = error_diagram(summaries, |s| s.mae_lit);
+    let shaded = error_diagram(summaries, |s| s.mae_shaded);
+    vec![
+        Diagram {
+            file: "matte_lit".into(),
+            title: "matte: on new backgrounds".into(),
+            input: input.into(),
+            reference: source.into(),
+            ..lit
+        },
+        Diagram {
+            file: "matte_shaded".into(),
+            title: "matte: in the object's own shadow".into(),
+            input: input.into(),
+            reference: source.into(),
+            ..shaded
+        },
+    ]
+}
+
+fn error_diagram(summaries: &[MethodSummary], error: fn(&Score) -> f64) -> Diagram {
+    Diagram {
+        error: "mean absolute error, scene-linear".into(),
         cost: "CPU seconds per photo".into(),
-        reference: source.into(),
-        points: summaries.iter().map(|s| point(s, of(&s.score))).collect(),
-        limit: Some((UNSEEN, "half of an 8-bit code at middle grey".into())),
-        why: why(summaries, of),
+        points: summaries.iter().map(|s| s.point(error(&s.score))).collect(),
+        limit: invisible_error(),
+        why: why_default(summaries, error),
         ..Diagram::default()
-    };
-    errors.map(diagram).into()
+    }
 }
 
-/// What the default is worth beside the paper's method.
-fn why(summaries: &[Summary], error: fn(&Score) -> f64) -> String {
-    let of = |method| {
-        summaries
-            .iter()
-            .find(|s| s.method == method)
-            .map_or(0.0, |s: &Summary| error(&s.score))
-    };
-    let share = three(of(Method::Physical) / of(Method::Paper));
+/// How the default compares with the paper's method.
+fn why_default(summaries: &[MethodSummary], error: fn(&Score) -> f64) -> String {
+    let [physical, paper] = [MattingMethod::Physical, MattingMethod::Paper]
+        .map(|method| error_of(summaries, method, error));
     format!(
         "Times include finding the object. Two screens need a second photo of each object. The default has \
-         {share} of the error of the paper's keyer."
+         {} of the error of the paper's keyer.",
+        three(physical / paper)
     )
 }
 
-fn point(summary: &Summary, error: f64) -> Point {
-    let is_default = summary.method == Method::Physical;
-    Point::new(summary.method.name(), "", summary.time_ms * MILLI, error).used_where(|_| is_default)
+fn error_of(summaries: &[MethodSummary], method: MattingMethod, error: fn(&Score) -> f64) -> f64 {
+    let own = summaries.iter().find(|s| s.method == method);
+    own.map_or(0.0, |s| error(&s.score))
+}
+
+impl MethodSummary {
+    fn point(&self, error: f64) -> Point {
+        let is_default = self.method == MattingMethod::Physical;
+        let seconds = self.time_ms * SECONDS_PER_MS;
+        Point::new(self.method.name(), "", seconds, error).used_where(|_| is_default)
+    }
 }
 
 #[cfg(test)]
@@ -92,8 +97,12 @@ mod tests {
 
     #[test]
     fn every_method_is_a_point_and_the_physical_one_has_the_ring() {
-        let found = of(&summaries(&[]), "", "");
-        assert!(found.iter().all(|d| d.points.len() == Method::ALL.len()));
+        let found = summary_diagrams(&summaries(&[]), "", "");
+        assert!(
+            found
+                .iter()
+                .all(|d| d.points.len() == MattingMethod::ALL.len())
+        );
         assert!(
             found
                 .iter()

@@ -5,12 +5,12 @@
 //! reflects some 7 %), and dye takes its share; the screen is seen through the object and lit through it. In folds and rims the
 //! sight meets more plastic, while the light, which comes from all around, does not.
 
-use super::truth::{Known, Noise};
+use super::truth::{Known, PhotoNoise};
 use petcomp::Image;
 use petcomp::{Coverage, LinearRgb};
 
 /// How many there are.
-pub(super) const COUNT: usize = TINTS.len();
+pub(super) const PHOTO_COUNT: usize = TINTS.len();
 /// Absorbance of the dye of two walls that lie flat: clear, blue, green, brown.
 const TINTS: [[f64; 3]; 4] = [
     [0.0; 3],
@@ -19,24 +19,115 @@ const TINTS: [[f64; 3]; 4] = [
     [0.08, 0.18, 0.25],
 ];
 /// Absorbance of two clear walls, by what four surfaces reflect.
-const CLEAR: f64 = 0.29;
-const SIZE: (usize, usize) = (600, 320);
-const SCREEN: LinearRgb = LinearRgb::new(0.06, 0.42, 0.12);
+const CLEAR_ABSORBANCE: f64 = 0.29;
+const SIZE_PX: (usize, usize) = (600, 320);
+const SCREEN_COLOR: LinearRgb = LinearRgb::new(0.06, 0.42, 0.12);
+/// How much darker the screen is, per squared side of the picture from its brightest place.
+const SCREEN_FALLOFF: f64 = 0.35;
 /// Light that film throws back.
-const SHEEN: f64 = 0.02;
+const SHEEN_LIGHT: f64 = 0.02;
+/// Paint of the label.
+const LABEL_COLOR: [f64; 3] = [0.6, 0.12, 0.1];
 /// Half length of the body's axis, radius of its ends, width of an edge, pixels.
 const AXIS_PX: f64 = 170.0;
 const RADIUS_PX: f64 = 75.0;
 const EDGE_PX: f64 = 1.0;
-/// Noise of a usual camera at base sensitivity.
-const NOISE: Noise = Noise {
+/// How deep the wall is seen at a grazing angle.
+const RIM_DEPTH_PX: f64 = 6.0;
+/// Where the streak is brightest, and half its width.
+const STREAK_DEPTH_PX: f64 = 30.0;
+const STREAK_WIDTH_PX: f64 = 5.0;
+/// The label is so far inside the outline.
+const LABEL_DEPTH_PX: f64 = 12.0;
+/// Noise of a typical camera at base sensitivity.
+const CAMERA_NOISE: PhotoNoise = PhotoNoise {
     shot: 0.006,
     read: 0.002,
 };
+/// Seeds of the photos' noise, apart from those of the shots that the two-screen method gets.
+const FIRST_NOISE_SEED: u64 = 1000;
 
-/// What is at one place.
+/// Photo `i`.
+pub(super) fn photo(i: usize) -> Known {
+    enlarged_photo(i, 1)
+}
+
+/// Photo `i` by a camera with `times` the pixels along each side: as sharp, and as noisy in each pixel.
+pub(super) fn enlarged_photo(i: usize, times: usize) -> Known {
+    let known = truth(i, times);
+    let photo = known.on(&known.screen, FIRST_NOISE_SEED + i as u64);
+    Known { photo, ..known }
+}
+
+/// All that is known of photo `i`, which is still black.
+fn truth(i: usize, times: usize) -> Known {
+    let pixels = bottle_pixels(i, times);
+    let (w, h) = pixels.size();
+    Known {
+        name: format!("made {}", i + 1),
+        photo: Image::filled(w, h, LinearRgb::BLACK),
+        foreground: pixels.map(|p| color_from(p.foreground)),
+        transmittance: pixels.map(|p| color_from(p.transmittance())),
+        view: pixels.map(|p| color_from(p.view)),
+        screen: uneven_screen(w, h),
+        mask: pixels.map(|p| Coverage(p.cover as f32)),
+        box_px: bounds(i).map(|side| side / pixel_size(times)),
+        noise: CAMERA_NOISE,
+        paint: SCREEN_COLOR,
+    }
+}
+
+/// Size of a pixel in pixels of the smallest photo.
+fn pixel_size(times: usize) -> f64 {
+    1.0 / times as f64
+}
+
+fn bottle_pixels(i: usize, times: usize) -> Image<BottlePixel> {
+    let px = pixel_size(times);
+    Image::from_fn(times * SIZE_PX.0, times * SIZE_PX.1, |x, y| {
+        bottle_at(i, [x, y].map(|v| (v as f64 + 0.5) * px), px)
+    })
+}
+
+fn color_from(channels: [f64; 3]) -> LinearRgb {
+    LinearRgb::from(channels.map(|v| v as f32))
+}
+
+fn uneven_screen(w: usize, h: usize) -> Image<LinearRgb> {
+    Image::from_fn(w, h, |x, y| {
+        let [dx, dy] = [x as f64 / w as f64 - 0.4, y as f64 / h as f64 - 0.6];
+        SCREEN_COLOR.scale((1.0 - SCREEN_FALLOFF * (dx * dx + dy * dy)) as f32)
+    })
+}
+
+/// Slope of each bottle's axis, radians.
+fn axis_slope(i: usize) -> f64 {
+    0.12 * i as f64 - 0.15
+}
+
+/// The ends of the axis.
+fn axis_ends(i: usize) -> [[f64; 2]; 2] {
+    let (w, h) = SIZE_PX;
+    let slope = axis_slope(i);
+    let [dx, dy] = [AXIS_PX * libm::cos(slope), AXIS_PX * libm::sin(slope)];
+    [-1.0, 1.0].map(|s| [0.5 * w as f64 + s * dx, 0.5 * h as f64 + s * dy])
+}
+
+/// Radius of the body at the first and at the last end: the neck is narrower.
+const RADII_PX: [f64; 2] = [0.55 * RADIUS_PX, RADIUS_PX];
+
+/// Two discs and all discs between them.
+fn bounds(i: usize) -> [f64; 4] {
+    let [a, b] = axis_ends(i);
+    let [neck, foot] = RADII_PX;
+    let [left, top] = [0, 1].map(|k| (a[k] - neck).min(b[k] - foot));
+    let [right, bottom] = [0, 1].map(|k| (a[k] + neck).max(b[k] + foot));
+    [left, top, right, bottom]
+}
+
+/// What a photo shows at one place.
 #[derive(Clone, Copy)]
-struct Place {
+struct BottlePixel {
     cover: f64,
     foreground: [f64; 3],
     view: [f64; 3],
@@ -44,122 +135,112 @@ struct Place {
     lit: [f64; 3],
 }
 
-/// Photo `i`.
-pub(super) fn made(i: usize) -> Known {
-    enlarged(i, 1)
+impl BottlePixel {
+    /// Of the screen's own light, which passes the object twice.
+    fn transmittance(&self) -> [f64; 3] {
+        [0, 1, 2].map(|c| self.view[c] * self.lit[c])
+    }
 }
 
-/// Photo `i` by a camera of so many times the pixels along each side: as sharp, and as noisy in each pixel.
-pub(super) fn enlarged(i: usize, times: usize) -> Known {
-    let (w, h) = (times * SIZE.0, times * SIZE.1);
-    let px = 1.0 / times as f64;
-    let places = Image::from_fn(w, h, |x, y| {
-        place(i, [x, y].map(|v| (v as f64 + 0.5) * px), px)
-    });
-    let color = |c: [f64; 3]| LinearRgb::from(c.map(|v| v as f32));
-    let foreground = places.map(|p| color(p.foreground));
-    let transmittance = places.map(|p| color([0, 1, 2].map(|c| p.view[c] * p.lit[c])));
-    let view = places.map(|p| color(p.view));
-    let mask = places.map(|p| Coverage(p.cover as f32));
-    let screen = Image::from_fn(w, h, |x, y| {
-        let [dx, dy] = [x as f64 / w as f64 - 0.4, y as f64 / h as f64 - 0.6];
-        SCREEN.scale((1.0 - 0.35 * (dx * dx + dy * dy)) as f32)
-    });
-    let box_px = bounds(i).map(|side| side / px);
-    let empty = Image::filled(w, h, LinearRgb::BLACK);
-    let name = format!("made {}", i + 1);
-    let known = Known {
-        name,
-        photo: empty,
-        foreground,
-        transmittance,
-        view,
-        screen,
-        mask,
-        box_px,
-        noise: NOISE,
-        paint: SCREEN,
-    };
-    let photo = known.on(&known.screen, FIRST_SEED + i as u64);
-    Known { photo, ..known }
-}
-
-/// Seeds of the photos' noise, apart from those of the shots that the two-screen method gets.
-const FIRST_SEED: u64 = 1000;
-
-/// Slope of each bottle's axis, radians.
-fn turn(i: usize) -> f64 {
-    0.12 * i as f64 - 0.15
-}
-
-/// The ends of the axis.
-fn ends(i: usize) -> [[f64; 2]; 2] {
-    let (w, h) = SIZE;
-    let [dx, dy] = [AXIS_PX * libm::cos(turn(i)), AXIS_PX * libm::sin(turn(i))];
-    [-1.0, 1.0].map(|s| [0.5 * w as f64 + s * dx, 0.5 * h as f64 + s * dy])
-}
-
-/// Radius of the body at the first and at the last end: the neck is narrower.
-const RADII: [f64; 2] = [0.55 * RADIUS_PX, RADIUS_PX];
-
-/// Two discs and all discs between them.
-fn bounds(i: usize) -> [f64; 4] {
-    let [a, b] = ends(i);
-    let low = |k: usize| (a[k] - RADII[0]).min(b[k] - RADII[1]);
-    let high = |k: usize| (a[k] + RADII[0]).max(b[k] + RADII[1]);
-    [low(0), low(1), high(0), high(1)]
-}
-
-/// What is at a place; an edge is as wide as `px`.
-fn place(i: usize, [x, y]: [f64; 2], px: f64) -> Place {
-    let (along, depth) = body(i, x, y);
+/// What bottle `i` is like at a place; an edge is as wide as `px`.
+fn bottle_at(i: usize, [x, y]: [f64; 2], px: f64) -> BottlePixel {
+    let (along, depth) = body_at(i, x, y);
     let cover = (depth / (EDGE_PX * px) + 0.5).clamp(0.0, 1.0);
     let inside = cover * cover * (3.0 - 2.0 * cover);
-    // Walls seen at a grazing angle near the outline are thicker, and wrinkles fold them.
-    let rim = 1.0 + 2.0 * libm::exp(-depth.max(0.0) / 6.0);
-    let wrinkle =
-        1.0 + 0.5 * libm::sin(0.11 * x + 0.03 * i as f64) * libm::sin(0.07 * y + 0.05 * x);
-    let label = if (0.45..0.65).contains(&along) && depth > 12.0 {
-        1.0
-    } else {
-        0.0
+    let walls = Walls {
+        flat: flat_walls(i),
+        rim: rim(depth),
+        wrinkle: wrinkle(i, x, y),
+        label: label_at(along, depth),
     };
-    let streak = 0.5
-        * libm::exp(-((depth - 30.0) / 5.0).powi(2))
-        * (0.5 + 0.5 * libm::sin(0.05 * x)).powi(4);
-    let flat = TINTS[i % COUNT].map(|dye| libm::exp(-CLEAR - dye));
-    let film = flat.map(|v| libm::pow(v, rim * wrinkle));
-    let own = |c: usize| {
-        let paint = [0.6, 0.12, 0.1][c] * (0.7 + 0.3 * libm::sin(0.3 * y));
-        label * paint + (1.0 - label) * (SHEEN * rim * wrinkle + streak)
-    };
-    Place {
+    BottlePixel {
         cover,
-        foreground: [0, 1, 2].map(|c| inside * own(c)),
-        view: film.map(|v| 1.0 - inside * (1.0 - (1.0 - label) * v)),
-        lit: flat.map(|v| 1.0 - inside * (1.0 - v)),
+        foreground: walls.light(x, y, depth).map(|v| inside * v),
+        view: walls.passes().map(|v| 1.0 - inside * (1.0 - v)),
+        lit: walls.flat.map(|v| 1.0 - inside * (1.0 - v)),
     }
+}
+
+/// Two walls of film at a place.
+struct Walls {
+    /// What they pass where they lie flat.
+    flat: [f64; 3],
+    rim: f64,
+    wrinkle: f64,
+    /// 1 under the label.
+    label: f64,
+}
+
+impl Walls {
+    /// What is seen through them.
+    fn passes(&self) -> [f64; 3] {
+        let film = self.flat.map(|v| libm::pow(v, self.rim * self.wrinkle));
+        film.map(|v| (1.0 - self.label) * v)
+    }
+
+    /// What they and the label throw back.
+    fn light(&self, x: f64, y: f64, depth: f64) -> [f64; 3] {
+        let sheen = SHEEN_LIGHT * self.rim * self.wrinkle + streak(x, depth);
+        label_paint(y).map(|paint| self.label * paint + (1.0 - self.label) * sheen)
+    }
+}
+
+/// What two walls pass that lie flat.
+fn flat_walls(i: usize) -> [f64; 3] {
+    TINTS[i % PHOTO_COUNT].map(|dye| libm::exp(-CLEAR_ABSORBANCE - dye))
+}
+
+/// The label's light, in stripes.
+fn label_paint(y: f64) -> [f64; 3] {
+    let stripe = 0.7 + 0.3 * libm::sin(0.3 * y);
+    LABEL_COLOR.map(|color| color * stripe)
+}
+
+/// How much thicker the walls look near the outline, where they are seen at a grazing angle.
+fn rim(depth: f64) -> f64 {
+    1.0 + 2.0 * libm::exp(-depth.max(0.0) / RIM_DEPTH_PX)
+}
+
+/// How much thicker the walls are where they are folded.
+fn wrinkle(i: usize, x: f64, y: f64) -> f64 {
+    1.0 + 0.5 * libm::sin(0.11 * x + 0.03 * i as f64) * libm::sin(0.07 * y + 0.05 * x)
+}
+
+/// 1 on the label.
+fn label_at(along: f64, depth: f64) -> f64 {
+    let is_label = (0.45..0.65).contains(&along) && depth > LABEL_DEPTH_PX;
+    f64::from(u8::from(is_label))
+}
+
+/// Light of the bright streak.
+fn streak(x: f64, depth: f64) -> f64 {
+    let across = libm::exp(-((depth - STREAK_DEPTH_PX) / STREAK_WIDTH_PX).powi(2));
+    0.5 * across * (0.5 + 0.5 * libm::sin(0.05 * x)).powi(4)
 }
 
 /// How far along the axis a point is, 0 to 1, and how deep inside the outline, pixels; negative outside.
 ///
 /// # Method
 /// The hull of two discs, by the distance to a cone of round ends.
-fn body(i: usize, x: f64, y: f64) -> (f64, f64) {
-    let [a, b] = ends(i);
+fn body_at(i: usize, x: f64, y: f64) -> (f64, f64) {
     let length = 2.0 * AXIS_PX;
-    let axis = [(b[0] - a[0]) / length, (b[1] - a[1]) / length];
-    let from = [x - a[0], y - a[1]];
-    let (along, across) = (
-        from[0] * axis[0] + from[1] * axis[1],
-        from[0] * axis[1] - from[1] * axis[0],
-    );
+    let [along, across] = along_and_across(axis_ends(i), length, [x, y]);
     // The side leans out by the difference of the radii: its foot lies further back than the point.
-    let sine = (RADII[1] - RADII[0]) / length;
+    let sine = (RADII_PX[1] - RADII_PX[0]) / length;
     let cosine = (1.0 - sine * sine).sqrt();
     let foot = ((along + across.abs() * sine / cosine) / length).clamp(0.0, 1.0);
-    let radius = RADII[0] + foot * (RADII[1] - RADII[0]);
+    let radius = RADII_PX[0] + foot * (RADII_PX[1] - RADII_PX[0]);
     (foot, radius - libm::hypot(along - foot * length, across))
+}
+
+/// A point in the frame of the axis, pixels.
+fn along_and_across([a, b]: [[f64; 2]; 2], length: f64, point: [f64; 2]) -> [f64; 2] {
+    let axis = [(b[0] - a[0]) / length, (b[1] - a[1]) / length];
+    let from = [point[0] - a[0], point[1] - a[1]];
+    [
+        from[0] * axis[0] + from[1] * axis[1],
+        from[0] * axis[1] - from[1] * axis[0],
+    ]
 }
 
 #[cfg(test)]
@@ -169,8 +250,8 @@ mod tests {
 
     #[test]
     fn the_box_holds_the_mask_tightly() {
-        for i in 0..COUNT {
-            let known = made(i);
+        for i in 0..PHOTO_COUNT {
+            let known = photo(i);
             let (w, h) = known.mask.size();
             let inside = |x: usize, y: usize| known.mask[(x, y)].0 >= 0.5;
             let columns = (0..w).filter(|&x| (0..h).any(|y| inside(x, y)));
@@ -193,7 +274,7 @@ mod tests {
 
     #[test]
     fn a_photo_is_its_foreground_over_its_screen_and_the_object_is_found() {
-        let known = made(1);
+        let known = photo(1);
         let off = |x: usize, y: usize| {
             let truth =
                 known.foreground[(x, y)] + known.transmittance[(x, y)] * known.screen[(x, y)];

@@ -1,4 +1,4 @@
-//! The ways to a cut-out that are compared.
+//! The matting methods that are compared.
 
 use super::truth::Known;
 use petcomp::Image;
@@ -6,13 +6,13 @@ use petcomp::Result;
 use petcomp::filter;
 use petcomp::matte::{
     CutOutOptions, FilmOptions, KeyOptions, Keying, Screen, ScreenPlate, SegmentOptions,
-    Segmentation, screen_color, segment, triangulate,
+    Segmentation, film, screen_color, segment, triangulate,
 };
 use petcomp::{Coverage, Film, LinearRgb, PremulRgba};
 
-/// A way to a cut-out.
+/// A matting method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Method {
+pub enum MattingMethod {
     /// Blender's keyer with the mean colour of the background, masked by the convex hull.
     Paper,
     /// Blender's keyer with a key of its own for every pixel, masked by the tight outline.
@@ -26,17 +26,17 @@ pub enum Method {
 }
 
 /// What a method made of a photo.
-pub(super) struct Cut {
+pub(super) struct MethodCutOut {
     /// Light and view transmittance.
     pub(super) film: Image<Film>,
     /// Transmittance with the object's own shadow.
     pub(super) transmittance: Image<LinearRgb>,
-    /// What it takes for the object.
+    /// Where it finds the object.
     pub(super) outline: Image<Coverage>,
     pub(super) found: Segmentation,
 }
 
-impl Method {
+impl MattingMethod {
     /// All of them, the paper's first.
     pub const ALL: [Self; 5] = [
         Self::Paper,
@@ -46,7 +46,7 @@ impl Method {
         Self::TwoScreen,
     ];
 
-    /// What it is called in tables.
+    /// Its name in tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::Paper => "paper",
@@ -58,57 +58,95 @@ impl Method {
     }
 
     /// Cuts the object out; `shots` are those of the two-screen method.
-    pub(super) fn run(self, known: &Known, shots: &[Image<LinearRgb>; 2]) -> Result<Cut> {
+    pub(super) fn run(self, known: &Known, shots: &[Image<LinearRgb>; 2]) -> Result<MethodCutOut> {
         let photo = &known.photo;
         let found = segment(photo, &SegmentOptions::default())?;
         if self == Self::Paper {
-            let key = Screen::Color(screen_color(photo, &found.mask)?);
-            let keyed = Keying::new(photo, key).run(&KeyOptions::default())?;
-            let cut = keyed.cutout.zip_map(&found.mask, |p, m| p.masked(m));
-            return Ok(Cut::grey(&cut, found.mask.clone(), found));
+            return key_by_color(photo, found);
         }
-        let inside = filter::gaussian_blur(&found.tight, CutOutOptions::default().soften_px);
-        let plate = fitted(photo, &found)?;
-        Ok(match self {
-            Self::Paper | Self::KeyPlate => {
-                let keyed =
-                    Keying::new(photo, Screen::Plate(&plate.image)).run(&KeyOptions::default())?;
-                let cut = keyed.cutout.zip_map(&inside, |p, m| p.masked(m));
-                Cut::grey(&cut, found.tight.clone(), found)
-            }
-            Self::Difference => {
-                let keyed = photo.zip_map(&plate.image, difference);
-                let cut = keyed.zip_map(&inside, |p, m| p.masked(m));
-                Cut::grey(&cut, found.tight.clone(), found)
-            }
-            Self::Physical => {
-                let solved = petcomp::matte::film(photo, &plate, &inside, &FilmOptions::default())?;
-                let outline = found.tight.clone();
-                Cut {
-                    film: solved.film,
-                    transmittance: solved.transmittance,
-                    outline,
-                    found,
-                }
-            }
-            Self::TwoScreen => {
-                let plates = [fitted(&shots[0], &found)?, fitted(&shots[1], &found)?];
-                let shots = [(&shots[0], &plates[0]), (&shots[1], &plates[1])];
-                let solved = triangulate(&shots, &inside, &Default::default())?;
-                let outline = found.tight.clone();
-                Cut {
-                    film: solved.film,
-                    transmittance: solved.transmittance,
-                    outline,
-                    found,
-                }
-            }
-        })
+        let plate = fitted_plate(photo, &found)?;
+        let prepared = PreparedPhoto {
+            photo,
+            inside: filter::gaussian_blur(&found.tight, CutOutOptions::default().soften_px),
+            found,
+            plate,
+        };
+        match self {
+            Self::Paper | Self::KeyPlate => prepared.key_by_plate(),
+            Self::Difference => Ok(prepared.color_difference()),
+            Self::Physical => prepared.physical_film(),
+            Self::TwoScreen => prepared.two_screens(shots),
+        }
     }
 }
 
-impl Cut {
-    fn grey(cut: &Image<PremulRgba>, outline: Image<Coverage>, found: Segmentation) -> Self {
+/// The paper's way.
+fn key_by_color(photo: &Image<LinearRgb>, found: Segmentation) -> Result<MethodCutOut> {
+    let key = Screen::Color(screen_color(photo, &found.mask)?);
+    let keyed = Keying::new(photo, key).run(&KeyOptions::default())?;
+    let cut = keyed.cutout.zip_map(&found.mask, |p, m| p.masked(m));
+    Ok(MethodCutOut::from_grey(&cut, found.mask.clone(), found))
+}
+
+fn fitted_plate(photo: &Image<LinearRgb>, found: &Segmentation) -> Result<ScreenPlate> {
+    ScreenPlate::fit(photo, &found.background(), &CutOutOptions::default().plate)
+}
+
+/// A photo, where the object is in it, and its screen.
+struct PreparedPhoto<'a> {
+    photo: &'a Image<LinearRgb>,
+    found: Segmentation,
+    inside: Image<Coverage>,
+    plate: ScreenPlate,
+}
+
+impl PreparedPhoto<'_> {
+    fn key_by_plate(self) -> Result<MethodCutOut> {
+        let screen = Screen::Plate(&self.plate.image);
+        let keyed = Keying::new(self.photo, screen).run(&KeyOptions::default())?;
+        Ok(self.masked_cut_out(&keyed.cutout))
+    }
+
+    fn color_difference(self) -> MethodCutOut {
+        let keyed = self.photo.zip_map(&self.plate.image, color_difference);
+        self.masked_cut_out(&keyed)
+    }
+
+    fn physical_film(self) -> Result<MethodCutOut> {
+        let options = FilmOptions::default();
+        let solved = film(self.photo, &self.plate, &self.inside, &options)?;
+        Ok(self.film_cut_out(solved.film, solved.transmittance))
+    }
+
+    fn two_screens(self, shots: &[Image<LinearRgb>; 2]) -> Result<MethodCutOut> {
+        let [first, second] = shots;
+        let plates = [
+            fitted_plate(first, &self.found)?,
+            fitted_plate(second, &self.found)?,
+        ];
+        let shots = [(first, &plates[0]), (second, &plates[1])];
+        let solved = triangulate(&shots, &self.inside, &Default::default())?;
+        Ok(self.film_cut_out(solved.film, solved.transmittance))
+    }
+
+    fn masked_cut_out(self, keyed: &Image<PremulRgba>) -> MethodCutOut {
+        let cut = keyed.zip_map(&self.inside, |p, m| p.masked(m));
+        MethodCutOut::from_grey(&cut, self.found.tight.clone(), self.found)
+    }
+
+    fn film_cut_out(self, film: Image<Film>, transmittance: Image<LinearRgb>) -> MethodCutOut {
+        MethodCutOut {
+            film,
+            transmittance,
+            outline: self.found.tight.clone(),
+            found: self.found,
+        }
+    }
+}
+
+impl MethodCutOut {
+    /// What is as opaque in every channel.
+    fn from_grey(cut: &Image<PremulRgba>, outline: Image<Coverage>, found: Segmentation) -> Self {
         let transmittance = cut.map(|p| LinearRgb::grey(1.0 - p.a.clamp(0.0, 1.0)));
         Self {
             film: cut.map(Film::from),
@@ -117,10 +155,15 @@ impl Cut {
             found,
         }
     }
-}
 
-fn fitted(photo: &Image<LinearRgb>, found: &Segmentation) -> Result<ScreenPlate> {
-    ScreenPlate::fit(photo, &found.background(), &CutOutOptions::default().plate)
+    /// Why it needs review.
+    pub(super) fn warnings(&self) -> Vec<String> {
+        let diagnostics = self.found.diagnostics.iter();
+        diagnostics
+            .filter(|d| d.needs_review())
+            .map(ToString::to_string)
+            .collect()
+    }
 }
 
 /// Colour difference against the screen's own colour, and what the screen does not explain of the pixel.
@@ -128,17 +171,26 @@ fn fitted(photo: &Image<LinearRgb>, found: &Segmentation) -> Result<ScreenPlate>
 /// # Method
 /// `1 - a = (I_p - max(I_others)) / (K_p - max(K_others))` for the screen's strongest channel `p` (Vlahos' colour
 /// difference); the foreground is `I - (1 - a) K`.
-fn difference(pixel: LinearRgb, screen: LinearRgb) -> PremulRgba {
+fn color_difference(pixel: LinearRgb, screen: LinearRgb) -> PremulRgba {
     let (i, k): ([f32; 3], [f32; 3]) = (pixel.into(), screen.into());
-    let p = (1..3).fold(0, |best, c| if k[c] > k[best] { c } else { best });
-    let excess = |c: [f32; 3]| c[p] - c[(p + 1) % 3].max(c[(p + 2) % 3]);
-    let through = if excess(k) > 0.0 {
-        (excess(i) / excess(k)).clamp(0.0, 1.0)
-    } else {
-        0.0
-    };
+    let through = share_of_screen(i, k);
     let [r, g, b] = [0, 1, 2].map(|c| (i[c] - through * k[c]).max(0.0));
     PremulRgba::new(r, g, b, 1.0 - through)
+}
+
+fn share_of_screen(pixel: [f32; 3], screen: [f32; 3]) -> f32 {
+    let strongest = (1..3).fold(0, |best, c| if screen[c] > screen[best] { c } else { best });
+    let [seen, full] = [pixel, screen].map(|color| excess(color, strongest));
+    if full > 0.0 {
+        (seen / full).clamp(0.0, 1.0)
+    } else {
+        0.0
+    }
+}
+
+/// How much a channel is above both others.
+fn excess(color: [f32; 3], channel: usize) -> f32 {
+    color[channel] - color[(channel + 1) % 3].max(color[(channel + 2) % 3])
 }
 
 #[cfg(test)]
@@ -148,12 +200,12 @@ mod tests {
     #[test]
     fn colour_difference_takes_the_screen_away_and_keeps_what_is_grey() {
         let screen = LinearRgb::new(0.05, 0.4, 0.1);
-        assert_eq!(difference(screen, screen), PremulRgba::TRANSPARENT);
+        assert_eq!(color_difference(screen, screen), PremulRgba::TRANSPARENT);
         assert_eq!(
-            difference(LinearRgb::grey(0.3), screen),
+            color_difference(LinearRgb::grey(0.3), screen),
             PremulRgba::new(0.3, 0.3, 0.3, 1.0)
         );
-        let half = difference(screen.scale(0.5) + LinearRgb::grey(0.1), screen);
+        let half = color_difference(screen.scale(0.5) + LinearRgb::grey(0.1), screen);
         assert!((half.a - 0.5).abs() < 1e-6 && (half.g - 0.1).abs() < 1e-6);
     }
 }

@@ -1,11 +1,19 @@
 //! Errors of a cut-out against what is known.
 
-use super::method::Cut;
+use super::method::MethodCutOut;
 use super::truth::Known;
+use crate::statistics::mean_of;
 use petcomp::Image;
 use petcomp::filter;
 use petcomp::geom::Point2;
-use petcomp::{Coverage, Film, LinearRgb};
+use petcomp::{Coverage, LinearRgb};
+
+/// Sums of errors over a picture are given in thousands.
+const SUM_UNIT: f64 = 1000.0;
+/// Width of the derivative whose length is the gradient, pixels ([Rhemann et al. 2009]).
+///
+/// [Rhemann et al. 2009]: https://doi.org/10.1109/CVPR.2009.5206503
+const GRADIENT_SIGMA_PX: f32 = 1.4;
 
 /// Errors of one cut-out.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -33,137 +41,184 @@ pub struct Score {
 }
 
 impl Score {
-    pub(super) fn of(found: &Cut, known: &Known, backgrounds: &[Image<LinearRgb>]) -> Self {
+    pub(super) fn new(
+        found: &MethodCutOut,
+        known: &Known,
+        backgrounds: &[Image<LinearRgb>],
+    ) -> Self {
         let alpha = found.film.map(|f| Coverage(f.to_rgba().a));
-        let truth = known.view.map(|v| Coverage(1.0 - (v.r + v.g + v.b) / 3.0));
-        let off = |a: Coverage, b: Coverage| f64::from(a.0) - f64::from(b.0);
-        let n = alpha.pixels().len().max(1) as f64;
-        let differences = || {
-            alpha
-                .pixels()
-                .iter()
-                .zip(truth.pixels())
-                .map(|(a, b)| off(*a, *b))
-        };
-        let slopes = gradient(&alpha)
-            .into_iter()
-            .zip(gradient(&truth))
-            .map(|(a, b)| (a - b) * (a - b));
-        let lit = |f: Film, _, b| f.over_color(b);
-        let shaded = |f: Film, t: LinearRgb, b: LinearRgb| f.color + t * b;
-        let [mae_lit, psnr_lit] = recomposite(found, known, &known.view, backgrounds, lit);
-        let [mae_shaded, psnr_shaded] =
-            recomposite(found, known, &known.transmittance, backgrounds, shaded);
+        let lit = lit_errors(found, known, backgrounds);
+        let shaded = shaded_errors(found, known, backgrounds);
         Self {
-            sad: differences().map(f64::abs).sum::<f64>() / THOUSAND,
-            mse: differences().map(|d| d * d).sum::<f64>() / n,
-            gradient: slopes.sum::<f64>() / THOUSAND,
-            mae_lit,
-            psnr_lit,
-            mae_shaded,
-            psnr_shaded,
-            residue: residue(&alpha, &known.mask),
+            mae_lit: lit.mean_absolute(),
+            psnr_lit: lit.psnr_db(),
+            mae_shaded: shaded.mean_absolute(),
+            psnr_shaded: shaded.psnr_db(),
+            residue: mean_residue(&alpha, &known.mask),
             iou: overlap(&found.outline, &known.mask),
             box_px: box_error(&found.found.hull, known.box_px),
+            ..Self::from_alpha(&alpha, &known.view.map(true_alpha))
+        }
+    }
+
+    /// Errors of alpha alone.
+    fn from_alpha(alpha: &Image<Coverage>, truth: &Image<Coverage>) -> Self {
+        let off = differences(alpha, truth);
+        let squared: f64 = off.iter().map(|d| d * d).sum();
+        Self {
+            sad: off.iter().map(|d| d.abs()).sum::<f64>() / SUM_UNIT,
+            mse: squared / off.len().max(1) as f64,
+            gradient: gradient_error(alpha, truth) / SUM_UNIT,
+            ..Self::default()
         }
     }
 }
 
-const THOUSAND: f64 = 1000.0;
-/// Width of the derivative whose length is the gradient, pixels ([Rhemann et al. 2009]).
-///
-/// [Rhemann et al. 2009]: https://doi.org/10.1109/CVPR.2009.5206503
-const GRADIENT_SIGMA_PX: f32 = 1.4;
-
-/// Length of the gradient of the blurred picture, by central differences.
-fn gradient(alpha: &Image<Coverage>) -> Vec<f64> {
-    let smooth = filter::gaussian_blur(alpha, GRADIENT_SIGMA_PX);
-    let at = |x: usize, y: usize, dx: isize, dy: isize| {
-        f64::from(smooth.nearest(x as isize + dx, y as isize + dy).0)
-    };
-    let half = |a: f64, b: f64| 0.5 * (a - b);
-    let (w, h) = alpha.size();
-    let along = |i: usize| {
-        let (x, y) = (i % w, i / w);
-        libm::hypot(
-            half(at(x, y, 1, 0), at(x, y, -1, 0)),
-            half(at(x, y, 0, 1), at(x, y, 0, -1)),
-        )
-    };
-    (0..w * h).map(along).collect()
+/// Alpha of an object with this transmittance.
+fn true_alpha(view: LinearRgb) -> Coverage {
+    Coverage(1.0 - (view.r + view.g + view.b) / 3.0)
 }
 
-/// Mean absolute error and peak signal-to-noise ratio over all backgrounds.
+fn differences(a: &Image<Coverage>, b: &Image<Coverage>) -> Vec<f64> {
+    pixel_pairs(a, b).map(|(a, b)| a - b).collect()
+}
+
+/// Coverages at the same pixel of two pictures.
+fn pixel_pairs(a: &Image<Coverage>, b: &Image<Coverage>) -> impl Iterator<Item = (f64, f64)> {
+    let pairs = a.pixels().iter().zip(b.pixels());
+    pairs.map(|(a, b)| (f64::from(a.0), f64::from(b.0)))
+}
+
+/// Sum of squared differences of the gradient's length.
+fn gradient_error(a: &Image<Coverage>, b: &Image<Coverage>) -> f64 {
+    let pairs = gradient_lengths(a).into_iter().zip(gradient_lengths(b));
+    pairs.map(|(a, b)| (a - b) * (a - b)).sum()
+}
+
+/// Length of the gradient of the blurred picture, by central differences.
+fn gradient_lengths(alpha: &Image<Coverage>) -> Vec<f64> {
+    let smooth = filter::gaussian_blur(alpha, GRADIENT_SIGMA_PX);
+    let (w, h) = alpha.size();
+    (0..w * h)
+        .map(|i| gradient_length(&smooth, (i % w) as isize, (i / w) as isize))
+        .collect()
+}
+
+fn gradient_length(image: &Image<Coverage>, x: isize, y: isize) -> f64 {
+    libm::hypot(
+        half_difference(image, [x + 1, y], [x - 1, y]),
+        half_difference(image, [x, y + 1], [x, y - 1]),
+    )
+}
+
+fn half_difference(image: &Image<Coverage>, a: [isize; 2], b: [isize; 2]) -> f64 {
+    let [a, b] = [a, b].map(|[x, y]| f64::from(image.nearest(x, y).0));
+    0.5 * (a - b)
+}
+
+/// Over new backgrounds that are lit by themselves.
+fn lit_errors(found: &MethodCutOut, known: &Known, backgrounds: &[Image<LinearRgb>]) -> ErrorSums {
+    let film = found.film.pixels();
+    recomposite(known, &known.view, backgrounds, |i, behind| {
+        film[i].over_color(behind)
+    })
+}
+
+/// Over new backgrounds in the object's own shadow.
+fn shaded_errors(
+    found: &MethodCutOut,
+    known: &Known,
+    backgrounds: &[Image<LinearRgb>],
+) -> ErrorSums {
+    let (film, passes) = (found.film.pixels(), found.transmittance.pixels());
+    recomposite(known, &known.transmittance, backgrounds, |i, behind| {
+        film[i].color + passes[i] * behind
+    })
+}
+
+/// Errors over all backgrounds; `ours` gives a pixel over what is behind it.
 fn recomposite(
-    found: &Cut,
     known: &Known,
     passes: &Image<LinearRgb>,
     backgrounds: &[Image<LinearRgb>],
-    over: impl Fn(Film, LinearRgb, LinearRgb) -> LinearRgb,
-) -> [f64; 2] {
-    let (mut sum, mut squares, mut count) = (0.0, 0.0, 0u64);
+    ours: impl Fn(usize, LinearRgb) -> LinearRgb,
+) -> ErrorSums {
+    let (foreground, passes) = (known.foreground.pixels(), passes.pixels());
+    let mut sums = ErrorSums::default();
     for background in backgrounds {
-        for i in 0..background.pixels().len() {
-            let b = background.pixels()[i];
-            let ours: [f32; 3] =
-                over(found.film.pixels()[i], found.transmittance.pixels()[i], b).into();
-            let truth: [f32; 3] = (known.foreground.pixels()[i] + passes.pixels()[i] * b).into();
-            for (a, b) in ours.into_iter().zip(truth) {
-                let d = f64::from(a) - f64::from(b);
-                (sum, squares, count) = (sum + d.abs(), squares + d * d, count + 1);
-            }
+        for (i, behind) in background.pixels().iter().enumerate() {
+            sums.add(ours(i, *behind), foreground[i] + passes[i] * *behind);
         }
     }
-    let n = count.max(1) as f64;
-    [
-        sum / n,
-        -10.0 * libm::log10((squares / n).max(f64::MIN_POSITIVE)),
-    ]
+    sums
+}
+
+/// Sums over channels.
+#[derive(Default)]
+struct ErrorSums {
+    absolute: f64,
+    squared: f64,
+    count: u64,
+}
+
+impl ErrorSums {
+    fn add(&mut self, ours: LinearRgb, truth: LinearRgb) {
+        let (ours, truth): ([f32; 3], [f32; 3]) = (ours.into(), truth.into());
+        for (a, b) in ours.into_iter().zip(truth) {
+            let difference = f64::from(a) - f64::from(b);
+            self.absolute += difference.abs();
+            self.squared += difference * difference;
+            self.count += 1;
+        }
+    }
+
+    fn mean_absolute(&self) -> f64 {
+        self.absolute / self.count.max(1) as f64
+    }
+
+    /// Peak signal-to-noise ratio, decibels.
+    fn psnr_db(&self) -> f64 {
+        let mean = self.squared / self.count.max(1) as f64;
+        -10.0 * libm::log10(mean.max(f64::MIN_POSITIVE))
+    }
 }
 
 /// Mean alpha where the object covers nothing.
-fn residue(alpha: &Image<Coverage>, mask: &Image<Coverage>) -> f64 {
-    let outside = alpha
-        .pixels()
-        .iter()
-        .zip(mask.pixels())
-        .filter(|(_, m)| m.0 == 0.0);
-    let (sum, count) = outside.fold((0.0, 0u64), |(sum, n), (a, _)| {
-        (sum + f64::from(a.0), n + 1)
-    });
-    sum / count.max(1) as f64
+fn mean_residue(alpha: &Image<Coverage>, mask: &Image<Coverage>) -> f64 {
+    let pairs = pixel_pairs(alpha, mask);
+    let outside: Vec<f64> = pairs.filter(|(_, m)| *m == 0.0).map(|(a, _)| a).collect();
+    mean_of(&outside, |alpha| *alpha)
 }
 
 /// Intersection over union of what is covered by at least a half.
 pub(crate) fn overlap(a: &Image<Coverage>, b: &Image<Coverage>) -> f64 {
-    let pairs = a
-        .pixels()
-        .iter()
-        .zip(b.pixels())
-        .map(|(a, b)| (a.0 >= 0.5, b.0 >= 0.5));
-    let (both, any) = pairs.fold((0u64, 0u64), |(both, any), (a, b)| {
-        (both + u64::from(a && b), any + u64::from(a || b))
-    });
+    let (mut both, mut any) = (0_u64, 0_u64);
+    for (a, b) in pixel_pairs(a, b) {
+        both += u64::from(a.min(b) >= 0.5);
+        any += u64::from(a.max(b) >= 0.5);
+    }
     both as f64 / any.max(1) as f64
 }
 
-/// The side of a hull's box that is farthest from left, top, right or bottom.
+/// The error of the side of a hull's box that is farthest from left, top, right or bottom.
 pub(super) fn box_error(hull: &[Point2<f64>], truth: [f64; 4]) -> f64 {
-    let low = |along: fn(&Point2<f64>) -> f64| hull.iter().map(along).fold(f64::INFINITY, f64::min);
-    let high =
-        |along: fn(&Point2<f64>) -> f64| hull.iter().map(along).fold(f64::NEG_INFINITY, f64::max);
-    let sides = [low(|p| p.x), low(|p| p.y), high(|p| p.x), high(|p| p.y)];
-    sides
-        .iter()
-        .zip(truth)
-        .map(|(a, b)| (a - b).abs())
-        .fold(0.0, f64::max)
+    let [left, right] = extent(hull.iter().map(|p| p.x));
+    let [top, bottom] = extent(hull.iter().map(|p| p.y));
+    let sides = [left, top, right, bottom].into_iter().zip(truth);
+    sides.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+}
+
+fn extent(values: impl Iterator<Item = f64>) -> [f64; 2] {
+    values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| {
+        [low.min(v), high.max(v)]
+    })
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::{background, truth::Noise};
+    use super::super::{patched_background, truth::PhotoNoise};
     use super::*;
+    use petcomp::Film;
     use petcomp::matte::{SegmentOptions, segment};
 
     const GREEN: LinearRgb = LinearRgb::new(0.04, 0.4, 0.08);
@@ -197,7 +252,7 @@ mod tests {
         let mask = Image::from_fn(w, h, |x, y| Coverage(f32::from(u8::from(on(x, y)))));
         let (box_px, noise) = (
             [40.0, 30.0, 120.0, 70.0],
-            Noise {
+            PhotoNoise {
                 shot: 0.0,
                 read: 0.0,
             },
@@ -216,8 +271,8 @@ mod tests {
         }
     }
 
-    fn truth(known: &Known) -> Cut {
-        Cut {
+    fn truth(known: &Known) -> MethodCutOut {
+        MethodCutOut {
             film: known.foreground.zip_map(&known.view, Film::new),
             transmittance: known.transmittance.clone(),
             outline: known.mask.clone(),
@@ -228,7 +283,11 @@ mod tests {
     #[test]
     fn the_truth_has_no_error() {
         let known = known();
-        let score = Score::of(&truth(&known), &known, &[background(known.photo.size(), 1)]);
+        let score = Score::new(
+            &truth(&known),
+            &known,
+            &[patched_background(known.photo.size(), 1)],
+        );
         let all = [
             score.sad,
             score.mse,
@@ -251,7 +310,7 @@ mod tests {
             color: f.color,
             opacity: f.opacity.map(|o| o + 0.1),
         });
-        let score = Score::of(&cut, &known, &[Image::filled(160, 100, LinearRgb::WHITE)]);
+        let score = Score::new(&cut, &known, &[Image::filled(160, 100, LinearRgb::WHITE)]);
         assert!(
             (score.mse - 0.01).abs() < 1e-5 && (score.sad - 1.6).abs() < 1e-3,
             "{score:?}"

@@ -6,6 +6,7 @@ use super::made;
 use super::score::box_error;
 use super::truth::Known;
 use crate::clock::timed;
+use crate::statistics::mean_of;
 use crate::{Diagram, Point};
 use petcomp::Coverage;
 use petcomp::Image;
@@ -14,16 +15,17 @@ use petcomp::Result;
 use petcomp::matte::{CutOutOptions, SegmentOptions, segment};
 
 /// Longer sides of the picture that is searched, pixels: those of the qualities, half of the least and double the most.
-const SIDES: [usize; 5] = [160, 320, 640, 1280, 2560];
+const SEARCH_SIDES_PX: [usize; 5] = [160, 320, 640, 1280, 2560];
 /// Pixels of the photos along each side, as multiples of the least.
-const TIMES: [usize; 3] = [1, 2, 4];
-const USUAL_TIMES: usize = 4;
+const PHOTO_SCALES: [usize; 3] = [1, 2, 4];
+/// That of the photos on which qualities are marked.
+const TYPICAL_PHOTO_SCALE: usize = 4;
 /// Means over the photos are even enough.
-const RUNS: usize = 1;
+const TIMED_RUNS: usize = 1;
 
 /// Errors and seconds of one search.
 #[derive(Clone, Copy, Debug, Default)]
-struct Found {
+struct SearchErrors {
     /// 1 - IoU of coverage.
     outline: f64,
     /// The side of the box that is farthest off, pixels of the photo.
@@ -31,111 +33,137 @@ struct Found {
     seconds: f64,
 }
 
-/// Overlap of the outline, and the box, each against time, of so many bottles: four, or fewer for a look.
+/// A search of photos, and its means over them.
+struct MeasuredSearch {
+    photo_scale: usize,
+    photo_width: usize,
+    side: usize,
+    mean: SearchErrors,
+}
+
+/// Overlap of the outline, and the box, each against time, of four bottles, or fewer for a quick report.
 ///
 /// # Errors
-/// As [`segment`]; a thread that cannot be had.
+/// As [`segment`]; a thread that cannot be started.
 pub fn searches(bottles: usize) -> Result<Vec<Diagram>> {
-    let (mut outlines, mut boxes) = (Vec::new(), Vec::new());
-    for times in TIMES {
-        let photos: Vec<Known> = (0..bottles.min(made::COUNT))
-            .map(|i| made::enlarged(i, times))
-            .collect();
-        let longer = photos
-            .iter()
-            .map(|known| known.photo.width())
-            .max()
-            .unwrap_or(0);
-        // A photo is not enlarged to be searched.
-        for side in SIDES.into_iter().filter(|side| *side <= longer) {
-            let found = searched(&photos, side)?;
-            let point = |error: f64| {
-                Point::new(
-                    format!("photos {longer} px wide"),
-                    format!("{side} px"),
-                    found.seconds,
-                    error,
-                )
-                .used_where(|quality| times == USUAL_TIMES && side == side_of(quality))
-            };
-            outlines.push(point(found.outline));
-            boxes.push(point(found.box_px));
-        }
+    let mut found = Vec::new();
+    for scale in PHOTO_SCALES {
+        found.extend(measure_photos(bottles.min(made::PHOTO_COUNT), scale)?);
     }
+    let input =
+        format!("{bottles} see-through bottles on an uneven screen with noise, made in code");
     Ok(vec![
-        diagram(
-            "matte_search_outline",
-            "matte: size of the search, outline",
-            "1 - IoU",
-            bottles,
-            outlines,
-        ),
-        diagram(
-            "matte_search_box",
-            "matte: size of the search, box",
-            "error of the box, px of the photo",
-            bottles,
-            boxes,
-        ),
+        Diagram {
+            file: "matte_search_outline".into(),
+            title: "matte: size of the search, outline".into(),
+            error: "1 - IoU".into(),
+            ..search_diagram(&found, &input, |mean| mean.outline)
+        },
+        Diagram {
+            file: "matte_search_box".into(),
+            title: "matte: size of the search, box".into(),
+            error: "error of the box, px of the photo".into(),
+            ..search_diagram(&found, &input, |mean| mean.box_px)
+        },
     ])
 }
 
-fn side_of(quality: Quality) -> usize {
-    quality
-        .cut_out(CutOutOptions::default())
-        .segment
-        .working_size
+/// Searches of all sizes in photos of one size.
+fn measure_photos(bottles: usize, photo_scale: usize) -> Result<Vec<MeasuredSearch>> {
+    let photos: Vec<Known> = (0..bottles)
+        .map(|i| made::enlarged_photo(i, photo_scale))
+        .collect();
+    let photo_width = largest_width(&photos);
+    // A photo is not enlarged to be searched.
+    SEARCH_SIDES_PX
+        .into_iter()
+        .filter(|side| *side <= photo_width)
+        .map(|side| {
+            Ok(MeasuredSearch {
+                photo_scale,
+                photo_width,
+                side,
+                mean: mean_result(&photos, side)?,
+            })
+        })
+        .collect()
+}
+
+fn largest_width(photos: &[Known]) -> usize {
+    let widths = photos.iter().map(|known| known.photo.width());
+    widths.max().unwrap_or(0)
+}
+
+impl MeasuredSearch {
+    fn point(&self, error: fn(&SearchErrors) -> f64) -> Point {
+        let curve = format!("photos {} px wide", self.photo_width);
+        let setting = format!("{} px", self.side);
+        Point::new(curve, setting, self.mean.seconds, error(&self.mean))
+            .used_where(|quality| self.is_used_by(quality))
+    }
+
+    fn is_used_by(&self, quality: Quality) -> bool {
+        self.photo_scale == TYPICAL_PHOTO_SCALE && self.side == search_side(quality)
+    }
+}
+
+fn search_side(quality: Quality) -> usize {
+    let options = quality.cut_out(CutOutOptions::default());
+    options.segment.working_size
 }
 
 /// Means over the photos.
-fn searched(photos: &[Known], working_size: usize) -> Result<Found> {
+fn mean_result(photos: &[Known], working_size: usize) -> Result<SearchErrors> {
     let options = SegmentOptions {
         working_size,
         ..SegmentOptions::default()
     };
-    let found: Vec<Found> = photos
+    let found: Vec<SearchErrors> = photos
         .iter()
-        .map(|known| search(known, &options))
+        .map(|known| search_photo(known, &options))
         .collect::<Result<_>>()?;
-    let mean =
-        |of: fn(&Found) -> f64| found.iter().map(of).sum::<f64>() / found.len().max(1) as f64;
-    Ok(Found {
-        outline: mean(|f| f.outline),
-        box_px: mean(|f| f.box_px),
-        seconds: mean(|f| f.seconds),
+    Ok(SearchErrors {
+        outline: mean_of(&found, |f| f.outline),
+        box_px: mean_of(&found, |f| f.box_px),
+        seconds: mean_of(&found, |f| f.seconds),
     })
 }
 
-fn search(known: &Known, options: &SegmentOptions) -> Result<Found> {
-    let (found, seconds) = timed(RUNS, || segment(&known.photo, options))?;
-    let outline = 1.0 - overlap(&found.tight, &known.mask);
-    Ok(Found {
-        outline,
+fn search_photo(known: &Known, options: &SegmentOptions) -> Result<SearchErrors> {
+    let (found, seconds) = timed(TIMED_RUNS, || segment(&known.photo, options))?;
+    Ok(SearchErrors {
+        outline: 1.0 - soft_overlap(&found.tight, &known.mask),
         box_px: box_error(&found.hull, known.box_px),
         seconds,
     })
 }
 
-/// Intersection over union, where a pixel counts as far as it is covered.
-fn overlap(a: &Image<Coverage>, b: &Image<Coverage>) -> f64 {
-    let pairs = || a.pixels().iter().zip(b.pixels());
-    let sum = |of: fn(f32, f32) -> f32| pairs().map(|(a, b)| f64::from(of(a.0, b.0))).sum::<f64>();
-    sum(f32::min) / sum(f32::max).max(f64::MIN_POSITIVE)
+/// Intersection over union, with pixels weighted by coverage.
+fn soft_overlap(a: &Image<Coverage>, b: &Image<Coverage>) -> f64 {
+    let both = sum_of_pairs(a, b, f32::min);
+    both / sum_of_pairs(a, b, f32::max).max(f64::MIN_POSITIVE)
 }
 
-fn diagram(file: &str, title: &str, error: &str, bottles: usize, points: Vec<Point>) -> Diagram {
+fn sum_of_pairs(a: &Image<Coverage>, b: &Image<Coverage>, of: fn(f32, f32) -> f32) -> f64 {
+    let pairs = a.pixels().iter().zip(b.pixels());
+    pairs.map(|(a, b)| f64::from(of(a.0, b.0))).sum()
+}
+
+/// What both diagrams share.
+fn search_diagram(
+    found: &[MeasuredSearch],
+    input: &str,
+    error: fn(&SearchErrors) -> f64,
+) -> Diagram {
     Diagram {
-        file: file.into(),
-        title: title.into(),
-        input: format!("{bottles} see-through bottles on an uneven screen with noise, made in code"),
-        error: error.into(),
+        input: input.into(),
         cost: "CPU seconds per photo".into(),
         reference: "the bottles' outline (closed form)".into(),
-        points,
+        points: found.iter().map(|search| search.point(error)).collect(),
         inputs: true,
         why: "However large a photo is, its outline is moved to where the photo itself changes, so that a search of 640 px \
-              is right to 0.2 % of the object; a box that is a few pixels off in a photo of 2400 is so by a fraction of one in a \
-              picture of 640 that the object is put into. Draft and reference move along the curve."
+              is right to 0.2 % of the object; a box that is a few pixels off in a photo of 2400 is off by a fraction of one in a \
+              picture of 640 into which the object is put. Draft and reference move along the curve."
             .into(),
         ..Diagram::default()
     }
@@ -147,12 +175,17 @@ mod tests {
 
     #[test]
     fn every_quality_searches_a_size_that_is_measured() {
-        assert!(Quality::ALL.iter().all(|q| SIDES.contains(&side_of(*q))));
+        assert!(
+            Quality::ALL
+                .iter()
+                .all(|q| SEARCH_SIDES_PX.contains(&search_side(*q)))
+        );
     }
 
     #[test]
-    fn a_search_is_held_against_the_closed_form() {
-        let found = searched(&[made::enlarged(1, 1)], side_of(Quality::Draft)).unwrap();
+    fn a_search_is_compared_with_the_closed_form() {
+        let found =
+            mean_result(&[made::enlarged_photo(1, 1)], search_side(Quality::Draft)).unwrap();
         assert!(
             found.outline < 0.03 && found.box_px < 3.0 && found.seconds > 0.0,
             "{found:?}"
@@ -161,7 +194,7 @@ mod tests {
 
     #[test]
     fn a_larger_camera_sees_the_same_bottle() {
-        let [small, large] = [1, 2].map(|times| made::enlarged(2, times));
+        let [small, large] = [1, 2].map(|times| made::enlarged_photo(2, times));
         let area = |known: &Known| {
             known
                 .mask
@@ -172,6 +205,6 @@ mod tests {
         };
         assert!((area(&large) / area(&small) / 4.0 - 1.0).abs() < 1e-3);
         assert_eq!(large.box_px, small.box_px.map(|side| 2.0 * side));
-        assert!((overlap(&small.mask, &small.mask) - 1.0).abs() < 1e-12);
+        assert!((soft_overlap(&small.mask, &small.mask) - 1.0).abs() < 1e-12);
     }
 }

@@ -1,11 +1,15 @@
 //! Photos with known mattes, as the sample world has them.
 
 use petcomp::Image;
+use petcomp::color::{linear_to_srgb, srgb_to_linear};
 use petcomp::io;
 use petcomp::{Coverage, LinearRgb};
 use petcomp::{Error, Result};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
+
+/// The largest value of a photo's 8 bits.
+const MAX_CODE: f32 = 255.0;
 
 /// A photo and all that its renderer knows of it; all pictures are scene-linear and of one size.
 pub(crate) struct Known {
@@ -22,38 +26,36 @@ pub(crate) struct Known {
     pub(crate) mask: Image<Coverage>,
     /// Left, top, right and bottom of the outline, pixels.
     pub(crate) box_px: [f64; 4],
-    pub(crate) noise: Noise,
+    pub(crate) noise: PhotoNoise,
     /// Colour of the screen's paint.
     pub(crate) paint: LinearRgb,
 }
 
 /// The paints of the sample world's two screens.
-const PAINTS: [LinearRgb; 2] = [
-    LinearRgb::new(0.045, 0.42, 0.085),
-    LinearRgb::new(0.03, 0.095, 0.52),
-];
+const GREEN_PAINT: LinearRgb = LinearRgb::new(0.045, 0.42, 0.085);
+const BLUE_PAINT: LinearRgb = LinearRgb::new(0.03, 0.095, 0.52);
 
 #[derive(Deserialize)]
-struct Document {
-    photos: Vec<Record>,
+struct TruthFile {
+    photos: Vec<TruthRecord>,
 }
 
 #[derive(Deserialize)]
-struct Record {
+struct TruthRecord {
     name: String,
     bbox_px: [f64; 4],
-    files: Files,
-    sensor: Noise,
-    screen: Paint,
+    files: TruthPaths,
+    sensor: PhotoNoise,
+    screen: ScreenPaint,
 }
 
 #[derive(Deserialize)]
-struct Paint {
+struct ScreenPaint {
     albedo_linear: [f32; 3],
 }
 
 #[derive(Deserialize)]
-struct Files {
+struct TruthPaths {
     photo_png: PathBuf,
     foreground: PathBuf,
     transmittance: PathBuf,
@@ -64,28 +66,41 @@ struct Files {
 
 /// Sensor noise: the variance of a value is `shot^2 * value + read^2`.
 #[derive(Clone, Copy, Debug, Deserialize)]
-pub(crate) struct Noise {
+pub(crate) struct PhotoNoise {
     pub(crate) shot: f64,
     pub(crate) read: f64,
+}
+
+impl PhotoNoise {
+    fn deviation(&self, value: f32) -> f64 {
+        (self.shot * self.shot * f64::from(value) + self.read * self.read).sqrt()
+    }
+
+    /// A value as a sensor records it, in 8 bits; `normal` is a normal number.
+    fn recorded(&self, value: f32, normal: f64) -> f32 {
+        let noisy = value + (self.deviation(value) * normal) as f32;
+        in_eight_bits(noisy.clamp(0.0, 1.0))
+    }
+}
+
+fn in_eight_bits(value: f32) -> f32 {
+    let code = MAX_CODE * linear_to_srgb(value);
+    srgb_to_linear(code.round() / MAX_CODE)
 }
 
 /// The records of a folder, by file name, still to be read.
 pub(crate) struct Truths {
     folder: PathBuf,
-    records: Vec<Record>,
+    records: Vec<TruthRecord>,
 }
 
 impl Truths {
     /// Finds the records (`*.json`) of a folder.
-    pub(crate) fn of(folder: &Path) -> Result<Self> {
-        let entries = std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
-        let paths =
-            entries.map(|entry| entry.map(|e| e.path()).map_err(|e| Error::file(folder, e)));
-        let mut paths: Vec<PathBuf> = paths.collect::<Result<_>>()?;
-        paths.retain(|path| path.extension().is_some_and(|e| e == "json"));
-        paths.sort();
-        let documents: Vec<Document> = paths.iter().map(io::read_json).collect::<Result<_>>()?;
-        let records: Vec<Record> = documents.into_iter().flat_map(|d| d.photos).collect();
+    pub(crate) fn in_folder(folder: &Path) -> Result<Self> {
+        let mut records = Vec::new();
+        for path in json_files(folder)? {
+            records.extend(io::read_json::<TruthFile>(&path)?.photos);
+        }
         if records.is_empty() {
             return Err(Error::file(
                 folder,
@@ -105,34 +120,58 @@ impl Truths {
     /// Reads photo `i`.
     pub(crate) fn read(&self, i: usize) -> Result<Known> {
         let record = &self.records[i];
-        let color = |name: &Path| io::inside(&self.folder, name).and_then(io::read::<LinearRgb>);
-        let mask: Image<Coverage> = io::read(io::inside(&self.folder, &record.files.mask)?)?;
-        // Linear in 8 bits, which is how coverage is stored and colour is not.
-        let view =
-            color(&record.files.transmittance_view)?.map(|p| p.map(petcomp::color::linear_to_srgb));
-        let inside = |t: LinearRgb, c: Coverage| t.map(|t| 1.0 + c.0.min(1.0) * (t - 1.0));
+        let files = &record.files;
+        let mask: Image<Coverage> = io::read(io::inside(&self.folder, &files.mask)?)?;
         Ok(Known {
             name: record.name.clone(),
-            photo: color(&record.files.photo_png)?,
-            foreground: color(&record.files.foreground)?,
-            transmittance: color(&record.files.transmittance)?.zip_map(&mask, inside),
-            view,
-            screen: color(&record.files.screen_plate)?,
+            photo: self.read_color(&files.photo_png)?,
+            foreground: self.read_color(&files.foreground)?,
+            transmittance: self
+                .read_color(&files.transmittance)?
+                .zip_map(&mask, one_outside),
+            view: self.read_view(&files.transmittance_view)?,
+            screen: self.read_color(&files.screen_plate)?,
             mask,
             box_px: record.bbox_px,
             noise: record.sensor,
             paint: record.screen.albedo_linear.into(),
         })
     }
+
+    fn read_view(&self, name: &Path) -> Result<Image<LinearRgb>> {
+        // Linear in 8 bits, which is how coverage is stored and colour is not.
+        Ok(self.read_color(name)?.map(|p| p.map(linear_to_srgb)))
+    }
+
+    fn read_color(&self, name: &Path) -> Result<Image<LinearRgb>> {
+        io::read(io::inside(&self.folder, name)?)
+    }
+}
+
+/// Sorted.
+fn json_files(folder: &Path) -> Result<Vec<PathBuf>> {
+    let entries = std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
+    let mut paths = Vec::new();
+    for entry in entries {
+        paths.push(entry.map_err(|e| Error::file(folder, e))?.path());
+    }
+    paths.retain(|path| path.extension().is_some_and(|e| e == "json"));
+    paths.sort();
+    Ok(paths)
+}
+
+/// Transmittance, blended with 1 where the object does not cover the pixel.
+fn one_outside(transmittance: LinearRgb, coverage: Coverage) -> LinearRgb {
+    transmittance.map(|t| 1.0 + coverage.0.min(1.0) * (t - 1.0))
 }
 
 impl Known {
     /// The empty screen painted green where it is blue, and blue where it is green, under the same light.
     pub(super) fn other_screen(&self) -> Image<LinearRgb> {
         let other = if self.paint.g > self.paint.b {
-            PAINTS[1]
+            BLUE_PAINT
         } else {
-            PAINTS[0]
+            GREEN_PAINT
         };
         let change = LinearRgb::new(
             other.r / self.paint.r,
@@ -146,22 +185,9 @@ impl Known {
     pub(crate) fn on(&self, screen: &Image<LinearRgb>, seed: u64) -> Image<LinearRgb> {
         let mut draw = super::normal(seed);
         let mut seen = self.foreground.clone();
-        for ((pixel, t), k) in seen
-            .pixels_mut()
-            .iter_mut()
-            .zip(self.transmittance.pixels())
-            .zip(screen.pixels())
-        {
-            *pixel = (*pixel + *t * *k).map(|v| {
-                let deviation = (self.noise.shot * self.noise.shot * f64::from(v)
-                    + self.noise.read * self.noise.read)
-                    .sqrt();
-                let code = 255.0
-                    * petcomp::color::linear_to_srgb(
-                        (v + (deviation * draw()) as f32).clamp(0.0, 1.0),
-                    );
-                petcomp::color::srgb_to_linear(code.round() / 255.0)
-            });
+        let behind = self.transmittance.pixels().iter().zip(screen.pixels());
+        for (pixel, (t, k)) in seen.pixels_mut().iter_mut().zip(behind) {
+            *pixel = (*pixel + *t * *k).map(|v| self.noise.recorded(v, draw()));
         }
         seen
     }

@@ -1,41 +1,33 @@
 //! The renderer's samples and filters: error against Cycles, over run time.
 
+use super::golden::GoldenScene;
 use crate::clock::timed;
+use crate::diagram::invisible_error;
 use crate::{Diagram, Point};
 use petcomp::DeepImage;
 use petcomp::Image;
 use petcomp::Quality;
+use petcomp::Result;
 use petcomp::composite;
-use petcomp::io;
 use petcomp::render::{RenderOptions, render, render_reference};
-use petcomp::scene::{Shot, cycles};
-use petcomp::{Error, Result};
+use petcomp::scene::Shot;
 use petcomp::{LinearRgb, PremulRgba};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// The curve that the qualities lie on.
 const PRESETS: &str = "presets";
-const MEGA: f64 = 1e6;
-const PIXELS: [usize; 4] = [1, 3, 4, 6];
-const LIGHTS: [usize; 4] = [1, 2, 4, 6];
-const SKIES: [usize; 4] = [8, 16, 64, 128];
-const CELLS: [f64; 4] = [4.0, 2.0, 1.0, 0.66];
+const PIXELS_PER_MEGAPIXEL: f64 = 1e6;
+const PIXEL_SAMPLES: [usize; 4] = [1, 3, 4, 6];
+const LIGHT_SAMPLES: [usize; 4] = [1, 2, 4, 6];
+const SKY_SAMPLES: [usize; 4] = [8, 16, 64, 128];
+const CELLS_PX: [f64; 4] = [4.0, 2.0, 1.0, 0.66];
 /// The scene on which filtered samples stand beside plain ones, which take a thousand times as long.
-const PLAIN: &str = "tilted_translucent";
+const PLAIN_SCENE: &str = "tilted_translucent";
 /// Samples along each side of a pixel there.
-const SIDES: [usize; 5] = [1, 2, 3, 4, 6];
-/// An error that eight bits do not show: half a code at middle grey.
-const UNSEEN: f64 = 0.004;
-
-/// A golden scene.
-struct Scene {
-    name: String,
-    shot: Shot,
-    wanted: Image<LinearRgb>,
-}
+const PLAIN_SIDES: [usize; 5] = [1, 2, 3, 4, 6];
 
 /// What a scene costs, and how wrong it is.
-struct Cost {
+struct SceneCost {
     mean_square: f64,
     seconds: f64,
     pixels: f64,
@@ -46,235 +38,245 @@ struct Cost {
 /// # Errors
 /// A scene or a picture that cannot be read.
 pub fn diagrams(golden: &Path, runs: usize) -> Result<Vec<Diagram>> {
-    let scenes = scenes(golden)?;
+    let scenes = GoldenScene::all_in(golden)?;
     if scenes.is_empty() {
         return Ok(Vec::new());
     }
-    let mut found = samples(&scenes, runs)?;
-    let plain: Vec<Scene> = scenes
-        .into_iter()
-        .filter(|scene| scene.name == PLAIN)
-        .collect();
-    if !plain.is_empty() {
-        found.push(filter(&plain, runs)?);
+    let mut found = sample_diagrams(&scenes, runs)?;
+    if let Some(scene) = scenes.iter().find(|scene| scene.name == PLAIN_SCENE) {
+        found.push(filter_diagram(scene, runs)?);
     }
     Ok(found)
 }
 
 /// Every setting, on the piles and on all scenes.
-fn samples(scenes: &[Scene], runs: usize) -> Result<Vec<Diagram>> {
+fn sample_diagrams(scenes: &[GoldenScene], runs: usize) -> Result<Vec<Diagram>> {
     let (mut all, mut piles) = (Vec::new(), Vec::new());
-    for (curve, setting, options) in settings() {
-        let costs = measured(scenes, runs, |shot| render(shot, &options))?;
-        let of = |is_in: fn(&Scene) -> bool| {
-            let some = scenes
-                .iter()
-                .zip(&costs)
-                .filter(|(scene, _)| is_in(scene))
-                .map(|(_, cost)| cost);
-            point(curve, &setting, some).used_where(|q| curve == PRESETS && q.render() == options)
-        };
-        piles.push(of(Scene::is_pile));
-        all.push(of(|_| true));
+    for setting in render_settings() {
+        let costs = measure_scenes(scenes, runs, |shot| render(shot, &setting.options))?;
+        let of_piles = scenes.iter().zip(&costs).filter(|(s, _)| s.is_pile());
+        piles.push(setting.point(of_piles.map(|(_, cost)| cost)));
+        all.push(setting.point(&costs));
     }
-    let count = scenes.iter().filter(|scene| scene.is_pile()).count();
-    let bottles = format!("{count} golden piles of 5 to 30 bottles");
-    let everything = format!("{} golden scenes", scenes.len());
+    let pile_count = scenes.iter().filter(|scene| scene.is_pile()).count();
     Ok(vec![
-        diagram(
-            "render_piles",
-            "render: samples, piles of bottles",
-            bottles,
-            piles,
-        ),
-        Diagram {
-            why: EDGES.into(),
-            ..diagram("render_all", "render: samples, all scenes", everything, all)
-        },
+        pile_diagram(piles, pile_count),
+        all_scenes_diagram(all, scenes.len()),
     ])
 }
 
-/// Filtered samples and plain ones.
-fn filter(scenes: &[Scene], runs: usize) -> Result<Diagram> {
-    let mut points = Vec::new();
-    for subsamples in SIDES {
-        let options = RenderOptions {
-            subsamples,
-            ..RenderOptions::default()
-        };
-        let is_default = options == RenderOptions::default();
-        let setting = format!("{subsamples} x {subsamples}");
-        let filtered = point(
-            "filtered",
-            &setting,
-            &measured(scenes, runs, |shot| render(shot, &options))?,
-        );
-        points.push(filtered.used_where(|q| is_default && q == Quality::default()));
-        points.push(point(
-            "plain samples",
-            &setting,
-            &measured(scenes, 1, |shot| render_reference(shot, &options))?,
-        ));
+fn pile_diagram(points: Vec<Point>, count: usize) -> Diagram {
+    Diagram {
+        file: "render_piles".into(),
+        title: "render: samples, piles of bottles".into(),
+        input: format!("{count} golden piles of 5 to 30 bottles"),
+        ..golden_diagram(points)
     }
-    Ok(diagram(
-        "render_filter",
-        "render: filtered and plain samples",
-        format!("golden scene {PLAIN}"),
-        points,
-    ))
 }
 
-/// What is to be known of the scenes.
-const EDGES: &str = "Cards of the scenes that are no piles are bare rectangles, whose edges want more samples of a pixel than \
+fn all_scenes_diagram(points: Vec<Point>, count: usize) -> Diagram {
+    Diagram {
+        file: "render_all".into(),
+        title: "render: samples, all scenes".into(),
+        input: format!("{count} golden scenes"),
+        why: EDGE_NOTE.into(),
+        ..golden_diagram(points)
+    }
+}
+
+/// Filtered samples and plain ones.
+fn filter_diagram(scene: &GoldenScene, runs: usize) -> Result<Diagram> {
+    let mut points = Vec::new();
+    for side in PLAIN_SIDES {
+        points.extend(filter_points(scene, side, runs)?);
+    }
+    Ok(Diagram {
+        file: "render_filter".into(),
+        title: "render: filtered and plain samples".into(),
+        input: format!("golden scene {PLAIN_SCENE}"),
+        ..golden_diagram(points)
+    })
+}
+
+fn filter_points(scene: &GoldenScene, subsamples: usize, runs: usize) -> Result<[Point; 2]> {
+    let default = RenderOptions::default();
+    let options = RenderOptions {
+        subsamples,
+        ..default
+    };
+    let setting = square_name(subsamples);
+    let filtered = scene.measure(runs, |shot| render(shot, &options))?;
+    let plain = scene.measure(1, |shot| render_reference(shot, &options))?;
+    let filtered = mean_point("filtered", &setting, [&filtered]);
+    Ok([
+        filtered.used_where(|quality| options == default && quality == Quality::default()),
+        mean_point("plain samples", &setting, [&plain]),
+    ])
+}
+
+/// Which scenes want more samples.
+const EDGE_NOTE: &str = "Cards of the scenes that are no piles are bare rectangles, whose edges want more samples of a pixel than \
     cut-outs do, which end in their own soft alpha.";
 
-fn diagram(file: &str, title: &str, input: String, points: Vec<Point>) -> Diagram {
+/// What all diagrams share.
+fn golden_diagram(points: Vec<Point>) -> Diagram {
     Diagram {
-        file: file.into(),
-        title: title.into(),
-        input,
         error: "RMS error, scene-linear".into(),
         cost: "CPU seconds per megapixel".into(),
         reference: "Blender 3.4.1 Cycles, 2048 samples or more a pixel (golden/render)".into(),
         points,
-        limit: Some((UNSEEN, "half of an 8-bit code at middle grey".into())),
+        limit: invisible_error(),
         ..Diagram::default()
     }
 }
 
+/// A point of a curve.
+struct RenderSetting {
+    curve: &'static str,
+    name: String,
+    options: RenderOptions,
+}
+
+impl RenderSetting {
+    fn new(curve: &'static str, name: String, options: RenderOptions) -> Self {
+        Self {
+            curve,
+            name,
+            options,
+        }
+    }
+
+    fn is_preset(&self) -> bool {
+        self.curve == PRESETS
+    }
+
+    fn point<'a>(&self, costs: impl IntoIterator<Item = &'a SceneCost>) -> Point {
+        mean_point(self.curve, &self.name, costs)
+            .used_where(|q| self.is_preset() && q.render() == self.options)
+    }
+}
+
 /// The presets, and each number of the default changed by itself.
-fn settings() -> Vec<(&'static str, String, RenderOptions)> {
-    let usual = RenderOptions::default();
+fn render_settings() -> Vec<RenderSetting> {
     let presets = super::settings()
-        .into_iter()
-        .map(|(name, options)| (PRESETS, name.to_owned(), options));
-    let square = |n: usize| format!("{n} x {n}");
-    let pixels = PIXELS.map(|n| {
-        (
-            "samples of a pixel",
-            square(n),
-            RenderOptions {
-                subsamples: n,
-                ..usual
-            },
-        )
-    });
-    let lights = LIGHTS.map(|n| {
-        (
-            "samples of a light",
-            square(n),
-            RenderOptions {
-                light_samples: n,
-                ..usual
-            },
-        )
-    });
-    let skies = SKIES.map(|n| {
-        (
-            "directions of the sky",
-            n.to_string(),
-            RenderOptions {
-                ambient_samples: n,
-                ..usual
-            },
-        )
-    });
-    let cells = CELLS.map(|px| {
-        (
-            "irradiance cells",
-            format!("{px} px"),
-            RenderOptions {
-                cell_px: px,
-                ..usual
-            },
-        )
-    });
+        .map(|(name, options)| RenderSetting::new(PRESETS, name.to_owned(), options));
     presets
-        .chain(pixels)
-        .chain(lights)
-        .chain(skies)
-        .chain(cells)
+        .into_iter()
+        .chain(PIXEL_SAMPLES.map(pixel_setting))
+        .chain(LIGHT_SAMPLES.map(light_setting))
+        .chain(SKY_SAMPLES.map(sky_setting))
+        .chain(CELLS_PX.map(cell_setting))
         .collect()
 }
 
-fn scenes(golden: &Path) -> Result<Vec<Scene>> {
-    let entries = std::fs::read_dir(golden)
-        .into_iter()
-        .flatten()
-        .flatten()
-        .map(|entry| entry.path());
-    let mut folders: Vec<PathBuf> = entries
-        .filter(|folder| folder.join("reference.exr").exists())
-        .collect();
-    folders.sort();
-    let scene = |folder: &PathBuf| {
-        let name = folder
-            .file_name()
-            .map(|n| n.to_string_lossy().into_owned())
-            .unwrap_or_default();
-        let (shot, wanted) = (
-            cycles::import(folder.join("scene.json"), None)?,
-            io::read(folder.join("reference.exr"))?,
-        );
-        Ok(Scene { name, shot, wanted })
+fn pixel_setting(subsamples: usize) -> RenderSetting {
+    let options = RenderOptions {
+        subsamples,
+        ..RenderOptions::default()
     };
-    folders.iter().map(scene).collect()
+    RenderSetting::new("samples of a pixel", square_name(subsamples), options)
 }
 
-fn measured(
-    scenes: &[Scene],
-    runs: usize,
-    render: impl Fn(&Shot) -> DeepImage + Sync,
-) -> Result<Vec<Cost>> {
-    let cost = |scene: &Scene| {
-        let frame = || {
-            Ok(composite::frame(
-                &render(&scene.shot),
-                scene.shot.plate.as_deref(),
-            ))
-        };
-        let (frame, seconds) = timed(runs, frame)?;
-        Ok(Cost {
-            mean_square: mean_square(&frame, scene)?,
-            seconds,
-            pixels: frame.pixels().len() as f64,
-        })
+fn light_setting(light_samples: usize) -> RenderSetting {
+    let options = RenderOptions {
+        light_samples,
+        ..RenderOptions::default()
     };
-    scenes.iter().map(cost).collect()
+    RenderSetting::new("samples of a light", square_name(light_samples), options)
 }
 
-/// Root mean squared error over scenes, each counting alike, and the CPU seconds of all of them per megapixel.
-fn point<'a>(curve: &str, setting: &str, costs: impl IntoIterator<Item = &'a Cost>) -> Point {
-    let costs: Vec<&Cost> = costs.into_iter().collect();
-    let sum = |of: fn(&Cost) -> f64| costs.iter().map(|cost| of(cost)).sum::<f64>();
-    let error = (sum(|c| c.mean_square) / costs.len() as f64).sqrt();
-    Point::new(
-        curve,
-        setting,
-        sum(|c| c.seconds) / sum(|c| c.pixels) * MEGA,
-        error,
+fn sky_setting(ambient_samples: usize) -> RenderSetting {
+    let options = RenderOptions {
+        ambient_samples,
+        ..RenderOptions::default()
+    };
+    RenderSetting::new(
+        "directions of the sky",
+        ambient_samples.to_string(),
+        options,
     )
 }
 
-impl Scene {
+fn cell_setting(cell_px: f64) -> RenderSetting {
+    let options = RenderOptions {
+        cell_px,
+        ..RenderOptions::default()
+    };
+    RenderSetting::new("irradiance cells", format!("{cell_px} px"), options)
+}
+
+fn square_name(side: usize) -> String {
+    format!("{side} x {side}")
+}
+
+fn measure_scenes(
+    scenes: &[GoldenScene],
+    runs: usize,
+    render: impl Fn(&Shot) -> DeepImage + Sync,
+) -> Result<Vec<SceneCost>> {
+    scenes
+        .iter()
+        .map(|scene| scene.measure(runs, &render))
+        .collect()
+}
+
+impl GoldenScene {
     /// Cut-outs of bottles in a heap: what datasets are made of.
     fn is_pile(&self) -> bool {
         self.name.starts_with("pile_of_")
     }
+
+    fn measure(
+        &self,
+        runs: usize,
+        render: impl Fn(&Shot) -> DeepImage + Sync,
+    ) -> Result<SceneCost> {
+        let plate = self.shot.plate.as_deref();
+        let (frame, seconds) = timed(runs, || Ok(composite::frame(&render(&self.shot), plate)))?;
+        Ok(SceneCost {
+            mean_square: self.mean_square_error(&frame)?,
+            seconds,
+            pixels: frame.pixels().len() as f64,
+        })
+    }
+
+    fn mean_square_error(&self, frame: &Image<PremulRgba>) -> Result<f64> {
+        if frame.size() != self.wanted.size() {
+            return Err(self.size_error(frame.size()));
+        }
+        let pairs = frame.pixels().iter().zip(self.wanted.pixels());
+        let sum: f64 = pairs.flat_map(|(p, q)| squared_differences(p, q)).sum();
+        Ok(sum / (3 * frame.pixels().len()) as f64)
+    }
 }
 
-fn mean_square(frame: &Image<PremulRgba>, scene: &Scene) -> Result<f64> {
-    if frame.size() != scene.wanted.size() {
-        let what = format!(
-            "{:?} pixels, reference has {:?}",
-            frame.size(),
-            scene.wanted.size()
-        );
-        return Err(Error::value(&scene.name, what));
-    }
-    let pairs = frame.pixels().iter().zip(scene.wanted.pixels());
-    let differences = pairs.flat_map(|(p, q)| [p.r - q.r, p.g - q.g, p.b - q.b]);
-    Ok(differences.map(|d| f64::from(d).powi(2)).sum::<f64>() / (3 * frame.pixels().len()) as f64)
+fn squared_differences(a: &PremulRgba, b: &LinearRgb) -> [f64; 3] {
+    [a.r - b.r, a.g - b.g, a.b - b.b].map(|d| f64::from(d).powi(2))
+}
+
+/// Root mean squared error over scenes, all of the same weight, and the CPU seconds of all of them per megapixel.
+fn mean_point<'a>(
+    curve: &str,
+    setting: &str,
+    costs: impl IntoIterator<Item = &'a SceneCost>,
+) -> Point {
+    let costs: Vec<&SceneCost> = costs.into_iter().collect();
+    let mean_square = total(&costs, |cost| cost.mean_square) / costs.len() as f64;
+    Point::new(
+        curve,
+        setting,
+        seconds_per_megapixel(&costs),
+        mean_square.sqrt(),
+    )
+}
+
+fn seconds_per_megapixel(costs: &[&SceneCost]) -> f64 {
+    let pixels = total(costs, |cost| cost.pixels);
+    total(costs, |cost| cost.seconds) / pixels * PIXELS_PER_MEGAPIXEL
+}
+
+fn total(costs: &[&SceneCost], of: fn(&SceneCost) -> f64) -> f64 {
+    costs.iter().map(|cost| of(cost)).sum()
 }
 
 #[cfg(test)]
@@ -283,43 +285,37 @@ mod tests {
 
     #[test]
     fn each_number_of_the_default_is_changed_by_itself() {
-        let usual = RenderOptions::default();
+        let default = RenderOptions::default();
         let changed = |o: &RenderOptions| {
             [
-                o.subsamples != usual.subsamples,
-                o.light_samples != usual.light_samples,
-                o.ambient_samples != usual.ambient_samples,
-                o.cell_px != usual.cell_px,
+                o.subsamples != default.subsamples,
+                o.light_samples != default.light_samples,
+                o.ambient_samples != default.ambient_samples,
+                o.cell_px != default.cell_px,
             ]
             .into_iter()
             .filter(|c| *c)
             .count()
         };
-        let all = settings();
+        let all = render_settings();
         assert!(
             all.iter()
-                .filter(|(curve, ..)| *curve != PRESETS)
-                .all(|(.., o)| changed(o) == 1)
+                .filter(|s| !s.is_preset())
+                .all(|s| changed(&s.options) == 1)
         );
-        assert_eq!(
-            all.iter()
-                .filter(|(curve, _, o)| *curve == PRESETS && *o == usual)
-                .count(),
-            1
-        );
+        let is_default = |s: &&RenderSetting| s.is_preset() && s.options == default;
+        assert_eq!(all.iter().filter(is_default).count(), 1);
     }
 
     #[test]
     fn a_preset_that_does_more_is_nearer_to_cycles() {
         let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../golden/render");
-        let scenes: Vec<_> = scenes(&golden)
-            .unwrap()
-            .into_iter()
-            .filter(|s| s.name == "pile_of_5")
-            .collect();
-        let measured =
-            |options: RenderOptions| measured(&scenes, 1, |shot| render(shot, &options)).unwrap();
-        let error = |options| point("", "", &measured(options)).error;
+        let scenes = GoldenScene::all_in(&golden).unwrap();
+        let pile = scenes.iter().find(|s| s.name == "pile_of_5").unwrap();
+        let error = |options: RenderOptions| {
+            let cost = pile.measure(1, |shot| render(shot, &options)).unwrap();
+            mean_point("", "", [&cost]).error
+        };
         let [draft, normal, high] = [
             Quality::Draft.render(),
             RenderOptions::default(),

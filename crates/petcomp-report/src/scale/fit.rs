@@ -1,12 +1,15 @@
 //! A cost as a sum of what things cost each: least squares without negative prices.
 
-use super::{Measured, Point, missing};
+use super::{ScaleMeasurements, ScalePoint, missing_error};
 use nalgebra::{DMatrix, DVector};
 use petcomp::Result;
 
+/// Singular values below this are zero: columns have length 1.
+const SINGULAR_EPSILON: f64 = 1e-12;
+
 /// What each thing costs, and how far measurements are from that.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Fit {
+pub struct CostFit {
     /// What is paid for.
     pub terms: Vec<&'static str>,
     /// The price of each; 0 for what does not show.
@@ -19,139 +22,123 @@ pub struct Fit {
 
 /// Time and memory of a picture.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Model {
+pub struct CostModel {
     /// Seconds of a processor per picture, of points on one thread.
-    pub time: Fit,
+    pub time: CostFit,
     /// Most bytes of a process, of all points.
-    pub memory: Fit,
+    pub memory: CostFit,
 }
+
+/// What is paid for, and how much of it a point has.
+type Term = (&'static str, fn(&ScalePoint) -> f64);
 
 /// Light is looked up on a lattice that is finest along the sides of cards, however small these are in the picture, and every
 /// place of it looks through as many layers as may lie above; and any card may stand in another's light.
-const TIME: [&str; 6] = [
-    "picture",
-    "megapixel",
-    "card",
-    "megapixel of a layer",
-    "1000 px of card sides under a layer",
-    "pair of cards",
+const TIME_TERMS: [Term; 6] = [
+    ("picture", |_| 1.0),
+    ("megapixel", |p| p.case.megapixels()),
+    ("card", |p| p.case.cards as f64),
+    ("megapixel of a layer", |p| p.case.megapixels() * p.layers),
+    ("1000 px of card sides under a layer", |p| {
+        card_sides(p) * p.layers
+    }),
+    ("pair of cards", card_pairs),
 ];
+
 /// Textures of cards are held with a border, and light with what lies above it: cards that overlap.
-const MEMORY: [&str; 5] = [
-    "process",
-    "megapixel in hand",
-    "megapixel of a layer in hand",
-    "1000 px of card sides in hand",
-    "pair of cards that overlap in hand",
+const MEMORY_TERMS: [Term; 5] = [
+    ("process", |_| 1.0),
+    ("megapixel in hand", |p| in_hand(p, p.case.megapixels())),
+    ("megapixel of a layer in hand", |p| {
+        in_hand(p, p.case.megapixels() * p.layers)
+    }),
+    ("1000 px of card sides in hand", |p| {
+        in_hand(p, card_sides(p))
+    }),
+    ("pair of cards that overlap in hand", |p| {
+        in_hand(p, p.case.cards as f64 * p.layers)
+    }),
 ];
 
-/// What a picture has of each term of its time.
-fn time_terms(point: &Point) -> Vec<f64> {
-    let (pixels, cards, layers) = (
-        point.case.megapixels(),
-        point.case.cards as f64,
-        point.layers,
-    );
-    vec![
-        1.0,
-        pixels,
-        cards,
-        pixels * layers,
-        sides(point) * layers,
-        pairs(point),
-    ]
-}
-
-/// What a process has of each term of its memory.
-fn memory_terms(point: &Point) -> Vec<f64> {
-    let (pixels, overlaps) = (
-        point.case.megapixels(),
-        point.case.cards as f64 * point.layers,
-    );
-    let in_hand = [pixels, pixels * point.layers, sides(point), overlaps]
-        .map(|v| point.case.threads as f64 * v);
-    std::iter::once(1.0).chain(in_hand).collect()
+/// What all threads together have of what a picture has.
+fn in_hand(point: &ScalePoint, of_picture: f64) -> f64 {
+    point.case.threads as f64 * of_picture
 }
 
 /// Thousands of pixels along the sides of all cards, were each a square: the root of each card's megapixels.
-fn sides(point: &Point) -> f64 {
+fn card_sides(point: &ScalePoint) -> f64 {
     let cards = point.case.cards as f64;
     cards * (point.case.megapixels() * point.layers / cards.max(1.0)).sqrt()
 }
 
-fn pairs(point: &Point) -> f64 {
+fn card_pairs(point: &ScalePoint) -> f64 {
     let cards = point.case.cards as f64;
     0.5 * cards * (cards - 1.0)
 }
 
-impl Model {
+/// How much a point has of each term.
+fn amounts(terms: &[Term], point: &ScalePoint) -> Vec<f64> {
+    terms.iter().map(|(_, amount)| amount(point)).collect()
+}
+
+impl CostModel {
     /// Fits both costs.
     ///
     /// # Errors
     /// Without points, or none on one thread.
-    pub fn of(measured: &Measured) -> Result<Self> {
-        let of = |terms: &[&'static str],
-                  row: fn(&Point) -> Vec<f64>,
-                  value: fn(&Point) -> f64,
-                  points: Vec<&Point>| {
-            let rows: Vec<_> = points.iter().map(|point| row(point)).collect();
-            let values: Vec<_> = points.iter().map(|point| value(point)).collect();
-            Fit::of(terms, &rows, &values).ok_or_else(|| missing("no points to fit"))
-        };
-        let alone = measured
-            .points
-            .iter()
-            .filter(|point| point.case.threads == 1)
-            .collect();
+    pub fn fit(measured: &ScaleMeasurements) -> Result<Self> {
+        let all: Vec<_> = measured.points.iter().collect();
+        let single = measured.single_threaded();
         Ok(Self {
-            time: of(&TIME, time_terms, |point| point.cpu_seconds, alone)?,
-            memory: of(
-                &MEMORY,
-                memory_terms,
-                |point| point.peak_bytes,
-                measured.points.iter().collect(),
-            )?,
+            time: fit_terms(&TIME_TERMS, &single, |point| point.cpu_seconds)?,
+            memory: fit_terms(&MEMORY_TERMS, &all, |point| point.peak_bytes)?,
         })
     }
 
     /// Seconds of a processor for a picture like a point's.
-    pub fn seconds(&self, point: &Point) -> f64 {
-        self.time.at(&time_terms(point))
+    pub fn seconds(&self, point: &ScalePoint) -> f64 {
+        self.time.cost_of(&amounts(&TIME_TERMS, point))
     }
 
     /// Most bytes of a process that makes pictures like a point's.
-    pub fn bytes(&self, point: &Point) -> f64 {
-        self.memory.at(&memory_terms(point))
+    pub fn bytes(&self, point: &ScalePoint) -> f64 {
+        self.memory.cost_of(&amounts(&MEMORY_TERMS, point))
     }
 }
 
-impl Fit {
+fn fit_terms(
+    terms: &[Term],
+    points: &[&ScalePoint],
+    cost: fn(&ScalePoint) -> f64,
+) -> Result<CostFit> {
+    let names: Vec<_> = terms.iter().map(|(name, _)| *name).collect();
+    let rows: Vec<_> = points.iter().map(|point| amounts(terms, point)).collect();
+    let costs: Vec<_> = points.iter().map(|point| cost(point)).collect();
+    CostFit::new(&names, &rows, &costs).ok_or_else(|| missing_error("no points to fit"))
+}
+
+impl CostFit {
     /// Fits prices to measured costs, a row for each of how much it has of each term; none without a measurement above 0.
     ///
     /// # Method
     /// Non-negative least squares of relative errors, since costs span decades. The best fit with some prices at 0 and the
     /// others free is looked for among all sets of prices, of which there are few; that it exists is a theorem of Lawson
     /// and Hanson ("Solving Least Squares Problems", 1974, chapter 23).
-    pub fn of(terms: &[&'static str], rows: &[Vec<f64>], values: &[f64]) -> Option<Self> {
-        let sound: Vec<usize> = (0..values.len()).filter(|&i| values[i] > 0.0).collect();
-        let prices = prices(rows, values, &sound)?;
-        let off = |prices: &[f64], i: usize| values[i] / dot(prices, &rows[i]) - 1.0;
-        let unseen = |i: usize| {
-            let others: Vec<_> = sound.iter().copied().filter(|&k| k != i).collect();
-            super::fit::prices(rows, values, &others)
-                .map_or(f64::INFINITY, |prices| off(&prices, i))
-        };
+    pub fn new(terms: &[&'static str], rows: &[Vec<f64>], costs: &[f64]) -> Option<Self> {
+        let data = Costs { rows, costs };
+        let prices = data.fit_without(None)?;
+        let all = 0..costs.len();
         Some(Self {
             terms: terms.to_vec(),
-            residuals: (0..values.len()).map(|i| off(&prices, i)).collect(),
-            unseen: (0..values.len()).map(unseen).collect(),
+            residuals: all.clone().map(|i| data.residual(&prices, i)).collect(),
+            unseen: all.map(|i| data.unseen_residual(i)).collect(),
             prices,
         })
     }
 
-    /// The cost of something that has so much of each term.
-    pub fn at(&self, row: &[f64]) -> f64 {
-        dot(&self.prices, row)
+    /// The cost of something with these amounts of each term.
+    pub fn cost_of(&self, amounts: &[f64]) -> f64 {
+        dot(&self.prices, amounts)
     }
 
     /// The share by which nine in ten measurements that were not fitted are off, at most.
@@ -166,45 +153,87 @@ impl Fit {
     }
 }
 
-fn dot(prices: &[f64], row: &[f64]) -> f64 {
-    prices.iter().zip(row).map(|(p, x)| p * x).sum()
+fn dot(prices: &[f64], amounts: &[f64]) -> f64 {
+    prices.iter().zip(amounts).map(|(p, x)| p * x).sum()
 }
 
-/// Prices of the terms by some of the measurements; none without any.
-fn prices(rows: &[Vec<f64>], values: &[f64], used: &[usize]) -> Option<Vec<f64>> {
-    let terms = rows.get(*used.first()?)?.len();
-    let sets = (1..1_usize << terms)
-        .map(|set| (0..terms).filter(|k| set >> k & 1 == 1).collect::<Vec<_>>());
-    let fitted = sets.filter_map(|set| free(rows, values, used, &set));
-    let best = fitted
-        .filter(|(prices, _)| prices.iter().all(|p| *p >= 0.0))
-        .min_by(|a, b| a.1.total_cmp(&b.1));
-    best.map(|(prices, _)| prices)
+/// Measured costs, and a row for each of how much it has of each term.
+struct Costs<'a> {
+    rows: &'a [Vec<f64>],
+    costs: &'a [f64],
 }
 
-/// Least squares with some prices free and the others 0; and the sum of squared relative errors.
-fn free(
-    rows: &[Vec<f64>],
-    values: &[f64],
-    used: &[usize],
-    set: &[usize],
-) -> Option<(Vec<f64>, f64)> {
-    let share = |i: usize, k: usize| rows[used[i]][set[k]] / values[used[i]];
-    let a = DMatrix::from_fn(used.len(), set.len(), share);
-    // Columns of one length, so that a term of few per thousand is not taken for rounding.
-    let lengths: Vec<f64> = a
-        .column_iter()
-        .map(|column| column.norm().max(f64::MIN_POSITIVE))
-        .collect();
-    let even = DMatrix::from_fn(used.len(), set.len(), |i, k| a[(i, k)] / lengths[k]);
-    let one = DVector::repeat(used.len(), 1.0);
-    let x = even.clone().svd(true, true).solve(&one, 1e-12).ok()?;
-    let error = (&even * &x - one).norm_squared();
-    let mut prices = vec![0.0; rows[used[0]].len()];
-    set.iter()
-        .zip(x.iter().zip(&lengths))
-        .for_each(|(&k, (x, length))| prices[k] = x / length);
-    Some((prices, error))
+/// Prices, and the sum of squared relative errors.
+type PricesAndError = (Vec<f64>, f64);
+
+impl Costs<'_> {
+    fn residual(&self, prices: &[f64], i: usize) -> f64 {
+        self.costs[i] / dot(prices, &self.rows[i]) - 1.0
+    }
+
+    /// The residual of a measurement by prices that are fitted to the others.
+    fn unseen_residual(&self, i: usize) -> f64 {
+        let prices = self.fit_without(Some(i));
+        prices.map_or(f64::INFINITY, |prices| self.residual(&prices, i))
+    }
+
+    fn positive(&self) -> Vec<usize> {
+        let all = 0..self.costs.len();
+        all.filter(|&i| self.costs[i] > 0.0).collect()
+    }
+
+    /// Prices by all measurements above 0 but one; none without any.
+    fn fit_without(&self, left_out: Option<usize>) -> Option<Vec<f64>> {
+        let mut used = self.positive();
+        used.retain(|i| Some(*i) != left_out);
+        let terms = self.rows.get(*used.first()?)?.len();
+        subsets(terms)
+            .filter_map(|free| self.least_squares(&used, &free))
+            .filter(|(prices, _)| prices.iter().all(|p| *p >= 0.0))
+            .min_by(|a, b| a.1.total_cmp(&b.1))
+            .map(|(prices, _)| prices)
+    }
+
+    /// Least squares with some prices free and the others 0.
+    fn least_squares(&self, used: &[usize], free: &[usize]) -> Option<PricesAndError> {
+        let mut shares = DMatrix::from_fn(used.len(), free.len(), |i, k| {
+            self.rows[used[i]][free[k]] / self.costs[used[i]]
+        });
+        let lengths = normalize_columns(&mut shares);
+        let (x, error) = solve_ones(&shares)?;
+        let mut prices = vec![0.0; self.rows[used[0]].len()];
+        for (&k, (x, length)) in free.iter().zip(x.iter().zip(&lengths)) {
+            prices[k] = x / length;
+        }
+        Some((prices, error))
+    }
+}
+
+/// All sets of terms but the empty one.
+fn subsets(terms: usize) -> impl Iterator<Item = Vec<usize>> {
+    let sets = 1..1_usize << terms;
+    sets.map(move |set| (0..terms).filter(|k| set >> k & 1 == 1).collect())
+}
+
+/// Makes columns of length 1, so that a term of few per thousand is not mistaken for rounding; returns their lengths.
+fn normalize_columns(matrix: &mut DMatrix<f64>) -> Vec<f64> {
+    let columns = matrix.column_iter_mut();
+    columns
+        .map(|mut column| {
+            let length = column.norm().max(f64::MIN_POSITIVE);
+            column /= length;
+            length
+        })
+        .collect()
+}
+
+/// What a matrix should be multiplied by to give ones, and the squared error that is left.
+fn solve_ones(matrix: &DMatrix<f64>) -> Option<(DVector<f64>, f64)> {
+    let ones = DVector::repeat(matrix.nrows(), 1.0);
+    let svd = matrix.clone().svd(true, true);
+    let x = svd.solve(&ones, SINGULAR_EPSILON).ok()?;
+    let error = (matrix * &x - ones).norm_squared();
+    Some((x, error))
 }
 
 #[cfg(test)]
@@ -225,7 +254,7 @@ mod tests {
             .iter()
             .map(|row| dot(&[0.5, 2e-4, 3.0], row))
             .collect();
-        let fit = Fit::of(&NAMES, &rows(), &values).unwrap();
+        let fit = CostFit::new(&NAMES, &rows(), &values).unwrap();
         assert!(
             fit.prices
                 .iter()
@@ -234,13 +263,13 @@ mod tests {
             "{:?}",
             fit.prices
         );
-        assert!(fit.spread() < 1e-6 && (fit.at(&[1.0, 2.0, 4.0]) - 12.5004).abs() < 1e-6);
+        assert!(fit.spread() < 1e-6 && (fit.cost_of(&[1.0, 2.0, 4.0]) - 12.5004).abs() < 1e-6);
     }
 
     #[test]
     fn nothing_has_a_negative_price() {
         let values: Vec<_> = rows().iter().map(|row| 5.0 - 0.2 * row[1]).collect();
-        let fit = Fit::of(&NAMES, &rows(), &values).unwrap();
+        let fit = CostFit::new(&NAMES, &rows(), &values).unwrap();
         assert!(fit.prices.iter().all(|p| *p >= 0.0) && fit.prices[0] > 0.0);
         assert!(
             fit.residuals.iter().any(|r| r.abs() > 0.1),
@@ -256,16 +285,16 @@ mod tests {
             .enumerate()
             .map(|(i, row)| noisy(i) * (1.0 + row[1]))
             .collect();
-        let fit = Fit::of(&NAMES, &rows(), &values).unwrap();
+        let fit = CostFit::new(&NAMES, &rows(), &values).unwrap();
         assert!((0.05..0.5).contains(&fit.spread()), "{}", fit.spread());
         let seen = fit.residuals.iter().map(|r| r * r).sum::<f64>();
         assert!(fit.unseen.iter().map(|r| r * r).sum::<f64>() > seen);
     }
 
     #[test]
-    fn too_little_to_fit_is_told() {
-        assert!(Fit::of(&NAMES, &[], &[]).is_none());
-        let one = Fit::of(&NAMES, &rows()[1..2], &[3.0]).unwrap();
+    fn too_little_to_fit_is_reported() {
+        assert!(CostFit::new(&NAMES, &[], &[]).is_none());
+        let one = CostFit::new(&NAMES, &rows()[1..2], &[3.0]).unwrap();
         assert!(one.residuals[0].abs() < 1e-9 && one.spread() == f64::INFINITY);
     }
 }

@@ -1,15 +1,17 @@
 //! What many pictures take on many machines, from the model of one.
 
-use super::{Case, Measured, Model, Point, grid, missing};
+use super::{CostModel, ScaleCase, ScaleMeasurements, ScalePoint, grid, missing_error};
 use petcomp::Result;
 
-/// What a dataset of usual pictures is expected to take.
+const SECONDS_PER_HOUR: f64 = 3600.0;
+
+/// What a dataset of default pictures is expected to take.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Forecast {
     /// Pictures.
     pub images: f64,
     /// Kind of the pictures.
-    pub case: Case,
+    pub case: ScaleCase,
     /// Seconds of a processor per picture, its cards already lying: what the model says, and between what nine in ten lie.
     pub picture_seconds: [f64; 3],
     /// Seconds of a processor until its cards lie.
@@ -24,76 +26,72 @@ pub struct Forecast {
     pub bytes: [f64; 3],
 }
 
-/// Forecasts a dataset of the usual pictures: 640 x 480 pixels, 12 cards that fall first.
+/// Forecasts a dataset of the default pictures: 640 x 480 pixels, 12 cards that fall first.
 ///
 /// # Errors
-/// As [`Model::of`]; without a point of that kind.
-pub fn forecast(measured: &Measured, images: f64) -> Result<Forecast> {
-    let model = Model::of(measured)?;
-    let usual = |point: &&Point| {
-        Case {
-            threads: 1,
-            ..point.case
-        } == grid::USUAL
-    };
-    let on = |threads: usize| {
-        measured
-            .points
-            .iter()
-            .filter(usual)
-            .find(|point| point.case.threads == threads)
-    };
-    let cores = measured
-        .points
-        .iter()
-        .filter(usual)
-        .map(|point| point.case.threads)
-        .max();
-    let cores = cores.ok_or_else(|| missing("no usual pictures"))?;
-    let (one, all) = on(1)
-        .zip(on(cores))
-        .ok_or_else(|| missing("no usual pictures on one thread"))?;
-    let fall_seconds = fall_seconds(&measured.falls, grid::USUAL.cards);
+/// As [`CostModel::fit`]; without a point of that kind.
+pub fn forecast(measured: &ScaleMeasurements, images: f64) -> Result<Forecast> {
+    let model = CostModel::fit(measured)?;
+    let (one, all) = one_and_all_threads(measured)?;
+    let cores = all.case.threads;
+    let fall_seconds = interpolated_fall(&measured.falls, grid::DEFAULT_PICTURE.cards);
     let efficiency = all.rate / (cores as f64 * one.rate);
-    let picture_seconds = around(model.seconds(one), model.time.spread());
-    let core_hours =
-        picture_seconds.map(|s| images * (s + fall_seconds) / efficiency.min(1.0) / 3600.0);
-    let bytes = around(model.bytes(all), model.memory.spread());
+    let picture_seconds = interval(model.seconds(one), model.time.spread());
+    let core_hours = picture_seconds.map(|s| core_hours(images, s + fall_seconds, efficiency));
     Ok(Forecast {
         images,
-        case: grid::USUAL,
+        case: grid::DEFAULT_PICTURE,
         picture_seconds,
         fall_seconds,
         efficiency,
         cores,
         core_hours,
-        bytes,
+        bytes: interval(model.bytes(all), model.memory.spread()),
     })
 }
 
+fn core_hours(images: f64, seconds_each: f64, efficiency: f64) -> f64 {
+    images * seconds_each / efficiency.min(1.0) / SECONDS_PER_HOUR
+}
+
+/// The default picture on one thread and on the most.
+fn one_and_all_threads(measured: &ScaleMeasurements) -> Result<(&ScalePoint, &ScalePoint)> {
+    let points = measured.default_pictures();
+    let one = points.iter().find(|point| point.is_single_threaded());
+    let all = points.iter().max_by_key(|point| point.case.threads);
+    match (one, all) {
+        (Some(one), Some(all)) => Ok((one, all)),
+        (None, Some(_)) => Err(missing_error("no default pictures on one thread")),
+        (_, None) => Err(missing_error("no default pictures")),
+    }
+}
+
 /// A value and what is this share of it less and more.
-fn around(value: f64, share: f64) -> [f64; 3] {
+fn interval(value: f64, share: f64) -> [f64; 3] {
     [value, value * (1.0 - share).max(0.0), value * (1.0 + share)]
 }
 
-/// Seconds of a fall of so many cards, in proportion between the numbers that were measured.
-fn fall_seconds(falls: &[(usize, f64)], cards: usize) -> f64 {
+/// Seconds of a fall of some cards, in proportion between the numbers that were measured.
+fn interpolated_fall(falls: &[(usize, f64)], cards: usize) -> f64 {
     let below = falls.iter().rev().find(|(n, _)| *n <= cards);
     let above = falls.iter().find(|(n, _)| *n >= cards);
     match (below, above) {
-        (Some(&(a, s)), Some(&(b, t))) if b > a => {
-            s + (t - s) * (cards - a) as f64 / (b - a) as f64
-        }
-        (Some(&(_, s)), _) | (None, Some(&(_, s))) => s,
+        (Some(below), Some(above)) if above.0 > below.0 => between(*below, *above, cards),
+        (Some((_, seconds)), _) | (None, Some((_, seconds))) => *seconds,
         (None, None) => 0.0,
     }
 }
 
+/// On the line through two falls.
+fn between((a, s): (usize, f64), (b, t): (usize, f64), cards: usize) -> f64 {
+    s + (t - s) * (cards - a) as f64 / (b - a) as f64
+}
+
 impl Forecast {
-    /// Hours on so many machines of [`cores`](Self::cores) cores: expected, least, most.
-    pub fn hours(&self, machines: usize) -> [f64; 3] {
-        self.core_hours
-            .map(|hours| hours / (machines * self.cores) as f64)
+    /// Hours on a number of machines of [`cores`](Self::cores) cores: expected, least, most.
+    pub fn hours_on(&self, machines: usize) -> [f64; 3] {
+        let cores = (machines * self.cores) as f64;
+        self.core_hours.map(|hours| hours / cores)
     }
 }
 
@@ -102,8 +100,8 @@ pub(super) mod tests {
     use super::*;
 
     /// Measurements of a machine that is exactly as the model says, and half as good on two threads.
-    pub(in super::super) fn measured() -> Measured {
-        let point = |case: Case| {
+    pub(in super::super) fn measured() -> ScaleMeasurements {
+        let point = |case: ScaleCase| {
             let layers = 0.01 * case.cards as f64 * case.scale * case.scale;
             let in_hand = case.megapixels() * case.threads as f64;
             let cpu_seconds =
@@ -113,7 +111,7 @@ pub(super) mod tests {
             } else {
                 1.0 / cpu_seconds
             };
-            Point {
+            ScalePoint {
                 case,
                 layers,
                 pictures: 3,
@@ -122,7 +120,7 @@ pub(super) mod tests {
                 peak_bytes: 1e7 + in_hand * (1e8 + 5e7 * layers),
             }
         };
-        Measured {
+        ScaleMeasurements {
             points: grid::cases(2).into_iter().map(point).collect(),
             falls: vec![(10, 0.1), (20, 0.3)],
         }
@@ -134,7 +132,7 @@ pub(super) mod tests {
         let one = measured
             .points
             .iter()
-            .find(|p| p.case == grid::USUAL)
+            .find(|p| p.case == grid::DEFAULT_PICTURE)
             .unwrap()
             .cpu_seconds;
         measured
@@ -142,26 +140,26 @@ pub(super) mod tests {
             .iter_mut()
             .filter(|p| p.case.threads == 2)
             .for_each(|p| p.rate = 1.0 / one);
-        let told = forecast(&measured, 1e6).unwrap();
+        let expected = forecast(&measured, 1e6).unwrap();
         assert!(
-            (told.picture_seconds[0] / one - 1.0).abs() < 1e-6
-                && (told.efficiency - 0.5).abs() < 1e-9
+            (expected.picture_seconds[0] / one - 1.0).abs() < 1e-6
+                && (expected.efficiency - 0.5).abs() < 1e-9
         );
         let hours = 1e6 * (one + 0.14) / 0.5 / 3600.0;
-        assert!((told.core_hours[0] / hours - 1.0).abs() < 1e-6);
-        assert!((told.hours(10)[0] / (hours / 20.0) - 1.0).abs() < 1e-6);
-        assert!(told.bytes[1] <= told.bytes[0] && told.bytes[0] <= told.bytes[2]);
+        assert!((expected.core_hours[0] / hours - 1.0).abs() < 1e-6);
+        assert!((expected.hours_on(10)[0] / (hours / 20.0) - 1.0).abs() < 1e-6);
+        assert!(expected.bytes[1] <= expected.bytes[0] && expected.bytes[0] <= expected.bytes[2]);
     }
 
     #[test]
     fn falls_between_those_measured_are_in_proportion() {
         let falls = [(10, 0.1), (20, 0.3)];
-        assert!((fall_seconds(&falls, 12) - 0.14).abs() < 1e-12);
+        assert!((interpolated_fall(&falls, 12) - 0.14).abs() < 1e-12);
         assert_eq!(
             (
-                fall_seconds(&falls, 3),
-                fall_seconds(&falls, 99),
-                fall_seconds(&[], 3)
+                interpolated_fall(&falls, 3),
+                interpolated_fall(&falls, 99),
+                interpolated_fall(&[], 3)
             ),
             (0.1, 0.3, 0.0)
         );
@@ -171,7 +169,7 @@ pub(super) mod tests {
     fn nothing_measured_is_no_forecast() {
         assert!(
             forecast(
-                &Measured {
+                &ScaleMeasurements {
                     points: vec![],
                     falls: vec![]
                 },

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 /// Pictures of one kind, and how many are made at once.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Case {
+pub struct ScaleCase {
     /// Threads, of which each makes a picture of its own.
     pub threads: usize,
     /// Width and height, pixels.
@@ -16,22 +16,16 @@ pub struct Case {
     pub scale: f64,
 }
 
-/// The picture of a usual dataset: that of the recipe's defaults, with its most cards.
-pub(super) const USUAL: Case = Case {
+/// The picture of a typical dataset: that of the recipe's defaults, with its most cards.
+pub(super) const DEFAULT_PICTURE: ScaleCase = ScaleCase {
     threads: 1,
     image: [640, 480],
     cards: 12,
     scale: 1.0,
 };
 
-/// From 0.3 to 33 megapixels, in shapes that cameras have.
-const IMAGES: [[u32; 2]; 5] = [
-    [640, 480],
-    [1152, 864],
-    [2048, 1536],
-    [3648, 2736],
-    [7680, 4320],
-];
+/// From 1 to 33 megapixels, in shapes that cameras have.
+const LARGER_IMAGES: [[u32; 2]; 4] = [[1152, 864], [2048, 1536], [3648, 2736], [7680, 4320]];
 /// Numbers of cards with the factors on their sides: so that cards and layers do not grow together.
 const CARDS: [(usize, f64); 12] = [
     (1, 1.0),
@@ -56,36 +50,48 @@ const CORNERS: [([u32; 2], usize, f64); 4] = [
 ];
 
 /// Cards that fall together.
-pub(super) const FALLS: [usize; 5] = [1, 5, 12, 20, 40];
+pub(super) const FALL_SIZES: [usize; 5] = [1, 5, 12, 20, 40];
 
-/// Every case: the usual picture on 1, 2, 4 ... threads, then sizes, cards and corners on one.
-pub(super) fn cases(threads: usize) -> Vec<Case> {
-    let powers = std::iter::successors(Some(1), |n| Some(2 * n)).take_while(|n| *n < threads);
-    let threads = powers
-        .chain([threads.max(1)])
-        .map(|threads| Case { threads, ..USUAL });
-    let sizes = IMAGES
-        .into_iter()
-        .skip(1)
-        .map(|image| Case { image, ..USUAL });
-    let cards = CARDS.into_iter().map(|(cards, scale)| Case {
+/// Every case: the default picture on 1, 2, 4 ... threads, then sizes, cards and corners on one.
+pub(super) fn cases(max_threads: usize) -> Vec<ScaleCase> {
+    let default = DEFAULT_PICTURE;
+    let threads = thread_counts(max_threads).map(|threads| ScaleCase { threads, ..default });
+    let sizes = LARGER_IMAGES.map(|image| ScaleCase { image, ..default });
+    let cards = CARDS.map(|(cards, scale)| ScaleCase {
         cards,
         scale,
-        ..USUAL
+        ..default
     });
-    let corners = CORNERS.into_iter().map(|(image, cards, scale)| Case {
+    let corners = CORNERS.map(|(image, cards, scale)| ScaleCase {
         image,
         cards,
         scale,
-        ..USUAL
+        ..default
     });
     threads.chain(sizes).chain(cards).chain(corners).collect()
 }
 
-impl Case {
+/// Powers of two up to the most, and the most.
+fn thread_counts(max_threads: usize) -> impl Iterator<Item = usize> {
+    let powers = std::iter::successors(Some(1), |n| Some(2 * n));
+    powers
+        .take_while(move |n| *n < max_threads)
+        .chain([max_threads.max(1)])
+}
+
+impl ScaleCase {
     /// Millions of pixels in a picture.
     pub fn megapixels(&self) -> f64 {
         f64::from(self.image[0]) * f64::from(self.image[1]) * 1e-6
+    }
+
+    /// Whether it is the default picture, on however many threads.
+    pub(super) fn is_default_picture(&self) -> bool {
+        let single = Self {
+            threads: 1,
+            ..*self
+        };
+        single == DEFAULT_PICTURE
     }
 }
 
@@ -112,7 +118,7 @@ mod tests {
     #[test]
     fn the_grid_spans_what_the_report_promises() {
         let cases = cases(1);
-        let span = |of: fn(&Case) -> f64| {
+        let span = |of: fn(&ScaleCase) -> f64| {
             cases
                 .iter()
                 .map(of)
@@ -120,7 +126,7 @@ mod tests {
                     [v.min(low), v.max(high)]
                 })
         };
-        assert!(span(Case::megapixels)[0] < 0.3 && span(Case::megapixels)[1] > 33.0);
+        assert!(span(ScaleCase::megapixels)[0] < 0.3 && span(ScaleCase::megapixels)[1] > 33.0);
         assert_eq!(span(|case| case.cards as f64), [1.0, 300.0]);
     }
 }

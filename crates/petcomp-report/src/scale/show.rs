@@ -1,286 +1,297 @@
 //! Tables and charts of what was measured, beside what the model says.
 
-use super::{Measured, Model, Point, forecast, grid};
+use super::{
+    CostFit, CostModel, Forecast, ScaleCase, ScaleMeasurements, ScalePoint, forecast, grid,
+};
+use crate::columns::{Column, table_from, table_of};
 use petcomp::Result;
 use petcomp::plot::{Axis, Chart, Curve, Table};
 
 /// Pictures that are forecast.
-const MILLION: f64 = 1e6;
+const FORECAST_PICTURES: f64 = 1e6;
 /// Machines that share them.
 const MACHINES: [usize; 3] = [1, 10, 100];
-const MB: f64 = 1e-6;
+const MB_PER_BYTE: f64 = 1e-6;
+const MS_PER_SECOND: f64 = 1e3;
 
 /// Tables with their titles: all points and residuals first, then the model, threads, falls, and a million pictures.
 ///
 /// # Errors
-/// As [`Model::of`] and [`forecast()`].
-pub fn tables(measured: &Measured) -> Result<Vec<(String, Table)>> {
-    let model = Model::of(measured)?;
-    let titled = |title: &str, table| (title.to_owned(), table);
-    Ok(vec![
-        titled("Points", points(measured, &model)),
-        titled("Cost model", prices(&model)),
-        titled("Threads", threads(measured)),
-        titled("Falls", falls(measured)),
-        titled("A million pictures", million(measured)?),
-    ])
+/// As [`CostModel::fit`] and [`forecast()`].
+pub fn tables(measured: &ScaleMeasurements) -> Result<Vec<(String, Table)>> {
+    let model = CostModel::fit(measured)?;
+    let forecast = forecast(measured, FORECAST_PICTURES)?;
+    let tables = [
+        ("Points", points_table(measured, &model)),
+        ("Cost model", prices_table(&model)),
+        ("Threads", threads_table(measured)),
+        ("Falls", falls_table(measured)),
+        ("A million pictures", forecast_table(&forecast)),
+    ];
+    Ok(tables
+        .map(|(title, table)| (title.to_owned(), table))
+        .into())
 }
 
-fn points(measured: &Measured, model: &Model) -> Table {
-    let mut table = Table::new([
-        "threads",
-        "image",
-        "Mpx",
-        "cards",
-        "layers",
-        "CPU s a picture",
-        "model",
-        "residual %",
-        "unseen %",
-        "pictures/s",
-        "peak MB",
-        "model MB",
-        "residual MB %",
-    ]);
-    let percent = |share: f64| format!("{:+.1}", 100.0 * share);
-    let mut alone = model.time.residuals.iter().zip(&model.time.unseen);
+/// A point beside what the model says of it.
+struct ModelledPoint {
+    point: ScalePoint,
+    seconds: f64,
+    /// Residual and unseen residual; time is fitted to points on one thread.
+    time: Option<[f64; 2]>,
+    bytes: f64,
+    memory_residual: f64,
+}
+
+const POINT_COLUMNS: [Column<ModelledPoint>; 13] = [
+    ("threads", |m| m.point.case.threads.to_string()),
+    ("image", |m| image_words(m.point.case.image)),
+    ("Mpx", |m| format!("{:.2}", m.point.case.megapixels())),
+    ("cards", |m| m.point.case.cards.to_string()),
+    ("layers", |m| format!("{:.3}", m.point.layers)),
+    ("CPU s a picture", |m| format!("{:.4}", m.point.cpu_seconds)),
+    ("model", |m| format!("{:.4}", m.seconds)),
+    ("residual %", |m| {
+        m.time.map_or(String::new(), |[seen, _]| percent(seen))
+    }),
+    ("unseen %", |m| {
+        m.time.map_or(String::new(), |[_, unseen]| percent(unseen))
+    }),
+    ("pictures/s", |m| format!("{:.2}", m.point.rate)),
+    ("peak MB", |m| megabytes(m.point.peak_bytes)),
+    ("model MB", |m| megabytes(m.bytes)),
+    ("residual MB %", |m| percent(m.memory_residual)),
+];
+
+fn image_words([w, h]: [u32; 2]) -> String {
+    format!("{w} x {h}")
+}
+
+fn percent(share: f64) -> String {
+    format!("{:+.1}", 100.0 * share)
+}
+
+fn megabytes(bytes: f64) -> String {
+    format!("{:.0}", bytes * MB_PER_BYTE)
+}
+
+fn points_table(measured: &ScaleMeasurements, model: &CostModel) -> Table {
+    let mut single = model.time.residuals.iter().zip(&model.time.unseen);
+    let mut modelled = Vec::new();
     for (point, memory) in measured.points.iter().zip(&model.memory.residuals) {
-        let Point {
-            case,
-            layers,
-            cpu_seconds,
-            rate,
-            peak_bytes,
-            ..
-        } = point;
-        // Time is fitted to points on one thread.
-        let time = if case.threads == 1 {
-            alone.next()
-        } else {
-            None
-        };
-        table.push([
-            case.threads.to_string(),
-            format!("{} x {}", case.image[0], case.image[1]),
-            format!("{:.2}", case.megapixels()),
-            case.cards.to_string(),
-            format!("{layers:.3}"),
-            format!("{cpu_seconds:.4}"),
-            format!("{:.4}", model.seconds(point)),
-            time.map_or(String::new(), |(residual, _)| percent(*residual)),
-            time.map_or(String::new(), |(_, unseen)| percent(*unseen)),
-            format!("{rate:.2}"),
-            format!("{:.0}", peak_bytes * MB),
-            format!("{:.0}", model.bytes(point) * MB),
-            percent(*memory),
-        ]);
+        let is_fitted = point.is_single_threaded();
+        let time = if is_fitted { single.next() } else { None };
+        modelled.push(ModelledPoint {
+            point: point.clone(),
+            seconds: model.seconds(point),
+            time: time.map(|(seen, unseen)| [*seen, *unseen]),
+            bytes: model.bytes(point),
+            memory_residual: *memory,
+        });
     }
-    table
+    table_of(&POINT_COLUMNS, &modelled)
 }
 
-fn prices(model: &Model) -> Table {
-    let mut table = Table::new(["each", "takes", "of"]);
-    let time = model.time.terms.iter().zip(&model.time.prices);
-    time.for_each(|(term, price)| {
-        table.push([
-            (*term).to_owned(),
-            format!("{:.4} ms", 1e3 * price),
-            "CPU time".into(),
-        ])
-    });
-    let memory = model.memory.terms.iter().zip(&model.memory.prices);
-    memory.for_each(|(term, price)| {
-        table.push([
-            (*term).to_owned(),
-            format!("{:.3} MB", price * MB),
-            "memory".into(),
-        ])
-    });
-    for (what, fit) in [("CPU time", &model.time), ("memory", &model.memory)] {
-        let spread = format!("within {:.0} %", 100.0 * fit.spread());
-        table.push([
-            "nine in ten points that the fit has not seen".into(),
-            spread,
-            what.to_owned(),
-        ]);
-    }
-    table
+fn prices_table(model: &CostModel) -> Table {
+    let lines = [
+        price_lines(&model.time, "CPU time", price_in_ms),
+        price_lines(&model.memory, "memory", price_in_mb),
+        vec![spread_line(&model.time, "CPU time")],
+        vec![spread_line(&model.memory, "memory")],
+    ];
+    table_from(["each", "takes", "of"], lines.concat())
 }
 
-/// The usual picture on one thread and on more, in their order.
-fn by_threads(measured: &Measured) -> Vec<&Point> {
-    let usual = |point: &&Point| {
-        grid::Case {
-            threads: 1,
-            ..point.case
-        } == grid::USUAL
-    };
-    measured.points.iter().filter(usual).collect()
+fn price_in_ms(seconds: f64) -> String {
+    format!("{:.4} ms", MS_PER_SECOND * seconds)
 }
 
-fn threads(measured: &Measured) -> Table {
-    let mut table = Table::new([
-        "threads",
-        "pictures/s",
-        "times one thread",
-        "efficiency %",
-        "CPU s a picture",
-        "peak MB",
-    ]);
-    let points = by_threads(measured);
+fn price_in_mb(bytes: f64) -> String {
+    format!("{:.3} MB", bytes * MB_PER_BYTE)
+}
+
+fn price_lines(fit: &CostFit, cost: &str, words: fn(f64) -> String) -> Vec<[String; 3]> {
+    let prices = fit.terms.iter().zip(&fit.prices);
+    prices
+        .map(|(term, price)| [(*term).to_owned(), words(*price), cost.to_owned()])
+        .collect()
+}
+
+fn spread_line(fit: &CostFit, cost: &str) -> [String; 3] {
+    [
+        "nine in ten points that the fit has not seen".into(),
+        format!("within {:.0} %", 100.0 * fit.spread()),
+        cost.to_owned(),
+    ]
+}
+
+const THREAD_TITLES: [&str; 6] = [
+    "threads",
+    "pictures/s",
+    "times one thread",
+    "efficiency %",
+    "CPU s a picture",
+    "peak MB",
+];
+
+fn threads_table(measured: &ScaleMeasurements) -> Table {
+    let points = measured.default_pictures();
     let one = points.first().map_or(f64::NAN, |point| point.rate);
-    for point in points {
-        let (threads, times) = (point.case.threads, point.rate / one);
-        table.push([
-            threads.to_string(),
-            format!("{:.2}", point.rate),
-            format!("{times:.2}"),
-            format!("{:.0}", 100.0 * times / threads as f64),
-            format!("{:.4}", point.cpu_seconds),
-            format!("{:.0}", point.peak_bytes * MB),
-        ]);
-    }
-    table
+    let lines = points.iter().map(|point| thread_line(point, one));
+    table_from(THREAD_TITLES, lines)
 }
 
-fn falls(measured: &Measured) -> Table {
-    let mut table = Table::new(["cards that fall together", "CPU ms until they lie"]);
-    measured
+fn thread_line(point: &ScalePoint, rate_of_one: f64) -> [String; 6] {
+    let (threads, speed_up) = (point.case.threads, point.rate / rate_of_one);
+    [
+        threads.to_string(),
+        format!("{:.2}", point.rate),
+        format!("{speed_up:.2}"),
+        format!("{:.0}", 100.0 * speed_up / threads as f64),
+        format!("{:.4}", point.cpu_seconds),
+        megabytes(point.peak_bytes),
+    ]
+}
+
+fn falls_table(measured: &ScaleMeasurements) -> Table {
+    let lines = measured
         .falls
         .iter()
-        .for_each(|(cards, s)| table.push([cards.to_string(), format!("{:.1}", 1e3 * s)]));
-    table
+        .map(|(cards, seconds)| [cards.to_string(), format!("{:.1}", MS_PER_SECOND * seconds)]);
+    table_from(["cards that fall together", "CPU ms until they lie"], lines)
 }
 
-fn million(measured: &Measured) -> Result<Table> {
-    let told = forecast(measured, MILLION)?;
-    let interval = |[value, least, most]: [f64; 3], digits: usize| {
-        format!("{value:.digits$} ({least:.digits$} to {most:.digits$})")
-    };
-    let mut table = Table::new(["a million pictures", "expected (nine in ten)"]);
-    let [w, h] = told.case.image;
-    table.push([
-        "picture".into(),
-        format!("{w} x {h}, {} cards", told.case.cards),
+fn forecast_table(forecast: &Forecast) -> Table {
+    let lines = [picture_lines(forecast), machine_lines(forecast)].concat();
+    table_from(["a million pictures", "expected (nine in ten)"], lines)
+}
+
+fn picture_lines(forecast: &Forecast) -> Vec<[String; 2]> {
+    let image = image_words(forecast.case.image);
+    let ms = forecast.picture_seconds.map(|s| MS_PER_SECOND * s);
+    let fall_ms = MS_PER_SECOND * forecast.fall_seconds;
+    vec![
+        [
+            "picture".into(),
+            format!("{image}, {} cards", forecast.case.cards),
+        ],
+        ["CPU ms a picture".into(), interval_words(ms, 1)],
+        ["CPU ms until its cards lie".into(), format!("{fall_ms:.1}")],
+    ]
+}
+
+fn machine_lines(forecast: &Forecast) -> Vec<[String; 2]> {
+    let cores = forecast.cores;
+    let mut lines = vec![
+        [
+            format!("efficiency of {cores} threads"),
+            format!("{:.0} %", 100.0 * forecast.efficiency),
+        ],
+        ["core hours".into(), interval_words(forecast.core_hours, 0)],
+    ];
+    lines.extend(MACHINES.map(|machines| hours_line(forecast, machines)));
+    lines.push([
+        format!("memory of a process of {cores} threads, MB"),
+        interval_words(forecast.bytes.map(|b| b * MB_PER_BYTE), 0),
     ]);
-    table.push([
-        "CPU ms a picture".into(),
-        interval(told.picture_seconds.map(|s| 1e3 * s), 1),
-    ]);
-    table.push([
-        "CPU ms until its cards lie".into(),
-        format!("{:.1}", 1e3 * told.fall_seconds),
-    ]);
-    table.push([
-        format!("efficiency of {} threads", told.cores),
-        format!("{:.0} %", 100.0 * told.efficiency),
-    ]);
-    table.push(["core hours".into(), interval(told.core_hours, 0)]);
-    for machines in MACHINES {
-        let plural = if machines == 1 { "" } else { "s" };
-        table.push([
-            format!(
-                "hours on {machines} machine{plural} of {} cores",
-                told.cores
-            ),
-            interval(told.hours(machines), 2),
-        ]);
-    }
-    table.push([
-        format!("memory of a process of {} threads, MB", told.cores),
-        interval(told.bytes.map(|b| b * MB), 0),
-    ]);
-    Ok(table)
+    lines
+}
+
+fn hours_line(forecast: &Forecast, machines: usize) -> [String; 2] {
+    let (plural, cores) = (if machines == 1 { "" } else { "s" }, forecast.cores);
+    [
+        format!("hours on {machines} machine{plural} of {cores} cores"),
+        interval_words(forecast.hours_on(machines), 2),
+    ]
+}
+
+fn interval_words([value, least, most]: [f64; 3], digits: usize) -> String {
+    format!("{value:.digits$} ({least:.digits$} to {most:.digits$})")
 }
 
 /// Charts with what is to be seen in them: rate by threads and memory; time by pixels and by cards.
 ///
 /// # Errors
-/// As [`Model::of`].
-pub fn charts(measured: &Measured) -> Result<Vec<(String, String)>> {
-    let model = Model::of(measured)?;
-    let usual = grid::USUAL;
-    let alone = || {
-        measured
-            .points
-            .iter()
-            .filter(|point| point.case.threads == 1)
-    };
-    let sizes: Vec<_> = alone()
-        .filter(|p| p.case.cards == usual.cards && p.case.scale == usual.scale)
-        .collect();
-    let cards: Vec<_> = alone()
-        .filter(|p| p.case.image == usual.image && p.case.scale == usual.scale)
-        .collect();
-    let threads = by_threads(measured);
-    let one = threads.first().map_or(1.0, |point| point.rate);
-    let pixels = |point: &Point| point.case.megapixels();
-    let rate = both(
-        "pictures a second",
-        "threads",
-        &threads,
-        |p| p.case.threads as f64,
-        |p| p.rate,
-        |p| one * p.case.threads as f64,
-    );
-    let memory = both(
-        "peak MB",
-        "megapixels",
-        &sizes,
-        pixels,
-        |p| p.peak_bytes * MB,
-        |p| model.bytes(p) * MB,
-    );
-    let by_pixels = both(
-        "CPU s a picture",
-        "megapixels",
-        &sizes,
-        pixels,
-        |p| p.cpu_seconds,
-        |p| model.seconds(p),
-    );
-    let by_cards = both(
-        "CPU s a picture",
-        "cards",
-        &cards,
-        |p| p.case.cards as f64,
-        |p| p.cpu_seconds,
-        |p| model.seconds(p),
-    );
+/// As [`CostModel::fit`].
+pub fn charts(measured: &ScaleMeasurements) -> Result<Vec<(String, String)>> {
+    let model = CostModel::fit(measured)?;
+    let sizes = by_sizes(measured);
+    let machine = [rate_chart(measured), memory_chart(&sizes, &model)];
+    let cards = by_cards(measured);
+    let time = [
+        time_chart(MEGAPIXELS, &sizes, &model),
+        time_chart(CARD_COUNT, &cards, &model),
+    ];
     Ok(vec![
-        (Chart::row(&[rate, memory]), "Left: every thread makes a picture of its own; the model is as many times one thread. Right: one picture in hand.".into()),
-        (Chart::row(&[by_pixels, by_cards]), "One thread: rendered, labelled, encoded, written; cards lie already. By pixels with 12 cards, by cards at 640 x 480.".into()),
+        (Chart::row(&machine), "Left: every thread makes a picture of its own; the model is as many times one thread. Right: one picture in hand.".into()),
+        (Chart::row(&time), "One thread: rendered, labelled, encoded, written; cards lie already. By pixels with 12 cards, by cards at 640 x 480.".into()),
     ])
 }
 
+/// What points are drawn along: its words, and its value of a point.
+type Along = (&'static str, fn(&ScalePoint) -> f64);
+
+const MEGAPIXELS: Along = ("megapixels", |p| p.case.megapixels());
+const CARD_COUNT: Along = ("cards", |p| p.case.cards as f64);
+const THREAD_COUNT: Along = ("threads", |p| p.case.threads as f64);
+
+/// Points on one thread that differ in their size alone.
+fn by_sizes(measured: &ScaleMeasurements) -> Vec<&ScalePoint> {
+    let ScaleCase { cards, scale, .. } = grid::DEFAULT_PICTURE;
+    let mut points = measured.single_threaded();
+    points.retain(|p| (p.case.cards, p.case.scale) == (cards, scale));
+    points
+}
+
+/// Points on one thread that differ in their number of cards alone.
+fn by_cards(measured: &ScaleMeasurements) -> Vec<&ScalePoint> {
+    let ScaleCase { image, scale, .. } = grid::DEFAULT_PICTURE;
+    let mut points = measured.single_threaded();
+    points.retain(|p| (p.case.image, p.case.scale) == (image, scale));
+    points
+}
+
+fn rate_chart(measured: &ScaleMeasurements) -> Chart {
+    let points = measured.default_pictures();
+    let one = points.first().map_or(1.0, |point| point.rate);
+    let curves = [
+        curve_of(&points, THREAD_COUNT, |p| p.rate),
+        curve_of(&points, THREAD_COUNT, |p| one * p.case.threads as f64),
+    ];
+    model_chart("pictures a second", THREAD_COUNT.0, curves)
+}
+
+fn memory_chart(points: &[&ScalePoint], model: &CostModel) -> Chart {
+    let curves = [
+        curve_of(points, MEGAPIXELS, |p| p.peak_bytes * MB_PER_BYTE),
+        curve_of(points, MEGAPIXELS, |p| model.bytes(p) * MB_PER_BYTE),
+    ];
+    model_chart("peak MB", MEGAPIXELS.0, curves)
+}
+
+fn time_chart(along: Along, points: &[&ScalePoint], model: &CostModel) -> Chart {
+    let curves = [
+        curve_of(points, along, |p| p.cpu_seconds),
+        curve_of(points, along, |p| model.seconds(p)),
+    ];
+    model_chart("CPU s a picture", along.0, curves)
+}
+
+fn curve_of(points: &[&ScalePoint], (_, x): Along, y: impl Fn(&ScalePoint) -> f64) -> Curve {
+    let mut curve: Curve = points.iter().map(|point| [x(point), y(point)]).collect();
+    curve.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    curve
+}
+
 /// A chart of measured and expected values.
-fn both(
-    up: &str,
-    across: &str,
-    points: &[&Point],
-    x: impl Fn(&Point) -> f64,
-    measured: impl Fn(&Point) -> f64,
-    expected: impl Fn(&Point) -> f64,
-) -> Chart {
-    let curve = |y: &dyn Fn(&Point) -> f64| -> Curve {
-        let mut curve: Curve = points.iter().map(|point| [x(point), y(point)]).collect();
-        curve.sort_by(|a, b| a[0].total_cmp(&b[0]));
-        curve
-    };
-    let curves = vec![curve(&measured), curve(&expected)];
-    let values = |axis: usize| {
-        curves
-            .iter()
-            .flatten()
-            .map(move |p| p[axis])
-            .collect::<Vec<_>>()
-    };
+fn model_chart(up: &str, across: &str, curves: [Curve; 2]) -> Chart {
+    let places = curves.concat();
     Chart {
         title: format!("{up} by {across}"),
         names: ["measured", "model"].map(String::from).into(),
-        across: Axis::over_decades(across, values(0)),
-        up: Axis::over_decades(up, values(1)),
-        curves,
+        across: Axis::over_decades(across, places.iter().map(|p| p[0])),
+        up: Axis::over_decades(up, places.iter().map(|p| p[1])),
+        curves: curves.into(),
         defaults: Vec::new(),
     }
 }
@@ -316,7 +327,7 @@ mod tests {
             .points
             .iter_mut()
             .for_each(|p| p.rate = if p.case.threads == 2 { 15.0 } else { 10.0 });
-        let rows = threads(&measured).rows;
+        let rows = threads_table(&measured).rows;
         assert_eq!(
             (
                 rows[0][3].as_str(),

@@ -1,99 +1,146 @@
 //! The physics' steps: errors of heaps at rest against run time.
 
-use super::{CARDS, PLATES, Row};
+use super::closed_form::PLATE_COUNT;
+use super::{HEAP_CARDS, SettleReportOptions, SettleRow, measure};
 use crate::{Diagram, Point};
 use petcomp::Quality;
+use petcomp::Result;
 use petcomp::plot::three;
 use petcomp::scene::SettleOptions;
 
-/// Length of the heap's typical card, millimetres, of which limits are shares.
-const CARD_MM: f64 = 200.0;
-const PERCENT: f64 = 100.0;
-/// Bodies keep two skins of 0.2 mm between them, so that a stack without overlap is higher by as much for each plate.
-const SKIN_MM: f64 = 0.4;
+/// Length of the heap's typical card, of which limits are shares.
+const CARD_LENGTH_MM: f64 = 200.0;
+/// Bodies keep two contact margins of 0.2 mm between them, so that a stack without overlap is higher by as much for each plate.
+const PLATE_GAP_MM: f64 = 0.4;
 
-/// Worst overlap, worst energy rise and the error of a stack, each against the time of a heap.
-pub fn diagrams(rows: &[Row]) -> Vec<Diagram> {
-    let usual = SettleOptions::default();
-    let heaps = rows.first().map_or(0, |row| row.heaps);
-    let with = |error: fn(&Row) -> f64| Diagram {
-        input: format!("{heaps} heaps of {CARDS} cards for each setting"),
-        cost: "CPU milliseconds per heap, median".into(),
-        points: rows.iter().map(|row| point(row, error(row))).collect(),
-        ..Diagram::default()
-    };
+/// Measures every setting with a number of heaps: worst overlap, worst energy rise and the error of a stack, each against the
+/// time of a heap.
+///
+/// # Errors
+/// None that a caller can cause.
+pub fn measured_diagrams(heaps: u64) -> Result<Vec<Diagram>> {
+    let rows = measure(&SettleReportOptions { heaps }, |_, _| ())?;
+    Ok(diagrams(&rows))
+}
+
+fn diagrams(rows: &[SettleRow]) -> Vec<Diagram> {
     vec![
-        Diagram {
-            file: "settle_overlap".into(),
-            title: "settle: overlap at rest".into(),
-            error: "worst overlap, mm".into(),
-            reference: "separating-axis test, independent of the engine".into(),
-            limit: Some((usual.max_overlap * CARD_MM, "more is refused".into())),
-            why: why(rows),
-            ..with(|row| row.overlap_mm[1])
-        },
-        Diagram {
-            file: "settle_energy".into(),
-            title: "settle: energy from nothing".into(),
-            error: "worst energy rise, %".into(),
-            reference: "conservation of energy (closed form)".into(),
-            limit: Some((usual.max_energy_rise * PERCENT, "more is refused".into())),
-            ..with(|row| row.energy_percent[1])
-        },
-        Diagram {
-            file: "settle_stack".into(),
-            title: "settle: height of a stack".into(),
-            error: "error of the height, mm".into(),
-            reference: "ten thicknesses, and two skins of 0.2 mm below each plate (closed form)"
-                .into(),
-            limit: Some((
-                usual.max_overlap * CARD_MM,
-                "what is accepted of overlaps".into(),
-            )),
-            ..with(stack_error)
-        },
+        overlap_diagram(rows),
+        energy_diagram(rows),
+        stack_diagram(rows),
     ]
 }
 
-fn point(row: &Row, error: f64) -> Point {
-    let options = SettleOptions::default();
-    let is_usual = row.ccd == options.ccd;
-    let curve = if is_usual {
-        format!("1/{} s", row.rate)
-    } else {
-        "1/480 s, other CCD".into()
-    };
-    let many = if row.iterations == 1 { "" } else { "s" };
-    let setting = if is_usual {
-        format!("{} iteration{many}", row.iterations)
-    } else {
-        format!("{} CCD stops", row.ccd)
-    };
-    Point::new(curve, setting, row.cpu_ms, error).used_where(|q: Quality| {
-        let settings = q.settle(options);
-        is_usual && settings.iterations == row.iterations && is_step(row, settings.step)
-    })
+fn overlap_diagram(rows: &[SettleRow]) -> Diagram {
+    Diagram {
+        file: "settle_overlap".into(),
+        title: "settle: overlap at rest".into(),
+        error: "worst overlap, mm".into(),
+        reference: "separating-axis test, independent of the engine".into(),
+        limit: Some((max_overlap_mm(), "more is refused".into())),
+        why: why_default(rows),
+        ..base_diagram(rows, |row| row.overlap_mm[1])
+    }
+}
+
+fn energy_diagram(rows: &[SettleRow]) -> Diagram {
+    Diagram {
+        file: "settle_energy".into(),
+        title: "settle: spurious energy".into(),
+        error: "worst energy rise, %".into(),
+        reference: "conservation of energy (closed form)".into(),
+        limit: Some((max_energy_percent(), "more is refused".into())),
+        ..base_diagram(rows, |row| row.energy_percent[1])
+    }
+}
+
+fn stack_diagram(rows: &[SettleRow]) -> Diagram {
+    let why_limit = "what is accepted of overlaps".into();
+    Diagram {
+        file: "settle_stack".into(),
+        title: "settle: height of a stack".into(),
+        error: "error of the height, mm".into(),
+        reference:
+            "ten thicknesses, and two contact margins of 0.2 mm below each plate (closed form)"
+                .into(),
+        limit: Some((max_overlap_mm(), why_limit)),
+        ..base_diagram(rows, SettleRow::stack_error_mm)
+    }
+}
+
+fn base_diagram(rows: &[SettleRow], error: fn(&SettleRow) -> f64) -> Diagram {
+    let heaps = rows.first().map_or(0, |row| row.heaps);
+    Diagram {
+        input: format!("{heaps} heaps of {HEAP_CARDS} cards for each setting"),
+        cost: "CPU milliseconds per heap, median".into(),
+        points: rows.iter().map(|row| row.point(error(row))).collect(),
+        ..Diagram::default()
+    }
+}
+
+fn max_overlap_mm() -> f64 {
+    SettleOptions::default().max_overlap * CARD_LENGTH_MM
+}
+
+fn max_energy_percent() -> f64 {
+    SettleOptions::default().max_energy_rise * 100.0
+}
+
+impl SettleRow {
+    fn point(&self, error: f64) -> Point {
+        let [curve, setting] = self.curve_and_setting();
+        Point::new(curve, setting, self.cpu_ms, error)
+            .used_where(|quality| self.is_used_by(quality))
+    }
+
+    fn curve_and_setting(&self) -> [String; 2] {
+        if !self.has_default_ccd() {
+            return [
+                "1/480 s, other CCD".into(),
+                format!("{} CCD stops", self.ccd),
+            ];
+        }
+        let plural = if self.iterations == 1 { "" } else { "s" };
+        [
+            format!("1/{} s", self.rate),
+            format!("{} iteration{plural}", self.iterations),
+        ]
+    }
+
+    fn is_used_by(&self, quality: Quality) -> bool {
+        let settings = quality.settle(SettleOptions::default());
+        self.has_default_ccd()
+            && settings.iterations == self.iterations
+            && self.is_step(settings.step)
+    }
+
+    /// Every error of a setting is as small as it should be.
+    fn is_right(&self) -> bool {
+        self.rested == self.heaps
+            && self.wrong_slopes == 0
+            && self.overlap_mm[1] <= max_overlap_mm()
+            && self.energy_percent[1] <= max_energy_percent()
+            && self.stack_error_mm() <= max_overlap_mm()
+    }
+
+    /// How far the stack is from its thicknesses and margins, millimetres.
+    fn stack_error_mm(&self) -> f64 {
+        (self.stack_mm - PLATE_GAP_MM * PLATE_COUNT as f64).abs()
+    }
 }
 
 /// What no single error shows: which settings are right in everything, and which of them costs least.
-fn why(rows: &[Row]) -> String {
-    let usual = SettleOptions::default();
-    let is_default = |row: &&Row| {
-        row.ccd == usual.ccd && row.iterations == usual.iterations && is_step(row, usual.step)
-    };
-    let right: Vec<&Row> = rows.iter().filter(|row| is_right(row)).collect();
+fn why_default(rows: &[SettleRow]) -> String {
+    let right: Vec<&SettleRow> = rows.iter().filter(|row| row.is_right()).collect();
     let best = right.iter().min_by(|a, b| a.cpu_ms.total_cmp(&b.cpu_ms));
-    let (Some(best), Some(default)) = (best, rows.iter().find(is_default)) else {
+    let default = rows.iter().find(|row| row.is_default());
+    let (Some(best), Some(default)) = (best, default) else {
         return String::new();
     };
-    let judged = if is_right(default) {
-        "is one of them"
-    } else {
-        "is NOT one of them"
-    };
+    let judged = if default.is_right() { "is" } else { "is NOT" };
     format!(
-        "A setting is right where every heap comes to a good end at the first try, all three errors are under their limits, and \
-         plates slide on slopes as the closed form says: {} of {} are, and the default {judged}. The cheapest of them is \
+        "A setting is right where every heap comes to rest at the first attempt, all three errors are under their limits, and \
+         plates slide on slopes as the closed form says: {} of {} are, and the default {judged} one of them. The cheapest of them is \
          1/{} s with {} iterations and {} CCD stops, at {} of the default's cost.",
         right.len(),
         rows.len(),
@@ -104,32 +151,12 @@ fn why(rows: &[Row]) -> String {
     )
 }
 
-fn is_step(row: &Row, step: f64) -> bool {
-    step * f64::from(row.rate) == 1.0
-}
-
-/// Every error of a setting is as small as is asked.
-fn is_right(row: &Row) -> bool {
-    let usual = SettleOptions::default();
-    let overlap = usual.max_overlap * CARD_MM;
-    row.rested == row.heaps
-        && row.wrong_slopes == 0
-        && row.overlap_mm[1] <= overlap
-        && row.energy_percent[1] <= usual.max_energy_rise * PERCENT
-        && stack_error(row) <= overlap
-}
-
-/// How far the stack is from its thicknesses and skins, millimetres.
-fn stack_error(row: &Row) -> f64 {
-    (row.stack_mm - SKIN_MM * PLATES as f64).abs()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn row(rate: u32, iterations: u32, ccd: u32) -> Row {
-        Row {
+    fn row(rate: u32, iterations: u32, ccd: u32) -> SettleRow {
+        SettleRow {
             rate,
             iterations,
             ccd,
@@ -155,30 +182,30 @@ mod tests {
         assert_eq!(found[0].points[2].curve, "1/480 s, other CCD");
     }
     #[test]
-    fn the_cheapest_setting_that_is_right_in_everything_is_told() {
-        let fine = |rate, cpu_ms| Row {
+    fn the_cheapest_setting_that_is_right_in_everything_is_named() {
+        let fine = |rate, cpu_ms| SettleRow {
             rested: 4,
             wrong_slopes: 0,
             cpu_ms,
             ..row(rate, 4, 1)
         };
-        let told = why(&[
+        let why = why_default(&[
             fine(480, 20.0),
             fine(240, 10.0),
-            Row {
+            SettleRow {
                 stack_mm: 1.0,
                 ..fine(960, 1.0)
             },
         ]);
         assert!(
-            told.contains("2 of 3 are") && told.contains("1/240 s") && told.contains("0.500"),
-            "{told}"
+            why.contains("2 of 3 are") && why.contains("1/240 s") && why.contains("0.500"),
+            "{why}"
         );
-        assert!(told.contains("is one of them") && why(&[]).is_empty());
-        let late = Row {
+        assert!(why.contains("is one of them") && why_default(&[]).is_empty());
+        let late = SettleRow {
             rested: 3,
             ..fine(480, 20.0)
         };
-        assert!(why(&[late, fine(960, 40.0)]).contains("is NOT one of them"));
+        assert!(why_default(&[late, fine(960, 40.0)]).contains("is NOT one of them"));
     }
 }

@@ -9,11 +9,11 @@ use std::time::Instant;
 
 /// A stiff or extreme case of a stage.
 pub struct HardCase {
-    /// What is extreme about it.
+    /// What is extreme about the input.
     pub name: String,
     /// What goes in.
     pub input: String,
-    /// What must come out, and by what right.
+    /// What must come out, and why.
     pub expectation: String,
     /// It takes seconds or gigabytes, or is known to fail: for the report, not for every test run.
     pub report_only: bool,
@@ -23,9 +23,9 @@ pub struct HardCase {
 /// What came out of a case.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Outcome {
-    /// What was measured, with its unit, or what was said.
+    /// What was measured, with its unit, or the message of an error.
     pub measured: String,
-    /// Whether that is as it must be.
+    /// Whether it meets the expectation.
     pub passed: bool,
 }
 
@@ -37,14 +37,26 @@ impl HardCase {
         expectation: impl Into<String>,
         run: impl Fn() -> Result<Outcome> + Send + Sync + 'static,
     ) -> Self {
-        let (name, input, expectation) = (name.into(), input.into(), expectation.into());
         Self {
-            name,
-            input,
-            expectation,
+            name: name.into(),
+            input: input.into(),
+            expectation: expectation.into(),
             report_only: false,
             run: Box::new(run),
         }
+    }
+
+    /// A case in which `attempt` must fail with an error whose message contains `cause`.
+    pub fn refused<T>(
+        name: impl Into<String>,
+        input: impl Into<String>,
+        cause: &'static str,
+        attempt: impl Fn() -> Result<T> + Send + Sync + 'static,
+    ) -> Self {
+        let expectation = format!("refused, by \"{cause}\"");
+        Self::new(name, input, expectation, move || {
+            Ok(Outcome::refused(attempt(), cause))
+        })
     }
 
     /// The same, left to the report.
@@ -59,44 +71,43 @@ impl HardCase {
     pub fn outcome(&self) -> Outcome {
         match catch_unwind(AssertUnwindSafe(&self.run)) {
             Ok(Ok(outcome)) => outcome,
-            Ok(Err(error)) => Outcome::new(format!("error: {error}"), false),
-            Err(panic) => Outcome::new(format!("panic: {}", message(&*panic)), false),
+            Ok(Err(error)) => Outcome::failed(format!("error: {error}")),
+            Err(panic) => Outcome::failed(format!("panic: {}", panic_message(&*panic))),
         }
     }
 
-    pub(super) fn row(&self, stage: &'static str) -> CaseResult {
+    pub(super) fn run_timed(&self, stage: &'static str) -> CaseResult {
         let start = Instant::now();
         let outcome = self.outcome();
-        let (name, input, expectation) = (
-            self.name.clone(),
-            self.input.clone(),
-            self.expectation.clone(),
-        );
         CaseResult {
             stage,
-            name,
-            input,
-            expectation,
+            name: self.name.clone(),
+            input: self.input.clone(),
+            expectation: self.expectation.clone(),
             outcome,
             wall_ms: start.elapsed().as_secs_f64() * 1e3,
         }
     }
 }
 
-/// What a panic says.
-fn message(panic: &(dyn Any + Send)) -> &str {
+fn panic_message(panic: &(dyn Any + Send)) -> &str {
     let text = panic.downcast_ref::<String>().map(String::as_str);
     text.or_else(|| panic.downcast_ref::<&str>().copied())
         .unwrap_or("without a message")
 }
 
 impl Outcome {
-    /// What was measured and whether that is as it must be.
+    /// What was measured and whether it meets the expectation.
     pub fn new(measured: impl Display, passed: bool) -> Self {
         Self {
             measured: measured.to_string(),
             passed,
         }
+    }
+
+    /// What was measured or reported where that cannot meet any expectation.
+    pub fn failed(measured: impl Display) -> Self {
+        Self::new(measured, false)
     }
 
     /// A number that must not be further than `tolerance` from `expected`.
@@ -107,35 +118,52 @@ impl Outcome {
         )
     }
 
+    /// A ratio of two numbers that must be 1 to within `tolerance`.
+    pub fn ratio(value: f64, expected: f64, tolerance: f64) -> Self {
+        Self::near(value / expected, 1.0, tolerance, "of it")
+    }
+
+    /// A number of things that must be exactly `expected`.
+    pub fn count(found: usize, expected: usize, unit: &str) -> Self {
+        Self::near(found as f64, expected as f64, 0.0, unit)
+    }
+
+    /// A number of things of which there must be none.
+    pub fn none(found: usize, unit: &str) -> Self {
+        Self::count(found, 0, unit)
+    }
+
     /// A number that must not be larger than `limit`.
     pub fn at_most(value: f64, limit: f64, unit: &str) -> Self {
         Self::new(with_unit(value, unit), value <= limit)
     }
 
-    /// An error that must be there and speak of `cause`.
+    /// An error that must be there and whose message must contain `cause`.
     pub fn refused<T>(result: Result<T>, cause: &str) -> Self {
-        match result {
-            Ok(_) => Self::new("no error", false),
-            Err(error) => Self::new(
-                format!("refused: {error}"),
-                error.to_string().contains(cause),
-            ),
-        }
+        let Err(error) = result else {
+            return Self::failed("no error");
+        };
+        let message = error.to_string();
+        Self::new(format!("refused: {message}"), message.contains(cause))
     }
 }
 
-/// A number with the digits that it is read by.
+/// A number with its significant digits, and its unit.
 fn with_unit(value: f64, unit: &str) -> String {
-    let plain = value == 0.0 || (1e-3..1e5).contains(&value.abs());
-    let number = if plain {
-        trimmed(format!("{value:.6}"))
-    } else {
-        format!("{value:.3e}")
-    };
+    let number = readable(value);
     if unit.is_empty() {
         number
     } else {
         format!("{number} {unit}")
+    }
+}
+
+/// Plain digits where they are few, an exponent elsewhere.
+fn readable(value: f64) -> String {
+    if value == 0.0 || (1e-3..1e5).contains(&value.abs()) {
+        trimmed(format!("{value:.6}"))
+    } else {
+        format!("{value:.3e}")
     }
 }
 
@@ -149,10 +177,10 @@ mod tests {
     use petcomp::Error;
 
     #[test]
-    fn numbers_are_told_with_the_digits_that_matter() {
-        let told = [0.0, 0.25, 65504.0, 1.5e-9, f64::NAN].map(|v| with_unit(v, "px"));
+    fn numbers_are_shown_with_the_digits_that_matter() {
+        let shown = [0.0, 0.25, 65504.0, 1.5e-9, f64::NAN].map(|v| with_unit(v, "px"));
         assert_eq!(
-            told,
+            shown,
             ["0 px", "0.25 px", "65504 px", "1.500e-9 px", "NaN px"]
         );
     }

@@ -1,12 +1,12 @@
 //! Pictures that are hard to put together: very many layers, everything off, values at the ends of their range.
 
-use super::staged::above;
+use super::staged::{camera_above, rendered};
 use super::{HardCase, Outcome};
 use petcomp::Image;
 use petcomp::Result;
 use petcomp::composite::{finish, frame};
 use petcomp::label::{LabelOptions, label};
-use petcomp::render::{RenderOptions, render};
+
 use petcomp::scene::{PostProcess, Shot};
 use petcomp::{DeepImage, DeepSample};
 use petcomp::{Depth, Film, LinearRgb, ObjectId, PremulRgba};
@@ -14,8 +14,8 @@ use std::sync::Arc;
 
 pub(super) fn cases() -> Result<Vec<HardCase>> {
     Ok(vec![
-        layers(),
-        thousands_of_layers(),
+        stacked_films(),
+        stacked_pixels(),
         everything_off(),
         empty_without_plate(),
         rounded_up(),
@@ -23,54 +23,54 @@ pub(super) fn cases() -> Result<Vec<HardCase>> {
         broken_plate(),
         exposed(200.0),
         exposed(-200.0),
-        sharpened(),
+        sharpened_spot(),
         one_pixel(),
     ])
 }
 
-fn layers() -> HardCase {
+fn default_shot() -> Shot {
+    Shot::new(camera_above([64, 48], 60.0))
+}
+
+fn stacked_films() -> HardCase {
     let expected = libm::pow(0.97, 200.0);
     HardCase::new(
         "200 films over each other",
         "transmittance 0.97 each, light 0.03, so that they tend to white",
         format!("0.97^200 = {expected:.6} passes and 1 minus that is the light: to 200 roundings"),
-        move || {
-            let film = Film::new(LinearRgb::grey(0.03), LinearRgb::grey(0.97));
-            let all = (0..200).fold(Film::default(), |behind, _| film.over(behind));
-            let off = [
-                f64::from(all.transmittance().g) - expected,
-                f64::from(all.color.g) - (1.0 - expected),
-            ];
-            Ok(Outcome::at_most(
-                off[0].abs().max(off[1].abs()),
-                200.0 * f64::from(f32::EPSILON),
-                "off",
-            ))
-        },
+        move || Ok(stack_films(expected)),
     )
 }
 
-fn thousands_of_layers() -> HardCase {
+fn stack_films(expected: f64) -> Outcome {
+    let film = Film::new(LinearRgb::grey(0.03), LinearRgb::grey(0.97));
+    let all = (0..200).fold(Film::default(), |behind, _| film.over(behind));
+    let transmittance_error = f64::from(all.transmittance().g) - expected;
+    let light_error = f64::from(all.color.g) - (1.0 - expected);
+    let off = transmittance_error.abs().max(light_error.abs());
+    Outcome::at_most(off, 200.0 * f64::from(f32::EPSILON), "off")
+}
+
+fn stacked_pixels() -> HardCase {
     HardCase::new(
         "10 000 pixels of alpha 1/255 over each other",
         "white",
         "alpha 1 and light 1, to 1e-4, never above 1",
-        || {
-            let a = 1.0 / 255.0;
-            let all = (0..10_000).fold(PremulRgba::TRANSPARENT, |behind, _| {
-                PremulRgba::new(a, a, a, a).over(behind)
-            });
-            let passed = (0.9999..=1.0).contains(&all.a) && (0.9999..=1.0).contains(&all.g);
-            Ok(Outcome::new(
-                format!("alpha {:.7}, light {:.7}", all.a, all.g),
-                passed,
-            ))
-        },
+        || Ok(stack_pixels()),
     )
 }
 
-/// Noise that looks like no constant.
-fn plate(width: usize, height: usize) -> Image<LinearRgb> {
+fn stack_pixels() -> Outcome {
+    let a = 1.0 / 255.0;
+    let all = (0..10_000).fold(PremulRgba::TRANSPARENT, |behind, _| {
+        PremulRgba::new(a, a, a, a).over(behind)
+    });
+    let passed = [all.a, all.g].iter().all(|v| (0.9999..=1.0).contains(v));
+    Outcome::new(format!("alpha {:.7}, light {:.7}", all.a, all.g), passed)
+}
+
+/// A gradient in which no two pixels are alike.
+fn gradient_plate(width: usize, height: usize) -> Image<LinearRgb> {
     Image::from_fn(width, height, |x, y| {
         LinearRgb::new(0.1 + 0.01 * x as f32, f32::MIN_POSITIVE, 1e5 + y as f32)
     })
@@ -81,37 +81,29 @@ fn everything_off() -> HardCase {
         "scene with everything off",
         "a plate; no card, light, ambient, environment, finish",
         "the plate's bits in every pixel, no shadow, no label: 0 differ",
-        || {
-            let plate = Arc::new(plate(64, 48));
-            let shot = Shot::new(above([64, 48], 60.0)).with_plate(plate.clone());
-            let deep = render(&shot, &RenderOptions::default());
-            let out = finish(
-                frame(&deep, Some(&plate)),
-                &deep,
-                Some(&plate),
-                &PostProcess::default(),
-            );
-            let pixels = out
-                .pixels()
-                .iter()
-                .zip(plate.pixels())
-                .filter(|(p, q)| **p != q.opaque())
-                .count();
-            let shadows = deep
-                .shadow()
-                .pixels()
-                .iter()
-                .filter(|s| **s != LinearRgb::WHITE)
-                .count();
-            let labels = label(&deep, &shot, &LabelOptions::default()).objects.len();
-            Ok(Outcome::near(
-                (pixels + shadows + labels) as f64,
-                0.0,
-                0.0,
-                "differ",
-            ))
-        },
+        composite_with_everything_off,
     )
+}
+
+fn composite_with_everything_off() -> Result<Outcome> {
+    let plate = Arc::new(gradient_plate(64, 48));
+    let shot = default_shot().with_plate(plate.clone());
+    let deep = rendered(&shot);
+    let framed = frame(&deep, Some(&plate));
+    let out = finish(framed, &deep, Some(&plate), &PostProcess::default());
+    let labels = label(&deep, &shot, &LabelOptions::default()).objects.len();
+    let differences = count_differing(&out, &plate) + count_shadowed(&deep) + labels;
+    Ok(Outcome::none(differences, "differ"))
+}
+
+fn count_differing(out: &Image<PremulRgba>, plate: &Image<LinearRgb>) -> usize {
+    let pairs = out.pixels().iter().zip(plate.pixels());
+    pairs.filter(|(p, q)| **p != q.opaque()).count()
+}
+
+fn count_shadowed(deep: &DeepImage) -> usize {
+    let shadow = deep.shadow().pixels().iter();
+    shadow.filter(|s| **s != LinearRgb::WHITE).count()
 }
 
 fn empty_without_plate() -> HardCase {
@@ -119,39 +111,37 @@ fn empty_without_plate() -> HardCase {
         "empty scene",
         "no card, no plate",
         "transparent black everywhere: 0 pixels differ",
-        || {
-            let deep = render(
-                &Shot::new(above([64, 48], 60.0)).with_ambient(LinearRgb::WHITE),
-                &RenderOptions::default(),
-            );
-            let out = frame(&deep, None);
-            Ok(Outcome::near(
-                out.pixels()
-                    .iter()
-                    .filter(|p| **p != PremulRgba::TRANSPARENT)
-                    .count() as f64,
-                0.0,
-                0.0,
-                "px",
-            ))
-        },
+        composite_empty_shot,
     )
 }
 
+fn composite_empty_shot() -> Result<Outcome> {
+    let deep = rendered(&default_shot().with_ambient(LinearRgb::WHITE));
+    let out = frame(&deep, None);
+    let drawn = out
+        .pixels()
+        .iter()
+        .filter(|p| **p != PremulRgba::TRANSPARENT);
+    Ok(Outcome::none(drawn.count(), "px"))
+}
+
 /// A picture of one row from the samples of its pixels.
-fn row(pixels: Vec<Vec<DeepSample>>) -> DeepImage {
+fn deep_row(pixels: Vec<Vec<DeepSample>>) -> DeepImage {
     DeepImage::from_pixels(Image::filled(pixels.len(), 1, LinearRgb::WHITE), pixels)
 }
 
-fn sample(id: u32, light: f32, visible: f32) -> DeepSample {
-    let depth = Depth(1.0);
+fn deep_sample(id: u32, light: f32, visible: f32) -> DeepSample {
     DeepSample {
         object: ObjectId(id),
-        depth,
+        depth: Depth(1.0),
         light: LinearRgb::grey(light),
         alpha: visible,
         visible,
     }
+}
+
+fn even_plate(pixels: usize, value: f32) -> Image<LinearRgb> {
+    Image::filled(pixels, 1, LinearRgb::grey(value))
 }
 
 fn rounded_up() -> HardCase {
@@ -159,18 +149,19 @@ fn rounded_up() -> HardCase {
         "shares that add up to a little over 1",
         "300 objects that hide 1/300 of a pixel each, each rounded up, over a plate of 1e5",
         "nothing of the plate passes: 0, not below",
-        || {
-            let share = (1.0 / 300.0_f32).next_up();
-            let deep = row(vec![(1..=300).map(|id| sample(id, 0.0, share)).collect()]);
-            let out = frame(&deep, Some(&Image::filled(1, 1, LinearRgb::grey(1e5))));
-            // The sum of 300 rounded numbers is known to 300 roundings, of which the plate is a 1e5-fold.
-            let value = f64::from(out[(0, 0)].g);
-            Ok(Outcome::new(
-                format!("{value:e}"),
-                (0.0..=300.0 * 1e5 * f64::from(f32::EPSILON)).contains(&value),
-            ))
-        },
+        composite_shares_rounded_up,
     )
+}
+
+fn composite_shares_rounded_up() -> Result<Outcome> {
+    let share = (1.0 / 300.0_f32).next_up();
+    let samples = (1..=300).map(|id| deep_sample(id, 0.0, share)).collect();
+    let out = frame(&deep_row(vec![samples]), Some(&even_plate(1, 1e5)));
+    // The sum of 300 rounded numbers is known to 300 roundings, of which the plate is a 1e5-fold.
+    let limit = 300.0 * 1e5 * f64::from(f32::EPSILON);
+    let value = f64::from(out[(0, 0)].g);
+    let passed = (0.0..=limit).contains(&value);
+    Ok(Outcome::new(format!("{value:e}"), passed))
 }
 
 fn bright_beside_dim() -> HardCase {
@@ -178,17 +169,15 @@ fn bright_beside_dim() -> HardCase {
         "1e5 beside 1e-4",
         "two opaque cards in neighbouring pixels, over a plate of 1e5",
         "1e-4 keeps its bits",
-        || {
-            let deep = row(vec![vec![sample(1, 1e5, 1.0)], vec![sample(2, 1e-4, 1.0)]]);
-            let out = frame(&deep, Some(&Image::filled(2, 1, LinearRgb::grey(1e5))));
-            Ok(Outcome::near(
-                out[(1, 0)].g.into(),
-                1e-4_f32.into(),
-                0.0,
-                "",
-            ))
-        },
+        composite_bright_beside_dim,
     )
+}
+
+fn composite_bright_beside_dim() -> Result<Outcome> {
+    let [bright, dim] = [deep_sample(1, 1e5, 1.0), deep_sample(2, 1e-4, 1.0)];
+    let deep = deep_row(vec![vec![bright], vec![dim]]);
+    let dimmed = frame(&deep, Some(&even_plate(2, 1e5)))[(1, 0)].g;
+    Ok(Outcome::near(dimmed.into(), 1e-4_f32.into(), 0.0, ""))
 }
 
 fn broken_plate() -> HardCase {
@@ -196,21 +185,16 @@ fn broken_plate() -> HardCase {
         "plate with one pixel of NaN",
         "64 x 48 pixels, no card",
         "no more than that pixel is NaN: 1",
-        || {
-            let mut plate = plate(64, 48);
-            plate[(20, 30)].g = f32::NAN;
-            let out = frame(
-                &render(&Shot::new(above([64, 48], 60.0)), &RenderOptions::default()),
-                Some(&plate),
-            );
-            let broken = out
-                .pixels()
-                .iter()
-                .filter(|p| !p.color().is_finite())
-                .count();
-            Ok(Outcome::near(broken as f64, 1.0, 0.0, "px"))
-        },
+        composite_broken_plate,
     )
+}
+
+fn composite_broken_plate() -> Result<Outcome> {
+    let mut plate = gradient_plate(64, 48);
+    plate[(20, 30)].g = f32::NAN;
+    let out = frame(&rendered(&default_shot()), Some(&plate));
+    let broken = out.pixels().iter().filter(|p| !p.color().is_finite());
+    Ok(Outcome::count(broken.count(), 1, "px"))
 }
 
 fn exposed(ev: f64) -> HardCase {
@@ -218,49 +202,60 @@ fn exposed(ev: f64) -> HardCase {
         format!("finish: exposure of {ev} EV"),
         "pixels of 0, 1e-4 and 1",
         "black stays 0, order stays, nothing is NaN",
-        move || {
-            let values = [0.0, 1e-4, 1.0];
-            let picture =
-                Image::from_vec(3, 1, values.map(|v| LinearRgb::grey(v).opaque()).to_vec());
-            let change = PostProcess {
-                exposure_ev: ev,
-                ..PostProcess::default()
-            };
-            let out = finish(picture, &row(vec![vec![]; 3]), None, &change);
-            let found = [0, 1, 2].map(|x| out[(x, 0)].g);
-            let passed = found[0] == 0.0 && found[0] <= found[1] && found[1] <= found[2];
-            Ok(Outcome::new(
-                format!("{:e}, {:e}, {:e}", found[0], found[1], found[2]),
-                passed,
-            ))
-        },
+        move || Ok(expose(ev)),
     )
 }
 
-fn sharpened() -> HardCase {
+fn expose(exposure_ev: f64) -> Outcome {
+    let change = PostProcess {
+        exposure_ev,
+        ..PostProcess::default()
+    };
+    let out = finish(
+        black_dim_and_bright(),
+        &deep_row(vec![vec![]; 3]),
+        None,
+        &change,
+    );
+    let [black, dim, bright] = [0, 1, 2].map(|x| out[(x, 0)].g);
+    let passed = black == 0.0 && black <= dim && dim <= bright;
+    Outcome::new(format!("{black:e}, {dim:e}, {bright:e}"), passed)
+}
+
+fn black_dim_and_bright() -> Image<PremulRgba> {
+    let pixels = [0.0, 1e-4, 1.0].map(|v| LinearRgb::grey(v).opaque());
+    Image::from_vec(3, 1, pixels.to_vec())
+}
+
+fn sharpened_spot() -> HardCase {
     HardCase::new(
         "finish: sharpening a pixel of 1e5 among 1e-4",
         "an amount of 2",
         "every value in 0..3e5, and 1e-4 kept (to 1e-6) where the window of 4 pixels does not reach",
-        || {
-            let picture = Image::from_fn(33, 33, |x, y| {
-                LinearRgb::grey(if (x, y) == (16, 16) { 1e5 } else { 1e-4 }).opaque()
-            });
-            let change = PostProcess {
-                sharpening: 2.0,
-                ..PostProcess::default()
-            };
-            let out = finish(picture, &row(vec![]), None, &change);
-            let [least, most] = [f32::min, f32::max]
-                .map(|of| out.pixels().iter().map(|p| p.g).fold(out[(0, 0)].g, of));
-            let far = f64::from(out[(2, 2)].g);
-            let passed = least >= 0.0 && most <= 3e5 && (far / 1e-4 - 1.0).abs() < 1e-6;
-            Ok(Outcome::new(
-                format!("{least:e} to {most:e}; far away {far:e}"),
-                passed,
-            ))
-        },
+        || Ok(sharpen_spot()),
     )
+}
+
+fn sharpen_spot() -> Outcome {
+    let change = PostProcess {
+        sharpening: 2.0,
+        ..PostProcess::default()
+    };
+    let out = finish(bright_spot(), &deep_row(vec![]), None, &change);
+    let [least, most] = [f32::min, f32::max].map(|pick| extreme_green(&out, pick));
+    let far = f64::from(out[(2, 2)].g);
+    let passed = least >= 0.0 && most <= 3e5 && (far / 1e-4 - 1.0).abs() < 1e-6;
+    Outcome::new(format!("{least:e} to {most:e}; far away {far:e}"), passed)
+}
+
+fn bright_spot() -> Image<PremulRgba> {
+    let mut picture = Image::filled(33, 33, LinearRgb::grey(1e-4).opaque());
+    picture[(16, 16)] = LinearRgb::grey(1e5).opaque();
+    picture
+}
+
+fn extreme_green(out: &Image<PremulRgba>, pick: fn(f32, f32) -> f32) -> f32 {
+    out.pixels().iter().map(|p| p.g).fold(out[(0, 0)].g, pick)
 }
 
 fn one_pixel() -> HardCase {
@@ -268,12 +263,12 @@ fn one_pixel() -> HardCase {
         "one-pixel image",
         "a film of transmittance 1/2 and light 0.25 over a plate of 1",
         "0.75 exactly",
-        || {
-            let out = frame(
-                &row(vec![vec![sample(1, 0.25, 0.5)]]),
-                Some(&Image::filled(1, 1, LinearRgb::WHITE)),
-            );
-            Ok(Outcome::near(out[(0, 0)].g.into(), 0.75, 0.0, ""))
-        },
+        composite_one_pixel,
     )
+}
+
+fn composite_one_pixel() -> Result<Outcome> {
+    let deep = deep_row(vec![vec![deep_sample(1, 0.25, 0.5)]]);
+    let out = frame(&deep, Some(&even_plate(1, 1.0)));
+    Ok(Outcome::near(out[(0, 0)].g.into(), 0.75, 0.0, ""))
 }

@@ -1,6 +1,8 @@
 //! Datasets that are hard to write: of empty pictures, of crowds, cut off in the middle, with numbers at their ends.
 
-use super::staged::{above, grey, level, scene};
+use super::staged::{
+    camera_above, empty_scene, grey, level_card, one_deep_pixel, rendered, temporary_folder,
+};
 use super::{HardCase, Outcome};
 use petcomp::composite;
 use petcomp::dataset::{
@@ -9,48 +11,54 @@ use petcomp::dataset::{
 };
 use petcomp::io;
 use petcomp::label::{LabelOptions, label};
-use petcomp::render::{RenderOptions, render};
-use petcomp::scene::{Background, CameraSource, Range, Recipe, Shot};
+use petcomp::scene::{Background, CameraSource, Range, Recipe, Scene, Shot};
 use petcomp::{DeepImage, DeepSample};
 use petcomp::{Error, Result};
 use petcomp::{LinearRgb, ObjectId};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 /// Objects in one pixel.
-const CROWD: u32 = 300;
+const CROWD_SIZE: u32 = 300;
 const IMAGE: [u32; 2] = [64, 48];
 
 pub(super) fn cases() -> Result<Vec<HardCase>> {
     let mut cases = vec![
         empty_pictures(),
-        crowd(),
+        crowded_pixel(),
         row_of_one_pixel(),
         too_small(),
         cut_journal(),
         lost_picture(),
-        classes_missing(),
-        splits(0),
-        splits(100),
-        splits(20),
-        last_number(),
-        shards(),
-        no_shard(),
-        negatives(),
-        seeds(),
+        missing_class(),
+        split_counts(0),
+        split_counts(100),
+        split_counts(20),
+        last_index(),
+        many_shards(),
+        invalid_shards(),
+        empty_scenes(),
+        extreme_seeds(),
     ];
-    cases.extend(recipes());
+    cases.extend(invalid_recipes());
     Ok(cases)
 }
 
 /// A picture of a shot, its labels, and what it was made from.
-fn taken(shot: &Shot) -> Sample {
-    let deep = render(shot, &RenderOptions::default());
-    sample(shot, deep)
+fn rendered_sample(shot: &Shot) -> Sample {
+    sample(shot, rendered(shot))
+}
+
+fn empty_sample() -> Sample {
+    rendered_sample(&empty_shot())
+}
+
+fn empty_shot() -> Shot {
+    Shot::new(camera_above(IMAGE, 100.0))
 }
 
 fn sample(shot: &Shot, deep: DeepImage) -> Sample {
-    let scene = scene(shot.camera);
+    let scene = empty_scene(shot.camera);
     let labels = label(&deep, shot, &LabelOptions::default());
     let frame = composite::frame(&deep, None).map(|p| p.color().opaque());
     Sample {
@@ -60,12 +68,11 @@ fn sample(shot: &Shot, deep: DeepImage) -> Sample {
     }
 }
 
-/// A card whose brightness tells picture `k` from the others.
-fn with_a_card(k: u64, size: f64) -> Shot {
-    let at = 0.01 * k as f64 - 0.05;
-    Shot::new(above(IMAGE, 100.0))
-        .with_ambient(LinearRgb::WHITE)
-        .with_card(level(1, [at, 0.0, 0.0], size, grey(1.0)))
+/// A card whose position distinguishes picture `k` from the others.
+fn with_a_card(k: u64) -> Sample {
+    let center = [0.01 * k as f64 - 0.05, 0.0, 0.0];
+    let card = level_card(1, center, 0.1, grey(1.0));
+    rendered_sample(&empty_shot().with_ambient(LinearRgb::WHITE).with_card(card))
 }
 
 /// A dataset in every layout, made and counted.
@@ -75,39 +82,24 @@ struct TestDataset {
 }
 
 impl TestDataset {
-    fn of(count: u64, make: impl Fn(u64) -> Sample + Sync) -> Result<Self> {
-        let folder = tempfile::tempdir().map_err(|e| Error::file(std::env::temp_dir(), e))?;
-        let made = Self { folder, count };
-        made.go_on(make)?;
-        Ok(made)
+    fn new(count: u64, make: impl Fn(u64) -> Sample + Sync) -> Result<Self> {
+        let folder = temporary_folder()?;
+        let dataset = Self { folder, count };
+        dataset.generate_missing(make)?;
+        Ok(dataset)
     }
 
     fn path(&self) -> &Path {
         self.folder.path()
     }
 
-    /// Makes what is missing; how many that were.
-    fn go_on(&self, make: impl Fn(u64) -> Sample + Sync) -> Result<u64> {
-        let report = generate(
-            &self.plan(),
-            |k| Ok(make(k)),
-            &|_| (),
-            &AtomicBool::new(false),
-        )?;
-        Ok(report.made)
+    /// Generates what is missing; the number of pictures made.
+    fn generate_missing(&self, make: impl Fn(u64) -> Sample + Sync) -> Result<u64> {
+        let running = AtomicBool::new(false);
+        Ok(generate(&self.plan(), |k| Ok(make(k)), &|_| (), &running)?.made)
     }
 
     fn plan(&self) -> Plan {
-        let formats = vec![Format::Yolo, Format::Coco, Format::Voc];
-        let mut writers: Vec<Box<dyn Writer>> =
-            vec![Box::new(Pictures::default()), Box::new(Sidecar)];
-        writers.extend(
-            LabelConfig {
-                formats,
-                ..LabelConfig::default()
-            }
-            .writers(&Pictures::default()),
-        );
         Plan {
             folder: self.path().into(),
             count: self.count,
@@ -117,18 +109,36 @@ impl TestDataset {
             classes: vec!["bottle".into()],
             split: Split::default(),
             obstructed: Obstructed::Keep,
-            writers,
+            writers: all_writers(),
             inputs: Default::default(),
         }
     }
 
-    /// Everything wrong with it, without the faults that small sets of like pictures have.
+    /// The findings of the checker, without those that small sets of similar pictures have.
     fn faults(&self) -> Result<Vec<String>> {
-        let faults = check(self.path())?.findings;
-        let told = faults.iter().map(|fault| fault.diagnostic.message.clone());
-        Ok(told
-            .filter(|what| !what.contains("looks like") && !what.contains("same bytes"))
-            .collect())
+        let findings = check(self.path())?.findings;
+        let messages = findings
+            .into_iter()
+            .map(|finding| finding.diagnostic.message);
+        Ok(messages.filter(|what| !is_about_similarity(what)).collect())
+    }
+
+    /// Images and rows of labels.
+    fn counts(&self) -> Result<(usize, usize)> {
+        let checked = check(self.path())?;
+        Ok((checked.images as usize, checked.rows.iter().sum()))
+    }
+
+    fn picture(&self, k: u64) -> PathBuf {
+        self.path().join(format!("images/train/{k:06}.png"))
+    }
+
+    fn cut_off_picture(&self, k: u64) -> Result<()> {
+        cut_off_file(&self.picture(k), |whole| whole / 2)
+    }
+
+    fn cut_off_journal(&self) -> Result<()> {
+        cut_off_file(&self.path().join(JOURNAL), |whole| whole - 20)
     }
 
     fn label(&self, name: &str) -> Result<String> {
@@ -136,369 +146,393 @@ impl TestDataset {
     }
 }
 
+/// Shortens a file to a length that its own determines.
+fn cut_off_file(path: &Path, length: impl Fn(usize) -> usize) -> Result<()> {
+    let mut bytes = std::fs::read(path).map_err(|e| Error::file(path, e))?;
+    bytes.truncate(length(bytes.len()));
+    std::fs::write(path, bytes).map_err(|e| Error::file(path, e))
+}
+
+fn all_writers() -> Vec<Box<dyn Writer>> {
+    let config = LabelConfig {
+        formats: vec![Format::Yolo, Format::Coco, Format::Voc],
+        ..LabelConfig::default()
+    };
+    let mut writers: Vec<Box<dyn Writer>> = vec![Box::new(Pictures::default()), Box::new(Sidecar)];
+    writers.extend(config.writers(&Pictures::default()));
+    writers
+}
+
+/// How many faults there are, and which.
+fn listed(faults: &[String]) -> String {
+    let text = format!("{} faults {}", faults.len(), faults.join("; "));
+    text.trim_end().into()
+}
+
+fn is_about_similarity(message: &str) -> bool {
+    message.contains("looks like") || message.contains("same bytes")
+}
+
 fn empty_pictures() -> HardCase {
     HardCase::new(
         "dataset of empty scenes",
         "5 pictures without an object, as YOLO, COCO and VOC",
         "no label, no fault: 0",
-        || {
-            let made = TestDataset::of(5, |_| taken(&Shot::new(above(IMAGE, 100.0))))?;
-            let (faults, checked) = (made.faults()?, check(made.path())?);
-            let rows: usize = checked.rows.iter().sum();
-            let told = format!(
-                "{} images, {rows} rows, {} faults {}",
-                checked.images,
-                faults.len(),
-                faults.join("; ")
-            );
-            Ok(Outcome::new(
-                told.trim_end(),
-                rows == 0 && faults.is_empty() && checked.images == 5,
-            ))
-        },
+        generate_empty_pictures,
     )
 }
 
-fn crowd() -> HardCase {
+fn generate_empty_pictures() -> Result<Outcome> {
+    let dataset = TestDataset::new(5, |_| empty_sample())?;
+    let (images, rows) = dataset.counts()?;
+    let faults = dataset.faults()?;
+    Ok(Outcome::new(
+        format!("{images} images, {rows} rows, {}", listed(&faults)),
+        (images, rows) == (5, 0) && faults.is_empty(),
+    ))
+}
+
+fn crowded_pixel() -> HardCase {
     HardCase::new(
         "300 objects in one pixel",
         "equal boxes of equal class, all labelled",
         "YOLO's equal rows are one; no fault",
-        || {
-            let made = TestDataset::of(2, |_| crowded())?;
-            let (rows, faults) = (
-                made.label("train/000001.txt")?.lines().count(),
-                made.faults()?,
-            );
-            Ok(Outcome::new(
-                format!("{rows} row, {} faults {}", faults.len(), faults.join("; ")),
-                rows == 1 && faults.is_empty(),
-            ))
-        },
+        generate_crowded_pictures,
     )
 }
 
-/// Pixel (3, 2) holds 300 objects, the first of them seen.
-fn crowded() -> Sample {
-    let cards = (1..=CROWD).map(|id| level(id, [0.0; 3], 0.01, grey(1.0)));
-    let shot = cards.fold(Shot::new(above(IMAGE, 100.0)), Shot::with_card);
-    let samples = (1..=CROWD).map(|id| DeepSample {
+fn generate_crowded_pictures() -> Result<Outcome> {
+    let dataset = TestDataset::new(2, |_| crowded_sample())?;
+    let rows = dataset.label("train/000001.txt")?.lines().count();
+    let faults = dataset.faults()?;
+    Ok(Outcome::new(
+        format!("{rows} row, {}", listed(&faults)),
+        rows == 1 && faults.is_empty(),
+    ))
+}
+
+/// Pixel (3, 2) holds 300 objects, of which the first is visible.
+fn crowded_sample() -> Sample {
+    let cards = (1..=CROWD_SIZE).map(|id| level_card(id, [0.0; 3], 0.01, grey(1.0)));
+    let shot = cards.fold(empty_shot(), Shot::with_card);
+    let samples: Vec<_> = (1..=CROWD_SIZE).map(opaque_sample).collect();
+    sample(&shot, one_deep_pixel(IMAGE, &samples))
+}
+
+fn opaque_sample(id: u32) -> DeepSample {
+    DeepSample {
         object: ObjectId(id),
         alpha: 1.0,
         visible: f32::from(u8::from(id == 1)),
         ..DeepSample::default()
-    });
-    let samples: Vec<_> = samples.collect();
-    let [w, h] = IMAGE.map(|side| side as usize);
-    let pixels = (0..w * h).map(|i| {
-        if i == 2 * w + 3 {
-            samples.clone()
-        } else {
-            Vec::new()
-        }
-    });
-    let deep = DeepImage::from_pixels(petcomp::Image::filled(w, h, LinearRgb::WHITE), pixels);
-    sample(&shot, deep)
+    }
 }
 
+/// A row of class 0 whose box is pixel (3, 2) of 64 x 48.
+const ONE_PIXEL_ROW: &str = "0 0.054688 0.052083 0.015625 0.020833\n";
+
 fn row_of_one_pixel() -> HardCase {
-    const ROW: &str = "0 0.054688 0.052083 0.015625 0.020833\n";
     HardCase::new(
         "YOLO row of one pixel",
         "pixel (3, 2) of 64 x 48",
-        format!("3.5/64 2.5/48 1/64 1/48: {}", ROW.trim_end()),
-        || {
-            let row = TestDataset::of(2, |_| crowded())?.label("train/000001.txt")?;
-            Ok(Outcome::new(row.trim_end(), row == ROW))
-        },
+        format!("3.5/64 2.5/48 1/64 1/48: {}", ONE_PIXEL_ROW.trim_end()),
+        write_row_of_one_pixel,
     )
 }
 
+fn write_row_of_one_pixel() -> Result<Outcome> {
+    let row = TestDataset::new(2, |_| crowded_sample())?.label("train/000001.txt")?;
+    Ok(Outcome::new(row.trim_end(), row == ONE_PIXEL_ROW))
+}
+
 fn too_small() -> HardCase {
-    HardCase::new(
+    HardCase::refused(
         "one-pixel pictures",
         "1 x 1 pixel, for YOLO",
-        "refused: \"expected at least 10 a side\"",
+        "expected at least 10 a side",
         || {
-            let made = TestDataset::of(1, |_| taken(&Shot::new(above([1, 1], 100.0))));
-            Ok(Outcome::refused(
-                made.map(|_| ()),
-                "expected at least 10 a side",
-            ))
+            let shot = Shot::new(camera_above([1, 1], 100.0));
+            TestDataset::new(1, |_| rendered_sample(&shot))
         },
     )
 }
 
 /// Ten pictures of a card.
-fn of_cards() -> Result<TestDataset> {
-    TestDataset::of(10, |k| taken(&with_a_card(k, 0.1)))
+fn dataset_of_cards() -> Result<TestDataset> {
+    TestDataset::new(10, with_a_card)
 }
 
 fn cut_journal() -> HardCase {
     HardCase::new(
         "journal cut off in the middle of a line",
-        "10 pictures; the run goes on",
+        "10 pictures; the run continues",
         "only the picture of that line is made again: 1; then no fault",
-        || {
-            let made = of_cards()?;
-            let path = made.path().join(JOURNAL);
-            let text = io::read_text(&path)?;
-            io::write_text(&path, &text[..text.len() - 20])?;
-            let again = made.go_on(|k| taken(&with_a_card(k, 0.1)))?;
-            let faults = made.faults()?;
-            Ok(Outcome::new(
-                format!("{again} made, {} faults", faults.len()),
-                again == 1 && faults.is_empty(),
-            ))
-        },
+        resume_with_cut_journal,
     )
+}
+
+fn resume_with_cut_journal() -> Result<Outcome> {
+    let dataset = dataset_of_cards()?;
+    dataset.cut_off_journal()?;
+    let again = dataset.generate_missing(with_a_card)?;
+    let faults = dataset.faults()?.len();
+    Ok(Outcome::new(
+        format!("{again} made, {faults} faults"),
+        again == 1 && faults == 0,
+    ))
 }
 
 fn lost_picture() -> HardCase {
     HardCase::new(
         "a picture lost, another cut off",
-        "10 pictures; the folder is mended, and the run goes on",
+        "10 pictures; the folder is repaired, and the run continues",
         "8 are good, 2 are made again; then no fault",
-        || {
-            let made = of_cards()?;
-            let picture = |k: u64| made.path().join(format!("images/train/{k:06}.png"));
-            std::fs::remove_file(picture(1)).map_err(|e| Error::file(picture(1), e))?;
-            let half = std::fs::read(picture(2)).map_err(|e| Error::file(picture(2), e))?;
-            std::fs::write(picture(2), &half[..half.len() / 2])
-                .map_err(|e| Error::file(picture(2), e))?;
-            let (good, lost) = repair(made.path())?;
-            let again = made.go_on(|k| taken(&with_a_card(k, 0.1)))?;
-            let faults = made.faults()?;
-            let told = format!(
-                "{good} good, {lost} lost, {again} made, {} faults",
-                faults.len()
-            );
-            Ok(Outcome::new(
-                told,
-                (good, lost, again) == (8, 2, 2) && faults.is_empty(),
-            ))
-        },
+        resume_after_repair,
     )
 }
 
-fn classes_missing() -> HardCase {
-    HardCase::new(
-        "object of a class that there is not",
+fn resume_after_repair() -> Result<Outcome> {
+    let dataset = damaged_dataset()?;
+    let (good, lost) = repair(dataset.path())?;
+    let again = dataset.generate_missing(with_a_card)?;
+    let faults = dataset.faults()?.len();
+    Ok(Outcome::new(
+        format!("{good} good, {lost} lost, {again} made, {faults} faults"),
+        (good, lost, again, faults) == (8, 2, 2, 0),
+    ))
+}
+
+/// Picture 1 is lost, picture 2 is cut off.
+fn damaged_dataset() -> Result<TestDataset> {
+    let dataset = dataset_of_cards()?;
+    let lost = dataset.picture(1);
+    std::fs::remove_file(&lost).map_err(|e| Error::file(lost, e))?;
+    dataset.cut_off_picture(2)?;
+    Ok(dataset)
+}
+
+fn missing_class() -> HardCase {
+    HardCase::refused(
+        "object of a class that does not exist",
         "class 7 of 1",
-        "refused, by \"but there are 1 classes\"",
-        || {
-            let made = TestDataset::of(1, |_| {
-                let mut sample = taken(&with_a_card(0, 0.1));
-                sample.labels.objects.iter_mut().for_each(|o| o.class = 7);
-                sample
-            });
-            Ok(Outcome::refused(
-                made.map(|_| ()),
-                "but there are 1 classes",
-            ))
-        },
+        "but there are 1 classes",
+        || TestDataset::new(1, |_| sample_of_class_7()),
     )
 }
 
-fn splits(percent: u8) -> HardCase {
-    let expected = 10 * u64::from(percent);
+fn sample_of_class_7() -> Sample {
+    let mut sample = with_a_card(0);
+    for object in &mut sample.labels.objects {
+        object.class = 7;
+    }
+    sample
+}
+
+fn split_counts(percent: u8) -> HardCase {
+    let expected = 10 * usize::from(percent);
     HardCase::new(
         format!("{percent} % for validation"),
         "1000 pictures, interleaved and consecutive",
         format!("{expected} for validation, either way"),
-        move || {
-            let count = |order| {
-                let split = Split {
-                    val_percent: percent,
-                    order,
-                };
-                (0..1000)
-                    .filter(|&k| split.part(k, 1000) == Part::Val)
-                    .count() as u64
-            };
-            let found = [
-                count(SplitOrder::Interleaved),
-                count(SplitOrder::Consecutive),
-            ];
-            Ok(Outcome::new(
-                format!("{} and {}", found[0], found[1]),
-                found == [expected; 2],
-            ))
-        },
+        move || count_splits(percent, expected),
     )
 }
 
-fn last_number() -> HardCase {
+fn count_splits(percent: u8, expected: usize) -> Result<Outcome> {
+    let found = [SplitOrder::Interleaved, SplitOrder::Consecutive]
+        .map(|order| count_validation(percent, order));
+    Ok(Outcome::new(
+        format!("{} and {}", found[0], found[1]),
+        found == [expected; 2],
+    ))
+}
+
+/// Pictures of 1000 that are for validation.
+fn count_validation(val_percent: u8, order: SplitOrder) -> usize {
+    let split = Split { val_percent, order };
+    let parts = (0..1000).map(|k| split.part(k, 1000));
+    parts.filter(|part| *part == Part::Val).count()
+}
+
+fn last_index() -> HardCase {
     HardCase::new(
-        "the last number there is",
+        "the largest index",
         "picture 2^64 - 1 of 2^64 - 1",
         "a part, without overflow",
-        || {
-            let parts = [SplitOrder::Interleaved, SplitOrder::Consecutive].map(|order| {
-                Split {
-                    order,
-                    ..Split::default()
-                }
-                .part(u64::MAX, u64::MAX)
-            });
-            Ok(Outcome::new(format!("{parts:?}"), parts[1] == Part::Val))
-        },
+        split_last_index,
     )
 }
 
-fn shards() -> HardCase {
+fn split_last_index() -> Result<Outcome> {
+    let parts = [SplitOrder::Interleaved, SplitOrder::Consecutive].map(part_of_last_index);
+    Ok(Outcome::new(format!("{parts:?}"), parts[1] == Part::Val))
+}
+
+fn part_of_last_index(order: SplitOrder) -> Part {
+    let split = Split {
+        order,
+        ..Split::default()
+    };
+    split.part(u64::MAX, u64::MAX)
+}
+
+fn many_shards() -> HardCase {
     HardCase::new(
         "more shards than pictures",
         "10 pictures on 1000 machines",
         "each picture on exactly one: 10",
-        || {
-            let all = (1..=1000)
-                .map(|index| Shard::new(index, 1000))
-                .collect::<Result<Vec<_>>>()?;
-            let once = (0..10)
-                .filter(|&k| all.iter().filter(|shard| shard.contains(k)).count() == 1)
-                .count();
-            Ok(Outcome::near(once as f64, 10.0, 0.0, ""))
-        },
+        contain_in_shards,
     )
 }
 
-fn no_shard() -> HardCase {
+fn contain_in_shards() -> Result<Outcome> {
+    let shards = all_shards(1000)?;
+    let on_one = (0..10).filter(|&k| count_containing(&shards, k) == 1);
+    Ok(Outcome::count(on_one.count(), 10, ""))
+}
+
+fn all_shards(count: u64) -> Result<Vec<Shard>> {
+    (1..=count).map(|index| Shard::new(index, count)).collect()
+}
+
+fn count_containing(shards: &[Shard], k: u64) -> usize {
+    shards.iter().filter(|shard| shard.contains(k)).count()
+}
+
+fn invalid_shards() -> HardCase {
     HardCase::new(
         "shard 0, shard 5 of 4, shard 1 of 0",
         "as --shard",
         "refused: 3",
-        || {
-            let refused = [(0, 4), (5, 4), (1, 0)]
-                .iter()
-                .filter(|(index, of)| Shard::new(*index, *of).is_err())
-                .count();
-            Ok(Outcome::near(refused as f64, 3.0, 0.0, "refused"))
-        },
+        make_invalid_shards,
     )
 }
 
+fn make_invalid_shards() -> Result<Outcome> {
+    let attempts = [(0, 4), (5, 4), (1, 0)].map(|(index, of)| Shard::new(index, of));
+    let refused = attempts.iter().filter(|attempt| attempt.is_err());
+    Ok(Outcome::count(refused.count(), 3, "refused"))
+}
+
 fn tray() -> Background {
-    let corners_px = [[0.0, 0.0], [60.0, 0.0], [60.0, 40.0], [0.0, 40.0]];
-    let camera = CameraSource::Rectangle {
-        corners_px,
-        photo: [60, 40],
-        focal_px: None,
-    };
     Background {
         name: "tray".into(),
         size: [0.6, 0.4],
-        camera,
+        camera: CameraSource::Rectangle {
+            corners_px: [[0.0, 0.0], [60.0, 0.0], [60.0, 40.0], [0.0, 40.0]],
+            photo: [60, 40],
+            focal_px: None,
+        },
     }
 }
 
-fn negatives() -> HardCase {
+fn empty_scenes() -> HardCase {
     HardCase::new(
         "recipe of empty scenes alone",
         "negatives = 1, and objects = 0, 20 scenes of each, without a catalog",
         "no object in any: 0",
-        || {
-            let none = Recipe {
-                objects: Range::fixed(0.0),
-                ..Recipe::default()
-            };
-            let negative = Recipe {
-                negatives: 1.0,
-                ..Recipe::default()
-            };
-            let count = |recipe: &Recipe, k| {
-                recipe
-                    .scene(1, k, &[tray()], &[])
-                    .map(|scene| scene.objects.len())
-            };
-            let all = (0..20)
-                .flat_map(|k| [count(&none, k), count(&negative, k)])
-                .collect::<Result<Vec<_>>>()?;
-            Ok(Outcome::near(
-                all.iter().sum::<usize>() as f64,
-                0.0,
-                0.0,
-                "objects",
-            ))
-        },
+        draw_empty_scenes,
     )
 }
 
-fn seeds() -> HardCase {
+fn draw_empty_scenes() -> Result<Outcome> {
+    let negative = Recipe {
+        negatives: 1.0,
+        ..Recipe::default()
+    };
+    let objects = count_objects(&without_objects())? + count_objects(&negative)?;
+    Ok(Outcome::none(objects, "objects"))
+}
+
+fn without_objects() -> Recipe {
+    Recipe {
+        objects: Range::fixed(0.0),
+        ..Recipe::default()
+    }
+}
+
+/// Objects of 20 scenes.
+fn count_objects(recipe: &Recipe) -> Result<usize> {
+    let scenes = (0..20).map(|k| recipe.scene(1, k, &[tray()], &[]));
+    scenes.map(|scene| Ok(scene?.objects.len())).sum()
+}
+
+fn extreme_seeds() -> HardCase {
     HardCase::new(
         "seeds and numbers at their ends",
         "seeds 0, 1 and 2^64 - 1, scenes 0, 1 and 2^64 - 1",
         "nine different scenes, each the same when it is drawn again",
         || {
-            let recipe = Recipe {
-                objects: Range::fixed(0.0),
-                ..Recipe::default()
-            };
-            let ends = [0, 1, u64::MAX];
-            let pairs = || ends.into_iter().flat_map(|seed| ends.map(|k| (seed, k)));
-            let drawn = || {
-                pairs()
-                    .map(|(seed, k)| recipe.scene(seed, k, &[tray()], &[]))
-                    .collect::<Result<Vec<_>>>()
-            };
-            let (once, again) = (drawn()?, drawn()?);
-            let different = (0..once.len())
-                .filter(|&i| !once[..i].contains(&once[i]))
-                .count();
-            let same = if once == again {
-                "the same again"
-            } else {
-                "not the same again"
-            };
-            Ok(Outcome::new(
-                format!("{different} different, {same}"),
-                different == 9 && once == again,
+            Ok(compare_draws(
+                &draw_extreme_seeds()?,
+                &draw_extreme_seeds()?,
             ))
         },
     )
 }
 
-fn recipes() -> Vec<HardCase> {
+fn draw_extreme_seeds() -> Result<Vec<Scene>> {
+    let recipe = without_objects();
+    extreme_seeds_and_indices()
+        .map(|(seed, k)| recipe.scene(seed, k, &[tray()], &[]))
+        .collect()
+}
+
+fn extreme_seeds_and_indices() -> impl Iterator<Item = (u64, u64)> {
+    let ends = [0, 1, u64::MAX];
+    ends.into_iter()
+        .flat_map(move |seed| ends.map(|k| (seed, k)))
+}
+
+fn compare_draws(once: &[Scene], again: &[Scene]) -> Outcome {
+    let different = count_distinct(once);
+    let is_same = once == again;
+    let same = if is_same { "the same" } else { "not the same" };
+    Outcome::new(
+        format!("{different} different, {same} again"),
+        different == 9 && is_same,
+    )
+}
+
+fn count_distinct(scenes: &[Scene]) -> usize {
+    (0..scenes.len())
+        .filter(|&i| !scenes[..i].contains(&scenes[i]))
+        .count()
+}
+
+fn invalid_recipes() -> Vec<HardCase> {
     vec![
         refused("recipe without a background", "background", &[], |_| ()),
-        refused("recipe without a catalog", "no asset", &[tray()], |_| ()),
-        refused("pictures of 0 x 48", "image", &[tray()], |recipe| {
-            recipe.image = [0, 48]
+        on_tray("recipe without a catalog", "no asset", |_| ()),
+        on_tray("pictures of 0 x 48", "image", |r| r.image = [0, 48]),
+        on_tray("10^9 objects", "objects", |r| r.objects = Range::fixed(1e9)),
+        on_tray("reversed range", "objects", |r| {
+            r.objects = Range::new(5.0, 2.0)
         }),
-        refused("10^9 objects", "objects", &[tray()], |recipe| {
-            recipe.objects = Range::fixed(1e9)
+        on_tray("range of NaN", "scale", |r| {
+            r.scale = Range::fixed(f64::NAN)
         }),
-        refused("range turned round", "objects", &[tray()], |recipe| {
-            recipe.objects = Range::new(5.0, 2.0)
+        on_tray("share of negatives of 1.5", "negatives", |r| {
+            r.negatives = 1.5
         }),
-        refused("range of NaN", "scale", &[tray()], |recipe| {
-            recipe.scale = Range::fixed(f64::NAN)
-        }),
-        refused(
-            "share of negatives of 1.5",
-            "negatives",
-            &[tray()],
-            |recipe| recipe.negatives = 1.5,
-        ),
     ]
 }
 
-/// A recipe with one thing wrong.
+fn on_tray(name: &str, cause: &'static str, spoil: fn(&mut Recipe)) -> HardCase {
+    refused(name, cause, &[tray()], spoil)
+}
+
+/// An otherwise valid recipe with one mistake.
 fn refused(
     name: &str,
     cause: &'static str,
-    places: &[Background],
+    backgrounds: &[Background],
     spoil: fn(&mut Recipe),
 ) -> HardCase {
-    let places = places.to_vec();
-    HardCase::new(
-        name,
-        "an else good recipe",
-        format!("refused, by \"{cause}\""),
-        move || {
-            let mut recipe = Recipe::default();
-            spoil(&mut recipe);
-            Ok(Outcome::refused(recipe.scene(0, 0, &places, &[]), cause))
-        },
-    )
+    let backgrounds = backgrounds.to_vec();
+    HardCase::refused(name, "an otherwise valid recipe", cause, move || {
+        let mut recipe = Recipe::default();
+        spoil(&mut recipe);
+        recipe.scene(0, 0, &backgrounds, &[])
+    })
 }

@@ -3,113 +3,24 @@
 use super::{HardCase, Outcome};
 use petcomp::Result;
 use petcomp::eval::{
-    Confusion, ConfusionOptions, Definition, Detection, EvalImage, GroundTruth, Scores, bootstrap,
-    coco, curves, evaluate, iou,
+    Confusion, ConfusionOptions, Definition, Detection, EvalImage, GroundTruth, bootstrap, coco,
+    curves, evaluate, iou,
 };
 use petcomp::geom::BBox;
 
 /// Boxes of the largest case.
-const MANY: usize = 100_000;
+const MOST_BOXES: usize = 100_000;
 /// Precision of a detector that makes no error, by YOLOv5's trapezoid, whose curve ends at precision 0.
 const PERFECT_YOLO: f64 = 0.995;
 
 pub(super) fn cases() -> Result<Vec<HardCase>> {
     let mut cases = Vec::new();
-    for (name, definition, perfect) in [
-        ("yolov5", Definition::Yolov5, PERFECT_YOLO),
-        ("coco", Definition::Coco, 1.0),
-    ] {
-        cases.extend([
-            scored(
-                name,
-                definition,
-                "nothing at all",
-                "no image",
-                0.0,
-                Vec::new,
-            ),
-            scored(
-                name,
-                definition,
-                "no predictions",
-                "10 boxes to find",
-                0.0,
-                || vec![sheet(10, 0, equal)],
-            ),
-            scored(
-                name,
-                definition,
-                "no truth",
-                "10 detections, nothing to find",
-                0.0,
-                || vec![sheet(0, 10, equal)],
-            ),
-            scored(
-                name,
-                definition,
-                "boxes without area",
-                "points found where points are",
-                0.0,
-                points,
-            ),
-            scored(
-                name,
-                definition,
-                "equal confidences",
-                "100 boxes, all found, all of 0.5",
-                perfect,
-                || vec![sheet(100, 100, equal)],
-            ),
-            scored(
-                name,
-                definition,
-                "confidences of 0",
-                "100 boxes, all found, all of 0",
-                perfect,
-                || vec![sheet(100, 100, |_| 0.0)],
-            ),
-            scored(
-                name,
-                definition,
-                "confidences of 1e-300",
-                "100 boxes, all found",
-                perfect,
-                || vec![sheet(100, 100, |i| 1e-300 * (i + 1) as f64)],
-            ),
-            scored(name, definition, "one box", "found", perfect, || {
-                vec![sheet(1, 1, equal)]
-            }),
-            scored(
-                name,
-                definition,
-                "a detection twice",
-                "1 box, named twice",
-                perfect,
-                || {
-                    let mut one = sheet(1, 1, equal);
-                    one.found.push(Detection {
-                        confidence: 0.4,
-                        ..one.found[0]
-                    });
-                    vec![one]
-                },
-            ),
-            scored(
-                name,
-                definition,
-                "100 000 boxes in 1000 images",
-                "all found",
-                perfect,
-                || {
-                    (0..MANY / 100)
-                        .map(|_| sheet(100, 100, |i| 1.0 / (i + 1) as f64))
-                        .collect()
-                },
-            ),
-        ]);
+    for scores in [YOLO_SCORES, COCO_SCORES] {
+        cases.extend(scores.cases_without_matches());
+        cases.extend(scores.cases_with_all_found());
     }
     cases.extend([
-        crowded(),
+        crowded_image(),
         one_image(),
         half_right(),
         no_images(),
@@ -119,85 +30,181 @@ pub(super) fn cases() -> Result<Vec<HardCase>> {
     Ok(cases)
 }
 
-fn equal(_: usize) -> f64 {
-    0.5
+/// A definition of the score, and the score of a detector that makes no error.
+#[derive(Clone, Copy)]
+struct ScoreCases {
+    name: &'static str,
+    definition: Definition,
+    perfect: f64,
 }
 
-/// Boxes of 10 x 10 pixels side by side, so many true, so many found in the same places.
-fn sheet(truths: usize, found: usize, confidence: fn(usize) -> f64) -> EvalImage {
-    let place = |i: usize| {
-        let (x, y) = (20.0 * (i % 100) as f64, 20.0 * (i / 100) as f64);
-        BBox {
-            x0: x,
-            y0: y,
-            x1: x + 10.0,
-            y1: y + 10.0,
-        }
-    };
-    let truth = (0..truths)
-        .map(|i| GroundTruth {
-            class: 0,
-            bbox: place(i),
-            area: 100.0,
-            crowd: false,
+const YOLO_SCORES: ScoreCases = ScoreCases {
+    name: "yolov5",
+    definition: Definition::Yolov5,
+    perfect: PERFECT_YOLO,
+};
+const COCO_SCORES: ScoreCases = ScoreCases {
+    name: "coco",
+    definition: Definition::Coco,
+    perfect: 1.0,
+};
+
+impl ScoreCases {
+    fn cases_without_matches(self) -> Vec<HardCase> {
+        vec![
+            self.zero("nothing at all", "no image", Vec::new),
+            self.zero("no predictions", "10 boxes to find", || {
+                vec![grid_image(10, 0, equal_confidence)]
+            }),
+            self.zero("no truth", "10 detections, nothing to find", || {
+                vec![grid_image(0, 10, equal_confidence)]
+            }),
+            self.zero(
+                "boxes without area",
+                "points found where points are",
+                image_of_points,
+            ),
+        ]
+    }
+
+    fn cases_with_all_found(self) -> Vec<HardCase> {
+        vec![
+            self.perfect(
+                "equal confidences",
+                "100 boxes, all found, all of 0.5",
+                || vec![grid_image(100, 100, equal_confidence)],
+            ),
+            self.perfect("confidences of 0", "100 boxes, all found, all of 0", || {
+                vec![grid_image(100, 100, |_| 0.0)]
+            }),
+            self.perfect("confidences of 1e-300", "100 boxes, all found", || {
+                vec![grid_image(100, 100, |i| 1e-300 * (i + 1) as f64)]
+            }),
+            self.perfect("one box", "found", || {
+                vec![grid_image(1, 1, equal_confidence)]
+            }),
+            self.perfect(
+                "a detection twice",
+                "1 box, named twice",
+                image_with_duplicate,
+            ),
+            self.perfect("100 000 boxes in 1000 images", "all found", many_images),
+        ]
+    }
+
+    fn zero(self, what: &str, input: &str, images: fn() -> Vec<EvalImage>) -> HardCase {
+        self.scored(what, input, 0.0, images)
+    }
+
+    fn perfect(self, what: &str, input: &str, images: fn() -> Vec<EvalImage>) -> HardCase {
+        self.scored(what, input, self.perfect, images)
+    }
+
+    fn scored(
+        self,
+        what: &str,
+        input: &str,
+        expected: f64,
+        images: fn() -> Vec<EvalImage>,
+    ) -> HardCase {
+        let name = format!("{}: {what}", self.name);
+        let expectation = format!("mAP {expected}, to 1e-9");
+        HardCase::new(name, input, expectation, move || {
+            Ok(compare_map(&images(), self.definition, expected))
         })
-        .collect();
-    let found = (0..found)
-        .map(|i| Detection {
-            class: 0,
-            bbox: place(i),
-            confidence: confidence(i),
-        })
-        .collect();
-    EvalImage {
-        image: String::new(),
-        truth,
-        found,
     }
 }
 
-fn points() -> Vec<EvalImage> {
-    let mut sheet = sheet(3, 3, equal);
-    sheet
-        .truth
-        .iter_mut()
-        .for_each(|t| (t.bbox.x1, t.bbox.y1, t.area) = (t.bbox.x0, t.bbox.y0, 0.0));
-    sheet
-        .found
-        .iter_mut()
-        .for_each(|f| (f.bbox.x1, f.bbox.y1) = (f.bbox.x0, f.bbox.y0));
-    vec![sheet]
+fn compare_map(images: &[EvalImage], definition: Definition, expected: f64) -> Outcome {
+    let map = evaluate(images, definition, &[]).map();
+    Outcome::near(map, expected, 1e-9, "")
 }
 
-fn scored(
-    name: &str,
-    definition: Definition,
-    what: &str,
-    input: &str,
-    expected: f64,
-    sheets: impl Fn() -> Vec<EvalImage> + Send + Sync + 'static,
-) -> HardCase {
-    let promise = format!("mAP {expected}, to 1e-9");
-    HardCase::new(format!("{name}: {what}"), input, promise, move || {
-        Ok(Outcome::near(
-            Scores::map(&evaluate(&sheets(), definition, &[])),
-            expected,
-            1e-9,
-            "",
-        ))
-    })
+fn image_with_duplicate() -> Vec<EvalImage> {
+    let mut one = grid_image(1, 1, equal_confidence);
+    one.found.push(Detection {
+        confidence: 0.4,
+        ..one.found[0]
+    });
+    vec![one]
 }
 
-fn crowded() -> HardCase {
+fn many_images() -> Vec<EvalImage> {
+    vec![grid_image(100, 100, falling_confidence); MOST_BOXES / 100]
+}
+
+fn equal_confidence(_: usize) -> f64 {
+    0.5
+}
+
+fn falling_confidence(i: usize) -> f64 {
+    1.0 / (i + 1) as f64
+}
+
+/// The `i`-th box of 10 x 10 pixels in rows of 100.
+fn grid_box(i: usize) -> BBox {
+    let (x, y) = (20.0 * (i % 100) as f64, 20.0 * (i / 100) as f64);
+    BBox {
+        x0: x,
+        y0: y,
+        x1: x + 10.0,
+        y1: y + 10.0,
+    }
+}
+
+/// Boxes side by side: the first `truths` are true, the first `found` are found.
+fn grid_image(truths: usize, found: usize, confidence: fn(usize) -> f64) -> EvalImage {
+    let truth = (0..truths).map(|i| GroundTruth {
+        class: 0,
+        bbox: grid_box(i),
+        area: 100.0,
+        crowd: false,
+    });
+    let found = (0..found).map(|i| Detection {
+        class: 0,
+        bbox: grid_box(i),
+        confidence: confidence(i),
+    });
+    EvalImage {
+        image: String::new(),
+        truth: truth.collect(),
+        found: found.collect(),
+    }
+}
+
+fn image_of_points() -> Vec<EvalImage> {
+    let mut image = grid_image(3, 3, equal_confidence);
+    for truth in &mut image.truth {
+        truth.bbox = corner_of(truth.bbox);
+        truth.area = 0.0;
+    }
+    for found in &mut image.found {
+        found.bbox = corner_of(found.bbox);
+    }
+    vec![image]
+}
+
+fn corner_of(bbox: BBox) -> BBox {
+    BBox {
+        x1: bbox.x0,
+        y1: bbox.y0,
+        ..bbox
+    }
+}
+
+fn crowded_image() -> HardCase {
     HardCase::new(
         "coco: 100 000 boxes in one image",
         "all found; COCO looks at 100 detections",
         "recall 0.001, so that 1 of 101 readings (at recall 0) finds precision 1: 1/101, to 1e-9",
-        || {
-            let scores = coco(&[sheet(MANY, 200, |i| 1.0 / (i + 1) as f64)], &[]).scores;
-            Ok(Outcome::near(scores.map(), 1.0 / 101.0, 1e-9, ""))
-        },
+        score_crowded_image,
     )
+}
+
+fn score_crowded_image() -> Result<Outcome> {
+    let image = grid_image(MOST_BOXES, 200, falling_confidence);
+    let map = coco(&[image], &[]).scores.map();
+    Ok(Outcome::near(map, 1.0 / 101.0, 1e-9, ""))
 }
 
 fn one_image() -> HardCase {
@@ -205,15 +212,13 @@ fn one_image() -> HardCase {
         "yolov5: 2000 boxes in one image",
         "all found, all of one confidence",
         format!("mAP {PERFECT_YOLO}, to 1e-9"),
-        || {
-            Ok(Outcome::near(
-                evaluate(&[sheet(2000, 2000, equal)], Definition::Yolov5, &[]).map(),
-                PERFECT_YOLO,
-                1e-9,
-                "",
-            ))
-        },
+        score_one_image,
     )
+}
+
+fn score_one_image() -> Result<Outcome> {
+    let image = grid_image(2000, 2000, equal_confidence);
+    Ok(compare_map(&[image], Definition::Yolov5, PERFECT_YOLO))
 }
 
 fn half_right() -> HardCase {
@@ -221,26 +226,26 @@ fn half_right() -> HardCase {
         "coco: equal confidences, half of them wrong",
         "100 found rightly, then 100 where nothing is, all of 0.5",
         "equal ones keep their order, the right ones first: mAP 1, to 1e-9",
-        || {
-            let mut half = sheet(50, 50, equal);
-            let away = |f: &Detection| Detection {
-                bbox: BBox {
-                    x0: f.bbox.x0 + 1e4,
-                    x1: f.bbox.x1 + 1e4,
-                    ..f.bbox
-                },
-                ..*f
-            };
-            let wrong: Vec<Detection> = half.found.iter().map(away).collect();
-            half.found.extend(wrong);
-            Ok(Outcome::near(
-                evaluate(&[half], Definition::Coco, &[]).map(),
-                1.0,
-                1e-9,
-                "",
-            ))
-        },
+        score_half_right,
     )
+}
+
+fn score_half_right() -> Result<Outcome> {
+    Ok(compare_map(&[half_right_image()], Definition::Coco, 1.0))
+}
+
+fn half_right_image() -> EvalImage {
+    let mut image = grid_image(50, 50, equal_confidence);
+    let wrong: Vec<Detection> = image.found.iter().map(moved_away).collect();
+    image.found.extend(wrong);
+    image
+}
+
+fn moved_away(found: &Detection) -> Detection {
+    let mut moved = *found;
+    moved.bbox.x0 += 1e4;
+    moved.bbox.x1 += 1e4;
+    moved
 }
 
 fn no_images() -> HardCase {
@@ -248,18 +253,18 @@ fn no_images() -> HardCase {
         "interval of no images",
         "a bootstrap of 100 rounds over nothing",
         "0 from 0 to 0; no curve",
-        || {
-            let interval = bootstrap(&[], Definition::Coco, 100, 1);
-            let (found, curves) = (
-                [interval.low, interval.value, interval.high],
-                curves(&[]).classes.len(),
-            );
-            Ok(Outcome::new(
-                format!("{found:?}, {curves} curves"),
-                found == [0.0; 3] && curves == 0,
-            ))
-        },
+        score_no_images,
     )
+}
+
+fn score_no_images() -> Result<Outcome> {
+    let interval = bootstrap(&[], Definition::Coco, 100, 1);
+    let found = [interval.low, interval.value, interval.high];
+    let curves = curves(&[]).classes.len();
+    Ok(Outcome::new(
+        format!("{found:?}, {curves} curves"),
+        found == [0.0; 3] && curves == 0,
+    ))
 }
 
 fn confusion() -> HardCase {
@@ -267,18 +272,24 @@ fn confusion() -> HardCase {
         "confusion: 300 boxes in one place",
         "300 equal true boxes and 300 equal detections of one class",
         "300 pairs, nothing missed, no false alarm",
-        || {
-            let mut sheet = sheet(300, 300, equal);
-            let place = sheet.truth[0].bbox;
-            sheet.truth.iter_mut().for_each(|t| t.bbox = place);
-            sheet.found.iter_mut().for_each(|f| f.bbox = place);
-            let counts = Confusion::new(&[sheet], &ConfusionOptions::default()).counts;
-            Ok(Outcome::new(
-                format!("{counts:?}"),
-                counts.into_iter().eq([([Some(0), Some(0)], 300)]),
-            ))
-        },
+        count_confusion,
     )
+}
+
+fn count_confusion() -> Result<Outcome> {
+    let images = [image_of_equal_boxes(300)];
+    let counts = Confusion::new(&images, &ConfusionOptions::default()).counts;
+    Ok(Outcome::new(
+        format!("{counts:?}"),
+        counts.into_iter().eq([([Some(0), Some(0)], 300)]),
+    ))
+}
+
+fn image_of_equal_boxes(count: usize) -> EvalImage {
+    let mut image = grid_image(count, count, equal_confidence);
+    image.truth.iter_mut().for_each(|t| t.bbox = grid_box(0));
+    image.found.iter_mut().for_each(|f| f.bbox = grid_box(0));
+    image
 }
 
 fn huge_boxes() -> HardCase {
@@ -286,26 +297,24 @@ fn huge_boxes() -> HardCase {
         "overlap of boxes of 1e150 pixels",
         "one half of the other; areas of 1e300",
         "intersection over union 1/2, to 1e-12; of infinite ones a number, not NaN",
-        || {
-            let whole = BBox {
-                x0: 0.0,
-                y0: 0.0,
-                x1: 1e150,
-                y1: 1e150,
-            };
-            let half = BBox {
-                x1: 0.5e150,
-                ..whole
-            };
-            let endless = BBox {
-                x1: f64::INFINITY,
-                ..whole
-            };
-            let (found, of_endless) = (iou(&whole, &half), iou(&endless, &endless));
-            Ok(Outcome::new(
-                format!("{found}, of infinite ones {of_endless}"),
-                (found - 0.5).abs() < 1e-12 && !of_endless.is_nan(),
-            ))
-        },
+        overlap_huge_boxes,
     )
+}
+
+fn overlap_huge_boxes() -> Result<Outcome> {
+    let [whole, half, endless] = [1e150, 0.5e150, f64::INFINITY].map(box_of_width);
+    let (of_half, of_endless) = (iou(&whole, &half), iou(&endless, &endless));
+    Ok(Outcome::new(
+        format!("{of_half}, of infinite ones {of_endless}"),
+        (of_half - 0.5).abs() < 1e-12 && !of_endless.is_nan(),
+    ))
+}
+
+fn box_of_width(x1: f64) -> BBox {
+    BBox {
+        x0: 0.0,
+        y0: 0.0,
+        x1,
+        y1: 1e150,
+    }
 }

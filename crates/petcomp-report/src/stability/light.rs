@@ -1,7 +1,7 @@
 //! Light that is hard to sum, and plates that are hard to match.
 
 use super::render::largest;
-use super::staged::{above, lamp, scene};
+use super::staged::{camera_above, empty_scene, lamp};
 use super::{HardCase, Outcome};
 use petcomp::Image;
 use petcomp::LinearRgb;
@@ -14,58 +14,45 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 pub(super) fn cases() -> Result<Vec<HardCase>> {
-    let groups = [lamps(), skies(), plates()];
+    let groups = [
+        extreme_lamps(),
+        extreme_skies(),
+        invalid_maps(),
+        plates_to_expose(),
+        plates_to_match(),
+        plates_with_noise(),
+    ];
     Ok(groups.into_iter().flatten().collect())
 }
 
-fn lamps() -> Vec<HardCase> {
-    let mut cases = Vec::new();
-    for shape in [LightShape::Rectangle, LightShape::Ellipse] {
-        let name = format!("{shape:?}").to_lowercase();
-        cases.push(small(
-            &name,
-            AreaLight {
-                shape,
-                ..lamp([0.3, 0.2, 0.9], 0.0, 10.0)
-            },
-            "of no size",
-        ));
-        cases.push(small(
-            &name,
-            AreaLight {
-                shape,
-                ..lamp([0.0, 0.0, 1e6], 0.1, 10.0)
-            },
-            "1000 km away",
-        ));
-        let graze = libm::sincos(1e-4);
-        cases.push(small(
-            &name,
-            AreaLight {
-                shape,
-                ..lamp([10.0 * graze.1, 0.0, 10.0 * graze.0], 1e-4, 10.0)
-            },
-            "grazing at 1e-4 rad",
-        ));
-        cases.push(wide(
-            &name,
-            AreaLight {
-                shape,
-                ..lamp([0.0, 0.0, 1e-6], 1.0, 10.0)
-            },
-            "1 um away",
-        ));
-        cases.push(wide(
-            &name,
-            AreaLight {
-                shape,
-                ..lamp([0.0, 0.0, 1.0], 1e6, 10.0)
-            },
-            "1000 km across",
-        ));
-    }
-    cases.push(inside());
+fn extreme_lamps() -> Vec<HardCase> {
+    let shapes = [LightShape::Rectangle, LightShape::Ellipse];
+    let mut cases: Vec<_> = shapes.into_iter().flat_map(lamps_of_shape).collect();
+    cases.push(inside_the_lamp());
     cases
+}
+
+fn lamps_of_shape(shape: LightShape) -> [HardCase; 5] {
+    let (sin, cos) = libm::sincos(1e-4);
+    let grazing = [10.0 * cos, 0.0, 10.0 * sin];
+    [
+        small_lamp(shape, [0.3, 0.2, 0.9], 0.0, "of no size"),
+        small_lamp(shape, [0.0, 0.0, 1e6], 0.1, "1000 km away"),
+        small_lamp(shape, grazing, 1e-4, "grazing at 1e-4 rad"),
+        wide_lamp(shape, [0.0, 0.0, 1e-6], 1.0, "1 um away"),
+        wide_lamp(shape, [0.0, 0.0, 1.0], 1e6, "1000 km across"),
+    ]
+}
+
+fn lamp_of_shape(shape: LightShape, position: [f64; 3], side: f64) -> AreaLight {
+    AreaLight {
+        shape,
+        ..lamp(position, side, 10.0)
+    }
+}
+
+fn lamp_case_name(shape: LightShape, what: &str) -> String {
+    format!("{} {what}", format!("{shape:?}").to_lowercase())
 }
 
 fn received(light: &AreaLight) -> f64 {
@@ -73,92 +60,67 @@ fn received(light: &AreaLight) -> f64 {
 }
 
 /// A light that is small from where it is seen: `P cos / (pi r^2)`.
-fn small(shape: &str, light: AreaLight, what: &str) -> HardCase {
+fn small_lamp(shape: LightShape, position: [f64; 3], side: f64, what: &str) -> HardCase {
+    let light = lamp_of_shape(shape, position, side);
     let to = Vector3::from(light.position);
     let expected = light.power * to.normalize().z / (PI * to.norm_squared());
-    let promise = format!("a point's irradiance P cos / (pi r^2) = {expected:.4e}, to 0.1 %");
     HardCase::new(
-        format!("{shape} {what}"),
+        lamp_case_name(shape, what),
         "10 W turned to a level receiver",
-        promise,
-        move || {
-            Ok(Outcome::near(
-                received(&light) / expected,
-                1.0,
-                1e-3,
-                "of it",
-            ))
-        },
+        format!("a point's irradiance P cos / (pi r^2) = {expected:.4e}, to 0.1 %"),
+        move || Ok(Outcome::ratio(received(&light), expected, 1e-3)),
     )
 }
 
 /// A light that fills the sky: `pi L`.
-fn wide(shape: &str, light: AreaLight, what: &str) -> HardCase {
+fn wide_lamp(shape: LightShape, position: [f64; 3], side: f64, what: &str) -> HardCase {
+    let light = lamp_of_shape(shape, position, side);
     let expected = PI * f64::from(radiance(&light).g);
-    let promise = format!("that of a sky as bright, pi L = {expected:.4e}, to 1 %");
     HardCase::new(
-        format!("{shape} {what}"),
+        lamp_case_name(shape, what),
         "10 W over a level receiver",
-        promise,
-        move || {
-            Ok(Outcome::near(
-                received(&light) / expected,
-                1.0,
-                0.01,
-                "of it",
-            ))
-        },
+        format!("that of a sky as bright, pi L = {expected:.4e}, to 1 %"),
+        move || Ok(Outcome::ratio(received(&light), expected, 0.01)),
     )
 }
 
-fn inside() -> HardCase {
+fn inside_the_lamp() -> HardCase {
     HardCase::new(
         "receiver in the middle of a light",
         "a light of 1 x 1 m, the point its centre",
         "finite: 0, since it shines away",
-        || {
-            Ok(Outcome::near(
-                received(&lamp([0.0; 3], 1.0, 10.0)),
-                0.0,
-                0.0,
-                "W/m2",
-            ))
-        },
+        light_inside_the_lamp,
     )
 }
 
-fn skies() -> Vec<HardCase> {
-    let refused = |name: &str, image: fn() -> Image<LinearRgb>, cause: &'static str| {
-        HardCase::new(
-            name,
-            "an environment map",
-            format!("refused, by \"{cause}\""),
-            move || Ok(Outcome::refused(Panorama::new(image()), cause)),
-        )
-    };
+fn light_inside_the_lamp() -> Result<Outcome> {
+    let found = received(&lamp([0.0; 3], 1.0, 10.0));
+    Ok(Outcome::near(found, 0.0, 0.0, "W/m2"))
+}
+
+fn extreme_skies() -> Vec<HardCase> {
     vec![
-        sky("map all black", Image::filled(16, 8, LinearRgb::BLACK), 0.0),
-        sky(
-            "map of one pixel of 1e5",
-            Image::filled(1, 1, LinearRgb::grey(1e5)),
-            1e5,
-        ),
-        sky(
-            "map of the largest half float",
-            Image::filled(16, 8, LinearRgb::grey(65504.0)),
-            65504.0,
-        ),
-        sky(
-            "map of the smallest float",
-            Image::filled(16, 8, LinearRgb::grey(f32::MIN_POSITIVE)),
-            f32::MIN_POSITIVE,
-        ),
-        pieces_add_up(),
-        refused("map with NaN", || spotted(f32::NAN), "at (5, 2)"),
-        refused("map with infinity", || spotted(f32::INFINITY), "at (5, 2)"),
-        refused("map with a negative value", || spotted(-1e-6), "at (5, 2)"),
-        refused("map without pixels", || Image::new(0, 0), "0 pixels"),
+        even_sky("map all black", (16, 8), 0.0),
+        even_sky("map of one pixel of 1e5", (1, 1), 1e5),
+        even_sky("map of the largest half float", (16, 8), 65504.0),
+        even_sky("map of the smallest float", (16, 8), f32::MIN_POSITIVE),
+        pieces_of_sky(),
     ]
+}
+
+fn invalid_maps() -> Vec<HardCase> {
+    vec![
+        refused_map("map with NaN", || spotted(f32::NAN), "at (5, 2)"),
+        refused_map("map with infinity", || spotted(f32::INFINITY), "at (5, 2)"),
+        refused_map("map with a negative value", || spotted(-1e-6), "at (5, 2)"),
+        refused_map("map without pixels", || Image::new(0, 0), "0 pixels"),
+    ]
+}
+
+fn refused_map(name: &str, image: fn() -> Image<LinearRgb>, cause: &'static str) -> HardCase {
+    HardCase::refused(name, "an environment map", cause, move || {
+        Panorama::new(image())
+    })
 }
 
 /// Dim, but for one texel.
@@ -169,205 +131,221 @@ fn spotted(value: f32) -> Image<LinearRgb> {
 }
 
 /// An even sky of radiance L gives every receiver `pi L`.
-fn sky(name: &str, image: Image<LinearRgb>, radiance: f32) -> HardCase {
+fn even_sky(name: &str, (width, height): (usize, usize), radiance: f32) -> HardCase {
     let expected = PI * f64::from(radiance);
-    let promise = format!("pi L = {expected:.4e} on receivers turned any way, to 0.2 %");
     HardCase::new(
         name,
-        format!("{} x {} pixels", image.width(), image.height()),
-        promise,
+        format!("{width} x {height} pixels"),
+        format!("pi L = {expected:.4e} on receivers turned any way, to 0.2 %"),
         move || {
-            let map = EnvironmentMap::new(Arc::new(Panorama::new(image.clone())?));
-            let sums =
-                NORMALS.map(|normal| sum_of_pieces(&map, &Vector3::from(normal).normalize()));
-            let off = sums
-                .map(|sum| (sum - expected).abs())
-                .into_iter()
-                .fold(0.0, largest);
-            let share = if expected > 0.0 { off / expected } else { off };
-            Ok(Outcome::at_most(share, 2e-3, "off"))
+            sum_even_sky(
+                Image::filled(width, height, LinearRgb::grey(radiance)),
+                expected,
+            )
         },
     )
 }
 
-/// Upwards, to a side, downwards, and between.
-const NORMALS: [[f64; 3]; 4] = [
-    [0.0, 0.0, 1.0],
-    [1.0, 0.0, 0.0],
-    [0.0, 0.0, -1.0],
-    [0.3, -0.8, 0.2],
-];
-
-fn sum_of_pieces(map: &EnvironmentMap, normal: &Vector3<f64>) -> f64 {
-    sky_pieces(map, 32, normal)
-        .iter()
-        .map(|piece| f64::from(piece.irradiance.g))
-        .sum()
+fn sum_even_sky(image: Image<LinearRgb>, expected: f64) -> Result<Outcome> {
+    let map = EnvironmentMap::new(Arc::new(Panorama::new(image)?));
+    let off = worst_error_of_sums(&map, expected);
+    let share = if expected > 0.0 { off / expected } else { off };
+    Ok(Outcome::at_most(share, 2e-3, "off"))
 }
 
-fn pieces_add_up() -> HardCase {
+fn worst_error_of_sums(map: &EnvironmentMap, expected: f64) -> f64 {
+    let off = normals().map(|normal| (sum_of_pieces(map, &normal) - expected).abs());
+    off.into_iter().fold(0.0, largest)
+}
+
+/// Upwards, to a side, downwards, and between.
+fn normals() -> [Vector3<f64>; 4] {
+    [
+        [0.0, 0.0, 1.0],
+        [1.0, 0.0, 0.0],
+        [0.0, 0.0, -1.0],
+        [0.3, -0.8, 0.2],
+    ]
+    .map(|normal| Vector3::from(normal).normalize())
+}
+
+fn sum_of_pieces(map: &EnvironmentMap, normal: &Vector3<f64>) -> f64 {
+    let pieces = sky_pieces(map, 32, normal);
+    pieces.iter().map(|p| f64::from(p.irradiance.g)).sum()
+}
+
+fn pieces_of_sky() -> HardCase {
     HardCase::new(
         "one texel of 1e5 among 1e-4",
         "a map of 64 x 32, cut into 32 pieces, for receivers turned four ways",
         "pieces sum to the irradiance of the whole map, to 1e-5",
-        || {
-            let value = |x: usize, y: usize| if (x, y) == (20, 9) { 1e5 } else { 1e-4 };
-            let panorama = Arc::new(Panorama::new(Image::from_fn(64, 32, |x, y| {
-                LinearRgb::grey(value(x, y))
-            }))?);
-            let map = EnvironmentMap::new(panorama.clone());
-            let off = NORMALS.map(|normal| {
-                let normal = Vector3::from(normal).normalize();
-                (sum_of_pieces(&map, &normal) / panorama.irradiance(&normal)[1] - 1.0).abs()
-            });
-            Ok(Outcome::at_most(
-                off.into_iter().fold(0.0, largest),
-                1e-5,
-                "off",
-            ))
-        },
+        sum_pieces_of_sky,
     )
 }
 
-/// A scene under even light, of which exposure and colour are open.
-fn open(exposure: Exposure, cast: LightTint, ambient: LinearRgb) -> Scene {
+fn sum_pieces_of_sky() -> Result<Outcome> {
+    let panorama = Arc::new(Panorama::new(sky_of_one_texel())?);
+    let map = EnvironmentMap::new(panorama.clone());
+    let off = normals().map(|normal| error_of_pieces(&map, &panorama, &normal));
+    let worst = off.into_iter().fold(0.0, largest);
+    Ok(Outcome::at_most(worst, 1e-5, "off"))
+}
+
+fn error_of_pieces(map: &EnvironmentMap, panorama: &Panorama, normal: &Vector3<f64>) -> f64 {
+    (sum_of_pieces(map, normal) / panorama.irradiance(normal)[1] - 1.0).abs()
+}
+
+fn sky_of_one_texel() -> Image<LinearRgb> {
+    Image::from_fn(64, 32, |x, y| {
+        LinearRgb::grey(if (x, y) == (20, 9) { 1e5 } else { 1e-4 })
+    })
+}
+
+/// A scene under even light, whose exposure and colour are unknown.
+fn unexposed_scene(exposure: Exposure, cast: LightTint, ambient: LinearRgb) -> Scene {
     Scene {
         exposure,
         cast,
         ambient,
-        ..scene(above([40, 30], 40.0))
+        ..empty_scene(camera_above([40, 30], 40.0))
     }
 }
 
-fn flat(value: f32) -> Image<LinearRgb> {
+fn flat_plate(value: f32) -> Image<LinearRgb> {
     Image::filled(40, 30, LinearRgb::grey(value))
 }
 
-fn plates() -> Vec<HardCase> {
-    let lit = LinearRgb::WHITE;
-    let one_glint = || {
-        Image::from_fn(40, 30, |x, y| {
-            LinearRgb::grey(if (x, y) == (7, 9) { 1e5 } else { 0.5 })
-        })
-    };
+fn plate_with_glint() -> Image<LinearRgb> {
+    let mut plate = flat_plate(0.5);
+    plate[(7, 9)] = LinearRgb::grey(1e5);
+    plate
+}
+
+fn large_plate(value: f32) -> Image<LinearRgb> {
+    Image::filled(200, 200, LinearRgb::grey(value))
+}
+
+fn plates_to_expose() -> Vec<HardCase> {
+    let one_pixel = Image::filled(1, 1, LinearRgb::grey(0.25));
+    let darkest = flat_plate(f32::MIN_POSITIVE);
     vec![
-        exposed("black plate", flat(0.0), lit, 0.0),
-        exposed("plate of NaN", flat(f32::NAN), lit, 0.0),
-        exposed(
-            "plate without light in the scene",
-            flat(0.5),
+        exposed("black plate", flat_plate(0.0), 0.0),
+        exposed("plate of NaN", flat_plate(f32::NAN), 0.0),
+        exposed_under(
             LinearRgb::BLACK,
+            "plate without light in the scene",
+            flat_plate(0.5),
             0.0,
         ),
-        exposed("plate of 0.5 with one pixel of 1e5", one_glint(), lit, -1.0),
         exposed(
-            "plate of the smallest float",
-            flat(f32::MIN_POSITIVE),
-            lit,
-            -126.0,
+            "plate of 0.5 with one pixel of 1e5",
+            plate_with_glint(),
+            -1.0,
         ),
-        exposed(
-            "plate of one pixel",
-            Image::filled(1, 1, LinearRgb::grey(0.25)),
-            lit,
-            -2.0,
-        ),
-        cast_of("surface all black", flat(0.0)),
-        cast_of("surface of NaN", flat(f32::NAN)),
-        cast_of("surface of grey 1e-30", flat(1e-30)),
-        cast_of("surface of grey 1e30", flat(1e30)),
-        noise_of(
-            "plate too small to tell its noise",
-            Image::filled(2, 2, LinearRgb::grey(0.5)),
-            None,
-        ),
-        noise_of(
-            "plate of NaN, 200 x 200",
-            Image::filled(200, 200, LinearRgb::grey(f32::NAN)),
-            None,
-        ),
-        noise_of(
-            "plate clipped all over, 200 x 200",
-            Image::filled(200, 200, LinearRgb::WHITE),
-            None,
-        ),
-        noise_of(
-            "plate of one grey, 200 x 200",
-            Image::filled(200, 200, LinearRgb::grey(0.3)),
-            Some(0.0),
-        ),
-        noise_of(
-            "plate of black, 200 x 200",
-            Image::filled(200, 200, LinearRgb::BLACK),
-            Some(0.0),
-        ),
+        exposed("plate of the smallest float", darkest, -126.0),
+        exposed("plate of one pixel", one_pixel, -2.0),
     ]
 }
 
-/// Even light of 1 shows white as 1: what the exposure has to be is the plate's white in stops, and 0 where there is none.
-fn exposed(name: &str, plate: Image<LinearRgb>, ambient: LinearRgb, expected_ev: f64) -> HardCase {
-    let promise = format!("an exposure of {expected_ev} EV, to 1e-4");
+fn plates_to_match() -> Vec<HardCase> {
+    [
+        ("surface all black", 0.0),
+        ("surface of NaN", f32::NAN),
+        ("surface of grey 1e-30", 1e-30),
+        ("surface of grey 1e30", 1e30),
+    ]
+    .map(|(name, value)| matched_tint(name, flat_plate(value)))
+    .into()
+}
+
+fn plates_with_noise() -> Vec<HardCase> {
+    let small = Image::filled(2, 2, LinearRgb::grey(0.5));
+    let [nan, white, grey, black] = [f32::NAN, 1.0, 0.3, 0.0].map(large_plate);
+    vec![
+        measured_noise("plate too small to measure its noise", small, None),
+        measured_noise("plate of NaN, 200 x 200", nan, None),
+        measured_noise("plate clipped all over, 200 x 200", white, None),
+        measured_noise("plate of one grey, 200 x 200", grey, Some(0.0)),
+        measured_noise("plate of black, 200 x 200", black, Some(0.0)),
+    ]
+}
+
+fn exposed(name: &str, plate: Image<LinearRgb>, expected_ev: f64) -> HardCase {
+    exposed_under(LinearRgb::WHITE, name, plate, expected_ev)
+}
+
+/// Even light of 1 shows white as 1: the exposure must be the plate's white in stops, and 0 where there is none.
+fn exposed_under(
+    ambient: LinearRgb,
+    name: &str,
+    plate: Image<LinearRgb>,
+    expected_ev: f64,
+) -> HardCase {
     HardCase::new(
         format!("exposure: {name}"),
         "matched to the plate's white",
-        promise,
-        move || {
-            let exposed = expose(
-                open(
-                    Exposure::MatchPlate { gain_ev: 0.0 },
-                    LightTint::default(),
-                    ambient,
-                ),
-                &plate,
-            );
-            let Exposure::Ev(ev) = exposed.exposure else {
-                return Ok(Outcome::new("still unknown", false));
-            };
-            Ok(Outcome::near(ev, expected_ev, 1e-4, "EV"))
-        },
+        format!("an exposure of {expected_ev} EV, to 1e-4"),
+        move || expose_plate(ambient, &plate, expected_ev),
     )
 }
 
-fn cast_of(name: &str, plate: Image<LinearRgb>) -> HardCase {
+fn expose_plate(ambient: LinearRgb, plate: &Image<LinearRgb>, expected_ev: f64) -> Result<Outcome> {
+    Ok(match exposure_of_plate(ambient, plate) {
+        Exposure::Ev(ev) => Outcome::near(ev, expected_ev, 1e-4, "EV"),
+        _ => Outcome::failed("still unknown"),
+    })
+}
+
+fn exposure_of_plate(ambient: LinearRgb, plate: &Image<LinearRgb>) -> Exposure {
+    let matched = Exposure::MatchPlate { gain_ev: 0.0 };
+    let scene = unexposed_scene(matched, LightTint::default(), ambient);
+    expose(scene, plate).exposure
+}
+
+fn matched_tint(name: &str, plate: Image<LinearRgb>) -> HardCase {
     HardCase::new(
         format!("colour of light: {name}"),
         "taken from the surface",
         "white, to 1e-5",
-        move || {
-            let known = match_light_tint(
-                open(
-                    Exposure::Ev(0.0),
-                    LightTint::MatchSurface { share: 1.0 },
-                    LinearRgb::WHITE,
-                ),
-                &plate,
-            );
-            let LightTint::Known(LinearRgb { r, g, b }) = known.cast else {
-                return Ok(Outcome::new("still unknown", false));
-            };
-            let off = [r, g, b]
-                .map(|v| f64::from(v - 1.0).abs())
-                .into_iter()
-                .fold(0.0, largest);
-            Ok(Outcome::at_most(off, 1e-5, "off"))
-        },
+        move || Ok(distance_from_white(&plate)),
     )
 }
 
-/// The noise of a plate as the standard deviation at mid grey; none where nothing can be told.
-fn noise_of(name: &str, plate: Image<LinearRgb>, expected: Option<f64>) -> HardCase {
-    let promise = expected.map_or("none is told".into(), |sigma| {
+fn distance_from_white(plate: &Image<LinearRgb>) -> Outcome {
+    let LightTint::Known(LinearRgb { r, g, b }) = tint_of_surface(plate) else {
+        return Outcome::failed("still unknown");
+    };
+    let off = [r, g, b].map(|v| f64::from(v - 1.0).abs());
+    Outcome::at_most(off.into_iter().fold(0.0, largest), 1e-5, "off")
+}
+
+fn tint_of_surface(plate: &Image<LinearRgb>) -> LightTint {
+    let matched = LightTint::MatchSurface { share: 1.0 };
+    let scene = unexposed_scene(Exposure::Ev(0.0), matched, LinearRgb::WHITE);
+    match_light_tint(scene, plate).cast
+}
+
+/// The noise of a plate as the standard deviation at mid grey; none where it cannot be measured.
+fn measured_noise(name: &str, plate: Image<LinearRgb>, expected: Option<f64>) -> HardCase {
+    let expectation = expected.map_or("none is reported".into(), |sigma| {
         format!("a deviation of {sigma}, to 1e-4")
     });
-    HardCase::new(format!("noise: {name}"), "measured", promise, move || {
-        Ok(match (plate_noise(&plate), expected) {
-            (Noise::Known { shot, read }, Some(sigma)) => {
-                Outcome::near((shot * 0.18 + read * read).sqrt(), sigma, 1e-4, "")
-            }
-            (noise, expected) => Outcome::new(
-                format!("{noise:?}"),
-                noise == Noise::None && expected.is_none(),
-            ),
-        })
-    })
+    HardCase::new(
+        format!("noise: {name}"),
+        "measured",
+        expectation,
+        move || Ok(compare_noise(plate_noise(&plate), expected)),
+    )
+}
+
+fn compare_noise(found: Noise, expected: Option<f64>) -> Outcome {
+    match (found, expected) {
+        (Noise::Known { shot, read }, Some(sigma)) => {
+            Outcome::near((shot * 0.18 + read * read).sqrt(), sigma, 1e-4, "")
+        }
+        (noise, expected) => Outcome::new(
+            format!("{noise:?}"),
+            noise == Noise::None && expected.is_none(),
+        ),
+    }
 }

@@ -1,273 +1,248 @@
-//! Photos that are hard to cut out: each must come out right, or say that it may not have.
+//! Photos that are hard to cut out: each must come out right, or be flagged for review.
 
-use super::bottle::{BLUE, BottlePhoto, GREEN, OutlineAccuracy};
+use super::bottle::{BLUE, BottlePhoto, GREEN, OutlineAccuracy, review_messages};
 use super::{HardCase, Outcome, keyer};
 use crate::matte::{GOOD_BOX_PX, GOOD_IOU};
 use petcomp::Image;
 use petcomp::Result;
 use petcomp::matte::{
     CutOut, CutOutOptions, FilmMatte, FilmOptions, PlateOptions, ScreenPlate, TriangulateOptions,
-    Triangulated, film, triangulate,
+    Triangulated, cut_out, film, triangulate,
 };
-use petcomp::{Coverage, LinearRgb};
+use petcomp::{Coverage, Diagnostic, LinearRgb};
 
 pub(super) fn cases() -> Result<Vec<HardCase>> {
     let mut cases = keyer::cases();
-    cases.extend(cut_outs());
-    cases.extend(refusals());
-    cases.extend(films());
+    cases.extend(ordinary_cut_outs());
+    cases.extend(badly_lit_cut_outs());
+    cases.extend(small_and_large_cut_outs());
+    cases.extend(refused_photos());
+    cases.extend(refused_pixels());
+    cases.extend(film_mattes());
     cases.extend(two_screens());
     Ok(cases)
 }
 
-/// What is promised of a photo.
+/// What is expected of the cut-out of a photo.
 #[derive(Clone, Copy)]
 enum ExpectedCutOut {
-    /// The outline is right and nothing is said against it.
+    /// The outline is right and needs no review.
     Right,
-    /// The outline is right, or doubted, or the photo is refused.
-    RightOrTold,
-    /// This is among the doubts.
-    Doubted(&'static str),
+    /// The outline is right, or flagged for review, or the photo is refused.
+    RightOrFlagged,
+    /// Flagged with a message that contains this.
+    Flagged(&'static str),
 }
 
 impl ExpectedCutOut {
-    fn told(self) -> String {
+    fn description(self) -> String {
         let right = format!(
             "outline right (IoU {GOOD_IOU}, box to {GOOD_BOX_PX} px of the picture that is searched)"
         );
         match self {
-            Self::Right => {
-                format!("{right} without a doubt, matte of the bare screen below {MOST_RESIDUE}")
+            Self::Right => format!(
+                "{right} and not flagged, matte of the bare screen below {MAX_RESIDUAL_MATTE}"
+            ),
+            Self::RightOrFlagged => {
+                format!("{right}, or flagged, or refused; never silently wrong")
             }
-            Self::RightOrTold => format!("{right}, or doubted, or refused; never silently wrong"),
-            Self::Doubted(what) => format!("doubted, by \"{what}\""),
+            Self::Flagged(what) => format!("flagged, by \"{what}\""),
         }
     }
 
-    fn is_kept(self, cut: &CutOut, found: &OutlineAccuracy) -> bool {
+    fn is_met(self, cut: &CutOut, found: &OutlineAccuracy) -> bool {
+        let reasons = &found.reasons;
         match self {
-            Self::Right => {
-                found.is_right
-                    && found.doubts.is_empty()
-                    && cut.residual_matte < MOST_RESIDUE
-                    && is_reduced(cut)
-            }
-            Self::RightOrTold => found.is_right || !found.doubts.is_empty(),
-            Self::Doubted(what) => found.doubts.iter().any(|doubt| doubt.contains(what)),
+            Self::Right => found.is_right && reasons.is_empty() && is_clean(cut),
+            Self::RightOrFlagged => found.is_right || !reasons.is_empty(),
+            Self::Flagged(what) => reasons.iter().any(|reason| reason.contains(what)),
         }
     }
 }
 
 /// A matte below a code of 8 bits.
-const MOST_RESIDUE: f32 = 0.003;
+const MAX_RESIDUAL_MATTE: f32 = 0.003;
 
-/// A cut-out is no larger than it may be.
-fn is_reduced(cut: &CutOut) -> bool {
-    cut.film.width().max(cut.film.height()) <= CutOutOptions::default().longest_side
+/// Nothing of the screen is left, and the cut-out is no larger than it may be.
+fn is_clean(cut: &CutOut) -> bool {
+    cut.residual_matte < MAX_RESIDUAL_MATTE
+        && cut.film.width().max(cut.film.height()) <= CutOutOptions::default().longest_side
 }
 
-fn cut_out_of(name: &str, promise: ExpectedCutOut, take: BottlePhoto) -> HardCase {
-    let input = format!(
-        "a bottle on a screen, {} x {} pixels",
-        take.size.0, take.size.1
-    );
-    HardCase::new(name, input, promise.told(), move || {
-        match (take.cut(), promise) {
+fn cut_out_case(name: &str, expected: ExpectedCutOut, photo: BottlePhoto) -> HardCase {
+    let (w, h) = photo.size;
+    let input = format!("a bottle on a screen, {w} x {h} pixels");
+    HardCase::new(name, input, expected.description(), move || {
+        expected.outcome(photo.cut())
+    })
+}
+
+impl ExpectedCutOut {
+    fn outcome(self, result: Result<(CutOut, OutlineAccuracy)>) -> Result<Outcome> {
+        match (result, self) {
             (Ok((cut, found)), _) => {
-                let doubts = if found.doubts.is_empty() {
-                    "no doubt".into()
-                } else {
-                    found.doubts.join("; ")
-                };
-                let told = format!(
-                    "IoU {:.4}, box off by {:.2} px, residue {:.4}, {doubts}",
-                    found.iou, found.box_px, cut.residual_matte
-                );
-                Ok(Outcome::new(told, promise.is_kept(&cut, &found)))
+                let measured = measured_cut_out(&cut, &found);
+                Ok(Outcome::new(measured, self.is_met(&cut, &found)))
             }
-            (Err(error), ExpectedCutOut::RightOrTold) => {
+            (Err(error), Self::RightOrFlagged) => {
                 Ok(Outcome::new(format!("refused: {error}"), true))
             }
             (Err(error), _) => Err(error),
         }
-    })
+    }
 }
 
-fn cut_outs() -> Vec<HardCase> {
-    use ExpectedCutOut::{Doubted, Right, RightOrTold};
-    let usual = BottlePhoto::default;
-    let grey = LinearRgb::new(0.5, 0.52, 0.5);
-    vec![
-        cut_out_of("plain photo, green screen", Right, usual()),
-        cut_out_of(
-            "plain photo, blue screen",
-            Right,
-            BottlePhoto {
-                screen: BLUE,
-                ..usual()
-            },
-        ),
-        cut_out_of(
-            "grey screen",
-            Right,
-            BottlePhoto {
-                screen: grey,
-                ..usual()
-            },
-        ),
-        opaque_on_grey(BottlePhoto {
-            screen: grey,
-            ..usual()
-        }),
-        cut_out_of(
-            "cap of the screen's hue",
-            RightOrTold,
-            BottlePhoto {
-                cap: LinearRgb::new(0.02, 0.25, 0.05),
-                ..usual()
-            },
-        ),
-        cut_out_of(
-            "clipped highlights",
-            Right,
-            BottlePhoto {
-                exposure: 1.8,
-                ..usual()
-            },
-        ),
-        cut_out_of(
-            "clipped all over",
-            RightOrTold,
-            BottlePhoto {
-                exposure: 3.0,
-                ..usual()
-            },
-        ),
-        cut_out_of(
-            "black photo",
-            RightOrTold,
-            BottlePhoto {
-                exposure: 0.0,
-                ..usual()
-            },
-        ),
-        cut_out_of(
-            "noise of 3 %, green screen",
-            RightOrTold,
-            BottlePhoto {
-                noise: 0.03,
-                ..usual()
-            },
-        ),
-        cut_out_of(
-            "noise of 3 %, blue screen",
-            RightOrTold,
-            BottlePhoto {
-                noise: 0.03,
-                screen: BLUE,
-                ..usual()
-            },
-        ),
-        cut_out_of(
-            "screen uneven by 60 %",
-            Right,
-            BottlePhoto {
-                uneven: 0.6,
-                ..usual()
-            },
-        ),
-        cut_out_of(
-            "object over the border",
-            Doubted("left border"),
-            BottlePhoto {
-                at: vec![[0.2, 0.5]],
-                ..usual()
-            },
-        ),
-        cut_out_of(
-            "64 x 64 pixels, green screen",
-            RightOrTold,
-            BottlePhoto {
-                size: (64, 64),
-                ..usual()
-            },
-        ),
-        cut_out_of(
-            "64 x 64 pixels, blue screen",
-            RightOrTold,
-            BottlePhoto {
-                size: (64, 64),
-                screen: BLUE,
-                ..usual()
-            },
-        ),
-        cut_out_of(
-            "12 megapixels",
-            Right,
-            BottlePhoto {
-                size: (4000, 3000),
-                ..usual()
-            },
-        )
-        .for_the_report(),
-    ]
-}
-
-fn opaque_on_grey(take: BottlePhoto) -> HardCase {
-    HardCase::new(
-        "grey screen tells nothing of film",
-        "the same photo",
-        "a guess, and that is a doubt",
-        move || {
-            let doubts: Vec<String> = take
-                .cut()?
-                .0
-                .diagnostics
-                .iter()
-                .filter(|d| d.needs_review())
-                .map(ToString::to_string)
-                .collect();
-            Ok(Outcome::new(
-                doubts.join("; "),
-                doubts.iter().any(|doubt| doubt.contains("too grey")),
-            ))
-        },
+fn measured_cut_out(cut: &CutOut, found: &OutlineAccuracy) -> String {
+    let reasons = joined(&found.reasons, "not flagged");
+    format!(
+        "IoU {:.4}, box off by {:.2} px, residual matte {:.4}, {reasons}",
+        found.iou, found.box_px, cut.residual_matte
     )
 }
 
-fn refusals() -> Vec<HardCase> {
+/// Messages in one line; `none` where there are none.
+fn joined(messages: &[String], none: &str) -> String {
+    if messages.is_empty() {
+        none.into()
+    } else {
+        messages.join("; ")
+    }
+}
+
+/// Nearly grey: film cannot be distinguished from such a screen.
+const GREY_SCREEN: LinearRgb = LinearRgb::new(0.5, 0.52, 0.5);
+/// A cap of the green screen's hue.
+const GREEN_CAP: LinearRgb = LinearRgb::new(0.02, 0.25, 0.05);
+
+fn ordinary_cut_outs() -> Vec<HardCase> {
+    use ExpectedCutOut::{Flagged, Right, RightOrFlagged};
+    let same_hue = BottlePhoto {
+        cap: GREEN_CAP,
+        ..BottlePhoto::default()
+    };
+    let over_border = BottlePhoto {
+        at: vec![[0.2, 0.5]],
+        ..BottlePhoto::default()
+    };
+    vec![
+        cut_out_case("plain photo, green screen", Right, on_screen(GREEN)),
+        cut_out_case("plain photo, blue screen", Right, on_screen(BLUE)),
+        cut_out_case("grey screen", Right, on_screen(GREY_SCREEN)),
+        film_on_grey(),
+        cut_out_case("cap of the screen's hue", RightOrFlagged, same_hue),
+        cut_out_case(
+            "object over the border",
+            Flagged("left border"),
+            over_border,
+        ),
+    ]
+}
+
+fn badly_lit_cut_outs() -> Vec<HardCase> {
+    use ExpectedCutOut::{Right, RightOrFlagged};
+    let uneven = BottlePhoto {
+        uneven: 0.6,
+        ..BottlePhoto::default()
+    };
+    vec![
+        cut_out_case("clipped highlights", Right, with_exposure(1.8)),
+        cut_out_case("clipped all over", RightOrFlagged, with_exposure(3.0)),
+        cut_out_case("black photo", RightOrFlagged, with_exposure(0.0)),
+        cut_out_case("noise of 3 %, green screen", RightOrFlagged, noisy(GREEN)),
+        cut_out_case("noise of 3 %, blue screen", RightOrFlagged, noisy(BLUE)),
+        cut_out_case("screen uneven by 60 %", Right, uneven),
+    ]
+}
+
+fn small_and_large_cut_outs() -> Vec<HardCase> {
+    use ExpectedCutOut::{Right, RightOrFlagged};
+    let [green, blue] = [GREEN, BLUE].map(|screen| of_size((64, 64), screen));
+    vec![
+        cut_out_case("64 x 64 pixels, green screen", RightOrFlagged, green),
+        cut_out_case("64 x 64 pixels, blue screen", RightOrFlagged, blue),
+        cut_out_case("12 megapixels", Right, of_size((4000, 3000), GREEN)).for_the_report(),
+    ]
+}
+
+fn on_screen(screen: LinearRgb) -> BottlePhoto {
+    BottlePhoto {
+        screen,
+        ..BottlePhoto::default()
+    }
+}
+
+fn with_exposure(exposure: f32) -> BottlePhoto {
+    BottlePhoto {
+        exposure,
+        ..BottlePhoto::default()
+    }
+}
+
+fn noisy(screen: LinearRgb) -> BottlePhoto {
+    BottlePhoto {
+        noise: 0.03,
+        ..on_screen(screen)
+    }
+}
+
+fn of_size(size: (usize, usize), screen: LinearRgb) -> BottlePhoto {
+    BottlePhoto {
+        size,
+        ..on_screen(screen)
+    }
+}
+
+fn film_on_grey() -> HardCase {
+    HardCase::new(
+        "film on a grey screen",
+        "the same photo",
+        "transmittance cannot be measured, and that is flagged",
+        cut_out_film_on_grey,
+    )
+}
+
+fn cut_out_film_on_grey() -> Result<Outcome> {
+    let (cut, _) = on_screen(GREY_SCREEN).cut()?;
+    let reasons = review_messages(&cut.diagnostics);
+    let is_flagged = reasons.iter().any(|reason| reason.contains("too grey"));
+    Ok(Outcome::new(reasons.join("; "), is_flagged))
+}
+
+fn refused_photos() -> Vec<HardCase> {
     let two = BottlePhoto {
         at: vec![[0.25, 0.5], [0.75, 0.5]],
         length: 0.4,
         ..BottlePhoto::default()
     };
-    let empty = |uneven: f32| BottlePhoto {
-        at: vec![],
-        uneven,
-        ..BottlePhoto::default()
-    };
+    let no_object = "is there an object";
     vec![
-        refused("two objects", "two objects", move || two.taken().0),
-        refused("empty screen", "is there an object", move || {
-            empty(0.0).taken().0
+        refused("two objects", "two objects", move || two.photo()),
+        refused("empty screen", no_object, || empty_screen(0.0)),
+        refused("empty screen, uneven by 60 %", no_object, || {
+            empty_screen(0.6)
         }),
-        refused(
-            "empty screen, uneven by 60 %",
-            "is there an object",
-            move || empty(0.6).taken().0,
-        ),
+    ]
+}
+
+fn refused_pixels() -> Vec<HardCase> {
+    let not_finite = "not a finite number";
+    vec![
         refused("photo of one pixel", "1 x 1 pixels", || {
             Image::filled(1, 1, GREEN)
         }),
         refused("photo without pixels", "0 x 0 pixels", || Image::new(0, 0)),
-        refused("photo with NaN", "not a finite number", || {
-            spoiled(f32::NAN)
-        }),
-        refused("photo with infinity", "not a finite number", || {
-            spoiled(f32::INFINITY)
-        }),
+        refused("photo with NaN", not_finite, || spoiled(f32::NAN)),
+        refused("photo with infinity", not_finite, || spoiled(f32::INFINITY)),
     ]
+}
+
+fn empty_screen(uneven: f32) -> Image<LinearRgb> {
+    let empty = BottlePhoto {
+        at: vec![],
+        uneven,
+        ..BottlePhoto::default()
+    };
+    empty.photo()
 }
 
 fn refused(
@@ -275,22 +250,14 @@ fn refused(
     cause: &'static str,
     photo: impl Fn() -> Image<LinearRgb> + Send + Sync + 'static,
 ) -> HardCase {
-    HardCase::new(
-        name,
-        "to be cut out",
-        format!("refused, by \"{cause}\""),
-        move || {
-            Ok(Outcome::refused(
-                petcomp::matte::cut_out(&photo(), &Default::default()),
-                cause,
-            ))
-        },
-    )
+    HardCase::refused(name, "to be cut out", cause, move || {
+        cut_out(&photo(), &CutOutOptions::default())
+    })
 }
 
 /// A plain photo with one bad pixel.
 fn spoiled(value: f32) -> Image<LinearRgb> {
-    let mut photo = BottlePhoto::default().taken().0;
+    let mut photo = BottlePhoto::default().photo();
     photo[(300, 160)].r = value;
     photo
 }
@@ -298,203 +265,211 @@ fn spoiled(value: f32) -> Image<LinearRgb> {
 const SIZE: (usize, usize) = (160, 100);
 
 /// An ellipse in the middle.
-fn inside() -> Image<Coverage> {
+fn ellipse() -> Image<Coverage> {
     Image::from_fn(SIZE.0, SIZE.1, |x, y| {
         let (u, v) = ((x as f32 - 80.0) / 60.0, (y as f32 - 50.0) / 35.0);
         Coverage(f32::from(u8::from(u * u + v * v < 1.0)))
     })
 }
 
-/// Light of a glint and transmittance of folded film at a pixel, inside.
-fn folded(x: usize, y: usize) -> (f32, f32) {
+/// Light of a glint and transmittance of folded film at a pixel of the ellipse.
+fn folded_film(x: usize, y: usize) -> (f32, f32) {
     let (x, y) = (x as f64, y as f64);
     let glint = libm::pow(libm::sin(0.17 * x - 0.29 * y), 8.0);
-    (
-        (0.02 + 0.1 * glint) as f32,
-        (0.6 + 0.2 * libm::sin(0.23 * x + 0.011 * y * y)) as f32,
-    )
+    let transmittance = 0.6 + 0.2 * libm::sin(0.23 * x + 0.011 * y * y);
+    ((0.02 + 0.1 * glint) as f32, transmittance as f32)
 }
 
 /// Neutral film on a screen of one colour, times an exposure, clipped at 1.
-fn on(screen: LinearRgb, exposure: f32) -> Image<LinearRgb> {
-    let mask = inside();
+fn film_on(screen: LinearRgb, exposure: f32) -> Image<LinearRgb> {
+    let mask = ellipse();
     Image::from_fn(SIZE.0, SIZE.1, |x, y| {
-        let (light, passes) = if mask[(x, y)].0 > 0.0 {
-            folded(x, y)
-        } else {
-            (0.0, 1.0)
-        };
+        let (light, passes) = film_or_nothing(&mask, x, y);
         screen.map(|k| ((light + passes * k) * exposure).min(1.0))
     })
 }
 
-fn films() -> Vec<HardCase> {
-    let white = || Image::filled(SIZE.0, SIZE.1, LinearRgb::WHITE);
-    vec![
-        nothing_extreme(),
-        underexposed(),
-        film_told(
+/// Light and transmittance of the film in the mask, of nothing beside it.
+fn film_or_nothing(mask: &Image<Coverage>, x: usize, y: usize) -> (f32, f32) {
+    if mask[(x, y)].0 > 0.0 {
+        folded_film(x, y)
+    } else {
+        (0.0, 1.0)
+    }
+}
+
+fn filled(color: LinearRgb) -> Image<LinearRgb> {
+    Image::filled(SIZE.0, SIZE.1, color)
+}
+
+fn film_mattes() -> Vec<HardCase> {
+    let mut cases = vec![ordinary_film(), underexposed_film()];
+    cases.extend(flagged_films());
+    cases.extend([
+        even_film("film in a black photo", LinearRgb::BLACK, 0.0),
+        even_film("film of the screen's own colour", GREEN, 1.0),
+        empty_mask(),
+        no_background(),
+    ]);
+    cases
+}
+
+fn flagged_films() -> [HardCase; 3] {
+    let clipped = "100.0 % of the object is clipped";
+    let (white, dark) = (LinearRgb::WHITE, GREEN.scale(1e-30));
+    [
+        (
             "film on a black screen",
-            || on(LinearRgb::BLACK, 1.0),
+            film_on(LinearRgb::BLACK, 1.0),
             LinearRgb::BLACK,
             "too grey",
         ),
-        film_told(
+        (
             "film in a photo clipped all over",
-            white,
+            filled(white),
             GREEN,
-            "100.0 % of the object is clipped",
+            clipped,
         ),
-        film_passing("film in a black photo", || Image::new(SIZE.0, SIZE.1), 0.0),
-        film_passing(
-            "film of the screen's own colour",
-            || Image::filled(SIZE.0, SIZE.1, GREEN),
-            1.0,
-        ),
-        film_told(
-            "film in a photo of 1e-30",
-            || on(GREEN.scale(1e-30), 1.0),
-            GREEN.scale(1e-30),
-            "",
-        ),
-        empty_mask(),
-        no_background(),
+        ("film in a photo of 1e-30", film_on(dark, 1.0), dark, ""),
     ]
+    .map(|(name, photo, screen, cause)| flagged_film(name, photo, screen, cause))
 }
 
-fn of_film(photo: &Image<LinearRgb>, screen: LinearRgb) -> Result<FilmMatte> {
-    film(
-        photo,
-        &ScreenPlate::even(screen, SIZE),
-        &inside(),
-        &FilmOptions::default(),
-    )
+fn film_matte(photo: &Image<LinearRgb>, screen: LinearRgb) -> Result<FilmMatte> {
+    let plate = ScreenPlate::even(screen, SIZE);
+    film(photo, &plate, &ellipse(), &FilmOptions::default())
 }
 
-/// A photo that tells nothing: sound pixels all the same, and a remark.
-fn film_told(
+/// A photo without information on the film: sound pixels all the same, and a diagnostic.
+fn flagged_film(
     name: &str,
-    photo: fn() -> Image<LinearRgb>,
+    photo: Image<LinearRgb>,
     screen: LinearRgb,
     cause: &'static str,
 ) -> HardCase {
-    let said = if cause.is_empty() {
+    let reported = if cause.is_empty() {
         String::new()
     } else {
-        format!("; said: \"{cause}\"")
+        format!("; reported: \"{cause}\"")
     };
-    let promise = format!("opacity in 0..1 and light finite in every pixel{said}");
-    HardCase::new(name, "neutral film on an even screen", promise, move || {
-        let found = of_film(&photo(), screen)?;
-        let unsound = found.film.pixels().iter().filter(|p| !p.is_sound()).count();
-        let remarks = found
-            .diagnostics
-            .iter()
-            .map(ToString::to_string)
-            .collect::<Vec<_>>()
-            .join("; ");
-        let remarks = if remarks.is_empty() {
-            "nothing said".into()
-        } else {
-            remarks
-        };
-        Ok(Outcome::new(
-            format!("{unsound} px unsound, {remarks}"),
-            unsound == 0 && remarks.contains(cause),
-        ))
-    })
+    let expectation = format!("opacity in 0..1 and light finite in every pixel{reported}");
+    HardCase::new(
+        name,
+        "neutral film on an even screen",
+        expectation,
+        move || Ok(judge_soundness(&film_matte(&photo, screen)?, cause)),
+    )
+}
+
+fn judge_soundness(found: &FilmMatte, cause: &str) -> Outcome {
+    let unsound = found.film.pixels().iter().filter(|p| !p.is_sound()).count();
+    let reported = reported(&found.diagnostics);
+    let passed = unsound == 0 && reported.contains(cause);
+    Outcome::new(format!("{unsound} px unsound, {reported}"), passed)
+}
+
+fn reported(diagnostics: &[Diagnostic]) -> String {
+    let messages: Vec<_> = diagnostics.iter().map(ToString::to_string).collect();
+    joined(&messages, "nothing reported")
 }
 
 /// A photo of one colour: nothing passes where it is black, all where it is the screen's.
-fn film_passing(name: &str, photo: fn() -> Image<LinearRgb>, expected: f32) -> HardCase {
-    let promise = format!("transmittance {expected} in every pixel, to 0.05 on average");
-    HardCase::new(name, "on an even green screen", promise, move || {
-        let found = of_film(&photo(), GREEN)?;
-        let mask = inside();
-        let off = found
-            .transmittance
-            .pixels()
-            .iter()
-            .zip(mask.pixels())
-            .map(|(t, c)| f64::from((t.g - expected).abs() * c.0));
-        Ok(Outcome::at_most(
-            off.sum::<f64>() / inside_area(),
-            0.05,
-            "off",
-        ))
+fn even_film(name: &str, color: LinearRgb, expected: f32) -> HardCase {
+    let expectation = format!("transmittance {expected} in every pixel, to 0.05 on average");
+    HardCase::new(name, "on an even green screen", expectation, move || {
+        judge_even_film(color, expected)
     })
 }
 
-fn inside_area() -> f64 {
-    inside().pixels().iter().map(|c| f64::from(c.0)).sum()
+fn judge_even_film(color: LinearRgb, expected: f32) -> Result<Outcome> {
+    let found = film_matte(&filled(color), GREEN)?.transmittance;
+    let off = mean_error_inside(&found, |_, _| expected);
+    Ok(Outcome::at_most(off, 0.05, "off"))
+}
+
+fn ellipse_area() -> f64 {
+    ellipse().pixels().iter().map(|c| f64::from(c.0)).sum()
+}
+
+/// The mean of an uncertainty over the ellipse, outside of which it is 0.
+fn mean_uncertainty(uncertainty: &Image<f32>) -> f64 {
+    let values = uncertainty.pixels().iter().map(|u| f64::from(*u));
+    values.sum::<f64>() / ellipse_area()
 }
 
 /// The well-conditioned neighbour of the others.
-fn nothing_extreme() -> HardCase {
-    let promise = "transmittance to 0.02 on average";
+fn ordinary_film() -> HardCase {
     HardCase::new(
         "film, nothing extreme",
         "neutral film on an even green screen",
-        promise,
-        || {
-            Ok(Outcome::at_most(
-                transmittance_error(&of_film(&on(GREEN, 1.0), GREEN)?.transmittance),
-                0.02,
-                "off",
-            ))
-        },
+        "transmittance to 0.02 on average",
+        judge_ordinary_film,
     )
 }
 
-/// So dark that no code of a picture would tell: the stage counts on the noise of coded pictures.
-fn underexposed() -> HardCase {
-    const DARK: f32 = 1e-3;
-    let promise =
-        "transmittance to 0.02 on average, or a mean uncertainty of at least half of its error";
+fn judge_ordinary_film() -> Result<Outcome> {
+    let found = film_matte(&film_on(GREEN, 1.0), GREEN)?;
+    let off = transmittance_error(&found.transmittance);
+    Ok(Outcome::at_most(off, 0.02, "off"))
+}
+
+/// Exposure of the underexposed film.
+const DARK_EXPOSURE: f32 = 1e-3;
+
+/// So dark that no code of a picture would show it: the stage expects the noise of coded pictures.
+fn underexposed_film() -> HardCase {
     HardCase::new(
         "film 1000 times underexposed",
         "neutral film on an even green screen",
-        promise,
-        || {
-            let found = of_film(&on(GREEN, DARK), GREEN.scale(DARK))?;
-            let error = transmittance_error(&found.transmittance);
-            let unsure = found
-                .uncertainty
-                .pixels()
-                .iter()
-                .map(|u| f64::from(*u))
-                .sum::<f64>()
-                / inside_area();
-            Ok(Outcome::new(
-                format!("off by {error:.3}, uncertainty {unsure:.3}"),
-                error < 0.02 || unsure > 0.5 * error,
-            ))
-        },
+        "transmittance to 0.02 on average, or a mean uncertainty of at least half of its error",
+        judge_underexposed_film,
     )
+}
+
+fn judge_underexposed_film() -> Result<Outcome> {
+    let found = film_matte(&film_on(GREEN, DARK_EXPOSURE), GREEN.scale(DARK_EXPOSURE))?;
+    let error = transmittance_error(&found.transmittance);
+    let unsure = mean_uncertainty(&found.uncertainty);
+    Ok(Outcome::new(
+        format!("off by {error:.3}, uncertainty {unsure:.3}"),
+        error < 0.02 || unsure > 0.5 * error,
+    ))
 }
 
 /// Mean error of the green transmittance inside.
 fn transmittance_error(found: &Image<LinearRgb>) -> f64 {
-    let mask = inside();
-    let pixels = (0..SIZE.1)
-        .flat_map(|y| (0..SIZE.0).map(move |x| (x, y)))
-        .filter(|&at| mask[at].0 > 0.0);
-    pixels
-        .map(|(x, y)| f64::from((found[(x, y)].g - folded(x, y).1).abs()))
-        .sum::<f64>()
-        / inside_area()
+    mean_error_inside(found, |x, y| folded_film(x, y).1)
+}
+
+fn mean_error_inside(found: &Image<LinearRgb>, expected: impl Fn(usize, usize) -> f32) -> f64 {
+    let inside = pixels_inside().into_iter();
+    let off = inside.map(|(x, y)| f64::from((found[(x, y)].g - expected(x, y)).abs()));
+    off.sum::<f64>() / ellipse_area()
+}
+
+fn pixels_inside() -> Vec<(usize, usize)> {
+    let mask = ellipse();
+    let pixels = (0..SIZE.1).flat_map(|y| (0..SIZE.0).map(move |x| (x, y)));
+    pixels.filter(|&at| mask[at].0 > 0.0).collect()
 }
 
 fn empty_mask() -> HardCase {
-    HardCase::new(
+    HardCase::refused(
         "film without an object",
         "a mask of zeros",
-        "refused, by \"mask of the object is empty\"",
-        || {
-            let (plate, nothing) = (ScreenPlate::even(GREEN, SIZE), Image::new(SIZE.0, SIZE.1));
-            let found = film(&on(GREEN, 1.0), &plate, &nothing, &FilmOptions::default());
-            Ok(Outcome::refused(found, "mask of the object is empty"))
-        },
+        "mask of the object is empty",
+        film_without_object,
+    )
+}
+
+fn film_without_object() -> Result<FilmMatte> {
+    let plate = ScreenPlate::even(GREEN, SIZE);
+    let nothing = Image::new(SIZE.0, SIZE.1);
+    film(
+        &film_on(GREEN, 1.0),
+        &plate,
+        &nothing,
+        &FilmOptions::default(),
     )
 }
 
@@ -503,14 +478,14 @@ fn no_background() -> HardCase {
         "screen without background",
         "no pixel of it to fit to",
         "refused: there is not enough",
-        || {
-            let nowhere = Image::filled(SIZE.0, SIZE.1, false);
-            Ok(Outcome::refused(
-                ScreenPlate::fit(&on(GREEN, 1.0), &nowhere, &PlateOptions::default()),
-                "background",
-            ))
-        },
+        fit_without_background,
     )
+}
+
+fn fit_without_background() -> Result<Outcome> {
+    let nowhere = Image::filled(SIZE.0, SIZE.1, false);
+    let plate = ScreenPlate::fit(&film_on(GREEN, 1.0), &nowhere, &PlateOptions::default());
+    Ok(Outcome::refused(plate, "background"))
 }
 
 /// What an exposure leaves of a screen before the sensor saturates.
@@ -519,58 +494,51 @@ fn exposed(screen: LinearRgb, exposure: f32) -> LinearRgb {
 }
 
 fn triangulated(screens: [LinearRgb; 2], exposure: f32) -> Result<Triangulated> {
-    let photos = screens.map(|screen| on(screen, exposure));
+    let photos = screens.map(|screen| film_on(screen, exposure));
     let plates = screens.map(|screen| ScreenPlate::even(exposed(screen, exposure), SIZE));
     let shots = [(&photos[0], &plates[0]), (&photos[1], &plates[1])];
-    triangulate(&shots, &inside(), &TriangulateOptions::default())
+    triangulate(&shots, &ellipse(), &TriangulateOptions::default())
 }
 
 fn two_screens() -> Vec<HardCase> {
-    let exact = |name: &str, screens: [LinearRgb; 2]| {
-        let promise = "photo = F + T screen has one solution in green: T to 1e-4 on average";
-        HardCase::new(
-            name,
-            "neutral film on two even screens, no noise",
-            promise,
-            move || {
-                Ok(Outcome::at_most(
-                    transmittance_error(&triangulated(screens, 1.0)?.transmittance),
-                    1e-4,
-                    "",
-                ))
-            },
-        )
-    };
-    let alike = |name: &str, screens: [LinearRgb; 2]| {
-        HardCase::new(
-            name,
-            "neutral film on both",
-            "refused, by \"too similar\"",
-            move || Ok(Outcome::refused(triangulated(screens, 1.0), "too similar")),
-        )
-    };
+    let black = LinearRgb::BLACK;
     vec![
-        exact("two screens, green and blue", [GREEN, BLUE]),
-        exact("two screens, one of them black", [GREEN, LinearRgb::BLACK]),
-        alike("two screens that are the same", [GREEN, GREEN]),
-        alike("two screens, both black", [LinearRgb::BLACK; 2]),
-        saturated(),
+        exact_screens("two screens, green and blue", [GREEN, BLUE]),
+        exact_screens("two screens, one of them black", [GREEN, black]),
+        similar_screens("two screens that are the same", [GREEN, GREEN]),
+        similar_screens("two screens, both black", [black; 2]),
+        saturated_photos(),
         clipped_screen(),
         one_screen(),
     ]
 }
 
-fn saturated() -> HardCase {
+fn exact_screens(name: &str, screens: [LinearRgb; 2]) -> HardCase {
     HardCase::new(
+        name,
+        "neutral film on two even screens, no noise",
+        "photo = F + T screen has one solution in green: T to 1e-4 on average",
+        move || judge_exact_screens(screens),
+    )
+}
+
+fn judge_exact_screens(screens: [LinearRgb; 2]) -> Result<Outcome> {
+    let found = triangulated(screens, 1.0)?.transmittance;
+    Ok(Outcome::at_most(transmittance_error(&found), 1e-4, ""))
+}
+
+fn similar_screens(name: &str, screens: [LinearRgb; 2]) -> HardCase {
+    HardCase::refused(name, "neutral film on both", "too similar", move || {
+        triangulated(screens, 1.0)
+    })
+}
+
+fn saturated_photos() -> HardCase {
+    HardCase::refused(
         "two photos clipped all over",
         "film on green and blue, 100 times too bright: screens and photos are white",
-        "refused, by \"too similar\"",
-        || {
-            Ok(Outcome::refused(
-                triangulated([GREEN, BLUE], 100.0),
-                "too similar",
-            ))
-        },
+        "too similar",
+        || triangulated([GREEN, BLUE], 100.0),
     )
 }
 
@@ -578,48 +546,35 @@ fn clipped_screen() -> HardCase {
     HardCase::new(
         "two photos with a clipped screen",
         "film on green and blue, 3 times too bright: the green of one screen is cut from 1.26 to 1",
-        "T to 0.05 on average, or told: a doubt, or a residual or mean uncertainty above 0.05",
-        || {
-            let found = triangulated([GREEN, BLUE], 3.0)?;
-            let error = transmittance_error(&found.transmittance);
-            let unsure = found
-                .uncertainty
-                .pixels()
-                .iter()
-                .map(|u| f64::from(*u))
-                .sum::<f64>()
-                / inside_area();
-            let doubts = found
-                .diagnostics
-                .iter()
-                .filter(|d| d.needs_review())
-                .count();
-            let told = doubts > 0 || found.residual > 0.05 || unsure > 0.05;
-            let numbers = format!(
-                "residual {:.3}, uncertainty {unsure:.3}, {doubts} doubts",
-                found.residual
-            );
-            Ok(Outcome::new(
-                format!("T off by {error:.3}, {numbers}"),
-                error < 0.05 || told,
-            ))
-        },
+        "T to 0.05 on average, or flagged, or a residual or mean uncertainty above 0.05",
+        || Ok(judge_clipped_screen(&triangulated([GREEN, BLUE], 3.0)?)),
+    )
+}
+
+fn judge_clipped_screen(found: &Triangulated) -> Outcome {
+    let error = transmittance_error(&found.transmittance);
+    let unsure = mean_uncertainty(&found.uncertainty);
+    let flags = review_messages(&found.diagnostics).len();
+    let residual = found.residual;
+    Outcome::new(
+        format!(
+            "T off by {error:.3}, residual {residual:.3}, uncertainty {unsure:.3}, {flags} flags"
+        ),
+        error < 0.05 || flags > 0 || residual > 0.05 || unsure > 0.05,
     )
 }
 
 fn one_screen() -> HardCase {
-    HardCase::new(
+    HardCase::refused(
         "triangulation from one photo",
         "film on green",
-        "refused, by \"expected at least 2\"",
-        || {
-            let (photo, plate) = (on(GREEN, 1.0), ScreenPlate::even(GREEN, SIZE));
-            let found = triangulate(
-                &[(&photo, &plate)],
-                &inside(),
-                &TriangulateOptions::default(),
-            );
-            Ok(Outcome::refused(found, "expected at least 2"))
-        },
+        "expected at least 2",
+        triangulate_one_photo,
     )
+}
+
+fn triangulate_one_photo() -> Result<Triangulated> {
+    let (photo, plate) = (film_on(GREEN, 1.0), ScreenPlate::even(GREEN, SIZE));
+    let options = TriangulateOptions::default();
+    triangulate(&[(&photo, &plate)], &ellipse(), &options)
 }

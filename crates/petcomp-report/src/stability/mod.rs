@@ -1,8 +1,8 @@
-//! Stability: every stage on stiff and extreme input, held against what must come out.
+//! Stability: every stage on stiff and extreme input, checked against a known result.
 //!
-//! What must come out is a closed form, a conservation law, the limit of neighbours that are easy, or an error that names
-//! its cause; it is never what came out before. A case that panics, or that fails where it should not, is a row that
-//! failed, and the others go on.
+//! The expected result is a closed form, a conservation law, the limit of easier neighbours, or an error that names its
+//! cause; it is never what came out before. A case that panics, or that fails where it should not, becomes a failed row,
+//! and the others still run.
 
 mod bottle;
 mod camera;
@@ -23,7 +23,7 @@ mod staged;
 
 pub use case::{HardCase, Outcome};
 
-use petcomp::io::{create_folder, write_text};
+use crate::files::write_texts;
 use petcomp::plot::Table;
 use petcomp::{Error, Result};
 use std::path::Path;
@@ -48,18 +48,32 @@ const STAGES: &[(&str, Cases)] = &[
 /// How a case ended.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CaseResult {
-    /// Whose case it is.
+    /// The stage under test.
     pub stage: &'static str,
-    /// What is extreme about it.
+    /// What is extreme about the input.
     pub name: String,
     /// What goes in.
     pub input: String,
     /// What must come out.
     pub expectation: String,
-    /// What came out, and whether that is as it must be.
+    /// What came out, and whether it meets the expectation.
     pub outcome: Outcome,
-    /// Time that it took, milliseconds.
+    /// Run time, milliseconds.
     pub wall_ms: f64,
+}
+
+impl CaseResult {
+    fn cells(&self) -> [String; 7] {
+        [
+            self.stage.into(),
+            self.name.clone(),
+            self.input.clone(),
+            self.expectation.clone(),
+            self.outcome.measured.clone(),
+            if self.outcome.passed { "pass" } else { "FAIL" }.into(),
+            format!("{:.1}", self.wall_ms),
+        ]
+    }
 }
 
 /// Names of the stages that have cases.
@@ -72,39 +86,49 @@ pub fn stages() -> impl Iterator<Item = &'static str> {
 /// # Errors
 /// [`Error::Value`] for a stage that has none.
 pub fn cases(stage: &str) -> Result<Vec<(&'static str, HardCase)>> {
-    let asked: Vec<_> = STAGES
-        .iter()
-        .filter(|(name, _)| stage.is_empty() || *name == stage)
-        .collect();
-    if asked.is_empty() {
-        let names = stages().collect::<Vec<_>>().join(", ");
-        return Err(Error::value(
-            "stage",
-            format!("\"{stage}\", expected one of {names}"),
-        ));
-    }
     let mut all = Vec::new();
-    for (name, cases) in asked {
+    for (name, cases) in selected_stages(stage)? {
         all.extend(cases()?.into_iter().map(|case| (*name, case)));
     }
     Ok(all)
 }
 
-/// Runs every case of every stage; `progress` hears of each and of how many there are.
+fn selected_stages(stage: &str) -> Result<Vec<&'static (&'static str, Cases)>> {
+    let selected: Vec<_> = STAGES
+        .iter()
+        .filter(|(name, _)| stage.is_empty() || *name == stage)
+        .collect();
+    if selected.is_empty() {
+        return Err(unknown_stage(stage));
+    }
+    Ok(selected)
+}
+
+fn unknown_stage(stage: &str) -> Error {
+    let names = stages().collect::<Vec<_>>().join(", ");
+    Error::value("stage", format!("\"{stage}\", expected one of {names}"))
+}
+
+/// Runs every case of every stage; `progress` is given the number of finished cases and of all cases.
 ///
 /// # Errors
 /// None that a caller can cause: cases are made in code.
 pub fn measure(progress: impl Fn(u64, u64)) -> Result<Vec<CaseResult>> {
-    Ok(run(&cases("")?, progress))
+    Ok(run_cases(&cases("")?, progress))
 }
 
-/// Runs cases one after another; `progress` hears of each and of how many there are.
-pub fn run(cases: &[(&'static str, HardCase)], progress: impl Fn(u64, u64)) -> Vec<CaseResult> {
-    let row = |(i, (stage, case)): (usize, &(&'static str, HardCase))| {
-        progress(i as u64, cases.len() as u64);
-        case.row(stage)
-    };
-    cases.iter().enumerate().map(row).collect()
+/// Runs cases one after another; `progress` is given the number of finished cases and of all cases.
+pub fn run_cases(
+    cases: &[(&'static str, HardCase)],
+    progress: impl Fn(u64, u64),
+) -> Vec<CaseResult> {
+    let numbered = cases.iter().enumerate();
+    numbered
+        .map(|(i, (stage, case))| {
+            progress(i as u64, cases.len() as u64);
+            case.run_timed(stage)
+        })
+        .collect()
 }
 
 /// Cases as a table, a row each.
@@ -118,19 +142,7 @@ pub fn table(rows: &[CaseResult]) -> Table {
         "pass",
         "time ms",
     ]);
-    for row in rows {
-        let pass = if row.outcome.passed { "pass" } else { "FAIL" };
-        let time = format!("{:.1}", row.wall_ms);
-        table.push([
-            row.stage,
-            &row.name,
-            &row.input,
-            &row.expectation,
-            &row.outcome.measured,
-            pass,
-            &time,
-        ]);
-    }
+    rows.iter().for_each(|row| table.push(row.cells()));
     table
 }
 
@@ -138,14 +150,20 @@ pub fn table(rows: &[CaseResult]) -> Table {
 pub fn summary(rows: &[CaseResult]) -> Table {
     let mut table = Table::new(["stage", "cases", "pass", "fail"]);
     for stage in stages() {
-        let of_stage = || rows.iter().filter(|row| row.stage == stage);
-        let passed = of_stage().filter(|row| row.outcome.passed).count();
-        let counts = [of_stage().count(), passed, of_stage().count() - passed];
-        if counts[0] > 0 {
-            table.push(std::iter::once(stage.into()).chain(counts.map(|n| n.to_string())));
+        let [cases, passed] = case_counts(rows, stage);
+        if cases > 0 {
+            let counts = [cases, passed, cases - passed].map(|n| n.to_string());
+            table.push(std::iter::once(stage.into()).chain(counts));
         }
     }
     table
+}
+
+/// How many cases a stage has and how many of them pass.
+fn case_counts(rows: &[CaseResult], stage: &str) -> [usize; 2] {
+    let of_stage: Vec<_> = rows.iter().filter(|row| row.stage == stage).collect();
+    let passed = of_stage.iter().filter(|row| row.outcome.passed).count();
+    [of_stage.len(), passed]
 }
 
 /// Runs the cases of a stage, or of all (an empty name), and writes `stability.csv` and `stability.md` into a folder.
@@ -153,11 +171,11 @@ pub fn summary(rows: &[CaseResult]) -> Table {
 /// # Errors
 /// As [`cases`]; files that cannot be written. A case that fails is a row, not an error.
 pub fn write(folder: &Path, stage: &str, progress: impl Fn(u64, u64)) -> Result<Vec<CaseResult>> {
-    let rows = run(&cases(stage)?, progress);
-    create_folder(folder)?;
-    write_text(folder.join("stability.csv"), &table(&rows).csv())?;
-    let text = format!("{}\n{}", summary(&rows).markdown(), table(&rows).markdown());
-    write_text(folder.join("stability.md"), &text)?;
+    let rows = run_cases(&cases(stage)?, progress);
+    let table = table(&rows);
+    let text = format!("{}\n{}", summary(&rows).markdown(), table.markdown());
+    let files = [("stability.csv", &*table.csv()), ("stability.md", &text)];
+    write_texts(folder, files)?;
     Ok(rows)
 }
 
@@ -166,14 +184,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_unknown_stage_is_told_with_those_that_are_known() {
-        let told = cases("physics")
+    fn an_unknown_stage_is_reported_with_the_known_ones() {
+        let message = cases("physics")
             .err()
             .map(|e| e.to_string())
             .unwrap_or_default();
         assert!(
-            told.starts_with("stage: \"physics\", expected one of "),
-            "{told}"
+            message.starts_with("stage: \"physics\", expected one of "),
+            "{message}"
         );
     }
 
@@ -209,7 +227,7 @@ mod tests {
                 HardCase::new("good", "", "", || Ok(Outcome::near(1.0, 1.0, 0.0, "m"))),
             ),
         ];
-        let rows = run(&cases, |_, _| ());
+        let rows = run_cases(&cases, |_, _| ());
         assert_eq!(
             rows.iter()
                 .map(|row| row.outcome.passed)

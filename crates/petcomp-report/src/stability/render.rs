@@ -1,9 +1,11 @@
 //! Shots that are hard to render: very many layers, very near, edge-on, very bright beside very dim, very small and large.
 
-use super::staged::{above, card, grey, lamp, level, looking_at, projected_area, small, tilted};
+use super::staged::{
+    camera_above, camera_looking_at, card, grey, lamp, level_card, projected_area, rendered,
+    small_shot, tilted,
+};
 use super::{HardCase, Outcome, memory, render_light};
 use crate::render::GOOD;
-use petcomp::DeepImage;
 use petcomp::Image;
 use petcomp::Quality;
 use petcomp::Result;
@@ -11,144 +13,159 @@ use petcomp::composite;
 use petcomp::geom::UnitQuaternion;
 use petcomp::render::{RenderOptions, interreflect, render, render_reference};
 use petcomp::scene::{Card, Shot};
+use petcomp::{DeepImage, DeepSample};
 use petcomp::{Film, LinearRgb, PremulRgba};
 use std::f64::consts::FRAC_PI_2;
 
 /// Layers of film in a pixel.
-const LAYERS: u32 = 200;
+const LAYER_COUNT: u32 = 200;
 /// A product or sum of that many single precision numbers is known to this.
-const ROUNDING: f64 = LAYERS as f64 * f32::EPSILON as f64;
+const ROUNDING_ERROR: f64 = LAYER_COUNT as f64 * f32::EPSILON as f64;
 
 pub(super) fn cases() -> Result<Vec<HardCase>> {
     let mut cases = vec![
-        layers_for_the_eye(),
-        layers_for_the_light(),
+        layers_before_the_eye(),
+        layers_before_the_light(),
         tinted_layers(),
-        near(),
+        near_card(),
         near_and_grazing(),
         one_pixel(),
         white_on_white(),
         sixteen_k(),
     ];
-    cases.extend([60.0, 85.0, 89.0, 89.9].map(steep));
+    cases.extend([60.0, 85.0, 89.0, 89.9].map(steep_card));
     cases.extend(render_light::cases());
     cases.extend(nothing_to_see());
-    cases.extend(awkward());
+    cases.extend(awkward_cards());
+    cases.extend(awkward_textures());
     Ok(cases)
 }
 
+fn every_pixel(deep: &DeepImage) -> impl Iterator<Item = (usize, usize)> {
+    let (w, h) = (deep.width(), deep.height());
+    (0..h).flat_map(move |y| (0..w).map(move |x| (x, y)))
+}
+
 /// Level layers between 0.1 and 0.5 m under the camera's metre, larger than what it sees.
-fn stack(texture: &Film) -> Shot {
-    let shot = small().with_light(lamp([0.3, 0.2, 0.9], 0.4, 10.0));
-    (1..=LAYERS).fold(shot, |shot, id| {
+fn stacked_films(texture: Film) -> Shot {
+    let shot = small_shot().with_light(lamp([0.3, 0.2, 0.9], 0.4, 10.0));
+    (1..=LAYER_COUNT).fold(shot, |shot, id| {
         let center = [0.0, 0.0, 0.1 + 0.002 * f64::from(id)];
-        let sheet = Image::filled(8, 8, *texture);
-        shot.with_card(card(
-            id,
-            center,
-            UnitQuaternion::identity(),
-            [4.0; 2],
-            sheet,
-        ))
+        let sheet = Image::filled(8, 8, texture);
+        let level = UnitQuaternion::identity();
+        shot.with_card(card(id, center, level, [4.0; 2], sheet))
     })
 }
 
-fn thin(opacity: LinearRgb) -> Film {
+fn absorbing_film(opacity: LinearRgb) -> Film {
     Film {
         color: LinearRgb::BLACK,
         opacity,
     }
 }
 
-fn layers_for_the_eye() -> HardCase {
-    let expected = libm::pow(0.99, f64::from(LAYERS));
+/// What 200 layers of transmittance 0.99 let through.
+fn grey_stack() -> DeepImage {
+    rendered(&stacked_films(absorbing_film(LinearRgb::grey(0.01))))
+}
+
+fn layers_before_the_eye() -> HardCase {
+    let expected = libm::pow(0.99, f64::from(LAYER_COUNT));
     HardCase::new(
         "200 layers of film before the eye",
         "200 level cards of transmittance 0.99 over one pixel",
         format!("0.99^200 = {expected:.6} passes, to 200 roundings"),
-        move || {
-            let deep = render(
-                &stack(&thin(LinearRgb::grey(0.01))),
-                &RenderOptions::default(),
-            );
-            let passes = f64::from(deep.flat(2, 2).transmittance().g);
-            Ok(Outcome::near(passes, expected, ROUNDING, ""))
-        },
+        move || pass_layers_to_the_eye(expected),
     )
 }
 
-fn layers_for_the_light() -> HardCase {
-    let expected = libm::pow(0.99, f64::from(LAYERS));
+fn pass_layers_to_the_eye(expected: f64) -> Result<Outcome> {
+    let passes = f64::from(grey_stack().flat(2, 2).transmittance().g);
+    Ok(Outcome::near(passes, expected, ROUNDING_ERROR, ""))
+}
+
+fn layers_before_the_light() -> HardCase {
+    let expected = libm::pow(0.99, f64::from(LAYER_COUNT));
     HardCase::new(
         "200 layers of film before the light",
         "the surface under 200 level cards of transmittance 0.99",
         format!("0.99^200 = {expected:.6} of the light arrives, to 200 roundings"),
-        move || {
-            let deep = render(
-                &stack(&thin(LinearRgb::grey(0.01))),
-                &RenderOptions::default(),
-            );
-            Ok(Outcome::near(
-                f64::from(deep.shadow()[(2, 2)].g),
-                expected,
-                ROUNDING,
-                "",
-            ))
-        },
+        move || pass_layers_to_the_light(expected),
     )
 }
 
+fn pass_layers_to_the_light(expected: f64) -> Result<Outcome> {
+    let arrives = f64::from(grey_stack().shadow()[(2, 2)].g);
+    Ok(Outcome::near(arrives, expected, ROUNDING_ERROR, ""))
+}
+
+/// What a tinted layer passes of red, green and blue.
+const TINT: [f64; 3] = [0.999, 0.99, 0.9];
+
 fn tinted_layers() -> HardCase {
-    let passes = [0.999, 0.99, 0.9];
-    let expected = passes.map(|t: f64| libm::pow(t, f64::from(LAYERS)));
+    let expected = TINT.map(|t| libm::pow(t, f64::from(LAYER_COUNT)));
+    let [r, g, b] = expected;
     HardCase::new(
         "200 layers of tinted film",
         "200 level cards that pass 0.999, 0.99 and 0.9 of red, green and blue",
-        format!(
-            "{:.4}, {:.4} and {:.1e} pass, to 200 roundings",
-            expected[0], expected[1], expected[2]
-        ),
-        move || {
-            let film = thin(passes.map(|t| (1.0 - t) as f32).into());
-            let deep = render(&stack(&film), &RenderOptions::default());
-            let [eye, light]: [[f32; 3]; 2] =
-                [deep.flat(2, 2).transmittance(), deep.shadow()[(2, 2)]].map(Into::into);
-            let found = eye.iter().zip(&expected).chain(light.iter().zip(&expected));
-            let worst = found
-                .map(|(found, t)| (f64::from(*found) - t).abs())
-                .fold(0.0, f64::max);
-            Ok(Outcome::at_most(worst, ROUNDING, "off"))
-        },
+        format!("{r:.4}, {g:.4} and {b:.1e} pass, to 200 roundings"),
+        move || Ok(render_tinted_layers(&expected)),
     )
 }
 
-/// The most that alpha, light and depth of an opaque grey card that fills the picture are off.
-fn off_a_full_card(deep: &DeepImage, depth: f64) -> f64 {
-    let pixels = (0..deep.height()).flat_map(|y| (0..deep.width()).map(move |x| (x, y)));
-    let off = |(x, y)| match deep.at(x, y) {
-        [s] => [(s.alpha, 1.0), (s.light.g, 0.5), (s.depth.0, depth as f32)]
-            .into_iter()
-            .map(|(found, expected)| f64::from((found - expected).abs()))
-            .fold(0.0, f64::max),
-        _ => f64::INFINITY,
-    };
-    pixels.map(off).fold(0.0, f64::max)
+fn render_tinted_layers(expected: &[f64; 3]) -> Outcome {
+    let film = absorbing_film(TINT.map(|t| (1.0 - t) as f32).into());
+    let deep = rendered(&stacked_films(film));
+    let [eye, light] = [deep.flat(2, 2).transmittance(), deep.shadow()[(2, 2)]]
+        .map(|passes| largest_error(passes, expected));
+    Outcome::at_most(eye.max(light), ROUNDING_ERROR, "off")
 }
 
-fn near() -> HardCase {
+fn largest_error(found: LinearRgb, expected: &[f64; 3]) -> f64 {
+    let pairs = <[f32; 3]>::from(found).into_iter().zip(expected);
+    pairs
+        .map(|(found, t)| (f64::from(found) - t).abs())
+        .fold(0.0, f64::max)
+}
+
+/// The largest error of alpha, light and depth of an opaque grey card that fills the picture.
+fn error_of_full_card(deep: &DeepImage, depth: f64) -> f64 {
+    let errors = every_pixel(deep).map(|(x, y)| match deep.at(x, y) {
+        [sample] => error_of_grey_sample(sample, depth),
+        _ => f64::INFINITY,
+    });
+    errors.fold(0.0, f64::max)
+}
+
+fn error_of_grey_sample(s: &DeepSample, depth: f64) -> f64 {
+    [(s.alpha, 1.0), (s.light.g, 0.5), (s.depth.0, depth as f32)]
+        .into_iter()
+        .map(|(found, expected)| f64::from((found - expected).abs()))
+        .fold(0.0, f64::max)
+}
+
+fn near_card() -> HardCase {
     HardCase::new(
         "camera 1 cm above a card",
         "an opaque card of albedo 1/2, 20 cm wide, 1 cm under the eye, under even light of 1",
         "alpha 1, light 1/2 and depth 0.01 m in every pixel, to 1e-5",
-        || {
-            let shot = Shot::new(above([64, 48], 60.0)).with_ambient(LinearRgb::WHITE);
-            let deep = render(
-                &shot.with_card(level(1, [0.0, 0.0, 0.99], 0.2, grey(1.0))),
-                &RenderOptions::default(),
-            );
-            Ok(Outcome::at_most(off_a_full_card(&deep, 0.01), 1e-5, "off"))
-        },
+        render_near_card,
     )
+}
+
+fn render_near_card() -> Result<Outcome> {
+    let deep = rendered(&near_card_shot());
+    Ok(Outcome::at_most(
+        error_of_full_card(&deep, 0.01),
+        1e-5,
+        "off",
+    ))
+}
+
+fn near_card_shot() -> Shot {
+    Shot::new(camera_above([64, 48], 60.0))
+        .with_ambient(LinearRgb::WHITE)
+        .with_card(level_card(1, [0.0, 0.0, 0.99], 0.2, grey(1.0)))
 }
 
 fn near_and_grazing() -> HardCase {
@@ -156,104 +173,104 @@ fn near_and_grazing() -> HardCase {
         "camera 1 cm above a card, looking along it",
         "an opaque card 20 m wide, the eye 1 cm over it, tilted by 80 degrees, under even light of 1",
         "below the horizon, 1 pixel away from it, alpha 1 and light 1/2, to 1e-4; above it nothing",
-        || {
-            let camera = looking_at(
-                [0.0, 0.0, 0.01],
-                [0.0, 0.01 * libm::tan(80_f64.to_radians()), 0.0],
-                [65, 48],
-                60.0,
-            );
-            let shot = Shot::new(camera).with_ambient(LinearRgb::WHITE);
-            let deep = render(
-                &shot.with_card(level(1, [0.0; 3], 20.0, grey(1.0))),
-                &RenderOptions::default(),
-            );
-            // Where the card ends 10 m away: a hair under the horizon, 60 tan(10 degrees) above the middle.
-            let horizon = 24.0 - 60.0 * libm::tan(10_f64.to_radians());
-            let off = |y: usize| -> f64 {
-                let expected = if y as f64 > horizon {
-                    [1.0, 0.5]
-                } else {
-                    [0.0, 0.0]
-                };
-                let flat = deep.flat(32, y);
-                f64::from(
-                    (flat.opacity.g - expected[0])
-                        .abs()
-                        .max((flat.color.g - expected[1]).abs()),
-                )
-            };
-            // The window of a pixel is three wide.
-            let rows = (0..48).filter(|&y| (y as f64 + 0.5 - horizon).abs() > 2.0);
-            Ok(Outcome::at_most(
-                rows.map(off).fold(0.0, f64::max),
-                1e-4,
-                "off",
-            ))
-        },
+        render_near_and_grazing,
     )
 }
 
-/// Places within a pixel that a steep card is looked at in.
-const PLACES: u32 = 64;
+fn render_near_and_grazing() -> Result<Outcome> {
+    let deep = rendered(&grazing_shot());
+    // Where the card ends 10 m away: slightly under the horizon, 60 tan(10 degrees) above the middle.
+    let horizon = 24.0 - 60.0 * libm::tan(10_f64.to_radians());
+    // The window of a pixel is three wide.
+    let rows = (0..48).filter(|&y| (y as f64 + 0.5 - horizon).abs() > 2.0);
+    let off = rows.map(|y| error_of_row(&deep, y, y as f64 > horizon));
+    Ok(Outcome::at_most(off.fold(0.0, f64::max), 1e-4, "off"))
+}
 
-/// A card that is nearly edge-on: what the picture shows of it, in pixels, is the area of its projected corners.
+fn grazing_shot() -> Shot {
+    let target = [0.0, 0.01 * libm::tan(80_f64.to_radians()), 0.0];
+    let camera = camera_looking_at([0.0, 0.0, 0.01], target, [65, 48], 60.0);
+    Shot::new(camera)
+        .with_ambient(LinearRgb::WHITE)
+        .with_card(level_card(1, [0.0; 3], 20.0, grey(1.0)))
+}
+
+fn error_of_row(deep: &DeepImage, y: usize, is_card: bool) -> f64 {
+    let [opacity, color] = if is_card { [1.0, 0.5] } else { [0.0, 0.0] };
+    let flat = deep.flat(32, y);
+    let off = (flat.opacity.g - opacity)
+        .abs()
+        .max((flat.color.g - color).abs());
+    f64::from(off)
+}
+
+/// Positions within a pixel that a steep card is rendered at.
+const SUBPIXEL_POSITIONS: u32 = 64;
+/// Focal length of the camera over a steep card, pixels.
+const STEEP_FOCAL_PX: f64 = 400.0;
+/// Side of a steep card, metres.
+const STEEP_SIDE_M: f64 = 0.2;
+/// The height of a steep card, whose centre is 0.9 m from the camera, in the picture: pixels.
+const STEEP_SIDE_PX: f64 = STEEP_SIDE_M * STEEP_FOCAL_PX / 0.9;
+
+/// A card that is nearly edge-on: its coverage, in pixels, must be the area of its projected corners.
 ///
-/// Each row of the picture has two samples a pixel: a strip thinner than their distance is met or missed, as it lies.
-fn steep(degrees: f64) -> HardCase {
-    const FOCAL: f64 = 400.0;
-    const LENGTH: f64 = 0.2;
-    let shown = move |place: u32| {
-        let pixel = 0.9 / FOCAL;
-        let center = [pixel * f64::from(place) / f64::from(PLACES), 0.0, 0.1];
-        let texture = Image::filled(512, 512, grey(1.0));
-        let sheet = card(
-            1,
-            center,
-            tilted(degrees.to_radians()),
-            [LENGTH; 2],
-            texture,
-        );
-        Shot::new(above([96, 128], FOCAL)).with_card(sheet)
-    };
-    let area = projected_area(&shown(0).cards[0], &shown(0).camera);
-    let strip = 0.5 * LENGTH * FOCAL / 0.9;
-    // Places a step apart meet a strip of so many pixels to one of them.
-    let width = area / (LENGTH * FOCAL / 0.9);
-    let mean_bound = 0.01 + 1.0 / (f64::from(PLACES) * width);
+/// Each row of the picture has two samples a pixel: a strip thinner than their distance is hit or missed, depending on where it is.
+fn steep_card(degrees: f64) -> HardCase {
+    let area = area_of_card(&steep_shot(degrees, 0));
+    // Half the height of the card: a row of samples.
+    let strip = 0.5 * STEEP_SIDE_PX;
+    // Positions a step apart meet a strip of so many pixels to one of them.
+    let width = area / STEEP_SIDE_PX;
+    let mean_bound = 0.01 + 1.0 / (f64::from(SUBPIXEL_POSITIONS) * width);
     HardCase::new(
         format!("card turned by {degrees} degrees"),
         format!(
-            "an opaque card of which {area:.1} pixels are seen, at {PLACES} places across a pixel"
+            "an opaque card of which {area:.1} pixels are seen, at {SUBPIXEL_POSITIONS} places across a pixel"
         ),
         format!(
             "coverage sums to the area of the projected corners: to {:.0} % on average, to a row of samples ({strip:.0} px) each",
             100.0 * mean_bound
         ),
         move || {
-            let found: Vec<f64> = (0..PLACES)
-                .map(|place| covered(&render(&shown(place), &RenderOptions::default())))
-                .collect();
-            // Moved sideways, a card shows a little more or less of itself.
-            let areas: Vec<f64> = (0..PLACES)
-                .map(|k| projected_area(&shown(k).cards[0], &shown(k).camera))
-                .collect();
-            let mean = found.iter().sum::<f64>() / areas.iter().sum::<f64>() - 1.0;
-            let worst = found
-                .iter()
-                .zip(&areas)
-                .map(|(f, a)| (f - a).abs())
-                .fold(0.0, largest);
-            let told = format!("{:+.2} % on average, {worst:.2} px at worst", 100.0 * mean);
-            Ok(Outcome::new(told, mean.abs() < mean_bound && worst < strip))
+            let (mean, worst) = steep_card_errors(degrees);
+            let measured = format!("{:+.2} % on average, {worst:.2} px at worst", 100.0 * mean);
+            Ok(Outcome::new(
+                measured,
+                mean.abs() < mean_bound && worst < strip,
+            ))
         },
     )
 }
 
+fn steep_shot(degrees: f64, position: u32) -> Shot {
+    let pixel = 0.9 / STEEP_FOCAL_PX;
+    let x = pixel * f64::from(position) / f64::from(SUBPIXEL_POSITIONS);
+    let texture = Image::filled(512, 512, grey(1.0));
+    let rotation = tilted(degrees.to_radians());
+    let sheet = card(1, [x, 0.0, 0.1], rotation, [STEEP_SIDE_M; 2], texture);
+    Shot::new(camera_above([96, 128], STEEP_FOCAL_PX)).with_card(sheet)
+}
+
+fn area_of_card(shot: &Shot) -> f64 {
+    projected_area(&shot.cards[0], &shot.camera)
+}
+
+/// The relative error of the mean coverage, and the largest error in pixels.
+fn steep_card_errors(degrees: f64) -> (f64, f64) {
+    let shots = (0..SUBPIXEL_POSITIONS).map(|position| steep_shot(degrees, position));
+    // Moved sideways, a card shows a little more or less of itself.
+    let (found, areas): (Vec<f64>, Vec<f64>) = shots
+        .map(|shot| (total_coverage(&rendered(&shot)), area_of_card(&shot)))
+        .unzip();
+    let mean = found.iter().sum::<f64>() / areas.iter().sum::<f64>() - 1.0;
+    let errors = found.iter().zip(&areas).map(|(f, a)| (f - a).abs());
+    (mean, errors.fold(0.0, largest))
+}
+
 /// Sum of coverage, pixels.
-fn covered(deep: &DeepImage) -> f64 {
-    let pixels = (0..deep.height()).flat_map(|y| (0..deep.width()).map(move |x| (x, y)));
-    pixels
+fn total_coverage(deep: &DeepImage) -> f64 {
+    every_pixel(deep)
         .flat_map(|(x, y)| deep.at(x, y))
         .map(|s| f64::from(s.alpha))
         .sum()
@@ -264,61 +281,63 @@ fn one_pixel() -> HardCase {
         "one-pixel image",
         "a tilted card in a shadow of its own, seen by 1 x 1 pixel",
         "the middle pixel of 65 x 65 that the same camera sees, to 1e-5",
-        || {
-            let seen = |side: u32| {
-                let shot =
-                    Shot::new(above([side; 2], 50.0)).with_light(lamp([0.3, 0.2, 0.9], 0.4, 10.0));
-                let sheet = Image::filled(64, 64, grey(0.6));
-                let shot = shot.with_card(card(1, [0.02, 0.0, 0.2], tilted(0.5), [0.3; 2], sheet));
-                let deep = render(&shot, &GOOD);
-                let middle = (side / 2) as usize;
-                (deep.flat(middle, middle), deep.shadow()[(middle, middle)])
-            };
-            let ((one, shade), (many, wide)) = (seen(1), seen(65));
-            let off = [
-                one.color.g - many.color.g,
-                one.opacity.g - many.opacity.g,
-                shade.g - wide.g,
-            ];
-            Ok(Outcome::at_most(
-                off.iter().fold(0.0, |most, v| v.abs().max(most)).into(),
-                1e-5,
-                "off",
-            ))
-        },
+        render_one_pixel,
     )
+}
+
+fn render_one_pixel() -> Result<Outcome> {
+    let pairs = middle_pixel(1).into_iter().zip(middle_pixel(65));
+    let worst = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+    Ok(Outcome::at_most(worst.into(), 1e-5, "off"))
+}
+
+/// Light, opacity and shadow of the middle pixel of a picture of a tilted card.
+fn middle_pixel(side: u32) -> [f32; 3] {
+    let deep = render(&tilted_card_shot(side), &GOOD);
+    let middle = (side / 2) as usize;
+    let flat = deep.flat(middle, middle);
+    let shadow = deep.shadow()[(middle, middle)];
+    [flat.color.g, flat.opacity.g, shadow.g]
+}
+
+fn tilted_card_shot(side: u32) -> Shot {
+    let sheet = Image::filled(64, 64, grey(0.6));
+    Shot::new(camera_above([side; 2], 50.0))
+        .with_light(lamp([0.3, 0.2, 0.9], 0.4, 10.0))
+        .with_card(card(1, [0.02, 0.0, 0.2], tilted(0.5), [0.3; 2], sheet))
 }
 
 fn white_on_white() -> HardCase {
     HardCase::new(
         "light between two white planes",
-        "a surface of albedo 1 under a white opaque card, which throws back all that it gets",
-        "no more than 20 times as bright (light thrown back is held at 0.95); never infinite",
-        || {
-            let shot = small().with_ambient(LinearRgb::WHITE);
-            let shot = shot.with_card(level(
-                1,
-                [0.0, 0.0, 0.05],
-                0.5,
-                PremulRgba::new(1.0, 1.0, 1.0, 1.0),
-            ));
-            let deep = interreflect(
-                render(&shot, &RenderOptions::default()),
-                &shot,
-                LinearRgb::WHITE,
-            );
-            let brightest = deep
-                .shadow()
-                .pixels()
-                .iter()
-                .map(|s| f64::from(s.r.max(s.g).max(s.b)));
-            Ok(Outcome::at_most(
-                brightest.fold(0.0, largest),
-                1.0 / (1.0 - 0.95) * (1.0 + 1e-5),
-                "times",
-            ))
-        },
+        "a surface of albedo 1 under a white opaque card, which reflects all that it gets",
+        "no more than 20 times as bright (reflected light is limited to 0.95); never infinite",
+        reflect_between_planes,
     )
+}
+
+fn reflect_between_planes() -> Result<Outcome> {
+    let brightest = brightest_between_planes();
+    let limit = 1.0 / (1.0 - 0.95) * (1.0 + 1e-5);
+    Ok(Outcome::at_most(brightest, limit, "times"))
+}
+
+fn brightest_between_planes() -> f64 {
+    let shot = white_card_shot();
+    let deep = interreflect(rendered(&shot), &shot, LinearRgb::WHITE);
+    let shadow = deep.shadow().pixels().iter();
+    shadow.map(brightest_channel).fold(0.0, largest)
+}
+
+fn brightest_channel(s: &LinearRgb) -> f64 {
+    f64::from(s.r.max(s.g).max(s.b))
+}
+
+fn white_card_shot() -> Shot {
+    let white = PremulRgba::new(1.0, 1.0, 1.0, 1.0);
+    small_shot()
+        .with_ambient(LinearRgb::WHITE)
+        .with_card(level_card(1, [0.0, 0.0, 0.05], 0.5, white))
 }
 
 /// The larger number; NaN where one is.
@@ -331,155 +350,163 @@ pub(super) fn largest(a: f64, b: f64) -> f64 {
 }
 
 /// Pixels along a side of the largest picture.
-const SIXTEEN_K: u32 = 16_384;
-/// What that picture may take at most: factors on the plate and starts of samples are 4 GiB, samples a quarter.
+const LARGEST_SIDE_PX: u32 = 16_384;
+/// What that picture may take at most: factors on the plate and offsets of samples are 4 GiB, samples a quarter.
 const SIXTEEN_K_GIB: f64 = 6.0;
 /// What it shows of a card of 2000 x 2000 pixels and 64 x 64 texels: alpha falls to one half over the outermost half texel,
 /// which takes an eighth of a texel off each side.
-const SHOWN: f64 = (2000.0 * (1.0 - 0.25 / 64.0)) * (2000.0 * (1.0 - 0.25 / 64.0));
+const SHOWN_PX: f64 = (2000.0 * (1.0 - 0.25 / 64.0)) * (2000.0 * (1.0 - 0.25 / 64.0));
 
 fn sixteen_k() -> HardCase {
     HardCase::new(
         "16k image",
         "16384 x 16384 pixels with a card of 2000 x 2000 in the last corner",
-        format!("{SHOWN:.0} pixels covered, to 1e-4; the last pixel's plate untouched; at most {SIXTEEN_K_GIB} GiB"),
-        || {
-            if let Some(free) = memory::available_gib().filter(|free| *free < SIXTEEN_K_GIB) {
-                return Ok(Outcome::new(format!("not tried: {free:.1} GiB are free"), false));
-            }
-            let from_corner = |px: f64| (f64::from(SIXTEEN_K) / 2.0 - px) / 10_000.0;
-            let center = [from_corner(1100.0), -from_corner(1100.0), 0.0];
-            let sheet = level(1, center, 0.2, grey(1.0));
-            let shot = Shot::new(above([SIXTEEN_K; 2], 10_000.0)).with_ambient(LinearRgb::WHITE).with_card(sheet);
-            let (deep, peak) = memory::peak_gib(|| render(&shot, &Quality::Draft.render()));
-            let (found, last) = (covered(&deep), SIXTEEN_K as usize - 1);
-            let fits = peak.is_none_or(|peak| peak < SIXTEEN_K_GIB);
-            let right = (found / SHOWN - 1.0).abs() < 1e-4 && deep.shadow()[(last, last)] == LinearRgb::WHITE;
-            let peak = peak.map_or(String::new(), |peak| format!(", {peak:.1} GiB"));
-            Ok(Outcome::new(format!("{found:.0} pixels{peak}"), fits && right))
-        },
+        format!(
+            "{SHOWN_PX:.0} pixels covered, to 1e-4; the last pixel's plate untouched; at most {SIXTEEN_K_GIB} GiB"
+        ),
+        || Ok(memory::shortage(SIXTEEN_K_GIB).unwrap_or_else(render_sixteen_k)),
     )
     .for_the_report()
 }
 
+fn render_sixteen_k() -> Outcome {
+    let shot = sixteen_k_shot();
+    let (deep, peak) = memory::peak_gib(|| render(&shot, &Quality::Draft.render()));
+    let found = total_coverage(&deep);
+    let fits = peak.is_none_or(|peak| peak < SIXTEEN_K_GIB);
+    let peak = peak.map_or(String::new(), |peak| format!(", {peak:.1} GiB"));
+    Outcome::new(
+        format!("{found:.0} pixels{peak}"),
+        fits && is_last_pixel_lit(&deep) && (found / SHOWN_PX - 1.0).abs() < 1e-4,
+    )
+}
+
+fn is_last_pixel_lit(deep: &DeepImage) -> bool {
+    let last = LARGEST_SIDE_PX as usize - 1;
+    deep.shadow()[(last, last)] == LinearRgb::WHITE
+}
+
+/// A card whose middle is 1100 pixels from the last corner.
+fn sixteen_k_shot() -> Shot {
+    let from_corner = (f64::from(LARGEST_SIDE_PX) / 2.0 - 1100.0) / 10_000.0;
+    let sheet = level_card(1, [from_corner, -from_corner, 0.0], 0.2, grey(1.0));
+    Shot::new(camera_above([LARGEST_SIDE_PX; 2], 10_000.0))
+        .with_ambient(LinearRgb::WHITE)
+        .with_card(sheet)
+}
+
 /// Shots in which nothing can be seen of the card: no sample in any pixel, and a plate that keeps its bits.
 fn nothing_to_see() -> Vec<HardCase> {
-    let gray = || Image::filled(8, 8, grey(0.8));
-    let flat = UnitQuaternion::identity;
-    let shots: Vec<(&str, Card)> = vec![
-        (
-            "card edge-on",
-            card(1, [0.0, 0.0, 0.1], tilted(FRAC_PI_2), [0.2; 2], gray()),
-        ),
-        (
-            "card behind the eye",
-            level(1, [0.0, 0.0, 2.0], 0.3, grey(0.8)),
-        ),
-        (
-            "card without area",
-            card(1, [0.0, 0.0, 0.1], flat(), [0.0, 0.2], gray()),
-        ),
-        (
-            "card of negative size",
-            card(1, [0.0, 0.0, 0.1], flat(), [-0.1, 0.2], gray()),
-        ),
-        (
-            "card without end",
-            card(1, [0.0, 0.0, 0.1], flat(), [f64::INFINITY, 0.2], gray()),
-        ),
-        (
-            "card at no number",
-            card(1, [f64::NAN, 0.0, 0.1], flat(), [0.1, 0.2], gray()),
-        ),
-        (
-            "card without a texel",
-            card(
-                1,
-                [0.0, 0.0, 0.1],
-                flat(),
-                [0.2; 2],
-                Image::<PremulRgba>::new(0, 0),
-            ),
-        ),
-        (
-            "card that is transparent",
-            level(1, [0.0, 0.0, 0.1], 0.2, PremulRgba::TRANSPARENT),
-        ),
-    ];
-    let case = |(name, card): (&str, Card)| {
-        let expectation = "no light, no coverage, in either renderer: exactly 0 px";
-        HardCase::new(name, "alone over a plate", expectation, move || {
-            let shot = Shot::new(above([16, 12], 20.0))
-                .with_card(card.clone())
-                .with_ambient(LinearRgb::WHITE);
-            let seen = |deep: DeepImage| {
-                let pixels = composite::frame(&deep, None).into_vec();
-                pixels
-                    .iter()
-                    .filter(|p| **p != PremulRgba::TRANSPARENT)
-                    .count() as f64
-            };
-            let options = RenderOptions::default();
-            Ok(Outcome::near(
-                seen(render(&shot, &options)) + seen(render_reference(&shot, &options)),
-                0.0,
-                0.0,
-                "px",
-            ))
-        })
-    };
-    shots.into_iter().map(case).collect()
+    let behind = level_card(1, [0.0, 0.0, 2.0], 0.3, grey(0.8));
+    let transparent = level_card(1, [0.0, 0.0, 0.1], 0.2, PremulRgba::TRANSPARENT);
+    vec![
+        invisible("card edge-on", edge_on_card()),
+        invisible("card behind the eye", behind),
+        invisible("card without area", card_of_size([0.0, 0.2])),
+        invisible("card of negative size", card_of_size([-0.1, 0.2])),
+        invisible("infinite card", card_of_size([f64::INFINITY, 0.2])),
+        invisible("card at NaN", card_at_nan()),
+        invisible("card without a texel", card_without_texel()),
+        invisible("card that is transparent", transparent),
+    ]
+}
+
+fn card_of_size(size: [f64; 2]) -> Card {
+    let level = UnitQuaternion::identity();
+    card(1, [0.0, 0.0, 0.1], level, size, texture())
+}
+
+fn edge_on_card() -> Card {
+    card(1, [0.0, 0.0, 0.1], tilted(FRAC_PI_2), [0.2; 2], texture())
+}
+
+fn card_at_nan() -> Card {
+    let level = UnitQuaternion::identity();
+    card(1, [f64::NAN, 0.0, 0.1], level, [0.1, 0.2], texture())
+}
+
+fn card_without_texel() -> Card {
+    Card {
+        texture: Image::<PremulRgba>::new(0, 0).into(),
+        ..card_of_size([0.2; 2])
+    }
+}
+
+fn texture() -> Image<PremulRgba> {
+    Image::filled(8, 8, grey(0.8))
+}
+
+fn invisible(name: &str, card: Card) -> HardCase {
+    let expectation = "no light, no coverage, in either renderer: exactly 0 px";
+    HardCase::new(name, "alone over a plate", expectation, move || {
+        render_invisible(&card)
+    })
+}
+
+fn render_invisible(card: &Card) -> Result<Outcome> {
+    let shot = Shot::new(camera_above([16, 12], 20.0))
+        .with_card(card.clone())
+        .with_ambient(LinearRgb::WHITE);
+    let seen = by_both_renderers(&shot).map(|deep| count_drawn(&deep));
+    Ok(Outcome::none(seen.iter().sum(), "px"))
+}
+
+fn by_both_renderers(shot: &Shot) -> [DeepImage; 2] {
+    let options = RenderOptions::default();
+    [render(shot, &options), render_reference(shot, &options)]
+}
+
+fn count_drawn(deep: &DeepImage) -> usize {
+    let pixels = composite::frame(deep, None).into_vec();
+    let drawn = pixels.iter().filter(|p| **p != PremulRgba::TRANSPARENT);
+    drawn.count()
 }
 
 /// Shots whose middle pixel has a known coverage.
-fn awkward() -> Vec<HardCase> {
-    let base = || Shot::new(above([15, 11], 20.0)).with_light(lamp([0.3, 0.2, 0.9], 0.4, 10.0));
-    let flat = UnitQuaternion::identity;
-    let one = |center: [f64; 3], texture: Image<PremulRgba>| {
-        base().with_card(card(1, center, flat(), [0.4; 2], texture))
-    };
-    let full = || Image::filled(8, 8, grey(0.8));
-    let twice = one([0.0, 0.0, 0.1], full()).with_card(level(2, [0.0, 0.0, 0.1], 0.4, grey(0.5)));
-    let through = card(
-        1,
-        [0.01, 0.0, 1.0],
-        UnitQuaternion::from_euler_angles(0.0, 1.2, 0.0),
-        [0.5; 2],
-        full(),
-    );
-    let from_below = one([0.0, 0.0, 0.1], full()).with_light(lamp([0.0, 0.0, -1.0], 0.4, 10.0));
+fn awkward_cards() -> Vec<HardCase> {
+    let from_below = card_at_height(0.1).with_light(lamp([0.0, 0.0, -1.0], 0.4, 10.0));
+    let twice = card_at_height(0.1).with_card(level_card(2, [0.0, 0.0, 0.1], 0.4, grey(0.5)));
+    let even = [0.8; 2];
+    vec![
+        covering("card under the surface", card_at_height(-0.1), even),
+        covering("card on the surface", card_at_height(0.0), even),
+        covering("two cards in one place", twice, [1.0 - 0.2 * 0.5; 2]),
+        covering("card in the plane of the light", card_at_height(0.9), even),
+        covering("light below the surface", from_below, even),
+        covering("card through the eye", card_through_the_eye(), [0.0, 1.0]),
+    ]
+}
+
+fn card_through_the_eye() -> Shot {
+    let tilt = UnitQuaternion::from_euler_angles(0.0, 1.2, 0.0);
+    lit_shot().with_card(card(1, [0.01, 0.0, 1.0], tilt, [0.5; 2], texture()))
+}
+
+/// The same of textures without a neighbouring texel.
+fn awkward_textures() -> [HardCase; 2] {
     // A lone texel is 0.8 in its middle and half of that at the card's edge, 4.4 pixels away; a pixel's window reaches 1.5.
     let faded = [0.8 * libm::pow(1.0 - 1.5 * 0.5 / 4.4, 2.0), 0.8];
-    vec![
-        covering(
-            "card under the surface",
-            one([0.0, 0.0, -0.1], full()),
-            [0.8; 2],
-        ),
-        covering("card on the surface", one([0.0; 3], full()), [0.8; 2]),
-        covering("two cards in one place", twice, [1.0 - 0.2 * 0.5; 2]),
-        covering(
-            "card in the plane of the light",
-            one([0.0, 0.0, 0.9], full()),
-            [0.8; 2],
-        ),
-        covering("light below the surface", from_below, [0.8; 2]),
-        covering(
-            "texture of one texel",
-            one([0.0, 0.0, 0.1], Image::filled(1, 1, grey(0.8))),
-            faded,
-        ),
-        covering(
-            "texture of one column",
-            one([0.0, 0.0, 0.1], Image::filled(1, 7, grey(0.8))),
-            faded,
-        ),
-        covering(
-            "card through the eye",
-            base().with_card(through),
-            [0.0, 1.0],
-        ),
+    let [texel, column] = [1, 7].map(|height| {
+        let texture = Image::filled(1, height, grey(0.8));
+        lit_shot().with_card(textured_card(0.1, texture))
+    });
+    [
+        covering("texture of one texel", texel, faded),
+        covering("texture of one column", column, faded),
     ]
+}
+
+fn lit_shot() -> Shot {
+    Shot::new(camera_above([15, 11], 20.0)).with_light(lamp([0.3, 0.2, 0.9], 0.4, 10.0))
+}
+
+fn card_at_height(height: f64) -> Shot {
+    lit_shot().with_card(textured_card(height, texture()))
+}
+
+fn textured_card(height: f64, texture: Image<PremulRgba>) -> Card {
+    let level = UnitQuaternion::identity();
+    card(1, [0.0, 0.0, height], level, [0.4; 2], texture)
 }
 
 fn covering(name: &str, shot: Shot, [least, most]: [f64; 2]) -> HardCase {
@@ -488,34 +515,44 @@ fn covering(name: &str, shot: Shot, [least, most]: [f64; 2]) -> HardCase {
     } else {
         format!("{least:.2} to {most}")
     };
-    let promise = format!(
+    let expectation = format!(
         "coverage {coverage} in the middle (to 1e-5), light finite, shadows in 0..1, in either renderer"
     );
-    HardCase::new(name, "under a light of 10 W", promise, move || {
-        let options = RenderOptions::default();
-        let ends = [render(&shot, &options), render_reference(&shot, &options)];
-        let state = if ends.iter().all(is_sound) {
-            "sound"
-        } else {
-            "not sound"
-        };
-        // A sum over nothing is -0.
-        let found = ends.map(|deep| f64::from(deep.flat(7, 5).opacity.g) + 0.0);
-        let right = found
-            .iter()
-            .all(|found| (least - 1e-5..=most + 1e-5).contains(found));
-        Ok(Outcome::new(
-            format!("{:.6} and {:.6}, {state}", found[0], found[1]),
-            state == "sound" && right,
-        ))
+    HardCase::new(name, "under a light of 10 W", expectation, move || {
+        Ok(judge_coverage(&by_both_renderers(&shot), [least, most]))
     })
+}
+
+fn judge_coverage(pictures: &[DeepImage; 2], [least, most]: [f64; 2]) -> Outcome {
+    let is_sound = pictures.iter().all(is_sound);
+    let state = if is_sound { "sound" } else { "not sound" };
+    let found = pictures.each_ref().map(middle_coverage);
+    let expected = least - 1e-5..=most + 1e-5;
+    Outcome::new(
+        format!("{:.6} and {:.6}, {state}", found[0], found[1]),
+        is_sound && found.iter().all(|found| expected.contains(found)),
+    )
+}
+
+fn middle_coverage(deep: &DeepImage) -> f64 {
+    // A sum over nothing is -0.
+    f64::from(deep.flat(7, 5).opacity.g) + 0.0
 }
 
 /// Every pixel's light is finite, its coverage and its shadows lie in 0..1.
 fn is_sound(deep: &DeepImage) -> bool {
-    let share = |v: f32| (0.0..=1.0).contains(&v);
-    let of_light = |s: &LinearRgb| share(s.r) && share(s.g) && share(s.b);
-    let pixels = composite::frame(deep, None).into_vec();
-    pixels.iter().all(|p| p.color().is_finite() && share(p.a))
-        && deep.shadow().pixels().iter().all(of_light)
+    let mut shadows = deep.shadow().pixels().iter().flat_map(|s| [s.r, s.g, s.b]);
+    composite::frame(deep, None)
+        .pixels()
+        .iter()
+        .all(is_pixel_sound)
+        && shadows.all(is_share)
+}
+
+fn is_pixel_sound(p: &PremulRgba) -> bool {
+    p.color().is_finite() && is_share(p.a)
+}
+
+fn is_share(v: f32) -> bool {
+    (0.0..=1.0).contains(&v)
 }

@@ -8,43 +8,43 @@ use petcomp::settle::{SettleVerdict, Settled, heap, octagon, settle, typical_len
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_6};
 
 /// More cards than this take seconds.
-const MANY: usize = 100;
+const MAX_TEST_CARDS: usize = 100;
 
-/// What is promised of the end of a fall.
+/// What is expected of the end of a fall.
 #[derive(Clone, Copy)]
 enum ExpectedEnd {
     /// [`SettleVerdict::Rested`].
     Rests,
-    /// Any other verdict, or an error: the scene or its options cannot be right.
+    /// Any other verdict, or an error: the scene or its options are invalid.
     IsRefused,
-    /// Either; nothing is promised but an end.
-    IsTold,
+    /// Either; nothing is expected but an end.
+    Ends,
 }
 
-/// A fall and what is promised of it.
+/// A fall and what is expected of it.
 struct HardFall {
     name: String,
     scene: Scene,
     options: SettleOptions,
-    promise: ExpectedEnd,
+    expectation: ExpectedEnd,
 }
 
-/// Cards are 200 mm long where nothing else is said.
 pub(super) fn cases() -> Result<Vec<HardCase>> {
     let groups = [
         thicknesses()?,
-        numbers()?,
-        scales()?,
-        masses()?,
+        card_counts()?,
+        box_sizes()?,
+        mass_ratios()?,
         gravities()?,
         arrangements()?,
-        impossible()?,
+        frictionless_and_bouncing()?,
+        impossible_falls()?,
     ];
     let falls = groups.into_iter().flatten().map(HardFall::into_case);
-    Ok(falls.chain([empty(), at_rest()?]).collect())
+    Ok(falls.chain([empty_scene(), scene_at_rest()?]).collect())
 }
 
-fn empty() -> HardCase {
+fn empty_scene() -> HardCase {
     HardCase::new(
         "empty scene",
         "no card",
@@ -52,68 +52,71 @@ fn empty() -> HardCase {
         || {
             let mut scene = heap(0, 1)?;
             scene.objects.clear();
-            Ok(unchanged(
-                &scene,
-                &settle(scene.clone(), &SettleOptions::default())?,
-            ))
+            settle_settled(&scene)
         },
     )
 }
 
-fn at_rest() -> Result<HardCase> {
+fn scene_at_rest() -> Result<HardCase> {
     let scene = settle(heap(0, 5)?, &SettleOptions::default())?.into_scene()?;
     Ok(HardCase::new(
         "everything at rest",
         "5 cards that have come to rest",
         "the scene as it is, after 0 s",
-        move || {
-            Ok(unchanged(
-                &scene,
-                &settle(scene.clone(), &SettleOptions::default())?,
-            ))
-        },
+        move || settle_settled(&scene),
     ))
 }
 
-fn unchanged(scene: &Scene, end: &Settled) -> Outcome {
-    let same = end.scene == *scene;
-    Outcome::new(
-        format!(
-            "{:.2} s, {}",
-            end.seconds,
-            if same { "the same" } else { "another" }
-        ),
-        same && end.seconds == 0.0,
-    )
+fn settle_settled(scene: &Scene) -> Result<Outcome> {
+    let end = settle(scene.clone(), &SettleOptions::default())?;
+    let is_same = end.scene == *scene;
+    let same = if is_same { "the same" } else { "another" };
+    Ok(Outcome::new(
+        format!("{:.2} s, {same}", end.seconds),
+        is_same && end.seconds == 0.0,
+    ))
 }
 
 impl HardFall {
     fn into_case(self) -> HardCase {
         let cards = self.scene.objects.len();
-        let input = if cards == 1 {
-            "1 card".into()
-        } else {
-            format!("{cards} cards")
-        };
+        let input = format!("{cards} card{}", if cards == 1 { "" } else { "s" });
         let Self {
             name,
             scene,
             options,
-            promise,
+            expectation,
         } = self;
-        let case = HardCase::new(name, input, promise.told(&options), move || {
-            Ok(promise.outcome(&scene, &options))
+        let case = HardCase::new(name, input, expectation.description(&options), move || {
+            Ok(expectation.outcome(&scene, &options))
         });
-        if cards > MANY {
+        if cards > MAX_TEST_CARDS {
             case.for_the_report()
         } else {
             case
         }
     }
+
+    /// The same, of which only an end is expected.
+    fn that_ends(self) -> Self {
+        Self {
+            expectation: ExpectedEnd::Ends,
+            ..self
+        }
+    }
+
+    /// The same, with other options, to be refused.
+    fn that_is_refused(self, options: SettleOptions) -> Self {
+        Self {
+            expectation: ExpectedEnd::IsRefused,
+            options,
+            ..self
+        }
+    }
 }
 
 impl ExpectedEnd {
-    fn told(self, options: &SettleOptions) -> String {
+    fn description(self, options: &SettleOptions) -> String {
         let [overlap, rise] =
             [options.max_overlap, options.max_energy_rise].map(|share| share * 100.0);
         match self {
@@ -121,86 +124,88 @@ impl ExpectedEnd {
                 "rests; overlap at most {overlap} % of a card, energy rise at most {rise} %"
             ),
             Self::IsRefused => "refused: it cannot be right".into(),
-            Self::IsTold => "an end in time, told for what it is".into(),
+            Self::Ends => "an end in time, reported as what it is".into(),
         }
     }
 
     fn outcome(self, scene: &Scene, options: &SettleOptions) -> Outcome {
-        let end = match (settle(scene.clone(), options), self) {
-            (Ok(end), _) => end,
-            (Err(error), promise) => {
-                return Outcome::new(error, matches!(promise, Self::IsRefused));
+        match settle(scene.clone(), options) {
+            Ok(end) => {
+                let passed = self.is_met(&end.verdict);
+                Outcome::new(end_in_words(&end, typical_length(scene)), passed)
             }
-        };
-        let rested = end.verdict == SettleVerdict::Rested;
-        let passed = match self {
+            Err(error) => Outcome::new(error, matches!(self, Self::IsRefused)),
+        }
+    }
+
+    fn is_met(self, verdict: &SettleVerdict) -> bool {
+        let rested = *verdict == SettleVerdict::Rested;
+        match self {
             Self::Rests => rested,
             Self::IsRefused => !rested,
-            Self::IsTold => true,
-        };
-        Outcome::new(told(&end, typical_length(scene)), passed)
+            Self::Ends => true,
+        }
     }
 }
 
 /// The end of a fall in words and numbers; `typical` is the length of a card, metres.
-fn told(end: &Settled, typical: f64) -> String {
-    let verdict = match &end.verdict {
+fn end_in_words(end: &Settled, typical: f64) -> String {
+    let verdict = verdict_in_words(&end.verdict);
+    let [overlap, rise] = [end.overlap / typical, end.energy_rise].map(|share| share * 100.0);
+    let attempt = end.rejected.len() + 1;
+    let seconds = end.seconds;
+    format!(
+        "{verdict} after {seconds:.2} s at attempt {attempt}; overlap {overlap:.4} %, energy rise {rise:.4} %"
+    )
+}
+
+fn verdict_in_words(verdict: &SettleVerdict) -> String {
+    match verdict {
         SettleVerdict::Rested => "rests".into(),
         SettleVerdict::TimedOut => "still moves".into(),
         SettleVerdict::Escaped(ids) => format!("{} escaped", ids.len()),
         SettleVerdict::Penetrating(_) => "sinks in".into(),
         SettleVerdict::Exploded(_) => "gains energy".into(),
-        SettleVerdict::Hanging(ids) => format!("{} hang in the air", ids.len()),
-    };
-    let [overlap, rise] = [end.overlap / typical, end.energy_rise].map(|share| share * 100.0);
-    let tries = end.rejected.len() + 1;
-    format!(
-        "{verdict} after {:.2} s at try {tries}; overlap {overlap:.4} %, energy rise {rise:.4} %",
-        end.seconds
-    )
+        SettleVerdict::Hanging(ids) => format!("{} float", ids.len()),
+    }
 }
 
-fn extreme(name: impl Into<String>, scene: Scene) -> HardFall {
+fn resting_fall(name: impl Into<String>, scene: Scene) -> HardFall {
     HardFall {
         name: name.into(),
         scene,
         options: SettleOptions::default(),
-        promise: ExpectedEnd::Rests,
+        expectation: ExpectedEnd::Rests,
     }
 }
 
 fn thicknesses() -> Result<Vec<HardFall>> {
-    let of = |mm: f64| {
-        let scene = changed(heap(1, 12)?, mm / 1e3, |_, object| {
-            object.thickness = mm / 1e3
-        });
-        Ok(extreme(format!("{mm} mm thick"), scene))
-    };
-    [0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0]
-        .into_iter()
-        .map(of)
-        .collect()
+    let all = [0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0];
+    all.into_iter().map(heap_of_thickness).collect()
 }
 
-fn numbers() -> Result<Vec<HardFall>> {
-    let of = |n: usize| {
-        let usual = extreme(format!("{n} in a heap"), heap(2, n)?);
-        // A try of many takes ten seconds.
-        let attempts = if n > MANY { 1 } else { usual.options.attempts };
-        Ok(HardFall {
-            options: SettleOptions {
-                attempts,
-                ..usual.options
-            },
-            ..usual
-        })
-    };
-    [1, 20, 60, 300].into_iter().map(of).collect()
+fn heap_of_thickness(mm: f64) -> Result<HardFall> {
+    let scene = changed(heap(1, 12)?, mm / 1e3, |_, object| {
+        object.thickness = mm / 1e3
+    });
+    Ok(resting_fall(format!("{mm} mm thick"), scene))
 }
 
-fn scales() -> Result<Vec<HardFall>> {
-    // Of a box 0.6 m long.
-    let of = |(name, by): (&str, f64)| Ok(extreme(name, scaled(heap(3, 12)?, by)));
+fn card_counts() -> Result<Vec<HardFall>> {
+    [1, 20, 60, 300].into_iter().map(heap_of_cards).collect()
+}
+
+fn heap_of_cards(n: usize) -> Result<HardFall> {
+    let mut fall = resting_fall(format!("{n} in a heap"), heap(2, n)?);
+    if n > MAX_TEST_CARDS {
+        // An attempt of many takes ten seconds.
+        fall.options.attempts = 1;
+    }
+    Ok(fall)
+}
+
+/// Of a box 0.6 m long.
+fn box_sizes() -> Result<Vec<HardFall>> {
     [
         ("box of 0.06 mm", 1e-4),
         ("box of 1 cm", 1.0 / 60.0),
@@ -208,153 +213,142 @@ fn scales() -> Result<Vec<HardFall>> {
         ("box of 6 km", 1e4),
     ]
     .into_iter()
-    .map(of)
+    .map(|(name, by)| Ok(resting_fall(name, scaled(heap(3, 12)?, by))))
     .collect()
 }
 
-fn masses() -> Result<Vec<HardFall>> {
-    let of = |ratio: f64| {
-        let weigh = |i: usize, object: &mut Object| {
-            object.mass = if i.is_multiple_of(2) {
-                0.03
-            } else {
-                0.03 * ratio
-            }
-        };
-        Ok(extreme(
-            format!("masses 1 : {ratio}"),
-            changed(heap(4, 20)?, 0.0, weigh),
-        ))
-    };
-    [10.0, 1e3, 1e6].into_iter().map(of).collect()
+fn mass_ratios() -> Result<Vec<HardFall>> {
+    [10.0, 1e3, 1e6]
+        .into_iter()
+        .map(heap_of_mass_ratio)
+        .collect()
+}
+
+/// Every other card is heavier.
+fn heap_of_mass_ratio(ratio: f64) -> Result<HardFall> {
+    let scene = changed(heap(4, 20)?, 0.0, |i, object| {
+        object.mass = 0.03 * if i.is_multiple_of(2) { 1.0 } else { ratio }
+    });
+    Ok(resting_fall(format!("masses 1 : {ratio}"), scene))
 }
 
 fn gravities() -> Result<Vec<HardFall>> {
-    let with = |name: String, g: [f64; 3]| -> Result<HardFall> {
-        let options = SettleOptions {
-            gravity: g.map(|x| 9.81 * x),
-            ..SettleOptions::default()
-        };
-        Ok(HardFall {
-            options,
-            ..extreme(name, heap(3, 12)?)
-        })
-    };
     let mut all = Vec::new();
     for factor in [0.1, 1.0, 10.0, 100.0] {
-        all.push(with(
-            format!("gravity times {factor}"),
-            [0.0, 0.0, -factor],
-        )?);
+        let name = format!("gravity times {factor}");
+        all.push(heap_under_gravity(name, [0.0, 0.0, -factor])?);
     }
     let tilted = [libm::sin(FRAC_PI_6), 0.0, -libm::cos(FRAC_PI_6)];
-    all.push(with("box tilted by 30 degrees".into(), tilted)?);
+    all.push(heap_under_gravity(
+        "box tilted by 30 degrees".into(),
+        tilted,
+    )?);
     Ok(all)
 }
 
+/// Gravity in multiples of that of the Earth.
+fn heap_under_gravity(name: String, gravity: [f64; 3]) -> Result<HardFall> {
+    let mut fall = resting_fall(name, heap(3, 12)?);
+    fall.options.gravity = gravity.map(|x| 9.81 * x);
+    Ok(fall)
+}
+
 fn arrangements() -> Result<Vec<HardFall>> {
-    let aligned = |i: usize, object: &mut Object| {
-        (object.size, object.thickness, object.mass) = ([0.2, 0.08], 0.005, 0.03);
-        let (above, height) = ([0.0; 2], 0.01 * (i + 1) as f64);
-        object.placement = Placement::Drop {
-            above,
-            height,
-            rotation: UnitQuaternion::identity(),
-        };
-    };
-    let on_edge = |i: usize, object: &mut Object| {
-        let Placement::Drop { rotation, .. } = &mut object.placement else {
-            return;
-        };
-        let yaw = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), i as f64);
-        *rotation = yaw * UnitQuaternion::from_axis_angle(&Vector3::x_axis(), FRAC_PI_2);
-    };
-    let as_long = |i: usize, object: &mut Object| {
-        aligned(i, object);
-        object.size[0] = if i == 0 { 0.58 } else { 0.2 };
-    };
-    let mut slippery = heap(6, 20)?;
-    slippery.surface.friction = 0.0;
-    let mut bouncing = heap(6, 20)?;
-    bouncing.surface.restitution = 1.0;
-    let short = SettleOptions {
-        time_limit: 10.0,
-        attempts: 2,
-        ..SettleOptions::default()
-    };
-    let told = |name: &str, scene| HardFall {
-        promise: ExpectedEnd::IsTold,
-        options: short,
-        ..extreme(name, scene)
-    };
+    let aligned = changed(heap(0, 20)?, 0.0, align);
+    let on_edge = changed(heap(5, 12)?, 0.1, set_on_edge);
+    let long = changed(heap(0, 2)?, 0.0, align_long);
+    let octagons = changed(heap(7, 20)?, 0.0, |_, object| {
+        object.outline = octagon(object.size)
+    });
     Ok(vec![
-        extreme(
-            "equal and exactly aligned",
-            changed(heap(0, 20)?, 0.0, aligned),
-        ),
-        extreme("on edge", changed(heap(5, 12)?, 0.1, on_edge)),
-        extreme(
-            "nearly as long as the box",
-            changed(heap(0, 2)?, 0.0, as_long),
-        ),
-        extreme(
-            "octagons",
-            changed(heap(7, 20)?, 0.0, |_, object| {
-                object.outline = octagon(object.size)
-            }),
-        ),
-        told("no friction", slippery),
-        told("all speed given back", bouncing),
+        resting_fall("equal and exactly aligned", aligned),
+        resting_fall("on edge", on_edge),
+        resting_fall("nearly as long as the box", long),
+        resting_fall("octagons", octagons),
     ])
 }
 
-fn impossible() -> Result<Vec<HardFall>> {
-    let refused = |name: &str, scene, options| HardFall {
-        promise: ExpectedEnd::IsRefused,
-        options,
-        ..extreme(name, scene)
+/// Equal cards, one exactly above another.
+fn align(i: usize, object: &mut Object) {
+    (object.size, object.thickness, object.mass) = ([0.2, 0.08], 0.005, 0.03);
+    object.placement = Placement::Drop {
+        above: [0.0; 2],
+        height: 0.01 * (i + 1) as f64,
+        rotation: UnitQuaternion::identity(),
     };
-    let usual = SettleOptions {
+}
+
+/// Aligned cards, the first of them as long as the box.
+fn align_long(i: usize, object: &mut Object) {
+    align(i, object);
+    object.size[0] = if i == 0 { 0.58 } else { 0.2 };
+}
+
+fn set_on_edge(i: usize, object: &mut Object) {
+    if let Placement::Drop { rotation, .. } = &mut object.placement {
+        let yaw = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), i as f64);
+        *rotation = yaw * UnitQuaternion::from_axis_angle(&Vector3::x_axis(), FRAC_PI_2);
+    }
+}
+
+fn frictionless_and_bouncing() -> Result<Vec<HardFall>> {
+    let mut slippery = resting_fall("no friction", heap(6, 20)?);
+    slippery.scene.surface.friction = 0.0;
+    let mut bouncing = resting_fall("no speed lost in a bounce", heap(6, 20)?);
+    bouncing.scene.surface.restitution = 1.0;
+    Ok([slippery, bouncing].map(shortened).into())
+}
+
+/// The same with fewer attempts; only an end is expected.
+fn shortened(mut fall: HardFall) -> HardFall {
+    (fall.options.time_limit, fall.options.attempts) = (10.0, 2);
+    fall.that_ends()
+}
+
+fn impossible_falls() -> Result<Vec<HardFall>> {
+    let larger = changed(heap(6, 3)?, 0.3, |_, object| object.size = [0.9, 0.7]);
+    let in_one_place = changed(heap(6, 12)?, 0.0, drop_in_one_place);
+    let mut longer_steps = resting_fall("steps twice as long", heap(6, 20)?).that_ends();
+    longer_steps.options = with_step_times(2.0);
+    let longest_steps = resting_fall("steps 4 times too long", heap(6, 20)?);
+    Ok(vec![
+        resting_fall("larger than the box", larger).that_is_refused(with_step_times(1.0)),
+        resting_fall("started in one place", in_one_place).that_ends(),
+        longer_steps,
+        longest_steps.that_is_refused(with_step_times(4.0)),
+    ])
+}
+
+fn drop_in_one_place(_: usize, object: &mut Object) {
+    if let Placement::Drop { above, height, .. } = &mut object.placement {
+        (*above, *height) = ([0.0; 2], 0.1);
+    }
+}
+
+fn with_step_times(factor: f64) -> SettleOptions {
+    let mut options = SettleOptions {
         attempts: 2,
         ..SettleOptions::default()
     };
-    let longer = |times: f64| SettleOptions {
-        step: usual.step * times,
-        ..usual
-    };
-    let larger = changed(heap(6, 3)?, 0.3, |_, object| object.size = [0.9, 0.7]);
-    let in_one_place = changed(heap(6, 12)?, 0.0, |_, object| {
-        let Placement::Drop { above, height, .. } = &mut object.placement else {
-            return;
-        };
-        (*above, *height) = ([0.0; 2], 0.1);
-    });
-    Ok(vec![
-        refused("larger than the box", larger, usual),
-        HardFall {
-            promise: ExpectedEnd::IsTold,
-            ..extreme("started in one place", in_one_place)
-        },
-        HardFall {
-            promise: ExpectedEnd::IsTold,
-            ..refused("steps twice as long", heap(6, 20)?, longer(2.0))
-        },
-        refused("steps 4 times too long", heap(6, 20)?, longer(4.0)),
-    ])
+    options.step *= factor;
+    options
 }
 
 /// The same cards, `by` times as large, with everything around them.
 fn scaled(mut scene: Scene, by: f64) -> Scene {
     scene.surface.size = scene.surface.size.map(|x| x * by);
     for object in &mut scene.objects {
-        object.size = object.size.map(|x| x * by);
-        object.thickness *= by;
-        let Placement::Drop { above, height, .. } = &mut object.placement else {
-            continue;
-        };
-        (*above, *height) = (above.map(|x| x * by), *height * by);
+        enlarge(object, by);
     }
     scene
+}
+
+fn enlarge(object: &mut Object, by: f64) {
+    object.size = object.size.map(|x| x * by);
+    object.thickness *= by;
+    if let Placement::Drop { above, height, .. } = &mut object.placement {
+        (*above, *height) = (above.map(|x| x * by), *height * by);
+    }
 }
 
 /// Each object changed; heights grow with `gap` so that thicker bodies still start apart.

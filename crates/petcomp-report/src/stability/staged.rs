@@ -1,43 +1,57 @@
 //! Shots that cases are made of: a camera straight above, level cards, small lights.
 
-use petcomp::Image;
 use petcomp::asset::Texture;
 use petcomp::camera::Camera;
 use petcomp::geom::{Point2, Point3, Pose, Quad, UnitQuaternion, Vector2, Vector3};
+use petcomp::render::{RenderOptions, render};
 use petcomp::scene::{
     AreaLight, CameraSource, Card, Exposure, Grade, LightShape, Scene, Shot, Surface,
 };
+use petcomp::{DeepImage, DeepSample, Image};
+use petcomp::{Error, Result};
 use petcomp::{LinearRgb, ObjectId, PremulRgba};
 use std::f64::consts::PI;
 use std::sync::Arc;
+use tempfile::TempDir;
 
 /// The outline of a whole card in texture coordinates.
 const WHOLE: [[f64; 2]; 4] = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
 
 /// A camera at height 1 over the origin, looking straight down; picture up is world `+y`.
-pub(super) fn above(image: [u32; 2], focal_px: f64) -> Camera {
-    let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI);
+pub(super) fn camera_above(image: [u32; 2], focal_px: f64) -> Camera {
     Camera {
         image,
         focal_px: Vector2::repeat(focal_px),
         principal_px: Point2::from(image.map(|side| 0.5 * f64::from(side))),
-        camera_from_world: Pose::from_parts(Vector3::new(0.0, 0.0, 1.0).into(), down),
+        camera_from_world: looking_down(),
     }
 }
 
-/// A camera at `eye` whose middle sees `target`.
-pub(super) fn looking_at(
+fn looking_down() -> Pose {
+    let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI);
+    Pose::from_parts(Vector3::new(0.0, 0.0, 1.0).into(), down)
+}
+
+/// A camera at `eye` whose image centre sees `target`.
+pub(super) fn camera_looking_at(
     eye: [f64; 3],
     target: [f64; 3],
     image: [u32; 2],
     focal_px: f64,
 ) -> Camera {
-    let world_from_camera =
-        Pose::face_towards(&Point3::from(eye), &Point3::from(target), &-Vector3::z());
     Camera {
-        camera_from_world: world_from_camera.inverse(),
-        ..above(image, focal_px)
+        camera_from_world: pose_facing(eye.into(), target.into()).inverse(),
+        ..camera_above(image, focal_px)
     }
+}
+
+fn pose_facing(eye: Point3<f64>, target: Point3<f64>) -> Pose {
+    Pose::face_towards(&eye, &target, &-Vector3::z())
+}
+
+/// A folder that is removed when it is dropped.
+pub(super) fn temporary_folder() -> Result<TempDir> {
+    tempfile::tempdir().map_err(|e| Error::file(std::env::temp_dir(), e))
 }
 
 /// A card with one texture on both sides.
@@ -57,20 +71,15 @@ pub(super) fn card(
         },
         texture: texture.into(),
         back: None,
-        outline_uv: WHOLE.iter().map(|&uv| uv.into()).collect::<Arc<[_]>>(),
+        outline_uv: Arc::new(WHOLE.map(Point2::from)),
         grade: Grade::default(),
     }
 }
 
 /// A level square card of one texel value, with so many texels that the fade of the outermost half is small.
-pub(super) fn level(id: u32, center: [f64; 3], size: f64, texel: PremulRgba) -> Card {
-    card(
-        id,
-        center,
-        UnitQuaternion::identity(),
-        [size; 2],
-        Image::filled(64, 64, texel),
-    )
+pub(super) fn level_card(id: u32, center: [f64; 3], size: f64, texel: PremulRgba) -> Card {
+    let texture = Image::filled(64, 64, texel);
+    card(id, center, UnitQuaternion::identity(), [size; 2], texture)
 }
 
 /// Turned about the world's `+y`.
@@ -85,24 +94,36 @@ pub(super) fn grey(alpha: f32) -> PremulRgba {
 
 /// A square light of this side at `position`, turned to the origin.
 pub(super) fn lamp(position: [f64; 3], side: f64, power: f64) -> AreaLight {
-    let (target, color) = ([0.0; 3], LinearRgb::WHITE);
     AreaLight {
         shape: LightShape::Rectangle,
         position,
-        target,
+        target: [0.0; 3],
         size: [side; 2],
         power,
-        color,
+        color: LinearRgb::WHITE,
     }
 }
 
+/// A picture of `size` in which pixel (3, 2) alone has samples, front to back.
+pub(super) fn one_deep_pixel([w, h]: [u32; 2], samples: &[DeepSample]) -> DeepImage {
+    let (w, h) = (w as usize, h as usize);
+    let mut pixels = vec![Vec::new(); w * h];
+    pixels[2 * w + 3] = samples.to_vec();
+    DeepImage::from_pixels(Image::filled(w, h, LinearRgb::WHITE), pixels)
+}
+
+/// The picture of a shot with the default options.
+pub(super) fn rendered(shot: &Shot) -> DeepImage {
+    render(shot, &RenderOptions::default())
+}
+
 /// A shot from above, 5 x 5 pixels of a centimetre.
-pub(super) fn small() -> Shot {
-    Shot::new(above([5, 5], 100.0))
+pub(super) fn small_shot() -> Shot {
+    Shot::new(camera_above([5, 5], 100.0))
 }
 
 /// A scene of nothing on a surface that fills the picture.
-pub(super) fn scene(camera: Camera) -> Scene {
+pub(super) fn empty_scene(camera: Camera) -> Scene {
     Scene {
         image: camera.image,
         plate: "plate".into(),
@@ -120,21 +141,20 @@ pub(super) fn scene(camera: Camera) -> Scene {
     }
 }
 
-/// The part of a card's square that a camera sees, pixels: the area of its projected corners.
+/// The area of a card's square as a camera sees it, pixels: that of its projected corners.
 pub(super) fn projected_area(card: &Card, camera: &Camera) -> f64 {
-    let corners: Vec<_> = card
-        .quad
-        .corners()
+    let corners = card.quad.corners();
+    let seen: Vec<_> = corners
         .iter()
-        .filter_map(|&corner| camera.project(corner))
+        .filter_map(|&corner| Some(camera.project(corner)?.0))
         .collect();
+    polygon_area(&seen)
+}
+
+fn polygon_area(corners: &[Point2<f64>]) -> f64 {
     let next = corners.iter().cycle().skip(1);
-    0.5 * corners
-        .iter()
-        .zip(next)
-        .map(|((a, _), (b, _))| a.x * b.y - b.x * a.y)
-        .sum::<f64>()
-        .abs()
+    let products = corners.iter().zip(next).map(|(a, b)| a.x * b.y - b.x * a.y);
+    0.5 * products.sum::<f64>().abs()
 }
 
 #[cfg(test)]
@@ -144,8 +164,8 @@ mod tests {
     #[test]
     fn a_level_card_covers_its_size_over_its_distance() {
         let area = projected_area(
-            &level(1, [0.0, 0.0, 0.1], 0.2, grey(1.0)),
-            &above([96, 96], 400.0),
+            &level_card(1, [0.0, 0.0, 0.1], 0.2, grey(1.0)),
+            &camera_above([96, 96], 400.0),
         );
         assert!(
             (area - (0.2 * 400.0 / 0.9) * (0.2 * 400.0 / 0.9)).abs() < 1e-9,
@@ -155,7 +175,7 @@ mod tests {
 
     #[test]
     fn the_middle_of_a_picture_sees_the_target() {
-        let camera = looking_at([0.3, -0.2, 0.8], [0.1, 0.0, 0.0], [40, 30], 50.0);
+        let camera = camera_looking_at([0.3, -0.2, 0.8], [0.1, 0.0, 0.0], [40, 30], 50.0);
         let seen = camera.project(Point3::new(0.1, 0.0, 0.0)).map(|(px, _)| px);
         assert!(
             seen.is_some_and(|px| (px - Point2::new(20.0, 15.0)).norm() < 1e-9),

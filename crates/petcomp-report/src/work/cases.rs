@@ -32,7 +32,7 @@ pub(super) enum Asked {
     Dataset,
 }
 
-/// What parts of a scene take.
+/// The work that parts of a scene take.
 const CARDS: &[Kind] = &[TextureSamples, Bakes];
 const LAMP: &[Kind] = &[LightSamples];
 const LIT: &[Kind] = &[ShadowRays, ShadedSamples, ShadowedPixels];
@@ -40,67 +40,114 @@ const THROUGH: &[Kind] = &[Transmittances];
 const PICTURE: &[Kind] = &[Encodes];
 const LABELS: &[Kind] = &[LabelSamples, Masks];
 
-/// What every scene pays for, or may: what it is read from and written to, and levels of detail where cards are small.
-const FREE: [Kind; 5] = [BytesWritten, FilesRead, BytesRead, Levels, LargeAllocations];
+/// Work that every scene may take: what it is read from and written to, and levels of detail where cards are small.
+const ALWAYS_ALLOWED: [Kind; 5] = [BytesWritten, FilesRead, BytesRead, Levels, LargeAllocations];
 
 impl WorkCase {
-    /// Work that the scene must not make: all that is not told to be used.
+    /// Work that the scene must not take: all that is not listed as used.
     pub(super) fn absent(&self) -> Vec<Kind> {
         Kind::ALL
             .into_iter()
-            .filter(|kind| !FREE.contains(kind) && !self.used.contains(kind))
+            .filter(|kind| !ALWAYS_ALLOWED.contains(kind) && !self.used.contains(kind))
             .collect()
     }
 }
 
 /// Every scene.
 pub(super) fn cases(world: &FixtureFolder) -> Vec<WorkCase> {
-    let usual = || world.scene();
-    let with_map = |strength| Scene {
-        environment: Some(world.environment(strength)),
-        ..usual()
-    };
-    let lit: &[&[Kind]] = &[CARDS, LAMP, LIT, THROUGH, PICTURE];
-    let case = |name, about, scene, asked, used: &[&[Kind]]| WorkCase {
+    let mut cases = sparse_scenes(world);
+    cases.extend(lit_scenes(world));
+    cases.extend(scenes_by_texture(world));
+    cases.extend(scenes_with_additions(world));
+    cases.extend(other_results(world));
+    cases
+}
+
+/// Work of a picture of see-through cards under a lamp.
+const LIT_PICTURE: &[&[Kind]] = &[CARDS, LAMP, LIT, THROUGH, PICTURE];
+
+fn picture(name: &'static str, about: &'static str, scene: Scene, used: &[&[Kind]]) -> WorkCase {
+    WorkCase {
         name,
         about,
         scene,
-        asked,
+        asked: Asked::Picture,
         used: used.concat(),
-    };
-    let picture =
-        |name, about, scene, used: &[&[Kind]]| case(name, about, scene, Asked::Picture, used);
-    let finish = PostProcess {
-        noise: Noise::Known {
-            shot: 1e-3,
-            read: 1e-3,
-        },
-        sharpening: 0.5,
-        ..PostProcess::default()
-    };
-    let unlit = |scene| Scene {
+    }
+}
+
+/// A picture that takes the work of lit cards and some more.
+fn lit_picture(name: &'static str, about: &'static str, scene: Scene, extra: &[Kind]) -> WorkCase {
+    picture(name, about, scene, &[&LIT_PICTURE.concat(), extra])
+}
+
+fn without_lamp(scene: Scene) -> Scene {
+    Scene {
         lights: vec![],
+        ..scene
+    }
+}
+
+fn without_sky(scene: Scene) -> Scene {
+    Scene {
         ambient: LinearRgb::BLACK,
         ..scene
-    };
-    let empty = Scene {
+    }
+}
+
+fn unlit(scene: Scene) -> Scene {
+    without_sky(without_lamp(scene))
+}
+
+fn without_cards(scene: Scene) -> Scene {
+    Scene {
         objects: vec![],
-        ..usual()
+        ..scene
+    }
+}
+
+fn without_plate(scene: Scene) -> Scene {
+    Scene {
+        plate: "".into(),
+        ..scene
+    }
+}
+
+fn finished(scene: Scene) -> Scene {
+    let noise = Noise::Known {
+        shot: 1e-3,
+        read: 1e-3,
     };
+    Scene {
+        finish: PostProcess {
+            noise,
+            sharpening: 0.5,
+            ..PostProcess::default()
+        },
+        ..scene
+    }
+}
+
+fn with_map(world: &FixtureFolder, strength: f64) -> Scene {
+    Scene {
+        environment: Some(world.environment(strength)),
+        ..world.scene()
+    }
+}
+
+fn sparse_scenes(world: &FixtureFolder) -> Vec<WorkCase> {
+    let empty = without_cards(world.scene());
     vec![
-        picture(
+        lit_picture(
             "usual",
             "3 see-through cards at rest, a lamp, an even sky: their picture",
-            usual(),
-            lit,
+            world.scene(),
+            &[],
         ),
         picture(
             "nothing",
             "no cards, no light, no plate",
-            unlit(Scene {
-                plate: "".into(),
-                ..empty.clone()
-            }),
+            unlit(without_plate(empty.clone())),
             &[PICTURE],
         ),
         picture(
@@ -109,74 +156,79 @@ pub(super) fn cases(world: &FixtureFolder) -> Vec<WorkCase> {
             empty,
             &[PICTURE],
         ),
-        picture("dark", "cards, no light", unlit(usual()), &[CARDS, PICTURE]),
+    ]
+}
+
+fn lit_scenes(world: &FixtureFolder) -> Vec<WorkCase> {
+    let dark = unlit(world.scene());
+    let under_sky = without_lamp(world.scene());
+    let under_lamp = without_sky(world.scene());
+    vec![
+        picture("dark", "cards, no light", dark, &[CARDS, PICTURE]),
         picture(
             "sky alone",
             "no lamp",
-            Scene {
-                lights: vec![],
-                ..usual()
-            },
+            under_sky,
             &[CARDS, LIT, THROUGH, PICTURE],
         ),
-        picture(
-            "lamp alone",
-            "no sky",
-            Scene {
-                ambient: LinearRgb::BLACK,
-                ..usual()
-            },
-            lit,
-        ),
+        lit_picture("lamp alone", "no sky", under_lamp, &[]),
+    ]
+}
+
+fn scenes_by_texture(world: &FixtureFolder) -> Vec<WorkCase> {
+    let [opaque, film] = [OPAQUE, FILM].map(|asset| made_of(asset, world.scene()));
+    vec![
         picture(
             "opaque",
             "cards with alpha 1 all over",
-            made_of(OPAQUE, usual()),
+            opaque,
             &[CARDS, LAMP, LIT, &[OpaqueEdges], PICTURE],
         ),
-        picture(
+        lit_picture(
             "film",
             "cards that pass each channel differently",
-            made_of(FILM, usual()),
-            &[&lit.concat(), &[FilmSamples]],
-        ),
-        picture(
-            "map",
-            "an environment map on top",
-            with_map(1.0),
-            &[&lit.concat(), &[MapPieces]],
-        ),
-        picture(
-            "dim map",
-            "an environment map of strength 0 on top",
-            with_map(0.0),
-            lit,
-        ),
-        picture(
-            "falling",
-            "the same cards, dropped",
-            dropped(usual()),
-            &[&lit.concat(), &[PhysicsWorlds, PhysicsSteps]],
-        ),
-        picture(
-            "finished",
-            "noise and sharpening",
-            Scene { finish, ..usual() },
-            &[&lit.concat(), &[Filters, NoisyPixels]],
-        ),
-        case(
-            "labels",
-            "labels of the usual scene, no picture",
-            usual(),
-            Asked::Labels,
-            &[CARDS, LABELS],
-        ),
-        case(
-            "dataset",
-            "picture and labels, as a dataset",
-            usual(),
-            Asked::Dataset,
-            &[&lit.concat(), LABELS],
+            film,
+            &[FilmSamples],
         ),
     ]
+}
+
+fn scenes_with_additions(world: &FixtureFolder) -> Vec<WorkCase> {
+    let (falling, finished) = (dropped(world.scene()), finished(world.scene()));
+    let [map, dim_map] = [1.0, 0.0].map(|strength| with_map(world, strength));
+    let about_dim = "an environment map of strength 0 on top";
+    vec![
+        lit_picture("map", "an environment map on top", map, &[MapPieces]),
+        lit_picture("dim map", about_dim, dim_map, &[]),
+        lit_picture(
+            "falling",
+            "the same cards, dropped",
+            falling,
+            &[PhysicsWorlds, PhysicsSteps],
+        ),
+        lit_picture(
+            "finished",
+            "noise and sharpening",
+            finished,
+            &[Filters, NoisyPixels],
+        ),
+    ]
+}
+
+fn other_results(world: &FixtureFolder) -> [WorkCase; 2] {
+    let labels = WorkCase {
+        name: "labels",
+        about: "labels of the usual scene, no picture",
+        scene: world.scene(),
+        asked: Asked::Labels,
+        used: [CARDS, LABELS].concat(),
+    };
+    let dataset = WorkCase {
+        name: "dataset",
+        about: "picture and labels, as a dataset",
+        asked: Asked::Dataset,
+        used: [&LIT_PICTURE.concat(), LABELS].concat(),
+        ..labels.clone()
+    };
+    [labels, dataset]
 }

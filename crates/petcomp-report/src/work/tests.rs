@@ -1,4 +1,4 @@
-//! What is promised of work: zeros where a thing is absent, more than zero where it is there, and idle switches.
+//! What must hold of work: zero where a feature is absent, more than zero where it is present, and switches that are off.
 
 use super::world::dropped;
 use super::*;
@@ -12,7 +12,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 #[test]
 fn scenes_pay_for_what_they_use_and_for_nothing_else() {
-    let world = FixtureFolder::make().unwrap();
+    let world = FixtureFolder::new().unwrap();
     for case in cases(&world) {
         let work = work_of(&world, &case).unwrap();
         let paid: Vec<_> = case
@@ -24,7 +24,7 @@ fn scenes_pay_for_what_they_use_and_for_nothing_else() {
         let idle: Vec<_> = case.used.iter().filter(|kind| work[**kind] == 0).collect();
         assert!(
             idle.is_empty(),
-            "{}: no {idle:?}, so that a zero elsewhere says nothing",
+            "{}: no {idle:?}, so that a zero elsewhere means nothing",
             case.name
         );
     }
@@ -32,7 +32,7 @@ fn scenes_pay_for_what_they_use_and_for_nothing_else() {
 
 #[test]
 fn work_is_the_same_at_any_thread_count_and_beside_other_scenes() {
-    let world = FixtureFolder::make().unwrap();
+    let world = FixtureFolder::new().unwrap();
     let all = || {
         cases(&world)
             .iter()
@@ -47,15 +47,15 @@ fn work_is_the_same_at_any_thread_count_and_beside_other_scenes() {
 
 #[test]
 fn a_scene_reads_the_files_that_it_names_and_no_others() {
-    let world = FixtureFolder::make().unwrap();
+    let world = FixtureFolder::new().unwrap();
     let cases = cases(&world);
     let read = |name: &str| {
         let case = cases.iter().find(|case| case.name == name).unwrap();
         work_of(&world, case).unwrap()[FilesRead]
     };
-    // Manifest, label, cut-out, photo.
+    // Manifest, label, cut-out, photo; without a photo no label either.
     assert_eq!(read("usual"), 4);
-    assert_eq!((read("plate alone"), read("nothing")), (3, 2));
+    assert_eq!((read("plate alone"), read("nothing")), (3, 1));
     assert_eq!((read("labels"), read("map"), read("dim map")), (3, 5, 4));
 }
 
@@ -77,7 +77,7 @@ fn made(world: &FixtureFolder, config: &DatasetConfig, scene: &Scene) -> (Vec<u8
 
 #[test]
 fn idle_switches_leave_every_byte_and_cost_nothing() {
-    let world = FixtureFolder::make().unwrap();
+    let world = FixtureFolder::new().unwrap();
     let (config, scene) = (world.config(), world.scene());
     let usual = made(&world, &config, &scene);
     let out = AreaLight {
@@ -152,7 +152,7 @@ fn idle_switches_leave_every_byte_and_cost_nothing() {
 
 #[test]
 fn quality_where_it_does_not_apply_changes_nothing() {
-    let world = FixtureFolder::make().unwrap();
+    let world = FixtureFolder::new().unwrap();
     let scene = world.scene();
     let with = |change: fn(&mut DatasetConfig), scene: &Scene| {
         let mut config = world.config();
@@ -221,14 +221,14 @@ fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
 
 #[test]
 fn jobs_and_progress_leave_every_byte() {
-    let world = FixtureFolder::make().unwrap();
+    let world = FixtureFolder::new().unwrap();
     let alone = dataset(&world, 1, &|_| {});
-    let told = AtomicU64::new(0);
+    let reported = AtomicU64::new(0);
     let watched = dataset(&world, 3, &|progress| {
-        told.store(progress.done, Ordering::Relaxed)
+        reported.store(progress.done, Ordering::Relaxed)
     });
     assert_eq!(
-        (told.into_inner(), alone.len()),
+        (reported.into_inner(), alone.len()),
         (3, 3 * 3 + 3),
         "pictures, labels, scenes; and three lists"
     );
@@ -237,7 +237,7 @@ fn jobs_and_progress_leave_every_byte() {
 
 #[test]
 fn labels_without_a_picture_are_those_with_one() {
-    let world = FixtureFolder::make().unwrap();
+    let world = FixtureFolder::new().unwrap();
     for case in cases(&world) {
         let pipeline = Pipeline::open(world.config()).unwrap();
         let labels = pipeline.label(case.scene.clone()).unwrap();
@@ -252,7 +252,7 @@ fn labels_without_a_picture_are_those_with_one() {
 
 #[test]
 fn parts_of_a_picture_that_are_asked_for_leave_the_picture_alone() {
-    let world = FixtureFolder::make().unwrap();
+    let world = FixtureFolder::new().unwrap();
     let pipeline = Pipeline::open(world.config()).unwrap();
     let (scene, shot) = pipeline.resolve(world.scene()).unwrap();
     let (deep, frame) = pipeline.shoot(&scene, &shot);
@@ -280,6 +280,6 @@ fn a_broken_promise_is_marked() {
     let cells = table(&[row(0), row(2)]).rows;
     assert_eq!(cells[0][2..], ["0 ✓", "3"]);
     assert_eq!(cells[1][2..], ["2 ✗", "3"]);
-    assert!(row(0).is_as_promised() && !row(2).is_as_promised());
+    assert!(row(0).is_as_expected() && !row(2).is_as_expected());
     assert!(table(&[]).rows.is_empty());
 }

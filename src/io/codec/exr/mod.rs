@@ -8,7 +8,6 @@ mod blocks;
 mod chroma;
 mod parts;
 mod read;
-mod runs;
 mod samples;
 mod write;
 
@@ -16,8 +15,8 @@ pub use parts::{ChannelSamples, Part};
 pub use read::Channel;
 pub use write::Compression;
 
+pub(crate) use ::exr::prelude::FlatSamples;
 pub(crate) use parts::encode_parts;
 pub(crate) use read::{channels, decode, header};
-pub(crate) use runs::encode_runs;
-pub(crate) use samples::{float_samples, half_samples, to_halves};
+pub(crate) use samples::{float_samples, half_samples};
 pub(crate) use write::encode;

@@ -3,36 +3,50 @@
 use super::super::Trial;
 use super::sensor::noisy;
 use crate::matte::truth::Known;
-use petcomp::Coverage;
 use petcomp::filter;
+use petcomp::{Coverage, LinearRgb};
 use petcomp::{Image, Roi};
+use std::ops::Range;
 
 /// A photo whose left border cuts off a share of the object's width.
 pub(super) fn cut_off(whole: Trial, share: f64) -> Trial {
-    let [left, top, right, bottom] = whole.box_px;
+    let [left, _, right, _] = whole.box_px;
     let from = (left + share * (right - left)) as usize;
     let (w, h) = whole.photo.size();
-    let roi = Roi::spanning(from..w, 0..h);
-    let box_px = [0.0, top, right - from as f64, bottom];
+    let mut cut = cropped(whole, Roi::spanning(from..w, 0..h));
+    // What is beyond the border is not in the box.
+    cut.box_px[0] = 0.0;
+    cut
+}
+
+fn cropped(whole: Trial, roi: Roi) -> Trial {
     Trial {
         photo: whole.photo.crop(roi),
         mask: whole.mask.crop(roi),
-        box_px,
+        box_px: cropped_box(whole.box_px, roi),
         ..whole
     }
 }
 
+fn cropped_box([left, top, right, bottom]: [f64; 4], roi: Roi) -> [f64; 4] {
+    let (x, y) = (roi.x as f64, roi.y as f64);
+    [left - x, top - y, right - x, bottom - y]
+}
+
 /// The photo and its mirror image beside each other.
 pub(super) fn two(one: &Trial) -> Trial {
-    let w = one.photo.width();
-    let column = |x: usize| if x < w { x } else { 2 * w - 1 - x };
-    let photo = Image::from_fn(2 * w, one.photo.height(), |x, y| one.photo[(column(x), y)]);
-    let mask = Image::from_fn(2 * w, one.mask.height(), |x, y| one.mask[(column(x), y)]);
     Trial {
-        photo,
-        mask,
+        photo: beside_its_mirror(&one.photo),
+        mask: beside_its_mirror(&one.mask),
         ..one.clone()
     }
+}
+
+fn beside_its_mirror<P: Copy + Send + Sync>(image: &Image<P>) -> Image<P> {
+    let w = image.width();
+    Image::from_fn(2 * w, image.height(), |x, y| {
+        image[(if x < w { x } else { 2 * w - 1 - x }, y)]
+    })
 }
 
 /// The longer side of a tiny photo, pixels.
@@ -55,113 +69,162 @@ pub(super) fn huge(whole: &Trial) -> Trial {
 
 fn resized(whole: &Trial, scale: f64) -> Trial {
     let (w, h) = whole.photo.size();
-    let side = |len: usize| (len as f64 * scale).round() as usize;
-    let [sx, sy] = [side(w) as f64 / w as f64, side(h) as f64 / h as f64];
-    let [left, top, right, bottom] = whole.box_px;
+    let [to_w, to_h] = [w, h].map(|side| (side as f64 * scale).round() as usize);
+    let scales = [to_w as f64 / w as f64, to_h as f64 / h as f64];
     Trial {
-        photo: filter::resize(&whole.photo, side(w), side(h)),
-        mask: filter::resize::<Coverage>(&whole.mask, side(w), side(h)),
-        box_px: [left * sx, top * sy, right * sx, bottom * sy],
+        photo: filter::resize(&whole.photo, to_w, to_h),
+        mask: filter::resize::<Coverage>(&whole.mask, to_w, to_h),
+        box_px: scaled_box(whole.box_px, scales),
         expected: whole.expected,
     }
 }
 
+fn scaled_box([left, top, right, bottom]: [f64; 4], [sx, sy]: [f64; 2]) -> [f64; 4] {
+    [left * sx, top * sy, right * sx, bottom * sy]
+}
+
 /// The photo turned on its side: rows become columns.
 pub(super) fn upright(flat: &Trial) -> Trial {
-    let (w, h) = flat.photo.size();
     let [left, top, right, bottom] = flat.box_px;
     Trial {
-        photo: Image::from_fn(h, w, |x, y| flat.photo[(y, x)]),
-        mask: Image::from_fn(h, w, |x, y| flat.mask[(y, x)]),
+        photo: transposed(&flat.photo),
+        mask: transposed(&flat.mask),
         box_px: [top, left, bottom, right],
         expected: flat.expected,
     }
 }
 
-/// Share of the picture that the box of an object that fills it has.
-const FULL: f64 = 0.8;
+fn transposed<P: Copy + Send + Sync>(image: &Image<P>) -> Image<P> {
+    Image::from_fn(image.height(), image.width(), |x, y| image[(y, x)])
+}
 
-/// The photo cut to the object's box and what is then left around it.
+/// Share of the picture that the box of an object that fills it has.
+const FULL_FRAME_SHARE: f64 = 0.8;
+
+/// The photo cut to the object's box and equal margins around it, as far as the photo reaches.
 pub(super) fn full_frame(whole: Trial) -> Trial {
     let [left, top, right, bottom] = whole.box_px;
     let (w, h) = whole.photo.size();
-    // Margins of one width m: (width + 2 m)(height + 2 m) = width height / FULL.
-    let (width, height) = (right - left, bottom - top);
+    let margin = full_frame_margin(right - left, bottom - top);
+    let columns = with_margin(left, right, margin, w);
+    let rows = with_margin(top, bottom, margin, h);
+    cropped(whole, Roi::spanning(columns, rows))
+}
+
+/// Margins of one width m: `(width + 2 m)(height + 2 m) = width height / FULL_FRAME_SHARE`.
+fn full_frame_margin(width: f64, height: f64) -> f64 {
     let sum = width + height;
-    let margin = 0.25 * ((sum * sum + 4.0 * width * height * (1.0 / FULL - 1.0)).sqrt() - sum);
-    let range = |low: f64, high: f64, len: usize| {
-        (low - margin).max(0.0) as usize..((high + margin).ceil() as usize).min(len)
-    };
-    let roi = Roi::spanning(range(left, right, w), range(top, bottom, h));
-    let (x, y) = (roi.x as f64, roi.y as f64);
-    let box_px = [left - x, top - y, right - x, bottom - y];
-    Trial {
-        photo: whole.photo.crop(roi),
-        mask: whole.mask.crop(roi),
-        box_px,
-        ..whole
-    }
+    let added = 1.0 / FULL_FRAME_SHARE - 1.0;
+    0.25 * ((sum * sum + 4.0 * width * height * added).sqrt() - sum)
+}
+
+fn with_margin(low: f64, high: f64, margin: f64, len: usize) -> Range<usize> {
+    (low - margin).max(0.0) as usize..((high + margin).ceil() as usize).min(len)
 }
 
 /// Share of the picture that a small object covers.
-const SMALL: f64 = 0.02;
+const SMALL_OBJECT_SHARE: f64 = 0.02;
 
-/// The object so small on the same screen.
+/// The object scaled down to that share, on the same screen.
 pub(super) fn small_object(known: &Known, whole: Trial) -> Trial {
     let (w, h) = known.photo.size();
-    let covered: f64 = known.mask.pixels().iter().map(|c| f64::from(c.0)).sum();
-    let scale = (SMALL * (w * h) as f64 / covered).sqrt();
+    let wanted = SMALL_OBJECT_SHARE * (w * h) as f64;
+    let scale = (wanted / total_coverage(&known.mask)).sqrt();
     shrunk(known, whole, [scale, scale])
 }
 
-/// How thin a thin object is beside what it was.
-const THIN: f64 = 0.125;
+fn total_coverage(mask: &Image<Coverage>) -> f64 {
+    mask.pixels().iter().map(|c| f64::from(c.0)).sum()
+}
+
+/// Width of a thin object as a share of what it was.
+const THIN_SCALE: f64 = 0.125;
 
 /// The object squeezed across its length.
 pub(super) fn thin_object(known: &Known, whole: Trial) -> Trial {
     let [left, top, right, bottom] = known.box_px;
     let scale = if right - left > bottom - top {
-        [1.0, THIN]
+        [1.0, THIN_SCALE]
     } else {
-        [THIN, 1.0]
+        [THIN_SCALE, 1.0]
     };
     shrunk(known, whole, scale)
 }
 
 /// The object made smaller by factors across and down, in the middle of its screen: `F + T K`, with the sensor's noise.
-fn shrunk(known: &Known, whole: Trial, [sx, sy]: [f64; 2]) -> Trial {
-    let (w, h) = known.photo.size();
-    let side = |len: usize, scale: f64| ((len as f64 * scale).round() as usize).clamp(1, len);
-    let (sw, sh) = (side(w, sx), side(h, sy));
-    let (x0, y0) = ((w - sw) / 2, (h - sh) / 2);
-    let inside = |x: usize, y: usize| (x0..x0 + sw).contains(&x) && (y0..y0 + sh).contains(&y);
-    let [light, through] =
-        [&known.foreground, &known.transmittance].map(|p| filter::resize(p, sw, sh));
-    let small = filter::resize(&known.mask, sw, sh);
-    let at = |x: usize, y: usize| (x - x0, y - y0);
-    let clean = Image::from_fn(w, h, |x, y| match inside(x, y) {
-        true => light[at(x, y)] + through[at(x, y)] * known.screen[(x, y)],
-        false => known.screen[(x, y)],
-    });
-    let mask = Image::from_fn(w, h, |x, y| {
-        if inside(x, y) {
-            small[at(x, y)]
-        } else {
-            Coverage(0.0)
-        }
-    });
-    let [left, top, right, bottom] = known.box_px;
-    let moved = |v: f64, from: usize, to: usize, at: usize| at as f64 + v * to as f64 / from as f64;
-    let box_px = [
-        moved(left, w, sw, x0),
-        moved(top, h, sh, y0),
-        moved(right, w, sw, x0),
-        moved(bottom, h, sh, y0),
-    ];
+fn shrunk(known: &Known, whole: Trial, scale: [f64; 2]) -> Trial {
+    let inset = Inset::new(known.photo.size(), scale);
     Trial {
-        photo: noisy(&clean, known.noise.read as f32, 1),
-        mask,
-        box_px,
+        photo: noisy(&inset.photo(known), known.noise.read as f32, 1),
+        mask: inset.mask(known),
+        box_px: inset.map_box(known.box_px),
         ..whole
     }
+}
+
+/// Where a picture that was made smaller lies in the middle of its old frame.
+struct Inset {
+    from: [usize; 2],
+    to: [usize; 2],
+    corner: [usize; 2],
+}
+
+impl Inset {
+    fn new((w, h): (usize, usize), [sx, sy]: [f64; 2]) -> Self {
+        let to = [scaled_side(w, sx), scaled_side(h, sy)];
+        Self {
+            from: [w, h],
+            to,
+            corner: [(w - to[0]) / 2, (h - to[1]) / 2],
+        }
+    }
+
+    fn photo(&self, known: &Known) -> Image<LinearRgb> {
+        let [light, through] = [&known.foreground, &known.transmittance]
+            .map(|picture| filter::resize(picture, self.to[0], self.to[1]));
+        self.image(|x, y, inside| {
+            let screen = known.screen[(x, y)];
+            inside.map_or(screen, |at| light[at] + through[at] * screen)
+        })
+    }
+
+    fn mask(&self, known: &Known) -> Image<Coverage> {
+        let small = filter::resize(&known.mask, self.to[0], self.to[1]);
+        self.image(|_, _, inside| inside.map_or(Coverage(0.0), |at| small[at]))
+    }
+
+    /// A picture of the old frame from the pixels of it and, where there is one, of the smaller picture.
+    fn image<P: Copy + Send + Sync>(
+        &self,
+        pixel: impl Fn(usize, usize, Option<(usize, usize)>) -> P + Sync,
+    ) -> Image<P> {
+        let [w, h] = self.from;
+        Image::from_fn(w, h, |x, y| pixel(x, y, self.at(x, y)))
+    }
+
+    /// The pixel of the smaller picture at a pixel of the frame; nothing beside it.
+    fn at(&self, x: usize, y: usize) -> Option<(usize, usize)> {
+        let [dx, dy] = [
+            x.checked_sub(self.corner[0])?,
+            y.checked_sub(self.corner[1])?,
+        ];
+        (dx < self.to[0] && dy < self.to[1]).then_some((dx, dy))
+    }
+
+    fn map_box(&self, [left, top, right, bottom]: [f64; 4]) -> [f64; 4] {
+        [
+            self.map_coordinate(0, left),
+            self.map_coordinate(1, top),
+            self.map_coordinate(0, right),
+            self.map_coordinate(1, bottom),
+        ]
+    }
+
+    fn map_coordinate(&self, axis: usize, v: f64) -> f64 {
+        self.corner[axis] as f64 + v * self.to[axis] as f64 / self.from[axis] as f64
+    }
+}
+
+fn scaled_side(len: usize, scale: f64) -> usize {
+    ((len as f64 * scale).round() as usize).clamp(1, len)
 }

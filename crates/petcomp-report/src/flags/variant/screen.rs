@@ -1,129 +1,204 @@
 //! What the screen is, and what lies on it.
 
 use crate::matte::truth::Known;
-use petcomp::Image;
 use petcomp::LinearRgb;
+use petcomp::{Image, Mask};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
+use std::f64::consts::TAU;
 
 /// The photo on another screen, of which the object hides and shades the same shares.
-pub(super) fn on(known: &Known, other: impl Fn(LinearRgb) -> LinearRgb + Sync) -> Image<LinearRgb> {
+pub(super) fn on_screen(
+    known: &Known,
+    other: impl Fn(LinearRgb) -> LinearRgb + Sync,
+) -> Image<LinearRgb> {
     let (w, h) = known.photo.size();
     Image::from_fn(w, h, |x, y| {
-        let at = (x, y);
-        let (p, k) = (known.photo[at], known.screen[at]);
-        let (from, to): ([f32; 3], [f32; 3]) = (k.into(), other(k).into());
-        let key = (1..3).fold(0, |best, c| if from[c] > from[best] { c } else { best });
-        if known.mask[at].0 == 0.0 {
-            // Beside the object all is screen, shadow and noise.
-            let light = <[f32; 3]>::from(p)[key] / from[key].max(f32::MIN_POSITIVE);
-            return LinearRgb::from(to).scale(light);
-        }
-        p + known.transmittance[at] * (other(k) + k.scale(-1.0))
+        let screen = other(known.screen[(x, y)]);
+        pixel_on_screen(known, (x, y), screen)
     })
 }
 
-/// What lets less than this through is opaque.
-const OPAQUE: f32 = 0.15;
-/// Least share of the object that is opaque, for there to be something to paint.
-const PAINTED: f64 = 0.02;
+fn pixel_on_screen(known: &Known, at: (usize, usize), other: LinearRgb) -> LinearRgb {
+    let (photo, screen) = (known.photo[at], known.screen[at]);
+    if known.mask[at].0 == 0.0 {
+        // Beside the object all is screen, shadow and noise.
+        other.scale(light_on_screen(photo, screen))
+    } else {
+        photo + known.transmittance[at] * (other + screen.scale(-1.0))
+    }
+}
+
+/// How bright a photo of a screen is, in the channel of the screen's colour.
+fn light_on_screen(photo: LinearRgb, screen: LinearRgb) -> f32 {
+    let [photo, screen]: [[f32; 3]; 2] = [photo.into(), screen.into()];
+    let key = largest_channel(screen);
+    photo[key] / screen[key].max(f32::MIN_POSITIVE)
+}
+
+/// The first of the largest channels.
+fn largest_channel(color: [f32; 3]) -> usize {
+    (1..3).fold(0, |best, c| if color[c] > color[best] { c } else { best })
+}
+
+/// A transmittance below this is opaque.
+const OPAQUE_TRANSMITTANCE: f32 = 0.15;
+/// The smallest share of an object that is painted where it is opaque.
+const MIN_PAINTED_SHARE: f64 = 0.02;
 
 /// The object with its opaque parts painted in the screen's hue, as bright as they were; nothing where it has none.
 pub(super) fn hued(known: &Known) -> Option<Image<LinearRgb>> {
-    let opaque = known.transmittance.map(|t| t.r.max(t.g).max(t.b) < OPAQUE);
-    let area = |set: &mut dyn Iterator<Item = bool>| set.filter(|p| *p).count() as f64;
-    let painted = area(&mut opaque.pixels().iter().copied());
-    if painted < PAINTED * area(&mut known.mask.pixels().iter().map(|c| c.0 > 0.5)) {
+    let opaque = opaque_parts(known);
+    let object = known.mask.pixels().iter().filter(|c| c.0 > 0.5).count();
+    if (count_set(&opaque) as f64) < MIN_PAINTED_SHARE * object as f64 {
         return None;
     }
     let (w, h) = known.photo.size();
     Some(Image::from_fn(w, h, |x, y| {
-        let (p, f, k) = (
-            known.photo[(x, y)],
-            known.foreground[(x, y)],
-            known.screen[(x, y)],
-        );
-        let sum = |c: LinearRgb| c.r + c.g + c.b;
         if opaque[(x, y)] {
-            p + f.scale(-1.0) + k.scale(sum(f) / sum(k).max(f32::MIN_POSITIVE))
+            painted(known, (x, y))
         } else {
-            p
+            known.photo[(x, y)]
         }
     }))
+}
+
+fn opaque_parts(known: &Known) -> Mask {
+    known
+        .transmittance
+        .map(|t| t.r.max(t.g).max(t.b) < OPAQUE_TRANSMITTANCE)
+}
+
+fn count_set(mask: &Mask) -> usize {
+    mask.pixels().iter().filter(|p| **p).count()
+}
+
+/// A pixel whose foreground has the screen's hue.
+fn painted(known: &Known, at: (usize, usize)) -> LinearRgb {
+    let (foreground, screen) = (known.foreground[at], known.screen[at]);
+    let brightness = channel_sum(foreground) / channel_sum(screen).max(f32::MIN_POSITIVE);
+    known.photo[at] + foreground.scale(-1.0) + screen.scale(brightness)
+}
+
+fn channel_sum(c: LinearRgb) -> f32 {
+    c.r + c.g + c.b
 }
 
 /// The photo with the screen's light changed by a factor, as much of it as is seen through the object.
 fn relit(known: &Known, light: impl Fn(f64, f64) -> f32 + Sync) -> Image<LinearRgb> {
     let (w, h) = known.photo.size();
     Image::from_fn(w, h, |x, y| {
-        let at = (x, y);
         let change = light(x as f64 + 0.5, y as f64 + 0.5) - 1.0;
-        let t = if known.mask[at].0 == 0.0 {
-            known.photo[at]
-        } else {
-            known.transmittance[at] * known.screen[at]
-        };
-        known.photo[at] + t.scale(change)
+        known.photo[(x, y)] + screen_light(known, (x, y)).scale(change)
     })
 }
 
-/// Even numbers of 0 to 1.
-fn shares(seed: u64) -> impl FnMut() -> f64 {
+/// The part of a pixel's light that comes from the screen.
+fn screen_light(known: &Known, at: (usize, usize)) -> LinearRgb {
+    if known.mask[at].0 == 0.0 {
+        known.photo[at]
+    } else {
+        known.transmittance[at] * known.screen[at]
+    }
+}
+
+/// Uniform random numbers of 0 to 1.
+fn uniform(seed: u64) -> impl FnMut() -> f64 {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     move || f64::from(rng.next_u32()) / f64::from(u32::MAX)
 }
 
 /// Creases of a screen, how much darker they are and how wide in pixels.
-const CREASES: usize = 12;
-const CREASE: [f64; 2] = [0.06, 4.0];
+const CREASE_COUNT: usize = 12;
+const CREASE_DEPTH: f64 = 0.06;
+const CREASE_WIDTH_PX: f64 = 4.0;
 
 /// Slack cloth: creases in all directions, dark on one side and light on the other.
 pub(super) fn wrinkled(known: &Known, seed: u64) -> Image<LinearRgb> {
-    let mut share = shares(seed);
+    let mut draw = uniform(seed);
     let (w, h) = (known.photo.width() as f64, known.photo.height() as f64);
-    let creases: Vec<[f64; 4]> = (0..CREASES)
-        .map(|_| {
-            let (sin, cos) = libm::sincos(std::f64::consts::TAU * share());
-            [w * share(), h * share(), sin, cos]
-        })
+    let creases: Vec<Crease> = (0..CREASE_COUNT)
+        .map(|_| Crease::random(w, h, &mut draw))
         .collect();
     relit(known, |x, y| {
-        let bend = |[u, v, sin, cos]: &[f64; 4]| {
-            let across = ((x - u) * sin + (y - v) * cos) / CREASE[1];
-            across * libm::exp(0.5 * (1.0 - across * across))
-        };
-        (1.0 + CREASE[0] * creases.iter().map(bend).sum::<f64>()).max(0.0) as f32
+        let bends = creases.iter().map(|crease| crease.bend(x, y));
+        (1.0 + CREASE_DEPTH * bends.sum::<f64>()).max(0.0) as f32
     })
 }
 
+/// A straight line through a point.
+struct Crease {
+    through: [f64; 2],
+    sin: f64,
+    cos: f64,
+}
+
+impl Crease {
+    fn random(w: f64, h: f64, mut draw: impl FnMut() -> f64) -> Self {
+        let (sin, cos) = libm::sincos(TAU * draw());
+        Self {
+            through: [w * draw(), h * draw()],
+            sin,
+            cos,
+        }
+    }
+
+    /// How the cloth is inclined at a point: 1 and -1 beside the crease.
+    fn bend(&self, x: f64, y: f64) -> f64 {
+        let [u, v] = self.through;
+        let across = ((x - u) * self.sin + (y - v) * self.cos) / CREASE_WIDTH_PX;
+        across * libm::exp(0.5 * (1.0 - across * across))
+    }
+}
+
 /// Specks on a screen, their radii in pixels from and to, and what they leave of the light.
-const SPECKS: usize = 60;
-const SPECK_PX: [f64; 2] = [0.7, 2.2];
+const SPECK_COUNT: usize = 60;
+const SPECK_RADII_PX: [f64; 2] = [0.7, 2.2];
 const SPECK_LIGHT: f32 = 0.35;
 
 /// Dust and crumbs all over.
 pub(super) fn specks(known: &Known, seed: u64) -> Image<LinearRgb> {
-    let mut share = shares(seed);
+    let mut draw = uniform(seed);
     let (w, h) = (known.photo.width() as f64, known.photo.height() as f64);
-    let mut draw = |from: f64, to: f64| from + (to - from) * share();
-    let specks: Vec<[f64; 3]> = (0..SPECKS)
-        .map(|_| [draw(0.0, w), draw(0.0, h), draw(SPECK_PX[0], SPECK_PX[1])])
+    let specks: Vec<Speck> = (0..SPECK_COUNT)
+        .map(|_| Speck::random(w, h, &mut draw))
         .collect();
     relit(known, |x, y| {
-        let depth = |[u, v, r]: &[f64; 3]| (r + 0.5 - (x - u).hypot(y - v)).clamp(0.0, 1.0);
-        1.0 - (1.0 - SPECK_LIGHT) * specks.iter().map(depth).fold(0.0, f64::max) as f32
+        let cover = specks.iter().map(|speck| speck.cover(x, y));
+        1.0 - (1.0 - SPECK_LIGHT) * cover.fold(0.0, f64::max) as f32
     })
+}
+
+struct Speck {
+    center: [f64; 2],
+    radius: f64,
+}
+
+impl Speck {
+    fn random(w: f64, h: f64, mut draw: impl FnMut() -> f64) -> Self {
+        let [least, most] = SPECK_RADII_PX;
+        Self {
+            center: [w * draw(), h * draw()],
+            radius: least + (most - least) * draw(),
+        }
+    }
+
+    /// How much of a pixel it covers.
+    fn cover(&self, x: f64, y: f64) -> f64 {
+        let [u, v] = self.center;
+        (self.radius + 0.5 - (x - u).hypot(y - v)).clamp(0.0, 1.0)
+    }
 }
 
 /// The table beyond the screen's edge: brown.
 const TABLE: LinearRgb = LinearRgb::new(0.25, 0.15, 0.08);
 /// Where the screen ends, as a share of the way from the border to the object.
-const SCREEN_ENDS: f64 = 0.4;
+const SCREEN_END_SHARE: f64 = 0.4;
 
 /// A screen that ends on the right, slightly aslant, with a table beyond.
 pub(super) fn ending(known: &Known) -> Image<LinearRgb> {
     let (w, h) = known.photo.size();
-    let edge = w as f64 - SCREEN_ENDS * (w as f64 - known.box_px[2]);
+    let edge = w as f64 - SCREEN_END_SHARE * (w as f64 - known.box_px[2]);
     Image::from_fn(w, h, |x, y| {
         let slant = 0.02 * (y as f64 - 0.5 * h as f64);
         let beyond = (x as f64 + 1.0 - edge - slant).clamp(0.0, 1.0) as f32;

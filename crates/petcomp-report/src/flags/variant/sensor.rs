@@ -15,10 +15,9 @@ pub(super) fn coded(p: LinearRgb) -> LinearRgb {
 pub(super) fn noisy(photo: &Image<LinearRgb>, sigma: f32, seed: u64) -> Image<LinearRgb> {
     let mut draw = normal(seed);
     let mut noisy = photo.clone();
-    noisy
-        .pixels_mut()
-        .iter_mut()
-        .for_each(|p| *p = p.map(|v| v + sigma * draw() as f32));
+    for p in noisy.pixels_mut() {
+        *p = p.map(|v| v + sigma * draw() as f32);
+    }
     noisy
 }
 

@@ -1,0 +1,110 @@
+//! `petcomp camera init` and `markers`: labels for photos.
+
+use crate::documents::stem_of;
+use crate::global::GlobalArgs;
+use crate::values::{parse_corners, parse_metres};
+use petcomp::camera::{self, Label};
+use petcomp::{Image, LinearRgb, io};
+use std::path::{Path, PathBuf};
+
+#[derive(clap::Args)]
+pub(crate) struct InitLabelArgs {
+    /// The photo
+    photo: PathBuf,
+    /// Width and height of the rectangle in metres: 0.56x0.37
+    #[arg(long, value_name = "WxH", value_parser = parse_metres, required_unless_present = "like")]
+    size: Option<[f64; 2]>,
+    /// Its corners in pixels, "x,y x,y x,y x,y": top left, top right, bottom right, bottom left
+    #[arg(long, value_name = "CORNERS", value_parser = parse_corners)]
+    corners: Option<[[f64; 2]; 4]>,
+    /// Label of another photo of the same rectangle: its size, its markers and its camera's name are taken over, and the
+    /// markers looked for
+    #[arg(long, value_name = "LABEL")]
+    like: Option<PathBuf>,
+    /// Label to write instead of NAME.label.json beside the photo
+    #[arg(short, long, value_name = "LABEL")]
+    output: Option<PathBuf>,
+    /// Replace a label that is there
+    #[arg(long)]
+    force: bool,
+}
+
+#[derive(clap::Args)]
+pub(crate) struct MarkersArgs {
+    /// The photo
+    photo: PathBuf,
+    /// Label with the markers' family, size and places; its corners may be missing
+    #[arg(long, value_name = "LABEL")]
+    map: PathBuf,
+    /// Label to write
+    #[arg(short, long, value_name = "LABEL")]
+    output: PathBuf,
+}
+
+pub(super) fn init_label(args: &InitLabelArgs, global: &GlobalArgs) -> anyhow::Result<()> {
+    let path = args.output_path();
+    let shown = path.display();
+    anyhow::ensure!(
+        args.force || !path.exists(),
+        "{shown}: is there already, and --force is not given"
+    );
+    let known = args.known_label(&path)?;
+    let label = match known.markers {
+        Some(_) => with_markers_of(known.clone(), &args.photo, &args.photo)?,
+        None => known.clone(),
+    };
+    io::write_text(&path, &camera::commented(&label)?)?;
+    let corners = args.describe_corners(label.points.len() - known.points.len());
+    global.print_status(format_args!(
+        "{shown}: {corners}; then `petcomp camera solve {shown}`"
+    ));
+    Ok(())
+}
+
+impl InitLabelArgs {
+    /// The given file, or `photos/bg.label.json` of `photos/bg.jpg`.
+    fn output_path(&self) -> PathBuf {
+        self.output.clone().unwrap_or_else(|| {
+            let name = format!("{}.label.json", stem_of(&self.photo));
+            self.photo.with_file_name(name)
+        })
+    }
+
+    /// What is known without looking at the photo's pixels.
+    fn known_label(&self, path: &Path) -> petcomp::Result<Label> {
+        let like = self.like.as_deref().map(camera::read_label).transpose()?;
+        let mut label = camera::init_label(&self.photo, path, like.as_ref())?;
+        if let Some([w, h]) = self.size {
+            (label.surface.width_m, label.surface.height_m) = (Some(w), Some(h));
+        }
+        label.surface.corners_px = self.corners;
+        Ok(label)
+    }
+
+    /// Where the corners come from, for a photo in which so many corners of markers were found.
+    fn describe_corners(&self, found: usize) -> String {
+        match (self.corners, found) {
+            (_, 1..) => format!("{found} marker corners found"),
+            (Some(_), _) => "corners as given".into(),
+            _ => {
+                "fill in surface.corners_px (top left, top right, bottom right, bottom left)".into()
+            }
+        }
+    }
+}
+
+pub(super) fn add_markers(args: &MarkersArgs, global: &GlobalArgs) -> anyhow::Result<()> {
+    let label: Label = io::read_json(&args.map)?;
+    let known = label.points.len();
+    let label = with_markers_of(label, &args.photo, &args.map)?;
+    io::write_json(&args.output, &label)?;
+    let found = label.points.len() - known;
+    global.print_written(&args.output, format_args!("{found} marker corners"));
+    Ok(())
+}
+
+/// The label with the corners of the photo's markers; an error names the file that is to be changed.
+fn with_markers_of(label: Label, photo: &Path, blamed: &Path) -> petcomp::Result<Label> {
+    let photo: Image<LinearRgb> = io::read(photo)?;
+    camera::with_markers(label, &photo).map_err(|e| e.in_file(blamed))
+}

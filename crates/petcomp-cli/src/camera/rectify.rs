@@ -1,0 +1,74 @@
+//! `petcomp camera rectify`: a metric top view, and the way back into the photo.
+
+use super::solve::{accepted, solved};
+use crate::values::parse_metres;
+use petcomp::camera::{self, Camera, LabelledPhoto, Solution};
+use petcomp::filter::Pyramid;
+use petcomp::{LinearRgb, PremulRgba, io};
+use std::path::{Path, PathBuf};
+
+#[derive(clap::Args)]
+pub(crate) struct RectifyArgs {
+    /// The photo (its size is that of the result with --back)
+    photo: PathBuf,
+    /// Its label
+    label: PathBuf,
+    /// Picture to write
+    #[arg(short, long)]
+    output: PathBuf,
+    /// Pixels per metre of the top view; by default those of the photo at the rectangle's centre
+    #[arg(long, value_name = "N")]
+    px_per_metre: Option<f64>,
+    /// Lay this picture on the rectangle instead, as the photo would show it
+    #[arg(long, value_name = "PICTURE")]
+    back: Option<PathBuf>,
+    /// Width and height of the rectangle in metres, for labels that do not say them
+    #[arg(long, value_name = "WxH", value_parser = parse_metres)]
+    size: Option<[f64; 2]>,
+    /// Take a camera that does not fit its label, too
+    #[arg(long)]
+    force: bool,
+}
+
+/// Writes the photo from above, or another picture as the photo's camera sees it on the surface.
+pub(super) fn write_view(args: &RectifyArgs) -> anyhow::Result<()> {
+    let labelled = read_only(&args.label, args.size)?;
+    let solution = accepted(solved(&labelled)?, &labelled, args.force)?;
+    let header = io::read_header(&args.photo)?;
+    let size = [header.width as u32, header.height as u32];
+    let camera = solution.camera.resized(size);
+    match &args.back {
+        Some(picture) => args.write_projected(picture, &camera, &solution),
+        None => args.write_top_view(&camera, &solution),
+    }
+}
+
+impl RectifyArgs {
+    fn write_projected(
+        &self,
+        picture: &Path,
+        camera: &Camera,
+        solution: &Solution,
+    ) -> anyhow::Result<()> {
+        let picture = Pyramid::new(io::read::<PremulRgba>(picture)?);
+        let projected = camera::project_picture(&picture, camera, solution.size);
+        Ok(io::write(&self.output, &projected)?)
+    }
+
+    fn write_top_view(&self, camera: &Camera, solution: &Solution) -> anyhow::Result<()> {
+        let px_per_metre = self.px_per_metre.unwrap_or(solution.fit.px_per_metre);
+        let photo = Pyramid::new(io::read::<LinearRgb>(&self.photo)?);
+        let view = camera::rectify(&photo, camera, solution.size, px_per_metre)?;
+        Ok(io::write(&self.output, &view)?)
+    }
+}
+
+/// The only label of a file.
+fn read_only(path: &Path, size: Option<[f64; 2]>) -> anyhow::Result<LabelledPhoto> {
+    let labels = camera::read_labels(path, size)?;
+    <[LabelledPhoto; 1]>::try_from(labels)
+        .map(|[only]| only)
+        .map_err(|labels| {
+            anyhow::anyhow!("{}: {} labels, expected one", path.display(), labels.len())
+        })
+}

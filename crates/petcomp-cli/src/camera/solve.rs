@@ -1,0 +1,222 @@
+//! `petcomp camera solve`, `joint` and `doctor`: cameras from labels.
+
+use crate::batch::FileBatch;
+use crate::diagnostics::report_diagnostics;
+use crate::global::GlobalArgs;
+use crate::print;
+use crate::values::parse_metres;
+use petcomp::camera::{self, CameraFile, Joint, Label, LabelledPhoto};
+use petcomp::camera::{Solution, SolveError, SolveOptions};
+use petcomp::{Error, Image, LinearRgb, io};
+use std::path::{Path, PathBuf};
+
+#[derive(clap::Args)]
+pub(crate) struct LabelFileArgs {
+    /// Labels: NAME.label.json, or files of LabelMe, CVAT (for images) or Label Studio together with --size
+    #[arg(required = true)]
+    labels: Vec<PathBuf>,
+    /// Width and height of the rectangle in metres, for labels that do not say them
+    #[arg(long, value_name = "WxH", value_parser = parse_metres)]
+    size: Option<[f64; 2]>,
+}
+
+#[derive(clap::Args)]
+pub(crate) struct SolveArgs {
+    #[command(flatten)]
+    labels: LabelFileArgs,
+    /// Camera file to write instead; for one label only
+    #[arg(short, long, value_name = "CAMERA")]
+    output: Option<PathBuf>,
+    /// Write cameras that do not fit their labels, too
+    #[arg(long)]
+    force: bool,
+}
+
+#[derive(clap::Args)]
+pub(crate) struct JointArgs {
+    #[command(flatten)]
+    labels: LabelFileArgs,
+    /// Write cameras that do not fit their labels, too
+    #[arg(long)]
+    force: bool,
+}
+
+impl LabelFileArgs {
+    /// All labels of all files.
+    fn read_all(&self) -> petcomp::Result<Vec<LabelledPhoto>> {
+        let files = self.labels.iter().map(|path| self.read_file(path));
+        Ok(files.collect::<petcomp::Result<Vec<_>>>()?.concat())
+    }
+
+    fn read_file(&self, path: &Path) -> petcomp::Result<Vec<LabelledPhoto>> {
+        camera::read_labels(path, self.size)
+    }
+
+    /// Does something with every label; where there are several, one that cannot be used does not stop the others.
+    fn for_each(&self, act: impl Fn(&LabelledPhoto) -> anyhow::Result<()>) -> anyhow::Result<()> {
+        if let [path] = &self.labels[..]
+            && let [labelled] = &self.read_file(path)?[..]
+        {
+            return act(labelled);
+        }
+        let mut batch = FileBatch::default();
+        for path in &self.labels {
+            match self.read_file(path) {
+                Ok(labels) => labels.iter().for_each(|one| batch.count(act(one))),
+                Err(error) => batch.count(Err(error.into())),
+            }
+        }
+        batch.finish()
+    }
+}
+
+/// Solves each label alone.
+pub(super) fn solve_each(args: &SolveArgs, global: &GlobalArgs) -> anyhow::Result<()> {
+    if args.output.is_some() {
+        let count = args.labels.read_all()?.len();
+        anyhow::ensure!(count == 1, "-o: {count} labels, expected one");
+    }
+    args.labels.for_each(|labelled| {
+        let solution = accepted(solved(labelled)?, labelled, args.force)?;
+        let file = CameraFile::new(&labelled.label, &solution);
+        let target = match &args.output {
+            Some(path) => path.clone(),
+            None => labelled.beside("camera.json"),
+        };
+        write_camera(&target, labelled, &file, &solution)?;
+        report_solution(labelled, &solution, global);
+        Ok(())
+    })
+}
+
+/// Solves the labels of each camera together.
+pub(super) fn solve_joint(args: &JointArgs, global: &GlobalArgs) -> anyhow::Result<()> {
+    let labels = args.labels.read_all()?;
+    let mut batch = FileBatch::default();
+    for group in camera::group_by_camera(&labels_of(&labels)) {
+        let members: Vec<LabelledPhoto> = group.iter().map(|&i| labels[i].clone()).collect();
+        let joint = camera::solve_joint(&labels_of(&members), &SolveOptions::default())
+            .map_err(|e| located(e, &members[0]))?;
+        report_outliers(&joint, &members);
+        for (member, photo) in members.iter().zip(joint.photos) {
+            batch.count(accept_member(member, photo, &members, args.force, global));
+        }
+    }
+    batch.finish()
+}
+
+fn labels_of(photos: &[LabelledPhoto]) -> Vec<Label> {
+    photos.iter().map(|photo| photo.label.clone()).collect()
+}
+
+fn report_outliers(joint: &Joint, members: &[LabelledPhoto]) {
+    for outlier in &joint.outliers {
+        report_diagnostics(&members[outlier.photo], &[outlier.diagnostic()]);
+    }
+}
+
+/// Writes and reports the camera of a photo that was solved together with others.
+fn accept_member(
+    member: &LabelledPhoto,
+    outcome: Result<Solution, SolveError>,
+    all: &[LabelledPhoto],
+    force: bool,
+    global: &GlobalArgs,
+) -> anyhow::Result<()> {
+    let solution = accepted(outcome.map_err(|e| located(e, member))?, member, force)?;
+    let mut file = CameraFile::new(&member.label, &solution);
+    if let Some(from) = file.solved_from.as_mut().filter(|_| all.len() > 1) {
+        from.together = camera::label_checksums(all);
+    }
+    write_camera(&member.beside("camera.json"), member, &file, &solution)?;
+    report_solution(member, &solution, global);
+    Ok(())
+}
+
+/// Says in plain words how well each camera is known.
+pub(super) fn explain_each(args: &LabelFileArgs) -> anyhow::Result<()> {
+    args.for_each(|labelled| {
+        let solution = solved(labelled)?;
+        let options = SolveOptions::default();
+        print::line(labelled);
+        print::text(camera::doctor(&labelled.label, &solution, &options));
+        accepted(solution, labelled, false)?;
+        Ok(())
+    })
+}
+
+pub(super) fn solved(labelled: &LabelledPhoto) -> petcomp::Result<Solution> {
+    let solution = camera::solve(&labelled.label, &SolveOptions::default())
+        .map_err(|e| located(e, labelled))?;
+    camera::check_distance(&solution.camera).map_err(|e| e.in_file(&labelled.source))?;
+    Ok(solution)
+}
+
+/// A solution that fits its label, or any where that is asked for.
+pub(super) fn accepted(
+    solution: Solution,
+    labelled: &LabelledPhoto,
+    force: bool,
+) -> petcomp::Result<Solution> {
+    match solution.misfit() {
+        Some(error) if !force => {
+            let what = format!("{error}; --force accepts it nevertheless");
+            Err(Error::file(&labelled.source, what))
+        }
+        _ => Ok(solution),
+    }
+}
+
+fn located(error: SolveError, labelled: &LabelledPhoto) -> Error {
+    Error::from(error).in_file(&labelled.source)
+}
+
+/// Writes the camera and, where the photo is there, the overlay.
+fn write_camera(
+    target: &Path,
+    labelled: &LabelledPhoto,
+    file: &CameraFile,
+    solution: &Solution,
+) -> petcomp::Result<()> {
+    io::write_json(target, file)?;
+    if let Some(photo) = labelled.photo() {
+        let photo: Image<LinearRgb> = io::read(photo)?;
+        io::write(overlay_beside(target), &camera::overlay(&photo, solution))?;
+    }
+    Ok(())
+}
+
+/// `bg.overlay.png` of `bg.camera.json`.
+fn overlay_beside(camera: &Path) -> PathBuf {
+    let name = camera.file_name().unwrap_or_default().to_string_lossy();
+    let stem = name.strip_suffix(".json").unwrap_or(&name);
+    let stem = stem.strip_suffix(".camera").unwrap_or(stem);
+    camera.with_file_name(format!("{stem}.overlay.png"))
+}
+
+fn report_solution(labelled: &LabelledPhoto, solution: &Solution, global: &GlobalArgs) {
+    let camera = &solution.camera;
+    global.print_status(format_args!(
+        "{labelled}: tilt {:.1} deg, height {:.3} m, {}, {}",
+        camera.tilt().to_degrees(),
+        camera.center().z,
+        describe_focal(solution),
+        describe_errors(solution)
+    ));
+    report_diagnostics(labelled, &solution.warnings);
+}
+
+fn describe_focal(solution: &Solution) -> String {
+    let (focal, percent) = (solution.camera.focal_px.x, 100.0 * solution.sigma.ln_focal);
+    let source = format!("{:?}", solution.focal_source).to_lowercase();
+    format!("focal length {focal:.0} px (+- {percent:.1} %, {source})")
+}
+
+fn describe_errors(solution: &Solution) -> String {
+    format!(
+        "corners to {:.2} px, {:.0} mm above the surface to {:.1} px",
+        solution.rms_px,
+        1000.0 * solution.sigma.reference_height,
+        solution.sigma.height_px
+    )
+}

@@ -1,0 +1,53 @@
+//! What is in a dataset that was just made.
+
+use crate::print;
+use petcomp::dataset::{DatasetCounts, Obstructed};
+use std::path::{Path, PathBuf};
+
+/// Prints what is in the folder: a result, so also where quiet is asked for.
+pub(crate) fn print_counts(counts: &DatasetCounts) {
+    print::line(images_line(counts));
+    print::line(objects_line(counts));
+    for class in &counts.classes {
+        let (labelled, objects) = (class.labelled, class.objects);
+        print::line(format_args!(
+            "  {:10} {labelled} labelled of {objects}",
+            class.name
+        ));
+    }
+}
+
+fn images_line(counts: &DatasetCounts) -> String {
+    format!(
+        "images       {} ({} for validation), {} made now, {} scenes resampled",
+        counts.images, counts.val, counts.made, counts.retries
+    )
+}
+
+fn objects_line(counts: &DatasetCounts) -> String {
+    format!(
+        "objects      {}, {} labelled, {} obstructed ({})",
+        counts.objects,
+        counts.labelled,
+        counts.obstructed,
+        obstructed_labels(counts.policy)
+    )
+}
+
+/// What became of the labels of objects that something lies over.
+fn obstructed_labels(policy: Obstructed) -> &'static str {
+    match policy {
+        Obstructed::Drop => "without a label",
+        Obstructed::Keep => "labelled like the others",
+        Obstructed::Ignore => "to be ignored, in YOLO without a label",
+        Obstructed::Class => "labelled as a class of their own",
+    }
+}
+
+/// What a dataset's trainers are given: the files that name all others, or the folder where there are none.
+pub(crate) fn trainer_inputs(counts: &DatasetCounts, folder: &Path) -> Vec<PathBuf> {
+    match counts.for_trainers.as_slice() {
+        [] => vec![folder.into()],
+        files => files.iter().map(|file| folder.join(file)).collect(),
+    }
+}

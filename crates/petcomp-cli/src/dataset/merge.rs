@@ -1,0 +1,34 @@
+//! `petcomp dataset merge`: the shards of several machines become one dataset.
+
+use super::{print_counts, trainer_inputs};
+use crate::global::GlobalArgs;
+use crate::interruption::interruption;
+use crate::print;
+use petcomp::dataset;
+use std::path::PathBuf;
+
+#[derive(clap::Args)]
+pub(crate) struct MergeArgs {
+    /// Folders of all shards, in any order
+    #[arg(required = true, value_name = "SHARD")]
+    shards: Vec<PathBuf>,
+    /// Folder to write the whole dataset into
+    #[arg(short, long, value_name = "FOLDER")]
+    output: PathBuf,
+}
+
+pub(crate) fn run(args: &MergeArgs, global: &GlobalArgs) -> anyhow::Result<()> {
+    let progress = global.start_progress("pictures");
+    let counts = dataset::merge(
+        &args.shards,
+        &args.output,
+        &|p| progress.update(p.done, p.count),
+        interruption(),
+    )?;
+    drop(progress);
+    print_counts(&counts);
+    for path in trainer_inputs(&counts, &args.output) {
+        print::line(path.display());
+    }
+    Ok(())
+}

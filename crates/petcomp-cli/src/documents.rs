@@ -1,0 +1,77 @@
+//! Recipes, scenes and options: the documents that several commands read.
+
+use petcomp::dataset::{DatasetConfig, Pipeline};
+use petcomp::io::{self, Override};
+use petcomp::{Quality, Result, Scene};
+use serde::de::DeserializeOwned;
+use std::path::{Path, PathBuf};
+
+/// Options from a TOML file, or the defaults where there is none.
+pub(crate) fn read_options<T: Default + DeserializeOwned>(file: Option<&Path>) -> Result<T> {
+    file.map_or_else(|| Ok(T::default()), io::read_toml)
+}
+
+/// A recipe file, and values in it that are to be different.
+#[derive(clap::Args)]
+pub(crate) struct RecipeArgs {
+    /// Recipe file (TOML): names the folders of assets and backgrounds, and what to draw
+    #[arg(value_name = "RECIPE")]
+    recipe: PathBuf,
+    /// Replace a value of the recipe: scene.objects=[4,12]
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    overrides: Vec<Override>,
+}
+
+impl RecipeArgs {
+    /// Reads the recipe.
+    pub(crate) fn read_config(&self) -> anyhow::Result<DatasetConfig> {
+        Ok(DatasetConfig::read(&self.recipe, &self.overrides)?)
+    }
+
+    /// Opens the folders that the recipe names.
+    pub(crate) fn open_pipeline(&self) -> anyhow::Result<Pipeline> {
+        Ok(Pipeline::open(self.read_config()?)?)
+    }
+}
+
+/// A scene file, and where the files that it names are.
+#[derive(clap::Args)]
+pub(crate) struct SceneArgs {
+    /// Scene, TOML or JSON; what is unknown in it is solved first
+    #[arg(value_name = "SCENE")]
+    pub(crate) path: PathBuf,
+    /// Recipe file (TOML) that names the folders of assets and backgrounds; by default the scene's own `[files]` does
+    #[arg(value_name = "RECIPE")]
+    recipe: Option<PathBuf>,
+    /// Replace a value of the recipe or of the scene's settings: render.subsamples=8
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    overrides: Vec<Override>,
+}
+
+impl SceneArgs {
+    pub(crate) fn read_scene(&self) -> anyhow::Result<Scene> {
+        Ok(io::read_document(&self.path)?)
+    }
+
+    /// The recipe's config or, without a recipe, that which the scene brings.
+    pub(crate) fn config_for(&self, scene: &Scene) -> anyhow::Result<DatasetConfig> {
+        Ok(match &self.recipe {
+            Some(recipe) => DatasetConfig::read(recipe, &self.overrides)?,
+            None => DatasetConfig::for_scene(scene, &self.path, &self.overrides)?,
+        })
+    }
+}
+
+/// The config, with everything computed as finely as is asked for.
+pub(crate) fn at_quality(quality: Option<Quality>, config: DatasetConfig) -> DatasetConfig {
+    match quality {
+        Some(quality) => quality.config(config),
+        None => config,
+    }
+}
+
+/// The file's name without its extension.
+pub(crate) fn stem_of(path: &Path) -> String {
+    let stem = path.file_stem().unwrap_or_default();
+    stem.to_string_lossy().into_owned()
+}

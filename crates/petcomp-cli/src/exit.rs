@@ -1,0 +1,46 @@
+//! How an error ends the program: one line, and a status.
+
+use crate::batch::Incomplete;
+use crate::print;
+use std::fmt;
+use std::process::ExitCode;
+
+const NEEDS_REVIEW_STATUS: u8 = 1;
+const INCOMPLETE_STATUS: u8 = 2;
+const DATA_STATUS: u8 = 3;
+pub(crate) const FILE_STATUS: u8 = 4;
+pub(crate) const INTERRUPTED_STATUS: u8 = 130;
+
+/// Everything was done, and `--strict` asked for a failure where a person should look.
+#[derive(Debug)]
+pub(crate) struct NeedsReview(pub(crate) String);
+
+impl fmt::Display for NeedsReview {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for NeedsReview {}
+
+/// Prints an error and its causes in one line and gives the exit status.
+pub(crate) fn report_error(error: &anyhow::Error) -> ExitCode {
+    print::aside(format_args!("error: {error:#}"));
+    ExitCode::from(status_of(error))
+}
+
+/// 1 where `--strict` found something to review, 2 where some of many files could not be used, 3 for data that cannot be
+/// right, 4 for files that cannot be used, 130 after an interruption. (2 is a wrong command line too; clap says that.)
+fn status_of(error: &anyhow::Error) -> u8 {
+    if error.is::<NeedsReview>() {
+        return NEEDS_REVIEW_STATUS;
+    }
+    if error.is::<Incomplete>() {
+        return INCOMPLETE_STATUS;
+    }
+    match error.downcast_ref::<petcomp::Error>() {
+        Some(petcomp::Error::File { .. }) => FILE_STATUS,
+        Some(petcomp::Error::Interrupted { .. }) => INTERRUPTED_STATUS,
+        _ => DATA_STATUS,
+    }
+}

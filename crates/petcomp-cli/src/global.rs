@@ -1,0 +1,146 @@
+//! The options that every subcommand has, and what they set up.
+
+use crate::print;
+use crate::progress::{ProgressDisplay, ProgressFormat};
+use crate::short_help::GLOBAL_HEADING;
+use crate::values::count;
+use petcomp::io::{Fallback, LimitOverride, Limits, ReadOptions};
+use petcomp::printable;
+use std::fmt::Display;
+use std::io::Write as _;
+use std::path::Path;
+
+/// Flags that mean the same everywhere: explained once, in `petcomp --help`.
+#[derive(clap::Args)]
+#[command(next_help_heading = GLOBAL_HEADING)]
+pub(crate) struct GlobalArgs {
+    /// Worker threads, at most 1024; 0 is one per core
+    #[arg(short = 'j', long, value_name = "N", default_value_t = 0, global = true, value_parser = count(0..=1024))]
+    threads: usize,
+    /// Say nothing but results and errors: no progress, no notes, no warnings
+    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    quiet: bool,
+    /// How to show how far a long job is: `bar` (lines where there is no terminal) or `json`, an object a line on the
+    /// standard error
+    #[arg(long, value_name = "HOW", default_value = "bar", global = true)]
+    progress: ProgressFormat,
+    /// Say more; twice for everything
+    #[arg(short, long, action = clap::ArgAction::Count, global = true)]
+    verbose: u8,
+    /// Let pictures and documents ask for more, or less: side=65536, pixels=512M, decoded_bytes=4G, seconds=60,
+    /// document_bytes=64M, ...
+    #[arg(long = "limit", value_name = "NAME=N", global = true)]
+    limits: Vec<LimitOverride>,
+    /// What reads pictures that petcomp's own decoders do not know
+    #[arg(long, value_enum, default_value_t, global = true)]
+    oiio: OpenImageIo,
+}
+
+/// Where OpenImageIO runs.
+#[derive(Clone, Copy, Default, clap::ValueEnum)]
+enum OpenImageIo {
+    /// In a sandboxed process of its own
+    #[default]
+    Worker,
+    /// The same, and no such picture is read where the system lacks Landlock or seccomp for its sandbox
+    WorkerStrict,
+    /// In this process: a damaged file may crash it (needs a build with the feature in-process-oiio)
+    InProcess,
+    /// Not at all
+    Off,
+}
+
+impl OpenImageIo {
+    fn fallback(self) -> anyhow::Result<Fallback> {
+        match self {
+            Self::Worker => Ok(Fallback::Worker),
+            Self::WorkerStrict => Ok(Fallback::StrictWorker),
+            Self::Off => Ok(Fallback::Nothing),
+            #[cfg(feature = "in-process-oiio")]
+            Self::InProcess => Ok(Fallback::InProcess(petcomp::io::oiio::in_process())),
+            #[cfg(not(feature = "in-process-oiio"))]
+            Self::InProcess => anyhow::bail!(
+                "--oiio in-process: this petcomp does not link OpenImageIO; build it with `--features in-process-oiio`"
+            ),
+        }
+    }
+}
+
+impl GlobalArgs {
+    /// Sets up threads, messages and what is read; called once.
+    pub(crate) fn apply(&self) -> anyhow::Result<()> {
+        self.start_logger();
+        // Fails only if a pool exists already, and then that pool serves.
+        let _ = rayon::ThreadPoolBuilder::new()
+            .num_threads(self.threads)
+            .build_global();
+        Ok(self.read_options()?.make_default()?)
+    }
+
+    fn start_logger(&self) {
+        env_logger::Builder::new()
+            .filter_module("petcomp", self.log_level())
+            .format(|out, record| {
+                let message = printable(&record.args().to_string());
+                writeln!(out, "{}: {message}", level_name(record.level()))
+            })
+            .init();
+    }
+
+    fn log_level(&self) -> log::LevelFilter {
+        match (self.quiet, self.verbose) {
+            (true, _) => log::LevelFilter::Error,
+            (_, 0) => log::LevelFilter::Warn,
+            (_, 1) => log::LevelFilter::Info,
+            _ => log::LevelFilter::Debug,
+        }
+    }
+
+    fn read_options(&self) -> anyhow::Result<ReadOptions> {
+        Ok(ReadOptions {
+            limits: self.limits()?,
+            fallback: self.oiio.fallback()?,
+            ..Default::default()
+        })
+    }
+
+    fn limits(&self) -> petcomp::Result<Limits> {
+        let mut overrides = self.limits.iter();
+        overrides.try_fold(Limits::default(), Limits::with)
+    }
+
+    /// Only results and errors are asked for.
+    pub(crate) fn is_quiet(&self) -> bool {
+        self.quiet
+    }
+
+    /// Prints a line about the work (what was written, what to look at), except with `--quiet`. The results that a command
+    /// exists for go through [`print`] instead.
+    pub(crate) fn print_status(&self, line: impl Display) {
+        if !self.quiet {
+            print::line(line);
+        }
+    }
+
+    /// Prints what a file that was written holds: `FILE: what`.
+    pub(crate) fn print_written(&self, file: &Path, what: impl Display) {
+        self.print_status(format_args!("{}: {what}", file.display()));
+    }
+
+    /// Points at a picture or page.
+    pub(crate) fn print_look_at(&self, file: &Path) {
+        self.print_status(format_args!("look at {}", file.display()));
+    }
+
+    /// A progress display: a bar on a terminal, plain lines elsewhere, nothing when quiet; or JSON, where that is asked for.
+    pub(crate) fn start_progress(&self, job: &'static str) -> ProgressDisplay {
+        ProgressDisplay::new(job, self.quiet, self.progress)
+    }
+}
+
+fn level_name(level: log::Level) -> String {
+    match level {
+        log::Level::Warn => "warning".into(),
+        level => level.as_str().to_lowercase(),
+    }
+}

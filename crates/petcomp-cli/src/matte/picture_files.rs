@@ -1,0 +1,23 @@
+//! Pictures of the keyers' commands, with all their bits.
+
+use anyhow::Result;
+use petcomp::Image;
+use petcomp::io::{self, Bits, ToFile, WriteOptions};
+use std::path::{Path, PathBuf};
+
+/// Writes a picture, in an EXR with all its bits.
+pub(crate) fn write_picture<P: ToFile>(path: &Path, image: &Image<P>) -> Result<()> {
+    let is_exr = path
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("exr"));
+    let options = WriteOptions {
+        bits: is_exr.then_some(Bits::Float),
+        ..WriteOptions::default()
+    };
+    Ok(io::write_with(path, image, &options)?)
+}
+
+/// Writes a picture where one was asked for.
+pub(crate) fn write_optional<P: ToFile>(path: &Option<PathBuf>, image: &Image<P>) -> Result<()> {
+    path.iter().try_for_each(|path| write_picture(path, image))
+}

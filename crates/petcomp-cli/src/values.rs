@@ -1,0 +1,80 @@
+//! Values on the command line that are more than one number or name.
+
+use clap::builder::RangedU64ValueParser;
+use petcomp::LinearRgb;
+use std::fmt::Display;
+use std::ops::RangeInclusive;
+use std::str::FromStr;
+
+/// A number of things within a range: more of them would take days, or all of the memory.
+pub(crate) fn count(range: RangeInclusive<u64>) -> RangedU64ValueParser<usize> {
+    RangedU64ValueParser::new().range(range)
+}
+
+/// Four points from `X,Y X,Y X,Y X,Y`.
+pub(crate) fn parse_corners(text: &str) -> Result<[[f64; 2]; 4], String> {
+    let points = text
+        .split(|c: char| c == ';' || c.is_whitespace())
+        .filter(|part| !part.is_empty())
+        .map(parse_point);
+    let points: Option<Vec<_>> = points.collect();
+    points
+        .and_then(|points| points.try_into().ok())
+        .ok_or_else(|| {
+            format!("\"{text}\", expected four corners as in \"120,80 900,85 905,600 110,590\"")
+        })
+}
+
+fn parse_point(text: &str) -> Option<[f64; 2]> {
+    let (x, y) = text.split_once(',')?;
+    Some([parse_finite(x)?, parse_finite(y)?])
+}
+
+fn parse_finite(text: &str) -> Option<f64> {
+    text.trim()
+        .parse()
+        .ok()
+        .filter(|value: &f64| value.is_finite())
+}
+
+/// Width and height in metres from `0.6x0.4`.
+pub(crate) fn parse_metres(text: &str) -> Result<[f64; 2], String> {
+    let (w, h) = text.split_once(['x', 'X']).unwrap_or_default();
+    match (parse_finite(w), parse_finite(h)) {
+        (Some(w), Some(h)) if w > 0.0 && h > 0.0 => Ok([w, h]),
+        _ => Err(format!(
+            "\"{text}\", expected WIDTHxHEIGHT in metres as in 0.6x0.4"
+        )),
+    }
+}
+
+/// Width and height in pixels from `640x480` or `640,480`.
+pub(crate) fn parse_pixel_size(text: &str) -> Result<[u32; 2], String> {
+    let (w, h) = text.split_once(['x', ',']).unwrap_or_default();
+    match (w.trim().parse(), h.trim().parse()) {
+        (Ok(w), Ok(h)) if w > 0 && h > 0 => Ok([w, h]),
+        _ => Err(format!("\"{text}\", expected WIDTHxHEIGHT as in 640x480")),
+    }
+}
+
+/// A colour from `R,G,B`.
+pub(crate) fn parse_color(text: &str) -> Result<LinearRgb, String> {
+    parse_numbers::<f32, 3>(text, "R,G,B").map(LinearRgb::from)
+}
+
+/// A pixel from `X,Y`.
+pub(crate) fn parse_pixel(text: &str) -> Result<[usize; 2], String> {
+    parse_numbers(text, "X,Y")
+}
+
+/// Numbers with commas between them.
+fn parse_numbers<T, const N: usize>(text: &str, form: &str) -> Result<[T; N], String>
+where
+    T: FromStr<Err: Display>,
+{
+    let numbers: Result<Vec<T>, _> = text.split(',').map(|n| n.trim().parse()).collect();
+    let numbers = numbers.map_err(|e| e.to_string())?;
+    numbers
+        .try_into()
+        .map_err(|numbers: Vec<T>| format!("{} numbers, expected {form}", numbers.len()))
+}

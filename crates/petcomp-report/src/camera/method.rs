@@ -1,0 +1,128 @@
+//! The methods that are compared, and the cameras that they have to find.
+
+use petcomp::camera::simulate::{Scenario, View};
+use petcomp::camera::{self, Priors, Solution, SolveOptions};
+
+/// Photos of one camera that are solved jointly.
+pub(super) const PHOTOS_TOGETHER: usize = 8;
+/// Distortion that several photos of one camera may find, as a standard deviation.
+const JOINT_KAPPA_SIGMA: f64 = 0.01;
+
+/// What the camera is really like, and what the solver assumes of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Lens {
+    /// A perfect pinhole over a perfect rectangle, and the solver knows; nothing is known of the focal length.
+    Ideal,
+    /// Principal point, distortion and tape measure are as uncertain as they usually are, with the default priors.
+    Realistic,
+}
+
+/// How a camera is found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SolveMethod {
+    /// The closed form and this many steps of refinement.
+    Steps(usize),
+    /// Every start, to the end, with covariance.
+    Whole,
+    /// Together with other photos of the same camera.
+    Joint,
+}
+
+impl Lens {
+    /// Both of them.
+    pub const ALL: [Self; 2] = [Self::Ideal, Self::Realistic];
+
+    /// Its name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Ideal => "ideal",
+            Self::Realistic => "realistic",
+        }
+    }
+
+    pub(super) fn scenario(self, corner_sigma_px: f64) -> Scenario {
+        let scenario = match self {
+            Self::Ideal => Scenario::default(),
+            Self::Realistic => Scenario::realistic(),
+        };
+        Scenario {
+            corner_sigma_px,
+            ..scenario
+        }
+    }
+
+    fn priors(self, method: SolveMethod) -> Priors {
+        match (self, method) {
+            (Self::Ideal, _) => Priors::ideal().with_free_focal(),
+            (Self::Realistic, SolveMethod::Joint) => Priors {
+                kappa_sigma: JOINT_KAPPA_SIGMA,
+                ..Priors::default()
+            },
+            (Self::Realistic, _) => Priors::default(),
+        }
+    }
+}
+
+impl SolveMethod {
+    /// All of them, the quickest first.
+    pub const ALL: [Self; 8] = [
+        Self::Steps(0),
+        Self::Steps(1),
+        Self::Steps(2),
+        Self::Steps(3),
+        Self::Steps(4),
+        Self::Steps(5),
+        Self::Whole,
+        Self::Joint,
+    ];
+
+    /// Its name in tables.
+    pub fn name(self) -> String {
+        match self {
+            Self::Steps(0) => "closed form".into(),
+            Self::Steps(1) => "closed form + 1 step".into(),
+            Self::Steps(n) => format!("closed form + {n} steps"),
+            Self::Whole => "full refinement".into(),
+            Self::Joint => format!("joint, {PHOTOS_TOGETHER} photos"),
+        }
+    }
+
+    pub(super) fn options(self, lens: Lens) -> SolveOptions {
+        SolveOptions {
+            priors: lens.priors(self),
+            max_iterations: self.max_iterations(),
+            ..Default::default()
+        }
+    }
+
+    fn max_iterations(self) -> Option<usize> {
+        match self {
+            Self::Steps(limit) => Some(limit),
+            Self::Whole | Self::Joint => None,
+        }
+    }
+
+    /// Solves the first of some photos of one camera.
+    pub(super) fn solve(self, views: &[View], options: &SolveOptions) -> Option<Solution> {
+        if self == Self::Joint {
+            solve_jointly(views, options)
+        } else {
+            camera::solve(&views[0].label, options).ok()
+        }
+    }
+
+    /// How many photos it looks at for one result.
+    pub(super) fn photos(self) -> usize {
+        if self == Self::Joint {
+            PHOTOS_TOGETHER
+        } else {
+            1
+        }
+    }
+}
+
+fn solve_jointly(views: &[View], options: &SolveOptions) -> Option<Solution> {
+    let labels: Vec<_> = views.iter().map(|view| view.label.clone()).collect();
+    let mut joint = camera::solve_joint(&labels, options).ok()?;
+    joint.photos.swap_remove(0).ok()
+}

@@ -1,0 +1,28 @@
+//! Tables of measurements, from a list of columns.
+
+use petcomp::plot::Table;
+
+/// The title of a column, and its cell of a row.
+pub(crate) type Column<R> = (&'static str, fn(&R) -> String);
+
+/// A table with a line for each row.
+pub(crate) fn table_of<'a, R: 'a>(
+    columns: &[Column<R>],
+    rows: impl IntoIterator<Item = &'a R>,
+) -> Table {
+    let mut table = Table::new(columns.iter().map(|(title, _)| *title));
+    for row in rows {
+        table.push(columns.iter().map(|(_, cell)| cell(row)));
+    }
+    table
+}
+
+/// A table of lines that are there already.
+pub(crate) fn table_from<const N: usize>(
+    titles: [&str; N],
+    lines: impl IntoIterator<Item = [String; N]>,
+) -> Table {
+    let mut table = Table::new(titles);
+    lines.into_iter().for_each(|line| table.push(line));
+    table
+}

@@ -1,0 +1,64 @@
+//! Random numbers and pictures from seeds.
+
+use petcomp::Image;
+use petcomp::LinearRgb;
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
+
+/// Longest side of a patch of a new background, pixels.
+const MAX_PATCH_PX: usize = 24;
+/// Patches over each place of a background, on average, were they as large as they can be.
+const PATCH_LAYERS: usize = 4;
+/// What patches leave free.
+const BACKGROUND_GREY: f32 = 0.2;
+/// Uniform numbers whose sum has variance 1.
+const UNIFORM_NUMBERS: usize = 12;
+
+/// Uniform numbers from 0 to 1.
+fn uniform(rng: &mut ChaCha8Rng) -> f64 {
+    f64::from(rng.next_u32()) / f64::from(u32::MAX)
+}
+
+/// Normal numbers: sums of twelve uniform ones.
+pub(crate) fn normal(seed: u64) -> impl FnMut() -> f64 {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    move || {
+        let sum: f64 = (0..UNIFORM_NUMBERS).map(|_| uniform(&mut rng)).sum();
+        sum - UNIFORM_NUMBERS as f64 / 2.0
+    }
+}
+
+/// A background that no method has seen: patches of random colours and sizes.
+pub(super) fn patched_background((w, h): (usize, usize), seed: u64) -> Image<LinearRgb> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut image = Image::filled(w, h, LinearRgb::grey(BACKGROUND_GREY));
+    for _ in 0..w * h * PATCH_LAYERS / (MAX_PATCH_PX * MAX_PATCH_PX) {
+        let color = random_color(&mut rng);
+        let [x, y, across, down] =
+            [w, h, MAX_PATCH_PX, MAX_PATCH_PX].map(|below| random_length(&mut rng, below));
+        fill_patch(&mut image, [x, y], [1 + across, 1 + down], color);
+    }
+    image
+}
+
+/// What is beyond the picture is left out.
+fn fill_patch(
+    image: &mut Image<LinearRgb>,
+    [x, y]: [usize; 2],
+    [width, height]: [usize; 2],
+    color: LinearRgb,
+) {
+    let (w, h) = image.size();
+    for row in y..(y + height).min(h) {
+        image.row_mut(row)[x..(x + width).min(w)].fill(color);
+    }
+}
+
+fn random_color(rng: &mut ChaCha8Rng) -> LinearRgb {
+    let channels: [f32; 3] = std::array::from_fn(|_| uniform(rng) as f32);
+    channels.into()
+}
+
+fn random_length(rng: &mut ChaCha8Rng, below: usize) -> usize {
+    (uniform(rng) as f32 * below as f32) as usize
+}
