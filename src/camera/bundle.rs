@@ -334,10 +334,7 @@ impl Bundle {
         photo: &PhotoBlock,
         index: usize,
     ) -> Option<Square> {
-        let inverse = photo.inverse_pose(0.0)?;
-        let response = -(inverse * &photo.coupling);
-        let cross = &response * shared;
-        let pose = inverse + &cross * response.transpose();
+        let (pose, cross) = photo.pose_covariance(shared)?;
         let mut covariance = Square::zeros();
         covariance
             .fixed_view_mut::<POSE_UNKNOWNS, POSE_UNKNOWNS>(0, 0)
@@ -449,6 +446,15 @@ impl PhotoBlock {
             pose[(i, i)] *= 1.0 + damping;
         }
         Some(pose.cholesky()?.inverse())
+    }
+
+    /// Covariance of the pose, and of the pose with the shared unknowns, from that of these.
+    fn pose_covariance(&self, shared: &DMatrix<f64>) -> Option<(Matrix6<f64>, Matrix6xX<f64>)> {
+        let inverse = self.inverse_pose(0.0)?;
+        let response = -(inverse * &self.coupling);
+        let cross = &response * shared;
+        let pose = inverse + &cross * response.transpose();
+        Some((pose, cross))
     }
 
     /// The step of the pose that goes with one of the shared unknowns, shortened where it would leap.

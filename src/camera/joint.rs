@@ -54,10 +54,7 @@ pub fn solve_joint(labels: &[Label], options: &SolveOptions) -> Result<Joint, So
     if let Some(photo) = labels.iter().position(|l| !same_frame(l, &labels[0])) {
         return Err(SolveError::DifferentPictures { photo });
     }
-    let photos: Vec<_> = labels.iter().map(|label| solve(label, options)).collect();
-    if let Some(Err(error)) = photos.first().filter(|_| photos.iter().all(Result::is_err)) {
-        return Err(error.clone());
-    }
+    let photos = solve_alone(labels, options)?;
     let solver = JointSolver {
         labels,
         alone: &photos,
@@ -65,6 +62,21 @@ pub fn solve_joint(labels: &[Label], options: &SolveOptions) -> Result<Joint, So
     };
     let estimate = solver.whole_or_cropped()?;
     Ok(Joint::new(photos, estimate))
+}
+
+/// What each photo gives.
+///
+/// # Errors
+/// The first photo's where none gives anything.
+fn solve_alone(
+    labels: &[Label],
+    options: &SolveOptions,
+) -> Result<Vec<Result<Solution, SolveError>>, SolveError> {
+    let photos: Vec<_> = labels.iter().map(|label| solve(label, options)).collect();
+    match photos.first() {
+        Some(Err(error)) if photos.iter().all(Result::is_err) => Err(error.clone()),
+        _ => Ok(photos),
+    }
 }
 
 impl Joint {
@@ -150,11 +162,13 @@ impl JointSolver<'_> {
         let mut outliers = Vec::new();
         let most_outliers = self.labels.len() / PHOTOS_PER_OUTLIER;
         while !used.is_empty() {
-            let mut estimate = self.estimate_from(&used, unknown)?;
+            let estimate = self.estimate_from(&used, unknown)?;
             let worst = worst_photo(&estimate.chi2).filter(|_| outliers.len() < most_outliers);
             let Some((worst, chi2)) = worst else {
-                estimate.outliers = outliers;
-                return Ok(Some(estimate));
+                return Ok(Some(JointEstimate {
+                    outliers,
+                    ..estimate
+                }));
             };
             let photo = used.remove(worst);
             outliers.push(OutlierPhoto { photo, chi2 });

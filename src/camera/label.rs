@@ -262,6 +262,13 @@ impl Label {
     }
 }
 
+impl LabelSurface {
+    /// The length of a side is stated.
+    pub(crate) fn has_side(&self) -> bool {
+        self.width_m.is_some() || self.height_m.is_some()
+    }
+}
+
 impl LabelCamera {
     fn states_principal_point(&self) -> bool {
         self.principal_point_px.is_some() || self.principal_point_sigma_px.is_some()

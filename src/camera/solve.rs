@@ -148,7 +148,7 @@ fn search_with_stated_distortion(
     let mut problem = Problem::new(label, framing, options)?;
     let mut found = search(&problem, options)?;
     let prior = problem.residuals.priors.ln_focal;
-    if label.camera.k1.is_none_or(|k1| k1 == 0.0) || prior.is_fixed() {
+    if !states_distortion(label) || prior.is_fixed() {
         return Ok((problem, found));
     }
     let mut applied = prior.mean;
@@ -162,6 +162,10 @@ fn search_with_stated_distortion(
         found = search(&problem, options)?;
     }
     Ok((problem, found))
+}
+
+fn states_distortion(label: &Label) -> bool {
+    label.camera.k1.is_some_and(|k1| k1 != 0.0)
 }
 
 fn search(problem: &Problem, options: &SolveOptions) -> Result<SearchResult, SolveError> {

@@ -84,14 +84,21 @@ impl PhotoCamera {
             true => solved,
             false => solved.and_then(Solution::fitting),
         };
-        let solution = usable.map_err(|error| located_error(error, labelled))?;
-        Ok(Self {
+        usable
+            .map(Self::from)
+            .map_err(|error| located_error(error, labelled))
+    }
+}
+
+impl From<Solution> for PhotoCamera {
+    fn from(solution: Solution) -> Self {
+        Self {
             camera: solution.camera,
             size: solution.size,
             warnings: solution.warnings,
             stored: false,
             stale: None,
-        })
+        }
     }
 }
 
@@ -129,8 +136,7 @@ fn checked_camera_file(path: &Path, labelled: &LabelledPhoto) -> Result<CameraFi
 
 /// The error of a label, or where its sides are missing, where to give them.
 fn located_error(error: SolveError, labelled: &LabelledPhoto) -> Error {
-    let surface = &labelled.label.surface;
-    if surface.width_m.is_some() || surface.height_m.is_some() {
+    if labelled.label.surface.has_side() {
         return Error::from(error).in_file(&labelled.source);
     }
     Error::file(
@@ -145,7 +151,7 @@ fn with_stored_size(labelled: &LabelledPhoto, file: Option<&CameraFile>) -> Labe
     let mut labelled = labelled.clone();
     let surface = &mut labelled.label.surface;
     let from = file.and_then(|f| f.solved_from.as_ref());
-    if let (None, None, Some(from)) = (surface.width_m, surface.height_m, from) {
+    if let Some(from) = from.filter(|_| !surface.has_side()) {
         [surface.width_m, surface.height_m] = from.size_m;
     }
     labelled

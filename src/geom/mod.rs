@@ -160,6 +160,16 @@ impl Line {
     }
 }
 
+/// The corners of a quadrangle whose sides are on these lines, the first between the last line and the first; none where
+/// neighbours are nearly parallel.
+pub(crate) fn corners_between(sides: &[Line; 4]) -> Option<[Point2<f64>; 4]> {
+    let mut corners = [Point2::origin(); 4];
+    for (i, corner) in corners.iter_mut().enumerate() {
+        *corner = sides[(i + 3) % 4].meeting(&sides[i])?;
+    }
+    Some(corners)
+}
+
 /// The mean of points, as an offset from the origin.
 pub(crate) fn mean_point(points: &[Point2<f64>]) -> Vector2<f64> {
     let sum = points

@@ -1,6 +1,7 @@
 //! Channel Key: one channel of some colour space against the others.
 
 use super::key::{Photo, Profile, from_ycc, to_ycc};
+use super::screen::other_channels;
 use crate::image::Image;
 use crate::pixel::{Coverage, PremulRgba};
 use serde::{Deserialize, Serialize};
@@ -121,11 +122,11 @@ impl ChannelKeyOptions {
     #[inline]
     fn key_excess(&self, c: [f32; 3]) -> f32 {
         let key = usize::from(self.matte_channel.min(2));
-        let (first, second) = [(1, 2), (0, 2), (0, 1)][key];
+        let (first, second) = other_channels(c, key);
         let limit = match self.limit_method {
             ChannelLimit::Single => c[usize::from(self.limit_channel.min(2))],
-            ChannelLimit::Max if c[first] < c[second] => c[second],
-            ChannelLimit::Max => c[first],
+            ChannelLimit::Max if first < second => second,
+            ChannelLimit::Max => first,
         };
         c[key] - limit
     }

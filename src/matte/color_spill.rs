@@ -1,6 +1,7 @@
 //! Color Spill: the screen's light on the subject, taken away.
 
 use super::key::{Photo, Profile};
+use super::screen::other_channels;
 use crate::image::Image;
 use crate::pixel::PremulRgba;
 use serde::{Deserialize, Serialize};
@@ -109,10 +110,10 @@ fn excess(c: [f32; 3], opts: &ColorSpillOptions) -> f32 {
 /// What the spill channel is limited by.
 #[inline(always)]
 fn limit(c: [f32; 3], opts: &ColorSpillOptions) -> f32 {
-    let (first, second) = [(1, 2), (0, 2), (0, 1)][opts.channel as usize];
+    let (first, second) = other_channels(c, opts.channel as usize);
     match opts.limit_method {
         SpillLimit::Simple => c[opts.limit_channel as usize],
-        SpillLimit::Average => (c[first] + c[second]) * 0.5,
+        SpillLimit::Average => (first + second) * 0.5,
     }
 }
 

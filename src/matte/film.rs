@@ -291,17 +291,20 @@ impl<'a> FilmSolution<'a> {
         let film = reflected.zip3_map(&seen, inside, |f, v, c| {
             Film::new(f.scale(c.0), covered(v, c))
         });
-        let most = flat.max_channel();
-        let uncertainty = factors.zip_map(inside, |f, c| (c.0 * f.sigma * most).min(1.0));
         FilmMatte {
             film,
             transmittance,
-            uncertainty,
+            uncertainty: uncertainty_of(factors, inside, flat.max_channel()),
             flat,
             color_uncertainty: ColorUncertainty::default(),
             diagnostics: Vec::new(),
         }
     }
+}
+
+/// Expected error of the largest channel of the transmittance.
+fn uncertainty_of(factors: &Image<Factor>, inside: &Image<Coverage>, most: f32) -> Image<f32> {
+    factors.zip_map(inside, |f, c| (c.0 * f.sigma * most).min(1.0))
 }
 
 impl FilmOptions {

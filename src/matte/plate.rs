@@ -220,16 +220,9 @@ const MAX_DEGREE: usize = 6;
 
 impl PlateOptions {
     pub(super) fn check(&self) -> Result<()> {
-        let (degree, shift) = (self.max_degree, self.max_shift_px);
-        if degree > MAX_DEGREE {
-            let what = format!("{degree}, expected 0 to {MAX_DEGREE}");
-            return Err(Error::value("max_degree", what));
-        }
+        check_degree(self.max_degree)?;
         check_share("least_gain", self.least_gain)?;
-        if shift.is_nan() || shift < 0.0 {
-            let what = format!("{shift}, expected at least 0");
-            return Err(Error::value("max_shift_px", what));
-        }
+        check_length("max_shift_px", self.max_shift_px)?;
         check_share("max_mismatch", self.max_mismatch)
     }
 
@@ -242,6 +235,21 @@ impl PlateOptions {
             "the empty screen is offset by ({x:.1}, {y:.1}) px from the photo, expected at most {most}; did the camera move?"
         )))
     }
+}
+
+fn check_degree(degree: usize) -> Result<()> {
+    if degree <= MAX_DEGREE {
+        return Ok(());
+    }
+    let what = format!("{degree}, expected 0 to {MAX_DEGREE}");
+    Err(Error::value("max_degree", what))
+}
+
+fn check_length(at: &str, value: f64) -> Result<()> {
+    if value >= 0.0 {
+        return Ok(());
+    }
+    Err(Error::value(at, format!("{value}, expected at least 0")))
 }
 
 fn check_share<T: Into<f64> + Copy + std::fmt::Display>(at: &str, value: T) -> Result<()> {

@@ -70,6 +70,12 @@ pub(super) fn is_keyable(screen: LinearRgb) -> bool {
     high > 0.0 && (high - 0.5 * (low + mid)) / high >= MIN_KEYABLE_EXCESS
 }
 
+/// The two channels beside one, in order.
+#[inline(always)]
+pub(super) fn other_channels(c: [f32; 3], channel: usize) -> (f32, f32) {
+    [(c[1], c[2]), (c[0], c[2]), (c[0], c[1])][channel]
+}
+
 /// Which channel of a colour is the largest; of equal ones the first.
 pub(super) fn strongest_channel(color: LinearRgb) -> usize {
     let channels: [f32; 3] = color.into();

@@ -8,7 +8,7 @@ use super::segment::PixelGroups;
 use crate::color::rgb_to_hsv;
 use crate::error::{Error, Result};
 use crate::filter;
-use crate::geom::{Line, Point2, Vector2};
+use crate::geom::{Line, Point2, Vector2, corners_between};
 use crate::image::{Image, Mask};
 use crate::pixel::{LinearRgb, Mix};
 
@@ -76,9 +76,7 @@ pub fn screen_corners(photo: &Image<LinearRgb>) -> Result<ScreenCorners> {
     }
     let picture = at_search_size(photo);
     let scale = photo.width() as f64 / picture.width() as f64;
-    let rough = four_corners(&screen_region(&picture)?.hull)
-        .ok_or_else(|| not_found("its outline has no four corners"))?;
-    let rough = rough.map(|p| Point2::from(p.coords * scale));
+    let rough = rough_corners(&picture)?.map(|p| Point2::from(p.coords * scale));
     // The second time the probes stand where the sides are.
     let near = refined(photo, &rough, scale)?;
     let found = refined(photo, &near.corners_px, scale)?;
@@ -86,6 +84,11 @@ pub fn screen_corners(photo: &Image<LinearRgb>) -> Result<ScreenCorners> {
         corners_px: from_top_left(found.corners_px),
         ..found
     })
+}
+
+fn rough_corners(picture: &Image<LinearRgb>) -> Result<[Point2<f64>; 4]> {
+    four_corners(&screen_region(picture)?.hull)
+        .ok_or_else(|| not_found("its outline has no four corners"))
 }
 
 fn at_search_size(photo: &Image<LinearRgb>) -> Image<LinearRgb> {
@@ -103,22 +106,13 @@ fn refined(
 ) -> Result<ScreenCorners> {
     let sides = fitted_sides(photo, corners, scale)?;
     Ok(ScreenCorners {
-        corners_px: corners_between(&sides)
+        corners_px: corners_between(&sides.map(|side| side.line))
             .ok_or_else(|| not_found("two of its sides are parallel that should meet"))?,
         sigma_px: sides
             .iter()
             .map(|side| side.off_px)
             .fold(NOISE_PX, f64::max),
     })
-}
-
-/// Where neighbouring sides meet, the first corner between the last side and the first.
-fn corners_between(sides: &[ScreenSide; 4]) -> Option<[Point2<f64>; 4]> {
-    let mut corners = [Point2::origin(); 4];
-    for (i, corner) in corners.iter_mut().enumerate() {
-        *corner = sides[(i + 3) % 4].line.meeting(&sides[i].line)?;
-    }
-    Some(corners)
 }
 
 /// The same ring of corners, begun with the one that is nearest to the picture's top left.
@@ -183,9 +177,13 @@ fn hue_regions(picture: &Image<LinearRgb>) -> Vec<HueRegion> {
         .iter()
         .filter_map(|&hue| {
             let set = hues.map(|other| other.is_some_and(|other| is_of_hue(other, hue, &common)));
-            largest_region(&filter::dilate(&filter::erode(&set, THIN_PX), THIN_PX))
+            largest_region(&without_thin_parts(&set))
         })
         .collect()
+}
+
+fn without_thin_parts(set: &Mask) -> Mask {
+    filter::dilate(&filter::erode(set, THIN_PX), THIN_PX)
 }
 
 /// A hue is near one of the common hues, and nearer to it than to the others.
@@ -299,11 +297,12 @@ fn four_corners(ring: &[Point2<f64>]) -> Option<[Point2<f64>; 4]> {
 fn farthest_between(ring: &[Point2<f64>], before: usize, after: usize) -> Option<usize> {
     let n = ring.len();
     let along = ring[after] - ring[before];
-    let off = |p: usize| along.perp(&(ring[p] - ring[before])).abs();
-    (1..n)
+    let (farthest, _) = (1..n)
         .map(|step| (before + step) % n)
         .take_while(|&p| p != after)
-        .max_by(|&p, &q| off(p).total_cmp(&off(q)))
+        .map(|p| (p, along.perp(&(ring[p] - ring[before])).abs()))
+        .max_by(|(_, a), (_, b)| a.total_cmp(b))?;
+    Some(farthest)
 }
 
 /// A straight side of a screen.
@@ -415,6 +414,7 @@ impl BorderProbe<'_> {
             .map(|k| self.color_at(-reach + (k as f64 + 0.5) * step))
             .map(|color| step * f64::from(dot(color.add_scaled(-1.0, outside), change) / square))
             .sum();
+        // Where the inside ends, from the foot.
         let at = inside_length - reach;
         (square > MIN_CHANGE * MIN_CHANGE && at.abs() < MAX_OFFSET_SHARE * reach)
             .then(|| self.foot + self.outward * at)

@@ -106,10 +106,8 @@ pub fn triangulate(
 /// What is found of the film, without what is known of the photos.
 fn composed(solved: &Image<SolvedFilm>, inside: &Image<Coverage>) -> Triangulated {
     let flat = lines::flat_transmittance(solved, inside);
-    let seen = view(&solved.map(|p| p.transmittance), flat, inside).zip_map(inside, covered);
-    let reflected = solved.zip_map(inside, |p, c| p.reflected.scale(c.0));
     Triangulated {
-        film: reflected.zip_map(&seen, Film::new),
+        film: seen_film(solved, flat, inside),
         transmittance: solved.zip_map(inside, |p, c| covered(p.transmittance, c)),
         uncertainty: solved.zip_map(inside, |p, c| (p.sigma * c.0).min(1.0)),
         flat,
@@ -118,6 +116,13 @@ fn composed(solved: &Image<SolvedFilm>, inside: &Image<Coverage>) -> Triangulate
         residual: 0.0,
         diagnostics: Vec::new(),
     }
+}
+
+/// Reflected light, and what is seen through plastic that where it lies flat measures `flat`.
+fn seen_film(solved: &Image<SolvedFilm>, flat: LinearRgb, inside: &Image<Coverage>) -> Image<Film> {
+    let seen = view(&solved.map(|p| p.transmittance), flat, inside).zip_map(inside, covered);
+    let reflected = solved.zip_map(inside, |p, c| p.reflected.scale(c.0));
+    reflected.zip_map(&seen, Film::new)
 }
 
 fn diagnostics(shift_px: &[[f64; 2]], determined: [bool; 3]) -> Vec<Diagnostic> {
@@ -268,10 +273,8 @@ impl Aligner<'_> {
     fn turned_px(&self, photo: &Image<LinearRgb>, weights: [f32; 3]) -> Option<f64> {
         let [low, high] =
             halves(&self.near).map(|end| register::shift(self.first, photo, &end, weights));
-        let apart = libm::hypot(
-            low.shift_px[0] - high.shift_px[0],
-            low.shift_px[1] - high.shift_px[1],
-        );
+        let [x, y] = [0, 1].map(|axis| low.shift_px[axis] - high.shift_px[axis]);
+        let apart = libm::hypot(x, y);
         let sigma = libm::hypot(low.sigma_px, high.sigma_px);
         (apart > MAX_END_SHIFT_PX.max(SIGNIFICANT_SIGMAS * sigma)).then_some(apart)
     }
@@ -287,14 +290,20 @@ const SIGNIFICANT_SIGMAS: f64 = 4.0;
 /// The two halves of an object, cut across the longer side of its box.
 fn halves(mask: &Mask) -> [Mask; 2] {
     let (w, h) = mask.size();
-    let spans = [0, 1].map(|axis| span(mask, axis));
-    let axis = usize::from(spans[1][1] - spans[1][0] > spans[0][1] - spans[0][0]);
-    let middle = usize::midpoint(spans[axis][0], spans[axis][1]);
+    let (axis, middle) = middle_of_longer_side(mask);
     [false, true].map(|above| {
         Image::from_fn(w, h, |x, y| {
             mask[(x, y)] && ([x, y][axis] > middle) == above
         })
     })
+}
+
+/// The axis along which a mask's box is longer, and its middle there.
+fn middle_of_longer_side(mask: &Mask) -> (usize, usize) {
+    let spans = [0, 1].map(|axis| span(mask, axis));
+    let [width, height] = spans.map(|[first, last]| last - first);
+    let axis = usize::from(height > width);
+    (axis, usize::midpoint(spans[axis][0], spans[axis][1]))
 }
 
 /// First and last column (axis 0) or row (axis 1) with a set pixel; two equal ones without any.

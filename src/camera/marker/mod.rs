@@ -168,19 +168,21 @@ impl MarkerLayout<'_> {
 
     /// The corners of a marker where the map has it; none where it has not.
     fn points(&self, marker: &Marker, turns: usize) -> impl Iterator<Item = LabelPoint> {
-        let center = self.map.map.get(&marker.id).copied();
-        let half = self.map.size_m / 2.0;
-        let offset = Vector2::repeat(self.label.pixel_origin.offset_px());
-        let sigma_px = marker.sigma_px.max(self.min_sigma_px);
         let marker = *marker;
-        center.into_iter().flat_map(move |center| {
+        let center = self.map.map.get(&marker.id);
+        center.into_iter().flat_map(move |&center| {
             [0, 1, 2, 3].map(|i| LabelPoint {
-                xyz_m: square_corner(center, half, i),
-                px: (marker.corners_px[(i + turns) % 4] - offset).into(),
-                sigma_px: Some(sigma_px),
+                xyz_m: square_corner(center, self.map.size_m / 2.0, i),
+                px: self.labelled_px(marker.corners_px[(i + turns) % 4]),
+                sigma_px: Some(marker.sigma_px.max(self.min_sigma_px)),
                 note: Some(format!("marker {}", marker.id)),
             })
         })
+    }
+
+    /// A position as the label writes it.
+    fn labelled_px(&self, px: Point2<f64>) -> [f64; 2] {
+        (px - Vector2::repeat(self.label.pixel_origin.offset_px())).into()
     }
 
     /// By how many right angles the markers have to be turned for a camera to fit clearly better than as they are; 0 where

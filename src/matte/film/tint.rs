@@ -242,9 +242,8 @@ impl ScreenPair {
         let body = std::array::from_fn(|c| scattered[c] / noise[c]);
         let seen = std::array::from_fn(|c| self.pixel[c] / noise[c]);
         let (thickness, reflection) = non_negative_fit(seen, through, body);
-        let misfit: f32 = (0..3)
-            .map(|c| (seen[c] - thickness * through[c] - reflection * body[c]).powi(2))
-            .sum();
+        let residuals = (0..3).map(|c| seen[c] - thickness * through[c] - reflection * body[c]);
+        let misfit: f32 = residuals.map(|off| off.powi(2)).sum();
         PixelFit {
             misfit: misfit.min(MAX_MISFIT),
             thickness,

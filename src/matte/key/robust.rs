@@ -7,7 +7,7 @@ use super::{Deviations, Keying, Screen};
 use crate::error::{Error, Result};
 use crate::filter::Pyramid;
 use crate::image::Image;
-use crate::matte::screen::mean_color;
+use crate::matte::screen::{mean_color, other_channels};
 use crate::pixel::{Coverage, LinearRgb, PremulRgba};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -22,7 +22,7 @@ const CHANNEL_NAMES: [&str; 3] = ["red", "green", "blue"];
 /// How far a colour exceeds the grey of its other channels in `channel`: the lesser of excess and saturation.
 fn key_strength(key: LinearRgb, channel: usize, balance: f32) -> f32 {
     let c = <[f32; 3]>::from(key);
-    let (lo, hi) = [(c[1], c[2]), (c[0], c[2]), (c[0], c[1])][channel];
+    let (lo, hi) = other_channels(c, channel);
     let v = balance * lo + (1.0 - balance) * hi;
     let excess = c[channel] - v;
     excess.min(excess * (1.0 - v).abs())

@@ -208,14 +208,16 @@ fn drift_px(
     let Ok(pass) = &own.pass else { return 0.0 };
     let stricter = scale.search.at_threshold(own.levels, STRICTER_FACTOR, opts);
     let stricter_px = stricter.map_or(longer_side(&pass.inside) as f64, |p| pass.distance(&p));
-    let other_depths = searched
-        .iter()
-        .filter(|other| other.scale == own.scale)
-        .filter_map(|other| other.pass.as_ref().ok());
-    let farthest_px = other_depths
+    let farthest_px = passes_at(searched, own.scale)
         .map(|other| pass.distance(other))
         .fold(stricter_px, f64::max);
     scale.reduction as f64 * farthest_px
+}
+
+/// What the searches of one picture size found.
+fn passes_at(searched: &[SearchResult], scale: usize) -> impl Iterator<Item = &Pass> {
+    let same = searched.iter().filter(move |other| other.scale == scale);
+    same.filter_map(|other| other.pass.as_ref().ok())
 }
 
 impl SearchResult {

@@ -154,20 +154,12 @@ impl Inferred {
     /// The share of flat plastic, and of nothing, that a pixel's determined channels are made of: least squares, with priors
     /// that hold where the channels do not separate them. No less than nothing is bare.
     fn shares(&self, pixel: &PixelLines) -> (f32, f32) {
-        let (mut pp, mut pb, mut bb) = (SHARE_SIGMA.powi(-2), 0.0, BARE_SIGMA.powi(-2));
-        let (mut tp, mut tb) = (0.0, 0.0);
+        let mut sums = ShareSums::prior();
         for c in (0..3).filter(|&c| self.determined[c]) {
             let weight = 1.0 / (pixel.sigma(c).powi(2) + MODEL_SIGMA * MODEL_SIGMA);
-            let (plastic, measured) = (self.plastic[c], pixel.slope(c).clamp(0.0, 1.0));
-            pp += weight * plastic * plastic;
-            pb += weight * plastic;
-            bb += weight;
-            tp += weight * measured * plastic;
-            tb += weight * measured;
+            sums.add(weight, self.plastic[c], pixel.slope(c).clamp(0.0, 1.0));
         }
-        let bare =
-            ((pp * tb - pb * tp) / (pp * bb - pb * pb).max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);
-        (((tp - pb * bare) / pp).max(0.0), bare)
+        sums.shares()
     }
 
     /// The film of one pixel: what is measured, mixed with what follows from the other channels by the variances.
@@ -182,6 +174,47 @@ impl Inferred {
             }
         });
         SolvedFilm::new(pixel, channels)
+    }
+}
+
+/// Weighted sums of the products of flat plastic (p), nothing (b) and the measured transmittance (t) of some channels.
+struct ShareSums {
+    pp: f32,
+    pb: f32,
+    bb: f32,
+    tp: f32,
+    tb: f32,
+}
+
+impl ShareSums {
+    /// What is known before any channel.
+    #[inline]
+    fn prior() -> Self {
+        Self {
+            pp: SHARE_SIGMA.powi(-2),
+            pb: 0.0,
+            bb: BARE_SIGMA.powi(-2),
+            tp: 0.0,
+            tb: 0.0,
+        }
+    }
+
+    #[inline]
+    fn add(&mut self, weight: f32, plastic: f32, measured: f32) {
+        self.pp += weight * plastic * plastic;
+        self.pb += weight * plastic;
+        self.bb += weight;
+        self.tp += weight * measured * plastic;
+        self.tb += weight * measured;
+    }
+
+    /// The shares of flat plastic and of nothing.
+    #[inline]
+    fn shares(&self) -> (f32, f32) {
+        let Self { pp, pb, bb, tp, tb } = self;
+        let bare =
+            ((pp * tb - pb * tp) / (pp * bb - pb * pb).max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);
+        (((tp - pb * bare) / pp).max(0.0), bare)
     }
 }
 
