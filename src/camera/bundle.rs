@@ -362,7 +362,7 @@ fn set_pose_covariance(covariance: &mut Square, unknown: usize, cross: &Vector6<
 }
 
 impl SharedSystem {
-    /// No information on any of so many unknowns.
+    /// No information on any of the unknowns.
     fn zeros(unknowns: usize) -> Self {
         Self {
             matrix: DMatrix::zeros(unknowns, unknowns),
@@ -416,7 +416,7 @@ impl BundleEquations {
 }
 
 impl PhotoBlock {
-    /// A pose, and nothing yet of so many shared unknowns.
+    /// A pose, not yet coupled to the shared unknowns.
     fn uncoupled(normal: &NormalEquations, shared: usize) -> Self {
         let pose = normal
             .information
@@ -497,7 +497,7 @@ fn framing_or(label: &Label, unknown: Framing) -> Framing {
     }
 }
 
-/// A photo's problem with a known lens, of which only the pose is left open.
+/// A photo's problem with a known lens: only the pose is unknown.
 fn with_fixed_lens(problem: &Problem, ln_focal: f64) -> Problem {
     let mut problem = problem.clone();
     let priors = &mut problem.residuals.priors;

@@ -18,7 +18,7 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::geom::{Point2, Point3, Vector2, Vector3};
 use nalgebra::Matrix2;
 
-/// Corners that cost so much in a whole picture, and so little in one that may be cropped, are of a cropped one.
+/// Corners that fit a cropped picture this much better than a whole one belong to a cropped one.
 pub(crate) fn is_off_center(whole: f64, loose: f64) -> bool {
     whole > loose + CHI2_99
 }

@@ -12,7 +12,7 @@ use crate::diagnostic::{Code, Diagnostic};
 
 /// A photo whose chi squared is beyond this contradicts the others: 0.01 % of two degrees of freedom.
 const OUTLIER_CHI2: f64 = 18.4;
-/// Of so many photos, one may be left out.
+/// One photo in this many may be left out.
 const PHOTOS_PER_OUTLIER: usize = 4;
 
 /// Photos of one camera, solved together.
@@ -34,7 +34,7 @@ pub struct OutlierPhoto {
 }
 
 impl OutlierPhoto {
-    /// What a person should know of it, to be read behind the photo's name.
+    /// A warning about it, to be read after the photo's name.
     pub fn diagnostic(&self) -> Diagnostic {
         let chi2 = self.chi2;
         let what = format!("contradicts the other photos (chi squared {chi2:.1}) and was left out");
@@ -251,7 +251,7 @@ fn same_camera(a: &Label, b: &Label) -> bool {
     b.camera.id.is_some() && a.camera.id == b.camera.id && same_frame(a, b)
 }
 
-/// Two pictures show the same frame of a camera, in whatever number of pixels: in units of the diagonal, everything that a
+/// Two pictures show the same frame of a camera, at any resolution: in units of the diagonal, everything that a
 /// camera's photos share is then the same.
 fn same_frame(a: &Label, b: &Label) -> bool {
     if is_part(a) || is_part(b) {

@@ -366,7 +366,7 @@ fn missing_message(keys: &[String]) -> String {
     format!("missing {key} {names}; `petcomp camera init PHOTO --size WxH` writes them")
 }
 
-/// Keys of which a label needs one or another, where it has none.
+/// Alternative keys, where a label has none of them.
 fn missing_alternatives(value: &Value) -> impl Iterator<Item = String> {
     let corners = lacks_all(value, &["/surface/corners_px", "/markers", "/points"])
         .then_some("surface.corners_px (or markers)");

@@ -19,7 +19,7 @@ use nalgebra::Vector3;
 const MAX_FOCAL_SIDES: f64 = 100.0;
 /// Noise of a corner that a person clicked, pixels.
 const CLICKED_SIGMA_PX: f64 = 1.0;
-/// Relative noise of a camera height of which only the value is stated.
+/// Relative noise of a camera height that is stated without a standard deviation.
 const STATED_HEIGHT_SIGMA: f64 = 0.03;
 
 /// The units of the solver, and what they stand for.
@@ -135,7 +135,7 @@ impl Problem {
     }
 }
 
-/// The corners, clockwise, labelled or predicted from the further points; and what is odd about them.
+/// The corners, clockwise, labelled or predicted from the further points, and warnings about them.
 fn used_corners(
     label: &Label,
     sides: MeasuredSides,

@@ -261,7 +261,7 @@ fn stem(path: &Path) -> String {
         .unwrap_or_default()
 }
 
-/// The label that another program's annotation means, its photo looked for beside the file.
+/// The label for another program's annotation, its photo searched for beside the file.
 fn imported_label(annotation: &Annotation, path: &Path) -> Result<LabelledPhoto> {
     let file = annotated_file(annotation, path);
     if file.is_empty() {

@@ -95,7 +95,7 @@ impl Scenario {
         }
     }
 
-    /// The same, tilted by so many degrees.
+    /// The same, tilted by `degrees`.
     pub fn tilted(self, degrees: f64) -> Self {
         Self {
             tilt: degrees.to_radians(),

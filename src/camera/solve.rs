@@ -1,4 +1,4 @@
-//! From a label to a camera, with a warning for everything that is odd about it.
+//! From a label to a camera, with a warning for everything unusual.
 
 use super::chi::CHI2_99;
 use super::error::SolveError;
@@ -176,7 +176,8 @@ fn search(problem: &Problem, options: &SolveOptions) -> Result<SearchResult, Sol
     found.ok_or(SolveError::NoPose)
 }
 
-/// Solves; where the picture contradicts its own EXIF value, solves again without that and keeps the first answer beside.
+/// Solves; where the picture contradicts its own EXIF value, solves again without that and keeps the first answer as the
+/// alternative.
 fn solve_without_wrong_exif(label: &Label, options: &SolveOptions) -> Result<Solution, SolveError> {
     let SolvedProblem {
         mut solution,

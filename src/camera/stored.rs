@@ -1,4 +1,4 @@
-//! Cameras that were solved before and lie beside their labels, and whether they still are those of their labels.
+//! Cameras that were solved before and lie beside their labels, and whether they still match them.
 
 use super::error::SolveError;
 use super::file::{CameraFile, SolvedFrom, checksum};
@@ -20,11 +20,11 @@ pub struct PhotoCamera {
     pub camera: Camera,
     /// Width and height of the rectangle as fitted, metres.
     pub size: [f64; 2],
-    /// What a person should look at.
+    /// Warnings to review.
     pub warnings: Vec<Diagnostic>,
     /// The camera was read from `NAME.camera.json`, not solved anew.
     pub stored: bool,
-    /// Why a stored camera was not used, in words.
+    /// Why a stored camera was not used.
     pub stale: Option<String>,
 }
 
@@ -48,7 +48,7 @@ pub(crate) fn photo_cameras(labels: &[LabelledPhoto], force: bool) -> Result<Vec
 }
 
 impl PhotoCamera {
-    /// The stored camera, unless it is not that of its label any more.
+    /// The stored camera, unless it does not match its label any more.
     fn new(
         labelled: &LabelledPhoto,
         file: Option<&CameraFile>,
@@ -157,7 +157,7 @@ fn with_stored_size(labelled: &LabelledPhoto, file: Option<&CameraFile>) -> Labe
     labelled
 }
 
-/// Why a camera is not that of its label any more; `known` are the labels that are there.
+/// Why a camera does not match its label any more; `known` are the labels that are there.
 fn staleness(
     file: &CameraFile,
     labelled: &LabelledPhoto,

@@ -26,7 +26,7 @@ pub(crate) struct Uncertainty {
     pub(crate) condition: f64,
 }
 
-/// How much of what is known of the focal length comes from the picture, and how much from its prior.
+/// How much of the information about the focal length comes from the picture, and how much from its prior.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FocalShare {
     /// Standard deviation of its logarithm; infinite where nothing is known.

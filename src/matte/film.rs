@@ -70,7 +70,7 @@ pub struct FilmMatte {
     pub flat: LinearRgb,
     /// What may make its colours wrong.
     pub color_uncertainty: ColorUncertainty,
-    /// What a person should know.
+    /// Notes and warnings.
     pub diagnostics: Vec<Diagnostic>,
 }
 

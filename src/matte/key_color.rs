@@ -134,7 +134,7 @@ fn median_or_zero(values: impl Iterator<Item = f32>) -> f32 {
     median(values, f32::total_cmp).unwrap_or(0.0)
 }
 
-/// The screen's own excess of its strongest channel, uneven light included, is below so many times its mean; see-through
+/// The screen's own excess of its strongest channel, uneven light included, is below this multiple of its mean; see-through
 /// plastic shows less than that.
 const SCREEN_EXCESS_FACTOR: f32 = 1.25;
 /// Rim of the mask that is left out, as a share of the longer side: bare screen.

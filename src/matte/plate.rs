@@ -22,7 +22,7 @@ pub struct PlateOptions {
     /// A higher degree must lower the residual by this share to be taken, 0 to 1. Default: 0.6: around
     /// the object only, a higher degree fits shadows and swings beneath it.
     pub least_gain: f64,
-    /// An empty-screen photo may be shifted by so many pixels. Default: 8.
+    /// Largest shift of an empty-screen photo, pixels. Default: 8.
     pub max_shift_px: f64,
     /// An empty-screen photo may differ from the photo by this share of the screen's brightness once it is aligned and
     /// its exposure matched, 0 to 1. Default: 0.05.

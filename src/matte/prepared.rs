@@ -13,7 +13,7 @@ const MIN_PHOTO_SIDE_PX: usize = 16;
 /// A photo with a shorter longer side than this is enlarged for the search: bands and gaps of a few pixels are wide beside
 /// an object of 20.
 const SMALL_PHOTO_PX: usize = 128;
-/// Longer side, at least, that it is enlarged to.
+/// Longer side, at least, to which it is enlarged.
 const ENLARGED_PHOTO_PX: usize = 256;
 
 /// A photo that can be segmented, and what is derived from it alone.

@@ -31,7 +31,7 @@ const HIGH_PASS_PX: f32 = 4.0;
 const MIN_AGREEMENT: f64 = 0.3;
 /// The longest step, pixels of its level: farther off the gradient is no guide.
 const MAX_STEP_PX: f64 = 2.0;
-/// A shift below so many standard deviations is none.
+/// A shift below this many standard deviations counts as none.
 const SIGNIFICANT_SIGMAS: f64 = 3.0;
 /// A search that moved by more than this share of the shorter side has diverged: there was nothing to hold on to.
 const MAX_SHIFT_SHARE: f64 = 0.25;

@@ -27,7 +27,7 @@ const THIN_PX: f64 = 2.0;
 /// What lies on a screen is farther than this from its border, and covers this share of it.
 const RIM_PX: f64 = 8.0;
 const MIN_OBJECT_SHARE: f64 = 0.002;
-/// So often a corner of a rough quadrangle is moved: it takes two or three rounds.
+/// Times a corner of a rough quadrangle is moved, at most: it takes two or three rounds.
 const MAX_CORNER_MOVES: usize = 40;
 /// Stretches along each side, and the part of it near its corners that is left out: corners are worn.
 const PROBE_COUNT: usize = 96;
@@ -39,13 +39,13 @@ const STEPS_PER_PX: f64 = 2.0;
 const MIN_CHANGE: f32 = 0.01;
 /// A border is found at most this share of the reach from where it is expected.
 const MAX_OFFSET_SHARE: f64 = 0.75;
-/// Probes farther from a side's line than so many times the median are of something else: an object, a shadow.
+/// Probes farther from a side's line than this multiple of the median belong to something else: an object, a shadow.
 const OUTLIER_FACTOR: f64 = 3.0;
 /// Rounds in which such probes are dropped.
 const OUTLIER_ROUNDS: usize = 4;
 /// Distances from a line below this are those of noise, pixels.
 const NOISE_PX: f64 = 0.1;
-/// A border of so many pixels of the search beside a side's line is no straight one.
+/// A border this far off a side's line, in pixels of the search, is not straight.
 const CROOKED_PX: f64 = 2.0;
 
 /// Where the corners of a screen are seen.

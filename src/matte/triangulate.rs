@@ -20,7 +20,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct TriangulateOptions {
-    /// The object may lie so many pixels off the first photo in another one, and is then moved back. Default: 8.
+    /// Largest offset of the object from the first photo that is moved back, pixels. Default: 8.
     pub max_shift_px: f64,
     /// Moved back, what the screens do not change must agree between the photos: least correlation, 0 to 1. Default: 0.5.
     pub least_agreement: f64,
@@ -56,7 +56,7 @@ pub struct Triangulated {
     pub shift_px: Vec<[f64; 2]>,
     /// Root mean square of what the film does not explain of the photos inside the object, scene-linear.
     pub residual: f32,
-    /// What a person should know.
+    /// Notes and warnings.
     pub diagnostics: Vec<Diagnostic>,
 }
 
@@ -103,7 +103,7 @@ pub fn triangulate(
     })
 }
 
-/// What is found of the film, without what is known of the photos.
+/// What was found out about the film, without what is known about the photos.
 fn composed(solved: &Image<SolvedFilm>, inside: &Image<Coverage>) -> Triangulated {
     let flat = lines::flat_transmittance(solved, inside);
     Triangulated {
@@ -280,7 +280,7 @@ impl Aligner<'_> {
     }
 }
 
-/// A shift known worse than this does not show how well the photos agree.
+/// A shift less certain than this does not show how well the photos agree.
 const MAX_JUDGED_SIGMA_PX: f64 = 0.2;
 /// Ends that move farther apart than this leave double edges.
 const MAX_END_SHIFT_PX: f64 = 1.0;

@@ -66,7 +66,7 @@ fn json_annotations(value: Value) -> Result<Option<Vec<Annotation>>> {
     }
 }
 
-/// The label that a LabelMe file means, of a rectangle of `size` metres.
+/// The label for a LabelMe file of a rectangle of `size` metres.
 ///
 /// # Errors
 /// [`Error::Value`] for text that is not LabelMe's, and for anything but one quadrangle, one rectangle or four points.
@@ -77,7 +77,7 @@ pub fn from_labelme(text: &str, size: [f64; 2]) -> Result<Label> {
 }
 
 impl Annotation {
-    /// The label that the annotation means; the sides of its rectangle are not known.
+    /// The label for the annotation; the sides of its rectangle are unknown.
     pub(crate) fn label(&self) -> Result<Label> {
         let (name, corners_px) = self.rectangle()?;
         let mut label = Label::new(self.size.unwrap_or_default(), corners_px, [1.0; 2]);

@@ -20,7 +20,7 @@ const INNER_REACH_CELLS: f64 = 0.45;
 /// White that has grown by more, pixels, has another cause; fewer edges than these are not conclusive.
 const MAX_GROWTH_PX: f64 = 1.0;
 const MIN_EDGES: usize = 6;
-/// So often the sides are fitted anew at most; corners that move by less stay.
+/// Times the sides are fitted anew, at most; corners that move by less stay.
 const MAX_ROUNDS: usize = 6;
 const SETTLED_PX: f64 = 0.01;
 /// Noise of a corner of a marker that is seen as sharp as can be, pixels.
@@ -283,7 +283,7 @@ fn crossing(
     (rise > MIN_RISE && edge.abs() <= reach).then_some(edge)
 }
 
-/// The position of a sample along a probe of so many steps, from its middle.
+/// The position of a sample along a probe of `steps` steps, from its middle.
 fn along_probe(i: f64, steps: usize, reach: f64) -> f64 {
     -reach + 2.0 * reach * i / steps as f64
 }

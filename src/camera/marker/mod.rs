@@ -71,7 +71,7 @@ fn marker_at(light: &Image<f32>, rough: &[Point2<f64>; 4]) -> Option<Marker> {
     })
 }
 
-/// The markers of every known family, of which nothing but their size is given.
+/// The markers of every known family, for when only their size is given.
 pub(crate) fn any_markers(photo: &Image<LinearRgb>) -> Vec<Marker> {
     #[cfg(feature = "markers")]
     {
@@ -157,7 +157,7 @@ impl<'a> MarkerLayout<'a> {
 }
 
 impl MarkerLayout<'_> {
-    /// The label with the corners of the markers as points, each marker turned by so many right angles.
+    /// The label with the corners of the markers as points, each marker turned by `turns` right angles.
     fn label_turned(&self, turns: usize) -> Label {
         let mut label = self.label.clone();
         for marker in &self.found {

@@ -64,7 +64,7 @@ fn softened(painted: &Mask) -> Image<f32> {
     filter::gaussian_blur(&painted.to_coverage(), PAINT_BLUR_PX).map(|p| ramp(p.0, &PAINT_SHARE))
 }
 
-/// Scene-linear reflected light from which on to which a glint hides what is seen through.
+/// Scene-linear reflected light between which a glint goes from hiding nothing to hiding all that lies behind.
 const GLINT_LIGHT: RangeInclusive<f32> = 0.14..=0.96;
 /// Reach of the surroundings that hidden pixels are filled from, standard deviation as a share of the side of a square of
 /// the object's area.
@@ -132,7 +132,7 @@ fn fill(factor: &mut Factor, hidden: f32, around: f32) {
     factor.sigma = factor.sigma.max(hidden * FILLED_SIGMA);
 }
 
-/// How much of what is seen through so much reflected light hides.
+/// How much of what lies behind is hidden by this much reflected light.
 fn hidden_share(reflected: f32) -> f32 {
     ramp(reflected, &GLINT_LIGHT)
 }

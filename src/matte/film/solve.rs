@@ -34,7 +34,7 @@ pub(super) struct Solver {
     spread: f32,
 }
 
-/// Tints must differ by so much of the largest to separate glint from scattered light.
+/// Tints must differ by this share of the largest to separate glint from scattered light.
 const MIN_TINT_CONTRAST: f32 = 0.25;
 /// Least light of the key channel over the others': with less no pixel measures anything. Its square is still a normal
 /// number.
@@ -79,7 +79,7 @@ impl Solver {
     }
 
     /// The factor on a screen that has too little hue to measure much: that of flat plastic unless more light is left than
-    /// plastic throws back. The deviation is that of something of which it is not known whether it is plastic.
+    /// plastic throws back. The deviation is that of something that may or may not be plastic.
     pub(super) fn guess(&self, pixel: [f32; 3], screen: [f32; 3]) -> Factor {
         let measured = self.measure(pixel, screen);
         let left = (0..3)
@@ -114,7 +114,7 @@ impl Solver {
         self.shares[0] * of[self.others[0]] + self.shares[1] * of[self.others[1]]
     }
 
-    /// What the photo gives, drawn to what is expected by the variances.
+    /// What the photo gives, combined with what is expected, weighted by the variances.
     #[inline(always)]
     fn combine(&self, pixel: [f32; 3], measured: &PixelMeasurement, expected: f32) -> Factor {
         let &PixelMeasurement {
@@ -175,7 +175,7 @@ fn largest_factor(pixel: [f32; 3], through: [f32; 3]) -> f32 {
         .fold(f32::MAX, f32::min)
 }
 
-/// The factor of what reflects so much light: plastic, or paint.
+/// The factor of something that reflects this much light: plastic, or paint.
 fn plastic_factor(brightest: f32) -> f32 {
     let (low, high) = (PAINT_LIGHT.start(), PAINT_LIGHT.end());
     ((high - brightest) / (high - low)).clamp(0.0, 1.0)

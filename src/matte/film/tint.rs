@@ -16,7 +16,7 @@ pub(super) struct Tint {
 }
 
 impl Tint {
-    /// One that is not doubted.
+    /// One without uncertainty.
     pub(super) fn certain(flat: [f32; 3]) -> Self {
         Self {
             flat,
@@ -62,7 +62,7 @@ const THICKNESS_WEIGHT: f32 = 1.0;
 const DYE_HANDICAP: f32 = 0.4;
 /// How much the light that plastic scatters has of its tint: as if it went halfway through.
 const SCATTER_DEPTH: f32 = 0.5;
-/// Flat plastic passes at most so many times what two walls do.
+/// Flat plastic passes at most this many times what two walls do.
 const MAX_THICKNESS_FACTOR: f32 = 1.3;
 /// Misfit by which tints are as good as each other.
 const EQUAL_MISFIT: f32 = 0.1;
@@ -173,7 +173,7 @@ fn darkest(mut pixels: Vec<ScreenPair>, key: usize, share: f64) -> Vec<ScreenPai
     pixels
 }
 
-/// Every so many-th item that about so many are left.
+/// Items at equal steps, about `count` of them.
 fn thinned<T>(items: Vec<T>, count: usize) -> impl Iterator<Item = T> {
     let step = (items.len() / count).max(1);
     items.into_iter().step_by(step)

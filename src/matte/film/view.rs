@@ -26,7 +26,7 @@ const OPAQUE_RATIO: f32 = 0.45;
 const RIM_DEPTH: f32 = 0.05;
 /// Blur of T, standard deviation as a share of that side: finer than that are only grains of light on the screen.
 const GRAIN_SIZE: f32 = 0.0025;
-/// No plastic passes more than so many times what flat plastic does.
+/// No plastic passes more than this many times what flat plastic does.
 const MAX_RATIO: f32 = 1.3;
 /// From the first transmittance on to the second a pixel turns to bare screen.
 const BARE_TRANSMITTANCE: RangeInclusive<f32> = 0.9..=0.97;

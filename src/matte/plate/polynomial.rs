@@ -30,7 +30,7 @@ const SHADOW_SIGMAS: f64 = 1.5;
 const CELL_NOISE: f64 = 2e-3;
 /// Cells a coefficient, at least.
 const MIN_CELLS_PER_COEFFICIENT: usize = 4;
-/// Every so many-th cell is left out of the fit that chooses the degree.
+/// One cell in this many is left out of the fit that chooses the degree.
 const HELD_OUT_STRIDE: usize = 3;
 
 /// A cell as the fit sees it: the monomials of its place, lower degrees first, and its channels' logarithms.
@@ -188,7 +188,7 @@ fn chosen_degree(samples: &[FitSample], opts: &PlateOptions) -> usize {
     degrees[lowest.unwrap_or(degrees.len() - 1)]
 }
 
-/// The degrees whose coefficients so many cells can determine.
+/// The degrees whose coefficients this number of cells can determine.
 fn usable_degrees(cells: usize, max_degree: usize) -> Vec<usize> {
     (0..=max_degree)
         .filter(|&d| d == 0 || cells >= MIN_CELLS_PER_COEFFICIENT * terms(d))

@@ -58,7 +58,7 @@ pub(super) struct Bands {
 }
 
 impl Bands {
-    /// Splits a photo into so many bands.
+    /// Splits a photo into `count` bands.
     pub(super) fn new(photo: &Image<LinearRgb>, luma: LumaMode, count: usize) -> Self {
         let mut channels: Vec<_> = luma
             .pictures(photo)
@@ -218,7 +218,7 @@ fn frame_values(image: &Image<f32>) -> Vec<f32> {
     values
 }
 
-/// Adds the first and the last so many values of a row, each once.
+/// Adds the first and the last `count` values of a row, each once.
 fn push_ends(values: &mut Vec<f32>, row: &[f32], count: usize) {
     let left = count.min(row.len());
     let right = row.len().saturating_sub(count).max(left);

@@ -33,7 +33,7 @@ pub(super) struct ChosenSearch<'a> {
 ///
 /// Half the size sees half the noise, and a third of it at a quarter; the bands then are as wide as those of one depth more.
 const SEARCHED_SIZES: [(usize, &[usize]); 3] = [(1, &[4, 3, 5, 2]), (2, &[3, 2, 4]), (4, &[2, 3])];
-/// The coarsest band has at least so many pixels along the longer side: below that, it does not separate an object from
+/// The coarsest band has at least this many pixels along the longer side: below that, it does not separate an object from
 /// the rest.
 const MIN_COARSEST_SIDE: usize = 30;
 /// Shorter side of a smaller picture, at least, pixels.
@@ -193,7 +193,7 @@ fn searches(scales: &[SearchScale<'_>], opts: &SegmentOptions) -> Vec<SearchResu
         .collect()
 }
 
-/// A stricter search has so many times the threshold of the finest band: half a step of exposure.
+/// Factor of the finest band's threshold in a stricter search: half a step of exposure.
 const STRICTER_FACTOR: f32 = 1.4;
 
 /// How far a side of the hull's box moves when edges must be stronger, or when the same picture is searched at another

@@ -115,7 +115,7 @@ fn push_joined(
     }
 }
 
-/// The first run of a run's group; what is on the way points nearer to it from then on.
+/// The first run of a run's group; runs on the way are pointed closer to it.
 fn first_of(runs: &mut [PixelRun], mut run: usize) -> usize {
     while runs[run].group != run {
         runs[run].group = runs[runs[run].group].group;

@@ -16,7 +16,7 @@ const LIKE_SHARE: f32 = 0.06;
 const LIKE_SIGMAS: f32 = 3.0;
 /// A pixel is unlike the screen when a channel differs by this share of the plate's strongest channel.
 const UNLIKE_SHARE: f32 = 0.3;
-/// Least area of a hole as a share of what is enclosed; smaller ones are a matter of the matte.
+/// Least area of a hole as a share of what is enclosed; smaller ones are left to the matte.
 const MIN_HOLE_AREA: f64 = 0.005;
 /// Share of the rim that must be unlike the screen: clear plastic is like it, and then what it encloses is the object.
 const OPAQUE_RIM_SHARE: f64 = 0.8;
@@ -97,7 +97,7 @@ fn is_like_screen(pixel: LinearRgb, plate: LinearRgb, noise: LinearRgb) -> bool 
     (0..3).all(|c| off[c] <= (LIKE_SHARE * plate[c]).max(LIKE_SIGMAS * noise[c]))
 }
 
-/// The cores of the groups that are large enough for a hole in an area of so many pixels.
+/// The cores of the groups that are large enough for a hole in an area of `area` pixels.
 fn large_groups(like: &Mask, area: usize) -> Vec<Mask> {
     let groups = PixelGroups::new(&filter::erode(like, 1.0));
     let sizes = groups.sizes(like);

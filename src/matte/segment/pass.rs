@@ -22,7 +22,7 @@ pub(super) struct Search {
     threshold: f32,
     /// Where the finest band is above its threshold.
     finest_binary: Mask,
-    /// Where the finest band is no mere smear of a stronger edge.
+    /// Where the finest band is more than the smear of a stronger edge.
     ridges: Mask,
 }
 
@@ -82,7 +82,7 @@ impl Search {
         self.pass(levels, &self.finest_binary, opts)
     }
 
-    /// The same with so many times the threshold of the finest band.
+    /// The same with `times` times the threshold of the finest band.
     pub(super) fn at_threshold(
         &self,
         levels: usize,
@@ -138,11 +138,11 @@ fn ridges(band: &Image<f32>, share: f32) -> Mask {
 const RIVAL_SHARE: f64 = 0.3;
 /// A smaller cluster is worth a warning from this share on.
 const REMNANT_SHARE: f64 = 0.05;
-/// So many clusters too small for a warning each give one together: where they lie on the screen, one may lie beside the
+/// This many clusters too small for a warning each give one together: where they lie on the screen, one may lie beside the
 /// object.
 const SPECK_COUNT: usize = 2;
 
-/// Edge pixels in clusters, of which the one with the most is the main one.
+/// Edge pixels in clusters; the largest cluster is the main one.
 struct EdgeClusters<'a> {
     edges: &'a Mask,
     groups: PixelGroups,
@@ -174,7 +174,7 @@ impl<'a> EdgeClusters<'a> {
         both(&self.groups.only(holds), self.edges)
     }
 
-    /// Where the main cluster and another one are, in words.
+    /// Descriptions of where the main cluster and another one are.
     fn places(&self, other: usize) -> [String; 2] {
         [self.main, other].map(|cluster| place(&self.only(|i| i == cluster)))
     }
@@ -267,14 +267,14 @@ fn possibly_two_objects(object: &Mask, join_px: f64) -> Option<Diagnostic> {
     Some(Diagnostic::warning(Code::TwoObjects, message))
 }
 
-/// The pixels of which more than a share lies in the convex hull of a set.
+/// The pixels that lie in the convex hull of a set by more than a share.
 fn under_hull(set: &Mask, share: f32) -> Mask {
     Outline::from_ring(hull::convex_hull(set))
         .coverage(set.width(), set.height())
         .map(|c| c.0 > share)
 }
 
-/// Where a set of pixels is, in words, as shares of the picture.
+/// Description of where a set of pixels is, as shares of the picture.
 fn place(set: &Mask) -> String {
     let hull = hull::convex_hull(set);
     let x = mean_percent(hull.iter().map(|p| p.x), set.width());

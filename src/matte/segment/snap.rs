@@ -9,13 +9,13 @@ use crate::matte::outline::{ring_length, sides};
 use crate::pixel::LinearRgb;
 use rayon::prelude::*;
 
-/// How far to either side of the outline the change is looked for, in pixels of the picture that was searched.
+/// How far to either side of the outline the change is searched for, in pixels of the picture that was searched.
 const PROFILE_REACH_PX: f64 = 1.5;
 /// Where the outside is taken from, beyond the reach, likewise.
 const OUTSIDE_PX: f64 = 2.0;
 /// Steps of a profile to a pixel of the search.
 const STEPS_PER_PX: usize = 4;
-/// Profiles are averaged over so many pixels of the photo along the outline.
+/// Profiles are averaged over this many pixels of the photo along the outline.
 const LANE_COUNT: i32 = 3;
 /// A change counts from this many times the noise on the outside.
 const MIN_CHANGE_SIGMAS: f32 = 5.0;

@@ -78,7 +78,7 @@ fn best_split(histogram: &[u64; HISTOGRAM_BINS]) -> usize {
     best_bin
 }
 
-/// Variance between two groups of so many values with these sums, times the square of all their number; negative where a
+/// Variance between two groups with these counts and sums, times the square of the total count; negative where a
 /// group is empty.
 fn variance_between(counts: [u64; 2], sums: [u64; 2]) -> f64 {
     if counts.contains(&0) {

@@ -63,18 +63,18 @@ impl PixelLines {
     }
 }
 
-/// Standard deviation of a transmittance of which nothing is known.
+/// Standard deviation of an unknown transmittance.
 const UNKNOWN_SIGMA: f32 = 1e3;
 /// Standard deviation of a transmittance inferred from other channels around what it is.
 const INFERRED_SIGMA: f32 = 0.06;
 /// Standard deviation of an open channel of the plastic that is inferred from its dye, as a share of it.
 const DYE_SIGMA: f32 = 0.15;
-/// Plates are so much off, as a share.
+/// Relative error of plates.
 const PLATE_ERROR: f32 = 0.01;
 /// Prior of a pixel's share of flat plastic, standard deviation around 0: plastic up to one and a half times as clear as
 /// flat.
 const SHARE_SIGMA: f32 = 1.5;
-/// Prior of a pixel's bare share, standard deviation around 0: now and then a rim with screen beside it.
+/// Prior of a pixel's bare share, standard deviation around 0: occasionally a rim with screen beside it.
 const BARE_SIGMA: f32 = 0.27;
 /// Standard deviation of transmittances around any sum of plastic and nothing.
 const MODEL_SIGMA: f32 = 0.015;
