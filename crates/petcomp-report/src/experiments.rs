@@ -227,7 +227,7 @@ impl PaperRow {
 }
 
 fn spread_of(ours: &BTreeMap<String, Vec<f64>>, key: &str) -> Option<Spread> {
-    Some(Spread::of(ours.get(key)?, 0))
+    Some(Spread::from_values(ours.get(key)?, 0))
 }
 
 /// Mean and deviation, interval and number of runs; empty without runs.

@@ -1,7 +1,7 @@
 //! What stands for an object in the physics world: a box, or a convex prism.
 
 use crate::geom::Vector3;
-use crate::scene::Object;
+use crate::scene::{Object, doubled_area};
 use rapier3d::prelude::{ColliderBuilder, Vector};
 
 /// The colliders of an object, `half` and `length` in the world's units: a box, or the parts of a
@@ -32,7 +32,7 @@ fn prism_parts(ring: &[[f64; 2]], half_height: f64, mass: f64) -> Option<Vec<Col
         .iter()
         .map(|part| plate(part, half_height))
         .collect::<Option<_>>()?;
-    let area = ring_area(ring);
+    let area = doubled_area(ring) / 2.0;
     let density = mass / (area * 2.0 * half_height);
     (area > 0.0).then(|| with_density(parts, density as f32))
 }
@@ -54,15 +54,6 @@ fn quarters(ring: &[[f64; 2]]) -> Vec<Vec<[f64; 2]>> {
             part
         })
         .collect()
-}
-
-fn ring_area(ring: &[[f64; 2]]) -> f64 {
-    let next = ring.iter().cycle().skip(1);
-    let crosses = ring
-        .iter()
-        .zip(next)
-        .map(|(a, b)| a[0] * b[1] - a[1] * b[0]);
-    crosses.sum::<f64>() / 2.0
 }
 
 /// A plate of this outline; none where the engine finds it too thin a shape.
@@ -95,11 +86,11 @@ mod tests {
             assert!(
                 parts
                     .iter()
-                    .all(|part| (3..=4).contains(&part.len()) && ring_area(part) > 0.0),
+                    .all(|part| (3..=4).contains(&part.len()) && 0.5 * doubled_area(part) > 0.0),
                 "{n}: {parts:?}"
             );
-            let sum: f64 = parts.iter().map(|part| ring_area(part)).sum();
-            assert!((sum - ring_area(&circle(n))).abs() < 1e-15, "{n}");
+            let sum: f64 = parts.iter().map(|part| 0.5 * doubled_area(part)).sum();
+            assert!((sum - 0.5 * doubled_area(&circle(n))).abs() < 1e-15, "{n}");
         }
         assert!(quarters(&[]).is_empty());
     }

@@ -4,7 +4,7 @@ use super::super::Trial;
 use super::sensor::noisy;
 use crate::matte::truth::Known;
 use petcomp::filter;
-use petcomp::{Coverage, Image, LinearRgb, Mix, Roi};
+use petcomp::{Coverage, Image, LinearRgb, Roi};
 use std::ops::Range;
 
 /// A photo whose left border cuts off a share of the object's width.
@@ -179,8 +179,8 @@ impl Inset {
     }
 
     fn photo(&self, known: &Known) -> Image<LinearRgb> {
-        let light = self.resize(&known.foreground);
-        let through = self.resize(&known.transmittance);
+        let [light, through] = [&known.foreground, &known.transmittance]
+            .map(|picture| filter::resize(picture, self.to[0], self.to[1]));
         self.image(|x, y, inside| {
             let screen = known.screen[(x, y)];
             inside.map_or(screen, |at| light[at] + through[at] * screen)
@@ -188,7 +188,7 @@ impl Inset {
     }
 
     fn mask(&self, known: &Known) -> Image<Coverage> {
-        let small = self.resize(&known.mask);
+        let small = filter::resize(&known.mask, self.to[0], self.to[1]);
         self.image(|_, _, inside| inside.map_or(Coverage(0.0), |at| small[at]))
     }
 
@@ -199,10 +199,6 @@ impl Inset {
     ) -> Image<P> {
         let [w, h] = self.from;
         Image::from_fn(w, h, |x, y| pixel(x, y, self.at(x, y)))
-    }
-
-    fn resize<P: Mix + Send + Sync>(&self, picture: &Image<P>) -> Image<P> {
-        filter::resize(picture, self.to[0], self.to[1])
     }
 
     /// The pixel of the smaller picture at a pixel of the frame; nothing beside it.
