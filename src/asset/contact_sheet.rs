@@ -94,16 +94,16 @@ fn write_lines(canvas: &mut Image<Srgb8>, lines: &[(String, Srgb8)]) {
 
 /// What is written over a cut-out: its size, and why it needs a review.
 fn lines_of(record: &PhotoRecord) -> Vec<(String, Srgb8)> {
-    let title = title(record);
-    let reasons = record.diagnostics.iter().map(|d| (&d.message, WARNING));
-    std::iter::once((&title, INK))
-        .chain(reasons)
-        .flat_map(|(text, ink)| {
-            draw::wrapped(text, STRIP_WIDTH_PX, TextSize::Small)
-                .into_iter()
-                .map(move |line| (line, ink))
-        })
-        .collect()
+    let title = wrapped_in(INK, &title(record));
+    let messages = record.diagnostics.iter().map(|d| &d.message);
+    let reasons = messages.flat_map(|message| wrapped_in(WARNING, message));
+    title.into_iter().chain(reasons).collect()
+}
+
+/// The lines of a text in one colour.
+fn wrapped_in(ink: Srgb8, text: &str) -> Vec<(String, Srgb8)> {
+    let lines = draw::wrapped(text, STRIP_WIDTH_PX, TextSize::Small);
+    lines.into_iter().map(|line| (line, ink)).collect()
 }
 
 fn title(record: &PhotoRecord) -> String {

@@ -254,11 +254,16 @@ fn grid_row(panorama: &Image<LinearRgb>, j: usize) -> Vec<Moments> {
     let mut cells = vec![Moments::default(); GRID_CELLS[0]];
     for t in 0..down {
         let [top, v, bottom] = [0.0, 0.5, 1.0].map(|part| grid_v(j, t as f64 + part, down));
-        let band = libm::cos(PI * top) - libm::cos(PI * bottom);
-        let solid_angle = band * TAU / (GRID_CELLS[0] * across) as f64;
+        let solid_angle = line_solid_angle([top, bottom], GRID_CELLS[0] * across);
         add_line(panorama, v, solid_angle, across, &mut cells);
     }
     cells
+}
+
+/// Of one of so many places along a line.
+fn line_solid_angle([top, bottom]: [f64; 2], places: usize) -> f64 {
+    let band = libm::cos(PI * top) - libm::cos(PI * bottom);
+    band * TAU / places as f64
 }
 
 /// The place down the panorama of line `t` of so many in a row of the grid.

@@ -190,11 +190,14 @@ fn layer_part(deep: &DeepImage, id: ObjectId, tinted: bool) -> Part {
         let values = values.map(|(p, _)| [p.r, p.g, p.b, p.a]);
         return float_part(name, ["R", "G", "B", "A"], values);
     }
-    float_part(
-        name,
-        ["R", "G", "B", "A", "TR", "TG", "TB"],
-        values.map(|(p, h)| [p.r, p.g, p.b, p.a, 1.0 - h.r, 1.0 - h.g, 1.0 - h.b]),
-    )
+    let names = ["R", "G", "B", "A", "TR", "TG", "TB"];
+    float_part(name, names, values.map(tinted_values))
+}
+
+/// Light, coverage, and what is let pass per channel.
+fn tinted_values((p, hidden): (PremulRgba, LinearRgb)) -> [f32; 7] {
+    let passes = hidden.map(|h| 1.0 - h);
+    [p.r, p.g, p.b, p.a, passes.r, passes.g, passes.b]
 }
 
 /// Light and coverage of an object in one pixel, and what it hides per channel.

@@ -59,16 +59,24 @@ fn encode<P: ToFile>(
 ) -> std::result::Result<(), Refusal> {
     openimageio::start()?;
     let format = Format::from_extension(path).ok_or("an extension that is not written")?;
-    let bits = match format {
-        Format::Dpx | Format::Cineon => options.bits.unwrap_or(Bits::Sixteen),
-        _ => sample_storage::<P>(Some(format), options.bits)?,
-    };
+    let bits = written_bits::<P>(format, options.bits)?;
     let name = path
         .to_str()
         .ok_or("a file name that is not UTF-8, which OpenImageIO cannot open")?;
     let layout = openimageio::written_layout(image.size(), P::NAMES, bits);
     let samples = sample_bytes(image, bits);
     openimageio::write_file(name, format, &layout, &samples, &options.metadata)
+}
+
+/// As asked, or the format's own; film scans have 16 bits.
+fn written_bits<P: ToFile>(
+    format: Format,
+    asked: Option<Bits>,
+) -> std::result::Result<Bits, String> {
+    match format {
+        Format::Dpx | Format::Cineon => Ok(asked.unwrap_or(Bits::Sixteen)),
+        _ => sample_storage::<P>(Some(format), asked),
+    }
 }
 
 /// The samples of a picture in native byte order.

@@ -89,13 +89,26 @@ fn encode<P: ToFile>(
     check_not_empty(image.size())?;
     work::add(Kind::Encodes, 1);
     let format = Format::from_extension(path);
-    let metadata = &options.metadata;
-    match (format, sample_storage::<P>(format, options.bits)?) {
-        (Some(Format::Exr), bits) => encode_exr(image, bits, options),
-        (Some(Format::Tiff), Bits::Float) => encode_float_tiff(image, metadata),
-        (Some(Format::Tiff), bits) => tiff::encode_codes(&CodedImage::new(image, bits), metadata),
-        (Some(Format::Jpeg), _) => encode_jpeg(image, options),
-        (_, bits) => png::encode(&CodedImage::new(image, bits), options.png_effort, metadata),
+    let bits = sample_storage::<P>(format, options.bits)?;
+    match format {
+        Some(Format::Exr) => encode_exr(image, bits, options),
+        Some(Format::Tiff) => encode_tiff(image, bits, &options.metadata),
+        Some(Format::Jpeg) => encode_jpeg(image, options),
+        _ => {
+            let codes = CodedImage::new(image, bits);
+            png::encode(&codes, options.png_effort, &options.metadata)
+        }
+    }
+}
+
+fn encode_tiff<P: ToFile>(
+    image: &Image<P>,
+    bits: Bits,
+    metadata: &[(String, String)],
+) -> std::result::Result<Vec<u8>, String> {
+    match bits {
+        Bits::Float => encode_float_tiff(image, metadata),
+        _ => tiff::encode_codes(&CodedImage::new(image, bits), metadata),
     }
 }
 
@@ -123,24 +136,37 @@ pub(super) fn sample_storage<P: ToFile>(
     Err(format!("{} samples, expected {expected}", bits.name()))
 }
 
-/// What a format can store of a pixel that means something in integers, or of one that does not; its own choice first.
+/// What a format can store of a pixel that means something in integers (`coded`), or of one that does not; its own choice
+/// first.
 fn possible_storage(
     format: Option<Format>,
     coded: bool,
 ) -> std::result::Result<&'static [Bits], String> {
-    match (format, coded) {
-        (Some(Format::Exr), true) => Ok(&[Bits::Half, Bits::Float]),
-        (Some(Format::Exr), false) => Ok(&[Bits::Float, Bits::Half]),
-        (Some(Format::Tiff), true) => Ok(&[Bits::Sixteen, Bits::Eight, Bits::Float]),
-        (Some(Format::Tiff), false) => Ok(&[Bits::Float]),
-        (Some(Format::Png), true) => Ok(&[Bits::Eight, Bits::Sixteen]),
-        (Some(Format::Jpeg), true) => Ok(&[Bits::Eight]),
-        (Some(Format::Png | Format::Jpeg), false) => {
+    if coded {
+        return possible_codes(format);
+    }
+    match format {
+        Some(Format::Exr) => Ok(&[Bits::Float, Bits::Half]),
+        Some(Format::Tiff) => Ok(&[Bits::Float]),
+        Some(Format::Png | Format::Jpeg) => {
             Err("a depth or a film needs float samples: .exr or .tif".into())
         }
-        _ => Err("cannot be written, expected the extension .exr, .png, .jpg or .tif".into()),
+        _ => Err(NOT_WRITTEN.into()),
     }
 }
+
+/// The same for a pixel that means something in integers.
+fn possible_codes(format: Option<Format>) -> std::result::Result<&'static [Bits], String> {
+    match format {
+        Some(Format::Exr) => Ok(&[Bits::Half, Bits::Float]),
+        Some(Format::Tiff) => Ok(&[Bits::Sixteen, Bits::Eight, Bits::Float]),
+        Some(Format::Png) => Ok(&[Bits::Eight, Bits::Sixteen]),
+        Some(Format::Jpeg) => Ok(&[Bits::Eight]),
+        _ => Err(NOT_WRITTEN.into()),
+    }
+}
+
+const NOT_WRITTEN: &str = "cannot be written, expected the extension .exr, .png, .jpg or .tif";
 
 fn encode_exr<P: ToFile>(
     image: &Image<P>,

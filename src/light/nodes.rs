@@ -97,17 +97,15 @@ pub(crate) fn nodes_above(
     normal: &Vector3<f64>,
 ) -> Vec<Node> {
     let frame = frame(light);
-    let half = half_sides(light);
-    let horizon = LightHorizon::new(&frame, half, point, normal);
-    let left = match light.shape {
-        LightShape::Rectangle if horizon.cuts_square() => horizon.strips(per_side.max(1)),
-        LightShape::Ellipse if horizon.cuts_disk() => horizon.chords(per_side.max(1)),
-        _ => return nodes(light, per_side),
+    let [a, b] = half_sides(light);
+    let horizon = LightHorizon::new(&frame, [a, b], point, normal);
+    let Some(left) = horizon.visible_part(light.shape, per_side.max(1)) else {
+        return nodes(light, per_side);
     };
     left.into_iter()
         .map(|([x, y], area)| Node {
-            point: frame.point(x * half[0], y * half[1]),
-            area: area * half[0] * half[1],
+            point: frame.point(x * a, y * b),
+            area: area * a * b,
         })
         .collect()
 }
@@ -127,6 +125,14 @@ impl LightHorizon {
                 half[0] * normal.dot(&frame.x),
                 half[1] * normal.dot(&frame.y),
             ],
+        }
+    }
+
+    /// Points and areas of what the plane leaves, with the light's sides running from -1 to 1; none where it cuts nothing.
+    fn visible_part(&self, shape: LightShape, per_side: usize) -> Option<Vec<([f64; 2], f64)>> {
+        match shape {
+            LightShape::Rectangle => self.cuts_square().then(|| self.strips(per_side)),
+            LightShape::Ellipse => self.cuts_disk().then(|| self.chords(per_side)),
         }
     }
 
@@ -168,20 +174,27 @@ impl LightHorizon {
     /// Points and areas in the unit disk above the plane.
     fn chords(&self, n: usize) -> Vec<([f64; 2], f64)> {
         let steepest = self.rise[0].hypot(self.rise[1]);
-        let [x, y] = self.rise.map(|r| r / steepest);
+        let up = self.rise.map(|r| r / steepest);
         let widest = libm::acos((-self.middle / steepest).clamp(-1.0, 1.0));
         // Chords of a nearly whole disk grow and shrink again: n of them miss its area by 2 %.
         let (across, along) = (gauss_legendre(2 * n), gauss_legendre(n));
         let mut points = Vec::with_capacity(2 * n * n);
         for (angle, width) in rule_on([0.0, widest], &across) {
             let (half, at) = libm::sincos(angle);
-            points.extend(along.iter().map(|&(t, w)| {
-                let point = [at * x - half * t * y, at * y + half * t * x];
-                (point, width * half * half * w)
-            }));
+            points.extend(
+                along
+                    .iter()
+                    .map(|&(t, w)| (point_on_chord(up, at, half * t), width * half * half * w)),
+            );
         }
         points
     }
+}
+
+/// A point of the chord across a unit direction at a distance from the middle, so far from the chord's own middle.
+#[inline]
+fn point_on_chord([x, y]: [f64; 2], at: f64, along: f64) -> [f64; 2] {
+    [at * x - along * y, at * y + along * x]
 }
 
 /// The part of -1..1 where `start + slope x` is above 0.

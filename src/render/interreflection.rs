@@ -37,15 +37,15 @@ pub fn interreflect(deep: DeepImage, shot: &Shot, albedo: LinearRgb) -> DeepImag
     let (Some(surface), Some(bounce)) = (surface, BounceMap::new(shot)) else {
         return deep;
     };
-    deep.map_shadow(|x, y, factor| {
-        let p = pixel_center(x, y);
-        let w = surface.w.dot(&p);
-        if w <= 0.0 {
-            return factor;
-        }
-        let back = albedo * bounce.at(&(surface.point * p / w));
-        factor * back.map(|b| 1.0 / (1.0 - b.clamp(0.0, MAX_BOUNCE)))
+    deep.map_shadow(|x, y, factor| match surface.point_at(&pixel_center(x, y)) {
+        Some(point) => factor * endless_bounces(albedo * bounce.at(&point)),
+        None => factor,
     })
+}
+
+/// What light becomes that comes back by these shares again and again.
+fn endless_bounces(back: LinearRgb) -> LinearRgb {
+    back.map(|b| 1.0 / (1.0 - b.clamp(0.0, MAX_BOUNCE)))
 }
 
 /// What comes back from above, on a grid over the part of the surface that has cards over it.
@@ -67,10 +67,11 @@ impl BounceMap {
             let (x, y) = (left + i as f64 * step, bottom + j as f64 * step);
             light_from_above(&cards, &Vector3::new(x, y, 0.0))
         });
+        let spread = (BOUNCE_SPREAD_M / step) as f32;
         Some(Self {
             corner: [left, bottom],
             step,
-            back: gaussian_blur(&back, (BOUNCE_SPREAD_M / step) as f32),
+            back: gaussian_blur(&back, spread),
         })
     }
 

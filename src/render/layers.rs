@@ -157,6 +157,11 @@ impl Layer {
         (self.plane.w.dot(p) / self.plane.height) as f32
     }
 
+    /// It is no farther away than another layer.
+    fn is_before(&self, other: &Self, p: &Vector3<f64>) -> bool {
+        self.reciprocal_depth(p) >= other.reciprocal_depth(p)
+    }
+
     /// Depth at a pixel's centre; as far as can be where the plane is behind the camera.
     fn depth_at(&self, x: usize, y: usize) -> Depth {
         let w = self.plane.w.dot(&pixel_center(x, y));
@@ -225,9 +230,7 @@ impl LayerStack {
     fn is_sorted_at(&self, layers: &[usize], corners: &[Vector3<f64>; 4]) -> bool {
         layers.windows(2).all(|pair| {
             let [near, far] = [pair[0], pair[1]].map(|k| &self.layers[k]);
-            corners
-                .iter()
-                .all(|p| near.reciprocal_depth(p) >= far.reciprocal_depth(p))
+            corners.iter().all(|p| near.is_before(far, p))
         })
     }
 

@@ -373,10 +373,7 @@ impl Receiver {
         let nearest = plane.height / HORIZON_M;
         for (axis, out) in out.iter_mut().enumerate() {
             out.resize(asked.len(), 0.0);
-            for (i, out) in out.iter_mut().enumerate() {
-                let k = i as f64;
-                *out = ((p[axis] + k * step[axis]) / (w + k * w_step).max(nearest)) as f32;
-            }
+            fill_quotients((p[axis], step[axis]), (w, w_step), nearest, out);
         }
     }
 }
@@ -444,6 +441,15 @@ impl RowBuffers {
             let through = &mut through[nodes.start - all.start..nodes.end - all.start];
             self.counts.through += ray.shadows[*k].attenuate(channel, j, nodes, through);
         }
+    }
+}
+
+/// Quotients along a row: of two numbers and their steps, the divisor never below a bound.
+#[inline]
+fn fill_quotients(p: (f64, f64), w: (f64, f64), lowest: f64, out: &mut [f32]) {
+    for (i, out) in out.iter_mut().enumerate() {
+        let k = i as f64;
+        *out = ((p.0 + k * p.1) / (w.0 + k * w.1).max(lowest)) as f32;
     }
 }
 

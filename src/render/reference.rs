@@ -240,10 +240,8 @@ impl<'a> ReferenceWorld<'a> {
         let cards = self.cards.iter().enumerate();
         let others = cards.filter(|&(k, _)| Some(k) != own);
         others.fold(LinearRgb::WHITE, |through, (_, card)| {
-            match crossing_uv(&card.plane, p, sample) {
-                Some(uv) => through * card.texel(uv, p).transmittance(),
-                None => through,
-            }
+            card.passes(p, sample)
+                .map_or(through, |passes| through * passes)
         })
     }
 
@@ -307,6 +305,12 @@ impl<'a> ReferenceCard<'a> {
             depth,
             normal: projected.normal,
         })
+    }
+
+    /// Share of a sample's light that it lets through to a point; none where it is not in the way.
+    fn passes(&self, p: &Vector3<f64>, sample: &LightSample) -> Option<LinearRgb> {
+        let uv = crossing_uv(&self.plane, p, sample)?;
+        Some(self.texel(uv, p).transmittance())
     }
 
     fn texel(&self, uv: [f64; 2], from: &Vector3<f64>) -> Film {

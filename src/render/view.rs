@@ -271,6 +271,12 @@ impl ProjectedPlane {
         along_x.cross(&along_y).norm().sqrt()
     }
 
+    /// The world point at a pixel position `(x, y, 1)`; none behind the eye.
+    pub(super) fn point_at(&self, p: &Vector3<f64>) -> Option<Vector3<f64>> {
+        let w = self.w.dot(p);
+        (w > 0.0).then(|| self.point * p / w)
+    }
+
     /// Texture coordinates and depth at a pixel position; none outside the plane or behind the eye.
     pub(super) fn intersect_px(&self, x: f64, y: f64) -> Option<([f64; 2], f64)> {
         let p = Vector3::new(x, y, 1.0);

@@ -54,7 +54,8 @@ pub(super) fn doubled_corner_area(ring: &[[f64; 2]], i: usize) -> f64 {
     (b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0])
 }
 
-fn doubled_area(ring: &[[f64; 2]]) -> f64 {
+/// Twice the area of a ring; above 0 where it turns left.
+pub(crate) fn doubled_area(ring: &[[f64; 2]]) -> f64 {
     let next = ring.iter().cycle().skip(1);
     ring.iter()
         .zip(next)

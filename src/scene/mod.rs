@@ -73,6 +73,8 @@ pub use fall::SettleOptions;
 pub(crate) use fall::{half_extent, level};
 pub(crate) use files::relative_to_file;
 pub use files::{SceneFiles, SceneSettings};
+#[cfg(feature = "settle")]
+pub(crate) use hull::doubled_area;
 pub use light::{AreaLight, Exposure, LightShape, LightTint};
 pub use locate::locate;
 pub use placement::{Grade, Object, Placement};

@@ -86,12 +86,9 @@ impl DropColumn<'_> {
     pub(super) fn stack(&self, objects: &mut [Object]) -> Result<()> {
         let mut top = 0.0;
         for (i, object) in objects.iter_mut().enumerate() {
-            let half = self.options.half_body(object);
+            let rotation = self.rotation_of(i, object)?;
+            let extent = half_extent(&rotation, &self.options.half_body(object));
             let path = format!("objects[{i}].start");
-            let rotation = self.fitting_rotation(&half, &path).ok_or_else(|| {
-                Error::value(format!("objects[{i}].size"), self.fit_problem(object))
-            })?;
-            let extent = half_extent(&rotation, &half);
             let above = self.draw_position(&extent, &path);
             let height = top + self.draw(&self.start.gap, &path, "gap") + extent.z;
             top = height + extent.z;
@@ -102,6 +99,12 @@ impl DropColumn<'_> {
             };
         }
         Ok(())
+    }
+
+    fn rotation_of(&self, i: usize, object: &Object) -> Result<UnitQuaternion<f64>> {
+        let half = self.options.half_body(object);
+        self.fitting_rotation(&half, &format!("objects[{i}].start"))
+            .ok_or_else(|| Error::value(format!("objects[{i}].size"), self.fit_problem(object)))
     }
 
     fn draw(&self, range: &Range, path: &str, name: &str) -> f64 {
@@ -152,10 +155,8 @@ impl DropColumn<'_> {
     /// A tilt about a horizontal axis.
     fn draw_tilt(&self, path: &str) -> UnitQuaternion<f64> {
         let towards = self.draw(&self.start.tilt_axis_deg, path, "tilt_axis_deg");
-        let towards = towards.to_radians();
-        let axis = Unit::new_unchecked(Vector3::new(libm::cos(towards), libm::sin(towards), 0.0));
         let tilt = self.draw(&self.start.tilt_deg, path, "tilt_deg");
-        UnitQuaternion::from_axis_angle(&axis, tilt.to_radians())
+        UnitQuaternion::from_axis_angle(&horizontal_axis(towards), tilt.to_radians())
     }
 }
 
@@ -184,6 +185,11 @@ fn whole_degrees(Range { min, max }: Range) -> impl Iterator<Item = f64> {
         .map(move |i| min.ceil() + f64::from(i))
         .take_while(move |degrees| *degrees < max);
     [min, max].into_iter().chain(whole)
+}
+
+fn horizontal_axis(degrees: f64) -> Unit<Vector3<f64>> {
+    let towards = degrees.to_radians();
+    Unit::new_unchecked(Vector3::new(libm::cos(towards), libm::sin(towards), 0.0))
 }
 
 fn level_turn(degrees: f64) -> UnitQuaternion<f64> {

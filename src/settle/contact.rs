@@ -205,8 +205,13 @@ fn drop_right_turns(chain: &mut Vec<Vector2<f64>>, next: &Vector2<f64>) {
 fn shared_corners(a: &[Vector2<f64>], b: &[Vector2<f64>], reach: f64) -> Vec<Vector2<f64>> {
     let of_a = a.iter().filter(|p| is_near(p, b, reach));
     let of_b = b.iter().filter(|p| is_near(p, a, reach));
-    let crossings = sides(a).flat_map(|s| sides(b).filter_map(move |t| crossing(s, t)));
-    of_a.chain(of_b).copied().chain(crossings).collect()
+    let corners = of_a.chain(of_b).copied();
+    corners.chain(crossings(a, b)).collect()
+}
+
+/// Where the sides of two rings cross.
+fn crossings(a: &[Vector2<f64>], b: &[Vector2<f64>]) -> impl Iterator<Item = Vector2<f64>> {
+    sides(a).flat_map(move |s| sides(b).filter_map(move |t| crossing(s, t)))
 }
 
 /// The sides of a ring; one of two points, none of one.

@@ -258,13 +258,17 @@ fn check_starts(scene: &Scene) -> Result<()> {
         if let Placement::Drop { above: [x, y], .. } = object.placement
             && (x.abs() > w / 2.0 || y.abs() > h / 2.0)
         {
-            return Err(Error::value(
-                format!("objects[{i}].placement.drop.above"),
-                format!("[{x}, {y}], expected over the surface of {w} x {h} m around the origin"),
-            ));
+            return Err(starts_outside(i, [x, y], scene.surface.size));
         }
     }
     Ok(())
+}
+
+fn starts_outside(i: usize, [x, y]: [f64; 2], [w, h]: [f64; 2]) -> Error {
+    Error::value(
+        format!("objects[{i}].placement.drop.above"),
+        format!("[{x}, {y}], expected over the surface of {w} x {h} m around the origin"),
+    )
 }
 
 #[cfg(test)]
@@ -553,6 +557,7 @@ mod tests {
     }
 
     /// The longest that is within bounds.
+    #[cfg(feature = "counters")]
     fn endless() -> SettleOptions {
         let slow = SettleOptions {
             step: 1e-4,

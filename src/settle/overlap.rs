@@ -71,15 +71,20 @@ impl Solid {
     /// Unit directions of the edges of its base, each once for opposite sides that are parallel; in
     /// the world.
     fn base_edges(&self, axes: &[Vector3<f64>; 3]) -> Vec<Vector3<f64>> {
-        let next = self.outline.iter().cycle().skip(1);
         let mut edges: Vec<Vector3<f64>> = Vec::with_capacity(self.outline.len() + 1);
-        for (a, b) in self.outline.iter().zip(next) {
-            let side = (axes[0] * (b[0] - a[0]) + axes[1] * (b[1] - a[1])).normalize();
+        for side in self.base_sides(axes) {
             if edges.iter().all(|edge| are_oblique(edge, &side)) {
                 edges.push(side);
             }
         }
         edges
+    }
+
+    /// Unit directions of the sides of its base, in order.
+    fn base_sides(&self, axes: &[Vector3<f64>; 3]) -> impl Iterator<Item = Vector3<f64>> {
+        let next = self.outline.iter().cycle().skip(1);
+        let sides = self.outline.iter().zip(next);
+        sides.map(|(a, b)| (axes[0] * (b[0] - a[0]) + axes[1] * (b[1] - a[1])).normalize())
     }
 }
 

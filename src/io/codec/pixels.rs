@@ -266,10 +266,7 @@ impl SampleRows<'_> {
         let colored = self.count_colored([r, g, b]);
         match alpha.first() {
             None if colored == 0 => Ok(r),
-            None => {
-                let expected = Wanted::Coverage.expected();
-                Err(format!("{colored} coloured pixels, expected {expected}"))
-            }
+            None => Err(not_a_matte(colored)),
             Some(&a) if colored == 0 && self.count_transparent(a) == 0 => Ok(r),
             Some(&a) if r != g => Ok(a),
             Some(_) => Err(Wanted::Coverage.missing_among(&self.raster.names)),
@@ -402,6 +399,11 @@ impl SampleRows<'_> {
         samples[self.rows.start * row..self.rows.end * row]
             .par_chunks_exact(self.raster.names.len())
     }
+}
+
+fn not_a_matte(colored: usize) -> String {
+    let expected = Wanted::Coverage.expected();
+    format!("{colored} coloured pixels, expected {expected}")
 }
 
 /// How far apart three channels lie.

@@ -84,6 +84,26 @@ impl Samples {
         matches!(self, Self::F16(_) | Self::F32(_))
     }
 
+    /// Those of one of so many channels.
+    fn one_channel(&self, count: usize, channel: usize) -> Self {
+        match self {
+            Self::U8(v) => Self::U8(one_channel(v, count, channel)),
+            Self::U16(v) => Self::U16(one_channel(v, count, channel)),
+            Self::F16(v) => Self::F16(one_channel(v, count, channel)),
+            Self::F32(v) => Self::F32(one_channel(v, count, channel)),
+        }
+    }
+
+    /// Those of the upright picture, `n` to a pixel, where the stored one has this size.
+    fn turned(&self, by: Orientation, n: usize, stored: (usize, usize)) -> Self {
+        match self {
+            Self::U8(v) => Self::U8(by.apply(v, n, stored)),
+            Self::U16(v) => Self::U16(by.apply(v, n, stored)),
+            Self::F16(v) => Self::F16(by.apply(v, n, stored)),
+            Self::F32(v) => Self::F32(by.apply(v, n, stored)),
+        }
+    }
+
     /// Gives the memory of the last samples back.
     pub(crate) fn shorten(&mut self, count: usize) {
         match self {
@@ -142,15 +162,9 @@ impl Raster {
         if count == 1 {
             return self;
         }
-        let samples = match &self.samples {
-            Samples::U8(v) => Samples::U8(one_channel(v, count, channel)),
-            Samples::U16(v) => Samples::U16(one_channel(v, count, channel)),
-            Samples::F16(v) => Samples::F16(one_channel(v, count, channel)),
-            Samples::F32(v) => Samples::F32(one_channel(v, count, channel)),
-        };
         Self {
             names: vec![self.names[channel].clone()],
-            samples,
+            samples: self.samples.one_channel(count, channel),
             ..self
         }
     }
@@ -160,18 +174,12 @@ impl Raster {
         if !orientation.turns() {
             return self;
         }
-        let (stored, n) = ((self.width, self.height), self.names.len());
-        let samples = match &self.samples {
-            Samples::U8(v) => Samples::U8(orientation.apply(v, n, stored)),
-            Samples::U16(v) => Samples::U16(orientation.apply(v, n, stored)),
-            Samples::F16(v) => Samples::F16(orientation.apply(v, n, stored)),
-            Samples::F32(v) => Samples::F32(orientation.apply(v, n, stored)),
-        };
+        let stored = (self.width, self.height);
         let (width, height) = orientation.size(stored);
         Self {
             width,
             height,
-            samples,
+            samples: self.samples.turned(orientation, self.names.len(), stored),
             ..self
         }
     }

@@ -108,11 +108,13 @@ fn stored_channels(decoder: &mut Decoder<impl Read + Seek>) -> Result<(u64, u8),
         } if is_alpha(&extra) => Ok((2, bit_depth)),
         ColorType::RGB(bits) => Ok((3, bits)),
         ColorType::RGBA(bits) | ColorType::CMYK(bits) => Ok((4, bits)),
-        other => {
-            let kind = format!("{other:?}").to_lowercase().replace(['(', ')'], " ");
-            Err(unsupported(&kind.trim()))
-        }
+        other => Err(unsupported_color(other)),
     }
+}
+
+fn unsupported_color(kind: ColorType) -> Refusal {
+    let name = format!("{kind:?}").to_lowercase().replace(['(', ')'], " ");
+    unsupported(&name.trim())
 }
 
 fn extra_samples(decoder: &mut Decoder<impl Read + Seek>) -> Result<Vec<u16>, TiffError> {
@@ -153,12 +155,15 @@ fn first_tags(file: &mut (impl Read + Seek)) -> std::io::Result<Vec<u16>> {
     file.seek(SeekFrom::Start(directory))?;
     let entries = read_integer(file, count, little)?.min(u64::from(u16::MAX));
     (0..entries)
-        .map(|_| {
-            let tag = read_integer(file, 2, little)? as u16;
-            file.seek_relative(entry - 2)?;
-            Ok(tag)
-        })
+        .map(|_| read_tag(file, entry, little))
         .collect()
+}
+
+/// The number of an entry of so many bytes, which is passed over.
+fn read_tag(file: &mut (impl Read + Seek), bytes: i64, little: bool) -> std::io::Result<u16> {
+    let tag = read_integer(file, 2, little)? as u16;
+    file.seek_relative(bytes - 2)?;
+    Ok(tag)
 }
 
 /// An integer of at most 8 bytes.

@@ -81,8 +81,8 @@ impl<'de> Visitor<'de> for KeyCheck {
         let (inside, mut keys) = (self.deeper()?, HashSet::new());
         while let Some(key) = object.next_key::<String>()? {
             object.next_value_seed(inside)?;
-            if !keys.insert(key.clone()) {
-                return Err(A::Error::custom(format!("key \"{key}\" twice")));
+            if let Some(twice) = keys.replace(key) {
+                return Err(A::Error::custom(format!("key \"{twice}\" twice")));
             }
         }
         Ok(())
@@ -112,11 +112,7 @@ fn find_in_value(
 ) -> Option<(String, Range<usize>)> {
     let deeper = levels.and_then(|n| n.checked_sub(1));
     match value {
-        DeValue::Float(number) if is_finite(number.as_str()) => None,
-        DeValue::Float(number) => {
-            let what = format!("{}, expected a finite number", number.as_str());
-            Some((what, span))
-        }
+        DeValue::Float(number) => Some((finite_problem(number.as_str())?, span)),
         DeValue::Array(_) if deeper.is_none() => Some((too_deep(max_depth), span)),
         DeValue::Array(list) => list
             .iter()
@@ -126,8 +122,10 @@ fn find_in_value(
     }
 }
 
-fn is_finite(number: &str) -> bool {
-    number.replace('_', "").parse().is_ok_and(f64::is_finite)
+/// The message about a number that is not finite.
+fn finite_problem(number: &str) -> Option<String> {
+    let is_finite = number.replace('_', "").parse().is_ok_and(f64::is_finite);
+    (!is_finite).then(|| format!("{number}, expected a finite number"))
 }
 
 fn find_in_table(

@@ -11,22 +11,27 @@ pub(super) struct DocumentMistake {
 }
 
 impl DocumentMistake {
+    /// One that is not a field's.
+    pub(super) fn in_document(line: Option<usize>, what: String) -> Self {
+        let at = String::new();
+        Self { at, line, what }
+    }
+
     pub(super) fn into_error(self) -> Error {
         let (at, what) = self.place_and_message();
-        match (at, self.line) {
-            ("" | "." | "?", None) => Error::value("document", what),
-            ("" | "." | "?", Some(line)) => Error::value(format!("line {line}"), what),
-            (at, None) => Error::value(at, what),
-            (at, Some(line)) => Error::value(at, format!("{what} (line {line})")),
+        let is_document = matches!(at, "" | "." | "?");
+        match self.line {
+            None if is_document => Error::value("document", what),
+            Some(line) if is_document => Error::value(format!("line {line}"), what),
+            None => Error::value(at, what),
+            Some(line) => Error::value(at, format!("{what} (line {line})")),
         }
     }
 
     fn place_and_message(&self) -> (&str, String) {
         let at = self.at.as_str();
         if let Some((key, what)) = unknown_key(&self.what) {
-            // The path of an unknown key ends with the key itself, which the message names anyway.
-            let outer = at.strip_suffix(key).map(|at| at.trim_end_matches('.'));
-            return (outer.unwrap_or(at), what);
+            return (outer_path(at, key), what);
         }
         match missing_key(&self.what) {
             Some(key) => (at, format!("missing key \"{key}\"")),
@@ -35,25 +40,36 @@ impl DocumentMistake {
     }
 }
 
+/// The path of an unknown key ends with the key itself, which the message names anyway.
+fn outer_path<'a>(at: &'a str, key: &str) -> &'a str {
+    let outer = at.strip_suffix(key).map(|at| at.trim_end_matches('.'));
+    outer.unwrap_or(at)
+}
+
 /// The same without the names that Rust has for what was expected.
 fn without_rust_types(message: &str) -> String {
     let Some((front, wanted)) = message.rsplit_once("expected ") else {
         return message.into();
     };
     let kind = wanted.split(' ').next().unwrap_or_default();
-    let words = match kind {
-        "u8" => "an integer from 0 to 255",
-        "u16" => "an integer from 0 to 65535",
-        "u32" => "an integer from 0 to 4294967295",
-        "u64" | "usize" => "an integer from 0",
-        "i8" | "i16" | "i32" | "i64" | "isize" => "an integer",
-        "f32" | "f64" => "a number",
-        "struct" | "internally" | "adjacently" => "a table",
-        "enum" | "variant" => "a name",
-        "tuple" => "a list",
-        _ => wanted,
-    };
+    let words = plain_name(kind).unwrap_or(wanted);
     format!("{front}expected {words}")
+}
+
+/// What people call a kind of value that has this name in Rust or serde.
+fn plain_name(kind: &str) -> Option<&'static str> {
+    match kind {
+        "u8" => Some("an integer from 0 to 255"),
+        "u16" => Some("an integer from 0 to 65535"),
+        "u32" => Some("an integer from 0 to 4294967295"),
+        "u64" | "usize" => Some("an integer from 0"),
+        "i8" | "i16" | "i32" | "i64" | "isize" => Some("an integer"),
+        "f32" | "f64" => Some("a number"),
+        "struct" | "internally" | "adjacently" => Some("a table"),
+        "enum" | "variant" => Some("a name"),
+        "tuple" => Some("a list"),
+        _ => None,
+    }
 }
 
 /// The key and our message, from serde's "unknown field `cuont`, expected one of `count`, `size`".
@@ -80,9 +96,11 @@ pub(crate) fn suggestion(key: &str, known: &[&str]) -> String {
         .min_by_key(|name| strsim::damerau_levenshtein(key, name));
     match nearest {
         None => "expected none".into(),
-        Some(near) if strsim::normalized_damerau_levenshtein(key, near) >= SIMILAR_SHARE => {
-            format!("did you mean \"{near}\"?")
-        }
+        Some(near) if are_similar(key, near) => format!("did you mean \"{near}\"?"),
         Some(_) => format!("expected one of {}", known.join(", ")),
     }
+}
+
+fn are_similar(a: &str, b: &str) -> bool {
+    strsim::normalized_damerau_levenshtein(a, b) >= SIMILAR_SHARE
 }

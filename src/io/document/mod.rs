@@ -40,14 +40,15 @@ pub(crate) fn read_toml_with<T: DeserializeOwned>(
         return read_toml(path);
     }
     let mut document: toml::Table = read_toml(path)?;
-    overrides
-        .iter()
-        .try_for_each(|o| o.apply(&mut document))
-        .map_err(|e| e.in_file(path))?;
+    apply_all(overrides, &mut document).map_err(|e| e.in_file(path))?;
     let text =
         toml::to_string(&document).map_err(|e| Error::file(path, one_line(&e.to_string())))?;
     // Lines of that text are not those of the file.
     parse_toml_lines(&text, |_| None).map_err(|e| e.in_file(path))
+}
+
+fn apply_all(overrides: &[Override], document: &mut toml::Table) -> Result<()> {
+    overrides.iter().try_for_each(|o| o.apply(document))
 }
 
 /// Settings from overrides alone: all of them lie in the table of that name.
@@ -58,16 +59,13 @@ pub(crate) fn read_toml_with<T: DeserializeOwned>(
 pub fn from_overrides<T: DeserializeOwned>(table: &str, overrides: &[Override]) -> Result<T> {
     let mut document = toml::Table::new();
     document.insert(table.into(), toml::Table::new().into());
-    overrides.iter().try_for_each(|o| o.apply(&mut document))?;
-    let settings = document
-        .remove(table)
-        .unwrap_or_else(|| toml::Table::new().into());
+    apply_all(overrides, &mut document)?;
+    let settings = document.remove(table);
     if let Some(key) = document.keys().next() {
-        return Err(Error::value(
-            key,
-            format!("no such table, expected {table}.NAME=VALUE"),
-        ));
+        let what = format!("no such table, expected {table}.NAME=VALUE");
+        return Err(Error::value(key, what));
     }
+    let settings = settings.unwrap_or_else(|| toml::Table::new().into());
     from_value(settings, &format!("{table}."))
 }
 
@@ -87,7 +85,7 @@ pub(crate) fn from_table_with<T: DeserializeOwned>(
     mut table: toml::Table,
     overrides: &[Override],
 ) -> Result<T> {
-    overrides.iter().try_for_each(|o| o.apply(&mut table))?;
+    apply_all(overrides, &mut table)?;
     from_table(table)
 }
 
@@ -223,12 +221,7 @@ fn parse_toml_lines<T: DeserializeOwned>(
 ) -> Result<T> {
     let document = DeTable::parse(text).map_err(|e| toml_mistake(&e, String::new(), &line))?;
     if let Some((what, span)) = find_invalid_toml(&document, max_depth()) {
-        return Err(DocumentMistake {
-            at: String::new(),
-            line: line(span.start),
-            what,
-        }
-        .into_error());
+        return Err(DocumentMistake::in_document(line(span.start), what).into_error());
     }
     serde_path_to_error::deserialize(toml::Deserializer::from(document)).map_err(|e| {
         let at = e.path().to_string();

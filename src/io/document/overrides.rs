@@ -50,14 +50,21 @@ fn is_finite(value: &Value) -> bool {
 impl Override {
     /// Puts the value into a document; tables on the way are made where they are missing, list entries are not.
     pub(super) fn apply(&self, document: &mut toml::Table) -> Result<()> {
+        let place = self.place_in(document);
+        *place.map_err(|what| Error::value(&self.path, what))? = self.value.clone();
+        Ok(())
+    }
+
+    fn place_in<'t>(
+        &self,
+        document: &'t mut toml::Table,
+    ) -> std::result::Result<&'t mut Value, &'static str> {
         let mut steps = self.path.split('.').flat_map(split_indices);
-        let place = match steps.next() {
+        let first = match steps.next() {
             Some(PathStep::Key(key)) => Ok(entry(document, key)),
             _ => Err("no key, expected KEY=VALUE"),
         };
-        let place = steps.fold(place, |here, step| step.down_from(here?));
-        *place.map_err(|what| Error::value(&self.path, what))? = self.value.clone();
-        Ok(())
+        steps.fold(first, |here, step| step.down_from(here?))
     }
 }
 
@@ -90,9 +97,8 @@ fn entry<'t>(table: &'t mut toml::Table, key: &str) -> &'t mut Value {
 /// `objects[3]` is the key `objects`, then the index 3.
 fn split_indices(part: &str) -> impl Iterator<Item = PathStep<'_>> {
     let key = part.split('[').next().unwrap_or_default();
-    let indices = part[key.len()..]
-        .split(['[', ']'])
-        .filter_map(|n| n.parse().ok().map(PathStep::Index));
+    let indices = part[key.len()..].split(['[', ']']);
+    let indices = indices.filter_map(|n| n.parse().ok().map(PathStep::Index));
     std::iter::once(PathStep::Key(key)).chain(indices)
 }
 

@@ -24,20 +24,25 @@ pub(crate) fn write_through(
     if path.is_dir() {
         return Err(Error::file(path, "cannot be written: is a folder"));
     }
-    let folder = path
-        .parent()
-        .filter(|p| !p.as_os_str().is_empty())
-        .unwrap_or(Path::new("."));
+    let folder = folder_of(path);
     let file = new_beside(folder).map_err(|e| match e.kind() {
-        std::io::ErrorKind::NotFound => Error::file(
-            path,
-            format!("cannot be written: no folder {}", folder.display()),
-        ),
+        std::io::ErrorKind::NotFound => no_folder(path, folder),
         _ => not_written(path, &e),
     })?;
     fill_and_move(file, path, fill)
         .and_then(|()| sync_folder(folder))
         .map_err(|e| not_written(path, &e))
+}
+
+/// The folder that a file lies in; the working folder for a bare name.
+fn folder_of(path: &Path) -> &Path {
+    let parent = path.parent().filter(|p| !p.as_os_str().is_empty());
+    parent.unwrap_or(Path::new("."))
+}
+
+fn no_folder(path: &Path, folder: &Path) -> Error {
+    let what = format!("cannot be written: no folder {}", folder.display());
+    Error::file(path, what)
 }
 
 fn not_written(path: &Path, e: &std::io::Error) -> Error {

@@ -3,7 +3,7 @@
 use super::atomic::write_through;
 use super::open::{open_regular, reason};
 use crate::error::{Error, Result};
-use std::io::{Read, Write};
+use std::io::{ErrorKind, Read, Write};
 use std::path::Path;
 
 /// Length and CRC-32 of a file.
@@ -62,18 +62,26 @@ fn copy_bytes(mut from: impl Read, to: &mut dyn Write) -> std::io::Result<Checks
     let (mut hasher, mut bytes) = (crc32fast::Hasher::new(), 0);
     let mut piece = vec![0; PIECE_BYTES];
     loop {
-        let filled = match from.read(&mut piece) {
-            Ok(0) => break,
-            Ok(filled) => filled,
-            Err(e) if e.kind() == std::io::ErrorKind::Interrupted => continue,
-            Err(e) => return Err(e),
-        };
+        let filled = read_some(&mut from, &mut piece)?;
+        if filled == 0 {
+            break;
+        }
         hasher.update(&piece[..filled]);
         to.write_all(&piece[..filled])?;
         bytes += filled as u64;
     }
     let crc32 = hasher.finalize();
     Ok(Checksum { bytes, crc32 })
+}
+
+/// Reads some bytes, whatever interrupts it; none at the end.
+fn read_some(from: &mut impl Read, piece: &mut [u8]) -> std::io::Result<usize> {
+    loop {
+        match from.read(piece) {
+            Err(e) if e.kind() == ErrorKind::Interrupted => continue,
+            done => return done,
+        }
+    }
 }
 
 #[cfg(test)]

@@ -11,18 +11,23 @@ use std::path::Path;
 /// [`Error::File`] for a link, which would lead to a file of somebody else's, and for anything but a regular file.
 pub(crate) fn open_own(path: &Path) -> Result<File> {
     refuse_foreign(path)?;
+    let file = own_options()
+        .open(path)
+        .map_err(|e| Error::file(path, reason(&e)))?;
+    match file.metadata() {
+        Ok(meta) if meta.is_file() => Ok(file),
+        Ok(_) => Err(foreign(path)),
+        Err(e) => Err(Error::file(path, reason(&e))),
+    }
+}
+
+/// To read and to append, made where it is not there.
+fn own_options() -> OpenOptions {
     let mut options = OpenOptions::new();
     options.read(true).append(true).create(true);
     #[cfg(unix)]
     std::os::unix::fs::OpenOptionsExt::custom_flags(&mut options, own_flags());
-    let opened = options
-        .open(path)
-        .and_then(|file| Ok((file.metadata()?, file)));
-    match opened {
-        Ok((meta, file)) if meta.is_file() => Ok(file),
-        Ok(_) => Err(foreign(path)),
-        Err(e) => Err(Error::file(path, reason(&e))),
-    }
+    options
 }
 
 /// Refuses what lies in the place of a file of petcomp's own and is none.

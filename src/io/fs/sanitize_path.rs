@@ -50,12 +50,14 @@ fn found_inside(folder: &Path, file: &Path) -> Result<(PathBuf, Metadata)> {
     match meta.map_err(|e| Error::file(&path, reason(&e)))? {
         Some(meta) if meta.is_file() => Ok((path, meta)),
         Some(_) => Err(Error::file(path, "not a regular file")),
-        None => {
-            let folder = or_working_folder(folder).display();
-            let what = format!("is a link out of {folder}, expected a file in that folder");
-            Err(Error::file(path, what))
-        }
+        None => Err(leads_out(path, folder)),
     }
+}
+
+fn leads_out(path: PathBuf, folder: &Path) -> Error {
+    let folder = or_working_folder(folder).display();
+    let what = format!("is a link out of {folder}, expected a file in that folder");
+    Error::file(path, what)
 }
 
 /// What a file is; none where one of the steps to it from the folder is a link.

@@ -104,20 +104,21 @@ fn refused(e: cxx::Exception) -> Refusal {
 
 impl Layout {
     fn check(&self, file_bytes: u64, limits: &Limits) -> Result<(), Refusal> {
+        limits.check(self.demand([self.width, self.height], file_bytes))?;
+        let data_size = [self.data_width, self.data_height];
+        Ok(limits.check(self.demand(data_size, file_bytes))?)
+    }
+
+    fn demand(&self, size: [i64; 2], file_bytes: u64) -> Demand {
+        let [width, height] = size.map(|side| u64::try_from(side).unwrap_or(0));
         let channels = self.channels.len() as u64;
-        for (width, height) in [
-            (self.width, self.height),
-            (self.data_width, self.data_height),
-        ] {
-            limits.check(Demand {
-                width: u64::try_from(width).unwrap_or(0),
-                height: u64::try_from(height).unwrap_or(0),
-                channels,
-                bytes_per_pixel: channels * u64::from(self.bytes.unsigned_abs()),
-                file_bytes,
-            })?;
+        Demand {
+            width,
+            height,
+            channels,
+            bytes_per_pixel: channels * u64::from(self.bytes.unsigned_abs()),
+            file_bytes,
         }
-        Ok(())
     }
 
     fn sample(&self) -> SampleKind {
@@ -190,13 +191,11 @@ fn windowed<T: Copy + Default>(samples: Vec<T>, layout: &Layout, picked: &[usize
     }
     let mut out = vec![T::default(); width * height * picked.len()];
     let (ys, xs) = layout.visible();
-    for y in ys {
-        for x in xs.clone() {
-            let pixel = &samples[layout.data_pixel(x, y) * stride..][..stride];
-            let to = (y * width + x) * picked.len();
-            for (slot, &channel) in out[to..].iter_mut().zip(picked) {
-                *slot = pixel[channel];
-            }
+    for (x, y) in ys.flat_map(|y| xs.clone().map(move |x| (x, y))) {
+        let pixel = &samples[layout.data_pixel(x, y) * stride..][..stride];
+        let to = (y * width + x) * picked.len();
+        for (slot, &channel) in out[to..].iter_mut().zip(picked) {
+            *slot = pixel[channel];
         }
     }
     out

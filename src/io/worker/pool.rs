@@ -73,11 +73,9 @@ fn find_program() -> Option<PathBuf> {
     }
     let own = std::env::current_exe().ok()?;
     let name = format!("{PROGRAM}{}", std::env::consts::EXE_SUFFIX);
-    own.ancestors()
-        .skip(1)
-        .take(2)
-        .map(|folder| folder.join(&name))
-        .find(|p| p.is_file())
+    let folders = own.ancestors().skip(1).take(2);
+    let mut programs = folders.map(|folder| folder.join(&name));
+    programs.find(|program| program.is_file())
 }
 
 /// Workers that wait for a request.
@@ -105,12 +103,7 @@ impl WorkerPool {
     ) -> std::result::Result<Response, Refusal> {
         let mut cause = String::new();
         for attempt in 0..MAX_ATTEMPTS {
-            // The second attempt is for a worker that nothing has happened to yet.
-            let idle = (attempt == 0).then(|| self.take(limits)).flatten();
-            let mut worker = match idle {
-                Some(worker) => worker,
-                None => Worker::start(program, limits)?,
-            };
+            let mut worker = self.worker(attempt, program, limits)?;
             worker.check_sandbox(strict)?;
             match worker.answer(source, request) {
                 Ok(response) => {
@@ -125,6 +118,17 @@ impl WorkerPool {
             }
         }
         Err(format!("unreadable: OpenImageIO died on it {MAX_ATTEMPTS} times ({cause})").into())
+    }
+
+    /// An idle one or a new one; the second attempt is for a worker that nothing has happened to yet.
+    fn worker(
+        &self,
+        attempt: usize,
+        program: &Path,
+        limits: &Limits,
+    ) -> std::result::Result<Worker, Refusal> {
+        let idle = (attempt == 0).then(|| self.take(limits)).flatten();
+        idle.map_or_else(|| Worker::start(program, limits), Ok)
     }
 
     /// One that was started with these limits.
@@ -196,13 +200,12 @@ impl Worker {
     fn receive_greeting(&mut self) -> std::io::Result<()> {
         self.from.get_mut().deadline = Instant::now() + START_TIMEOUT;
         self.greeting = receive_line(&mut self.from)?;
-        if self.greeting.petcomp != env!("CARGO_PKG_VERSION") {
-            return Err(std::io::Error::other(format!(
-                "belongs to petcomp {}",
-                self.greeting.petcomp
-            )));
+        let version = &self.greeting.petcomp;
+        if version == env!("CARGO_PKG_VERSION") {
+            return Ok(());
         }
-        Ok(())
+        let what = format!("belongs to petcomp {version}");
+        Err(std::io::Error::other(what))
     }
 
     /// What the system could not give it is an error where that is asked for, and a warning elsewhere.
@@ -229,17 +232,15 @@ impl Worker {
         let started = Instant::now();
         let mut timeout = Duration::from_secs(self.limits.seconds);
         self.set_deadline(started + timeout);
-        let shape = match self
-            .ask_shape(source, request)
-            .map_err(|e| self.failure(e, timeout))?
-        {
+        let asked = self.ask_shape(source, request);
+        let shape = match asked.map_err(|e| self.failure(e, timeout))? {
             Ok(shape) if request != Request::Header => shape,
             other => return Ok(other.map(Response::Shape)),
         };
         timeout += timeout_for_samples(&shape);
         self.set_deadline(started + timeout);
-        let raster =
-            receive_samples(&mut self.from, shape).map_err(|e| self.failure(e, timeout))?;
+        let received = receive_samples(&mut self.from, shape);
+        let raster = received.map_err(|e| self.failure(e, timeout))?;
         Ok(Ok(Response::Raster(raster)))
     }
 
@@ -266,17 +267,13 @@ impl Worker {
 
     /// The signal that ended it, or what else went wrong. It does not run any more.
     fn cause_of_death(&mut self, e: &std::io::Error) -> String {
-        let status = match is_closed(e) {
-            true => self.wait_for_exit(EXIT_TIMEOUT),
-            false => None,
-        };
+        let status = is_closed(e)
+            .then(|| self.wait_for_exit(EXIT_TIMEOUT))
+            .flatten();
         // It may have ended by itself.
         let _ = self.child.kill();
         match status {
-            Some(status) => match status.signal() {
-                Some(signal) => format!("signal {signal}"),
-                None => status.to_string(),
-            },
+            Some(status) => ending_of(status),
             None if is_closed(e) => "closed its pipes and did not exit".into(),
             None => format!("garbled response: {e}"),
         }
@@ -293,6 +290,13 @@ impl Worker {
                 status => return status.ok().flatten(),
             }
         }
+    }
+}
+
+fn ending_of(status: ExitStatus) -> String {
+    match status.signal() {
+        Some(signal) => format!("signal {signal}"),
+        None => status.to_string(),
     }
 }
 

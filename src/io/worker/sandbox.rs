@@ -26,30 +26,23 @@ impl MemoryLimit {
     /// Fixes what may never be exceeded under these limits.
     pub(super) fn new(limits: &Limits) -> Self {
         let at_start = mapped_bytes().unwrap_or(ASSUMED_MAPPED_BYTES);
-        let budget = limits
-            .decoded_bytes
-            .saturating_mul(PICTURE_COPIES)
-            .saturating_add(limits.file_bytes);
-        Self {
-            at_start,
-            most: at_start
-                .saturating_add(HEADROOM_BYTES)
-                .saturating_add(budget),
-        }
+        let most = needed_bytes(at_start, limits.file_bytes, limits.decoded_bytes);
+        Self { at_start, most }
     }
 
     /// Lets a file of so many bytes ask for so many decoded ones.
     pub(super) fn allow(&self, file_bytes: u64, decoded_bytes: u64) {
-        let budget = decoded_bytes
-            .saturating_mul(PICTURE_COPIES)
-            .saturating_add(file_bytes);
-        let current = self
-            .at_start
-            .saturating_add(HEADROOM_BYTES)
-            .saturating_add(budget)
-            .min(self.most);
+        let current = needed_bytes(self.at_start, file_bytes, decoded_bytes).min(self.most);
         limit_resource(Resource::As, current, self.most);
     }
+}
+
+/// Address space of a worker that had mapped some at its start, for a file.
+fn needed_bytes(at_start: u64, file_bytes: u64, decoded_bytes: u64) -> u64 {
+    let pictures = decoded_bytes.saturating_mul(PICTURE_COPIES);
+    [HEADROOM_BYTES, pictures, file_bytes]
+        .into_iter()
+        .fold(at_start, u64::saturating_add)
 }
 
 /// Where the system does not report it: what OpenImageIO 2.4 maps on Debian 12.
@@ -177,26 +170,25 @@ mod linux {
 
     /// Every other call fails with EPERM, among them all that open, execute, connect, trace and start.
     fn filter_calls() -> Outcome {
-        let mut rules: BTreeMap<i64, Vec<SeccompRule>> = ALLOWED_CALLS
-            .into_iter()
-            .map(|call| (call, Vec::new()))
-            .collect();
-        // Its own limits, and a signal to itself (abort), are its own business.
-        rules.insert(libc::SYS_prlimit64, vec![first_argument_is(0)?]);
-        rules.insert(
-            libc::SYS_tgkill,
-            vec![first_argument_is(std::process::id().into())?],
-        );
-        let refused = SeccompAction::Errno(libc::EPERM as u32);
         let filter = SeccompFilter::new(
-            rules,
-            refused,
+            call_rules()?,
+            SeccompAction::Errno(libc::EPERM as u32),
             SeccompAction::Allow,
             std::env::consts::ARCH.try_into()?,
         )?;
         let program: BpfProgram = filter.try_into()?;
         // OpenImageIO's libraries have started threads of their own by now.
         Ok(seccompiler::apply_filter_all_threads(&program)?)
+    }
+
+    fn call_rules() -> Result<BTreeMap<i64, Vec<SeccompRule>>, seccompiler::BackendError> {
+        let allowed = ALLOWED_CALLS.into_iter();
+        let mut rules: BTreeMap<_, _> = allowed.map(|call| (call, Vec::new())).collect();
+        // Its own limits, and a signal to itself (abort), are its own business.
+        let own = first_argument_is(std::process::id().into())?;
+        rules.insert(libc::SYS_prlimit64, vec![first_argument_is(0)?]);
+        rules.insert(libc::SYS_tgkill, vec![own]);
+        Ok(rules)
     }
 
     fn first_argument_is(value: u64) -> Result<SeccompRule, seccompiler::BackendError> {

@@ -5,8 +5,11 @@ use super::protocol::{
     Greeting, Request, RequestHead, ResponseHead, receive_line, send_line, send_raster,
 };
 use super::sandbox::{MemoryLimit, enter_sandbox};
+use crate::io::codec::Wanted;
+use crate::io::codec::raster::Raster;
 use crate::io::codec::refusal::Refusal;
 use crate::io::format::Format;
+use crate::io::header::Window;
 use crate::io::limits::{Limits, at_most, machine_bytes};
 use crate::io::source::SourceFile;
 use std::ffi::OsString;
@@ -36,19 +39,23 @@ fn respond_to_all(limits: Limits, from: &mut impl BufRead, to: &mut impl Write) 
     // Asked while files can be opened.
     machine_bytes();
     let (memory, missing) = enter_sandbox(&limits);
-    let greeting = Greeting {
-        petcomp: env!("CARGO_PKG_VERSION").into(),
-        openimageio: openimageio::version(),
-        missing,
-    };
-    send_line(to, &greeting)?;
-    to.flush()?;
+    greet(missing, to)?;
     let server = Server { limits, memory };
     while !from.fill_buf()?.is_empty() {
         server.respond(from, to)?;
         to.flush()?;
     }
     Ok(())
+}
+
+fn greet(missing: Vec<String>, to: &mut impl Write) -> Result<()> {
+    let greeting = Greeting {
+        petcomp: env!("CARGO_PKG_VERSION").into(),
+        openimageio: openimageio::version(),
+        missing,
+    };
+    send_line(to, &greeting)?;
+    to.flush()
 }
 
 /// What holds for every request.
@@ -86,23 +93,29 @@ impl Server {
         request: Request,
         to: &mut impl Write,
     ) -> Result<()> {
-        let file_bytes = source.bytes.len() as u64;
         match request {
             Request::Header => match openimageio::shape(source, &self.limits) {
                 Ok(shape) => send_line(to, &ResponseHead::Picture(shape)),
                 Err(e) => send_refusal(to, &e),
             },
-            Request::Pixels { wanted, window } => {
-                let decoded =
-                    openimageio::decode(source, &self.limits, wanted, window, |decoded_bytes| {
-                        self.memory.allow(file_bytes, decoded_bytes)
-                    });
-                match decoded {
-                    Ok(raster) => send_raster(to, &raster),
-                    Err(e) => send_refusal(to, &e),
-                }
-            }
+            Request::Pixels { wanted, window } => match self.decode(source, wanted, window) {
+                Ok(raster) => send_raster(to, &raster),
+                Err(e) => send_refusal(to, &e),
+            },
         }
+    }
+
+    /// The pixels, in as much memory as they need.
+    fn decode(
+        &self,
+        source: &SourceFile,
+        wanted: Wanted,
+        window: Window,
+    ) -> std::result::Result<Raster, Refusal> {
+        let file_bytes = source.bytes.len() as u64;
+        openimageio::decode(source, &self.limits, wanted, window, |decoded_bytes| {
+            self.memory.allow(file_bytes, decoded_bytes)
+        })
     }
 }
 

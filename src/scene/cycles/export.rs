@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::geom::Vector3;
 use crate::image::Image;
 use crate::io::{self, Bits, WriteOptions};
-use crate::pixel::LinearRgb;
+use crate::pixel::{Film, LinearRgb};
 use crate::scene::{AreaLight, Card, EnvironmentMap, LightShape, Shot};
 use nalgebra::SMatrix;
 use std::path::Path;
@@ -127,7 +127,7 @@ fn matrix_rows<const N: usize>(m: SMatrix<f64, N, N>) -> [[f64; N]; N] {
 }
 
 fn write_side(folder: &Path, name: &str, texture: &Texture) -> Result<CyclesSide> {
-    let (color, opacity) = (format!("{name}.exr"), format!("{name}_opacity.exr"));
+    let color = format!("{name}.exr");
     match texture {
         Texture::Rgba(pyramid) => Ok(CyclesSide {
             texture: write_picture(folder, &color, pyramid.base())?,
@@ -137,14 +137,15 @@ fn write_side(folder: &Path, name: &str, texture: &Texture) -> Result<CyclesSide
             let film = pyramid.base();
             Ok(CyclesSide {
                 texture: write_picture(folder, &color, &film.map(|film| film.to_rgba()))?,
-                film: Some(write_picture(
-                    folder,
-                    &opacity,
-                    &film.map(|film| film.opacity),
-                )?),
+                film: Some(write_opacity(folder, name, film)?),
             })
         }
     }
+}
+
+fn write_opacity(folder: &Path, name: &str, film: &Image<Film>) -> Result<String> {
+    let name = format!("{name}_opacity.exr");
+    write_picture(folder, &name, &film.map(|film| film.opacity))
 }
 
 fn cycles_light(light: &AreaLight, exposure: f32) -> CyclesLight {

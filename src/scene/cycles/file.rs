@@ -1,6 +1,7 @@
 //! What stands in a scene file of the reference renderer; lengths in metres, matrices by rows.
 
 use crate::pixel::LinearRgb;
+use crate::scene::{Grade, LightShape};
 use serde::{Deserialize, Serialize};
 
 /// The whole file. Keys that only Blender needs (physics, material) are ignored.
@@ -73,6 +74,16 @@ pub(super) struct CyclesQuad {
     pub(super) value: f32,
 }
 
+impl CyclesQuad {
+    pub(super) fn grade(&self) -> Grade {
+        Grade {
+            hue_deg: self.hue_shift,
+            saturation: self.saturation,
+            value: self.value,
+        }
+    }
+}
+
 #[derive(Serialize, Deserialize)]
 pub(super) struct CyclesSide {
     pub(super) texture: String,
@@ -103,11 +114,30 @@ pub(super) enum CyclesShape {
     Ellipse,
 }
 
+impl From<CyclesShape> for LightShape {
+    fn from(shape: CyclesShape) -> Self {
+        match shape {
+            CyclesShape::Rectangle | CyclesShape::Square => Self::Rectangle,
+            CyclesShape::Disk | CyclesShape::Ellipse => Self::Ellipse,
+        }
+    }
+}
+
 #[derive(Clone, Copy, Serialize, Deserialize)]
 #[serde(untagged)]
 pub(super) enum CyclesSize {
     One(f64),
     Two([f64; 2]),
+}
+
+impl CyclesSize {
+    /// Both sides.
+    pub(super) fn sides(self) -> [f64; 2] {
+        match self {
+            Self::One(side) => [side; 2],
+            Self::Two(sides) => sides,
+        }
+    }
 }
 
 /// A constant colour, or a picture; degrees.

@@ -1,8 +1,6 @@
 //! A shot from a file of the reference renderer.
 
-use super::file::{
-    CyclesEnvironment, CyclesFile, CyclesLight, CyclesQuad, CyclesShape, CyclesSide, CyclesSize,
-};
+use super::file::{CyclesEnvironment, CyclesFile, CyclesLight, CyclesQuad, CyclesSide};
 use crate::asset::{Panorama, Texture};
 use crate::camera::Camera;
 use crate::error::{Error, Result};
@@ -10,7 +8,7 @@ use crate::geom::{Point2, Pose, Quad, UnitQuaternion, Vector2, Vector3};
 use crate::image::Image;
 use crate::io;
 use crate::pixel::{Film, LinearRgb, Mix, ObjectId, PremulRgba};
-use crate::scene::{AreaLight, CATCHER_RATIO, Card, EnvironmentMap, Grade, LightShape, Shot};
+use crate::scene::{AreaLight, CATCHER_RATIO, Card, EnvironmentMap, Shot};
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
@@ -96,11 +94,7 @@ impl PictureFolder {
         let back = quad.back.as_ref();
         Ok(Card {
             back: back.map(|back| self.read_texture(back)).transpose()?,
-            grade: Grade {
-                hue_deg: quad.hue_shift,
-                saturation: quad.saturation,
-                value: quad.value,
-            },
+            grade: quad.grade(),
             ..Card::new(ObjectId(quad.id), placed, self.read_texture(&quad.front)?)
         })
     }
@@ -140,14 +134,17 @@ impl PictureFolder {
         let Some(path) = &around.path else {
             return Ok(None);
         };
-        let path = self.find(path)?;
-        let photo: Image<PremulRgba> = io::read(&path)?;
-        let panorama = Panorama::new(photo.map(PremulRgba::color)).map_err(|e| e.in_file(path))?;
         Ok(Some(EnvironmentMap {
-            panorama: Arc::new(panorama),
+            panorama: Arc::new(self.read_panorama(path)?),
             rotation: around.rotation_z.to_radians(),
             strength: around.strength,
         }))
+    }
+
+    fn read_panorama(&self, name: &str) -> Result<Panorama> {
+        let path = self.find(name)?;
+        let photo: Image<PremulRgba> = io::read(&path)?;
+        Panorama::new(photo.map(PremulRgba::color)).map_err(|e| e.in_file(path))
     }
 }
 
@@ -192,16 +189,10 @@ fn rotation_from_rows(rows: [[f64; 3]; 3]) -> UnitQuaternion<f64> {
 
 fn area_light(light: &CyclesLight) -> AreaLight {
     AreaLight {
-        shape: match light.shape {
-            CyclesShape::Rectangle | CyclesShape::Square => LightShape::Rectangle,
-            CyclesShape::Disk | CyclesShape::Ellipse => LightShape::Ellipse,
-        },
+        shape: light.shape.into(),
         position: light.position,
         target: light.target,
-        size: match light.size {
-            CyclesSize::One(side) => [side; 2],
-            CyclesSize::Two(sides) => sides,
-        },
+        size: light.size.sides(),
         power: light.power,
         color: light.color,
     }

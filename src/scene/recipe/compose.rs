@@ -34,17 +34,26 @@ impl Recipe {
         };
         self.vary_objects(&mut objects, &draws);
         let surface = self.draw_surface(&draws, background.size);
-        let column = DropColumn {
+        self.drop_column(background, surface, &draws)
+            .stack(&mut objects)?;
+        let scene = self.lit_scene(&draws, background, surface, objects);
+        scene.check()?;
+        Ok(scene)
+    }
+
+    fn drop_column<'a>(
+        &'a self,
+        background: &'a Background,
+        surface: Surface,
+        draws: &'a Draws<'a>,
+    ) -> DropColumn<'a> {
+        DropColumn {
             background: &background.name,
             surface,
             start: &self.start,
             options: &self.settle,
-            draws: &draws,
-        };
-        column.stack(&mut objects)?;
-        let scene = self.lit_scene(&draws, background, surface, objects);
-        scene.check()?;
-        Ok(scene)
+            draws,
+        }
     }
 
     /// The scene with these objects, its light drawn.

@@ -251,12 +251,7 @@ impl Drop<'_> {
         height: f64,
         units: &WorldUnits,
     ) -> RigidBodyHandle {
-        let (body, pose) = start_of(object, height);
-        let body = body
-            .pose(units.to_world(&pose))
-            .linear_damping(LINEAR_DAMPING)
-            .angular_damping(ANGULAR_DAMPING);
-        let body = world.insert_body(body);
+        let body = world.insert_body(rigid_body(object, height, units));
         for part in self.colliders(object, units) {
             world.insert_collider(part, Some(body));
         }
@@ -307,6 +302,14 @@ fn room_slabs([x, y]: [f64; 2], middle: f64) -> [Slab; 5] {
         ([0.0, -y - wall, middle], [wide, wall, high]),
     ]
     .map(|(center, half)| Slab { center, half })
+}
+
+/// A body that stands, or falls from a height, damped.
+fn rigid_body(object: &Object, height: f64, units: &WorldUnits) -> RigidBodyBuilder {
+    let (body, pose) = start_of(object, height);
+    body.pose(units.to_world(&pose))
+        .linear_damping(LINEAR_DAMPING)
+        .angular_damping(ANGULAR_DAMPING)
 }
 
 /// Mass of an object in the world, within [`MASS_SPREAD`] of the typical one.

@@ -1,7 +1,7 @@
 //! What stands for an object in the physics world: a box, or a convex prism.
 
 use crate::geom::Vector3;
-use crate::scene::Object;
+use crate::scene::{Object, doubled_area};
 use rapier3d::prelude::{ColliderBuilder, Vector};
 
 /// The colliders of an object, `half` and `length` in the world's units: a box, or the parts of a
@@ -32,7 +32,7 @@ fn prism_parts(ring: &[[f64; 2]], half_height: f64, mass: f64) -> Option<Vec<Col
         .iter()
         .map(|part| plate(part, half_height))
         .collect::<Option<_>>()?;
-    let area = ring_area(ring);
+    let area = doubled_area(ring) / 2.0;
     let density = mass / (area * 2.0 * half_height);
     (area > 0.0).then(|| with_density(parts, density as f32))
 }
@@ -54,15 +54,6 @@ fn quarters(ring: &[[f64; 2]]) -> Vec<Vec<[f64; 2]>> {
             part
         })
         .collect()
-}
-
-fn ring_area(ring: &[[f64; 2]]) -> f64 {
-    let next = ring.iter().cycle().skip(1);
-    let crosses = ring
-        .iter()
-        .zip(next)
-        .map(|(a, b)| a[0] * b[1] - a[1] * b[0]);
-    crosses.sum::<f64>() / 2.0
 }
 
 /// A plate of this outline; none where the engine finds it too thin a shape.

@@ -54,10 +54,8 @@ impl PartReader<'_> {
                 block.layer == self.part && block.level == largest
             })?;
         loop {
-            let batch = chunks
-                .by_ref()
-                .take(self.batch_blocks())
-                .collect::<exr::error::Result<Vec<Chunk>>>()?;
+            let batch = chunks.by_ref().take(self.batch_blocks());
+            let batch = batch.collect::<exr::error::Result<Vec<Chunk>>>()?;
             if batch.is_empty() {
                 break;
             }
@@ -65,10 +63,7 @@ impl PartReader<'_> {
                 out.put_block(self.header(), block);
             }
         }
-        if let Some(sampling) = self.sampling {
-            out.interpolate_rows(sampling);
-        }
-        Ok(out.samples)
+        Ok(out.finish(self.sampling))
     }
 
     /// Blocks that are decoded at a time.
@@ -142,16 +137,26 @@ impl<'a> SampleBuffer<'a> {
                     self.put(line.channel, [line.x, line.y], &line.samples);
                 }
             }
-            DecodedBlock::Pixels(block) => {
-                let mut floats = Vec::new();
-                for line in block.lines(&header.channels) {
-                    let (at, channel) = (line.location.position, line.location.channel);
-                    let kind = header.channels.list[channel].sample_type;
-                    to_floats(line.value, kind, &mut floats);
-                    self.put(channel, [at.x(), at.y()], &floats);
-                }
-            }
+            DecodedBlock::Pixels(block) => self.put_pixels(header, &block),
         }
+    }
+
+    fn put_pixels(&mut self, header: &Header, block: &UncompressedBlock) {
+        let mut floats = Vec::new();
+        for line in block.lines(&header.channels) {
+            let (at, channel) = (line.location.position, line.location.channel);
+            let kind = header.channels.list[channel].sample_type;
+            to_floats(line.value, kind, &mut floats);
+            self.put(channel, [at.x(), at.y()], &floats);
+        }
+    }
+
+    /// All samples, those between rows made from them.
+    fn finish(mut self, sampling: Option<&Sampling>) -> Vec<f32> {
+        if let Some(sampling) = sampling {
+            self.interpolate_rows(sampling);
+        }
+        self.samples
     }
 
     /// A run of samples of a channel, cut to the window.
@@ -162,16 +167,17 @@ impl<'a> SampleBuffer<'a> {
         let (x, y) = (x as i64 + self.left, y as i64 + self.top);
         let columns = overlap(x, samples.len(), self.width);
         let rows = overlap(y, 1, self.height);
-        if rows.is_empty() || columns.is_empty() {
-            return;
+        if !rows.is_empty() && !columns.is_empty() {
+            let samples = &samples[(columns.start as i64 - x) as usize..][..columns.len()];
+            self.put_run(slot, [columns.start, rows.start], samples);
         }
-        let samples = &samples[(columns.start as i64 - x) as usize..][..columns.len()];
-        let (at, step) = self.row_offset(slot, rows.start);
-        self.samples[at + columns.start * step..]
-            .iter_mut()
-            .step_by(step)
-            .zip(samples)
-            .for_each(|(to, &from)| *to = from);
+    }
+
+    /// Samples of a channel from a pixel of the window on.
+    fn put_run(&mut self, slot: usize, [x, y]: [usize; 2], samples: &[f32]) {
+        let (at, step) = self.row_offset(slot, y);
+        let out = self.samples[at + x * step..].iter_mut().step_by(step);
+        out.zip(samples).for_each(|(to, &from)| *to = from);
     }
 
     /// Where the samples of a row begin, and how far apart they are.

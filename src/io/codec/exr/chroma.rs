@@ -31,23 +31,17 @@ impl Sampling {
     /// in. None for a file that has one, or that is not what it should be.
     pub(super) fn find(file: &[u8]) -> Option<(Self, Vec<u8>)> {
         let offsets = sampling_offsets(file)?;
-        let pairs = offsets
-            .iter()
-            .map(|&at| read_pair(file, at))
-            .collect::<Option<Vec<_>>>()?;
-        let known = pairs
-            .iter()
-            .flatten()
-            .all(|n| (1..=MAX_SAMPLING).contains(n));
-        if !known || pairs.iter().flatten().all(|&n| n == 1) {
+        let pairs: Option<Vec<[usize; 2]>> =
+            offsets.iter().map(|&at| read_pair(file, at)).collect();
+        let pairs = pairs?;
+        if pairs.iter().flatten().all(|&n| n == 1) {
             return None;
         }
         let mut even = file.to_vec();
         for at in offsets {
             even[at..at + FULL_SAMPLING.len()].copy_from_slice(&FULL_SAMPLING);
         }
-        let pairs = pairs.into_iter().map(|pair| pair.map(|n| n as usize));
-        Some((Self(pairs.collect()), even))
+        Some((Self(pairs), even))
     }
 
     /// Whether the part is one that is read: rows, with a window that every sampling divides.
@@ -116,19 +110,21 @@ impl Sampling {
                 "unsupported EXR: channels of this sampling".into(),
             ));
         }
+        let declared = self.declared(header, bytes / pixels);
+        let section = IntegerBounds::new(Vec2(0, rows.start as i32), Vec2(width, rows.len()));
+        let data = block.compressed_pixels_le;
+        let compression = header.compression;
+        Ok(compression.decompress_image_section_from_le(&declared, data, section, false)?)
+    }
+
+    /// A header with the samplings, and so many bytes for each pixel.
+    fn declared(&self, header: &Header, bytes_per_pixel: usize) -> Header {
         let mut declared = header.clone();
-        declared.channels.bytes_per_pixel = bytes / pixels;
+        declared.channels.bytes_per_pixel = bytes_per_pixel;
         for (channel, &[x, y]) in declared.channels.list.iter_mut().zip(&self.0) {
             channel.sampling = Vec2(x, y);
         }
-        let section = IntegerBounds::new(Vec2(0, rows.start as i32), Vec2(width, rows.len()));
-        let data = header.compression.decompress_image_section_from_le(
-            &declared,
-            block.compressed_pixels_le,
-            section,
-            false,
-        )?;
-        Ok(data)
+        declared
     }
 
     /// The lines out of the bytes of a block, each repeated for the rows that it stands for.
@@ -139,28 +135,35 @@ impl Sampling {
         mut data: &[u8],
     ) -> Result<Vec<SampleLine>, Refusal> {
         let mut out = Vec::new();
-        for &StoredLine { channel, y, bytes } in lines {
-            let (line, rest) = data
-                .split_at_checked(bytes)
+        for line in lines {
+            let bytes;
+            (bytes, data) = data
+                .split_at_checked(line.bytes)
                 .ok_or("damaged EXR: a block that is too short")?;
-            data = rest;
-            let [x_step, y_step] = self.0[channel];
-            let mut samples = Vec::new();
-            to_floats(
-                line,
-                header.channels.list[channel].sample_type,
-                &mut samples,
-            );
-            let samples = enlarged(&samples, x_step);
-            let rows = y..(y + y_step).min(header.layer_size.y());
-            out.extend(rows.map(|y| SampleLine {
-                channel,
-                x: 0,
-                y,
-                samples: samples.clone(),
-            }));
+            out.extend(self.repeated_line(header, line, bytes));
         }
         Ok(out)
+    }
+
+    /// A stored line, enlarged, for each of the rows that it stands for.
+    fn repeated_line(
+        &self,
+        header: &Header,
+        &StoredLine { channel, y, .. }: &StoredLine,
+        bytes: &[u8],
+    ) -> impl Iterator<Item = SampleLine> + use<> {
+        let [x_step, y_step] = self.0[channel];
+        let mut samples = Vec::new();
+        let kind = header.channels.list[channel].sample_type;
+        to_floats(bytes, kind, &mut samples);
+        let samples = enlarged(&samples, x_step);
+        let rows = y..(y + y_step).min(header.layer_size.y());
+        rows.map(move |y| SampleLine {
+            channel,
+            x: 0,
+            y,
+            samples: samples.clone(),
+        })
     }
 }
 
@@ -185,11 +188,10 @@ fn block_rows(header: &Header, block: &CompressedScanLineBlock) -> Result<Range<
     let top = i64::from(block.y_coordinate) - i64::from(header.own_attributes.layer_position.y());
     let height = header.layer_size.y();
     let most = header.compression.scan_lines_per_block();
-    let top = usize::try_from(top)
-        .ok()
-        .filter(|y| *y < height && y % most == 0)
-        .ok_or("damaged EXR: a block outside the picture")?;
-    Ok(top..(top + most).min(height))
+    match usize::try_from(top) {
+        Ok(y) if y < height && y % most == 0 => Ok(y..(y + most).min(height)),
+        _ => Err("damaged EXR: a block outside the picture".into()),
+    }
 }
 
 /// `n` values for each, interpolated linearly to the next; the last goes on.
@@ -226,10 +228,14 @@ fn offsets_in_list(file: &[u8], mut at: usize) -> Option<Vec<usize>> {
     Some(offsets)
 }
 
-fn read_pair(file: &[u8], at: usize) -> Option<[u32; 2]> {
-    let x = *file.get(at..)?.first_chunk()?;
-    let y = *file.get(at + 4..)?.first_chunk()?;
-    Some([u32::from_le_bytes(x), u32::from_le_bytes(y)])
+fn read_pair(file: &[u8], at: usize) -> Option<[usize; 2]> {
+    Some([read_sampling(file, at)?, read_sampling(file, at + 4)?])
+}
+
+/// Pixels for a sample; none where that is no number which files have.
+fn read_sampling(file: &[u8], at: usize) -> Option<usize> {
+    let n = u32::from_le_bytes(*file.get(at..)?.first_chunk()?);
+    (1..=MAX_SAMPLING).contains(&n).then_some(n as usize)
 }
 
 /// Turns luminance and differences, the first three of `n` interleaved channels, into red, green and blue of a space.

@@ -18,6 +18,12 @@ pub struct Part {
     pub metadata: Vec<(String, String)>,
 }
 
+impl Part {
+    fn error_in(&self, channel: &str, what: &str) -> String {
+        format!("{}: channel {channel}: {what}", self.name)
+    }
+}
+
 /// Samples of one channel.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ChannelSamples {
@@ -39,17 +45,13 @@ impl ChannelSamples {
 /// A whole file of parts of one size (width, height), losslessly compressed; the same parts give the same bytes.
 pub(crate) fn encode_parts(size: (usize, usize), parts: &[Part]) -> Result<Vec<u8>, String> {
     check_parts(size, parts)?;
-    let layers = parts
-        .iter()
-        .map(|part| part_layer(size, part))
-        .collect::<Result<Vec<_>, _>>()?;
+    let layers = parts.iter().map(|part| part_layer(size, part));
+    let layers = layers.collect::<Result<Vec<_>, _>>()?;
     let window = IntegerBounds::from_dimensions(Vec2(size.0, size.1));
     let image = Image::from_layers(ImageAttributes::new(window), layers);
     let mut out = Cursor::new(Vec::new());
-    image
-        .write()
-        .to_buffered(&mut out)
-        .map_err(|e| e.to_string())?;
+    let written = image.write().to_buffered(&mut out);
+    written.map_err(|e| e.to_string())?;
     let mut bytes = out.into_inner();
     sort_headers(&mut bytes).ok_or("header of an unknown kind")?;
     Ok(bytes)
@@ -78,23 +80,30 @@ fn part_layer(
     let mut list = SmallVec::new();
     for (name, samples) in &part.channels {
         let samples = samples.to_flat();
-        if samples.len() != width * height {
-            return Err(format!(
-                "{}: channel {name}: {} samples, expected {width} x {height}",
-                part.name,
-                samples.len()
-            ));
-        }
+        check_count(&samples, (width, height)).map_err(|e| part.error_in(name, &e))?;
         list.push(AnyChannel::new(latin_text(name)?, samples));
     }
     let mut attributes = LayerAttributes::named(latin_text(&part.name)?);
     add_texts(&mut attributes, &part.metadata)?;
+    let (encoding, channels) = (Encoding::SMALL_LOSSLESS, AnyChannels::sort(list));
     Ok(Layer::new(
         Vec2(width, height),
         attributes,
-        Encoding::SMALL_LOSSLESS,
-        AnyChannels::sort(list),
+        encoding,
+        channels,
     ))
+}
+
+/// Fails where there is not one sample for each pixel.
+pub(super) fn check_count(
+    samples: &FlatSamples,
+    (width, height): (usize, usize),
+) -> Result<(), String> {
+    let count = samples.len();
+    if count == width * height {
+        return Ok(());
+    }
+    Err(format!("{count} samples, expected {width} x {height}"))
 }
 
 /// The byte of the version that holds the kind of file, and its bit for several parts.

@@ -10,7 +10,7 @@ use crate::io::codec::refusal::Refusal;
 use crate::io::format::Format;
 use crate::io::header::{Header, Notes, Window};
 use crate::io::limits::{Demand, Limits, affordable, at_most};
-use exr::meta::attribute::{AttributeValue, Chromaticities};
+use exr::meta::attribute::{AttributeValue, ChannelList, Chromaticities};
 use exr::prelude::{IntegerBounds, MetaData, Vec2};
 use std::borrow::Cow;
 use std::io::{BufReader, Read};
@@ -49,17 +49,18 @@ pub(crate) fn channels(
     let (width, height) = window_size(file.window());
     limits.check_memory(width, height, names.len())?;
     let picked: Vec<usize> = (0..names.len()).collect();
-    let samples = file
-        .reader(part, &picked, file.window(), SampleOrder::Planar)?
-        .read()?;
-    let channels = names
-        .into_iter()
-        .zip(samples.chunks_exact(width * height))
-        .map(|(name, plane)| Channel {
-            name,
-            samples: plane.to_vec(),
-        });
+    let reader = file.reader(part, &picked, file.window(), SampleOrder::Planar)?;
+    let samples = reader.read()?;
+    let planes = samples.chunks_exact(width * height);
+    let channels = names.into_iter().zip(planes).map(Channel::from);
     Ok(((width, height), channels.collect()))
+}
+
+impl From<(String, &[f32])> for Channel {
+    fn from((name, plane): (String, &[f32])) -> Self {
+        let samples = plane.to_vec();
+        Self { name, samples }
+    }
 }
 
 /// A file whose headers were checked.
@@ -77,12 +78,7 @@ impl<'a> CheckedFile<'a> {
         };
         let meta = read_meta(&*bytes, bytes.len() as u64, limits)?;
         if let Some(sampling) = &sampling {
-            let [header] = &meta.headers[..] else {
-                return Err(Refusal::Unsupported(
-                    "unsupported EXR: subsampled channels in one of several parts".into(),
-                ));
-            };
-            sampling.check(header)?;
+            check_sampling(sampling, &meta)?;
         }
         Ok(Self {
             bytes,
@@ -118,12 +114,7 @@ impl<'a> CheckedFile<'a> {
     }
 
     fn channel_names(&self, part: usize) -> Vec<String> {
-        self.meta.headers[part]
-            .channels
-            .list
-            .iter()
-            .map(|c| c.name.to_string())
-            .collect()
+        listed_names(&self.meta.headers[part].channels)
     }
 
     fn picked_names(&self, part: usize, picked: &[usize]) -> Vec<String> {
@@ -176,6 +167,15 @@ impl<'a> CheckedFile<'a> {
     }
 }
 
+fn check_sampling(sampling: &Sampling, meta: &MetaData) -> Result<(), Refusal> {
+    match &meta.headers[..] {
+        [header] => sampling.check(header),
+        _ => Err(Refusal::Unsupported(
+            "unsupported EXR: subsampled channels in one of several parts".into(),
+        )),
+    }
+}
+
 fn named_space(named: Chromaticities) -> RgbSpace {
     RgbSpace {
         primaries: [named.red, named.green, named.blue].map(xy),
@@ -193,17 +193,7 @@ fn window_size(window: IntegerBounds) -> (usize, usize) {
 
 /// The headers alone, checked against the limits: data and display window of every part, and their sum.
 fn read_meta(file: impl Read, file_bytes: u64, limits: &Limits) -> Result<MetaData, Refusal> {
-    let start = BufReader::new(file.take(limits.metadata_bytes));
-    let meta = MetaData::read_from_buffered(start, false);
-    if meta.is_err() && file_bytes > limits.metadata_bytes {
-        at_most(
-            file_bytes,
-            limits.metadata_bytes,
-            "bytes without an end of the header",
-            "metadata_bytes",
-        )?;
-    }
-    let meta = meta?;
+    let meta = read_limited_meta(file, file_bytes, limits)?;
     at_most(meta.headers.len() as u64, limits.parts, "parts", "parts")?;
     let mut total = 0_u64;
     for header in &meta.headers {
@@ -212,11 +202,25 @@ fn read_meta(file: impl Read, file_bytes: u64, limits: &Limits) -> Result<MetaDa
     let most = limits.decoded_bytes;
     at_most(total, most, "decoded bytes", "decoded_bytes")?;
     if meta.headers.iter().all(|h| h.deep) {
-        return Err(Refusal::Unsupported(
-            "deep EXR, expected flat pixels".into(),
-        ));
+        let what = "deep EXR, expected flat pixels";
+        return Err(Refusal::Unsupported(what.into()));
     }
     Ok(meta)
+}
+
+/// The headers, read from no more bytes than metadata may have.
+fn read_limited_meta(
+    file: impl Read,
+    file_bytes: u64,
+    limits: &Limits,
+) -> Result<MetaData, Refusal> {
+    let most = limits.metadata_bytes;
+    let meta = MetaData::read_from_buffered(BufReader::new(file.take(most)), false);
+    if meta.is_err() && file_bytes > most {
+        let what = "bytes without an end of the header";
+        at_most(file_bytes, most, what, "metadata_bytes")?;
+    }
+    Ok(meta?)
 }
 
 /// Decoded bytes of a part within the limits.
@@ -254,28 +258,41 @@ pub(crate) fn header(
     file_bytes: u64,
     limits: &Limits,
 ) -> Result<Header, Refusal> {
-    let mut start = Vec::new();
-    file.by_ref()
-        .take(FIRST_BYTES)
-        .read_to_end(&mut start)
-        .map_err(exr::error::Error::from)?;
-    let start = Sampling::find(&start).map_or(start, |(_, even)| even);
-    let meta = read_meta(start.chain(file), file_bytes, limits)?;
+    let start = read_start(&mut file)?;
+    let meta = read_meta(start.as_slice().chain(file), file_bytes, limits)?;
     let first = meta.headers.first().ok_or("no part with pixels")?;
     let (width, height) = window_size(first.shared_attributes.display_window);
-    let list = &first.channels.list;
-    let bytes = list.iter().map(|c| c.sample_type.bytes_per_sample());
     Ok(Header {
         format: Format::Exr,
         width,
         height,
-        channels: in_default_order(list.iter().map(|c| c.name.to_string()).collect()),
-        bits: 8 * bytes.max().unwrap_or(0) as u32,
+        channels: in_default_order(listed_names(&first.channels)),
+        bits: 8 * widest_sample(&first.channels) as u32,
         data_at: data_offset(first),
         data_size: [first.layer_size.x(), first.layer_size.y()],
         metadata: text_attributes(first),
         ..Header::default()
     })
+}
+
+/// The first bytes, as if every channel had a sample for each pixel.
+fn read_start(file: &mut impl Read) -> Result<Vec<u8>, Refusal> {
+    let mut start = Vec::new();
+    let read = file.by_ref().take(FIRST_BYTES).read_to_end(&mut start);
+    read.map_err(exr::error::Error::from)?;
+    Ok(Sampling::find(&start).map_or(start, |(_, even)| even))
+}
+
+fn listed_names(channels: &ChannelList) -> Vec<String> {
+    let list = channels.list.iter();
+    list.map(|channel| channel.name.to_string()).collect()
+}
+
+/// Bytes of the largest kind of sample.
+fn widest_sample(channels: &ChannelList) -> usize {
+    let list = channels.list.iter();
+    let bytes = list.map(|channel| channel.sample_type.bytes_per_sample());
+    bytes.max().unwrap_or(0)
 }
 
 /// Column and row of the first stored pixel in the display window.
@@ -298,11 +315,8 @@ fn in_default_order(mut names: Vec<String>) -> Vec<String> {
 }
 
 fn text_attributes(header: &exr::meta::header::Header) -> Notes {
-    let all = header
-        .own_attributes
-        .other
-        .iter()
-        .chain(&header.shared_attributes.other);
+    let own = header.own_attributes.other.iter();
+    let all = own.chain(&header.shared_attributes.other);
     let mut notes: Notes = all
         .filter_map(|(name, value)| match value {
             AttributeValue::Text(text) => Some((name.to_string(), text.to_string())),
@@ -326,9 +340,8 @@ pub(crate) fn decode(
     let (width, height) = window_size(window);
     limits.check_memory(width, height, picked.len())?;
     let mut names = file.picked_names(part, &picked);
-    let mut samples = file
-        .reader(part, &picked, window, SampleOrder::Interleaved)?
-        .read()?;
+    let reader = file.reader(part, &picked, window, SampleOrder::Interleaved)?;
+    let mut samples = reader.read()?;
     if matches!(wanted, Wanted::Color | Wanted::Film) && picked.len() >= 3 {
         convert_colors(&mut samples, &mut names, &file.space())?;
     }
@@ -344,17 +357,21 @@ pub(crate) fn decode(
 
 /// Luminance with its differences where there are those, and what is chosen of other channels elsewhere.
 fn choose_channels(wanted: Wanted, names: &[String]) -> Result<Choice, String> {
-    let chroma = LUMINANCE_CHROMA
-        .into_iter()
-        .map(|name| names.iter().position(|n| n == name))
-        .collect::<Option<Vec<_>>>();
-    match (wanted, chroma) {
-        (Wanted::Color | Wanted::Film, Some(mut picked)) => {
-            picked.extend(names.iter().position(|n| n == "A"));
-            Ok((ChannelMatch::Named, picked))
-        }
+    match (wanted, luminance_chroma(names)) {
+        (Wanted::Color | Wanted::Film, Some(picked)) => Ok((ChannelMatch::Named, picked)),
         _ => wanted.choose(names),
     }
+}
+
+/// Luminance, its differences, and alpha where it is there.
+fn luminance_chroma(names: &[String]) -> Option<Vec<usize>> {
+    let [y, ry, by] = LUMINANCE_CHROMA.map(|name| index_of(names, name));
+    let alpha = index_of(names, "A");
+    Some([y?, ry?, by?].into_iter().chain(alpha).collect())
+}
+
+fn index_of(names: &[String], name: &str) -> Option<usize> {
+    names.iter().position(|other| other == name)
 }
 
 /// Makes the first three channels red, green and blue of Rec. 709.

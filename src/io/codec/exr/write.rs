@@ -1,6 +1,7 @@
 //! EXR files of one part.
 
 use super::attributes::{FIRST_ATTRIBUTE, add_texts, latin_text, sort_attributes};
+use super::parts::check_count;
 use exr::prelude::{
     AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, SmallVec, Vec2,
     WritableImage,
@@ -55,17 +56,12 @@ pub(crate) fn encode(
 }
 
 fn channel_list(
-    (width, height): (usize, usize),
+    size: (usize, usize),
     planes: Vec<(&str, FlatSamples)>,
 ) -> Result<AnyChannels<FlatSamples>, String> {
     let mut list = SmallVec::new();
     for (name, samples) in planes {
-        if samples.len() != width * height {
-            return Err(format!(
-                "channel {name}: {} samples, expected {width} x {height}",
-                samples.len()
-            ));
-        }
+        check_count(&samples, size).map_err(|e| format!("channel {name}: {e}"))?;
         list.push(AnyChannel::new(latin_text(name)?, samples));
     }
     Ok(AnyChannels::sort(list))
