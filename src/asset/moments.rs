@@ -93,7 +93,7 @@ impl Moments {
     }
 }
 
-/// A panorama's light, ready to be asked for over any rectangle, and its cuts.
+/// A panorama's light, ready to be summed over any rectangle, and its cuts.
 #[derive(Debug)]
 pub(super) struct LightSums {
     /// Light above and left of each grid corner.

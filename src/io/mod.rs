@@ -86,7 +86,7 @@ pub use codec::codes::ToFile;
 pub use codec::exr::Compression;
 #[doc(hidden)]
 pub use codec::jpeg::through_jpeg;
-#[cfg(any(feature = "fuzzing", test))]
+#[cfg(feature = "fuzzing")]
 pub(crate) use document::parse_toml;
 #[doc(hidden)]
 pub use document::{

@@ -8,7 +8,7 @@ use crate::pixel::LinearRgb;
 use crate::scene::{AreaLight, LightShape};
 use std::f64::consts::TAU;
 
-/// Samples along each side of an ellipse where its irradiance is asked for without shadows.
+/// Samples along each side of an ellipse where its irradiance is computed without shadows.
 const ELLIPSE_SAMPLES: usize = 16;
 /// Corners of the polygon that stands for an ellipse where it is near.
 const ELLIPSE_CORNERS: usize = 256;

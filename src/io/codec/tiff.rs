@@ -247,7 +247,7 @@ pub(crate) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Refusal> {
     })
 }
 
-/// Codes from the lowest bit up, as before 1990: they begin with the code that says so (TIFF 6.0, section 13).
+/// Codes from the lowest bit up, as before 1990: such data begins with the clear code (TIFF 6.0, section 13).
 fn refuse_old_lzw(decoder: &mut Decoder<impl Read + Seek>, bytes: &[u8]) -> Result<(), Refusal> {
     if decoder.find_tag_unsigned(Tag::Compression)? != Some(LZW_COMPRESSION) {
         return Ok(());

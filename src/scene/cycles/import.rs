@@ -251,6 +251,7 @@ mod tests {
     use super::super::{SCRIPT, export};
     use super::*;
     use crate::geom::Quad;
+    use crate::scene::{Grade, LightShape};
 
     #[test]
     fn a_scene_names_pictures_beside_it_and_none_further_away() {

@@ -95,7 +95,7 @@ pub(super) struct Fall {
     pub(super) energy_rise: f64,
     /// Least and greatest x and y of the swept space; metres of the scene.
     pub(super) swept: [[f64; 2]; 2],
-    /// The motion, as often as was asked for.
+    /// The motion, sampled as often as requested.
     pub(super) samples: Vec<MotionSample>,
 }
 

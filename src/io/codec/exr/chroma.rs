@@ -232,7 +232,7 @@ fn read_pair(file: &[u8], at: usize) -> Option<[usize; 2]> {
     Some([read_sampling(file, at)?, read_sampling(file, at + 4)?])
 }
 
-/// Pixels for a sample; none where that is no number which files have.
+/// Pixels for a sample; none for a number that no file has.
 fn read_sampling(file: &[u8], at: usize) -> Option<usize> {
     let n = u32::from_le_bytes(*file.get(at..)?.first_chunk()?);
     (1..=MAX_SAMPLING).contains(&n).then_some(n as usize)
