@@ -15,6 +15,7 @@ const FLOORS: &[&[&str]] = &[
         "stopwatch",
         "work",
     ],
+    &["image"],
     &[
         "allowance",
         "bounds",

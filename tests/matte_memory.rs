@@ -56,14 +56,15 @@ fn a_frame_takes_its_output_and_two_channels_at_most() {
         channels(both),
         channels(alone)
     );
-    // The meter sees what is there in any case: five channels of output, or one.
+    // The meter sees what is there in any case: five channels of output, or one, less the few pages that the heap had.
+    let seen = |outputs: usize| outputs * CHANNEL * 99 / 100;
     assert!(
-        (5 * CHANNEL..=(5 + 2) * CHANNEL).contains(&both),
+        (seen(5)..=(5 + 2) * CHANNEL).contains(&both),
         "{} channels",
         channels(both)
     );
     assert!(
-        (CHANNEL..=(1 + 2) * CHANNEL).contains(&alone),
+        (seen(1)..=(1 + 2) * CHANNEL).contains(&alone),
         "{} channels",
         channels(alone)
     );

@@ -6,7 +6,7 @@
 
 use super::error::SolveError;
 use super::label::{Framing, Label};
-use super::model::{KAPPA, LN_FOCAL, PRINCIPAL, STRETCH, State, UNKNOWNS, Unknowns};
+use super::model::{KAPPA, LN_FOCAL, PRINCIPAL, STRETCH, Square, State, UNKNOWNS, Unknowns};
 use super::options::SolveOptions;
 use super::prior::{ParameterPriors, Prior};
 use super::problem::Problem;
@@ -50,10 +50,15 @@ pub(crate) struct BundleEquations {
     normals: Vec<NormalEquations>,
 }
 
-/// The normal equations of the shared unknowns after every pose has been eliminated.
-struct ReducedSystem {
+/// The normal equations of the shared unknowns.
+struct SharedSystem {
     matrix: DMatrix<f64>,
     right: DVector<f64>,
+}
+
+/// The shared system after every pose has been eliminated, and the blocks that were.
+struct ReducedSystem {
+    shared: SharedSystem,
     photos: Vec<PhotoBlock>,
 }
 
@@ -68,21 +73,23 @@ struct PhotoBlock {
 }
 
 impl Bundle {
-    /// Of the labels that are used; pictures of unknown framing are treated as pictures of this one.
+    /// For the labels that are used; pictures of unknown framing are treated as having this one.
     pub(crate) fn new(
         labels: &[Label],
         used: &[usize],
         unknown: Framing,
         options: &SolveOptions,
     ) -> Result<Self, SolveError> {
-        let problems = used
+        let labels: Vec<&Label> = used.iter().map(|&i| &labels[i]).collect();
+        let problems = labels
             .iter()
-            .map(|&i| {
-                let known = Some(labels[i].framing()).filter(|f| *f != Framing::Unknown);
-                Problem::new(&labels[i], known.unwrap_or(unknown), options)
-            })
+            .map(|label| Problem::new(label, framing_or(label, unknown), options))
             .collect::<Result<Vec<_>, _>>()?;
-        let surface = surfaces_shown(used.iter().map(|&i| &labels[i]).zip(&problems));
+        let surface = surfaces_shown(labels.into_iter().zip(&problems));
+        Self::from_problems(problems, surface)
+    }
+
+    fn from_problems(problems: Vec<Problem>, surface: Vec<usize>) -> Result<Self, SolveError> {
         Ok(Self {
             residuals: problems.iter().map(without_shared_priors).collect(),
             shared: shared_priors(&problems, &surface).ok_or(SolveError::NoCorners)?,
@@ -93,13 +100,18 @@ impl Bundle {
 
     /// The lower of the minima from the photos' own focal lengths and from the prior.
     pub(crate) fn best(&self, alone: &[Result<Solution, SolveError>]) -> Option<BundleEquations> {
+        self.ln_focal_starts(alone)
+            .filter_map(|ln_focal| self.refine(self.posed(ln_focal)?))
+            .min_by(|a, b| a.cost.total_cmp(&b.cost))
+    }
+
+    /// Logarithms of the focal length from which to refine.
+    fn ln_focal_starts(&self, alone: &[Result<Solution, SolveError>]) -> impl Iterator<Item = f64> {
         let prior = self.shared[0];
         let measured = mean_ln_focal(alone, self.problems[0].units.unit_px);
         [Some(prior.mean), measured.filter(|_| !prior.is_fixed())]
             .into_iter()
             .flatten()
-            .filter_map(|ln_focal| self.refine(self.posed(ln_focal)?))
-            .min_by(|a, b| a.cost.total_cmp(&b.cost))
     }
 
     /// Every photo's best pose for a focal length, the lens otherwise as its priors have it.
@@ -107,13 +119,8 @@ impl Bundle {
         self.problems
             .iter()
             .map(|problem| {
-                let mut problem = problem.clone();
-                let priors = &mut problem.residuals.priors;
-                priors.ln_focal = Prior::fixed(ln_focal);
-                priors.principal_sigma = 0.0;
-                priors.stretch_sigma = 0.0;
-                priors.kappa.sigma = 0.0;
-                Some(problem.search()?.best.state)
+                let found = with_fixed_lens(problem, ln_focal).search()?;
+                Some(found.best.state)
             })
             .collect()
     }
@@ -137,32 +144,36 @@ impl Bundle {
 
     /// The cost around the states to second order; none where a point would be behind its camera.
     fn linearized(&self, states: Vec<State>) -> Option<BundleEquations> {
-        let normals = self
-            .residuals
-            .iter()
-            .zip(&states)
-            .map(|(residuals, state)| residuals.normal_equations(state))
-            .collect::<Option<Vec<_>>>()?;
+        let normals = self.normal_equations(&states)?;
         let chi2: Vec<f64> = normals.iter().map(|n| n.cost).collect();
-        let values = self.shared_values(&states);
-        let shared = self.shared.iter().zip(values.iter());
-        let prior_cost: f64 = shared.map(|(prior, &value)| prior.cost(value)).sum();
         Some(BundleEquations {
-            cost: chi2.iter().sum::<f64>() + prior_cost,
+            cost: chi2.iter().sum::<f64>() + self.prior_cost(&states),
             states,
             chi2,
             normals,
         })
     }
 
+    /// Those of each photo's own residuals.
+    fn normal_equations(&self, states: &[State]) -> Option<Vec<NormalEquations>> {
+        self.residuals
+            .iter()
+            .zip(states)
+            .map(|(residuals, state)| residuals.normal_equations(state))
+            .collect()
+    }
+
+    fn prior_cost(&self, states: &[State]) -> f64 {
+        let values = self.shared_values(states);
+        let shared = self.shared.iter().zip(values.iter());
+        shared.map(|(prior, &value)| prior.cost(value)).sum()
+    }
+
     fn refine(&self, states: Vec<State>) -> Option<BundleEquations> {
         let mut equations = self.linearized(states)?;
         let mut damping = INITIAL_DAMPING;
         for _ in 0..MAX_ITERATIONS {
-            let next = self
-                .stepped(&equations, damping)
-                .and_then(|states| self.linearized(states));
-            match next.filter(|next| next.cost < equations.cost) {
+            match self.lower_neighbour(&equations, damping) {
                 Some(next) => {
                     let fall = (equations.cost - next.cost) / equations.cost;
                     equations = next;
@@ -180,75 +191,75 @@ impl Bundle {
         Some(equations)
     }
 
+    /// The equations after a damped step, where that lowers the cost.
+    fn lower_neighbour(
+        &self,
+        equations: &BundleEquations,
+        damping: f64,
+    ) -> Option<BundleEquations> {
+        let states = self.stepped(equations, damping)?;
+        self.linearized(states)
+            .filter(|next| next.cost < equations.cost)
+    }
+
     /// All states after a damped step.
     fn stepped(&self, equations: &BundleEquations, damping: f64) -> Option<Vec<State>> {
-        let ReducedSystem {
-            matrix,
-            right,
-            photos,
-        } = self.reduced(equations, damping)?;
-        let shared = matrix.cholesky()?.solve(&right);
-        let limit = shared.amax().max(1.0);
-        let shared = shared / limit;
+        let ReducedSystem { shared, photos } = self.reduced(equations, damping)?;
+        let shared = shared.limited_step()?;
         photos
             .iter()
             .enumerate()
             .map(|(index, photo)| {
                 let pose = photo.pose_step(&shared, damping)?;
-                let mut step = Unknowns::zeros();
-                step.fixed_rows_mut::<POSE_UNKNOWNS>(0).copy_from(&pose);
-                for (unknown, column) in self.columns(index) {
-                    step[unknown] = shared[column];
-                }
+                let step = self.photo_step(index, &pose, &shared);
                 Some(equations.states[index].stepped(&step))
             })
             .collect()
     }
 
+    /// The step of all unknowns of a photo, from those of its pose and of what is shared.
+    fn photo_step(&self, photo: usize, pose: &Vector6<f64>, shared: &DVector<f64>) -> Unknowns {
+        let mut step = Unknowns::zeros();
+        step.fixed_rows_mut::<POSE_UNKNOWNS>(0).copy_from(pose);
+        for (unknown, column) in self.columns(photo) {
+            step[unknown] = shared[column];
+        }
+        step
+    }
+
     /// The shared system after every pose has been eliminated.
     fn reduced(&self, equations: &BundleEquations, damping: f64) -> Option<ReducedSystem> {
-        let (mut matrix, mut right) = self.prior_system(&equations.states);
+        let mut shared = self.prior_system(&equations.states);
         let photos: Vec<PhotoBlock> = (0..equations.normals.len())
             .map(|photo| self.photo_block(equations, photo))
             .collect();
         for photo in &photos {
-            matrix += &photo.own;
-            right += &photo.own_right;
+            shared.add(photo);
         }
-        for i in 0..self.shared.len() {
-            matrix[(i, i)] *= 1.0 + damping;
-        }
+        damp_diagonal(&mut shared.matrix, damping);
         for photo in &photos {
-            let inverse = photo.inverse_pose(damping)?;
-            matrix -= photo.coupling.transpose() * inverse * &photo.coupling;
-            right -= photo.coupling.transpose() * (inverse * photo.pose_right);
+            shared.eliminate_pose(photo, damping)?;
         }
-        self.hold_unconstrained(&mut matrix, &mut right);
-        Some(ReducedSystem {
-            matrix,
-            right,
-            photos,
-        })
+        self.hold_unconstrained(&mut shared);
+        Some(ReducedSystem { shared, photos })
     }
 
     /// The part of the shared system that comes from the priors.
-    fn prior_system(&self, states: &[State]) -> (DMatrix<f64>, DVector<f64>) {
-        let count = self.shared.len();
-        let (mut matrix, mut right) = (DMatrix::zeros(count, count), DVector::zeros(count));
+    fn prior_system(&self, states: &[State]) -> SharedSystem {
+        let mut system = SharedSystem::zeros(self.shared.len());
         let values = self.shared_values(states);
         for (i, prior) in self.shared.iter().enumerate() {
-            matrix[(i, i)] += prior.information();
-            right[i] -= (values[i] - prior.mean) * prior.information();
+            system.matrix[(i, i)] += prior.information();
+            system.right[i] -= (values[i] - prior.mean) * prior.information();
         }
-        (matrix, right)
+        system
     }
 
     /// Keeps what is fixed, or what nothing constrains, where it is.
-    fn hold_unconstrained(&self, matrix: &mut DMatrix<f64>, right: &mut DVector<f64>) {
+    fn hold_unconstrained(&self, SharedSystem { matrix, right }: &mut SharedSystem) {
         for (i, prior) in self.shared.iter().enumerate() {
             if prior.is_fixed() || matrix[(i, i)] <= 0.0 {
-                matrix.row_mut(i).fill(0.0);
-                matrix.column_mut(i).fill(0.0);
+                clear_row_and_column(matrix, i);
                 (matrix[(i, i)], right[i]) = (1.0, 0.0);
             }
         }
@@ -257,14 +268,11 @@ impl Bundle {
     /// A photo's part of the normal equations, by pose and by what is shared.
     fn photo_block(&self, equations: &BundleEquations, index: usize) -> PhotoBlock {
         let normal = &equations.normals[index];
-        let information = &normal.information;
         let mut block = PhotoBlock::uncoupled(normal, self.shared.len());
         for (unknown, column) in self.columns(index) {
-            let coupling = information.fixed_view::<POSE_UNKNOWNS, 1>(0, unknown);
-            block.coupling.set_column(column, &coupling);
-            block.own_right[column] -= normal.slope[unknown];
+            block.couple(normal, unknown, column);
             for (other, other_column) in self.columns(index) {
-                block.own[(column, other_column)] += information[(unknown, other)];
+                block.own[(column, other_column)] += normal.information[(unknown, other)];
             }
         }
         block
@@ -277,69 +285,128 @@ impl Bundle {
         options: &SolveOptions,
     ) -> Vec<Solution> {
         let shared = self.shared_covariance(equations);
-        self.problems
-            .iter()
-            .enumerate()
-            .map(|(index, problem)| {
-                let minimum = equations.minimum(index);
-                let mut uncertainty = Uncertainty::new(&minimum, self.shared[0]);
-                if let Some((covariance, photos)) = &shared {
-                    self.fill_covariance(&mut uncertainty, covariance, &photos[index], index);
-                    let information = inverse_or_zero(covariance[(0, 0)]);
-                    let ln_focal = minimum.state.ln_focal;
-                    uncertainty.focal = focal_share(ln_focal, information, self.shared[0]);
-                }
-                let mut with_shared_prior = problem.clone();
-                with_shared_prior.residuals.priors.ln_focal = self.shared[0];
-                with_shared_prior.solution_with(&minimum, &uncertainty, options)
+        (0..self.problems.len())
+            .map(|photo| {
+                let minimum = equations.minimum(photo);
+                let uncertainty = self.uncertainty(photo, &minimum, shared.as_ref());
+                self.with_shared_prior(photo)
+                    .solution_with(&minimum, &uncertainty, options)
             })
             .collect()
     }
 
-    /// Covariance of the shared unknowns, and the photos' blocks it comes from.
-    fn shared_covariance(
+    /// How well a photo's unknowns are known, by the shared covariance where there is one.
+    fn uncertainty(
         &self,
-        equations: &BundleEquations,
-    ) -> Option<(DMatrix<f64>, Vec<PhotoBlock>)> {
-        let ReducedSystem { matrix, photos, .. } = self.reduced(equations, 0.0)?;
-        let mut covariance = matrix.cholesky()?.inverse();
+        photo: usize,
+        minimum: &Minimum,
+        shared: Option<&SharedCovariance>,
+    ) -> Uncertainty {
+        let mut uncertainty = Uncertainty::new(minimum, self.shared[0]);
+        if let Some((covariance, photos)) = shared {
+            if let Some(own) = self.photo_covariance(covariance, &photos[photo], photo) {
+                uncertainty.covariance = own;
+            }
+            let information = inverse_or_zero(covariance[(0, 0)]);
+            let ln_focal = minimum.state.ln_focal;
+            uncertainty.focal = focal_share(ln_focal, information, self.shared[0]);
+        }
+        uncertainty
+    }
+
+    /// A photo's problem, with the prior of the focal length that the photos share.
+    fn with_shared_prior(&self, photo: usize) -> Problem {
+        let mut problem = self.problems[photo].clone();
+        problem.residuals.priors.ln_focal = self.shared[0];
+        problem
+    }
+
+    fn shared_covariance(&self, equations: &BundleEquations) -> Option<SharedCovariance> {
+        let ReducedSystem { shared, photos } = self.reduced(equations, 0.0)?;
+        let mut covariance = shared.matrix.cholesky()?.inverse();
         for i in (0..self.shared.len()).filter(|&i| self.shared[i].is_fixed()) {
-            covariance.row_mut(i).fill(0.0);
-            covariance.column_mut(i).fill(0.0);
+            clear_row_and_column(&mut covariance, i);
         }
         Some((covariance, photos))
     }
 
     /// A photo's covariance, from that of the shared unknowns and its own block.
-    fn fill_covariance(
+    fn photo_covariance(
         &self,
-        uncertainty: &mut Uncertainty,
         shared: &DMatrix<f64>,
         photo: &PhotoBlock,
         index: usize,
-    ) {
-        let Some(inverse) = photo.inverse_pose(0.0) else {
-            return;
-        };
+    ) -> Option<Square> {
+        let inverse = photo.inverse_pose(0.0)?;
         let response = -(inverse * &photo.coupling);
         let cross = &response * shared;
         let pose = inverse + &cross * response.transpose();
-        let covariance = &mut uncertainty.covariance;
-        covariance.fill(0.0);
+        let mut covariance = Square::zeros();
         covariance
             .fixed_view_mut::<POSE_UNKNOWNS, POSE_UNKNOWNS>(0, 0)
             .copy_from(&pose);
         let columns = self.columns(index);
         for (unknown, column) in columns {
-            for row in 0..POSE_UNKNOWNS {
-                covariance[(row, unknown)] = cross[(row, column)];
-                covariance[(unknown, row)] = cross[(row, column)];
-            }
+            set_pose_covariance(&mut covariance, unknown, &cross.column(column).into());
             for (other, other_column) in columns {
                 covariance[(unknown, other)] = shared[(column, other_column)];
             }
         }
+        Some(covariance)
     }
+}
+
+/// Covariance of the shared unknowns, and the photos' blocks it comes from.
+type SharedCovariance = (DMatrix<f64>, Vec<PhotoBlock>);
+
+/// Sets the covariance of the pose with one of the shared unknowns.
+fn set_pose_covariance(covariance: &mut Square, unknown: usize, cross: &Vector6<f64>) {
+    for row in 0..POSE_UNKNOWNS {
+        covariance[(row, unknown)] = cross[row];
+        covariance[(unknown, row)] = cross[row];
+    }
+}
+
+impl SharedSystem {
+    /// No information on any of so many unknowns.
+    fn zeros(unknowns: usize) -> Self {
+        Self {
+            matrix: DMatrix::zeros(unknowns, unknowns),
+            right: DVector::zeros(unknowns),
+        }
+    }
+
+    /// Adds what a photo shows of the shared unknowns for its present pose.
+    fn add(&mut self, photo: &PhotoBlock) {
+        self.matrix += &photo.own;
+        self.right += &photo.own_right;
+    }
+
+    /// Takes out what the photo's pose can explain as well: the Schur complement.
+    fn eliminate_pose(&mut self, photo: &PhotoBlock, damping: f64) -> Option<()> {
+        let inverse = photo.inverse_pose(damping)?;
+        self.matrix -= photo.coupling.transpose() * inverse * &photo.coupling;
+        self.right -= photo.coupling.transpose() * (inverse * photo.pose_right);
+        Some(())
+    }
+
+    /// The step of the shared unknowns, shortened where it would leap.
+    fn limited_step(self) -> Option<DVector<f64>> {
+        let step = self.matrix.cholesky()?.solve(&self.right);
+        let limit = step.amax().max(1.0);
+        Some(step / limit)
+    }
+}
+
+fn damp_diagonal(matrix: &mut DMatrix<f64>, damping: f64) {
+    for i in 0..matrix.nrows() {
+        matrix[(i, i)] *= 1.0 + damping;
+    }
+}
+
+fn clear_row_and_column(matrix: &mut DMatrix<f64>, i: usize) {
+    matrix.row_mut(i).fill(0.0);
+    matrix.column_mut(i).fill(0.0);
 }
 
 impl BundleEquations {
@@ -369,6 +436,15 @@ impl PhotoBlock {
         }
     }
 
+    /// Sets what connects the pose with one of the shared unknowns, and that unknown's slope.
+    fn couple(&mut self, normal: &NormalEquations, unknown: usize, column: usize) {
+        let coupling = normal
+            .information
+            .fixed_view::<POSE_UNKNOWNS, 1>(0, unknown);
+        self.coupling.set_column(column, &coupling);
+        self.own_right[column] -= normal.slope[unknown];
+    }
+
     /// Inverse of the pose's block, damped in proportion to its diagonal.
     fn inverse_pose(&self, damping: f64) -> Option<Matrix6<f64>> {
         let mut pose = self.pose;
@@ -387,36 +463,71 @@ impl PhotoBlock {
 
 /// Which of their surfaces each photo shows; those of one name and size are one, unnamed ones stand alone.
 fn surfaces_shown<'a>(photos: impl Iterator<Item = (&'a Label, &'a Problem)>) -> Vec<usize> {
-    let mut surfaces: Vec<(&str, [f64; 2])> = Vec::new();
+    let mut surfaces: Vec<NamedSurface> = Vec::new();
     photos
         .map(|(label, problem)| {
             let surface = (label.surface.id.as_str(), problem.size);
-            let known = surfaces
-                .iter()
-                .position(|s| *s == surface && !surface.0.is_empty());
-            known.unwrap_or_else(|| {
-                surfaces.push(surface);
-                surfaces.len() - 1
-            })
+            position_of(&mut surfaces, surface)
         })
         .collect()
 }
 
+/// The name and the size of a surface.
+type NamedSurface<'a> = (&'a str, [f64; 2]);
+
+/// Where a surface is in a list, to which it is added if it is unnamed or new.
+fn position_of<'a>(surfaces: &mut Vec<NamedSurface<'a>>, surface: NamedSurface<'a>) -> usize {
+    let known = surfaces
+        .iter()
+        .position(|s| *s == surface && !surface.0.is_empty());
+    known.unwrap_or_else(|| {
+        surfaces.push(surface);
+        surfaces.len() - 1
+    })
+}
+
+/// The framing of a picture, or this one where it is unknown.
+fn framing_or(label: &Label, unknown: Framing) -> Framing {
+    match label.framing() {
+        Framing::Unknown => unknown,
+        known => known,
+    }
+}
+
+/// A photo's problem with a known lens, of which only the pose is left open.
+fn with_fixed_lens(problem: &Problem, ln_focal: f64) -> Problem {
+    let mut problem = problem.clone();
+    let priors = &mut problem.residuals.priors;
+    priors.ln_focal = Prior::fixed(ln_focal);
+    priors.principal_sigma = 0.0;
+    priors.stretch_sigma = 0.0;
+    priors.kappa.sigma = 0.0;
+    problem
+}
+
 /// Priors of the lens, by the photo that knows most of its focal length, and of each surface's stretch.
 fn shared_priors(problems: &[Problem], surface: &[usize]) -> Option<Vec<Prior>> {
-    let best_known = problems.iter().min_by(|a, b| {
-        let [a, b] = [a, b].map(|problem| problem.residuals.priors.ln_focal.sigma);
-        a.total_cmp(&b)
-    })?;
-    let lens = best_known.residuals.priors;
-    let principal = Prior::at_zero(lens.principal_sigma);
-    let mut shared = vec![lens.ln_focal, principal, principal, lens.kappa];
+    let mut shared = lens_priors(best_known_priors(problems)?).to_vec();
     let surfaces = surface.iter().max().map_or(0, |last| last + 1);
     shared.extend((0..surfaces).map(|s| {
         let shown = surface.iter().position(|&x| x == s).unwrap_or(0);
         Prior::at_zero(problems[shown].residuals.priors.stretch_sigma)
     }));
     Some(shared)
+}
+
+/// The priors of the photo that knows most of its focal length.
+fn best_known_priors(problems: &[Problem]) -> Option<&ParameterPriors> {
+    problems
+        .iter()
+        .map(|problem| &problem.residuals.priors)
+        .min_by(|a, b| a.ln_focal.sigma.total_cmp(&b.ln_focal.sigma))
+}
+
+/// In the order of [`LENS_UNKNOWNS`].
+fn lens_priors(priors: &ParameterPriors) -> [Prior; 4] {
+    let principal = Prior::at_zero(priors.principal_sigma);
+    [priors.ln_focal, principal, principal, priors.kappa]
 }
 
 /// What a photo shows, with flat priors of what is shared.
@@ -436,16 +547,22 @@ fn without_shared_priors(problem: &Problem) -> Residuals {
 
 /// Weighted mean of what the photos alone give for the logarithm of the focal length, in units; none where none gives it.
 fn mean_ln_focal(alone: &[Result<Solution, SolveError>], unit_px: f64) -> Option<f64> {
-    let mut sums = (0.0, 0.0);
-    for solution in alone.iter().flatten() {
-        if let (Some(px), sigma) = (solution.focal.from_data_px, solution.sigma.ln_focal) {
-            let weight = solution.focal.share / (sigma * sigma);
-            if weight.is_finite() {
-                sums = (sums.0 + weight, sums.1 + weight * libm::log(px / unit_px));
-            }
-        }
-    }
-    (sums.0 > 0.0).then(|| sums.1 / sums.0)
+    let (weight, sum) = alone
+        .iter()
+        .flatten()
+        .filter_map(weighted_focal_px)
+        .fold((0.0, 0.0), |(weights, sum), (weight, px)| {
+            (weights + weight, sum + weight * libm::log(px / unit_px))
+        });
+    (weight > 0.0).then(|| sum / weight)
+}
+
+/// What a photo alone gives for its focal length, behind its weight.
+fn weighted_focal_px(solution: &Solution) -> Option<(f64, f64)> {
+    let sigma = solution.sigma.ln_focal;
+    let px = solution.focal.from_data_px?;
+    let weight = solution.focal.share / (sigma * sigma);
+    weight.is_finite().then_some((weight, px))
 }
 
 fn inverse_or_zero(variance: f64) -> f64 {

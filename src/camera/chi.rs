@@ -9,19 +9,25 @@ pub(crate) const CHI2_99: f64 = 9.2;
 /// Exact, by the recurrence from two degrees to the next: each adds `(x/2)^(k/2) exp(-x/2) / gamma(k/2 + 1)`.
 pub(crate) fn exceeds(x: f64, dof: usize) -> Option<f64> {
     let half = x / 2.0;
-    let (mut k, mut tail) = match dof {
+    let (first, start) = match dof {
         0 => return None,
         n if n % 2 == 0 => (2, libm::exp(-half)),
         _ => (1, libm::erfc(half.sqrt())),
     };
-    while k < dof {
-        let order = k as f64 / 2.0;
-        if half > 0.0 {
-            tail += libm::exp(order * libm::log(half) - half - libm::lgamma(order + 1.0));
-        }
-        k += 2;
-    }
+    let tail = (first..dof)
+        .step_by(2)
+        .fold(start, |tail, k| tail + recurrence_term(half, k));
     Some(tail.min(1.0))
+}
+
+/// What the tail gains from `k` degrees of freedom to two more, by half of chi squared.
+fn recurrence_term(half: f64, k: usize) -> f64 {
+    let order = k as f64 / 2.0;
+    if half > 0.0 {
+        libm::exp(order * libm::log(half) - half - libm::lgamma(order + 1.0))
+    } else {
+        0.0
+    }
 }
 
 #[cfg(test)]

@@ -13,7 +13,7 @@ const COLLINEAR_SIGMAS: f64 = 3.0;
 /// Below this length of the longest side corner noise is a large part of the picture.
 const SMALL_QUAD_PX: f64 = 50.0;
 
-/// OrderedCorners corners: convex, clockwise in the picture (y down), starting at the labelled first.
+/// Corners in order: convex, clockwise in the picture (y down), starting at the labelled first.
 #[derive(Clone, Debug)]
 pub(crate) struct OrderedCorners {
     pub(crate) corners: [Point2<f64>; 4],
@@ -37,24 +37,28 @@ pub(crate) fn check(
     if let (CornerOrder::Strict, Some(found)) = (policy, repair.clone()) {
         return Err(SolveError::Order(found));
     }
-    let warnings = repair
+    Ok(OrderedCorners {
+        corners,
+        warnings: warnings(&corners, image, repair),
+    })
+}
+
+fn warnings(
+    corners: &[Point2<f64>; 4],
+    image: [u32; 2],
+    repair: Option<Diagnostic>,
+) -> Vec<Diagnostic> {
+    repair
         .into_iter()
-        .chain(small_quad(&corners))
-        .chain(far_outside(&corners, image))
-        .collect();
-    Ok(OrderedCorners { corners, warnings })
+        .chain(small_quad(corners))
+        .chain(far_outside(corners, image))
+        .collect()
 }
 
 /// Twice the signed areas of the triangles that leave out one corner each; in a picture of a rectangle the one without
 /// corner `i` is proportional to the depth of corner `i`.
 pub(crate) fn triangle_areas(c: &[Vector2<f64>; 4]) -> [f64; 4] {
-    let twice = |i: usize, j: usize, k: usize| (c[j] - c[i]).perp(&(c[k] - c[i]));
-    [
-        twice(1, 2, 3),
-        twice(0, 2, 3),
-        twice(0, 1, 3),
-        twice(0, 1, 2),
-    ]
+    [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]].map(|[i, j, k]| (c[j] - c[i]).perp(&(c[k] - c[i])))
 }
 
 fn refuse_coincident(c: &[Point2<f64>; 4], sigma: f64) -> Result<(), SolveError> {
@@ -81,22 +85,28 @@ fn clockwise(c: &[Point2<f64>; 4]) -> ([usize; 4], Option<Diagnostic>) {
     if areas.iter().all(|&a| a > 0.0) {
         ([0, 1, 2, 3], None)
     } else if areas.iter().all(|&a| a < 0.0) {
-        let what = "the corners run anticlockwise; the second and fourth were exchanged";
-        let reversed = Diagnostic::warning(Code::CornersReversed, what);
-        ([0, 3, 2, 1], Some(reversed))
+        ([0, 3, 2, 1], Some(reversed_warning()))
     } else {
-        let what = "the corners cross each other; sorted clockwise, starting at the first";
-        let reordered = Diagnostic::warning(Code::CornersReordered, what);
-        (by_angle(c), Some(reordered))
+        (by_angle(c), Some(reordered_warning()))
     }
+}
+
+fn reversed_warning() -> Diagnostic {
+    let what = "the corners run anticlockwise; the second and fourth were exchanged";
+    Diagnostic::warning(Code::CornersReversed, what)
+}
+
+fn reordered_warning() -> Diagnostic {
+    let what = "the corners cross each other; sorted clockwise, starting at the first";
+    Diagnostic::warning(Code::CornersReordered, what)
 }
 
 /// By angle around the mean (clockwise, as y runs down), rotated so that corner 0 stays first.
 fn by_angle(c: &[Point2<f64>; 4]) -> [usize; 4] {
     let mean = c.iter().fold(Vector2::zeros(), |sum, p| sum + p.coords) / 4.0;
-    let angle = |i: usize| libm::atan2(c[i].y - mean.y, c[i].x - mean.x);
+    let angles = c.map(|p| libm::atan2(p.y - mean.y, p.x - mean.x));
     let mut order = [0, 1, 2, 3];
-    order.sort_by(|&i, &j| angle(i).total_cmp(&angle(j)));
+    order.sort_by(|&i: &usize, &j: &usize| angles[i].total_cmp(&angles[j]));
     let first = order.iter().position(|&i| i == 0).unwrap_or(0);
     order.rotate_left(first);
     order
@@ -105,21 +115,33 @@ fn by_angle(c: &[Point2<f64>; 4]) -> [usize; 4] {
 /// Ordered corners must be convex, and none within noise of the line of two others.
 fn refuse_folded(c: &[Point2<f64>; 4], sigma: f64) -> Result<(), SolveError> {
     let areas = triangle_areas(&c.map(|p| p.coords));
-    let limit_px = COLLINEAR_SIGMAS * sigma;
     for (left_out, area) in areas.into_iter().enumerate() {
         let height_px = area / longest_side_without(c, left_out);
-        if height_px <= -limit_px.max(f64::MIN_POSITIVE) {
-            return Err(SolveError::NotConvex);
-        }
-        if height_px < limit_px || area <= 0.0 {
-            return Err(SolveError::Collinear {
-                corner: (left_out + 2) % 4,
-                distance_px: height_px.abs(),
-                limit_px,
-            });
+        refuse_flat(left_out, height_px, COLLINEAR_SIGMAS * sigma)?;
+        if area <= 0.0 {
+            return Err(collinear(left_out, height_px, COLLINEAR_SIGMAS * sigma));
         }
     }
     Ok(())
+}
+
+/// A triangle without one corner is at least so high.
+fn refuse_flat(left_out: usize, height_px: f64, limit_px: f64) -> Result<(), SolveError> {
+    if height_px <= -limit_px.max(f64::MIN_POSITIVE) {
+        Err(SolveError::NotConvex)
+    } else if height_px < limit_px {
+        Err(collinear(left_out, height_px, limit_px))
+    } else {
+        Ok(())
+    }
+}
+
+fn collinear(left_out: usize, height_px: f64, limit_px: f64) -> SolveError {
+    SolveError::Collinear {
+        corner: (left_out + 2) % 4,
+        distance_px: height_px.abs(),
+        limit_px,
+    }
 }
 
 /// The longest side of the triangle of the other three corners.
@@ -129,24 +151,31 @@ fn longest_side_without(c: &[Point2<f64>; 4], left_out: usize) -> f64 {
 }
 
 fn small_quad(c: &[Point2<f64>; 4]) -> Option<Diagnostic> {
-    let longest_px = [0, 1, 2, 3]
+    let longest_px = longest_side(c);
+    (longest_px < SMALL_QUAD_PX).then(|| {
+        let what = format!(
+            "the longest side is only {longest_px:.1} px; expected at least {SMALL_QUAD_PX}"
+        );
+        Diagnostic::warning(Code::SmallQuad, what)
+    })
+}
+
+fn longest_side(c: &[Point2<f64>; 4]) -> f64 {
+    (0..4)
         .map(|i| (c[(i + 1) % 4] - c[i]).norm())
-        .into_iter()
-        .fold(0.0, f64::max);
-    let what = || {
-        format!("the longest side is only {longest_px:.1} px; expected at least {SMALL_QUAD_PX}")
-    };
-    (longest_px < SMALL_QUAD_PX).then(|| Diagnostic::warning(Code::SmallQuad, what()))
+        .fold(0.0, f64::max)
 }
 
 fn far_outside(c: &[Point2<f64>; 4], image: [u32; 2]) -> impl Iterator<Item = Diagnostic> {
     let c = *c;
     (0..4)
         .filter(move |&corner| is_far_outside(c[corner], image))
-        .map(|corner| {
-            let what = format!("corner {corner} lies more than a diagonal outside the picture");
-            Diagnostic::warning(Code::CornerOutside, what)
-        })
+        .map(outside_warning)
+}
+
+fn outside_warning(corner: usize) -> Diagnostic {
+    let what = format!("corner {corner} lies more than a diagonal outside the picture");
+    Diagnostic::warning(Code::CornerOutside, what)
 }
 
 /// More than a diagonal of the picture.

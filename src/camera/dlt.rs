@@ -16,16 +16,22 @@ pub(crate) fn homography(pairs: &[(Point2<f64>, Point2<f64>)]) -> Option<Homogra
     }
     let from = normalisation(pairs.iter().map(|p| p.0))?;
     let to = normalisation(pairs.iter().map(|p| p.1))?;
-    let mut square = SMatrix::<f64, 9, 9>::zeros();
-    for (p, q) in pairs {
-        let (p, q) = (from * p.to_homogeneous(), to * q.to_homogeneous());
-        square = equations(&p, &q)
-            .iter()
-            .fold(square, |square, row| square + row * row.transpose());
-    }
+    let normalized = pairs
+        .iter()
+        .map(|(p, q)| (from * p.to_homogeneous(), to * q.to_homogeneous()));
+    let square = normal_matrix(normalized);
     let h = null_vector(square, SINGULAR_EIGENVALUE * pairs.len() as f64)?;
     let map = to.try_inverse()? * Matrix3::from_fn(|i, j| h[3 * i + j]) * from;
     map.iter().all(|v| v.is_finite()).then_some(Homography(map))
+}
+
+/// The sum of the squares of all equations.
+fn normal_matrix(pairs: impl Iterator<Item = (Vector3<f64>, Vector3<f64>)>) -> SMatrix<f64, 9, 9> {
+    pairs
+        .flat_map(|(p, q)| equations(&p, &q))
+        .fold(SMatrix::zeros(), |square, row| {
+            square + row * row.transpose()
+        })
 }
 
 /// The two linear equations of a pair of points, one for each coordinate.
@@ -53,17 +59,22 @@ fn null_vector(square: SMatrix<f64, 9, 9>, threshold: f64) -> Option<SVector<f64
 
 /// The map to zero mean and a root mean square distance of sqrt 2.
 fn normalisation(points: impl Iterator<Item = Point2<f64>> + Clone) -> Option<Matrix3<f64>> {
-    let count = points.clone().count() as f64;
-    let mean = points
-        .clone()
-        .fold(Vector2::zeros(), |sum, p| sum + p.coords)
-        / count;
-    let squares: f64 = points.map(|p| (p.coords - mean).norm_squared()).sum();
-    let spread = (squares / count).sqrt();
+    let (mean, spread) = mean_and_spread(points);
     let scale = std::f64::consts::SQRT_2 / spread;
     let (x, y) = (-scale * mean.x, -scale * mean.y);
     let matrix = Matrix3::new(scale, 0.0, x, 0.0, scale, y, 0.0, 0.0, 1.0);
     scale.is_finite().then_some(matrix)
+}
+
+/// The mean of points and their root mean square distance from it.
+fn mean_and_spread(points: impl Iterator<Item = Point2<f64>> + Clone) -> (Vector2<f64>, f64) {
+    let count = points.clone().count() as f64;
+    let sum = points
+        .clone()
+        .fold(Vector2::zeros(), |sum, p| sum + p.coords);
+    let mean = sum / count;
+    let squares: f64 = points.map(|p| (p.coords - mean).norm_squared()).sum();
+    (mean, (squares / count).sqrt())
 }
 
 #[cfg(test)]

@@ -6,17 +6,15 @@ use super::options::SolveOptions;
 use super::solution::Solution;
 use super::solve::solve;
 use crate::diagnostic::Code;
+use crate::geom::Point2;
 
 /// A tape measure's relative error of the camera height that the advice speaks of.
 const TAPE_HEIGHT_SIGMA: f64 = 0.03;
 /// An improvement by this factor or more is worth a sentence.
 const WORTHWHILE_FACTOR: f64 = 0.8;
 
-/// What a person should know of a solution, a few lines of plain words.
+/// What a person should know about a solution, in a few lines of plain words.
 pub fn doctor(label: &Label, solution: &Solution, options: &SolveOptions) -> String {
-    let misfit = solution
-        .misfit()
-        .map(|error| format!("This camera cannot be used: {error}."));
     let lines = [
         pose_line(solution),
         focal_line(solution),
@@ -24,14 +22,27 @@ pub fn doctor(label: &Label, solution: &Solution, options: &SolveOptions) -> Str
         surface_line(solution),
         height_line(solution),
     ];
-    let warnings = solution
+    misfit_line(solution)
+        .into_iter()
+        .chain(lines)
+        .chain(warning_lines(solution))
+        .chain(height_advice(label, solution, options))
+        .map(|line| line + "\n")
+        .collect()
+}
+
+fn misfit_line(solution: &Solution) -> Option<String> {
+    let error = solution.misfit()?;
+    Some(format!("This camera cannot be used: {error}."))
+}
+
+/// All warnings but that of the framing, which has a line of its own.
+fn warning_lines(solution: &Solution) -> impl Iterator<Item = String> {
+    solution
         .warnings
         .iter()
         .filter(|w| w.code != Code::FramingUnknown)
-        .map(|warning| format!("Warning: {warning}."));
-    let lines = misfit.into_iter().chain(lines).chain(warnings);
-    let advice = height_advice(label, solution, options);
-    lines.chain(advice).map(|line| line + "\n").collect()
+        .map(|warning| format!("Warning: {warning}."))
 }
 
 fn pose_line(solution: &Solution) -> String {
@@ -49,7 +60,15 @@ fn pose_line(solution: &Solution) -> String {
 fn focal_line(solution: &Solution) -> String {
     let focal_px = solution.camera.focal_px.x;
     let percent = 100.0 * solution.sigma.ln_focal;
-    let known = match solution.focal_source {
+    let source = source_text(solution.focal_source);
+    match percent.is_finite() {
+        true => format!("Its focal length is {focal_px:.0} px (+- {percent:.1} %): {source}."),
+        false => format!("Its focal length is not known; {focal_px:.0} px was assumed."),
+    }
+}
+
+fn source_text(source: FocalSource) -> &'static str {
+    match source {
         FocalSource::Measured => "measured by the corners",
         FocalSource::Mixed => "partly from the corners, partly from what was known before",
         FocalSource::Prior => {
@@ -57,18 +76,12 @@ fn focal_line(solution: &Solution) -> String {
         }
         FocalSource::Fixed => "as given",
         FocalSource::Unbounded => "a bound, not a value: nothing constrains it",
-    };
-    match percent.is_finite() {
-        true => format!("Its focal length is {focal_px:.0} px (+- {percent:.1} %): {known}."),
-        false => format!("Its focal length is not known; {focal_px:.0} px was assumed."),
     }
 }
 
 /// Where the principal point is in the picture, and why that is known.
 fn framing_line(label: &Label, solution: &Solution, options: &SolveOptions) -> String {
-    let (camera, sigma_px) = (&solution.camera, solution.sigma.principal_px);
-    let [x, y] = [camera.principal_px.x, camera.principal_px.y];
-    let known = format!("Its principal point is at ({x:.0}, {y:.0}) px (+- {sigma_px:.0})");
+    let known = principal_text(solution);
     match solution.framing {
         Framing::Whole => {
             format!("{known}: the picture is whole, or it is known of which part it is.")
@@ -84,6 +97,14 @@ fn framing_line(label: &Label, solution: &Solution, options: &SolveOptions) -> S
             )
         }
     }
+}
+
+fn principal_text(solution: &Solution) -> String {
+    let Point2 { coords: at } = solution.camera.principal_px;
+    format!(
+        "Its principal point is at ({:.0}, {:.0}) px (+- {:.0})",
+        at.x, at.y, solution.sigma.principal_px
+    )
 }
 
 /// How much better the focal length would be known if the picture were whole; empty where the corners do not allow that.
@@ -125,10 +146,10 @@ fn height_advice(label: &Label, solution: &Solution, options: &SolveOptions) -> 
         return None;
     }
     let height = solution.camera.center().z;
-    let mut measured = label.clone();
-    measured.camera.height_m = Some(height);
-    measured.camera.height_sigma_m = Some(TAPE_HEIGHT_SIGMA * height);
-    let better = solve(&measured, options).ok()?.sigma.height_px;
+    let better = solve(&with_measured_height(label, height), options)
+        .ok()?
+        .sigma
+        .height_px;
     (better < WORTHWHILE_FACTOR * solution.sigma.height_px).then(|| {
         format!(
             "Measure the height of the lens above the surface (about {height:.2} m) to {:.0} mm and write it as \
@@ -138,6 +159,14 @@ fn height_advice(label: &Label, solution: &Solution, options: &SolveOptions) -> 
             solution.sigma.height_px
         )
     })
+}
+
+/// The label as it would be with the height of the lens, measured with a tape.
+fn with_measured_height(label: &Label, height: f64) -> Label {
+    let mut measured = label.clone();
+    measured.camera.height_m = Some(height);
+    measured.camera.height_sigma_m = Some(TAPE_HEIGHT_SIGMA * height);
+    measured
 }
 
 #[cfg(test)]

@@ -72,15 +72,30 @@ pub struct ColmapModel {
     pub points: String,
 }
 
-impl BlenderCamera {
+impl SensorFit {
     /// The fitted side, pixels of the picture's width.
-    fn fitted_side(&self, [w, h]: [f64; 2]) -> f64 {
-        let tall = self.pixel_aspect * h;
-        match self.sensor_fit {
-            SensorFit::Horizontal => w,
-            SensorFit::Vertical => tall,
-            SensorFit::Auto => w.max(tall),
+    fn fitted_side(self, [w, h]: [f64; 2], pixel_aspect: f64) -> f64 {
+        let tall = pixel_aspect * h;
+        match self {
+            Self::Horizontal => w,
+            Self::Vertical => tall,
+            Self::Auto => w.max(tall),
         }
+    }
+}
+
+impl BlenderCamera {
+    /// Camera axes from world axes.
+    fn rotation(&self) -> Matrix3<f64> {
+        let m = &self.matrix_world;
+        blender_flip() * Matrix3::from_fn(|i, j| m[i][j]).transpose()
+    }
+
+    fn camera_from_world(&self) -> Pose {
+        let m = &self.matrix_world;
+        let rotation = self.rotation();
+        let center = Vector3::new(m[0][3], m[1][3], m[2][3]);
+        pose_from(rotation, -(rotation * center))
     }
 
     fn sensor_mm(&self) -> f64 {
@@ -97,21 +112,17 @@ impl Camera {
     pub fn to_blender(&self) -> BlenderCamera {
         let [w, h] = self.image.map(f64::from);
         let pixel_aspect = self.focal_px.x / self.focal_px.y;
-        let mut camera = BlenderCamera {
+        let view = SensorFit::Auto.fitted_side([w, h], pixel_aspect);
+        BlenderCamera {
             sensor_fit: SensorFit::Auto,
             sensor_width: SENSOR_WIDTH_MM,
             sensor_height: SENSOR_WIDTH_MM,
-            lens: 0.0,
-            shift_x: 0.0,
-            shift_y: 0.0,
+            lens: self.focal_px.x * SENSOR_WIDTH_MM / view,
+            shift_x: (w / 2.0 - self.principal_px.x) / view,
+            shift_y: (self.principal_px.y - h / 2.0) * pixel_aspect / view,
             pixel_aspect,
             matrix_world: self.matrix_world(),
-        };
-        let view = camera.fitted_side([w, h]);
-        camera.lens = self.focal_px.x * camera.sensor_mm() / view;
-        camera.shift_x = (w / 2.0 - self.principal_px.x) / view;
-        camera.shift_y = (self.principal_px.y - h / 2.0) * pixel_aspect / view;
-        camera
+        }
     }
 
     fn matrix_world(&self) -> [[f64; 4]; 4] {
@@ -125,22 +136,18 @@ impl Camera {
     /// The camera that Blender renders a picture of this size with.
     pub fn from_blender(blender: &BlenderCamera, image: [u32; 2]) -> Self {
         let [w, h] = image.map(f64::from);
-        let view = blender.fitted_side([w, h]);
+        let view = blender.sensor_fit.fitted_side([w, h], blender.pixel_aspect);
         let fx = blender.lens / blender.sensor_mm() * view;
         let principal_px = Point2::new(
             w / 2.0 - blender.shift_x * view,
             h / 2.0 + blender.shift_y * view / blender.pixel_aspect,
         );
-        let m = &blender.matrix_world;
-        let rotation = blender_flip() * Matrix3::from_fn(|i, j| m[i][j]).transpose();
-        let center = Vector3::new(m[0][3], m[1][3], m[2][3]);
-        Self::posed(
+        Self {
             image,
-            Vector2::new(fx, fx / blender.pixel_aspect),
+            focal_px: Vector2::new(fx, fx / blender.pixel_aspect),
             principal_px,
-            rotation,
-            -(rotation * center),
-        )
+            camera_from_world: blender.camera_from_world(),
+        }
     }
 
     /// The camera in OpenCV's terms.
@@ -158,15 +165,13 @@ impl Camera {
     /// The camera that OpenCV means, for a picture of this size.
     pub fn from_opencv(opencv: &OpencvCamera, image: [u32; 2]) -> Self {
         let k = &opencv.k;
-        let principal_px = Point2::new(k[0][2] + 0.5, k[1][2] + 0.5);
         let rotation = Matrix3::from_fn(|i, j| opencv.r[i][j]);
-        Self::posed(
+        Self {
             image,
-            Vector2::new(k[0][0], k[1][1]),
-            principal_px,
-            rotation,
-            opencv.t.into(),
-        )
+            focal_px: Vector2::new(k[0][0], k[1][1]),
+            principal_px: Point2::new(k[0][2] + 0.5, k[1][2] + 0.5),
+            camera_from_world: pose_from(rotation, opencv.t.into()),
+        }
     }
 
     /// Lines of Python that make the camera in Blender.
@@ -211,23 +216,13 @@ impl Camera {
             .to_rotation_matrix()
             .into_inner()
     }
+}
 
-    fn posed(
-        image: [u32; 2],
-        focal_px: Vector2<f64>,
-        principal_px: Point2<f64>,
-        rotation: Matrix3<f64>,
-        t: Vector3<f64>,
-    ) -> Self {
-        let rotation =
-            UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation));
-        Self {
-            image,
-            focal_px,
-            principal_px,
-            camera_from_world: Pose::from_parts(t.into(), rotation),
-        }
-    }
+/// A pose from a matrix that is a rotation, and a translation.
+pub(crate) fn pose_from(rotation: Matrix3<f64>, translation: Vector3<f64>) -> Pose {
+    let rotation = Rotation3::from_matrix_unchecked(rotation);
+    let rotation = UnitQuaternion::from_rotation_matrix(&rotation);
+    Pose::from_parts(translation.into(), rotation)
 }
 
 impl ColmapModel {

@@ -4,6 +4,7 @@ use super::exchange::{BlenderCamera, OpencvCamera, matrix_rows};
 use super::focal::FocalSource;
 use super::label::{Framing, Label, LabelImage};
 use super::label_check::MAX_MAGNITUDE;
+use super::model::Square;
 use super::pinhole::Camera;
 use super::solution::{FocalFinding, Solution};
 use super::uncertainty::UNKNOWN_NAMES;
@@ -216,20 +217,16 @@ impl CameraFile {
             check_positive("surface", side)?;
         }
         check_pose(&self.found.opencv)?;
-        if self.camera().center().z > 0.0 {
-            Ok(())
-        } else {
-            Err(Error::value("opencv.t", "the camera is below the surface"))
-        }
+        check_above_surface(&self.camera())
     }
 
     fn check_image(&self, image: [u32; 2]) -> Result<()> {
-        let own = [self.image.width, self.image.height];
-        if own == image && !image.contains(&0) {
+        let [w, h] = [self.image.width, self.image.height];
+        if [w, h] == image && !image.contains(&0) {
             return Ok(());
         }
-        let ([w, h], [a, b]) = (own, image);
-        let what = format!("{w} x {h} pixels, expected {a} x {b}");
+        let [width, height] = image;
+        let what = format!("{w} x {h} pixels, expected {width} x {height}");
         Err(Error::value("image", what))
     }
 }
@@ -266,20 +263,31 @@ impl Model {
     }
 }
 
+fn check_above_surface(camera: &Camera) -> Result<()> {
+    if camera.center().z > 0.0 {
+        Ok(())
+    } else {
+        Err(Error::value("opencv.t", "the camera is below the surface"))
+    }
+}
+
 fn check_pose(opencv: &OpencvCamera) -> Result<()> {
     for value in opencv.t {
         check_magnitude("opencv.t", value)?;
     }
-    let rotation = Matrix3::from_fn(|i, j| opencv.r[i][j]);
-    let off = (rotation * rotation.transpose() - Matrix3::identity()).norm();
-    if off < ROTATION_TOLERANCE && rotation.determinant() > 0.0 {
+    if is_rotation(&Matrix3::from_fn(|i, j| opencv.r[i][j])) {
         Ok(())
     } else {
         Err(Error::value("opencv.R", "not a rotation"))
     }
 }
 
-/// A matrix as far from a rotation as this is none.
+fn is_rotation(matrix: &Matrix3<f64>) -> bool {
+    let off = (matrix * matrix.transpose() - Matrix3::identity()).norm();
+    off < ROTATION_TOLERANCE && matrix.determinant() > 0.0
+}
+
+/// Matrices farther from a rotation than this are not accepted as one.
 const ROTATION_TOLERANCE: f64 = 1e-6;
 
 fn check_magnitude(at: &str, value: f64) -> Result<()> {
@@ -330,7 +338,7 @@ pub(crate) fn checksum(label: &Label) -> u32 {
 impl FoundCamera {
     fn new(solution: &Solution) -> Self {
         let camera = &solution.camera;
-        let homography = camera.pixel_from_surface().0;
+        let alternative = solution.alternative.as_deref().map(Self::new);
         Self {
             model: Model::new(solution),
             opencv: camera.to_opencv(),
@@ -338,7 +346,7 @@ impl FoundCamera {
             tilt_deg: camera.tilt().to_degrees(),
             blender: camera.to_blender(),
             surface: FittedSurface::new(solution.size),
-            homography: matrix_rows(&homography),
+            homography: matrix_rows(&camera.pixel_from_surface().0),
             sigma: SigmaRecord::new(solution),
             fit: FitRecord::new(solution),
             framing: solution.framing,
@@ -347,10 +355,7 @@ impl FoundCamera {
             focal_from_data: solution.focal.from_data_px,
             focal_prior: FocalPrior::new(&solution.focal),
             warnings: solution.warnings.clone(),
-            alternative: solution
-                .alternative
-                .as_deref()
-                .map(|other| Box::new(Self::new(other))),
+            alternative: alternative.map(Box::new),
         }
     }
 }
@@ -366,13 +371,16 @@ impl SigmaRecord {
             height_ref_m: sigma.reference_height,
             principal_point_px: finite(sigma.principal_px),
             unknowns: UNKNOWN_NAMES.map(String::from).into(),
-            covariance: sigma
-                .covariance
-                .row_iter()
-                .map(|row| row.iter().map(|&v| finite(v)).collect())
-                .collect(),
+            covariance: finite_rows(&sigma.covariance),
         }
     }
+}
+
+fn finite_rows(square: &Square) -> Vec<Vec<Option<f64>>> {
+    square
+        .row_iter()
+        .map(|row| row.iter().map(|&v| finite(v)).collect())
+        .collect()
 }
 
 impl FitRecord {

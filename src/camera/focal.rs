@@ -77,13 +77,7 @@ pub(crate) fn length_prior(
     let camera = &label.camera;
     match (camera.focal_px, plausible_equivalent(label, framing)) {
         (Some(px), _) => (stated_prior(camera, px, STATED_SIGMA), PriorSource::Label),
-        (None, Some(px)) => {
-            let mut prior = stated_prior(camera, px, EQUIVALENT_SIGMA);
-            if framing == Framing::Unknown && !camera.focal_fixed {
-                prior.sigma = libm::hypot(prior.sigma, CROP_SIGMA);
-            }
-            (prior, PriorSource::Exif)
-        }
+        (None, Some(px)) => (equivalent_prior(camera, framing, px), PriorSource::Exif),
         (None, None) => (
             nominal_prior(label.taken_size(), priors),
             PriorSource::Nominal,
@@ -109,6 +103,15 @@ fn stated_prior(camera: &LabelCamera, focal_px: f64, default_sigma: f64) -> Prio
         mean: libm::log(focal_px),
         sigma,
     }
+}
+
+/// By a 35 mm equivalent, which a cropped picture would not have.
+fn equivalent_prior(camera: &LabelCamera, framing: Framing, focal_px: f64) -> Prior {
+    let mut prior = stated_prior(camera, focal_px, EQUIVALENT_SIGMA);
+    if framing == Framing::Unknown && !camera.focal_fixed {
+        prior.sigma = libm::hypot(prior.sigma, CROP_SIGMA);
+    }
+    prior
 }
 
 /// Where nothing states the focal length.

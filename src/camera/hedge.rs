@@ -32,16 +32,22 @@ impl Solution {
         (self.focal.share, self.focal.from_data_px) = (loose.focal.share, loose.focal.from_data_px);
         (self.focal_source, self.framing) = (loose.focal_source, Framing::Unknown);
         self.warnings.retain(|w| w.code != Code::HeightUncertain);
-        let limit_px = self.height_limit_px(options);
-        if whole_px > limit_px {
-            self.warnings.extend(self.height_warning(options));
-        } else if self.sigma.height_px > limit_px {
-            self.warnings.push(self.framing_warning(whole_px));
-        }
+        self.warnings
+            .extend(self.hedged_height_warning(whole_px, options));
         self
     }
 
-    /// That points above the surface would be known better, to this, if the picture were known to be whole.
+    /// About points above the surface, which a whole picture would show as well as `whole_px`.
+    fn hedged_height_warning(&self, whole_px: f64, options: &SolveOptions) -> Option<Diagnostic> {
+        let limit_px = self.height_limit_px(options);
+        if whole_px > limit_px {
+            self.height_warning(options)
+        } else {
+            (self.sigma.height_px > limit_px).then(|| self.framing_warning(whole_px))
+        }
+    }
+
+    /// Says that points above the surface would be known better, to `whole_px`, if the picture were known to be whole.
     fn framing_warning(&self, whole_px: f64) -> Diagnostic {
         let (height, sigma_px) = (self.sigma.reference_height, self.sigma.height_px);
         Diagnostic::warning(
@@ -55,18 +61,20 @@ impl Solution {
 
     /// The camera of a picture that turns out not to be whole, and beside it that of a whole one.
     pub(crate) fn off_center(mut self, whole: Option<Self>) -> Self {
-        let [w, h] = self.camera.image.map(f64::from);
-        let off_px = (self.camera.principal_px - Point2::new(w / 2.0, h / 2.0)).norm();
-        self.warnings.push(Diagnostic::warning(
-            Code::OffCenter,
-            format!(
-                "the principal point lies {off_px:.0} px (+- {:.0}) off the middle of the picture: it was cropped, the lens \
-                 was shifted, or the EXIF focal length is wrong",
-                self.sigma.principal_px
-            ),
-        ));
+        self.warnings.push(self.off_center_warning());
         self.alternative = self.alternative.or(whole.map(Box::new));
         self
+    }
+
+    fn off_center_warning(&self) -> Diagnostic {
+        let [w, h] = self.camera.image.map(f64::from);
+        let off_px = (self.camera.principal_px - Point2::new(w / 2.0, h / 2.0)).norm();
+        let what = format!(
+            "the principal point lies {off_px:.0} px (+- {:.0}) off the middle of the picture: it was cropped, the lens \
+             was shifted, or the EXIF focal length is wrong",
+            self.sigma.principal_px
+        );
+        Diagnostic::warning(Code::OffCenter, what)
     }
 
     fn sigma_with(&self, loose: &Self, apart: &Unknowns) -> Sigma {

@@ -20,10 +20,7 @@ pub fn init_label(photo: &Path, path: &Path, like: Option<&Label>) -> Result<Lab
         [1.0; 2],
     );
     label.image.file = file_below(photo, path)?;
-    label.surface = LabelSurface {
-        id: "surface".into(),
-        ..LabelSurface::default()
-    };
+    label.surface = unmeasured_surface();
     if let Some(like) = like {
         copy_shared(&mut label, like);
     }
@@ -31,22 +28,37 @@ pub fn init_label(photo: &Path, path: &Path, like: Option<&Label>) -> Result<Lab
     Ok(label)
 }
 
+fn unmeasured_surface() -> LabelSurface {
+    LabelSurface {
+        id: "surface".into(),
+        ..LabelSurface::default()
+    }
+}
+
 /// Takes over from another label of the same rectangle what the photos share.
 fn copy_shared(label: &mut Label, like: &Label) {
-    label.surface = LabelSurface {
-        corners_px: None,
-        source: None,
-        ..like.surface.clone()
-    };
+    label.surface = without_corners(&like.surface);
     label.markers = like.markers.clone();
     if like.image_size() == label.image_size() {
-        label.camera = LabelCamera {
-            height_m: None,
-            height_sigma_m: None,
-            ..like.camera.clone()
-        };
+        label.camera = without_height(&like.camera);
     }
     label.camera.id = like.camera.id.clone();
+}
+
+fn without_corners(surface: &LabelSurface) -> LabelSurface {
+    LabelSurface {
+        corners_px: None,
+        source: None,
+        ..surface.clone()
+    }
+}
+
+fn without_height(camera: &LabelCamera) -> LabelCamera {
+    LabelCamera {
+        height_m: None,
+        height_sigma_m: None,
+        ..camera.clone()
+    }
 }
 
 /// The photo as a label at `path` names it.
@@ -82,52 +94,74 @@ struct CommentedLabel<'a> {
 /// [`Error::Value`] for a value that JSON cannot express.
 pub fn commented(label: &Label) -> Result<String> {
     let mut shown = label.clone();
-    let mut todo = Vec::new();
-    if label.surface.corners_px.is_none() && label.points.is_empty() {
+    if lacks_corners(label) {
         // NaN is written as null.
         shown.surface.corners_px = Some([[f64::NAN; 2]; 4]);
-        todo.push(
-            "surface.corners_px: x and y of the rectangle's corners in pixels from the top left of the picture, clockwise \
-             from its top left; the side from the first to the second is width_m",
-        );
     }
-    if label.framing() == Framing::Unknown {
-        todo.push("image: add \"cropped\": false if nothing was cut off the picture, true if something was");
-    }
-    let text = serde_json::to_string_pretty(&CommentedLabel {
-        todo,
+    let commented = CommentedLabel {
+        todo: open_questions(label),
         label: &shown,
-    })
-    .map_err(|e| Error::value("label", e))?;
+    };
+    let text = serde_json::to_string_pretty(&commented).map_err(|e| Error::value("label", e))?;
     Ok(with_folded_lists(&text) + "\n")
+}
+
+fn lacks_corners(label: &Label) -> bool {
+    label.surface.corners_px.is_none() && label.points.is_empty()
+}
+
+/// What is left to be filled in.
+fn open_questions(label: &Label) -> Vec<&'static str> {
+    let corners = lacks_corners(label).then_some(
+        "surface.corners_px: x and y of the rectangle's corners in pixels from the top left of the picture, clockwise \
+         from its top left; the side from the first to the second is width_m",
+    );
+    let framing = (label.framing() == Framing::Unknown).then_some(
+        "image: add \"cropped\": false if nothing was cut off the picture, true if something was",
+    );
+    corners.into_iter().chain(framing).collect()
 }
 
 /// Pretty JSON, its lists of numbers in one line each.
 fn with_folded_lists(text: &str) -> String {
-    let mut lines: Vec<String> = Vec::new();
-    let mut list: Option<String> = None;
+    let mut folded = FoldedLines::default();
     for line in text.lines() {
+        folded.push(line);
+    }
+    folded.lines.join("\n")
+}
+
+/// Lines of JSON, and the list of numbers that is open at their end.
+#[derive(Default)]
+struct FoldedLines {
+    lines: Vec<String>,
+    list: Option<String>,
+}
+
+impl FoldedLines {
+    fn push(&mut self, line: &str) {
         let part = line.trim();
-        match &mut list {
+        match &mut self.list {
             _ if line.ends_with('[') => {
-                lines.extend(list.take());
-                list = Some(line.to_owned());
+                self.lines.extend(self.list.take());
+                self.list = Some(line.to_owned());
             }
             Some(open) if part.starts_with(']') => {
-                lines.push(format!("{}{part}", open.trim_end()));
-                list = None;
+                *open = format!("{}{part}", open.trim_end());
+                self.lines.extend(self.list.take());
             }
-            Some(open) if is_number(part) => {
-                *open += part;
-                *open += if part.ends_with(',') { " " } else { "" };
-            }
+            Some(open) if is_number(part) => append_number(open, part),
             _ => {
-                lines.extend(list.take());
-                lines.push(line.to_owned());
+                self.lines.extend(self.list.take());
+                self.lines.push(line.to_owned());
             }
         }
     }
-    lines.join("\n")
+}
+
+fn append_number(list: &mut String, number: &str) {
+    *list += number;
+    *list += if number.ends_with(',') { " " } else { "" };
 }
 
 /// An element of a list of numbers, `null` among them.

@@ -64,17 +64,22 @@ pub fn solve_joint(labels: &[Label], options: &SolveOptions) -> Result<Joint, So
         options,
     };
     let estimate = solver.whole_or_cropped()?;
-    let mut joint = Joint {
-        outliers: misfit_outliers(&photos),
-        photos,
-    };
-    if let Some(estimate) = estimate {
-        joint.apply(estimate);
-    }
-    Ok(joint)
+    Ok(Joint::new(photos, estimate))
 }
 
 impl Joint {
+    /// What the photos give alone, and those that agree together.
+    fn new(alone: Vec<Result<Solution, SolveError>>, together: Option<JointEstimate>) -> Self {
+        let mut joint = Self {
+            outliers: misfit_outliers(&alone),
+            photos: alone,
+        };
+        if let Some(estimate) = together {
+            joint.apply(estimate);
+        }
+        joint
+    }
+
     /// Replaces the solutions of the photos that agree.
     fn apply(&mut self, estimate: JointEstimate) {
         for (solution, photo) in estimate.solutions.into_iter().zip(estimate.used) {
@@ -92,7 +97,8 @@ fn misfit_outliers(photos: &[Result<Solution, SolveError>]) -> Vec<OutlierPhoto>
         .filter_map(|(photo, solution)| {
             let solution = solution.as_ref().ok()?;
             let chi2 = solution.fit.chi2;
-            solution.misfit().map(|_| OutlierPhoto { photo, chi2 })
+            solution.misfit()?;
+            Some(OutlierPhoto { photo, chi2 })
         })
         .collect()
 }
@@ -108,6 +114,8 @@ struct JointSolver<'a> {
 struct JointEstimate {
     used: Vec<usize>,
     states: Vec<State>,
+    /// Of each photo's own observations.
+    chi2: Vec<f64>,
     solutions: Vec<Solution>,
     cost: f64,
     outliers: Vec<OutlierPhoto>,
@@ -117,11 +125,7 @@ impl JointSolver<'_> {
     /// The camera of whole pictures or, where they may have been cropped and the corners demand it, of cropped ones.
     fn whole_or_cropped(&self) -> Result<Option<JointEstimate>, SolveError> {
         let whole = self.estimate(Framing::Whole)?;
-        let unknown = self
-            .labels
-            .iter()
-            .any(|label| label.framing() == Framing::Unknown);
-        if !unknown || !self.options.priors.cropping_matters() {
+        if !self.may_be_cropped() {
             return Ok(whole);
         }
         let (Some(whole), Some(loose)) = (whole, self.estimate(Framing::Unknown)?) else {
@@ -133,6 +137,12 @@ impl JointSolver<'_> {
         Ok(Some(whole.hedged(&loose, self.options)))
     }
 
+    fn may_be_cropped(&self) -> bool {
+        let mut labels = self.labels.iter();
+        labels.any(|label| label.framing() == Framing::Unknown)
+            && self.options.priors.cropping_matters()
+    }
+
     /// What the photos that fit give together, but for those that contradict the others; pictures of unknown framing are
     /// treated as pictures of this one.
     fn estimate(&self, unknown: Framing) -> Result<Option<JointEstimate>, SolveError> {
@@ -140,23 +150,30 @@ impl JointSolver<'_> {
         let mut outliers = Vec::new();
         let most_outliers = self.labels.len() / PHOTOS_PER_OUTLIER;
         while !used.is_empty() {
-            let bundle = Bundle::new(self.labels, &used, unknown, self.options)?;
-            let best = bundle.best(self.alone).ok_or(SolveError::NoPose)?;
-            let outlier = worst_photo(&best.chi2).filter(|_| outliers.len() < most_outliers);
-            if let Some((worst, chi2)) = outlier {
-                let photo = used.remove(worst);
-                outliers.push(OutlierPhoto { photo, chi2 });
-                continue;
-            }
-            return Ok(Some(JointEstimate {
-                used,
-                solutions: bundle.solutions(&best, self.options),
-                states: best.states,
-                cost: best.cost,
-                outliers,
-            }));
+            let mut estimate = self.estimate_from(&used, unknown)?;
+            let worst = worst_photo(&estimate.chi2).filter(|_| outliers.len() < most_outliers);
+            let Some((worst, chi2)) = worst else {
+                estimate.outliers = outliers;
+                return Ok(Some(estimate));
+            };
+            let photo = used.remove(worst);
+            outliers.push(OutlierPhoto { photo, chi2 });
         }
         Ok(None)
+    }
+
+    /// What these photos give together.
+    fn estimate_from(&self, used: &[usize], unknown: Framing) -> Result<JointEstimate, SolveError> {
+        let bundle = Bundle::new(self.labels, used, unknown, self.options)?;
+        let best = bundle.best(self.alone).ok_or(SolveError::NoPose)?;
+        Ok(JointEstimate {
+            used: used.to_vec(),
+            solutions: bundle.solutions(&best, self.options),
+            states: best.states,
+            chi2: best.chi2,
+            cost: best.cost,
+            outliers: Vec::new(),
+        })
     }
 
     /// A camera fits the photo when it is alone.
@@ -183,19 +200,22 @@ impl JointEstimate {
 
     /// Whole pictures with the error that they have if they are cropped.
     fn hedged(mut self, loose: &Self, options: &SolveOptions) -> Self {
-        let solutions = std::mem::take(&mut self.solutions);
+        let solutions = std::mem::take(&mut self.solutions).into_iter().enumerate();
         self.solutions = solutions
-            .into_iter()
-            .enumerate()
-            .map(|(i, solution)| {
-                let Some(other) = loose.used.iter().position(|photo| *photo == self.used[i]) else {
-                    return solution;
-                };
-                let apart = self.states[i].step_to(&loose.states[other]);
-                solution.hedged(&loose.solutions[other], &apart, options)
+            .map(|(i, solution)| match loose.index_of(self.used[i]) {
+                None => solution,
+                Some(other) => {
+                    let apart = self.states[i].step_to(&loose.states[other]);
+                    solution.hedged(&loose.solutions[other], &apart, options)
+                }
             })
             .collect();
         self
+    }
+
+    /// Where a photo is among those that were used.
+    fn index_of(&self, photo: usize) -> Option<usize> {
+        self.used.iter().position(|used| *used == photo)
     }
 }
 
@@ -204,10 +224,8 @@ impl JointEstimate {
 pub fn group_by_camera(labels: &[Label]) -> Vec<Vec<usize>> {
     let mut groups: Vec<Vec<usize>> = Vec::new();
     for (i, label) in labels.iter().enumerate() {
-        match groups
-            .iter_mut()
-            .find(|group| same_camera(&labels[group[0]], label))
-        {
+        let mut known = groups.iter_mut();
+        match known.find(|group| same_camera(&labels[group[0]], label)) {
             Some(group) => group.push(i),
             None => groups.push(vec![i]),
         }
@@ -225,7 +243,11 @@ fn same_frame(a: &Label, b: &Label) -> bool {
     if is_part(a) || is_part(b) {
         return a.image_size() == b.image_size() && a.image.crop == b.image.crop;
     }
-    let ([aw, ah], [bw, bh]) = (a.image_size().map(f64::from), b.image_size().map(f64::from));
+    have_same_shape(a.image_size(), b.image_size())
+}
+
+fn have_same_shape(a: [u32; 2], b: [u32; 2]) -> bool {
+    let ([aw, ah], [bw, bh]) = (a.map(f64::from), b.map(f64::from));
     // Reduced sizes are rounded to whole pixels.
     (aw * bh - ah * bw).abs() <= aw.max(ah).max(bw).max(bh)
 }

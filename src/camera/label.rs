@@ -248,24 +248,33 @@ impl Label {
 
     /// Which part of the picture that the camera took this one is.
     pub fn framing(&self) -> Framing {
-        let (image, camera) = (&self.image, &self.camera);
-        let stated =
-            camera.principal_point_px.is_some() || camera.principal_point_sigma_px.is_some();
-        match image.cropped {
-            _ if image.crop.is_some() => Framing::Whole,
+        match self.image.cropped {
+            _ if self.image.crop.is_some() => Framing::Whole,
             Some(true) => Framing::Cropped,
-            None if !stated => Framing::Unknown,
+            None if !self.camera.states_principal_point() => Framing::Unknown,
             _ => Framing::Whole,
         }
     }
 
     /// A labelled pixel position in our convention.
     pub(crate) fn pixel(&self, px: [f64; 2]) -> Point2<f64> {
-        let offset = match self.pixel_origin {
-            PixelOrigin::Corner => 0.0,
-            PixelOrigin::Center => 0.5,
-        };
-        Point2::from(px) + Vector2::repeat(offset)
+        Point2::from(px) + Vector2::repeat(self.pixel_origin.offset_px())
+    }
+}
+
+impl LabelCamera {
+    fn states_principal_point(&self) -> bool {
+        self.principal_point_px.is_some() || self.principal_point_sigma_px.is_some()
+    }
+}
+
+impl PixelOrigin {
+    /// What has to be added to a coordinate to bring it into our convention.
+    pub(crate) fn offset_px(self) -> f64 {
+        match self {
+            Self::Corner => 0.0,
+            Self::Center => 0.5,
+        }
     }
 }
 
@@ -277,15 +286,17 @@ impl<'de> Deserialize<'de> for Label {
         }
         let mut track = serde_path_to_error::Track::new();
         let tracked = serde_path_to_error::Deserializer::new(value, &mut track);
-        Self::deserialize(tracked).map_err(|e| {
-            let (what, at) = (e.to_string(), track.path().to_string());
-            // A message about a key names it; the reader of the file adds what was probably meant.
-            D::Error::custom(if what.contains(" field `") {
-                what
-            } else {
-                format!("{at}: {what}")
-            })
-        })
+        Self::deserialize(tracked)
+            .map_err(|e| D::Error::custom(located_message(e.to_string(), &track.path())))
+    }
+}
+
+/// A message behind its place; one about a key names the key itself, and the reader of the file adds the closest known one.
+fn located_message(what: String, at: &serde_path_to_error::Path) -> String {
+    if what.contains(" field `") {
+        what
+    } else {
+        format!("{at}: {what}")
     }
 }
 
@@ -339,11 +350,13 @@ fn missing_keys(value: &Value) -> Option<String> {
         return None;
     }
     missing.extend(missing_alternatives(value));
-    let key = if missing.len() == 1 { "key" } else { "keys" };
-    Some(format!(
-        "missing {key} {}; `petcomp camera init PHOTO --size WxH` writes them",
-        missing.join(", ")
-    ))
+    Some(missing_message(&missing))
+}
+
+fn missing_message(keys: &[String]) -> String {
+    let key = if keys.len() == 1 { "key" } else { "keys" };
+    let names = keys.join(", ");
+    format!("missing {key} {names}; `petcomp camera init PHOTO --size WxH` writes them")
 }
 
 /// Keys of which a label needs one or another, where it has none.
@@ -373,11 +386,12 @@ fn version_one<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u32, D::Err
 /// Without the keys that start with `_`.
 fn without_comments(value: Value) -> Value {
     match value {
-        Value::Object(map) => {
-            let kept = map.into_iter().filter(|(key, _)| !key.starts_with('_'));
-            Value::Object(kept.map(|(key, v)| (key, without_comments(v))).collect())
-        }
-        Value::Array(items) => Value::Array(items.into_iter().map(without_comments).collect()),
+        Value::Object(map) => map
+            .into_iter()
+            .filter(|(key, _)| !key.starts_with('_'))
+            .map(|(key, v)| (key, without_comments(v)))
+            .collect(),
+        Value::Array(items) => items.into_iter().map(without_comments).collect(),
         other => other,
     }
 }

@@ -3,16 +3,13 @@
 use super::error::SolveError;
 use super::label::{Label, LabelCamera, LabelPoint, LabelSurface};
 
-/// Larger numbers, and smaller ones than one over it where they are positive, are in no label that means something.
+/// No meaningful label holds larger numbers, or positive ones smaller than one over this.
 pub(crate) const MAX_MAGNITUDE: f64 = 1e9;
 
 /// The picture has pixels, everything is finite, and positive where it has to be.
 pub(crate) fn check_label(label: &Label) -> Result<(), SolveError> {
-    for size in [label.image_size(), label.taken_size()] {
-        if size.contains(&0) {
-            return Err(SolveError::BadImage(size));
-        }
-    }
+    check_picture(label.image_size())?;
+    check_picture(label.taken_size())?;
     check_surface(&label.surface)?;
     if let Some(crop) = &label.image.crop {
         check_finite("image.crop.offset_px", &crop.offset_px)?;
@@ -51,7 +48,7 @@ fn check_camera(camera: &LabelCamera) -> Result<(), SolveError> {
     check_positive("camera.height_sigma_m", camera.height_sigma_m)
 }
 
-/// Zero is allowed: what it is of is then exact.
+/// Zero is allowed: the value is then exact.
 fn check_not_negative(at: &'static str, value: Option<f64>) -> Result<(), SolveError> {
     check_positive(at, value.filter(|&v| v != 0.0))
 }
@@ -65,13 +62,20 @@ fn check_positive(at: &'static str, value: Option<f64>) -> Result<(), SolveError
     }
 }
 
-/// Finite, and no larger than what squares and products of a few of them can bear.
+/// Finite, and small enough for squares and products of a few of them.
 fn check_finite(at: &'static str, values: &[f64]) -> Result<(), SolveError> {
     values.iter().try_for_each(|&value| match value.abs() {
         size if !size.is_finite() => Err(SolveError::NonFinite(at)),
         size if size > MAX_MAGNITUDE => Err(out_of_range(at, value)),
         _ => Ok(()),
     })
+}
+
+fn check_picture(size: [u32; 2]) -> Result<(), SolveError> {
+    if size.contains(&0) {
+        return Err(SolveError::BadImage(size));
+    }
+    Ok(())
 }
 
 fn out_of_range(at: &'static str, value: f64) -> SolveError {

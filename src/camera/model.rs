@@ -28,6 +28,12 @@ pub(crate) type Square = SMatrix<f64, UNKNOWNS, UNKNOWNS>;
 /// Change of a picture position (a column each for x and y) per unknown.
 pub(crate) type Slope = SMatrix<f64, UNKNOWNS, 2>;
 
+/// Sets everything about an unknown to zero.
+pub(crate) fn clear_unknown(square: &mut Square, unknown: usize) {
+    square.row_mut(unknown).fill(0.0);
+    square.column_mut(unknown).fill(0.0);
+}
+
 /// A camera over a rectangle; units as in [`camera`](super).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct State {
@@ -82,6 +88,30 @@ struct PinholeView {
     position: Vector2<f64>,
 }
 
+impl ScaledPose {
+    /// After the pose's part of a small step.
+    #[inline]
+    fn stepped(&self, step: &Unknowns) -> Self {
+        let turn = Rotation3::new(step.fixed_rows::<3>(0));
+        Self {
+            rotation: turn.matrix() * self.rotation,
+            center: self.center + step.fixed_rows::<2>(CENTER),
+            scale: self.scale * libm::exp(step[LN_SCALE]),
+        }
+    }
+
+    /// The pose's part of the step that leads to another pose.
+    fn step_to(&self, other: &Self) -> Unknowns {
+        let turn = Rotation3::from_matrix_unchecked(other.rotation * self.rotation.transpose());
+        let mut step = Unknowns::zeros();
+        step.fixed_rows_mut::<3>(0).copy_from(&turn.scaled_axis());
+        step.fixed_rows_mut::<2>(CENTER)
+            .copy_from(&(other.center - self.center));
+        step[LN_SCALE] = libm::log(other.scale / self.scale);
+        step
+    }
+}
+
 impl State {
     /// A camera over a rectangle that is as measured.
     pub(crate) fn new(
@@ -90,15 +120,14 @@ impl State {
         kappa: f64,
         stretch_shares: StretchShares,
     ) -> Self {
-        let (ln_focal, principal) = (libm::log(focal), Vector2::zeros());
         Self {
             pose,
-            ln_focal,
+            ln_focal: libm::log(focal),
             focal,
             stretch: 0.0,
             stretch_shares,
             sides: [1.0; 2],
-            principal,
+            principal: Vector2::zeros(),
             kappa,
         }
     }
@@ -142,13 +171,8 @@ impl State {
 
     /// After a small step in every unknown.
     pub(crate) fn stepped(&self, step: &Unknowns) -> Self {
-        let turn = Rotation3::new(step.fixed_rows::<3>(0));
         let moved = Self {
-            pose: ScaledPose {
-                rotation: turn.matrix() * self.pose.rotation,
-                center: self.pose.center + step.fixed_rows::<2>(CENTER),
-                scale: self.pose.scale * libm::exp(step[LN_SCALE]),
-            },
+            pose: self.pose.stepped(step),
             principal: self.principal + step.fixed_rows::<2>(PRINCIPAL),
             kappa: self.kappa + step[KAPPA],
             ..*self
@@ -160,13 +184,7 @@ impl State {
 
     /// The step that leads from here to another state.
     pub(crate) fn step_to(&self, other: &Self) -> Unknowns {
-        let turn =
-            Rotation3::from_matrix_unchecked(other.pose.rotation * self.pose.rotation.transpose());
-        let mut step = Unknowns::zeros();
-        step.fixed_rows_mut::<3>(0).copy_from(&turn.scaled_axis());
-        step.fixed_rows_mut::<2>(CENTER)
-            .copy_from(&(other.pose.center - self.pose.center));
-        step[LN_SCALE] = libm::log(other.pose.scale / self.pose.scale);
+        let mut step = self.pose.step_to(&other.pose);
         for unknown in LN_FOCAL..UNKNOWNS {
             step[unknown] = other.value(unknown) - self.value(unknown);
         }
@@ -229,29 +247,8 @@ impl State {
     /// Change of a position without distortion, relative to the principal point.
     #[inline]
     fn pinhole_slope(&self, seen: &PinholeView, per_stretch: &Vector3<f64>) -> Slope {
-        let PinholeView {
-            turned,
-            nearness,
-            depth,
-            position,
-        } = seen;
-        let (near, far) = (self.pose.scale / depth, nearness / depth);
-        let mut slope = Slope::zeros();
-        for axis in 0..2 {
-            // The change of the position along this axis per change of the turned point.
-            let mut per_point = Vector3::new(0.0, 0.0, -position[axis] * far);
-            per_point[axis] = near;
-            let mut column = slope.column_mut(axis);
-            column
-                .fixed_rows_mut::<3>(0)
-                .copy_from(&turned.cross(&per_point));
-            column[CENTER + axis] = 1.0 / depth;
-            column[LN_SCALE] = per_point.dot(turned);
-            column[LN_FOCAL] = position[axis] * far * turned.z;
-            column[STRETCH] = per_point.dot(per_stretch);
-            column[PRINCIPAL + axis] = -1.0 / depth;
-        }
-        slope
+        let near = self.pose.scale / seen.depth;
+        Slope::from_columns(&[0, 1].map(|axis| seen.axis_slope(axis, near, per_stretch)))
     }
 
     /// What distortion makes of the change of a position.
@@ -277,9 +274,17 @@ impl State {
 
     /// Logarithm of the camera's height over the surface and how it changes with the unknowns; none below it.
     pub(crate) fn ln_height(&self) -> Option<(f64, Unknowns)> {
-        let t = self.translation();
         let normal: Vector3<f64> = self.pose.rotation.column(2).into();
-        let height = -normal.dot(&t);
+        let height = -normal.dot(&self.translation());
+        (height > 0.0).then(|| {
+            let slope = self.height_slope(&normal, height);
+            (libm::log(height), slope / height)
+        })
+    }
+
+    /// How the camera's height over a surface of this normal changes with the unknowns.
+    fn height_slope(&self, normal: &Vector3<f64>, height: f64) -> Unknowns {
+        let t = self.translation();
         let mut slope = Unknowns::zeros();
         slope.fixed_rows_mut::<3>(0).copy_from(&-normal.cross(&t));
         for axis in 0..2 {
@@ -288,7 +293,29 @@ impl State {
         }
         slope[LN_SCALE] = -height;
         slope[LN_FOCAL] = -normal.z * t.z;
-        (height > 0.0).then(|| (libm::log(height), slope / height))
+        slope
+    }
+}
+
+impl PinholeView {
+    /// Change of the position along an axis; `near` is picture lengths per length at the point's depth.
+    #[inline]
+    fn axis_slope(&self, axis: usize, near: f64, per_stretch: &Vector3<f64>) -> Unknowns {
+        let (turned, position) = (&self.turned, self.position[axis]);
+        let far = self.nearness / self.depth;
+        // The change of the position along this axis per change of the turned point.
+        let mut per_point = Vector3::new(0.0, 0.0, -position * far);
+        per_point[axis] = near;
+        let mut slope = Unknowns::zeros();
+        slope
+            .fixed_rows_mut::<3>(0)
+            .copy_from(&turned.cross(&per_point));
+        slope[CENTER + axis] = 1.0 / self.depth;
+        slope[LN_SCALE] = per_point.dot(turned);
+        slope[LN_FOCAL] = position * far * turned.z;
+        slope[STRETCH] = per_point.dot(per_stretch);
+        slope[PRINCIPAL + axis] = -1.0 / self.depth;
+        slope
     }
 }
 

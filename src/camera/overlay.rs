@@ -1,6 +1,7 @@
 //! A picture to judge a camera by: rectangle, metric grid and a box of the reference height, drawn over the photo.
 
 use super::pinhole::Camera;
+use super::rectangle::corner_points;
 use super::solution::Solution;
 use crate::color::{decode_srgb8, encode_srgb8};
 use crate::draw::{self, TextSize};
@@ -47,12 +48,16 @@ const fn linear_rgb(r: f32, g: f32, b: f32) -> LinearRgb {
 /// standard deviations of where the camera sees the corners.
 pub fn overlay(photo: &Image<LinearRgb>, solution: &Solution) -> Image<LinearRgb> {
     let drawing = OverlayDrawing::new(photo, solution).picture;
-    let legend = legend(photo.width(), solution);
-    let (width, height) = photo.size();
-    Image::from_fn(width, height + legend.height(), |x, y| {
+    stacked(&drawing, &legend(photo.width(), solution))
+}
+
+/// Two pictures of the same width, one above the other.
+fn stacked(above: &Image<LinearRgb>, below: &Image<LinearRgb>) -> Image<LinearRgb> {
+    let (width, height) = above.size();
+    Image::from_fn(width, height + below.height(), |x, y| {
         match y.checked_sub(height) {
-            None => drawing[(x, y)],
-            Some(below) => legend[(x, below)],
+            None => above[(x, y)],
+            Some(y) => below[(x, y)],
         }
     })
 }
@@ -110,15 +115,18 @@ const TEXT_LEFT_PX: usize = 2 * MARGIN_PX + MARK_PX;
 fn legend(width: usize, solution: &Solution) -> Image<LinearRgb> {
     let grown = (width * 2).div_ceil(LEGEND_COLUMNS).max(1);
     let columns = width.div_ceil(grown).max(1);
-    let text_columns = columns.saturating_sub(TEXT_LEFT_PX + MARGIN_PX);
-    let lines: Vec<LegendEntry> = entries(solution)
-        .iter()
-        .flat_map(|entry| entry.wrapped(text_columns))
-        .collect();
-    let canvas = draw_lines(&lines, columns);
+    let canvas = draw_lines(&legend_lines(solution, columns), columns);
     Image::from_fn(width, canvas.height() * grown, |x, y| {
         decode_srgb8(canvas[(x / grown, y / grown)])
     })
+}
+
+fn legend_lines(solution: &Solution, columns: usize) -> Vec<LegendEntry> {
+    let text_columns = columns.saturating_sub(TEXT_LEFT_PX + MARGIN_PX);
+    legend_entries(solution)
+        .iter()
+        .flat_map(|entry| entry.wrapped(text_columns))
+        .collect()
 }
 
 fn draw_lines(lines: &[LegendEntry], columns: usize) -> Image<Srgb8> {
@@ -130,40 +138,36 @@ fn draw_lines(lines: &[LegendEntry], columns: usize) -> Image<Srgb8> {
     canvas
 }
 
-fn entries(solution: &Solution) -> Vec<LegendEntry> {
+fn legend_entries(solution: &Solution) -> Vec<LegendEntry> {
     let warnings = solution
         .warnings
         .iter()
         .map(|warning| LegendEntry::plain(warning.to_string(), WARNING_INK));
-    color_entries(solution)
+    color_meanings(solution)
         .into_iter()
+        .map(|(color, text)| LegendEntry::for_color(color, text))
         .chain([LegendEntry::plain(camera_text(solution), INK)])
         .chain(warnings)
         .collect()
 }
 
-fn color_entries(solution: &Solution) -> [LegendEntry; 4] {
+fn color_meanings(solution: &Solution) -> [(LinearRgb, String); 4] {
     let [w, h] = solution.size;
     let step = grid_step(solution.size);
     let height = solution.sigma.reference_height;
+    let rectangle = format!("rectangle as fitted, {w:.3} x {h:.3} m");
+    let corner = format!(
+        "labelled corner, and {ELLIPSE_SIGMAS:.0} standard deviations of where the camera sees it"
+    );
     [
-        (
-            RECTANGLE_COLOR,
-            format!("rectangle as fitted, {w:.3} x {h:.3} m"),
-        ),
+        (RECTANGLE_COLOR, rectangle),
         (GRID_COLOR, format!("grid of {step:.3} m on the surface")),
         (
             BOX_COLOR,
             format!("box {height:.3} m high over the rectangle"),
         ),
-        (
-            LABEL_COLOR,
-            format!(
-                "labelled corner, and {ELLIPSE_SIGMAS:.0} standard deviations of where the camera sees it"
-            ),
-        ),
+        (LABEL_COLOR, corner),
     ]
-    .map(|(color, text)| LegendEntry::for_color(color, text))
 }
 
 fn camera_text(solution: &Solution) -> String {
@@ -179,12 +183,14 @@ fn camera_text(solution: &Solution) -> String {
 }
 
 /// Lines of a grid over a rectangle: both ends, metres.
-fn grid(size: [f64; 2]) -> Vec<[[f64; 3]; 2]> {
+fn grid(size: [f64; 2]) -> impl Iterator<Item = [Point3<f64>; 2]> {
     let step = grid_step(size);
     let [x, y] = size.map(|s| s / 2.0);
-    let upright = multiples(step, x).map(|at| [[at, -y, 0.0], [at, y, 0.0]]);
-    let level = multiples(step, y).map(|at| [[-x, at, 0.0], [x, at, 0.0]]);
-    upright.chain(level).collect()
+    let upright = multiples(step, x).map(move |at| [[at, -y], [at, y]]);
+    let level = multiples(step, y).map(move |at| [[-x, at], [x, at]]);
+    upright
+        .chain(level)
+        .map(|ends| ends.map(|[x, y]| Point3::new(x, y, 0.0)))
 }
 
 /// Multiples of a step up to a distance from zero.
@@ -218,20 +224,25 @@ struct OverlayDrawing {
 impl OverlayDrawing {
     /// A solution drawn over a photo, of the label's size or another.
     fn new(photo: &Image<LinearRgb>, solution: &Solution) -> Self {
-        let image = [photo.width() as u32, photo.height() as u32];
-        let zoom = f64::from(image[0]) / f64::from(solution.camera.image[0].max(1));
-        let longer_side = f64::from(image[0].max(image[1]));
-        let mut drawing = Self {
-            picture: photo.clone(),
-            camera: solution.camera.resized(image),
-            line_px: (longer_side / SIDE_PER_LINE_WIDTH).max(1.0),
-        };
+        let mut drawing = Self::over_photo(photo, &solution.camera);
         for line in grid(solution.size) {
             drawing.line(line, GRID_COLOR, GRID_WEIGHT);
         }
         drawing.draw_box(solution.size, solution.sigma.reference_height);
+        let zoom = photo.width() as f64 / f64::from(solution.camera.image[0].max(1));
         drawing.draw_corners(solution, zoom);
         drawing
+    }
+
+    /// A photo on which nothing is drawn yet, and a camera for its size.
+    fn over_photo(photo: &Image<LinearRgb>, camera: &Camera) -> Self {
+        let (width, height) = photo.size();
+        let longer_side = width.max(height) as f64;
+        Self {
+            picture: photo.clone(),
+            camera: camera.resized([width as u32, height as u32]),
+            line_px: (longer_side / SIDE_PER_LINE_WIDTH).max(1.0),
+        }
     }
 
     /// Labelled corners and their error ellipses, in a picture enlarged by `zoom`.
@@ -244,22 +255,20 @@ impl OverlayDrawing {
 
     /// The rectangle, and a box of some height over it.
     fn draw_box(&mut self, size: [f64; 2], height: f64) {
-        let [x, y] = size.map(|s| s / 2.0);
-        let base = [[-x, y], [x, y], [x, -y], [-x, -y]];
+        let base = corner_points(size);
         for i in 0..4 {
-            let [a, b] = [base[i], base[(i + 1) % 4]];
-            let [foot, next_foot] = [a, b].map(|[x, y]| [x, y, 0.0]);
-            let [top, next_top] = [a, b].map(|[x, y]| [x, y, height]);
-            self.line([top, next_top], BOX_COLOR, BOX_WEIGHT);
-            self.line([foot, top], BOX_COLOR, BOX_WEIGHT);
-            self.line([foot, next_foot], RECTANGLE_COLOR, RECTANGLE_WEIGHT);
+            let feet = [base[i], base[(i + 1) % 4]];
+            let tops = feet.map(|foot| Point3::new(foot.x, foot.y, height));
+            self.line(tops, BOX_COLOR, BOX_WEIGHT);
+            self.line([feet[0], tops[0]], BOX_COLOR, BOX_WEIGHT);
+            self.line(feet, RECTANGLE_COLOR, RECTANGLE_WEIGHT);
         }
     }
 
     /// A straight line in space; nothing where an end is behind the camera.
-    fn line(&mut self, ends: [[f64; 3]; 2], color: LinearRgb, weight: f64) {
-        let [a, b] = ends.map(|p| self.camera.project(Point3::from(p)).map(|(px, _)| px));
-        if let (Some(a), Some(b)) = (a, b) {
+    fn line(&mut self, ends: [Point3<f64>; 2], color: LinearRgb, weight: f64) {
+        let [a, b] = ends.map(|end| self.camera.project(end));
+        if let (Some((a, _)), Some((b, _))) = (a, b) {
             self.stroke([a, b], color, weight * self.line_px);
         }
     }
@@ -278,11 +287,9 @@ impl OverlayDrawing {
             return;
         }
         let eigen = SymmetricEigen::new(*covariance);
-        let radii = eigen
-            .eigenvalues
-            .map(|v| ELLIPSE_SIGMAS * v.max(0.0).sqrt());
+        let sigmas = eigen.eigenvalues.map(|v| v.max(0.0).sqrt());
         for i in 0..ELLIPSE_POINTS {
-            let ends = [i, i + 1].map(|i| center + eigen.eigenvectors * on_ellipse(&radii, i));
+            let ends = [i, i + 1].map(|i| center + eigen.eigenvectors * on_ellipse(&sigmas, i));
             self.stroke(ends, LABEL_COLOR, self.line_px);
         }
     }
@@ -292,8 +299,7 @@ impl OverlayDrawing {
         let (columns, rows) = self.pixels_near(ends, width / 2.0 + 1.0);
         for y in rows {
             for x in columns.clone() {
-                let center = Point2::new(x as f64 + 0.5, y as f64 + 0.5);
-                let cover = (width / 2.0 + 0.5 - distance(center, ends)).clamp(0.0, 1.0) as f32;
+                let cover = stroke_coverage(x, y, ends, width);
                 if cover > 0.0 {
                     self.picture[(x, y)] = mixed(self.picture[(x, y)], color, cover);
                 }
@@ -314,8 +320,16 @@ impl OverlayDrawing {
     }
 }
 
+/// How much of a pixel a line covers.
+#[inline]
+fn stroke_coverage(x: usize, y: usize, ends: [Point2<f64>; 2], width: f64) -> f32 {
+    let center = Point2::new(x as f64 + 0.5, y as f64 + 0.5);
+    (width / 2.0 + 0.5 - distance(center, ends)).clamp(0.0, 1.0) as f32
+}
+
 /// One of the points around an ellipse along the axes.
-fn on_ellipse(radii: &Vector2<f64>, i: usize) -> Vector2<f64> {
+fn on_ellipse(sigmas: &Vector2<f64>, i: usize) -> Vector2<f64> {
+    let radii = sigmas.map(|sigma| ELLIPSE_SIGMAS * sigma);
     let angle = std::f64::consts::TAU * i as f64 / ELLIPSE_POINTS as f64;
     Vector2::new(radii.x * libm::cos(angle), radii.y * libm::sin(angle))
 }
@@ -388,7 +402,7 @@ mod tests {
             &SolveOptions::default(),
         )
         .unwrap();
-        let texts: Vec<String> = entries(&solution)
+        let texts: Vec<String> = legend_entries(&solution)
             .into_iter()
             .map(|entry| entry.text)
             .collect();

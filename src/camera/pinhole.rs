@@ -52,14 +52,11 @@ impl Camera {
     /// assert!((camera.tilt().to_degrees() - 45.0).abs() < 1e-9);
     /// ```
     pub fn look_at(eye: Point3<f64>, target: Point3<f64>, focal_px: f64, image: [u32; 2]) -> Self {
-        let forward = target - eye;
-        let vertical = forward.cross(&Vector3::z()).norm() < 1e-9 * forward.norm();
-        let up = if vertical { Vector3::y() } else { Vector3::z() };
-        let rotation = UnitQuaternion::look_at_lh(&forward, &-up);
+        let rotation = upright_rotation(&(target - eye));
         Self {
             image,
             focal_px: [focal_px; 2].into(),
-            principal_px: Point2::new(f64::from(image[0]) / 2.0, f64::from(image[1]) / 2.0),
+            principal_px: image.map(|side| f64::from(side) / 2.0).into(),
             camera_from_world: Pose::from_parts((-(rotation * eye.coords)).into(), rotation),
         }
     }
@@ -110,10 +107,8 @@ impl Camera {
 
     /// The same view taken at another picture size: what the camera becomes when its picture is resized.
     pub fn resized(&self, image: [u32; 2]) -> Self {
-        let k = Vector2::new(
-            f64::from(image[0]) / f64::from(self.image[0]),
-            f64::from(image[1]) / f64::from(self.image[1]),
-        );
+        let [from, to] = [self.image, image].map(|size| Vector2::from(size.map(f64::from)));
+        let k = to.component_div(&from);
         Self {
             image,
             focal_px: self.focal_px.component_mul(&k),
@@ -123,9 +118,21 @@ impl Camera {
     }
 }
 
+/// The camera's axes when it looks along a direction, upright.
+fn upright_rotation(forward: &Vector3<f64>) -> UnitQuaternion<f64> {
+    let is_vertical = forward.cross(&Vector3::z()).norm() < 1e-9 * forward.norm();
+    let up = if is_vertical {
+        Vector3::y()
+    } else {
+        Vector3::z()
+    };
+    UnitQuaternion::look_at_lh(forward, &-up)
+}
+
 /// Where a point is seen through a lens with distortion; not finite behind the camera.
 pub fn distorted(camera: &Camera, kappa: f64, point: Point3<f64>) -> Point2<f64> {
-    let half = libm::hypot(f64::from(camera.image[0]), f64::from(camera.image[1])) / 2.0;
+    let [w, h] = camera.image.map(f64::from);
+    let half = libm::hypot(w, h) / 2.0;
     let Some((px, _)) = camera.project(point) else {
         return Point2::new(f64::NAN, f64::NAN);
     };

@@ -1,6 +1,6 @@
 //! Priors: what is known of the unknowns before the picture is measured, a mean and a standard deviation each.
 
-use super::model::{KAPPA, LN_FOCAL, PRINCIPAL, STRETCH, Square, State, Unknowns};
+use super::model::{KAPPA, LN_FOCAL, PRINCIPAL, STRETCH, Square, State, Unknowns, clear_unknown};
 
 /// A normal distribution; a zero standard deviation fixes its unknown, an infinite one makes the prior flat.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -73,8 +73,7 @@ impl ParameterPriors {
     pub(crate) fn remove_fixed(&self, information: &mut Square, slope: &mut Unknowns) {
         for (i, prior) in self.by_unknown() {
             if prior.is_fixed() {
-                information.row_mut(i).fill(0.0);
-                information.column_mut(i).fill(0.0);
+                clear_unknown(information, i);
                 slope[i] = 0.0;
             }
         }
@@ -97,9 +96,10 @@ impl ParameterPriors {
     ) -> f64 {
         let mut cost = 0.0;
         for (i, prior) in self.by_unknown() {
+            let value = state.value(i);
             information[(i, i)] += prior.information();
-            slope[i] += (state.value(i) - prior.mean) * prior.information();
-            cost += prior.cost(state.value(i));
+            slope[i] += (value - prior.mean) * prior.information();
+            cost += prior.cost(value);
         }
         cost
     }

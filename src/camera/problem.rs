@@ -67,25 +67,23 @@ impl Problem {
         options: &SolveOptions,
     ) -> Result<Self, SolveError> {
         check_label(label)?;
+        let priors = &options.priors;
         let sides = MeasuredSides::new(label, options)?;
+        let stretch_shares = sides.stretch_shares();
         let (corners_px, warnings) = used_corners(label, sides, options)?;
         let units = SolverUnits::for_picture(label);
-        let (ln_focal, prior_source) = units.focal_prior(label, framing, &options.priors);
+        let (ln_focal, prior_source) = units.focal_prior(label, framing, priors);
         let prior_focal = libm::exp(ln_focal.mean);
-        let kappa = kappa_prior(label, focal.unwrap_or(prior_focal), &options.priors);
+        let kappa = kappa_prior(label, focal.unwrap_or(prior_focal), priors);
         let projected = units.projected(&corners_px, kappa.mean);
         let size = sides.completed(|| ratio_by_right_angle(&projected, prior_focal));
         let units = units.for_rectangle(size);
-        let residuals = Residuals {
-            observations: units.observations(label, size, &corners_px, sides.stretch_shares()),
-            priors: ParameterPriors {
-                ln_focal,
-                stretch_sigma: sides.stretch_sigma(label, &options.priors),
-                principal_sigma: principal_sigma(label, framing, &options.priors),
-                kappa,
-                ln_height: height_prior(label, &units),
-            },
-            ln_focal_range: units.ln_focal_range(label),
+        let parameter_priors = ParameterPriors {
+            ln_focal,
+            stretch_sigma: sides.stretch_sigma(label, priors),
+            principal_sigma: principal_sigma(label, framing, priors),
+            kappa,
+            ln_height: height_prior(label, &units),
         };
         Ok(Self {
             image: label.image_size(),
@@ -94,8 +92,12 @@ impl Problem {
             corners_px,
             projected,
             size,
-            stretch_shares: sides.stretch_shares(),
-            residuals,
+            stretch_shares,
+            residuals: Residuals {
+                observations: units.observations(label, size, &corners_px, stretch_shares),
+                priors: parameter_priors,
+                ln_focal_range: units.ln_focal_range(label),
+            },
             prior_source,
             warnings,
         })
@@ -118,13 +120,17 @@ impl Problem {
 
     /// The focal length that the corners give in closed form, where they give one that can be followed.
     pub(crate) fn closed_form_focal(&self) -> Option<f64> {
-        let squared = if self.stretch_shares == StretchShares::BOTH {
+        let squared = self.closed_form_focal_squared();
+        let [shortest, longest] = self.residuals.ln_focal_range.map(libm::exp);
+        (squared > shortest * shortest && squared < longest * longest).then(|| squared.sqrt())
+    }
+
+    fn closed_form_focal_squared(&self) -> f64 {
+        if self.stretch_shares == StretchShares::BOTH {
             self.projected.focal_squared(self.size[0] / self.size[1])
         } else {
             self.projected.focal_squared_any_ratio()
-        };
-        let [shortest, longest] = self.residuals.ln_focal_range.map(libm::exp);
-        (squared > shortest * shortest && squared < longest * longest).then(|| squared.sqrt())
+        }
     }
 
     /// The sides in a state, metres.
@@ -139,26 +145,24 @@ fn used_corners(
     sides: MeasuredSides,
     options: &SolveOptions,
 ) -> Result<([Point2<f64>; 4], Vec<Diagnostic>), SolveError> {
-    let labelled = label
-        .surface
-        .corners_px
-        .map(|corners| corners.map(|c| label.pixel(c)));
+    let labelled = labelled_corners(label);
     let quad_px = labelled
         .or_else(|| sides.predicted_corners(label))
         .ok_or(SolveError::NoCorners)?;
+    let sigma_px = corner_sigma_px(label);
     let OrderedCorners {
         corners,
         mut warnings,
-    } = corners::check(
-        quad_px,
-        corner_sigma_px(label),
-        label.image_size(),
-        options.order,
-    )?;
+    } = corners::check(quad_px, sigma_px, label.image_size(), options.order)?;
     if labelled.is_none() {
         warnings.extend(sides.span_warning(label));
     }
     Ok((corners, warnings))
+}
+
+fn labelled_corners(label: &Label) -> Option<[Point2<f64>; 4]> {
+    let corners = label.surface.corners_px?;
+    Some(corners.map(|c| label.pixel(c)))
 }
 
 fn corner_sigma_px(label: &Label) -> f64 {
@@ -228,25 +232,31 @@ impl SolverUnits {
         corners_px: &[Point2<f64>; 4],
         stretch_shares: StretchShares,
     ) -> Vec<Observation> {
-        let sigma_px = corner_sigma_px(label);
         let is_labelled = label.surface.corners_px.is_some();
         let corners = corner_points(size)
             .into_iter()
             .zip(corners_px)
             .filter(|_| is_labelled)
-            .map(|(point, &px)| self.observation(point, px, sigma_px));
-        // Where both sides were measured, so was the point, with the same tape.
-        let rigid = stretch_shares != StretchShares::BOTH;
-        let further = label.points.iter().map(|point| Observation {
-            rigid,
-            ..self.point_observation(label, point)
-        });
+            .map(|(point, &px)| self.observation(point, px, corner_sigma_px(label)));
+        let further = label
+            .points
+            .iter()
+            .map(|point| self.point_observation(label, point, stretch_shares));
         corners.chain(further).collect()
     }
 
-    fn point_observation(&self, label: &Label, point: &LabelPoint) -> Observation {
+    fn point_observation(
+        &self,
+        label: &Label,
+        point: &LabelPoint,
+        stretch_shares: StretchShares,
+    ) -> Observation {
         let sigma_px = point.sigma_px.unwrap_or(corner_sigma_px(label));
-        self.observation(point.xyz_m.into(), label.pixel(point.px), sigma_px)
+        Observation {
+            // Where both sides were measured, so was the point, with the same tape.
+            rigid: stretch_shares != StretchShares::BOTH,
+            ..self.observation(point.xyz_m.into(), label.pixel(point.px), sigma_px)
+        }
     }
 
     /// Of a point that stretches with the rectangle.
@@ -305,8 +315,11 @@ fn height_prior(label: &Label, units: &SolverUnits) -> Option<Prior> {
 fn undistorted(seen: Vector2<f64>, kappa: f64) -> Vector2<f64> {
     const MAX_STEPS: usize = 60;
     const TOLERANCE: f64 = 1e-12;
+    if kappa == 0.0 {
+        return seen;
+    }
     let mut straight = seen;
-    for _ in 0..if kappa == 0.0 { 0 } else { MAX_STEPS } {
+    for _ in 0..MAX_STEPS {
         let next = seen / (1.0 + kappa * straight.norm_squared());
         let moved = (next - straight).norm();
         straight = next;

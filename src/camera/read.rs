@@ -38,6 +38,13 @@ impl LabelledPhoto {
         photo_of(&self.label, &self.source)
     }
 
+    fn has_file_of_its_own(&self) -> bool {
+        let start = format!("{}.", self.name);
+        self.source
+            .file_name()
+            .is_some_and(|file| file.to_string_lossy().starts_with(&start))
+    }
+
     /// Read from a label file, not from another program's.
     fn is_ours(&self) -> bool {
         ends_with(&self.source, LABEL_SUFFIX)
@@ -48,12 +55,7 @@ impl std::fmt::Display for LabelledPhoto {
     /// The file, and the picture where the file alone does not identify it.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{}", self.source.display())?;
-        let file = self
-            .source
-            .file_name()
-            .map(|n| n.to_string_lossy().into_owned())
-            .unwrap_or_default();
-        if file.starts_with(&format!("{}.", self.name)) {
+        if self.has_file_of_its_own() {
             Ok(())
         } else {
             write!(f, " ({})", self.name)
@@ -95,10 +97,7 @@ fn labels_of(
     size: Option<[f64; 2]>,
 ) -> Result<Vec<LabelledPhoto>> {
     let labels = match annotations {
-        Some(annotations) => annotations
-            .iter()
-            .map(|annotation| imported_label(annotation, path))
-            .collect::<Result<Vec<_>>>()?,
+        Some(annotations) => imported_labels(&annotations, path)?,
         None => own_labels(text, path)?,
     };
     if labels.is_empty() {
@@ -107,6 +106,13 @@ fn labels_of(
     labels
         .into_iter()
         .map(|labelled| completed(labelled, size))
+        .collect()
+}
+
+fn imported_labels(annotations: &[Annotation], path: &Path) -> Result<Vec<LabelledPhoto>> {
+    annotations
+        .iter()
+        .map(|annotation| imported_label(annotation, path))
         .collect()
 }
 
@@ -123,23 +129,27 @@ pub(crate) fn labels_in(folder: &Path, size: Option<[f64; 2]>) -> Result<Vec<Lab
             continue;
         };
         for labelled in labels {
-            match found.iter().find(|other| other.name == labelled.name) {
-                None => found.push(labelled),
-                Some(ours) if ours.is_ours() => {
-                    log::info!(
-                        "{labelled}: left out, since {} is there",
-                        ours.source.display()
-                    );
-                }
-                Some(other) => {
-                    let what = format!("labels {} once more, after {other}", labelled.name);
-                    return Err(Error::file(path, what));
-                }
-            }
+            push_new(&mut found, labelled)?;
         }
     }
     found.sort_by(|a, b| a.name.cmp(&b.name));
     Ok(found)
+}
+
+/// Adds a label of a photo that has none yet; leaves it out where one of ours is there.
+fn push_new(found: &mut Vec<LabelledPhoto>, labelled: LabelledPhoto) -> Result<()> {
+    match found.iter().find(|other| other.name == labelled.name) {
+        None => found.push(labelled),
+        Some(ours) if ours.is_ours() => {
+            let source = ours.source.display();
+            log::info!("{labelled}: left out, since {source} is there");
+        }
+        Some(other) => {
+            let what = format!("labels {} once more, after {other}", labelled.name);
+            return Err(Error::file(&labelled.source, what));
+        }
+    }
+    Ok(())
 }
 
 /// The files of a folder that may hold labels, ours first: what is read later does not replace it.
@@ -192,38 +202,41 @@ fn label_text(path: &Path) -> Result<String> {
 /// The error of a photo that was given instead of its label.
 fn photo_instead(photo: &Path) -> Error {
     let label = photo.with_file_name(format!("{}{LABEL_SUFFIX}", stem(photo)));
-    let next = match label.is_file() {
-        true => format!("{} lies beside it", label.display()),
-        false => format!(
-            "`petcomp camera init {} --size WIDTHxHEIGHT` writes one",
-            photo.display()
-        ),
+    let next = if label.is_file() {
+        format!("{} lies beside it", label.display())
+    } else {
+        let photo = photo.display();
+        format!("`petcomp camera init {photo} --size WIDTHxHEIGHT` writes one")
     };
     Error::file(photo, format!("a picture, expected a label of it; {next}"))
 }
 
 /// A label of ours, or an array of them.
 fn own_labels(text: &str, path: &Path) -> Result<Vec<LabelledPhoto>> {
-    let is_array = text.trim_start().starts_with('[');
-    let labels: Vec<Label> = match is_array {
-        true => io::parse_json(text),
-        false => io::parse_json(text).map(|label| vec![label]),
+    parse_own_labels(text, path).map_err(|e| e.in_file(path))
+}
+
+fn parse_own_labels(text: &str, path: &Path) -> Result<Vec<LabelledPhoto>> {
+    if !text.trim_start().starts_with('[') {
+        let label = io::parse_json(text)?;
+        return Ok(vec![own_label(label, label_name(path), path)?]);
     }
-    .map_err(|e| e.in_file(path))?;
-    labels
+    io::parse_json::<Vec<Label>>(text)?
         .into_iter()
         .map(|label| {
-            check_photo_path(&label).map_err(|e| e.in_file(path))?;
-            Ok(LabelledPhoto {
-                name: match is_array {
-                    true => stem(Path::new(&label.image.file)),
-                    false => label_name(path),
-                },
-                label,
-                source: path.into(),
-            })
+            let name = stem(Path::new(&label.image.file));
+            own_label(label, name, path)
         })
         .collect()
+}
+
+fn own_label(label: Label, name: String, path: &Path) -> Result<LabelledPhoto> {
+    check_photo_path(&label)?;
+    Ok(LabelledPhoto {
+        label,
+        source: path.into(),
+        name,
+    })
 }
 
 /// A photo that is named lies in or below the folder of its label.
@@ -259,8 +272,7 @@ fn imported_label(annotation: &Annotation, path: &Path) -> Result<LabelledPhoto>
         .map_err(|e| e.within(&file).in_file(path))?;
     label.image.file.clone_from(&file);
     if annotation.size.is_none() {
-        let header = io::read_header(path.with_file_name(&file))?;
-        (label.image.width, label.image.height) = (header.width as u32, header.height as u32);
+        fill_in_size(&mut label, &path.with_file_name(&file))?;
     }
     Ok(LabelledPhoto {
         name: stem(Path::new(&file)),
@@ -269,24 +281,28 @@ fn imported_label(annotation: &Annotation, path: &Path) -> Result<LabelledPhoto>
     })
 }
 
+/// Takes over the size of the label's photo.
+fn fill_in_size(label: &mut Label, photo: &Path) -> Result<()> {
+    let header = io::read_header(photo)?;
+    (label.image.width, label.image.height) = (header.width as u32, header.height as u32);
+    Ok(())
+}
+
 /// The name of an annotation's photo: the first that is there, in or below the folder or directly in it, or else the last.
 fn annotated_file(annotation: &Annotation, path: &Path) -> String {
-    let inside = annotation
-        .files
-        .iter()
-        .filter(|file| io::below("", file.as_str()).is_ok())
-        .cloned();
-    let bare = annotation
-        .files
-        .iter()
-        .map(|file| file.rsplit('/').next().unwrap_or_default().to_owned());
-    let names: Vec<String> = inside.chain(bare).collect();
+    let names: Vec<&str> = possible_files(annotation).collect();
     names
         .iter()
         .find(|name| path.with_file_name(name).is_file())
         .or(names.last())
-        .cloned()
+        .map(|name| (*name).to_owned())
         .unwrap_or_default()
+}
+
+fn possible_files(annotation: &Annotation) -> impl Iterator<Item = &str> {
+    let names = annotation.files.iter().map(String::as_str);
+    let inside = names.clone().filter(|file| io::below("", file).is_ok());
+    inside.chain(names.map(|file| file.rsplit('/').next().unwrap_or_default()))
 }
 
 /// With the sides that were given where the label has none, and with its photo's EXIF data.
@@ -323,12 +339,12 @@ pub(crate) fn with_photo(mut label: Label, path: impl AsRef<Path>) -> Result<Lab
 
 /// A photo has the size that its label says.
 fn check_photo_size(label: &Label, photo: &Path, header: &io::Header) -> Result<()> {
-    let ([w, h], [expected_w, expected_h]) = ([header.width, header.height], label.image_size());
-    if [w, h] == [expected_w as usize, expected_h as usize] {
+    let (w, h, [width, height]) = (header.width, header.height, label.image_size());
+    if [w, h] == [width as usize, height as usize] {
         return Ok(());
     }
     let photo = photo.display();
-    let what = format!("{expected_w} x {expected_h} pixels, but {photo} has {w} x {h}");
+    let what = format!("{width} x {height} pixels, but {photo} has {w} x {h}");
     Err(Error::value("image", what))
 }
 
@@ -345,21 +361,20 @@ pub(crate) fn apply_exif(label: &mut Label, header: &io::Header) {
     }
 }
 
-/// Sides that a surface with objects on it can have; a label may be in centimetres by mistake.
+/// Checks that a surface with objects on it can have the label's sides, which may be in centimetres by mistake.
 ///
 /// # Errors
 /// [`Error::Value`] that names the side.
 pub(crate) fn check_size(label: &Label) -> Result<()> {
-    let sides = [
-        ("surface.width_m", label.surface.width_m),
-        ("surface.height_m", label.surface.height_m),
-    ];
-    sides
-        .into_iter()
-        .try_for_each(|(at, side)| side.map_or(Ok(()), |metres| SURFACE.check(at, metres)))
+    check_side("surface.width_m", label.surface.width_m)?;
+    check_side("surface.height_m", label.surface.height_m)
 }
 
-/// A camera that is near enough to see objects on the surface: how far it is follows from the label's lengths.
+fn check_side(at: &str, metres: Option<f64>) -> Result<()> {
+    metres.map_or(Ok(()), |metres| SURFACE.check(at, metres))
+}
+
+/// Checks that a camera is near enough to see objects on the surface: how far it is follows from the label's lengths.
 ///
 /// # Errors
 /// [`Error::Value`] with the distance.
@@ -368,13 +383,11 @@ pub fn check_distance(camera: &Camera) -> Result<()> {
     if CAMERA.contains(distance) {
         return Ok(());
     }
-    let unit = CAMERA
+    let metres = number((1e3 * distance).round() / 1e3);
+    let question = CAMERA
         .unit_meant(distance)
         .map_or(String::new(), |unit| format!("; is the size in {unit}s?"));
-    let what = format!(
-        "the camera would be {} m away, expected {CAMERA}{unit}",
-        number((1e3 * distance).round() / 1e3)
-    );
+    let what = format!("the camera would be {metres} m away, expected {CAMERA}{question}");
     Err(Error::value("surface", what))
 }
 

@@ -35,9 +35,7 @@ pub(crate) struct ScaledPose {
 impl ProjectedRectangle {
     /// From corners in the order top left, top right, bottom right, bottom left, relative to the principal point.
     pub(crate) fn new(corners: &[Vector2<f64>; 4]) -> Self {
-        let areas = triangle_areas(corners);
-        let mean = areas.iter().sum::<f64>() / 4.0;
-        let [c0, c1, c2, c3] = [0, 1, 2, 3].map(|i| corners[i].push(1.0) * (areas[i] / mean));
+        let [c0, c1, c2, c3] = homogeneous_corners(corners);
         let [along, down] = [c1 - c0, c3 - c0];
         Self {
             along: (along.xy(), along.z),
@@ -85,6 +83,13 @@ impl ProjectedRectangle {
     }
 }
 
+/// The corners of a rectangle's picture with their depths, relative to the mean depth, as last coordinates.
+fn homogeneous_corners(corners: &[Vector2<f64>; 4]) -> [Vector3<f64>; 4] {
+    let areas = triangle_areas(corners);
+    let mean = areas.iter().sum::<f64>() / 4.0;
+    [0, 1, 2, 3].map(|i| corners[i].push(1.0) * (areas[i] / mean))
+}
+
 impl ProjectedRectangle {
     /// The two poses from which the rectangle looks like this from so far that perspective is lost in the noise.
     ///
@@ -93,21 +98,26 @@ impl ProjectedRectangle {
     pub(crate) fn distant_poses(&self, size: [f64; 2]) -> [ScaledPose; 2] {
         let along = self.along.0 / (size[0] * self.center.z);
         let up = -self.down.0 / (size[1] * self.center.z);
-        let (n1, n2, dot) = (along.norm_squared(), up.norm_squared(), along.dot(&up));
-        let squared = (n1 + n2 + libm::hypot(n1 - n2, 2.0 * dot)) / 2.0;
-        let (lean, other) = (leaning(n1, squared), leaning(n2, squared));
-        let leans = (lean, if dot > 0.0 { -other } else { other });
-        let (scale, center) = (squared.sqrt(), self.center.xy() / self.center.z);
+        let squared = frontal_squared(&along, &up);
+        let [lean, other] = [along, up].map(|axis| leaning(axis.norm_squared(), squared));
+        let leans = [lean, if along.dot(&up) > 0.0 { -other } else { other }];
+        let scale = squared.sqrt();
         [1.0, -1.0].map(|sign| {
-            let x = (along / scale).push(sign * leans.0);
-            let y = (up / scale).push(sign * leans.1);
+            let x = (along / scale).push(sign * leans[0]);
+            let y = (up / scale).push(sign * leans[1]);
             ScaledPose {
                 rotation: rotation_along_x(&x, &y),
-                center,
+                center: self.center.xy() / self.center.z,
                 scale,
             }
         })
     }
+}
+
+/// The squared length of a unit seen from the front, from the pictures of two units at right angles to each other.
+fn frontal_squared(along: &Vector2<f64>, up: &Vector2<f64>) -> f64 {
+    let (n1, n2) = (along.norm_squared(), up.norm_squared());
+    (n1 + n2 + libm::hypot(n1 - n2, 2.0 * along.dot(up))) / 2.0
 }
 
 /// The rotation whose x axis is along a vector, and whose y axis is nearest to another.

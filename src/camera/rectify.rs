@@ -4,7 +4,7 @@ use super::pinhole::Camera;
 use crate::bounds::number;
 use crate::error::{Error, Result};
 use crate::filter::{Pyramid, sample_bilinear};
-use crate::geom::{Homography, Point2, Vector2};
+use crate::geom::{Homography, Point2, Vector2, Vector3};
 use crate::image::Image;
 use crate::pixel::Mix;
 use nalgebra::{Matrix2, Matrix3};
@@ -27,25 +27,23 @@ pub fn rectify<P: Mix>(
     size: [f64; 2],
     px_per_metre: f64,
 ) -> Result<Image<P>> {
+    let map = map_size(size, px_per_metre)?;
+    let photo_from_map = Homography(camera.pixel_from_surface().0 * surface_from_map(size, map).0);
+    let [width, height] = map.map(|side| side as usize);
+    Ok(warp(photo, &photo_from_map, width, height))
+}
+
+/// Width and height of a map, pixels: integers.
+fn map_size(size: [f64; 2], px_per_metre: f64) -> Result<[f64; 2]> {
     let [width, height] = size.map(|metres| (metres * px_per_metre).round());
-    if !(width >= 1.0 && height >= 1.0 && width * height <= MAX_MAP_PIXELS) {
-        return Err(Error::value(
-            "px_per_metre",
-            format!(
-                "{px_per_metre} makes a map of {} x {} pixels, expected at most {MAX_MAP_PIXELS}",
-                number(width),
-                number(height)
-            ),
-        ));
+    if width >= 1.0 && height >= 1.0 && width * height <= MAX_MAP_PIXELS {
+        return Ok([width, height]);
     }
-    let photo_from_map =
-        Homography(camera.pixel_from_surface().0 * surface_from_map(size, [width, height]).0);
-    Ok(warp(
-        photo,
-        &photo_from_map,
-        width as usize,
-        height as usize,
-    ))
+    let [w, h] = [width, height].map(number);
+    let what = format!(
+        "{px_per_metre} makes a map of {w} x {h} pixels, expected at most {MAX_MAP_PIXELS}"
+    );
+    Err(Error::value("px_per_metre", what))
 }
 
 /// The photo that the camera takes of a picture lying on the rectangle of `size` metres; empty beside it.
@@ -58,14 +56,10 @@ pub fn project_picture<P: Mix>(picture: &Pyramid<P>, camera: &Camera, size: [f64
         return Image::new(width, height);
     };
     // In front of the camera the last coordinate is one over the depth: positive.
-    let center =
-        inverse * photo_from_picture * nalgebra::Vector3::new(w as f64 / 2.0, h as f64 / 2.0, 1.0);
-    warp(
-        picture,
-        &Homography(inverse * center.z.signum()),
-        width,
-        height,
-    )
+    let middle = Vector3::new(w as f64 / 2.0, h as f64 / 2.0, 1.0);
+    let center = inverse * photo_from_picture * middle;
+    let picture_from_photo = Homography(inverse * center.z.signum());
+    warp(picture, &picture_from_photo, width, height)
 }
 
 /// Surface metres from the pixels of a map of so many.
@@ -95,21 +89,29 @@ pub fn warp<P: Mix>(
     width: usize,
     height: usize,
 ) -> Image<P> {
-    let m = source_from_target.0;
     Image::from_fn(width, height, |x, y| {
-        let q = m * Point2::new(x as f64 + 0.5, y as f64 + 0.5).to_homogeneous();
-        if q.z.is_nan() || q.z <= 0.0 {
-            return P::default();
-        }
-        let at = q.xy() / q.z;
-        let slope = (m.fixed_view::<2, 2>(0, 0) - at * m.fixed_view::<1, 2>(2, 0)) / q.z;
-        footprint_mean(source, at, &slope)
+        let center = Point2::new(x as f64 + 0.5, y as f64 + 0.5);
+        mapped(source_from_target, center)
+            .map_or_else(P::default, |(at, slope)| footprint_mean(source, at, &slope))
     })
+}
+
+/// Where a map takes a point, and its derivative there; none where it comes from behind.
+#[inline]
+fn mapped(map: &Homography, point: Point2<f64>) -> Option<(Vector2<f64>, Matrix2<f64>)> {
+    let m = &map.0;
+    let q = m * point.to_homogeneous();
+    if q.z.is_nan() || q.z <= 0.0 {
+        return None;
+    }
+    let at = q.xy() / q.z;
+    let slope = (m.fixed_view::<2, 2>(0, 0) - at * m.fixed_view::<1, 2>(2, 0)) / q.z;
+    Some((at, slope))
 }
 
 /// The mean over what a pixel covers. In one piece: most of the time of a warp is spent here.
 fn footprint_mean<P: Mix>(source: &Pyramid<P>, at: Vector2<f64>, slope: &Matrix2<f64>) -> P {
-    let axes = axes(slope);
+    let axes = footprint_axes(slope);
     let [long, short] = axes.map(|axis| axis.norm());
     let level = level_below((0.5 * short).max(long / MAX_SAMPLES)).min(source.levels() - 1);
     let (picture, scale) = (source.level(level), f64::from(1_u32 << level));
@@ -141,24 +143,28 @@ const MAX_PYRAMID_LEVELS: f64 = 31.0;
 
 /// The long and the short axis of a footprint, whole, pixels of the source: the eigenvectors of the slope times its
 /// transpose, as long as the roots of the eigenvalues.
-fn axes(slope: &Matrix2<f64>) -> [Vector2<f64>; 2] {
+fn footprint_axes(slope: &Matrix2<f64>) -> [Vector2<f64>; 2] {
     let square = slope * slope.transpose();
-    let (mean, half) = (
-        square.trace() / 2.0,
-        (square[(0, 0)] - square[(1, 1)]) / 2.0,
-    );
+    let mean = square.trace() / 2.0;
+    let half = (square[(0, 0)] - square[(1, 1)]) / 2.0;
     let mixed = square[(0, 1)];
     let spread = (half * half + mixed * mixed).sqrt();
-    // Two ways to write the same direction; the one that does not cancel.
-    let direction = match half >= 0.0 {
-        true => Vector2::new(spread + half, mixed),
-        false => Vector2::new(mixed, spread - half),
-    };
-    let along = direction.try_normalize(0.0).unwrap_or(Vector2::x());
+    let along = long_direction(half, mixed, spread);
     [
         along * (mean + spread).sqrt(),
         Vector2::new(-along.y, along.x) * (mean - spread).max(0.0).sqrt(),
     ]
+}
+
+/// The eigenvector of the larger eigenvalue; two ways to write the same direction, of which the one that does not cancel.
+#[inline]
+fn long_direction(half: f64, mixed: f64, spread: f64) -> Vector2<f64> {
+    let direction = if half >= 0.0 {
+        Vector2::new(spread + half, mixed)
+    } else {
+        Vector2::new(mixed, spread - half)
+    };
+    direction.try_normalize(0.0).unwrap_or(Vector2::x())
 }
 
 #[cfg(test)]
@@ -264,7 +270,7 @@ mod tests {
             (4.0, 1.5, 1.6),
         ] {
             let rotation = nalgebra::Rotation2::new(turn).into_inner();
-            let [long, short] = axes(&(rotation * Matrix2::new(a, 0.0, 0.0, b)));
+            let [long, short] = footprint_axes(&(rotation * Matrix2::new(a, 0.0, 0.0, b)));
             assert!(
                 (long.norm() - a).abs() < 1e-9 && (short.norm() - b).abs() < 1e-6,
                 "{long} {short}"

@@ -67,11 +67,7 @@ impl Residuals {
 
     /// The normal equations at a state; none where a point would be behind the camera.
     pub(crate) fn normal_equations(&self, state: &State) -> Option<NormalEquations> {
-        let mut normal = NormalEquations {
-            information: Square::zeros(),
-            slope: Unknowns::zeros(),
-            cost: 0.0,
-        };
+        let mut normal = NormalEquations::zeros();
         for observation in &self.observations {
             normal.add_observation(state, observation)?;
         }
@@ -115,16 +111,11 @@ impl Residuals {
         let mut descent = Descent::new(self, start, bar)?;
         while descent.iterations < max_iterations && descent.damping < MAX_DAMPING {
             descent.iterations += 1;
-            if descent.iterate()? == Progress::Finished {
+            if descent.iterate()? == StepOutcome::Finished {
                 break;
             }
         }
-        Some(Minimum {
-            state: descent.state,
-            cost: descent.normal.cost,
-            information: descent.normal.information,
-            iterations: descent.iterations,
-        })
+        Some(descent.minimum())
     }
 }
 
@@ -140,7 +131,7 @@ struct Descent<'a> {
 
 /// Whether a descent goes on.
 #[derive(PartialEq)]
-enum Progress {
+enum StepOutcome {
     Continues,
     Finished,
 }
@@ -157,27 +148,43 @@ impl<'a> Descent<'a> {
         })
     }
 
+    /// What has been reached.
+    fn minimum(&self) -> Minimum {
+        Minimum {
+            state: self.state,
+            cost: self.normal.cost,
+            information: self.normal.information,
+            iterations: self.iterations,
+        }
+    }
+
     /// Tries a damped step; none where it is taken and has no normal equations.
-    fn iterate(&mut self) -> Option<Progress> {
+    fn iterate(&mut self) -> Option<StepOutcome> {
         let Some((step, length)) = self.normal.damped_step(self.damping) else {
             self.damping *= DAMPING_INCREASE;
-            return Some(Progress::Continues);
+            return Some(StepOutcome::Continues);
         };
         let next = self.residuals.stepped(&self.state, &step);
         let mut has_converged = length < STEP_TOLERANCE;
         match self.residuals.cost(&next) {
             Some(cost) if cost < self.normal.cost => {
                 has_converged |= self.hardly_falls_to(cost);
-                self.state = next;
-                self.normal = self.residuals.normal_equations(&next)?;
-                self.damping *= DAMPING_DECREASE;
+                self.move_to(next)?;
             }
             _ => self.damping *= DAMPING_INCREASE,
         }
-        Some(match has_converged {
-            true => Progress::Finished,
-            false => Progress::Continues,
+        Some(if has_converged {
+            StepOutcome::Finished
+        } else {
+            StepOutcome::Continues
         })
+    }
+
+    fn move_to(&mut self, next: State) -> Option<()> {
+        self.state = next;
+        self.normal = self.residuals.normal_equations(&next)?;
+        self.damping *= DAMPING_DECREASE;
+        Some(())
     }
 
     /// A step to a lower cost that is not worth another.
@@ -188,6 +195,15 @@ impl<'a> Descent<'a> {
 }
 
 impl NormalEquations {
+    #[inline]
+    fn zeros() -> Self {
+        Self {
+            information: Square::zeros(),
+            slope: Unknowns::zeros(),
+            cost: 0.0,
+        }
+    }
+
     /// Adds both coordinates of an observation; none where its point would be behind the camera.
     #[inline]
     fn add_observation(&mut self, state: &State, observation: &Observation) -> Option<()> {
@@ -211,6 +227,18 @@ impl NormalEquations {
     ///
     /// Damping in proportion to the diagonal is the same as damping evenly after scaling to a unit diagonal.
     fn damped_step(&self, damping: f64) -> Option<(Unknowns, f64)> {
+        let step = solve_positive(self.damped_information(damping), -self.slope)?;
+        let squares = step.component_mul(&step);
+        let length = squares.dot(&self.information.diagonal()).sqrt();
+        let leap = LIMITED_UNKNOWNS
+            .into_iter()
+            .map(|i| step[i].abs())
+            .fold(MAX_STEP, f64::max);
+        Some((step * (MAX_STEP / leap), length))
+    }
+
+    #[inline]
+    fn damped_information(&self, damping: f64) -> Square {
         let mut damped = self.information;
         for i in 0..UNKNOWNS {
             let own = damped[(i, i)];
@@ -221,16 +249,7 @@ impl NormalEquations {
                 1.0
             };
         }
-        let step = solve_positive(damped, -self.slope)?;
-        let length = step
-            .component_mul(&step)
-            .dot(&self.information.diagonal())
-            .sqrt();
-        let leap = LIMITED_UNKNOWNS
-            .into_iter()
-            .map(|i| step[i].abs())
-            .fold(MAX_STEP, f64::max);
-        Some((step * (MAX_STEP / leap), length))
+        damped
     }
 }
 

@@ -19,6 +19,19 @@ pub(crate) struct SearchResult {
 impl Problem {
     /// Refines from every start and keeps what stands above the surface; none where nothing does.
     pub(crate) fn search(&self) -> Option<SearchResult> {
+        let minima = self.minima();
+        let best = lowest(minima.iter())?;
+        let elsewhere = minima
+            .iter()
+            .filter(|m| degrees_apart(&m.state.pose, &best.state.pose) > ONE_POSE_DEG);
+        Some(SearchResult {
+            best,
+            other: lowest(elsewhere),
+        })
+    }
+
+    /// What the starts lead to, above the surface.
+    fn minima(&self) -> Vec<Minimum> {
         let mut minima: Vec<Minimum> = Vec::with_capacity(10);
         let mut lowest = f64::INFINITY;
         for start in self.starts() {
@@ -27,14 +40,7 @@ impl Problem {
             lowest = minimum.map_or(lowest, |m| lowest.min(m.cost));
             minima.extend(minimum);
         }
-        let best = *minima.iter().min_by(|a, b| a.cost.total_cmp(&b.cost))?;
-        let elsewhere = minima
-            .iter()
-            .filter(|m| degrees_apart(&m.state.pose, &best.state.pose) > ONE_POSE_DEG);
-        Some(SearchResult {
-            best,
-            other: elsewhere.min_by(|a, b| a.cost.total_cmp(&b.cost)).copied(),
-        })
+        minima
     }
 
     /// The closed form, where it stands above the surface, after at most so many iterations.
@@ -78,6 +84,10 @@ impl Problem {
     fn prior_focal(&self) -> f64 {
         libm::exp(self.residuals.priors.ln_focal.mean)
     }
+}
+
+fn lowest<'a>(minima: impl Iterator<Item = &'a Minimum>) -> Option<Minimum> {
+    minima.min_by(|a, b| a.cost.total_cmp(&b.cost)).copied()
 }
 
 fn is_above_surface(minimum: &Minimum) -> bool {

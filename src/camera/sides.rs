@@ -28,17 +28,13 @@ pub(crate) enum MeasuredSides {
 impl MeasuredSides {
     pub(crate) fn new(label: &Label, options: &SolveOptions) -> Result<Self, SolveError> {
         let (w, h) = (label.surface.width_m, label.surface.height_m);
-        check_sides(
-            [w.unwrap_or(1.0), h.unwrap_or(1.0)],
-            w.is_some() && h.is_some(),
-        )?;
+        check_sides(w, h)?;
         match (w, h) {
             (Some(w), Some(h)) => Ok(Self::Both([w, h])),
             (Some(w), None) => Ok(Self::Width(w)),
             (None, Some(h)) => Ok(Self::Height(h)),
             (None, None) if options.unit_scale => Ok(Self::Width(1.0)),
-            (None, None) if has_corners(label) => Err(SolveError::NoScale),
-            (None, None) => Err(SolveError::Empty),
+            (None, None) => Err(unscaled_error(label)),
         }
     }
 
@@ -66,14 +62,10 @@ impl MeasuredSides {
         let Self::Both(size) = self else { return None };
         let [along, across] = [0, 1].map(|axis| point_span(label, size, axis));
         let (span, side) = (along.max(across), size[0].max(size[1]));
-        (side > MAX_SPAN_RATIO * span).then(|| {
-            Diagnostic::warning(
-                Code::SmallMarkerSpan,
-                format!(
-                    "the markers span only {span:.3} m of a surface of {side:.3} m: put four of them just inside its corners"
-                ),
-            )
-        })
+        let what = format!(
+            "the markers span only {span:.3} m of a surface of {side:.3} m: put four of them just inside its corners"
+        );
+        (side > MAX_SPAN_RATIO * span).then(|| Diagnostic::warning(Code::SmallMarkerSpan, what))
     }
 
     pub(crate) fn stretch_shares(self) -> StretchShares {
@@ -94,15 +86,26 @@ impl MeasuredSides {
     }
 }
 
-/// Lengths that a rectangle can have, and where both are measured, a ratio.
-fn check_sides([w, h]: [f64; 2], are_both_measured: bool) -> Result<(), SolveError> {
+/// The error of a label without sides.
+fn unscaled_error(label: &Label) -> SolveError {
+    if has_corners(label) {
+        SolveError::NoScale
+    } else {
+        SolveError::Empty
+    }
+}
+
+/// Refuses lengths, or a ratio of two, that no rectangle has.
+fn check_sides(width: Option<f64>, height: Option<f64>) -> Result<(), SolveError> {
     let range = 1.0 / MAX_MAGNITUDE..=MAX_MAGNITUDE;
-    let is_plausible = range.contains(&w)
-        && range.contains(&h)
-        && (!are_both_measured || (w / h).max(h / w) <= MAX_SIDE_RATIO);
-    is_plausible
-        .then_some(())
-        .ok_or(SolveError::BadDimensions([w, h]))
+    let [w, h] = [width, height].map(|side| side.unwrap_or(1.0));
+    let has_plausible_ratio =
+        width.is_none() || height.is_none() || (w / h).max(h / w) <= MAX_SIDE_RATIO;
+    if range.contains(&w) && range.contains(&h) && has_plausible_ratio {
+        Ok(())
+    } else {
+        Err(SolveError::BadDimensions([w, h]))
+    }
 }
 
 /// Corners, or points enough to predict them from.
@@ -121,11 +124,10 @@ fn points_on_surface(label: &Label, size: [f64; 2]) -> impl Iterator<Item = &Lab
 
 /// How far the points on a surface of this size reach along an axis, metres.
 fn point_span(label: &Label, size: [f64; 2], axis: usize) -> f64 {
-    let [low, high] = points_on_surface(label, size)
-        .map(|p| p.xyz_m[axis])
-        .fold([f64::MAX, f64::MIN], |[low, high], v| {
-            [v.min(low), v.max(high)]
-        });
+    let positions = points_on_surface(label, size).map(|p| p.xyz_m[axis]);
+    let [low, high] = positions.fold([f64::MAX, f64::MIN], |[low, high], v| {
+        [v.min(low), v.max(high)]
+    });
     high - low
 }
 
@@ -133,12 +135,8 @@ fn point_span(label: &Label, size: [f64; 2], axis: usize) -> f64 {
 pub(crate) fn ratio_by_right_angle(projected: &ProjectedRectangle, prior_focal: f64) -> f64 {
     let squared = projected.focal_squared_any_ratio();
     let [short, long] = [0.2 * prior_focal, 5.0 * prior_focal].map(|f| f * f);
-    let focal = if (short..long).contains(&squared) {
-        squared.sqrt()
-    } else {
-        prior_focal
-    };
+    let measured = (short..long).contains(&squared).then(|| squared.sqrt());
     projected
-        .ratio(focal)
+        .ratio(measured.unwrap_or(prior_focal))
         .clamp(1.0 / MAX_SIDE_RATIO, MAX_SIDE_RATIO)
 }

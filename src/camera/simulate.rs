@@ -1,9 +1,10 @@
 //! Random views of a rectangle with a known camera: what tests, benches and reports measure the solver against.
 
+use super::exchange::pose_from;
 use super::label::Label;
 use super::pinhole::{Camera, distorted};
 use super::rectangle::corner_points;
-use crate::geom::{Point2, Pose, UnitQuaternion, Vector2, Vector3};
+use crate::geom::{Point2, Vector2, Vector3};
 use nalgebra::{Matrix3, Rotation3};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -113,31 +114,37 @@ impl Scenario {
     pub fn views(&self, seed: u64, k: u64, count: usize, tilts: [f64; 2]) -> Vec<View> {
         let mut dice = Dice::new(seed, k);
         let lens = self.lens(&mut dice);
-        let one = |_| {
-            let tilt = dice.between(tilts[0], tilts[1]);
-            self.tilted(tilt).view_through(&lens, &mut dice)
-        };
-        (0..count).map(one).collect()
+        (0..count)
+            .map(|_| {
+                let tilt = dice.between(tilts[0], tilts[1]);
+                self.tilted(tilt).view_through(&lens, &mut dice)
+            })
+            .collect()
     }
 
     fn lens(&self, dice: &mut Dice) -> SharedLens {
-        let center = Point2::from(self.image.map(|s| f64::from(s) / 2.0));
-        let mut off = Vector2::new(dice.normal(), dice.normal()) * self.principal_sigma_px;
-        if self.off_center > 0.0 {
-            let direction = dice.between(0.0, TAU);
-            let px = self.off_center * f64::from(self.image[0].max(self.image[1]));
-            off += Vector2::new(libm::cos(direction), libm::sin(direction)) * px;
-        }
+        // In this order: the numbers of a seed stay the same.
+        let principal_px = self.principal_px(dice);
         let kappa = if dice.between(0.0, 1.0) < 0.5 {
             -self.kappa
         } else {
             self.kappa
         };
         SharedLens {
-            principal_px: center + off,
+            principal_px,
             kappa,
             ln_ratio: dice.normal() * self.ratio_sigma,
         }
+    }
+
+    fn principal_px(&self, dice: &mut Dice) -> Point2<f64> {
+        let center = Point2::from(self.image.map(|s| f64::from(s) / 2.0));
+        let mut off = Vector2::new(dice.normal(), dice.normal()) * self.principal_sigma_px;
+        if self.off_center > 0.0 {
+            let px = self.off_center * f64::from(self.image[0].max(self.image[1]));
+            off += dice.direction() * px;
+        }
+        center + off
     }
 
     fn view_through(&self, lens: &SharedLens, dice: &mut Dice) -> View {
@@ -145,22 +152,23 @@ impl Scenario {
         let noisy = corner_points(self.size)
             .map(|p| distorted(&camera, lens.kappa, p))
             .map(|p| [0, 1].map(|axis| p[axis] + dice.normal() * self.corner_sigma_px));
-        // The person measured another ratio than there is.
-        let half = libm::exp(lens.ln_ratio / 2.0);
-        let mut label = Label::new(
-            self.image,
-            noisy,
-            [self.size[0] * half, self.size[1] / half],
-        );
-        label.surface.corner_sigma_px =
-            (self.corner_sigma_px > 0.0).then_some(self.corner_sigma_px);
-        label.image.cropped = (self.off_center == 0.0).then_some(false);
         View {
-            label,
+            label: self.label(noisy, lens.ln_ratio),
             camera,
             kappa: lens.kappa,
             size: self.size,
         }
+    }
+
+    /// What a person would label who measured another ratio of the sides than there is.
+    fn label(&self, corners_px: [[f64; 2]; 4], ln_ratio: f64) -> Label {
+        let half = libm::exp(ln_ratio / 2.0);
+        let measured = [self.size[0] * half, self.size[1] / half];
+        let mut label = Label::new(self.image, corners_px, measured);
+        label.surface.corner_sigma_px =
+            (self.corner_sigma_px > 0.0).then_some(self.corner_sigma_px);
+        label.image.cropped = (self.off_center == 0.0).then_some(false);
+        label
     }
 
     fn camera(&self, lens: &SharedLens, dice: &mut Dice) -> Camera {
@@ -178,10 +186,7 @@ impl Scenario {
             image: self.image,
             focal_px: Vector2::repeat(self.focal_px),
             principal_px: lens.principal_px,
-            camera_from_world: Pose::from_parts(
-                t.into(),
-                UnitQuaternion::from_rotation_matrix(&rotation),
-            ),
+            camera_from_world: pose_from(*rotation.matrix(), t),
         }
     }
 
@@ -195,25 +200,19 @@ impl Scenario {
         is_above: impl Fn(Vector2<f64>) -> bool,
     ) -> Vector2<f64> {
         let image = Vector2::from(self.image.map(f64::from));
-        for _ in 0..100 {
-            let from = image * MARGIN_SIDES - low - lens.principal_px.coords;
-            let to = image * (1.0 - MARGIN_SIDES) - high - lens.principal_px.coords;
-            let tried = Vector2::new(dice.between(from.x, to.x), dice.between(from.y, to.y));
-            if is_above(tried) {
-                return tried;
-            }
-        }
-        (image - low - high) / 2.0 - lens.principal_px.coords
+        let from = image * MARGIN_SIDES - low - lens.principal_px.coords;
+        let to = image * (1.0 - MARGIN_SIDES) - high - lens.principal_px.coords;
+        (0..100)
+            .map(|_| dice.inside(from, to))
+            .find(|&center| is_above(center))
+            .unwrap_or_else(|| (image - low - high) / 2.0 - lens.principal_px.coords)
     }
 
     fn rotation(&self, dice: &mut Dice) -> Rotation3<f64> {
         let azimuth = self.azimuth.unwrap_or_else(|| dice.between(0.0, TAU));
         let axis = Vector3::new(libm::cos(azimuth), libm::sin(azimuth), 0.0);
         let roll = Rotation3::new(Vector3::z() * dice.between(0.0, TAU));
-        let down = Rotation3::from_matrix_unchecked(Matrix3::from_diagonal(&Vector3::new(
-            1.0, -1.0, -1.0,
-        )));
-        roll * down * Rotation3::new(axis * self.tilt)
+        roll * downwards() * Rotation3::new(axis * self.tilt)
     }
 
     /// The distance at which the rectangle fills its part of the picture, by bisection.
@@ -222,9 +221,7 @@ impl Scenario {
         let [mut near, mut far] = [1.05 * nearest + 1e-4 * self.size[0], 1e5 * self.size[0]];
         for _ in 0..100 {
             let middle = (near * far).sqrt();
-            let (low, high) = self.extent(turned, middle);
-            let filled = (high - low).component_div(&image).max();
-            if filled > self.fill {
+            if self.filled_share(turned, middle, image) > self.fill {
                 near = middle
             } else {
                 far = middle
@@ -233,18 +230,25 @@ impl Scenario {
         far
     }
 
+    /// The part of the picture that the rectangle fills from a distance.
+    fn filled_share(&self, turned: &[Vector3<f64>; 4], distance: f64, image: Vector2<f64>) -> f64 {
+        let (low, high) = self.extent(turned, distance);
+        (high - low).component_div(&image).max()
+    }
+
     /// Bounds of the corners in the picture when the rectangle's centre is on the axis, pixels.
     fn extent(&self, turned: &[Vector3<f64>; 4], distance: f64) -> (Vector2<f64>, Vector2<f64>) {
         let seen = turned.map(|p| p.xy() * (self.focal_px / (p.z + distance)));
-        let low = seen
-            .iter()
-            .fold(Vector2::repeat(f64::MAX), |low, p| low.inf(p));
-        (
-            low,
-            seen.iter()
-                .fold(Vector2::repeat(f64::MIN), |high, p| high.sup(p)),
-        )
+        let start = (Vector2::repeat(f64::MAX), Vector2::repeat(f64::MIN));
+        seen.iter()
+            .fold(start, |(low, high), p| (low.inf(p), high.sup(p)))
     }
+}
+
+/// The camera's axes when it looks straight down.
+fn downwards() -> Rotation3<f64> {
+    let diagonal = Vector3::new(1.0, -1.0, -1.0);
+    Rotation3::from_matrix_unchecked(Matrix3::from_diagonal(&diagonal))
 }
 
 fn translation(center_px: Vector2<f64>, distance: f64, focal_px: f64) -> Vector3<f64> {
@@ -264,6 +268,18 @@ impl Dice {
     fn between(&mut self, low: f64, high: f64) -> f64 {
         let unit = (self.0.next_u64() >> 11) as f64 / (1u64 << 53) as f64;
         low + (high - low) * unit
+    }
+
+    /// A point of a box.
+    fn inside(&mut self, from: Vector2<f64>, to: Vector2<f64>) -> Vector2<f64> {
+        let x = self.between(from.x, to.x);
+        Vector2::new(x, self.between(from.y, to.y))
+    }
+
+    /// A unit vector.
+    fn direction(&mut self) -> Vector2<f64> {
+        let angle = self.between(0.0, TAU);
+        Vector2::new(libm::cos(angle), libm::sin(angle))
     }
 
     /// Box and Muller's normal deviate.

@@ -2,9 +2,10 @@
 
 use super::chi;
 use super::error::SolveError;
+use super::exchange::pose_from;
 use super::focal::FocalSource;
 use super::label::Framing;
-use super::model::Square;
+use super::model::{Square, State};
 use super::options::SolveOptions;
 use super::pinhole::Camera;
 use super::problem::Problem;
@@ -12,8 +13,8 @@ use super::rectangle::corner_points;
 use super::refine::{Minimum, Residuals};
 use super::uncertainty::{FocalShare, Uncertainty};
 use crate::diagnostic::{Code, Diagnostic, Severity};
-use crate::geom::{Point2, Point3, Pose, UnitQuaternion, Vector2};
-use nalgebra::{Matrix2, Matrix3, Rotation3};
+use crate::geom::{Point2, Point3, Vector2};
+use nalgebra::{Matrix2, Matrix3};
 
 /// From this share of the information on, the focal length counts as measured; below the other, as the prior's.
 const MEASURED_SHARE: f64 = 0.9;
@@ -116,6 +117,14 @@ pub struct Sigma {
     pub covariance: Square,
 }
 
+impl SolveOptions {
+    /// Height of the objects on a rectangle of this size, metres.
+    fn height_of_objects(&self, size: [f64; 2]) -> f64 {
+        self.reference_height
+            .unwrap_or(REFERENCE_HEIGHT_SHARE * size[0].min(size[1]))
+    }
+}
+
 impl Problem {
     /// What a minimum means, in metres and pixels.
     pub(crate) fn solution(&self, minimum: &Minimum, options: &SolveOptions) -> Solution {
@@ -130,16 +139,12 @@ impl Problem {
         uncertainty: &Uncertainty,
         options: &SolveOptions,
     ) -> Solution {
-        let state = &minimum.state;
         let camera = self.camera(minimum);
-        let size = self.fitted_size(state);
+        let size = self.fitted_size(&minimum.state);
         let per_corner_px = self.corner_distances_px(minimum);
-        let height = options
-            .reference_height
-            .unwrap_or(REFERENCE_HEIGHT_SHARE * size[0].min(size[1]));
         let mut solution = Solution {
             camera,
-            kappa: state.kappa,
+            kappa: minimum.state.kappa,
             size,
             corners_px: self.corners_px,
             framing: self.framing,
@@ -147,7 +152,7 @@ impl Problem {
             focal: self.focal_finding(&uncertainty.focal),
             rms_px: (per_corner_px.iter().map(|d| d * d).sum::<f64>() / 4.0).sqrt(),
             fit: self.fit(minimum, &camera, per_corner_px, uncertainty.condition),
-            sigma: self.sigma(minimum, uncertainty, height),
+            sigma: self.sigma(minimum, uncertainty, options.height_of_objects(size)),
             warnings: self.warnings.clone(),
             alternative: None,
         };
@@ -157,29 +162,24 @@ impl Problem {
 
     fn focal_finding(&self, focal: &FocalShare) -> FocalFinding {
         let prior = self.residuals.priors.ln_focal;
+        let from_data_px = focal
+            .from_data
+            .map(|measured| self.units.focal_px(measured.mean));
         FocalFinding {
             share: focal.share,
             prior_px: self.units.focal_px(prior.mean),
             prior_sigma: prior.sigma,
-            from_data_px: focal
-                .from_data
-                .map(|measured| self.units.focal_px(measured.mean))
-                .filter(|px| px.is_finite()),
+            from_data_px: from_data_px.filter(|px| px.is_finite()),
         }
     }
 
     fn camera(&self, minimum: &Minimum) -> Camera {
         let (state, units) = (&minimum.state, &self.units);
-        let rotation = Rotation3::from_matrix_unchecked(state.pose.rotation);
-        let rotation = UnitQuaternion::from_rotation_matrix(&rotation);
         Camera {
             image: self.image,
             focal_px: Vector2::repeat(state.focal * units.unit_px),
             principal_px: units.principal_px + state.principal * units.unit_px,
-            camera_from_world: Pose::from_parts(
-                (state.translation() * units.unit).into(),
-                rotation,
-            ),
+            camera_from_world: pose_from(state.pose.rotation, state.translation() * units.unit),
         }
     }
 
@@ -187,12 +187,17 @@ impl Problem {
     fn corner_distances_px(&self, minimum: &Minimum) -> [f64; 4] {
         let points = corner_points(self.size);
         [0, 1, 2, 3].map(|i| {
-            let point = points[i].coords / self.units.unit;
-            let seen = minimum.state.project(&point, false);
-            let seen_px = seen.map_or(Point2::new(f64::NAN, f64::NAN), |u| {
-                self.units.principal_px + u * self.units.unit_px
-            });
+            let seen_px = self.seen_px(&minimum.state, points[i]);
             (seen_px - self.corners_px[i]).norm()
+        })
+    }
+
+    /// Where a point of the rectangle, metres, is seen; NaN behind the camera.
+    fn seen_px(&self, state: &State, point: Point3<f64>) -> Point2<f64> {
+        let units = &self.units;
+        let seen = state.project(&(point.coords / units.unit), false);
+        seen.map_or(Point2::new(f64::NAN, f64::NAN), |u| {
+            units.principal_px + u * units.unit_px
         })
     }
 
@@ -204,9 +209,6 @@ impl Problem {
         condition: f64,
     ) -> Fit {
         let dof = self.degrees_of_freedom();
-        let depths = corner_points(self.fitted_size(&minimum.state)).map(|c| depth(camera, c));
-        let nearest = depths.into_iter().fold(f64::MAX, f64::min);
-        let farthest = depths.into_iter().fold(0.0, f64::max);
         Fit {
             chi2: minimum.cost,
             dof,
@@ -215,7 +217,7 @@ impl Problem {
             per_corner_px,
             iterations: minimum.iterations,
             condition,
-            depth_ratio: farthest / nearest,
+            depth_ratio: depth_ratio(camera, self.fitted_size(&minimum.state)),
             px_per_metre: minimum.state.pose.scale * self.units.unit_px / self.units.unit,
         }
     }
@@ -251,12 +253,21 @@ impl Problem {
             FocalSource::Fixed
         } else if prior.is_flat() && range.contains(&minimum.state.ln_focal) {
             FocalSource::Unbounded
-        } else if focal.share >= MEASURED_SHARE {
-            FocalSource::Measured
-        } else if focal.share >= PRIOR_SHARE {
-            FocalSource::Mixed
         } else {
-            FocalSource::Prior
+            FocalSource::from_share(focal.share)
+        }
+    }
+}
+
+impl FocalSource {
+    /// By the share of the information that comes from the picture.
+    fn from_share(share: f64) -> Self {
+        if share >= MEASURED_SHARE {
+            Self::Measured
+        } else if share >= PRIOR_SHARE {
+            Self::Mixed
+        } else {
+            Self::Prior
         }
     }
 }
@@ -273,19 +284,21 @@ impl Solution {
     /// Why the solution does not fit its label, where it does not: so improbable by chance, or so much better with the
     /// sides exchanged, that it cannot be used.
     pub fn misfit(&self) -> Option<SolveError> {
-        let is_improbable = self
-            .warnings
-            .iter()
-            .any(|w| w.code == Code::PoorFit && w.severity == Severity::Error);
         let exchanged = self
             .fit
             .exchanged_chi2
             .filter(|_| self.has_fitting_alternative());
-        (is_improbable || exchanged.is_some()).then(|| SolveError::NoFit {
+        (self.is_improbable() || exchanged.is_some()).then(|| SolveError::NoFit {
             rms_px: self.rms_px,
             p_value: self.fit.p_value.unwrap_or(0.0),
             exchanged: exchanged.map(|exchanged| [self.fit.chi2, exchanged]),
         })
+    }
+
+    fn is_improbable(&self) -> bool {
+        self.warnings
+            .iter()
+            .any(|w| w.code == Code::PoorFit && w.severity == Severity::Error)
     }
 
     fn has_fitting_alternative(&self) -> bool {
@@ -296,24 +309,11 @@ impl Solution {
 
     /// Everything that a camera file holds is finite, but for standard deviations of what nothing is known of.
     pub(crate) fn is_finite(&self) -> bool {
-        let (camera, fit, focal) = (&self.camera, &self.fit, &self.focal);
-        let center = camera.center();
-        let principal = camera.principal_px;
-        let pose = [camera.focal_px.x, principal.x, principal.y];
-        let fits = [
-            fit.chi2,
-            fit.depth_ratio,
-            fit.px_per_metre,
-            self.rms_px,
-            self.kappa,
-            focal.prior_px,
-            focal.share,
-        ];
-        pose.iter()
-            .chain(center.iter())
-            .chain(&fits)
-            .chain(&self.size)
-            .all(|value| value.is_finite())
+        let fit = &self.fit;
+        let values = [fit.chi2, fit.depth_ratio, fit.px_per_metre, self.rms_px];
+        let lens = [self.kappa, self.focal.prior_px, self.focal.share];
+        let mut all = values.iter().chain(&lens).chain(&self.size);
+        is_finite_camera(&self.camera) && all.all(|value| value.is_finite())
     }
 
     /// From which error on objects at the reference height are worth a warning, pixels.
@@ -327,15 +327,12 @@ impl Solution {
     /// That objects on the surface may be seen at the wrong place, where they may.
     pub(crate) fn height_warning(&self, options: &SolveOptions) -> Option<Diagnostic> {
         let (height, sigma_px) = (self.sigma.reference_height, self.sigma.height_px);
-        (sigma_px > self.height_limit_px(options)).then(|| {
-            Diagnostic::warning(
-                Code::HeightUncertain,
-                format!(
-                    "a point {height:.3} m above the surface is known only to {sigma_px:.1} px: give the focal length or the \
-                     camera height, add photos taken at an angle, or label points above the surface"
-                ),
-            )
-        })
+        let what = format!(
+            "a point {height:.3} m above the surface is known only to {sigma_px:.1} px: give the focal length or the \
+             camera height, add photos taken at an angle, or label points above the surface"
+        );
+        (sigma_px > self.height_limit_px(options))
+            .then(|| Diagnostic::warning(Code::HeightUncertain, what))
     }
 
     /// Adds what is odd about the solution by itself.
@@ -372,20 +369,41 @@ impl Solution {
     /// An error where the fit is so improbable that the camera is refused.
     fn fit_warning(&self) -> Option<Diagnostic> {
         let p_value = self.fit.p_value.filter(|&p| p < POOR_FIT_P)?;
-        let severity = if p_value < REFUSED_FIT_P {
-            Severity::Error
-        } else {
-            Severity::Warning
-        };
         let what = format!(
             "no camera fits ({:.1} px off, p = {p_value:.1e}): wrong dimensions, corners of different rectangles, strong \
              distortion, a cropped picture, or corner_sigma_px is too small",
             self.rms_px
         );
-        Some(Diagnostic::new(Code::PoorFit, severity, what))
+        Some(Diagnostic::new(
+            Code::PoorFit,
+            misfit_severity(p_value),
+            what,
+        ))
     }
 }
 
-fn depth(camera: &Camera, point: Point3<f64>) -> f64 {
-    (camera.camera_from_world * point).z
+fn misfit_severity(p_value: f64) -> Severity {
+    if p_value < REFUSED_FIT_P {
+        Severity::Error
+    } else {
+        Severity::Warning
+    }
+}
+
+fn is_finite_camera(camera: &Camera) -> bool {
+    let center = camera.center();
+    camera.focal_px.x.is_finite()
+        && camera
+            .principal_px
+            .iter()
+            .chain(center.iter())
+            .all(|value| value.is_finite())
+}
+
+/// Depth of the farthest corner of a rectangle over that of the nearest.
+fn depth_ratio(camera: &Camera, size: [f64; 2]) -> f64 {
+    let depths = corner_points(size).map(|corner| (camera.camera_from_world * corner).z);
+    let nearest = depths.into_iter().fold(f64::MAX, f64::min);
+    let farthest = depths.into_iter().fold(0.0, f64::max);
+    farthest / nearest
 }

@@ -60,12 +60,9 @@ struct SolvedProblem {
 
 /// The solution of a label as it stands.
 fn solve_as_labelled(label: &Label, options: &SolveOptions) -> Result<SolvedProblem, SolveError> {
+    let may_hedge = options.max_iterations.is_none() && options.priors.cropping_matters();
     match label.framing() {
-        Framing::Unknown
-            if options.max_iterations.is_none() && options.priors.cropping_matters() =>
-        {
-            solve_perhaps_cropped(label, options)
-        }
+        Framing::Unknown if may_hedge => solve_perhaps_cropped(label, options),
         Framing::Unknown => solve_framed(label, Framing::Whole, options),
         known => solve_framed(label, known, options),
     }
@@ -81,10 +78,17 @@ fn solve_perhaps_cropped(
     match (whole, loose) {
         (Ok(whole), Ok(loose)) => Ok(whole_or_cropped(whole, loose, options)),
         (Ok(whole), Err(_)) => Ok(whole),
-        (Err(_), loose) => loose.map(|l| SolvedProblem {
-            solution: l.solution.off_center(None),
-            ..l
-        }),
+        (Err(_), loose) => loose.map(|loose| loose.off_center(None)),
+    }
+}
+
+impl SolvedProblem {
+    /// The camera of a picture that turns out not to be whole, and beside it that of a whole one.
+    fn off_center(self, whole: Option<Solution>) -> Self {
+        Self {
+            solution: self.solution.off_center(whole),
+            ..self
+        }
     }
 }
 
@@ -95,8 +99,7 @@ fn whole_or_cropped(
     options: &SolveOptions,
 ) -> SolvedProblem {
     if is_off_center(whole.minimum.cost, loose.minimum.cost) {
-        let solution = loose.solution.off_center(Some(whole.solution));
-        return SolvedProblem { solution, ..loose };
+        return loose.off_center(Some(whole.solution));
     }
     let apart = whole.minimum.state.step_to(&loose.minimum.state);
     SolvedProblem {
@@ -118,13 +121,7 @@ fn solve_framed(
         return Err(SolveError::NoPose);
     }
     if let Some(other) = other.filter(|other| other.cost < best.cost + CHI2_99) {
-        let apart_deg = degrees_apart(&best.state.pose, &other.state.pose);
-        solution.warnings.push(Diagnostic::warning(
-            Code::PoseAmbiguous,
-            format!(
-                "the pose is ambiguous: another one, turned by {apart_deg:.1} degrees, fits almost as well"
-            ),
-        ));
+        solution.warnings.push(ambiguity_warning(&best, &other));
         solution.alternative = Some(Box::new(problem.solution(&other, options)));
     }
     Ok(SolvedProblem {
@@ -132,6 +129,14 @@ fn solve_framed(
         problem,
         minimum: best,
     })
+}
+
+fn ambiguity_warning(best: &Minimum, other: &Minimum) -> Diagnostic {
+    let apart_deg = degrees_apart(&best.state.pose, &other.state.pose);
+    let what = format!(
+        "the pose is ambiguous: another one, turned by {apart_deg:.1} degrees, fits almost as well"
+    );
+    Diagnostic::warning(Code::PoseAmbiguous, what)
 }
 
 /// The search; for a label that states k1 repeated until that is applied at the focal length found.
@@ -142,10 +147,12 @@ fn search_with_stated_distortion(
 ) -> Result<(Problem, SearchResult), SolveError> {
     let mut problem = Problem::new(label, framing, options)?;
     let mut found = search(&problem, options)?;
-    let is_settled =
-        label.camera.k1.is_none_or(|k1| k1 == 0.0) || problem.residuals.priors.ln_focal.is_fixed();
-    let mut applied = problem.residuals.priors.ln_focal.mean;
-    for _ in 0..if is_settled { 0 } else { MAX_REPEATS } {
+    let prior = problem.residuals.priors.ln_focal;
+    if label.camera.k1.is_none_or(|k1| k1 == 0.0) || prior.is_fixed() {
+        return Ok((problem, found));
+    }
+    let mut applied = prior.mean;
+    for _ in 0..MAX_REPEATS {
         let ln_focal = found.best.state.ln_focal;
         if (ln_focal - applied).abs() < FOCAL_TOLERANCE {
             break;
@@ -179,12 +186,23 @@ fn solve_without_wrong_exif(label: &Label, options: &SolveOptions) -> Result<Sol
         solution.warnings.push(conflict);
         return Ok(solution);
     }
+    let second = solve_as_labelled(&without_exif_focal(label), options)?.solution;
+    Ok(second.preferred_to(solution, conflict))
+}
+
+fn without_exif_focal(label: &Label) -> Label {
     let mut without = label.clone();
     (without.camera.focal_35mm, without.camera.focal_sigma) = (None, None);
-    let mut second = solve_as_labelled(&without, options)?.solution;
-    second.warnings.push(conflict);
-    second.alternative = Some(Box::new(solution));
-    Ok(second)
+    without
+}
+
+impl Solution {
+    /// With another solution as its alternative, and a warning that says why.
+    fn preferred_to(mut self, other: Self, warning: Diagnostic) -> Self {
+        self.warnings.push(warning);
+        self.alternative = Some(Box::new(other));
+        self
+    }
 }
 
 fn focal_conflict(problem: &Problem, minimum: &Minimum) -> Option<Diagnostic> {
@@ -193,15 +211,11 @@ fn focal_conflict(problem: &Problem, minimum: &Minimum) -> Option<Diagnostic> {
     let sigmas = focal.prior_conflict(prior)?.abs();
     let prior_px = problem.units.focal_px(prior.mean);
     let measured_px = problem.units.focal_px(focal.from_data?.mean);
-    (sigmas > CONFLICT_SIGMAS).then(|| {
-        Diagnostic::warning(
-            Code::FocalPriorConflict,
-            format!(
-                "focal length: {prior_px:.0} px was expected and the corners give {measured_px:.0} px ({sigmas:.1} sigmas \
-                 apart): wrong EXIF, a cropped or a zoomed picture"
-            ),
-        )
-    })
+    let what = format!(
+        "focal length: {prior_px:.0} px was expected and the corners give {measured_px:.0} px ({sigmas:.1} sigmas \
+         apart): wrong EXIF, a cropped or a zoomed picture"
+    );
+    (sigmas > CONFLICT_SIGMAS).then(|| Diagnostic::warning(Code::FocalPriorConflict, what))
 }
 
 /// Where width and height exchanged fit clearly better, adds a warning and the better solution, as the alternative or, with
@@ -211,25 +225,22 @@ fn compare_exchanged_sides(
     options: &SolveOptions,
     mut labelled: Solution,
 ) -> Solution {
-    let Some(mut exchanged) = with_exchanged_sides(label, options, labelled.fit.chi2) else {
+    let Some(exchanged) = with_exchanged_sides(label, options, labelled.fit.chi2) else {
         return labelled;
     };
-    let warning = Diagnostic::warning(
-        Code::SidesSwapped,
-        format!(
-            "width and height look exchanged (chi squared {:.1} as labelled, {:.1} exchanged)",
-            labelled.fit.chi2, exchanged.fit.chi2
-        ),
-    );
+    let warning = exchange_warning(labelled.fit.chi2, exchanged.fit.chi2);
     if options.order == CornerOrder::Auto {
-        exchanged.warnings.push(warning);
-        exchanged.alternative = Some(Box::new(labelled));
-        return exchanged;
+        return exchanged.preferred_to(labelled, warning);
     }
-    labelled.warnings.push(warning);
     labelled.fit.exchanged_chi2 = Some(exchanged.fit.chi2);
-    labelled.alternative = Some(Box::new(exchanged));
-    labelled
+    labelled.preferred_to(exchanged, warning)
+}
+
+fn exchange_warning(labelled_chi2: f64, exchanged_chi2: f64) -> Diagnostic {
+    let what = format!(
+        "width and height look exchanged (chi squared {labelled_chi2:.1} as labelled, {exchanged_chi2:.1} exchanged)"
+    );
+    Diagnostic::warning(Code::SidesSwapped, what)
 }
 
 /// The solution with width and height exchanged, where it fits clearly better than this chi squared.
@@ -240,7 +251,8 @@ fn with_exchanged_sides(label: &Label, options: &SolveOptions, chi2: f64) -> Opt
         return None;
     }
     let mut exchanged = label.clone();
-    (exchanged.surface.width_m, exchanged.surface.height_m) = (Some(height_m), Some(width_m));
+    let surface = &mut exchanged.surface;
+    std::mem::swap(&mut surface.width_m, &mut surface.height_m);
     let other = solve_without_wrong_exif(&exchanged, options).ok()?;
     (other.fit.chi2 + CHI2_99 < chi2).then_some(other)
 }

@@ -1,10 +1,11 @@
 //! Cameras that were solved before and lie beside their labels, and whether they still are those of their labels.
 
 use super::error::SolveError;
-use super::file::{CameraFile, checksum};
+use super::file::{CameraFile, SolvedFrom, checksum};
 use super::options::SolveOptions;
 use super::pinhole::Camera;
 use super::read::LabelledPhoto;
+use super::solution::Solution;
 use super::solve::solve;
 use crate::diagnostic::Diagnostic;
 use crate::error::{Error, Result};
@@ -34,19 +35,14 @@ pub struct PhotoCamera {
 /// # Errors
 /// A camera file that cannot be right; a label that no camera can have seen, or that none fits.
 pub(crate) fn photo_cameras(labels: &[LabelledPhoto], force: bool) -> Result<Vec<PhotoCamera>> {
-    let files = labels
+    let mut found = Vec::with_capacity(labels.len());
+    for labelled in labels {
+        let file = read_camera_file(labelled)?;
+        found.push((with_stored_size(labelled, file.as_ref()), file));
+    }
+    let known = label_checksums(found.iter().map(|(labelled, _)| labelled));
+    found
         .iter()
-        .map(read_camera_file)
-        .collect::<Result<Vec<_>>>()?;
-    let labels: Vec<LabelledPhoto> = labels
-        .iter()
-        .zip(&files)
-        .map(|(labelled, file)| with_stored_size(labelled, file.as_ref()))
-        .collect();
-    let known = label_checksums(&labels);
-    labels
-        .iter()
-        .zip(&files)
         .map(|(labelled, file)| PhotoCamera::new(labelled, file.as_ref(), &known, force))
         .collect()
 }
@@ -83,12 +79,12 @@ impl PhotoCamera {
     }
 
     fn solved(labelled: &LabelledPhoto, force: bool) -> Result<Self> {
-        let solution = solve(&labelled.label, &SolveOptions::default())
-            .and_then(|solution| match force {
-                true => Ok(solution),
-                false => solution.fitting(),
-            })
-            .map_err(|error| located_error(error, labelled))?;
+        let solved = solve(&labelled.label, &SolveOptions::default());
+        let usable = match force {
+            true => solved,
+            false => solved.and_then(Solution::fitting),
+        };
+        let solution = usable.map_err(|error| located_error(error, labelled))?;
         Ok(Self {
             camera: solution.camera,
             size: solution.size,
@@ -111,16 +107,17 @@ fn read_camera_file(labelled: &LabelledPhoto) -> Result<Option<CameraFile>> {
     }
     checked_camera_file(&path, labelled)
         .map(Some)
-        .map_err(|error| {
-            let what = error.to_string();
-            let what = what
-                .strip_prefix(&format!("{}: ", path.display()))
-                .unwrap_or(&what);
-            Error::file(
-                &path,
-                format!("{what}; delete it, or run `petcomp camera solve` again"),
-            )
-        })
+        .map_err(|error| with_advice(error, &path))
+}
+
+/// The error of a camera file, with what to do about it.
+fn with_advice(error: Error, path: &Path) -> Error {
+    let what = error.to_string();
+    let what = what
+        .strip_prefix(&format!("{}: ", path.display()))
+        .unwrap_or(&what);
+    let what = format!("{what}; delete it, or run `petcomp camera solve` again");
+    Error::file(path, what)
 }
 
 fn checked_camera_file(path: &Path, labelled: &LabelledPhoto) -> Result<CameraFile> {
@@ -167,11 +164,19 @@ fn staleness(
     if from.label_crc32 != checksum(&labelled.label) {
         return Some("solved from another version of its label, or with another size".into());
     }
-    let (name, _) = from
-        .together
-        .iter()
-        .find(|&(name, crc)| known.get(name).is_some_and(|now| now != crc))?;
+    let name = changed_companion(from, known)?;
     Some(format!("solved together with another version of {name}"))
+}
+
+/// The first label among those that were solved together which is not what it was then.
+fn changed_companion<'a>(
+    from: &'a SolvedFrom,
+    known: &BTreeMap<String, u32>,
+) -> Option<&'a String> {
+    let mut together = from.together.iter();
+    together
+        .find(|&(name, crc)| known.get(name).is_some_and(|now| now != crc))
+        .map(|(name, _)| name)
 }
 
 fn modified(path: &Path) -> Option<std::time::SystemTime> {

@@ -1,7 +1,7 @@
 //! How well a camera is known: the covariance of its unknowns and what follows from it.
 
 use super::model::{
-    CENTER, KAPPA, LN_FOCAL, LN_SCALE, PRINCIPAL, Square, State, UNKNOWNS, Unknowns,
+    CENTER, KAPPA, LN_FOCAL, LN_SCALE, PRINCIPAL, Square, State, UNKNOWNS, Unknowns, clear_unknown,
 };
 use super::prior::Prior;
 use super::problem::Problem;
@@ -38,6 +38,13 @@ pub(crate) struct FocalShare {
 }
 
 impl FocalShare {
+    /// That of a focal length that was given as exact.
+    const FIXED: Self = Self {
+        sigma: 0.0,
+        share: 0.0,
+        from_data: None,
+    };
+
     /// Difference between the picture and the prior, in standard deviations of the difference.
     pub(crate) fn prior_conflict(&self, prior: Prior) -> Option<f64> {
         let data = self.from_data?;
@@ -67,26 +74,13 @@ impl Uncertainty {
             return ((c[(0, 0)] + c[(1, 1)]) / 2.0).sqrt();
         }
         let (x, y) = (normal.y / sin, -normal.x / sin);
-        (x * x * c[(0, 0)] + 2.0 * x * y * c[(0, 1)] + y * y * c[(1, 1)])
-            .max(0.0)
-            .sqrt()
+        let variance = x * x * c[(0, 0)] + 2.0 * x * y * c[(0, 1)] + y * y * c[(1, 1)];
+        variance.max(0.0).sqrt()
     }
 
     /// Covariance of the camera's place over the rectangle.
     pub(crate) fn center_covariance(&self, state: &State) -> Matrix3<f64> {
-        let t = state.translation();
-        let back = state.pose.rotation.transpose();
-        let mut slope = SMatrix::<f64, 3, UNKNOWNS>::zeros();
-        slope
-            .fixed_columns_mut::<3>(0)
-            .copy_from(&-t.cross_matrix());
-        for axis in 0..2 {
-            slope[(axis, CENTER + axis)] = -1.0 / state.pose.scale;
-            slope[(axis, PRINCIPAL + axis)] = 1.0 / state.pose.scale;
-        }
-        slope.set_column(LN_SCALE, &t);
-        slope[(2, LN_FOCAL)] = -t.z;
-        let slope = back * slope;
+        let slope = state.pose.rotation.transpose() * turned_center_slope(state);
         slope * self.covariance * slope.transpose()
     }
 
@@ -136,6 +130,22 @@ impl Uncertainty {
     }
 }
 
+/// Change of the camera's centre, in the camera's axes, per unknown.
+fn turned_center_slope(state: &State) -> SMatrix<f64, 3, UNKNOWNS> {
+    let t = state.translation();
+    let mut slope = SMatrix::<f64, 3, UNKNOWNS>::zeros();
+    slope
+        .fixed_columns_mut::<3>(0)
+        .copy_from(&-t.cross_matrix());
+    for axis in 0..2 {
+        slope[(axis, CENTER + axis)] = -1.0 / state.pose.scale;
+        slope[(axis, PRINCIPAL + axis)] = 1.0 / state.pose.scale;
+    }
+    slope.set_column(LN_SCALE, &t);
+    slope[(2, LN_FOCAL)] = -t.z;
+    slope
+}
+
 /// A variance after rounding: not negative, and infinite where it is NaN.
 pub(crate) fn repaired_variance(value: f64) -> f64 {
     if value.is_nan() {
@@ -173,20 +183,24 @@ fn covariance(information: &Square) -> (Square, f64) {
         inverse += response * response.transpose() / left.max(ROUNDING_SHARE);
     }
     clear_uninformed(&mut inverse, information);
-    let left = if left > ROUNDING_SHARE {
-        left / (scale[LN_FOCAL] * scale[LN_FOCAL])
+    let covariance = inverse.component_mul(&(scale * scale.transpose()));
+    (covariance, unscaled_information(left, scale[LN_FOCAL]))
+}
+
+/// Information in an unknown's own unit; zero where there is only rounding.
+fn unscaled_information(scaled: f64, scale: f64) -> f64 {
+    if scaled > ROUNDING_SHARE {
+        scaled / (scale * scale)
     } else {
         0.0
-    };
-    (inverse.component_mul(&(scale * scale.transpose())), left)
+    }
 }
 
 /// The information with the focal length decoupled from the rest, and the coupling that was there.
 fn without_focal(mut rest: Square) -> (Square, Unknowns) {
     let mut coupling: Unknowns = rest.column(LN_FOCAL).into();
     coupling[LN_FOCAL] = 0.0;
-    rest.row_mut(LN_FOCAL).fill(0.0);
-    rest.column_mut(LN_FOCAL).fill(0.0);
+    clear_unknown(&mut rest, LN_FOCAL);
     rest[(LN_FOCAL, LN_FOCAL)] = 1.0;
     (rest, coupling)
 }
@@ -202,8 +216,7 @@ fn inverse_or_rounded(matrix: &Square) -> Option<Square> {
 /// No variance for unknowns without information.
 fn clear_uninformed(covariance: &mut Square, information: &Square) {
     for i in (0..UNKNOWNS).filter(|&i| information[(i, i)] == 0.0) {
-        covariance.row_mut(i).fill(0.0);
-        covariance.column_mut(i).fill(0.0);
+        clear_unknown(covariance, i);
     }
 }
 
@@ -217,11 +230,7 @@ fn scaled(information: &Square, scale: &Unknowns) -> Square {
 /// What is known of the focal length, from the information left on its logarithm.
 pub(crate) fn focal_share(ln_focal: f64, information: f64, prior: Prior) -> FocalShare {
     if prior.is_fixed() {
-        return FocalShare {
-            sigma: 0.0,
-            share: 0.0,
-            from_data: None,
-        };
+        return FocalShare::FIXED;
     }
     let from_data = (information - prior.information()).max(0.0);
     let share = if information > 0.0 {
@@ -229,13 +238,8 @@ pub(crate) fn focal_share(ln_focal: f64, information: f64, prior: Prior) -> Foca
     } else {
         0.0
     };
-    let start = if prior.is_flat() {
-        ln_focal
-    } else {
-        prior.mean
-    };
     let alone = Prior {
-        mean: start + (ln_focal - start) / share,
+        mean: without_prior(ln_focal, prior, share),
         sigma: 1.0 / from_data.sqrt(),
     };
     FocalShare {
@@ -243,6 +247,16 @@ pub(crate) fn focal_share(ln_focal: f64, information: f64, prior: Prior) -> Foca
         share,
         from_data: (alone.mean.is_finite() && alone.sigma.is_finite()).then_some(alone),
     }
+}
+
+/// The logarithm of the focal length that the picture alone gives, if it has this share in the value.
+fn without_prior(ln_focal: f64, prior: Prior, share: f64) -> f64 {
+    let start = if prior.is_flat() {
+        ln_focal
+    } else {
+        prior.mean
+    };
+    start + (ln_focal - start) / share
 }
 
 /// Condition number of the information with a unit diagonal, without the prior of the focal length.

@@ -90,9 +90,8 @@ impl BackgroundPhoto {
 
     /// The part of the photo that pictures show.
     fn part(&self) -> f64 {
-        let kept = self.kept.width as f64 * self.kept.height as f64;
-        let [width, height] = self.taken.map(f64::from);
-        kept / (width * height)
+        let kept = [self.kept.width as f64, self.kept.height as f64];
+        area(kept) / area(self.taken.map(f64::from))
     }
 
     /// That only a part of the photo fits into the pictures' shape, and what that leaves of its rectangle.
@@ -101,14 +100,18 @@ impl BackgroundPhoto {
             return None;
         }
         let ([w, h], Roi { width, height, .. }) = (self.taken, self.kept);
-        let rectangle = if self.cuts_off() {
+        let rectangle = self.describe_cut();
+        Some(format!(
+            "of {w} x {h} pixels the middle {width} x {height} are shown{rectangle}"
+        ))
+    }
+
+    fn describe_cut(&self) -> &'static str {
+        if self.cuts_off() {
             ", without a part of the rectangle"
         } else {
             ""
-        };
-        Some(format!(
-            "of {w} x {h} pixels the middle_part {width} x {height} are shown{rectangle}"
-        ))
+        }
     }
 
     /// A corner of the rectangle that the photo shows is not in the pictures.
@@ -130,16 +133,18 @@ impl BackgroundPhoto {
 
     /// The whole photo at the scale of the pictures, pixels.
     fn uncropped_size(&self) -> [f64; 2] {
-        let size = self.image.map(f64::from);
+        let [w, h] = self.image.map(f64::from);
+        let [taken_w, taken_h] = self.taken.map(f64::from);
         [
-            size[0] * (self.taken[0] as f64 / self.kept.width as f64),
-            size[1] * (self.taken[1] as f64 / self.kept.height as f64),
+            w * (taken_w / self.kept.width as f64),
+            h * (taken_h / self.kept.height as f64),
         ]
     }
 
     fn surface_corners(&self) -> [Point3<f64>; 4] {
         let [x, y] = self.background.size.map(|side| side / 2.0);
-        [[-x, y], [x, y], [x, -y], [-x, -y]].map(|[x, y]| Point3::new(x, y, 0.0))
+        let corners = [[-x, y], [x, y], [x, -y], [-x, -y]];
+        corners.map(|[x, y]| Point3::new(x, y, 0.0))
     }
 
     /// The photo at the picture's size, scene-linear; read once.
@@ -248,6 +253,10 @@ fn cropped(camera: Camera, kept: Roi) -> Camera {
         principal_px: camera.principal_px - corner,
         ..camera
     }
+}
+
+fn area([w, h]: [f64; 2]) -> f64 {
+    w * h
 }
 
 #[cfg(test)]

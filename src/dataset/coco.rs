@@ -7,6 +7,7 @@ use crate::geom::Point2;
 use crate::io;
 use crate::label::{RleMask, trace};
 use serde::{Deserialize, Serialize};
+use serde_json::json;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -177,17 +178,18 @@ impl Coco {
 }
 
 fn annotation_id(k: u64, object: u32) -> Result<u64> {
-    let id = Some(u64::from(object)).filter(|&id| (1..IDS_PER_IMAGE).contains(&id));
-    let id = id.and_then(|id| k.checked_mul(IDS_PER_IMAGE)?.checked_add(id));
-    id.ok_or_else(|| {
-        Error::value(
-            "labels.objects",
-            format!(
-                "object {object}, expected 1 to {} for COCO",
-                IDS_PER_IMAGE - 1
-            ),
-        )
-    })
+    let id = u64::from(object);
+    let first = k.checked_mul(IDS_PER_IMAGE);
+    let unique = first.and_then(|first| first.checked_add(id));
+    unique
+        .filter(|_| (1..IDS_PER_IMAGE).contains(&id))
+        .ok_or_else(|| unusable_id(object))
+}
+
+fn unusable_id(object: u32) -> Error {
+    let most = IDS_PER_IMAGE - 1;
+    let what = format!("object {object}, expected 1 to {most} for COCO");
+    Error::value("labels.objects", what)
 }
 
 /// x, y, x, y, ..
@@ -240,10 +242,8 @@ fn write_entry(
 }
 
 fn categories(classes: &[String]) -> serde_json::Value {
-    (1..)
-        .zip(classes)
-        .map(|(id, name): (u64, _)| {
-            serde_json::json!({ "id": id, "name": name, "supercategory": "object" })
-        })
+    let numbered = (1_u64..).zip(classes);
+    numbered
+        .map(|(id, name)| json!({ "id": id, "name": name, "supercategory": "object" }))
         .collect()
 }

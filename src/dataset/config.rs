@@ -117,13 +117,17 @@ impl DatasetConfig {
     /// The setups of the paper's ablations: this one with one source of variation after another switched off, the scenes
     /// in pairs.
     pub fn ablations(&self) -> impl Iterator<Item = (Ablation, Self)> {
-        Ablation::PAPER.into_iter().map(|ablation| {
-            let mut config = self.clone();
-            config.scene.off.extend(ablation.off);
-            config.scene.off.sort();
-            config.scene.off.dedup();
-            (ablation, config)
-        })
+        let ablations = Ablation::PAPER.into_iter();
+        ablations.map(|ablation| (ablation, self.without(&ablation)))
+    }
+
+    /// The recipe with what an ablation switches off.
+    fn without(&self, ablation: &Ablation) -> Self {
+        let mut config = self.clone();
+        config.scene.off.extend(ablation.off);
+        config.scene.off.sort();
+        config.scene.off.dedup();
+        config
     }
 }
 

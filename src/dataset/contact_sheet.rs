@@ -1,17 +1,17 @@
 //! A sheet of small pictures with their labels: the first look at a dataset.
 
 use crate::color::to_srgb8;
+use crate::dataset::SampleRecord;
 use crate::dataset::folder;
 use crate::dataset::journal::lines_of;
 use crate::dataset::journal_line::JournalLine;
-use crate::dataset::{Part, SampleRecord};
 use crate::draw::{self, TextSize};
 use crate::error::Result;
 use crate::filter::resize;
 use crate::image::Image;
 use crate::io;
+use crate::label::Labels;
 use crate::label::overlay::{UNLABELLED, draw_labels};
-use crate::label::{Labels, ObjectLabel};
 use crate::pixel::{LinearRgb, ObjectId, Srgb8};
 use rayon::prelude::*;
 use std::path::Path;
@@ -90,7 +90,7 @@ impl ContactTile {
 
     fn drawn(&self) -> Image<Srgb8> {
         let mut canvas = to_srgb8(&self.picture);
-        draw_labels(&mut canvas, &self.labels, |object: &ObjectLabel| {
+        draw_labels(&mut canvas, &self.labels, |object| {
             self.labelled.contains(&object.id)
         });
         canvas
@@ -156,12 +156,9 @@ fn read_tile(
 }
 
 fn tile_caption(line: &JournalLine, record: &SampleRecord) -> String {
-    let part = match line.part {
-        Part::Val => "val  ",
-        Part::Train => "train",
-    };
+    let (k, part) = (line.k, line.part.name());
     let (labelled, all) = (record.labelled.len(), record.labels.objects.len());
-    format!("{:06} {part} {labelled}/{all} labelled", line.k)
+    format!("{k:06} {part:5} {labelled}/{all} labelled")
 }
 
 /// Where everything is on a sheet, pixels.
@@ -322,10 +319,9 @@ fn count_objects(class_count: usize, tiles: &[ContactTile]) -> (Vec<usize>, usiz
 
 /// Places entries beside each other, and in the next line where the width ends.
 fn place_entries(entries: Vec<(Srgb8, String)>, width: usize) -> Vec<LegendEntry> {
-    let mut placed: Vec<LegendEntry> = Vec::new();
+    let mut placed = Vec::new();
     for (color, text) in entries {
-        let entry = LegendEntry::after(placed.last(), color, text, width);
-        placed.push(entry);
+        placed.push(LegendEntry::after(placed.last(), color, text, width));
     }
     placed
 }

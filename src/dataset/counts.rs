@@ -74,18 +74,9 @@ impl DatasetCounts {
 
 impl ClassCount {
     fn for_classes(names: &[String], lines: &[JournalLine]) -> Vec<Self> {
-        let numbered = names.iter().enumerate();
-        numbered
-            .map(|(class, name)| {
-                let [objects, labelled] = count_class(lines, class);
-                let name = name.clone();
-                Self {
-                    name,
-                    objects,
-                    labelled,
-                }
-            })
-            .collect()
+        let counts = (0..).map(|class| count_class(lines, class));
+        let classes = names.iter().cloned().zip(counts);
+        classes.map(Self::from).collect()
     }
 }
 
@@ -105,7 +96,17 @@ fn sum_of(lines: &[JournalLine], count: fn(&JournalLine) -> u32) -> u64 {
 /// Objects of a class, and how many of them have a label.
 fn count_class(lines: &[JournalLine], class: usize) -> [u64; 2] {
     let counts = lines.iter().filter_map(|line| line.classes.get(class));
-    counts.fold([0; 2], |[a, b], &[c, d]| {
-        [a + u64::from(c), b + u64::from(d)]
+    counts.fold([0; 2], |sums, counts| {
+        [0, 1].map(|i| sums[i] + u64::from(counts[i]))
     })
+}
+
+impl From<(String, [u64; 2])> for ClassCount {
+    fn from((name, [objects, labelled]): (String, [u64; 2])) -> Self {
+        Self {
+            name,
+            objects,
+            labelled,
+        }
+    }
 }

@@ -47,20 +47,18 @@ impl LongRun {
 
 impl fmt::Display for LongRun {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self {
-            seconds,
-            left,
-            each,
-            at_least,
-        } = *self;
-        let about = if at_least { "at least" } else { "about" };
-        let hours = seconds / 3600.0;
-        let time = if hours < 48.0 {
-            format!("{hours:.1} hours")
-        } else {
-            format!("{:.0} days", hours / 24.0)
-        };
+        let about = if self.at_least { "at least" } else { "about" };
+        let (time, left, each) = (in_words(self.seconds), self.left, self.each);
         write!(f, "{about} {time} for {left} pictures, one in {each:.2} s")
+    }
+}
+
+fn in_words(seconds: f64) -> String {
+    let hours = seconds / 3600.0;
+    if hours < 48.0 {
+        format!("{hours:.1} hours")
+    } else {
+        format!("{:.0} days", hours / 24.0)
     }
 }
 

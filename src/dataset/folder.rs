@@ -135,7 +135,11 @@ fn holds_something(folder: &Path) -> Result<bool> {
         return Ok(false);
     }
     let mut entries = std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
-    Ok(entries.any(|entry| entry.is_ok_and(|e| !e.file_name().to_string_lossy().starts_with('.'))))
+    Ok(entries.any(|entry| entry.is_ok_and(|entry| !is_hidden(&entry.file_name()))))
+}
+
+fn is_hidden(name: &OsStr) -> bool {
+    name.to_string_lossy().starts_with('.')
 }
 
 fn lock(folder: &Path) -> Result<File> {

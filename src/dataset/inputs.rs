@@ -133,14 +133,12 @@ fn stamp(meta: &Metadata) -> String {
 }
 
 fn is_settled(meta: &Metadata, now: SystemTime) -> bool {
-    let latest = [meta.modified().ok(), changed(meta)]
-        .into_iter()
-        .flatten()
-        .max();
-    latest.is_some_and(|latest| {
-        now.duration_since(latest)
-            .is_ok_and(|age| age > SETTLED_AGE)
-    })
+    let times = [meta.modified().ok(), changed(meta)];
+    let Some(latest) = times.into_iter().flatten().max() else {
+        return false;
+    };
+    let age = now.duration_since(latest);
+    age.is_ok_and(|age| age > SETTLED_AGE)
 }
 
 /// When a file's content or its names changed last: a time that nobody can set back.

@@ -159,11 +159,8 @@ fn whole_lines(read: NumberedLines, path: &Path, consequence: &str) -> Vec<Journ
 
 /// The lines that are not damaged, in order of number; of one number the last.
 fn by_number(read: NumberedLines) -> Vec<JournalLine> {
-    let lines: BTreeMap<u64, JournalLine> = read
-        .into_iter()
-        .filter_map(|(_, line)| line.ok())
-        .map(|line| (line.k, line))
-        .collect();
+    let good = read.into_iter().filter_map(|(_, line)| line.ok());
+    let lines: BTreeMap<u64, _> = good.map(|line| (line.k, line)).collect();
     lines.into_values().collect()
 }
 

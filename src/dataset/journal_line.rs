@@ -82,15 +82,11 @@ impl JournalLine {
 
     /// What a writer needs to know to join it with others.
     pub(crate) fn written(&self) -> Written {
-        let files = self
-            .files
-            .iter()
-            .map(|file| file.path.split('/').collect())
-            .collect();
+        let files = self.files.iter();
         Written {
             k: self.k,
             part: self.part,
-            files,
+            files: files.map(|file| file.path.split('/').collect()).collect(),
         }
     }
 
@@ -117,9 +113,8 @@ impl JournalLine {
 
     /// Every file is there with its very bytes.
     pub(crate) fn has_same_bytes(&self, folder: &Path) -> bool {
-        self.files
-            .iter()
-            .all(|file| file.difference(folder).is_none())
+        let mut files = self.files.iter();
+        files.all(|file| file.difference(folder).is_none())
     }
 
     /// Every file is there in its full size.

@@ -91,10 +91,8 @@ fn check_deep(sample: &Sample) -> Result<()> {
     if (deep_w, deep_h) == (w, h) {
         return Ok(());
     }
-    Err(Error::value(
-        "deep",
-        format!("{deep_w} x {deep_h} pixels, expected the picture's {w} x {h}"),
-    ))
+    let what = format!("{deep_w} x {deep_h} pixels, expected the picture's {w} x {h}");
+    Err(Error::value("deep", what))
 }
 
 /// The name of a channel and how a pixel gives its value.
@@ -120,11 +118,10 @@ fn picture_channels(frame: &Image<PremulRgba>, deep: &DeepImage) -> Vec<NamedCha
 }
 
 fn channels_of<P: Copy>(image: &Image<P>, channels: &[Channel<P>]) -> Vec<NamedChannel> {
-    let planes = channels.iter().map(|(name, value)| {
-        let plane = image.pixels().iter().map(value);
-        ((*name).into(), plane.collect())
-    });
-    planes.collect()
+    let channels = channels.iter();
+    channels
+        .map(|(name, value)| ((*name).into(), image.pixels().iter().map(value).collect()))
+        .collect()
 }
 
 fn borrowed(channels: &[NamedChannel]) -> Vec<(&str, &[f32])> {

@@ -4,7 +4,7 @@ use crate::dataset::yolo_yaml::DataYaml;
 use crate::dataset::{Part, SampleRecord};
 use crate::error::{Error, Result};
 use crate::io;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 /// Images for training and for validation, in order; none is a copy.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -35,8 +35,8 @@ impl Listing {
 
     /// All images in order of name: the series as it was taken.
     pub fn series(&self) -> Vec<PathBuf> {
-        let mut all: Vec<PathBuf> = self.train.iter().chain(&self.val).cloned().collect();
-        all.sort_by(|a, b| a.file_name().cmp(&b.file_name()).then_with(|| a.cmp(b)));
+        let mut all = [&self.train[..], &self.val[..]].concat();
+        all.sort_by(|a, b| (a.file_name(), a).cmp(&(b.file_name(), b)));
         all
     }
 
@@ -47,10 +47,8 @@ impl Listing {
     /// A share that is not in `0..=1`.
     pub fn head(&self, share: f64) -> Result<Self> {
         if !(0.0..=1.0).contains(&share) {
-            return Err(Error::value(
-                "head",
-                format!("{share}, expected a share, 0 to 1"),
-            ));
+            let what = format!("{share}, expected a share, 0 to 1");
+            return Err(Error::value("head", what));
         }
         Ok(Self {
             train: first_share(&self.train, share),
@@ -131,8 +129,8 @@ fn without_dots(path: &Path) -> PathBuf {
     let mut plain = PathBuf::new();
     for step in path.components() {
         match step {
-            std::path::Component::CurDir => {}
-            std::path::Component::ParentDir => drop(plain.pop()),
+            Component::CurDir => {}
+            Component::ParentDir => drop(plain.pop()),
             step => plain.push(step),
         }
     }
@@ -149,15 +147,10 @@ pub(crate) fn is_image(path: &Path) -> bool {
 /// # Errors
 /// When there is none beside it.
 pub(crate) fn record_of(image: &Path) -> Result<SampleRecord> {
-    let swapped: PathBuf = image
-        .iter()
-        .map(|step| {
-            if step == "images" {
-                "scenes".as_ref()
-            } else {
-                step
-            }
-        })
-        .collect();
-    io::read_json(swapped.with_extension("json"))
+    let steps = image.iter();
+    let swapped = steps.map(|step| match step {
+        step if step == "images" => "scenes".as_ref(),
+        step => step,
+    });
+    io::read_json(swapped.collect::<PathBuf>().with_extension("json"))
 }

@@ -263,10 +263,8 @@ fn label_writer(
 
 /// Copies a file, if it is as it was written.
 fn copy(shard: &Path, folder: &Path, file: &WrittenFile) -> Result<()> {
-    let (from, to) = (
-        io::inside(shard, &file.path)?,
-        io::below(folder, &file.path)?,
-    );
+    let from = io::inside(shard, &file.path)?;
+    let to = io::below(folder, &file.path)?;
     io::create_folder(to.parent().unwrap_or(folder))?;
     io::copy(from, to, file.checksum())
 }

@@ -250,14 +250,14 @@ impl Written {
     /// # Errors
     /// When there is none.
     pub fn file(&self, kind: &str) -> std::io::Result<&Path> {
-        let found = self
-            .files
-            .iter()
-            .find(|file| file.starts_with(kind))
-            .map(PathBuf::as_path);
-        found.ok_or_else(|| {
-            std::io::Error::other(format!("sample {} has no file in {kind}", self.k))
-        })
+        let found = self.files.iter().find(|file| file.starts_with(kind));
+        let k = self.k;
+        match found {
+            Some(file) => Ok(file),
+            None => Err(std::io::Error::other(format!(
+                "sample {k} has no file in {kind}"
+            ))),
+        }
     }
 }
 

@@ -42,7 +42,7 @@ impl Thumbnail {
     /// Root mean square difference, 8-bit codes.
     fn codes_from(&self, other: &Self) -> f64 {
         let pairs = self.0.iter().zip(&other.0);
-        let sum: u64 = pairs.map(|(a, b)| u64::from(a.abs_diff(*b)).pow(2)).sum();
+        let sum: u64 = pairs.map(|(a, b)| squared_difference(*a, *b)).sum();
         (sum as f64 / self.0.len().max(1) as f64).sqrt()
     }
 
@@ -92,6 +92,11 @@ fn thumbnails(images: &[PathBuf]) -> Result<Vec<Thumbnail>> {
 
 fn grey_code(p: &Srgb8) -> u8 {
     ((u16::from(p.r) + 2 * u16::from(p.g) + u16::from(p.b)) / 4) as u8
+}
+
+#[inline]
+fn squared_difference(a: u8, b: u8) -> u64 {
+    u64::from(a.abs_diff(b)).pow(2)
 }
 
 #[cfg(test)]

@@ -42,12 +42,7 @@ impl Obstructed {
     pub fn classes(self, classes: &[String]) -> Result<Vec<String>> {
         let mut classes = classes.to_vec();
         if self == Self::Class {
-            if classes.iter().any(|name| name == OBSTRUCTED) {
-                let what = format!(
-                    "\"class\" adds a class \"{OBSTRUCTED}\", but the assets have one of that name"
-                );
-                return Err(Error::value("labels.obstructed", what));
-            }
+            check_is_free(&classes)?;
             classes.push(OBSTRUCTED.into());
         }
         Ok(classes)
@@ -82,6 +77,16 @@ impl Obstructed {
             }),
         }
     }
+}
+
+/// Fails where the assets have a class of the name that is added.
+fn check_is_free(classes: &[String]) -> Result<()> {
+    if classes.iter().all(|name| name != OBSTRUCTED) {
+        return Ok(());
+    }
+    let what =
+        format!("\"class\" adds a class \"{OBSTRUCTED}\", but the assets have one of that name");
+    Err(Error::value("labels.obstructed", what))
 }
 
 #[cfg(test)]

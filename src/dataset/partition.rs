@@ -48,18 +48,10 @@ impl Group {
 
 impl Group {
     /// What a scene has in common with the others of its group.
-    fn of(self, scene: &Scene) -> String {
+    fn key_of(self, scene: &Scene) -> String {
         match self {
             Self::Background => scene.plate.clone(),
-            Self::Selection => {
-                let mut photos: Vec<String> = scene
-                    .objects
-                    .iter()
-                    .map(|object| format!("{}/{}", object.asset, object.photo))
-                    .collect();
-                photos.sort();
-                photos.join(" ")
-            }
+            Self::Selection => selection_of(scene),
         }
     }
 }
@@ -70,10 +62,8 @@ impl FromStr for Group {
     fn from_str(text: &str) -> Result<Self> {
         let known = Self::ALL.into_iter().find(|group| group.name() == text);
         known.ok_or_else(|| {
-            Error::value(
-                "group",
-                format!("\"{text}\", expected background or selection"),
-            )
+            let what = format!("\"{text}\", expected background or selection");
+            Error::value("group", what)
         })
     }
 }
@@ -145,7 +135,7 @@ impl Listing {
 fn groups(images: &[PathBuf], group: Group) -> Result<Vec<String>> {
     images
         .par_iter()
-        .map(|image| Ok(group.of(&record_of(image)?.drawn)))
+        .map(|image| Ok(group.key_of(&record_of(image)?.drawn)))
         .collect()
 }
 
@@ -189,6 +179,15 @@ fn check_ratio(ratio: f64) -> Result<()> {
     }
     let what = format!("{ratio}, expected a share between 0 and 1");
     Err(Error::value("ratio", what))
+}
+
+/// The photos of a scene's objects, in an order of their own.
+fn selection_of(scene: &Scene) -> String {
+    let objects = scene.objects.iter();
+    let photos = objects.map(|object| format!("{}/{}", object.asset, object.photo));
+    let mut photos: Vec<String> = photos.collect();
+    photos.sort();
+    photos.join(" ")
 }
 
 #[cfg(test)]

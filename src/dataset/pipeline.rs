@@ -91,7 +91,8 @@ impl Pipeline {
     /// Median length of the objects in the library.
     fn median_object_m(&self) -> Option<f64> {
         let photos = self.library.assets.iter().flat_map(|asset| &asset.photos);
-        let mut lengths: Vec<f64> = photos.map(|photo| photo.record.object_m[0]).collect();
+        let lengths = photos.map(|photo| photo.record.object_m[0]);
+        let mut lengths: Vec<f64> = lengths.collect();
         lengths.sort_by(f64::total_cmp);
         lengths.get(lengths.len() / 2).copied()
     }
@@ -113,19 +114,14 @@ impl Pipeline {
     }
 
     fn new(config: DatasetConfig, library: Library, places: Vec<BackgroundPhoto>) -> Result<Self> {
-        let backgrounds = places
-            .iter()
-            .map(|place| place.background.clone())
-            .collect();
-        let catalog = catalog(&library);
-        let surroundings = EnvironmentMaps::of(&config);
+        let backgrounds = places.iter().map(|place| place.background.clone());
         Ok(Self {
+            backgrounds: backgrounds.collect(),
+            catalog: catalog(&library),
+            surroundings: EnvironmentMaps::of(&config),
             config,
             library,
             places,
-            backgrounds,
-            catalog,
-            surroundings,
             stop: &NEVER,
         })
     }

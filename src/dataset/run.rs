@@ -244,14 +244,10 @@ impl RunState {
     }
 
     fn enter(&mut self, line: JournalLine, times: Times) -> Result<()> {
-        let Progress { done, count, made } = self.progress;
-        let new = u64::from(!self.journal.has(line.k));
+        let is_new = !self.journal.has(line.k);
         self.journal.add(line)?;
-        self.progress = Progress {
-            done: done + new,
-            count,
-            made: made + 1,
-        };
+        self.progress.done += u64::from(is_new);
+        self.progress.made += 1;
         self.times += times;
         Ok(())
     }

@@ -161,8 +161,8 @@ fn difference(value: Option<&Value>, default: Option<&Value>) -> Option<Value> {
 
 fn table_difference(own: &Table, defaults: &Table) -> Table {
     let entries = own.iter().filter_map(|(key, value)| {
-        let value = difference(Some(value), defaults.get(key))?;
-        Some((key.clone(), value))
+        let value = difference(Some(value), defaults.get(key));
+        value.map(|value| (key.clone(), value))
     });
     entries.collect()
 }

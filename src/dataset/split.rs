@@ -64,13 +64,19 @@ impl Split {
 
     /// The part of sample `k` of `count`.
     pub fn part(&self, k: u64, count: u64) -> Part {
-        let is_val = match self.order {
-            SplitOrder::Interleaved => {
-                self.train_before(k.saturating_add(1)) == self.train_before(k)
-            }
+        if self.is_val(k, count) {
+            Part::Val
+        } else {
+            Part::Train
+        }
+    }
+
+    fn is_val(&self, k: u64, count: u64) -> bool {
+        let next = k.saturating_add(1);
+        match self.order {
+            SplitOrder::Interleaved => self.train_before(next) == self.train_before(k),
             SplitOrder::Consecutive => u128::from(k) >= self.train_before(count),
-        };
-        if is_val { Part::Val } else { Part::Train }
+        }
     }
 
     /// Samples for training among the first `n`.

@@ -167,13 +167,10 @@ impl Summary {
     /// # Errors
     /// A record that cannot be read.
     pub fn shown(&self, folder: &Path, place: usize) -> Result<ShownSample> {
-        let [picture, record] = self.glances[place]
-            .files
-            .each_ref()
-            .map(|file| folder.join(file));
+        let [picture, record] = &self.glances[place].files;
         Ok(ShownSample {
-            picture,
-            record: io::read_json(record)?,
+            picture: folder.join(picture),
+            record: io::read_json(folder.join(record))?,
         })
     }
 
@@ -207,9 +204,10 @@ impl Summary {
 
     fn add_balance(&mut self, part: Part, line: &JournalLine) {
         let part = usize::from(part == Part::Val);
-        for (class, [objects, labels]) in self.balance.iter_mut().zip(&line.classes) {
-            class[part][0] += u64::from(*objects);
-            class[part][1] += u64::from(*labels);
+        for (class, counts) in self.balance.iter_mut().zip(&line.classes) {
+            for (sum, count) in class[part].iter_mut().zip(counts) {
+                *sum += u64::from(*count);
+            }
         }
     }
 

@@ -82,12 +82,10 @@ impl RunTimes {
 
 /// The runs that wrote a folder.
 pub(crate) fn runs_of(folder: &Path) -> Vec<RunTimes> {
-    let text = io::inside(folder, RUNS)
-        .and_then(io::read_text)
-        .unwrap_or_default();
-    text.lines()
-        .filter_map(|line| serde_json::from_str(line).ok())
-        .collect()
+    let text = io::inside(folder, RUNS).and_then(io::read_text);
+    let text = text.unwrap_or_default();
+    let lines = text.lines().map(serde_json::from_str);
+    lines.filter_map(|line| line.ok()).collect()
 }
 
 /// What a closure gives, and how long it took.

@@ -52,12 +52,8 @@ impl Writer for Voc {
     }
 
     fn finish(&self, folder: &Path, _classes: &[String], samples: &[Written]) -> Result<()> {
-        Part::ALL.iter().try_for_each(|&part| {
-            let numbers = samples
-                .iter()
-                .filter(|sample| sample.part == part)
-                .map(|sample| format!("{:06}\n", sample.k));
-            io::write_text(folder.join(list(part)), &numbers.collect::<String>())
+        Part::ALL.into_iter().try_for_each(|part| {
+            io::write_text(folder.join(list(part)), &numbers_of(part, samples))
         })
     }
 }
@@ -138,6 +134,12 @@ fn escaped(text: &str) -> String {
         }
     }
     xml
+}
+
+/// The samples of a part, a line each.
+fn numbers_of(part: Part, samples: &[Written]) -> String {
+    let samples = samples.iter().filter(|sample| sample.part == part);
+    samples.map(|sample| format!("{:06}\n", sample.k)).collect()
 }
 
 #[cfg(test)]

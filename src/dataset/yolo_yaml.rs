@@ -110,13 +110,12 @@ impl DataYaml {
     }
 
     fn missing(&self) -> Vec<String> {
-        let mut missing: Vec<String> = Part::ALL
-            .into_iter()
-            .filter(|&part| self.folders(part).is_empty())
-            .map(|part| format!("no {}:, which trainers require", part.name()))
-            .collect();
-        missing.extend(self.names_problem());
+        let parts = Part::ALL.into_iter();
+        let missing = parts.filter(|&part| self.folders(part).is_empty());
         missing
+            .map(|part| format!("no {}:, which trainers require", part.name()))
+            .chain(self.names_problem())
+            .collect()
     }
 
     fn names_problem(&self) -> Option<String> {
@@ -255,10 +254,8 @@ impl<'a> Reader<'a> {
 
     fn alias(&mut self, anchor: usize) -> Result<Value, Problem> {
         let value = self.anchors.get(&anchor).cloned().unwrap_or(Value::Other);
-        match self.alias_budget.checked_sub(value.bytes()) {
-            Some(left) => self.alias_budget = left,
-            None => return Err((None, "aliases repeat too much text".into())),
-        }
+        let left = self.alias_budget.checked_sub(value.bytes());
+        self.alias_budget = left.ok_or((None, "aliases repeat too much text".into()))?;
         Ok(value)
     }
 

@@ -169,8 +169,8 @@ impl DifferenceTally {
                 self.values = [a.to_vec(), b.to_vec()];
             }
             let relative = relative_error(error, u, v);
-            warned |= error > thresholds.warn.into() && relative > thresholds.warn_relative.into();
-            failed |= error > thresholds.fail.into() && relative > thresholds.fail_relative.into();
+            warned |= thresholds.is_warned(error, relative);
+            failed |= thresholds.is_failed(error, relative);
         }
         self.warned += usize::from(warned);
         self.failed += usize::from(failed);
@@ -313,6 +313,18 @@ fn without_trailing_zeros(number: &str) -> &str {
         number.trim_end_matches('0').trim_end_matches('.')
     } else {
         number
+    }
+}
+
+impl Thresholds {
+    #[inline]
+    fn is_warned(&self, error: f64, relative: f64) -> bool {
+        error > self.warn.into() && relative > self.warn_relative.into()
+    }
+
+    #[inline]
+    fn is_failed(&self, error: f64, relative: f64) -> bool {
+        error > self.fail.into() && relative > self.fail_relative.into()
     }
 }
 

@@ -91,11 +91,12 @@ fn shown<P: NamedChannels>(pixel: Option<&P>) -> LinearRgb {
 
 /// Colour by colour what differs; a missing pixel is zeros.
 fn shown_difference(a: &[f32], b: &[f32]) -> LinearRgb {
-    let error = |c: usize| magnified_error(channel_or_zero(a, c), channel_or_zero(b, c));
+    let [red, green, blue, alpha] =
+        [0, 1, 2, 3].map(|c| magnified_error(channel_or_zero(a, c), channel_or_zero(b, c)));
     match a.len().max(b.len()) {
         0 => LinearRgb::BLACK,
-        1 => LinearRgb::grey(error(0)),
-        _ => LinearRgb::new(error(0), error(1), error(2)) + LinearRgb::grey(error(3)),
+        1 => LinearRgb::grey(red),
+        _ => LinearRgb::new(red, green, blue) + LinearRgb::grey(alpha),
     }
 }
 

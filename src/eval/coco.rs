@@ -95,9 +95,8 @@ pub fn coco(sheets: &[EvalImage], weights: &[u32]) -> CocoScores {
 /// The detections of every class with something to find, the surest 100 of each image.
 pub(super) fn rankings(classes: &ByClass<'_>, range: AreaRange) -> Vec<Ranking> {
     let classes = classes.classes();
-    let classes = classes.par_iter();
-    classes
-        .map(|boxes| Ranking::new(boxes, |image| match_image(image, range)))
+    let rank = classes.par_iter();
+    rank.map(|boxes| Ranking::new(boxes, |image| match_image(image, range)))
         .collect()
 }
 
@@ -290,10 +289,9 @@ fn nearest(
 /// Intersection over union; over the detection's own area where the truth is a crowd.
 fn overlap(found: &Detection, truth: &GroundTruth) -> f64 {
     let shared = intersection(&found.bbox, &truth.bbox);
-    let whole = if truth.crowd {
-        area(&found.bbox)
-    } else {
-        area(&found.bbox) + area(&truth.bbox) - shared
+    let whole = match truth.crowd {
+        true => area(&found.bbox),
+        false => area(&found.bbox) + area(&truth.bbox) - shared,
     };
     share(shared, whole)
 }

@@ -141,14 +141,14 @@ impl CocoTruth {
         Ok(())
     }
 
-    fn add_detection(&mut self, detection: &CocoDetection) -> Result<()> {
-        let (image, class) = self.place(detection.image_id, detection.category_id)?;
-        let bbox = corners(detection.bbox)?;
-        self.sheets[image].found.push(Detection {
+    fn add_detection(&mut self, found: &CocoDetection) -> Result<()> {
+        let (image, class) = self.place(found.image_id, found.category_id)?;
+        let detection = Detection {
             class,
-            bbox,
-            confidence: detection.score,
-        });
+            bbox: corners(found.bbox)?,
+            confidence: found.score,
+        };
+        self.sheets[image].found.push(detection);
         Ok(())
     }
 
@@ -164,9 +164,12 @@ impl CocoTruth {
     /// Where the images are: in `folder`, or where COCO and petcomp have them for a document at `path`. A file name that
     /// leads out of a folder leads nowhere.
     pub fn pictures(&self, path: &Path, folder: Option<&Path>) -> Vec<Option<Picture>> {
-        let roots = folder.map_or_else(|| image_folders(path), |folder| vec![folder.to_path_buf()]);
-        self.files
-            .iter()
+        let roots = match folder {
+            Some(folder) => vec![folder.to_path_buf()],
+            None => image_folders(path),
+        };
+        let files = self.files.iter();
+        files
             .map(|(name, size)| find_picture(&roots, name, *size))
             .collect()
     }
@@ -222,10 +225,8 @@ fn places(list: &str, ids: impl Iterator<Item = i64>) -> Result<BTreeMap<i64, us
     let mut places = BTreeMap::new();
     for (i, id) in ids.enumerate() {
         if let Some(first) = places.insert(id, i) {
-            return Err(Error::value(
-                format!("{list}[{i}].id"),
-                format!("{id}, as of {list}[{first}], expected another"),
-            ));
+            let what = format!("{id}, as of {list}[{first}], expected another");
+            return Err(Error::value(format!("{list}[{i}].id"), what));
         }
     }
     Ok(places)
@@ -252,9 +253,10 @@ impl ImageRecord {
     /// The file's name without folder and extension; the id of an image without a file.
     fn name(&self) -> String {
         let (file, _) = self.file();
-        Path::new(&file)
-            .file_stem()
-            .map_or_else(|| self.id.to_string(), |n| n.to_string_lossy().into_owned())
+        match Path::new(&file).file_stem() {
+            Some(stem) => stem.to_string_lossy().into_owned(),
+            None => self.id.to_string(),
+        }
     }
 }
 

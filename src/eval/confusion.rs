@@ -61,9 +61,10 @@ impl Confusion {
     /// The classes that occur, those first with the most boxes missed, found where nothing is, or confused with another class;
     /// of equal ones those first with the most boxes.
     pub fn worst(&self) -> Vec<u32> {
-        let mut classes: Vec<(u32, [u64; 2])> = self.sums_by_class().into_iter().collect();
-        classes.sort_by_key(|&(_, sums)| std::cmp::Reverse(sums));
-        classes.into_iter().map(|(class, _)| class).collect()
+        let sums = self.sums_by_class();
+        let mut classes: Vec<u32> = sums.keys().copied().collect();
+        classes.sort_by_key(|class| std::cmp::Reverse(sums[class]));
+        classes
     }
 
     /// For each class the wrong ones, and all in which it occurs.

@@ -59,10 +59,8 @@ fn mean_precision(ranked: &[Ranked<'_>]) -> Vec<[f64; 2]> {
 
 fn sampled_precision(ranked: &Ranked<'_>) -> Vec<[f64; 2]> {
     let samples = average::samples(&ranked.recall, &ranked.precision);
-    let numbered = samples.into_iter().enumerate();
-    numbered
-        .map(|(i, precision)| [average::recall_at(i), precision])
-        .collect()
+    let recalls = (0..).map(average::recall_at);
+    recalls.zip(samples).map(|(x, y)| [x, y]).collect()
 }
 
 /// The mean of curves with points at the same places.

@@ -35,11 +35,9 @@ pub struct Mistake {
 /// All mistakes by the pairs that a [`Confusion`](super::Confusion) counts, the worst first: of detections the surest,
 /// of misses the box with the most area that no detection covers.
 pub fn mistakes(sheets: &[EvalImage], options: &ConfusionOptions) -> Vec<Mistake> {
-    let mut all: Vec<(f64, Mistake)> = sheets
-        .par_iter()
-        .enumerate()
-        .flat_map_iter(|(i, sheet)| rated_mistakes(i, sheet, options))
-        .collect();
+    let numbered = sheets.par_iter().enumerate();
+    let rated = numbered.flat_map_iter(|(i, sheet)| rated_mistakes(i, sheet, options));
+    let mut all: Vec<(f64, Mistake)> = rated.collect();
     all.sort_by(worst_first);
     all.into_iter().map(|(_, mistake)| mistake).collect()
 }
@@ -55,8 +53,14 @@ fn rated_mistakes(
 
 /// Detections before misses; of each kind the most severe first.
 fn worst_first(a: &(f64, Mistake), b: &(f64, Mistake)) -> Ordering {
-    let [a_missed, b_missed] = [a, b].map(|(_, mistake)| mistake.kind == MistakeKind::Missed);
-    a_missed.cmp(&b_missed).then(b.0.total_cmp(&a.0))
+    let by_kind = a.1.is_miss().cmp(&b.1.is_miss());
+    by_kind.then(b.0.total_cmp(&a.0))
+}
+
+impl Mistake {
+    fn is_miss(&self) -> bool {
+        self.kind == MistakeKind::Missed
+    }
 }
 
 /// Finds the mistakes of one image.

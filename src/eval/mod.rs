@@ -218,9 +218,11 @@ pub fn thresholds() -> [f64; THRESHOLDS] {
 }
 
 fn mean(values: impl IntoIterator<Item = f64>) -> f64 {
-    let (sum, count) = values
-        .into_iter()
-        .fold((0.0, 0), |(sum, count), v| (sum + v, count + 1));
+    let (mut sum, mut count) = (0.0, 0_u32);
+    for value in values {
+        sum += value;
+        count += 1;
+    }
     if count == 0 {
         0.0
     } else {

@@ -14,9 +14,12 @@ pub(super) fn area(b: &BBox) -> f64 {
 
 /// Area of what two boxes share.
 pub(super) fn intersection(a: &BBox, b: &BBox) -> f64 {
-    let width = a.x1.min(b.x1) - a.x0.max(b.x0);
-    let height = a.y1.min(b.y1) - a.y0.max(b.y0);
-    width.max(0.0) * height.max(0.0)
+    shared_length([a.x0, a.x1], [b.x0, b.x1]) * shared_length([a.y0, a.y1], [b.y0, b.y1])
+}
+
+#[inline]
+fn shared_length(a: [f64; 2], b: [f64; 2]) -> f64 {
+    (a[1].min(b[1]) - a[0].max(b[0])).max(0.0)
 }
 
 /// A ratio; 0 where there is nothing to share.

@@ -56,17 +56,7 @@ fn picture(
     names: &[String],
     shown: &[u32],
 ) -> String {
-    let [across, up] = axes.map(|title| Axis {
-        title: title.into(),
-        range: [0.0, 1.0],
-        logarithmic: false,
-    });
-    let mut chart = Chart {
-        title: title.into(),
-        across,
-        up,
-        ..Default::default()
-    };
+    let mut chart = empty_chart(title, axes);
     if curves.classes.len() > 1 {
         let name = format!("mean of {} classes", curves.classes.len());
         chart.names.push(name);
@@ -81,6 +71,21 @@ fn picture(
         chart.curves.push(lines[place].clone());
     }
     Chart::row(&[chart])
+}
+
+/// A chart of shares, both axes from 0 to 1.
+fn empty_chart(title: &str, axes: [&str; 2]) -> Chart {
+    let [across, up] = axes.map(|title| Axis {
+        title: title.into(),
+        range: [0.0, 1.0],
+        logarithmic: false,
+    });
+    Chart {
+        title: title.into(),
+        across,
+        up,
+        ..Default::default()
+    }
 }
 
 /// Found against true classes, those to be `shown`: each column's shares as shades, counts in words. Others share a row
@@ -137,16 +142,12 @@ struct ConfusionTable {
 impl ConfusionTable {
     fn new(confusion: &Confusion, names: &[String], shown: &[u32]) -> Self {
         let titles = titles(confusion, names, shown);
-        let places: BTreeMap<u32, usize> = shown.iter().copied().zip(0..).collect();
-        let background = titles.len() - 1;
-        let place = |class: Option<u32>| match class {
-            None => background,
-            Some(class) => places.get(&class).copied().unwrap_or(background - 1),
-        };
         let (mut counts, mut sums) = (BTreeMap::new(), vec![0; titles.len()]);
-        for (&[found, truth], &count) in &confusion.counts {
-            *counts.entry([place(truth), place(found)]).or_default() += count;
-            sums[place(truth)] += count;
+        let background = titles.len() - 1;
+        for (classes, &count) in &confusion.counts {
+            let [found, truth] = classes.map(|class| column_of(class, shown, background));
+            *counts.entry([truth, found]).or_default() += count;
+            sums[truth] += count;
         }
         Self {
             titles,
@@ -172,36 +173,30 @@ impl ConfusionTable {
     fn lines(&self, cell: f64) -> String {
         let n = self.titles.len();
         let all = cell * n as f64;
-        let line = |i: usize| {
+        let mut path = String::new();
+        for i in 0..=n {
             let at = NAME_ROOM + cell * i as f64;
-            format!("M{at:.1} {NAME_ROOM}v{all:.1}M{NAME_ROOM} {at:.1}h{all:.1}")
-        };
-        let lines: String = (0..=n).map(line).collect();
-        format!("<path d=\"{lines}\" stroke=\"#ddd\" fill=\"none\"/>\n")
+            let _ = write!(
+                path,
+                "M{at:.1} {NAME_ROOM}v{all:.1}M{NAME_ROOM} {at:.1}h{all:.1}"
+            );
+        }
+        format!("<path d=\"{path}\" stroke=\"#ddd\" fill=\"none\"/>\n")
     }
 
     fn cell(&self, [column, row]: [usize; 2], count: u64, cell: f64) -> String {
         let share = count as f64 / self.sums[column] as f64;
         let [x, y] = [column, row].map(|i| NAME_ROOM + cell * i as f64);
         let light = 255.0 - 200.0 * share;
-        let ink = if share > 0.6 { " fill=\"white\"" } else { "" };
-        let mut svg = String::new();
-        let told = format!(
-            "found {}, true {}: {count}",
-            self.titles[row], self.titles[column]
-        );
-        let _ = writeln!(
-            svg,
+        let (found, truth) = (&self.titles[row], &self.titles[column]);
+        let title = escaped(&format!("found {found}, true {truth}: {count}"));
+        let rectangle = format!(
             "<rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"{cell:.1}\" height=\"{cell:.1}\" \
-             fill=\"rgb({light:.0},{light:.0},255)\" stroke=\"#ccc\"><title>{}</title></rect>",
-            escaped(&told)
+             fill=\"rgb({light:.0},{light:.0},255)\" stroke=\"#ccc\"><title>{title}</title></rect>\n"
         );
-        svg + &word(
-            [x + cell / 2.0, y + cell / 2.0 + 4.0],
-            "middle",
-            &short(count),
-            ink,
-        )
+        let at = [x + cell / 2.0, y + cell / 2.0 + 4.0];
+        let ink = if share > 0.6 { " fill=\"white\"" } else { "" };
+        rectangle + &word(at, "middle", &short(count), ink)
     }
 }
 
@@ -227,6 +222,15 @@ pub(crate) fn class_name(class: u32, names: &[String]) -> String {
         .get(class as usize)
         .cloned()
         .unwrap_or_else(|| format!("class {class}"))
+}
+
+/// The column of a class; those that are not shown share the one before the background's.
+fn column_of(class: Option<u32>, shown: &[u32], background: usize) -> usize {
+    let Some(class) = class else {
+        return background;
+    };
+    let column = shown.iter().position(|&own| own == class);
+    column.unwrap_or(background - 1)
 }
 
 #[cfg(test)]

@@ -125,12 +125,10 @@ impl Running {
 
     /// Adds sums that are others than the last ones.
     fn turn(&mut self, right: f64, wrong: f64) {
-        let last = self
-            .right
-            .last()
-            .copied()
-            .zip(self.wrong.last().copied())
-            .unwrap_or_default();
+        let last = match (self.right.last(), self.wrong.last()) {
+            (Some(right), Some(wrong)) => (*right, *wrong),
+            _ => (0.0, 0.0),
+        };
         if last != (right, wrong) {
             self.push(right, wrong);
         }

@@ -111,17 +111,11 @@ pub(crate) fn sheet_of(
     found: &str,
     size: [u32; 2],
 ) -> std::result::Result<EvalImage, String> {
-    let truth = parse_rows(truth, 0)?
-        .into_iter()
-        .map(|row| row.truth(size))
-        .collect();
-    let found = parse_rows(found, 1)?
-        .into_iter()
-        .map(|row| row.found(size))
-        .collect();
+    let truth = parse_rows(truth, 0)?.into_iter().map(|row| row.truth(size));
+    let found = parse_rows(found, 1)?.into_iter().map(|row| row.found(size));
     Ok(EvalImage {
-        found,
-        ..EvalImage::new("", truth)
+        found: found.collect(),
+        ..EvalImage::new("", truth.collect())
     })
 }
 
@@ -274,13 +268,13 @@ fn too_few(numbers: &[f64], extra: usize) -> String {
 }
 
 impl LabelRow {
-    fn bbox(&self, [w, h]: [u32; 2]) -> BBox {
-        let (w, h, s) = (f64::from(w), f64::from(h), self.shares);
+    fn bbox(&self, size: [u32; 2]) -> BBox {
+        let ([w, h], shares) = (size.map(f64::from), self.shares);
         BBox {
-            x0: s.x0 * w,
-            y0: s.y0 * h,
-            x1: s.x1 * w,
-            y1: s.y1 * h,
+            x0: shares.x0 * w,
+            y0: shares.y0 * h,
+            x1: shares.x1 * w,
+            y1: shares.y1 * h,
         }
     }
 

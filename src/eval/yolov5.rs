@@ -49,13 +49,10 @@ pub(super) fn rankings(sheets: &[EvalImage]) -> Vec<Ranking> {
 pub(super) fn scores(rankings: &[Ranking], weights: &[u32]) -> Scores {
     let classes = ranked(rankings, weights);
     let best = best_confidence(&classes);
-    let scores = classes
-        .par_iter()
-        .map(|class| class.scores(best, weights))
-        .collect();
+    let scores = classes.par_iter().map(|class| class.scores(best, weights));
     Scores {
         definition: Definition::Yolov5,
-        classes: scores,
+        classes: scores.collect(),
     }
 }
 
@@ -174,10 +171,13 @@ pub(super) fn best_confidence(classes: &[Ranked<'_>]) -> usize {
 
 /// Sum of the readings around one; the ends go on as they are.
 fn window_sum(values: &[f64], i: usize) -> f64 {
-    let (i, reach) = (i as isize, SMOOTHING_READINGS as isize);
-    (i - reach..=i + reach)
-        .map(|i| values[i.clamp(0, values.len() as isize - 1) as usize])
-        .sum()
+    let (i, reach, last) = (
+        i as isize,
+        SMOOTHING_READINGS as isize,
+        values.len() as isize - 1,
+    );
+    let window = i - reach..=i + reach;
+    window.map(|i| values[i.clamp(0, last) as usize]).sum()
 }
 
 /// The detections of a class in one image, marked right where they found something, and how many boxes there are.
@@ -205,11 +205,9 @@ fn match_image(image: &ImageBoxes<'_>) -> (Vec<Hit>, usize) {
 /// The box that a detection overlaps most; of equal overlaps the last: that is how the original's descending sort leaves
 /// them.
 fn nearest(image: &ImageBoxes<'_>, index: &BoxIndex, found: &Detection) -> Option<(usize, f32)> {
-    index
-        .near(&found.bbox)
-        .into_iter()
-        .map(|t| (t, overlap(&image.truth[t].bbox, &found.bbox)))
-        .max_by(|a, b| a.1.total_cmp(&b.1))
+    let near = index.near(&found.bbox).into_iter();
+    let overlaps = near.map(|t| (t, overlap(&image.truth[t].bbox, &found.bbox)));
+    overlaps.max_by(|a, b| a.1.total_cmp(&b.1))
 }
 
 /// Intersection over union in single precision.

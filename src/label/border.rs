@@ -1,7 +1,7 @@
 //! Masks as polygons, for readers without pixels.
 
 use crate::geom::Point2;
-use crate::label::{Labels, trace};
+use crate::label::{Labels, ObjectLabel, trace};
 use crate::pixel::ObjectId;
 use serde::{Deserialize, Serialize};
 
@@ -20,22 +20,27 @@ pub struct Border {
 
 /// The borders of all objects, in order of id, simplified as [`trace::polygons`] are.
 pub fn borders(labels: &Labels, tolerance_px: f64) -> Vec<Border> {
-    labels
-        .objects
-        .iter()
-        .map(|object| Border {
+    let objects = labels.objects.iter();
+    objects
+        .map(|object| Border::new(object, tolerance_px))
+        .collect()
+}
+
+impl Border {
+    fn new(object: &ObjectLabel, tolerance_px: f64) -> Self {
+        Self {
             id: object.id,
             class: object.class,
             amodal: trace::polygons(&object.amodal_mask, tolerance_px),
             visible: trace::polygons(&object.visible_mask, tolerance_px),
-        })
-        .collect()
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::label::{ObjectLabel, RleMask};
+    use crate::label::RleMask;
 
     #[test]
     fn an_object_of_which_nothing_is_seen_has_a_whole_border_and_none_that_is_seen() {

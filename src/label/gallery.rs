@@ -51,23 +51,19 @@ impl Figure {
     /// A picture that cannot be read.
     pub(crate) fn cropped(path: &Path, size: [f64; 2], view: BBox) -> Result<Self> {
         let picture = io::read::<LinearRgb>(path)?;
-        let scale_x = picture.width() as f64 / size[0];
-        let scale_y = picture.height() as f64 / size[1];
-        let columns = pixel_span([view.x0, view.x1], scale_x, picture.width());
-        let rows = pixel_span([view.y0, view.y1], scale_y, picture.height());
+        let scale = [
+            picture.width() as f64 / size[0],
+            picture.height() as f64 / size[1],
+        ];
+        let columns = pixel_span([view.x0, view.x1], scale[0], picture.width());
+        let rows = pixel_span([view.y0, view.y1], scale[1], picture.height());
         if columns.is_empty() || rows.is_empty() {
             let what = "nothing of it lies in the part to be shown";
             return Err(Error::file(path, what));
         }
-        let view = BBox {
-            x0: columns.start as f64 / scale_x,
-            y0: rows.start as f64 / scale_y,
-            x1: columns.end as f64 / scale_x,
-            y1: rows.end as f64 / scale_y,
-        };
         Ok(Self {
+            view: view_of(&columns, &rows, scale),
             jpeg: page_jpeg(&picture.crop(Roi::spanning(columns, rows)))?,
-            view,
             drawing: String::new(),
             caption: String::new(),
         })
@@ -134,8 +130,19 @@ impl Figure {
 
 /// The whole pixels between two places of a drawing, of a picture `scale` times as large.
 fn pixel_span([start, end]: [f64; 2], scale: f64, length: usize) -> Range<usize> {
-    let whole = |v: f64| ((v * scale).max(0.0) as usize).min(length);
-    whole(start)..whole(end + 1.0 / scale)
+    let [start, end] =
+        [start, end + 1.0 / scale].map(|v| ((v * scale).max(0.0) as usize).min(length));
+    start..end
+}
+
+/// What so many whole pixels show.
+fn view_of(columns: &Range<usize>, rows: &Range<usize>, [scale_x, scale_y]: [f64; 2]) -> BBox {
+    BBox {
+        x0: columns.start as f64 / scale_x,
+        y0: rows.start as f64 / scale_y,
+        x1: columns.end as f64 / scale_x,
+        y1: rows.end as f64 / scale_y,
+    }
 }
 
 /// A picture as small as it is shown, in the bytes of a file.
@@ -150,8 +157,12 @@ fn shrunk(picture: &Image<LinearRgb>) -> Image<LinearRgb> {
     if factor >= 1.0 {
         return picture.clone();
     }
-    let [w, h] = [w, h].map(|side| ((side as f64 * factor).round() as usize).max(1));
+    let [w, h] = [w, h].map(|side| scaled_side(side, factor));
     resize(picture, w, h)
+}
+
+fn scaled_side(side: usize, factor: f64) -> usize {
+    ((side as f64 * factor).round() as usize).max(1)
 }
 
 /// A grid of figures; `name` begins their addresses on the page.
@@ -174,13 +185,7 @@ pub(crate) fn marked_box(
     color: &str,
     style: &str,
 ) -> String {
-    let rect = format!(
-        "<rect x=\"{:.2}\" y=\"{:.2}\" width=\"{:.2}\" height=\"{:.2}\" fill=\"none\" stroke=\"{color}\" {style}/>",
-        b.x0,
-        b.y0,
-        b.width(),
-        b.height()
-    );
+    let rect = rectangle(b, color, style);
     if content.is_empty() {
         return rect;
     }
@@ -191,6 +196,13 @@ pub(crate) fn marked_box(
         b.y0 + letter
     };
     rect + &words([b.x0, y], content, letter, color)
+}
+
+fn rectangle(b: &BBox, color: &str, style: &str) -> String {
+    let [x, y, w, h] = [b.x0, b.y0, b.width(), b.height()].map(|v| format!("{v:.2}"));
+    format!(
+        "<rect x=\"{x}\" y=\"{y}\" width=\"{w}\" height=\"{h}\" fill=\"none\" stroke=\"{color}\" {style}/>"
+    )
 }
 
 /// Words that begin at a place.
@@ -204,14 +216,11 @@ pub(crate) fn words([x, y]: [f64; 2], content: &str, letter: f64, color: &str) -
 
 /// No more letters of a text than there is room for.
 pub(crate) fn clipped(text: &str, letters: usize) -> String {
-    match text.char_indices().nth(letters) {
-        Some(_) => text
-            .chars()
-            .take(letters.saturating_sub(1))
-            .chain(['…'])
-            .collect(),
-        None => text.to_owned(),
+    if text.chars().count() <= letters {
+        return text.to_owned();
     }
+    let kept = text.chars().take(letters.saturating_sub(1));
+    kept.chain(['…']).collect()
 }
 
 #[cfg(test)]

@@ -40,9 +40,8 @@ impl RleMask {
     /// From runs; none unless they add up to the picture, no run but the first being empty.
     pub(crate) fn from_runs(size: [u32; 2], runs: Vec<u32>) -> Option<Self> {
         let sum: u64 = runs.iter().map(|&n| u64::from(n)).sum();
-        let whole =
-            sum == u64::from(size[0]) * u64::from(size[1]) && runs.iter().skip(1).all(|&n| n > 0);
-        whole.then_some(Self { size, runs })
+        let has_no_gap = runs.iter().skip(1).all(|&n| n > 0);
+        (has_no_gap && sum == pixel_count(size)).then_some(Self { size, runs })
     }
 
     /// Width and height of the picture.
@@ -164,6 +163,10 @@ impl Bits {
         }
         usize::MAX
     }
+}
+
+fn pixel_count([width, height]: [u32; 2]) -> u64 {
+    u64::from(width) * u64::from(height)
 }
 
 #[cfg(test)]

@@ -156,14 +156,11 @@ pub fn label(deep: &DeepImage, shot: &Shot, options: &LabelOptions) -> Labels {
         (image[0] as usize, image[1] as usize),
         "deep picture and camera differ"
     );
-    let objects: Vec<_> = silhouettes(deep, shot, options)
-        .filter(|s| !s.amodal_box(options.amodal).is_empty())
-        .collect();
+    let mut objects = silhouettes(deep, shot, options);
+    objects.retain(|s| !s.amodal_box(options.amodal).is_empty());
     let occluders = topmost::occluders(&objects, &shot.camera, options.overlap_iou);
-    let labels = objects
-        .into_iter()
-        .zip(occluders)
-        .map(|(object, covered_by)| object.into_label(options.amodal, covered_by));
+    let pairs = objects.into_iter().zip(occluders);
+    let labels = pairs.map(|(object, covered_by)| object.into_label(options.amodal, covered_by));
     Labels {
         image,
         objects: labels.collect(),
@@ -175,19 +172,19 @@ fn silhouettes<'a>(
     deep: &DeepImage,
     shot: &'a Shot,
     options: &LabelOptions,
-) -> impl Iterator<Item = Silhouette<'a>> {
+) -> Vec<Silhouette<'a>> {
     let mut cards: Vec<&Card> = shot.cards.iter().collect();
     cards.sort_by_key(|card| card.id);
     let ids: Vec<_> = cards.iter().map(|card| card.id).collect();
     let visibilities = visibility::fold_samples(deep, &ids, options);
-    cards
-        .into_iter()
-        .zip(visibilities)
+    let pairs = cards.into_iter().zip(visibilities);
+    pairs
         .map(|(card, visibility)| Silhouette {
             card,
             region: outline::region(card, &shot.camera),
             visibility,
         })
+        .collect()
 }
 
 impl Silhouette<'_> {

@@ -60,21 +60,22 @@ pub(crate) fn rings(region: &MultiPolygon<f64>) -> Vec<Vec<Point2<f64>>> {
 
 fn outer_ring(part: &Polygon<f64>) -> Vec<Point2<f64>> {
     let coords = &part.exterior().0;
-    coords[..coords.len().saturating_sub(1)]
-        .iter()
-        .map(|c| Point2::new(c.x, c.y))
-        .collect()
+    let open = coords.iter().take(coords.len().saturating_sub(1));
+    open.map(|c| Point2::new(c.x, c.y)).collect()
 }
 
 /// The smallest box around a region.
 pub(crate) fn bounds(region: &MultiPolygon<f64>) -> BBox {
-    let rect = region.bounding_rect();
-    rect.map_or_else(BBox::default, |r| BBox {
-        x0: r.min().x,
-        y0: r.min().y,
-        x1: r.max().x,
-        y1: r.max().y,
-    })
+    let Some(rect) = region.bounding_rect() else {
+        return BBox::default();
+    };
+    let (min, max) = (rect.min(), rect.max());
+    BBox {
+        x0: min.x,
+        y0: min.y,
+        x1: max.x,
+        y1: max.y,
+    }
 }
 
 fn in_camera(card: &Card, camera: &Camera) -> Vec<Vector3<f64>> {
@@ -120,8 +121,8 @@ fn pixel(p: &Vector3<f64>, camera: &Camera) -> Coord<f64> {
 
 fn picture(camera: &Camera) -> Polygon<f64> {
     let [w, h] = camera.image.map(f64::from);
-    let corners = [(0.0, 0.0), (w, 0.0), (w, h), (0.0, h)];
-    Polygon::new(LineString::from(corners.to_vec()), Vec::new())
+    let corners = vec![(0.0, 0.0), (w, 0.0), (w, h), (0.0, h)];
+    Polygon::new(LineString::from(corners), Vec::new())
 }
 
 #[cfg(test)]

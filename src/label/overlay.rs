@@ -2,7 +2,7 @@
 
 use crate::color::encode_srgb8;
 use crate::draw::{self, TextSize};
-use crate::geom::BBox;
+use crate::geom::{BBox, Point2};
 use crate::image::Image;
 use crate::label::{Labels, ObjectLabel};
 use crate::pixel::{PremulRgba, Srgb8};
@@ -31,20 +31,25 @@ pub(crate) fn draw_labels(
     labels: &Labels,
     boxed: impl Fn(&ObjectLabel) -> bool,
 ) {
-    let scale_x = canvas.width() as f64 / f64::from(labels.image[0].max(1));
-    let scale_y = canvas.height() as f64 / f64::from(labels.image[1].max(1));
+    let [width, height] = labels.image.map(|side| f64::from(side.max(1)));
+    let scale = [
+        canvas.width() as f64 / width,
+        canvas.height() as f64 / height,
+    ];
     let (boxed, outlined): (Vec<_>, Vec<_>) = labels.objects.iter().partition(|o| boxed(o));
     for ring in outlined.into_iter().flat_map(|o| &o.outline_px) {
-        let ring: Vec<_> = ring
-            .iter()
-            .map(|p| [p.x * scale_x, p.y * scale_y].into())
-            .collect();
-        draw::outline(canvas, &ring, UNLABELLED);
+        draw::outline(canvas, &scaled_ring(ring, scale), UNLABELLED);
     }
     for object in boxed {
-        let b = scaled(&object.amodal_box, [scale_x, scale_y]);
+        let b = scaled(&object.amodal_box, scale);
         draw::border(canvas, &b, draw::class_color(object.class), 1);
     }
+}
+
+fn scaled_ring(ring: &[Point2<f64>], [scale_x, scale_y]: [f64; 2]) -> Vec<Point2<f64>> {
+    ring.iter()
+        .map(|p| Point2::new(p.x * scale_x, p.y * scale_y))
+        .collect()
 }
 
 fn scaled(b: &BBox, [x, y]: [f64; 2]) -> BBox {
@@ -59,15 +64,17 @@ fn scaled(b: &BBox, [x, y]: [f64; 2]) -> BBox {
 /// A name on the box's upper edge; below the edge where there is no room above it.
 fn draw_tag(canvas: &mut Image<Srgb8>, object: &ObjectLabel, name: &str) {
     let size = TextSize::Small;
-    let [w, h] = [size.width(name) + 6, size.height()];
-    let (left, top) = (object.amodal_box.x0 as isize, object.amodal_box.y0 as isize);
-    let x = left.min(canvas.width() as isize - w as isize).max(0);
-    let y = if top >= h as isize {
-        top - h as isize
-    } else {
-        top
-    };
+    let tag = [size.width(name) + 6, size.height()];
+    let [x, y] = tag_corner(&object.amodal_box, tag, canvas.width());
     let paper = draw::class_color(object.class);
-    draw::fill(canvas, [x, y], [w, h], paper);
+    draw::fill(canvas, [x, y], tag, paper);
     draw::text(canvas, [x + 3, y], name, draw::ink_on(paper), size);
+}
+
+/// Above the box where there is room, else in it.
+fn tag_corner(b: &BBox, [w, h]: [usize; 2], canvas_width: usize) -> [isize; 2] {
+    let (left, top) = (b.x0 as isize, b.y0 as isize);
+    let x = left.min(canvas_width as isize - w as isize).max(0);
+    let above = top - h as isize;
+    [x, if above >= 0 { above } else { top }]
 }

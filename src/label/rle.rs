@@ -46,11 +46,7 @@ impl TryFrom<MaskText> for RleMask {
 
     fn try_from(text: MaskText) -> Result<Self, String> {
         let [h, w] = text.size;
-        if w.max(h) > LONGEST_SIDE_PX || u64::from(w) * u64::from(h) > MOST_PIXELS {
-            return Err(format!(
-                "size: {w} x {h} pixels, expected at most {LONGEST_SIDE_PX} a side, {MOST_PIXELS} in all"
-            ));
-        }
+        check_size(w, h)?;
         let runs = decode(&text.counts).ok_or("counts: not COCO's compressed run lengths")?;
         let sum: u64 = runs.iter().map(|&n| u64::from(n)).sum();
         RleMask::from_runs([w, h], runs)
@@ -62,10 +58,26 @@ impl TryFrom<MaskText> for RleMask {
 pub(crate) fn encode(runs: &[u32]) -> String {
     let mut text = String::new();
     for (i, &run) in runs.iter().enumerate() {
-        let before = if i > 2 { runs[i - 2] } else { 0 };
-        push_number(&mut text, i64::from(run) - i64::from(before));
+        push_number(&mut text, i64::from(run) - run_before(&runs[..i]));
     }
     text
+}
+
+/// The run that the next one is stored as the difference from.
+fn run_before(runs: &[u32]) -> i64 {
+    match runs {
+        [_, .., before, _] => i64::from(*before),
+        _ => 0,
+    }
+}
+
+fn check_size(w: u32, h: u32) -> Result<(), String> {
+    if w.max(h) <= LONGEST_SIDE_PX && u64::from(w) * u64::from(h) <= MOST_PIXELS {
+        return Ok(());
+    }
+    Err(format!(
+        "size: {w} x {h} pixels, expected at most {LONGEST_SIDE_PX} a side, {MOST_PIXELS} in all"
+    ))
 }
 
 fn push_number(text: &mut String, mut number: i64) {
@@ -88,12 +100,8 @@ pub(crate) fn decode(text: &str) -> Option<Vec<u32>> {
     let mut bytes = text.bytes();
     while let Some(first) = bytes.next() {
         let number = pull_number(first, &mut bytes)?;
-        let before = if runs.len() > 2 {
-            runs[runs.len() - 2]
-        } else {
-            0
-        };
-        runs.push(u32::try_from(number.checked_add(i64::from(before))?).ok()?);
+        let run = number.checked_add(run_before(&runs))?;
+        runs.push(u32::try_from(run).ok()?);
     }
     Some(runs)
 }

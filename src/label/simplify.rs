@@ -169,13 +169,13 @@ impl CornerLinks {
     }
 
     fn rings(&self) -> Vec<Ring> {
-        let kept = |ring: &RingSpan| {
-            (ring.first..ring.first + ring.length)
-                .filter(|i| self.kept[*i])
-                .map(|i| self.positions[i])
-                .collect()
-        };
-        self.rings.iter().map(kept).collect()
+        self.rings.iter().map(|ring| self.kept_ring(ring)).collect()
+    }
+
+    fn kept_ring(&self, ring: &RingSpan) -> Ring {
+        let corners = ring.first..ring.first + ring.length;
+        let kept = corners.filter(|i| self.kept[*i]);
+        kept.map(|i| self.positions[i]).collect()
     }
 }
 
@@ -209,10 +209,19 @@ fn holds([a, b, c]: [[f64; 2]; 3], p: [f64; 2]) -> bool {
 
 /// From a point to a line between two.
 fn distance(p: [f64; 2], [a, b]: [[f64; 2]; 2]) -> f64 {
-    let (along, from) = ([b[0] - a[0], b[1] - a[1]], [p[0] - a[0], p[1] - a[1]]);
-    let length2 = along[0] * along[0] + along[1] * along[1];
-    let share = ((from[0] * along[0] + from[1] * along[1]) / length2).clamp(0.0, 1.0);
+    let (along, from) = (difference(b, a), difference(p, a));
+    let share = (dot(from, along) / dot(along, along)).clamp(0.0, 1.0);
     libm::hypot(from[0] - share * along[0], from[1] - share * along[1])
+}
+
+#[inline]
+fn difference(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+    [a[0] - b[0], a[1] - b[1]]
+}
+
+#[inline]
+fn dot(a: [f64; 2], b: [f64; 2]) -> f64 {
+    a[0] * b[0] + a[1] * b[1]
 }
 
 #[cfg(test)]

@@ -29,16 +29,25 @@ pub(crate) fn occluders(
     let mut occluders = vec![Vec::new(); objects.len()];
     for j in 0..objects.len() {
         for i in (0..j).filter(|i| boxes[*i].overlaps(&boxes[j])) {
-            let (first, second) = (&objects[i], &objects[j]);
-            let Some(center) = overlap_center(&first.region, &second.region, iou) else {
+            let Some(first_is_above) = is_first_above(&objects[i], &objects[j], camera, iou) else {
                 continue;
             };
-            let first_is_above = is_above(first.card, second.card, camera, center);
             let (above, below) = if first_is_above { (i, j) } else { (j, i) };
             occluders[below].push(objects[above].card.id);
         }
     }
     occluders
+}
+
+/// None where the two do not overlap enough.
+fn is_first_above(
+    first: &Silhouette<'_>,
+    second: &Silhouette<'_>,
+    camera: &Camera,
+    iou: f64,
+) -> Option<bool> {
+    let center = overlap_center(&first.region, &second.region, iou)?;
+    Some(is_above(first.card, second.card, camera, center))
 }
 
 /// Of two cards that meet at a pixel position, the first is at least as near.

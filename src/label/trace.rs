@@ -225,9 +225,13 @@ fn join_part(mut whole: Ring, part: Ring) -> Ring {
     whole
 }
 
-fn nearest_corner(ring: &Ring, [x, y]: [f64; 2]) -> Option<usize> {
-    let distance2 = |corner: &[f64; 2]| (corner[0] - x).powi(2) + (corner[1] - y).powi(2);
-    (0..ring.len()).min_by(|&i, &k| distance2(&ring[i]).total_cmp(&distance2(&ring[k])))
+fn nearest_corner(ring: &Ring, to: [f64; 2]) -> Option<usize> {
+    (0..ring.len())
+        .min_by(|&i, &k| squared_distance(ring[i], to).total_cmp(&squared_distance(ring[k], to)))
+}
+
+fn squared_distance(a: [f64; 2], b: [f64; 2]) -> f64 {
+    (a[0] - b[0]).powi(2) + (a[1] - b[1]).powi(2)
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Charts of curves on logarithmic or linear axes, side by side, as SVG.
 
 use super::markup::{label, tenths, text};
-use super::number::power;
+use super::number::{power, trimmed};
 use maud::{Markup, html};
 
 /// Size of the frame of a chart in a row, and of one alone, in SVG units.
@@ -175,21 +175,25 @@ fn drawing(charts: &[Chart], frame: [f64; 2], beside: &Beside) -> String {
     let legend_left = charts.len() as f64 * (LEFT_MARGIN + frame[0]);
     let width = legend_left + legend_width(names);
     let height = TOP_MARGIN + frame[1] + BOTTOM_MARGIN;
-    let framed = (0..).zip(charts).map(|(i, chart)| Framed {
-        chart,
-        left: LEFT_MARGIN + f64::from(i) * (LEFT_MARGIN + frame[0]),
-        size: frame,
-    });
     html! {
         svg xmlns="http://www.w3.org/2000/svg" viewBox=(format_args!("0 0 {width} {height}")) width=(width)
             height=(height) font-family="sans-serif" font-size="12" {
             rect width=(width) height=(height) fill="white" {}
-            @for chart in framed { (chart.svg(beside)) }
+            @for chart in framed(charts, frame) { (chart.svg(beside)) }
             (legend(names, legend_left + 16.0))
         }
     }
     .into_string()
         + "\n"
+}
+
+/// Charts beside each other.
+fn framed(charts: &[Chart], size: [f64; 2]) -> impl Iterator<Item = Framed<'_>> {
+    (0..).zip(charts).map(move |(i, chart)| Framed {
+        chart,
+        left: LEFT_MARGIN + f64::from(i) * (LEFT_MARGIN + size[0]),
+        size,
+    })
 }
 
 fn legend_width(names: &[String]) -> f64 {
@@ -257,20 +261,29 @@ impl Framed<'_> {
 
     /// Lines at round values, with the values.
     fn grid_lines(&self) -> Markup {
-        let [w, h] = self.size;
         html! {
             @for mark in self.chart.across.marked_values() {
-                @if let Some(x) = self.x(mark) {
-                    path d=(format_args!("M{x:.1} {TOP_MARGIN}v{h}")) stroke="#ddd" {}
-                    (label(x, self.bottom() + 16.0, "middle", &short_number(mark)))
-                }
+                @if let Some(x) = self.x(mark) { (self.upright_line(x, mark)) }
             }
             @for mark in self.chart.up.marked_values() {
-                @if let Some(y) = self.y(mark) {
-                    path d=(format_args!("M{} {y:.1}h{w}", self.left)) stroke="#ddd" {}
-                    (label(self.left - 6.0, y + 4.0, "end", &short_number(mark)))
-                }
+                @if let Some(y) = self.y(mark) { (self.level_line(y, mark)) }
             }
+        }
+    }
+
+    fn upright_line(&self, x: f64, mark: f64) -> Markup {
+        let h = self.size[1];
+        html! {
+            path d=(format_args!("M{x:.1} {TOP_MARGIN}v{h}")) stroke="#ddd" {}
+            (label(x, self.bottom() + 16.0, "middle", &short_number(mark)))
+        }
+    }
+
+    fn level_line(&self, y: f64, mark: f64) -> Markup {
+        let (left, w) = (self.left, self.size[0]);
+        html! {
+            path d=(format_args!("M{left} {y:.1}h{w}")) stroke="#ddd" {}
+            (label(left - 6.0, y + 4.0, "end", &short_number(mark)))
         }
     }
 
@@ -301,22 +314,20 @@ impl Framed<'_> {
     }
 
     fn point_labels(&self, beside: &Beside) -> Markup {
-        let labels = beside
-            .labels
-            .iter()
-            .filter_map(|(point, text)| Some((self.place(point)?, text.as_str())));
+        let labels = beside.labels.iter();
+        let labels = labels.filter_map(|(point, text)| Some((self.place(point)?, text.as_str())));
         let points = self.chart.curves.iter().flatten();
-        let frame = Area {
+        let points = points.filter_map(|p| self.place(p));
+        labels_beside(labels.collect(), points.collect(), self.area())
+    }
+
+    fn area(&self) -> Area {
+        Area {
             left: self.left,
             top: TOP_MARGIN,
             right: self.left + self.size[0],
             bottom: self.bottom(),
-        };
-        labels_beside(
-            labels.collect(),
-            points.filter_map(|p| self.place(p)).collect(),
-            frame,
-        )
+        }
     }
 }
 
@@ -386,16 +397,21 @@ fn free_places(
     let mut placed = Vec::new();
     for (point, word) in labels {
         let width = POINT_LABEL_LETTER_WIDTH * word.chars().count() as f64;
-        let free = places_beside(point, width).into_iter().find(|place| {
-            let area = Area::of_word(*place, width);
-            frame.holds(&area) && !taken.iter().any(|other| other.overlaps(&area))
-        });
+        let mut places = places_beside(point, width).into_iter();
+        let free = places.find(|place| frame.has_room(&Area::of_word(*place, width), &taken));
         if let Some(place) = free {
             taken.push(Area::of_word(place, width));
             placed.push((place, word));
         }
     }
     placed
+}
+
+impl Area {
+    /// It holds another area, which none of those that are taken overlaps.
+    fn has_room(&self, area: &Self, taken: &[Self]) -> bool {
+        self.holds(area) && !taken.iter().any(|other| other.overlaps(area))
+    }
 }
 
 /// Where a word beside a point may begin, best first: to its right or left, above or below.
@@ -410,8 +426,7 @@ fn short_number(value: f64) -> String {
     if value != 0.0 && !(9e-4..9e4).contains(&value.abs()) {
         return power(value);
     }
-    let text = format!("{value:.3}");
-    text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    trimmed(&format!("{value:.3}")).to_owned()
 }
 
 #[cfg(test)]

@@ -29,15 +29,20 @@ pub(crate) fn heat_map(title: &str, places: &[[f64; 2]]) -> String {
 /// Places in each cell, row by row.
 fn counts_by_cell(places: &[[f64; 2]]) -> Vec<u64> {
     let mut counts = vec![0_u64; GRID_CELLS[0] * GRID_CELLS[1]];
-    let inside = places
-        .iter()
-        .filter(|place| place.iter().all(|share| (0.0..=1.0).contains(share)));
-    for place in inside {
-        let [column, row] =
-            [0, 1].map(|i| ((place[i] * GRID_CELLS[i] as f64) as usize).min(GRID_CELLS[i] - 1));
-        counts[row * GRID_CELLS[0] + column] += 1;
+    for cell in places.iter().filter_map(cell_of) {
+        counts[cell] += 1;
     }
     counts
+}
+
+/// The cell of a place, if that lies in the picture.
+fn cell_of(place: &[f64; 2]) -> Option<usize> {
+    if !place.iter().all(|share| (0.0..=1.0).contains(share)) {
+        return None;
+    }
+    let [column, row] =
+        [0, 1].map(|i| ((place[i] * GRID_CELLS[i] as f64) as usize).min(GRID_CELLS[i] - 1));
+    Some(row * GRID_CELLS[0] + column)
 }
 
 /// The cells with something in them.

@@ -1,6 +1,7 @@
 //! Histograms as SVG: what was drawn against what it was drawn from.
 
 use super::markup::{tenths, text};
+use super::number::trimmed;
 use maud::{Markup, html};
 
 /// Size of the bars' frame, SVG units.
@@ -156,23 +157,16 @@ fn cut_to_room(text: &str, room: f64) -> String {
     if text.chars().count() <= most {
         return text.to_owned();
     }
-    text.chars()
-        .take(most.saturating_sub(1))
-        .chain(['\u{2026}'])
-        .collect()
+    let kept = text.chars().take(most.saturating_sub(1));
+    kept.chain(['\u{2026}']).collect()
 }
 
 /// A number with as many digits as help.
 fn short_number(value: f64) -> String {
-    let text = if value.abs() >= 100.0 {
+    if value.abs() >= 100.0 {
         format!("{value:.0}")
     } else {
-        format!("{value:.3}")
-    };
-    if text.contains('.') {
-        text.trim_end_matches('0').trim_end_matches('.').to_owned()
-    } else {
-        text
+        trimmed(&format!("{value:.3}")).to_owned()
     }
 }
 

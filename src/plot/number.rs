@@ -20,13 +20,15 @@ pub fn three(value: f64) -> String {
 /// With a power of ten, without zeros at the end of the number before it.
 pub(crate) fn power(value: f64) -> String {
     let text = format!("{value:.2e}");
-    let Some((number, exponent)) = text.split_once('e') else {
-        return text;
-    };
-    format!(
-        "{}e{exponent}",
-        number.trim_end_matches('0').trim_end_matches('.')
-    )
+    match text.split_once('e') {
+        Some((number, exponent)) => format!("{}e{exponent}", trimmed(number)),
+        None => text,
+    }
+}
+
+/// A number with digits behind its point, without the zeros at its end.
+pub(crate) fn trimmed(number: &str) -> &str {
+    number.trim_end_matches('0').trim_end_matches('.')
 }
 
 #[cfg(test)]

@@ -105,23 +105,23 @@ impl Page {
 
 /// Bytes in the alphabet of RFC 4648 section 4, padded.
 pub fn base64(bytes: &[u8]) -> String {
-    const ALPHABET: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
     for group in bytes.chunks(3) {
-        let word = group
-            .iter()
-            .fold(0_u32, |word, &b| word << 8 | u32::from(b))
-            << (8 * (3 - group.len()));
-        for i in 0..4 {
-            let code = ALPHABET[(word >> (18 - 6 * i) & 63) as usize];
-            text.push(if i <= group.len() {
-                char::from(code)
-            } else {
-                '='
-            });
-        }
+        let letters = base64_letters(group);
+        text.extend(&letters[..=group.len()]);
+        text.extend(std::iter::repeat_n('=', 3 - group.len()));
     }
     text
+}
+
+/// The letters of three bytes; those of bytes that are missing mean nothing.
+fn base64_letters(group: &[u8]) -> [char; 4] {
+    const ALPHABET: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let word = group
+        .iter()
+        .fold(0_u32, |word, &b| word << 8 | u32::from(b));
+    let word = word << (8 * (3 - group.len()));
+    [18, 12, 6, 0].map(|shift| char::from(ALPHABET[(word >> shift & 63) as usize]))
 }
 
 #[cfg(test)]

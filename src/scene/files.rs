@@ -45,13 +45,26 @@ pub(crate) fn relative_to_file(path: &Path, file: &Path) -> Result<PathBuf> {
     Ok(io::relative(&absolute(path)?, folder))
 }
 
-/// The path from the root. `..` is resolved on the disk, since a link may stand before it.
+/// The path from the root. `..` is resolved on the disk where the path is there, since a link may stand before it.
 fn absolute(path: &Path) -> Result<PathBuf> {
     let climbs = path.components().any(|step| step == Component::ParentDir);
     match path.canonicalize() {
         Ok(resolved) if climbs => Ok(resolved),
-        _ => std::path::absolute(path).map_err(|e| Error::file(path, e)),
+        _ => std::path::absolute(path)
+            .map(|path| without_parent_steps(&path))
+            .map_err(|e| Error::file(path, e)),
     }
+}
+
+fn without_parent_steps(path: &Path) -> PathBuf {
+    path.components().fold(PathBuf::new(), |mut steps, step| {
+        if step == Component::ParentDir {
+            steps.pop();
+        } else {
+            steps.push(step);
+        }
+        steps
+    })
 }
 
 /// A path that is named in one file as it is named in another.

@@ -557,6 +557,7 @@ mod tests {
     }
 
     /// The longest that is within bounds.
+    #[cfg(feature = "counters")]
     fn endless() -> SettleOptions {
         let slow = SettleOptions {
             step: 1e-4,

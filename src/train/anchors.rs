@@ -31,11 +31,8 @@ pub struct Anchors {
 /// [Redmon and Farhadi 2017]: https://arxiv.org/abs/1612.08242
 /// [k-means++]: https://dl.acm.org/doi/10.5555/1283383.1283494
 pub fn anchors(boxes: &[[f64; 2]], count: usize, seed: u64) -> Anchors {
-    let boxes: Vec<[f64; 2]> = boxes
-        .iter()
-        .copied()
-        .filter(|b| b.iter().all(|v| v.is_finite() && *v > 0.0))
-        .collect();
+    let mut boxes = boxes.to_vec();
+    boxes.retain(|b| b.iter().all(|v| v.is_finite() && *v > 0.0));
     if boxes.is_empty() || count == 0 {
         return Anchors::default();
     }
@@ -43,15 +40,21 @@ pub fn anchors(boxes: &[[f64; 2]], count: usize, seed: u64) -> Anchors {
     let first = spread(&boxes, count.min(boxes.len()), &mut rng);
     let mut sizes = cluster(&boxes, first);
     sizes.sort_by(|a, b| (a[0] * a[1]).total_cmp(&(b[0] * b[1])));
-    let mean_iou = boxes.iter().map(|b| nearest(b, &sizes).1).sum::<f64>() / boxes.len() as f64;
-    let reached = boxes
-        .iter()
-        .filter(|b| sizes.iter().any(|a| in_reach(b, a)))
-        .count();
-    Anchors {
-        sizes,
-        mean_iou,
-        best_possible_recall: reached as f64 / boxes.len() as f64,
+    Anchors::measured(sizes, &boxes)
+}
+
+impl Anchors {
+    /// How well the sizes fit boxes.
+    fn measured(sizes: Vec<[f64; 2]>, boxes: &[[f64; 2]]) -> Self {
+        let count = boxes.len() as f64;
+        let reached = boxes
+            .iter()
+            .filter(|b| sizes.iter().any(|a| in_reach(b, a)));
+        Self {
+            mean_iou: boxes.iter().map(|b| nearest(b, &sizes).1).sum::<f64>() / count,
+            best_possible_recall: reached.count() as f64 / count,
+            sizes,
+        }
     }
 }
 
@@ -73,13 +76,10 @@ fn cluster(boxes: &[[f64; 2]], mut sizes: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
 
 /// Starting points far from each other: each drawn with the square of its distance to those before.
 fn spread(boxes: &[[f64; 2]], count: usize, rng: &mut ChaCha8Rng) -> Vec<[f64; 2]> {
-    let uniform = |rng: &mut ChaCha8Rng| (rng.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
     let mut sizes = vec![boxes[(uniform(rng) * boxes.len() as f64) as usize]];
     while sizes.len() < count {
-        let squares: Vec<f64> = boxes
-            .iter()
-            .map(|b| (1.0 - nearest(b, &sizes).1).powi(2))
-            .collect();
+        let squares = boxes.iter().map(|b| (1.0 - nearest(b, &sizes).1).powi(2));
+        let squares: Vec<f64> = squares.collect();
         let mut left = uniform(rng) * squares.iter().sum::<f64>();
         let drawn = squares.iter().position(|s| {
             left -= s;
@@ -88,6 +88,11 @@ fn spread(boxes: &[[f64; 2]], count: usize, rng: &mut ChaCha8Rng) -> Vec<[f64; 2
         sizes.push(boxes[drawn.unwrap_or(boxes.len() - 1)]);
     }
     sizes
+}
+
+/// From 0 to 1.
+fn uniform(rng: &mut ChaCha8Rng) -> f64 {
+    (rng.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
 }
 
 fn nearest(b: &[f64; 2], sizes: &[[f64; 2]]) -> (usize, f64) {
@@ -104,14 +109,11 @@ fn fit(a: &[f64; 2], b: &[f64; 2]) -> f64 {
 }
 
 fn mean_of(boxes: &[[f64; 2]], nearest: &[usize], k: usize) -> Option<[f64; 2]> {
-    let members = boxes
-        .iter()
-        .zip(nearest)
-        .filter(|(_, n)| **n == k)
-        .map(|(b, _)| b);
-    let (sum, count) = members.fold(([0.0; 2], 0.0), |(sum, n), b| {
-        ([sum[0] + b[0], sum[1] + b[1]], n + 1.0)
-    });
+    let (mut sum, mut count) = ([0.0; 2], 0.0);
+    for (b, _) in boxes.iter().zip(nearest).filter(|(_, n)| **n == k) {
+        sum = [sum[0] + b[0], sum[1] + b[1]];
+        count += 1.0;
+    }
     (count > 0.0).then(|| sum.map(|s| s / count))
 }
 

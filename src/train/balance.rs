@@ -49,19 +49,11 @@ impl Balance {
     /// ```
     pub fn weights(&self, real: u64, synthetic: u64) -> Result<Weights> {
         if !(0.0..=1.0).contains(&self.alpha) {
-            return Err(Error::value(
-                "alpha",
-                format!("{}, expected 0 to 1", self.alpha),
-            ));
+            let what = format!("{}, expected 0 to 1", self.alpha);
+            return Err(Error::value("alpha", what));
         }
-        for (at, count) in [("real", real), ("synthetic", synthetic)] {
-            if count == 0 {
-                return Err(Error::value(
-                    at,
-                    "no images, expected at least one of each source",
-                ));
-            }
-        }
+        check_images("real", real)?;
+        check_images("synthetic", synthetic)?;
         let (r, s) = (real as f64, synthetic as f64);
         let scale = (s + r) * if self.normalize { 1.0 } else { 0.5 };
         Ok(Weights {
@@ -69,6 +61,14 @@ impl Balance {
             synthetic: scale / s * (1.0 - self.alpha),
         })
     }
+}
+
+fn check_images(source: &str, count: u64) -> Result<()> {
+    if count > 0 {
+        return Ok(());
+    }
+    let what = "no images, expected at least one of each source";
+    Err(Error::value(source, what))
 }
 
 #[cfg(test)]

@@ -7,22 +7,25 @@
 /// # Method
 /// Equation 1 of the paper: `2 sigmoid(t) - 0.5 + cell` and `anchor (2 sigmoid(t))^2`.
 pub fn decode(t: [f64; 4], cell: [f64; 2], anchor: [f64; 2]) -> [f64; 4] {
-    let twice = t.map(|v| 2.0 * sigmoid(v));
-    let size = |i: usize| anchor[i] * twice[2 + i] * twice[2 + i];
+    let [x, y, w, h] = t.map(|v| 2.0 * sigmoid(v));
     [
-        twice[0] - 0.5 + cell[0],
-        twice[1] - 0.5 + cell[1],
-        size(0),
-        size(1),
+        x - 0.5 + cell[0],
+        y - 0.5 + cell[1],
+        anchor[0] * w * w,
+        anchor[1] * h * h,
     ]
 }
 
 /// The numbers that [`decode`] takes to a box; none for a box that it cannot reach: a centre more than half a cell
 /// outside its cell, a side of 0 or of 4 anchors and more.
 pub fn encode(bbox: [f64; 4], cell: [f64; 2], anchor: [f64; 2]) -> Option<[f64; 4]> {
-    let place = |i: usize| (bbox[i] - cell[i] + 0.5) / 2.0;
-    let side = |i: usize| (bbox[2 + i] / anchor[i]).sqrt() / 2.0;
-    let shares = [place(0), place(1), side(0), side(1)];
+    let [x, y, w, h] = bbox;
+    let shares = [
+        (x - cell[0] + 0.5) / 2.0,
+        (y - cell[1] + 0.5) / 2.0,
+        (w / anchor[0]).sqrt() / 2.0,
+        (h / anchor[1]).sqrt() / 2.0,
+    ];
     let reachable = shares.iter().all(|s| *s > 0.0 && *s < 1.0);
     reachable.then(|| shares.map(|s| libm::log(s / (1.0 - s))))
 }

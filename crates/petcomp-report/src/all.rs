@@ -104,7 +104,7 @@ const SLOW_SECTIONS: [fn() -> Result<Section>; 3] =
 /// leaves out extreme cases, counted work and scale.
 ///
 /// # Errors
-/// An input that cannot be read; a thread or scratch folder that cannot be had; memory and scale need Linux's `/proc`.
+/// An input that cannot be read; a thread or scratch folder that cannot be made; memory and scale need Linux's `/proc`.
 pub fn measure(options: &AllOptions, progress: impl Fn(u64, u64)) -> Result<Document> {
     let slow = options.slow_sections();
     let steps = (STAGES.len() + slow.len()) as u64;
@@ -190,7 +190,7 @@ fn other_programs(comparisons: &[peers::PeerComparison], folder: &Path) -> Secti
     if comparisons.is_empty() {
         let folder = folder.display();
         return section.text(format!(
-            "There are no measurements in {folder}: `make peers` runs the other programs that can be had."
+            "There are no measurements in {folder}: `make peers` runs the other programs that are available."
         ));
     }
     comparisons
@@ -232,7 +232,7 @@ fn stability_of_stages() -> Result<Section> {
 
 fn counted_work() -> Result<Section> {
     let rows = work::measure(|_, _| ())?;
-    let kept = rows.iter().filter(|row| row.is_as_promised()).count();
+    let kept = rows.iter().filter(|row| row.is_as_expected()).count();
     Ok(Section::new("A scene pays for what it uses")
         .text(format!(
             "Work, counted and not timed: the same at every run and on every machine. A marked zero is promised; {kept} of {} \

@@ -64,7 +64,7 @@ pub struct CameraRow {
     pub failed: usize,
     /// Error of the focal length, percent: median and 95 % quantile.
     pub focal_percent: [f64; 2],
-    /// Error of where points 50 mm above the surface are seen, root mean square over the rectangle, pixels; likewise.
+    /// Error of where points 50 mm above the surface are seen, root mean square over the rectangle, pixels: median and 95 % quantile.
     pub height_px: [f64; 2],
     /// Median CPU time of a photo, microseconds.
     pub time_us: f64,

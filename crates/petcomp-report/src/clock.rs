@@ -26,17 +26,22 @@ const MOST_REPEATS: f64 = 1000.0;
 /// The first of `work`; a thread that cannot be started.
 pub(super) fn timed<T: Send>(runs: usize, work: impl Fn() -> Result<T> + Sync) -> Result<(T, f64)> {
     let one = single_thread()?;
-    let start = cpu_seconds();
-    let made = one.install(&work)?;
-    let first = cpu_seconds() - start;
+    let (made, first) = seconds_of(|| one.install(&work));
+    let made = made?;
     let repeats = repeats_for(first);
     let mut times = vec![first];
     for _ in 1..runs {
-        let start = cpu_seconds();
-        one.install(|| repeat(repeats, &work))?;
-        times.push((cpu_seconds() - start) / repeats as f64);
+        let (repeated, seconds) = seconds_of(|| one.install(|| repeat(repeats, &work)));
+        repeated?;
+        times.push(seconds / repeats as f64);
     }
     Ok((made, median(times)))
+}
+
+fn seconds_of<T>(work: impl FnOnce() -> T) -> (T, f64) {
+    let start = cpu_seconds();
+    let made = work();
+    (made, cpu_seconds() - start)
 }
 
 fn single_thread() -> Result<ThreadPool> {

@@ -97,7 +97,6 @@ impl Conversion<'_> {
 
 fn encoding() -> Result<Diagram> {
     let lights = shuffled_lights();
-    let wrong = count_wrong_codes(&encode_by_table(&lights), &lights);
     let reason = "what rounding to 8 bits costs, and 1 % for the few values";
     Ok(Diagram {
         file: "color_encode".into(),
@@ -106,12 +105,19 @@ fn encoding() -> Result<Diagram> {
         error: "RMS error of the encoded value".into(),
         points: encoding_points(&lights)?,
         limit: Some((1.01 * ROUNDING_RMS / MAX_CODE_8, reason.into())),
-        why: format!(
-            "Pictures have 8 bits, and {wrong} of {} codes differ from the nearest one: the table is the formula, rounded.",
-            lights.len()
-        ),
+        why: why_table(&lights),
         ..color_diagram()
     })
+}
+
+fn why_table(lights: &[f32]) -> String {
+    let (wrong, all) = (
+        count_wrong_codes(&encode_by_table(lights), lights),
+        lights.len(),
+    );
+    format!(
+        "Pictures have 8 bits, and {wrong} of {all} codes differ from the nearest one: the table is the formula, rounded."
+    )
 }
 
 /// What both diagrams share.
@@ -128,19 +134,22 @@ fn encoding_points(lights: &[f32]) -> Result<Vec<Point>> {
         values: lights,
         exact: encoded,
     };
-    let eight_bits = conversion.point(["table", "8 bits"], encode_by_table, |c| {
-        f64::from(*c) / MAX_CODE_8
-    })?;
     Ok(vec![
-        eight_bits.used_where(|_| true),
-        conversion.point(["table", "16 bits"], encode_by_table_16, |c| {
-            f64::from(*c) / MAX_CODE_16
-        })?,
+        conversion
+            .point(["table", "8 bits"], encode_by_table, value_of_code_8)?
+            .used_where(|_| true),
+        conversion.point(["table", "16 bits"], encode_by_table_16, value_of_code_16)?,
         conversion.point_of_each(["formula", "32-bit float"], linear_to_srgb)?,
-        conversion.point_of_each(["plain power", "gamma 2.2"], |v| {
-            Curve::Gamma(PLAIN_GAMMA).encode(v)
-        })?,
+        conversion.point_of_each(["plain power", "gamma 2.2"], encode_by_power)?,
     ])
+}
+
+fn value_of_code_8(code: &u8) -> f64 {
+    f64::from(*code) / MAX_CODE_8
+}
+
+fn value_of_code_16(code: &u16) -> f64 {
+    f64::from(*code) / MAX_CODE_16
 }
 
 fn encode_by_table(values: &[f32]) -> Vec<u8> {
@@ -158,9 +167,14 @@ fn encode_by_table_16(values: &[f32]) -> Vec<u16> {
 /// Codes that are not the nearest to what the closed form gives.
 fn count_wrong_codes(codes: &[u8], lights: &[f32]) -> usize {
     let all = codes.iter().zip(lights);
-    // Half a code, and a little for the closed form's own rounding.
-    all.filter(|(c, v)| (f64::from(**c) - MAX_CODE_8 * encoded(f64::from(**v))).abs() > 0.5 + 1e-9)
+    all.filter(|(code, light)| is_wrong_code(**code, **light))
         .count()
+}
+
+fn is_wrong_code(code: u8, light: f32) -> bool {
+    let exact = MAX_CODE_8 * encoded(f64::from(light));
+    // Half a code, and a little for the closed form's own rounding.
+    (f64::from(code) - exact).abs() > 0.5 + 1e-9
 }
 
 fn decoding() -> Result<Diagram> {
@@ -177,31 +191,33 @@ fn decoding() -> Result<Diagram> {
 }
 
 fn decoding_points(codes: &[u8]) -> Result<Vec<Point>> {
-    let values: Vec<f32> = codes.iter().map(|c| value_of_code(*c)).collect();
+    let values: Vec<f32> = codes.iter().map(|c| value_of_code_8(c) as f32).collect();
     let conversion = Conversion {
         values: &values,
         exact: decoded,
     };
     // The tables take codes, not values: both stand for the same.
-    let eight_bits =
-        conversion.point(["table", "8 bits"], |_| decode_by_table(codes), to_double)?;
-    let sixteen_bits = conversion.point(
-        ["table", "16 bits"],
-        |_| decode_by_table_16(codes),
-        to_double,
-    )?;
+
     Ok(vec![
-        eight_bits.used_where(|_| true),
-        sixteen_bits,
+        conversion
+            .point(["table", "8 bits"], |_| decode_by_table(codes), to_double)?
+            .used_where(|_| true),
+        conversion.point(
+            ["table", "16 bits"],
+            |_| decode_by_table_16(codes),
+            to_double,
+        )?,
         conversion.point_of_each(["formula", "32-bit float"], srgb_to_linear)?,
-        conversion.point_of_each(["plain power", "gamma 2.2"], |v| {
-            Curve::Gamma(PLAIN_GAMMA).decode(v)
-        })?,
+        conversion.point_of_each(["plain power", "gamma 2.2"], decode_by_power)?,
     ])
 }
 
-fn value_of_code(code: u8) -> f32 {
-    (f64::from(code) / MAX_CODE_8) as f32
+fn encode_by_power(v: f32) -> f32 {
+    Curve::Gamma(PLAIN_GAMMA).encode(v)
+}
+
+fn decode_by_power(v: f32) -> f32 {
+    Curve::Gamma(PLAIN_GAMMA).decode(v)
 }
 
 fn to_double(v: &f32) -> f64 {

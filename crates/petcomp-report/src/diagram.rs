@@ -8,7 +8,7 @@ use petcomp::plot::{Axis, Beside, Chart, Curve, Table, three};
 const TIMING_NOISE_FACTOR: f64 = 1.1;
 /// How far the axis reaches below the least error where some errors are 0: so far that its edge is not read as an error.
 const ZERO_ERROR_ROOM_FACTOR: f64 = 10.0;
-/// An error of a picture that nobody sees: half of a code of 8 bits at middle grey.
+/// The largest invisible error of a picture: half of a code of 8 bits at middle grey.
 const INVISIBLE_ERROR: f64 = 0.004;
 
 /// Error against cost of the settings of a stage, and of other programs that do the same.
@@ -147,7 +147,7 @@ impl Point {
         names.join(", ")
     }
 
-    /// The words beside it: what is set, and the qualities that use it.
+    /// The words next to it: what is set, and the qualities that use it.
     fn label(&self) -> String {
         let name = self.short_name();
         match self.qualities.len() {
@@ -305,7 +305,7 @@ impl Diagram {
         [point.cost, point.error.max(self.error_axis().range[0])]
     }
 
-    /// Words beside points. Those of points that a quality uses come first: words without room are left out.
+    /// Labels of points. Those of points that a quality uses come first: labels without room are left out.
     fn labels(&self) -> Vec<([f64; 2], String)> {
         let (used, unused): (Vec<_>, Vec<_>) =
             self.points.iter().partition(|p| !p.qualities.is_empty());
@@ -419,7 +419,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_front_is_what_nobody_beats() {
+    fn the_front_is_what_no_point_beats() {
         let points = [
             [1.0, 9.0],
             [2.0, 4.0],

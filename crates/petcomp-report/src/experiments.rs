@@ -1,5 +1,6 @@
 //! Our trained models beside the paper's.
 
+use super::files::write_texts;
 use petcomp::eval::page::{Metrics, Spread};
 use petcomp::io;
 use petcomp::plot::{Page, Table};
@@ -139,15 +140,19 @@ impl From<Spread> for SampleMoments {
 ///
 /// [Welch 1947]: https://doi.org/10.1093/biomet/34.1-2.28
 pub fn welch_test(a: SampleMoments, b: SampleMoments) -> Option<f64> {
-    let (va, vb) = (a.variance_of_mean(), b.variance_of_mean());
-    let sum = va + vb;
+    let sum = a.variance_of_mean() + b.variance_of_mean();
     if a.n < 2 || b.n < 2 || sum <= 0.0 {
         return None;
     }
-    let freedom = sum * sum / (va * va / a.freedom() + vb * vb / b.freedom());
     let t = (a.mean - b.mean).abs() / sum.sqrt();
-    let distribution = StudentsT::new(0.0, 1.0, freedom).ok()?;
+    let distribution = StudentsT::new(0.0, 1.0, welch_freedom(a, b)).ok()?;
     Some(2.0 * distribution.sf(t))
+}
+
+/// Degrees of freedom of the difference of two means.
+fn welch_freedom(a: SampleMoments, b: SampleMoments) -> f64 {
+    let (va, vb) = (a.variance_of_mean(), b.variance_of_mean());
+    (va + vb) * (va + vb) / (va * va / a.freedom() + vb * vb / b.freedom())
 }
 
 /// Our numbers beside the paper's: a row per value of the paper, ours empty where there is no run.
@@ -222,7 +227,7 @@ impl PaperRow {
 }
 
 fn spread_of(ours: &BTreeMap<String, Vec<f64>>, key: &str) -> Option<Spread> {
-    Some(Spread::of(ours.get(key)?, 0))
+    Some(Spread::from_values(ours.get(key)?, 0))
 }
 
 /// Mean and deviation, interval and number of runs; empty without runs.
@@ -287,11 +292,13 @@ impl PaperTraining {
 pub fn write(folder: &Path, of: &Path) -> Result<Table> {
     let table = table(&read_runs(of)?);
     let updates = updates_table(PAPER_TRAINING);
-    io::create_folder(folder)?;
-    io::write_text(folder.join("experiments.csv"), &table.csv())?;
-    io::write_text(folder.join("experiments.md"), &table.markdown())?;
-    io::write_text(folder.join("updates.csv"), &updates.csv())?;
-    io::write_text(folder.join("experiments.html"), &page(&table, &updates))?;
+    let files = [
+        ("experiments.csv", &*table.csv()),
+        ("experiments.md", &table.markdown()),
+        ("updates.csv", &updates.csv()),
+        ("experiments.html", &page(&table, &updates)),
+    ];
+    write_texts(folder, files)?;
     Ok(table)
 }
 

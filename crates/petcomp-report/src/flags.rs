@@ -8,13 +8,14 @@ mod variant;
 
 pub use variant::{Expected, PhotoVariant};
 
+use super::files::write_texts;
 use super::matte::score::overlap;
 use super::matte::truth::{Known, Truths};
 use super::matte::{GOOD_BOX_PX, GOOD_IOU};
 use petcomp::Image;
 use petcomp::Result;
 use petcomp::geom::Point2;
-use petcomp::io;
+
 use petcomp::matte::{CutOut, CutOutOptions, cut_out};
 use petcomp::plot::Table;
 use petcomp::{Coverage, LinearRgb};
@@ -54,7 +55,7 @@ pub struct Judgement {
     /// How it ended.
     pub end: End,
     /// Why the cut-out needs review, or why there is none.
-    pub doubts: Vec<String>,
+    pub reasons: Vec<String>,
 }
 
 /// How a photo ended.
@@ -131,7 +132,7 @@ impl Trial {
             Err(error) => Judgement {
                 errors: None,
                 end: self.end_of_refused(),
-                doubts: vec![error.to_string()],
+                reasons: vec![error.to_string()],
             },
         }
     }
@@ -145,23 +146,18 @@ impl Trial {
     }
 
     fn judge(&self, cut: &CutOut) -> Judgement {
-        let errors = self.errors(cut);
-        let [iou, box_px] = errors;
-        // Pixels of a reduced search are that much larger.
-        let is_right =
-            iou >= GOOD_IOU && box_px <= GOOD_BOX_PX * cut.segmentation.reduction.max(1.0);
-        let doubts = outline_doubts(cut);
+        let (errors, reasons) = (self.errors(cut), outline_reasons(cut));
+        let is_right = is_right(errors, cut.segmentation.reduction);
         Judgement {
             errors: Some(errors),
-            end: self.expected.end(is_right, !doubts.is_empty()),
-            doubts,
+            end: self.expected.end(is_right, !reasons.is_empty()),
+            reasons,
         }
     }
 
     fn errors(&self, cut: &CutOut) -> [f64; 2] {
-        let sides = bounding_sides(&cut.segmentation.hull).into_iter();
-        let off = sides.zip(self.box_px).map(|(a, b)| (a - b).abs());
-        let box_px = off.fold(0.0, f64::max);
+        let sides = bounding_sides(&cut.segmentation.hull);
+        let box_px = largest_difference(sides, self.box_px);
         [overlap(&cut.segmentation.tight, &self.mask), box_px]
     }
 }
@@ -178,8 +174,13 @@ impl Expected {
     }
 }
 
+/// Pixels of a reduced search are that much larger.
+pub(crate) fn is_right([iou, box_px]: [f64; 2], reduction: f64) -> bool {
+    iou >= GOOD_IOU && box_px <= GOOD_BOX_PX * reduction.max(1.0)
+}
+
 /// Why an outline needs review; its colours are another matter.
-fn outline_doubts(cut: &CutOut) -> Vec<String> {
+fn outline_reasons(cut: &CutOut) -> Vec<String> {
     let of_outline = cut
         .diagnostics
         .iter()
@@ -188,13 +189,18 @@ fn outline_doubts(cut: &CutOut) -> Vec<String> {
 }
 
 /// Left, top, right and bottom of a polygon.
-fn bounding_sides(polygon: &[Point2<f64>]) -> [f64; 4] {
+pub(crate) fn bounding_sides(polygon: &[Point2<f64>]) -> [f64; 4] {
     [
         least(polygon, |p| p.x),
         least(polygon, |p| p.y),
         -least(polygon, |p| -p.x),
         -least(polygon, |p| -p.y),
     ]
+}
+
+pub(crate) fn largest_difference(a: [f64; 4], b: [f64; 4]) -> f64 {
+    let off = a.iter().zip(b).map(|(a, b)| (a - b).abs());
+    off.fold(0.0, f64::max)
 }
 
 fn least(polygon: &[Point2<f64>], along: fn(&Point2<f64>) -> f64) -> f64 {
@@ -206,13 +212,23 @@ pub fn table(rows: &[FlagRow]) -> Table {
     let ends = End::ALL.map(End::name);
     let mut table = Table::new(["photos", "made of"].into_iter().chain(ends));
     for variant in PhotoVariant::ALL {
-        let own: Vec<_> = rows.iter().filter(|row| row.variant == variant).collect();
-        let counts = End::ALL.map(|end| own.iter().filter(|row| row.judged.end == end).count());
-        let counts = [own.len()].into_iter().chain(counts);
-        let name = [variant.name().to_owned()].into_iter();
-        table.push(name.chain(counts.map(|count| count.to_string())));
+        let name = variant.name().to_owned();
+        let counts = counts_of(rows, variant).map(|count| count.to_string());
+        table.push([name].into_iter().chain(counts));
     }
     table
+}
+
+/// How many photos of a variant there are, and how many ended in each way.
+fn counts_of(rows: &[FlagRow], variant: PhotoVariant) -> impl Iterator<Item = usize> {
+    let of_variant = rows.iter().filter(|row| row.variant == variant);
+    let ends: Vec<End> = of_variant.map(|row| row.judged.end).collect();
+    let each = End::ALL.map(|end| count_end(&ends, end));
+    [ends.len()].into_iter().chain(each)
+}
+
+fn count_end(ends: &[End], end: End) -> usize {
+    ends.iter().filter(|found| **found == end).count()
 }
 
 /// Every photo in every variant.
@@ -232,7 +248,7 @@ impl FlagRow {
             four_decimals(iou),
             four_decimals(box_px),
             judged.end.name().into(),
-            judged.doubts.join("; "),
+            judged.reasons.join("; "),
         ]
     }
 }
@@ -249,9 +265,8 @@ pub fn write(truth: &Path, folder: &Path, progress: impl Fn(u64, u64)) -> Result
     let rows = measure(truth, progress)?;
     let table = table(&rows);
     let markdown = format!("# Right, or flagged\n\n{}", table.markdown());
-    io::create_folder(folder)?;
-    io::write_text(folder.join("flags.csv"), &details(&rows).csv())?;
-    io::write_text(folder.join("flags.md"), &markdown)?;
+    let data = details(&rows).csv();
+    write_texts(folder, [("flags.csv", &data), ("flags.md", &markdown)])?;
     Ok(table)
 }
 
@@ -358,7 +373,7 @@ mod tests {
             judged: Judgement {
                 errors: None,
                 end,
-                doubts: vec!["x; y".into()],
+                reasons: vec!["x; y".into()],
             },
         };
         let rows = [

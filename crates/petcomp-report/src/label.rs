@@ -28,7 +28,7 @@ const TIMED_RUNS: usize = 7;
 /// Error against time, and against the points that are written.
 ///
 /// # Errors
-/// A thread that cannot be had.
+/// A thread that cannot be started.
 pub fn diagrams() -> Result<Vec<Diagram>> {
     let mut found = LabelPoints::default();
     for size in SIZES_PX {
@@ -72,8 +72,7 @@ impl EllipsePicture {
             alpha_threshold,
             ..LabelOptions::default()
         };
-        let labelled = || Ok(label(&self.deep, &self.shot, &options));
-        let (labels, seconds) = timed(TIMED_RUNS, labelled)?;
+        let (labels, seconds) = timed(TIMED_RUNS, || Ok(label(&self.deep, &self.shot, &options)))?;
         let mask = only_mask(&labels);
         Ok(MeasuredMask {
             name: self.setting_name(alpha_threshold),
@@ -166,7 +165,7 @@ impl LabelPoints {
         Ok(())
     }
 
-    /// The outline of the geometry with so many corners.
+    /// The outline of the geometry with this number of corners.
     fn add_outline(&mut self, corners: usize) -> Result<()> {
         let ellipse = Ellipse::seen_by(DEFAULT_SIZE_PX);
         let shot = ellipse.shot(corners);

@@ -28,7 +28,7 @@ const TIMED_RUNS: usize = 5;
 /// The shadow of a card under an area light, and under an even sky.
 ///
 /// # Errors
-/// A thread that cannot be had.
+/// A thread that cannot be started.
 pub fn diagrams() -> Result<Vec<Diagram>> {
     let kinds = [LightKind::Area, LightKind::Sky];
     kinds.into_iter().map(shadow_diagram).collect()
@@ -117,7 +117,7 @@ fn input_words() -> String {
 
 type Renderer = fn(&Shot, &RenderOptions) -> DeepImage;
 
-/// A card's shadow, to be rendered, and what it is.
+/// A card's shadow, to be rendered, and its closed form.
 struct Shadow {
     kind: LightKind,
     shot: Shot,

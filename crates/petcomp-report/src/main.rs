@@ -36,7 +36,7 @@ pub(crate) struct ReportFlags {
 
 impl ReportFlags {
     /// Prints a line about the work, unless asked to be quiet.
-    pub(crate) fn say(&self, line: impl std::fmt::Display) {
+    pub(crate) fn print_line(&self, line: impl std::fmt::Display) {
         if !self.quiet {
             println!("{line}");
         }

@@ -68,7 +68,7 @@ pub fn measure(folder: &Path, progress: impl Fn(u64, u64)) -> Result<Vec<MatteRo
     measure_known(truths.len(), |i| truths.read(i), progress)
 }
 
-/// Measures every method on so many photos.
+/// Measures every method on a number of photos.
 fn measure_known(
     count: usize,
     read: impl Fn(usize) -> Result<Known>,

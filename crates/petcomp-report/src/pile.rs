@@ -20,7 +20,7 @@ const TEXTURE_COUNT: u32 = 5;
 /// Size of a card, metres.
 const CARD_SIZE_M: [f64; 2] = [0.07, 0.21];
 
-/// A camera that looks straight down from so many metres over the origin.
+/// A camera that looks straight down from `height_m` over the origin.
 pub(super) fn camera_above(image: [u32; 2], height_m: f64) -> Camera {
     let [w, h] = image.map(f64::from);
     Camera {
@@ -53,7 +53,7 @@ pub(super) fn whole_card_uv() -> Arc<[Point2<f64>]> {
     Arc::new([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(Point2::from))
 }
 
-/// So many see-through bottles on and over each other, under one light and a dim sky.
+/// See-through bottles on and over each other, under one light and a dim sky.
 pub(super) fn pile(cards: u32, image: [u32; 2]) -> Shot {
     let shot = Shot::new(camera_above(image, CAMERA_HEIGHT_M))
         .with_light(lamp(LinearRgb::new(1.0, 0.95, 0.85)))

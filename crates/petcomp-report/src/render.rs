@@ -14,6 +14,7 @@ pub use show::{charts, golden_table, speed_up, table};
 use super::clock::timed;
 use super::files::write_texts;
 use cycles::{CyclesPictures, TimedPicture};
+use petcomp::DeepImage;
 use petcomp::Image;
 use petcomp::Quality;
 use petcomp::diff::Likeness;
@@ -37,6 +38,12 @@ pub struct RenderReportOptions {
     pub golden: PathBuf,
     /// Renderings per setting, of which the median is reported. Default: 5.
     pub repeats: usize,
+}
+
+impl RenderReportOptions {
+    fn import(&self, size: [u32; 2]) -> Result<Shot> {
+        petcomp::scene::cycles::import(&self.scene, Some(size))
+    }
 }
 
 /// The quadrature renders a quarter of the picture's sides: it takes a thousand times as long.
@@ -153,12 +160,11 @@ struct TimedScene {
 
 impl TimedScene {
     fn new(options: &RenderReportOptions, best: Option<Image<LinearRgb>>) -> Result<Self> {
-        let import = |size| petcomp::scene::cycles::import(&options.scene, Some(size));
-        let small = import(options.size.map(|side| (side / QUADRATURE_SHRINK).max(1)))?;
+        let small = options.import(options.size.map(|side| (side / QUADRATURE_SHRINK).max(1)))?;
         let deep = render_reference(&small, &QUADRATURE);
         Ok(Self {
-            shot: import(options.size)?,
-            quadrature: finished(&composite::frame(&deep, small.plate.as_deref())),
+            shot: options.import(options.size)?,
+            quadrature: composed(&deep, &small),
             small,
             best,
         })
@@ -197,8 +203,12 @@ impl TimedScene {
 }
 
 fn picture_of(shot: &Shot, options: &RenderOptions) -> Image<LinearRgb> {
-    let deep = render(shot, options);
-    finished(&composite::frame(&deep, shot.plate.as_deref()))
+    composed(&render(shot, options), shot)
+}
+
+/// Deep samples over the plate of their scene.
+fn composed(deep: &DeepImage, shot: &Shot) -> Image<LinearRgb> {
+    finished(&composite::frame(deep, shot.plate.as_deref()))
 }
 
 fn finished(frame: &Image<PremulRgba>) -> Image<LinearRgb> {

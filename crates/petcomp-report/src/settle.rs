@@ -124,7 +124,7 @@ fn settings() -> Vec<SettleOptions> {
         .collect()
 }
 
-/// So many steps a second, with every number of iterations.
+/// A number of steps a second, with every number of iterations.
 fn at_rate(rate: u32, default: SettleOptions) -> [SettleOptions; 4] {
     ITERATIONS.map(|iterations| SettleOptions {
         step: 1.0 / f64::from(rate),

@@ -8,6 +8,7 @@ mod cases;
 mod tests;
 mod world;
 
+use crate::files::write_texts;
 use cases::{Asked, WorkCase, cases};
 use petcomp::PremulRgba;
 use petcomp::dataset::{Pipeline, generate};
@@ -34,7 +35,7 @@ pub struct WorkRow {
 
 impl WorkRow {
     /// Every count that must be zero is.
-    pub fn is_as_promised(&self) -> bool {
+    pub fn is_as_expected(&self) -> bool {
         self.counts
             .iter()
             .all(|(kind, count)| *count == 0 || !self.absent.contains(kind))
@@ -121,11 +122,10 @@ fn counts_allocations() -> Result<bool> {
 /// # Errors
 /// As [`measure`]; files that cannot be written.
 pub fn write(folder: impl AsRef<Path>, progress: impl Fn(u64, u64)) -> Result<Vec<WorkRow>> {
-    let folder = folder.as_ref();
-    io::create_folder(folder)?;
     let rows = measure(progress)?;
-    io::write_text(folder.join("work.csv"), &csv(&rows).csv())?;
-    io::write_text(folder.join("work.md"), &markdown(&rows))?;
+    let data = csv(&rows).csv();
+    let files = [("work.csv", &*data), ("work.md", &markdown(&rows))];
+    write_texts(folder.as_ref(), files)?;
     Ok(rows)
 }
 
@@ -162,7 +162,7 @@ fn scenes_by_kinds(rows: &[WorkRow], shown: impl Fn(&WorkRow, Kind, u64) -> Stri
 
 /// The table with its explanation.
 fn markdown(rows: &[WorkRow]) -> String {
-    let kept = rows.iter().filter(|row| row.is_as_promised()).count();
+    let kept = rows.iter().filter(|row| row.is_as_expected()).count();
     let head = format!(
         "# What scenes pay for\n\nCounted, not timed; the same numbers at any thread count. ✓ marks a zero that is \
          guaranteed and tested. {kept} of {} scenes are as expected.\n\n",

@@ -24,13 +24,13 @@ fn trial(stage: &str, case: HardCase) -> Trial {
 
 fn held(case: &HardCase) -> Result<(), Failed> {
     let outcome = case.outcome();
-    let told = format!(
+    let message = format!(
         "{}; expected: {}; found: {}",
         case.input, case.expectation, outcome.measured
     );
     if outcome.passed {
         Ok(())
     } else {
-        Err(told.into())
+        Err(message.into())
     }
 }

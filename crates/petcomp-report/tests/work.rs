@@ -1,4 +1,4 @@
-//! Large allocations, counted by an allocator that tells: the one of the program.
+//! Large allocations, counted by the allocator of the program.
 
 #[path = "../src/allocator.rs"]
 mod allocator;
@@ -27,7 +27,7 @@ fn an_allocation_of_a_mebibyte_is_one_and_a_smaller_one_is_none() {
 #[test]
 fn every_scene_is_as_promised_with_allocations_counted_too() {
     let rows = measure(|_, _| {}).unwrap();
-    let broken: Vec<_> = rows.iter().filter(|row| !row.is_as_promised()).collect();
+    let broken: Vec<_> = rows.iter().filter(|row| !row.is_as_expected()).collect();
     assert!(broken.is_empty(), "{broken:#?}");
     let large = |name: &str| {
         let row = rows.iter().find(|row| row.scene == name).unwrap();

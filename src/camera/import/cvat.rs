@@ -1,6 +1,6 @@
 //! CVAT: the export "CVAT for images 1.1", an XML file for many pictures.
 
-use super::{AnnotatedShape, Annotation, ShapeKind, upright_corners};
+use super::{AnnotatedShape, Annotation, ShapeKind, turned_about, upright_corners, with_shapes};
 use crate::error::{Error, Result};
 use roxmltree::{Document, Node};
 
@@ -16,32 +16,30 @@ pub(super) fn annotations(text: &str) -> Result<Option<Vec<Annotation>>> {
         return Ok(None);
     }
     let images = root.children().filter(|node| node.has_tag_name("image"));
-    let all: Result<Vec<Annotation>> = images
+    let annotations = images
         .enumerate()
-        .map(|(i, node)| annotation(node).map_err(|e| e.within(&format!("image[{i}]"))))
-        .collect();
-    Ok(Some(
-        all?.into_iter()
-            .filter(|annotation| !annotation.shapes.is_empty())
-            .collect(),
-    ))
+        .map(|(i, node)| annotation(node).map_err(|e| e.within(&format!("image[{i}]"))));
+    with_shapes(annotations).map(Some)
 }
 
 /// CVAT's pixels are ours: 0 is the edge of the picture.
 fn annotation(image: Node<'_, '_>) -> Result<Annotation> {
     let (width, height) = (number(image, "width")?, number(image, "height")?);
-    let shapes = image
-        .children()
-        .filter(Node::is_element)
-        .map(shape)
-        .collect::<Result<Vec<_>>>()?;
     let name = image.attribute("name").unwrap_or_default();
     Ok(Annotation {
         files: vec![name.replace('\\', "/")],
         size: Some([width as u32, height as u32]),
-        shapes: shapes.into_iter().flatten().collect(),
+        shapes: shapes(image)?,
         source: "cvat",
     })
+}
+
+fn shapes(image: Node<'_, '_>) -> Result<Vec<AnnotatedShape>> {
+    image
+        .children()
+        .filter(Node::is_element)
+        .filter_map(|node| shape(node).transpose())
+        .collect()
 }
 
 fn shape(node: Node<'_, '_>) -> Result<Option<AnnotatedShape>> {
@@ -73,16 +71,15 @@ fn points(node: Node<'_, '_>) -> Result<Vec<[f64; 2]>> {
     let text = node.attribute("points").unwrap_or_default();
     text.split(';')
         .filter(|part| !part.trim().is_empty())
-        .map(|part| {
-            point(part).ok_or_else(|| Error::value("points", format!("\"{part}\", expected x,y")))
-        })
+        .map(point)
         .collect()
 }
 
 /// `x,y` as numbers.
-fn point(text: &str) -> Option<[f64; 2]> {
-    let (x, y) = text.split_once(',')?;
-    Some([x.trim().parse().ok()?, y.trim().parse().ok()?])
+fn point(text: &str) -> Result<[f64; 2]> {
+    text.split_once(',')
+        .and_then(|(x, y)| Some([x.trim().parse().ok()?, y.trim().parse().ok()?]))
+        .ok_or_else(|| Error::value("points", format!("\"{text}\", expected x,y")))
 }
 
 fn number(node: Node<'_, '_>, name: &str) -> Result<f64> {
@@ -99,14 +96,9 @@ fn turned_about_middle(corners: Vec<[f64; 2]>, degrees: f64) -> Vec<[f64; 2]> {
         return corners;
     }
     let middle = [0, 1].map(|axis| (corners[0][axis] + corners[2][axis]) / 2.0);
-    let angle = degrees.to_radians();
-    let (sin, cos) = (libm::sin(angle), libm::cos(angle));
     corners
         .into_iter()
-        .map(|[x, y]| {
-            let [u, v] = [x - middle[0], y - middle[1]];
-            [middle[0] + u * cos - v * sin, middle[1] + u * sin + v * cos]
-        })
+        .map(|[x, y]| turned_about(middle, [x - middle[0], y - middle[1]], degrees))
         .collect()
 }
 

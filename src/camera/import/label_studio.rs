@@ -1,7 +1,7 @@
 //! Label Studio: the exports JSON (tasks with annotations and results) and JSON-MIN (tasks with their results beside each
 //! other). Positions are in percent of the picture.
 
-use super::{AnnotatedShape, Annotation, ShapeKind};
+use super::{AnnotatedShape, Annotation, ShapeKind, turned_about, with_shapes};
 use crate::error::{Error, Result};
 use serde::Deserialize;
 use serde_json::Value;
@@ -37,7 +37,7 @@ struct ResultGeometry {
 }
 
 pub(super) fn is_label_studio(value: &Value) -> bool {
-    let tasks = value.as_array().map_or(&[][..], Vec::as_slice);
+    let tasks = items(value);
     !tasks.is_empty()
         && tasks
             .iter()
@@ -45,16 +45,13 @@ pub(super) fn is_label_studio(value: &Value) -> bool {
 }
 
 pub(super) fn annotations(value: Value) -> Result<Vec<Annotation>> {
-    let tasks = value.as_array().map_or(&[][..], Vec::as_slice);
-    let found: Result<Vec<Annotation>> = tasks
-        .iter()
-        .enumerate()
-        .map(|(i, task)| annotation(task).map_err(|e| e.within(&format!("[{i}]"))))
-        .collect();
-    Ok(found?
-        .into_iter()
-        .filter(|annotation| !annotation.shapes.is_empty())
-        .collect())
+    let tasks = items(&value).iter().enumerate();
+    with_shapes(tasks.map(|(i, task)| annotation(task).map_err(|e| e.within(&format!("[{i}]")))))
+}
+
+/// The elements of an array; none of anything else.
+fn items(value: &Value) -> &[Value] {
+    value.as_array().map_or(&[], Vec::as_slice)
 }
 
 fn annotation(task: &Value) -> Result<Annotation> {
@@ -67,11 +64,7 @@ fn annotation(task: &Value) -> Result<Annotation> {
         source: "label-studio",
         ..Default::default()
     };
-    for (i, result) in results.iter().enumerate() {
-        // Choices, ratings and the like have no size of a picture.
-        if result.get("original_width").is_none() {
-            continue;
-        }
+    for (i, result) in results.iter().enumerate().filter(|(_, r)| has_size(r)) {
         let result = read_result(result).map_err(|e| Error::value(format!("result[{i}]"), e))?;
         annotation.size = Some([result.original_width, result.original_height]);
         annotation.shapes.extend(result.shape());
@@ -90,22 +83,22 @@ fn read_result(value: &Value) -> std::result::Result<AnnotationResult, String> {
 
 /// The results of the only annotation that was not cancelled.
 fn only_annotation_results(annotations: &Value) -> Result<Vec<&Value>> {
-    let all = annotations.as_array().map_or(&[][..], Vec::as_slice);
-    let kept: Vec<&Value> = all
+    let kept: Vec<&Value> = items(annotations)
         .iter()
-        .filter(|a| a.get("was_cancelled").and_then(Value::as_bool) != Some(true))
+        .filter(|annotation| !is_cancelled(annotation))
         .collect();
     match kept.as_slice() {
         [] => Ok(Vec::new()),
-        [one] => Ok(one
-            .get("result")
-            .and_then(Value::as_array)
-            .map_or(Vec::new(), |list| list.iter().collect())),
-        more => Err(Error::value(
-            "annotations",
-            format!("{}, expected one", more.len()),
-        )),
+        [one] => Ok(one.get("result").into_iter().flat_map(items).collect()),
+        more => {
+            let what = format!("{}, expected one", more.len());
+            Err(Error::value("annotations", what))
+        }
     }
+}
+
+fn is_cancelled(annotation: &Value) -> bool {
+    annotation.get("was_cancelled").and_then(Value::as_bool) == Some(true)
 }
 
 /// JSON-MIN: results in lists under the names of the tools that drew them.
@@ -115,10 +108,12 @@ fn results_beside(task: &Value) -> Vec<&Value> {
         .into_iter()
         .flat_map(|task| task.values())
         .filter_map(Value::as_array);
-    lists
-        .flatten()
-        .filter(|result| result.get("original_width").is_some())
-        .collect()
+    lists.flatten().filter(|result| has_size(result)).collect()
+}
+
+/// Choices, ratings and the like have no size of a picture.
+fn has_size(result: &Value) -> bool {
+    result.get("original_width").is_some()
 }
 
 impl AnnotationResult {
@@ -172,10 +167,8 @@ impl ResultGeometry {
 
 /// The corners of a rectangle that was turned clockwise about its first one.
 fn turned_about_corner([x, y]: [f64; 2], [w, h]: [f64; 2], degrees: f64) -> Vec<[f64; 2]> {
-    let angle = degrees.to_radians();
-    let (sin, cos) = (libm::sin(angle), libm::cos(angle));
     [[0.0, 0.0], [w, 0.0], [w, h], [0.0, h]]
-        .map(|[u, v]| [x + u * cos - v * sin, y + u * sin + v * cos])
+        .map(|offset| turned_about([x, y], offset, degrees))
         .into()
 }
 
@@ -192,11 +185,14 @@ fn picture_names(task: &Value) -> Vec<String> {
         .flat_map(|data| data.values())
         .chain(task.get("file_upload"))
         .filter_map(|value| picture_name(value.as_str()?))
-        .flat_map(|name| {
-            let bare = without_upload_prefix(&name).map(str::to_owned);
-            [Some(name), bare].into_iter().flatten()
-        })
+        .flat_map(with_original_name)
         .collect()
+}
+
+/// A name, and the one that the file may have had before it was uploaded.
+fn with_original_name(name: String) -> impl Iterator<Item = String> {
+    let original = without_upload_prefix(&name).map(str::to_owned);
+    [Some(name), original].into_iter().flatten()
 }
 
 /// The name of the picture at an address.
@@ -224,15 +220,21 @@ fn decoded(text: &str) -> String {
     let mut bytes = Vec::with_capacity(text.len());
     let mut rest = text.as_bytes();
     while let Some((&first, after)) = rest.split_first() {
-        let hex = after
-            .get(..2)
-            .filter(|_| first == b'%')
-            .and_then(|hex| std::str::from_utf8(hex).ok());
-        let byte = hex.and_then(|hex| u8::from_str_radix(hex, 16).ok());
-        bytes.push(byte.unwrap_or(first));
-        rest = if byte.is_some() { &after[2..] } else { after };
+        let escaped = escaped_byte(after).filter(|_| first == b'%');
+        bytes.push(escaped.unwrap_or(first));
+        rest = if escaped.is_some() {
+            &after[2..]
+        } else {
+            after
+        };
     }
     String::from_utf8(bytes).unwrap_or_else(|_| text.to_owned())
+}
+
+/// The byte that two hexadecimal digits stand for.
+fn escaped_byte(text: &[u8]) -> Option<u8> {
+    let digits = std::str::from_utf8(text.get(..2)?).ok()?;
+    u8::from_str_radix(digits, 16).ok()
 }
 
 #[cfg(test)]

@@ -43,20 +43,19 @@ pub(super) fn annotation(value: Value) -> Result<Annotation> {
     })
 }
 
-fn shape(
-    LabelMeShape {
-        label: name,
-        shape_type,
-        points,
-    }: LabelMeShape,
-) -> AnnotatedShape {
-    let (kind, points) = match (shape_type.as_str(), points.as_slice()) {
+fn shape(shape: LabelMeShape) -> AnnotatedShape {
+    let points = shape.points;
+    let (kind, points) = match (shape.shape_type.as_str(), points.as_slice()) {
         ("rectangle", [a, b]) => (ShapeKind::Rectangle, upright_corners(*a, *b)),
         ("rectangle", _) => (ShapeKind::Rectangle, points),
         ("point" | "points", _) => (ShapeKind::Points, points),
         _ => (ShapeKind::Polygon, points),
     };
-    AnnotatedShape { kind, name, points }
+    AnnotatedShape {
+        kind,
+        name: shape.label,
+        points,
+    }
 }
 
 #[cfg(test)]

@@ -50,16 +50,20 @@ pub(crate) fn annotations(text: &str) -> Result<Option<Vec<Annotation>>> {
     if text.trim_start().starts_with('<') {
         return cvat::annotations(text);
     }
-    let Ok(value) = io::parse_json::<Value>(text) else {
-        return Ok(None);
-    };
+    match io::parse_json::<Value>(text) {
+        Ok(value) => json_annotations(value),
+        Err(_) => Ok(None),
+    }
+}
+
+fn json_annotations(value: Value) -> Result<Option<Vec<Annotation>>> {
     if labelme::is_labelme(&value) {
-        return labelme::annotation(value).map(|one| Some(vec![one]));
+        labelme::annotation(value).map(|one| Some(vec![one]))
+    } else if label_studio::is_label_studio(&value) {
+        label_studio::annotations(value).map(Some)
+    } else {
+        Ok(None)
     }
-    if label_studio::is_label_studio(&value) {
-        return label_studio::annotations(value).map(Some);
-    }
-    Ok(None)
 }
 
 /// The label that a LabelMe file means, of a rectangle of `size` metres.
@@ -79,10 +83,9 @@ impl Annotation {
         let mut label = Label::new(self.size.unwrap_or_default(), corners_px, [1.0; 2]);
         (label.surface.width_m, label.surface.height_m) = (None, None);
         label.image.file = self.files.first().cloned().unwrap_or_default();
-        label.surface.id = if name.is_empty() {
-            "surface".into()
-        } else {
-            name
+        label.surface.id = match name.is_empty() {
+            true => "surface".into(),
+            false => name,
         };
         label.surface.source = Some(self.source.into());
         Ok(label)
@@ -164,21 +167,27 @@ const CORNER_NAMES: [&[&str]; 4] = [
 
 /// Single points as they were drawn, or where they are named so, from the top left.
 fn corners_from_points(points: [(&String, [f64; 2]); 4]) -> NamedCorners {
-    let corners = points.map(|(_, point)| point);
-    let places = points.map(|(name, _)| corner_named(name));
-    if (0..4).all(|corner| places.contains(&Some(corner))) {
-        let mut named = corners;
-        for (place, point) in places.into_iter().flatten().zip(corners) {
-            named[place] = point;
-        }
-        return ("surface".into(), named);
+    if let Some(corners) = corners_by_name(&points) {
+        return ("surface".into(), corners);
     }
     let first = points[0].0;
     let name = match points.iter().all(|(name, _)| *name == first) {
         true => first.clone(),
         false => "surface".into(),
     };
-    (name, corners)
+    (name, points.map(|(_, point)| point))
+}
+
+/// The points in the order of their names, where each corner is named once.
+fn corners_by_name(points: &[(&String, [f64; 2]); 4]) -> Option<[[f64; 2]; 4]> {
+    let mut corners = [None; 4];
+    for (name, point) in points {
+        corners[corner_named(name)?] = Some(*point);
+    }
+    let [Some(a), Some(b), Some(c), Some(d)] = corners else {
+        return None;
+    };
+    Some([a, b, c, d])
 }
 
 /// Which corner a point is by its name, from the top left.
@@ -187,6 +196,20 @@ fn corner_named(name: &str) -> Option<usize> {
     CORNER_NAMES
         .iter()
         .position(|words| words.contains(&name.trim()))
+}
+
+/// Those annotations that hold a shape.
+fn with_shapes(annotations: impl Iterator<Item = Result<Annotation>>) -> Result<Vec<Annotation>> {
+    let mut all = annotations.collect::<Result<Vec<_>>>()?;
+    all.retain(|annotation| !annotation.shapes.is_empty());
+    Ok(all)
+}
+
+/// The point at an offset from a centre, turned clockwise about that.
+fn turned_about([x, y]: [f64; 2], [u, v]: [f64; 2], degrees: f64) -> [f64; 2] {
+    let angle = degrees.to_radians();
+    let (sin, cos) = (libm::sin(angle), libm::cos(angle));
+    [x + u * cos - v * sin, y + u * sin + v * cos]
 }
 
 /// The corners of an upright rectangle between two opposite ones, clockwise from the top left.

@@ -18,17 +18,9 @@ const MAX_WRONG_BITS: usize = 1;
 ///
 /// One thread and no decimation: the same corners every time, and the best.
 pub(super) fn find(photo: &Image<LinearRgb>, artwork: Artwork) -> Vec<Marker> {
-    let Some(grey) = grey(photo) else {
+    let (Some(grey), Some(mut detector)) = (linear_grey(photo), exact_detector()) else {
         return Vec::new();
     };
-    let Ok(mut detector) = Detector::builder()
-        .add_family_bits(Family::tag_36h11(), MAX_WRONG_BITS)
-        .build()
-    else {
-        return Vec::new();
-    };
-    detector.set_thread_number(1);
-    detector.set_decimation(1.0);
     detector
         .detect(&grey)
         .iter()
@@ -36,18 +28,25 @@ pub(super) fn find(photo: &Image<LinearRgb>, artwork: Artwork) -> Vec<Marker> {
         .collect()
 }
 
+/// With one thread and without decimation.
+fn exact_detector() -> Option<Detector> {
+    let mut detector = Detector::builder()
+        .add_family_bits(Family::tag_36h11(), MAX_WRONG_BITS)
+        .build()
+        .ok()?;
+    detector.set_thread_number(1);
+    detector.set_decimation(1.0);
+    Some(detector)
+}
+
 /// The photo in bytes, as bright as fits, and linear: an edge then is where half of the light is. (Display-encoded, white
 /// seems to grow by a quarter of a pixel.)
-fn grey(photo: &Image<LinearRgb>) -> Option<apriltag::Image> {
-    let (width, height) = (photo.width(), photo.height());
-    if width == 0 || height == 0 {
+fn linear_grey(photo: &Image<LinearRgb>) -> Option<apriltag::Image> {
+    if photo.is_empty() {
         return None;
     }
-    let brightest = photo
-        .pixels()
-        .iter()
-        .map(clamped_luminance)
-        .fold(f32::MIN_POSITIVE, f32::max);
+    let brightest = brightest_luminance(photo);
+    let (width, height) = photo.size();
     let mut grey = apriltag::Image::zeros_with_stride(width, height, width).ok()?;
     for (to, from) in grey.as_slice_mut().iter_mut().zip(photo.pixels()) {
         *to = (255.0 * clamped_luminance(from) / brightest).round() as u8;
@@ -55,6 +54,15 @@ fn grey(photo: &Image<LinearRgb>) -> Option<apriltag::Image> {
     Some(grey)
 }
 
+fn brightest_luminance(photo: &Image<LinearRgb>) -> f32 {
+    photo
+        .pixels()
+        .iter()
+        .map(clamped_luminance)
+        .fold(f32::MIN_POSITIVE, f32::max)
+}
+
+#[inline]
 fn clamped_luminance(pixel: &LinearRgb) -> f32 {
     pixel.luminance().clamp(0.0, 1.0)
 }

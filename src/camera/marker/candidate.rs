@@ -26,20 +26,22 @@ pub(super) fn quads(photo: &Image<LinearRgb>) -> Vec<[Point2<f64>; 4]> {
     if photo.is_empty() {
         return Vec::new();
     }
-    let tone = photo.map(|p| linear_to_srgb(p.luminance()));
-    let radius = (WINDOW_SIDES * photo.width().max(photo.height()) as f64)
-        .ceil()
-        .max(5.0) as usize;
-    let ground = box_blur(&tone, radius);
-    let dark = tone.zip_map(&ground, |t, g| t < g - DARK_DIFFERENCE);
-    regions(dark)
+    dark_regions(dark_pixels(photo))
         .into_iter()
         .filter_map(|region| quad(&region))
         .collect()
 }
 
+/// The pixels that are darker than their surroundings.
+fn dark_pixels(photo: &Image<LinearRgb>) -> Mask {
+    let tone = photo.map(|p| linear_to_srgb(p.luminance()));
+    let radius = WINDOW_SIDES * photo.width().max(photo.height()) as f64;
+    let ground = box_blur(&tone, radius.ceil().max(5.0) as usize);
+    tone.zip_map(&ground, |t, g| t < g - DARK_DIFFERENCE)
+}
+
 /// The outer corners of every connected dark region that is large enough.
-fn regions(mut dark: Mask) -> Vec<Vec<Point2<f64>>> {
+fn dark_regions(mut dark: Mask) -> Vec<Vec<Point2<f64>>> {
     let mut found = Vec::new();
     for start in 0..dark.pixels().len() {
         if !std::mem::take(&mut dark.pixels_mut()[start]) {
@@ -59,10 +61,8 @@ fn take_region(dark: &mut Mask, start: usize) -> (usize, RowEnds) {
     let (mut pixels, mut ends) = (0, RowEnds::new());
     let mut stack = vec![start];
     while let Some(at) = stack.pop() {
-        let (x, y) = (at % width, at / width);
         pixels += 1;
-        let end = ends.entry(y).or_insert((x, x));
-        *end = (end.0.min(x), end.1.max(x));
+        extend_row(&mut ends, at % width, at / width);
         for neighbour in neighbours(at, [width, height]) {
             if std::mem::take(&mut dark.pixels_mut()[neighbour]) {
                 stack.push(neighbour);
@@ -70,6 +70,11 @@ fn take_region(dark: &mut Mask, start: usize) -> (usize, RowEnds) {
         }
     }
     (pixels, ends)
+}
+
+fn extend_row(ends: &mut RowEnds, x: usize, y: usize) {
+    let (first, last) = ends.entry(y).or_insert((x, x));
+    (*first, *last) = ((*first).min(x), (*last).max(x));
 }
 
 /// The pixels beside, above and below one that are in the picture.
@@ -97,18 +102,24 @@ fn outer_corners(ends: &RowEnds) -> Vec<Point2<f64>> {
 
 /// The four corners of a region that is nearly a quadrangle.
 fn quad(outline: &[Point2<f64>]) -> Option<[Point2<f64>; 4]> {
-    let sum = outline
-        .iter()
-        .fold(Vector2::zeros(), |sum, p| sum + p.coords);
-    let mean = sum / outline.len() as f64;
-    let a = farthest(outline, mean.into())?;
+    let a = farthest(outline, mean_point(outline))?;
     let c = farthest(outline, a)?;
     let [b, d] = extremes_beside(outline, a, c)?;
     // b lies to the left of the way from a to c, so that a, b, c, d run clockwise where y runs down.
     let corners = [a, b, c, d];
-    let are_long = (0..4).all(|i| (corners[(i + 1) % 4] - corners[i]).norm() >= MIN_SIDE_PX);
     let fills_hull = polygon_area(&corners) >= MIN_HULL_SHARE * hull_area(outline);
-    (are_long && fills_hull).then_some(corners)
+    (has_long_sides(&corners) && fills_hull).then_some(corners)
+}
+
+fn mean_point(points: &[Point2<f64>]) -> Point2<f64> {
+    let sum = points
+        .iter()
+        .fold(Vector2::zeros(), |sum, p| sum + p.coords);
+    (sum / points.len() as f64).into()
+}
+
+fn has_long_sides(corners: &[Point2<f64>; 4]) -> bool {
+    (0..4).all(|i| (corners[(i + 1) % 4] - corners[i]).norm() >= MIN_SIDE_PX)
 }
 
 fn farthest(points: &[Point2<f64>], from: Point2<f64>) -> Option<Point2<f64>> {
@@ -124,21 +135,20 @@ fn extremes_beside(
     a: Point2<f64>,
     c: Point2<f64>,
 ) -> Option<[Point2<f64>; 2]> {
-    let by_side = |p: &Point2<f64>, q: &Point2<f64>| {
-        let [p, q] = [p, q].map(|point| (c - a).perp(&(point - a)));
-        p.total_cmp(&q)
-    };
-    let left = points.iter().copied().min_by(by_side)?;
-    Some([left, points.iter().copied().max_by(by_side)?])
+    let sides = points.iter().map(|&p| (p, (c - a).perp(&(p - a))));
+    let (left, _) = sides.clone().min_by(|p, q| p.1.total_cmp(&q.1))?;
+    let (right, _) = sides.max_by(|p, q| p.1.total_cmp(&q.1))?;
+    Some([left, right])
 }
 
 fn polygon_area(corners: &[Point2<f64>]) -> f64 {
-    let twice = (0..corners.len()).map(|i| {
-        corners[i]
-            .coords
-            .perp(&corners[(i + 1) % corners.len()].coords)
-    });
-    twice.sum::<f64>() / 2.0
+    let next = corners.iter().cycle().skip(1);
+    let twice: f64 = corners
+        .iter()
+        .zip(next)
+        .map(|(a, b)| a.coords.perp(&b.coords))
+        .sum();
+    twice / 2.0
 }
 
 /// Area of the convex hull, by Andrew's monotone chain.

@@ -42,11 +42,7 @@ pub(super) struct MarkerReading {
 /// The marker between four corners (clockwise).
 pub(super) fn read(light: &Image<f32>, corners: &[Point2<f64>; 4]) -> Option<MarkerReading> {
     let cells = cell_means(light, corners)?;
-    let all = cells.as_flattened().iter().copied();
-    let (dark, bright) = (
-        all.clone().fold(f32::MAX, f32::min),
-        all.fold(0.0, f32::max),
-    );
+    let (dark, bright) = extremes(cells.as_flattened());
     let middle = (dark + bright) / 2.0;
     let white = cells.map(|line| line.map(|cell| cell > middle));
     let code = pattern_code(&white)?;
@@ -60,6 +56,14 @@ pub(super) fn read(light: &Image<f32>, corners: &[Point2<f64>; 4]) -> Option<Mar
         white,
         is_overexposed: bright >= OVEREXPOSED_LIGHT,
     })
+}
+
+fn extremes(light: &[f32]) -> (f32, f32) {
+    light
+        .iter()
+        .fold((f32::MAX, 0.0), |(dark, bright): (f32, f32), &cell| {
+            (dark.min(cell), bright.max(cell))
+        })
 }
 
 /// The light of each cell between four corners; none where the photo does not show one.
@@ -100,25 +104,32 @@ fn is_border(i: usize) -> bool {
 fn cell_mean(light: &Image<f32>, photo_from_square: &Homography, cell: [usize; 2]) -> Option<f32> {
     let mut sum = 0.0;
     for i in 0..9 {
-        let [u, v] = [(cell[0], i % 3), (cell[1], i / 3)]
-            .map(|(cell, k)| (cell as f64 + 0.3 + 0.2 * k as f64) / MARKER_CELLS as f64);
-        let at = photo_from_square.map(Point2::new(u, v));
+        let at = photo_from_square.map(sample_position(cell, [i % 3, i / 3]));
         sum += sample_nearest(light, at.x, at.y)?;
     }
     Some(sum / 9.0)
 }
 
-fn lookup(mut code: u16) -> Option<(u32, usize)> {
-    for turns in 0..4 {
-        let id = DICT_4X4_50
-            .iter()
-            .position(|&known| (known ^ code).count_ones() <= MAX_WRONG_BITS);
-        if let Some(id) = id {
-            return Some((id as u32, turns));
-        }
-        code = turned(code);
-    }
-    None
+/// Where in the unit square a cell's sample (column and row, of three each) is.
+fn sample_position(cell: [usize; 2], sample: [usize; 2]) -> Point2<f64> {
+    let [u, v] = [0, 1]
+        .map(|axis| (cell[axis] as f64 + 0.3 + 0.2 * sample[axis] as f64) / MARKER_CELLS as f64);
+    Point2::new(u, v)
+}
+
+/// Number of a marker, and by how many quarters its pattern was turned.
+fn lookup(code: u16) -> Option<(u32, usize)> {
+    std::iter::successors(Some(code), |&code| Some(turned(code)))
+        .take(4)
+        .enumerate()
+        .find_map(|(turns, code)| Some((known_id(code)?, turns)))
+}
+
+fn known_id(code: u16) -> Option<u32> {
+    let id = DICT_4X4_50
+        .iter()
+        .position(|&known| (known ^ code).count_ones() <= MAX_WRONG_BITS)?;
+    Some(id as u32)
 }
 
 /// The pattern turned by a quarter anticlockwise: as read from the next corner clockwise.

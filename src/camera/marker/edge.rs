@@ -47,20 +47,30 @@ pub(super) fn refined(light: &Image<f32>, rough: &[Point2<f64>; 4]) -> Option<[P
     let mut corners = *rough;
     // From the second time on the probes stand where the sides are.
     for _ in 0..MAX_ROUNDS {
-        let mut lines = [Line {
-            normal: Vector2::zeros(),
-            offset: 0.0,
-        }; 4];
-        for (i, line) in lines.iter_mut().enumerate() {
-            *line = side(light, &corners, i)?;
-        }
         let before = corners;
-        for i in 0..4 {
-            corners[i] = lines[(i + 3) % 4].meeting(&lines[i])?;
-        }
+        corners = corners_between(&fitted_sides(light, &before)?)?;
         if (0..4).all(|i| (corners[i] - before[i]).norm() < SETTLED_PX) {
             break;
         }
+    }
+    Some(corners)
+}
+
+/// The line along each side of a quadrangle; none where a side shows no edge.
+fn fitted_sides(light: &Image<f32>, corners: &[Point2<f64>; 4]) -> Option<[Line; 4]> {
+    Some([
+        fitted_side(light, corners, 0)?,
+        fitted_side(light, corners, 1)?,
+        fitted_side(light, corners, 2)?,
+        fitted_side(light, corners, 3)?,
+    ])
+}
+
+/// The corners of a quadrangle whose sides are on these lines, the first between the last line and the first.
+fn corners_between(sides: &[Line; 4]) -> Option<[Point2<f64>; 4]> {
+    let mut corners = [Point2::origin(); 4];
+    for (i, corner) in corners.iter_mut().enumerate() {
+        *corner = sides[(i + 3) % 4].meeting(&sides[i])?;
     }
     Some(corners)
 }
@@ -81,26 +91,23 @@ pub(super) fn by_cells(
     let edges = EdgeShifts::measure(light, corners, white);
     let growth = if is_overexposed { edges.growth() } else { 0.0 };
     let lines = [0, 1, 2, 3].map(|i| moved_side(corners, i, growth));
-    let mut px = *corners;
-    for i in 0..4 {
-        px[i] = lines[(i + 3) % 4].meeting(&lines[i])?;
-    }
-    let off = edges.rms_px(growth);
-    // Lines that meet at an acute angle meet far away when one is off.
-    let spread = (0..4)
-        .map(|i| lines[(i + 3) % 4].normal.perp(&lines[i].normal).powi(-2))
-        .sum::<f64>()
-        / 4.0;
+    let off = OUTLINE_ERROR_SHARE * edges.rms_px(growth) * mean_square_spread(&lines).sqrt();
     Some(RefinedCorners {
-        px,
-        sigma_px: libm::hypot(MIN_SIGMA_PX, OUTLINE_ERROR_SHARE * off * spread.sqrt()),
+        px: corners_between(&lines)?,
+        sigma_px: libm::hypot(MIN_SIGMA_PX, off),
     })
+}
+
+/// By how much the corners between four lines are farther off than the lines: lines that meet at an acute angle meet far
+/// away when one is off.
+fn mean_square_spread(lines: &[Line; 4]) -> f64 {
+    let squares = (0..4).map(|i| lines[(i + 3) % 4].normal.perp(&lines[i].normal).powi(-2));
+    squares.sum::<f64>() / 4.0
 }
 
 /// The line through a side, moved outwards.
 fn moved_side(corners: &[Point2<f64>; 4], first: usize, outwards_px: f64) -> Line {
-    let along = corners[(first + 1) % 4] - corners[first];
-    let normal = Vector2::new(along.y, -along.x).normalize();
+    let normal = outward_normal(corners[first], corners[(first + 1) % 4]);
     Line {
         normal,
         offset: normal.dot(&corners[first].coords) + outwards_px,
@@ -127,29 +134,23 @@ impl EdgeShifts {
 
     /// How far white has grown over black, pixels; 0 where too few edges were found.
     fn growth(&self) -> f64 {
-        let (xy, xx) = self
-            .moved
-            .iter()
-            .fold((0.0, 0.0), |(xy, xx), [x, y]| (xy + x * y, xx + x * x));
         if self.moved.len() < MIN_EDGES {
-            0.0
-        } else {
-            (xy / xx).clamp(-MAX_GROWTH_PX, MAX_GROWTH_PX)
+            return 0.0;
         }
+        let sums = self.moved.iter();
+        let (xy, xx) = sums.fold((0.0, 0.0), |(xy, xx), [x, y]| (xy + x * y, xx + x * x));
+        (xy / xx).clamp(-MAX_GROWTH_PX, MAX_GROWTH_PX)
     }
 
     /// Root mean square distance of the edges from their places when white has grown so far, pixels; of too few edges a
     /// pixel.
     fn rms_px(&self, growth: f64) -> f64 {
-        let squares = self
-            .moved
-            .iter()
-            .map(|[x, y]| (y - growth * x) * (y - growth * x));
         if self.moved.len() < MIN_EDGES {
-            1.0
-        } else {
-            (squares.sum::<f64>() / self.moved.len() as f64).sqrt()
+            return 1.0;
         }
+        let off = self.moved.iter().map(|[x, y]| y - growth * x);
+        let squares: f64 = off.map(|off| off * off).sum();
+        (squares / self.moved.len() as f64).sqrt()
     }
 }
 
@@ -196,11 +197,19 @@ impl InnerEdge {
         let foot = self.position(photo_from_square, along);
         let step = self.position(photo_from_square, along + 0.5)
             - self.position(photo_from_square, along - 0.5);
-        let reach = (INNER_REACH_CELLS * step.norm()).clamp(*REACH_PX.start(), *REACH_PX.end());
+        let reach = clamped_reach(INNER_REACH_CELLS * step.norm());
         let moved = crossing(light, foot, step.normalize() * self.rising, reach)?;
-        let per_growth = 2.0 * along / MARKER_CELLS as f64 - self.rising - 1.0;
-        Some([per_growth, moved * self.rising])
+        Some([self.shift_per_growth(), moved * self.rising])
     }
+
+    /// By how much a growth of white by a pixel would move the edge.
+    fn shift_per_growth(&self) -> f64 {
+        2.0 * self.along as f64 / MARKER_CELLS as f64 - self.rising - 1.0
+    }
+}
+
+fn clamped_reach(px: f64) -> f64 {
+    px.clamp(*REACH_PX.start(), *REACH_PX.end())
 }
 
 fn inner_edges(white: &WhiteCells) -> Vec<InnerEdge> {
@@ -216,20 +225,28 @@ fn inner_edges(white: &WhiteCells) -> Vec<InnerEdge> {
 }
 
 /// The edge near the side from a corner to the next, dark on its right-hand side (clockwise corners, y down).
-fn side(light: &Image<f32>, corners: &[Point2<f64>; 4], first: usize) -> Option<Line> {
+fn fitted_side(light: &Image<f32>, corners: &[Point2<f64>; 4], first: usize) -> Option<Line> {
     let [a, b, c, d] = [0, 1, 2, 3].map(|i| corners[(first + i) % 4]);
-    let along = b - a;
-    let outward = Vector2::new(along.y, -along.x).normalize();
+    let outward = outward_normal(a, b);
     // From a steep side a marker is much longer than high, and so are its cells.
     let across = (outward.dot(&(a - d)) + outward.dot(&(b - c))) / 2.0;
-    let reach =
-        (REACH_CELLS * across / MARKER_CELLS as f64).clamp(*REACH_PX.start(), *REACH_PX.end());
+    let reach = clamped_reach(REACH_CELLS * across / MARKER_CELLS as f64);
     let points = (0..SIDE_PROBES).filter_map(|i| {
-        let part = CORNER_PART + (1.0 - 2.0 * CORNER_PART) * (i as f64 + 0.5) / SIDE_PROBES as f64;
-        let foot = a + along * part;
+        let foot = a + (b - a) * probe_part(i);
         Some(foot + outward * crossing(light, foot, outward, reach)?)
     });
     line_through_most(points.collect())
+}
+
+/// The unit vector to the left of the way from a corner to the next.
+fn outward_normal(from: Point2<f64>, to: Point2<f64>) -> Vector2<f64> {
+    let along = to - from;
+    Vector2::new(along.y, -along.x).normalize()
+}
+
+/// Where a probe stands on its side, 0 to 1.
+fn probe_part(i: usize) -> f64 {
+    CORNER_PART + (1.0 - 2.0 * CORNER_PART) * (i as f64 + 0.5) / SIDE_PROBES as f64
 }
 
 /// The line through the probes of a side, without those that are off it; none where half of them are.
@@ -276,6 +293,8 @@ fn along_probe(i: f64, steps: usize, reach: f64) -> f64 {
 fn bilinear(light: &Image<f32>, x: f64, y: f64) -> f32 {
     let (i, j) = (x.floor(), y.floor());
     let (u, v) = ((x - i) as f32, (y - j) as f32);
-    let at = |di: isize, dj: isize| light.nearest(i as isize + di, j as isize + dj);
-    (at(0, 0) * (1.0 - u) + at(1, 0) * u) * (1.0 - v) + (at(0, 1) * (1.0 - u) + at(1, 1) * u) * v
+    let (i, j) = (i as isize, j as isize);
+    let [above, below] =
+        [j, j + 1].map(|j| light.nearest(i, j) * (1.0 - u) + light.nearest(i + 1, j) * u);
+    above * (1.0 - v) + below * v
 }

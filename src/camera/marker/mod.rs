@@ -15,12 +15,12 @@ mod dictionary;
 mod edge;
 
 use super::chi::CHI2_99;
-use super::label::{Label, LabelPoint, MarkerMap, PixelOrigin};
+use super::label::{Label, LabelPoint, MarkerMap};
 use super::options::SolveOptions;
 use super::solution::Fit;
 use super::solve::solve;
 use crate::error::{Error, Result};
-use crate::geom::Point2;
+use crate::geom::{Point2, Vector2};
 use crate::image::Image;
 use crate::pixel::LinearRgb;
 
@@ -50,11 +50,13 @@ pub fn find_markers(photo: &Image<LinearRgb>) -> Vec<Marker> {
         .iter()
         .filter_map(|rough| marker_at(&light, rough))
         .collect();
-    found.sort_by(|a, b| {
-        let [left, right] = [a, b].map(|marker| marker.corners_px[0].x);
-        a.id.cmp(&b.id).then(left.total_cmp(&right))
-    });
+    found.sort_by(by_number_and_place);
     found
+}
+
+fn by_number_and_place(a: &Marker, b: &Marker) -> std::cmp::Ordering {
+    let [left, right] = [a, b].map(|marker| marker.corners_px[0].x);
+    a.id.cmp(&b.id).then(left.total_cmp(&right))
 }
 
 /// The marker between four rough corners.
@@ -94,26 +96,7 @@ pub(crate) fn any_markers(photo: &Image<LinearRgb>) -> Vec<Marker> {
 /// [`Error::Value`] for a label without a marker map, one of a family that is not known, and a photo that shows none of
 /// its markers.
 pub fn with_markers(label: Label, photo: &Image<LinearRgb>) -> Result<Label> {
-    let Some(map) = &label.markers else {
-        return Err(Error::value(
-            "markers",
-            "missing, expected family, size_m and map",
-        ));
-    };
-    let (mut found, least_px) = find_family(map, photo)?;
-    found.retain(|marker| map.map.contains_key(&marker.id));
-    if found.is_empty() {
-        return Err(Error::value(
-            "markers",
-            "none of them was found in the photo",
-        ));
-    }
-    let layout = MarkerLayout {
-        label: &label,
-        map,
-        found: &found,
-        min_sigma_px: least_px,
-    };
+    let layout = MarkerLayout::find(&label, photo)?;
     let turns = layout.fitting_turns();
     if turns > 0 {
         let degrees = 90 * turns;
@@ -146,16 +129,38 @@ fn find_family(map: &MarkerMap, photo: &Image<LinearRgb>) -> Result<(Vec<Marker>
 struct MarkerLayout<'a> {
     label: &'a Label,
     map: &'a MarkerMap,
-    found: &'a [Marker],
+    found: Vec<Marker>,
     /// Least noise that is stated of their corners, pixels.
     min_sigma_px: f64,
+}
+
+impl<'a> MarkerLayout<'a> {
+    /// Those of the label's map that the photo shows, at least one.
+    fn find(label: &'a Label, photo: &Image<LinearRgb>) -> Result<Self> {
+        let map = label
+            .markers
+            .as_ref()
+            .ok_or_else(|| Error::value("markers", "missing, expected family, size_m and map"))?;
+        let (mut found, min_sigma_px) = find_family(map, photo)?;
+        found.retain(|marker| map.map.contains_key(&marker.id));
+        if found.is_empty() {
+            let what = "none of them was found in the photo";
+            return Err(Error::value("markers", what));
+        }
+        Ok(Self {
+            label,
+            map,
+            found,
+            min_sigma_px,
+        })
+    }
 }
 
 impl MarkerLayout<'_> {
     /// The label with the corners of the markers as points, each marker turned by so many right angles.
     fn label_turned(&self, turns: usize) -> Label {
         let mut label = self.label.clone();
-        for marker in self.found {
+        for marker in &self.found {
             label.points.extend(self.points(marker, turns));
         }
         label
@@ -165,21 +170,15 @@ impl MarkerLayout<'_> {
     fn points(&self, marker: &Marker, turns: usize) -> impl Iterator<Item = LabelPoint> {
         let center = self.map.map.get(&marker.id).copied();
         let half = self.map.size_m / 2.0;
-        let offset = match self.label.pixel_origin {
-            PixelOrigin::Center => 0.5,
-            PixelOrigin::Corner => 0.0,
-        };
+        let offset = Vector2::repeat(self.label.pixel_origin.offset_px());
         let sigma_px = marker.sigma_px.max(self.min_sigma_px);
         let marker = *marker;
         center.into_iter().flat_map(move |center| {
-            [0, 1, 2, 3].map(|i| {
-                let px = marker.corners_px[(i + turns) % 4];
-                LabelPoint {
-                    xyz_m: square_corner(center, half, i),
-                    px: [px.x - offset, px.y - offset],
-                    sigma_px: Some(sigma_px),
-                    note: Some(format!("marker {}", marker.id)),
-                }
+            [0, 1, 2, 3].map(|i| LabelPoint {
+                xyz_m: square_corner(center, half, i),
+                px: (marker.corners_px[(i + turns) % 4] - offset).into(),
+                sigma_px: Some(sigma_px),
+                note: Some(format!("marker {}", marker.id)),
             })
         })
     }
@@ -191,11 +190,10 @@ impl MarkerLayout<'_> {
         if straight.is_some_and(|fit| fit.p_value.is_none_or(|p| p >= POOR_FIT_P)) {
             return 0;
         }
-        let straight = straight.map_or(f64::INFINITY, |fit| fit.chi2);
         (1..4)
-            .map(|turns| (turns, self.fit(turns).map_or(f64::INFINITY, |fit| fit.chi2)))
+            .map(|turns| (turns, chi2_or_infinite(self.fit(turns))))
             .min_by(|a, b| a.1.total_cmp(&b.1))
-            .filter(|(_, chi2)| chi2 + CHI2_99 < straight)
+            .filter(|(_, chi2)| chi2 + CHI2_99 < chi2_or_infinite(straight))
             .map_or(0, |(turns, _)| turns)
     }
 
@@ -205,6 +203,10 @@ impl MarkerLayout<'_> {
         let solution = solve(&label, &SolveOptions::default()).ok()?;
         Some(solution.fit)
     }
+}
+
+fn chi2_or_infinite(fit: Option<Fit>) -> f64 {
+    fit.map_or(f64::INFINITY, |fit| fit.chi2)
 }
 
 /// A corner of a square on the surface, from the top left, clockwise.

@@ -46,13 +46,11 @@ impl Checked {
     /// Smallest, median and largest side of a class's boxes, percent of the image.
     fn side_range(&self, class: usize, side: usize) -> String {
         let sides = self.sides_of(class, side);
-        match (sides.first(), sides.last()) {
-            (Some(min), Some(max)) => {
-                let median = sides[sides.len() / 2];
-                format!("{min:.1} / {median:.1} / {max:.1} %")
-            }
-            _ => "-".into(),
-        }
+        let Some(max) = sides.last() else {
+            return "-".into();
+        };
+        let (min, median) = (sides[0], sides[sides.len() / 2]);
+        format!("{min:.1} / {median:.1} / {max:.1} %")
     }
 
     /// Widths or heights of the boxes of a class, percent of the image, ascending.
@@ -76,14 +74,16 @@ impl Checked {
     }
 
     fn parts_without_label(&self, class: usize) -> impl Iterator<Item = Diagnostic> {
-        let name = &self.classes[class];
-        Part::ALL
-            .into_iter()
+        let parts = Part::ALL.into_iter();
+        parts
             .filter(move |&part| self.count(class, part) == 0)
-            .map(move |part| {
-                let message = format!("class \"{name}\" has no label in {}", part.name());
-                Diagnostic::note(Code::ClassWithoutLabels, message)
-            })
+            .map(move |part| self.no_label_in(part, class))
+    }
+
+    fn no_label_in(&self, part: Part, class: usize) -> Diagnostic {
+        let (name, part) = (&self.classes[class], part.name());
+        let message = format!("class \"{name}\" has no label in {part}");
+        Diagnostic::note(Code::ClassWithoutLabels, message)
     }
 
     fn rare_class(&self, class: usize) -> Option<Diagnostic> {
@@ -98,11 +98,9 @@ impl Checked {
 
     fn tiny_boxes(&self) -> Option<Diagnostic> {
         let count = self.boxes.iter().filter(|b| b.is_tiny()).count();
-        (count > 0).then(|| {
-            let percent = 100.0 * TINY_SIDE_SHARE;
-            let message = format!("{count} boxes are below {percent:.0} % of the image's side");
-            Diagnostic::note(Code::TinyBoxes, message)
-        })
+        let percent = 100.0 * TINY_SIDE_SHARE;
+        let message = format!("{count} boxes are below {percent:.0} % of the image's side");
+        (count > 0).then(|| Diagnostic::note(Code::TinyBoxes, message))
     }
 }
 

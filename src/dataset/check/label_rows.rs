@@ -37,11 +37,10 @@ pub(super) fn read_rows(
 
 /// The columns of each row that is not empty, with its line.
 fn split_rows(text: &str) -> Vec<(usize, Vec<&str>)> {
-    text.lines()
-        .map(|line| line.split_whitespace().collect::<Vec<_>>())
-        .enumerate()
-        .filter(|(_, row)| !row.is_empty())
-        .map(|(i, row)| (i + 1, row))
+    let rows = text.lines().map(|line| line.split_whitespace().collect());
+    let numbered = (1..).zip(rows);
+    numbered
+        .filter(|(_, row): &(_, Vec<_>)| !row.is_empty())
         .collect()
 }
 
@@ -113,15 +112,9 @@ fn parse_number(text: &str) -> Result<f64, String> {
 }
 
 fn check_shares(row: &[&str], values: &[f64]) -> Result<(), String> {
-    let outside = values
-        .iter()
-        .skip(1)
-        .position(|share| !(0.0..=1.0).contains(share));
-    match outside {
-        Some(i) => Err(format!(
-            "{}, expected a share of the image, 0 to 1",
-            row[1 + i]
-        )),
+    let mut shares = row.iter().zip(values).skip(1);
+    match shares.find(|(_, share)| !(0.0..=1.0).contains(*share)) {
+        Some((text, _)) => Err(format!("{text}, expected a share of the image, 0 to 1")),
         None => Ok(()),
     }
 }

@@ -8,7 +8,7 @@ mod unsupported;
 
 use crate::dataset::finding::Finding;
 use crate::dataset::folder::JOURNAL;
-use crate::dataset::journal::numbered_lines;
+use crate::dataset::journal::{NumberedLines, numbered_lines};
 use crate::dataset::journal_line::JournalLine;
 use crate::dataset::listing::is_image;
 use crate::dataset::near_duplicates::{NEAR_DUPLICATE_RMS, Thumbnail, nearest};
@@ -247,23 +247,21 @@ impl Checker<'_> {
     }
 
     /// The lines that are as they were written; the others are findings.
-    fn good_lines(
-        &mut self,
-        lines: Vec<(usize, std::result::Result<JournalLine, String>)>,
-    ) -> Vec<(usize, JournalLine)> {
+    fn good_lines(&mut self, lines: NumberedLines) -> Vec<(usize, JournalLine)> {
         let mut good = Vec::new();
         for (i, line) in lines {
             match line {
                 Ok(line) => good.push((i, line)),
-                Err(e) => self.findings.push(Finding::in_line(
-                    JOURNAL,
-                    i,
-                    Code::BadJournalLine,
-                    format!("not a line of a journal: {e}"),
-                )),
+                Err(e) => self.add_damaged_line(i, &e),
             }
         }
         good
+    }
+
+    fn add_damaged_line(&mut self, i: usize, error: &str) {
+        let message = format!("not a line of a journal: {error}");
+        let finding = Finding::in_line(JOURNAL, i, Code::BadJournalLine, message);
+        self.findings.push(finding);
     }
 
     fn find_changed_files(&mut self, lines: &[(usize, JournalLine)]) {

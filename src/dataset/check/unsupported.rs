@@ -55,11 +55,8 @@ fn settle_options(dataset: &Path) -> SettleOptions {
 /// The objects of a sidecar file that nothing holds up.
 fn unsupported_in(path: &Path, options: &SettleOptions) -> Result<Vec<String>> {
     let SettledScene { drawn, scene } = io::read_json(path)?;
-    let ids = settle::hanging(&drawn, &scene, options)?;
-    Ok(ids
-        .iter()
-        .map(|id| describe(*id, &scene.objects[id - 1]))
-        .collect())
+    let ids = settle::hanging(&drawn, &scene, options)?.into_iter();
+    Ok(ids.map(|id| describe(id, &scene.objects[id - 1])).collect())
 }
 
 fn describe(id: usize, object: &Object) -> String {

@@ -6,7 +6,7 @@ use crate::io;
 use crate::plot::Page;
 use std::collections::BTreeMap;
 use std::fmt::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// So many pictures stand behind one heading, and so many are listed: a page stays below a few MB.
 const PICTURES_PER_HEADING: usize = 100;
@@ -14,8 +14,7 @@ const MAX_LISTED_PICTURES: usize = 5_000;
 
 /// Adds every picture, a hundred behind each heading, for a page in `page_folder`.
 pub(super) fn add_all(page: &mut Page, folder: &Path, summary: &Summary, page_folder: &Path) {
-    let absolute = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
-    let root = io::relative(&absolute(folder), &absolute(page_folder));
+    let root = io::relative(&absolute_path(folder), &absolute_path(page_folder));
     page.subheading("All pictures").text(
         "What stands behind these headings is not on this page: pictures are read from the dataset's folder when a heading \
          is opened, and each leads to its file.",
@@ -33,9 +32,13 @@ pub(super) fn add_all(page: &mut Page, folder: &Path, summary: &Summary, page_fo
     }
 }
 
+fn absolute_path(path: &Path) -> PathBuf {
+    std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf())
+}
+
 fn listed_together(samples: &[SampleSummary], root: &Path) -> String {
-    let index = |sample: Option<&SampleSummary>| sample.map_or(0, |sample| sample.index);
-    let (first, last) = (index(samples.first()), index(samples.last()));
+    let [first, last] =
+        [samples.first(), samples.last()].map(|sample| sample.map_or(0, |sample| sample.index));
     let items: String = samples.iter().map(|sample| listed(sample, root)).collect();
     format!(
         "<details><summary>{first:06} to {last:06}</summary><div class=\"all\">\n{items}</div></details>\n"
@@ -61,28 +64,39 @@ fn boxes_by_class(sample: &SampleSummary) -> String {
         let [x, y, w, h] = [b.x0, b.y0, b.width(), b.height()].map(|v| v.round());
         let _ = write!(paths.entry(*class).or_default(), "M{x} {y}h{w}v{h}h-{w}z");
     }
+    let paths = paths.iter();
     paths
-        .iter()
-        .map(|(class, path)| {
-            let color = color_of(*class);
-            format!("<path d=\"{path}\" fill=\"none\" stroke=\"{color}\" vector-effect=\"non-scaling-stroke\"/>")
-        })
+        .map(|(class, path)| colored_path(*class, path))
         .collect()
+}
+
+fn colored_path(class: u32, path: &str) -> String {
+    let color = color_of(class);
+    format!(
+        "<path d=\"{path}\" fill=\"none\" stroke=\"{color}\" vector-effect=\"non-scaling-stroke\"/>"
+    )
 }
 
 /// A relative path as an address, every byte that means something in one written out.
 fn address(path: &Path) -> String {
-    let byte = |b: u8| match b {
-        b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'/' | b'.' | b'-' | b'_' => {
-            char::from(b).to_string()
-        }
-        b => format!("%{b:02X}"),
-    };
-    let text: String = path.to_string_lossy().bytes().map(byte).collect();
+    let text: String = path
+        .to_string_lossy()
+        .bytes()
+        .map(percent_encoded)
+        .collect();
     // Before a colon would stand a scheme.
     if text.starts_with('/') {
         text
     } else {
         format!("./{text}")
+    }
+}
+
+fn percent_encoded(byte: u8) -> String {
+    match byte {
+        b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'/' | b'.' | b'-' | b'_' => {
+            char::from(byte).to_string()
+        }
+        _ => format!("%{byte:02X}"),
     }
 }

@@ -1,5 +1,6 @@
 //! A dataset beside the user's own photographs: distributions that should be alike.
 
+use super::distributions::extremes;
 use super::labelled_pictures::{LabelledPicture, LabelledSet};
 use super::outlier::{quantile, short};
 use crate::color::encode_srgb8;
@@ -49,16 +50,17 @@ pub(super) fn add_comparison(
     ));
     page.subheading("Classes")
         .table(&class_shares(ours, theirs));
+    add_figures(page, theirs, max_figures);
+}
+
+fn add_figures(page: &mut Page, theirs: &LabelledSet, max_figures: usize) {
     let figures: Vec<Figure> = theirs
         .spread(max_figures)
         .into_par_iter()
         .filter_map(|picture| figure(theirs, picture))
         .collect();
-    page.subheading(&format!(
-        "Your pictures ({} of {})",
-        figures.len(),
-        theirs.pictures.len()
-    ));
+    let (shown, of) = (figures.len(), theirs.pictures.len());
+    page.subheading(&format!("Your pictures ({shown} of {of})"));
     page.html(&gallery("yours", &figures));
 }
 
@@ -89,7 +91,6 @@ fn measure(set: &LabelledSet) -> Vec<Measure> {
 }
 
 fn measure_boxes(set: &LabelledSet) -> [Measure; 6] {
-    let percent = |i: usize| set.boxes().map(|(_, b)| 100.0 * b[i]).collect::<Vec<f64>>();
     let counts = set
         .pictures
         .iter()
@@ -99,15 +100,20 @@ fn measure_boxes(set: &LabelledSet) -> [Measure; 6] {
         .map(|(_, [_, _, w, h])| 100.0 * (w * h).max(0.0).sqrt());
     [
         ("labels in a picture", counts.collect()),
-        ("width of a box, % of the picture", percent(2)),
-        ("height of a box, % of the picture", percent(3)),
+        ("width of a box, % of the picture", percentages(set, 2)),
+        ("height of a box, % of the picture", percentages(set, 3)),
         (
             "square root of a box's area, % of the picture",
             root_area.collect(),
         ),
-        ("centre of a box from the left, %", percent(0)),
-        ("centre of a box from the top, %", percent(1)),
+        ("centre of a box from the left, %", percentages(set, 0)),
+        ("centre of a box from the top, %", percentages(set, 1)),
     ]
+}
+
+/// The `i`-th number of each box, which is a share of its picture.
+fn percentages(set: &LabelledSet, i: usize) -> Vec<f64> {
+    set.boxes().map(|(_, b)| 100.0 * b[i]).collect()
 }
 
 /// The title of a measure and how the statistics of a picture give it.
@@ -158,16 +164,12 @@ impl PixelStatistics {
             [code.r, code.g, code.b].map(f32::from)
         });
         let luma = codes.map(|[r, g, b]| 0.299 * r + 0.587 * g + 0.114 * b);
-        let spread =
-            codes.map(|c| c.into_iter().fold(0.0, f32::max) - c.into_iter().fold(255.0, f32::min));
+        let spread = codes.map(channel_spread);
         let brightness = mean(luma.pixels().iter().copied());
-        let squares = luma
-            .pixels()
-            .iter()
-            .map(|v| (v - brightness as f32).powi(2));
+        let deviations = luma.pixels().iter().map(|v| v - brightness as f32);
         Self {
             brightness,
-            contrast: mean(squares).sqrt(),
+            contrast: mean(deviations.map(|v| v.powi(2))).sqrt(),
             saturation: mean(spread.pixels().iter().copied()),
             detail: detail(&luma),
         }
@@ -193,9 +195,8 @@ fn figure(set: &LabelledSet, picture: &LabelledPicture) -> Option<Figure> {
     // Boxes are shares of the picture, which is a square of 100 then; the frame gives it its shape back.
     let header = io::read_header(&picture.path).ok()?;
     let size = [header.width as f64, header.height as f64];
-    let mut figure = Figure::whole(&picture.path, size)
-        .inspect_err(|error| log::warn!("{error}"))
-        .ok()?;
+    let figure = Figure::whole(&picture.path, size);
+    let mut figure = figure.inspect_err(|error| log::warn!("{error}")).ok()?;
     let (letter, top) = (figure.letter_height(), figure.top());
     for (class, shares) in picture.boxes.iter().flatten() {
         let bbox = in_pixels(*shares, size);
@@ -207,12 +208,9 @@ fn figure(set: &LabelledSet, picture: &LabelledPicture) -> Option<Figure> {
 }
 
 fn in_pixels([x, y, w, h]: [f64; 4], size: [f64; 2]) -> BBox {
-    BBox {
-        x0: (x - w / 2.0) * size[0],
-        y0: (y - h / 2.0) * size[1],
-        x1: (x + w / 2.0) * size[0],
-        y1: (y + h / 2.0) * size[1],
-    }
+    let [x0, x1] = [x - w / 2.0, x + w / 2.0].map(|x| x * size[0]);
+    let [y0, y1] = [y - h / 2.0, y + h / 2.0].map(|y| y * size[1]);
+    BBox { x0, y0, x1, y1 }
 }
 
 fn caption(picture: &LabelledPicture) -> String {
@@ -230,9 +228,9 @@ fn class_shares(ours: &LabelledSet, theirs: &LabelledSet) -> Table {
     let names: BTreeSet<&String> = both.iter().flat_map(BTreeMap::keys).collect();
     let mut table = Table::new(["class", "dataset", "yours"]);
     for name in names {
-        let [ours, theirs] = both.each_ref().map(|shares| {
-            let share = shares.get(name);
-            share.map_or("-".into(), |share| format!("{share:.1} %"))
+        let [ours, theirs] = both.each_ref().map(|shares| match shares.get(name) {
+            Some(share) => format!("{share:.1} %"),
+            None => "-".into(),
         });
         table.push([name.clone(), ours, theirs]);
     }
@@ -293,9 +291,8 @@ struct ComparedMeasure {
 
 /// What both have values of, what differs most first.
 fn compare_measures(ours: &LabelledSet, theirs: &LabelledSet) -> Vec<ComparedMeasure> {
-    let mut measures: Vec<ComparedMeasure> = measure(ours)
-        .into_iter()
-        .zip(measure(theirs))
+    let pairs = measure(ours).into_iter().zip(measure(theirs));
+    let mut measures: Vec<_> = pairs
         .filter(|((_, ours), (_, theirs))| !ours.is_empty() && !theirs.is_empty())
         .map(|((title, ours), (_, theirs))| ComparedMeasure {
             title,
@@ -318,37 +315,27 @@ impl ComparedMeasure {
         let [w, h] = FRAME;
         let (width, height) = (ROOM_LEFT + w + ROOM_RIGHT, ROOM_ABOVE + h + ROOM_BELOW);
         let (line, title) = (ROOM_ABOVE + h, escaped(self.title));
-        let mut svg = format!(
+        let (bars, steps) = (bars(&ours, most), steps(&theirs, most));
+        let words = self.words([low, high]);
+        format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" font-family=\"sans-serif\" \
-             font-size=\"11\">\n<title>{title}</title>\n"
-        );
-        svg += &bars(&ours, most);
-        svg += &steps(&theirs, most);
-        let _ = writeln!(svg, "<path d=\"M{ROOM_LEFT} {line}h{w}\" stroke=\"#888\"/>");
-        for (x, y, anchor, text) in [
-            (ROOM_LEFT, ROOM_ABOVE - 10.0, "start", self.title.to_owned()),
-            (ROOM_LEFT, line + 14.0, "start", short(low)),
-            (ROOM_LEFT + w, line + 14.0, "end", short(high)),
-        ] {
-            let text = escaped(&text);
-            let _ = writeln!(
-                svg,
-                "<text x=\"{x}\" y=\"{y}\" text-anchor=\"{anchor}\">{text}</text>"
-            );
-        }
-        svg + "</svg>\n"
+             font-size=\"11\">\n<title>{title}</title>\n{bars}{steps}<path d=\"M{ROOM_LEFT} {line}h{w}\" \
+             stroke=\"#888\"/>\n{words}</svg>\n"
+        )
+    }
+
+    /// The title above the frame and its ends below it.
+    fn words(&self, [low, high]: [f64; 2]) -> String {
+        let [w, h] = FRAME;
+        let below = ROOM_ABOVE + h + 14.0;
+        text_at([ROOM_LEFT, ROOM_ABOVE - 10.0], "start", self.title)
+            + &text_at([ROOM_LEFT, below], "start", &short(low))
+            + &text_at([ROOM_LEFT + w, below], "end", &short(high))
     }
 
     /// Least and greatest value of both, apart from each other.
     fn range(&self) -> [f64; 2] {
-        let all = || self.ours.iter().chain(&self.theirs).copied();
-        let low = all().fold(f64::INFINITY, f64::min);
-        let high = all().fold(f64::NEG_INFINITY, f64::max);
-        if low < high {
-            [low, high]
-        } else {
-            [low - 0.5, low + 0.5]
-        }
+        extremes(self.ours.iter().chain(&self.theirs))
     }
 }
 
@@ -404,12 +391,24 @@ fn shares(values: &[f64], low: f64, high: f64) -> [f64; HISTOGRAM_BINS] {
 fn distance(mut a: Vec<f64>, mut b: Vec<f64>) -> f64 {
     a.sort_by(f64::total_cmp);
     b.sort_by(f64::total_cmp);
-    let below =
-        |values: &[f64], x: f64| values.partition_point(|v| *v <= x) as f64 / values.len() as f64;
-    a.iter()
-        .chain(&b)
-        .map(|&x| (below(&a, x) - below(&b, x)).abs())
-        .fold(0.0, f64::max)
+    let values = a.iter().chain(&b);
+    let gaps = values.map(|&x| share_below(&a, x) - share_below(&b, x));
+    gaps.map(f64::abs).fold(0.0, f64::max)
+}
+
+/// Share of sorted values that are not above `x`.
+fn share_below(values: &[f64], x: f64) -> f64 {
+    values.partition_point(|v| *v <= x) as f64 / values.len() as f64
+}
+
+fn text_at([x, y]: [f64; 2], anchor: &str, text: &str) -> String {
+    let text = escaped(text);
+    format!("<text x=\"{x}\" y=\"{y}\" text-anchor=\"{anchor}\">{text}</text>\n")
+}
+
+/// The largest channel less the smallest.
+fn channel_spread(codes: [f32; 3]) -> f32 {
+    codes.into_iter().fold(0.0, f32::max) - codes.into_iter().fold(255.0, f32::min)
 }
 
 #[cfg(test)]

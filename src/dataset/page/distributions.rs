@@ -31,12 +31,8 @@ pub(super) fn add_drawn(page: &mut Page, summary: &Summary) {
             range => charts.push(drawn_histogram(key, values, range)),
         }
     }
-    charts.extend(
-        summary
-            .chosen
-            .iter()
-            .map(|(what, counts)| choice_histogram(what, counts)),
-    );
+    let chosen = summary.chosen.iter();
+    charts.extend(chosen.map(|(what, counts)| choice_histogram(what, counts)));
     add_histograms(page, &charts);
     if !fixed.rows.is_empty() {
         page.table(&fixed);
@@ -46,15 +42,19 @@ pub(super) fn add_drawn(page: &mut Page, summary: &Summary) {
 /// Values of one draw, against its range in the recipe and whether it draws integers.
 fn drawn_histogram(key: &str, values: &[f64], range: Option<([f64; 2], bool)>) -> Histogram {
     match range {
-        Some(([low, high], true)) => {
-            let ends = [low - 0.5, high + 0.5];
-            let mut histogram =
-                Histogram::new(key, values, ends, integer_bars([low, high])).uniform();
-            histogram.ends = [low.to_string(), high.to_string()];
-            histogram
-        }
+        Some((range, true)) => integer_histogram(key, values, range),
         Some((range, false)) => Histogram::new(key, values, range, HISTOGRAM_BINS).uniform(),
         None => Histogram::new(key, values, extremes(values), HISTOGRAM_BINS),
+    }
+}
+
+/// A bar for each integer.
+fn integer_histogram(key: &str, values: &[f64], [low, high]: [f64; 2]) -> Histogram {
+    let bars = integer_bars([low, high]);
+    let histogram = Histogram::new(key, values, [low - 0.5, high + 0.5], bars);
+    Histogram {
+        ends: [low.to_string(), high.to_string()],
+        ..histogram.uniform()
     }
 }
 
@@ -69,35 +69,32 @@ fn integer_bars([low, high]: [f64; 2]) -> usize {
 }
 
 fn choice_histogram(what: &str, counts: &BTreeMap<String, u64>) -> Histogram {
-    let name =
-        |entry: Option<(&String, &u64)>| entry.map_or(String::new(), |(name, _)| name.clone());
+    let ends = [counts.keys().next(), counts.keys().next_back()];
     let histogram = Histogram {
         title: format!("{what} ({} of them)", counts.len()),
-        ends: [
-            name(counts.first_key_value()),
-            name(counts.last_key_value()),
-        ],
+        ends: ends.map(|name| name.cloned().unwrap_or_default()),
         counts: counts.values().copied().collect(),
         expected: None,
     };
-    if what == "photo of the asset" {
-        histogram
-    } else {
-        histogram.uniform()
+    match what {
+        "photo of the asset" => histogram,
+        _ => histogram.uniform(),
     }
 }
 
-fn extremes(values: &[f64]) -> [f64; 2] {
+pub(super) fn extremes<'a>(values: impl IntoIterator<Item = &'a f64>) -> [f64; 2] {
     let [low, high] = values
-        .iter()
-        .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| {
-            [v.min(a), v.max(b)]
-        });
+        .into_iter()
+        .fold([f64::INFINITY, f64::NEG_INFINITY], widened);
     if low < high {
         [low, high]
     } else {
         [low - 0.5, low + 0.5]
     }
+}
+
+fn widened([low, high]: [f64; 2], value: &f64) -> [f64; 2] {
+    [value.min(low), value.max(high)]
 }
 
 /// Adds what can be seen, and how large it is.

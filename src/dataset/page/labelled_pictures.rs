@@ -3,6 +3,7 @@
 use crate::dataset::{Listing, SampleSummary, Summary, YoloSet, is_image};
 use crate::error::{Error, Result};
 use crate::eval::{self, GroundTruth};
+use crate::geom::BBox;
 use crate::io;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
@@ -36,26 +37,16 @@ impl LabelledSet {
     /// # Errors
     /// A folder without images; a label that cannot be read.
     pub(super) fn read(folder: &Path) -> Result<Self> {
-        let (classes, images) = if folder.join("data.yaml").is_file() {
-            let listing = Listing::read(folder)?;
-            (listing.classes.clone(), listing.series())
-        } else {
-            let mut images = Vec::new();
-            collect_images(folder, &mut BTreeSet::new(), &mut images)?;
-            images.sort();
-            (Vec::new(), images)
-        };
+        let (classes, images) = listed_images(folder)?;
         if images.is_empty() {
-            return Err(Error::file(
-                folder,
-                "no images, expected a YOLO dataset or a folder of images with labels",
-            ));
+            let what = "no images, expected a YOLO dataset or a folder of images with labels";
+            return Err(Error::file(folder, what));
         }
-        let pictures = images
-            .into_par_iter()
-            .map(LabelledPicture::read)
-            .collect::<Result<_>>()?;
-        Ok(Self { classes, pictures })
+        let pictures = images.into_par_iter().map(LabelledPicture::read);
+        Ok(Self {
+            classes,
+            pictures: pictures.collect::<Result<_>>()?,
+        })
     }
 
     /// The pictures of a dataset that petcomp made.
@@ -115,12 +106,9 @@ impl LabelledPicture {
     }
 
     fn from_sample(folder: &Path, sample: &SampleSummary) -> Self {
-        let [w, h] = sample.image.map(f64::from);
-        let boxes = sample.labels.iter().map(|(class, b)| {
-            let center = b.center();
-            let shares = [center.x / w, center.y / h, b.width() / w, b.height() / h];
-            (*class, shares)
-        });
+        let size = sample.image.map(f64::from);
+        let labels = sample.labels.iter();
+        let boxes = labels.map(|(class, b)| (*class, shares_of(b, size)));
         Self {
             path: folder.join(&sample.files[0]),
             boxes: Some(boxes.collect()),
@@ -140,25 +128,41 @@ fn collect_images(
     seen: &mut BTreeSet<PathBuf>,
     images: &mut Vec<PathBuf>,
 ) -> Result<()> {
-    let failed = |e| Error::file(folder, e);
-    if !seen.insert(folder.canonicalize().map_err(failed)?) {
+    if !seen.insert(folder.canonicalize().map_err(|e| Error::file(folder, e))?) {
         return Ok(());
     }
-    for entry in std::fs::read_dir(folder).map_err(failed)?.flatten() {
-        let path = entry.path();
+    let entries = std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
+    for path in entries.flatten().map(|entry| entry.path()) {
         if path.is_dir() {
             collect_images(&path, seen, images)?;
         } else if path.is_file() && is_image(&path) {
             images.push(path);
         }
         if images.len() > MAX_IMAGES {
-            return Err(Error::file(
-                folder,
-                format!("more than {MAX_IMAGES} images, expected fewer"),
-            ));
+            let what = format!("more than {MAX_IMAGES} images, expected fewer");
+            return Err(Error::file(folder, what));
         }
     }
     Ok(())
+}
+
+/// Classes and images of a YOLO dataset, or all images below a folder.
+fn listed_images(folder: &Path) -> Result<(Vec<String>, Vec<PathBuf>)> {
+    if folder.join("data.yaml").is_file() {
+        let listing = Listing::read(folder)?;
+        let images = listing.series();
+        return Ok((listing.classes, images));
+    }
+    let mut images = Vec::new();
+    collect_images(folder, &mut BTreeSet::new(), &mut images)?;
+    images.sort();
+    Ok((Vec::new(), images))
+}
+
+/// Centre and sides of a box as shares of its picture.
+fn shares_of(b: &BBox, [w, h]: [f64; 2]) -> [f64; 4] {
+    let center = b.center();
+    [center.x / w, center.y / h, b.width() / w, b.height() / h]
 }
 
 #[cfg(test)]

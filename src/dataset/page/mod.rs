@@ -55,15 +55,20 @@ pub fn page(folder: &Path, options: &DatasetReportOptions) -> Result<Page> {
         let theirs = LabelledSet::read(own)?;
         beside::add_comparison(&mut page, &ours, &theirs, options.most.div_ceil(2));
     }
-    distributions::add_drawn(&mut page, &summary);
-    distributions::add_seen(&mut page, &summary);
-    add_unlabelled(&mut page, &summary);
-    page.heading("Classes").table(&balance(&summary));
-    add_background_notes(&mut page, &summary);
-    add_rejected(&mut page, &summary);
-    page.heading("Time").table(&times(&summary));
-    add_identity(&mut page, &summary);
+    add_statistics(&mut page, &summary);
     Ok(page)
+}
+
+/// Everything that is not about single pictures.
+fn add_statistics(page: &mut Page, summary: &Summary) {
+    distributions::add_drawn(page, summary);
+    distributions::add_seen(page, summary);
+    add_unlabelled(page, summary);
+    page.heading("Classes").table(&balance(summary));
+    add_background_notes(page, summary);
+    add_rejected(page, summary);
+    page.heading("Time").table(&times(summary));
+    add_identity(page, summary);
 }
 
 /// "Dataset" and the folder's name, once where it is called so itself.
@@ -87,33 +92,31 @@ fn add_identity(page: &mut Page, summary: &Summary) {
 }
 
 fn facts(summary: &Summary) -> Table {
-    let field = |name: &str| {
-        let value = summary.identity[name].to_string();
-        value.trim_matches('"').to_owned()
-    };
-    let counts = summary.balance.iter().flatten();
-    let [objects, labels] = counts.fold([0; 2], |[a, b], [objects, labels]| {
-        [a + objects, b + labels]
-    });
     let [train, val] = summary.images;
     let images = train + val;
+    let [objects, labels] = object_counts(summary);
+    let images = format!("{images} ({train} for training, {val} for validation)");
+    let objects = format!("{objects}, {labels} of them with a label");
+    let version = format!("petcomp {}", identity_text(summary, "petcomp"));
     let mut table = Table::new(["", ""]);
-    for (name, value) in [
-        (
-            "images",
-            format!("{images} ({train} for training, {val} for validation)"),
-        ),
-        (
-            "objects",
-            format!("{objects}, {labels} of them with a label"),
-        ),
-        ("seed", field("seed")),
-        ("obstructed objects", field("obstructed")),
-        ("made by", format!("petcomp {}", field("petcomp"))),
-    ] {
-        table.push([name.to_owned(), value]);
-    }
+    table.push(["images", &images]);
+    table.push(["objects", &objects]);
+    table.push(["seed", &identity_text(summary, "seed")]);
+    table.push(["obstructed objects", &identity_text(summary, "obstructed")]);
+    table.push(["made by", &version]);
     table
+}
+
+/// A field of what the dataset was made from.
+fn identity_text(summary: &Summary, name: &str) -> String {
+    let value = summary.identity[name].to_string();
+    value.trim_matches('"').to_owned()
+}
+
+/// Objects of all classes, and how many of them have a label.
+fn object_counts(summary: &Summary) -> [u64; 2] {
+    let counts = summary.balance.iter().flatten();
+    counts.fold([0; 2], |sums, counts| [0, 1].map(|i| sums[i] + counts[i]))
 }
 
 fn balance(summary: &Summary) -> Table {
@@ -144,11 +147,10 @@ fn add_background_notes(page: &mut Page, summary: &Summary) {
     };
     let mut table = Table::new(["background", "what to look at"]);
     for (name, texts) in notes {
-        let texts = texts.as_array().map_or(&[][..], Vec::as_slice);
-        texts
-            .iter()
-            .filter_map(|text| text.as_str())
-            .for_each(|text| table.push([name.clone(), text.to_owned()]));
+        let texts = texts.as_array().into_iter().flatten();
+        for text in texts.filter_map(|text| text.as_str()) {
+            table.push([name, text]);
+        }
     }
     page.heading("Backgrounds").table(&table);
 }
@@ -185,16 +187,17 @@ fn times(summary: &Summary) -> Table {
     let mut table = Table::new(columns);
     for run in &summary.runs {
         let made = run.made as f64;
-        let each = |seconds: f64| format!("{:.1} ms an image", 1000.0 * seconds / made);
+        let [settle, render, label, write] = [run.settle_s, run.render_s, run.label_s, run.write_s]
+            .map(|seconds| format!("{:.1} ms an image", 1000.0 * seconds / made));
         table.push([
             run.made.to_string(),
             run.threads.to_string(),
             format!("{:.1}", run.wall_s),
             format!("{:.2}", made / run.wall_s),
-            each(run.settle_s),
-            each(run.render_s),
-            each(run.label_s),
-            each(run.write_s),
+            settle,
+            render,
+            label,
+            write,
         ]);
     }
     table
@@ -213,6 +216,17 @@ fn add_unlabelled(page: &mut Page, summary: &Summary) {
         page.text("All have one.");
         return;
     }
+    let policy = summary.identity["obstructed"].as_str().unwrap_or("drop");
+    page.table(&unlabelled_reasons(summary)).text(&format!(
+        "The recipe's obstructed = \"{policy}\" decides about objects that others lie over, by the topmost rule, however \
+         little of them is hidden; \"keep\" labels them too."
+    ));
+    let title = "seen share of objects without a label";
+    let histogram = distributions::visible_histogram(title, &summary.unlabelled_visible);
+    distributions::add_histograms(page, &[histogram]);
+}
+
+fn unlabelled_reasons(summary: &Summary) -> Table {
     let mut table = Table::new(["reason", "objects", "share of all objects"]);
     for (reason, count) in &summary.unlabelled {
         let share = 100.0 * *count as f64 / summary.visible.len().max(1) as f64;
@@ -222,12 +236,5 @@ fn add_unlabelled(page: &mut Page, summary: &Summary) {
             format!("{share:.1} %"),
         ]);
     }
-    let policy = summary.identity["obstructed"].as_str().unwrap_or("drop");
-    page.table(&table).text(&format!(
-        "The recipe's obstructed = \"{policy}\" decides about objects that others lie over, by the topmost rule, however \
-         little of them is hidden; \"keep\" labels them too."
-    ));
-    let title = "seen share of objects without a label";
-    let histogram = distributions::visible_histogram(title, &summary.unlabelled_visible);
-    distributions::add_histograms(page, &[histogram]);
+    table
 }

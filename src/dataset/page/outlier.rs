@@ -1,5 +1,7 @@
 //! What is unlike the rest, in robust standard deviations.
 
+use std::collections::BTreeMap;
+
 /// A number of every row.
 pub(crate) struct Feature<'a> {
     /// What it is: `objects`.
@@ -34,20 +36,14 @@ const SIGMA_PER_MEAN_DEVIATION: f64 = 1.2533;
 /// The modified z-score of Iglewicz and Hoaglin: distance from the median over the median absolute deviation, or over the
 /// mean one where most values are the same.
 pub(crate) fn outliers(features: &[Feature<'_>]) -> Vec<Outlier> {
-    let mut worst: Vec<Option<Outlier>> = Vec::new();
-    for feature in features {
-        worst.resize(worst.len().max(feature.values.len()), None);
-        for outlier in feature.outliers() {
-            let known = &mut worst[outlier.row];
-            if known
-                .as_ref()
-                .is_none_or(|known| outlier.deviations > known.deviations)
-            {
-                *known = Some(outlier);
-            }
+    let mut worst: BTreeMap<usize, Outlier> = BTreeMap::new();
+    for outlier in features.iter().flat_map(Feature::outliers) {
+        let known = worst.get(&outlier.row);
+        if known.is_none_or(|known| outlier.deviations > known.deviations) {
+            worst.insert(outlier.row, outlier);
         }
     }
-    let mut all: Vec<Outlier> = worst.into_iter().flatten().collect();
+    let mut all: Vec<Outlier> = worst.into_values().collect();
     all.sort_by(|a, b| b.deviations.total_cmp(&a.deviations));
     all
 }
@@ -58,21 +54,21 @@ impl Feature<'_> {
         let Some((median, scale)) = median_and_scale(&self.values) else {
             return Vec::new();
         };
-        let typical = short(median);
-        let mut outliers = Vec::new();
-        for (row, value) in self.values.iter().enumerate() {
-            let deviations = (value - median).abs() / scale;
-            let shown = short(*value);
-            // What reads the same is not unlike.
-            if shown != typical && deviations > MIN_DEVIATIONS {
-                outliers.push(Outlier {
-                    row,
-                    deviations,
-                    why: format!("{} {shown}, as a rule {typical}", self.name),
-                });
-            }
-        }
-        outliers
+        let values = self.values.iter().enumerate();
+        values
+            .filter_map(|(row, value)| self.outlier(row, *value, median, scale))
+            .collect()
+    }
+
+    fn outlier(&self, row: usize, value: f64, median: f64, scale: f64) -> Option<Outlier> {
+        let deviations = (value - median).abs() / scale;
+        let (shown, typical) = (short(value), short(median));
+        // What reads the same is not unlike.
+        (shown != typical && deviations > MIN_DEVIATIONS).then(|| Outlier {
+            row,
+            deviations,
+            why: format!("{} {shown}, as a rule {typical}", self.name),
+        })
     }
 }
 
@@ -82,9 +78,12 @@ fn median_and_scale(values: &[f64]) -> Option<(f64, f64)> {
     let middle = median(finite.clone())?;
     let off: Vec<f64> = finite.iter().map(|v| (v - middle).abs()).collect();
     let mean = off.iter().sum::<f64>() / off.len() as f64;
-    let scale = Some(SIGMA_PER_MEDIAN_DEVIATION * median(off)?)
-        .filter(|&scale| scale > 0.0)
-        .unwrap_or(SIGMA_PER_MEAN_DEVIATION * mean);
+    let by_median = SIGMA_PER_MEDIAN_DEVIATION * median(off)?;
+    let scale = if by_median > 0.0 {
+        by_median
+    } else {
+        SIGMA_PER_MEAN_DEVIATION * mean
+    };
     (scale > 0.0).then_some((middle, scale))
 }
 
@@ -96,9 +95,9 @@ pub(crate) fn median(values: Vec<f64>) -> Option<f64> {
 /// A value that this share of all are below; the upper one of two.
 pub(crate) fn quantile(mut values: Vec<f64>, share: f64) -> Option<f64> {
     values.sort_by(f64::total_cmp);
-    values
-        .get(((values.len() as f64 * share) as usize).min(values.len().saturating_sub(1)))
-        .copied()
+    let place = (values.len() as f64 * share) as usize;
+    let last = values.len().saturating_sub(1);
+    values.get(place.min(last)).copied()
 }
 
 /// A number with two decimals at most.

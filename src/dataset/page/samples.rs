@@ -2,6 +2,7 @@
 
 use super::color_of;
 use super::outlier::{Feature, outliers};
+use crate::dataset::SampleRecord;
 use crate::dataset::{SampleSummary, ShownSample, Summary, UnlabelledReason};
 use crate::error::Result;
 use crate::eval::class_name;
@@ -42,23 +43,11 @@ pub(super) fn add_samples(
     page.heading("Pictures")
         .html(&legend(summary))
         .html("<div>\n");
-    for (id, text, on) in SWITCHES {
-        let checked = if on { " checked" } else { "" };
-        page.html(&format!(
-            "<input type=\"checkbox\" id=\"{id}\"{checked}><label for=\"{id}\">{text}</label>\n"
-        ));
+    for switch in SWITCHES {
+        page.html(&switch_html(switch));
     }
     let selected = select_samples(&summary.glances, count);
-    let outliers = selected
-        .iter()
-        .filter(|sample| sample.why.is_some())
-        .count();
-    page.text(&format!(
-        "{} of {} pictures: first {outliers} that are unlike the others, with what sets them apart, then others evenly \
-         spread. Click one to enlarge it; Escape and the arrow keys work too.",
-        selected.len(),
-        summary.glances.len()
-    ));
+    page.text(&describe_selection(&selected, summary.glances.len()));
     let figures: Vec<Figure> = selected
         .par_iter()
         .map(|sample| {
@@ -70,6 +59,20 @@ pub(super) fn add_samples(
         .html(&gallery("picture", &figures))
         .html("</div>\n</div>\n");
     Ok(())
+}
+
+fn switch_html((id, text, on): (&str, &str, bool)) -> String {
+    let checked = if on { " checked" } else { "" };
+    format!("<input type=\"checkbox\" id=\"{id}\"{checked}><label for=\"{id}\">{text}</label>\n")
+}
+
+fn describe_selection(selected: &[SelectedSample], all: usize) -> String {
+    let outliers = selected.iter().filter(|sample| sample.why.is_some());
+    let (count, outliers) = (selected.len(), outliers.count());
+    format!(
+        "{count} of {all} pictures: first {outliers} that are unlike the others, with what sets them apart, then others evenly \
+         spread. Click one to enlarge it; Escape and the arrow keys work too."
+    )
 }
 
 /// Colours of the classes and kinds of lines.
@@ -101,18 +104,16 @@ struct SelectedSample {
 
 /// Pictures to show: those unlike the others, at most half, then others evenly spread.
 fn select_samples(samples: &[SampleSummary], count: usize) -> Vec<SelectedSample> {
-    let mut selected: Vec<SelectedSample> = outliers(&features(samples))
-        .into_iter()
+    let outliers = outliers(&features(samples)).into_iter();
+    let mut selected: Vec<SelectedSample> = outliers
         .take(count / 2)
         .map(|outlier| SelectedSample {
             row: outlier.row,
             why: Some(outlier.why),
         })
         .collect();
-    let known: Vec<usize> = selected.iter().map(|sample| sample.row).collect();
-    let rest: Vec<usize> = (0..samples.len())
-        .filter(|row| !known.contains(row))
-        .collect();
+    let mut rest: Vec<usize> = (0..samples.len()).collect();
+    rest.retain(|&row| selected.iter().all(|sample| sample.row != row));
     let count = (count - selected.len()).min(rest.len());
     selected.extend((0..count).map(|i| SelectedSample {
         row: rest[i * rest.len() / count],
@@ -158,11 +159,9 @@ fn figure(shown: &ShownSample, classes: &[String], why: Option<&str>) -> Result<
     let mut figure = Figure::whole(&shown.picture, record.labels.image.map(f64::from))?;
     let letter = figure.letter_height();
     let (mut boxes, mut masks, mut others) = (String::new(), String::new(), String::new());
-    let mut labelled = 0;
     for object in &record.labels.objects {
         match UnlabelledReason::of(object, record) {
             None => {
-                labelled += 1;
                 boxes += &box_of(object, classes, letter);
                 masks += &mask_of(object);
             }
@@ -172,13 +171,18 @@ fn figure(shown: &ShownSample, classes: &[String], why: Option<&str>) -> Result<
     figure.drawing = format!(
         "<g class=\"masks\">{masks}</g><g class=\"others\">{others}</g><g class=\"boxes\">{boxes}</g>"
     );
-    let why = why.map_or(String::new(), |why| format!("; {why}"));
-    let (index, part) = (record.index, record.part.name());
-    figure.caption = format!(
-        "{index:06} {part}: {labelled} of {} objects labelled{why}",
-        record.labels.objects.len()
-    );
+    figure.caption = figure_caption(record, why);
     Ok(figure)
+}
+
+fn figure_caption(record: &SampleRecord, why: Option<&str>) -> String {
+    let (index, part, objects) = (record.index, record.part.name(), &record.labels.objects);
+    let labelled = objects
+        .iter()
+        .filter(|object| UnlabelledReason::of(object, record).is_none());
+    let (labelled, all) = (labelled.count(), objects.len());
+    let why = why.map_or(String::new(), |why| format!("; {why}"));
+    format!("{index:06} {part}: {labelled} of {all} objects labelled{why}")
 }
 
 fn box_of(object: &ObjectLabel, classes: &[String], letter: f64) -> String {
@@ -237,27 +241,18 @@ fn outline_of(
 }
 
 fn why_unlabelled(object: &ObjectLabel, reason: UnlabelledReason) -> String {
-    match reason {
-        UnlabelledReason::Covered => {
-            let above: Vec<String> = object
-                .covered_by
-                .iter()
-                .map(|id| id.0.to_string())
-                .collect();
-            format!("under {}", above.join(", "))
-        }
-        reason => reason.description().to_owned(),
+    if reason != UnlabelledReason::Covered {
+        return reason.description().to_owned();
     }
+    let above = object.covered_by.iter().map(|id| id.0.to_string());
+    format!("under {}", above.collect::<Vec<_>>().join(", "))
 }
 
 fn titled_polygon(ring: &[Point2<f64>], title: &str) -> String {
-    let points: String = ring
-        .iter()
-        .map(|p| format!("{:.1},{:.1} ", p.x, p.y))
-        .collect();
+    let points = ring.iter().map(|p| format!("{:.1},{:.1}", p.x, p.y));
+    let points = points.collect::<Vec<_>>().join(" ");
     format!(
-        "<polygon points=\"{}\" fill=\"none\" pointer-events=\"all\" stroke=\"{UNLABELLED}\" stroke-width=\"1.5\">\
-         <title>{title}</title></polygon>",
-        points.trim_end()
+        "<polygon points=\"{points}\" fill=\"none\" pointer-events=\"all\" stroke=\"{UNLABELLED}\" stroke-width=\"1.5\">\
+         <title>{title}</title></polygon>"
     )
 }

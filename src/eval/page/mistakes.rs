@@ -1,7 +1,9 @@
 //! What a detector got wrong, as a table and as pictures, the worst first.
 
 use super::{EvalReportOptions, Run};
-use crate::eval::{Detection, EvalImage, GroundTruth, Mistake, MistakeKind, Picture, class_name};
+use crate::eval::{
+    ConfusionOptions, Detection, EvalImage, GroundTruth, Mistake, MistakeKind, Picture, class_name,
+};
 use crate::geom::BBox;
 use crate::label::gallery::{self, Figure, gallery, marked_box};
 use crate::plot::{Page, Table};
@@ -52,18 +54,8 @@ pub(crate) fn add_to(
     mistakes: &[Mistake],
     options: &EvalReportOptions,
 ) {
-    let count = |kind| mistakes.iter().filter(|m| m.kind == kind).count();
-    let [alarms, wrong, missed] = [
-        MistakeKind::FalseAlarm,
-        MistakeKind::WrongClass,
-        MistakeKind::Missed,
-    ]
-    .map(count);
-    page.heading("Mistakes").text(&format!(
-        "{alarms} false alarms, {wrong} of another class than the box that they name, {missed} boxes missed; detections \
-         surer than {} that overlap a box by more than {}. All of them, the worst first, are in mistakes.csv.",
-        options.confusion.confidence, options.confusion.iou
-    ));
+    page.heading("Mistakes")
+        .text(&describe_mistakes(mistakes, options));
     if options.pictures.iter().flatten().next().is_none() {
         page.text(
             "No pictures of them: the images were not found; say where they are with --images.",
@@ -73,49 +65,46 @@ pub(crate) fn add_to(
     page.html(gallery::STYLE).html(&legend());
     let (misses, detections): (Vec<&Mistake>, Vec<&Mistake>) =
         mistakes.iter().partition(|m| m.kind == MistakeKind::Missed);
-    add_figures(
-        page,
-        "alarm",
-        "False alarms and wrong classes, the surest first",
-        run,
-        &detections,
-        options,
-    );
-    add_figures(
-        page,
-        "miss",
-        "Boxes that were missed, the largest first",
-        run,
-        &misses,
-        options,
-    );
+    let title = "False alarms and wrong classes, the surest first";
+    add_figures(page, ["alarm", title], run, &detections, options);
+    let title = "Boxes that were missed, the largest first";
+    add_figures(page, ["miss", title], run, &misses, options);
+}
+
+fn describe_mistakes(mistakes: &[Mistake], options: &EvalReportOptions) -> String {
+    let [alarms, wrong, missed] = [
+        MistakeKind::FalseAlarm,
+        MistakeKind::WrongClass,
+        MistakeKind::Missed,
+    ]
+    .map(|kind| mistakes.iter().filter(|m| m.kind == kind).count());
+    let ConfusionOptions { confidence, iou } = options.confusion;
+    format!(
+        "{alarms} false alarms, {wrong} of another class than the box that they name, {missed} boxes missed; detections \
+         surer than {confidence} that overlap a box by more than {iou}. All of them, the worst first, are in mistakes.csv."
+    )
 }
 
 fn add_figures(
     page: &mut Page,
-    name: &str,
-    title: &str,
+    [name, title]: [&str; 2],
     run: &Run,
     mistakes: &[&Mistake],
     options: &EvalReportOptions,
 ) {
-    let with_picture = |m: &&&Mistake| options.pictures.get(m.sheet).is_some_and(Option::is_some);
     let shown: Vec<&Mistake> = mistakes
         .iter()
-        .filter(with_picture)
-        .take(options.shown)
         .copied()
+        .filter(|m| options.pictures.get(m.sheet).is_some_and(Option::is_some))
+        .take(options.shown)
         .collect();
     let figures: Vec<Figure> = shown
         .par_iter()
         .filter_map(|mistake| figure(run, mistake, options))
         .collect();
     if !figures.is_empty() {
-        page.subheading(&format!(
-            "{title} ({} of {})",
-            figures.len(),
-            mistakes.len()
-        ));
+        let (shown, of) = (figures.len(), mistakes.len());
+        page.subheading(&format!("{title} ({shown} of {of})"));
         page.html(&gallery(name, &figures));
     }
 }
@@ -168,15 +157,11 @@ struct ShownMistake<'a> {
 impl<'a> ShownMistake<'a> {
     fn new(run: &'a Run, mistake: &'a Mistake) -> Self {
         let sheet = &run.sheets[mistake.sheet];
-        let (truth, found) = (
-            mistake.truth.map(|t| &sheet.truth[t]),
-            mistake.found.map(|f| &sheet.found[f]),
-        );
         Self {
             mistake,
             sheet,
-            truth,
-            found,
+            truth: mistake.truth.map(|t| &sheet.truth[t]),
+            found: mistake.found.map(|f| &sheet.found[f]),
         }
     }
 
@@ -186,32 +171,34 @@ impl<'a> ShownMistake<'a> {
 
     /// The box that is wrong.
     fn wrong(&self) -> BBox {
-        let (truth, found) = (self.truth.map(|t| t.bbox), self.found.map(|f| f.bbox));
+        let [truth, found] = self.boxes();
         if self.is_miss() { truth } else { found }.unwrap_or_default()
     }
 
+    /// Of the truth and of the detection.
+    fn boxes(&self) -> [Option<BBox>; 2] {
+        [self.truth.map(|t| t.bbox), self.found.map(|f| f.bbox)]
+    }
+
     /// The part of the picture around it.
-    fn view(&self, [width, height]: [f64; 2]) -> BBox {
-        let boxes = [self.truth.map(|t| t.bbox), self.found.map(|f| f.bbox)];
-        let both = boxes
-            .into_iter()
-            .flatten()
-            .reduce(BBox::hull)
-            .unwrap_or_default();
-        let side =
-            (VIEW_SCALE * both.width().max(both.height())).max(MIN_VIEW_SHARE * width.max(height));
-        let (w, h, middle) = (side.min(width), side.min(height), both.center());
-        let x0 = (middle.x - w / 2.0).clamp(0.0, width - w);
-        let y0 = (middle.y - h / 2.0).clamp(0.0, height - h);
-        BBox {
-            x0,
-            y0,
-            x1: x0 + w,
-            y1: y0 + h,
-        }
+    fn view(&self, size: [f64; 2]) -> BBox {
+        let both = self.boxes().into_iter().flatten().reduce(BBox::hull);
+        square_around(&both.unwrap_or_default(), size)
     }
 
     fn drawing(&self, view: &BBox, canvas: &Canvas<'_>) -> String {
+        let mut svg = self.other_marks(view, canvas);
+        if let Some(truth) = self.truth {
+            svg += &self.truth_mark(truth, canvas);
+        }
+        if let Some(found) = self.found {
+            svg += &self.found_mark(found, canvas);
+        }
+        svg
+    }
+
+    /// Boxes and detections that have no part in the mistake.
+    fn other_marks(&self, view: &BBox, canvas: &Canvas<'_>) -> String {
         let mut svg = String::new();
         for truth in self.other_boxes(view) {
             let color = if truth.crowd { CROWD } else { TRUTH };
@@ -219,12 +206,6 @@ impl<'a> ShownMistake<'a> {
         }
         for found in self.other_detections(view, canvas.options.confusion.confidence) {
             svg += &canvas.marked(&found.bbox, "", FOUND, DASHED);
-        }
-        if let Some(truth) = self.truth {
-            svg += &self.truth_mark(truth, canvas);
-        }
-        if let Some(found) = self.found {
-            svg += &self.found_mark(found, canvas);
         }
         svg
     }
@@ -250,21 +231,15 @@ impl<'a> ShownMistake<'a> {
 
     /// Its row in the table of mistakes.
     fn row(&self, options: &EvalReportOptions) -> [String; 10] {
-        let name = |class: Option<u32>| {
-            class
-                .map(|class| class_name(class, &options.classes))
-                .unwrap_or_default()
-        };
         let wrong = self.wrong();
         let [x0, y0, x1, y1] = [wrong.x0, wrong.y0, wrong.x1, wrong.y1].map(|v| format!("{v:.1}"));
+        let confidence = self.found.map(|f| format!("{:.4}", f.confidence));
         [
             self.sheet.image.clone(),
             word(self.mistake.kind).to_owned(),
-            name(self.truth.map(|t| t.class)),
-            name(self.found.map(|f| f.class)),
-            self.found
-                .map(|f| format!("{:.4}", f.confidence))
-                .unwrap_or_default(),
+            self.true_class(options),
+            self.found_class(options),
+            confidence.unwrap_or_default(),
             format!("{:.3}", self.mistake.iou),
             x0,
             y0,
@@ -273,28 +248,31 @@ impl<'a> ShownMistake<'a> {
         ]
     }
 
+    /// Nothing where there is no box.
+    fn true_class(&self, options: &EvalReportOptions) -> String {
+        let truth = self.truth.map(|t| class_name(t.class, &options.classes));
+        truth.unwrap_or_default()
+    }
+
+    fn found_class(&self, options: &EvalReportOptions) -> String {
+        let found = self.found.map(|f| class_name(f.class, &options.classes));
+        found.unwrap_or_default()
+    }
+
     /// Boxes of the truth in the view that the mistake is not about.
     fn other_boxes(&self, view: &BBox) -> Vec<&'a GroundTruth> {
-        let other = |t: &&GroundTruth| !self.truth.is_some_and(|own| std::ptr::eq(own, *t));
-        self.sheet
-            .truth
-            .iter()
-            .filter(other)
-            .filter(|t| t.bbox.overlaps(view))
+        let seen = self.sheet.truth.iter().filter(|t| t.bbox.overlaps(view));
+        seen.filter(|&t| !self.truth.is_some_and(|own| std::ptr::eq(own, t)))
             .take(MAX_OTHER_BOXES)
             .collect()
     }
 
     /// Detections in the view that the mistake is not about, the surest ones.
     fn other_detections(&self, view: &BBox, confidence: f64) -> Vec<&'a Detection> {
-        let other = |f: &&Detection| !self.found.is_some_and(|own| std::ptr::eq(own, *f));
-        let sure = self
-            .sheet
-            .found
-            .iter()
-            .filter(|f| f.confidence > confidence);
-        let mut seen: Vec<&Detection> = sure
-            .filter(other)
+        let found = self.sheet.found.iter();
+        let mut seen: Vec<&Detection> = found
+            .filter(|f| f.confidence > confidence)
+            .filter(|&f| !self.found.is_some_and(|own| std::ptr::eq(own, f)))
             .filter(|f| f.bbox.overlaps(view))
             .collect();
         seen.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
@@ -303,13 +281,9 @@ impl<'a> ShownMistake<'a> {
     }
 
     fn caption(&self, options: &EvalReportOptions) -> String {
-        let name = |class: u32| class_name(class, &options.classes);
-        let found = self
-            .found
-            .map(|f| format!("{} {:.2}", name(f.class), f.confidence))
-            .unwrap_or_default();
-        let truth = self.truth.map(|t| name(t.class)).unwrap_or_default();
-        let iou = self.mistake.iou;
+        let (truth, iou) = (self.true_class(options), self.mistake.iou);
+        let confidence = self.found.map_or(0.0, |f| f.confidence);
+        let found = format!("{} {confidence:.2}", self.found_class(options));
         let what = match (self.mistake.kind, self.truth, self.found) {
             (MistakeKind::Missed, _, Some(_)) => {
                 format!("{truth} missed; nearest detection: {found}, IoU {iou:.2}")
@@ -332,23 +306,39 @@ fn word(kind: MistakeKind) -> &'static str {
 }
 
 fn legend() -> String {
-    let key = |color: &str, style: &str, words: &str| {
-        format!(
-            "<span style=\"white-space:nowrap;margin-right:1.5em\"><svg width=\"34\" height=\"14\" viewBox=\"0 0 34 14\">\
-             <path d=\"M2 7h30\" stroke=\"{color}\" {style}/></svg> {words}</span>\n"
-        )
-    };
     let keys = [
-        key(WRONG, THICK_DASHED, "wrong detection"),
-        key(WRONG, THICK, "missed box"),
-        key(TRUTH, THIN, "box of the truth"),
-        key(FOUND, DASHED, "other detection"),
-        key(CROWD, THIN, "crowd"),
+        legend_key(WRONG, THICK_DASHED, "wrong detection"),
+        legend_key(WRONG, THICK, "missed box"),
+        legend_key(TRUTH, THIN, "box of the truth"),
+        legend_key(FOUND, DASHED, "other detection"),
+        legend_key(CROWD, THIN, "crowd"),
     ];
     format!(
         "<p>{}Click a picture to enlarge it; Escape and the arrow keys work too.</p>\n",
         keys.concat()
     )
+}
+
+fn legend_key(color: &str, style: &str, words: &str) -> String {
+    format!(
+        "<span style=\"white-space:nowrap;margin-right:1.5em\"><svg width=\"34\" height=\"14\" viewBox=\"0 0 34 14\">\
+         <path d=\"M2 7h30\" stroke=\"{color}\" {style}/></svg> {words}</span>\n"
+    )
+}
+
+/// The part of a picture that shows a box with its surroundings.
+fn square_around(shown: &BBox, [width, height]: [f64; 2]) -> BBox {
+    let side =
+        (VIEW_SCALE * shown.width().max(shown.height())).max(MIN_VIEW_SHARE * width.max(height));
+    let (w, h, middle) = (side.min(width), side.min(height), shown.center());
+    let x0 = (middle.x - w / 2.0).clamp(0.0, width - w);
+    let y0 = (middle.y - h / 2.0).clamp(0.0, height - h);
+    BBox {
+        x0,
+        y0,
+        x1: x0 + w,
+        y1: y0 + h,
+    }
 }
 
 #[cfg(test)]

@@ -85,30 +85,15 @@ pub struct Spread {
 
 impl Spread {
     /// Over the values of runs; the interval comes from 2000 draws of the runs with replacement.
-    pub fn of(values: &[f64], seed: u64) -> Self {
-        const ROUNDS: u64 = 2000;
+    pub fn from_values(values: &[f64], seed: u64) -> Self {
         let n = values.len().max(1) as f64;
         let mean = values.iter().sum::<f64>() / n;
-        let squares: f64 = values.iter().map(|v| (v - mean) * (v - mean)).sum();
-        let resampled = |k| {
-            let times = eval::drawn(values.len(), seed, k);
-            values
-                .iter()
-                .zip(times)
-                .map(|(v, t)| v * f64::from(t))
-                .sum::<f64>()
-                / n
-        };
-        let interval = eval::interval(mean, (0..ROUNDS).map(resampled).collect());
+        let resampled = (0..RESAMPLES).map(|k| resampled_mean(values, seed, k));
         Self {
             runs: values.len(),
             mean,
-            std: if n > 1.0 {
-                (squares / (n - 1.0)).sqrt()
-            } else {
-                0.0
-            },
-            interval,
+            std: deviation(values, mean),
+            interval: eval::interval(mean, resampled.collect()),
         }
     }
 }
@@ -159,41 +144,45 @@ pub fn write(folder: &Path, runs: &[Run], options: &EvalReportOptions) -> Result
     let all: Vec<Metrics> = runs.iter().map(|run| Metrics::of(run, options)).collect();
     io::create_folder(folder)?;
     write_metrics(folder, &all)?;
-    let confusion = runs
-        .first()
-        .map(|run| Confusion::new(&run.sheets, &options.confusion))
-        .unwrap_or_default();
+    let first = runs.first();
+    let confusion = first.map(|run| Confusion::new(&run.sheets, &options.confusion));
+    let confusion = confusion.unwrap_or_default();
     let shown = shown_classes(&all, &confusion);
     let mut page = Page::new("Detections against the truth");
     let scores = scores_table(&all, options);
     add_table(&mut page, folder, "Scores", "scores.csv", [&scores; 2])?;
-    let classes = classes_table(&all, options);
-    let classes_shown = classes_among(&all, options, &shown);
-    let title = classes_title(&all, &shown);
-    add_table(
-        &mut page,
-        folder,
-        &title,
-        "classes.csv",
-        [&classes, &classes_shown],
-    )?;
+    add_classes(&mut page, folder, &all, &shown, options)?;
     let factors = factors_table(runs, options);
     add_table(&mut page, folder, "Factors", "factors.csv", [&factors; 2])?;
-    if let Some(run) = runs.first() {
+    if let Some(run) = first {
         add_run(folder, &mut page, run, &confusion, &shown, options)?;
     }
     io::write_text(folder.join("eval.html"), &page.document())?;
     Ok(all)
 }
 
+fn add_classes(
+    page: &mut Page,
+    folder: &Path,
+    all: &[Metrics],
+    shown: &[u32],
+    options: &EvalReportOptions,
+) -> Result<()> {
+    let title = classes_title(all, shown);
+    let tables = [
+        &classes_table(all, options),
+        &classes_among(all, options, shown),
+    ];
+    add_table(page, folder, &title, "classes.csv", tables)
+}
+
 /// `metrics.json` of one run, or `1-NAME.json` and so on of several.
 fn write_metrics(folder: &Path, all: &[Metrics]) -> Result<()> {
-    for (i, metrics) in all.iter().enumerate() {
-        let name = if all.len() == 1 {
-            "metrics.json".into()
-        } else {
-            format!("{}-{}.json", i + 1, metrics.run)
-        };
+    if let [only] = all {
+        return io::write_json(folder.join("metrics.json"), only);
+    }
+    for (i, metrics) in (1..).zip(all) {
+        let name = format!("{i}-{}.json", metrics.run);
         io::write_json(folder.join(name), metrics)?;
     }
     Ok(())
@@ -233,15 +222,11 @@ fn add_run(
         io::write_text(folder.join(format!("{name}.svg")), &svg)?;
         page.chart(&svg, &caption);
     }
-    io::write_text(
-        folder.join("confusion.csv"),
-        &confusion_table(confusion, options).csv(),
-    )?;
+    let counts = confusion_table(confusion, options);
+    io::write_text(folder.join("confusion.csv"), &counts.csv())?;
     let mistakes = eval::mistakes(&run.sheets, &options.confusion);
-    io::write_text(
-        folder.join("mistakes.csv"),
-        &mistakes::table(run, &mistakes, options).csv(),
-    )?;
+    let table = mistakes::table(run, &mistakes, options);
+    io::write_text(folder.join("mistakes.csv"), &table.csv())?;
     mistakes::add_to(page, run, &mistakes, options);
     Ok(())
 }
@@ -282,13 +267,12 @@ fn classes_title(all: &[Metrics], shown: &[u32]) -> String {
 
 fn confusion_table(confusion: &Confusion, options: &EvalReportOptions) -> Table {
     let mut table = Table::new(["found", "true", "count"]);
-    let name = |class: Option<u32>| {
-        class.map_or("background".into(), |class| {
-            eval::class_name(class, &options.classes)
-        })
-    };
-    for (&[found, truth], count) in &confusion.counts {
-        table.push([name(found), name(truth), count.to_string()]);
+    for (classes, count) in &confusion.counts {
+        let [found, truth] = classes.map(|class| match class {
+            Some(class) => eval::class_name(class, &options.classes),
+            None => "background".into(),
+        });
+        table.push([found, truth, count.to_string()]);
     }
     table
 }
@@ -311,18 +295,21 @@ pub fn scores_table(all: &[Metrics], options: &EvalReportOptions) -> Table {
     }
     if all.len() > 1 {
         let maps: Vec<f64> = all.iter().map(|m| m.yolov5.map()).collect();
-        let spread = Spread::of(&maps, options.seed);
-        table.push([
-            "mean +- std",
-            &format!("{} runs", spread.runs),
-            "yolov5",
-            "",
-            "",
-            &format!("{} +- {}", share(spread.mean), share(spread.std)),
-            &range_text(&spread.interval),
-        ]);
+        table.push(spread_row(&Spread::from_values(&maps, options.seed)));
     }
     table
+}
+
+fn spread_row(spread: &Spread) -> [String; 7] {
+    [
+        "mean +- std".into(),
+        format!("{} runs", spread.runs),
+        "yolov5".into(),
+        String::new(),
+        String::new(),
+        format!("{} +- {}", share(spread.mean), share(spread.std)),
+        range_text(&spread.interval),
+    ]
 }
 
 fn range_text(interval: &Interval) -> String {
@@ -331,11 +318,9 @@ fn range_text(interval: &Interval) -> String {
 
 /// Average precision per class and threshold by the definition of YOLOv5.
 pub fn classes_table(all: &[Metrics], options: &EvalReportOptions) -> Table {
-    let classes: BTreeSet<u32> = all
-        .iter()
-        .flat_map(|m| m.yolov5.classes.iter().map(|c| c.class))
-        .collect();
-    classes_among(all, options, &classes.into_iter().collect::<Vec<_>>())
+    let classes = all.iter().flat_map(|metrics| &metrics.yolov5.classes);
+    let classes: BTreeSet<u32> = classes.map(|class| class.class).collect();
+    classes_among(all, options, &Vec::from_iter(classes))
 }
 
 /// The same for a terminal: of many classes those with the lowest average precision, and how many others there are.
@@ -413,14 +398,19 @@ pub fn factors_table(runs: &[Run], options: &EvalReportOptions) -> Table {
         for level in tags.levels(i) {
             for (run, matches) in runs.iter().zip(&matches) {
                 let weights = level_weights(run, tags, i, level);
-                let images = weights.iter().filter(|weight| **weight > 0).count();
-                let [yolov5, coco] = matches.each_ref().map(|m| share(m.map(&weights)));
-                let images = images.to_string();
+                let [images, yolov5, coco] = weighted_scores(matches, &weights);
                 table.push([&run.name, factor, level, &images, &yolov5, &coco]);
             }
         }
     }
     table
+}
+
+/// Number of images, and the mAP of both definitions on them.
+fn weighted_scores(matches: &[Matches; 2], weights: &[u32]) -> [String; 3] {
+    let images = weights.iter().filter(|weight| **weight > 0).count();
+    let [yolov5, coco] = matches.each_ref().map(|m| share(m.map(weights)));
+    [images.to_string(), yolov5, coco]
 }
 
 /// The detections of a run matched by both definitions.
@@ -444,18 +434,7 @@ fn pictures(
     options: &EvalReportOptions,
 ) -> [(&'static str, String, String); 3] {
     let (curves, names) = (eval::curves(&run.sheets), &options.classes);
-    let ConfusionOptions { confidence, iou } = options.confusion;
-    let told = format!(
-        "Which class is found where which is true; detections surer than {confidence} that overlap a box by more than {iou}. \
-         Shades are shares of a column. All counts are in confusion.csv."
-    );
-    let few = match curves.classes.len() {
-        n if n > eval::MAX_CURVES => format!(
-            " The mean of {n} classes, and {} of them.",
-            eval::MAX_CURVES
-        ),
-        _ => String::new(),
-    };
+    let few = describe_curves(curves.classes.len());
     [
         (
             "precision_recall",
@@ -469,10 +448,27 @@ fn pictures(
         ),
         (
             "confusion",
-            told,
+            describe_confusion(&options.confusion),
             eval::confusion_picture(confusion, names, shown),
         ),
     ]
+}
+
+/// Which classes have a curve, where not all have.
+fn describe_curves(classes: usize) -> String {
+    let most = eval::MAX_CURVES;
+    if classes > most {
+        format!(" The mean of {classes} classes, and {most} of them.")
+    } else {
+        String::new()
+    }
+}
+
+fn describe_confusion(ConfusionOptions { confidence, iou }: &ConfusionOptions) -> String {
+    format!(
+        "Which class is found where which is true; detections surer than {confidence} that overlap a box by more than {iou}. \
+         Shades are shares of a column. All counts are in confusion.csv."
+    )
 }
 
 fn share(value: f64) -> String {
@@ -480,6 +476,24 @@ fn share(value: f64) -> String {
 }
 
 const _: () = assert!(THRESHOLDS > 5, "mAP@0.75 is the sixth threshold");
+
+/// Rounds of the bootstrap over runs.
+const RESAMPLES: u64 = 2000;
+
+fn resampled_mean(values: &[f64], seed: u64, round: u64) -> f64 {
+    let times = eval::drawn(values.len(), seed, round);
+    let weighted = values.iter().zip(times).map(|(v, t)| v * f64::from(t));
+    weighted.sum::<f64>() / values.len().max(1) as f64
+}
+
+/// Standard deviation of a sample; 0 of one value.
+fn deviation(values: &[f64], mean: f64) -> f64 {
+    let squares: f64 = values.iter().map(|v| (v - mean) * (v - mean)).sum();
+    match values.len() {
+        0 | 1 => 0.0,
+        n => (squares / (n as f64 - 1.0)).sqrt(),
+    }
+}
 
 #[cfg(test)]
 mod tests {
@@ -535,11 +549,11 @@ mod tests {
 
     #[test]
     fn several_runs_give_mean_and_spread() {
-        let spread = Spread::of(&[1.0, 2.0, 3.0], 0);
+        let spread = Spread::from_values(&[1.0, 2.0, 3.0], 0);
         assert_eq!((spread.runs, spread.mean, spread.std), (3, 2.0, 1.0));
         assert!(
             spread.interval.low >= 1.0 && spread.interval.high <= 3.0 && spread.interval.low < 2.0
         );
-        assert_eq!(Spread::of(&[0.5], 0).std, 0.0);
+        assert_eq!(Spread::from_values(&[0.5], 0).std, 0.0);
     }
 }

@@ -86,11 +86,11 @@ mod tests {
             assert!(
                 parts
                     .iter()
-                    .all(|part| (3..=4).contains(&part.len()) && doubled_area(part) > 0.0),
+                    .all(|part| (3..=4).contains(&part.len()) && 0.5 * doubled_area(part) > 0.0),
                 "{n}: {parts:?}"
             );
-            let sum: f64 = parts.iter().map(|part| doubled_area(part)).sum();
-            assert!((sum - doubled_area(&circle(n))).abs() < 1e-15, "{n}");
+            let sum: f64 = parts.iter().map(|part| 0.5 * doubled_area(part)).sum();
+            assert!((sum - 0.5 * doubled_area(&circle(n))).abs() < 1e-15, "{n}");
         }
         assert!(quarters(&[]).is_empty());
     }

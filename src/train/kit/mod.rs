@@ -90,21 +90,25 @@ pub fn write(folder: &Path, options: &KitOptions) -> Result<()> {
     let synthetic = open_set(&options.synthetic)?;
     check_classes(&real, &synthetic, options)?;
     let counts = [real.train.len() as u64, synthetic.train.len() as u64];
-    let weights = options.balance.weights(counts[0], counts[1])?;
+    let balance = balance_document(&options.balance, counts)?;
     io::create_folder(folder)?;
     write_lists(folder, &real, &synthetic)?;
     for variant in &VARIANTS {
         let path = folder.join(format!("{}.yaml", variant.name));
         io::write_text(path, &variant.yaml(&real.classes))?;
     }
-    let balance = serde_json::json!({
-        "alpha": options.balance.alpha, "normalize": options.balance.normalize,
-        "images": { "real": counts[0], "synthetic": counts[1] }, "weights": weights,
-    });
     io::write_json(folder.join("balance.json"), &balance)?;
     io::write_text(folder.join("hyp.yaml"), HYP_YAML)?;
     io::write_text(folder.join("balanced.py"), BALANCED_PY)?;
     io::write_text(folder.join("commands.sh"), &commands(options, counts))
+}
+
+fn balance_document(balance: &Balance, [real, synthetic]: [u64; 2]) -> Result<serde_json::Value> {
+    Ok(serde_json::json!({
+        "alpha": balance.alpha, "normalize": balance.normalize,
+        "images": { "real": real, "synthetic": synthetic },
+        "weights": balance.weights(real, synthetic)?,
+    }))
 }
 
 /// A list of the images of each part of both datasets.
@@ -150,59 +154,59 @@ fn open_set(folder: &Path) -> Result<YoloSet> {
 
 impl Variant {
     fn yaml(&self, classes: &[String]) -> String {
-        let list = |names: &[&str]| {
-            names
-                .iter()
-                .map(|name| format!("  - {name}.txt\n"))
-                .collect::<String>()
-        };
+        let (count, train, val) = (classes.len(), yaml_list(self.train), yaml_list(self.val));
         // A JSON string is a YAML string, whatever is in it.
-        let names = classes
-            .iter()
+        let names = classes.iter().map(|name| serde_json::Value::from(&**name));
+        let names = names
             .enumerate()
-            .map(|(i, name)| format!("  {i}: {}\n", serde_json::Value::from(name.as_str())));
+            .map(|(i, name)| format!("  {i}: {name}\n"));
         let names: String = names.collect();
         format!(
-            "# `path` is this folder; start the training in it.\npath: .\ntrain:\n{}val:\n{}nc: {}\nnames:\n{names}",
-            list(self.train),
-            list(self.val),
-            classes.len()
+            "# `path` is this folder; start the training in it.\npath: .\ntrain:\n{train}val:\n{val}nc: {count}\nnames:\n{names}"
         )
     }
 }
 
 /// The commands of all trainings, with equally many updates for the single sources told in words.
-fn commands(options: &KitOptions, [real, synthetic]: [u64; 2]) -> String {
+fn commands(options: &KitOptions, counts: [u64; 2]) -> String {
     let KitOptions {
         seeds,
         epochs,
         batch,
         ..
     } = options;
-    let combined = Updates::new(real + synthetic, *batch, *epochs);
-    let equal = |images| combined.epochs_of(batches_per_epoch(images, *batch));
-    let mut text = format!(
-        "#!/bin/sh\n# Start in this folder. YOLOV5 is the folder of a clone of YOLOv5; combined trainings need Ultralytics.\n\
-         # One epoch over both sources: {} batches; {} updates in all. Equally many updates take {:.1} epochs of the\n\
-         # synthetic images alone and {:.1} of the real ones.\nset -eu\n: \"${{YOLOV5:?}}\"\nexport PYTHONPATH=\"$PWD\"\n",
-        combined.batches,
-        combined.total,
-        equal(synthetic),
-        equal(real)
-    );
-    for variant in VARIANTS.iter().filter(|v| v.name != "combined") {
-        text += &format!("\n# {}\nfor seed in $(seq 1 {seeds}); do\n", variant.name);
+    let mut text = commands_head(options, counts);
+    for Variant { name, .. } in VARIANTS.iter().filter(|v| v.name != "combined") {
         text += &format!(
-            "  python \"$YOLOV5/train.py\" --data {0}.yaml --hyp hyp.yaml --weights yolov5s.pt --img 640 --epochs {epochs} \
-             --batch-size {batch} --cos-lr --seed \"$seed\" --project runs/{0} --name \"$seed\"\ndone\n",
-            variant.name
+            "\n# {name}\nfor seed in $(seq 1 {seeds}); do\n  python \"$YOLOV5/train.py\" --data {name}.yaml --hyp hyp.yaml \
+             --weights yolov5s.pt --img 640 --epochs {epochs} --batch-size {batch} --cos-lr --seed \"$seed\" \
+             --project runs/{name} --name \"$seed\"\ndone\n"
         );
     }
-    text += &format!("\n# combined (equation 2)\nfor seed in $(seq 1 {seeds}); do\n");
-    text += &format!(
-        "  python balanced.py --epochs {epochs} --batch {batch} --seed \"$seed\" --name \"combined/$seed\"\ndone\n"
-    );
-    text
+    text + &format!(
+        "\n# combined (equation 2)\nfor seed in $(seq 1 {seeds}); do\n  python balanced.py --epochs {epochs} --batch {batch} \
+         --seed \"$seed\" --name \"combined/$seed\"\ndone\n"
+    )
+}
+
+/// What the trainings need, and how long each source alone takes for equally many updates.
+fn commands_head(options: &KitOptions, [real, synthetic]: [u64; 2]) -> String {
+    let combined = Updates::new(real + synthetic, options.batch, options.epochs);
+    let [real, synthetic] = [real, synthetic]
+        .map(|images| combined.epochs_of(batches_per_epoch(images, options.batch)));
+    let Updates { batches, total, .. } = combined;
+    format!(
+        "#!/bin/sh\n# Start in this folder. YOLOV5 is the folder of a clone of YOLOv5; combined trainings need Ultralytics.\n\
+         # One epoch over both sources: {batches} batches; {total} updates in all. Equally many updates take {synthetic:.1} epochs of the\n\
+         # synthetic images alone and {real:.1} of the real ones.\nset -eu\n: \"${{YOLOV5:?}}\"\nexport PYTHONPATH=\"$PWD\"\n"
+    )
+}
+
+fn yaml_list(names: &[&str]) -> String {
+    names
+        .iter()
+        .map(|name| format!("  - {name}.txt\n"))
+        .collect()
 }
 
 #[cfg(test)]

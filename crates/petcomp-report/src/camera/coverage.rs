@@ -1,4 +1,4 @@
-//! How often the truth lies within the stated error, with the principal point in the picture's middle and beside it.
+//! How often the truth lies within the stated error, with the principal point in the middle of the picture and off it.
 
 use super::show::three;
 use super::{focal_percent, height_error_px};
@@ -13,7 +13,7 @@ const OFF_CENTER: [f64; 4] = [0.0, 0.05, 0.1, 0.23];
 const NOISES_PX: [f64; 2] = [0.5, 1.0];
 /// Angles from straight above, degrees, in turn.
 const TILTS_DEG: [f64; 6] = [5.0, 10.0, 20.0, 30.0, 45.0, 60.0];
-/// Errors are counted within so many standard deviations.
+/// Numbers of standard deviations within which errors are counted.
 const SIGMAS: [f64; 3] = [1.0, 2.0, 3.0];
 const VIEW_SEED: u64 = 7;
 const FRAMINGS: [Framing; 3] = [Framing::Whole, Framing::Unknown, Framing::Cropped];
@@ -159,9 +159,7 @@ pub(super) fn csv(rows: &[StatedErrors]) -> String {
 }
 
 const MARKDOWN_COLUMNS: [Column<StatedErrors>; 12] = [
-    ("beside the middle", |r| {
-        format!("{} %", 100.0 * r.off_center)
-    }),
+    ("off the middle", |r| format!("{} %", 100.0 * r.off_center)),
     ("corners to, px", |r| r.noise_px.to_string()),
     ("label says", |r| label_words(r.framing).to_owned()),
     ("refused", |r| format!("{} of {}", r.refused, r.views)),
@@ -185,7 +183,7 @@ fn label_words(framing: Framing) -> &'static str {
 }
 
 const EXPLANATION: &str = "\n## Is the stated error true?\n\n\
-    Principal points in the middle of the picture, as of whole ones, and so much of its longer side beside it, as of \
+    Principal points in the middle of the picture, as in whole ones, and off it by a share of its longer side, as in \
     cropped ones; tilts of 5 to 60 degrees; nothing is known of the focal length. Focal length: median error, median of \
     the stated standard deviation, parts within one, two and three of those, and the worst.\n\n";
 
@@ -202,7 +200,7 @@ mod tests {
         for row in measure(120) {
             println!("{row:?}");
             assert_eq!(row.refused, 0, "{row:?}");
-            // A normal error is within one standard deviation in 68 % of all cases; beside the middle by 23 % every view is
+            // A normal error is within one standard deviation in 68 % of all cases; off the middle by 23 % every view is
             // one of twice what is expected of a cropped one.
             let extreme = row.off_center > 0.2;
             let least = if extreme {
@@ -222,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn whole_pictures_pay_only_where_nobody_says_that_they_are_whole() {
+    fn whole_pictures_pay_only_where_they_are_not_labelled_whole() {
         for noise_px in NOISES_PX {
             let [whole, unknown, cropped] =
                 FRAMINGS.map(|framing| coverage(0.0, noise_px, framing, 120));

@@ -1,4 +1,4 @@
-//! The ways to a camera that are compared, and the cameras that are looked for.
+//! The methods that are compared, and the cameras that they have to find.
 
 use petcomp::camera::simulate::{Scenario, View};
 use petcomp::camera::{self, Priors, Solution, SolveOptions};
@@ -20,7 +20,7 @@ pub enum Lens {
 /// How a camera is found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SolveMethod {
-    /// The closed form and so many steps of refinement.
+    /// The closed form and this many steps of refinement.
     Steps(usize),
     /// Every start, to the end, with covariance.
     Whole,

@@ -38,7 +38,7 @@ pub(crate) fn run(args: &Args, common: &ReportFlags) -> anyhow::Result<()> {
         all::write(&args.output, &args.options(), progress)
     })?;
     let page = args.output.join("report.html");
-    common.say(format_args!("look at {}", page.display()));
+    common.print_line(format_args!("look at {}", page.display()));
     Ok(())
 }
 

@@ -24,7 +24,7 @@ pub(crate) fn run(args: &Args, common: &ReportFlags) -> anyhow::Result<()> {
     let rows = common.with_progress("measuring", |progress| {
         camera::write(&args.output, &options, progress)
     })?;
-    common.say(format_args!(
+    common.print_line(format_args!(
         "{}: camera.csv ({} lines), camera_coverage.csv, camera.md and six plots",
         args.output.display(),
         rows.len()

@@ -16,6 +16,6 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args, common: &ReportFlags) -> anyhow::Result<()> {
     let table = experiments::write(&args.output, &args.runs)?;
     println!("{}", table.markdown());
-    common.say(args.output.join("experiments.html").display());
+    common.print_line(args.output.join("experiments.html").display());
     Ok(())
 }

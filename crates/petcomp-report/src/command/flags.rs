@@ -10,6 +10,6 @@ pub(crate) fn run(args: &TruthArgs, common: &ReportFlags) -> anyhow::Result<()> 
     })?;
     println!("{}", table.markdown().trim_end());
     let folder = args.output.display();
-    common.say(format_args!("{folder}: flags.csv and flags.md"));
+    common.print_line(format_args!("{folder}: flags.csv and flags.md"));
     Ok(())
 }

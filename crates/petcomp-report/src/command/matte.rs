@@ -9,7 +9,7 @@ pub(crate) fn run(args: &TruthArgs, common: &ReportFlags) -> anyhow::Result<()> 
         matte::write(&args.truth, &args.output, progress)
     })?;
     println!("{}", matte::table(&summaries).markdown().trim_end());
-    common.say(format_args!(
+    common.print_line(format_args!(
         "{}: matte.csv, matte.md, matte.svg and matte.html",
         args.output.display()
     ));

@@ -52,18 +52,18 @@ pub(crate) enum Command {
 }
 
 pub(crate) fn run(command: &Command, common: &ReportFlags) -> anyhow::Result<()> {
-    use Command as C;
+    use Command::*;
     match command {
-        C::All(args) => all::run(args, common),
-        C::Camera(args) => camera::run(args, common),
-        C::Settle(args) => settle::run(args, common),
-        C::Stability(args) => stability::run(args, common),
-        C::Experiments(args) => experiments::run(args, common),
-        C::Matte(args) => matte::run(args, common),
-        C::Flags(args) => flags::run(args, common),
-        C::Render(args) => render::run(args, common),
-        C::Work(args) => work::run(args, common),
-        C::Scale(args) => scale::run(args, common),
+        All(args) => all::run(args, common),
+        Camera(args) => camera::run(args, common),
+        Settle(args) => settle::run(args, common),
+        Stability(args) => stability::run(args, common),
+        Experiments(args) => experiments::run(args, common),
+        Matte(args) => matte::run(args, common),
+        Flags(args) => flags::run(args, common),
+        Render(args) => render::run(args, common),
+        Work(args) => work::run(args, common),
+        Scale(args) => scale::run(args, common),
     }
 }
 

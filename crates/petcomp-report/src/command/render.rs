@@ -36,7 +36,7 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args, common: &ReportFlags) -> anyhow::Result<()> {
     let (rows, golden) = render::write(&args.output, &args.options())?;
     println!("{}", render::table(&rows).markdown());
-    common.say(format_args!(
+    common.print_line(format_args!(
         "{}: render.csv, render.md, render.svg; {} golden pictures",
         args.output.display(),
         golden.len()

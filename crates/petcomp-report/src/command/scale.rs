@@ -40,7 +40,7 @@ pub(crate) fn run(args: &Args, common: &ReportFlags) -> anyhow::Result<()> {
         println!("{title}\n{}", table.markdown());
     }
     let folder = args.output.display();
-    common.say(format_args!("{folder}: scale.csv, scale.md and two charts"));
+    common.print_line(format_args!("{folder}: scale.csv, scale.md and two charts"));
     Ok(())
 }
 

@@ -31,7 +31,7 @@ pub(crate) fn run(args: &Args, common: &ReportFlags) -> anyhow::Result<()> {
     let rows = common.with_progress("measuring", |progress| {
         settle::write(&args.output, &options, progress)
     })?;
-    common.say(format_args!(
+    common.print_line(format_args!(
         "{}: settle.csv ({} lines), settle.md and a plot",
         args.output.display(),
         rows.len()

@@ -24,13 +24,17 @@ pub(crate) fn run(args: &Args, common: &ReportFlags) -> anyhow::Result<()> {
     let rows = common.with_progress("trying", |progress| {
         stability::write(&args.output, &args.stage, progress)
     })?;
-    let failed: Vec<_> = rows.iter().filter(|row| !row.outcome.passed).collect();
-    failed.iter().for_each(|row| print_failure(row));
-    let (failed, all) = (failed.len(), rows.len());
-    let table = args.output.join("stability.md");
+    let failed = print_failures(&rows);
+    let (all, table) = (rows.len(), args.output.join("stability.md"));
     println!("{}: {} of {all} pass", table.display(), all - failed);
     anyhow::ensure!(failed == 0, "{failed} of {all} cases fail");
     Ok(())
+}
+
+/// How many cases failed.
+fn print_failures(rows: &[CaseResult]) -> usize {
+    let failed = rows.iter().filter(|row| !row.outcome.passed);
+    failed.inspect(|row| print_failure(row)).count()
 }
 
 fn print_failure(row: &CaseResult) {

@@ -13,8 +13,8 @@ pub(crate) struct Args {
 
 pub(crate) fn run(args: &Args, common: &ReportFlags) -> anyhow::Result<()> {
     let rows = common.with_progress("counting", |progress| work::write(&args.output, progress))?;
-    let kept = rows.iter().filter(|row| row.is_as_promised()).count();
+    let kept = rows.iter().filter(|row| row.is_as_expected()).count();
     let page = args.output.join("work.md");
-    println!("{}: {kept} of {} as promised", page.display(), rows.len());
+    println!("{}: {kept} of {} as expected", page.display(), rows.len());
     Ok(())
 }

@@ -146,7 +146,7 @@ impl PhotoVariant {
     pub(crate) fn trial(self, known: &Known, seed: u64) -> Option<Trial> {
         let source = VariantSource::new(known, seed);
         let trial = source
-            .reframed(self)
+            .with_other_outline(self)
             .or_else(|| Some(source.with_photo(source.photo(self)?)))?;
         Some(Trial {
             photo: trial.photo.map(sensor::coded),
@@ -230,18 +230,31 @@ impl<'a> VariantSource<'a> {
     }
 
     /// A variant with another outline; nothing for the others.
+    fn with_other_outline(&self, variant: PhotoVariant) -> Option<Trial> {
+        self.reframed(variant).or_else(|| self.resized(variant))
+    }
+
+    /// Variants of the border and the place of the object.
     fn reframed(&self, variant: PhotoVariant) -> Option<Trial> {
         use PhotoVariant as V;
         Some(match variant {
             V::OverBorder => framing::cut_off(self.plain(), 0.1),
+            V::AtBorder => framing::cut_off(self.plain(), 0.0),
             V::Two => framing::two(&self.plain()),
-            V::Tiny => framing::tiny(&self.plain()),
-            V::Huge => self.huge(),
             V::Portrait => framing::upright(&self.plain()),
             V::FullFrame => framing::full_frame(self.plain()),
+            _ => return None,
+        })
+    }
+
+    /// Variants of the size of the photo or the object.
+    fn resized(&self, variant: PhotoVariant) -> Option<Trial> {
+        use PhotoVariant as V;
+        Some(match variant {
+            V::Tiny => framing::tiny(&self.plain()),
+            V::Huge => self.huge(),
             V::SmallObject => framing::small_object(self.known, self.plain()),
             V::ThinObject => framing::thin_object(self.known, self.plain()),
-            V::AtBorder => framing::cut_off(self.plain(), 0.0),
             _ => return None,
         })
     }
@@ -261,61 +274,93 @@ impl<'a> VariantSource<'a> {
     /// The photo of a variant with the same outline; nothing where it cannot be made.
     fn photo(&self, variant: PhotoVariant) -> Option<Image<LinearRgb>> {
         self.relit(variant)
+            .or_else(|| self.shadowed(variant))
             .or_else(|| self.on_other_screen(variant))
-            .or_else(|| self.taken_worse(variant))
+            .or_else(|| self.on_worse_screen(variant))
+            .or_else(|| self.out_of_focus(variant))
+            .or_else(|| self.badly_exposed(variant))
     }
 
-    /// Variants of the light.
+    fn fallen_off(&self, share: f64) -> Image<LinearRgb> {
+        lighting::fallen_off(&self.known.photo, self.direction, share)
+    }
+
+    /// Variants of the light without a hard shadow.
     fn relit(&self, variant: PhotoVariant) -> Option<Image<LinearRgb>> {
         use PhotoVariant as V;
-        let (known, direction) = (self.known, self.direction);
         Some(match variant {
-            V::Uneven => lighting::fallen_off(&known.photo, direction, 0.15),
-            V::VeryUneven => lighting::fallen_off(&known.photo, direction, 0.6),
-            V::ShadowBeside => lighting::shadowed(known, 0.5),
-            V::ShadowAcross => lighting::shadowed(known, -0.3),
+            V::Uneven => self.fallen_off(0.15),
+            V::VeryUneven => self.fallen_off(0.6),
             V::Vignetted => {
-                let dark_corners = lens::vignetted(&known.photo, 0.4);
-                lighting::fallen_off(&dark_corners, direction, 0.3)
+                let dark_corners = lens::vignetted(&self.known.photo, 0.4);
+                lighting::fallen_off(&dark_corners, self.direction, 0.3)
             }
-            V::TwoHues => lighting::two_hues(&known.photo, direction),
-            V::CastShadow => lighting::cast_shadow(known, direction),
+            V::TwoHues => lighting::two_hues(&self.known.photo, self.direction),
             _ => return None,
         })
     }
 
-    /// Variants of the screen.
+    /// Variants with a hard shadow.
+    fn shadowed(&self, variant: PhotoVariant) -> Option<Image<LinearRgb>> {
+        use PhotoVariant as V;
+        Some(match variant {
+            V::ShadowBeside => lighting::shadowed(self.known, 0.5),
+            V::ShadowAcross => lighting::shadowed(self.known, -0.3),
+            V::CastShadow => lighting::cast_shadow(self.known, self.direction),
+            _ => return None,
+        })
+    }
+
+    /// Variants of the screen's colour, or of the screen alone.
     fn on_other_screen(&self, variant: PhotoVariant) -> Option<Image<LinearRgb>> {
         use PhotoVariant as V;
-        let (known, seed) = (self.known, self.seed);
+        let known = self.known;
         Some(match variant {
             V::OtherScreen => screen::on_screen(known, |k| LinearRgb::new(k.r, k.b, k.g)),
             V::GreyScreen => screen::on_screen(known, |k| LinearRgb::grey(k.r.max(k.g).max(k.b))),
             V::ScreenHue => screen::hued(known)?,
             V::Empty => self.with_read_noise(&known.screen),
             V::EmptyUneven => {
-                self.with_read_noise(&lighting::fallen_off(&known.screen, self.direction, 0.6))
+                let uneven = lighting::fallen_off(&known.screen, self.direction, 0.6);
+                self.with_read_noise(&uneven)
             }
-            V::Wrinkled => screen::wrinkled(known, seed),
-            V::Specks => screen::specks(known, seed),
-            V::ScreenEdge => screen::ending(known),
             _ => return None,
         })
     }
 
-    /// Variants of the camera.
-    fn taken_worse(&self, variant: PhotoVariant) -> Option<Image<LinearRgb>> {
+    /// Variants of what is on the screen.
+    fn on_worse_screen(&self, variant: PhotoVariant) -> Option<Image<LinearRgb>> {
+        use PhotoVariant as V;
+        Some(match variant {
+            V::Wrinkled => screen::wrinkled(self.known, self.seed),
+            V::Specks => screen::specks(self.known, self.seed),
+            V::ScreenEdge => screen::ending(self.known),
+            _ => return None,
+        })
+    }
+
+    /// Variants of the lens and of motion.
+    fn out_of_focus(&self, variant: PhotoVariant) -> Option<Image<LinearRgb>> {
+        use PhotoVariant as V;
+        let photo = &self.known.photo;
+        Some(match variant {
+            V::Blurred => petcomp::filter::gaussian_blur(photo, 2.0),
+            V::MotionBlur => lens::moved(photo, self.direction, 6),
+            V::Defocused => lens::defocused(photo, 3),
+            _ => return None,
+        })
+    }
+
+    /// Variants of the sensor and of the file, and the photo itself.
+    fn badly_exposed(&self, variant: PhotoVariant) -> Option<Image<LinearRgb>> {
         use PhotoVariant as V;
         let photo = &self.known.photo;
         Some(match variant {
             V::Plain => photo.clone(),
             V::Overexposed => photo.map(|p| p.scale(3.0)),
             V::Noisy => sensor::noisy(photo, 0.03, self.seed),
-            V::Blurred => petcomp::filter::gaussian_blur(photo, 2.0),
             V::Jpeg => sensor::jpeg(photo, 60)?,
             V::Dark => self.with_read_noise(&photo.map(|p| p.scale(0.1))),
-            V::MotionBlur => lens::moved(photo, self.direction, 6),
-            V::Defocused => lens::defocused(photo, 3),
             _ => return None,
         })
     }

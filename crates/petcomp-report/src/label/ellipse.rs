@@ -129,7 +129,7 @@ impl Ellipse {
             .then(|| [-root, root].map(|root| self.center.x + (root - b) / (2.0 * a)))
     }
 
-    /// A card whose outline has so many corners on the ellipse.
+    /// A card whose outline has this number of corners on the ellipse.
     pub(super) fn shot(&self, corners: usize) -> Shot {
         let turns = (0..corners).map(|i| TAU * i as f64 / corners as f64);
         Shot::new(camera_above(self.image, 1.0)).with_card(Card {

@@ -76,7 +76,7 @@ pub(super) fn exact_shares(shot: &Shot, kind: LightKind) -> Vec<Option<f64>> {
         .collect()
 }
 
-/// The point of the surface that a pixel sees beside the card.
+/// The point of the surface that a pixel sees; nothing where it sees the card.
 fn surface_point(shot: &Shot, pixel: [u32; 2]) -> Option<Point3<f64>> {
     let [x, y] = pixel.map(|v| f64::from(v) + 0.5);
     let ray = shot.camera.ray(Point2::new(x, y));

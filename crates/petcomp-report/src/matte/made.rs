@@ -52,7 +52,7 @@ pub(super) fn photo(i: usize) -> Known {
     enlarged_photo(i, 1)
 }
 
-/// Photo `i` by a camera of so many times the pixels along each side: as sharp, and as noisy in each pixel.
+/// Photo `i` by a camera with `times` the pixels along each side: as sharp, and as noisy in each pixel.
 pub(super) fn enlarged_photo(i: usize, times: usize) -> Known {
     let known = truth(i, times);
     let photo = known.on(&known.screen, FIRST_NOISE_SEED + i as u64);

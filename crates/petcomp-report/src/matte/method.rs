@@ -1,4 +1,4 @@
-//! The ways to a cut-out that are compared.
+//! The matting methods that are compared.
 
 use super::truth::Known;
 use petcomp::Image;
@@ -10,7 +10,7 @@ use petcomp::matte::{
 };
 use petcomp::{Coverage, Film, LinearRgb, PremulRgba};
 
-/// A way to a cut-out.
+/// A matting method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum MattingMethod {
     /// Blender's keyer with the mean colour of the background, masked by the convex hull.

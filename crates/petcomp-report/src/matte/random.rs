@@ -11,7 +11,7 @@ const MAX_PATCH_PX: usize = 24;
 const PATCH_LAYERS: usize = 4;
 /// What patches leave free.
 const BACKGROUND_GREY: f32 = 0.2;
-/// The sum of so many uniform numbers has variance 1.
+/// Uniform numbers whose sum has variance 1.
 const UNIFORM_NUMBERS: usize = 12;
 
 /// Uniform numbers from 0 to 1.

@@ -2,6 +2,7 @@
 
 use super::method::MethodCutOut;
 use super::truth::Known;
+use crate::statistics::mean_of;
 use petcomp::Image;
 use petcomp::filter;
 use petcomp::geom::Point2;
@@ -73,16 +74,19 @@ impl Score {
     }
 }
 
-/// Alpha of what passes so much.
+/// Alpha of an object with this transmittance.
 fn true_alpha(view: LinearRgb) -> Coverage {
     Coverage(1.0 - (view.r + view.g + view.b) / 3.0)
 }
 
 fn differences(a: &Image<Coverage>, b: &Image<Coverage>) -> Vec<f64> {
+    pixel_pairs(a, b).map(|(a, b)| a - b).collect()
+}
+
+/// Coverages at the same pixel of two pictures.
+fn pixel_pairs(a: &Image<Coverage>, b: &Image<Coverage>) -> impl Iterator<Item = (f64, f64)> {
     let pairs = a.pixels().iter().zip(b.pixels());
-    pairs
-        .map(|(a, b)| f64::from(a.0) - f64::from(b.0))
-        .collect()
+    pairs.map(|(a, b)| (f64::from(a.0), f64::from(b.0)))
 }
 
 /// Sum of squared differences of the gradient's length.
@@ -181,21 +185,17 @@ impl ErrorSums {
 
 /// Mean alpha where the object covers nothing.
 fn mean_residue(alpha: &Image<Coverage>, mask: &Image<Coverage>) -> f64 {
-    let pairs = alpha.pixels().iter().zip(mask.pixels());
-    let outside = pairs.filter(|(_, m)| m.0 == 0.0);
-    let (sum, count) = outside.fold((0.0, 0u64), |(sum, n), (a, _)| {
-        (sum + f64::from(a.0), n + 1)
-    });
-    sum / count.max(1) as f64
+    let pairs = pixel_pairs(alpha, mask);
+    let outside: Vec<f64> = pairs.filter(|(_, m)| *m == 0.0).map(|(a, _)| a).collect();
+    mean_of(&outside, |alpha| *alpha)
 }
 
 /// Intersection over union of what is covered by at least a half.
 pub(crate) fn overlap(a: &Image<Coverage>, b: &Image<Coverage>) -> f64 {
     let (mut both, mut any) = (0_u64, 0_u64);
-    for (a, b) in a.pixels().iter().zip(b.pixels()) {
-        let [a, b] = [a, b].map(|coverage| coverage.0 >= 0.5);
-        both += u64::from(a && b);
-        any += u64::from(a || b);
+    for (a, b) in pixel_pairs(a, b) {
+        both += u64::from(a.min(b) >= 0.5);
+        any += u64::from(a.max(b) >= 0.5);
     }
     both as f64 / any.max(1) as f64
 }

@@ -41,10 +41,10 @@ struct MeasuredSearch {
     mean: SearchErrors,
 }
 
-/// Overlap of the outline, and the box, each against time, of so many bottles: four, or fewer for a quick report.
+/// Overlap of the outline, and the box, each against time, of four bottles, or fewer for a quick report.
 ///
 /// # Errors
-/// As [`segment`]; a thread that cannot be had.
+/// As [`segment`]; a thread that cannot be started.
 pub fn searches(bottles: usize) -> Result<Vec<Diagram>> {
     let mut found = Vec::new();
     for scale in PHOTO_SCALES {
@@ -138,7 +138,7 @@ fn search_photo(known: &Known, options: &SegmentOptions) -> Result<SearchErrors>
     })
 }
 
-/// Intersection over union, where a pixel counts as far as it is covered.
+/// Intersection over union, with pixels weighted by coverage.
 fn soft_overlap(a: &Image<Coverage>, b: &Image<Coverage>) -> f64 {
     let both = sum_of_pairs(a, b, f32::min);
     both / sum_of_pairs(a, b, f32::max).max(f64::MIN_POSITIVE)

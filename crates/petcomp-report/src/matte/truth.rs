@@ -79,9 +79,13 @@ impl PhotoNoise {
     /// A value as a sensor records it, in 8 bits; `normal` is a normal number.
     fn recorded(&self, value: f32, normal: f64) -> f32 {
         let noisy = value + (self.deviation(value) * normal) as f32;
-        let code = MAX_CODE * linear_to_srgb(noisy.clamp(0.0, 1.0));
-        srgb_to_linear(code.round() / MAX_CODE)
+        in_eight_bits(noisy.clamp(0.0, 1.0))
     }
+}
+
+fn in_eight_bits(value: f32) -> f32 {
+    let code = MAX_CODE * linear_to_srgb(value);
+    srgb_to_linear(code.round() / MAX_CODE)
 }
 
 /// The records of a folder, by file name, still to be read.
@@ -156,7 +160,7 @@ fn json_files(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(paths)
 }
 
-/// Transmittance of an object that covers so much of a pixel.
+/// Transmittance, blended with 1 where the object does not cover the pixel.
 fn one_outside(transmittance: LinearRgb, coverage: Coverage) -> LinearRgb {
     transmittance.map(|t| 1.0 + coverage.0.min(1.0) * (t - 1.0))
 }

@@ -107,9 +107,9 @@ fn filter_points(scene: &GoldenScene, subsamples: usize, runs: usize) -> Result<
     let setting = square_name(subsamples);
     let filtered = scene.measure(runs, |shot| render(shot, &options))?;
     let plain = scene.measure(1, |shot| render_reference(shot, &options))?;
-    let is_default = |quality| options == default && quality == Quality::default();
+    let filtered = mean_point("filtered", &setting, [&filtered]);
     Ok([
-        mean_point("filtered", &setting, [&filtered]).used_where(is_default),
+        filtered.used_where(|quality| options == default && quality == Quality::default()),
         mean_point("plain samples", &setting, [&plain]),
     ])
 }
@@ -262,13 +262,17 @@ fn mean_point<'a>(
 ) -> Point {
     let costs: Vec<&SceneCost> = costs.into_iter().collect();
     let mean_square = total(&costs, |cost| cost.mean_square) / costs.len() as f64;
-    let seconds = total(&costs, |cost| cost.seconds) / total(&costs, |cost| cost.pixels);
     Point::new(
         curve,
         setting,
-        seconds * PIXELS_PER_MEGAPIXEL,
+        seconds_per_megapixel(&costs),
         mean_square.sqrt(),
     )
+}
+
+fn seconds_per_megapixel(costs: &[&SceneCost]) -> f64 {
+    let pixels = total(costs, |cost| cost.pixels);
+    total(costs, |cost| cost.seconds) / pixels * PIXELS_PER_MEGAPIXEL
 }
 
 fn total(costs: &[&SceneCost], of: fn(&SceneCost) -> f64) -> f64 {

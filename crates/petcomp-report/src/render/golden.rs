@@ -106,7 +106,7 @@ fn stacked_strips(strips: &[Image<LinearRgb>]) -> Option<Image<LinearRgb>> {
     ))
 }
 
-/// White beside a strip.
+/// White outside a strip.
 fn strip_pixel(strip: Option<&Image<LinearRgb>>, x: usize, y: usize) -> LinearRgb {
     match strip {
         Some(strip) if x < strip.width() && y < strip.height() => strip[(x, y)],

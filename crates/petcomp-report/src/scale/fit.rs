@@ -60,7 +60,7 @@ const MEMORY_TERMS: [Term; 5] = [
     }),
 ];
 
-/// What all threads together have of something of which a picture has so much.
+/// What all threads together have of what a picture has.
 fn in_hand(point: &ScalePoint, of_picture: f64) -> f64 {
     point.case.threads as f64 * of_picture
 }
@@ -136,7 +136,7 @@ impl CostFit {
         })
     }
 
-    /// The cost of something that has so much of each term.
+    /// The cost of something with these amounts of each term.
     pub fn cost_of(&self, amounts: &[f64]) -> f64 {
         dot(&self.prices, amounts)
     }
@@ -209,7 +209,7 @@ impl Costs<'_> {
     }
 }
 
-/// All sets of so many terms but the empty one.
+/// All sets of terms but the empty one.
 fn subsets(terms: usize) -> impl Iterator<Item = Vec<usize>> {
     let sets = 1..1_usize << terms;
     sets.map(move |set| (0..terms).filter(|k| set >> k & 1 == 1).collect())

@@ -71,7 +71,7 @@ fn interval(value: f64, share: f64) -> [f64; 3] {
     [value, value * (1.0 - share).max(0.0), value * (1.0 + share)]
 }
 
-/// Seconds of a fall of so many cards, in proportion between the numbers that were measured.
+/// Seconds of a fall of some cards, in proportion between the numbers that were measured.
 fn interpolated_fall(falls: &[(usize, f64)], cards: usize) -> f64 {
     let below = falls.iter().rev().find(|(n, _)| *n <= cards);
     let above = falls.iter().find(|(n, _)| *n >= cards);
@@ -88,7 +88,7 @@ fn between((a, s): (usize, f64), (b, t): (usize, f64), cards: usize) -> f64 {
 }
 
 impl Forecast {
-    /// Hours on so many machines of [`cores`](Self::cores) cores: expected, least, most.
+    /// Hours on a number of machines of [`cores`](Self::cores) cores: expected, least, most.
     pub fn hours_on(&self, machines: usize) -> [f64; 3] {
         let cores = (machines * self.cores) as f64;
         self.core_hours.map(|hours| hours / cores)

@@ -60,7 +60,7 @@ impl PictureInputs {
         Self { scene, shot }
     }
 
-    /// A dataset of so many pictures in a folder that is gone afterwards; returns the layers of one.
+    /// Makes a dataset in a temporary folder and returns the layers of one picture.
     pub(super) fn make(&self, pictures: u64) -> Result<f64> {
         let folder = tempfile::tempdir().map_err(|e| Error::value("temporary folder", e))?;
         let layers = OnceLock::new();

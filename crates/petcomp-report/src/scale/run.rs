@@ -9,7 +9,7 @@ use petcomp::settle::{SettleOptions, heap, settle};
 use petcomp::{Error, Result, work};
 use std::time::Instant;
 
-/// What else the machine does only ever adds to the time of a picture: the least of so many rounds counts.
+/// What else the machine does only ever adds to the time of a picture: the fastest of these rounds counts.
 const MAX_ROUNDS: u64 = 3;
 const MAX_PICTURES_PER_ROUND: f64 = 1000.0;
 /// Pictures do not take less than this, for the number of them in a round.
@@ -17,7 +17,7 @@ const LEAST_PICTURE_SECONDS: f64 = 1e-3;
 /// Heaps whose falls are timed.
 const TIMED_HEAPS: u64 = 5;
 
-/// Makes pictures of a kind for about so many seconds of work, one on each thread at least, and returns what they took.
+/// Makes pictures of a kind for about this many seconds of work, one on each thread at least, and returns what they took.
 ///
 /// For a process that does nothing else: memory is that of the whole process.
 ///
@@ -67,7 +67,7 @@ impl Round {
         })
     }
 
-    /// Rounds, and the pictures of each, that fill so many seconds if pictures take as long as this one.
+    /// Rounds, and the pictures of each, that fill this many seconds if pictures take as long as this one.
     fn plan_more(&self, threads: usize, seconds: f64) -> (u64, u64) {
         // A picture that takes all of the time is made once more, others in several rounds.
         let rounds = if self.cpu < seconds { MAX_ROUNDS } else { 1 };
@@ -78,7 +78,7 @@ impl Round {
     }
 }
 
-/// Median seconds of a processor until a heap of so many cards lies still.
+/// Median seconds of a processor until a heap of cards lies still.
 pub(super) fn fall_seconds(cards: usize) -> Result<f64> {
     let seconds = (0..TIMED_HEAPS)
         .map(|k| heap_seconds(k, cards))

@@ -1,6 +1,8 @@
 //! Tables and charts of what was measured, beside what the model says.
 
-use super::{CostFit, CostModel, Forecast, ScaleMeasurements, ScalePoint, forecast, grid};
+use super::{
+    CostFit, CostModel, Forecast, ScaleCase, ScaleMeasurements, ScalePoint, forecast, grid,
+};
 use crate::columns::{Column, table_from, table_of};
 use petcomp::Result;
 use petcomp::plot::{Axis, Chart, Curve, Table};
@@ -235,17 +237,17 @@ const THREAD_COUNT: Along = ("threads", |p| p.case.threads as f64);
 
 /// Points on one thread that differ in their size alone.
 fn by_sizes(measured: &ScaleMeasurements) -> Vec<&ScalePoint> {
-    let default = grid::DEFAULT_PICTURE;
+    let ScaleCase { cards, scale, .. } = grid::DEFAULT_PICTURE;
     let mut points = measured.single_threaded();
-    points.retain(|p| p.case.cards == default.cards && p.case.scale == default.scale);
+    points.retain(|p| (p.case.cards, p.case.scale) == (cards, scale));
     points
 }
 
 /// Points on one thread that differ in their number of cards alone.
 fn by_cards(measured: &ScaleMeasurements) -> Vec<&ScalePoint> {
-    let default = grid::DEFAULT_PICTURE;
+    let ScaleCase { image, scale, .. } = grid::DEFAULT_PICTURE;
     let mut points = measured.single_threaded();
-    points.retain(|p| p.case.image == default.image && p.case.scale == default.scale);
+    points.retain(|p| (p.case.image, p.case.scale) == (image, scale));
     points
 }
 

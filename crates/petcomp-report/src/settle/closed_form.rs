@@ -82,7 +82,7 @@ pub(super) fn count_wrong_slopes(options: &SettleOptions) -> Result<usize> {
     Ok(wrong)
 }
 
-/// Whether a plate on a slope of so many times the critical one slides if that is more than 1, and else stays.
+/// Whether a plate on a slope of `share` times the critical one slides where that is more than 1, and else stays.
 fn slides_rightly(share: f64, options: &SettleOptions) -> Result<bool> {
     let scene = plate_on_slope()?;
     let options = SettleOptions {
@@ -100,7 +100,7 @@ fn gravity_on_slope(slope: f64) -> [f64; 3] {
     [libm::sin(slope), 0.0, -libm::cos(slope)].map(|x| GRAVITY_M_S2 * x)
 }
 
-/// A plate that is still moving counts as what it should be.
+/// A plate that is still moving counts as right.
 fn has_slid(position: Option<[f64; 2]>, should_slide: bool) -> bool {
     position.map_or(should_slide, |[x, _]| x - SLIDE_START_M > LANDING_SLIP_M)
 }

@@ -13,7 +13,7 @@ const CARD_LENGTH_MM: f64 = 200.0;
 /// Bodies keep two contact margins of 0.2 mm between them, so that a stack without overlap is higher by as much for each plate.
 const PLATE_GAP_MM: f64 = 0.4;
 
-/// Measures every setting with so many heaps: worst overlap, worst energy rise and the error of a stack, each against the
+/// Measures every setting with a number of heaps: worst overlap, worst energy rise and the error of a stack, each against the
 /// time of a heap.
 ///
 /// # Errors

@@ -37,7 +37,7 @@ pub fn peer_cases() -> Result<Vec<PeerCase>> {
 }
 
 impl PeerCase {
-    /// Heap `k` of so many cards.
+    /// Heap `k` of a number of cards.
     fn new(cards: usize, k: u64) -> Result<Self> {
         let options = SettleOptions::default();
         let scene = heap(k, cards)?;

@@ -1,11 +1,11 @@
 //! Synthetic photos of a bottle whose outline is known: a waisted body of film with a rim, glints, a striped label and a
 //! cap, in its own soft shadow.
 
-use crate::matte::{GOOD_BOX_PX, GOOD_IOU, normal};
+use crate::flags::{bounding_sides, is_right, largest_difference};
+use crate::matte::normal;
 use petcomp::LinearRgb;
 use petcomp::Result;
 use petcomp::color::{linear_to_srgb, srgb_to_linear};
-use petcomp::geom::Point2;
 use petcomp::matte::{CutOut, CutOutOptions, cut_out};
 use petcomp::{Coverage, Diagnostic, Image, Mask};
 
@@ -109,12 +109,15 @@ fn striped_label(x: f64) -> LinearRgb {
 }
 
 fn film_at(x: f64, y: f64, is_rim: bool) -> (LinearRgb, f32) {
-    let is_glint = libm::sin(x * 37.0 + y * 61.0) * libm::cos(x * 11.0 - y * 29.0) > 0.8;
-    match (is_rim, is_glint) {
+    match (is_rim, is_glint(x, y)) {
         (_, true) => (LinearRgb::grey(0.8), 0.5),
         (true, false) => (LinearRgb::grey(0.05), 0.5),
         (false, false) => (LinearRgb::grey(0.02), 0.8),
     }
+}
+
+fn is_glint(x: f64, y: f64) -> bool {
+    libm::sin(x * 37.0 + y * 61.0) * libm::cos(x * 11.0 - y * 29.0) > 0.8
 }
 
 /// What a bottle leaves of the light of the screen beside it.
@@ -130,14 +133,15 @@ fn coded_to_8_bits(value: f32) -> f32 {
 }
 
 impl BottlePhoto {
+    fn extent(&self) -> [f64; 2] {
+        [self.size.0 as f64, self.size.1 as f64]
+    }
+
     /// Where a point of the picture lies in the frame of bottle `i`.
     fn on_bottle(&self, i: usize, x: f64, y: f64) -> (f64, f64) {
-        let (w, h) = (self.size.0 as f64, self.size.1 as f64);
+        let ([w, h], [u, v]) = (self.extent(), self.at[i]);
         let unit = self.length * w / 2.0;
-        let (x, y) = (
-            (x - self.at[i][0] * w) / unit,
-            (y - self.at[i][1] * h) / unit,
-        );
+        let (x, y) = ((x - u * w) / unit, (y - v * h) / unit);
         let (sin, cos) = libm::sincos(BOTTLE_ROTATION_RAD);
         (cos * x + sin * y, cos * y - sin * x)
     }
@@ -153,18 +157,21 @@ impl BottlePhoto {
             .find_map(|(u, v)| bottle_at(u, v, self.cap))
     }
 
-    /// What the uneven lamp leaves of the light at a point.
     fn lamp_falloff(&self, x: f64, y: f64) -> f32 {
-        let (w, h) = (self.size.0 as f64, self.size.1 as f64);
+        let [w, h] = self.extent();
         1.0 - self.uneven * ((0.7 * x / w + 0.3 * y / h) as f32)
     }
 
     fn light_at(&self, x: f64, y: f64) -> LinearRgb {
-        let shadows = self.on_bottles(x, y).map(soft_shadow);
-        let behind = self.screen.scale(shadows.product());
+        let behind = self.shaded_screen(x, y);
         self.bottle_seen(x, y)
             .map_or(behind, |(f, t)| f + behind.scale(t))
             .scale(self.lamp_falloff(x, y) * self.exposure)
+    }
+
+    fn shaded_screen(&self, x: f64, y: f64) -> LinearRgb {
+        let shadows = self.on_bottles(x, y).map(soft_shadow);
+        self.screen.scale(shadows.product())
     }
 
     fn pixel_at(&self, x: usize, y: usize) -> LinearRgb {
@@ -182,11 +189,15 @@ impl BottlePhoto {
     pub(super) fn photo(&self) -> Image<LinearRgb> {
         let (w, h) = self.size;
         let mut photo = Image::from_fn(w, h, |x, y| self.pixel_at(x, y));
+        self.expose_sensor(&mut photo);
+        photo
+    }
+
+    fn expose_sensor(&self, photo: &mut Image<LinearRgb>) {
         let mut noise = normal(3);
         for p in photo.pixels_mut() {
             *p = p.map(|v| coded_to_8_bits(v + self.noise * noise() as f32));
         }
-        photo
     }
 
     fn mask(&self) -> Mask {
@@ -210,10 +221,10 @@ pub(super) struct OutlineAccuracy {
     pub(super) iou: f64,
     /// The largest error of a side of the box, pixels.
     pub(super) box_px: f64,
-    /// It is within the bounds that are promised.
+    /// It is within the bounds of a good outline.
     pub(super) is_right: bool,
     /// Why the outline needs review; what film cannot know on a screen of its own hue is another matter.
-    pub(super) doubts: Vec<String>,
+    pub(super) reasons: Vec<String>,
 }
 
 impl OutlineAccuracy {
@@ -221,13 +232,11 @@ impl OutlineAccuracy {
         let found = &cut.segmentation;
         let iou = intersection_over_union(&found.tight, mask);
         let box_px = largest_difference(bounding_sides(&found.hull), sides_of(mask));
-        // Pixels of a reduced search are that much larger.
-        let is_right = iou >= GOOD_IOU && box_px <= GOOD_BOX_PX * found.reduction.max(1.0);
         Self {
             iou,
             box_px,
-            is_right,
-            doubts: review_messages(&found.diagnostics),
+            is_right: is_right([iou, box_px], found.reduction),
+            reasons: review_messages(&found.diagnostics),
         }
     }
 }
@@ -243,25 +252,6 @@ fn intersection_over_union(tight: &Image<Coverage>, mask: &Mask) -> f64 {
     let pairs: Vec<_> = found.zip(mask.pixels().iter().copied()).collect();
     let shared = pairs.iter().filter(|(a, b)| *a && *b).count();
     shared as f64 / pairs.iter().filter(|(a, b)| *a || *b).count() as f64
-}
-
-/// Left, top, right and bottom of a polygon.
-fn bounding_sides(hull: &[Point2<f64>]) -> [f64; 4] {
-    [
-        least(hull, |p| p.x),
-        least(hull, |p| p.y),
-        -least(hull, |p| -p.x),
-        -least(hull, |p| -p.y),
-    ]
-}
-
-fn least(points: &[Point2<f64>], coordinate: fn(&Point2<f64>) -> f64) -> f64 {
-    points.iter().map(coordinate).fold(f64::MAX, f64::min)
-}
-
-fn largest_difference(a: [f64; 4], b: [f64; 4]) -> f64 {
-    let off = a.iter().zip(b).map(|(a, b)| (a - b).abs());
-    off.fold(0.0, f64::max)
 }
 
 /// Left, top, right and bottom of a mask.

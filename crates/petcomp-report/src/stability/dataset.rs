@@ -1,6 +1,8 @@
 //! Datasets that are hard to write: of empty pictures, of crowds, cut off in the middle, with numbers at their ends.
 
-use super::staged::{camera_above, empty_scene, grey, level_card, one_deep_pixel, rendered};
+use super::staged::{
+    camera_above, empty_scene, grey, level_card, one_deep_pixel, rendered, temporary_folder,
+};
 use super::{HardCase, Outcome};
 use petcomp::composite;
 use petcomp::dataset::{
@@ -81,7 +83,7 @@ struct TestDataset {
 
 impl TestDataset {
     fn new(count: u64, make: impl Fn(u64) -> Sample + Sync) -> Result<Self> {
-        let folder = tempfile::tempdir().map_err(|e| Error::file(std::env::temp_dir(), e))?;
+        let folder = temporary_folder()?;
         let dataset = Self { folder, count };
         dataset.generate_missing(make)?;
         Ok(dataset)
@@ -118,9 +120,13 @@ impl TestDataset {
         let messages = findings
             .into_iter()
             .map(|finding| finding.diagnostic.message);
-        Ok(messages
-            .filter(|what| !what.contains("looks like") && !what.contains("same bytes"))
-            .collect())
+        Ok(messages.filter(|what| !is_about_similarity(what)).collect())
+    }
+
+    /// Images and rows of labels.
+    fn counts(&self) -> Result<(usize, usize)> {
+        let checked = check(self.path())?;
+        Ok((checked.images as usize, checked.rows.iter().sum()))
     }
 
     fn picture(&self, k: u64) -> PathBuf {
@@ -128,20 +134,23 @@ impl TestDataset {
     }
 
     fn cut_off_picture(&self, k: u64) -> Result<()> {
-        let path = self.picture(k);
-        let whole = std::fs::read(&path).map_err(|e| Error::file(&path, e))?;
-        std::fs::write(&path, &whole[..whole.len() / 2]).map_err(|e| Error::file(&path, e))
+        cut_off_file(&self.picture(k), |whole| whole / 2)
     }
 
     fn cut_off_journal(&self) -> Result<()> {
-        let path = self.path().join(JOURNAL);
-        let text = io::read_text(&path)?;
-        io::write_text(&path, &text[..text.len() - 20])
+        cut_off_file(&self.path().join(JOURNAL), |whole| whole - 20)
     }
 
     fn label(&self, name: &str) -> Result<String> {
         io::read_text(self.path().join("labels").join(name))
     }
+}
+
+/// Shortens a file to a length that its own determines.
+fn cut_off_file(path: &Path, length: impl Fn(usize) -> usize) -> Result<()> {
+    let mut bytes = std::fs::read(path).map_err(|e| Error::file(path, e))?;
+    bytes.truncate(length(bytes.len()));
+    std::fs::write(path, bytes).map_err(|e| Error::file(path, e))
 }
 
 fn all_writers() -> Vec<Box<dyn Writer>> {
@@ -160,6 +169,10 @@ fn listed(faults: &[String]) -> String {
     text.trim_end().into()
 }
 
+fn is_about_similarity(message: &str) -> bool {
+    message.contains("looks like") || message.contains("same bytes")
+}
+
 fn empty_pictures() -> HardCase {
     HardCase::new(
         "dataset of empty scenes",
@@ -171,11 +184,11 @@ fn empty_pictures() -> HardCase {
 
 fn generate_empty_pictures() -> Result<Outcome> {
     let dataset = TestDataset::new(5, |_| empty_sample())?;
-    let (faults, checked) = (dataset.faults()?, check(dataset.path())?);
-    let (images, rows) = (checked.images, checked.rows.iter().sum::<usize>());
+    let (images, rows) = dataset.counts()?;
+    let faults = dataset.faults()?;
     Ok(Outcome::new(
         format!("{images} images, {rows} rows, {}", listed(&faults)),
-        rows == 0 && faults.is_empty() && images == 5,
+        (images, rows) == (5, 0) && faults.is_empty(),
     ))
 }
 
@@ -233,18 +246,15 @@ fn write_row_of_one_pixel() -> Result<Outcome> {
 }
 
 fn too_small() -> HardCase {
-    HardCase::new(
+    HardCase::refused(
         "one-pixel pictures",
         "1 x 1 pixel, for YOLO",
-        "refused: \"expected at least 10 a side\"",
-        generate_too_small,
+        "expected at least 10 a side",
+        || {
+            let shot = Shot::new(camera_above([1, 1], 100.0));
+            TestDataset::new(1, |_| rendered_sample(&shot))
+        },
     )
-}
-
-fn generate_too_small() -> Result<Outcome> {
-    let shot = Shot::new(camera_above([1, 1], 100.0));
-    let attempt = TestDataset::new(1, |_| rendered_sample(&shot));
-    Ok(Outcome::refused(attempt, "expected at least 10 a side"))
 }
 
 /// Ten pictures of a card.
@@ -282,10 +292,7 @@ fn lost_picture() -> HardCase {
 }
 
 fn resume_after_repair() -> Result<Outcome> {
-    let dataset = dataset_of_cards()?;
-    let lost = dataset.picture(1);
-    std::fs::remove_file(&lost).map_err(|e| Error::file(lost, e))?;
-    dataset.cut_off_picture(2)?;
+    let dataset = damaged_dataset()?;
     let (good, lost) = repair(dataset.path())?;
     let again = dataset.generate_missing(with_a_card)?;
     let faults = dataset.faults()?.len();
@@ -293,6 +300,15 @@ fn resume_after_repair() -> Result<Outcome> {
         format!("{good} good, {lost} lost, {again} made, {faults} faults"),
         (good, lost, again, faults) == (8, 2, 2, 0),
     ))
+}
+
+/// Picture 1 is lost, picture 2 is cut off.
+fn damaged_dataset() -> Result<TestDataset> {
+    let dataset = dataset_of_cards()?;
+    let lost = dataset.picture(1);
+    std::fs::remove_file(&lost).map_err(|e| Error::file(lost, e))?;
+    dataset.cut_off_picture(2)?;
+    Ok(dataset)
 }
 
 fn missing_class() -> HardCase {
@@ -370,10 +386,13 @@ fn many_shards() -> HardCase {
 }
 
 fn contain_in_shards() -> Result<Outcome> {
-    let shards: Result<Vec<_>> = (1..=1000).map(|index| Shard::new(index, 1000)).collect();
-    let shards = shards?;
+    let shards = all_shards(1000)?;
     let on_one = (0..10).filter(|&k| count_containing(&shards, k) == 1);
     Ok(Outcome::count(on_one.count(), 10, ""))
+}
+
+fn all_shards(count: u64) -> Result<Vec<Shard>> {
+    (1..=count).map(|index| Shard::new(index, count)).collect()
 }
 
 fn count_containing(shards: &[Shard], k: u64) -> usize {
@@ -454,26 +473,31 @@ fn extreme_seeds() -> HardCase {
 
 fn draw_extreme_seeds() -> Result<Vec<Scene>> {
     let recipe = without_objects();
-    let ends = [0, 1, u64::MAX];
-    let pairs = ends.into_iter().flat_map(|seed| ends.map(|k| (seed, k)));
-    pairs
+    extreme_seeds_and_indices()
         .map(|(seed, k)| recipe.scene(seed, k, &[tray()], &[]))
         .collect()
 }
 
+fn extreme_seeds_and_indices() -> impl Iterator<Item = (u64, u64)> {
+    let ends = [0, 1, u64::MAX];
+    ends.into_iter()
+        .flat_map(move |seed| ends.map(|k| (seed, k)))
+}
+
 fn compare_draws(once: &[Scene], again: &[Scene]) -> Outcome {
-    let different = (0..once.len())
-        .filter(|&i| !once[..i].contains(&once[i]))
-        .count();
-    let same = if once == again {
-        "the same again"
-    } else {
-        "not the same again"
-    };
+    let different = count_distinct(once);
+    let is_same = once == again;
+    let same = if is_same { "the same" } else { "not the same" };
     Outcome::new(
-        format!("{different} different, {same}"),
-        different == 9 && once == again,
+        format!("{different} different, {same} again"),
+        different == 9 && is_same,
     )
+}
+
+fn count_distinct(scenes: &[Scene]) -> usize {
+    (0..scenes.len())
+        .filter(|&i| !scenes[..i].contains(&scenes[i]))
+        .count()
 }
 
 fn invalid_recipes() -> Vec<HardCase> {

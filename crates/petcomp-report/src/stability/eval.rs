@@ -108,12 +108,16 @@ impl ScoreCases {
         images: fn() -> Vec<EvalImage>,
     ) -> HardCase {
         let name = format!("{}: {what}", self.name);
-        let promise = format!("mAP {expected}, to 1e-9");
-        HardCase::new(name, input, promise, move || {
-            let map = evaluate(&images(), self.definition, &[]).map();
-            Ok(Outcome::near(map, expected, 1e-9, ""))
+        let expectation = format!("mAP {expected}, to 1e-9");
+        HardCase::new(name, input, expectation, move || {
+            Ok(compare_map(&images(), self.definition, expected))
         })
     }
+}
+
+fn compare_map(images: &[EvalImage], definition: Definition, expected: f64) -> Outcome {
+    let map = evaluate(images, definition, &[]).map();
+    Outcome::near(map, expected, 1e-9, "")
 }
 
 fn image_with_duplicate() -> Vec<EvalImage> {
@@ -208,12 +212,13 @@ fn one_image() -> HardCase {
         "yolov5: 2000 boxes in one image",
         "all found, all of one confidence",
         format!("mAP {PERFECT_YOLO}, to 1e-9"),
-        || {
-            let image = grid_image(2000, 2000, equal_confidence);
-            let map = evaluate(&[image], Definition::Yolov5, &[]).map();
-            Ok(Outcome::near(map, PERFECT_YOLO, 1e-9, ""))
-        },
+        score_one_image,
     )
+}
+
+fn score_one_image() -> Result<Outcome> {
+    let image = grid_image(2000, 2000, equal_confidence);
+    Ok(compare_map(&[image], Definition::Yolov5, PERFECT_YOLO))
 }
 
 fn half_right() -> HardCase {
@@ -226,11 +231,14 @@ fn half_right() -> HardCase {
 }
 
 fn score_half_right() -> Result<Outcome> {
-    let mut half = grid_image(50, 50, equal_confidence);
-    let wrong: Vec<Detection> = half.found.iter().map(moved_away).collect();
-    half.found.extend(wrong);
-    let map = evaluate(&[half], Definition::Coco, &[]).map();
-    Ok(Outcome::near(map, 1.0, 1e-9, ""))
+    Ok(compare_map(&[half_right_image()], Definition::Coco, 1.0))
+}
+
+fn half_right_image() -> EvalImage {
+    let mut image = grid_image(50, 50, equal_confidence);
+    let wrong: Vec<Detection> = image.found.iter().map(moved_away).collect();
+    image.found.extend(wrong);
+    image
 }
 
 fn moved_away(found: &Detection) -> Detection {
@@ -294,9 +302,8 @@ fn huge_boxes() -> HardCase {
 }
 
 fn overlap_huge_boxes() -> Result<Outcome> {
-    let endless = box_of_width(f64::INFINITY);
-    let of_half = iou(&box_of_width(1e150), &box_of_width(0.5e150));
-    let of_endless = iou(&endless, &endless);
+    let [whole, half, endless] = [1e150, 0.5e150, f64::INFINITY].map(box_of_width);
+    let (of_half, of_endless) = (iou(&whole, &half), iou(&endless, &endless));
     Ok(Outcome::new(
         format!("{of_half}, of infinite ones {of_endless}"),
         (of_half - 0.5).abs() < 1e-12 && !of_endless.is_nan(),

@@ -1,5 +1,6 @@
 //! Files that are hard to write or to read: values beyond a half float, the smallest ones, cut and lying headers, 16k.
 
+use super::staged::temporary_folder;
 use super::{HardCase, Outcome, memory};
 use petcomp::Image;
 use petcomp::io::{self, Bits, ReadOptions, WriteOptions, exr};
@@ -64,8 +65,7 @@ struct CaseFolder(TempDir);
 
 impl CaseFolder {
     fn new() -> Result<Self> {
-        let folder = tempfile::tempdir().map_err(|e| Error::file(std::env::temp_dir(), e))?;
-        Ok(Self(folder))
+        Ok(Self(temporary_folder()?))
     }
 
     fn path(&self, name: impl AsRef<Path>) -> PathBuf {
@@ -83,8 +83,12 @@ fn through_file(name: &str, values: &[f32], options: &WriteOptions) -> Result<Ve
     let folder = CaseFolder::new()?;
     let path = folder.path(name);
     io::write_with(&path, &green_row(values), options)?;
-    let back = io::read::<LinearRgb>(&path)?;
-    Ok(back.pixels().iter().map(|p| p.g).collect())
+    read_green(&path)
+}
+
+fn read_green(path: &Path) -> Result<Vec<f32>> {
+    let picture = io::read::<LinearRgb>(path)?;
+    Ok(picture.pixels().iter().map(|p| p.g).collect())
 }
 
 fn green_row(values: &[f32]) -> Image<LinearRgb> {
@@ -99,8 +103,8 @@ fn listed(values: &[f32]) -> String {
 
 fn half_float(name: &str, values: &'static [f32], expected: &'static [f32]) -> HardCase {
     let input = format!("{} to a half-float EXR and back", listed(values));
-    let promise = format!("{}: clamped, never infinite", listed(expected));
-    HardCase::new(name, input, promise, move || {
+    let expectation = format!("{}: clamped, never infinite", listed(expected));
+    HardCase::new(name, input, expectation, move || {
         write_half_floats(values, expected)
     })
 }
@@ -263,8 +267,8 @@ fn lying(
     limit: &'static str,
     make: fn(&Path) -> Result<PathBuf>,
 ) -> HardCase {
-    let promise = format!("refused by Limits::{limit}, within 64 MiB");
-    HardCase::new(name, input, promise, move || {
+    let expectation = format!("refused by Limits::{limit}, within 64 MiB");
+    HardCase::new(name, input, expectation, move || {
         let folder = CaseFolder::new()?;
         Ok(read_lying_file(&make(folder.0.path())?, limit))
     })

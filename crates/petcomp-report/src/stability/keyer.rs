@@ -75,9 +75,12 @@ fn weak_screen(saturation: f32) -> HardCase {
 
 fn key_weak_screen(saturation: f32) -> Result<Outcome> {
     let screen = LinearRgb::new(0.5, 0.5 + saturation, 0.5);
-    let photo = nearly_grey_photo();
-    let keyed = profiles().map(|p| key(&photo, screen, &KeyOptions::for_profile(p)));
+    let keyed = key_by_profiles(&nearly_grey_photo(), screen);
     Ok(outside_unit_range(keyed.into_iter()))
+}
+
+fn key_by_profiles(photo: &Image<LinearRgb>, screen: LinearRgb) -> [Keyed; 4] {
+    profiles().map(|p| key(photo, screen, &KeyOptions::for_profile(p)))
 }
 
 fn nearly_grey_photo() -> Image<LinearRgb> {
@@ -88,16 +91,20 @@ fn nearly_grey_photo() -> Image<LinearRgb> {
 
 fn known_pixel(name: &str, value: [f32; 3], expected: f32) -> HardCase {
     let input = format!("{value:?} against {:?}", <[f32; 3]>::from(GREEN));
-    let promise = format!("a matte of {expected}, as Blender 3.4.1 prints it, to 1e-7");
-    HardCase::new(name, input, promise, move || {
+    let expectation = format!("a matte of {expected}, as Blender 3.4.1 prints it, to 1e-7");
+    HardCase::new(name, input, expectation, move || {
         key_known_pixel(value, expected)
     })
 }
 
 fn key_known_pixel(value: [f32; 3], expected: f32) -> Result<Outcome> {
-    let photo = Image::filled(1, 1, value.into());
-    let matte = key(&photo, GREEN, &KeyOptions::default()).matte[(0, 0)].0;
+    let matte = matte_of_pixel(value.into());
     Ok(Outcome::near(matte.into(), expected.into(), 1e-7, ""))
+}
+
+fn matte_of_pixel(value: LinearRgb) -> f32 {
+    let photo = Image::filled(1, 1, value);
+    key(&photo, GREEN, &KeyOptions::default()).matte[(0, 0)].0
 }
 
 fn screen_color() -> HardCase {
@@ -110,8 +117,7 @@ fn screen_color() -> HardCase {
 }
 
 fn key_screen_color() -> Result<Outcome> {
-    let photo = Image::filled(64, 64, GREEN);
-    let keyed = profiles().map(|p| key(&photo, GREEN, &KeyOptions::for_profile(p)));
+    let keyed = key_by_profiles(&Image::filled(64, 64, GREEN), GREEN);
     let left = keyed.iter().map(light_and_coverage).sum();
     Ok(Outcome::near(left, 0.0, 0.0, ""))
 }
@@ -258,12 +264,14 @@ fn twelve_megapixels() -> HardCase {
         "keyer: 12 megapixels",
         "4000 x 3000 pixels, a pattern that repeats every 64",
         "the matte repeats, too, away from the border: 0 differ",
-        || {
-            let matte = key(&tiled_photo(), GREEN, &KeyOptions::default()).matte;
-            Ok(Outcome::none(count_unrepeated(&matte), "differ"))
-        },
+        key_twelve_megapixels,
     )
     .for_the_report()
+}
+
+fn key_twelve_megapixels() -> Result<Outcome> {
+    let matte = key(&tiled_photo(), GREEN, &KeyOptions::default()).matte;
+    Ok(Outcome::none(count_unrepeated(&matte), "differ"))
 }
 
 fn tiled_photo() -> Image<LinearRgb> {

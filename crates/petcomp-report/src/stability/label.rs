@@ -2,13 +2,13 @@
 
 use super::staged::{camera_above, card, grey, level_card, one_deep_pixel, rendered, tilted};
 use super::{HardCase, Outcome};
-use petcomp::DeepSample;
 use petcomp::Image;
 use petcomp::Result;
 use petcomp::geom::BBox;
 use petcomp::geom::Point2;
 use petcomp::label::{AmodalBox, LabelOptions, ObjectLabel, RleMask, label};
 use petcomp::scene::{Card, Shot};
+use petcomp::{DeepImage, DeepSample};
 use petcomp::{Depth, LinearRgb, ObjectId, PremulRgba};
 use std::f64::consts::FRAC_PI_2;
 
@@ -134,11 +134,13 @@ fn smaller_than_a_pixel() -> HardCase {
         "object of a hundredth of a pixel",
         "a card of 1 x 1 mm where a pixel is 10 mm",
         "below the threshold of 0.1 in every pixel: no label, 0",
-        || {
-            let found = labels_of([64, 48], [opaque_card(1, [0.0; 3], 0.001)]);
-            Ok(Outcome::none(found.len(), "labels"))
-        },
+        label_tiny_object,
     )
+}
+
+fn label_tiny_object() -> Result<Outcome> {
+    let found = labels_of([64, 48], [opaque_card(1, [0.0; 3], 0.001)]);
+    Ok(Outcome::none(found.len(), "labels"))
 }
 
 fn many_in_a_pixel() -> HardCase {
@@ -270,14 +272,17 @@ fn out_of_sight() -> HardCase {
 fn label_out_of_sight() -> Result<Outcome> {
     let shot = shot_out_of_sight();
     let deep = rendered(&shot);
-    let found = [AmodalBox::Mask, AmodalBox::Outline].map(|amodal| {
-        let options = LabelOptions {
-            amodal,
-            ..LabelOptions::default()
-        };
-        label(&deep, &shot, &options).objects.len()
-    });
-    Ok(Outcome::none(found.iter().sum(), "labels"))
+    let by_mask = count_labels(&deep, &shot, AmodalBox::Mask);
+    let by_outline = count_labels(&deep, &shot, AmodalBox::Outline);
+    Ok(Outcome::none(by_mask + by_outline, "labels"))
+}
+
+fn count_labels(deep: &DeepImage, shot: &Shot, amodal: AmodalBox) -> usize {
+    let options = LabelOptions {
+        amodal,
+        ..LabelOptions::default()
+    };
+    label(deep, shot, &options).objects.len()
 }
 
 fn shot_out_of_sight() -> Shot {
@@ -302,11 +307,13 @@ fn broken_outline() -> HardCase {
         "outline without an area",
         "no corner, one, two, three on a line, one of NaN",
         "the box of the mask all the same, no outline: 5 of 5",
-        || {
-            let right = BROKEN_OUTLINES.iter().filter(|o| is_boxed_by_mask(o));
-            Ok(Outcome::count(right.count(), 5, "right"))
-        },
+        label_broken_outlines,
     )
+}
+
+fn label_broken_outlines() -> Result<Outcome> {
+    let right = BROKEN_OUTLINES.iter().filter(|o| is_boxed_by_mask(o));
+    Ok(Outcome::count(right.count(), 5, "right"))
 }
 
 fn is_boxed_by_mask(outline: &[[f64; 2]]) -> bool {
@@ -335,14 +342,15 @@ fn label_deep_stack() -> Result<Outcome> {
 fn check_stack(found: &[ObjectLabel]) -> Outcome {
     let topmost = found.iter().filter(|o| o.is_topmost());
     let tops: Vec<u32> = topmost.map(|o| o.id.0).collect();
-    let right = found
-        .iter()
-        .filter(|o| o.covered_by.len() == (CROWD_SIZE - o.id.0) as usize)
-        .count();
+    let right = found.iter().filter(|o| is_under_all_above(o)).count();
     Outcome::new(
         format!("on top {tops:?}, {right} covered by all above them"),
         tops == [CROWD_SIZE] && right == CROWD_SIZE as usize,
     )
+}
+
+fn is_under_all_above(object: &ObjectLabel) -> bool {
+    object.covered_by.len() == (CROWD_SIZE - object.id.0) as usize
 }
 
 /// Pixels along a side of the largest mask.
@@ -379,10 +387,12 @@ fn at_the_threshold() -> HardCase {
 
 fn label_at_the_threshold() -> Result<Outcome> {
     let threshold = LabelOptions::default().alpha_threshold;
-    let found = [threshold, threshold.next_up()]
-        .map(|alpha| labels_of_one_pixel(&[dark_sample(1, alpha, alpha)]).len());
-    Ok(Outcome::new(
-        format!("{} and {} labels", found[0], found[1]),
-        found == [0, 1],
-    ))
+    let at = count_labels_of_alpha(threshold);
+    let above = count_labels_of_alpha(threshold.next_up());
+    let measured = format!("{at} and {above} labels");
+    Ok(Outcome::new(measured, (at, above) == (0, 1)))
+}
+
+fn count_labels_of_alpha(alpha: f32) -> usize {
+    labels_of_one_pixel(&[dark_sample(1, alpha, alpha)]).len()
 }

@@ -89,11 +89,13 @@ fn inside_the_lamp() -> HardCase {
         "receiver in the middle of a light",
         "a light of 1 x 1 m, the point its centre",
         "finite: 0, since it shines away",
-        || {
-            let found = received(&lamp([0.0; 3], 1.0, 10.0));
-            Ok(Outcome::near(found, 0.0, 0.0, "W/m2"))
-        },
+        light_inside_the_lamp,
     )
+}
+
+fn light_inside_the_lamp() -> Result<Outcome> {
+    let found = received(&lamp([0.0; 3], 1.0, 10.0));
+    Ok(Outcome::near(found, 0.0, 0.0, "W/m2"))
 }
 
 fn extreme_skies() -> Vec<HardCase> {
@@ -146,10 +148,14 @@ fn even_sky(name: &str, (width, height): (usize, usize), radiance: f32) -> HardC
 
 fn sum_even_sky(image: Image<LinearRgb>, expected: f64) -> Result<Outcome> {
     let map = EnvironmentMap::new(Arc::new(Panorama::new(image)?));
-    let off = normals().map(|normal| (sum_of_pieces(&map, &normal) - expected).abs());
-    let off = off.into_iter().fold(0.0, largest);
+    let off = worst_error_of_sums(&map, expected);
     let share = if expected > 0.0 { off / expected } else { off };
     Ok(Outcome::at_most(share, 2e-3, "off"))
+}
+
+fn worst_error_of_sums(map: &EnvironmentMap, expected: f64) -> f64 {
+    let off = normals().map(|normal| (sum_of_pieces(map, &normal) - expected).abs());
+    off.into_iter().fold(0.0, largest)
 }
 
 /// Upwards, to a side, downwards, and between.
@@ -180,10 +186,13 @@ fn pieces_of_sky() -> HardCase {
 fn sum_pieces_of_sky() -> Result<Outcome> {
     let panorama = Arc::new(Panorama::new(sky_of_one_texel())?);
     let map = EnvironmentMap::new(panorama.clone());
-    let off = normals()
-        .map(|normal| (sum_of_pieces(&map, &normal) / panorama.irradiance(&normal)[1] - 1.0).abs());
+    let off = normals().map(|normal| error_of_pieces(&map, &panorama, &normal));
     let worst = off.into_iter().fold(0.0, largest);
     Ok(Outcome::at_most(worst, 1e-5, "off"))
+}
+
+fn error_of_pieces(map: &EnvironmentMap, panorama: &Panorama, normal: &Vector3<f64>) -> f64 {
+    (sum_of_pieces(map, normal) / panorama.irradiance(normal)[1] - 1.0).abs()
 }
 
 fn sky_of_one_texel() -> Image<LinearRgb> {
@@ -281,12 +290,16 @@ fn exposed_under(
 }
 
 fn expose_plate(ambient: LinearRgb, plate: &Image<LinearRgb>, expected_ev: f64) -> Result<Outcome> {
+    Ok(match exposure_of_plate(ambient, plate) {
+        Exposure::Ev(ev) => Outcome::near(ev, expected_ev, 1e-4, "EV"),
+        _ => Outcome::failed("still unknown"),
+    })
+}
+
+fn exposure_of_plate(ambient: LinearRgb, plate: &Image<LinearRgb>) -> Exposure {
     let matched = Exposure::MatchPlate { gain_ev: 0.0 };
     let scene = unexposed_scene(matched, LightTint::default(), ambient);
-    let Exposure::Ev(ev) = expose(scene, &plate).exposure else {
-        return Ok(Outcome::failed("still unknown"));
-    };
-    Ok(Outcome::near(ev, expected_ev, 1e-4, "EV"))
+    expose(scene, plate).exposure
 }
 
 fn matched_tint(name: &str, plate: Image<LinearRgb>) -> HardCase {
@@ -299,23 +312,30 @@ fn matched_tint(name: &str, plate: Image<LinearRgb>) -> HardCase {
 }
 
 fn distance_from_white(plate: &Image<LinearRgb>) -> Outcome {
-    let matched = LightTint::MatchSurface { share: 1.0 };
-    let scene = unexposed_scene(Exposure::Ev(0.0), matched, LinearRgb::WHITE);
-    let LightTint::Known(LinearRgb { r, g, b }) = match_light_tint(scene, plate).cast else {
+    let LightTint::Known(LinearRgb { r, g, b }) = tint_of_surface(plate) else {
         return Outcome::failed("still unknown");
     };
     let off = [r, g, b].map(|v| f64::from(v - 1.0).abs());
     Outcome::at_most(off.into_iter().fold(0.0, largest), 1e-5, "off")
 }
 
+fn tint_of_surface(plate: &Image<LinearRgb>) -> LightTint {
+    let matched = LightTint::MatchSurface { share: 1.0 };
+    let scene = unexposed_scene(Exposure::Ev(0.0), matched, LinearRgb::WHITE);
+    match_light_tint(scene, plate).cast
+}
+
 /// The noise of a plate as the standard deviation at mid grey; none where it cannot be measured.
 fn measured_noise(name: &str, plate: Image<LinearRgb>, expected: Option<f64>) -> HardCase {
-    let promise = expected.map_or("none is reported".into(), |sigma| {
+    let expectation = expected.map_or("none is reported".into(), |sigma| {
         format!("a deviation of {sigma}, to 1e-4")
     });
-    HardCase::new(format!("noise: {name}"), "measured", promise, move || {
-        Ok(compare_noise(plate_noise(&plate), expected))
-    })
+    HardCase::new(
+        format!("noise: {name}"),
+        "measured",
+        expectation,
+        move || Ok(compare_noise(plate_noise(&plate), expected)),
+    )
 }
 
 fn compare_noise(found: Noise, expected: Option<f64>) -> Outcome {

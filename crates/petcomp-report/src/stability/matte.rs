@@ -9,7 +9,7 @@ use petcomp::matte::{
     CutOut, CutOutOptions, FilmMatte, FilmOptions, PlateOptions, ScreenPlate, TriangulateOptions,
     Triangulated, cut_out, film, triangulate,
 };
-use petcomp::{Coverage, LinearRgb};
+use petcomp::{Coverage, Diagnostic, LinearRgb};
 
 pub(super) fn cases() -> Result<Vec<HardCase>> {
     let mut cases = keyer::cases();
@@ -51,10 +51,11 @@ impl ExpectedCutOut {
     }
 
     fn is_met(self, cut: &CutOut, found: &OutlineAccuracy) -> bool {
+        let reasons = &found.reasons;
         match self {
-            Self::Right => found.is_right && found.doubts.is_empty() && is_clean(cut),
-            Self::RightOrFlagged => found.is_right || !found.doubts.is_empty(),
-            Self::Flagged(what) => found.doubts.iter().any(|doubt| doubt.contains(what)),
+            Self::Right => found.is_right && reasons.is_empty() && is_clean(cut),
+            Self::RightOrFlagged => found.is_right || !reasons.is_empty(),
+            Self::Flagged(what) => reasons.iter().any(|reason| reason.contains(what)),
         }
     }
 }
@@ -72,25 +73,31 @@ fn cut_out_case(name: &str, expected: ExpectedCutOut, photo: BottlePhoto) -> Har
     let (w, h) = photo.size;
     let input = format!("a bottle on a screen, {w} x {h} pixels");
     HardCase::new(name, input, expected.description(), move || {
-        match (photo.cut(), expected) {
-            (Ok((cut, found)), _) => Ok(judge_cut_out(expected, &cut, &found)),
-            (Err(error), ExpectedCutOut::RightOrFlagged) => {
+        expected.outcome(photo.cut())
+    })
+}
+
+impl ExpectedCutOut {
+    fn outcome(self, result: Result<(CutOut, OutlineAccuracy)>) -> Result<Outcome> {
+        match (result, self) {
+            (Ok((cut, found)), _) => {
+                let measured = measured_cut_out(&cut, &found);
+                Ok(Outcome::new(measured, self.is_met(&cut, &found)))
+            }
+            (Err(error), Self::RightOrFlagged) => {
                 Ok(Outcome::new(format!("refused: {error}"), true))
             }
             (Err(error), _) => Err(error),
         }
-    })
+    }
 }
 
-fn judge_cut_out(expected: ExpectedCutOut, cut: &CutOut, found: &OutlineAccuracy) -> Outcome {
-    let measured = format!(
-        "IoU {:.4}, box off by {:.2} px, residual matte {:.4}, {}",
-        found.iou,
-        found.box_px,
-        cut.residual_matte,
-        joined(&found.doubts, "not flagged")
-    );
-    Outcome::new(measured, expected.is_met(cut, found))
+fn measured_cut_out(cut: &CutOut, found: &OutlineAccuracy) -> String {
+    let reasons = joined(&found.reasons, "not flagged");
+    format!(
+        "IoU {:.4}, box off by {:.2} px, residual matte {:.4}, {reasons}",
+        found.iou, found.box_px, cut.residual_matte
+    )
 }
 
 /// Messages in one line; `none` where there are none.
@@ -102,7 +109,7 @@ fn joined(messages: &[String], none: &str) -> String {
     }
 }
 
-/// Nearly grey: film cannot be told from such a screen.
+/// Nearly grey: film cannot be distinguished from such a screen.
 const GREY_SCREEN: LinearRgb = LinearRgb::new(0.5, 0.52, 0.5);
 /// A cap of the green screen's hue.
 const GREEN_CAP: LinearRgb = LinearRgb::new(0.02, 0.25, 0.05);
@@ -196,9 +203,9 @@ fn film_on_grey() -> HardCase {
 
 fn cut_out_film_on_grey() -> Result<Outcome> {
     let (cut, _) = on_screen(GREY_SCREEN).cut()?;
-    let doubts = review_messages(&cut.diagnostics);
-    let is_flagged = doubts.iter().any(|doubt| doubt.contains("too grey"));
-    Ok(Outcome::new(doubts.join("; "), is_flagged))
+    let reasons = review_messages(&cut.diagnostics);
+    let is_flagged = reasons.iter().any(|reason| reason.contains("too grey"));
+    Ok(Outcome::new(reasons.join("; "), is_flagged))
 }
 
 fn refused_photos() -> Vec<HardCase> {
@@ -277,13 +284,18 @@ fn folded_film(x: usize, y: usize) -> (f32, f32) {
 fn film_on(screen: LinearRgb, exposure: f32) -> Image<LinearRgb> {
     let mask = ellipse();
     Image::from_fn(SIZE.0, SIZE.1, |x, y| {
-        let (light, passes) = if mask[(x, y)].0 > 0.0 {
-            folded_film(x, y)
-        } else {
-            (0.0, 1.0)
-        };
+        let (light, passes) = film_or_nothing(&mask, x, y);
         screen.map(|k| ((light + passes * k) * exposure).min(1.0))
     })
+}
+
+/// Light and transmittance of the film in the mask, of nothing beside it.
+fn film_or_nothing(mask: &Image<Coverage>, x: usize, y: usize) -> (f32, f32) {
+    if mask[(x, y)].0 > 0.0 {
+        folded_film(x, y)
+    } else {
+        (0.0, 1.0)
+    }
 }
 
 fn filled(color: LinearRgb) -> Image<LinearRgb> {
@@ -328,7 +340,7 @@ fn film_matte(photo: &Image<LinearRgb>, screen: LinearRgb) -> Result<FilmMatte> 
     film(photo, &plate, &ellipse(), &FilmOptions::default())
 }
 
-/// A photo that tells nothing of the film: sound pixels all the same, and a diagnostic.
+/// A photo without information on the film: sound pixels all the same, and a diagnostic.
 fn flagged_film(
     name: &str,
     photo: Image<LinearRgb>,
@@ -340,24 +352,31 @@ fn flagged_film(
     } else {
         format!("; reported: \"{cause}\"")
     };
-    let promise = format!("opacity in 0..1 and light finite in every pixel{reported}");
-    HardCase::new(name, "neutral film on an even screen", promise, move || {
-        Ok(judge_soundness(&film_matte(&photo, screen)?, cause))
-    })
+    let expectation = format!("opacity in 0..1 and light finite in every pixel{reported}");
+    HardCase::new(
+        name,
+        "neutral film on an even screen",
+        expectation,
+        move || Ok(judge_soundness(&film_matte(&photo, screen)?, cause)),
+    )
 }
 
 fn judge_soundness(found: &FilmMatte, cause: &str) -> Outcome {
     let unsound = found.film.pixels().iter().filter(|p| !p.is_sound()).count();
-    let messages: Vec<_> = found.diagnostics.iter().map(ToString::to_string).collect();
-    let reported = joined(&messages, "nothing reported");
+    let reported = reported(&found.diagnostics);
     let passed = unsound == 0 && reported.contains(cause);
     Outcome::new(format!("{unsound} px unsound, {reported}"), passed)
 }
 
+fn reported(diagnostics: &[Diagnostic]) -> String {
+    let messages: Vec<_> = diagnostics.iter().map(ToString::to_string).collect();
+    joined(&messages, "nothing reported")
+}
+
 /// A photo of one colour: nothing passes where it is black, all where it is the screen's.
 fn even_film(name: &str, color: LinearRgb, expected: f32) -> HardCase {
-    let promise = format!("transmittance {expected} in every pixel, to 0.05 on average");
-    HardCase::new(name, "on an even green screen", promise, move || {
+    let expectation = format!("transmittance {expected} in every pixel, to 0.05 on average");
+    HardCase::new(name, "on an even green screen", expectation, move || {
         judge_even_film(color, expected)
     })
 }
@@ -423,11 +442,15 @@ fn transmittance_error(found: &Image<LinearRgb>) -> f64 {
 }
 
 fn mean_error_inside(found: &Image<LinearRgb>, expected: impl Fn(usize, usize) -> f32) -> f64 {
-    let mask = ellipse();
-    let pixels = (0..SIZE.1).flat_map(|y| (0..SIZE.0).map(move |x| (x, y)));
-    let inside = pixels.filter(|&at| mask[at].0 > 0.0);
+    let inside = pixels_inside().into_iter();
     let off = inside.map(|(x, y)| f64::from((found[(x, y)].g - expected(x, y)).abs()));
     off.sum::<f64>() / ellipse_area()
+}
+
+fn pixels_inside() -> Vec<(usize, usize)> {
+    let mask = ellipse();
+    let pixels = (0..SIZE.1).flat_map(|y| (0..SIZE.0).map(move |x| (x, y)));
+    pixels.filter(|&at| mask[at].0 > 0.0).collect()
 }
 
 fn empty_mask() -> HardCase {
@@ -435,11 +458,18 @@ fn empty_mask() -> HardCase {
         "film without an object",
         "a mask of zeros",
         "mask of the object is empty",
-        || {
-            let (plate, nothing) = (ScreenPlate::even(GREEN, SIZE), Image::new(SIZE.0, SIZE.1));
-            let photo = film_on(GREEN, 1.0);
-            film(&photo, &plate, &nothing, &FilmOptions::default())
-        },
+        film_without_object,
+    )
+}
+
+fn film_without_object() -> Result<FilmMatte> {
+    let plate = ScreenPlate::even(GREEN, SIZE);
+    let nothing = Image::new(SIZE.0, SIZE.1);
+    film(
+        &film_on(GREEN, 1.0),
+        &plate,
+        &nothing,
+        &FilmOptions::default(),
     )
 }
 
@@ -448,12 +478,14 @@ fn no_background() -> HardCase {
         "screen without background",
         "no pixel of it to fit to",
         "refused: there is not enough",
-        || {
-            let nowhere = Image::filled(SIZE.0, SIZE.1, false);
-            let plate = ScreenPlate::fit(&film_on(GREEN, 1.0), &nowhere, &PlateOptions::default());
-            Ok(Outcome::refused(plate, "background"))
-        },
+        fit_without_background,
     )
+}
+
+fn fit_without_background() -> Result<Outcome> {
+    let nowhere = Image::filled(SIZE.0, SIZE.1, false);
+    let plate = ScreenPlate::fit(&film_on(GREEN, 1.0), &nowhere, &PlateOptions::default());
+    Ok(Outcome::refused(plate, "background"))
 }
 
 /// What an exposure leaves of a screen before the sensor saturates.
@@ -486,11 +518,13 @@ fn exact_screens(name: &str, screens: [LinearRgb; 2]) -> HardCase {
         name,
         "neutral film on two even screens, no noise",
         "photo = F + T screen has one solution in green: T to 1e-4 on average",
-        move || {
-            let found = triangulated(screens, 1.0)?.transmittance;
-            Ok(Outcome::at_most(transmittance_error(&found), 1e-4, ""))
-        },
+        move || judge_exact_screens(screens),
     )
+}
+
+fn judge_exact_screens(screens: [LinearRgb; 2]) -> Result<Outcome> {
+    let found = triangulated(screens, 1.0)?.transmittance;
+    Ok(Outcome::at_most(transmittance_error(&found), 1e-4, ""))
 }
 
 fn similar_screens(name: &str, screens: [LinearRgb; 2]) -> HardCase {
@@ -535,10 +569,12 @@ fn one_screen() -> HardCase {
         "triangulation from one photo",
         "film on green",
         "expected at least 2",
-        || {
-            let (photo, plate) = (film_on(GREEN, 1.0), ScreenPlate::even(GREEN, SIZE));
-            let shots = [(&photo, &plate)];
-            triangulate(&shots, &ellipse(), &TriangulateOptions::default())
-        },
+        triangulate_one_photo,
     )
+}
+
+fn triangulate_one_photo() -> Result<Triangulated> {
+    let (photo, plate) = (film_on(GREEN, 1.0), ScreenPlate::even(GREEN, SIZE));
+    let options = TriangulateOptions::default();
+    triangulate(&[(&photo, &plate)], &ellipse(), &options)
 }

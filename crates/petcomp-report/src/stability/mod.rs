@@ -23,7 +23,7 @@ mod staged;
 
 pub use case::{HardCase, Outcome};
 
-use petcomp::io::{create_folder, write_text};
+use crate::files::write_texts;
 use petcomp::plot::Table;
 use petcomp::{Error, Result};
 use std::path::Path;
@@ -172,11 +172,10 @@ fn case_counts(rows: &[CaseResult], stage: &str) -> [usize; 2] {
 /// As [`cases`]; files that cannot be written. A case that fails is a row, not an error.
 pub fn write(folder: &Path, stage: &str, progress: impl Fn(u64, u64)) -> Result<Vec<CaseResult>> {
     let rows = run_cases(&cases(stage)?, progress);
-    create_folder(folder)?;
     let table = table(&rows);
-    write_text(folder.join("stability.csv"), &table.csv())?;
     let text = format!("{}\n{}", summary(&rows).markdown(), table.markdown());
-    write_text(folder.join("stability.md"), &text)?;
+    let files = [("stability.csv", &*table.csv()), ("stability.md", &text)];
+    write_texts(folder, files)?;
     Ok(rows)
 }
 

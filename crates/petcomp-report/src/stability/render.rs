@@ -154,14 +154,18 @@ fn near_card() -> HardCase {
 }
 
 fn render_near_card() -> Result<Outcome> {
-    let shot = Shot::new(camera_above([64, 48], 60.0)).with_ambient(LinearRgb::WHITE);
-    let card = level_card(1, [0.0, 0.0, 0.99], 0.2, grey(1.0));
-    let deep = rendered(&shot.with_card(card));
+    let deep = rendered(&near_card_shot());
     Ok(Outcome::at_most(
         error_of_full_card(&deep, 0.01),
         1e-5,
         "off",
     ))
+}
+
+fn near_card_shot() -> Shot {
+    Shot::new(camera_above([64, 48], 60.0))
+        .with_ambient(LinearRgb::WHITE)
+        .with_card(level_card(1, [0.0, 0.0, 0.99], 0.2, grey(1.0)))
 }
 
 fn near_and_grazing() -> HardCase {
@@ -282,26 +286,25 @@ fn one_pixel() -> HardCase {
 }
 
 fn render_one_pixel() -> Result<Outcome> {
-    let (one, many) = (middle_pixel(1), middle_pixel(65));
-    let off = one.iter().zip(&many).map(|(a, b)| (a - b).abs());
-    let worst = off.fold(0.0, f32::max);
+    let pairs = middle_pixel(1).into_iter().zip(middle_pixel(65));
+    let worst = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
     Ok(Outcome::at_most(worst.into(), 1e-5, "off"))
 }
 
 /// Light, opacity and shadow of the middle pixel of a picture of a tilted card.
 fn middle_pixel(side: u32) -> [f32; 3] {
-    let shot =
-        Shot::new(camera_above([side; 2], 50.0)).with_light(lamp([0.3, 0.2, 0.9], 0.4, 10.0));
-    let sheet = Image::filled(64, 64, grey(0.6));
-    let shot = shot.with_card(card(1, [0.02, 0.0, 0.2], tilted(0.5), [0.3; 2], sheet));
-    let deep = render(&shot, &GOOD);
+    let deep = render(&tilted_card_shot(side), &GOOD);
     let middle = (side / 2) as usize;
     let flat = deep.flat(middle, middle);
-    [
-        flat.color.g,
-        flat.opacity.g,
-        deep.shadow()[(middle, middle)].g,
-    ]
+    let shadow = deep.shadow()[(middle, middle)];
+    [flat.color.g, flat.opacity.g, shadow.g]
+}
+
+fn tilted_card_shot(side: u32) -> Shot {
+    let sheet = Image::filled(64, 64, grey(0.6));
+    Shot::new(camera_above([side; 2], 50.0))
+        .with_light(lamp([0.3, 0.2, 0.9], 0.4, 10.0))
+        .with_card(card(1, [0.02, 0.0, 0.2], tilted(0.5), [0.3; 2], sheet))
 }
 
 fn white_on_white() -> HardCase {
@@ -309,24 +312,32 @@ fn white_on_white() -> HardCase {
         "light between two white planes",
         "a surface of albedo 1 under a white opaque card, which reflects all that it gets",
         "no more than 20 times as bright (reflected light is limited to 0.95); never infinite",
-        || {
-            let brightest = brightest_between_planes();
-            let limit = 1.0 / (1.0 - 0.95) * (1.0 + 1e-5);
-            Ok(Outcome::at_most(brightest, limit, "times"))
-        },
+        reflect_between_planes,
     )
 }
 
+fn reflect_between_planes() -> Result<Outcome> {
+    let brightest = brightest_between_planes();
+    let limit = 1.0 / (1.0 - 0.95) * (1.0 + 1e-5);
+    Ok(Outcome::at_most(brightest, limit, "times"))
+}
+
 fn brightest_between_planes() -> f64 {
-    let white = PremulRgba::new(1.0, 1.0, 1.0, 1.0);
-    let shot = small_shot()
-        .with_ambient(LinearRgb::WHITE)
-        .with_card(level_card(1, [0.0, 0.0, 0.05], 0.5, white));
+    let shot = white_card_shot();
     let deep = interreflect(rendered(&shot), &shot, LinearRgb::WHITE);
     let shadow = deep.shadow().pixels().iter();
-    shadow
-        .map(|s| f64::from(s.r.max(s.g).max(s.b)))
-        .fold(0.0, largest)
+    shadow.map(brightest_channel).fold(0.0, largest)
+}
+
+fn brightest_channel(s: &LinearRgb) -> f64 {
+    f64::from(s.r.max(s.g).max(s.b))
+}
+
+fn white_card_shot() -> Shot {
+    let white = PremulRgba::new(1.0, 1.0, 1.0, 1.0);
+    small_shot()
+        .with_ambient(LinearRgb::WHITE)
+        .with_card(level_card(1, [0.0, 0.0, 0.05], 0.5, white))
 }
 
 /// The larger number; NaN where one is.
@@ -361,14 +372,18 @@ fn sixteen_k() -> HardCase {
 fn render_sixteen_k() -> Outcome {
     let shot = sixteen_k_shot();
     let (deep, peak) = memory::peak_gib(|| render(&shot, &Quality::Draft.render()));
-    let (found, last) = (total_coverage(&deep), LARGEST_SIDE_PX as usize - 1);
+    let found = total_coverage(&deep);
     let fits = peak.is_none_or(|peak| peak < SIXTEEN_K_GIB);
-    let is_untouched = deep.shadow()[(last, last)] == LinearRgb::WHITE;
     let peak = peak.map_or(String::new(), |peak| format!(", {peak:.1} GiB"));
     Outcome::new(
         format!("{found:.0} pixels{peak}"),
-        fits && is_untouched && (found / SHOWN_PX - 1.0).abs() < 1e-4,
+        fits && is_last_pixel_lit(&deep) && (found / SHOWN_PX - 1.0).abs() < 1e-4,
     )
+}
+
+fn is_last_pixel_lit(deep: &DeepImage) -> bool {
+    let last = LARGEST_SIDE_PX as usize - 1;
+    deep.shadow()[(last, last)] == LinearRgb::WHITE
 }
 
 /// A card whose middle is 1100 pixels from the last corner.
@@ -500,10 +515,10 @@ fn covering(name: &str, shot: Shot, [least, most]: [f64; 2]) -> HardCase {
     } else {
         format!("{least:.2} to {most}")
     };
-    let promise = format!(
+    let expectation = format!(
         "coverage {coverage} in the middle (to 1e-5), light finite, shadows in 0..1, in either renderer"
     );
-    HardCase::new(name, "under a light of 10 W", promise, move || {
+    HardCase::new(name, "under a light of 10 W", expectation, move || {
         Ok(judge_coverage(&by_both_renderers(&shot), [least, most]))
     })
 }
@@ -511,10 +526,7 @@ fn covering(name: &str, shot: Shot, [least, most]: [f64; 2]) -> HardCase {
 fn judge_coverage(pictures: &[DeepImage; 2], [least, most]: [f64; 2]) -> Outcome {
     let is_sound = pictures.iter().all(is_sound);
     let state = if is_sound { "sound" } else { "not sound" };
-    // A sum over nothing is -0.
-    let found = pictures
-        .each_ref()
-        .map(|deep| f64::from(deep.flat(7, 5).opacity.g) + 0.0);
+    let found = pictures.each_ref().map(middle_coverage);
     let expected = least - 1e-5..=most + 1e-5;
     Outcome::new(
         format!("{:.6} and {:.6}, {state}", found[0], found[1]),
@@ -522,14 +534,23 @@ fn judge_coverage(pictures: &[DeepImage; 2], [least, most]: [f64; 2]) -> Outcome
     )
 }
 
+fn middle_coverage(deep: &DeepImage) -> f64 {
+    // A sum over nothing is -0.
+    f64::from(deep.flat(7, 5).opacity.g) + 0.0
+}
+
 /// Every pixel's light is finite, its coverage and its shadows lie in 0..1.
 fn is_sound(deep: &DeepImage) -> bool {
-    let pixels = composite::frame(deep, None).into_vec();
     let mut shadows = deep.shadow().pixels().iter().flat_map(|s| [s.r, s.g, s.b]);
-    pixels
+    composite::frame(deep, None)
+        .pixels()
         .iter()
-        .all(|p| p.color().is_finite() && is_share(p.a))
+        .all(is_pixel_sound)
         && shadows.all(is_share)
+}
+
+fn is_pixel_sound(p: &PremulRgba) -> bool {
+    p.color().is_finite() && is_share(p.a)
 }
 
 fn is_share(v: f32) -> bool {

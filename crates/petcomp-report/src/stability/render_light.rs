@@ -60,11 +60,13 @@ fn grazing_light(degrees: f64) -> HardCase {
         format!("light grazing at {degrees} degrees"),
         "a small light of 1000 W, 10 m away, over a white level card",
         format!("cosine law: {expected:.6e}, to 0.1 %"),
-        move || {
-            let ratio = lit_by(light) / expected;
-            Ok(Outcome::near(ratio, 1.0, 1e-3, "of the closed form"))
-        },
+        move || reflect_grazing_light(light, expected),
     )
+}
+
+fn reflect_grazing_light(light: AreaLight, expected: f64) -> Result<Outcome> {
+    let ratio = lit_by(light) / expected;
+    Ok(Outcome::near(ratio, 1.0, 1e-3, "of the closed form"))
 }
 
 fn small_light(side: f64) -> HardCase {
@@ -90,11 +92,13 @@ fn cut_by_the_horizon((quality, options): (&str, RenderOptions)) -> HardCase {
         format!("light half below the horizon, quality {quality}"),
         "an upright light of 1 x 1 m, 1 m away, half of it under the plane of a white level card",
         format!("Lambert's formula for the upper half, {expected:.6}: to 5 %, 0.07 stops"),
-        move || {
-            let found = light_reflected(small_shot().with_light(light), &options);
-            Ok(Outcome::ratio(found, expected, 0.05))
-        },
+        move || reflect_upper_half(light, &options, expected),
     )
+}
+
+fn reflect_upper_half(light: AreaLight, options: &RenderOptions, expected: f64) -> Result<Outcome> {
+    let found = light_reflected(small_shot().with_light(light), &options);
+    Ok(Outcome::ratio(found, expected, 0.05))
 }
 
 fn reflected_from_upper_half(light: &AreaLight) -> f64 {
@@ -121,11 +125,13 @@ fn light_in_a_card() -> HardCase {
         "light inside a card",
         "an upright opaque card through the middle of a light of 0.2 x 0.2 m; the surface on one side of it",
         format!("that half of the light: {expected:.4} of the irradiance, to 0.02 at quality high"),
-        move || {
-            let found = shade_in_the_middle(&light_in_a_card_shot(), &HIGH);
-            Ok(Outcome::near(found, expected, 0.02, ""))
-        },
+        move || shade_light_in_a_card(expected),
     )
+}
+
+fn shade_light_in_a_card(expected: f64) -> Result<Outcome> {
+    let found = shade_in_the_middle(&light_in_a_card_shot(), &HIGH);
+    Ok(Outcome::near(found, expected, 0.02, ""))
 }
 
 fn light_in_a_card_shot() -> Shot {

@@ -26,7 +26,7 @@ struct HardFall {
     name: String,
     scene: Scene,
     options: SettleOptions,
-    promise: ExpectedEnd,
+    expectation: ExpectedEnd,
 }
 
 pub(super) fn cases() -> Result<Vec<HardCase>> {
@@ -85,10 +85,10 @@ impl HardFall {
             name,
             scene,
             options,
-            promise,
+            expectation,
         } = self;
-        let case = HardCase::new(name, input, promise.description(&options), move || {
-            Ok(promise.outcome(&scene, &options))
+        let case = HardCase::new(name, input, expectation.description(&options), move || {
+            Ok(expectation.outcome(&scene, &options))
         });
         if cards > MAX_TEST_CARDS {
             case.for_the_report()
@@ -100,7 +100,7 @@ impl HardFall {
     /// The same, of which only an end is expected.
     fn that_ends(self) -> Self {
         Self {
-            promise: ExpectedEnd::Ends,
+            expectation: ExpectedEnd::Ends,
             ..self
         }
     }
@@ -108,7 +108,7 @@ impl HardFall {
     /// The same, with other options, to be refused.
     fn that_is_refused(self, options: SettleOptions) -> Self {
         Self {
-            promise: ExpectedEnd::IsRefused,
+            expectation: ExpectedEnd::IsRefused,
             options,
             ..self
         }
@@ -175,7 +175,7 @@ fn resting_fall(name: impl Into<String>, scene: Scene) -> HardFall {
         name: name.into(),
         scene,
         options: SettleOptions::default(),
-        promise: ExpectedEnd::Rests,
+        expectation: ExpectedEnd::Rests,
     }
 }
 

@@ -8,22 +8,28 @@ use petcomp::scene::{
     AreaLight, CameraSource, Card, Exposure, Grade, LightShape, Scene, Shot, Surface,
 };
 use petcomp::{DeepImage, DeepSample, Image};
+use petcomp::{Error, Result};
 use petcomp::{LinearRgb, ObjectId, PremulRgba};
 use std::f64::consts::PI;
 use std::sync::Arc;
+use tempfile::TempDir;
 
 /// The outline of a whole card in texture coordinates.
 const WHOLE: [[f64; 2]; 4] = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
 
 /// A camera at height 1 over the origin, looking straight down; picture up is world `+y`.
 pub(super) fn camera_above(image: [u32; 2], focal_px: f64) -> Camera {
-    let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI);
     Camera {
         image,
         focal_px: Vector2::repeat(focal_px),
         principal_px: Point2::from(image.map(|side| 0.5 * f64::from(side))),
-        camera_from_world: Pose::from_parts(Vector3::new(0.0, 0.0, 1.0).into(), down),
+        camera_from_world: looking_down(),
     }
+}
+
+fn looking_down() -> Pose {
+    let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI);
+    Pose::from_parts(Vector3::new(0.0, 0.0, 1.0).into(), down)
 }
 
 /// A camera at `eye` whose image centre sees `target`.
@@ -33,12 +39,19 @@ pub(super) fn camera_looking_at(
     image: [u32; 2],
     focal_px: f64,
 ) -> Camera {
-    let [eye, target] = [eye, target].map(Point3::from);
-    let world_from_camera = Pose::face_towards(&eye, &target, &-Vector3::z());
     Camera {
-        camera_from_world: world_from_camera.inverse(),
+        camera_from_world: pose_facing(eye.into(), target.into()).inverse(),
         ..camera_above(image, focal_px)
     }
+}
+
+fn pose_facing(eye: Point3<f64>, target: Point3<f64>) -> Pose {
+    Pose::face_towards(&eye, &target, &-Vector3::z())
+}
+
+/// A folder that is removed when it is dropped.
+pub(super) fn temporary_folder() -> Result<TempDir> {
+    tempfile::tempdir().map_err(|e| Error::file(std::env::temp_dir(), e))
 }
 
 /// A card with one texture on both sides.
@@ -49,17 +62,16 @@ pub(super) fn card(
     size: [f64; 2],
     texture: impl Into<Texture>,
 ) -> Card {
-    let world_from_card = Pose::from_parts(Vector3::from(center).into(), rotation);
     Card {
         id: ObjectId(id),
         class: 0,
         quad: Quad {
-            world_from_card,
+            world_from_card: Pose::from_parts(Vector3::from(center).into(), rotation),
             size,
         },
         texture: texture.into(),
         back: None,
-        outline_uv: WHOLE.iter().map(|&uv| uv.into()).collect::<Arc<[_]>>(),
+        outline_uv: Arc::new(WHOLE.map(Point2::from)),
         grade: Grade::default(),
     }
 }
@@ -136,9 +148,13 @@ pub(super) fn projected_area(card: &Card, camera: &Camera) -> f64 {
         .iter()
         .filter_map(|&corner| Some(camera.project(corner)?.0))
         .collect();
-    let next = seen.iter().cycle().skip(1);
-    let doubled = seen.iter().zip(next).map(|(a, b)| a.x * b.y - b.x * a.y);
-    0.5 * doubled.sum::<f64>().abs()
+    polygon_area(&seen)
+}
+
+fn polygon_area(corners: &[Point2<f64>]) -> f64 {
+    let next = corners.iter().cycle().skip(1);
+    let products = corners.iter().zip(next).map(|(a, b)| a.x * b.y - b.x * a.y);
+    0.5 * products.sum::<f64>().abs()
 }
 
 #[cfg(test)]

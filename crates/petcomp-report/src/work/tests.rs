@@ -1,4 +1,4 @@
-//! What is promised of work: zeros where a thing is absent, more than zero where it is there, and idle switches.
+//! What must hold of work: zero where a feature is absent, more than zero where it is present, and switches that are off.
 
 use super::world::dropped;
 use super::*;
@@ -24,7 +24,7 @@ fn scenes_pay_for_what_they_use_and_for_nothing_else() {
         let idle: Vec<_> = case.used.iter().filter(|kind| work[**kind] == 0).collect();
         assert!(
             idle.is_empty(),
-            "{}: no {idle:?}, so that a zero elsewhere says nothing",
+            "{}: no {idle:?}, so that a zero elsewhere means nothing",
             case.name
         );
     }
@@ -53,9 +53,9 @@ fn a_scene_reads_the_files_that_it_names_and_no_others() {
         let case = cases.iter().find(|case| case.name == name).unwrap();
         work_of(&world, case).unwrap()[FilesRead]
     };
-    // Manifest, label, cut-out, photo.
+    // Manifest, label, cut-out, photo; without a photo no label either.
     assert_eq!(read("usual"), 4);
-    assert_eq!((read("plate alone"), read("nothing")), (3, 2));
+    assert_eq!((read("plate alone"), read("nothing")), (3, 1));
     assert_eq!((read("labels"), read("map"), read("dim map")), (3, 5, 4));
 }
 
@@ -223,12 +223,12 @@ fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
 fn jobs_and_progress_leave_every_byte() {
     let world = FixtureFolder::new().unwrap();
     let alone = dataset(&world, 1, &|_| {});
-    let told = AtomicU64::new(0);
+    let reported = AtomicU64::new(0);
     let watched = dataset(&world, 3, &|progress| {
-        told.store(progress.done, Ordering::Relaxed)
+        reported.store(progress.done, Ordering::Relaxed)
     });
     assert_eq!(
-        (told.into_inner(), alone.len()),
+        (reported.into_inner(), alone.len()),
         (3, 3 * 3 + 3),
         "pictures, labels, scenes; and three lists"
     );
@@ -280,6 +280,6 @@ fn a_broken_promise_is_marked() {
     let cells = table(&[row(0), row(2)]).rows;
     assert_eq!(cells[0][2..], ["0 ✓", "3"]);
     assert_eq!(cells[1][2..], ["2 ✗", "3"]);
-    assert!(row(0).is_as_promised() && !row(2).is_as_promised());
+    assert!(row(0).is_as_expected() && !row(2).is_as_expected());
     assert!(table(&[]).rows.is_empty());
 }

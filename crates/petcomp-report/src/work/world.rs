@@ -46,9 +46,6 @@ impl FixtureFolder {
     pub(super) fn new() -> Result<Self> {
         let folder = tempfile::tempdir().map_err(|e| Error::value("temporary folder", e))?;
         let world = Self { folder };
-        for kind in ["assets", "photos"] {
-            io::create_folder(world.path(kind))?;
-        }
         world.write_assets()?;
         world.write_photo()?;
         io::write(world.path(PANORAMA), &Image::from_fn(32, 16, sky_color))?;
@@ -61,22 +58,20 @@ impl FixtureFolder {
 
     fn write_assets(&self) -> Result<()> {
         let folder = self.path("assets");
+        io::create_folder(&folder)?;
         io::write(folder.join(file_of(SEE_THROUGH)), &striped_cut_out(0.5))?;
         io::write(folder.join(file_of(OPAQUE)), &striped_cut_out(1.0))?;
         io::write(
             folder.join(file_of(FILM)),
             &striped_cut_out(0.5).map(tinted),
         )?;
-        let mut manifest = Manifest {
-            classes: vec!["none".into()],
-            assets: [SEE_THROUGH, OPAQUE, FILM].map(asset_record).into(),
-        };
-        manifest.write(&folder)?;
+        manifest().write(&folder)?;
         Ok(())
     }
 
     fn write_photo(&self) -> Result<()> {
         let folder = self.path("photos");
+        io::create_folder(&folder)?;
         let [w, h] = IMAGE.map(|side| side as usize);
         io::write(folder.join("tray.png"), &Image::from_fn(w, h, grain))?;
         let mut label = Label::new(IMAGE, SURFACE_CORNERS_PX, SURFACE_SIZE_M);
@@ -128,6 +123,13 @@ impl FixtureFolder {
             rotation_deg: 0.0,
             strength,
         }
+    }
+}
+
+fn manifest() -> Manifest {
+    Manifest {
+        classes: vec!["none".into()],
+        assets: [SEE_THROUGH, OPAQUE, FILM].map(asset_record).into(),
     }
 }
 

@@ -4,7 +4,7 @@ use super::super::Trial;
 use super::sensor::noisy;
 use crate::matte::truth::Known;
 use petcomp::filter;
-use petcomp::{Coverage, Mix};
+use petcomp::{Coverage, LinearRgb};
 use petcomp::{Image, Roi};
 use std::ops::Range;
 
@@ -20,14 +20,17 @@ pub(super) fn cut_off(whole: Trial, share: f64) -> Trial {
 }
 
 fn cropped(whole: Trial, roi: Roi) -> Trial {
-    let (x, y) = (roi.x as f64, roi.y as f64);
-    let [left, top, right, bottom] = whole.box_px;
     Trial {
         photo: whole.photo.crop(roi),
         mask: whole.mask.crop(roi),
-        box_px: [left - x, top - y, right - x, bottom - y],
+        box_px: cropped_box(whole.box_px, roi),
         ..whole
     }
+}
+
+fn cropped_box([left, top, right, bottom]: [f64; 4], roi: Roi) -> [f64; 4] {
+    let (x, y) = (roi.x as f64, roi.y as f64);
+    [left - x, top - y, right - x, bottom - y]
 }
 
 /// The photo and its mirror image beside each other.
@@ -67,14 +70,17 @@ pub(super) fn huge(whole: &Trial) -> Trial {
 fn resized(whole: &Trial, scale: f64) -> Trial {
     let (w, h) = whole.photo.size();
     let [to_w, to_h] = [w, h].map(|side| (side as f64 * scale).round() as usize);
-    let [sx, sy] = [to_w as f64 / w as f64, to_h as f64 / h as f64];
-    let [left, top, right, bottom] = whole.box_px;
+    let scales = [to_w as f64 / w as f64, to_h as f64 / h as f64];
     Trial {
         photo: filter::resize(&whole.photo, to_w, to_h),
         mask: filter::resize::<Coverage>(&whole.mask, to_w, to_h),
-        box_px: [left * sx, top * sy, right * sx, bottom * sy],
+        box_px: scaled_box(whole.box_px, scales),
         expected: whole.expected,
     }
+}
+
+fn scaled_box([left, top, right, bottom]: [f64; 4], [sx, sy]: [f64; 2]) -> [f64; 4] {
+    [left * sx, top * sy, right * sx, bottom * sy]
 }
 
 /// The photo turned on its side: rows become columns.
@@ -122,9 +128,13 @@ const SMALL_OBJECT_SHARE: f64 = 0.02;
 /// The object scaled down to that share, on the same screen.
 pub(super) fn small_object(known: &Known, whole: Trial) -> Trial {
     let (w, h) = known.photo.size();
-    let covered: f64 = known.mask.pixels().iter().map(|c| f64::from(c.0)).sum();
-    let scale = (SMALL_OBJECT_SHARE * (w * h) as f64 / covered).sqrt();
+    let wanted = SMALL_OBJECT_SHARE * (w * h) as f64;
+    let scale = (wanted / total_coverage(&known.mask)).sqrt();
     shrunk(known, whole, [scale, scale])
+}
+
+fn total_coverage(mask: &Image<Coverage>) -> f64 {
+    mask.pixels().iter().map(|c| f64::from(c.0)).sum()
 }
 
 /// Width of a thin object as a share of what it was.
@@ -143,22 +153,10 @@ pub(super) fn thin_object(known: &Known, whole: Trial) -> Trial {
 
 /// The object made smaller by factors across and down, in the middle of its screen: `F + T K`, with the sensor's noise.
 fn shrunk(known: &Known, whole: Trial, scale: [f64; 2]) -> Trial {
-    let (w, h) = known.photo.size();
     let inset = Inset::new(known.photo.size(), scale);
-    let [light, through] = [&known.foreground, &known.transmittance].map(|p| inset.resize(p));
-    let small = inset.resize(&known.mask);
-    let clean = Image::from_fn(w, h, |x, y| {
-        let screen = known.screen[(x, y)];
-        inset
-            .at(x, y)
-            .map_or(screen, |at| light[at] + through[at] * screen)
-    });
-    let mask = Image::from_fn(w, h, |x, y| {
-        inset.at(x, y).map_or(Coverage(0.0), |at| small[at])
-    });
     Trial {
-        photo: noisy(&clean, known.noise.read as f32, 1),
-        mask,
+        photo: noisy(&inset.photo(known), known.noise.read as f32, 1),
+        mask: inset.mask(known),
         box_px: inset.map_box(known.box_px),
         ..whole
     }
@@ -181,8 +179,27 @@ impl Inset {
         }
     }
 
-    fn resize<P: Mix + Send + Sync>(&self, picture: &Image<P>) -> Image<P> {
-        filter::resize(picture, self.to[0], self.to[1])
+    fn photo(&self, known: &Known) -> Image<LinearRgb> {
+        let [light, through] = [&known.foreground, &known.transmittance]
+            .map(|picture| filter::resize(picture, self.to[0], self.to[1]));
+        self.image(|x, y, inside| {
+            let screen = known.screen[(x, y)];
+            inside.map_or(screen, |at| light[at] + through[at] * screen)
+        })
+    }
+
+    fn mask(&self, known: &Known) -> Image<Coverage> {
+        let small = filter::resize(&known.mask, self.to[0], self.to[1]);
+        self.image(|_, _, inside| inside.map_or(Coverage(0.0), |at| small[at]))
+    }
+
+    /// A picture of the old frame from the pixels of it and, where there is one, of the smaller picture.
+    fn image<P: Copy + Send + Sync>(
+        &self,
+        pixel: impl Fn(usize, usize, Option<(usize, usize)>) -> P + Sync,
+    ) -> Image<P> {
+        let [w, h] = self.from;
+        Image::from_fn(w, h, |x, y| pixel(x, y, self.at(x, y)))
     }
 
     /// The pixel of the smaller picture at a pixel of the frame; nothing beside it.

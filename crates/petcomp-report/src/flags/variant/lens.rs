@@ -32,14 +32,16 @@ fn nearest_pixel(offset: f64) -> isize {
 
 /// A lens that makes a disc of every point.
 pub(super) fn defocused(photo: &Image<LinearRgb>, radius_px: isize) -> Image<LinearRgb> {
-    let side = -radius_px..=radius_px;
-    let square = side
-        .clone()
-        .flat_map(|dx| side.clone().map(move |dy| (dx, dy)));
-    let disc: Vec<_> = square
+    let disc: Vec<_> = square_offsets(radius_px)
         .filter(|(dx, dy)| dx * dx + dy * dy <= radius_px * radius_px)
         .collect();
     mean_of_shifts(photo, &disc)
+}
+
+fn square_offsets(radius_px: isize) -> impl Iterator<Item = (isize, isize)> {
+    let side = -radius_px..=radius_px;
+    side.clone()
+        .flat_map(move |dx| side.clone().map(move |dy| (dx, dy)))
 }
 
 /// A lens that darkens the corners by a share.

@@ -14,22 +14,31 @@ pub(super) fn on_screen(
 ) -> Image<LinearRgb> {
     let (w, h) = known.photo.size();
     Image::from_fn(w, h, |x, y| {
-        let at = (x, y);
-        let (photo, screen) = (known.photo[at], known.screen[at]);
-        if known.mask[at].0 == 0.0 {
-            // Beside the object all is screen, shadow and noise.
-            other(screen).scale(light_on_screen(photo, screen))
-        } else {
-            photo + known.transmittance[at] * (other(screen) + screen.scale(-1.0))
-        }
+        let screen = other(known.screen[(x, y)]);
+        pixel_on_screen(known, (x, y), screen)
     })
 }
 
-/// How bright a photo of a screen is, in the channel of the screen's colour: the larger of green and blue, or green.
+fn pixel_on_screen(known: &Known, at: (usize, usize), other: LinearRgb) -> LinearRgb {
+    let (photo, screen) = (known.photo[at], known.screen[at]);
+    if known.mask[at].0 == 0.0 {
+        // Beside the object all is screen, shadow and noise.
+        other.scale(light_on_screen(photo, screen))
+    } else {
+        photo + known.transmittance[at] * (other + screen.scale(-1.0))
+    }
+}
+
+/// How bright a photo of a screen is, in the channel of the screen's colour.
 fn light_on_screen(photo: LinearRgb, screen: LinearRgb) -> f32 {
     let [photo, screen]: [[f32; 3]; 2] = [photo.into(), screen.into()];
-    let key = (1..3).fold(0, |best, c| if screen[c] > screen[best] { c } else { best });
+    let key = largest_channel(screen);
     photo[key] / screen[key].max(f32::MIN_POSITIVE)
+}
+
+/// The first of the largest channels.
+fn largest_channel(color: [f32; 3]) -> usize {
+    (1..3).fold(0, |best, c| if color[c] > color[best] { c } else { best })
 }
 
 /// A transmittance below this is opaque.
