@@ -32,7 +32,7 @@ pub struct Built {
 /// left out and reported in [`Built::refused`].
 ///
 /// `progress` is called with the photos done and their number, at the start and after each photo, from several threads.
-/// What the folder already had stays; a photo that is there already is replaced. The manifest is written last and does not
+/// What the folder already had stays; a photo that it already has is replaced. The manifest is written last and does not
 /// depend on threads.
 ///
 /// # Errors
@@ -72,7 +72,7 @@ impl Built {
     }
 }
 
-/// A list from a file, whose classes the manifest takes in; its paths are made relative to the working folder.
+/// A list from a file, whose classes are added to the manifest; its paths are made relative to the working folder.
 fn checked(list: List, path: &Path, manifest: &mut Manifest) -> Result<List> {
     list.check(manifest).map_err(|e| e.in_file(path))?;
     Ok(list.located_in(path.parent().unwrap_or(Path::new(""))))

@@ -94,7 +94,7 @@ impl Library {
     }
 }
 
-/// The photos of a manifest in its order: those that are there, and the others from their files.
+/// The photos of a manifest in its order: those just added, and the others from their files.
 fn load_all(folder: &Path, manifest: &Manifest, added: &[Photo]) -> Vec<Result<Photo>> {
     let records: Vec<(String, &PhotoRecord)> = places_and_records(manifest).collect();
     records

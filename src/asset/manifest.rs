@@ -58,7 +58,7 @@ pub struct PhotoRecord {
     /// Standard error of these, metres: of the outline, and of the scale where a screen or marker gives it.
     #[serde(default)]
     pub error_m: f64,
-    /// Length and width of the convex hull, which older manifests hold and nobody reads.
+    /// Length and width of the convex hull, which older manifests hold; ignored.
     #[serde(default, rename = "hull_m", skip_serializing)]
     pub(super) _hull_m: IgnoredKey,
     /// Colour of the screen, scene-linear.
@@ -192,10 +192,10 @@ impl Manifest {
     }
 
     /// Takes classes into the list: those that are declared, in that order, or else those in use, behind the ones that are
-    /// there, in the order in which they appear. No class that is there changes its number.
+    /// there, in the order in which they appear. No existing class changes its number.
     ///
     /// # Errors
-    /// [`Error::Value`] (`classes`) for declared ones that do not begin with those that are there.
+    /// [`Error::Value`] (`classes`) for declared ones that do not begin with the existing ones.
     pub(super) fn add_classes<'a>(
         &mut self,
         declared: &[String],
@@ -211,7 +211,7 @@ impl Manifest {
         Ok(())
     }
 
-    /// Fails where declared classes do not begin with those that are there.
+    /// Fails where declared classes do not begin with the existing ones.
     fn check_order(&self, declared: &[String]) -> Result<()> {
         if declared.starts_with(&self.classes) {
             return Ok(());

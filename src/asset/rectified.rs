@@ -64,7 +64,7 @@ impl RectifiedPhoto {
         Self::through(TopView::of_screen(pose, height), photo)
     }
 
-    /// The photo without its markers, whose black squares have sides of so many metres; the largest shows the plane.
+    /// The photo without its markers, whose black squares have this `side`, metres; the largest shows the plane.
     pub(super) fn by_marker(
         photo: Image<LinearRgb>,
         side: f64,

@@ -98,7 +98,7 @@ impl ReferenceRectangle {
         better_first(as_given, swapped)
     }
 
-    /// The camera that sees the reference, were its sides of so many metres.
+    /// The camera that sees the reference, if its sides had this `size`, metres.
     fn solved(&self, size: [f64; 2], image: [u32; 2], header: &Header) -> Result<Solution> {
         let mut label = Label::new(image, self.corners_px.map(Into::into), size);
         label.surface.corner_sigma_px = Some(self.sigma_px);

@@ -277,7 +277,7 @@ impl SpringGeometry {
     }
 }
 
-/// Place in an order of each of so many bodies.
+/// Place in `order` of each of `count` bodies.
 fn slots_of(order: &[usize], count: usize) -> Vec<Option<usize>> {
     let mut slots = vec![None; count];
     for (slot, &i) in order.iter().enumerate() {

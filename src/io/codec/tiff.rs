@@ -159,7 +159,7 @@ fn first_tags(file: &mut (impl Read + Seek)) -> std::io::Result<Vec<u16>> {
         .collect()
 }
 
-/// The number of an entry of so many bytes, which is passed over.
+/// The tag of an entry of this many bytes; the file is then behind the entry.
 fn read_tag(file: &mut (impl Read + Seek), bytes: i64, little: bool) -> std::io::Result<u16> {
     let tag = read_integer(file, 2, little)? as u16;
     file.seek_relative(bytes - 2)?;

@@ -57,7 +57,7 @@ pub(super) struct Greeting {
     pub(super) missing: Vec<String>,
 }
 
-/// The first line of a request; so many bytes follow.
+/// The first line of a request; `bytes` bytes follow.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct RequestHead {
     pub(super) format: String,

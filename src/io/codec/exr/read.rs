@@ -363,7 +363,7 @@ fn choose_channels(wanted: Wanted, names: &[String]) -> Result<Choice, String> {
     }
 }
 
-/// Luminance, its differences, and alpha where it is there.
+/// Luminance, its differences, and alpha if present.
 fn luminance_chroma(names: &[String]) -> Option<Vec<usize>> {
     let [y, ry, by] = LUMINANCE_CHROMA.map(|name| index_of(names, name));
     let alpha = index_of(names, "A");
