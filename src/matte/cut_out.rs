@@ -92,9 +92,12 @@ pub fn cut_out_on(
     watch.lap("cut");
     let matted = Matted::new(&prepared, &screen, &region, opts)?;
     watch.lap("matte");
-    let diagnostics = diagnostics(photo, &segmentation, &matted, opts);
-    let trim = region.trim(opts.longest_side);
-    let cut = trim.cut_out(matted, segmentation, &screen, diagnostics);
+    let cut = CutOut {
+        diagnostics: diagnostics(photo, &segmentation, &matted, opts),
+        ..region
+            .trim(opts.longest_side)
+            .cut_out(matted, segmentation, &screen)
+    };
     watch.lap("trim");
     watch.log("cut out");
     Ok(cut)
@@ -205,14 +208,8 @@ struct Trim {
 }
 
 impl Trim {
-    /// The matte of the region, trimmed.
-    fn cut_out(
-        &self,
-        matted: Matted,
-        found: Segmentation,
-        screen: &CleanScreen,
-        diagnostics: Vec<Diagnostic>,
-    ) -> CutOut {
+    /// The matte of the region, trimmed; without diagnostics.
+    fn cut_out(&self, matted: Matted, found: Segmentation, screen: &CleanScreen) -> CutOut {
         CutOut {
             film: self.cropped(&matted.film),
             transmittance: self.cropped(&matted.transmittance),
@@ -226,7 +223,7 @@ impl Trim {
             method: matted.method,
             residual_matte: matted.residual_matte,
             color_uncertainty: matted.color_uncertainty,
-            diagnostics,
+            diagnostics: Vec::new(),
             segmentation: found,
         }
     }
