@@ -32,7 +32,7 @@ pub struct Built {
 /// left out and reported in [`Built::refused`].
 ///
 /// `progress` is called with the photos done and their number, at the start and after each photo, from several threads.
-/// What the folder already had stays; a photo that is there already is replaced. The manifest is written last and does not
+/// What the folder already had stays; a photo that it already has is replaced. The manifest is written last and does not
 /// depend on threads.
 ///
 /// # Errors
@@ -72,7 +72,7 @@ impl Built {
     }
 }
 
-/// A list from a file, whose classes the manifest takes in; its paths are made relative to the working folder.
+/// A list from a file, whose classes are added to the manifest; its paths are made relative to the working folder.
 fn checked(list: List, path: &Path, manifest: &mut Manifest) -> Result<List> {
     list.check(manifest).map_err(|e| e.in_file(path))?;
     Ok(list.located_in(path.parent().unwrap_or(Path::new(""))))
@@ -173,7 +173,7 @@ mod tests {
         Ok(read)
     }
 
-    /// All that tells two libraries apart.
+    /// All that distinguishes two libraries.
     fn in_brief(library: &Library) -> Vec<(String, PhotoRecord, u32, Vec<Point2<f64>>)> {
         let photos = library
             .assets
@@ -213,7 +213,7 @@ mod tests {
             panic!("one asset")
         };
         assert_eq!((asset.class.as_str(), asset.photos.len()), ("cap", 2));
-        // An edge is told to a pixel, so a length to two: 60 px are 0.3 m to within 1 in 30.
+        // An edge is known to a pixel, so a length to two: 60 px are 0.3 m to within 1 in 30.
         assert!((asset.photos[0].record.px_per_metre / 200.0 - 1.0).abs() < 1.0 / 30.0);
         assert!((asset.photos[1].record.object_m[0] - 0.6).abs() <= 0.02);
         assert!((asset.photos[1].record.object_m[1] - 0.3).abs() <= 0.02);
@@ -237,7 +237,7 @@ mod tests {
 
     #[test]
     fn mistakes_in_a_list_are_named_before_any_work() {
-        let said = |list: &str| {
+        let printed = |list: &str| {
             let folder = folder_with(list);
             let error = build(
                 folder.path().join("photos.toml"),
@@ -250,20 +250,21 @@ mod tests {
         };
         let declared = |classes: &str| format!("classes = {classes}\n{TWO}");
         assert!(
-            said(&declared("[\"cup\"]")).contains("photos[0].class: \"cap\", expected one of cup")
+            printed(&declared("[\"cup\"]"))
+                .contains("photos[0].class: \"cap\", expected one of cup")
         );
         assert!(
-            said(&declared("[\"cap\", \"cap\"]")).contains("classes[1]: \"cap\" is there twice")
+            printed(&declared("[\"cap\", \"cap\"]")).contains("classes[1]: \"cap\" is there twice")
         );
-        assert!(said(&TWO.replace("length = 0.3", "")).contains(
+        assert!(printed(&TWO.replace("length = 0.3", "")).contains(
             "photos[0].length: missing, expected length, px_per_metre, screen_size or marker_size"
         ));
         assert!(
-            said(&TWO.replace("length = 0.3", "length = -1.0")).contains("photos[0].length: -1")
+            printed(&TWO.replace("length = 0.3", "length = -1.0")).contains("photos[0].length: -1")
         );
-        assert!(said(&TWO.replace("two.png", "one.png")).contains("photos[1].file"));
-        assert!(said(&TWO.replace("\"a\"", "\"../a\"")).contains("photos[0].asset"));
-        assert!(said("photos = []\n").contains("photos: empty"));
+        assert!(printed(&TWO.replace("two.png", "one.png")).contains("photos[1].file"));
+        assert!(printed(&TWO.replace("\"a\"", "\"../a\"")).contains("photos[0].asset"));
+        assert!(printed("photos = []\n").contains("photos: empty"));
     }
 
     #[test]
@@ -282,12 +283,12 @@ mod tests {
             2
         );
         std::fs::write(folder.path().join("photos.csv"), "file,asset\none.png,a\n").unwrap();
-        let told = List::read(folder.path().join("photos.csv"))
+        let reported = List::read(folder.path().join("photos.csv"))
             .unwrap_err()
             .to_string();
         assert!(
-            told.ends_with("photos.csv: line 2: missing key \"class\""),
-            "{told}"
+            reported.ends_with("photos.csv: line 2: missing key \"class\""),
+            "{reported}"
         );
     }
 
@@ -318,22 +319,23 @@ mod tests {
 
     #[test]
     fn sizes_in_another_unit_are_asked_about_where_they_are_given() {
-        let told = |from: &str, to: &str| built(&TWO.replace(from, to)).unwrap_err().to_string();
-        let length = told("length = 0.3", "length = 229");
+        let reported =
+            |from: &str, to: &str| built(&TWO.replace(from, to)).unwrap_err().to_string();
+        let length = reported("length = 0.3", "length = 229");
         let expected =
             "expected 0.005 to 5 m (objects are 5 mm to 5 m long); is it in millimetres?";
         assert!(
             length.ends_with(&format!("photos.toml: photos[0].length: 229, {expected}")),
             "{length}"
         );
-        assert!(told("length = 0.3", "length = 22.9").ends_with("is it in centimetres?"));
-        let scale = told("px_per_metre = 100.0", "px_per_metre = 1e308");
+        assert!(reported("length = 0.3", "length = 22.9").ends_with("is it in centimetres?"));
+        let scale = reported("px_per_metre = 100.0", "px_per_metre = 1e308");
         assert!(
             scale
                 .ends_with("photos[1].px_per_metre: 1e308, expected 1 to 1e7 (pixels for a metre)"),
             "{scale}"
         );
-        let scale = told("px_per_metre = 100.0", "px_per_metre = 2.0");
+        let scale = reported("px_per_metre = 100.0", "px_per_metre = 2.0");
         assert!(
             scale.contains("photos.toml: photos[1].px_per_metre: 2, makes what is in two.png 30"),
             "{scale}"
@@ -343,11 +345,11 @@ mod tests {
             "{scale}"
         );
         assert!(
-            told("length = 0.3", "length = 0.3\nthickness = 5")
+            reported("length = 0.3", "length = 0.3\nthickness = 5")
                 .contains("photos[0].thickness: 5, expected")
         );
         assert!(
-            told("length = 0.3", "length = 0.3\nmass = 1e300")
+            reported("length = 0.3", "length = 0.3\nmass = 1e300")
                 .contains("photos[0].mass: 1e300, expected")
         );
     }

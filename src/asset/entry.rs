@@ -117,7 +117,7 @@ impl PhotoEntry {
         }
     }
 
-    /// Fails on a field that says nothing without another one.
+    /// Fails on a field that is meaningless without another one.
     fn check_companions(&self) -> Result<()> {
         if self.screen_corners.is_some() && self.screen_size.is_none() {
             let what = "missing, expected it beside screen_corners";
@@ -221,10 +221,10 @@ mod tests {
         );
         assert_eq!(scale("marker_size = 0.05"), Ok(Scale::Marker(0.05)));
         let corners = [[1.0, 1.0], [9.0, 1.0], [9.0, 6.0], [1.0, 6.0]];
-        let told = scale(&format!(
+        let reported = scale(&format!(
             "screen_size = [0.6, 0.4]\nscreen_corners = {corners:?}"
         ));
-        assert_eq!(told, Ok(Scale::Screen([0.6, 0.4], Some(corners))));
+        assert_eq!(reported, Ok(Scale::Screen([0.6, 0.4], Some(corners))));
         let missing = "length: missing, expected length, px_per_metre, screen_size or marker_size";
         assert_eq!(scale("").unwrap_err(), missing);
         assert!(

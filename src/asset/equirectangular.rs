@@ -51,7 +51,7 @@ fn rows_around(v: f64, height: usize) -> (usize, usize, f32) {
     (top, (top + 1).min(height - 1), (y - floor) as f32)
 }
 
-/// A column of a picture that goes on at its other side.
+/// A column of a picture that wraps around.
 #[inline]
 fn wrapped_column(i: f64, width: usize) -> usize {
     i.rem_euclid(width as f64) as usize % width

@@ -163,7 +163,7 @@ fn to_review(cut: &CutOut) -> impl Iterator<Item = Diagnostic> {
     cut.diagnostics.iter().filter(|d| d.needs_review()).cloned()
 }
 
-/// What the manifest says of a cut-out.
+/// The entry of a cut-out in the manifest.
 ///
 /// # Errors
 /// [`Error::Value`] for a scale that makes the object too short or too long.
@@ -181,7 +181,7 @@ fn new_record(cut: &CutOut, entry: &PhotoEntry, photo: &RectifiedPhoto) -> Resul
     })
 }
 
-/// What its matte says of a cut-out, in a file and of a scale.
+/// The fields of an entry that follow from the matte, for a cut-out in a file and of a scale.
 fn matte_record(cut: &CutOut, file: String, px_per_metre: f64) -> PhotoRecord {
     let (w, h) = cut.film.size();
     let size_m = [w as f64, h as f64].map(|px| px / px_per_metre);

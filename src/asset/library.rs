@@ -28,7 +28,7 @@ pub struct Photo {
     pub texture: Texture,
     /// The object's convex hull in texture coordinates (0 to 1, right and down), in order.
     pub outline_uv: Arc<[Point2<f64>]>,
-    /// What the manifest says of it.
+    /// Its entry in the manifest.
     pub record: PhotoRecord,
 }
 
@@ -38,12 +38,12 @@ impl Library {
     /// # Errors
     /// Those of [`Manifest::read`]; [`Error::File`] for a cut-out that cannot be read or holds values that no
     /// picture has; [`Error::Field`] (`size_m`) for
-    /// one of another size than the manifest says. Of several the first in the manifest's order.
+    /// one of another size than in the manifest. Of several the first in the manifest's order.
     pub fn open(folder: impl AsRef<Path>) -> Result<Self> {
         Self::open_some(folder, |_| true)
     }
 
-    /// The same with no other assets than those whose names are wanted; what the manifest says of others is checked still.
+    /// The same with only the assets whose names are wanted; the entries of the others are checked, too.
     ///
     /// # Errors
     /// As [`open`](Self::open).
@@ -94,7 +94,7 @@ impl Library {
     }
 }
 
-/// The photos of a manifest in its order: those that are there, and the others from their files.
+/// The photos of a manifest in its order: those just added, and the others from their files.
 fn load_all(folder: &Path, manifest: &Manifest, added: &[Photo]) -> Vec<Result<Photo>> {
     let records: Vec<(String, &PhotoRecord)> = places_and_records(manifest).collect();
     records
@@ -106,7 +106,7 @@ fn load_all(folder: &Path, manifest: &Manifest, added: &[Photo]) -> Vec<Result<P
         .collect()
 }
 
-/// All photos of a manifest, with where they stand in it.
+/// All photos of a manifest, with their places in it.
 fn places_and_records(manifest: &Manifest) -> impl Iterator<Item = (String, &PhotoRecord)> {
     manifest.assets.iter().enumerate().flat_map(|(i, asset)| {
         let photos = asset.photos.iter().enumerate();
@@ -160,7 +160,7 @@ fn unsound_pixel(film: &Film, (x, y): (usize, usize)) -> String {
 }
 
 impl Photo {
-    /// A cut-out and what the manifest says of it.
+    /// A cut-out and its entry in the manifest.
     pub fn new(cut_out: impl Into<Texture>, record: PhotoRecord) -> Self {
         let texture = cut_out.into();
         let (w, h) = texture.size();
@@ -249,16 +249,16 @@ mod tests {
 
     #[test]
     fn a_missing_or_wrong_cut_out_is_named() {
-        let said = Library::open(folder_with(None).path())
+        let printed = Library::open(folder_with(None).path())
             .unwrap_err()
             .to_string();
-        assert!(said.contains("a.exr"), "{said}");
-        let said = Library::open(folder_with(Some((40, 22))).path())
+        assert!(printed.contains("a.exr"), "{printed}");
+        let printed = Library::open(folder_with(Some((40, 22))).path())
             .unwrap_err()
             .to_string();
         assert!(
-            said.contains("assets[0].photos[0].size_m") && said.contains("40 x 22"),
-            "{said}"
+            printed.contains("assets[0].photos[0].size_m") && printed.contains("40 x 22"),
+            "{printed}"
         );
     }
 

@@ -56,7 +56,7 @@ impl List {
         })
     }
 
-    /// Checks the list against the manifest of the folder that it is for, which takes in its classes.
+    /// Checks the list against the manifest of the folder that it is for, and adds its classes to it.
     ///
     /// # Errors
     /// [`Error::Value`] for the first value that cannot be right, naming the entry.

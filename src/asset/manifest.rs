@@ -58,7 +58,7 @@ pub struct PhotoRecord {
     /// Standard error of these, metres: of the outline, and of the scale where a screen or marker gives it.
     #[serde(default)]
     pub error_m: f64,
-    /// Length and width of the convex hull, which older manifests hold and nobody reads.
+    /// Length and width of the convex hull, which older manifests hold; ignored.
     #[serde(default, rename = "hull_m", skip_serializing)]
     pub(super) _hull_m: IgnoredKey,
     /// Colour of the screen, scene-linear.
@@ -192,10 +192,10 @@ impl Manifest {
     }
 
     /// Takes classes into the list: those that are declared, in that order, or else those in use, behind the ones that are
-    /// there, in the order in which they appear. No class that is there changes its number.
+    /// there, in the order in which they appear. No existing class changes its number.
     ///
     /// # Errors
-    /// [`Error::Value`] (`classes`) for declared ones that do not begin with those that are there.
+    /// [`Error::Value`] (`classes`) for declared ones that do not begin with the existing ones.
     pub(super) fn add_classes<'a>(
         &mut self,
         declared: &[String],
@@ -211,7 +211,7 @@ impl Manifest {
         Ok(())
     }
 
-    /// Fails where declared classes do not begin with those that are there.
+    /// Fails where declared classes do not begin with the existing ones.
     fn check_order(&self, declared: &[String]) -> Result<()> {
         if declared.starts_with(&self.classes) {
             return Ok(());
@@ -517,10 +517,10 @@ pub(super) mod tests {
             text.replace("color_confidence = 0.8", "color_confidence = 1.5"),
         )
         .unwrap();
-        let told = Manifest::read(folder.path()).unwrap_err().to_string();
+        let reported = Manifest::read(folder.path()).unwrap_err().to_string();
         assert!(
-            told.contains("assets[0].photos[0].color_confidence: 1.5, expected 0 to 1"),
-            "{told}"
+            reported.contains("assets[0].photos[0].color_confidence: 1.5, expected 0 to 1"),
+            "{reported}"
         );
     }
 
@@ -571,9 +571,9 @@ pub(super) mod tests {
             learned(&["bag"], &["bag", "can", "jar"], &["can"]).unwrap(),
             ["bag", "can", "jar"]
         );
-        let told = learned(&["bag"], &["can", "bag"], &[]).unwrap_err();
+        let reported = learned(&["bag"], &["can", "bag"], &[]).unwrap_err();
         assert_eq!(
-            told,
+            reported,
             "classes: can, bag; expected to begin with those that the folder has: bag"
         );
         assert!(
@@ -609,29 +609,32 @@ pub(super) mod tests {
             spoil(&mut manifest);
             manifest.check().unwrap_err().to_string()
         };
-        let said = message(|m| m.assets[1].class = "cpa".into());
+        let printed = message(|m| m.assets[1].class = "cpa".into());
         assert_eq!(
-            said,
+            printed,
             "assets[1].class: \"cpa\", expected one of cap, label, none"
         );
         assert_eq!(
             message(|m| m.assets[1].name = "b".into()),
             "assets[1]: \"b\" is there twice"
         );
-        let said = message(|m| m.assets[0].photos[0].px_per_metre = f64::NAN);
+        let printed = message(|m| m.assets[0].photos[0].px_per_metre = f64::NAN);
         assert_eq!(
-            said,
+            printed,
             "assets[0].photos[0].px_per_metre: NaN, expected 1 to 1e7 (pixels for a metre)"
         );
-        let said = message(|m| m.assets[0].photos[0].px_per_metre = 1e308);
+        let printed = message(|m| m.assets[0].photos[0].px_per_metre = 1e308);
         assert_eq!(
-            said,
+            printed,
             "assets[0].photos[0].px_per_metre: 1e308, expected 1 to 1e7 (pixels for a metre)"
         );
-        let said = message(|m| m.assets[0].photos[0].object_m[0] = 229.0);
+        let printed = message(|m| m.assets[0].photos[0].object_m[0] = 229.0);
         let expected =
             "229, expected 0.005 to 5 m (objects are 5 mm to 5 m long); is it in millimetres?";
-        assert_eq!(said, format!("assets[0].photos[0].object_m[0]: {expected}"));
+        assert_eq!(
+            printed,
+            format!("assets[0].photos[0].object_m[0]: {expected}")
+        );
         assert!(
             message(|m| m.assets[0].photos[0].file = "../x.exr".into())
                 .contains("expected a path below")
@@ -647,8 +650,8 @@ pub(super) mod tests {
     fn an_unknown_key_is_refused_with_a_suggestion() {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join(MANIFEST), "classses = [\"a\"]\n").unwrap();
-        let said = Manifest::read(folder.path()).unwrap_err().to_string();
-        assert!(said.contains("did you mean \"classes\""), "{said}");
+        let printed = Manifest::read(folder.path()).unwrap_err().to_string();
+        assert!(printed.contains("did you mean \"classes\""), "{printed}");
     }
 
     #[test]

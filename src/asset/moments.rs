@@ -93,7 +93,7 @@ impl Moments {
     }
 }
 
-/// A panorama's light, ready to be asked for over any rectangle, and its cuts.
+/// A panorama's light, ready to be summed over any rectangle, and its cuts.
 #[derive(Debug)]
 pub(super) struct LightSums {
     /// Light above and left of each grid corner.
@@ -223,7 +223,7 @@ impl LightSums {
     }
 }
 
-/// Part `k` of `n` even ones of so many cells.
+/// The cells of part `k` of `n` even ones.
 fn even_span(k: usize, n: usize, cells: usize) -> [usize; 2] {
     [k, k + 1].map(|k| k * cells / n)
 }
@@ -260,18 +260,18 @@ fn grid_row(panorama: &Image<LinearRgb>, j: usize) -> Vec<Moments> {
     cells
 }
 
-/// Of one of so many places along a line.
+/// The solid angle of one of `places` places along a line.
 fn line_solid_angle([top, bottom]: [f64; 2], places: usize) -> f64 {
     let band = libm::cos(PI * top) - libm::cos(PI * bottom);
     band * TAU / places as f64
 }
 
-/// The place down the panorama of line `t` of so many in a row of the grid.
+/// How far down the panorama line `t` of a row of the grid lies, 0 to 1.
 fn grid_v(j: usize, t: f64, lines: usize) -> f64 {
     (j as f64 + t / lines as f64) / GRID_CELLS[1] as f64
 }
 
-/// Adds places along a line to the cells that they are in, so many to each.
+/// Adds places along a line to the cells that they are in, `per_cell` to each.
 fn add_line(
     panorama: &Image<LinearRgb>,
     v: f64,

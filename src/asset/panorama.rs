@@ -16,7 +16,7 @@ use std::sync::OnceLock;
 #[derive(Debug)]
 pub struct Panorama {
     image: Image<LinearRgb>,
-    /// Made when light is first asked for.
+    /// Made when light is first requested.
     sums: OnceLock<LightSums>,
 }
 

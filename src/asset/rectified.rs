@@ -64,7 +64,7 @@ impl RectifiedPhoto {
         Self::through(TopView::of_screen(pose, height), photo)
     }
 
-    /// The photo without its markers, whose black squares have sides of so many metres; the largest shows the plane.
+    /// The photo without its markers, whose black squares have this `side`, metres; the largest shows the plane.
     pub(super) fn by_marker(
         photo: Image<LinearRgb>,
         side: f64,
@@ -252,8 +252,8 @@ mod tests {
                     let ray = ground.camera.ray(seen(&camera, at, height));
                     ray.at((0.035 - ray.origin.z) / ray.direction.z)
                 });
-                let (off, told) = ((b - a).norm() / 0.1 - 1.0, ground.sigma(a + (b - a) / 2.0));
-                (squares, count) = (squares + (off / told) * (off / told), count + 1);
+                let (off, reported) = ((b - a).norm() / 0.1 - 1.0, ground.sigma(a + (b - a) / 2.0));
+                (squares, count) = (squares + (off / reported) * (off / reported), count + 1);
             }
         }
         let chi = (squares / f64::from(count)).sqrt();
@@ -282,11 +282,11 @@ mod tests {
     fn a_screen_of_other_proportions_is_doubted() {
         let camera = camera(0.3, 1000.0);
         let doubt = |size| {
-            let told = ReferenceRectangle {
+            let reported = ReferenceRectangle {
                 size,
                 ..reference(&camera, SCREEN, 0.2)
             };
-            let ground = ScreenPose::solve(&told, camera.image, &Header::default()).unwrap();
+            let ground = ScreenPose::solve(&reported, camera.image, &Header::default()).unwrap();
             RectifiedPhoto {
                 photo: Image::new(0, 0),
                 view: Some(TopView::of_screen(ground, 0.0)),
@@ -423,21 +423,22 @@ mod tests {
             width: 750,
             height: 750,
         };
-        let told = added(&photo.crop(part), Scale::Screen(SCREEN, None))
+        let reported = added(&photo.crop(part), Scale::Screen(SCREEN, None))
             .unwrap_err()
             .to_string();
         assert!(
-            told.contains(
+            reported.contains(
                 "a.png: the corners of the screen cannot be found: it reaches the border"
             ),
-            "{told}"
+            "{reported}"
         );
-        let told = added(&photo, Scale::Screen([0.6, 0.2], None))
+        let reported = added(&photo, Scale::Screen([0.6, 0.2], None))
             .unwrap_err()
             .to_string();
         assert!(
-            told.contains("its corners are not those of 0.6 x 0.2 m; are width and height right?"),
-            "{told}"
+            reported
+                .contains("its corners are not those of 0.6 x 0.2 m; are width and height right?"),
+            "{reported}"
         );
     }
 
@@ -450,13 +451,13 @@ mod tests {
     #[test]
     fn a_photo_without_a_marker_is_told() {
         let photo = Image::filled(120, 80, LinearRgb::new(0.04, 0.4, 0.08));
-        let told = RectifiedPhoto::by_marker(photo, 0.06, 0.0, &Header::default())
+        let reported = RectifiedPhoto::by_marker(photo, 0.06, 0.0, &Header::default())
             .err()
             .unwrap()
             .to_string();
         assert!(
-            told.contains("no marker (AprilTag tag36h11, ArUco DICT_4X4_50) was found"),
-            "{told}"
+            reported.contains("no marker (AprilTag tag36h11, ArUco DICT_4X4_50) was found"),
+            "{reported}"
         );
     }
 }

@@ -59,8 +59,7 @@ impl ScreenPose {
 
     /// Standard error of a length at a place over the screen, as a share.
     ///
-    /// An error of the corners tilts the plane that they give: its scale is off the more, the farther from them it is
-    /// asked for.
+    /// An error of the corners tilts the plane that they give: its scale is off the more, the farther a place is from them.
     pub(super) fn sigma(&self, place: Point3<f64>) -> f64 {
         let share = place.z / (self.camera.center().z - place.z);
         let of_height = share * libm::hypot(2.0 * HEIGHT_SIGMA, self.height_sigma);
@@ -99,7 +98,7 @@ impl ReferenceRectangle {
         better_first(as_given, swapped)
     }
 
-    /// The camera that sees the reference, were its sides of so many metres.
+    /// The camera that sees the reference, if its sides had this `size`, metres.
     fn solved(&self, size: [f64; 2], image: [u32; 2], header: &Header) -> Result<Solution> {
         let mut label = Label::new(image, self.corners_px.map(Into::into), size);
         label.surface.corner_sigma_px = Some(self.sigma_px);

@@ -33,7 +33,7 @@ const SEPARATORS: [u8; 3] = [b',', b';', b'\t'];
 /// The rows of a spreadsheet.
 ///
 /// # Errors
-/// [`Error::Value`] with the line: a column that no photo has, a cell that is no number, letters in an unknown code.
+/// [`Error::Value`] with the line: a column that no photo has, a cell that is not a number, letters in an unknown encoding.
 pub(super) fn rows(bytes: &[u8]) -> Result<Vec<SpreadsheetRow>> {
     // Else the reader of CSV counts lines wrongly.
     let text = decoded(bytes)?.replace("\r\n", "\n");
@@ -228,9 +228,9 @@ mod tests {
     fn a_size_is_two_numbers() {
         let rows = table("file;screen_size\na;0,60x0,40\n".as_bytes()).unwrap();
         assert_eq!(rows, ["2: file = \"a\", screen_size = [0.6, 0.4], "]);
-        let told = table("screen size\n0.6\n".as_bytes()).unwrap_err();
+        let reported = table("screen size\n0.6\n".as_bytes()).unwrap_err();
         assert_eq!(
-            told,
+            reported,
             "line 2: screen_size: \"0.6\", expected a size such as 0.60x0.40"
         );
     }
@@ -254,23 +254,28 @@ mod tests {
 
     #[test]
     fn mistakes_name_line_and_column() {
-        let told = |text: &str| table(text.as_bytes()).unwrap_err();
+        let reported = |text: &str| table(text.as_bytes()).unwrap_err();
         assert_eq!(
-            told("file,lenght\n"),
+            reported("file,lenght\n"),
             "line 1: unknown column \"lenght\", did you mean \"length\"?"
         );
         assert_eq!(
-            told("file,mass\na,b\n"),
+            reported("file,mass\na,b\n"),
             "line 2: mass: \"b\", expected a number such as 0.265"
         );
         // An English thousand, or a decimal comma?
         assert!(
-            told("file,px_per_metre\na,\"1,966\"\n").starts_with("line 2: px_per_metre: \"1,966\"")
+            reported("file,px_per_metre\na,\"1,966\"\n")
+                .starts_with("line 2: px_per_metre: \"1,966\"")
         );
         assert!(
-            told("file;px_per_metre\na;1.966,7\n").starts_with("line 2: px_per_metre: \"1.966,7\"")
+            reported("file;px_per_metre\na;1.966,7\n")
+                .starts_with("line 2: px_per_metre: \"1.966,7\"")
         );
-        assert!(told("length\nnan\n").starts_with("line 2: length: \"nan\""));
-        assert_eq!(told("file,asset\na,b\nc\n"), "line 3: 1 cells, expected 2");
+        assert!(reported("length\nnan\n").starts_with("line 2: length: \"nan\""));
+        assert_eq!(
+            reported("file,asset\na,b\nc\n"),
+            "line 3: 1 cells, expected 2"
+        );
     }
 }

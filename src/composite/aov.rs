@@ -1,6 +1,6 @@
 //! Arbitrary output variables: everything that deep samples hold besides the finished frame, as parts of an EXR file.
 //!
-//! Each is a fold of its own over the samples, done only when asked for.
+//! Each is a fold of its own over the samples, done only on request.
 
 use crate::composite::cryptomatte::cryptomatte;
 use crate::composite::part::{float_part, pixels_of};
@@ -13,7 +13,7 @@ use crate::pixel::{LinearRgb, ObjectId, PremulRgba};
 use crate::scene::Shot;
 use std::str::FromStr;
 
-/// A part of the picture that can be asked for by its name.
+/// A part of the picture that can be requested by its name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Aov {
     /// `beauty`: the finished frame, `R G B A`, scene-linear, premultiplied.
@@ -72,7 +72,7 @@ pub fn front(samples: &[DeepSample]) -> Option<&DeepSample> {
     samples.iter().find(|s| s.alpha > FRONT_ALPHA)
 }
 
-/// The parts asked for, in that order, of one size.
+/// The requested parts, in that order, of one size.
 ///
 /// `frame` is the finished frame of the same samples, `shot` what they were rendered from: position and texture
 /// coordinates are those at the pixel's centre, as depth is.

@@ -27,7 +27,7 @@ pub struct Header {
     pub data_at: [i64; 2],
     /// Columns and rows that are stored: those of the picture, but for EXR, whose data window may be any other.
     pub data_size: [usize; 2],
-    /// Names of the channels, `R G B A` first where they are there.
+    /// Names of the channels, `R G B A` first if present.
     pub channels: Vec<String>,
     /// Bits of a sample: 8 and 16 are display-encoded integers (16 in an EXR: half floats), 32 is float.
     pub bits: u32,

@@ -40,7 +40,7 @@ pub struct Limits {
     pub memory_percent: u64,
 }
 
-/// A day: nobody waits longer for a picture.
+/// A day: longer than anybody waits for a picture.
 const MAX_SECONDS: u64 = 86_400;
 /// Levels that the readers of TOML and JSON follow by themselves.
 const MAX_DOCUMENT_DEPTH: u64 = 80;
@@ -49,7 +49,7 @@ const MAX_LIMIT: u64 = 1 << 53;
 /// Percent of the memory: all there is, and more.
 const MAX_MEMORY_PERCENT: u64 = 10_000;
 
-/// What a pixel takes in each channel that is used, at the worst: three floats.
+/// Most bytes that a pixel takes in each channel in use: three floats.
 const BYTES_PER_SAMPLE: u64 = 12;
 
 /// Below this many decoded bytes no ratio is suspicious: a plain white picture compresses very well.

@@ -1,6 +1,6 @@
 //! Input and output: the only place that opens pictures, and the only one that calls C++.
 //!
-//! A picture is read by its content, not by its name, and becomes the pixel type that the caller asks for:
+//! A picture is read by its content, not by its name, and becomes the pixel type that the caller requests:
 //!
 //! ```
 //! use petcomp::{Image, LinearRgb, io};
@@ -24,10 +24,10 @@
 //! codes; others are named in a warning and the codes treated as sRGB. Inks (CMYK) are multiplied. Samples that are infinite or
 //! NaN are counted in a warning, and become codes of 0 or full scale where integers are written.
 //!
-//! # What holds for files from anywhere
+//! # What holds for untrusted files
 //!
-//! No file that is given to petcomp crashes it, hangs it, exhausts the machine's memory or gets out of its folder; what can
-//! be read is read correctly, what cannot is named in one line.
+//! No file crashes petcomp, hangs it, exhausts the machine's memory or leads out of its folder; what can be read is read
+//! correctly, what cannot is named in one line.
 //!
 //! * **What is opened.** Regular files only, by content and not by name: EXR, PNG, JPEG, TIFF, Radiance HDR; DPX and Cineon
 //!   only under their own names.
@@ -36,9 +36,9 @@
 //!   is not pixels. Memory that the system does not give is not attempted.
 //! * **Who decodes.** Decoders in Rust, in this process; one that panics has met a damaged file. What they do not know goes
 //!   to OpenImageIO in a worker process, which gets the file's bytes and gives samples through pipes. It may open no file
-//!   (Landlock, seccomp, file size 0), start nothing, connect nowhere, has memory for the file in hand, and is killed when it takes more
-//!   than [`Limits::seconds`]. A file on which two workers die is named with the signal. The worker is not trusted either.
-//! * **What is written** stands beside its place first, is put on the disk, and is moved there: whole or not at all. A link in
+//!   (Landlock, seccomp, file size 0), start nothing, connect nowhere, has memory for the current file only, and is killed when it takes
+//!   more than [`Limits::seconds`]. A file on which two workers die is named with the signal. The worker is not trusted either.
+//! * **What is written** goes to a temporary file beside its place, is synced, and moved there: whole or not at all. A link in
 //!   its place is replaced, not followed; `refuse_links` keeps outputs in their folder. No metadata of an input
 //!   gets into an output, so neither positions (GPS) nor serial numbers do.
 //! * **Where a document leads.** A path in a document that may come from anywhere (journal and manifest of a dataset or an
@@ -47,11 +47,11 @@
 //!   elsewhere on purpose: recipes (`assets`, `backgrounds`, `environment.files`), lists of photos, `data.yaml` and the lists it names.
 //!   What they name must be regular files within the limits too. Files that petcomp appends to (`.lock`, `index.jsonl`,
 //!   `.runs.jsonl`) are refused where a link is in their place.
-//! * **Documents** (JSON, TOML) are at most 64 MiB and nested 80 to 128 deep, without duplicate keys or numbers that are not finite;
-//!   a mistake is named with its line.
+//! * **Documents** (JSON, TOML) are by default at most 16 MiB and nested 64 deep, without duplicate keys or numbers that are not
+//!   finite; a mistake is named with its line.
 //!
-//! Not guaranteed: that decoders have no mistakes ([`oiio::read`] and [`Fallback::InProcess`] let OpenImageIO's into this process,
-//! and Debian does not repair them), that a kernel without Landlock or seccomp has an equal sandbox (one warning reports it;
+//! Not guaranteed: that decoders have no bugs ([`oiio::read`] and [`Fallback::InProcess`] let OpenImageIO's into this process,
+//! and Debian does not fix them), that a kernel without Landlock or seccomp has an equal sandbox (one warning reports it;
 //! [`Fallback::StrictWorker`] refuses), that the stages behind reading fit into any memory, or anything against a person with an account on the machine. Half-grey
 //! pictures out of JPEGs that are damaged in the middle, with their end in place, cannot be distinguished from real ones.
 

@@ -68,14 +68,14 @@ fn encode<P: ToFile>(
     openimageio::write_file(name, format, &layout, &samples, &options.metadata)
 }
 
-/// As asked, or the format's own; film scans have 16 bits.
+/// As requested, or the format's own; film scans have 16 bits.
 fn written_bits<P: ToFile>(
     format: Format,
-    asked: Option<Bits>,
+    requested: Option<Bits>,
 ) -> std::result::Result<Bits, String> {
     match format {
-        Format::Dpx | Format::Cineon => Ok(asked.unwrap_or(Bits::Sixteen)),
-        _ => sample_storage::<P>(Some(format), asked),
+        Format::Dpx | Format::Cineon => Ok(requested.unwrap_or(Bits::Sixteen)),
+        _ => sample_storage::<P>(Some(format), requested),
     }
 }
 

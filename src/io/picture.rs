@@ -1,4 +1,4 @@
-//! A decoded picture whose pixels are made when they are asked for.
+//! A decoded picture whose pixels are made on request.
 
 use super::codec::channels::{ChannelMatch, Wanted};
 use super::codec::profile::{ColorDescription, DisplayProfile};
@@ -87,9 +87,9 @@ impl Picture {
     /// The colours of some rows, as [`read`](super::read) makes them; of `LinearRgb`, without a look at alpha.
     ///
     /// # Panics
-    /// When the rows reach outside the picture, or the pixels asked for are no colours.
+    /// When the rows reach outside the picture, or the requested pixels are not colours.
     pub fn rows<P: FromFile>(&self, rows: Range<usize>) -> Image<P> {
-        assert_eq!(P::WANTED, Wanted::Color, "pixels that are no colours");
+        assert_eq!(P::WANTED, Wanted::Color, "pixels that are not colours");
         self.raster
             .pixels(self.profile.as_ref(), rows)
             .expect("colours were found when the picture was read")
@@ -98,10 +98,10 @@ impl Picture {
     /// All colours, as [`read`](super::read) makes them.
     ///
     /// # Errors
-    /// [`Error::File`] for a picture with alpha below 1 where `LinearRgb` is asked for.
+    /// [`Error::File`] for a picture with alpha below 1 where `LinearRgb` is requested.
     ///
     /// # Panics
-    /// When the pixels asked for are no colours.
+    /// When the requested pixels are not colours.
     pub fn pixels<P: FromFile>(&self) -> Result<Image<P>> {
         let rows = 0..self.raster.height;
         let whole = self.raster.rows(self.profile.as_ref(), rows.clone());

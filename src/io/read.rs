@@ -16,7 +16,7 @@ use crate::error::{Error, Result};
 use crate::image::Image;
 use std::path::Path;
 
-/// Reads a picture as the pixels asked for, with the default [`ReadOptions`].
+/// Reads a picture as pixels of the requested type, with the default [`ReadOptions`].
 ///
 /// `LinearRgb` wants an opaque picture: one with alpha below 1 is refused, an alpha of 1 is dropped. `PremulRgba` and
 /// `StraightRgba` get alpha 1 from a file without alpha. `Coverage` is the only channel of a file, or `R`, `G` and `B` where
@@ -24,7 +24,7 @@ use std::path::Path;
 ///
 /// # Errors
 /// [`Error::File`] for a file that is missing, not regular, not a picture, damaged, beyond the limits, or without the
-/// channels asked for.
+/// required channels.
 pub fn read<P: FromFile>(path: impl AsRef<Path>) -> Result<Image<P>> {
     read_with(path, &ReadOptions::default())
 }

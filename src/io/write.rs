@@ -121,13 +121,13 @@ fn check_not_empty((width, height): (usize, usize)) -> std::result::Result<(), S
     ))
 }
 
-/// The storage of a sample: as asked, or the format's own.
+/// The storage of a sample: as requested, or the format's own.
 pub(super) fn sample_storage<P: ToFile>(
     format: Option<Format>,
-    asked: Option<Bits>,
+    requested: Option<Bits>,
 ) -> std::result::Result<Bits, String> {
     let possible = possible_storage(format, P::CODED)?;
-    let bits = asked.unwrap_or(possible[0]);
+    let bits = requested.unwrap_or(possible[0]);
     if possible.contains(&bits) {
         return Ok(bits);
     }

@@ -1,4 +1,4 @@
-//! Directions that stand for a constant environment.
+//! Directions that represent a constant environment.
 
 use crate::geom::Vector3;
 use std::f64::consts::TAU;

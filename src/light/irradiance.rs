@@ -8,9 +8,9 @@ use crate::pixel::LinearRgb;
 use crate::scene::{AreaLight, LightShape};
 use std::f64::consts::TAU;
 
-/// Samples along each side of an ellipse where its irradiance is asked for without shadows.
+/// Samples along each side of an ellipse where its irradiance is computed without shadows.
 const ELLIPSE_SAMPLES: usize = 16;
-/// Corners of the polygon that stands for an ellipse where it is near.
+/// Corners of the polygon that replaces an ellipse at short distance.
 const ELLIPSE_CORNERS: usize = 256;
 
 /// Irradiance at `point` on a surface of unit `normal`, where nothing is in the way.

@@ -6,7 +6,7 @@ use crate::light::quadrature::gauss_legendre;
 use crate::scene::{AreaLight, LightShape};
 use std::f64::consts::TAU;
 
-/// A point of a light's face and the area it stands for.
+/// A point of a light's face and the area it represents.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Node {
     /// Where.

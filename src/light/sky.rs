@@ -6,7 +6,7 @@ use crate::pixel::LinearRgb;
 use crate::scene::{EnvironmentMap, turned};
 use crate::work::{self, Kind};
 
-/// A direction that stands for a piece of the sky.
+/// A direction that represents a piece of the sky.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SkyPiece {
     /// Unit vector towards the middle of the piece's light.

@@ -28,7 +28,7 @@ pub struct Cryptomatte {
 }
 
 impl Cryptomatte {
-    /// The layer of the objects in a picture; `names` says how each is called, and objects without a name are left out.
+    /// The layer of the objects in a picture; `names` holds their names, and objects without one are left out.
     ///
     /// Coverage is what is seen of an object. Where more than six objects share a pixel, those with least are left out.
     pub fn new(deep: &DeepImage, layer: &str, names: &[(ObjectId, String)]) -> Self {

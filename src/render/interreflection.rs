@@ -20,7 +20,7 @@ const GRID_STEP_M: f64 = 0.002;
 /// Most steps along a side; longer ones for larger scenes.
 const MAX_GRID_STEPS: f64 = 1024.0;
 
-/// A white surface under a white card would glow for ever.
+/// A white surface under a white card would glow forever.
 const MAX_BOUNCE: f32 = 0.95;
 
 /// Brightens the surface by what cards above reflect back to it; for callers who know the surface's albedo.

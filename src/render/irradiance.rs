@@ -102,10 +102,11 @@ fn map_bands<'a>(
 
 /// One row of what occluders hide of a receiver's lights.
 fn fill_hidden_row(receiver: &Receiver, j: usize, out: &mut [Float4], buffers: &mut RowBuffers) {
-    let asked = receiver.asked_nodes(j);
-    if !asked.is_empty() {
-        receiver.gather_row(j, &asked, buffers);
-        out[asked.start - receiver.columns.start..][..asked.len()].copy_from_slice(&buffers.hidden);
+    let requested = receiver.requested_nodes(j);
+    if !requested.is_empty() {
+        receiver.gather_row(j, &requested, buffers);
+        out[requested.start - receiver.columns.start..][..requested.len()]
+            .copy_from_slice(&buffers.hidden);
     }
 }
 
@@ -117,16 +118,16 @@ fn fill_combined_row(
     out: &mut [Float4],
     buffers: &mut RowBuffers,
 ) {
-    let asked = lit.fine.asked_nodes(j);
-    if asked.is_empty() {
+    let requested = lit.fine.requested_nodes(j);
+    if requested.is_empty() {
         return;
     }
-    lit.fine.gather_row(j, &asked, buffers);
-    soft.enlarge_row(j, &asked, &mut buffers.coarse);
-    let out = &mut out[asked.start - lit.fine.columns.start..][..asked.len()];
+    lit.fine.gather_row(j, &requested, buffers);
+    soft.enlarge_row(j, &requested, &mut buffers.coarse);
+    let out = &mut out[requested.start - lit.fine.columns.start..][..requested.len()];
     let sums = buffers.open.iter().zip(&buffers.hidden);
     for (i, (out, (open, hidden))) in out.iter_mut().zip(sums).enumerate() {
-        let soft = between_coarse(&buffers.coarse, asked.start, i);
+        let soft = between_coarse(&buffers.coarse, requested.start, i);
         *out = remaining(lit.relative, open, &hidden.add_scaled(1.0, soft));
     }
 }
@@ -197,9 +198,12 @@ impl IrradianceMap {
         })
     }
 
-    /// The row of this coarser map that belongs to row `j` of a finer one, at all nodes around `asked`; 0 outside.
-    fn enlarge_row(&self, j: usize, asked: &Range<usize>, out: &mut Vec<Float4>) {
-        let (first, last) = (coarser_nodes(asked.start)[0], coarser_nodes(asked.end)[1]);
+    /// The row of this coarser map that belongs to row `j` of a finer one, at all nodes around `requested`; 0 outside.
+    fn enlarge_row(&self, j: usize, requested: &Range<usize>, out: &mut Vec<Float4>) {
+        let (first, last) = (
+            coarser_nodes(requested.start)[0],
+            coarser_nodes(requested.end)[1],
+        );
         refill(out, last + 1 - first, Float4::ZERO);
         let known = range_overlap(&self.columns, &(first..last + 1));
         for row in coarser_nodes(j) {

@@ -174,7 +174,7 @@ impl Layer {
 }
 
 impl LayerStack {
-    /// Everything that is to know about a block.
+    /// Renders all of a block.
     pub(super) fn render_tile(&self, block: PixelBlock) -> RenderedTile {
         let layers: Vec<_> = (0..self.layers.len())
             .filter(|&k| self.layers[k].touches(&block))

@@ -13,7 +13,7 @@ use std::f64::consts::PI;
 pub(super) struct LightSample {
     /// Where.
     pub(super) at: Vector4<f64>,
-    /// Side of the square of light that it stands for: metres, or radians of a direction.
+    /// Side of the square of light that it represents: metres, or radians of a direction.
     pub(super) width: f64,
     /// What it does to a receiver that sees it.
     pub(super) kind: SampleKind,

@@ -18,7 +18,7 @@ use std::sync::{Arc, OnceLock};
 /// Positions in single precision are off by less than this, texels.
 const POSITION_ERROR_TEXELS: f64 = 1.0 / 8.0;
 
-/// A texture's opacity at each halving, made when first asked for; shared by the cards that show it.
+/// A texture's opacity at each halving, made on first use; shared by the cards that show it.
 #[derive(Debug)]
 pub(super) struct OpacityMips<'a> {
     texture: &'a Texture,

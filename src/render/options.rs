@@ -68,7 +68,7 @@ const AMBIENT_SAMPLES: Bounds = Bounds::new(1.0, 4096.0, "quality reference has 
 const CELL_PX: Bounds = Bounds::new(0.25, 16.0, "pixels; smaller cells resolve nothing more");
 
 impl RenderOptions {
-    /// Fails on the first number that has no use: none at all, or so many that a picture takes hours.
+    /// Fails on the first number without use: zero, or so large that a picture takes hours.
     ///
     /// # Errors
     /// [`Error::Value`](crate::Error::Value) with the option's name.

@@ -25,7 +25,7 @@ use std::ops::Range;
 #[derive(Debug)]
 pub(super) struct Receiver {
     plane: ProjectedPlane,
-    /// Nodes outside of these conditions are not asked for.
+    /// Nodes outside of these sides are not requested.
     outline: Vec<Vector3<f64>>,
     pub(super) columns: Range<usize>,
     pub(super) rows: Range<usize>,
@@ -55,7 +55,7 @@ impl RayGroup {
 pub(super) struct ReceiverIrradiance {
     pub(super) fine: Receiver,
     pub(super) coarse: Receiver,
-    /// The share of open irradiance is asked for, not irradiance itself.
+    /// The share of open irradiance is requested, not irradiance itself.
     pub(super) relative: bool,
 }
 
@@ -65,7 +65,7 @@ impl ReceiverIrradiance {
         self.fine.groups.is_empty() && self.coarse.groups.is_empty()
     }
 
-    /// The value of nodes that are not asked for.
+    /// The value of nodes that are not requested.
     pub(super) fn unlit_value(&self) -> Float4 {
         if self.relative {
             Float4::ONE
@@ -119,7 +119,7 @@ impl<'a> LightingContext<'a> {
         ))
     }
 
-    /// Card number `own`, asked for where the card is seen and a node around. None where it is not seen at all.
+    /// Card number `own`, at the nodes where the card is seen and one around. None where it is not seen at all.
     pub(super) fn card(&self, own: usize, reach: [f64; 2]) -> Option<ReceiverIrradiance> {
         let lights = self.light_samples(&self.occluders.cards[own].plane)?;
         let [faces, sky] = SelectedLights::split(&lights);
@@ -149,7 +149,7 @@ impl<'a> LightingContext<'a> {
         Some(self.receiver(projected, groups, lights, (outline, area)))
     }
 
-    /// The surface; asked for where a shadow may fall on it. None where there is no shadow, or none to be seen.
+    /// The surface, at the nodes where a shadow may fall on it. None where there is no shadow, or none to be seen.
     pub(super) fn surface(&self) -> Option<ReceiverIrradiance> {
         let lights = self.light_samples(&self.occluders.surface)?;
         let [faces, sky] = SelectedLights::split(&lights);
@@ -217,7 +217,7 @@ impl<'a> SelectedLights<'a> {
     }
 }
 
-/// Sides of a card's nodes that are asked for: two nodes further out, for the finer lattice's one that lies between them.
+/// Sides of the requested nodes of a card: two nodes further out, for the finer lattice's one that lies between them.
 fn card_outline(plane: &ProjectedPlane, reach: [f64; 2]) -> Vec<Vector3<f64>> {
     let sides = quad_sides(&plane.u, &plane.v, &plane.w, reach);
     sides.iter().map(|s| grown_side(s, 2.0)).collect()
@@ -287,20 +287,20 @@ impl RayCounts {
 }
 
 impl Receiver {
-    /// The nodes of a row that are asked for.
-    pub(super) fn asked_nodes(&self, j: usize) -> Range<usize> {
+    /// The requested nodes of a row.
+    pub(super) fn requested_nodes(&self, j: usize) -> Range<usize> {
         let (low, high) = row_span(&self.outline, j as f64);
         integer_range(low, high, &self.columns)
     }
 
-    /// Open and hidden irradiance at the asked nodes of a row: the open sky and this receiver's own lights.
-    pub(super) fn gather_row(&self, j: usize, asked: &Range<usize>, buffers: &mut RowBuffers) {
-        buffers.start_row(asked.len(), self.open_sky.into());
+    /// Open and hidden irradiance at the requested nodes of a row: the open sky and this receiver's own lights.
+    pub(super) fn gather_row(&self, j: usize, requested: &Range<usize>, buffers: &mut RowBuffers) {
+        buffers.start_row(requested.len(), self.open_sky.into());
         if self.groups.iter().any(RayGroup::has_faces) {
-            self.fill_positions(j, asked, &mut buffers.position);
+            self.fill_positions(j, requested, &mut buffers.position);
         }
         for group in &self.groups {
-            self.gather_group(group, j, asked, buffers);
+            self.gather_group(group, j, requested, buffers);
         }
         work::add_all(std::mem::take(&mut buffers.counts).into_work());
     }
@@ -320,14 +320,14 @@ impl Receiver {
         &self,
         group: &RayGroup,
         j: usize,
-        asked: &Range<usize>,
+        requested: &Range<usize>,
         buffers: &mut RowBuffers,
     ) {
-        buffers.start_group(asked.len(), group.has_faces(), self.channels);
+        buffers.start_group(requested.len(), group.has_faces(), self.channels);
         let touched = group
             .rays
             .iter()
-            .map(|ray| self.gather_ray(ray, j, asked, buffers))
+            .map(|ray| self.gather_ray(ray, j, requested, buffers))
             .reduce(range_union);
         add_open(&mut buffers.open, &buffers.group, group.radiance.into());
         if let Some(touched) = touched.filter(|t| !t.is_empty()) {
@@ -335,23 +335,23 @@ impl Receiver {
         }
     }
 
-    /// Adds up a ray; returns the nodes (counted from the first that is asked for) where something is in its way.
+    /// Adds up a ray; returns the nodes (counted from the first requested one) where something is in its way.
     fn gather_ray(
         &self,
         ray: &ShadowRay,
         j: usize,
-        asked: &Range<usize>,
+        requested: &Range<usize>,
         buffers: &mut RowBuffers,
     ) -> Range<usize> {
-        buffers.ray.resize(asked.len(), 0.0);
+        buffers.ray.resize(requested.len(), 0.0);
         // What the sky gives in the open is in `open_sky`.
         if ray.is_face() {
             buffers.add_face(ray);
         }
-        let Some(all) = buffers.touch_shadows(ray, j, asked) else {
+        let Some(all) = buffers.touch_shadows(ray, j, requested) else {
             return 0..0;
         };
-        let here = all.start - asked.start..all.end - asked.start;
+        let here = all.start - requested.start..all.end - requested.start;
         if !ray.is_face() {
             let strength = &mut buffers.ray[here.clone()];
             ray.unit_irradiance().fill([&[]; 3], strength);
@@ -365,14 +365,14 @@ impl Receiver {
     }
 
     /// World positions of a row's nodes.
-    fn fill_positions(&self, j: usize, asked: &Range<usize>, out: &mut [Vec<f32>; 3]) {
+    fn fill_positions(&self, j: usize, requested: &Range<usize>, out: &mut [Vec<f32>; 3]) {
         let plane = &self.plane;
-        let first = Vector3::new(asked.start as f64, j as f64, 1.0);
+        let first = Vector3::new(requested.start as f64, j as f64, 1.0);
         let (p, w) = (plane.point * first, plane.w.dot(&first));
         let (step, w_step) = (plane.point.column(0), plane.w.x);
         let nearest = plane.height / HORIZON_M;
         for (axis, out) in out.iter_mut().enumerate() {
-            out.resize(asked.len(), 0.0);
+            out.resize(requested.len(), 0.0);
             fill_quotients((p[axis], step[axis]), (w, w_step), nearest, out);
         }
     }
@@ -423,10 +423,14 @@ impl RowBuffers {
         &mut self,
         ray: &ShadowRay,
         j: usize,
-        asked: &Range<usize>,
+        requested: &Range<usize>,
     ) -> Option<Range<usize>> {
         self.touched.clear();
-        let nodes = ray.shadows.iter().map(|s| s.nodes(j, asked)).enumerate();
+        let nodes = ray
+            .shadows
+            .iter()
+            .map(|s| s.nodes(j, requested))
+            .enumerate();
         self.touched
             .extend(nodes.filter(|(_, nodes)| !nodes.is_empty()));
         let touched = self.touched.iter().map(|(_, nodes)| nodes.clone());

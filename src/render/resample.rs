@@ -4,7 +4,7 @@ use crate::image::Image;
 use crate::render::float4::Float4;
 use crate::render::texel_grid::BORDER_TEXELS;
 
-/// A level of detail, and how much smaller the picture is to be.
+/// A level of detail, and how much smaller the picture becomes.
 #[derive(Clone, Copy)]
 pub(super) struct DetailLevel {
     level: usize,

@@ -26,7 +26,7 @@ const PENUMBRA_BLUR_SHARE: f64 = 0.25;
 pub(super) struct ShadowedReceiver<'a> {
     /// How it lies in the lattice.
     pub(super) plane: &'a ProjectedPlane,
-    /// Where it is asked for.
+    /// The requested part of it.
     pub(super) area: &'a LatticeArea,
     /// The camera, in nodes.
     pub(super) view: &'a CameraView,
@@ -176,8 +176,8 @@ impl<'a> ShadowProjection<'a> {
     }
 
     fn misses(&self, (rows, columns): &LatticeArea) -> bool {
-        let asked = self.receiver.area;
-        let apart = !ranges_meet(rows, &asked.0) || !ranges_meet(columns, &asked.1);
+        let requested = self.receiver.area;
+        let apart = !ranges_meet(rows, &requested.0) || !ranges_meet(columns, &requested.1);
         apart || rows.len() < 2 || columns.len() < 2
     }
 

@@ -219,7 +219,7 @@ fn pass_tinted(
         }
         let texel = bilinear_texel(&texture.texels, size.0, &cells, lane);
         let opacity = film_opacity(texture, texel, &cells, lane);
-        // The fourth number says whether anything is seen at all.
+        // The fourth number is above 0 where anything is seen at all.
         let seen = lit_by(texel, irradiance.get(i)).with_fourth(texel.alpha());
         *light = light.add_product(*through, seen);
         *alpha += channel_mean(opacity.rgb());

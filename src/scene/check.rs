@@ -305,33 +305,36 @@ mod tests {
 
     #[test]
     fn a_complaint_names_the_field_the_value_and_what_was_expected() {
-        let told = complaint(|s| s.objects[1].size = [0.0, 0.1]);
+        let reported = complaint(|s| s.objects[1].size = [0.0, 0.1]);
         assert_eq!(
-            told,
+            reported,
             "objects[1].size: [0.0, 0.1], expected within 1e-9 to 1000000 (metres)"
         );
         assert_eq!(
             complaint(|s| s.image = [0, 3]),
             "image: [0, 3], expected two numbers above 0"
         );
-        let told = complaint(|s| s.image = [60_000, 40_000]);
+        let reported = complaint(|s| s.image = [60_000, 40_000]);
         assert_eq!(
-            told,
+            reported,
             "image: [60000, 40000], expected at most 16384 a side and 67108864 in all"
         );
-        let told = complaint(|s| s.objects = vec![s.objects[0].clone(); 1_001]);
-        assert_eq!(told, "objects: 1001, expected at most 1000");
-        let told = complaint(|s| s.surface.restitution = 1.5);
-        assert_eq!(told, "surface.restitution: 1.5, expected 0 to 1 (a share)");
-        let clockwise = [[0.0, 0.0], [0.0, 0.05], [0.1, 0.0]];
-        let told = complaint(|s| s.objects[0].outline = clockwise.into());
-        assert!(
-            told.starts_with("objects[0].outline: [[0.0, 0.0], "),
-            "{told}"
-        );
-        let told = complaint(|s| s.lights[0].power = f64::NAN);
+        let reported = complaint(|s| s.objects = vec![s.objects[0].clone(); 1_001]);
+        assert_eq!(reported, "objects: 1001, expected at most 1000");
+        let reported = complaint(|s| s.surface.restitution = 1.5);
         assert_eq!(
-            told,
+            reported,
+            "surface.restitution: 1.5, expected 0 to 1 (a share)"
+        );
+        let clockwise = [[0.0, 0.0], [0.0, 0.05], [0.1, 0.0]];
+        let reported = complaint(|s| s.objects[0].outline = clockwise.into());
+        assert!(
+            reported.starts_with("objects[0].outline: [[0.0, 0.0], "),
+            "{reported}"
+        );
+        let reported = complaint(|s| s.lights[0].power = f64::NAN);
+        assert_eq!(
+            reported,
             "lights[0].power: NaN, expected 0 to 1e9 (what single precision adds up)"
         );
     }
@@ -339,11 +342,11 @@ mod tests {
     #[test]
     fn a_quaternion_that_is_no_rotation_is_told() {
         let long = UnitQuaternion::new_unchecked(nalgebra::Quaternion::new(2.0, 0.0, 0.0, 0.0));
-        let told = complaint(|s| {
+        let reported = complaint(|s| {
             s.objects[0].placement = Placement::At(Pose::from_parts([0.0; 3].into(), long))
         });
         assert_eq!(
-            told,
+            reported,
             "objects[0].placement.at.rotation: a quaternion of norm 2, expected norm 1"
         );
     }

@@ -173,11 +173,14 @@ mod tests {
         let hue = crate::scene::Range::new(-20.0, 20.0);
         assert_eq!(hue.draw(&plain, "hue_deg"), hue.draw(&logged, "hue_deg"));
         let drawn = log.into_draws();
-        let told: Vec<String> = drawn
+        let reported: Vec<String> = drawn
             .iter()
             .map(|d| format!("{} {}", d.path, d.from))
             .collect();
-        assert_eq!(told, ["background one of 4", "hue_deg uniform [-20, 20]"]);
+        assert_eq!(
+            reported,
+            ["background one of 4", "hue_deg uniform [-20, 20]"]
+        );
         assert_eq!(drawn[1].value, hue.draw(&plain, "hue_deg"));
     }
 

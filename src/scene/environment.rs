@@ -160,23 +160,23 @@ mod tests {
             rotation_deg: 0.0,
             strength: 1.0,
         };
-        let told = |e: Environment| e.check("environment").unwrap_err().to_string();
+        let reported = |e: Environment| e.check("environment").unwrap_err().to_string();
         assert!(
-            told(Environment {
+            reported(Environment {
                 file: String::new(),
                 ..good.clone()
             })
             .starts_with("environment.file")
         );
         assert!(
-            told(Environment {
+            reported(Environment {
                 rotation_deg: f64::NAN,
                 ..good.clone()
             })
             .starts_with("environment.rotation_deg")
         );
         assert!(
-            told(Environment {
+            reported(Environment {
                 strength: -1.0,
                 ..good
             })

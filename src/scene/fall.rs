@@ -173,7 +173,7 @@ mod tests {
     #[test]
     fn options_that_cannot_be_right_are_told() {
         assert!(SettleOptions::default().check().is_ok());
-        let told = |step: f64| {
+        let reported = |step: f64| {
             SettleOptions {
                 step,
                 ..Default::default()
@@ -189,7 +189,7 @@ mod tests {
             (1.0 / 64.0, "0.015625"),
         ] {
             assert_eq!(
-                told(step),
+                reported(step),
                 format!("settle.step: {number}, expected 0.0001 to 0.0042 ({why})")
             );
         }

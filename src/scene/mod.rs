@@ -133,7 +133,7 @@ pub struct Scene {
     /// What happens to the finished frame.
     #[serde(default, skip_serializing_if = "PostProcess::is_identity")]
     pub finish: PostProcess,
-    /// Where the files that it names lie; without it a recipe says so.
+    /// Where the files that it names lie; without it, the recipe names the folders.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub files: Option<SceneFiles>,
     /// How its picture and labels are made, where no recipe is given.

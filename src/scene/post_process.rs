@@ -196,18 +196,18 @@ mod tests {
 
     #[test]
     fn what_cannot_be_right_is_told() {
-        let told = |f: PostProcess| f.check("finish").unwrap_err().to_string();
+        let reported = |f: PostProcess| f.check("finish").unwrap_err().to_string();
         let good = PostProcess::default();
         assert!(good.check("finish").is_ok());
         assert!(
-            told(PostProcess {
+            reported(PostProcess {
                 exposure_ev: f64::NAN,
                 ..good
             })
             .starts_with("finish.exposure_ev: NaN")
         );
         assert!(
-            told(PostProcess {
+            reported(PostProcess {
                 white_balance: LinearRgb::BLACK,
                 ..good
             })
@@ -217,7 +217,9 @@ mod tests {
             shot: -1.0,
             read: 0.0,
         };
-        assert!(told(PostProcess { noise, ..good }).starts_with("finish.noise.known.shot: -1,"));
+        assert!(
+            reported(PostProcess { noise, ..good }).starts_with("finish.noise.known.shot: -1,")
+        );
         let read: PostProcess = toml::from_str("noise = 'match_plate'").unwrap();
         assert_eq!(read.noise, Noise::MatchPlate);
     }

@@ -165,21 +165,24 @@ mod tests {
 
     #[test]
     fn a_range_that_cannot_be_right_is_told() {
-        let (scale, told) = (Bounds::new(0.0, 9.0, ""), |e: Result<()>| {
+        let (scale, reported) = (Bounds::new(0.0, 9.0, ""), |e: Result<()>| {
             e.unwrap_err().to_string()
         });
         let expected = "scale: [2, 1], expected [min, max] within 0 to 9";
-        assert_eq!(told(Range::new(2.0, 1.0).check("scale", &scale)), expected);
         assert_eq!(
-            told(Range::fixed(-1.0).check("scale", &scale)),
+            reported(Range::new(2.0, 1.0).check("scale", &scale)),
+            expected
+        );
+        assert_eq!(
+            reported(Range::fixed(-1.0).check("scale", &scale)),
             "scale: -1, expected 0 to 9"
         );
         assert!(Range::fixed(f64::NAN).check("scale", &scale).is_err());
-        let said = told(Range::new(1.0, 2.5).check_count("objects", &scale));
-        assert_eq!(said, "objects: [1, 2.5], expected integers");
+        let printed = reported(Range::new(1.0, 2.5).check_count("objects", &scale));
+        assert_eq!(printed, "objects: [1, 2.5], expected integers");
         let gap = Range::new(5.0, 20.0).check("gap", &Bounds::metres(0.0, 1.0, ""));
         assert_eq!(
-            told(gap),
+            reported(gap),
             "gap: [5, 20], expected [min, max] within 0 to 1 m; is it in centimetres?"
         );
     }

@@ -280,21 +280,24 @@ mod tests {
             height: 0.3,
             rotation: UnitQuaternion::identity(),
         };
-        let told = complaint(|s| s.objects[1].placement = falling);
-        assert_eq!(told, "objects[1].placement: still falling; settle it first");
-        let told = complaint(|s| s.exposure = Exposure::MatchPlate { gain_ev: 0.0 });
+        let reported = complaint(|s| s.objects[1].placement = falling);
         assert_eq!(
-            told,
+            reported,
+            "objects[1].placement: still falling; settle it first"
+        );
+        let reported = complaint(|s| s.exposure = Exposure::MatchPlate { gain_ev: 0.0 });
+        assert_eq!(
+            reported,
             "exposure: still to be matched to the plate; light it first"
         );
-        let told = complaint(|s| s.cast = LightTint::MatchSurface { share: 1.0 });
+        let reported = complaint(|s| s.cast = LightTint::MatchSurface { share: 1.0 });
         assert_eq!(
-            told,
+            reported,
             "cast: still to be matched to the plate; light it first"
         );
-        let told = complaint(|s| s.finish.noise = Noise::MatchPlate);
+        let reported = complaint(|s| s.finish.noise = Noise::MatchPlate);
         assert_eq!(
-            told,
+            reported,
             "finish.noise: still to be matched to the plate; light it first"
         );
         let rectangle = CameraSource::Rectangle {
@@ -310,9 +313,9 @@ mod tests {
 
     #[test]
     fn an_asset_that_the_library_lacks_is_told() {
-        let told = complaint(|s| s.objects[1].asset = "b9".into());
+        let reported = complaint(|s| s.objects[1].asset = "b9".into());
         assert_eq!(
-            told,
+            reported,
             "objects[1].asset: \"b9\", photo 0, expected one that the library has"
         );
     }
@@ -320,10 +323,10 @@ mod tests {
     #[test]
     fn a_plate_of_another_size_is_told() {
         let plate = Arc::new(Image::filled(3, 6, LinearRgb::BLACK));
-        let told = scene()
+        let reported = scene()
             .resolve(look, Some(plate), None)
             .unwrap_err()
             .to_string();
-        assert_eq!(told, "plate: 3 x 6 pixels, expected 8 x 6");
+        assert_eq!(reported, "plate: 3 x 6 pixels, expected 8 x 6");
     }
 }

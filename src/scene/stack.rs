@@ -316,12 +316,12 @@ mod tests {
 
     #[test]
     fn a_card_that_fits_no_way_is_told() {
-        let told = stacked(0, &DropRanges::default(), cards(2, [0.5, 0.31]))
+        let reported = stacked(0, &DropRanges::default(), cards(2, [0.5, 0.31]))
             .unwrap_err()
             .to_string();
         let expected = "objects[0].size: \"b0\", 0.500 x 0.310 m, does not fit between the walls of \"tray\", 0.400 x 0.300 m: \
                         expected a smaller object (scene.scale) or a larger surface";
-        assert_eq!(told, expected);
+        assert_eq!(reported, expected);
     }
 
     /// Half extents of the level body, turned as it would lie down.

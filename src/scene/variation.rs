@@ -16,7 +16,7 @@ pub enum Variation {
     /// Photos of an asset: only its first is used.
     Photo,
     /// Where lights are, how bright and of which colour: each stays at the middle of its ranges. How large they are,
-    /// which is how soft shadows are, goes on varying.
+    /// which is how soft shadows are, still varies.
     Light,
     /// New choices of objects for every scene: there are only 50, as in the paper.
     Selection,

@@ -1,4 +1,4 @@
-//! The bodies that stand for a scene's objects, and the lengths that a scene's tolerances scale with.
+//! The bodies that represent a scene's objects, and the lengths that a scene's tolerances scale with.
 
 use super::overlap::Solid;
 use crate::geom::Pose;
@@ -60,7 +60,7 @@ pub(super) fn current_pose(object: &Object) -> Pose {
     }
 }
 
-/// The bodies that stand for the objects at these poses, one for each object.
+/// The bodies that represent the objects at these poses, one for each object.
 pub(super) fn solids(scene: &Scene, options: &SettleOptions, poses: &[Pose]) -> Vec<Solid> {
     let posed = scene.objects.iter().zip(poses);
     posed

@@ -224,7 +224,7 @@ pub fn settle_within(
 /// Ids (index + 1) of objects that are unsupported at the end of a fall: no forces at their
 /// contacts hold them where they are, walls being smooth.
 ///
-/// `before` says which objects fell; the others stand where their author put them and support what
+/// Objects that fall in `before` fell; the others stand where their author put them and support what
 /// lies on them. None where they were laid without physics ([`SettleMode::Flat`]).
 ///
 /// # Errors
@@ -426,9 +426,9 @@ mod tests {
             (&SettleVerdict::TimedOut, &scene)
         );
         assert_eq!(settled.rejected, vec![SettleVerdict::TimedOut; 3]);
-        let told = settled.into_scene().unwrap_err().to_string();
+        let reported = settled.into_scene().unwrap_err().to_string();
         assert_eq!(
-            told,
+            reported,
             "settle: something still moves after 0.1 s, after 4 attempts"
         );
     }
@@ -581,11 +581,11 @@ mod tests {
             ..SettleOptions::default()
         };
         for options in [endless(), little] {
-            let told = || settle(dropped(0, 100), &options).unwrap_err().to_string();
-            let (told, work) = crate::work::counted(told).unwrap();
+            let reported = || settle(dropped(0, 100), &options).unwrap_err().to_string();
+            let (reported, work) = crate::work::counted(reported).unwrap();
             assert!(
-                told.starts_with("settle: no rest within the work of one picture, "),
-                "{told}"
+                reported.starts_with("settle: no rest within the work of one picture, "),
+                "{reported}"
             );
             assert_eq!(work[crate::work::Kind::PhysicsSteps], 0);
         }
@@ -594,11 +594,11 @@ mod tests {
     #[cfg(feature = "counters")]
     #[test]
     fn settings_without_an_end_end_with_the_work_of_one_picture() {
-        let told = || settle(dropped(0, 5), &endless()).unwrap_err().to_string();
-        let (told, work) = crate::work::counted(told).unwrap();
+        let reported = || settle(dropped(0, 5), &endless()).unwrap_err().to_string();
+        let (reported, work) = crate::work::counted(reported).unwrap();
         assert!(
-            told.starts_with("settle: no rest within the work of one picture, 100000000 "),
-            "{told}"
+            reported.starts_with("settle: no rest within the work of one picture, 100000000 "),
+            "{reported}"
         );
         assert!(
             (1..10_000).contains(&work[crate::work::Kind::PhysicsSteps]),
@@ -615,12 +615,12 @@ mod tests {
             most_work: 20_000,
             ..Default::default()
         };
-        let told = settle(dropped(0, 5), &options).unwrap_err().to_string();
+        let reported = settle(dropped(0, 5), &options).unwrap_err().to_string();
         assert!(
-            told.starts_with(
+            reported.starts_with(
                 "settle: no rest within the work of one picture, 20000 (settle.most_work)"
             ),
-            "{told}"
+            "{reported}"
         );
     }
 
@@ -665,14 +665,14 @@ mod tests {
 
     #[test]
     fn a_start_outside_the_walls_is_told() {
-        let told = settle(
+        let reported = settle(
             falling(&[([0.0, 0.0], 0.1), ([0.1, -0.3], 0.1)]),
             &SettleOptions::default(),
         )
         .unwrap_err();
         let expected = "[0.1, -0.3], expected over the surface of 0.6 x 0.4 m around the origin";
         assert_eq!(
-            told.to_string(),
+            reported.to_string(),
             format!("objects[1].placement.drop.above: {expected}")
         );
     }

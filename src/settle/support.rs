@@ -20,7 +20,7 @@ use super::overlap::{Solid, Touch, falling_from_lowest};
 use crate::geom::Vector3;
 use crate::scene::{Scene, SettleOptions};
 
-/// Factor on friction: what falls is to be found, not what would creep.
+/// Factor on friction: bodies that would fall are sought, not those that would creep.
 const FRICTION_FACTOR: f64 = 2.0;
 /// Share of its weight above which a body that no contact supports counts as hanging. A card whose
 /// centre of mass is beyond what it lies on by a thirtieth of its length has as much; of 1,994 heaps
@@ -277,7 +277,7 @@ impl SpringGeometry {
     }
 }
 
-/// Place in an order of each of so many bodies.
+/// Place in `order` of each of `count` bodies.
 fn slots_of(order: &[usize], count: usize) -> Vec<Option<usize>> {
     let mut slots = vec![None; count];
     for (slot, &i) in order.iter().enumerate() {
@@ -505,9 +505,9 @@ mod tests {
 
     #[test]
     fn scenes_of_different_objects_are_told() {
-        let told = hanging(&dropped(0, 3), &dropped(0, 2), &SettleOptions::default())
+        let reported = hanging(&dropped(0, 3), &dropped(0, 2), &SettleOptions::default())
             .unwrap_err()
             .to_string();
-        assert_eq!(told, "objects: 2, but 3 fell");
+        assert_eq!(reported, "objects: 2, but 3 fell");
     }
 }

@@ -9,9 +9,9 @@ pub(crate) const VIEW_TRANSMITTANCE: [&str; 3] = ["VR", "VG", "VB"];
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Wanted {
-    /// `R G B`, or `Y` for grey; `A` where it is there.
+    /// `R G B`, or `Y` for grey; `A` if present.
     Color,
-    /// As `Color`, with the transmittance `VR VG VB` or else `TR TG TB` where one is there.
+    /// As `Color`, with the transmittance `VR VG VB` or else `TR TG TB`, if present.
     Film,
     /// The only channel, or the three equal ones of a grey picture, or `A`.
     Coverage,

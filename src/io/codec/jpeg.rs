@@ -48,7 +48,7 @@ pub(crate) fn read_before_scan(file: &mut impl Read, limits: &Limits) -> Result<
     }
 }
 
-/// Reads a marker and its segment behind the bytes that are there; the marker.
+/// Appends a marker and its segment; returns the marker.
 fn append_segment(bytes: &mut Vec<u8>, file: &mut impl Read) -> Result<u8, Refusal> {
     let at = bytes.len();
     let marker = append_marker(bytes, file)?;
@@ -73,7 +73,7 @@ fn append_marker(bytes: &mut Vec<u8>, file: &mut impl Read) -> Result<u8, Refusa
     }
 }
 
-/// Reads so many more bytes.
+/// Appends `count` more bytes.
 fn append(bytes: &mut Vec<u8>, file: &mut impl Read, count: usize) -> Result<(), Refusal> {
     let at = bytes.len();
     bytes.resize(at + count, 0);

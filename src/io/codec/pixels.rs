@@ -555,7 +555,7 @@ mod tests {
             [0.2, none]
         );
         assert_eq!(matte(&[51, 255, 0, 255], "Y A").unwrap(), [0.2, none]);
-        // An alpha that says something is the matte.
+        // An alpha that is not 1 everywhere is the matte.
         assert_eq!(
             matte(&[51, 51, 51, 255, 0, 0, 0, 0], "R G B A").unwrap(),
             [full, none]

@@ -105,7 +105,7 @@ pub(crate) fn color_description(bytes: &[u8], limits: &Limits) -> Option<ColorDe
     }
 }
 
-/// The exponent and the primaries, where one of them is there.
+/// The exponent and the primaries, if either is present.
 fn described_curve(info: &png::Info<'_>) -> Option<ColorDescription> {
     let gamma = info.gama_chunk.map(|gamma| gamma.into_scaled());
     let exponent = gamma.map(|gamma| SCALED_ONE / f64::from(gamma));

@@ -373,7 +373,7 @@ mod tests {
         let matrix = to_rec709(&xyz).unwrap().unwrap();
         let white = matrix.apply([1.0; 3]);
         assert!(white.iter().all(|v| (v - 1.0).abs() < 1e-6), "{white:?}");
-        // Y is what Rec. 709 says luminance is, before the white is adapted: green has most of it.
+        // Y is the luminance of Rec. 709 before the white is adapted: green has most of it.
         let [r, g, b] = matrix.apply([0.0, 1.0, 0.0]);
         assert!(g > 1.0 && r < 0.0 && b < 0.0, "{r} {g} {b}");
         assert_eq!(to_rec709(&RgbSpace::REC709), Ok(None));

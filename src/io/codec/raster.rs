@@ -39,7 +39,7 @@ impl SampleKind {
 }
 
 impl Samples {
-    /// So many zeros.
+    /// `count` zeros.
     pub(crate) fn zeroed(kind: SampleKind, count: usize) -> Self {
         match kind {
             SampleKind::U8 => Self::U8(zeroed_vec(count)),
@@ -84,7 +84,7 @@ impl Samples {
         matches!(self, Self::F16(_) | Self::F32(_))
     }
 
-    /// Those of one of so many channels.
+    /// The samples of one of `count` channels.
     fn one_channel(&self, count: usize, channel: usize) -> Self {
         match self {
             Self::U8(v) => Self::U8(one_channel(v, count, channel)),

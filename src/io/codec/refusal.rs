@@ -7,7 +7,7 @@ use crate::error::one_line;
 pub(crate) enum Refusal {
     /// The file may be fine, this decoder does not know its kind: another may.
     Unsupported(String),
-    /// The file is damaged, too large or not what was asked for.
+    /// The file is damaged, too large or not what was requested.
     Broken(String),
 }
 

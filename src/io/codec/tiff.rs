@@ -159,7 +159,7 @@ fn first_tags(file: &mut (impl Read + Seek)) -> std::io::Result<Vec<u16>> {
         .collect()
 }
 
-/// The number of an entry of so many bytes, which is passed over.
+/// The tag of an entry of this many bytes; the file is then behind the entry.
 fn read_tag(file: &mut (impl Read + Seek), bytes: i64, little: bool) -> std::io::Result<u16> {
     let tag = read_integer(file, 2, little)? as u16;
     file.seek_relative(bytes - 2)?;
@@ -247,7 +247,7 @@ pub(crate) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Refusal> {
     })
 }
 
-/// Codes from the lowest bit up, as before 1990: they begin with the code that says so (TIFF 6.0, section 13).
+/// Codes from the lowest bit up, as before 1990: such data begins with the clear code (TIFF 6.0, section 13).
 fn refuse_old_lzw(decoder: &mut Decoder<impl Read + Seek>, bytes: &[u8]) -> Result<(), Refusal> {
     if decoder.find_tag_unsigned(Tag::Compression)? != Some(LZW_COMPRESSION) {
         return Ok(());

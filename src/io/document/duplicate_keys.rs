@@ -7,7 +7,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 /// Parses a JSON document and refuses an object with a key twice (most readers silently keep the last of them) and what is
-/// nested deeper than so many levels.
+/// nested deeper than `max_depth` levels.
 pub(super) fn check_json(text: &str, max_depth: u64) -> serde_json::Result<()> {
     let mut document = serde_json::Deserializer::from_str(text);
     KeyCheck {
@@ -24,7 +24,7 @@ fn too_deep(max_depth: u64) -> String {
     )
 }
 
-/// A value that may be nested by so many levels more.
+/// A value that may be nested by this many levels more.
 #[derive(Clone, Copy)]
 struct KeyCheck {
     levels: u64,
@@ -90,7 +90,7 @@ impl<'de> Visitor<'de> for KeyCheck {
 }
 
 /// What a TOML document holds that JSON cannot express, and where: a number that is infinite or NaN; or nesting deeper than
-/// so many levels.
+/// `max_depth` levels.
 pub(super) fn find_invalid_toml(
     document: &Spanned<DeTable<'_>>,
     max_depth: u64,

@@ -14,7 +14,7 @@ pub struct Override {
 impl FromStr for Override {
     type Err = Error;
 
-    /// From `path=value`; the value is TOML (`3`, `[4, 12]`, `"text"`, `true`), and text where it is none of that.
+    /// From `path=value`; the value is TOML (`3`, `[4, 12]`, `"text"`, `true`), or else text.
     fn from_str(text: &str) -> Result<Self> {
         let Some((path, value)) = text.split_once('=') else {
             return Err(Error::value(text, "no value, expected KEY=VALUE"));

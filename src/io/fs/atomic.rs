@@ -13,7 +13,7 @@ pub(crate) fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
     write_through(path, |file| file.write_all(bytes))
 }
 
-/// Writes a file piece by piece: nothing of it is there before `fill` has written all of it.
+/// Writes a file piece by piece: it does not appear before `fill` has written all of it.
 ///
 /// # Errors
 /// [`Error::File`] with the error of `fill` or of the system.
@@ -114,7 +114,7 @@ pub fn relative(to: &Path, from: &Path) -> PathBuf {
     up.chain(to.components().skip(shared)).collect()
 }
 
-/// Makes a folder, and those above it; one that is there already is fine.
+/// Makes a folder and its parents; one that already exists is fine.
 ///
 /// # Errors
 /// [`Error::File`] where a file is in the way or the folder may not be made.

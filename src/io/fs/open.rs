@@ -43,7 +43,7 @@ pub(crate) fn read_regular(path: &Path, most: (u64, &str), expected: &str) -> Re
     read_to_end(file, bytes, most.0).map_err(|e| Error::file(path, e))
 }
 
-/// What is left of a file that had so many bytes when it was opened, and may have grown.
+/// The rest of a file that had `length` bytes when it was opened, and may have grown.
 pub(crate) fn read_to_end(
     file: impl Read,
     length: u64,

@@ -55,7 +55,7 @@ pub(crate) fn shape(source: &SourceFile, limits: &Limits) -> Result<Shape, Refus
     })
 }
 
-/// Samples as the file has them, in the window asked for; `reserve` gets the number of their bytes before they are read.
+/// Samples as the file has them, in the requested window; `reserve` gets the number of their bytes before they are read.
 pub(crate) fn decode(
     source: &SourceFile,
     limits: &Limits,
@@ -234,7 +234,7 @@ fn decoded<T>(samples: Vec<T>, light: impl Fn(T) -> f32) -> Vec<f32> {
     samples.into_iter().map(light).collect()
 }
 
-/// The layout of a picture that is to be written.
+/// The layout of a picture to write.
 pub(crate) fn written_layout(
     (width, height): (usize, usize),
     channels: &[&str],

@@ -208,7 +208,7 @@ impl Worker {
         Err(std::io::Error::other(what))
     }
 
-    /// What the system could not give it is an error where that is asked for, and a warning elsewhere.
+    /// An incomplete sandbox is an error for strict requests and a warning otherwise.
     fn check_sandbox(&self, strict: bool) -> std::result::Result<(), Refusal> {
         let missing = self.greeting.missing.join("; ");
         if missing.is_empty() {
@@ -369,7 +369,7 @@ mod tests {
         r#"","openimageio":"0","missing":[]}'"#
     );
 
-    /// A worker that greets and then does what a shell script says.
+    /// A worker that greets and then runs a shell script.
     fn asked(script: &str, limits: &Limits) -> std::result::Result<Raster, String> {
         asked_of(&format!("{GREETING}\n{script}"), limits, false)
     }

@@ -1,7 +1,7 @@
 //! What petcomp and its worker program send each other.
 //!
 //! The worker is started with [`Limits`] as its argument and sends a greeting. A request is a line of JSON and the bytes
-//! of a file; a response is a line of JSON and, where pixels were asked for, the samples in native byte order. The side
+//! of a file; a response is a line of JSON and, where pixels were requested, the samples in native byte order. The side
 //! that asks trusts nothing: it checks every size itself.
 
 use crate::io::codec::Wanted;
@@ -57,7 +57,7 @@ pub(super) struct Greeting {
     pub(super) missing: Vec<String>,
 }
 
-/// The first line of a request; so many bytes follow.
+/// The first line of a request; `bytes` bytes follow.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct RequestHead {
     pub(super) format: String,
@@ -69,7 +69,7 @@ pub(super) struct RequestHead {
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum ResponseHead {
-    /// A picture; its samples follow if pixels were asked for.
+    /// A picture; its samples follow if pixels were requested.
     Picture(Shape),
     /// Why there is none.
     Refused(String),

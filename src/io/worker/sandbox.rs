@@ -14,7 +14,7 @@ const CPU_SECONDS: u64 = 600;
 /// Open files; it opens none itself.
 const MAX_OPEN_FILES: u64 = 64;
 
-/// Bounds on this process's memory, as far as it needs them for the file in hand.
+/// Bounds on this process's memory, as tight as the current file allows.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct MemoryLimit {
     /// Mapped when the program had loaded its libraries.
@@ -30,7 +30,7 @@ impl MemoryLimit {
         Self { at_start, most }
     }
 
-    /// Lets a file of so many bytes ask for so many decoded ones.
+    /// Allows the memory for a file of this size and this many decoded bytes.
     pub(super) fn allow(&self, file_bytes: u64, decoded_bytes: u64) {
         let current = needed_bytes(self.at_start, file_bytes, decoded_bytes).min(self.most);
         limit_resource(Resource::As, current, self.most);
@@ -112,7 +112,7 @@ mod linux {
         Ok(rustix::thread::set_no_new_privs(true)?)
     }
 
-    /// No file or folder may be opened, no socket connected, nobody outside signalled: a rule set without a rule.
+    /// No file or folder may be opened, no socket connected, no other process signalled: a rule set without a rule.
     fn forbid_files() -> Outcome {
         // What a kernel does not know of this is left out.
         let abi = ABI::V6;

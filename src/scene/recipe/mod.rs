@@ -116,7 +116,7 @@ impl Recipe {
     /// is used up, then again from all of it.
     ///
     /// # Errors
-    /// An impossible range; no background; an empty catalog while objects are asked for; a card that
+    /// An impossible range; no background; an empty catalog while there should be objects; a card that
     /// fits the surface in no direction.
     pub fn scene(
         &self,

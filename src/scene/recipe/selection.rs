@@ -94,7 +94,7 @@ impl Recipe {
     }
 }
 
-/// Fails on a catalog without an asset while objects are asked for.
+/// Fails on an empty catalog while there should be objects.
 fn check_catalog(count: usize, catalog: &[AssetVariant]) -> Result<()> {
     if count == 0 || !catalog.is_empty() {
         return Ok(());

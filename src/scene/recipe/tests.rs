@@ -101,10 +101,10 @@ fn a_file_says_only_what_it_wants_otherwise() {
 
 #[test]
 fn what_a_file_cannot_say_is_told() {
-    let told = |text| toml::from_str::<Recipe>(text).unwrap_err().to_string();
-    assert!(told("object = 3").contains("unknown field `object`"));
-    assert!(told("selections = 0").contains("expected \"unique\" or a number above 0"));
-    assert!(told("selections = 'all'").contains("expected \"unique\" or a number above 0"));
+    let reported = |text| toml::from_str::<Recipe>(text).unwrap_err().to_string();
+    assert!(reported("object = 3").contains("unknown field `object`"));
+    assert!(reported("selections = 0").contains("expected \"unique\" or a number above 0"));
+    assert!(reported("selections = 'all'").contains("expected \"unique\" or a number above 0"));
     let wrong: Recipe = toml::from_str("lights = [{ size = [-1, 1] }]").unwrap();
     assert_eq!(
         wrong.check().unwrap_err().to_string(),
@@ -114,23 +114,25 @@ fn what_a_file_cannot_say_is_told() {
 
 #[test]
 fn nothing_to_choose_from_is_told() {
-    let told = |backgrounds: &[Background], catalog: &[AssetVariant]| {
+    let reported = |backgrounds: &[Background], catalog: &[AssetVariant]| {
         Recipe::default()
             .scene(0, 0, backgrounds, catalog)
             .unwrap_err()
             .to_string()
     };
     assert_eq!(
-        told(&[], &catalog(1)),
+        reported(&[], &catalog(1)),
         "backgrounds: none, expected at least one labelled photo"
     );
-    assert!(told(&[tray("a")], &[]).ends_with("asked for, but there is no asset to choose from"));
+    assert!(
+        reported(&[tray("a")], &[]).ends_with("asked for, but there is no asset to choose from")
+    );
     let bare = AssetVariant {
         photo_sizes: vec![],
         ..catalog(1).remove(0)
     };
     assert_eq!(
-        told(&[tray("a")], &[bare]),
+        reported(&[tray("a")], &[bare]),
         "assets.b0: no photo, expected at least one"
     );
 }

@@ -55,7 +55,7 @@ const MAX_SUBSTEPS: u32 = 100;
 const ITERATIONS_PER_WORK: u32 = 4;
 /// Half the thickness of floor and walls, metres in the world.
 const WALL_HALF_M: f64 = 0.5;
-/// Damping of speed and of spin: without it one fall in 30 rocks for ever.
+/// Damping of speed and of spin: without it one fall in 30 rocks forever.
 const LINEAR_DAMPING: f32 = 0.1;
 const ANGULAR_DAMPING: f32 = 0.5;
 /// Speed below which bodies sleep, in units of length a second: 1 cm/s. At the default some bodies
@@ -95,7 +95,7 @@ pub(super) struct Fall {
     pub(super) energy_rise: f64,
     /// Least and greatest x and y of the swept space; metres of the scene.
     pub(super) swept: [[f64; 2]; 2],
-    /// The motion, as often as was asked for.
+    /// The motion, sampled as often as requested.
     pub(super) samples: Vec<MotionSample>,
 }
 

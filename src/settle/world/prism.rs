@@ -1,4 +1,4 @@
-//! What stands for an object in the physics world: a box, or a convex prism.
+//! The shape of an object in the physics world: a box, or a convex prism.
 
 use crate::geom::Vector3;
 use crate::scene::{Object, doubled_area};
@@ -43,7 +43,7 @@ fn with_density(parts: Vec<ColliderBuilder>, density: f32) -> Vec<ColliderBuilde
 }
 
 /// A convex ring cut across into rings of four corners, one of three at the end where they are odd;
-/// nothing of nothing.
+/// none for an empty ring.
 fn quarters(ring: &[[f64; 2]]) -> Vec<Vec<[f64; 2]>> {
     let n = ring.len();
     (0..n.saturating_sub(1) / 2)

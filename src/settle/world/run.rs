@@ -4,7 +4,7 @@
 //! At rest is what the engine has put to sleep (every body slower than 1 cm/s and 0.5 rad/s for
 //! 0.5 s), and what only trembles: no end of a card has moved by [`REST_MOTION_M`] for
 //! [`REST_TIME_S`] and the bodies together have less kinetic energy than if all of them moved at
-//! [`REST_SPEED_M_PER_S`]. A thin card between others may vibrate for ever by hundredths of a
+//! [`REST_SPEED_M_PER_S`]. A thin card between others may vibrate forever by hundredths of a
 //! millimetre, driven by the contact solver; damping does not stop it.
 
 use super::units::WorldUnits;

@@ -95,7 +95,7 @@ impl Sampling {
         lines
     }
 
-    /// The bytes of a block, declared to the decoder as pixels of as many bytes each.
+    /// The bytes of a block, which the decoder takes as pixels of equally many bytes each.
     fn decompress(
         &self,
         header: &Header,
@@ -117,7 +117,7 @@ impl Sampling {
         Ok(compression.decompress_image_section_from_le(&declared, data, section, false)?)
     }
 
-    /// A header with the samplings, and so many bytes for each pixel.
+    /// A header with the samplings and this number of bytes per pixel.
     fn declared(&self, header: &Header, bytes_per_pixel: usize) -> Header {
         let mut declared = header.clone();
         declared.channels.bytes_per_pixel = bytes_per_pixel;
@@ -194,7 +194,7 @@ fn block_rows(header: &Header, block: &CompressedScanLineBlock) -> Result<Range<
     }
 }
 
-/// `n` values for each, interpolated linearly to the next; the last goes on.
+/// `n` values for each, interpolated linearly to the next; the last is repeated.
 fn enlarged(samples: &[f32], n: usize) -> Vec<f32> {
     let next = samples.iter().skip(1).chain(samples.last());
     samples
@@ -232,7 +232,7 @@ fn read_pair(file: &[u8], at: usize) -> Option<[usize; 2]> {
     Some([read_sampling(file, at)?, read_sampling(file, at + 4)?])
 }
 
-/// Pixels for a sample; none where that is no number which files have.
+/// Pixels for a sample; none for a number that no file has.
 fn read_sampling(file: &[u8], at: usize) -> Option<usize> {
     let n = u32::from_le_bytes(*file.get(at..)?.first_chunk()?);
     (1..=MAX_SAMPLING).contains(&n).then_some(n as usize)

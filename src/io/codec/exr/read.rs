@@ -127,7 +127,7 @@ impl<'a> CheckedFile<'a> {
         self.meta.headers[0].shared_attributes.display_window
     }
 
-    /// The window of a part that is asked for.
+    /// The requested window of a part.
     fn window_of(&self, part: usize, shown: Window) -> IntegerBounds {
         let header = &self.meta.headers[part];
         match shown {
@@ -363,7 +363,7 @@ fn choose_channels(wanted: Wanted, names: &[String]) -> Result<Choice, String> {
     }
 }
 
-/// Luminance, its differences, and alpha where it is there.
+/// Luminance, its differences, and alpha if present.
 fn luminance_chroma(names: &[String]) -> Option<Vec<usize>> {
     let [y, ry, by] = LUMINANCE_CHROMA.map(|name| index_of(names, name));
     let alpha = index_of(names, "A");
@@ -536,9 +536,14 @@ mod tests {
             (kept.width, kept.height, kept.samples),
             (2, 2, Samples::F32(vec![1.0, 2.0, 3.0, 4.0]))
         );
-        let told = header(out.get_ref().as_slice(), 1_000, &Limits::default()).unwrap();
+        let reported = header(out.get_ref().as_slice(), 1_000, &Limits::default()).unwrap();
         assert_eq!(
-            (told.width, told.height, told.data_at, told.data_size),
+            (
+                reported.width,
+                reported.height,
+                reported.data_at,
+                reported.data_size
+            ),
             (2, 3, [-1, 1], [2, 2])
         );
     }
