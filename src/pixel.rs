@@ -228,6 +228,12 @@ impl LinearRgb {
         0.2126 * self.r + 0.7152 * self.g + 0.0722 * self.b
     }
 
+    /// The largest channel.
+    #[inline(always)]
+    pub fn max_channel(self) -> f32 {
+        self.r.max(self.g).max(self.b)
+    }
+
     /// No channel is NaN or infinite.
     #[inline(always)]
     pub fn is_finite(self) -> bool {

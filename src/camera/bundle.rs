@@ -173,18 +173,17 @@ impl Bundle {
         let mut equations = self.linearized(states)?;
         let mut damping = INITIAL_DAMPING;
         for _ in 0..MAX_ITERATIONS {
-            match self.lower_neighbour(&equations, damping) {
-                Some(next) => {
-                    let fall = (equations.cost - next.cost) / equations.cost;
-                    equations = next;
-                    damping *= DAMPING_DECREASE;
-                    if fall < COST_TOLERANCE {
-                        break;
-                    }
+            let Some(next) = self.lower_neighbour(&equations, damping) else {
+                damping *= DAMPING_INCREASE;
+                if damping > MAX_DAMPING {
+                    break;
                 }
-                None => damping *= DAMPING_INCREASE,
-            }
-            if damping > MAX_DAMPING {
+                continue;
+            };
+            let fall = (equations.cost - next.cost) / equations.cost;
+            equations = next;
+            damping *= DAMPING_DECREASE;
+            if fall < COST_TOLERANCE {
                 break;
             }
         }
@@ -229,13 +228,11 @@ impl Bundle {
 
     /// The shared system after every pose has been eliminated.
     fn reduced(&self, equations: &BundleEquations, damping: f64) -> Option<ReducedSystem> {
-        let mut shared = self.prior_system(&equations.states);
         let photos: Vec<PhotoBlock> = (0..equations.normals.len())
             .map(|photo| self.photo_block(equations, photo))
             .collect();
-        for photo in &photos {
-            shared.add(photo);
-        }
+        let mut shared = self.prior_system(&equations.states);
+        photos.iter().for_each(|photo| shared.add(photo));
         damp_diagonal(&mut shared.matrix, damping);
         for photo in &photos {
             shared.eliminate_pose(photo, damping)?;
@@ -337,10 +334,7 @@ impl Bundle {
         photo: &PhotoBlock,
         index: usize,
     ) -> Option<Square> {
-        let inverse = photo.inverse_pose(0.0)?;
-        let response = -(inverse * &photo.coupling);
-        let cross = &response * shared;
-        let pose = inverse + &cross * response.transpose();
+        let (pose, cross) = photo.pose_covariance(shared)?;
         let mut covariance = Square::zeros();
         covariance
             .fixed_view_mut::<POSE_UNKNOWNS, POSE_UNKNOWNS>(0, 0)
@@ -368,7 +362,7 @@ fn set_pose_covariance(covariance: &mut Square, unknown: usize, cross: &Vector6<
 }
 
 impl SharedSystem {
-    /// No information on any of so many unknowns.
+    /// No information on any of the unknowns.
     fn zeros(unknowns: usize) -> Self {
         Self {
             matrix: DMatrix::zeros(unknowns, unknowns),
@@ -422,7 +416,7 @@ impl BundleEquations {
 }
 
 impl PhotoBlock {
-    /// A pose, and nothing yet of so many shared unknowns.
+    /// A pose, not yet coupled to the shared unknowns.
     fn uncoupled(normal: &NormalEquations, shared: usize) -> Self {
         let pose = normal
             .information
@@ -452,6 +446,15 @@ impl PhotoBlock {
             pose[(i, i)] *= 1.0 + damping;
         }
         Some(pose.cholesky()?.inverse())
+    }
+
+    /// Covariance of the pose, and of the pose with the shared unknowns, from that of these.
+    fn pose_covariance(&self, shared: &DMatrix<f64>) -> Option<(Matrix6<f64>, Matrix6xX<f64>)> {
+        let inverse = self.inverse_pose(0.0)?;
+        let response = -(inverse * &self.coupling);
+        let cross = &response * shared;
+        let pose = inverse + &cross * response.transpose();
+        Some((pose, cross))
     }
 
     /// The step of the pose that goes with one of the shared unknowns, shortened where it would leap.
@@ -494,7 +497,7 @@ fn framing_or(label: &Label, unknown: Framing) -> Framing {
     }
 }
 
-/// A photo's problem with a known lens, of which only the pose is left open.
+/// A photo's problem with a known lens: only the pose is unknown.
 fn with_fixed_lens(problem: &Problem, ln_focal: f64) -> Problem {
     let mut problem = problem.clone();
     let priors = &mut problem.residuals.priors;

@@ -1,4 +1,4 @@
-//! How surprising a sum of squares is.
+//! The probability of a sum of squares.
 
 /// Another explanation counts where its chi squared is no worse, or better, by this: 1 % of two degrees of freedom.
 pub(crate) const CHI2_99: f64 = 9.2;

@@ -3,7 +3,7 @@
 use super::error::SolveError;
 use super::options::CornerOrder;
 use crate::diagnostic::{Code, Diagnostic};
-use crate::geom::{Point2, Vector2};
+use crate::geom::{Point2, Vector2, mean_point};
 
 /// Corners closer than this many pixels are one corner; also closer than [`COINCIDENT_SIGMAS`] times their noise.
 const COINCIDENT_PX: f64 = 2.0;
@@ -103,7 +103,7 @@ fn reordered_warning() -> Diagnostic {
 
 /// By angle around the mean (clockwise, as y runs down), rotated so that corner 0 stays first.
 fn by_angle(c: &[Point2<f64>; 4]) -> [usize; 4] {
-    let mean = c.iter().fold(Vector2::zeros(), |sum, p| sum + p.coords) / 4.0;
+    let mean = mean_point(c);
     let angles = c.map(|p| libm::atan2(p.y - mean.y, p.x - mean.x));
     let mut order = [0, 1, 2, 3];
     order.sort_by(|&i: &usize, &j: &usize| angles[i].total_cmp(&angles[j]));

@@ -21,8 +21,13 @@ pub(crate) fn homography(pairs: &[(Point2<f64>, Point2<f64>)]) -> Option<Homogra
         .map(|(p, q)| (from * p.to_homogeneous(), to * q.to_homogeneous()));
     let square = normal_matrix(normalized);
     let h = null_vector(square, SINGULAR_EIGENVALUE * pairs.len() as f64)?;
-    let map = to.try_inverse()? * Matrix3::from_fn(|i, j| h[3 * i + j]) * from;
+    let map = to.try_inverse()? * matrix_from(&h) * from;
     map.iter().all(|v| v.is_finite()).then_some(Homography(map))
+}
+
+/// A matrix from its elements row by row.
+fn matrix_from(elements: &SVector<f64, 9>) -> Matrix3<f64> {
+    Matrix3::from_fn(|i, j| elements[3 * i + j])
 }
 
 /// The sum of the squares of all equations.

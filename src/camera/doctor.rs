@@ -1,4 +1,4 @@
-//! A solution in plain words: what is known how well, and what to measure to know it better.
+//! A solution in plain words: how well each quantity is known, and what to measure to know it better.
 
 use super::focal::FocalSource;
 use super::label::{Framing, Label};
@@ -8,9 +8,9 @@ use super::solve::solve;
 use crate::diagnostic::Code;
 use crate::geom::Point2;
 
-/// A tape measure's relative error of the camera height that the advice speaks of.
+/// Relative error of a camera height measured with a tape, as the advice assumes.
 const TAPE_HEIGHT_SIGMA: f64 = 0.03;
-/// An improvement by this factor or more is worth a sentence.
+/// An improvement by this factor or more is worth mentioning.
 const WORTHWHILE_FACTOR: f64 = 0.8;
 
 /// What a person should know about a solution, in a few lines of plain words.

@@ -1,4 +1,4 @@
-//! Solution files (`NAME.camera.json`): a solved camera with everything that is known of it.
+//! Solution files (`NAME.camera.json`): a solved camera with everything known about it.
 
 use super::exchange::{BlenderCamera, OpencvCamera, matrix_rows};
 use super::focal::FocalSource;
@@ -62,7 +62,7 @@ pub enum CameraFormat {
     PlaneCamera,
 }
 
-/// A camera, how far to trust it, and another one.
+/// A camera, how reliable it is, and another possible one.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FoundCamera {
     /// Intrinsics in our pixels.
@@ -94,10 +94,10 @@ pub struct FoundCamera {
     pub focal_from_data: Option<f64>,
     /// The prior of the focal length.
     pub focal_prior: FocalPrior,
-    /// What a person should look at.
+    /// Warnings to review.
     #[serde(deserialize_with = "warnings_with_codes")]
     pub warnings: Vec<Diagnostic>,
-    /// Another camera that a person should know of.
+    /// Another possible camera.
     pub alternative: Option<Box<FoundCamera>>,
 }
 

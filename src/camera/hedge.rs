@@ -10,17 +10,38 @@ use super::chi::CHI2_99;
 use super::label::Framing;
 use super::model::Unknowns;
 use super::options::SolveOptions;
-use super::pinhole::distorted;
+use super::pinhole::{Camera, distorted};
 use super::rectangle::corner_points;
 use super::solution::{Sigma, Solution};
 use super::uncertainty::{grid_at_height, repaired_variance};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::geom::{Point2, Point3, Vector2};
+use crate::geom::{Point2, Point3, Vector2, Vector3};
 use nalgebra::Matrix2;
 
-/// Corners that cost so much in a whole picture, and so little in one that may be cropped, are of a cropped one.
+/// Corners that fit a cropped picture this much better than a whole one belong to a cropped one.
 pub(crate) fn is_off_center(whole: f64, loose: f64) -> bool {
     whole > loose + CHI2_99
+}
+
+/// How far apart two cameras are.
+struct CameraDifference {
+    ln_focal: f64,
+    tilt: f64,
+    center: Vector3<f64>,
+    /// Along one axis, root mean square.
+    principal_px: f64,
+}
+
+impl CameraDifference {
+    fn new(from: &Camera, to: &Camera) -> Self {
+        let principal = to.principal_px - from.principal_px;
+        Self {
+            ln_focal: libm::log(to.focal_px.x / from.focal_px.x),
+            tilt: to.tilt() - from.tilt(),
+            center: to.center() - from.center(),
+            principal_px: principal.norm() / std::f64::consts::SQRT_2,
+        }
+    }
 }
 
 impl Solution {
@@ -78,18 +99,18 @@ impl Solution {
     }
 
     fn sigma_with(&self, loose: &Self, apart: &Unknowns) -> Sigma {
-        let (camera, other, sigma) = (&self.camera, &loose.camera, &loose.sigma);
-        let moved = other.center() - camera.center();
-        let middle = other.principal_px - camera.principal_px;
-        let ln_focal_off = libm::log(other.focal_px.x / camera.focal_px.x);
+        let (sigma, off) = (
+            &loose.sigma,
+            CameraDifference::new(&self.camera, &loose.camera),
+        );
         Sigma {
-            ln_focal: libm::hypot(sigma.ln_focal, ln_focal_off),
-            tilt: libm::hypot(sigma.tilt, other.tilt() - camera.tilt()),
-            center: sigma.center + moved * moved.transpose(),
+            ln_focal: libm::hypot(sigma.ln_focal, off.ln_focal),
+            tilt: libm::hypot(sigma.tilt, off.tilt),
+            center: sigma.center + off.center * off.center.transpose(),
             corners_px: self.corner_covariances_with(loose),
             reference_height: self.sigma.reference_height,
             height_px: libm::hypot(sigma.height_px, self.height_apart_px(loose)),
-            principal_px: libm::hypot(sigma.principal_px, middle.norm() / std::f64::consts::SQRT_2),
+            principal_px: libm::hypot(sigma.principal_px, off.principal_px),
             covariance: sigma.covariance + apart * apart.transpose(),
         }
     }
@@ -105,9 +126,11 @@ impl Solution {
     /// Root mean square distance of points at the reference height as two cameras see them.
     fn height_apart_px(&self, other: &Self) -> f64 {
         let height = self.sigma.reference_height;
-        let pairs = grid_at_height(self.size, height).zip(grid_at_height(other.size, height));
-        let squares: Vec<f64> = pairs
-            .map(|(a, b)| repaired_variance((other.sees(b) - self.sees(a)).norm_squared()))
+        let own = grid_at_height(self.size, height).map(|point| self.sees(point));
+        let others = grid_at_height(other.size, height).map(|point| other.sees(point));
+        let squares: Vec<f64> = own
+            .zip(others)
+            .map(|(a, b)| repaired_variance((b - a).norm_squared()))
             .collect();
         (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
     }

@@ -143,19 +143,23 @@ impl FoldedLines {
         let part = line.trim();
         match &mut self.list {
             _ if line.ends_with('[') => {
-                self.lines.extend(self.list.take());
+                self.close_list();
                 self.list = Some(line.to_owned());
             }
             Some(open) if part.starts_with(']') => {
                 *open = format!("{}{part}", open.trim_end());
-                self.lines.extend(self.list.take());
+                self.close_list();
             }
             Some(open) if is_number(part) => append_number(open, part),
             _ => {
-                self.lines.extend(self.list.take());
+                self.close_list();
                 self.lines.push(line.to_owned());
             }
         }
+    }
+
+    fn close_list(&mut self) {
+        self.lines.extend(self.list.take());
     }
 }
 

@@ -12,7 +12,7 @@ use crate::diagnostic::{Code, Diagnostic};
 
 /// A photo whose chi squared is beyond this contradicts the others: 0.01 % of two degrees of freedom.
 const OUTLIER_CHI2: f64 = 18.4;
-/// Of so many photos, one may be left out.
+/// One photo in this many may be left out.
 const PHOTOS_PER_OUTLIER: usize = 4;
 
 /// Photos of one camera, solved together.
@@ -34,7 +34,7 @@ pub struct OutlierPhoto {
 }
 
 impl OutlierPhoto {
-    /// What a person should know of it, to be read behind the photo's name.
+    /// A warning about it, to be read after the photo's name.
     pub fn diagnostic(&self) -> Diagnostic {
         let chi2 = self.chi2;
         let what = format!("contradicts the other photos (chi squared {chi2:.1}) and was left out");
@@ -54,10 +54,7 @@ pub fn solve_joint(labels: &[Label], options: &SolveOptions) -> Result<Joint, So
     if let Some(photo) = labels.iter().position(|l| !same_frame(l, &labels[0])) {
         return Err(SolveError::DifferentPictures { photo });
     }
-    let photos: Vec<_> = labels.iter().map(|label| solve(label, options)).collect();
-    if let Some(Err(error)) = photos.first().filter(|_| photos.iter().all(Result::is_err)) {
-        return Err(error.clone());
-    }
+    let photos = solve_alone(labels, options)?;
     let solver = JointSolver {
         labels,
         alone: &photos,
@@ -65,6 +62,21 @@ pub fn solve_joint(labels: &[Label], options: &SolveOptions) -> Result<Joint, So
     };
     let estimate = solver.whole_or_cropped()?;
     Ok(Joint::new(photos, estimate))
+}
+
+/// What each photo gives.
+///
+/// # Errors
+/// The first photo's where none gives anything.
+fn solve_alone(
+    labels: &[Label],
+    options: &SolveOptions,
+) -> Result<Vec<Result<Solution, SolveError>>, SolveError> {
+    let photos: Vec<_> = labels.iter().map(|label| solve(label, options)).collect();
+    match photos.first() {
+        Some(Err(error)) if photos.iter().all(Result::is_err) => Err(error.clone()),
+        _ => Ok(photos),
+    }
 }
 
 impl Joint {
@@ -150,11 +162,13 @@ impl JointSolver<'_> {
         let mut outliers = Vec::new();
         let most_outliers = self.labels.len() / PHOTOS_PER_OUTLIER;
         while !used.is_empty() {
-            let mut estimate = self.estimate_from(&used, unknown)?;
+            let estimate = self.estimate_from(&used, unknown)?;
             let worst = worst_photo(&estimate.chi2).filter(|_| outliers.len() < most_outliers);
             let Some((worst, chi2)) = worst else {
-                estimate.outliers = outliers;
-                return Ok(Some(estimate));
+                return Ok(Some(JointEstimate {
+                    outliers,
+                    ..estimate
+                }));
             };
             let photo = used.remove(worst);
             outliers.push(OutlierPhoto { photo, chi2 });
@@ -237,7 +251,7 @@ fn same_camera(a: &Label, b: &Label) -> bool {
     b.camera.id.is_some() && a.camera.id == b.camera.id && same_frame(a, b)
 }
 
-/// Two pictures show the same frame of a camera, in whatever number of pixels: in units of the diagonal, everything that a
+/// Two pictures show the same frame of a camera, at any resolution: in units of the diagonal, everything that a
 /// camera's photos share is then the same.
 fn same_frame(a: &Label, b: &Label) -> bool {
     if is_part(a) || is_part(b) {

@@ -262,6 +262,13 @@ impl Label {
     }
 }
 
+impl LabelSurface {
+    /// The length of a side is stated.
+    pub(crate) fn has_side(&self) -> bool {
+        self.width_m.is_some() || self.height_m.is_some()
+    }
+}
+
 impl LabelCamera {
     fn states_principal_point(&self) -> bool {
         self.principal_point_px.is_some() || self.principal_point_sigma_px.is_some()
@@ -359,7 +366,7 @@ fn missing_message(keys: &[String]) -> String {
     format!("missing {key} {names}; `petcomp camera init PHOTO --size WxH` writes them")
 }
 
-/// Keys of which a label needs one or another, where it has none.
+/// Alternative keys, where a label has none of them.
 fn missing_alternatives(value: &Value) -> impl Iterator<Item = String> {
     let corners = lacks_all(value, &["/surface/corners_px", "/markers", "/points"])
         .then_some("surface.corners_px (or markers)");

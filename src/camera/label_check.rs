@@ -1,4 +1,4 @@
-//! Numbers of a label that cannot be right.
+//! Checks for impossible numbers in a label.
 
 use super::error::SolveError;
 use super::label::{Label, LabelCamera, LabelPoint, LabelSurface};

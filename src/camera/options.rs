@@ -13,7 +13,7 @@ pub struct SolveOptions {
     pub reference_height: Option<f64>,
     /// Warn where a point at that height is known no better than to this, pixels. Default: 0.0015 picture diagonals.
     pub max_height_sigma_px: Option<f64>,
-    /// At most so many iterations of the refinement, from the closed form alone; 0 is the closed form itself. Default: none,
+    /// Largest number of iterations of the refinement, from the closed form alone; 0 is the closed form itself. Default: none,
     /// from every start until nothing changes any more.
     ///
     /// With a limit, other poses are not searched for, EXIF data and the order of the sides are trusted, and the standard
@@ -36,7 +36,7 @@ pub enum CornerOrder {
 /// Standard deviations of what a label leaves open; 0 fixes the default value, infinity makes the prior flat.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Priors {
-    /// Relative, of a focal length of which nothing is known; its median is the picture's longer side.
+    /// Relative, of an unknown focal length; its median is the picture's longer side.
     /// Default: 0.35 (two lenses of three are between 25 and 51 mm equivalent).
     pub focal_sigma: f64,
     /// Of the principal point of a whole picture, in picture diagonals. Default: 0.005.

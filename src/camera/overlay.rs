@@ -18,7 +18,7 @@ const LABEL_COLOR: LinearRgb = linear_rgb(0.9, 0.0, 0.35);
 const GRID_WEIGHT: f64 = 0.6;
 const BOX_WEIGHT: f64 = 1.0;
 const RECTANGLE_WEIGHT: f64 = 1.5;
-/// A line is one pixel wide for so many pixels of the picture's longer side.
+/// Pixels of the picture's longer side for each pixel of a line's width.
 const SIDE_PER_LINE_WIDTH: f64 = 800.0;
 /// Error ellipses are drawn this many standard deviations large, to be seen at all.
 const ELLIPSE_SIGMAS: f64 = 10.0;
@@ -27,7 +27,7 @@ const ELLIPSE_POINTS: usize = 48;
 const MAX_GRID_LINES: f64 = 12.0;
 /// Half an arm of the cross at a labelled corner, in line widths.
 const CROSS_ARM: f64 = 5.0;
-/// The legend is drawn for a picture of at least half so many columns and no more than so many, and enlarged to this one.
+/// The legend is drawn at half this many to this many columns and enlarged to the picture's.
 const LEGEND_COLUMNS: usize = 1600;
 /// Room around the legend and between a mark and its text, and the side of a mark, pixels.
 const MARGIN_PX: usize = 8;
@@ -87,7 +87,7 @@ impl LegendEntry {
         }
     }
 
-    /// Lines of so many columns at most, the mark beside the first.
+    /// Lines of at most `columns` columns, the mark beside the first.
     fn wrapped(&self, columns: usize) -> impl Iterator<Item = Self> {
         let lines = draw::wrapped(&self.text, columns, LEGEND_SIZE);
         lines.into_iter().enumerate().map(|(i, text)| Self {
@@ -334,7 +334,7 @@ fn on_ellipse(sigmas: &Vector2<f64>, i: usize) -> Vector2<f64> {
     Vector2::new(radii.x * libm::cos(angle), radii.y * libm::sin(angle))
 }
 
-/// The pixels of a row or column of so many that are within a distance of an interval.
+/// The pixels of a row or column of `count` that are within a distance of an interval.
 fn range_near([p, q]: [f64; 2], reach: f64, count: usize) -> std::ops::Range<usize> {
     let from = (p.min(q) - reach).clamp(0.0, count as f64);
     let to = (p.max(q) + reach).clamp(0.0, count as f64);

@@ -1,4 +1,4 @@
-//! Priors: what is known of the unknowns before the picture is measured, a mean and a standard deviation each.
+//! Priors: what is known about the unknowns before the picture is measured, a mean and a standard deviation each.
 
 use super::model::{KAPPA, LN_FOCAL, PRINCIPAL, STRETCH, Square, State, Unknowns, clear_unknown};
 

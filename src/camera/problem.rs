@@ -19,7 +19,7 @@ use nalgebra::Vector3;
 const MAX_FOCAL_SIDES: f64 = 100.0;
 /// Noise of a corner that a person clicked, pixels.
 const CLICKED_SIGMA_PX: f64 = 1.0;
-/// Relative noise of a camera height of which only the value is stated.
+/// Relative noise of a camera height that is stated without a standard deviation.
 const STATED_HEIGHT_SIGMA: f64 = 0.03;
 
 /// The units of the solver, and what they stand for.
@@ -67,23 +67,23 @@ impl Problem {
         options: &SolveOptions,
     ) -> Result<Self, SolveError> {
         check_label(label)?;
-        let priors = &options.priors;
         let sides = MeasuredSides::new(label, options)?;
         let stretch_shares = sides.stretch_shares();
         let (corners_px, warnings) = used_corners(label, sides, options)?;
         let units = SolverUnits::for_picture(label);
-        let (ln_focal, prior_source) = units.focal_prior(label, framing, priors);
-        let prior_focal = libm::exp(ln_focal.mean);
-        let kappa = kappa_prior(label, focal.unwrap_or(prior_focal), priors);
-        let projected = units.projected(&corners_px, kappa.mean);
+        let (priors, prior_source) = units.lens_priors(label, framing, focal, &options.priors);
+        let projected = units.projected(&corners_px, priors.kappa.mean);
+        let prior_focal = libm::exp(priors.ln_focal.mean);
         let size = sides.completed(|| ratio_by_right_angle(&projected, prior_focal));
         let units = units.for_rectangle(size);
-        let parameter_priors = ParameterPriors {
-            ln_focal,
-            stretch_sigma: sides.stretch_sigma(label, priors),
-            principal_sigma: principal_sigma(label, framing, priors),
-            kappa,
-            ln_height: height_prior(label, &units),
+        let residuals = Residuals {
+            observations: units.observations(label, size, &corners_px, stretch_shares),
+            priors: ParameterPriors {
+                stretch_sigma: sides.stretch_sigma(label, &options.priors),
+                ln_height: height_prior(label, &units),
+                ..priors
+            },
+            ln_focal_range: units.ln_focal_range(label),
         };
         Ok(Self {
             image: label.image_size(),
@@ -93,11 +93,7 @@ impl Problem {
             projected,
             size,
             stretch_shares,
-            residuals: Residuals {
-                observations: units.observations(label, size, &corners_px, stretch_shares),
-                priors: parameter_priors,
-                ln_focal_range: units.ln_focal_range(label),
-            },
+            residuals,
             prior_source,
             warnings,
         })
@@ -139,7 +135,7 @@ impl Problem {
     }
 }
 
-/// The corners, clockwise, labelled or predicted from the further points; and what is odd about them.
+/// The corners, clockwise, labelled or predicted from the further points, and warnings about them.
 fn used_corners(
     label: &Label,
     sides: MeasuredSides,
@@ -190,6 +186,27 @@ impl SolverUnits {
             unit: (size[0] * size[1]).sqrt(),
             ..self
         }
+    }
+
+    /// The priors of the lens, the others flat, and where that of the focal length comes from. A stated distortion is
+    /// for this focal length, or that of the prior.
+    fn lens_priors(
+        &self,
+        label: &Label,
+        framing: Framing,
+        focal: Option<f64>,
+        priors: &Priors,
+    ) -> (ParameterPriors, PriorSource) {
+        let (ln_focal, source) = self.focal_prior(label, framing, priors);
+        let focal = focal.unwrap_or(libm::exp(ln_focal.mean));
+        let lens = ParameterPriors {
+            ln_focal,
+            stretch_sigma: f64::INFINITY,
+            principal_sigma: principal_sigma(label, framing, priors),
+            kappa: kappa_prior(label, focal, priors),
+            ln_height: None,
+        };
+        (lens, source)
     }
 
     /// Prior of the logarithm of the focal length.

@@ -261,23 +261,24 @@ fn stem(path: &Path) -> String {
         .unwrap_or_default()
 }
 
-/// The label that another program's annotation means, its photo looked for beside the file.
+/// The label for another program's annotation, its photo searched for beside the file.
 fn imported_label(annotation: &Annotation, path: &Path) -> Result<LabelledPhoto> {
     let file = annotated_file(annotation, path);
     if file.is_empty() {
         return Err(Error::file(path, "no name of a picture"));
     }
+    let name = stem(Path::new(&file));
     let mut label = io::below("", &file)
         .and_then(|_| annotation.label())
         .map_err(|e| e.within(&file).in_file(path))?;
-    label.image.file.clone_from(&file);
     if annotation.size.is_none() {
         fill_in_size(&mut label, &path.with_file_name(&file))?;
     }
+    label.image.file = file;
     Ok(LabelledPhoto {
-        name: stem(Path::new(&file)),
         label,
         source: path.into(),
+        name,
     })
 }
 
@@ -308,8 +309,8 @@ fn possible_files(annotation: &Annotation) -> impl Iterator<Item = &str> {
 /// With the sides that were given where the label has none, and with its photo's EXIF data.
 fn completed(mut labelled: LabelledPhoto, size: Option<[f64; 2]>) -> Result<LabelledPhoto> {
     let surface = &mut labelled.label.surface;
-    if let (Some([w, h]), None, None) = (size, surface.width_m, surface.height_m) {
-        (surface.width_m, surface.height_m) = (Some(w), Some(h));
+    if let Some(size) = size.filter(|_| !surface.has_side()) {
+        [surface.width_m, surface.height_m] = size.map(Some);
     }
     check_size(&labelled.label).map_err(|e| e.in_file(&labelled.source))?;
     Ok(LabelledPhoto {

@@ -77,7 +77,7 @@ impl ProjectedRectangle {
         let up = -b.push(focal * dh);
         ScaledPose {
             rotation: rotation_between(&along, &up),
-            center: self.center.xy() / self.center.z,
+            center: self.center_on_picture(),
             scale: (along.norm() / size[0] + up.norm() / size[1]) / (2.0 * self.center.z),
         }
     }
@@ -99,19 +99,29 @@ impl ProjectedRectangle {
         let along = self.along.0 / (size[0] * self.center.z);
         let up = -self.down.0 / (size[1] * self.center.z);
         let squared = frontal_squared(&along, &up);
-        let [lean, other] = [along, up].map(|axis| leaning(axis.norm_squared(), squared));
-        let leans = [lean, if along.dot(&up) > 0.0 { -other } else { other }];
+        let leans = leanings(&along, &up, squared);
         let scale = squared.sqrt();
         [1.0, -1.0].map(|sign| {
             let x = (along / scale).push(sign * leans[0]);
             let y = (up / scale).push(sign * leans[1]);
             ScaledPose {
                 rotation: rotation_along_x(&x, &y),
-                center: self.center.xy() / self.center.z,
+                center: self.center_on_picture(),
                 scale,
             }
         })
     }
+
+    /// Where the rectangle's centre is seen.
+    fn center_on_picture(&self) -> Vector2<f64> {
+        self.center.xy() / self.center.z
+    }
+}
+
+/// The depth components of two axes at right angles to each other, up to a sign of both.
+fn leanings(along: &Vector2<f64>, up: &Vector2<f64>, squared: f64) -> [f64; 2] {
+    let [lean, other] = [along, up].map(|axis| leaning(axis.norm_squared(), squared));
+    [lean, if along.dot(up) > 0.0 { -other } else { other }]
 }
 
 /// The squared length of a unit seen from the front, from the pictures of two units at right angles to each other.

@@ -11,7 +11,7 @@ use nalgebra::{Matrix2, Matrix3};
 
 /// No pixel is the mean of more samples along an axis than this; beyond, they are taken from coarser levels.
 const MAX_SAMPLES: f64 = 32.0;
-/// Larger pictures are a typing error; so many take 800 MB.
+/// Larger pictures are treated as typing errors: this many pixels take 800 MB.
 const MAX_MAP_PIXELS: f64 = 67_108_864.0;
 
 /// The rectangle of `size` metres seen from straight above, `px_per_metre` pixels to the metre, its top left corner first.
@@ -62,7 +62,7 @@ pub fn project_picture<P: Mix>(picture: &Pyramid<P>, camera: &Camera, size: [f64
     warp(picture, &picture_from_photo, width, height)
 }
 
-/// Surface metres from the pixels of a map of so many.
+/// Surface metres from the pixels of a map of this size.
 fn surface_from_map(size: [f64; 2], pixels: [f64; 2]) -> Homography {
     let [x, y] = [size[0] / pixels[0], size[1] / pixels[1]];
     let rows = [

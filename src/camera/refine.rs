@@ -101,7 +101,7 @@ impl Residuals {
         self.refine_for(start, bar, MAX_ITERATIONS)
     }
 
-    /// The same, stopping after so many iterations.
+    /// The same, stopping after `max_iterations` iterations.
     pub(crate) fn refine_for(
         &self,
         start: State,

@@ -43,7 +43,7 @@ impl Problem {
         minima
     }
 
-    /// The closed form, where it stands above the surface, after at most so many iterations.
+    /// The closed form, where it stands above the surface, after at most `max_iterations` iterations.
     pub(crate) fn closed_form(&self, max_iterations: usize) -> Option<SearchResult> {
         let is_fixed = self.residuals.priors.ln_focal.is_fixed();
         let focal = self.closed_form_focal().filter(|_| !is_fixed);

@@ -14,7 +14,7 @@ use crate::geom::Point2;
 const MAX_SIDE_RATIO: f64 = 1e3;
 /// Points lower than this part of the shorter side lie on the surface, for a first guess.
 const ON_SURFACE_SHARE: f64 = 0.01;
-/// A surface more than so many times longer than the span of its points is poorly constrained by them.
+/// A surface longer than this multiple of the span of its points is poorly constrained by them.
 const MAX_SPAN_RATIO: f64 = 3.0;
 
 /// The measured sides, metres.

@@ -95,7 +95,7 @@ impl Scenario {
         }
     }
 
-    /// The same, tilted by so many degrees.
+    /// The same, tilted by `degrees`.
     pub fn tilted(self, degrees: f64) -> Self {
         Self {
             tilt: degrees.to_radians(),
@@ -173,6 +173,22 @@ impl Scenario {
 
     fn camera(&self, lens: &SharedLens, dice: &mut Dice) -> Camera {
         let rotation = self.rotation(dice);
+        let t = self.translation(lens, &rotation, dice);
+        Camera {
+            image: self.image,
+            focal_px: Vector2::repeat(self.focal_px),
+            principal_px: lens.principal_px,
+            camera_from_world: pose_from(*rotation.matrix(), t),
+        }
+    }
+
+    /// Where the rectangle's centre is in the camera's frame.
+    fn translation(
+        &self,
+        lens: &SharedLens,
+        rotation: &Rotation3<f64>,
+        dice: &mut Dice,
+    ) -> Vector3<f64> {
         let turned = corner_points(self.size).map(|p| rotation * p.coords);
         let distance = self.distance(&turned, Vector2::from(self.image.map(f64::from)));
         let bounds = self.extent(&turned, distance);
@@ -181,13 +197,7 @@ impl Scenario {
             let t = translation(center, distance, self.focal_px);
             -normal.dot(&t) > LEAST_HEIGHT * distance
         });
-        let t = translation(center, distance, self.focal_px);
-        Camera {
-            image: self.image,
-            focal_px: Vector2::repeat(self.focal_px),
-            principal_px: lens.principal_px,
-            camera_from_world: pose_from(*rotation.matrix(), t),
-        }
+        translation(center, distance, self.focal_px)
     }
 
     /// Where the rectangle's centre is seen, relative to the principal point, so that its bounds are in the picture: random

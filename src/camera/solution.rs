@@ -1,4 +1,4 @@
-//! A solved camera, and how far to trust it.
+//! A solved camera, and how reliable it is.
 
 use super::chi;
 use super::error::SolveError;
@@ -30,7 +30,7 @@ const HEIGHT_SIGMA_DIAGONALS: f64 = 0.0015;
 const POOR_FIT_P: f64 = 0.01;
 const REFUSED_FIT_P: f64 = 1e-4;
 
-/// A camera, and how far to trust it.
+/// A camera, and how reliable it is.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Solution {
     /// The camera; the labelled rectangle is the plane `z = 0`, centred.
@@ -54,9 +54,9 @@ pub struct Solution {
     pub fit: Fit,
     /// Standard deviations.
     pub sigma: Sigma,
-    /// What a person should look at.
+    /// Warnings to review.
     pub warnings: Vec<Diagnostic>,
-    /// Another camera that a person should know of; the warnings say why.
+    /// Another possible camera; the warnings explain why.
     pub alternative: Option<Box<Solution>>,
 }
 
@@ -150,7 +150,7 @@ impl Problem {
             framing: self.framing,
             focal_source: self.focal_source(minimum, &uncertainty.focal),
             focal: self.focal_finding(&uncertainty.focal),
-            rms_px: (per_corner_px.iter().map(|d| d * d).sum::<f64>() / 4.0).sqrt(),
+            rms_px: root_mean_square(&per_corner_px),
             fit: self.fit(minimum, &camera, per_corner_px, uncertainty.condition),
             sigma: self.sigma(minimum, uncertainty, options.height_of_objects(size)),
             warnings: self.warnings.clone(),
@@ -324,7 +324,7 @@ impl Solution {
             .unwrap_or(HEIGHT_SIGMA_DIAGONALS * libm::hypot(w, h))
     }
 
-    /// That objects on the surface may be seen at the wrong place, where they may.
+    /// The warning about objects on the surface that may be projected to the wrong place.
     pub(crate) fn height_warning(&self, options: &SolveOptions) -> Option<Diagnostic> {
         let (height, sigma_px) = (self.sigma.reference_height, self.sigma.height_px);
         let what = format!(
@@ -335,7 +335,7 @@ impl Solution {
             .then(|| Diagnostic::warning(Code::HeightUncertain, what))
     }
 
-    /// Adds what is odd about the solution by itself.
+    /// Adds the warnings about the solution by itself.
     fn add_warnings(&mut self, options: &SolveOptions) {
         let found = [
             self.grazing_warning(),
@@ -398,6 +398,10 @@ fn is_finite_camera(camera: &Camera) -> bool {
             .iter()
             .chain(center.iter())
             .all(|value| value.is_finite())
+}
+
+fn root_mean_square(distances: &[f64; 4]) -> f64 {
+    (distances.iter().map(|d| d * d).sum::<f64>() / 4.0).sqrt()
 }
 
 /// Depth of the farthest corner of a rectangle over that of the nearest.

@@ -1,4 +1,4 @@
-//! From a label to a camera, with a warning for everything that is odd about it.
+//! From a label to a camera, with a warning for everything unusual.
 
 use super::chi::CHI2_99;
 use super::error::SolveError;
@@ -148,7 +148,7 @@ fn search_with_stated_distortion(
     let mut problem = Problem::new(label, framing, options)?;
     let mut found = search(&problem, options)?;
     let prior = problem.residuals.priors.ln_focal;
-    if label.camera.k1.is_none_or(|k1| k1 == 0.0) || prior.is_fixed() {
+    if !states_distortion(label) || prior.is_fixed() {
         return Ok((problem, found));
     }
     let mut applied = prior.mean;
@@ -164,6 +164,10 @@ fn search_with_stated_distortion(
     Ok((problem, found))
 }
 
+fn states_distortion(label: &Label) -> bool {
+    label.camera.k1.is_some_and(|k1| k1 != 0.0)
+}
+
 fn search(problem: &Problem, options: &SolveOptions) -> Result<SearchResult, SolveError> {
     let found = match options.max_iterations {
         None => problem.search(),
@@ -172,7 +176,8 @@ fn search(problem: &Problem, options: &SolveOptions) -> Result<SearchResult, Sol
     found.ok_or(SolveError::NoPose)
 }
 
-/// Solves; where the picture contradicts its own EXIF value, solves again without that and keeps the first answer beside.
+/// Solves; where the picture contradicts its own EXIF value, solves again without that and keeps the first answer as the
+/// alternative.
 fn solve_without_wrong_exif(label: &Label, options: &SolveOptions) -> Result<Solution, SolveError> {
     let SolvedProblem {
         mut solution,

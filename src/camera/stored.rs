@@ -1,4 +1,4 @@
-//! Cameras that were solved before and lie beside their labels, and whether they still are those of their labels.
+//! Cameras that were solved before and lie beside their labels, and whether they still match them.
 
 use super::error::SolveError;
 use super::file::{CameraFile, SolvedFrom, checksum};
@@ -20,11 +20,11 @@ pub struct PhotoCamera {
     pub camera: Camera,
     /// Width and height of the rectangle as fitted, metres.
     pub size: [f64; 2],
-    /// What a person should look at.
+    /// Warnings to review.
     pub warnings: Vec<Diagnostic>,
     /// The camera was read from `NAME.camera.json`, not solved anew.
     pub stored: bool,
-    /// Why a stored camera was not used, in words.
+    /// Why a stored camera was not used.
     pub stale: Option<String>,
 }
 
@@ -48,7 +48,7 @@ pub(crate) fn photo_cameras(labels: &[LabelledPhoto], force: bool) -> Result<Vec
 }
 
 impl PhotoCamera {
-    /// The stored camera, unless it is not that of its label any more.
+    /// The stored camera, unless it does not match its label any more.
     fn new(
         labelled: &LabelledPhoto,
         file: Option<&CameraFile>,
@@ -84,14 +84,21 @@ impl PhotoCamera {
             true => solved,
             false => solved.and_then(Solution::fitting),
         };
-        let solution = usable.map_err(|error| located_error(error, labelled))?;
-        Ok(Self {
+        usable
+            .map(Self::from)
+            .map_err(|error| located_error(error, labelled))
+    }
+}
+
+impl From<Solution> for PhotoCamera {
+    fn from(solution: Solution) -> Self {
+        Self {
             camera: solution.camera,
             size: solution.size,
             warnings: solution.warnings,
             stored: false,
             stale: None,
-        })
+        }
     }
 }
 
@@ -129,8 +136,7 @@ fn checked_camera_file(path: &Path, labelled: &LabelledPhoto) -> Result<CameraFi
 
 /// The error of a label, or where its sides are missing, where to give them.
 fn located_error(error: SolveError, labelled: &LabelledPhoto) -> Error {
-    let surface = &labelled.label.surface;
-    if surface.width_m.is_some() || surface.height_m.is_some() {
+    if labelled.label.surface.has_side() {
         return Error::from(error).in_file(&labelled.source);
     }
     Error::file(
@@ -145,13 +151,13 @@ fn with_stored_size(labelled: &LabelledPhoto, file: Option<&CameraFile>) -> Labe
     let mut labelled = labelled.clone();
     let surface = &mut labelled.label.surface;
     let from = file.and_then(|f| f.solved_from.as_ref());
-    if let (None, None, Some(from)) = (surface.width_m, surface.height_m, from) {
+    if let Some(from) = from.filter(|_| !surface.has_side()) {
         [surface.width_m, surface.height_m] = from.size_m;
     }
     labelled
 }
 
-/// Why a camera is not that of its label any more; `known` are the labels that are there.
+/// Why a camera does not match its label any more; `known` are the labels that are there.
 fn staleness(
     file: &CameraFile,
     labelled: &LabelledPhoto,

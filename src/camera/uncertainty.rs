@@ -26,7 +26,7 @@ pub(crate) struct Uncertainty {
     pub(crate) condition: f64,
 }
 
-/// How much of what is known of the focal length comes from the picture, and how much from its prior.
+/// How much of the information about the focal length comes from the picture, and how much from its prior.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FocalShare {
     /// Standard deviation of its logarithm; infinite where nothing is known.
@@ -69,13 +69,18 @@ impl Uncertainty {
     pub(crate) fn tilt_sigma(&self, state: &State) -> f64 {
         let normal = state.pose.rotation.column(2);
         let sin = libm::hypot(normal.x, normal.y);
-        let c = &self.covariance;
         if sin < LEAST_TILT_SINE {
+            let c = &self.covariance;
             return ((c[(0, 0)] + c[(1, 1)]) / 2.0).sqrt();
         }
-        let (x, y) = (normal.y / sin, -normal.x / sin);
-        let variance = x * x * c[(0, 0)] + 2.0 * x * y * c[(0, 1)] + y * y * c[(1, 1)];
+        let variance = self.rotation_variance(normal.y / sin, -normal.x / sin);
         variance.max(0.0).sqrt()
+    }
+
+    /// Variance of the rotation about an axis in the picture's plane.
+    fn rotation_variance(&self, x: f64, y: f64) -> f64 {
+        let c = &self.covariance;
+        x * x * c[(0, 0)] + 2.0 * x * y * c[(0, 1)] + y * y * c[(1, 1)]
     }
 
     /// Covariance of the camera's place over the rectangle.
@@ -183,8 +188,14 @@ fn covariance(information: &Square) -> (Square, f64) {
         inverse += response * response.transpose() / left.max(ROUNDING_SHARE);
     }
     clear_uninformed(&mut inverse, information);
-    let covariance = inverse.component_mul(&(scale * scale.transpose()));
-    (covariance, unscaled_information(left, scale[LN_FOCAL]))
+    (
+        unscaled(&inverse, &scale),
+        unscaled_information(left, scale[LN_FOCAL]),
+    )
+}
+
+fn unscaled(covariance: &Square, scale: &Unknowns) -> Square {
+    covariance.component_mul(&(scale * scale.transpose()))
 }
 
 /// Information in an unknown's own unit; zero where there is only rounding.

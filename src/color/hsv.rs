@@ -28,22 +28,27 @@ pub struct Hsv {
 /// [Smith 1978]: https://doi.org/10.1145/965139.807361
 #[inline(always)]
 pub fn rgb_to_hsv(c: LinearRgb) -> Hsv {
-    let v = c.r.max(c.g).max(c.b);
+    let v = c.max_channel();
     let spread = v - c.r.min(c.g).min(c.b);
-    let sixths = if c.r == v {
-        (c.g - c.b) / spread
-    } else if c.g == v {
-        2.0 + (c.b - c.r) / spread
-    } else {
-        4.0 + (c.r - c.g) / spread
-    };
     let h = if spread == 0.0 {
         0.0
     } else {
-        turn(sixths / 6.0)
+        turn(hue_sixths(c, v, spread) / 6.0)
     };
     let s = if v == 0.0 { 0.0 } else { spread / v };
     Hsv { h, s, v }
+}
+
+/// Hue in sixths of a turn, from the largest channel and the spread of all.
+#[inline(always)]
+fn hue_sixths(c: LinearRgb, largest: f32, spread: f32) -> f32 {
+    if c.r == largest {
+        (c.g - c.b) / spread
+    } else if c.g == largest {
+        2.0 + (c.b - c.r) / spread
+    } else {
+        4.0 + (c.r - c.g) / spread
+    }
 }
 
 /// The colour of a hue, saturation and value; whole turns of the hue fall away, up to 2^31 of them.

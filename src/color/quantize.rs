@@ -129,9 +129,7 @@ impl<const CELL_BITS: u32> Encoder<CELL_BITS> {
         let last = 1.0_f32.to_bits() >> Self::REST_BITS;
         let mut code = 0;
         let cells = (first..=last).map(|number| {
-            while next_light(code, max) <= f32::from_bits(number << Self::REST_BITS) {
-                code += 1;
-            }
+            code = code_at(f32::from_bits(number << Self::REST_BITS), code, max);
             LightCell {
                 code,
                 next: next_light(code, max),
@@ -155,6 +153,14 @@ impl<const CELL_BITS: u32> Encoder<CELL_BITS> {
         let cell = &self.cells[number as usize];
         cell.code + u16::from(light >= cell.next)
     }
+}
+
+/// The code of some light, which is at least the given one.
+fn code_at(light: f32, mut code: u16, max: u16) -> u16 {
+    while next_light(code, max) <= light {
+        code += 1;
+    }
+    code
 }
 
 /// The least light of the next code; infinite after the last.

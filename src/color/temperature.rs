@@ -12,24 +12,9 @@ use crate::pixel::LinearRgb;
 /// system for HDTV applications", 2002).
 pub fn planckian(kelvin: f64) -> LinearRgb {
     let t = kelvin.clamp(MIN_KELVIN, MAX_KELVIN);
-    let x = polynomial(
-        if t <= 4000.0 {
-            X_BELOW_4000_K
-        } else {
-            X_ABOVE_4000_K
-        },
-        1.0 / t,
-    );
-    let y = polynomial(
-        if t <= 2222.0 {
-            Y_BELOW_2222_K
-        } else if t <= 4000.0 {
-            Y_BELOW_4000_K
-        } else {
-            Y_ABOVE_4000_K
-        },
-        x,
-    );
+    let (x_spline, y_spline) = splines_at(t);
+    let x = polynomial(x_spline, 1.0 / t);
+    let y = polynomial(y_spline, x);
     let xyz = [x / y, 1.0, (1.0 - x - y) / y].map(|v| v as f32);
     LinearRgb::from(ColorMatrix::linear_from_xyz().apply(xyz)).map(|v| v.max(0.0))
 }
@@ -45,6 +30,17 @@ const X_ABOVE_4000_K: [f64; 4] = [-3.025_846_9e9, 2.107_037_9e6, 0.222_634_7e3, 
 const Y_BELOW_2222_K: [f64; 4] = [-1.106_381_4, -1.348_110_20, 2.185_558_32, -0.202_196_83];
 const Y_BELOW_4000_K: [f64; 4] = [-0.954_947_6, -1.374_185_93, 2.091_370_15, -0.167_488_67];
 const Y_ABOVE_4000_K: [f64; 4] = [3.081_758_0, -5.873_386_70, 3.751_129_97, -0.370_014_83];
+
+/// The parts of the splines for x and for y that hold at a temperature.
+fn splines_at(kelvin: f64) -> ([f64; 4], [f64; 4]) {
+    if kelvin <= 2222.0 {
+        (X_BELOW_4000_K, Y_BELOW_2222_K)
+    } else if kelvin <= 4000.0 {
+        (X_BELOW_4000_K, Y_BELOW_4000_K)
+    } else {
+        (X_ABOVE_4000_K, Y_ABOVE_4000_K)
+    }
+}
 
 fn polynomial([a, b, c, d]: [f64; 4], v: f64) -> f64 {
     ((a * v + b) * v + c) * v + d

@@ -81,6 +81,10 @@ struct CodeScale {
 }
 
 impl CodeScale {
+    fn new(zero: f64, unit: f64) -> Self {
+        Self { zero, unit }
+    }
+
     fn code(self, signal: f64) -> f64 {
         self.zero + self.unit * signal
     }
@@ -94,24 +98,13 @@ impl CodeRange {
     /// Of luma and of the differences.
     fn scales(self) -> [CodeScale; 2] {
         match self {
-            Self::Full => {
-                [CodeScale {
-                    zero: 0.0,
-                    unit: 1.0,
-                }; 2]
-            }
+            Self::Full => [CodeScale::new(0.0, 1.0); 2],
             Self::Video { bits } => {
                 let max = libm::exp2(bits.into()) - 1.0;
                 let step = libm::exp2(f64::from(bits) - 8.0) / max;
                 [
-                    CodeScale {
-                        zero: 16.0 * step,
-                        unit: 219.0 * step,
-                    },
-                    CodeScale {
-                        zero: 128.0 * step,
-                        unit: 224.0 * step,
-                    },
+                    CodeScale::new(16.0 * step, 219.0 * step),
+                    CodeScale::new(128.0 * step, 224.0 * step),
                 ]
             }
         }

@@ -176,10 +176,7 @@ struct SheetLayout {
 impl SheetLayout {
     fn new(tiles: &[ContactTile], classes: &[String], options: &ContactSheetOptions) -> Self {
         let cell = cell_size(tiles);
-        let columns = match options.columns {
-            0 => pleasing_columns(tiles.len(), cell),
-            n => n.min(tiles.len().max(1)),
-        };
+        let columns = options.columns_for(tiles.len(), cell);
         let row = (columns * (cell[0] + GAP_PX)).saturating_sub(GAP_PX);
         let content = row.max(TextSize::Large.width(&options.title));
         let legend = legend_entries(classes, tiles, content);
@@ -334,6 +331,15 @@ fn draw_legend(sheet: &mut Image<Srgb8>, top: isize, entries: &[LegendEntry]) {
         draw::fill(sheet, mark, [MARK_PX, MARK_PX], entry.color);
         let text = [x + MARK_PX as isize + 8, y];
         draw::text(sheet, text, &entry.text, INK, TextSize::Small);
+    }
+}
+
+impl ContactSheetOptions {
+    fn columns_for(&self, count: usize, cell: [usize; 2]) -> usize {
+        match self.columns {
+            0 => pleasing_columns(count, cell),
+            columns => columns.min(count.max(1)),
+        }
     }
 }
 

@@ -100,18 +100,17 @@ impl ShardedDataset {
     fn open(folders: &[PathBuf]) -> Result<Self> {
         let opened = folders.iter().map(|folder| open_shard(folder));
         let opened: Vec<(Value, ShardShare)> = opened.collect::<Result<_>>()?;
-        let Some((first, share)) = opened.first() else {
+        let Some((first, ShardShare { shard, count })) = opened.first() else {
             return Err(Error::value("shards", "none, expected their folders"));
         };
-        let (of, count) = (share.shard.of, share.count);
         for (folder, (document, share)) in folders.iter().zip(&opened) {
-            check_same_dataset((first, of, count), (document, share), folder)?;
+            check_same_dataset((first, shard.of, *count), (document, share), folder)?;
         }
         let shares: Vec<Shard> = opened.iter().map(|(_, share)| share.shard).collect();
-        check_complete(folders, &shares, of)?;
+        check_complete(folders, &shares, shard.of)?;
         Ok(Self {
             document: first.as_object().cloned().unwrap_or_default(),
-            count,
+            count: *count,
             shares,
         })
     }

@@ -88,14 +88,8 @@ impl Listing {
         let all = self.series();
         let count = (all.len() as f64 * ratio).round() as usize;
         let [train, val] = match how {
-            Partition::Consecutive { guard } => {
-                let first_val = count.saturating_add(guard).min(all.len());
-                [all[..count].to_vec(), all[first_val..].to_vec()]
-            }
-            Partition::Random => {
-                let each_alone: Vec<String> = (0..all.len()).map(|i| i.to_string()).collect();
-                grouped(&all, &each_alone, count, seed)
-            }
+            Partition::Consecutive { guard } => consecutive(&all, count, guard),
+            Partition::Random => grouped(&all, &numbers_to(all.len()), count, seed),
             Partition::Grouped(group) => grouped(&all, &groups(&all, group)?, count, seed),
         };
         let classes = self.classes.clone();
@@ -188,6 +182,17 @@ fn selection_of(scene: &Scene) -> String {
     let mut photos: Vec<String> = photos.collect();
     photos.sort();
     photos.join(" ")
+}
+
+/// The first images, and those behind the ones that are left out.
+fn consecutive(images: &[PathBuf], train: usize, guard: usize) -> [Vec<PathBuf>; 2] {
+    let first_val = train.saturating_add(guard).min(images.len());
+    [images[..train].to_vec(), images[first_val..].to_vec()]
+}
+
+/// A group for each image.
+fn numbers_to(count: usize) -> Vec<String> {
+    (0..count).map(|i| i.to_string()).collect()
 }
 
 #[cfg(test)]

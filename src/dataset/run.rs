@@ -52,12 +52,7 @@ pub(super) fn run(
     let _lock = folder::claim(plan)?;
     plan.inputs.keep(&plan.folder);
     let journal = Journal::open(&plan.folder)?;
-    // One sample is made again whatever the number of the others.
-    let again = matches!(plan.range, SampleRange::One(_));
-    let count = match plan.range {
-        SampleRange::One(_) => plan.count.max(journal.end()),
-        _ => plan.count,
-    };
+    let count = expected_count(plan, &journal);
     check_nothing_beyond(&journal, count, plan)?;
     let run = DatasetRun {
         plan,
@@ -69,12 +64,16 @@ pub(super) fn run(
         began: Instant::now(),
     };
     run.report(&run.state());
-    let next = Mutex::new(plan.range.below(run.count));
-    run.work(run.missing(again), || {
-        let mut next = next.lock().unwrap_or_else(PoisonError::into_inner);
-        next.find(|&k| again || !run.state().journal.has(k))
-    })?;
+    run.make_all()?;
     run.finish()
+}
+
+/// One sample is made again whatever the number of the others.
+fn expected_count(plan: &Plan, journal: &Journal) -> u64 {
+    match plan.range {
+        SampleRange::One(_) => plan.count.max(journal.end()),
+        _ => plan.count,
+    }
 }
 
 /// A pool for each sample that is made at a time.
@@ -146,6 +145,16 @@ impl<F: Fn(u64) -> Result<(JournalLine, Times)> + Sync> DatasetRun<'_, F> {
         } else {
             count - done.min(count)
         }
+    }
+
+    /// Makes every sample that is not there, and a single one that is asked for in any case.
+    fn make_all(&self) -> Result<()> {
+        let again = matches!(self.plan.range, SampleRange::One(_));
+        let next = Mutex::new(self.plan.range.below(self.count));
+        self.work(self.missing(again), || {
+            let mut next = next.lock().unwrap_or_else(PoisonError::into_inner);
+            next.find(|&k| again || !self.state().journal.has(k))
+        })
     }
 
     fn goes_on(&self) -> bool {

@@ -50,12 +50,13 @@ impl DatasetConfig {
         let files = scene.files.as_ref().ok_or_else(no_files)?;
         let folder = path.parent().unwrap_or(Path::new(""));
         self.assets = folder.join(required(&files.assets, "assets", "the assets")?);
-        self.backgrounds = PathBuf::new();
-        if !scene.plate.is_empty() {
-            let content = format!("the photo \"{}\" and its label", scene.plate);
-            let backgrounds = required(&files.backgrounds, "backgrounds", &content)?;
-            self.backgrounds = folder.join(backgrounds);
-        }
+        self.backgrounds = match scene.plate.as_str() {
+            "" => PathBuf::new(),
+            plate => {
+                let content = format!("the photo \"{plate}\" and its label");
+                folder.join(required(&files.backgrounds, "backgrounds", &content)?)
+            }
+        };
         self.folder = folder.into();
         if let Some(environments) = &files.environments {
             self.folder = folder.join(environments);

@@ -190,12 +190,7 @@ impl<V: Fn(&str) -> Option<String>> JobEnvironment<V> {
     fn slurm_shard(&self, id: u64, of: Option<u64>) -> Result<Shard> {
         let first = self.number("SLURM_ARRAY_TASK_MIN")?.unwrap_or(0);
         let step = self.number("SLURM_ARRAY_TASK_STEP")?.unwrap_or(1).max(1);
-        let count = self.number("SLURM_ARRAY_TASK_COUNT")?;
-        let last = self.number("SLURM_ARRAY_TASK_MAX")?;
-        if let (Some(count), Some(last)) = (count, last) {
-            check_all_tasks(count, first, last, step)?;
-        }
-        let of = of.or(count).ok_or_else(|| {
+        let of = of.or(self.slurm_task_count(first, step)?).ok_or_else(|| {
             let what = "SLURM_ARRAY_TASK_COUNT is not set: say auto/N";
             Error::value("shard", what)
         })?;
@@ -204,6 +199,16 @@ impl<V: Fn(&str) -> Option<String>> JobEnvironment<V> {
             Error::value("SLURM_ARRAY_TASK_ID", what)
         })?;
         Shard::new((past / step).saturating_add(1), of)
+    }
+
+    /// Fails for an array with holes.
+    fn slurm_task_count(&self, first: u64, step: u64) -> Result<Option<u64>> {
+        let count = self.number("SLURM_ARRAY_TASK_COUNT")?;
+        let last = self.number("SLURM_ARRAY_TASK_MAX")?;
+        if let (Some(count), Some(last)) = (count, last) {
+            check_all_tasks(count, first, last, step)?;
+        }
+        Ok(count)
     }
 }
 

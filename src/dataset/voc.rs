@@ -84,16 +84,14 @@ impl Voc {
             ("difficult", label.ignored),
             ("occluded", !label.object.is_topmost()),
         ];
-        let mut xml =
-            format!("  <object>\n    <name>{name}</name>\n    <pose>Unspecified</pose>\n");
-        for (claim, is_so) in claims {
-            xml += &format!("    <{claim}>{}</{claim}>\n", u8::from(is_so));
-        }
-        xml += "    <bndbox>\n";
-        for (side, at) in pixels(&b) {
-            xml += &format!("      <{side}>{at}</{side}>\n");
-        }
-        xml + "    </bndbox>\n  </object>\n"
+        let claims =
+            claims.map(|(claim, is_so)| format!("    <{claim}>{}</{claim}>\n", u8::from(is_so)));
+        let sides = pixels(&b).map(|(side, at)| format!("      <{side}>{at}</{side}>\n"));
+        let (claims, sides) = (claims.concat(), sides.concat());
+        format!(
+            "  <object>\n    <name>{name}</name>\n    <pose>Unspecified</pose>\n{claims}    <bndbox>\n{sides}    </bndbox>\n  \
+             </object>\n"
+        )
     }
 }
 

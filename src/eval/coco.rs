@@ -78,17 +78,25 @@ pub fn coco(sheets: &[EvalImage], weights: &[u32]) -> CocoScores {
     );
     let classes = ByClass::new(sheets);
     let rankings = AreaRange::ALL.map(|range| rankings(&classes, range));
-    let [all, by_area @ ..] = rankings
+    let measured = rankings
         .each_ref()
         .map(|rankings| measured(rankings, weights));
-    CocoScores {
-        ap_by_area: by_area.each_ref().map(|m| over(m, |m| mean(m.ap))),
-        ar_by_count: MAX_DETECTIONS.map(|count| over(&all, |m| mean(m.recall_within(count)))),
-        ar_by_area: by_area.each_ref().map(|m| over(m, |m| mean(m.recall))),
-        scores: Scores {
-            definition: Definition::Coco,
-            classes: all.iter().map(Measured::scores).collect(),
-        },
+    CocoScores::from_measured(&measured)
+}
+
+impl CocoScores {
+    /// From what was measured in all areas, and in each range of them.
+    fn from_measured([all, by_area @ ..]: &[Vec<Measured<'_>>; 4]) -> Self {
+        let by_area = by_area.each_ref();
+        Self {
+            ap_by_area: by_area.map(|m| over(m, |m| mean(m.ap))),
+            ar_by_count: MAX_DETECTIONS.map(|count| over(all, |m| mean(m.recall_within(count)))),
+            ar_by_area: by_area.map(|m| over(m, |m| mean(m.recall))),
+            scores: Scores {
+                definition: Definition::Coco,
+                classes: all.iter().map(Measured::scores).collect(),
+            },
+        }
     }
 }
 
@@ -199,22 +207,27 @@ struct Target<'a> {
 fn match_image(image: &ImageBoxes<'_>, range: AreaRange) -> (Vec<Hit>, usize) {
     let mut targets = targets_of(image, range);
     let index = BoxIndex::new(targets.iter().map(|t| t.truth.bbox));
-    let mut hits = Vec::new();
-    for (place, found) in image.found.iter().take(MAX_DETECTIONS[2]).enumerate() {
-        let near = index.near(&found.bbox).into_iter();
-        let overlaps: Vec<(usize, f64)> = near
-            .map(|k| (k, overlap(found, targets[k].truth)))
-            .collect();
+    let surest = image.found.iter().take(MAX_DETECTIONS[2]).enumerate();
+    let hits = surest.map(|(place, found)| {
+        let overlaps = overlaps_with(found, &targets, &index);
         let (right, ignored) = marks(found, &mut targets, &overlaps, range);
-        hits.push(Hit {
+        Hit {
             confidence: found.confidence,
             sheet: image.sheet,
             place: place as u32,
             right,
             ignored,
-        });
-    }
+        }
+    });
+    let hits = hits.collect();
     (hits, targets.iter().filter(|t| !t.ignored).count())
+}
+
+/// Places of the targets near a detection, and how far they overlap it.
+fn overlaps_with(found: &Detection, targets: &[Target<'_>], index: &BoxIndex) -> Vec<(usize, f64)> {
+    let near = index.near(&found.bbox).into_iter();
+    near.map(|k| (k, overlap(found, targets[k].truth)))
+        .collect()
 }
 
 /// Those that count come first: a detection takes an ignored box only where none of them is left.

@@ -99,11 +99,9 @@ impl CocoTruth {
         let images = places("images", document.images.iter().map(|image| image.id))?;
         let categories = places("categories", document.categories.iter().map(|c| c.id))?;
         let records: Vec<&ImageRecord> = images.values().map(|&i| &document.images[i]).collect();
-        let names = categories.values();
-        let names = names.map(|&i| document.categories[i].name.clone());
         let mut truth = Self {
             sheets: records.iter().map(|image| image.to_sheet()).collect(),
-            classes: names.collect(),
+            classes: document.category_names(categories.values()),
             files: records.iter().map(|image| image.file()).collect(),
             images: images.keys().copied().zip(0..).collect(),
             categories: categories.into_keys().zip(0..).collect(),
@@ -276,6 +274,12 @@ fn corners([x, y, w, h]: [f64; 4]) -> Result<BBox> {
         [x, y, w, h]
     );
     Err(Error::value("bbox", what))
+}
+
+impl CocoDocument {
+    fn category_names<'a>(&self, places: impl Iterator<Item = &'a usize>) -> Vec<String> {
+        places.map(|&i| self.categories[i].name.clone()).collect()
+    }
 }
 
 #[cfg(test)]

@@ -33,22 +33,22 @@ pub(super) fn pairs(sheet: &EvalImage, options: &ConfusionOptions) -> Vec<BoxPai
 /// A detection and the free box that it overlaps most. The greatest comes first: of equal overlaps the first box, then
 /// the first detection.
 #[derive(Clone, Copy, PartialEq)]
-struct Candidate {
+struct PairCandidate {
     overlap: f64,
     truth: usize,
     found: usize,
 }
 
-impl Eq for Candidate {}
+impl Eq for PairCandidate {}
 
-impl Ord for Candidate {
+impl Ord for PairCandidate {
     fn cmp(&self, other: &Self) -> std::cmp::Ordering {
         let by_overlap = self.overlap.total_cmp(&other.overlap);
         by_overlap.then_with(|| (other.truth, other.found).cmp(&(self.truth, self.found)))
     }
 }
 
-impl PartialOrd for Candidate {
+impl PartialOrd for PairCandidate {
     fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
         Some(self.cmp(other))
     }
@@ -74,9 +74,10 @@ impl<'a> PairSearch<'a> {
 
     /// The box that each detection names.
     fn match_boxes(&mut self, found: &[usize]) -> Vec<Option<usize>> {
-        let mut open: BinaryHeap<Candidate> = found.iter().filter_map(|&f| self.best(f)).collect();
+        let mut open: BinaryHeap<PairCandidate> =
+            found.iter().filter_map(|&f| self.best(f)).collect();
         let mut matched = vec![None; self.sheet.found.len()];
-        while let Some(Candidate { truth, found, .. }) = open.pop() {
+        while let Some(PairCandidate { truth, found, .. }) = open.pop() {
             if self.taken[truth] {
                 // Its box has been taken; boxes only get fewer, so its next one is no better than this was.
                 open.extend(self.best(found));
@@ -98,13 +99,13 @@ impl<'a> PairSearch<'a> {
             })
     }
 
-    fn best(&self, found: usize) -> Option<Candidate> {
+    fn best(&self, found: usize) -> Option<PairCandidate> {
         let bbox = &self.sheet.found[found].bbox;
         self.index
             .near(bbox)
             .into_iter()
             .filter(|&t| !self.taken[t] && !self.sheet.truth[t].crowd)
-            .map(|t| Candidate {
+            .map(|t| PairCandidate {
                 overlap: iou(&self.sheet.truth[t].bbox, bbox),
                 truth: t,
                 found,

@@ -18,7 +18,7 @@ pub fn gaussian_blur<P: Mix>(image: &Image<P>, sigma_px: f32) -> Image<P> {
     }
     work::add(Kind::Filters, 1);
     let [columns, rows] =
-        [image.width(), image.height()].map(|len| gaussian(len, f64::from(sigma_px)));
+        [image.width(), image.height()].map(|len| gaussian_taps(len, f64::from(sigma_px)));
     filter(image, &columns, &rows)
 }
 
@@ -29,19 +29,19 @@ pub fn box_blur<P: Mix>(image: &Image<P>, radius: usize) -> Image<P> {
         return image.clone();
     }
     work::add(Kind::Filters, 1);
-    let [columns, rows] = [image.width(), image.height()].map(|len| windows(len, radius, |_| 1.0));
+    let [columns, rows] =
+        [image.width(), image.height()].map(|len| window_taps(len, radius, |_| 1.0));
     filter(image, &columns, &rows)
 }
 
 /// A Gaussian around every sample of a line.
-fn gaussian(len: usize, sigma: f64) -> Vec<Taps> {
-    windows(len, (GAUSSIAN_REACH_SIGMAS * sigma).ceil() as usize, |d| {
-        libm::exp(-0.5 * (d as f64 / sigma).powi(2))
-    })
+fn gaussian_taps(len: usize, sigma: f64) -> Vec<Taps> {
+    let reach = (GAUSSIAN_REACH_SIGMAS * sigma).ceil() as usize;
+    window_taps(len, reach, |d| libm::exp(-0.5 * (d as f64 / sigma).powi(2)))
 }
 
 /// Around every sample of a line, weights by a function of the distance, out to `reach`.
-fn windows(len: usize, reach: usize, weight: impl Fn(isize) -> f64) -> Vec<Taps> {
+fn window_taps(len: usize, reach: usize, weight: impl Fn(isize) -> f64) -> Vec<Taps> {
     let reach = reach.min(len) as isize;
     (0..len as isize)
         .map(|i| Taps::new(i - reach..i + reach + 1, len, |j| weight(j - i)))

@@ -19,9 +19,7 @@ pub fn depth(mask: &Mask) -> Image<f32> {
     let mut out = Image::new(width, height);
     out.par_rows_mut()
         .zip(columns.par_chunks_exact(width.max(1)))
-        .for_each(|(row, columns)| {
-            nearest(row, columns);
-        });
+        .for_each(|(row, columns)| fill_row(row, columns));
     out
 }
 
@@ -34,26 +32,28 @@ struct Parabola {
 
 impl Parabola {
     /// Where another one crosses it, whose foot is farther right.
+    #[inline]
     fn crossing(&self, foot: f64, floor: f64) -> f64 {
         0.5 * ((floor + foot * foot) - (self.floor + self.foot * self.foot)) / (foot - self.foot)
+    }
+
+    #[inline]
+    fn height_at(&self, x: f64) -> f64 {
+        self.floor + (x - self.foot).powi(2)
     }
 }
 
 /// The distances along one row whose columns are so far from their nearest unset pixel.
-fn nearest(row: &mut [f32], columns: &[u32]) {
+fn fill_row(row: &mut [f32], columns: &[u32]) {
     let envelope = lower_envelope(columns);
     let mut lowest = 0;
     for (x, pixel) in row.iter_mut().enumerate() {
-        while envelope
-            .get(lowest + 1)
-            .is_some_and(|next| next.from <= x as f64)
-        {
+        let x = x as f64;
+        while envelope.get(lowest + 1).is_some_and(|p| p.from <= x) {
             lowest += 1;
         }
-        let square = envelope
-            .get(lowest)
-            .map_or(f64::INFINITY, |p| p.floor + (x as f64 - p.foot).powi(2));
-        *pixel = square.sqrt() as f32;
+        let square = envelope.get(lowest).map(|p| p.height_at(x));
+        *pixel = square.unwrap_or(f64::INFINITY).sqrt() as f32;
     }
 }
 
@@ -61,19 +61,27 @@ fn nearest(row: &mut [f32], columns: &[u32]) {
 fn lower_envelope(columns: &[u32]) -> Vec<Parabola> {
     let mut envelope: Vec<Parabola> = Vec::new();
     for (x, &column) in columns.iter().enumerate().filter(|(_, c)| **c < u32::MAX) {
-        let (foot, floor) = (x as f64, f64::from(column) * f64::from(column));
-        while envelope
-            .last()
-            .is_some_and(|last| last.crossing(foot, floor) <= last.from)
-        {
-            envelope.pop();
-        }
-        let from = envelope
-            .last()
-            .map_or(f64::NEG_INFINITY, |last| last.crossing(foot, floor));
-        envelope.push(Parabola { foot, floor, from });
+        push_lowest(
+            &mut envelope,
+            x as f64,
+            f64::from(column) * f64::from(column),
+        );
     }
     envelope
+}
+
+/// Adds a parabola farther right, in place of those that are the lowest nowhere any more.
+fn push_lowest(envelope: &mut Vec<Parabola>, foot: f64, floor: f64) {
+    let mut from = f64::NEG_INFINITY;
+    while let Some(last) = envelope.last() {
+        let crossing = last.crossing(foot, floor);
+        if crossing > last.from {
+            from = crossing;
+            break;
+        }
+        envelope.pop();
+    }
+    envelope.push(Parabola { foot, floor, from });
 }
 
 #[cfg(test)]

@@ -24,9 +24,7 @@ pub fn dilate(mask: &Mask, radius_px: f64) -> Mask {
     let mut out = Image::new(mask.width(), mask.height());
     out.par_rows_mut()
         .zip(distances.par_chunks_exact(mask.width().max(1)))
-        .for_each(|(row, distances)| {
-            mark(row, distances, &reach);
-        });
+        .for_each(|(row, distances)| mark_reached(row, distances, &reach));
     out
 }
 
@@ -40,19 +38,21 @@ pub(crate) fn erode(mask: &Mask, radius_px: f64) -> Mask {
 /// How far a set pixel reaches sideways at each vertical distance; farther than the list goes it does not reach.
 fn reach_by_distance(mask: &Mask, radius: f64) -> Vec<usize> {
     let last = radius.min(mask.height() as f64) as usize;
-    let sideways = |d: usize| ((radius - d as f64) * (radius + d as f64)).sqrt();
     (0..=last)
-        .map(|d| sideways(d).min(mask.width() as f64) as usize)
+        .map(|d| chord_half(radius, d as f64).min(mask.width() as f64) as usize)
         .collect()
+}
+
+/// Half the chord of a circle at a distance from its centre.
+fn chord_half(radius: f64, distance: f64) -> f64 {
+    ((radius - distance) * (radius + distance)).sqrt()
 }
 
 /// For every pixel the distance to the nearest set pixel of its column; very large where there is none.
 pub(super) fn vertical_distances(mask: &Mask) -> Vec<u32> {
     let (width, height) = mask.size();
-    let mut distances = vec![u32::MAX; width * height];
-    for (distance, &set) in distances.iter_mut().zip(mask.pixels()) {
-        *distance = if set { 0 } else { u32::MAX };
-    }
+    let pixels = mask.pixels().iter();
+    let mut distances: Vec<u32> = pixels.map(|&set| if set { 0 } else { u32::MAX }).collect();
     for y in 1..height {
         let (above, below) = distances.split_at_mut(y * width);
         one_farther(&above[(y - 1) * width..], &mut below[..width]);
@@ -72,16 +72,19 @@ fn one_farther(neighbors: &[u32], distances: &mut [u32]) {
 }
 
 /// Sets what the columns' nearest pixels reach along one row: from the left what lies right of them, then the rest.
-fn mark(row: &mut [bool], distances: &[u32], reach: &[usize]) {
-    let sideways = |distance: u32| reach.get(distance as usize);
+fn mark_reached(row: &mut [bool], distances: &[u32], reach: &[usize]) {
     let mut end = 0;
     for (x, (pixel, &distance)) in row.iter_mut().zip(distances).enumerate() {
-        end = sideways(distance).map_or(end, |s| end.max(x + s + 1));
+        if let Some(sideways) = reach.get(distance as usize) {
+            end = end.max(x + sideways + 1);
+        }
         *pixel = x < end;
     }
     let mut start = row.len();
     for (x, (pixel, &distance)) in row.iter_mut().zip(distances).enumerate().rev() {
-        start = sideways(distance).map_or(start, |s| start.min(x.saturating_sub(*s)));
+        if let Some(sideways) = reach.get(distance as usize) {
+            start = start.min(x.saturating_sub(*sideways));
+        }
         *pixel |= x >= start;
     }
 }

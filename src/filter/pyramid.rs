@@ -62,7 +62,7 @@ pub fn halve<P: Mix>(image: &Image<P>) -> Image<P> {
 
 fn halved<P: Mix>(image: &Image<P>) -> Image<P> {
     let [columns, rows] = [image.width(), image.height()].map(|len| {
-        lines(len.div_ceil(2), |i| {
+        line_taps(len.div_ceil(2), |i| {
             Taps::new(2 * i..2 * i + 2, len, |_| 1.0)
         })
     });
@@ -80,12 +80,15 @@ fn halved<P: Mix>(image: &Image<P>) -> Image<P> {
 /// [Burt and Adelson 1983]: https://doi.org/10.1109/TCOM.1983.1095851
 pub fn reduce<P: Mix>(image: &Image<P>) -> Image<P> {
     work::add(Kind::Filters, 1);
-    let [columns, rows] = [image.width(), image.height()].map(|len| {
-        lines(len.div_ceil(2), |i| {
-            Taps::new(2 * i - 2..2 * i + 3, len, |j| binomial(j - 2 * i))
-        })
-    });
+    let [columns, rows] = [image.width(), image.height()].map(reducing_taps);
     filter(image, &columns, &rows)
+}
+
+/// From a line of `len` to one of half that.
+fn reducing_taps(len: usize) -> Vec<Taps> {
+    line_taps(len.div_ceil(2), |i| {
+        Taps::new(2 * i - 2..2 * i + 3, len, |j| binomial(j - 2 * i))
+    })
 }
 
 /// The inverse of [`reduce`]: a smooth picture of `width` x `height` through the pixels of one of half that size.
@@ -103,16 +106,22 @@ pub fn expand<P: Mix>(image: &Image<P>, width: usize, height: usize) -> Image<P>
     let half = (width.div_ceil(2), height.div_ceil(2));
     assert_eq!(image.size(), half, "not half of {width} x {height}");
     work::add(Kind::Filters, 1);
-    let [columns, rows] = [(half.0, width), (half.1, height)].map(|(from, to)| {
-        lines(to, |i| {
-            Taps::new(i / 2 - 1..i / 2 + 2, from, |j| binomial(2 * j - i))
-        })
-    });
+    let (columns, rows) = (
+        expanding_taps(half.0, width),
+        expanding_taps(half.1, height),
+    );
     filter(image, &columns, &rows)
 }
 
+/// From a line of `from`, half as long, to one of `to`.
+fn expanding_taps(from: usize, to: usize) -> Vec<Taps> {
+    line_taps(to, |i| {
+        Taps::new(i / 2 - 1..i / 2 + 2, from, |j| binomial(2 * j - i))
+    })
+}
+
 /// The taps of every sample of a line.
-fn lines(len: usize, taps: impl Fn(isize) -> Taps) -> Vec<Taps> {
+fn line_taps(len: usize, taps: impl Fn(isize) -> Taps) -> Vec<Taps> {
     (0..len as isize).map(taps).collect()
 }
 

@@ -15,23 +15,21 @@ pub fn resize<P: Mix>(image: &Image<P>, width: usize, height: usize) -> Image<P>
         return image.clone();
     }
     work::add(Kind::Filters, 1);
-    filter(
-        image,
-        &taps(image.width(), width),
-        &taps(image.height(), height),
-    )
+    let columns = scaling_taps(image.width(), width);
+    let rows = scaling_taps(image.height(), height);
+    filter(image, &columns, &rows)
 }
 
-fn taps(from: usize, to: usize) -> Vec<Taps> {
+fn scaling_taps(from: usize, to: usize) -> Vec<Taps> {
     let scale = from as f64 / to as f64;
     let half_width = scale.max(1.0);
     (0..to)
-        .map(|i| triangle((i as f64 + 0.5) * scale, half_width, from))
+        .map(|i| triangle_around((i as f64 + 0.5) * scale, half_width, from))
         .collect()
 }
 
 /// A triangle around `center` of a line of `len` samples.
-fn triangle(center: f64, half_width: f64, len: usize) -> Taps {
+fn triangle_around(center: f64, half_width: f64, len: usize) -> Taps {
     let window = (center - half_width).floor() as isize..(center + half_width).ceil() as isize;
     Taps::new(window, len, |j| {
         1.0 - ((j as f64 + 0.5 - center) / half_width).abs()

@@ -41,15 +41,21 @@ pub(crate) fn sample_nearest<P: Copy>(image: &Image<P>, x: f64, y: f64) -> Optio
     inside.then(|| image[(x as usize, y as usize)])
 }
 
+/// The last pixel whose centre is not beyond a coordinate, and how far beyond it that is.
+#[inline(always)]
+fn index_and_rest(x: f64) -> (isize, f32) {
+    let before = (x - 0.5).floor();
+    let rest = (x - 0.5 - before) as f32;
+    // Far beyond any picture, so that the next pixel's index does not overflow.
+    (before.clamp(-1e15, 1e15) as isize, rest)
+}
+
 #[inline(always)]
 fn bilinear<P: Mix>(at: impl Fn(isize, isize) -> P, x: f64, y: f64) -> P {
     if !(x.is_finite() && y.is_finite()) {
         return P::default();
     }
-    let (left, top) = ((x - 0.5).floor(), (y - 0.5).floor());
-    let (u, v) = ((x - 0.5 - left) as f32, (y - 0.5 - top) as f32);
-    // Far beyond any picture, so that the next pixel's index does not overflow.
-    let [i, j] = [left, top].map(|edge| edge.clamp(-1e15, 1e15) as isize);
+    let ((i, u), (j, v)) = (index_and_rest(x), index_and_rest(y));
     P::default()
         .add_scaled((1.0 - u) * (1.0 - v), at(i, j))
         .add_scaled(u * (1.0 - v), at(i + 1, j))

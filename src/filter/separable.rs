@@ -21,17 +21,12 @@ impl Taps {
         len: usize,
         weight: impl Fn(isize) -> f64,
     ) -> Self {
-        let last = window.end.min(len as isize);
-        let inside = window.start.max(0)..last;
-        let first = inside.clone().find(|&i| weight(i) > 0.0).unwrap_or(last);
-        let end = inside
-            .rev()
-            .find(|&i| weight(i) > 0.0)
-            .map_or(first, |i| i + 1);
-        let sum: f64 = (first..end).map(&weight).sum();
+        let inside = window.start.max(0)..window.end.min(len as isize);
+        let range = without_weightless_ends(inside, &weight);
+        let sum: f64 = range.clone().map(&weight).sum();
         Self {
-            first: first.max(0) as usize,
-            weights: (first..end).map(|i| (weight(i) / sum) as f32).collect(),
+            first: range.start.max(0) as usize,
+            weights: range.map(|i| (weight(i) / sum) as f32).collect(),
         }
     }
 
@@ -45,6 +40,17 @@ impl Taps {
         let samples = line[self.first..].iter().zip(&self.weights);
         samples.fold(P::default(), |sum, (&p, &w)| sum.add_scaled(w, p))
     }
+}
+
+/// The part of a range between its first and its last sample that weigh something.
+fn without_weightless_ends(
+    range: std::ops::Range<isize>,
+    weight: impl Fn(isize) -> f64,
+) -> std::ops::Range<isize> {
+    let mut weighty = range.clone().filter(|&i| weight(i) > 0.0);
+    let last = weighty.clone().next_back();
+    let first = weighty.next().unwrap_or(range.end);
+    first..last.map_or(first, |last| last + 1)
 }
 
 /// Output pixels that are worked on together, few enough for their sums to stay in the first cache.
@@ -63,16 +69,21 @@ pub(super) fn filter<P: Mix>(image: &Image<P>, columns: &[Taps], rows: &[Taps]) 
     let mut out = Image::new(columns.len(), rows.len());
     out.par_rows_mut().zip(rows).for_each_init(
         || vec![P::default(); image.width()],
-        |mixed, (mut out, taps)| {
+        |mixed, (out, taps)| {
             mix_rows(image, taps, mixed);
-            for run in &runs {
-                let (here, rest) = out.split_at_mut(run.len());
-                mix_along(mixed, run, here);
-                out = rest;
-            }
+            mix_runs(mixed, &runs, out);
         },
     );
     out
+}
+
+/// A row of output pixels, run by run, from a mixed row.
+fn mix_runs<P: Mix>(line: &[P], runs: &[&[Taps]], mut out: &mut [P]) {
+    for run in runs {
+        let (here, rest) = out.split_at_mut(run.len());
+        mix_along(line, run, here);
+        out = rest;
+    }
 }
 
 /// The rows of a picture that the taps name, mixed to one.

@@ -98,8 +98,8 @@ impl Quad {
         let t = self.plane().intersect(ray)?;
         let local = self.world_from_card.inverse_transform_point(&ray.at(t));
         let uv = Point2::new(local.x / self.size[0] + 0.5, 0.5 - local.y / self.size[1]);
-        let inside = (0.0..=1.0).contains(&uv.x) && (0.0..=1.0).contains(&uv.y);
-        inside.then_some((t, uv))
+        let is_inside = uv.iter().all(|v| (0.0..=1.0).contains(v));
+        is_inside.then_some((t, uv))
     }
 }
 
@@ -136,10 +136,7 @@ impl Line {
         if points.len() < 2 {
             return None;
         }
-        let mean = points
-            .iter()
-            .fold(Vector2::zeros(), |sum, p| sum + p.coords)
-            / points.len() as f64;
+        let mean = mean_point(points);
         let angle = main_direction(points, mean);
         let normal = Vector2::new(-libm::sin(angle), libm::cos(angle));
         Some(Self {
@@ -161,6 +158,24 @@ impl Line {
         let p = Point2::new(x / det, y / det);
         (det.abs() > MIN_ANGLE_RAD && p.coords.iter().all(|v| v.is_finite())).then_some(p)
     }
+}
+
+/// The corners of a quadrangle whose sides are on these lines, the first between the last line and the first; none where
+/// neighbours are nearly parallel.
+pub(crate) fn corners_between(sides: &[Line; 4]) -> Option<[Point2<f64>; 4]> {
+    let mut corners = [Point2::origin(); 4];
+    for (i, corner) in corners.iter_mut().enumerate() {
+        *corner = sides[(i + 3) % 4].meeting(&sides[i])?;
+    }
+    Some(corners)
+}
+
+/// The mean of points, as an offset from the origin.
+pub(crate) fn mean_point(points: &[Point2<f64>]) -> Vector2<f64> {
+    let sum = points
+        .iter()
+        .fold(Vector2::zeros(), |sum, p| sum + p.coords);
+    sum / points.len() as f64
 }
 
 /// The direction in which points spread most around their mean, radians from x.

@@ -109,16 +109,19 @@ pub(crate) fn fold_samples(
         for x in 0..deep.width() {
             sample_count += deep.at(x, y).len();
             for sample in deep.at(x, y) {
-                let Ok(i) = ids.binary_search(&sample.object) else {
-                    continue;
-                };
-                tallies[i].add(x, y, sample, options.alpha_threshold);
+                if let Ok(i) = ids.binary_search(&sample.object) {
+                    tallies[i].add(x, y, sample, options.alpha_threshold);
+                }
             }
         }
     }
-    work::add_all([
-        (Kind::LabelSamples, sample_count as u64),
-        (Kind::Masks, 2 * ids.len() as u64),
-    ]);
+    count_work(sample_count, ids.len());
     tallies.into_iter().map(VisibilityTally::finish).collect()
+}
+
+fn count_work(samples: usize, objects: usize) {
+    work::add_all([
+        (Kind::LabelSamples, samples as u64),
+        (Kind::Masks, 2 * objects as u64),
+    ]);
 }

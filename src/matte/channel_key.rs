@@ -1,6 +1,7 @@
 //! Channel Key: one channel of some colour space against the others.
 
 use super::key::{Photo, Profile, from_ycc, to_ycc};
+use super::screen::other_channels;
 use crate::image::Image;
 use crate::pixel::{Coverage, PremulRgba};
 use serde::{Deserialize, Serialize};
@@ -85,61 +86,84 @@ pub struct ChannelKeyed {
 pub fn channel_key<P: Photo>(photo: &Image<P>, opts: &ChannelKeyOptions) -> ChannelKeyed {
     let matte = photo.map(|p| {
         let p = p.premul();
-        Coverage(alpha_of(to_space(p, opts), p.a, opts))
+        Coverage(opts.alpha(to_space(p, opts), p.a))
     });
-    let cutout = photo.zip_map(&matte, |p, m| {
-        let p = p.premul();
-        if opts.profile == Profile::Blender45 || opts.color_space == KeySpace::Rgb {
-            return p.masked(m);
-        }
-        let [x, y, z] = to_space(p, opts).map(|v| v * m.0);
-        let [r, g, b] = from_space([x, y, z], opts.color_space);
-        PremulRgba::new(r, g, b, p.a * m.0)
-    });
+    let cutout = photo.zip_map(&matte, |p, m| opts.masked(p.premul(), m));
     ChannelKeyed { matte, cutout }
 }
 
-fn alpha_of(c: [f32; 3], alpha: f32, opts: &ChannelKeyOptions) -> f32 {
-    let key = usize::from(opts.matte_channel.min(2));
-    let others = [(1, 2), (0, 2), (0, 1)][key];
-    let limit = match opts.limit_method {
-        ChannelLimit::Single => c[usize::from(opts.limit_channel.min(2))],
-        ChannelLimit::Max if c[others.0] < c[others.1] => c[others.1],
-        ChannelLimit::Max => c[others.0],
-    };
-    let a = 1.0 - (c[key] - limit);
-    let m = if a > opts.limit_max {
-        alpha
-    } else if a < opts.limit_min {
-        0.0
-    } else {
-        (a - opts.limit_min) / (opts.limit_max - opts.limit_min)
-    };
-    if m < alpha { m } else { alpha }
+impl ChannelKeyOptions {
+    /// A pixel seen through its matte.
+    #[inline]
+    fn masked(&self, p: PremulRgba, m: Coverage) -> PremulRgba {
+        if self.profile == Profile::Blender45 || self.color_space == KeySpace::Rgb {
+            return p.masked(m);
+        }
+        let [x, y, z] = to_space(p, self).map(|v| v * m.0);
+        let [r, g, b] = from_space([x, y, z], self.color_space);
+        PremulRgba::new(r, g, b, p.a * m.0)
+    }
+
+    /// The matte of a pixel with these channels, at most its alpha.
+    #[inline]
+    fn alpha(&self, channels: [f32; 3], alpha: f32) -> f32 {
+        let a = 1.0 - self.key_excess(channels);
+        let m = if a > self.limit_max {
+            alpha
+        } else if a < self.limit_min {
+            0.0
+        } else {
+            (a - self.limit_min) / (self.limit_max - self.limit_min)
+        };
+        if m < alpha { m } else { alpha }
+    }
+
+    /// By how much the key channel exceeds its limit.
+    #[inline]
+    fn key_excess(&self, c: [f32; 3]) -> f32 {
+        let key = usize::from(self.matte_channel.min(2));
+        let (first, second) = other_channels(c, key);
+        let limit = match self.limit_method {
+            ChannelLimit::Single => c[usize::from(self.limit_channel.min(2))],
+            ChannelLimit::Max if first < second => second,
+            ChannelLimit::Max => first,
+        };
+        c[key] - limit
+    }
 }
 
 fn to_space(p: PremulRgba, opts: &ChannelKeyOptions) -> [f32; 3] {
     match opts.color_space {
         KeySpace::Rgb => [p.r, p.g, p.b],
         KeySpace::Hsv => to_hsv(p),
-        KeySpace::Yuv => [
-            0.2126 * p.r + 0.7152 * p.g + 0.0722 * p.b,
-            -0.09991 * p.r - 0.33609 * p.g + 0.436 * p.b,
-            0.615 * p.r - 0.55861 * p.g - 0.05639 * p.b,
-        ],
+        KeySpace::Yuv => to_yuv(p),
         KeySpace::Ycc => to_ycc(p, opts.profile == Profile::Blender45),
     }
+}
+
+#[inline]
+fn to_yuv(p: PremulRgba) -> [f32; 3] {
+    [
+        0.2126 * p.r + 0.7152 * p.g + 0.0722 * p.b,
+        -0.09991 * p.r - 0.33609 * p.g + 0.436 * p.b,
+        0.615 * p.r - 0.55861 * p.g - 0.05639 * p.b,
+    ]
+}
+
+#[inline]
+fn from_yuv([y, u, v]: [f32; 3]) -> [f32; 3] {
+    [
+        y + 1.28033 * v,
+        y - 0.21482 * u - 0.38059 * v,
+        y + 2.12798 * u,
+    ]
 }
 
 fn from_space([x, y, z]: [f32; 3], space: KeySpace) -> [f32; 3] {
     match space {
         KeySpace::Rgb => [x, y, z],
         KeySpace::Hsv => from_hsv([x, y, z]).map(|v| if v > 0.0 { v } else { 0.0 }),
-        KeySpace::Yuv => [
-            x + 1.28033 * z,
-            x - 0.21482 * y - 0.38059 * z,
-            x + 2.12798 * y,
-        ],
+        KeySpace::Yuv => from_yuv([x, y, z]),
         KeySpace::Ycc => from_ycc([x, y, z]),
     }
 }

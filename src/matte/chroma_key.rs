@@ -1,4 +1,4 @@
-//! Chroma Key: a wedge in the plane of colour differences.
+//! Chroma Key: a wedge in the plane of the colour differences.
 
 use super::key::{Photo, Profile, differences};
 use crate::image::Image;
@@ -46,11 +46,7 @@ pub fn chroma_key<P: Photo>(
 ) -> Image<Coverage> {
     let exact = opts.profile == Profile::Blender45;
     let (cos, sin) = direction(centred(screen.opaque(), exact), exact);
-    let wedge = Wedge {
-        slope: libm::tan(f64::from(opts.tolerance / 2.0)) as f32,
-        core: opts.threshold / 2.0,
-        gain: opts.gain,
-    };
+    let wedge = Wedge::new(opts);
     photo.map(|p| {
         let p = p.premul();
         let [c, r] = centred(p, exact);
@@ -74,6 +70,14 @@ struct Wedge {
 }
 
 impl Wedge {
+    fn new(opts: &ChromaKeyOptions) -> Self {
+        Self {
+            slope: libm::tan(f64::from(opts.tolerance / 2.0)) as f32,
+            core: opts.threshold / 2.0,
+            gain: opts.gain,
+        }
+    }
+
     /// The matte at `x` along the screen's direction and `z` across it; none outside the wedge.
     #[inline(always)]
     fn alpha(&self, x: f32, z: f32) -> Option<f32> {
@@ -91,16 +95,18 @@ impl Wedge {
 /// Cosine and sine of the key's direction.
 fn direction([c, r]: [f32; 2], exact: bool) -> (f32, f32) {
     if exact {
-        let length = (c * c + r * r).sqrt();
-        return if length == 0.0 {
-            (0.0, 0.0)
-        } else {
-            (c / length, r / length)
-        };
+        return normalized(c, r);
     }
-    let angle = libm::atan2(f64::from(r), f64::from(c)) as f32;
-    (
-        libm::cos(f64::from(angle)) as f32,
-        libm::sin(f64::from(angle)) as f32,
-    )
+    let angle = f64::from(libm::atan2(f64::from(r), f64::from(c)) as f32);
+    (libm::cos(angle) as f32, libm::sin(angle) as f32)
+}
+
+/// A vector of length 1, or 0 where it has no length.
+fn normalized(c: f32, r: f32) -> (f32, f32) {
+    let length = (c * c + r * r).sqrt();
+    if length == 0.0 {
+        (0.0, 0.0)
+    } else {
+        (c / length, r / length)
+    }
 }

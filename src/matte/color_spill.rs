@@ -1,6 +1,7 @@
 //! Color Spill: the screen's light on the subject, taken away.
 
 use super::key::{Photo, Profile};
+use super::screen::other_channels;
 use crate::image::Image;
 use crate::pixel::PremulRgba;
 use serde::{Deserialize, Serialize};
@@ -79,32 +80,40 @@ impl Default for ColorSpillOptions {
 pub fn color_spill<P: Photo>(photo: &Image<P>, opts: &ColorSpillOptions) -> Image<PremulRgba> {
     let spill = opts.channel as usize;
     let strengths = strengths(opts, spill);
-    photo.map(|p| {
-        let p = p.premul();
-        let c = [p.r, p.g, p.b];
-        let excess = excess(c, opts);
-        let [r, g, b] = [0, 1, 2].map(|k| c[k] + strengths[k] * excess);
-        if excess > 0.0 {
-            PremulRgba::new(r, g, b, p.a)
-        } else {
-            p
-        }
-    })
+    photo.map(|p| without_spill(p.premul(), strengths, opts))
+}
+
+#[inline(always)]
+fn without_spill(p: PremulRgba, strengths: [f32; 3], opts: &ColorSpillOptions) -> PremulRgba {
+    let c = [p.r, p.g, p.b];
+    let excess = excess(c, opts);
+    let [r, g, b] = [0, 1, 2].map(|k| c[k] + strengths[k] * excess);
+    if excess > 0.0 {
+        PremulRgba::new(r, g, b, p.a)
+    } else {
+        p
+    }
 }
 
 /// By how much the spill channel exceeds its limit.
 #[inline(always)]
 fn excess(c: [f32; 3], opts: &ColorSpillOptions) -> f32 {
-    let spill = opts.channel as usize;
-    let others = [(1, 2), (0, 2), (0, 1)][spill];
-    let limit = match opts.limit_method {
-        SpillLimit::Simple => c[opts.limit_channel as usize],
-        SpillLimit::Average => (c[others.0] + c[others.1]) * 0.5,
-    };
+    let spill = c[opts.channel as usize];
+    let limit = limit(c, opts);
     if opts.profile == Profile::Blender45 {
-        opts.fac * c[spill] - opts.ratio * limit
+        opts.fac * spill - opts.ratio * limit
     } else {
-        opts.fac.min(1.0) * (c[spill] - opts.ratio * limit)
+        opts.fac.min(1.0) * (spill - opts.ratio * limit)
+    }
+}
+
+/// What the spill channel is limited by.
+#[inline(always)]
+fn limit(c: [f32; 3], opts: &ColorSpillOptions) -> f32 {
+    let (first, second) = other_channels(c, opts.channel as usize);
+    match opts.limit_method {
+        SpillLimit::Simple => c[opts.limit_channel as usize],
+        SpillLimit::Average => (first + second) * 0.5,
     }
 }
 

@@ -7,7 +7,7 @@ pub use options::{Boundary, CutOutOptions, MatteMethod};
 
 use super::film::ColorUncertainty;
 use super::outline::Outline;
-use super::plate::ScreenPlate;
+use super::plate::{PlateOptions, ScreenPlate};
 use super::prepared::Prepared;
 use super::screen::{screen_color, screen_pixels};
 use super::segment::{Segmentation, segment_prepared};
@@ -120,13 +120,7 @@ impl CleanScreen {
         let plate = match (empty, opts.screen) {
             (Some(empty), _) => ScreenPlate::from_photo(empty, photo, &background, &opts.plate)?,
             (None, Some(color)) => ScreenPlate::even(color, photo.size()),
-            // A margin around a large object may leave nothing; the mask alone then leaves a rim, which gives a colour.
-            (None, None) if !background.pixels().contains(&true) => {
-                ScreenPlate::even(screen_color(photo, &found.mask)?, photo.size())
-            }
-            (None, None) => {
-                ScreenPlate::fit(photo, &background, &opts.plate).map_err(|e| e.within("plate"))?
-            }
+            (None, None) => fitted_plate(photo, &background, &found.mask, &opts.plate)?,
         };
         Ok(Self {
             background,
@@ -134,6 +128,21 @@ impl CleanScreen {
             plate,
         })
     }
+}
+
+/// The plate by the photo alone.
+fn fitted_plate(
+    photo: &Image<LinearRgb>,
+    background: &Mask,
+    mask: &Image<Coverage>,
+    opts: &PlateOptions,
+) -> Result<ScreenPlate> {
+    // A margin around a large object may leave nothing; the mask alone then leaves a rim, which gives a colour.
+    if !background.pixels().contains(&true) {
+        let color = screen_color(photo, mask)?;
+        return Ok(ScreenPlate::even(color, photo.size()));
+    }
+    ScreenPlate::fit(photo, background, opts).map_err(|e| e.within("plate"))
 }
 
 /// The part of a photo around the object: there is nothing to solve elsewhere.
@@ -151,29 +160,36 @@ impl ObjectRegion {
     fn new(prepared: &Prepared<'_>, found: &Segmentation, opts: &CutOutOptions) -> Self {
         let size = prepared.photo.size();
         let around = hull_roi(&found.hull, opts.margin_px.max(opts.reach_px()), size);
-        let boundary = match opts.within {
-            Boundary::Tight => &found.tight,
-            Boundary::Hull => &found.mask,
-        };
+        let boundary = opts.within.of_object(found).crop(around);
         Self {
             around,
             kept: hull_roi(&found.hull, opts.margin_px, size),
             photo: prepared.photo.crop(around),
-            cut: softened(&boundary.crop(around), opts.soften_px),
+            cut: softened(&boundary, opts.soften_px),
         }
     }
 
     /// How pictures of the region become those of the cut-out, whose longer side is at most `longest_side`.
     fn trim(&self, longest_side: usize) -> Trim {
-        let longer = self.kept.width.max(self.kept.height);
+        let roi = self.kept;
+        let longer = roi.width.max(roi.height);
         Trim {
-            roi: self.kept,
+            roi,
             in_region: Roi {
-                x: self.kept.x - self.around.x,
-                y: self.kept.y - self.around.y,
-                ..self.kept
+                x: roi.x - self.around.x,
+                y: roi.y - self.around.y,
+                ..roi
             },
             scale: (longest_side as f64 / longer as f64).min(1.0),
+        }
+    }
+}
+
+impl Boundary {
+    fn of_object(self, found: &Segmentation) -> &Image<Coverage> {
+        match self {
+            Self::Tight => &found.tight,
+            Self::Hull => &found.mask,
         }
     }
 }
@@ -227,9 +243,12 @@ impl Trim {
         if self.scale >= 1.0 {
             return image;
         }
-        let [width, height] = [image.width(), image.height()]
-            .map(|side| ((side as f64 * self.scale).round() as usize).max(1));
-        filter::resize(&image, width, height)
+        let (width, height) = image.size();
+        filter::resize(&image, self.scaled(width), self.scaled(height))
+    }
+
+    fn scaled(&self, side: usize) -> usize {
+        ((side as f64 * self.scale).round() as usize).max(1)
     }
 }
 
@@ -252,19 +271,16 @@ fn softened(mask: &Image<Coverage>, sigma_px: f32) -> Image<Coverage> {
     if sigma_px <= 0.0 {
         return mask.clone();
     }
-    // The weights of the blur sum to 1 only as far as rounding goes; more than all of a pixel is not sound.
+    // The weights of the blur sum to 1 only up to rounding, and no pixel is more than covered.
     filter::gaussian_blur(mask, sigma_px).map(|c| Coverage(c.0.clamp(0.0, 1.0)))
 }
 
 /// Share of the pixels outside a mask with a channel of `clipped` or more.
 fn clipped_share(photo: &Image<LinearRgb>, mask: &Image<Coverage>, clipped: f32) -> f32 {
-    let outside = photo
-        .pixels()
-        .iter()
-        .zip(mask.pixels())
-        .filter(|(_, m)| m.0 <= 0.0);
+    let pixels = photo.pixels().iter().zip(mask.pixels());
+    let outside = pixels.filter(|(_, m)| m.0 <= 0.0);
     let (all, count) = outside.fold((0_u64, 0_u64), |(all, count), (p, _)| {
-        (all + 1, count + u64::from(p.r.max(p.g).max(p.b) >= clipped))
+        (all + 1, count + u64::from(p.max_channel() >= clipped))
     });
     count as f32 / all.max(1) as f32
 }
@@ -312,13 +328,11 @@ fn clipped_screen(
     clipped: f32,
 ) -> Option<Diagnostic> {
     let share = clipped_share(photo, mask, clipped);
-    (share > MAX_CLIPPED_SHARE).then(|| {
-        let message = format!(
-            "{:.0} % of the screen is clipped: transmittance cannot be measured; use a shorter exposure",
-            100.0 * share
-        );
-        Diagnostic::warning(Code::ClippedScreen, message)
-    })
+    let message = format!(
+        "{:.0} % of the screen is clipped: transmittance cannot be measured; use a shorter exposure",
+        100.0 * share
+    );
+    (share > MAX_CLIPPED_SHARE).then(|| Diagnostic::warning(Code::ClippedScreen, message))
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use super::key::{Photo, Profile};
 use crate::error::{Error, Result};
 use crate::image::Image;
-use crate::pixel::Coverage;
+use crate::pixel::{Coverage, PremulRgba};
 use serde::{Deserialize, Serialize};
 
 /// Settings of [`difference_key`].
@@ -41,36 +41,49 @@ pub fn difference_key<P: Photo>(
     clean: &Image<P>,
     opts: &DifferenceKeyOptions,
 ) -> Result<Image<Coverage>> {
-    if photo.size() != clean.size() {
-        let ((w, h), (width, height)) = (clean.size(), photo.size());
-        return Err(Error::value(
-            "clean plate",
-            format!("{w} x {h} pixels, expected the photo's {width} x {height}"),
-        ));
-    }
-    let (tolerance, falloff) = (opts.tolerance, opts.falloff);
-    let late = opts.profile == Profile::Blender45;
+    check_sizes(clean.size(), photo.size())?;
     Ok(photo.zip_map(clean, |a, b| {
-        let (a, b) = (a.premul(), b.premul());
-        let difference = ((a.r - b.r).abs() + (a.g - b.g).abs() + (a.b - b.b).abs()) / 3.0;
-        let m = if late {
-            late_matte(difference, tolerance, falloff)
-        } else {
-            matte(difference, tolerance, falloff)
-        };
+        let a = a.premul();
+        let m = opts.matte(mean_difference(a, b.premul()));
         Coverage(m.map_or(a.a, |m| if m < a.a { m } else { a.a }))
     }))
 }
 
-/// The rise of the matte as Blender 3.4 reckons; none beyond it.
-fn matte(difference: f32, tolerance: f32, falloff: f32) -> Option<f32> {
+impl DifferenceKeyOptions {
+    /// The matte of an opaque pixel; none beyond the falloff.
+    #[inline]
+    fn matte(&self, difference: f32) -> Option<f32> {
+        if self.profile == Profile::Blender45 {
+            late_matte(difference, self.tolerance, self.falloff)
+        } else {
+            early_matte(difference, self.tolerance, self.falloff)
+        }
+    }
+}
+
+fn check_sizes((w, h): (usize, usize), (width, height): (usize, usize)) -> Result<()> {
+    if (w, h) == (width, height) {
+        return Ok(());
+    }
+    let what = format!("{w} x {h} pixels, expected the photo's {width} x {height}");
+    Err(Error::value("clean plate", what))
+}
+
+/// Mean of the absolute differences of the channels.
+#[inline]
+fn mean_difference(a: PremulRgba, b: PremulRgba) -> f32 {
+    ((a.r - b.r).abs() + (a.g - b.g).abs() + (a.b - b.b).abs()) / 3.0
+}
+
+/// The rise of the matte as Blender 3.4 computes it; none beyond it.
+fn early_matte(difference: f32, tolerance: f32, falloff: f32) -> Option<f32> {
     if difference <= tolerance {
         return Some(0.0);
     }
     (difference <= falloff + tolerance).then(|| (difference - tolerance) / falloff)
 }
 
-/// The rise of the matte as Blender 4.5 reckons; none beyond it.
+/// The rise of the matte as Blender 4.5 computes it; none beyond it.
 fn late_matte(difference: f32, tolerance: f32, falloff: f32) -> Option<f32> {
     let beyond = difference - tolerance;
     let beyond = if beyond > 0.0 { beyond } else { 0.0 };

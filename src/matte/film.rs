@@ -70,7 +70,7 @@ pub struct FilmMatte {
     pub flat: LinearRgb,
     /// What may make its colours wrong.
     pub color_uncertainty: ColorUncertainty,
-    /// What a person should know.
+    /// Notes and warnings.
     pub diagnostics: Vec<Diagnostic>,
 }
 
@@ -144,23 +144,15 @@ pub(super) struct FilmInput<'a> {
 pub(super) fn solve_film(object: FilmInput<'_>, opts: &FilmOptions) -> Result<FilmMatte> {
     object.check()?;
     let mut watch = Stopwatch::start();
-    let solution = FilmSolution {
-        object,
-        calm: calmed(object.photo, object.plate.residual),
-        key: strongest_channel(object.screen),
-        is_keyable: is_keyable(object.screen),
-        opts,
-    };
+    let solution = FilmSolution::new(object, opts);
     let tint = solution.tint();
     watch.lap("tint");
     let mut factors = solution.factors(tint.flat);
     watch.lap("factors");
     let color_uncertainty = solution.refine(&mut factors, tint, &mut watch);
-    let grey = (!solution.is_keyable).then(|| grey_screen(object.screen));
-    let diagnostics = grey.into_iter().chain(color_uncertainty.diagnostics());
     let matte = FilmMatte {
         color_uncertainty,
-        diagnostics: diagnostics.collect(),
+        diagnostics: solution.diagnostics(color_uncertainty),
         ..solution.composed(&factors, tint.flat.into())
     };
     watch.lap("compose");
@@ -200,53 +192,54 @@ struct FilmSolution<'a> {
     opts: &'a FilmOptions,
 }
 
-impl FilmSolution<'_> {
-    /// The tint that is given, or else that of the photo. On a grey screen all of the object is looked at, and that the
-    /// tint may be another is part of the guess.
+impl<'a> FilmSolution<'a> {
+    fn new(object: FilmInput<'a>, opts: &'a FilmOptions) -> Self {
+        Self {
+            object,
+            calm: calmed(object.photo, object.plate.residual),
+            key: strongest_channel(object.screen),
+            is_keyable: is_keyable(object.screen),
+            opts,
+        }
+    }
+
+    fn diagnostics(&self, uncertainty: ColorUncertainty) -> Vec<Diagnostic> {
+        let grey = (!self.is_keyable).then(|| grey_screen(self.object.screen));
+        grey.into_iter().chain(uncertainty.diagnostics()).collect()
+    }
+
+    /// The given tint, or else that of the photo. On a grey screen all of the object is sampled, and that the tint may be
+    /// another is part of the guess.
     fn tint(&self) -> Tint {
         if let Some(flat) = self.opts.flat {
-            return Tint {
-                flat: flat.into(),
-                uncertainty: 0.0,
-            };
+            return Tint::certain(flat.into());
         }
-        let share = if self.is_keyable { DARKEST_SHARE } else { 1.0 };
-        let samples = TintSamples::new(
-            &self.calm,
-            self.object.plate,
-            self.object.inside,
-            self.key,
-            share,
-        );
-        let tint = samples.fit();
-        match self.is_keyable {
-            true => tint,
-            false => Tint {
-                uncertainty: 0.0,
-                ..tint
-            },
+        let FilmInput { plate, inside, .. } = self.object;
+        if self.is_keyable {
+            TintSamples::new(&self.calm, plate, inside, self.key, DARKEST_SHARE).fit()
+        } else {
+            let samples = TintSamples::new(&self.calm, plate, inside, self.key, 1.0);
+            Tint::certain(samples.fit().flat)
         }
     }
 
     /// By which factor each pixel is flat plastic.
     fn factors(&self, flat: [f32; 3]) -> Image<Factor> {
-        let solver = Solver::new(self.key, flat, self.object.plate.residual, self.opts);
+        let FilmInput { plate, inside, .. } = self.object;
+        let solver = Solver::new(self.key, flat, plate.residual, self.opts);
         let factor = if self.is_keyable {
             Solver::solve
         } else {
             Solver::guess
         };
-        self.calm.zip3_map(
-            &self.object.plate.image,
-            self.object.inside,
-            |pixel, screen, inside| {
+        self.calm
+            .zip3_map(&plate.image, inside, |pixel, screen, inside| {
                 if inside.0 > 0.0 {
                     factor(&solver, pixel.into(), screen.into())
                 } else {
                     Factor::default()
                 }
-            },
-        )
+            })
     }
 
     /// Makes paint opaque, fills what glints hide, and says how certain the colours are.
@@ -256,19 +249,20 @@ impl FilmSolution<'_> {
         Tint { flat, uncertainty }: Tint,
         watch: &mut Stopwatch,
     ) -> ColorUncertainty {
-        let (inside, longer_side) = (self.object.inside, self.object.longer_side);
-        let most = flat.into_iter().fold(0.0, f32::max);
-        let guessed = uncertainty::guessed(factors, inside, self.opts.thickness_spread, most);
-        let screen_hue = bright::make_opaque(
-            factors,
-            &self.calm,
-            &self.object.plate.image,
+        let FilmInput {
+            photo,
+            plate,
             inside,
             longer_side,
-        );
+            ..
+        } = self.object;
+        let most = flat.into_iter().fold(0.0, f32::max);
+        let guessed = uncertainty::guessed(factors, inside, self.opts.thickness_spread, most);
+        let screen_hue =
+            bright::make_opaque(factors, &self.calm, &plate.image, inside, longer_side);
         let keyed_away = uncertainty::keyed_away(factors, inside, flat[self.key], longer_side);
         watch.lap("paint");
-        let clipped = bright::fill_glints(factors, self.object.photo, inside, self.opts.clipped);
+        let clipped = bright::fill_glints(factors, photo, inside, self.opts.clipped);
         watch.lap("glints");
         ColorUncertainty {
             keyed_away,
@@ -279,27 +273,28 @@ impl FilmSolution<'_> {
         }
     }
 
+    /// What a transmittance leaves of the photo's light.
+    fn reflected(&self, transmittance: &Image<LinearRgb>) -> Image<LinearRgb> {
+        let plate = &self.object.plate.image;
+        self.object
+            .photo
+            .zip3_map(plate, transmittance, |p, k, t| without(p, t * k))
+    }
+
     /// F, T and V from the factors by which the pixels are flat plastic.
     fn composed(&self, factors: &Image<Factor>, flat: LinearRgb) -> FilmMatte {
         let inside = self.object.inside;
         let plastic = factors.map(|f| flat.map(|t| (f.value * t).clamp(0.0, 1.0)));
         let transmittance = plastic.zip_map(inside, covered);
-        let reflected =
-            self.object
-                .photo
-                .zip3_map(&self.object.plate.image, &transmittance, |p, k, t| {
-                    without(p, t * k)
-                });
         let seen = view(&plastic, flat, inside);
+        let reflected = self.reflected(&transmittance);
         let film = reflected.zip3_map(&seen, inside, |f, v, c| {
             Film::new(f.scale(c.0), covered(v, c))
         });
-        let most = flat.r.max(flat.g).max(flat.b);
-        let uncertainty = factors.zip_map(inside, |f, c| (c.0 * f.sigma * most).min(1.0));
         FilmMatte {
             film,
             transmittance,
-            uncertainty,
+            uncertainty: uncertainty_of(factors, inside, flat.max_channel()),
             flat,
             color_uncertainty: ColorUncertainty::default(),
             diagnostics: Vec::new(),
@@ -307,27 +302,33 @@ impl FilmSolution<'_> {
     }
 }
 
+/// Expected error of the largest channel of the transmittance.
+fn uncertainty_of(factors: &Image<Factor>, inside: &Image<Coverage>, most: f32) -> Image<f32> {
+    factors.zip_map(inside, |f, c| (c.0 * f.sigma * most).min(1.0))
+}
+
 impl FilmOptions {
     pub(super) fn check(&self) -> Result<()> {
-        if let Some(flat) = self.flat
-            && !<[f32; 3]>::from(flat)
-                .iter()
-                .all(|t| (0.001..=1.0).contains(t))
-        {
-            return Err(Error::value(
-                "flat",
-                format!("({}, {}, {}), expected 0.001 to 1", flat.r, flat.g, flat.b),
-            ));
-        }
-        let positive = [
-            ("clipped", self.clipped),
-            ("thickness_spread", self.thickness_spread),
-            ("reflection_error", self.reflection_error),
-        ];
-        match positive.into_iter().find(|(_, v)| v.is_nan() || *v <= 0.0) {
-            Some((at, v)) => Err(Error::value(at, format!("{v}, expected more than 0"))),
-            None => Ok(()),
-        }
+        self.flat.map_or(Ok(()), check_flat)?;
+        check_positive("clipped", self.clipped)?;
+        check_positive("thickness_spread", self.thickness_spread)?;
+        check_positive("reflection_error", self.reflection_error)
+    }
+}
+
+fn check_flat(LinearRgb { r, g, b }: LinearRgb) -> Result<()> {
+    if [r, g, b].iter().all(|t| (0.001..=1.0).contains(t)) {
+        return Ok(());
+    }
+    let what = format!("({r}, {g}, {b}), expected 0.001 to 1");
+    Err(Error::value("flat", what))
+}
+
+fn check_positive(at: &str, value: f32) -> Result<()> {
+    if value > 0.0 {
+        Ok(())
+    } else {
+        Err(Error::value(at, format!("{value}, expected more than 0")))
     }
 }
 
@@ -339,7 +340,7 @@ const NOISE_BLUR_PX: f32 = 1.0;
 
 /// The photo that the transmittance is measured in.
 fn calmed(photo: &Image<LinearRgb>, noise: LinearRgb) -> Cow<'_, Image<LinearRgb>> {
-    if noise.r.max(noise.g).max(noise.b) < MAX_SHARP_NOISE {
+    if noise.max_channel() < MAX_SHARP_NOISE {
         return Cow::Borrowed(photo);
     }
     Cow::Owned(filter::gaussian_blur(photo, NOISE_BLUR_PX))

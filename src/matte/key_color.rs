@@ -1,6 +1,7 @@
 //! Key colour: one colour for the screen, and whether the object has it, too.
 
 use super::film::ColorUncertainty;
+use super::median::median;
 use super::screen::{screen_color, screen_pixels, strongest_channel};
 use crate::diagnostic::Diagnostic;
 use crate::error::Result;
@@ -103,8 +104,8 @@ struct RobustMean {
 }
 
 fn robust_mean(values: &[f32]) -> RobustMean {
-    let center = median(values.to_vec());
-    let sigma = SIGMA_OF_MEDIAN * median(values.iter().map(|v| (v - center).abs()).collect());
+    let center = median_or_zero(values.iter().copied());
+    let sigma = SIGMA_OF_MEDIAN * median_or_zero(values.iter().map(|v| (v - center).abs()));
     let reach = TUKEY_SIGMAS * sigma.max(MIN_SIGMA);
     RobustMean {
         center: biweight_mean(values, center, reach).unwrap_or(center),
@@ -112,27 +113,28 @@ fn robust_mean(values: &[f32]) -> RobustMean {
     }
 }
 
+/// Tukey's weight of a deviation in units of the reach.
+#[inline]
+fn biweight(deviation: f32) -> f32 {
+    (1.0 - deviation.powi(2)).max(0.0).powi(2)
+}
+
 /// Mean weighted by Tukey's biweight around a centre; none where no value is within reach.
 fn biweight_mean(values: &[f32], center: f32, reach: f32) -> Option<f32> {
     let (mut sum, mut weights) = (0.0_f64, 0.0_f64);
     for &v in values {
-        let weight = f64::from((1.0 - ((v - center) / reach).powi(2)).max(0.0).powi(2));
+        let weight = f64::from(biweight((v - center) / reach));
         sum += weight * f64::from(v);
         weights += weight;
     }
     (weights > 0.0).then(|| (sum / weights) as f32)
 }
 
-fn median(mut values: Vec<f32>) -> f32 {
-    let middle = values.len() / 2;
-    if values.is_empty() {
-        0.0
-    } else {
-        *values.select_nth_unstable_by(middle, f32::total_cmp).1
-    }
+fn median_or_zero(values: impl Iterator<Item = f32>) -> f32 {
+    median(values, f32::total_cmp).unwrap_or(0.0)
 }
 
-/// The screen's own excess of its strongest channel, uneven light included, is below so many times its mean; see-through
+/// The screen's own excess of its strongest channel, uneven light included, is below this multiple of its mean; see-through
 /// plastic shows less than that.
 const SCREEN_EXCESS_FACTOR: f32 = 1.25;
 /// Rim of the mask that is left out, as a share of the longer side: bare screen.

@@ -34,27 +34,26 @@ pub fn keying_screen(
     smoothness: f64,
 ) -> Result<Image<LinearRgb>> {
     if !(0.0..=1.0).contains(&smoothness) {
-        return Err(Error::value(
-            "smoothness",
-            format!("{smoothness}, expected 0 to 1"),
-        ));
+        let what = format!("{smoothness}, expected 0 to 1");
+        return Err(Error::value("smoothness", what));
     }
+    let points = points_inside(points, width, height)?;
     let size = [width as f64, height as f64];
-    let points: Vec<ScreenPoint> = points
-        .iter()
-        .filter(|p| p.is_inside(size))
-        .copied()
-        .collect();
-    if points.is_empty() {
-        return Err(Error::value(
-            "points",
-            format!("none inside the {width} x {height} pixels, expected at least 1"),
-        ));
-    }
     let sigma = SHARPEST_SIGMA + SMOOTHNESS_SIGMA * smoothness;
     Ok(Image::from_fn(width, height, |x, y| {
         screen_color(&points, [x as f64 + 0.5, y as f64 + 0.5], size, sigma)
     }))
+}
+
+/// The points that lie in the picture, at least one.
+fn points_inside(points: &[ScreenPoint], width: usize, height: usize) -> Result<Vec<ScreenPoint>> {
+    let mut inside = points.to_vec();
+    inside.retain(|p| p.is_inside([width as f64, height as f64]));
+    if inside.is_empty() {
+        let what = format!("none inside the {width} x {height} pixels, expected at least 1");
+        return Err(Error::value("points", what));
+    }
+    Ok(inside)
 }
 
 impl ScreenPoint {
@@ -71,10 +70,10 @@ impl ScreenPoint {
 
 /// The plate at one place.
 fn screen_color(points: &[ScreenPoint], at: [f64; 2], size: [f64; 2], sigma: f64) -> LinearRgb {
-    let squares = || points.iter().map(|p| p.square_distance(at, size));
+    let squares = points.iter().map(|p| p.square_distance(at, size));
     // Measured from the nearest point, the weights of far pixels do not all vanish; their ratios are the same.
-    let nearest = squares().fold(f64::INFINITY, f64::min);
-    let weights = squares().map(|square| libm::exp((nearest - square) / (sigma * sigma)));
+    let nearest = squares.clone().fold(f64::INFINITY, f64::min);
+    let weights = squares.map(|square| libm::exp((nearest - square) / (sigma * sigma)));
     weighted_mean(weights.zip(points.iter().map(|p| p.color)))
 }
 

@@ -24,6 +24,7 @@ mod film;
 pub mod key;
 mod key_color;
 mod keying_screen;
+mod median;
 mod outline;
 mod plate;
 mod prepared;

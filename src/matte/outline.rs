@@ -3,9 +3,9 @@
 use crate::geom::Point2;
 use crate::image::Image;
 use crate::pixel::Coverage;
-use contour::ContourBuilder;
+use contour::{Contour, ContourBuilder};
 use geo::orient::Direction;
-use geo::{Area, ConvexHull, MultiPoint, Orient, Point, Polygon};
+use geo::{Area, ConvexHull, Coord, MultiPoint, Orient, Point, Polygon};
 use rayon::prelude::*;
 
 /// The border of what an object covers, in pixel-corner coordinates.
@@ -29,20 +29,13 @@ impl Outline {
     /// # Method
     /// Marching squares with linear interpolation between pixel centres (crate `contour`).
     pub fn around(coverage: &Image<Coverage>) -> Self {
-        let values: Vec<f64> = coverage.pixels().iter().map(|c| f64::from(c.0)).collect();
-        let (w, h) = coverage.size();
-        // Fails only where the number of values is not that of the pixels.
-        let contours = ContourBuilder::new(w, h, true)
-            .contours(&values, &[HALF_COVERED])
-            .unwrap_or_default();
-        let rings = contours
+        let rings = contours(coverage)
             .iter()
             .flat_map(|contour| &contour.geometry().0)
             .filter(|polygon| polygon.unsigned_area() >= MIN_RING_AREA_PX)
-            .flat_map(|polygon| open_rings(polygon.orient(Direction::Default)));
-        Self {
-            rings: rings.collect(),
-        }
+            .flat_map(|polygon| open_rings(polygon.orient(Direction::Default)))
+            .collect();
+        Self { rings }
     }
 
     /// A single ring, clockwise as seen.
@@ -54,11 +47,7 @@ impl Outline {
     pub fn hull(&self) -> Vec<Point2<f64>> {
         let points = self.rings.iter().flatten().map(|p| Point::new(p.x, p.y));
         let (ring, _) = points.collect::<MultiPoint>().convex_hull().into_inner();
-        ring.0
-            .iter()
-            .skip(1)
-            .map(|c| Point2::new(c.x, c.y))
-            .collect()
+        points_of(ring.0.get(1..).unwrap_or_default())
     }
 
     /// Area inside, square pixels, without the holes.
@@ -66,7 +55,8 @@ impl Outline {
         self.rings.iter().map(|ring| signed_area(ring)).sum()
     }
 
-    /// How wide it is, if it were a long strip: twice the area over the length of its rings, pixels; 0 for nothing.
+    /// How wide a long strip of this area and outline would be: twice the area over the length of its rings, pixels; 0
+    /// where there is nothing.
     pub fn width(&self) -> f64 {
         let around: f64 = self.rings.iter().map(|ring| ring_length(ring)).sum();
         if around > 0.0 {
@@ -103,11 +93,10 @@ impl Outline {
     fn sides_by_row(&self, height: usize) -> Vec<Vec<RingSide>> {
         let mut rows = vec![Vec::new(); height];
         for ring in &self.rings {
-            for [a, b] in sides(ring) {
-                let top = a.y.min(b.y).max(0.0) as usize;
-                let bottom = a.y.max(b.y).max(0.0) as usize;
+            for side in sides(ring) {
+                let (top, bottom) = rows_crossed(side);
                 for row in rows.iter_mut().take(bottom.saturating_add(1)).skip(top) {
-                    row.push([a, b]);
+                    row.push(side);
                 }
             }
         }
@@ -115,10 +104,27 @@ impl Outline {
     }
 }
 
-/// Two neighbouring points of a ring.
-type RingSide = [Point2<f64>; 2];
+fn contours(coverage: &Image<Coverage>) -> Vec<Contour> {
+    let values: Vec<f64> = coverage.pixels().iter().map(|c| f64::from(c.0)).collect();
+    let (w, h) = coverage.size();
+    // Fails only where the number of values is not that of the pixels.
+    ContourBuilder::new(w, h, true)
+        .contours(&values, &[HALF_COVERED])
+        .unwrap_or_default()
+}
 
-fn sides(ring: &[Point2<f64>]) -> impl Iterator<Item = RingSide> {
+/// Two neighbouring points of a ring.
+pub(super) type RingSide = [Point2<f64>; 2];
+
+/// The first and the last row of pixels that a side passes through.
+fn rows_crossed([a, b]: RingSide) -> (usize, usize) {
+    let top = a.y.min(b.y).max(0.0) as usize;
+    let bottom = a.y.max(b.y).max(0.0) as usize;
+    (top, bottom)
+}
+
+/// The sides of a closed ring.
+pub(super) fn sides(ring: &[Point2<f64>]) -> impl Iterator<Item = RingSide> {
     let next = ring.iter().cycle().skip(1);
     ring.iter().zip(next).map(|(a, b)| [*a, *b])
 }
@@ -126,13 +132,16 @@ fn sides(ring: &[Point2<f64>]) -> impl Iterator<Item = RingSide> {
 /// The rings of a polygon without their repeated first points.
 fn open_rings(polygon: Polygon) -> impl Iterator<Item = Vec<Point2<f64>>> {
     let (outer, holes) = polygon.into_inner();
-    std::iter::once(outer).chain(holes).map(|ring| {
-        let open = &ring.0[..ring.0.len().saturating_sub(1)];
-        open.iter().map(|c| Point2::new(c.x, c.y)).collect()
-    })
+    std::iter::once(outer)
+        .chain(holes)
+        .map(|ring| points_of(&ring.0[..ring.0.len().saturating_sub(1)]))
 }
 
-fn ring_length(ring: &[Point2<f64>]) -> f64 {
+pub(super) fn points_of(coordinates: &[Coord]) -> Vec<Point2<f64>> {
+    coordinates.iter().map(|c| Point2::new(c.x, c.y)).collect()
+}
+
+pub(super) fn ring_length(ring: &[Point2<f64>]) -> f64 {
     sides(ring).map(|[a, b]| (b - a).norm()).sum()
 }
 
@@ -175,9 +184,15 @@ fn add_span(row: &mut [Coverage], x0: f64, x1: f64) {
         pixel.0 += LINE_COVERAGE;
     }
     for x in (first..whole.start).chain(whole.end..end) {
-        let overlap = x1.min((x + 1) as f64) - x0.max(x as f64);
-        row[x].0 += overlap.clamp(0.0, 1.0) as f32 * LINE_COVERAGE;
+        row[x].0 += overlap(x, x0, x1) * LINE_COVERAGE;
     }
+}
+
+/// The part of pixel `x` that lies from `x0` to `x1`.
+#[inline]
+fn overlap(x: usize, x0: f64, x1: f64) -> f32 {
+    let length = x1.min((x + 1) as f64) - x0.max(x as f64);
+    length.clamp(0.0, 1.0) as f32
 }
 
 /// Area of a ring, positive where it goes clockwise as seen (shoelace formula).

@@ -22,7 +22,7 @@ pub struct PlateOptions {
     /// A higher degree must lower the residual by this share to be taken, 0 to 1. Default: 0.6: around
     /// the object only, a higher degree fits shadows and swings beneath it.
     pub least_gain: f64,
-    /// An empty-screen photo may be shifted by so many pixels. Default: 8.
+    /// Largest shift of an empty-screen photo, pixels. Default: 8.
     pub max_shift_px: f64,
     /// An empty-screen photo may differ from the photo by this share of the screen's brightness once it is aligned and
     /// its exposure matched, 0 to 1. Default: 0.05.
@@ -78,14 +78,8 @@ impl ScreenPlate {
         opts.check()?;
         let cells = cells::means(photo, background);
         let fitted = Polynomial::fit(&cells, photo.size(), opts)?;
-        let image = fitted.image(photo.size());
-        Ok(Self::measured(
-            image,
-            photo,
-            background,
-            Some(fitted.degree),
-            [0.0; 2],
-        ))
+        let (image, degree) = (fitted.image(photo.size()), Some(fitted.degree));
+        Ok(Self::measured(image, photo, background, degree, [0.0; 2]))
     }
 
     /// Takes a photo of the empty screen for the plate.
@@ -108,10 +102,7 @@ impl ScreenPlate {
         check_same_size(empty, photo)?;
         let shift_px = shift_onto(photo, empty, background)?;
         opts.check_shift(shift_px)?;
-        let moved = register::moved(empty, shift_px);
-        let smooth = filter::gaussian_blur(&moved, PHOTO_BLUR_PX);
-        let gain = gain_on_background(photo, &smooth, background)?;
-        let image = smooth.map(|p| p * gain);
+        let image = matched(empty, photo, background, shift_px)?;
         let plate = Self::measured(image, photo, background, None, shift_px);
         plate.check_mismatch(photo, background, opts)?;
         Ok(plate)
@@ -208,10 +199,8 @@ impl ScreenPlate {
         background: &Mask,
         opts: &PlateOptions,
     ) -> Result<()> {
-        let mismatch = cells::mismatch(
-            &cells::means(photo, background),
-            &cells::means(&self.image, background),
-        );
+        let [seen, expected] = [photo, &self.image].map(|image| cells::means(image, background));
+        let mismatch = cells::mismatch(&seen, &expected);
         if mismatch <= opts.max_mismatch {
             return Ok(());
         }
@@ -231,24 +220,10 @@ const MAX_DEGREE: usize = 6;
 
 impl PlateOptions {
     pub(super) fn check(&self) -> Result<()> {
-        let (degree, shift) = (self.max_degree, self.max_shift_px);
-        let (gain, mismatch) = (self.least_gain, self.max_mismatch);
-        let share = 0.0..=1.0;
-        let wrong = if degree > MAX_DEGREE {
-            (
-                "max_degree",
-                format!("{degree}, expected 0 to {MAX_DEGREE}"),
-            )
-        } else if !share.contains(&gain) {
-            ("least_gain", format!("{gain}, expected 0 to 1"))
-        } else if shift.is_nan() || shift < 0.0 {
-            ("max_shift_px", format!("{shift}, expected at least 0"))
-        } else if !share.contains(&f64::from(mismatch)) {
-            ("max_mismatch", format!("{mismatch}, expected 0 to 1"))
-        } else {
-            return Ok(());
-        };
-        Err(Error::value(wrong.0, wrong.1))
+        check_degree(self.max_degree)?;
+        check_share("least_gain", self.least_gain)?;
+        check_length("max_shift_px", self.max_shift_px)?;
+        check_share("max_mismatch", self.max_mismatch)
     }
 
     fn check_shift(&self, [x, y]: [f64; 2]) -> Result<()> {
@@ -260,6 +235,40 @@ impl PlateOptions {
             "the empty screen is offset by ({x:.1}, {y:.1}) px from the photo, expected at most {most}; did the camera move?"
         )))
     }
+}
+
+fn check_degree(degree: usize) -> Result<()> {
+    if degree <= MAX_DEGREE {
+        return Ok(());
+    }
+    let what = format!("{degree}, expected 0 to {MAX_DEGREE}");
+    Err(Error::value("max_degree", what))
+}
+
+fn check_length(at: &str, value: f64) -> Result<()> {
+    if value >= 0.0 {
+        return Ok(());
+    }
+    Err(Error::value(at, format!("{value}, expected at least 0")))
+}
+
+fn check_share<T: Into<f64> + Copy + std::fmt::Display>(at: &str, value: T) -> Result<()> {
+    if (0.0..=1.0).contains(&value.into()) {
+        return Ok(());
+    }
+    Err(Error::value(at, format!("{value}, expected 0 to 1")))
+}
+
+/// A photo of the empty screen, moved onto the photo, without its noise and of the photo's exposure.
+fn matched(
+    empty: &Image<LinearRgb>,
+    photo: &Image<LinearRgb>,
+    background: &Mask,
+    shift_px: [f64; 2],
+) -> Result<Image<LinearRgb>> {
+    let smooth = filter::gaussian_blur(&register::moved(empty, shift_px), PHOTO_BLUR_PX);
+    let gain = gain_on_background(photo, &smooth, background)?;
+    Ok(smooth.map(|p| p * gain))
 }
 
 fn check_same_size(empty: &Image<LinearRgb>, photo: &Image<LinearRgb>) -> Result<()> {
@@ -283,9 +292,7 @@ fn shift_onto(
     let without_object = photo.zip3_map(
         empty,
         background,
-        |p, e, free| {
-            if free { p } else { e * gain }
-        },
+        |p, e, free| if free { p } else { e * gain },
     );
     Ok(register::shift(&without_object, empty, background, [1.0; 3]).shift_px)
 }
@@ -305,16 +312,18 @@ fn whole_mean(plate: &Image<LinearRgb>) -> LinearRgb {
     mean_color(plate.pixels().iter().copied()).unwrap_or(LinearRgb::BLACK)
 }
 
+/// The least and the greatest value of a channel.
+fn extremes(plate: &Image<LinearRgb>, channel: usize) -> (f32, f32) {
+    let pixels = plate.pixels().iter();
+    let values = pixels.map(|p| <[f32; 3]>::from(*p)[channel]);
+    values.fold((f32::MAX, 0.0_f32), |(low, high), v| {
+        (low.min(v), high.max(v))
+    })
+}
+
 /// 1 minus darkest over brightest of the strongest channel.
 fn unevenness(plate: &Image<LinearRgb>) -> f32 {
-    let strongest = strongest_channel(whole_mean(plate));
-    let values = plate
-        .pixels()
-        .iter()
-        .map(|p| <[f32; 3]>::from(*p)[strongest]);
-    let (low, high) = values.fold((f32::MAX, 0.0_f32), |(low, high), v| {
-        (low.min(v), high.max(v))
-    });
+    let (low, high) = extremes(plate, strongest_channel(whole_mean(plate)));
     if high > 0.0 {
         1.0 - (low / high).clamp(0.0, 1.0)
     } else {

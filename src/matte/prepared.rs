@@ -13,7 +13,7 @@ const MIN_PHOTO_SIDE_PX: usize = 16;
 /// A photo with a shorter longer side than this is enlarged for the search: bands and gaps of a few pixels are wide beside
 /// an object of 20.
 const SMALL_PHOTO_PX: usize = 128;
-/// Longer side, at least, that it is enlarged to.
+/// Longer side, at least, to which it is enlarged.
 const ENLARGED_PHOTO_PX: usize = 256;
 
 /// A photo that can be segmented, and what is derived from it alone.
@@ -49,14 +49,12 @@ impl<'a> Prepared<'a> {
 
 /// Refuses a photo with a pixel that is not finite.
 pub(super) fn check_finite(photo: &Image<LinearRgb>) -> Result<()> {
-    match photo.pixels().iter().position(|p| !p.is_finite()) {
-        Some(i) => Err(refused(format!(
-            "pixel ({}, {}) is not a finite number",
-            i % photo.width(),
-            i / photo.width()
-        ))),
-        None => Ok(()),
-    }
+    let Some(i) = photo.pixels().iter().position(|p| !p.is_finite()) else {
+        return Ok(());
+    };
+    let (x, y) = (i % photo.width(), i / photo.width());
+    let what = format!("pixel ({x}, {y}) is not a finite number");
+    Err(refused(what))
 }
 
 fn check_size(photo: &Image<LinearRgb>) -> Result<()> {
@@ -82,20 +80,26 @@ pub(super) fn longer_side<P: Copy>(image: &Image<P>) -> usize {
 /// The photo, or a copy whose longer side is `working_size`; a small photo enlarged.
 fn at_working_size(photo: &Image<LinearRgb>, working_size: usize) -> Cow<'_, Image<LinearRgb>> {
     let longer = longer_side(photo);
-    let (w, h) = photo.size();
     if longer < SMALL_PHOTO_PX.min(working_size) {
-        let times = ENLARGED_PHOTO_PX.div_ceil(longer);
-        return Cow::Owned(filter::resize(photo, times * w, times * h));
+        Cow::Owned(enlarged(photo, ENLARGED_PHOTO_PX.div_ceil(longer)))
+    } else if longer <= working_size {
+        Cow::Borrowed(photo)
+    } else {
+        Cow::Owned(reduced(photo, working_size))
     }
-    if longer <= working_size {
-        return Cow::Borrowed(photo);
-    }
-    let [w, h] = [w, h].map(|side| {
-        (side * working_size)
-            .div_ceil(longer)
-            .max(MIN_SEARCH_SIZE_PX)
+}
+
+fn enlarged(photo: &Image<LinearRgb>, times: usize) -> Image<LinearRgb> {
+    filter::resize(photo, times * photo.width(), times * photo.height())
+}
+
+fn reduced(photo: &Image<LinearRgb>, working_size: usize) -> Image<LinearRgb> {
+    let longer = longer_side(photo);
+    let [w, h] = [photo.width(), photo.height()].map(|side| {
+        let side = (side * working_size).div_ceil(longer);
+        side.max(MIN_SEARCH_SIZE_PX)
     });
-    Cow::Owned(filter::resize(photo, w, h))
+    filter::resize(photo, w, h)
 }
 
 #[cfg(test)]

@@ -31,7 +31,7 @@ const HIGH_PASS_PX: f32 = 4.0;
 const MIN_AGREEMENT: f64 = 0.3;
 /// The longest step, pixels of its level: farther off the gradient is no guide.
 const MAX_STEP_PX: f64 = 2.0;
-/// A shift below so many standard deviations is none.
+/// A shift below this many standard deviations counts as none.
 const SIGNIFICANT_SIGMAS: f64 = 3.0;
 /// A search that moved by more than this share of the shorter side has diverged: there was nothing to hold on to.
 const MAX_SHIFT_SHARE: f64 = 0.25;
@@ -55,16 +55,31 @@ pub(super) fn shift(
         mask: mask.to_coverage(),
     };
     let found = whole.coarse_to_fine();
-    let length = Vector2::from(found.shift_px).norm();
-    let is_unlike = found.agreement < MIN_AGREEMENT;
-    let is_lost = length > MAX_SHIFT_SHARE * a.width().min(a.height()) as f64;
-    if is_lost || is_unlike || length < SIGNIFICANT_SIGMAS * found.sigma_px {
-        return Registered {
-            shift_px: [0.0; 2],
-            ..found
-        };
+    if found.is_reliable(a.width().min(a.height())) {
+        return found;
     }
-    found
+    Registered {
+        shift_px: [0.0; 2],
+        ..found
+    }
+}
+
+impl Registered {
+    /// Without any structure.
+    const NOTHING: Self = Self {
+        shift_px: [0.0; 2],
+        sigma_px: f64::INFINITY,
+        agreement: 0.0,
+    };
+
+    /// The shift is a significant one between pictures of the same thing; `side` is the shorter one of the picture.
+    fn is_reliable(&self, side: usize) -> bool {
+        let length = Vector2::from(self.shift_px).norm();
+        let is_unlike = self.agreement < MIN_AGREEMENT;
+        let is_lost = length > MAX_SHIFT_SHARE * side as f64;
+        let is_insignificant = length < SIGNIFICANT_SIGMAS * self.sigma_px;
+        !(is_unlike || is_lost || is_insignificant)
+    }
 }
 
 /// A picture moved right and down, its border going on outside.
@@ -105,37 +120,36 @@ impl PicturePair {
     /// The pair itself and its halves, as long as they are large enough.
     fn into_pyramid(self) -> Vec<Self> {
         let mut levels = vec![self];
-        while levels.len() < PYRAMID_LEVELS {
-            let last = &levels[levels.len() - 1];
-            if last.a.width().min(last.a.height()) < 2 * MIN_HALVED_SIDE_PX {
-                break;
-            }
-            let next = last.halved();
+        while levels.len() < PYRAMID_LEVELS && levels[levels.len() - 1].can_be_halved() {
+            let next = levels[levels.len() - 1].halved();
             levels.push(next);
         }
         levels
     }
 
+    fn can_be_halved(&self) -> bool {
+        self.a.width().min(self.a.height()) >= 2 * MIN_HALVED_SIDE_PX
+    }
+
     /// The shift from the coarsest level down to the finest, each starting from the one before.
     fn coarse_to_fine(self) -> Registered {
-        let mut found = Registered {
-            shift_px: [0.0; 2],
-            sigma_px: f64::INFINITY,
-            agreement: 0.0,
-        };
+        let mut found = Registered::NOTHING;
         for (level, pair) in self.into_pyramid().iter().enumerate().rev() {
             let at_full = f64::from(1 << level);
-            let start = found.shift_px.map(|s| s / at_full);
-            let Some((at, last)) = pair.high_passed().refined(start.into()) else {
-                continue;
-            };
-            found = Registered {
-                shift_px: (at * at_full).into(),
-                sigma_px: last.sigma * at_full,
-                agreement: last.agreement,
-            };
+            found = pair.registered(found.shift_px, at_full).unwrap_or(found);
         }
         found
+    }
+
+    /// The shift by this level, of which a pixel is `at_full` of the first, from a start; both in pixels of the first.
+    fn registered(&self, start_px: [f64; 2], at_full: f64) -> Option<Registered> {
+        let start = start_px.map(|s| s / at_full);
+        let (at, last) = self.high_passed().refined(start.into())?;
+        Some(Registered {
+            shift_px: (at * at_full).into(),
+            sigma_px: last.sigma * at_full,
+            agreement: last.agreement,
+        })
     }
 
     fn high_passed(&self) -> Self {
@@ -167,11 +181,10 @@ impl PicturePair {
         let (gain, agreement) = self.gain_and_agreement(&b)?;
         let equations = self.normal_equations(&b, gain);
         let inverse: Matrix2<f64> = equations.normal.try_inverse()?;
-        let variance = equations.square / equations.count * CORRELATED_PIXELS;
         let by: Vector2<f64> = inverse * equations.right;
         Some(ShiftStep {
             by: by.cap_magnitude(MAX_STEP_PX),
-            sigma: (variance * inverse.trace()).sqrt(),
+            sigma: (equations.variance() * inverse.trace()).sqrt(),
             agreement,
         })
     }
@@ -197,19 +210,10 @@ impl PicturePair {
     }
 
     fn normal_equations(&self, b: &Image<f32>, gain: f64) -> ShiftEquations {
-        let mut sums = ShiftEquations {
-            normal: Matrix2::zeros(),
-            right: Vector2::zeros(),
-            square: 0.0,
-            count: 0.0,
-        };
+        let mut sums = ShiftEquations::default();
         for at in self.compared() {
-            let g = scaled_gradient(b, at, gain);
-            let left = f64::from(self.a[at]) - gain * f64::from(b[at]);
-            sums.normal += g * g.transpose();
-            sums.right -= g * left;
-            sums.square += left * left;
-            sums.count += 1.0;
+            let residual = f64::from(self.a[at]) - gain * f64::from(b[at]);
+            sums.add(scaled_gradient(b, at, gain), residual);
         }
         sums
     }
@@ -224,12 +228,28 @@ fn scaled_gradient(b: &Image<f32>, (x, y): (usize, usize), gain: f64) -> Vector2
 }
 
 /// Sums of the least squares problem for a shift.
+#[derive(Default)]
 struct ShiftEquations {
     normal: Matrix2<f64>,
     right: Vector2<f64>,
     /// Of the residuals.
     square: f64,
     count: f64,
+}
+
+impl ShiftEquations {
+    #[inline]
+    fn add(&mut self, gradient: Vector2<f64>, residual: f64) {
+        self.normal += gradient * gradient.transpose();
+        self.right -= gradient * residual;
+        self.square += residual * residual;
+        self.count += 1.0;
+    }
+
+    /// Variance of a residual, in independent pixels.
+    fn variance(&self) -> f64 {
+        self.square / self.count * CORRELATED_PIXELS
+    }
 }
 
 /// One step of Gauss and Newton.

@@ -36,15 +36,20 @@ fn background(mask: &Image<Coverage>, margin: f64) -> Mask {
 
 fn mean(photo: &Image<LinearRgb>, set: &Mask) -> Option<LinearRgb> {
     assert_eq!(photo.size(), set.size(), "photo and mask differ in size");
-    let inside = photo
-        .pixels()
-        .iter()
-        .zip(set.pixels())
-        .filter(|(_, set)| **set);
-    mean_color(inside.map(|(p, _)| *p))
+    mean_color(masked_pixels(photo, set))
 }
 
-/// Mean of colours; none of none. Sums in double precision and in the order of the pixels: the same at any thread count.
+/// The pixels of a photo where a mask is set.
+pub(super) fn masked_pixels(
+    photo: &Image<LinearRgb>,
+    set: &Mask,
+) -> impl Iterator<Item = LinearRgb> {
+    let pixels = photo.pixels().iter().zip(set.pixels());
+    pixels.filter(|(_, set)| **set).map(|(p, _)| *p)
+}
+
+/// Mean of colours; none where there are none. Sums in double precision and in the order of the pixels: the same at any
+/// thread count.
 pub(super) fn mean_color(pixels: impl Iterator<Item = LinearRgb>) -> Option<LinearRgb> {
     let (sum, count) = pixels.fold(([0.0_f64; 3], 0_u64), |([r, g, b], count), p| {
         let sum = [r + f64::from(p.r), g + f64::from(p.g), b + f64::from(p.b)];
@@ -63,6 +68,12 @@ pub(super) fn is_keyable(screen: LinearRgb) -> bool {
     channels.sort_by(f32::total_cmp);
     let [low, mid, high] = channels;
     high > 0.0 && (high - 0.5 * (low + mid)) / high >= MIN_KEYABLE_EXCESS
+}
+
+/// The two channels beside one, in order.
+#[inline(always)]
+pub(super) fn other_channels(c: [f32; 3], channel: usize) -> (f32, f32) {
+    [(c[1], c[2]), (c[0], c[2]), (c[0], c[1])][channel]
 }
 
 /// Which channel of a colour is the largest; of equal ones the first.

@@ -1,5 +1,6 @@
 //! The four corners of a coloured screen that is seen as a whole.
 
+use super::median::median;
 use super::outline::Outline;
 use super::prepared::{longer_side, refused};
 use super::screen::is_keyable;
@@ -7,7 +8,7 @@ use super::segment::PixelGroups;
 use crate::color::rgb_to_hsv;
 use crate::error::{Error, Result};
 use crate::filter;
-use crate::geom::{Line, Point2, Vector2};
+use crate::geom::{Line, Point2, Vector2, corners_between};
 use crate::image::{Image, Mask};
 use crate::pixel::{LinearRgb, Mix};
 
@@ -26,7 +27,7 @@ const THIN_PX: f64 = 2.0;
 /// What lies on a screen is farther than this from its border, and covers this share of it.
 const RIM_PX: f64 = 8.0;
 const MIN_OBJECT_SHARE: f64 = 0.002;
-/// So often a corner of a rough quadrangle is moved: it takes two or three rounds.
+/// Times a corner of a rough quadrangle is moved, at most: it takes two or three rounds.
 const MAX_CORNER_MOVES: usize = 40;
 /// Stretches along each side, and the part of it near its corners that is left out: corners are worn.
 const PROBE_COUNT: usize = 96;
@@ -38,13 +39,13 @@ const STEPS_PER_PX: f64 = 2.0;
 const MIN_CHANGE: f32 = 0.01;
 /// A border is found at most this share of the reach from where it is expected.
 const MAX_OFFSET_SHARE: f64 = 0.75;
-/// Probes farther from a side's line than so many times the median are of something else: an object, a shadow.
+/// Probes farther from a side's line than this multiple of the median belong to something else: an object, a shadow.
 const OUTLIER_FACTOR: f64 = 3.0;
 /// Rounds in which such probes are dropped.
 const OUTLIER_ROUNDS: usize = 4;
 /// Distances from a line below this are those of noise, pixels.
 const NOISE_PX: f64 = 0.1;
-/// A border of so many pixels of the search beside a side's line is no straight one.
+/// A border this far off a side's line, in pixels of the search, is not straight.
 const CROOKED_PX: f64 = 2.0;
 
 /// Where the corners of a screen are seen.
@@ -75,9 +76,7 @@ pub fn screen_corners(photo: &Image<LinearRgb>) -> Result<ScreenCorners> {
     }
     let picture = at_search_size(photo);
     let scale = photo.width() as f64 / picture.width() as f64;
-    let rough = four_corners(&screen_region(&picture)?.hull)
-        .ok_or_else(|| not_found("its outline has no four corners"))?;
-    let rough = rough.map(|p| Point2::from(p.coords * scale));
+    let rough = rough_corners(&picture)?.map(|p| Point2::from(p.coords * scale));
     // The second time the probes stand where the sides are.
     let near = refined(photo, &rough, scale)?;
     let found = refined(photo, &near.corners_px, scale)?;
@@ -85,6 +84,11 @@ pub fn screen_corners(photo: &Image<LinearRgb>) -> Result<ScreenCorners> {
         corners_px: from_top_left(found.corners_px),
         ..found
     })
+}
+
+fn rough_corners(picture: &Image<LinearRgb>) -> Result<[Point2<f64>; 4]> {
+    four_corners(&screen_region(picture)?.hull)
+        .ok_or_else(|| not_found("its outline has no four corners"))
 }
 
 fn at_search_size(photo: &Image<LinearRgb>) -> Image<LinearRgb> {
@@ -100,28 +104,23 @@ fn refined(
     corners: &[Point2<f64>; 4],
     scale: f64,
 ) -> Result<ScreenCorners> {
-    let sides = sides(photo, corners, scale)?;
-    let mut corners_px = *corners;
-    for (i, corner) in corners_px.iter_mut().enumerate() {
-        let meeting = sides[(i + 3) % 4].line.meeting(&sides[i].line);
-        *corner =
-            meeting.ok_or_else(|| not_found("two of its sides are parallel that should meet"))?;
-    }
-    let sigma_px = sides
-        .iter()
-        .map(|side| side.off_px)
-        .fold(NOISE_PX, f64::max);
+    let sides = fitted_sides(photo, corners, scale)?;
     Ok(ScreenCorners {
-        corners_px,
-        sigma_px,
+        corners_px: corners_between(&sides.map(|side| side.line))
+            .ok_or_else(|| not_found("two of its sides are parallel that should meet"))?,
+        sigma_px: sides
+            .iter()
+            .map(|side| side.off_px)
+            .fold(NOISE_PX, f64::max),
     })
 }
 
 /// The same ring of corners, begun with the one that is nearest to the picture's top left.
 pub(crate) fn from_top_left(corners: [Point2<f64>; 4]) -> [Point2<f64>; 4] {
+    let from_corner = corners.map(|p| p.x + p.y);
     let first = (0..4)
-        .min_by(|&i, &j| (corners[i].x + corners[i].y).total_cmp(&(corners[j].x + corners[j].y)));
-    let first = first.unwrap_or_default();
+        .min_by(|&i, &j| from_corner[i].total_cmp(&from_corner[j]))
+        .unwrap_or_default();
     [0, 1, 2, 3].map(|i| corners[(first + i) % 4])
 }
 
@@ -145,10 +144,7 @@ struct HueRegion {
 
 /// The region that is a screen.
 fn screen_region(picture: &Image<LinearRgb>) -> Result<HueRegion> {
-    let least = MIN_SCREEN_SHARE * picture.pixels().len() as f64;
-    let mut regions = hue_regions(picture);
-    regions.retain(|region| region.pixels as f64 >= least);
-    regions.sort_by_key(|region| std::cmp::Reverse(region.pixels));
+    let mut regions = large_hue_regions(picture);
     let is_cut = regions.iter().any(|region| region.is_cut);
     regions.retain(|region| !region.is_cut);
     // A box on a screen that is not seen as a whole has four corners, too, but nothing lies on it.
@@ -164,6 +160,15 @@ fn screen_region(picture: &Image<LinearRgb>) -> Result<HueRegion> {
         .ok_or_else(|| not_found("no tenth of the photo has one colour such as green or blue"))
 }
 
+/// The regions that are large enough for a screen, largest first.
+fn large_hue_regions(picture: &Image<LinearRgb>) -> Vec<HueRegion> {
+    let least = MIN_SCREEN_SHARE * picture.pixels().len() as f64;
+    let mut regions = hue_regions(picture);
+    regions.retain(|region| region.pixels as f64 >= least);
+    regions.sort_by_key(|region| std::cmp::Reverse(region.pixels));
+    regions
+}
+
 /// The largest region of each hue.
 fn hue_regions(picture: &Image<LinearRgb>) -> Vec<HueRegion> {
     let hues = picture.map(hue_step);
@@ -172,9 +177,13 @@ fn hue_regions(picture: &Image<LinearRgb>) -> Vec<HueRegion> {
         .iter()
         .filter_map(|&hue| {
             let set = hues.map(|other| other.is_some_and(|other| is_of_hue(other, hue, &common)));
-            largest_region(&filter::dilate(&filter::erode(&set, THIN_PX), THIN_PX))
+            largest_region(&without_thin_parts(&set))
         })
         .collect()
+}
+
+fn without_thin_parts(set: &Mask) -> Mask {
+    filter::dilate(&filter::erode(set, THIN_PX), THIN_PX)
 }
 
 /// A hue is near one of the common hues, and nearer to it than to the others.
@@ -188,7 +197,7 @@ fn is_of_hue(hue: usize, common_hue: usize, common: &[usize]) -> bool {
 
 /// The step of the circle of hues; none for a grey.
 fn hue_step(p: LinearRgb) -> Option<usize> {
-    let has_hue = is_keyable(p) && p.r.max(p.g).max(p.b) >= MIN_BRIGHTNESS;
+    let has_hue = is_keyable(p) && p.max_channel() >= MIN_BRIGHTNESS;
     has_hue.then(|| (rgb_to_hsv(p).h * HUE_STEPS as f32) as usize % HUE_STEPS)
 }
 
@@ -207,11 +216,7 @@ fn common_hues(hues: &Image<Option<usize>>) -> Vec<usize> {
     let least = MIN_SCREEN_SHARE * hues.pixels().len() as f64;
     let mut common = Vec::new();
     while common.len() < MAX_HUES {
-        // Of windows that hold the same pixels the one around the highest count.
-        let windows = (0..HUE_STEPS).map(|hue| (window_count(&counts, hue), counts[hue], hue));
-        let Some((count, _, hue)) = windows.max() else {
-            break;
-        };
+        let (count, hue) = fullest_window(&counts);
         if (count as f64) < least {
             break;
         }
@@ -219,6 +224,13 @@ fn common_hues(hues: &Image<Option<usize>>) -> Vec<usize> {
         same_hues(hue).for_each(|other| counts[other] = 0);
     }
     common
+}
+
+/// The number of pixels that are nearly of one hue, and that hue.
+fn fullest_window(counts: &[usize; HUE_STEPS]) -> (usize, usize) {
+    // Of windows that hold the same pixels the one around the highest count.
+    let windows = (0..HUE_STEPS).map(|hue| (window_count(counts, hue), counts[hue], hue));
+    windows.max().map_or((0, 0), |(count, _, hue)| (count, hue))
 }
 
 /// The steps that are one hue.
@@ -253,12 +265,16 @@ fn reaches_border(set: &Mask) -> bool {
 /// Something lies within the hull of a region, away from its border.
 fn is_covered(region: &Mask, hull: &[Point2<f64>]) -> bool {
     let (w, h) = region.size();
-    let within = Outline::from_ring(hull.to_vec())
-        .coverage(w, h)
-        .map(|c| c.0 > 0.5);
+    let coverage = Outline::from_ring(hull.to_vec()).coverage(w, h);
+    let within = coverage.map(|c| c.0 > 0.5);
     let free = filter::erode(&within, RIM_PX).zip_map(region, |inside, screen| inside && !screen);
-    let largest = PixelGroups::new(&free).sizes(&free).into_iter().max();
-    largest.unwrap_or(0) as f64 > MIN_OBJECT_SHARE * within.count() as f64
+    largest_group(&free) as f64 > MIN_OBJECT_SHARE * within.count() as f64
+}
+
+/// Pixels of the largest connected group of a set.
+fn largest_group(set: &Mask) -> usize {
+    let sizes = PixelGroups::new(set).sizes(set);
+    sizes.into_iter().max().unwrap_or(0)
 }
 
 /// The four points of a convex polygon that enclose the most of it, in its order.
@@ -281,11 +297,12 @@ fn four_corners(ring: &[Point2<f64>]) -> Option<[Point2<f64>; 4]> {
 fn farthest_between(ring: &[Point2<f64>], before: usize, after: usize) -> Option<usize> {
     let n = ring.len();
     let along = ring[after] - ring[before];
-    let off = |p: usize| along.perp(&(ring[p] - ring[before])).abs();
-    (1..n)
+    let (farthest, _) = (1..n)
         .map(|step| (before + step) % n)
         .take_while(|&p| p != after)
-        .max_by(|&p, &q| off(p).total_cmp(&off(q)))
+        .map(|p| (p, along.perp(&(ring[p] - ring[before])).abs()))
+        .max_by(|(_, a), (_, b)| a.total_cmp(b))?;
+    Some(farthest)
 }
 
 /// A straight side of a screen.
@@ -296,7 +313,7 @@ struct ScreenSide {
     off_px: f64,
 }
 
-fn sides(
+fn fitted_sides(
     photo: &Image<LinearRgb>,
     corners: &[Point2<f64>; 4],
     scale: f64,
@@ -305,15 +322,19 @@ fn sides(
     let found: Vec<ScreenSide> = (0..4)
         .filter_map(|i| ScreenSide::near(photo, [corners[i], corners[(i + 1) % 4]], reach))
         .collect();
-    let found: [ScreenSide; 4] = found
+    let sides = found
         .try_into()
         .map_err(|_| not_found("a side of it shows no straight border"))?;
-    match found.iter().find(|side| side.off_px > CROOKED_PX * scale) {
-        Some(side) => Err(not_found(format!(
-            "a side of it is crooked by {:.1} pixels",
-            side.off_px
+    check_straight(&sides, CROOKED_PX * scale)?;
+    Ok(sides)
+}
+
+fn check_straight(sides: &[ScreenSide; 4], limit_px: f64) -> Result<()> {
+    match sides.iter().find(|side| side.off_px > limit_px) {
+        Some(ScreenSide { off_px, .. }) => Err(not_found(format!(
+            "a side of it is crooked by {off_px:.1} pixels"
         ))),
-        None => Ok(found),
+        None => Ok(()),
     }
 }
 
@@ -325,13 +346,17 @@ impl ScreenSide {
             drop_outliers(&mut points)?;
         }
         let line = Line::through(&points)?;
-        let squares: f64 = points
-            .iter()
-            .map(|p| line.distance(*p) * line.distance(*p))
-            .sum();
-        let off_px = (squares / points.len() as f64).sqrt();
+        let off_px = rms_distance(&line, &points);
         (points.len() >= PROBE_COUNT / 2).then_some(Self { line, off_px })
     }
+}
+
+fn rms_distance(line: &Line, points: &[Point2<f64>]) -> f64 {
+    let squares: f64 = points
+        .iter()
+        .map(|p| line.distance(*p) * line.distance(*p))
+        .sum();
+    (squares / points.len() as f64).sqrt()
 }
 
 /// Where probes along the way from one corner to the next find a border.
@@ -343,10 +368,9 @@ fn border_points(
     let along = to - from;
     let outward = Vector2::new(along.y, -along.x).try_normalize(0.0)?;
     let points = (0..PROBE_COUNT).filter_map(|i| {
-        let part = CORNER_PART + (1.0 - 2.0 * CORNER_PART) * (i as f64 + 0.5) / PROBE_COUNT as f64;
         let probe = BorderProbe {
             photo,
-            foot: from + along * part,
+            foot: from + along * probe_part(i),
             outward,
         };
         probe.border(reach)
@@ -354,12 +378,16 @@ fn border_points(
     Some(points.collect())
 }
 
+/// Where a probe stands on its side, 0 to 1.
+fn probe_part(i: usize) -> f64 {
+    CORNER_PART + (1.0 - 2.0 * CORNER_PART) * (i as f64 + 0.5) / PROBE_COUNT as f64
+}
+
 /// Drops the points that are far from the line through all.
 fn drop_outliers(points: &mut Vec<Point2<f64>>) -> Option<()> {
     let line = Line::through(points)?;
-    let mut off: Vec<f64> = points.iter().map(|p| line.distance(*p).abs()).collect();
-    let (_, median, _) = off.select_nth_unstable_by(points.len() / 2, f64::total_cmp);
-    let most = OUTLIER_FACTOR * median.max(NOISE_PX);
+    let off = points.iter().map(|p| line.distance(*p).abs());
+    let most = OUTLIER_FACTOR * median(off, f64::total_cmp)?.max(NOISE_PX);
     points.retain(|p| line.distance(*p).abs() <= most);
     Some(())
 }
@@ -386,6 +414,7 @@ impl BorderProbe<'_> {
             .map(|k| self.color_at(-reach + (k as f64 + 0.5) * step))
             .map(|color| step * f64::from(dot(color.add_scaled(-1.0, outside), change) / square))
             .sum();
+        // Where the inside ends, from the foot.
         let at = inside_length - reach;
         (square > MIN_CHANGE * MIN_CHANGE && at.abs() < MAX_OFFSET_SHARE * reach)
             .then(|| self.foot + self.outward * at)

@@ -28,6 +28,7 @@ use crate::geom::Point2;
 use crate::image::Image;
 use crate::pixel::{Coverage, LinearRgb};
 use crate::stopwatch::Stopwatch;
+use choose::ChosenSearch;
 use shape::ObjectShape;
 
 /// Where the object is in a photo.
@@ -68,11 +69,8 @@ impl SegmentStep {
     /// The picture in the range 0 to 1 that files show: where values go above 1, their logarithms as shares of the
     /// largest.
     pub fn shown(&self) -> Image<f32> {
-        let most = self
-            .image
-            .pixels()
-            .iter()
-            .fold(0.0f32, |most, v| most.max(*v));
+        let pixels = self.image.pixels().iter();
+        let most = pixels.fold(0.0f32, |most, v| most.max(*v));
         if most <= 1.0 {
             return self.image.clone();
         }
@@ -121,26 +119,37 @@ pub(super) fn segment_prepared(
     watch.lap("holes");
     let shape = ObjectShape::new(prepared, &chosen, &object.solid);
     let confidence = shape.confidence(prepared, chosen.confidence);
+    watch.lap("outline");
     let mut diagnostics = chosen.diagnostics(prepared.small.width());
     diagnostics.extend(object.diagnostic());
     diagnostics.extend(confidence.diagnostics());
-    watch.lap("outline");
-    let [mask, tight] = shape.coverages(prepared.photo.size());
     let found = Segmentation {
-        mask,
-        tight,
-        hull: shape.hull,
-        outline: shape.outline,
-        touches: chosen.pass.touches,
         confidence,
-        levels: chosen.levels,
-        reduction: shape.scale.reduction(),
         diagnostics,
-        steps: chosen.into_steps(&prepared.small),
+        ..Segmentation::new(prepared, chosen, shape)
     };
     watch.lap("masks");
     watch.log("segment");
     Ok(found)
+}
+
+impl Segmentation {
+    /// With the confidence of the search alone and without diagnostics.
+    fn new(prepared: &Prepared<'_>, chosen: ChosenSearch<'_>, shape: ObjectShape) -> Self {
+        let [mask, tight] = shape.coverages(prepared.photo.size());
+        Self {
+            mask,
+            tight,
+            hull: shape.hull,
+            outline: shape.outline,
+            touches: chosen.pass.touches,
+            confidence: chosen.confidence,
+            levels: chosen.levels,
+            reduction: shape.scale.reduction(),
+            diagnostics: Vec::new(),
+            steps: chosen.into_steps(&prepared.small),
+        }
+    }
 }
 
 #[cfg(test)]

@@ -4,9 +4,10 @@ mod dye;
 mod lines;
 
 use super::film::{covered, view};
+use super::median::median;
 use super::plate::ScreenPlate;
 use super::prepared::refused;
-use super::register;
+use super::register::{self, Registered};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
 use crate::filter;
@@ -19,7 +20,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct TriangulateOptions {
-    /// The object may lie so many pixels off the first photo in another one, and is then moved back. Default: 8.
+    /// Largest offset of the object from the first photo that is moved back, pixels. Default: 8.
     pub max_shift_px: f64,
     /// Moved back, what the screens do not change must agree between the photos: least correlation, 0 to 1. Default: 0.5.
     pub least_agreement: f64,
@@ -55,7 +56,7 @@ pub struct Triangulated {
     pub shift_px: Vec<[f64; 2]>,
     /// Root mean square of what the film does not explain of the photos inside the object, scene-linear.
     pub residual: f32,
-    /// What a person should know.
+    /// Notes and warnings.
     pub diagnostics: Vec<Diagnostic>,
 }
 
@@ -87,17 +88,8 @@ pub fn triangulate(
 ) -> Result<Triangulated> {
     check_sizes(shots, inside)?;
     let aligned = align(shots, inside, opts)?;
-    let noise = shots
-        .iter()
-        .map(|(_, plate)| strongest_noise(plate.residual))
-        .fold(MIN_NOISE, f32::max);
-    let lines = fit_lines(&aligned, noise);
-    let determined = determined_channels(&lines, inside, opts.max_sigma);
-    if determined == [false; 3] {
-        return Err(refused(
-            "the screens are too similar in every channel to separate film from background",
-        ));
-    }
+    let lines = fit_lines(&aligned, strongest_noise(shots));
+    let determined = determined_channels(&lines, inside, opts.max_sigma)?;
     let dye = dye::fit(&lines, inside, determined);
     let inferred = Inferred::fit(&lines, inside, determined, dye);
     let solved = lines.map(|line| inferred.complete(&line));
@@ -111,13 +103,11 @@ pub fn triangulate(
     })
 }
 
-/// What is found of the film, without what is known of the photos.
+/// What was found out about the film, without what is known about the photos.
 fn composed(solved: &Image<SolvedFilm>, inside: &Image<Coverage>) -> Triangulated {
     let flat = lines::flat_transmittance(solved, inside);
-    let seen = view(&solved.map(|p| p.transmittance), flat, inside).zip_map(inside, covered);
-    let reflected = solved.zip_map(inside, |p, c| p.reflected.scale(c.0));
     Triangulated {
-        film: reflected.zip_map(&seen, Film::new),
+        film: seen_film(solved, flat, inside),
         transmittance: solved.zip_map(inside, |p, c| covered(p.transmittance, c)),
         uncertainty: solved.zip_map(inside, |p, c| (p.sigma * c.0).min(1.0)),
         flat,
@@ -128,17 +118,22 @@ fn composed(solved: &Image<SolvedFilm>, inside: &Image<Coverage>) -> Triangulate
     }
 }
 
+/// Reflected light, and what is seen through plastic that where it lies flat measures `flat`.
+fn seen_film(solved: &Image<SolvedFilm>, flat: LinearRgb, inside: &Image<Coverage>) -> Image<Film> {
+    let seen = view(&solved.map(|p| p.transmittance), flat, inside).zip_map(inside, covered);
+    let reflected = solved.zip_map(inside, |p, c| p.reflected.scale(c.0));
+    reflected.zip_map(&seen, Film::new)
+}
+
 fn diagnostics(shift_px: &[[f64; 2]], determined: [bool; 3]) -> Vec<Diagnostic> {
-    let moved = (1..)
-        .zip(shift_px)
-        .filter(|(_, shift)| **shift != [0.0; 2])
-        .map(|(photo, shift)| moved_photo(photo, *shift));
-    let open = CHANNELS
-        .into_iter()
-        .zip(determined)
-        .filter(|(_, determined)| !determined)
-        .map(|(name, _)| similar_screens(name));
-    moved.chain(open).collect()
+    let photos = (1..).zip(shift_px);
+    let moved = photos.filter(|(_, shift)| **shift != [0.0; 2]);
+    let channels = CHANNELS.into_iter().zip(determined);
+    let open = channels.filter(|(_, determined)| !determined);
+    moved
+        .map(|(photo, shift)| moved_photo(photo, *shift))
+        .chain(open.map(|(name, _)| similar_screens(name)))
+        .collect()
 }
 
 /// Noise of a photo at least: coded pictures are no finer.
@@ -158,10 +153,8 @@ fn check_sizes(
     inside: &Image<Coverage>,
 ) -> Result<()> {
     if shots.len() < 2 {
-        return Err(Error::value(
-            "photos",
-            format!("{}, expected at least 2", shots.len()),
-        ));
+        let what = format!("{}, expected at least 2", shots.len());
+        return Err(Error::value("photos", what));
     }
     for (i, (photo, plate)) in shots.iter().enumerate() {
         assert_eq!(
@@ -169,15 +162,23 @@ fn check_sizes(
             plate.image.size(),
             "photo {i} and its plate differ in size"
         );
-        if photo.size() != inside.size() {
-            let ((w, h), (iw, ih)) = (photo.size(), inside.size());
-            return Err(Error::value(
-                format!("photos[{i}]"),
-                format!("{w} x {h} pixels, expected {iw} x {ih}"),
-            ));
-        }
+        check_same_size(i, photo, inside)?;
     }
     Ok(())
+}
+
+/// Photo `number`, from 0, has the size of the mask.
+fn check_same_size(
+    number: usize,
+    photo: &Image<LinearRgb>,
+    inside: &Image<Coverage>,
+) -> Result<()> {
+    let ((w, h), (width, height)) = (photo.size(), inside.size());
+    if (w, h) == (width, height) {
+        return Ok(());
+    }
+    let what = format!("{w} x {h} pixels, expected {width} x {height}");
+    Err(Error::value(format!("photos[{number}]"), what))
 }
 
 fn align(
@@ -192,21 +193,23 @@ fn align(
         near: filter::dilate(&inside.map(|c| c.0 > 0.0), reach),
         opts,
     };
-    let mut aligned = vec![AlignedPhoto {
-        photo: first.clone(),
-        screen: first_plate.image.clone(),
-        shift_px: [0.0; 2],
-    }];
+    let mut aligned = vec![AlignedPhoto::new(first, first_plate, [0.0; 2])];
     for (number, (photo, plate)) in (2..).zip(others) {
         let weights = unchanged_light(first_plate.color(), plate.color());
-        let [x, y] = aligner.shift_px(number, photo, weights)?;
-        aligned.push(AlignedPhoto {
+        let shift_px = aligner.shift_px(number, photo, weights)?;
+        aligned.push(AlignedPhoto::new(photo, plate, shift_px));
+    }
+    Ok(aligned)
+}
+
+impl AlignedPhoto {
+    fn new(photo: &Image<LinearRgb>, plate: &ScreenPlate, [x, y]: [f64; 2]) -> Self {
+        Self {
             photo: register::moved(photo, [x, y]),
             screen: register::moved(&plate.image, [x, y]),
             shift_px: [0.0 - x, 0.0 - y],
-        });
+        }
     }
-    Ok(aligned)
 }
 
 /// What the other photos are aligned to.
@@ -230,43 +233,54 @@ impl Aligner<'_> {
         weights: [f32; 3],
     ) -> Result<[f64; 2]> {
         let found = register::shift(self.first, photo, &self.near, weights);
-        let ([x, y], most) = (found.shift_px, self.opts.max_shift_px);
-        if x.abs().max(y.abs()) > most {
-            return Err(refused(format!(
-                "photo {number}: the object is offset by ({:.1}, {:.1}) px from the first, expected at most {most}; did it move?",
-                -x, -y
-            )));
+        let problem = self
+            .too_far(&found)
+            .or_else(|| self.too_unlike(&found))
+            .or_else(|| self.turned(photo, weights));
+        match problem {
+            Some(what) => Err(refused(format!("photo {number}: {what}"))),
+            None => Ok(found.shift_px),
         }
-        let least = self.opts.least_agreement;
-        if found.sigma_px < MAX_JUDGED_SIGMA_PX && found.agreement < least {
-            return Err(refused(format!(
-                "photo {number}: correlation with the first is {:.2}, expected {least:.2}; did the object turn or the light change?",
-                found.agreement
-            )));
-        }
-        if let Some(apart) = self.turned_px(photo, weights) {
-            return Err(refused(format!(
-                "photo {number}: the two ends of the object moved {apart:.1} px apart from the first, expected at most \
-                 {MAX_END_SHIFT_PX}; did it turn?"
-            )));
-        }
-        Ok([x, y])
+    }
+
+    fn too_far(&self, found: &Registered) -> Option<String> {
+        let ([x, y], most) = (found.shift_px.map(|v| -v), self.opts.max_shift_px);
+        (x.abs().max(y.abs()) > most).then(|| {
+            format!(
+                "the object is offset by ({x:.1}, {y:.1}) px from the first, expected at most {most}; did it move?"
+            )
+        })
+    }
+
+    fn too_unlike(&self, found: &Registered) -> Option<String> {
+        let (agreement, least) = (found.agreement, self.opts.least_agreement);
+        (found.sigma_px < MAX_JUDGED_SIGMA_PX && agreement < least).then(|| {
+            format!(
+                "correlation with the first is {agreement:.2}, expected {least:.2}; did the object turn or the light change?"
+            )
+        })
+    }
+
+    fn turned(&self, photo: &Image<LinearRgb>, weights: [f32; 3]) -> Option<String> {
+        let apart = self.turned_px(photo, weights)?;
+        Some(format!(
+            "the two ends of the object moved {apart:.1} px apart from the first, expected at most \
+             {MAX_END_SHIFT_PX}; did it turn?"
+        ))
     }
 
     /// How far the ends of the object moved apart, in pixels, where that is more than they may and certainly so.
     fn turned_px(&self, photo: &Image<LinearRgb>, weights: [f32; 3]) -> Option<f64> {
         let [low, high] =
             halves(&self.near).map(|end| register::shift(self.first, photo, &end, weights));
-        let apart = libm::hypot(
-            low.shift_px[0] - high.shift_px[0],
-            low.shift_px[1] - high.shift_px[1],
-        );
+        let [x, y] = [0, 1].map(|axis| low.shift_px[axis] - high.shift_px[axis]);
+        let apart = libm::hypot(x, y);
         let sigma = libm::hypot(low.sigma_px, high.sigma_px);
         (apart > MAX_END_SHIFT_PX.max(SIGNIFICANT_SIGMAS * sigma)).then_some(apart)
     }
 }
 
-/// A shift known worse than this does not show how well the photos agree.
+/// A shift less certain than this does not show how well the photos agree.
 const MAX_JUDGED_SIGMA_PX: f64 = 0.2;
 /// Ends that move farther apart than this leave double edges.
 const MAX_END_SHIFT_PX: f64 = 1.0;
@@ -276,14 +290,20 @@ const SIGNIFICANT_SIGMAS: f64 = 4.0;
 /// The two halves of an object, cut across the longer side of its box.
 fn halves(mask: &Mask) -> [Mask; 2] {
     let (w, h) = mask.size();
-    let spans = [0, 1].map(|axis| span(mask, axis));
-    let axis = usize::from(spans[1][1] - spans[1][0] > spans[0][1] - spans[0][0]);
-    let middle = usize::midpoint(spans[axis][0], spans[axis][1]);
+    let (axis, middle) = middle_of_longer_side(mask);
     [false, true].map(|above| {
         Image::from_fn(w, h, |x, y| {
             mask[(x, y)] && ([x, y][axis] > middle) == above
         })
     })
+}
+
+/// The axis along which a mask's box is longer, and its middle there.
+fn middle_of_longer_side(mask: &Mask) -> (usize, usize) {
+    let spans = [0, 1].map(|axis| span(mask, axis));
+    let [width, height] = spans.map(|[first, last]| last - first);
+    let axis = usize::from(height > width);
+    (axis, usize::midpoint(spans[axis][0], spans[axis][1]))
 }
 
 /// First and last column (axis 0) or row (axis 1) with a set pixel; two equal ones without any.
@@ -300,14 +320,13 @@ fn span(mask: &Mask, axis: usize) -> [usize; 2] {
 /// The light that does not change between two screens: the mean of the channels without its part along the difference.
 fn unchanged_light(a: LinearRgb, b: LinearRgb) -> [f32; 3] {
     let even = [1.0_f32 / 3.0; 3];
-    let (a, b): ([f32; 3], [f32; 3]) = (a.into(), b.into());
-    let along: [f32; 3] = std::array::from_fn(|c| a[c] - b[c]);
+    let along = [a.r - b.r, a.g - b.g, a.b - b.b];
     let square: f32 = along.iter().map(|v| v * v).sum();
     if square <= 0.0 {
         return even;
     }
     let share: f32 = along.iter().zip(even).map(|(v, e)| v * e).sum::<f32>() / square;
-    std::array::from_fn(|c| even[c] - share * along[c])
+    along.map(|v| 1.0 / 3.0 - share * v)
 }
 
 fn fit_lines(photos: &[AlignedPhoto], noise: f32) -> Image<PixelLines> {
@@ -315,24 +334,36 @@ fn fit_lines(photos: &[AlignedPhoto], noise: f32) -> Image<PixelLines> {
     Image::from_fn(w, h, |x, y| {
         let mut lines = [ScreenLine::default(); 3];
         for aligned in photos {
-            let pixel: [f32; 3] = aligned.photo[(x, y)].into();
-            let screen: [f32; 3] = aligned.screen[(x, y)].into();
-            (0..3).for_each(|c| lines[c].add(screen[c], pixel[c]));
+            add_point(&mut lines, aligned.screen[(x, y)], aligned.photo[(x, y)]);
         }
         PixelLines { lines, noise }
     })
 }
 
+#[inline]
+fn add_point(lines: &mut [ScreenLine; 3], screen: LinearRgb, pixel: LinearRgb) {
+    let (screen, pixel): ([f32; 3], [f32; 3]) = (screen.into(), pixel.into());
+    (0..3).for_each(|c| lines[c].add(screen[c], pixel[c]));
+}
+
 /// Channels whose slope is measured well enough, by the median over the object.
+///
+/// # Errors
+/// [`Error::Photo`] where there is none.
 fn determined_channels(
     lines: &Image<PixelLines>,
     inside: &Image<Coverage>,
     max_sigma: f32,
-) -> [bool; 3] {
-    [0, 1, 2].map(|c| {
+) -> Result<[bool; 3]> {
+    let determined = [0, 1, 2].map(|c| {
         let sigmas = lines::covered_pixels(lines, inside).map(|p| p.sigma(c));
-        lines::median(sigmas).is_some_and(|sigma| sigma <= max_sigma)
-    })
+        median(sigmas, f32::total_cmp).is_some_and(|sigma| sigma <= max_sigma)
+    });
+    if determined == [false; 3] {
+        let what = "the screens are too similar in every channel to separate film from background";
+        return Err(refused(what));
+    }
+    Ok(determined)
 }
 
 /// Root mean square of what the film does not explain of the photos inside the object.
@@ -357,8 +388,11 @@ fn square_distance(a: LinearRgb, b: LinearRgb) -> f64 {
     a.iter().zip(b).map(|(a, b)| f64::from(a - b).powi(2)).sum()
 }
 
-fn strongest_noise(noise: LinearRgb) -> f32 {
-    noise.r.max(noise.g).max(noise.b)
+fn strongest_noise(shots: &[(&Image<LinearRgb>, &ScreenPlate)]) -> f32 {
+    shots
+        .iter()
+        .map(|(_, plate)| plate.residual.max_channel())
+        .fold(MIN_NOISE, f32::max)
 }
 
 /// `photo` counts from 1.

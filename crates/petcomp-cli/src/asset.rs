@@ -7,7 +7,7 @@ use crate::global::GlobalArgs;
 use crate::print;
 use crate::values::{parse_corners, parse_metres};
 use petcomp::asset::{self, Asset, Built, Library, Manifest};
-use petcomp::asset::{PhotoEntry, PhotoRecord, Scale, ScreenSource};
+use petcomp::asset::{Photo, PhotoEntry, PhotoRecord, Scale, ScreenSource};
 use petcomp::matte::CutOutOptions;
 use petcomp::{Quality, io};
 use std::path::{Path, PathBuf};
@@ -108,12 +108,10 @@ impl ScaleArgs {
     /// The one that is given; `corners` are those of the screen.
     fn scale(&self, corners: Option<[[f64; 2]; 4]>) -> Scale {
         let screen = self.screen_size.map(|size| Scale::Screen(size, corners));
-        self.scale
-            .map(Scale::PxPerMetre)
-            .or_else(|| self.object_size())
-            .or(screen)
-            .or(self.marker_size.map(Scale::Marker))
-            .unwrap_or(Scale::Length(self.length.unwrap_or_default()))
+        let scale = self.scale.map(Scale::PxPerMetre);
+        let scale = scale.or_else(|| self.object_size()).or(screen);
+        let scale = scale.or(self.marker_size.map(Scale::Marker));
+        scale.unwrap_or(Scale::Length(self.length.unwrap_or_default()))
     }
 
     fn object_size(&self) -> Option<Scale> {
@@ -148,7 +146,8 @@ fn check_folder(folder: &Path, strict: bool) -> anyhow::Result<()> {
         "{folder}: {assets} assets, {cut_outs} cut-outs, all intact, {to_review} to review"
     ));
     if strict && to_review > 0 {
-        return Err(NeedsReview(format!("{folder}: {to_review} cut-outs to review")).into());
+        let what = format!("{folder}: {to_review} cut-outs to review");
+        return Err(NeedsReview(what).into());
     }
     Ok(())
 }
@@ -215,13 +214,9 @@ fn write_sheet(folder: &Path, library: &Library, global: &GlobalArgs) -> anyhow:
 
 fn add_photos(args: &AddPhotoArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     let options = args.quality.cut_out(CutOutOptions::default());
-    let mut added = Vec::new();
-    for photo in &args.photos {
-        let entry = args.entry_for(photo);
-        let photo = asset::add_photo(&args.output, &entry, &args.classes, &options)?;
-        report_added(&photo.record, global);
-        added.push(photo);
-    }
+    let photos = args.photos.iter();
+    let added = photos.map(|photo| args.add_photo(photo, &options, global));
+    let added = added.collect::<petcomp::Result<Vec<_>>>()?;
     let library = Library::open_with(&args.output, added)?;
     show_classes(&library.classes, "--classes", global);
     write_sheet(&args.output, &library, global)
@@ -238,6 +233,18 @@ fn report_added(record: &PhotoRecord, global: &GlobalArgs) {
 }
 
 impl AddPhotoArgs {
+    fn add_photo(
+        &self,
+        photo: &Path,
+        options: &CutOutOptions,
+        global: &GlobalArgs,
+    ) -> petcomp::Result<Photo> {
+        let entry = self.entry_for(photo);
+        let added = asset::add_photo(&self.output, &entry, &self.classes, options)?;
+        report_added(&added.record, global);
+        Ok(added)
+    }
+
     fn entry_for(&self, photo: &Path) -> PhotoEntry {
         let scale = self.scale.scale(self.screen_corners);
         PhotoEntry {

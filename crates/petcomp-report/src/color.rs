@@ -5,11 +5,10 @@
 
 use super::clock::timed;
 use super::{Diagram, Point};
-use petcomp::Result;
 use petcomp::color::{
     Curve, decode_srgb8, decode_srgb16, encode_srgb8, encode_srgb16, linear_to_srgb, srgb_to_linear,
 };
-use petcomp::{LinearRgb, Srgb8};
+use petcomp::{LinearRgb, Result, Srgb8};
 
 /// Values that are converted: a megapixel of three channels.
 const VALUE_COUNT: usize = 3 << 20;

@@ -6,13 +6,10 @@
 use super::clock::timed;
 use super::pile::pile;
 use super::{Diagram, Point};
-use petcomp::Image;
-use petcomp::Quality;
 use petcomp::io::{self, Bits, Compression, WriteOptions};
 use petcomp::plot::three;
 use petcomp::render::render;
-use petcomp::{Error, Result};
-use petcomp::{LinearRgb, PremulRgba};
+use petcomp::{Error, Image, LinearRgb, PremulRgba, Quality, Result};
 use petcomp::{Shot, composite};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};

@@ -12,13 +12,11 @@ use super::files::write_texts;
 use super::matte::score::overlap;
 use super::matte::truth::{Known, Truths};
 use super::matte::{GOOD_BOX_PX, GOOD_IOU};
-use petcomp::Image;
-use petcomp::Result;
 use petcomp::geom::Point2;
 
 use petcomp::matte::{CutOut, CutOutOptions, cut_out};
 use petcomp::plot::Table;
-use petcomp::{Coverage, LinearRgb};
+use petcomp::{Coverage, Image, LinearRgb, Result};
 use rayon::prelude::*;
 use std::path::Path;
 

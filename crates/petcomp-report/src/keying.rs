@@ -4,12 +4,10 @@
 
 use super::clock::timed;
 use super::{Diagram, Point};
-use petcomp::Image;
-use petcomp::Result;
 use petcomp::matte::key::Blur;
 use petcomp::matte::{KeyOptions, Keying, Screen};
 use petcomp::plot::three;
-use petcomp::{Coverage, LinearRgb};
+use petcomp::{Coverage, Image, LinearRgb, Result};
 use std::ops::Range;
 
 const SIZE: (usize, usize) = (640, 480);

@@ -18,8 +18,12 @@ pub(super) fn annotations(text: &str) -> Result<Option<Vec<Annotation>>> {
     let images = root.children().filter(|node| node.has_tag_name("image"));
     let annotations = images
         .enumerate()
-        .map(|(i, node)| annotation(node).map_err(|e| e.within(&format!("image[{i}]"))));
+        .map(|(i, node)| numbered_annotation(i, node));
     with_shapes(annotations).map(Some)
+}
+
+fn numbered_annotation(i: usize, image: Node<'_, '_>) -> Result<Annotation> {
+    annotation(image).map_err(|e| e.within(&format!("image[{i}]")))
 }
 
 /// CVAT's pixels are ours: 0 is the edge of the picture.
@@ -56,14 +60,11 @@ fn shape(node: Node<'_, '_>) -> Result<Option<AnnotatedShape>> {
 fn box_corners(node: Node<'_, '_>) -> Result<Vec<[f64; 2]>> {
     let first = [number(node, "xtl")?, number(node, "ytl")?];
     let opposite = [number(node, "xbr")?, number(node, "ybr")?];
-    let degrees = match node.attribute("rotation") {
-        None => 0.0,
-        Some(_) => number(node, "rotation")?,
-    };
-    Ok(turned_about_middle(
-        upright_corners(first, opposite),
-        degrees,
-    ))
+    let corners = upright_corners(first, opposite);
+    match node.attribute("rotation") {
+        None => Ok(corners),
+        Some(_) => Ok(turned_about_middle(corners, number(node, "rotation")?)),
+    }
 }
 
 /// `x,y;x,y` as numbers.

@@ -66,10 +66,16 @@ fn annotation(task: &Value) -> Result<Annotation> {
     };
     for (i, result) in results.iter().enumerate().filter(|(_, r)| has_size(r)) {
         let result = read_result(result).map_err(|e| Error::value(format!("result[{i}]"), e))?;
-        annotation.size = Some([result.original_width, result.original_height]);
-        annotation.shapes.extend(result.shape());
+        annotation.add(&result);
     }
     Ok(annotation)
+}
+
+impl Annotation {
+    fn add(&mut self, result: &AnnotationResult) {
+        self.size = Some([result.original_width, result.original_height]);
+        self.shapes.extend(result.shape());
+    }
 }
 
 fn read_result(value: &Value) -> std::result::Result<AnnotationResult, String> {
@@ -120,19 +126,28 @@ impl AnnotationResult {
     /// What was drawn; none for a result that is neither points nor a rectangle.
     fn shape(&self) -> Option<AnnotatedShape> {
         let geometry = self.value.as_ref().unwrap_or(&self.own);
-        let (kind, points) = match (&geometry.points, geometry.x.zip(geometry.y)) {
-            (Some(points), _) => (ShapeKind::Polygon, points.clone()),
-            (None, Some((x, y))) if geometry.keypointlabels.is_some() => {
-                (ShapeKind::Points, vec![[x, y]])
-            }
-            (None, Some((x, y))) => return self.rectangle(geometry, [x, y]),
-            _ => return None,
-        };
-        Some(AnnotatedShape {
+        if let Some(points) = &geometry.points {
+            return Some(self.points(ShapeKind::Polygon, geometry, points));
+        }
+        let corner = [geometry.x?, geometry.y?];
+        if geometry.keypointlabels.is_some() {
+            Some(self.points(ShapeKind::Points, geometry, &[corner]))
+        } else {
+            self.rectangle(geometry, corner)
+        }
+    }
+
+    fn points(
+        &self,
+        kind: ShapeKind,
+        geometry: &ResultGeometry,
+        points: &[[f64; 2]],
+    ) -> AnnotatedShape {
+        AnnotatedShape {
             kind,
             name: geometry.name(),
-            points: points.into_iter().map(|p| self.to_px(p)).collect(),
-        })
+            points: points.iter().map(|p| self.to_px(*p)).collect(),
+        }
     }
 
     fn rectangle(&self, geometry: &ResultGeometry, corner: [f64; 2]) -> Option<AnnotatedShape> {

@@ -7,7 +7,7 @@ mod cvat;
 mod label_studio;
 mod labelme;
 
-use super::label::Label;
+use super::label::{Label, LabelSurface};
 use crate::error::{Error, Result};
 use crate::io;
 use serde_json::Value;
@@ -66,7 +66,7 @@ fn json_annotations(value: Value) -> Result<Option<Vec<Annotation>>> {
     }
 }
 
-/// The label that a LabelMe file means, of a rectangle of `size` metres.
+/// The label for a LabelMe file of a rectangle of `size` metres.
 ///
 /// # Errors
 /// [`Error::Value`] for text that is not LabelMe's, and for anything but one quadrangle, one rectangle or four points.
@@ -77,17 +77,21 @@ pub fn from_labelme(text: &str, size: [f64; 2]) -> Result<Label> {
 }
 
 impl Annotation {
-    /// The label that the annotation means; the sides of its rectangle are not known.
+    /// The label for the annotation; the sides of its rectangle are unknown.
     pub(crate) fn label(&self) -> Result<Label> {
         let (name, corners_px) = self.rectangle()?;
         let mut label = Label::new(self.size.unwrap_or_default(), corners_px, [1.0; 2]);
-        (label.surface.width_m, label.surface.height_m) = (None, None);
         label.image.file = self.files.first().cloned().unwrap_or_default();
-        label.surface.id = match name.is_empty() {
-            true => "surface".into(),
-            false => name,
+        label.surface = LabelSurface {
+            id: if name.is_empty() {
+                UNNAMED.into()
+            } else {
+                name
+            },
+            corners_px: Some(corners_px),
+            source: Some(self.source.into()),
+            ..LabelSurface::default()
         };
-        label.surface.source = Some(self.source.into());
         Ok(label)
     }
 
@@ -144,6 +148,9 @@ impl Annotation {
     }
 }
 
+/// What a surface without a name is called.
+const UNNAMED: &str = "surface";
+
 /// Name of a surface and its corners, pixels.
 type NamedCorners = (String, [[f64; 2]; 4]);
 
@@ -168,12 +175,12 @@ const CORNER_NAMES: [&[&str]; 4] = [
 /// Single points as they were drawn, or where they are named so, from the top left.
 fn corners_from_points(points: [(&String, [f64; 2]); 4]) -> NamedCorners {
     if let Some(corners) = corners_by_name(&points) {
-        return ("surface".into(), corners);
+        return (UNNAMED.into(), corners);
     }
     let first = points[0].0;
     let name = match points.iter().all(|(name, _)| *name == first) {
         true => first.clone(),
-        false => "surface".into(),
+        false => UNNAMED.into(),
     };
     (name, points.map(|(_, point)| point))
 }

@@ -2,7 +2,7 @@
 
 use crate::color::linear_to_srgb;
 use crate::filter::box_blur;
-use crate::geom::{Point2, Vector2};
+use crate::geom::{Point2, mean_point};
 use crate::image::{Image, Mask};
 use crate::pixel::LinearRgb;
 use std::collections::BTreeMap;
@@ -102,20 +102,13 @@ fn outer_corners(ends: &RowEnds) -> Vec<Point2<f64>> {
 
 /// The four corners of a region that is nearly a quadrangle.
 fn quad(outline: &[Point2<f64>]) -> Option<[Point2<f64>; 4]> {
-    let a = farthest(outline, mean_point(outline))?;
+    let a = farthest(outline, mean_point(outline).into())?;
     let c = farthest(outline, a)?;
     let [b, d] = extremes_beside(outline, a, c)?;
     // b lies to the left of the way from a to c, so that a, b, c, d run clockwise where y runs down.
     let corners = [a, b, c, d];
     let fills_hull = polygon_area(&corners) >= MIN_HULL_SHARE * hull_area(outline);
     (has_long_sides(&corners) && fills_hull).then_some(corners)
-}
-
-fn mean_point(points: &[Point2<f64>]) -> Point2<f64> {
-    let sum = points
-        .iter()
-        .fold(Vector2::zeros(), |sum, p| sum + p.coords);
-    (sum / points.len() as f64).into()
 }
 
 fn has_long_sides(corners: &[Point2<f64>; 4]) -> bool {

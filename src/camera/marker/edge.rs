@@ -2,7 +2,7 @@
 
 use super::dictionary::{MARKER_CELLS, WhiteCells};
 use crate::camera::rectangle::square_from_corners;
-use crate::geom::{Homography, Line, Point2, Vector2};
+use crate::geom::{Homography, Line, Point2, Vector2, corners_between};
 use crate::image::Image;
 
 /// Stretches along each side, and the part of it near its corners that is not looked at.
@@ -20,7 +20,7 @@ const INNER_REACH_CELLS: f64 = 0.45;
 /// White that has grown by more, pixels, has another cause; fewer edges than these are not conclusive.
 const MAX_GROWTH_PX: f64 = 1.0;
 const MIN_EDGES: usize = 6;
-/// So often the sides are fitted anew at most; corners that move by less stay.
+/// Times the sides are fitted anew, at most; corners that move by less stay.
 const MAX_ROUNDS: usize = 6;
 const SETTLED_PX: f64 = 0.01;
 /// Noise of a corner of a marker that is seen as sharp as can be, pixels.
@@ -64,15 +64,6 @@ fn fitted_sides(light: &Image<f32>, corners: &[Point2<f64>; 4]) -> Option<[Line;
         fitted_side(light, corners, 2)?,
         fitted_side(light, corners, 3)?,
     ])
-}
-
-/// The corners of a quadrangle whose sides are on these lines, the first between the last line and the first.
-fn corners_between(sides: &[Line; 4]) -> Option<[Point2<f64>; 4]> {
-    let mut corners = [Point2::origin(); 4];
-    for (i, corner) in corners.iter_mut().enumerate() {
-        *corner = sides[(i + 3) % 4].meeting(&sides[i])?;
-    }
-    Some(corners)
 }
 
 /// The corners of a marker, corrected by the edges between its cells.
@@ -231,11 +222,19 @@ fn fitted_side(light: &Image<f32>, corners: &[Point2<f64>; 4], first: usize) -> 
     // From a steep side a marker is much longer than high, and so are its cells.
     let across = (outward.dot(&(a - d)) + outward.dot(&(b - c))) / 2.0;
     let reach = clamped_reach(REACH_CELLS * across / MARKER_CELLS as f64);
-    let points = (0..SIDE_PROBES).filter_map(|i| {
-        let foot = a + (b - a) * probe_part(i);
-        Some(foot + outward * crossing(light, foot, outward, reach)?)
-    });
+    let feet = (0..SIDE_PROBES).map(|i| a + (b - a) * probe_part(i));
+    let points = feet.filter_map(|foot| edge_point(light, foot, outward, reach));
     line_through_most(points.collect())
+}
+
+/// Where the light rises along a probe.
+fn edge_point(
+    light: &Image<f32>,
+    foot: Point2<f64>,
+    outward: Vector2<f64>,
+    reach: f64,
+) -> Option<Point2<f64>> {
+    Some(foot + outward * crossing(light, foot, outward, reach)?)
 }
 
 /// The unit vector to the left of the way from a corner to the next.
@@ -284,7 +283,7 @@ fn crossing(
     (rise > MIN_RISE && edge.abs() <= reach).then_some(edge)
 }
 
-/// The position of a sample along a probe of so many steps, from its middle.
+/// The position of a sample along a probe of `steps` steps, from its middle.
 fn along_probe(i: f64, steps: usize, reach: f64) -> f64 {
     -reach + 2.0 * reach * i / steps as f64
 }

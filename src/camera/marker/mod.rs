@@ -71,7 +71,7 @@ fn marker_at(light: &Image<f32>, rough: &[Point2<f64>; 4]) -> Option<Marker> {
     })
 }
 
-/// The markers of every known family, of which nothing but their size is given.
+/// The markers of every known family, for when only their size is given.
 pub(crate) fn any_markers(photo: &Image<LinearRgb>) -> Vec<Marker> {
     #[cfg(feature = "markers")]
     {
@@ -157,7 +157,7 @@ impl<'a> MarkerLayout<'a> {
 }
 
 impl MarkerLayout<'_> {
-    /// The label with the corners of the markers as points, each marker turned by so many right angles.
+    /// The label with the corners of the markers as points, each marker turned by `turns` right angles.
     fn label_turned(&self, turns: usize) -> Label {
         let mut label = self.label.clone();
         for marker in &self.found {
@@ -168,19 +168,21 @@ impl MarkerLayout<'_> {
 
     /// The corners of a marker where the map has it; none where it has not.
     fn points(&self, marker: &Marker, turns: usize) -> impl Iterator<Item = LabelPoint> {
-        let center = self.map.map.get(&marker.id).copied();
-        let half = self.map.size_m / 2.0;
-        let offset = Vector2::repeat(self.label.pixel_origin.offset_px());
-        let sigma_px = marker.sigma_px.max(self.min_sigma_px);
         let marker = *marker;
-        center.into_iter().flat_map(move |center| {
+        let center = self.map.map.get(&marker.id);
+        center.into_iter().flat_map(move |&center| {
             [0, 1, 2, 3].map(|i| LabelPoint {
-                xyz_m: square_corner(center, half, i),
-                px: (marker.corners_px[(i + turns) % 4] - offset).into(),
-                sigma_px: Some(sigma_px),
+                xyz_m: square_corner(center, self.map.size_m / 2.0, i),
+                px: self.labelled_px(marker.corners_px[(i + turns) % 4]),
+                sigma_px: Some(marker.sigma_px.max(self.min_sigma_px)),
                 note: Some(format!("marker {}", marker.id)),
             })
         })
+    }
+
+    /// A position as the label writes it.
+    fn labelled_px(&self, px: Point2<f64>) -> [f64; 2] {
+        (px - Vector2::repeat(self.label.pixel_origin.offset_px())).into()
     }
 
     /// By how many right angles the markers have to be turned for a camera to fit clearly better than as they are; 0 where

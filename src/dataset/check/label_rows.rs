@@ -17,21 +17,16 @@ pub(super) fn read_rows(
     class_count: Option<usize>,
 ) -> (Vec<LabelRow>, Vec<Finding>) {
     let rows = split_rows(text);
-    let format = RowFormat {
-        outlines: rows.iter().any(|(_, row)| row.len() > MAX_BOX_COLUMNS),
-        class_count,
-    };
-    let (mut good, mut findings) = (Vec::new(), Vec::new());
-    let mut known: Vec<Vec<f64>> = Vec::new();
+    let format = RowFormat::new(&rows, class_count);
+    let (mut known, mut findings) = (Vec::new(), Vec::new());
     for (line, row) in rows {
         match format.parse_new(&row, &known) {
-            Ok(values) => {
-                good.extend(class_count.map(|_| format.label(&values)));
-                known.push(values);
-            }
+            Ok(values) => known.push(values),
             Err((code, message)) => findings.push(Finding::in_line(path, line, code, message)),
         }
     }
+    let good = known.iter().filter(|_| class_count.is_some());
+    let good = good.map(|values| format.label(values)).collect();
     (good, findings)
 }
 
@@ -52,6 +47,14 @@ struct RowFormat {
 }
 
 impl RowFormat {
+    fn new(rows: &[(usize, Vec<&str>)], class_count: Option<usize>) -> Self {
+        let mut lengths = rows.iter().map(|(_, row)| row.len());
+        Self {
+            outlines: lengths.any(|columns| columns > MAX_BOX_COLUMNS),
+            class_count,
+        }
+    }
+
     /// The numbers of a row, or what is wrong with it.
     fn parse(&self, row: &[&str]) -> Result<Vec<f64>, String> {
         self.check_columns(row.len())?;

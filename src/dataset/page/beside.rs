@@ -159,10 +159,7 @@ impl PixelStatistics {
     }
 
     fn new(picture: &Image<LinearRgb>) -> Self {
-        let codes = picture.map(|p| {
-            let code = encode_srgb8(p);
-            [code.r, code.g, code.b].map(f32::from)
-        });
+        let codes = picture.map(codes_of);
         let luma = codes.map(|[r, g, b]| 0.299 * r + 0.587 * g + 0.114 * b);
         let spread = codes.map(channel_spread);
         let brightness = mean(luma.pixels().iter().copied());
@@ -197,14 +194,17 @@ fn figure(set: &LabelledSet, picture: &LabelledPicture) -> Option<Figure> {
     let size = [header.width as f64, header.height as f64];
     let figure = Figure::whole(&picture.path, size);
     let mut figure = figure.inspect_err(|error| log::warn!("{error}")).ok()?;
-    let (letter, top) = (figure.letter_height(), figure.top());
-    for (class, shares) in picture.boxes.iter().flatten() {
-        let bbox = in_pixels(*shares, size);
-        let (name, color) = (set.name(*class), super::color_of(*class));
-        figure.drawing += &marked_box(&bbox, &name, letter, top, &color, "stroke-width=\"2\"");
-    }
+    let boxes = picture.boxes.iter().flatten();
+    let marks = boxes.map(|(class, shares)| mark(&figure, set, *class, &in_pixels(*shares, size)));
+    figure.drawing = marks.collect();
     figure.caption = caption(picture);
     Some(figure)
+}
+
+fn mark(figure: &Figure, set: &LabelledSet, class: u32, b: &BBox) -> String {
+    let (letter, top) = (figure.letter_height(), figure.top());
+    let (name, color) = (set.name(class), super::color_of(class));
+    marked_box(b, &name, letter, top, &color, "stroke-width=\"2\"")
 }
 
 fn in_pixels([x, y, w, h]: [f64; 4], size: [f64; 2]) -> BBox {
@@ -409,6 +409,11 @@ fn text_at([x, y]: [f64; 2], anchor: &str, text: &str) -> String {
 /// The largest channel less the smallest.
 fn channel_spread(codes: [f32; 3]) -> f32 {
     codes.into_iter().fold(0.0, f32::max) - codes.into_iter().fold(255.0, f32::min)
+}
+
+fn codes_of(pixel: LinearRgb) -> [f32; 3] {
+    let code = encode_srgb8(pixel);
+    [code.r, code.g, code.b].map(f32::from)
 }
 
 #[cfg(test)]

@@ -144,21 +144,23 @@ pub fn write(folder: &Path, runs: &[Run], options: &EvalReportOptions) -> Result
     let all: Vec<Metrics> = runs.iter().map(|run| Metrics::of(run, options)).collect();
     io::create_folder(folder)?;
     write_metrics(folder, &all)?;
-    let first = runs.first();
-    let confusion = first.map(|run| Confusion::new(&run.sheets, &options.confusion));
+    let confusion = runs.first().map(|run| confusion_of(run, options));
     let confusion = confusion.unwrap_or_default();
     let shown = shown_classes(&all, &confusion);
     let mut page = Page::new("Detections against the truth");
-    let scores = scores_table(&all, options);
+    let [scores, factors] = [scores_table(&all, options), factors_table(runs, options)];
     add_table(&mut page, folder, "Scores", "scores.csv", [&scores; 2])?;
     add_classes(&mut page, folder, &all, &shown, options)?;
-    let factors = factors_table(runs, options);
     add_table(&mut page, folder, "Factors", "factors.csv", [&factors; 2])?;
-    if let Some(run) = first {
+    if let Some(run) = runs.first() {
         add_run(folder, &mut page, run, &confusion, &shown, options)?;
     }
     io::write_text(folder.join("eval.html"), &page.document())?;
     Ok(all)
+}
+
+fn confusion_of(run: &Run, options: &EvalReportOptions) -> Confusion {
+    Confusion::new(&run.sheets, &options.confusion)
 }
 
 fn add_classes(
@@ -390,20 +392,24 @@ pub fn factors_table(runs: &[Run], options: &EvalReportOptions) -> Table {
         "coco mAP@0.5:0.95",
     ]);
     let tags = &options.tags;
-    if tags.factors.is_empty() {
-        return table;
-    }
-    let matches: Vec<[Matches; 2]> = runs.iter().map(match_both).collect();
-    for (i, factor) in tags.factors.iter().enumerate() {
-        for level in tags.levels(i) {
-            for (run, matches) in runs.iter().zip(&matches) {
-                let weights = level_weights(run, tags, i, level);
-                let [images, yolov5, coco] = weighted_scores(matches, &weights);
-                table.push([&run.name, factor, level, &images, &yolov5, &coco]);
-            }
+    if !tags.factors.is_empty() {
+        let matches: Vec<[Matches; 2]> = runs.iter().map(match_both).collect();
+        for i in 0..tags.factors.len() {
+            add_factor(&mut table, runs, &matches, tags, i);
         }
     }
     table
+}
+
+/// A row for each level of a factor and each run.
+fn add_factor(table: &mut Table, runs: &[Run], matches: &[[Matches; 2]], tags: &Tags, i: usize) {
+    for level in tags.levels(i) {
+        for (run, matches) in runs.iter().zip(matches) {
+            let weights = level_weights(run, tags, i, level);
+            let [images, yolov5, coco] = weighted_scores(matches, &weights);
+            table.push([&run.name, &tags.factors[i], level, &images, &yolov5, &coco]);
+        }
+    }
 }
 
 /// Number of images, and the mAP of both definitions on them.

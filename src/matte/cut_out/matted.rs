@@ -32,13 +32,15 @@ impl Matted {
         match opts.method.unwrap_or_default() {
             MatteMethod::Physical => Self::physical(prepared, screen, region, opts),
             MatteMethod::Key => Self::keyed(prepared, screen, region, opts),
-            MatteMethod::Outline => {
-                let cutout = region
-                    .photo
-                    .zip_map(&region.cut, |p, m| p.opaque().masked(m));
-                Ok(Self::grey(MatteMethod::Outline, cutout, 0.0))
-            }
+            MatteMethod::Outline => Ok(Self::outline(region)),
         }
+    }
+
+    fn outline(region: &ObjectRegion) -> Self {
+        let cutout = region
+            .photo
+            .zip_map(&region.cut, |p, m| p.opaque().masked(m));
+        Self::grey(MatteMethod::Outline, cutout, 0.0)
     }
 
     fn physical(
@@ -54,24 +56,7 @@ impl Matted {
             screen: screen.color,
             longer_side: prepared.longer_side(),
         };
-        let FilmMatte {
-            film,
-            transmittance,
-            uncertainty,
-            color_uncertainty,
-            diagnostics,
-            ..
-        } = solve_film(object, &opts.film)?;
-        // Film is empty outside the cut.
-        Ok(Self {
-            method: MatteMethod::Physical,
-            film,
-            transmittance,
-            uncertainty,
-            residual_matte: 0.0,
-            color_uncertainty: Some(color_uncertainty),
-            diagnostics,
-        })
+        solve_film(object, &opts.film).map(Self::from)
     }
 
     fn keyed(
@@ -105,13 +90,25 @@ impl Matted {
     }
 }
 
+impl From<FilmMatte> for Matted {
+    fn from(matte: FilmMatte) -> Self {
+        Self {
+            method: MatteMethod::Physical,
+            film: matte.film,
+            transmittance: matte.transmittance,
+            uncertainty: matte.uncertainty,
+            // Film is empty outside the cut.
+            residual_matte: 0.0,
+            color_uncertainty: Some(matte.color_uncertainty),
+            diagnostics: matte.diagnostics,
+        }
+    }
+}
+
 /// Mean of a matte where a mask is set; 0 where it is empty.
 fn mean_matte(matte: &Image<Coverage>, set: &Mask) -> f32 {
-    let chosen = matte
-        .pixels()
-        .iter()
-        .zip(set.pixels())
-        .filter(|(_, inside)| **inside);
+    let pixels = matte.pixels().iter().zip(set.pixels());
+    let chosen = pixels.filter(|(_, inside)| **inside);
     let (sum, count) = chosen.fold((0.0, 0u64), |(sum, count), (m, _)| {
         (sum + f64::from(m.0), count + 1)
     });

@@ -106,10 +106,14 @@ impl CutOutOptions {
         self.plate.check().map_err(|e| e.within("plate"))?;
         self.film.check().map_err(|e| e.within("film"))?;
         self.key.check()?;
+        self.check_lengths()?;
+        self.screen.map_or(Ok(()), check_screen)
+    }
+
+    fn check_lengths(&self) -> Result<()> {
         Bounds::new(0.0, 100.0, "pixels").check("soften_px", self.soften_px.into())?;
         Bounds::new(0.0, 10_000.0, "pixels").check("margin_px", self.margin_px as f64)?;
-        Bounds::new(16.0, 32_768.0, "pixels").check("longest_side", self.longest_side as f64)?;
-        self.screen.map_or(Ok(()), check_screen)
+        Bounds::new(16.0, 32_768.0, "pixels").check("longest_side", self.longest_side as f64)
     }
 }
 

@@ -1,6 +1,6 @@
-//! Pixels that are no bare plastic: paint, and glints that hide what is seen through.
+//! Pixels that are not bare plastic: paint, and glints that hide what is behind them.
 
-use super::object::{interior, is_screen, share, side_px};
+use super::object::{interior, is_screen, ramp, share, side_px};
 use super::solve::Factor;
 use crate::filter;
 use crate::image::{Image, Mask};
@@ -26,18 +26,13 @@ pub(super) fn make_opaque(
     inside: &Image<Coverage>,
     longer_side: usize,
 ) -> f32 {
-    let bright = factors.zip3_map(photo, plate, |f, p, k| {
-        f.raw > MIN_PAINT_FACTOR && !is_screen(p.into(), k.into())
-    });
+    let bright = brighter_than_screen(factors, photo, plate);
     let painted = factors.zip_map(&bright, |f, bright| f.coloured || bright);
     if !painted.pixels().contains(&true) {
         return 0.0;
     }
     let paint = softened(&painted.zip_map(&interior(inside, longer_side), |p, i| p && i));
-    for (factor, paint) in factors.pixels_mut().iter_mut().zip(paint.pixels()) {
-        factor.value *= 1.0 - paint;
-        factor.sigma = factor.sigma.max(*paint);
-    }
+    cover_with_paint(factors, &paint);
     let of_hue = paint
         .pixels()
         .iter()
@@ -46,14 +41,30 @@ pub(super) fn make_opaque(
     share(of_hue, inside)
 }
 
-/// How opaque the paint of a mask is, 0 to 1, without single pixels and with soft edges.
-fn softened(painted: &Mask) -> Image<f32> {
-    let (low, high) = (PAINT_SHARE.start(), PAINT_SHARE.end());
-    filter::gaussian_blur(&painted.to_coverage(), PAINT_BLUR_PX)
-        .map(|p| ((p.0 - low) / (high - low)).clamp(0.0, 1.0))
+fn cover_with_paint(factors: &mut Image<Factor>, paint: &Image<f32>) {
+    for (factor, paint) in factors.pixels_mut().iter_mut().zip(paint.pixels()) {
+        factor.value *= 1.0 - paint;
+        factor.sigma = factor.sigma.max(*paint);
+    }
 }
 
-/// Scene-linear reflected light from which on to which a glint hides what is seen through.
+/// The pixels that are brighter in the screen's hue than plastic in front of it can be.
+fn brighter_than_screen(
+    factors: &Image<Factor>,
+    photo: &Image<LinearRgb>,
+    plate: &Image<LinearRgb>,
+) -> Mask {
+    factors.zip3_map(photo, plate, |f, p, k| {
+        f.raw > MIN_PAINT_FACTOR && !is_screen(p.into(), k.into())
+    })
+}
+
+/// How opaque the paint of a mask is, 0 to 1, without single pixels and with soft edges.
+fn softened(painted: &Mask) -> Image<f32> {
+    filter::gaussian_blur(&painted.to_coverage(), PAINT_BLUR_PX).map(|p| ramp(p.0, &PAINT_SHARE))
+}
+
+/// Scene-linear reflected light between which a glint goes from hiding nothing to hiding all that lies behind.
 const GLINT_LIGHT: RangeInclusive<f32> = 0.14..=0.96;
 /// Reach of the surroundings that hidden pixels are filled from, standard deviation as a share of the side of a square of
 /// the object's area.
@@ -73,9 +84,7 @@ pub(super) fn fill_glints(
     inside: &Image<Coverage>,
     clipped_at: f32,
 ) -> f32 {
-    let clipped = photo.zip_map(inside, |p, c| {
-        c.0 > 0.0 && p.r.max(p.g).max(p.b) >= clipped_at
-    });
+    let clipped = photo.zip_map(inside, |p, c| c.0 > 0.0 && p.max_channel() >= clipped_at);
     let hidden = factors.zip_map(&clipped, |f, clipped| {
         if clipped {
             1.0
@@ -83,7 +92,12 @@ pub(super) fn fill_glints(
             hidden_share(f.reflected)
         }
     });
-    let around = surroundings(factors, &hidden, inside);
+    fill_hidden(factors, &hidden, &surroundings(factors, &hidden, inside));
+    share(clipped.pixels().iter().copied(), inside)
+}
+
+/// Fills what is hidden from its surroundings, which are half the size.
+fn fill_hidden(factors: &mut Image<Factor>, hidden: &Image<f32>, around: &Image<LinearRgb>) {
     factors.par_rows_mut().enumerate().for_each(|(y, row)| {
         for (x, (factor, &hidden)) in row.iter_mut().zip(hidden.row(y)).enumerate() {
             let around = around[(x / 2, y / 2)];
@@ -92,7 +106,6 @@ pub(super) fn fill_glints(
             }
         }
     });
-    share(clipped.pixels().iter().copied(), inside)
 }
 
 /// Weight (`r`) and weighted factor (`g`) of what is not hidden around each pixel, at half the size, which is enough for
@@ -108,6 +121,7 @@ fn surroundings(
     filter::gaussian_blur(&filter::halve(&weighted), reach_px / 2.0)
 }
 
+#[inline]
 fn fill(factor: &mut Factor, hidden: f32, around: f32) {
     let more = around - factor.value;
     factor.value += if hidden < 1.0 {
@@ -118,8 +132,7 @@ fn fill(factor: &mut Factor, hidden: f32, around: f32) {
     factor.sigma = factor.sigma.max(hidden * FILLED_SIGMA);
 }
 
-/// How much of what is seen through so much reflected light hides.
+/// How much of what lies behind is hidden by this much reflected light.
 fn hidden_share(reflected: f32) -> f32 {
-    let (low, high) = (GLINT_LIGHT.start(), GLINT_LIGHT.end());
-    ((reflected - low) / (high - low)).clamp(0.0, 1.0)
+    ramp(reflected, &GLINT_LIGHT)
 }

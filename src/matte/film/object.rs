@@ -3,6 +3,7 @@
 use crate::filter;
 use crate::image::{Image, Mask};
 use crate::pixel::Coverage;
+use std::ops::RangeInclusive;
 
 /// Coverage from which on a pixel is wholly inside: what 8 bits and a blur's rounding leave of 1.
 pub(in crate::matte) const OPAQUE: f32 = 0.99;
@@ -32,6 +33,13 @@ pub(super) fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
+/// How far a value is from the start of a range to its end, 0 to 1.
+#[inline(always)]
+pub(super) fn ramp(value: f32, range: &RangeInclusive<f32>) -> f32 {
+    let (low, high) = (range.start(), range.end());
+    ((value - low) / (high - low)).clamp(0.0, 1.0)
+}
+
 /// Area of the object, pixels.
 fn area(inside: &Image<Coverage>) -> f64 {
     inside.pixels().iter().map(|c| f64::from(c.0)).sum()
@@ -45,11 +53,8 @@ pub(super) fn side_px(inside: &Image<Coverage>) -> f32 {
 /// The share of the object's area that a set of pixels has.
 pub(super) fn share(set: impl Iterator<Item = bool>, inside: &Image<Coverage>) -> f32 {
     let object = area(inside);
-    let chosen: f64 = set
-        .zip(inside.pixels())
-        .filter(|(set, _)| *set)
-        .map(|(_, c)| f64::from(c.0))
-        .sum();
+    let covered = set.zip(inside.pixels()).filter(|(set, _)| *set);
+    let chosen: f64 = covered.map(|(_, c)| f64::from(c.0)).sum();
     if object > 0.0 {
         (chosen / object) as f32
     } else {

@@ -22,21 +22,21 @@ pub fn film_planes(
         "film and transmittance differ in size"
     );
     let alpha = film.pixels().iter().map(|f| f.to_rgba().a).collect();
-    let [r, g, b] = channels(film, |f| f.color);
-    let [tr, tg, tb] = channels(transmittance, |t| t);
-    let [vr, vg, vb] = channels(film, Film::transmittance);
-    vec![
-        ("R", r),
-        ("G", g),
-        ("B", b),
-        ("A", alpha),
-        (TRANSMITTANCE[0], tr),
-        (TRANSMITTANCE[1], tg),
-        (TRANSMITTANCE[2], tb),
-        (VIEW_TRANSMITTANCE[0], vr),
-        (VIEW_TRANSMITTANCE[1], vg),
-        (VIEW_TRANSMITTANCE[2], vb),
-    ]
+    let color = named(["R", "G", "B"], channels(film, |f| f.color));
+    let measured = named(TRANSMITTANCE, channels(transmittance, |t| t));
+    let seen = named(VIEW_TRANSMITTANCE, channels(film, Film::transmittance));
+    color
+        .chain([("A", alpha)])
+        .chain(measured)
+        .chain(seen)
+        .collect()
+}
+
+fn named(
+    names: [&'static str; 3],
+    channels: [Vec<f32>; 3],
+) -> impl Iterator<Item = (&'static str, Vec<f32>)> {
+    names.into_iter().zip(channels)
 }
 
 /// The three channels of a colour of every pixel.

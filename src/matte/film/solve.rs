@@ -34,9 +34,10 @@ pub(super) struct Solver {
     spread: f32,
 }
 
-/// Tints must differ by so much of the largest to separate glint from scattered light.
+/// Tints must differ by this share of the largest to separate glint from scattered light.
 const MIN_TINT_CONTRAST: f32 = 0.25;
-/// Least light of the key channel over the others': with less no pixel measures anything. Its square is a number still.
+/// Least light of the key channel over the others': with less no pixel measures anything. Its square is still a normal
+/// number.
 const MIN_GAIN: f32 = 1e-12;
 /// Noise of a pixel at least: coded pictures are no finer.
 const MIN_NOISE: f32 = 0.004;
@@ -62,7 +63,7 @@ impl Solver {
             flat,
             shares: shares(key, others, scattered),
             cast: scattered[others[1]] / scattered[others[0]],
-            noise: noise.r.max(noise.g).max(noise.b).max(MIN_NOISE),
+            noise: noise.max_channel().max(MIN_NOISE),
             reflection_error: opts.reflection_error * (1.0 - clearness * TINT_ERROR_SHARE),
             spread: opts.thickness_spread,
         }
@@ -78,7 +79,7 @@ impl Solver {
     }
 
     /// The factor on a screen that has too little hue to measure much: that of flat plastic unless more light is left than
-    /// plastic throws back. The deviation is that of something of which it is not known whether it is plastic.
+    /// plastic throws back. The deviation is that of something that may or may not be plastic.
     pub(super) fn guess(&self, pixel: [f32; 3], screen: [f32; 3]) -> Factor {
         let measured = self.measure(pixel, screen);
         let left = (0..3)
@@ -94,12 +95,12 @@ impl Solver {
 
     /// What the photo alone gives.
     #[inline(always)]
-    fn measure(&self, pixel: [f32; 3], screen: [f32; 3]) -> Measured {
+    fn measure(&self, pixel: [f32; 3], screen: [f32; 3]) -> PixelMeasurement {
         let through: [f32; 3] = std::array::from_fn(|c| self.flat[c] * screen[c]);
         let reflected = self.mixed(pixel).max(0.0);
         let gain = (through[self.key] - self.mixed(through)).max(MIN_GAIN);
         let reflection = self.reflection_error * reflected;
-        Measured {
+        PixelMeasurement {
             through,
             reflected,
             factor: (pixel[self.key] - self.mixed(pixel)) / gain,
@@ -113,10 +114,10 @@ impl Solver {
         self.shares[0] * of[self.others[0]] + self.shares[1] * of[self.others[1]]
     }
 
-    /// What the photo gives, drawn to what is expected by the variances.
+    /// What the photo gives, combined with what is expected, weighted by the variances.
     #[inline(always)]
-    fn combine(&self, pixel: [f32; 3], measured: &Measured, expected: f32) -> Factor {
-        let &Measured {
+    fn combine(&self, pixel: [f32; 3], measured: &PixelMeasurement, expected: f32) -> Factor {
+        let &PixelMeasurement {
             through,
             factor: raw,
             variance,
@@ -124,7 +125,9 @@ impl Solver {
         } = measured;
         let prior = self.spread * self.spread;
         let drawn = (raw * prior + expected * variance) / (prior + variance);
-        let value = drawn.min(bound(pixel, through)).clamp(0.0, self.most());
+        let value = drawn
+            .min(largest_factor(pixel, through))
+            .clamp(0.0, self.most());
         let [a, b] = self.others.map(|c| pixel[c] - value * through[c]);
         Factor {
             value,
@@ -154,7 +157,7 @@ impl Solver {
 }
 
 /// What a pixel alone gives.
-struct Measured {
+struct PixelMeasurement {
     /// The screen through flat plastic.
     through: [f32; 3],
     /// Reflected light of the key channel.
@@ -164,15 +167,15 @@ struct Measured {
     variance: f32,
 }
 
-/// Nothing reflects less than no light: no channel shows more screen than light.
+/// The factor at which a channel is all screen: nothing reflects less than no light.
 #[inline(always)]
-fn bound(pixel: [f32; 3], through: [f32; 3]) -> f32 {
+fn largest_factor(pixel: [f32; 3], through: [f32; 3]) -> f32 {
     (0..3)
         .map(|c| pixel[c] / through[c].max(f32::MIN_POSITIVE))
         .fold(f32::MAX, f32::min)
 }
 
-/// The factor of what reflects so much light: plastic, or paint.
+/// The factor of something that reflects this much light: plastic, or paint.
 fn plastic_factor(brightest: f32) -> f32 {
     let (low, high) = (PAINT_LIGHT.start(), PAINT_LIGHT.end());
     ((high - brightest) / (high - low)).clamp(0.0, 1.0)

@@ -2,6 +2,7 @@
 
 use super::object::{OPAQUE, dot, is_screen};
 use crate::image::Image;
+use crate::matte::median::median;
 use crate::matte::plate::ScreenPlate;
 use crate::pixel::{Coverage, LinearRgb};
 
@@ -12,6 +13,16 @@ pub(super) struct Tint {
     pub(super) flat: [f32; 3],
     /// How far tints that explain the photo as well differ from it in some channel.
     pub(super) uncertainty: f32,
+}
+
+impl Tint {
+    /// One without uncertainty.
+    pub(super) fn certain(flat: [f32; 3]) -> Self {
+        Self {
+            flat,
+            uncertainty: 0.0,
+        }
+    }
 }
 
 /// A tint that is tried.
@@ -51,7 +62,7 @@ const THICKNESS_WEIGHT: f32 = 1.0;
 const DYE_HANDICAP: f32 = 0.4;
 /// How much the light that plastic scatters has of its tint: as if it went halfway through.
 const SCATTER_DEPTH: f32 = 0.5;
-/// Flat plastic passes at most so many times what two walls do.
+/// Flat plastic passes at most this many times what two walls do.
 const MAX_THICKNESS_FACTOR: f32 = 1.3;
 /// Misfit by which tints are as good as each other.
 const EQUAL_MISFIT: f32 = 0.1;
@@ -95,22 +106,19 @@ impl TintSamples {
         key: usize,
         share: f64,
     ) -> Self {
-        let pair = |i: usize| ScreenPair {
-            pixel: photo.pixels()[i].into(),
-            screen: plate.image.pixels()[i].into(),
+        let pairs = PhotoOnScreen {
+            photo,
+            screen: &plate.image,
         };
         let object: Vec<usize> = (0..photo.pixels().len())
-            .filter(|&i| inside.pixels()[i].0 >= OPAQUE && !pair(i).is_bare(key))
+            .filter(|&i| inside.pixels()[i].0 >= OPAQUE && !pairs.pair(i).is_bare(key))
             .collect();
-        let sampled = object
-            .iter()
-            .step_by((object.len() / OBJECT_SAMPLES).max(1))
-            .map(|&i| (pair(i).reflected(key), i))
-            .collect();
-        let darkest = darkest(sampled, share);
-        let step = (darkest.len() / TINT_SAMPLES).max(1);
-        let pixels = darkest.into_iter().step_by(step).map(pair).collect();
-        Self { key, pixels }
+        let sampled = thinned(object, OBJECT_SAMPLES).map(|i| pairs.pair(i));
+        let darkest = darkest(sampled.collect(), key, share);
+        Self {
+            key,
+            pixels: thinned(darkest, TINT_SAMPLES).collect(),
+        }
     }
 
     /// The tint that explains the pixels best.
@@ -120,18 +128,8 @@ impl TintSamples {
     /// `u * flat * screen + f * scattered` with the best thickness factor u and reflection f that are not negative. The
     /// lowest median wins.
     pub(super) fn fit(&self) -> Tint {
-        let clear = self.judge([CLEAR_TRANSMITTANCE; 3], 0.0);
-        let dyed = dyed()
-            .filter(|flat| flat[self.key] >= MIN_KEY_TRANSMITTANCE)
-            .map(|flat| self.judge(flat, DYE_HANDICAP));
-        let tried: Vec<TintHypothesis> = std::iter::once(clear).chain(dyed).collect();
-        let best = tried.iter().fold(clear, |best, tint| {
-            if tint.misfit < best.misfit {
-                *tint
-            } else {
-                best
-            }
-        });
+        let tried = self.hypotheses();
+        let best = lowest_misfit(&tried);
         let as_good = tried
             .iter()
             .filter(|tint| tint.misfit <= best.misfit + EQUAL_MISFIT);
@@ -143,6 +141,15 @@ impl TintSamples {
         }
     }
 
+    /// Clear plastic, and then every dye in every amount.
+    fn hypotheses(&self) -> Vec<TintHypothesis> {
+        let clear = self.judge([CLEAR_TRANSMITTANCE; 3], 0.0);
+        let dyed = dyed()
+            .filter(|flat| flat[self.key] >= MIN_KEY_TRANSMITTANCE)
+            .map(|flat| self.judge(flat, DYE_HANDICAP));
+        std::iter::once(clear).chain(dyed).collect()
+    }
+
     fn judge(&self, flat: [f32; 3], handicap: f32) -> TintHypothesis {
         let scattered = scattered_tint(flat);
         let fits: Vec<PixelFit> = self
@@ -150,8 +157,8 @@ impl TintSamples {
             .iter()
             .map(|pair| pair.explained_by(flat, scattered))
             .collect();
-        let misfit = median(fits.iter().map(|fit| fit.misfit));
-        let thickness = median(fits.iter().map(|fit| fit.thickness));
+        let misfit = median_or_zero(fits.iter().map(|fit| fit.misfit));
+        let thickness = median_or_zero(fits.iter().map(|fit| fit.thickness));
         TintHypothesis {
             flat,
             misfit: misfit + THICKNESS_WEIGHT * (thickness - 1.0).powi(2) + handicap,
@@ -159,11 +166,29 @@ impl TintSamples {
     }
 }
 
-/// The pixels, named by light and index, of a share that has the least light.
-fn darkest(mut pixels: Vec<(f32, usize)>, share: f64) -> Vec<usize> {
-    pixels.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+/// The share of the pixels that reflects least, in that order.
+fn darkest(mut pixels: Vec<ScreenPair>, key: usize, share: f64) -> Vec<ScreenPair> {
+    pixels.sort_by(|a, b| a.reflected(key).total_cmp(&b.reflected(key)));
     pixels.truncate((pixels.len() as f64 * share).ceil() as usize);
-    pixels.into_iter().map(|(_, i)| i).collect()
+    pixels
+}
+
+/// Items at equal steps, about `count` of them.
+fn thinned<T>(items: Vec<T>, count: usize) -> impl Iterator<Item = T> {
+    let step = (items.len() / count).max(1);
+    items.into_iter().step_by(step)
+}
+
+/// The first of the hypotheses that explain the pixels best.
+fn lowest_misfit(tried: &[TintHypothesis]) -> TintHypothesis {
+    let (first, rest) = (tried[0], &tried[1..]);
+    rest.iter().fold(first, |best, tint| {
+        if tint.misfit < best.misfit {
+            *tint
+        } else {
+            best
+        }
+    })
 }
 
 fn largest_difference(a: [f32; 3], b: [f32; 3]) -> f32 {
@@ -178,6 +203,22 @@ struct PixelFit {
     thickness: f32,
 }
 
+/// A photo and the screen behind it.
+struct PhotoOnScreen<'a> {
+    photo: &'a Image<LinearRgb>,
+    screen: &'a Image<LinearRgb>,
+}
+
+impl PhotoOnScreen<'_> {
+    #[inline]
+    fn pair(&self, index: usize) -> ScreenPair {
+        ScreenPair {
+            pixel: self.photo.pixels()[index].into(),
+            screen: self.screen.pixels()[index].into(),
+        }
+    }
+}
+
 impl ScreenPair {
     fn is_bare(&self, key: usize) -> bool {
         self.pixel[key] >= MIN_BARE_SHARE * self.screen[key] && is_screen(self.pixel, self.screen)
@@ -188,18 +229,21 @@ impl ScreenPair {
         self.pixel[(key + 1) % 3] + self.pixel[(key + 2) % 3]
     }
 
+    #[inline(always)]
+    fn noise(&self) -> [f32; 3] {
+        self.pixel
+            .map(|p| PIXEL_NOISE[0] + PIXEL_NOISE[1] * p.max(0.0))
+    }
+
     /// Least squares over the channels, in units of their noise, with neither coefficient negative.
     fn explained_by(&self, flat: [f32; 3], scattered: [f32; 3]) -> PixelFit {
-        let noise = self
-            .pixel
-            .map(|p| PIXEL_NOISE[0] + PIXEL_NOISE[1] * p.max(0.0));
+        let noise = self.noise();
         let through = std::array::from_fn(|c| flat[c] * self.screen[c] / noise[c]);
         let body = std::array::from_fn(|c| scattered[c] / noise[c]);
         let seen = std::array::from_fn(|c| self.pixel[c] / noise[c]);
         let (thickness, reflection) = non_negative_fit(seen, through, body);
-        let misfit: f32 = (0..3)
-            .map(|c| (seen[c] - thickness * through[c] - reflection * body[c]).powi(2))
-            .sum();
+        let residuals = (0..3).map(|c| seen[c] - thickness * through[c] - reflection * body[c]);
+        let misfit: f32 = residuals.map(|off| off.powi(2)).sum();
         PixelFit {
             misfit: misfit.min(MAX_MISFIT),
             thickness,
@@ -219,14 +263,8 @@ fn non_negative_fit(seen: [f32; 3], through: [f32; 3], body: [f32; 3]) -> (f32, 
     (u, f)
 }
 
-fn median(values: impl Iterator<Item = f32>) -> f32 {
-    let mut values: Vec<f32> = values.collect();
-    let middle = values.len() / 2;
-    if values.is_empty() {
-        0.0
-    } else {
-        *values.select_nth_unstable_by(middle, f32::total_cmp).1
-    }
+fn median_or_zero(values: impl Iterator<Item = f32>) -> f32 {
+    median(values, f32::total_cmp).unwrap_or(0.0)
 }
 
 #[cfg(test)]

@@ -138,13 +138,18 @@ pub(super) fn keyed_away(
     if !bare.pixels().contains(&true) {
         return 0.0;
     }
-    share(
-        bare.pixels()
-            .iter()
-            .zip(interior(inside, longer_side).pixels())
-            .map(|(bare, interior)| *bare && *interior),
-        inside,
-    )
+    let bare = bare.zip_map(&interior(inside, longer_side), |bare, inner| bare && inner);
+    share(bare.pixels().iter().copied(), inside)
+}
+
+/// How much of a pixel's standard deviation is the prior's, 0 to 1.
+#[inline]
+fn prior_share(factor: &Factor, spread: f32) -> f64 {
+    if factor.coloured {
+        0.0
+    } else {
+        f64::from((factor.sigma / spread).min(1.0))
+    }
 }
 
 /// How much of the transmittance is the prior's, mean over the object: none of it where there is paint. `spread` is the
@@ -157,11 +162,7 @@ pub(super) fn guessed(
 ) -> f32 {
     let weighted = factors.pixels().iter().zip(inside.pixels());
     let (sum, area) = weighted.fold((0.0, 0.0), |(sum, area), (f, c)| {
-        let prior = if f.coloured {
-            0.0
-        } else {
-            f64::from((f.sigma / spread).min(1.0))
-        };
+        let prior = prior_share(f, spread);
         (sum + f64::from(c.0) * prior * prior, area + f64::from(c.0))
     });
     if area > 0.0 {

@@ -6,7 +6,7 @@
 //! the sight as it blocks the light. Deep inside it lies flat: what dims the screen there is mostly shadow, light that the
 //! folds above sent elsewhere, and the sight goes on; only what lets hardly anything through is a label or a fold.
 
-use super::object::side_px;
+use super::object::{ramp, side_px};
 use crate::filter;
 use crate::image::Image;
 use crate::pixel::{Coverage, LinearRgb, PremulRgba};
@@ -26,7 +26,7 @@ const OPAQUE_RATIO: f32 = 0.45;
 const RIM_DEPTH: f32 = 0.05;
 /// Blur of T, standard deviation as a share of that side: finer than that are only grains of light on the screen.
 const GRAIN_SIZE: f32 = 0.0025;
-/// No plastic passes more than so many times what flat plastic does.
+/// No plastic passes more than this many times what flat plastic does.
 const MAX_RATIO: f32 = 1.3;
 /// From the first transmittance on to the second a pixel turns to bare screen.
 const BARE_TRANSMITTANCE: RangeInclusive<f32> = 0.9..=0.97;
@@ -41,35 +41,44 @@ pub(in crate::matte) fn view(
 ) -> Image<LinearRgb> {
     let side = side_px(inside);
     let depths = filter::depth(&inside.map(|c| c.0 >= 0.5));
-    let weighted = transmittance.zip_map(inside, |t, c| {
-        PremulRgba::new(t.r * c.0, t.g * c.0, t.b * c.0, c.0)
-    });
-    let smooth = filter::gaussian_blur(&weighted, GRAIN_SIZE * side);
+    let smooth = filter::gaussian_blur(&weighted(transmittance, inside), GRAIN_SIZE * side);
     smooth.zip3_map(&depths, transmittance, |smooth, depth, t| {
-        let smooth = smooth
-            .color()
-            .scale(smooth.a.max(f32::MIN_POSITIVE).recip());
-        // Outside the object there is nothing to smooth.
-        if smooth == LinearRgb::BLACK {
-            return smooth;
-        }
         let inner = flatness(depth / side.max(f32::MIN_POSITIVE));
-        LinearRgb::new(
-            channel_view(smooth.r, flat.r, t.r, inner),
-            channel_view(smooth.g, flat.g, t.g, inner),
-            channel_view(smooth.b, flat.b, t.b, inner),
-        )
+        pixel_view(unweighted(smooth), flat, t, inner)
     })
+}
+
+/// Transmittance times coverage, with the coverage.
+fn weighted(transmittance: &Image<LinearRgb>, inside: &Image<Coverage>) -> Image<PremulRgba> {
+    transmittance.zip_map(inside, |t, c| {
+        PremulRgba::new(t.r * c.0, t.g * c.0, t.b * c.0, c.0)
+    })
+}
+
+#[inline(always)]
+fn unweighted(p: PremulRgba) -> LinearRgb {
+    p.color().scale(p.a.max(f32::MIN_POSITIVE).recip())
+}
+
+#[inline(always)]
+fn pixel_view(smooth: LinearRgb, flat: LinearRgb, t: LinearRgb, inner: f32) -> LinearRgb {
+    // Outside the object there is nothing to smooth.
+    if smooth == LinearRgb::BLACK {
+        return smooth;
+    }
+    LinearRgb::new(
+        channel_view(smooth.r, flat.r, t.r, inner),
+        channel_view(smooth.g, flat.g, t.g, inner),
+        channel_view(smooth.b, flat.b, t.b, inner),
+    )
 }
 
 /// View transmittance of one channel: `smooth` is its T without grain, `flat` that of flat plastic, `t` its own T.
 #[inline(always)]
 fn channel_view(smooth: f32, flat: f32, t: f32, inner: f32) -> f32 {
-    let plastic =
-        (FLAT_VIEW_GAIN * flat.sqrt() * relative_view(smooth / flat.max(f32::MIN_POSITIVE), inner))
-            .clamp(0.0, 1.0);
-    let (low, high) = (BARE_TRANSMITTANCE.start(), BARE_TRANSMITTANCE.end());
-    let bare = ((t - low) / (high - low)).clamp(0.0, 1.0);
+    let relative = relative_view(smooth / flat.max(f32::MIN_POSITIVE), inner);
+    let plastic = (FLAT_VIEW_GAIN * flat.sqrt() * relative).clamp(0.0, 1.0);
+    let bare = ramp(t, &BARE_TRANSMITTANCE);
     plastic + bare * (1.0 - plastic)
 }
 

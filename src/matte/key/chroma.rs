@@ -42,27 +42,24 @@ fn to_unit(code: f32, behaviour: Behaviour) -> f32 {
 
 /// Blue and red difference of a colour in unit scale, 128/255 being neutral.
 pub(in crate::matte) fn differences(p: PremulRgba, is_late: bool) -> [f32; 2] {
-    let behaviour = if is_late {
+    let behaviour = late_behaviour(is_late);
+    DIFFERENCES.map(|w| to_unit(code_value(p, w, NEUTRAL_CODE), behaviour))
+}
+
+#[inline(always)]
+fn late_behaviour(is_late: bool) -> Behaviour {
+    if is_late {
         Behaviour::V45
     } else {
         Behaviour::V34
-    };
-    DIFFERENCES.map(|w| to_unit(code_value(p, w, NEUTRAL_CODE), behaviour))
+    }
 }
 
 /// All three signals of a colour in unit scale.
 pub(in crate::matte) fn to_ycc(p: PremulRgba, is_late: bool) -> [f32; 3] {
-    let behaviour = if is_late {
-        Behaviour::V45
-    } else {
-        Behaviour::V34
-    };
+    let luma = code_value(p, LUMA_WEIGHTS, LUMA_OFFSET);
     let [cb, cr] = differences(p, is_late);
-    [
-        to_unit(code_value(p, LUMA_WEIGHTS, LUMA_OFFSET), behaviour),
-        cb,
-        cr,
-    ]
+    [to_unit(luma, late_behaviour(is_late)), cb, cr]
 }
 
 /// The colour of three signals in unit scale.

@@ -1,6 +1,7 @@
 //! The picture seen through its matte, with the screen's colour cast taken away.
 
 use super::model::{Model, primary_channel};
+use super::options::KeyOptions;
 use super::raw::split_channels;
 use crate::pixel::{LinearRgb, PremulRgba};
 
@@ -16,6 +17,14 @@ pub(super) struct Despill {
 }
 
 impl Despill {
+    pub(super) fn new(opts: &KeyOptions) -> Self {
+        Self {
+            factor: opts.despill_factor,
+            balance: opts.despill_balance,
+            subtract: opts.subtract_screen,
+        }
+    }
+
     /// One pixel of the cut-out, premultiplied.
     #[inline(always)]
     pub(super) fn cutout<M: Model, const PRIMARY: usize>(
@@ -66,14 +75,17 @@ impl Despill {
 /// `max(0, I - (1 - M) K)`: what the screen does not explain.
 #[inline(always)]
 fn without_screen(p: PremulRgba, m: f32, key: LinearRgb) -> PremulRgba {
-    let rest = |c: f32, k: f32| {
-        let left = c - (1.0 - m) * k;
-        if left > 0.0 { left } else { 0.0 }
-    };
     PremulRgba::new(
-        rest(p.r, key.r),
-        rest(p.g, key.g),
-        rest(p.b, key.b),
+        rest(p.r, m, key.r),
+        rest(p.g, m, key.g),
+        rest(p.b, m, key.b),
         p.a * m,
     )
+}
+
+/// What one channel of the screen leaves of a pixel's.
+#[inline(always)]
+fn rest(c: f32, m: f32, k: f32) -> f32 {
+    let left = c - (1.0 - m) * k;
+    if left > 0.0 { left } else { 0.0 }
 }

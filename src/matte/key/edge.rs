@@ -8,7 +8,7 @@ use super::rows::{Pad, Rows, Source, Window, looked_at, rows_around, window_rows
 /// Share of a pixel's neighbours that must be alike for it not to be an edge; Blender's constant.
 const ALIKE_SHARE: f32 = 0.9;
 
-/// How far a profile looks for edges.
+/// How far a profile searches for edges.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum EdgeReach {
     /// Nowhere: every pixel gets this answer.

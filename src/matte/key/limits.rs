@@ -32,23 +32,17 @@ impl Rows for Garbage<'_> {
         for (m, g) in out.iter_mut().zip(self.garbage.row(y)) {
             let most = 1.0 - usable_value(*g, self.careful);
             *m = match self.behaviour {
-                Behaviour::V34 | Behaviour::V45 => {
-                    if most < *m {
-                        most
-                    } else {
-                        *m
-                    }
-                }
-                Behaviour::V42 => {
-                    if *m < most {
-                        *m
-                    } else {
-                        most
-                    }
-                }
+                Behaviour::V34 | Behaviour::V45 => lesser(most, *m),
+                Behaviour::V42 => lesser(*m, most),
             };
         }
     }
+}
+
+/// The first where it is less, or else the second.
+#[inline(always)]
+fn lesser(first: f32, second: f32) -> f32 {
+    if first < second { first } else { second }
 }
 
 /// The matte, at least the core matte.
@@ -75,24 +69,19 @@ impl Rows for Core<'_> {
 }
 
 impl Core<'_> {
+    #[inline(always)]
     fn larger_value(&self, m: f32, c: f32) -> f32 {
         match self.behaviour {
-            Behaviour::V34 | Behaviour::V45 => {
-                if m < c {
-                    c
-                } else {
-                    m
-                }
-            }
-            Behaviour::V42 => {
-                if c < m {
-                    m
-                } else {
-                    c
-                }
-            }
+            Behaviour::V34 | Behaviour::V45 => greater(c, m),
+            Behaviour::V42 => greater(m, c),
         }
     }
+}
+
+/// The first where it is greater, or else the second.
+#[inline(always)]
+fn greater(first: f32, second: f32) -> f32 {
+    if second < first { first } else { second }
 }
 
 /// The finished matte held between 0 and 1, counting what lay outside.

@@ -24,10 +24,10 @@
 //!    0.35)` gets 0.60: the factor `|1 - v|` ties the matte to brightness, and only greys of brightness `v(K)` come out
 //!    exact. `ignore_brightness` leaves the factor out.
 //! 3. **Clip** (`clip_black`, `clip_white`). Values up to black become 0, from white on 1, those between are stretched, so
-//!    that noise in the screen and shine on the subject vanish. *Edges* are left alone, lest hair be eaten: a pixel is an
+//!    that noise in the screen and shine on the subject vanish. *Edges* are left alone, so that hair survives: a pixel is an
 //!    edge if fewer than 9 in 10 of its neighbours within `edge_kernel_radius` differ from it by less than
 //!    `edge_kernel_tolerance`. [`Keying::edges`] shows them.
-//! 4. **Garbage and core matte**: `min(m, 1 - garbage)`, then `max(m, core)`: what a person knows better.
+//! 4. **Garbage and core matte**: `min(m, 1 - garbage)`, then `max(m, core)`: what the user knows.
 //! 5. **Post-blur** (`blur_post`): a box blur of the matte.
 //! 6. **Dilate or erode** (`dilate_distance`): the largest or smallest value within a disc.
 //! 7. **Feather** (`feather_distance`): the matte grows along a falloff curve and is blended there with a Gaussian blur of
@@ -251,11 +251,8 @@ impl<'a, P: Photo> Keying<'a, P> {
         let screen = filled
             .as_ref()
             .map_or(self.screen, |f| Screen::Plate(&f.plate));
-        let stream = Stream::new(
-            Keying { screen, ..*self },
-            filled.as_ref().map(|f| f.channel),
-            opts,
-        );
+        let channel = filled.as_ref().map(|f| f.channel);
+        let stream = Stream::new(Keying { screen, ..*self }, channel, opts);
         let deviations = stream.compute_plane(plane, matte, cutout);
         Ok(Deviations {
             filled_plate: filled.as_ref().map_or(0, |f| f.count),
@@ -269,11 +266,10 @@ impl<'a, P: Photo> Keying<'a, P> {
         self.check_size("garbage", self.garbage.map(Image::size))?;
         self.check_size("core", self.core.map(Image::size))?;
         match self.screen {
-            Screen::Color(c) if !c.is_finite() => Err(Error::value(
-                "screen",
-                format!("{:?}, expected finite numbers", <[f32; 3]>::from(c)),
-            )),
-            Screen::Color(c) => robust::check_color(c, opts),
+            Screen::Color(c) => {
+                check_finite(c)?;
+                robust::check_color(c, opts)
+            }
             Screen::Plate(plate) => self.check_size("plate", Some(plate.size())),
         }
     }
@@ -289,6 +285,14 @@ impl<'a, P: Photo> Keying<'a, P> {
             _ => Ok(()),
         }
     }
+}
+
+fn check_finite(screen: LinearRgb) -> Result<()> {
+    if screen.is_finite() {
+        return Ok(());
+    }
+    let what = format!("{:?}, expected finite numbers", <[f32; 3]>::from(screen));
+    Err(Error::value("screen", what))
 }
 
 impl std::fmt::Display for Deviations {

@@ -18,7 +18,7 @@ pub(super) trait Model: 'static {
         (if first < p.b { first } else { p.b }) > 1.0
     }
 
-    /// The pixel as this model is willing to see it.
+    /// The pixel as this model treats it.
     #[inline(always)]
     fn seen(p: PremulRgba) -> PremulRgba {
         p
@@ -31,7 +31,7 @@ pub(super) struct V34;
 pub(super) struct V42;
 /// Blender 4.5.
 pub(super) struct V45;
-/// Blender 3.4 that only sees numbers it can reckon with.
+/// Blender 3.4, with unusable pixels made transparent.
 pub(super) struct Robust;
 
 impl Model for V34 {}
@@ -63,10 +63,10 @@ impl Model for Robust {
     }
 }
 
-/// Largest magnitude that the robust profile reckons with: from here, sums in single precision could reach infinity.
+/// Largest magnitude that the robust profile computes with: beyond it, sums in single precision could reach infinity.
 const MAX_USABLE: f32 = 1e30;
 
-/// Whether the robust profile takes a pixel as it is: no channel is NaN, infinite or beyond all reason.
+/// Whether the robust profile takes a pixel as it is: no channel is NaN, infinite or too large to compute with.
 #[inline(always)]
 pub(super) fn is_usable(p: PremulRgba) -> bool {
     // `&` instead of `&&`: without branches the row loops vectorise.

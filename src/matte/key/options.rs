@@ -173,14 +173,17 @@ impl KeyOptions {
         for ((at, value, range), (_, nearest, _)) in self.sizes().into_iter().zip(near.sizes()) {
             check_inside(at, value, nearest, range)?;
         }
-        if self.profile == Profile::Robust && self.clip_white <= self.clip_black {
-            let what = format!(
-                "{}, expected more than clip_black ({})",
-                self.clip_white, self.clip_black
-            );
-            return Err(Error::value("key.clip_white", what));
+        self.check_levels()
+    }
+
+    /// In the robust profile, white is above black.
+    fn check_levels(&self) -> Result<()> {
+        let (black, white) = (self.clip_black, self.clip_white);
+        if self.profile != Profile::Robust || white > black {
+            return Ok(());
         }
-        Ok(())
+        let what = format!("{white}, expected more than clip_black ({black})");
+        Err(Error::value("key.clip_white", what))
     }
 
     /// Every setting moved to the nearest value that Blender's node can hold; a fraction that is NaN becomes 0.

@@ -98,22 +98,12 @@ impl<'a, P: Photo> Keyer<'a, P> {
             Screen::Color(c) => (Screen::Color(socket_color(c)), socket_color(c)),
             Screen::Plate(_) => (screen, LinearRgb::BLACK),
         };
-        let terms =
-            loops.terms[primary_channel(color)](color, opts.screen_balance, opts.ignore_brightness);
-        let (factor, balance, subtract) = (
-            opts.despill_factor,
-            opts.despill_balance,
-            opts.subtract_screen,
-        );
+        let terms = loops.terms[primary_channel(color)];
         Self {
             screen,
             channel,
-            terms,
-            despill: Despill {
-                factor,
-                balance,
-                subtract,
-            },
+            terms: terms(color, opts.screen_balance, opts.ignore_brightness),
+            despill: Despill::new(opts),
             loops,
         }
     }

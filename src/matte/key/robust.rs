@@ -7,7 +7,7 @@ use super::{Deviations, Keying, Screen};
 use crate::error::{Error, Result};
 use crate::filter::Pyramid;
 use crate::image::Image;
-use crate::matte::screen::mean_color;
+use crate::matte::screen::{mean_color, other_channels};
 use crate::pixel::{Coverage, LinearRgb, PremulRgba};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -22,7 +22,7 @@ const CHANNEL_NAMES: [&str; 3] = ["red", "green", "blue"];
 /// How far a colour exceeds the grey of its other channels in `channel`: the lesser of excess and saturation.
 fn key_strength(key: LinearRgb, channel: usize, balance: f32) -> f32 {
     let c = <[f32; 3]>::from(key);
-    let (lo, hi) = [(c[1], c[2]), (c[0], c[2]), (c[0], c[1])][channel];
+    let (lo, hi) = other_channels(c, channel);
     let v = balance * lo + (1.0 - balance) * hi;
     let excess = c[channel] - v;
     excess.min(excess * (1.0 - v).abs())
@@ -35,15 +35,15 @@ pub(super) fn check_color(key: LinearRgb, opts: &KeyOptions) -> Result<()> {
     if opts.profile != Profile::Robust || opts.accept_weak_key || found >= MIN_KEY_STRENGTH {
         return Ok(());
     }
-    let LinearRgb { r, g, b } = key;
-    let name = CHANNEL_NAMES[channel];
-    Err(Error::value(
-        "screen",
-        format!(
-            "{r},{g},{b} is too grey to key: its {name} stands out by {found:.4}, expected at least {MIN_KEY_STRENGTH}; \
-             give a more saturated screen colour, or set key.accept_weak_key = true"
-        ),
-    ))
+    Err(weak_key(key, CHANNEL_NAMES[channel], found))
+}
+
+fn weak_key(LinearRgb { r, g, b }: LinearRgb, channel: &str, strength: f32) -> Error {
+    let what = format!(
+        "{r},{g},{b} is too grey to key: its {channel} stands out by {strength:.4}, expected at least {MIN_KEY_STRENGTH}; \
+         give a more saturated screen colour, or set key.accept_weak_key = true"
+    );
+    Error::value("screen", what)
 }
 
 /// Warns of settings that switch the edge search into something hardly wanted.
@@ -63,7 +63,7 @@ pub(super) fn warn_of_edge_settings(opts: &KeyOptions) {
 }
 
 /// A plate without holes.
-pub(super) struct Filled {
+pub(super) struct FilledPlate {
     pub(super) plate: Image<LinearRgb>,
     /// The primary channel of the plate's mean.
     pub(super) channel: usize,
@@ -77,15 +77,9 @@ pub(super) struct Filled {
 /// A pyramid of halved means that count only the usable pixels; a hole takes the colour of the finest level that has one.
 /// # Errors
 /// [`Error::Value`] where no pixel of the plate is usable.
-pub(super) fn fill_plate(plate: &Image<LinearRgb>, opts: &KeyOptions) -> Result<Filled> {
+pub(super) fn fill_plate(plate: &Image<LinearRgb>, opts: &KeyOptions) -> Result<FilledPlate> {
     let channel = primary_channel(usable_mean(plate));
-    let known = plate.map(|c| {
-        if is_usable_key(c, channel, opts) {
-            c.opaque()
-        } else {
-            PremulRgba::TRANSPARENT
-        }
-    });
+    let known = usable_keys(plate, channel, opts);
     let count = known.pixels().par_iter().filter(|p| p.a == 0.0).count();
     if count == plate.pixels().len() && count > 0 {
         return Err(no_usable_key(channel));
@@ -94,10 +88,21 @@ pub(super) fn fill_plate(plate: &Image<LinearRgb>, opts: &KeyOptions) -> Result<
     let plate = Image::from_fn(plate.width(), plate.height(), |x, y| {
         nearest_known(&levels, x, y)
     });
-    Ok(Filled {
+    Ok(FilledPlate {
         plate,
         channel,
         count,
+    })
+}
+
+/// The plate with its holes transparent.
+fn usable_keys(plate: &Image<LinearRgb>, channel: usize, opts: &KeyOptions) -> Image<PremulRgba> {
+    plate.map(|c| {
+        if is_usable_key(c, channel, opts) {
+            c.opaque()
+        } else {
+            PremulRgba::TRANSPARENT
+        }
     })
 }
 
@@ -149,20 +154,24 @@ pub(super) fn count_unusable<P: Photo>(
     if opts.profile != Profile::Robust {
         return Deviations::default();
     }
-    let mut deviations = Deviations::default();
-    for y in rows {
-        let pixels = keying.photo.row(y).iter();
-        deviations.unusable_pixels += pixels.filter(|p| !is_usable(p.premul())).count();
-        for matte in [keying.garbage, keying.core].into_iter().flatten() {
-            let values = matte.row(y).iter();
-            deviations.unusable_mattes += values.filter(|m| !is_usable_matte(**m)).count();
-        }
+    rows.map(|y| unusable_in_row(keying, y)).sum()
+}
+
+fn unusable_in_row<P: Photo>(keying: &Keying<'_, P>, y: usize) -> Deviations {
+    let pixels = keying.photo.row(y).iter();
+    let mattes = [keying.garbage, keying.core].into_iter().flatten();
+    Deviations {
+        unusable_pixels: pixels.filter(|p| !is_usable(p.premul())).count(),
+        unusable_mattes: mattes
+            .flat_map(|matte| matte.row(y))
+            .filter(|m| !is_usable_matte(**m))
+            .count(),
+        ..Deviations::default()
     }
-    deviations
 }
 
 /// The screen as the robust profile keys against it: a plate without holes, its mean's primary channel.
-pub(super) fn without_holes(screen: Screen<'_>, opts: &KeyOptions) -> Result<Option<Filled>> {
+pub(super) fn without_holes(screen: Screen<'_>, opts: &KeyOptions) -> Result<Option<FilledPlate>> {
     match screen {
         Screen::Plate(plate) if opts.profile == Profile::Robust => {
             fill_plate(plate, opts).map(Some)

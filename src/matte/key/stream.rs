@@ -123,12 +123,17 @@ impl<'a, P: Photo> Stream<'a, P> {
 
     /// A band starts by computing the rows above it that its windows reach; longer bands do so less often.
     fn band_rows(&self, height: usize) -> usize {
+        let threads = rayon::current_num_threads();
+        let least = (self.halo_rows() * BAND_PER_HALO).max(MIN_BAND_ROWS);
+        let rounds = height / (threads * least);
+        height.div_ceil(threads * rounds.max(1)).max(1)
+    }
+
+    /// Rows above a band that its windows reach.
+    fn halo_rows(&self) -> usize {
         let o = self.opts;
         let distances = o.dilate_distance.unsigned_abs() + o.feather_distance.unsigned_abs();
-        let halo = (o.blur_pre + o.edge_kernel_radius + o.blur_post + distances) as usize;
-        let threads = rayon::current_num_threads();
-        let rounds = height / (threads * (halo * BAND_PER_HALO).max(MIN_BAND_ROWS));
-        height.div_ceil(threads * rounds.max(1)).max(1)
+        (o.blur_pre + o.edge_kernel_radius + o.blur_post + distances) as usize
     }
 
     fn plane_source(&self, plane: Plane) -> Source<'_> {
@@ -150,11 +155,10 @@ impl<'a, P: Photo> Stream<'a, P> {
                 keyer: self.keyer(),
             });
         }
-        let pixels = vec![PremulRgba::default(); photo.width()];
         Box::new(BlurredMatte {
             blur: ChromaBlur::new(photo, self.opts),
             keyer: self.keyer(),
-            pixels,
+            pixels: vec![PremulRgba::default(); photo.width()],
         })
     }
 
@@ -181,6 +185,7 @@ impl<'a, P: Photo> Stream<'a, P> {
         let Keying { garbage, core, .. } = self.keying;
         let (behaviour, careful) = (self.behaviour(), self.opts.profile == Profile::Robust);
         let mut source = self.clipped_matte();
+        let needs_core = core.is_some() || (garbage.is_some() && behaviour == Behaviour::V45);
         if let Some(garbage) = garbage {
             source = Box::new(Garbage {
                 source,
@@ -190,7 +195,7 @@ impl<'a, P: Photo> Stream<'a, P> {
             });
         }
         // Blender 4.5 applies a core matte of 0 where none is given, which matters below a garbage matte above 1.
-        if core.is_some() || (garbage.is_some() && behaviour == Behaviour::V45) {
+        if needs_core {
             source = Box::new(Core {
                 source,
                 core,

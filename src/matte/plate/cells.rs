@@ -1,6 +1,7 @@
 //! Means over small cells of the picture: little noise, few numbers, and medians where outliers must not count.
 
 use crate::image::{Image, Mask};
+use crate::matte::median::median;
 use crate::pixel::LinearRgb;
 use std::ops::Range;
 
@@ -44,15 +45,13 @@ fn cell_mean(
     let (w, h) = photo.size();
     let columns = cell_range(index[0], side, w);
     let rows = cell_range(index[1], side, h);
-    let area = (columns.len() * rows.len()) as f64;
+    let least = MIN_SCREEN_SHARE * (columns.len() * rows.len()) as f64;
     let mut sums = CellSums::default();
     for y in rows {
         let free = &background.row(y)[columns.clone()];
         sums.add_row([columns.start, y], &photo.row(y)[columns.clone()], free);
     }
-    (f64::from(sums.count) >= MIN_SCREEN_SHARE * area)
-        .then(|| sums.mean(index))
-        .flatten()
+    sums.mean(index).filter(|_| f64::from(sums.count) >= least)
 }
 
 /// The pixels of the cell `index` along a side of the picture.
@@ -81,14 +80,10 @@ impl CellSums {
 
     #[inline]
     fn add(&mut self, at_px: [f64; 2], color: LinearRgb) {
-        let channels: [f32; 3] = color.into();
+        let channels = [color.r, color.g, color.b].map(f64::from);
         self.count += 1;
-        for (sum, v) in self.at_px.iter_mut().zip(at_px) {
-            *sum += v;
-        }
-        for (sum, c) in self.color.iter_mut().zip(channels) {
-            *sum += f64::from(c);
-        }
+        add_to(&mut self.at_px, at_px);
+        add_to(&mut self.color, channels);
     }
 
     fn mean(&self, index: [usize; 2]) -> Option<Cell> {
@@ -101,13 +96,20 @@ impl CellSums {
     }
 }
 
+#[inline]
+fn add_to<const N: usize>(sums: &mut [f64; N], values: [f64; N]) {
+    for (sum, value) in sums.iter_mut().zip(values) {
+        *sum += value;
+    }
+}
+
 /// The factor per channel from the second picture's cells to the first's: the median of their quotients.
 pub(super) fn gain(photo: &[Cell], plate: &[Cell]) -> Option<LinearRgb> {
     let [r, g, b] = [0, 1, 2].map(|c| {
         let quotients = pairs(photo, plate)
             .filter(|(_, b)| b.color[c] > 0.0)
             .map(|(a, b)| a.color[c] / b.color[c]);
-        median(quotients)
+        median(quotients, f64::total_cmp)
     });
     Some([r? as f32, g? as f32, b? as f32].into())
 }
@@ -115,19 +117,15 @@ pub(super) fn gain(photo: &[Cell], plate: &[Cell]) -> Option<LinearRgb> {
 /// Median over the cells of the largest difference between the channels, as a share of the brightest channel.
 pub(super) fn mismatch(photo: &[Cell], plate: &[Cell]) -> f32 {
     let differences = pairs(photo, plate).map(|(a, b)| a.relative_difference(b));
-    median(differences).unwrap_or(0.0) as f32
+    median(differences, f64::total_cmp).unwrap_or(0.0) as f32
 }
 
 impl Cell {
     /// The largest difference between the channels, as a share of the other's brightest channel.
     fn relative_difference(&self, other: &Self) -> f64 {
         let brightest = other.color.into_iter().fold(f64::MIN_POSITIVE, f64::max);
-        let largest = self
-            .color
-            .iter()
-            .zip(other.color)
-            .map(|(a, b)| (a - b).abs())
-            .fold(0.0, f64::max);
+        let channels = self.color.iter().zip(other.color);
+        let largest = channels.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         largest / brightest
     }
 
@@ -146,13 +144,6 @@ fn pairs<'a>(a: &'a [Cell], b: &'a [Cell]) -> impl Iterator<Item = (&'a Cell, &'
     })
 }
 
-/// The value in the middle; of an even number the higher of the two.
-pub(super) fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let mut values: Vec<f64> = values.collect();
-    let middle = values.len() / 2;
-    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
-}
-
 /// Standard deviation of a photo around a plate where the screen is free, channel by channel, by the median of the
 /// absolute differences: what is not screen after all does not count.
 pub(super) fn deviation(
@@ -161,19 +152,19 @@ pub(super) fn deviation(
     background: &Mask,
 ) -> LinearRgb {
     let step = (photo.pixels().len() / DEVIATION_SAMPLES).max(1);
-    let sampled: Vec<usize> = (0..photo.pixels().len())
+    let differences: Vec<[f64; 3]> = (0..photo.pixels().len())
         .step_by(step)
         .filter(|&i| background.pixels()[i])
-        .collect();
-    let differences: Vec<[f64; 3]> = sampled
-        .into_iter()
         .map(|i| channel_differences(photo.pixels()[i], plate.pixels()[i]))
         .collect();
-    let [r, g, b] = [0, 1, 2].map(|c| {
-        let sigma = SIGMA_OF_MEDIAN * median(differences.iter().map(|d| d[c])).unwrap_or(0.0);
-        sigma as f32
-    });
-    LinearRgb::new(r, g, b)
+    [0, 1, 2]
+        .map(|c| robust_sigma(differences.iter().map(|d| d[c])) as f32)
+        .into()
+}
+
+/// Standard deviation, by the median of absolute differences; 0 of none.
+pub(super) fn robust_sigma(differences: impl Iterator<Item = f64>) -> f64 {
+    SIGMA_OF_MEDIAN * median(differences, f64::total_cmp).unwrap_or(0.0)
 }
 
 fn channel_differences(a: LinearRgb, b: LinearRgb) -> [f64; 3] {
@@ -183,4 +174,4 @@ fn channel_differences(a: LinearRgb, b: LinearRgb) -> [f64; 3] {
 /// Pixels that are sampled for a standard deviation: 1 % of error.
 const DEVIATION_SAMPLES: usize = 20_000;
 /// Standard deviation of a Gaussian over the median of its absolute values.
-pub(super) const SIGMA_OF_MEDIAN: f64 = 1.4826;
+const SIGMA_OF_MEDIAN: f64 = 1.4826;

@@ -1,9 +1,10 @@
 //! Polynomials of the position, one a channel, for the logarithm of the screen.
 
 use super::PlateOptions;
-use super::cells::{Cell, SIGMA_OF_MEDIAN, median};
+use super::cells::{self, Cell};
 use crate::error::Result;
 use crate::image::Image;
+use crate::matte::median::median;
 use crate::matte::prepared::refused;
 use crate::pixel::LinearRgb;
 use nalgebra::{DMatrix, DVector};
@@ -29,11 +30,11 @@ const SHADOW_SIGMAS: f64 = 1.5;
 const CELL_NOISE: f64 = 2e-3;
 /// Cells a coefficient, at least.
 const MIN_CELLS_PER_COEFFICIENT: usize = 4;
-/// Every so many-th cell is left out of the fit that chooses the degree.
+/// One cell in this many is left out of the fit that chooses the degree.
 const HELD_OUT_STRIDE: usize = 3;
 
 /// A cell as the fit sees it: the monomials of its place, lower degrees first, and its channels' logarithms.
-struct Sample {
+struct FitSample {
     basis: Vec<f64>,
     log: [f64; 3],
 }
@@ -43,7 +44,7 @@ impl Polynomial {
     pub(super) fn fit(cells: &[Cell], size: (usize, usize), opts: &PlateOptions) -> Result<Self> {
         let samples = samples(cells, size, opts.max_degree)?;
         let degree = chosen_degree(&samples, opts);
-        let all: Vec<&Sample> = samples.iter().collect();
+        let all: Vec<&FitSample> = samples.iter().collect();
         Ok(Self {
             degree,
             coefficients: [0, 1, 2].map(|c| robust_fit(&all, degree, c)),
@@ -52,11 +53,8 @@ impl Polynomial {
 
     /// The screen in every pixel.
     pub(super) fn image(&self, size: (usize, usize)) -> Image<LinearRgb> {
-        let (w, h) = size;
-        let mut out = Image::new(w, h);
-        let u: Vec<f32> = (0..w)
-            .map(|x| normalized([x as f64 + 0.5, 0.0], size)[0] as f32)
-            .collect();
+        let mut out = Image::new(size.0, size.1);
+        let u = normalized_columns(size);
         out.par_rows_mut().enumerate().for_each(|(y, row)| {
             self.fill_row(normalized([0.0, y as f64 + 0.5], size)[1], &u, row)
         });
@@ -141,24 +139,35 @@ fn normalized([x, y]: [f64; 2], (w, h): (usize, usize)) -> [f64; 2] {
     [(x - 0.5 * w as f64) / half, (y - 0.5 * h as f64) / half]
 }
 
-fn samples(cells: &[Cell], size: (usize, usize), max_degree: usize) -> Result<Vec<Sample>> {
-    let brightest = cells.iter().flat_map(|cell| cell.color).fold(0.0, f64::max);
-    if cells.is_empty() {
-        return Err(refused(
-            "the object leaves no background to fit the screen to",
-        ));
-    }
-    if brightest <= 0.0 {
-        return Err(refused(
-            "the background is black; a screen plate needs light on the screen",
-        ));
-    }
-    let (exponents, darkest) = (exponents(max_degree), MIN_BRIGHTNESS * brightest);
-    let samples = cells.iter().map(|cell| Sample {
+/// The first coordinate of each column's pixels.
+fn normalized_columns(size: (usize, usize)) -> Vec<f32> {
+    (0..size.0)
+        .map(|x| normalized([x as f64 + 0.5, 0.0], size)[0] as f32)
+        .collect()
+}
+
+fn samples(cells: &[Cell], size: (usize, usize), max_degree: usize) -> Result<Vec<FitSample>> {
+    let exponents = exponents(max_degree);
+    let darkest = MIN_BRIGHTNESS * brightest_channel(cells)?;
+    let samples = cells.iter().map(|cell| FitSample {
         basis: monomials(&exponents, normalized(cell.at_px, size)),
         log: cell.color.map(|c| libm::log(c.max(darkest))),
     });
     Ok(samples.collect())
+}
+
+/// The brightest channel of any cell: more than 0.
+fn brightest_channel(cells: &[Cell]) -> Result<f64> {
+    if cells.is_empty() {
+        let what = "the object leaves no background to fit the screen to";
+        return Err(refused(what));
+    }
+    let brightest = cells.iter().flat_map(|cell| cell.color).fold(0.0, f64::max);
+    if brightest <= 0.0 {
+        let what = "the background is black; a screen plate needs light on the screen";
+        return Err(refused(what));
+    }
+    Ok(brightest)
 }
 
 fn monomials(exponents: &[[usize; 2]], [u, v]: [f64; 2]) -> Vec<f64> {
@@ -169,21 +178,17 @@ fn monomials(exponents: &[[usize; 2]], [u, v]: [f64; 2]) -> Vec<f64> {
 }
 
 /// The lowest degree that no higher one beats by the least gain, by the error at cells that are left out.
-fn chosen_degree(samples: &[Sample], opts: &PlateOptions) -> usize {
+fn chosen_degree(samples: &[FitSample], opts: &PlateOptions) -> usize {
     let degrees = usable_degrees(samples.len(), opts.max_degree);
     let split = HeldOut::new(samples);
     let errors: Vec<f64> = degrees.iter().map(|&d| split.error(d)).collect();
-    let best = errors
-        .iter()
-        .copied()
-        .fold(f64::MAX, f64::min)
-        .max(CELL_NOISE);
-    let enough = best / (1.0 - opts.least_gain).max(f64::MIN_POSITIVE);
+    let best = errors.iter().copied().fold(f64::MAX, f64::min);
+    let enough = best.max(CELL_NOISE) / (1.0 - opts.least_gain).max(f64::MIN_POSITIVE);
     let lowest = errors.iter().position(|e| *e <= enough);
     degrees[lowest.unwrap_or(degrees.len() - 1)]
 }
 
-/// The degrees whose coefficients so many cells can determine.
+/// The degrees whose coefficients this number of cells can determine.
 fn usable_degrees(cells: usize, max_degree: usize) -> Vec<usize> {
     (0..=max_degree)
         .filter(|&d| d == 0 || cells >= MIN_CELLS_PER_COEFFICIENT * terms(d))
@@ -192,21 +197,18 @@ fn usable_degrees(cells: usize, max_degree: usize) -> Vec<usize> {
 
 /// Samples parted in those that are fitted and those that the fit is judged by.
 struct HeldOut<'a> {
-    fitted: Vec<&'a Sample>,
-    left_out: Vec<&'a Sample>,
+    fitted: Vec<&'a FitSample>,
+    left_out: Vec<&'a FitSample>,
 }
 
 impl<'a> HeldOut<'a> {
-    fn new(samples: &'a [Sample]) -> Self {
-        let (mut fitted, mut left_out) = (Vec::new(), Vec::new());
-        for (i, sample) in samples.iter().enumerate() {
-            if i % HELD_OUT_STRIDE == 0 {
-                left_out.push(sample);
-            } else {
-                fitted.push(sample);
-            }
+    fn new(samples: &'a [FitSample]) -> Self {
+        let numbered = samples.iter().enumerate();
+        let fitted = numbered.filter(|(i, _)| i % HELD_OUT_STRIDE != 0);
+        Self {
+            fitted: fitted.map(|(_, sample)| sample).collect(),
+            left_out: samples.iter().step_by(HELD_OUT_STRIDE).collect(),
         }
-        Self { fitted, left_out }
     }
 
     /// Median absolute error at the cells that were left out, of the brightest channel: the others have its shape and more
@@ -221,7 +223,7 @@ impl<'a> HeldOut<'a> {
             .left_out
             .iter()
             .map(|s| (s.log[channel] - value(&k, s)).abs());
-        median(errors).unwrap_or(f64::MAX)
+        median(errors, f64::total_cmp).unwrap_or(f64::MAX)
     }
 
     fn brightest_channel(&self) -> usize {
@@ -231,21 +233,18 @@ impl<'a> HeldOut<'a> {
 }
 
 /// The polynomial where a sample is; the basis may go on to higher degrees.
-fn value(k: &DVector<f64>, sample: &Sample) -> f64 {
+fn value(k: &DVector<f64>, sample: &FitSample) -> f64 {
     k.iter().zip(&sample.basis).map(|(k, b)| k * b).sum()
 }
 
 /// Iteratively reweighted least squares for one channel.
-fn robust_fit(samples: &[&Sample], degree: usize, channel: usize) -> DVector<f64> {
+fn robust_fit(samples: &[&FitSample], degree: usize, channel: usize) -> DVector<f64> {
     let mut weights = vec![1.0; samples.len()];
     let mut k = DVector::zeros(terms(degree));
     for _ in 0..REWEIGHTING_ROUNDS {
         k = least_squares(samples, channel, &weights, terms(degree));
-        let residuals: Vec<f64> = samples
-            .iter()
-            .map(|s| s.log[channel] - value(&k, s))
-            .collect();
-        weights = biweights(&residuals);
+        let residuals = samples.iter().map(|s| s.log[channel] - value(&k, s));
+        weights = biweights(&residuals.collect::<Vec<_>>());
     }
     k
 }
@@ -265,17 +264,19 @@ fn biweights(residuals: &[f64]) -> Vec<f64> {
 
 /// Standard deviation by the median of the absolute values, at least the noise of a cell.
 fn robust_sigma<'a>(residuals: impl Iterator<Item = &'a f64>) -> f64 {
-    (SIGMA_OF_MEDIAN * median(residuals.map(|r| r.abs())).unwrap_or(0.0)).max(CELL_NOISE)
+    cells::robust_sigma(residuals.map(|r| r.abs())).max(CELL_NOISE)
 }
 
 /// Weighted least squares by the first `n` monomials, a trace of the identity added so that too few cells are no disaster.
-fn least_squares(samples: &[&Sample], channel: usize, weights: &[f64], n: usize) -> DVector<f64> {
+fn least_squares(
+    samples: &[&FitSample],
+    channel: usize,
+    weights: &[f64],
+    n: usize,
+) -> DVector<f64> {
     let (mut normal, mut right) = (DMatrix::identity(n, n) * RIDGE_WEIGHT, DVector::zeros(n));
-    for (sample, weight) in samples
-        .iter()
-        .zip(weights)
-        .filter(|(_, weight)| **weight > 0.0)
-    {
+    let weighted = samples.iter().zip(weights);
+    for (sample, weight) in weighted.filter(|(_, weight)| **weight > 0.0) {
         for i in 0..n {
             let scaled = weight * sample.basis[i];
             right[i] += scaled * sample.log[channel];

@@ -3,6 +3,7 @@
 use crate::error::{Error, Result};
 use crate::filter;
 use crate::image::Image;
+use crate::matte::median::median;
 use crate::pixel::LinearRgb;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -22,16 +23,13 @@ impl LumaMode {
     /// # Errors
     /// [`Error::Value`] (`tone.grey`) for weights that cannot be right.
     pub(super) fn check(self) -> Result<()> {
-        let Self::Grey(weights) = self else {
-            return Ok(());
-        };
-        if !weights.iter().all(|w| (0.0..=1e6).contains(w)) || weights == [0.0; 3] {
-            return Err(Error::value(
-                "tone.grey",
-                format!("{weights:?}, expected weights of 0 to 1e6, not all 0"),
-            ));
+        match self {
+            Self::Grey(weights) if !are_weights(weights) => {
+                let what = format!("{weights:?}, expected weights of 0 to 1e6, not all 0");
+                Err(Error::value("tone.grey", what))
+            }
+            _ => Ok(()),
         }
-        Ok(())
     }
 
     /// The pictures whose bands are taken.
@@ -45,6 +43,10 @@ impl LumaMode {
     }
 }
 
+fn are_weights(weights: [f32; 3]) -> bool {
+    weights.iter().all(|w| (0.0..=1e6).contains(w)) && weights != [0.0; 3]
+}
+
 /// The bands of a photo, in units of noise.
 pub(super) struct Bands {
     /// What is finer than about 2 pixels, of the photo's size.
@@ -56,7 +58,7 @@ pub(super) struct Bands {
 }
 
 impl Bands {
-    /// Splits a photo into so many bands.
+    /// Splits a photo into `count` bands.
     pub(super) fn new(photo: &Image<LinearRgb>, luma: LumaMode, count: usize) -> Self {
         let mut channels: Vec<_> = luma
             .pictures(photo)
@@ -66,7 +68,10 @@ impl Bands {
         let mut bands = (0..count)
             .map(|_| in_units_of_noise(channels.iter_mut().filter_map(Iterator::next).collect()));
         let finest = bands.next().unwrap_or_default();
-        let coarser: Vec<_> = bands.map(|band| largest_around(&band, 1)).collect();
+        Self::from_bands(finest, bands.map(|band| largest_around(&band, 1)).collect())
+    }
+
+    fn from_bands(finest: Image<f32>, coarser: Vec<Image<f32>>) -> Self {
         let sizes = std::iter::once(finest.size())
             .chain(coarser.iter().map(Image::size))
             .collect();
@@ -121,34 +126,45 @@ fn band_magnitudes(picture: Image<f32>, count: usize) -> Vec<Image<f32>> {
 /// that seems to have none is clipped.
 fn in_units_of_noise(bands: Vec<Image<f32>>) -> Image<f32> {
     let noises: Vec<f32> = bands.iter().map(noise_sigma).collect();
-    let least = 0.5 * median(&noises);
-    bands
+    let least = 0.5 * median_noise(&noises);
+    let squares = bands
         .iter()
         .zip(&noises)
-        .map(|(band, noise)| {
-            let unit = 1.0 / noise.max(least);
-            band.map(|v| (v * unit) * (v * unit))
-        })
+        .map(|(band, noise)| squared_in_units(band, noise.max(least)));
+    squares
         .reduce(|a, b| a.zip_map(&b, |a, b| a + b))
         .unwrap_or_default()
         .map(f32::sqrt)
 }
 
+fn squared_in_units(band: &Image<f32>, noise: f32) -> Image<f32> {
+    let unit = 1.0 / noise;
+    band.map(|v| (v * unit) * (v * unit))
+}
+
 /// The largest value at most `reach` columns and rows away, for every pixel.
 pub(super) fn largest_around(band: &Image<f32>, reach: usize) -> Image<f32> {
-    let (w, h) = band.size();
+    let along = largest_along(band, reach);
+    let height = band.height();
+    let mut around = along.clone();
+    around.par_rows_mut().enumerate().for_each(|(y, row)| {
+        for near in y.saturating_sub(reach)..(y + reach + 1).min(height) {
+            raise(row, along.row(near));
+        }
+    });
+    around
+}
+
+/// The largest value at most `reach` columns away, for every pixel.
+fn largest_along(band: &Image<f32>, reach: usize) -> Image<f32> {
     let mut along = band.clone();
     along.par_rows_mut().enumerate().for_each(|(y, row)| {
-        for by in 1..=reach.min(w) {
+        for by in 1..=reach.min(band.width()) {
             raise(row, &band.row(y)[by..]);
             raise(&mut row[by..], band.row(y));
         }
     });
-    let mut around = along.clone();
-    around.par_rows_mut().enumerate().for_each(|(y, row)| {
-        (y.saturating_sub(reach)..(y + reach + 1).min(h)).for_each(|v| raise(row, along.row(v)));
-    });
-    around
+    along
 }
 
 /// Raises values to others, where those are larger.
@@ -158,14 +174,9 @@ fn raise(row: &mut [f32], other: &[f32]) {
     }
 }
 
-/// The upper one of the values in the middle; the least noise where there is none.
-fn median(values: &[f32]) -> f32 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f32::total_cmp);
-    sorted
-        .get(sorted.len() / 2)
-        .copied()
-        .unwrap_or(ROUNDING_SIGMA)
+/// The median; the least noise where there is none.
+fn median_noise(noises: &[f32]) -> f32 {
+    median(noises.iter().copied(), f32::total_cmp).unwrap_or(ROUNDING_SIGMA)
 }
 
 /// Width of the frame along the border that shows the background, as a share of the longer side.
@@ -196,18 +207,23 @@ fn noise_sigma(magnitudes: &Image<f32>) -> f32 {
 fn frame_values(image: &Image<f32>) -> Vec<f32> {
     let (w, h) = image.size();
     let frame = ((w.max(h) as f64 * FRAME_WIDTH) as usize).max(1);
-    let left = frame.min(w);
-    let right = w.saturating_sub(frame).max(left);
     let mut values = Vec::new();
     for (y, row) in image.rows().enumerate() {
         if y < frame || y + frame >= h {
             values.extend_from_slice(row);
         } else {
-            values.extend_from_slice(&row[..left]);
-            values.extend_from_slice(&row[right..]);
+            push_ends(&mut values, row, frame);
         }
     }
     values
+}
+
+/// Adds the first and the last `count` values of a row, each once.
+fn push_ends(values: &mut Vec<f32>, row: &[f32], count: usize) {
+    let left = count.min(row.len());
+    let right = row.len().saturating_sub(count).max(left);
+    values.extend_from_slice(&row[..left]);
+    values.extend_from_slice(&row[right..]);
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 use super::snap::{EdgePoint, distance, edge_points, evenly_spaced};
 use crate::image::Image;
 use crate::matte::Outline;
+use crate::matte::median::median;
 use crate::pixel::LinearRgb;
 use rayon::prelude::*;
 
@@ -24,21 +25,18 @@ const GAUSSIAN_SLOPE: f64 = 0.398_942;
 /// Along profiles across the outline, the steepest change over one pixel as a share of the whole change: `1 / (sqrt(2 pi)
 /// sigma)` for a blurred step. The median over the outline.
 pub(super) fn edge_blur_px(outline: &Outline, roots: &Image<LinearRgb>, scale: f64) -> f64 {
+    let spacing = PROFILE_SPACING_PX * scale.max(1.0);
     let points: Vec<_> = outline
         .rings
         .iter()
-        .flat_map(|ring| edge_points(&evenly_spaced(ring, PROFILE_SPACING_PX * scale.max(1.0)), 1))
+        .flat_map(|ring| edge_points(&evenly_spaced(ring, spacing), 1))
         .collect();
-    let mut slopes: Vec<f32> = points
+    let slopes: Vec<f32> = points
         .par_iter()
         .filter_map(|point| steepest_share(&profile(roots, point, scale)))
         .collect();
-    if slopes.is_empty() {
-        return 0.0;
-    }
-    let middle = slopes.len() / 2;
-    let (_, median, _) = slopes.select_nth_unstable_by(middle, f32::total_cmp);
-    GAUSSIAN_SLOPE / f64::from(*median)
+    median(slopes.into_iter(), f32::total_cmp)
+        .map_or(0.0, |slope| GAUSSIAN_SLOPE / f64::from(slope))
 }
 
 /// The photo along the normal, at steps of half a pixel of the search.
@@ -50,17 +48,14 @@ fn profile(roots: &Image<LinearRgb>, point: &EdgePoint, scale: f64) -> Vec<Linea
 
 /// The steepest change over a pixel, as a share of the whole change; nothing where hardly anything changes.
 fn steepest_share(profile: &[LinearRgb]) -> Option<f32> {
-    let whole = profile
-        .iter()
-        .enumerate()
-        .flat_map(|(i, a)| profile[i..].iter().map(move |b| distance(*a, *b)))
-        .fold(0.0, f32::max);
-    let steepest = profile
-        .iter()
-        .zip(profile.iter().skip(2))
-        .map(|(a, b)| distance(*a, *b))
-        .fold(0.0, f32::max);
+    let pairs = (0..profile.len()).flat_map(|i| profile[i..].iter().map(move |b| (&profile[i], b)));
+    let whole = largest_distance(pairs);
+    let steepest = largest_distance(profile.iter().zip(profile.iter().skip(2)));
     (whole > MIN_CHANGE).then(|| steepest / whole)
+}
+
+fn largest_distance<'a>(pairs: impl Iterator<Item = (&'a LinearRgb, &'a LinearRgb)>) -> f32 {
+    pairs.map(|(a, b)| distance(*a, *b)).fold(0.0, f32::max)
 }
 
 #[cfg(test)]

@@ -33,7 +33,7 @@ pub(super) struct ChosenSearch<'a> {
 ///
 /// Half the size sees half the noise, and a third of it at a quarter; the bands then are as wide as those of one depth more.
 const SEARCHED_SIZES: [(usize, &[usize]); 3] = [(1, &[4, 3, 5, 2]), (2, &[3, 2, 4]), (4, &[2, 3])];
-/// The coarsest band has at least so many pixels along the longer side: below that, it does not separate an object from
+/// The coarsest band has at least this many pixels along the longer side: below that, it does not separate an object from
 /// the rest.
 const MIN_COARSEST_SIDE: usize = 30;
 /// Shorter side of a smaller picture, at least, pixels.
@@ -46,7 +46,7 @@ const COMPARED_SIDE_PX: usize = 256;
 /// Searches the picture at several sizes and depths.
 ///
 /// # Method
-/// An outline is right where it lies on edges and where it does not depend on how it was looked for. Each search scores
+/// An outline is right where it lies on edges and where it does not depend on how it was searched for. Each search scores
 /// the share of its outline that lies on edges times its mean overlap (intersection over union) with what the other
 /// searches found; a search that finds nothing overlaps with nothing. The best score wins, the finer picture when in
 /// doubt.
@@ -74,13 +74,9 @@ pub(super) fn best_search<'a>(
 
 /// The first search that failed, where more than half of them did.
 fn first_of_many_failures(searched: &[SearchResult]) -> Option<usize> {
-    let failed: Vec<usize> = (0..searched.len())
-        .filter(|&i| searched[i].pass.is_err())
-        .collect();
-    failed
-        .first()
-        .copied()
-        .filter(|_| 2 * failed.len() > searched.len())
+    let mut failed = (0..searched.len()).filter(|&i| searched[i].pass.is_err());
+    let count = failed.clone().count();
+    failed.next().filter(|_| 2 * count > searched.len())
 }
 
 /// Support and agreement of each search.
@@ -101,17 +97,10 @@ fn best_candidate(
     confidences: &[Confidence],
     levels: Option<usize>,
 ) -> usize {
-    let candidates: Vec<usize> = (0..searched.len())
-        .filter(|&i| {
-            levels.is_none_or(|levels| searched[i].scale == 0 && searched[i].levels == levels)
-        })
-        .collect();
-    let most = candidates
-        .iter()
-        .map(|&i| confidences[i].value())
-        .fold(0.0, f64::max);
+    let mut candidates = (0..searched.len()).filter(|&i| searched[i].is_candidate(levels));
+    let values = candidates.clone().map(|i| confidences[i].value());
+    let most = values.fold(0.0, f64::max);
     candidates
-        .into_iter()
         .find(|&i| confidences[i].value() >= FINER_PREFERENCE * most)
         .unwrap_or(0)
 }
@@ -132,12 +121,7 @@ impl<'a> SearchScale<'a> {
         depths: Vec<usize>,
         opts: &SegmentOptions,
     ) -> Self {
-        let picture = if reduction > 1 {
-            let (w, h) = whole.size();
-            Cow::Owned(filter::resize(whole, w / reduction, h / reduction))
-        } else {
-            Cow::Borrowed(whole)
-        };
+        let picture = reduced(whole, reduction);
         let deepest = depths.iter().copied().max().unwrap_or(2);
         Self {
             reduction,
@@ -148,19 +132,31 @@ impl<'a> SearchScale<'a> {
     }
 }
 
-fn scales<'a>(picture: &'a Image<LinearRgb>, opts: &SegmentOptions) -> Vec<SearchScale<'a>> {
+fn reduced(picture: &Image<LinearRgb>, reduction: usize) -> Cow<'_, Image<LinearRgb>> {
+    if reduction <= 1 {
+        return Cow::Borrowed(picture);
+    }
     let (w, h) = picture.size();
-    let sizes: Vec<_> = SEARCHED_SIZES
-        .into_iter()
-        .filter(|(reduction, _)| *reduction == 1 || w.min(h) / reduction >= MIN_SEARCHED_SIDE_PX)
-        .collect();
-    sizes
+    Cow::Owned(filter::resize(picture, w / reduction, h / reduction))
+}
+
+fn scales<'a>(picture: &'a Image<LinearRgb>, opts: &SegmentOptions) -> Vec<SearchScale<'a>> {
+    let longer = longer_side(picture);
+    searched_sizes(picture.size())
         .par_iter()
         .map(|&(reduction, depths)| {
             let asked = opts.levels.filter(|_| reduction == 1);
-            let depths = usable_depths(depths, w.max(h) / reduction, asked);
+            let depths = usable_depths(depths, longer / reduction, asked);
             SearchScale::new(picture, reduction, depths, opts)
         })
+        .collect()
+}
+
+/// The reductions, and the depths for each, that leave enough of a picture.
+fn searched_sizes((w, h): (usize, usize)) -> Vec<(usize, &'static [usize])> {
+    SEARCHED_SIZES
+        .into_iter()
+        .filter(|(reduction, _)| *reduction == 1 || w.min(h) / reduction >= MIN_SEARCHED_SIDE_PX)
         .collect()
 }
 
@@ -184,10 +180,8 @@ struct SearchResult {
 }
 
 fn searches(scales: &[SearchScale<'_>], opts: &SegmentOptions) -> Vec<SearchResult> {
-    let settings: Vec<(usize, usize)> = scales
-        .iter()
-        .enumerate()
-        .flat_map(|(i, scale)| scale.depths.iter().map(move |&levels| (i, levels)))
+    let settings: Vec<(usize, usize)> = (0..scales.len())
+        .flat_map(|i| scales[i].depths.iter().map(move |&levels| (i, levels)))
         .collect();
     settings
         .par_iter()
@@ -199,7 +193,7 @@ fn searches(scales: &[SearchScale<'_>], opts: &SegmentOptions) -> Vec<SearchResu
         .collect()
 }
 
-/// A stricter search has so many times the threshold of the finest band: half a step of exposure.
+/// Factor of the finest band's threshold in a stricter search: half a step of exposure.
 const STRICTER_FACTOR: f32 = 1.4;
 
 /// How far a side of the hull's box moves when edges must be stronger, or when the same picture is searched at another
@@ -212,21 +206,26 @@ fn drift_px(
 ) -> f64 {
     let (own, scale) = (&searched[pick], &scales[searched[pick].scale]);
     let Ok(pass) = &own.pass else { return 0.0 };
-    let stricter = scale
-        .search
-        .at_threshold(own.levels, STRICTER_FACTOR, opts)
-        .map_or(longer_side(&pass.inside) as f64, |other| {
-            pass.distance(&other)
-        });
-    let other_depths = searched
-        .iter()
-        .filter(|other| other.scale == own.scale)
-        .filter_map(|other| other.pass.as_ref().ok())
-        .map(|other| pass.distance(other));
-    scale.reduction as f64 * other_depths.fold(stricter, f64::max)
+    let stricter = scale.search.at_threshold(own.levels, STRICTER_FACTOR, opts);
+    let stricter_px = stricter.map_or(longer_side(&pass.inside) as f64, |p| pass.distance(&p));
+    let farthest_px = passes_at(searched, own.scale)
+        .map(|other| pass.distance(other))
+        .fold(stricter_px, f64::max);
+    scale.reduction as f64 * farthest_px
+}
+
+/// What the searches of one picture size found.
+fn passes_at(searched: &[SearchResult], scale: usize) -> impl Iterator<Item = &Pass> {
+    let same = searched.iter().filter(move |other| other.scale == scale);
+    same.filter_map(|other| other.pass.as_ref().ok())
 }
 
 impl SearchResult {
+    /// It was done at the depth that was asked for, if one was.
+    fn is_candidate(&self, levels: Option<usize>) -> bool {
+        levels.is_none_or(|levels| self.scale == 0 && self.levels == levels)
+    }
+
     fn into_chosen(
         self,
         mut scales: Vec<SearchScale<'_>>,
@@ -258,11 +257,11 @@ impl SearchResult {
         let Ok(pass) = &self.pass else { return 0.0 };
         let near = filter::dilate(&pass.object, EDGE_REACH_PX);
         let core = filter::erode(&pass.inside, 1.0);
-        let outline: Vec<_> = off_border(core.size())
-            .filter(|&at| pass.inside[at] && !core[at])
-            .collect();
-        let on_edges = outline.iter().filter(|at| near[**at]).count();
-        on_edges as f64 / outline.len().max(1) as f64
+        let outline = off_border(core.size()).filter(|&at| pass.inside[at] && !core[at]);
+        let (length, on_edges) = outline.fold((0_usize, 0_usize), |(length, on_edges), at| {
+            (length + 1, on_edges + usize::from(near[at]))
+        });
+        on_edges as f64 / length.max(1) as f64
     }
 }
 
@@ -276,9 +275,9 @@ const EDGE_REACH_PX: f64 = 2.0;
 
 /// Mean overlap of one area with the others.
 fn agreement(areas: &[Option<Mask>], i: usize) -> f64 {
-    let others = areas.iter().enumerate().filter(|(j, _)| *j != i);
+    let others = (0..areas.len()).filter(|&j| j != i);
     let sum: f64 = others
-        .map(|(_, other)| match (&areas[i], other) {
+        .map(|j| match (&areas[i], &areas[j]) {
             (Some(own), Some(other)) => overlap(own, other),
             _ => 0.0,
         })
@@ -340,19 +339,16 @@ const BORDERS: [&str; 4] = ["left", "top", "right", "bottom"];
 
 /// The warning about an object that the photo cuts off; none for a whole one.
 fn truncated(touches: [bool; 4]) -> Option<Diagnostic> {
-    let reached: Vec<_> = BORDERS
-        .into_iter()
-        .zip(touches)
-        .filter(|(_, touches)| *touches)
+    let borders = BORDERS.into_iter().zip(touches);
+    let reached: Vec<_> = borders
+        .filter(|border| border.1)
         .map(|(name, _)| name)
         .collect();
-    (!reached.is_empty()).then(|| {
-        let message = format!(
-            "the object reaches the {} border: the part beyond is missing from its size",
-            reached.join(" and ")
-        );
-        Diagnostic::warning(Code::Truncated, message)
-    })
+    let message = format!(
+        "the object reaches the {} border: the part beyond is missing from its size",
+        reached.join(" and ")
+    );
+    (!reached.is_empty()).then(|| Diagnostic::warning(Code::Truncated, message))
 }
 
 /// The warning about an object that was found at a lower resolution than asked for; from the widths of the pictures.

@@ -44,10 +44,8 @@ impl PixelGroups {
     pub(in super::super) fn sizes(&self, members: &Mask) -> Vec<usize> {
         let mut sizes = vec![0; self.count];
         for run in &self.runs {
-            sizes[run.group] += members.row(run.row)[run.columns.clone()]
-                .iter()
-                .filter(|p| **p)
-                .count();
+            let pixels = members.row(run.row)[run.columns.clone()].iter();
+            sizes[run.group] += pixels.filter(|p| **p).count();
         }
         sizes
     }
@@ -63,13 +61,18 @@ impl PixelGroups {
 
     /// Whether each group reaches the border of the picture.
     fn reaching_border(&self) -> Vec<bool> {
-        let (w, h) = self.size;
         let mut reaching = vec![false; self.count];
         for run in &self.runs {
-            reaching[run.group] |=
-                run.row == 0 || run.row + 1 == h || run.columns.start == 0 || run.columns.end == w;
+            reaching[run.group] |= run.reaches_border(self.size);
         }
         reaching
+    }
+}
+
+impl PixelRun {
+    fn reaches_border(&self, (w, h): (usize, usize)) -> bool {
+        let Range { start, end } = self.columns;
+        self.row == 0 || self.row + 1 == h || start == 0 || end == w
     }
 }
 
@@ -112,7 +115,7 @@ fn push_joined(
     }
 }
 
-/// The first run of a run's group; what is on the way points nearer to it from then on.
+/// The first run of a run's group; runs on the way are pointed closer to it.
 fn first_of(runs: &mut [PixelRun], mut run: usize) -> usize {
     while runs[run].group != run {
         runs[run].group = runs[runs[run].group].group;

@@ -6,7 +6,7 @@ use crate::filter;
 use crate::image::{Image, Mask};
 use crate::matte::plate::{PlateOptions, ScreenPlate};
 use crate::matte::prepared::longer_side;
-use crate::matte::screen::is_keyable;
+use crate::matte::screen::{is_keyable, masked_pixels};
 use crate::pixel::LinearRgb;
 
 /// Width of the zone around the object that is not used as background, as a share of the longer side: contact shadows.
@@ -16,7 +16,7 @@ const LIKE_SHARE: f32 = 0.06;
 const LIKE_SIGMAS: f32 = 3.0;
 /// A pixel is unlike the screen when a channel differs by this share of the plate's strongest channel.
 const UNLIKE_SHARE: f32 = 0.3;
-/// Least area of a hole as a share of what is enclosed; smaller ones are a matter of the matte.
+/// Least area of a hole as a share of what is enclosed; smaller ones are left to the matte.
 const MIN_HOLE_AREA: f64 = 0.005;
 /// Share of the rim that must be unlike the screen: clear plastic is like it, and then what it encloses is the object.
 const OPAQUE_RIM_SHARE: f64 = 0.8;
@@ -73,25 +73,31 @@ fn without_holes(picture: &Image<LinearRgb>, inside: &Mask, background: &Mask) -
         return inside.clone();
     }
     let unlike = smooth.zip_map(&plate.image, is_unlike_screen);
-    candidates
-        .iter()
-        .map(Hole::new)
+    let holes = candidates.iter().map(Hole::new);
+    holes
         .filter(|hole| hole.has_opaque_rim(inside, &unlike))
-        .fold(inside.clone(), |kept, hole| {
-            kept.zip_map(&hole.area, |kept, hole| kept && !hole)
-        })
+        .fold(inside.clone(), |kept, hole| without(&kept, &hole.area))
+}
+
+fn without(set: &Mask, taken: &Mask) -> Mask {
+    set.zip_map(taken, |kept, taken| kept && !taken)
 }
 
 /// The pixels inside that have the plate's colour.
 fn screen_like(smooth: &Image<LinearRgb>, plate: &ScreenPlate, inside: &Mask) -> Mask {
-    let noise: [f32; 3] = plate.residual.into();
     smooth.zip3_map(&plate.image, inside, |p, k, inside| {
-        let (off, k) = (differences(p, k), <[f32; 3]>::from(k));
-        inside && (0..3).all(|c| off[c] <= (LIKE_SHARE * k[c]).max(LIKE_SIGMAS * noise[c]))
+        inside && is_like_screen(p, k, plate.residual)
     })
 }
 
-/// The cores of the groups that are large enough for a hole in an area of so many pixels.
+#[inline]
+fn is_like_screen(pixel: LinearRgb, plate: LinearRgb, noise: LinearRgb) -> bool {
+    let off = differences(pixel, plate);
+    let (plate, noise): ([f32; 3], [f32; 3]) = (plate.into(), noise.into());
+    (0..3).all(|c| off[c] <= (LIKE_SHARE * plate[c]).max(LIKE_SIGMAS * noise[c]))
+}
+
+/// The cores of the groups that are large enough for a hole in an area of `area` pixels.
 fn large_groups(like: &Mask, area: usize) -> Vec<Mask> {
     let groups = PixelGroups::new(&filter::erode(like, 1.0));
     let sizes = groups.sizes(like);
@@ -118,27 +124,23 @@ struct Hole {
 impl Hole {
     fn new(core: &Mask) -> Self {
         let area = filter::dilate(core, RIM_PX[0]);
-        let rim =
-            filter::dilate(&area, RIM_PX[1] - RIM_PX[0]).zip_map(&area, |near, hole| near && !hole);
+        let near = filter::dilate(&area, RIM_PX[1] - RIM_PX[0]);
+        let rim = without(&near, &area);
         Self { area, rim }
     }
 
     /// It is enclosed all around, mostly by what is unlike the screen.
     fn has_opaque_rim(&self, inside: &Mask, unlike: &Mask) -> bool {
         let opaque = self.rim.zip_map(unlike, |rim, unlike| rim && unlike);
-        let open = self.rim.zip_map(inside, |rim, inside| rim && !inside);
-        open.count() == 0 && opaque.count() as f64 >= OPAQUE_RIM_SHARE * self.rim.count() as f64
+        let is_enclosed = without(&self.rim, inside).count() == 0;
+        is_enclosed && opaque.count() as f64 >= OPAQUE_RIM_SHARE * self.rim.count() as f64
     }
 }
 
 /// Whether the screen has enough colour to be distinguished from clear plastic.
 fn are_distinguishable(picture: &Image<LinearRgb>, background: &Mask) -> bool {
-    let free = picture
-        .pixels()
-        .iter()
-        .zip(background.pixels())
-        .filter(|(_, free)| **free);
-    is_keyable(free.fold(LinearRgb::BLACK, |sum, (p, _)| sum + *p))
+    let free = masked_pixels(picture, background);
+    is_keyable(free.fold(LinearRgb::BLACK, |sum, p| sum + p))
 }
 
 fn differences(a: LinearRgb, b: LinearRgb) -> [f32; 3] {

@@ -2,6 +2,7 @@
 
 use crate::geom::Point2;
 use crate::image::Mask;
+use crate::matte::outline::points_of;
 use geo::{Area, ConvexHull, MultiPoint, Point};
 
 /// Convex hull of the object whose edges these pixels are, in order, clockwise as seen; empty where there is no area.
@@ -19,12 +20,7 @@ pub(super) fn convex_hull(edges: &Mask) -> Vec<Point2<f64>> {
     }
     // geo goes counter-clockwise with y up, which is clockwise as seen, and repeats the first point.
     let (ring, _) = hull.into_inner();
-    let closed = ring.into_inner();
-    closed
-        .iter()
-        .skip(1)
-        .map(|c| Point2::new(c.x, c.y))
-        .collect()
+    points_of(ring.0.get(1..).unwrap_or_default())
 }
 
 /// The first and the last pixel of every row that has any.
@@ -57,11 +53,8 @@ pub(super) fn sides(polygon: &[Point2<f64>]) -> [f64; 4] {
 
 /// The largest distance between a side of one polygon's box and that of another.
 pub(super) fn farthest_side(a: &[Point2<f64>], b: &[Point2<f64>]) -> f64 {
-    sides(a)
-        .into_iter()
-        .zip(sides(b))
-        .map(|(a, b)| (a - b).abs())
-        .fold(0.0, f64::max)
+    let pairs = sides(a).into_iter().zip(sides(b));
+    pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
 /// By how much the side of one polygon's box that lies farthest beyond another's does so; 0 where none does.

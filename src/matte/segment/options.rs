@@ -23,9 +23,9 @@ pub struct SegmentOptions {
     /// Threshold of the coarsest band (`last_threshold` in files). Default: Otsu.
     #[serde(rename = "last_threshold")]
     pub coarsest_threshold: Threshold,
-    /// An edge stands out at least so many times the noise, whatever the threshold of the finest band. Default: 6.
+    /// An edge exceeds at least this multiple of the noise, regardless of the finest band's threshold. Default: 6.
     pub least_contrast: f32,
-    /// An edge pixel is at least so strong beside the strongest within 2 pixels, 0 to 1: thins edges. Default: 0.6.
+    /// An edge pixel has at least this share of the strongest value within 2 pixels, 0 to 1: thins edges. Default: 0.6.
     pub ridge: f32,
     /// Groups of fewer edge pixels are dirt or noise. Default: 4.
     pub speck: usize,

@@ -22,7 +22,7 @@ pub(super) struct Search {
     threshold: f32,
     /// Where the finest band is above its threshold.
     finest_binary: Mask,
-    /// Where the finest band is no mere smear of a stronger edge.
+    /// Where the finest band is more than the smear of a stronger edge.
     ridges: Mask,
 }
 
@@ -62,19 +62,13 @@ impl Search {
     /// Splits a picture into bands, `deepest` of them.
     pub(super) fn new(picture: &Image<LinearRgb>, opts: &SegmentOptions, deepest: usize) -> Self {
         let bands = Bands::new(picture, opts.tone, deepest);
-        let finest = &bands.finest;
-        let threshold = opts
-            .finest_threshold
-            .of_band(finest)
-            .max(opts.least_contrast);
-        let finest_binary = finest.map(|v| v > threshold);
-        let strongest = band::largest_around(finest, SMEAR_PX);
-        let ridges = finest.zip_map(&strongest, |v, most| v >= opts.ridge * most);
+        let otsu_or_given = opts.finest_threshold.of_band(&bands.finest);
+        let threshold = otsu_or_given.max(opts.least_contrast);
         Self {
+            finest_binary: bands.finest.map(|v| v > threshold),
+            ridges: ridges(&bands.finest, opts.ridge),
             bands,
             threshold,
-            finest_binary,
-            ridges,
         }
     }
 
@@ -88,7 +82,7 @@ impl Search {
         self.pass(levels, &self.finest_binary, opts)
     }
 
-    /// The same with so many times the threshold of the finest band.
+    /// The same with `times` times the threshold of the finest band.
     pub(super) fn at_threshold(
         &self,
         levels: usize,
@@ -102,15 +96,13 @@ impl Search {
 
     /// Where both bands have an edge, thinned, without groups of fewer pixels than a speck.
     fn thin_edges(&self, finest: &Mask, coarsest: &Mask, speck: usize) -> Mask {
-        let both = finest.zip_map(coarsest, |a, b| a && b);
-        let thin = both.zip_map(&self.ridges, |both, ridge| both && ridge);
+        let thin = both(&both(finest, coarsest), &self.ridges);
         cluster::without_specks(&thin, speck)
     }
 
     fn pass(&self, levels: usize, finest_binary: &Mask, opts: &SegmentOptions) -> Result<Pass> {
         let coarsest = self.bands.at_full_size(levels);
-        let threshold = opts.coarsest_threshold.of_band(&coarsest);
-        let coarsest_binary = coarsest.map(|v| v > threshold);
+        let coarsest_binary = opts.coarsest_threshold.binarised(&coarsest);
         let edges = self.thin_edges(finest_binary, &coarsest_binary, opts.speck);
         let join_px = (opts.join * longer_side(&edges) as f64).max(MIN_JOIN_PX);
         let (object, diagnostics) = main_object(&edges, join_px)?;
@@ -131,15 +123,26 @@ impl Search {
     }
 }
 
+/// What two sets have in common.
+fn both(a: &Mask, b: &Mask) -> Mask {
+    a.zip_map(b, |a, b| a && b)
+}
+
+/// Where a band has at least a share of the strongest value nearby.
+fn ridges(band: &Image<f32>, share: f32) -> Mask {
+    let strongest = band::largest_around(band, SMEAR_PX);
+    band.zip_map(&strongest, |v, most| v >= share * most)
+}
+
 /// Two clusters are two objects when the smaller one has at least this share of the larger one's edge pixels.
 const RIVAL_SHARE: f64 = 0.3;
 /// A smaller cluster is worth a warning from this share on.
 const REMNANT_SHARE: f64 = 0.05;
-/// So many clusters too small for a warning each give one together: where they lie on the screen, one may lie beside the
+/// This many clusters too small for a warning each give one together: where they lie on the screen, one may lie beside the
 /// object.
 const SPECK_COUNT: usize = 2;
 
-/// Edge pixels in clusters, of which the one with the most is the main one.
+/// Edge pixels in clusters; the largest cluster is the main one.
 struct EdgeClusters<'a> {
     edges: &'a Mask,
     groups: PixelGroups,
@@ -156,27 +159,22 @@ impl<'a> EdgeClusters<'a> {
         let groups = PixelGroups::new(&filter::dilate(edges, join_px / 2.0));
         let sizes = groups.sizes(edges);
         let main = (0..sizes.len()).max_by_key(|&i| (sizes[i], Reverse(i)))?;
-        let mut clusters = Self {
+        let hull = under_hull(&both(&groups.only(|i| i == main), edges), 0.0);
+        Some(Self {
             edges,
+            sizes_inside: groups.sizes(&both(edges, &hull)),
             groups,
             sizes,
             main,
-            sizes_inside: Vec::new(),
-        };
-        let hull = under_hull(&clusters.only(|i| i == main), 0.0);
-        let inside = edges.zip_map(&hull, |edge, inside| edge && inside);
-        clusters.sizes_inside = clusters.groups.sizes(&inside);
-        Some(clusters)
+        })
     }
 
     /// The edge pixels of the clusters for which a claim holds.
     fn only(&self, holds: impl Fn(usize) -> bool) -> Mask {
-        self.groups
-            .only(holds)
-            .zip_map(self.edges, |near, edge| near && edge)
+        both(&self.groups.only(holds), self.edges)
     }
 
-    /// Where the main cluster and another one are, in words.
+    /// Descriptions of where the main cluster and another one are.
     fn places(&self, other: usize) -> [String; 2] {
         [self.main, other].map(|cluster| place(&self.only(|i| i == cluster)))
     }
@@ -184,6 +182,27 @@ impl<'a> EdgeClusters<'a> {
     /// At least half of a cluster lies within the hull of the main one, or it is that.
     fn belongs(&self, cluster: usize) -> bool {
         cluster == self.main || 2 * self.sizes_inside[cluster] >= self.sizes[cluster]
+    }
+
+    /// The warnings about what is left out.
+    ///
+    /// # Errors
+    /// [`Error::Photo`] where it could be an object of its own.
+    fn judge_others(&self) -> Result<Vec<Diagnostic>> {
+        let mut diagnostics = Vec::new();
+        let mut specks = 0;
+        for (i, share) in self.others() {
+            if share >= RIVAL_SHARE {
+                return Err(two_objects(&self.places(i)));
+            }
+            if share >= REMNANT_SHARE {
+                diagnostics.push(left_out(&self.places(i)));
+            } else {
+                specks += 1;
+            }
+        }
+        diagnostics.extend((specks >= SPECK_COUNT).then(|| specks_on_screen(specks)));
+        Ok(diagnostics)
     }
 
     /// The clusters that do not belong to the main one, and their sizes as shares of its size.
@@ -199,24 +218,12 @@ impl<'a> EdgeClusters<'a> {
 /// Edges nearer to each other than `join_px` form a cluster; the object is the cluster of most edge pixels and what
 /// lies inside its hull. A cluster outside it is an error if it could be an object of its own, else it is left out.
 fn main_object(edges: &Mask, join_px: f64) -> Result<(Mask, Vec<Diagnostic>)> {
-    let Some(clusters) = EdgeClusters::new(edges, join_px) else {
-        return Err(refused(
+    let clusters = EdgeClusters::new(edges, join_px).ok_or_else(|| {
+        refused(
             "nothing stands out from what is along the borders; is there an object, in focus, with background all around it?",
-        ));
-    };
-    let mut diagnostics = Vec::new();
-    let mut specks = 0;
-    for (i, share) in clusters.others() {
-        if share >= RIVAL_SHARE {
-            return Err(two_objects(&clusters.places(i)));
-        }
-        if share >= REMNANT_SHARE {
-            diagnostics.push(left_out(&clusters.places(i)));
-        } else {
-            specks += 1;
-        }
-    }
-    diagnostics.extend((specks >= SPECK_COUNT).then(|| specks_on_screen(specks)));
+        )
+    })?;
+    let mut diagnostics = clusters.judge_others()?;
     let object = clusters.only(|i| clusters.belongs(i));
     diagnostics.extend(possibly_two_objects(&object, CLOSER_JOIN_SHARE * join_px));
     Ok((object, diagnostics))
@@ -260,14 +267,14 @@ fn possibly_two_objects(object: &Mask, join_px: f64) -> Option<Diagnostic> {
     Some(Diagnostic::warning(Code::TwoObjects, message))
 }
 
-/// The pixels of which more than a share lies in the convex hull of a set.
+/// The pixels that lie in the convex hull of a set by more than a share.
 fn under_hull(set: &Mask, share: f32) -> Mask {
     Outline::from_ring(hull::convex_hull(set))
         .coverage(set.width(), set.height())
         .map(|c| c.0 > share)
 }
 
-/// Where a set of pixels is, in words, as shares of the picture.
+/// Description of where a set of pixels is, as shares of the picture.
 fn place(set: &Mask) -> String {
     let hull = hull::convex_hull(set);
     let x = mean_percent(hull.iter().map(|p| p.x), set.width());
@@ -281,7 +288,7 @@ fn mean_percent(coordinates: impl ExactSizeIterator<Item = f64>, len: usize) -> 
     (100.0 * coordinates.sum::<f64>() / n / len as f64).round()
 }
 
-/// The area may grow by this factor when twice the gap is bridged; by more, and it had leaked.
+/// The area may grow by this factor when twice the gap is bridged; if it grows by more, it had leaked.
 const LEAK_AREA_RATIO: f64 = 1.1;
 
 /// The area inside the hull that the edges enclose, gaps up to twice `join_px` bridged; wider ones while that makes the
@@ -328,17 +335,22 @@ fn is_any_set(set: &Mask, columns: Range<usize>, mut rows: Range<usize>) -> bool
 const MIN_OBJECT_LENGTH: f64 = 0.05;
 
 fn check_object(hull: &[Point2<f64>], touches: [bool; 4], (w, h): (usize, usize)) -> Result<()> {
-    let [left, top, right, bottom] = hull::sides(hull);
-    let (width, height) = ((right - left).max(0.0), (bottom - top).max(0.0));
+    let [width, height] = box_size(hull);
     if hull.is_empty() || width.max(height) < MIN_OBJECT_LENGTH * w.max(h) as f64 {
         return Err(refused(format!(
             "the largest thing found is {width:.0} x {height:.0} of {w} x {h} pixels; is there an object, and is it in focus?"
         )));
     }
     if touches == [true; 4] {
-        return Err(refused(
-            "the object reaches all four borders; photograph it with background all around it",
-        ));
+        let what =
+            "the object reaches all four borders; photograph it with background all around it";
+        return Err(refused(what));
     }
     Ok(())
+}
+
+/// Width and height of a polygon; 0 without corners.
+fn box_size(polygon: &[Point2<f64>]) -> [f64; 2] {
+    let [left, top, right, bottom] = hull::sides(polygon);
+    [(right - left).max(0.0), (bottom - top).max(0.0)]
 }

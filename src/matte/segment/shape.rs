@@ -49,12 +49,11 @@ impl ObjectShape {
     /// The outline around the object's area, moved to where the photo changes, and the hull of it and of its thin tips.
     pub(super) fn new(prepared: &Prepared<'_>, chosen: &ChosenSearch<'_>, area: &Mask) -> Self {
         let scale = PixelScale::new(prepared.photo.size(), area.size());
-        let blurred = filter::gaussian_blur(&area.to_coverage(), CRACK_BLUR_PX);
-        let rough = Outline::around(&blurred).map(|p| scale.to_photo(p));
+        let rough = rough_outline(area).map(|p| scale.to_photo(p));
         let outline = snap::snapped(&rough, &prepared.sqrt, scale.reduction());
+        let tips = inset(&chosen.pass.hull, TIP_INSET_PX).map(|p| scale.to_photo(p));
         let mut rings = outline.rings.clone();
-        let tips = inset(&chosen.pass.hull, TIP_INSET_PX);
-        rings.push(tips.into_iter().map(|p| scale.to_photo(p)).collect());
+        rings.push(tips.collect());
         Self {
             hull: Outline { rings }.hull(),
             outline,
@@ -82,12 +81,17 @@ impl ObjectShape {
     }
 }
 
+/// The outline of a set, in its pixels.
+fn rough_outline(area: &Mask) -> Outline {
+    Outline::around(&filter::gaussian_blur(&area.to_coverage(), CRACK_BLUR_PX))
+}
+
 /// A convex polygon's corners moved towards its middle.
-fn inset(hull: &[Point2<f64>], by: f64) -> Vec<Point2<f64>> {
+fn inset(hull: &[Point2<f64>], by: f64) -> impl Iterator<Item = Point2<f64>> {
     let middle = hull.iter().fold(Point2::origin(), |sum, p| {
         sum + p.coords / hull.len() as f64
     });
-    hull.iter().map(|p| moved_towards(*p, middle, by)).collect()
+    hull.iter().map(move |p| moved_towards(*p, middle, by))
 }
 
 fn moved_towards(p: Point2<f64>, goal: Point2<f64>, by: f64) -> Point2<f64> {

@@ -4,16 +4,18 @@ use crate::filter;
 use crate::geom::{Point2, Vector2};
 use crate::image::Image;
 use crate::matte::Outline;
+use crate::matte::median::median;
+use crate::matte::outline::{ring_length, sides};
 use crate::pixel::LinearRgb;
 use rayon::prelude::*;
 
-/// How far to either side of the outline the change is looked for, in pixels of the picture that was searched.
+/// How far to either side of the outline the change is searched for, in pixels of the picture that was searched.
 const PROFILE_REACH_PX: f64 = 1.5;
 /// Where the outside is taken from, beyond the reach, likewise.
 const OUTSIDE_PX: f64 = 2.0;
 /// Steps of a profile to a pixel of the search.
 const STEPS_PER_PX: usize = 4;
-/// Profiles are averaged over so many pixels of the photo along the outline.
+/// Profiles are averaged over this many pixels of the photo along the outline.
 const LANE_COUNT: i32 = 3;
 /// A change counts from this many times the noise on the outside.
 const MIN_CHANGE_SIGMAS: f32 = 5.0;
@@ -49,17 +51,22 @@ fn snapped_ring(ring: &[Point2<f64>], roots: &Image<LinearRgb>, scale: f64) -> V
         return ring.to_vec();
     }
     let points = edge_points(ring, 2);
-    let profiles: Vec<EdgeProfile> = points
-        .par_iter()
-        .map(|point| EdgeProfile::new(roots, point, scale))
-        .collect();
-    let least = least_change(&profiles);
-    let found: Vec<Option<f64>> = profiles.iter().map(|p| p.half_way(least)).collect();
+    let found = displacements(&points, roots, scale);
     points
         .iter()
         .enumerate()
         .map(|(i, point)| point.displaced(median_around(&found, i), roots.size(), scale))
         .collect()
+}
+
+/// How far outwards the photo changes at each point, where it clearly does, pixels of the search.
+fn displacements(points: &[EdgePoint], roots: &Image<LinearRgb>, scale: f64) -> Vec<Option<f64>> {
+    let profiles: Vec<EdgeProfile> = points
+        .par_iter()
+        .map(|point| EdgeProfile::new(roots, point, scale))
+        .collect();
+    let least = least_change(&profiles);
+    profiles.iter().map(|p| p.half_way(least)).collect()
 }
 
 /// The points of a ring, with normals across the chords between the neighbours `reach` points away.
@@ -72,19 +79,15 @@ pub(super) fn edge_points(ring: &[Point2<f64>], reach: usize) -> Vec<EdgePoint> 
 
 /// The least change that is no noise, from the median noise of all profiles.
 fn least_change(profiles: &[EdgeProfile]) -> f32 {
-    let mut noises: Vec<f32> = profiles.iter().map(|p| p.noise).collect();
-    noises.sort_by(f32::total_cmp);
-    MIN_CHANGE_SIGMAS * noises[noises.len() / 2].max(ROUNDING_STEP)
+    let noise = median(profiles.iter().map(|p| p.noise), f32::total_cmp);
+    MIN_CHANGE_SIGMAS * noise.unwrap_or(0.0).max(ROUNDING_STEP)
 }
 
 /// Median of what was found at a point of a ring and its neighbours; 0 where nothing was.
 fn median_around(found: &[Option<f64>], i: usize) -> f64 {
     let n = found.len();
-    let mut near: Vec<f64> = (0..=2 * MEDIAN_REACH)
-        .filter_map(|k| found[(i + n + k - MEDIAN_REACH) % n])
-        .collect();
-    near.sort_by(f64::total_cmp);
-    near.get(near.len() / 2).copied().unwrap_or(0.0)
+    let near = (0..=2 * MEDIAN_REACH).filter_map(|k| found[(i + n + k - MEDIAN_REACH) % n]);
+    median(near, f64::total_cmp).unwrap_or(0.0)
 }
 
 /// A point of an outline and the unit normal to its outside.
@@ -130,6 +133,14 @@ fn is_on_border(v: f64, len: f64, scale: f64) -> bool {
     v <= scale || v >= len - scale
 }
 
+/// The colours along the normal beyond the reach of a profile.
+fn outside_colors(roots: &Image<LinearRgb>, point: &EdgePoint, scale: f64) -> Vec<LinearRgb> {
+    let step = 1.0 / STEPS_PER_PX as f64;
+    (0..(OUTSIDE_PX * STEPS_PER_PX as f64) as usize)
+        .map(|k| point.mean_at(roots, PROFILE_REACH_PX + k as f64 * step, scale))
+        .collect()
+}
+
 /// Difference from the outside along a normal, from the outside inwards.
 struct EdgeProfile {
     /// One value per step.
@@ -140,11 +151,8 @@ struct EdgeProfile {
 
 impl EdgeProfile {
     fn new(roots: &Image<LinearRgb>, point: &EdgePoint, scale: f64) -> Self {
+        let (mean, noise) = mean_and_deviation(&outside_colors(roots, point, scale));
         let step = 1.0 / STEPS_PER_PX as f64;
-        let outside: Vec<_> = (0..(OUTSIDE_PX * STEPS_PER_PX as f64) as usize)
-            .map(|k| point.mean_at(roots, PROFILE_REACH_PX + k as f64 * step, scale))
-            .collect();
-        let (mean, noise) = mean_and_deviation(&outside);
         let change = (0..=(2.0 * PROFILE_REACH_PX * STEPS_PER_PX as f64) as usize).map(|k| {
             let inwards = point.mean_at(roots, PROFILE_REACH_PX - k as f64 * step, scale);
             distance(inwards, mean)
@@ -157,13 +165,12 @@ impl EdgeProfile {
 
     /// Where the first clear change is half done: outwards from the outline, pixels of the search.
     fn half_way(&self, least: f32) -> Option<f64> {
-        let change = &self.change;
         let rim = self.rim(least)?;
-        let half = 0.5 * change[rim];
-        let k = (1..=rim).find(|&k| change[k] >= half)?;
-        let part = f64::from((half - change[k - 1]) / (change[k] - change[k - 1]));
-        (change[k - 1] < half)
-            .then(|| PROFILE_REACH_PX - (k as f64 - 1.0 + part) / STEPS_PER_PX as f64)
+        let half = 0.5 * self.change[rim];
+        let k = (1..=rim).find(|&k| self.change[k] >= half)?;
+        let (before, after) = (self.change[k - 1], self.change[k]);
+        let part = f64::from((half - before) / (after - before));
+        (before < half).then(|| PROFILE_REACH_PX - (k as f64 - 1.0 + part) / STEPS_PER_PX as f64)
     }
 
     /// The first local maximum that is a clear change.
@@ -180,14 +187,10 @@ impl EdgeProfile {
 /// The mean of some colours, and the root mean square of their distances from it.
 fn mean_and_deviation(colors: &[LinearRgb]) -> (LinearRgb, f32) {
     let n = colors.len() as f32;
-    let mean = colors
-        .iter()
-        .fold(LinearRgb::BLACK, |sum, p| sum + *p)
-        .scale(1.0 / n);
-    let square: f32 = colors
-        .iter()
-        .map(|p| distance(*p, mean) * distance(*p, mean))
-        .sum();
+    let sum = colors.iter().fold(LinearRgb::BLACK, |sum, p| sum + *p);
+    let mean = sum.scale(1.0 / n);
+    let distances = colors.iter().map(|p| distance(*p, mean));
+    let square: f32 = distances.map(|off| off * off).sum();
     (mean, (square / n).sqrt())
 }
 
@@ -199,10 +202,10 @@ pub(super) fn distance(a: LinearRgb, b: LinearRgb) -> f32 {
 
 /// Points of a ring at equal distances of about `spacing`.
 pub(super) fn evenly_spaced(ring: &[Point2<f64>], spacing: f64) -> Vec<Point2<f64>> {
-    let length: f64 = sides(ring).map(|(a, b)| (b - a).norm()).sum();
+    let length = ring_length(ring);
     let step = length / (length / spacing).round().max(1.0);
     let (mut points, mut walked, mut next) = (Vec::new(), 0.0, 0.0);
-    for (a, b) in sides(ring) {
+    for [a, b] in sides(ring) {
         let side = (b - a).norm();
         while next < walked + side && next < length - 0.5 * step {
             points.push(a + (b - a) * ((next - walked) / side));
@@ -211,11 +214,6 @@ pub(super) fn evenly_spaced(ring: &[Point2<f64>], spacing: f64) -> Vec<Point2<f6
         walked += side;
     }
     points
-}
-
-/// The sides of a closed ring.
-fn sides(ring: &[Point2<f64>]) -> impl Iterator<Item = (&Point2<f64>, &Point2<f64>)> {
-    ring.iter().zip(ring.iter().cycle().skip(1))
 }
 
 #[cfg(test)]

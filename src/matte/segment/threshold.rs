@@ -1,6 +1,6 @@
 //! The threshold of a picture of magnitudes.
 
-use crate::image::Image;
+use crate::image::{Image, Mask};
 use serde::{Deserialize, Serialize};
 
 /// How a band is binarised.
@@ -15,6 +15,12 @@ pub enum Threshold {
 }
 
 impl Threshold {
+    /// Where a band is above its threshold.
+    pub(super) fn binarised(self, band: &Image<f32>) -> Mask {
+        let threshold = self.of_band(band);
+        band.map(|v| v > threshold)
+    }
+
     /// The threshold of a band, in units of noise.
     pub(super) fn of_band(self, band: &Image<f32>) -> f32 {
         match self {
@@ -41,12 +47,18 @@ fn otsu(band: &Image<f32>) -> f32 {
     if span <= 0.0 {
         return largest;
     }
-    let mut histogram = [0u64; HISTOGRAM_BINS];
+    let split = best_split(&log_histogram(band, span));
+    libm::expf((split + 1) as f32 / HISTOGRAM_BINS as f32 * span)
+}
+
+/// How many values have a logarithm in each bin of the span from 0.
+fn log_histogram(band: &Image<f32>, span: f32) -> [u64; HISTOGRAM_BINS] {
+    let mut histogram = [0; HISTOGRAM_BINS];
     for v in band.pixels() {
         let bin = (libm::logf(v.max(1.0)) / span * HISTOGRAM_BINS as f32) as usize;
         histogram[bin.min(HISTOGRAM_BINS - 1)] += 1;
     }
-    libm::expf((best_split(&histogram) + 1) as f32 / HISTOGRAM_BINS as f32 * span)
+    histogram
 }
 
 /// Last bin of the lower group.
@@ -66,7 +78,7 @@ fn best_split(histogram: &[u64; HISTOGRAM_BINS]) -> usize {
     best_bin
 }
 
-/// Variance between two groups of so many values with these sums, times the square of all their number; negative where a
+/// Variance between two groups with these counts and sums, times the square of the total count; negative where a
 /// group is empty.
 fn variance_between(counts: [u64; 2], sums: [u64; 2]) -> f64 {
     if counts.contains(&0) {

@@ -1,8 +1,9 @@
 //! The plastic of an object whose transmittance is known in some channels: what it is in the others.
 
-use super::lines::{PixelLines, median};
+use super::lines::{PixelLines, opaque_pixels};
 use crate::image::Image;
-use crate::matte::film::{OPAQUE, tint};
+use crate::matte::film::tint;
+use crate::matte::median::median;
 use crate::pixel::Coverage;
 
 /// Pixels that are sampled.
@@ -42,18 +43,11 @@ fn clearer_half(
     inside: &Image<Coverage>,
     determined: [bool; 3],
 ) -> Vec<PixelLines> {
-    let object = || {
-        pixels
-            .pixels()
-            .iter()
-            .zip(inside.pixels())
-            .filter(|(_, c)| c.0 >= OPAQUE)
-            .map(|(p, _)| p)
-    };
-    let Some(middle) = median(object().map(|p| clearness(p, determined))) else {
+    let values = opaque_pixels(pixels, inside).map(|p| clearness(p, determined));
+    let Some(middle) = median(values, f32::total_cmp) else {
         return Vec::new();
     };
-    let clear: Vec<&PixelLines> = object()
+    let clear: Vec<&PixelLines> = opaque_pixels(pixels, inside)
         .filter(|p| clearness(p, determined) >= middle)
         .collect();
     clear
@@ -86,19 +80,25 @@ impl DyeSamples {
             .iter()
             .map(|pixel| self.explained(pixel, flat))
             .collect();
-        let thickness = median(fits.iter().map(|fit| fit.1)).unwrap_or(1.0);
-        let misfit = median(fits.iter().map(|fit| fit.0)).unwrap_or(0.0);
+        let thickness = median(fits.iter().map(|fit| fit.1), f32::total_cmp).unwrap_or(1.0);
+        let misfit = median(fits.iter().map(|fit| fit.0), f32::total_cmp).unwrap_or(0.0);
         misfit + THICKNESS_WEIGHT * (thickness - 1.0).powi(2) + handicap
     }
 
-    /// Squared misfit of a pixel in standard deviations, and its factor of thickness.
-    fn explained(&self, pixel: &PixelLines, flat: [f32; 3]) -> (f32, f32) {
+    /// Times that a pixel is as see-through as flat plastic.
+    #[inline]
+    fn thickness_factor(&self, pixel: &PixelLines, flat: [f32; 3]) -> f32 {
         let (mut over, mut under) = (0.0, 0.0);
         for c in channels(self.determined) {
             over += weight(pixel, c) * pixel.slope(c) * flat[c];
             under += weight(pixel, c) * flat[c] * flat[c];
         }
-        let factor = (over / under.max(f32::MIN_POSITIVE)).max(0.0);
+        (over / under.max(f32::MIN_POSITIVE)).max(0.0)
+    }
+
+    /// Squared misfit of a pixel in standard deviations, and its factor of thickness.
+    fn explained(&self, pixel: &PixelLines, flat: [f32; 3]) -> (f32, f32) {
+        let factor = self.thickness_factor(pixel, flat);
         let misfit = channels(self.determined)
             .map(|c| weight(pixel, c) * (pixel.slope(c) - factor * flat[c]).powi(2))
             .sum();

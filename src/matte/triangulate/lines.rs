@@ -2,6 +2,7 @@
 
 use crate::image::Image;
 use crate::matte::film::OPAQUE;
+use crate::matte::median::median;
 use crate::pixel::{Coverage, LinearRgb};
 
 /// Sums for a straight line through points.
@@ -62,18 +63,18 @@ impl PixelLines {
     }
 }
 
-/// Standard deviation of a transmittance of which nothing is known.
+/// Standard deviation of an unknown transmittance.
 const UNKNOWN_SIGMA: f32 = 1e3;
 /// Standard deviation of a transmittance inferred from other channels around what it is.
 const INFERRED_SIGMA: f32 = 0.06;
 /// Standard deviation of an open channel of the plastic that is inferred from its dye, as a share of it.
 const DYE_SIGMA: f32 = 0.15;
-/// Plates are so much off, as a share.
+/// Relative error of plates.
 const PLATE_ERROR: f32 = 0.01;
 /// Prior of a pixel's share of flat plastic, standard deviation around 0: plastic up to one and a half times as clear as
 /// flat.
 const SHARE_SIGMA: f32 = 1.5;
-/// Prior of a pixel's bare share, standard deviation around 0: now and then a rim with screen beside it.
+/// Prior of a pixel's bare share, standard deviation around 0: occasionally a rim with screen beside it.
 const BARE_SIGMA: f32 = 0.27;
 /// Standard deviation of transmittances around any sum of plastic and nothing.
 const MODEL_SIGMA: f32 = 0.015;
@@ -122,9 +123,7 @@ impl Inferred {
             if determined[c] {
                 plastic[c]
             } else {
-                let (gain, variance) = prior.gain(pixels, inside, c);
-                let dye = DYE_SIGMA * DYE_SIGMA;
-                (plastic[c] * (variance + gain * dye) / (variance + dye)).clamp(0.0, 1.0)
+                scaled_plastic(plastic[c], prior.gain(pixels, inside, c))
             }
         });
         Self { plastic, ..prior }
@@ -148,55 +147,104 @@ impl Inferred {
             levers.push(pixel.lines[channel].lever());
         }
         let gain = (top / bottom) as f32;
-        let lever = median(levers.into_iter()).unwrap_or(UNKNOWN_SIGMA);
-        let off = PLATE_ERROR * lever.min(UNKNOWN_SIGMA) * gain.max(1.0);
+        let off = PLATE_ERROR * median_lever(levers) * gain.max(1.0);
         (gain, (1.0 / bottom) as f32 + off * off)
     }
 
     /// The share of flat plastic, and of nothing, that a pixel's determined channels are made of: least squares, with priors
     /// that hold where the channels do not separate them. No less than nothing is bare.
     fn shares(&self, pixel: &PixelLines) -> (f32, f32) {
-        let (mut pp, mut pb, mut bb) = (SHARE_SIGMA.powi(-2), 0.0, BARE_SIGMA.powi(-2));
-        let (mut tp, mut tb) = (0.0, 0.0);
+        let mut sums = ShareSums::prior();
         for c in (0..3).filter(|&c| self.determined[c]) {
             let weight = 1.0 / (pixel.sigma(c).powi(2) + MODEL_SIGMA * MODEL_SIGMA);
-            let (plastic, measured) = (self.plastic[c], pixel.slope(c).clamp(0.0, 1.0));
-            pp += weight * plastic * plastic;
-            pb += weight * plastic;
-            bb += weight;
-            tp += weight * measured * plastic;
-            tb += weight * measured;
+            sums.add(weight, self.plastic[c], pixel.slope(c).clamp(0.0, 1.0));
         }
-        let bare =
-            ((pp * tb - pb * tp) / (pp * bb - pb * pb).max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);
-        (((tp - pb * bare) / pp).max(0.0), bare)
+        sums.shares()
     }
 
     /// The film of one pixel: what is measured, mixed with what follows from the other channels by the variances.
     pub(super) fn complete(&self, pixel: &PixelLines) -> SolvedFilm {
         let (share, bare) = self.shares(pixel);
         let channels = [0, 1, 2].map(|c| {
+            let (slope, sigma) = (pixel.slope(c), pixel.sigma(c));
             if self.determined[c] {
-                (pixel.slope(c).clamp(0.0, 1.0), pixel.sigma(c))
+                (slope.clamp(0.0, 1.0), sigma)
             } else {
-                mixed(
-                    pixel.slope(c),
-                    pixel.sigma(c),
-                    share * self.plastic[c] + bare,
-                )
+                mixed(slope, sigma, share * self.plastic[c] + bare)
             }
         });
+        SolvedFilm::new(pixel, channels)
+    }
+}
+
+/// Weighted sums of the products of flat plastic (p), nothing (b) and the measured transmittance (t) of some channels.
+struct ShareSums {
+    pp: f32,
+    pb: f32,
+    bb: f32,
+    tp: f32,
+    tb: f32,
+}
+
+impl ShareSums {
+    /// What is known before any channel.
+    #[inline]
+    fn prior() -> Self {
+        Self {
+            pp: SHARE_SIGMA.powi(-2),
+            pb: 0.0,
+            bb: BARE_SIGMA.powi(-2),
+            tp: 0.0,
+            tb: 0.0,
+        }
+    }
+
+    #[inline]
+    fn add(&mut self, weight: f32, plastic: f32, measured: f32) {
+        self.pp += weight * plastic * plastic;
+        self.pb += weight * plastic;
+        self.bb += weight;
+        self.tp += weight * measured * plastic;
+        self.tb += weight * measured;
+    }
+
+    /// The shares of flat plastic and of nothing.
+    #[inline]
+    fn shares(&self) -> (f32, f32) {
+        let Self { pp, pb, bb, tp, tb } = self;
+        let bare =
+            ((pp * tb - pb * tp) / (pp * bb - pb * pb).max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);
+        (((tp - pb * bare) / pp).max(0.0), bare)
+    }
+}
+
+impl SolvedFilm {
+    /// From the transmittance of each channel and its standard deviation.
+    #[inline]
+    fn new(pixel: &PixelLines, channels: [(f32, f32); 3]) -> Self {
         let transmittance = channels.map(|(t, _)| t);
-        let reflected =
+        let reflected: [f32; 3] =
             std::array::from_fn(|c| pixel.lines[c].intercept(transmittance[c]).max(0.0));
-        SolvedFilm {
+        Self {
             transmittance: transmittance.into(),
-            reflected: LinearRgb::from(reflected),
+            reflected: reflected.into(),
             sigma: channels
                 .iter()
                 .fold(0.0, |worst, (_, sigma)| worst.max(*sigma)),
         }
     }
+}
+
+/// Transmittance of the plastic in an open channel, between its dye's and what the lines give, by the variances.
+fn scaled_plastic(plastic: f32, (gain, variance): (f32, f32)) -> f32 {
+    let dye = DYE_SIGMA * DYE_SIGMA;
+    (plastic * (variance + gain * dye) / (variance + dye)).clamp(0.0, 1.0)
+}
+
+fn median_lever(levers: Vec<f32>) -> f32 {
+    median(levers.into_iter(), f32::total_cmp)
+        .unwrap_or(UNKNOWN_SIGMA)
+        .min(UNKNOWN_SIGMA)
 }
 
 /// A measured transmittance and one inferred from other channels, mixed by their variances, and the deviation of that.
@@ -215,12 +263,17 @@ pub(super) fn covered_pixels<'a, P: Copy>(
     pixels: &'a Image<P>,
     inside: &'a Image<Coverage>,
 ) -> impl Iterator<Item = &'a P> {
-    pixels
-        .pixels()
-        .iter()
-        .zip(inside.pixels())
-        .filter(|(_, c)| c.0 > 0.5)
-        .map(|(p, _)| p)
+    let pixels = pixels.pixels().iter().zip(inside.pixels());
+    pixels.filter(|(_, c)| c.0 > 0.5).map(|(p, _)| p)
+}
+
+/// The pixels that are wholly inside.
+pub(super) fn opaque_pixels<'a, P: Copy>(
+    pixels: &'a Image<P>,
+    inside: &'a Image<Coverage>,
+) -> impl Iterator<Item = &'a P> {
+    let pixels = pixels.pixels().iter().zip(inside.pixels());
+    pixels.filter(|(_, c)| c.0 >= OPAQUE).map(|(p, _)| p)
 }
 
 /// Transmittance per channel where the plastic lies flat: the median over what is not much darker than the clearest.
@@ -228,23 +281,23 @@ pub(super) fn flat_transmittance(
     solved: &Image<SolvedFilm>,
     inside: &Image<Coverage>,
 ) -> LinearRgb {
-    let object: Vec<LinearRgb> = solved
-        .pixels()
-        .iter()
-        .zip(inside.pixels())
-        .filter(|(_, c)| c.0 >= OPAQUE)
-        .map(|(p, _)| p.transmittance)
+    let mut object: Vec<LinearRgb> = opaque_pixels(solved, inside)
+        .map(|p| p.transmittance)
         .collect();
     let Some(clearest) = clearest(&object) else {
         return LinearRgb::WHITE;
     };
-    let flat: Vec<[f32; 3]> = object
-        .into_iter()
-        .filter(|t| mean_channel(*t) >= MIN_FLAT_SHARE * clearest)
-        .map(Into::into)
-        .collect();
-    let medians = [0, 1, 2].map(|c| median(flat.iter().map(|t| t[c])).unwrap_or(1.0));
-    LinearRgb::from(medians).map(|t| t.clamp(0.001, 1.0))
+    object.retain(|t| mean_channel(*t) >= MIN_FLAT_SHARE * clearest);
+    median_color(&object).map(|t| t.clamp(0.001, 1.0))
+}
+
+/// Channel by channel; white of none.
+fn median_color(colors: &[LinearRgb]) -> LinearRgb {
+    let medians = [0, 1, 2].map(|c| {
+        let channel = colors.iter().map(|color| <[f32; 3]>::from(*color)[c]);
+        median(channel, f32::total_cmp).unwrap_or(1.0)
+    });
+    LinearRgb::from(medians)
 }
 
 /// Mean transmittance of the clearest pixels; none without pixels.
@@ -257,10 +310,4 @@ fn clearest(object: &[LinearRgb]) -> Option<f32> {
 
 fn mean_channel(t: LinearRgb) -> f32 {
     (t.r + t.g + t.b) / 3.0
-}
-
-pub(super) fn median(values: impl Iterator<Item = f32>) -> Option<f32> {
-    let mut values: Vec<f32> = values.collect();
-    let middle = values.len() / 2;
-    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f32::total_cmp).1)
 }

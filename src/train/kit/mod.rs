@@ -93,14 +93,19 @@ pub fn write(folder: &Path, options: &KitOptions) -> Result<()> {
     let balance = balance_document(&options.balance, counts)?;
     io::create_folder(folder)?;
     write_lists(folder, &real, &synthetic)?;
-    for variant in &VARIANTS {
-        let path = folder.join(format!("{}.yaml", variant.name));
-        io::write_text(path, &variant.yaml(&real.classes))?;
-    }
+    write_variants(folder, &real.classes)?;
     io::write_json(folder.join("balance.json"), &balance)?;
     io::write_text(folder.join("hyp.yaml"), HYP_YAML)?;
     io::write_text(folder.join("balanced.py"), BALANCED_PY)?;
     io::write_text(folder.join("commands.sh"), &commands(options, counts))
+}
+
+fn write_variants(folder: &Path, classes: &[String]) -> Result<()> {
+    for variant in &VARIANTS {
+        let path = folder.join(format!("{}.yaml", variant.name));
+        io::write_text(path, &variant.yaml(classes))?;
+    }
+    Ok(())
 }
 
 fn balance_document(balance: &Balance, [real, synthetic]: [u64; 2]) -> Result<serde_json::Value> {

@@ -30,16 +30,20 @@ enum CameraFormat {
 
 pub(super) fn export_cameras(args: &ExportCameraArgs) -> anyhow::Result<()> {
     let files: petcomp::Result<Vec<CameraFile>> = args.cameras.iter().map(io::read_json).collect();
-    let files = files?;
-    let text = match args.to {
-        CameraFormat::Colmap => return write_colmap(args.output.as_deref(), &files),
-        CameraFormat::Blender => only_camera(&files)?.to_blender_script(),
+    let (files, output) = (files?, args.output.as_deref());
+    match args.to {
+        CameraFormat::Colmap => write_colmap(output, &files),
+        CameraFormat::Blender => write_or_print(output, &only_camera(&files)?.to_blender_script()),
         CameraFormat::Opencv => {
-            serde_json::to_string_pretty(&only_camera(&files)?.to_opencv())? + "\n"
+            let camera = only_camera(&files)?.to_opencv();
+            write_or_print(output, &(serde_json::to_string_pretty(&camera)? + "\n"))
         }
-    };
-    match &args.output {
-        Some(path) => io::write_text(path, &text)?,
+    }
+}
+
+fn write_or_print(output: Option<&Path>, text: &str) -> anyhow::Result<()> {
+    match output {
+        Some(path) => io::write_text(path, text)?,
         None => print::text(text.trim_end()),
     }
     Ok(())

@@ -49,15 +49,13 @@ pub(super) fn init_label(args: &InitLabelArgs, global: &GlobalArgs) -> anyhow::R
         "{shown}: is there already, and --force is not given"
     );
     let known = args.known_label(&path)?;
-    let label = match known.markers {
-        Some(_) => with_markers_of(known.clone(), &args.photo, &args.photo)?,
-        None => known.clone(),
-    };
+    let label = args.with_markers(known.clone())?;
     io::write_text(&path, &camera::commented(&label)?)?;
     let corners = args.describe_corners(label.points.len() - known.points.len());
-    global.print_status(format_args!(
-        "{shown}: {corners}; then `petcomp camera solve {shown}`"
-    ));
+    global.print_written(
+        &path,
+        format_args!("{corners}; then `petcomp camera solve {shown}`"),
+    );
     Ok(())
 }
 
@@ -79,6 +77,14 @@ impl InitLabelArgs {
         }
         label.surface.corners_px = self.corners;
         Ok(label)
+    }
+
+    /// The label with the corners of the markers that it has.
+    fn with_markers(&self, label: Label) -> petcomp::Result<Label> {
+        match label.markers {
+            Some(_) => with_markers_of(label, &self.photo, &self.photo),
+            None => Ok(label),
+        }
     }
 
     /// Where the corners come from, for a photo in which so many corners of markers were found.

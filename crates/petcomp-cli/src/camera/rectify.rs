@@ -66,9 +66,9 @@ impl RectifyArgs {
 /// The only label of a file.
 fn read_only(path: &Path, size: Option<[f64; 2]>) -> anyhow::Result<LabelledPhoto> {
     let labels = camera::read_labels(path, size)?;
-    <[LabelledPhoto; 1]>::try_from(labels)
-        .map(|[only]| only)
-        .map_err(|labels| {
-            anyhow::anyhow!("{}: {} labels, expected one", path.display(), labels.len())
-        })
+    let count = labels.len();
+    match <[LabelledPhoto; 1]>::try_from(labels) {
+        Ok([only]) => Ok(only),
+        Err(_) => anyhow::bail!("{}: {count} labels, expected one", path.display()),
+    }
 }

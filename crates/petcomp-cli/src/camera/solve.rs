@@ -5,7 +5,7 @@ use crate::diagnostics::report_diagnostics;
 use crate::global::GlobalArgs;
 use crate::print;
 use crate::values::parse_metres;
-use petcomp::camera::{self, CameraFile, Joint, Label, LabelledPhoto};
+use petcomp::camera::{self, CameraFile, Label, LabelledPhoto};
 use petcomp::camera::{Solution, SolveError, SolveOptions};
 use petcomp::{Error, Image, LinearRgb, io};
 use std::path::{Path, PathBuf};
@@ -79,14 +79,19 @@ pub(super) fn solve_each(args: &SolveArgs, global: &GlobalArgs) -> anyhow::Resul
     args.labels.for_each(|labelled| {
         let solution = accepted(solved(labelled)?, labelled, args.force)?;
         let file = CameraFile::new(&labelled.label, &solution);
-        let target = match &args.output {
-            Some(path) => path.clone(),
-            None => labelled.beside("camera.json"),
-        };
-        write_camera(&target, labelled, &file, &solution)?;
+        write_camera(&args.target_for(labelled), labelled, &file, &solution)?;
         report_solution(labelled, &solution, global);
         Ok(())
     })
+}
+
+impl SolveArgs {
+    fn target_for(&self, labelled: &LabelledPhoto) -> PathBuf {
+        match &self.output {
+            Some(path) => path.clone(),
+            None => labelled.beside("camera.json"),
+        }
+    }
 }
 
 /// Solves the labels of each camera together.
@@ -95,30 +100,34 @@ pub(super) fn solve_joint(args: &JointArgs, global: &GlobalArgs) -> anyhow::Resu
     let mut batch = FileBatch::default();
     for group in camera::group_by_camera(&labels_of(&labels)) {
         let members: Vec<LabelledPhoto> = group.iter().map(|&i| labels[i].clone()).collect();
-        let joint = camera::solve_joint(&labels_of(&members), &SolveOptions::default())
-            .map_err(|e| located(e, &members[0]))?;
-        report_outliers(&joint, &members);
-        for (member, photo) in members.iter().zip(joint.photos) {
+        for (member, photo) in members.iter().zip(solve_together(&members)?) {
             batch.count(accept_member(member, photo, &members, args.force, global));
         }
     }
     batch.finish()
 }
 
-fn labels_of(photos: &[LabelledPhoto]) -> Vec<Label> {
-    photos.iter().map(|photo| photo.label.clone()).collect()
-}
-
-fn report_outliers(joint: &Joint, members: &[LabelledPhoto]) {
+/// Solves photos of one camera, and reports those that contradict the others.
+fn solve_together(members: &[LabelledPhoto]) -> petcomp::Result<Vec<JointOutcome>> {
+    let joint = camera::solve_joint(&labels_of(members), &SolveOptions::default())
+        .map_err(|e| located(e, &members[0]))?;
     for outlier in &joint.outliers {
         report_diagnostics(&members[outlier.photo], &[outlier.diagnostic()]);
     }
+    Ok(joint.photos)
+}
+
+/// What became of a photo that was solved together with others.
+type JointOutcome = Result<Solution, SolveError>;
+
+fn labels_of(photos: &[LabelledPhoto]) -> Vec<Label> {
+    photos.iter().map(|photo| photo.label.clone()).collect()
 }
 
 /// Writes and reports the camera of a photo that was solved together with others.
 fn accept_member(
     member: &LabelledPhoto,
-    outcome: Result<Solution, SolveError>,
+    outcome: JointOutcome,
     all: &[LabelledPhoto],
     force: bool,
     global: &GlobalArgs,

@@ -1,7 +1,7 @@
 //! What is in a dataset that was just made.
 
 use crate::print;
-use petcomp::dataset::{DatasetCounts, Obstructed};
+use petcomp::dataset::{ClassCount, DatasetCounts, Obstructed};
 use std::path::{Path, PathBuf};
 
 /// Prints what is in the folder: a result, so also where quiet is asked for.
@@ -9,12 +9,20 @@ pub(crate) fn print_counts(counts: &DatasetCounts) {
     print::line(images_line(counts));
     print::line(objects_line(counts));
     for class in &counts.classes {
-        let (labelled, objects) = (class.labelled, class.objects);
-        print::line(format_args!(
-            "  {:10} {labelled} labelled of {objects}",
-            class.name
-        ));
+        print::line(class_line(class));
     }
+}
+
+/// Prints what a dataset's trainers are given.
+pub(super) fn print_trainer_inputs(counts: &DatasetCounts, folder: &Path) {
+    for path in trainer_inputs(counts, folder) {
+        print::line(path.display());
+    }
+}
+
+fn class_line(class: &ClassCount) -> String {
+    let (name, labelled, objects) = (&class.name, class.labelled, class.objects);
+    format!("  {name:10} {labelled} labelled of {objects}")
 }
 
 fn images_line(counts: &DatasetCounts) -> String {

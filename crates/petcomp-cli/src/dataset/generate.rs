@@ -1,6 +1,6 @@
 //! `petcomp dataset generate`: a recipe becomes images with labels.
 
-use super::{LongRunConsent, generate_supervised, print_counts, trainer_inputs};
+use super::{LongRunConsent, generate_supervised, print_counts, print_trainer_inputs};
 use crate::documents::{RecipeArgs, at_quality};
 use crate::global::GlobalArgs;
 use crate::interruption::interruption;
@@ -53,18 +53,13 @@ pub(crate) fn run(args: &GenerateArgs, global: &GlobalArgs) -> anyhow::Result<()
         repair_folder(&folder)?;
     }
     let pipeline = Pipeline::open(config)?.stopped_by(interruption());
-    let plan = Plan {
-        range,
-        ..pipeline.plan(args.image_count(), args.seed, &folder)?
-    };
+    let plan = args.plan(&pipeline, range, &folder)?;
     let counts = generate_supervised(&pipeline, &plan, &args.consent, global)?;
     print_counts(&counts);
     if args.preview.is_some() {
         write_preview_sheet(&folder, args.image_count())?;
     }
-    for path in trainer_inputs(&counts, &folder) {
-        print::line(path.display());
-    }
+    print_trainer_inputs(&counts, &folder);
     Ok(())
 }
 
@@ -78,25 +73,34 @@ impl GenerateArgs {
         })
     }
 
+    fn plan(
+        &self,
+        pipeline: &Pipeline,
+        range: SampleRange,
+        folder: &Path,
+    ) -> petcomp::Result<Plan> {
+        Ok(Plan {
+            range,
+            ..pipeline.plan(self.image_count(), self.seed, folder)?
+        })
+    }
+
     /// Number of images of the whole dataset, or of the preview.
     fn image_count(&self) -> u64 {
-        match (self.count, self.preview, self.only) {
-            (Some(count), Some(first), _) => count.min(first),
-            (Some(count), None, _) | (None, Some(count), _) => count,
-            (None, None, Some(only)) => only.saturating_add(1),
-            (None, None, None) => 0,
+        let after_only = self.only.map(|only| only.saturating_add(1));
+        match (self.count, self.preview) {
+            (Some(count), Some(first)) => count.min(first),
+            (count, first) => count.or(first).or(after_only).unwrap_or(0),
         }
     }
 
     fn sample_range(&self) -> petcomp::Result<SampleRange> {
-        match (self.only, self.shard) {
-            (Some(k), _) => Ok(SampleRange::One(k)),
-            (None, Some(choice)) => {
-                let shard = choice.within(|name| std::env::var(name).ok());
-                shard.map(SampleRange::Shard)
-            }
-            (None, None) => Ok(SampleRange::All),
-        }
+        let whole = self.only.map_or(SampleRange::All, SampleRange::One);
+        let Some(choice) = self.shard else {
+            return Ok(whole);
+        };
+        let shard = choice.within(|name| std::env::var(name).ok());
+        shard.map(SampleRange::Shard)
     }
 
     /// A shard has a folder of its own.

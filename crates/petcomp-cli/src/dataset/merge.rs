@@ -1,9 +1,8 @@
 //! `petcomp dataset merge`: the shards of several machines become one dataset.
 
-use super::{print_counts, trainer_inputs};
+use super::{print_counts, print_trainer_inputs};
 use crate::global::GlobalArgs;
 use crate::interruption::interruption;
-use crate::print;
 use petcomp::dataset;
 use std::path::PathBuf;
 
@@ -27,8 +26,6 @@ pub(crate) fn run(args: &MergeArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     )?;
     drop(progress);
     print_counts(&counts);
-    for path in trainer_inputs(&counts, &args.output) {
-        print::line(path.display());
-    }
+    print_trainer_inputs(&counts, &args.output);
     Ok(())
 }

@@ -10,6 +10,7 @@ mod select;
 mod supervised;
 mod training;
 
+use counts::print_trainer_inputs;
 pub(crate) use counts::{print_counts, trainer_inputs};
 pub(crate) use supervised::{LongRunConsent, generate_supervised};
 

@@ -6,6 +6,7 @@ use petcomp::Error;
 use petcomp::dataset::{self, DatasetCounts, LongRun, Pipeline, Plan, Progress};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
+use std::thread::ScopedJoinHandle;
 use std::time::{Duration, Instant};
 
 /// How often the time that the rest will take is estimated.
@@ -30,12 +31,15 @@ pub(crate) fn generate_supervised(
     let display = global.start_progress("pictures");
     let watch = RunWatch::default();
     let (made, long_run) = watch.over(!consent.yes, || {
-        let sample = |k| pipeline.sample(plan.seed, k);
-        let show = |progress: Progress| {
-            display.update(progress.done, progress.count);
-            watch.note(progress);
-        };
-        dataset::generate(plan, sample, &show, interruption())
+        dataset::generate(
+            plan,
+            |k| pipeline.sample(plan.seed, k),
+            &|progress| {
+                display.update(progress.done, progress.count);
+                watch.note(progress);
+            },
+            interruption(),
+        )
     });
     match (made, long_run) {
         (Err(Error::Interrupted { what }), Some(long)) => {
@@ -63,11 +67,7 @@ impl RunWatch {
             let watching = is_limited.then(|| scope.spawn(|| self.stop_long_run()));
             let made = job();
             self.is_done.store(true, Ordering::Relaxed);
-            let long_run = watching.and_then(|thread| {
-                thread.thread().unpark();
-                thread.join().ok().flatten()
-            });
-            (made, long_run)
+            (made, watching.and_then(join_now))
         })
     }
 
@@ -89,4 +89,9 @@ impl RunWatch {
         let progress = *self.last.lock().unwrap_or_else(PoisonError::into_inner);
         LongRun::of(&progress?, began.elapsed(), rayon::current_num_threads())
     }
+}
+
+fn join_now(watching: ScopedJoinHandle<'_, Option<LongRun>>) -> Option<LongRun> {
+    watching.thread().unpark();
+    watching.join().ok().flatten()
 }

@@ -125,10 +125,11 @@ struct MixedSets {
 
 impl MixedSets {
     fn open(args: &MixedSetArgs) -> petcomp::Result<Self> {
-        let (real, synthetic) = (YoloSet::open(&args.real)?, YoloSet::open(&args.synthetic)?);
-        let [in_real, in_synthetic] = [&real, &synthetic].map(|set| set.train.len() as u64);
+        let real = YoloSet::open(&args.real)?;
+        let synthetic = YoloSet::open(&args.synthetic)?;
+        let counts = [&real, &synthetic].map(|set| set.train.len() as u64);
         Ok(Self {
-            weights: args.balance().weights(in_real, in_synthetic)?,
+            weights: args.balance().weights(counts[0], counts[1])?,
             real,
             synthetic,
         })

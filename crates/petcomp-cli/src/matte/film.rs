@@ -6,7 +6,7 @@ use crate::global::GlobalArgs;
 use anyhow::Result;
 use petcomp::io::{self, Override, from_overrides};
 use petcomp::matte::{
-    PlateOptions, ScreenPlate, SegmentOptions, Triangulated, film, film_planes, segment,
+    FilmMatte, PlateOptions, ScreenPlate, SegmentOptions, Triangulated, film, film_planes, segment,
     triangulate,
 };
 use petcomp::{Coverage, Film, Image, LinearRgb};
@@ -54,35 +54,43 @@ pub(crate) struct TriangulateArgs {
 
 impl FilmArgs {
     pub(crate) fn run(&self, global: &GlobalArgs) -> Result<()> {
-        let (path, args) = (&self.photo, &self.options);
-        let photo: Image<LinearRgb> = io::read(path)?;
-        let inside = args.object_mask(path, &photo)?;
-        let plate = args.screen_plate(0, path, &photo, &inside)?;
-        let options = from_overrides("film", &args.settings)?;
-        let found = film(&photo, &plate, &inside, &options).map_err(|e| e.in_file(path))?;
-        report_diagnostics(path.display(), &found.diagnostics);
+        let args = &self.options;
+        let photo: Image<LinearRgb> = io::read(&self.photo)?;
+        let inside = args.object_mask(&self.photo, &photo)?;
+        let plate = args.screen_plate(0, &self.photo, &photo, &inside)?;
+        let found = self.solve(&photo, &plate, &inside)?;
         args.write_film(&found.film, &found.transmittance)?;
         args.write_extras(&plate, &found.uncertainty)?;
         global.print_written(&args.output, describe_plate(&plate, found.flat));
         Ok(())
     }
+
+    fn solve(
+        &self,
+        photo: &Image<LinearRgb>,
+        plate: &ScreenPlate,
+        inside: &Image<Coverage>,
+    ) -> Result<FilmMatte> {
+        let options = from_overrides("film", &self.options.settings)?;
+        let found = film(photo, plate, inside, &options).map_err(|e| e.in_file(&self.photo))?;
+        report_diagnostics(self.photo.display(), &found.diagnostics);
+        Ok(found)
+    }
 }
 
 impl TriangulateArgs {
     pub(crate) fn run(&self, global: &GlobalArgs) -> Result<()> {
-        let (paths, args) = (&self.photos, &self.options);
-        let photos: Vec<Image<LinearRgb>> = paths.iter().map(io::read).collect::<Result<_, _>>()?;
-        let inside = args.object_mask(&paths[0], &photos[0])?;
+        let args = &self.options;
+        let photos = self.photos.iter().map(io::read);
+        let photos: Vec<Image<LinearRgb>> = photos.collect::<Result<_, _>>()?;
+        let inside = args.object_mask(&self.photos[0], &photos[0])?;
         let plates = self.screen_plates(&photos, &inside)?;
         let found = self.triangulate(&photos, &plates, &inside)?;
-        report_diagnostics(paths[0].display(), &found.diagnostics);
         args.write_film(&found.film, &found.transmittance)?;
         args.write_extras(&plates[0], &found.uncertainty)?;
         let (plate, residual) = (describe_plate(&plates[0], found.flat), found.residual);
-        global.print_written(
-            &args.output,
-            format_args!("{plate}; residual {residual:.4}"),
-        );
+        let what = format!("{plate}; residual {residual:.4}");
+        global.print_written(&args.output, what);
         Ok(())
     }
 
@@ -94,7 +102,9 @@ impl TriangulateArgs {
     ) -> Result<Triangulated> {
         let shots: Vec<_> = photos.iter().zip(plates).collect();
         let options = from_overrides("film", &self.options.settings)?;
-        Ok(triangulate(&shots, inside, &options)?)
+        let found = triangulate(&shots, inside, &options)?;
+        report_diagnostics(self.photos[0].display(), &found.diagnostics);
+        Ok(found)
     }
 
     fn screen_plates(

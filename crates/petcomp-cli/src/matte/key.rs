@@ -102,12 +102,9 @@ pub(crate) fn run(args: &KeyArgs) -> Result<()> {
     let options = args.options()?;
     let plate: Option<Image<LinearRgb>> = read_optional(&args.plate)?;
     let input = args.read_input(plate.as_ref())?;
-    let screen = plate.as_ref().map(Screen::Plate);
-    let keying = input.keying(screen.unwrap_or(Screen::Color(args.screen.unwrap_or_default())));
+    let color = Screen::Color(args.screen.unwrap_or_default());
+    let keying = input.keying(plate.as_ref().map_or(color, Screen::Plate));
     let keyed = keying.run(&options)?;
-    if keyed.deviations != Deviations::default() {
-        log::warn!("{}: {}", args.input.display(), keyed.deviations);
-    }
     args.write_keyed(&keyed)?;
     if let Some(path) = &args.edges {
         write_picture(path, &keying.edges(&options)?)?;
@@ -124,6 +121,9 @@ impl KeyArgs {
     }
 
     fn write_keyed(&self, keyed: &Keyed) -> Result<()> {
+        if keyed.deviations != Deviations::default() {
+            log::warn!("{}: {}", self.input.display(), keyed.deviations);
+        }
         write_picture(&self.output, &keyed.cutout)?;
         write_optional(&self.matte, &keyed.matte)
     }

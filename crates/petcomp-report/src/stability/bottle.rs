@@ -3,11 +3,9 @@
 
 use crate::flags::{bounding_sides, is_right, largest_difference};
 use crate::matte::normal;
-use petcomp::LinearRgb;
-use petcomp::Result;
 use petcomp::color::{linear_to_srgb, srgb_to_linear};
 use petcomp::matte::{CutOut, CutOutOptions, cut_out};
-use petcomp::{Coverage, Diagnostic, Image, Mask};
+use petcomp::{Coverage, Diagnostic, Image, LinearRgb, Mask, Result};
 
 pub(super) const GREEN: LinearRgb = LinearRgb::new(0.04, 0.4, 0.08);
 pub(super) const BLUE: LinearRgb = LinearRgb::new(0.03, 0.06, 0.35);
@@ -157,6 +155,7 @@ impl BottlePhoto {
             .find_map(|(u, v)| bottle_at(u, v, self.cap))
     }
 
+    /// What the uneven lamp leaves of the light at a point.
     fn lamp_falloff(&self, x: f64, y: f64) -> f32 {
         let [w, h] = self.extent();
         1.0 - self.uneven * ((0.7 * x / w + 0.3 * y / h) as f32)

@@ -2,14 +2,11 @@
 
 use super::staged::{camera_above, rendered};
 use super::{HardCase, Outcome};
-use petcomp::Image;
-use petcomp::Result;
 use petcomp::composite::{finish, frame};
 use petcomp::label::{LabelOptions, label};
 
 use petcomp::scene::{PostProcess, Shot};
-use petcomp::{DeepImage, DeepSample};
-use petcomp::{Depth, Film, LinearRgb, ObjectId, PremulRgba};
+use petcomp::{DeepImage, DeepSample, Depth, Film, Image, LinearRgb, ObjectId, PremulRgba, Result};
 use std::sync::Arc;
 
 pub(super) fn cases() -> Result<Vec<HardCase>> {

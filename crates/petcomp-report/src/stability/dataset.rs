@@ -12,9 +12,7 @@ use petcomp::dataset::{
 use petcomp::io;
 use petcomp::label::{LabelOptions, label};
 use petcomp::scene::{Background, CameraSource, Range, Recipe, Scene, Shot};
-use petcomp::{DeepImage, DeepSample};
-use petcomp::{Error, Result};
-use petcomp::{LinearRgb, ObjectId};
+use petcomp::{DeepImage, DeepSample, Error, LinearRgb, ObjectId, Result};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
@@ -126,7 +124,7 @@ impl TestDataset {
     /// Images and rows of labels.
     fn counts(&self) -> Result<(usize, usize)> {
         let checked = check(self.path())?;
-        Ok((checked.images as usize, checked.rows.iter().sum()))
+        Ok((checked.images, checked.rows.iter().sum()))
     }
 
     fn picture(&self, k: u64) -> PathBuf {

@@ -2,10 +2,8 @@
 
 use super::staged::temporary_folder;
 use super::{HardCase, Outcome, memory};
-use petcomp::Image;
 use petcomp::io::{self, Bits, ReadOptions, WriteOptions, exr};
-use petcomp::{Coverage, LinearRgb, PremulRgba};
-use petcomp::{Error, Result};
+use petcomp::{Coverage, Error, Image, LinearRgb, PremulRgba, Result};
 use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;

@@ -3,8 +3,7 @@
 use super::{HardCase, Outcome};
 use petcomp::matte::key::Profile;
 use petcomp::matte::{KeyOptions, Keyed, Keying, Screen, key};
-use petcomp::{Coverage, LinearRgb, PremulRgba};
-use petcomp::{Image, Result};
+use petcomp::{Coverage, Image, LinearRgb, PremulRgba, Result};
 
 const GREEN: LinearRgb = LinearRgb::new(0.1, 0.75, 0.2);
 

@@ -2,14 +2,11 @@
 
 use super::staged::{camera_above, card, grey, level_card, one_deep_pixel, rendered, tilted};
 use super::{HardCase, Outcome};
-use petcomp::Image;
-use petcomp::Result;
 use petcomp::geom::BBox;
 use petcomp::geom::Point2;
 use petcomp::label::{AmodalBox, LabelOptions, ObjectLabel, RleMask, label};
 use petcomp::scene::{Card, Shot};
-use petcomp::{DeepImage, DeepSample};
-use petcomp::{Depth, LinearRgb, ObjectId, PremulRgba};
+use petcomp::{DeepImage, DeepSample, Depth, Image, LinearRgb, ObjectId, PremulRgba, Result};
 use std::f64::consts::FRAC_PI_2;
 
 /// Objects in one pixel, or in one stack.

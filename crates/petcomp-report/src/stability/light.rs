@@ -3,13 +3,11 @@
 use super::render::largest;
 use super::staged::{camera_above, empty_scene, lamp};
 use super::{HardCase, Outcome};
-use petcomp::Image;
-use petcomp::LinearRgb;
-use petcomp::Result;
 use petcomp::asset::Panorama;
 use petcomp::geom::{Point3, Vector3};
 use petcomp::light::{expose, irradiance, match_light_tint, plate_noise, radiance, sky_pieces};
 use petcomp::scene::{AreaLight, EnvironmentMap, Exposure, LightShape, LightTint, Noise, Scene};
+use petcomp::{Image, LinearRgb, Result};
 use std::f64::consts::PI;
 use std::sync::Arc;
 

@@ -3,13 +3,11 @@
 use super::bottle::{BLUE, BottlePhoto, GREEN, OutlineAccuracy, review_messages};
 use super::{HardCase, Outcome, keyer};
 use crate::matte::{GOOD_BOX_PX, GOOD_IOU};
-use petcomp::Image;
-use petcomp::Result;
 use petcomp::matte::{
     CutOut, CutOutOptions, FilmMatte, FilmOptions, PlateOptions, ScreenPlate, TriangulateOptions,
     Triangulated, cut_out, film, triangulate,
 };
-use petcomp::{Coverage, Diagnostic, LinearRgb};
+use petcomp::{Coverage, Diagnostic, Image, LinearRgb, Result};
 
 pub(super) fn cases() -> Result<Vec<HardCase>> {
     let mut cases = keyer::cases();

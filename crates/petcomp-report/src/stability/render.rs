@@ -6,15 +6,11 @@ use super::staged::{
 };
 use super::{HardCase, Outcome, memory, render_light};
 use crate::render::GOOD;
-use petcomp::Image;
-use petcomp::Quality;
-use petcomp::Result;
 use petcomp::composite;
 use petcomp::geom::UnitQuaternion;
 use petcomp::render::{RenderOptions, interreflect, render, render_reference};
 use petcomp::scene::{Card, Shot};
-use petcomp::{DeepImage, DeepSample};
-use petcomp::{Film, LinearRgb, PremulRgba};
+use petcomp::{DeepImage, DeepSample, Film, Image, LinearRgb, PremulRgba, Quality, Result};
 use std::f64::consts::FRAC_PI_2;
 
 /// Layers of film in a pixel.

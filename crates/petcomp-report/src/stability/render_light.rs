@@ -9,8 +9,7 @@ use petcomp::geom::{Point3, UnitQuaternion, Vector3};
 use petcomp::light::{frame, polygon_irradiance, radiance};
 use petcomp::render::{RenderOptions, render};
 use petcomp::scene::{AreaLight, Card, EnvironmentMap, Shot};
-use petcomp::{Image, Result};
-use petcomp::{LinearRgb, PremulRgba};
+use petcomp::{Image, LinearRgb, PremulRgba, Result};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::sync::Arc;
 

@@ -7,9 +7,7 @@ use petcomp::render::{RenderOptions, render};
 use petcomp::scene::{
     AreaLight, CameraSource, Card, Exposure, Grade, LightShape, Scene, Shot, Surface,
 };
-use petcomp::{DeepImage, DeepSample, Image};
-use petcomp::{Error, Result};
-use petcomp::{LinearRgb, ObjectId, PremulRgba};
+use petcomp::{DeepImage, DeepSample, Error, Image, LinearRgb, ObjectId, PremulRgba, Result};
 use std::f64::consts::PI;
 use std::sync::Arc;
 use tempfile::TempDir;

@@ -4,8 +4,7 @@ use super::super::Trial;
 use super::sensor::noisy;
 use crate::matte::truth::Known;
 use petcomp::filter;
-use petcomp::{Coverage, LinearRgb};
-use petcomp::{Image, Roi};
+use petcomp::{Coverage, Image, LinearRgb, Roi};
 use std::ops::Range;
 
 /// A photo whose left border cuts off a share of the object's width.

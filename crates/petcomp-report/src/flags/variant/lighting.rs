@@ -2,9 +2,8 @@
 
 use super::scaled;
 use crate::matte::truth::Known;
-use petcomp::Image;
 use petcomp::filter;
-use petcomp::{Coverage, LinearRgb};
+use petcomp::{Coverage, Image, LinearRgb};
 
 /// How far a point lies along a direction: -1 and 1 at the edges of the picture.
 struct Gradient {

@@ -1,8 +1,7 @@
 //! What the screen is, and what lies on it.
 
 use crate::matte::truth::Known;
-use petcomp::LinearRgb;
-use petcomp::{Image, Mask};
+use petcomp::{Image, LinearRgb, Mask};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use std::f64::consts::TAU;

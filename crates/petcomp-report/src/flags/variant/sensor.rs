@@ -1,10 +1,9 @@
 //! What a camera makes of light: noise and codes.
 
 use crate::matte::normal;
-use petcomp::Image;
-use petcomp::LinearRgb;
 use petcomp::color::{decode_srgb8, encode_srgb8, linear_to_srgb, srgb_to_linear};
 use petcomp::io;
+use petcomp::{Image, LinearRgb};
 
 /// A value as a camera of 8 bits stores it.
 pub(super) fn coded(p: LinearRgb) -> LinearRgb {
