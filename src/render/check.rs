@@ -2,7 +2,7 @@
 
 use crate::asset::Texture;
 use crate::error::{Error, Result};
-use crate::pixel::Film;
+use crate::pixel::{Film, ObjectId};
 use crate::scene::{AreaLight, Card, EnvironmentMap, Shot};
 
 /// Is a shot something that can be rendered?
@@ -29,14 +29,12 @@ pub fn check(shot: &Shot) -> Result<()> {
 
 fn check_plate(shot: &Shot) -> Result<()> {
     let [width, height] = shot.camera.image.map(|side| side as usize);
-    match &shot.plate {
-        Some(plate) if plate.size() != (width, height) => {
-            let (w, h) = plate.size();
-            let what = format!("{w} x {h} pixels, expected {width} x {height}");
-            Err(Error::value("plate", what))
-        }
-        _ => Ok(()),
+    let (w, h) = shot.plate.as_ref().map_or((width, height), |p| p.size());
+    if (w, h) == (width, height) {
+        return Ok(());
     }
+    let what = format!("{w} x {h} pixels, expected {width} x {height}");
+    Err(Error::value("plate", what))
 }
 
 fn check_light(i: usize, light: &AreaLight) -> Result<()> {
@@ -77,15 +75,20 @@ fn check_map(map: &EnvironmentMap) -> Result<()> {
 }
 
 fn check_ids(cards: &[Card]) -> Result<()> {
-    let mut ids: Vec<_> = cards.iter().map(|card| card.id).collect();
-    ids.sort_unstable();
-    match ids.windows(2).find(|pair| pair[0] == pair[1]) {
-        Some(twice) => Err(Error::value(
-            "cards",
-            format!("id {} is used twice, expected one card each", twice[0].0),
-        )),
+    match repeated_id(cards) {
+        Some(id) => {
+            let what = format!("id {} is used twice, expected one card each", id.0);
+            Err(Error::value("cards", what))
+        }
         None => Ok(()),
     }
+}
+
+fn repeated_id(cards: &[Card]) -> Option<ObjectId> {
+    let mut ids: Vec<_> = cards.iter().map(|card| card.id).collect();
+    ids.sort_unstable();
+    let pair = ids.windows(2).find(|pair| pair[0] == pair[1])?;
+    Some(pair[0])
 }
 
 fn check_card(card: &Card) -> std::result::Result<(), String> {

@@ -22,13 +22,10 @@ pub(super) type LatticePosition = (u32, f32);
 impl Lattice {
     pub(super) fn new(view: &CameraView, cell: f64) -> Self {
         let pixel_from_node = Matrix3::new(cell, 0.0, -cell, 0.0, cell, -cell, 0.0, 0.0, 1.0);
-        // One pixel beyond the picture's end: sub-samples reach over it.
-        let [width, height] =
-            [view.width, view.height].map(|pixels| ((pixels as f64 + 1.0) / cell) as usize + 3);
         let view = CameraView {
             ray: view.ray * pixel_from_node,
-            width,
-            height,
+            width: node_count(view.width, cell),
+            height: node_count(view.height, cell),
             ..*view
         };
         Self { cell, view }
@@ -49,6 +46,11 @@ impl Lattice {
         let node = (pixel / self.cell + 1.0).max(0.0);
         (node as u32, (node - node.floor()) as f32)
     }
+}
+
+/// Nodes up to one pixel beyond the picture's end: sub-samples reach over it.
+fn node_count(pixels: usize, cell: f64) -> usize {
+    ((pixels as f64 + 1.0) / cell) as usize + 3
 }
 
 /// The two nodes of a lattice of twice the distance around a node, the same one twice where it lies on it.

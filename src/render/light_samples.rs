@@ -70,7 +70,7 @@ impl LightSamples {
         let shining = shot.environment.iter().filter(|map| map.strength != 0.0);
         let pieces =
             shining.flat_map(|map| light::sky_pieces(map, options.ambient_samples, normal));
-        let ambient = LightGroup::ambient(shot.ambient, options.ambient_samples, normal);
+        let ambient = LightGroup::constant(shot, options, normal);
         Self::from_parts(faces, ambient, pieces)
     }
 
@@ -88,7 +88,7 @@ impl LightSamples {
             .environment
             .iter()
             .flat_map(|map| light::sky_cells(map, options.ambient_samples, normal));
-        let ambient = LightGroup::ambient(shot.ambient, options.ambient_samples, normal);
+        let ambient = LightGroup::constant(shot, options, normal);
         let Self { faces, sky } = Self::from_parts(faces, ambient, pieces);
         faces.into_iter().chain(sky).collect()
     }
@@ -124,6 +124,11 @@ impl LightGroup {
             radiance: light::radiance(light),
             samples: samples.collect(),
         }
+    }
+
+    /// The constant environment of a shot.
+    fn constant(shot: &Shot, options: &RenderOptions, normal: &Vector3<f64>) -> Self {
+        Self::ambient(shot.ambient, options.ambient_samples, normal)
     }
 
     /// A constant environment, from directions around a normal.

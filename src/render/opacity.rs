@@ -114,14 +114,15 @@ impl OpacityLevel {
         image: &Image<P>,
         channels: &[&dyn Fn(P) -> f32],
     ) -> Self {
+        let (width, height) = bordered_size(image.size());
         let planes = channels
             .iter()
             .map(|channel| bordered_plane(image, channel));
         let mut pixels = image.pixels().iter();
         Self {
             grid,
-            width: image.width() + 2 * BORDER_TEXELS,
-            height: image.height() + 2 * BORDER_TEXELS,
+            width,
+            height,
             planes: planes.collect(),
             opaque: pixels.all(|&p| channels.iter().all(|channel| channel(p) == 1.0)),
         }
@@ -149,13 +150,17 @@ impl OpacityLevel {
 
 /// One channel of an image, with a border of zeros.
 fn bordered_plane<P: Copy>(image: &Image<P>, channel: impl Fn(P) -> f32) -> Vec<f32> {
-    let width = image.width() + 2 * BORDER_TEXELS;
-    let mut plane = vec![0.0; width * (image.height() + 2 * BORDER_TEXELS)];
+    let (width, height) = bordered_size(image.size());
+    let mut plane = vec![0.0; width * height];
     for (y, row) in image.rows().enumerate() {
         let line = &mut plane[(y + BORDER_TEXELS) * width + BORDER_TEXELS..][..row.len()];
         line.iter_mut().zip(row).for_each(|(a, &p)| *a = channel(p));
     }
     plane
+}
+
+fn bordered_size((width, height): (usize, usize)) -> (usize, usize) {
+    (width + 2 * BORDER_TEXELS, height + 2 * BORDER_TEXELS)
 }
 
 /// Dense since it is the innermost loop of shadows: compiled as one piece for each set of vector instructions, lanes apart.

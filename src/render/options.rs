@@ -81,17 +81,20 @@ impl RenderOptions {
 
     /// The same with every number inside the range that the arithmetic bears: at least one sample, cells of 0.25 to 16 pixels.
     pub(super) fn clamped(self) -> Self {
-        let cell_px = if self.cell_px.is_finite() {
-            self.cell_px.clamp(0.25, 16.0)
-        } else {
-            1.0
-        };
         Self {
             subsamples: self.subsamples.clamp(1, 64),
             light_samples: self.light_samples.clamp(1, 64),
             ambient_samples: self.ambient_samples.clamp(1, 4096),
-            cell_px,
+            cell_px: clamped_cell(self.cell_px),
         }
+    }
+}
+
+fn clamped_cell(cell_px: f64) -> f64 {
+    if cell_px.is_finite() {
+        cell_px.clamp(0.25, 16.0)
+    } else {
+        1.0
     }
 }
 

@@ -43,9 +43,13 @@ fn filter_quantile(share: f64) -> f64 {
 /// Weight of the window left of `s`; 0 at its left end, 1 at its right end.
 fn cumulative_weight(s: f64) -> f64 {
     let t = s / (2.0 * WINDOW_RADIUS_PX) + 0.5;
-    let [first, second, third] = [1, 2, 3]
-        .map(|k: usize| WINDOW_TERMS[k] * libm::sin(TAU * k as f64 * t) / (TAU * k as f64));
+    let [first, second, third] = [1, 2, 3].map(|k| integrated_term(k, t));
     t + (first + second + third) / WINDOW_TERMS[0]
+}
+
+/// The integral of a cosine of the window up to `t`.
+fn integrated_term(k: usize, t: f64) -> f64 {
+    WINDOW_TERMS[k] * libm::sin(TAU * k as f64 * t) / (TAU * k as f64)
 }
 
 #[cfg(test)]

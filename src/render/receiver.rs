@@ -156,8 +156,7 @@ impl<'a> LightingContext<'a> {
         let fine = self.surface_on(&self.fine, faces)?;
         let coarse = self.surface_on(&self.coarse, sky)?;
         let fine = fine.grown_around(&coarse, &self.fine.view);
-        let is_seen = fine.rows.len() > 1 && fine.columns.len() > 1;
-        is_seen.then_some(ReceiverIrradiance {
+        fine.has_cells().then_some(ReceiverIrradiance {
             fine,
             coarse,
             relative: true,
@@ -303,6 +302,11 @@ impl Receiver {
             self.gather_group(group, j, requested, buffers);
         }
         work::add_all(std::mem::take(&mut buffers.counts).into_work());
+    }
+
+    /// Whether there are two nodes along each side.
+    fn has_cells(&self) -> bool {
+        self.rows.len() > 1 && self.columns.len() > 1
     }
 
     /// With the nodes that a receiver of twice the distance needs around its own, as far as the picture goes.

@@ -282,10 +282,8 @@ impl CardMap {
         depth: Vector3<f64>,
         opacity: Arc<OpacityLevel>,
     ) -> ProjectedShadow {
-        let Self { u, v, w, below } = self;
-        let mut sides = quad_sides(&u, &v, &w, opacity.grid.reach).to_vec();
-        sides[4] = below;
-        sides.push(depth);
+        let sides = self.sides(depth, opacity.grid.reach);
+        let Self { u, v, w, .. } = self;
         let inset = opacity.opaque_inset();
         let inside = inset.map(|inset| quad_sides(&u, &v, &w, inset.map(|by| -by)));
         let [u, v] = opacity.grid.texel_rows(&u, &v, &w);
@@ -299,6 +297,14 @@ impl CardMap {
             opacity: Some(opacity),
             inside,
         }
+    }
+
+    /// Where the shadow ends: at the card's sides, below the card, and in front of the eye.
+    fn sides(&self, depth: Vector3<f64>, reach: [f64; 2]) -> Vec<Vector3<f64>> {
+        let mut sides = quad_sides(&self.u, &self.v, &self.w, reach).to_vec();
+        sides[4] = self.below;
+        sides.push(depth);
+        sides
     }
 }
 

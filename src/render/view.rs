@@ -154,6 +154,12 @@ impl CameraView {
         in_front.then(|| seen.map(|p| p / p.z))
     }
 
+    /// Picture position `(x, y, 1)` of a world point; the middle where it is at or behind the eye.
+    fn position_of(&self, point: &Vector3<f64>) -> Vector3<f64> {
+        let seen = self.project_points(&[*point]);
+        seen.map_or(self.middle_px(), |[p]| p)
+    }
+
     /// Picture position `(x, y, 1)` of the middle.
     fn middle_px(&self) -> Vector3<f64> {
         Vector3::new(0.5 * self.width as f64, 0.5 * self.height as f64, 1.0)
@@ -262,8 +268,7 @@ impl ProjectedPlane {
     /// Side of the square that a pixel (or lattice cell) covers on the plane's plane, metres, where it shows `target`; in
     /// the middle of the picture where that is behind the eye.
     pub(super) fn cell_metres(&self, view: &CameraView, target: &Vector3<f64>) -> f64 {
-        let seen = view.project_points(&[*target]);
-        let p = seen.map_or(view.middle_px(), |[p]| p);
+        let p = view.position_of(target);
         let w = self.w.dot(&p).max(self.height / HORIZON_M);
         let point = self.point * p / w;
         let [along_x, along_y] =
