@@ -228,6 +228,12 @@ impl LinearRgb {
         0.2126 * self.r + 0.7152 * self.g + 0.0722 * self.b
     }
 
+    /// Red, green and blue.
+    #[inline(always)]
+    pub fn channels(self) -> [f32; 3] {
+        [self.r, self.g, self.b]
+    }
+
     /// The largest channel.
     #[inline(always)]
     pub fn max_channel(self) -> f32 {

@@ -107,9 +107,13 @@ fn by_angle(c: &[Point2<f64>; 4]) -> [usize; 4] {
     let angles = c.map(|p| libm::atan2(p.y - mean.y, p.x - mean.x));
     let mut order = [0, 1, 2, 3];
     order.sort_by(|&i: &usize, &j: &usize| angles[i].total_cmp(&angles[j]));
-    let first = order.iter().position(|&i| i == 0).unwrap_or(0);
-    order.rotate_left(first);
-    order
+    starting_at_zero(order)
+}
+
+fn starting_at_zero(mut ring: [usize; 4]) -> [usize; 4] {
+    let first = ring.iter().position(|&i| i == 0).unwrap_or(0);
+    ring.rotate_left(first);
+    ring
 }
 
 /// Ordered corners must be convex, and none within noise of the line of two others.

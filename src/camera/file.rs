@@ -366,7 +366,7 @@ impl SigmaRecord {
         Self {
             ln_f: finite(sigma.ln_focal),
             tilt_deg: finite(sigma.tilt.to_degrees()),
-            center_m: [0, 1, 2].map(|i| finite(sigma.center[(i, i)].max(0.0).sqrt())),
+            center_m: deviations(&sigma.center).map(finite),
             height_px: finite(sigma.height_px),
             height_ref_m: sigma.reference_height,
             principal_point_px: finite(sigma.principal_px),
@@ -374,6 +374,11 @@ impl SigmaRecord {
             covariance: finite_rows(&sigma.covariance),
         }
     }
+}
+
+/// The standard deviations of a covariance.
+fn deviations(covariance: &Matrix3<f64>) -> [f64; 3] {
+    [0, 1, 2].map(|i| covariance[(i, i)].max(0.0).sqrt())
 }
 
 fn finite_rows(square: &Square) -> Vec<Vec<Option<f64>>> {

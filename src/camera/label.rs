@@ -206,22 +206,12 @@ impl Label {
     /// A label of a rectangle of `size` metres, seen at `corners_px` (from the top left, clockwise) in a picture of
     /// `image` pixels; nothing else is known.
     pub fn new(image: [u32; 2], corners_px: [[f64; 2]; 4], size: [f64; 2]) -> Self {
-        let [width, height] = image;
         Self {
             format: LabelFormat::PlaneLabel,
             version: 1,
-            image: LabelImage {
-                width,
-                height,
-                ..Default::default()
-            },
+            image: LabelImage::unnamed(image),
             pixel_origin: PixelOrigin::Corner,
-            surface: LabelSurface {
-                width_m: Some(size[0]),
-                height_m: Some(size[1]),
-                corners_px: Some(corners_px),
-                ..Default::default()
-            },
+            surface: LabelSurface::unnamed(corners_px, size),
             camera: LabelCamera::default(),
             points: Vec::new(),
             markers: None,
@@ -262,7 +252,26 @@ impl Label {
     }
 }
 
+impl LabelImage {
+    fn unnamed([width, height]: [u32; 2]) -> Self {
+        Self {
+            width,
+            height,
+            ..Self::default()
+        }
+    }
+}
+
 impl LabelSurface {
+    fn unnamed(corners_px: [[f64; 2]; 4], [width, height]: [f64; 2]) -> Self {
+        Self {
+            width_m: Some(width),
+            height_m: Some(height),
+            corners_px: Some(corners_px),
+            ..Self::default()
+        }
+    }
+
     /// The length of a side is stated.
     pub(crate) fn has_side(&self) -> bool {
         self.width_m.is_some() || self.height_m.is_some()

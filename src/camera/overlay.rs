@@ -186,11 +186,13 @@ fn camera_text(solution: &Solution) -> String {
 fn grid(size: [f64; 2]) -> impl Iterator<Item = [Point3<f64>; 2]> {
     let step = grid_step(size);
     let [x, y] = size.map(|s| s / 2.0);
-    let upright = multiples(step, x).map(move |at| [[at, -y], [at, y]]);
-    let level = multiples(step, y).map(move |at| [[-x, at], [x, at]]);
-    upright
-        .chain(level)
-        .map(|ends| ends.map(|[x, y]| Point3::new(x, y, 0.0)))
+    let upright = multiples(step, x).map(move |at| [on_surface(at, -y), on_surface(at, y)]);
+    let level = multiples(step, y).map(move |at| [on_surface(-x, at), on_surface(x, at)]);
+    upright.chain(level)
+}
+
+fn on_surface(x: f64, y: f64) -> Point3<f64> {
+    Point3::new(x, y, 0.0)
 }
 
 /// Multiples of a step up to a distance from zero.
@@ -288,9 +290,11 @@ impl OverlayDrawing {
         }
         let eigen = SymmetricEigen::new(*covariance);
         let sigmas = eigen.eigenvalues.map(|v| v.max(0.0).sqrt());
-        for i in 0..ELLIPSE_POINTS {
-            let ends = [i, i + 1].map(|i| center + eigen.eigenvectors * on_ellipse(&sigmas, i));
-            self.stroke(ends, LABEL_COLOR, self.line_px);
+        let points = (0..=ELLIPSE_POINTS)
+            .map(|i| center + eigen.eigenvectors * on_ellipse(&sigmas, i))
+            .collect::<Vec<_>>();
+        for ends in points.windows(2) {
+            self.stroke([ends[0], ends[1]], LABEL_COLOR, self.line_px);
         }
     }
 

@@ -330,15 +330,22 @@ pub(crate) fn with_photo(mut label: Label, path: impl AsRef<Path>) -> Result<Lab
     let Some(photo) = photo_of(&label, path) else {
         return Ok(label);
     };
-    let folder = path.parent().unwrap_or(Path::new(""));
-    io::inside(folder, &label.image.file).map_err(|e| e.within("image").in_file(path))?;
+    check_inside(&label, path)?;
     let header = io::read_header(&photo)?;
     check_photo_size(&label, &photo, &header).map_err(|e| e.in_file(path))?;
     apply_exif(&mut label, &header);
     Ok(label)
 }
 
-/// A photo has the size that its label says.
+/// Refuses a photo that is reached through a link out of the folder of its label.
+fn check_inside(label: &Label, path: &Path) -> Result<()> {
+    let folder = path.parent().unwrap_or(Path::new(""));
+    io::inside(folder, &label.image.file)
+        .map(drop)
+        .map_err(|e| e.within("image").in_file(path))
+}
+
+/// Checks that a photo has the size that its label states.
 fn check_photo_size(label: &Label, photo: &Path, header: &io::Header) -> Result<()> {
     let (w, h, [width, height]) = (header.width, header.height, label.image_size());
     if [w, h] == [width as usize, height as usize] {

@@ -56,8 +56,7 @@ impl Residuals {
     fn cost(&self, state: &State) -> Option<f64> {
         let mut cost = self.priors.cost(state);
         for observation in &self.observations {
-            let seen = state.project(&observation.point, observation.rigid)?;
-            cost += ((seen - observation.seen) * observation.weight).norm_squared();
+            cost += observation.cost(state)?;
         }
         if let Some(height) = self.priors.ln_height {
             cost += height.cost(state.ln_height()?.0);
@@ -116,6 +115,14 @@ impl Residuals {
             }
         }
         Some(descent.minimum())
+    }
+}
+
+impl Observation {
+    #[inline]
+    fn cost(&self, state: &State) -> Option<f64> {
+        let seen = state.project(&self.point, self.rigid)?;
+        Some(((seen - self.seen) * self.weight).norm_squared())
     }
 }
 

@@ -45,9 +45,7 @@ impl Problem {
 
     /// The closed form, where it stands above the surface, after at most `max_iterations` iterations.
     pub(crate) fn closed_form(&self, max_iterations: usize) -> Option<SearchResult> {
-        let is_fixed = self.residuals.priors.ln_focal.is_fixed();
-        let focal = self.closed_form_focal().filter(|_| !is_fixed);
-        let start = self.start(focal.unwrap_or_else(|| self.prior_focal()));
+        let start = self.start(self.closed_form_or_prior_focal());
         let best = self
             .residuals
             .refine_for(start, f64::INFINITY, max_iterations)
@@ -79,6 +77,12 @@ impl Problem {
             Some(prior / 2.0),
             Some(prior * 3.0),
         ]
+    }
+
+    fn closed_form_or_prior_focal(&self) -> f64 {
+        let is_fixed = self.residuals.priors.ln_focal.is_fixed();
+        let measured = self.closed_form_focal().filter(|_| !is_fixed);
+        measured.unwrap_or_else(|| self.prior_focal())
     }
 
     fn prior_focal(&self) -> f64 {

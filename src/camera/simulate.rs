@@ -190,7 +190,8 @@ impl Scenario {
         dice: &mut Dice,
     ) -> Vector3<f64> {
         let turned = corner_points(self.size).map(|p| rotation * p.coords);
-        let distance = self.distance(&turned, Vector2::from(self.image.map(f64::from)));
+        let image = Vector2::from(self.image.map(f64::from));
+        let distance = self.distance(&turned, image);
         let bounds = self.extent(&turned, distance);
         let normal: Vector3<f64> = rotation.matrix().column(2).into();
         let center = self.center_px(lens, bounds, dice, |center| {

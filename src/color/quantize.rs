@@ -79,7 +79,7 @@ fn decode_with(table: &[f32; 256], code: Srgb8) -> LinearRgb {
 
 #[inline(always)]
 fn encode_with(encoder: &Encoder<CELL_BITS8>, color: LinearRgb) -> Srgb8 {
-    let [r, g, b] = <[f32; 3]>::from(color).map(|light| encoder.code(light) as u8);
+    let [r, g, b] = color.channels().map(|light| encoder.code(light) as u8);
     Srgb8 { r, g, b }
 }
 

@@ -65,15 +65,16 @@ impl BackgroundPhoto {
     }
 
     fn open(labelled: &LabelledPhoto, seen: &PhotoCamera, image: [u32; 2]) -> Result<Self> {
-        let taken = labelled.label.image_size();
-        let kept = middle_part(taken, image);
         let photo = photo_path(labelled)?;
         camera::check_distance(&seen.camera).map_err(|e| e.in_file(&labelled.source))?;
+        let taken = labelled.label.image_size();
+        let kept = middle_part(taken, image);
+        let camera = cropped(seen.camera, kept).resized(image);
         let mut background = Self {
             background: Background {
                 name: labelled.name.clone(),
                 size: seen.size,
-                camera: CameraSource::Known(cropped(seen.camera, kept).resized(image)),
+                camera: CameraSource::Known(camera),
             },
             label: labelled.source.clone(),
             photo,
@@ -83,8 +84,7 @@ impl BackgroundPhoto {
             image,
             plate: OnceLock::new(),
         };
-        let shape_note = background.shape_note();
-        background.notes.extend(shape_note);
+        background.notes.extend(background.shape_note());
         Ok(background)
     }
 

@@ -54,11 +54,10 @@ impl DatasetCounts {
     /// Counts what the lines of a plan's journal say; `made` of the `asked` images are this run's.
     pub(crate) fn new(lines: &[JournalLine], plan: &Plan, asked: u64, made: u64) -> Self {
         let classes = ClassCount::for_classes(&plan.classes, lines);
-        let val = lines.iter().filter(|line| line.part == Part::Val);
         Self {
             asked,
             images: lines.len() as u64,
-            val: val.count() as u64,
+            val: sum_of(lines, |line| u32::from(line.part == Part::Val)),
             made,
             objects: classes.iter().map(|c| c.objects).sum(),
             labelled: classes.iter().map(|c| c.labelled).sum(),

@@ -100,22 +100,24 @@ type Channel<P> = (&'static str, fn(&P) -> f32);
 
 /// The picture, its depth and its shadows.
 fn picture_channels(frame: &Image<PremulRgba>, deep: &DeepImage) -> Vec<NamedChannel> {
-    let color: [Channel<PremulRgba>; 4] = [
-        ("R", |p| p.r),
-        ("G", |p| p.g),
-        ("B", |p| p.b),
-        ("A", |p| p.a),
-    ];
-    let shadow: [Channel<LinearRgb>; 3] = [
-        ("shadow.R", |s| s.r),
-        ("shadow.G", |s| s.g),
-        ("shadow.B", |s| s.b),
-    ];
-    let mut channels = channels_of(frame, &color);
+    let mut channels = channels_of(frame, &COLOR_CHANNELS);
     channels.push(("Z".into(), value_per_pixel(deep, nearest)));
-    channels.extend(channels_of(deep.shadow(), &shadow));
+    channels.extend(channels_of(deep.shadow(), &SHADOW_CHANNELS));
     channels
 }
+
+const COLOR_CHANNELS: [Channel<PremulRgba>; 4] = [
+    ("R", |p| p.r),
+    ("G", |p| p.g),
+    ("B", |p| p.b),
+    ("A", |p| p.a),
+];
+
+const SHADOW_CHANNELS: [Channel<LinearRgb>; 3] = [
+    ("shadow.R", |s| s.r),
+    ("shadow.G", |s| s.g),
+    ("shadow.B", |s| s.b),
+];
 
 fn channels_of<P: Copy>(image: &Image<P>, channels: &[Channel<P>]) -> Vec<NamedChannel> {
     let channels = channels.iter();

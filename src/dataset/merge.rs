@@ -106,13 +106,13 @@ impl ShardedDataset {
         for (folder, (document, share)) in folders.iter().zip(&opened) {
             check_same_dataset((first, shard.of, *count), (document, share), folder)?;
         }
-        let shares: Vec<Shard> = opened.iter().map(|(_, share)| share.shard).collect();
-        check_complete(folders, &shares, shard.of)?;
-        Ok(Self {
+        let dataset = Self {
             document: first.as_object().cloned().unwrap_or_default(),
             count: *count,
-            shares,
-        })
+            shares: opened.iter().map(|(_, share)| share.shard).collect(),
+        };
+        check_complete(folders, &dataset.shares, shard.of)?;
+        Ok(dataset)
     }
 
     /// The lines of all journals by number, each with its shard's folder.
@@ -145,11 +145,15 @@ fn check_complete(folders: &[PathBuf], shares: &[Shard], of: u64) -> Result<()> 
             return Err(Error::file(&folders[i], what));
         }
     }
-    let Some(index) = (1..=of).find(|index| !places.contains_key(index)) else {
-        return Ok(());
-    };
+    match (1..=of).find(|index| !places.contains_key(index)) {
+        Some(index) => Err(missing_shard(index, of)),
+        None => Ok(()),
+    }
+}
+
+fn missing_shard(index: u64, of: u64) -> Error {
     let what = format!("shard {index}/{of} is missing");
-    Err(Error::value("shards", what))
+    Error::value("shards", what)
 }
 
 /// Fails on the first field in which a shard's dataset is not the first shard's.

@@ -193,20 +193,16 @@ impl<F: Fn(u64) -> Result<(JournalLine, Times)> + Sync> DatasetRun<'_, F> {
     fn finish(self) -> Result<DatasetCounts> {
         let (plan, count, wall) = (self.plan, self.count, self.began.elapsed());
         let state = self.state.into_inner();
-        let RunState {
-            journal,
-            progress: Progress { made, .. },
-            times,
-            failure,
-        } = state.unwrap_or_else(PoisonError::into_inner);
+        let state = state.unwrap_or_else(PoisonError::into_inner);
+        let made = state.progress.made;
         io::sync(&plan.folder);
-        times.append(&plan.folder, made, wall);
-        let done = journal.count(count, |k| plan.range.contains(k));
+        state.times.append(&plan.folder, made, wall);
+        let done = state.journal.count(count, |k| plan.range.contains(k));
         let asked = plan.range.count_below(count);
         let folder = plan.folder.display();
         let status = format!("{done} of {asked} samples are in {folder}; the same command goes on");
-        let closed = journal.close(count);
-        if let Some((k, error)) = failure {
+        let closed = state.journal.close(count);
+        if let Some((k, error)) = state.failure {
             log::warn!("sample {k} failed; {status}");
             return Err(error);
         }

@@ -269,7 +269,7 @@ impl Comparison {
     /// The line on the pixels over a threshold.
     fn write_share(&self, f: &mut fmt::Formatter<'_>, count: usize, threshold: f32) -> fmt::Result {
         let percent = 100.0 * count as f64 / self.pixels.max(1) as f64;
-        let (percent, threshold) = (general(percent, 3), short(threshold.into()));
+        let (percent, threshold) = (general_format(percent, 3), short(threshold.into()));
         writeln!(f, "  {count} pixels ({percent}%) over {threshold}")
     }
 }
@@ -277,23 +277,23 @@ impl Comparison {
 impl fmt::Display for Largest {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { x, y, channel, .. } = self;
-        let [a, b] = self.values.each_ref().map(|values| listed(values));
+        let [a, b] = self.values.each_ref().map(|values| listed_values(values));
         write!(f, "({x}, {y}, {channel})  values are {a} vs {b}")
     }
 }
 
-fn listed(values: &[f32]) -> String {
+fn listed_values(values: &[f32]) -> String {
     let values: Vec<String> = values.iter().map(f32::to_string).collect();
     values.join(", ")
 }
 
 /// A number to as many digits as `idiff` prints.
 fn short(x: f64) -> String {
-    general(x, 6)
+    general_format(x, 6)
 }
 
 /// A number to some significant digits, in the way of C's `%g`: no zeros at the end, an exponent where it is short.
-fn general(x: f64, digits: usize) -> String {
+fn general_format(x: f64, digits: usize) -> String {
     let scientific = format!("{x:.*e}", digits - 1);
     let Some((mantissa, exponent)) = scientific.split_once('e') else {
         return scientific.to_lowercase();
@@ -346,10 +346,10 @@ mod tests {
             (f64::INFINITY, "inf"),
             (f64::NAN, "nan"),
         ] {
-            assert_eq!(general(x, 6), text);
+            assert_eq!(general_format(x, 6), text);
         }
         assert_eq!(
-            (general(16.6667, 3), general(100.0, 3)),
+            (general_format(16.6667, 3), general_format(100.0, 3)),
             ("16.7".into(), "100".into())
         );
     }

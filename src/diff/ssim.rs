@@ -69,11 +69,11 @@ impl Moments {
     fn new(a: &Image<f32>, b: &Image<f32>) -> Self {
         let window = Window::gaussian();
         Self {
-            a: window.means(a),
-            b: window.means(b),
-            aa: window.means(&a.map(|u| u * u)),
-            bb: window.means(&b.map(|v| v * v)),
-            ab: window.means(&a.zip_map(b, |u, v| u * v)),
+            a: window.windowed_means(a),
+            b: window.windowed_means(b),
+            aa: window.windowed_means(&a.map(|u| u * u)),
+            bb: window.windowed_means(&b.map(|v| v * v)),
+            ab: window.windowed_means(&a.zip_map(b, |u, v| u * v)),
         }
     }
 
@@ -116,7 +116,7 @@ impl Window {
     }
 
     /// Weighted means around every pixel, the border's values going on outside.
-    fn means(&self, plane: &Image<f32>) -> Image<f32> {
+    fn windowed_means(&self, plane: &Image<f32>) -> Image<f32> {
         let (width, height) = plane.size();
         let along_x = Image::from_fn(width, height, |x, y| {
             let row = plane.row(y);
@@ -172,7 +172,7 @@ mod tests {
 
     #[test]
     fn the_mean_of_a_plane_of_one_value_is_that_value() {
-        let means = Window::gaussian().means(&Image::filled(7, 5, 0.3));
+        let means = Window::gaussian().windowed_means(&Image::filled(7, 5, 0.3));
         assert!(means.pixels().iter().all(|v| (v - 0.3).abs() < 1e-6));
     }
 }

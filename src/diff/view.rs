@@ -15,7 +15,7 @@ const MIDDLE_GREY: f32 = 0.18;
 /// # Panics
 /// When the sizes differ.
 pub fn difference<P: NamedChannels>(a: &Image<P>, b: &Image<P>, scale: f32) -> Image<P> {
-    combined(a, b, |u, v| (u - v) * scale)
+    combined_pixels(a, b, |u, v| (u - v) * scale)
 }
 
 /// `|a - b| * scale` of every channel, alpha too: a difference in colour alone is transparent.
@@ -32,12 +32,12 @@ pub fn absolute_difference<P: NamedChannels>(
     let mut pixels = Vec::with_capacity(width * height);
     for band in bands((width, height)) {
         let (a, b) = (a.read_rows(band.clone()), b.read_rows(band));
-        pixels.extend_from_slice(combined(&a, &b, |u, v| (u - v).abs() * scale).pixels());
+        pixels.extend_from_slice(combined_pixels(&a, &b, |u, v| (u - v).abs() * scale).pixels());
     }
     Image::from_vec(width, height, pixels)
 }
 
-fn combined<P: NamedChannels>(
+fn combined_pixels<P: NamedChannels>(
     a: &Image<P>,
     b: &Image<P>,
     f: impl Fn(f32, f32) -> f32 + Sync,
@@ -61,12 +61,12 @@ pub fn triple<P: NamedChannels>(expected: &Image<P>, actual: &Image<P>) -> Image
     Image::from_fn(3 * width, height, |x, y| {
         let [left, right] = [expected, actual].map(|image| pixel(image, x % width, y));
         match x / width {
-            0 => shown(left.as_ref()),
+            0 => shown_over_grey(left.as_ref()),
             1 => shown_difference(
                 left.as_ref().map_or(&[], channels),
                 right.as_ref().map_or(&[], channels),
             ),
-            _ => shown(right.as_ref()),
+            _ => shown_over_grey(right.as_ref()),
         }
     })
 }
@@ -80,7 +80,7 @@ fn channels<P: NamedChannels>(pixel: &P) -> &[f32] {
 }
 
 /// A pixel over the backdrop; black where there is none.
-fn shown<P: NamedChannels>(pixel: Option<&P>) -> LinearRgb {
+fn shown_over_grey<P: NamedChannels>(pixel: Option<&P>) -> LinearRgb {
     match *pixel.map_or(&[][..], channels) {
         [r, g, b, a] => LinearRgb::new(r, g, b) + LinearRgb::grey(MIDDLE_GREY * (1.0 - a)),
         [r, g, b] => LinearRgb::new(r, g, b),

@@ -147,11 +147,11 @@ fn view_of(columns: &Range<usize>, rows: &Range<usize>, [scale_x, scale_y]: [f64
 
 /// A picture as small as it is shown, in the bytes of a file.
 fn page_jpeg(picture: &Image<LinearRgb>) -> Result<Vec<u8>> {
-    io::jpeg_bytes(&to_srgb8(&shrunk(picture)), JPEG_QUALITY)
+    io::jpeg_bytes(&to_srgb8(&shrunk_for_page(picture)), JPEG_QUALITY)
 }
 
 /// A picture no larger than is shown.
-fn shrunk(picture: &Image<LinearRgb>) -> Image<LinearRgb> {
+fn shrunk_for_page(picture: &Image<LinearRgb>) -> Image<LinearRgb> {
     let (w, h) = picture.size();
     let factor = MAX_SIDE_PX / w.max(h) as f64;
     if factor >= 1.0 {

@@ -23,12 +23,12 @@ const SLIVER_AREA_PX2: f64 = 1e-2;
 /// The part of the picture that lies inside a card's outline; empty where the card is out of sight or edge-on.
 pub(crate) fn region(card: &Card, camera: &Camera) -> MultiPolygon<f64> {
     let seen = clip_to_view(in_camera(card, camera), camera);
-    let px: Vec<_> = seen.iter().map(|p| pixel(p, camera)).collect();
+    let px: Vec<_> = seen.iter().map(|p| to_pixel(p, camera)).collect();
     if px.len() < 3 || px.iter().any(|p| !p.x.is_finite() || !p.y.is_finite()) {
         return MultiPolygon(Vec::new());
     }
     let outline = Polygon::new(LineString(px), Vec::new());
-    let parts = outline.intersection_with_fill_rule(&picture(camera), FillRule::NonZero);
+    let parts = outline.intersection_with_fill_rule(&picture_rectangle(camera), FillRule::NonZero);
     without_slivers(parts)
         .map(|part| part.map_coords(|c| clamp_to_picture(c, camera)))
         .collect()
@@ -88,15 +88,18 @@ fn in_camera(card: &Card, camera: &Camera) -> Vec<Vector3<f64>> {
 fn clip_to_view(outline: Vec<Vector3<f64>>, camera: &Camera) -> Vec<Vector3<f64>> {
     let [w, h] = camera.image.map(f64::from);
     let (f, c) = (camera.focal_px, camera.principal_px);
-    let far_enough = clip(outline, |p| p.z - NEAR_PLANE_M);
-    let right_of_left = clip(far_enough, |p| f.x * p.x + c.x * p.z);
-    let left_of_right = clip(right_of_left, |p| (w - c.x) * p.z - f.x * p.x);
-    let below_top = clip(left_of_right, |p| f.y * p.y + c.y * p.z);
-    clip(below_top, |p| (h - c.y) * p.z - f.y * p.y)
+    let far_enough = clip_to_half_space(outline, |p| p.z - NEAR_PLANE_M);
+    let right_of_left = clip_to_half_space(far_enough, |p| f.x * p.x + c.x * p.z);
+    let left_of_right = clip_to_half_space(right_of_left, |p| (w - c.x) * p.z - f.x * p.x);
+    let below_top = clip_to_half_space(left_of_right, |p| f.y * p.y + c.y * p.z);
+    clip_to_half_space(below_top, |p| (h - c.y) * p.z - f.y * p.y)
 }
 
 /// The part of a polygon where a linear function of the position is not negative.
-fn clip(polygon: Vec<Vector3<f64>>, side: impl Fn(&Vector3<f64>) -> f64) -> Vec<Vector3<f64>> {
+fn clip_to_half_space(
+    polygon: Vec<Vector3<f64>>,
+    side: impl Fn(&Vector3<f64>) -> f64,
+) -> Vec<Vector3<f64>> {
     let mut kept = Vec::with_capacity(polygon.len() + 2);
     let followers = polygon.iter().cycle().skip(1);
     for (a, b) in polygon.iter().zip(followers) {
@@ -111,7 +114,7 @@ fn clip(polygon: Vec<Vector3<f64>>, side: impl Fn(&Vector3<f64>) -> f64) -> Vec<
     kept
 }
 
-fn pixel(p: &Vector3<f64>, camera: &Camera) -> Coord<f64> {
+fn to_pixel(p: &Vector3<f64>, camera: &Camera) -> Coord<f64> {
     let (f, c) = (camera.focal_px, camera.principal_px);
     Coord {
         x: p.x / p.z * f.x + c.x,
@@ -119,7 +122,7 @@ fn pixel(p: &Vector3<f64>, camera: &Camera) -> Coord<f64> {
     }
 }
 
-fn picture(camera: &Camera) -> Polygon<f64> {
+fn picture_rectangle(camera: &Camera) -> Polygon<f64> {
     let [w, h] = camera.image.map(f64::from);
     let corners = vec![(0.0, 0.0), (w, 0.0), (w, h), (0.0, h)];
     Polygon::new(LineString::from(corners), Vec::new())

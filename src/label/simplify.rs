@@ -145,9 +145,9 @@ impl CornerLinks {
         }
         let own = [self.before[at], at, self.after[at]];
         let triangle = own.map(|i| self.positions[i]);
-        !self
-            .corners_near(triangle)
-            .any(|i| self.kept[i] && !own.contains(&i) && holds(triangle, self.positions[i]))
+        !self.corners_near(triangle).any(|i| {
+            self.kept[i] && !own.contains(&i) && triangle_holds(triangle, self.positions[i])
+        })
     }
 
     /// The corners within the bounds of a triangle.
@@ -197,13 +197,17 @@ fn extent(values: [f64; 3]) -> [f64; 2] {
 }
 
 /// Twice the signed area of a triangle: exact for integers.
-fn turn(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
+fn doubled_triangle_area(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
     (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 }
 
 /// Whether a point within a triangle's bounds lies in it or on its sides.
-fn holds([a, b, c]: [[f64; 2]; 3], p: [f64; 2]) -> bool {
-    let turns = [turn(a, b, p), turn(b, c, p), turn(c, a, p)];
+fn triangle_holds([a, b, c]: [[f64; 2]; 3], p: [f64; 2]) -> bool {
+    let turns = [
+        doubled_triangle_area(a, b, p),
+        doubled_triangle_area(b, c, p),
+        doubled_triangle_area(c, a, p),
+    ];
     turns.iter().all(|t| *t >= 0.0) || turns.iter().all(|t| *t <= 0.0)
 }
 

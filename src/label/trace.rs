@@ -21,13 +21,16 @@ const STEPS: [[i64; 2]; 4] = [[1, 0], [0, 1], [-1, 0], [0, -1]];
 /// Corners that the border goes without are dropped: no point of it is then farther than `tolerance_px` from the polygons,
 /// and no side crosses another. 0 keeps all corners; parts and holes are kept at any tolerance.
 pub fn polygons(mask: &RleMask, tolerance_px: f64) -> Vec<Vec<Point2<f64>>> {
-    parts(mask, tolerance_px).into_iter().map(points).collect()
+    joined_parts(mask, tolerance_px)
+        .into_iter()
+        .map(points)
+        .collect()
 }
 
 /// The whole mask as one closed polygon, parts and holes joined by slits, simplified as [`polygons`] are; without points
 /// for an empty mask.
 pub fn polygon(mask: &RleMask, tolerance_px: f64) -> Vec<Point2<f64>> {
-    let mut parts = parts(mask, tolerance_px).into_iter();
+    let mut parts = joined_parts(mask, tolerance_px).into_iter();
     let first = parts.next().unwrap_or_default();
     points(parts.fold(first, join_part))
 }
@@ -36,7 +39,7 @@ fn points(ring: Ring) -> Vec<Point2<f64>> {
     ring.into_iter().map(Point2::from).collect()
 }
 
-fn parts(mask: &RleMask, tolerance_px: f64) -> Vec<Ring> {
+fn joined_parts(mask: &RleMask, tolerance_px: f64) -> Vec<Ring> {
     let rings = simplified(Grid::new(mask).rings(), tolerance_px);
     let (mut parts, mut holes): (Vec<_>, Vec<_>) =
         rings.into_iter().partition(|r| doubled_area(r) > 0.0);
@@ -107,14 +110,14 @@ impl Grid {
             let at = [self.left + i % columns, self.top + i / columns];
             // Every ring has an edge to the right.
             while self.leaving[self.index(at)] & 1 != 0 {
-                rings.push(self.walk(at));
+                rings.push(self.walk_ring(at));
             }
         }
         rings
     }
 
     /// Takes the ring that leaves `start` to the right; corners where it goes straight on are left out.
-    fn walk(&mut self, start: [i64; 2]) -> Ring {
+    fn walk_ring(&mut self, start: [i64; 2]) -> Ring {
         let mut ring = Vec::new();
         let (mut at, mut d, mut came) = (start, 0, usize::MAX);
         loop {

@@ -2,7 +2,7 @@
 
 use super::film::ColorUncertainty;
 use super::median::median;
-use super::screen::{screen_color, screen_pixels, strongest_channel};
+use super::screen::{masked_pixels, screen_color, screen_pixels, strongest_channel};
 use crate::diagnostic::Diagnostic;
 use crate::error::Result;
 use crate::filter;
@@ -86,13 +86,10 @@ const MIN_SIGMA: f32 = 1e-3;
 
 /// Values of a channel where a mask is set, thinned out; without those that are not finite.
 fn channel_values(photo: &Image<LinearRgb>, set: &Mask, channel: usize) -> Vec<f32> {
-    let all: Vec<usize> = (0..photo.pixels().len())
-        .filter(|&i| set.pixels()[i])
-        .collect();
-    let step = (all.len() / MAX_SAMPLES).max(1);
-    all.into_iter()
+    let step = (set.count() / MAX_SAMPLES).max(1);
+    masked_pixels(photo, set)
         .step_by(step)
-        .map(|i| <[f32; 3]>::from(photo.pixels()[i])[channel])
+        .map(|p| p.channels()[channel])
         .filter(|v| v.is_finite())
         .collect()
 }
@@ -161,16 +158,20 @@ fn object_share(
     mask: &Image<Coverage>,
     holds: impl Fn(LinearRgb) -> bool,
 ) -> f32 {
-    let rim_px = RIM_SHARE * photo.width().max(photo.height()) as f64;
-    let interior = filter::erode(&mask.map(|c| c.0 > 0.5), rim_px);
+    let interior = without_rim(mask);
     let pixels = photo.pixels().iter().zip(interior.pixels());
     let count = pixels.filter(|(p, inside)| **inside && holds(**p)).count();
     count as f32 / interior.count().max(1) as f32
 }
 
+fn without_rim(mask: &Image<Coverage>) -> Mask {
+    let rim_px = RIM_SHARE * mask.width().max(mask.height()) as f64;
+    filter::erode(&mask.map(|c| c.0 > 0.5), rim_px)
+}
+
 /// By how much a channel exceeds the larger of the two others.
 fn excess(p: LinearRgb, channel: usize) -> f32 {
-    let c: [f32; 3] = p.into();
+    let c = p.channels();
     c[channel] - c[(channel + 1) % 3].max(c[(channel + 2) % 3])
 }
 

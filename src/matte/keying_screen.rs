@@ -80,8 +80,7 @@ fn screen_color(points: &[ScreenPoint], at: [f64; 2], size: [f64; 2], sigma: f64
 fn weighted_mean(parts: impl Iterator<Item = (f64, LinearRgb)>) -> LinearRgb {
     let (mut sum, mut total) = ([0.0; 3], 0.0);
     for (weight, color) in parts {
-        let color: [f32; 3] = color.into();
-        for (sum, channel) in sum.iter_mut().zip(color) {
+        for (sum, channel) in sum.iter_mut().zip(color.channels()) {
             *sum += weight * f64::from(channel);
         }
         total += weight;

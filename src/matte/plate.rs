@@ -314,8 +314,7 @@ fn whole_mean(plate: &Image<LinearRgb>) -> LinearRgb {
 
 /// The least and the greatest value of a channel.
 fn extremes(plate: &Image<LinearRgb>, channel: usize) -> (f32, f32) {
-    let pixels = plate.pixels().iter();
-    let values = pixels.map(|p| <[f32; 3]>::from(*p)[channel]);
+    let values = plate.pixels().iter().map(|p| p.channels()[channel]);
     values.fold((f32::MAX, 0.0_f32), |(low, high), v| {
         (low.min(v), high.max(v))
     })

@@ -64,7 +64,7 @@ const MIN_KEYABLE_EXCESS: f32 = 0.3;
 
 /// The screen has enough colour to distinguish it from what is in front of it.
 pub(super) fn is_keyable(screen: LinearRgb) -> bool {
-    let mut channels: [f32; 3] = screen.into();
+    let mut channels = screen.channels();
     channels.sort_by(f32::total_cmp);
     let [low, mid, high] = channels;
     high > 0.0 && (high - 0.5 * (low + mid)) / high >= MIN_KEYABLE_EXCESS
@@ -78,7 +78,7 @@ pub(super) fn other_channels(c: [f32; 3], channel: usize) -> (f32, f32) {
 
 /// Which channel of a colour is the largest; of equal ones the first.
 pub(super) fn strongest_channel(color: LinearRgb) -> usize {
-    let channels: [f32; 3] = color.into();
+    let channels = color.channels();
     (1..3).fold(0, |best, c| {
         if channels[c] > channels[best] {
             c

@@ -209,10 +209,7 @@ fn hue_distance(a: usize, b: usize) -> usize {
 
 /// The hues that cover enough of the picture for a screen, most common first.
 fn common_hues(hues: &Image<Option<usize>>) -> Vec<usize> {
-    let mut counts = [0_usize; HUE_STEPS];
-    for &hue in hues.pixels().iter().flatten() {
-        counts[hue] += 1;
-    }
+    let mut counts = hue_counts(hues);
     let least = MIN_SCREEN_SHARE * hues.pixels().len() as f64;
     let mut common = Vec::new();
     while common.len() < MAX_HUES {
@@ -224,6 +221,14 @@ fn common_hues(hues: &Image<Option<usize>>) -> Vec<usize> {
         same_hues(hue).for_each(|other| counts[other] = 0);
     }
     common
+}
+
+fn hue_counts(hues: &Image<Option<usize>>) -> [usize; HUE_STEPS] {
+    let mut counts = [0; HUE_STEPS];
+    for &hue in hues.pixels().iter().flatten() {
+        counts[hue] += 1;
+    }
+    counts
 }
 
 /// The number of pixels that are nearly of one hue, and that hue.

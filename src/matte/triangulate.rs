@@ -203,6 +203,12 @@ fn align(
 }
 
 impl AlignedPhoto {
+    /// Sum of the squares of what a film does not explain of pixel `i`.
+    #[inline]
+    fn square_residual(&self, i: usize, film: &SolvedFilm) -> f64 {
+        square_distance(film.over(self.screen.pixels()[i]), self.photo.pixels()[i])
+    }
+
     fn new(photo: &Image<LinearRgb>, plate: &ScreenPlate, [x, y]: [f64; 2]) -> Self {
         Self {
             photo: register::moved(photo, [x, y]),
@@ -342,7 +348,7 @@ fn fit_lines(photos: &[AlignedPhoto], noise: f32) -> Image<PixelLines> {
 
 #[inline]
 fn add_point(lines: &mut [ScreenLine; 3], screen: LinearRgb, pixel: LinearRgb) {
-    let (screen, pixel): ([f32; 3], [f32; 3]) = (screen.into(), pixel.into());
+    let (screen, pixel) = (screen.channels(), pixel.channels());
     (0..3).for_each(|c| lines[c].add(screen[c], pixel[c]));
 }
 
@@ -371,8 +377,7 @@ fn residual(photos: &[AlignedPhoto], solved: &Image<SolvedFilm>, inside: &Image<
     let (mut square, mut count) = (0.0_f64, 0.0_f64);
     for i in (0..solved.pixels().len()).filter(|&i| inside.pixels()[i].0 > 0.5) {
         for aligned in photos {
-            let explained = solved.pixels()[i].over(aligned.screen.pixels()[i]);
-            square += square_distance(explained, aligned.photo.pixels()[i]);
+            square += aligned.square_residual(i, &solved.pixels()[i]);
             count += 3.0;
         }
     }
@@ -384,8 +389,8 @@ fn residual(photos: &[AlignedPhoto], solved: &Image<SolvedFilm>, inside: &Image<
 }
 
 fn square_distance(a: LinearRgb, b: LinearRgb) -> f64 {
-    let (a, b): ([f32; 3], [f32; 3]) = (a.into(), b.into());
-    a.iter().zip(b).map(|(a, b)| f64::from(a - b).powi(2)).sum()
+    let channels = a.channels().into_iter().zip(b.channels());
+    channels.map(|(a, b)| f64::from(a - b).powi(2)).sum()
 }
 
 fn strongest_noise(shots: &[(&Image<LinearRgb>, &ScreenPlate)]) -> f32 {

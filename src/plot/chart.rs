@@ -110,7 +110,7 @@ impl Axis {
     }
 
     /// How far along a value is, from 0 to 1; none where it cannot be shown.
-    fn fraction(&self, value: f64) -> Option<f64> {
+    fn fraction_of(&self, value: f64) -> Option<f64> {
         let [low, high, value] = [self.range[0], self.range[1], value]
             .map(|v| if self.logarithmic { libm::log10(v) } else { v });
         let fraction = (value - low) / (high - low);
@@ -160,17 +160,17 @@ fn positive_extent(values: impl IntoIterator<Item = f64>) -> Option<[f64; 2]> {
 impl Chart {
     /// Charts side by side with one list of names, the first chart's, as an SVG document.
     pub fn row(charts: &[Self]) -> String {
-        drawing(charts, ROW_FRAME_SIZE, &Beside::default())
+        draw_charts(charts, ROW_FRAME_SIZE, &Beside::default())
     }
 
     /// A chart by itself, larger than in a row, as an SVG document.
     #[doc(hidden)]
     pub fn alone(&self, beside: &Beside) -> String {
-        drawing(std::slice::from_ref(self), LONE_FRAME_SIZE, beside)
+        draw_charts(std::slice::from_ref(self), LONE_FRAME_SIZE, beside)
     }
 }
 
-fn drawing(charts: &[Chart], frame: [f64; 2], beside: &Beside) -> String {
+fn draw_charts(charts: &[Chart], frame: [f64; 2], beside: &Beside) -> String {
     let names = charts.first().map_or(&[][..], |c| &c.names);
     let legend_left = charts.len() as f64 * (LEFT_MARGIN + frame[0]);
     let width = legend_left + legend_width(names);
@@ -180,7 +180,7 @@ fn drawing(charts: &[Chart], frame: [f64; 2], beside: &Beside) -> String {
             height=(height) font-family="sans-serif" font-size="12" {
             rect width=(width) height=(height) fill="white" {}
             @for chart in framed(charts, frame) { (chart.svg(beside)) }
-            (legend(names, legend_left + 16.0))
+            (draw_legend(names, legend_left + 16.0))
         }
     }
     .into_string()
@@ -202,7 +202,7 @@ fn legend_width(names: &[String]) -> f64 {
 }
 
 /// A line and a name for each curve.
-fn legend(names: &[String], left: f64) -> Markup {
+fn draw_legend(names: &[String], left: f64) -> Markup {
     html! {
         @for (i, name) in names.iter().enumerate() {
             @let y = TOP_MARGIN + 14.0 + 20.0 * i as f64;
@@ -226,12 +226,12 @@ struct Framed<'a> {
 
 impl Framed<'_> {
     fn x(&self, value: f64) -> Option<f64> {
-        let fraction = self.chart.across.fraction(value)?;
+        let fraction = self.chart.across.fraction_of(value)?;
         Some(self.left + self.size[0] * fraction)
     }
 
     fn y(&self, value: f64) -> Option<f64> {
-        let fraction = self.chart.up.fraction(value)?;
+        let fraction = self.chart.up.fraction_of(value)?;
         Some(TOP_MARGIN + self.size[1] * (1.0 - fraction))
     }
 

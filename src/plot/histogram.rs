@@ -80,7 +80,7 @@ impl Histogram {
             svg xmlns="http://www.w3.org/2000/svg" class="histogram" width=(width)
                 height=(BASELINE + BOTTOM_MARGIN) font-family="sans-serif" font-size="11" {
                 @if let Some(expected) = self.expected { (self.expected_band(expected)) }
-                (self.bars())
+                (self.draw_bars())
                 @if let Some(expected) = self.expected {
                     path d=(line_across(&tenths(self.y(expected)))) stroke="#d55e00" stroke-dasharray="5 3" {}
                 }
@@ -113,7 +113,7 @@ impl Histogram {
         }
     }
 
-    fn bars(&self) -> Markup {
+    fn draw_bars(&self) -> Markup {
         let bin_width = FRAME_SIZE[0] / self.counts.len().max(1) as f64;
         html! {
             @for (i, &count) in self.counts.iter().enumerate() {

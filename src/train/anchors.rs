@@ -37,8 +37,8 @@ pub fn anchors(boxes: &[[f64; 2]], count: usize, seed: u64) -> Anchors {
         return Anchors::default();
     }
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let first = spread(&boxes, count.min(boxes.len()), &mut rng);
-    let mut sizes = cluster(&boxes, first);
+    let first = spread_sizes(&boxes, count.min(boxes.len()), &mut rng);
+    let mut sizes = cluster_sizes(&boxes, first);
     sizes.sort_by(|a, b| (a[0] * a[1]).total_cmp(&(b[0] * b[1])));
     Anchors::measured(sizes, &boxes)
 }
@@ -51,7 +51,7 @@ impl Anchors {
             .iter()
             .filter(|b| sizes.iter().any(|a| in_reach(b, a)));
         Self {
-            mean_iou: boxes.iter().map(|b| nearest(b, &sizes).1).sum::<f64>() / count,
+            mean_iou: boxes.iter().map(|b| nearest_size(b, &sizes).1).sum::<f64>() / count,
             best_possible_recall: reached.count() as f64 / count,
             sizes,
         }
@@ -59,10 +59,10 @@ impl Anchors {
 }
 
 /// Moves each anchor to the mean of the boxes that are nearest to it, until they stay.
-fn cluster(boxes: &[[f64; 2]], mut sizes: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
+fn cluster_sizes(boxes: &[[f64; 2]], mut sizes: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     let mut before = Vec::new();
     for _ in 0..MAX_ROUNDS {
-        let nearest: Vec<usize> = boxes.iter().map(|b| nearest(b, &sizes).0).collect();
+        let nearest: Vec<usize> = boxes.iter().map(|b| nearest_size(b, &sizes).0).collect();
         if nearest == before {
             break;
         }
@@ -75,12 +75,14 @@ fn cluster(boxes: &[[f64; 2]], mut sizes: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
 }
 
 /// Starting points far from each other: each drawn with the square of its distance to those before.
-fn spread(boxes: &[[f64; 2]], count: usize, rng: &mut ChaCha8Rng) -> Vec<[f64; 2]> {
-    let mut sizes = vec![boxes[(uniform(rng) * boxes.len() as f64) as usize]];
+fn spread_sizes(boxes: &[[f64; 2]], count: usize, rng: &mut ChaCha8Rng) -> Vec<[f64; 2]> {
+    let mut sizes = vec![boxes[(uniform_share(rng) * boxes.len() as f64) as usize]];
     while sizes.len() < count {
-        let squares = boxes.iter().map(|b| (1.0 - nearest(b, &sizes).1).powi(2));
+        let squares = boxes
+            .iter()
+            .map(|b| (1.0 - nearest_size(b, &sizes).1).powi(2));
         let squares: Vec<f64> = squares.collect();
-        let mut left = uniform(rng) * squares.iter().sum::<f64>();
+        let mut left = uniform_share(rng) * squares.iter().sum::<f64>();
         let drawn = squares.iter().position(|s| {
             left -= s;
             left < 0.0
@@ -91,19 +93,22 @@ fn spread(boxes: &[[f64; 2]], count: usize, rng: &mut ChaCha8Rng) -> Vec<[f64; 2
 }
 
 /// From 0 to 1.
-fn uniform(rng: &mut ChaCha8Rng) -> f64 {
+fn uniform_share(rng: &mut ChaCha8Rng) -> f64 {
     (rng.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
 }
 
-fn nearest(b: &[f64; 2], sizes: &[[f64; 2]]) -> (usize, f64) {
-    let fits = sizes.iter().map(|a| fit(a, b)).enumerate();
+fn nearest_size(b: &[f64; 2], sizes: &[[f64; 2]]) -> (usize, f64) {
+    let fits = sizes
+        .iter()
+        .map(|a| overlap_at_one_corner(a, b))
+        .enumerate();
     fits.fold((0, f64::NEG_INFINITY), |best, (k, fit)| {
         if fit > best.1 { (k, fit) } else { best }
     })
 }
 
 /// Intersection over union about one centre.
-fn fit(a: &[f64; 2], b: &[f64; 2]) -> f64 {
+fn overlap_at_one_corner(a: &[f64; 2], b: &[f64; 2]) -> f64 {
     let shared = a[0].min(b[0]) * a[1].min(b[1]);
     shared / (a[0] * a[1] + b[0] * b[1] - shared)
 }
@@ -136,7 +141,7 @@ mod tests {
             .collect();
         let found = anchors(&boxes, 3, 1);
         for (a, g) in found.sizes.iter().zip(groups) {
-            assert!(fit(a, &g) > 0.97, "{a:?} {g:?}");
+            assert!(overlap_at_one_corner(a, &g) > 0.97, "{a:?} {g:?}");
         }
         assert!(found.mean_iou > 0.9 && found.best_possible_recall == 1.0);
     }

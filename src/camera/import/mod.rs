@@ -98,14 +98,14 @@ impl Annotation {
     /// Name and corners of the only shape that can be the surface.
     fn rectangle(&self) -> Result<NamedCorners> {
         self.check_finite()?;
-        let quads = self.four_cornered(ShapeKind::Polygon);
-        let boxes = self.four_cornered(ShapeKind::Rectangle);
+        let mut quads = self.four_cornered(ShapeKind::Polygon);
+        let mut boxes = self.four_cornered(ShapeKind::Rectangle);
         let points = self.named_points();
-        match (quads.as_slice(), boxes.as_slice(), points.as_slice()) {
-            ([quad], ..) => Ok(quad.clone()),
-            ([], [one], _) => Ok(one.clone()),
-            ([], [], [a, b, c, d]) => Ok(corners_from_points([*a, *b, *c, *d])),
-            _ => Err(self.unclear([quads.len(), boxes.len(), points.len()])),
+        match [quads.len(), boxes.len(), points.len()] {
+            [1, ..] => Ok(quads.remove(0)),
+            [0, 1, _] => Ok(boxes.remove(0)),
+            [0, 0, 4] => Ok(corners_from_points([0, 1, 2, 3].map(|i| points[i]))),
+            counts => Err(self.unclear(counts)),
         }
     }
 

@@ -92,12 +92,14 @@ fn neighbours(at: usize, [width, height]: [usize; 2]) -> impl Iterator<Item = us
 
 /// The corners of the first and last pixel of each row.
 fn outer_corners(ends: &RowEnds) -> Vec<Point2<f64>> {
-    let corners = ends.iter().flat_map(|(&y, &(x0, x1))| {
-        let (top, bottom) = (y as f64, y as f64 + 1.0);
-        let (left, right) = (x0 as f64, x1 as f64 + 1.0);
-        [[left, top], [right, top], [left, bottom], [right, bottom]].map(Point2::from)
-    });
+    let corners = ends.iter().flat_map(|(&y, &ends)| row_corners(y, ends));
     corners.collect()
+}
+
+fn row_corners(y: usize, (first, last): (usize, usize)) -> [Point2<f64>; 4] {
+    let (top, bottom) = (y as f64, y as f64 + 1.0);
+    let (left, right) = (first as f64, last as f64 + 1.0);
+    [[left, top], [right, top], [left, bottom], [right, bottom]].map(Point2::from)
 }
 
 /// The four corners of a region that is nearly a quadrangle.

@@ -16,18 +16,17 @@ impl Checked {
     pub fn balance(&self) -> Table {
         let mut table = Table::new(["class", "train", "val", "share", "box width", "box height"]);
         for class in 0..self.rows.len() {
-            let share = 100.0 * self.rows[class] as f64 / self.boxes.len().max(1) as f64;
-            let [width, height] = [0, 1].map(|side| self.side_range(class, side));
-            table.push([
-                self.class_name(class),
-                self.count(class, Part::Train).to_string(),
-                self.count(class, Part::Val).to_string(),
-                format!("{share:.1} %"),
-                width,
-                height,
-            ]);
+            table.push(self.balance_row(class));
         }
         table
+    }
+
+    fn balance_row(&self, class: usize) -> [String; 6] {
+        let share = 100.0 * self.rows[class] as f64 / self.boxes.len().max(1) as f64;
+        let [train, val] = Part::ALL.map(|part| self.count(class, part).to_string());
+        let [width, height] = [0, 1].map(|side| self.side_range(class, side));
+        let share = format!("{share:.1} %");
+        [self.class_name(class), train, val, share, width, height]
     }
 
     fn class_name(&self, class: usize) -> String {

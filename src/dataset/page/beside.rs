@@ -40,6 +40,13 @@ pub(super) fn add_comparison(
     max_figures: usize,
 ) {
     add_heading(page, ours, theirs);
+    add_measures(page, ours, theirs);
+    page.subheading("Classes")
+        .table(&class_shares(ours, theirs));
+    add_figures(page, theirs, max_figures);
+}
+
+fn add_measures(page: &mut Page, ours: &LabelledSet, theirs: &LabelledSet) {
     let measures = compare_measures(ours, theirs);
     page.table(&distances(&measures));
     let charts: String = measures.iter().map(ComparedMeasure::svg).collect();
@@ -48,9 +55,6 @@ pub(super) fn add_comparison(
     page.html(&format!(
         "<div class=\"histograms\">\n{charts}{maps}</div>\n"
     ));
-    page.subheading("Classes")
-        .table(&class_shares(ours, theirs));
-    add_figures(page, theirs, max_figures);
 }
 
 fn add_figures(page: &mut Page, theirs: &LabelledSet, max_figures: usize) {
@@ -308,20 +312,24 @@ fn compare_measures(ours: &LabelledSet, theirs: &LabelledSet) -> Vec<ComparedMea
 impl ComparedMeasure {
     /// Shares of each in bins of the same width: ours as bars, the others as steps.
     fn svg(&self) -> String {
-        let [low, high] = self.range();
-        let [ours, theirs] = [&self.ours, &self.theirs].map(|values| shares(values, low, high));
-        let most = ours.iter().chain(&theirs).copied().fold(0.0, f64::max);
-        let most = most.max(1e-9);
         let [w, h] = FRAME;
         let (width, height) = (ROOM_LEFT + w + ROOM_RIGHT, ROOM_ABOVE + h + ROOM_BELOW);
         let (line, title) = (ROOM_ABOVE + h, escaped(self.title));
-        let (bars, steps) = (bars(&ours, most), steps(&theirs, most));
-        let words = self.words([low, high]);
+        let range = self.range();
+        let (histograms, words) = (self.histograms(range), self.words(range));
         format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" font-family=\"sans-serif\" \
-             font-size=\"11\">\n<title>{title}</title>\n{bars}{steps}<path d=\"M{ROOM_LEFT} {line}h{w}\" \
+             font-size=\"11\">\n<title>{title}</title>\n{histograms}<path d=\"M{ROOM_LEFT} {line}h{w}\" \
              stroke=\"#888\"/>\n{words}</svg>\n"
         )
+    }
+
+    /// Ours as bars, theirs as steps.
+    fn histograms(&self, [low, high]: [f64; 2]) -> String {
+        let [ours, theirs] = [&self.ours, &self.theirs].map(|values| shares(values, low, high));
+        let most = ours.iter().chain(&theirs).copied().fold(0.0, f64::max);
+        let most = most.max(1e-9);
+        bars(&ours, most) + &steps(&theirs, most)
     }
 
     /// The title above the frame and its ends below it.

@@ -23,6 +23,17 @@ pub(super) fn add_drawn(page: &mut Page, summary: &Summary) {
         "Bars: values in the dataset. Dashed line: the recipe's distribution; about one bar in twenty lies outside the \
          band around it by chance. What does not vary is in the table below.",
     );
+    let (mut charts, fixed) = drawn_values(summary);
+    let chosen = summary.chosen.iter();
+    charts.extend(chosen.map(|(what, counts)| choice_histogram(what, counts)));
+    add_histograms(page, &charts);
+    if !fixed.rows.is_empty() {
+        page.table(&fixed);
+    }
+}
+
+/// Histograms of the values that vary, and a table of the others.
+fn drawn_values(summary: &Summary) -> (Vec<Histogram>, Table) {
     let mut fixed = Table::new(["not varying", "value"]);
     let mut charts = Vec::new();
     for (key, values) in &summary.drawn {
@@ -31,12 +42,7 @@ pub(super) fn add_drawn(page: &mut Page, summary: &Summary) {
             range => charts.push(drawn_histogram(key, values, range)),
         }
     }
-    let chosen = summary.chosen.iter();
-    charts.extend(chosen.map(|(what, counts)| choice_histogram(what, counts)));
-    add_histograms(page, &charts);
-    if !fixed.rows.is_empty() {
-        page.table(&fixed);
-    }
+    (charts, fixed)
 }
 
 /// Values of one draw, against its range in the recipe and whether it draws integers.

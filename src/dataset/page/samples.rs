@@ -1,7 +1,7 @@
 //! Pictures of a dataset with their labels over them.
 
 use super::color_of;
-use super::outlier::{Feature, outliers};
+use super::outlier::{Feature, Outlier, outliers};
 use crate::dataset::SampleRecord;
 use crate::dataset::{SampleSummary, ShownSample, Summary, UnlabelledReason};
 use crate::error::Result;
@@ -104,14 +104,8 @@ struct SelectedSample {
 
 /// Pictures to show: those unlike the others, at most half, then others evenly spread.
 fn select_samples(samples: &[SampleSummary], count: usize) -> Vec<SelectedSample> {
-    let outliers = outliers(&features(samples)).into_iter();
-    let mut selected: Vec<SelectedSample> = outliers
-        .take(count / 2)
-        .map(|outlier| SelectedSample {
-            row: outlier.row,
-            why: Some(outlier.why),
-        })
-        .collect();
+    let outliers = outliers(&features(samples)).into_iter().take(count / 2);
+    let mut selected: Vec<_> = outliers.map(SelectedSample::from).collect();
     let mut rest: Vec<usize> = (0..samples.len()).collect();
     rest.retain(|&row| selected.iter().all(|sample| sample.row != row));
     let count = (count - selected.len()).min(rest.len());
@@ -122,31 +116,41 @@ fn select_samples(samples: &[SampleSummary], count: usize) -> Vec<SelectedSample
     selected
 }
 
+impl From<Outlier> for SelectedSample {
+    fn from(outlier: Outlier) -> Self {
+        Self {
+            row: outlier.row,
+            why: Some(outlier.why),
+        }
+    }
+}
+
 /// The title of a measure and how the summary of a sample gives it.
 type SampleMeasure = (&'static str, fn(&SampleSummary) -> f64);
 
 /// What may set a picture apart.
 fn features(samples: &[SampleSummary]) -> [Feature<'static>; 7] {
-    let measures: [SampleMeasure; 7] = [
-        ("objects", |s| s.objects as f64),
-        ("labels", |s| s.labels.len() as f64),
-        ("objects without a label", |s| {
-            (s.objects - s.labels.len()) as f64
-        }),
-        ("least seen label, %", |s| 100.0 * s.least_visible),
-        ("largest box, px", |s| {
-            longer_sides(s).fold(f64::NAN, f64::max)
-        }),
-        ("smallest box, px", |s| {
-            longer_sides(s).fold(f64::NAN, f64::min)
-        }),
-        ("rejected scenes", |s| s.rejected as f64),
-    ];
-    measures.map(|(name, value)| Feature {
+    SAMPLE_MEASURES.map(|(name, value)| Feature {
         name,
         values: samples.iter().map(value).collect(),
     })
 }
+
+const SAMPLE_MEASURES: [SampleMeasure; 7] = [
+    ("objects", |s| s.objects as f64),
+    ("labels", |s| s.labels.len() as f64),
+    ("objects without a label", |s| {
+        (s.objects - s.labels.len()) as f64
+    }),
+    ("least seen label, %", |s| 100.0 * s.least_visible),
+    ("largest box, px", |s| {
+        longer_sides(s).fold(f64::NAN, f64::max)
+    }),
+    ("smallest box, px", |s| {
+        longer_sides(s).fold(f64::NAN, f64::min)
+    }),
+    ("rejected scenes", |s| s.rejected as f64),
+];
 
 /// The longer side of each labelled box.
 fn longer_sides(sample: &SampleSummary) -> impl Iterator<Item = f64> {

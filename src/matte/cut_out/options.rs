@@ -118,7 +118,7 @@ impl CutOutOptions {
 }
 
 fn check_screen(screen: LinearRgb) -> Result<()> {
-    let channels: [f32; 3] = screen.into();
+    let channels = screen.channels();
     if screen.is_finite() && channels.iter().all(|v| *v >= 0.0) {
         return Ok(());
     }

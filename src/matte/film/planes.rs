@@ -42,8 +42,8 @@ fn named(
 /// The three channels of a colour of every pixel.
 fn channels<P: Copy>(image: &Image<P>, color: impl Fn(P) -> LinearRgb) -> [Vec<f32>; 3] {
     [0, 1, 2].map(|c| {
-        let channel = |&p: &P| <[f32; 3]>::from(color(p))[c];
-        image.pixels().iter().map(channel).collect()
+        let pixels = image.pixels().iter();
+        pixels.map(|p| color(*p).channels()[c]).collect()
     })
 }
 

@@ -20,6 +20,17 @@ pub(super) struct Factor {
     pub(super) coloured: bool,
 }
 
+impl Factor {
+    /// As something that may or may not be plastic, whose factors have the deviation `spread`.
+    fn guessed(self, spread: f32) -> Self {
+        Self {
+            raw: self.value,
+            sigma: self.sigma / spread,
+            ..self
+        }
+    }
+}
+
 /// What is the same for all pixels of a photo.
 pub(super) struct Solver {
     key: usize,
@@ -85,12 +96,8 @@ impl Solver {
         let left = (0..3)
             .map(|c| pixel[c] - measured.through[c])
             .fold(0.0, f32::max);
-        let factor = self.combine(pixel, &measured, plastic_factor(left));
-        Factor {
-            raw: factor.value,
-            sigma: factor.sigma / self.spread,
-            ..factor
-        }
+        self.combine(pixel, &measured, plastic_factor(left))
+            .guessed(self.spread)
     }
 
     /// What the photo alone gives.

@@ -74,12 +74,18 @@ pub(super) fn scattered_tint(flat: [f32; 3]) -> [f32; 3] {
 
 /// Transmittance of flat plastic with each dye in each amount.
 pub(in crate::matte) fn dyed() -> impl Iterator<Item = [f32; 3]> {
+    dye_amounts().flat_map(|amount| DYE_ABSORBANCES.map(|dye| dyed_with(amount, dye)))
+}
+
+fn dye_amounts() -> impl Iterator<Item = f32> {
     let [least, most, step] = DYE_AMOUNTS;
     let count = ((most - least) / step) as usize;
-    let amounts = (0..=count).map(move |i| least + i as f32 * step);
-    amounts.flat_map(|amount| {
-        DYE_ABSORBANCES.map(|dye| dye.map(|a| CLEAR_TRANSMITTANCE * libm::expf(-amount * a)))
-    })
+    (0..=count).map(move |i| least + i as f32 * step)
+}
+
+/// Transmittance of flat plastic with an amount of a dye: the law of Beer and Lambert.
+fn dyed_with(amount: f32, absorbances: [f32; 3]) -> [f32; 3] {
+    absorbances.map(|a| CLEAR_TRANSMITTANCE * libm::expf(-amount * a))
 }
 
 /// The pixels that show a tint.

@@ -291,7 +291,7 @@ fn check_finite(screen: LinearRgb) -> Result<()> {
     if screen.is_finite() {
         return Ok(());
     }
-    let what = format!("{:?}, expected finite numbers", <[f32; 3]>::from(screen));
+    let what = format!("{:?}, expected finite numbers", screen.channels());
     Err(Error::value("screen", what))
 }
 

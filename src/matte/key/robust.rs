@@ -21,7 +21,7 @@ const CHANNEL_NAMES: [&str; 3] = ["red", "green", "blue"];
 
 /// How far a colour exceeds the grey of its other channels in `channel`: the lesser of excess and saturation.
 fn key_strength(key: LinearRgb, channel: usize, balance: f32) -> f32 {
-    let c = <[f32; 3]>::from(key);
+    let c = key.channels();
     let (lo, hi) = other_channels(c, channel);
     let v = balance * lo + (1.0 - balance) * hi;
     let excess = c[channel] - v;

@@ -29,7 +29,7 @@ pub(super) fn means(photo: &Image<LinearRgb>, background: &Mask) -> Vec<Cell> {
         "photo and background differ in size"
     );
     let (w, h) = photo.size();
-    let side = w.max(h).div_ceil(CELLS_ALONG_SIDE).max(1);
+    let side = cell_side(w.max(h));
     let columns = w.div_ceil(side);
     (0..columns * h.div_ceil(side))
         .filter_map(|i| cell_mean(photo, background, [i % columns, i / columns], side))
@@ -52,6 +52,11 @@ fn cell_mean(
         sums.add_row([columns.start, y], &photo.row(y)[columns.clone()], free);
     }
     sums.mean(index).filter(|_| f64::from(sums.count) >= least)
+}
+
+/// Side of a cell in a picture of this longer side, pixels.
+fn cell_side(longer: usize) -> usize {
+    longer.div_ceil(CELLS_ALONG_SIDE).max(1)
 }
 
 /// The pixels of the cell `index` along a side of the picture.

@@ -255,11 +255,13 @@ fn biweights(residuals: &[f64]) -> Vec<f64> {
     let below = SHADOW_SIGMAS * robust_sigma(residuals.iter().filter(|r| **r > 0.0));
     residuals
         .iter()
-        .map(|&r| {
-            let reach = if r > 0.0 { above } else { below };
-            (1.0 - (r / reach).powi(2)).max(0.0).powi(2)
-        })
+        .map(|&r| biweight(r / if r > 0.0 { above } else { below }))
         .collect()
+}
+
+/// Tukey's weight of a residual in units of its reach.
+fn biweight(r: f64) -> f64 {
+    (1.0 - r.powi(2)).max(0.0).powi(2)
 }
 
 /// Standard deviation by the median of the absolute values, at least the noise of a cell.

@@ -245,10 +245,9 @@ impl SearchResult {
 
     /// The inside in a picture small enough to be compared quickly.
     fn small_area(&self, (w, h): (usize, usize)) -> Option<Mask> {
-        let pass = self.pass.as_ref().ok()?;
+        let inside = self.pass.as_ref().ok()?.inside.to_coverage();
         let longer = w.max(h);
         let [w, h] = [w, h].map(|side| (side * COMPARED_SIDE_PX.min(longer)).div_ceil(longer));
-        let inside = pass.inside.to_coverage();
         Some(filter::resize(&inside, w, h).map(|c| c.0 > 0.5))
     }
 
@@ -276,13 +275,16 @@ const EDGE_REACH_PX: f64 = 2.0;
 /// Mean overlap of one area with the others.
 fn agreement(areas: &[Option<Mask>], i: usize) -> f64 {
     let others = (0..areas.len()).filter(|&j| j != i);
+    let own = areas[i].as_ref();
     let sum: f64 = others
-        .map(|j| match (&areas[i], &areas[j]) {
-            (Some(own), Some(other)) => overlap(own, other),
-            _ => 0.0,
-        })
+        .map(|j| overlap_or_zero(own, areas[j].as_ref()))
         .sum();
     sum / areas.len().saturating_sub(1).max(1) as f64
+}
+
+/// 0 where one area was not found.
+fn overlap_or_zero(a: Option<&Mask>, b: Option<&Mask>) -> f64 {
+    a.zip(b).map_or(0.0, |(a, b)| overlap(a, b))
 }
 
 /// Intersection over union.

@@ -93,7 +93,7 @@ fn screen_like(smooth: &Image<LinearRgb>, plate: &ScreenPlate, inside: &Mask) ->
 #[inline]
 fn is_like_screen(pixel: LinearRgb, plate: LinearRgb, noise: LinearRgb) -> bool {
     let off = differences(pixel, plate);
-    let (plate, noise): ([f32; 3], [f32; 3]) = (plate.into(), noise.into());
+    let (plate, noise) = (plate.channels(), noise.channels());
     (0..3).all(|c| off[c] <= (LIKE_SHARE * plate[c]).max(LIKE_SIGMAS * noise[c]))
 }
 
@@ -108,7 +108,7 @@ fn large_groups(like: &Mask, area: usize) -> Vec<Mask> {
 }
 
 fn is_unlike_screen(pixel: LinearRgb, plate: LinearRgb) -> bool {
-    let strongest = <[f32; 3]>::from(plate).into_iter().fold(0.0, f32::max);
+    let strongest = plate.channels().into_iter().fold(0.0, f32::max);
     differences(pixel, plate)
         .into_iter()
         .any(|d| d >= UNLIKE_SHARE * strongest)

@@ -11,10 +11,9 @@ use geo::{Area, ConvexHull, MultiPoint, Point};
 /// nearer to the edge than its outer corner. Where a pixel lies on the border of the picture, so does the hull.
 pub(super) fn convex_hull(edges: &Mask) -> Vec<Point2<f64>> {
     let (w, h) = edges.size();
-    let hull = row_ends(edges)
-        .map(|(x, y)| Point::new(center_or_border(x, w), center_or_border(y, h)))
-        .collect::<MultiPoint>()
-        .convex_hull();
+    let points =
+        row_ends(edges).map(|(x, y)| Point::new(center_or_border(x, w), center_or_border(y, h)));
+    let hull = points.collect::<MultiPoint>().convex_hull();
     if hull.unsigned_area() <= 0.0 {
         return Vec::new();
     }
@@ -25,12 +24,16 @@ pub(super) fn convex_hull(edges: &Mask) -> Vec<Point2<f64>> {
 
 /// The first and the last pixel of every row that has any.
 fn row_ends(set: &Mask) -> impl Iterator<Item = (usize, usize)> {
-    let ends = set.rows().enumerate().filter_map(|(y, row)| {
-        let first = row.iter().position(|p| *p)?;
-        let last = row.iter().rposition(|p| *p)?;
-        Some([(first, y), (last, y)])
-    });
-    ends.flatten()
+    set.rows()
+        .enumerate()
+        .flat_map(|(y, row)| set_ends(row).into_iter().flatten().map(move |x| (x, y)))
+}
+
+/// The first and the last set pixel of a row.
+fn set_ends(row: &[bool]) -> Option<[usize; 2]> {
+    let first = row.iter().position(|p| *p)?;
+    let last = row.iter().rposition(|p| *p)?;
+    Some([first, last])
 }
 
 fn center_or_border(i: usize, len: usize) -> f64 {

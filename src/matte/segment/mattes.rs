@@ -52,7 +52,7 @@ impl Segmentation {
         let deep = filter::erode(&self.tight.map(|c| c.0 >= 1.0), CORE_DEPTH_PX);
         let opaque = photo.zip_map(plate, |p, k| {
             let c = strongest_channel(k);
-            <[f32; 3]>::from(p)[c] < CORE_TRANSMITTANCE * <[f32; 3]>::from(k)[c]
+            p.channels()[c] < CORE_TRANSMITTANCE * k.channels()[c]
         });
         deep.zip_map(&opaque, |deep, opaque| deep && opaque)
             .to_coverage()

@@ -108,9 +108,8 @@ impl EdgePoint {
 
     /// The mean of a few pixels along the outline at a distance `t` outwards, pixels of the search.
     pub(super) fn mean_at(&self, roots: &Image<LinearRgb>, t: f64, scale: f64) -> LinearRgb {
-        let along = Vector2::new(-self.normal.y, self.normal.x);
         let lanes = (-(LANE_COUNT / 2)..=LANE_COUNT / 2).map(|lane| {
-            let p = self.at + self.normal * (t * scale) + along * (f64::from(lane) * scale / 2.0);
+            let p = self.lane_position(lane, t, scale);
             filter::sample_bilinear_clamped(roots, p.x, p.y)
         });
         lanes
@@ -118,10 +117,17 @@ impl EdgePoint {
             .scale(1.0 / LANE_COUNT as f32)
     }
 
+    /// The position at a distance `t` outwards on a profile beside that through the point.
+    #[inline]
+    fn lane_position(&self, lane: i32, t: f64, scale: f64) -> Point2<f64> {
+        let along = Vector2::new(-self.normal.y, self.normal.x);
+        self.at + self.normal * (t * scale) + along * (f64::from(lane) * scale / 2.0)
+    }
+
     /// The point moved outwards; what reaches the border of the photo stays there.
     fn displaced(&self, by: f64, (w, h): (usize, usize), scale: f64) -> Point2<f64> {
         let (w, h) = (w as f64, h as f64);
-        if is_on_border(self.at.x, w, scale) || is_on_border(self.at.y, h, scale) {
+        if is_near_border(self.at.x, w, scale) || is_near_border(self.at.y, h, scale) {
             return self.at;
         }
         let moved = self.at + self.normal * (by * scale);
@@ -129,7 +135,7 @@ impl EdgePoint {
     }
 }
 
-fn is_on_border(v: f64, len: f64, scale: f64) -> bool {
+fn is_near_border(v: f64, len: f64, scale: f64) -> bool {
     v <= scale || v >= len - scale
 }
 
@@ -178,9 +184,12 @@ impl EdgeProfile {
         let change = &self.change;
         let most = change.iter().fold(0.0f32, |most, c| most.max(*c));
         let least = least.max(MIN_CHANGE_SHARE * most);
-        (0..change.len()).find(|&k| {
-            change[k] >= least && change.get(k + 1).is_none_or(|next| *next <= change[k])
-        })
+        (0..change.len()).find(|&k| change[k] >= least && self.does_not_rise_after(k))
+    }
+
+    fn does_not_rise_after(&self, k: usize) -> bool {
+        let next = self.change.get(k + 1);
+        next.is_none_or(|next| *next <= self.change[k])
     }
 }
 

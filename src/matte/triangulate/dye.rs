@@ -50,11 +50,8 @@ fn clearer_half(
     let clear: Vec<&PixelLines> = opaque_pixels(pixels, inside)
         .filter(|p| clearness(p, determined) >= middle)
         .collect();
-    clear
-        .iter()
-        .step_by((clear.len() / DYE_SAMPLES).max(1))
-        .map(|p| **p)
-        .collect()
+    let step = (clear.len() / DYE_SAMPLES).max(1);
+    clear.into_iter().step_by(step).copied().collect()
 }
 
 /// Sum of the determined channels' transmittances.
@@ -75,13 +72,10 @@ struct DyeSamples {
 impl DyeSamples {
     /// Median misfit of plastic in standard deviations squared, and what its thickness and a handicap add.
     fn misfit(&self, flat: [f32; 3], handicap: f32) -> f32 {
-        let fits: Vec<(f32, f32)> = self
-            .pixels
-            .iter()
-            .map(|pixel| self.explained(pixel, flat))
-            .collect();
-        let thickness = median(fits.iter().map(|fit| fit.1), f32::total_cmp).unwrap_or(1.0);
-        let misfit = median(fits.iter().map(|fit| fit.0), f32::total_cmp).unwrap_or(0.0);
+        let fits = self.pixels.iter().map(|pixel| self.explained(pixel, flat));
+        let (misfits, factors): (Vec<f32>, Vec<f32>) = fits.unzip();
+        let thickness = median(factors.into_iter(), f32::total_cmp).unwrap_or(1.0);
+        let misfit = median(misfits.into_iter(), f32::total_cmp).unwrap_or(0.0);
         misfit + THICKNESS_WEIGHT * (thickness - 1.0).powi(2) + handicap
     }
 

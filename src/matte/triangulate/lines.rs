@@ -294,7 +294,7 @@ pub(super) fn flat_transmittance(
 /// Channel by channel; white of none.
 fn median_color(colors: &[LinearRgb]) -> LinearRgb {
     let medians = [0, 1, 2].map(|c| {
-        let channel = colors.iter().map(|color| <[f32; 3]>::from(*color)[c]);
+        let channel = colors.iter().map(|color| color.channels()[c]);
         median(channel, f32::total_cmp).unwrap_or(1.0)
     });
     LinearRgb::from(medians)

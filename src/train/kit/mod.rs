@@ -97,13 +97,16 @@ pub fn write(folder: &Path, options: &KitOptions) -> Result<()> {
     io::write_json(folder.join("balance.json"), &balance)?;
     io::write_text(folder.join("hyp.yaml"), HYP_YAML)?;
     io::write_text(folder.join("balanced.py"), BALANCED_PY)?;
-    io::write_text(folder.join("commands.sh"), &commands(options, counts))
+    io::write_text(
+        folder.join("commands.sh"),
+        &training_commands(options, counts),
+    )
 }
 
 fn write_variants(folder: &Path, classes: &[String]) -> Result<()> {
     for variant in &VARIANTS {
         let path = folder.join(format!("{}.yaml", variant.name));
-        io::write_text(path, &variant.yaml(classes))?;
+        io::write_text(path, &variant.to_yaml(classes))?;
     }
     Ok(())
 }
@@ -158,7 +161,7 @@ fn open_set(folder: &Path) -> Result<YoloSet> {
 }
 
 impl Variant {
-    fn yaml(&self, classes: &[String]) -> String {
+    fn to_yaml(&self, classes: &[String]) -> String {
         let (count, train, val) = (classes.len(), yaml_list(self.train), yaml_list(self.val));
         // A JSON string is a YAML string, whatever is in it.
         let names = classes.iter().map(|name| serde_json::Value::from(&**name));
@@ -173,7 +176,7 @@ impl Variant {
 }
 
 /// The commands of all trainings, with equally many updates for the single sources told in words.
-fn commands(options: &KitOptions, counts: [u64; 2]) -> String {
+fn training_commands(options: &KitOptions, counts: [u64; 2]) -> String {
     let KitOptions {
         seeds,
         epochs,
