@@ -1,6 +1,6 @@
 //! Pictures at half the size, and half of that: plain averages, and the binomial kernel of Laplacian pyramids.
 
-use super::separable::{Taps, filter};
+use super::separable::{Taps, filter, filter_sides};
 use crate::image::Image;
 use crate::pixel::Mix;
 use crate::work::{self, Kind};
@@ -61,12 +61,15 @@ pub fn halve<P: Mix>(image: &Image<P>) -> Image<P> {
 }
 
 fn halved<P: Mix>(image: &Image<P>) -> Image<P> {
-    let [columns, rows] = [image.width(), image.height()].map(|len| {
-        line_taps(len.div_ceil(2), |i| {
-            Taps::new(2 * i..2 * i + 2, len, |_| 1.0)
-        })
-    });
+    let [columns, rows] = [image.width(), image.height()].map(halving_taps);
     filter(image, &columns, &rows)
+}
+
+/// The mean of two neighbours each.
+fn halving_taps(len: usize) -> Vec<Taps> {
+    line_taps(len.div_ceil(2), |i| {
+        Taps::new(2 * i..2 * i + 2, len, |_| 1.0)
+    })
 }
 
 /// A picture of half the size, smoothed by the binomial kernel (1 4 6 4 1)/16; odd sizes round up.
@@ -79,9 +82,7 @@ fn halved<P: Mix>(image: &Image<P>) -> Image<P> {
 ///
 /// [Burt and Adelson 1983]: https://doi.org/10.1109/TCOM.1983.1095851
 pub fn reduce<P: Mix>(image: &Image<P>) -> Image<P> {
-    work::add(Kind::Filters, 1);
-    let [columns, rows] = [image.width(), image.height()].map(reducing_taps);
-    filter(image, &columns, &rows)
+    filter_sides(image, reducing_taps)
 }
 
 /// From a line of `len` to one of half that.

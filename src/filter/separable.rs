@@ -3,6 +3,7 @@
 
 use crate::image::Image;
 use crate::pixel::Mix;
+use crate::work::{self, Kind};
 use rayon::prelude::*;
 
 /// The samples of one line that an output sample is the weighted mean of: the first one's index, and the weights from
@@ -55,6 +56,16 @@ fn without_weightless_ends(
 
 /// Output pixels that are worked on together, few enough for their sums to stay in the first cache.
 const BLOCK_PIXELS: usize = 512;
+
+/// A picture filtered along both sides with the taps for their lengths.
+pub(super) fn filter_sides<P: Mix>(
+    image: &Image<P>,
+    taps: impl Fn(usize) -> Vec<Taps>,
+) -> Image<P> {
+    work::add(Kind::Filters, 1);
+    let [columns, rows] = [image.width(), image.height()].map(taps);
+    filter(image, &columns, &rows)
+}
 
 /// A picture as large as there are `columns` and `rows`, filtered from `image`.
 ///
