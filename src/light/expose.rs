@@ -2,7 +2,7 @@
 
 use crate::geom::{Point3, Vector3};
 use crate::image::Image;
-use crate::light::{irradiance, match_light_tint, match_noise, surface_color};
+use crate::light::{irradiance, match_light_tint, match_noise, surface_color, value_of_rank};
 use crate::pixel::LinearRgb;
 use crate::scene::{Exposure, Scene};
 use std::f64::consts::PI;
@@ -63,13 +63,17 @@ fn stops_of(ratio: f64) -> f64 {
 ///
 /// Pixels that are not finite are left out; 0 for a plate without any other.
 pub(crate) fn plate_white(plate: &Image<LinearRgb>) -> f32 {
-    let finite = plate.pixels().iter().filter(|c| c.is_finite());
-    let mut values: Vec<_> = finite.map(|c| c.luminance()).collect();
-    if values.is_empty() {
+    let luminances = finite_luminances(plate);
+    if luminances.is_empty() {
         return 0.0;
     }
-    let rank = ((values.len() - 1) as f64 * WHITE_PERCENTILE).round() as usize;
-    *values.select_nth_unstable_by(rank, f32::total_cmp).1
+    let rank = ((luminances.len() - 1) as f64 * WHITE_PERCENTILE).round() as usize;
+    value_of_rank(luminances, rank)
+}
+
+fn finite_luminances(plate: &Image<LinearRgb>) -> Vec<f32> {
+    let finite = plate.pixels().iter().filter(|c| c.is_finite());
+    finite.map(|c| c.luminance()).collect()
 }
 
 /// Luminance of a white card in the middle of the surface.

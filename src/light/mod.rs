@@ -57,3 +57,8 @@ pub use sky::{SkyPiece, sky_pieces};
 #[doc(hidden)]
 pub use surface::match_light_tint;
 pub(crate) use surface::surface_color;
+
+/// The value before which `rank` others stand when they are sorted.
+fn value_of_rank(mut values: Vec<f32>, rank: usize) -> f32 {
+    *values.select_nth_unstable_by(rank, f32::total_cmp).1
+}

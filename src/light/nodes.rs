@@ -142,8 +142,11 @@ impl LightHorizon {
     }
 
     fn cuts_disk(&self) -> bool {
-        let [a, b] = self.rise.map(f64::abs);
-        self.middle.abs() < a.hypot(b)
+        self.middle.abs() < self.steepest_rise()
+    }
+
+    fn steepest_rise(&self) -> f64 {
+        self.rise[0].hypot(self.rise[1])
     }
 
     /// Points and areas in the square -1..1 above the plane.
@@ -173,7 +176,7 @@ impl LightHorizon {
 
     /// Points and areas in the unit disk above the plane.
     fn chords(&self, n: usize) -> Vec<([f64; 2], f64)> {
-        let steepest = self.rise[0].hypot(self.rise[1]);
+        let steepest = self.steepest_rise();
         let up = self.rise.map(|r| r / steepest);
         let widest = libm::acos((-self.middle / steepest).clamp(-1.0, 1.0));
         // Chords of a nearly whole disk grow and shrink again: n of them miss its area by 2 %.

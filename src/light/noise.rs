@@ -1,6 +1,7 @@
 //! The noise of a photograph.
 
 use crate::image::Image;
+use crate::light::value_of_rank;
 use crate::pixel::LinearRgb;
 use crate::scene::{Noise, Scene};
 
@@ -42,11 +43,15 @@ pub fn plate_noise(plate: &Image<LinearRgb>) -> Noise {
 
 /// The residuals around all pixels but the outermost.
 fn residuals_of(plate: &Image<LinearRgb>) -> Vec<(f32, f32)> {
-    let (width, height) = plate.size();
-    (1..height.saturating_sub(1))
-        .flat_map(|y| (1..width.saturating_sub(1)).map(move |x| (x, y)))
+    inner_pixels(plate.size())
         .filter_map(|(x, y)| residual_at(plate, x, y))
         .collect()
+}
+
+/// Those that have eight neighbours, row by row.
+fn inner_pixels((width, height): (usize, usize)) -> impl Iterator<Item = (usize, usize)> {
+    (1..height.saturating_sub(1))
+        .flat_map(move |y| (1..width.saturating_sub(1)).map(move |x| (x, y)))
 }
 
 /// Mean and magnitude of the residual around a pixel; none near white or where something is not finite.
@@ -64,16 +69,19 @@ fn residual_at(plate: &Image<LinearRgb>, x: usize, y: usize) -> Option<(f32, f32
 
 /// Mean brightness and variance of a group.
 fn group_noise(group: &[(f32, f32)]) -> [f64; 2] {
-    let mean = group.iter().map(|p| f64::from(p.0)).sum::<f64>() / group.len() as f64;
     let sigma = lower_quartile(group) / (QUARTILE_SIGMAS * MASK_GAIN);
-    [mean, sigma * sigma]
+    [mean_brightness(group), sigma * sigma]
+}
+
+fn mean_brightness(group: &[(f32, f32)]) -> f64 {
+    let sum: f64 = group.iter().map(|p| f64::from(p.0)).sum();
+    sum / group.len() as f64
 }
 
 /// That of the residuals of a group.
 fn lower_quartile(group: &[(f32, f32)]) -> f64 {
-    let mut residuals: Vec<f32> = group.iter().map(|p| p.1).collect();
-    let (_, quarter, _) = residuals.select_nth_unstable_by(group.len() / 4, f32::total_cmp);
-    f64::from(*quarter)
+    let residuals = group.iter().map(|p| p.1).collect();
+    f64::from(value_of_rank(residuals, group.len() / 4))
 }
 
 /// The line of least squares through variances over means.

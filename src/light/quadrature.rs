@@ -8,21 +8,28 @@ use std::f64::consts::PI;
 /// Newton's iteration on the Legendre polynomial from Tricomi's estimate of its roots.
 pub(crate) fn gauss_legendre(n: usize) -> Vec<(f64, f64)> {
     (0..n)
-        .map(|i| {
-            let estimate = libm::cos(PI * (n as f64 - i as f64 - 0.25) / (n as f64 + 0.5));
-            gauss_point(n, estimate)
-        })
+        .map(|i| gauss_point(n, root_estimate(n, i)))
         .collect()
 }
 
+/// A root of the Legendre polynomial, good to three digits.
+fn root_estimate(n: usize, i: usize) -> f64 {
+    libm::cos(PI * (n as f64 - i as f64 - 0.25) / (n as f64 + 0.5))
+}
+
 fn gauss_point(n: usize, estimate: f64) -> (f64, f64) {
-    // Quadratic convergence: 8 steps are plenty from an estimate good to three digits.
-    let root = (0..8).fold(estimate, |x, _| {
-        let (p, slope) = legendre(n, x);
-        x - p / slope
-    });
+    let root = legendre_root(n, estimate);
     let (_, slope) = legendre(n, root);
     (root, 2.0 / ((1.0 - root * root) * slope * slope))
+}
+
+/// Newton's method.
+fn legendre_root(n: usize, estimate: f64) -> f64 {
+    // Quadratic convergence: 8 steps are plenty from an estimate good to three digits.
+    (0..8).fold(estimate, |x, _| {
+        let (p, slope) = legendre(n, x);
+        x - p / slope
+    })
 }
 
 /// Value and slope of the Legendre polynomial of degree `n`, by its recurrence.

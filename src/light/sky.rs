@@ -100,9 +100,13 @@ impl VisiblePiece {
     fn in_world(&self, rotation: f64, scale: [f64; 3]) -> SkyPiece {
         SkyPiece {
             direction: turned(&self.direction, -rotation),
-            irradiance: std::array::from_fn(|c| (self.irradiance[c] * scale[c]) as f32).into(),
+            irradiance: self.scaled_irradiance(scale),
             width: self.width,
         }
+    }
+
+    fn scaled_irradiance(&self, scale: [f64; 3]) -> LinearRgb {
+        std::array::from_fn(|c| (self.irradiance[c] * scale[c]) as f32).into()
     }
 
     /// None for a piece below a receiver's horizon.

@@ -3,6 +3,7 @@
 use crate::camera::Camera;
 use crate::geom::{Plane, Point2, Point3};
 use crate::image::Image;
+use crate::light::value_of_rank;
 use crate::pixel::LinearRgb;
 use crate::scene::{CameraSource, LightTint, Scene};
 
@@ -45,9 +46,8 @@ fn surface_point(camera: &Camera, x: usize, y: usize) -> Option<Point3<f64>> {
 
 /// The median of a channel; the upper one of two.
 fn median_of(colors: &[LinearRgb], channel: fn(&LinearRgb) -> f32) -> f32 {
-    let mut values: Vec<f32> = colors.iter().map(channel).collect();
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f32::total_cmp).1
+    let values = colors.iter().map(channel).collect();
+    value_of_rank(values, colors.len() / 2)
 }
 
 /// Turns [`LightTint::MatchSurface`] into the colour of the surface's light; any other scene comes back as it is.
