@@ -52,15 +52,17 @@ impl Aov {
     ];
 }
 
+fn unknown_aov(name: &str) -> Error {
+    let names = Aov::ALL.map(|(n, _)| n).join(", ");
+    Error::value("aov", format!("\"{name}\", expected some of {names}"))
+}
+
 impl FromStr for Aov {
     type Err = Error;
 
     fn from_str(name: &str) -> Result<Self> {
         let known = Self::ALL.iter().find(|(n, _)| *n == name);
-        known.map(|&(_, aov)| aov).ok_or_else(|| {
-            let names = Self::ALL.map(|(n, _)| n).join(", ");
-            Error::value("aov", format!("\"{name}\", expected some of {names}"))
-        })
+        known.map(|&(_, aov)| aov).ok_or_else(|| unknown_aov(name))
     }
 }
 
@@ -133,7 +135,7 @@ impl AovSource<'_> {
     }
 
     fn layer_parts(&self) -> Vec<Part> {
-        let tinted = pixels_of(self.deep).any(|(x, y)| !self.deep.tints(x, y).is_empty());
+        let tinted = has_tints(self.deep);
         let ids = self.shot.cards.iter().map(|card| card.id);
         ids.map(|id| layer_part(self.deep, id, tinted)).collect()
     }
@@ -180,6 +182,11 @@ impl AovSource<'_> {
             .ray(Point2::new(x as f64 + 0.5, y as f64 + 0.5))
             .at(f64::from(sample.depth.0))
     }
+}
+
+/// Whether there is film anywhere.
+fn has_tints(deep: &DeepImage) -> bool {
+    pixels_of(deep).any(|(x, y)| !deep.tints(x, y).is_empty())
 }
 
 /// What one object adds to the picture; with what it lets pass per channel where there is film.

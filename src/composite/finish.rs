@@ -58,9 +58,14 @@ fn channel_gains(finish: &PostProcess) -> LinearRgb {
 fn sharpen(frame: &Image<PremulRgba>, amount: f32) -> Image<PremulRgba> {
     let soft = gaussian_blur(frame, SHARPENING_SIGMA_PX);
     frame.zip_map(&soft, |p, s| {
-        let sharp = p.color().scale(1.0 + amount).add_scaled(-amount, s.color());
-        with_color(p, sharp.map(|v| v.max(0.0)))
+        with_color(p, sharpened(p.color(), s.color(), amount))
     })
+}
+
+#[inline]
+fn sharpened(color: LinearRgb, soft: LinearRgb, amount: f32) -> LinearRgb {
+    let sharp = color.scale(1.0 + amount).add_scaled(-amount, soft);
+    sharp.map(|v| v.max(0.0))
 }
 
 fn with_color(p: PremulRgba, LinearRgb { r, g, b }: LinearRgb) -> PremulRgba {
@@ -146,11 +151,17 @@ impl SensorNoise {
         noisy.into()
     }
 
+    /// Noise that a value should have and the plate that shows through does not bring.
+    #[inline(always)]
+    fn missing_variance(&self, exposed: &ExposedValue) -> f64 {
+        let (share, all) = (f64::from(exposed.passes), self.variance(exposed.value));
+        all - share * share * self.variance(exposed.plate)
+    }
+
     #[inline(always)]
     fn noisy_value(&self, exposed: &ExposedValue, index: u64) -> f32 {
         let ExposedValue { value, .. } = *exposed;
-        let (share, all) = (f64::from(exposed.passes), self.variance(value));
-        let missing = all - share * share * self.variance(exposed.plate);
+        let missing = self.missing_variance(exposed);
         if missing <= 0.0 {
             return value;
         }
