@@ -14,6 +14,7 @@ use super::refine::{Minimum, NormalEquations, Residuals};
 use super::solution::Solution;
 use super::uncertainty::{Uncertainty, focal_share};
 use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX, Vector6};
+use std::cmp::Ordering;
 
 /// Number of unknowns of a pose.
 const POSE_UNKNOWNS: usize = 6;
@@ -48,6 +49,12 @@ pub(crate) struct BundleEquations {
     /// Of each photo's own observations.
     pub(crate) chi2: Vec<f64>,
     normals: Vec<NormalEquations>,
+}
+
+impl BundleEquations {
+    fn compare_costs(&self, other: &Self) -> Ordering {
+        self.cost.total_cmp(&other.cost)
+    }
 }
 
 /// The normal equations of the shared unknowns.
@@ -102,7 +109,7 @@ impl Bundle {
     pub(crate) fn best(&self, alone: &[Result<Solution, SolveError>]) -> Option<BundleEquations> {
         self.ln_focal_starts(alone)
             .filter_map(|ln_focal| self.refine(self.posed(ln_focal)?))
-            .min_by(|a, b| a.cost.total_cmp(&b.cost))
+            .min_by(BundleEquations::compare_costs)
     }
 
     /// Logarithms of the focal length from which to refine.
@@ -253,11 +260,10 @@ impl Bundle {
     }
 
     /// Keeps what is fixed, or what nothing constrains, where it is.
-    fn hold_unconstrained(&self, SharedSystem { matrix, right }: &mut SharedSystem) {
+    fn hold_unconstrained(&self, system: &mut SharedSystem) {
         for (i, prior) in self.shared.iter().enumerate() {
-            if prior.is_fixed() || matrix[(i, i)] <= 0.0 {
-                clear_row_and_column(matrix, i);
-                (matrix[(i, i)], right[i]) = (1.0, 0.0);
+            if prior.is_fixed() || system.matrix[(i, i)] <= 0.0 {
+                system.hold(i);
             }
         }
     }
@@ -368,6 +374,13 @@ impl SharedSystem {
             matrix: DMatrix::zeros(unknowns, unknowns),
             right: DVector::zeros(unknowns),
         }
+    }
+
+    /// Keeps an unknown where it is.
+    fn hold(&mut self, unknown: usize) {
+        clear_row_and_column(&mut self.matrix, unknown);
+        self.matrix[(unknown, unknown)] = 1.0;
+        self.right[unknown] = 0.0;
     }
 
     /// Adds what a photo shows of the shared unknowns for its present pose.
@@ -500,11 +513,7 @@ fn framing_or(label: &Label, unknown: Framing) -> Framing {
 /// A photo's problem with a known lens: only the pose is unknown.
 fn with_fixed_lens(problem: &Problem, ln_focal: f64) -> Problem {
     let mut problem = problem.clone();
-    let priors = &mut problem.residuals.priors;
-    priors.ln_focal = Prior::fixed(ln_focal);
-    priors.principal_sigma = 0.0;
-    priors.stretch_sigma = 0.0;
-    priors.kappa.sigma = 0.0;
+    problem.residuals.priors.fix_lens(ln_focal);
     problem
 }
 
@@ -537,13 +546,7 @@ fn lens_priors(priors: &ParameterPriors) -> [Prior; 4] {
 fn without_shared_priors(problem: &Problem) -> Residuals {
     let residuals = &problem.residuals;
     Residuals {
-        priors: ParameterPriors {
-            ln_focal: Prior::FLAT,
-            stretch_sigma: f64::INFINITY,
-            principal_sigma: f64::INFINITY,
-            kappa: Prior::FLAT,
-            ln_height: residuals.priors.ln_height,
-        },
+        priors: ParameterPriors::only_height(residuals.priors.ln_height),
         ..residuals.clone()
     }
 }
@@ -563,9 +566,8 @@ fn mean_ln_focal(alone: &[Result<Solution, SolveError>], unit_px: f64) -> Option
 /// What a photo alone gives for its focal length, behind its weight.
 fn weighted_focal_px(solution: &Solution) -> Option<(f64, f64)> {
     let sigma = solution.sigma.ln_focal;
-    let px = solution.focal.from_data_px?;
     let weight = solution.focal.share / (sigma * sigma);
-    weight.is_finite().then_some((weight, px))
+    Some((weight, solution.focal.from_data_px?)).filter(|_| weight.is_finite())
 }
 
 fn inverse_or_zero(variance: f64) -> f64 {

@@ -58,23 +58,34 @@ fn warnings(
 /// Twice the signed areas of the triangles that leave out one corner each; in a picture of a rectangle the one without
 /// corner `i` is proportional to the depth of corner `i`.
 pub(crate) fn triangle_areas(c: &[Vector2<f64>; 4]) -> [f64; 4] {
-    [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]].map(|[i, j, k]| (c[j] - c[i]).perp(&(c[k] - c[i])))
+    OTHER_CORNERS.map(|[i, j, k]| (c[j] - c[i]).perp(&(c[k] - c[i])))
 }
+
+/// The three corners other than each.
+const OTHER_CORNERS: [[usize; 3]; 4] = [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]];
 
 fn refuse_coincident(c: &[Point2<f64>; 4], sigma: f64) -> Result<(), SolveError> {
     let limit_px = COINCIDENT_PX.max(COINCIDENT_SIGMAS * sigma);
-    for first in 0..4 {
-        for second in first + 1..4 {
-            let distance_px = (c[first] - c[second]).norm();
-            if distance_px < limit_px {
-                return Err(SolveError::Coincident {
-                    first,
-                    second,
-                    distance_px,
-                    limit_px,
-                });
-            }
-        }
+    CORNER_PAIRS
+        .into_iter()
+        .try_for_each(|pair| refuse_close_pair(c, pair, limit_px))
+}
+
+const CORNER_PAIRS: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
+
+fn refuse_close_pair(
+    c: &[Point2<f64>; 4],
+    [first, second]: [usize; 2],
+    limit_px: f64,
+) -> Result<(), SolveError> {
+    let distance_px = (c[first] - c[second]).norm();
+    if distance_px < limit_px {
+        return Err(SolveError::Coincident {
+            first,
+            second,
+            distance_px,
+            limit_px,
+        });
     }
     Ok(())
 }
@@ -185,8 +196,12 @@ fn outside_warning(corner: usize) -> Diagnostic {
 /// More than a diagonal of the picture.
 fn is_far_outside(corner: Point2<f64>, image: [u32; 2]) -> bool {
     let size = Vector2::from(image.map(f64::from));
+    distance_outside_px(corner, size) > size.norm()
+}
+
+fn distance_outside_px(corner: Point2<f64>, size: Vector2<f64>) -> f64 {
     let inside = Vector2::new(corner.x.clamp(0.0, size.x), corner.y.clamp(0.0, size.y));
-    (corner.coords - inside).norm() > size.norm()
+    (corner.coords - inside).norm()
 }
 
 #[cfg(test)]

@@ -34,9 +34,8 @@ fn matrix_from(elements: &SVector<f64, 9>) -> Matrix3<f64> {
 fn normal_matrix(pairs: impl Iterator<Item = (Vector3<f64>, Vector3<f64>)>) -> SMatrix<f64, 9, 9> {
     pairs
         .flat_map(|(p, q)| equations(&p, &q))
-        .fold(SMatrix::zeros(), |square, row| {
-            square + row * row.transpose()
-        })
+        .map(|row| row * row.transpose())
+        .sum()
 }
 
 /// The two linear equations of a pair of points, one for each coordinate.

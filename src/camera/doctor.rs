@@ -52,7 +52,7 @@ fn pose_line(solution: &Solution) -> String {
         "The camera is {:.3} m (+- {:.3}) above the surface, tilted by {:.1} degrees (+- {:.1}) from straight down.",
         camera.center().z,
         height_sigma,
-        camera.tilt().to_degrees(),
+        camera.tilt_deg(),
         sigma.tilt.to_degrees(),
     )
 }

@@ -92,10 +92,14 @@ impl BlenderCamera {
     }
 
     fn camera_from_world(&self) -> Pose {
-        let m = &self.matrix_world;
         let rotation = self.rotation();
-        let center = Vector3::new(m[0][3], m[1][3], m[2][3]);
-        pose_from(rotation, -(rotation * center))
+        pose_from(rotation, -(rotation * self.center()))
+    }
+
+    /// Where the camera stands, metres.
+    fn center(&self) -> Vector3<f64> {
+        let m = &self.matrix_world;
+        Vector3::new(m[0][3], m[1][3], m[2][3])
     }
 
     fn sensor_mm(&self) -> f64 {
@@ -152,14 +156,19 @@ impl Camera {
 
     /// The camera in OpenCV's terms.
     pub fn to_opencv(&self) -> OpencvCamera {
-        let mut k = self.intrinsics();
-        k[(0, 2)] -= 0.5;
-        k[(1, 2)] -= 0.5;
         OpencvCamera {
-            k: matrix_rows(&k),
+            k: matrix_rows(&self.opencv_intrinsics()),
             r: matrix_rows(&self.rotation()),
             t: self.camera_from_world.translation.vector.into(),
         }
+    }
+
+    /// The camera matrix where pixel centres are integers.
+    fn opencv_intrinsics(&self) -> Matrix3<f64> {
+        let mut k = self.intrinsics();
+        k[(0, 2)] -= 0.5;
+        k[(1, 2)] -= 0.5;
+        k
     }
 
     /// The camera that OpenCV means, for a picture of this size.
@@ -230,13 +239,16 @@ impl ColmapModel {
     pub fn new<'a>(views: impl IntoIterator<Item = (&'a str, &'a Camera)>) -> Self {
         let mut model = Self::default();
         for (i, (name, camera)) in views.into_iter().enumerate() {
-            let id = i + 1;
-            let pose = colmap_pose(camera);
-            // Writing to a string cannot fail.
-            let _ = writeln!(model.cameras, "{id} PINHOLE {}", colmap_intrinsics(camera));
-            let _ = writeln!(model.images, "{id} {pose} {id} {name}\n");
+            model.add_view(i + 1, name, camera);
         }
         model
+    }
+
+    fn add_view(&mut self, id: usize, name: &str, camera: &Camera) {
+        let pose = colmap_pose(camera);
+        // Writing to a string cannot fail.
+        let _ = writeln!(self.cameras, "{id} PINHOLE {}", colmap_intrinsics(camera));
+        let _ = writeln!(self.images, "{id} {pose} {id} {name}\n");
     }
 }
 

@@ -193,11 +193,11 @@ impl CameraFile {
 
     /// The camera of the file.
     pub fn camera(&self) -> Camera {
-        let (model, image) = (&self.found.model, [self.image.width, self.image.height]);
+        let model = &self.found.model;
         Camera {
             focal_px: Vector2::repeat(model.f_px),
             principal_px: Point2::from(model.principal_point_px),
-            ..Camera::from_opencv(&self.found.opencv, image)
+            ..Camera::from_opencv(&self.found.opencv, self.image.size())
         }
     }
 
@@ -221,13 +221,10 @@ impl CameraFile {
     }
 
     fn check_image(&self, image: [u32; 2]) -> Result<()> {
-        let [w, h] = [self.image.width, self.image.height];
-        if [w, h] == image && !image.contains(&0) {
+        if self.image.size() == image && !image.contains(&0) {
             return Ok(());
         }
-        let [width, height] = image;
-        let what = format!("{w} x {h} pixels, expected {width} x {height}");
-        Err(Error::value("image", what))
+        Err(other_size(self.image.size(), image))
     }
 }
 
@@ -271,6 +268,11 @@ fn check_above_surface(camera: &Camera) -> Result<()> {
     }
 }
 
+fn other_size([w, h]: [u32; 2], [width, height]: [u32; 2]) -> Error {
+    let what = format!("{w} x {h} pixels, expected {width} x {height}");
+    Error::value("image", what)
+}
+
 fn check_pose(opencv: &OpencvCamera) -> Result<()> {
     for value in opencv.t {
         check_magnitude("opencv.t", value)?;
@@ -302,8 +304,10 @@ fn check_positive(at: &str, value: f64) -> Result<()> {
     if (1.0 / MAX_MAGNITUDE..=MAX_MAGNITUDE).contains(&value) {
         return Ok(());
     }
-    let what = format!("{value:e}, expected a positive number");
-    Err(Error::value(at, what))
+    Err(Error::value(
+        at,
+        format!("{value:e}, expected a positive number"),
+    ))
 }
 
 /// Reads warnings, without those of older files, which had a `kind` and its numbers instead of a code and a message.
@@ -339,11 +343,12 @@ impl FoundCamera {
     fn new(solution: &Solution) -> Self {
         let camera = &solution.camera;
         let alternative = solution.alternative.as_deref().map(Self::new);
+        // Long, but only a list: one line for each field of the file.
         Self {
             model: Model::new(solution),
             opencv: camera.to_opencv(),
             center_m: camera.center().into(),
-            tilt_deg: camera.tilt().to_degrees(),
+            tilt_deg: camera.tilt_deg(),
             blender: camera.to_blender(),
             surface: FittedSurface::new(solution.size),
             homography: matrix_rows(&camera.pixel_from_surface().0),

@@ -88,8 +88,7 @@ impl Solution {
     }
 
     fn off_center_warning(&self) -> Diagnostic {
-        let [w, h] = self.camera.image.map(f64::from);
-        let off_px = (self.camera.principal_px - Point2::new(w / 2.0, h / 2.0)).norm();
+        let off_px = off_center_px(&self.camera);
         let what = format!(
             "the principal point lies {off_px:.0} px (+- {:.0}) off the middle of the picture: it was cropped, the lens \
              was shifted, or the EXIF focal length is wrong",
@@ -138,6 +137,12 @@ impl Solution {
     fn sees(&self, point: Point3<f64>) -> Vector2<f64> {
         distorted(&self.camera, self.kappa, point).coords
     }
+}
+
+/// Distance of the principal point from the middle of the picture.
+fn off_center_px(camera: &Camera) -> f64 {
+    let [w, h] = camera.image.map(f64::from);
+    (camera.principal_px - Point2::new(w / 2.0, h / 2.0)).norm()
 }
 
 #[cfg(test)]

@@ -39,6 +39,11 @@ fn unmeasured_surface() -> LabelSurface {
 fn copy_shared(label: &mut Label, like: &Label) {
     label.surface = without_corners(&like.surface);
     label.markers = like.markers.clone();
+    copy_camera(label, like);
+}
+
+/// The lens holds for pictures of the same size, the camera's name for all.
+fn copy_camera(label: &mut Label, like: &Label) {
     if like.image_size() == label.image_size() {
         label.camera = without_height(&like.camera);
     }
@@ -112,15 +117,15 @@ fn lacks_corners(label: &Label) -> bool {
 
 /// What is left to be filled in.
 fn open_questions(label: &Label) -> Vec<&'static str> {
-    let corners = lacks_corners(label).then_some(
-        "surface.corners_px: x and y of the rectangle's corners in pixels from the top left of the picture, clockwise \
-         from its top left; the side from the first to the second is width_m",
-    );
-    let framing = (label.framing() == Framing::Unknown).then_some(
-        "image: add \"cropped\": false if nothing was cut off the picture, true if something was",
-    );
+    let corners = lacks_corners(label).then_some(CORNERS_QUESTION);
+    let framing = (label.framing() == Framing::Unknown).then_some(FRAMING_QUESTION);
     corners.into_iter().chain(framing).collect()
 }
+
+const CORNERS_QUESTION: &str = "surface.corners_px: x and y of the rectangle's corners in pixels from the top left of the \
+     picture, clockwise from its top left; the side from the first to the second is width_m";
+const FRAMING_QUESTION: &str =
+    "image: add \"cropped\": false if nothing was cut off the picture, true if something was";
 
 /// Pretty JSON, its lists of numbers in one line each.
 fn with_folded_lists(text: &str) -> String {

@@ -106,13 +106,13 @@ fn misfit_outliers(photos: &[Result<Solution, SolveError>]) -> Vec<OutlierPhoto>
     photos
         .iter()
         .enumerate()
-        .filter_map(|(photo, solution)| {
-            let solution = solution.as_ref().ok()?;
-            let chi2 = solution.fit.chi2;
-            solution.misfit()?;
-            Some(OutlierPhoto { photo, chi2 })
-        })
+        .filter_map(|(photo, solution)| misfit_outlier(photo, solution.as_ref().ok()?))
         .collect()
+}
+
+fn misfit_outlier(photo: usize, solution: &Solution) -> Option<OutlierPhoto> {
+    let chi2 = solution.fit.chi2;
+    solution.misfit().map(|_| OutlierPhoto { photo, chi2 })
 }
 
 /// Photos of one camera, and what each gives alone.
@@ -255,9 +255,13 @@ fn same_camera(a: &Label, b: &Label) -> bool {
 /// camera's photos share is then the same.
 fn same_frame(a: &Label, b: &Label) -> bool {
     if is_part(a) || is_part(b) {
-        return a.image_size() == b.image_size() && a.image.crop == b.image.crop;
+        return show_same_part(a, b);
     }
     have_same_shape(a.image_size(), b.image_size())
+}
+
+fn show_same_part(a: &Label, b: &Label) -> bool {
+    a.image_size() == b.image_size() && a.image.crop == b.image.crop
 }
 
 fn have_same_shape(a: [u32; 2], b: [u32; 2]) -> bool {

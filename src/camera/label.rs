@@ -220,7 +220,7 @@ impl Label {
 
     /// Width and height of the picture, pixels.
     pub fn image_size(&self) -> [u32; 2] {
-        [self.image.width, self.image.height]
+        self.image.size()
     }
 
     /// Width and height of the picture that the camera took, pixels.
@@ -232,8 +232,8 @@ impl Label {
 
     /// The centre of the picture that the camera took, in this one's pixels.
     pub(crate) fn taken_center(&self) -> Point2<f64> {
-        let offset = self.image.crop.map_or([0.0; 2], |crop| crop.offset_px);
-        Point2::from(self.taken_size().map(|side| f64::from(side) / 2.0)) - Vector2::from(offset)
+        let center = self.taken_size().map(|side| f64::from(side) / 2.0);
+        Point2::from(center) - self.image.crop_offset_px()
     }
 
     /// Which part of the picture that the camera took this one is.
@@ -253,6 +253,15 @@ impl Label {
 }
 
 impl LabelImage {
+    /// Width and height, pixels.
+    pub(crate) fn size(&self) -> [u32; 2] {
+        [self.width, self.height]
+    }
+
+    /// The upper left corner in the picture that the camera took, pixels.
+    fn crop_offset_px(&self) -> Vector2<f64> {
+        self.crop.map_or([0.0; 2], |crop| crop.offset_px).into()
+    }
     fn unnamed([width, height]: [u32; 2]) -> Self {
         Self {
             width,
@@ -275,6 +284,10 @@ impl LabelSurface {
     /// The length of a side is stated.
     pub(crate) fn has_side(&self) -> bool {
         self.width_m.is_some() || self.height_m.is_some()
+    }
+
+    pub(crate) fn set_size(&mut self, size: [f64; 2]) {
+        [self.width_m, self.height_m] = size.map(Some);
     }
 }
 
@@ -377,12 +390,23 @@ fn missing_message(keys: &[String]) -> String {
 
 /// Alternative keys, where a label has none of them.
 fn missing_alternatives(value: &Value) -> impl Iterator<Item = String> {
-    let corners = lacks_all(value, &["/surface/corners_px", "/markers", "/points"])
-        .then_some("surface.corners_px (or markers)");
-    let sides = lacks_all(value, &["/surface/width_m", "/surface/height_m"])
-        .then_some("surface.width_m (or surface.height_m)");
-    corners.into_iter().chain(sides).map(String::from)
+    KEY_ALTERNATIVES
+        .iter()
+        .filter(|(keys, _)| lacks_all(value, keys))
+        .map(|&(_, missing)| missing.into())
 }
+
+/// Keys of which a label has at least one, as pointers, and what to say where it has none.
+const KEY_ALTERNATIVES: [(&[&str], &str); 2] = [
+    (
+        &["/surface/corners_px", "/markers", "/points"],
+        "surface.corners_px (or markers)",
+    ),
+    (
+        &["/surface/width_m", "/surface/height_m"],
+        "surface.width_m (or surface.height_m)",
+    ),
+];
 
 fn lacks_all(value: &Value, keys: &[&str]) -> bool {
     keys.iter().all(|key| is_missing(value, key))

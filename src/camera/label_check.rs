@@ -8,14 +8,17 @@ pub(crate) const MAX_MAGNITUDE: f64 = 1e9;
 
 /// The picture has pixels, everything is finite, and positive where it has to be.
 pub(crate) fn check_label(label: &Label) -> Result<(), SolveError> {
-    check_picture(label.image_size())?;
-    check_picture(label.taken_size())?;
+    check_image(label)?;
     check_surface(&label.surface)?;
-    if let Some(crop) = &label.image.crop {
-        check_finite("image.crop.offset_px", &crop.offset_px)?;
-    }
     label.points.iter().try_for_each(check_point)?;
     check_camera(&label.camera)
+}
+
+fn check_image(label: &Label) -> Result<(), SolveError> {
+    check_picture(label.image_size())?;
+    check_picture(label.taken_size())?;
+    let mut crop = label.image.crop.iter();
+    crop.try_for_each(|crop| check_finite("image.crop.offset_px", &crop.offset_px))
 }
 
 fn check_surface(surface: &LabelSurface) -> Result<(), SolveError> {

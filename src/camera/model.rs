@@ -236,10 +236,10 @@ impl State {
     /// Change of a stretched point per stretch, in the camera's axes.
     #[inline]
     fn stretch_derivative(&self, stretched: &Vector3<f64>, rigid: bool) -> Vector3<f64> {
-        let StretchShares([x, y]) = if rigid {
-            StretchShares([0.0; 2])
+        let [x, y] = if rigid {
+            [0.0; 2]
         } else {
-            self.stretch_shares
+            self.stretch_shares.0
         };
         self.pose.rotation * Vector3::new(x * stretched.x, y * stretched.y, 0.0)
     }

@@ -1,5 +1,7 @@
 //! How to solve, and the priors of what a label leaves open.
 
+use super::label::Framing;
+
 /// How to solve.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SolveOptions {
@@ -73,6 +75,15 @@ impl Priors {
             ratio_sigma: 0.0,
             kappa_sigma: 0.0,
             ..Self::default()
+        }
+    }
+
+    /// Of the principal point, in picture diagonals.
+    pub(crate) fn principal_sigma_for(&self, framing: Framing) -> f64 {
+        if framing == Framing::Whole {
+            self.principal_sigma
+        } else {
+            self.cropped_sigma
         }
     }
 

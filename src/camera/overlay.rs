@@ -99,12 +99,16 @@ impl LegendEntry {
 
     /// Draws a line of the legend.
     fn draw(&self, canvas: &mut Image<Srgb8>, top: usize) {
+        self.draw_mark(canvas, top);
+        let at = [TEXT_LEFT_PX as isize, top as isize];
+        draw::text(canvas, at, &self.text, self.ink, LEGEND_SIZE);
+    }
+
+    fn draw_mark(&self, canvas: &mut Image<Srgb8>, top: usize) {
         if let Some(color) = self.mark {
             let at = [MARGIN_PX as isize, top as isize + 2];
             draw::fill(canvas, at, [MARK_PX; 2], color);
         }
-        let at = [TEXT_LEFT_PX as isize, top as isize];
-        draw::text(canvas, at, &self.text, self.ink, LEGEND_SIZE);
     }
 }
 
@@ -177,7 +181,7 @@ fn camera_text(solution: &Solution) -> String {
         camera.focal_px.x,
         100.0 * solution.sigma.ln_focal,
         camera.center().z,
-        camera.tilt().to_degrees(),
+        camera.tilt_deg(),
         solution.rms_px
     )
 }
@@ -207,12 +211,15 @@ fn grid_step(size: [f64; 2]) -> f64 {
 
 /// The next 1, 2 or 5 times a power of ten.
 fn round_step(least: f64) -> f64 {
-    let power = libm::pow(10.0, libm::floor(libm::log10(least)));
-    [1.0, 2.0, 5.0, 10.0]
+    let power = power_of_ten_below(least);
+    [power, 2.0 * power, 5.0 * power]
         .into_iter()
-        .map(|n| n * power)
         .find(|&step| step >= least)
         .unwrap_or(10.0 * power)
+}
+
+fn power_of_ten_below(value: f64) -> f64 {
+    libm::pow(10.0, libm::floor(libm::log10(value)))
 }
 
 /// A picture that is drawn on.
@@ -239,11 +246,10 @@ impl OverlayDrawing {
     /// A photo on which nothing is drawn yet, and a camera for its size.
     fn over_photo(photo: &Image<LinearRgb>, camera: &Camera) -> Self {
         let (width, height) = photo.size();
-        let longer_side = width.max(height) as f64;
         Self {
             picture: photo.clone(),
             camera: camera.resized([width as u32, height as u32]),
-            line_px: (longer_side / SIDE_PER_LINE_WIDTH).max(1.0),
+            line_px: line_width_px(width.max(height)),
         }
     }
 
@@ -329,6 +335,11 @@ impl OverlayDrawing {
 fn stroke_coverage(x: usize, y: usize, ends: [Point2<f64>; 2], width: f64) -> f32 {
     let center = Point2::new(x as f64 + 0.5, y as f64 + 0.5);
     (width / 2.0 + 0.5 - distance(center, ends)).clamp(0.0, 1.0) as f32
+}
+
+/// The width of a line that is well seen in a picture of this size.
+fn line_width_px(longer_side: usize) -> f64 {
+    (longer_side as f64 / SIDE_PER_LINE_WIDTH).max(1.0)
 }
 
 /// One of the points around an ellipse along the axes.

@@ -70,18 +70,22 @@ impl Camera {
     /// Pixel position and depth (metres along the optical axis) of a world point; none at or behind the camera.
     pub fn project(&self, world: Point3<f64>) -> Option<(Point2<f64>, f64)> {
         let c = self.camera_from_world * world;
-        let px = Point2::new(c.x / c.z * self.focal_px.x, c.y / c.z * self.focal_px.y)
-            + self.principal_px.coords;
-        (c.z > 0.0).then_some((px, c.z))
+        (c.z > 0.0).then_some((self.seen_px(c), c.z))
+    }
+
+    /// Where a point of the camera's frame is seen.
+    #[inline]
+    fn seen_px(&self, c: Point3<f64>) -> Point2<f64> {
+        Point2::new(c.x / c.z * self.focal_px.x, c.y / c.z * self.focal_px.y)
+            + self.principal_px.coords
     }
 
     /// The ray through a pixel position. Its parameter *is* the depth along the optical axis, in metres.
     pub fn ray(&self, px: Point2<f64>) -> Ray {
         let d = (px - self.principal_px).component_div(&self.focal_px);
-        let direction = self.camera_from_world.rotation.inverse() * Vector3::new(d.x, d.y, 1.0);
         Ray {
             origin: self.center(),
-            direction,
+            direction: self.camera_from_world.rotation.inverse() * d.push(1.0),
         }
     }
 
@@ -89,6 +93,10 @@ impl Camera {
     pub fn tilt(&self) -> f64 {
         let axis = self.camera_from_world.rotation.inverse() * Vector3::z();
         libm::acos((-axis.z).clamp(-1.0, 1.0))
+    }
+
+    pub(crate) fn tilt_deg(&self) -> f64 {
+        self.tilt().to_degrees()
     }
 
     /// The matrix K of focal lengths and principal point.
@@ -120,13 +128,16 @@ impl Camera {
 
 /// The camera's axes when it looks along a direction, upright.
 fn upright_rotation(forward: &Vector3<f64>) -> UnitQuaternion<f64> {
-    let is_vertical = forward.cross(&Vector3::z()).norm() < 1e-9 * forward.norm();
-    let up = if is_vertical {
+    let up = if is_vertical(forward) {
         Vector3::y()
     } else {
         Vector3::z()
     };
     UnitQuaternion::look_at_lh(forward, &-up)
+}
+
+fn is_vertical(direction: &Vector3<f64>) -> bool {
+    direction.cross(&Vector3::z()).norm() < 1e-9 * direction.norm()
 }
 
 /// Where a point is seen through a lens with distortion; not finite behind the camera.

@@ -58,6 +58,24 @@ pub(crate) struct ParameterPriors {
 }
 
 impl ParameterPriors {
+    /// Nothing is known but perhaps the height.
+    pub(crate) fn only_height(ln_height: Option<Prior>) -> Self {
+        Self {
+            ln_focal: Prior::FLAT,
+            stretch_sigma: f64::INFINITY,
+            principal_sigma: f64::INFINITY,
+            kappa: Prior::FLAT,
+            ln_height,
+        }
+    }
+
+    /// Takes the lens and the sides as exactly known.
+    pub(crate) fn fix_lens(&mut self, ln_focal: f64) {
+        self.ln_focal = Prior::fixed(ln_focal);
+        self.principal_sigma = 0.0;
+        self.stretch_sigma = 0.0;
+        self.kappa.sigma = 0.0;
+    }
     /// Index and prior of each unknown that has one.
     fn by_unknown(&self) -> [(usize, Prior); 5] {
         [

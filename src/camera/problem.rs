@@ -169,12 +169,8 @@ impl SolverUnits {
     /// For a picture, with lengths in metres.
     fn for_picture(label: &Label) -> Self {
         let diagonal = Vector2::from(label.image_size().map(f64::from));
-        let principal_px = label
-            .camera
-            .principal_point_px
-            .map_or(label.taken_center(), |px| label.pixel(px));
         Self {
-            principal_px,
+            principal_px: expected_principal_px(label),
             unit_px: diagonal.norm() / 2.0,
             unit: 1.0,
         }
@@ -228,6 +224,11 @@ impl SolverUnits {
 
     fn normalized(&self, px: Point2<f64>) -> Vector2<f64> {
         (px - self.principal_px) / self.unit_px
+    }
+
+    /// The pixel of a position on the picture.
+    pub(crate) fn pixel(&self, position: Vector2<f64>) -> Point2<f64> {
+        self.principal_px + position * self.unit_px
     }
 
     /// The focal length in pixels, from its logarithm.
@@ -288,19 +289,18 @@ impl SolverUnits {
     }
 }
 
+/// As stated, or the middle of the picture as taken.
+fn expected_principal_px(label: &Label) -> Point2<f64> {
+    let stated = label.camera.principal_point_px;
+    stated.map_or(label.taken_center(), |px| label.pixel(px))
+}
+
 /// Standard deviation of a coordinate of the principal point, in the solver's units.
 fn principal_sigma(label: &Label, framing: Framing, priors: &Priors) -> f64 {
-    let default_sigma = if framing == Framing::Whole {
-        priors.principal_sigma
-    } else {
-        priors.cropped_sigma
-    };
+    let default_px = priors.principal_sigma_for(framing) * diagonal_px(label.taken_size());
+    let sigma_px = label.camera.principal_point_sigma_px;
     let unit_px = diagonal_px(label.image_size()) / 2.0;
-    label
-        .camera
-        .principal_point_sigma_px
-        .unwrap_or(default_sigma * diagonal_px(label.taken_size()))
-        / unit_px
+    sigma_px.unwrap_or(default_px) / unit_px
 }
 
 fn diagonal_px(size: [u32; 2]) -> f64 {

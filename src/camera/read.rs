@@ -1,7 +1,7 @@
 //! Labels from files, ours and other programs', completed with their photos' EXIF data.
 
 use super::import::{self, Annotation};
-use super::label::Label;
+use super::label::{Label, LabelImage};
 use super::pinhole::Camera;
 use crate::bounds::{CAMERA, SURFACE, number};
 use crate::error::{Error, Result};
@@ -272,7 +272,7 @@ fn imported_label(annotation: &Annotation, path: &Path) -> Result<LabelledPhoto>
         .and_then(|_| annotation.label())
         .map_err(|e| e.within(&file).in_file(path))?;
     if annotation.size.is_none() {
-        fill_in_size(&mut label, &path.with_file_name(&file))?;
+        fill_in_size(&mut label.image, &path.with_file_name(&file))?;
     }
     label.image.file = file;
     Ok(LabelledPhoto {
@@ -283,21 +283,19 @@ fn imported_label(annotation: &Annotation, path: &Path) -> Result<LabelledPhoto>
 }
 
 /// Takes over the size of the label's photo.
-fn fill_in_size(label: &mut Label, photo: &Path) -> Result<()> {
+fn fill_in_size(image: &mut LabelImage, photo: &Path) -> Result<()> {
     let header = io::read_header(photo)?;
-    (label.image.width, label.image.height) = (header.width as u32, header.height as u32);
+    (image.width, image.height) = (header.width as u32, header.height as u32);
     Ok(())
 }
 
 /// The name of an annotation's photo: the first that is there, in or below the folder or directly in it, or else the last.
 fn annotated_file(annotation: &Annotation, path: &Path) -> String {
-    let names: Vec<&str> = possible_files(annotation).collect();
-    names
-        .iter()
+    possible_files(annotation)
         .find(|name| path.with_file_name(name).is_file())
-        .or(names.last())
-        .map(|name| (*name).to_owned())
+        .or_else(|| possible_files(annotation).last())
         .unwrap_or_default()
+        .to_owned()
 }
 
 fn possible_files(annotation: &Annotation) -> impl Iterator<Item = &str> {
@@ -310,7 +308,7 @@ fn possible_files(annotation: &Annotation) -> impl Iterator<Item = &str> {
 fn completed(mut labelled: LabelledPhoto, size: Option<[f64; 2]>) -> Result<LabelledPhoto> {
     let surface = &mut labelled.label.surface;
     if let Some(size) = size.filter(|_| !surface.has_side()) {
-        [surface.width_m, surface.height_m] = size.map(Some);
+        surface.set_size(size);
     }
     check_size(&labelled.label).map_err(|e| e.in_file(&labelled.source))?;
     Ok(LabelledPhoto {

@@ -65,9 +65,8 @@ impl ProjectedRectangle {
 
     /// Width over height of the rectangle, for a known focal length.
     pub(crate) fn ratio(&self, focal: f64) -> f64 {
-        let ((a, dw), (b, dh)) = (self.along, self.down);
         let f2 = focal * focal;
-        ((a.norm_squared() + f2 * dw * dw) / (b.norm_squared() + f2 * dh * dh)).sqrt()
+        (length_squared(self.along, f2) / length_squared(self.down, f2)).sqrt()
     }
 
     /// The pose for a known focal length and size; the sides are made orthogonal symmetrically.
@@ -81,6 +80,11 @@ impl ProjectedRectangle {
             scale: (along.norm() / size[0] + up.norm() / size[1]) / (2.0 * self.center.z),
         }
     }
+}
+
+/// Of a projected side at a focal length, given squared.
+fn length_squared((side, depth): (Vector2<f64>, f64), focal_squared: f64) -> f64 {
+    side.norm_squared() + focal_squared * depth * depth
 }
 
 /// The corners of a rectangle's picture with their depths, relative to the mean depth, as last coordinates.

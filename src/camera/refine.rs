@@ -52,6 +52,11 @@ pub(crate) struct NormalEquations {
 }
 
 impl Residuals {
+    /// Measured numbers, priors apart.
+    pub(crate) fn measurement_count(&self) -> usize {
+        2 * self.observations.len() + usize::from(self.priors.ln_height.is_some())
+    }
+
     /// The cost of a state; none where a point would be behind the camera.
     fn cost(&self, state: &State) -> Option<f64> {
         let mut cost = self.priors.cost(state);
@@ -248,15 +253,19 @@ impl NormalEquations {
     fn damped_information(&self, damping: f64) -> Square {
         let mut damped = self.information;
         for i in 0..UNKNOWNS {
-            let own = damped[(i, i)];
-            // An unknown without information stays where it is.
-            damped[(i, i)] = if own > 0.0 {
-                own * (1.0 + damping)
-            } else {
-                1.0
-            };
+            damped[(i, i)] = damped_diagonal(damped[(i, i)], damping);
         }
         damped
+    }
+}
+
+/// An unknown without information stays where it is.
+#[inline]
+fn damped_diagonal(own: f64, damping: f64) -> f64 {
+    if own > 0.0 {
+        own * (1.0 + damping)
+    } else {
+        1.0
     }
 }
 

@@ -16,6 +16,13 @@ pub(crate) struct SearchResult {
     pub(crate) other: Option<Minimum>,
 }
 
+impl SearchResult {
+    /// Without a search for other poses.
+    fn only(best: Minimum) -> Self {
+        Self { best, other: None }
+    }
+}
+
 impl Problem {
     /// Refines from every start and keeps what stands above the surface; none where nothing does.
     pub(crate) fn search(&self) -> Option<SearchResult> {
@@ -46,11 +53,10 @@ impl Problem {
     /// The closed form, where it stands above the surface, after at most `max_iterations` iterations.
     pub(crate) fn closed_form(&self, max_iterations: usize) -> Option<SearchResult> {
         let start = self.start(self.closed_form_or_prior_focal());
-        let best = self
-            .residuals
+        self.residuals
             .refine_for(start, f64::INFINITY, max_iterations)
-            .filter(is_above_surface)?;
-        Some(SearchResult { best, other: None })
+            .filter(is_above_surface)
+            .map(SearchResult::only)
     }
 
     /// For each focal length the closed form and its mirror image; then the two poses without perspective.
@@ -68,7 +74,7 @@ impl Problem {
     /// The mean of the prior, what the corners give, and a short and a long lens; only the mean where it is fixed.
     fn focal_starts(&self) -> [Option<f64>; 4] {
         let prior = self.prior_focal();
-        if self.residuals.priors.ln_focal.is_fixed() {
+        if self.has_fixed_focal() {
             return [Some(prior), None, None, None];
         }
         [
@@ -80,9 +86,12 @@ impl Problem {
     }
 
     fn closed_form_or_prior_focal(&self) -> f64 {
-        let is_fixed = self.residuals.priors.ln_focal.is_fixed();
-        let measured = self.closed_form_focal().filter(|_| !is_fixed);
+        let measured = self.closed_form_focal().filter(|_| !self.has_fixed_focal());
         measured.unwrap_or_else(|| self.prior_focal())
+    }
+
+    fn has_fixed_focal(&self) -> bool {
+        self.residuals.priors.ln_focal.is_fixed()
     }
 
     fn prior_focal(&self) -> f64 {

@@ -114,8 +114,8 @@ fn has_corners(label: &Label) -> bool {
 }
 
 /// The points that lie on a surface of this size.
-fn points_on_surface(label: &Label, size: [f64; 2]) -> impl Iterator<Item = &LabelPoint> {
-    let near = ON_SURFACE_SHARE * size[0].min(size[1]);
+fn points_on_surface(label: &Label, [w, h]: [f64; 2]) -> impl Iterator<Item = &LabelPoint> {
+    let near = ON_SURFACE_SHARE * w.min(h);
     label
         .points
         .iter()
@@ -124,8 +124,11 @@ fn points_on_surface(label: &Label, size: [f64; 2]) -> impl Iterator<Item = &Lab
 
 /// How far the points on a surface of this size reach along an axis, metres.
 fn point_span(label: &Label, size: [f64; 2], axis: usize) -> f64 {
-    let positions = points_on_surface(label, size).map(|p| p.xyz_m[axis]);
-    let [low, high] = positions.fold([f64::MAX, f64::MIN], |[low, high], v| {
+    span(points_on_surface(label, size).map(|p| p.xyz_m[axis]))
+}
+
+fn span(values: impl Iterator<Item = f64>) -> f64 {
+    let [low, high] = values.fold([f64::MAX, f64::MIN], |[low, high], v| {
         [v.min(low), v.max(high)]
     });
     high - low

@@ -125,11 +125,7 @@ impl Scenario {
     fn lens(&self, dice: &mut Dice) -> SharedLens {
         // In this order: the numbers of a seed stay the same.
         let principal_px = self.principal_px(dice);
-        let kappa = if dice.between(0.0, 1.0) < 0.5 {
-            -self.kappa
-        } else {
-            self.kappa
-        };
+        let kappa = dice.sign() * self.kappa;
         SharedLens {
             principal_px,
             kappa,
@@ -276,9 +272,17 @@ impl Dice {
         Self(rng)
     }
 
+    fn below_one(&mut self) -> f64 {
+        (self.0.next_u64() >> 11) as f64 / (1u64 << 53) as f64
+    }
+
     fn between(&mut self, low: f64, high: f64) -> f64 {
-        let unit = (self.0.next_u64() >> 11) as f64 / (1u64 << 53) as f64;
-        low + (high - low) * unit
+        low + (high - low) * self.below_one()
+    }
+
+    /// Minus or plus one.
+    fn sign(&mut self) -> f64 {
+        if self.below_one() < 0.5 { -1.0 } else { 1.0 }
     }
 
     /// A point of a box.
@@ -295,7 +299,7 @@ impl Dice {
 
     /// Box and Muller's normal deviate.
     fn normal(&mut self) -> f64 {
-        let radius = (-2.0 * libm::log(1.0 - self.between(0.0, 1.0))).sqrt();
+        let radius = (-2.0 * libm::log(1.0 - self.below_one())).sqrt();
         radius * libm::cos(self.between(0.0, TAU))
     }
 }

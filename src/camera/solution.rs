@@ -10,7 +10,7 @@ use super::options::SolveOptions;
 use super::pinhole::Camera;
 use super::problem::Problem;
 use super::rectangle::corner_points;
-use super::refine::{Minimum, Residuals};
+use super::refine::Minimum;
 use super::uncertainty::{FocalShare, Uncertainty};
 use crate::diagnostic::{Code, Diagnostic, Severity};
 use crate::geom::{Point2, Point3, Vector2};
@@ -178,7 +178,7 @@ impl Problem {
         Camera {
             image: self.image,
             focal_px: Vector2::repeat(state.focal * units.unit_px),
-            principal_px: units.principal_px + state.principal * units.unit_px,
+            principal_px: units.pixel(state.principal),
             camera_from_world: pose_from(state.pose.rotation, state.translation() * units.unit),
         }
     }
@@ -194,11 +194,8 @@ impl Problem {
 
     /// Where a point of the rectangle, metres, is seen; NaN behind the camera.
     fn seen_px(&self, state: &State, point: Point3<f64>) -> Point2<f64> {
-        let units = &self.units;
-        let seen = state.project(&(point.coords / units.unit), false);
-        seen.map_or(Point2::new(f64::NAN, f64::NAN), |u| {
-            units.principal_px + u * units.unit_px
-        })
+        let seen = state.project(&(point.coords / self.units.unit), false);
+        seen.map_or(Point2::from([f64::NAN; 2]), |u| self.units.pixel(u))
     }
 
     fn fit(
@@ -223,13 +220,9 @@ impl Problem {
     }
 
     fn degrees_of_freedom(&self) -> usize {
-        let Residuals {
-            observations,
-            priors,
-            ..
-        } = &self.residuals;
-        let measured = 2 * observations.len() + usize::from(priors.ln_height.is_some());
-        measured.saturating_sub(6 + priors.flat_count())
+        let residuals = &self.residuals;
+        let unknowns = 6 + residuals.priors.flat_count();
+        residuals.measurement_count().saturating_sub(unknowns)
     }
 
     fn sigma(&self, minimum: &Minimum, uncertainty: &Uncertainty, reference_height: f64) -> Sigma {
@@ -347,7 +340,7 @@ impl Solution {
     }
 
     fn grazing_warning(&self) -> Option<Diagnostic> {
-        let tilt_deg = self.camera.tilt().to_degrees();
+        let tilt_deg = self.camera.tilt_deg();
         (tilt_deg > GRAZING_DEG).then(|| {
             let what = format!(
                 "grazing view: the camera looks along the surface ({tilt_deg:.1} degrees from straight down)"
@@ -391,13 +384,11 @@ fn misfit_severity(p_value: f64) -> Severity {
 }
 
 fn is_finite_camera(camera: &Camera) -> bool {
-    let center = camera.center();
-    camera.focal_px.x.is_finite()
-        && camera
-            .principal_px
-            .iter()
-            .chain(center.iter())
-            .all(|value| value.is_finite())
+    let numbers = camera.principal_px.iter().copied();
+    numbers
+        .chain(camera.center().iter().copied())
+        .chain([camera.focal_px.x])
+        .all(f64::is_finite)
 }
 
 fn root_mean_square(distances: &[f64; 4]) -> f64 {

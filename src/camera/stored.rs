@@ -2,6 +2,7 @@
 
 use super::error::SolveError;
 use super::file::{CameraFile, SolvedFrom, checksum};
+use super::label::Label;
 use super::options::SolveOptions;
 use super::pinhole::Camera;
 use super::read::LabelledPhoto;
@@ -79,14 +80,18 @@ impl PhotoCamera {
     }
 
     fn solved(labelled: &LabelledPhoto, force: bool) -> Result<Self> {
-        let solved = solve(&labelled.label, &SolveOptions::default());
-        let usable = match force {
-            true => solved,
-            false => solved.and_then(Solution::fitting),
-        };
-        usable
+        usable_solution(&labelled.label, force)
             .map(Self::from)
             .map_err(|error| located_error(error, labelled))
+    }
+}
+
+/// A camera that fits, or with `force` any.
+fn usable_solution(label: &Label, force: bool) -> std::result::Result<Solution, SolveError> {
+    let solved = solve(label, &SolveOptions::default());
+    match force {
+        true => solved,
+        false => solved.and_then(Solution::fitting),
     }
 }
 
@@ -109,22 +114,20 @@ fn camera_path(labelled: &LabelledPhoto) -> PathBuf {
 /// The camera file of a label, where there is one.
 fn read_camera_file(labelled: &LabelledPhoto) -> Result<Option<CameraFile>> {
     let path = camera_path(labelled);
-    if !path.exists() {
-        return Ok(None);
-    }
-    checked_camera_file(&path, labelled)
-        .map(Some)
-        .map_err(|error| with_advice(error, &path))
+    let file = path.exists().then(|| checked_camera_file(&path, labelled));
+    file.transpose().map_err(|error| with_advice(error, &path))
 }
 
 /// The error of a camera file, with what to do about it.
 fn with_advice(error: Error, path: &Path) -> Error {
-    let what = error.to_string();
-    let what = what
-        .strip_prefix(&format!("{}: ", path.display()))
-        .unwrap_or(&what);
+    let what = message_without_path(&error.to_string(), path);
     let what = format!("{what}; delete it, or run `petcomp camera solve` again");
     Error::file(path, what)
+}
+
+fn message_without_path(message: &str, path: &Path) -> String {
+    let place = format!("{}: ", path.display());
+    message.strip_prefix(&place).unwrap_or(message).to_owned()
 }
 
 fn checked_camera_file(path: &Path, labelled: &LabelledPhoto) -> Result<CameraFile> {

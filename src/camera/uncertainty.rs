@@ -111,8 +111,7 @@ impl Uncertainty {
         problem: &Problem,
         state: &State,
     ) -> [Matrix2<f64>; 4] {
-        let corners = corner_points(problem.size);
-        corners.map(|c| {
+        corner_points(problem.size).map(|c| {
             self.point_covariance_px(problem, state, c.coords)
                 .unwrap_or(Matrix2::repeat(f64::INFINITY))
         })
@@ -163,10 +162,14 @@ pub(crate) fn repaired_variance(value: f64) -> f64 {
 /// Points of a grid over a rectangle, metres, at a height.
 pub(crate) fn grid_at_height([w, h]: [f64; 2], height: f64) -> impl Iterator<Item = Point3<f64>> {
     (0..GRID_SIDE * GRID_SIDE).map(move |i| {
-        let [x, y] =
-            [i % GRID_SIDE, i / GRID_SIDE].map(|k| k as f64 / (GRID_SIDE - 1) as f64 - 0.5);
+        let (x, y) = (grid_share(i % GRID_SIDE), grid_share(i / GRID_SIDE));
         Point3::new(x * w, y * h, height)
     })
+}
+
+/// Where a point of the grid stands on its side, from -0.5 to 0.5.
+fn grid_share(k: usize) -> f64 {
+    k as f64 / (GRID_SIDE - 1) as f64 - 0.5
 }
 
 /// Inverse of the information, and the information left on the focal length when all else is free.
@@ -182,7 +185,7 @@ fn covariance(information: &Square) -> (Square, f64) {
     inverse[(LN_FOCAL, LN_FOCAL)] = 0.0;
     let mut response = -(inverse * coupling);
     let own = f64::from(information[(LN_FOCAL, LN_FOCAL)] > 0.0);
-    let left = (own + coupling.dot(&response)).max(0.0);
+    let left = information_left(own, &coupling, &response);
     if own > 0.0 {
         response[LN_FOCAL] = 1.0;
         inverse += response * response.transpose() / left.max(ROUNDING_SHARE);
@@ -192,6 +195,11 @@ fn covariance(information: &Square) -> (Square, f64) {
         unscaled(&inverse, &scale),
         unscaled_information(left, scale[LN_FOCAL]),
     )
+}
+
+/// On the focal length, when all else answers to it.
+fn information_left(own: f64, coupling: &Unknowns, response: &Unknowns) -> f64 {
+    (own + coupling.dot(response)).max(0.0)
 }
 
 fn unscaled(covariance: &Square, scale: &Unknowns) -> Square {

@@ -78,9 +78,12 @@ fn points(node: Node<'_, '_>) -> Result<Vec<[f64; 2]>> {
 
 /// `x,y` as numbers.
 fn point(text: &str) -> Result<[f64; 2]> {
-    text.split_once(',')
-        .and_then(|(x, y)| Some([x.trim().parse().ok()?, y.trim().parse().ok()?]))
-        .ok_or_else(|| Error::value("points", format!("\"{text}\", expected x,y")))
+    parsed_point(text).ok_or_else(|| Error::value("points", format!("\"{text}\", expected x,y")))
+}
+
+fn parsed_point(text: &str) -> Option<[f64; 2]> {
+    let (x, y) = text.split_once(',')?;
+    Some([x.trim().parse().ok()?, y.trim().parse().ok()?])
 }
 
 fn number(node: Node<'_, '_>, name: &str) -> Result<f64> {

@@ -38,10 +38,11 @@ struct ResultGeometry {
 
 pub(super) fn is_label_studio(value: &Value) -> bool {
     let tasks = items(value);
-    !tasks.is_empty()
-        && tasks
-            .iter()
-            .all(|task| task.get("annotations").is_some() || !results_beside(task).is_empty())
+    !tasks.is_empty() && tasks.iter().all(is_task)
+}
+
+fn is_task(value: &Value) -> bool {
+    value.get("annotations").is_some() || !results_beside(value).is_empty()
 }
 
 pub(super) fn annotations(value: Value) -> Result<Vec<Annotation>> {
@@ -109,12 +110,14 @@ fn is_cancelled(annotation: &Value) -> bool {
 
 /// JSON-MIN: results in lists under the names of the tools that drew them.
 fn results_beside(task: &Value) -> Vec<&Value> {
-    let lists = task
-        .as_object()
-        .into_iter()
-        .flat_map(|task| task.values())
-        .filter_map(Value::as_array);
+    let lists = member_values(task).filter_map(Value::as_array);
     lists.flatten().filter(|result| has_size(result)).collect()
+}
+
+/// The values of an object; none of anything else.
+fn member_values(value: &Value) -> impl Iterator<Item = &Value> {
+    let object = value.as_object().into_iter();
+    object.flat_map(|members| members.values())
 }
 
 /// Choices, ratings and the like have no size of a picture.
@@ -195,9 +198,7 @@ const PICTURE_ENDINGS: [&str; 8] = [
 /// Names that a task's picture may have, the most likely first.
 fn picture_names(task: &Value) -> Vec<String> {
     let data = task.get("data").unwrap_or(task);
-    data.as_object()
-        .into_iter()
-        .flat_map(|data| data.values())
+    member_values(data)
         .chain(task.get("file_upload"))
         .filter_map(|value| picture_name(value.as_str()?))
         .flat_map(with_original_name)
@@ -212,22 +213,30 @@ fn with_original_name(name: String) -> impl Iterator<Item = String> {
 
 /// The name of the picture at an address.
 fn picture_name(address: &str) -> Option<String> {
+    let name = decoded(last_part(address)?);
+    is_picture(&name).then_some(name)
+}
+
+/// What follows the last slash, of the path in the query where there is one.
+fn last_part(address: &str) -> Option<&str> {
     let path = address.rsplit_once("?d=").map_or(address, |(_, path)| path);
-    let name = decoded(path.rsplit(['/', '\\']).next()?);
-    PICTURE_ENDINGS
-        .iter()
-        .any(|end| name.to_lowercase().ends_with(end))
-        .then_some(name)
+    path.rsplit(['/', '\\']).next()
+}
+
+fn is_picture(name: &str) -> bool {
+    let name = name.to_lowercase();
+    PICTURE_ENDINGS.iter().any(|end| name.ends_with(end))
 }
 
 /// The name that a file had before it was uploaded.
 fn without_upload_prefix(name: &str) -> Option<&str> {
     let (digits, rest) = name.split_at_checked(UPLOAD_PREFIX_LENGTH - 1)?;
     let bare = rest.strip_prefix('-')?;
-    digits
-        .bytes()
-        .all(|byte| byte.is_ascii_hexdigit())
-        .then_some(bare)
+    is_hexadecimal(digits).then_some(bare)
+}
+
+fn is_hexadecimal(text: &str) -> bool {
+    text.bytes().all(|byte| byte.is_ascii_hexdigit())
 }
 
 /// A text with its `%20` and the like undone.

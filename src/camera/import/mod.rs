@@ -47,13 +47,14 @@ pub(crate) enum ShapeKind {
 /// [`Error::Value`] for a file of one of the programs that does not hold what theirs do.
 pub(crate) fn annotations(text: &str) -> Result<Option<Vec<Annotation>>> {
     let text = text.trim_start_matches('\u{feff}');
-    if text.trim_start().starts_with('<') {
+    if is_xml(text) {
         return cvat::annotations(text);
     }
-    match io::parse_json::<Value>(text) {
-        Ok(value) => json_annotations(value),
-        Err(_) => Ok(None),
-    }
+    io::parse_json(text).map_or(Ok(None), json_annotations)
+}
+
+fn is_xml(text: &str) -> bool {
+    text.trim_start().starts_with('<')
 }
 
 fn json_annotations(value: Value) -> Result<Option<Vec<Annotation>>> {
@@ -72,7 +73,7 @@ fn json_annotations(value: Value) -> Result<Option<Vec<Annotation>>> {
 /// [`Error::Value`] for text that is not LabelMe's, and for anything but one quadrangle, one rectangle or four points.
 pub fn from_labelme(text: &str, size: [f64; 2]) -> Result<Label> {
     let mut label = labelme::annotation(io::parse_json(text)?)?.label()?;
-    (label.surface.width_m, label.surface.height_m) = (Some(size[0]), Some(size[1]));
+    label.surface.set_size(size);
     Ok(label)
 }
 
@@ -110,8 +111,7 @@ impl Annotation {
     }
 
     fn check_finite(&self) -> Result<()> {
-        let mut numbers = self.shapes.iter().flat_map(|s| s.points.as_flattened());
-        match numbers.all(|v| v.is_finite()) {
+        match self.shapes.iter().all(AnnotatedShape::is_finite) {
             true => Ok(()),
             false => Err(Error::value("shapes", "a point is not finite")),
         }
@@ -130,10 +130,7 @@ impl Annotation {
     /// Name and corners of the shapes of a kind that have four.
     fn four_cornered(&self, kind: ShapeKind) -> Vec<NamedCorners> {
         self.shapes_of(kind)
-            .filter_map(|shape| {
-                let corners = without_repeated_end(&shape.points).try_into().ok()?;
-                Some((shape.name.clone(), corners))
-            })
+            .filter_map(AnnotatedShape::corners)
             .collect()
     }
 
@@ -154,12 +151,22 @@ const UNNAMED: &str = "surface";
 /// Name of a surface and its corners, pixels.
 type NamedCorners = (String, [[f64; 2]; 4]);
 
+impl AnnotatedShape {
+    fn is_finite(&self) -> bool {
+        self.points.as_flattened().iter().all(|v| v.is_finite())
+    }
+
+    /// Its corners, where it has four.
+    fn corners(&self) -> Option<NamedCorners> {
+        let corners = without_repeated_end(&self.points).try_into().ok()?;
+        Some((self.name.clone(), corners))
+    }
+}
+
 /// A polygon without a last point that repeats the first.
 fn without_repeated_end(points: &[[f64; 2]]) -> &[[f64; 2]] {
     match points {
-        [first, rest @ .., last] if first == last && !rest.is_empty() => {
-            &points[..points.len() - 1]
-        }
+        [ring @ .., last] if ring.len() > 1 && ring[0] == *last => ring,
         _ => points,
     }
 }

@@ -59,11 +59,11 @@ pub(super) fn read(light: &Image<f32>, corners: &[Point2<f64>; 4]) -> Option<Mar
 }
 
 fn extremes(light: &[f32]) -> (f32, f32) {
-    light
-        .iter()
-        .fold((f32::MAX, 0.0), |(dark, bright): (f32, f32), &cell| {
-            (dark.min(cell), bright.max(cell))
-        })
+    let cells = light.iter().copied();
+    (
+        cells.clone().fold(f32::MAX, f32::min),
+        cells.fold(0.0, f32::max),
+    )
 }
 
 /// The light of each cell between four corners; none where the photo does not show one.
@@ -112,9 +112,9 @@ fn cell_mean(light: &Image<f32>, photo_from_square: &Homography, cell: [usize; 2
 
 /// Where in the unit square a cell's sample (column and row, of three each) is.
 fn sample_position(cell: [usize; 2], sample: [usize; 2]) -> Point2<f64> {
-    let [u, v] = [0, 1]
-        .map(|axis| (cell[axis] as f64 + 0.3 + 0.2 * sample[axis] as f64) / MARKER_CELLS as f64);
-    Point2::new(u, v)
+    [0, 1]
+        .map(|axis| (cell[axis] as f64 + 0.3 + 0.2 * sample[axis] as f64) / MARKER_CELLS as f64)
+        .into()
 }
 
 /// Number of a marker, and by how many quarters its pattern was turned.

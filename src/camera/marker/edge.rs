@@ -207,12 +207,18 @@ fn inner_edges(white: &WhiteCells) -> Vec<InnerEdge> {
     let mut edges = Vec::new();
     for upright in [false, true] {
         for across in 1..MARKER_CELLS - 1 {
-            let found = (1..MARKER_CELLS)
-                .filter_map(|along| InnerEdge::between(white, upright, across, along));
-            edges.extend(found);
+            edges.extend(edges_of_line(white, upright, across));
         }
     }
     edges
+}
+
+fn edges_of_line(
+    white: &WhiteCells,
+    upright: bool,
+    across: usize,
+) -> impl Iterator<Item = InnerEdge> {
+    (1..MARKER_CELLS).filter_map(move |along| InnerEdge::between(white, upright, across, along))
 }
 
 /// The edge near the side from a corner to the next, dark on its right-hand side (clockwise corners, y down).
@@ -248,11 +254,17 @@ fn probe_part(i: usize) -> f64 {
     CORNER_PART + (1.0 - 2.0 * CORNER_PART) * (i as f64 + 0.5) / SIDE_PROBES as f64
 }
 
+/// Drops the points that are far from the line through all of them.
+fn drop_outliers(points: &mut Vec<Point2<f64>>) -> Option<()> {
+    let line = Line::through(points)?;
+    points.retain(|p| line.distance(*p).abs() < MAX_OFF_LINE_PX);
+    Some(())
+}
+
 /// The line through the probes of a side, without those that are off it; none where half of them are.
 fn line_through_most(mut points: Vec<Point2<f64>>) -> Option<Line> {
     for _ in 0..2 {
-        let line = Line::through(&points)?;
-        points.retain(|p| line.distance(*p).abs() < MAX_OFF_LINE_PX);
+        drop_outliers(&mut points)?;
     }
     if points.len() < SIDE_PROBES / 2 {
         None

@@ -80,6 +80,11 @@ pub(crate) fn any_markers(photo: &Image<LinearRgb>) -> Vec<Marker> {
             return tags;
         }
     }
+    dictionary_markers(photo)
+}
+
+/// The dictionary's markers, none of them stated better than in general.
+fn dictionary_markers(photo: &Image<LinearRgb>) -> Vec<Marker> {
     let mut found = find_markers(photo);
     for marker in &mut found {
         marker.sigma_px = marker.sigma_px.max(MIN_STATED_SIGMA_PX);
@@ -98,13 +103,17 @@ pub(crate) fn any_markers(photo: &Image<LinearRgb>) -> Vec<Marker> {
 pub fn with_markers(label: Label, photo: &Image<LinearRgb>) -> Result<Label> {
     let layout = MarkerLayout::find(&label, photo)?;
     let turns = layout.fitting_turns();
+    warn_of_turns(turns);
+    Ok(layout.label_turned(turns))
+}
+
+fn warn_of_turns(turns: usize) {
     if turns > 0 {
         let degrees = 90 * turns;
         log::warn!(
             "markers: they fit the map only if turned by {degrees} degrees (markers.artwork, or the map's axes)"
         );
     }
-    Ok(layout.label_turned(turns))
 }
 
 /// The markers of a map's family, and the least noise that is stated of their corners.
@@ -213,13 +222,11 @@ fn chi2_or_infinite(fit: Option<Fit>) -> f64 {
 
 /// A corner of a square on the surface, from the top left, clockwise.
 fn square_corner([x, y, z]: [f64; 3], half: f64, corner: usize) -> [f64; 3] {
-    match corner {
-        0 => [x - half, y + half, z],
-        1 => [x + half, y + half, z],
-        2 => [x + half, y - half, z],
-        _ => [x - half, y - half, z],
-    }
+    let [right, up] = CORNER_DIRECTIONS[corner];
+    [x + right * half, y + up * half, z]
 }
+
+const CORNER_DIRECTIONS: [[f64; 2]; 4] = [[-1.0, 1.0], [1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]];
 
 #[cfg(test)]
 pub(crate) use tests::printed;
