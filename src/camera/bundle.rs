@@ -567,7 +567,9 @@ fn mean_ln_focal(alone: &[Result<Solution, SolveError>], unit_px: f64) -> Option
 fn weighted_focal_px(solution: &Solution) -> Option<(f64, f64)> {
     let sigma = solution.sigma.ln_focal;
     let weight = solution.focal.share / (sigma * sigma);
-    Some((weight, solution.focal.from_data_px?)).filter(|_| weight.is_finite())
+    weight
+        .is_finite()
+        .then_some((weight, solution.focal.from_data_px?))
 }
 
 fn inverse_or_zero(variance: f64) -> f64 {

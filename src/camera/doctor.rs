@@ -50,7 +50,7 @@ fn pose_line(solution: &Solution) -> String {
     let height_sigma = sigma.center[(2, 2)].max(0.0).sqrt();
     format!(
         "The camera is {:.3} m (+- {:.3}) above the surface, tilted by {:.1} degrees (+- {:.1}) from straight down.",
-        camera.center().z,
+        camera.height_m(),
         height_sigma,
         camera.tilt_deg(),
         sigma.tilt.to_degrees(),
@@ -145,7 +145,7 @@ fn height_advice(label: &Label, solution: &Solution, options: &SolveOptions) -> 
     if label.camera.height_m.is_some() {
         return None;
     }
-    let height = solution.camera.center().z;
+    let height = solution.camera.height_m();
     let better = solve(&with_measured_height(label, height), options)
         .ok()?
         .sigma

@@ -221,10 +221,11 @@ impl CameraFile {
     }
 
     fn check_image(&self, image: [u32; 2]) -> Result<()> {
-        if self.image.size() == image && !image.contains(&0) {
+        let size = self.image.size();
+        if size == image && !image.contains(&0) {
             return Ok(());
         }
-        Err(other_size(self.image.size(), image))
+        Err(other_size(size, image))
     }
 }
 
@@ -261,7 +262,7 @@ impl Model {
 }
 
 fn check_above_surface(camera: &Camera) -> Result<()> {
-    if camera.center().z > 0.0 {
+    if camera.height_m() > 0.0 {
         Ok(())
     } else {
         Err(Error::value("opencv.t", "the camera is below the surface"))

@@ -122,13 +122,17 @@ impl Solution {
         })
     }
 
+    /// Where the camera sees a grid over the rectangle, at a height.
+    fn seen_grid(&self, height: f64) -> impl Iterator<Item = Vector2<f64>> {
+        grid_at_height(self.size, height).map(|point| self.sees(point))
+    }
+
     /// Root mean square distance of points at the reference height as two cameras see them.
     fn height_apart_px(&self, other: &Self) -> f64 {
         let height = self.sigma.reference_height;
-        let own = grid_at_height(self.size, height).map(|point| self.sees(point));
-        let others = grid_at_height(other.size, height).map(|point| other.sees(point));
-        let squares: Vec<f64> = own
-            .zip(others)
+        let squares: Vec<f64> = self
+            .seen_grid(height)
+            .zip(other.seen_grid(height))
             .map(|(a, b)| repaired_variance((b - a).norm_squared()))
             .collect();
         (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()

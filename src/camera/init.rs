@@ -98,17 +98,22 @@ struct CommentedLabel<'a> {
 /// # Errors
 /// [`Error::Value`] for a value that JSON cannot express.
 pub fn commented(label: &Label) -> Result<String> {
+    let commented = CommentedLabel {
+        todo: open_questions(label),
+        label: &with_null_corners(label),
+    };
+    let text = serde_json::to_string_pretty(&commented).map_err(|e| Error::value("label", e))?;
+    Ok(with_folded_lists(&text) + "\n")
+}
+
+/// With corners to be filled in, where there are none.
+fn with_null_corners(label: &Label) -> Label {
     let mut shown = label.clone();
     if lacks_corners(label) {
         // NaN is written as null.
         shown.surface.corners_px = Some([[f64::NAN; 2]; 4]);
     }
-    let commented = CommentedLabel {
-        todo: open_questions(label),
-        label: &shown,
-    };
-    let text = serde_json::to_string_pretty(&commented).map_err(|e| Error::value("label", e))?;
-    Ok(with_folded_lists(&text) + "\n")
+    shown
 }
 
 fn lacks_corners(label: &Label) -> bool {

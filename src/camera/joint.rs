@@ -51,9 +51,7 @@ impl OutlierPhoto {
 /// # Errors
 /// [`SolveError::DifferentPictures`] where the shapes differ; the first photo's error where no photo can be used.
 pub fn solve_joint(labels: &[Label], options: &SolveOptions) -> Result<Joint, SolveError> {
-    if let Some(photo) = labels.iter().position(|l| !same_frame(l, &labels[0])) {
-        return Err(SolveError::DifferentPictures { photo });
-    }
+    refuse_different_frames(labels)?;
     let photos = solve_alone(labels, options)?;
     let solver = JointSolver {
         labels,
@@ -249,6 +247,13 @@ pub fn group_by_camera(labels: &[Label]) -> Vec<Vec<usize>> {
 
 fn same_camera(a: &Label, b: &Label) -> bool {
     b.camera.id.is_some() && a.camera.id == b.camera.id && same_frame(a, b)
+}
+
+fn refuse_different_frames(labels: &[Label]) -> Result<(), SolveError> {
+    match labels.iter().position(|l| !same_frame(l, &labels[0])) {
+        Some(photo) => Err(SolveError::DifferentPictures { photo }),
+        None => Ok(()),
+    }
 }
 
 /// Two pictures show the same frame of a camera, at any resolution: in units of the diagonal, everything that a

@@ -180,7 +180,7 @@ fn camera_text(solution: &Solution) -> String {
         "focal length {:.0} px (+- {:.1} %), {:.3} m high, tilt {:.1} degrees, corners to {:.2} px",
         camera.focal_px.x,
         100.0 * solution.sigma.ln_focal,
-        camera.center().z,
+        camera.height_m(),
         camera.tilt_deg(),
         solution.rms_px
     )
@@ -234,9 +234,7 @@ impl OverlayDrawing {
     /// A solution drawn over a photo, of the label's size or another.
     fn new(photo: &Image<LinearRgb>, solution: &Solution) -> Self {
         let mut drawing = Self::over_photo(photo, &solution.camera);
-        for line in grid(solution.size) {
-            drawing.line(line, GRID_COLOR, GRID_WEIGHT);
-        }
+        drawing.draw_grid(solution.size);
         drawing.draw_box(solution.size, solution.sigma.reference_height);
         let zoom = photo.width() as f64 / f64::from(solution.camera.image[0].max(1));
         drawing.draw_corners(solution, zoom);
@@ -258,6 +256,12 @@ impl OverlayDrawing {
         for (corner, covariance) in solution.corners_px.iter().zip(&solution.sigma.corners_px) {
             self.cross(corner * zoom);
             self.ellipse(corner * zoom, &(covariance * zoom * zoom));
+        }
+    }
+
+    fn draw_grid(&mut self, size: [f64; 2]) {
+        for line in grid(size) {
+            self.line(line, GRID_COLOR, GRID_WEIGHT);
         }
     }
 

@@ -95,6 +95,11 @@ impl Camera {
         libm::acos((-axis.z).clamp(-1.0, 1.0))
     }
 
+    /// Height above the surface, metres.
+    pub(crate) fn height_m(&self) -> f64 {
+        self.center().z
+    }
+
     pub(crate) fn tilt_deg(&self) -> f64 {
         self.tilt().to_degrees()
     }

@@ -66,6 +66,7 @@ impl Problem {
         focal: Option<f64>,
         options: &SolveOptions,
     ) -> Result<Self, SolveError> {
+        // In one piece: each step needs what several before it have found.
         check_label(label)?;
         let sides = MeasuredSides::new(label, options)?;
         let stretch_shares = sides.stretch_shares();

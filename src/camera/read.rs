@@ -223,11 +223,14 @@ fn parse_own_labels(text: &str, path: &Path) -> Result<Vec<LabelledPhoto>> {
     }
     io::parse_json::<Vec<Label>>(text)?
         .into_iter()
-        .map(|label| {
-            let name = stem(Path::new(&label.image.file));
-            own_label(label, name, path)
-        })
+        .map(|label| listed_label(label, path))
         .collect()
+}
+
+/// One of several in a file, which goes by its photo's name.
+fn listed_label(label: Label, path: &Path) -> Result<LabelledPhoto> {
+    let name = stem(Path::new(&label.image.file));
+    own_label(label, name, path)
 }
 
 fn own_label(label: Label, name: String, path: &Path) -> Result<LabelledPhoto> {
@@ -389,12 +392,21 @@ pub fn check_distance(camera: &Camera) -> Result<()> {
     if CAMERA.contains(distance) {
         return Ok(());
     }
+    Err(implausible_distance(distance))
+}
+
+fn implausible_distance(distance: f64) -> Error {
     let metres = number((1e3 * distance).round() / 1e3);
-    let question = CAMERA
-        .unit_meant(distance)
-        .map_or(String::new(), |unit| format!("; is the size in {unit}s?"));
+    let question = unit_question(distance);
     let what = format!("the camera would be {metres} m away, expected {CAMERA}{question}");
-    Err(Error::value("surface", what))
+    Error::value("surface", what)
+}
+
+/// Asks for the unit of the size, where another one would explain the distance.
+fn unit_question(distance: f64) -> String {
+    CAMERA
+        .unit_meant(distance)
+        .map_or(String::new(), |unit| format!("; is the size in {unit}s?"))
 }
 
 /// The picture of a label that was read from `path`, where it is there.

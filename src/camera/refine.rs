@@ -79,11 +79,7 @@ impl Residuals {
             let (value, slope) = state.ln_height()?;
             normal.add(value - height.mean, &slope, height.information());
         }
-        self.priors
-            .remove_fixed(&mut normal.information, &mut normal.slope);
-        normal.cost += self
-            .priors
-            .add_to(state, &mut normal.information, &mut normal.slope);
+        normal.add_priors(&self.priors, state);
         Some(normal)
     }
 
@@ -218,6 +214,11 @@ impl NormalEquations {
 
     /// Adds both coordinates of an observation; none where its point would be behind the camera.
     #[inline]
+    fn add_priors(&mut self, priors: &ParameterPriors, state: &State) {
+        priors.remove_fixed(&mut self.information, &mut self.slope);
+        self.cost += priors.add_to(state, &mut self.information, &mut self.slope);
+    }
+
     fn add_observation(&mut self, state: &State, observation: &Observation) -> Option<()> {
         let (seen, slope) = state.slope(&observation.point, observation.rigid)?;
         let off = seen - observation.seen;
@@ -242,11 +243,7 @@ impl NormalEquations {
         let step = solve_positive(self.damped_information(damping), -self.slope)?;
         let squares = step.component_mul(&step);
         let length = squares.dot(&self.information.diagonal()).sqrt();
-        let leap = LIMITED_UNKNOWNS
-            .into_iter()
-            .map(|i| step[i].abs())
-            .fold(MAX_STEP, f64::max);
-        Some((step * (MAX_STEP / leap), length))
+        Some((step * (MAX_STEP / leap(&step)), length))
     }
 
     #[inline]
@@ -257,6 +254,14 @@ impl NormalEquations {
         }
         damped
     }
+}
+
+/// The largest change of an unknown of limited step, no less than the limit.
+fn leap(step: &Unknowns) -> f64 {
+    LIMITED_UNKNOWNS
+        .into_iter()
+        .map(|i| step[i].abs())
+        .fold(MAX_STEP, f64::max)
 }
 
 /// An unknown without information stays where it is.

@@ -61,11 +61,8 @@ impl Problem {
 
     /// For each focal length the closed form and its mirror image; then the two poses without perspective.
     fn starts(&self) -> impl Iterator<Item = State> {
-        let near = self.focal_starts().into_iter().flatten().flat_map(|focal| {
-            let direct = self.start(focal);
-            let pose = direct.pose.mirrored(focal);
-            [direct, State { pose, ..direct }]
-        });
+        let focals = self.focal_starts().into_iter().flatten();
+        let near = focals.flat_map(|focal| self.direct_and_mirrored(focal));
         let nominal = self.start(self.prior_focal());
         let distant = self.projected.distant_poses(self.unit_size());
         near.chain(distant.map(|pose| State { pose, ..nominal }))
@@ -83,6 +80,12 @@ impl Problem {
             Some(prior / 2.0),
             Some(prior * 3.0),
         ]
+    }
+
+    fn direct_and_mirrored(&self, focal: f64) -> [State; 2] {
+        let direct = self.start(focal);
+        let pose = direct.pose.mirrored(focal);
+        [direct, State { pose, ..direct }]
     }
 
     fn closed_form_or_prior_focal(&self) -> f64 {

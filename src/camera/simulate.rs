@@ -158,13 +158,17 @@ impl Scenario {
 
     /// What a person would label who measured another ratio of the sides than there is.
     fn label(&self, corners_px: [[f64; 2]; 4], ln_ratio: f64) -> Label {
-        let half = libm::exp(ln_ratio / 2.0);
-        let measured = [self.size[0] * half, self.size[1] / half];
-        let mut label = Label::new(self.image, corners_px, measured);
+        let mut label = Label::new(self.image, corners_px, self.measured_size(ln_ratio));
         label.surface.corner_sigma_px =
             (self.corner_sigma_px > 0.0).then_some(self.corner_sigma_px);
         label.image.cropped = (self.off_center == 0.0).then_some(false);
         label
+    }
+
+    /// The sides as measured, with an error of their ratio.
+    fn measured_size(&self, ln_ratio: f64) -> [f64; 2] {
+        let half = libm::exp(ln_ratio / 2.0);
+        [self.size[0] * half, self.size[1] / half]
     }
 
     fn camera(&self, lens: &SharedLens, dice: &mut Dice) -> Camera {

@@ -341,12 +341,10 @@ impl Solution {
 
     fn grazing_warning(&self) -> Option<Diagnostic> {
         let tilt_deg = self.camera.tilt_deg();
-        (tilt_deg > GRAZING_DEG).then(|| {
-            let what = format!(
-                "grazing view: the camera looks along the surface ({tilt_deg:.1} degrees from straight down)"
-            );
-            Diagnostic::warning(Code::GrazingView, what)
-        })
+        let what = format!(
+            "grazing view: the camera looks along the surface ({tilt_deg:.1} degrees from straight down)"
+        );
+        (tilt_deg > GRAZING_DEG).then(|| Diagnostic::warning(Code::GrazingView, what))
     }
 
     fn unbounded_warning(&self) -> Option<Diagnostic> {

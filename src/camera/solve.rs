@@ -255,9 +255,14 @@ fn with_exchanged_sides(label: &Label, options: &SolveOptions, chi2: f64) -> Opt
     if width_m == height_m || chi2 <= CHI2_99 {
         return None;
     }
+    let other = solve_without_wrong_exif(&exchanged(label), options).ok()?;
+    (other.fit.chi2 + CHI2_99 < chi2).then_some(other)
+}
+
+/// The label with width and height exchanged.
+fn exchanged(label: &Label) -> Label {
     let mut exchanged = label.clone();
     let surface = &mut exchanged.surface;
     std::mem::swap(&mut surface.width_m, &mut surface.height_m);
-    let other = solve_without_wrong_exif(&exchanged, options).ok()?;
-    (other.fit.chi2 + CHI2_99 < chi2).then_some(other)
+    exchanged
 }

@@ -119,11 +119,15 @@ impl Uncertainty {
 
     /// Root mean square error, pixels, of points over the rectangle at a height of `height` metres.
     pub(crate) fn height_sigma_px(&self, problem: &Problem, state: &State, height: f64) -> f64 {
-        let traces = grid_at_height(problem.size, height).map(|point| {
-            self.point_covariance_px(problem, state, point.coords)
-                .map_or(f64::INFINITY, |c| repaired_variance(c.trace()))
-        });
-        (traces.sum::<f64>() / (GRID_SIDE * GRID_SIDE) as f64).sqrt()
+        let variances = grid_at_height(problem.size, height)
+            .map(|point| self.point_variance_px(problem, state, point.coords));
+        (variances.sum::<f64>() / (GRID_SIDE * GRID_SIDE) as f64).sqrt()
+    }
+
+    /// Variance of both coordinates together.
+    fn point_variance_px(&self, problem: &Problem, state: &State, point: Vector3<f64>) -> f64 {
+        self.point_covariance_px(problem, state, point)
+            .map_or(f64::INFINITY, |c| repaired_variance(c.trace()))
     }
 
     /// Standard deviation of a coordinate of the principal point, pixels.

@@ -3,7 +3,7 @@
 //! Each is a fold of its own over the samples, done only on request.
 
 use crate::composite::cryptomatte::cryptomatte;
-use crate::composite::part::{float_part, pixels_of};
+use crate::composite::part::{float_part, pixels_of, plain_part};
 use crate::deep::{DeepImage, DeepSample};
 use crate::error::{Error, Result};
 use crate::geom::{Point2, Point3};
@@ -126,12 +126,13 @@ impl AovSource<'_> {
     }
 
     fn id_part(&self) -> Part {
-        let ids = self.fronts().map(|(_, s)| s.map_or(0, |s| s.object.0));
-        Part {
-            name: "id".into(),
-            channels: vec![("id".into(), ChannelSamples::Integer(ids.collect()))],
-            metadata: Vec::new(),
-        }
+        let ids = ChannelSamples::Integer(self.front_ids().collect());
+        plain_part("id", vec![("id".into(), ids)])
+    }
+
+    /// Of the objects in front; 0 where there is none.
+    fn front_ids(&self) -> impl Iterator<Item = u32> {
+        self.fronts().map(|(_, s)| s.map_or(0, |s| s.object.0))
     }
 
     fn layer_parts(&self) -> Vec<Part> {
@@ -151,11 +152,13 @@ impl AovSource<'_> {
     }
 
     fn positions(&self) -> impl Iterator<Item = [f32; 3]> {
-        self.fronts().map(|(at, s)| {
-            s.map_or([f32::NAN; 3], |s| {
-                self.world_point(at, s).coords.map(|v| v as f32).into()
-            })
-        })
+        self.fronts()
+            .map(|(at, s)| s.map_or([f32::NAN; 3], |s| self.position_at(at, s)))
+    }
+
+    fn position_at(&self, at: (usize, usize), sample: &DeepSample) -> [f32; 3] {
+        let point = self.world_point(at, sample);
+        point.coords.map(|v| v as f32).into()
     }
 
     fn texture_coordinates(&self) -> impl Iterator<Item = [f32; 2]> {

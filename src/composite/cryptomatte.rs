@@ -53,14 +53,18 @@ fn ranked_objects(
     samples: &[DeepSample],
     name: impl Fn(ObjectId) -> String,
 ) -> [f32; 2 * RANKS_PER_PIXEL] {
-    let mut seen: Vec<_> = visible_coverage(samples).into_iter().collect();
-    // A stable sort: equally visible objects stay in the order of their ids.
-    seen.sort_by(|a, b| b.1.total_cmp(&a.1));
     let mut out = [0.0; 2 * RANKS_PER_PIXEL];
-    for (pair, (id, coverage)) in out.chunks_exact_mut(2).zip(seen) {
+    for (pair, (id, coverage)) in out.chunks_exact_mut(2).zip(most_visible_first(samples)) {
         pair.copy_from_slice(&[id_of_name(&name(id)), coverage]);
     }
     out
+}
+
+fn most_visible_first(samples: &[DeepSample]) -> Vec<(ObjectId, f32)> {
+    let mut seen: Vec<_> = visible_coverage(samples).into_iter().collect();
+    // A stable sort: equally visible objects stay in the order of their ids.
+    seen.sort_by(|a, b| b.1.total_cmp(&a.1));
+    seen
 }
 
 /// What is seen of each object, by its id.

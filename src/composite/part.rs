@@ -16,11 +16,15 @@ pub(super) fn float_part<const N: usize>(
     values: impl Iterator<Item = [f32; N]>,
 ) -> Part {
     let channels = names.iter().zip(separate_planes(values));
+    let channels = channels.map(|(name, plane)| (name.to_string(), ChannelSamples::Float(plane)));
+    plain_part(name, channels.collect())
+}
+
+/// A part without metadata.
+pub(super) fn plain_part(name: impl Into<String>, channels: Vec<(String, ChannelSamples)>) -> Part {
     Part {
         name: name.into(),
-        channels: channels
-            .map(|(name, plane)| (name.to_string(), ChannelSamples::Float(plane)))
-            .collect(),
+        channels,
         metadata: Vec::new(),
     }
 }

@@ -18,8 +18,7 @@ pub struct Pyramid<P> {
 impl<P: Mix> Pyramid<P> {
     /// A pyramid over a picture; no level but the first exists yet.
     pub fn new(base: Image<P>) -> Self {
-        let longest = base.width().max(base.height()).max(1);
-        let count = longest.next_power_of_two().trailing_zeros() as usize;
+        let count = halving_count(base.size());
         Self {
             base,
             halves: (0..count).map(|_| OnceLock::new()).collect(),
@@ -63,6 +62,12 @@ pub fn halve<P: Mix>(image: &Image<P>) -> Image<P> {
 fn halved<P: Mix>(image: &Image<P>) -> Image<P> {
     let [columns, rows] = [image.width(), image.height()].map(halving_taps);
     filter(image, &columns, &rows)
+}
+
+/// How often a picture is halved until one pixel is left.
+fn halving_count((width, height): (usize, usize)) -> usize {
+    let longest = width.max(height).max(1);
+    longest.next_power_of_two().trailing_zeros() as usize
 }
 
 /// The mean of two neighbours each.

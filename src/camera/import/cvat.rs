@@ -83,7 +83,11 @@ fn point(text: &str) -> Result<[f64; 2]> {
 
 fn parsed_point(text: &str) -> Option<[f64; 2]> {
     let (x, y) = text.split_once(',')?;
-    Some([x.trim().parse().ok()?, y.trim().parse().ok()?])
+    Some([coordinate(x)?, coordinate(y)?])
+}
+
+fn coordinate(text: &str) -> Option<f64> {
+    text.trim().parse().ok()
 }
 
 fn number(node: Node<'_, '_>, name: &str) -> Result<f64> {

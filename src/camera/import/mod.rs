@@ -84,11 +84,7 @@ impl Annotation {
         let mut label = Label::new(self.size.unwrap_or_default(), corners_px, [1.0; 2]);
         label.image.file = self.files.first().cloned().unwrap_or_default();
         label.surface = LabelSurface {
-            id: if name.is_empty() {
-                UNNAMED.into()
-            } else {
-                name
-            },
+            id: name_or_unnamed(name),
             corners_px: Some(corners_px),
             source: Some(self.source.into()),
             ..LabelSurface::default()
@@ -149,6 +145,14 @@ impl Annotation {
 const UNNAMED: &str = "surface";
 
 /// Name of a surface and its corners, pixels.
+fn name_or_unnamed(name: String) -> String {
+    if name.is_empty() {
+        UNNAMED.into()
+    } else {
+        name
+    }
+}
+
 type NamedCorners = (String, [[f64; 2]; 4]);
 
 impl AnnotatedShape {
@@ -184,12 +188,16 @@ fn corners_from_points(points: [(&String, [f64; 2]); 4]) -> NamedCorners {
     if let Some(corners) = corners_by_name(&points) {
         return (UNNAMED.into(), corners);
     }
+    (common_name(&points), points.map(|(_, point)| point))
+}
+
+/// The name that all points have.
+fn common_name(points: &[(&String, [f64; 2]); 4]) -> String {
     let first = points[0].0;
-    let name = match points.iter().all(|(name, _)| *name == first) {
+    match points.iter().all(|(name, _)| *name == first) {
         true => first.clone(),
         false => UNNAMED.into(),
-    };
-    (name, points.map(|(_, point)| point))
+    }
 }
 
 /// The points in the order of their names, where each corner is named once.

@@ -69,16 +69,20 @@ fn clamped_luminance(pixel: &LinearRgb) -> f32 {
 
 /// The library lists corners anticlockwise from the bottom left of the official picture; OpenCV prints it upside down.
 fn marker(tag: &Detection, artwork: Artwork) -> Option<Marker> {
-    let order = match artwork {
-        Artwork::Apriltag => [3, 2, 1, 0],
-        Artwork::Opencv => [1, 0, 3, 2],
-    };
     let corners = tag.corners();
     Some(Marker {
         id: u32::try_from(tag.id()).ok()?,
-        corners_px: order.map(|i| Point2::from(corners[i])),
+        corners_px: corner_order(artwork).map(|i| Point2::from(corners[i])),
         sigma_px: CORNER_SIGMA_PX,
     })
+}
+
+/// The detector's numbers of the corners in our order, from the top left, clockwise.
+fn corner_order(artwork: Artwork) -> [usize; 4] {
+    match artwork {
+        Artwork::Apriltag => [3, 2, 1, 0],
+        Artwork::Opencv => [1, 0, 3, 2],
+    }
 }
 
 #[cfg(test)]

@@ -35,9 +35,13 @@ pub(super) fn quads(photo: &Image<LinearRgb>) -> Vec<[Point2<f64>; 4]> {
 /// The pixels that are darker than their surroundings.
 fn dark_pixels(photo: &Image<LinearRgb>) -> Mask {
     let tone = photo.map(|p| linear_to_srgb(p.luminance()));
-    let radius = WINDOW_SIDES * photo.width().max(photo.height()) as f64;
-    let ground = box_blur(&tone, radius.ceil().max(5.0) as usize);
+    let ground = box_blur(&tone, window_radius(photo.size()));
     tone.zip_map(&ground, |t, g| t < g - DARK_DIFFERENCE)
+}
+
+fn window_radius((width, height): (usize, usize)) -> usize {
+    let radius = WINDOW_SIDES * width.max(height) as f64;
+    radius.ceil().max(5.0) as usize
 }
 
 /// The outer corners of every connected dark region that is large enough.

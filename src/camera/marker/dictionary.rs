@@ -59,10 +59,9 @@ pub(super) fn read(light: &Image<f32>, corners: &[Point2<f64>; 4]) -> Option<Mar
 }
 
 fn extremes(light: &[f32]) -> (f32, f32) {
-    let cells = light.iter().copied();
     (
-        cells.clone().fold(f32::MAX, f32::min),
-        cells.fold(0.0, f32::max),
+        light.iter().copied().fold(f32::MAX, f32::min),
+        light.iter().copied().fold(0.0, f32::max),
     )
 }
 

@@ -49,11 +49,15 @@ pub(super) fn refined(light: &Image<f32>, rough: &[Point2<f64>; 4]) -> Option<[P
     for _ in 0..MAX_ROUNDS {
         let before = corners;
         corners = corners_between(&fitted_sides(light, &before)?)?;
-        if (0..4).all(|i| (corners[i] - before[i]).norm() < SETTLED_PX) {
+        if have_settled(&before, &corners) {
             break;
         }
     }
     Some(corners)
+}
+
+fn have_settled(before: &[Point2<f64>; 4], after: &[Point2<f64>; 4]) -> bool {
+    (0..4).all(|i| (after[i] - before[i]).norm() < SETTLED_PX)
 }
 
 /// The line along each side of a quadrangle; none where a side shows no edge.

@@ -116,6 +116,13 @@ fn warn_of_turns(turns: usize) {
     }
 }
 
+fn marker_map(label: &Label) -> Result<&MarkerMap> {
+    label
+        .markers
+        .as_ref()
+        .ok_or_else(|| Error::value("markers", "missing, expected family, size_m and map"))
+}
+
 /// The markers of a map's family, and the least noise that is stated of their corners.
 fn find_family(map: &MarkerMap, photo: &Image<LinearRgb>) -> Result<(Vec<Marker>, f64)> {
     match map.family.as_str() {
@@ -146,10 +153,7 @@ struct MarkerLayout<'a> {
 impl<'a> MarkerLayout<'a> {
     /// Those of the label's map that the photo shows, at least one.
     fn find(label: &'a Label, photo: &Image<LinearRgb>) -> Result<Self> {
-        let map = label
-            .markers
-            .as_ref()
-            .ok_or_else(|| Error::value("markers", "missing, expected family, size_m and map"))?;
+        let map = marker_map(label)?;
         let (mut found, min_sigma_px) = find_family(map, photo)?;
         found.retain(|marker| map.map.contains_key(&marker.id));
         if found.is_empty() {
