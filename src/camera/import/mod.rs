@@ -144,7 +144,6 @@ impl Annotation {
 /// What a surface without a name is called.
 const UNNAMED: &str = "surface";
 
-/// Name of a surface and its corners, pixels.
 fn name_or_unnamed(name: String) -> String {
     if name.is_empty() {
         UNNAMED.into()
@@ -153,6 +152,7 @@ fn name_or_unnamed(name: String) -> String {
     }
 }
 
+/// Name of a surface and its corners, pixels.
 type NamedCorners = (String, [[f64; 2]; 4]);
 
 impl AnnotatedShape {
