@@ -27,7 +27,11 @@ pub fn encode(bbox: [f64; 4], cell: [f64; 2], anchor: [f64; 2]) -> Option<[f64; 
         (h / anchor[1]).sqrt() / 2.0,
     ];
     let reachable = shares.iter().all(|s| *s > 0.0 && *s < 1.0);
-    reachable.then(|| shares.map(|s| libm::log(s / (1.0 - s))))
+    reachable.then(|| shares.map(logit))
+}
+
+fn logit(share: f64) -> f64 {
+    libm::log(share / (1.0 - share))
 }
 
 fn sigmoid(v: f64) -> f64 {
