@@ -223,13 +223,14 @@ fn add_photos(args: &AddPhotoArgs, global: &GlobalArgs) -> anyhow::Result<()> {
 }
 
 fn report_added(record: &PhotoRecord, global: &GlobalArgs) {
-    let [length, width] = record.object_m.map(|m| m * 1e3);
-    global.print_status(format_args!(
-        "{}: {length:.1} x {width:.1} mm (+- {:.1})",
-        record.file,
-        record.error_m * 1e3
-    ));
+    global.print_status(describe_size(record));
     report_diagnostics(&record.file, &record.diagnostics);
+}
+
+fn describe_size(record: &PhotoRecord) -> String {
+    let [length, width] = record.object_m.map(|m| m * 1e3);
+    let (file, error) = (&record.file, record.error_m * 1e3);
+    format!("{file}: {length:.1} x {width:.1} mm (+- {error:.1})")
 }
 
 impl AddPhotoArgs {
@@ -256,11 +257,8 @@ impl AddPhotoArgs {
 
     /// The name that is given, or that of the first photo.
     fn asset_name(&self) -> String {
-        match (&self.name, self.photos.first()) {
-            (Some(name), _) => name.clone(),
-            (None, Some(photo)) => stem_of(photo),
-            (None, None) => String::new(),
-        }
+        let first = self.photos.first().map(|photo| stem_of(photo));
+        self.name.clone().or(first).unwrap_or_default()
     }
 }
 
@@ -273,11 +271,14 @@ fn extremes_mm(metres: &[[f64; 2]], i: usize) -> [f64; 2] {
     ends.map(|metres| 1e3 * metres)
 }
 
+fn numbered(classes: &[String]) -> Vec<String> {
+    let classes = classes.iter().enumerate();
+    classes.map(|(i, class)| format!("{i} {class}")).collect()
+}
+
 /// Shows which number each class has, and how to change that.
 fn show_classes(classes: &[String], how: &str, global: &GlobalArgs) {
-    let numbered = classes.iter().enumerate();
-    let numbered: Vec<_> = numbered.map(|(i, class)| format!("{i} {class}")).collect();
-    let list = numbered.join(", ");
+    let list = numbered(classes).join(", ");
     global.print_status(format_args!("classes {list}; another order: {how}"));
 }
 

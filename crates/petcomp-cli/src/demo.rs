@@ -3,7 +3,7 @@
 use crate::global::GlobalArgs;
 use crate::print;
 use crate::{asset, dataset};
-use petcomp::dataset::{DatasetConfig, DatasetCounts, Pipeline, contact_sheet_of};
+use petcomp::dataset::{DatasetConfig, DatasetCounts, Pipeline};
 use petcomp::{Error, io};
 use std::path::{Path, PathBuf};
 
@@ -69,8 +69,7 @@ impl DemoArgs {
     fn write_sheet(&self) -> petcomp::Result<PathBuf> {
         let path = self.output.join("contact_sheet.png");
         let count = self.count as usize;
-        let sheet = contact_sheet_of(&self.dataset_folder(), count, &Default::default())?;
-        io::write(&path, &sheet)?;
+        dataset::write_contact_sheet(&self.dataset_folder(), count, &path)?;
         Ok(path)
     }
 

@@ -76,12 +76,16 @@ const SINGLE_DASH: [&str; 11] = [
 /// The command line with `idiff`'s spelling turned into ours, for the `diff` subcommand only.
 pub(crate) fn accept_idiff_spelling(words: impl Iterator<Item = OsString>) -> Vec<OsString> {
     let words: Vec<OsString> = words.collect();
-    let verb = words.iter().skip(1).find(|word| !is_flag(word));
-    if verb.is_some_and(|verb| verb == "diff") {
+    if is_diff(&words) {
         words.into_iter().map(with_two_dashes).collect()
     } else {
         words
     }
+}
+
+fn is_diff(words: &[OsString]) -> bool {
+    let verb = words.iter().skip(1).find(|word| !is_flag(word));
+    verb.is_some_and(|verb| verb == "diff")
 }
 
 fn is_flag(word: &OsString) -> bool {

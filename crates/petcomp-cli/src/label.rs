@@ -55,14 +55,14 @@ impl LabelArgs {
     }
 
     fn report(&self, labels: &Labels, global: &GlobalArgs) {
-        let objects = &labels.objects;
-        let topmost = objects.iter().filter(|o| o.is_topmost()).count();
-        let count = objects.len();
-        global.print_written(
-            &self.output,
-            format_args!("{count} objects, {topmost} on top"),
-        );
+        global.print_written(&self.output, count_objects(labels));
     }
+}
+
+fn count_objects(labels: &Labels) -> String {
+    let objects = &labels.objects;
+    let topmost = objects.iter().filter(|o| o.is_topmost()).count();
+    format!("{} objects, {topmost} on top", objects.len())
 }
 
 /// Takes the picture, and writes it with its labels drawn on it.

@@ -69,14 +69,19 @@ impl SettleArgs {
     }
 
     fn options_for(&self, scene: &Scene) -> petcomp::Result<SettleOptions> {
-        let options = match &self.options {
-            Some(path) => read_options(path),
-            None => self.scene_options(scene),
-        }?;
+        let options = self.given_options(scene)?;
         Ok(match self.quality {
             Some(quality) => quality.settle(options),
             None => options,
         })
+    }
+
+    /// Those of the file that was given, or the scene's own.
+    fn given_options(&self, scene: &Scene) -> petcomp::Result<SettleOptions> {
+        match &self.options {
+            Some(path) => read_options(path),
+            None => self.scene_options(scene),
+        }
     }
 
     /// Those of the scene's own settings.
