@@ -295,8 +295,11 @@ fn legend_entries(classes: &[String], tiles: &[ContactTile], width: usize) -> Ve
 /// Width and height of the legend, pixels.
 fn legend_size(entries: &[LegendEntry]) -> [usize; 2] {
     let width = entries.iter().map(LegendEntry::end).max();
-    let lines = entries.last().map_or(0, |entry| entry.line + 1);
-    [width.unwrap_or(0), lines * LEGEND_LINE_PX]
+    [width.unwrap_or(0), line_count(entries) * LEGEND_LINE_PX]
+}
+
+fn line_count(entries: &[LegendEntry]) -> usize {
+    entries.last().map_or(0, |entry| entry.line + 1)
 }
 
 /// Objects with a label for each class, and objects without one.

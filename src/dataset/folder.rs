@@ -7,7 +7,7 @@ use crate::io;
 use serde_json::{Map, Value, json};
 use std::ffi::OsStr;
 use std::fs::{File, TryLockError};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Name of the file that says what a dataset was made from.
 pub(crate) const IDENTITY: &str = "dataset.json";
@@ -41,7 +41,7 @@ pub(crate) fn claim(plan: &Plan) -> Result<Claim> {
         check_same_plan(&before, &now, folder)?;
     }
     sweep(folder)?;
-    io::write_json(folder.join(IDENTITY), &now)?;
+    io::write_json(identity_file(folder), &now)?;
     for writer in &plan.writers {
         writer.begin(folder, &plan.classes)?;
     }
@@ -66,23 +66,27 @@ fn claimable_identity(folder: &Path) -> Result<Option<Value>> {
 fn check_same_plan(before: &Value, now: &Value, folder: &Path) -> Result<()> {
     of_this_format(before, folder)?;
     same(before, now, "")
-        .map_err(|(at, what)| Error::value(at, what).in_file(folder.join(IDENTITY)))
+        .map_err(|(at, what)| Error::value(at, what).in_file(identity_file(folder)))
+}
+
+/// The file that says what the dataset in a folder was made from.
+pub(super) fn identity_file(folder: &Path) -> PathBuf {
+    folder.join(IDENTITY)
 }
 
 /// Claims the folder of a dataset that was begun before.
 pub(crate) fn reclaim(folder: &Path) -> Result<Claim> {
-    let before = identity(folder)?;
-    let before = before.ok_or_else(|| {
-        Error::file(
-            folder,
-            format!("no {IDENTITY}, expected a dataset that was begun before"),
-        )
-    })?;
+    let before = identity(folder)?.ok_or_else(|| not_begun(folder))?;
     io::refuse_links(folder)?;
     of_this_format(&before, folder)?;
     Ok(Claim {
         _lock: lock(folder)?,
     })
+}
+
+fn not_begun(folder: &Path) -> Error {
+    let what = format!("no {IDENTITY}, expected a dataset that was begun before");
+    Error::file(folder, what)
 }
 
 /// The folder was begun before every input was recorded and lines had checksums.
@@ -105,12 +109,12 @@ pub(crate) fn of_this_format(identity: &Value, folder: &Path) -> Result<()> {
         _ => ("was begun by a newer petcomp", "newer"),
     };
     let what = format!("{what}: finish it with the {others} one, or begin a new folder");
-    Err(Error::file(folder.join(IDENTITY), what))
+    Err(Error::file(identity_file(folder), what))
 }
 
 /// What a folder was made from; none where it is no dataset yet.
 pub(crate) fn identity(folder: &Path) -> Result<Option<Value>> {
-    match std::fs::symlink_metadata(folder.join(IDENTITY)) {
+    match std::fs::symlink_metadata(identity_file(folder)) {
         Err(_) => Ok(None),
         Ok(_) => io::read_json(io::inside(folder, IDENTITY)?).map(Some),
     }

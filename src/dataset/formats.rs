@@ -122,13 +122,17 @@ impl LabelConfig {
     /// The writers of the layouts, each once, in the order in which [`Format`] lists them: [`WebDataset`] packs what the
     /// others write.
     pub fn writers(&self, pictures: &Pictures) -> Vec<Box<dyn Writer>> {
+        let formats = self.distinct_formats().into_iter();
+        formats
+            .map(|format| self.writer(format, pictures))
+            .collect()
+    }
+
+    fn distinct_formats(&self) -> Vec<Format> {
         let mut formats = self.formats.clone();
         formats.sort();
         formats.dedup();
         formats
-            .into_iter()
-            .map(|format| self.writer(format, pictures))
-            .collect()
     }
 
     fn writer(&self, format: Format, pictures: &Pictures) -> Box<dyn Writer> {

@@ -133,12 +133,14 @@ fn stamp(meta: &Metadata) -> String {
 }
 
 fn is_settled(meta: &Metadata, now: SystemTime) -> bool {
+    let age = last_change(meta).and_then(|latest| now.duration_since(latest).ok());
+    age.is_some_and(|age| age > SETTLED_AGE)
+}
+
+/// When the file's content or its entry changed last.
+fn last_change(meta: &Metadata) -> Option<SystemTime> {
     let times = [meta.modified().ok(), changed(meta)];
-    let Some(latest) = times.into_iter().flatten().max() else {
-        return false;
-    };
-    let age = now.duration_since(latest);
-    age.is_ok_and(|age| age > SETTLED_AGE)
+    times.into_iter().flatten().max()
 }
 
 /// When a file's content or its names changed last: a time that nobody can set back.

@@ -55,11 +55,14 @@ impl Journal {
 
     /// Adds a finished sample.
     pub(crate) fn add(&mut self, line: JournalLine) -> Result<()> {
-        self.file
-            .write_all(line.text().as_bytes())
-            .map_err(|e| Error::file(&self.path, e))?;
+        self.append(&line.text())?;
         self.lines.insert(line.k, line);
         Ok(())
+    }
+
+    fn append(&mut self, text: &str) -> Result<()> {
+        let written = self.file.write_all(text.as_bytes());
+        written.map_err(|e| Error::file(&self.path, e))
     }
 
     /// Number of finished samples below `count` that are wanted.
@@ -79,14 +82,15 @@ impl Journal {
 }
 
 /// The last line has no end: what follows would be read as a part of it.
-fn is_torn(mut file: &File) -> std::io::Result<bool> {
-    if file.metadata()?.len() == 0 {
-        return Ok(false);
-    }
+fn is_torn(file: &File) -> std::io::Result<bool> {
+    Ok(file.metadata()?.len() > 0 && last_byte(file)? != b'\n')
+}
+
+fn last_byte(mut file: &File) -> std::io::Result<u8> {
     let mut last = [0];
     file.seek(SeekFrom::End(-1))?;
     file.read_exact(&mut last)?;
-    Ok(last != *b"\n")
+    Ok(last[0])
 }
 
 fn end_last_line(file: &mut File) -> std::io::Result<()> {
@@ -154,18 +158,25 @@ fn read_journal(file: &File, path: &Path, is_older: bool) -> Result<NumberedLine
 /// The lines that are not damaged, in the order of the file.
 fn whole_lines(read: NumberedLines, path: &Path, consequence: &str) -> Vec<JournalLine> {
     warn_of_damage(&read, path, consequence);
-    read.into_iter().filter_map(|(_, line)| line.ok()).collect()
+    undamaged(read).collect()
+}
+
+fn undamaged(read: NumberedLines) -> impl Iterator<Item = JournalLine> {
+    read.into_iter().filter_map(|(_, line)| line.ok())
 }
 
 /// The lines that are not damaged, in order of number; of one number the last.
 fn by_number(read: NumberedLines) -> Vec<JournalLine> {
-    let good = read.into_iter().filter_map(|(_, line)| line.ok());
-    let lines: BTreeMap<u64, _> = good.map(|line| (line.k, line)).collect();
+    let lines: BTreeMap<u64, _> = undamaged(read).map(|line| (line.k, line)).collect();
     lines.into_values().collect()
 }
 
+fn count_damaged(read: &NumberedLines) -> usize {
+    read.iter().filter(|(_, line)| line.is_err()).count()
+}
+
 fn warn_of_damage(read: &NumberedLines, path: &Path, consequence: &str) {
-    let damaged = read.iter().filter(|(_, line)| line.is_err()).count();
+    let damaged = count_damaged(read);
     if damaged > 0 {
         log::warn!("{}: {damaged} damaged lines, {consequence}", path.display());
     }

@@ -82,11 +82,10 @@ impl JournalLine {
 
     /// What a writer needs to know to join it with others.
     pub(crate) fn written(&self) -> Written {
-        let files = self.files.iter();
         Written {
             k: self.k,
             part: self.part,
-            files: files.map(|file| file.path.split('/').collect()).collect(),
+            files: self.files.iter().map(WrittenFile::local_path).collect(),
         }
     }
 
@@ -155,6 +154,10 @@ fn read_back_all(folder: &Path, files: &[PathBuf]) -> Result<Vec<WrittenFile>> {
 }
 
 impl WrittenFile {
+    /// Its path below the dataset's folder, as this system writes it.
+    fn local_path(&self) -> PathBuf {
+        self.path.split('/').collect()
+    }
     /// Reads the file back: what counts is what is on the disk.
     pub(crate) fn read_back(folder: &Path, path: &Path) -> Result<Self> {
         let Checksum { bytes, crc32 } = Checksum::from_file(io::inside(folder, path)?)?;

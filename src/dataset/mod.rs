@@ -40,6 +40,7 @@ mod obstructed;
 #[doc(hidden)]
 pub mod page;
 mod partition;
+mod paths;
 mod pictures;
 mod pipeline;
 mod quality;
@@ -251,13 +252,14 @@ impl Written {
     /// When there is none.
     pub fn file(&self, kind: &str) -> std::io::Result<&Path> {
         let found = self.files.iter().find(|file| file.starts_with(kind));
+        found
+            .map(PathBuf::as_path)
+            .ok_or_else(|| self.no_file(kind))
+    }
+
+    fn no_file(&self, kind: &str) -> std::io::Error {
         let k = self.k;
-        match found {
-            Some(file) => Ok(file),
-            None => Err(std::io::Error::other(format!(
-                "sample {k} has no file in {kind}"
-            ))),
-        }
+        std::io::Error::other(format!("sample {k} has no file in {kind}"))
     }
 }
 

@@ -41,9 +41,12 @@ impl Thumbnail {
 
     /// Root mean square difference, 8-bit codes.
     fn codes_from(&self, other: &Self) -> f64 {
+        (self.squared_error(other) as f64 / self.0.len().max(1) as f64).sqrt()
+    }
+
+    fn squared_error(&self, other: &Self) -> u64 {
         let pairs = self.0.iter().zip(&other.0);
-        let sum: u64 = pairs.map(|(a, b)| squared_difference(*a, *b)).sum();
-        (sum as f64 / self.0.len().max(1) as f64).sqrt()
+        pairs.map(|(a, b)| squared_difference(*a, *b)).sum()
     }
 
     /// The place of the nearest in a list, and how far it is.

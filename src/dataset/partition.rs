@@ -61,10 +61,7 @@ impl FromStr for Group {
 
     fn from_str(text: &str) -> Result<Self> {
         let known = Self::ALL.into_iter().find(|group| group.name() == text);
-        known.ok_or_else(|| {
-            let what = format!("\"{text}\", expected background or selection");
-            Error::value("group", what)
-        })
+        known.ok_or_else(|| unknown_group(text))
     }
 }
 
@@ -107,11 +104,14 @@ impl Listing {
     /// An image that cannot be read.
     pub fn leakage(&self, max_codes: f64) -> Result<Leakage> {
         let groups = Group::ALL.into_iter();
-        let groups = groups.filter_map(|group| Some((group.name(), self.shared_groups(group)?)));
         Ok(Leakage {
-            groups: groups.collect(),
+            groups: groups.filter_map(|group| self.leaked(group)).collect(),
             near_duplicates: near_pairs(&self.train, &self.val, max_codes)?,
         })
+    }
+
+    fn leaked(&self, group: Group) -> Option<(&'static str, [usize; 2])> {
+        Some((group.name(), self.shared_groups(group)?))
     }
 
     /// Groups of the images for validation, and how many of them occur in training; none where they are not known.
@@ -177,11 +177,16 @@ fn check_ratio(ratio: f64) -> Result<()> {
 
 /// The photos of a scene's objects, in an order of their own.
 fn selection_of(scene: &Scene) -> String {
-    let objects = scene.objects.iter();
-    let photos = objects.map(|object| format!("{}/{}", object.asset, object.photo));
-    let mut photos: Vec<String> = photos.collect();
+    let mut photos = photos_of(scene);
     photos.sort();
     photos.join(" ")
+}
+
+fn photos_of(scene: &Scene) -> Vec<String> {
+    let objects = scene.objects.iter();
+    objects
+        .map(|object| format!("{}/{}", object.asset, object.photo))
+        .collect()
 }
 
 /// The first images, and those behind the ones that are left out.
@@ -193,6 +198,11 @@ fn consecutive(images: &[PathBuf], train: usize, guard: usize) -> [Vec<PathBuf>;
 /// A group for each image.
 fn numbers_to(count: usize) -> Vec<String> {
     (0..count).map(|i| i.to_string()).collect()
+}
+
+fn unknown_group(name: &str) -> Error {
+    let what = format!("\"{name}\", expected background or selection");
+    Error::value("group", what)
 }
 
 #[cfg(test)]

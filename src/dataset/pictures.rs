@@ -1,7 +1,8 @@
 //! The images of a dataset.
 
 use crate::bounds::Bounds;
-use crate::dataset::{Entry, Part, Writer};
+use crate::dataset::paths::create_part_folders;
+use crate::dataset::{Entry, Writer};
 use crate::error::Result;
 use crate::io::{self, WriteOptions};
 use serde::{Deserialize, Serialize};
@@ -77,13 +78,9 @@ impl Writer for Pictures {
         } else {
             &["images"]
         };
-        for dir in kinds
+        kinds
             .iter()
-            .flat_map(|kind| Part::ALL.map(|part| folder.join(kind).join(part.name())))
-        {
-            io::create_folder(&dir)?;
-        }
-        Ok(())
+            .try_for_each(|kind| create_part_folders(folder, kind))
     }
 
     fn write(&self, folder: &Path, entry: &Entry<'_>) -> Result<Vec<PathBuf>> {

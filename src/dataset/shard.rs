@@ -165,13 +165,9 @@ struct JobEnvironment<V> {
 
 impl<V: Fn(&str) -> Option<String>> JobEnvironment<V> {
     fn number(&self, name: &str) -> Result<Option<u64>> {
-        let Some(text) = (self.variable)(name) else {
-            return Ok(None);
-        };
-        let number = text.trim().parse();
-        let number =
-            number.map_err(|_| Error::value(name, format!("\"{text}\", expected a number")));
-        number.map(Some)
+        (self.variable)(name)
+            .map(|text| parse_number(name, &text))
+            .transpose()
     }
 
     fn kubernetes_shard(&self, of: Option<u64>) -> Result<Shard> {
@@ -212,9 +208,18 @@ impl<V: Fn(&str) -> Option<String>> JobEnvironment<V> {
     }
 }
 
+fn parse_number(name: &str, text: &str) -> Result<u64> {
+    let number = text.trim().parse();
+    number.map_err(|_| Error::value(name, format!("\"{text}\", expected a number")))
+}
+
+fn are_all_tasks(count: u64, first: u64, last: u64, step: u64) -> bool {
+    count > 0 && last.checked_sub(first) == (count - 1).checked_mul(step)
+}
+
 /// An array with holes makes no whole dataset.
 fn check_all_tasks(count: u64, first: u64, last: u64, step: u64) -> Result<()> {
-    if count > 0 && last.checked_sub(first) == (count - 1).checked_mul(step) {
+    if are_all_tasks(count, first, last, step) {
         return Ok(());
     }
     let what =

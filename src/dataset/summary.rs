@@ -272,10 +272,7 @@ impl ReadSample {
             k: line.k,
             part: line.part,
             record: io::read_json(line.file(folder, "scenes/")?)?,
-            files: [
-                line.file_name(folder, "images/")?.to_owned(),
-                line.file_name(folder, "scenes/")?.to_owned(),
-            ],
+            files: own_files(folder, line)?,
         })
     }
 }
@@ -315,6 +312,12 @@ fn count_in_part(lines: &[JournalLine], part: Part) -> usize {
 /// `/objects/2/hue` of `objects[2].hue`.
 fn json_pointer(key: &str) -> String {
     format!("/{}", key.replace(['.', '['], "/").replace(']', ""))
+}
+
+/// Picture and record of a sample.
+fn own_files(folder: &Path, line: &JournalLine) -> Result<[String; 2]> {
+    let picture = line.file_name(folder, "images/")?.to_owned();
+    Ok([picture, line.file_name(folder, "scenes/")?.to_owned()])
 }
 
 #[cfg(test)]

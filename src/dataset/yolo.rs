@@ -1,8 +1,9 @@
 //! Labels for YOLO: one text file per image, one line per object, and `data.yaml`.
 
 use crate::dataset::formats::is_exact;
+use crate::dataset::paths::create_part_folders;
 use crate::dataset::yolo_yaml::DataYaml;
-use crate::dataset::{Entry, Extent, LabelledObject, Part, Writer};
+use crate::dataset::{Entry, Extent, LabelledObject, Writer};
 use crate::error::{Error, Result};
 use crate::geom::BBox;
 use crate::geom::Point2;
@@ -56,10 +57,7 @@ impl Writer for Yolo {
     }
 
     fn begin(&self, folder: &Path, classes: &[String]) -> Result<()> {
-        for part in Part::ALL {
-            let dir = folder.join("labels").join(part.name());
-            io::create_folder(&dir)?;
-        }
+        create_part_folders(folder, "labels")?;
         io::write_text(folder.join(DATA_YAML), &DataYaml::write(classes))
     }
 

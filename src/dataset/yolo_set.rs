@@ -1,6 +1,7 @@
 //! A YOLO dataset on disk, of petcomp's or of the user's own: which images, which classes.
 
 use crate::dataset::Part;
+use crate::dataset::paths::folder_of;
 use crate::dataset::yolo_yaml::DataYaml;
 use crate::error::{Error, Result};
 use crate::io;
@@ -72,7 +73,7 @@ fn images_of(root: &Path, parts: &[String]) -> Result<Vec<PathBuf>> {
 /// The lines of a list; `./` is the list's own folder, as for YOLOv5.
 fn listed_in(list: &Path) -> Result<Vec<PathBuf>> {
     let text = io::read_text(list)?;
-    let folder = list.parent().unwrap_or(Path::new(""));
+    let folder = folder_of(list);
     let lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
     Ok(lines
         .map(|line| {

@@ -36,9 +36,13 @@ fn absolute_path(path: &Path) -> PathBuf {
     std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf())
 }
 
+/// The first and the last index.
+fn index_range(samples: &[SampleSummary]) -> [u64; 2] {
+    [samples.first(), samples.last()].map(|sample| sample.map_or(0, |sample| sample.index))
+}
+
 fn listed_together(samples: &[SampleSummary], root: &Path) -> String {
-    let [first, last] =
-        [samples.first(), samples.last()].map(|sample| sample.map_or(0, |sample| sample.index));
+    let [first, last] = index_range(samples);
     let items: String = samples.iter().map(|sample| listed(sample, root)).collect();
     format!(
         "<details><summary>{first:06} to {last:06}</summary><div class=\"all\">\n{items}</div></details>\n"
@@ -93,10 +97,13 @@ fn address(path: &Path) -> String {
 }
 
 fn percent_encoded(byte: u8) -> String {
-    match byte {
-        b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'/' | b'.' | b'-' | b'_' => {
-            char::from(byte).to_string()
-        }
-        _ => format!("%{byte:02X}"),
+    if is_plain_in_address(byte) {
+        char::from(byte).to_string()
+    } else {
+        format!("%{byte:02X}")
     }
+}
+
+fn is_plain_in_address(byte: u8) -> bool {
+    byte.is_ascii_alphanumeric() || b"/.-_".contains(&byte)
 }

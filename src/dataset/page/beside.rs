@@ -218,8 +218,7 @@ fn in_pixels([x, y, w, h]: [f64; 4], size: [f64; 2]) -> BBox {
 }
 
 fn caption(picture: &LabelledPicture) -> String {
-    let name = picture.path.file_name().unwrap_or_default();
-    let name = name.to_string_lossy();
+    let name = picture.file_name();
     match &picture.boxes {
         None => format!("{name}: no label file"),
         Some(boxes) => format!("{name}: {} labels", boxes.len()),
@@ -262,12 +261,7 @@ fn distances(measures: &[ComparedMeasure]) -> Table {
         "distance",
     ]);
     for measure in measures {
-        table.push([
-            measure.title.to_owned(),
-            quantiles(&measure.ours),
-            quantiles(&measure.theirs),
-            format!("{:.2}", measure.distance),
-        ]);
+        table.push(measure.row());
     }
     table
 }
@@ -310,6 +304,14 @@ fn compare_measures(ours: &LabelledSet, theirs: &LabelledSet) -> Vec<ComparedMea
 }
 
 impl ComparedMeasure {
+    fn row(&self) -> [String; 4] {
+        [
+            self.title.to_owned(),
+            quantiles(&self.ours),
+            quantiles(&self.theirs),
+            format!("{:.2}", self.distance),
+        ]
+    }
     /// Shares of each in bins of the same width: ours as bars, the others as steps.
     fn svg(&self) -> String {
         let [w, h] = FRAME;
@@ -371,13 +373,14 @@ fn bars(shares: &[f64], most: f64) -> String {
     svg
 }
 
+fn step(bin: usize, share: f64, most: f64) -> String {
+    format!("V{:.1}H{:.1}", share_y(share, most), bin_x(bin + 1))
+}
+
 fn steps(shares: &[f64], most: f64) -> String {
     let line = ROOM_ABOVE + FRAME[1];
-    let steps: String = shares
-        .iter()
-        .enumerate()
-        .map(|(i, share)| format!("V{:.1}H{:.1}", share_y(*share, most), bin_x(i + 1)))
-        .collect();
+    let shares = shares.iter().enumerate();
+    let steps: String = shares.map(|(i, share)| step(i, *share, most)).collect();
     format!(
         "<path d=\"M{ROOM_LEFT} {line}{steps}V{line}\" fill=\"none\" stroke=\"{THEIRS}\" stroke-width=\"2\"/>\n"
     )
@@ -386,10 +389,14 @@ fn steps(shares: &[f64], most: f64) -> String {
 fn shares(values: &[f64], low: f64, high: f64) -> [f64; HISTOGRAM_BINS] {
     let mut shares = [0.0; HISTOGRAM_BINS];
     for value in values {
-        let place = (value - low) / (high - low) * HISTOGRAM_BINS as f64;
-        shares[(place.max(0.0) as usize).min(HISTOGRAM_BINS - 1)] += 1.0 / values.len() as f64;
+        shares[bin_of(*value, low, high)] += 1.0 / values.len() as f64;
     }
     shares
+}
+
+fn bin_of(value: f64, low: f64, high: f64) -> usize {
+    let place = (value - low) / (high - low) * HISTOGRAM_BINS as f64;
+    (place.max(0.0) as usize).min(HISTOGRAM_BINS - 1)
 }
 
 /// Greatest distance of two empirical distribution functions.

@@ -6,6 +6,7 @@ use crate::eval::{self, GroundTruth};
 use crate::geom::BBox;
 use crate::io;
 use rayon::prelude::*;
+use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
@@ -29,6 +30,12 @@ pub(super) struct LabelledPicture {
     pub(super) path: PathBuf,
     /// None for a picture without a label file.
     pub(super) boxes: Option<Vec<ShareBox>>,
+}
+
+impl LabelledPicture {
+    pub(super) fn file_name(&self) -> Cow<'_, str> {
+        self.path.file_name().unwrap_or_default().to_string_lossy()
+    }
 }
 
 impl LabelledSet {

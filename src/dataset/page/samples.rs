@@ -248,13 +248,21 @@ fn why_unlabelled(object: &ObjectLabel, reason: UnlabelledReason) -> String {
     if reason != UnlabelledReason::Covered {
         return reason.description().to_owned();
     }
-    let above = object.covered_by.iter().map(|id| id.0.to_string());
-    format!("under {}", above.collect::<Vec<_>>().join(", "))
+    format!("under {}", ids_above(object).join(", "))
+}
+
+fn ids_above(object: &ObjectLabel) -> Vec<String> {
+    let above = object.covered_by.iter();
+    above.map(|id| id.0.to_string()).collect()
+}
+
+fn svg_points(ring: &[Point2<f64>]) -> String {
+    let points = ring.iter().map(|p| format!("{:.1},{:.1}", p.x, p.y));
+    points.collect::<Vec<_>>().join(" ")
 }
 
 fn titled_polygon(ring: &[Point2<f64>], title: &str) -> String {
-    let points = ring.iter().map(|p| format!("{:.1},{:.1}", p.x, p.y));
-    let points = points.collect::<Vec<_>>().join(" ");
+    let points = svg_points(ring);
     format!(
         "<polygon points=\"{points}\" fill=\"none\" pointer-events=\"all\" stroke=\"{UNLABELLED}\" stroke-width=\"1.5\">\
          <title>{title}</title></polygon>"
