@@ -65,10 +65,12 @@ fn mean_iou(sizes: &[[f64; 2]], boxes: &[[f64; 2]]) -> f64 {
 }
 
 fn best_possible_recall(sizes: &[[f64; 2]], boxes: &[[f64; 2]]) -> f64 {
-    let boxes_in_reach = boxes
-        .iter()
-        .filter(|b| sizes.iter().any(|a| in_reach(b, a)));
-    boxes_in_reach.count() as f64 / boxes.len() as f64
+    let reached = boxes.iter().filter(|b| is_in_reach(b, sizes));
+    reached.count() as f64 / boxes.len() as f64
+}
+
+fn is_in_reach(b: &[f64; 2], sizes: &[[f64; 2]]) -> bool {
+    sizes.iter().any(|a| in_reach(b, a))
 }
 
 fn nearest_indices(boxes: &[[f64; 2]], sizes: &[[f64; 2]]) -> Vec<usize> {
