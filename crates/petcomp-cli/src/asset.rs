@@ -139,8 +139,7 @@ const SHEET: &str = "contact_sheet.png";
 fn check_folder(folder: &Path, strict: bool) -> anyhow::Result<()> {
     let library = Library::open(folder)?;
     let records: Vec<_> = records_of(&library).collect();
-    let to_review = records.iter().filter(|record| record.needs_review());
-    let to_review = to_review.inspect(|record| list_reasons(record)).count();
+    let to_review = list_to_review(&records);
     let (folder, assets, cut_outs) = (folder.display(), library.assets.len(), records.len());
     print::line(format_args!(
         "{folder}: {assets} assets, {cut_outs} cut-outs, all intact, {to_review} to review"
@@ -150,6 +149,12 @@ fn check_folder(folder: &Path, strict: bool) -> anyhow::Result<()> {
         return Err(NeedsReview(what).into());
     }
     Ok(())
+}
+
+/// Lists what there is to review, and counts it.
+fn list_to_review(records: &[&PhotoRecord]) -> usize {
+    let to_review = records.iter().filter(|record| record.needs_review());
+    to_review.inspect(|record| list_reasons(record)).count()
 }
 
 fn records_of(library: &Library) -> impl Iterator<Item = &PhotoRecord> {

@@ -54,10 +54,14 @@ impl DemoArgs {
         self.output.join("dataset")
     }
 
+    fn relative_backgrounds(&self) -> petcomp::Result<PathBuf> {
+        let backgrounds = absolute_path(&self.samples.join("backgrounds"))?;
+        Ok(io::relative(&backgrounds, &absolute_path(&self.output)?))
+    }
+
     /// A recipe file that names its folders and nothing else.
     fn write_recipe(&self) -> petcomp::Result<PathBuf> {
-        let backgrounds = absolute_path(&self.samples.join("backgrounds"))?;
-        let backgrounds = io::relative(&backgrounds, &absolute_path(&self.output)?);
+        let backgrounds = self.relative_backgrounds()?;
         // A JSON string is a TOML string.
         let backgrounds = serde_json::Value::from(backgrounds.to_string_lossy());
         let text = format!("assets = \"assets\"\nbackgrounds = {backgrounds}\n");

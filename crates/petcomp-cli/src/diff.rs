@@ -9,6 +9,7 @@ use petcomp::diff::{
 use petcomp::io::{Format, Picture};
 use petcomp::{Image, LinearRgb, PremulRgba, StraightRgba, io};
 use std::ffi::OsString;
+use std::fmt::Display;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -102,10 +103,7 @@ fn with_two_dashes(word: OsString) -> OsString {
 pub(crate) fn run(args: &DiffArgs, global: &GlobalArgs) -> anyhow::Result<ExitCode> {
     let pair = match PicturePair::read(args) {
         Ok(pair) => pair,
-        Err(error) => {
-            print::aside(format_args!("error: {error}"));
-            return Ok(ExitCode::from(Verdict::Unreadable.exit_code()));
-        }
+        Err(error) => return Ok(exit_unreadable(&error)),
     };
     let report = pair.compare(&args.thresholds());
     if let Some(path) = args.difference_path(&report) {
@@ -116,6 +114,11 @@ pub(crate) fn run(args: &DiffArgs, global: &GlobalArgs) -> anyhow::Result<ExitCo
     print::text(&report);
     pair.print_likeness(global);
     Ok(ExitCode::from(report.verdict.exit_code()))
+}
+
+fn exit_unreadable(error: &impl Display) -> ExitCode {
+    print::aside(format_args!("error: {error}"));
+    ExitCode::from(Verdict::Unreadable.exit_code())
 }
 
 /// The two pictures: the second is what the first should be.

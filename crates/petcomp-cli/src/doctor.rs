@@ -11,13 +11,7 @@ pub(crate) struct DoctorArgs {}
 pub(crate) fn run(_: &DoctorArgs) -> anyhow::Result<ExitCode> {
     print::line(format_args!("petcomp {}", env!("CARGO_PKG_VERSION")));
     print::line(format_args!("threads  {}", rayon::current_num_threads()));
-    let blender = version_of("blender");
-    print::line(format_args!(
-        "blender  {}",
-        blender
-            .as_deref()
-            .unwrap_or("not found (only `make golden` needs it)")
-    ));
+    print::line(format_args!("blender  {}", blender_version()));
     let outcomes = [
         report_check("oiio", worker_answers()),
         report_check("png", png_alpha()),
@@ -29,6 +23,11 @@ pub(crate) fn run(_: &DoctorArgs) -> anyhow::Result<ExitCode> {
     } else {
         ExitCode::FAILURE
     })
+}
+
+fn blender_version() -> String {
+    let missing = "not found (only `make golden` needs it)";
+    version_of("blender").unwrap_or_else(|| missing.into())
 }
 
 /// Prints what a check found; whether it passed.

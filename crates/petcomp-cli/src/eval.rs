@@ -104,15 +104,24 @@ impl EvalArgs {
         };
         let mut runs = Vec::new();
         for path in predictions {
-            let sheets = if truth.extension().is_some_and(|e| e == "json") {
-                self.read_coco(path, truth, options)
-            } else {
-                self.read_yolo(path, truth, options)
-            };
-            let (name, sheets) = (run_name(path), sheets?);
+            let sheets = self.read_predictions(path, truth, options)?;
+            let name = run_name(path);
             runs.push(Run { name, sheets });
         }
         Ok(runs)
+    }
+
+    fn read_predictions(
+        &self,
+        path: &Path,
+        truth: &Path,
+        options: &mut EvalReportOptions,
+    ) -> petcomp::Result<Vec<EvalImage>> {
+        if truth.extension().is_some_and(|e| e == "json") {
+            self.read_coco(path, truth, options)
+        } else {
+            self.read_yolo(path, truth, options)
+        }
     }
 
     fn read_coco(

@@ -25,10 +25,7 @@ pub(crate) struct LabelArgs {
 pub(crate) fn run(args: &LabelArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     let scene = args.read_scene()?;
     let pipeline = Pipeline::open_for(args.scene.config_for(&scene)?, &scene)?;
-    let labels = match &args.overlay {
-        Some(path) => write_overlay(path, &pipeline, scene),
-        None => pipeline.label(scene),
-    };
+    let labels = args.label(&pipeline, scene);
     let labels = labels.map_err(|e| e.in_file(&args.scene.path))?;
     io::write_json(&args.output, &labels)?;
     args.write_polygons(&labels, &pipeline)?;
@@ -44,6 +41,13 @@ impl LabelArgs {
             Some(_) => scene,
             None => scene.unlit(),
         })
+    }
+
+    fn label(&self, pipeline: &Pipeline, scene: Scene) -> petcomp::Result<Labels> {
+        match &self.overlay {
+            Some(path) => write_overlay(path, pipeline, scene),
+            None => pipeline.label(scene),
+        }
     }
 
     fn write_polygons(&self, labels: &Labels, pipeline: &Pipeline) -> petcomp::Result<()> {

@@ -29,16 +29,22 @@ enum CameraFormat {
 }
 
 pub(super) fn export_cameras(args: &ExportCameraArgs) -> anyhow::Result<()> {
-    let files: petcomp::Result<Vec<CameraFile>> = args.cameras.iter().map(io::read_json).collect();
-    let (files, output) = (files?, args.output.as_deref());
+    let (files, output) = (args.read_cameras()?, args.output.as_deref());
     match args.to {
         CameraFormat::Colmap => write_colmap(output, &files),
         CameraFormat::Blender => write_or_print(output, &only_camera(&files)?.to_blender_script()),
-        CameraFormat::Opencv => {
-            let camera = only_camera(&files)?.to_opencv();
-            write_or_print(output, &(serde_json::to_string_pretty(&camera)? + "\n"))
-        }
+        CameraFormat::Opencv => write_or_print(output, &opencv_document(only_camera(&files)?)?),
     }
+}
+
+impl ExportCameraArgs {
+    fn read_cameras(&self) -> petcomp::Result<Vec<CameraFile>> {
+        self.cameras.iter().map(io::read_json).collect()
+    }
+}
+
+fn opencv_document(camera: Camera) -> serde_json::Result<String> {
+    Ok(serde_json::to_string_pretty(&camera.to_opencv())? + "\n")
 }
 
 fn write_or_print(output: Option<&Path>, text: &str) -> anyhow::Result<()> {

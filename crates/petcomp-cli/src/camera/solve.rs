@@ -70,12 +70,20 @@ impl LabelFileArgs {
     }
 }
 
+impl SolveArgs {
+    /// One file can hold one camera only.
+    fn check_output(&self) -> anyhow::Result<()> {
+        if self.output.is_some() {
+            let count = self.labels.read_all()?.len();
+            anyhow::ensure!(count == 1, "-o: {count} labels, expected one");
+        }
+        Ok(())
+    }
+}
+
 /// Solves each label alone.
 pub(super) fn solve_each(args: &SolveArgs, global: &GlobalArgs) -> anyhow::Result<()> {
-    if args.output.is_some() {
-        let count = args.labels.read_all()?.len();
-        anyhow::ensure!(count == 1, "-o: {count} labels, expected one");
-    }
+    args.check_output()?;
     args.labels.for_each(|labelled| {
         let solution = accepted(solved(labelled)?, labelled, args.force)?;
         let file = CameraFile::new(&labelled.label, &solution);
@@ -133,13 +141,23 @@ fn accept_member(
     global: &GlobalArgs,
 ) -> anyhow::Result<()> {
     let solution = accepted(outcome.map_err(|e| located(e, member))?, member, force)?;
-    let mut file = CameraFile::new(&member.label, &solution);
-    if let Some(from) = file.solved_from.as_mut().filter(|_| all.len() > 1) {
-        from.together = camera::label_checksums(all);
-    }
+    let file = joint_camera_file(member, &solution, all);
     write_camera(&member.beside("camera.json"), member, &file, &solution)?;
     report_solution(member, &solution, global);
     Ok(())
+}
+
+/// The camera of a photo, with the checksums of those that it was solved together with.
+fn joint_camera_file(
+    member: &LabelledPhoto,
+    solution: &Solution,
+    all: &[LabelledPhoto],
+) -> CameraFile {
+    let mut file = CameraFile::new(&member.label, solution);
+    if let Some(from) = file.solved_from.as_mut().filter(|_| all.len() > 1) {
+        from.together = camera::label_checksums(all);
+    }
+    file
 }
 
 /// Says in plain words how well each camera is known.

@@ -72,10 +72,17 @@ fn check_dataset(args: &CheckArgs, global: &GlobalArgs) -> anyhow::Result<()> {
         global.print_status(located(&folder, note));
     }
     print_findings(&checked, &args.folder)?;
-    if args.strict && !notes.is_empty() {
-        return Err(NeedsReview(format!("{folder}: {} notes", notes.len())).into());
+    args.check_note_count(notes.len())
+}
+
+impl CheckArgs {
+    fn check_note_count(&self, count: usize) -> anyhow::Result<()> {
+        if self.strict && count > 0 {
+            let folder = self.folder.display();
+            return Err(NeedsReview(format!("{folder}: {count} notes")).into());
+        }
+        Ok(())
     }
-    Ok(())
 }
 
 /// Prints what is wrong, which is an error, or how much was checked.
