@@ -72,20 +72,18 @@ impl ContactTile {
         caption: String,
         width: usize,
     ) -> Self {
-        let (w, h) = picture.size();
-        let width = width.clamp(1, w.max(1));
-        let height = (h * width).div_ceil(w.max(1)).max(1);
-        let picture = if width < w {
-            resize(picture, width, height)
-        } else {
-            picture.clone()
-        };
         Self {
-            picture,
+            picture: shrunk(picture, width),
             labels,
             labelled,
             caption,
         }
+    }
+
+    /// Width of the wider of picture and caption.
+    fn width(&self) -> usize {
+        let caption = TextSize::Small.width(&self.caption);
+        self.picture.width().max(caption)
     }
 
     fn drawn(&self) -> Image<Srgb8> {
@@ -95,6 +93,16 @@ impl ContactTile {
         });
         canvas
     }
+}
+
+/// The picture no wider than `width`.
+fn shrunk(picture: &Image<LinearRgb>, width: usize) -> Image<LinearRgb> {
+    let (w, h) = picture.size();
+    let width = width.clamp(1, w.max(1));
+    if width >= w {
+        return picture.clone();
+    }
+    resize(picture, width, (h * width).div_ceil(w.max(1)).max(1))
 }
 
 /// Lays out pictures in rows, each with its boxes and a caption, under a title and a legend of the classes.
@@ -215,9 +223,7 @@ impl SheetLayout {
 /// Size of the largest picture with its caption.
 fn cell_size(tiles: &[ContactTile]) -> [usize; 2] {
     let text = TextSize::Small;
-    let widths = tiles
-        .iter()
-        .map(|tile| tile.picture.width().max(text.width(&tile.caption)));
+    let widths = tiles.iter().map(ContactTile::width);
     let heights = tiles.iter().map(|tile| tile.picture.height());
     [
         widths.max().unwrap_or(0),

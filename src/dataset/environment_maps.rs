@@ -58,10 +58,7 @@ impl EnvironmentMaps {
             return Ok(self.folder.join(name));
         }
         io::inside(&self.folder, name).map_err(|e| match e {
-            Error::Value { .. } => {
-                let what = "expected one that the recipe lists (scene.environment.files) or that lies in its folder";
-                Error::value("environment.file", format!("\"{name}\", {what}"))
-            }
+            Error::Value { .. } => not_listed(name),
             other => other,
         })
     }
@@ -90,6 +87,12 @@ impl EnvironmentMaps {
         // Every change is whole, even where a thread panicked afterwards.
         self.kept.lock().unwrap_or_else(PoisonError::into_inner)
     }
+}
+
+fn not_listed(name: &str) -> Error {
+    let what =
+        "expected one that the recipe lists (scene.environment.files) or that lies in its folder";
+    Error::value("environment.file", format!("\"{name}\", {what}"))
 }
 
 fn total_bytes(kept: &[(String, Arc<Panorama>)]) -> usize {

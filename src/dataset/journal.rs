@@ -109,7 +109,12 @@ fn lines_with_files(known: Vec<JournalLine>, folder: &Path) -> BTreeMap<u64, Jou
         .filter(|(i, line)| line.has_files(folder, *i < synced))
         .map(|(_, line)| line)
         .collect();
-    held.into_iter().map(|line| (line.k, line)).collect()
+    keyed_by_number(held)
+}
+
+/// Of one number the last.
+fn keyed_by_number(lines: impl IntoIterator<Item = JournalLine>) -> BTreeMap<u64, JournalLine> {
+    lines.into_iter().map(|line| (line.k, line)).collect()
 }
 
 /// Compares the files of a dataset with what was written and marks samples that differ to be made again: returns how
@@ -125,12 +130,16 @@ pub fn repair(folder: &Path) -> Result<(usize, usize)> {
     let read = read_journal(&io::open_own(&path)?, &path, false)?;
     let all = read.len();
     let lines = by_number(read);
-    let good: Vec<&JournalLine> = lines
-        .par_iter()
-        .filter(|line| line.has_same_bytes(folder))
-        .collect();
+    let good = lines_with_same_bytes(&lines, folder);
     write_lines(&path, good.iter().copied())?;
     Ok((good.len(), all - good.len()))
+}
+
+fn lines_with_same_bytes<'a>(lines: &'a [JournalLine], folder: &Path) -> Vec<&'a JournalLine> {
+    lines
+        .par_iter()
+        .filter(|line| line.has_same_bytes(folder))
+        .collect()
 }
 
 /// The whole lines of a folder's journal, in order of number.
@@ -167,8 +176,7 @@ fn undamaged(read: NumberedLines) -> impl Iterator<Item = JournalLine> {
 
 /// The lines that are not damaged, in order of number; of one number the last.
 fn by_number(read: NumberedLines) -> Vec<JournalLine> {
-    let lines: BTreeMap<u64, _> = undamaged(read).map(|line| (line.k, line)).collect();
-    lines.into_values().collect()
+    keyed_by_number(undamaged(read)).into_values().collect()
 }
 
 fn count_damaged(read: &NumberedLines) -> usize {

@@ -68,8 +68,7 @@ impl Listing {
         io::create_folder(folder)?;
         let folder = absolute_path(folder)?;
         for (part, images) in Part::ALL.into_iter().zip([&self.train, &self.val]) {
-            let list = folder.join(format!("{}.txt", part.name()));
-            io::write_text(list, &list_of(images, &folder))?;
+            write_list(part, images, &folder)?;
         }
         let yaml = DataYaml::write_with(&self.classes, |part| format!("{part}.txt"));
         io::write_text(folder.join("data.yaml"), &yaml)
@@ -114,6 +113,11 @@ fn images_in_folder(folder: &Path) -> Result<Vec<PathBuf>> {
     let mut images: Vec<PathBuf> = paths.filter(|path| is_image(path)).collect();
     images.sort();
     Ok(images)
+}
+
+fn write_list(part: Part, images: &[PathBuf], folder: &Path) -> Result<()> {
+    let list = folder.join(format!("{}.txt", part.name()));
+    io::write_text(list, &list_of(images, folder))
 }
 
 /// Images as lines of a list; trainers take `./` for its folder.

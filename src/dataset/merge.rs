@@ -196,16 +196,18 @@ fn open_shards(folders: &[PathBuf]) -> Result<Vec<(Value, ShardShare)>> {
 
 /// What a shard's folder was made from, and which share it is.
 fn open_shard(path: &Path) -> Result<(Value, ShardShare)> {
-    let Some(mut document) = folder::identity(path)? else {
-        let what = format!("no {IDENTITY}, expected a shard");
-        return Err(Error::file(path, what));
-    };
+    let mut document = folder::identity(path)?.ok_or_else(|| no_identity(path))?;
     let share = document.as_object_mut().and_then(|map| map.remove("shard"));
     let share = share.ok_or_else(|| Error::file(path, "is a whole dataset, expected a shard"))?;
     folder::of_this_format(&document, path)?;
     let share =
         ShardShare::from_value(share).map_err(|e| e.in_file(folder::identity_file(path)))?;
     Ok((document, share))
+}
+
+fn no_identity(folder: &Path) -> Error {
+    let what = format!("no {IDENTITY}, expected a shard");
+    Error::file(folder, what)
 }
 
 /// The plan that a dataset was made with, but for where its samples come from.
@@ -226,14 +228,18 @@ fn merged_plan(mut document: Map<String, Value>, count: u64, folder: &Path) -> R
 
 /// The writers that wrote with these settings.
 fn writers_of(settings: Vec<Map<String, Value>>) -> Result<Vec<Box<dyn Writer>>> {
-    let pictures = match settings.iter().find(|map| map.contains_key("pictures")) {
-        Some(map) => field(&mut map.clone(), "pictures")?,
-        None => Pictures::default(),
-    };
+    let pictures = pictures_of(&settings)?;
     let named = settings.into_iter().flatten();
     named
         .map(|(name, settings)| writer_of(&name, settings, &pictures))
         .collect()
+}
+
+fn pictures_of(settings: &[Map<String, Value>]) -> Result<Pictures> {
+    match settings.iter().find(|map| map.contains_key("pictures")) {
+        Some(map) => field(&mut map.clone(), "pictures"),
+        None => Ok(Pictures::default()),
+    }
 }
 
 fn field<T: serde::de::DeserializeOwned>(

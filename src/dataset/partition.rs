@@ -158,13 +158,17 @@ fn groups_for_validation(groups: &[String], wanted: usize, seed: u64) -> BTreeSe
 
 /// Groups and their sizes, in a random order.
 fn shuffled_groups(groups: &[String], seed: u64) -> Vec<(&str, usize)> {
+    let mut order: Vec<_> = group_sizes(groups).into_iter().collect();
+    order.sort_by_key(|(group, _)| Draws::new(seed, 0).bits(&format!("split.{group}")));
+    order
+}
+
+fn group_sizes(groups: &[String]) -> BTreeMap<&str, usize> {
     let mut sizes: BTreeMap<&str, usize> = BTreeMap::new();
     for group in groups {
         *sizes.entry(group).or_default() += 1;
     }
-    let mut order: Vec<_> = sizes.into_iter().collect();
-    order.sort_by_key(|(group, _)| Draws::new(seed, 0).bits(&format!("split.{group}")));
-    order
+    sizes
 }
 
 fn check_ratio(ratio: f64) -> Result<()> {

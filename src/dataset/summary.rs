@@ -129,11 +129,7 @@ impl Summary {
         summary.images = Part::ALL.map(|part| count_in_part(&lines, part));
         // In batches, so that no more records are in memory than threads can read at a time.
         for batch in lines.chunks(RECORDS_PER_BATCH) {
-            let samples: Result<Vec<ReadSample>> = batch
-                .par_iter()
-                .map(|line| ReadSample::read(folder, line))
-                .collect();
-            for (sample, line) in samples?.into_iter().zip(batch) {
+            for (sample, line) in read_samples(folder, batch)?.into_iter().zip(batch) {
                 summary.add(&sample, line);
                 summary.glances.push(SampleSummary::new(sample));
             }
@@ -176,14 +172,18 @@ impl Summary {
 
     /// The distribution of a drawn number: least and greatest value, and whether it is an integer.
     pub fn range(&self, key: &str) -> Option<([f64; 2], bool)> {
-        let recipe = self.identity["recipe"]["scene"].clone();
-        let recipe: Recipe = serde_json::from_value(recipe).ok()?;
-        let recipe = serde_json::to_value(recipe.narrowed()).ok()?;
-        let range = match recipe.pointer(&json_pointer(key))? {
+        let range = match self.narrowed_recipe()?.pointer(&json_pointer(key))? {
             Value::Array(ends) if ends.len() == 2 => [ends[0].as_f64()?, ends[1].as_f64()?],
             fixed => [fixed.as_f64()?; 2],
         };
         Some((range, key == "objects"))
+    }
+
+    /// As JSON, without what is switched off.
+    fn narrowed_recipe(&self) -> Option<Value> {
+        let recipe = self.identity["recipe"]["scene"].clone();
+        let recipe: Recipe = serde_json::from_value(recipe).ok()?;
+        serde_json::to_value(recipe.narrowed()).ok()
     }
 
     fn add(&mut self, sample: &ReadSample, line: &JournalLine) {
@@ -312,6 +312,13 @@ fn count_in_part(lines: &[JournalLine], part: Part) -> usize {
 /// `/objects/2/hue` of `objects[2].hue`.
 fn json_pointer(key: &str) -> String {
     format!("/{}", key.replace(['.', '['], "/").replace(']', ""))
+}
+
+fn read_samples(folder: &Path, lines: &[JournalLine]) -> Result<Vec<ReadSample>> {
+    lines
+        .par_iter()
+        .map(|line| ReadSample::read(folder, line))
+        .collect()
 }
 
 /// Picture and record of a sample.

@@ -28,8 +28,7 @@ impl YoloSet {
         let path = folder.join("data.yaml");
         let (yaml, problems) = DataYaml::read(&io::read_text(&path)?);
         if let Some((line, what)) = problems.into_iter().next() {
-            let line = line.map(|n| format!("line {n}: ")).unwrap_or_default();
-            return Err(Error::file(path, format!("{line}{what}")));
+            return Err(yaml_problem(&path, line, &what));
         }
         let root = yaml.root(folder);
         let [train, val] = Part::ALL.map(|part| images_of(&root, yaml.folders(part)));
@@ -68,6 +67,11 @@ fn images_of(root: &Path, parts: &[String]) -> Result<Vec<PathBuf>> {
         images.extend(found);
     }
     Ok(images)
+}
+
+fn yaml_problem(path: &Path, line: Option<usize>, what: &str) -> Error {
+    let line = line.map(|n| format!("line {n}: ")).unwrap_or_default();
+    Error::file(path, format!("{line}{what}"))
 }
 
 /// The lines of a list; `./` is the list's own folder, as for YOLOv5.

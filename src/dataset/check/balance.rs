@@ -86,11 +86,7 @@ impl Checked {
     fn rare_class(&self, class: usize) -> Option<Diagnostic> {
         let (rows, all) = (*self.rows.get(class)?, self.boxes.len());
         let is_rare = rows > 0 && (rows as f64) < RARE_LABEL_SHARE * all as f64;
-        is_rare.then(|| {
-            let name = &self.classes[class];
-            let message = format!("class \"{name}\" has only {rows} of {all} labels");
-            Diagnostic::note(Code::RareClass, message)
-        })
+        is_rare.then(|| rare_class_note(&self.classes[class], rows, all))
     }
 
     fn tiny_boxes(&self) -> Option<Diagnostic> {
@@ -115,4 +111,9 @@ fn tiny_boxes_note(count: usize) -> Diagnostic {
     let percent = 100.0 * TINY_SIDE_SHARE;
     let message = format!("{count} boxes are below {percent:.0} % of the image's side");
     Diagnostic::note(Code::TinyBoxes, message)
+}
+
+fn rare_class_note(name: &str, rows: usize, all: usize) -> Diagnostic {
+    let message = format!("class \"{name}\" has only {rows} of {all} labels");
+    Diagnostic::note(Code::RareClass, message)
 }

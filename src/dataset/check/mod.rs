@@ -171,15 +171,20 @@ impl Checker<'_> {
         let mut images = Vec::new();
         for part in Part::ALL {
             for folder in yaml.folders(part) {
-                let mut found = list_files(self.folder, folder);
-                found.retain(|path| is_image(path));
-                if found.is_empty() {
-                    self.add(folder, Code::NoImages, "no images, expected at least one");
-                }
+                let found = self.list_images_in(folder);
                 images.extend(found.into_iter().map(|path| (part, path)));
             }
         }
         images
+    }
+
+    fn list_images_in(&mut self, folder: &str) -> Vec<PathBuf> {
+        let mut found = list_files(self.folder, folder);
+        found.retain(|path| is_image(path));
+        if found.is_empty() {
+            self.add(folder, Code::NoImages, "no images, expected at least one");
+        }
+        found
     }
 
     /// Images with the bytes of another; images of an empty scene may well be the same.

@@ -22,13 +22,17 @@ struct SettledScene {
 /// A finding for each sidecar file with objects that hang in the air, and for each that cannot be read.
 pub(super) fn find(dataset: &Path) -> Vec<Finding> {
     let options = settle_options(dataset);
+    scene_files(dataset)
+        .into_par_iter()
+        .filter_map(|path| find_in(dataset, path, &options))
+        .collect()
+}
+
+fn scene_files(dataset: &Path) -> Vec<PathBuf> {
     let folders = ["scenes/train", "scenes/val"].iter();
     let mut files: Vec<PathBuf> = folders.flat_map(|part| list_files(dataset, part)).collect();
     files.retain(|path| path.extension().is_some_and(|e| e == "json"));
     files
-        .into_par_iter()
-        .filter_map(|path| find_in(dataset, path, &options))
-        .collect()
 }
 
 fn find_in(dataset: &Path, path: PathBuf, options: &SettleOptions) -> Option<Finding> {

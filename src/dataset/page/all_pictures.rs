@@ -2,10 +2,11 @@
 
 use super::color_of;
 use crate::dataset::{SampleSummary, Summary};
+use crate::geom::BBox;
 use crate::io;
 use crate::plot::Page;
 use std::collections::BTreeMap;
-use std::fmt::Write;
+
 use std::path::{Path, PathBuf};
 
 /// So many pictures stand behind one heading, and so many are listed: a page stays below a few MB.
@@ -25,11 +26,13 @@ pub(super) fn add_all(page: &mut Page, folder: &Path, summary: &Summary, page_fo
     }
     let more = summary.glances.len() - count;
     if more > 0 {
-        let address = address(&root.join("images"));
-        page.html(&format!(
-            "<p>{more} more are in <a href=\"{address}\">images</a>.</p>\n"
-        ));
+        page.html(&link_to_others(more, &root));
     }
+}
+
+fn link_to_others(count: usize, root: &Path) -> String {
+    let address = address(&root.join("images"));
+    format!("<p>{count} more are in <a href=\"{address}\">images</a>.</p>\n")
 }
 
 fn absolute_path(path: &Path) -> PathBuf {
@@ -61,12 +64,17 @@ fn listed(sample: &SampleSummary, root: &Path) -> String {
     )
 }
 
+/// A box as a part of an SVG path, in whole pixels.
+fn rectangle(b: &BBox) -> String {
+    let [x, y, w, h] = [b.x0, b.y0, b.width(), b.height()].map(|v| v.round());
+    format!("M{x} {y}h{w}v{h}h-{w}z")
+}
+
 /// The boxes of each class as one path.
 fn boxes_by_class(sample: &SampleSummary) -> String {
     let mut paths: BTreeMap<u32, String> = BTreeMap::new();
     for (class, b) in &sample.labels {
-        let [x, y, w, h] = [b.x0, b.y0, b.width(), b.height()].map(|v| v.round());
-        let _ = write!(paths.entry(*class).or_default(), "M{x} {y}h{w}v{h}h-{w}z");
+        *paths.entry(*class).or_default() += &rectangle(b);
     }
     let paths = paths.iter();
     paths

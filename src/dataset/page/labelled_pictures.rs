@@ -105,10 +105,7 @@ impl LabelledPicture {
         let Some(label) = candidates.iter().find(|label| label.is_file()) else {
             return Ok(Self { path, boxes: None });
         };
-        // In a picture of one pixel, pixels are shares.
-        let image = eval::yolo_sheet(&io::read_text(label)?, "", [1, 1])
-            .map_err(|what| Error::file(label, what))?;
-        let boxes = Some(image.truth.iter().map(share_box).collect());
+        let boxes = Some(read_boxes(label)?);
         Ok(Self { path, boxes })
     }
 
@@ -121,6 +118,13 @@ impl LabelledPicture {
             boxes: Some(boxes.collect()),
         }
     }
+}
+
+fn read_boxes(label: &Path) -> Result<Vec<ShareBox>> {
+    // In a picture of one pixel, pixels are shares.
+    let image = eval::yolo_sheet(&io::read_text(label)?, "", [1, 1])
+        .map_err(|what| Error::file(label, what))?;
+    Ok(image.truth.iter().map(share_box).collect())
 }
 
 fn share_box(truth: &GroundTruth) -> ShareBox {
@@ -160,10 +164,14 @@ fn listed_images(folder: &Path) -> Result<(Vec<String>, Vec<PathBuf>)> {
         let images = listing.series();
         return Ok((listing.classes, images));
     }
+    Ok((Vec::new(), images_below(folder)?))
+}
+
+fn images_below(folder: &Path) -> Result<Vec<PathBuf>> {
     let mut images = Vec::new();
     collect_images(folder, &mut BTreeSet::new(), &mut images)?;
     images.sort();
-    Ok((Vec::new(), images))
+    Ok(images)
 }
 
 /// Centre and sides of a box as shares of its picture.

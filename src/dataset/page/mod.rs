@@ -154,6 +154,10 @@ fn add_background_notes(page: &mut Page, summary: &Summary) {
     let Some(notes) = notes.filter(|notes| !notes.is_empty()) else {
         return;
     };
+    page.heading("Backgrounds").table(&background_notes(notes));
+}
+
+fn background_notes(notes: &serde_json::Map<String, serde_json::Value>) -> Table {
     let mut table = Table::new(["background", "what to look at"]);
     for (name, texts) in notes {
         let texts = texts.as_array().into_iter().flatten();
@@ -161,7 +165,7 @@ fn add_background_notes(page: &mut Page, summary: &Summary) {
             table.push([name, text]);
         }
     }
-    page.heading("Backgrounds").table(&table);
+    table
 }
 
 fn add_rejected(page: &mut Page, summary: &Summary) {
@@ -170,16 +174,19 @@ fn add_rejected(page: &mut Page, summary: &Summary) {
         page.text("None.");
         return;
     }
-    let mut table = Table::new(["image", "why"]);
-    summary
-        .rejected
-        .iter()
-        .for_each(|(k, why)| table.push([format!("{k:06}"), why.clone()]));
     page.text(&format!(
         "{} scenes did not come to rest and were resampled.",
         summary.rejected.len()
     ))
-    .table(&table);
+    .table(&rejected_scenes(summary));
+}
+
+fn rejected_scenes(summary: &Summary) -> Table {
+    let mut table = Table::new(["image", "why"]);
+    for (k, why) in &summary.rejected {
+        table.push([format!("{k:06}"), why.clone()]);
+    }
+    table
 }
 
 fn times(summary: &Summary) -> Table {

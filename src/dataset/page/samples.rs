@@ -50,15 +50,21 @@ pub(super) fn add_samples(
     page.text(&describe_selection(&selected, summary.glances.len()));
     let figures: Vec<Figure> = selected
         .par_iter()
-        .map(|sample| {
-            let shown = summary.shown(folder, sample.row)?;
-            figure(&shown, &summary.classes, sample.why.as_deref())
-        })
+        .map(|sample| sample_figure(summary, folder, sample))
         .collect::<Result<_>>()?;
     page.html("<div class=\"samples\">\n")
         .html(&gallery("picture", &figures))
         .html("</div>\n</div>\n");
     Ok(())
+}
+
+fn sample_figure(
+    summary: &Summary,
+    folder: &std::path::Path,
+    sample: &SelectedSample,
+) -> Result<Figure> {
+    let shown = summary.shown(folder, sample.row)?;
+    figure(&shown, &summary.classes, sample.why.as_deref())
 }
 
 fn switch_html((id, text, on): (&str, &str, bool)) -> String {
@@ -181,12 +187,16 @@ fn figure(shown: &ShownSample, classes: &[String], why: Option<&str>) -> Result<
 
 fn figure_caption(record: &SampleRecord, why: Option<&str>) -> String {
     let (index, part, objects) = (record.index, record.part.name(), &record.labels.objects);
-    let labelled = objects
-        .iter()
-        .filter(|object| UnlabelledReason::of(object, record).is_none());
-    let (labelled, all) = (labelled.count(), objects.len());
+    let (labelled, all) = (count_labelled(record), objects.len());
     let why = why.map_or(String::new(), |why| format!("; {why}"));
     format!("{index:06} {part}: {labelled} of {all} objects labelled{why}")
+}
+
+fn count_labelled(record: &SampleRecord) -> usize {
+    let objects = record.labels.objects.iter();
+    objects
+        .filter(|object| UnlabelledReason::of(object, record).is_none())
+        .count()
 }
 
 fn box_of(object: &ObjectLabel, classes: &[String], letter: f64) -> String {
@@ -198,23 +208,30 @@ fn box_of(object: &ObjectLabel, classes: &[String], letter: f64) -> String {
         "<rect x=\"{x0}\" y=\"{y0}\" width=\"{width}\" height=\"{height}\" fill=\"none\" pointer-events=\"all\" \
          stroke=\"{color}\" stroke-width=\"2\"><title>{id} {}: {:.0} % seen</title></rect>",
         escaped(&name),
-        100.0 * object.visible_fraction
+        percent_seen(object)
     );
     rectangle + &gallery::words([x0, y0 + letter], &format!("{id} {name}"), letter, "#222")
 }
 
 fn mask_of(object: &ObjectLabel) -> String {
-    let mut path = String::new();
-    for polygon in trace::polygons(&object.visible_mask, 0.0) {
-        for (i, p) in polygon.iter().enumerate() {
-            let _ = write!(path, "{}{} {}", if i == 0 { "M" } else { "L" }, p.x, p.y);
-        }
-        path.push('z');
-    }
+    let polygons = trace::polygons(&object.visible_mask, 0.0);
+    let path: String = polygons.iter().map(|polygon| svg_path(polygon)).collect();
     format!(
         "<path d=\"{path}\" fill=\"{}\" fill-opacity=\"0.45\"/>",
         color_of(object.class)
     )
+}
+
+fn svg_path(polygon: &[Point2<f64>]) -> String {
+    let mut path = String::new();
+    for (i, p) in polygon.iter().enumerate() {
+        let _ = write!(path, "{}{} {}", if i == 0 { "M" } else { "L" }, p.x, p.y);
+    }
+    path + "z"
+}
+
+fn percent_seen(object: &ObjectLabel) -> f64 {
+    100.0 * object.visible_fraction
 }
 
 /// An outline with the reason why it has no label.
@@ -229,11 +246,8 @@ fn outline_of(
     }
     let why = why_unlabelled(object, reason);
     let id = object.id.0;
-    let title = format!(
-        "{id} {}: no label, {why}; {:.0} % seen",
-        class_name(object.class, classes),
-        100.0 * object.visible_fraction
-    );
+    let (name, seen) = (class_name(object.class, classes), percent_seen(object));
+    let title = format!("{id} {name}: no label, {why}; {seen:.0} % seen");
     let rings: String = object
         .outline_px
         .iter()
