@@ -178,10 +178,10 @@ impl BackgroundPhoto {
         if [w, h] == self.taken.map(|side| side as usize) {
             return Ok(());
         }
-        Err(self.other_size(w, h))
+        Err(self.size_mismatch(w, h))
     }
 
-    fn other_size(&self, w: usize, h: usize) -> Error {
+    fn size_mismatch(&self, w: usize, h: usize) -> Error {
         let [label_w, label_h] = self.taken;
         let what = format!("{w} x {h} pixels, but its label says {label_w} x {label_h}");
         Error::file(&self.photo, what)

@@ -70,13 +70,11 @@ fn of_places(places: &[BackgroundPhoto], inputs: &mut Inputs) -> Result<Vec<Valu
 
 /// The photos of backgrounds, by the names of their inputs.
 fn photo_files(places: &[BackgroundPhoto]) -> Vec<(String, &Path)> {
-    places
-        .iter()
-        .map(
-            |BackgroundPhoto {
-                 background, photo, ..
-             }| { (format!("background {}", background.name), &**photo) },
-        )
+    let names = places.iter().map(|place| &place.background.name);
+    let photos = places.iter().map(|place| &*place.photo);
+    names
+        .map(|name| format!("background {name}"))
+        .zip(photos)
         .collect()
 }
 

@@ -15,10 +15,10 @@ pub(crate) fn count(range: RangeInclusive<u64>) -> RangedU64ValueParser<usize> {
 pub(crate) fn parse_corners(text: &str) -> Result<[[f64; 2]; 4], String> {
     let points: Option<Vec<_>> = split_points(text).map(parse_point).collect();
     let corners = points.and_then(|points| points.try_into().ok());
-    corners.ok_or_else(|| no_corners(text))
+    corners.ok_or_else(|| bad_corners(text))
 }
 
-fn no_corners(text: &str) -> String {
+fn bad_corners(text: &str) -> String {
     format!("\"{text}\", expected four corners as in \"120,80 900,85 905,600 110,590\"")
 }
 

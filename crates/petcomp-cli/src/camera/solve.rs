@@ -190,12 +190,12 @@ pub(super) fn accepted(
     force: bool,
 ) -> petcomp::Result<Solution> {
     match solution.misfit() {
-        Some(error) if !force => Err(without_force(&labelled.source, &error)),
+        Some(error) if !force => Err(needs_force(&labelled.source, &error)),
         _ => Ok(solution),
     }
 }
 
-fn without_force(label: &Path, misfit: &SolveError) -> Error {
+fn needs_force(label: &Path, misfit: &SolveError) -> Error {
     let what = format!("{misfit}; --force accepts it nevertheless");
     Error::file(label, what)
 }

@@ -107,8 +107,9 @@ impl NodePictures {
     }
 
     fn color_spill(&self) -> Result<()> {
+        let photo = self.read_photo()?;
         let options = from_overrides("key", &self.settings)?;
-        write_picture(&self.output, &color_spill(&self.read_photo()?, &options))
+        write_picture(&self.output, &color_spill(&photo, &options))
     }
 
     /// Writes the picture seen through a matte.
