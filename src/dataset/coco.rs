@@ -172,15 +172,20 @@ impl Coco {
     }
 
     fn segmentation(&self, mask: &RleMask, ignored: bool) -> Segmentation {
-        let polygons = match self.masks {
-            CocoMask::Polygon if !ignored => trace::polygons(mask, self.simplify),
-            _ => Vec::new(),
-        };
+        let polygons = self.polygons(mask, ignored);
         // Readers do not take a list without polygons.
         if polygons.is_empty() {
             Segmentation::Runs(mask.clone())
         } else {
             Segmentation::Polygons(polygons.iter().map(|ring| coordinates_of(ring)).collect())
+        }
+    }
+
+    /// None of a mask that is written as runs.
+    fn polygons(&self, mask: &RleMask, ignored: bool) -> Vec<Vec<Point2<f64>>> {
+        match self.masks {
+            CocoMask::Polygon if !ignored => trace::polygons(mask, self.simplify),
+            _ => Vec::new(),
         }
     }
 }

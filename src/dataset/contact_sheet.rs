@@ -290,12 +290,16 @@ impl LegendEntry {
 /// The legend's entries, in as many lines as they need within a width.
 fn legend_entries(classes: &[String], tiles: &[ContactTile], width: usize) -> Vec<LegendEntry> {
     let (labelled, unlabelled) = count_objects(classes.len(), tiles);
-    let named = classes.iter().zip(labelled);
-    let texts = named.map(|(name, count)| format!("{name} ({count})"));
-    let mut entries: Vec<(Srgb8, String)> = (0..).map(draw::class_color).zip(texts).collect();
+    let mut entries = class_entries(classes, &labelled);
     let text = format!("no label, another lies over it ({unlabelled})");
     entries.push((UNLABELLED, text));
     place_entries(entries, width)
+}
+
+fn class_entries(classes: &[String], counts: &[usize]) -> Vec<(Srgb8, String)> {
+    let named = classes.iter().zip(counts);
+    let texts = named.map(|(name, count)| format!("{name} ({count})"));
+    (0..).map(draw::class_color).zip(texts).collect()
 }
 
 /// Width and height of the legend, pixels.
@@ -336,11 +340,15 @@ fn draw_legend(sheet: &mut Image<Srgb8>, top: isize, entries: &[LegendEntry]) {
     for entry in entries {
         let x = (MARGIN_PX + entry.x) as isize;
         let y = top + (entry.line * LEGEND_LINE_PX) as isize;
-        let mark = [x, y + ((TextSize::Small.height() - MARK_PX) / 2) as isize];
-        draw::fill(sheet, mark, [MARK_PX, MARK_PX], entry.color);
+        draw_mark(sheet, [x, y], entry.color);
         let text = [x + MARK_PX as isize + 8, y];
         draw::text(sheet, text, &entry.text, INK, TextSize::Small);
     }
+}
+
+fn draw_mark(sheet: &mut Image<Srgb8>, [x, y]: [isize; 2], color: Srgb8) {
+    let mark = [x, y + ((TextSize::Small.height() - MARK_PX) / 2) as isize];
+    draw::fill(sheet, mark, [MARK_PX, MARK_PX], color);
 }
 
 impl ContactSheetOptions {

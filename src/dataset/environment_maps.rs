@@ -77,9 +77,7 @@ impl EnvironmentMaps {
         let picture = Arc::new(picture);
         let mut kept = self.kept();
         kept.push((name.to_owned(), picture.clone()));
-        while kept.len() > 1 && total_bytes(&kept) > KEPT_BYTES {
-            kept.remove(0);
-        }
+        drop_oldest(&mut kept);
         picture
     }
 
@@ -93,6 +91,13 @@ fn not_listed(name: &str) -> Error {
     let what =
         "expected one that the recipe lists (scene.environment.files) or that lies in its folder";
     Error::value("environment.file", format!("\"{name}\", {what}"))
+}
+
+/// Drops the pictures that were used longest ago, until the others take little enough memory.
+fn drop_oldest(kept: &mut Vec<(String, Arc<Panorama>)>) {
+    while kept.len() > 1 && total_bytes(kept) > KEPT_BYTES {
+        kept.remove(0);
+    }
 }
 
 fn total_bytes(kept: &[(String, Arc<Panorama>)]) -> usize {

@@ -32,9 +32,7 @@ pub(crate) fn claim(plan: &Plan) -> Result<Claim> {
     let before = claimable_identity(folder)?;
     io::create_folder(folder)?;
     io::refuse_links(folder)?;
-    for name in [LOCK, JOURNAL, RUNS] {
-        io::refuse_foreign(&folder.join(name))?;
-    }
+    refuse_foreign_files(folder)?;
     let lock = lock(folder)?;
     let now = plan_identity(plan)?;
     if let Some(before) = before {
@@ -42,24 +40,37 @@ pub(crate) fn claim(plan: &Plan) -> Result<Claim> {
     }
     sweep(folder)?;
     io::write_json(identity_file(folder), &now)?;
-    for writer in &plan.writers {
-        writer.begin(folder, &plan.classes)?;
-    }
+    begin_writers(plan)?;
     Ok(Claim { _lock: lock })
+}
+
+fn refuse_foreign_files(folder: &Path) -> Result<()> {
+    let mut own = [LOCK, JOURNAL, RUNS].iter();
+    own.try_for_each(|name| io::refuse_foreign(&folder.join(name)))
+}
+
+fn begin_writers(plan: &Plan) -> Result<()> {
+    let mut writers = plan.writers.iter();
+    writers.try_for_each(|writer| writer.begin(&plan.folder, &plan.classes))
 }
 
 /// What a folder was made from; fails for one that holds something else.
 fn claimable_identity(folder: &Path) -> Result<Option<Value>> {
-    if folder.exists() && !folder.is_dir() {
-        let what = "is a file, expected a folder for the dataset";
-        return Err(Error::file(folder, what));
-    }
+    check_is_folder(folder)?;
     let before = identity(folder)?;
     if before.is_none() && holds_something(folder)? {
         let what = format!("is not empty and has no {IDENTITY}, expected a new or empty folder");
         return Err(Error::file(folder, what));
     }
     Ok(before)
+}
+
+fn check_is_folder(folder: &Path) -> Result<()> {
+    if folder.is_dir() || !folder.exists() {
+        return Ok(());
+    }
+    let what = "is a file, expected a folder for the dataset";
+    Err(Error::file(folder, what))
 }
 
 /// Fails where the folder was begun with another plan, naming the field.
@@ -100,16 +111,23 @@ fn format_of(identity: &Value) -> u64 {
 
 /// Refuses what another petcomp recorded otherwise: nobody could tell whether its inputs are still the same.
 pub(crate) fn of_this_format(identity: &Value, folder: &Path) -> Result<()> {
-    let (what, others) = match format_of(identity) {
-        FORMAT_VERSION => return Ok(()),
-        ..FORMAT_VERSION => (
-            "was begun by an older petcomp, which did not record every input",
-            "older",
-        ),
-        _ => ("was begun by a newer petcomp", "newer"),
+    let Some((what, others)) = other_petcomp(identity) else {
+        return Ok(());
     };
     let what = format!("{what}: finish it with the {others} one, or begin a new folder");
     Err(Error::file(identity_file(folder), what))
+}
+
+/// Which petcomp began a dataset, where its format is not this one's.
+fn other_petcomp(identity: &Value) -> Option<(&'static str, &'static str)> {
+    match format_of(identity) {
+        FORMAT_VERSION => None,
+        ..FORMAT_VERSION => Some((
+            "was begun by an older petcomp, which did not record every input",
+            "older",
+        )),
+        _ => Some(("was begun by a newer petcomp", "newer")),
+    }
 }
 
 /// What a folder was made from; none where it is no dataset yet.

@@ -77,7 +77,7 @@ impl Inputs {
     fn look(&self, name: &str, path: &Path, now: SystemTime) -> Result<Input> {
         let meta = std::fs::metadata(path).map_err(|e| Error::file(path, e))?;
         let stamp = stamp(&meta);
-        if let Some(known) = self.before.get(name).filter(|input| input.stamp == stamp) {
+        if let Some(known) = self.known(name, &stamp) {
             return Ok(known.clone());
         }
         Ok(Input {
@@ -85,6 +85,11 @@ impl Inputs {
             crc32: Checksum::from_file(path)?.crc32,
             is_settled: is_settled(&meta, now),
         })
+    }
+
+    /// The input as it was read before, where its file has not changed since.
+    fn known(&self, name: &str, stamp: &str) -> Option<&Input> {
+        self.before.get(name).filter(|input| input.stamp == stamp)
     }
 
     /// Keeps the checksums for the next run. They only save time: a folder without room for them is no error.

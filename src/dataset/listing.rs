@@ -49,10 +49,7 @@ impl Listing {
     /// # Errors
     /// A share that is not in `0..=1`.
     pub fn head(&self, share: f64) -> Result<Self> {
-        if !(0.0..=1.0).contains(&share) {
-            let what = format!("{share}, expected a share, 0 to 1");
-            return Err(Error::value("head", what));
-        }
+        check_share(share)?;
         Ok(Self {
             train: first_share(&self.train, share),
             val: first_share(&self.val, share),
@@ -126,6 +123,14 @@ fn list_of(images: &[PathBuf], folder: &Path) -> String {
         .iter()
         .map(|path| format!("./{}\n", io::relative(path, folder).display()))
         .collect()
+}
+
+fn check_share(share: f64) -> Result<()> {
+    if (0.0..=1.0).contains(&share) {
+        return Ok(());
+    }
+    let what = format!("{share}, expected a share, 0 to 1");
+    Err(Error::value("head", what))
 }
 
 fn first_share(images: &[PathBuf], share: f64) -> Vec<PathBuf> {

@@ -115,6 +115,7 @@ pub use yolo::YoloTask;
 pub use yolo_set::YoloSet;
 #[cfg(feature = "fuzzing")]
 pub(crate) use yolo_yaml::DataYaml;
+pub(crate) use yolo_yaml::yaml_names;
 
 use crate::deep::DeepImage;
 use crate::error::Result;

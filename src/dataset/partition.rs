@@ -116,13 +116,14 @@ impl Listing {
 
     /// Groups of the images for validation, and how many of them occur in training; none where they are not known.
     fn shared_groups(&self, group: Group) -> Option<[usize; 2]> {
-        let [train, val] = [&self.train, &self.val].map(|images| groups(images, group));
-        let (train, val) = (
-            BTreeSet::from_iter(train.ok()?),
-            BTreeSet::from_iter(val.ok()?),
-        );
+        let train = distinct_groups(&self.train, group)?;
+        let val = distinct_groups(&self.val, group)?;
         Some([val.len(), val.intersection(&train).count()])
     }
+}
+
+fn distinct_groups(images: &[PathBuf], group: Group) -> Option<BTreeSet<String>> {
+    Some(groups(images, group).ok()?.into_iter().collect())
 }
 
 /// The group of each image.

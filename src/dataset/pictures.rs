@@ -84,15 +84,25 @@ impl Writer for Pictures {
     }
 
     fn write(&self, folder: &Path, entry: &Entry<'_>) -> Result<Vec<PathBuf>> {
-        let path = entry.path("images", self.format.extension());
-        let displayed = entry.sample.frame.map(|p| p.color());
-        io::write_with(folder.join(&path), &displayed, &self.write_options())?;
-        let mut paths = vec![path];
+        let mut paths = vec![self.write_displayed(folder, entry)?];
         if self.exr {
-            let exr = entry.path("exr", "exr");
-            io::write(folder.join(&exr), &entry.sample.frame)?;
-            paths.push(exr);
+            paths.push(write_exr(folder, entry)?);
         }
         Ok(paths)
     }
+}
+
+impl Pictures {
+    fn write_displayed(&self, folder: &Path, entry: &Entry<'_>) -> Result<PathBuf> {
+        let path = entry.path("images", self.format.extension());
+        let displayed = entry.sample.frame.map(|p| p.color());
+        io::write_with(folder.join(&path), &displayed, &self.write_options())?;
+        Ok(path)
+    }
+}
+
+fn write_exr(folder: &Path, entry: &Entry<'_>) -> Result<PathBuf> {
+    let path = entry.path("exr", "exr");
+    io::write(folder.join(&path), &entry.sample.frame)?;
+    Ok(path)
 }

@@ -188,11 +188,7 @@ impl Summary {
 
     fn add(&mut self, sample: &ReadSample, line: &JournalLine) {
         let record = &sample.record;
-        for (path, &value) in &record.draws {
-            if let Some(key) = key(path) {
-                self.drawn.entry(key).or_default().push(value);
-            }
-        }
+        self.add_draws(record);
         self.add_choices(&record.drawn);
         for object in &record.labels.objects {
             self.add_object(object, record);
@@ -217,6 +213,14 @@ impl Summary {
         for object in &drawn.objects {
             self.count("asset", object.asset.clone());
             self.count("photo of the asset", object.photo.to_string());
+        }
+    }
+
+    fn add_draws(&mut self, record: &SampleRecord) {
+        for (path, &value) in &record.draws {
+            if let Some(key) = key(path) {
+                self.drawn.entry(key).or_default().push(value);
+            }
         }
     }
 
@@ -246,18 +250,14 @@ impl SampleSummary {
             files,
         } = sample;
         let labelled = labelled_objects(&record);
-        let visible = labelled.iter().map(|object| object.visible_fraction);
-        let boxes = labelled
-            .iter()
-            .map(|object| (object.class, object.amodal_box));
         Self {
             index: k,
             part,
             files,
             image: record.labels.image,
             objects: record.labels.objects.len(),
-            labels: boxes.collect(),
-            least_visible: visible.fold(1.0, f64::min),
+            labels: boxes_of(&labelled),
+            least_visible: least_visible(&labelled),
             rejected: record.rejected.len(),
         }
     }
@@ -279,22 +279,22 @@ impl ReadSample {
 
 /// The key in the recipe of a draw's distribution; none for a choice from a list and for a rotation that was resampled.
 fn key(path: &str) -> Option<String> {
-    let choice = path == "background"
-        || path.ends_with(".asset")
-        || path.ends_with(".photo")
-        || path.ends_with(".file");
-    if choice || path.contains('#') {
+    if is_choice(path) || path.contains('#') {
         return None;
     }
-    let own = path
-        .strip_prefix("objects[")
-        .and_then(|rest| rest.split_once("]."))
-        .map(|(_, own)| own);
-    Some(
-        own.or(path.strip_prefix("selection."))
-            .unwrap_or(path)
-            .to_owned(),
-    )
+    let own = object_key(path).or(path.strip_prefix("selection."));
+    Some(own.unwrap_or(path).to_owned())
+}
+
+fn is_choice(path: &str) -> bool {
+    let names = [".asset", ".photo", ".file"];
+    path == "background" || names.iter().any(|name| path.ends_with(name))
+}
+
+/// `hue` of `objects[2].hue`.
+fn object_key(path: &str) -> Option<&str> {
+    let (_, own) = path.strip_prefix("objects[")?.split_once("].")?;
+    Some(own)
 }
 
 /// Objects that have a label and are in the picture.
@@ -312,6 +312,18 @@ fn count_in_part(lines: &[JournalLine], part: Part) -> usize {
 /// `/objects/2/hue` of `objects[2].hue`.
 fn json_pointer(key: &str) -> String {
     format!("/{}", key.replace(['.', '['], "/").replace(']', ""))
+}
+
+fn boxes_of(objects: &[&ObjectLabel]) -> Vec<(u32, BBox)> {
+    let boxes = objects.iter();
+    boxes
+        .map(|object| (object.class, object.amodal_box))
+        .collect()
+}
+
+fn least_visible(objects: &[&ObjectLabel]) -> f64 {
+    let visible = objects.iter().map(|object| object.visible_fraction);
+    visible.fold(1.0, f64::min)
 }
 
 fn read_samples(folder: &Path, lines: &[JournalLine]) -> Result<Vec<ReadSample>> {

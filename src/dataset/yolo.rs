@@ -66,17 +66,19 @@ impl Writer for Yolo {
     }
 
     fn write(&self, folder: &Path, entry: &Entry<'_>) -> Result<Vec<PathBuf>> {
-        let [w, h] = entry.sample.labels.image;
-        if w.min(h) < MIN_SIDE_PX {
-            return Err(Error::value(
-                "image",
-                format!("{w} x {h} pixels, expected at least {MIN_SIDE_PX} a side for YOLO"),
-            ));
-        }
+        check_sides(entry.sample.labels.image)?;
         let path = entry.path("labels", "txt");
         io::write_text(folder.join(&path), &self.rows(entry))?;
         Ok(vec![path])
     }
+}
+
+fn check_sides([w, h]: [u32; 2]) -> Result<()> {
+    if w.min(h) >= MIN_SIDE_PX {
+        return Ok(());
+    }
+    let what = format!("{w} x {h} pixels, expected at least {MIN_SIDE_PX} a side for YOLO");
+    Err(Error::value("image", what))
 }
 
 impl Yolo {

@@ -61,11 +61,7 @@ impl DataYaml {
             yaml += &format!("{}: {}\n", part.name(), place(part.name()));
         }
         yaml += &format!("nc: {}\nnames:\n", classes.len());
-        for (i, name) in classes.iter().enumerate() {
-            // A JSON string is a YAML string, whatever is in it.
-            yaml += &format!("  {i}: {}\n", serde_json::Value::from(name.as_str()));
-        }
-        yaml
+        yaml + &yaml_names(classes)
     }
 
     /// Reads the keys that trainers need; all others are skipped. What could be read stays, whatever else is wrong.
@@ -345,6 +341,15 @@ impl<'a> Reader<'a> {
         }
         Ok(())
     }
+}
+
+/// The entries below `names:`.
+pub(crate) fn yaml_names(classes: &[String]) -> String {
+    let names = classes.iter().enumerate();
+    names
+        // A JSON string is a YAML string, whatever is in it.
+        .map(|(i, name)| format!("  {i}: {}\n", serde_json::Value::from(name.as_str())))
+        .collect()
 }
 
 fn scalar(text: &str, style: ScalarStyle) -> Value {

@@ -148,12 +148,18 @@ fn add_heat_maps(page: &mut Page, summary: &Summary) {
     let set = LabelledSet::from_summary(Path::new(""), summary);
     let mut maps = heat_map("centres of all labels", &set.centres());
     if summary.classes.len() > 1 {
-        for (class, name) in (0..).zip(&summary.classes).take(MAX_CLASS_MAPS) {
-            let title = format!("centres of {}", gallery::clipped(name, 30));
-            maps += &heat_map(&title, &set.centres_of(class));
-        }
+        maps += &class_maps(&summary.classes, &set);
     }
     page.html(&format!("<div class=\"histograms\">\n{maps}</div>\n"));
+}
+
+fn class_maps(classes: &[String], set: &LabelledSet) -> String {
+    let classes = (0..).zip(classes).take(MAX_CLASS_MAPS);
+    let maps = classes.map(|(class, name)| {
+        let title = format!("centres of {}", gallery::clipped(name, 30));
+        heat_map(&title, &set.centres_of(class))
+    });
+    maps.collect()
 }
 
 /// Adds charts beside each other.

@@ -101,11 +101,8 @@ impl LabelledSet {
 
 impl LabelledPicture {
     fn read(path: PathBuf) -> Result<Self> {
-        let candidates = [YoloSet::label_of(&path), path.with_extension("txt")];
-        let Some(label) = candidates.iter().find(|label| label.is_file()) else {
-            return Ok(Self { path, boxes: None });
-        };
-        let boxes = Some(read_boxes(label)?);
+        let label = label_beside(&path);
+        let boxes = label.map(|label| read_boxes(&label)).transpose()?;
         Ok(Self { path, boxes })
     }
 
@@ -118,6 +115,12 @@ impl LabelledPicture {
             boxes: Some(boxes.collect()),
         }
     }
+}
+
+/// The label file of an image: that of a YOLO dataset, or one of its name in the same folder.
+fn label_beside(image: &Path) -> Option<PathBuf> {
+    let mut candidates = [YoloSet::label_of(image), image.with_extension("txt")].into_iter();
+    candidates.find(|label| label.is_file())
 }
 
 fn read_boxes(label: &Path) -> Result<Vec<ShareBox>> {
@@ -149,12 +152,17 @@ fn collect_images(
         } else if path.is_file() && is_image(&path) {
             images.push(path);
         }
-        if images.len() > MAX_IMAGES {
-            let what = format!("more than {MAX_IMAGES} images, expected fewer");
-            return Err(Error::file(folder, what));
-        }
+        check_image_count(images.len(), folder)?;
     }
     Ok(())
+}
+
+fn check_image_count(count: usize, folder: &Path) -> Result<()> {
+    if count <= MAX_IMAGES {
+        return Ok(());
+    }
+    let what = format!("more than {MAX_IMAGES} images, expected fewer");
+    Err(Error::file(folder, what))
 }
 
 /// Classes and images of a YOLO dataset, or all images below a folder.

@@ -40,12 +40,7 @@ pub(super) fn add_samples(
     folder: &std::path::Path,
     count: usize,
 ) -> Result<()> {
-    page.heading("Pictures")
-        .html(&legend(summary))
-        .html("<div>\n");
-    for switch in SWITCHES {
-        page.html(&switch_html(switch));
-    }
+    add_controls(page, summary);
     let selected = select_samples(&summary.glances, count);
     page.text(&describe_selection(&selected, summary.glances.len()));
     let figures: Vec<Figure> = selected
@@ -56,6 +51,15 @@ pub(super) fn add_samples(
         .html(&gallery("picture", &figures))
         .html("</div>\n</div>\n");
     Ok(())
+}
+
+fn add_controls(page: &mut Page, summary: &Summary) {
+    page.heading("Pictures")
+        .html(&legend(summary))
+        .html("<div>\n");
+    for switch in SWITCHES {
+        page.html(&switch_html(switch));
+    }
 }
 
 fn sample_figure(
@@ -248,11 +252,7 @@ fn outline_of(
     let id = object.id.0;
     let (name, seen) = (class_name(object.class, classes), percent_seen(object));
     let title = format!("{id} {name}: no label, {why}; {seen:.0} % seen");
-    let rings: String = object
-        .outline_px
-        .iter()
-        .map(|ring| titled_polygon(ring, &escaped(&title)))
-        .collect();
+    let rings = titled_rings(object, &escaped(&title));
     let center = object.amodal_box.center();
     let at = [center.x - 2.0 * letter, center.y];
     rings + &gallery::words(at, &format!("{id} {why}"), 0.7 * letter, "#555")
@@ -273,6 +273,11 @@ fn ids_above(object: &ObjectLabel) -> Vec<String> {
 fn svg_points(ring: &[Point2<f64>]) -> String {
     let points = ring.iter().map(|p| format!("{:.1},{:.1}", p.x, p.y));
     points.collect::<Vec<_>>().join(" ")
+}
+
+fn titled_rings(object: &ObjectLabel, title: &str) -> String {
+    let rings = object.outline_px.iter();
+    rings.map(|ring| titled_polygon(ring, title)).collect()
 }
 
 fn titled_polygon(ring: &[Point2<f64>], title: &str) -> String {

@@ -1,7 +1,7 @@
 //! Files with which the paper's experiments run in YOLOv5 and Ultralytics.
 
 use super::{Balance, Updates, batches_per_epoch};
-use crate::dataset::YoloSet;
+use crate::dataset::{YoloSet, yaml_names};
 use crate::error::{Error, Result};
 use crate::io;
 use std::path::{Path, PathBuf};
@@ -206,14 +206,6 @@ fn yaml_list(names: &[&str]) -> String {
     names
         .iter()
         .map(|name| format!("  - {name}.txt\n"))
-        .collect()
-}
-
-fn yaml_names(classes: &[String]) -> String {
-    let names = classes.iter().enumerate();
-    names
-        // A JSON string is a YAML string, whatever is in it.
-        .map(|(i, name)| format!("  {i}: {}\n", serde_json::Value::from(&**name)))
         .collect()
 }
 
