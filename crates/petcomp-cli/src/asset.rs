@@ -218,10 +218,7 @@ fn write_sheet(folder: &Path, library: &Library, global: &GlobalArgs) -> anyhow:
 }
 
 fn add_photos(args: &AddPhotoArgs, global: &GlobalArgs) -> anyhow::Result<()> {
-    let options = args.quality.cut_out(CutOutOptions::default());
-    let photos = args.photos.iter();
-    let added = photos.map(|photo| args.add_photo(photo, &options, global));
-    let added = added.collect::<petcomp::Result<Vec<_>>>()?;
+    let added = args.add_each(global)?;
     let library = Library::open_with(&args.output, added)?;
     show_classes(&library.classes, "--classes", global);
     write_sheet(&args.output, &library, global)
@@ -239,6 +236,14 @@ fn describe_size(record: &PhotoRecord) -> String {
 }
 
 impl AddPhotoArgs {
+    fn add_each(&self, global: &GlobalArgs) -> petcomp::Result<Vec<Photo>> {
+        let options = self.quality.cut_out(CutOutOptions::default());
+        let photos = self.photos.iter();
+        photos
+            .map(|photo| self.add_photo(photo, &options, global))
+            .collect()
+    }
+
     fn add_photo(
         &self,
         photo: &Path,

@@ -78,9 +78,14 @@ fn print_rejected(provenance: &Provenance) {
 }
 
 fn print_draws(provenance: &Provenance) {
+    print_rows(&draw_rows(provenance));
+}
+
+fn draw_rows(provenance: &Provenance) -> Vec<DrawRow<'_>> {
     let draws = provenance.draws.iter();
-    let rows = draws.map(|draw| DrawRow::new(draw, &provenance.drawn));
-    print_rows(&rows.collect::<Vec<_>>());
+    draws
+        .map(|draw| DrawRow::new(draw, &provenance.drawn))
+        .collect()
 }
 
 /// A draw as it is printed.

@@ -108,8 +108,7 @@ fn plan_batches(args: &BatchesArgs, global: &GlobalArgs) -> anyhow::Result<()> {
         size: args.sets.batch,
         seed: args.seed,
     };
-    let epochs = (0..args.epochs).flat_map(|epoch| sets.epoch_lines(epoch, &options));
-    let lines: Vec<String> = epochs.collect();
+    let lines = sets.lines(args.epochs, &options);
     io::write_text(&args.output, &lines.concat())?;
     let (batches, weights) = (lines.len(), sets.describe_weights());
     global.print_written(&args.output, format_args!("{batches} batches; {weights}"));
@@ -138,6 +137,13 @@ impl MixedSets {
     fn describe_weights(&self) -> String {
         let Weights { real, synthetic } = self.weights;
         format!("weights real {real:.4}, synthetic {synthetic:.4}")
+    }
+
+    fn lines(&self, epochs: u64, options: &BatchOptions) -> Vec<String> {
+        let epochs = 0..epochs;
+        epochs
+            .flat_map(|epoch| self.epoch_lines(epoch, options))
+            .collect()
     }
 
     fn epoch_lines(&self, epoch: u64, options: &BatchOptions) -> Vec<String> {
