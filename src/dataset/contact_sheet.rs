@@ -213,10 +213,13 @@ impl SheetLayout {
     /// Top left corner of a picture.
     fn place(&self, i: usize) -> [usize; 2] {
         let [column, row] = [i % self.columns, i / self.columns];
-        [
-            MARGIN_PX + column * (self.cell[0] + GAP_PX),
-            self.top + row * (self.cell[1] + GAP_PX),
-        ]
+        let [across, down] = self.cell_pitch();
+        [MARGIN_PX + column * across, self.top + row * down]
+    }
+
+    /// From a cell to the next one beside and below it.
+    fn cell_pitch(&self) -> [usize; 2] {
+        self.cell.map(|side| side + GAP_PX)
     }
 }
 

@@ -54,6 +54,11 @@ impl Thumbnail {
         let distances = all.iter().map(|other| self.codes_from(other)).enumerate();
         distances.min_by(|a, b| a.1.total_cmp(&b.1))
     }
+
+    fn nearest_within(&self, all: &[Self], codes: f64) -> Option<(usize, f64)> {
+        self.nearest_of(all)
+            .filter(|(_, distance)| *distance < codes)
+    }
 }
 
 /// For each of `val` the nearest of `train`, as places in the lists, where it is nearer than `codes`.
@@ -65,8 +70,8 @@ pub(crate) fn nearest(
     val.par_iter()
         .enumerate()
         .filter_map(|(i, own)| {
-            let (j, distance) = own.nearest_of(train)?;
-            (distance < codes).then_some((i, j, distance))
+            let (j, distance) = own.nearest_within(train, codes)?;
+            Some((i, j, distance))
         })
         .collect()
 }

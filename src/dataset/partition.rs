@@ -103,15 +103,17 @@ impl Listing {
     /// # Errors
     /// An image that cannot be read.
     pub fn leakage(&self, max_codes: f64) -> Result<Leakage> {
-        let groups = Group::ALL.into_iter();
         Ok(Leakage {
-            groups: groups.filter_map(|group| self.leaked(group)).collect(),
+            groups: self.leaked_groups(),
             near_duplicates: near_pairs(&self.train, &self.val, max_codes)?,
         })
     }
 
-    fn leaked(&self, group: Group) -> Option<(&'static str, [usize; 2])> {
-        Some((group.name(), self.shared_groups(group)?))
+    fn leaked_groups(&self) -> Vec<(&'static str, [usize; 2])> {
+        let groups = Group::ALL.into_iter();
+        groups
+            .filter_map(|group| Some((group.name(), self.shared_groups(group)?)))
+            .collect()
     }
 
     /// Groups of the images for validation, and how many of them occur in training; none where they are not known.

@@ -73,14 +73,8 @@ impl Writer for Pictures {
     }
 
     fn begin(&self, folder: &Path, _classes: &[String]) -> Result<()> {
-        let kinds = if self.exr {
-            &["images", "exr"][..]
-        } else {
-            &["images"]
-        };
-        kinds
-            .iter()
-            .try_for_each(|kind| create_part_folders(folder, kind))
+        let mut kinds = self.kinds().iter();
+        kinds.try_for_each(|kind| create_part_folders(folder, kind))
     }
 
     fn write(&self, folder: &Path, entry: &Entry<'_>) -> Result<Vec<PathBuf>> {
@@ -93,6 +87,15 @@ impl Writer for Pictures {
 }
 
 impl Pictures {
+    /// The folders of the dataset that it writes to.
+    fn kinds(&self) -> &'static [&'static str] {
+        if self.exr {
+            &["images", "exr"]
+        } else {
+            &["images"]
+        }
+    }
+
     fn write_displayed(&self, folder: &Path, entry: &Entry<'_>) -> Result<PathBuf> {
         let path = entry.path("images", self.format.extension());
         let displayed = entry.sample.frame.map(|p| p.color());

@@ -92,6 +92,11 @@ pub(super) fn extremes<'a>(values: impl IntoIterator<Item = &'a f64>) -> [f64; 2
     let [low, high] = values
         .into_iter()
         .fold([f64::INFINITY, f64::NEG_INFINITY], widened);
+    with_room([low, high])
+}
+
+/// A range of one value is widened, so that it has bins.
+fn with_room([low, high]: [f64; 2]) -> [f64; 2] {
     if low < high {
         [low, high]
     } else {

@@ -77,24 +77,30 @@ fn switch_html((id, text, on): (&str, &str, bool)) -> String {
 }
 
 fn describe_selection(selected: &[SelectedSample], all: usize) -> String {
-    let outliers = selected.iter().filter(|sample| sample.why.is_some());
-    let (count, outliers) = (selected.len(), outliers.count());
+    let (count, outliers) = (selected.len(), count_outliers(selected));
     format!(
         "{count} of {all} pictures: first {outliers} that are unlike the others, with what sets them apart, then others evenly \
          spread. Click one to enlarge it; Escape and the arrow keys work too."
     )
 }
 
+fn count_outliers(selected: &[SelectedSample]) -> usize {
+    let outliers = selected.iter().filter(|sample| sample.why.is_some());
+    outliers.count()
+}
+
 /// Colours of the classes and kinds of lines.
 fn legend(summary: &Summary) -> String {
-    let classes: String = (0..)
-        .zip(&summary.classes)
+    let classes = class_keys(&summary.classes);
+    let unlabelled = legend_key(UNLABELLED, "outline of an object without a label");
+    format!("<p>{classes}{unlabelled}</p>\n")
+}
+
+fn class_keys(classes: &[String]) -> String {
+    let classes = (0..).zip(classes);
+    classes
         .map(|(class, name)| legend_key(&color_of(class), name))
-        .collect();
-    format!(
-        "<p>{classes}{}</p>\n",
-        legend_key(UNLABELLED, "outline of an object without a label")
-    )
+        .collect()
 }
 
 fn legend_key(fill: &str, text: &str) -> String {
