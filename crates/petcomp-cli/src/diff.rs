@@ -109,9 +109,7 @@ pub(crate) fn run(args: &DiffArgs, global: &GlobalArgs) -> anyhow::Result<ExitCo
     if let Some(path) = args.difference_path(&report) {
         pair.write_difference(path, args.scale)?;
     }
-    let (a, b) = (args.a.display(), args.b.display());
-    global.print_status(format_args!("Comparing \"{a}\" and \"{b}\""));
-    print::text(&report);
+    print_comparison(args, &report, global);
     pair.print_likeness(global);
     Ok(ExitCode::from(report.verdict.exit_code()))
 }
@@ -119,6 +117,12 @@ pub(crate) fn run(args: &DiffArgs, global: &GlobalArgs) -> anyhow::Result<ExitCo
 fn exit_unreadable(error: &impl Display) -> ExitCode {
     print::aside(format_args!("error: {error}"));
     ExitCode::from(Verdict::Unreadable.exit_code())
+}
+
+fn print_comparison(args: &DiffArgs, report: &Comparison, global: &GlobalArgs) {
+    let (a, b) = (args.a.display(), args.b.display());
+    global.print_status(format_args!("Comparing \"{a}\" and \"{b}\""));
+    print::text(report);
 }
 
 /// The two pictures: the second is what the first should be.

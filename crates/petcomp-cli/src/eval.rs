@@ -51,10 +51,7 @@ pub(crate) fn run(args: &EvalArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     let runs = args.read_runs(&mut options)?;
     let metrics = args.measure(&runs, &options)?;
     print_scores(&metrics, &options, global);
-    let factors = page::factors_table(&runs, &options);
-    if !factors.rows.is_empty() {
-        print::text(factors.markdown());
-    }
+    print_factors(&runs, &options);
     if let Some(folder) = &args.output {
         global.print_look_at(&folder.join("eval.html"));
     }
@@ -69,6 +66,13 @@ fn print_scores(metrics: &[Metrics], options: &EvalReportOptions, global: &Globa
         global.print_status(format_args!(
             "the classes with the lowest AP; {others} others: -o FOLDER writes classes.csv"
         ));
+    }
+}
+
+fn print_factors(runs: &[Run], options: &EvalReportOptions) {
+    let factors = page::factors_table(runs, options);
+    if !factors.rows.is_empty() {
+        print::text(factors.markdown());
     }
 }
 

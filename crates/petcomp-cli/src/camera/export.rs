@@ -65,11 +65,14 @@ fn only_camera(files: &[CameraFile]) -> anyhow::Result<Camera> {
 fn write_colmap(folder: Option<&Path>, files: &[CameraFile]) -> anyhow::Result<()> {
     let folder = folder
         .ok_or_else(|| anyhow::anyhow!("-o: missing, expected a folder for COLMAP's files"))?;
-    let model = colmap_model(files);
+    Ok(write_model(folder, &colmap_model(files))?)
+}
+
+fn write_model(folder: &Path, model: &ColmapModel) -> petcomp::Result<()> {
     io::create_folder(folder)?;
     io::write_text(folder.join("cameras.txt"), &model.cameras)?;
     io::write_text(folder.join("images.txt"), &model.images)?;
-    Ok(io::write_text(folder.join("points3D.txt"), &model.points)?)
+    io::write_text(folder.join("points3D.txt"), &model.points)
 }
 
 fn colmap_model(files: &[CameraFile]) -> ColmapModel {
