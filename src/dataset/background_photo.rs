@@ -1,9 +1,10 @@
 //! Labelled photos of the place that scenes are set in.
 
 use crate::camera::{self, Camera, LabelledPhoto, PhotoCamera};
+use crate::dataset::paths::folder_of;
 use crate::error::{Error, Result};
 use crate::filter;
-use crate::geom::{Point2, Point3};
+use crate::geom::{Point2, Point3, Vector2};
 use crate::image::{Image, Roi};
 use crate::io;
 use crate::pixel::LinearRgb;
@@ -67,10 +68,22 @@ impl BackgroundPhoto {
     fn open(labelled: &LabelledPhoto, seen: &PhotoCamera, image: [u32; 2]) -> Result<Self> {
         let photo = photo_path(labelled)?;
         camera::check_distance(&seen.camera).map_err(|e| e.in_file(&labelled.source))?;
+        let mut background = Self::cropped_to(image, labelled, seen, photo);
+        background.notes.extend(background.shape_note());
+        Ok(background)
+    }
+
+    /// The middle part of a photo that has the shape of the picture.
+    fn cropped_to(
+        image: [u32; 2],
+        labelled: &LabelledPhoto,
+        seen: &PhotoCamera,
+        photo: PathBuf,
+    ) -> Self {
         let taken = labelled.label.image_size();
         let kept = middle_part(taken, image);
         let camera = cropped(seen.camera, kept).resized(image);
-        let mut background = Self {
+        Self {
             background: Background {
                 name: labelled.name.clone(),
                 size: seen.size,
@@ -83,9 +96,7 @@ impl BackgroundPhoto {
             kept,
             image,
             plate: OnceLock::new(),
-        };
-        background.notes.extend(background.shape_note());
-        Ok(background)
+        }
     }
 
     /// The part of the photo that pictures show.
@@ -96,14 +107,16 @@ impl BackgroundPhoto {
 
     /// That only a part of the photo fits into the pictures' shape, and what that leaves of its rectangle.
     fn shape_note(&self) -> Option<String> {
-        if self.part() == 1.0 {
-            return None;
-        }
-        let ([w, h], Roi { width, height, .. }) = (self.taken, self.kept);
-        let rectangle = self.describe_cut();
-        Some(format!(
-            "of {w} x {h} pixels the middle {width} x {height} are shown{rectangle}"
-        ))
+        (self.part() != 1.0).then(|| self.describe_crop())
+    }
+
+    fn describe_crop(&self) -> String {
+        let [w, h] = self.taken;
+        let Roi { width, height, .. } = self.kept;
+        format!(
+            "of {w} x {h} pixels the middle {width} x {height} are shown{}",
+            self.describe_cut()
+        )
     }
 
     fn describe_cut(&self) -> &'static str {
@@ -133,12 +146,14 @@ impl BackgroundPhoto {
 
     /// The whole photo at the scale of the pictures, pixels.
     fn uncropped_size(&self) -> [f64; 2] {
-        let [w, h] = self.image.map(f64::from);
-        let [taken_w, taken_h] = self.taken.map(f64::from);
-        [
-            w * (taken_w / self.kept.width as f64),
-            h * (taken_h / self.kept.height as f64),
-        ]
+        let ([w, h], [across, down]) = (self.image.map(f64::from), self.taken_to_kept());
+        [w * across, h * down]
+    }
+
+    /// How many times the width and height of the kept part the photo has.
+    fn taken_to_kept(&self) -> [f64; 2] {
+        let [w, h] = self.taken.map(f64::from);
+        [w / self.kept.width as f64, h / self.kept.height as f64]
     }
 
     fn surface_corners(&self) -> [Point3<f64>; 4] {
@@ -160,12 +175,16 @@ impl BackgroundPhoto {
     }
 
     fn check_size(&self, (w, h): (usize, usize)) -> Result<()> {
-        let [tw, th] = self.taken;
         if [w, h] == self.taken.map(|side| side as usize) {
             return Ok(());
         }
-        let what = format!("{w} x {h} pixels, but its label says {tw} x {th}");
-        Err(Error::file(&self.photo, what))
+        Err(self.size_mismatch(w, h))
+    }
+
+    fn size_mismatch(&self, w: usize, h: usize) -> Error {
+        let [label_w, label_h] = self.taken;
+        let what = format!("{w} x {h} pixels, but its label says {label_w} x {label_h}");
+        Error::file(&self.photo, what)
     }
 }
 
@@ -217,8 +236,7 @@ fn warn_of_shapes(places: &[BackgroundPhoto]) {
 
 /// The photo that a label names, in the label's folder.
 fn photo_path(labelled: &LabelledPhoto) -> Result<PathBuf> {
-    let folder = labelled.source.parent().unwrap_or(Path::new(""));
-    io::inside(folder, &labelled.label.image.file)
+    io::inside(folder_of(&labelled.source), &labelled.label.image.file)
         .map_err(|e| e.within("image").in_file(&labelled.source))
 }
 
@@ -247,12 +265,15 @@ fn is_within_side(at: f64, size: f64, seen: f64) -> bool {
 
 /// The camera of a part of its picture.
 fn cropped(camera: Camera, kept: Roi) -> Camera {
-    let corner = crate::geom::Vector2::new(kept.x as f64, kept.y as f64);
     Camera {
         image: [kept.width as u32, kept.height as u32],
-        principal_px: camera.principal_px - corner,
+        principal_px: camera.principal_px - corner_of(kept),
         ..camera
     }
+}
+
+fn corner_of(kept: Roi) -> Vector2<f64> {
+    Vector2::new(kept.x as f64, kept.y as f64)
 }
 
 fn area([w, h]: [f64; 2]) -> f64 {

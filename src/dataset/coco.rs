@@ -1,6 +1,7 @@
 //! Labels as COCO writes them: one JSON document for each part of the dataset.
 
 use crate::dataset::formats::is_exact;
+use crate::dataset::paths::create_part_folders;
 use crate::dataset::{Entry, Extent, LabelledObject, Part, PictureFormat, Writer, Written};
 use crate::error::{Error, Result};
 use crate::geom::Point2;
@@ -98,9 +99,7 @@ impl Writer for Coco {
     }
 
     fn begin(&self, folder: &Path, _classes: &[String]) -> Result<()> {
-        Part::ALL
-            .iter()
-            .try_for_each(|part| io::create_folder(folder.join(PARTS_FOLDER).join(part.name())))
+        create_part_folders(folder, PARTS_FOLDER)
     }
 
     fn write(&self, folder: &Path, entry: &Entry<'_>) -> Result<Vec<PathBuf>> {
@@ -125,19 +124,28 @@ impl Writer for Coco {
 
 impl Coco {
     fn share(&self, entry: &Entry<'_>) -> Result<ImageShare> {
-        let labels = entry.labelled.iter();
-        let annotations = labels.filter_map(|label| self.annotation(entry.k, label).transpose());
         Ok(ImageShare {
             image: self.image_of(entry),
-            annotations: annotations.collect::<Result<_>>()?,
+            annotations: self.annotations(entry)?,
         })
+    }
+
+    fn annotations(&self, entry: &Entry<'_>) -> Result<Vec<Annotation>> {
+        let labels = entry.labelled.iter();
+        labels
+            .filter_map(|label| self.annotation(entry.k, label).transpose())
+            .collect()
+    }
+
+    fn picture_name(&self, k: u64) -> String {
+        format!("{k:06}.{}", self.pictures.extension())
     }
 
     fn image_of(&self, entry: &Entry<'_>) -> CocoImage {
         let [width, height] = entry.sample.labels.image;
         CocoImage {
             id: entry.k,
-            file_name: format!("{:06}.{}", entry.k, self.pictures.extension()),
+            file_name: self.picture_name(entry.k),
             width,
             height,
         }
@@ -164,10 +172,7 @@ impl Coco {
     }
 
     fn segmentation(&self, mask: &RleMask, ignored: bool) -> Segmentation {
-        let polygons = match self.masks {
-            CocoMask::Polygon if !ignored => trace::polygons(mask, self.simplify),
-            _ => Vec::new(),
-        };
+        let polygons = self.polygons(mask, ignored);
         // Readers do not take a list without polygons.
         if polygons.is_empty() {
             Segmentation::Runs(mask.clone())
@@ -175,15 +180,26 @@ impl Coco {
             Segmentation::Polygons(polygons.iter().map(|ring| coordinates_of(ring)).collect())
         }
     }
+
+    /// None of a mask that is written as runs.
+    fn polygons(&self, mask: &RleMask, ignored: bool) -> Vec<Vec<Point2<f64>>> {
+        match self.masks {
+            CocoMask::Polygon if !ignored => trace::polygons(mask, self.simplify),
+            _ => Vec::new(),
+        }
+    }
 }
 
 fn annotation_id(k: u64, object: u32) -> Result<u64> {
     let id = u64::from(object);
-    let first = k.checked_mul(IDS_PER_IMAGE);
-    let unique = first.and_then(|first| first.checked_add(id));
-    unique
+    unique_id(k, id)
         .filter(|_| (1..IDS_PER_IMAGE).contains(&id))
         .ok_or_else(|| unusable_id(object))
+}
+
+/// None where it would overflow.
+fn unique_id(k: u64, object: u64) -> Option<u64> {
+    k.checked_mul(IDS_PER_IMAGE)?.checked_add(object)
 }
 
 fn unusable_id(object: u32) -> Error {

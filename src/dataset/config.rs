@@ -1,9 +1,10 @@
 //! The file that a dataset is made from.
 
 use crate::dataset::environment_maps::seen_from;
+use crate::dataset::paths::{absolute_path, folder_of};
 use crate::dataset::yolo::MIN_SIDE_PX;
 use crate::dataset::{LabelConfig, Pictures, Split};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::io;
 use crate::render::RenderOptions;
 use crate::scene::{Ablation, Recipe};
@@ -68,7 +69,7 @@ impl DatasetConfig {
         let path = path.as_ref();
         let mut config: Self = io::read_toml_with(path, overrides)?;
         config.check().map_err(|e| e.in_file(path))?;
-        let folder = path.parent().unwrap_or(Path::new(""));
+        let folder = folder_of(path);
         config.assets = folder.join(&config.assets);
         config.backgrounds = folder.join(&config.backgrounds);
         config.folder = folder.into();
@@ -78,7 +79,7 @@ impl DatasetConfig {
     /// Fails on the first value that cannot be right, by its path: `render.subsamples`.
     ///
     /// # Errors
-    /// [`Error::Value`] with the value and what was expected.
+    /// [`Error::Value`](crate::error::Error::Value) with the value and what was expected.
     pub fn check(&self) -> Result<()> {
         self.scene.check().map_err(|e| e.within("scene"))?;
         self.render.check().map_err(|e| e.within("render"))?;
@@ -98,7 +99,7 @@ impl DatasetConfig {
     /// When it cannot be written.
     pub fn write(&self, path: impl AsRef<Path>) -> Result<()> {
         let path = path.as_ref();
-        let folder = absolute_path(path.parent().unwrap_or(Path::new("")))?;
+        let folder = absolute_path(folder_of(path))?;
         let mut config = self.clone();
         config.assets = io::relative(&absolute_path(&config.assets)?, &folder);
         config.backgrounds = io::relative(&absolute_path(&config.backgrounds)?, &folder);
@@ -129,10 +130,6 @@ impl DatasetConfig {
         config.scene.off.dedup();
         config
     }
-}
-
-fn absolute_path(path: &Path) -> Result<PathBuf> {
-    std::path::absolute(path).map_err(|e| Error::file(path, e))
 }
 
 #[cfg(test)]

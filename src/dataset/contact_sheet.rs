@@ -72,20 +72,18 @@ impl ContactTile {
         caption: String,
         width: usize,
     ) -> Self {
-        let (w, h) = picture.size();
-        let width = width.clamp(1, w.max(1));
-        let height = (h * width).div_ceil(w.max(1)).max(1);
-        let picture = if width < w {
-            resize(picture, width, height)
-        } else {
-            picture.clone()
-        };
         Self {
-            picture,
+            picture: shrunk(picture, width),
             labels,
             labelled,
             caption,
         }
+    }
+
+    /// Width of the wider of picture and caption.
+    fn width(&self) -> usize {
+        let caption = TextSize::Small.width(&self.caption);
+        self.picture.width().max(caption)
     }
 
     fn drawn(&self) -> Image<Srgb8> {
@@ -95,6 +93,16 @@ impl ContactTile {
         });
         canvas
     }
+}
+
+/// The picture no wider than `width`.
+fn shrunk(picture: &Image<LinearRgb>, width: usize) -> Image<LinearRgb> {
+    let (w, h) = picture.size();
+    let width = width.clamp(1, w.max(1));
+    if width >= w {
+        return picture.clone();
+    }
+    resize(picture, width, (h * width).div_ceil(w.max(1)).max(1))
 }
 
 /// Lays out pictures in rows, each with its boxes and a caption, under a title and a legend of the classes.
@@ -205,19 +213,20 @@ impl SheetLayout {
     /// Top left corner of a picture.
     fn place(&self, i: usize) -> [usize; 2] {
         let [column, row] = [i % self.columns, i / self.columns];
-        [
-            MARGIN_PX + column * (self.cell[0] + GAP_PX),
-            self.top + row * (self.cell[1] + GAP_PX),
-        ]
+        let [across, down] = self.cell_pitch();
+        [MARGIN_PX + column * across, self.top + row * down]
+    }
+
+    /// From a cell to the next one beside and below it.
+    fn cell_pitch(&self) -> [usize; 2] {
+        self.cell.map(|side| side + GAP_PX)
     }
 }
 
 /// Size of the largest picture with its caption.
 fn cell_size(tiles: &[ContactTile]) -> [usize; 2] {
     let text = TextSize::Small;
-    let widths = tiles
-        .iter()
-        .map(|tile| tile.picture.width().max(text.width(&tile.caption)));
+    let widths = tiles.iter().map(ContactTile::width);
     let heights = tiles.iter().map(|tile| tile.picture.height());
     [
         widths.max().unwrap_or(0),
@@ -284,19 +293,26 @@ impl LegendEntry {
 /// The legend's entries, in as many lines as they need within a width.
 fn legend_entries(classes: &[String], tiles: &[ContactTile], width: usize) -> Vec<LegendEntry> {
     let (labelled, unlabelled) = count_objects(classes.len(), tiles);
-    let named = classes.iter().zip(labelled);
-    let texts = named.map(|(name, count)| format!("{name} ({count})"));
-    let mut entries: Vec<(Srgb8, String)> = (0..).map(draw::class_color).zip(texts).collect();
+    let mut entries = class_entries(classes, &labelled);
     let text = format!("no label, another lies over it ({unlabelled})");
     entries.push((UNLABELLED, text));
     place_entries(entries, width)
 }
 
+fn class_entries(classes: &[String], counts: &[usize]) -> Vec<(Srgb8, String)> {
+    let named = classes.iter().zip(counts);
+    let texts = named.map(|(name, count)| format!("{name} ({count})"));
+    (0..).map(draw::class_color).zip(texts).collect()
+}
+
 /// Width and height of the legend, pixels.
 fn legend_size(entries: &[LegendEntry]) -> [usize; 2] {
     let width = entries.iter().map(LegendEntry::end).max();
-    let lines = entries.last().map_or(0, |entry| entry.line + 1);
-    [width.unwrap_or(0), lines * LEGEND_LINE_PX]
+    [width.unwrap_or(0), line_count(entries) * LEGEND_LINE_PX]
+}
+
+fn line_count(entries: &[LegendEntry]) -> usize {
+    entries.last().map_or(0, |entry| entry.line + 1)
 }
 
 /// Objects with a label for each class, and objects without one.
@@ -327,11 +343,15 @@ fn draw_legend(sheet: &mut Image<Srgb8>, top: isize, entries: &[LegendEntry]) {
     for entry in entries {
         let x = (MARGIN_PX + entry.x) as isize;
         let y = top + (entry.line * LEGEND_LINE_PX) as isize;
-        let mark = [x, y + ((TextSize::Small.height() - MARK_PX) / 2) as isize];
-        draw::fill(sheet, mark, [MARK_PX, MARK_PX], entry.color);
+        draw_mark(sheet, [x, y], entry.color);
         let text = [x + MARK_PX as isize + 8, y];
         draw::text(sheet, text, &entry.text, INK, TextSize::Small);
     }
+}
+
+fn draw_mark(sheet: &mut Image<Srgb8>, [x, y]: [isize; 2], color: Srgb8) {
+    let mark = [x, y + ((TextSize::Small.height() - MARK_PX) / 2) as isize];
+    draw::fill(sheet, mark, [MARK_PX, MARK_PX], color);
 }
 
 impl ContactSheetOptions {

@@ -95,9 +95,12 @@ fn sum_of(lines: &[JournalLine], count: fn(&JournalLine) -> u32) -> u64 {
 /// Objects of a class, and how many of them have a label.
 fn count_class(lines: &[JournalLine], class: usize) -> [u64; 2] {
     let counts = lines.iter().filter_map(|line| line.classes.get(class));
-    counts.fold([0; 2], |sums, counts| {
-        [0, 1].map(|i| sums[i] + u64::from(counts[i]))
-    })
+    sum_by_part(counts.map(|counts| counts.map(u64::from)))
+}
+
+/// The sums of counts by part.
+pub(super) fn sum_by_part(counts: impl Iterator<Item = [u64; 2]>) -> [u64; 2] {
+    counts.fold([0; 2], |sums, counts| [0, 1].map(|i| sums[i] + counts[i]))
 }
 
 impl From<(String, [u64; 2])> for ClassCount {

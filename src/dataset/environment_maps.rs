@@ -2,6 +2,7 @@
 
 use crate::asset::Panorama;
 use crate::dataset::DatasetConfig;
+use crate::dataset::paths::absolute_path;
 use crate::error::{Error, Result};
 use crate::io;
 use std::path::{Path, PathBuf};
@@ -57,10 +58,7 @@ impl EnvironmentMaps {
             return Ok(self.folder.join(name));
         }
         io::inside(&self.folder, name).map_err(|e| match e {
-            Error::Value { .. } => {
-                let what = "expected one that the recipe lists (scene.environment.files) or that lies in its folder";
-                Error::value("environment.file", format!("\"{name}\", {what}"))
-            }
+            Error::Value { .. } => not_listed(name),
             other => other,
         })
     }
@@ -79,15 +77,26 @@ impl EnvironmentMaps {
         let picture = Arc::new(picture);
         let mut kept = self.kept();
         kept.push((name.to_owned(), picture.clone()));
-        while kept.len() > 1 && total_bytes(&kept) > KEPT_BYTES {
-            kept.remove(0);
-        }
+        drop_oldest(&mut kept);
         picture
     }
 
     fn kept(&self) -> MutexGuard<'_, Vec<(String, Arc<Panorama>)>> {
         // Every change is whole, even where a thread panicked afterwards.
         self.kept.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+fn not_listed(name: &str) -> Error {
+    let what =
+        "expected one that the recipe lists (scene.environment.files) or that lies in its folder";
+    Error::value("environment.file", format!("\"{name}\", {what}"))
+}
+
+/// Drops the pictures that were used longest ago, until the others take little enough memory.
+fn drop_oldest(kept: &mut Vec<(String, Arc<Panorama>)>) {
+    while kept.len() > 1 && total_bytes(kept) > KEPT_BYTES {
+        kept.remove(0);
     }
 }
 
@@ -98,8 +107,7 @@ fn total_bytes(kept: &[(String, Arc<Panorama>)]) -> usize {
 
 /// A name in a recipe as it is seen from another folder.
 pub(crate) fn seen_from(folder: &Path, own: &Path, name: &str) -> Result<String> {
-    let file = own.join(name);
-    let file = std::path::absolute(&file).map_err(|e| Error::file(&file, e))?;
+    let file = absolute_path(&own.join(name))?;
     Ok(io::relative(&file, folder).to_string_lossy().into_owned())
 }
 

@@ -63,18 +63,19 @@ fn of_photo(photo: &Photo) -> Value {
 }
 
 fn of_places(places: &[BackgroundPhoto], inputs: &mut Inputs) -> Result<Vec<Value>> {
-    let files: Vec<(String, &Path)> = places
-        .iter()
-        .map(|place| {
-            (
-                format!("background {}", place.background.name),
-                &*place.photo,
-            )
-        })
-        .collect();
-    let photos = inputs.checksums(&files)?;
+    let photos = inputs.checksums(&photo_files(places))?;
     let pairs = places.iter().zip(photos);
     Ok(pairs.map(|(place, photo)| of_place(place, photo)).collect())
+}
+
+/// The photos of backgrounds, by the names of their inputs.
+fn photo_files(places: &[BackgroundPhoto]) -> Vec<(String, &Path)> {
+    let names = places.iter().map(|place| &place.background.name);
+    let photos = places.iter().map(|place| &*place.photo);
+    names
+        .map(|name| format!("background {name}"))
+        .zip(photos)
+        .collect()
 }
 
 fn of_place(place: &BackgroundPhoto, photo: u32) -> Value {

@@ -7,7 +7,7 @@ use crate::io;
 use serde_json::{Map, Value, json};
 use std::ffi::OsStr;
 use std::fs::{File, TryLockError};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Name of the file that says what a dataset was made from.
 pub(crate) const IDENTITY: &str = "dataset.json";
@@ -32,28 +32,31 @@ pub(crate) fn claim(plan: &Plan) -> Result<Claim> {
     let before = claimable_identity(folder)?;
     io::create_folder(folder)?;
     io::refuse_links(folder)?;
-    for name in [LOCK, JOURNAL, RUNS] {
-        io::refuse_foreign(&folder.join(name))?;
-    }
+    refuse_foreign_files(folder)?;
     let lock = lock(folder)?;
     let now = plan_identity(plan)?;
     if let Some(before) = before {
         check_same_plan(&before, &now, folder)?;
     }
     sweep(folder)?;
-    io::write_json(folder.join(IDENTITY), &now)?;
-    for writer in &plan.writers {
-        writer.begin(folder, &plan.classes)?;
-    }
+    io::write_json(identity_file(folder), &now)?;
+    begin_writers(plan)?;
     Ok(Claim { _lock: lock })
+}
+
+fn refuse_foreign_files(folder: &Path) -> Result<()> {
+    let mut own = [LOCK, JOURNAL, RUNS].iter();
+    own.try_for_each(|name| io::refuse_foreign(&folder.join(name)))
+}
+
+fn begin_writers(plan: &Plan) -> Result<()> {
+    let mut writers = plan.writers.iter();
+    writers.try_for_each(|writer| writer.begin(&plan.folder, &plan.classes))
 }
 
 /// What a folder was made from; fails for one that holds something else.
 fn claimable_identity(folder: &Path) -> Result<Option<Value>> {
-    if folder.exists() && !folder.is_dir() {
-        let what = "is a file, expected a folder for the dataset";
-        return Err(Error::file(folder, what));
-    }
+    check_is_folder(folder)?;
     let before = identity(folder)?;
     if before.is_none() && holds_something(folder)? {
         let what = format!("is not empty and has no {IDENTITY}, expected a new or empty folder");
@@ -62,27 +65,39 @@ fn claimable_identity(folder: &Path) -> Result<Option<Value>> {
     Ok(before)
 }
 
+fn check_is_folder(folder: &Path) -> Result<()> {
+    if folder.is_dir() || !folder.exists() {
+        return Ok(());
+    }
+    let what = "is a file, expected a folder for the dataset";
+    Err(Error::file(folder, what))
+}
+
 /// Fails where the folder was begun with another plan, naming the field.
 fn check_same_plan(before: &Value, now: &Value, folder: &Path) -> Result<()> {
     of_this_format(before, folder)?;
     same(before, now, "")
-        .map_err(|(at, what)| Error::value(at, what).in_file(folder.join(IDENTITY)))
+        .map_err(|(at, what)| Error::value(at, what).in_file(identity_file(folder)))
+}
+
+/// The file that says what the dataset in a folder was made from.
+pub(super) fn identity_file(folder: &Path) -> PathBuf {
+    folder.join(IDENTITY)
 }
 
 /// Claims the folder of a dataset that was begun before.
 pub(crate) fn reclaim(folder: &Path) -> Result<Claim> {
-    let before = identity(folder)?;
-    let before = before.ok_or_else(|| {
-        Error::file(
-            folder,
-            format!("no {IDENTITY}, expected a dataset that was begun before"),
-        )
-    })?;
+    let before = identity(folder)?.ok_or_else(|| not_begun(folder))?;
     io::refuse_links(folder)?;
     of_this_format(&before, folder)?;
     Ok(Claim {
         _lock: lock(folder)?,
     })
+}
+
+fn not_begun(folder: &Path) -> Error {
+    let what = format!("no {IDENTITY}, expected a dataset that was begun before");
+    Error::file(folder, what)
 }
 
 /// The folder was begun before every input was recorded and lines had checksums.
@@ -96,21 +111,28 @@ fn format_of(identity: &Value) -> u64 {
 
 /// Refuses what another petcomp recorded otherwise: nobody could tell whether its inputs are still the same.
 pub(crate) fn of_this_format(identity: &Value, folder: &Path) -> Result<()> {
-    let (what, others) = match format_of(identity) {
-        FORMAT_VERSION => return Ok(()),
-        ..FORMAT_VERSION => (
-            "was begun by an older petcomp, which did not record every input",
-            "older",
-        ),
-        _ => ("was begun by a newer petcomp", "newer"),
+    let Some((what, others)) = other_petcomp(identity) else {
+        return Ok(());
     };
     let what = format!("{what}: finish it with the {others} one, or begin a new folder");
-    Err(Error::file(folder.join(IDENTITY), what))
+    Err(Error::file(identity_file(folder), what))
+}
+
+/// Which petcomp began a dataset, where its format is not this one's.
+fn other_petcomp(identity: &Value) -> Option<(&'static str, &'static str)> {
+    match format_of(identity) {
+        FORMAT_VERSION => None,
+        ..FORMAT_VERSION => Some((
+            "was begun by an older petcomp, which did not record every input",
+            "older",
+        )),
+        _ => Some(("was begun by a newer petcomp", "newer")),
+    }
 }
 
 /// What a folder was made from; none where it is no dataset yet.
 pub(crate) fn identity(folder: &Path) -> Result<Option<Value>> {
-    match std::fs::symlink_metadata(folder.join(IDENTITY)) {
+    match std::fs::symlink_metadata(identity_file(folder)) {
         Err(_) => Ok(None),
         Ok(_) => io::read_json(io::inside(folder, IDENTITY)?).map(Some),
     }

@@ -1,7 +1,9 @@
 //! The part of a recipe that says how labels are made and written: its table `[labels]`.
 
 use crate::bounds::Bounds;
-use crate::dataset::{Coco, Layers, Obstructed, Pictures, Voc, WebDataset, Writer, Yolo};
+use crate::dataset::{
+    Coco, Layers, Obstructed, PictureFormat, Pictures, Voc, WebDataset, Writer, Yolo,
+};
 use crate::error::Result;
 use crate::geom::BBox;
 use crate::label::{AmodalBox, LabelOptions, ObjectLabel, RleMask};
@@ -122,32 +124,44 @@ impl LabelConfig {
     /// The writers of the layouts, each once, in the order in which [`Format`] lists them: [`WebDataset`] packs what the
     /// others write.
     pub fn writers(&self, pictures: &Pictures) -> Vec<Box<dyn Writer>> {
-        let mut formats = self.formats.clone();
-        formats.sort();
-        formats.dedup();
+        let formats = self.distinct_formats().into_iter();
         formats
-            .into_iter()
             .map(|format| self.writer(format, pictures))
             .collect()
     }
 
+    fn distinct_formats(&self) -> Vec<Format> {
+        let mut formats = self.formats.clone();
+        formats.sort();
+        formats.dedup();
+        formats
+    }
+
     fn writer(&self, format: Format, pictures: &Pictures) -> Box<dyn Writer> {
         match format {
-            Format::Yolo => Box::new(Yolo {
-                simplify: self.simplify,
-                ..self.yolo
-            }),
-            Format::Coco => Box::new(Coco {
-                pictures: pictures.format,
-                simplify: self.simplify,
-                ..self.coco
-            }),
+            Format::Yolo => Box::new(self.yolo_writer()),
+            Format::Coco => Box::new(self.coco_writer(pictures.format)),
             Format::Voc => Box::new(Voc {
                 pictures: pictures.format,
                 ..self.voc
             }),
             Format::Layers => Box::new(self.layers),
             Format::WebDataset => Box::new(self.webdataset),
+        }
+    }
+
+    fn yolo_writer(&self) -> Yolo {
+        Yolo {
+            simplify: self.simplify,
+            ..self.yolo
+        }
+    }
+
+    fn coco_writer(&self, pictures: PictureFormat) -> Coco {
+        Coco {
+            pictures,
+            simplify: self.simplify,
+            ..self.coco
         }
     }
 }

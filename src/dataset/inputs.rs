@@ -77,7 +77,7 @@ impl Inputs {
     fn look(&self, name: &str, path: &Path, now: SystemTime) -> Result<Input> {
         let meta = std::fs::metadata(path).map_err(|e| Error::file(path, e))?;
         let stamp = stamp(&meta);
-        if let Some(known) = self.before.get(name).filter(|input| input.stamp == stamp) {
+        if let Some(known) = self.known(name, &stamp) {
             return Ok(known.clone());
         }
         Ok(Input {
@@ -85,6 +85,11 @@ impl Inputs {
             crc32: Checksum::from_file(path)?.crc32,
             is_settled: is_settled(&meta, now),
         })
+    }
+
+    /// The input as it was read before, where its file has not changed since.
+    fn known(&self, name: &str, stamp: &str) -> Option<&Input> {
+        self.before.get(name).filter(|input| input.stamp == stamp)
     }
 
     /// Keeps the checksums for the next run. They only save time: a folder without room for them is no error.
@@ -133,12 +138,14 @@ fn stamp(meta: &Metadata) -> String {
 }
 
 fn is_settled(meta: &Metadata, now: SystemTime) -> bool {
+    let age = last_change(meta).and_then(|latest| now.duration_since(latest).ok());
+    age.is_some_and(|age| age > SETTLED_AGE)
+}
+
+/// When the file's content or its entry changed last.
+fn last_change(meta: &Metadata) -> Option<SystemTime> {
     let times = [meta.modified().ok(), changed(meta)];
-    let Some(latest) = times.into_iter().flatten().max() else {
-        return false;
-    };
-    let age = now.duration_since(latest);
-    age.is_ok_and(|age| age > SETTLED_AGE)
+    times.into_iter().flatten().max()
 }
 
 /// When a file's content or its names changed last: a time that nobody can set back.

@@ -55,11 +55,14 @@ impl Journal {
 
     /// Adds a finished sample.
     pub(crate) fn add(&mut self, line: JournalLine) -> Result<()> {
-        self.file
-            .write_all(line.text().as_bytes())
-            .map_err(|e| Error::file(&self.path, e))?;
+        self.append(&line.text())?;
         self.lines.insert(line.k, line);
         Ok(())
+    }
+
+    fn append(&mut self, text: &str) -> Result<()> {
+        let written = self.file.write_all(text.as_bytes());
+        written.map_err(|e| Error::file(&self.path, e))
     }
 
     /// Number of finished samples below `count` that are wanted.
@@ -79,14 +82,15 @@ impl Journal {
 }
 
 /// The last line has no end: what follows would be read as a part of it.
-fn is_torn(mut file: &File) -> std::io::Result<bool> {
-    if file.metadata()?.len() == 0 {
-        return Ok(false);
-    }
+fn is_torn(file: &File) -> std::io::Result<bool> {
+    Ok(file.metadata()?.len() > 0 && last_byte(file)? != b'\n')
+}
+
+fn last_byte(mut file: &File) -> std::io::Result<u8> {
     let mut last = [0];
     file.seek(SeekFrom::End(-1))?;
     file.read_exact(&mut last)?;
-    Ok(last != *b"\n")
+    Ok(last[0])
 }
 
 fn end_last_line(file: &mut File) -> std::io::Result<()> {
@@ -105,7 +109,12 @@ fn lines_with_files(known: Vec<JournalLine>, folder: &Path) -> BTreeMap<u64, Jou
         .filter(|(i, line)| line.has_files(folder, *i < synced))
         .map(|(_, line)| line)
         .collect();
-    held.into_iter().map(|line| (line.k, line)).collect()
+    keyed_by_number(held)
+}
+
+/// Of one number the last.
+fn keyed_by_number(lines: impl IntoIterator<Item = JournalLine>) -> BTreeMap<u64, JournalLine> {
+    lines.into_iter().map(|line| (line.k, line)).collect()
 }
 
 /// Compares the files of a dataset with what was written and marks samples that differ to be made again: returns how
@@ -121,12 +130,16 @@ pub fn repair(folder: &Path) -> Result<(usize, usize)> {
     let read = read_journal(&io::open_own(&path)?, &path, false)?;
     let all = read.len();
     let lines = by_number(read);
-    let good: Vec<&JournalLine> = lines
-        .par_iter()
-        .filter(|line| line.has_same_bytes(folder))
-        .collect();
+    let good = lines_with_same_bytes(&lines, folder);
     write_lines(&path, good.iter().copied())?;
     Ok((good.len(), all - good.len()))
+}
+
+fn lines_with_same_bytes<'a>(lines: &'a [JournalLine], folder: &Path) -> Vec<&'a JournalLine> {
+    lines
+        .par_iter()
+        .filter(|line| line.has_same_bytes(folder))
+        .collect()
 }
 
 /// The whole lines of a folder's journal, in order of number.
@@ -154,18 +167,24 @@ fn read_journal(file: &File, path: &Path, is_older: bool) -> Result<NumberedLine
 /// The lines that are not damaged, in the order of the file.
 fn whole_lines(read: NumberedLines, path: &Path, consequence: &str) -> Vec<JournalLine> {
     warn_of_damage(&read, path, consequence);
-    read.into_iter().filter_map(|(_, line)| line.ok()).collect()
+    undamaged(read).collect()
+}
+
+fn undamaged(read: NumberedLines) -> impl Iterator<Item = JournalLine> {
+    read.into_iter().filter_map(|(_, line)| line.ok())
 }
 
 /// The lines that are not damaged, in order of number; of one number the last.
 fn by_number(read: NumberedLines) -> Vec<JournalLine> {
-    let good = read.into_iter().filter_map(|(_, line)| line.ok());
-    let lines: BTreeMap<u64, _> = good.map(|line| (line.k, line)).collect();
-    lines.into_values().collect()
+    keyed_by_number(undamaged(read)).into_values().collect()
+}
+
+fn count_damaged(read: &NumberedLines) -> usize {
+    read.iter().filter(|(_, line)| line.is_err()).count()
 }
 
 fn warn_of_damage(read: &NumberedLines, path: &Path, consequence: &str) {
-    let damaged = read.iter().filter(|(_, line)| line.is_err()).count();
+    let damaged = count_damaged(read);
     if damaged > 0 {
         log::warn!("{}: {damaged} damaged lines, {consequence}", path.display());
     }

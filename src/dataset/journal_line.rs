@@ -8,7 +8,7 @@ use crate::dataset::folder::{IDENTITY, JOURNAL};
 use crate::dataset::{Entry, Part, Written};
 use crate::error::{Error, Result};
 use crate::io::{self, Checksum};
-use crate::label::cyclic_overlaps;
+use crate::label::{ObjectLabel, cyclic_overlaps};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -49,12 +49,11 @@ impl JournalLine {
     /// The line of a sample whose files have just been written.
     pub(crate) fn new(entry: &Entry<'_>, folder: &Path, files: &[PathBuf]) -> Result<Self> {
         let objects = &entry.sample.labels.objects;
-        let obstructed = objects.iter().filter(|object| !object.is_topmost());
         Ok(Self {
             k: entry.k,
             part: entry.part,
             classes: count_by_class(entry),
-            obstructed: obstructed.count() as u32,
+            obstructed: count_obstructed(objects),
             knotted: cyclic_overlaps(objects).len() as u32,
             retries: entry.sample.rejected_scenes() as u32,
             files: read_back_all(folder, files)?,
@@ -63,11 +62,7 @@ impl JournalLine {
 
     /// Reads a line, if it is as it was written; `is_older` says that lines without a checksum are taken as well.
     pub(crate) fn parse(text: &[u8], is_older: bool) -> std::result::Result<Self, String> {
-        let line = match split_seal(text) {
-            Some(sealed) => unsealed(sealed)?,
-            None if is_older => text.to_vec(),
-            None => return Err("has no checksum, or is torn".into()),
-        };
+        let line = without_seal(text, is_older)?;
         let line: Self = serde_json::from_slice(&line).map_err(|e| e.to_string())?;
         line.files.iter().try_for_each(WrittenFile::check_path)?;
         Ok(line)
@@ -82,11 +77,10 @@ impl JournalLine {
 
     /// What a writer needs to know to join it with others.
     pub(crate) fn written(&self) -> Written {
-        let files = self.files.iter();
         Written {
             k: self.k,
             part: self.part,
-            files: files.map(|file| file.path.split('/').collect()).collect(),
+            files: self.files.iter().map(WrittenFile::local_path).collect(),
         }
     }
 
@@ -134,6 +128,11 @@ impl JournalLine {
     }
 }
 
+fn count_obstructed(objects: &[ObjectLabel]) -> u32 {
+    let obstructed = objects.iter().filter(|object| !object.is_topmost());
+    obstructed.count() as u32
+}
+
 /// For each class its objects in the picture, and how many of them have a label.
 fn count_by_class(entry: &Entry<'_>) -> Vec<[u32; 2]> {
     let mut classes = vec![[0; 2]; entry.classes.len()];
@@ -155,6 +154,10 @@ fn read_back_all(folder: &Path, files: &[PathBuf]) -> Result<Vec<WrittenFile>> {
 }
 
 impl WrittenFile {
+    /// Its path below the dataset's folder, as this system writes it.
+    fn local_path(&self) -> PathBuf {
+        self.path.split('/').collect()
+    }
     /// Reads the file back: what counts is what is on the disk.
     pub(crate) fn read_back(folder: &Path, path: &Path) -> Result<Self> {
         let Checksum { bytes, crc32 } = Checksum::from_file(io::inside(folder, path)?)?;
@@ -201,8 +204,7 @@ impl WrittenFile {
     /// Fails where the path is none of a sample's: outside of the folder, hidden, or a file of the dataset as a whole.
     fn check_path(&self) -> std::result::Result<(), String> {
         io::below("", &self.path).map_err(|e| e.to_string())?;
-        let is_hidden = self.path.split('/').any(|step| step.starts_with('.'));
-        if is_hidden || [JOURNAL, IDENTITY].contains(&self.path.as_str()) {
+        if is_reserved(&self.path) {
             return Err(format!(
                 "file: \"{}\", expected a file of a sample",
                 self.path
@@ -222,6 +224,21 @@ fn unsealed((body, crc32): (&[u8], u32)) -> std::result::Result<Vec<u8>, String>
     } else {
         Err("has other bytes than when it was written".into())
     }
+}
+
+/// The line without its seal, which lines of older datasets do not have.
+fn without_seal(text: &[u8], is_older: bool) -> std::result::Result<Vec<u8>, String> {
+    match split_seal(text) {
+        Some(sealed) => unsealed(sealed),
+        None if is_older => Ok(text.to_vec()),
+        None => Err("has no checksum, or is torn".into()),
+    }
+}
+
+/// Hidden, or a file of the dataset itself.
+fn is_reserved(path: &str) -> bool {
+    let is_hidden = path.split('/').any(|step| step.starts_with('.'));
+    is_hidden || [JOURNAL, IDENTITY].contains(&path)
 }
 
 /// The part of a line that its checksum is of, and the checksum.

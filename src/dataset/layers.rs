@@ -1,10 +1,11 @@
 //! One EXR file for each image with everything a compositor asks for.
 
-use crate::dataset::{Entry, Part, Sample, Writer};
+use crate::dataset::paths::create_part_folders;
+use crate::dataset::{Entry, Sample, Writer};
 use crate::deep::{DeepImage, DeepSample};
 use crate::error::{Error, Result};
 use crate::image::Image;
-use crate::io;
+
 use crate::io::exr::write_channels;
 use crate::label::LabelOptions;
 use crate::pixel::{LinearRgb, ObjectId, PremulRgba};
@@ -44,9 +45,7 @@ impl Writer for Layers {
     }
 
     fn begin(&self, folder: &Path, _classes: &[String]) -> Result<()> {
-        Part::ALL
-            .iter()
-            .try_for_each(|part| io::create_folder(folder.join(KIND).join(part.name())))
+        create_part_folders(folder, KIND)
     }
 
     fn write(&self, folder: &Path, entry: &Entry<'_>) -> Result<Vec<PathBuf>> {
@@ -122,8 +121,12 @@ const SHADOW_CHANNELS: [Channel<LinearRgb>; 3] = [
 fn channels_of<P: Copy>(image: &Image<P>, channels: &[Channel<P>]) -> Vec<NamedChannel> {
     let channels = channels.iter();
     channels
-        .map(|(name, value)| ((*name).into(), image.pixels().iter().map(value).collect()))
+        .map(|(name, value)| ((*name).into(), values_of(image, value)))
         .collect()
+}
+
+fn values_of<P: Copy>(image: &Image<P>, value: &fn(&P) -> f32) -> Vec<f32> {
+    image.pixels().iter().map(value).collect()
 }
 
 fn borrowed(channels: &[NamedChannel]) -> Vec<(&str, &[f32])> {
@@ -134,11 +137,14 @@ fn borrowed(channels: &[NamedChannel]) -> Vec<(&str, &[f32])> {
 }
 
 fn cryptomatte(entry: &Entry<'_>) -> Cryptomatte {
+    Cryptomatte::new(&entry.sample.deep, "CryptoObject", &object_names(entry))
+}
+
+fn object_names(entry: &Entry<'_>) -> Vec<(ObjectId, String)> {
     let objects = entry.sample.labels.objects.iter();
-    let names: Vec<_> = objects
+    objects
         .map(|o| (o.id, name(o.id, o.class, entry.classes)))
-        .collect();
-    Cryptomatte::new(&entry.sample.deep, "CryptoObject", &names)
+        .collect()
 }
 
 /// Depth of the first sample of a pixel of which enough is seen to belong to a mask.
@@ -202,14 +208,14 @@ const OBJECT_CHANNELS: [ObjectChannel; 6] = [
 fn object_channels(deep: &DeepImage, id: ObjectId) -> Vec<NamedChannel> {
     let channels = OBJECT_CHANNELS.iter();
     channels
-        .map(|channel| {
-            let name = format!("{}{:03}.{}", channel.layer, id.0, channel.name);
-            (name, channel.plane(deep, id))
-        })
+        .map(|channel| (channel.name_for(id), channel.plane(deep, id)))
         .collect()
 }
 
 impl ObjectChannel {
+    fn name_for(&self, id: ObjectId) -> String {
+        format!("{}{:03}.{}", self.layer, id.0, self.name)
+    }
     fn plane(&self, deep: &DeepImage, id: ObjectId) -> Vec<f32> {
         value_per_pixel(deep, |samples| {
             let own = samples.iter().find(|s| s.object == id);

@@ -1,9 +1,12 @@
 //! The images of a dataset, part by part, and a choice of them: lists that trainers read, without copies.
 
+use crate::dataset::paths::{absolute_path, folder_of};
 use crate::dataset::yolo_yaml::DataYaml;
 use crate::dataset::{Part, SampleRecord};
 use crate::error::{Error, Result};
 use crate::io;
+use std::cmp::Ordering;
+use std::ffi::OsStr;
 use std::path::{Component, Path, PathBuf};
 
 /// Images for training and for validation, in order; none is a copy.
@@ -36,7 +39,7 @@ impl Listing {
     /// All images in order of name: the series as it was taken.
     pub fn series(&self) -> Vec<PathBuf> {
         let mut all = [&self.train[..], &self.val[..]].concat();
-        all.sort_by(|a, b| (a.file_name(), a).cmp(&(b.file_name(), b)));
+        all.sort_by(|a, b| compare_names(a, b));
         all
     }
 
@@ -46,10 +49,7 @@ impl Listing {
     /// # Errors
     /// A share that is not in `0..=1`.
     pub fn head(&self, share: f64) -> Result<Self> {
-        if !(0.0..=1.0).contains(&share) {
-            let what = format!("{share}, expected a share, 0 to 1");
-            return Err(Error::value("head", what));
-        }
+        check_share(share)?;
         Ok(Self {
             train: first_share(&self.train, share),
             val: first_share(&self.val, share),
@@ -65,12 +65,16 @@ impl Listing {
         io::create_folder(folder)?;
         let folder = absolute_path(folder)?;
         for (part, images) in Part::ALL.into_iter().zip([&self.train, &self.val]) {
-            let list = folder.join(format!("{}.txt", part.name()));
-            io::write_text(list, &list_of(images, &folder))?;
+            write_list(part, images, &folder)?;
         }
         let yaml = DataYaml::write_with(&self.classes, |part| format!("{part}.txt"));
         io::write_text(folder.join("data.yaml"), &yaml)
     }
+}
+
+/// By the file's name, then by its whole path.
+fn compare_names(a: &Path, b: &Path) -> Ordering {
+    (a.file_name(), a).cmp(&(b.file_name(), b))
 }
 
 /// The images of the folders or lists of a part.
@@ -93,7 +97,7 @@ fn images_in(folder: &Path, part: &str) -> Result<Vec<PathBuf>> {
 }
 
 fn listed_images(list: &Path) -> Result<Vec<PathBuf>> {
-    let folder = list.parent().unwrap_or(Path::new(""));
+    let folder = folder_of(list);
     let text = io::read_text(list)?;
     let lines = text.lines().filter(|line| !line.is_empty());
     Ok(lines.map(|line| without_dots(&folder.join(line))).collect())
@@ -108,6 +112,11 @@ fn images_in_folder(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(images)
 }
 
+fn write_list(part: Part, images: &[PathBuf], folder: &Path) -> Result<()> {
+    let list = folder.join(format!("{}.txt", part.name()));
+    io::write_text(list, &list_of(images, folder))
+}
+
 /// Images as lines of a list; trainers take `./` for its folder.
 fn list_of(images: &[PathBuf], folder: &Path) -> String {
     images
@@ -116,8 +125,12 @@ fn list_of(images: &[PathBuf], folder: &Path) -> String {
         .collect()
 }
 
-fn absolute_path(path: &Path) -> Result<PathBuf> {
-    std::path::absolute(path).map_err(|e| Error::file(path, e))
+fn check_share(share: f64) -> Result<()> {
+    if (0.0..=1.0).contains(&share) {
+        return Ok(());
+    }
+    let what = format!("{share}, expected a share, 0 to 1");
+    Err(Error::value("head", what))
 }
 
 fn first_share(images: &[PathBuf], share: f64) -> Vec<PathBuf> {
@@ -137,9 +150,12 @@ fn without_dots(path: &Path) -> PathBuf {
     plain
 }
 
+/// Extensions of the images that a listing names.
+const IMAGE_EXTENSIONS: [&str; 5] = ["png", "jpg", "jpeg", "tif", "tiff"];
+
 pub(crate) fn is_image(path: &Path) -> bool {
     let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
-    extension.is_some_and(|e| ["png", "jpg", "jpeg", "tif", "tiff"].contains(&e.as_str()))
+    extension.is_some_and(|e| IMAGE_EXTENSIONS.contains(&e.as_str()))
 }
 
 /// What is known of an image: its sidecar.
@@ -147,10 +163,14 @@ pub(crate) fn is_image(path: &Path) -> bool {
 /// # Errors
 /// When there is none beside it.
 pub(crate) fn record_of(image: &Path) -> Result<SampleRecord> {
-    let steps = image.iter();
-    let swapped = steps.map(|step| match step {
-        step if step == "images" => "scenes".as_ref(),
-        step => step,
-    });
-    io::read_json(swapped.collect::<PathBuf>().with_extension("json"))
+    let record: PathBuf = image.iter().map(images_to_scenes).collect();
+    io::read_json(record.with_extension("json"))
+}
+
+fn images_to_scenes(step: &OsStr) -> &OsStr {
+    if step == "images" {
+        "scenes".as_ref()
+    } else {
+        step
+    }
 }

@@ -98,21 +98,20 @@ struct ShardedDataset {
 impl ShardedDataset {
     /// Opens shards, which must be all of one dataset.
     fn open(folders: &[PathBuf]) -> Result<Self> {
-        let opened = folders.iter().map(|folder| open_shard(folder));
-        let opened: Vec<(Value, ShardShare)> = opened.collect::<Result<_>>()?;
+        let opened = open_shards(folders)?;
         let Some((first, ShardShare { shard, count })) = opened.first() else {
             return Err(Error::value("shards", "none, expected their folders"));
         };
         for (folder, (document, share)) in folders.iter().zip(&opened) {
             check_same_dataset((first, shard.of, *count), (document, share), folder)?;
         }
-        let dataset = Self {
+        let shares: Vec<Shard> = opened.iter().map(|(_, share)| share.shard).collect();
+        check_complete(folders, &shares, shard.of)?;
+        Ok(Self {
             document: first.as_object().cloned().unwrap_or_default(),
             count: *count,
-            shares: opened.iter().map(|(_, share)| share.shard).collect(),
-        };
-        check_complete(folders, &dataset.shares, shard.of)?;
-        Ok(dataset)
+            shares,
+        })
     }
 
     /// The lines of all journals by number, each with its shard's folder.
@@ -165,7 +164,7 @@ fn check_same_dataset(
     let expected = json!({ "of": of, "count": count, "dataset": first });
     let found = json!({ "of": share.shard.of, "count": share.count, "dataset": document });
     folder::same(&expected, &found, "").map_err(|(at, what)| {
-        Error::value(at.trim_start_matches("dataset."), what).in_file(folder.join(IDENTITY))
+        Error::value(at.trim_start_matches("dataset."), what).in_file(folder::identity_file(folder))
     })
 }
 
@@ -191,17 +190,24 @@ impl ShardShare {
     }
 }
 
+fn open_shards(folders: &[PathBuf]) -> Result<Vec<(Value, ShardShare)>> {
+    folders.iter().map(|folder| open_shard(folder)).collect()
+}
+
 /// What a shard's folder was made from, and which share it is.
 fn open_shard(path: &Path) -> Result<(Value, ShardShare)> {
-    let Some(mut document) = folder::identity(path)? else {
-        let what = format!("no {IDENTITY}, expected a shard");
-        return Err(Error::file(path, what));
-    };
+    let mut document = folder::identity(path)?.ok_or_else(|| no_identity(path))?;
     let share = document.as_object_mut().and_then(|map| map.remove("shard"));
     let share = share.ok_or_else(|| Error::file(path, "is a whole dataset, expected a shard"))?;
     folder::of_this_format(&document, path)?;
-    let share = ShardShare::from_value(share).map_err(|e| e.in_file(path.join(IDENTITY)))?;
+    let share =
+        ShardShare::from_value(share).map_err(|e| e.in_file(folder::identity_file(path)))?;
     Ok((document, share))
+}
+
+fn no_identity(folder: &Path) -> Error {
+    let what = format!("no {IDENTITY}, expected a shard");
+    Error::file(folder, what)
 }
 
 /// The plan that a dataset was made with, but for where its samples come from.
@@ -222,14 +228,18 @@ fn merged_plan(mut document: Map<String, Value>, count: u64, folder: &Path) -> R
 
 /// The writers that wrote with these settings.
 fn writers_of(settings: Vec<Map<String, Value>>) -> Result<Vec<Box<dyn Writer>>> {
-    let pictures = match settings.iter().find(|map| map.contains_key("pictures")) {
-        Some(map) => field(&mut map.clone(), "pictures")?,
-        None => Pictures::default(),
-    };
+    let pictures = pictures_of(&settings)?;
     let named = settings.into_iter().flatten();
     named
         .map(|(name, settings)| writer_of(&name, settings, &pictures))
         .collect()
+}
+
+fn pictures_of(settings: &[Map<String, Value>]) -> Result<Pictures> {
+    match settings.iter().find(|map| map.contains_key("pictures")) {
+        Some(map) => field(&mut map.clone(), "pictures"),
+        None => Ok(Pictures::default()),
+    }
 }
 
 fn field<T: serde::de::DeserializeOwned>(

@@ -40,6 +40,7 @@ mod obstructed;
 #[doc(hidden)]
 pub mod page;
 mod partition;
+mod paths;
 mod pictures;
 mod pipeline;
 mod quality;
@@ -114,6 +115,7 @@ pub use yolo::YoloTask;
 pub use yolo_set::YoloSet;
 #[cfg(feature = "fuzzing")]
 pub(crate) use yolo_yaml::DataYaml;
+pub(crate) use yolo_yaml::yaml_names;
 
 use crate::deep::DeepImage;
 use crate::error::Result;
@@ -251,13 +253,14 @@ impl Written {
     /// When there is none.
     pub fn file(&self, kind: &str) -> std::io::Result<&Path> {
         let found = self.files.iter().find(|file| file.starts_with(kind));
+        found
+            .map(PathBuf::as_path)
+            .ok_or_else(|| self.no_file(kind))
+    }
+
+    fn no_file(&self, kind: &str) -> std::io::Error {
         let k = self.k;
-        match found {
-            Some(file) => Ok(file),
-            None => Err(std::io::Error::other(format!(
-                "sample {k} has no file in {kind}"
-            ))),
-        }
+        std::io::Error::other(format!("sample {k} has no file in {kind}"))
     }
 }
 

@@ -41,15 +41,23 @@ impl Thumbnail {
 
     /// Root mean square difference, 8-bit codes.
     fn codes_from(&self, other: &Self) -> f64 {
+        (self.squared_error(other) as f64 / self.0.len().max(1) as f64).sqrt()
+    }
+
+    fn squared_error(&self, other: &Self) -> u64 {
         let pairs = self.0.iter().zip(&other.0);
-        let sum: u64 = pairs.map(|(a, b)| squared_difference(*a, *b)).sum();
-        (sum as f64 / self.0.len().max(1) as f64).sqrt()
+        pairs.map(|(a, b)| squared_difference(*a, *b)).sum()
     }
 
     /// The place of the nearest in a list, and how far it is.
     fn nearest_of(&self, all: &[Self]) -> Option<(usize, f64)> {
         let distances = all.iter().map(|other| self.codes_from(other)).enumerate();
         distances.min_by(|a, b| a.1.total_cmp(&b.1))
+    }
+
+    fn nearest_within(&self, all: &[Self], codes: f64) -> Option<(usize, f64)> {
+        self.nearest_of(all)
+            .filter(|(_, distance)| *distance < codes)
     }
 }
 
@@ -62,8 +70,8 @@ pub(crate) fn nearest(
     val.par_iter()
         .enumerate()
         .filter_map(|(i, own)| {
-            let (j, distance) = own.nearest_of(train)?;
-            (distance < codes).then_some((i, j, distance))
+            let (j, distance) = own.nearest_within(train, codes)?;
+            Some((i, j, distance))
         })
         .collect()
 }

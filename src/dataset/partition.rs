@@ -61,10 +61,7 @@ impl FromStr for Group {
 
     fn from_str(text: &str) -> Result<Self> {
         let known = Self::ALL.into_iter().find(|group| group.name() == text);
-        known.ok_or_else(|| {
-            let what = format!("\"{text}\", expected background or selection");
-            Error::value("group", what)
-        })
+        known.ok_or_else(|| unknown_group(text))
     }
 }
 
@@ -106,23 +103,29 @@ impl Listing {
     /// # Errors
     /// An image that cannot be read.
     pub fn leakage(&self, max_codes: f64) -> Result<Leakage> {
-        let groups = Group::ALL.into_iter();
-        let groups = groups.filter_map(|group| Some((group.name(), self.shared_groups(group)?)));
         Ok(Leakage {
-            groups: groups.collect(),
+            groups: self.leaked_groups(),
             near_duplicates: near_pairs(&self.train, &self.val, max_codes)?,
         })
     }
 
+    fn leaked_groups(&self) -> Vec<(&'static str, [usize; 2])> {
+        let groups = Group::ALL.into_iter();
+        groups
+            .filter_map(|group| Some((group.name(), self.shared_groups(group)?)))
+            .collect()
+    }
+
     /// Groups of the images for validation, and how many of them occur in training; none where they are not known.
     fn shared_groups(&self, group: Group) -> Option<[usize; 2]> {
-        let [train, val] = [&self.train, &self.val].map(|images| groups(images, group));
-        let (train, val) = (
-            BTreeSet::from_iter(train.ok()?),
-            BTreeSet::from_iter(val.ok()?),
-        );
+        let train = distinct_groups(&self.train, group)?;
+        let val = distinct_groups(&self.val, group)?;
         Some([val.len(), val.intersection(&train).count()])
     }
+}
+
+fn distinct_groups(images: &[PathBuf], group: Group) -> Option<BTreeSet<String>> {
+    Some(groups(images, group).ok()?.into_iter().collect())
 }
 
 /// The group of each image.
@@ -158,13 +161,17 @@ fn groups_for_validation(groups: &[String], wanted: usize, seed: u64) -> BTreeSe
 
 /// Groups and their sizes, in a random order.
 fn shuffled_groups(groups: &[String], seed: u64) -> Vec<(&str, usize)> {
+    let mut order: Vec<_> = group_sizes(groups).into_iter().collect();
+    order.sort_by_key(|(group, _)| Draws::new(seed, 0).bits(&format!("split.{group}")));
+    order
+}
+
+fn group_sizes(groups: &[String]) -> BTreeMap<&str, usize> {
     let mut sizes: BTreeMap<&str, usize> = BTreeMap::new();
     for group in groups {
         *sizes.entry(group).or_default() += 1;
     }
-    let mut order: Vec<_> = sizes.into_iter().collect();
-    order.sort_by_key(|(group, _)| Draws::new(seed, 0).bits(&format!("split.{group}")));
-    order
+    sizes
 }
 
 fn check_ratio(ratio: f64) -> Result<()> {
@@ -177,11 +184,16 @@ fn check_ratio(ratio: f64) -> Result<()> {
 
 /// The photos of a scene's objects, in an order of their own.
 fn selection_of(scene: &Scene) -> String {
-    let objects = scene.objects.iter();
-    let photos = objects.map(|object| format!("{}/{}", object.asset, object.photo));
-    let mut photos: Vec<String> = photos.collect();
+    let mut photos = photos_of(scene);
     photos.sort();
     photos.join(" ")
+}
+
+fn photos_of(scene: &Scene) -> Vec<String> {
+    let objects = scene.objects.iter();
+    objects
+        .map(|object| format!("{}/{}", object.asset, object.photo))
+        .collect()
 }
 
 /// The first images, and those behind the ones that are left out.
@@ -193,6 +205,11 @@ fn consecutive(images: &[PathBuf], train: usize, guard: usize) -> [Vec<PathBuf>;
 /// A group for each image.
 fn numbers_to(count: usize) -> Vec<String> {
     (0..count).map(|i| i.to_string()).collect()
+}
+
+fn unknown_group(name: &str) -> Error {
+    let what = format!("\"{name}\", expected background or selection");
+    Error::value("group", what)
 }
 
 #[cfg(test)]

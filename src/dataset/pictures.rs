@@ -1,7 +1,8 @@
 //! The images of a dataset.
 
 use crate::bounds::Bounds;
-use crate::dataset::{Entry, Part, Writer};
+use crate::dataset::paths::create_part_folders;
+use crate::dataset::{Entry, Writer};
 use crate::error::Result;
 use crate::io::{self, WriteOptions};
 use serde::{Deserialize, Serialize};
@@ -72,30 +73,39 @@ impl Writer for Pictures {
     }
 
     fn begin(&self, folder: &Path, _classes: &[String]) -> Result<()> {
-        let kinds = if self.exr {
-            &["images", "exr"][..]
-        } else {
-            &["images"]
-        };
-        for dir in kinds
-            .iter()
-            .flat_map(|kind| Part::ALL.map(|part| folder.join(kind).join(part.name())))
-        {
-            io::create_folder(&dir)?;
-        }
-        Ok(())
+        let mut kinds = self.kinds().iter();
+        kinds.try_for_each(|kind| create_part_folders(folder, kind))
     }
 
     fn write(&self, folder: &Path, entry: &Entry<'_>) -> Result<Vec<PathBuf>> {
-        let path = entry.path("images", self.format.extension());
-        let displayed = entry.sample.frame.map(|p| p.color());
-        io::write_with(folder.join(&path), &displayed, &self.write_options())?;
-        let mut paths = vec![path];
+        let mut paths = vec![self.write_displayed(folder, entry)?];
         if self.exr {
-            let exr = entry.path("exr", "exr");
-            io::write(folder.join(&exr), &entry.sample.frame)?;
-            paths.push(exr);
+            paths.push(write_exr(folder, entry)?);
         }
         Ok(paths)
     }
+}
+
+impl Pictures {
+    /// The folders of the dataset that it writes to.
+    fn kinds(&self) -> &'static [&'static str] {
+        if self.exr {
+            &["images", "exr"]
+        } else {
+            &["images"]
+        }
+    }
+
+    fn write_displayed(&self, folder: &Path, entry: &Entry<'_>) -> Result<PathBuf> {
+        let path = entry.path("images", self.format.extension());
+        let displayed = entry.sample.frame.map(|p| p.color());
+        io::write_with(folder.join(&path), &displayed, &self.write_options())?;
+        Ok(path)
+    }
+}
+
+fn write_exr(folder: &Path, entry: &Entry<'_>) -> Result<PathBuf> {
+    let path = entry.path("exr", "exr");
+    io::write(folder.join(&path), &entry.sample.frame)?;
+    Ok(path)
 }

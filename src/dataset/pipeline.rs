@@ -61,11 +61,13 @@ impl Pipeline {
     pub fn with_library(config: DatasetConfig, library: Library) -> Result<Self> {
         let places = open_backgrounds(&config)?;
         let pipeline = Self::new(config, library, places)?;
-        pipeline
-            .places
-            .iter()
-            .try_for_each(|place| pipeline.check_size_in(place))?;
+        pipeline.check_sizes()?;
         Ok(pipeline)
+    }
+
+    fn check_sizes(&self) -> Result<()> {
+        let mut places = self.places.iter();
+        places.try_for_each(|place| self.check_size_in(place))
     }
 
     /// Refuses a place in whose pictures the median object is too small to have an outline: a length is in another unit.
@@ -281,8 +283,7 @@ impl Pipeline {
     /// Renders a shot and finishes its frame as the scene asks.
     pub fn shoot(&self, scene: &Scene, shot: &Shot) -> (DeepImage, Image<PremulRgba>) {
         let deep = render::render(shot, &self.config.render);
-        let frame = composite::frame(&deep, shot.plate.as_deref());
-        let frame = composite::finish(frame, &deep, shot.plate.as_deref(), &scene.finish);
+        let frame = finished_frame(&deep, scene, shot);
         (deep, frame)
     }
 
@@ -345,9 +346,12 @@ impl Pipeline {
     }
 
     fn unknown_plate(&self, name: &str) -> Error {
-        let known: Vec<&str> = self.backgrounds.iter().map(|b| b.name.as_str()).collect();
-        let what = format!("\"{name}\", expected one of {}", known.join(", "));
-        Error::value("plate", what)
+        let known = self.background_names().join(", ");
+        Error::value("plate", format!("\"{name}\", expected one of {known}"))
+    }
+
+    fn background_names(&self) -> Vec<&str> {
+        self.backgrounds.iter().map(|b| b.name.as_str()).collect()
     }
 }
 
@@ -367,4 +371,9 @@ fn redraw_seed(seed: u64, k: u64, n: usize) -> u64 {
         0 => seed,
         n => Draws::new(seed, k).bits(&format!("redraw[{n}]")),
     }
+}
+
+fn finished_frame(deep: &DeepImage, scene: &Scene, shot: &Shot) -> Image<PremulRgba> {
+    let plate = shot.plate.as_deref();
+    composite::finish(composite::frame(deep, plate), deep, plate, &scene.finish)
 }

@@ -8,6 +8,7 @@ use crate::dataset::{DatasetCounts, Plan, SampleRange};
 use crate::error::{Error, Result};
 use crate::io;
 use crate::work;
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
@@ -24,6 +25,36 @@ pub struct Progress {
     pub count: u64,
     /// Samples made by this run.
     pub made: u64,
+}
+
+impl Progress {
+    /// That of a run that is about to begin.
+    fn so_far(journal: &Journal, plan: &Plan, count: u64) -> Self {
+        Self {
+            done: journal.count(count, |k| plan.range.contains(k)),
+            count: plan.range.count_below(count),
+            made: 0,
+        }
+    }
+
+    fn check_is_done(&self, folder: &Path) -> Result<()> {
+        if self.done >= self.count {
+            return Ok(());
+        }
+        let what = self.describe(folder);
+        Err(Error::Interrupted { what })
+    }
+
+    fn describe(&self, folder: &Path) -> String {
+        let (done, asked, folder) = (self.done, self.count, folder.display());
+        format!("{done} of {asked} samples are in {folder}; the same command goes on")
+    }
+
+    /// Counts a sample that was made.
+    fn add(&mut self, is_new: bool) {
+        self.done += u64::from(is_new);
+        self.made += 1;
+    }
 }
 
 /// Most samples that a dataset may have: a number above is a slip of the finger, and no sum of counts can overflow.
@@ -197,19 +228,7 @@ impl<F: Fn(u64) -> Result<(JournalLine, Times)> + Sync> DatasetRun<'_, F> {
         let made = state.progress.made;
         io::sync(&plan.folder);
         state.times.append(&plan.folder, made, wall);
-        let done = state.journal.count(count, |k| plan.range.contains(k));
-        let asked = plan.range.count_below(count);
-        let folder = plan.folder.display();
-        let status = format!("{done} of {asked} samples are in {folder}; the same command goes on");
-        let closed = state.journal.close(count);
-        if let Some((k, error)) = state.failure {
-            log::warn!("sample {k} failed; {status}");
-            return Err(error);
-        }
-        let lines = closed?;
-        if done < asked {
-            return Err(Error::Interrupted { what: status });
-        }
+        let lines = state.close(plan, count)?;
         if lines.len() as u64 == count {
             join_samples(plan, &lines)?;
         }
@@ -228,14 +247,9 @@ fn join_samples(plan: &Plan, lines: &[JournalLine]) -> Result<()> {
 impl RunState {
     /// The state before a run's first sample.
     fn new(journal: Journal, plan: &Plan, count: u64) -> Self {
-        let progress = Progress {
-            done: journal.count(count, |k| plan.range.contains(k)),
-            count: plan.range.count_below(count),
-            made: 0,
-        };
         Self {
+            progress: Progress::so_far(&journal, plan, count),
             journal,
-            progress,
             times: Times::default(),
             failure: None,
         }
@@ -248,11 +262,26 @@ impl RunState {
         }
     }
 
+    /// Puts the journal in order and returns its lines.
+    ///
+    /// # Errors
+    /// The sample that failed; fewer samples than were asked for.
+    fn close(self, plan: &Plan, count: u64) -> Result<Vec<JournalLine>> {
+        let now = Progress::so_far(&self.journal, plan, count);
+        let closed = self.journal.close(count);
+        if let Some((k, error)) = self.failure {
+            log::warn!("sample {k} failed; {}", now.describe(&plan.folder));
+            return Err(error);
+        }
+        let lines = closed?;
+        now.check_is_done(&plan.folder)?;
+        Ok(lines)
+    }
+
     fn enter(&mut self, line: JournalLine, times: Times) -> Result<()> {
         let is_new = !self.journal.has(line.k);
         self.journal.add(line)?;
-        self.progress.done += u64::from(is_new);
-        self.progress.made += 1;
+        self.progress.add(is_new);
         self.times += times;
         Ok(())
     }

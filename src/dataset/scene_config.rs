@@ -1,6 +1,7 @@
 //! The config that a scene file brings by itself, and what it takes to bring one.
 
 use crate::dataset::DatasetConfig;
+use crate::dataset::paths::folder_of;
 use crate::error::{Error, Result};
 use crate::io;
 use crate::scene::{Scene, SceneFiles, SceneSettings, relative_to_file};
@@ -48,22 +49,20 @@ impl DatasetConfig {
 
     fn with_scene_folders(mut self, scene: &Scene, path: &Path) -> Result<Self> {
         let files = scene.files.as_ref().ok_or_else(no_files)?;
-        let folder = path.parent().unwrap_or(Path::new(""));
+        let folder = folder_of(path);
         self.assets = folder.join(required(&files.assets, "assets", "the assets")?);
-        self.backgrounds = match scene.plate.as_str() {
-            "" => PathBuf::new(),
-            plate => {
-                let content = format!("the photo \"{plate}\" and its label");
-                folder.join(required(&files.backgrounds, "backgrounds", &content)?)
-            }
-        };
+        self.backgrounds = backgrounds_folder(files, &scene.plate, folder)?;
         self.folder = folder.into();
         if let Some(environments) = &files.environments {
-            self.folder = folder.join(environments);
-            let maps = scene.environment.iter();
-            self.scene.environment.files = maps.map(|map| map.file.clone()).collect();
+            self.use_environments(scene, folder.join(environments));
         }
         Ok(self)
+    }
+
+    fn use_environments(&mut self, scene: &Scene, folder: PathBuf) {
+        self.folder = folder;
+        let maps = scene.environment.iter();
+        self.scene.environment.files = maps.map(|map| map.file.clone()).collect();
     }
 
     /// A scene of this config with all that it takes to render it from a file at `path` alone.
@@ -161,11 +160,19 @@ fn difference(value: Option<&Value>, default: Option<&Value>) -> Option<Value> {
 }
 
 fn table_difference(own: &Table, defaults: &Table) -> Table {
-    let entries = own.iter().filter_map(|(key, value)| {
-        let value = difference(Some(value), defaults.get(key));
-        value.map(|value| (key.clone(), value))
-    });
-    entries.collect()
+    let entries = own.iter();
+    entries
+        .filter_map(|(key, value)| Some((key.clone(), difference(Some(value), defaults.get(key))?)))
+        .collect()
+}
+
+/// The folder with a scene's plate; a scene without one needs none.
+fn backgrounds_folder(files: &SceneFiles, plate: &str, folder: &Path) -> Result<PathBuf> {
+    if plate.is_empty() {
+        return Ok(PathBuf::new());
+    }
+    let content = format!("the photo \"{plate}\" and its label");
+    Ok(folder.join(required(&files.backgrounds, "backgrounds", &content)?))
 }
 
 #[cfg(test)]

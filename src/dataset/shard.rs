@@ -72,20 +72,23 @@ impl Shard {
     /// An index that is not in `1..=of`.
     pub fn new(index: u64, of: u64) -> Result<Self> {
         let shard = Self { index, of };
+        match shard.expectation() {
+            None => Ok(shard),
+            Some(expected) => {
+                let what = format!("{shard}, expected {expected}");
+                Err(Error::value("shard", what))
+            }
+        }
+    }
+
+    /// What is expected instead of a shard that cannot be.
+    fn expectation(self) -> Option<String> {
+        let Self { index, of } = self;
         match index {
-            _ if of == 0 => Err(Error::value(
-                "shard",
-                format!("{shard}, expected at least one shard"),
-            )),
-            0 => Err(Error::value(
-                "shard",
-                format!("{shard}, expected 1/{of} to {of}/{of}"),
-            )),
-            _ if index > of => Err(Error::value(
-                "shard",
-                format!("{shard}, expected at most {of}/{of}"),
-            )),
-            _ => Ok(shard),
+            _ if of == 0 => Some("at least one shard".into()),
+            0 => Some(format!("1/{of} to {of}/{of}")),
+            _ if index > of => Some(format!("at most {of}/{of}")),
+            _ => None,
         }
     }
 
@@ -165,13 +168,9 @@ struct JobEnvironment<V> {
 
 impl<V: Fn(&str) -> Option<String>> JobEnvironment<V> {
     fn number(&self, name: &str) -> Result<Option<u64>> {
-        let Some(text) = (self.variable)(name) else {
-            return Ok(None);
-        };
-        let number = text.trim().parse();
-        let number =
-            number.map_err(|_| Error::value(name, format!("\"{text}\", expected a number")));
-        number.map(Some)
+        (self.variable)(name)
+            .map(|text| parse_number(name, &text))
+            .transpose()
     }
 
     fn kubernetes_shard(&self, of: Option<u64>) -> Result<Shard> {
@@ -194,10 +193,7 @@ impl<V: Fn(&str) -> Option<String>> JobEnvironment<V> {
             let what = "SLURM_ARRAY_TASK_COUNT is not set: say auto/N";
             Error::value("shard", what)
         })?;
-        let past = id.checked_sub(first).ok_or_else(|| {
-            let what = format!("{id}, expected at least {first}");
-            Error::value("SLURM_ARRAY_TASK_ID", what)
-        })?;
+        let past = tasks_before(id, first)?;
         Shard::new((past / step).saturating_add(1), of)
     }
 
@@ -212,9 +208,25 @@ impl<V: Fn(&str) -> Option<String>> JobEnvironment<V> {
     }
 }
 
+fn parse_number(name: &str, text: &str) -> Result<u64> {
+    let number = text.trim().parse();
+    number.map_err(|_| Error::value(name, format!("\"{text}\", expected a number")))
+}
+
+fn are_all_tasks(count: u64, first: u64, last: u64, step: u64) -> bool {
+    count > 0 && last.checked_sub(first) == (count - 1).checked_mul(step)
+}
+
+fn tasks_before(id: u64, first: u64) -> Result<u64> {
+    id.checked_sub(first).ok_or_else(|| {
+        let what = format!("{id}, expected at least {first}");
+        Error::value("SLURM_ARRAY_TASK_ID", what)
+    })
+}
+
 /// An array with holes makes no whole dataset.
 fn check_all_tasks(count: u64, first: u64, last: u64, step: u64) -> Result<()> {
-    if count > 0 && last.checked_sub(first) == (count - 1).checked_mul(step) {
+    if are_all_tasks(count, first, last, step) {
         return Ok(());
     }
     let what =

@@ -1,5 +1,6 @@
 //! Everything known of a sample, one JSON file beside each image.
 
+use crate::dataset::paths::create_part_folders;
 use crate::dataset::{Entry, Part, Provenance, Writer};
 use crate::error::Result;
 use crate::io;
@@ -54,10 +55,7 @@ impl Writer for Sidecar {
     }
 
     fn begin(&self, folder: &Path, _classes: &[String]) -> Result<()> {
-        for dir in Part::ALL.map(|part| folder.join("scenes").join(part.name())) {
-            io::create_folder(&dir)?;
-        }
-        Ok(())
+        create_part_folders(folder, "scenes")
     }
 
     fn write(&self, folder: &Path, entry: &Entry<'_>) -> Result<Vec<PathBuf>> {
@@ -74,8 +72,7 @@ impl SampleRecord {
     /// Everything known of an entry.
     fn new(entry: &Entry<'_>, provenance: &Provenance) -> Self {
         let labels = &entry.sample.labels;
-        let labelled = entry.labelled.iter().map(|label| label.object.id);
-        let topmost = labels.objects.iter().filter(|object| object.is_topmost());
+
         Self {
             petcomp: env!("CARGO_PKG_VERSION").to_owned(),
             recipe_hash: entry.recipe_hash.to_owned(),
@@ -83,8 +80,8 @@ impl SampleRecord {
             scene_seed: provenance.scene_seed,
             index: entry.k,
             part: entry.part,
-            labelled: labelled.collect(),
-            topmost: topmost.map(|object| object.id).collect(),
+            labelled: labelled_ids(entry),
+            topmost: topmost_ids(labels),
             knotted: cyclic_overlaps(&labels.objects),
             rejected: provenance.rejected.clone(),
             draws: values_by_path(&provenance.draws),
@@ -100,4 +97,13 @@ fn values_by_path(draws: &[Drawn]) -> BTreeMap<String, f64> {
         .iter()
         .map(|draw| (draw.path.clone(), draw.value))
         .collect()
+}
+
+fn labelled_ids(entry: &Entry<'_>) -> Vec<ObjectId> {
+    entry.labelled.iter().map(|label| label.object.id).collect()
+}
+
+fn topmost_ids(labels: &Labels) -> Vec<ObjectId> {
+    let topmost = labels.objects.iter().filter(|object| object.is_topmost());
+    topmost.map(|object| object.id).collect()
 }

@@ -129,11 +129,7 @@ impl Summary {
         summary.images = Part::ALL.map(|part| count_in_part(&lines, part));
         // In batches, so that no more records are in memory than threads can read at a time.
         for batch in lines.chunks(RECORDS_PER_BATCH) {
-            let samples: Result<Vec<ReadSample>> = batch
-                .par_iter()
-                .map(|line| ReadSample::read(folder, line))
-                .collect();
-            for (sample, line) in samples?.into_iter().zip(batch) {
+            for (sample, line) in read_samples(folder, batch)?.into_iter().zip(batch) {
                 summary.add(&sample, line);
                 summary.glances.push(SampleSummary::new(sample));
             }
@@ -176,23 +172,23 @@ impl Summary {
 
     /// The distribution of a drawn number: least and greatest value, and whether it is an integer.
     pub fn range(&self, key: &str) -> Option<([f64; 2], bool)> {
-        let recipe = self.identity["recipe"]["scene"].clone();
-        let recipe: Recipe = serde_json::from_value(recipe).ok()?;
-        let recipe = serde_json::to_value(recipe.narrowed()).ok()?;
-        let range = match recipe.pointer(&json_pointer(key))? {
+        let range = match self.narrowed_recipe()?.pointer(&json_pointer(key))? {
             Value::Array(ends) if ends.len() == 2 => [ends[0].as_f64()?, ends[1].as_f64()?],
             fixed => [fixed.as_f64()?; 2],
         };
         Some((range, key == "objects"))
     }
 
+    /// As JSON, without what is switched off.
+    fn narrowed_recipe(&self) -> Option<Value> {
+        let recipe = self.identity["recipe"]["scene"].clone();
+        let recipe: Recipe = serde_json::from_value(recipe).ok()?;
+        serde_json::to_value(recipe.narrowed()).ok()
+    }
+
     fn add(&mut self, sample: &ReadSample, line: &JournalLine) {
         let record = &sample.record;
-        for (path, &value) in &record.draws {
-            if let Some(key) = key(path) {
-                self.drawn.entry(key).or_default().push(value);
-            }
-        }
+        self.add_draws(record);
         self.add_choices(&record.drawn);
         for object in &record.labels.objects {
             self.add_object(object, record);
@@ -217,6 +213,14 @@ impl Summary {
         for object in &drawn.objects {
             self.count("asset", object.asset.clone());
             self.count("photo of the asset", object.photo.to_string());
+        }
+    }
+
+    fn add_draws(&mut self, record: &SampleRecord) {
+        for (path, &value) in &record.draws {
+            if let Some(key) = key(path) {
+                self.drawn.entry(key).or_default().push(value);
+            }
         }
     }
 
@@ -246,18 +250,14 @@ impl SampleSummary {
             files,
         } = sample;
         let labelled = labelled_objects(&record);
-        let visible = labelled.iter().map(|object| object.visible_fraction);
-        let boxes = labelled
-            .iter()
-            .map(|object| (object.class, object.amodal_box));
         Self {
             index: k,
             part,
             files,
             image: record.labels.image,
             objects: record.labels.objects.len(),
-            labels: boxes.collect(),
-            least_visible: visible.fold(1.0, f64::min),
+            labels: boxes_of(&labelled),
+            least_visible: least_visible(&labelled),
             rejected: record.rejected.len(),
         }
     }
@@ -272,32 +272,29 @@ impl ReadSample {
             k: line.k,
             part: line.part,
             record: io::read_json(line.file(folder, "scenes/")?)?,
-            files: [
-                line.file_name(folder, "images/")?.to_owned(),
-                line.file_name(folder, "scenes/")?.to_owned(),
-            ],
+            files: own_files(folder, line)?,
         })
     }
 }
 
 /// The key in the recipe of a draw's distribution; none for a choice from a list and for a rotation that was resampled.
 fn key(path: &str) -> Option<String> {
-    let choice = path == "background"
-        || path.ends_with(".asset")
-        || path.ends_with(".photo")
-        || path.ends_with(".file");
-    if choice || path.contains('#') {
+    if is_choice(path) || path.contains('#') {
         return None;
     }
-    let own = path
-        .strip_prefix("objects[")
-        .and_then(|rest| rest.split_once("]."))
-        .map(|(_, own)| own);
-    Some(
-        own.or(path.strip_prefix("selection."))
-            .unwrap_or(path)
-            .to_owned(),
-    )
+    let own = object_key(path).or(path.strip_prefix("selection."));
+    Some(own.unwrap_or(path).to_owned())
+}
+
+fn is_choice(path: &str) -> bool {
+    let names = [".asset", ".photo", ".file"];
+    path == "background" || names.iter().any(|name| path.ends_with(name))
+}
+
+/// `hue` of `objects[2].hue`.
+fn object_key(path: &str) -> Option<&str> {
+    let (_, own) = path.strip_prefix("objects[")?.split_once("].")?;
+    Some(own)
 }
 
 /// Objects that have a label and are in the picture.
@@ -315,6 +312,31 @@ fn count_in_part(lines: &[JournalLine], part: Part) -> usize {
 /// `/objects/2/hue` of `objects[2].hue`.
 fn json_pointer(key: &str) -> String {
     format!("/{}", key.replace(['.', '['], "/").replace(']', ""))
+}
+
+fn boxes_of(objects: &[&ObjectLabel]) -> Vec<(u32, BBox)> {
+    let boxes = objects.iter();
+    boxes
+        .map(|object| (object.class, object.amodal_box))
+        .collect()
+}
+
+fn least_visible(objects: &[&ObjectLabel]) -> f64 {
+    let visible = objects.iter().map(|object| object.visible_fraction);
+    visible.fold(1.0, f64::min)
+}
+
+fn read_samples(folder: &Path, lines: &[JournalLine]) -> Result<Vec<ReadSample>> {
+    lines
+        .par_iter()
+        .map(|line| ReadSample::read(folder, line))
+        .collect()
+}
+
+/// Picture and record of a sample.
+fn own_files(folder: &Path, line: &JournalLine) -> Result<[String; 2]> {
+    let picture = line.file_name(folder, "images/")?.to_owned();
+    Ok([picture, line.file_name(folder, "scenes/")?.to_owned()])
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! Labels as Pascal VOC writes them: one XML file for each image, and lists of images.
 
+use crate::dataset::paths::create_part_folders;
 use crate::dataset::{Entry, Extent, LabelledObject, Part, PictureFormat, Writer, Written};
 use crate::error::Result;
 use crate::geom::BBox;
@@ -36,9 +37,7 @@ impl Writer for Voc {
     }
 
     fn begin(&self, folder: &Path, _classes: &[String]) -> Result<()> {
-        Part::ALL
-            .iter()
-            .try_for_each(|part| io::create_folder(folder.join(KIND).join(part.name())))
+        create_part_folders(folder, KIND)
     }
 
     fn write(&self, folder: &Path, entry: &Entry<'_>) -> Result<Vec<PathBuf>> {
@@ -77,17 +76,13 @@ impl Voc {
         if b.is_empty() {
             return String::new();
         }
-        let class = entry.classes.get(label.class as usize);
-        let name = class.map_or_else(|| label.class.to_string(), |name| escaped(name));
+        let name = class_name(entry, label.class);
         let claims = [
             ("truncated", is_cut(&b, entry.sample.labels.image)),
             ("difficult", label.ignored),
             ("occluded", !label.object.is_topmost()),
         ];
-        let claims =
-            claims.map(|(claim, is_so)| format!("    <{claim}>{}</{claim}>\n", u8::from(is_so)));
-        let sides = pixels(&b).map(|(side, at)| format!("      <{side}>{at}</{side}>\n"));
-        let (claims, sides) = (claims.concat(), sides.concat());
+        let (claims, sides) = (claims.map(claim_element).concat(), side_elements(&b));
         format!(
             "  <object>\n    <name>{name}</name>\n    <pose>Unspecified</pose>\n{claims}    <bndbox>\n{sides}    </bndbox>\n  \
              </object>\n"
@@ -111,6 +106,21 @@ fn first_pixel(edge: f64) -> u64 {
 
 fn last_pixel(edge: f64) -> u64 {
     libm::ceil(edge) as u64
+}
+
+fn class_name(entry: &Entry<'_>, class: u32) -> String {
+    let name = entry.classes.get(class as usize);
+    name.map_or_else(|| class.to_string(), |name| escaped(name))
+}
+
+fn claim_element((claim, is_so): (&str, bool)) -> String {
+    format!("    <{claim}>{}</{claim}>\n", u8::from(is_so))
+}
+
+fn side_elements(b: &BBox) -> String {
+    pixels(b)
+        .map(|(side, at)| format!("      <{side}>{at}</{side}>\n"))
+        .concat()
 }
 
 /// The object reaches a border of the image.

@@ -59,14 +59,20 @@ impl Writer for WebDataset {
         for part in Part::ALL {
             let of_part = samples.iter().filter(|sample| sample.part == part);
             let of_part: Vec<_> = of_part.collect();
-            let archives = of_part.chunks(self.samples.max(1));
-            let count = archives.len();
-            for (i, samples) in archives.enumerate() {
-                io::write_through(&archive(folder, part, i), |out| pack(out, folder, samples))?;
-            }
-            remove_archives_from(folder, part, count)?;
+            self.write_archives(folder, part, &of_part)?;
         }
         Ok(())
+    }
+}
+
+impl WebDataset {
+    fn write_archives(&self, folder: &Path, part: Part, samples: &[&Written]) -> Result<()> {
+        let archives = samples.chunks(self.samples.max(1));
+        let count = archives.len();
+        for (i, samples) in archives.enumerate() {
+            io::write_through(&archive(folder, part, i), |out| pack(out, folder, samples))?;
+        }
+        remove_archives_from(folder, part, count)
     }
 }
 

@@ -1,8 +1,9 @@
 //! Labels for YOLO: one text file per image, one line per object, and `data.yaml`.
 
 use crate::dataset::formats::is_exact;
+use crate::dataset::paths::create_part_folders;
 use crate::dataset::yolo_yaml::DataYaml;
-use crate::dataset::{Entry, Extent, LabelledObject, Part, Writer};
+use crate::dataset::{Entry, Extent, LabelledObject, Writer};
 use crate::error::{Error, Result};
 use crate::geom::BBox;
 use crate::geom::Point2;
@@ -56,10 +57,7 @@ impl Writer for Yolo {
     }
 
     fn begin(&self, folder: &Path, classes: &[String]) -> Result<()> {
-        for part in Part::ALL {
-            let dir = folder.join("labels").join(part.name());
-            io::create_folder(&dir)?;
-        }
+        create_part_folders(folder, "labels")?;
         io::write_text(folder.join(DATA_YAML), &DataYaml::write(classes))
     }
 
@@ -68,17 +66,19 @@ impl Writer for Yolo {
     }
 
     fn write(&self, folder: &Path, entry: &Entry<'_>) -> Result<Vec<PathBuf>> {
-        let [w, h] = entry.sample.labels.image;
-        if w.min(h) < MIN_SIDE_PX {
-            return Err(Error::value(
-                "image",
-                format!("{w} x {h} pixels, expected at least {MIN_SIDE_PX} a side for YOLO"),
-            ));
-        }
+        check_sides(entry.sample.labels.image)?;
         let path = entry.path("labels", "txt");
         io::write_text(folder.join(&path), &self.rows(entry))?;
         Ok(vec![path])
     }
+}
+
+fn check_sides([w, h]: [u32; 2]) -> Result<()> {
+    if w.min(h) >= MIN_SIDE_PX {
+        return Ok(());
+    }
+    let what = format!("{w} x {h} pixels, expected at least {MIN_SIDE_PX} a side for YOLO");
+    Err(Error::value("image", what))
 }
 
 impl Yolo {

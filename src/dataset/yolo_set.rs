@@ -1,6 +1,7 @@
 //! A YOLO dataset on disk, of petcomp's or of the user's own: which images, which classes.
 
 use crate::dataset::Part;
+use crate::dataset::paths::folder_of;
 use crate::dataset::yolo_yaml::DataYaml;
 use crate::error::{Error, Result};
 use crate::io;
@@ -27,8 +28,7 @@ impl YoloSet {
         let path = folder.join("data.yaml");
         let (yaml, problems) = DataYaml::read(&io::read_text(&path)?);
         if let Some((line, what)) = problems.into_iter().next() {
-            let line = line.map(|n| format!("line {n}: ")).unwrap_or_default();
-            return Err(Error::file(path, format!("{line}{what}")));
+            return Err(yaml_problem(&path, line, &what));
         }
         let root = yaml.root(folder);
         let [train, val] = Part::ALL.map(|part| images_of(&root, yaml.folders(part)));
@@ -69,10 +69,15 @@ fn images_of(root: &Path, parts: &[String]) -> Result<Vec<PathBuf>> {
     Ok(images)
 }
 
+fn yaml_problem(path: &Path, line: Option<usize>, what: &str) -> Error {
+    let line = line.map(|n| format!("line {n}: ")).unwrap_or_default();
+    Error::file(path, format!("{line}{what}"))
+}
+
 /// The lines of a list; `./` is the list's own folder, as for YOLOv5.
 fn listed_in(list: &Path) -> Result<Vec<PathBuf>> {
     let text = io::read_text(list)?;
-    let folder = list.parent().unwrap_or(Path::new(""));
+    let folder = folder_of(list);
     let lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
     Ok(lines
         .map(|line| {

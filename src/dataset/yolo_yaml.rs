@@ -61,11 +61,7 @@ impl DataYaml {
             yaml += &format!("{}: {}\n", part.name(), place(part.name()));
         }
         yaml += &format!("nc: {}\nnames:\n", classes.len());
-        for (i, name) in classes.iter().enumerate() {
-            // A JSON string is a YAML string, whatever is in it.
-            yaml += &format!("  {i}: {}\n", serde_json::Value::from(name.as_str()));
-        }
-        yaml
+        yaml + &yaml_names(classes)
     }
 
     /// Reads the keys that trainers need; all others are skipped. What could be read stays, whatever else is wrong.
@@ -110,9 +106,7 @@ impl DataYaml {
     }
 
     fn missing(&self) -> Vec<String> {
-        let parts = Part::ALL.into_iter();
-        let missing = parts.filter(|&part| self.folders(part).is_empty());
-        missing
+        self.missing_parts()
             .map(|part| format!("no {}:, which trainers require", part.name()))
             .chain(self.names_problem())
             .collect()
@@ -123,8 +117,17 @@ impl DataYaml {
         if count == 0 {
             return Some("no names, expected one for each class".into());
         }
+        self.count_problem(count)
+    }
+
+    fn count_problem(&self, count: usize) -> Option<String> {
         let nc = self.nc.filter(|&nc| nc != count)?;
         Some(format!("nc: {nc}, but there are {count} names"))
+    }
+
+    fn missing_parts(&self) -> impl Iterator<Item = Part> {
+        let parts = Part::ALL.into_iter();
+        parts.filter(move |&part| self.folders(part).is_empty())
     }
 }
 
@@ -254,9 +257,14 @@ impl<'a> Reader<'a> {
 
     fn alias(&mut self, anchor: usize) -> Result<Value, Problem> {
         let value = self.anchors.get(&anchor).cloned().unwrap_or(Value::Other);
-        let left = self.alias_budget.checked_sub(value.bytes());
-        self.alias_budget = left.ok_or((None, "aliases repeat too much text".into()))?;
+        self.spend_alias_budget(value.bytes())?;
         Ok(value)
+    }
+
+    fn spend_alias_budget(&mut self, bytes: usize) -> Result<(), Problem> {
+        let left = self.alias_budget.checked_sub(bytes);
+        self.alias_budget = left.ok_or((None, "aliases repeat too much text".into()))?;
+        Ok(())
     }
 
     /// The rest of a list; one of other things than texts is [`Value::Other`].
@@ -335,14 +343,24 @@ impl<'a> Reader<'a> {
     }
 }
 
+/// The entries below `names:`.
+pub(crate) fn yaml_names(classes: &[String]) -> String {
+    let names = classes.iter().enumerate();
+    names
+        // A JSON string is a YAML string, whatever is in it.
+        .map(|(i, name)| format!("  {i}: {}\n", serde_json::Value::from(name.as_str())))
+        .collect()
+}
+
 fn scalar(text: &str, style: ScalarStyle) -> Value {
-    let is_null =
-        style == ScalarStyle::Plain && matches!(text, "" | "~" | "null" | "Null" | "NULL");
-    if is_null {
-        Value::Null
-    } else {
-        Value::Text(text.to_owned())
+    match style {
+        ScalarStyle::Plain if is_null(text) => Value::Null,
+        _ => Value::Text(text.to_owned()),
     }
+}
+
+fn is_null(text: &str) -> bool {
+    matches!(text, "" | "~" | "null" | "Null" | "NULL")
 }
 
 fn not_yaml(error: &ScanError) -> Problem {

@@ -31,38 +31,57 @@ pub struct Anchors {
 /// [Redmon and Farhadi 2017]: https://arxiv.org/abs/1612.08242
 /// [k-means++]: https://dl.acm.org/doi/10.5555/1283383.1283494
 pub fn anchors(boxes: &[[f64; 2]], count: usize, seed: u64) -> Anchors {
-    let mut boxes = boxes.to_vec();
-    boxes.retain(|b| b.iter().all(|v| v.is_finite() && *v > 0.0));
+    let boxes = boxes_with_area(boxes);
     if boxes.is_empty() || count == 0 {
         return Anchors::default();
     }
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let first = spread_sizes(&boxes, count.min(boxes.len()), &mut rng);
     let mut sizes = cluster_sizes(&boxes, first);
-    sizes.sort_by(|a, b| (a[0] * a[1]).total_cmp(&(b[0] * b[1])));
+    sizes.sort_by(|a, b| area(a).total_cmp(&area(b)));
     Anchors::measured(sizes, &boxes)
+}
+
+fn boxes_with_area(boxes: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    let mut boxes = boxes.to_vec();
+    boxes.retain(|b| b.iter().all(|v| v.is_finite() && *v > 0.0));
+    boxes
 }
 
 impl Anchors {
     /// How well the sizes fit boxes.
     fn measured(sizes: Vec<[f64; 2]>, boxes: &[[f64; 2]]) -> Self {
-        let count = boxes.len() as f64;
-        let reached = boxes
-            .iter()
-            .filter(|b| sizes.iter().any(|a| in_reach(b, a)));
         Self {
-            mean_iou: boxes.iter().map(|b| nearest_size(b, &sizes).1).sum::<f64>() / count,
-            best_possible_recall: reached.count() as f64 / count,
+            mean_iou: mean_iou(&sizes, boxes),
+            best_possible_recall: best_possible_recall(&sizes, boxes),
             sizes,
         }
     }
+}
+
+fn mean_iou(sizes: &[[f64; 2]], boxes: &[[f64; 2]]) -> f64 {
+    let overlaps = boxes.iter().map(|b| nearest_size(b, sizes).1);
+    overlaps.sum::<f64>() / boxes.len() as f64
+}
+
+fn best_possible_recall(sizes: &[[f64; 2]], boxes: &[[f64; 2]]) -> f64 {
+    let reached = boxes.iter().filter(|b| is_in_reach(b, sizes));
+    reached.count() as f64 / boxes.len() as f64
+}
+
+fn is_in_reach(b: &[f64; 2], sizes: &[[f64; 2]]) -> bool {
+    sizes.iter().any(|a| in_reach(b, a))
+}
+
+fn nearest_indices(boxes: &[[f64; 2]], sizes: &[[f64; 2]]) -> Vec<usize> {
+    boxes.iter().map(|b| nearest_size(b, sizes).0).collect()
 }
 
 /// Moves each anchor to the mean of the boxes that are nearest to it, until they stay.
 fn cluster_sizes(boxes: &[[f64; 2]], mut sizes: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     let mut before = Vec::new();
     for _ in 0..MAX_ROUNDS {
-        let nearest: Vec<usize> = boxes.iter().map(|b| nearest_size(b, &sizes).0).collect();
+        let nearest = nearest_indices(boxes, &sizes);
         if nearest == before {
             break;
         }
@@ -74,14 +93,17 @@ fn cluster_sizes(boxes: &[[f64; 2]], mut sizes: Vec<[f64; 2]>) -> Vec<[f64; 2]> 
     sizes
 }
 
+/// From each box to the size that fits it best, by 1 - IoU.
+fn squared_distances(boxes: &[[f64; 2]], sizes: &[[f64; 2]]) -> Vec<f64> {
+    let overlaps = boxes.iter().map(|b| nearest_size(b, sizes).1);
+    overlaps.map(|overlap| (1.0 - overlap).powi(2)).collect()
+}
+
 /// Starting points far from each other: each drawn with the square of its distance to those before.
 fn spread_sizes(boxes: &[[f64; 2]], count: usize, rng: &mut ChaCha8Rng) -> Vec<[f64; 2]> {
     let mut sizes = vec![boxes[(uniform_share(rng) * boxes.len() as f64) as usize]];
     while sizes.len() < count {
-        let squares = boxes
-            .iter()
-            .map(|b| (1.0 - nearest_size(b, &sizes).1).powi(2));
-        let squares: Vec<f64> = squares.collect();
+        let squares = squared_distances(boxes, &sizes);
         let mut left = uniform_share(rng) * squares.iter().sum::<f64>();
         let drawn = squares.iter().position(|s| {
             left -= s;
@@ -110,7 +132,11 @@ fn nearest_size(b: &[f64; 2], sizes: &[[f64; 2]]) -> (usize, f64) {
 /// Intersection over union about one centre.
 fn overlap_at_one_corner(a: &[f64; 2], b: &[f64; 2]) -> f64 {
     let shared = a[0].min(b[0]) * a[1].min(b[1]);
-    shared / (a[0] * a[1] + b[0] * b[1] - shared)
+    shared / (area(a) + area(b) - shared)
+}
+
+fn area(size: &[f64; 2]) -> f64 {
+    size[0] * size[1]
 }
 
 fn mean_of(boxes: &[[f64; 2]], nearest: &[usize], k: usize) -> Option<[f64; 2]> {

@@ -48,18 +48,26 @@ impl Balance {
     /// assert_eq!((format!("{:.4}", paper.real), format!("{:.4}", paper.synthetic)), ("0.8658".into(), "0.3515".into()));
     /// ```
     pub fn weights(&self, real: u64, synthetic: u64) -> Result<Weights> {
-        if !(0.0..=1.0).contains(&self.alpha) {
-            let what = format!("{}, expected 0 to 1", self.alpha);
-            return Err(Error::value("alpha", what));
-        }
+        self.check_alpha()?;
         check_images("real", real)?;
         check_images("synthetic", synthetic)?;
-        let (r, s) = (real as f64, synthetic as f64);
-        let scale = (s + r) * if self.normalize { 1.0 } else { 0.5 };
-        Ok(Weights {
-            real: scale / r * self.alpha,
-            synthetic: scale / s * (1.0 - self.alpha),
-        })
+        Ok(self.weights_for(real as f64, synthetic as f64))
+    }
+
+    fn weights_for(&self, real: f64, synthetic: f64) -> Weights {
+        let scale = (synthetic + real) * if self.normalize { 1.0 } else { 0.5 };
+        Weights {
+            real: scale / real * self.alpha,
+            synthetic: scale / synthetic * (1.0 - self.alpha),
+        }
+    }
+
+    fn check_alpha(&self) -> Result<()> {
+        if (0.0..=1.0).contains(&self.alpha) {
+            return Ok(());
+        }
+        let what = format!("{}, expected 0 to 1", self.alpha);
+        Err(Error::value("alpha", what))
     }
 }
 

@@ -21,13 +21,25 @@ pub fn decode(t: [f64; 4], cell: [f64; 2], anchor: [f64; 2]) -> [f64; 4] {
 pub fn encode(bbox: [f64; 4], cell: [f64; 2], anchor: [f64; 2]) -> Option<[f64; 4]> {
     let [x, y, w, h] = bbox;
     let shares = [
-        (x - cell[0] + 0.5) / 2.0,
-        (y - cell[1] + 0.5) / 2.0,
-        (w / anchor[0]).sqrt() / 2.0,
-        (h / anchor[1]).sqrt() / 2.0,
+        half_offset(x, cell[0]),
+        half_offset(y, cell[1]),
+        half_root(w, anchor[0]),
+        half_root(h, anchor[1]),
     ];
     let reachable = shares.iter().all(|s| *s > 0.0 && *s < 1.0);
-    reachable.then(|| shares.map(|s| libm::log(s / (1.0 - s))))
+    reachable.then(|| shares.map(logit))
+}
+
+fn half_offset(center: f64, cell: f64) -> f64 {
+    (center - cell + 0.5) / 2.0
+}
+
+fn half_root(side: f64, anchor: f64) -> f64 {
+    (side / anchor).sqrt() / 2.0
+}
+
+fn logit(share: f64) -> f64 {
+    libm::log(share / (1.0 - share))
 }
 
 fn sigmoid(v: f64) -> f64 {

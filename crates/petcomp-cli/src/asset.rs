@@ -139,8 +139,7 @@ const SHEET: &str = "contact_sheet.png";
 fn check_folder(folder: &Path, strict: bool) -> anyhow::Result<()> {
     let library = Library::open(folder)?;
     let records: Vec<_> = records_of(&library).collect();
-    let to_review = records.iter().filter(|record| record.needs_review());
-    let to_review = to_review.inspect(|record| list_reasons(record)).count();
+    let to_review = list_to_review(&records);
     let (folder, assets, cut_outs) = (folder.display(), library.assets.len(), records.len());
     print::line(format_args!(
         "{folder}: {assets} assets, {cut_outs} cut-outs, all intact, {to_review} to review"
@@ -150,6 +149,12 @@ fn check_folder(folder: &Path, strict: bool) -> anyhow::Result<()> {
         return Err(NeedsReview(what).into());
     }
     Ok(())
+}
+
+/// Lists what there is to review, and counts it.
+fn list_to_review(records: &[&PhotoRecord]) -> usize {
+    let to_review = records.iter().filter(|record| record.needs_review());
+    to_review.inspect(|record| list_reasons(record)).count()
 }
 
 fn records_of(library: &Library) -> impl Iterator<Item = &PhotoRecord> {
@@ -213,26 +218,32 @@ fn write_sheet(folder: &Path, library: &Library, global: &GlobalArgs) -> anyhow:
 }
 
 fn add_photos(args: &AddPhotoArgs, global: &GlobalArgs) -> anyhow::Result<()> {
-    let options = args.quality.cut_out(CutOutOptions::default());
-    let photos = args.photos.iter();
-    let added = photos.map(|photo| args.add_photo(photo, &options, global));
-    let added = added.collect::<petcomp::Result<Vec<_>>>()?;
+    let added = args.add_each(global)?;
     let library = Library::open_with(&args.output, added)?;
     show_classes(&library.classes, "--classes", global);
     write_sheet(&args.output, &library, global)
 }
 
 fn report_added(record: &PhotoRecord, global: &GlobalArgs) {
-    let [length, width] = record.object_m.map(|m| m * 1e3);
-    global.print_status(format_args!(
-        "{}: {length:.1} x {width:.1} mm (+- {:.1})",
-        record.file,
-        record.error_m * 1e3
-    ));
+    global.print_status(describe_size(record));
     report_diagnostics(&record.file, &record.diagnostics);
 }
 
+fn describe_size(record: &PhotoRecord) -> String {
+    let [length, width] = record.object_m.map(|m| m * 1e3);
+    let (file, error) = (&record.file, record.error_m * 1e3);
+    format!("{file}: {length:.1} x {width:.1} mm (+- {error:.1})")
+}
+
 impl AddPhotoArgs {
+    fn add_each(&self, global: &GlobalArgs) -> petcomp::Result<Vec<Photo>> {
+        let options = self.quality.cut_out(CutOutOptions::default());
+        let photos = self.photos.iter();
+        photos
+            .map(|photo| self.add_photo(photo, &options, global))
+            .collect()
+    }
+
     fn add_photo(
         &self,
         photo: &Path,
@@ -256,11 +267,8 @@ impl AddPhotoArgs {
 
     /// The name that is given, or that of the first photo.
     fn asset_name(&self) -> String {
-        match (&self.name, self.photos.first()) {
-            (Some(name), _) => name.clone(),
-            (None, Some(photo)) => stem_of(photo),
-            (None, None) => String::new(),
-        }
+        let first = self.photos.first().map(|photo| stem_of(photo));
+        self.name.clone().or(first).unwrap_or_default()
     }
 }
 
@@ -273,11 +281,14 @@ fn extremes_mm(metres: &[[f64; 2]], i: usize) -> [f64; 2] {
     ends.map(|metres| 1e3 * metres)
 }
 
+fn numbered(classes: &[String]) -> Vec<String> {
+    let classes = classes.iter().enumerate();
+    classes.map(|(i, class)| format!("{i} {class}")).collect()
+}
+
 /// Shows which number each class has, and how to change that.
 fn show_classes(classes: &[String], how: &str, global: &GlobalArgs) {
-    let numbered = classes.iter().enumerate();
-    let numbered: Vec<_> = numbered.map(|(i, class)| format!("{i} {class}")).collect();
-    let list = numbered.join(", ");
+    let list = numbered(classes).join(", ");
     global.print_status(format_args!("classes {list}; another order: {how}"));
 }
 

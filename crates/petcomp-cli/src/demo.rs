@@ -3,7 +3,7 @@
 use crate::global::GlobalArgs;
 use crate::print;
 use crate::{asset, dataset};
-use petcomp::dataset::{DatasetConfig, DatasetCounts, Pipeline, contact_sheet_of};
+use petcomp::dataset::{DatasetConfig, DatasetCounts, Pipeline};
 use petcomp::{Error, io};
 use std::path::{Path, PathBuf};
 
@@ -54,10 +54,14 @@ impl DemoArgs {
         self.output.join("dataset")
     }
 
+    fn relative_backgrounds(&self) -> petcomp::Result<PathBuf> {
+        let backgrounds = absolute_path(&self.samples.join("backgrounds"))?;
+        Ok(io::relative(&backgrounds, &absolute_path(&self.output)?))
+    }
+
     /// A recipe file that names its folders and nothing else.
     fn write_recipe(&self) -> petcomp::Result<PathBuf> {
-        let backgrounds = absolute_path(&self.samples.join("backgrounds"))?;
-        let backgrounds = io::relative(&backgrounds, &absolute_path(&self.output)?);
+        let backgrounds = self.relative_backgrounds()?;
         // A JSON string is a TOML string.
         let backgrounds = serde_json::Value::from(backgrounds.to_string_lossy());
         let text = format!("assets = \"assets\"\nbackgrounds = {backgrounds}\n");
@@ -69,8 +73,7 @@ impl DemoArgs {
     fn write_sheet(&self) -> petcomp::Result<PathBuf> {
         let path = self.output.join("contact_sheet.png");
         let count = self.count as usize;
-        let sheet = contact_sheet_of(&self.dataset_folder(), count, &Default::default())?;
-        io::write(&path, &sheet)?;
+        dataset::write_contact_sheet(&self.dataset_folder(), count, &path)?;
         Ok(path)
     }
 

@@ -9,6 +9,7 @@ use petcomp::diff::{
 use petcomp::io::{Format, Picture};
 use petcomp::{Image, LinearRgb, PremulRgba, StraightRgba, io};
 use std::ffi::OsString;
+use std::fmt::Display;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -76,12 +77,16 @@ const SINGLE_DASH: [&str; 11] = [
 /// The command line with `idiff`'s spelling turned into ours, for the `diff` subcommand only.
 pub(crate) fn accept_idiff_spelling(words: impl Iterator<Item = OsString>) -> Vec<OsString> {
     let words: Vec<OsString> = words.collect();
-    let verb = words.iter().skip(1).find(|word| !is_flag(word));
-    if verb.is_some_and(|verb| verb == "diff") {
+    if is_diff(&words) {
         words.into_iter().map(with_two_dashes).collect()
     } else {
         words
     }
+}
+
+fn is_diff(words: &[OsString]) -> bool {
+    let verb = words.iter().skip(1).find(|word| !is_flag(word));
+    verb.is_some_and(|verb| verb == "diff")
 }
 
 fn is_flag(word: &OsString) -> bool {
@@ -98,20 +103,26 @@ fn with_two_dashes(word: OsString) -> OsString {
 pub(crate) fn run(args: &DiffArgs, global: &GlobalArgs) -> anyhow::Result<ExitCode> {
     let pair = match PicturePair::read(args) {
         Ok(pair) => pair,
-        Err(error) => {
-            print::aside(format_args!("error: {error}"));
-            return Ok(ExitCode::from(Verdict::Unreadable.exit_code()));
-        }
+        Err(error) => return Ok(exit_unreadable(&error)),
     };
     let report = pair.compare(&args.thresholds());
     if let Some(path) = args.difference_path(&report) {
         pair.write_difference(path, args.scale)?;
     }
-    let (a, b) = (args.a.display(), args.b.display());
-    global.print_status(format_args!("Comparing \"{a}\" and \"{b}\""));
-    print::text(&report);
+    print_comparison(args, &report, global);
     pair.print_likeness(global);
     Ok(ExitCode::from(report.verdict.exit_code()))
+}
+
+fn exit_unreadable(error: &impl Display) -> ExitCode {
+    print::aside(format_args!("error: {error}"));
+    ExitCode::from(Verdict::Unreadable.exit_code())
+}
+
+fn print_comparison(args: &DiffArgs, report: &Comparison, global: &GlobalArgs) {
+    let (a, b) = (args.a.display(), args.b.display());
+    global.print_status(format_args!("Comparing \"{a}\" and \"{b}\""));
+    print::text(report);
 }
 
 /// The two pictures: the second is what the first should be.

@@ -1,6 +1,7 @@
 //! `petcomp doctor`: what this machine has, and whether petcomp works on it.
 
 use crate::print;
+use petcomp::io::ToFile;
 use petcomp::{Image, PremulRgba, Srgba8, io};
 use std::process::{Command, ExitCode};
 
@@ -11,13 +12,7 @@ pub(crate) struct DoctorArgs {}
 pub(crate) fn run(_: &DoctorArgs) -> anyhow::Result<ExitCode> {
     print::line(format_args!("petcomp {}", env!("CARGO_PKG_VERSION")));
     print::line(format_args!("threads  {}", rayon::current_num_threads()));
-    let blender = version_of("blender");
-    print::line(format_args!(
-        "blender  {}",
-        blender
-            .as_deref()
-            .unwrap_or("not found (only `make golden` needs it)")
-    ));
+    print::line(format_args!("blender  {}", blender_version()));
     let outcomes = [
         report_check("oiio", worker_answers()),
         report_check("png", png_alpha()),
@@ -29,6 +24,11 @@ pub(crate) fn run(_: &DoctorArgs) -> anyhow::Result<ExitCode> {
     } else {
         ExitCode::FAILURE
     })
+}
+
+fn blender_version() -> String {
+    let missing = "not found (only `make golden` needs it)";
+    version_of("blender").unwrap_or_else(|| missing.into())
 }
 
 /// Prints what a check found; whether it passed.
@@ -67,10 +67,7 @@ const HALF_WHITE: Srgba8 = Srgba8 {
 
 /// Half-transparent white must come back as half of linear white, not of encoded white.
 fn png_alpha() -> anyhow::Result<String> {
-    let folder = temporary_folder()?;
-    let path = folder.path().join("half.png");
-    io::write(&path, &Image::filled(1, 1, HALF_WHITE))?;
-    let pixel = io::read::<PremulRgba>(&path)?[(0, 0)];
+    let pixel = round_trip("half.png", HALF_WHITE)?;
     let red = petcomp::color::encode_srgb8(pixel.color()).r;
     anyhow::ensure!(
         red == 188,
@@ -81,11 +78,16 @@ fn png_alpha() -> anyhow::Result<String> {
 
 /// What is written is what is read.
 fn exr_round_trip() -> anyhow::Result<String> {
-    let folder = temporary_folder()?;
-    let path = folder.path().join("value.exr");
     let value = PremulRgba::new(0.25, 3.5, -0.125, 0.5);
-    io::write(&path, &Image::filled(2, 2, value))?;
-    let back = io::read::<PremulRgba>(&path)?[(1, 1)];
+    let back = round_trip("value.exr", value)?;
     anyhow::ensure!(back == value, "what was written is not what is read");
     Ok("values above 1 and below 0 survive".into())
+}
+
+/// Writes a picture of one value and reads its last pixel.
+fn round_trip<P: ToFile + Copy>(name: &str, value: P) -> anyhow::Result<PremulRgba> {
+    let folder = temporary_folder()?;
+    let path = folder.path().join(name);
+    io::write(&path, &Image::filled(2, 2, value))?;
+    Ok(io::read::<PremulRgba>(&path)?[(1, 1)])
 }

@@ -51,10 +51,7 @@ pub(crate) fn run(args: &EvalArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     let runs = args.read_runs(&mut options)?;
     let metrics = args.measure(&runs, &options)?;
     print_scores(&metrics, &options, global);
-    let factors = page::factors_table(&runs, &options);
-    if !factors.rows.is_empty() {
-        print::text(factors.markdown());
-    }
+    print_factors(&runs, &options);
     if let Some(folder) = &args.output {
         global.print_look_at(&folder.join("eval.html"));
     }
@@ -69,6 +66,13 @@ fn print_scores(metrics: &[Metrics], options: &EvalReportOptions, global: &Globa
         global.print_status(format_args!(
             "the classes with the lowest AP; {others} others: -o FOLDER writes classes.csv"
         ));
+    }
+}
+
+fn print_factors(runs: &[Run], options: &EvalReportOptions) {
+    let factors = page::factors_table(runs, options);
+    if !factors.rows.is_empty() {
+        print::text(factors.markdown());
     }
 }
 
@@ -104,15 +108,24 @@ impl EvalArgs {
         };
         let mut runs = Vec::new();
         for path in predictions {
-            let sheets = if truth.extension().is_some_and(|e| e == "json") {
-                self.read_coco(path, truth, options)
-            } else {
-                self.read_yolo(path, truth, options)
-            };
-            let (name, sheets) = (run_name(path), sheets?);
+            let sheets = self.read_predictions(path, truth, options)?;
+            let name = run_name(path);
             runs.push(Run { name, sheets });
         }
         Ok(runs)
+    }
+
+    fn read_predictions(
+        &self,
+        path: &Path,
+        truth: &Path,
+        options: &mut EvalReportOptions,
+    ) -> petcomp::Result<Vec<EvalImage>> {
+        if truth.extension().is_some_and(|e| e == "json") {
+            self.read_coco(path, truth, options)
+        } else {
+            self.read_yolo(path, truth, options)
+        }
     }
 
     fn read_coco(

@@ -80,10 +80,7 @@ impl GlobalArgs {
     fn start_logger(&self) {
         env_logger::Builder::new()
             .filter_module("petcomp", self.log_level())
-            .format(|out, record| {
-                let message = printable(&record.args().to_string());
-                writeln!(out, "{}: {message}", level_name(record.level()))
-            })
+            .format(|out, record| writeln!(out, "{}", log_line(record)))
             .init();
     }
 
@@ -136,6 +133,11 @@ impl GlobalArgs {
     pub(crate) fn start_progress(&self, job: &'static str) -> ProgressDisplay {
         ProgressDisplay::new(job, self.quiet, self.progress)
     }
+}
+
+fn log_line(record: &log::Record<'_>) -> String {
+    let message = printable(&record.args().to_string());
+    format!("{}: {message}", level_name(record.level()))
 }
 
 fn level_name(level: log::Level) -> String {

@@ -16,27 +16,31 @@ static STOP: AtomicBool = AtomicBool::new(false);
 /// absent, so the same command continues from there.
 pub(crate) fn interruption() -> &'static AtomicBool {
     static ONCE: Once = Once::new();
-    ONCE.call_once(|| {
-        if let Err(error) = ctrlc::set_handler(stop_soon) {
-            log::warn!("interrupts cannot be caught: {error}");
-        }
-    });
+    ONCE.call_once(catch_interrupts);
     &STOP
+}
+
+fn catch_interrupts() {
+    if let Err(error) = ctrlc::set_handler(stop_soon) {
+        log::warn!("interrupts cannot be caught: {error}");
+    }
 }
 
 fn stop_soon() {
     if STOP.swap(true, Ordering::Relaxed) {
         stop_now();
     }
-    std::thread::spawn(|| {
-        std::thread::sleep(GRACE_PERIOD);
-        stop_now();
-    });
+    std::thread::spawn(stop_after_grace_period);
     print::aside(format_args!(
         "stopping after the pictures in hand, in {} s at the latest; the same command goes on; interrupt again to stop at \
          once",
         GRACE_PERIOD.as_secs()
     ));
+}
+
+fn stop_after_grace_period() {
+    std::thread::sleep(GRACE_PERIOD);
+    stop_now();
 }
 
 fn stop_now() -> ! {

@@ -25,10 +25,7 @@ pub(crate) struct LabelArgs {
 pub(crate) fn run(args: &LabelArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     let scene = args.read_scene()?;
     let pipeline = Pipeline::open_for(args.scene.config_for(&scene)?, &scene)?;
-    let labels = match &args.overlay {
-        Some(path) => write_overlay(path, &pipeline, scene),
-        None => pipeline.label(scene),
-    };
+    let labels = args.label(&pipeline, scene);
     let labels = labels.map_err(|e| e.in_file(&args.scene.path))?;
     io::write_json(&args.output, &labels)?;
     args.write_polygons(&labels, &pipeline)?;
@@ -46,6 +43,13 @@ impl LabelArgs {
         })
     }
 
+    fn label(&self, pipeline: &Pipeline, scene: Scene) -> petcomp::Result<Labels> {
+        match &self.overlay {
+            Some(path) => write_overlay(path, pipeline, scene),
+            None => pipeline.label(scene),
+        }
+    }
+
     fn write_polygons(&self, labels: &Labels, pipeline: &Pipeline) -> petcomp::Result<()> {
         let Some(path) = &self.polygons else {
             return Ok(());
@@ -55,14 +59,14 @@ impl LabelArgs {
     }
 
     fn report(&self, labels: &Labels, global: &GlobalArgs) {
-        let objects = &labels.objects;
-        let topmost = objects.iter().filter(|o| o.is_topmost()).count();
-        let count = objects.len();
-        global.print_written(
-            &self.output,
-            format_args!("{count} objects, {topmost} on top"),
-        );
+        global.print_written(&self.output, count_objects(labels));
     }
+}
+
+fn count_objects(labels: &Labels) -> String {
+    let objects = &labels.objects;
+    let topmost = objects.iter().filter(|o| o.is_topmost()).count();
+    format!("{} objects, {topmost} on top", objects.len())
 }
 
 /// Takes the picture, and writes it with its labels drawn on it.

@@ -27,8 +27,12 @@ pub(crate) fn aside(line: impl Display) {
 pub(crate) fn usage(message: &clap::Error) -> ExitCode {
     match print_usage(message) {
         Err(error) if !message.use_stderr() => exit_unwritable(&error),
-        _ => ExitCode::from(u8::try_from(message.exit_code()).unwrap_or(u8::MAX)),
+        _ => usage_exit_code(message),
     }
+}
+
+fn usage_exit_code(message: &clap::Error) -> ExitCode {
+    u8::try_from(message.exit_code()).unwrap_or(u8::MAX).into()
 }
 
 /// With its colours, unless an argument brings some of its own.

@@ -60,10 +60,15 @@ impl RenderArgs {
         } else {
             self.write_parts(deep, shot, frame)?;
         }
-        if let Some(path) = &self.preview {
-            io::write(path, &displayed(frame))?;
-        }
+        self.write_preview(frame)?;
         Ok(())
+    }
+
+    fn write_preview(&self, frame: &Image<PremulRgba>) -> petcomp::Result<()> {
+        match &self.preview {
+            Some(path) => io::write(path, &displayed(frame)),
+            None => Ok(()),
+        }
     }
 
     fn write_resolved(&self, scene: Scene, config: &DatasetConfig) -> petcomp::Result<()> {

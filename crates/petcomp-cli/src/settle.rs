@@ -47,16 +47,19 @@ pub(crate) fn run(args: &SettleArgs, global: &GlobalArgs) -> anyhow::Result<()> 
 impl SettleArgs {
     /// Lets the objects fall and writes the trace, for a failed fall too: it shows what went wrong.
     fn settle(&self, scene: Scene, options: &SettleOptions) -> petcomp::Result<Settled> {
-        let interval = match self.trace {
-            Some(_) => TRACE_INTERVAL_STEPS,
-            None => 0,
-        };
-        let (settled, samples) =
-            settle_traced(scene, options, interval).map_err(|e| e.in_file(&self.scene))?;
+        let (settled, samples) = settle_traced(scene, options, self.trace_interval())
+            .map_err(|e| e.in_file(&self.scene))?;
         if let Some(path) = &self.trace {
             io::write_text(path, &trace_csv(&samples))?;
         }
         Ok(settled)
+    }
+
+    fn trace_interval(&self) -> usize {
+        match self.trace {
+            Some(_) => TRACE_INTERVAL_STEPS,
+            None => 0,
+        }
     }
 
     /// Writes the scene at rest, the files that it names seen from its new place.
@@ -69,14 +72,19 @@ impl SettleArgs {
     }
 
     fn options_for(&self, scene: &Scene) -> petcomp::Result<SettleOptions> {
-        let options = match &self.options {
-            Some(path) => read_options(path),
-            None => self.scene_options(scene),
-        }?;
+        let options = self.given_options(scene)?;
         Ok(match self.quality {
             Some(quality) => quality.settle(options),
             None => options,
         })
+    }
+
+    /// Those of the file that was given, or the scene's own.
+    fn given_options(&self, scene: &Scene) -> petcomp::Result<SettleOptions> {
+        match &self.options {
+            Some(path) => read_options(path),
+            None => self.scene_options(scene),
+        }
     }
 
     /// Those of the scene's own settings.

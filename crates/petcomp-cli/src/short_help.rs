@@ -7,12 +7,14 @@ pub(crate) const GLOBAL_HEADING: &str = "Global options";
 pub(crate) fn with_short_help(program: clap::Command) -> clap::Command {
     let options = program.get_arguments().filter(|arg| arg.is_global_set());
     let options: Vec<clap::Arg> = options.cloned().collect();
-    let flags: Vec<String> = options.iter().map(shortest_flag).collect();
-    let line = format!(
-        "{GLOBAL_HEADING} (see `petcomp --help`): {}",
-        flags.join(", ")
-    );
+    let line = flags_line(&options);
     program.mut_subcommands(|command| with_hidden_options(command, &options, &line))
+}
+
+fn flags_line(options: &[clap::Arg]) -> String {
+    let flags: Vec<String> = options.iter().map(shortest_flag).collect();
+    let flags = flags.join(", ");
+    format!("{GLOBAL_HEADING} (see `petcomp --help`): {flags}")
 }
 
 /// The options are present and hidden, so clap does not copy them from the program.

@@ -13,16 +13,18 @@ pub(crate) fn count(range: RangeInclusive<u64>) -> RangedU64ValueParser<usize> {
 
 /// Four points from `X,Y X,Y X,Y X,Y`.
 pub(crate) fn parse_corners(text: &str) -> Result<[[f64; 2]; 4], String> {
-    let points = text
-        .split(|c: char| c == ';' || c.is_whitespace())
+    let points: Option<Vec<_>> = split_points(text).map(parse_point).collect();
+    let corners = points.and_then(|points| points.try_into().ok());
+    corners.ok_or_else(|| bad_corners(text))
+}
+
+fn bad_corners(text: &str) -> String {
+    format!("\"{text}\", expected four corners as in \"120,80 900,85 905,600 110,590\"")
+}
+
+fn split_points(text: &str) -> impl Iterator<Item = &str> {
+    text.split(|c: char| c == ';' || c.is_whitespace())
         .filter(|part| !part.is_empty())
-        .map(parse_point);
-    let points: Option<Vec<_>> = points.collect();
-    points
-        .and_then(|points| points.try_into().ok())
-        .ok_or_else(|| {
-            format!("\"{text}\", expected four corners as in \"120,80 900,85 905,600 110,590\"")
-        })
 }
 
 fn parse_point(text: &str) -> Option<[f64; 2]> {

@@ -44,12 +44,10 @@ impl Checked {
 
     /// Smallest, median and largest side of a class's boxes, percent of the image.
     fn side_range(&self, class: usize, side: usize) -> String {
-        let sides = self.sides_of(class, side);
-        let Some(max) = sides.last() else {
-            return "-".into();
-        };
-        let (min, median) = (sides[0], sides[sides.len() / 2]);
-        format!("{min:.1} / {median:.1} / {max:.1} %")
+        match min_median_max(&self.sides_of(class, side)) {
+            Some([min, median, max]) => format!("{min:.1} / {median:.1} / {max:.1} %"),
+            None => "-".into(),
+        }
     }
 
     /// Widths or heights of the boxes of a class, percent of the image, ascending.
@@ -63,13 +61,13 @@ impl Checked {
 
     /// What is not wrong but good to know: classes with no labels or few, boxes that are very small.
     pub fn notes(&self) -> Vec<Diagnostic> {
-        let mut notes = Vec::new();
-        for class in 0..self.classes.len() {
-            notes.extend(self.parts_without_label(class));
-            notes.extend(self.rare_class(class));
-        }
-        notes.extend(self.tiny_boxes());
-        notes
+        let classes = (0..self.classes.len()).flat_map(|class| self.class_notes(class));
+        classes.chain(self.tiny_boxes()).collect()
+    }
+
+    fn class_notes(&self, class: usize) -> impl Iterator<Item = Diagnostic> {
+        self.parts_without_label(class)
+            .chain(self.rare_class(class))
     }
 
     fn parts_without_label(&self, class: usize) -> impl Iterator<Item = Diagnostic> {
@@ -88,18 +86,12 @@ impl Checked {
     fn rare_class(&self, class: usize) -> Option<Diagnostic> {
         let (rows, all) = (*self.rows.get(class)?, self.boxes.len());
         let is_rare = rows > 0 && (rows as f64) < RARE_LABEL_SHARE * all as f64;
-        is_rare.then(|| {
-            let name = &self.classes[class];
-            let message = format!("class \"{name}\" has only {rows} of {all} labels");
-            Diagnostic::note(Code::RareClass, message)
-        })
+        is_rare.then(|| rare_class_note(&self.classes[class], rows, all))
     }
 
     fn tiny_boxes(&self) -> Option<Diagnostic> {
         let count = self.boxes.iter().filter(|b| b.is_tiny()).count();
-        let percent = 100.0 * TINY_SIDE_SHARE;
-        let message = format!("{count} boxes are below {percent:.0} % of the image's side");
-        (count > 0).then(|| Diagnostic::note(Code::TinyBoxes, message))
+        (count > 0).then(|| tiny_boxes_note(count))
     }
 }
 
@@ -108,4 +100,20 @@ impl CheckedBox {
         self.sides
             .is_some_and(|sides| sides.iter().any(|side| *side < TINY_SIDE_SHARE))
     }
+}
+
+/// Of numbers in order.
+fn min_median_max(sorted: &[f64]) -> Option<[f64; 3]> {
+    Some([*sorted.first()?, sorted[sorted.len() / 2], *sorted.last()?])
+}
+
+fn tiny_boxes_note(count: usize) -> Diagnostic {
+    let percent = 100.0 * TINY_SIDE_SHARE;
+    let message = format!("{count} boxes are below {percent:.0} % of the image's side");
+    Diagnostic::note(Code::TinyBoxes, message)
+}
+
+fn rare_class_note(name: &str, rows: usize, all: usize) -> Diagnostic {
+    let message = format!("class \"{name}\" has only {rows} of {all} labels");
+    Diagnostic::note(Code::RareClass, message)
 }

@@ -34,9 +34,7 @@ impl CheckedImage {
         part: Part,
         class_count: Option<usize>,
     ) -> Self {
-        let checksum = io::Checksum::from_file(folder.join(&path))
-            .ok()
-            .map(|sum| (sum.bytes, sum.crc32));
+        let checksum = size_and_checksum(&folder.join(&path));
         let mut image = Self {
             path,
             part,
@@ -85,4 +83,9 @@ impl CheckedImage {
 
 fn shorter_side(picture: &Image<PremulRgba>) -> usize {
     picture.width().min(picture.height())
+}
+
+fn size_and_checksum(file: &Path) -> Option<(u64, u32)> {
+    let sum = io::Checksum::from_file(file).ok()?;
+    Some((sum.bytes, sum.crc32))
 }

@@ -32,11 +32,14 @@ pub(super) fn read_rows(
 
 /// The columns of each row that is not empty, with its line.
 fn split_rows(text: &str) -> Vec<(usize, Vec<&str>)> {
-    let rows = text.lines().map(|line| line.split_whitespace().collect());
-    let numbered = (1..).zip(rows);
-    numbered
-        .filter(|(_, row): &(_, Vec<_>)| !row.is_empty())
+    (1..)
+        .zip(text.lines().map(columns_of))
+        .filter(|(_, columns)| !columns.is_empty())
         .collect()
+}
+
+fn columns_of(row: &str) -> Vec<&str> {
+    row.split_whitespace().collect()
 }
 
 /// What the rows of a file must look like.
@@ -71,30 +74,33 @@ impl RowFormat {
 
     /// The numbers of a row that is none of those before.
     fn parse_new(&self, row: &[&str], known: &[Vec<f64>]) -> Result<Vec<f64>, (Code, String)> {
-        let values = self.parse(row);
-        let values = values.map_err(|message| (Code::BadLabelRow, message))?;
-        if known.contains(&values) {
-            let message = "the same row stands above".into();
-            return Err((Code::DuplicateLabelRow, message));
+        let values = self.parse(row).map_err(|what| (Code::BadLabelRow, what))?;
+        match known.contains(&values) {
+            false => Ok(values),
+            true => Err((Code::DuplicateLabelRow, "the same row stands above".into())),
         }
-        Ok(values)
     }
 
     fn check_columns(&self, count: usize) -> Result<(), String> {
+        if self.allows_columns(count) {
+            return Ok(());
+        }
+        let expected = match self.outlines {
+            false => "5",
+            true => "a class and at least 3 pairs as in the file's other rows",
+        };
+        Err(format!("{count} columns, expected {expected}"))
+    }
+
+    fn allows_columns(&self, count: usize) -> bool {
         match self.outlines {
-            false if count == 5 => Ok(()),
-            false => Err(format!("{count} columns, expected 5")),
-            true if count >= 7 && count % 2 == 1 => Ok(()),
-            true => Err(format!(
-                "{count} columns, expected a class and at least 3 pairs as in the file's other rows"
-            )),
+            false => count == 5,
+            true => count >= 7 && count % 2 == 1,
         }
     }
 
     fn check_class(&self, text: &str) -> Result<(), String> {
-        let class = text
-            .parse::<usize>()
-            .map_err(|_| format!("class {text}, expected an integer from 0"))?;
+        let class = class_number(text)?;
         match self.class_count {
             Some(count) if class >= count => Err(format!(
                 "class {class}, but data.yaml has {count} classes, from 0"
@@ -120,4 +126,9 @@ fn check_shares(row: &[&str], values: &[f64]) -> Result<(), String> {
         Some((text, _)) => Err(format!("{text}, expected a share of the image, 0 to 1")),
         None => Ok(()),
     }
+}
+
+fn class_number(text: &str) -> Result<usize, String> {
+    let class = text.parse();
+    class.map_err(|_| format!("class {text}, expected an integer from 0"))
 }

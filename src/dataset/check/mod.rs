@@ -12,6 +12,7 @@ use crate::dataset::journal::{NumberedLines, numbered_lines};
 use crate::dataset::journal_line::JournalLine;
 use crate::dataset::listing::is_image;
 use crate::dataset::near_duplicates::{NEAR_DUPLICATE_RMS, Thumbnail, nearest};
+use crate::dataset::paths::folder_of;
 use crate::dataset::yolo_yaml::DataYaml;
 use crate::dataset::{Part, YoloSet};
 use crate::diagnostic::Code;
@@ -119,8 +120,7 @@ fn boxes_of(image: &CheckedImage) -> impl Iterator<Item = CheckedBox> {
 /// The label files of a folder of images.
 fn list_labels(dataset: &Path, images: &str) -> Vec<PathBuf> {
     let label = YoloSet::label_of(&Path::new(images).join("x"));
-    let folder = label.parent().unwrap_or(Path::new(""));
-    let mut labels = list_files(dataset, &folder.to_string_lossy());
+    let mut labels = list_files(dataset, &folder_of(&label).to_string_lossy());
     labels.retain(|path| path.extension().is_some_and(|e| e == "txt"));
     labels
 }
@@ -171,15 +171,20 @@ impl Checker<'_> {
         let mut images = Vec::new();
         for part in Part::ALL {
             for folder in yaml.folders(part) {
-                let mut found = list_files(self.folder, folder);
-                found.retain(|path| is_image(path));
-                if found.is_empty() {
-                    self.add(folder, Code::NoImages, "no images, expected at least one");
-                }
+                let found = self.list_images_in(folder);
                 images.extend(found.into_iter().map(|path| (part, path)));
             }
         }
         images
+    }
+
+    fn list_images_in(&mut self, folder: &str) -> Vec<PathBuf> {
+        let mut found = list_files(self.folder, folder);
+        found.retain(|path| is_image(path));
+        if found.is_empty() {
+            self.add(folder, Code::NoImages, "no images, expected at least one");
+        }
+        found
     }
 
     /// Images with the bytes of another; images of an empty scene may well be the same.
@@ -248,14 +253,18 @@ impl Checker<'_> {
 
     /// The lines that are as they were written; the others are findings.
     fn good_lines(&mut self, lines: NumberedLines) -> Vec<(usize, JournalLine)> {
-        let mut good = Vec::new();
-        for (i, line) in lines {
-            match line {
-                Ok(line) => good.push((i, line)),
-                Err(e) => self.add_damaged_line(i, &e),
-            }
-        }
-        good
+        let lines = lines.into_iter();
+        lines
+            .filter_map(|(i, line)| Some((i, self.good_line(i, line)?)))
+            .collect()
+    }
+
+    fn good_line(
+        &mut self,
+        i: usize,
+        line: std::result::Result<JournalLine, String>,
+    ) -> Option<JournalLine> {
+        line.inspect_err(|e| self.add_damaged_line(i, e)).ok()
     }
 
     fn add_damaged_line(&mut self, i: usize, error: &str) {

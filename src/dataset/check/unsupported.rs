@@ -22,13 +22,17 @@ struct SettledScene {
 /// A finding for each sidecar file with objects that hang in the air, and for each that cannot be read.
 pub(super) fn find(dataset: &Path) -> Vec<Finding> {
     let options = settle_options(dataset);
+    scene_files(dataset)
+        .into_par_iter()
+        .filter_map(|path| find_in(dataset, path, &options))
+        .collect()
+}
+
+fn scene_files(dataset: &Path) -> Vec<PathBuf> {
     let folders = ["scenes/train", "scenes/val"].iter();
     let mut files: Vec<PathBuf> = folders.flat_map(|part| list_files(dataset, part)).collect();
     files.retain(|path| path.extension().is_some_and(|e| e == "json"));
     files
-        .into_par_iter()
-        .filter_map(|path| find_in(dataset, path, &options))
-        .collect()
 }
 
 fn find_in(dataset: &Path, path: PathBuf, options: &SettleOptions) -> Option<Finding> {
@@ -45,11 +49,14 @@ fn find_in(dataset: &Path, path: PathBuf, options: &SettleOptions) -> Option<Fin
 
 /// How the dataset's objects fell; the defaults where that is not known.
 fn settle_options(dataset: &Path) -> SettleOptions {
-    let identity = folder::identity(dataset).ok().flatten();
-    identity
-        .and_then(|identity| identity.pointer("/recipe/scene/settle").cloned())
+    settle_table(dataset)
         .and_then(|settle| serde_json::from_value(settle).ok())
         .unwrap_or_default()
+}
+
+fn settle_table(dataset: &Path) -> Option<serde_json::Value> {
+    let identity = folder::identity(dataset).ok()??;
+    identity.pointer("/recipe/scene/settle").cloned()
 }
 
 /// The objects of a sidecar file that nothing holds up.
@@ -60,9 +67,13 @@ fn unsupported_in(path: &Path, options: &SettleOptions) -> Result<Vec<String>> {
 }
 
 fn describe(id: usize, object: &Object) -> String {
-    let height = match object.placement {
-        Placement::At(pose) => pose.translation.z,
-        Placement::Drop { height, .. } => height,
-    };
+    let height = height_of(&object.placement);
     format!("object {id} (\"{}\"), {height:.2} m up", object.asset)
+}
+
+fn height_of(placement: &Placement) -> f64 {
+    match placement {
+        Placement::At(pose) => pose.translation.z,
+        Placement::Drop { height, .. } => *height,
+    }
 }

@@ -2,10 +2,11 @@
 
 use super::color_of;
 use crate::dataset::{SampleSummary, Summary};
+use crate::geom::BBox;
 use crate::io;
 use crate::plot::Page;
 use std::collections::BTreeMap;
-use std::fmt::Write;
+
 use std::path::{Path, PathBuf};
 
 /// So many pictures stand behind one heading, and so many are listed: a page stays below a few MB.
@@ -25,20 +26,26 @@ pub(super) fn add_all(page: &mut Page, folder: &Path, summary: &Summary, page_fo
     }
     let more = summary.glances.len() - count;
     if more > 0 {
-        let address = address(&root.join("images"));
-        page.html(&format!(
-            "<p>{more} more are in <a href=\"{address}\">images</a>.</p>\n"
-        ));
+        page.html(&link_to_others(more, &root));
     }
+}
+
+fn link_to_others(count: usize, root: &Path) -> String {
+    let address = address(&root.join("images"));
+    format!("<p>{count} more are in <a href=\"{address}\">images</a>.</p>\n")
 }
 
 fn absolute_path(path: &Path) -> PathBuf {
     std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf())
 }
 
+/// The first and the last index.
+fn index_range(samples: &[SampleSummary]) -> [u64; 2] {
+    [samples.first(), samples.last()].map(|sample| sample.map_or(0, |sample| sample.index))
+}
+
 fn listed_together(samples: &[SampleSummary], root: &Path) -> String {
-    let [first, last] =
-        [samples.first(), samples.last()].map(|sample| sample.map_or(0, |sample| sample.index));
+    let [first, last] = index_range(samples);
     let items: String = samples.iter().map(|sample| listed(sample, root)).collect();
     format!(
         "<details><summary>{first:06} to {last:06}</summary><div class=\"all\">\n{items}</div></details>\n"
@@ -57,12 +64,17 @@ fn listed(sample: &SampleSummary, root: &Path) -> String {
     )
 }
 
+/// A box as a part of an SVG path, in whole pixels.
+fn rectangle(b: &BBox) -> String {
+    let [x, y, w, h] = [b.x0, b.y0, b.width(), b.height()].map(|v| v.round());
+    format!("M{x} {y}h{w}v{h}h-{w}z")
+}
+
 /// The boxes of each class as one path.
 fn boxes_by_class(sample: &SampleSummary) -> String {
     let mut paths: BTreeMap<u32, String> = BTreeMap::new();
     for (class, b) in &sample.labels {
-        let [x, y, w, h] = [b.x0, b.y0, b.width(), b.height()].map(|v| v.round());
-        let _ = write!(paths.entry(*class).or_default(), "M{x} {y}h{w}v{h}h-{w}z");
+        *paths.entry(*class).or_default() += &rectangle(b);
     }
     let paths = paths.iter();
     paths
@@ -93,10 +105,13 @@ fn address(path: &Path) -> String {
 }
 
 fn percent_encoded(byte: u8) -> String {
-    match byte {
-        b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'/' | b'.' | b'-' | b'_' => {
-            char::from(byte).to_string()
-        }
-        _ => format!("%{byte:02X}"),
+    if is_plain_in_address(byte) {
+        char::from(byte).to_string()
+    } else {
+        format!("%{byte:02X}")
     }
+}
+
+fn is_plain_in_address(byte: u8) -> bool {
+    byte.is_ascii_alphanumeric() || b"/.-_".contains(&byte)
 }

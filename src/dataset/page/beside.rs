@@ -13,7 +13,7 @@ use crate::pixel::LinearRgb;
 use crate::plot::{Page, Table, escaped, heat::heat_map};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
-use std::fmt::Write;
+
 use std::path::Path;
 
 /// So many pictures of each set are read to compare their pixels, and so wide.
@@ -69,22 +69,21 @@ fn add_figures(page: &mut Page, theirs: &LabelledSet, max_figures: usize) {
 }
 
 fn add_heading(page: &mut Page, ours: &LabelledSet, theirs: &LabelledSet) {
-    let unlabelled = theirs
-        .pictures
-        .iter()
-        .filter(|picture| picture.boxes.is_none())
-        .count();
-    let without = if unlabelled > 0 {
-        format!(", {unlabelled} of them without a label file")
-    } else {
-        String::new()
-    };
+    let without = describe_unlabelled(theirs);
     page.heading("Beside your own pictures").text(&format!(
         "{} pictures of the dataset (blue) and {} of yours (orange){without}. The distance is that of Kolmogorov and Smirnov: \
          0 for the same distribution, 1 for two that have nothing in common; what differs most comes first.",
         ours.pictures.len(),
         theirs.pictures.len()
     ));
+}
+
+fn describe_unlabelled(set: &LabelledSet) -> String {
+    let pictures = set.pictures.iter();
+    match pictures.filter(|picture| picture.boxes.is_none()).count() {
+        0 => String::new(),
+        count => format!(", {count} of them without a label file"),
+    }
 }
 
 /// What can be compared of a set, by what it is.
@@ -124,11 +123,7 @@ fn percentages(set: &LabelledSet, i: usize) -> Vec<f64> {
 type PixelMeasure = (&'static str, fn(&PixelStatistics) -> f64);
 
 fn measure_pixels(set: &LabelledSet) -> [Measure; 4] {
-    let statistics: Vec<PixelStatistics> = set
-        .spread(MAX_MEASURED_PICTURES)
-        .into_par_iter()
-        .filter_map(|picture| PixelStatistics::read(&picture.path))
-        .collect();
+    let statistics = pixel_statistics(set);
     let measures: [PixelMeasure; 4] = [
         ("brightness of a picture, mean code", |s| s.brightness),
         ("contrast of a picture, standard deviation of codes", |s| {
@@ -140,6 +135,13 @@ fn measure_pixels(set: &LabelledSet) -> [Measure; 4] {
         }),
     ];
     measures.map(|(title, value)| (title, statistics.iter().map(value).collect()))
+}
+
+fn pixel_statistics(set: &LabelledSet) -> Vec<PixelStatistics> {
+    set.spread(MAX_MEASURED_PICTURES)
+        .into_par_iter()
+        .filter_map(|picture| PixelStatistics::read(&picture.path))
+        .collect()
 }
 
 /// What the pixels of a picture are like as a whole, in codes of 8 bits.
@@ -156,10 +158,7 @@ impl PixelStatistics {
         let picture = io::read::<LinearRgb>(path)
             .inspect_err(|error| log::warn!("{error}"))
             .ok()?;
-        let (w, h) = picture.size();
-        let width = w.min(MEASURED_WIDTH_PX);
-        let small = resize(&picture, width, (h * width).div_ceil(w).max(1));
-        Some(Self::new(&small))
+        Some(Self::new(&shrunk(&picture)))
     }
 
     fn new(picture: &Image<LinearRgb>) -> Self {
@@ -183,6 +182,12 @@ fn detail(luma: &Image<f32>) -> f64 {
         luma.rows()
             .flat_map(|row| row.windows(2).map(|pair| (pair[1] - pair[0]).abs())),
     )
+}
+
+fn shrunk(picture: &Image<LinearRgb>) -> Image<LinearRgb> {
+    let (w, h) = picture.size();
+    let width = w.min(MEASURED_WIDTH_PX);
+    resize(picture, width, (h * width).div_ceil(w).max(1))
 }
 
 fn mean(values: impl Iterator<Item = f32>) -> f64 {
@@ -218,8 +223,7 @@ fn in_pixels([x, y, w, h]: [f64; 4], size: [f64; 2]) -> BBox {
 }
 
 fn caption(picture: &LabelledPicture) -> String {
-    let name = picture.path.file_name().unwrap_or_default();
-    let name = name.to_string_lossy();
+    let name = picture.file_name();
     match &picture.boxes {
         None => format!("{name}: no label file"),
         Some(boxes) => format!("{name}: {} labels", boxes.len()),
@@ -232,21 +236,30 @@ fn class_shares(ours: &LabelledSet, theirs: &LabelledSet) -> Table {
     let names: BTreeSet<&String> = both.iter().flat_map(BTreeMap::keys).collect();
     let mut table = Table::new(["class", "dataset", "yours"]);
     for name in names {
-        let [ours, theirs] = both.each_ref().map(|shares| match shares.get(name) {
-            Some(share) => format!("{share:.1} %"),
-            None => "-".into(),
-        });
+        let [ours, theirs] = both.each_ref().map(|shares| percent(shares.get(name)));
         table.push([name.clone(), ours, theirs]);
     }
     table
 }
 
-/// Share of each class among the labels, percent.
-fn shares_by_class(set: &LabelledSet) -> BTreeMap<String, f64> {
+fn percent(share: Option<&f64>) -> String {
+    match share {
+        Some(share) => format!("{share:.1} %"),
+        None => "-".into(),
+    }
+}
+
+fn boxes_by_class(set: &LabelledSet) -> BTreeMap<String, f64> {
     let mut counts: BTreeMap<String, f64> = BTreeMap::new();
     for (class, _) in set.boxes() {
         *counts.entry(set.name(*class)).or_default() += 1.0;
     }
+    counts
+}
+
+/// Share of each class among the labels, percent.
+fn shares_by_class(set: &LabelledSet) -> BTreeMap<String, f64> {
+    let counts = boxes_by_class(set);
     let all = counts.values().sum::<f64>().max(1.0);
     counts
         .into_iter()
@@ -262,12 +275,7 @@ fn distances(measures: &[ComparedMeasure]) -> Table {
         "distance",
     ]);
     for measure in measures {
-        table.push([
-            measure.title.to_owned(),
-            quantiles(&measure.ours),
-            quantiles(&measure.theirs),
-            format!("{:.2}", measure.distance),
-        ]);
+        table.push(measure.row());
     }
     table
 }
@@ -298,18 +306,29 @@ fn compare_measures(ours: &LabelledSet, theirs: &LabelledSet) -> Vec<ComparedMea
     let pairs = measure(ours).into_iter().zip(measure(theirs));
     let mut measures: Vec<_> = pairs
         .filter(|((_, ours), (_, theirs))| !ours.is_empty() && !theirs.is_empty())
-        .map(|((title, ours), (_, theirs))| ComparedMeasure {
-            title,
-            distance: distance(ours.clone(), theirs.clone()),
-            ours,
-            theirs,
-        })
+        .map(|((title, ours), (_, theirs))| ComparedMeasure::new(title, ours, theirs))
         .collect();
     measures.sort_by(|a, b| b.distance.total_cmp(&a.distance));
     measures
 }
 
 impl ComparedMeasure {
+    fn new(title: &'static str, ours: Vec<f64>, theirs: Vec<f64>) -> Self {
+        Self {
+            title,
+            distance: distance(ours.clone(), theirs.clone()),
+            ours,
+            theirs,
+        }
+    }
+    fn row(&self) -> [String; 4] {
+        [
+            self.title.to_owned(),
+            quantiles(&self.ours),
+            quantiles(&self.theirs),
+            format!("{:.2}", self.distance),
+        ]
+    }
     /// Shares of each in bins of the same width: ours as bars, the others as steps.
     fn svg(&self) -> String {
         let [w, h] = FRAME;
@@ -358,26 +377,27 @@ fn share_y(share: f64, most: f64) -> f64 {
 }
 
 fn bars(shares: &[f64], most: f64) -> String {
+    let shares = shares.iter().enumerate();
+    shares.map(|(i, share)| bar(i, *share, most)).collect()
+}
+
+fn bar(bin: usize, share: f64, most: f64) -> String {
     let width = FRAME[0] / HISTOGRAM_BINS as f64 - 1.0;
-    let mut svg = String::new();
-    for (i, share) in shares.iter().enumerate() {
-        let (x, top) = (bin_x(i) + 0.5, share_y(*share, most));
-        let height = ROOM_ABOVE + FRAME[1] - top;
-        let _ = writeln!(
-            svg,
-            "<rect x=\"{x:.1}\" y=\"{top:.1}\" width=\"{width:.1}\" height=\"{height:.1}\" fill=\"{OURS}\" opacity=\"0.75\"/>"
-        );
-    }
-    svg
+    let (x, top) = (bin_x(bin) + 0.5, share_y(share, most));
+    let height = ROOM_ABOVE + FRAME[1] - top;
+    format!(
+        "<rect x=\"{x:.1}\" y=\"{top:.1}\" width=\"{width:.1}\" height=\"{height:.1}\" fill=\"{OURS}\" opacity=\"0.75\"/>\n"
+    )
+}
+
+fn step(bin: usize, share: f64, most: f64) -> String {
+    format!("V{:.1}H{:.1}", share_y(share, most), bin_x(bin + 1))
 }
 
 fn steps(shares: &[f64], most: f64) -> String {
     let line = ROOM_ABOVE + FRAME[1];
-    let steps: String = shares
-        .iter()
-        .enumerate()
-        .map(|(i, share)| format!("V{:.1}H{:.1}", share_y(*share, most), bin_x(i + 1)))
-        .collect();
+    let shares = shares.iter().enumerate();
+    let steps: String = shares.map(|(i, share)| step(i, *share, most)).collect();
     format!(
         "<path d=\"M{ROOM_LEFT} {line}{steps}V{line}\" fill=\"none\" stroke=\"{THEIRS}\" stroke-width=\"2\"/>\n"
     )
@@ -386,10 +406,14 @@ fn steps(shares: &[f64], most: f64) -> String {
 fn shares(values: &[f64], low: f64, high: f64) -> [f64; HISTOGRAM_BINS] {
     let mut shares = [0.0; HISTOGRAM_BINS];
     for value in values {
-        let place = (value - low) / (high - low) * HISTOGRAM_BINS as f64;
-        shares[(place.max(0.0) as usize).min(HISTOGRAM_BINS - 1)] += 1.0 / values.len() as f64;
+        shares[bin_of(*value, low, high)] += 1.0 / values.len() as f64;
     }
     shares
+}
+
+fn bin_of(value: f64, low: f64, high: f64) -> usize {
+    let place = (value - low) / (high - low) * HISTOGRAM_BINS as f64;
+    (place.max(0.0) as usize).min(HISTOGRAM_BINS - 1)
 }
 
 /// Greatest distance of two empirical distribution functions.

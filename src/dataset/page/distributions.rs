@@ -92,6 +92,11 @@ pub(super) fn extremes<'a>(values: impl IntoIterator<Item = &'a f64>) -> [f64; 2
     let [low, high] = values
         .into_iter()
         .fold([f64::INFINITY, f64::NEG_INFINITY], widened);
+    with_room([low, high])
+}
+
+/// A range of one value is widened, so that it has bins.
+fn with_room([low, high]: [f64; 2]) -> [f64; 2] {
     if low < high {
         [low, high]
     } else {
@@ -148,12 +153,18 @@ fn add_heat_maps(page: &mut Page, summary: &Summary) {
     let set = LabelledSet::from_summary(Path::new(""), summary);
     let mut maps = heat_map("centres of all labels", &set.centres());
     if summary.classes.len() > 1 {
-        for (class, name) in (0..).zip(&summary.classes).take(MAX_CLASS_MAPS) {
-            let title = format!("centres of {}", gallery::clipped(name, 30));
-            maps += &heat_map(&title, &set.centres_of(class));
-        }
+        maps += &class_maps(&summary.classes, &set);
     }
     page.html(&format!("<div class=\"histograms\">\n{maps}</div>\n"));
+}
+
+fn class_maps(classes: &[String], set: &LabelledSet) -> String {
+    let classes = (0..).zip(classes).take(MAX_CLASS_MAPS);
+    let maps = classes.map(|(class, name)| {
+        let title = format!("centres of {}", gallery::clipped(name, 30));
+        heat_map(&title, &set.centres_of(class))
+    });
+    maps.collect()
 }
 
 /// Adds charts beside each other.

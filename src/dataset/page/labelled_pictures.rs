@@ -6,6 +6,7 @@ use crate::eval::{self, GroundTruth};
 use crate::geom::BBox;
 use crate::io;
 use rayon::prelude::*;
+use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
@@ -29,6 +30,12 @@ pub(super) struct LabelledPicture {
     pub(super) path: PathBuf,
     /// None for a picture without a label file.
     pub(super) boxes: Option<Vec<ShareBox>>,
+}
+
+impl LabelledPicture {
+    pub(super) fn file_name(&self) -> Cow<'_, str> {
+        self.path.file_name().unwrap_or_default().to_string_lossy()
+    }
 }
 
 impl LabelledSet {
@@ -94,14 +101,8 @@ impl LabelledSet {
 
 impl LabelledPicture {
     fn read(path: PathBuf) -> Result<Self> {
-        let candidates = [YoloSet::label_of(&path), path.with_extension("txt")];
-        let Some(label) = candidates.iter().find(|label| label.is_file()) else {
-            return Ok(Self { path, boxes: None });
-        };
-        // In a picture of one pixel, pixels are shares.
-        let image = eval::yolo_sheet(&io::read_text(label)?, "", [1, 1])
-            .map_err(|what| Error::file(label, what))?;
-        let boxes = Some(image.truth.iter().map(share_box).collect());
+        let label = label_beside(&path);
+        let boxes = label.map(|label| read_boxes(&label)).transpose()?;
         Ok(Self { path, boxes })
     }
 
@@ -114,6 +115,19 @@ impl LabelledPicture {
             boxes: Some(boxes.collect()),
         }
     }
+}
+
+/// The label file of an image: that of a YOLO dataset, or one of its name in the same folder.
+fn label_beside(image: &Path) -> Option<PathBuf> {
+    let mut candidates = [YoloSet::label_of(image), image.with_extension("txt")].into_iter();
+    candidates.find(|label| label.is_file())
+}
+
+fn read_boxes(label: &Path) -> Result<Vec<ShareBox>> {
+    // In a picture of one pixel, pixels are shares.
+    let image = eval::yolo_sheet(&io::read_text(label)?, "", [1, 1])
+        .map_err(|what| Error::file(label, what))?;
+    Ok(image.truth.iter().map(share_box).collect())
 }
 
 fn share_box(truth: &GroundTruth) -> ShareBox {
@@ -138,12 +152,17 @@ fn collect_images(
         } else if path.is_file() && is_image(&path) {
             images.push(path);
         }
-        if images.len() > MAX_IMAGES {
-            let what = format!("more than {MAX_IMAGES} images, expected fewer");
-            return Err(Error::file(folder, what));
-        }
+        check_image_count(images.len(), folder)?;
     }
     Ok(())
+}
+
+fn check_image_count(count: usize, folder: &Path) -> Result<()> {
+    if count <= MAX_IMAGES {
+        return Ok(());
+    }
+    let what = format!("more than {MAX_IMAGES} images, expected fewer");
+    Err(Error::file(folder, what))
 }
 
 /// Classes and images of a YOLO dataset, or all images below a folder.
@@ -153,10 +172,14 @@ fn listed_images(folder: &Path) -> Result<(Vec<String>, Vec<PathBuf>)> {
         let images = listing.series();
         return Ok((listing.classes, images));
     }
+    Ok((Vec::new(), images_below(folder)?))
+}
+
+fn images_below(folder: &Path) -> Result<Vec<PathBuf>> {
     let mut images = Vec::new();
     collect_images(folder, &mut BTreeSet::new(), &mut images)?;
     images.sort();
-    Ok((Vec::new(), images))
+    Ok(images)
 }
 
 /// Centre and sides of a box as shares of its picture.

@@ -9,6 +9,7 @@ mod outlier;
 mod samples;
 
 use crate::dataset::Summary;
+use crate::dataset::counts::sum_by_part;
 use crate::draw::class_color;
 use crate::error::Result;
 use crate::label::gallery;
@@ -43,10 +44,7 @@ impl Default for DatasetReportOptions {
 /// As [`Summary::read`]; a picture that cannot be read; a folder beside it without images.
 pub fn page(folder: &Path, options: &DatasetReportOptions) -> Result<Page> {
     let summary = Summary::read(folder)?;
-    let mut page = Page::new(title(folder));
-    page.table(&facts(&summary))
-        .html(gallery::STYLE)
-        .html(samples::SAMPLES_STYLE);
+    let mut page = begin_page(folder, &summary);
     samples::add_samples(&mut page, &summary, folder, options.most)?;
     let page_folder = options.page.as_deref().unwrap_or(folder);
     all_pictures::add_all(&mut page, folder, &summary, page_folder);
@@ -57,6 +55,14 @@ pub fn page(folder: &Path, options: &DatasetReportOptions) -> Result<Page> {
     }
     add_statistics(&mut page, &summary);
     Ok(page)
+}
+
+fn begin_page(folder: &Path, summary: &Summary) -> Page {
+    let mut page = Page::new(title(folder));
+    page.table(&facts(summary))
+        .html(gallery::STYLE)
+        .html(samples::SAMPLES_STYLE);
+    page
 }
 
 /// Everything that is not about single pictures.
@@ -82,10 +88,14 @@ fn title(folder: &Path) -> String {
     format!("Dataset {name}")
 }
 
+fn escaped_document(document: &serde_json::Value) -> String {
+    let text = serde_json::to_string_pretty(document).unwrap_or_default();
+    text.lines().map(|line| escaped(line) + "\n").collect()
+}
+
 /// Adds what the dataset was made from.
 fn add_identity(page: &mut Page, summary: &Summary) {
-    let recipe = serde_json::to_string_pretty(&summary.identity).unwrap_or_default();
-    let recipe: String = recipe.lines().map(|line| escaped(line) + "\n").collect();
+    let recipe = escaped_document(&summary.identity);
     page.heading("Made from").html(&format!(
         "<details><summary>dataset.json</summary><pre>{recipe}</pre></details>\n"
     ));
@@ -115,8 +125,7 @@ fn identity_text(summary: &Summary, name: &str) -> String {
 
 /// Objects of all classes, and how many of them have a label.
 fn object_counts(summary: &Summary) -> [u64; 2] {
-    let counts = summary.balance.iter().flatten();
-    counts.fold([0; 2], |sums, counts| [0, 1].map(|i| sums[i] + counts[i]))
+    sum_by_part(summary.balance.iter().flatten().copied())
 }
 
 fn balance(summary: &Summary) -> Table {
@@ -145,6 +154,10 @@ fn add_background_notes(page: &mut Page, summary: &Summary) {
     let Some(notes) = notes.filter(|notes| !notes.is_empty()) else {
         return;
     };
+    page.heading("Backgrounds").table(&background_notes(notes));
+}
+
+fn background_notes(notes: &serde_json::Map<String, serde_json::Value>) -> Table {
     let mut table = Table::new(["background", "what to look at"]);
     for (name, texts) in notes {
         let texts = texts.as_array().into_iter().flatten();
@@ -152,7 +165,7 @@ fn add_background_notes(page: &mut Page, summary: &Summary) {
             table.push([name, text]);
         }
     }
-    page.heading("Backgrounds").table(&table);
+    table
 }
 
 fn add_rejected(page: &mut Page, summary: &Summary) {
@@ -161,16 +174,19 @@ fn add_rejected(page: &mut Page, summary: &Summary) {
         page.text("None.");
         return;
     }
-    let mut table = Table::new(["image", "why"]);
-    summary
-        .rejected
-        .iter()
-        .for_each(|(k, why)| table.push([format!("{k:06}"), why.clone()]));
     page.text(&format!(
         "{} scenes did not come to rest and were resampled.",
         summary.rejected.len()
     ))
-    .table(&table);
+    .table(&rejected_scenes(summary));
+}
+
+fn rejected_scenes(summary: &Summary) -> Table {
+    let mut table = Table::new(["image", "why"]);
+    for (k, why) in &summary.rejected {
+        table.push([format!("{k:06}"), why.clone()]);
+    }
+    table
 }
 
 fn times(summary: &Summary) -> Table {

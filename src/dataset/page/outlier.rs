@@ -36,6 +36,12 @@ const SIGMA_PER_MEAN_DEVIATION: f64 = 1.2533;
 /// The modified z-score of Iglewicz and Hoaglin: distance from the median over the median absolute deviation, or over the
 /// mean one where most values are the same.
 pub(crate) fn outliers(features: &[Feature<'_>]) -> Vec<Outlier> {
+    let mut all: Vec<Outlier> = worst_by_row(features).into_values().collect();
+    all.sort_by(|a, b| b.deviations.total_cmp(&a.deviations));
+    all
+}
+
+fn worst_by_row(features: &[Feature<'_>]) -> BTreeMap<usize, Outlier> {
     let mut worst: BTreeMap<usize, Outlier> = BTreeMap::new();
     for outlier in features.iter().flat_map(Feature::outliers) {
         let known = worst.get(&outlier.row);
@@ -43,9 +49,7 @@ pub(crate) fn outliers(features: &[Feature<'_>]) -> Vec<Outlier> {
             worst.insert(outlier.row, outlier);
         }
     }
-    let mut all: Vec<Outlier> = worst.into_values().collect();
-    all.sort_by(|a, b| b.deviations.total_cmp(&a.deviations));
-    all
+    worst
 }
 
 impl Feature<'_> {

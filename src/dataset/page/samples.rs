@@ -40,25 +40,35 @@ pub(super) fn add_samples(
     folder: &std::path::Path,
     count: usize,
 ) -> Result<()> {
+    add_controls(page, summary);
+    let selected = select_samples(&summary.glances, count);
+    page.text(&describe_selection(&selected, summary.glances.len()));
+    let figures: Vec<Figure> = selected
+        .par_iter()
+        .map(|sample| sample_figure(summary, folder, sample))
+        .collect::<Result<_>>()?;
+    page.html("<div class=\"samples\">\n")
+        .html(&gallery("picture", &figures))
+        .html("</div>\n</div>\n");
+    Ok(())
+}
+
+fn add_controls(page: &mut Page, summary: &Summary) {
     page.heading("Pictures")
         .html(&legend(summary))
         .html("<div>\n");
     for switch in SWITCHES {
         page.html(&switch_html(switch));
     }
-    let selected = select_samples(&summary.glances, count);
-    page.text(&describe_selection(&selected, summary.glances.len()));
-    let figures: Vec<Figure> = selected
-        .par_iter()
-        .map(|sample| {
-            let shown = summary.shown(folder, sample.row)?;
-            figure(&shown, &summary.classes, sample.why.as_deref())
-        })
-        .collect::<Result<_>>()?;
-    page.html("<div class=\"samples\">\n")
-        .html(&gallery("picture", &figures))
-        .html("</div>\n</div>\n");
-    Ok(())
+}
+
+fn sample_figure(
+    summary: &Summary,
+    folder: &std::path::Path,
+    sample: &SelectedSample,
+) -> Result<Figure> {
+    let shown = summary.shown(folder, sample.row)?;
+    figure(&shown, &summary.classes, sample.why.as_deref())
 }
 
 fn switch_html((id, text, on): (&str, &str, bool)) -> String {
@@ -67,24 +77,30 @@ fn switch_html((id, text, on): (&str, &str, bool)) -> String {
 }
 
 fn describe_selection(selected: &[SelectedSample], all: usize) -> String {
-    let outliers = selected.iter().filter(|sample| sample.why.is_some());
-    let (count, outliers) = (selected.len(), outliers.count());
+    let (count, outliers) = (selected.len(), count_outliers(selected));
     format!(
         "{count} of {all} pictures: first {outliers} that are unlike the others, with what sets them apart, then others evenly \
          spread. Click one to enlarge it; Escape and the arrow keys work too."
     )
 }
 
+fn count_outliers(selected: &[SelectedSample]) -> usize {
+    let outliers = selected.iter().filter(|sample| sample.why.is_some());
+    outliers.count()
+}
+
 /// Colours of the classes and kinds of lines.
 fn legend(summary: &Summary) -> String {
-    let classes: String = (0..)
-        .zip(&summary.classes)
+    let classes = class_keys(&summary.classes);
+    let unlabelled = legend_key(UNLABELLED, "outline of an object without a label");
+    format!("<p>{classes}{unlabelled}</p>\n")
+}
+
+fn class_keys(classes: &[String]) -> String {
+    let classes = (0..).zip(classes);
+    classes
         .map(|(class, name)| legend_key(&color_of(class), name))
-        .collect();
-    format!(
-        "<p>{classes}{}</p>\n",
-        legend_key(UNLABELLED, "outline of an object without a label")
-    )
+        .collect()
 }
 
 fn legend_key(fill: &str, text: &str) -> String {
@@ -181,12 +197,16 @@ fn figure(shown: &ShownSample, classes: &[String], why: Option<&str>) -> Result<
 
 fn figure_caption(record: &SampleRecord, why: Option<&str>) -> String {
     let (index, part, objects) = (record.index, record.part.name(), &record.labels.objects);
-    let labelled = objects
-        .iter()
-        .filter(|object| UnlabelledReason::of(object, record).is_none());
-    let (labelled, all) = (labelled.count(), objects.len());
+    let (labelled, all) = (count_labelled(record), objects.len());
     let why = why.map_or(String::new(), |why| format!("; {why}"));
     format!("{index:06} {part}: {labelled} of {all} objects labelled{why}")
+}
+
+fn count_labelled(record: &SampleRecord) -> usize {
+    let objects = record.labels.objects.iter();
+    objects
+        .filter(|object| UnlabelledReason::of(object, record).is_none())
+        .count()
 }
 
 fn box_of(object: &ObjectLabel, classes: &[String], letter: f64) -> String {
@@ -198,23 +218,30 @@ fn box_of(object: &ObjectLabel, classes: &[String], letter: f64) -> String {
         "<rect x=\"{x0}\" y=\"{y0}\" width=\"{width}\" height=\"{height}\" fill=\"none\" pointer-events=\"all\" \
          stroke=\"{color}\" stroke-width=\"2\"><title>{id} {}: {:.0} % seen</title></rect>",
         escaped(&name),
-        100.0 * object.visible_fraction
+        percent_seen(object)
     );
     rectangle + &gallery::words([x0, y0 + letter], &format!("{id} {name}"), letter, "#222")
 }
 
 fn mask_of(object: &ObjectLabel) -> String {
-    let mut path = String::new();
-    for polygon in trace::polygons(&object.visible_mask, 0.0) {
-        for (i, p) in polygon.iter().enumerate() {
-            let _ = write!(path, "{}{} {}", if i == 0 { "M" } else { "L" }, p.x, p.y);
-        }
-        path.push('z');
-    }
+    let polygons = trace::polygons(&object.visible_mask, 0.0);
+    let path: String = polygons.iter().map(|polygon| svg_path(polygon)).collect();
     format!(
         "<path d=\"{path}\" fill=\"{}\" fill-opacity=\"0.45\"/>",
         color_of(object.class)
     )
+}
+
+fn svg_path(polygon: &[Point2<f64>]) -> String {
+    let mut path = String::new();
+    for (i, p) in polygon.iter().enumerate() {
+        let _ = write!(path, "{}{} {}", if i == 0 { "M" } else { "L" }, p.x, p.y);
+    }
+    path + "z"
+}
+
+fn percent_seen(object: &ObjectLabel) -> f64 {
+    100.0 * object.visible_fraction
 }
 
 /// An outline with the reason why it has no label.
@@ -229,16 +256,9 @@ fn outline_of(
     }
     let why = why_unlabelled(object, reason);
     let id = object.id.0;
-    let title = format!(
-        "{id} {}: no label, {why}; {:.0} % seen",
-        class_name(object.class, classes),
-        100.0 * object.visible_fraction
-    );
-    let rings: String = object
-        .outline_px
-        .iter()
-        .map(|ring| titled_polygon(ring, &escaped(&title)))
-        .collect();
+    let (name, seen) = (class_name(object.class, classes), percent_seen(object));
+    let title = format!("{id} {name}: no label, {why}; {seen:.0} % seen");
+    let rings = titled_rings(object, &escaped(&title));
     let center = object.amodal_box.center();
     let at = [center.x - 2.0 * letter, center.y];
     rings + &gallery::words(at, &format!("{id} {why}"), 0.7 * letter, "#555")
@@ -248,13 +268,26 @@ fn why_unlabelled(object: &ObjectLabel, reason: UnlabelledReason) -> String {
     if reason != UnlabelledReason::Covered {
         return reason.description().to_owned();
     }
-    let above = object.covered_by.iter().map(|id| id.0.to_string());
-    format!("under {}", above.collect::<Vec<_>>().join(", "))
+    format!("under {}", ids_above(object).join(", "))
+}
+
+fn ids_above(object: &ObjectLabel) -> Vec<String> {
+    let above = object.covered_by.iter();
+    above.map(|id| id.0.to_string()).collect()
+}
+
+fn svg_points(ring: &[Point2<f64>]) -> String {
+    let points = ring.iter().map(|p| format!("{:.1},{:.1}", p.x, p.y));
+    points.collect::<Vec<_>>().join(" ")
+}
+
+fn titled_rings(object: &ObjectLabel, title: &str) -> String {
+    let rings = object.outline_px.iter();
+    rings.map(|ring| titled_polygon(ring, title)).collect()
 }
 
 fn titled_polygon(ring: &[Point2<f64>], title: &str) -> String {
-    let points = ring.iter().map(|p| format!("{:.1},{:.1}", p.x, p.y));
-    let points = points.collect::<Vec<_>>().join(" ");
+    let points = svg_points(ring);
     format!(
         "<polygon points=\"{points}\" fill=\"none\" pointer-events=\"all\" stroke=\"{UNLABELLED}\" stroke-width=\"1.5\">\
          <title>{title}</title></polygon>"

@@ -1,7 +1,7 @@
 //! Files with which the paper's experiments run in YOLOv5 and Ultralytics.
 
 use super::{Balance, Updates, batches_per_epoch};
-use crate::dataset::YoloSet;
+use crate::dataset::{YoloSet, yaml_names};
 use crate::error::{Error, Result};
 use crate::io;
 use std::path::{Path, PathBuf};
@@ -95,12 +95,13 @@ pub fn write(folder: &Path, options: &KitOptions) -> Result<()> {
     write_lists(folder, &real, &synthetic)?;
     write_variants(folder, &real.classes)?;
     io::write_json(folder.join("balance.json"), &balance)?;
+    write_scripts(folder, &training_commands(options, counts))
+}
+
+fn write_scripts(folder: &Path, commands: &str) -> Result<()> {
     io::write_text(folder.join("hyp.yaml"), HYP_YAML)?;
     io::write_text(folder.join("balanced.py"), BALANCED_PY)?;
-    io::write_text(
-        folder.join("commands.sh"),
-        &training_commands(options, counts),
-    )
+    io::write_text(folder.join("commands.sh"), commands)
 }
 
 fn write_variants(folder: &Path, classes: &[String]) -> Result<()> {
@@ -137,13 +138,9 @@ fn check_classes(real: &YoloSet, synthetic: &YoloSet, options: &KitOptions) -> R
     if real.classes == synthetic.classes {
         return Ok(());
     }
-    let what = format!(
-        "{:?} in {}, expected {:?} as in {}",
-        synthetic.classes,
-        options.synthetic.display(),
-        real.classes,
-        options.real.display()
-    );
+    let (real_folder, folder) = (options.real.display(), options.synthetic.display());
+    let (found, expected) = (&synthetic.classes, &real.classes);
+    let what = format!("{found:?} in {folder}, expected {expected:?} as in {real_folder}");
     Err(Error::value("classes", what))
 }
 
@@ -163,12 +160,7 @@ fn open_set(folder: &Path) -> Result<YoloSet> {
 impl Variant {
     fn to_yaml(&self, classes: &[String]) -> String {
         let (count, train, val) = (classes.len(), yaml_list(self.train), yaml_list(self.val));
-        // A JSON string is a YAML string, whatever is in it.
-        let names = classes.iter().map(|name| serde_json::Value::from(&**name));
-        let names = names
-            .enumerate()
-            .map(|(i, name)| format!("  {i}: {name}\n"));
-        let names: String = names.collect();
+        let names = yaml_names(classes);
         format!(
             "# `path` is this folder; start the training in it.\npath: .\ntrain:\n{train}val:\n{val}nc: {count}\nnames:\n{names}"
         )

@@ -29,16 +29,22 @@ enum CameraFormat {
 }
 
 pub(super) fn export_cameras(args: &ExportCameraArgs) -> anyhow::Result<()> {
-    let files: petcomp::Result<Vec<CameraFile>> = args.cameras.iter().map(io::read_json).collect();
-    let (files, output) = (files?, args.output.as_deref());
+    let (files, output) = (args.read_cameras()?, args.output.as_deref());
     match args.to {
         CameraFormat::Colmap => write_colmap(output, &files),
         CameraFormat::Blender => write_or_print(output, &only_camera(&files)?.to_blender_script()),
-        CameraFormat::Opencv => {
-            let camera = only_camera(&files)?.to_opencv();
-            write_or_print(output, &(serde_json::to_string_pretty(&camera)? + "\n"))
-        }
+        CameraFormat::Opencv => write_or_print(output, &opencv_document(only_camera(&files)?)?),
     }
+}
+
+impl ExportCameraArgs {
+    fn read_cameras(&self) -> petcomp::Result<Vec<CameraFile>> {
+        self.cameras.iter().map(io::read_json).collect()
+    }
+}
+
+fn opencv_document(camera: Camera) -> serde_json::Result<String> {
+    Ok(serde_json::to_string_pretty(&camera.to_opencv())? + "\n")
 }
 
 fn write_or_print(output: Option<&Path>, text: &str) -> anyhow::Result<()> {
@@ -59,11 +65,14 @@ fn only_camera(files: &[CameraFile]) -> anyhow::Result<Camera> {
 fn write_colmap(folder: Option<&Path>, files: &[CameraFile]) -> anyhow::Result<()> {
     let folder = folder
         .ok_or_else(|| anyhow::anyhow!("-o: missing, expected a folder for COLMAP's files"))?;
-    let model = colmap_model(files);
+    Ok(write_model(folder, &colmap_model(files))?)
+}
+
+fn write_model(folder: &Path, model: &ColmapModel) -> petcomp::Result<()> {
     io::create_folder(folder)?;
     io::write_text(folder.join("cameras.txt"), &model.cameras)?;
     io::write_text(folder.join("images.txt"), &model.images)?;
-    Ok(io::write_text(folder.join("points3D.txt"), &model.points)?)
+    io::write_text(folder.join("points3D.txt"), &model.points)
 }
 
 fn colmap_model(files: &[CameraFile]) -> ColmapModel {

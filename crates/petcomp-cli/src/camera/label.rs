@@ -44,10 +44,7 @@ pub(crate) struct MarkersArgs {
 pub(super) fn init_label(args: &InitLabelArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     let path = args.output_path();
     let shown = path.display();
-    anyhow::ensure!(
-        args.force || !path.exists(),
-        "{shown}: is there already, and --force is not given"
-    );
+    args.check_is_free(&path)?;
     let known = args.known_label(&path)?;
     let label = args.with_markers(known.clone())?;
     io::write_text(&path, &camera::commented(&label)?)?;
@@ -66,6 +63,15 @@ impl InitLabelArgs {
             let name = format!("{}.label.json", stem_of(&self.photo));
             self.photo.with_file_name(name)
         })
+    }
+
+    fn check_is_free(&self, path: &Path) -> anyhow::Result<()> {
+        anyhow::ensure!(
+            self.force || !path.exists(),
+            "{}: is there already, and --force is not given",
+            path.display()
+        );
+        Ok(())
     }
 
     /// What is known without looking at the photo's pixels.

@@ -34,9 +34,7 @@ pub(crate) struct RectifyArgs {
 pub(super) fn write_view(args: &RectifyArgs) -> anyhow::Result<()> {
     let labelled = read_only(&args.label, args.size)?;
     let solution = accepted(solved(&labelled)?, &labelled, args.force)?;
-    let header = io::read_header(&args.photo)?;
-    let size = [header.width as u32, header.height as u32];
-    let camera = solution.camera.resized(size);
+    let camera = solution.camera.resized(args.photo_size()?);
     match &args.back {
         Some(picture) => args.write_projected(picture, &camera, &solution),
         None => args.write_top_view(&camera, &solution),
@@ -44,6 +42,11 @@ pub(super) fn write_view(args: &RectifyArgs) -> anyhow::Result<()> {
 }
 
 impl RectifyArgs {
+    fn photo_size(&self) -> petcomp::Result<[u32; 2]> {
+        let header = io::read_header(&self.photo)?;
+        Ok([header.width as u32, header.height as u32])
+    }
+
     fn write_projected(
         &self,
         picture: &Path,

@@ -5,7 +5,7 @@ use crate::diagnostics::report_diagnostics;
 use crate::global::GlobalArgs;
 use crate::print;
 use crate::values::parse_metres;
-use petcomp::camera::{self, CameraFile, Label, LabelledPhoto};
+use petcomp::camera::{self, Camera, CameraFile, Label, LabelledPhoto};
 use petcomp::camera::{Solution, SolveError, SolveOptions};
 use petcomp::{Error, Image, LinearRgb, io};
 use std::path::{Path, PathBuf};
@@ -70,12 +70,20 @@ impl LabelFileArgs {
     }
 }
 
+impl SolveArgs {
+    /// One file can hold one camera only.
+    fn check_output(&self) -> anyhow::Result<()> {
+        if self.output.is_some() {
+            let count = self.labels.read_all()?.len();
+            anyhow::ensure!(count == 1, "-o: {count} labels, expected one");
+        }
+        Ok(())
+    }
+}
+
 /// Solves each label alone.
 pub(super) fn solve_each(args: &SolveArgs, global: &GlobalArgs) -> anyhow::Result<()> {
-    if args.output.is_some() {
-        let count = args.labels.read_all()?.len();
-        anyhow::ensure!(count == 1, "-o: {count} labels, expected one");
-    }
+    args.check_output()?;
     args.labels.for_each(|labelled| {
         let solution = accepted(solved(labelled)?, labelled, args.force)?;
         let file = CameraFile::new(&labelled.label, &solution);
@@ -133,13 +141,23 @@ fn accept_member(
     global: &GlobalArgs,
 ) -> anyhow::Result<()> {
     let solution = accepted(outcome.map_err(|e| located(e, member))?, member, force)?;
-    let mut file = CameraFile::new(&member.label, &solution);
-    if let Some(from) = file.solved_from.as_mut().filter(|_| all.len() > 1) {
-        from.together = camera::label_checksums(all);
-    }
+    let file = joint_camera_file(member, &solution, all);
     write_camera(&member.beside("camera.json"), member, &file, &solution)?;
     report_solution(member, &solution, global);
     Ok(())
+}
+
+/// The camera of a photo, with the checksums of those that it was solved together with.
+fn joint_camera_file(
+    member: &LabelledPhoto,
+    solution: &Solution,
+    all: &[LabelledPhoto],
+) -> CameraFile {
+    let mut file = CameraFile::new(&member.label, solution);
+    if let Some(from) = file.solved_from.as_mut().filter(|_| all.len() > 1) {
+        from.together = camera::label_checksums(all);
+    }
+    file
 }
 
 /// Says in plain words how well each camera is known.
@@ -154,9 +172,13 @@ pub(super) fn explain_each(args: &LabelFileArgs) -> anyhow::Result<()> {
     })
 }
 
+fn solve_label(labelled: &LabelledPhoto) -> petcomp::Result<Solution> {
+    let solution = camera::solve(&labelled.label, &SolveOptions::default());
+    solution.map_err(|e| located(e, labelled))
+}
+
 pub(super) fn solved(labelled: &LabelledPhoto) -> petcomp::Result<Solution> {
-    let solution = camera::solve(&labelled.label, &SolveOptions::default())
-        .map_err(|e| located(e, labelled))?;
+    let solution = solve_label(labelled)?;
     camera::check_distance(&solution.camera).map_err(|e| e.in_file(&labelled.source))?;
     Ok(solution)
 }
@@ -168,12 +190,14 @@ pub(super) fn accepted(
     force: bool,
 ) -> petcomp::Result<Solution> {
     match solution.misfit() {
-        Some(error) if !force => {
-            let what = format!("{error}; --force accepts it nevertheless");
-            Err(Error::file(&labelled.source, what))
-        }
+        Some(error) if !force => Err(needs_force(&labelled.source, &error)),
         _ => Ok(solution),
     }
+}
+
+fn needs_force(label: &Path, misfit: &SolveError) -> Error {
+    let what = format!("{misfit}; --force accepts it nevertheless");
+    Error::file(label, what)
 }
 
 fn located(error: SolveError, labelled: &LabelledPhoto) -> Error {
@@ -189,30 +213,40 @@ fn write_camera(
 ) -> petcomp::Result<()> {
     io::write_json(target, file)?;
     if let Some(photo) = labelled.photo() {
-        let photo: Image<LinearRgb> = io::read(photo)?;
-        io::write(overlay_beside(target), &camera::overlay(&photo, solution))?;
+        write_overlay(target, &photo, solution)?;
     }
     Ok(())
+}
+
+fn write_overlay(camera: &Path, photo: &Path, solution: &Solution) -> petcomp::Result<()> {
+    let photo: Image<LinearRgb> = io::read(photo)?;
+    io::write(overlay_beside(camera), &camera::overlay(&photo, solution))
 }
 
 /// `bg.overlay.png` of `bg.camera.json`.
 fn overlay_beside(camera: &Path) -> PathBuf {
     let name = camera.file_name().unwrap_or_default().to_string_lossy();
-    let stem = name.strip_suffix(".json").unwrap_or(&name);
-    let stem = stem.strip_suffix(".camera").unwrap_or(stem);
-    camera.with_file_name(format!("{stem}.overlay.png"))
+    camera.with_file_name(format!("{}.overlay.png", camera_stem(&name)))
+}
+
+fn camera_stem(name: &str) -> &str {
+    let stem = name.strip_suffix(".json").unwrap_or(name);
+    stem.strip_suffix(".camera").unwrap_or(stem)
 }
 
 fn report_solution(labelled: &LabelledPhoto, solution: &Solution, global: &GlobalArgs) {
-    let camera = &solution.camera;
     global.print_status(format_args!(
-        "{labelled}: tilt {:.1} deg, height {:.3} m, {}, {}",
-        camera.tilt().to_degrees(),
-        camera.center().z,
+        "{labelled}: {}, {}, {}",
+        describe_view(&solution.camera),
         describe_focal(solution),
         describe_errors(solution)
     ));
     report_diagnostics(labelled, &solution.warnings);
+}
+
+fn describe_view(camera: &Camera) -> String {
+    let (tilt, height) = (camera.tilt().to_degrees(), camera.center().z);
+    format!("tilt {tilt:.1} deg, height {height:.3} m")
 }
 
 fn describe_focal(solution: &Solution) -> String {

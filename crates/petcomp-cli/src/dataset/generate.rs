@@ -1,13 +1,15 @@
 //! `petcomp dataset generate`: a recipe becomes images with labels.
 
-use super::{LongRunConsent, generate_supervised, print_counts, print_trainer_inputs};
+use super::{
+    LongRunConsent, generate_supervised, print_counts, print_trainer_inputs, write_contact_sheet,
+};
 use crate::documents::{RecipeArgs, at_quality};
 use crate::global::GlobalArgs;
 use crate::interruption::interruption;
 use crate::print;
+use petcomp::Quality;
 use petcomp::dataset::{self, DatasetConfig, Pipeline, Plan};
-use petcomp::dataset::{SampleRange, ShardChoice, contact_sheet_of};
-use petcomp::{Quality, io};
+use petcomp::dataset::{SampleRange, ShardChoice};
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
@@ -95,12 +97,10 @@ impl GenerateArgs {
     }
 
     fn sample_range(&self) -> petcomp::Result<SampleRange> {
-        let whole = self.only.map_or(SampleRange::All, SampleRange::One);
-        let Some(choice) = self.shard else {
-            return Ok(whole);
-        };
-        let shard = choice.within(|name| std::env::var(name).ok());
-        shard.map(SampleRange::Shard)
+        match self.shard {
+            Some(choice) => shard_range(choice),
+            None => Ok(self.only.map_or(SampleRange::All, SampleRange::One)),
+        }
     }
 
     /// A shard has a folder of its own.
@@ -121,10 +121,14 @@ fn repair_folder(folder: &Path) -> petcomp::Result<()> {
     Ok(())
 }
 
+fn shard_range(choice: ShardChoice) -> petcomp::Result<SampleRange> {
+    let shard = choice.within(|name| std::env::var(name).ok());
+    shard.map(SampleRange::Shard)
+}
+
 fn write_preview_sheet(folder: &Path, count: u64) -> petcomp::Result<()> {
     let path = folder.join("sheet.png");
-    let sheet = contact_sheet_of(folder, count as usize, &Default::default())?;
-    io::write(&path, &sheet)?;
+    write_contact_sheet(folder, count as usize, &path)?;
     print::line(format_args!("look at      {}", path.display()));
     Ok(())
 }

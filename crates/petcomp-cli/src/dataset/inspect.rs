@@ -72,10 +72,17 @@ fn check_dataset(args: &CheckArgs, global: &GlobalArgs) -> anyhow::Result<()> {
         global.print_status(located(&folder, note));
     }
     print_findings(&checked, &args.folder)?;
-    if args.strict && !notes.is_empty() {
-        return Err(NeedsReview(format!("{folder}: {} notes", notes.len())).into());
+    args.check_note_count(notes.len())
+}
+
+impl CheckArgs {
+    fn check_note_count(&self, count: usize) -> anyhow::Result<()> {
+        if self.strict && count > 0 {
+            let folder = self.folder.display();
+            return Err(NeedsReview(format!("{folder}: {count} notes")).into());
+        }
+        Ok(())
     }
-    Ok(())
 }
 
 /// Prints what is wrong, which is an error, or how much was checked.
@@ -90,6 +97,11 @@ fn print_findings(checked: &Checked, folder: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
+fn page_folder(page: &Path) -> &Path {
+    let folder = page.parent().filter(|path| *path != Path::new(""));
+    folder.unwrap_or(Path::new("."))
+}
+
 fn write_report(args: &ReportArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     let output = args.page_path();
     let page = dataset::page::page(&args.folder, &args.options_for(&output))?;
@@ -100,10 +112,9 @@ fn write_report(args: &ReportArgs, global: &GlobalArgs) -> anyhow::Result<()> {
 
 impl ReportArgs {
     fn options_for(&self, page: &Path) -> DatasetReportOptions {
-        let folder = page.parent().filter(|path| *path != Path::new(""));
         DatasetReportOptions {
             most: self.most,
-            page: Some(folder.unwrap_or(Path::new(".")).into()),
+            page: Some(page_folder(page).into()),
             beside: self.beside.clone(),
         }
     }
@@ -116,9 +127,20 @@ impl ReportArgs {
     }
 }
 
+/// Draws the first pictures of a dataset.
+pub(crate) fn write_contact_sheet(
+    dataset: &Path,
+    count: usize,
+    output: &Path,
+) -> petcomp::Result<()> {
+    io::write(
+        output,
+        &contact_sheet_of(dataset, count, &Default::default())?,
+    )
+}
+
 fn write_sheet(args: &SheetArgs, global: &GlobalArgs) -> anyhow::Result<()> {
-    let sheet = contact_sheet_of(&args.folder, args.most, &Default::default())?;
-    io::write(&args.output, &sheet)?;
+    write_contact_sheet(&args.folder, args.most, &args.output)?;
     global.print_status(args.output.display());
     Ok(())
 }

@@ -12,6 +12,7 @@ mod training;
 
 use counts::print_trainer_inputs;
 pub(crate) use counts::{print_counts, trainer_inputs};
+pub(crate) use inspect::write_contact_sheet;
 pub(crate) use supervised::{LongRunConsent, generate_supervised};
 
 use crate::global::GlobalArgs;

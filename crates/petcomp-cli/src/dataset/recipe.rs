@@ -6,7 +6,7 @@ use crate::print;
 use petcomp::dataset::{DatasetConfig, Provenance};
 use petcomp::scene::Drawn;
 use petcomp::{Error, Scene, io};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 #[derive(clap::Subcommand)]
 pub(crate) enum RecipeCommand {
@@ -42,10 +42,16 @@ pub(super) fn run(command: &RecipeCommand, global: &GlobalArgs) -> anyhow::Resul
     }
 }
 
-fn init_recipe(args: &InitRecipeArgs, global: &GlobalArgs) -> anyhow::Result<()> {
-    if args.recipe.exists() {
-        return Err(Error::file(&args.recipe, "is there already, expected a new file").into());
+fn check_is_new(recipe: &Path) -> petcomp::Result<()> {
+    if !recipe.exists() {
+        return Ok(());
     }
+    let what = "is there already, expected a new file";
+    Err(Error::file(recipe, what))
+}
+
+fn init_recipe(args: &InitRecipeArgs, global: &GlobalArgs) -> anyhow::Result<()> {
+    check_is_new(&args.recipe)?;
     io::write_text(&args.recipe, DatasetConfig::template())?;
     global.print_status(args.recipe.display());
     Ok(())
@@ -72,9 +78,14 @@ fn print_rejected(provenance: &Provenance) {
 }
 
 fn print_draws(provenance: &Provenance) {
+    print_rows(&draw_rows(provenance));
+}
+
+fn draw_rows(provenance: &Provenance) -> Vec<DrawRow<'_>> {
     let draws = provenance.draws.iter();
-    let rows = draws.map(|draw| DrawRow::new(draw, &provenance.drawn));
-    print_rows(&rows.collect::<Vec<_>>());
+    draws
+        .map(|draw| DrawRow::new(draw, &provenance.drawn))
+        .collect()
 }
 
 /// A draw as it is printed.

@@ -8,7 +8,7 @@ use petcomp::dataset::YoloSet;
 use petcomp::eval::{YoloTruth, read_yolo_truth};
 use petcomp::io;
 use petcomp::train::kit::KitOptions;
-use petcomp::train::{self, Balance, Batch, BatchOptions, Source, Weights};
+use petcomp::train::{self, Anchors, Balance, Batch, BatchOptions, Source, Weights};
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Subcommand)]
@@ -108,8 +108,7 @@ fn plan_batches(args: &BatchesArgs, global: &GlobalArgs) -> anyhow::Result<()> {
         size: args.sets.batch,
         seed: args.seed,
     };
-    let epochs = (0..args.epochs).flat_map(|epoch| sets.epoch_lines(epoch, &options));
-    let lines: Vec<String> = epochs.collect();
+    let lines = sets.lines(args.epochs, &options);
     io::write_text(&args.output, &lines.concat())?;
     let (batches, weights) = (lines.len(), sets.describe_weights());
     global.print_written(&args.output, format_args!("{batches} batches; {weights}"));
@@ -140,13 +139,23 @@ impl MixedSets {
         format!("weights real {real:.4}, synthetic {synthetic:.4}")
     }
 
-    fn epoch_lines(&self, epoch: u64, options: &BatchOptions) -> Vec<String> {
-        let (real, synthetic) = (self.real.train.len(), self.synthetic.train.len());
-        let batches = train::batches(real, synthetic, epoch, options);
-        batches
-            .iter()
-            .map(|batch| self.batch_line(epoch, batch))
+    fn lines(&self, epochs: u64, options: &BatchOptions) -> Vec<String> {
+        let epochs = 0..epochs;
+        epochs
+            .flat_map(|epoch| self.epoch_lines(epoch, options))
             .collect()
+    }
+
+    fn epoch_lines(&self, epoch: u64, options: &BatchOptions) -> Vec<String> {
+        let batches = self.batches(epoch, options).into_iter();
+        batches
+            .map(|batch| self.batch_line(epoch, &batch))
+            .collect()
+    }
+
+    fn batches(&self, epoch: u64, options: &BatchOptions) -> Vec<Batch> {
+        let (real, synthetic) = (self.real.train.len(), self.synthetic.train.len());
+        train::batches(real, synthetic, epoch, options)
     }
 
     /// A line of JSON: epoch, source, weight of the loss, images.
@@ -168,23 +177,33 @@ impl MixedSets {
 }
 
 fn write_kit(args: &KitArgs, global: &GlobalArgs) -> anyhow::Result<()> {
-    let options = KitOptions {
-        balance: args.sets.balance(),
-        seeds: args.seeds,
-        epochs: args.epochs,
-        batch: args.sets.batch as u64,
-        ..KitOptions::new(&args.sets.real, &args.sets.synthetic)
-    };
-    train::kit::write(&args.output, &options)?;
+    train::kit::write(&args.output, &args.kit_options())?;
     global.print_written(&args.output, "run commands.sh there");
     Ok(())
+}
+
+impl KitArgs {
+    fn kit_options(&self) -> KitOptions {
+        let sets = &self.sets;
+        KitOptions {
+            balance: sets.balance(),
+            seeds: self.seeds,
+            epochs: self.epochs,
+            batch: sets.batch as u64,
+            ..KitOptions::new(&sets.real, &sets.synthetic)
+        }
+    }
 }
 
 fn fit_anchors(args: &AnchorsArgs) -> anyhow::Result<()> {
     let set = YoloSet::open(&args.folder)?;
     let truth = read_yolo_truth(&train_labels(&set), None)?;
     let sides = box_sides(&truth, f64::from(args.side));
-    let found = train::anchors(&sides, args.count, args.seed);
+    print_anchors(&train::anchors(&sides, args.count, args.seed));
+    Ok(())
+}
+
+fn print_anchors(found: &Anchors) {
     for [w, h] in &found.sizes {
         print::line(format_args!("{w:.1},{h:.1}"));
     }
@@ -192,7 +211,6 @@ fn fit_anchors(args: &AnchorsArgs) -> anyhow::Result<()> {
         "mean IoU {:.3}, best possible recall {:.4}",
         found.mean_iou, found.best_possible_recall
     ));
-    Ok(())
 }
 
 /// The folder of the labels for training.

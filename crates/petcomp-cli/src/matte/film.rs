@@ -81,17 +81,22 @@ impl FilmArgs {
 impl TriangulateArgs {
     pub(crate) fn run(&self, global: &GlobalArgs) -> Result<()> {
         let args = &self.options;
-        let photos = self.photos.iter().map(io::read);
-        let photos: Vec<Image<LinearRgb>> = photos.collect::<Result<_, _>>()?;
+        let photos = self.read_photos()?;
         let inside = args.object_mask(&self.photos[0], &photos[0])?;
         let plates = self.screen_plates(&photos, &inside)?;
         let found = self.triangulate(&photos, &plates, &inside)?;
         args.write_film(&found.film, &found.transmittance)?;
         args.write_extras(&plates[0], &found.uncertainty)?;
-        let (plate, residual) = (describe_plate(&plates[0], found.flat), found.residual);
-        let what = format!("{plate}; residual {residual:.4}");
-        global.print_written(&args.output, what);
+        let what = describe_plate(&plates[0], found.flat);
+        global.print_written(
+            &args.output,
+            format_args!("{what}; residual {:.4}", found.residual),
+        );
         Ok(())
+    }
+
+    fn read_photos(&self) -> petcomp::Result<Vec<Image<LinearRgb>>> {
+        self.photos.iter().map(io::read).collect()
     }
 
     fn triangulate(
@@ -178,13 +183,16 @@ fn check_same_size(mask: &Image<Coverage>, photo: &Image<LinearRgb>) -> Result<(
 
 /// The screen and the plastic in a few words.
 fn describe_plate(plate: &ScreenPlate, flat: LinearRgb) -> String {
-    let fitted = match plate.degree {
-        Some(degree) => format!("fitted by degree {degree}"),
-        None => "photographed".into(),
-    };
-    let uneven = 100.0 * plate.unevenness;
+    let (screen, uneven) = (plate_source(plate), 100.0 * plate.unevenness);
     format!(
-        "screen {fitted}, {uneven:.0} % uneven; flat plastic lets through {:.2} {:.2} {:.2}",
+        "screen {screen}, {uneven:.0} % uneven; flat plastic lets through {:.2} {:.2} {:.2}",
         flat.r, flat.g, flat.b
     )
+}
+
+fn plate_source(plate: &ScreenPlate) -> String {
+    match plate.degree {
+        Some(degree) => format!("fitted by degree {degree}"),
+        None => "photographed".into(),
+    }
 }

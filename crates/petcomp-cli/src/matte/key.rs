@@ -53,11 +53,10 @@ impl KeyArgs {
         if self.auto_mattes {
             return self.with_found_mattes(plate);
         }
-        let [garbage, core] = [&self.garbage, &self.core].map(read_optional);
         Ok(KeyerInput {
             photo: io::read(&self.input)?,
-            garbage: garbage?,
-            core: core?,
+            garbage: read_optional(&self.garbage)?,
+            core: read_optional(&self.core)?,
         })
     }
 

@@ -94,7 +94,7 @@ pub(crate) fn run(command: &NodeCommand) -> Result<()> {
 impl NodePictures {
     fn channel_key(&self) -> Result<()> {
         let options = from_overrides("key", &self.settings)?;
-        let keyed = channel_key(&io::read::<PremulRgba>(&self.input)?, &options);
+        let keyed = channel_key(&self.read_photo()?, &options);
         self.write_pair(&keyed.cutout, &keyed.matte)
     }
 
@@ -107,7 +107,7 @@ impl NodePictures {
     }
 
     fn color_spill(&self) -> Result<()> {
-        let photo: Image<PremulRgba> = io::read(&self.input)?;
+        let photo = self.read_photo()?;
         let options = from_overrides("key", &self.settings)?;
         write_picture(&self.output, &color_spill(&photo, &options))
     }
@@ -117,9 +117,13 @@ impl NodePictures {
         &self,
         matte: impl Fn(&Image<PremulRgba>, &[Override]) -> Result<Image<Coverage>>,
     ) -> Result<()> {
-        let photo: Image<PremulRgba> = io::read(&self.input)?;
+        let photo = self.read_photo()?;
         let matte = matte(&photo, &self.settings)?;
         self.write_pair(&photo.zip_map(&matte, |p, m| p.masked(m)), &matte)
+    }
+
+    fn read_photo(&self) -> petcomp::Result<Image<PremulRgba>> {
+        io::read(&self.input)
     }
 
     fn write_pair(&self, cutout: &Image<PremulRgba>, matte: &Image<Coverage>) -> Result<()> {

@@ -7,14 +7,16 @@ use std::path::{Path, PathBuf};
 
 /// Writes a picture, in an EXR with all its bits.
 pub(crate) fn write_picture<P: ToFile>(path: &Path, image: &Image<P>) -> Result<()> {
-    let is_exr = path
-        .extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("exr"));
     let options = WriteOptions {
-        bits: is_exr.then_some(Bits::Float),
+        bits: is_exr(path).then_some(Bits::Float),
         ..WriteOptions::default()
     };
     Ok(io::write_with(path, image, &options)?)
+}
+
+fn is_exr(path: &Path) -> bool {
+    let extension = path.extension();
+    extension.is_some_and(|e| e.eq_ignore_ascii_case("exr"))
 }
 
 /// Writes a picture where one was asked for.
