@@ -1,6 +1,7 @@
 //! Keying Screen: a plate from a few points where the screen is seen.
 
-use crate::error::{Error, Result};
+use super::check::check_value;
+use crate::error::Result;
 use crate::image::Image;
 use crate::pixel::LinearRgb;
 use nalgebra::Point2;
@@ -33,10 +34,9 @@ pub fn keying_screen(
     points: &[ScreenPoint],
     smoothness: f64,
 ) -> Result<Image<LinearRgb>> {
-    if !(0.0..=1.0).contains(&smoothness) {
-        let what = format!("{smoothness}, expected 0 to 1");
-        return Err(Error::value("smoothness", what));
-    }
+    check_value((0.0..=1.0).contains(&smoothness), "smoothness", || {
+        format!("{smoothness}, expected 0 to 1")
+    })?;
     let points = points_inside(points, width, height)?;
     let size = [width as f64, height as f64];
     let sigma = SHARPEST_SIGMA + SMOOTHNESS_SIGMA * smoothness;
@@ -49,10 +49,9 @@ pub fn keying_screen(
 fn points_inside(points: &[ScreenPoint], width: usize, height: usize) -> Result<Vec<ScreenPoint>> {
     let mut inside = points.to_vec();
     inside.retain(|p| p.is_inside([width as f64, height as f64]));
-    if inside.is_empty() {
-        let what = format!("none inside the {width} x {height} pixels, expected at least 1");
-        return Err(Error::value("points", what));
-    }
+    check_value(!inside.is_empty(), "points", || {
+        format!("none inside the {width} x {height} pixels, expected at least 1")
+    })?;
     Ok(inside)
 }
 

@@ -82,11 +82,13 @@ fn gaussian_table(distance: usize, behaviour: Behaviour) -> Vec<f32> {
 /// Offsets in the order in which the profile visits samples.
 fn visiting_order(radius: isize, behaviour: Behaviour) -> Vec<isize> {
     match behaviour {
-        Behaviour::V45 => std::iter::once(0)
-            .chain((1..=radius).flat_map(|i| [-i, i]))
-            .collect(),
+        Behaviour::V45 => from_the_middle(radius).collect(),
         Behaviour::V34 | Behaviour::V42 => (-radius..=radius).collect(),
     }
+}
+
+fn from_the_middle(radius: isize) -> impl Iterator<Item = isize> {
+    std::iter::once(0).chain((1..=radius).flat_map(|i| [-i, i]))
 }
 
 fn total_from_centre(gauss: &[f32]) -> f32 {

@@ -132,9 +132,12 @@ impl<'a, P: Photo> Stream<'a, P> {
     /// A band starts by computing the rows above it that its windows reach; longer bands do so less often.
     fn band_rows(&self, height: usize) -> usize {
         let threads = rayon::current_num_threads();
-        let least = (self.halo_rows() * BAND_PER_HALO).max(MIN_BAND_ROWS);
-        let rounds = height / (threads * least);
+        let rounds = height / (threads * self.min_band_rows());
         height.div_ceil(threads * rounds.max(1)).max(1)
+    }
+
+    fn min_band_rows(&self) -> usize {
+        (self.halo_rows() * BAND_PER_HALO).max(MIN_BAND_ROWS)
     }
 
     /// Rows above a band that its windows reach.
@@ -181,12 +184,16 @@ impl<'a, P: Photo> Stream<'a, P> {
 
     /// The edges: Blender up to 4.3 looks for them in the clipped matte, later ones in the raw one.
     fn edge_plane(&self) -> Source<'_> {
-        let searched = if self.behaviour() == Behaviour::V45 {
+        let searched = self.searched_matte();
+        Box::new(Edges::new(searched, self.size(), self.options))
+    }
+
+    fn searched_matte(&self) -> Source<'_> {
+        if self.behaviour() == Behaviour::V45 {
             self.raw_matte()
         } else {
             self.clipped_matte()
-        };
-        Box::new(Edges::new(searched, self.size(), self.options))
+        }
     }
 
     fn limited_matte(&self) -> Source<'_> {
