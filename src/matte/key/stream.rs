@@ -97,13 +97,8 @@ impl<'a, P: Photo> Stream<'a, P> {
         let bands = matte.pixels_mut().par_chunks_mut(width * rows).enumerate();
         let cutouts = bands_of(cutout, width * rows, height.div_ceil(rows));
         let seen = bands.zip(cutouts).map(|((band, matte), cutout)| {
-            let first = band * rows;
-            self.compute_band(&mut *self.plane_source(plane), first, matte, cutout);
-            robust::count_unusable(
-                &self.keying,
-                self.options,
-                first..first + matte.len() / width,
-            )
+            self.compute_band(plane, band * rows, matte, cutout);
+            self.count_unusable(band * rows, matte.len() / width)
         });
         Deviations {
             clamped: self.clamped.load(Ordering::Relaxed),
@@ -111,14 +106,20 @@ impl<'a, P: Photo> Stream<'a, P> {
         }
     }
 
+    /// What cannot be used of so many rows of the inputs.
+    fn count_unusable(&self, first: usize, rows: usize) -> Deviations {
+        robust::count_unusable(&self.keying, self.options, first..first + rows)
+    }
+
     fn compute_band(
         &self,
-        plane: &mut dyn Rows,
+        plane: Plane,
         first: usize,
         matte: &mut [Coverage],
         cutout: &mut [PremulRgba],
     ) {
         let width = self.keying.photo.width();
+        let mut plane = self.plane_source(plane);
         let keyer = self.keyer();
         let mut cutout = cutout.chunks_exact_mut(width);
         for (y, matte) in (first..).zip(matte.chunks_exact_mut(width)) {
