@@ -36,7 +36,7 @@ impl Default for DifferenceKeyOptions {
 /// # Method
 /// With `D` the mean of the absolute differences of R, G and B: 0 up to `tolerance`, then `(D - tolerance) / falloff`.
 /// # Errors
-/// [`Error::Value`] where the sizes differ.
+/// [`Error::Value`](crate::Error::Value) where the sizes differ.
 pub fn difference_key<P: Photo>(
     photo: &Image<P>,
     clean: &Image<P>,

@@ -104,7 +104,8 @@ impl FilmMatte {
 /// factor of their surroundings, clipped ones all of it.
 ///
 /// # Errors
-/// [`Error::Photo`] where `inside` is empty or a pixel of the photo is not a finite number; [`Error::Value`] for an option that cannot be right.
+/// [`Error::Photo`](crate::Error::Photo) where `inside` is empty or a pixel of the photo is not a finite number;
+/// [`Error::Value`](crate::Error::Value) for an option that cannot be right.
 /// # Panics
 /// When the sizes differ.
 ///
@@ -171,7 +172,7 @@ impl<'a> FilmInput<'a> {
     }
 
     /// # Errors
-    /// [`Error::Photo`](crate::error::Error::Photo) where the mask is empty.
+    /// [`Error::Photo`](crate::Error::Photo) where the mask is empty.
     /// # Panics
     /// When the sizes differ.
     fn check(&self) -> Result<()> {

@@ -68,8 +68,8 @@ impl ScreenPlate {
     /// `least_gain` in the residual of cells that were left out of the fit.
     ///
     /// # Errors
-    /// [`Error::Photo`] where there is not enough background, or no light on it; [`Error::Value`] for an option that cannot
-    /// be right.
+    /// [`Error::Photo`](crate::Error::Photo) where there is not enough background, or no light on it;
+    /// [`Error::Value`](crate::Error::Value) for an option that cannot be right.
     /// # Panics
     /// When the sizes differ.
     ///
@@ -92,8 +92,9 @@ impl ScreenPlate {
     /// are matched channel by channel, and its noise is blurred.
     ///
     /// # Errors
-    /// [`Error::Photo`] where the sizes differ, the empty screen lies farther off than `max_shift_px`, or differs from what the
-    /// photo shows of the screen by more than `max_mismatch`; [`Error::Value`] for an option that cannot be right.
+    /// [`Error::Photo`](crate::Error::Photo) where the sizes differ, the empty screen lies farther off than
+    /// `max_shift_px`, or differs from what the photo shows of the screen by more than `max_mismatch`;
+    /// [`Error::Value`](crate::Error::Value) for an option that cannot be right.
     /// # Panics
     /// When the sizes of photo and background differ.
     pub fn from_photo(

@@ -31,7 +31,7 @@ impl<'a> Prepared<'a> {
     /// Checks a photo and reduces it to a longer side of `working_size` pixels.
     ///
     /// # Errors
-    /// [`Error::Photo`] for a photo that is too small or has a pixel that is not finite.
+    /// [`Error::Photo`](crate::Error::Photo) for a photo that is too small or has a pixel that is not finite.
     pub(super) fn new(photo: &'a Image<LinearRgb>, working_size: usize) -> Result<Self> {
         check_size(photo)?;
         check_finite(photo)?;

@@ -16,7 +16,7 @@ const SCREEN_MARGIN: f64 = 0.02;
 /// Where the margin leaves nothing, the mask alone is left out.
 ///
 /// # Errors
-/// [`Error::Photo`] when the mask leaves no background.
+/// [`Error::Photo`](crate::Error::Photo) when the mask leaves no background.
 /// # Panics
 /// When the sizes differ.
 pub fn screen_color(photo: &Image<LinearRgb>, mask: &Image<Coverage>) -> Result<LinearRgb> {

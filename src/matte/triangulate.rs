@@ -77,8 +77,9 @@ pub struct Triangulated {
 /// across it is the same in both photos, and shows how far they lie apart.
 ///
 /// # Errors
-/// [`Error::Value`] (`photos`) for fewer than two or of different size; [`Error::Photo`] where no channel of the screens
-/// differs, the object moved farther than `max_shift_px`, turned, or moved otherwise (`least_agreement`).
+/// [`Error::Value`](crate::Error::Value) (`photos`) for fewer than two or of different size;
+/// [`Error::Photo`](crate::Error::Photo) where no channel of the screens differs, the object moved farther than
+/// `max_shift_px`, turned, or moved otherwise (`least_agreement`).
 /// # Panics
 /// When a photo and its plate differ in size.
 ///
@@ -245,7 +246,7 @@ impl Aligner<'_> {
     /// not change.
     ///
     /// # Errors
-    /// [`Error::Photo`] where it was moved too far, turned, or differs otherwise.
+    /// [`Error::Photo`](crate::Error::Photo) where it was moved too far, turned, or differs otherwise.
     fn shift_px(
         &self,
         number: usize,
@@ -370,7 +371,7 @@ fn add_point(lines: &mut [ScreenLine; 3], screen: LinearRgb, pixel: LinearRgb) {
 /// Channels whose slope is measured well enough, by the median over the object.
 ///
 /// # Errors
-/// [`Error::Photo`] where there is none.
+/// [`Error::Photo`](crate::Error::Photo) where there is none.
 fn determined_channels(
     lines: &Image<PixelLines>,
     inside: &Image<Coverage>,

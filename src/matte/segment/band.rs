@@ -25,7 +25,7 @@ pub enum LumaMode {
 
 impl LumaMode {
     /// # Errors
-    /// [`Error::Value`] (`tone.grey`) for weights that cannot be right.
+    /// [`Error::Value`](crate::Error::Value) (`tone.grey`) for weights that cannot be right.
     pub(super) fn check(self) -> Result<()> {
         let Self::Grey(weights) = self else {
             return Ok(());
