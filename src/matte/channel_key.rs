@@ -107,29 +107,44 @@ impl ChannelKeyOptions {
     /// The matte of a pixel with these channels, at most its alpha.
     #[inline]
     fn alpha(&self, channels: [f32; 3], alpha: f32) -> f32 {
-        let a = 1.0 - self.key_excess(channels);
-        let m = if a > self.limit_max {
-            alpha
+        let m = self.between_limits(1.0 - self.key_excess(channels), alpha);
+        if m < alpha { m } else { alpha }
+    }
+
+    /// How far a value is from the lower limit to the upper one; 0 below, `above` above.
+    #[inline]
+    fn between_limits(&self, a: f32, above: f32) -> f32 {
+        if a > self.limit_max {
+            above
         } else if a < self.limit_min {
             0.0
         } else {
             (a - self.limit_min) / (self.limit_max - self.limit_min)
-        };
-        if m < alpha { m } else { alpha }
+        }
     }
 
     /// By how much the key channel exceeds its limit.
     #[inline]
     fn key_excess(&self, c: [f32; 3]) -> f32 {
         let key = usize::from(self.matte_channel.min(2));
-        let (first, second) = other_channels(c, key);
-        let limit = match self.limit_method {
-            ChannelLimit::Single => c[usize::from(self.limit_channel.min(2))],
-            ChannelLimit::Max if first < second => second,
-            ChannelLimit::Max => first,
-        };
-        c[key] - limit
+        c[key] - self.limit(c, key)
     }
+
+    /// What the key channel is compared with.
+    #[inline]
+    fn limit(&self, c: [f32; 3], key: usize) -> f32 {
+        match self.limit_method {
+            ChannelLimit::Single => c[usize::from(self.limit_channel.min(2))],
+            ChannelLimit::Max => larger_other(c, key),
+        }
+    }
+}
+
+/// The larger of the two channels beside one.
+#[inline]
+fn larger_other(c: [f32; 3], channel: usize) -> f32 {
+    let (first, second) = other_channels(c, channel);
+    if first < second { second } else { first }
 }
 
 fn to_space(p: PremulRgba, options: &ChannelKeyOptions) -> [f32; 3] {
@@ -191,10 +206,15 @@ fn to_hsv(p: PremulRgba) -> [f32; 3] {
 }
 
 fn from_hsv([h, s, v]: [f32; 3]) -> [f32; 3] {
-    let full = [
-        (h * 6.0 - 3.0).abs() - 1.0,
-        2.0 - (h * 6.0 - 2.0).abs(),
-        2.0 - (h * 6.0 - 4.0).abs(),
-    ];
-    full.map(|n| ((n.clamp(0.0, 1.0) - 1.0) * s + 1.0) * v)
+    full_color(h * 6.0).map(|n| ((n.clamp(0.0, 1.0) - 1.0) * s + 1.0) * v)
+}
+
+/// The colour of full saturation and value of a hue in sixths of the circle, unclamped.
+#[inline]
+fn full_color(sixths: f32) -> [f32; 3] {
+    [
+        (sixths - 3.0).abs() - 1.0,
+        2.0 - (sixths - 2.0).abs(),
+        2.0 - (sixths - 4.0).abs(),
+    ]
 }

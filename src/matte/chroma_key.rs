@@ -44,15 +44,8 @@ pub fn chroma_key<P: Photo>(
     screen: LinearRgb,
     options: &ChromaKeyOptions,
 ) -> Image<Coverage> {
-    let exact = options.profile == Profile::Blender45;
-    let (cos, sin) = direction(centred(screen.opaque(), exact), exact);
-    let wedge = Wedge::new(options);
-    photo.map(|p| {
-        let p = p.premul();
-        let [c, r] = centred(p, exact);
-        let (x, z) = (c * cos + r * sin, r * cos - c * sin);
-        Coverage(wedge.alpha(x, z).filter(|&a| a < p.a).unwrap_or(p.a))
-    })
+    let wedge = Wedge::new(screen, options);
+    photo.map(|p| wedge.matte(p.premul()))
 }
 
 /// Colour differences around 0.
@@ -62,6 +55,10 @@ fn centred(p: PremulRgba, exact: bool) -> [f32; 2] {
 
 /// What is keyed around the screen's direction.
 struct Wedge {
+    /// Cosine and sine of that direction.
+    direction: (f32, f32),
+    /// The colour differences are those of Blender 4.5.
+    exact: bool,
     /// Tangent of half its opening.
     slope: f32,
     /// Half the angle that is keyed wholly, radians.
@@ -70,20 +67,35 @@ struct Wedge {
 }
 
 impl Wedge {
-    fn new(options: &ChromaKeyOptions) -> Self {
+    fn new(screen: LinearRgb, options: &ChromaKeyOptions) -> Self {
+        let exact = options.profile == Profile::Blender45;
         Self {
+            direction: direction(centred(screen.opaque(), exact), exact),
+            exact,
             slope: libm::tan(f64::from(options.tolerance / 2.0)) as f32,
             core: options.threshold / 2.0,
             gain: options.gain,
         }
     }
 
+    #[inline(always)]
+    fn matte(&self, p: PremulRgba) -> Coverage {
+        let (x, z) = self.turned(centred(p, self.exact));
+        Coverage(self.alpha(x, z).filter(|&a| a < p.a).unwrap_or(p.a))
+    }
+
+    /// Colour differences along the screen's direction and across it.
+    #[inline(always)]
+    fn turned(&self, [c, r]: [f32; 2]) -> (f32, f32) {
+        let (cos, sin) = self.direction;
+        (c * cos + r * sin, r * cos - c * sin)
+    }
+
     /// The matte at `x` along the screen's direction and `z` across it; none outside the wedge.
     #[inline(always)]
     fn alpha(&self, x: f32, z: f32) -> Option<f32> {
         let inside = x - z.abs() / self.slope;
-        let angle = libm::atan2(f64::from(z), f64::from(x)) as f32;
-        let alpha = if angle.abs() < self.core {
+        let alpha = if angle(x, z).abs() < self.core {
             0.0
         } else {
             1.0 - inside / self.gain
@@ -95,9 +107,19 @@ impl Wedge {
 /// Cosine and sine of the key's direction.
 fn direction([c, r]: [f32; 2], exact: bool) -> (f32, f32) {
     if exact {
-        return normalized(c, r);
+        normalized(c, r)
+    } else {
+        cos_and_sin(angle(c, r))
     }
-    let angle = f64::from(libm::atan2(f64::from(r), f64::from(c)) as f32);
+}
+
+#[inline(always)]
+fn angle(x: f32, y: f32) -> f32 {
+    libm::atan2(f64::from(y), f64::from(x)) as f32
+}
+
+fn cos_and_sin(angle: f32) -> (f32, f32) {
+    let angle = f64::from(angle);
     (libm::cos(angle) as f32, libm::sin(angle) as f32)
 }
 

@@ -110,23 +110,30 @@ fn excess(c: [f32; 3], options: &ColorSpillOptions) -> f32 {
 /// What the spill channel is limited by.
 #[inline(always)]
 fn limit(c: [f32; 3], options: &ColorSpillOptions) -> f32 {
-    let (first, second) = other_channels(c, options.channel as usize);
     match options.limit_method {
         SpillLimit::Simple => c[options.limit_channel as usize],
-        SpillLimit::Average => (first + second) * 0.5,
+        SpillLimit::Average => mean_of_others(c, options.channel as usize),
     }
+}
+
+#[inline(always)]
+fn mean_of_others(c: [f32; 3], channel: usize) -> f32 {
+    let (first, second) = other_channels(c, channel);
+    (first + second) * 0.5
 }
 
 /// What every channel gets of the excess.
 fn strengths(options: &ColorSpillOptions, spill: usize) -> [f32; 3] {
     let mut strengths = match options.use_unspill {
-        true => [
-            options.unspill_red,
-            options.unspill_green,
-            options.unspill_blue,
-        ],
+        true => options.unspill_strengths(),
         false => [0, 1, 2].map(|k| if k == spill { 1.0 } else { 0.0 }),
     };
     strengths[spill] = -strengths[spill];
     strengths
+}
+
+impl ColorSpillOptions {
+    fn unspill_strengths(&self) -> [f32; 3] {
+        [self.unspill_red, self.unspill_green, self.unspill_blue]
+    }
 }

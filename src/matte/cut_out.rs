@@ -88,18 +88,30 @@ pub fn cut_out_on(
     watch.lap("segment");
     let screen = CleanScreen::new(photo, empty, &segmentation, options)?;
     watch.lap("plate");
-    let region = ObjectRegion::new(&prepared, &segmentation, options);
+    let cut = cut_segmented(&prepared, segmentation, &screen, options, &mut watch)?;
+    watch.log("cut out");
+    Ok(cut)
+}
+
+/// Cuts out an object that is found, on a screen that is known.
+fn cut_segmented(
+    prepared: &Prepared<'_>,
+    segmentation: Segmentation,
+    screen: &CleanScreen,
+    options: &CutOutOptions,
+    watch: &mut Stopwatch,
+) -> Result<CutOut> {
+    let region = ObjectRegion::new(prepared, &segmentation, options);
     watch.lap("cut");
-    let matted = Matted::new(&prepared, &screen, &region, options)?;
+    let matted = Matted::new(prepared, screen, &region, options)?;
     watch.lap("matte");
     let cut = CutOut {
-        diagnostics: diagnostics(photo, &segmentation, &matted, options),
+        diagnostics: diagnostics(prepared.photo, &segmentation, &matted, options),
         ..region
             .trim(options.longest_side)
-            .cut_out(matted, segmentation, &screen)
+            .cut_out(matted, segmentation, screen)
     };
     watch.lap("trim");
-    watch.log("cut out");
     Ok(cut)
 }
 
@@ -174,17 +186,24 @@ impl ObjectRegion {
 
     /// How pictures of the region become those of the cut-out, whose longer side is at most `longest_side`.
     fn trim(&self, longest_side: usize) -> Trim {
-        let roi = self.kept;
-        let longer = roi.width.max(roi.height);
         Trim {
-            roi,
-            in_region: Roi {
-                x: roi.x - self.around.x,
-                y: roi.y - self.around.y,
-                ..roi
-            },
-            scale: (longest_side as f64 / longer as f64).min(1.0),
+            roi: self.kept,
+            in_region: self.kept_in_region(),
+            scale: self.kept_scale(longest_side),
         }
+    }
+
+    fn kept_in_region(&self) -> Roi {
+        Roi {
+            x: self.kept.x - self.around.x,
+            y: self.kept.y - self.around.y,
+            ..self.kept
+        }
+    }
+
+    fn kept_scale(&self, longest_side: usize) -> f64 {
+        let longer = self.kept.width.max(self.kept.height);
+        (longest_side as f64 / longer as f64).min(1.0)
     }
 }
 
@@ -238,10 +257,15 @@ impl Trim {
     fn cropped<P: Mix>(&self, image: &Image<P>) -> Image<P> {
         let image = image.crop(self.in_region);
         if self.scale >= 1.0 {
-            return image;
+            image
+        } else {
+            self.reduced(&image)
         }
+    }
+
+    fn reduced<P: Mix>(&self, image: &Image<P>) -> Image<P> {
         let (width, height) = image.size();
-        filter::resize(&image, self.scaled(width), self.scaled(height))
+        filter::resize(image, self.scaled(width), self.scaled(height))
     }
 
     fn scaled(&self, side: usize) -> usize {
@@ -258,10 +282,15 @@ fn hull_roi(hull: &[Point2<f64>], margin_px: usize, (w, h): (usize, usize)) -> R
 
 /// The whole pixels of a row of `len` from the least to the greatest of some coordinates.
 fn whole_pixels(coordinates: impl Iterator<Item = f64>, len: usize) -> std::ops::Range<usize> {
-    let (low, high) = coordinates.fold((f64::MAX, 0.0), |(low, high): (f64, f64), v| {
-        (low.min(v), high.max(v))
-    });
+    let (low, high) = extremes(coordinates);
     (low.max(0.0) as usize).min(len)..(high.ceil() as usize).min(len)
+}
+
+/// The least of some coordinates and the greatest, at least 0.
+fn extremes(coordinates: impl Iterator<Item = f64>) -> (f64, f64) {
+    coordinates.fold((f64::MAX, 0.0_f64), |(low, high), v| {
+        (low.min(v), high.max(v))
+    })
 }
 
 fn softened(mask: &Image<Coverage>, sigma_px: f32) -> Image<Coverage> {
@@ -298,7 +327,8 @@ fn diagnostics(
     diagnostics.extend((residual > MAX_RESIDUAL_MATTE).then(|| residual_matte(residual)));
     // An outline alone does not depend on the screen.
     if matted.method != MatteMethod::Outline {
-        diagnostics.extend(clipped_screen(photo, &found.mask, options.film.clipped));
+        let share = clipped_share(photo, &found.mask, options.film.clipped);
+        diagnostics.extend((share > MAX_CLIPPED_SHARE).then(|| clipped_screen(share)));
     }
     diagnostics
 }
@@ -318,18 +348,15 @@ fn residual_matte(share: f32) -> Diagnostic {
 /// corner beside a lamp may be clipped.
 const MAX_CLIPPED_SHARE: f32 = 0.1;
 
-/// The warning about a screen that is too bright for the camera.
-fn clipped_screen(
-    photo: &Image<LinearRgb>,
-    mask: &Image<Coverage>,
-    clipped: f32,
-) -> Option<Diagnostic> {
-    let share = clipped_share(photo, mask, clipped);
-    let message = format!(
-        "{:.0} % of the screen is clipped: transmittance cannot be measured; use a shorter exposure",
-        100.0 * share
-    );
-    (share > MAX_CLIPPED_SHARE).then(|| Diagnostic::warning(Code::ClippedScreen, message))
+/// The warning about a screen that is too bright for the camera in a share of its pixels.
+fn clipped_screen(share: f32) -> Diagnostic {
+    Diagnostic::warning(
+        Code::ClippedScreen,
+        format_args!(
+            "{:.0} % of the screen is clipped: transmittance cannot be measured; use a shorter exposure",
+            100.0 * share
+        ),
+    )
 }
 
 #[cfg(test)]

@@ -1,7 +1,8 @@
 //! Difference Key: what differs from a picture of the place without the subject.
 
+use super::check::check_size;
 use super::key::{Photo, Profile};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::image::Image;
 use crate::pixel::{Coverage, PremulRgba};
 use serde::{Deserialize, Serialize};
@@ -35,21 +36,23 @@ impl Default for DifferenceKeyOptions {
 /// # Method
 /// With `D` the mean of the absolute differences of R, G and B: 0 up to `tolerance`, then `(D - tolerance) / falloff`.
 /// # Errors
-/// [`Error::Value`] where the sizes differ.
+/// [`Error::Value`](crate::Error::Value) where the sizes differ.
 pub fn difference_key<P: Photo>(
     photo: &Image<P>,
     clean: &Image<P>,
     options: &DifferenceKeyOptions,
 ) -> Result<Image<Coverage>> {
-    check_sizes(clean.size(), photo.size())?;
-    Ok(photo.zip_map(clean, |a, b| {
-        let a = a.premul();
-        let m = options.matte(mean_difference(a, b.premul()));
-        Coverage(m.map_or(a.a, |m| if m < a.a { m } else { a.a }))
-    }))
+    check_size("clean plate", clean.size(), photo.size())?;
+    Ok(photo.zip_map(clean, |a, b| options.coverage(a.premul(), b.premul())))
 }
 
 impl DifferenceKeyOptions {
+    /// The matte of a pixel, at most its alpha.
+    #[inline]
+    fn coverage(&self, p: PremulRgba, clean: PremulRgba) -> Coverage {
+        let m = self.matte(mean_difference(p, clean));
+        Coverage(m.map_or(p.a, |m| if m < p.a { m } else { p.a }))
+    }
     /// The matte of an opaque pixel; none beyond the falloff.
     #[inline]
     fn matte(&self, difference: f32) -> Option<f32> {
@@ -59,14 +62,6 @@ impl DifferenceKeyOptions {
             early_matte(difference, self.tolerance, self.falloff)
         }
     }
-}
-
-fn check_sizes((w, h): (usize, usize), (width, height): (usize, usize)) -> Result<()> {
-    if (w, h) == (width, height) {
-        return Ok(());
-    }
-    let what = format!("{w} x {h} pixels, expected the photo's {width} x {height}");
-    Err(Error::value("clean plate", what))
 }
 
 /// Mean of the absolute differences of the channels.
@@ -87,10 +82,14 @@ fn early_matte(difference: f32, tolerance: f32, falloff: f32) -> Option<f32> {
 fn late_matte(difference: f32, tolerance: f32, falloff: f32) -> Option<f32> {
     let beyond = difference - tolerance;
     let beyond = if beyond > 0.0 { beyond } else { 0.0 };
-    let share = if falloff == 0.0 {
+    (difference <= tolerance + falloff).then(|| quotient_or_zero(beyond, falloff))
+}
+
+#[inline]
+fn quotient_or_zero(dividend: f32, divisor: f32) -> f32 {
+    if divisor == 0.0 {
         0.0
     } else {
-        beyond / falloff
-    };
-    (difference <= tolerance + falloff).then_some(share)
+        dividend / divisor
+    }
 }

@@ -13,11 +13,13 @@ pub use planes::film_planes;
 pub use uncertainty::ColorUncertainty;
 pub(super) use view::view;
 
+use super::arrays::largest;
+use super::check::{check_photo, check_value};
 use super::plate::ScreenPlate;
-use super::prepared::{check_finite, longer_side, refused};
+use super::prepared::{check_finite, longer_side};
 use super::screen::{is_keyable, strongest_channel};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::filter;
 use crate::image::Image;
 use crate::pixel::{Coverage, Film, LinearRgb};
@@ -102,7 +104,8 @@ impl FilmMatte {
 /// factor of their surroundings, clipped ones all of it.
 ///
 /// # Errors
-/// [`Error::Photo`] where `inside` is empty or a pixel of the photo is not a finite number; [`Error::Value`] for an option that cannot be right.
+/// [`Error::Photo`](crate::Error::Photo) where `inside` is empty or a pixel of the photo is not a finite number;
+/// [`Error::Value`](crate::Error::Value) for an option that cannot be right.
 /// # Panics
 /// When the sizes differ.
 ///
@@ -115,14 +118,7 @@ pub fn film(
 ) -> Result<FilmMatte> {
     options.check()?;
     check_finite(photo)?;
-    let object = FilmInput {
-        photo,
-        plate,
-        inside,
-        screen: plate.color(),
-        longer_side: longer_side(photo),
-    };
-    solve_film(object, options)
+    solve_film(FilmInput::whole(photo, plate, inside), options)
 }
 
 /// A photo on its screen, or the part of it around the object: there is nothing to solve elsewhere. All pictures are of
@@ -160,12 +156,33 @@ pub(super) fn solve_film(object: FilmInput<'_>, options: &FilmOptions) -> Result
     Ok(matte)
 }
 
-impl FilmInput<'_> {
+impl<'a> FilmInput<'a> {
+    fn whole(
+        photo: &'a Image<LinearRgb>,
+        plate: &'a ScreenPlate,
+        inside: &'a Image<Coverage>,
+    ) -> Self {
+        Self {
+            photo,
+            plate,
+            inside,
+            screen: plate.color(),
+            longer_side: longer_side(photo),
+        }
+    }
+
     /// # Errors
-    /// [`Error::Photo`] where the mask is empty.
+    /// [`Error::Photo`](crate::Error::Photo) where the mask is empty.
     /// # Panics
     /// When the sizes differ.
     fn check(&self) -> Result<()> {
+        self.assert_same_sizes();
+        check_photo(self.inside.pixels().iter().any(|c| c.0 > 0.0), || {
+            "the mask of the object is empty".into()
+        })
+    }
+
+    fn assert_same_sizes(&self) {
         let size = self.photo.size();
         assert_eq!(
             size,
@@ -173,11 +190,6 @@ impl FilmInput<'_> {
             "photo and plate differ in size"
         );
         assert_eq!(size, self.inside.size(), "photo and mask differ in size");
-        if self.inside.pixels().iter().any(|c| c.0 > 0.0) {
-            Ok(())
-        } else {
-            Err(refused("the mask of the object is empty"))
-        }
     }
 }
 
@@ -211,16 +223,17 @@ impl<'a> FilmSolution<'a> {
     /// The given tint, or else that of the photo. On a grey screen all of the object is sampled, and that the tint may be
     /// another is part of the guess.
     fn tint(&self) -> Tint {
-        if let Some(flat) = self.options.flat {
-            return Tint::certain(flat.into());
+        match self.options.flat {
+            Some(flat) => Tint::certain(flat.into()),
+            None if self.is_keyable => self.tint_samples(DARKEST_SHARE).fit(),
+            None => Tint::certain(self.tint_samples(1.0).fit().flat),
         }
+    }
+
+    /// A share of the object's pixels, the darkest first.
+    fn tint_samples(&self, share: f64) -> TintSamples {
         let FilmInput { plate, inside, .. } = self.object;
-        if self.is_keyable {
-            TintSamples::new(&self.calm, plate, inside, self.key, DARKEST_SHARE).fit()
-        } else {
-            let samples = TintSamples::new(&self.calm, plate, inside, self.key, 1.0);
-            Tint::certain(samples.fit().flat)
-        }
+        TintSamples::new(&self.calm, plate, inside, self.key, share)
     }
 
     /// By which factor each pixel is flat plastic.
@@ -256,7 +269,7 @@ impl<'a> FilmSolution<'a> {
             longer_side,
             ..
         } = self.object;
-        let most = flat.into_iter().fold(0.0, f32::max);
+        let most = largest(flat);
         let guessed = uncertainty::guessed(factors, inside, self.options.thickness_spread, most);
         let screen_hue =
             bright::make_opaque(factors, &self.calm, &plate.image, inside, longer_side);
@@ -317,19 +330,14 @@ impl FilmOptions {
 }
 
 fn check_flat(LinearRgb { r, g, b }: LinearRgb) -> Result<()> {
-    if [r, g, b].iter().all(|t| (0.001..=1.0).contains(t)) {
-        return Ok(());
-    }
-    let what = format!("({r}, {g}, {b}), expected 0.001 to 1");
-    Err(Error::value("flat", what))
+    let is_right = [r, g, b].iter().all(|t| (0.001..=1.0).contains(t));
+    check_value(is_right, "flat", || {
+        format!("({r}, {g}, {b}), expected 0.001 to 1")
+    })
 }
 
 fn check_positive(at: &str, value: f32) -> Result<()> {
-    if value > 0.0 {
-        Ok(())
-    } else {
-        Err(Error::value(at, format!("{value}, expected more than 0")))
-    }
+    check_value(value > 0.0, at, || format!("{value}, expected more than 0"))
 }
 
 /// Noise from which on the transmittance is measured in a blurred photo: a twentieth of what a screen at 0.4 shows through

@@ -2,6 +2,7 @@
 
 use super::film::ColorUncertainty;
 use super::median::median;
+use super::prepared::longer_side;
 use super::screen::{masked_pixels, screen_color, screen_pixels, strongest_channel};
 use crate::diagnostic::Diagnostic;
 use crate::error::Result;
@@ -86,12 +87,15 @@ const MIN_SIGMA: f32 = 1e-3;
 
 /// Values of a channel where a mask is set, thinned out; without those that are not finite.
 fn channel_values(photo: &Image<LinearRgb>, set: &Mask, channel: usize) -> Vec<f32> {
-    let step = (set.count() / MAX_SAMPLES).max(1);
-    masked_pixels(photo, set)
-        .step_by(step)
+    sampled_pixels(photo, set)
         .map(|p| p.channels()[channel])
         .filter(|v| v.is_finite())
         .collect()
+}
+
+fn sampled_pixels(photo: &Image<LinearRgb>, set: &Mask) -> impl Iterator<Item = LinearRgb> {
+    let step = (set.count() / MAX_SAMPLES).max(1);
+    masked_pixels(photo, set).step_by(step)
 }
 
 /// Location and scale of values, outliers excluded.
@@ -148,7 +152,7 @@ fn screen_hue(
     let channel = strongest_channel(screen);
     let screen_excess = excess(screen, channel);
     let limit = SCREEN_EXCESS_FACTOR * screen_excess;
-    let share = object_share(photo, mask, |p| excess(p, channel) > limit);
+    let share = object_share(photo, mask, |p| excess(*p, channel) > limit);
     (screen_excess > 0.0 && share > MIN_HUED_SHARE).then(|| ColorUncertainty::screen_hue(share))
 }
 
@@ -156,16 +160,15 @@ fn screen_hue(
 fn object_share(
     photo: &Image<LinearRgb>,
     mask: &Image<Coverage>,
-    holds: impl Fn(LinearRgb) -> bool,
+    holds: impl Fn(&LinearRgb) -> bool,
 ) -> f32 {
     let interior = without_rim(mask);
-    let pixels = photo.pixels().iter().zip(interior.pixels());
-    let count = pixels.filter(|(p, inside)| **inside && holds(**p)).count();
+    let count = masked_pixels(photo, &interior).filter(holds).count();
     count as f32 / interior.count().max(1) as f32
 }
 
 fn without_rim(mask: &Image<Coverage>) -> Mask {
-    let rim_px = RIM_SHARE * mask.width().max(mask.height()) as f64;
+    let rim_px = RIM_SHARE * longer_side(mask) as f64;
     filter::erode(&mask.map(|c| c.0 > 0.5), rim_px)
 }
 

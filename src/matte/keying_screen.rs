@@ -1,6 +1,7 @@
 //! Keying Screen: a plate from a few points where the screen is seen.
 
-use crate::error::{Error, Result};
+use super::check::check_value;
+use crate::error::Result;
 use crate::image::Image;
 use crate::pixel::LinearRgb;
 use nalgebra::Point2;
@@ -27,16 +28,15 @@ const SMOOTHNESS_SIGMA: f64 = 0.85;
 /// # Method
 /// `sum(w color) / sum(w)` with `w = exp(-d^2 / sigma^2)`, `sigma = 0.15 + 0.85 smoothness`, in double precision.
 /// # Errors
-/// [`Error::Value`] where no point lies in the picture, or `smoothness` outside 0 to 1.
+/// [`Error::Value`](crate::Error::Value) where no point lies in the picture, or `smoothness` outside 0 to 1.
 pub fn keying_screen(
     (width, height): (usize, usize),
     points: &[ScreenPoint],
     smoothness: f64,
 ) -> Result<Image<LinearRgb>> {
-    if !(0.0..=1.0).contains(&smoothness) {
-        let what = format!("{smoothness}, expected 0 to 1");
-        return Err(Error::value("smoothness", what));
-    }
+    check_value((0.0..=1.0).contains(&smoothness), "smoothness", || {
+        format!("{smoothness}, expected 0 to 1")
+    })?;
     let points = points_inside(points, width, height)?;
     let size = [width as f64, height as f64];
     let sigma = SHARPEST_SIGMA + SMOOTHNESS_SIGMA * smoothness;
@@ -49,10 +49,9 @@ pub fn keying_screen(
 fn points_inside(points: &[ScreenPoint], width: usize, height: usize) -> Result<Vec<ScreenPoint>> {
     let mut inside = points.to_vec();
     inside.retain(|p| p.is_inside([width as f64, height as f64]));
-    if inside.is_empty() {
-        let what = format!("none inside the {width} x {height} pixels, expected at least 1");
-        return Err(Error::value("points", what));
-    }
+    check_value(!inside.is_empty(), "points", || {
+        format!("none inside the {width} x {height} pixels, expected at least 1")
+    })?;
     Ok(inside)
 }
 

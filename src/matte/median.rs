@@ -1,4 +1,4 @@
-//! Medians.
+//! Medians and other quantiles.
 
 use std::cmp::Ordering;
 
@@ -7,7 +7,15 @@ pub(super) fn median<T: Copy>(
     values: impl Iterator<Item = T>,
     order: impl FnMut(&T, &T) -> Ordering,
 ) -> Option<T> {
-    let mut values: Vec<T> = values.collect();
-    let middle = values.len() / 2;
-    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, order).1)
+    quantile(values.collect(), 0.5, order)
+}
+
+/// The value that a share, 0 to 1, of the others lies below; none where there is none.
+pub(super) fn quantile<T: Copy>(
+    mut values: Vec<T>,
+    share: f64,
+    order: impl FnMut(&T, &T) -> Ordering,
+) -> Option<T> {
+    let rank = (values.len() as f64 * share) as usize;
+    (rank < values.len()).then(|| *values.select_nth_unstable_by(rank, order).1)
 }

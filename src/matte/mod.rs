@@ -15,7 +15,9 @@
 //! # Ok::<(), petcomp::Error>(())
 //! ```
 
+mod arrays;
 mod channel_key;
+mod check;
 mod chroma_key;
 mod color_spill;
 mod cut_out;

@@ -29,13 +29,13 @@ impl Outline {
     /// # Method
     /// Marching squares with linear interpolation between pixel centres (crate `contour`).
     pub fn around(coverage: &Image<Coverage>) -> Self {
-        let rings = contours(coverage)
-            .iter()
-            .flat_map(|contour| &contour.geometry().0)
-            .filter(|polygon| polygon.unsigned_area() >= MIN_RING_AREA_PX)
-            .flat_map(|polygon| open_rings(polygon.orient(Direction::Default)))
-            .collect();
-        Self { rings }
+        Self {
+            rings: contours(coverage)
+                .iter()
+                .flat_map(large_polygons)
+                .flat_map(|polygon| open_rings(polygon.orient(Direction::Default)))
+                .collect(),
+        }
     }
 
     /// A single ring, clockwise as seen.
@@ -45,9 +45,13 @@ impl Outline {
 
     /// The convex hull, clockwise as seen.
     pub fn hull(&self) -> Vec<Point2<f64>> {
-        let points = self.rings.iter().flatten().map(|p| Point::new(p.x, p.y));
-        let (ring, _) = points.collect::<MultiPoint>().convex_hull().into_inner();
+        let (ring, _) = self.all_points().convex_hull().into_inner();
         points_of(ring.0.get(1..).unwrap_or_default())
+    }
+
+    fn all_points(&self) -> MultiPoint {
+        let points = self.rings.iter().flatten();
+        points.map(|p| Point::new(p.x, p.y)).collect()
     }
 
     /// Area inside, square pixels, without the holes.
@@ -58,12 +62,17 @@ impl Outline {
     /// How wide a long strip of this area and outline would be: twice the area over the length of its rings, pixels; 0
     /// where there is nothing.
     pub fn width(&self) -> f64 {
-        let around: f64 = self.rings.iter().map(|ring| ring_length(ring)).sum();
+        let around = self.length();
         if around > 0.0 {
             2.0 * self.area() / around
         } else {
             0.0
         }
+    }
+
+    /// Length of all rings, pixels.
+    fn length(&self) -> f64 {
+        self.rings.iter().map(|ring| ring_length(ring)).sum()
     }
 
     /// Every point moved by a function.
@@ -72,7 +81,7 @@ impl Outline {
             rings: self
                 .rings
                 .iter()
-                .map(|ring| ring.iter().map(|p| f(*p)).collect())
+                .map(|ring| ring.iter().copied().map(&f).collect())
                 .collect(),
         }
     }
@@ -94,7 +103,7 @@ impl Outline {
         let mut rows = vec![Vec::new(); height];
         for ring in &self.rings {
             for side in sides(ring) {
-                let (top, bottom) = rows_crossed(side);
+                let [top, bottom] = rows_crossed(side);
                 for row in rows.iter_mut().take(bottom.saturating_add(1)).skip(top) {
                     row.push(side);
                 }
@@ -105,22 +114,28 @@ impl Outline {
 }
 
 fn contours(coverage: &Image<Coverage>) -> Vec<Contour> {
-    let values: Vec<f64> = coverage.pixels().iter().map(|c| f64::from(c.0)).collect();
-    let (w, h) = coverage.size();
     // Fails only where the number of values is not that of the pixels.
-    ContourBuilder::new(w, h, true)
-        .contours(&values, &[HALF_COVERED])
+    ContourBuilder::new(coverage.width(), coverage.height(), true)
+        .contours(&values_of(coverage), &[HALF_COVERED])
         .unwrap_or_default()
+}
+
+fn values_of(coverage: &Image<Coverage>) -> Vec<f64> {
+    coverage.pixels().iter().map(|c| f64::from(c.0)).collect()
+}
+
+/// The polygons of a contour that are more than rounding.
+fn large_polygons(contour: &Contour) -> impl Iterator<Item = &Polygon> {
+    let polygons = contour.geometry().0.iter();
+    polygons.filter(|polygon| polygon.unsigned_area() >= MIN_RING_AREA_PX)
 }
 
 /// Two neighbouring points of a ring.
 pub(super) type RingSide = [Point2<f64>; 2];
 
 /// The first and the last row of pixels that a side passes through.
-fn rows_crossed([a, b]: RingSide) -> (usize, usize) {
-    let top = a.y.min(b.y).max(0.0) as usize;
-    let bottom = a.y.max(b.y).max(0.0) as usize;
-    (top, bottom)
+fn rows_crossed([a, b]: RingSide) -> [usize; 2] {
+    [a.y.min(b.y), a.y.max(b.y)].map(|y| y.max(0.0) as usize)
 }
 
 /// The sides of a closed ring.
@@ -134,7 +149,12 @@ fn open_rings(polygon: Polygon) -> impl Iterator<Item = Vec<Point2<f64>>> {
     let (outer, holes) = polygon.into_inner();
     std::iter::once(outer)
         .chain(holes)
-        .map(|ring| points_of(&ring.0[..ring.0.len().saturating_sub(1)]))
+        .map(|ring| open_ring(&ring.0))
+}
+
+/// The points of a closed ring without its repeated first one.
+fn open_ring(closed: &[Coord]) -> Vec<Point2<f64>> {
+    points_of(&closed[..closed.len().saturating_sub(1)])
 }
 
 pub(super) fn points_of(coordinates: &[Coord]) -> Vec<Point2<f64>> {
@@ -151,8 +171,16 @@ const SCAN_LINES: usize = 8;
 const LINE_COVERAGE: f32 = 1.0 / SCAN_LINES as f32;
 
 /// Where a side crosses the horizontal line at `y`.
-fn crossing([a, b]: &RingSide, y: f64) -> Option<f64> {
-    ((a.y <= y) != (b.y <= y)).then(|| a.x + (y - a.y) / (b.y - a.y) * (b.x - a.x))
+#[inline]
+fn crossing(side: &RingSide, y: f64) -> Option<f64> {
+    let [a, b] = side;
+    ((a.y <= y) != (b.y <= y)).then(|| x_on_side(side, y))
+}
+
+/// Where the line through a side that is not horizontal is at `y`.
+#[inline]
+fn x_on_side([a, b]: &RingSide, y: f64) -> f64 {
+    a.x + (y - a.y) / (b.y - a.y) * (b.x - a.x)
 }
 
 /// Adds what the insides of rings with these sides cover of row `y`.

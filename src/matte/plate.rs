@@ -3,10 +3,10 @@
 mod cells;
 mod polynomial;
 
-use super::prepared::refused;
+use super::check::{check_photo, check_value, refused};
 use super::register;
 use super::screen::{mean_color, screen_pixels, strongest_channel};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::filter;
 use crate::image::{Image, Mask, Roi};
 use crate::pixel::{Coverage, LinearRgb};
@@ -68,8 +68,8 @@ impl ScreenPlate {
     /// `least_gain` in the residual of cells that were left out of the fit.
     ///
     /// # Errors
-    /// [`Error::Photo`] where there is not enough background, or no light on it; [`Error::Value`] for an option that cannot
-    /// be right.
+    /// [`Error::Photo`](crate::Error::Photo) where there is not enough background, or no light on it;
+    /// [`Error::Value`](crate::Error::Value) for an option that cannot be right.
     /// # Panics
     /// When the sizes differ.
     ///
@@ -92,8 +92,9 @@ impl ScreenPlate {
     /// are matched channel by channel, and its noise is blurred.
     ///
     /// # Errors
-    /// [`Error::Photo`] where the sizes differ, the empty screen lies farther off than `max_shift_px`, or differs from what the
-    /// photo shows of the screen by more than `max_mismatch`; [`Error::Value`] for an option that cannot be right.
+    /// [`Error::Photo`](crate::Error::Photo) where the sizes differ, the empty screen lies farther off than
+    /// `max_shift_px`, or differs from what the photo shows of the screen by more than `max_mismatch`;
+    /// [`Error::Value`](crate::Error::Value) for an option that cannot be right.
     /// # Panics
     /// When the sizes of photo and background differ.
     pub fn from_photo(
@@ -103,12 +104,12 @@ impl ScreenPlate {
         options: &PlateOptions,
     ) -> Result<Self> {
         options.check()?;
-        check_same_size(empty, photo)?;
+        check_same_size(empty.size(), photo.size())?;
         let shift_px = shift_onto(photo, empty, background)?;
         options.check_shift(shift_px)?;
         let image = matched(empty, photo, background, shift_px)?;
         let plate = Self::measured(image, photo, background, None, shift_px);
-        plate.check_mismatch(photo, background, options)?;
+        options.check_mismatch(plate.mismatch(photo, background))?;
         Ok(plate)
     }
 
@@ -142,10 +143,9 @@ impl ScreenPlate {
     }
 
     /// One colour everywhere: the paper's model of the screen.
-    pub fn even(color: LinearRgb, size: (usize, usize)) -> Self {
-        let image = Image::filled(size.0, size.1, color);
+    pub fn even(color: LinearRgb, (width, height): (usize, usize)) -> Self {
         Self {
-            image,
+            image: Image::filled(width, height, color),
             unevenness: 0.0,
             residual: LinearRgb::BLACK,
             degree: Some(0),
@@ -197,22 +197,10 @@ impl ScreenPlate {
         }
     }
 
-    fn check_mismatch(
-        &self,
-        photo: &Image<LinearRgb>,
-        background: &Mask,
-        options: &PlateOptions,
-    ) -> Result<()> {
-        let [seen, expected] = [photo, &self.image].map(|image| cells::means(image, background));
-        let mismatch = cells::mismatch(&seen, &expected);
-        if mismatch <= options.max_mismatch {
-            return Ok(());
-        }
-        Err(refused(format!(
-            "the empty screen differs from the photo's by {:.0} %, expected at most {:.0} %; did the light change?",
-            100.0 * mismatch,
-            100.0 * options.max_mismatch
-        )))
+    /// By how much the plate differs from what the photo shows of the screen, as a share of the screen's brightness.
+    fn mismatch(&self, photo: &Image<LinearRgb>, background: &Mask) -> f32 {
+        let [seen, expected] = cell_means([photo, &self.image], background);
+        cells::mismatch(&seen, &expected)
     }
 }
 
@@ -232,35 +220,38 @@ impl PlateOptions {
 
     fn check_shift(&self, [x, y]: [f64; 2]) -> Result<()> {
         let most = self.max_shift_px;
-        if x.abs() <= most && y.abs() <= most {
-            return Ok(());
-        }
-        Err(refused(format!(
-            "the empty screen is offset by ({x:.1}, {y:.1}) px from the photo, expected at most {most}; did the camera move?"
-        )))
+        check_photo(x.abs() <= most && y.abs() <= most, || {
+            format!(
+                "the empty screen is offset by ({x:.1}, {y:.1}) px from the photo, expected at most {most}; did the camera move?"
+            )
+        })
+    }
+
+    fn check_mismatch(&self, mismatch: f32) -> Result<()> {
+        check_photo(mismatch <= self.max_mismatch, || {
+            format!(
+                "the empty screen differs from the photo's by {:.0} %, expected at most {:.0} %; did the light change?",
+                100.0 * mismatch,
+                100.0 * self.max_mismatch
+            )
+        })
     }
 }
 
 fn check_degree(degree: usize) -> Result<()> {
-    if degree <= MAX_DEGREE {
-        return Ok(());
-    }
-    let what = format!("{degree}, expected 0 to {MAX_DEGREE}");
-    Err(Error::value("max_degree", what))
+    check_value(degree <= MAX_DEGREE, "max_degree", || {
+        format!("{degree}, expected 0 to {MAX_DEGREE}")
+    })
 }
 
 fn check_length(at: &str, value: f64) -> Result<()> {
-    if value >= 0.0 {
-        return Ok(());
-    }
-    Err(Error::value(at, format!("{value}, expected at least 0")))
+    check_value(value >= 0.0, at, || format!("{value}, expected at least 0"))
 }
 
 fn check_share<T: Into<f64> + Copy + std::fmt::Display>(at: &str, value: T) -> Result<()> {
-    if (0.0..=1.0).contains(&value.into()) {
-        return Ok(());
-    }
-    Err(Error::value(at, format!("{value}, expected 0 to 1")))
+    check_value((0.0..=1.0).contains(&value.into()), at, || {
+        format!("{value}, expected 0 to 1")
+    })
 }
 
 /// A photo of the empty screen, moved onto the photo, without its noise and of the photo's exposure.
@@ -270,19 +261,19 @@ fn matched(
     background: &Mask,
     shift_px: [f64; 2],
 ) -> Result<Image<LinearRgb>> {
-    let smooth = filter::gaussian_blur(&register::moved(empty, shift_px), PHOTO_BLUR_PX);
+    let smooth = moved_and_smoothed(empty, shift_px);
     let gain = gain_on_background(photo, &smooth, background)?;
     Ok(smooth.map(|p| p * gain))
 }
 
-fn check_same_size(empty: &Image<LinearRgb>, photo: &Image<LinearRgb>) -> Result<()> {
-    let ((w, h), (width, height)) = (empty.size(), photo.size());
-    if (w, h) == (width, height) {
-        return Ok(());
-    }
-    Err(refused(format!(
-        "the empty screen is {w} x {h} pixels, expected {width} x {height} as the photo"
-    )))
+fn moved_and_smoothed(empty: &Image<LinearRgb>, shift_px: [f64; 2]) -> Image<LinearRgb> {
+    filter::gaussian_blur(&register::moved(empty, shift_px), PHOTO_BLUR_PX)
+}
+
+fn check_same_size((w, h): (usize, usize), (width, height): (usize, usize)) -> Result<()> {
+    check_photo((w, h) == (width, height), || {
+        format!("the empty screen is {w} x {h} pixels, expected {width} x {height} as the photo")
+    })
 }
 
 /// How far a photo of the empty screen must be moved to lie on the photo, pixels right and down.
@@ -293,12 +284,22 @@ fn shift_onto(
 ) -> Result<[f64; 2]> {
     let gain = gain_on_background(photo, empty, background)?;
     // The object's edges must not be seen: the filters of the search reach over them into the free screen.
-    let without_object = photo.zip3_map(
+    let without_object = free_or_empty(photo, empty, background, gain);
+    Ok(register::shift(&without_object, empty, background, [1.0; 3]).shift_px)
+}
+
+/// The photo where the screen is free, elsewhere the empty screen times a gain.
+fn free_or_empty(
+    photo: &Image<LinearRgb>,
+    empty: &Image<LinearRgb>,
+    background: &Mask,
+    gain: LinearRgb,
+) -> Image<LinearRgb> {
+    photo.zip3_map(
         empty,
         background,
         |p, e, free| if free { p } else { e * gain },
-    );
-    Ok(register::shift(&without_object, empty, background, [1.0; 3]).shift_px)
+    )
 }
 
 /// The factor per channel from a photo of the empty screen to the photo.
@@ -307,18 +308,22 @@ fn gain_on_background(
     empty: &Image<LinearRgb>,
     background: &Mask,
 ) -> Result<LinearRgb> {
-    let cells = [photo, empty].map(|picture| cells::means(picture, background));
-    cells::gain(&cells[0], &cells[1])
+    let [photo, empty] = cell_means([photo, empty], background);
+    cells::gain(&photo, &empty)
         .ok_or_else(|| refused("the object leaves no background to check the empty screen on"))
+}
+
+/// The cells of two pictures where a photo shows the screen.
+fn cell_means(pictures: [&Image<LinearRgb>; 2], background: &Mask) -> [Vec<cells::Cell>; 2] {
+    pictures.map(|picture| cells::means(picture, background))
 }
 
 fn whole_mean(plate: &Image<LinearRgb>) -> LinearRgb {
     mean_color(plate.pixels().iter().copied()).unwrap_or(LinearRgb::BLACK)
 }
 
-/// The least and the greatest value of a channel.
-fn extremes(plate: &Image<LinearRgb>, channel: usize) -> (f32, f32) {
-    let values = plate.pixels().iter().map(|p| p.channels()[channel]);
+/// The least and the greatest of some values.
+fn extremes(values: impl Iterator<Item = f32>) -> (f32, f32) {
     values.fold((f32::MAX, 0.0_f32), |(low, high), v| {
         (low.min(v), high.max(v))
     })
@@ -326,7 +331,8 @@ fn extremes(plate: &Image<LinearRgb>, channel: usize) -> (f32, f32) {
 
 /// 1 minus darkest over brightest of the strongest channel.
 fn unevenness(plate: &Image<LinearRgb>) -> f32 {
-    let (low, high) = extremes(plate, strongest_channel(whole_mean(plate)));
+    let channel = strongest_channel(whole_mean(plate));
+    let (low, high) = extremes(plate.pixels().iter().map(|p| p.channels()[channel]));
     if high > 0.0 {
         1.0 - (low / high).clamp(0.0, 1.0)
     } else {

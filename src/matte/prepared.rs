@@ -1,6 +1,7 @@
 //! A photo as the stages of a cut-out take it: checked, reduced and square-rooted once.
 
-use crate::error::{Error, Result};
+use super::check::{check_photo, refused};
+use crate::error::Result;
 use crate::filter;
 use crate::image::Image;
 use crate::pixel::LinearRgb;
@@ -30,14 +31,14 @@ impl<'a> Prepared<'a> {
     /// Checks a photo and reduces it to a longer side of `working_size` pixels.
     ///
     /// # Errors
-    /// [`Error::Photo`] for a photo that is too small or has a pixel that is not finite.
+    /// [`Error::Photo`](crate::Error::Photo) for a photo that is too small or has a pixel that is not finite.
     pub(super) fn new(photo: &'a Image<LinearRgb>, working_size: usize) -> Result<Self> {
         check_size(photo)?;
         check_finite(photo)?;
         Ok(Self {
             photo,
             small: at_working_size(photo, working_size),
-            sqrt: photo.map(|p| p.map(|v| v.max(0.0).sqrt())),
+            sqrt: photo.map(square_root),
         })
     }
 
@@ -45,6 +46,12 @@ impl<'a> Prepared<'a> {
     pub(super) fn longer_side(&self) -> usize {
         longer_side(self.photo)
     }
+}
+
+/// Square roots of the channels: the shot noise of a sensor is the same everywhere in them.
+#[inline]
+pub(super) fn square_root(p: LinearRgb) -> LinearRgb {
+    p.map(|v| v.max(0.0).sqrt())
 }
 
 /// Refuses a photo with a pixel that is not finite.
@@ -59,17 +66,11 @@ pub(super) fn check_finite(photo: &Image<LinearRgb>) -> Result<()> {
 
 fn check_size(photo: &Image<LinearRgb>) -> Result<()> {
     let (w, h) = photo.size();
-    if w.min(h) < MIN_PHOTO_SIDE_PX {
-        return Err(refused(format!(
+    check_photo(w.min(h) >= MIN_PHOTO_SIDE_PX, || {
+        format!(
             "the photo is {w} x {h} pixels, expected at least {MIN_PHOTO_SIDE_PX} x {MIN_PHOTO_SIDE_PX}"
-        )));
-    }
-    Ok(())
-}
-
-/// The error for a photo that cannot be cut out.
-pub(super) fn refused(what: impl Into<String>) -> Error {
-    Error::Photo { what: what.into() }
+        )
+    })
 }
 
 /// Longer side of a picture, pixels.
@@ -94,12 +95,17 @@ fn enlarged(photo: &Image<LinearRgb>, times: usize) -> Image<LinearRgb> {
 }
 
 fn reduced(photo: &Image<LinearRgb>, working_size: usize) -> Image<LinearRgb> {
-    let longer = longer_side(photo);
-    let [w, h] = [photo.width(), photo.height()].map(|side| {
-        let side = (side * working_size).div_ceil(longer);
-        side.max(MIN_SEARCH_SIZE_PX)
-    });
+    let [w, h] = scaled_sides(photo.size(), working_size, MIN_SEARCH_SIZE_PX);
     filter::resize(photo, w, h)
+}
+
+/// The sides of a picture that is scaled to a longer side; none is less than `shortest`.
+pub(super) fn scaled_sides(
+    (w, h): (usize, usize),
+    longer_side: usize,
+    shortest: usize,
+) -> [usize; 2] {
+    [w, h].map(|side| (side * longer_side).div_ceil(w.max(h)).max(shortest))
 }
 
 #[cfg(test)]

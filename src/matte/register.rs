@@ -74,11 +74,17 @@ impl Registered {
 
     /// The shift is a significant one between pictures of the same thing; `side` is the shorter one of the picture.
     fn is_reliable(&self, side: usize) -> bool {
-        let length = Vector2::from(self.shift_px).norm();
         let is_unlike = self.agreement < MIN_AGREEMENT;
-        let is_lost = length > MAX_SHIFT_SHARE * side as f64;
-        let is_insignificant = length < SIGNIFICANT_SIGMAS * self.sigma_px;
-        !(is_unlike || is_lost || is_insignificant)
+        let is_lost = self.length_px() > MAX_SHIFT_SHARE * side as f64;
+        !(is_unlike || is_lost || self.is_insignificant())
+    }
+
+    fn is_insignificant(&self) -> bool {
+        self.length_px() < SIGNIFICANT_SIGMAS * self.sigma_px
+    }
+
+    fn length_px(&self) -> f64 {
+        Vector2::from(self.shift_px).norm()
     }
 }
 
@@ -109,20 +115,20 @@ struct PicturePair {
 }
 
 impl PicturePair {
-    fn halved(&self) -> Self {
-        Self {
+    /// The next level; none where its pictures would be too small.
+    fn halved(&self) -> Option<Self> {
+        self.can_be_halved().then(|| Self {
             a: filter::halve(&self.a),
             b: filter::halve(&self.b),
             mask: filter::halve(&self.mask),
-        }
+        })
     }
 
     /// The pair itself and its halves, as long as they are large enough.
     fn into_pyramid(self) -> Vec<Self> {
         let mut levels = vec![self];
-        while levels.len() < PYRAMID_LEVELS && levels[levels.len() - 1].can_be_halved() {
-            let next = levels[levels.len() - 1].halved();
-            levels.push(next);
+        for _ in 1..PYRAMID_LEVELS {
+            levels.extend(levels.last().and_then(Self::halved));
         }
         levels
     }
@@ -143,13 +149,9 @@ impl PicturePair {
 
     /// The shift by this level, of which a pixel is `at_full` of the first, from a start; both in pixels of the first.
     fn registered(&self, start_px: [f64; 2], at_full: f64) -> Option<Registered> {
-        let start = start_px.map(|s| s / at_full);
-        let (at, last) = self.high_passed().refined(start.into())?;
-        Some(Registered {
-            shift_px: (at * at_full).into(),
-            sigma_px: last.sigma * at_full,
-            agreement: last.agreement,
-        })
+        let start = Vector2::from(start_px) / at_full;
+        let (at, last) = self.high_passed().refined(start)?;
+        Some(last.to_registered(at, at_full))
     }
 
     fn high_passed(&self) -> Self {
@@ -257,6 +259,17 @@ struct ShiftStep {
     by: Vector2<f64>,
     sigma: f64,
     agreement: f64,
+}
+
+impl ShiftStep {
+    /// The shift that this was the last step to, at a level of which a pixel is `at_full` of the first.
+    fn to_registered(&self, at: Vector2<f64>, at_full: f64) -> Registered {
+        Registered {
+            shift_px: (at * at_full).into(),
+            sigma_px: self.sigma * at_full,
+            agreement: self.agreement,
+        }
+    }
 }
 
 /// Neighbouring pixels that vary together after the blur: the area of its kernel, 4 pi sigma^2.

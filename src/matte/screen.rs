@@ -1,6 +1,9 @@
 //! The colour of the screen, from what the object leaves free of it.
 
-use crate::error::{Error, Result};
+use super::arrays::index_of_largest;
+use super::check::refused;
+use super::prepared::longer_side;
+use crate::error::Result;
 use crate::filter;
 use crate::image::{Image, Mask};
 use crate::pixel::{Coverage, LinearRgb};
@@ -13,15 +16,13 @@ const SCREEN_MARGIN: f64 = 0.02;
 /// Where the margin leaves nothing, the mask alone is left out.
 ///
 /// # Errors
-/// [`Error::Photo`] when the mask leaves no background.
+/// [`Error::Photo`](crate::Error::Photo) when the mask leaves no background.
 /// # Panics
 /// When the sizes differ.
 pub fn screen_color(photo: &Image<LinearRgb>, mask: &Image<Coverage>) -> Result<LinearRgb> {
-    let far = background(mask, SCREEN_MARGIN);
-    let found = mean(photo, &far).or_else(|| mean(photo, &background(mask, 0.0)));
-    found.ok_or_else(|| Error::Photo {
-        what: "the object leaves no background to take the screen colour from".into(),
-    })
+    let far = mean(photo, &screen_pixels(mask));
+    far.or_else(|| mean(photo, &background(mask, 0.0)))
+        .ok_or_else(|| refused("the object leaves no background to take the screen colour from"))
 }
 
 /// The pixels outside a mask and a margin around it.
@@ -30,7 +31,7 @@ pub(super) fn screen_pixels(mask: &Image<Coverage>) -> Mask {
 }
 
 fn background(mask: &Image<Coverage>, margin: f64) -> Mask {
-    let margin_px = margin * mask.width().max(mask.height()) as f64;
+    let margin_px = margin * longer_side(mask) as f64;
     filter::dilate(&mask.map(|c| c.0 > 0.0), margin_px).complement()
 }
 
@@ -45,7 +46,7 @@ pub(super) fn masked_pixels(
     set: &Mask,
 ) -> impl Iterator<Item = LinearRgb> {
     let pixels = photo.pixels().iter().zip(set.pixels());
-    pixels.filter(|(_, set)| **set).map(|(p, _)| *p)
+    pixels.filter_map(|(p, set)| set.then_some(*p))
 }
 
 /// Mean of colours; none where there are none. Sums in double precision and in the order of the pixels: the same at any
@@ -66,8 +67,12 @@ const MIN_KEYABLE_EXCESS: f32 = 0.3;
 pub(super) fn is_keyable(screen: LinearRgb) -> bool {
     let mut channels = screen.channels();
     channels.sort_by(f32::total_cmp);
-    let [low, mid, high] = channels;
-    high > 0.0 && (high - 0.5 * (low + mid)) / high >= MIN_KEYABLE_EXCESS
+    channels[2] > 0.0 && excess_share(channels) >= MIN_KEYABLE_EXCESS
+}
+
+/// By how much the largest channel exceeds the mean of the others, as a share of it.
+fn excess_share([low, mid, high]: [f32; 3]) -> f32 {
+    (high - 0.5 * (low + mid)) / high
 }
 
 /// The two channels beside one, in order.
@@ -78,14 +83,7 @@ pub(super) fn other_channels(c: [f32; 3], channel: usize) -> (f32, f32) {
 
 /// Which channel of a colour is the largest; of equal ones the first.
 pub(super) fn strongest_channel(color: LinearRgb) -> usize {
-    let channels = color.channels();
-    (1..3).fold(0, |best, c| {
-        if channels[c] > channels[best] {
-            c
-        } else {
-            best
-        }
-    })
+    index_of_largest(color.channels())
 }
 
 #[cfg(test)]

@@ -1,8 +1,9 @@
 //! The four corners of a coloured screen that is seen as a whole.
 
+use super::check::refused;
 use super::median::median;
 use super::outline::Outline;
-use super::prepared::{longer_side, refused};
+use super::prepared::{longer_side, scaled_sides};
 use super::screen::is_keyable;
 use super::segment::PixelGroups;
 use crate::color::rgb_to_hsv;
@@ -92,9 +93,8 @@ fn rough_corners(picture: &Image<LinearRgb>) -> Result<[Point2<f64>; 4]> {
 }
 
 fn at_search_size(photo: &Image<LinearRgb>) -> Image<LinearRgb> {
-    let longer = longer_side(photo);
-    let [width, height] = [photo.width(), photo.height()]
-        .map(|side| (side * SEARCH_SIZE_PX.min(longer)).div_ceil(longer).max(1));
+    let longer = SEARCH_SIZE_PX.min(longer_side(photo));
+    let [width, height] = scaled_sides(photo.size(), longer, 1);
     filter::resize(photo, width, height)
 }
 
@@ -106,13 +106,20 @@ fn refined(
 ) -> Result<ScreenCorners> {
     let sides = fitted_sides(photo, corners, scale)?;
     Ok(ScreenCorners {
-        corners_px: corners_between(&sides.map(|side| side.line))
-            .ok_or_else(|| not_found("two of its sides are parallel that should meet"))?,
-        sigma_px: sides
-            .iter()
-            .map(|side| side.off_px)
-            .fold(NOISE_PX, f64::max),
+        corners_px: corners_of(&sides)?,
+        sigma_px: most_off_px(&sides),
     })
+}
+
+fn corners_of(sides: &[ScreenSide; 4]) -> Result<[Point2<f64>; 4]> {
+    corners_between(&sides.map(|side| side.line))
+        .ok_or_else(|| not_found("two of its sides are parallel that should meet"))
+}
+
+/// How far the border is from the least straight side; not less than noise.
+fn most_off_px(sides: &[ScreenSide; 4]) -> f64 {
+    let off_px = sides.iter().map(|side| side.off_px);
+    off_px.fold(NOISE_PX, f64::max)
 }
 
 /// The same ring of corners, begun with the one that is nearest to the picture's top left.
@@ -188,11 +195,8 @@ fn without_thin_parts(set: &Mask) -> Mask {
 
 /// A hue is near one of the common hues, and nearer to it than to the others.
 fn is_of_hue(hue: usize, common_hue: usize, common: &[usize]) -> bool {
-    let nearest = common
-        .iter()
-        .copied()
-        .min_by_key(|&other| hue_distance(hue, other));
-    nearest == Some(common_hue) && hue_distance(hue, common_hue) <= SAME_HUE_STEPS
+    let nearest = common.iter().min_by_key(|other| hue_distance(hue, **other));
+    nearest == Some(&common_hue) && hue_distance(hue, common_hue) <= SAME_HUE_STEPS
 }
 
 /// The step of the circle of hues; none for a grey.

@@ -3,13 +3,15 @@
 mod dye;
 mod lines;
 
+use super::arrays::channel_pairs;
+use super::check::{check_photo, check_value, refused};
 use super::film::{covered, view};
 use super::median::median;
 use super::plate::ScreenPlate;
-use super::prepared::refused;
+
 use super::register::{self, Registered};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::filter;
 use crate::image::{Image, Mask};
 use crate::pixel::{Coverage, Film, LinearRgb};
@@ -75,8 +77,9 @@ pub struct Triangulated {
 /// across it is the same in both photos, and shows how far they lie apart.
 ///
 /// # Errors
-/// [`Error::Value`] (`photos`) for fewer than two or of different size; [`Error::Photo`] where no channel of the screens
-/// differs, the object moved farther than `max_shift_px`, turned, or moved otherwise (`least_agreement`).
+/// [`Error::Value`](crate::Error::Value) (`photos`) for fewer than two or of different size;
+/// [`Error::Photo`](crate::Error::Photo) where no channel of the screens differs, the object moved farther than
+/// `max_shift_px`, turned, or moved otherwise (`least_agreement`).
 /// # Panics
 /// When a photo and its plate differ in size.
 ///
@@ -120,20 +123,34 @@ fn composed(solved: &Image<SolvedFilm>, inside: &Image<Coverage>) -> Triangulate
 
 /// Reflected light, and what is seen through plastic that where it lies flat measures `flat`.
 fn seen_film(solved: &Image<SolvedFilm>, flat: LinearRgb, inside: &Image<Coverage>) -> Image<Film> {
-    let seen = view(&solved.map(|p| p.transmittance), flat, inside).zip_map(inside, covered);
     let reflected = solved.zip_map(inside, |p, c| p.reflected.scale(c.0));
-    reflected.zip_map(&seen, Film::new)
+    reflected.zip_map(&view_transmittance(solved, flat, inside), Film::new)
+}
+
+fn view_transmittance(
+    solved: &Image<SolvedFilm>,
+    flat: LinearRgb,
+    inside: &Image<Coverage>,
+) -> Image<LinearRgb> {
+    let measured = solved.map(|p| p.transmittance);
+    view(&measured, flat, inside).zip_map(inside, covered)
 }
 
 fn diagnostics(shift_px: &[[f64; 2]], determined: [bool; 3]) -> Vec<Diagnostic> {
+    let moved = moved_photos(shift_px);
+    moved.chain(open_channels(determined)).collect()
+}
+
+fn moved_photos(shift_px: &[[f64; 2]]) -> impl Iterator<Item = Diagnostic> {
     let photos = (1..).zip(shift_px);
     let moved = photos.filter(|(_, shift)| **shift != [0.0; 2]);
+    moved.map(|(photo, shift)| moved_photo(photo, *shift))
+}
+
+fn open_channels(determined: [bool; 3]) -> impl Iterator<Item = Diagnostic> {
     let channels = CHANNELS.into_iter().zip(determined);
     let open = channels.filter(|(_, determined)| !determined);
-    moved
-        .map(|(photo, shift)| moved_photo(photo, *shift))
-        .chain(open.map(|(name, _)| similar_screens(name)))
-        .collect()
+    open.map(|(name, _)| similar_screens(name))
 }
 
 /// Noise of a photo at least: coded pictures are no finer.
@@ -152,17 +169,16 @@ fn check_sizes(
     shots: &[(&Image<LinearRgb>, &ScreenPlate)],
     inside: &Image<Coverage>,
 ) -> Result<()> {
-    if shots.len() < 2 {
-        let what = format!("{}, expected at least 2", shots.len());
-        return Err(Error::value("photos", what));
-    }
+    check_value(shots.len() >= 2, "photos", || {
+        format!("{}, expected at least 2", shots.len())
+    })?;
     for (i, (photo, plate)) in shots.iter().enumerate() {
         assert_eq!(
             photo.size(),
             plate.image.size(),
             "photo {i} and its plate differ in size"
         );
-        check_same_size(i, photo, inside)?;
+        check_same_size(i, photo.size(), inside.size())?;
     }
     Ok(())
 }
@@ -170,15 +186,14 @@ fn check_sizes(
 /// Photo `number`, from 0, has the size of the mask.
 fn check_same_size(
     number: usize,
-    photo: &Image<LinearRgb>,
-    inside: &Image<Coverage>,
+    (w, h): (usize, usize),
+    (width, height): (usize, usize),
 ) -> Result<()> {
-    let ((w, h), (width, height)) = (photo.size(), inside.size());
-    if (w, h) == (width, height) {
-        return Ok(());
-    }
-    let what = format!("{w} x {h} pixels, expected {width} x {height}");
-    Err(Error::value(format!("photos[{number}]"), what))
+    check_value(
+        (w, h) == (width, height),
+        &format!("photos[{number}]"),
+        || format!("{w} x {h} pixels, expected {width} x {height}"),
+    )
 }
 
 fn align(
@@ -209,11 +224,11 @@ impl AlignedPhoto {
         square_distance(film.over(self.screen.pixels()[i]), self.photo.pixels()[i])
     }
 
-    fn new(photo: &Image<LinearRgb>, plate: &ScreenPlate, [x, y]: [f64; 2]) -> Self {
+    fn new(photo: &Image<LinearRgb>, plate: &ScreenPlate, by_px: [f64; 2]) -> Self {
         Self {
-            photo: register::moved(photo, [x, y]),
-            screen: register::moved(&plate.image, [x, y]),
-            shift_px: [0.0 - x, 0.0 - y],
+            photo: register::moved(photo, by_px),
+            screen: register::moved(&plate.image, by_px),
+            shift_px: by_px.map(|v| 0.0 - v),
         }
     }
 }
@@ -231,7 +246,7 @@ impl Aligner<'_> {
     /// not change.
     ///
     /// # Errors
-    /// [`Error::Photo`] where it was moved too far, turned, or differs otherwise.
+    /// [`Error::Photo`](crate::Error::Photo) where it was moved too far, turned, or differs otherwise.
     fn shift_px(
         &self,
         number: usize,
@@ -348,28 +363,36 @@ fn fit_lines(photos: &[AlignedPhoto], noise: f32) -> Image<PixelLines> {
 
 #[inline]
 fn add_point(lines: &mut [ScreenLine; 3], screen: LinearRgb, pixel: LinearRgb) {
-    let (screen, pixel) = (screen.channels(), pixel.channels());
-    (0..3).for_each(|c| lines[c].add(screen[c], pixel[c]));
+    for (line, (screen, pixel)) in lines.iter_mut().zip(channel_pairs(screen, pixel)) {
+        line.add(screen, pixel);
+    }
 }
 
 /// Channels whose slope is measured well enough, by the median over the object.
 ///
 /// # Errors
-/// [`Error::Photo`] where there is none.
+/// [`Error::Photo`](crate::Error::Photo) where there is none.
 fn determined_channels(
     lines: &Image<PixelLines>,
     inside: &Image<Coverage>,
     max_sigma: f32,
 ) -> Result<[bool; 3]> {
-    let determined = [0, 1, 2].map(|c| {
-        let sigmas = lines::covered_pixels(lines, inside).map(|p| p.sigma(c));
-        median(sigmas, f32::total_cmp).is_some_and(|sigma| sigma <= max_sigma)
-    });
-    if determined == [false; 3] {
-        let what = "the screens are too similar in every channel to separate film from background";
-        return Err(refused(what));
-    }
+    let determined =
+        [0, 1, 2].map(|c| median_sigma(lines, inside, c).is_some_and(|sigma| sigma <= max_sigma));
+    check_photo(determined != [false; 3], || {
+        "the screens are too similar in every channel to separate film from background".into()
+    })?;
     Ok(determined)
+}
+
+/// Standard deviation of a channel's transmittance, the median over the object.
+fn median_sigma(
+    lines: &Image<PixelLines>,
+    inside: &Image<Coverage>,
+    channel: usize,
+) -> Option<f32> {
+    let pixels = lines::covered_pixels(lines, inside);
+    median(pixels.map(|p| p.sigma(channel)), f32::total_cmp)
 }
 
 /// Root mean square of what the film does not explain of the photos inside the object.
@@ -389,8 +412,8 @@ fn residual(photos: &[AlignedPhoto], solved: &Image<SolvedFilm>, inside: &Image<
 }
 
 fn square_distance(a: LinearRgb, b: LinearRgb) -> f64 {
-    let channels = a.channels().into_iter().zip(b.channels());
-    channels.map(|(a, b)| f64::from(a - b).powi(2)).sum()
+    let pairs = channel_pairs(a, b).into_iter();
+    pairs.map(|(a, b)| f64::from(a - b).powi(2)).sum()
 }
 
 fn strongest_noise(shots: &[(&Image<LinearRgb>, &ScreenPlate)]) -> f32 {

@@ -36,10 +36,8 @@ impl Matted {
         }
     }
 
-    fn outline(region: &ObjectRegion) -> Self {
-        let cutout = region
-            .photo
-            .zip_map(&region.cut, |p, m| p.opaque().masked(m));
+    fn outline(ObjectRegion { photo, cut, .. }: &ObjectRegion) -> Self {
+        let cutout = photo.zip_map(cut, |p, m| p.opaque().masked(m));
         Self::grey(MatteMethod::Outline, cutout, 0.0)
     }
 

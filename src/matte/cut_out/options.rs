@@ -1,7 +1,8 @@
 //! How a photo becomes a cut-out.
 
 use crate::bounds::Bounds;
-use crate::error::{Error, Result};
+use crate::error::Result;
+use crate::matte::check::check_value;
 use crate::matte::film::FilmOptions;
 use crate::matte::key::KeyOptions;
 use crate::matte::plate::PlateOptions;
@@ -119,11 +120,8 @@ impl CutOutOptions {
 
 fn check_screen(screen: LinearRgb) -> Result<()> {
     let channels = screen.channels();
-    if screen.is_finite() && channels.iter().all(|v| *v >= 0.0) {
-        return Ok(());
-    }
-    Err(Error::value(
-        "screen",
-        format!("{channels:?}, expected numbers of at least 0"),
-    ))
+    let is_right = screen.is_finite() && channels.iter().all(|v| *v >= 0.0);
+    check_value(is_right, "screen", || {
+        format!("{channels:?}, expected numbers of at least 0")
+    })
 }

@@ -43,9 +43,14 @@ pub(super) fn make_opaque(
 
 fn cover_with_paint(factors: &mut Image<Factor>, paint: &Image<f32>) {
     for (factor, paint) in factors.pixels_mut().iter_mut().zip(paint.pixels()) {
-        factor.value *= 1.0 - paint;
-        factor.sigma = factor.sigma.max(*paint);
+        paint_over(factor, *paint);
     }
+}
+
+#[inline]
+fn paint_over(factor: &mut Factor, paint: f32) {
+    factor.value *= 1.0 - paint;
+    factor.raise_sigma(paint);
 }
 
 /// The pixels that are brighter in the screen's hue than plastic in front of it can be.
@@ -129,7 +134,7 @@ fn fill(factor: &mut Factor, hidden: f32, around: f32) {
     } else {
         more
     };
-    factor.sigma = factor.sigma.max(hidden * FILLED_SIGMA);
+    factor.raise_sigma(hidden * FILLED_SIGMA);
 }
 
 /// How much of what lies behind is hidden by this much reflected light.

@@ -2,6 +2,7 @@
 
 use crate::filter;
 use crate::image::{Image, Mask};
+use crate::matte::arrays::{dot, largest};
 use crate::pixel::Coverage;
 use std::ops::RangeInclusive;
 
@@ -23,14 +24,8 @@ pub(super) fn interior(inside: &Image<Coverage>, longer_side: usize) -> Mask {
 /// A pixel is the screen in some shade.
 pub(super) fn is_screen(pixel: [f32; 3], screen: [f32; 3]) -> bool {
     let shade = dot(pixel, screen) / dot(screen, screen).max(f32::MIN_POSITIVE);
-    let strongest = screen.into_iter().fold(0.0, f32::max);
+    let strongest = largest(screen);
     (0..3).all(|c| (pixel[c] - shade * screen[c]).abs() <= MAX_SCREEN_DEVIATION * strongest)
-}
-
-/// Sum of the products of three channels.
-#[inline(always)]
-pub(super) fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// How far a value is from the start of a range to its end, 0 to 1.
@@ -53,11 +48,15 @@ pub(super) fn side_px(inside: &Image<Coverage>) -> f32 {
 /// The share of the object's area that a set of pixels has.
 pub(super) fn share(set: impl Iterator<Item = bool>, inside: &Image<Coverage>) -> f32 {
     let object = area(inside);
-    let covered = set.zip(inside.pixels()).filter(|(set, _)| *set);
-    let chosen: f64 = covered.map(|(_, c)| f64::from(c.0)).sum();
     if object > 0.0 {
-        (chosen / object) as f32
+        (area_of(set, inside) / object) as f32
     } else {
         0.0
     }
+}
+
+/// Area of the object in a set of pixels.
+fn area_of(set: impl Iterator<Item = bool>, inside: &Image<Coverage>) -> f64 {
+    let covered = set.zip(inside.pixels()).filter(|(set, _)| *set);
+    covered.map(|(_, c)| f64::from(c.0)).sum()
 }

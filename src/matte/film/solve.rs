@@ -2,6 +2,7 @@
 
 use super::FilmOptions;
 use super::tint::{CLEAR_TRANSMITTANCE, scattered_tint};
+use crate::matte::arrays::largest;
 use crate::pixel::LinearRgb;
 use std::ops::RangeInclusive;
 
@@ -28,6 +29,12 @@ impl Factor {
             sigma: self.sigma / spread,
             ..self
         }
+    }
+
+    /// Makes the deviation at least that.
+    #[inline]
+    pub(super) fn raise_sigma(&mut self, least: f32) {
+        self.sigma = self.sigma.max(least);
     }
 }
 
@@ -83,9 +90,8 @@ impl Solver {
     /// The factor on a screen with a hue.
     pub(super) fn solve(&self, pixel: [f32; 3], screen: [f32; 3]) -> Factor {
         let measured = self.measure(pixel, screen);
-        let brightest = pixel[self.others[0]]
-            .max(pixel[self.others[1]])
-            .max(measured.reflected);
+        let [a, b] = self.others.map(|c| pixel[c]);
+        let brightest = a.max(b).max(measured.reflected);
         self.combine(pixel, &measured, plastic_factor(brightest))
     }
 
@@ -93,9 +99,7 @@ impl Solver {
     /// plastic throws back. The deviation is that of something that may or may not be plastic.
     pub(super) fn guess(&self, pixel: [f32; 3], screen: [f32; 3]) -> Factor {
         let measured = self.measure(pixel, screen);
-        let left = (0..3)
-            .map(|c| pixel[c] - measured.through[c])
-            .fold(0.0, f32::max);
+        let left = measured.most_left(pixel);
         self.combine(pixel, &measured, plastic_factor(left))
             .guessed(self.spread)
     }
@@ -152,14 +156,21 @@ impl Solver {
     }
 
     /// Plastic reflects neutrally, scatters in its own tint, or both: what lies beyond is paint.
+    #[inline]
     fn is_coloured(&self, a: f32, b: f32) -> bool {
-        let [least, most] = if self.cast < 1.0 {
+        let [least, most] = self.plastic_range(a);
+        let beyond = (least - b).max(b - most);
+        beyond > MAX_DARK_CAST_DIFFERENCE + MAX_CAST_DIFFERENCE * a.abs().max(b.abs())
+    }
+
+    /// What plastic reflects in the second of the other channels, least and most, where it reflects `a` in the first.
+    #[inline]
+    fn plastic_range(&self, a: f32) -> [f32; 2] {
+        if self.cast < 1.0 {
             [self.cast * a, a]
         } else {
             [a, self.cast * a]
-        };
-        let beyond = (least - b).max(b - most);
-        beyond > MAX_DARK_CAST_DIFFERENCE + MAX_CAST_DIFFERENCE * a.abs().max(b.abs())
+        }
     }
 }
 
@@ -172,6 +183,16 @@ struct PixelMeasurement {
     factor: f32,
     /// Of the factor.
     variance: f32,
+}
+
+impl PixelMeasurement {
+    /// The most light of a channel that the screen through flat plastic leaves; not less than 0.
+    #[inline]
+    fn most_left(&self, pixel: [f32; 3]) -> f32 {
+        (0..3)
+            .map(|c| pixel[c] - self.through[c])
+            .fold(0.0, f32::max)
+    }
 }
 
 /// The factor at which a channel is all screen: nothing reflects less than no light.
@@ -191,7 +212,7 @@ fn plastic_factor(brightest: f32) -> f32 {
 /// The shares of two channels' light that make up the third's, for light of which a part is neutral and the rest has the
 /// colour `scattered`; half and half where the two do not differ.
 fn shares(key: usize, [a, b]: [usize; 2], scattered: [f32; 3]) -> [f32; 2] {
-    let soft = MIN_TINT_CONTRAST * scattered.iter().copied().fold(0.0, f32::max);
+    let soft = MIN_TINT_CONTRAST * largest(scattered);
     let differ = scattered[a] - scattered[b];
     let share = (differ * (scattered[key] - scattered[b]) + 0.5 * soft * soft)
         / (differ * differ + soft * soft);

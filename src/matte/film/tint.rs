@@ -1,7 +1,8 @@
 //! The plastic of a photo: which dye, and how much of it, found from the pixels that reflect least.
 
-use super::object::{OPAQUE, dot, is_screen};
+use super::object::{OPAQUE, is_screen};
 use crate::image::Image;
+use crate::matte::arrays::dot;
 use crate::matte::median::median;
 use crate::matte::plate::ScreenPlate;
 use crate::pixel::{Coverage, LinearRgb};
@@ -136,24 +137,22 @@ impl TintSamples {
     pub(super) fn fit(&self) -> Tint {
         let tried = self.hypotheses();
         let best = lowest_misfit(&tried);
-        let as_good = tried
-            .iter()
-            .filter(|tint| tint.misfit <= best.misfit + EQUAL_MISFIT);
         Tint {
             flat: best.flat,
-            uncertainty: as_good
-                .map(|tint| largest_difference(tint.flat, best.flat))
-                .fold(0.0, f32::max),
+            uncertainty: best.uncertainty(&tried),
         }
     }
 
     /// Clear plastic, and then every dye in every amount.
     fn hypotheses(&self) -> Vec<TintHypothesis> {
         let clear = self.judge([CLEAR_TRANSMITTANCE; 3], 0.0);
-        let dyed = dyed()
+        std::iter::once(clear).chain(self.judged_dyes()).collect()
+    }
+
+    fn judged_dyes(&self) -> impl Iterator<Item = TintHypothesis> {
+        dyed()
             .filter(|flat| flat[self.key] >= MIN_KEY_TRANSMITTANCE)
-            .map(|flat| self.judge(flat, DYE_HANDICAP));
-        std::iter::once(clear).chain(dyed).collect()
+            .map(|flat| self.judge(flat, DYE_HANDICAP))
     }
 
     fn judge(&self, flat: [f32; 3], handicap: f32) -> TintHypothesis {
@@ -183,6 +182,20 @@ fn darkest(mut pixels: Vec<ScreenPair>, key: usize, share: f64) -> Vec<ScreenPai
 fn thinned<T>(items: Vec<T>, count: usize) -> impl Iterator<Item = T> {
     let step = (items.len() / count).max(1);
     items.into_iter().step_by(step)
+}
+
+impl TintHypothesis {
+    /// The largest difference in a channel from those that explain the pixels as well.
+    fn uncertainty(&self, tried: &[Self]) -> f32 {
+        let as_good = tried.iter().filter(|other| other.is_as_good_as(self));
+        as_good
+            .map(|other| largest_difference(other.flat, self.flat))
+            .fold(0.0, f32::max)
+    }
+
+    fn is_as_good_as(&self, best: &Self) -> bool {
+        self.misfit <= best.misfit + EQUAL_MISFIT
+    }
 }
 
 /// The first of the hypotheses that explain the pixels best.

@@ -39,7 +39,7 @@ impl ColorUncertainty {
     /// How certain colour and transmittance are, 0 to 1: 0.5 where one cause reaches [`NEEDS_REVIEW`](Self::NEEDS_REVIEW).
     pub fn confidence(self) -> f64 {
         let all = self.causes().into_iter().zip(Self::NEEDS_REVIEW.causes());
-        all.map(|(cause, limit)| f64::from(limit) / (f64::from(limit) + f64::from(cause)))
+        all.map(|(cause, limit)| certainty(cause.into(), limit.into()))
             .product()
     }
 
@@ -125,6 +125,11 @@ const MIN_REPORTED_CLIPPED: f32 = 0.03;
 /// Transmittance of the screen's channel from which on nothing seems to lie on the screen: two clear walls pass 0.56, one of
 /// them three quarters.
 const BARE_TRANSMITTANCE: f32 = 0.85;
+
+/// 1 without a cause, 0.5 where it reaches its limit.
+fn certainty(cause: f64, limit: f64) -> f64 {
+    limit / (limit + cause)
+}
 
 /// The share of the object that looks like bare screen, away from its rim, and was left see-through. `flat` is what flat
 /// plastic passes in the screen's channel, `longer_side` that of the whole photo, pixels.

@@ -50,9 +50,7 @@ pub(in crate::matte) fn view(
 
 /// Transmittance times coverage, with the coverage.
 fn weighted(transmittance: &Image<LinearRgb>, inside: &Image<Coverage>) -> Image<PremulRgba> {
-    transmittance.zip_map(inside, |t, c| {
-        PremulRgba::new(t.r * c.0, t.g * c.0, t.b * c.0, c.0)
-    })
+    transmittance.zip_map(inside, |t, c| t.opaque().masked(c))
 }
 
 #[inline(always)]
@@ -76,10 +74,15 @@ fn pixel_view(smooth: LinearRgb, flat: LinearRgb, t: LinearRgb, inner: f32) -> L
 /// View transmittance of one channel: `smooth` is its T without grain, `flat` that of flat plastic, `t` its own T.
 #[inline(always)]
 fn channel_view(smooth: f32, flat: f32, t: f32, inner: f32) -> f32 {
-    let relative = relative_view(smooth / flat.max(f32::MIN_POSITIVE), inner);
-    let plastic = (FLAT_VIEW_GAIN * flat.sqrt() * relative).clamp(0.0, 1.0);
+    let plastic = plastic_view(smooth, flat, inner);
     let bare = ramp(t, &BARE_TRANSMITTANCE);
     plastic + bare * (1.0 - plastic)
+}
+
+#[inline(always)]
+fn plastic_view(smooth: f32, flat: f32, inner: f32) -> f32 {
+    let relative = relative_view(smooth / flat.max(f32::MIN_POSITIVE), inner);
+    (FLAT_VIEW_GAIN * flat.sqrt() * relative).clamp(0.0, 1.0)
 }
 
 /// How far plastic so deep below the outline counts as flat, 0 to 1.
@@ -93,8 +96,13 @@ fn flatness(depth: f32) -> f32 {
 fn relative_view(u: f32, inner: f32) -> f32 {
     let u = u.clamp(0.0, MAX_RATIO);
     let rim = RIM_GAIN * u * u.sqrt().sqrt();
-    let deep = cube(u) * (1.0 + cube(OPAQUE_RATIO)) / (cube(u) + cube(OPAQUE_RATIO));
-    rim + inner * (deep - rim)
+    rim + inner * (deep_view(u) - rim)
+}
+
+/// The same deep inside the object.
+#[inline]
+fn deep_view(u: f32) -> f32 {
+    cube(u) * (1.0 + cube(OPAQUE_RATIO)) / (cube(u) + cube(OPAQUE_RATIO))
 }
 
 #[inline(always)]

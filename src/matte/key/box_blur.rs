@@ -5,6 +5,7 @@ use super::model::Behaviour;
 use super::options::{Blur, KeyOptions};
 use super::rows::{Pad, Rows, Source, Window, rows_around, window_rows};
 use super::running_blur::{BoxReach, RunningBlur};
+use std::ops::Range;
 
 /// A plane blurred by a box of `size` (at least 1), in the way that the options ask for.
 pub(super) fn box_blurred<'a>(
@@ -156,32 +157,32 @@ impl BoxKernel {
 
     fn along_x(&self, padded: &mut [f32], calm: &mut Calm, out: &mut [f32]) {
         let radius = self.radius();
-        let pad = if let Self::CutOff { .. } = self {
-            Pad::Value(0.0)
-        } else {
-            Pad::Repeat
-        };
-        pad.fill_margins(padded, radius);
+        let repeat = matches!(self, Self::Repeat { .. });
+        Pad::repeat_or(repeat, 0.0).fill_margins(padded, radius);
         calm.fill_row(
             out,
             (0, 0..1, radius),
             |_, near| self.settled_value(near),
-            |columns, out| {
-                let at = |offset: usize| &padded[columns.start + offset..columns.end + offset];
-                match self {
-                    Self::CutOff {
-                        columns: counts, ..
-                    } => {
-                        mean_of_rows(out, 2 * radius + 1, at, &counts[columns.clone()]);
-                    }
-                    Self::Repeat { weights, .. } => {
-                        weighted_sum(out, weights, at(radius), |i| {
-                            [at(radius + i), at(radius - i)]
-                        });
-                    }
-                }
-            },
+            |columns, out| self.compute_along_x(padded, columns, out),
         );
+    }
+
+    /// Blurs a few columns of a row between margins.
+    fn compute_along_x(&self, padded: &[f32], columns: Range<usize>, out: &mut [f32]) {
+        let radius = self.radius();
+        let at = |offset: usize| &padded[columns.start + offset..columns.end + offset];
+        match self {
+            Self::CutOff {
+                columns: counts, ..
+            } => {
+                mean_of_rows(out, 2 * radius + 1, at, &counts[columns.clone()]);
+            }
+            Self::Repeat { weights, .. } => {
+                weighted_sum(out, weights, at(radius), |i| {
+                    [at(radius + i), at(radius - i)]
+                });
+            }
+        }
     }
 
     /// Blender counts rows from the bottom, so sums run upwards.
@@ -195,28 +196,38 @@ impl BoxKernel {
         let rows = rows_around(y, self.radius(), height);
         calm.fill_row(
             out,
-            (y, rows.clone(), 0),
+            (y, rows, 0),
             |_, near| self.settled_value(near),
-            |columns, out| {
-                let at = |row: usize| &window.row(row)[columns.clone()];
-                match self {
-                    Self::CutOff { .. } => {
-                        let counts = [rows.len() as f32; RUN_COLUMNS];
-                        mean_of_rows(
-                            out,
-                            rows.len(),
-                            |i| at(rows.end - 1 - i),
-                            &counts[..columns.len()],
-                        );
-                    }
-                    Self::Repeat { weights, .. } => {
-                        weighted_sum(out, weights, at(y), |i| {
-                            [at(y.saturating_sub(i)), at((y + i).min(height - 1))]
-                        });
-                    }
-                }
-            },
+            |columns, out| self.compute_along_y(window, (y, height), columns, out),
         );
+    }
+
+    /// Blurs a few columns of row `y`.
+    fn compute_along_y(
+        &self,
+        window: &Window,
+        (y, height): (usize, usize),
+        columns: Range<usize>,
+        out: &mut [f32],
+    ) {
+        let at = |row: usize| &window.row(row)[columns.clone()];
+        match self {
+            Self::CutOff { .. } => {
+                let rows = rows_around(y, self.radius(), height);
+                let counts = [rows.len() as f32; RUN_COLUMNS];
+                mean_of_rows(
+                    out,
+                    rows.len(),
+                    |i| at(rows.end - 1 - i),
+                    &counts[..columns.len()],
+                );
+            }
+            Self::Repeat { weights, .. } => {
+                weighted_sum(out, weights, at(y), |i| {
+                    [at(y.saturating_sub(i)), at((y + i).min(height - 1))]
+                });
+            }
+        }
     }
 }
 
@@ -235,6 +246,7 @@ fn mean_of_rows<'a, F: Fn(usize) -> &'a [f32]>(
     row: F,
     inside: &[f32],
 ) {
+    // Longer than elsewhere: both loops are compiled for each vector width in one piece.
     out.fill(0.0);
     let whole = count - count % ROWS_AT_ONCE;
     for i in (0..whole).step_by(ROWS_AT_ONCE) {

@@ -103,6 +103,7 @@ impl Calm {
                 compute(columns.clone(), &mut out[columns]);
             }
         };
+        // Longer than elsewhere: one pass over the blocks joins those that are not calm into runs.
         self.gather_rows(rows);
         let row = self.slot(y).start;
         let mut open = 0..0;

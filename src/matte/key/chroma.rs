@@ -65,8 +65,7 @@ pub(in crate::matte) fn to_ycc(p: PremulRgba, is_late: bool) -> [f32; 3] {
 /// The colour of three signals in unit scale.
 pub(in crate::matte) fn from_ycc(signals: [f32; 3]) -> [f32; 3] {
     let [y, cb, cr] = signals.map(|s| s * CODE_MAX);
-    let p = color_from_codes(y, cb, cr, 1.0);
-    [p.r, p.g, p.b]
+    color_from_codes(y, cb, cr, 1.0).color().channels()
 }
 
 /// The colour of three signals in code values.

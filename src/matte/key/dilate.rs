@@ -49,6 +49,15 @@ struct Extreme {
 }
 
 impl Extreme {
+    fn new(largest: bool, unlimited: bool) -> Self {
+        let start = match (unlimited, largest) {
+            (true, true) => f32::MIN,
+            (true, false) => f32::MAX,
+            (false, true) => 0.0,
+            (false, false) => 1.0,
+        };
+        Self { largest, start }
+    }
     /// The extreme of two samples; the first stays where they are equal or one is NaN.
     #[inline(always)]
     fn pick(self, a: f32, b: f32) -> f32 {
@@ -69,19 +78,12 @@ impl<'a> Dilate<'a> {
             distance,
             lopsided: !unlimited && options.profile != Profile::Robust,
         };
-        let largest = options.dilate_distance > 0;
-        let start = match (unlimited, largest) {
-            (true, true) => f32::MIN,
-            (true, false) => f32::MAX,
-            (false, true) => 0.0,
-            (false, false) => 1.0,
-        };
         let runs = (2 * distance + 1).ilog2() as usize + 1;
         let window = Window::new((width + 2 * distance) * runs, window_rows(distance, height));
         Self {
             source,
             shape,
-            extreme: Extreme { largest, start },
+            extreme: Extreme::new(options.dilate_distance > 0, unlimited),
             height,
             window,
             width,
@@ -89,8 +91,9 @@ impl<'a> Dilate<'a> {
     }
 }
 
-impl Rows for Dilate<'_> {
-    fn row(&mut self, y: usize, out: &mut [f32]) {
+impl Dilate<'_> {
+    /// Makes the runs of the rows around row `y` present.
+    fn cover_rows(&mut self, y: usize) {
         let Self {
             source,
             shape,
@@ -110,21 +113,27 @@ impl Rows for Dilate<'_> {
             Pad::Value(extreme.start).fill_margins(&mut runs[..stride], margin);
             double_runs(runs, stride, *extreme);
         });
-        out.fill(extreme.start);
-        for near in rows_around(y, margin, *height) {
-            let Some((left, right)) = shape.row_reach(y as isize - near as isize) else {
-                continue;
-            };
-            let length = left + right + 1;
-            let level = length.ilog2() as usize;
-            let runs = &window.row(near)[level * stride..][..stride];
-            let (first, second) = (margin - left, margin + right + 1 - (1 << level));
-            widen_row(
-                out,
-                &runs[first..first + *width],
-                &runs[second..second + *width],
-                *extreme,
-            );
+    }
+
+    /// The extremes of two runs of row `near`, for every pixel, that together reach from `left` to `right` of it.
+    fn two_runs(&self, near: usize, (left, right): (usize, usize)) -> [&[f32]; 2] {
+        let (margin, width) = (self.shape.distance, self.width);
+        let stride = width + 2 * margin;
+        let level = (left + right + 1).ilog2() as usize;
+        let runs = &self.window.row(near)[level * stride..][..stride];
+        [margin - left, margin + right + 1 - (1 << level)].map(|first| &runs[first..first + width])
+    }
+}
+
+impl Rows for Dilate<'_> {
+    fn row(&mut self, y: usize, out: &mut [f32]) {
+        self.cover_rows(y);
+        out.fill(self.extreme.start);
+        for near in rows_around(y, self.shape.distance, self.height) {
+            if let Some(reach) = self.shape.row_reach(y as isize - near as isize) {
+                let [a, b] = self.two_runs(near, reach);
+                widen_row(out, a, b, self.extreme);
+            }
         }
     }
 }

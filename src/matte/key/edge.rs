@@ -81,11 +81,8 @@ impl<'a> EdgeSearch<'a> {
 
     fn search_row(&mut self, y: usize, half: usize, matte: &mut [f32], edges: &mut [f32]) {
         let (width, height, repeat) = (matte.len(), self.height, self.behaviour.repeats_border());
-        let pad = if repeat {
-            Pad::Repeat
-        } else {
-            Pad::Value(f32::NAN)
-        };
+        // Longer than elsewhere: window, source and notes are borrowed at once, and each row is searched while it is cached.
+        let pad = Pad::repeat_or(repeat, f32::NAN);
         self.window
             .cover_rows(rows_around(y, half, height), |y, row| {
                 self.source.row(y, &mut row[half..half + width]);
@@ -166,6 +163,7 @@ fn mark_edges(
     tolerance: f32,
     behaviour: Behaviour,
 ) {
+    // Longer than elsewhere: a loop for each behaviour, all compiled for each vector width.
     let pixels = counts.iter_mut().zip(matte).zip(seen.columns);
     let all = ((2 * seen.half + 1) * (2 * seen.half + 1)) as f32;
     match behaviour {

@@ -82,11 +82,13 @@ fn gaussian_table(distance: usize, behaviour: Behaviour) -> Vec<f32> {
 /// Offsets in the order in which the profile visits samples.
 fn visiting_order(radius: isize, behaviour: Behaviour) -> Vec<isize> {
     match behaviour {
-        Behaviour::V45 => std::iter::once(0)
-            .chain((1..=radius).flat_map(|i| [-i, i]))
-            .collect(),
+        Behaviour::V45 => from_the_middle(radius).collect(),
         Behaviour::V34 | Behaviour::V42 => (-radius..=radius).collect(),
     }
+}
+
+fn from_the_middle(radius: isize) -> impl Iterator<Item = isize> {
+    std::iter::once(0).chain((1..=radius).flat_map(|i| [-i, i]))
 }
 
 fn total_from_centre(gauss: &[f32]) -> f32 {
@@ -233,6 +235,18 @@ impl FeatherKernel {
         );
     }
 
+    /// The order of the samples that lie inside, `up` rows above the bottom. Windows that are cut off keep the middle of the
+    /// order, which runs upwards for them.
+    fn order_inside(&self, up: usize, height: usize) -> &[isize] {
+        match self.behaviour {
+            Behaviour::V45 => &self.order[..],
+            _ => {
+                &self.order[self.radius().saturating_sub(up)..]
+                    [..rows_around(up, self.radius(), height).len()]
+            }
+        }
+    }
+
     /// Blender counts rows from the bottom, so an offset of 1 is one row up.
     fn along_y(
         &self,
@@ -243,14 +257,7 @@ impl FeatherKernel {
     ) {
         let up = height - 1 - y;
         let total = self.weight_inside(up, height);
-        // Windows that are cut off keep the middle of the order, which runs upwards for them.
-        let order = match self.behaviour {
-            Behaviour::V45 => &self.order[..],
-            _ => {
-                &self.order[self.radius().saturating_sub(up)..]
-                    [..rows_around(up, self.radius(), height).len()]
-            }
-        };
+        let order = self.order_inside(up, height);
         calm.fill_row(
             out,
             (y, rows_around(y, self.radius(), height), 0),
@@ -275,6 +282,7 @@ impl FeatherKernel {
         totals: &[f32],
         out: &mut [f32],
     ) {
+        // Longer than elsewhere: three buffers on the stack are lent to one loop for every kind of window.
         let tap = |side: isize| -> Tap<'r> {
             let i = side.unsigned_abs();
             (row(side), [self.falloff[i], self.gauss[i]])
@@ -350,6 +358,7 @@ fn offer_taps<const LIMITED: bool, const N: usize>(
     blur: &mut [f32],
     taps: [Tap<'_>; N],
 ) {
+    // Longer than elsewhere: all that happens to a pixel stands in one loop, which is made vectors of.
     let len = best.len();
     let (weight, blur) = (&mut weight[..len], &mut blur[..len]);
     let rows = taps.map(|([candidates, samples], _)| (&candidates[..len], &samples[..len]));

@@ -99,6 +99,7 @@ pub use photo::Photo;
 
 use crate::error::{Error, Result};
 use crate::image::Image;
+use crate::matte::check::check_size;
 use crate::pixel::{Coverage, LinearRgb, PremulRgba};
 use stream::{Plane, Stream, fit_size};
 
@@ -280,14 +281,7 @@ impl<'a, P: Photo> Keying<'a, P> {
 
     /// Refuses a picture of another size than the photo's.
     fn check_size(&self, name: &str, size: Option<(usize, usize)>) -> Result<()> {
-        let (width, height) = self.photo.size();
-        match size {
-            Some((w, h)) if (w, h) != (width, height) => Err(Error::value(
-                name,
-                format!("{w} x {h} pixels, expected the photo's {width} x {height}"),
-            )),
-            _ => Ok(()),
-        }
+        size.map_or(Ok(()), |size| check_size(name, size, self.photo.size()))
     }
 }
 

@@ -46,9 +46,7 @@ impl Model for V42 {
 impl Model for V45 {
     #[inline(always)]
     fn is_overexposed(p: PremulRgba) -> bool {
-        let first = if p.g < p.r { p.g } else { p.r };
-        let second = if p.b < first { p.b } else { first };
-        (if p.a < second { p.a } else { second }) > 1.0
+        lesser(lesser(lesser(p.r, p.g), p.b), p.a) > 1.0
     }
 }
 
@@ -65,6 +63,12 @@ impl Model for Robust {
 
 /// Largest magnitude that the robust profile computes with: beyond it, sums in single precision could reach infinity.
 const MAX_USABLE: f32 = 1e30;
+
+/// The second of two numbers where it is less, else the first.
+#[inline(always)]
+fn lesser(a: f32, b: f32) -> f32 {
+    if b < a { b } else { a }
+}
 
 /// Whether the robust profile takes a pixel as it is: no channel is NaN, infinite or too large to compute with.
 #[inline(always)]

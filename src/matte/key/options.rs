@@ -1,6 +1,7 @@
 //! Settings of a keyer: one struct, one TOML table, Blender's own names.
 
 use crate::error::{Error, Result};
+use crate::matte::check::check_value;
 use serde::{Deserialize, Serialize};
 
 /// Which keyer to be: one of the three that Blender has shipped, or the careful one.
@@ -179,11 +180,10 @@ impl KeyOptions {
     /// In the robust profile, white is above black.
     fn check_levels(&self) -> Result<()> {
         let (black, white) = (self.clip_black, self.clip_white);
-        if self.profile != Profile::Robust || white > black {
-            return Ok(());
-        }
-        let what = format!("{white}, expected more than clip_black ({black})");
-        Err(Error::value("key.clip_white", what))
+        let is_right = self.profile != Profile::Robust || white > black;
+        check_value(is_right, "key.clip_white", || {
+            format!("{white}, expected more than clip_black ({black})")
+        })
     }
 
     /// Every setting moved to the nearest value that Blender's node can hold; a fraction that is NaN becomes 0.

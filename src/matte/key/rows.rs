@@ -114,6 +114,15 @@ pub(super) enum Pad {
 }
 
 impl Pad {
+    /// The border repeated, or else a value.
+    pub(super) fn repeat_or(repeat: bool, value: f32) -> Self {
+        if repeat {
+            Self::Repeat
+        } else {
+            Self::Value(value)
+        }
+    }
+
     /// Fills both margins of a padded row whose middle is there.
     pub(super) fn fill_margins(self, padded: &mut [f32], margin: usize) {
         let len = padded.len();

@@ -4,6 +4,7 @@
 //! band of rows finds the same sums wherever it starts.
 
 use super::rows::{Pad, Rows, Window, rows_around, window_rows};
+use std::ops::Range;
 
 /// Largest magnitude of a sample: that of half precision.
 const MAX_SAMPLE: f32 = 65_504.0;
@@ -42,7 +43,7 @@ pub(super) struct RunningBlur<S> {
     window: Window,
     sums: Vec<f64>,
     /// The rows in the sums.
-    summed: std::ops::Range<usize>,
+    summed: Range<usize>,
     /// One over how many samples of a row count, for every column.
     shares: Vec<f64>,
 }
@@ -64,23 +65,50 @@ impl<S: Rows> RunningBlur<S> {
         }
     }
 
-    /// Moves the sums to other rows. Sums are exact, so that starting anew gives the same ones.
-    fn move_sums(&mut self, rows: std::ops::Range<usize>) {
+    /// Makes rows that are blurred along x present.
+    fn cover_rows(&mut self, rows: Range<usize>) {
         let Self {
             source,
             reach,
             padded,
             window,
-            sums,
             shares,
             ..
         } = self;
-        window.cover_rows(rows.clone(), |y, row| {
+        window.cover_rows(rows, |y, row| {
             let inside = reach.radius..reach.radius + row.len();
             source.row(y, &mut padded[inside.clone()]);
             hold_row(&mut padded[inside]);
             along_x(padded, *reach, shares, row);
         });
+    }
+
+    /// How many rows of the window of row `y` repeat the first one, and the last one.
+    fn repeated_rows(&self, y: usize) -> [f64; 2] {
+        if !self.reach.repeat {
+            return [0.0; 2];
+        }
+        let radius = self.reach.radius;
+        let above = radius.saturating_sub(y);
+        let below = (y + radius).saturating_sub(self.height - 1);
+        [above, below].map(|rows| rows as f64)
+    }
+
+    /// Writes row `y`, whose window repeats rows of the border.
+    fn row_at_border(&self, y: usize, [above, below]: [f64; 2], share: f64, out: &mut [f32]) {
+        // Only windows that reach over the border need its rows, and those hold them.
+        let border =
+            |missing: f64, row: usize| self.window.row(if missing > 0.0 { row } else { y });
+        let borders = border(above, 0).iter().zip(border(below, self.height - 1));
+        for ((o, sum), (first, last)) in out.iter_mut().zip(&self.sums).zip(borders) {
+            *o = ((sum + above * f64::from(*first) + below * f64::from(*last)) * share) as f32;
+        }
+    }
+
+    /// Moves the sums to other rows. Sums are exact, so that starting anew gives the same ones.
+    fn move_sums(&mut self, rows: Range<usize>) {
+        self.cover_rows(rows.clone());
+        let (window, sums) = (&self.window, &mut self.sums);
         let keeps = self.summed.end > rows.start && rows.start - self.summed.start <= 1;
         if !keeps {
             sums.fill(0.0);
@@ -96,32 +124,14 @@ impl<S: Rows> RunningBlur<S> {
 
 impl<S: Rows> Rows for RunningBlur<S> {
     fn row(&mut self, y: usize, out: &mut [f32]) {
-        let (radius, height) = (self.reach.radius, self.height);
-        self.move_sums(rows_around(y, radius, height));
-        let share = 1.0 / self.reach.sample_count(y, height);
-        let beyond = |missing: usize| {
-            if self.reach.repeat {
-                missing as f64
-            } else {
-                0.0
-            }
-        };
-        let (above, below) = (
-            beyond(radius.saturating_sub(y)),
-            beyond((y + radius).saturating_sub(height - 1)),
-        );
-        if above + below == 0.0 {
-            out.iter_mut()
-                .zip(&self.sums)
-                .for_each(|(o, s)| *o = (s * share) as f32);
-            return;
+        self.move_sums(rows_around(y, self.reach.radius, self.height));
+        let share = 1.0 / self.reach.sample_count(y, self.height);
+        let repeated = self.repeated_rows(y);
+        if repeated != [0.0; 2] {
+            return self.row_at_border(y, repeated, share, out);
         }
-        // Only windows that reach over the border need its rows, and those hold them.
-        let border =
-            |missing: f64, row: usize| self.window.row(if missing > 0.0 { row } else { y });
-        let borders = border(above, 0).iter().zip(border(below, height - 1));
-        for ((o, sum), (first, last)) in out.iter_mut().zip(&self.sums).zip(borders) {
-            *o = ((sum + above * f64::from(*first) + below * f64::from(*last)) * share) as f32;
+        for (o, sum) in out.iter_mut().zip(&self.sums) {
+            *o = (sum * share) as f32;
         }
     }
 }
@@ -161,12 +171,7 @@ fn add_row(sums: &mut [f64], row: &[f32], sign: f64) {
 /// Blurs a row between margins; the last sample of `padded` is never counted.
 fn along_x(padded: &mut [f32], reach: BoxReach, shares: &[f64], out: &mut [f32]) {
     let (diameter, end) = (2 * reach.radius + 1, padded.len() - 1);
-    let pad = if reach.repeat {
-        Pad::Repeat
-    } else {
-        Pad::Value(0.0)
-    };
-    pad.fill_margins(&mut padded[..end], reach.radius);
+    Pad::repeat_or(reach.repeat, 0.0).fill_margins(&mut padded[..end], reach.radius);
     let mut sum: f64 = padded[..diameter].iter().map(|v| f64::from(*v)).sum();
     let steps = padded[diameter..].iter().zip(&padded[..]);
     for ((o, share), (enters, leaves)) in out.iter_mut().zip(shares).zip(steps) {

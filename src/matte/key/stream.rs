@@ -97,13 +97,8 @@ impl<'a, P: Photo> Stream<'a, P> {
         let bands = matte.pixels_mut().par_chunks_mut(width * rows).enumerate();
         let cutouts = bands_of(cutout, width * rows, height.div_ceil(rows));
         let seen = bands.zip(cutouts).map(|((band, matte), cutout)| {
-            let first = band * rows;
-            self.compute_band(&mut *self.plane_source(plane), first, matte, cutout);
-            robust::count_unusable(
-                &self.keying,
-                self.options,
-                first..first + matte.len() / width,
-            )
+            self.compute_band(plane, band * rows, matte, cutout);
+            self.count_unusable(band * rows, matte.len() / width)
         });
         Deviations {
             clamped: self.clamped.load(Ordering::Relaxed),
@@ -111,14 +106,20 @@ impl<'a, P: Photo> Stream<'a, P> {
         }
     }
 
+    /// What cannot be used of so many rows of the inputs.
+    fn count_unusable(&self, first: usize, rows: usize) -> Deviations {
+        robust::count_unusable(&self.keying, self.options, first..first + rows)
+    }
+
     fn compute_band(
         &self,
-        plane: &mut dyn Rows,
+        plane: Plane,
         first: usize,
         matte: &mut [Coverage],
         cutout: &mut [PremulRgba],
     ) {
         let width = self.keying.photo.width();
+        let mut plane = self.plane_source(plane);
         let keyer = self.keyer();
         let mut cutout = cutout.chunks_exact_mut(width);
         for (y, matte) in (first..).zip(matte.chunks_exact_mut(width)) {
@@ -132,9 +133,12 @@ impl<'a, P: Photo> Stream<'a, P> {
     /// A band starts by computing the rows above it that its windows reach; longer bands do so less often.
     fn band_rows(&self, height: usize) -> usize {
         let threads = rayon::current_num_threads();
-        let least = (self.halo_rows() * BAND_PER_HALO).max(MIN_BAND_ROWS);
-        let rounds = height / (threads * least);
+        let rounds = height / (threads * self.min_band_rows());
         height.div_ceil(threads * rounds.max(1)).max(1)
+    }
+
+    fn min_band_rows(&self) -> usize {
+        (self.halo_rows() * BAND_PER_HALO).max(MIN_BAND_ROWS)
     }
 
     /// Rows above a band that its windows reach.
@@ -181,12 +185,16 @@ impl<'a, P: Photo> Stream<'a, P> {
 
     /// The edges: Blender up to 4.3 looks for them in the clipped matte, later ones in the raw one.
     fn edge_plane(&self) -> Source<'_> {
-        let searched = if self.behaviour() == Behaviour::V45 {
+        let searched = self.searched_matte();
+        Box::new(Edges::new(searched, self.size(), self.options))
+    }
+
+    fn searched_matte(&self) -> Source<'_> {
+        if self.behaviour() == Behaviour::V45 {
             self.raw_matte()
         } else {
             self.clipped_matte()
-        };
-        Box::new(Edges::new(searched, self.size(), self.options))
+        }
     }
 
     fn limited_matte(&self) -> Source<'_> {

@@ -1,6 +1,7 @@
 //! Means over small cells of the picture: little noise, few numbers, and medians where outliers must not count.
 
 use crate::image::{Image, Mask};
+use crate::matte::arrays::largest_difference;
 use crate::matte::median::median;
 use crate::pixel::LinearRgb;
 use std::ops::Range;
@@ -85,10 +86,9 @@ impl CellSums {
 
     #[inline]
     fn add(&mut self, at_px: [f64; 2], color: LinearRgb) {
-        let channels = [color.r, color.g, color.b].map(f64::from);
         self.count += 1;
         add_to(&mut self.at_px, at_px);
-        add_to(&mut self.color, channels);
+        add_to(&mut self.color, color.channels().map(f64::from));
     }
 
     fn mean(&self, index: [usize; 2]) -> Option<Cell> {
@@ -129,9 +129,7 @@ impl Cell {
     /// The largest difference between the channels, as a share of the other's brightest channel.
     fn relative_difference(&self, other: &Self) -> f64 {
         let brightest = other.color.into_iter().fold(f64::MIN_POSITIVE, f64::max);
-        let channels = self.color.iter().zip(other.color);
-        let largest = channels.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-        largest / brightest
+        largest_difference(self.color, other.color) / brightest
     }
 
     /// Row and column, in the order of the cells.

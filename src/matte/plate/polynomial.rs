@@ -4,8 +4,9 @@ use super::PlateOptions;
 use super::cells::{self, Cell};
 use crate::error::Result;
 use crate::image::Image;
+use crate::matte::arrays::index_of_largest;
+use crate::matte::check::refused;
 use crate::matte::median::median;
-use crate::matte::prepared::refused;
 use crate::pixel::LinearRgb;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -231,8 +232,8 @@ impl<'a> HeldOut<'a> {
     }
 
     fn brightest_channel(&self) -> usize {
-        let sums = [0, 1, 2].map(|c: usize| self.fitted.iter().map(|s| s.log[c]).sum::<f64>());
-        (1..3).fold(0, |best, c| if sums[c] > sums[best] { c } else { best })
+        let logs = self.fitted.iter().map(|sample| &sample.log);
+        index_of_largest([0, 1, 2].map(|c: usize| logs.clone().map(|log| log[c]).sum::<f64>()))
     }
 }
 

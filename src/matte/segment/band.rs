@@ -1,12 +1,16 @@
 //! Bands of a Laplacian pyramid, in units of their noise.
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::filter;
 use crate::image::Image;
-use crate::matte::median::median;
+use crate::matte::arrays::dot;
+use crate::matte::check::check_value;
+use crate::matte::median::{median, quantile};
+use crate::matte::prepared::square_root;
 use crate::pixel::LinearRgb;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::iter;
 
 /// What the pyramid is made of.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -21,24 +25,27 @@ pub enum LumaMode {
 
 impl LumaMode {
     /// # Errors
-    /// [`Error::Value`] (`tone.grey`) for weights that cannot be right.
+    /// [`Error::Value`](crate::Error::Value) (`tone.grey`) for weights that cannot be right.
     pub(super) fn check(self) -> Result<()> {
-        match self {
-            Self::Grey(weights) if !are_weights(weights) => {
-                let what = format!("{weights:?}, expected weights of 0 to 1e6, not all 0");
-                Err(Error::value("tone.grey", what))
-            }
-            _ => Ok(()),
-        }
+        let Self::Grey(weights) = self else {
+            return Ok(());
+        };
+        check_value(are_weights(weights), "tone.grey", || {
+            format!("{weights:?}, expected weights of 0 to 1e6, not all 0")
+        })
     }
 
     /// The pictures whose bands are taken.
     fn pictures(self, photo: &Image<LinearRgb>) -> Vec<Image<f32>> {
+        let weights = self.weights().into_iter();
+        weights.map(|weights| luma_root(photo, weights)).collect()
+    }
+
+    /// The weights of red, green and blue in each picture.
+    fn weights(self) -> Vec<[f32; 3]> {
         match self {
-            Self::Channels => [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
-                .map(|channel| luma_root(photo, channel))
-                .into(),
-            Self::Grey(weights) => vec![luma_root(photo, weights)],
+            Self::Channels => vec![[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            Self::Grey(weights) => vec![weights],
         }
     }
 }
@@ -72,13 +79,11 @@ impl Bands {
     }
 
     fn from_bands(finest: Image<f32>, coarser: Vec<Image<f32>>) -> Self {
-        let sizes = std::iter::once(finest.size())
-            .chain(coarser.iter().map(Image::size))
-            .collect();
+        let sizes = iter::once(finest.size()).chain(coarser.iter().map(Image::size));
         Self {
+            sizes: sizes.collect(),
             finest,
             coarser,
-            sizes,
         }
     }
 
@@ -100,11 +105,8 @@ impl Bands {
 /// luminance would do.
 pub(super) fn luma_root(photo: &Image<LinearRgb>, weights: [f32; 3]) -> Image<f32> {
     let sum: f32 = weights.iter().sum();
-    let [r, g, b] = weights.map(|w| w / sum);
-    photo.map(|p| {
-        let root = p.map(|v| v.max(0.0).sqrt());
-        r * root.r + g * root.g + b * root.b
-    })
+    let shares = weights.map(|w| w / sum);
+    photo.map(|p| dot(shares, square_root(p).channels()))
 }
 
 /// Magnitudes of the bands of one picture, each of its own size.
@@ -194,13 +196,10 @@ const ROUNDING_SIGMA: f32 = 1.0 / 255.0 / 3.464;
 /// As the median absolute deviation, but from the lower quartile and along the border of the picture, where an object
 /// is not: `quartile / 0.3186` for normal noise.
 fn noise_sigma(magnitudes: &Image<f32>) -> f32 {
-    let mut values = frame_values(magnitudes);
-    let rank = (values.len() as f64 * QUIET_SHARE) as usize;
-    if rank >= values.len() {
-        return ROUNDING_SIGMA;
-    }
-    let (_, quartile, _) = values.select_nth_unstable_by(rank, f32::total_cmp);
-    (*quartile / QUARTILE_OF_NORMAL).max(ROUNDING_SIGMA)
+    let quartile = quantile(frame_values(magnitudes), QUIET_SHARE, f32::total_cmp);
+    quartile.map_or(ROUNDING_SIGMA, |quartile| {
+        (quartile / QUARTILE_OF_NORMAL).max(ROUNDING_SIGMA)
+    })
 }
 
 /// The values in a frame along the border.

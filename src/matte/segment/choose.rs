@@ -8,7 +8,7 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::error::Result;
 use crate::filter;
 use crate::image::{Image, Mask};
-use crate::matte::prepared::longer_side;
+use crate::matte::prepared::{longer_side, scaled_sides};
 use crate::pixel::LinearRgb;
 use rayon::prelude::*;
 use std::borrow::Cow;
@@ -74,9 +74,12 @@ pub(super) fn best_search<'a>(
 
 /// The first search that failed, where more than half of them did.
 fn first_of_many_failures(searched: &[SearchResult]) -> Option<usize> {
-    let mut failed = (0..searched.len()).filter(|&i| searched[i].pass.is_err());
-    let count = failed.clone().count();
-    failed.next().filter(|_| 2 * count > searched.len())
+    let are_many = 2 * failures(searched).count() > searched.len();
+    failures(searched).next().filter(|_| are_many)
+}
+
+fn failures(searched: &[SearchResult]) -> impl Iterator<Item = usize> {
+    (0..searched.len()).filter(|&i| searched[i].pass.is_err())
 }
 
 /// Support and agreement of each search.
@@ -122,14 +125,17 @@ impl<'a> SearchScale<'a> {
         options: &SegmentOptions,
     ) -> Self {
         let picture = reduced(whole, reduction);
-        let deepest = depths.iter().copied().max().unwrap_or(2);
         Self {
             reduction,
-            search: Search::new(&picture, options, deepest),
+            search: Search::new(&picture, options, deepest(&depths)),
             picture,
             depths,
         }
     }
+}
+
+fn deepest(depths: &[usize]) -> usize {
+    depths.iter().copied().max().unwrap_or(2)
 }
 
 fn reduced(picture: &Image<LinearRgb>, reduction: usize) -> Cow<'_, Image<LinearRgb>> {
@@ -248,8 +254,7 @@ impl SearchResult {
     /// The inside in a picture small enough to be compared quickly.
     fn small_area(&self, (w, h): (usize, usize)) -> Option<Mask> {
         let inside = self.pass.as_ref().ok()?.inside.to_coverage();
-        let longer = w.max(h);
-        let [w, h] = [w, h].map(|side| (side * COMPARED_SIDE_PX.min(longer)).div_ceil(longer));
+        let [w, h] = scaled_sides((w, h), COMPARED_SIDE_PX.min(w.max(h)), 1);
         Some(filter::resize(&inside, w, h).map(|c| c.0 > 0.5))
     }
 
@@ -292,7 +297,7 @@ fn overlap_or_zero(a: Option<&Mask>, b: Option<&Mask>) -> f64 {
 /// Intersection over union.
 fn overlap(a: &Mask, b: &Mask) -> f64 {
     let both = a.zip_map(b, |a, b| a && b).count();
-    let either = a.zip_map(b, |a, b| a || b).count();
+    let either = a.count() + b.count() - both;
     both as f64 / either.max(1) as f64
 }
 
@@ -343,16 +348,25 @@ const BORDERS: [&str; 4] = ["left", "top", "right", "bottom"];
 
 /// The warning about an object that the photo cuts off; none for a whole one.
 fn truncated(touches: [bool; 4]) -> Option<Diagnostic> {
+    let reached = border_names(touches);
+    (!reached.is_empty()).then(|| truncated_at(&reached))
+}
+
+fn border_names(touches: [bool; 4]) -> Vec<&'static str> {
     let borders = BORDERS.into_iter().zip(touches);
-    let reached: Vec<_> = borders
-        .filter(|border| border.1)
-        .map(|(name, _)| name)
-        .collect();
-    let message = format!(
-        "the object reaches the {} border: the part beyond is missing from its size",
-        reached.join(" and ")
-    );
-    (!reached.is_empty()).then(|| Diagnostic::warning(Code::Truncated, message))
+    borders
+        .filter_map(|(name, reached)| reached.then_some(name))
+        .collect()
+}
+
+fn truncated_at(borders: &[&str]) -> Diagnostic {
+    Diagnostic::warning(
+        Code::Truncated,
+        format_args!(
+            "the object reaches the {} border: the part beyond is missing from its size",
+            borders.join(" and ")
+        ),
+    )
 }
 
 /// The warning about an object that was found at a lower resolution than asked for; from the widths of the pictures.

@@ -20,6 +20,14 @@ struct PixelRun {
     group: usize,
 }
 
+impl PixelRun {
+    /// How many of its pixels a mask has.
+    fn count(&self, members: &Mask) -> usize {
+        let pixels = members.row(self.row)[self.columns.clone()].iter();
+        pixels.filter(|p| **p).count()
+    }
+}
+
 impl PixelGroups {
     /// Finds the groups: runs that touch the same run, corners included, are of one.
     pub(in super::super) fn new(set: &Mask) -> Self {
@@ -44,8 +52,7 @@ impl PixelGroups {
     pub(in super::super) fn sizes(&self, members: &Mask) -> Vec<usize> {
         let mut sizes = vec![0; self.count];
         for run in &self.runs {
-            let pixels = members.row(run.row)[run.columns.clone()].iter();
-            sizes[run.group] += pixels.filter(|p| **p).count();
+            sizes[run.group] += run.count(members);
         }
         sizes
     }
@@ -154,9 +161,9 @@ pub(super) fn without_specks(set: &Mask, least: usize) -> Mask {
 /// The set with its holes filled: all that cannot be reached from the border of the picture. Outlines must be two
 /// pixels thick, since the way around goes over corners too.
 pub(super) fn filled(set: &Mask) -> Mask {
-    let groups = PixelGroups::new(&set.map(|inside| !inside));
+    let groups = PixelGroups::new(&set.complement());
     let reaching = groups.reaching_border();
-    groups.only(|group| reaching[group]).map(|open| !open)
+    groups.only(|group| reaching[group]).complement()
 }
 
 #[cfg(test)]

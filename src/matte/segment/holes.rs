@@ -4,6 +4,7 @@ use super::cluster::PixelGroups;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::filter;
 use crate::image::{Image, Mask};
+use crate::matte::arrays::largest;
 use crate::matte::plate::{PlateOptions, ScreenPlate};
 use crate::matte::prepared::longer_side;
 use crate::matte::screen::{is_keyable, masked_pixels};
@@ -108,7 +109,7 @@ fn large_groups(like: &Mask, area: usize) -> Vec<Mask> {
 }
 
 fn is_unlike_screen(pixel: LinearRgb, plate: LinearRgb) -> bool {
-    let strongest = plate.channels().into_iter().fold(0.0, f32::max);
+    let strongest = largest(plate.channels());
     differences(pixel, plate)
         .into_iter()
         .any(|d| d >= UNLIKE_SHARE * strongest)
@@ -131,9 +132,16 @@ impl Hole {
 
     /// It is enclosed all around, mostly by what is unlike the screen.
     fn has_opaque_rim(&self, inside: &Mask, unlike: &Mask) -> bool {
-        let opaque = self.rim.zip_map(unlike, |rim, unlike| rim && unlike);
-        let is_enclosed = without(&self.rim, inside).count() == 0;
-        is_enclosed && opaque.count() as f64 >= OPAQUE_RIM_SHARE * self.rim.count() as f64
+        let opaque = self
+            .rim
+            .zip_map(unlike, |rim, unlike| rim && unlike)
+            .count();
+        let least = OPAQUE_RIM_SHARE * self.rim.count() as f64;
+        self.is_enclosed(inside) && opaque as f64 >= least
+    }
+
+    fn is_enclosed(&self, inside: &Mask) -> bool {
+        without(&self.rim, inside).count() == 0
     }
 }
 

@@ -2,6 +2,7 @@
 
 use crate::geom::Point2;
 use crate::image::Mask;
+use crate::matte::arrays::largest_difference;
 use crate::matte::outline::points_of;
 use geo::{Area, ConvexHull, MultiPoint, Point};
 
@@ -31,9 +32,8 @@ fn row_ends(set: &Mask) -> impl Iterator<Item = (usize, usize)> {
 
 /// The first and the last set pixel of a row.
 fn set_ends(row: &[bool]) -> Option<[usize; 2]> {
-    let first = row.iter().position(|p| *p)?;
-    let last = row.iter().rposition(|p| *p)?;
-    Some([first, last])
+    let mut pixels = row.iter();
+    Some([pixels.clone().position(|p| *p)?, pixels.rposition(|p| *p)?])
 }
 
 fn center_or_border(i: usize, len: usize) -> f64 {
@@ -56,8 +56,7 @@ pub(super) fn sides(polygon: &[Point2<f64>]) -> [f64; 4] {
 
 /// The largest distance between a side of one polygon's box and that of another.
 pub(super) fn farthest_side(a: &[Point2<f64>], b: &[Point2<f64>]) -> f64 {
-    let pairs = sides(a).into_iter().zip(sides(b));
-    pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    largest_difference(sides(a), sides(b))
 }
 
 /// By how much the side of one polygon's box that lies farthest beyond another's does so; 0 where none does.

@@ -10,7 +10,8 @@ use crate::filter;
 use crate::geom::Point2;
 use crate::image::{Image, Mask};
 use crate::matte::Outline;
-use crate::matte::prepared::{longer_side, refused};
+use crate::matte::check::refused;
+use crate::matte::prepared::longer_side;
 use crate::pixel::LinearRgb;
 use std::cmp::Reverse;
 use std::ops::Range;
@@ -213,7 +214,12 @@ impl<'a> EdgeClusters<'a> {
     fn others(&self) -> impl Iterator<Item = (usize, f64)> {
         (0..self.sizes.len())
             .filter(|&i| !self.belongs(i))
-            .map(|i| (i, self.sizes[i] as f64 / self.sizes[self.main] as f64))
+            .map(|i| (i, self.relative_size(i)))
+    }
+
+    /// Pixels of a cluster over those of the main one.
+    fn relative_size(&self, i: usize) -> f64 {
+        self.sizes[i] as f64 / self.sizes[self.main] as f64
     }
 }
 
@@ -312,7 +318,7 @@ fn enclosed_area(edges: &Mask, join_px: f64) -> Mask {
 
 fn closed(edges: &Mask, hull: &Mask, radius_px: f64) -> Mask {
     let filled = cluster::filled(&filter::dilate(edges, radius_px));
-    filter::erode(&filled, radius_px).zip_map(hull, |inside, hull| inside && hull)
+    both(&filter::erode(&filled, radius_px), hull)
 }
 
 /// An object whose edges come so near to the border, pixels, may go on beyond: an edge has two sides, and a faint tip is

@@ -88,10 +88,14 @@ fn rough_outline(area: &Mask) -> Outline {
 
 /// A convex polygon's corners moved towards its middle.
 fn inset(hull: &[Point2<f64>], by: f64) -> impl Iterator<Item = Point2<f64>> {
-    let middle = hull.iter().fold(Point2::origin(), |sum, p| {
-        sum + p.coords / hull.len() as f64
-    });
+    let middle = mean_point(hull);
     hull.iter().map(move |p| moved_towards(*p, middle, by))
+}
+
+fn mean_point(points: &[Point2<f64>]) -> Point2<f64> {
+    points.iter().fold(Point2::origin(), |sum, p| {
+        sum + p.coords / points.len() as f64
+    })
 }
 
 fn moved_towards(p: Point2<f64>, goal: Point2<f64>, by: f64) -> Point2<f64> {

@@ -15,6 +15,8 @@ const PROFILE_REACH_PX: f64 = 1.5;
 const OUTSIDE_PX: f64 = 2.0;
 /// Steps of a profile to a pixel of the search.
 const STEPS_PER_PX: usize = 4;
+/// Length of a step, pixels of the search.
+const STEP_PX: f64 = 1.0 / STEPS_PER_PX as f64;
 /// Profiles are averaged over this many pixels of the photo along the outline.
 const LANE_COUNT: i32 = 3;
 /// A change counts from this many times the noise on the outside.
@@ -39,18 +41,18 @@ pub(super) fn snapped(outline: &Outline, roots: &Image<LinearRgb>, scale: f64) -
     let rings = outline
         .rings
         .iter()
-        .map(|ring| snapped_ring(&evenly_spaced(ring, scale.max(1.0)), roots, scale));
+        .map(|ring| snapped_ring(ring, roots, scale));
     Outline {
         rings: rings.collect(),
     }
 }
 
 fn snapped_ring(ring: &[Point2<f64>], roots: &Image<LinearRgb>, scale: f64) -> Vec<Point2<f64>> {
-    let n = ring.len();
-    if n < 2 * MEDIAN_REACH + 1 {
-        return ring.to_vec();
+    let ring = evenly_spaced(ring, scale.max(1.0));
+    if ring.len() < 2 * MEDIAN_REACH + 1 {
+        return ring;
     }
-    let points = edge_points(ring, 2);
+    let points = edge_points(&ring, 2);
     let found = displacements(&points, roots, scale);
     points
         .iter()
@@ -71,10 +73,15 @@ fn displacements(points: &[EdgePoint], roots: &Image<LinearRgb>, scale: f64) -> 
 
 /// The points of a ring, with normals across the chords between the neighbours `reach` points away.
 pub(super) fn edge_points(ring: &[Point2<f64>], reach: usize) -> Vec<EdgePoint> {
-    let n = ring.len();
-    (0..n)
-        .map(|i| EdgePoint::new(ring[i], [ring[(i + n - reach) % n], ring[(i + reach) % n]]))
+    (0..ring.len())
+        .map(|i| EdgePoint::new(ring[i], neighbours(ring, i, reach)))
         .collect()
+}
+
+/// The points of a ring `reach` before and after one.
+fn neighbours(ring: &[Point2<f64>], i: usize, reach: usize) -> [Point2<f64>; 2] {
+    let n = ring.len();
+    [ring[(i + n - reach) % n], ring[(i + reach) % n]]
 }
 
 /// The least change that is no noise, from the median noise of all profiles.
@@ -120,8 +127,12 @@ impl EdgePoint {
     /// The position at a distance `t` outwards on a profile beside that through the point.
     #[inline]
     fn lane_position(&self, lane: i32, t: f64, scale: f64) -> Point2<f64> {
-        let along = Vector2::new(-self.normal.y, self.normal.x);
-        self.at + self.normal * (t * scale) + along * (f64::from(lane) * scale / 2.0)
+        self.at + self.normal * (t * scale) + self.tangent() * (f64::from(lane) * scale / 2.0)
+    }
+
+    #[inline]
+    fn tangent(&self) -> Vector2<f64> {
+        Vector2::new(-self.normal.y, self.normal.x)
     }
 
     /// The point moved outwards; what reaches the border of the photo stays there.
@@ -141,9 +152,8 @@ fn is_near_border(v: f64, len: f64, scale: f64) -> bool {
 
 /// The colours along the normal beyond the reach of a profile.
 fn outside_colors(roots: &Image<LinearRgb>, point: &EdgePoint, scale: f64) -> Vec<LinearRgb> {
-    let step = 1.0 / STEPS_PER_PX as f64;
     (0..(OUTSIDE_PX * STEPS_PER_PX as f64) as usize)
-        .map(|k| point.mean_at(roots, PROFILE_REACH_PX + k as f64 * step, scale))
+        .map(|k| point.mean_at(roots, PROFILE_REACH_PX + k as f64 * STEP_PX, scale))
         .collect()
 }
 
@@ -158,9 +168,8 @@ struct EdgeProfile {
 impl EdgeProfile {
     fn new(roots: &Image<LinearRgb>, point: &EdgePoint, scale: f64) -> Self {
         let (mean, noise) = mean_and_deviation(&outside_colors(roots, point, scale));
-        let step = 1.0 / STEPS_PER_PX as f64;
         let change = (0..=(2.0 * PROFILE_REACH_PX * STEPS_PER_PX as f64) as usize).map(|k| {
-            let inwards = point.mean_at(roots, PROFILE_REACH_PX - k as f64 * step, scale);
+            let inwards = point.mean_at(roots, PROFILE_REACH_PX - k as f64 * STEP_PX, scale);
             distance(inwards, mean)
         });
         Self {

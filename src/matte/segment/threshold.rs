@@ -55,10 +55,15 @@ fn otsu(band: &Image<f32>) -> f32 {
 fn log_histogram(band: &Image<f32>, span: f32) -> [u64; HISTOGRAM_BINS] {
     let mut histogram = [0; HISTOGRAM_BINS];
     for v in band.pixels() {
-        let bin = (libm::logf(v.max(1.0)) / span * HISTOGRAM_BINS as f32) as usize;
-        histogram[bin.min(HISTOGRAM_BINS - 1)] += 1;
+        histogram[log_bin(*v, span)] += 1;
     }
     histogram
+}
+
+#[inline]
+fn log_bin(value: f32, span: f32) -> usize {
+    let bin = (libm::logf(value.max(1.0)) / span * HISTOGRAM_BINS as f32) as usize;
+    bin.min(HISTOGRAM_BINS - 1)
 }
 
 /// Last bin of the lower group.

@@ -2,7 +2,7 @@
 
 use crate::image::Image;
 use crate::matte::film::OPAQUE;
-use crate::matte::median::median;
+use crate::matte::median::{median, quantile};
 use crate::pixel::{Coverage, LinearRgb};
 
 /// Sums for a straight line through points.
@@ -119,14 +119,23 @@ impl Inferred {
             determined,
             plastic,
         };
-        let plastic = std::array::from_fn(|c| {
-            if determined[c] {
-                plastic[c]
-            } else {
-                scaled_plastic(plastic[c], prior.gain(pixels, inside, c))
-            }
-        });
+        let plastic = std::array::from_fn(|c| prior.scaled_channel(pixels, inside, c));
         Self { plastic, ..prior }
+    }
+
+    /// Flat plastic in a channel, scaled where that is open.
+    fn scaled_channel(
+        &self,
+        pixels: &Image<PixelLines>,
+        inside: &Image<Coverage>,
+        channel: usize,
+    ) -> f32 {
+        let plastic = self.plastic[channel];
+        if self.determined[channel] {
+            plastic
+        } else {
+            scaled_plastic(plastic, self.gain(pixels, inside, channel))
+        }
     }
 
     /// By what the plastic of an open channel must be multiplied by its own lines, and the variance of that: noise, and
@@ -274,7 +283,7 @@ pub(super) fn covered_pixels<'a, P: Copy>(
     inside: &'a Image<Coverage>,
 ) -> impl Iterator<Item = &'a P> {
     let pixels = pixels.pixels().iter().zip(inside.pixels());
-    pixels.filter(|(_, c)| c.0 > 0.5).map(|(p, _)| p)
+    pixels.filter_map(|(p, c)| (c.0 > 0.5).then_some(p))
 }
 
 /// The pixels that are wholly inside.
@@ -283,7 +292,7 @@ pub(super) fn opaque_pixels<'a, P: Copy>(
     inside: &'a Image<Coverage>,
 ) -> impl Iterator<Item = &'a P> {
     let pixels = pixels.pixels().iter().zip(inside.pixels());
-    pixels.filter(|(_, c)| c.0 >= OPAQUE).map(|(p, _)| p)
+    pixels.filter_map(|(p, c)| (c.0 >= OPAQUE).then_some(p))
 }
 
 /// Transmittance per channel where the plastic lies flat: the median over what is not much darker than the clearest.
@@ -303,19 +312,19 @@ pub(super) fn flat_transmittance(
 
 /// Channel by channel; white of none.
 fn median_color(colors: &[LinearRgb]) -> LinearRgb {
-    let medians = [0, 1, 2].map(|c| {
-        let channel = colors.iter().map(|color| color.channels()[c]);
-        median(channel, f32::total_cmp).unwrap_or(1.0)
-    });
-    LinearRgb::from(medians)
+    let medians = [0, 1, 2].map(|c| median_of_channel(colors, c));
+    LinearRgb::from(medians.map(|median| median.unwrap_or(1.0)))
+}
+
+fn median_of_channel(colors: &[LinearRgb], channel: usize) -> Option<f32> {
+    let values = colors.iter().map(|color| color.channels()[channel]);
+    median(values, f32::total_cmp)
 }
 
 /// Mean transmittance of the clearest pixels; none without pixels.
 fn clearest(object: &[LinearRgb]) -> Option<f32> {
-    let mut means: Vec<f32> = object.iter().copied().map(mean_channel).collect();
-    let rank = (means.len() as f64 * (1.0 - CLEAREST_SHARE)) as usize;
-    let rank = rank.min(means.len().checked_sub(1)?);
-    Some(*means.select_nth_unstable_by(rank, f32::total_cmp).1)
+    let means = object.iter().copied().map(mean_channel).collect();
+    quantile(means, 1.0 - CLEAREST_SHARE, f32::total_cmp)
 }
 
 fn mean_channel(t: LinearRgb) -> f32 {
