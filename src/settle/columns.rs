@@ -107,8 +107,9 @@ impl Fall {
     /// By time, then by id.
     fn sort_samples(&mut self) {
         self.samples.sort_by(|a, b| {
-            let by_time = a.seconds.total_cmp(&b.seconds);
-            by_time.then(a.object.cmp(&b.object))
+            a.seconds
+                .total_cmp(&b.seconds)
+                .then(a.object.cmp(&b.object))
         });
     }
 }

@@ -58,14 +58,14 @@ fn quarters(ring: &[[f64; 2]]) -> Vec<Vec<[f64; 2]>> {
 
 /// A plate of this outline; none where the engine finds it too thin a shape.
 fn plate(ring: &[[f64; 2]], half_height: f64) -> Option<ColliderBuilder> {
-    let corners: Vec<Vector> = [half_height, -half_height]
-        .into_iter()
-        .flat_map(|z| {
-            ring.iter()
-                .map(move |&[x, y]| Vector::new(x as f32, y as f32, z as f32))
-        })
-        .collect();
-    ColliderBuilder::convex_hull(&corners)
+    let rims = [half_height, -half_height].map(|z| ring_at(ring, z));
+    ColliderBuilder::convex_hull(&rims.concat())
+}
+
+fn ring_at(ring: &[[f64; 2]], z: f64) -> Vec<Vector> {
+    ring.iter()
+        .map(|&[x, y]| Vector::new(x as f32, y as f32, z as f32))
+        .collect()
 }
 
 #[cfg(test)]
