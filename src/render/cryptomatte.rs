@@ -94,16 +94,19 @@ fn channel_name(layer: &str, i: usize) -> String {
 }
 
 fn layer_metadata(layer: &str, names: &[(ObjectId, String)]) -> Vec<(String, String)> {
-    let texts = [
+    layer_texts(layer, names)
+        .into_iter()
+        .map(|(what, text)| (attribute_name(layer, what), text))
+        .collect()
+}
+
+fn layer_texts(layer: &str, names: &[(ObjectId, String)]) -> [(&'static str, String); 4] {
+    [
         ("name", layer.to_owned()),
         ("hash", "MurmurHash3_32".to_owned()),
         ("conversion", "uint32_to_float32".to_owned()),
         ("manifest", manifest_text(names)),
-    ];
-    texts
-        .into_iter()
-        .map(|(what, text)| (attribute_name(layer, what), text))
-        .collect()
+    ]
 }
 
 /// Ids by name, as JSON.
