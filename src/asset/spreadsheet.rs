@@ -3,6 +3,7 @@
 
 use crate::error::{Error, Result};
 use crate::io;
+use std::borrow::Cow;
 
 /// A line of a list of photos.
 #[derive(Debug)]
@@ -101,12 +102,16 @@ impl Columns {
     }
 
     fn number(&self, cell: &str) -> Option<toml::Value> {
-        let number: f64 = if self.has_decimal_comma(cell) {
-            cell.replace(',', ".").parse().ok()?
-        } else {
-            cell.parse().ok()?
-        };
+        let number: f64 = self.with_decimal_point(cell).parse().ok()?;
         number.is_finite().then(|| number.into())
+    }
+
+    fn with_decimal_point<'c>(&self, cell: &'c str) -> Cow<'c, str> {
+        if self.has_decimal_comma(cell) {
+            cell.replace(',', ".").into()
+        } else {
+            cell.into()
+        }
     }
 
     /// Between commas a comma in a number may as well separate thousands.

@@ -3,6 +3,7 @@
 use crate::filter::Pyramid;
 use crate::image::Image;
 use crate::pixel::{Film, PremulRgba};
+use bytemuck::NoUninit;
 use std::sync::Arc;
 
 /// A cut-out at all its levels of detail, shared by all that show it. Scene-linear, premultiplied.
@@ -67,10 +68,14 @@ impl Texture {
     /// CRC-32 of the texels at full detail.
     pub fn checksum(&self) -> u32 {
         match self {
-            Self::Rgba(pyramid) => crc32fast::hash(bytemuck::cast_slice(pyramid.base().pixels())),
-            Self::Film(pyramid) => crc32fast::hash(bytemuck::cast_slice(pyramid.base().pixels())),
+            Self::Rgba(pyramid) => checksum_of(pyramid.base()),
+            Self::Film(pyramid) => checksum_of(pyramid.base()),
         }
     }
+}
+
+fn checksum_of<P: NoUninit>(image: &Image<P>) -> u32 {
+    crc32fast::hash(bytemuck::cast_slice(image.pixels()))
 }
 
 impl From<Image<PremulRgba>> for Texture {
