@@ -65,8 +65,8 @@ pub fn write_with<P: ToFile>(
     options: &WriteOptions,
 ) -> Result<()> {
     let path = path.as_ref();
-    let bytes = encode(path, image, options).map_err(|e| Error::file(path, e))?;
-    write_bytes(path, &bytes)
+    let encoded = encode(path, image, options);
+    write_bytes(path, &encoded.map_err(|e| Error::file(path, e))?)
 }
 
 /// The bytes of a JPEG file of a quality from 1 to 100.
@@ -173,23 +173,30 @@ fn encode_exr<P: ToFile>(
     bits: Bits,
     options: &WriteOptions,
 ) -> std::result::Result<Vec<u8>, String> {
-    let planes = P::NAMES
-        .iter()
-        .enumerate()
-        .map(|(c, &name)| (name, channel_samples(image, c, bits)))
-        .collect();
+    let planes = exr_planes(image, bits);
     let metadata = with_colorspace(&options.metadata);
     exr::encode(image.size(), planes, options.compression, &metadata)
 }
 
+fn exr_planes<P: ToFile>(image: &Image<P>, bits: Bits) -> Vec<(&'static str, exr::FlatSamples)> {
+    let channels = P::NAMES.iter().enumerate();
+    channels
+        .map(|(c, &name)| (name, channel_samples(image, c, bits)))
+        .collect()
+}
+
 /// One channel of a picture, scene-linear.
 fn channel_samples<P: ToFile>(image: &Image<P>, channel: usize, bits: Bits) -> exr::FlatSamples {
-    let pixels = image.pixels().par_iter();
-    let plane: Vec<f32> = pixels.map(|p| p.linear()[channel]).collect();
+    let plane = channel_plane(image, channel);
     match bits {
         Bits::Half => exr::half_samples(&plane),
         _ => exr::float_samples(plane),
     }
+}
+
+fn channel_plane<P: ToFile>(image: &Image<P>, channel: usize) -> Vec<f32> {
+    let pixels = image.pixels().par_iter();
+    pixels.map(|p| p.linear()[channel]).collect()
 }
 
 fn encode_float_tiff<P: ToFile>(
@@ -197,8 +204,8 @@ fn encode_float_tiff<P: ToFile>(
     metadata: &[(String, String)],
 ) -> std::result::Result<Vec<u8>, String> {
     let samples = interleaved(image, P::linear);
-    let metadata = with_colorspace(metadata);
-    tiff::encode_floats(image.size(), P::NAMES.len(), &samples, &metadata)
+    let metadata = &with_colorspace(metadata);
+    tiff::encode_floats(image.size(), P::NAMES.len(), &samples, metadata)
 }
 
 fn encode_jpeg<P: ToFile>(

@@ -9,7 +9,7 @@ use crate::io::format::Format;
 use crate::io::header::{Header, Notes, note};
 use crate::io::limits::{Demand, Limits};
 use crate::quality::Quality;
-use png::{BitDepth, ColorType, Transformations};
+use png::{BitDepth, ColorType, Compression, Transformations};
 use std::io::{BufRead, Cursor, ErrorKind, Seek};
 
 impl From<png::DecodingError> for Refusal {
@@ -159,11 +159,11 @@ fn big_endian_codes(bytes: &[u8]) -> Vec<u16> {
 }
 
 /// Effort of deflate and of the filters before it; the default takes a few milliseconds for 640 x 480.
-fn compression(effort: Quality) -> png::Compression {
+fn compression(effort: Quality) -> Compression {
     match effort {
-        Quality::Draft => png::Compression::Fastest,
-        Quality::Normal => png::Compression::Fast,
-        Quality::Reference => png::Compression::High,
+        Quality::Draft => Compression::Fastest,
+        Quality::Normal => Compression::Fast,
+        Quality::Reference => Compression::High,
     }
 }
 
@@ -225,12 +225,20 @@ fn add_texts(
     metadata: &[(String, String)],
 ) -> Result<(), png::EncodingError> {
     for (key, value) in metadata {
-        match value.chars().all(|c| (c as u32) < 256) {
-            true => encoder.add_text_chunk(key.clone(), value.clone())?,
-            false => encoder.add_itxt_chunk(key.clone(), value.clone())?,
-        }
+        add_text(encoder, key.clone(), value.clone())?;
     }
     Ok(())
+}
+
+fn add_text(
+    encoder: &mut png::Encoder<'_, &mut Vec<u8>>,
+    key: String,
+    value: String,
+) -> Result<(), png::EncodingError> {
+    match value.chars().all(|c| (c as u32) < 256) {
+        true => encoder.add_text_chunk(key, value),
+        false => encoder.add_itxt_chunk(key, value),
+    }
 }
 
 #[cfg(test)]

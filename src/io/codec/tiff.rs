@@ -63,13 +63,8 @@ fn open<R: Read + Seek>(
     let (width, height) = decoder.dimensions()?;
     refuse_missing_palette(&mut decoder)?;
     let (channels, bits) = stored_channels(&mut decoder)?;
-    limits.check(Demand {
-        width: width.into(),
-        height: height.into(),
-        channels,
-        bytes_per_pixel: channels * u64::from(bits).div_ceil(8),
-        file_bytes,
-    })?;
+    let bytes = u64::from(bits).div_ceil(8);
+    limits.check(Demand::new([width, height], channels, bytes, file_bytes))?;
     let inks = matches!(decoder.colortype()?, ColorType::CMYK(_));
     let names = default_names(if inks { 3 } else { channels as usize });
     Ok(OpenedTiff {

@@ -110,15 +110,9 @@ impl Layout {
     }
 
     fn demand(&self, size: [i64; 2], file_bytes: u64) -> Demand {
-        let [width, height] = size.map(|side| u64::try_from(side).unwrap_or(0));
+        let size = size.map(|side| u64::try_from(side).unwrap_or(0));
         let channels = self.channels.len() as u64;
-        Demand {
-            width,
-            height,
-            channels,
-            bytes_per_pixel: channels * u64::from(self.bytes.unsigned_abs()),
-            file_bytes,
-        }
+        Demand::new(size, channels, self.bytes.unsigned_abs(), file_bytes)
     }
 
     fn sample(&self) -> SampleKind {
@@ -268,14 +262,12 @@ pub(crate) fn write_file(
     samples: &[u8],
     metadata: &[(String, String)],
 ) -> Result<(), Refusal> {
-    let notes: Vec<_> = metadata
-        .iter()
-        .map(|(key, value)| ffi::Note {
-            key: key.clone(),
-            value: value.clone(),
-        })
-        .collect();
+    let notes: Vec<_> = metadata.iter().cloned().map(note).collect();
     ffi::write(path, format.name(), layout, samples, &notes).map_err(refused)
+}
+
+fn note((key, value): (String, String)) -> ffi::Note {
+    ffi::Note { key, value }
 }
 
 #[cfg(test)]
