@@ -40,10 +40,7 @@ pub(super) fn rows(bytes: &[u8]) -> Result<Vec<SpreadsheetRow>> {
     let text = decoded(bytes)?.replace("\r\n", "\n");
     let text = text.trim_start_matches('\u{feff}');
     let separator = separator(text.lines().next().unwrap_or_default());
-    let mut reader = csv::ReaderBuilder::new()
-        .delimiter(separator)
-        .trim(csv::Trim::All)
-        .from_reader(text.as_bytes());
+    let mut reader = csv_reader(text, separator);
     let headers = reader.headers().map_err(|e| csv_error(&e))?;
     let sheet = Columns::new(headers, separator)?;
     reader
@@ -51,6 +48,13 @@ pub(super) fn rows(bytes: &[u8]) -> Result<Vec<SpreadsheetRow>> {
         .map(|record| sheet.row(&record.map_err(|e| csv_error(&e))?))
         .filter(|row| !matches!(row, Ok(row) if row.cells.is_empty()))
         .collect()
+}
+
+fn csv_reader(text: &str, separator: u8) -> csv::Reader<&[u8]> {
+    csv::ReaderBuilder::new()
+        .delimiter(separator)
+        .trim(csv::Trim::All)
+        .from_reader(text.as_bytes())
 }
 
 /// What stands in the columns of a spreadsheet.

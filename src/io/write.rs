@@ -236,9 +236,16 @@ fn without_alpha(codes: &[u8]) -> std::result::Result<Vec<u8>, String> {
 
 /// The texts with the colour space in front, unless the caller named one.
 fn with_colorspace(metadata: &[(String, String)]) -> Vec<(String, String)> {
-    let named = metadata.iter().any(|(key, _)| key == COLORSPACE.0);
-    let ours = (!named).then(|| (COLORSPACE.0.to_string(), COLORSPACE.1.to_string()));
+    let ours = (!names_colorspace(metadata)).then(colorspace_note);
     ours.into_iter().chain(metadata.iter().cloned()).collect()
+}
+
+fn names_colorspace(metadata: &[(String, String)]) -> bool {
+    metadata.iter().any(|(key, _)| key == COLORSPACE.0)
+}
+
+fn colorspace_note() -> (String, String) {
+    (COLORSPACE.0.to_string(), COLORSPACE.1.to_string())
 }
 
 #[cfg(test)]

@@ -139,8 +139,13 @@ fn positive(exif: &Exif, tag: Tag) -> Option<f64> {
 
 /// A finite number.
 fn rational(exif: &Exif, tag: Tag) -> Option<f64> {
-    match &exif.get_field(tag, In::PRIMARY)?.value {
-        Value::Rational(values) => values.first().map(|v| v.to_f64()).filter(|v| v.is_finite()),
+    let number = first_rational(&exif.get_field(tag, In::PRIMARY)?.value)?;
+    number.is_finite().then_some(number)
+}
+
+fn first_rational(value: &Value) -> Option<f64> {
+    match value {
+        Value::Rational(values) => values.first().map(|v| v.to_f64()),
         _ => None,
     }
 }

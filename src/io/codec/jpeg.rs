@@ -152,12 +152,18 @@ fn profile_part(segment: JpegSegment<'_>) -> Option<(u8, &[u8])> {
     Some((number, part))
 }
 
+fn check_complete(bytes: &[u8]) -> Result<(), Refusal> {
+    if segments(bytes).any(|s| s.marker == EOI) {
+        Ok(())
+    } else {
+        Err("truncated JPEG (no end marker)".into())
+    }
+}
+
 /// Decodes a complete file; decoders return a half-grey picture for one that was cut, so that is looked at first.
 pub(crate) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Refusal> {
     read_before_scan(&mut &bytes[..], limits)?;
-    if !segments(bytes).any(|s| s.marker == EOI) {
-        return Err("truncated JPEG (no end marker)".into());
-    }
+    check_complete(bytes)?;
     let decoder = open(bytes, bytes.len() as u64, limits)?;
     let (width, height) = decoder.dimensions();
     let size = (width as usize, height as usize);

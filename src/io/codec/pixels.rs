@@ -325,6 +325,8 @@ impl SampleRows<'_> {
     }
 
     /// Colours in the form that the file has them; `decode` takes its display codes, `light` display values.
+    ///
+    /// Long since each of the four forms that a file may have is a loop without a branch for every pixel.
     fn convert_colors<T: FileSample, P: Colored>(
         &self,
         samples: &[T],

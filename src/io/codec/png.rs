@@ -42,14 +42,9 @@ fn open<R: BufRead + Seek>(
 
 fn demand<R: BufRead + Seek>(reader: &png::Reader<R>, file_bytes: u64) -> Demand {
     let (color, depth) = reader.output_color_type();
-    let channels = color.samples() as u64;
-    Demand {
-        width: u64::from(reader.info().width),
-        height: u64::from(reader.info().height),
-        channels,
-        bytes_per_pixel: channels * u64::from(stored_bits(depth) / 8),
-        file_bytes,
-    }
+    let (info, channels) = (reader.info(), color.samples() as u64);
+    let size = [info.width, info.height];
+    Demand::new(size, channels, stored_bits(depth) / 8, file_bytes)
 }
 
 /// Bits of a sample as it is handed over: fewer than 8 are expanded.
@@ -76,11 +71,14 @@ pub(crate) fn header(
 }
 
 fn texts(info: &png::Info<'_>) -> Notes {
-    let latin = info.uncompressed_latin1_text.iter();
-    let latin = latin.map(|t| note(&t.keyword, &t.text));
+    let latin = info.uncompressed_latin1_text.iter().map(latin_note);
     latin
         .chain(info.utf8_text.iter().filter_map(utf8_note))
         .collect()
+}
+
+fn latin_note(text: &png::text_metadata::TEXtChunk) -> (String, String) {
+    note(&text.keyword, &text.text)
 }
 
 fn utf8_note(text: &png::text_metadata::ITXtChunk) -> Option<(String, String)> {

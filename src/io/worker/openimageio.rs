@@ -78,7 +78,7 @@ pub(crate) fn decode(
     Ok(Raster {
         width,
         height,
-        names: picked.iter().map(|&i| layout.channels[i].clone()).collect(),
+        names: layout.names_of(&picked),
         samples,
         display_encoded,
         premultiplied: false,
@@ -103,6 +103,15 @@ fn refused(e: cxx::Exception) -> Refusal {
 }
 
 impl Layout {
+    fn names_of(&self, picked: &[usize]) -> Vec<String> {
+        picked.iter().map(|&i| self.channels[i].clone()).collect()
+    }
+
+    /// Nothing to cut, to pad or to leave out.
+    fn is_shown_as_stored(&self, picked: &[usize]) -> bool {
+        self.shows_all() && picked.iter().copied().eq(0..self.channels.len())
+    }
+
     fn check(&self, file_bytes: u64, limits: &Limits) -> Result<(), Refusal> {
         limits.check(self.demand([self.width, self.height], file_bytes))?;
         let data_size = [self.data_width, self.data_height];
@@ -180,7 +189,7 @@ fn read_samples(
 fn windowed<T: Copy + Default>(samples: Vec<T>, layout: &Layout, picked: &[usize]) -> Vec<T> {
     let (width, height) = (layout.width as usize, layout.height as usize);
     let stride = layout.channels.len();
-    if layout.shows_all() && picked.iter().copied().eq(0..stride) {
+    if layout.is_shown_as_stored(picked) {
         return samples;
     }
     let mut out = vec![T::default(); width * height * picked.len()];
@@ -188,11 +197,16 @@ fn windowed<T: Copy + Default>(samples: Vec<T>, layout: &Layout, picked: &[usize
     for (x, y) in ys.flat_map(|y| xs.clone().map(move |x| (x, y))) {
         let pixel = &samples[layout.data_pixel(x, y) * stride..][..stride];
         let to = (y * width + x) * picked.len();
-        for (slot, &channel) in out[to..].iter_mut().zip(picked) {
-            *slot = pixel[channel];
-        }
+        copy_picked(&mut out[to..], pixel, picked);
     }
     out
+}
+
+#[inline]
+fn copy_picked<T: Copy>(to: &mut [T], pixel: &[T], picked: &[usize]) {
+    for (slot, &channel) in to.iter_mut().zip(picked) {
+        *slot = pixel[channel];
+    }
 }
 
 /// Samples with their meaning, and whether they are display-encoded: the rule of [`io`](crate::io) for integers and

@@ -337,6 +337,10 @@ fn text_attributes(header: &exr::meta::header::Header) -> Notes {
     notes
 }
 
+fn are_colors(wanted: Wanted, picked: &[usize]) -> bool {
+    matches!(wanted, Wanted::Color | Wanted::Film) && picked.len() >= 3
+}
+
 /// The wanted channels of the part that has them under the best names.
 pub(crate) fn decode(
     bytes: &[u8],
@@ -352,7 +356,7 @@ pub(crate) fn decode(
     let mut names = file.picked_names(part, &picked);
     let reader = file.reader(part, &picked, window, SampleOrder::Interleaved)?;
     let mut samples = reader.read()?;
-    if matches!(wanted, Wanted::Color | Wanted::Film) && picked.len() >= 3 {
+    if are_colors(wanted, &picked) {
         convert_colors(&mut samples, &mut names, &file.space())?;
     }
     Ok(Raster {
