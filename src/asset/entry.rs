@@ -141,8 +141,10 @@ impl PhotoEntry {
     /// The scale by what the object itself measures.
     fn object_scale(&self) -> Option<Scale> {
         let length = self.length?;
-        let size = self.width.map(|width| Scale::Size([length, width]));
-        Some(size.unwrap_or(Scale::Length(length)))
+        Some(match self.width {
+            Some(width) => Scale::Size([length, width]),
+            None => Scale::Length(length),
+        })
     }
 
     /// Checks all values, the class against those of the folder.

@@ -287,10 +287,10 @@ pub(super) fn check_each<T>(
     name: &str,
     check: impl Fn(&T) -> Result<()>,
 ) -> Result<()> {
-    for (i, item) in items.iter().enumerate() {
-        check(item).map_err(|e| e.within(&format!("{name}[{i}]")))?;
-    }
-    Ok(())
+    items
+        .iter()
+        .enumerate()
+        .try_for_each(|(i, item)| check(item).map_err(|e| e.within(&format!("{name}[{i}]"))))
 }
 
 /// Place of a class in a list of names.

@@ -65,8 +65,8 @@ pub fn write_with<P: ToFile>(
     options: &WriteOptions,
 ) -> Result<()> {
     let path = path.as_ref();
-    let encoded = encode(path, image, options);
-    write_bytes(path, &encoded.map_err(|e| Error::file(path, e))?)
+    let bytes = encode(path, image, options).map_err(|e| Error::file(path, e))?;
+    write_bytes(path, &bytes)
 }
 
 /// The bytes of a JPEG file of a quality from 1 to 100.
@@ -179,8 +179,9 @@ fn encode_exr<P: ToFile>(
 }
 
 fn exr_planes<P: ToFile>(image: &Image<P>, bits: Bits) -> Vec<(&'static str, exr::FlatSamples)> {
-    let channels = P::NAMES.iter().enumerate();
-    channels
+    P::NAMES
+        .iter()
+        .enumerate()
         .map(|(c, &name)| (name, channel_samples(image, c, bits)))
         .collect()
 }
@@ -204,8 +205,8 @@ fn encode_float_tiff<P: ToFile>(
     metadata: &[(String, String)],
 ) -> std::result::Result<Vec<u8>, String> {
     let samples = interleaved(image, P::linear);
-    let metadata = &with_colorspace(metadata);
-    tiff::encode_floats(image.size(), P::NAMES.len(), &samples, metadata)
+    let size = image.size();
+    tiff::encode_floats(size, P::NAMES.len(), &samples, &with_colorspace(metadata))
 }
 
 fn encode_jpeg<P: ToFile>(

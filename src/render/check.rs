@@ -63,7 +63,7 @@ fn lengths_of(light: &AreaLight) -> impl Iterator<Item = f64> {
 
 /// The environment, constant or a map, and the exposure.
 fn check_sky(shot: &Shot) -> Result<()> {
-    shot.environment.as_ref().map_or(Ok(()), check_map)?;
+    shot.environment.iter().try_for_each(check_map)?;
     require(
         shot.exposure.is_finite() && shot.ambient.is_finite(),
         "exposure",
@@ -105,7 +105,7 @@ fn check_card(card: &Card) -> std::result::Result<(), String> {
         return Err("id 0, expected 1 or more".into());
     }
     check_texture(&card.texture)?;
-    card.back.as_ref().map_or(Ok(()), check_back)
+    card.back.iter().try_for_each(check_back)
 }
 
 fn check_back(back: &Texture) -> std::result::Result<(), String> {

@@ -140,7 +140,7 @@ impl SampleGrid {
 
     /// Where a pixel is on the lattice, where light is looked up once for each.
     #[inline(always)]
-    fn position_of(&self, [x, y]: [usize; 2]) -> (LatticePosition, LatticePosition) {
+    fn position_of(&self, x: usize, y: usize) -> (LatticePosition, LatticePosition) {
         (self.columns[x], self.rows[y])
     }
 
@@ -394,8 +394,8 @@ impl LayerStack {
 
     fn may_be_shadowed(&self, block: &PixelBlock) -> bool {
         let (columns, rows) = self.samples.nodes_around(block);
-        let map = self.catcher.share.as_ref();
-        map.is_some_and(|map| map.meets(columns, rows))
+        let share = &self.catcher.share;
+        share.as_ref().is_some_and(|map| map.meets(columns, rows))
     }
 
     /// What shadows leave of the surface's light: the average over what is seen of it.
@@ -437,7 +437,7 @@ impl LayerStack {
     /// The share at one position of the sample grid.
     #[inline(always)]
     fn share_at(&self, map: &IrradianceMap, x: usize, y: usize) -> Float4 {
-        let (column, row) = self.samples.position_of([x, y]);
+        let (column, row) = self.samples.position_of(x, y);
         if map.holds(column, row) {
             map.value_at(column, row)
         } else {

@@ -152,8 +152,12 @@ impl AttemptSeries<'_> {
         if self.options.mode == SettleMode::Flat {
             return SettleVerdict::Rested;
         }
-        let unsupported = support::unsupported(self.scene, self.options, bodies, touching);
-        rested_or_hanging(unsupported)
+        rested_or_hanging(support::unsupported(
+            self.scene,
+            self.options,
+            bodies,
+            touching,
+        ))
     }
 
     fn is_too_deep(&self, depth: f64) -> bool {

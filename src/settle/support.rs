@@ -185,9 +185,8 @@ impl SpringModel {
     }
 
     fn contact_energy(&self, y: &[f64]) -> f64 {
-        let springs = self.springs.iter();
-        let squares = springs.map(|spring| spring.compression(y).powi(2));
-        0.5 * CONTACT_STIFFNESS * squares.sum::<f64>()
+        let compressions = self.springs.iter().map(|spring| spring.compression(y));
+        0.5 * CONTACT_STIFFNESS * compressions.map(|c| c.powi(2)).sum::<f64>()
     }
 
     /// Of the bodies' own springs, less what their weights release.
@@ -222,8 +221,8 @@ fn relative_masses(scene: &Scene, order: &[usize]) -> Vec<f64> {
 }
 
 fn mean_mass(scene: &Scene, ids: &[usize]) -> f64 {
-    let total: f64 = ids.iter().map(|&i| scene.objects[i].mass).sum();
-    total / ids.len().max(1) as f64
+    let masses = ids.iter().map(|&i| scene.objects[i].mass);
+    masses.sum::<f64>() / ids.len().max(1) as f64
 }
 
 /// The pull of gravity in each degree of freedom.
@@ -258,8 +257,9 @@ impl SpringGeometry {
         contacts
             .iter()
             .flat_map(|contact| {
-                let forces = friction_pyramid(contact, friction);
-                forces.into_iter().map(|f| self.spring(contact, f))
+                friction_pyramid(contact, friction)
+                    .into_iter()
+                    .map(|force| self.spring(contact, force))
             })
             .collect()
     }

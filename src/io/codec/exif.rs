@@ -77,9 +77,9 @@ impl CameraNotes {
 }
 
 /// One size is another times an integer, but for [`SIZE_TOLERANCE`].
-fn is_multiple(size: [f64; 2], [long, short]: [f64; 2]) -> bool {
-    let factor = (size[0] / long).round();
-    factor >= 1.0 && is_close(size[0], factor * long) && is_close(size[1], factor * short)
+fn is_multiple([width, height]: [f64; 2], [long, short]: [f64; 2]) -> bool {
+    let factor = (width / long).round();
+    factor >= 1.0 && is_close(width, factor * long) && is_close(height, factor * short)
 }
 
 fn is_close(side: f64, expected: f64) -> bool {

@@ -52,15 +52,15 @@ pub(crate) fn read_before_scan(file: &mut impl Read, limits: &Limits) -> Result<
 fn append_segment(bytes: &mut Vec<u8>, file: &mut impl Read) -> Result<u8, Refusal> {
     let marker = append_marker(bytes, file)?;
     let length = append_length(bytes, file)?;
-    append(bytes, file, usize::from(length).saturating_sub(2))?;
+    append(bytes, file, length.saturating_sub(2))?;
     Ok(marker)
 }
 
 /// Appends the length of a segment, which counts its own two bytes.
-fn append_length(bytes: &mut Vec<u8>, file: &mut impl Read) -> Result<u16, Refusal> {
+fn append_length(bytes: &mut Vec<u8>, file: &mut impl Read) -> Result<usize, Refusal> {
     let at = bytes.len();
     append(bytes, file, 2)?;
-    Ok(u16::from_be_bytes([bytes[at], bytes[at + 1]]))
+    Ok(u16::from_be_bytes([bytes[at], bytes[at + 1]]).into())
 }
 
 /// Reads a marker that a segment follows.

@@ -251,8 +251,7 @@ impl SampleRows<'_> {
 
     fn count_transparent_colors(&self) -> Result<usize, String> {
         let picked = Wanted::Color.pick(&self.raster.names)?;
-        let alpha = picked.get(3);
-        Ok(alpha.map_or(0, |&a| self.count_transparent(a)))
+        Ok(picked.get(3).map_or(0, |&a| self.count_transparent(a)))
     }
 
     /// Pixels that are not opaque by channel `a`.

@@ -233,10 +233,14 @@ fn add_text(
     key: String,
     value: String,
 ) -> Result<(), png::EncodingError> {
-    match value.chars().all(|c| (c as u32) < 256) {
+    match is_latin(&value) {
         true => encoder.add_text_chunk(key, value),
         false => encoder.add_itxt_chunk(key, value),
     }
+}
+
+fn is_latin(text: &str) -> bool {
+    text.chars().all(|c| (c as u32) < 256)
 }
 
 #[cfg(test)]
