@@ -74,6 +74,10 @@ impl Texture {
     }
 }
 
+fn is_grey(image: &Image<Film>) -> bool {
+    image.pixels().iter().all(|film| film.is_grey())
+}
+
 fn checksum_of<P: NoUninit>(image: &Image<P>) -> u32 {
     crc32fast::hash(bytemuck::cast_slice(image.pixels()))
 }
@@ -86,7 +90,7 @@ impl From<Image<PremulRgba>> for Texture {
 
 impl From<Image<Film>> for Texture {
     fn from(image: Image<Film>) -> Self {
-        if image.pixels().iter().all(|film| film.is_grey()) {
+        if is_grey(&image) {
             image.map(Film::to_rgba).into()
         } else {
             Self::Film(Arc::new(Pyramid::new(image)))

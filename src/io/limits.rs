@@ -285,8 +285,7 @@ fn usable_bytes() -> Option<u64> {
 }
 
 fn installed_bytes() -> Option<u64> {
-    let report = std::fs::read_to_string("/proc/meminfo").ok()?;
-    let total = report.lines().find_map(|l| l.strip_prefix("MemTotal:"))?;
+    let total = line_after("MemTotal:", "/proc/meminfo")?;
     let kib: u64 = total.trim().strip_suffix(" kB")?.parse().ok()?;
     Some(kib << 10)
 }
@@ -299,9 +298,15 @@ fn control_group_bytes() -> Option<u64> {
         .min()
 }
 
+/// The rest of the first line of a file that begins like this.
+fn line_after(start: &str, file: &str) -> Option<String> {
+    let text = std::fs::read_to_string(file).ok()?;
+    let rest = text.lines().find_map(|line| line.strip_prefix(start))?;
+    Some(rest.into())
+}
+
 fn own_control_group() -> Option<PathBuf> {
-    let groups = std::fs::read_to_string("/proc/self/cgroup").ok()?;
-    let own = groups.lines().find_map(|l| l.strip_prefix("0::/"))?;
+    let own = line_after("0::/", "/proc/self/cgroup")?;
     Some(Path::new("/sys/fs/cgroup").join(own))
 }
 

@@ -41,8 +41,8 @@ impl Picture {
 
     pub(super) fn decode(path: &Path, options: &ReadOptions, wanted: Wanted) -> Result<Self> {
         let source = SourceFile::open(path, &options.limits)?;
-        let decoded = decode_raster(&source, options, wanted);
-        Self::from_raster(decoded, &source, &options.limits, wanted)
+        let raster = decode_raster(&source, options, wanted);
+        Self::from_raster(raster, &source, &options.limits, wanted)
     }
 
     /// Finds the meaning of samples, and turns the picture the way the camera was held.

@@ -241,11 +241,15 @@ fn assemble_tiles(view: &CameraView, tiles: &[RenderedTile]) -> DeepImage {
 fn assemble_shadow(view: &CameraView, tiles: &[RenderedTile]) -> Image<LinearRgb> {
     let mut shadow = Image::filled(view.width, view.height, LinearRgb::WHITE);
     for tile in tiles {
-        if let Some(values) = &tile.shadow {
-            copy_block(&tile.block, values, &mut shadow);
-        }
+        copy_shadow(tile, &mut shadow);
     }
     shadow
+}
+
+fn copy_shadow(tile: &RenderedTile, picture: &mut Image<LinearRgb>) {
+    if let Some(values) = &tile.shadow {
+        copy_block(&tile.block, values, picture);
+    }
 }
 
 /// Copies a block's values, row by row, to where it lies in a picture.

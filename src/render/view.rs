@@ -51,8 +51,10 @@ impl ScenePlane {
     }
 
     fn is_finite(&self) -> bool {
-        let vectors = [&self.x, &self.y, &self.normal, &self.center];
-        vectors.iter().all(|v| v.iter().all(|c| c.is_finite()))
+        [&self.x, &self.y, &self.normal, &self.center]
+            .into_iter()
+            .flatten()
+            .all(|c| c.is_finite())
     }
 
     /// The normal on the side of a point, and how far the point is from the plane.
