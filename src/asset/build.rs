@@ -52,12 +52,16 @@ pub fn build(
     let inserted = insert_all(&list, outcomes, &mut manifest);
     let (photos, refused) = inserted.map_err(|e| e.in_file(&path))?;
     if photos.is_empty() {
-        let what = format!("no photo gave a cut-out: {}", refused.join("; "));
-        return Err(Error::file(path, what));
+        return Err(no_cut_out(&path, &refused));
     }
     manifest.write(folder)?;
     let library = Library::from_manifest(folder, manifest, &photos)?;
     Ok(Built::new(library, &photos, refused))
+}
+
+fn no_cut_out(list: &Path, refused: &[String]) -> Error {
+    let what = format!("no photo gave a cut-out: {}", refused.join("; "));
+    Error::file(list, what)
 }
 
 impl Built {

@@ -42,10 +42,14 @@ const COLUMN_WIDTH_PX: usize = STRIP_WIDTH_PX + 2 * GAP_PX;
 /// Every cut-out over a checkerboard, black, white and green, with its size, the confidence in outline and colour, and why it
 /// needs a review.
 pub fn contact_sheet(library: &Library) -> Image<Srgb8> {
-    let assets = library.assets.iter();
-    let photos: Vec<&Photo> = assets.flat_map(|asset| &asset.photos).collect();
-    let strips: Vec<Image<Srgb8>> = photos.par_iter().map(|photo| strip(photo)).collect();
+    let photos = photos_of(library);
+    let strips: Vec<_> = photos.par_iter().map(|photo| strip(photo)).collect();
     in_columns(&strips)
+}
+
+fn photos_of(library: &Library) -> Vec<&Photo> {
+    let assets = library.assets.iter();
+    assets.flat_map(|asset| &asset.photos).collect()
 }
 
 /// Strips in rows from the top left, each row as high as its highest.
@@ -53,12 +57,16 @@ fn in_columns(strips: &[Image<Srgb8>]) -> Image<Srgb8> {
     let mut sheet = blank_sheet(strips);
     let mut top = GAP_PX;
     for row in strips.chunks(COLUMNS) {
-        for (i, strip) in row.iter().enumerate() {
-            draw::paste(&mut sheet, [GAP_PX + i * COLUMN_WIDTH_PX, top], strip);
-        }
+        paste_row(&mut sheet, top, row);
         top += row_height(row);
     }
     sheet
+}
+
+fn paste_row(sheet: &mut Image<Srgb8>, top: usize, row: &[Image<Srgb8>]) {
+    for (i, strip) in row.iter().enumerate() {
+        draw::paste(sheet, [GAP_PX + i * COLUMN_WIDTH_PX, top], strip);
+    }
 }
 
 /// Paper of the size that strips take.

@@ -119,12 +119,11 @@ impl PhotoEntry {
 
     /// Fails on a field that is meaningless without another one.
     fn check_companions(&self) -> Result<()> {
-        if self.screen_corners.is_some() && self.screen_size.is_none() {
-            let what = "missing, expected it beside screen_corners";
-            return Err(Error::value("screen_size", what));
+        if self.screen_corners.is_some() {
+            require_beside("screen_corners", "screen_size", &self.screen_size)?;
         }
-        if self.width.is_some() && self.length.is_none() {
-            return Err(Error::value("length", "missing, expected it beside width"));
+        if self.width.is_some() {
+            require_beside("width", "length", &self.length)?;
         }
         Ok(())
     }
@@ -141,10 +140,11 @@ impl PhotoEntry {
 
     /// The scale by what the object itself measures.
     fn object_scale(&self) -> Option<Scale> {
-        match (self.length, self.width) {
-            (Some(length), Some(width)) => Some(Scale::Size([length, width])),
-            (length, _) => length.map(Scale::Length),
-        }
+        let length = self.length?;
+        Some(match self.width {
+            Some(width) => Scale::Size([length, width]),
+            None => Scale::Length(length),
+        })
     }
 
     /// Checks all values, the class against those of the folder.
@@ -184,6 +184,17 @@ impl PhotoEntry {
     pub(super) fn source(&self) -> String {
         let name = self.file.file_name().unwrap_or_default();
         name.to_string_lossy().into_owned()
+    }
+}
+
+/// Fails unless a field that another one needs has a value.
+fn require_beside<T>(given: &str, name: &str, value: &Option<T>) -> Result<()> {
+    match value {
+        Some(_) => Ok(()),
+        None => Err(Error::value(
+            name,
+            format!("missing, expected it beside {given}"),
+        )),
     }
 }
 

@@ -149,12 +149,15 @@ fn with_name(error: Error, photo: &Path) -> Error {
 
 fn log_diagnostics(cut: &CutOut, photo: &Path) {
     for diagnostic in &cut.diagnostics {
-        let level = if diagnostic.code == Code::ScreenHue {
-            log::Level::Warn
-        } else {
-            log::Level::Info
-        };
-        log::log!(level, "{}: {diagnostic}", photo.display());
+        log::log!(log_level(diagnostic), "{}: {diagnostic}", photo.display());
+    }
+}
+
+fn log_level(diagnostic: &Diagnostic) -> log::Level {
+    if diagnostic.code == Code::ScreenHue {
+        log::Level::Warn
+    } else {
+        log::Level::Info
     }
 }
 

@@ -163,12 +163,8 @@ impl Photo {
     /// A cut-out and its entry in the manifest.
     pub fn new(cut_out: impl Into<Texture>, record: PhotoRecord) -> Self {
         let texture = cut_out.into();
-        let (w, h) = texture.size();
-        let outline = record.outline_px.iter();
         Self {
-            outline_uv: outline
-                .map(|&[x, y]| Point2::new(x / w as f64, y / h as f64))
-                .collect(),
+            outline_uv: texture_coordinates(&record.outline_px, texture.size()),
             texture,
             record,
         }
@@ -178,6 +174,13 @@ impl Photo {
     pub fn size(&self) -> [f64; 2] {
         self.record.size_m
     }
+}
+
+fn texture_coordinates(outline_px: &[[f64; 2]], (w, h): (usize, usize)) -> Arc<[Point2<f64>]> {
+    let corners = outline_px.iter();
+    corners
+        .map(|&[x, y]| Point2::new(x / w as f64, y / h as f64))
+        .collect()
 }
 
 #[cfg(test)]

@@ -2,8 +2,7 @@
 
 use super::entry::PhotoEntry;
 use super::manifest::{Manifest, check_each};
-use super::screen_source::ScreenSource;
-use super::spreadsheet;
+use super::spreadsheet::{self, SpreadsheetRow};
 use crate::error::{Error, Result};
 use crate::io;
 use crate::matte::CutOutOptions;
@@ -46,9 +45,14 @@ impl List {
     /// [`Error::File`] for a file that cannot be read or understood, with its line.
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
-        if !is_csv(path) {
-            return io::read_toml(path);
+        if is_csv(path) {
+            Self::from_csv(path)
+        } else {
+            io::read_toml(path)
         }
+    }
+
+    fn from_csv(path: &Path) -> Result<Self> {
         let bytes = io::read_bytes(path)?;
         Ok(Self {
             photos: photos_of_csv(&bytes).map_err(|e| e.in_file(path))?,
@@ -90,9 +94,7 @@ impl List {
     pub(super) fn located_in(mut self, folder: &Path) -> Self {
         for photo in &mut self.photos {
             photo.file = with_actual_spelling(folder.join(&photo.file));
-            if let ScreenSource::Photo(empty) = &mut photo.screen {
-                *empty = folder.join(&empty);
-            }
+            photo.screen.locate_in(folder);
         }
         self
     }
@@ -119,10 +121,12 @@ pub(super) fn find_list(path: &Path) -> Result<PathBuf> {
 }
 
 fn photos_of_csv(bytes: &[u8]) -> Result<Vec<PhotoEntry>> {
-    spreadsheet::rows(bytes)?
-        .into_iter()
-        .map(|row| io::from_table(row.cells).map_err(|e| spreadsheet::in_line(e, row.line)))
-        .collect()
+    let rows = spreadsheet::rows(bytes)?;
+    rows.into_iter().map(entry_of_row).collect()
+}
+
+fn entry_of_row(row: SpreadsheetRow) -> Result<PhotoEntry> {
+    io::from_table(row.cells).map_err(|e| spreadsheet::in_line(e, row.line))
 }
 
 /// The file of that name, or where there is none the only one beside it that is called so but for capitals and the
@@ -161,6 +165,7 @@ fn normalized_name(path: &Path) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::screen_source::ScreenSource;
     use super::*;
 
     #[test]

@@ -216,8 +216,7 @@ impl Manifest {
         if declared.starts_with(&self.classes) {
             return Ok(());
         }
-        let (declared, known) = (declared.join(", "), self.classes.join(", "));
-        let what = format!("{declared}; expected to begin with those that the folder has: {known}");
+        let what = unexpected_order(&declared.join(", "), &self.classes.join(", "));
         Err(Error::value("classes", what))
     }
 
@@ -278,14 +277,20 @@ impl Asset<PhotoRecord> {
     }
 }
 
+fn unexpected_order(declared: &str, known: &str) -> String {
+    format!("{declared}; expected to begin with those that the folder has: {known}")
+}
+
 /// Checks every item of a list; errors name its place: `photos[2]`.
 pub(super) fn check_each<T>(
     items: &[T],
     name: &str,
     check: impl Fn(&T) -> Result<()>,
 ) -> Result<()> {
-    let mut numbered = items.iter().enumerate();
-    numbered.try_for_each(|(i, item)| check(item).map_err(|e| e.within(&format!("{name}[{i}]"))))
+    items
+        .iter()
+        .enumerate()
+        .try_for_each(|(i, item)| check(item).map_err(|e| e.within(&format!("{name}[{i}]"))))
 }
 
 /// Place of a class in a list of names.
@@ -390,13 +395,17 @@ const CUT_OUT_SIDE: Bounds = Bounds::metres(1e-4, 20.0, "objects are 5 mm to 5 m
 
 /// A name that is safe as the name of a file: letters and digits of any language.
 pub(super) fn check_name(name: &str) -> Result<()> {
-    let is_short = !name.is_empty() && name.len() <= MAX_NAME_BYTES;
-    if is_short && name.chars().all(is_name_character) && !name.starts_with('.') {
+    if is_name(name) {
         return Ok(());
     }
     let start = printable_start(name);
     let what = format!("\"{start}\", expected letters, digits, _ and -");
     Err(Error::value("name", what))
+}
+
+fn is_name(name: &str) -> bool {
+    let is_short = !name.is_empty() && name.len() <= MAX_NAME_BYTES;
+    is_short && name.chars().all(is_name_character) && !name.starts_with('.')
 }
 
 fn is_name_character(c: char) -> bool {
@@ -408,12 +417,16 @@ const MAX_NAME_BYTES: usize = 120;
 
 /// A name that stands on a line of its own in every format of labels.
 pub(super) fn check_class(name: &str) -> Result<()> {
-    let is_short = !name.trim().is_empty() && name.len() <= MAX_NAME_BYTES;
-    if is_short && !name.chars().any(char::is_control) {
+    if is_class_name(name) {
         return Ok(());
     }
     let what = format!("\"{}\", expected a name on one line", printable_start(name));
     Err(Error::value("class", what))
+}
+
+fn is_class_name(name: &str) -> bool {
+    let is_short = !name.trim().is_empty() && name.len() <= MAX_NAME_BYTES;
+    is_short && !name.chars().any(char::is_control)
 }
 
 /// The beginning of a name, on one line.

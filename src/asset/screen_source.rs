@@ -35,6 +35,20 @@ impl ScreenSource {
         }
     }
 
+    /// With its photo, where it is one, beside the list in this folder.
+    pub(super) fn locate_in(&mut self, folder: &Path) {
+        if let Self::Photo(path) = self {
+            *path = folder.join(&path);
+        }
+    }
+
+    fn color_or_photo(text: String) -> std::result::Result<Self, String> {
+        match numbers(&text) {
+            Some(numbers) => color_of(numbers).map(Self::Color),
+            None => Ok(Self::Photo(text.into())),
+        }
+    }
+
     fn photo(&self) -> Option<&Path> {
         if let Self::Photo(path) = self {
             Some(path)
@@ -51,10 +65,7 @@ impl TryFrom<String> for ScreenSource {
         match text.as_str() {
             "auto" => Ok(Self::Auto),
             "" => Err("empty, expected auto, R,G,B or a photo".into()),
-            _ => match numbers(&text) {
-                Some(numbers) => color_of(numbers).map(Self::Color),
-                None => Ok(Self::Photo(text.into())),
-            },
+            _ => Self::color_or_photo(text),
         }
     }
 }
@@ -65,8 +76,7 @@ fn numbers(text: &str) -> Option<Vec<f32>> {
 }
 
 fn color_of(channels: Vec<f32>) -> std::result::Result<LinearRgb, String> {
-    let channels: std::result::Result<[f32; 3], _> = channels.try_into();
-    channels
+    <[f32; 3]>::try_from(channels)
         .map(LinearRgb::from)
         .map_err(|n| format!("{} numbers, expected auto, R,G,B or a photo", n.len()))
 }
@@ -127,12 +137,14 @@ impl EmptyScreens {
     /// # Errors
     /// Those of [`io::read`].
     pub(super) fn get(&self, screen: &ScreenSource) -> Result<Option<Cow<'_, Image<LinearRgb>>>> {
-        let Some(path) = screen.photo() else {
-            return Ok(None);
-        };
+        let path = screen.photo();
+        path.map(|path| self.image(path)).transpose()
+    }
+
+    fn image(&self, path: &Path) -> Result<Cow<'_, Image<LinearRgb>>> {
         match self.shared.get(path) {
-            Some(image) => Ok(Some(Cow::Borrowed(image))),
-            None => io::read(path).map(|image| Some(Cow::Owned(image))),
+            Some(image) => Ok(Cow::Borrowed(image)),
+            None => io::read(path).map(Cow::Owned),
         }
     }
 }

@@ -3,6 +3,7 @@
 
 use crate::error::{Error, Result};
 use crate::io;
+use std::borrow::Cow;
 
 /// A line of a list of photos.
 #[derive(Debug)]
@@ -39,10 +40,7 @@ pub(super) fn rows(bytes: &[u8]) -> Result<Vec<SpreadsheetRow>> {
     let text = decoded(bytes)?.replace("\r\n", "\n");
     let text = text.trim_start_matches('\u{feff}');
     let separator = separator(text.lines().next().unwrap_or_default());
-    let mut reader = csv::ReaderBuilder::new()
-        .delimiter(separator)
-        .trim(csv::Trim::All)
-        .from_reader(text.as_bytes());
+    let mut reader = csv_reader(text, separator);
     let headers = reader.headers().map_err(|e| csv_error(&e))?;
     let sheet = Columns::new(headers, separator)?;
     reader
@@ -50,6 +48,13 @@ pub(super) fn rows(bytes: &[u8]) -> Result<Vec<SpreadsheetRow>> {
         .map(|record| sheet.row(&record.map_err(|e| csv_error(&e))?))
         .filter(|row| !matches!(row, Ok(row) if row.cells.is_empty()))
         .collect()
+}
+
+fn csv_reader(text: &str, separator: u8) -> csv::Reader<&[u8]> {
+    csv::ReaderBuilder::new()
+        .delimiter(separator)
+        .trim(csv::Trim::All)
+        .from_reader(text.as_bytes())
 }
 
 /// What stands in the columns of a spreadsheet.
@@ -101,12 +106,16 @@ impl Columns {
     }
 
     fn number(&self, cell: &str) -> Option<toml::Value> {
-        let number: f64 = if self.has_decimal_comma(cell) {
-            cell.replace(',', ".").parse().ok()?
-        } else {
-            cell.parse().ok()?
-        };
+        let number: f64 = self.with_decimal_point(cell).parse().ok()?;
         number.is_finite().then(|| number.into())
+    }
+
+    fn with_decimal_point<'c>(&self, cell: &'c str) -> Cow<'c, str> {
+        if self.has_decimal_comma(cell) {
+            cell.replace(',', ".").into()
+        } else {
+            cell.into()
+        }
     }
 
     /// Between commas a comma in a number may as well separate thousands.

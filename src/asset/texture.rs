@@ -3,6 +3,7 @@
 use crate::filter::Pyramid;
 use crate::image::Image;
 use crate::pixel::{Film, PremulRgba};
+use bytemuck::NoUninit;
 use std::sync::Arc;
 
 /// A cut-out at all its levels of detail, shared by all that show it. Scene-linear, premultiplied.
@@ -67,10 +68,18 @@ impl Texture {
     /// CRC-32 of the texels at full detail.
     pub fn checksum(&self) -> u32 {
         match self {
-            Self::Rgba(pyramid) => crc32fast::hash(bytemuck::cast_slice(pyramid.base().pixels())),
-            Self::Film(pyramid) => crc32fast::hash(bytemuck::cast_slice(pyramid.base().pixels())),
+            Self::Rgba(pyramid) => checksum_of(pyramid.base()),
+            Self::Film(pyramid) => checksum_of(pyramid.base()),
         }
     }
+}
+
+fn is_grey(image: &Image<Film>) -> bool {
+    image.pixels().iter().all(|film| film.is_grey())
+}
+
+fn checksum_of<P: NoUninit>(image: &Image<P>) -> u32 {
+    crc32fast::hash(bytemuck::cast_slice(image.pixels()))
 }
 
 impl From<Image<PremulRgba>> for Texture {
@@ -81,7 +90,7 @@ impl From<Image<PremulRgba>> for Texture {
 
 impl From<Image<Film>> for Texture {
     fn from(image: Image<Film>) -> Self {
-        if image.pixels().iter().all(|film| film.is_grey()) {
+        if is_grey(&image) {
             image.map(Film::to_rgba).into()
         } else {
             Self::Film(Arc::new(Pyramid::new(image)))

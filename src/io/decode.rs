@@ -94,11 +94,13 @@ fn read_jpeg_header(
 /// What the camera noted; EXR and HDR have no room for it.
 pub(super) fn camera_notes(source: &SourceFile) -> CameraNotes {
     match source.format {
-        Format::Jpeg | Format::Tiff | Format::Png => {
-            catch_panic(|| Ok(CameraNotes::read(Cursor::new(&source.bytes)))).unwrap_or_default()
-        }
+        Format::Jpeg | Format::Tiff | Format::Png => exif_notes(&source.bytes),
         _ => CameraNotes::default(),
     }
+}
+
+fn exif_notes(file: &[u8]) -> CameraNotes {
+    catch_panic(|| Ok(CameraNotes::read(Cursor::new(file)))).unwrap_or_default()
 }
 
 /// Another decoder for what ours do not know.
@@ -123,14 +125,17 @@ pub(super) fn decode_elsewhere(
 /// The meaning of alpha in a TIFF comes from the file's own tag: OpenImageIO treats an unspecified one as associated.
 #[cfg(feature = "oiio")]
 fn with_known_alpha(raster: Raster, source: &SourceFile) -> Raster {
-    let premultiplied = match source.format {
+    Raster {
+        premultiplied: is_premultiplied(&raster, source),
+        ..raster
+    }
+}
+
+fn is_premultiplied(raster: &Raster, source: &SourceFile) -> bool {
+    match source.format {
         Format::Tiff => CameraNotes::has_associated_alpha(&source.bytes),
         Format::Exr => true,
         _ => raster.premultiplied,
-    };
-    Raster {
-        premultiplied,
-        ..raster
     }
 }
 

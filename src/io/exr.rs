@@ -25,11 +25,9 @@ pub fn write_channels(
     channels: &[(&str, &[f32])],
     metadata: &[(String, String)],
 ) -> Result<()> {
-    let planes = channels
-        .iter()
-        .map(|&(name, samples)| (name, exr::float_samples(samples.to_vec())))
-        .collect();
-    let encoded = exr::encode(size, planes, exr::Compression::Zip, metadata);
+    let encoded = encode(size, channels, metadata, |samples| {
+        exr::float_samples(samples.to_vec())
+    });
     write_encoded(path.as_ref(), encoded)
 }
 
@@ -43,12 +41,21 @@ pub fn write_half_channels(
     channels: &[(&str, &[f32])],
     metadata: &[(String, String)],
 ) -> Result<()> {
+    let encoded = encode(size, channels, metadata, exr::half_samples);
+    write_encoded(path.as_ref(), encoded)
+}
+
+fn encode(
+    size: (usize, usize),
+    channels: &[(&str, &[f32])],
+    metadata: &[(String, String)],
+    stored: impl Fn(&[f32]) -> exr::FlatSamples,
+) -> std::result::Result<Vec<u8>, String> {
     let planes = channels
         .iter()
-        .map(|&(name, samples)| (name, exr::half_samples(samples)))
+        .map(|&(name, samples)| (name, stored(samples)))
         .collect();
-    let encoded = exr::encode(size, planes, exr::Compression::Zip, metadata);
-    write_encoded(path.as_ref(), encoded)
+    exr::encode(size, planes, exr::Compression::Zip, metadata)
 }
 
 /// Writes parts of one size (width, height) into one EXR file, losslessly compressed; the same parts give the same bytes.

@@ -4,7 +4,7 @@
 //! are checked first, in arithmetic that cannot wrap.
 
 use crate::error::{Error, Result};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::sync::OnceLock;
 
@@ -177,6 +177,22 @@ pub(super) struct Demand {
 }
 
 impl Demand {
+    /// What a picture asks for all of whose channels are stored alike.
+    pub(super) fn new(
+        [width, height]: [impl Into<u64>; 2],
+        channels: impl Into<u64>,
+        bytes_per_sample: impl Into<u64>,
+        file_bytes: u64,
+    ) -> Self {
+        let channels = channels.into();
+        Self {
+            width: width.into(),
+            height: height.into(),
+            channels,
+            bytes_per_pixel: channels * bytes_per_sample.into(),
+            file_bytes,
+        }
+    }
     fn is_empty(&self) -> bool {
         self.width == 0 || self.height == 0 || self.channels == 0
     }
@@ -202,12 +218,22 @@ impl Limits {
     /// The decoded bytes of a file.
     fn check_bytes(&self, bytes: u64, file_bytes: u64) -> std::result::Result<(), String> {
         at_most(bytes, self.decoded_bytes, "decoded bytes", "decoded_bytes")?;
-        if bytes > RATIO_FREE_BYTES {
-            let ratio = bytes / file_bytes.max(1);
-            let what = "decoded bytes for each byte of the file";
-            at_most(ratio, self.ratio, what, "ratio")?;
-        }
+        self.check_ratio(bytes, file_bytes)?;
         affordable(bytes)
+    }
+
+    fn check_ratio(&self, bytes: u64, file_bytes: u64) -> std::result::Result<(), String> {
+        if bytes <= RATIO_FREE_BYTES {
+            return Ok(());
+        }
+        let what = "decoded bytes for each byte of the file";
+        at_most(bytes / file_bytes.max(1), self.ratio, what, "ratio")
+    }
+
+    /// Fails on a header that goes on beyond the limit of metadata.
+    pub(super) fn check_header_bytes(&self, bytes: u64) -> std::result::Result<(), String> {
+        let what = "bytes without an end of the header";
+        at_most(bytes, self.metadata_bytes, what, "metadata_bytes")
     }
 
     /// Refuses a picture that needs too much of the machine's memory; the text shows the sum. Where the system does not
@@ -250,28 +276,38 @@ pub(super) fn saturating_product<const N: usize>(sizes: [u64; N]) -> u64 {
 /// report it. Asked once.
 pub(super) fn machine_bytes() -> Option<u64> {
     static BYTES: OnceLock<Option<u64>> = OnceLock::new();
-    *BYTES.get_or_init(|| {
-        let installed = installed_bytes()?;
-        Some(control_group_bytes().unwrap_or(u64::MAX).min(installed))
-    })
+    *BYTES.get_or_init(usable_bytes)
+}
+
+fn usable_bytes() -> Option<u64> {
+    let installed = installed_bytes()?;
+    Some(control_group_bytes().unwrap_or(u64::MAX).min(installed))
 }
 
 fn installed_bytes() -> Option<u64> {
-    let report = std::fs::read_to_string("/proc/meminfo").ok()?;
-    let total = report.lines().find_map(|l| l.strip_prefix("MemTotal:"))?;
+    let total = line_after("MemTotal:", "/proc/meminfo")?;
     let kib: u64 = total.trim().strip_suffix(" kB")?.parse().ok()?;
     Some(kib << 10)
 }
 
 /// The least that this process's control group (cgroup v2) or one above it allows.
 fn control_group_bytes() -> Option<u64> {
-    let groups = std::fs::read_to_string("/proc/self/cgroup").ok()?;
-    let own = groups.lines().find_map(|l| l.strip_prefix("0::/"))?;
-    Path::new("/sys/fs/cgroup")
-        .join(own)
+    own_control_group()?
         .ancestors()
         .filter_map(group_bytes)
         .min()
+}
+
+/// The rest of the first line of a file that begins like this.
+fn line_after(start: &str, file: &str) -> Option<String> {
+    let text = std::fs::read_to_string(file).ok()?;
+    let rest = text.lines().find_map(|line| line.strip_prefix(start))?;
+    Some(rest.into())
+}
+
+fn own_control_group() -> Option<PathBuf> {
+    let own = line_after("0::/", "/proc/self/cgroup")?;
+    Some(Path::new("/sys/fs/cgroup").join(own))
 }
 
 fn group_bytes(group: &Path) -> Option<u64> {
@@ -296,14 +332,17 @@ pub(super) fn at_most(
 
 /// Refuses what the system has no memory for, as far as it reports that: an allocation that fails ends the process.
 pub(super) fn affordable(bytes: u64) -> std::result::Result<(), String> {
-    let fits = usize::try_from(bytes).is_ok_and(|n| Vec::<u8>::new().try_reserve_exact(n).is_ok());
-    if fits {
+    if can_reserve(bytes) {
         return Ok(());
     }
     let mebibytes = bytes >> 20;
     Err(format!(
         "needs {mebibytes} MiB of memory, more than the system gives"
     ))
+}
+
+fn can_reserve(bytes: u64) -> bool {
+    usize::try_from(bytes).is_ok_and(|n| Vec::<u8>::new().try_reserve_exact(n).is_ok())
 }
 
 #[cfg(test)]

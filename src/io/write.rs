@@ -173,23 +173,31 @@ fn encode_exr<P: ToFile>(
     bits: Bits,
     options: &WriteOptions,
 ) -> std::result::Result<Vec<u8>, String> {
-    let planes = P::NAMES
-        .iter()
-        .enumerate()
-        .map(|(c, &name)| (name, channel_samples(image, c, bits)))
-        .collect();
+    let planes = exr_planes(image, bits);
     let metadata = with_colorspace(&options.metadata);
     exr::encode(image.size(), planes, options.compression, &metadata)
 }
 
+fn exr_planes<P: ToFile>(image: &Image<P>, bits: Bits) -> Vec<(&'static str, exr::FlatSamples)> {
+    P::NAMES
+        .iter()
+        .enumerate()
+        .map(|(c, &name)| (name, channel_samples(image, c, bits)))
+        .collect()
+}
+
 /// One channel of a picture, scene-linear.
 fn channel_samples<P: ToFile>(image: &Image<P>, channel: usize, bits: Bits) -> exr::FlatSamples {
-    let pixels = image.pixels().par_iter();
-    let plane: Vec<f32> = pixels.map(|p| p.linear()[channel]).collect();
+    let plane = channel_plane(image, channel);
     match bits {
         Bits::Half => exr::half_samples(&plane),
         _ => exr::float_samples(plane),
     }
+}
+
+fn channel_plane<P: ToFile>(image: &Image<P>, channel: usize) -> Vec<f32> {
+    let pixels = image.pixels().par_iter();
+    pixels.map(|p| p.linear()[channel]).collect()
 }
 
 fn encode_float_tiff<P: ToFile>(
@@ -197,8 +205,8 @@ fn encode_float_tiff<P: ToFile>(
     metadata: &[(String, String)],
 ) -> std::result::Result<Vec<u8>, String> {
     let samples = interleaved(image, P::linear);
-    let metadata = with_colorspace(metadata);
-    tiff::encode_floats(image.size(), P::NAMES.len(), &samples, &metadata)
+    let size = image.size();
+    tiff::encode_floats(size, P::NAMES.len(), &samples, &with_colorspace(metadata))
 }
 
 fn encode_jpeg<P: ToFile>(
@@ -229,9 +237,16 @@ fn without_alpha(codes: &[u8]) -> std::result::Result<Vec<u8>, String> {
 
 /// The texts with the colour space in front, unless the caller named one.
 fn with_colorspace(metadata: &[(String, String)]) -> Vec<(String, String)> {
-    let named = metadata.iter().any(|(key, _)| key == COLORSPACE.0);
-    let ours = (!named).then(|| (COLORSPACE.0.to_string(), COLORSPACE.1.to_string()));
+    let ours = (!names_colorspace(metadata)).then(colorspace_note);
     ours.into_iter().chain(metadata.iter().cloned()).collect()
+}
+
+fn names_colorspace(metadata: &[(String, String)]) -> bool {
+    metadata.iter().any(|(key, _)| key == COLORSPACE.0)
+}
+
+fn colorspace_note() -> (String, String) {
+    (COLORSPACE.0.to_string(), COLORSPACE.1.to_string())
 }
 
 #[cfg(test)]

@@ -16,12 +16,19 @@ use crate::scene::{AreaLight, Card, EnvironmentMap, Shot};
 /// twice; a plate of another size; a light or an exposure that is not finite.
 pub fn check(shot: &Shot) -> Result<()> {
     check_plate(shot)?;
-    for (i, light) in shot.lights.iter().enumerate() {
-        check_light(i, light)?;
-    }
+    check_lights(&shot.lights)?;
     check_sky(shot)?;
     check_ids(&shot.cards)?;
-    for (i, card) in shot.cards.iter().enumerate() {
+    check_cards(&shot.cards)
+}
+
+fn check_lights(lights: &[AreaLight]) -> Result<()> {
+    let mut numbered = lights.iter().enumerate();
+    numbered.try_for_each(|(i, light)| check_light(i, light))
+}
+
+fn check_cards(cards: &[Card]) -> Result<()> {
+    for (i, card) in cards.iter().enumerate() {
         check_card(card).map_err(|what| Error::value(format!("cards[{i}]"), what))?;
     }
     Ok(())
@@ -38,48 +45,50 @@ fn check_plate(shot: &Shot) -> Result<()> {
 }
 
 fn check_light(i: usize, light: &AreaLight) -> Result<()> {
-    let mut lengths = [light.position, light.target]
-        .into_iter()
-        .flatten()
-        .chain(light.size);
-    let finite = lengths.all(f64::is_finite) && light.power.is_finite() && light.color.is_finite();
-    if finite {
-        return Ok(());
-    }
-    Err(Error::value(
-        format!("lights[{i}]"),
+    require(
+        is_finite(light),
+        &format!("lights[{i}]"),
         "not finite, expected numbers",
-    ))
+    )
+}
+
+fn is_finite(light: &AreaLight) -> bool {
+    lengths_of(light).all(f64::is_finite) && light.power.is_finite() && light.color.is_finite()
+}
+
+fn lengths_of(light: &AreaLight) -> impl Iterator<Item = f64> {
+    let places = [light.position, light.target];
+    places.into_iter().flatten().chain(light.size)
 }
 
 /// The environment, constant or a map, and the exposure.
 fn check_sky(shot: &Shot) -> Result<()> {
-    shot.environment.as_ref().map_or(Ok(()), check_map)?;
-    if shot.exposure.is_finite() && shot.ambient.is_finite() {
-        return Ok(());
-    }
-    Err(Error::value(
+    shot.environment.iter().try_for_each(check_map)?;
+    require(
+        shot.exposure.is_finite() && shot.ambient.is_finite(),
         "exposure",
         "exposure or ambient is not finite, expected numbers",
-    ))
+    )
+}
+
+fn require(holds: bool, at: &str, what: &str) -> Result<()> {
+    holds.then_some(()).ok_or_else(|| Error::value(at, what))
 }
 
 fn check_map(map: &EnvironmentMap) -> Result<()> {
-    if map.rotation.is_finite() && map.strength.is_finite() && map.strength >= 0.0 {
-        return Ok(());
-    }
-    Err(Error::value(
+    require(
+        map.rotation.is_finite() && map.strength.is_finite() && map.strength >= 0.0,
         "environment",
         "rotation or strength is out of range, expected a finite rotation and a strength of at least 0",
-    ))
+    )
 }
 
 fn check_ids(cards: &[Card]) -> Result<()> {
     match repeated_id(cards) {
-        Some(id) => {
-            let what = format!("id {} is used twice, expected one card each", id.0);
-            Err(Error::value("cards", what))
-        }
+        Some(ObjectId(id)) => Err(Error::value(
+            "cards",
+            format!("id {id} is used twice, expected one card each"),
+        )),
         None => Ok(()),
     }
 }
@@ -96,16 +105,19 @@ fn check_card(card: &Card) -> std::result::Result<(), String> {
         return Err("id 0, expected 1 or more".into());
     }
     check_texture(&card.texture)?;
-    card.back.as_ref().map_or(Ok(()), |back| {
-        check_texture(back).map_err(|what| format!("back: {what}"))
-    })
+    card.back.iter().try_for_each(check_back)
+}
+
+fn check_back(back: &Texture) -> std::result::Result<(), String> {
+    check_texture(back).map_err(|what| format!("back: {what}"))
 }
 
 fn check_texture(texture: &Texture) -> std::result::Result<(), String> {
-    let (width, height) = texture.size();
-    (0..height)
-        .flat_map(|y| (0..width).map(move |x| (x, y)))
-        .try_for_each(|(x, y)| check_texel(&texture.texel(x, y), x, y))
+    positions_in(texture.size()).try_for_each(|(x, y)| check_texel(&texture.texel(x, y), x, y))
+}
+
+fn positions_in((width, height): (usize, usize)) -> impl Iterator<Item = (usize, usize)> {
+    (0..height).flat_map(move |y| (0..width).map(move |x| (x, y)))
 }
 
 fn check_texel(texel: &Film, x: usize, y: usize) -> std::result::Result<(), String> {

@@ -32,20 +32,26 @@ impl Cryptomatte {
     ///
     /// Coverage is what is seen of an object. Where more than six objects share a pixel, those with least are left out.
     pub fn new(deep: &DeepImage, layer: &str, names: &[(ObjectId, String)]) -> Self {
-        let ids: Vec<(ObjectId, f32)> = names
-            .iter()
-            .map(|(object, name)| (*object, id_of_name(name)))
-            .collect();
-        let channels = rank_planes(deep, &ids)
-            .into_iter()
-            .enumerate()
-            .map(|(i, plane)| (channel_name(layer, i), plane))
-            .collect();
+        let ids = hashed_ids(names);
         Self {
-            channels,
+            channels: named_planes(layer, rank_planes(deep, &ids)),
             metadata: layer_metadata(layer, names),
         }
     }
+}
+
+fn hashed_ids(names: &[(ObjectId, String)]) -> Vec<(ObjectId, f32)> {
+    let names = names.iter();
+    names
+        .map(|(object, name)| (*object, id_of_name(name)))
+        .collect()
+}
+
+fn named_planes(layer: &str, planes: Vec<Vec<f32>>) -> Vec<(String, Vec<f32>)> {
+    let numbered = planes.into_iter().enumerate();
+    numbered
+        .map(|(i, plane)| (channel_name(layer, i), plane))
+        .collect()
 }
 
 /// Samples of each channel, row by row: id and coverage of each rank in turn.
@@ -94,16 +100,19 @@ fn channel_name(layer: &str, i: usize) -> String {
 }
 
 fn layer_metadata(layer: &str, names: &[(ObjectId, String)]) -> Vec<(String, String)> {
-    let texts = [
+    layer_texts(layer, names)
+        .into_iter()
+        .map(|(what, text)| (attribute_name(layer, what), text))
+        .collect()
+}
+
+fn layer_texts(layer: &str, names: &[(ObjectId, String)]) -> [(&'static str, String); 4] {
+    [
         ("name", layer.to_owned()),
         ("hash", "MurmurHash3_32".to_owned()),
         ("conversion", "uint32_to_float32".to_owned()),
         ("manifest", manifest_text(names)),
-    ];
-    texts
-        .into_iter()
-        .map(|(what, text)| (attribute_name(layer, what), text))
-        .collect()
+    ]
 }
 
 /// Ids by name, as JSON.

@@ -2,11 +2,12 @@
 
 use crate::asset::Texture;
 use crate::deep::DeepImage;
+use crate::geom::Vector3;
 use crate::image::Image;
 use crate::pixel::LinearRgb;
 use crate::render::RenderOptions;
 use crate::render::block::PixelBlock;
-use crate::render::half_plane::quad_sides;
+
 use crate::render::irradiance::{IrradianceMap, irradiance_maps};
 use crate::render::lattice::Lattice;
 use crate::render::layers::{Layer, LayerStack, RenderedTile, SampleGrid, ShadowCatcher};
@@ -162,7 +163,7 @@ impl<'a> ProjectedCard<'a> {
             return None;
         }
         work::add(Kind::Bakes, 1);
-        let (projected, texture) = visible_side(card, plane, projected, view);
+        let (projected, texture) = visible_side(card, plane, projected, &view.eye);
         let level = detail_level(texture, plane, &projected, view, offsets);
         let texture = BakedTexture::new(texture, &card.grade, level);
         let (rows, columns) = rows_and_columns(plane, texture.grid.reach, view);
@@ -176,11 +177,10 @@ impl<'a> ProjectedCard<'a> {
     }
 
     fn into_layer(self, light: Option<IrradianceMap>) -> Layer {
-        let plane = self.plane;
         Layer {
             id: self.card.id,
-            plane,
-            sides: quad_sides(&plane.u, &plane.v, &plane.w, self.texture.grid.reach),
+            plane: self.plane,
+            sides: self.plane.sides(self.texture.grid.reach),
             texture: self.texture,
             light,
             columns: self.columns,
@@ -194,16 +194,10 @@ fn visible_side<'a>(
     card: &'a Card,
     plane: &ScenePlane,
     projected: ProjectedPlane,
-    view: &CameraView,
+    eye: &Vector3<f64>,
 ) -> (ProjectedPlane, &'a Texture) {
     match &card.back {
-        Some(back) if plane.is_seen_from_behind(&view.eye) => {
-            let mirrored = ProjectedPlane {
-                u: projected.w - projected.u,
-                ..projected
-            };
-            (mirrored, back)
-        }
+        Some(back) if plane.is_seen_from_behind(eye) => (projected.mirrored(), back),
         _ => (projected, &card.texture),
     }
 }
@@ -247,11 +241,15 @@ fn assemble_tiles(view: &CameraView, tiles: &[RenderedTile]) -> DeepImage {
 fn assemble_shadow(view: &CameraView, tiles: &[RenderedTile]) -> Image<LinearRgb> {
     let mut shadow = Image::filled(view.width, view.height, LinearRgb::WHITE);
     for tile in tiles {
-        if let Some(values) = &tile.shadow {
-            copy_block(&tile.block, values, &mut shadow);
-        }
+        copy_shadow(tile, &mut shadow);
     }
     shadow
+}
+
+fn copy_shadow(tile: &RenderedTile, picture: &mut Image<LinearRgb>) {
+    if let Some(values) = &tile.shadow {
+        copy_block(&tile.block, values, picture);
+    }
 }
 
 /// Copies a block's values, row by row, to where it lies in a picture.

@@ -11,6 +11,13 @@ impl Float4 {
     pub(super) const ZERO: Self = Self([0.0; 4]);
     pub(super) const ONE: Self = Self([1.0; 4]);
 
+    /// A light: a number for each color channel, and 1.
+    #[inline(always)]
+    pub(super) fn light_from_fn(channel: impl Fn(usize) -> f32) -> Self {
+        let [r, g, b] = [0, 1, 2].map(channel);
+        Self([r, g, b, 1.0])
+    }
+
     #[inline(always)]
     pub(super) fn rgb(self) -> LinearRgb {
         LinearRgb::new(self.0[0], self.0[1], self.0[2])

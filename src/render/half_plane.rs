@@ -1,6 +1,8 @@
 //! Shapes with straight edges, row by row: where linear conditions on `(x, y, 1)` all hold.
 
 use crate::geom::Vector3;
+use crate::render::ranges::integer_range;
+use std::ops::Range;
 
 /// The `x` for which every `side . (x, y, 1)` is at least 0, as lowest and highest; reversed where there is none.
 pub(super) fn row_span(sides: &[Vector3<f64>], y: f64) -> (f64, f64) {
@@ -18,14 +20,23 @@ pub(super) fn row_span(sides: &[Vector3<f64>], y: f64) -> (f64, f64) {
     (low, high)
 }
 
+/// The nodes of row `j` of a lattice inside all sides.
+pub(super) fn nodes_inside(
+    sides: &[Vector3<f64>],
+    j: usize,
+    within: &Range<usize>,
+) -> Range<usize> {
+    let (low, high) = row_span(sides, j as f64);
+    integer_range(low, high, within)
+}
+
 /// Sides of the shape `0 <= u/w <= 1`, `0 <= v/w <= 1`, `w >= 0`, reaching further out by shares of it.
 pub(super) fn quad_sides(
     u: &Vector3<f64>,
     v: &Vector3<f64>,
     w: &Vector3<f64>,
-    reach: [f64; 2],
+    [a, b]: [f64; 2],
 ) -> [Vector3<f64>; 5] {
-    let [a, b] = reach;
     [
         u + w * a,
         w * (1.0 + a) - u,
@@ -43,7 +54,6 @@ pub(super) fn grown_side(side: &Vector3<f64>, by: f64) -> Vector3<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::render::ranges::integer_range;
 
     #[test]
     fn a_square_has_its_rows() {

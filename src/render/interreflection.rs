@@ -67,11 +67,10 @@ impl BounceMap {
             let (x, y) = (left + i as f64 * step, bottom + j as f64 * step);
             light_from_above(&cards, &Vector3::new(x, y, 0.0))
         });
-        let spread = (BOUNCE_SPREAD_M / step) as f32;
         Some(Self {
             corner: [left, bottom],
             step,
-            back: gaussian_blur(&back, spread),
+            back: blurred(&back, step),
         })
     }
 
@@ -79,6 +78,11 @@ impl BounceMap {
         let [x, y] = [0, 1].map(|axis: usize| (point[axis] - self.corner[axis]) / self.step + 0.5);
         sample_bilinear(&self.back, x, y)
     }
+}
+
+fn blurred(back: &Image<LinearRgb>, step: f64) -> Image<LinearRgb> {
+    let spread = (BOUNCE_SPREAD_M / step) as f32;
+    gaussian_blur(back, spread)
 }
 
 /// Low end and length of cards along an axis, with room for the blur.

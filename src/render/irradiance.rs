@@ -153,21 +153,22 @@ fn between_coarse(coarse: &[Float4], start: usize, i: usize) -> Float4 {
 /// What is left of open irradiance.
 #[inline(always)]
 fn remaining_light(open: &Float4, hidden: &Float4) -> Float4 {
-    let [r, g, b] = [0, 1, 2].map(|i| (open.0[i] - hidden.0[i]).max(0.0));
-    Float4([r, g, b, 1.0])
+    Float4::light_from_fn(|i| (open.0[i] - hidden.0[i]).max(0.0))
 }
 
 /// The same as a share; exactly 1 where nothing is hidden, and where there is no light.
 #[inline(always)]
 fn remaining_share(open: &Float4, hidden: &Float4) -> Float4 {
-    let [r, g, b] = [0, 1, 2].map(|i| {
-        if open.0[i] > 0.0 {
-            (1.0 - hidden.0[i] / open.0[i]).clamp(0.0, 1.0)
-        } else {
-            1.0
-        }
-    });
-    Float4([r, g, b, 1.0])
+    Float4::light_from_fn(|i| channel_share(open.0[i], hidden.0[i]))
+}
+
+#[inline(always)]
+fn channel_share(open: f32, hidden: f32) -> f32 {
+    if open > 0.0 {
+        (1.0 - hidden / open).clamp(0.0, 1.0)
+    } else {
+        1.0
+    }
 }
 
 impl IrradianceMap {
@@ -231,11 +232,7 @@ impl IrradianceMap {
     /// Is a position inside, with all four nodes around it?
     #[inline(always)]
     pub(super) fn holds(&self, column: LatticePosition, row: LatticePosition) -> bool {
-        let (i, j) = (column.0 as usize, row.0 as usize);
-        i >= self.columns.start
-            && i + 1 < self.columns.end
-            && j >= self.rows.start
-            && j + 1 < self.rows.end
+        holds_cell(&self.columns, column.0 as usize) && holds_cell(&self.rows, row.0 as usize)
     }
 
     /// The value at a position; at the nearest cell for one outside.
@@ -249,6 +246,12 @@ impl IrradianceMap {
         let bottom = &self.values[start + width..][..2];
         Float4::bilinear([top[0], top[1]], [bottom[0], bottom[1]], column.1, row.1)
     }
+}
+
+/// Are a node and the next one both inside?
+#[inline(always)]
+fn holds_cell(nodes: &Range<usize>, first: usize) -> bool {
+    first >= nodes.start && first + 1 < nodes.end
 }
 
 /// Number inside a range of the node before a position, of which another follows.

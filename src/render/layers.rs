@@ -10,7 +10,7 @@ use crate::pixel::{Depth, LinearRgb, ObjectId};
 use crate::render::block::PixelBlock;
 use crate::render::float4::Float4;
 use crate::render::grade::channel_mean;
-use crate::render::half_plane::{quad_sides, row_span};
+use crate::render::half_plane::row_span;
 use crate::render::irradiance::IrradianceMap;
 use crate::render::lattice::LatticePosition;
 use crate::render::ranges::{integer_range, range_overlap, ranges_meet};
@@ -138,6 +138,18 @@ impl SampleGrid {
         self.offsets.iter().fold(0.0, |m: f64, o| m.max(o.abs()))
     }
 
+    /// Where a pixel is on the lattice, where light is looked up once for each.
+    #[inline(always)]
+    fn position_of(&self, x: usize, y: usize) -> (LatticePosition, LatticePosition) {
+        (self.columns[x], self.rows[y])
+    }
+
+    /// Columns and rows of the lattice nodes around a block.
+    fn nodes_around(&self, block: &PixelBlock) -> (Range<usize>, Range<usize>) {
+        let columns = self.node_range(&block.x, &self.columns);
+        (columns, self.node_range(&block.y, &self.rows))
+    }
+
     /// Lattice nodes around some pixels, of the positions along one axis.
     fn node_range(&self, pixels: &Range<usize>, positions: &[LatticePosition]) -> Range<usize> {
         let n = self.positions_per_side();
@@ -162,14 +174,13 @@ impl Layer {
         self.reciprocal_depth(p) >= other.reciprocal_depth(p)
     }
 
+    fn is_before_at_all(&self, other: &Self, points: &[Vector3<f64>]) -> bool {
+        points.iter().all(|p| self.is_before(other, p))
+    }
+
     /// Depth at a pixel's centre; as far as can be where the plane is behind the camera.
     fn depth_at(&self, x: usize, y: usize) -> Depth {
-        let w = self.plane.w.dot(&pixel_center(x, y));
-        Depth(if w > 0.0 {
-            (self.plane.height / w) as f32
-        } else {
-            f32::MAX
-        })
+        Depth(self.plane.depth_at(&pixel_center(x, y)) as f32)
     }
 }
 
@@ -228,10 +239,9 @@ impl LayerStack {
     }
 
     fn is_sorted_at(&self, layers: &[usize], corners: &[Vector3<f64>; 4]) -> bool {
-        layers.windows(2).all(|pair| {
-            let [near, far] = [pair[0], pair[1]].map(|k| &self.layers[k]);
-            corners.iter().all(|p| near.is_before(far, p))
-        })
+        layers
+            .windows(2)
+            .all(|pair| self.layers[pair[0]].is_before_at_all(&self.layers[pair[1]], corners))
     }
 
     /// Walks a block's layers front to back; returns what passes through all of them.
@@ -383,13 +393,9 @@ impl LayerStack {
     }
 
     fn may_be_shadowed(&self, block: &PixelBlock) -> bool {
-        let Some(map) = &self.catcher.share else {
-            return false;
-        };
-        map.meets(
-            self.samples.node_range(&block.x, &self.samples.columns),
-            self.samples.node_range(&block.y, &self.samples.rows),
-        )
+        let (columns, rows) = self.samples.nodes_around(block);
+        let share = &self.catcher.share;
+        share.as_ref().is_some_and(|map| map.meets(columns, rows))
     }
 
     /// What shadows leave of the surface's light: the average over what is seen of it.
@@ -400,7 +406,7 @@ impl LayerStack {
         let (Some(map), Some(plane)) = (&self.catcher.share, &self.catcher.plane) else {
             return;
         };
-        let edges = quad_sides(&plane.u, &plane.v, &plane.w, [0.0; 2]);
+        let edges = plane.sides([0.0; 2]);
         for y in part.y.clone() {
             if let Some(row) = tile.shadow_row(part, y) {
                 let spans = CatcherSpans::new(&self.samples, &edges, y);
@@ -431,7 +437,7 @@ impl LayerStack {
     /// The share at one position of the sample grid.
     #[inline(always)]
     fn share_at(&self, map: &IrradianceMap, x: usize, y: usize) -> Float4 {
-        let (column, row) = (self.samples.columns[x], self.samples.rows[y]);
+        let (column, row) = self.samples.position_of(x, y);
         if map.holds(column, row) {
             map.value_at(column, row)
         } else {
@@ -520,14 +526,18 @@ fn common_span(spans: &[(f64, f64)]) -> (f64, f64) {
 
 /// The weighted mean of a share, per channel; 1 for no weight, and exactly 1 where the share is 1 all over.
 fn weighted_mean(sum: &Float4, weight: &Float4) -> LinearRgb {
-    let [r, g, b] = [0, 1, 2].map(|c| {
-        if weight.0[c] > 0.0 {
-            (sum.0[c] / weight.0[c]).min(1.0)
-        } else {
-            1.0
-        }
-    });
+    let [r, g, b] = [0, 1, 2].map(|c| channel_mean_share(sum.0[c], weight.0[c]));
     LinearRgb::new(r, g, b)
+}
+
+/// One channel of it; all of the light where there is no weight.
+#[inline(always)]
+fn channel_mean_share(sum: f32, weight: f32) -> f32 {
+    if weight > 0.0 {
+        (sum / weight).min(1.0)
+    } else {
+        1.0
+    }
 }
 
 /// A layer along one row of sub-samples; `x` counts pixels from the block's left edge.

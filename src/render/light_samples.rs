@@ -135,13 +135,9 @@ impl LightGroup {
     fn ambient(radiance: LinearRgb, count: usize, normal: &Vector3<f64>) -> Self {
         let world_from_hemisphere = hemisphere_frame(normal);
         let share = PI / count as f64;
-        let samples = light::ambient_directions(count)
-            .into_iter()
-            .map(|d| LightSample {
-                at: (world_from_hemisphere * d).to_homogeneous(),
-                width: (share / d.z).sqrt(),
-                kind: SampleKind::Sky { share },
-            });
+        let samples = light::ambient_directions(count).into_iter().map(|d| {
+            LightSample::in_sky(&(world_from_hemisphere * d), (share / d.z).sqrt(), share)
+        });
         Self {
             radiance,
             samples: samples.collect(),
@@ -152,11 +148,7 @@ impl LightGroup {
     fn sky_piece(piece: light::SkyPiece) -> Self {
         Self {
             radiance: piece.irradiance,
-            samples: vec![LightSample {
-                at: piece.direction.to_homogeneous(),
-                width: piece.width,
-                kind: SampleKind::Sky { share: 1.0 },
-            }],
+            samples: vec![LightSample::in_sky(&piece.direction, piece.width, 1.0)],
         }
     }
 
@@ -171,13 +163,17 @@ impl LightGroup {
 
 /// Axes of a frame whose `z` is `normal`.
 fn hemisphere_frame(normal: &Vector3<f64>) -> Matrix3<f64> {
-    let helper = if normal.x.abs() < 0.6 {
+    let x = oblique_axis(normal).cross(normal).normalize();
+    Matrix3::from_columns(&[x, normal.cross(&x), *normal])
+}
+
+/// An axis of the world that is far from parallel to a normal.
+fn oblique_axis(normal: &Vector3<f64>) -> Vector3<f64> {
+    if normal.x.abs() < 0.6 {
         Vector3::x()
     } else {
         Vector3::y()
-    };
-    let x = helper.cross(normal).normalize();
-    Matrix3::from_columns(&[x, normal.cross(&x), *normal])
+    }
 }
 
 impl LightSample {
@@ -188,6 +184,15 @@ impl LightSample {
             at: node.point.to_homogeneous(),
             width: area.sqrt(),
             kind: SampleKind::Face { normal, area },
+        }
+    }
+
+    /// A part of the sky with this cosine times solid angle.
+    fn in_sky(direction: &Vector3<f64>, width: f64, share: f64) -> Self {
+        Self {
+            at: direction.to_homogeneous(),
+            width,
+            kind: SampleKind::Sky { share },
         }
     }
 

@@ -142,9 +142,13 @@ impl OpacityLevel {
         first: usize,
         through: &mut [f32],
     ) {
-        let plane = &self.planes[channel.min(self.planes.len() - 1)];
         let size = (self.width, self.height);
-        attenuate_line(plane, size, line, first as f32, through);
+        attenuate_line(self.plane(channel), size, line, first as f32, through);
+    }
+
+    /// Opacities of a channel; a grey level has one plane for all.
+    fn plane(&self, channel: usize) -> &[f32] {
+        &self.planes[channel.min(self.planes.len() - 1)]
     }
 }
 

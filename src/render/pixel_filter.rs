@@ -22,8 +22,12 @@ pub(super) fn filter_quantiles(count: usize) -> Vec<f64> {
 
 /// What the positions leave of the window's width: the standard deviation that the texture's own filter must add.
 pub(super) fn residual_sigma(offsets: &[f64]) -> f64 {
-    let covered = offsets.iter().map(|o| o * o).sum::<f64>() / offsets.len() as f64;
-    (WINDOW_VARIANCE_PX2 - covered).max(0.0).sqrt()
+    let residual = WINDOW_VARIANCE_PX2 - mean_square(offsets);
+    residual.max(0.0).sqrt()
+}
+
+fn mean_square(offsets: &[f64]) -> f64 {
+    offsets.iter().map(|o| o * o).sum::<f64>() / offsets.len() as f64
 }
 
 fn filter_quantile(share: f64) -> f64 {

@@ -6,12 +6,12 @@
 use crate::geom::Vector3;
 use crate::pixel::LinearRgb;
 use crate::render::float4::Float4;
-use crate::render::half_plane::{grown_side, quad_sides, row_span};
+use crate::render::half_plane::{grown_side, nodes_inside};
 use crate::render::lattice::Lattice;
 use crate::render::light_samples::{LightGroup, LightSamples};
 use crate::render::occluders::Occluders;
-use crate::render::ranges::{integer_range, range_union, range_until};
-use crate::render::shadow::{ShadowedReceiver, TexelReads};
+use crate::render::ranges::{range_union, range_until};
+use crate::render::shadow::{ProjectedShadow, ShadowedReceiver, TexelReads};
 use crate::render::shadow_ray::{ShadowRay, shadow_rays};
 use crate::render::view::{
     CameraView, HORIZON_M, LatticeArea, ProjectedPlane, ScenePlane, rows_and_columns,
@@ -46,6 +46,10 @@ struct RayGroup {
 impl RayGroup {
     fn has_faces(&self) -> bool {
         self.rays.iter().any(ShadowRay::is_face)
+    }
+
+    fn shadows(&self) -> impl Iterator<Item = &ProjectedShadow> {
+        self.rays.iter().flat_map(|ray| &ray.shadows)
     }
 }
 
@@ -218,30 +222,34 @@ impl<'a> SelectedLights<'a> {
 
 /// Sides of the requested nodes of a card: two nodes further out, for the finer lattice's one that lies between them.
 fn card_outline(plane: &ProjectedPlane, reach: [f64; 2]) -> Vec<Vector3<f64>> {
-    let sides = quad_sides(&plane.u, &plane.v, &plane.w, reach);
+    let sides = plane.sides(reach);
     sides.iter().map(|s| grown_side(s, 2.0)).collect()
 }
 
 /// Bounds of all shadows on a receiver.
 fn shadowed_area(groups: &[RayGroup]) -> LatticeArea {
-    let shadows = groups
-        .iter()
-        .flat_map(|group| &group.rays)
-        .flat_map(|ray| &ray.shadows);
+    let shadows = groups.iter().flat_map(RayGroup::shadows);
     shadows
-        .map(|shadow| (shadow.rows.clone(), shadow.columns.clone()))
-        .reduce(|a, b| (range_union(a.0, b.0), range_union(a.1, b.1)))
+        .map(ProjectedShadow::area)
+        .reduce(area_union)
         .unwrap_or((0..0, 0..0))
+}
+
+fn area_union(a: LatticeArea, b: LatticeArea) -> LatticeArea {
+    (range_union(a.0, b.0), range_union(a.1, b.1))
 }
 
 /// Nodes of a lattice, and those around the nodes of the lattice of twice its distance.
 fn finer_union(fine: &Range<usize>, coarse: &Range<usize>) -> Range<usize> {
-    let doubled = if coarse.is_empty() {
+    range_union(fine.clone(), finer_nodes(coarse))
+}
+
+fn finer_nodes(coarse: &Range<usize>) -> Range<usize> {
+    if coarse.is_empty() {
         0..0
     } else {
         (2 * coarse.start).saturating_sub(2)..2 * coarse.end
-    };
-    range_union(fine.clone(), doubled)
+    }
 }
 
 /// Scratch of one task, a value per node of a row.
@@ -288,8 +296,7 @@ impl RayCounts {
 impl Receiver {
     /// The requested nodes of a row.
     pub(super) fn requested_nodes(&self, j: usize) -> Range<usize> {
-        let (low, high) = row_span(&self.outline, j as f64);
-        integer_range(low, high, &self.columns)
+        nodes_inside(&self.outline, j, &self.columns)
     }
 
     /// Open and hidden irradiance at the requested nodes of a row: the open sky and this receiver's own lights.

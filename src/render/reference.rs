@@ -289,12 +289,7 @@ impl<'a> ReferenceCard<'a> {
     /// Depth of its plane at a picture position; as far as can be where it is behind the camera.
     fn depth_at(&self, x: f64, y: f64) -> Option<f64> {
         let projected = self.projected.as_ref()?;
-        let w = projected.w.dot(&Vector3::new(x, y, 1.0));
-        Some(if w > 0.0 {
-            projected.height / w
-        } else {
-            f64::from(f32::MAX)
-        })
+        Some(projected.depth_at(&Vector3::new(x, y, 1.0)))
     }
 
     fn intersect_px(&self, x: f64, y: f64) -> Option<CardHit> {

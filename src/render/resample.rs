@@ -91,11 +91,16 @@ impl<'a, P: Copy, F: Fn(P) -> Float4> RowAverages<'a, P, F> {
         self.sum.fill(Float4::ZERO);
         for (y, weight) in rows.weighted() {
             self.read_line(y);
-            for (s, t) in self.sum.iter_mut().zip(&self.line) {
-                *s = s.add_scaled(weight, *t);
-            }
+            self.add_line(weight);
         }
         &self.sum
+    }
+
+    #[inline]
+    fn add_line(&mut self, weight: f32) {
+        for (s, t) in self.sum.iter_mut().zip(&self.line) {
+            *s = s.add_scaled(weight, *t);
+        }
     }
 
     #[inline]

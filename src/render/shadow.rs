@@ -1,13 +1,15 @@
 //! Shadows of cards and of the surface on a receiver: where they are, and how much light they let through.
 
 use crate::geom::Vector3;
-use crate::render::half_plane::{quad_sides, row_span};
+use crate::render::half_plane::{nodes_inside, quad_sides};
 use crate::render::light_samples::LightSample;
 use crate::render::occluders::{Occluder, Occluders};
 use crate::render::opacity::OpacityLevel;
-use crate::render::ranges::{integer_range, ranges_meet};
+
 use crate::render::texel_grid::{TexelLine, texel_line};
-use crate::render::view::{CameraView, LatticeArea, ProjectedPlane, ScenePlane, texture_rows};
+use crate::render::view::{
+    CameraView, LatticeArea, ProjectedPlane, ScenePlane, areas_meet, texture_rows,
+};
 use nalgebra::Matrix3;
 use std::ops::Range;
 use std::sync::Arc;
@@ -171,14 +173,13 @@ impl<'a> ShadowProjection<'a> {
 
     /// Height of the sample over a card's plane, metres (a cosine for a direction); negative behind it.
     fn height_over(&self, plane: &ScenePlane) -> f64 {
-        let (at, q) = (self.sample.at.xyz(), self.sample.at.w);
-        plane.normal.dot(&at) - q * plane.normal.dot(&plane.center)
+        let at = &self.sample.at;
+        plane.normal.dot(&at.xyz()) - at.w * plane.normal.dot(&plane.center)
     }
 
-    fn misses(&self, (rows, columns): &LatticeArea) -> bool {
-        let requested = self.receiver.area;
-        let apart = !ranges_meet(rows, &requested.0) || !ranges_meet(columns, &requested.1);
-        apart || rows.len() < 2 || columns.len() < 2
+    fn misses(&self, area: &LatticeArea) -> bool {
+        let (rows, columns) = area;
+        !areas_meet(area, self.receiver.area) || rows.len() < 2 || columns.len() < 2
     }
 
     fn card_map(&self, plane: &ScenePlane, toward: f64, from_behind: bool) -> CardMap {
@@ -309,13 +310,16 @@ impl CardMap {
 }
 
 impl ProjectedShadow {
+    /// Rows and columns that the shadow may touch.
+    pub(super) fn area(&self) -> LatticeArea {
+        (self.rows.clone(), self.columns.clone())
+    }
     /// Nodes of a row that the shadow touches.
     pub(super) fn nodes(&self, j: usize, within: &Range<usize>) -> Range<usize> {
         if !self.rows.contains(&j) {
             return within.start..within.start;
         }
-        let (low, high) = row_span(&self.sides, j as f64);
-        integer_range(low, high, within)
+        nodes_inside(&self.sides, j, within)
     }
 
     /// Multiplies what gets through to these nodes of a row, in one channel; returns what had to be read for it.
@@ -350,8 +354,7 @@ impl ProjectedShadow {
 
     /// Where an opaque card surely lets nothing through, counted from the first of the nodes.
     fn dark_nodes(&self, j: usize, nodes: &Range<usize>) -> Option<Range<usize>> {
-        let (low, high) = row_span(self.inside.as_ref()?, j as f64);
-        let dark = integer_range(low, high, nodes);
+        let dark = nodes_inside(self.inside.as_ref()?, j, nodes);
         Some(dark.start - nodes.start..dark.end - nodes.start)
     }
 }

@@ -48,6 +48,11 @@ impl BakedTexture {
     fn apply_grade(&mut self, grade: &Grade) {
         grade_colors(&mut self.texels, grade);
         self.grade_opacity(grade);
+        self.average_opacity();
+    }
+
+    /// Alpha of a film's texels is the mean opacity of their channels.
+    fn average_opacity(&mut self) {
         for (t, o) in self.texels.iter_mut().zip(&self.opacity) {
             t.0[3] = channel_mean(o.rgb());
         }

@@ -2,7 +2,8 @@
 
 use crate::camera::Camera;
 use crate::geom::Vector3;
-use crate::render::ranges::integer_range;
+use crate::render::half_plane::quad_sides;
+use crate::render::ranges::{integer_range, ranges_meet};
 use crate::scene::{Card, Shot};
 use nalgebra::Matrix3;
 use std::ops::Range;
@@ -50,13 +51,15 @@ impl ScenePlane {
     }
 
     fn is_finite(&self) -> bool {
-        let vectors = [&self.x, &self.y, &self.normal, &self.center];
-        vectors.iter().all(|v| v.iter().all(|c| c.is_finite()))
+        [&self.x, &self.y, &self.normal, &self.center]
+            .into_iter()
+            .flatten()
+            .all(|c| c.is_finite())
     }
 
     /// The normal on the side of a point, and how far the point is from the plane.
     fn side_of(&self, point: &Vector3<f64>) -> (Vector3<f64>, f64) {
-        let above = self.normal.dot(&(point - self.center));
+        let above = self.height_of(point);
         if above >= 0.0 {
             (self.normal, above)
         } else {
@@ -67,7 +70,13 @@ impl ScenePlane {
     /// A point sees its back.
     #[inline]
     pub(super) fn is_seen_from_behind(&self, point: &Vector3<f64>) -> bool {
-        self.normal.dot(&(point - self.center)) < 0.0
+        self.height_of(point) < 0.0
+    }
+
+    /// How far a point is in front of the plane.
+    #[inline]
+    fn height_of(&self, point: &Vector3<f64>) -> f64 {
+        self.normal.dot(&(point - self.center))
     }
 
     /// The plane `z = 0` as far as it receives shadows.
@@ -172,12 +181,13 @@ impl CameraView {
 
     /// Rows and columns of projected points, one more on each side; all where one of the points is not in front.
     pub(super) fn area_around(&self, points: &[Vector3<f64>; 4]) -> LatticeArea {
-        let Some(px) = self.project_points(points) else {
-            return self.whole_area();
-        };
+        let corners = self.project_points(points);
+        corners.map_or_else(|| self.whole_area(), |px| self.area_around_px(&px))
+    }
+
+    fn area_around_px(&self, px: &[Vector3<f64>; 4]) -> LatticeArea {
         let columns = range_around(px.map(|p| p.x), self.width);
-        let rows = range_around(px.map(|p| p.y), self.height);
-        (rows, columns)
+        (range_around(px.map(|p| p.y), self.height), columns)
     }
 }
 
@@ -200,6 +210,11 @@ pub(super) fn pixel_center(x: usize, y: usize) -> Vector3<f64> {
 
 /// Rows and columns of the lattice, or pixels of a picture.
 pub(super) type LatticeArea = (Range<usize>, Range<usize>);
+
+/// Areas have something in common.
+pub(super) fn areas_meet(a: &LatticeArea, b: &LatticeArea) -> bool {
+    ranges_meet(&a.0, &b.0) && ranges_meet(&a.1, &b.1)
+}
 
 /// Rows and columns that a plane is seen in, grown by shares of its size; one more on each side.
 pub(super) fn rows_and_columns(
@@ -276,10 +291,34 @@ impl ProjectedPlane {
         along_x.cross(&along_y).norm().sqrt()
     }
 
+    /// Linear conditions on `(x, y, 1)` inside the texture with a border of `reach`, and in front of the eye.
+    pub(super) fn sides(&self, reach: [f64; 2]) -> [Vector3<f64>; 5] {
+        quad_sides(&self.u, &self.v, &self.w, reach)
+    }
+
+    /// The same plane with its texture the other way round.
+    pub(super) fn mirrored(self) -> Self {
+        Self {
+            u: self.w - self.u,
+            ..self
+        }
+    }
+
     /// The world point at a pixel position `(x, y, 1)`; none behind the eye.
     pub(super) fn point_at(&self, p: &Vector3<f64>) -> Option<Vector3<f64>> {
         let w = self.w.dot(p);
         (w > 0.0).then(|| self.point * p / w)
+    }
+
+    /// Depth at a pixel position `(x, y, 1)`; as far as can be behind the eye.
+    #[inline]
+    pub(super) fn depth_at(&self, p: &Vector3<f64>) -> f64 {
+        let w = self.w.dot(p);
+        if w > 0.0 {
+            self.height / w
+        } else {
+            f64::from(f32::MAX)
+        }
     }
 
     /// Texture coordinates and depth at a pixel position; none outside the plane or behind the eye.
@@ -316,12 +355,16 @@ pub(super) fn texture_rows(
 
 /// The cards of a shot that have an area, a place and texels, with their planes, in the order of their ids.
 pub(super) fn visible_planes(shot: &Shot) -> Vec<(&Card, ScenePlane)> {
-    let there = shot.cards.iter().filter(|card| !card.texture.is_empty());
-    let mut planes: Vec<_> = there
-        .filter_map(|card| Some((card, ScenePlane::from_card(card)?)))
-        .collect();
-    planes.sort_by_key(|(card, _)| card.id);
+    let mut planes: Vec<_> = shot.cards.iter().filter_map(visible_plane).collect();
+    planes.sort_by_key(|plane| plane.0.id);
     planes
+}
+
+fn visible_plane(card: &Card) -> Option<(&Card, ScenePlane)> {
+    if card.texture.is_empty() {
+        return None;
+    }
+    Some((card, ScenePlane::from_card(card)?))
 }
 
 #[cfg(test)]

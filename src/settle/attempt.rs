@@ -110,8 +110,7 @@ impl AttemptSeries<'_> {
     /// Bodies that have sunk in need stiffer contacts, which shorter steps bear; those that have
     /// gained energy hit too hard in one step, and would again from most heights.
     fn needs_shorter_steps(&self, attempt: &Attempt) -> bool {
-        let sank =
-            attempt.overlap.is_finite() && attempt.overlap > max_overlap(self.scene, self.options);
+        let sank = attempt.overlap.is_finite() && self.is_too_deep(attempt.overlap);
         sank || matches!(attempt.verdict, SettleVerdict::Exploded(_))
     }
 
@@ -139,7 +138,7 @@ impl AttemptSeries<'_> {
     fn judge_motion(&self, fall: &Fall, depth: f64) -> Option<SettleVerdict> {
         if !fall.rests {
             Some(SettleVerdict::TimedOut)
-        } else if depth > max_overlap(self.scene, self.options) {
+        } else if self.is_too_deep(depth) {
             Some(SettleVerdict::Penetrating(depth))
         } else if fall.energy_rise > self.options.max_energy_rise {
             Some(SettleVerdict::Exploded(fall.energy_rise))
@@ -153,12 +152,16 @@ impl AttemptSeries<'_> {
         if self.options.mode == SettleMode::Flat {
             return SettleVerdict::Rested;
         }
-        let unsupported = support::unsupported(self.scene, self.options, bodies, touching);
-        if unsupported.is_empty() {
-            SettleVerdict::Rested
-        } else {
-            SettleVerdict::Hanging(unsupported)
-        }
+        rested_or_hanging(support::unsupported(
+            self.scene,
+            self.options,
+            bodies,
+            touching,
+        ))
+    }
+
+    fn is_too_deep(&self, depth: f64) -> bool {
+        depth > max_overlap(self.scene, self.options)
     }
 }
 
@@ -177,12 +180,18 @@ pub(super) fn start_heights(scene: &Scene, attempt: usize) -> Vec<f64> {
     heights
 }
 
+fn rested_or_hanging(unsupported: Vec<usize>) -> SettleVerdict {
+    if unsupported.is_empty() {
+        SettleVerdict::Rested
+    } else {
+        SettleVerdict::Hanging(unsupported)
+    }
+}
+
 /// Raises each height by its own amount above the raise of the next lower one.
 fn raise_from_lowest(heights: &mut [f64], amount: impl Fn(usize) -> f64) {
-    let mut order: Vec<usize> = (0..heights.len()).collect();
-    order.sort_by(|&a, &b| heights[a].total_cmp(&heights[b]));
     let mut raise = 0.0;
-    for i in order {
+    for i in overlap::ascending_by(heights.len(), |i| heights[i]) {
         raise += amount(i);
         heights[i] += raise;
     }

@@ -1,7 +1,7 @@
 //! The bodies that represent a scene's objects, and the lengths that a scene's tolerances scale with.
 
 use super::overlap::Solid;
-use crate::geom::Pose;
+use crate::geom::{Pose, Vector3};
 use crate::scene::{Object, Placement, Scene, SettleOptions};
 
 /// Gap below which bodies at rest touch, as a share of the typical card's longer side: 3 mm for
@@ -70,16 +70,19 @@ pub(super) fn solids(scene: &Scene, options: &SettleOptions, poses: &[Pose]) -> 
 
 fn solid_for(object: &Object, world_from_body: Pose, options: &SettleOptions) -> Solid {
     let half = options.half_body(object);
-    let outline = if object.outline.is_empty() {
-        rectangle(half.x, half.y)
-    } else {
-        object.outline.clone()
-    };
     Solid {
         world_from_body,
         half,
-        outline,
+        outline: outline_or_box(object, &half),
         falls: is_dropped(object),
+    }
+}
+
+fn outline_or_box(object: &Object, half: &Vector3<f64>) -> Vec<[f64; 2]> {
+    if object.outline.is_empty() {
+        rectangle(half.x, half.y)
+    } else {
+        object.outline.clone()
     }
 }
 

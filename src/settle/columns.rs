@@ -66,12 +66,19 @@ fn fall_alone(scene: &Scene, options: &SettleOptions, i: usize) -> Option<Fall> 
 
 /// The first two columns, in order, whose swept spaces overlap; NaN overlaps everything.
 fn first_colliding_pair(columns: &[FallenColumn]) -> Option<(usize, usize)> {
-    let mut pairs = (0..columns.len()).flat_map(|i| (i + 1..columns.len()).map(move |j| (i, j)));
-    pairs.find(|&(i, j)| !are_apart(&columns[i].fall, &columns[j].fall))
+    pairs_up_to(columns.len()).find(|&(i, j)| !are_apart(&columns[i].fall, &columns[j].fall))
+}
+
+fn pairs_up_to(count: usize) -> impl Iterator<Item = (usize, usize)> {
+    (0..count).flat_map(move |i| (i + 1..count).map(move |j| (i, j)))
 }
 
 fn are_apart(a: &Fall, b: &Fall) -> bool {
-    (0..2).any(|i| a.swept[i][1] < b.swept[i][0] || b.swept[i][1] < a.swept[i][0])
+    (0..2).any(|i| are_disjoint(a.swept[i], b.swept[i]))
+}
+
+fn are_disjoint(a: [f64; 2], b: [f64; 2]) -> bool {
+    a[1] < b[0] || b[1] < a[0]
 }
 
 fn merge_columns(columns: Vec<FallenColumn>) -> Fall {
@@ -107,8 +114,9 @@ impl Fall {
     /// By time, then by id.
     fn sort_samples(&mut self) {
         self.samples.sort_by(|a, b| {
-            let by_time = a.seconds.total_cmp(&b.seconds);
-            by_time.then(a.object.cmp(&b.object))
+            a.seconds
+                .total_cmp(&b.seconds)
+                .then(a.object.cmp(&b.object))
         });
     }
 }

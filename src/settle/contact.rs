@@ -3,6 +3,7 @@
 use super::overlap::{Solid, Touch};
 use crate::geom::Vector3;
 use nalgebra::Vector2;
+use std::cmp::Ordering;
 
 /// Direction cosine up to which `x` is far enough from a direction to span the plane across it.
 const MAX_HELPER_COSINE: f64 = 0.6;
@@ -114,13 +115,17 @@ fn shared_points(a: &Solid, b: &Solid, towards: &Vector3<f64>, reach: f64) -> Ve
 
 /// Two unit vectors across another one.
 pub(super) fn perpendicular_axes(direction: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
-    let helper = if direction.x.abs() < MAX_HELPER_COSINE {
+    let u = oblique_axis(direction).cross(direction).normalize();
+    (u, direction.cross(&u))
+}
+
+/// An axis of the world that is far from parallel to a direction.
+fn oblique_axis(direction: &Vector3<f64>) -> Vector3<f64> {
+    if direction.x.abs() < MAX_HELPER_COSINE {
         Vector3::x()
     } else {
         Vector3::y()
-    };
-    let u = helper.cross(direction).normalize();
-    (u, direction.cross(&u))
+    }
 }
 
 /// The corners of a body that lie farthest in a direction.
@@ -134,12 +139,12 @@ impl NearestCorners {
     /// Those of a body, to within `reach`.
     fn new(solid: &Solid, towards: &Vector3<f64>, reach: f64) -> Self {
         let height = highest_corner(solid, towards);
-        let near = solid
-            .corners()
-            .filter(|corner| corner.dot(towards) > height - reach);
         Self {
             height,
-            corners: near.collect(),
+            corners: solid
+                .corners()
+                .filter(|corner| corner.dot(towards) > height - reach)
+                .collect(),
         }
     }
 
@@ -176,9 +181,13 @@ fn convex_hull(points: impl Iterator<Item = Vector2<f64>>) -> Vec<Vector2<f64>> 
 /// The points in order of x, then of y, each once.
 fn sorted_by_x(points: impl Iterator<Item = Vector2<f64>>) -> Vec<Vector2<f64>> {
     let mut points: Vec<Vector2<f64>> = points.collect();
-    points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
+    points.sort_by(by_x_then_y);
     points.dedup();
     points
+}
+
+fn by_x_then_y(a: &Vector2<f64>, b: &Vector2<f64>) -> Ordering {
+    a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y))
 }
 
 /// The chain of a hull along sorted points, without its last one, where the other chain begins.
@@ -216,12 +225,15 @@ fn crossings(a: &[Vector2<f64>], b: &[Vector2<f64>]) -> impl Iterator<Item = Vec
 
 /// The sides of a ring; one of two points, none of one.
 fn sides(ring: &[Vector2<f64>]) -> impl Iterator<Item = [Vector2<f64>; 2]> {
-    let count = match ring.len() {
+    (0..side_count(ring.len())).map(|i| [ring[i], ring[(i + 1) % ring.len()]])
+}
+
+fn side_count(corners: usize) -> usize {
+    match corners {
         0 | 1 => 0,
         2 => 1,
         n => n,
-    };
-    (0..count).map(|i| [ring[i], ring[(i + 1) % ring.len()]])
+    }
 }
 
 /// Whether a point lies in a ring.

@@ -97,8 +97,13 @@ pub(super) fn falling_from_lowest(solids: &[Solid]) -> Vec<usize> {
 
 /// Indices of all bodies, from the lowest to the highest.
 pub(super) fn from_lowest(solids: &[Solid]) -> Vec<usize> {
-    let mut order: Vec<usize> = (0..solids.len()).collect();
-    order.sort_by(|&a, &b| solids[a].center().z.total_cmp(&solids[b].center().z));
+    ascending_by(solids.len(), |i| solids[i].center().z)
+}
+
+/// The numbers up to `count`, by what `key` says of them; equal ones stay in order.
+pub(super) fn ascending_by(count: usize, key: impl Fn(usize) -> f64) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..count).collect();
+    order.sort_by(|&a, &b| key(a).total_cmp(&key(b)));
     order
 }
 
@@ -152,15 +157,17 @@ impl Touch {
 /// Deepest overlap of a dropped body with any other, with the floor `z = 0` or with the walls over
 /// the surface's edges, metres; 0 when nothing overlaps.
 pub(super) fn deepest(solids: &[Solid], touching: &[Touch], surface: [f64; 2]) -> f64 {
-    let in_room = solids
-        .iter()
-        .filter(|solid| solid.falls)
-        .map(|solid| depth_in_room(solid, surface))
-        .fold(0.0, f64::max);
     touching
         .iter()
         .map(|touch| -touch.gap)
-        .fold(in_room, f64::max)
+        .fold(deepest_in_room(solids, surface), f64::max)
+}
+
+fn deepest_in_room(solids: &[Solid], surface: [f64; 2]) -> f64 {
+    let falling = solids.iter().filter(|solid| solid.falls);
+    falling
+        .map(|solid| depth_in_room(solid, surface))
+        .fold(0.0, f64::max)
 }
 
 /// How far a body reaches through the floor or a wall, whichever is most; 0 inside.

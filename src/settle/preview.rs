@@ -122,12 +122,14 @@ fn draw_faces(
 
 /// The upper and the lower face of a body.
 fn faces(body: &Solid) -> [Vec<Point3<f64>>; 2] {
-    [body.half.z, -body.half.z].map(|z| {
-        let corners = body.outline.iter();
-        corners
-            .map(|&[x, y]| body.world_from_body * Point3::new(x, y, z))
-            .collect()
-    })
+    [body.half.z, -body.half.z].map(|z| face_at(body, z))
+}
+
+fn face_at(body: &Solid, z: f64) -> Vec<Point3<f64>> {
+    let corners = body.outline.iter();
+    corners
+        .map(|&[x, y]| body.world_from_body * Point3::new(x, y, z))
+        .collect()
 }
 
 #[cfg(test)]

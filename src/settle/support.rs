@@ -122,9 +122,13 @@ impl SpringModel {
 
     /// Towards the minimum that the springs pressed at `y` would have; none where that gains nothing.
     fn newton_step(&self, y: &[f64], energy: f64) -> Option<(Vec<f64>, f64)> {
-        let stretches = self.springs.iter().map(|spring| spring.stretch(y));
-        let pressed: Vec<bool> = stretches.map(|stretch| stretch < 0.0).collect();
-        self.line_search(y, &self.quadratic_minimum(&pressed), energy)
+        self.line_search(y, &self.quadratic_minimum(&self.pressed(y)), energy)
+    }
+
+    /// Which springs are shorter than at rest.
+    fn pressed(&self, y: &[f64]) -> Vec<bool> {
+        let springs = self.springs.iter();
+        springs.map(|spring| spring.stretch(y) < 0.0).collect()
     }
 
     /// The minimum with all springs pressed, or no displacement where that has less energy.
@@ -177,11 +181,12 @@ impl SpringModel {
     }
 
     fn energy(&self, y: &[f64]) -> f64 {
-        let compressed = self
-            .springs
-            .iter()
-            .map(|spring| spring.stretch(y).min(0.0).powi(2));
-        self.own_energy(y) + 0.5 * CONTACT_STIFFNESS * compressed.sum::<f64>()
+        self.own_energy(y) + self.contact_energy(y)
+    }
+
+    fn contact_energy(&self, y: &[f64]) -> f64 {
+        let compressions = self.springs.iter().map(|spring| spring.compression(y));
+        0.5 * CONTACT_STIFFNESS * compressions.map(|c| c.powi(2)).sum::<f64>()
     }
 
     /// Of the bodies' own springs, less what their weights release.
@@ -208,12 +213,16 @@ fn interpolate(from: &[f64], to: &[f64], share: f64) -> Vec<f64> {
 
 /// Mass of each body over their mean, for each degree of freedom.
 fn relative_masses(scene: &Scene, order: &[usize]) -> Vec<f64> {
-    let total: f64 = order.iter().map(|&i| scene.objects[i].mass).sum();
-    let mean = total / order.len().max(1) as f64;
+    let mean = mean_mass(scene, order);
     order
         .iter()
         .flat_map(|&i| [scene.objects[i].mass / mean; DOF_COUNT])
         .collect()
+}
+
+fn mean_mass(scene: &Scene, ids: &[usize]) -> f64 {
+    let masses = ids.iter().map(|&i| scene.objects[i].mass);
+    masses.sum::<f64>() / ids.len().max(1) as f64
 }
 
 /// The pull of gravity in each degree of freedom.
@@ -248,8 +257,9 @@ impl SpringGeometry {
         contacts
             .iter()
             .flat_map(|contact| {
-                let forces = friction_pyramid(contact, friction).into_iter();
-                forces.map(|force| self.spring(contact, force))
+                friction_pyramid(contact, friction)
+                    .into_iter()
+                    .map(|force| self.spring(contact, force))
             })
             .collect()
     }
@@ -292,6 +302,11 @@ impl Spring {
         self.ends.iter().flatten().map(|end| end.advance(y)).sum()
     }
 
+    /// How far its ends move together.
+    fn compression(&self, y: &[f64]) -> f64 {
+        self.stretch(y).min(0.0)
+    }
+
     /// The places of its two bodies, where both fell.
     fn coupled_slots(&self) -> Option<[usize; 2]> {
         let [a, b] = &self.ends;
@@ -312,8 +327,8 @@ impl Spring {
 impl SpringEnd {
     /// How far its body moves along its push.
     fn advance(&self, y: &[f64]) -> f64 {
-        let own = y[DOF_COUNT * self.slot..].iter();
-        own.zip(&self.wrench).map(|(y, push)| y * push).sum()
+        let own = &y[DOF_COUNT * self.slot..];
+        own.iter().zip(&self.wrench).map(|(y, push)| y * push).sum()
     }
 
     /// Adds the block of the matrix in the rows of this end and the columns of another, up to the
@@ -354,7 +369,8 @@ fn friction_pyramid(contact: &Contact, friction: f64) -> Vec<Vector3<f64>> {
 }
 
 fn center_of_mass(solid: &Solid) -> Vector3<f64> {
-    let ([x, y, _], [a, b]) = (solid.axes(), centroid(&solid.outline));
+    let [x, y, _] = solid.axes();
+    let [a, b] = centroid(&solid.outline);
     solid.center() + x * a + y * b
 }
 

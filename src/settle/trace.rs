@@ -30,8 +30,7 @@ pub fn csv(samples: &[MotionSample]) -> String {
 }
 
 fn csv_line(sample: &MotionSample) -> String {
-    let values = sample.values();
-    let cells: String = values.iter().map(|x| format!(",{x:.7}")).collect();
+    let cells = sample.values().map(|x| format!(",{x:.7}")).concat();
     format!("{:.6},{}{cells}\n", sample.seconds, sample.object)
 }
 

@@ -78,13 +78,15 @@ impl Wanted {
 /// Colour, with the transmittance in place of alpha where there is one.
 fn choose_film(names: &[String]) -> Option<Choice> {
     let (fit, mut picked) = choose_color(names)?;
-    let transmittance = all_of_layer(names, "", VIEW_TRANSMITTANCE)
-        .or_else(|| all_of_layer(names, "", TRANSMITTANCE));
-    if let Some(transmittance) = transmittance {
+    if let Some(transmittance) = transmittance_of(names) {
         picked.truncate(3);
         picked.extend(transmittance);
     }
     Some((fit, picked))
+}
+
+fn transmittance_of(names: &[String]) -> Option<Vec<usize>> {
+    all_of_layer(names, "", VIEW_TRANSMITTANCE).or_else(|| all_of_layer(names, "", TRANSMITTANCE))
 }
 
 /// A grey picture, or else alpha.
@@ -108,10 +110,9 @@ fn choose_color(names: &[String]) -> Option<Choice> {
     if let Some(picked) = color_of_layer(names, "") {
         return Some((ChannelMatch::Named, picked));
     }
-    if let Some(picked) = color_of_best_layer(names) {
-        return Some((ChannelMatch::Layer, picked));
-    }
-    Some((ChannelMatch::Alone, only_visible(names)?))
+    color_of_best_layer(names)
+        .map(|picked| (ChannelMatch::Layer, picked))
+        .or_else(|| Some((ChannelMatch::Alone, only_visible(names)?)))
 }
 
 /// The only channel that can be seen, three times over, and the only alpha.

@@ -37,18 +37,16 @@ impl Default for CameraNotes {
 impl CameraNotes {
     /// The notes in a JPEG, TIFF or PNG file. A photo without notes, or with damaged ones, is as good as another.
     pub(crate) fn read(mut file: impl BufRead + Seek) -> Self {
-        match exif::Reader::new().read_from_container(&mut file) {
-            Ok(exif) => Self::from_exif(&exif),
-            Err(_) => Self::default(),
-        }
+        let exif = read_exif(&mut file);
+        exif.map_or_else(Self::default, |exif| Self::from_exif(&exif))
     }
 
     /// A TIFF declares that its colours are multiplied by alpha (TIFF 6.0, `ExtraSamples` = 1).
     #[cfg(feature = "oiio")]
     pub(crate) fn has_associated_alpha(tiff: &[u8]) -> bool {
         const EXTRA_SAMPLES: Tag = Tag(exif::Context::Tiff, 338);
-        let exif = exif::Reader::new().read_from_container(&mut std::io::Cursor::new(tiff));
-        exif.is_ok_and(|exif| integer(&exif, EXTRA_SAMPLES) == Some(1))
+        let exif = read_exif(&mut std::io::Cursor::new(tiff));
+        exif.is_some_and(|exif| integer(&exif, EXTRA_SAMPLES) == Some(1))
     }
 
     fn from_exif(exif: &Exif) -> Self {
@@ -79,11 +77,17 @@ impl CameraNotes {
 }
 
 /// One size is another times an integer, but for [`SIZE_TOLERANCE`].
-fn is_multiple(size: [f64; 2], [long, short]: [f64; 2]) -> bool {
-    let factor = (size[0] / long).round();
-    factor >= 1.0
-        && (size[0] / (factor * long) - 1.0).abs() <= SIZE_TOLERANCE
-        && (size[1] / (factor * short) - 1.0).abs() <= SIZE_TOLERANCE
+fn is_multiple([width, height]: [f64; 2], [long, short]: [f64; 2]) -> bool {
+    let factor = (width / long).round();
+    factor >= 1.0 && is_close(width, factor * long) && is_close(height, factor * short)
+}
+
+fn is_close(side: f64, expected: f64) -> bool {
+    (side / expected - 1.0).abs() <= SIZE_TOLERANCE
+}
+
+fn read_exif(file: &mut (impl BufRead + Seek)) -> Option<Exif> {
+    exif::Reader::new().read_from_container(file).ok()
 }
 
 fn noted_size(exif: &Exif) -> Option<[f64; 2]> {
@@ -135,8 +139,13 @@ fn positive(exif: &Exif, tag: Tag) -> Option<f64> {
 
 /// A finite number.
 fn rational(exif: &Exif, tag: Tag) -> Option<f64> {
-    match &exif.get_field(tag, In::PRIMARY)?.value {
-        Value::Rational(values) => values.first().map(|v| v.to_f64()).filter(|v| v.is_finite()),
+    let number = first_rational(&exif.get_field(tag, In::PRIMARY)?.value)?;
+    number.is_finite().then_some(number)
+}
+
+fn first_rational(value: &Value) -> Option<f64> {
+    match value {
+        Value::Rational(values) => values.first().map(|v| v.to_f64()),
         _ => None,
     }
 }

@@ -1,13 +1,13 @@
 //! Radiance RGBE: scene-linear, read only.
 
 use super::orient::Orientation;
-use super::profile::to_rec709;
+use super::profile::{convert_primaries, to_rec709};
 use super::raster::{Raster, Samples, default_names};
 use super::refusal::Refusal;
 use crate::color::RgbSpace;
 use crate::io::format::Format;
 use crate::io::header::Header;
-use crate::io::limits::{Demand, Limits, at_most};
+use crate::io::limits::{Demand, Limits};
 use image::codecs::hdr::HdrDecoder;
 use image::{ImageDecoder, ImageError};
 use std::io::{BufRead, Cursor, Read};
@@ -85,13 +85,15 @@ fn read_line(file: &mut impl BufRead) -> Result<Vec<u8>, Refusal> {
 /// first, those of the pixels in a row second; `-Y` goes down.
 fn resolution(line: &[u8]) -> Result<([u32; 2], Orientation), Refusal> {
     let text = String::from_utf8_lossy(line);
-    parsed_resolution(&text).ok_or_else(|| {
-        // Where the line does not end, all of the pixels would be in the message.
-        let shown: String = text.trim().chars().take(LONGEST_SHOWN).collect();
-        Refusal::Broken(format!(
-            "damaged HDR: size {shown:?}, expected \"-Y 480 +X 640\""
-        ))
-    })
+    parsed_resolution(&text).ok_or_else(|| unknown_resolution(&text))
+}
+
+fn unknown_resolution(text: &str) -> Refusal {
+    // Where the line does not end, all of the pixels would be in the message.
+    let shown: String = text.trim().chars().take(LONGEST_SHOWN).collect();
+    Refusal::Broken(format!(
+        "damaged HDR: size {shown:?}, expected \"-Y 480 +X 640\""
+    ))
 }
 
 fn parsed_resolution(text: &str) -> Option<([u32; 2], Orientation)> {
@@ -168,9 +170,7 @@ fn light_raster((width, height): (usize, usize), light: Vec<f32>) -> Raster {
 /// CIE XYZ as light of Rec. 709.
 fn convert_xyz(samples: &mut [f32]) -> Result<(), String> {
     if let Some(matrix) = to_rec709(&XYZ_SPACE)? {
-        for px in samples.chunks_exact_mut(3) {
-            px.copy_from_slice(&matrix.apply([px[0], px[1], px[2]]));
-        }
+        convert_primaries(samples, 3, &matrix);
     }
     Ok(())
 }
@@ -180,12 +180,7 @@ fn check_head_length(bytes: &[u8], limits: &Limits) -> Result<(), String> {
     let start = &bytes[..bytes.len().min(limits.metadata_bytes as usize + 1)];
     match start.windows(2).any(|pair| pair == b"\n\n") {
         true => Ok(()),
-        false => at_most(
-            start.len() as u64,
-            limits.metadata_bytes,
-            "bytes without an end of the header",
-            "metadata_bytes",
-        ),
+        false => limits.check_header_bytes(start.len() as u64),
     }
 }
 

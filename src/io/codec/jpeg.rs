@@ -50,12 +50,17 @@ pub(crate) fn read_before_scan(file: &mut impl Read, limits: &Limits) -> Result<
 
 /// Appends a marker and its segment; returns the marker.
 fn append_segment(bytes: &mut Vec<u8>, file: &mut impl Read) -> Result<u8, Refusal> {
-    let at = bytes.len();
     let marker = append_marker(bytes, file)?;
-    append(bytes, file, 2)?;
-    let length = u16::from_be_bytes([bytes[at + 2], bytes[at + 3]]);
-    append(bytes, file, usize::from(length).saturating_sub(2))?;
+    let length = append_length(bytes, file)?;
+    append(bytes, file, length.saturating_sub(2))?;
     Ok(marker)
+}
+
+/// Appends the length of a segment, which counts its own two bytes.
+fn append_length(bytes: &mut Vec<u8>, file: &mut impl Read) -> Result<usize, Refusal> {
+    let at = bytes.len();
+    append(bytes, file, 2)?;
+    Ok(u16::from_be_bytes([bytes[at], bytes[at + 1]]).into())
 }
 
 /// Reads a marker that a segment follows.
@@ -101,14 +106,8 @@ fn open<'a>(
 ) -> Result<JpegDecoder<Cursor<&'a [u8]>>, Refusal> {
     let decoder = JpegDecoder::new(Cursor::new(bytes))?;
     let (width, height) = decoder.dimensions();
-    let channels = u64::from(decoder.color_type().channel_count());
-    limits.check(Demand {
-        width: width.into(),
-        height: height.into(),
-        channels,
-        bytes_per_pixel: channels,
-        file_bytes,
-    })?;
+    let channels = decoder.color_type().channel_count();
+    limits.check(Demand::new([width, height], channels, 1_u8, file_bytes))?;
     Ok(decoder)
 }
 
@@ -128,8 +127,8 @@ pub(crate) fn header(start: &[u8], file_bytes: u64, limits: &Limits) -> Result<H
 }
 
 fn notes_of_comments(bytes: &[u8]) -> Notes {
-    let comments = segments(bytes).filter(|s| s.marker == COM);
-    comments
+    segments(bytes)
+        .filter(|s| s.marker == COM)
         .flat_map(|s| notes_of_lines(&String::from_utf8_lossy(s.data)))
         .collect()
 }
@@ -153,12 +152,18 @@ fn profile_part(segment: JpegSegment<'_>) -> Option<(u8, &[u8])> {
     Some((number, part))
 }
 
+fn check_complete(bytes: &[u8]) -> Result<(), Refusal> {
+    if segments(bytes).any(|s| s.marker == EOI) {
+        Ok(())
+    } else {
+        Err("truncated JPEG (no end marker)".into())
+    }
+}
+
 /// Decodes a complete file; decoders return a half-grey picture for one that was cut, so that is looked at first.
 pub(crate) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Refusal> {
     read_before_scan(&mut &bytes[..], limits)?;
-    if !segments(bytes).any(|s| s.marker == EOI) {
-        return Err("truncated JPEG (no end marker)".into());
-    }
+    check_complete(bytes)?;
     let decoder = open(bytes, bytes.len() as u64, limits)?;
     let (width, height) = decoder.dimensions();
     let size = (width as usize, height as usize);
@@ -213,10 +218,12 @@ fn split_segment(mut bytes: &[u8]) -> Option<(JpegSegment<'_>, &[u8])> {
 
 /// Where the entropy-coded data ends: at a marker that is neither a stuffed byte, a restart nor padding.
 fn end_of_scan(bytes: &[u8]) -> usize {
-    bytes
-        .windows(2)
-        .position(|pair| pair[0] == 0xff && !matches!(pair[1], 0 | 0xff | 0xd0..=0xd7))
-        .unwrap_or(bytes.len())
+    bytes.windows(2).position(is_marker).unwrap_or(bytes.len())
+}
+
+/// Neither an escaped byte of data nor padding nor a restart.
+fn is_marker(pair: &[u8]) -> bool {
+    pair[0] == 0xff && !matches!(pair[1], 0 | 0xff | 0xd0..=0xd7)
 }
 
 /// A whole file from 8-bit codes of one or three channels.

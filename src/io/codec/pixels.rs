@@ -97,10 +97,12 @@ impl FromFile for Depth {
 /// Colour and transmittance of a pixel, from the channels at these indices.
 #[inline(always)]
 fn film_pixel<T: FileSample>(px: &[T], [r, g, b, tr, tg, tb]: [usize; 6]) -> Film {
-    Film::new(
-        [r, g, b].map(|i| px[i].into()).into(),
-        [tr, tg, tb].map(|i| px[i].into()).into(),
-    )
+    Film::new(triple(px, [r, g, b]), triple(px, [tr, tg, tb]))
+}
+
+#[inline(always)]
+fn triple<T: FileSample>(px: &[T], channels: [usize; 3]) -> LinearRgb {
+    channels.map(|i| px[i].into()).into()
 }
 
 /// Colour with alpha in whichever form the file has it.
@@ -239,16 +241,17 @@ pub struct SampleRows<'a> {
 impl SampleRows<'_> {
     /// A photo must not hide the share of a pixel that is missing.
     fn refuse_transparency(&self) -> Result<(), String> {
-        let transparent = match Wanted::Color.pick(&self.raster.names)?.get(3) {
-            Some(&a) => self.count_transparent(a),
-            None => 0,
-        };
-        if transparent == 0 {
-            return Ok(());
+        match self.count_transparent_colors()? {
+            0 => Ok(()),
+            count => Err(format!(
+                "{count} pixels with alpha below 1, expected an opaque picture (put it over a background first)"
+            )),
         }
-        Err(format!(
-            "{transparent} pixels with alpha below 1, expected an opaque picture (put it over a background first)"
-        ))
+    }
+
+    fn count_transparent_colors(&self) -> Result<usize, String> {
+        let picked = Wanted::Color.pick(&self.raster.names)?;
+        Ok(picked.get(3).map_or(0, |&a| self.count_transparent(a)))
     }
 
     /// Pixels that are not opaque by channel `a`.
@@ -321,6 +324,8 @@ impl SampleRows<'_> {
     }
 
     /// Colours in the form that the file has them; `decode` takes its display codes, `light` display values.
+    ///
+    /// Long since each of the four forms that a file may have is a loop without a branch for every pixel.
     fn convert_colors<T: FileSample, P: Colored>(
         &self,
         samples: &[T],

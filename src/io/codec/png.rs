@@ -9,7 +9,7 @@ use crate::io::format::Format;
 use crate::io::header::{Header, Notes, note};
 use crate::io::limits::{Demand, Limits};
 use crate::quality::Quality;
-use png::{BitDepth, ColorType, Transformations};
+use png::{BitDepth, ColorType, Compression, Transformations};
 use std::io::{BufRead, Cursor, ErrorKind, Seek};
 
 impl From<png::DecodingError> for Refusal {
@@ -42,14 +42,9 @@ fn open<R: BufRead + Seek>(
 
 fn demand<R: BufRead + Seek>(reader: &png::Reader<R>, file_bytes: u64) -> Demand {
     let (color, depth) = reader.output_color_type();
-    let channels = color.samples() as u64;
-    Demand {
-        width: u64::from(reader.info().width),
-        height: u64::from(reader.info().height),
-        channels,
-        bytes_per_pixel: channels * u64::from(stored_bits(depth) / 8),
-        file_bytes,
-    }
+    let (info, channels) = (reader.info(), color.samples() as u64);
+    let size = [info.width, info.height];
+    Demand::new(size, channels, stored_bits(depth) / 8, file_bytes)
 }
 
 /// Bits of a sample as it is handed over: fewer than 8 are expanded.
@@ -76,11 +71,14 @@ pub(crate) fn header(
 }
 
 fn texts(info: &png::Info<'_>) -> Notes {
-    let latin = info.uncompressed_latin1_text.iter();
-    let latin = latin.map(|t| note(&t.keyword, &t.text));
+    let latin = info.uncompressed_latin1_text.iter().map(latin_note);
     latin
         .chain(info.utf8_text.iter().filter_map(utf8_note))
         .collect()
+}
+
+fn latin_note(text: &png::text_metadata::TEXtChunk) -> (String, String) {
+    note(&text.keyword, &text.text)
 }
 
 fn utf8_note(text: &png::text_metadata::ITXtChunk) -> Option<(String, String)> {
@@ -159,11 +157,11 @@ fn big_endian_codes(bytes: &[u8]) -> Vec<u16> {
 }
 
 /// Effort of deflate and of the filters before it; the default takes a few milliseconds for 640 x 480.
-fn compression(effort: Quality) -> png::Compression {
+fn compression(effort: Quality) -> Compression {
     match effort {
-        Quality::Draft => png::Compression::Fastest,
-        Quality::Normal => png::Compression::Fast,
-        Quality::Reference => png::Compression::High,
+        Quality::Draft => Compression::Fastest,
+        Quality::Normal => Compression::Fast,
+        Quality::Reference => Compression::High,
     }
 }
 
@@ -225,12 +223,24 @@ fn add_texts(
     metadata: &[(String, String)],
 ) -> Result<(), png::EncodingError> {
     for (key, value) in metadata {
-        match value.chars().all(|c| (c as u32) < 256) {
-            true => encoder.add_text_chunk(key.clone(), value.clone())?,
-            false => encoder.add_itxt_chunk(key.clone(), value.clone())?,
-        }
+        add_text(encoder, key.clone(), value.clone())?;
     }
     Ok(())
+}
+
+fn add_text(
+    encoder: &mut png::Encoder<'_, &mut Vec<u8>>,
+    key: String,
+    value: String,
+) -> Result<(), png::EncodingError> {
+    match is_latin(&value) {
+        true => encoder.add_text_chunk(key, value),
+        false => encoder.add_itxt_chunk(key, value),
+    }
+}
+
+fn is_latin(text: &str) -> bool {
+    text.chars().all(|c| (c as u32) < 256)
 }
 
 #[cfg(test)]

@@ -139,12 +139,15 @@ impl DisplayProfile {
     /// Linear Rec. 709 of display values from 0 to 1.
     #[inline]
     pub(crate) fn light(&self, display: [f32; 3]) -> [f32; 3] {
-        let light = [0, 1, 2].map(|c: usize| {
-            let code = display[c].clamp(0.0, 1.0) * LARGEST_CODE + 0.5;
-            self.curves[c][code as usize]
-        });
+        let light = [0, 1, 2].map(|c: usize| self.curves[c][nearest_code(display[c])]);
         self.to_rec709.apply(light)
     }
+}
+
+/// Number of the code that is nearest to a display value.
+#[inline]
+fn nearest_code(display: f32) -> usize {
+    (display.clamp(0.0, 1.0) * LARGEST_CODE + 0.5) as usize
 }
 
 fn rec709_from_icc(icc: &ColorProfile) -> Matrix3<f64> {
@@ -237,6 +240,15 @@ pub(crate) fn to_rec709(named: &RgbSpace) -> Result<Option<ColorMatrix>, String>
     let mut pairs = given.iter().zip(ours);
     let same = pairs.all(|(v, w)| (v - w).abs() < CHROMATICITY_TOLERANCE);
     Ok((!same).then(|| rgb_from_rgb(&RgbSpace::REC709, named).into()))
+}
+
+/// Converts the first three of every `n` samples.
+pub(crate) fn convert_primaries(samples: &mut [f32], n: usize, matrix: &ColorMatrix) {
+    for px in samples.chunks_exact_mut(n) {
+        if let Some(color) = px.first_chunk_mut() {
+            *color = matrix.apply(*color);
+        }
+    }
 }
 
 /// Primaries may be no colours that can be seen, as those of XYZ and ACES are.

@@ -9,7 +9,8 @@ use crate::io::header::{Header, lines_of_notes, notes_of_lines};
 use crate::io::limits::{Demand, Limits};
 use std::io::{Cursor, Read, Seek, SeekFrom};
 use tiff::decoder::{Decoder, DecodingResult};
-use tiff::encoder::{TiffEncoder, TiffValue, colortype};
+use tiff::encoder::colortype::{self, Gray8, Gray16, Gray32Float, RGB8, RGB16, RGB32Float};
+use tiff::encoder::{TiffEncoder, TiffValue};
 use tiff::tags::{ExtraSamples, Tag};
 use tiff::{ColorType, TiffError};
 
@@ -63,13 +64,8 @@ fn open<R: Read + Seek>(
     let (width, height) = decoder.dimensions()?;
     refuse_missing_palette(&mut decoder)?;
     let (channels, bits) = stored_channels(&mut decoder)?;
-    limits.check(Demand {
-        width: width.into(),
-        height: height.into(),
-        channels,
-        bytes_per_pixel: channels * u64::from(bits).div_ceil(8),
-        file_bytes,
-    })?;
+    let bytes = u64::from(bits).div_ceil(8);
+    limits.check(Demand::new([width, height], channels, bytes, file_bytes))?;
     let inks = matches!(decoder.colortype()?, ColorType::CMYK(_));
     let names = default_names(if inks { 3 } else { channels as usize });
     Ok(OpenedTiff {
@@ -385,6 +381,8 @@ fn read_chunk(
 
 /// Doubles become floats and integers of other kinds 16 bits: full scale stays full scale, and what is below zero becomes
 /// zero.
+///
+/// Long since every kind of samples has its line.
 fn known_samples(decoded: DecodingResult) -> Samples {
     match decoded {
         DecodingResult::U8(v) => Samples::U8(v),
@@ -449,14 +447,11 @@ pub(crate) fn encode_codes(
     metadata: &[(String, String)],
 ) -> Result<Vec<u8>, String> {
     let (size, n) = ((picture.width, picture.height), picture.names.len());
-    let alpha = (n == 4).then_some(ExtraSamples::UnassociatedAlpha);
-    let file = match &picture.codes {
-        Codes::U8(v) if n == 1 => encode::<colortype::Gray8>(size, v, alpha, metadata),
-        Codes::U8(v) => encode::<colortype::RGB8>(size, v, alpha, metadata),
-        Codes::U16(v) if n == 1 => encode::<colortype::Gray16>(size, v, alpha, metadata),
-        Codes::U16(v) => encode::<colortype::RGB16>(size, v, alpha, metadata),
-    };
-    file.map_err(|e| e.to_string())
+    let alpha = ExtraSamples::UnassociatedAlpha;
+    match &picture.codes {
+        Codes::U8(v) => encode_grey_or_rgb::<Gray8, RGB8>(size, n, v, alpha, metadata),
+        Codes::U16(v) => encode_grey_or_rgb::<Gray16, RGB16>(size, n, v, alpha, metadata),
+    }
 }
 
 /// A whole file of scene-linear floats of one, three or four channels; colours are multiplied by alpha.
@@ -466,10 +461,27 @@ pub(crate) fn encode_floats(
     samples: &[f32],
     metadata: &[(String, String)],
 ) -> Result<Vec<u8>, String> {
-    let alpha = (channels > 3).then_some(ExtraSamples::AssociatedAlpha);
+    let alpha = ExtraSamples::AssociatedAlpha;
+    encode_grey_or_rgb::<Gray32Float, RGB32Float>(size, channels, samples, alpha, metadata)
+}
+
+/// A file of one channel as `Grey`, of three or four as `Rgb`; `alpha` is what a fourth one is.
+fn encode_grey_or_rgb<Grey, Rgb>(
+    size: (usize, usize),
+    channels: usize,
+    samples: &[Grey::Inner],
+    alpha: ExtraSamples,
+    metadata: &[(String, String)],
+) -> Result<Vec<u8>, String>
+where
+    Grey: colortype::ColorType,
+    Rgb: colortype::ColorType<Inner = Grey::Inner>,
+    [Grey::Inner]: TiffValue,
+{
+    let alpha = (channels > 3).then_some(alpha);
     match channels {
-        1 => encode::<colortype::Gray32Float>(size, samples, alpha, metadata),
-        _ => encode::<colortype::RGB32Float>(size, samples, alpha, metadata),
+        1 => encode::<Grey>(size, samples, alpha, metadata),
+        _ => encode::<Rgb>(size, samples, alpha, metadata),
     }
     .map_err(|e| e.to_string())
 }

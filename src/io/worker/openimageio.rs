@@ -78,7 +78,7 @@ pub(crate) fn decode(
     Ok(Raster {
         width,
         height,
-        names: picked.iter().map(|&i| layout.channels[i].clone()).collect(),
+        names: layout.names_of(&picked),
         samples,
         display_encoded,
         premultiplied: false,
@@ -103,6 +103,15 @@ fn refused(e: cxx::Exception) -> Refusal {
 }
 
 impl Layout {
+    fn names_of(&self, picked: &[usize]) -> Vec<String> {
+        picked.iter().map(|&i| self.channels[i].clone()).collect()
+    }
+
+    /// Nothing to cut, to pad or to leave out.
+    fn is_shown_as_stored(&self, picked: &[usize]) -> bool {
+        self.shows_all() && picked.iter().copied().eq(0..self.channels.len())
+    }
+
     fn check(&self, file_bytes: u64, limits: &Limits) -> Result<(), Refusal> {
         limits.check(self.demand([self.width, self.height], file_bytes))?;
         let data_size = [self.data_width, self.data_height];
@@ -110,15 +119,9 @@ impl Layout {
     }
 
     fn demand(&self, size: [i64; 2], file_bytes: u64) -> Demand {
-        let [width, height] = size.map(|side| u64::try_from(side).unwrap_or(0));
+        let size = size.map(|side| u64::try_from(side).unwrap_or(0));
         let channels = self.channels.len() as u64;
-        Demand {
-            width,
-            height,
-            channels,
-            bytes_per_pixel: channels * u64::from(self.bytes.unsigned_abs()),
-            file_bytes,
-        }
+        Demand::new(size, channels, self.bytes.unsigned_abs(), file_bytes)
     }
 
     fn sample(&self) -> SampleKind {
@@ -186,7 +189,7 @@ fn read_samples(
 fn windowed<T: Copy + Default>(samples: Vec<T>, layout: &Layout, picked: &[usize]) -> Vec<T> {
     let (width, height) = (layout.width as usize, layout.height as usize);
     let stride = layout.channels.len();
-    if layout.shows_all() && picked.iter().copied().eq(0..stride) {
+    if layout.is_shown_as_stored(picked) {
         return samples;
     }
     let mut out = vec![T::default(); width * height * picked.len()];
@@ -194,11 +197,16 @@ fn windowed<T: Copy + Default>(samples: Vec<T>, layout: &Layout, picked: &[usize
     for (x, y) in ys.flat_map(|y| xs.clone().map(move |x| (x, y))) {
         let pixel = &samples[layout.data_pixel(x, y) * stride..][..stride];
         let to = (y * width + x) * picked.len();
-        for (slot, &channel) in out[to..].iter_mut().zip(picked) {
-            *slot = pixel[channel];
-        }
+        copy_picked(&mut out[to..], pixel, picked);
     }
     out
+}
+
+#[inline]
+fn copy_picked<T: Copy>(to: &mut [T], pixel: &[T], picked: &[usize]) {
+    for (slot, &channel) in to.iter_mut().zip(picked) {
+        *slot = pixel[channel];
+    }
 }
 
 /// Samples with their meaning, and whether they are display-encoded: the rule of [`io`](crate::io) for integers and
@@ -268,14 +276,12 @@ pub(crate) fn write_file(
     samples: &[u8],
     metadata: &[(String, String)],
 ) -> Result<(), Refusal> {
-    let notes: Vec<_> = metadata
-        .iter()
-        .map(|(key, value)| ffi::Note {
-            key: key.clone(),
-            value: value.clone(),
-        })
-        .collect();
+    let notes: Vec<_> = metadata.iter().cloned().map(note).collect();
     ffi::write(path, format.name(), layout, samples, &notes).map_err(refused)
+}
+
+fn note((key, value): (String, String)) -> ffi::Note {
+    ffi::Note { key, value }
 }
 
 #[cfg(test)]

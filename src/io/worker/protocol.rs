@@ -88,13 +88,20 @@ pub(crate) struct Shape {
 impl Shape {
     /// What a picture of this shape asks for.
     fn demand(&self, file_bytes: u64) -> Demand {
+        let size = [self.width as u64, self.height as u64];
         let channels = self.names.len() as u64;
-        Demand {
-            width: self.width as u64,
-            height: self.height as u64,
-            channels,
-            bytes_per_pixel: channels * u64::from(self.sample.bytes()),
-            file_bytes,
+        Demand::new(size, channels, self.sample.bytes(), file_bytes)
+    }
+}
+
+impl From<&Raster> for Shape {
+    fn from(raster: &Raster) -> Self {
+        Self {
+            width: raster.width,
+            height: raster.height,
+            names: raster.names.clone(),
+            sample: raster.samples.kind(),
+            display_encoded: raster.display_encoded,
         }
     }
 }
@@ -135,14 +142,7 @@ pub(super) fn send_request(
 
 /// Responds with a picture and its samples.
 pub(super) fn send_raster(to: &mut impl Write, raster: &Raster) -> Result<()> {
-    let shape = Shape {
-        width: raster.width,
-        height: raster.height,
-        names: raster.names.clone(),
-        sample: raster.samples.kind(),
-        display_encoded: raster.display_encoded,
-    };
-    send_line(to, &ResponseHead::Picture(shape))?;
+    send_line(to, &ResponseHead::Picture(raster.into()))?;
     to.write_all(raster.samples.bytes())?;
     to.flush()
 }

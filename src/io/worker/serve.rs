@@ -112,9 +112,8 @@ impl Server {
         wanted: Wanted,
         window: Window,
     ) -> std::result::Result<Raster, Refusal> {
-        let file_bytes = source.bytes.len() as u64;
         openimageio::decode(source, &self.limits, wanted, window, |decoded_bytes| {
-            self.memory.allow(file_bytes, decoded_bytes)
+            self.memory.allow(source.bytes.len() as u64, decoded_bytes)
         })
     }
 }

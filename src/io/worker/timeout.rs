@@ -42,11 +42,15 @@ impl TimedPipe {
     fn when_ready<T>(&self, what: PollFlags, mut act: impl FnMut(&File) -> Result<T>) -> Result<T> {
         loop {
             match act(&self.file) {
-                Err(e) if e.kind() == ErrorKind::WouldBlock => self.wait(what)?,
+                Err(e) if would_block(&e) => self.wait(what)?,
                 done => return done,
             }
         }
     }
+}
+
+fn would_block(e: &Error) -> bool {
+    e.kind() == ErrorKind::WouldBlock
 }
 
 impl Read for TimedPipe {

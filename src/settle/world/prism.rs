@@ -17,8 +17,7 @@ pub(super) fn colliders(
     length: f64,
     mass: f64,
 ) -> Vec<ColliderBuilder> {
-    let corners = object.outline.iter();
-    let ring: Vec<[f64; 2]> = corners.map(|corner| corner.map(|x| x * length)).collect();
+    let ring = scaled(&object.outline, length);
     prism_parts(&ring, half.z, mass).unwrap_or_else(|| vec![cuboid(half).mass(mass as f32)])
 }
 
@@ -58,14 +57,18 @@ fn quarters(ring: &[[f64; 2]]) -> Vec<Vec<[f64; 2]>> {
 
 /// A plate of this outline; none where the engine finds it too thin a shape.
 fn plate(ring: &[[f64; 2]], half_height: f64) -> Option<ColliderBuilder> {
-    let corners: Vec<Vector> = [half_height, -half_height]
-        .into_iter()
-        .flat_map(|z| {
-            ring.iter()
-                .map(move |&[x, y]| Vector::new(x as f32, y as f32, z as f32))
-        })
-        .collect();
-    ColliderBuilder::convex_hull(&corners)
+    let rims = [half_height, -half_height].map(|z| ring_at(ring, z));
+    ColliderBuilder::convex_hull(&rims.concat())
+}
+
+fn scaled(ring: &[[f64; 2]], by: f64) -> Vec<[f64; 2]> {
+    ring.iter().map(|corner| corner.map(|x| x * by)).collect()
+}
+
+fn ring_at(ring: &[[f64; 2]], z: f64) -> Vec<Vector> {
+    ring.iter()
+        .map(|&[x, y]| Vector::new(x as f32, y as f32, z as f32))
+        .collect()
 }
 
 #[cfg(test)]

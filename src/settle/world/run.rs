@@ -13,7 +13,9 @@ use crate::allowance::Allowance;
 use crate::error::Result;
 use crate::settle::trace::MotionSample;
 use crate::work::{self, Kind};
-use rapier3d::prelude::{Aabb, PhysicsWorld, Pose as RapierPose, RigidBody, RigidBodyHandle};
+use rapier3d::prelude::{
+    Aabb, PhysicsWorld, Pose as RapierPose, RigidBody, RigidBodyHandle, Rotation,
+};
 
 /// Motion of a card that still counts as rest, metres in the world.
 const REST_MOTION_M: f32 = 0.0002;
@@ -71,9 +73,8 @@ impl FallRun<'_> {
     }
 
     fn step_work(&self) -> u64 {
-        let contacts = self.world.narrow_phase.contact_graph();
-        let pairs = contacts.raw_graph().raw_edges().len();
-        (self.bodies.len() + pairs) as u64 * self.work_per_pair
+        let contacts = self.world.narrow_phase.contact_graph().raw_graph();
+        (self.bodies.len() + contacts.raw_edges().len()) as u64 * self.work_per_pair
     }
 
     fn is_asleep(&self) -> bool {
@@ -273,8 +274,11 @@ impl Stillness {
 /// How far the end of a card has moved, at most: its middle, and half a card times the angle (twice
 /// the difference of the quaternions).
 fn motion_between(a: &RapierPose, b: &RapierPose) -> f32 {
-    let turned = (a.rotation - b.rotation)
-        .length()
-        .min((a.rotation + b.rotation).length());
+    let turned = rotation_between(a.rotation, b.rotation);
     (a.translation - b.translation).length() + CARD_LENGTH_M as f32 * turned
+}
+
+/// How far two unit quaternions are apart; one and its negative are the same rotation.
+fn rotation_between(a: Rotation, b: Rotation) -> f32 {
+    (a - b).length().min((a + b).length())
 }

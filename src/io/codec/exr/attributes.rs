@@ -17,10 +17,14 @@ pub(super) fn add_texts(
     metadata: &[(String, String)],
 ) -> Result<(), String> {
     for (key, value) in metadata {
-        let value = AttributeValue::Text(latin_text(value)?);
+        let value = text_attribute(value)?;
         attributes.other.insert(latin_text(key)?, value);
     }
     Ok(())
+}
+
+fn text_attribute(text: &str) -> Result<AttributeValue, String> {
+    latin_text(text).map(AttributeValue::Text)
 }
 
 /// An attribute among the bytes of a file: name, kind, length and value.

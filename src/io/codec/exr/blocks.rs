@@ -132,12 +132,14 @@ impl<'a> SampleBuffer<'a> {
 
     fn put_block(&mut self, header: &Header, block: DecodedBlock) {
         match block {
-            DecodedBlock::Lines(lines) => {
-                for line in lines {
-                    self.put(line.channel, [line.x, line.y], &line.samples);
-                }
-            }
+            DecodedBlock::Lines(lines) => self.put_lines(&lines),
             DecodedBlock::Pixels(block) => self.put_pixels(header, &block),
+        }
+    }
+
+    fn put_lines(&mut self, lines: &[SampleLine]) {
+        for line in lines {
+            self.put(line.channel, [line.x, line.y], &line.samples);
         }
     }
 

@@ -47,13 +47,13 @@ impl Sampling {
     /// Whether the part is one that is read: rows, with a window that every sampling divides.
     pub(super) fn check(&self, header: &Header) -> Result<(), Refusal> {
         match header.blocks {
-            exr::meta::BlockDescription::ScanLines
-                if self.0.iter().all(|pair| divides(*pair, header)) =>
-            {
-                Ok(())
-            }
+            exr::meta::BlockDescription::ScanLines if self.divides(header) => Ok(()),
             _ => Err("damaged EXR: sampling of channels that does not divide the picture".into()),
         }
+    }
+
+    fn divides(&self, header: &Header) -> bool {
+        self.0.iter().all(|pair| divides(*pair, header))
     }
 
     /// Rows of pixels for a sample of a channel.

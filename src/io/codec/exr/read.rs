@@ -2,9 +2,9 @@
 
 use super::blocks::{PartReader, SampleOrder};
 use super::chroma::{LUMINANCE_CHROMA, Sampling, to_rgb};
-use crate::color::{ColorMatrix, RgbSpace};
+use crate::color::RgbSpace;
 use crate::io::codec::channels::{ChannelMatch, Choice, Wanted};
-use crate::io::codec::profile::to_rec709;
+use crate::io::codec::profile::{convert_primaries, to_rec709};
 use crate::io::codec::raster::{Raster, Samples};
 use crate::io::codec::refusal::Refusal;
 use crate::io::format::Format;
@@ -125,12 +125,9 @@ impl<'a> CheckedFile<'a> {
 
     /// The requested window of a part.
     fn window_of(&self, part: usize, shown: Window) -> IntegerBounds {
-        let header = &self.meta.headers[part];
         match shown {
             Window::Display => self.window(),
-            Window::Data => {
-                IntegerBounds::new(header.own_attributes.layer_position, header.layer_size)
-            }
+            Window::Data => data_window(&self.meta.headers[part]),
         }
     }
 
@@ -220,9 +217,8 @@ fn read_limited_meta(
 ) -> Result<MetaData, Refusal> {
     let most = limits.metadata_bytes;
     let meta = MetaData::read_from_buffered(BufReader::new(file.take(most)), false);
-    if meta.is_err() && file_bytes > most {
-        let what = "bytes without an end of the header";
-        at_most(file_bytes, most, what, "metadata_bytes")?;
+    if meta.is_err() {
+        limits.check_header_bytes(file_bytes)?;
     }
     Ok(meta?)
 }
@@ -281,10 +277,14 @@ pub(crate) fn header(
 
 /// The first bytes, as if every channel had a sample for each pixel.
 fn read_start(file: &mut impl Read) -> Result<Vec<u8>, Refusal> {
-    let mut start = Vec::new();
-    let read = file.by_ref().take(FIRST_BYTES).read_to_end(&mut start);
-    read.map_err(exr::error::Error::from)?;
+    let start = first_bytes(file)?;
     Ok(Sampling::find(&start).map_or(start, |(_, even)| even))
+}
+
+fn first_bytes(file: &mut impl Read) -> Result<Vec<u8>, exr::error::Error> {
+    let mut start = Vec::new();
+    file.take(FIRST_BYTES).read_to_end(&mut start)?;
+    Ok(start)
 }
 
 fn listed_names(channels: &ChannelList) -> Vec<String> {
@@ -299,6 +299,10 @@ fn widest_sample(channels: &ChannelList) -> usize {
     bytes.max().unwrap_or(0)
 }
 
+fn data_window(header: &exr::meta::header::Header) -> IntegerBounds {
+    IntegerBounds::new(header.own_attributes.layer_position, header.layer_size)
+}
+
 /// Column and row of the first stored pixel in the display window.
 fn data_offset(header: &exr::meta::header::Header) -> [i64; 2] {
     let stored = header.own_attributes.layer_position;
@@ -311,11 +315,13 @@ fn data_offset(header: &exr::meta::header::Header) -> [i64; 2] {
 
 /// `R G B A` first, the rest by name.
 fn in_default_order(mut names: Vec<String>) -> Vec<String> {
-    names.sort_by_key(|name| {
-        let rank = "RGBA".find(name.as_str()).filter(|_| name.len() == 1);
-        (rank.unwrap_or(4), name.clone())
-    });
+    names.sort_by_key(|name| (rank_in_rgba(name), name.clone()));
     names
+}
+
+fn rank_in_rgba(name: &str) -> usize {
+    let rank = "RGBA".find(name).filter(|_| name.len() == 1);
+    rank.unwrap_or(4)
 }
 
 fn text_attributes(header: &exr::meta::header::Header) -> Notes {
@@ -329,6 +335,10 @@ fn text_attributes(header: &exr::meta::header::Header) -> Notes {
         .collect();
     notes.sort();
     notes
+}
+
+fn are_colors(wanted: Wanted, picked: &[usize]) -> bool {
+    matches!(wanted, Wanted::Color | Wanted::Film) && picked.len() >= 3
 }
 
 /// The wanted channels of the part that has them under the best names.
@@ -346,7 +356,7 @@ pub(crate) fn decode(
     let mut names = file.picked_names(part, &picked);
     let reader = file.reader(part, &picked, window, SampleOrder::Interleaved)?;
     let mut samples = reader.read()?;
-    if matches!(wanted, Wanted::Color | Wanted::Film) && picked.len() >= 3 {
+    if are_colors(wanted, &picked) {
         convert_colors(&mut samples, &mut names, &file.space())?;
     }
     Ok(Raster {
@@ -396,12 +406,6 @@ fn convert_colors(
 }
 
 /// The first three of `n` interleaved channels in other primaries; alpha stays.
-fn convert_primaries(samples: &mut [f32], n: usize, matrix: &ColorMatrix) {
-    for px in samples.chunks_exact_mut(n) {
-        let color = matrix.apply([px[0], px[1], px[2]]);
-        px[..3].copy_from_slice(&color);
-    }
-}
 
 #[cfg(test)]
 mod tests {

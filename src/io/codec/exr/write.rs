@@ -2,6 +2,7 @@
 
 use super::attributes::{FIRST_ATTRIBUTE, add_texts, latin_text, sort_attributes};
 use super::parts::check_count;
+use exr::prelude::Compression as Method;
 use exr::prelude::{
     AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, SmallVec, Vec2,
     WritableImage,
@@ -21,11 +22,11 @@ pub enum Compression {
 }
 
 impl Compression {
-    fn method(self) -> exr::prelude::Compression {
+    fn method(self) -> Method {
         match self {
-            Self::None => exr::prelude::Compression::Uncompressed,
-            Self::Zip => exr::prelude::Compression::ZIP16,
-            Self::Piz => exr::prelude::Compression::PIZ,
+            Self::None => Method::Uncompressed,
+            Self::Zip => Method::ZIP16,
+            Self::Piz => Method::PIZ,
         }
     }
 }
@@ -60,9 +61,16 @@ fn channel_list(
     planes: Vec<(&str, FlatSamples)>,
 ) -> Result<AnyChannels<FlatSamples>, String> {
     let mut list = SmallVec::new();
-    for (name, samples) in planes {
-        check_count(&samples, size).map_err(|e| format!("channel {name}: {e}"))?;
-        list.push(AnyChannel::new(latin_text(name)?, samples));
+    for plane in planes {
+        list.push(checked_channel(plane, size)?);
     }
     Ok(AnyChannels::sort(list))
+}
+
+fn checked_channel(
+    (name, samples): (&str, FlatSamples),
+    size: (usize, usize),
+) -> Result<AnyChannel<FlatSamples>, String> {
+    check_count(&samples, size).map_err(|e| format!("channel {name}: {e}"))?;
+    Ok(AnyChannel::new(latin_text(name)?, samples))
 }
