@@ -230,6 +230,15 @@ fn mean(values: impl IntoIterator<Item = f64>) -> f64 {
     }
 }
 
+/// # Panics
+/// When there are weights and not one per sheet.
+fn check_weights(weights: &[u32], sheets: usize) {
+    assert!(
+        weights.is_empty() || weights.len() == sheets,
+        "one weight per sheet"
+    );
+}
+
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;

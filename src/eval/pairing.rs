@@ -2,6 +2,7 @@
 
 use super::overlap::{BoxIndex, area, intersection, iou, share};
 use super::{ConfusionOptions, EvalImage};
+use crate::geom::BBox;
 use std::collections::BinaryHeap;
 
 /// A detection and the box that it names, by their places in the sheet: without a box it is a false alarm, without a
@@ -16,9 +17,7 @@ pub(super) struct BoxPair {
 /// crowd are ignored.
 pub(super) fn pairs(sheet: &EvalImage, options: &ConfusionOptions) -> Vec<BoxPair> {
     let mut search = PairSearch::new(sheet, options);
-    let sure: Vec<usize> = (0..sheet.found.len())
-        .filter(|&f| sheet.found[f].confidence > options.confidence)
-        .collect();
+    let sure = sure_detections(sheet, options.confidence);
     let matched = search.match_boxes(&sure);
     let pairs = sure.iter().map(|&f| BoxPair {
         found: Some(f),
@@ -27,6 +26,14 @@ pub(super) fn pairs(sheet: &EvalImage, options: &ConfusionOptions) -> Vec<BoxPai
     pairs
         .filter(|pair| pair.truth.is_some() || !search.in_crowd(pair.found))
         .chain(search.missed())
+        .collect()
+}
+
+/// The places of those surer than this.
+fn sure_detections(sheet: &EvalImage, confidence: f64) -> Vec<usize> {
+    let places = 0..sheet.found.len();
+    places
+        .filter(|&f| sheet.found[f].confidence > confidence)
         .collect()
 }
 
@@ -63,10 +70,9 @@ struct PairSearch<'a> {
 
 impl<'a> PairSearch<'a> {
     fn new(sheet: &'a EvalImage, options: &ConfusionOptions) -> Self {
-        let index = BoxIndex::new(sheet.truth.iter().map(|t| t.bbox));
         Self {
             sheet,
-            index,
+            index: BoxIndex::for_truth(sheet),
             taken: vec![false; sheet.truth.len()],
             min_iou: options.iou,
         }
@@ -91,38 +97,50 @@ impl<'a> PairSearch<'a> {
 
     /// The boxes that no detection names.
     fn missed(&self) -> impl Iterator<Item = BoxPair> {
-        (0..self.sheet.truth.len())
-            .filter(|&t| !self.taken[t] && !self.sheet.truth[t].crowd)
-            .map(|t| BoxPair {
-                found: None,
-                truth: Some(t),
-            })
+        let truth = 0..self.sheet.truth.len();
+        let missed = truth.filter(|&t| self.is_open(t));
+        missed.map(|t| BoxPair {
+            found: None,
+            truth: Some(t),
+        })
+    }
+
+    /// Whether a box is still to be found.
+    fn is_open(&self, t: usize) -> bool {
+        !self.taken[t] && !self.sheet.truth[t].crowd
     }
 
     fn best(&self, found: usize) -> Option<PairCandidate> {
-        let bbox = &self.sheet.found[found].bbox;
-        self.index
-            .near(bbox)
-            .into_iter()
-            .filter(|&t| !self.taken[t] && !self.sheet.truth[t].crowd)
-            .map(|t| PairCandidate {
-                overlap: iou(&self.sheet.truth[t].bbox, bbox),
-                truth: t,
-                found,
-            })
+        let near = self.index.near(&self.sheet.found[found].bbox);
+        near.into_iter()
+            .filter(|&t| self.is_open(t))
+            .map(|t| self.candidate(t, found))
             .filter(|candidate| candidate.overlap > self.min_iou)
             .max()
+    }
+
+    fn candidate(&self, truth: usize, found: usize) -> PairCandidate {
+        let (there, seen) = (&self.sheet.truth[truth], &self.sheet.found[found]);
+        PairCandidate {
+            overlap: iou(&there.bbox, &seen.bbox),
+            truth,
+            found,
+        }
     }
 
     /// As the COCO tools have it, by the share of the detection that lies in a crowd.
     fn in_crowd(&self, found: Option<usize>) -> bool {
         found.is_some_and(|f| {
             let bbox = &self.sheet.found[f].bbox;
-            self.index.near(bbox).into_iter().any(|t| {
-                let truth = &self.sheet.truth[t];
-                truth.crowd && share(intersection(bbox, &truth.bbox), area(bbox)) > self.min_iou
-            })
+            let near = self.index.near(bbox);
+            near.into_iter().any(|t| self.is_in_crowd(bbox, t))
         })
+    }
+
+    /// Whether so much of a detection lies in this box, and the box is a crowd.
+    fn is_in_crowd(&self, bbox: &BBox, t: usize) -> bool {
+        let truth = &self.sheet.truth[t];
+        truth.crowd && share(intersection(bbox, &truth.bbox), area(bbox)) > self.min_iou
     }
 }
 

@@ -38,19 +38,28 @@ fn cells(line: &str) -> Vec<String> {
     line.split(',').map(|cell| cell.trim().to_owned()).collect()
 }
 
+/// The name of an image without folder and extension.
+fn stem_of(name: &str) -> String {
+    let stem = Path::new(name).file_stem().unwrap_or_default();
+    stem.to_string_lossy().into_owned()
+}
+
 impl Tags {
     /// Adds a line: the image and its level of each factor.
     fn add(&mut self, row: Vec<String>) -> std::result::Result<(), String> {
-        let expected = 1 + self.factors.len();
-        if row.len() != expected {
-            return Err(format!("{} cells, expected {expected}", row.len()));
-        }
-        let stem = Path::new(&row[0]).file_stem().unwrap_or_default();
-        let stem = stem.to_string_lossy().into_owned();
-        match self.levels.insert(stem, row[1..].to_vec()) {
+        self.check_cells(&row)?;
+        match self.levels.insert(stem_of(&row[0]), row[1..].to_vec()) {
             None => Ok(()),
             Some(_) => Err(format!("image \"{}\" is listed twice", row[0])),
         }
+    }
+
+    fn check_cells(&self, row: &[String]) -> std::result::Result<(), String> {
+        let expected = 1 + self.factors.len();
+        if row.len() == expected {
+            return Ok(());
+        }
+        Err(format!("{} cells, expected {expected}", row.len()))
     }
 
     /// No tags yet, for the factors that the first line names behind the image.

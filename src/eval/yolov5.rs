@@ -4,7 +4,7 @@ use super::average::{interpolated, recall_and_precision, trapezoid};
 use super::by_class::{ByClass, ImageBoxes};
 use super::overlap::BoxIndex;
 use super::rank::{Hit, Marks, Ranking, Running};
-use super::{ClassScores, Definition, Detection, EvalImage, Scores, THRESHOLDS};
+use super::{ClassScores, Definition, Detection, EvalImage, Scores, THRESHOLDS, check_weights};
 use crate::geom::BBox;
 use rayon::prelude::*;
 
@@ -30,10 +30,7 @@ const SMOOTHING_READINGS: usize = 50;
 /// # Panics
 /// When there are weights and not one per sheet.
 pub fn yolov5(sheets: &[EvalImage], weights: &[u32]) -> Scores {
-    assert!(
-        weights.is_empty() || weights.len() == sheets.len(),
-        "one weight per sheet"
-    );
+    check_weights(weights, sheets.len());
     scores(&rankings(sheets), weights)
 }
 
@@ -49,16 +46,23 @@ pub(super) fn rankings(sheets: &[EvalImage]) -> Vec<Ranking> {
 pub(super) fn scores(rankings: &[Ranking], weights: &[u32]) -> Scores {
     let classes = ranked(rankings, weights);
     let best = best_confidence(&classes);
-    let scores = classes.par_iter().map(|class| class.scores(best, weights));
     Scores {
         definition: Definition::Yolov5,
-        classes: scores.collect(),
+        classes: scores_at(best, &classes, weights),
     }
+}
+
+/// The scores of all classes at a reading of confidence.
+fn scores_at(reading: usize, classes: &[Ranked<'_>], weights: &[u32]) -> Vec<ClassScores> {
+    let scores = classes
+        .par_iter()
+        .map(|class| class.scores(reading, weights));
+    scores.collect()
 }
 
 /// Average precision of a class at every threshold; none where there is nothing to find.
 pub(super) fn average_precision(ranking: &Ranking, weights: &[u32]) -> Option<[f64; THRESHOLDS]> {
-    let truths = Some(ranking.truths(weights)).filter(|&truths| truths > 0.0)?;
+    let truths = ranking.truths_to_find(weights)?;
     let turns = ranking.turns(weights);
     Some(turns.each_ref().map(|sums| area_below(sums, truths)))
 }
@@ -92,17 +96,13 @@ pub(super) struct Ranked<'a> {
 
 impl<'a> Ranked<'a> {
     fn new(ranking: &'a Ranking, weights: &[u32]) -> Option<Self> {
-        let truths = ranking.truths(weights);
+        let truths = ranking.truths_to_find(weights)?;
         let (recall, precision) = curve(&ranking.running(0, weights), truths);
-        let confidences = ranking
-            .counting(weights)
-            .map(|(hit, _)| -hit.confidence)
-            .collect();
-        (truths > 0.0).then_some(Self {
+        Some(Self {
             ranking,
             recall,
             precision,
-            confidences,
+            confidences: negated_confidences(ranking, weights),
         })
     }
 
@@ -139,6 +139,11 @@ impl<'a> Ranked<'a> {
     }
 }
 
+fn negated_confidences(ranking: &Ranking, weights: &[u32]) -> Vec<f64> {
+    let counting = ranking.counting(weights);
+    counting.map(|(hit, _)| -hit.confidence).collect()
+}
+
 fn curve(sums: &Running, truths: f64) -> (Vec<f64>, Vec<f64>) {
     recall_and_precision(sums, truths, [RATIO_EPSILON, 0.0])
 }
@@ -150,18 +155,24 @@ pub(super) fn confidence(i: usize) -> f64 {
 
 /// Where the smoothed mean F1 of the classes is greatest.
 pub(super) fn best_confidence(classes: &[Ranked<'_>]) -> usize {
-    let f1: Vec<f64> = (0..CONFIDENCE_STEPS)
-        .into_par_iter()
-        .map(|i| {
-            classes
-                .iter()
-                .map(|class| class.f1_at(confidence(i)))
-                .sum::<f64>()
-        })
-        .collect();
+    let sums = f1_sums(classes);
+    first_greatest((0..CONFIDENCE_STEPS).map(|i| window_sum(&sums, i)))
+}
+
+/// The sum of the classes' F1 at every reading of confidence.
+fn f1_sums(classes: &[Ranked<'_>]) -> Vec<f64> {
+    let readings = (0..CONFIDENCE_STEPS).into_par_iter();
+    readings.map(|i| f1_sum(classes, confidence(i))).collect()
+}
+
+fn f1_sum(classes: &[Ranked<'_>], confidence: f64) -> f64 {
+    classes.iter().map(|class| class.f1_at(confidence)).sum()
+}
+
+/// Where the greatest value is; of equal ones the first.
+fn first_greatest(values: impl Iterator<Item = f64>) -> usize {
     let mut best = (0, f64::NEG_INFINITY);
-    for i in 0..CONFIDENCE_STEPS {
-        let value = window_sum(&f1, i);
+    for (i, value) in values.enumerate() {
         if value > best.1 {
             best = (i, value);
         }
@@ -182,24 +193,29 @@ fn window_sum(values: &[f64], i: usize) -> f64 {
 
 /// The detections of a class in one image, marked right where they found something, and how many boxes there are.
 fn match_image(image: &ImageBoxes<'_>) -> (Vec<Hit>, usize) {
+    let right = right_marks(image).into_iter().enumerate();
+    let hits = right.map(|(place, right)| Hit::new(image, place, [right, 0]));
+    (hits.collect(), image.truth.len())
+}
+
+/// The thresholds at which each detection found a box that no surer one has found.
+fn right_marks(image: &ImageBoxes<'_>) -> Vec<Marks> {
     let index = BoxIndex::new(image.truth.iter().map(|t| t.bbox));
     let mut taken: Vec<Marks> = vec![0; image.truth.len()];
-    let hits = image.found.iter().enumerate().map(|(place, found)| {
-        let right = nearest(image, &index, found).map_or(0, |(nearest, overlap)| {
-            let reached = reached(overlap);
-            let right = reached & !taken[nearest];
-            taken[nearest] |= reached;
-            right
-        });
-        Hit {
-            confidence: found.confidence,
-            sheet: image.sheet,
-            place: place as u32,
-            right,
-            ignored: 0,
-        }
-    });
-    (hits.collect(), image.truth.len())
+    let found = image.found.iter();
+    found
+        .map(|found| match nearest(image, &index, found) {
+            Some((truth, overlap)) => take_free(&mut taken[truth], reached(overlap)),
+            None => 0,
+        })
+        .collect()
+}
+
+/// Takes a box at the thresholds that are reached; returns those at which it was free.
+fn take_free(taken: &mut Marks, reached: Marks) -> Marks {
+    let free = reached & !*taken;
+    *taken |= reached;
+    free
 }
 
 /// The box that a detection overlaps most; of equal overlaps the last: that is how the original's descending sort leaves
@@ -212,10 +228,20 @@ fn nearest(image: &ImageBoxes<'_>, index: &BoxIndex, found: &Detection) -> Optio
 
 /// Intersection over union in single precision.
 fn overlap(a: &BBox, b: &BBox) -> f32 {
-    let [a, b] = [a, b].map(|b| [b.x0, b.y0, b.x1, b.y1].map(|v| v as f32));
-    let shared =
-        (a[2].min(b[2]) - a[0].max(b[0])).max(0.0) * (a[3].min(b[3]) - a[1].max(b[1])).max(0.0);
+    let [a, b] = [corners_of(a), corners_of(b)];
+    let shared = shared_area(a, b);
     shared / (area_of(a) + area_of(b) - shared + AREA_EPSILON)
+}
+
+/// In single precision: left, top, right, bottom.
+#[inline]
+fn corners_of(b: &BBox) -> [f32; 4] {
+    [b.x0, b.y0, b.x1, b.y1].map(|v| v as f32)
+}
+
+#[inline]
+fn shared_area(a: [f32; 4], b: [f32; 4]) -> f32 {
+    (a[2].min(b[2]) - a[0].max(b[0])).max(0.0) * (a[3].min(b[3]) - a[1].max(b[1])).max(0.0)
 }
 
 #[inline]
