@@ -60,17 +60,20 @@ pub(super) fn recall_and_precision(
     truths: f64,
     epsilon: [f64; 2],
 ) -> (Vec<f64>, Vec<f64>) {
-    let both = sums.right.iter().zip(&sums.wrong);
-    let recall = sums
-        .right
-        .iter()
-        .map(|right| right / (truths + epsilon[0]))
-        .collect();
     (
-        recall,
-        both.map(|(right, wrong)| right / (right + wrong + epsilon[1]))
-            .collect(),
+        recalls(sums, truths + epsilon[0]),
+        precisions(sums, epsilon[1]),
     )
+}
+
+fn recalls(sums: &Running, truths: f64) -> Vec<f64> {
+    sums.right.iter().map(|right| right / truths).collect()
+}
+
+fn precisions(sums: &Running, epsilon: f64) -> Vec<f64> {
+    let both = sums.right.iter().zip(&sums.wrong);
+    both.map(|(right, wrong)| right / (right + wrong + epsilon))
+        .collect()
 }
 
 /// Piecewise linear reading as NumPy's `interp` does it; the last of equal positions counts.
@@ -83,10 +86,15 @@ fn between(x: f64, after: usize, xs: &[f64], ys: &[f64]) -> f64 {
     match after {
         0 => ys[0],
         n if n == xs.len() => ys[n - 1],
-        // What the line below gives there, without its division.
+        // What the line gives there, without its division.
         n if ys[n] == ys[n - 1] => ys[n],
-        n => (ys[n] - ys[n - 1]) / (xs[n] - xs[n - 1]) * (x - xs[n - 1]) + ys[n - 1],
+        n => on_line(x, [xs[n - 1], xs[n]], [ys[n - 1], ys[n]]),
     }
+}
+
+#[inline]
+fn on_line(x: f64, xs: [f64; 2], ys: [f64; 2]) -> f64 {
+    (ys[1] - ys[0]) / (xs[1] - xs[0]) * (x - xs[0]) + ys[0]
 }
 
 /// Makes values the greatest of those that follow.

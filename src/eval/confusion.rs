@@ -1,7 +1,7 @@
 //! Which class is found where which is true.
 
 use super::EvalImage;
-use super::pairing::pairs;
+use super::pairing::{BoxPair, pairs};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -31,6 +31,14 @@ impl Default for ConfusionOptions {
     }
 }
 
+/// Of the detection and of the box that it names.
+fn classes_in(sheet: &EvalImage, pair: BoxPair) -> [Option<u32>; 2] {
+    [
+        pair.found.map(|f| sheet.found[f].class),
+        pair.truth.map(|t| sheet.truth[t].class),
+    ]
+}
+
 impl Confusion {
     /// Counts over all images, whatever the classes of two boxes that overlap. Pairs are made from the greatest overlap
     /// down; crowds, and detections in them, are ignored.
@@ -38,11 +46,8 @@ impl Confusion {
         let mut confusion = Self::default();
         for sheet in sheets {
             for pair in pairs(sheet, options) {
-                let key = [
-                    pair.found.map(|f| sheet.found[f].class),
-                    pair.truth.map(|t| sheet.truth[t].class),
-                ];
-                *confusion.counts.entry(key).or_default() += 1;
+                let classes = classes_in(sheet, pair);
+                *confusion.counts.entry(classes).or_default() += 1;
             }
         }
         confusion
