@@ -99,28 +99,20 @@ impl DeepImage {
         let (width, height) = shadow.size();
         // Starts become ends as each pixel's samples take their places.
         let mut ends = pixel_starts(width, height, samples.clone());
-        let mut placed = vec![DeepSample::default(); ends.last().map_or(0, |&n| n as usize)];
+        let mut placed = vec![DeepSample::default(); last_start(&ends)];
         let mut tints = tints.peekable();
-        let tint_count = if tints.peek().is_some() {
-            placed.len()
-        } else {
-            0
-        };
-        let mut placed_tints = vec![LinearRgb::BLACK; tint_count];
+        let mut placed_tints = black_tints(placed.len(), tints.peek().is_some());
         for (x, y, sample) in samples {
-            let next = &mut ends[y as usize * width + x as usize];
-            placed[*next as usize] = sample;
+            let place = take_place(&mut ends[y as usize * width + x as usize]);
+            placed[place] = sample;
             if let Some(tint) = tints.next() {
-                placed_tints[*next as usize] = tint;
+                placed_tints[place] = tint;
             }
-            *next += 1;
         }
-        ends.rotate_right(1);
-        ends[0] = 0;
         Self {
             width,
             height,
-            starts: ends,
+            starts: starts_from_ends(ends),
             samples: placed,
             tints: placed_tints,
             shadow,
@@ -157,18 +149,22 @@ impl DeepImage {
     /// All that the objects do to one pixel: their light, and what they hide of what is behind, per channel.
     #[inline(always)]
     pub fn flat(&self, x: usize, y: usize) -> Film {
-        let (samples, tints) = (self.at(x, y), self.tints(x, y));
+        let samples = self.at(x, y);
         let color = samples
             .iter()
             .fold(LinearRgb::BLACK, |sum, s| sum + s.light);
-        let hidden = match tints {
-            [] => LinearRgb::grey(samples.iter().map(|s| s.visible).sum()),
-            tints => tints.iter().fold(LinearRgb::BLACK, |sum, &t| sum + t),
-        };
         // A sum of shares that make up a whole may miss it by a rounding.
         Film {
             color,
-            opacity: hidden.map(|o| o.min(1.0)),
+            opacity: self.hidden(x, y).map(|o| o.min(1.0)),
+        }
+    }
+
+    /// The sum of what the samples of a pixel hide of the plate.
+    fn hidden(&self, x: usize, y: usize) -> LinearRgb {
+        match self.tints(x, y) {
+            [] => LinearRgb::grey(self.at(x, y).iter().map(|s| s.visible).sum()),
+            tints => tints.iter().fold(LinearRgb::BLACK, |sum, &t| sum + t),
         }
     }
 
@@ -206,4 +202,27 @@ fn pixel_starts(
         starts[i + 1] += starts[i];
     }
     starts
+}
+
+#[inline]
+fn take_place(next: &mut u32) -> usize {
+    let place = *next as usize;
+    *next += 1;
+    place
+}
+
+/// The start of each pixel is the end of the one before it.
+fn starts_from_ends(mut ends: Vec<u32>) -> Vec<u32> {
+    ends.rotate_right(1);
+    ends[0] = 0;
+    ends
+}
+
+fn last_start(starts: &[u32]) -> usize {
+    starts.last().map_or(0, |&n| n as usize)
+}
+
+/// None where the samples have no tints.
+fn black_tints(samples: usize, is_tinted: bool) -> Vec<LinearRgb> {
+    vec![LinearRgb::BLACK; if is_tinted { samples } else { 0 }]
 }

@@ -95,8 +95,8 @@ pub(crate) fn paste(canvas: &mut Image<Srgb8>, [x, y]: [usize; 2], picture: &Ima
 /// The border of a box, `thick` whole pixels wide and inside the canvas, with a halo of one pixel on either side.
 pub(crate) fn border(canvas: &mut Image<Srgb8>, b: &BBox, color: Srgb8, thick: isize) {
     let (w, h) = canvas.size();
-    let [x0, x1] = [b.x0, b.x1].map(|x| libm::round(x.clamp(0.0, w as f64)) as isize);
-    let [y0, y1] = [b.y0, b.y1].map(|y| libm::round(y.clamp(0.0, h as f64)) as isize);
+    let [x0, x1] = [b.x0, b.x1].map(|x| nearest_edge(x, w));
+    let [y0, y1] = [b.y0, b.y1].map(|y| nearest_edge(y, h));
     for y in y0 - 1..=y1 {
         for x in x0 - 1..=x1 {
             // Pixels from the border's outer edge, inwards; -1 is the halo outside.
@@ -107,6 +107,11 @@ pub(crate) fn border(canvas: &mut Image<Srgb8>, b: &BBox, color: Srgb8, thick: i
             }
         }
     }
+}
+
+/// Of the edges between the pixels of a side.
+fn nearest_edge(at: f64, length: usize) -> isize {
+    libm::round(at.clamp(0.0, length as f64)) as isize
 }
 
 /// A closed line of one pixel's width through points, smooth, with a halo.

@@ -1,6 +1,6 @@
 //! FLIP: how different two pictures look to someone who flips between them.
 
-use super::bands::{RowSource, bands, grown};
+use super::bands::{RowSource, bands, grown, rows_from};
 use crate::image::Image;
 use flip_rs::{DEFAULT_PPD, FlipError, RgbImage, ldr_flip};
 use std::ops::Range;
@@ -26,7 +26,7 @@ pub fn flip(reference: &Image<[f32; 3]>, test: &Image<[f32; 3]>) -> Option<f64> 
     let sum: f64 = bands(test.size())
         .map(|band| {
             let outer = grown(&band, REACH_ROWS, test.height());
-            let inner = band.start - outer.start..band.end - outer.start;
+            let inner = rows_from(outer.start, &band);
             let [reference, test] = [reference, test].map(|p| p.read_rows(outer.clone()));
             row_sum(&reference, &test, inner)
         })

@@ -1,6 +1,6 @@
 //! How alike two pictures are, in the numbers that pictures are judged by.
 
-use super::bands::{RowSource, bands, grown};
+use super::bands::{RowSource, bands, grown, rows_from};
 use super::{flip, ssim};
 use crate::color::linear_to_srgb;
 use crate::image::Image;
@@ -76,13 +76,13 @@ impl LikenessSums {
         band: Range<usize>,
         windows: Range<usize>,
     ) {
-        let band = band.start - first..band.end - first;
+        let band = rows_from(first, &band);
         for y in band.clone() {
             self.add_row(picture.row(y), reference.row(y));
         }
         let [shown, wanted] = [displayed(picture), displayed(reference)];
         if !windows.is_empty() {
-            let windows = windows.start - first..windows.end - first;
+            let windows = rows_from(first, &windows);
             self.ssim.extend(ssim::row_sums(&wanted, &shown, windows));
         }
         self.flip += flip::row_sum(&wanted, &shown, band);

@@ -154,6 +154,12 @@ fn compare_rows<P: NamedChannels>(
     tally
 }
 
+/// Whether two channels are no different: NaN is like NaN.
+#[inline]
+fn is_same(u: f32, v: f32) -> bool {
+    u == v || (u.is_nan() && v.is_nan())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -39,8 +39,12 @@ pub(super) fn window_centers(length: usize) -> Range<usize> {
 /// The measure of a picture from the sums of its rows that have windows; none where there are none.
 pub(super) fn mean(rows: &[[f64; 3]], (width, height): (usize, usize)) -> Option<f64> {
     let windows = window_centers(width).len() * window_centers(height).len();
-    let means = [0, 1, 2].map(|c| rows.iter().map(|row| row[c]).sum::<f64>() / windows as f64);
+    let means = [0, 1, 2].map(|c| channel_sum(rows, c) / windows as f64);
     (windows > 0).then(|| means.iter().sum::<f64>() / 3.0)
+}
+
+fn channel_sum(rows: &[[f64; 3]], c: usize) -> f64 {
+    rows.iter().map(|row| row[c]).sum()
 }
 
 /// Sums over the windows of some rows, which lie wholly inside, for each channel.
@@ -50,10 +54,14 @@ pub(super) fn row_sums(
     rows: Range<usize>,
 ) -> Vec<[f64; 3]> {
     let channels =
-        [0, 1, 2].map(|c| Moments::new(&a.map(|p| p[c]), &b.map(|p| p[c])).row_sums(rows.clone()));
+        [0, 1, 2].map(|c| Moments::new(&channel(a, c), &channel(b, c)).row_sums(rows.clone()));
     (0..rows.len())
         .map(|y| [0, 1, 2].map(|c| channels[c][y]))
         .collect()
+}
+
+fn channel(image: &Image<[f32; 3]>, c: usize) -> Image<f32> {
+    image.map(|p| p[c])
 }
 
 /// Means over windows of one channel of two pictures, of its squares and of their product.
@@ -100,14 +108,15 @@ struct Window {
     weights: Vec<f32>,
 }
 
+fn gaussian_weight(x: f64) -> f32 {
+    libm::exp(-x * x / (2.0 * WINDOW_SIGMA_PX * WINDOW_SIGMA_PX)) as f32
+}
+
 impl Window {
     fn gaussian() -> Self {
         let radius = WINDOW_RADIUS_PX as i32;
         let weights: Vec<f32> = (-radius..=radius)
-            .map(|i| {
-                let x = f64::from(i);
-                libm::exp(-x * x / (2.0 * WINDOW_SIGMA_PX * WINDOW_SIGMA_PX)) as f32
-            })
+            .map(|i| gaussian_weight(f64::from(i)))
             .collect();
         let sum: f32 = weights.iter().sum();
         Self {

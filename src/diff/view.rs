@@ -1,7 +1,7 @@
 //! Differences to look at.
 
-use super::NamedChannels;
 use super::bands::{RowSource, bands};
+use super::{NamedChannels, is_same};
 use crate::image::Image;
 use crate::pixel::LinearRgb;
 
@@ -106,7 +106,7 @@ fn channel_or_zero(values: &[f32], c: usize) -> f32 {
 
 /// The distance of two values, magnified; 1 where one of them is not a number.
 fn magnified_error(u: f32, v: f32) -> f32 {
-    if u == v || (u.is_nan() && v.is_nan()) {
+    if is_same(u, v) {
         0.0
     } else if (u - v).is_nan() {
         1.0

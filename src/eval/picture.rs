@@ -1,8 +1,7 @@
 //! Curves and the confusion matrix as SVG.
 
 use super::{Confusion, Curves};
-use crate::label::clipped;
-use crate::plot::{Axis, Chart, escaped};
+use crate::plot::{Axis, Chart, clipped, escaped};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 

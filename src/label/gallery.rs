@@ -8,6 +8,7 @@ use crate::image::{Image, Roi};
 use crate::io;
 use crate::pixel::LinearRgb;
 use crate::plot::base64;
+pub(crate) use crate::plot::clipped;
 use crate::plot::markup::text;
 use maud::{Markup, PreEscaped, html};
 use std::ops::Range;
@@ -51,12 +52,8 @@ impl Figure {
     /// A picture that cannot be read.
     pub(crate) fn cropped(path: &Path, size: [f64; 2], view: BBox) -> Result<Self> {
         let picture = io::read::<LinearRgb>(path)?;
-        let scale = [
-            picture.width() as f64 / size[0],
-            picture.height() as f64 / size[1],
-        ];
-        let columns = pixel_span([view.x0, view.x1], scale[0], picture.width());
-        let rows = pixel_span([view.y0, view.y1], scale[1], picture.height());
+        let scale = scale_of(&picture, size);
+        let [columns, rows] = visible_pixels(&picture, &view, scale);
         if columns.is_empty() || rows.is_empty() {
             let what = "nothing of it lies in the part to be shown";
             return Err(Error::file(path, what));
@@ -116,19 +113,41 @@ impl Figure {
 
     /// The picture under its drawing, which a click enlarges.
     fn frame(&self, address: &str) -> Markup {
-        let (w, h) = (self.view.width(), self.view.height());
-        let view_box = format!("{:.2} {:.2} {w:.2} {h:.2}", self.view.x0, self.view.y0);
+        let aspect = self.view.width() / self.view.height();
         let data = format!("data:image/jpeg;base64,{}", base64(&self.jpeg));
         html! {
-            a class="frame" href=(address) title="enlarge" style=(format_args!("--aspect:{:.4}", w / h)) {
+            a class="frame" href=(address) title="enlarge" style=(format_args!("--aspect:{aspect:.4}")) {
                 img alt=(text(&self.caption)) src=(data);
-                svg viewBox=(view_box) { (PreEscaped(&self.drawing)) }
+                svg viewBox=(self.view_box()) { (PreEscaped(&self.drawing)) }
             }
         }
+    }
+
+    fn view_box(&self) -> String {
+        let (w, h) = (self.view.width(), self.view.height());
+        format!("{:.2} {:.2} {w:.2} {h:.2}", self.view.x0, self.view.y0)
     }
 }
 
 /// The whole pixels between two places of a drawing, of a picture `scale` times as large.
+fn visible_pixels(
+    picture: &Image<LinearRgb>,
+    view: &BBox,
+    [scale_x, scale_y]: [f64; 2],
+) -> [Range<usize>; 2] {
+    let columns = pixel_span([view.x0, view.x1], scale_x, picture.width());
+    let rows = pixel_span([view.y0, view.y1], scale_y, picture.height());
+    [columns, rows]
+}
+
+/// Pixels of the picture for each unit of a drawing of `size`.
+fn scale_of(picture: &Image<LinearRgb>, [width, height]: [f64; 2]) -> [f64; 2] {
+    [
+        picture.width() as f64 / width,
+        picture.height() as f64 / height,
+    ]
+}
+
 fn pixel_span([start, end]: [f64; 2], scale: f64, length: usize) -> Range<usize> {
     let [start, end] =
         [start, end + 1.0 / scale].map(|v| ((v * scale).max(0.0) as usize).min(length));
@@ -189,13 +208,22 @@ pub(crate) fn marked_box(
     if content.is_empty() {
         return rect;
     }
+    rect + &words(
+        [b.x0, words_baseline(b, letter, top)],
+        content,
+        letter,
+        color,
+    )
+}
+
+/// Above the box where there is room, else inside.
+fn words_baseline(b: &BBox, letter: f64, top: f64) -> f64 {
     let has_room_above = b.y0 - 1.2 * letter >= top;
-    let y = if has_room_above {
+    if has_room_above {
         b.y0 - 0.25 * letter
     } else {
         b.y0 + letter
-    };
-    rect + &words([b.x0, y], content, letter, color)
+    }
 }
 
 fn rectangle(b: &BBox, color: &str, style: &str) -> String {
@@ -212,15 +240,6 @@ pub(crate) fn words([x, y]: [f64; 2], content: &str, letter: f64, color: &str) -
             fill=(color) { (text(content)) }
     }
     .into_string()
-}
-
-/// No more letters of a text than there is room for.
-pub(crate) fn clipped(text: &str, letters: usize) -> String {
-    if text.chars().count() <= letters {
-        return text.to_owned();
-    }
-    let kept = text.chars().take(letters.saturating_sub(1));
-    kept.chain(['…']).collect()
 }
 
 #[cfg(test)]

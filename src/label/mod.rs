@@ -36,7 +36,6 @@ mod visibility;
 
 #[doc(hidden)]
 pub use border::{Border, borders};
-pub(crate) use gallery::clipped;
 pub use mask::RleMask;
 #[doc(hidden)]
 pub use overlay::overlay;
@@ -151,11 +150,7 @@ struct Silhouette<'a> {
 /// When `deep` does not have the size of the shot's camera.
 pub fn label(deep: &DeepImage, shot: &Shot, options: &LabelOptions) -> Labels {
     let image = shot.camera.image;
-    assert_eq!(
-        (deep.width(), deep.height()),
-        (image[0] as usize, image[1] as usize),
-        "deep picture and camera differ"
-    );
+    check_size(deep, image);
     let mut objects = silhouettes(deep, shot, options);
     objects.retain(|s| !s.amodal_box(options.amodal).is_empty());
     let occluders = topmost::occluders(&objects, &shot.camera, options.overlap_iou);
@@ -167,27 +162,44 @@ pub fn label(deep: &DeepImage, shot: &Shot, options: &LabelOptions) -> Labels {
     }
 }
 
+fn check_size(deep: &DeepImage, [width, height]: [u32; 2]) {
+    assert_eq!(
+        (deep.width(), deep.height()),
+        (width as usize, height as usize),
+        "deep picture and camera differ"
+    );
+}
+
 /// All cards of a shot as its camera sees them, in order of id.
 fn silhouettes<'a>(
     deep: &DeepImage,
     shot: &'a Shot,
     options: &LabelOptions,
 ) -> Vec<Silhouette<'a>> {
-    let mut cards: Vec<&Card> = shot.cards.iter().collect();
-    cards.sort_by_key(|card| card.id);
+    let cards = cards_by_id(shot);
     let ids: Vec<_> = cards.iter().map(|card| card.id).collect();
     let visibilities = visibility::fold_samples(deep, &ids, options);
     let pairs = cards.into_iter().zip(visibilities);
     pairs
-        .map(|(card, visibility)| Silhouette {
-            card,
-            region: outline::region(card, &shot.camera),
-            visibility,
-        })
+        .map(|(card, visibility)| Silhouette::new(card, &shot.camera, visibility))
         .collect()
 }
 
-impl Silhouette<'_> {
+fn cards_by_id(shot: &Shot) -> Vec<&Card> {
+    let mut cards: Vec<&Card> = shot.cards.iter().collect();
+    cards.sort_by_key(|card| card.id);
+    cards
+}
+
+impl<'a> Silhouette<'a> {
+    fn new(card: &'a Card, camera: &Camera, visibility: ObjectVisibility) -> Self {
+        Self {
+            card,
+            region: outline::region(card, camera),
+            visibility,
+        }
+    }
+
     fn amodal_box(&self, around: AmodalBox) -> BBox {
         match around {
             AmodalBox::Mask => self.visibility.amodal.bounds(),

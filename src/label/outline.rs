@@ -11,7 +11,9 @@ use crate::geom::BBox;
 use crate::geom::{Point2, Vector3};
 use crate::scene::Card;
 use geo::bool_ops::FillRule;
-use geo::{Area, BooleanOps, BoundingRect, Coord, LineString, MapCoords, MultiPolygon, Polygon};
+use geo::{
+    Area, BooleanOps, BoundingRect, Coord, LineString, MapCoords, MultiPolygon, Polygon, Rect,
+};
 
 /// Least distance from the camera that is projected, metres: closer than any lens focuses, far above rounding.
 const NEAR_PLANE_M: f64 = 1e-4;
@@ -22,9 +24,8 @@ const SLIVER_AREA_PX2: f64 = 1e-2;
 
 /// The part of the picture that lies inside a card's outline; empty where the card is out of sight or edge-on.
 pub(crate) fn region(card: &Card, camera: &Camera) -> MultiPolygon<f64> {
-    let seen = clip_to_view(in_camera(card, camera), camera);
-    let px: Vec<_> = seen.iter().map(|p| to_pixel(p, camera)).collect();
-    if px.len() < 3 || px.iter().any(|p| !p.x.is_finite() || !p.y.is_finite()) {
+    let px = projected(card, camera);
+    if !has_area(&px) {
         return MultiPolygon(Vec::new());
     }
     let outline = Polygon::new(LineString(px), Vec::new());
@@ -32,6 +33,16 @@ pub(crate) fn region(card: &Card, camera: &Camera) -> MultiPolygon<f64> {
     without_slivers(parts)
         .map(|part| part.map_coords(|c| clamp_to_picture(c, camera)))
         .collect()
+}
+
+/// The outline of the part in view, pixels.
+fn projected(card: &Card, camera: &Camera) -> Vec<Coord<f64>> {
+    let seen = clip_to_view(in_camera(card, camera), camera);
+    seen.iter().map(|p| to_pixel(p, camera)).collect()
+}
+
+fn has_area(px: &[Coord<f64>]) -> bool {
+    px.len() >= 3 && px.iter().all(|p| p.x.is_finite() && p.y.is_finite())
 }
 
 fn clamp_to_picture(c: Coord<f64>, camera: &Camera) -> Coord<f64> {
@@ -66,9 +77,10 @@ fn outer_ring(part: &Polygon<f64>) -> Vec<Point2<f64>> {
 
 /// The smallest box around a region.
 pub(crate) fn bounds(region: &MultiPolygon<f64>) -> BBox {
-    let Some(rect) = region.bounding_rect() else {
-        return BBox::default();
-    };
+    region.bounding_rect().map(bbox_of).unwrap_or_default()
+}
+
+fn bbox_of(rect: Rect<f64>) -> BBox {
     let (min, max) = (rect.min(), rect.max());
     BBox {
         x0: min.x,

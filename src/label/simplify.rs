@@ -12,6 +12,7 @@
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
+use std::ops::Range;
 
 /// A closed line, without a repeated last point.
 pub(super) type Ring = Vec<[f64; 2]>;
@@ -22,17 +23,13 @@ pub(super) fn simplified(rings: Vec<Ring>, tolerance_px: f64) -> Vec<Ring> {
         return rings;
     }
     let mut corners = CornerLinks::new(&rings);
-    // What costs the same goes in the order of the rings.
-    let mut open: BinaryHeap<_> = (0..corners.positions.len())
-        .map(|at| Reverse(corners.candidate(at)))
-        .collect();
+    let mut open = corners.candidates();
     while let Some(Reverse(candidate)) = open.pop() {
-        let at = candidate.corner;
-        let is_outdated = !corners.kept[at] || corners.candidate(at) != candidate;
-        if is_outdated || candidate.cost() > tolerance_px || !corners.may_drop(at) {
+        let is_outdated = !corners.is_current(candidate);
+        if is_outdated || candidate.cost() > tolerance_px || !corners.may_drop(candidate.corner) {
             continue;
         }
-        let neighbours = corners.drop(at);
+        let neighbours = corners.drop(candidate.corner);
         open.extend(neighbours.map(|at| Reverse(corners.candidate(at))));
     }
     corners.rings()
@@ -74,6 +71,19 @@ struct RingSpan {
 }
 
 impl RingSpan {
+    fn new(first: usize, length: usize) -> Self {
+        Self {
+            first,
+            length,
+            left: length,
+        }
+    }
+
+    /// All that there were.
+    fn corners(&self) -> Range<usize> {
+        self.first..self.first + self.length
+    }
+
     /// The corner after another one, of all that there were.
     fn follower(&self, at: usize) -> usize {
         self.first + (at + 1 - self.first) % self.length
@@ -104,18 +114,24 @@ impl CornerLinks {
 
     /// Links the corners of the next ring.
     fn append(&mut self, length: usize) {
-        let first = self.ring_of.len();
-        let span = RingSpan {
-            first,
-            length,
-            left: length,
-        };
-        for at in first..first + length {
+        let span = RingSpan::new(self.ring_of.len(), length);
+        for at in span.corners() {
             self.before.push(span.leader(at));
             self.after.push(span.follower(at));
             self.ring_of.push(self.rings.len());
         }
         self.rings.push(span);
+    }
+
+    /// All corners; what costs the same goes in the order of the rings.
+    fn candidates(&self) -> BinaryHeap<Reverse<Candidate>> {
+        let corners = 0..self.positions.len();
+        corners.map(|at| Reverse(self.candidate(at))).collect()
+    }
+
+    /// Whether its corner is left and still costs what it did.
+    fn is_current(&self, candidate: Candidate) -> bool {
+        self.kept[candidate.corner] && self.candidate(candidate.corner) == candidate
     }
 
     fn candidate(&self, corner: usize) -> Candidate {
@@ -145,9 +161,13 @@ impl CornerLinks {
         }
         let own = [self.before[at], at, self.after[at]];
         let triangle = own.map(|i| self.positions[i]);
-        !self.corners_near(triangle).any(|i| {
-            self.kept[i] && !own.contains(&i) && triangle_holds(triangle, self.positions[i])
-        })
+        let mut near = self.corners_near(triangle);
+        !near.any(|i| self.is_held(i, triangle) && !own.contains(&i))
+    }
+
+    /// Whether a corner is left and lies in the triangle.
+    fn is_held(&self, i: usize, triangle: [[f64; 2]; 3]) -> bool {
+        self.kept[i] && triangle_holds(triangle, self.positions[i])
     }
 
     /// The corners within the bounds of a triangle.
@@ -173,8 +193,7 @@ impl CornerLinks {
     }
 
     fn kept_ring(&self, ring: &RingSpan) -> Ring {
-        let corners = ring.first..ring.first + ring.length;
-        let kept = corners.filter(|i| self.kept[*i]);
+        let kept = ring.corners().filter(|i| self.kept[*i]);
         kept.map(|i| self.positions[i]).collect()
     }
 }
@@ -214,8 +233,12 @@ fn triangle_holds([a, b, c]: [[f64; 2]; 3], p: [f64; 2]) -> bool {
 /// From a point to a line between two.
 fn distance(p: [f64; 2], [a, b]: [[f64; 2]; 2]) -> f64 {
     let (along, from) = (difference(b, a), difference(p, a));
-    let share = (dot(from, along) / dot(along, along)).clamp(0.0, 1.0);
+    let share = share_along(from, along);
     libm::hypot(from[0] - share * along[0], from[1] - share * along[1])
+}
+
+fn share_along(from: [f64; 2], along: [f64; 2]) -> f64 {
+    (dot(from, along) / dot(along, along)).clamp(0.0, 1.0)
 }
 
 #[inline]

@@ -69,14 +69,15 @@ fn all_above(objects: &[ObjectLabel], id: ObjectId) -> BTreeSet<ObjectId> {
     let mut found = BTreeSet::new();
     let mut next = vec![id];
     while let Some(below) = next.pop() {
-        let over = objects
-            .iter()
-            .filter(|o| o.id == below)
-            .flat_map(|o| &o.covered_by)
-            .copied();
+        let over = directly_above(objects, below);
         next.extend(over.filter(|&id| found.insert(id)).collect::<Vec<_>>());
     }
     found
+}
+
+fn directly_above(objects: &[ObjectLabel], id: ObjectId) -> impl Iterator<Item = ObjectId> {
+    let below = objects.iter().filter(move |o| o.id == id);
+    below.flat_map(|o| &o.covered_by).copied()
 }
 
 /// Centroid of the overlap of a pair; none where they are no pair.

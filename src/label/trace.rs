@@ -9,7 +9,7 @@
 //! Ear Clipping", 2002). Without a tolerance the area, by the shoelace formula, stays that of the mask.
 
 use super::simplify::{Ring, simplified};
-use crate::geom::Point2;
+use crate::geom::{BBox, Point2};
 use crate::label::RleMask;
 
 /// Steps to the right, down, left and up: each a right turn from the one before.
@@ -63,26 +63,29 @@ struct Grid {
 
 impl Grid {
     fn new(mask: &RleMask) -> Self {
-        let b = mask.bounds();
-        let [left, top, right, bottom] = [b.x0, b.y0, b.x1, b.y1].map(|v| v as i64);
-        let (columns, rows) = (right - left + 1, bottom - top + 1);
-        let mut grid = Self {
-            left,
-            top,
-            columns,
-            rows,
-            leaving: vec![0; (columns * rows) as usize],
-        };
+        let mut grid = Self::around(mask.bounds());
         for (x, y) in mask.pixels() {
             grid.add_pixel(i64::from(x), i64::from(y));
         }
         grid
     }
 
+    /// Without a border.
+    fn around(b: BBox) -> Self {
+        let [left, top, right, bottom] = [b.x0, b.y0, b.x1, b.y1].map(|v| v as i64);
+        let (columns, rows) = (right - left + 1, bottom - top + 1);
+        Self {
+            left,
+            top,
+            columns,
+            rows,
+            leaving: vec![0; (columns * rows) as usize],
+        }
+    }
+
     /// The four sides of a pixel, clockwise.
     fn add_pixel(&mut self, x: i64, y: i64) {
-        let corners = [[x, y], [x + 1, y], [x + 1, y + 1], [x, y + 1]];
-        for (direction, corner) in corners.into_iter().enumerate() {
+        for (direction, corner) in pixel_corners(x, y).into_iter().enumerate() {
             self.add_side(corner, direction);
         }
     }
@@ -104,16 +107,27 @@ impl Grid {
     }
 
     fn rings(mut self) -> Vec<Ring> {
-        let columns = self.columns;
         let mut rings = Vec::new();
-        for i in 0..columns * self.rows {
-            let at = [self.left + i % columns, self.top + i / columns];
+        for i in 0..self.columns * self.rows {
+            let at = self.corner(i);
             // Every ring has an edge to the right.
             while self.leaving[self.index(at)] & 1 != 0 {
                 rings.push(self.walk_ring(at));
             }
         }
         rings
+    }
+
+    #[inline]
+    fn corner(&self, i: i64) -> [i64; 2] {
+        [self.left + i % self.columns, self.top + i / self.columns]
+    }
+
+    /// Takes away an edge of the border.
+    #[inline]
+    fn take_edge(&mut self, at: [i64; 2], d: usize) {
+        let start = self.index(at);
+        self.leaving[start] &= !(1 << d);
     }
 
     /// Takes the ring that leaves `start` to the right; corners where it goes straight on are left out.
@@ -124,8 +138,7 @@ impl Grid {
             if d != came {
                 ring.push(at.map(|v| v as f64));
             }
-            let here = self.index(at);
-            self.leaving[here] &= !(1 << d);
+            self.take_edge(at, d);
             (at, came) = (step(at, d), d);
             // Another ring may pass through the same corner: this one comes back from below, to turn right.
             let is_closed = at == start && d == 3;
@@ -146,16 +159,23 @@ impl Grid {
     }
 }
 
+/// Clockwise.
+#[inline]
+fn pixel_corners(x: i64, y: i64) -> [[i64; 2]; 4] {
+    [[x, y], [x + 1, y], [x + 1, y + 1], [x, y + 1]]
+}
+
 fn step([x, y]: [i64; 2], d: usize) -> [i64; 2] {
     [x + STEPS[d][0], y + STEPS[d][1]]
 }
 
 /// Twice the area; negative for a hole.
 fn doubled_area(ring: &Ring) -> f64 {
-    ring.iter()
-        .zip(ring.iter().cycle().skip(1))
-        .map(|(a, b)| a[0] * b[1] - b[0] * a[1])
-        .sum()
+    edges(ring).map(|(a, b)| a[0] * b[1] - b[0] * a[1]).sum()
+}
+
+fn edges(ring: &Ring) -> impl Iterator<Item = (&[f64; 2], &[f64; 2])> {
+    ring.iter().zip(ring.iter().cycle().skip(1))
 }
 
 /// From left to right, then from above.
@@ -197,23 +217,27 @@ struct BorderCrossing {
     corner: usize,
 }
 
-fn next_border_to_the_left(parts: &[Ring], [x, y]: [f64; 2]) -> Option<BorderCrossing> {
+fn next_border_to_the_left(parts: &[Ring], from: [f64; 2]) -> Option<BorderCrossing> {
     let mut nearest: Option<BorderCrossing> = None;
     for (part, ring) in parts.iter().enumerate() {
-        for (corner, (a, b)) in ring.iter().zip(ring.iter().cycle().skip(1)).enumerate() {
-            // Edges that go up have the inside to their right.
-            let goes_up = b[1] <= y && y < a[1];
-            let crossing = a[0] + (y - a[1]) * (b[0] - a[0]) / (b[1] - a[1]);
-            if goes_up && crossing < x && nearest.as_ref().is_none_or(|n| n.x < crossing) {
-                nearest = Some(BorderCrossing {
-                    x: crossing,
-                    part,
-                    corner,
-                });
+        for (corner, (a, b)) in edges(ring).enumerate() {
+            let Some(x) = crossing_to_the_left(from, *a, *b) else {
+                continue;
+            };
+            if nearest.as_ref().is_none_or(|n| n.x < x) {
+                nearest = Some(BorderCrossing { x, part, corner });
             }
         }
     }
     nearest
+}
+
+/// Where an edge that goes up, which has the inside to its right, is passed.
+#[inline]
+fn crossing_to_the_left([x, y]: [f64; 2], a: [f64; 2], b: [f64; 2]) -> Option<f64> {
+    let goes_up = b[1] <= y && y < a[1];
+    let crossing = a[0] + (y - a[1]) * (b[0] - a[0]) / (b[1] - a[1]);
+    (goes_up && crossing < x).then_some(crossing)
 }
 
 /// Joins a part to the corner that is nearest to its first.

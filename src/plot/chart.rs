@@ -121,9 +121,7 @@ impl Axis {
     fn marked_values(&self) -> Vec<f64> {
         let [low, high] = self.range;
         if !self.logarithmic {
-            return (0..=4)
-                .map(|i| low + (high - low) * f64::from(i) / 4.0)
-                .collect();
+            return quarters([low, high]);
         }
         let steps = if high > FEW_DECADES * low {
             &DECADE_STEPS[..1]
@@ -155,6 +153,18 @@ fn positive_extent(values: impl IntoIterator<Item = f64>) -> Option<[f64; 2]> {
         .filter(|v| v.is_finite() && *v > 0.0)
         .map(|v| [v, v])
         .reduce(|[low, high], [v, _]| [v.min(low), v.max(high)])
+}
+
+/// The ends of a range and what divides it into four.
+fn quarters([low, high]: [f64; 2]) -> Vec<f64> {
+    (0..=4)
+        .map(|i| low + (high - low) * f64::from(i) / 4.0)
+        .collect()
+}
+
+fn polyline_points(places: &[[f64; 2]]) -> String {
+    let points = places.iter().map(|[x, y]| format!("{x:.1},{y:.1}"));
+    points.collect::<Vec<_>>().join(" ")
 }
 
 impl Chart {
@@ -299,13 +309,9 @@ impl Framed<'_> {
     /// The points of a curve, joined by a line where it is asked for.
     fn curve_svg(&self, curve: &Curve, color: &str, joined: bool) -> Markup {
         let places: Vec<_> = curve.iter().filter_map(|p| self.place(p)).collect();
-        let points: Vec<String> = places
-            .iter()
-            .map(|[x, y]| format!("{x:.1},{y:.1}"))
-            .collect();
         html! {
             @if joined {
-                polyline points=(points.join(" ")) fill="none" stroke=(color) stroke-width="1.5" {}
+                polyline points=(polyline_points(&places)) fill="none" stroke=(color) stroke-width="1.5" {}
             }
             @for [x, y] in places {
                 circle cx=(tenths(x)) cy=(tenths(y)) r="2.5" fill=(color) {}
@@ -397,14 +403,17 @@ fn free_places(
     let mut placed = Vec::new();
     for (point, word) in labels {
         let width = POINT_LABEL_LETTER_WIDTH * word.chars().count() as f64;
-        let mut places = places_beside(point, width).into_iter();
-        let free = places.find(|place| frame.has_room(&Area::of_word(*place, width), &taken));
-        if let Some(place) = free {
+        if let Some(place) = free_place(point, width, &taken, &frame) {
             taken.push(Area::of_word(place, width));
             placed.push((place, word));
         }
     }
     placed
+}
+
+fn free_place(point: [f64; 2], width: f64, taken: &[Area], frame: &Area) -> Option<[f64; 2]> {
+    let mut places = places_beside(point, width).into_iter();
+    places.find(|place| frame.has_room(&Area::of_word(*place, width), taken))
 }
 
 impl Area {

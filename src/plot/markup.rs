@@ -22,3 +22,12 @@ pub(super) fn tenths(value: f64) -> String {
 pub(super) fn label(x: f64, y: f64, anchor: &str, content: &str) -> Markup {
     html! { text x=(tenths(x)) y=(tenths(y)) text-anchor=(anchor) { (text(content)) } }
 }
+
+/// A text of at most so many letters; one that is cut ends in an ellipsis.
+pub(crate) fn clipped(text: &str, letters: usize) -> String {
+    if text.chars().count() <= letters {
+        return text.to_owned();
+    }
+    let kept = text.chars().take(letters.saturating_sub(1));
+    kept.chain(['…']).collect()
+}
