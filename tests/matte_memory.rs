@@ -42,10 +42,10 @@ fn a_frame_takes_its_output_and_two_channels_at_most() {
     };
     let photo = Image::from_fn(WIDTH, HEIGHT, pixel);
     let job = Keying::new(&photo, Screen::Color(LinearRgb::new(0.1, 0.75, 0.2)));
-    let opts = KeyOptions::default();
+    let options = KeyOptions::default();
     let grown = (
-        peak_growth(|| job.run(&opts).unwrap()),
-        peak_growth(|| job.matte(&opts).unwrap()),
+        peak_growth(|| job.run(&options).unwrap()),
+        peak_growth(|| job.matte(&options).unwrap()),
     );
     let (Some(both), Some(alone)) = grown else {
         eprintln!("skipped: /proc/self does not tell the peak of memory here");

@@ -36,6 +36,9 @@ const BACKGROUNDS: [Background; 4] = [
 /// Width of a cut-out over all backgrounds, pixels.
 const STRIP_WIDTH_PX: usize = BACKGROUNDS.len() * (CUT_OUT_SIDE_PX + GAP_PX);
 
+/// From a strip to the next one beside it, pixels.
+const COLUMN_WIDTH_PX: usize = STRIP_WIDTH_PX + 2 * GAP_PX;
+
 /// Every cut-out over a checkerboard, black, white and green, with its size, the confidence in outline and colour, and why it
 /// needs a review.
 pub fn contact_sheet(library: &Library) -> Image<Srgb8> {
@@ -47,18 +50,22 @@ pub fn contact_sheet(library: &Library) -> Image<Srgb8> {
 
 /// Strips in rows from the top left, each row as high as its highest.
 fn in_columns(strips: &[Image<Srgb8>]) -> Image<Srgb8> {
-    let column_width = STRIP_WIDTH_PX + 2 * GAP_PX;
-    let columns = COLUMNS.min(strips.len().max(1));
-    let heights: usize = strips.chunks(COLUMNS).map(row_height).sum();
-    let mut sheet = Image::filled(columns * column_width + GAP_PX, heights + GAP_PX, PAPER);
+    let mut sheet = blank_sheet(strips);
     let mut top = GAP_PX;
     for row in strips.chunks(COLUMNS) {
         for (i, strip) in row.iter().enumerate() {
-            draw::paste(&mut sheet, [GAP_PX + i * column_width, top], strip);
+            draw::paste(&mut sheet, [GAP_PX + i * COLUMN_WIDTH_PX, top], strip);
         }
         top += row_height(row);
     }
     sheet
+}
+
+/// Paper of the size that strips take.
+fn blank_sheet(strips: &[Image<Srgb8>]) -> Image<Srgb8> {
+    let columns = COLUMNS.min(strips.len().max(1));
+    let height: usize = strips.chunks(COLUMNS).map(row_height).sum();
+    Image::filled(columns * COLUMN_WIDTH_PX + GAP_PX, height + GAP_PX, PAPER)
 }
 
 fn row_height(strips: &[Image<Srgb8>]) -> usize {

@@ -190,15 +190,15 @@ impl PhotoEntry {
 /// The photo's name without ending, safe as a name anywhere.
 fn file_stem(photo: &Path) -> String {
     let stem = photo.file_stem().unwrap_or_default().to_string_lossy();
-    stem.chars()
-        .map(|c| {
-            if c.is_alphanumeric() || c == '-' {
-                c
-            } else {
-                '_'
-            }
-        })
-        .collect()
+    stem.chars().map(safe_character).collect()
+}
+
+fn safe_character(c: char) -> char {
+    if c.is_alphanumeric() || c == '-' {
+        c
+    } else {
+        '_'
+    }
 }
 
 #[cfg(test)]

@@ -80,12 +80,14 @@ impl TopView {
 
     /// Standard error of a length at a pixel of the view, as a share.
     pub(super) fn sigma(&self, at: Point2<f64>) -> f64 {
-        let [x, y] = [
-            at.x / self.px_per_metre - self.size[0] / 2.0,
-            self.size[1] / 2.0 - at.y / self.px_per_metre,
-        ];
-        self.pose
-            .sigma(self.screen_from_view * Point3::new(x, y, 0.0))
+        self.pose.sigma(self.screen_from_view * self.point_at(at))
+    }
+
+    /// The point of the view's own plane at a pixel.
+    fn point_at(&self, pixel: Point2<f64>) -> Point3<f64> {
+        let x = pixel.x / self.px_per_metre - self.size[0] / 2.0;
+        let y = self.size[1] / 2.0 - pixel.y / self.px_per_metre;
+        Point3::new(x, y, 0.0)
     }
 }
 

@@ -183,8 +183,8 @@ fn covariance(information: &Square) -> (Square, f64) {
     let mut response = -(inverse * coupling);
     let own = f64::from(information[(LN_FOCAL, LN_FOCAL)] > 0.0);
     let left = (own + coupling.dot(&response)).max(0.0);
-    response[LN_FOCAL] = 1.0;
     if own > 0.0 {
+        response[LN_FOCAL] = 1.0;
         inverse += response * response.transpose() / left.max(ROUNDING_SHARE);
     }
     clear_uninformed(&mut inverse, information);

@@ -44,14 +44,14 @@ pub fn read_with<P: FromFile>(path: impl AsRef<Path>, options: &ReadOptions) -> 
 pub fn read_header(path: impl AsRef<Path>) -> Result<Header> {
     let (path, options) = (path.as_ref(), ReadOptions::default());
     let opened = OpenedSource::open(path, &options.limits)?;
-    let decoded = match header_of(opened, &options) {
+    let (mut header, notes) = match header_of(opened, &options) {
         Err(Refusal::Unsupported(what)) => {
             let source = SourceFile::open(path, &options.limits)?;
             header_elsewhere(&source, what, &options)
         }
         decoded => decoded,
-    };
-    let (mut header, notes) = decoded.map_err(|e| Error::file(path, e))?;
+    }
+    .map_err(|e| Error::file(path, e))?;
     apply_notes(&mut header, &notes);
     Ok(header)
 }

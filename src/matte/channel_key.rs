@@ -83,12 +83,12 @@ pub struct ChannelKeyed {
 ///
 /// # Method
 /// `a = 1 - (key - limit)`: the pixel's alpha above `limit_max`, 0 below `limit_min`, linear between, at most its alpha.
-pub fn channel_key<P: Photo>(photo: &Image<P>, opts: &ChannelKeyOptions) -> ChannelKeyed {
+pub fn channel_key<P: Photo>(photo: &Image<P>, options: &ChannelKeyOptions) -> ChannelKeyed {
     let matte = photo.map(|p| {
         let p = p.premul();
-        Coverage(opts.alpha(to_space(p, opts), p.a))
+        Coverage(options.alpha(to_space(p, options), p.a))
     });
-    let cutout = photo.zip_map(&matte, |p, m| opts.masked(p.premul(), m));
+    let cutout = photo.zip_map(&matte, |p, m| options.masked(p.premul(), m));
     ChannelKeyed { matte, cutout }
 }
 
@@ -132,12 +132,12 @@ impl ChannelKeyOptions {
     }
 }
 
-fn to_space(p: PremulRgba, opts: &ChannelKeyOptions) -> [f32; 3] {
-    match opts.color_space {
+fn to_space(p: PremulRgba, options: &ChannelKeyOptions) -> [f32; 3] {
+    match options.color_space {
         KeySpace::Rgb => [p.r, p.g, p.b],
         KeySpace::Hsv => to_hsv(p),
         KeySpace::Yuv => to_yuv(p),
-        KeySpace::Ycc => to_ycc(p, opts.profile == Profile::Blender45),
+        KeySpace::Ycc => to_ycc(p, options.profile == Profile::Blender45),
     }
 }
 

@@ -42,11 +42,11 @@ impl Default for ChromaKeyOptions {
 pub fn chroma_key<P: Photo>(
     photo: &Image<P>,
     screen: LinearRgb,
-    opts: &ChromaKeyOptions,
+    options: &ChromaKeyOptions,
 ) -> Image<Coverage> {
-    let exact = opts.profile == Profile::Blender45;
+    let exact = options.profile == Profile::Blender45;
     let (cos, sin) = direction(centred(screen.opaque(), exact), exact);
-    let wedge = Wedge::new(opts);
+    let wedge = Wedge::new(options);
     photo.map(|p| {
         let p = p.premul();
         let [c, r] = centred(p, exact);
@@ -70,11 +70,11 @@ struct Wedge {
 }
 
 impl Wedge {
-    fn new(opts: &ChromaKeyOptions) -> Self {
+    fn new(options: &ChromaKeyOptions) -> Self {
         Self {
-            slope: libm::tan(f64::from(opts.tolerance / 2.0)) as f32,
-            core: opts.threshold / 2.0,
-            gain: opts.gain,
+            slope: libm::tan(f64::from(options.tolerance / 2.0)) as f32,
+            core: options.threshold / 2.0,
+            gain: options.gain,
         }
     }
 

@@ -77,16 +77,16 @@ impl Default for ColorSpillOptions {
 /// # Method
 /// The excess of the spill channel over `ratio` times its limit is subtracted from it where positive, and handed to the
 /// other channels as the strengths say.
-pub fn color_spill<P: Photo>(photo: &Image<P>, opts: &ColorSpillOptions) -> Image<PremulRgba> {
-    let spill = opts.channel as usize;
-    let strengths = strengths(opts, spill);
-    photo.map(|p| without_spill(p.premul(), strengths, opts))
+pub fn color_spill<P: Photo>(photo: &Image<P>, options: &ColorSpillOptions) -> Image<PremulRgba> {
+    let spill = options.channel as usize;
+    let strengths = strengths(options, spill);
+    photo.map(|p| without_spill(p.premul(), strengths, options))
 }
 
 #[inline(always)]
-fn without_spill(p: PremulRgba, strengths: [f32; 3], opts: &ColorSpillOptions) -> PremulRgba {
+fn without_spill(p: PremulRgba, strengths: [f32; 3], options: &ColorSpillOptions) -> PremulRgba {
     let c = [p.r, p.g, p.b];
-    let excess = excess(c, opts);
+    let excess = excess(c, options);
     let [r, g, b] = [0, 1, 2].map(|k| c[k] + strengths[k] * excess);
     if excess > 0.0 {
         PremulRgba::new(r, g, b, p.a)
@@ -97,30 +97,34 @@ fn without_spill(p: PremulRgba, strengths: [f32; 3], opts: &ColorSpillOptions) -
 
 /// By how much the spill channel exceeds its limit.
 #[inline(always)]
-fn excess(c: [f32; 3], opts: &ColorSpillOptions) -> f32 {
-    let spill = c[opts.channel as usize];
-    let limit = limit(c, opts);
-    if opts.profile == Profile::Blender45 {
-        opts.fac * spill - opts.ratio * limit
+fn excess(c: [f32; 3], options: &ColorSpillOptions) -> f32 {
+    let spill = c[options.channel as usize];
+    let limit = limit(c, options);
+    if options.profile == Profile::Blender45 {
+        options.fac * spill - options.ratio * limit
     } else {
-        opts.fac.min(1.0) * (spill - opts.ratio * limit)
+        options.fac.min(1.0) * (spill - options.ratio * limit)
     }
 }
 
 /// What the spill channel is limited by.
 #[inline(always)]
-fn limit(c: [f32; 3], opts: &ColorSpillOptions) -> f32 {
-    let (first, second) = other_channels(c, opts.channel as usize);
-    match opts.limit_method {
-        SpillLimit::Simple => c[opts.limit_channel as usize],
+fn limit(c: [f32; 3], options: &ColorSpillOptions) -> f32 {
+    let (first, second) = other_channels(c, options.channel as usize);
+    match options.limit_method {
+        SpillLimit::Simple => c[options.limit_channel as usize],
         SpillLimit::Average => (first + second) * 0.5,
     }
 }
 
 /// What every channel gets of the excess.
-fn strengths(opts: &ColorSpillOptions, spill: usize) -> [f32; 3] {
-    let mut strengths = match opts.use_unspill {
-        true => [opts.unspill_red, opts.unspill_green, opts.unspill_blue],
+fn strengths(options: &ColorSpillOptions, spill: usize) -> [f32; 3] {
+    let mut strengths = match options.use_unspill {
+        true => [
+            options.unspill_red,
+            options.unspill_green,
+            options.unspill_blue,
+        ],
         false => [0, 1, 2].map(|k| if k == spill { 1.0 } else { 0.0 }),
     };
     strengths[spill] = -strengths[spill];

@@ -68,8 +68,8 @@ impl CutOut {
 /// # Errors
 /// Those of [`segment`](super::segment()) and of [`ScreenPlate::fit`]; [`Error::Value`](crate::Error::Value)
 /// (`key.clip_black`, `soften_px`, ..) for an option that cannot be right.
-pub fn cut_out(photo: &Image<LinearRgb>, opts: &CutOutOptions) -> Result<CutOut> {
-    cut_out_on(photo, None, opts)
+pub fn cut_out(photo: &Image<LinearRgb>, options: &CutOutOptions) -> Result<CutOut> {
+    cut_out_on(photo, None, options)
 }
 
 /// As [`cut_out`], with a photo of the empty screen where there is one.
@@ -79,22 +79,25 @@ pub fn cut_out(photo: &Image<LinearRgb>, opts: &CutOutOptions) -> Result<CutOut>
 pub fn cut_out_on(
     photo: &Image<LinearRgb>,
     empty: Option<&Image<LinearRgb>>,
-    opts: &CutOutOptions,
+    options: &CutOutOptions,
 ) -> Result<CutOut> {
-    opts.check()?;
+    options.check()?;
     let mut watch = Stopwatch::start();
-    let prepared = Prepared::new(photo, opts.segment.working_size)?;
-    let segmentation = segment_prepared(&prepared, &opts.segment)?;
+    let prepared = Prepared::new(photo, options.segment.working_size)?;
+    let segmentation = segment_prepared(&prepared, &options.segment)?;
     watch.lap("segment");
-    let screen = CleanScreen::new(photo, empty, &segmentation, opts)?;
+    let screen = CleanScreen::new(photo, empty, &segmentation, options)?;
     watch.lap("plate");
-    let region = ObjectRegion::new(&prepared, &segmentation, opts);
+    let region = ObjectRegion::new(&prepared, &segmentation, options);
     watch.lap("cut");
-    let matted = Matted::new(&prepared, &screen, &region, opts)?;
+    let matted = Matted::new(&prepared, &screen, &region, options)?;
     watch.lap("matte");
-    let diagnostics = diagnostics(photo, &segmentation, &matted, opts);
-    let trim = region.trim(opts.longest_side);
-    let cut = trim.cut_out(matted, segmentation, &screen, diagnostics);
+    let cut = CutOut {
+        diagnostics: diagnostics(photo, &segmentation, &matted, options),
+        ..region
+            .trim(options.longest_side)
+            .cut_out(matted, segmentation, &screen)
+    };
     watch.lap("trim");
     watch.log("cut out");
     Ok(cut)
@@ -114,13 +117,13 @@ impl CleanScreen {
         photo: &Image<LinearRgb>,
         empty: Option<&Image<LinearRgb>>,
         found: &Segmentation,
-        opts: &CutOutOptions,
+        options: &CutOutOptions,
     ) -> Result<Self> {
         let background = screen_pixels(&found.mask);
-        let plate = match (empty, opts.screen) {
-            (Some(empty), _) => ScreenPlate::from_photo(empty, photo, &background, &opts.plate)?,
+        let plate = match (empty, options.screen) {
+            (Some(empty), _) => ScreenPlate::from_photo(empty, photo, &background, &options.plate)?,
             (None, Some(color)) => ScreenPlate::even(color, photo.size()),
-            (None, None) => fitted_plate(photo, &background, &found.mask, &opts.plate)?,
+            (None, None) => fitted_plate(photo, &background, &found.mask, &options.plate)?,
         };
         Ok(Self {
             background,
@@ -135,14 +138,14 @@ fn fitted_plate(
     photo: &Image<LinearRgb>,
     background: &Mask,
     mask: &Image<Coverage>,
-    opts: &PlateOptions,
+    options: &PlateOptions,
 ) -> Result<ScreenPlate> {
     // A margin around a large object may leave nothing; the mask alone then leaves a rim, which gives a colour.
     if !background.pixels().contains(&true) {
         let color = screen_color(photo, mask)?;
         return Ok(ScreenPlate::even(color, photo.size()));
     }
-    ScreenPlate::fit(photo, background, opts).map_err(|e| e.within("plate"))
+    ScreenPlate::fit(photo, background, options).map_err(|e| e.within("plate"))
 }
 
 /// The part of a photo around the object: there is nothing to solve elsewhere.
@@ -157,15 +160,15 @@ struct ObjectRegion {
 }
 
 impl ObjectRegion {
-    fn new(prepared: &Prepared<'_>, found: &Segmentation, opts: &CutOutOptions) -> Self {
+    fn new(prepared: &Prepared<'_>, found: &Segmentation, options: &CutOutOptions) -> Self {
         let size = prepared.photo.size();
-        let around = hull_roi(&found.hull, opts.margin_px.max(opts.reach_px()), size);
-        let boundary = opts.within.of_object(found).crop(around);
+        let around = hull_roi(&found.hull, options.margin_px.max(options.reach_px()), size);
+        let boundary = options.within.of_object(found).crop(around);
         Self {
             around,
-            kept: hull_roi(&found.hull, opts.margin_px, size),
+            kept: hull_roi(&found.hull, options.margin_px, size),
             photo: prepared.photo.crop(around),
-            cut: softened(&boundary, opts.soften_px),
+            cut: softened(&boundary, options.soften_px),
         }
     }
 
@@ -205,14 +208,8 @@ struct Trim {
 }
 
 impl Trim {
-    /// The matte of the region, trimmed.
-    fn cut_out(
-        &self,
-        matted: Matted,
-        found: Segmentation,
-        screen: &CleanScreen,
-        diagnostics: Vec<Diagnostic>,
-    ) -> CutOut {
+    /// The matte of the region, trimmed; without diagnostics.
+    fn cut_out(&self, matted: Matted, found: Segmentation, screen: &CleanScreen) -> CutOut {
         CutOut {
             film: self.cropped(&matted.film),
             transmittance: self.cropped(&matted.transmittance),
@@ -226,7 +223,7 @@ impl Trim {
             method: matted.method,
             residual_matte: matted.residual_matte,
             color_uncertainty: matted.color_uncertainty,
-            diagnostics,
+            diagnostics: Vec::new(),
             segmentation: found,
         }
     }
@@ -293,7 +290,7 @@ fn diagnostics(
     photo: &Image<LinearRgb>,
     found: &Segmentation,
     matted: &Matted,
-    opts: &CutOutOptions,
+    options: &CutOutOptions,
 ) -> Vec<Diagnostic> {
     let mut diagnostics = found.diagnostics.clone();
     diagnostics.extend_from_slice(&matted.diagnostics);
@@ -301,7 +298,7 @@ fn diagnostics(
     diagnostics.extend((residual > MAX_RESIDUAL_MATTE).then(|| residual_matte(residual)));
     // An outline alone does not depend on the screen.
     if matted.method != MatteMethod::Outline {
-        diagnostics.extend(clipped_screen(photo, &found.mask, opts.film.clipped));
+        diagnostics.extend(clipped_screen(photo, &found.mask, options.film.clipped));
     }
     diagnostics
 }
@@ -420,22 +417,22 @@ mod tests {
 
     #[test]
     fn options_are_a_toml_table_and_named_where_they_are_wrong() {
-        let opts: CutOutOptions = toml::from_str(
+        let options: CutOutOptions = toml::from_str(
             "method = \"key\"\nwithin = \"hull\"\n[segment]\nlevels = 5\nfirst_threshold = { noise = 8.0 }\n[key]\nclip_black = 0.1\n",
         )
         .unwrap();
         assert_eq!(
-            (opts.within, opts.segment.finest_threshold),
+            (options.within, options.segment.finest_threshold),
             (Boundary::Hull, Threshold::Noise(8.0))
         );
-        let back: CutOutOptions = toml::from_str(&toml::to_string(&opts).unwrap()).unwrap();
-        assert_eq!(back, opts);
+        let back: CutOutOptions = toml::from_str(&toml::to_string(&options).unwrap()).unwrap();
+        assert_eq!(back, options);
         let wrong = CutOutOptions {
             segment: SegmentOptions {
                 levels: Some(99),
                 ..Default::default()
             },
-            ..opts
+            ..options
         };
         let said = cut_out(&slab(GREEN), &wrong).unwrap_err().to_string();
         assert_eq!(said, "segment.levels: 99, expected 2 to 8");

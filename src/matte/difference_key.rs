@@ -39,12 +39,12 @@ impl Default for DifferenceKeyOptions {
 pub fn difference_key<P: Photo>(
     photo: &Image<P>,
     clean: &Image<P>,
-    opts: &DifferenceKeyOptions,
+    options: &DifferenceKeyOptions,
 ) -> Result<Image<Coverage>> {
     check_sizes(clean.size(), photo.size())?;
     Ok(photo.zip_map(clean, |a, b| {
         let a = a.premul();
-        let m = opts.matte(mean_difference(a, b.premul()));
+        let m = options.matte(mean_difference(a, b.premul()));
         Coverage(m.map_or(a.a, |m| if m < a.a { m } else { a.a }))
     }))
 }

@@ -111,9 +111,9 @@ pub fn film(
     photo: &Image<LinearRgb>,
     plate: &ScreenPlate,
     inside: &Image<Coverage>,
-    opts: &FilmOptions,
+    options: &FilmOptions,
 ) -> Result<FilmMatte> {
-    opts.check()?;
+    options.check()?;
     check_finite(photo)?;
     let object = FilmInput {
         photo,
@@ -122,7 +122,7 @@ pub fn film(
         screen: plate.color(),
         longer_side: longer_side(photo),
     };
-    solve_film(object, opts)
+    solve_film(object, options)
 }
 
 /// A photo on its screen, or the part of it around the object: there is nothing to solve elsewhere. All pictures are of
@@ -141,10 +141,10 @@ pub(super) struct FilmInput<'a> {
 }
 
 /// As [`film`], with options that are checked.
-pub(super) fn solve_film(object: FilmInput<'_>, opts: &FilmOptions) -> Result<FilmMatte> {
+pub(super) fn solve_film(object: FilmInput<'_>, options: &FilmOptions) -> Result<FilmMatte> {
     object.check()?;
     let mut watch = Stopwatch::start();
-    let solution = FilmSolution::new(object, opts);
+    let solution = FilmSolution::new(object, options);
     let tint = solution.tint();
     watch.lap("tint");
     let mut factors = solution.factors(tint.flat);
@@ -189,17 +189,17 @@ struct FilmSolution<'a> {
     /// The screen's strongest channel.
     key: usize,
     is_keyable: bool,
-    opts: &'a FilmOptions,
+    options: &'a FilmOptions,
 }
 
 impl<'a> FilmSolution<'a> {
-    fn new(object: FilmInput<'a>, opts: &'a FilmOptions) -> Self {
+    fn new(object: FilmInput<'a>, options: &'a FilmOptions) -> Self {
         Self {
             object,
             calm: calmed(object.photo, object.plate.residual),
             key: strongest_channel(object.screen),
             is_keyable: is_keyable(object.screen),
-            opts,
+            options,
         }
     }
 
@@ -211,7 +211,7 @@ impl<'a> FilmSolution<'a> {
     /// The given tint, or else that of the photo. On a grey screen all of the object is sampled, and that the tint may be
     /// another is part of the guess.
     fn tint(&self) -> Tint {
-        if let Some(flat) = self.opts.flat {
+        if let Some(flat) = self.options.flat {
             return Tint::certain(flat.into());
         }
         let FilmInput { plate, inside, .. } = self.object;
@@ -226,7 +226,7 @@ impl<'a> FilmSolution<'a> {
     /// By which factor each pixel is flat plastic.
     fn factors(&self, flat: [f32; 3]) -> Image<Factor> {
         let FilmInput { plate, inside, .. } = self.object;
-        let solver = Solver::new(self.key, flat, plate.residual, self.opts);
+        let solver = Solver::new(self.key, flat, plate.residual, self.options);
         let factor = if self.is_keyable {
             Solver::solve
         } else {
@@ -257,12 +257,12 @@ impl<'a> FilmSolution<'a> {
             ..
         } = self.object;
         let most = flat.into_iter().fold(0.0, f32::max);
-        let guessed = uncertainty::guessed(factors, inside, self.opts.thickness_spread, most);
+        let guessed = uncertainty::guessed(factors, inside, self.options.thickness_spread, most);
         let screen_hue =
             bright::make_opaque(factors, &self.calm, &plate.image, inside, longer_side);
         let keyed_away = uncertainty::keyed_away(factors, inside, flat[self.key], longer_side);
         watch.lap("paint");
-        let clipped = bright::fill_glints(factors, photo, inside, self.opts.clipped);
+        let clipped = bright::fill_glints(factors, photo, inside, self.options.clipped);
         watch.lap("glints");
         ColorUncertainty {
             keyed_away,

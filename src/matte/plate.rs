@@ -74,10 +74,14 @@ impl ScreenPlate {
     /// When the sizes differ.
     ///
     /// [Tukey]: https://doi.org/10.1080/03610927708827533
-    pub fn fit(photo: &Image<LinearRgb>, background: &Mask, opts: &PlateOptions) -> Result<Self> {
-        opts.check()?;
+    pub fn fit(
+        photo: &Image<LinearRgb>,
+        background: &Mask,
+        options: &PlateOptions,
+    ) -> Result<Self> {
+        options.check()?;
         let cells = cells::means(photo, background);
-        let fitted = Polynomial::fit(&cells, photo.size(), opts)?;
+        let fitted = Polynomial::fit(&cells, photo.size(), options)?;
         let (image, degree) = (fitted.image(photo.size()), Some(fitted.degree));
         Ok(Self::measured(image, photo, background, degree, [0.0; 2]))
     }
@@ -96,15 +100,15 @@ impl ScreenPlate {
         empty: &Image<LinearRgb>,
         photo: &Image<LinearRgb>,
         background: &Mask,
-        opts: &PlateOptions,
+        options: &PlateOptions,
     ) -> Result<Self> {
-        opts.check()?;
+        options.check()?;
         check_same_size(empty, photo)?;
         let shift_px = shift_onto(photo, empty, background)?;
-        opts.check_shift(shift_px)?;
+        options.check_shift(shift_px)?;
         let image = matched(empty, photo, background, shift_px)?;
         let plate = Self::measured(image, photo, background, None, shift_px);
-        plate.check_mismatch(photo, background, opts)?;
+        plate.check_mismatch(photo, background, options)?;
         Ok(plate)
     }
 
@@ -117,9 +121,9 @@ impl ScreenPlate {
     pub fn fit_outside(
         photo: &Image<LinearRgb>,
         mask: &Image<Coverage>,
-        opts: &PlateOptions,
+        options: &PlateOptions,
     ) -> Result<Self> {
-        Self::fit(photo, &screen_pixels(mask), opts)
+        Self::fit(photo, &screen_pixels(mask), options)
     }
 
     /// [`ScreenPlate::from_photo`], checked on what an object's mask and a margin around it leave free.
@@ -132,9 +136,9 @@ impl ScreenPlate {
         empty: &Image<LinearRgb>,
         photo: &Image<LinearRgb>,
         mask: &Image<Coverage>,
-        opts: &PlateOptions,
+        options: &PlateOptions,
     ) -> Result<Self> {
-        Self::from_photo(empty, photo, &screen_pixels(mask), opts)
+        Self::from_photo(empty, photo, &screen_pixels(mask), options)
     }
 
     /// One colour everywhere: the paper's model of the screen.
@@ -197,17 +201,17 @@ impl ScreenPlate {
         &self,
         photo: &Image<LinearRgb>,
         background: &Mask,
-        opts: &PlateOptions,
+        options: &PlateOptions,
     ) -> Result<()> {
         let [seen, expected] = [photo, &self.image].map(|image| cells::means(image, background));
         let mismatch = cells::mismatch(&seen, &expected);
-        if mismatch <= opts.max_mismatch {
+        if mismatch <= options.max_mismatch {
             return Ok(());
         }
         Err(refused(format!(
             "the empty screen differs from the photo's by {:.0} %, expected at most {:.0} %; did the light change?",
             100.0 * mismatch,
-            100.0 * opts.max_mismatch
+            100.0 * options.max_mismatch
         )))
     }
 }

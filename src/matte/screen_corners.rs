@@ -411,18 +411,24 @@ impl BorderProbe<'_> {
     /// The centre of gravity of the change in linear light, which blur does not move.
     fn border(&self, reach: f64) -> Option<Point2<f64>> {
         let steps = (2.0 * reach * STEPS_PER_PX).ceil() as usize;
-        let step = 2.0 * reach / steps as f64;
         let [inside, outside] = [-1.0, 1.0].map(|side| self.mean_beyond(side, reach, steps));
         let change = inside.add_scaled(-1.0, outside);
         let square = dot(change, change);
-        let inside_length: f64 = (0..steps)
-            .map(|k| self.color_at(-reach + (k as f64 + 0.5) * step))
+        let step = 2.0 * reach / steps as f64;
+        let inside_length: f64 = self
+            .colors(reach, steps)
             .map(|color| step * f64::from(dot(color.add_scaled(-1.0, outside), change) / square))
             .sum();
         // Where the inside ends, from the foot.
         let at = inside_length - reach;
         (square > MIN_CHANGE * MIN_CHANGE && at.abs() < MAX_OFFSET_SHARE * reach)
             .then(|| self.foot + self.outward * at)
+    }
+
+    /// The colours in the middle of each step.
+    fn colors(&self, reach: f64, steps: usize) -> impl Iterator<Item = LinearRgb> {
+        let step = 2.0 * reach / steps as f64;
+        (0..steps).map(move |k| self.color_at(-reach + (k as f64 + 0.5) * step))
     }
 
     fn color_at(&self, t: f64) -> LinearRgb {

@@ -102,18 +102,18 @@ impl SegmentStep {
 /// [`Error::Value`](crate::Error::Value) for an option that cannot be right.
 ///
 /// [Burt and Adelson 1983]: https://doi.org/10.1109/TCOM.1983.1095851
-pub fn segment(photo: &Image<LinearRgb>, opts: &SegmentOptions) -> Result<Segmentation> {
-    opts.check()?;
-    segment_prepared(&Prepared::new(photo, opts.working_size)?, opts)
+pub fn segment(photo: &Image<LinearRgb>, options: &SegmentOptions) -> Result<Segmentation> {
+    options.check()?;
+    segment_prepared(&Prepared::new(photo, options.working_size)?, options)
 }
 
 /// As [`segment`], with options that are checked and a photo that is prepared for their working size.
 pub(super) fn segment_prepared(
     prepared: &Prepared<'_>,
-    opts: &SegmentOptions,
+    options: &SegmentOptions,
 ) -> Result<Segmentation> {
     let mut watch = Stopwatch::start();
-    let chosen = choose::best_search(&prepared.small, opts)?;
+    let chosen = choose::best_search(&prepared.small, options)?;
     watch.lap("search");
     let object = chosen.object_area();
     watch.lap("holes");

@@ -84,12 +84,12 @@ pub struct Triangulated {
 pub fn triangulate(
     shots: &[(&Image<LinearRgb>, &ScreenPlate)],
     inside: &Image<Coverage>,
-    opts: &TriangulateOptions,
+    options: &TriangulateOptions,
 ) -> Result<Triangulated> {
     check_sizes(shots, inside)?;
-    let aligned = align(shots, inside, opts)?;
+    let aligned = align(shots, inside, options)?;
     let lines = fit_lines(&aligned, strongest_noise(shots));
-    let determined = determined_channels(&lines, inside, opts.max_sigma)?;
+    let determined = determined_channels(&lines, inside, options.max_sigma)?;
     let dye = dye::fit(&lines, inside, determined);
     let inferred = Inferred::fit(&lines, inside, determined, dye);
     let solved = lines.map(|line| inferred.complete(&line));
@@ -184,14 +184,14 @@ fn check_same_size(
 fn align(
     shots: &[(&Image<LinearRgb>, &ScreenPlate)],
     inside: &Image<Coverage>,
-    opts: &TriangulateOptions,
+    options: &TriangulateOptions,
 ) -> Result<Vec<AlignedPhoto>> {
     let ((first, first_plate), others) = (shots[0], &shots[1..]);
-    let reach = opts.max_shift_px.ceil().max(0.0);
+    let reach = options.max_shift_px.ceil().max(0.0);
     let aligner = Aligner {
         first,
         near: filter::dilate(&inside.map(|c| c.0 > 0.0), reach),
-        opts,
+        options,
     };
     let mut aligned = vec![AlignedPhoto::new(first, first_plate, [0.0; 2])];
     for (number, (photo, plate)) in (2..).zip(others) {
@@ -223,7 +223,7 @@ struct Aligner<'a> {
     first: &'a Image<LinearRgb>,
     /// The object and as far around it as it may have moved.
     near: Mask,
-    opts: &'a TriangulateOptions,
+    options: &'a TriangulateOptions,
 }
 
 impl Aligner<'_> {
@@ -250,7 +250,7 @@ impl Aligner<'_> {
     }
 
     fn too_far(&self, found: &Registered) -> Option<String> {
-        let ([x, y], most) = (found.shift_px.map(|v| -v), self.opts.max_shift_px);
+        let ([x, y], most) = (found.shift_px.map(|v| -v), self.options.max_shift_px);
         (x.abs().max(y.abs()) > most).then(|| {
             format!(
                 "the object is offset by ({x:.1}, {y:.1}) px from the first, expected at most {most}; did it move?"
@@ -259,7 +259,7 @@ impl Aligner<'_> {
     }
 
     fn too_unlike(&self, found: &Registered) -> Option<String> {
-        let (agreement, least) = (found.agreement, self.opts.least_agreement);
+        let (agreement, least) = (found.agreement, self.options.least_agreement);
         (found.sigma_px < MAX_JUDGED_SIGMA_PX && agreement < least).then(|| {
             format!(
                 "correlation with the first is {agreement:.2}, expected {least:.2}; did the object turn or the light change?"

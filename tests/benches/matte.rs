@@ -119,15 +119,15 @@ fn bench(c: &mut Criterion) {
         b.iter(|| job.matte_into(&KeyOptions::default(), &mut matte).unwrap());
     });
     for (name, profile) in Profile::ALL {
-        let opts = all_stages(profile);
+        let options = all_stages(profile);
         group.bench_function(format!("key/all stages, {name}"), |b| {
-            b.iter(|| job.run_into(&opts, &mut keyed).unwrap())
+            b.iter(|| job.run_into(&options, &mut keyed).unwrap())
         });
     }
     for (size, blur, name) in BLURS {
-        let opts = blurred(size, blur);
+        let options = blurred(size, blur);
         group.bench_function(format!("blur {size}, {name}"), |b| {
-            b.iter(|| job.matte_into(&opts, &mut matte).unwrap())
+            b.iter(|| job.matte_into(&options, &mut matte).unwrap())
         });
     }
     group.finish();

@@ -41,7 +41,7 @@ pub(crate) fn run(case: &Case) -> Result<(), String> {
 }
 
 fn keying(case: &Case) -> Result<(), String> {
-    let opts: KeyOptions = options(case)?;
+    let options: KeyOptions = options(case)?;
     let photo = photo(case)?;
     let [plate, garbage, core] = ["plate", "garbage", "core"].map(|name| input(case, name));
     let (plate, garbage, core) = (plate?, garbage?, core?);
@@ -54,7 +54,7 @@ fn keying(case: &Case) -> Result<(), String> {
     let mut job = Keying::new(&photo, screen);
     job = garbage.iter().fold(job, |job, m| job.with_garbage(m));
     job = core.iter().fold(job, |job, m| job.with_core(m));
-    check(case, &job, &opts)
+    check(case, &job, &options)
 }
 
 /// The one node whose bits are not Blender's: it adds up in double precision.
@@ -121,10 +121,10 @@ fn screen(case: &Case) -> Result<(), String> {
     }
 }
 
-fn check<P: Photo>(case: &Case, job: &Keying<'_, P>, opts: &KeyOptions) -> Result<(), String> {
-    let keyed = job.run(opts).map_err(|e| e.to_string())?;
-    let edges = job.edges(opts).map_err(|e| e.to_string())?;
-    let alone = job.matte(opts).map_err(|e| e.to_string())?;
+fn check<P: Photo>(case: &Case, job: &Keying<'_, P>, options: &KeyOptions) -> Result<(), String> {
+    let keyed = job.run(options).map_err(|e| e.to_string())?;
+    let edges = job.edges(options).map_err(|e| e.to_string())?;
+    let alone = job.matte(options).map_err(|e| e.to_string())?;
     all([
         same_matte(case, "reference_matte.exr", &keyed.matte),
         same_matte(case, "reference_edges.exr", &edges),

@@ -218,18 +218,23 @@ pub(crate) enum Codes {
     U16(Vec<u16>),
 }
 
+impl Codes {
+    fn new<P: ToFile>(image: &Image<P>, bits: Bits) -> Self {
+        match bits {
+            Bits::Sixteen => Self::U16(interleaved(image, P::codes::<u16>)),
+            _ => Self::U8(interleaved(image, P::codes::<u8>)),
+        }
+    }
+}
+
 impl CodedImage<'static> {
     pub(crate) fn new<P: ToFile>(image: &Image<P>, bits: Bits) -> Self {
         let (width, height) = image.size();
-        let codes = match bits {
-            Bits::Sixteen => Codes::U16(interleaved(image, P::codes::<u16>)),
-            _ => Codes::U8(interleaved(image, P::codes::<u8>)),
-        };
         Self {
             width,
             height,
             names: P::NAMES,
-            codes,
+            codes: Codes::new(image, bits),
         }
     }
 }

@@ -76,15 +76,15 @@ pub(crate) fn header(
 }
 
 fn texts(info: &png::Info<'_>) -> Notes {
-    let latin = info
-        .uncompressed_latin1_text
-        .iter()
-        .map(|t| note(&t.keyword, &t.text));
-    let utf8 = info
-        .utf8_text
-        .iter()
-        .filter_map(|t| Some(note(&t.keyword, &t.get_text().ok()?)));
-    latin.chain(utf8).collect()
+    let latin = info.uncompressed_latin1_text.iter();
+    let latin = latin.map(|t| note(&t.keyword, &t.text));
+    latin
+        .chain(info.utf8_text.iter().filter_map(utf8_note))
+        .collect()
+}
+
+fn utf8_note(text: &png::text_metadata::ITXtChunk) -> Option<(String, String)> {
+    Some(note(&text.keyword, &text.get_text().ok()?))
 }
 
 /// How the file describes its colours, by the chunk that takes precedence (PNG 3rd edition, 4.3): code points, a profile,

@@ -27,11 +27,11 @@ impl Matted {
         prepared: &Prepared<'_>,
         screen: &CleanScreen,
         region: &ObjectRegion,
-        opts: &CutOutOptions,
+        options: &CutOutOptions,
     ) -> Result<Self> {
-        match opts.method.unwrap_or_default() {
-            MatteMethod::Physical => Self::physical(prepared, screen, region, opts),
-            MatteMethod::Key => Self::keyed(prepared, screen, region, opts),
+        match options.method.unwrap_or_default() {
+            MatteMethod::Physical => Self::physical(prepared, screen, region, options),
+            MatteMethod::Key => Self::keyed(prepared, screen, region, options),
             MatteMethod::Outline => Ok(Self::outline(region)),
         }
     }
@@ -47,7 +47,7 @@ impl Matted {
         prepared: &Prepared<'_>,
         screen: &CleanScreen,
         region: &ObjectRegion,
-        opts: &CutOutOptions,
+        options: &CutOutOptions,
     ) -> Result<Self> {
         let object = FilmInput {
             photo: &region.photo,
@@ -56,17 +56,17 @@ impl Matted {
             screen: screen.color,
             longer_side: prepared.longer_side(),
         };
-        solve_film(object, &opts.film).map(Self::from)
+        solve_film(object, &options.film).map(Self::from)
     }
 
     fn keyed(
         prepared: &Prepared<'_>,
         screen: &CleanScreen,
         region: &ObjectRegion,
-        opts: &CutOutOptions,
+        options: &CutOutOptions,
     ) -> Result<Self> {
         let keyed = Keying::new(prepared.photo, Screen::Plate(&screen.plate.image))
-            .run(&opts.key)
+            .run(&options.key)
             .map_err(|e| e.within("key"))?;
         let cutout = keyed.cutout.crop(region.around);
         Ok(Self::grey(

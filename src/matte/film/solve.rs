@@ -64,7 +64,7 @@ const MAX_CAST_DIFFERENCE: f32 = 0.4;
 const MAX_DARK_CAST_DIFFERENCE: f32 = 0.02;
 
 impl Solver {
-    pub(super) fn new(key: usize, flat: [f32; 3], noise: LinearRgb, opts: &FilmOptions) -> Self {
+    pub(super) fn new(key: usize, flat: [f32; 3], noise: LinearRgb, options: &FilmOptions) -> Self {
         let others = [(key + 1) % 3, (key + 2) % 3];
         let clearness = (flat[key] / CLEAR_TRANSMITTANCE).clamp(0.0, 1.0);
         let scattered = scattered_tint(flat);
@@ -75,8 +75,8 @@ impl Solver {
             shares: shares(key, others, scattered),
             cast: scattered[others[1]] / scattered[others[0]],
             noise: noise.max_channel().max(MIN_NOISE),
-            reflection_error: opts.reflection_error * (1.0 - clearness * TINT_ERROR_SHARE),
-            spread: opts.thickness_spread,
+            reflection_error: options.reflection_error * (1.0 - clearness * TINT_ERROR_SHARE),
+            spread: options.thickness_spread,
         }
     }
 

@@ -9,12 +9,12 @@ use super::running_blur::{BoxReach, RunningBlur};
 /// A plane blurred by a box of `size` (at least 1), in the way that the options ask for.
 pub(super) fn box_blurred<'a>(
     source: impl Rows + 'a,
-    opts: &KeyOptions,
+    options: &KeyOptions,
     size: u32,
     picture: (usize, usize),
 ) -> Source<'a> {
-    let (behaviour, size) = (opts.profile.behaviour(), size as usize);
-    match opts.blur {
+    let (behaviour, size) = (options.profile.behaviour(), size as usize);
+    match options.blur {
         Blur::Exact => Box::new(BoxBlur::new(source, behaviour, size, picture)),
         Blur::RunningSum => {
             let reach = BoxKernel::new(behaviour, size, picture).reach();

@@ -163,8 +163,11 @@ pub(super) struct ChromaBlur<'a, P> {
 }
 
 impl<'a, P: Photo> ChromaBlur<'a, P> {
-    pub(super) fn new(photo: &'a Image<P>, opts: &KeyOptions) -> Self {
-        let (behaviour, careful) = (opts.profile.behaviour(), opts.profile == Profile::Robust);
+    pub(super) fn new(photo: &'a Image<P>, options: &KeyOptions) -> Self {
+        let (behaviour, careful) = (
+            options.profile.behaviour(),
+            options.profile == Profile::Robust,
+        );
         let planes = DIFFERENCES.map(|weights| {
             let plane = Difference {
                 photo,
@@ -172,7 +175,7 @@ impl<'a, P: Photo> ChromaBlur<'a, P> {
                 weights,
                 behaviour,
             };
-            box_blurred(plane, opts, opts.blur_pre, photo.size())
+            box_blurred(plane, options, options.blur_pre, photo.size())
         });
         let rows = [vec![0.0; photo.width()], vec![0.0; photo.width()]];
         Self {

@@ -17,11 +17,11 @@ pub(super) struct Despill {
 }
 
 impl Despill {
-    pub(super) fn new(opts: &KeyOptions) -> Self {
+    pub(super) fn new(options: &KeyOptions) -> Self {
         Self {
-            factor: opts.despill_factor,
-            balance: opts.despill_balance,
-            subtract: opts.subtract_screen,
+            factor: options.despill_factor,
+            balance: options.despill_balance,
+            subtract: options.subtract_screen,
         }
     }
 

@@ -61,15 +61,15 @@ impl<'a> Dilate<'a> {
     pub(super) fn new(
         source: Source<'a>,
         (width, height): (usize, usize),
-        opts: &KeyOptions,
+        options: &KeyOptions,
     ) -> Self {
-        let distance = opts.dilate_distance.unsigned_abs() as usize;
-        let unlimited = opts.profile.behaviour() == Behaviour::V45;
+        let distance = options.dilate_distance.unsigned_abs() as usize;
+        let unlimited = options.profile.behaviour() == Behaviour::V45;
         let shape = Disc {
             distance,
-            lopsided: !unlimited && opts.profile != Profile::Robust,
+            lopsided: !unlimited && options.profile != Profile::Robust,
         };
-        let largest = opts.dilate_distance > 0;
+        let largest = options.dilate_distance > 0;
         let start = match (unlimited, largest) {
             (true, true) => f32::MIN,
             (true, false) => f32::MAX,
@@ -179,11 +179,11 @@ mod tests {
     }
 
     fn dilated_dot(profile: Profile, distance: i32) -> Vec<String> {
-        let opts = KeyOptions {
+        let options = KeyOptions {
             dilate_distance: distance,
             ..KeyOptions::for_profile(profile)
         };
-        let mut dilate = Dilate::new(Box::new(Dot), (11, 11), &opts);
+        let mut dilate = Dilate::new(Box::new(Dot), (11, 11), &options);
         let mut row = [0.0; 11];
         let picture = |y| {
             dilate.row(y, &mut row);

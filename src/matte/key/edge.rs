@@ -42,9 +42,9 @@ struct EdgeSearch<'a> {
 }
 
 impl<'a> EdgeSearch<'a> {
-    fn new(source: Source<'a>, (width, height): (usize, usize), opts: &KeyOptions) -> Self {
-        let behaviour = opts.profile.behaviour();
-        let reach = EdgeReach::new(behaviour, opts.edge_kernel_radius as usize);
+    fn new(source: Source<'a>, (width, height): (usize, usize), options: &KeyOptions) -> Self {
+        let behaviour = options.profile.behaviour();
+        let reach = EdgeReach::new(behaviour, options.edge_kernel_radius as usize);
         let half = if let EdgeReach::Window(half) = reach {
             half
         } else {
@@ -59,7 +59,7 @@ impl<'a> EdgeSearch<'a> {
         Self {
             source,
             behaviour,
-            tolerance: opts.edge_kernel_tolerance,
+            tolerance: options.edge_kernel_tolerance,
             reach,
             height,
             window,
@@ -193,18 +193,18 @@ pub(super) struct Clip<'a> {
 
 impl<'a> Clip<'a> {
     /// Whether the levels can change anything.
-    pub(super) fn is_wanted(opts: &KeyOptions) -> bool {
-        let levels_differ =
-            opts.profile.behaviour() != Behaviour::V45 || opts.clip_black != opts.clip_white;
-        (opts.clip_black > 0.0 || opts.clip_white < 1.0) && levels_differ
+    pub(super) fn is_wanted(options: &KeyOptions) -> bool {
+        let levels_differ = options.profile.behaviour() != Behaviour::V45
+            || options.clip_black != options.clip_white;
+        (options.clip_black > 0.0 || options.clip_white < 1.0) && levels_differ
     }
 
-    pub(super) fn new(source: Source<'a>, size: (usize, usize), opts: &KeyOptions) -> Self {
-        let search = EdgeSearch::new(source, size, opts);
+    pub(super) fn new(source: Source<'a>, size: (usize, usize), options: &KeyOptions) -> Self {
+        let search = EdgeSearch::new(source, size, options);
         Self {
             search,
-            black: opts.clip_black,
-            white: opts.clip_white,
+            black: options.clip_black,
+            white: options.clip_white,
             edges: vec![0.0; size.0],
         }
     }
@@ -272,9 +272,9 @@ pub(super) struct Edges<'a> {
 }
 
 impl<'a> Edges<'a> {
-    pub(super) fn new(source: Source<'a>, size: (usize, usize), opts: &KeyOptions) -> Self {
+    pub(super) fn new(source: Source<'a>, size: (usize, usize), options: &KeyOptions) -> Self {
         Self {
-            search: EdgeSearch::new(source, size, opts),
+            search: EdgeSearch::new(source, size, options),
             searched: vec![0.0; size.0],
         }
     }

@@ -38,19 +38,19 @@ struct FeatherKernel {
 }
 
 impl FeatherKernel {
-    fn new(opts: &KeyOptions) -> Self {
-        let distance = opts.feather_distance.unsigned_abs() as usize;
+    fn new(options: &KeyOptions) -> Self {
+        let distance = options.feather_distance.unsigned_abs() as usize;
         let step = 1.0 / distance as f32;
-        let behaviour = opts.profile.behaviour();
+        let behaviour = options.profile.behaviour();
         let falloff = (0..=distance)
-            .map(|i| falloff_weight(opts.feather_falloff, 1.0 - i as f32 * step))
+            .map(|i| falloff_weight(options.feather_falloff, 1.0 - i as f32 * step))
             .collect();
         Self {
             gauss: gaussian_table(distance, behaviour),
             falloff,
             order: visiting_order(distance as isize, behaviour),
             behaviour,
-            inward: opts.feather_distance < 0,
+            inward: options.feather_distance < 0,
         }
     }
 
@@ -124,9 +124,9 @@ impl<'a> Feather<'a> {
     pub(super) fn new(
         source: Source<'a>,
         (width, height): (usize, usize),
-        opts: &KeyOptions,
+        options: &KeyOptions,
     ) -> Self {
-        let kernel = FeatherKernel::new(opts);
+        let kernel = FeatherKernel::new(options);
         let margined = vec![0.0; width + 2 * kernel.radius()];
         let capacity = window_rows(kernel.radius(), height);
         Self {
@@ -377,7 +377,7 @@ mod tests {
     )]
     #[test]
     fn the_tables_are_the_published_ones() {
-        let opts = KeyOptions {
+        let options = KeyOptions {
             feather_distance: 3,
             ..KeyOptions::default()
         };
@@ -389,7 +389,7 @@ mod tests {
             [0.249338925, 0.151231691, 0.0337443464, 0.00276990514]
         );
         assert_eq!(
-            FeatherKernel::new(&opts).falloff,
+            FeatherKernel::new(&options).falloff,
             [1.0, 0.740740657, 0.259259224, 0.0]
         );
     }

@@ -143,11 +143,11 @@ pub struct Deviations {
 /// Takes a scene-linear photo of any size; returns the matte and the premultiplied cut-out, same size. Settings outside
 /// their range are moved to its nearest end, and nothing is refused: [`Keying::run`] is the call that checks, and that
 /// takes plates, garbage and core mattes, and photos with alpha.
-pub fn key(photo: &Image<LinearRgb>, screen: LinearRgb, opts: &KeyOptions) -> Keyed {
-    let opts = opts.clamped();
+pub fn key(photo: &Image<LinearRgb>, screen: LinearRgb, options: &KeyOptions) -> Keyed {
+    let options = options.clamped();
     let mut keyed = Keyed::default();
     fit_size(&mut keyed.cutout, photo.width(), photo.height());
-    let stream = Stream::new(Keying::new(photo, Screen::Color(screen)), None, &opts);
+    let stream = Stream::new(Keying::new(photo, Screen::Color(screen)), None, &options);
     keyed.deviations = stream.compute_plane(Plane::Matte, &mut keyed.matte, &mut keyed.cutout);
     keyed
 }
@@ -193,9 +193,9 @@ impl<'a, P: Photo> Keying<'a, P> {
     /// # Errors
     /// [`Error::Value`] for a setting out of range, a picture of another size than the photo's, a screen colour that is
     /// not finite, and in the `robust` profile for a key that cannot work.
-    pub fn run(&self, opts: &KeyOptions) -> Result<Keyed> {
+    pub fn run(&self, options: &KeyOptions) -> Result<Keyed> {
         let mut keyed = Keyed::default();
-        self.run_into(opts, &mut keyed)?;
+        self.run_into(options, &mut keyed)?;
         Ok(keyed)
     }
 
@@ -203,11 +203,11 @@ impl<'a, P: Photo> Keying<'a, P> {
     ///
     /// # Errors
     /// As [`run`](Self::run).
-    pub fn run_into(&self, opts: &KeyOptions, keyed: &mut Keyed) -> Result<()> {
+    pub fn run_into(&self, options: &KeyOptions, keyed: &mut Keyed) -> Result<()> {
         let (width, height) = self.photo.size();
         fit_size(&mut keyed.cutout, width, height);
         keyed.deviations =
-            self.compute_plane(opts, Plane::Matte, &mut keyed.matte, &mut keyed.cutout)?;
+            self.compute_plane(options, Plane::Matte, &mut keyed.matte, &mut keyed.cutout)?;
         Ok(())
     }
 
@@ -215,9 +215,9 @@ impl<'a, P: Photo> Keying<'a, P> {
     ///
     /// # Errors
     /// As [`run`](Self::run).
-    pub fn matte(&self, opts: &KeyOptions) -> Result<Image<Coverage>> {
+    pub fn matte(&self, options: &KeyOptions) -> Result<Image<Coverage>> {
         let mut matte = Image::default();
-        self.matte_into(opts, &mut matte)?;
+        self.matte_into(options, &mut matte)?;
         Ok(matte)
     }
 
@@ -225,34 +225,38 @@ impl<'a, P: Photo> Keying<'a, P> {
     ///
     /// # Errors
     /// As [`run`](Self::run).
-    pub fn matte_into(&self, opts: &KeyOptions, matte: &mut Image<Coverage>) -> Result<Deviations> {
-        self.compute_plane(opts, Plane::Matte, matte, &mut Image::default())
+    pub fn matte_into(
+        &self,
+        options: &KeyOptions,
+        matte: &mut Image<Coverage>,
+    ) -> Result<Deviations> {
+        self.compute_plane(options, Plane::Matte, matte, &mut Image::default())
     }
 
     /// The edges that the levels leave alone: 1 at edges, 0 elsewhere.
     ///
     /// # Errors
     /// As [`run`](Self::run).
-    pub fn edges(&self, opts: &KeyOptions) -> Result<Image<Coverage>> {
+    pub fn edges(&self, options: &KeyOptions) -> Result<Image<Coverage>> {
         let mut edges = Image::default();
-        self.compute_plane(opts, Plane::Edges, &mut edges, &mut Image::default())?;
+        self.compute_plane(options, Plane::Edges, &mut edges, &mut Image::default())?;
         Ok(edges)
     }
 
     fn compute_plane(
         &self,
-        opts: &KeyOptions,
+        options: &KeyOptions,
         plane: Plane,
         matte: &mut Image<Coverage>,
         cutout: &mut Image<PremulRgba>,
     ) -> Result<Deviations> {
-        self.check(opts)?;
-        let filled = robust::without_holes(self.screen, opts)?;
+        self.check(options)?;
+        let filled = robust::without_holes(self.screen, options)?;
         let screen = filled
             .as_ref()
             .map_or(self.screen, |f| Screen::Plate(&f.plate));
         let channel = filled.as_ref().map(|f| f.channel);
-        let stream = Stream::new(Keying { screen, ..*self }, channel, opts);
+        let stream = Stream::new(Keying { screen, ..*self }, channel, options);
         let deviations = stream.compute_plane(plane, matte, cutout);
         Ok(Deviations {
             filled_plate: filled.as_ref().map_or(0, |f| f.count),
@@ -260,15 +264,15 @@ impl<'a, P: Photo> Keying<'a, P> {
         })
     }
 
-    fn check(&self, opts: &KeyOptions) -> Result<()> {
-        opts.check()?;
-        robust::warn_of_edge_settings(opts);
+    fn check(&self, options: &KeyOptions) -> Result<()> {
+        options.check()?;
+        robust::warn_of_edge_settings(options);
         self.check_size("garbage", self.garbage.map(Image::size))?;
         self.check_size("core", self.core.map(Image::size))?;
         match self.screen {
             Screen::Color(c) => {
                 check_finite(c)?;
-                robust::check_color(c, opts)
+                robust::check_color(c, options)
             }
             Screen::Plate(plate) => self.check_size("plate", Some(plate.size())),
         }

@@ -262,14 +262,14 @@ mod tests {
     #[test]
     fn the_toml_table_is_the_struct() {
         let text = "profile = \"blender-4.5\"\nclip_black = 0.25\nfeather_falloff = \"INVERSE_SQUARE\"\nblur = \"running_sum\"\n";
-        let opts: KeyOptions = toml::from_str(text).unwrap();
+        let options: KeyOptions = toml::from_str(text).unwrap();
         let want = KeyOptions {
             clip_black: 0.25,
             feather_falloff: Falloff::InverseSquare,
             blur: Blur::RunningSum,
             ..KeyOptions::for_profile(Profile::Blender45)
         };
-        assert_eq!(opts, want);
+        assert_eq!(options, want);
     }
 
     #[test]
@@ -280,20 +280,20 @@ mod tests {
 
     #[test]
     fn a_setting_out_of_range_is_named() {
-        let opts = KeyOptions {
+        let options = KeyOptions {
             feather_distance: -101,
             ..KeyOptions::default()
         };
         assert_eq!(
-            opts.check().unwrap_err().to_string(),
+            options.check().unwrap_err().to_string(),
             "key.feather_distance: -101, expected -100 to 100"
         );
-        let opts = KeyOptions {
+        let options = KeyOptions {
             screen_balance: f32::NAN,
             ..KeyOptions::default()
         };
         assert_eq!(
-            opts.check().unwrap_err().to_string(),
+            options.check().unwrap_err().to_string(),
             "key.screen_balance: NaN, expected 0 to 1"
         );
     }

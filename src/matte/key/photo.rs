@@ -92,8 +92,8 @@ pub(super) struct Keyer<'a, P> {
 }
 
 impl<'a, P: Photo> Keyer<'a, P> {
-    pub(super) fn new(screen: Screen<'a>, channel: Option<usize>, opts: &KeyOptions) -> Self {
-        let loops = Loops::for_profile(opts.profile);
+    pub(super) fn new(screen: Screen<'a>, channel: Option<usize>, options: &KeyOptions) -> Self {
+        let loops = Loops::for_profile(options.profile);
         let (screen, color) = match screen {
             Screen::Color(c) => (Screen::Color(socket_color(c)), socket_color(c)),
             Screen::Plate(_) => (screen, LinearRgb::BLACK),
@@ -102,8 +102,8 @@ impl<'a, P: Photo> Keyer<'a, P> {
         Self {
             screen,
             channel,
-            terms: terms(color, opts.screen_balance, opts.ignore_brightness),
-            despill: Despill::new(opts),
+            terms: terms(color, options.screen_balance, options.ignore_brightness),
+            despill: Despill::new(options),
             loops,
         }
     }

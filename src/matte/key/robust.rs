@@ -29,10 +29,10 @@ fn key_strength(key: LinearRgb, channel: usize, balance: f32) -> f32 {
 }
 
 /// Refuses a key colour from which no matte but noise can be made.
-pub(super) fn check_color(key: LinearRgb, opts: &KeyOptions) -> Result<()> {
+pub(super) fn check_color(key: LinearRgb, options: &KeyOptions) -> Result<()> {
     let (key, channel) = (socket_color(key), primary_channel(socket_color(key)));
-    let found = key_strength(key, channel, opts.screen_balance);
-    if opts.profile != Profile::Robust || opts.accept_weak_key || found >= MIN_KEY_STRENGTH {
+    let found = key_strength(key, channel, options.screen_balance);
+    if options.profile != Profile::Robust || options.accept_weak_key || found >= MIN_KEY_STRENGTH {
         return Ok(());
     }
     Err(weak_key(key, CHANNEL_NAMES[channel], found))
@@ -47,15 +47,17 @@ fn weak_key(LinearRgb { r, g, b }: LinearRgb, channel: &str, strength: f32) -> E
 }
 
 /// Warns of settings that switch the edge search into something hardly wanted.
-pub(super) fn warn_of_edge_settings(opts: &KeyOptions) {
-    if opts.profile != Profile::Robust || (opts.clip_black <= 0.0 && opts.clip_white >= 1.0) {
+pub(super) fn warn_of_edge_settings(options: &KeyOptions) {
+    if options.profile != Profile::Robust
+        || (options.clip_black <= 0.0 && options.clip_white >= 1.0)
+    {
         return;
     }
-    if opts.edge_kernel_radius == 1 {
+    if options.edge_kernel_radius == 1 {
         log::warn!(
             "key.edge_kernel_radius: 1 makes every pixel an edge, so the levels do nothing; 0 clips all pixels"
         );
-    } else if opts.edge_kernel_radius > 0 && opts.edge_kernel_tolerance == 0.0 {
+    } else if options.edge_kernel_radius > 0 && options.edge_kernel_tolerance == 0.0 {
         log::warn!(
             "key.edge_kernel_tolerance: 0 makes every pixel an edge, so the levels do nothing"
         );
@@ -77,9 +79,9 @@ pub(super) struct FilledPlate {
 /// A pyramid of halved means that count only the usable pixels; a hole takes the colour of the finest level that has one.
 /// # Errors
 /// [`Error::Value`] where no pixel of the plate is usable.
-pub(super) fn fill_plate(plate: &Image<LinearRgb>, opts: &KeyOptions) -> Result<FilledPlate> {
+pub(super) fn fill_plate(plate: &Image<LinearRgb>, options: &KeyOptions) -> Result<FilledPlate> {
     let channel = primary_channel(usable_mean(plate));
-    let known = usable_keys(plate, channel, opts);
+    let known = usable_keys(plate, channel, options);
     let count = known.pixels().par_iter().filter(|p| p.a == 0.0).count();
     if count == plate.pixels().len() && count > 0 {
         return Err(no_usable_key(channel));
@@ -96,9 +98,13 @@ pub(super) fn fill_plate(plate: &Image<LinearRgb>, opts: &KeyOptions) -> Result<
 }
 
 /// The plate with its holes transparent.
-fn usable_keys(plate: &Image<LinearRgb>, channel: usize, opts: &KeyOptions) -> Image<PremulRgba> {
+fn usable_keys(
+    plate: &Image<LinearRgb>,
+    channel: usize,
+    options: &KeyOptions,
+) -> Image<PremulRgba> {
     plate.map(|c| {
-        if is_usable_key(c, channel, opts) {
+        if is_usable_key(c, channel, options) {
             c.opaque()
         } else {
             PremulRgba::TRANSPARENT
@@ -107,10 +113,10 @@ fn usable_keys(plate: &Image<LinearRgb>, channel: usize, opts: &KeyOptions) -> I
 }
 
 /// A pixel of a plate that can be keyed against.
-fn is_usable_key(c: LinearRgb, channel: usize, opts: &KeyOptions) -> bool {
+fn is_usable_key(c: LinearRgb, channel: usize, options: &KeyOptions) -> bool {
     is_usable(c.opaque())
-        && (opts.accept_weak_key
-            || key_strength(c, channel, opts.screen_balance) >= MIN_KEY_STRENGTH)
+        && (options.accept_weak_key
+            || key_strength(c, channel, options.screen_balance) >= MIN_KEY_STRENGTH)
 }
 
 fn no_usable_key(channel: usize) -> Error {
@@ -148,10 +154,10 @@ pub(super) fn is_usable_matte(m: Coverage) -> bool {
 /// Counts what the robust profile replaces in some rows of the photo and its mattes.
 pub(super) fn count_unusable<P: Photo>(
     keying: &Keying<'_, P>,
-    opts: &KeyOptions,
+    options: &KeyOptions,
     rows: Range<usize>,
 ) -> Deviations {
-    if opts.profile != Profile::Robust {
+    if options.profile != Profile::Robust {
         return Deviations::default();
     }
     rows.map(|y| unusable_in_row(keying, y)).sum()
@@ -171,10 +177,13 @@ fn unusable_in_row<P: Photo>(keying: &Keying<'_, P>, y: usize) -> Deviations {
 }
 
 /// The screen as the robust profile keys against it: a plate without holes, its mean's primary channel.
-pub(super) fn without_holes(screen: Screen<'_>, opts: &KeyOptions) -> Result<Option<FilledPlate>> {
+pub(super) fn without_holes(
+    screen: Screen<'_>,
+    options: &KeyOptions,
+) -> Result<Option<FilledPlate>> {
     match screen {
-        Screen::Plate(plate) if opts.profile == Profile::Robust => {
-            fill_plate(plate, opts).map(Some)
+        Screen::Plate(plate) if options.profile == Profile::Robust => {
+            fill_plate(plate, options).map(Some)
         }
         _ => Ok(None),
     }
@@ -206,21 +215,21 @@ mod tests {
 
     #[test]
     fn a_grey_key_is_refused_with_advice() {
-        let opts = KeyOptions::for_profile(Profile::Robust);
-        let message = check_color(LinearRgb::grey(0.5), &opts)
+        let options = KeyOptions::for_profile(Profile::Robust);
+        let message = check_color(LinearRgb::grey(0.5), &options)
             .unwrap_err()
             .to_string();
         assert!(
             message.starts_with("screen: 0.5,0.5,0.5 is too grey")
                 && message.contains("accept_weak_key")
         );
-        assert!(check_color(GREEN, &opts).is_ok());
+        assert!(check_color(GREEN, &options).is_ok());
         assert!(
             check_color(
                 LinearRgb::grey(0.5),
                 &KeyOptions {
                     accept_weak_key: true,
-                    ..opts
+                    ..options
                 }
             )
             .is_ok()

@@ -62,17 +62,21 @@ pub(super) enum Plane {
 pub(super) struct Stream<'a, P> {
     keying: Keying<'a, P>,
     channel: Option<usize>,
-    opts: &'a KeyOptions,
+    options: &'a KeyOptions,
     clamped: AtomicUsize,
 }
 
 impl<'a, P: Photo> Stream<'a, P> {
     /// A keying whose primary channel is given where it does not follow each pixel's own key.
-    pub(super) fn new(keying: Keying<'a, P>, channel: Option<usize>, opts: &'a KeyOptions) -> Self {
+    pub(super) fn new(
+        keying: Keying<'a, P>,
+        channel: Option<usize>,
+        options: &'a KeyOptions,
+    ) -> Self {
         Self {
             keying,
             channel,
-            opts,
+            options,
             clamped: AtomicUsize::new(0),
         }
     }
@@ -95,7 +99,11 @@ impl<'a, P: Photo> Stream<'a, P> {
         let seen = bands.zip(cutouts).map(|((band, matte), cutout)| {
             let first = band * rows;
             self.compute_band(&mut *self.plane_source(plane), first, matte, cutout);
-            robust::count_unusable(&self.keying, self.opts, first..first + matte.len() / width)
+            robust::count_unusable(
+                &self.keying,
+                self.options,
+                first..first + matte.len() / width,
+            )
         });
         Deviations {
             clamped: self.clamped.load(Ordering::Relaxed),
@@ -131,7 +139,7 @@ impl<'a, P: Photo> Stream<'a, P> {
 
     /// Rows above a band that its windows reach.
     fn halo_rows(&self) -> usize {
-        let o = self.opts;
+        let o = self.options;
         let distances = o.dilate_distance.unsigned_abs() + o.feather_distance.unsigned_abs();
         (o.blur_pre + o.edge_kernel_radius + o.blur_post + distances) as usize
     }
@@ -144,19 +152,19 @@ impl<'a, P: Photo> Stream<'a, P> {
     }
 
     fn keyer<Q: Photo>(&self) -> Keyer<'a, Q> {
-        Keyer::new(self.keying.screen, self.channel, self.opts)
+        Keyer::new(self.keying.screen, self.channel, self.options)
     }
 
     fn raw_matte(&self) -> Source<'_> {
         let photo = self.keying.photo;
-        if self.opts.blur_pre == 0 {
+        if self.options.blur_pre == 0 {
             return Box::new(RawMatte {
                 photo,
                 keyer: self.keyer(),
             });
         }
         Box::new(BlurredMatte {
-            blur: ChromaBlur::new(photo, self.opts),
+            blur: ChromaBlur::new(photo, self.options),
             keyer: self.keyer(),
             pixels: vec![PremulRgba::default(); photo.width()],
         })
@@ -164,8 +172,8 @@ impl<'a, P: Photo> Stream<'a, P> {
 
     fn clipped_matte(&self) -> Source<'_> {
         let raw = self.raw_matte();
-        if Clip::is_wanted(self.opts) {
-            Box::new(Clip::new(raw, self.size(), self.opts))
+        if Clip::is_wanted(self.options) {
+            Box::new(Clip::new(raw, self.size(), self.options))
         } else {
             raw
         }
@@ -178,12 +186,12 @@ impl<'a, P: Photo> Stream<'a, P> {
         } else {
             self.clipped_matte()
         };
-        Box::new(Edges::new(searched, self.size(), self.opts))
+        Box::new(Edges::new(searched, self.size(), self.options))
     }
 
     fn limited_matte(&self) -> Source<'_> {
         let Keying { garbage, core, .. } = self.keying;
-        let (behaviour, careful) = (self.behaviour(), self.opts.profile == Profile::Robust);
+        let (behaviour, careful) = (self.behaviour(), self.options.profile == Profile::Robust);
         let mut source = self.clipped_matte();
         let needs_core = core.is_some() || (garbage.is_some() && behaviour == Behaviour::V45);
         if let Some(garbage) = garbage {
@@ -208,7 +216,7 @@ impl<'a, P: Photo> Stream<'a, P> {
 
     /// The finished matte.
     fn finished_matte(&self) -> Source<'_> {
-        let (o, size) = (self.opts, self.size());
+        let (o, size) = (self.options, self.size());
         let mut source = self.limited_matte();
         if o.blur_post > 0 {
             source = box_blurred(source, o, o.blur_post, size);
@@ -229,7 +237,7 @@ impl<'a, P: Photo> Stream<'a, P> {
     }
 
     fn behaviour(&self) -> Behaviour {
-        self.opts.profile.behaviour()
+        self.options.profile.behaviour()
     }
 
     fn size(&self) -> (usize, usize) {

@@ -20,14 +20,18 @@ fn with_balances(b: f32, f: f32, e: f32) -> KeyOptions {
     }
 }
 
-fn keyed_pixel(pixel: [f32; 3], key_color: [f32; 3], opts: &KeyOptions) -> (f32, [f32; 4]) {
-    let keyed = key(&Image::filled(1, 1, pixel.into()), key_color.into(), opts);
+fn keyed_pixel(pixel: [f32; 3], key_color: [f32; 3], options: &KeyOptions) -> (f32, [f32; 4]) {
+    let keyed = key(
+        &Image::filled(1, 1, pixel.into()),
+        key_color.into(),
+        options,
+    );
     let c = keyed.cutout[(0, 0)];
     (keyed.matte[(0, 0)].0, [c.r, c.g, c.b, c.a])
 }
 
 /// A matte from garbage alone: what a row operation makes of given values.
-fn row_operation(values: &[f32], opts: &KeyOptions) -> Vec<f32> {
+fn row_operation(values: &[f32], options: &KeyOptions) -> Vec<f32> {
     let photo = Image::filled(values.len(), 1, LinearRgb::grey(0.3));
     let garbage = Image::from_vec(
         values.len(),
@@ -35,7 +39,7 @@ fn row_operation(values: &[f32], opts: &KeyOptions) -> Vec<f32> {
         values.iter().map(|v| Coverage(1.0 - v)).collect(),
     );
     let job = Keying::new(&photo, Screen::Color(GREEN)).with_garbage(&garbage);
-    job.matte(opts)
+    job.matte(options)
         .unwrap()
         .pixels()
         .iter()
@@ -127,12 +131,12 @@ fn pixels_come_out_as_in_blender() {
 
 #[test]
 fn overexposure_looks_at_alpha_in_blender_4_5_alone() {
-    let opts = KeyOptions {
+    let options = KeyOptions {
         profile: LATE,
         ..with_balances(0.5, 1.0, 0.5)
     };
     assert_eq!(
-        keyed_pixel([1.2, 2.5, 1.1], GREEN.into(), &opts).0,
+        keyed_pixel([1.2, 2.5, 1.1], GREEN.into(), &options).0,
         0.602940977
     );
     assert_eq!(
@@ -144,9 +148,9 @@ fn overexposure_looks_at_alpha_in_blender_4_5_alone() {
 #[test]
 fn row_operations_come_out_as_in_blender() {
     let of = |profile, change: fn(&mut KeyOptions)| {
-        let mut opts = KeyOptions::for_profile(profile);
-        change(&mut opts);
-        row_operation(&ROW, &opts)
+        let mut options = KeyOptions::for_profile(profile);
+        change(&mut options);
+        row_operation(&ROW, &options)
     };
     let early = Profile::Blender34;
     let third = [
@@ -236,12 +240,12 @@ fn bits_do_not_depend_on_the_number_of_threads() {
         LinearRgb::new(0.3, 0.2 + ((x * 31 + y * 17) % 97) as f32 * 0.005, 0.25)
     });
     let tall = Image::from_fn(37, 211, |x, y| photo[((x * 211 + y) % 20_000, x % 3)]);
-    let on = |threads: usize, photo: &Image<LinearRgb>, opts: &KeyOptions| {
+    let on = |threads: usize, photo: &Image<LinearRgb>, options: &KeyOptions| {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
             .build()
             .unwrap();
-        pool.install(|| key(photo, GREEN, opts).matte)
+        pool.install(|| key(photo, GREEN, options).matte)
     };
     let runs = |profile| {
         [Blur::Exact, Blur::RunningSum].map(|blur| KeyOptions {
@@ -249,12 +253,12 @@ fn bits_do_not_depend_on_the_number_of_threads() {
             ..all_stages(profile)
         })
     };
-    for opts in Profile::ALL
+    for options in Profile::ALL
         .into_iter()
         .flat_map(|(_, profile)| runs(profile))
     {
-        assert!(on(1, &photo, &opts) == on(3, &photo, &opts));
-        assert!(on(1, &tall, &opts) == on(7, &tall, &opts));
+        assert!(on(1, &photo, &options) == on(3, &photo, &options));
+        assert!(on(1, &tall, &options) == on(7, &tall, &options));
     }
 }
 
@@ -264,8 +268,8 @@ fn the_matte_alone_is_the_same_matte() {
         LinearRgb::new(0.2, 0.01 * (x + y) as f32, 0.3)
     });
     let job = Keying::new(&photo, Screen::Color(GREEN));
-    let opts = all_stages(Profile::Blender42);
-    assert!(job.matte(&opts).unwrap() == job.run(&opts).unwrap().matte);
+    let options = all_stages(Profile::Blender42);
+    assert!(job.matte(&options).unwrap() == job.run(&options).unwrap().matte);
 }
 
 #[test]
@@ -282,13 +286,13 @@ fn running_sums_are_blenders_up_to_its_own_rounding() {
     for (_, profile) in Profile::ALL {
         for size in [1, 2, 5, 6, 20, 60] {
             let matte = |blur_pre, blur| {
-                let opts = KeyOptions {
+                let options = KeyOptions {
                     blur_pre,
                     blur_post: size,
                     blur,
                     ..KeyOptions::for_profile(profile)
                 };
-                job.matte(&opts).unwrap()
+                job.matte(&options).unwrap()
             };
             let differ = |pre| {
                 let (exact, running) = (matte(pre, Blur::Exact), matte(pre, Blur::RunningSum));
@@ -323,12 +327,12 @@ fn a_plate_of_one_colour_keys_like_that_colour() {
     });
     let plate = Image::filled(70, 40, GREEN);
     for (_, profile) in Profile::ALL {
-        let opts = all_stages(profile);
+        let options = all_stages(profile);
         let by_plate = Keying::new(&photo, Screen::Plate(&plate))
-            .run(&opts)
+            .run(&options)
             .unwrap();
         let by_color = Keying::new(&photo, Screen::Color(GREEN))
-            .run(&opts)
+            .run(&options)
             .unwrap();
         assert!(by_plate.matte == by_color.matte && by_plate.cutout == by_color.cutout);
     }
@@ -354,14 +358,14 @@ fn what_cannot_be_keyed_is_refused_by_name() {
 
 #[test]
 fn subtracting_the_screen_leaves_the_foreground() {
-    let opts = KeyOptions {
+    let options = KeyOptions {
         subtract_screen: true,
         ignore_brightness: true,
         ..KeyOptions::default()
     };
     let front = LinearRgb::grey(0.4);
     let half = front.scale(0.5) + GREEN.scale(0.5);
-    let keyed = key(&Image::filled(1, 1, half), GREEN, &opts);
+    let keyed = key(&Image::filled(1, 1, half), GREEN, &options);
     assert!((keyed.matte[(0, 0)].0 - 0.5).abs() < 1e-6);
     let c = keyed.cutout[(0, 0)];
     assert!([c.r, c.g, c.b].iter().all(|v| (v - 0.2).abs() < 1e-6));

@@ -41,9 +41,13 @@ struct FitSample {
 
 impl Polynomial {
     /// Fits all channels, with the lowest degree that is good enough.
-    pub(super) fn fit(cells: &[Cell], size: (usize, usize), opts: &PlateOptions) -> Result<Self> {
-        let samples = samples(cells, size, opts.max_degree)?;
-        let degree = chosen_degree(&samples, opts);
+    pub(super) fn fit(
+        cells: &[Cell],
+        size: (usize, usize),
+        options: &PlateOptions,
+    ) -> Result<Self> {
+        let samples = samples(cells, size, options.max_degree)?;
+        let degree = chosen_degree(&samples, options);
         let all: Vec<&FitSample> = samples.iter().collect();
         Ok(Self {
             degree,
@@ -178,12 +182,12 @@ fn monomials(exponents: &[[usize; 2]], [u, v]: [f64; 2]) -> Vec<f64> {
 }
 
 /// The lowest degree that no higher one beats by the least gain, by the error at cells that are left out.
-fn chosen_degree(samples: &[FitSample], opts: &PlateOptions) -> usize {
-    let degrees = usable_degrees(samples.len(), opts.max_degree);
+fn chosen_degree(samples: &[FitSample], options: &PlateOptions) -> usize {
+    let degrees = usable_degrees(samples.len(), options.max_degree);
     let split = HeldOut::new(samples);
     let errors: Vec<f64> = degrees.iter().map(|&d| split.error(d)).collect();
     let best = errors.iter().copied().fold(f64::MAX, f64::min);
-    let enough = best.max(CELL_NOISE) / (1.0 - opts.least_gain).max(f64::MIN_POSITIVE);
+    let enough = best.max(CELL_NOISE) / (1.0 - options.least_gain).max(f64::MIN_POSITIVE);
     let lowest = errors.iter().position(|e| *e <= enough);
     degrees[lowest.unwrap_or(degrees.len() - 1)]
 }

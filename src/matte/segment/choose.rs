@@ -54,19 +54,19 @@ const COMPARED_SIDE_PX: usize = 256;
 /// That of the default search when more than half of the searches fail.
 pub(super) fn best_search<'a>(
     picture: &'a Image<LinearRgb>,
-    opts: &SegmentOptions,
+    options: &SegmentOptions,
 ) -> Result<ChosenSearch<'a>> {
-    let scales = scales(picture, opts);
-    let mut searched = searches(&scales, opts);
+    let scales = scales(picture, options);
+    let mut searched = searches(&scales, options);
     if let Some(failed) = first_of_many_failures(&searched) {
         return searched
             .swap_remove(failed)
             .into_chosen(scales, Confidence::default());
     }
     let confidences = confidences(&searched, picture.size());
-    let pick = best_candidate(&searched, &confidences, opts.levels);
+    let pick = best_candidate(&searched, &confidences, options.levels);
     let confidence = Confidence {
-        drift_px: drift_px(&searched, pick, &scales, opts),
+        drift_px: drift_px(&searched, pick, &scales, options),
         ..confidences[pick]
     };
     searched.swap_remove(pick).into_chosen(scales, confidence)
@@ -119,13 +119,13 @@ impl<'a> SearchScale<'a> {
         whole: &'a Image<LinearRgb>,
         reduction: usize,
         depths: Vec<usize>,
-        opts: &SegmentOptions,
+        options: &SegmentOptions,
     ) -> Self {
         let picture = reduced(whole, reduction);
         let deepest = depths.iter().copied().max().unwrap_or(2);
         Self {
             reduction,
-            search: Search::new(&picture, opts, deepest),
+            search: Search::new(&picture, options, deepest),
             picture,
             depths,
         }
@@ -140,14 +140,14 @@ fn reduced(picture: &Image<LinearRgb>, reduction: usize) -> Cow<'_, Image<Linear
     Cow::Owned(filter::resize(picture, w / reduction, h / reduction))
 }
 
-fn scales<'a>(picture: &'a Image<LinearRgb>, opts: &SegmentOptions) -> Vec<SearchScale<'a>> {
+fn scales<'a>(picture: &'a Image<LinearRgb>, options: &SegmentOptions) -> Vec<SearchScale<'a>> {
     let longer = longer_side(picture);
     searched_sizes(picture.size())
         .par_iter()
         .map(|&(reduction, depths)| {
-            let asked = opts.levels.filter(|_| reduction == 1);
+            let asked = options.levels.filter(|_| reduction == 1);
             let depths = usable_depths(depths, longer / reduction, asked);
-            SearchScale::new(picture, reduction, depths, opts)
+            SearchScale::new(picture, reduction, depths, options)
         })
         .collect()
 }
@@ -179,7 +179,7 @@ struct SearchResult {
     pass: Result<Pass>,
 }
 
-fn searches(scales: &[SearchScale<'_>], opts: &SegmentOptions) -> Vec<SearchResult> {
+fn searches(scales: &[SearchScale<'_>], options: &SegmentOptions) -> Vec<SearchResult> {
     let settings: Vec<(usize, usize)> = (0..scales.len())
         .flat_map(|i| scales[i].depths.iter().map(move |&levels| (i, levels)))
         .collect();
@@ -188,7 +188,7 @@ fn searches(scales: &[SearchScale<'_>], opts: &SegmentOptions) -> Vec<SearchResu
         .map(|&(scale, levels)| SearchResult {
             scale,
             levels,
-            pass: scales[scale].search.at_depth(levels, opts),
+            pass: scales[scale].search.at_depth(levels, options),
         })
         .collect()
 }
@@ -202,11 +202,13 @@ fn drift_px(
     searched: &[SearchResult],
     pick: usize,
     scales: &[SearchScale<'_>],
-    opts: &SegmentOptions,
+    options: &SegmentOptions,
 ) -> f64 {
     let (own, scale) = (&searched[pick], &scales[searched[pick].scale]);
     let Ok(pass) = &own.pass else { return 0.0 };
-    let stricter = scale.search.at_threshold(own.levels, STRICTER_FACTOR, opts);
+    let stricter = scale
+        .search
+        .at_threshold(own.levels, STRICTER_FACTOR, options);
     let stricter_px = stricter.map_or(longer_side(&pass.inside) as f64, |p| pass.distance(&p));
     let farthest_px = passes_at(searched, own.scale)
         .map(|other| pass.distance(other))
@@ -415,11 +417,11 @@ mod tests {
         let photo = Image::from_fn(300, 200, |x, y| {
             LinearRgb::grey(if disc(x as f64, y as f64) { 0.8 } else { 0.1 })
         });
-        let opts = SegmentOptions::default();
-        let whole = best_search(&photo, &opts).unwrap();
+        let options = SegmentOptions::default();
+        let whole = best_search(&photo, &options).unwrap();
         assert!(matches!(whole.picture, Cow::Borrowed(picture) if std::ptr::eq(picture, &photo)));
-        for scale in scales(&photo, &opts) {
-            let searched = scale.search.at_depth(2, &opts).unwrap().inside.size();
+        for scale in scales(&photo, &options) {
+            let searched = scale.search.at_depth(2, &options).unwrap().inside.size();
             assert_eq!(scale.picture.size(), searched);
         }
     }

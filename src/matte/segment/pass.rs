@@ -60,13 +60,17 @@ const MIN_JOIN_PX: f64 = 6.0;
 
 impl Search {
     /// Splits a picture into bands, `deepest` of them.
-    pub(super) fn new(picture: &Image<LinearRgb>, opts: &SegmentOptions, deepest: usize) -> Self {
-        let bands = Bands::new(picture, opts.tone, deepest);
-        let otsu_or_given = opts.finest_threshold.of_band(&bands.finest);
-        let threshold = otsu_or_given.max(opts.least_contrast);
+    pub(super) fn new(
+        picture: &Image<LinearRgb>,
+        options: &SegmentOptions,
+        deepest: usize,
+    ) -> Self {
+        let bands = Bands::new(picture, options.tone, deepest);
+        let otsu_or_given = options.finest_threshold.of_band(&bands.finest);
+        let threshold = otsu_or_given.max(options.least_contrast);
         Self {
             finest_binary: bands.finest.map(|v| v > threshold),
-            ridges: ridges(&bands.finest, opts.ridge),
+            ridges: ridges(&bands.finest, options.ridge),
             bands,
             threshold,
         }
@@ -78,8 +82,8 @@ impl Search {
     }
 
     /// Finds the object with band `levels` as the coarsest one.
-    pub(super) fn at_depth(&self, levels: usize, opts: &SegmentOptions) -> Result<Pass> {
-        self.pass(levels, &self.finest_binary, opts)
+    pub(super) fn at_depth(&self, levels: usize, options: &SegmentOptions) -> Result<Pass> {
+        self.pass(levels, &self.finest_binary, options)
     }
 
     /// The same with `times` times the threshold of the finest band.
@@ -87,11 +91,11 @@ impl Search {
         &self,
         levels: usize,
         times: f32,
-        opts: &SegmentOptions,
+        options: &SegmentOptions,
     ) -> Result<Pass> {
         let threshold = times * self.threshold;
         let finest_binary = self.bands.finest.map(|v| v > threshold);
-        self.pass(levels, &finest_binary, opts)
+        self.pass(levels, &finest_binary, options)
     }
 
     /// Where both bands have an edge, thinned, without groups of fewer pixels than a speck.
@@ -100,11 +104,11 @@ impl Search {
         cluster::without_specks(&thin, speck)
     }
 
-    fn pass(&self, levels: usize, finest_binary: &Mask, opts: &SegmentOptions) -> Result<Pass> {
+    fn pass(&self, levels: usize, finest_binary: &Mask, options: &SegmentOptions) -> Result<Pass> {
         let coarsest = self.bands.at_full_size(levels);
-        let coarsest_binary = opts.coarsest_threshold.binarised(&coarsest);
-        let edges = self.thin_edges(finest_binary, &coarsest_binary, opts.speck);
-        let join_px = (opts.join * longer_side(&edges) as f64).max(MIN_JOIN_PX);
+        let coarsest_binary = options.coarsest_threshold.binarised(&coarsest);
+        let edges = self.thin_edges(finest_binary, &coarsest_binary, options.speck);
+        let join_px = (options.join * longer_side(&edges) as f64).max(MIN_JOIN_PX);
         let (object, diagnostics) = main_object(&edges, join_px)?;
         let hull = hull::convex_hull(&object);
         let touches = reached_borders(&object);

@@ -278,8 +278,8 @@ fn specks_all_over_are_told() {
 
 #[test]
 fn impossible_options_are_named() {
-    let said = |opts: SegmentOptions| {
-        segment(&Image::filled(64, 64, GREEN), &opts)
+    let said = |options: SegmentOptions| {
+        segment(&Image::filled(64, 64, GREEN), &options)
             .unwrap_err()
             .to_string()
     };

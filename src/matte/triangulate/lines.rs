@@ -139,16 +139,26 @@ impl Inferred {
     ) -> (f32, f32) {
         let (mut top, mut bottom, mut levers) = (0.0, f64::MIN_POSITIVE, Vec::new());
         for pixel in covered_pixels(pixels, inside) {
-            let (share, bare) = self.shares(pixel);
-            let expected = f64::from(share * self.plastic[channel]);
+            let (measured, expected) = self.measured_and_expected(pixel, channel);
             let weight = 1.0 / f64::from(pixel.sigma(channel)).powi(2);
-            top += weight * f64::from(pixel.slope(channel).clamp(-1.0, 2.0) - bare) * expected;
+            top += weight * measured * expected;
             bottom += weight * expected * expected;
             levers.push(pixel.lines[channel].lever());
         }
         let gain = (top / bottom) as f32;
         let off = PLATE_ERROR * median_lever(levers) * gain.max(1.0);
         (gain, (1.0 / bottom) as f32 + off * off)
+    }
+
+    /// The part of an open channel's transmittance that is plastic, by its own line and by the other channels.
+    #[inline]
+    fn measured_and_expected(&self, pixel: &PixelLines, channel: usize) -> (f64, f64) {
+        let (share, bare) = self.shares(pixel);
+        let measured = pixel.slope(channel).clamp(-1.0, 2.0) - bare;
+        (
+            f64::from(measured),
+            f64::from(share * self.plastic[channel]),
+        )
     }
 
     /// The share of flat plastic, and of nothing, that a pixel's determined channels are made of: least squares, with priors

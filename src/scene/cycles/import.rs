@@ -1,6 +1,8 @@
 //! A shot from a file of the reference renderer.
 
-use super::file::{CyclesEnvironment, CyclesFile, CyclesLight, CyclesQuad, CyclesSide};
+use super::file::{
+    CyclesCamera, CyclesEnvironment, CyclesFile, CyclesLight, CyclesQuad, CyclesSide,
+};
 use crate::asset::{Panorama, Texture};
 use crate::camera::Camera;
 use crate::error::{Error, Result};
@@ -165,15 +167,18 @@ fn film_pixel(color: PremulRgba, opacity: PremulRgba) -> Film {
 
 fn known_camera(file: &CyclesFile) -> Camera {
     let c = &file.camera;
-    let pose = Pose::from_parts(Vector3::from(c.t).into(), rotation_from_rows(c.R));
+    let rendered = [file.render.width, file.render.height];
     Camera {
-        image: c
-            .resolution
-            .unwrap_or([file.render.width, file.render.height]),
+        image: c.resolution.unwrap_or(rendered),
         focal_px: Vector2::new(c.K[0][0], c.K[1][1]),
         principal_px: Point2::new(c.K[0][2], c.K[1][2]),
-        camera_from_world: pose,
+        camera_from_world: camera_pose(c),
     }
+}
+
+fn camera_pose(camera: &CyclesCamera) -> Pose {
+    let translation = Vector3::from(camera.t);
+    Pose::from_parts(translation.into(), rotation_from_rows(camera.R))
 }
 
 fn world_from_card(pose: &[[f64; 4]; 4]) -> Pose {

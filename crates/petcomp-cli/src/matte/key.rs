@@ -53,7 +53,7 @@ impl KeyArgs {
         if self.auto_mattes {
             return self.with_found_mattes(plate);
         }
-        let [garbage, core] = [&self.garbage, &self.core].map(|path| read_optional(path));
+        let [garbage, core] = [&self.garbage, &self.core].map(read_optional);
         Ok(KeyerInput {
             photo: io::read(&self.input)?,
             garbage: garbage?,

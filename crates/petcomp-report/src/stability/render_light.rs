@@ -96,7 +96,7 @@ fn cut_by_the_horizon((quality, options): (&str, RenderOptions)) -> HardCase {
 }
 
 fn reflect_upper_half(light: AreaLight, options: &RenderOptions, expected: f64) -> Result<Outcome> {
-    let found = light_reflected(small_shot().with_light(light), &options);
+    let found = light_reflected(small_shot().with_light(light), options);
     Ok(Outcome::ratio(found, expected, 0.05))
 }
 

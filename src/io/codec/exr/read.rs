@@ -102,11 +102,7 @@ impl<'a> CheckedFile<'a> {
         let choices = self
             .flat_parts()
             .map(|part| (part, choose_channels(wanted, &self.channel_names(part))));
-        // Parts without the channels come last: their error is given where no part has them.
-        let best = choices.min_by_key(|(_, choice)| match choice {
-            Ok((quality, _)) => (false, Some(*quality)),
-            Err(_) => (true, None),
-        });
+        let best = choices.min_by_key(|(_, choice)| rank_of(choice));
         let (part, choice) = best.ok_or("no part with pixels")?;
         let (_, mut picked) = choice?;
         picked.dedup();
@@ -164,6 +160,14 @@ impl<'a> CheckedFile<'a> {
             order,
             sampling: self.sampling.as_ref(),
         })
+    }
+}
+
+/// Parts without the channels come last: their error is given where no part has them.
+fn rank_of(choice: &Result<Choice, String>) -> (bool, Option<ChannelMatch>) {
+    match choice {
+        Ok((quality, _)) => (false, Some(*quality)),
+        Err(_) => (true, None),
     }
 }
 
