@@ -10,7 +10,7 @@ use crate::geom::{Point2, Point3};
 use crate::image::Image;
 use crate::io::exr::{ChannelSamples, Part};
 use crate::pixel::{LinearRgb, ObjectId, PremulRgba};
-use crate::scene::Shot;
+use crate::scene::{Card, Shot};
 use std::str::FromStr;
 
 /// A part of the picture that can be requested by its name.
@@ -57,11 +57,13 @@ impl FromStr for Aov {
 
     fn from_str(name: &str) -> Result<Self> {
         let known = Self::ALL.iter().find(|(n, _)| *n == name);
-        known.map(|&(_, aov)| aov).ok_or_else(|| {
-            let names = Self::ALL.map(|(n, _)| n).join(", ");
-            Error::value("aov", format!("\"{name}\", expected some of {names}"))
-        })
+        known.map(|&(_, aov)| aov).ok_or_else(|| unknown_aov(name))
     }
+}
+
+fn unknown_aov(name: &str) -> Error {
+    let names = Aov::ALL.map(|(n, _)| n).join(", ");
+    Error::value("aov", format!("\"{name}\", expected some of {names}"))
 }
 
 /// Coverage above which an object owns a pixel: that of the reference renderer.
@@ -109,7 +111,7 @@ impl AovSource<'_> {
         float_part(
             "beauty",
             ["R", "G", "B", "A"],
-            pixels.map(|p| [p.r, p.g, p.b, p.a]),
+            pixels.map(|&p| rgba_values(p)),
         )
     }
 
@@ -133,7 +135,7 @@ impl AovSource<'_> {
     }
 
     fn layer_parts(&self) -> Vec<Part> {
-        let tinted = pixels_of(self.deep).any(|(x, y)| !self.deep.tints(x, y).is_empty());
+        let tinted = is_tinted(self.deep);
         let ids = self.shot.cards.iter().map(|card| card.id);
         ids.map(|id| layer_part(self.deep, id, tinted)).collect()
     }
@@ -149,11 +151,13 @@ impl AovSource<'_> {
     }
 
     fn positions(&self) -> impl Iterator<Item = [f32; 3]> {
-        self.fronts().map(|(at, s)| {
-            s.map_or([f32::NAN; 3], |s| {
-                self.world_point(at, s).coords.map(|v| v as f32).into()
-            })
-        })
+        self.fronts()
+            .map(|(at, s)| s.map_or([f32::NAN; 3], |s| self.position_at(at, s)))
+    }
+
+    fn position_at(&self, at: (usize, usize), sample: &DeepSample) -> [f32; 3] {
+        let point = self.world_point(at, sample);
+        point.coords.map(|v| v as f32).into()
     }
 
     fn texture_coordinates(&self) -> impl Iterator<Item = [f32; 2]> {
@@ -163,14 +167,17 @@ impl AovSource<'_> {
 
     /// Texture coordinates that a sample shows at its pixel's centre.
     fn uv_at(&self, at: (usize, usize), sample: &DeepSample) -> Option<[f32; 2]> {
-        let mut cards = self.shot.cards.iter();
-        let quad = &cards.find(|card| card.id == sample.object)?.quad;
+        let quad = &self.card(sample.object)?.quad;
         let point = self.world_point(at, sample);
         let p = quad.world_from_card.inverse_transform_point(&point);
         Some([
             (p.x / quad.size[0] + 0.5) as f32,
             (0.5 - p.y / quad.size[1]) as f32,
         ])
+    }
+
+    fn card(&self, id: ObjectId) -> Option<&Card> {
+        self.shot.cards.iter().find(|card| card.id == id)
     }
 
     /// The point of the world that a sample shows at its pixel's centre.
@@ -187,11 +194,20 @@ fn layer_part(deep: &DeepImage, id: ObjectId, tinted: bool) -> Part {
     let name = format!("layer.{}", id.0);
     let values = pixels_of(deep).map(|at| own_light(deep, at, id));
     if !tinted {
-        let values = values.map(|(p, _)| [p.r, p.g, p.b, p.a]);
+        let values = values.map(|(p, _)| rgba_values(p));
         return float_part(name, ["R", "G", "B", "A"], values);
     }
     let names = ["R", "G", "B", "A", "TR", "TG", "TB"];
     float_part(name, names, values.map(tinted_values))
+}
+
+#[inline]
+fn rgba_values(p: PremulRgba) -> [f32; 4] {
+    [p.r, p.g, p.b, p.a]
+}
+
+fn is_tinted(deep: &DeepImage) -> bool {
+    pixels_of(deep).any(|(x, y)| !deep.tints(x, y).is_empty())
 }
 
 /// Light, coverage, and what is let pass per channel.

@@ -42,10 +42,16 @@ const CHANNELS: [&str; 2 * RANKS_PER_PIXEL] = [
 pub fn cryptomatte(deep: &DeepImage, name: impl Fn(ObjectId) -> String) -> Part {
     let ranks = pixels_of(deep).map(|(x, y)| ranked_objects(deep.at(x, y), &name));
     let mut part = float_part(NAME, CHANNELS, ranks);
-    let samples = pixels_of(deep).flat_map(|(x, y)| deep.at(x, y));
-    let objects: BTreeMap<ObjectId, String> = samples.map(|s| (s.object, name(s.object))).collect();
-    part.metadata = part_metadata(objects.values());
+    part.metadata = part_metadata(named_objects(deep, name).values());
     part
+}
+
+fn named_objects(
+    deep: &DeepImage,
+    name: impl Fn(ObjectId) -> String,
+) -> BTreeMap<ObjectId, String> {
+    let samples = pixels_of(deep).flat_map(|(x, y)| deep.at(x, y));
+    samples.map(|s| (s.object, name(s.object))).collect()
 }
 
 /// Identifier and coverage, in turn; zeros where there are fewer objects.

@@ -165,11 +165,14 @@ impl SensorNoise {
 
 /// A number from the normal distribution, by Box and Muller from two uniform ones.
 fn normal_deviate(seed: u64, index: u64) -> f64 {
-    let [first, second] = [0, 1].map(|k| {
-        let bits = split_mix(split_mix(seed).wrapping_add(2 * index + k)) >> 11;
-        bits as f64 / (1_u64 << 53) as f64
-    });
+    let [first, second] = [0, 1].map(|k| unit_deviate(seed, 2 * index + k));
     (-2.0 * libm::log(1.0 - first)).sqrt() * libm::cos(TAU * second)
+}
+
+/// A number of 0 to 1, without 1, from the uniform distribution.
+fn unit_deviate(seed: u64, index: u64) -> f64 {
+    let bits = split_mix(split_mix(seed).wrapping_add(index)) >> 11;
+    bits as f64 / (1_u64 << 53) as f64
 }
 
 /// SplitMix64 (Steele, Lea and Flood, 2014): neighbouring numbers become unrelated ones.

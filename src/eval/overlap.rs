@@ -83,7 +83,7 @@ impl BoxIndex {
     }
 }
 
-/// Places of the boxes, from the leftmost.
+/// How far to the right the boxes reach up to each in the order.
 fn running_right_edges(boxes: &[BBox], order: &[usize]) -> Vec<f64> {
     let edges = order.iter().scan(f64::NEG_INFINITY, |reach, &i| {
         *reach = reach.max(boxes[i].x1);
@@ -92,6 +92,7 @@ fn running_right_edges(boxes: &[BBox], order: &[usize]) -> Vec<f64> {
     edges.collect()
 }
 
+/// Places of the boxes, from the leftmost.
 fn order_by_left(boxes: &[BBox]) -> Vec<usize> {
     let mut order: Vec<usize> = (0..boxes.len()).collect();
     order.sort_by(|&a, &b| boxes[a].x0.total_cmp(&boxes[b].x0));

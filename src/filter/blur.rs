@@ -1,9 +1,8 @@
 //! Blurs.
 
-use super::separable::{Taps, filter};
+use super::separable::{Taps, filter_both_ways};
 use crate::image::Image;
 use crate::pixel::Mix;
-use crate::work::{self, Kind};
 
 /// Standard deviations at which the Gaussian window ends; what lies beyond weighs 6e-5 of the whole.
 const GAUSSIAN_REACH_SIGMAS: f64 = 4.0;
@@ -16,10 +15,7 @@ pub fn gaussian_blur<P: Mix>(image: &Image<P>, sigma_px: f32) -> Image<P> {
     if sigma_px.is_nan() || sigma_px <= 0.0 {
         return image.clone();
     }
-    work::add(Kind::Filters, 1);
-    let [columns, rows] =
-        [image.width(), image.height()].map(|len| gaussian_taps(len, f64::from(sigma_px)));
-    filter(image, &columns, &rows)
+    filter_both_ways(image, |len| gaussian_taps(len, f64::from(sigma_px)))
 }
 
 /// A picture of which each pixel is the mean of the square of `2 radius + 1` pixels around it; unchanged where that is
@@ -28,10 +24,7 @@ pub fn box_blur<P: Mix>(image: &Image<P>, radius: usize) -> Image<P> {
     if radius == 0 {
         return image.clone();
     }
-    work::add(Kind::Filters, 1);
-    let [columns, rows] =
-        [image.width(), image.height()].map(|len| window_taps(len, radius, |_| 1.0));
-    filter(image, &columns, &rows)
+    filter_both_ways(image, |len| window_taps(len, radius, |_| 1.0))
 }
 
 /// A Gaussian around every sample of a line.

@@ -1,6 +1,6 @@
 //! Pictures at half the size, and half of that: plain averages, and the binomial kernel of Laplacian pyramids.
 
-use super::separable::{Taps, filter};
+use super::separable::{Taps, filter, filter_both_ways};
 use crate::image::Image;
 use crate::pixel::Mix;
 use crate::work::{self, Kind};
@@ -18,8 +18,7 @@ pub struct Pyramid<P> {
 impl<P: Mix> Pyramid<P> {
     /// A pyramid over a picture; no level but the first exists yet.
     pub fn new(base: Image<P>) -> Self {
-        let longest = base.width().max(base.height()).max(1);
-        let count = longest.next_power_of_two().trailing_zeros() as usize;
+        let count = halvings(base.size());
         Self {
             base,
             halves: (0..count).map(|_| OnceLock::new()).collect(),
@@ -61,12 +60,20 @@ pub fn halve<P: Mix>(image: &Image<P>) -> Image<P> {
 }
 
 fn halved<P: Mix>(image: &Image<P>) -> Image<P> {
-    let [columns, rows] = [image.width(), image.height()].map(|len| {
-        line_taps(len.div_ceil(2), |i| {
-            Taps::new(2 * i..2 * i + 2, len, |_| 1.0)
-        })
-    });
-    filter(image, &columns, &rows)
+    let (width, height) = image.size();
+    filter(image, &halving_taps(width), &halving_taps(height))
+}
+
+/// How often a picture can be halved until one pixel is left.
+fn halvings((width, height): (usize, usize)) -> usize {
+    let longest = width.max(height).max(1);
+    longest.next_power_of_two().trailing_zeros() as usize
+}
+
+fn halving_taps(len: usize) -> Vec<Taps> {
+    line_taps(len.div_ceil(2), |i| {
+        Taps::new(2 * i..2 * i + 2, len, |_| 1.0)
+    })
 }
 
 /// A picture of half the size, smoothed by the binomial kernel (1 4 6 4 1)/16; odd sizes round up.
@@ -79,9 +86,7 @@ fn halved<P: Mix>(image: &Image<P>) -> Image<P> {
 ///
 /// [Burt and Adelson 1983]: https://doi.org/10.1109/TCOM.1983.1095851
 pub fn reduce<P: Mix>(image: &Image<P>) -> Image<P> {
-    work::add(Kind::Filters, 1);
-    let [columns, rows] = [image.width(), image.height()].map(reducing_taps);
-    filter(image, &columns, &rows)
+    filter_both_ways(image, reducing_taps)
 }
 
 /// From a line of `len` to one of half that.

@@ -14,13 +14,16 @@ pub(crate) fn sample_bilinear<P: Mix>(image: &Image<P>, x: f64, y: f64) -> P {
 
 #[inline(always)]
 fn pixel_or_empty<P: Copy + Default>(image: &Image<P>, i: isize, j: isize) -> P {
-    let inside =
-        (0..image.width() as isize).contains(&i) && (0..image.height() as isize).contains(&j);
-    if inside {
+    if is_inside(image, i, j) {
         image[(i as usize, j as usize)]
     } else {
         P::default()
     }
+}
+
+#[inline]
+fn is_inside<P: Copy>(image: &Image<P>, i: isize, j: isize) -> bool {
+    (0..image.width() as isize).contains(&i) && (0..image.height() as isize).contains(&j)
 }
 
 /// The bilinear value at `(x, y)` in pixels, going on outside the picture as the nearest pixel inside; 0 in an empty

@@ -3,6 +3,7 @@
 
 use crate::image::Image;
 use crate::pixel::Mix;
+use crate::work::{self, Kind};
 use rayon::prelude::*;
 
 /// The samples of one line that an output sample is the weighted mean of: the first one's index, and the weights from
@@ -62,10 +63,7 @@ const BLOCK_PIXELS: usize = 512;
 /// along itself. There is no picture in between. Neighbours with the same weights (a blur) are summed tap by tap, not
 /// pixel by pixel, for the same reason.
 pub(super) fn filter<P: Mix>(image: &Image<P>, columns: &[Taps], rows: &[Taps]) -> Image<P> {
-    let runs: Vec<&[Taps]> = columns
-        .chunk_by(|a, b| b.follows(a))
-        .flat_map(|run| run.chunks(BLOCK_PIXELS))
-        .collect();
+    let runs = runs_of(columns);
     let mut out = Image::new(columns.len(), rows.len());
     out.par_rows_mut().zip(rows).for_each_init(
         || vec![P::default(); image.width()],
@@ -75,6 +73,22 @@ pub(super) fn filter<P: Mix>(image: &Image<P>, columns: &[Taps], rows: &[Taps]) 
         },
     );
     out
+}
+
+/// Taps that are alike, in blocks.
+fn runs_of(columns: &[Taps]) -> Vec<&[Taps]> {
+    let runs = columns.chunk_by(|a, b| b.follows(a));
+    runs.flat_map(|run| run.chunks(BLOCK_PIXELS)).collect()
+}
+
+/// Filters columns and rows with taps of one kind, by the length of a side.
+pub(super) fn filter_both_ways<P: Mix>(
+    image: &Image<P>,
+    taps: impl Fn(usize) -> Vec<Taps>,
+) -> Image<P> {
+    work::add(Kind::Filters, 1);
+    let (width, height) = image.size();
+    filter(image, &taps(width), &taps(height))
 }
 
 /// A row of output pixels, run by run, from a mixed row.

@@ -129,7 +129,7 @@ impl Figure {
     }
 }
 
-/// The whole pixels between two places of a drawing, of a picture `scale` times as large.
+/// Columns and rows of the picture that a view shows.
 fn visible_pixels(
     picture: &Image<LinearRgb>,
     view: &BBox,
@@ -148,6 +148,7 @@ fn scale_of(picture: &Image<LinearRgb>, [width, height]: [f64; 2]) -> [f64; 2] {
     ]
 }
 
+/// The whole pixels between two places of a drawing, of a picture `scale` times as large.
 fn pixel_span([start, end]: [f64; 2], scale: f64, length: usize) -> Range<usize> {
     let [start, end] =
         [start, end + 1.0 / scale].map(|v| ((v * scale).max(0.0) as usize).min(length));

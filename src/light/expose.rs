@@ -4,7 +4,7 @@ use crate::geom::{Point3, Vector3};
 use crate::image::Image;
 use crate::light::{irradiance, match_light_tint, match_noise, surface_color};
 use crate::pixel::LinearRgb;
-use crate::scene::{Exposure, Scene};
+use crate::scene::{AreaLight, Exposure, Scene};
 use std::f64::consts::PI;
 
 /// Share of the plate's pixels that are darker than its white.
@@ -63,8 +63,7 @@ fn stops_of(ratio: f64) -> f64 {
 ///
 /// Pixels that are not finite are left out; 0 for a plate without any other.
 pub(crate) fn plate_white(plate: &Image<LinearRgb>) -> f32 {
-    let finite = plate.pixels().iter().filter(|c| c.is_finite());
-    let mut values: Vec<_> = finite.map(|c| c.luminance()).collect();
+    let mut values = finite_luminances(plate);
     if values.is_empty() {
         return 0.0;
     }
@@ -72,14 +71,20 @@ pub(crate) fn plate_white(plate: &Image<LinearRgb>) -> f32 {
     *values.select_nth_unstable_by(rank, f32::total_cmp).1
 }
 
+fn finite_luminances(plate: &Image<LinearRgb>) -> Vec<f32> {
+    let finite = plate.pixels().iter().filter(|c| c.is_finite());
+    finite.map(|c| c.luminance()).collect()
+}
+
 /// Luminance of a white card in the middle of the surface.
 fn white_card(scene: &Scene) -> f32 {
-    let lit: f32 = scene
-        .lights
-        .iter()
-        .map(|light| irradiance(light, Point3::origin(), Vector3::z()).luminance())
-        .sum();
+    let lit: f32 = scene.lights.iter().map(luminance_at_origin).sum();
     lit / PI as f32 + scene.ambient.luminance()
+}
+
+/// Of what a light sends to the middle of the surface.
+fn luminance_at_origin(light: &AreaLight) -> f32 {
+    irradiance(light, Point3::origin(), Vector3::z()).luminance()
 }
 
 #[cfg(test)]

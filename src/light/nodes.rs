@@ -175,7 +175,7 @@ impl LightHorizon {
     fn chords(&self, n: usize) -> Vec<([f64; 2], f64)> {
         let steepest = self.rise[0].hypot(self.rise[1]);
         let up = self.rise.map(|r| r / steepest);
-        let widest = libm::acos((-self.middle / steepest).clamp(-1.0, 1.0));
+        let widest = self.widest_angle(steepest);
         // Chords of a nearly whole disk grow and shrink again: n of them miss its area by 2 %.
         let (across, along) = (gauss_legendre(2 * n), gauss_legendre(n));
         let mut points = Vec::with_capacity(2 * n * n);
@@ -188,6 +188,11 @@ impl LightHorizon {
             );
         }
         points
+    }
+
+    /// Half of what is seen of the rim.
+    fn widest_angle(&self, steepest: f64) -> f64 {
+        libm::acos((-self.middle / steepest).clamp(-1.0, 1.0))
     }
 }
 

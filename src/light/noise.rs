@@ -30,8 +30,7 @@ pub(crate) fn match_noise(mut scene: Scene, plate: &Image<LinearRgb>) -> Scene {
 /// The residual of the difference of two Laplacians, which passes over slopes and straight edges (J. Immerkær, "Fast Noise
 /// Variance Estimation", 1996); its lower quartile in groups of like brightness; a line through their variances.
 pub fn plate_noise(plate: &Image<LinearRgb>) -> Noise {
-    let mut residuals = residuals_of(plate);
-    residuals.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let residuals = residuals_by_brightness(plate);
     let size = residuals.len() / BRIGHTNESS_GROUPS;
     if size < MIN_GROUP_PIXELS {
         return Noise::None;
@@ -40,13 +39,24 @@ pub fn plate_noise(plate: &Image<LinearRgb>) -> Noise {
     fit_noise(&groups)
 }
 
+fn residuals_by_brightness(plate: &Image<LinearRgb>) -> Vec<(f32, f32)> {
+    let mut residuals = residuals_of(plate);
+    residuals.sort_by(|a, b| a.0.total_cmp(&b.0));
+    residuals
+}
+
 /// The residuals around all pixels but the outermost.
 fn residuals_of(plate: &Image<LinearRgb>) -> Vec<(f32, f32)> {
-    let (width, height) = plate.size();
-    (1..height.saturating_sub(1))
-        .flat_map(|y| (1..width.saturating_sub(1)).map(move |x| (x, y)))
+    let places = inner_places(plate.size());
+    places
         .filter_map(|(x, y)| residual_at(plate, x, y))
         .collect()
+}
+
+/// Pixels with neighbours on all sides.
+fn inner_places((width, height): (usize, usize)) -> impl Iterator<Item = (usize, usize)> {
+    let rows = 1..height.saturating_sub(1);
+    rows.flat_map(move |y| (1..width.saturating_sub(1)).map(move |x| (x, y)))
 }
 
 /// Mean and magnitude of the residual around a pixel; none near white or where something is not finite.
@@ -64,9 +74,12 @@ fn residual_at(plate: &Image<LinearRgb>, x: usize, y: usize) -> Option<(f32, f32
 
 /// Mean brightness and variance of a group.
 fn group_noise(group: &[(f32, f32)]) -> [f64; 2] {
-    let mean = group.iter().map(|p| f64::from(p.0)).sum::<f64>() / group.len() as f64;
     let sigma = lower_quartile(group) / (QUARTILE_SIGMAS * MASK_GAIN);
-    [mean, sigma * sigma]
+    [mean_brightness(group), sigma * sigma]
+}
+
+fn mean_brightness(group: &[(f32, f32)]) -> f64 {
+    group.iter().map(|p| f64::from(p.0)).sum::<f64>() / group.len() as f64
 }
 
 /// That of the residuals of a group.

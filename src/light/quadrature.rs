@@ -8,21 +8,25 @@ use std::f64::consts::PI;
 /// Newton's iteration on the Legendre polynomial from Tricomi's estimate of its roots.
 pub(crate) fn gauss_legendre(n: usize) -> Vec<(f64, f64)> {
     (0..n)
-        .map(|i| {
-            let estimate = libm::cos(PI * (n as f64 - i as f64 - 0.25) / (n as f64 + 0.5));
-            gauss_point(n, estimate)
-        })
+        .map(|i| gauss_point(n, estimated_root(n, i)))
         .collect()
+}
+
+/// Of the Legendre polynomial of degree `n`, good to three digits.
+fn estimated_root(n: usize, i: usize) -> f64 {
+    libm::cos(PI * (n as f64 - i as f64 - 0.25) / (n as f64 + 0.5))
 }
 
 fn gauss_point(n: usize, estimate: f64) -> (f64, f64) {
     // Quadratic convergence: 8 steps are plenty from an estimate good to three digits.
-    let root = (0..8).fold(estimate, |x, _| {
-        let (p, slope) = legendre(n, x);
-        x - p / slope
-    });
+    let root = (0..8).fold(estimate, |x, _| newton_step(n, x));
     let (_, slope) = legendre(n, root);
     (root, 2.0 / ((1.0 - root * root) * slope * slope))
+}
+
+fn newton_step(n: usize, x: f64) -> f64 {
+    let (p, slope) = legendre(n, x);
+    x - p / slope
 }
 
 /// Value and slope of the Legendre polynomial of degree `n`, by its recurrence.

@@ -67,11 +67,7 @@ fn visible_pieces(
         .collect();
     if seen.is_empty() && irradiance.iter().any(|&e| e > 0.0) {
         // A sun has taken all the cuts, on the other side: what little there is here is one piece.
-        seen.push(VisiblePiece {
-            direction: *normal,
-            irradiance,
-            width: HALF_SKY_WIDTH,
-        });
+        seen.push(VisiblePiece::half_sky(normal, irradiance));
     }
     seen
 }
@@ -79,13 +75,19 @@ fn visible_pieces(
 /// Factors that make pieces add up to the irradiance of the whole map times its strength.
 fn irradiance_scale(pieces: &[VisiblePiece], whole: [f64; 3], strength: f64) -> [f64; 3] {
     std::array::from_fn(|c| {
-        let sum = pieces.iter().fold(0.0, |sum, p| sum + p.irradiance[c]);
+        let sum = irradiance_sum(pieces, c);
         if sum > 0.0 {
             strength * whole[c] / sum
         } else {
             0.0
         }
     })
+}
+
+fn irradiance_sum(pieces: &[VisiblePiece], channel: usize) -> f64 {
+    pieces
+        .iter()
+        .fold(0.0, |sum, p| sum + p.irradiance[channel])
 }
 
 /// A piece in the frame of the picture.
@@ -115,5 +117,14 @@ impl VisiblePiece {
             irradiance,
             width: piece.moments.width(),
         })
+    }
+
+    /// All that lights a surface, as one piece.
+    fn half_sky(normal: &Vector3<f64>, irradiance: [f64; 3]) -> Self {
+        Self {
+            direction: *normal,
+            irradiance,
+            width: HALF_SKY_WIDTH,
+        }
     }
 }

@@ -13,24 +13,29 @@ pub(crate) fn surface_color(scene: &Scene, plate: &Image<LinearRgb>) -> Option<L
         return None;
     };
     let seen = surface_pixels(&camera, scene.surface.size, plate);
-    if seen.is_empty() {
-        return None;
-    }
-    Some(LinearRgb::new(
-        median_of(&seen, |c| c.r),
-        median_of(&seen, |c| c.g),
-        median_of(&seen, |c| c.b),
-    ))
+    (!seen.is_empty()).then(|| median_color(&seen))
+}
+
+fn median_color(colors: &[LinearRgb]) -> LinearRgb {
+    LinearRgb::new(
+        median_of(colors, |c| c.r),
+        median_of(colors, |c| c.g),
+        median_of(colors, |c| c.b),
+    )
 }
 
 /// The finite pixels of a plate that show a surface of this size.
 fn surface_pixels(camera: &Camera, size: [f64; 2], plate: &Image<LinearRgb>) -> Vec<LinearRgb> {
     let places = (0..plate.height()).flat_map(|y| (0..plate.width()).map(move |x| (x, y)));
     places
-        .filter(|&(x, y)| surface_point(camera, x, y).is_some_and(|p| is_on_surface(&p, size)))
+        .filter(|&at| shows_surface(camera, size, at))
         .map(|at| plate[at])
         .filter(|c| c.is_finite())
         .collect()
+}
+
+fn shows_surface(camera: &Camera, size: [f64; 2], (x, y): (usize, usize)) -> bool {
+    surface_point(camera, x, y).is_some_and(|p| is_on_surface(&p, size))
 }
 
 fn is_on_surface(point: &Point3<f64>, [w, h]: [f64; 2]) -> bool {
@@ -69,11 +74,15 @@ pub fn match_light_tint(scene: Scene, plate: &Image<LinearRgb>) -> Scene {
 /// A share, as an exponent, of a colour's ratio to grey; white for a colour without some channel.
 fn tint_of(color: LinearRgb, share: f64) -> LinearRgb {
     let luminance = color.luminance();
-    if color.r > 0.0 && color.g > 0.0 && color.b > 0.0 {
+    if is_positive(color) {
         color.map(|v| libm::pow(f64::from(v / luminance), share) as f32)
     } else {
         LinearRgb::WHITE
     }
+}
+
+fn is_positive(color: LinearRgb) -> bool {
+    color.r > 0.0 && color.g > 0.0 && color.b > 0.0
 }
 
 #[cfg(test)]

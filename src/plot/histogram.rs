@@ -154,11 +154,11 @@ fn clipped_label([x, y]: [f64; 2], room: f64, anchor: &str, whole: &str) -> Mark
     }
 }
 
-/// A text, cut where there is no more room for it.
 fn bin_at(place: f64) -> usize {
     if place > 0.0 { place as usize } else { 0 }
 }
 
+/// A text, cut where there is no more room for it.
 fn cut_to_room(text: &str, room: f64) -> String {
     clipped(text, (room / LETTER_WIDTH) as usize)
 }

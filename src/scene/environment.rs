@@ -36,10 +36,7 @@ impl Environment {
     /// Fails on the first impossible value.
     pub(super) fn check(&self, at: &str) -> Result<()> {
         if self.file.is_empty() {
-            return Err(Error::value(
-                format!("{at}.file"),
-                "\"\", expected the name of a picture",
-            ));
+            return Err(unnamed_picture(format!("{at}.file")));
         }
         TURN.check(&format!("{at}.rotation_deg"), self.rotation_deg)?;
         RADIANCE.check(&format!("{at}.strength"), self.strength)
@@ -82,6 +79,10 @@ pub(crate) fn turned(direction: &Vector3<f64>, angle: f64) -> Vector3<f64> {
     Vector3::new(cos * d.x - sin * d.y, sin * d.x + cos * d.y, d.z)
 }
 
+fn unnamed_picture(at: String) -> Error {
+    Error::value(at, "\"\", expected the name of a picture")
+}
+
 /// What a scene's environment map is drawn from.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -119,8 +120,7 @@ impl EnvironmentRanges {
 
     pub(super) fn check(&self) -> Result<()> {
         if let Some(i) = self.files.iter().position(String::is_empty) {
-            let what = "\"\", expected the name of a picture";
-            return Err(Error::value(format!("environment.files[{i}]"), what));
+            return Err(unnamed_picture(format!("environment.files[{i}]")));
         }
         self.rotation_deg.check("environment.rotation_deg", &TURN)?;
         self.strength.check("environment.strength", &RADIANCE)

@@ -104,13 +104,17 @@ impl SettleOptions {
 
     fn check_gravity(&self) -> Result<()> {
         let [x, y, z] = self.gravity;
-        if !(z < 0.0 && [x, y, z].iter().all(|g| g.is_finite())) {
+        if !self.falls_down() {
             return Err(Error::value(
                 "settle.gravity",
                 format!("{:?}, expected to point down", self.gravity),
             ));
         }
         GRAVITY.check("settle.gravity", libm::hypot(libm::hypot(x, y), z))
+    }
+
+    fn falls_down(&self) -> bool {
+        self.gravity[2] < 0.0 && self.gravity.iter().all(|g| g.is_finite())
     }
 }
 

@@ -88,11 +88,7 @@ impl Scene {
     fn cards(&self, look: impl Fn(&Object) -> Option<Appearance>) -> Result<Vec<Card>> {
         let numbered = self.objects.iter().enumerate();
         numbered
-            .map(|(i, object)| {
-                let pose = rest_pose(i, object)?;
-                let look = look(object).ok_or_else(|| unknown_asset(i, object))?;
-                Ok(look.into_card(ObjectId(object_id(i)?), object, pose))
-            })
+            .map(|(i, object)| resting_card(i, object, &look))
             .collect()
     }
 
@@ -174,6 +170,16 @@ fn unmatched(at: &str) -> Error {
 fn missing_panorama(file: &str) -> Error {
     let what = format!("\"{file}\", but its picture was not given");
     Error::value("environment.file", what)
+}
+
+fn resting_card(
+    i: usize,
+    object: &Object,
+    look: impl Fn(&Object) -> Option<Appearance>,
+) -> Result<Card> {
+    let pose = rest_pose(i, object)?;
+    let look = look(object).ok_or_else(|| unknown_asset(i, object))?;
+    Ok(look.into_card(ObjectId(object_id(i)?), object, pose))
 }
 
 fn rest_pose(i: usize, object: &Object) -> Result<Pose> {

@@ -131,7 +131,7 @@ impl DropColumn<'_> {
         let room = self.surface.size;
         (0..MAX_YAW_DRAWS)
             .map(|number| self.draw_rotation(path, number))
-            .find(|rotation| fits(room, half, rotation) && fits(room, half, &level(rotation)))
+            .find(|rotation| fits_level_too(room, half, rotation))
             .or_else(|| self.draw_level_rotation(half, path))
     }
 
@@ -143,13 +143,8 @@ impl DropColumn<'_> {
 
     /// First a turn about the vertical, drawn for this object for the `number`-th time, then the tilt.
     fn draw_rotation(&self, path: &str, number: u32) -> UnitQuaternion<f64> {
-        let yaw_name = if number == 0 {
-            "yaw_deg".into()
-        } else {
-            format!("yaw_deg#{number}")
-        };
-        let yaw = level_turn(self.draw(&self.start.yaw_deg, path, &yaw_name));
-        self.draw_tilt(path) * yaw
+        let yaw = self.draw(&self.start.yaw_deg, path, &yaw_field(number));
+        self.draw_tilt(path) * level_turn(yaw)
     }
 
     /// A tilt about a horizontal axis.
@@ -176,6 +171,15 @@ impl DropRanges {
         whole_degrees(self.yaw_deg)
             .map(level_turn)
             .filter(move |rotation| fits(surface, half, rotation))
+    }
+}
+
+/// Every further draw of a yaw has a path of its own.
+fn yaw_field(number: u32) -> String {
+    if number == 0 {
+        "yaw_deg".into()
+    } else {
+        format!("yaw_deg#{number}")
     }
 }
 
@@ -207,6 +211,11 @@ fn fits(surface: [f64; 2], half: &Vector3<f64>, rotation: &UnitQuaternion<f64>) 
     free.iter()
         .zip(surface)
         .all(|(free, side)| *free >= -FIT_TOLERANCE * side)
+}
+
+/// Whether a body fits as it is turned, and without its tilt.
+fn fits_level_too(surface: [f64; 2], half: &Vector3<f64>, rotation: &UnitQuaternion<f64>) -> bool {
+    fits(surface, half, rotation) && fits(surface, half, &level(rotation))
 }
 
 /// The message for a card that fits nowhere.

@@ -150,15 +150,21 @@ fn write_opacity(folder: &Path, name: &str, film: &Image<Film>) -> Result<String
 
 fn cycles_light(light: &AreaLight, exposure: f32) -> CyclesLight {
     CyclesLight {
-        shape: match light.shape {
-            LightShape::Rectangle => CyclesShape::Rectangle,
-            LightShape::Ellipse => CyclesShape::Ellipse,
-        },
+        shape: light.shape.into(),
         size: CyclesSize::Two(light.size),
         power: light.power * f64::from(exposure),
         color: light.color,
         position: light.position,
         target: light_target(light),
+    }
+}
+
+impl From<LightShape> for CyclesShape {
+    fn from(shape: LightShape) -> Self {
+        match shape {
+            LightShape::Rectangle => Self::Rectangle,
+            LightShape::Ellipse => Self::Ellipse,
+        }
     }
 }
 

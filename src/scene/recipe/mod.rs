@@ -184,11 +184,7 @@ impl Recipe {
         check_image(self.image)?;
         self.check_objects()?;
         self.check_light()?;
-        self.friction.check("friction", &FRICTION)?;
-        self.restitution.check("restitution", &SHARE)?;
-        if let Some(albedo) = self.surface_albedo {
-            ALBEDO.check("surface_albedo", albedo)?;
-        }
+        self.check_surface()?;
         check_cast(&self.cast)?;
         self.finish.check()?;
         self.settle.check()
@@ -200,6 +196,15 @@ impl Recipe {
         self.scale.check("scale", &SCALE)?;
         self.start.check()?;
         self.grade.check("grade")
+    }
+
+    fn check_surface(&self) -> Result<()> {
+        self.friction.check("friction", &FRICTION)?;
+        self.restitution.check("restitution", &SHARE)?;
+        match self.surface_albedo {
+            Some(albedo) => ALBEDO.check("surface_albedo", albedo),
+            None => Ok(()),
+        }
     }
 
     fn check_light(&self) -> Result<()> {

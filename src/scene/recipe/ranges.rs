@@ -109,10 +109,14 @@ impl LightRanges {
     fn draw_color(&self, draws: &Draws, path: &str) -> LinearRgb {
         let tint =
             [0, 1, 2].map(|c| self.color[c].draw(draws, &format!("{path}.color[{c}]")) as f32);
-        let glow = self.temperature_k.map_or(LinearRgb::WHITE, |range| {
+        LinearRgb::from(tint) * self.draw_glow(draws, path)
+    }
+
+    /// The colour of its temperature.
+    fn draw_glow(&self, draws: &Draws, path: &str) -> LinearRgb {
+        self.temperature_k.map_or(LinearRgb::WHITE, |range| {
             planckian(range.draw_field(draws, path, "temperature_k"))
-        });
-        LinearRgb::from(tint) * glow
+        })
     }
 
     /// The light at the middle of its ranges, its size still varying.
