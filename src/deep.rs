@@ -149,18 +149,22 @@ impl DeepImage {
     /// All that the objects do to one pixel: their light, and what they hide of what is behind, per channel.
     #[inline(always)]
     pub fn flat(&self, x: usize, y: usize) -> Film {
-        let samples = self.at(x, y);
-        let color = samples
-            .iter()
-            .fold(LinearRgb::BLACK, |sum, s| sum + s.light);
         // A sum of shares that make up a whole may miss it by a rounding.
         Film {
-            color,
+            color: self.light(x, y),
             opacity: self.hidden(x, y).map(|o| o.min(1.0)),
         }
     }
 
+    /// The sum of what the samples of a pixel send to the camera.
+    #[inline]
+    fn light(&self, x: usize, y: usize) -> LinearRgb {
+        let samples = self.at(x, y).iter();
+        samples.fold(LinearRgb::BLACK, |sum, s| sum + s.light)
+    }
+
     /// The sum of what the samples of a pixel hide of the plate.
+    #[inline]
     fn hidden(&self, x: usize, y: usize) -> LinearRgb {
         match self.tints(x, y) {
             [] => LinearRgb::grey(self.at(x, y).iter().map(|s| s.visible).sum()),

@@ -38,13 +38,16 @@ pub(crate) fn class_color(class: u32) -> Srgb8 {
 
 /// Black or white, whichever is easier to read on a colour.
 pub(crate) fn ink_on(paper: Srgb8) -> Srgb8 {
-    // Luma of Rec. 601 on the codes: close to how light a colour looks.
-    let luma = 299 * u32::from(paper.r) + 587 * u32::from(paper.g) + 114 * u32::from(paper.b);
-    if luma > 140_000 {
+    if luma(paper) > 140_000 {
         rgb(0, 0, 0)
     } else {
         rgb(255, 255, 255)
     }
+}
+
+/// Luma of Rec. 601 on the codes, times 1000: close to how light a colour looks.
+fn luma(color: Srgb8) -> u32 {
+    299 * u32::from(color.r) + 587 * u32::from(color.g) + 114 * u32::from(color.b)
 }
 
 /// Mixes a colour into a pixel, where there is one.
@@ -57,11 +60,16 @@ fn blend(canvas: &mut Image<Srgb8>, x: isize, y: isize, color: Srgb8, alpha: f32
         return;
     }
     let under = canvas[(x, y)];
-    canvas[(x, y)] = rgb(
-        mixed(under.r, color.r, alpha),
-        mixed(under.g, color.g, alpha),
-        mixed(under.b, color.b, alpha),
-    );
+    canvas[(x, y)] = mixed_color(under, color, alpha);
+}
+
+#[inline]
+fn mixed_color(under: Srgb8, over: Srgb8, alpha: f32) -> Srgb8 {
+    rgb(
+        mixed(under.r, over.r, alpha),
+        mixed(under.g, over.g, alpha),
+        mixed(under.b, over.b, alpha),
+    )
 }
 
 #[inline]
@@ -114,6 +122,10 @@ fn nearest_edge(at: f64, length: usize) -> isize {
     libm::round(at.clamp(0.0, length as f64)) as isize
 }
 
+fn pixel_within(at: f64, length: usize) -> isize {
+    at.clamp(0.0, length as f64) as isize
+}
+
 /// A closed line of one pixel's width through points, smooth, with a halo.
 pub(crate) fn outline(canvas: &mut Image<Srgb8>, ring: &[Point2<f64>], color: Srgb8) {
     for (radius, color, alpha) in [(1.5, HALO, HALO_ALPHA), (0.5, color, 1.0)] {
@@ -149,8 +161,7 @@ impl Segment {
     /// Columns or rows that it may touch.
     fn pixel_range(&self, a: f64, b: f64, length: usize) -> Range<isize> {
         let reach = self.radius + 1.0;
-        let clamp = |v: f64| v.clamp(0.0, length as f64) as isize;
-        clamp(a.min(b) - reach)..clamp(a.max(b) + reach + 1.0)
+        pixel_within(a.min(b) - reach, length)..pixel_within(a.max(b) + reach + 1.0, length)
     }
 
     /// A ramp over one pixel by the distance of its middle from the line.

@@ -13,9 +13,14 @@ pub(super) const RECALL_POINTS: usize = 101;
 /// As YOLOv5 computes it (its file `utils/metrics.py`, function `compute_ap`, method `interp`).
 pub(super) fn trapezoid(recall: &[f64], precision: &[f64]) -> f64 {
     let read = envelope_samples(recall, precision);
-    (0..RECALL_POINTS - 1)
-        .map(|i| (recall_at(i + 1) - recall_at(i)) * (read[i + 1] + read[i]) / 2.0)
-        .sum()
+    let strips = 0..RECALL_POINTS - 1;
+    strips.map(|i| strip_area(i, [read[i], read[i + 1]])).sum()
+}
+
+/// Between the `i`-th recall and the next one.
+#[inline]
+fn strip_area(i: usize, heights: [f64; 2]) -> f64 {
+    (recall_at(i + 1) - recall_at(i)) * (heights[1] + heights[0]) / 2.0
 }
 
 /// The envelope of the precision at each of the recalls, linear between its points.
@@ -48,10 +53,14 @@ pub(super) fn samples(recall: &[f64], precision: &[f64]) -> [f64; RECALL_POINTS]
     let mut ys = precision.to_vec();
     make_envelope(&mut ys);
     std::array::from_fn(|i| {
-        ys.get(recall.partition_point(|&r| r < recall_at(i)))
-            .copied()
-            .unwrap_or(0.0)
+        let reached = first_reaching(recall_at(i), recall);
+        ys.get(reached).copied().unwrap_or(0.0)
     })
+}
+
+#[inline]
+fn first_reaching(recall: f64, recalls: &[f64]) -> usize {
+    recalls.partition_point(|&r| r < recall)
 }
 
 /// Recall and precision after each detection, `epsilon` keeping the divisions defined.

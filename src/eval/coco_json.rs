@@ -123,9 +123,8 @@ impl CocoTruth {
     }
 
     fn add_annotation(&mut self, annotation: &CocoAnnotation) -> Result<()> {
-        let (image, class) = self.place(annotation.image_id, annotation.category_id)?;
-        let truth = annotation.to_truth(class)?;
-        self.sheets[image].truth.push(truth);
+        let (sheet, class) = self.sheet_mut(annotation.image_id, annotation.category_id)?;
+        sheet.truth.push(annotation.to_truth(class)?);
         Ok(())
     }
 
@@ -138,10 +137,15 @@ impl CocoTruth {
     }
 
     fn add_detection(&mut self, found: &CocoDetection) -> Result<()> {
-        let (image, class) = self.place(found.image_id, found.category_id)?;
-        let detection = found.to_detection(class)?;
-        self.sheets[image].found.push(detection);
+        let (sheet, class) = self.sheet_mut(found.image_id, found.category_id)?;
+        sheet.found.push(found.to_detection(class)?);
         Ok(())
+    }
+
+    /// The sheet of an image, and the class of a category.
+    fn sheet_mut(&mut self, image: i64, category: i64) -> Result<(&mut EvalImage, u32)> {
+        let (place, class) = self.place(image, category)?;
+        Ok((&mut self.sheets[place], class))
     }
 
     fn place(&self, image: i64, category: i64) -> Result<(usize, u32)> {
@@ -300,13 +304,17 @@ fn impossible_box(bbox: [f64; 4]) -> Error {
 
 impl CocoAnnotation {
     fn to_truth(&self, class: u32) -> Result<GroundTruth> {
-        let [_, _, width, height] = self.bbox;
         Ok(GroundTruth {
             class,
             bbox: corners(self.bbox)?,
-            area: self.area.unwrap_or(width * height),
+            area: self.mask_or_box_area(),
             crowd: self.iscrowd != 0,
         })
+    }
+
+    fn mask_or_box_area(&self) -> f64 {
+        let [_, _, width, height] = self.bbox;
+        self.area.unwrap_or(width * height)
     }
 }
 

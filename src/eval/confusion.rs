@@ -45,12 +45,16 @@ impl Confusion {
     pub fn new(sheets: &[EvalImage], options: &ConfusionOptions) -> Self {
         let mut confusion = Self::default();
         for sheet in sheets {
-            for pair in pairs(sheet, options) {
-                let classes = classes_in(sheet, pair);
-                *confusion.counts.entry(classes).or_default() += 1;
-            }
+            confusion.add_sheet(sheet, options);
         }
         confusion
+    }
+
+    fn add_sheet(&mut self, sheet: &EvalImage, options: &ConfusionOptions) {
+        for pair in pairs(sheet, options) {
+            let classes = classes_in(sheet, pair);
+            *self.counts.entry(classes).or_default() += 1;
+        }
     }
 
     /// How often `found` was found where `truth` is.

@@ -111,14 +111,16 @@ impl<'a> MistakeFinder<'a> {
 
     fn false_alarm(&self, f: usize) -> Mistake {
         let (truth, iou) = self.nearest_truth(f).unzip();
-        let pair = [Some(f), truth];
-        self.mistake(MistakeKind::FalseAlarm, pair, iou.unwrap_or(0.0))
+        self.mistake(
+            MistakeKind::FalseAlarm,
+            [Some(f), truth],
+            iou.unwrap_or(0.0),
+        )
     }
 
     fn missed(&self, t: usize) -> Mistake {
         let (found, iou) = self.nearest_found(t).unzip();
-        let pair = [found, Some(t)];
-        self.mistake(MistakeKind::Missed, pair, iou.unwrap_or(0.0))
+        self.mistake(MistakeKind::Missed, [found, Some(t)], iou.unwrap_or(0.0))
     }
 
     fn mistake(&self, kind: MistakeKind, pair: [Option<usize>; 2], iou: f64) -> Mistake {

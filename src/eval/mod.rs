@@ -223,11 +223,17 @@ fn mean(values: impl IntoIterator<Item = f64>) -> f64 {
         sum += value;
         count += 1;
     }
-    if count == 0 {
-        0.0
-    } else {
-        sum / f64::from(count)
-    }
+    overlap::share(sum, f64::from(count))
+}
+
+/// The lines of a text that are not blank, with their places in it.
+fn filled_lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
+    let lines = text.lines().enumerate();
+    lines.filter(|(_, line)| !line.trim().is_empty())
+}
+
+fn in_line(i: usize, what: &str) -> String {
+    format!("line {}: {what}", i + 1)
 }
 
 /// # Panics

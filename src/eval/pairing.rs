@@ -97,12 +97,12 @@ impl<'a> PairSearch<'a> {
 
     /// The boxes that no detection names.
     fn missed(&self) -> impl Iterator<Item = BoxPair> {
-        let truth = 0..self.sheet.truth.len();
-        let missed = truth.filter(|&t| self.is_open(t));
-        missed.map(|t| BoxPair {
-            found: None,
-            truth: Some(t),
-        })
+        (0..self.sheet.truth.len())
+            .filter(|&t| self.is_open(t))
+            .map(|t| BoxPair {
+                found: None,
+                truth: Some(t),
+            })
     }
 
     /// Whether a box is still to be found.
@@ -120,12 +120,15 @@ impl<'a> PairSearch<'a> {
     }
 
     fn candidate(&self, truth: usize, found: usize) -> PairCandidate {
-        let (there, seen) = (&self.sheet.truth[truth], &self.sheet.found[found]);
         PairCandidate {
-            overlap: iou(&there.bbox, &seen.bbox),
+            overlap: self.overlap(truth, found),
             truth,
             found,
         }
+    }
+
+    fn overlap(&self, t: usize, f: usize) -> f64 {
+        iou(&self.sheet.truth[t].bbox, &self.sheet.found[f].bbox)
     }
 
     /// As the COCO tools have it, by the share of the detection that lies in a crowd.

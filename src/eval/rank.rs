@@ -40,10 +40,8 @@ impl Hit {
 
     /// Whether it is right at a threshold; none where it is ignored.
     fn is_right_at(&self, threshold: usize) -> Option<bool> {
-        match [self.ignored, self.right].map(|marks| marks >> threshold & 1 == 1) {
-            [true, _] => None,
-            [_, right] => Some(right),
-        }
+        let is_ignored = is_marked(self.ignored, threshold);
+        (!is_ignored).then(|| is_marked(self.right, threshold))
     }
 }
 
@@ -188,10 +186,8 @@ impl Running {
     }
 
     fn last(&self) -> (f64, f64) {
-        match (self.right.last(), self.wrong.last()) {
-            (Some(right), Some(wrong)) => (*right, *wrong),
-            _ => (0.0, 0.0),
-        }
+        let last = self.right.last().zip(self.wrong.last());
+        last.map_or((0.0, 0.0), |(right, wrong)| (*right, *wrong))
     }
 }
 
@@ -202,6 +198,11 @@ pub(super) fn marked(mut marks: Marks) -> impl Iterator<Item = usize> {
         marks &= marks - 1;
         Some(next)
     })
+}
+
+#[inline]
+fn is_marked(marks: Marks, threshold: usize) -> bool {
+    marks >> threshold & 1 == 1
 }
 
 /// How often an image counts.

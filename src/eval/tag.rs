@@ -1,5 +1,6 @@
 //! Tags of images (light, camera position, ..), for scores per factor.
 
+use super::{filled_lines, in_line};
 use crate::error::{Error, Result};
 use crate::io;
 use std::collections::{BTreeMap, BTreeSet};
@@ -23,13 +24,11 @@ pub fn read_tags(path: &Path) -> Result<Tags> {
 }
 
 fn parse(text: &str) -> std::result::Result<Tags, String> {
-    let lines = text.lines().enumerate();
-    let mut lines = lines.filter(|(_, line)| !line.trim().is_empty());
+    let mut lines = filled_lines(text);
     let titles = lines.next().map(|(_, line)| cells(line));
     let mut tags = Tags::with_titles(&titles.unwrap_or_default())?;
     for (i, line) in lines {
-        tags.add(cells(line))
-            .map_err(|what| format!("line {}: {what}", i + 1))?;
+        tags.add(cells(line)).map_err(|what| in_line(i, &what))?;
     }
     Ok(tags)
 }

@@ -1,6 +1,6 @@
 //! Reads truth and detections from folders of YOLO text files.
 
-use super::{Detection, EvalImage, GroundTruth, Picture};
+use super::{Detection, EvalImage, GroundTruth, Picture, filled_lines, in_line};
 use crate::error::{Error, Result};
 use crate::geom::{BBox, Point2};
 use crate::io;
@@ -211,12 +211,8 @@ const MAX_SHARE: f64 = 10.0;
 
 /// Lines with `extra` numbers (a confidence or nothing) at their ends.
 fn parse_rows(text: &str, extra: usize) -> std::result::Result<Vec<LabelRow>, String> {
-    let lines = text
-        .lines()
-        .enumerate()
-        .filter(|(_, line)| !line.trim().is_empty());
-    lines
-        .map(|(i, line)| parse_row(line, extra).map_err(|what| format!("line {}: {what}", i + 1)))
+    filled_lines(text)
+        .map(|(i, line)| parse_row(line, extra).map_err(|what| in_line(i, &what)))
         .collect()
 }
 

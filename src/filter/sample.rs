@@ -39,9 +39,12 @@ pub(crate) fn sample_bilinear_clamped<P: Mix>(image: &Image<P>, x: f64, y: f64) 
 /// The pixel whose square holds `(x, y)`, for pixels of any kind; `None` outside the picture.
 #[inline]
 pub(crate) fn sample_nearest<P: Copy>(image: &Image<P>, x: f64, y: f64) -> Option<P> {
-    let inside =
-        (0.0..image.width() as f64).contains(&x) && (0.0..image.height() as f64).contains(&y);
-    inside.then(|| image[(x as usize, y as usize)])
+    holds(image, x, y).then(|| image[(x as usize, y as usize)])
+}
+
+#[inline]
+fn holds<P: Copy>(image: &Image<P>, x: f64, y: f64) -> bool {
+    (0.0..image.width() as f64).contains(&x) && (0.0..image.height() as f64).contains(&y)
 }
 
 /// The last pixel whose centre is not beyond a coordinate, and how far beyond it that is.

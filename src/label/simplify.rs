@@ -217,7 +217,8 @@ fn extent(values: [f64; 3]) -> [f64; 2] {
 
 /// Twice the signed area of a triangle: exact for integers.
 fn doubled_triangle_area(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
-    (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+    let (u, v) = (difference(b, a), difference(c, a));
+    u[0] * v[1] - u[1] * v[0]
 }
 
 /// Whether a point within a triangle's bounds lies in it or on its sides.

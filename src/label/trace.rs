@@ -65,7 +65,7 @@ impl Grid {
     fn new(mask: &RleMask) -> Self {
         let mut grid = Self::around(mask.bounds());
         for (x, y) in mask.pixels() {
-            grid.add_pixel(i64::from(x), i64::from(y));
+            grid.add_pixel(x, y);
         }
         grid
     }
@@ -84,8 +84,9 @@ impl Grid {
     }
 
     /// The four sides of a pixel, clockwise.
-    fn add_pixel(&mut self, x: i64, y: i64) {
-        for (direction, corner) in pixel_corners(x, y).into_iter().enumerate() {
+    fn add_pixel(&mut self, x: u32, y: u32) {
+        let corners = pixel_corners(x.into(), y.into());
+        for (direction, corner) in corners.into_iter().enumerate() {
             self.add_side(corner, direction);
         }
     }

@@ -76,12 +76,10 @@ pub struct Axis {
 impl Axis {
     /// A logarithmic axis over powers of ten that hold all positive values; 1 to 10 where there are none.
     pub fn over_decades(title: impl Into<String>, values: impl IntoIterator<Item = f64>) -> Self {
-        let [low, high] = positive_extent(values).unwrap_or([1.0, 10.0]);
-        let first = libm::floor(libm::log10(low));
-        let last = libm::ceil(libm::log10(high)).max(first + 1.0);
+        let extent = positive_extent(values).unwrap_or([1.0, 10.0]);
         Self {
             title: title.into(),
-            range: [first, last].map(libm::exp10),
+            range: decades_around(extent).map(libm::exp10),
             logarithmic: true,
         }
     }
@@ -111,10 +109,18 @@ impl Axis {
 
     /// How far along a value is, from 0 to 1; none where it cannot be shown.
     fn fraction_of(&self, value: f64) -> Option<f64> {
-        let [low, high, value] = [self.range[0], self.range[1], value]
-            .map(|v| if self.logarithmic { libm::log10(v) } else { v });
+        let [low, high, value] = [self.range[0], self.range[1], value].map(|v| self.on_scale(v));
         let fraction = (value - low) / (high - low);
         fraction.is_finite().then(|| fraction.clamp(0.0, 1.0))
+    }
+
+    #[inline]
+    fn on_scale(&self, value: f64) -> f64 {
+        if self.logarithmic {
+            libm::log10(value)
+        } else {
+            value
+        }
     }
 
     /// Values with a line through the chart.
@@ -153,6 +159,12 @@ fn positive_extent(values: impl IntoIterator<Item = f64>) -> Option<[f64; 2]> {
         .filter(|v| v.is_finite() && *v > 0.0)
         .map(|v| [v, v])
         .reduce(|[low, high], [v, _]| [v.min(low), v.max(high)])
+}
+
+/// The exponents of the decades that hold a range, at least one.
+fn decades_around([low, high]: [f64; 2]) -> [f64; 2] {
+    let first = libm::floor(libm::log10(low));
+    [first, libm::ceil(libm::log10(high)).max(first + 1.0)]
 }
 
 /// The ends of a range and what divides it into four.

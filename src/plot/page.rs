@@ -50,10 +50,7 @@ impl Page {
 
     /// The first rows of a table that may be long, and where the others are.
     pub fn beginning(&mut self, table: &Table, rows: usize, file: &str) -> &mut Self {
-        self.table(&Table {
-            columns: table.columns.clone(),
-            rows: table.rows.iter().take(rows).cloned().collect(),
-        });
+        self.table(&table.first_rows(rows));
         match table.rows.len().saturating_sub(rows) {
             0 => self,
             more => self.text(&format!("{more} more rows are in {file}.")),

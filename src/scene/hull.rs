@@ -56,11 +56,11 @@ pub(super) fn doubled_corner_area(ring: &[[f64; 2]], i: usize) -> f64 {
 
 /// Twice the area of a ring; above 0 where it turns left.
 pub(crate) fn doubled_area(ring: &[[f64; 2]]) -> f64 {
-    let next = ring.iter().cycle().skip(1);
-    ring.iter()
-        .zip(next)
-        .map(|(a, b)| a[0] * b[1] - a[1] * b[0])
-        .sum()
+    edges(ring).map(|(a, b)| a[0] * b[1] - a[1] * b[0]).sum()
+}
+
+fn edges(ring: &[[f64; 2]]) -> impl Iterator<Item = (&[f64; 2], &[f64; 2])> {
+    ring.iter().zip(ring.iter().cycle().skip(1))
 }
 
 #[cfg(test)]

@@ -185,11 +185,13 @@ fn resting_card(
 fn rest_pose(i: usize, object: &Object) -> Result<Pose> {
     match object.placement {
         Placement::At(pose) => Ok(pose),
-        Placement::Drop { .. } => Err(Error::value(
-            format!("objects[{i}].placement"),
-            "still falling; settle it first",
-        )),
+        Placement::Drop { .. } => Err(still_falling(i)),
     }
+}
+
+fn still_falling(i: usize) -> Error {
+    let at = format!("objects[{i}].placement");
+    Error::value(at, "still falling; settle it first")
 }
 
 fn unknown_asset(i: usize, object: &Object) -> Error {

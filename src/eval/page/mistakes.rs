@@ -111,7 +111,7 @@ fn add_figures(
 fn with_pictures<'a>(mistakes: &[&'a Mistake], options: &EvalReportOptions) -> Vec<&'a Mistake> {
     let shown = mistakes.iter().copied();
     shown
-        .filter(|m| options.pictures.get(m.sheet).is_some_and(Option::is_some))
+        .filter(|m| options.picture(m.sheet).is_some())
         .take(options.shown)
         .collect()
 }
@@ -119,7 +119,7 @@ fn with_pictures<'a>(mistakes: &[&'a Mistake], options: &EvalReportOptions) -> V
 /// None for a picture that cannot be read, which is only warned of: the scores do not depend on it.
 fn figure(run: &Run, mistake: &Mistake, options: &EvalReportOptions) -> Option<Figure> {
     let shown = ShownMistake::new(run, mistake);
-    let Picture { path, size } = options.pictures.get(mistake.sheet)?.as_ref()?;
+    let Picture { path, size } = options.picture(mistake.sheet)?;
     let view = shown.view(*size);
     let mut figure = Figure::cropped(path, *size, view)
         .inspect_err(|error| log::warn!("{error}"))

@@ -41,6 +41,13 @@ pub struct EvalReportOptions {
     pub shown: usize,
 }
 
+impl EvalReportOptions {
+    /// Of a sheet, where it is found.
+    fn picture(&self, sheet: usize) -> Option<&Picture> {
+        self.pictures.get(sheet)?.as_ref()
+    }
+}
+
 impl Default for EvalReportOptions {
     fn default() -> Self {
         Self {
@@ -275,11 +282,13 @@ fn shown_classes(all: &[Metrics], confusion: &Confusion) -> Vec<u32> {
 
 /// Those of the truth and those that were found.
 fn known_classes(all: &[Metrics], confusion: &Confusion) -> BTreeSet<u32> {
-    let scored = all.iter().flat_map(|m| &m.yolov5.classes);
-    scored
-        .map(|class| class.class)
-        .chain(confusion.classes())
-        .collect()
+    scored_classes(all).chain(confusion.classes()).collect()
+}
+
+/// The classes in the truth of the runs, one after the other.
+fn scored_classes(all: &[Metrics]) -> impl Iterator<Item = u32> {
+    let scored = all.iter().flat_map(|metrics| &metrics.yolov5.classes);
+    scored.map(|class| class.class)
 }
 
 fn classes_title(all: &[Metrics], shown: &[u32]) -> String {
@@ -355,8 +364,7 @@ fn range_text(interval: &Interval) -> String {
 
 /// Average precision per class and threshold by the definition of YOLOv5.
 pub fn classes_table(all: &[Metrics], options: &EvalReportOptions) -> Table {
-    let classes = all.iter().flat_map(|metrics| &metrics.yolov5.classes);
-    let classes: BTreeSet<u32> = classes.map(|class| class.class).collect();
+    let classes: BTreeSet<u32> = scored_classes(all).collect();
     classes_among(all, options, &Vec::from_iter(classes))
 }
 

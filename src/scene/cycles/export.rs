@@ -77,12 +77,15 @@ fn write_plate(folder: &Path, shot: &Shot) -> Result<Option<CyclesPicture>> {
 }
 
 fn write_picture<P: io::ToFile>(folder: &Path, name: &str, image: &Image<P>) -> Result<String> {
-    let options = WriteOptions {
+    io::write_with(folder.join(name), image, &float_options())?;
+    Ok(name.into())
+}
+
+fn float_options() -> WriteOptions {
+    WriteOptions {
         bits: Some(Bits::Float),
         ..Default::default()
-    };
-    io::write_with(folder.join(name), image, &options)?;
-    Ok(name.into())
+    }
 }
 
 fn cycles_camera(camera: &Camera) -> CyclesCamera {
@@ -118,8 +121,12 @@ fn checked_id(card: &Card) -> Result<u32> {
     if (1..=u32::from(u16::MAX)).contains(&id) {
         return Ok(id);
     }
+    Err(id_out_of_range(id))
+}
+
+fn id_out_of_range(id: u32) -> Error {
     let what = format!("id {id}, expected 1 to {}", u16::MAX);
-    Err(Error::value("cards", what))
+    Error::value("cards", what)
 }
 
 fn matrix_rows<const N: usize>(m: SMatrix<f64, N, N>) -> [[f64; N]; N] {

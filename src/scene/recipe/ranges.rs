@@ -102,8 +102,7 @@ impl LightRanges {
     fn draw_offset(&self, draws: &Draws, path: &str) -> [f64; 2] {
         let offset = self.offset.draw_field(draws, path, "offset");
         let azimuth = self.azimuth_deg.draw_field(draws, path, "azimuth_deg");
-        let azimuth = azimuth.to_radians();
-        [offset * libm::cos(azimuth), offset * libm::sin(azimuth)]
+        from_polar(offset, azimuth.to_radians())
     }
 
     fn draw_color(&self, draws: &Draws, path: &str) -> LinearRgb {
@@ -152,4 +151,8 @@ impl LightRanges {
             ("power", &self.power, &RADIANCE),
         ]
     }
+}
+
+fn from_polar(radius: f64, azimuth: f64) -> [f64; 2] {
+    [radius * libm::cos(azimuth), radius * libm::sin(azimuth)]
 }
