@@ -127,11 +127,7 @@ impl AovSource<'_> {
 
     fn id_part(&self) -> Part {
         let ids = self.fronts().map(|(_, s)| s.map_or(0, |s| s.object.0));
-        Part {
-            name: "id".into(),
-            channels: vec![("id".into(), ChannelSamples::Integer(ids.collect()))],
-            metadata: Vec::new(),
-        }
+        integer_part("id", ids.collect())
     }
 
     fn layer_parts(&self) -> Vec<Part> {
@@ -199,6 +195,15 @@ fn layer_part(deep: &DeepImage, id: ObjectId, tinted: bool) -> Part {
     }
     let names = ["R", "G", "B", "A", "TR", "TG", "TB"];
     float_part(name, names, values.map(tinted_values))
+}
+
+/// A part of one channel of the same name.
+fn integer_part(name: &str, values: Vec<u32>) -> Part {
+    Part {
+        name: name.into(),
+        channels: vec![(name.into(), ChannelSamples::Integer(values))],
+        metadata: Vec::new(),
+    }
 }
 
 #[inline]

@@ -59,14 +59,19 @@ fn ranked_objects(
     samples: &[DeepSample],
     name: impl Fn(ObjectId) -> String,
 ) -> [f32; 2 * RANKS_PER_PIXEL] {
-    let mut seen: Vec<_> = visible_coverage(samples).into_iter().collect();
-    // A stable sort: equally visible objects stay in the order of their ids.
-    seen.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let seen = objects_by_coverage(samples);
     let mut out = [0.0; 2 * RANKS_PER_PIXEL];
     for (pair, (id, coverage)) in out.chunks_exact_mut(2).zip(seen) {
         pair.copy_from_slice(&[id_of_name(&name(id)), coverage]);
     }
     out
+}
+
+fn objects_by_coverage(samples: &[DeepSample]) -> Vec<(ObjectId, f32)> {
+    let mut seen: Vec<_> = visible_coverage(samples).into_iter().collect();
+    // A stable sort: equally visible objects stay in the order of their ids.
+    seen.sort_by(|a, b| b.1.total_cmp(&a.1));
+    seen
 }
 
 /// What is seen of each object, by its id.

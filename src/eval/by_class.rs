@@ -53,17 +53,19 @@ fn places<'a, C: Iterator<Item = u32>>(
     sheets: &'a [EvalImage],
     classes: impl Fn(&'a EvalImage) -> C,
 ) -> Vec<BoxPlace> {
-    let mut places = Vec::new();
-    for (sheet, boxes) in sheets.iter().enumerate() {
-        for (index, class) in classes(boxes).enumerate() {
-            places.push(BoxPlace {
-                class,
-                sheet,
-                index,
-            });
-        }
-    }
-    places
+    let numbered = sheets.iter().enumerate();
+    numbered
+        .flat_map(|(sheet, boxes)| places_on(sheet, classes(boxes)))
+        .collect()
+}
+
+fn places_on(sheet: usize, classes: impl Iterator<Item = u32>) -> impl Iterator<Item = BoxPlace> {
+    let numbered = classes.enumerate();
+    numbered.map(move |(index, class)| BoxPlace {
+        class,
+        sheet,
+        index,
+    })
 }
 
 fn truth_places(sheets: &[EvalImage]) -> Vec<BoxPlace> {

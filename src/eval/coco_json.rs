@@ -206,10 +206,14 @@ fn find_picture(roots: &[PathBuf], name: &str, size: Option<[f64; 2]>) -> Option
     if !is_below(name) {
         return None;
     }
-    let mut paths = roots.iter().map(|root| root.join(name));
-    let path = paths.find(|path| path.is_file())?;
+    let path = existing_file(roots, name)?;
     let size = size.or_else(|| stored_size(&path))?;
     Some(Picture { path, size })
+}
+
+fn existing_file(roots: &[PathBuf], name: &str) -> Option<PathBuf> {
+    let mut paths = roots.iter().map(|root| root.join(name));
+    paths.find(|path| path.is_file())
 }
 
 /// A path that stays below the folder that it is joined to.

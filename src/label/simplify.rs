@@ -199,12 +199,16 @@ impl CornerLinks {
 }
 
 fn by_row(positions: &[[f64; 2]]) -> Vec<Vec<usize>> {
-    let bottom = positions.iter().map(|c| c[1] as usize).max().unwrap_or(0);
-    let mut rows = vec![Vec::new(); bottom + 1];
+    let mut rows = vec![Vec::new(); last_row(positions) + 1];
     for (i, position) in positions.iter().enumerate() {
         rows[position[1] as usize].push(i);
     }
     rows
+}
+
+fn last_row(positions: &[[f64; 2]]) -> usize {
+    let rows = positions.iter().map(|c| c[1] as usize);
+    rows.max().unwrap_or(0)
 }
 
 /// Least and greatest of coordinates of at least 0.

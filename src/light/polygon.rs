@@ -16,11 +16,14 @@ pub fn polygon_irradiance(
     normal: Vector3<f64>,
 ) -> f64 {
     let rays = above_horizon(corners.iter().map(|c| c - point).collect(), normal);
-    let edges = rays.iter().zip(rays.iter().cycle().skip(1));
-    0.5 * edges
+    0.5 * edges(&rays)
         .map(|(a, b)| edge_irradiance(a, b, normal))
         .sum::<f64>()
         .abs()
+}
+
+fn edges(rays: &[Vector3<f64>]) -> impl Iterator<Item = (&Vector3<f64>, &Vector3<f64>)> {
+    rays.iter().zip(rays.iter().cycle().skip(1))
 }
 
 fn edge_irradiance(a: &Vector3<f64>, b: &Vector3<f64>, normal: Vector3<f64>) -> f64 {

@@ -112,10 +112,15 @@ impl EnvironmentRanges {
             return None;
         }
         Some(Environment {
-            file: self.files[draws.choose("environment.file", self.files.len())].clone(),
+            file: self.draw_file(draws),
             rotation_deg: self.rotation_deg.draw(draws, "environment.rotation_deg"),
             strength: self.strength.draw(draws, "environment.strength"),
         })
+    }
+
+    fn draw_file(&self, draws: &Draws) -> String {
+        let i = draws.choose("environment.file", self.files.len());
+        self.files[i].clone()
     }
 
     pub(super) fn check(&self) -> Result<()> {

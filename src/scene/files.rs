@@ -47,13 +47,17 @@ pub(crate) fn relative_to_file(path: &Path, file: &Path) -> Result<PathBuf> {
 
 /// The path from the root. `..` is resolved on the disk where the path is there, since a link may stand before it.
 fn absolute(path: &Path) -> Result<PathBuf> {
-    let climbs = path.components().any(|step| step == Component::ParentDir);
     match path.canonicalize() {
-        Ok(resolved) if climbs => Ok(resolved),
+        Ok(resolved) if climbs(path) => Ok(resolved),
         _ => std::path::absolute(path)
             .map(|path| without_parent_steps(&path))
             .map_err(|e| Error::file(path, e)),
     }
+}
+
+fn climbs(path: &Path) -> bool {
+    let mut steps = path.components();
+    steps.any(|step| step == Component::ParentDir)
 }
 
 fn without_parent_steps(path: &Path) -> PathBuf {

@@ -50,8 +50,13 @@ fn least_corner(ring: &[[f64; 2]]) -> Option<(usize, f64)> {
 
 /// Twice the area of the triangle of a corner and its neighbours; above 0 where the ring turns left.
 pub(super) fn doubled_corner_area(ring: &[[f64; 2]], i: usize) -> f64 {
-    let [a, b, c] = [i + ring.len() - 1, i, i + 1].map(|i| ring[i % ring.len()]);
+    let [a, b, c] = with_neighbours(ring, i);
     (b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0])
+}
+
+/// A corner between the one before and the one after it.
+fn with_neighbours(ring: &[[f64; 2]], i: usize) -> [[f64; 2]; 3] {
+    [i + ring.len() - 1, i, i + 1].map(|i| ring[i % ring.len()])
 }
 
 /// Twice the area of a ring; above 0 where it turns left.

@@ -116,17 +116,10 @@ impl Scene {
 
     fn known_camera(&self) -> Result<Camera> {
         let CameraSource::Known(camera) = self.camera else {
-            return Err(Error::value(
-                "camera",
-                "still a rectangle in a photo; locate it first",
-            ));
+            return Err(unsolved_camera());
         };
         if camera.image != self.image {
-            let what = format!(
-                "{:?}, expected the scene's image {:?}",
-                camera.image, self.image
-            );
-            return Err(Error::value("camera.known.image", what));
+            return Err(different_image(camera.image, self.image));
         }
         Ok(camera)
     }
@@ -192,6 +185,15 @@ fn rest_pose(i: usize, object: &Object) -> Result<Pose> {
 fn still_falling(i: usize) -> Error {
     let at = format!("objects[{i}].placement");
     Error::value(at, "still falling; settle it first")
+}
+
+fn unsolved_camera() -> Error {
+    Error::value("camera", "still a rectangle in a photo; locate it first")
+}
+
+fn different_image(image: [u32; 2], expected: [u32; 2]) -> Error {
+    let what = format!("{image:?}, expected the scene's image {expected:?}");
+    Error::value("camera.known.image", what)
 }
 
 fn unknown_asset(i: usize, object: &Object) -> Error {

@@ -118,8 +118,7 @@ impl PictureFolder {
         if size == expected {
             return Ok(opacity);
         }
-        let what = format!("{size:?} pixels, but its colour has {expected:?}");
-        Err(Error::file(path, what))
+        Err(different_size(&path, size, expected))
     }
 
     /// Gives a shot the lights and the environment of a file.
@@ -182,9 +181,17 @@ fn camera_pose(camera: &CyclesCamera) -> Pose {
 }
 
 fn world_from_card(pose: &[[f64; 4]; 4]) -> Pose {
-    let axes = std::array::from_fn(|i| std::array::from_fn(|j| pose[i][j]));
     let at = Vector3::new(pose[0][3], pose[1][3], pose[2][3]);
-    Pose::from_parts(at.into(), rotation_from_rows(axes))
+    Pose::from_parts(at.into(), rotation_from_rows(axes_of(pose)))
+}
+
+fn axes_of(pose: &[[f64; 4]; 4]) -> [[f64; 3]; 3] {
+    std::array::from_fn(|i| std::array::from_fn(|j| pose[i][j]))
+}
+
+fn different_size(path: &Path, size: (usize, usize), expected: (usize, usize)) -> Error {
+    let what = format!("{size:?} pixels, but its colour has {expected:?}");
+    Error::file(path, what)
 }
 
 fn rotation_from_rows(rows: [[f64; 3]; 3]) -> UnitQuaternion<f64> {
@@ -244,11 +251,16 @@ fn covered_shares(n: usize, len: usize) -> Vec<Vec<(usize, f32)>> {
 fn shares_between(start: f64, end: f64, scale: f64, len: usize) -> Vec<(usize, f32)> {
     (start as usize..len)
         .map(|i| {
-            let covered = end.min((i + 1) as f64) - start.max(i as f64);
+            let covered = covered_length(i, start, end);
             (i, (covered / scale) as f32)
         })
         .take_while(|&(_, share)| share > 0.0)
         .collect()
+}
+
+/// Of the pixel.
+fn covered_length(i: usize, start: f64, end: f64) -> f64 {
+    end.min((i + 1) as f64) - start.max(i as f64)
 }
 
 #[cfg(test)]
