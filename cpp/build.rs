@@ -35,14 +35,15 @@ fn build_shim() {
         .std("c++17")
         .includes(&oiio.include_paths)
         .flag_if_supported("-Wno-deprecated-declarations")
-        // Otherwise the inline members of its classes are exported for the library to use, which makes every program
-        // that contains the shim need the library, called or not.
+        // Otherwise the inline members of its classes are exported for the library to use, which
+        // makes every program that contains the shim need the library, called or not.
         .flag_if_supported("-fvisibility-inlines-hidden")
         .compile("petcomp_oiio");
     for path in &oiio.link_paths {
         println!("cargo:rustc-link-search=native={}", path.display());
     }
-    // Behind compile(): the linker looks for what the shim lacks in what follows it, and leaves out what nobody calls.
+    // Behind compile(): the linker looks for what the shim lacks in what follows it, and leaves out
+    // what nobody calls.
     for lib in &oiio.libs {
         println!("cargo:rustc-link-lib=dylib={lib}");
     }

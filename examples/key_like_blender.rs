@@ -1,4 +1,5 @@
-//! Blender's Keying node on a picture made here: the colour of a half-transparent pixel, by version.
+//! Blender's Keying node on a picture made here: the colour of a half-transparent pixel, by
+//! version.
 //!
 //! `cargo run --release --example key_like_blender`
 

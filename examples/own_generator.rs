@@ -1,4 +1,5 @@
-//! Pictures of a generator of your own, written as a dataset that trainers read: here, one leaning card each.
+//! Pictures of a generator of your own, written as a dataset that trainers read: here, one leaning
+//! card each.
 //!
 //! `cargo run --release --example own_generator [FOLDER]`
 

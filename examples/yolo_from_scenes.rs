@@ -1,6 +1,8 @@
-//! Scene files become labelled pictures in YOLO's layout, as they are: no recipe, nothing drawn by chance.
+//! Scene files become labelled pictures in YOLO's layout, as they are: no recipe, nothing drawn by
+//! chance.
 //!
-//! `petcomp scene draw` writes such files: their table `[files]` names the folders of assets and photos.
+//! `petcomp scene draw` writes such files: their table `[files]` names the folders of assets and
+//! photos.
 //!
 //! `cargo run --release --example yolo_from_scenes FOLDER SCENE..`
 

@@ -35,11 +35,13 @@ pub(crate) const MOST_PIXELS: u64 = 64 << 20;
 
 /// Millimetres and centimetres in a metre, with their names.
 const SMALLER_UNITS: [(f64, &str); 2] = [(1000.0, "millimetre"), (100.0, "centimetre")];
-/// From so many on a length that should be in metres is more likely in millimetres than in centimetres.
+/// From so many on a length that should be in metres is more likely in millimetres than in
+/// centimetres.
 const MIN_LIKELY_MILLIMETRES: f64 = 100.0;
 
 impl Bounds {
-    /// From `lowest` to `highest`; `why` ends a message, and may be empty where the range is the quantity's own.
+    /// From `lowest` to `highest`; `why` ends a message, and may be empty where the range is the
+    /// quantity's own.
     pub(crate) const fn new(lowest: f64, highest: f64, why: &'static str) -> Self {
         Self {
             lowest,

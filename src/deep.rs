@@ -5,8 +5,8 @@ use crate::pixel::{Depth, Film, LinearRgb, ObjectId};
 
 /// What one object contributes to one pixel, averaged over the pixel.
 ///
-/// `light` and `visible` are already attenuated by what lies in front, so a picture is their plain sum and a label can
-/// never disagree with it.
+/// `light` and `visible` are already attenuated by what lies in front, so a picture is their plain
+/// sum and a label can never disagree with it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DeepSample {
     /// Whose it is.
@@ -23,8 +23,9 @@ pub struct DeepSample {
 
 /// A picture of deep samples, and what the shadows leave of the surface's light.
 ///
-/// Film hides another share in each channel: pictures with film have [`tints`](Self::tints) beside the samples, whose
-/// `alpha` and `visible` are then the mean over channels. Pictures without film have none and pay for none.
+/// Film hides another share in each channel: pictures with film have [`tints`](Self::tints) beside
+/// the samples, whose `alpha` and `visible` are then the mean over channels. Pictures without film
+/// have none and pay for none.
 #[derive(Clone, Debug, Default)]
 pub struct DeepImage {
     width: usize,
@@ -70,7 +71,8 @@ impl DeepImage {
         }
     }
 
-    /// The same picture with what each sample hides, channel by channel: `visible`, of which that is the mean.
+    /// The same picture with what each sample hides, channel by channel: `visible`, of which that
+    /// is the mean.
     ///
     /// In the order of the samples, pixel by pixel; none at all for a picture without film.
     ///
@@ -84,10 +86,11 @@ impl DeepImage {
         Self { tints, ..self }
     }
 
-    /// Assembles a picture from samples in any order of pixels, each with its column and row; those of one pixel come
-    /// front to back.
+    /// Assembles a picture from samples in any order of pixels, each with its column and row; those
+    /// of one pixel come front to back.
     ///
-    /// `shadow` has the picture's size; `tints` come in the order of the samples, or there are none.
+    /// `shadow` has the picture's size; `tints` come in the order of the samples, or there are
+    /// none.
     ///
     /// # Panics
     /// When a sample lies outside the picture, or when there are more than `u32` can count.
@@ -99,28 +102,20 @@ impl DeepImage {
         let (width, height) = shadow.size();
         // Starts become ends as each pixel's samples take their places.
         let mut ends = pixel_starts(width, height, samples.clone());
-        let mut placed = vec![DeepSample::default(); ends.last().map_or(0, |&n| n as usize)];
+        let mut placed = vec![DeepSample::default(); last_start(&ends)];
         let mut tints = tints.peekable();
-        let tint_count = if tints.peek().is_some() {
-            placed.len()
-        } else {
-            0
-        };
-        let mut placed_tints = vec![LinearRgb::BLACK; tint_count];
+        let mut placed_tints = black_tints(placed.len(), tints.peek().is_some());
         for (x, y, sample) in samples {
-            let next = &mut ends[y as usize * width + x as usize];
-            placed[*next as usize] = sample;
+            let place = take_place(&mut ends[y as usize * width + x as usize]);
+            placed[place] = sample;
             if let Some(tint) = tints.next() {
-                placed_tints[*next as usize] = tint;
+                placed_tints[place] = tint;
             }
-            *next += 1;
         }
-        ends.rotate_right(1);
-        ends[0] = 0;
         Self {
             width,
             height,
-            starts: ends,
+            starts: starts_from_ends(ends),
             samples: placed,
             tints: placed_tints,
             shadow,
@@ -143,8 +138,9 @@ impl DeepImage {
         &self.samples[self.sample_range(x, y)]
     }
 
-    /// What each sample of a pixel hides of what is behind, per channel, as far as it is itself seen; empty where no
-    /// object of the picture is film: every channel is the sample's `visible` then.
+    /// What each sample of a pixel hides of what is behind, per channel, as far as it is itself
+    /// seen; empty where no object of the picture is film: every channel is the sample's
+    /// `visible` then.
     #[inline(always)]
     pub fn tints(&self, x: usize, y: usize) -> &[LinearRgb] {
         if self.tints.is_empty() {
@@ -154,21 +150,30 @@ impl DeepImage {
         }
     }
 
-    /// All that the objects do to one pixel: their light, and what they hide of what is behind, per channel.
+    /// All that the objects do to one pixel: their light, and what they hide of what is behind, per
+    /// channel.
     #[inline(always)]
     pub fn flat(&self, x: usize, y: usize) -> Film {
-        let (samples, tints) = (self.at(x, y), self.tints(x, y));
-        let color = samples
-            .iter()
-            .fold(LinearRgb::BLACK, |sum, s| sum + s.light);
-        let hidden = match tints {
-            [] => LinearRgb::grey(samples.iter().map(|s| s.visible).sum()),
-            tints => tints.iter().fold(LinearRgb::BLACK, |sum, &t| sum + t),
-        };
         // A sum of shares that make up a whole may miss it by a rounding.
         Film {
-            color,
-            opacity: hidden.map(|o| o.min(1.0)),
+            color: self.light(x, y),
+            opacity: self.hidden(x, y).map(|o| o.min(1.0)),
+        }
+    }
+
+    /// The sum of what the samples of a pixel send to the camera.
+    #[inline]
+    fn light(&self, x: usize, y: usize) -> LinearRgb {
+        let samples = self.at(x, y).iter();
+        samples.fold(LinearRgb::BLACK, |sum, s| sum + s.light)
+    }
+
+    /// The sum of what the samples of a pixel hide of the plate.
+    #[inline]
+    fn hidden(&self, x: usize, y: usize) -> LinearRgb {
+        match self.tints(x, y) {
+            [] => LinearRgb::grey(self.at(x, y).iter().map(|s| s.visible).sum()),
+            tints => tints.iter().fold(LinearRgb::BLACK, |sum, &t| sum + t),
         }
     }
 
@@ -206,4 +211,27 @@ fn pixel_starts(
         starts[i + 1] += starts[i];
     }
     starts
+}
+
+#[inline]
+fn take_place(next: &mut u32) -> usize {
+    let place = *next as usize;
+    *next += 1;
+    place
+}
+
+/// The start of each pixel is the end of the one before it.
+fn starts_from_ends(mut ends: Vec<u32>) -> Vec<u32> {
+    ends.rotate_right(1);
+    ends[0] = 0;
+    ends
+}
+
+fn last_start(starts: &[u32]) -> usize {
+    starts.last().map_or(0, |&n| n as usize)
+}
+
+/// None where the samples have no tints.
+fn black_tints(samples: usize, is_tinted: bool) -> Vec<LinearRgb> {
+    vec![LinearRgb::BLACK; if is_tinted { samples } else { 0 }]
 }

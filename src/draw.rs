@@ -8,8 +8,8 @@ use noto_sans_mono_bitmap::{
 };
 use std::ops::Range;
 
-/// Colours of classes: Okabe and Ito, "Color Universal Design" (2008), distinct for every kind of colour vision; in an
-/// order in which the first ones stand out most on photos.
+/// Colours of classes: Okabe and Ito, "Color Universal Design" (2008), distinct for every kind of
+/// colour vision; in an order in which the first ones stand out most on photos.
 const CLASS_PALETTE: [Srgb8; 7] = [
     rgb(0xE6, 0x9F, 0x00),
     rgb(0x56, 0xB4, 0xE9),
@@ -38,13 +38,16 @@ pub(crate) fn class_color(class: u32) -> Srgb8 {
 
 /// Black or white, whichever is easier to read on a colour.
 pub(crate) fn ink_on(paper: Srgb8) -> Srgb8 {
-    // Luma of Rec. 601 on the codes: close to how light a colour looks.
-    let luma = 299 * u32::from(paper.r) + 587 * u32::from(paper.g) + 114 * u32::from(paper.b);
-    if luma > 140_000 {
+    if luma(paper) > 140_000 {
         rgb(0, 0, 0)
     } else {
         rgb(255, 255, 255)
     }
+}
+
+/// Luma of Rec. 601 on the codes, times 1000: close to how light a colour looks.
+fn luma(color: Srgb8) -> u32 {
+    299 * u32::from(color.r) + 587 * u32::from(color.g) + 114 * u32::from(color.b)
 }
 
 /// Mixes a colour into a pixel, where there is one.
@@ -57,11 +60,16 @@ fn blend(canvas: &mut Image<Srgb8>, x: isize, y: isize, color: Srgb8, alpha: f32
         return;
     }
     let under = canvas[(x, y)];
-    canvas[(x, y)] = rgb(
-        mixed(under.r, color.r, alpha),
-        mixed(under.g, color.g, alpha),
-        mixed(under.b, color.b, alpha),
-    );
+    canvas[(x, y)] = mixed_color(under, color, alpha);
+}
+
+#[inline]
+fn mixed_color(under: Srgb8, over: Srgb8, alpha: f32) -> Srgb8 {
+    rgb(
+        mixed(under.r, over.r, alpha),
+        mixed(under.g, over.g, alpha),
+        mixed(under.b, over.b, alpha),
+    )
 }
 
 #[inline]
@@ -92,11 +100,12 @@ pub(crate) fn paste(canvas: &mut Image<Srgb8>, [x, y]: [usize; 2], picture: &Ima
     }
 }
 
-/// The border of a box, `thick` whole pixels wide and inside the canvas, with a halo of one pixel on either side.
+/// The border of a box, `thick` whole pixels wide and inside the canvas, with a halo of one pixel
+/// on either side.
 pub(crate) fn border(canvas: &mut Image<Srgb8>, b: &BBox, color: Srgb8, thick: isize) {
     let (w, h) = canvas.size();
-    let [x0, x1] = [b.x0, b.x1].map(|x| libm::round(x.clamp(0.0, w as f64)) as isize);
-    let [y0, y1] = [b.y0, b.y1].map(|y| libm::round(y.clamp(0.0, h as f64)) as isize);
+    let [x0, x1] = [b.x0, b.x1].map(|x| nearest_edge(x, w));
+    let [y0, y1] = [b.y0, b.y1].map(|y| nearest_edge(y, h));
     for y in y0 - 1..=y1 {
         for x in x0 - 1..=x1 {
             // Pixels from the border's outer edge, inwards; -1 is the halo outside.
@@ -107,6 +116,15 @@ pub(crate) fn border(canvas: &mut Image<Srgb8>, b: &BBox, color: Srgb8, thick: i
             }
         }
     }
+}
+
+/// Of the edges between the pixels of a side.
+fn nearest_edge(at: f64, length: usize) -> isize {
+    libm::round(at.clamp(0.0, length as f64)) as isize
+}
+
+fn pixel_within(at: f64, length: usize) -> isize {
+    at.clamp(0.0, length as f64) as isize
 }
 
 /// A closed line of one pixel's width through points, smooth, with a halo.
@@ -144,8 +162,7 @@ impl Segment {
     /// Columns or rows that it may touch.
     fn pixel_range(&self, a: f64, b: f64, length: usize) -> Range<isize> {
         let reach = self.radius + 1.0;
-        let clamp = |v: f64| v.clamp(0.0, length as f64) as isize;
-        clamp(a.min(b) - reach)..clamp(a.max(b) + reach + 1.0)
+        pixel_within(a.min(b) - reach, length)..pixel_within(a.max(b) + reach + 1.0, length)
     }
 
     /// A ramp over one pixel by the distance of its middle from the line.
@@ -191,7 +208,8 @@ impl TextSize {
     }
 }
 
-/// The lines of a text that has room for `width` pixels, broken between words, and within those that are longer.
+/// The lines of a text that has room for `width` pixels, broken between words, and within those
+/// that are longer.
 pub(crate) fn wrapped(text: &str, width: usize, size: TextSize) -> Vec<String> {
     let room = (width / size.width("m").max(1)).max(1);
     let mut lines = vec![String::new()];
@@ -315,8 +333,8 @@ mod tests {
             .pixels((40, 40))
             .map(|(.., coverage)| f64::from(coverage))
             .sum();
-        // A ramp from full to nothing over one pixel on either side integrates to a width of 1; the two round ends add
-        // about one more.
+        // A ramp from full to nothing over one pixel on either side integrates to a width of 1; the
+        // two round ends add about one more.
         let length = (b - a).norm();
         assert!(ink > length && ink < length + 2.0, "{ink} {length}");
     }

@@ -7,7 +7,8 @@ pub type Result<T> = std::result::Result<T, Error>;
 
 /// Why something could not be done, by who must act.
 ///
-/// Messages are one line, lower case, without a full stop: `tray.label.json: surface.corners_px: 3 corners, expected 4`.
+/// Messages are one line, lower case, without a full stop: `tray.label.json: surface.corners_px: 3
+/// corners, expected 4`.
 #[non_exhaustive]
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
@@ -80,7 +81,8 @@ impl Error {
         }
     }
 
-    /// The same error, its field path from one level further out: `count` within `scene` is `scene.count`.
+    /// The same error, its field path from one level further out: `count` within `scene` is
+    /// `scene.count`.
     pub fn within(self, outer: &str) -> Self {
         match self {
             Self::Value { at, what } => Self::Value {
@@ -111,7 +113,8 @@ fn without_number(message: &str) -> String {
         return message.into();
     };
     let behind = rest.split_once(')').map_or("", |(_, behind)| behind);
-    // The system's own words are the last of the message, and the only ones that begin with a capital.
+    // The system's own words are the last of the message, and the only ones that begin with a
+    // capital.
     let start = front.rfind(": ").map_or(0, |colon| colon + 2);
     let (before, words) = front.split_at(start);
     let mut letters = words.chars();
@@ -127,8 +130,9 @@ fn named(path: &Path) -> String {
     printable(&path.to_string_lossy())
 }
 
-/// Text as it may be shown on a line of a terminal or stand in a document: what would move the cursor, change colours,
-/// begin a line or turn the order of letters around is written out, a line feed as `\\n` and an escape as `\\x1b`.
+/// Text as it may be shown on a line of a terminal or stand in a document: what would move the
+/// cursor, change colours, begin a line or turn the order of letters around is written out, a line
+/// feed as `\\n` and an escape as `\\x1b`.
 pub fn printable(text: &str) -> String {
     let mut shown = String::with_capacity(text.len());
     for c in text.chars() {
@@ -143,7 +147,8 @@ pub fn printable(text: &str) -> String {
     shown
 }
 
-/// Letters of a foreign message that are shown; a damaged file may make a decoder list thousands of numbers.
+/// Letters of a foreign message that are shown; a damaged file may make a decoder list thousands of
+/// numbers.
 const SHOWN_LETTERS: usize = 300;
 
 /// The beginning of a text of any form on one line.
@@ -155,8 +160,8 @@ pub(crate) fn one_line(text: &str) -> String {
     }
 }
 
-/// Control characters, separators of lines and paragraphs, and marks of direction (Unicode Bidirectional Algorithm,
-/// "explicit directional embeddings, overrides and isolates").
+/// Control characters, separators of lines and paragraphs, and marks of direction (Unicode
+/// Bidirectional Algorithm, "explicit directional embeddings, overrides and isolates").
 fn is_control(c: char) -> bool {
     c.is_control()
         || matches!(c, '\u{2028}' | '\u{2029}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')

@@ -1,4 +1,5 @@
-//! Entry points of the fuzzers in `fuzz/`: each takes any bytes and must return. Not part of the library's interface.
+//! Entry points of the fuzzers in `fuzz/`: each takes any bytes and must return. Not part of the
+//! library's interface.
 
 use crate::{camera, dataset, eval, io};
 

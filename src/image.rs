@@ -1,7 +1,8 @@
 //! A rectangle of pixels of one kind.
 //!
-//! Row 0 is the top row, pixel `(x, y)` covers `[x, x+1) x [y, y+1)` and has its centre at `+0.5`. Pixels lie row by
-//! row in one allocation without padding; work goes over whole rows so that the compiler can vectorise it.
+//! Row 0 is the top row, pixel `(x, y)` covers `[x, x+1) x [y, y+1)` and has its centre at `+0.5`.
+//! Pixels lie row by row in one allocation without padding; work goes over whole rows so that the
+//! compiler can vectorise it.
 
 use crate::pixel::Coverage;
 use rayon::prelude::*;
@@ -31,7 +32,8 @@ pub struct Roi {
 }
 
 impl Roi {
-    /// The rectangle from the columns and rows it spans, both half open; empty where they are reversed.
+    /// The rectangle from the columns and rows it spans, both half open; empty where they are
+    /// reversed.
     pub fn spanning(xs: std::ops::Range<usize>, ys: std::ops::Range<usize>) -> Self {
         Self {
             x: xs.start,

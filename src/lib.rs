@@ -1,8 +1,9 @@
 //! Photographs become labelled training images.
 //!
-//! A photo on a coloured screen becomes a cut-out ([`matte`]), kept with its size and class ([`asset`]). Four corners of a
-//! rectangle become a [`camera`]. A recipe and a number become a [`Scene`], whose unknowns the stages replace one by one;
-//! what is left is a [`Shot`], rendered to deep samples, from which picture and labels are both read.
+//! A photo on a coloured screen becomes a cut-out ([`matte`]), kept with its size and class
+//! ([`asset`]). Four corners of a rectangle become a [`camera`]. A recipe and a number become a
+//! [`Scene`], whose unknowns the stages replace one by one; what is left is a [`Shot`], rendered to
+//! deep samples, from which picture and labels are both read.
 //!
 //! | unknown in a scene | replaced by | what it takes |
 //! | --- | --- | --- |
@@ -11,10 +12,10 @@
 //! | [`Exposure::MatchPlate`](scene::Exposure) and its like | [`light`] | the photo of the place |
 //! | names of textures and of the plate | [`Scene::resolve`] | a [`Library`](asset::Library) and the photo |
 //!
-//! A generator of its own may begin anywhere: with a scene, or with a shot built in code and one call to
-//! [`composite::picture`]. `examples/` has five programs. Conventions of axes and pixels are in [`geom`], the kinds of
-//! pixels and what may be done with them at [`Image`]. What is public but not listed here serves petcomp's own programs
-//! and may change in any version.
+//! A generator of its own may begin anywhere: with a scene, or with a shot built in code and one
+//! call to [`composite::picture`]. `examples/` has five programs. Conventions of axes and pixels
+//! are in [`geom`], the kinds of pixels and what may be done with them at [`Image`]. What is public
+//! but not listed here serves petcomp's own programs and may change in any version.
 //!
 //! ```
 //! use petcomp::geom::{Pose, Quad};

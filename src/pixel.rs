@@ -1,10 +1,12 @@
 //! The kinds of pixel, one type each, so that a wrong mix of colour or alpha does not compile.
 //!
 //! Geometry errors are loud, colour and alpha errors are silent: that is why geometry gets names
-//! (`world_from_camera`) and pixels get types. Everything inside the library is *scene-linear*, Rec. 709 primaries,
-//! `f32`, values above 1 kept. Display-encoded types ([`Srgb8`], [`Srgba8`]) stop at [`io`](crate::io).
+//! (`world_from_camera`) and pixels get types. Everything inside the library is *scene-linear*,
+//! Rec. 709 primaries, `f32`, values above 1 kept. Display-encoded types ([`Srgb8`], [`Srgba8`])
+//! stop at [`io`](crate::io).
 //!
-//! Averaging identifiers, depths, straight alpha or display values is meaningless, and refused by the compiler:
+//! Averaging identifiers, depths, straight alpha or display values is meaningless, and refused by
+//! the compiler:
 //!
 //! ```compile_fail
 //! use petcomp::{Image, StraightRgba, filter};
@@ -38,7 +40,8 @@ pub struct LinearRgb {
     pub b: f32,
 }
 
-/// Scene-linear colour already multiplied by its alpha (associated alpha): the form in which pixels add up.
+/// Scene-linear colour already multiplied by its alpha (associated alpha): the form in which pixels
+/// add up.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct PremulRgba {
@@ -66,10 +69,11 @@ pub struct StraightRgba {
     pub a: f32,
 }
 
-/// Tinted see-through film: the light that a pixel adds, and the share of what is behind that each channel loses.
+/// Tinted see-through film: the light that a pixel adds, and the share of what is behind that each
+/// channel loses.
 ///
-/// What [`PremulRgba`] is with an alpha of its own for each channel; zero is nothing at all. Stored as opacity, which
-/// averages like alpha; [`Film::transmittance`] is 1 minus that.
+/// What [`PremulRgba`] is with an alpha of its own for each channel; zero is nothing at all. Stored
+/// as opacity, which averages like alpha; [`Film::transmittance`] is 1 minus that.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Film {
@@ -368,7 +372,8 @@ impl Film {
         self.color + self.transmittance() * behind
     }
 
-    /// The same with one alpha for all channels, their mean: what a program without film makes of it.
+    /// The same with one alpha for all channels, their mean: what a program without film makes of
+    /// it.
     #[inline(always)]
     pub fn to_rgba(self) -> PremulRgba {
         let LinearRgb { r, g, b } = self.opacity;

@@ -1,7 +1,8 @@
 //! Work: what a scene made the stages do, counted and not timed.
 //!
-//! The stages count by themselves, once per row, tile or call, with numbers that they have anyway. Without the feature
-//! `counters` a count is nothing at all; with it, `counted` runs a job and returns what it did.
+//! The stages count by themselves, once per row, tile or call, with numbers that they have anyway.
+//! Without the feature `counters` a count is nothing at all; with it, `counted` runs a job and
+//! returns what it did.
 #![cfg_attr(
     not(feature = "counters"),
     allow(dead_code, unreachable_pub, reason = "nothing is counted")
@@ -34,7 +35,8 @@ pub(crate) fn pool(threads: usize) -> std::io::Result<rayon::ThreadPool> {
         .map_err(std::io::Error::other)
 }
 
-/// Kinds of work with their names; their meaning is written once, for the documentation and for tables.
+/// Kinds of work with their names; their meaning is written once, for the documentation and for
+/// tables.
 macro_rules! kinds {
     ($(#[doc = $meaning:literal] $kind:ident, $name:literal;)*) => {
         /// A kind of work.

@@ -1,7 +1,8 @@
-//! Accuracy of the camera solver on simulated views, against tables of what a maximum-likelihood solver reaches.
+//! Accuracy of the camera solver on simulated views, against tables of what a maximum-likelihood
+//! solver reaches.
 //!
-//! Every view is a function of a seed and its number. The tables were measured with another program (the prototype), with
-//! other random views; hence the slack.
+//! Every view is a function of a seed and its number. The tables were measured with another program
+//! (the prototype), with other random views; hence the slack.
 
 #![cfg(feature = "pipeline")]
 #![cfg(feature = "pipeline")]
@@ -205,7 +206,8 @@ fn realistic(tilt: f64, belief: &Belief) -> Vec<(Solution, View)> {
     let views = (0..VIEWS).map(|k| (k, scenario.view(2, k)));
     let told = views.map(|(k, view)| match belief {
         Belief { exif: false, .. } => view,
-        // With ideal beliefs the tape's error contradicts EXIF, which is dropped then; the table was measured without that.
+        // With ideal beliefs the tape's error contradicts EXIF, which is dropped then; the table
+        // was measured without that.
         Belief { ideal: true, .. } => with_stated_exif(view, &scenario, k),
         Belief { ideal: false, .. } => with_exif(view, &scenario, k),
     });
@@ -307,7 +309,8 @@ fn realistic_cameras_reach_the_table() {
 
 #[test]
 fn realistic_cameras_know_how_sure_they_are() {
-    // Section 15.3: shares within one and two sigmas, and chi squared of 2.0 to 2.7 with EXIF (two degrees of freedom).
+    // Section 15.3: shares within one and two sigmas, and chi squared of 2.0 to 2.7 with EXIF (two
+    // degrees of freedom).
     for tilt in [0.0, 5.0, 10.0, 15.0, 20.0, 30.0, 45.0, 60.0] {
         for exif in [false, true] {
             let solved = realistic(tilt, &Belief { exif, ideal: false });
@@ -372,7 +375,8 @@ fn a_tilt_about_a_side_is_nothing_special() {
 
 #[test]
 fn a_known_focal_length_gives_the_pose_of_the_table() {
-    // Section 15.2, last paragraph: degrees of the normal, position in % of the distance, mm at the surface, px at 50 mm.
+    // Section 15.2, last paragraph: degrees of the normal, position in % of the distance, mm at the
+    // surface, px at 50 mm.
     for (tilt, normal, position) in [
         (0.0, Spread(0.15, 0.34), Spread(0.28, 0.64)),
         (20.0, Spread(0.11, 0.26), Spread(0.22, 0.49)),
@@ -406,7 +410,8 @@ fn a_known_focal_length_gives_the_pose_of_the_table() {
 
 #[test]
 fn a_known_focal_length_gives_the_surface_and_the_heights_of_the_table() {
-    // Section 15.2, last paragraph, 95 %: mm on the surface, px at 50 mm. Nothing is said of the surface at 45 degrees.
+    // Section 15.2, last paragraph, 95 %: mm on the surface, px at 50 mm. Nothing is said of the
+    // surface at 45 degrees.
     for (tilt, surface_mm, height_px) in [
         (0.0, Some(0.5), Some(2.4)),
         (20.0, Some(0.5), Some(2.1)),
@@ -443,7 +448,8 @@ fn a_known_focal_length_gives_the_surface_and_the_heights_of_the_table() {
     }
 }
 
-/// Root mean square over a grid on the rectangle: where the found camera sees, on the surface, what the true one shows.
+/// Root mean square over a grid on the rectangle: where the found camera sees, on the surface, what
+/// the true one shows.
 fn surface_error_mm(view: &View, solution: &Solution) -> f64 {
     let part = |i: usize| i as f64 / 3.0 - 0.5;
     let mut sum = 0.0;
@@ -459,7 +465,8 @@ fn surface_error_mm(view: &View, solution: &Solution) -> f64 {
 
 #[test]
 fn an_unknown_side_comes_out_of_the_picture() {
-    // Section 15.6, realistic camera, error of the ratio in %: focal length known, by EXIF, not known.
+    // Section 15.6, realistic camera, error of the ratio in %: focal length known, by EXIF, not
+    // known.
     let table = [
         (0.0, [Spread(0.1, 0.2), Spread(0.1, 0.2), Spread(0.1, 0.2)]),
         (
@@ -495,8 +502,9 @@ fn an_unknown_side_comes_out_of_the_picture() {
                 100.0 * (w / h / 1.5 - 1.0).abs()
             };
             let found = Spread::of((0..VIEWS).map(error).collect());
-            // At 60 degrees and with the focal length not known well, the rare large errors are larger than the table's: 4.3
-            // and 9.1 % instead of 3.3 and 5.2 %; why is not known. The median is the table's.
+            // At 60 degrees and with the focal length not known well, the rare large errors are
+            // larger than the table's: 4.3 and 9.1 % instead of 3.3 and 5.2 %; why is
+            // not known. The median is the table's.
             let tail = if tilt == 60.0 && known != "known" {
                 1.4
             } else {
@@ -526,7 +534,8 @@ fn with_height(mut view: View, sigma: f64, k: u64) -> View {
     view
 }
 
-/// The corners of a rim above the rectangle, measured with the same tape as its sides and clicked as well as its corners.
+/// The corners of a rim above the rectangle, measured with the same tape as its sides and clicked
+/// as well as its corners.
 fn with_rim(mut view: View, height: f64, k: u64) -> View {
     let [w, h] = [view.label.surface.width_m, view.label.surface.height_m].map(Option::unwrap);
     for (i, [x, y]) in [[-0.5, 0.5], [0.5, 0.5], [0.5, -0.5], [-0.5, -0.5]]
@@ -712,7 +721,8 @@ fn wrong_exif_is_noticed_where_the_table_says() {
 
 #[test]
 fn the_height_error_is_what_it_is_said_to_be() {
-    // Section 7: the predicted RMS is right within 7 % with EXIF, 20 % with the default belief; 600 views add 5 %.
+    // Section 7: the predicted RMS is right within 7 % with EXIF, 20 % with the default belief; 600
+    // views add 5 %.
     for (exif, slack) in [(true, 0.12), (false, 0.25)] {
         for tilt in [5.0, 20.0] {
             let scenario = Scenario {
@@ -761,7 +771,8 @@ fn seen(view: &View, point: petcomp::geom::Point3<f64>) -> petcomp::geom::Point2
     camera.principal_px + straight * (1.0 + view.kappa * (straight / half_px).norm_squared())
 }
 
-/// Root mean square over a grid 50 mm above the rectangle: where the fitted camera sees it, and where the photo shows it.
+/// Root mean square over a grid 50 mm above the rectangle: where the fitted camera sees it, and
+/// where the photo shows it.
 fn height_error_px(view: &View, solution: &Solution) -> f64 {
     let part = |i: usize| i as f64 / 3.0 - 0.5;
     let mut sum = 0.0;
@@ -863,9 +874,9 @@ fn photos_together_reach_the_table() {
                 "{what}: {:.2} / {:.2}, table {} / {}",
                 found.0, found.1, expected.0, expected.1
             );
-            // Two photos from above are both so steep, once in twenty, that the belief's own 25 % is the error, and the
-            // table's 60 trials happened to hold fewer (its row of 0 to 5 degrees has a better median for two photos than
-            // for four).
+            // Two photos from above are both so steep, once in twenty, that the belief's own 25 %
+            // is the error, and the table's 60 trials happened to hold fewer (its row
+            // of 0 to 5 degrees has a better median for two photos than for four).
             let from_above = count == 2 && tilts[1] <= 10.0;
             let slack = if from_above { 2.0 } else { 1.6 };
             assert!(

@@ -1,4 +1,5 @@
-//! Awkward and wrong labels: what happens, exactly. The extreme ones are rows of `petcomp-report stability`.
+//! Awkward and wrong labels: what happens, exactly. The extreme ones are rows of `petcomp-report
+//! stability`.
 
 #![cfg(feature = "pipeline")]
 #![cfg(feature = "pipeline")]

@@ -11,7 +11,8 @@ use std::sync::LazyLock;
 
 /// The first markers of `DICT_4X4_50`, row by row from the top left, 1 is white.
 const CODES: [u16; 4] = [0xb532, 0x0f9a, 0x332d, 0x9946];
-/// A board of two sides in metres with markers of 40 mm in its corners, each on white paper of one cell more.
+/// A board of two sides in metres with markers of 40 mm in its corners, each on white paper of one
+/// cell more.
 const BOARD: [f64; 2] = [0.56, 0.37];
 const SIDE: f64 = 0.04;
 const CENTERS: [[f64; 2]; 4] = [
@@ -20,7 +21,8 @@ const CENTERS: [[f64; 2]; 4] = [
     [0.244, -0.149],
     [-0.244, -0.149],
 ];
-/// Resolution of the board's picture, pixels per metre: every edge of it lies between two of its pixels.
+/// Resolution of the board's picture, pixels per metre: every edge of it lies between two of its
+/// pixels.
 const PRINT: f64 = 3000.0;
 
 /// Light of the board at a place: paper, ink, or the grey tray.
@@ -65,7 +67,8 @@ fn photo(camera: &Camera) -> Image<LinearRgb> {
     })
 }
 
-/// A mean over five by five pixels, the nearer ones counting more: a lens that is a little out of focus.
+/// A mean over five by five pixels, the nearer ones counting more: a lens that is a little out of
+/// focus.
 fn blurred(photo: &Image<LinearRgb>) -> Image<LinearRgb> {
     const WEIGHTS: [f32; 5] = [0.07, 0.24, 0.38, 0.24, 0.07];
     let (w, h) = photo.size();
@@ -86,8 +89,8 @@ fn blurred(photo: &Image<LinearRgb>) -> Image<LinearRgb> {
     pass(&pass(photo, [1, 0]), [0, 1])
 }
 
-/// The numbers of the markers found, and the distances of their corners from the truth, pixels, each with what its standard
-/// deviation makes expect.
+/// The numbers of the markers found, and the distances of their corners from the truth, pixels,
+/// each with what its standard deviation makes expect.
 fn found(photo: &Image<LinearRgb>, camera: &Camera) -> (Vec<u32>, Vec<[f64; 2]>) {
     let markers = camera::find_markers(photo);
     let mut errors = Vec::new();

@@ -1,4 +1,5 @@
-//! The sample backgrounds: cameras from their labels, and from their printed markers, against the renderer's truth.
+//! The sample backgrounds: cameras from their labels, and from their printed markers, against the
+//! renderer's truth.
 
 #![cfg(feature = "pipeline")]
 
@@ -15,7 +16,8 @@ fn sample(name: &str) -> PathBuf {
 
 #[test]
 fn every_label_gives_the_renderer_s_camera_within_its_own_error() {
-    // Focal length and camera height of the renderer (README of the folder, and 0.9648, 1.0760, 1.0765, 1.1610 m).
+    // Focal length and camera height of the renderer (README of the folder, and 0.9648, 1.0760,
+    // 1.0765, 1.1610 m).
     let truth = [
         ("bg0000", 1374.85, 0.9648),
         ("bg0001", 1492.55, 1.0760),

@@ -1,4 +1,5 @@
-//! A dataset's folder: the same bytes whoever made it and however often they were stopped, and trainers accept it.
+//! A dataset's folder: the same bytes whoever made it and however often they were stopped, and
+//! trainers accept it.
 
 #![cfg(feature = "pipeline")]
 
@@ -73,7 +74,8 @@ fn mask(b: &BBox) -> RleMask {
     RleMask::from_fn(IMAGE, |x, y| inside(x, b.x0, b.x1) && inside(y, b.y0, b.y1))
 }
 
-/// Sample k: noise that depends on k, with k mod 4 objects, of which the second lies under the first.
+/// Sample k: noise that depends on k, with k mod 4 objects, of which the second lies under the
+/// first.
 fn sample(k: u64) -> Result<Sample> {
     let value =
         |x: usize, y: usize| ((x as u64 * 31 + y as u64 * 17 + k * 7919) % 97) as f32 / 97.0;
@@ -243,7 +245,8 @@ fn a_stopped_run_goes_on_to_the_same_bytes() {
         "{e}"
     );
 
-    // What a kill may leave: a torn line, half a file, a temporary file, a file whose line never came.
+    // What a kill may leave: a torn line, half a file, a temporary file, a file whose line never
+    // came.
     let journal = broken.path().join("index.jsonl");
     let lines = std::fs::read_to_string(&journal).unwrap();
     let finished = lines.lines().count();
@@ -876,7 +879,8 @@ fn shards_that_do_not_make_a_whole_are_refused() {
     assert!(refused(&folders).contains("000003.txt: has other bytes than when it was written"));
 }
 
-/// Changes the first line of a folder's journal, and gives it the checksum of its new bytes if it is to pass for whole.
+/// Changes the first line of a folder's journal, and gives it the checksum of its new bytes if it
+/// is to pass for whole.
 fn edit_journal(folder: &Path, from: &str, to: &str, pass: bool) {
     let (first, rest) = text(folder, "index.jsonl")
         .split_once('\n')
@@ -1262,7 +1266,8 @@ fn a_browser_shows_the_report_and_its_switches_work() {
     }
 }
 
-/// The files of a recipe, made in code: two assets, a labelled photo, a picture of the surroundings.
+/// The files of a recipe, made in code: two assets, a labelled photo, a picture of the
+/// surroundings.
 fn write_world(folder: &Path) {
     let write = |name: &str, text: String| {
         std::fs::create_dir_all(folder.join(name).parent().unwrap()).unwrap();

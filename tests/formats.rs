@@ -1,7 +1,9 @@
-//! Labels in every format, from pictures that the renderer made, read back by the programs that they are for.
+//! Labels in every format, from pictures that the renderer made, read back by the programs that
+//! they are for.
 //!
-//! The programs are Python packages: `$PETCOMP_PYTHON` (or `python3`) is asked for them, and where it has none, the test
-//! says so and passes. `make formats` fetches pycocotools and runs all of this.
+//! The programs are Python packages: `$PETCOMP_PYTHON` (or `python3`) is asked for them, and where
+//! it has none, the test says so and passes. `make formats` fetches pycocotools and runs all of
+//! this.
 
 #![cfg(feature = "pipeline")]
 
@@ -70,7 +72,8 @@ fn card(id: u32, center: [f64; 3], turn: f64, size: [f64; 2]) -> Card {
     }
 }
 
-/// Picture k: none, one, two or three rings; the second lies over the first, the third is cut by the picture's edge.
+/// Picture k: none, one, two or three rings; the second lies over the first, the third is cut by
+/// the picture's edge.
 fn shot(k: u64) -> Shot {
     let shift = 0.01 * (k / 4) as f64;
     let cards = [
@@ -177,7 +180,8 @@ fn python(check: &str, package: &str, folder: &Path) {
     eprintln!("{}", said(&out.stdout));
 }
 
-/// Pixels of the masks of each sample's objects, by the number and the object's: what a reader must find again.
+/// Pixels of the masks of each sample's objects, by the number and the object's: what a reader must
+/// find again.
 fn tell_pixels(folder: &Path) {
     let pixels = |k: u64| {
         let objects = sample(k).unwrap().labels.objects;

@@ -30,7 +30,8 @@ fn status(name: &str) -> Option<usize> {
         .map(|kib: usize| kib * 1024)
 }
 
-/// What a call needs at its worst beyond what was there before it, bytes a pixel; none where the system does not tell.
+/// What a call needs at its worst beyond what was there before it, bytes a pixel; none where the
+/// system does not tell.
 fn bytes_a_pixel<T>(call: impl FnOnce() -> T) -> Option<f64> {
     // 5 sets the high-water mark back to what is resident now.
     fs::write("/proc/self/clear_refs", "5").ok()?;
@@ -77,7 +78,8 @@ fn a_picture_of_one_bit_takes_little_more_than_its_pixels() {
     assert_at_most(2.0, "read as samples", taken);
 }
 
-/// As `petcomp diff` does it: both pictures and all that is found out about them take less than the pixels of one.
+/// As `petcomp diff` does it: both pictures and all that is found out about them take less than the
+/// pixels of one.
 #[test]
 fn two_pictures_are_compared_in_the_memory_of_one_channel() {
     let _alone = ALONE.lock().unwrap_or_else(|e| e.into_inner());
@@ -99,7 +101,8 @@ fn two_pictures_are_compared_in_the_memory_of_one_channel() {
     assert_at_most(BYTES as f64, "compared", taken);
 }
 
-/// What is seen of a difference looks at rows around each row: bands of it take as much however large the picture is.
+/// What is seen of a difference looks at rows around each row: bands of it take as much however
+/// large the picture is.
 #[test]
 fn likeness_takes_memory_for_bands_alone() {
     let _alone = ALONE.lock().unwrap_or_else(|e| e.into_inner());

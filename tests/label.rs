@@ -1,4 +1,5 @@
-//! Laws of labels, against pictures cast by brute force: many rays a pixel, no code shared with the library's renderer.
+//! Laws of labels, against pictures cast by brute force: many rays a pixel, no code shared with the
+//! library's renderer.
 
 #![cfg(feature = "pipeline")]
 
@@ -183,8 +184,9 @@ fn area(rings: &[Vec<Point2<f64>>]) -> f64 {
 
 /// How far a convex outline may reach beyond the outermost pixels that rays hit, pixels.
 ///
-/// Rays hit every disc of radius `r = 1 / (sqrt(2) RAYS)`. The outline holds a disc of radius area / perimeter, so
-/// shrunk towards any of its points it holds one of radius `r`, as much nearer to that point as it is smaller.
+/// Rays hit every disc of radius `r = 1 / (sqrt(2) RAYS)`. The outline holds a disc of radius area
+/// / perimeter, so shrunk towards any of its points it holds one of radius `r`, as much nearer to
+/// that point as it is smaller.
 fn missed(object: &ObjectLabel) -> f64 {
     let b = &object.amodal_box;
     let radius = 1.0 / (std::f64::consts::SQRT_2 * RAYS as f64);
@@ -306,7 +308,8 @@ proptest! {
 
 #[test]
 fn three_cards_that_lie_over_each_other_in_a_circle_are_a_knot() {
-    // Like the flaps of a carton: each card is tilted about its long side, over the next, under the one before.
+    // Like the flaps of a carton: each card is tilted about its long side, over the next, under the
+    // one before.
     let flap = |id: u32| {
         let turn = std::f64::consts::TAU / 3.0 * f64::from(id);
         let spin = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), turn);
@@ -344,7 +347,8 @@ fn a_stack_is_no_knot() {
 
 #[test]
 fn a_tilted_card_is_compared_where_the_two_overlap() {
-    // Card 1 is lower at its centre than card 2, but its raised end is above card 2, and there they overlap.
+    // Card 1 is lower at its centre than card 2, but its raised end is above card 2, and there they
+    // overlap.
     let tilted = card(1, [0.0, 0.0, 0.1], [0.0, -0.5, 0.0], [0.6, 0.1], &WHOLE);
     let small = card(2, [0.2, 0.0, 0.15], [0.0; 3], [0.1; 2], &WHOLE);
     let found = labels(&shot([tilted, small]), &LabelOptions::default());

@@ -178,8 +178,8 @@ fn pile() -> Scene {
     }
 }
 
-/// The bits seen on the first machine (x86-64, release). A new release of the engine or new settings in `settle` change
-/// them, knowingly; a machine, build or thread count must not.
+/// The bits seen on the first machine (x86-64, release). A new release of the engine or new
+/// settings in `settle` change them, knowingly; a machine, build or thread count must not.
 #[test]
 fn the_same_pile_ends_at_the_same_bits_everywhere() {
     assert_eq!(
@@ -210,7 +210,8 @@ fn skin(object: &Object) -> Vec<Vector3<f64>> {
     points
 }
 
-/// How deep any point of `a`'s skin lies in `b`: by points, so that it shares no code with the verdict.
+/// How deep any point of `a`'s skin lies in `b`: by points, so that it shares no code with the
+/// verdict.
 fn sampled_depth(a: &Object, b: &Object) -> f64 {
     let (Placement::At(at_a), Placement::At(at_b)) = (a.placement, b.placement) else {
         panic!("still falling")
@@ -277,8 +278,8 @@ fn heaped_up(scene: &Scene) -> bool {
     scene.objects.iter().map(height).fold(0.0, f64::max) > thickness + longest
 }
 
-/// How scenes of 5 to 15 objects end in trays from 1 to 1.5 times the longest card: those with something in the air, and
-/// those that come to no rest, which is told.
+/// How scenes of 5 to 15 objects end in trays from 1 to 1.5 times the longest card: those with
+/// something in the air, and those that come to no rest, which is told.
 fn ends_in_tight_trays(scenes: u64) -> [usize; 2] {
     let end = |k: u64| {
         let tray = tight(
@@ -421,6 +422,7 @@ fn of_ten_thousand_drops_none_escapes() {
         .flat_map(|end| end.1.iter().chain([&end.0]))
         .filter(|v| matches!(v, SettleVerdict::Escaped(_)));
     assert_eq!(escapes.count(), 0);
-    // 3 of 10,000 gain more than 1 % of their energy in a step at each of eight tries: told, and drawn again by a dataset.
+    // 3 of 10,000 gain more than 1 % of their energy in a step at each of eight tries: told, and
+    // drawn again by a dataset.
     assert!(bad <= 10, "{bad}");
 }

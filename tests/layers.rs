@@ -4,7 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
 
-/// The rooms of `src`, floor by floor from the ground up. A room uses those on floors below its own.
+/// The rooms of `src`, floor by floor from the ground up. A room uses those on floors below its
+/// own.
 const FLOORS: &[&[&str]] = &[
     &[
         "diagnostic",

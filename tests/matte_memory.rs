@@ -1,4 +1,5 @@
-//! How much memory keying a 4K frame takes. A process of its own: the high-water mark is the process's.
+//! How much memory keying a 4K frame takes. A process of its own: the high-water mark is the
+//! process's.
 
 use petcomp::matte::key::{KeyOptions, Keying, Screen};
 use petcomp::{Image, LinearRgb, PremulRgba};
@@ -21,7 +22,8 @@ fn status(name: &str) -> Option<usize> {
         .map(|kib: usize| kib * 1024)
 }
 
-/// What a call needs at its worst beyond what was there before it; none where the system does not tell.
+/// What a call needs at its worst beyond what was there before it; none where the system does not
+/// tell.
 fn peak_growth<T>(call: impl FnOnce() -> T) -> Option<usize> {
     // 5 sets the high-water mark back to what is resident now.
     fs::write("/proc/self/clear_refs", "5").ok()?;
@@ -56,7 +58,8 @@ fn a_frame_takes_its_output_and_two_channels_at_most() {
         channels(both),
         channels(alone)
     );
-    // The meter sees what is there in any case: five channels of output, or one, less the few pages that the heap had.
+    // The meter sees what is there in any case: five channels of output, or one, less the few pages
+    // that the heap had.
     let seen = |outputs: usize| outputs * CHANNEL * 99 / 100;
     assert!(
         (seen(5)..=(5 + 2) * CHANNEL).contains(&both),

@@ -18,7 +18,8 @@ pub struct Built {
     pub library: Library,
     /// Photos that were cut out.
     pub photos: usize,
-    /// Lengths of the objects that were cut out, with their standard errors, metres, in the order of the list.
+    /// Lengths of the objects that were cut out, with their standard errors, metres, in the order
+    /// of the list.
     pub lengths: Vec<[f64; 2]>,
     /// Photos that gave no cut-out, and why.
     pub refused: Vec<String>,
@@ -26,19 +27,20 @@ pub struct Built {
     pub needs_review: Vec<PhotoRecord>,
 }
 
-/// Cuts all photos of a list out, several at a time, into an asset folder, which is made if it is not there.
+/// Cuts all photos of a list out, several at a time, into an asset folder, which is made if it is
+/// not there.
 ///
-/// `list` is a TOML or CSV file, or a folder with `photos.toml` or `photos.csv` in it. A photo without a usable object is
-/// left out and reported in [`Built::refused`].
+/// `list` is a TOML or CSV file, or a folder with `photos.toml` or `photos.csv` in it. A photo
+/// without a usable object is left out and reported in [`Built::refused`].
 ///
-/// `progress` is called with the photos done and their number, at the start and after each photo, from several threads.
-/// What the folder already had stays; a photo that it already has is replaced. The manifest is written last and does not
-/// depend on threads.
+/// `progress` is called with the photos done and their number, at the start and after each photo,
+/// from several threads. What the folder already had stays; a photo that it already has is
+/// replaced. The manifest is written last and does not depend on threads.
 ///
 /// # Errors
 /// A list that cannot be read or be right (before any work, naming the entry); the first
-/// photo that cannot be read, or [`Error::Photo`] where no photo gives a cut-out; those of [`Library::open`] for cut-outs
-/// that were there before.
+/// photo that cannot be read, or [`Error::Photo`] where no photo gives a cut-out; those of
+/// [`Library::open`] for cut-outs that were there before.
 pub fn build(
     list: impl AsRef<Path>,
     folder: impl AsRef<Path>,
@@ -76,7 +78,8 @@ impl Built {
     }
 }
 
-/// A list from a file, whose classes are added to the manifest; its paths are made relative to the working folder.
+/// A list from a file, whose classes are added to the manifest; its paths are made relative to the
+/// working folder.
 fn checked(list: List, path: &Path, manifest: &mut Manifest) -> Result<List> {
     list.check(manifest).map_err(|e| e.in_file(path))?;
     Ok(list.located_in(path.parent().unwrap_or(Path::new(""))))
@@ -451,7 +454,8 @@ mod tests {
         assert!(plain < built_sheet_height(&library, |_| ()));
     }
 
-    /// Height of the contact sheet when something is done to all records: a line of text makes it higher.
+    /// Height of the contact sheet when something is done to all records: a line of text makes it
+    /// higher.
     fn built_sheet_height(library: &Library, change: fn(&mut PhotoRecord)) -> usize {
         let mut library = library.clone();
         library

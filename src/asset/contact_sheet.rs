@@ -20,7 +20,8 @@ const COLUMNS: usize = 2;
 const PAPER: Srgb8 = draw::rgb(0x1C, 0x1E, 0x22);
 const INK: Srgb8 = draw::rgb(0xF2, 0xF2, 0xF2);
 const WARNING: Srgb8 = draw::rgb(0xFF, 0xB0, 0x40);
-/// A screen's green, so that what is left of a green screen cannot be seen here and is seen on the others.
+/// A screen's green, so that what is left of a green screen cannot be seen here and is seen on the
+/// others.
 const GREEN: LinearRgb = LinearRgb::new(0.05, 0.45, 0.08);
 
 /// What lies behind a cut-out at a pixel.
@@ -39,8 +40,8 @@ const STRIP_WIDTH_PX: usize = BACKGROUNDS.len() * (CUT_OUT_SIDE_PX + GAP_PX);
 /// From a strip to the next one beside it, pixels.
 const COLUMN_WIDTH_PX: usize = STRIP_WIDTH_PX + 2 * GAP_PX;
 
-/// Every cut-out over a checkerboard, black, white and green, with its size, the confidence in outline and colour, and why it
-/// needs a review.
+/// Every cut-out over a checkerboard, black, white and green, with its size, the confidence in
+/// outline and colour, and why it needs a review.
 pub fn contact_sheet(library: &Library) -> Image<Srgb8> {
     let photos = photos_of(library);
     let strips: Vec<_> = photos.par_iter().map(|photo| strip(photo)).collect();

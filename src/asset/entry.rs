@@ -9,11 +9,13 @@ use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// A photo of an object and what is known that cannot be seen in it: an entry of a [`List`](super::List).
+/// A photo of an object and what is known that cannot be seen in it: an entry of a
+/// [`List`](super::List).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PhotoEntry {
-    /// The photo. In a list: relative to it; `.jpg` and `.jpeg` are one, and so are capitals and small letters.
+    /// The photo. In a list: relative to it; `.jpg` and `.jpeg` are one, and so are capitals and
+    /// small letters.
     pub file: PathBuf,
     /// Name of the object: letters and digits of any language, `_`, `-` and `.`.
     pub asset: String,
@@ -29,7 +31,8 @@ pub struct PhotoEntry {
     /// Or: length of the object along its longest side, metres, 0.005 to 5.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub length: Option<f64>,
-    /// And its width, metres: then both fix the scale, and contradict an outline of other proportions.
+    /// And its width, metres: then both fix the scale, and contradict an outline of other
+    /// proportions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub width: Option<f64>,
     /// Or: width and height of the whole screen, metres, all of which is seen.
@@ -41,7 +44,8 @@ pub struct PhotoEntry {
     /// Or: side of the black square of a printed marker on the screen, metres.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub marker_size: Option<f64>,
-    /// What it was photographed on: `auto`, a colour `R,G,B` or a photo of the empty screen. Default: `auto`.
+    /// What it was photographed on: `auto`, a colour `R,G,B` or a photo of the empty screen.
+    /// Default: `auto`.
     #[serde(default)]
     pub screen: ScreenSource,
     /// Thickness of the body that falls, metres. Default: 0.005.

@@ -5,7 +5,8 @@ use crate::image::Image;
 use crate::pixel::{LinearRgb, Mix};
 use std::f64::consts::{PI, TAU};
 
-/// Where a direction (of any length but 0) lies in an equirectangular picture, 0 to 1, right and down.
+/// Where a direction (of any length but 0) lies in an equirectangular picture, 0 to 1, right and
+/// down.
 pub(crate) fn direction_to_uv(direction: &Vector3<f64>) -> [f64; 2] {
     let u = 0.5 - libm::atan2(direction.y, direction.x) / TAU;
     let v = libm::atan2(direction.xy().norm(), direction.z) / PI;
@@ -19,7 +20,8 @@ pub fn uv_to_direction([u, v]: [f64; 2]) -> Vector3<f64> {
     Vector3::new(radius * cos, radius * sin, z)
 }
 
-/// The colour at a place of a picture: bilinear between texel centres, around in `u`, the outermost row going on in `v`.
+/// The colour at a place of a picture: bilinear between texel centres, around in `u`, the outermost
+/// row going on in `v`.
 ///
 /// Its parts are inlined: light sums call it several times a texel.
 pub(super) fn sample(image: &Image<LinearRgb>, [u, v]: [f64; 2]) -> LinearRgb {

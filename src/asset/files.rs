@@ -11,11 +11,13 @@ use crate::stopwatch::Stopwatch;
 use half::f16;
 use std::path::Path;
 
-/// Writes film (`.exr`) and thumbnail (`.png`) under one name, and returns the film as it will be read back.
+/// Writes film (`.exr`) and thumbnail (`.png`) under one name, and returns the film as it will be
+/// read back.
 ///
-/// The EXR holds half floats, zip-compressed: `R G B` is the object's own light F, `A` the mean opacity along the line of
-/// sight (together: premultiplied RGBA for programs that know no film), `TR TG TB` the transmittance as measured, the
-/// object's own shadow included, and `VR VG VB` that of the line of sight alone.
+/// The EXR holds half floats, zip-compressed: `R G B` is the object's own light F, `A` the mean
+/// opacity along the line of sight (together: premultiplied RGBA for programs that know no film),
+/// `TR TG TB` the transmittance as measured, the object's own shadow included, and `VR VG VB` that
+/// of the line of sight alone.
 pub(super) fn write(path: &Path, cut: &CutOut) -> Result<Image<Film>> {
     let mut watch = Stopwatch::start();
     let channels = channels(cut);

@@ -21,15 +21,15 @@ use std::path::Path;
 
 /// Cuts the object out of a photo and adds it to an asset folder, which is made if it is not there.
 ///
-/// `classes` are the names of the folder's classes in order, where they are declared; where there are none, a class that
-/// the folder does not have comes behind those that it has.
+/// `classes` are the names of the folder's classes in order, where they are declared; where there
+/// are none, a class that the folder does not have comes behind those that it has.
 ///
-/// Adding the same photo to the same asset again replaces it. The manifest is written last, whole or not at all. Not for
-/// two processes at once: the later manifest wins.
+/// Adding the same photo to the same asset again replaces it. The manifest is written last, whole
+/// or not at all. Not for two processes at once: the later manifest wins.
 ///
 /// # Errors
-/// [`Error::Value`] for a wrong name, class or size; those of reading the photo and of [`cut_out`](crate::matte::cut_out), naming the photo;
-/// those of writing.
+/// [`Error::Value`] for a wrong name, class or size; those of reading the photo and of
+/// [`cut_out`](crate::matte::cut_out), naming the photo; those of writing.
 pub fn add_photo(
     folder: impl AsRef<Path>,
     entry: &PhotoEntry,
@@ -67,7 +67,8 @@ pub(super) struct CutOutWriter<'a> {
 }
 
 impl CutOutWriter<'_> {
-    /// Writes the cut-out and the thumbnail of one photo, and returns the photo as it would be read back.
+    /// Writes the cut-out and the thumbnail of one photo, and returns the photo as it would be read
+    /// back.
     pub(super) fn write(&self, entry: &PhotoEntry) -> Result<Photo> {
         let mut watch = Stopwatch::start();
         let photo = read_rectified(entry).map_err(|e| with_name(e, &entry.file))?;

@@ -36,14 +36,15 @@ impl Library {
     /// Opens an asset folder: checks its manifest and loads its cut-outs, several at a time.
     ///
     /// # Errors
-    /// Those of [`Manifest::read`]; [`Error::File`] for a cut-out that cannot be read or holds values that no
-    /// picture has; [`Error::Field`] (`size_m`) for
+    /// Those of [`Manifest::read`]; [`Error::File`] for a cut-out that cannot be read or holds
+    /// values that no picture has; [`Error::Field`] (`size_m`) for
     /// one of another size than in the manifest. Of several the first in the manifest's order.
     pub fn open(folder: impl AsRef<Path>) -> Result<Self> {
         Self::open_some(folder, |_| true)
     }
 
-    /// The same with only the assets whose names are wanted; the entries of the others are checked, too.
+    /// The same with only the assets whose names are wanted; the entries of the others are checked,
+    /// too.
     ///
     /// # Errors
     /// As [`open`](Self::open).
@@ -62,7 +63,8 @@ impl Library {
         Self::from_manifest(folder.as_ref(), manifest, &added)
     }
 
-    /// The library of a manifest that was read or written just now, with photos that need not be read.
+    /// The library of a manifest that was read or written just now, with photos that need not be
+    /// read.
     pub(super) fn from_manifest(
         folder: &Path,
         manifest: Manifest,
@@ -114,7 +116,8 @@ fn places_and_records(manifest: &Manifest) -> impl Iterator<Item = (String, &Pho
     })
 }
 
-/// By how many pixels a picture may differ from the size that its manifest gives in metres: rounding.
+/// By how many pixels a picture may differ from the size that its manifest gives in metres:
+/// rounding.
 const ROUNDING_PX: f64 = 0.5;
 
 /// Reads the cut-out of a record that stands at a place of the manifest.

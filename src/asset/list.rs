@@ -10,8 +10,8 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// A list of photos: `photos.toml`, or `photos.csv` with the fields of [`PhotoEntry`] for columns, as spreadsheets
-/// write it: between commas, semicolons or tabs, with decimal points or commas.
+/// A list of photos: `photos.toml`, or `photos.csv` with the fields of [`PhotoEntry`] for columns,
+/// as spreadsheets write it: between commas, semicolons or tabs, with decimal points or commas.
 ///
 /// ```toml
 /// [[photos]]
@@ -24,8 +24,8 @@ use std::path::{Path, PathBuf};
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct List {
-    /// Names of the classes in order: a label's number is the place in this list. Default: those of the photos, in the
-    /// order in which they appear.
+    /// Names of the classes in order: a label's number is the place in this list. Default: those
+    /// of the photos, in the order in which they appear.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub classes: Vec<String>,
     /// How the objects are cut out.
@@ -60,7 +60,8 @@ impl List {
         })
     }
 
-    /// Checks the list against the manifest of the folder that it is for, and adds its classes to it.
+    /// Checks the list against the manifest of the folder that it is for, and adds its classes to
+    /// it.
     ///
     /// # Errors
     /// [`Error::Value`] for the first value that cannot be right, naming the entry.
@@ -129,8 +130,8 @@ fn entry_of_row(row: SpreadsheetRow) -> Result<PhotoEntry> {
     io::from_table(row.cells).map_err(|e| spreadsheet::in_line(e, row.line))
 }
 
-/// The file of that name, or where there is none the only one beside it that is called so but for capitals and the
-/// spelling of `.jpg`.
+/// The file of that name, or where there is none the only one beside it that is called so but for
+/// capitals and the spelling of `.jpg`.
 fn with_actual_spelling(path: PathBuf) -> PathBuf {
     if path.exists() {
         return path;

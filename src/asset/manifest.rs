@@ -16,7 +16,8 @@ use std::path::Path;
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Manifest {
-    /// Names of the classes; a label's number is the place in this list. Default: those of the assets, in their order.
+    /// Names of the classes; a label's number is the place in this list. Default: those of the
+    /// assets, in their order.
     #[serde(default)]
     pub classes: Vec<String>,
     /// The assets, by name.
@@ -24,8 +25,8 @@ pub struct Manifest {
     pub assets: Vec<Asset<PhotoRecord>>,
 }
 
-/// One object, which may have been photographed several times: of [`PhotoRecord`]s in a manifest, of
-/// [`Photo`](super::Photo)s in a library.
+/// One object, which may have been photographed several times: of [`PhotoRecord`]s in a manifest,
+/// of [`Photo`](super::Photo)s in a library.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Asset<P> {
@@ -55,7 +56,8 @@ pub struct PhotoRecord {
     pub size_m: [f64; 2],
     /// Length and width of the object's tight outline, however it is turned, metres.
     pub object_m: [f64; 2],
-    /// Standard error of these, metres: of the outline, and of the scale where a screen or marker gives it.
+    /// Standard error of these, metres: of the outline, and of the scale where a screen or marker
+    /// gives it.
     #[serde(default)]
     pub error_m: f64,
     /// Length and width of the convex hull, which older manifests hold; ignored.
@@ -165,7 +167,8 @@ impl Manifest {
     /// Writes the manifest of a folder, whole or not at all; assets by name, photos by file.
     ///
     /// # Errors
-    /// [`Error::Field`] for a value that cannot be right, [`Error::File`] where it cannot be written.
+    /// [`Error::Field`] for a value that cannot be right, [`Error::File`] where it cannot be
+    /// written.
     pub fn write(&mut self, folder: impl AsRef<Path>) -> Result<()> {
         let path = folder.as_ref().join(MANIFEST);
         self.assets.sort_by(|a, b| a.name.cmp(&b.name));
@@ -176,7 +179,8 @@ impl Manifest {
         io::write_toml(path, self)
     }
 
-    /// Adds a photo to an asset, which is made if it is not there; a photo of the same file is replaced.
+    /// Adds a photo to an asset, which is made if it is not there; a photo of the same file is
+    /// replaced.
     ///
     /// # Errors
     /// [`Error::Value`] (`class`) when the asset is known as something else.
@@ -191,8 +195,9 @@ impl Manifest {
         }
     }
 
-    /// Takes classes into the list: those that are declared, in that order, or else those in use, behind the ones that are
-    /// there, in the order in which they appear. No existing class changes its number.
+    /// Takes classes into the list: those that are declared, in that order, or else those in use,
+    /// behind the ones that are there, in the order in which they appear. No existing class
+    /// changes its number.
     ///
     /// # Errors
     /// [`Error::Value`] (`classes`) for declared ones that do not begin with the existing ones.

@@ -19,9 +19,10 @@ pub(super) struct MeasuredSize {
     pub(super) size_mismatch: Option<Diagnostic>,
 }
 
-/// Standard error of one side of an outline, pixels of the picture that was searched: root mean square over the four sides
-/// of the boxes of 48 rendered bottles, each against the renderer's exact box, was 0.39 for the tight outline (0.41 on 36
-/// photos, 0.29 on 12 of other seeds) and 0.48 for the hull; of the two the larger.
+/// Standard error of one side of an outline, pixels of the picture that was searched: root mean
+/// square over the four sides of the boxes of 48 rendered bottles, each against the renderer's
+/// exact box, was 0.39 for the tight outline (0.41 on 36 photos, 0.29 on 12 of other seeds) and
+/// 0.48 for the hull; of the two the larger.
 const SIDE_ERROR_PX: f64 = 0.5;
 /// Given and measured proportions may differ by this share.
 const PROPORTION_SLACK: f64 = 0.05;
@@ -45,8 +46,8 @@ impl MeasuredSize {
     }
 }
 
-/// Pixels of a cut-out for a metre, by its tight outline or by the screen's scale; `enlargement` is its scale over the
-/// photo's.
+/// Pixels of a cut-out for a metre, by its tight outline or by the screen's scale; `enlargement` is
+/// its scale over the photo's.
 fn scale_of_outline(tight: [f64; 2], scale: Scale, screen_scale: f64, enlargement: f64) -> f64 {
     match scale {
         Scale::PxPerMetre(photo_scale) => photo_scale * enlargement,
@@ -61,7 +62,8 @@ fn least_squares_scale(tight: [f64; 2], [l, w]: [f64; 2]) -> f64 {
     (tight[0] * l + tight[1] * w) / (l * l + w * w)
 }
 
-/// Standard error of the length of an outline, and how far its tips may lie beyond it, pixels of the cut-out.
+/// Standard error of the length of an outline, and how far its tips may lie beyond it, pixels of
+/// the cut-out.
 fn outline_error_px(cut: &CutOut, tight: [f64; 2]) -> f64 {
     let hull = oriented_size(&cut.hull);
     let side_px = SIDE_ERROR_PX * cut.segmentation.reduction * cut.scale;

@@ -1,9 +1,9 @@
 //! Asset: a cut-out with its real size, outline and class, kept in a folder with one manifest.
 //!
-//! An asset folder holds `assets.toml` ([`Manifest`]) and, in a folder for each asset, its cut-outs (half-float EXR,
-//! scene-linear: `R G B A` premultiplied, `TR TG TB` transmittance as measured, `VR VG VB` that of the line of sight) with
-//! a thumbnail PNG beside each. The manifest is written last and whole, so that a folder never names a picture that is not
-//! there.
+//! An asset folder holds `assets.toml` ([`Manifest`]) and, in a folder for each asset, its cut-outs
+//! (half-float EXR, scene-linear: `R G B A` premultiplied, `TR TG TB` transmittance as measured,
+//! `VR VG VB` that of the line of sight) with a thumbnail PNG beside each. The manifest is written
+//! last and whole, so that a folder never names a picture that is not there.
 //!
 //! ```text
 //! photos.toml -build-> folder and Library        folder -Library::open-> Library        photo -add_photo-> the same folder

@@ -7,13 +7,15 @@ use crate::pixel::LinearRgb;
 use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
 
-/// Columns and rows that light is summed in: 1.4 degrees. What is smaller, as a sun, keeps its exact direction.
+/// Columns and rows that light is summed in: 1.4 degrees. What is smaller, as a sun, keeps its
+/// exact direction.
 const GRID_CELLS: [usize; 2] = [256, 128];
 
 /// Most pieces that a panorama is cut into.
 const MAX_PIECES: usize = 1024;
 
-/// Share of a piece's light that counts wherever it comes from: upright receivers see the sides and the ground too.
+/// Share of a piece's light that counts wherever it comes from: upright receivers see the sides and
+/// the ground too.
 const ANY_DIRECTION_SHARE: f64 = 0.25;
 
 /// Light of a part of the sky.
@@ -38,14 +40,16 @@ pub struct Piece {
 }
 
 impl Moments {
-    /// Unit vector to the middle of the light; none where there is no light, or as much from everywhere.
+    /// Unit vector to the middle of the light; none where there is no light, or as much from
+    /// everywhere.
     pub fn direction(&self) -> Option<Vector3<f64>> {
         self.luminous()
             .try_normalize(1e-9 * self.light)
             .filter(|_| self.light > 0.0)
     }
 
-    /// Irradiance on a receiver that sees all of it; 0 in channels that come from behind on the whole.
+    /// Irradiance on a receiver that sees all of it; 0 in channels that come from behind on the
+    /// whole.
     pub fn irradiance(&self, normal: &Vector3<f64>) -> [f64; 3] {
         self.flux.map(|flux| flux.dot(normal).max(0.0))
     }
@@ -53,8 +57,8 @@ impl Moments {
     /// Side of the square of even light that is spread as widely, radians.
     ///
     /// # Method
-    /// Light of angular variance s^2 (sum of both axes) has a mean direction of length `1 - s^2 / 2`; a square of side b
-    /// has `s^2 = b^2 / 6`.
+    /// Light of angular variance s^2 (sum of both axes) has a mean direction of length `1 - s^2 /
+    /// 2`; a square of side b has `s^2 = b^2 / 6`.
     pub fn width(&self) -> f64 {
         let length = if self.light > 0.0 {
             self.luminous().norm() / self.light
@@ -86,8 +90,8 @@ impl Moments {
         }
     }
 
-    /// What a shadow gets wrong that treats all this light as coming from one direction: as an edge that is off by the
-    /// width of the light, of the light's strength, squared and summed.
+    /// What a shadow gets wrong that treats all this light as coming from one direction: as an edge
+    /// that is off by the width of the light, of the light's strength, squared and summed.
     fn error(&self) -> f64 {
         self.weight * self.weight * self.width()
     }
@@ -151,7 +155,8 @@ impl LightSums {
         while self.cuts.len() + 2 < MAX_PIECES && self.cut_worst(&mut open) {}
     }
 
-    /// Cuts the worst of the open pieces, if it has more than one cell; it is open no more. Returns whether there was one.
+    /// Cuts the worst of the open pieces, if it has more than one cell; it is open no more. Returns
+    /// whether there was one.
     fn cut_worst(&mut self, open: &mut Vec<bool>) -> bool {
         let Some(worst) = self.worst_piece(open) else {
             return false;
@@ -246,7 +251,8 @@ fn summed_area_table(rows: &[Vec<Moments>]) -> Vec<Moments> {
     corners
 }
 
-/// Cells of a row of the grid, each the sum over places inside that are denser than the panorama's texels.
+/// Cells of a row of the grid, each the sum over places inside that are denser than the panorama's
+/// texels.
 fn grid_row(panorama: &Image<LinearRgb>, j: usize) -> Vec<Moments> {
     let (width, height) = panorama.size();
     let across = 2 * width.div_ceil(GRID_CELLS[0]);
@@ -292,7 +298,8 @@ fn sample_light(panorama: &Image<LinearRgb>, uv: [f64; 2], solid_angle: f64) -> 
     Moments::from_radiance(sample(panorama, uv), &uv_to_direction(uv), solid_angle)
 }
 
-/// Grid cells a side that a coarse cell sums: 5.6 degrees are fine enough for the horizon that cuts them.
+/// Grid cells a side that a coarse cell sums: 5.6 degrees are fine enough for the horizon that cuts
+/// them.
 const COARSE_CELL_SIDE: usize = 4;
 
 fn coarse_cells(rows: &[Vec<Moments>]) -> Vec<Moments> {

@@ -24,7 +24,8 @@ impl Panorama {
     /// A panorama from its picture.
     ///
     /// # Errors
-    /// [`Error::Value`] for a picture without pixels, or with a value that is negative, NaN or infinite.
+    /// [`Error::Value`] for a picture without pixels, or with a value that is negative, NaN or
+    /// infinite.
     pub fn new(image: Image<LinearRgb>) -> Result<Self> {
         check_radiance(&image).map_err(|what| Error::value("environment", what))?;
         Ok(Self {
@@ -55,12 +56,14 @@ impl Panorama {
         sample(&self.image, direction_to_uv(direction))
     }
 
-    /// The panorama cut into at most `count` (at least 2) rectangles, small where light is strong and uneven.
+    /// The panorama cut into at most `count` (at least 2) rectangles, small where light is strong
+    /// and uneven.
     ///
     /// # Method
-    /// Whichever rectangle would make the largest error in shadows, were all its light to come from one direction, is cut
-    /// in two where that leaves the least; so a sun ends up alone. More pieces cut fewer pieces further. As median cut
-    /// [Debevec 2005], with the error of shadow edges for the energy.
+    /// Whichever rectangle would make the largest error in shadows, were all its light to come from
+    /// one direction, is cut in two where that leaves the least; so a sun ends up alone. More
+    /// pieces cut fewer pieces further. As median cut [Debevec 2005], with the error of shadow
+    /// edges for the energy.
     ///
     /// [Debevec 2005]: https://doi.org/10.1145/1187297.1187387
     pub fn pieces(&self, count: usize) -> Vec<Piece> {
@@ -81,7 +84,8 @@ impl Panorama {
         if let Some(sums) = self.sums.get() {
             return sums;
         }
-        // Summed before the cell is locked: the work is parallel, and a thread that waits may come back here.
+        // Summed before the cell is locked: the work is parallel, and a thread that waits may come
+        // back here.
         let sums = LightSums::new(&self.image);
         self.sums.get_or_init(|| sums)
     }

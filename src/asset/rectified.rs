@@ -1,5 +1,5 @@
-//! A photo seen from straight above, by what lies in the plane of its screen: the screen's own four corners, or a printed
-//! marker.
+//! A photo seen from straight above, by what lies in the plane of its screen: the screen's own four
+//! corners, or a printed marker.
 
 use super::inpaint::inpaint;
 use super::screen_pose::{ReferenceRectangle, ScreenPose, scale_unknown};
@@ -21,10 +21,11 @@ const MARKER_MARGIN: f64 = 0.35;
 /// Sides that may be exchanged need a review where that makes lengths differ by this share.
 const REVIEWED_SWAP_ERROR: f64 = 0.01;
 
-/// A photo as it is seen from straight above, where something in it shows the screen's plane; else as it is.
+/// A photo as it is seen from straight above, where something in it shows the screen's plane; else
+/// as it is.
 ///
-/// A camera that is tilted sees an object shorter than it is along one direction, and larger in front than behind: no one
-/// scale is right for it.
+/// A camera that is tilted sees an object shorter than it is along one direction, and larger in
+/// front than behind: no one scale is right for it.
 pub(super) struct RectifiedPhoto {
     pub(super) photo: Image<LinearRgb>,
     view: Option<TopView>,
@@ -42,8 +43,8 @@ impl RectifiedPhoto {
         Self { photo, view: None }
     }
 
-    /// The inside of a screen of `size` metres, by its four corners, which are found where they are not given; things are
-    /// as large as at `height` metres above it.
+    /// The inside of a screen of `size` metres, by its four corners, which are found where they are
+    /// not given; things are as large as at `height` metres above it.
     pub(super) fn by_corners(
         photo: Image<LinearRgb>,
         size: [f64; 2],
@@ -64,7 +65,8 @@ impl RectifiedPhoto {
         Self::through(TopView::of_screen(pose, height), photo)
     }
 
-    /// The photo without its markers, whose black squares have this `side`, metres; the largest shows the plane.
+    /// The photo without its markers, whose black squares have this `side`, metres; the largest
+    /// shows the plane.
     pub(super) fn by_marker(
         photo: Image<LinearRgb>,
         side: f64,
@@ -239,7 +241,8 @@ mod tests {
         for (k, tilt) in (0..24).zip([0.0, 0.2, 0.5].into_iter().cycle()) {
             for (side, sigma_px, far) in [(0.5, 1.0, 0.1), (0.08, 0.15, 0.2)] {
                 let drawn = |i: u64| normal(16 * k + i);
-                // What nobody knows: the lens, the tape's error and the height at which the outline lies.
+                // What nobody knows: the lens, the tape's error and the height at which the outline
+                // lies.
                 let camera = camera(tilt, 1000.0 * libm::exp(0.35 * drawn(8)));
                 let mut noisy = reference(&camera, [side; 2], sigma_px);
                 noisy.size = [side * (1.0 + TAPE_SIGMA * drawn(9)); 2];
@@ -319,7 +322,8 @@ mod tests {
                 found.size
             );
         }
-        // Sides of nearly the same length: the photo does not tell which is which, and that is part of the error.
+        // Sides of nearly the same length: the photo does not tell which is which, and that is part
+        // of the error.
         let view = TopView::of_screen(ground([0.303, 0.4]), 0.0);
         assert!(view.pose.swap_error == 0.0);
         let nearly = ReferenceRectangle {
@@ -351,7 +355,8 @@ mod tests {
     /// Side of the marker's black square: six of the eight cells of what is printed.
     const MARKER: f64 = 0.072;
 
-    /// A green screen with a slab across it and, where it is asked for, a marker on it, on a brown table.
+    /// A green screen with a slab across it and, where it is asked for, a marker on it, on a brown
+    /// table.
     fn photo(camera: &Camera, with_marker: bool) -> Image<LinearRgb> {
         let marker = printed(7, 12);
         let screen = Image::from_fn(600, 400, |x, y| {

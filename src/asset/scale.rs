@@ -12,11 +12,12 @@ pub enum Scale {
     Length(f64),
     /// Length and width of the object, longest first, metres.
     Size([f64; 2]),
-    /// Width and height of the whole screen, metres, with its corners where they are known (from the top left, clockwise,
-    /// pixels); else they are found. The object's scale is that at half its thickness above the screen.
+    /// Width and height of the whole screen, metres, with its corners where they are known (from
+    /// the top left, clockwise, pixels); else they are found. The object's scale is that at
+    /// half its thickness above the screen.
     Screen([f64; 2], Option<[[f64; 2]; 4]>),
-    /// Side of the black square of a printed marker that lies on the screen (AprilTag tag36h11 or ArUco DICT_4X4_50),
-    /// metres.
+    /// Side of the black square of a printed marker that lies on the screen (AprilTag tag36h11 or
+    /// ArUco DICT_4X4_50), metres.
     Marker(f64),
 }
 
@@ -35,7 +36,8 @@ impl Scale {
         }
     }
 
-    /// Checks that the scale makes the object in the photo `source` as long as one that can be photographed on a screen.
+    /// Checks that the scale makes the object in the photo `source` as long as one that can be
+    /// photographed on a screen.
     ///
     /// # Errors
     /// [`Error::Value`], which asks about the unit where another one would make sense.
@@ -57,7 +59,8 @@ impl Scale {
         Err(Error::value(at, what))
     }
 
-    /// The field of an entry that gives it and its value, where that is something else than the object.
+    /// The field of an entry that gives it and its value, where that is something else than the
+    /// object.
     fn measured_field(self) -> Option<(&'static str, String)> {
         match self {
             Self::Length(_) | Self::Size(_) => None,

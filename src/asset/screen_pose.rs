@@ -1,5 +1,5 @@
-//! Where a camera stands over a screen, by a rectangle of known size in the screen's plane, and how well the scale is
-//! known from that.
+//! Where a camera stands over a screen, by a rectangle of known size in the screen's plane, and how
+//! well the scale is known from that.
 
 use crate::camera::{self, CHI2_99, Camera, Label, Solution};
 use crate::error::{Error, Result};
@@ -15,7 +15,8 @@ const IMPOSSIBLE_P_VALUE: f64 = 1e-6;
 /// Less probable fits need a review.
 const IMPROBABLE_P_VALUE: f64 = 0.01;
 
-/// A rectangle of known size in the plane of the screen, and where its corners are seen, from the top left, clockwise.
+/// A rectangle of known size in the plane of the screen, and where its corners are seen, from the
+/// top left, clockwise.
 pub(super) struct ReferenceRectangle {
     pub(super) size: [f64; 2],
     pub(super) corners_px: [Point2<f64>; 4],
@@ -32,14 +33,16 @@ pub(super) struct ScreenPose {
     corner_sigma: f64,
     /// Error of the camera's height as a share of it.
     height_sigma: f64,
-    /// By how much lengths would differ if the sides were exchanged, where the photo fits either way; as a share.
+    /// By how much lengths would differ if the sides were exchanged, where the photo fits either
+    /// way; as a share.
     pub(super) swap_error: f64,
     /// The corners are hardly those of a rectangle of this size.
     pub(super) is_poor_fit: bool,
 }
 
 impl ScreenPose {
-    /// Solves for the camera of a photo of `image` pixels; width and height of the reference may be exchanged.
+    /// Solves for the camera of a photo of `image` pixels; width and height of the reference may be
+    /// exchanged.
     pub(super) fn solve(
         reference: &ReferenceRectangle,
         image: [u32; 2],
@@ -59,7 +62,8 @@ impl ScreenPose {
 
     /// Standard error of a length at a place over the screen, as a share.
     ///
-    /// An error of the corners tilts the plane that they give: its scale is off the more, the farther a place is from them.
+    /// An error of the corners tilts the plane that they give: its scale is off the more, the
+    /// farther a place is from them.
     pub(super) fn sigma(&self, place: Point3<f64>) -> f64 {
         let share = place.z / (self.camera.center().z - place.z);
         let of_height = share * libm::hypot(2.0 * HEIGHT_SIGMA, self.height_sigma);
@@ -76,7 +80,8 @@ impl ScreenPose {
     }
 }
 
-/// By how much lengths differ between two solutions that fit about as well; 0 where the other fits much worse.
+/// By how much lengths differ between two solutions that fit about as well; 0 where the other fits
+/// much worse.
 fn swap_error(best: &Solution, other: &Solution) -> f64 {
     if other.fit.chi2 < best.fit.chi2 + CHI2_99 {
         (best.fit.px_per_metre / other.fit.px_per_metre - 1.0).abs()

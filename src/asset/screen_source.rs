@@ -12,7 +12,8 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-/// What is known of the screen: `auto`, a colour `R,G,B` (scene-linear) or a photo of the empty screen.
+/// What is known of the screen: `auto`, a colour `R,G,B` (scene-linear) or a photo of the empty
+/// screen.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub enum ScreenSource {
@@ -121,8 +122,8 @@ fn use_counts<'a>(screens: impl Iterator<Item = &'a ScreenSource>) -> BTreeMap<&
 }
 
 impl EmptyScreens {
-    /// Reads those that are named more than once. One that cannot be read is left to the first photo that needs it, whose
-    /// error names it.
+    /// Reads those that are named more than once. One that cannot be read is left to the first
+    /// photo that needs it, whose error names it.
     pub(super) fn shared_by<'a>(screens: impl Iterator<Item = &'a ScreenSource>) -> Self {
         let shared = use_counts(screens)
             .into_par_iter()

@@ -2,10 +2,12 @@
 
 use crate::geom::{Point2, Vector2};
 
-/// Length and width, longest first, of the rectangle of least area around a convex polygon; 0 for no polygon.
+/// Length and width, longest first, of the rectangle of least area around a convex polygon; 0 for
+/// no polygon.
 ///
 /// # Method
-/// One side of that rectangle lies on a side of the polygon (Freeman and Shapira 1975), so every side is tried.
+/// One side of that rectangle lies on a side of the polygon (Freeman and Shapira 1975), so every
+/// side is tried.
 pub(crate) fn oriented_size(hull: &[Point2<f64>]) -> [f64; 2] {
     let next = hull.iter().cycle().skip(1);
     let sides = hull.iter().zip(next).map(|(a, b)| b - a);

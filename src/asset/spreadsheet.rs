@@ -1,5 +1,5 @@
-//! CSV as spreadsheets write it in this country or that: what separates cells, how numbers are written, which bytes stand
-//! for letters.
+//! CSV as spreadsheets write it in this country or that: what separates cells, how numbers are
+//! written, which bytes stand for letters.
 
 use crate::error::{Error, Result};
 use crate::io;
@@ -34,7 +34,8 @@ const SEPARATORS: [u8; 3] = [b',', b';', b'\t'];
 /// The rows of a spreadsheet.
 ///
 /// # Errors
-/// [`Error::Value`] with the line: a column that no photo has, a cell that is not a number, letters in an unknown encoding.
+/// [`Error::Value`] with the line: a column that no photo has, a cell that is not a number, letters
+/// in an unknown encoding.
 pub(super) fn rows(bytes: &[u8]) -> Result<Vec<SpreadsheetRow>> {
     // Else the reader of CSV counts lines wrongly.
     let text = decoded(bytes)?.replace("\r\n", "\n");
@@ -135,7 +136,8 @@ fn decoded(bytes: &[u8]) -> Result<String> {
             "neither UTF-8 nor Windows-1252, expected a CSV file in UTF-8",
         ));
     }
-    // Above the control codes that code is Latin-1, whose bytes are the first characters of Unicode.
+    // Above the control codes that code is Latin-1, whose bytes are the first characters of
+    // Unicode.
     Ok(bytes.iter().copied().map(char::from).collect())
 }
 

@@ -8,8 +8,8 @@ use std::sync::Arc;
 
 /// A cut-out at all its levels of detail, shared by all that show it. Scene-linear, premultiplied.
 ///
-/// Made from a picture of either kind. A film without tint becomes a cut-out with alpha, so that nothing pays for a tint
-/// that it does not have; to keep the film, build the variant directly.
+/// Made from a picture of either kind. A film without tint becomes a cut-out with alpha, so that
+/// nothing pays for a tint that it does not have; to keep the film, build the variant directly.
 #[derive(Clone, Debug)]
 pub enum Texture {
     /// Every channel loses the same share of what is behind.

@@ -10,7 +10,8 @@ use crate::pixel::LinearRgb;
 
 /// What is drawn in from the border of the screen, as a share of its sides: edges and worn corners.
 const SCREEN_INSET: f64 = 0.02;
-/// A camera looks less steeply at a screen than this, as the sine of the angle, or its photo is not for measuring.
+/// A camera looks less steeply at a screen than this, as the sine of the angle, or its photo is not
+/// for measuring.
 const MIN_SINE_TO_SCREEN: f64 = 0.25;
 /// Shortest side that can hold an object and its background, pixels.
 const MIN_SIDE_PX: f64 = 16.0;
@@ -29,7 +30,8 @@ pub(super) struct TopView {
 impl TopView {
     /// What is seen over the inside of a screen.
     pub(super) fn of_screen(pose: ScreenPose, height: f64) -> Self {
-        // Lines of sight to a rectangle pass a plane above it in a smaller rectangle, nearer to below the camera.
+        // Lines of sight to a rectangle pass a plane above it in a smaller rectangle, nearer to
+        // below the camera.
         let (center, share) = (pose.camera.center(), height / pose.camera.center().z);
         let middle = Vector3::new(center.x * share, center.y * share, height);
         let seen = (1.0 - share) * (1.0 - 2.0 * SCREEN_INSET);
@@ -129,7 +131,8 @@ impl PhotoFootprint {
     }
 }
 
-/// What a pixel shows of a plane at a height over the screen; none where the camera looks along the plane.
+/// What a pixel shows of a plane at a height over the screen; none where the camera looks along the
+/// plane.
 fn place_at_height(camera: &Camera, pixel: Point2<f64>, height: f64) -> Option<Point3<f64>> {
     let ray = camera.ray(pixel);
     let sine = -ray.direction.normalize().z;
@@ -141,7 +144,8 @@ fn middle_two(mut values: [f64; 4]) -> [f64; 2] {
     [values[1], values[2]]
 }
 
-/// The finer of the photo's scales in the middle of a view, pixels per metre: nothing of the photo is lost.
+/// The finer of the photo's scales in the middle of a view, pixels per metre: nothing of the photo
+/// is lost.
 fn finest_scale(camera: &Camera, screen_from_view: Pose, size: [f64; 2]) -> f64 {
     let step = SCALE_STEP * size[0].min(size[1]);
     let steps = [[step, 0.0], [0.0, step]].map(|[x, y]| {

@@ -1,8 +1,9 @@
 //! Photos of one camera as one least squares problem.
 //!
 //! # Method
-//! Damped least squares on an arrow-shaped system: the six unknowns of each pose are coupled only to the shared ones, so
-//! each photo is eliminated on its own (Schur complement) and what remains is small. The priors of the lens count once.
+//! Damped least squares on an arrow-shaped system: the six unknowns of each pose are coupled only
+//! to the shared ones, so each photo is eliminated on its own (Schur complement) and what remains
+//! is small. The priors of the lens count once.
 
 use super::error::SolveError;
 use super::label::{Framing, Label};
@@ -470,14 +471,16 @@ impl PhotoBlock {
         Some((pose, cross))
     }
 
-    /// The step of the pose that goes with one of the shared unknowns, shortened where it would leap.
+    /// The step of the pose that goes with one of the shared unknowns, shortened where it would
+    /// leap.
     fn pose_step(&self, shared: &DVector<f64>, damping: f64) -> Option<Vector6<f64>> {
         let pose = self.inverse_pose(damping)? * (self.pose_right - &self.coupling * shared);
         Some(pose / pose.amax().max(1.0))
     }
 }
 
-/// Which of their surfaces each photo shows; those of one name and size are one, unnamed ones stand alone.
+/// Which of their surfaces each photo shows; those of one name and size are one, unnamed ones stand
+/// alone.
 fn surfaces_shown<'a>(photos: impl Iterator<Item = (&'a Label, &'a Problem)>) -> Vec<usize> {
     let mut surfaces: Vec<NamedSurface> = Vec::new();
     photos
@@ -517,7 +520,8 @@ fn with_fixed_lens(problem: &Problem, ln_focal: f64) -> Problem {
     problem
 }
 
-/// Priors of the lens, by the photo that knows most of its focal length, and of each surface's stretch.
+/// Priors of the lens, by the photo that knows most of its focal length, and of each surface's
+/// stretch.
 fn shared_priors(problems: &[Problem], surface: &[usize]) -> Option<Vec<Prior>> {
     let mut shared = lens_priors(best_known_priors(problems)?).to_vec();
     let surfaces = surface.iter().max().map_or(0, |last| last + 1);
@@ -551,7 +555,8 @@ fn without_shared_priors(problem: &Problem) -> Residuals {
     }
 }
 
-/// Weighted mean of what the photos alone give for the logarithm of the focal length, in units; none where none gives it.
+/// Weighted mean of what the photos alone give for the logarithm of the focal length, in units;
+/// none where none gives it.
 fn mean_ln_focal(alone: &[Result<Solution, SolveError>], unit_px: f64) -> Option<f64> {
     let (weight, sum) = alone
         .iter()

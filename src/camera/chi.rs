@@ -1,12 +1,15 @@
 //! The probability of a sum of squares.
 
-/// Another explanation counts where its chi squared is no worse, or better, by this: 1 % of two degrees of freedom.
+/// Another explanation counts where its chi squared is no worse, or better, by this: 1 % of two
+/// degrees of freedom.
 pub(crate) const CHI2_99: f64 = 9.2;
 
-/// Probability that a chi squared of `dof` degrees of freedom exceeds `x`; none without degrees of freedom.
+/// Probability that a chi squared of `dof` degrees of freedom exceeds `x`; none without degrees of
+/// freedom.
 ///
 /// # Method
-/// Exact, by the recurrence from two degrees to the next: each adds `(x/2)^(k/2) exp(-x/2) / gamma(k/2 + 1)`.
+/// Exact, by the recurrence from two degrees to the next: each adds `(x/2)^(k/2) exp(-x/2) /
+/// gamma(k/2 + 1)`.
 pub(crate) fn exceeds(x: f64, dof: usize) -> Option<f64> {
     let half = x / 2.0;
     let (first, start) = match dof {

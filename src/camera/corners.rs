@@ -5,7 +5,8 @@ use super::options::CornerOrder;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::geom::{Point2, Vector2, mean_point};
 
-/// Corners closer than this many pixels are one corner; also closer than [`COINCIDENT_SIGMAS`] times their noise.
+/// Corners closer than this many pixels are one corner; also closer than [`COINCIDENT_SIGMAS`]
+/// times their noise.
 const COINCIDENT_PX: f64 = 2.0;
 const COINCIDENT_SIGMAS: f64 = 4.0;
 /// A corner nearer than this many sigmas to the line of two others makes a triangle.
@@ -20,7 +21,8 @@ pub(crate) struct OrderedCorners {
     pub(crate) warnings: Vec<Diagnostic>,
 }
 
-/// Checks four corners (pixels) labelled with noise `sigma` in a picture of size `image`, and repairs their order.
+/// Checks four corners (pixels) labelled with noise `sigma` in a picture of size `image`, and
+/// repairs their order.
 ///
 /// # Errors
 /// [`SolveError`] for corners that no rectangle in front of a camera can have.
@@ -55,8 +57,8 @@ fn warnings(
         .collect()
 }
 
-/// Twice the signed areas of the triangles that leave out one corner each; in a picture of a rectangle the one without
-/// corner `i` is proportional to the depth of corner `i`.
+/// Twice the signed areas of the triangles that leave out one corner each; in a picture of a
+/// rectangle the one without corner `i` is proportional to the depth of corner `i`.
 pub(crate) fn triangle_areas(c: &[Vector2<f64>; 4]) -> [f64; 4] {
     OTHER_CORNERS.map(|[i, j, k]| (c[j] - c[i]).perp(&(c[k] - c[i])))
 }

@@ -1,7 +1,8 @@
 //! The projective map of a plane from four or more points, as a first guess.
 //!
 //! # Method
-//! The direct linear transformation with Hartley's normalisation: both point sets to zero mean and RMS distance sqrt 2.
+//! The direct linear transformation with Hartley's normalisation: both point sets to zero mean and
+//! RMS distance sqrt 2.
 
 use crate::geom::{Homography, Point2, Vector2, Vector3};
 use nalgebra::{Matrix3, SMatrix, SVector};
@@ -9,7 +10,8 @@ use nalgebra::{Matrix3, SMatrix, SVector};
 /// Singular systems have a second eigenvalue below this, a point.
 const SINGULAR_EIGENVALUE: f64 = 1e-9;
 
-/// The map that takes each `from` nearest to its `to`; none for fewer than four points or all on a line.
+/// The map that takes each `from` nearest to its `to`; none for fewer than four points or all on a
+/// line.
 pub(crate) fn homography(pairs: &[(Point2<f64>, Point2<f64>)]) -> Option<Homography> {
     if pairs.len() < 4 {
         return None;
@@ -50,7 +52,8 @@ fn equations(p: &Vector3<f64>, q: &Vector3<f64>) -> [SVector<f64, 9>; 2] {
     })
 }
 
-/// The eigenvector of the smallest eigenvalue, where the second smallest is larger than a threshold.
+/// The eigenvector of the smallest eigenvalue, where the second smallest is larger than a
+/// threshold.
 fn null_vector(square: SMatrix<f64, 9, 9>, threshold: f64) -> Option<SVector<f64, 9>> {
     let eigen = square.symmetric_eigen();
     let smallest = eigen.eigenvalues.imin();

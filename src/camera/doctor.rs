@@ -1,4 +1,5 @@
-//! A solution in plain words: how well each quantity is known, and what to measure to know it better.
+//! A solution in plain words: how well each quantity is known, and what to measure to know it
+//! better.
 
 use super::focal::FocalSource;
 use super::label::{Framing, Label};
@@ -107,7 +108,8 @@ fn principal_text(solution: &Solution) -> String {
     )
 }
 
-/// How much better the focal length would be known if the picture were whole; empty where the corners do not allow that.
+/// How much better the focal length would be known if the picture were whole; empty where the
+/// corners do not allow that.
 fn whole_picture_gain(label: &Label, solution: &Solution, options: &SolveOptions) -> String {
     let mut whole = label.clone();
     whole.image.cropped = Some(false);

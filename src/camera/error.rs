@@ -76,7 +76,8 @@ pub enum SolveError {
         /// The least distance.
         limit_px: f64,
     },
-    /// The corners are in another order than asked for ([`CornerOrder::Strict`](super::CornerOrder::Strict)).
+    /// The corners are in another order than asked for
+    /// ([`CornerOrder::Strict`](super::CornerOrder::Strict)).
     #[error("surface.corners_px: {0}, and the order has to be right")]
     Order(Diagnostic),
     /// Photos that should be of one camera differ in the shape of the picture.

@@ -1,8 +1,9 @@
 //! Cameras in the terms of other programs: Blender, OpenCV, COLMAP.
 //!
 //! # Method
-//! Blender looks along -z with +y up, so its frame is ours turned by diag(1, -1, -1); its lens shifts are in units of the
-//! side that the sensor is fitted to. OpenCV's pixel centres are integers. COLMAP's pixels are ours.
+//! Blender looks along -z with +y up, so its frame is ours turned by diag(1, -1, -1); its lens
+//! shifts are in units of the side that the sensor is fitted to. OpenCV's pixel centres are
+//! integers. COLMAP's pixels are ours.
 
 use super::pinhole::Camera;
 use crate::geom::{Point2, Pose, UnitQuaternion, Vector2};

@@ -311,7 +311,8 @@ fn check_positive(at: &str, value: f64) -> Result<()> {
     ))
 }
 
-/// Reads warnings, without those of older files, which had a `kind` and its numbers instead of a code and a message.
+/// Reads warnings, without those of older files, which had a `kind` and its numbers instead of a
+/// code and a message.
 fn warnings_with_codes<'de, D: Deserializer<'de>>(
     deserializer: D,
 ) -> std::result::Result<Vec<Diagnostic>, D::Error> {

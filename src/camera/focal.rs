@@ -7,14 +7,15 @@ use serde::{Deserialize, Serialize};
 
 /// Diagonal of the 36 mm x 24 mm frame that 35 mm equivalents refer to, millimetres.
 const FULL_FRAME_DIAGONAL_MM: f64 = 43.266_615_305_567_87;
-/// Focal length where nothing is known, in longer picture sides: 36 mm equivalent, the median of pocket cameras.
+/// Focal length where nothing is known, in longer picture sides: 36 mm equivalent, the median of
+/// pocket cameras.
 const NOMINAL_FOCAL_SIDES: f64 = 1.0;
 /// Relative noise of a focal length that is stated without a standard deviation.
 const STATED_SIGMA: f64 = 0.01;
 /// The same of a 35 mm equivalent; the ways to convert it differ by 4 %.
 const EQUIVALENT_SIGMA: f64 = 0.05;
-/// Added to that where the picture may have been cropped, since the equivalent then refers to a longer diagonal: people
-/// keep between half and all of a picture.
+/// Added to that where the picture may have been cropped, since the equivalent then refers to a
+/// longer diagonal: people keep between half and all of a picture.
 const CROP_SIGMA: f64 = 0.15;
 /// Equivalents that imply a focal length outside this range, in longer sides, are wrong.
 const PLAUSIBLE_FOCAL_SIDES: std::ops::RangeInclusive<f64> = 0.2..=20.0;
@@ -31,7 +32,8 @@ pub enum FocalSource {
     Prior,
     /// The label gave it as exact.
     Fixed,
-    /// Nothing: the prior was flat, and the corners look as if seen from infinitely far. It is the largest sensible value.
+    /// Nothing: the prior was flat, and the corners look as if seen from infinitely far. It is the
+    /// largest sensible value.
     Unbounded,
 }
 
@@ -68,7 +70,8 @@ pub(crate) fn nominal_px(image: [u32; 2]) -> f64 {
     NOMINAL_FOCAL_SIDES * longer_side(image)
 }
 
-/// The prior of the logarithm of the focal length in pixels, for a picture of some framing, and where it comes from.
+/// The prior of the logarithm of the focal length in pixels, for a picture of some framing, and
+/// where it comes from.
 pub(crate) fn length_prior(
     label: &Label,
     framing: Framing,

@@ -1,10 +1,10 @@
 //! The uncertainty of a picture that may have been cropped.
 //!
 //! # Method
-//! Two cameras are solved: of a whole picture, whose principal point is in its middle, and of one that may be a part of a
-//! larger picture. As long as the corners allow it the first one is the answer, since most pictures are whole. Its error is
-//! what the second one leaves open, and the distance to it: the mean square error of the answer where the picture is
-//! cropped after all.
+//! Two cameras are solved: of a whole picture, whose principal point is in its middle, and of one
+//! that may be a part of a larger picture. As long as the corners allow it the first one is the
+//! answer, since most pictures are whole. Its error is what the second one leaves open, and the
+//! distance to it: the mean square error of the answer where the picture is cropped after all.
 
 use super::chi::CHI2_99;
 use super::label::Framing;
@@ -45,8 +45,8 @@ impl CameraDifference {
 }
 
 impl Solution {
-    /// The camera of a picture assumed to be whole, `apart` from that of the same picture if it may be cropped, with the
-    /// uncertainty of both.
+    /// The camera of a picture assumed to be whole, `apart` from that of the same picture if it may
+    /// be cropped, with the uncertainty of both.
     pub(crate) fn hedged(mut self, loose: &Self, apart: &Unknowns, options: &SolveOptions) -> Self {
         let whole_px = self.sigma.height_px;
         self.sigma = self.sigma_with(loose, apart);
@@ -68,7 +68,8 @@ impl Solution {
         }
     }
 
-    /// Says that points above the surface would be known better, to `whole_px`, if the picture were known to be whole.
+    /// Says that points above the surface would be known better, to `whole_px`, if the picture were
+    /// known to be whole.
     fn framing_warning(&self, whole_px: f64) -> Diagnostic {
         let (height, sigma_px) = (self.sigma.reference_height, self.sigma.height_px);
         Diagnostic::warning(

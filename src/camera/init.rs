@@ -7,8 +7,9 @@ use crate::io;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
-/// The label, to be written to `path`, of a photo: its size, what its EXIF data say of the lens and of its framing, and the
-/// surface, markers and camera of another label of the same rectangle. Its corners are missing.
+/// The label, to be written to `path`, of a photo: its size, what its EXIF data say of the lens and
+/// of its framing, and the surface, markers and camera of another label of the same rectangle. Its
+/// corners are missing.
 ///
 /// # Errors
 /// A file that is no picture; a photo that does not lie in or below the label's folder.
@@ -93,7 +94,8 @@ struct CommentedLabel<'a> {
     label: &'a Label,
 }
 
-/// The text of a label file, in which what is missing is there to be filled in: corners of `null`, and what they mean.
+/// The text of a label file, in which what is missing is there to be filled in: corners of `null`,
+/// and what they mean.
 ///
 /// # Errors
 /// [`Error::Value`] for a value that JSON cannot express.

@@ -10,7 +10,8 @@ use super::solution::Solution;
 use super::solve::solve;
 use crate::diagnostic::{Code, Diagnostic};
 
-/// A photo whose chi squared is beyond this contradicts the others: 0.01 % of two degrees of freedom.
+/// A photo whose chi squared is beyond this contradicts the others: 0.01 % of two degrees of
+/// freedom.
 const OUTLIER_CHI2: f64 = 18.4;
 /// One photo in this many may be left out.
 const PHOTOS_PER_OUTLIER: usize = 4;
@@ -18,7 +19,8 @@ const PHOTOS_PER_OUTLIER: usize = 4;
 /// Photos of one camera, solved together.
 #[derive(Clone, Debug)]
 pub struct Joint {
-    /// One per label: with the shared lens, alone where the photo contradicts the others, or why it could not be used.
+    /// One per label: with the shared lens, alone where the photo contradicts the others, or why
+    /// it could not be used.
     pub photos: Vec<Result<Solution, SolveError>>,
     /// The photos that were left out.
     pub outliers: Vec<OutlierPhoto>,
@@ -42,14 +44,16 @@ impl OutlierPhoto {
     }
 }
 
-/// Solves photos of one camera together: they share focal length, principal point and distortion, and photos of one surface
-/// share its sides.
+/// Solves photos of one camera together: they share focal length, principal point and distortion,
+/// and photos of one surface share its sides.
 ///
-/// The labels have to agree in the shape of their pictures; one may be a reduced copy. See [`group_by_camera`]. A photo that
-/// no camera fits when it is alone takes no part, and keeps its own solution.
+/// The labels have to agree in the shape of their pictures; one may be a reduced copy. See
+/// [`group_by_camera`]. A photo that no camera fits when it is alone takes no part, and keeps its
+/// own solution.
 ///
 /// # Errors
-/// [`SolveError::DifferentPictures`] where the shapes differ; the first photo's error where no photo can be used.
+/// [`SolveError::DifferentPictures`] where the shapes differ; the first photo's error where no
+/// photo can be used.
 pub fn solve_joint(labels: &[Label], options: &SolveOptions) -> Result<Joint, SolveError> {
     refuse_different_frames(labels)?;
     let photos = solve_alone(labels, options)?;
@@ -132,7 +136,8 @@ struct JointEstimate {
 }
 
 impl JointSolver<'_> {
-    /// The camera of whole pictures or, where they may have been cropped and the corners demand it, of cropped ones.
+    /// The camera of whole pictures or, where they may have been cropped and the corners demand it,
+    /// of cropped ones.
     fn whole_or_cropped(&self) -> Result<Option<JointEstimate>, SolveError> {
         let whole = self.estimate(Framing::Whole)?;
         if !self.may_be_cropped() {
@@ -153,8 +158,8 @@ impl JointSolver<'_> {
             && self.options.priors.cropping_matters()
     }
 
-    /// What the photos that fit give together, but for those that contradict the others; pictures of unknown framing are
-    /// treated as pictures of this one.
+    /// What the photos that fit give together, but for those that contradict the others; pictures
+    /// of unknown framing are treated as pictures of this one.
     fn estimate(&self, unknown: Framing) -> Result<Option<JointEstimate>, SolveError> {
         let mut used: Vec<usize> = (0..self.labels.len()).filter(|i| self.fits(*i)).collect();
         let mut outliers = Vec::new();
@@ -231,8 +236,8 @@ impl JointEstimate {
     }
 }
 
-/// Groups of labels that name the same camera and agree in the shape of their pictures, each in order; unnamed cameras
-/// stand alone.
+/// Groups of labels that name the same camera and agree in the shape of their pictures, each in
+/// order; unnamed cameras stand alone.
 pub fn group_by_camera(labels: &[Label]) -> Vec<Vec<usize>> {
     let mut groups: Vec<Vec<usize>> = Vec::new();
     for (i, label) in labels.iter().enumerate() {
@@ -256,8 +261,8 @@ fn refuse_different_frames(labels: &[Label]) -> Result<(), SolveError> {
     }
 }
 
-/// Two pictures show the same frame of a camera, at any resolution: in units of the diagonal, everything that a
-/// camera's photos share is then the same.
+/// Two pictures show the same frame of a camera, at any resolution: in units of the diagonal,
+/// everything that a camera's photos share is then the same.
 fn same_frame(a: &Label, b: &Label) -> bool {
     if is_part(a) || is_part(b) {
         return show_same_part(a, b);

@@ -5,10 +5,11 @@ use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::Value;
 
-/// The corners of a flat rectangle of known size in a photo, and what is known of the camera that took it.
+/// The corners of a flat rectangle of known size in a photo, and what is known of the camera that
+/// took it.
 ///
-/// In files an unknown key is an error, except where it starts with `_`: those are comments. Values are as a person
-/// wrote them; [`camera::solve`](crate::camera::solve) checks them.
+/// In files an unknown key is an error, except where it starts with `_`: those are comments. Values
+/// are as a person wrote them; [`camera::solve`](crate::camera::solve) checks them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(remote = "Self", deny_unknown_fields)]
 pub struct Label {
@@ -54,8 +55,9 @@ pub struct LabelImage {
     pub width: u32,
     /// Height of the upright picture, pixels.
     pub height: u32,
-    /// A part was cut away, so that the principal point need not be the picture's centre; `false` says that the picture is
-    /// whole. Default: what the photo's EXIF data say. See [`Label::framing`].
+    /// A part was cut away, so that the principal point need not be the picture's centre; `false`
+    /// says that the picture is whole. Default: what the photo's EXIF data say. See
+    /// [`Label::framing`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cropped: Option<bool>,
     /// Where it was cut out, if that is known; it then does not count as cropped.
@@ -67,7 +69,8 @@ pub struct LabelImage {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Framing {
-    /// All of it, or a known part, or one of known principal point: the label or its photo's EXIF data say so.
+    /// All of it, or a known part, or one of known principal point: the label or its photo's EXIF
+    /// data say so.
     Whole,
     /// Not known: EXIF data were removed, or state another size.
     #[default]
@@ -114,7 +117,8 @@ pub struct LabelSurface {
     /// Standard deviation of both lengths, metres.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dimension_sigma_m: Option<f64>,
-    /// Top left, top right, bottom right, bottom left, pixels. May be missing where there are markers.
+    /// Top left, top right, bottom right, bottom left, pixels. May be missing where there are
+    /// markers.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub corners_px: Option<[[f64; 2]; 4]>,
     /// Standard deviation of a corner's coordinates, pixels. Default: 1.
@@ -203,8 +207,8 @@ pub enum Artwork {
 }
 
 impl Label {
-    /// A label of a rectangle of `size` metres, seen at `corners_px` (from the top left, clockwise) in a picture of
-    /// `image` pixels; nothing else is known.
+    /// A label of a rectangle of `size` metres, seen at `corners_px` (from the top left, clockwise)
+    /// in a picture of `image` pixels; nothing else is known.
     pub fn new(image: [u32; 2], corners_px: [[f64; 2]; 4], size: [f64; 2]) -> Self {
         Self {
             format: LabelFormat::PlaneLabel,
@@ -320,7 +324,8 @@ impl<'de> Deserialize<'de> for Label {
     }
 }
 
-/// A message behind its place; one about a key names the key itself, and the reader of the file adds the closest known one.
+/// A message behind its place; one about a key names the key itself, and the reader of the file
+/// adds the closest known one.
 fn located_message(what: String, at: &serde_path_to_error::Path) -> String {
     if what.contains(" field `") {
         what

@@ -1,9 +1,12 @@
-//! Camera: a pinhole model, and the camera that sees a rectangle of known size at four labelled corners.
+//! Camera: a pinhole model, and the camera that sees a rectangle of known size at four labelled
+//! corners.
 //!
-//! [`solve`] turns a [`Label`] into a [`Solution`]; [`scene::locate`](crate::scene::locate) is the pipeline stage that does so inside a scene.
+//! [`solve`] turns a [`Label`] into a [`Solution`]; [`scene::locate`](crate::scene::locate) is the
+//! pipeline stage that does so inside a scene.
 //!
-//! The solver works in units of its own, in which everything is of order one: pixels relative to the principal point
-//! over half the picture's diagonal, lengths over the geometric mean of the rectangle's sides.
+//! The solver works in units of its own, in which everything is of order one: pixels relative to
+//! the principal point over half the picture's diagonal, lengths over the geometric mean of the
+//! rectangle's sides.
 
 mod bundle;
 mod chi;

@@ -1,9 +1,10 @@
 //! Where a camera sees a point, and how that changes with the unknowns.
 //!
 //! # Method
-//! The eleven unknowns are chosen so that the one weak direction stands alone: from straight above the focal length (and
-//! the principal point) has no influence on any residual while all else stays well conditioned. Focal length and distance
-//! would be almost perfectly correlated; the logarithm of the scale, focal length over distance, is not.
+//! The eleven unknowns are chosen so that the one weak direction stands alone: from straight above
+//! the focal length (and the principal point) has no influence on any residual while all else stays
+//! well conditioned. Focal length and distance would be almost perfectly correlated; the logarithm
+//! of the scale, focal length over distance, is not.
 
 use super::rectangle::ScaledPose;
 use crate::geom::Vector2;
@@ -272,7 +273,8 @@ impl State {
         self.principal + position * (1.0 + self.kappa * position.norm_squared())
     }
 
-    /// Logarithm of the camera's height over the surface and how it changes with the unknowns; none below it.
+    /// Logarithm of the camera's height over the surface and how it changes with the unknowns; none
+    /// below it.
     pub(crate) fn ln_height(&self) -> Option<(f64, Unknowns)> {
         let normal: Vector3<f64> = self.pose.rotation.column(2).into();
         let height = -normal.dot(&self.translation());
@@ -298,7 +300,8 @@ impl State {
 }
 
 impl PinholeView {
-    /// Change of the position along an axis; `near` is picture lengths per length at the point's depth.
+    /// Change of the position along an axis; `near` is picture lengths per length at the point's
+    /// depth.
     #[inline]
     fn axis_slope(&self, axis: usize, near: f64, per_stretch: &Vector3<f64>) -> Unknowns {
         let (turned, position) = (&self.turned, self.position[axis]);

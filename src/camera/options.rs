@@ -11,15 +11,17 @@ pub struct SolveOptions {
     pub priors: Priors,
     /// Take the width as 1 where neither side is known. Default: false, an error.
     pub unit_scale: bool,
-    /// Height of the objects that will stand on the surface, metres. Default: a tenth of the shorter side.
+    /// Height of the objects that will stand on the surface, metres. Default: a tenth of the
+    /// shorter side.
     pub reference_height: Option<f64>,
-    /// Warn where a point at that height is known no better than to this, pixels. Default: 0.0015 picture diagonals.
+    /// Warn where a point at that height is known no better than to this, pixels. Default: 0.0015
+    /// picture diagonals.
     pub max_height_sigma_px: Option<f64>,
-    /// Largest number of iterations of the refinement, from the closed form alone; 0 is the closed form itself. Default: none,
-    /// from every start until nothing changes any more.
+    /// Largest number of iterations of the refinement, from the closed form alone; 0 is the closed
+    /// form itself. Default: none, from every start until nothing changes any more.
     ///
-    /// With a limit, other poses are not searched for, EXIF data and the order of the sides are trusted, and the standard
-    /// deviations are those at the last iteration.
+    /// With a limit, other poses are not searched for, EXIF data and the order of the sides are
+    /// trusted, and the standard deviations are those at the last iteration.
     pub max_iterations: Option<usize>,
 }
 
@@ -35,7 +37,8 @@ pub enum CornerOrder {
     Auto,
 }
 
-/// Standard deviations of what a label leaves open; 0 fixes the default value, infinity makes the prior flat.
+/// Standard deviations of what a label leaves open; 0 fixes the default value, infinity makes the
+/// prior flat.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Priors {
     /// Relative, of an unknown focal length; its median is the picture's longer side.
@@ -43,8 +46,9 @@ pub struct Priors {
     pub focal_sigma: f64,
     /// Of the principal point of a whole picture, in picture diagonals. Default: 0.005.
     pub principal_sigma: f64,
-    /// Of the principal point of a picture that is cropped, or may be, in picture diagonals. Default: 0.12 (cutting a third
-    /// away on one side moves it by 0.2 diagonals; see `petcomp-report camera`).
+    /// Of the principal point of a picture that is cropped, or may be, in picture diagonals.
+    /// Default: 0.12 (cutting a third away on one side moves it by 0.2 diagonals; see
+    /// `petcomp-report camera`).
     pub cropped_sigma: f64,
     /// Relative, of the ratio of the sides. Default: 0.005.
     pub ratio_sigma: f64,
@@ -67,7 +71,8 @@ impl Default for Priors {
 impl Priors {
     /// For rendered pictures: a perfect camera over a perfect rectangle.
     ///
-    /// Not for photos: from near above it turns half a percent of tape error into focal errors of hundreds of percent.
+    /// Not for photos: from near above it turns half a percent of tape error into focal errors of
+    /// hundreds of percent.
     pub fn ideal() -> Self {
         Self {
             principal_sigma: 0.0,

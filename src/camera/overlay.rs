@@ -1,4 +1,5 @@
-//! A picture to judge a camera by: rectangle, metric grid and a box of the reference height, drawn over the photo.
+//! A picture to judge a camera by: rectangle, metric grid and a box of the reference height, drawn
+//! over the photo.
 
 use super::pinhole::Camera;
 use super::rectangle::corner_points;
@@ -43,9 +44,10 @@ const fn linear_rgb(r: f32, g: f32, b: f32) -> LinearRgb {
 
 /// Draws a solution over its photo, with a legend below it.
 ///
-/// Green is the rectangle as fitted, white a grid of 1, 2 or 5 times a power of ten metres, orange a box over the rectangle
-/// as high as [`Sigma::reference_height`](super::Sigma), crosses are the labelled corners, the ellipses around them ten
-/// standard deviations of where the camera sees the corners.
+/// Green is the rectangle as fitted, white a grid of 1, 2 or 5 times a power of ten metres, orange
+/// a box over the rectangle as high as [`Sigma::reference_height`](super::Sigma), crosses are the
+/// labelled corners, the ellipses around them ten standard deviations of where the camera sees the
+/// corners.
 pub fn overlay(photo: &Image<LinearRgb>, solution: &Solution) -> Image<LinearRgb> {
     let drawing = OverlayDrawing::new(photo, solution).picture;
     stacked(&drawing, &legend(photo.width(), solution))

@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 
 /// A pinhole camera without distortion: where it stands and how it maps the world to pixels.
 ///
-/// Axes are x right, y down, z forward; `camera_from_world` maps world metres into that frame. Pixel conventions are
-/// those of [`geom`](crate::geom).
+/// Axes are x right, y down, z forward; `camera_from_world` maps world metres into that frame.
+/// Pixel conventions are those of [`geom`](crate::geom).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Camera {
@@ -24,7 +24,8 @@ pub struct Camera {
 impl Camera {
     /// A camera straight above the centre of the surface, the picture's top towards `+y`.
     ///
-    /// `height` is in metres; the principal point is the middle of the picture, `image` its width and height in pixels.
+    /// `height` is in metres; the principal point is the middle of the picture, `image` its width
+    /// and height in pixels.
     ///
     /// ```
     /// use petcomp::Camera;
@@ -42,8 +43,8 @@ impl Camera {
         )
     }
 
-    /// A camera at `eye` that looks at `target`, upright: `+z` of the world is up in the picture, or `+y` where the camera
-    /// looks straight down or up.
+    /// A camera at `eye` that looks at `target`, upright: `+z` of the world is up in the picture,
+    /// or `+y` where the camera looks straight down or up.
     ///
     /// ```
     /// use petcomp::Camera;
@@ -67,7 +68,8 @@ impl Camera {
             .inverse_transform_point(&Point3::origin())
     }
 
-    /// Pixel position and depth (metres along the optical axis) of a world point; none at or behind the camera.
+    /// Pixel position and depth (metres along the optical axis) of a world point; none at or behind
+    /// the camera.
     pub fn project(&self, world: Point3<f64>) -> Option<(Point2<f64>, f64)> {
         let c = self.camera_from_world * world;
         (c.z > 0.0).then_some((self.seen_px(c), c.z))
@@ -80,7 +82,8 @@ impl Camera {
             + self.principal_px.coords
     }
 
-    /// The ray through a pixel position. Its parameter *is* the depth along the optical axis, in metres.
+    /// The ray through a pixel position. Its parameter *is* the depth along the optical axis, in
+    /// metres.
     pub fn ray(&self, px: Point2<f64>) -> Ray {
         let d = (px - self.principal_px).component_div(&self.focal_px);
         Ray {
@@ -89,7 +92,8 @@ impl Camera {
         }
     }
 
-    /// Angle between the optical axis and the normal of the surface `z = 0`, radians; 0 looks straight down.
+    /// Angle between the optical axis and the normal of the surface `z = 0`, radians; 0 looks
+    /// straight down.
     pub fn tilt(&self) -> f64 {
         let axis = self.camera_from_world.rotation.inverse() * Vector3::z();
         libm::acos((-axis.z).clamp(-1.0, 1.0))
@@ -118,7 +122,8 @@ impl Camera {
         Homography(self.intrinsics() * plane)
     }
 
-    /// The same view taken at another picture size: what the camera becomes when its picture is resized.
+    /// The same view taken at another picture size: what the camera becomes when its picture is
+    /// resized.
     pub fn resized(&self, image: [u32; 2]) -> Self {
         let [from, to] = [self.image, image].map(|size| Vector2::from(size.map(f64::from)));
         let k = to.component_div(&from);

@@ -1,8 +1,10 @@
-//! Priors: what is known about the unknowns before the picture is measured, a mean and a standard deviation each.
+//! Priors: what is known about the unknowns before the picture is measured, a mean and a standard
+//! deviation each.
 
 use super::model::{KAPPA, LN_FOCAL, PRINCIPAL, STRETCH, Square, State, Unknowns, clear_unknown};
 
-/// A normal distribution; a zero standard deviation fixes its unknown, an infinite one makes the prior flat.
+/// A normal distribution; a zero standard deviation fixes its unknown, an infinite one makes the
+/// prior flat.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Prior {
     pub(crate) mean: f64,
@@ -31,7 +33,8 @@ impl Prior {
         self.sigma.is_infinite()
     }
 
-    /// One over the variance: what it adds to the information on its unknown. None for a fixed one, which is no unknown.
+    /// One over the variance: what it adds to the information on its unknown. None for a fixed one,
+    /// which is no unknown.
     pub(crate) fn information(&self) -> f64 {
         if self.is_fixed() {
             0.0

@@ -59,7 +59,8 @@ impl Problem {
         Self::with_focal(label, framing, None, options)
     }
 
-    /// The same, where a stated distortion is for this focal length (in units) instead of the prior's.
+    /// The same, where a stated distortion is for this focal length (in units) instead of the
+    /// prior's.
     pub(crate) fn with_focal(
         label: &Label,
         framing: Framing,
@@ -115,7 +116,8 @@ impl Problem {
         self.size.map(|s| s / self.units.unit)
     }
 
-    /// The focal length that the corners give in closed form, where they give one that can be followed.
+    /// The focal length that the corners give in closed form, where they give one that can be
+    /// followed.
     pub(crate) fn closed_form_focal(&self) -> Option<f64> {
         let squared = self.closed_form_focal_squared();
         let [shortest, longest] = self.residuals.ln_focal_range.map(libm::exp);
@@ -185,8 +187,8 @@ impl SolverUnits {
         }
     }
 
-    /// The priors of the lens, the others flat, and where that of the focal length comes from. A stated distortion is
-    /// for this focal length, or that of the prior.
+    /// The priors of the lens, the others flat, and where that of the focal length comes from. A
+    /// stated distortion is for this focal length, or that of the prior.
     fn lens_priors(
         &self,
         label: &Label,
@@ -243,7 +245,8 @@ impl SolverUnits {
         [1.0 / MAX_FOCAL_SIDES, MAX_FOCAL_SIDES].map(|f| libm::log(f * nominal))
     }
 
-    /// The labelled corners and the further points. Corners that were only predicted are a start and no observations.
+    /// The labelled corners and the further points. Corners that were only predicted are a start
+    /// and no observations.
     fn observations(
         &self,
         label: &Label,

@@ -22,7 +22,8 @@ pub struct LabelledPhoto {
     pub label: Label,
     /// The file that it was read from; one of another program may hold many labels.
     pub source: PathBuf,
-    /// What its files are called: `bg0001` of `bg0001.label.json`, or of another program's `bg0001.jpg`.
+    /// What its files are called: `bg0001` of `bg0001.label.json`, or of another program's
+    /// `bg0001.jpg`.
     pub name: String,
 }
 
@@ -63,7 +64,8 @@ impl std::fmt::Display for LabelledPhoto {
     }
 }
 
-/// Reads a label (`NAME.label.json`), with its photo's EXIF focal length where it gives none itself.
+/// Reads a label (`NAME.label.json`), with its photo's EXIF focal length where it gives none
+/// itself.
 ///
 /// # Errors
 /// As [`read_labels`]; a file with several labels.
@@ -76,12 +78,13 @@ pub fn read_label(path: impl AsRef<Path>) -> Result<Label> {
     }
 }
 
-/// Reads the labels of a file: one of ours, or an array of them, or what LabelMe, CVAT ("for images") or Label Studio
-/// (JSON or JSON-MIN) wrote. `size` is the rectangle's width and height, metres, for labels without them.
+/// Reads the labels of a file: one of ours, or an array of them, or what LabelMe, CVAT ("for
+/// images") or Label Studio (JSON or JSON-MIN) wrote. `size` is the rectangle's width and height,
+/// metres, for labels without them.
 ///
 /// # Errors
-/// A file that cannot be read or understood, a photo instead of a label among them; a photo that has another size than its
-/// label says, or a path that leads out of the label's folder.
+/// A file that cannot be read or understood, a photo instead of a label among them; a photo that
+/// has another size than its label says, or a path that leads out of the label's folder.
 pub fn read_labels(path: impl AsRef<Path>, size: Option<[f64; 2]>) -> Result<Vec<LabelledPhoto>> {
     let path = path.as_ref();
     let text = label_text(path)?;
@@ -116,8 +119,8 @@ fn imported_labels(annotations: &[Annotation], path: &Path) -> Result<Vec<Labell
         .collect()
 }
 
-/// Reads the labels of a folder in order of name. Files that are of no label format are left out, and so are other
-/// programs' labels of photos that have one of ours.
+/// Reads the labels of a folder in order of name. Files that are of no label format are left out,
+/// and so are other programs' labels of photos that have one of ours.
 ///
 /// # Errors
 /// As [`read_labels`]; a folder that cannot be read; a photo that is labelled twice.
@@ -176,7 +179,8 @@ fn may_be_label(path: &Path) -> bool {
 /// The labels of a file; none where it is not called a label and holds nothing of another program.
 ///
 /// # Errors
-/// Labels of another program that are badly formed; as [`read_labels`] for a file that is called a label.
+/// Labels of another program that are badly formed; as [`read_labels`] for a file that is called a
+/// label.
 fn labels_if_any(path: &Path, size: Option<[f64; 2]>) -> Result<Option<Vec<LabelledPhoto>>> {
     let is_ours = ends_with(path, LABEL_SUFFIX);
     let text = match label_text(path) {
@@ -292,7 +296,8 @@ fn fill_in_size(image: &mut LabelImage, photo: &Path) -> Result<()> {
     Ok(())
 }
 
-/// The name of an annotation's photo: the first that is there, in or below the folder or directly in it, or else the last.
+/// The name of an annotation's photo: the first that is there, in or below the folder or directly
+/// in it, or else the last.
 fn annotated_file(annotation: &Annotation, path: &Path) -> String {
     possible_files(annotation)
         .find(|name| path.with_file_name(name).is_file())
@@ -320,9 +325,10 @@ fn completed(mut labelled: LabelledPhoto, size: Option<[f64; 2]>) -> Result<Labe
     })
 }
 
-/// A label that was read from `path`, with the focal length of its photo's EXIF data where it gives none itself; as it is
-/// where the photo is not there. Unless the label says whether the photo is cropped, its EXIF data do: it is where they
-/// state another shape, and whole where they state its size or an integer multiple of it.
+/// A label that was read from `path`, with the focal length of its photo's EXIF data where it gives
+/// none itself; as it is where the photo is not there. Unless the label says whether the photo is
+/// cropped, its EXIF data do: it is where they state another shape, and whole where they state its
+/// size or an integer multiple of it.
 ///
 /// # Errors
 /// A photo that cannot be read, or has another size than the label says.
@@ -370,7 +376,8 @@ pub(crate) fn apply_exif(label: &mut Label, header: &io::Header) {
     }
 }
 
-/// Checks that a surface with objects on it can have the label's sides, which may be in centimetres by mistake.
+/// Checks that a surface with objects on it can have the label's sides, which may be in centimetres
+/// by mistake.
 ///
 /// # Errors
 /// [`Error::Value`] that names the side.
@@ -383,7 +390,8 @@ fn check_side(at: &str, metres: Option<f64>) -> Result<()> {
     metres.map_or(Ok(()), |metres| SURFACE.check(at, metres))
 }
 
-/// Checks that a camera is near enough to see objects on the surface: how far it is follows from the label's lengths.
+/// Checks that a camera is near enough to see objects on the surface: how far it is follows from
+/// the label's lengths.
 ///
 /// # Errors
 /// [`Error::Value`] with the distance.
@@ -423,8 +431,8 @@ mod tests {
     use exif::experimental::Writer;
     use exif::{Field, In, Rational, Tag, Value};
 
-    /// A label of a photo of 90 x 60 pixels with EXIF data: a 35 mm equivalent of 28 mm, a digital zoom, and the size it was
-    /// taken in.
+    /// A label of a photo of 90 x 60 pixels with EXIF data: a 35 mm equivalent of 28 mm, a digital
+    /// zoom, and the size it was taken in.
     fn label_of_photo(zoom: [u32; 2], taken: [u32; 2]) -> Label {
         let folder = tempfile::tempdir().unwrap();
         let photo = folder.path().join("a.jpg");

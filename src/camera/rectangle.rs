@@ -1,10 +1,11 @@
 //! Focal length and pose from the picture of a rectangle, in closed form.
 //!
 //! # Method
-//! The depth of a corner is the area of the triangle of the other three (both parallelogram identities in homogeneous
-//! coordinates); with depths the sides' directions follow without intersecting any lines, so parallel sides are nothing
-//! special. Two equations are linear in the squared focal length: the sides are at right angles, and their ratio is
-//! known. They are the imaginary and the real part of one complex equation, which gives them their weights.
+//! The depth of a corner is the area of the triangle of the other three (both parallelogram
+//! identities in homogeneous coordinates); with depths the sides' directions follow without
+//! intersecting any lines, so parallel sides are nothing special. Two equations are linear in the
+//! squared focal length: the sides are at right angles, and their ratio is known. They are the
+//! imaginary and the real part of one complex equation, which gives them their weights.
 
 use super::corners::triangle_areas;
 use crate::geom::{Homography, Point2, Point3, Vector2};
@@ -33,7 +34,8 @@ pub(crate) struct ScaledPose {
 }
 
 impl ProjectedRectangle {
-    /// From corners in the order top left, top right, bottom right, bottom left, relative to the principal point.
+    /// From corners in the order top left, top right, bottom right, bottom left, relative to the
+    /// principal point.
     pub(crate) fn new(corners: &[Vector2<f64>; 4]) -> Self {
         let [c0, c1, c2, c3] = homogeneous_corners(corners);
         let [along, down] = [c1 - c0, c3 - c0];
@@ -46,7 +48,8 @@ impl ProjectedRectangle {
 
     /// The squared focal length, for a rectangle whose width is `ratio` times its height.
     ///
-    /// Zero, negative or not finite where the picture shows no perspective: from exactly above, or in the noise.
+    /// Zero, negative or not finite where the picture shows no perspective: from exactly above, or
+    /// in the noise.
     pub(crate) fn focal_squared(&self, ratio: f64) -> f64 {
         let ((a, dw), (b, dh)) = (self.along, self.down);
         let r2 = ratio * ratio;
@@ -87,7 +90,8 @@ fn length_squared((side, depth): (Vector2<f64>, f64), focal_squared: f64) -> f64
     side.norm_squared() + focal_squared * depth * depth
 }
 
-/// The corners of a rectangle's picture with their depths, relative to the mean depth, as last coordinates.
+/// The corners of a rectangle's picture with their depths, relative to the mean depth, as last
+/// coordinates.
 fn homogeneous_corners(corners: &[Vector2<f64>; 4]) -> [Vector3<f64>; 4] {
     let areas = triangle_areas(corners);
     let mean = areas.iter().sum::<f64>() / 4.0;
@@ -95,10 +99,11 @@ fn homogeneous_corners(corners: &[Vector2<f64>; 4]) -> [Vector3<f64>; 4] {
 }
 
 impl ProjectedRectangle {
-    /// The two poses from which the rectangle looks like this from so far that perspective is lost in the noise.
+    /// The two poses from which the rectangle looks like this from so far that perspective is lost
+    /// in the noise.
     ///
-    /// Its picture is then a parallelogram, and [`pose_at`](Self::pose_at) sees no tilt in it: a saddle of the cost. The
-    /// foreshortening gives the tilt, up to its sign.
+    /// Its picture is then a parallelogram, and [`pose_at`](Self::pose_at) sees no tilt in it: a
+    /// saddle of the cost. The foreshortening gives the tilt, up to its sign.
     pub(crate) fn distant_poses(&self, size: [f64; 2]) -> [ScaledPose; 2] {
         let along = self.along.0 / (size[0] * self.center.z);
         let up = -self.down.0 / (size[1] * self.center.z);
@@ -128,7 +133,8 @@ fn leanings(along: &Vector2<f64>, up: &Vector2<f64>, squared: f64) -> [f64; 2] {
     [lean, if along.dot(up) > 0.0 { -other } else { other }]
 }
 
-/// The squared length of a unit seen from the front, from the pictures of two units at right angles to each other.
+/// The squared length of a unit seen from the front, from the pictures of two units at right angles
+/// to each other.
 fn frontal_squared(along: &Vector2<f64>, up: &Vector2<f64>) -> f64 {
     let (n1, n2) = (along.norm_squared(), up.norm_squared());
     (n1 + n2 + libm::hypot(n1 - n2, 2.0 * along.dot(up))) / 2.0
@@ -150,7 +156,8 @@ fn rotation_between(x: &Vector3<f64>, y: &Vector3<f64>) -> Matrix3<f64> {
     Matrix3::from_columns(&[x, y, x.cross(&y)])
 }
 
-/// The depth component of a unit axis, from its squared length in the picture and that of an axis seen from the front.
+/// The depth component of a unit axis, from its squared length in the picture and that of an axis
+/// seen from the front.
 fn leaning(squared: f64, frontal_squared: f64) -> f64 {
     (1.0 - squared / frontal_squared).max(0.0).sqrt()
 }
@@ -162,7 +169,8 @@ pub(crate) fn corner_points(size: [f64; 2]) -> [Point3<f64>; 4] {
 }
 
 impl ScaledPose {
-    /// The other pose from which a small or distant rectangle looks almost the same: mirrored at the line of sight.
+    /// The other pose from which a small or distant rectangle looks almost the same: mirrored at
+    /// the line of sight.
     pub(crate) fn mirrored(&self, focal: f64) -> Self {
         let sight = self.center.push(focal).normalize();
         let upright = shortest_rotation_to_z(&sight);
@@ -172,14 +180,16 @@ impl ScaledPose {
     }
 }
 
-/// The map from the unit square (u right, v down) to four corners from its (0, 0), clockwise; exact.
+/// The map from the unit square (u right, v down) to four corners from its (0, 0), clockwise;
+/// exact.
 pub(crate) fn square_from_corners(corners: &[Point2<f64>; 4]) -> Homography {
     let areas = triangle_areas(&corners.map(|c| c.coords));
     let [c0, c1, _, c3] = [0, 1, 2, 3].map(|i| corners[i].to_homogeneous() * areas[i]);
     Homography(Matrix3::from_columns(&[c1 - c0, c3 - c0, c0]))
 }
 
-/// Rodrigues' formula for the shortest turn of a unit vector in front of the camera (`z > 0`) to +z.
+/// Rodrigues' formula for the shortest turn of a unit vector in front of the camera (`z > 0`) to
+/// +z.
 fn shortest_rotation_to_z(v: &Vector3<f64>) -> Matrix3<f64> {
     let cross = v.cross(&Vector3::z()).cross_matrix();
     Matrix3::identity() + cross + cross * cross / (1.0 + v.z)

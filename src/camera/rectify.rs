@@ -9,15 +9,17 @@ use crate::image::Image;
 use crate::pixel::Mix;
 use nalgebra::{Matrix2, Matrix3};
 
-/// No pixel is the mean of more samples along an axis than this; beyond, they are taken from coarser levels.
+/// No pixel is the mean of more samples along an axis than this; beyond, they are taken from
+/// coarser levels.
 const MAX_SAMPLES: f64 = 32.0;
 /// Larger pictures are treated as typing errors: this many pixels take 800 MB.
 const MAX_MAP_PIXELS: f64 = 67_108_864.0;
 
-/// The rectangle of `size` metres seen from straight above, `px_per_metre` pixels to the metre, its top left corner first.
+/// The rectangle of `size` metres seen from straight above, `px_per_metre` pixels to the metre, its
+/// top left corner first.
 ///
-/// Takes a photo in any pixels that may be averaged (scene-linear), of the camera's size; what the photo does not show is
-/// empty.
+/// Takes a photo in any pixels that may be averaged (scene-linear), of the camera's size; what the
+/// photo does not show is empty.
 ///
 /// # Errors
 /// [`Error::Value`] for a map without pixels or of more than 64 million.
@@ -50,7 +52,8 @@ fn unusable_scale(px_per_metre: f64, pixels: [f64; 2]) -> Error {
     Error::value("px_per_metre", what)
 }
 
-/// The photo that the camera takes of a picture lying on the rectangle of `size` metres; empty beside it.
+/// The photo that the camera takes of a picture lying on the rectangle of `size` metres; empty
+/// beside it.
 pub fn project_picture<P: Mix>(picture: &Pyramid<P>, camera: &Camera, size: [f64; 2]) -> Image<P> {
     let (w, h) = picture.base().size();
     let photo_from_picture =
@@ -77,14 +80,17 @@ fn surface_from_map(size: [f64; 2], pixels: [f64; 2]) -> Homography {
     Homography(Matrix3::from_fn(|i, j| rows[i][j]))
 }
 
-/// A picture seen through a projective map: the value of each target pixel is the mean over what it covers of the source.
+/// A picture seen through a projective map: the value of each target pixel is the mean over what it
+/// covers of the source.
 ///
-/// Empty where the map comes from behind (its last coordinate is not positive) or from outside the source.
+/// Empty where the map comes from behind (its last coordinate is not positive) or from outside the
+/// source.
 ///
 /// # Method
-/// The footprint of a pixel is an ellipse, from the map's derivative ([Heckbert]). It is the mean of a grid of samples along
-/// its axes, one or more a pixel of the level of the pyramid that they are taken from: the last that is twice as fine as
-/// the short axis, so that its own blur hardly adds to the footprint's.
+/// The footprint of a pixel is an ellipse, from the map's derivative ([Heckbert]). It is the mean
+/// of a grid of samples along its axes, one or more a pixel of the level of the pyramid that they
+/// are taken from: the last that is twice as fine as the short axis, so that its own blur hardly
+/// adds to the footprint's.
 ///
 /// [Heckbert]: https://www2.eecs.berkeley.edu/Pubs/TechRpts/1989/5504.html
 pub fn warp<P: Mix>(
@@ -145,8 +151,8 @@ fn level_below(size: f64) -> usize {
 /// No picture has more levels.
 const MAX_PYRAMID_LEVELS: f64 = 31.0;
 
-/// The long and the short axis of a footprint, whole, pixels of the source: the eigenvectors of the slope times its
-/// transpose, as long as the roots of the eigenvalues.
+/// The long and the short axis of a footprint, whole, pixels of the source: the eigenvectors of the
+/// slope times its transpose, as long as the roots of the eigenvalues.
 fn footprint_axes(slope: &Matrix2<f64>) -> [Vector2<f64>; 2] {
     let square = slope * slope.transpose();
     let mean = square.trace() / 2.0;
@@ -160,7 +166,8 @@ fn footprint_axes(slope: &Matrix2<f64>) -> [Vector2<f64>; 2] {
     ]
 }
 
-/// The eigenvector of the larger eigenvalue; two ways to write the same direction, of which the one that does not cancel.
+/// The eigenvector of the larger eigenvalue; two ways to write the same direction, of which the one
+/// that does not cancel.
 #[inline]
 fn long_direction(half: f64, mixed: f64, spread: f64) -> Vector2<f64> {
     let direction = if half >= 0.0 {
@@ -226,7 +233,8 @@ mod tests {
         assert!(worst < 1e-6, "{worst}");
     }
 
-    /// A zone plate, seen through a map that shrinks it by so much: what `warp` makes of it, and its mean over each pixel.
+    /// A zone plate, seen through a map that shrinks it by so much: what `warp` makes of it, and
+    /// its mean over each pixel.
     fn shrunk_rings(by: [f64; 2]) -> (Image<Coverage>, Image<Coverage>) {
         let rings = |x: f64, y: f64| 0.5 + 0.4 * libm::cos(4e-3 * (x * x + y * y));
         let mean = |x: usize, y: usize, [w, h]: [f64; 2]| {
@@ -249,7 +257,8 @@ mod tests {
 
     #[test]
     fn a_pixel_is_the_mean_over_what_it_covers() {
-        // Bilinear samples blur by a pixel of their level: a seventh of the rings, the finest of which are 3 pixels wide.
+        // Bilinear samples blur by a pixel of their level: a seventh of the rings, the finest of
+        // which are 3 pixels wide.
         for by in [[1.3, 1.3], [2.0, 2.0], [3.0, 2.5], [1.0, 5.0]] {
             let (found, wanted) = shrunk_rings(by);
             let inner = |i: &usize| {

@@ -1,8 +1,8 @@
 //! The most probable camera near a first guess.
 //!
 //! # Method
-//! Levenberg and Marquardt's damped least squares on the normal equations, scaled to a unit diagonal; priors are further
-//! residuals.
+//! Levenberg and Marquardt's damped least squares on the normal equations, scaled to a unit
+//! diagonal; priors are further residuals.
 
 use super::model::{LN_FOCAL, LN_SCALE, Observation, STRETCH, Square, State, UNKNOWNS, Unknowns};
 use super::prior::ParameterPriors;
@@ -95,8 +95,9 @@ impl Residuals {
 
     /// Down to the nearest minimum; none where the start is impossible.
     ///
-    /// Only minima below `bar` are of interest: a start that is far above it and hardly falls any more is left where it is.
-    /// (The mirrored start of a large rectangle creeps along a valley floor for as long as it may.)
+    /// Only minima below `bar` are of interest: a start that is far above it and hardly falls any
+    /// more is left where it is. (The mirrored start of a large rectangle creeps along a valley
+    /// floor for as long as it may.)
     pub(crate) fn refine(&self, start: State, bar: f64) -> Option<Minimum> {
         self.refine_for(start, bar, MAX_ITERATIONS)
     }
@@ -238,7 +239,8 @@ impl NormalEquations {
 
     /// The damped step, shortened where it would leap, and its length in the scale of the unknowns.
     ///
-    /// Damping in proportion to the diagonal is the same as damping evenly after scaling to a unit diagonal.
+    /// Damping in proportion to the diagonal is the same as damping evenly after scaling to a unit
+    /// diagonal.
     fn damped_step(&self, damping: f64) -> Option<(Unknowns, f64)> {
         let step = solve_positive(self.damped_information(damping), -self.slope)?;
         let squares = step.component_mul(&step);
@@ -274,10 +276,11 @@ fn damped_diagonal(own: f64, damping: f64) -> f64 {
     }
 }
 
-/// Solves `a x = b` for a positive definite `a`, of which the lower half is read; none where it is not.
+/// Solves `a x = b` for a positive definite `a`, of which the lower half is read; none where it is
+/// not.
 ///
-/// Cholesky's method, left-looking by columns: a quarter of the time of the general one, and the search spends most of its
-/// time here; so it stays in one piece.
+/// Cholesky's method, left-looking by columns: a quarter of the time of the general one, and the
+/// search spends most of its time here; so it stays in one piece.
 fn solve_positive(a: Square, b: Unknowns) -> Option<Unknowns> {
     let (mut l, mut x) = (a.data.0, b.data.0[0]);
     for j in 0..UNKNOWNS {

@@ -50,7 +50,8 @@ impl Problem {
         minima
     }
 
-    /// The closed form, where it stands above the surface, after at most `max_iterations` iterations.
+    /// The closed form, where it stands above the surface, after at most `max_iterations`
+    /// iterations.
     pub(crate) fn closed_form(&self, max_iterations: usize) -> Option<SearchResult> {
         let start = self.start(self.closed_form_or_prior_focal());
         self.residuals
@@ -59,7 +60,8 @@ impl Problem {
             .map(SearchResult::only)
     }
 
-    /// For each focal length the closed form and its mirror image; then the two poses without perspective.
+    /// For each focal length the closed form and its mirror image; then the two poses without
+    /// perspective.
     fn starts(&self) -> impl Iterator<Item = State> {
         let focals = self.focal_starts().into_iter().flatten();
         let near = focals.flat_map(|focal| self.direct_and_mirrored(focal));
@@ -68,7 +70,8 @@ impl Problem {
         near.chain(distant.map(|pose| State { pose, ..nominal }))
     }
 
-    /// The mean of the prior, what the corners give, and a short and a long lens; only the mean where it is fixed.
+    /// The mean of the prior, what the corners give, and a short and a long lens; only the mean
+    /// where it is fixed.
     fn focal_starts(&self) -> [Option<f64>; 4] {
         let prior = self.prior_focal();
         if self.has_fixed_focal() {

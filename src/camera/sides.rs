@@ -1,4 +1,5 @@
-//! The sides of the rectangle as measured, and what follows from them and from points on the surface.
+//! The sides of the rectangle as measured, and what follows from them and from points on the
+//! surface.
 
 use super::dlt;
 use super::error::SolveError;
@@ -47,7 +48,8 @@ impl MeasuredSides {
         }
     }
 
-    /// Where the corners of a rectangle of known sides must be by the further points on its surface.
+    /// Where the corners of a rectangle of known sides must be by the further points on its
+    /// surface.
     pub(crate) fn predicted_corners(self, label: &Label) -> Option<[Point2<f64>; 4]> {
         let Self::Both(size) = self else { return None };
         let pairs: Vec<_> = points_on_surface(label, size)
@@ -134,7 +136,8 @@ fn span(values: impl Iterator<Item = f64>) -> f64 {
     high - low
 }
 
-/// Width over height by the right angle, at the focal length that it gives or else at that of the prior.
+/// Width over height by the right angle, at the focal length that it gives or else at that of the
+/// prior.
 pub(crate) fn ratio_by_right_angle(projected: &ProjectedRectangle, prior_focal: f64) -> f64 {
     let squared = projected.focal_squared_any_ratio();
     let [short, long] = [0.2 * prior_focal, 5.0 * prior_focal].map(|f| f * f);

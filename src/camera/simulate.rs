@@ -1,4 +1,5 @@
-//! Random views of a rectangle with a known camera: what tests, benches and reports measure the solver against.
+//! Random views of a rectangle with a known camera: what tests, benches and reports measure the
+//! solver against.
 
 use super::exchange::pose_from;
 use super::label::Label;
@@ -15,7 +16,8 @@ const MARGIN_SIDES: f64 = 0.02;
 /// Cameras are at least so high above the surface, in distances from the rectangle's centre.
 const LEAST_HEIGHT: f64 = 0.05;
 
-/// A kind of view; the default is the ideal camera of the accuracy tables, from straight above, without noise.
+/// A kind of view; the default is the ideal camera of the accuracy tables, from straight above,
+/// without noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scenario {
     /// Width and height of the picture, pixels.
@@ -34,8 +36,9 @@ pub struct Scenario {
     pub corner_sigma_px: f64,
     /// Noise of the principal point, pixels.
     pub principal_sigma_px: f64,
-    /// Distance of the principal point from the picture's middle before that noise, in longer sides, in a random
-    /// direction: a cropped picture, or a shifted lens. Where it is 0 labels say that the picture is whole.
+    /// Distance of the principal point from the picture's middle before that noise, in longer
+    /// sides, in a random direction: a cropped picture, or a shifted lens. Where it is 0
+    /// labels say that the picture is whole.
     pub off_center: f64,
     /// Radial distortion; its sign is random.
     pub kappa: f64,
@@ -83,8 +86,8 @@ struct SharedLens {
 }
 
 impl Scenario {
-    /// A camera with realistic errors: corners to 1 px, the principal point to 0.005 diagonals, a slight distortion,
-    /// the sides to 0.5 %.
+    /// A camera with realistic errors: corners to 1 px, the principal point to 0.005 diagonals, a
+    /// slight distortion, the sides to 0.5 %.
     pub fn realistic() -> Self {
         Self {
             corner_sigma_px: 1.0,
@@ -201,8 +204,9 @@ impl Scenario {
         translation(center, distance, self.focal_px)
     }
 
-    /// Where the rectangle's centre is seen, relative to the principal point, so that its bounds are in the picture: random
-    /// where the camera is then above the surface, or else the middle.
+    /// Where the rectangle's centre is seen, relative to the principal point, so that its bounds
+    /// are in the picture: random where the camera is then above the surface, or else the
+    /// middle.
     fn center_px(
         &self,
         lens: &SharedLens,

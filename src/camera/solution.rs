@@ -16,17 +16,19 @@ use crate::diagnostic::{Code, Diagnostic, Severity};
 use crate::geom::{Point2, Point3, Vector2};
 use nalgebra::{Matrix2, Matrix3};
 
-/// From this share of the information on, the focal length counts as measured; below the other, as the prior's.
+/// From this share of the information on, the focal length counts as measured; below the other, as
+/// the prior's.
 const MEASURED_SHARE: f64 = 0.9;
 const PRIOR_SHARE: f64 = 0.1;
 /// Above this tilt the surface is seen almost edge-on.
 const GRAZING_DEG: f64 = 80.0;
 /// Height of the objects where none is given, in shorter sides.
 const REFERENCE_HEIGHT_SHARE: f64 = 0.1;
-/// Error of objects worth a warning where none is given, in picture diagonals: more than an EXIF value leaves, less than
-/// knowing nothing from above does.
+/// Error of objects worth a warning where none is given, in picture diagonals: more than an EXIF
+/// value leaves, less than knowing nothing from above does.
 const HEIGHT_SIGMA_DIAGONALS: f64 = 0.0015;
-/// Fits less probable than the first are worth a warning; those less probable than the second are refused.
+/// Fits less probable than the first are worth a warning; those less probable than the second are
+/// refused.
 const POOR_FIT_P: f64 = 0.01;
 const REFUSED_FIT_P: f64 = 1e-4;
 
@@ -35,8 +37,9 @@ const REFUSED_FIT_P: f64 = 1e-4;
 pub struct Solution {
     /// The camera; the labelled rectangle is the plane `z = 0`, centred.
     pub camera: Camera,
-    /// Radial distortion: a point at offset `x` from the principal point is seen at `x (1 + kappa |x|^2 / S^2)`, with half
-    /// the picture's diagonal for S. The camera itself is without distortion.
+    /// Radial distortion: a point at offset `x` from the principal point is seen at
+    /// `x (1 + kappa |x|^2 / S^2)`, with half the picture's diagonal for S. The camera itself is without
+    /// distortion.
     pub kappa: f64,
     /// Width and height of the rectangle as fitted, metres: they agree with the picture.
     pub size: [f64; 2],
@@ -48,7 +51,8 @@ pub struct Solution {
     pub focal_source: FocalSource,
     /// What the prior and the picture say of the focal length.
     pub focal: FocalFinding,
-    /// Root mean square distance of the rectangle's projected corners from the labelled ones, pixels.
+    /// Root mean square distance of the rectangle's projected corners from the labelled ones,
+    /// pixels.
     pub rms_px: f64,
     /// How well the label fits.
     pub fit: Fit,
@@ -76,7 +80,8 @@ pub struct FocalFinding {
 /// How well a label fits its camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fit {
-    /// Sum of squared distances from everything labelled and from the priors, in standard deviations.
+    /// Sum of squared distances from everything labelled and from the priors, in standard
+    /// deviations.
     pub chi2: f64,
     /// Degrees of freedom of that sum.
     pub dof: usize,
@@ -113,7 +118,8 @@ pub struct Sigma {
     pub height_px: f64,
     /// Of a coordinate of the principal point, pixels.
     pub principal_px: f64,
-    /// Covariance of the unknowns, in the solver's units; the order is that of [`camera::UNKNOWNS`](super::UNKNOWNS).
+    /// Covariance of the unknowns, in the solver's units; the order is that of
+    /// [`camera::UNKNOWNS`](super::UNKNOWNS).
     pub covariance: Square,
 }
 
@@ -274,8 +280,8 @@ impl Solution {
         self.misfit().map_or(Ok(self), Err)
     }
 
-    /// Why the solution does not fit its label, where it does not: so improbable by chance, or so much better with the
-    /// sides exchanged, that it cannot be used.
+    /// Why the solution does not fit its label, where it does not: so improbable by chance, or so
+    /// much better with the sides exchanged, that it cannot be used.
     pub fn misfit(&self) -> Option<SolveError> {
         let exchanged = self
             .fit
@@ -300,7 +306,8 @@ impl Solution {
             .is_some_and(|other| other.misfit().is_none())
     }
 
-    /// Everything that a camera file holds is finite, but for standard deviations of what nothing is known of.
+    /// Everything that a camera file holds is finite, but for standard deviations of what nothing
+    /// is known of.
     pub(crate) fn is_finite(&self) -> bool {
         let fit = &self.fit;
         let values = [fit.chi2, fit.depth_ratio, fit.px_per_metre, self.rms_px];

@@ -15,7 +15,8 @@ use crate::diagnostic::{Code, Diagnostic};
 
 /// Picture and prior contradict each other beyond this many standard deviations.
 const CONFLICT_SIGMAS: f64 = 3.0;
-/// How often a stated distortion is applied anew, and the relative change of the focal length that ends it.
+/// How often a stated distortion is applied anew, and the relative change of the focal length that
+/// ends it.
 const MAX_REPEATS: usize = 20;
 const FOCAL_TOLERANCE: f64 = 1e-9;
 
@@ -24,16 +25,17 @@ const FOCAL_TOLERANCE: f64 = 1e-9;
 /// The rectangle becomes the world plane `z = 0`, centred, `+x` along its width.
 ///
 /// # Method
-/// The most probable camera given the corners and the priors of focal length, tape measure and lens, from several
-/// closed-form starts; the covariance at the optimum gives how well each quantity is known. Where the picture does not
-/// constrain the focal length, the answer rests on its prior, and [`Solution::focal_source`] says so. A picture that may
-/// have been cropped is treated as whole as long as its corners allow that, with the error that it has if it is not
+/// The most probable camera given the corners and the priors of focal length, tape measure and
+/// lens, from several closed-form starts; the covariance at the optimum gives how well each
+/// quantity is known. Where the picture does not constrain the focal length, the answer rests on
+/// its prior, and [`Solution::focal_source`] says so. A picture that may have been cropped is
+/// treated as whole as long as its corners allow that, with the error that it has if it is not
 /// ([`Label::framing`]).
 ///
 /// A camera that does not fit its label is returned, too: [`Solution::fitting`] refuses it.
 /// # Errors
-/// [`SolveError`], for labels that no camera can have seen. A view from straight above is not an error.
-/// # Examples
+/// [`SolveError`], for labels that no camera can have seen. A view from straight above is not an
+/// error. # Examples
 /// ```
 /// # use petcomp::camera::{self, Label};
 /// // A rectangle of 0.6 m x 0.4 m from 0.8 m away, tilted by 30 degrees.
@@ -92,7 +94,8 @@ impl SolvedProblem {
     }
 }
 
-/// The camera of a whole picture with the uncertainty of both, or the other one where the corners demand it.
+/// The camera of a whole picture with the uncertainty of both, or the other one where the corners
+/// demand it.
 fn whole_or_cropped(
     whole: SolvedProblem,
     loose: SolvedProblem,
@@ -176,8 +179,8 @@ fn search(problem: &Problem, options: &SolveOptions) -> Result<SearchResult, Sol
     found.ok_or(SolveError::NoPose)
 }
 
-/// Solves; where the picture contradicts its own EXIF value, solves again without that and keeps the first answer as the
-/// alternative.
+/// Solves; where the picture contradicts its own EXIF value, solves again without that and keeps
+/// the first answer as the alternative.
 fn solve_without_wrong_exif(label: &Label, options: &SolveOptions) -> Result<Solution, SolveError> {
     let SolvedProblem {
         mut solution,
@@ -223,8 +226,8 @@ fn focal_conflict(problem: &Problem, minimum: &Minimum) -> Option<Diagnostic> {
     (sigmas > CONFLICT_SIGMAS).then(|| Diagnostic::warning(Code::FocalPriorConflict, what))
 }
 
-/// Where width and height exchanged fit clearly better, adds a warning and the better solution, as the alternative or, with
-/// [`CornerOrder::Auto`], as the first.
+/// Where width and height exchanged fit clearly better, adds a warning and the better solution, as
+/// the alternative or, with [`CornerOrder::Auto`], as the first.
 fn compare_exchanged_sides(
     label: &Label,
     options: &SolveOptions,
@@ -248,7 +251,8 @@ fn exchange_warning(labelled_chi2: f64, exchanged_chi2: f64) -> Diagnostic {
     Diagnostic::warning(Code::SidesSwapped, what)
 }
 
-/// The solution with width and height exchanged, where it fits clearly better than this chi squared.
+/// The solution with width and height exchanged, where it fits clearly better than this chi
+/// squared.
 fn with_exchanged_sides(label: &Label, options: &SolveOptions, chi2: f64) -> Option<Solution> {
     let surface = &label.surface;
     let (width_m, height_m) = (surface.width_m?, surface.height_m?);

@@ -29,9 +29,9 @@ pub struct PhotoCamera {
     pub stale: Option<String>,
 }
 
-/// The cameras of labelled photos, in order: that beside a label (`NAME.camera.json`) where it is there and was solved from
-/// this label, or else that of the label. One that does not fit its label is refused, unless `force`d here or when it was
-/// solved.
+/// The cameras of labelled photos, in order: that beside a label (`NAME.camera.json`) where it is
+/// there and was solved from this label, or else that of the label. One that does not fit its label
+/// is refused, unless `force`d here or when it was solved.
 ///
 /// # Errors
 /// A camera file that cannot be right; a label that no camera can have seen, or that none fits.
@@ -192,7 +192,8 @@ fn modified(path: &Path) -> Option<std::time::SystemTime> {
     std::fs::metadata(path).ok()?.modified().ok()
 }
 
-/// The checksums of labels by name: what each of those that are solved together keeps of the others.
+/// The checksums of labels by name: what each of those that are solved together keeps of the
+/// others.
 pub fn label_checksums<'a>(
     labels: impl IntoIterator<Item = &'a LabelledPhoto>,
 ) -> BTreeMap<String, u32> {

@@ -26,7 +26,8 @@ pub(crate) struct Uncertainty {
     pub(crate) condition: f64,
 }
 
-/// How much of the information about the focal length comes from the picture, and how much from its prior.
+/// How much of the information about the focal length comes from the picture, and how much from its
+/// prior.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FocalShare {
     /// Standard deviation of its logarithm; infinite where nothing is known.
@@ -178,8 +179,9 @@ fn grid_share(k: usize) -> f64 {
 
 /// Inverse of the information, and the information left on the focal length when all else is free.
 ///
-/// The focal length is split off first (its Schur complement): it is the one unknown that may have no information at
-/// all, and then its variance is huge while the rest stays as it is. Fixed unknowns have no information and get no variance.
+/// The focal length is split off first (its Schur complement): it is the one unknown that may have
+/// no information at all, and then its variance is huge while the rest stays as it is. Fixed
+/// unknowns have no information and get no variance.
 fn covariance(information: &Square) -> (Square, f64) {
     let scale = unit_diagonal(information);
     let (rest, coupling) = without_focal(scaled(information, &scale));
@@ -272,7 +274,8 @@ pub(crate) fn focal_share(ln_focal: f64, information: f64, prior: Prior) -> Foca
     }
 }
 
-/// The logarithm of the focal length that the picture alone gives, if it has this share in the value.
+/// The logarithm of the focal length that the picture alone gives, if it has this share in the
+/// value.
 fn without_prior(ln_focal: f64, prior: Prior, share: f64) -> f64 {
     let start = if prior.is_flat() {
         ln_focal

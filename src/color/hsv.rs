@@ -4,9 +4,9 @@ use crate::pixel::LinearRgb;
 
 /// A colour as hue, saturation and value.
 ///
-/// `v` is the largest channel and may be of any size and sign; `h` is a fraction of a turn, 0 = red, 1/3 = green;
-/// `s` is the spread of the channels over `v`: 0 to 1 where no channel is negative, above 1 where one is, negative
-/// where all are.
+/// `v` is the largest channel and may be of any size and sign; `h` is a fraction of a turn, 0 =
+/// red, 1/3 = green; `s` is the spread of the channels over `v`: 0 to 1 where no channel is
+/// negative, above 1 where one is, negative where all are.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Hsv {
     /// Hue in turns, 0 up to 1; 0 for grey.
@@ -17,10 +17,11 @@ pub struct Hsv {
     pub v: f32,
 }
 
-/// Hue, saturation and value of a colour; the largest channel may be above 1 and any channel below 0.
+/// Hue, saturation and value of a colour; the largest channel may be above 1 and any channel below
+/// 0.
 ///
-/// The inverse is exact up to rounding, but for one case: where the largest channel is exactly 0 saturation has no
-/// value, and the colour becomes black.
+/// The inverse is exact up to rounding, but for one case: where the largest channel is exactly 0
+/// saturation has no value, and the colour becomes black.
 ///
 /// # Method
 /// The hexcone model of [Smith 1978], whose formulas need no bounds on the channels.
@@ -63,12 +64,14 @@ pub fn hsv_to_rgb(c: Hsv) -> LinearRgb {
 
 /// The colour turned in hue, its saturation and value multiplied.
 ///
-/// `hue_deg` is added to the hue, in degrees; `saturation` and `value` are factors. Saturation ends at 1, negative
-/// results at 0, and nothing ends at the top. A colour times k gives the result times k, so premultiplied colour may be
-/// passed as it is. No change asked (0, 1, 1) returns the colour as it came.
+/// `hue_deg` is added to the hue, in degrees; `saturation` and `value` are factors. Saturation ends
+/// at 1, negative results at 0, and nothing ends at the top. A colour times k gives the result
+/// times k, so premultiplied colour may be passed as it is. No change asked (0, 1, 1) returns the
+/// colour as it came.
 ///
 /// # Method
-/// Cycles' Hue Saturation Value node on linear colour, factor 1 (Blender 3.4 and 4.5 agree within 2e-4 per texel).
+/// Cycles' Hue Saturation Value node on linear colour, factor 1 (Blender 3.4 and 4.5 agree within
+/// 2e-4 per texel).
 #[inline(always)]
 pub fn shift_hsv(c: LinearRgb, hue_deg: f32, saturation: f32, value: f32) -> LinearRgb {
     if (hue_deg, saturation, value) == (0.0, 1.0, 1.0) {

@@ -1,12 +1,12 @@
 //! Colour: transfer curves, primaries, hue and saturation, exactly.
 //!
-//! The library works in scene-linear light with Rec. 709 primaries and white D65 ([`LinearRgb`]). Everything else is
-//! met at a border and converted there, once: display values by [`decode_srgb8`] and [`encode_srgb8`], other
-//! primaries by a [`ColorMatrix`], video by [`Ycbcr`].
+//! The library works in scene-linear light with Rec. 709 primaries and white D65 ([`LinearRgb`]).
+//! Everything else is met at a border and converted there, once: display values by [`decode_srgb8`]
+//! and [`encode_srgb8`], other primaries by a [`ColorMatrix`], video by [`Ycbcr`].
 //!
-//! Curves are computed through the `libm` crate in `f64` and rounded once, never through the system's own `powf`: the
-//! same input gives the same bytes on every machine. Matrices are derived in `f64` from primaries and white points and
-//! stored as `f32`.
+//! Curves are computed through the `libm` crate in `f64` and rounded once, never through the
+//! system's own `powf`: the same input gives the same bytes on every machine. Matrices are derived
+//! in `f64` from primaries and white points and stored as `f32`.
 
 mod hsv;
 mod quantize;

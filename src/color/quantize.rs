@@ -1,10 +1,11 @@
 //! Between light and whole-number sRGB codes: decoding by table, encoding correctly rounded.
 //!
 //! # Method
-//! Code `k` begins at the light whose encoded value is `(k - 1/2) / max`. That threshold, computed in `f64` and rounded
-//! up to the next `f32`, decides every `f32` exactly. The top bits of a float (its exponent and the first bits of its
-//! fraction) choose a cell so small that it holds at most one threshold: encoding is one look into a table and one
-//! comparison, without a power and without a branch.
+//! Code `k` begins at the light whose encoded value is `(k - 1/2) / max`. That threshold, computed
+//! in `f64` and rounded up to the next `f32`, decides every `f32` exactly. The top bits of a float
+//! (its exponent and the first bits of its fraction) choose a cell so small that it holds at most
+//! one threshold: encoding is one look into a table and one comparison, without a power and without
+//! a branch.
 
 use super::transfer::Curve;
 use crate::image::Image;
@@ -98,8 +99,8 @@ fn light_of(code: u16, max: u16) -> f32 {
     Curve::Srgb.decode_f64(f64::from(code) / f64::from(max)) as f32
 }
 
-/// Cells in an octave, as a power of two, so many that no cell holds two thresholds: the 68 codes of the octave below
-/// 1 are the most that 8 bits have in any.
+/// Cells in an octave, as a power of two, so many that no cell holds two thresholds: the 68 codes
+/// of the octave below 1 are the most that 8 bits have in any.
 const CELL_BITS8: u32 = 7;
 /// The same for the 17300 codes that 16 bits have in the octave below 1.
 const CELL_BITS16: u32 = 15;
@@ -193,7 +194,8 @@ mod tests {
         (Curve::Srgb.encode_f64(clipped) * f64::from(max) + 0.5).floor() as u16
     }
 
-    /// Floats of all sizes from far below the first code to above 1, spread over their bit patterns.
+    /// Floats of all sizes from far below the first code to above 1, spread over their bit
+    /// patterns.
     fn floats(count: u32) -> impl Iterator<Item = f32> {
         let (low, high) = (1e-6_f32.to_bits(), 1.01_f32.to_bits());
         (0..count).map(move |i| {

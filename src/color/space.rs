@@ -1,7 +1,7 @@
 //! RGB spaces, CIE XYZ and the matrices between them, derived from primaries and white points.
 //!
-//! Matrices are named `target_from_source` and derived in `f64`; a [`ColorMatrix`] is one of them rounded to `f32`,
-//! to be applied to pixels. Only linear values may be passed.
+//! Matrices are named `target_from_source` and derived in `f64`; a [`ColorMatrix`] is one of them
+//! rounded to `f32`, to be applied to pixels. Only linear values may be passed.
 
 use crate::pixel::LinearRgb;
 use nalgebra::{Matrix3, Vector3};
@@ -16,7 +16,8 @@ pub struct RgbSpace {
 }
 
 impl RgbSpace {
-    /// Rec. 709 primaries and D65, which sRGB shares (ITU-R BT.709-6, IEC 61966-2-1): the library's working space.
+    /// Rec. 709 primaries and D65, which sRGB shares (ITU-R BT.709-6, IEC 61966-2-1): the library's
+    /// working space.
     pub const REC709: Self = Self {
         primaries: [[0.64, 0.33], [0.30, 0.60], [0.15, 0.06]],
         white: [0.3127, 0.3290],
@@ -38,7 +39,8 @@ impl RgbSpace {
 /// # Method
 /// Columns are the primaries, scaled so that they add up to white (SMPTE RP 177).
 pub fn xyz_from_rgb(space: &RgbSpace) -> Matrix3<f64> {
-    // Of any length, so that primaries without luminance, as those of XYZ itself, are columns like others.
+    // Of any length, so that primaries without luminance, as those of XYZ itself, are columns like
+    // others.
     let primaries = Matrix3::from_columns(
         &space
             .primaries
@@ -63,7 +65,8 @@ pub fn rgb_from_rgb(target: &RgbSpace, source: &RgbSpace) -> Matrix3<f64> {
 /// XYZ under one white (chromaticity x, y) of what had been seen under another.
 ///
 /// # Method
-/// Linear Bradford adaptation: von Kries scaling in sharpened cone responses (K. M. Lam 1985; ICC.1:2022, Annex E).
+/// Linear Bradford adaptation: von Kries scaling in sharpened cone responses (K. M. Lam 1985;
+/// ICC.1:2022, Annex E).
 pub fn bradford(target_white: [f64; 2], source_white: [f64; 2]) -> Matrix3<f64> {
     let [target, source] = [target_white, source_white].map(|white| CONES_FROM_XYZ * xyz_of(white));
     inverse(&CONES_FROM_XYZ)

@@ -3,13 +3,15 @@
 use crate::color::ColorMatrix;
 use crate::pixel::LinearRgb;
 
-/// Light of a black body of `kelvin` (1667 to 25 000; clamped), scene-linear, of luminance 1: red when cool, blue when hot.
+/// Light of a black body of `kelvin` (1667 to 25 000; clamped), scene-linear, of luminance 1: red
+/// when cool, blue when hot.
 ///
-/// Channels that would be negative, colours that Rec. 709 does not have, are 0. About 6504 K is white.
+/// Channels that would be negative, colours that Rec. 709 does not have, are 0. About 6504 K is
+/// white.
 ///
 /// # Method
-/// Cubic splines through the Planckian locus in CIE 1931 x, y (Kang et al., "Design of advanced color temperature control
-/// system for HDTV applications", 2002).
+/// Cubic splines through the Planckian locus in CIE 1931 x, y (Kang et al., "Design of advanced
+/// color temperature control system for HDTV applications", 2002).
 pub fn planckian(kelvin: f64) -> LinearRgb {
     let t = kelvin.clamp(MIN_KELVIN, MAX_KELVIN);
     let (x_spline, y_spline) = splines_at(t);

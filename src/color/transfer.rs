@@ -2,8 +2,9 @@
 
 /// A curve between scene-linear light and encoded values, both about 0 to 1.
 ///
-/// Every curve is odd: a negative value is the mirror image of the positive one, so nothing is lost below zero and
-/// no power of a negative number is taken. Values above 1 follow the curve's own formula.
+/// Every curve is odd: a negative value is the mirror image of the positive one, so nothing is lost
+/// below zero and no power of a negative number is taken. Values above 1 follow the curve's own
+/// formula.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Curve {
     /// Encoded values are light.
@@ -62,8 +63,9 @@ const SRGB_SLOPE: f64 = 12.92;
 const REC709_KNEE: f64 = 0.018;
 /// Slope of the straight part of Rec. 709 (ITU-R BT.709-6, item 1.2).
 const REC709_SLOPE: f64 = 4.5;
-/// `1.099 * 0.018^0.45 - 0.099`: the smallest value that the power part gives. The rounded constants of the standard
-/// leave a gap between 0.081 and this; decoding by this bound takes every encoded value back to where it came from.
+/// `1.099 * 0.018^0.45 - 0.099`: the smallest value that the power part gives. The rounded
+/// constants of the standard leave a gap between 0.081 and this; decoding by this bound takes every
+/// encoded value back to where it came from.
 const REC709_KNEE_VALUE: f64 = 0.081_247_944_035_140_46;
 
 /// An odd function from its positive half.
@@ -111,7 +113,8 @@ mod tests {
             .chain([f32::MIN_POSITIVE, 1e-6, 0.003_130_8, 0.018, 1e4])
     }
 
-    /// The two parts of sRGB, with the rounded constants of its standard, miss each other by as much at the knee.
+    /// The two parts of sRGB, with the rounded constants of its standard, miss each other by as
+    /// much at the knee.
     const GAP: f32 = 3e-9;
 
     #[test]

@@ -2,8 +2,9 @@
 
 /// A way to write encoded R'G'B' as luma and two colour differences.
 ///
-/// Takes and gives display-encoded values, not light. Luma is 0 to 1 and the differences are -1/2 to 1/2 in
-/// [`CodeRange::Full`]; in [`CodeRange::Video`] all three are code values over the largest code. Nothing is clipped.
+/// Takes and gives display-encoded values, not light. Luma is 0 to 1 and the differences are -1/2
+/// to 1/2 in [`CodeRange::Full`]; in [`CodeRange::Video`] all three are code values over the
+/// largest code. Nothing is clipped.
 ///
 /// ```
 /// use petcomp::color::{CodeRange, Ycbcr};

@@ -1,4 +1,5 @@
-//! Arbitrary output variables: everything that deep samples hold besides the finished frame, as parts of an EXR file.
+//! Arbitrary output variables: everything that deep samples hold besides the finished frame, as
+//! parts of an EXR file.
 //!
 //! Each is a fold of its own over the samples, done only on request.
 
@@ -32,8 +33,9 @@ pub enum Aov {
     Uv,
     /// `cryptomatte`: coverage of every object, see [`cryptomatte`].
     Cryptomatte,
-    /// `layers`: a part `layer.ID` for each card: its own light and what it hides, held out by what lies in front,
-    /// `R G B A`; with film in the picture also `TR TG TB`, 1 minus what it hides per channel. Their sum is the picture.
+    /// `layers`: a part `layer.ID` for each card: its own light and what it hides, held out by what
+    /// lies in front, `R G B A`; with film in the picture also `TR TG TB`, 1 minus what it
+    /// hides per channel. Their sum is the picture.
     Layers,
 }
 
@@ -76,8 +78,8 @@ pub fn front(samples: &[DeepSample]) -> Option<&DeepSample> {
 
 /// The requested parts, in that order, of one size.
 ///
-/// `frame` is the finished frame of the same samples, `shot` what they were rendered from: position and texture
-/// coordinates are those at the pixel's centre, as depth is.
+/// `frame` is the finished frame of the same samples, `shot` what they were rendered from: position
+/// and texture coordinates are those at the pixel's centre, as depth is.
 pub fn parts(aovs: &[Aov], deep: &DeepImage, shot: &Shot, frame: &Image<PremulRgba>) -> Vec<Part> {
     let picture = AovSource { deep, shot, frame };
     aovs.iter().flat_map(|aov| picture.parts_of(*aov)).collect()
@@ -311,7 +313,8 @@ mod tests {
             (plane(&parts[1], "Z")[middle] - 0.8).abs() < 1e-5
                 && plane(&parts[1], "Z")[0].is_infinite()
         );
-        // The pixel's centre is half a pixel right of and below the principal point: 0.01 m at depth 0.8.
+        // The pixel's centre is half a pixel right of and below the principal point: 0.01 m at
+        // depth 0.8.
         let at = ["X", "Y", "Z"].map(|c| plane(&parts[2], c)[middle]);
         assert!(
             (at[0] - 0.01).abs() < 1e-5

@@ -28,15 +28,16 @@ const CHANNELS: [&str; 2 * RANKS_PER_PIXEL] = [
     "CryptoObject02.A",
 ];
 
-/// Identifier and visible coverage of up to six objects of each pixel, the most visible first, with the manifest of
-/// their names: a part that programs that know Cryptomatte read as it is.
+/// Identifier and visible coverage of up to six objects of each pixel, the most visible first, with
+/// the manifest of their names: a part that programs that know Cryptomatte read as it is.
 ///
-/// An object's coverage is the share of the pixel that it hides of what is behind it, seen through what lies in front.
+/// An object's coverage is the share of the pixel that it hides of what is behind it, seen through
+/// what lies in front.
 ///
 /// # Method
-/// [Cryptomatte specification] 1.2: channels `CryptoObject00.R` (identifier), `.G` (coverage), `.B`, `.A` and so on;
-/// identifiers are MurmurHash3 (32 bits, seed 0) of the name, their exponent kept away from those of infinity, NaN and
-/// denormal numbers.
+/// [Cryptomatte specification] 1.2: channels `CryptoObject00.R` (identifier), `.G` (coverage),
+/// `.B`, `.A` and so on; identifiers are MurmurHash3 (32 bits, seed 0) of the name, their exponent
+/// kept away from those of infinity, NaN and denormal numbers.
 ///
 /// [Cryptomatte specification]: https://github.com/Psyop/Cryptomatte
 pub fn cryptomatte(deep: &DeepImage, name: impl Fn(ObjectId) -> String) -> Part {
@@ -76,7 +77,8 @@ fn visible_coverage(samples: &[DeepSample]) -> BTreeMap<ObjectId, f32> {
     seen
 }
 
-/// The attributes that the specification requires, under the first seven digits of the part's own hash.
+/// The attributes that the specification requires, under the first seven digits of the part's own
+/// hash.
 fn part_metadata<'a>(names: impl Iterator<Item = &'a String>) -> Vec<(String, String)> {
     let manifest: BTreeMap<&str, String> = names.map(|n| (n.as_str(), hex_id(n))).collect();
     let texts = [

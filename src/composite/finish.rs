@@ -1,4 +1,5 @@
-//! The frame as a camera would have given it: noise where there was none, white balance, exposure, sharpening.
+//! The frame as a camera would have given it: noise where there was none, white balance, exposure,
+//! sharpening.
 
 use crate::deep::DeepImage;
 use crate::filter::gaussian_blur;
@@ -11,15 +12,17 @@ use std::f64::consts::TAU;
 /// Standard deviation of the blur that sharpening removes.
 const SHARPENING_SIGMA_PX: f32 = 1.0;
 
-/// Finishes a frame of deep samples over `plate`; scene-linear, premultiplied. [`PostProcess::default`] gives the same bits.
+/// Finishes a frame of deep samples over `plate`; scene-linear, premultiplied.
+/// [`PostProcess::default`] gives the same bits.
 ///
-/// Cards get the noise that a photograph of them would have, and no pixel more than that: what is seen of the plate
-/// already has its own, so that a pixel without card or shadow keeps its bits. Exposure, white balance and sharpening
-/// are the whole frame's.
+/// Cards get the noise that a photograph of them would have, and no pixel more than that: what is
+/// seen of the plate already has its own, so that a pixel without card or shadow keeps its bits.
+/// Exposure, white balance and sharpening are the whole frame's.
 ///
 /// # Method
-/// Noise is Gaussian, its variance `shot * value + read^2` less what the plate's own share brings along. It depends on
-/// the seed, the pixel and the channel only. Noise still to be matched ([`Noise::MatchPlate`]) is none.
+/// Noise is Gaussian, its variance `shot * value + read^2` less what the plate's own share brings
+/// along. It depends on the seed, the pixel and the channel only. Noise still to be matched
+/// ([`Noise::MatchPlate`]) is none.
 pub fn finish(
     frame: Image<PremulRgba>,
     deep: &DeepImage,

@@ -9,9 +9,9 @@ use crate::scene::Shot;
 /// Folds deep samples into a picture, over `plate` where there is one.
 ///
 /// Scene-linear, premultiplied, of the deep picture's size. With a plate every pixel is opaque,
-/// `light + transmittance * shadow * plate`, and the plate's own bits where there is neither card nor shadow. Without,
-/// pixels are the objects' light and coverage; shadows need something to fall on and are left out, and film loses its
-/// tint ([`film`] keeps it).
+/// `light + transmittance * shadow * plate`, and the plate's own bits where there is neither card
+/// nor shadow. Without, pixels are the objects' light and coverage; shadows need something to fall
+/// on and are left out, and film loses its tint ([`film`] keeps it).
 ///
 /// # Panics
 /// When the plate's size is not the picture's.
@@ -52,7 +52,8 @@ pub fn picture(shot: &Shot, options: &RenderOptions) -> Image<PremulRgba> {
     frame(&render(shot, options), shot.plate.as_deref())
 }
 
-/// Folds deep samples into a picture of their light and of what they let pass, per channel; scene-linear.
+/// Folds deep samples into a picture of their light and of what they let pass, per channel;
+/// scene-linear.
 pub fn film(deep: &DeepImage) -> Image<Film> {
     Image::from_fn(deep.width(), deep.height(), |x, y| deep.flat(x, y))
 }

@@ -14,7 +14,8 @@ use std::sync::{Arc, OnceLock};
 
 /// A part of a photo so small is worth a warning where only that fits into the pictures' shape.
 const SMALL_SHOWN_SHARE: f64 = 0.75;
-/// A rectangle whose corner is cut off by more than this part of a picture's side is not all there any more.
+/// A rectangle whose corner is cut off by more than this part of a picture's side is not all there
+/// any more.
 const CUT_OFF_SHARE: f64 = 0.02;
 
 /// A labelled photo: its camera is found once, its pixels are read when a picture first needs them.
@@ -105,7 +106,8 @@ impl BackgroundPhoto {
         area(kept) / area(self.taken.map(f64::from))
     }
 
-    /// That only a part of the photo fits into the pictures' shape, and what that leaves of its rectangle.
+    /// That only a part of the photo fits into the pictures' shape, and what that leaves of its
+    /// rectangle.
     fn shape_note(&self) -> Option<String> {
         (self.part() != 1.0).then(|| self.describe_crop())
     }
@@ -188,8 +190,8 @@ impl BackgroundPhoto {
     }
 }
 
-/// Warns of cameras: of each that is stale and not used; of those solved now that have warnings, once for all. What was
-/// reported where a camera was solved is not repeated.
+/// Warns of cameras: of each that is stale and not used; of those solved now that have warnings,
+/// once for all. What was reported where a camera was solved is not repeated.
 fn warn_of_cameras(labels: &[LabelledPhoto], sightings: &[PhotoCamera]) {
     for stale in sightings.iter().filter_map(|seen| seen.stale.as_ref()) {
         log::warn!("{stale}");
@@ -218,7 +220,8 @@ fn unreported_names<'a>(labels: &'a [LabelledPhoto], sightings: &[PhotoCamera]) 
         .collect()
 }
 
-/// Says, once for all, that photos are of another shape than the pictures, where that costs much of them.
+/// Says, once for all, that photos are of another shape than the pictures, where that costs much of
+/// them.
 fn warn_of_shapes(places: &[BackgroundPhoto]) {
     let odd: Vec<_> = places.iter().filter(|place| place.is_misshapen()).collect();
     let least = odd.iter().min_by(|a, b| a.part().total_cmp(&b.part()));
@@ -254,7 +257,8 @@ fn middle_part(photo: [u32; 2], image: [u32; 2]) -> Roi {
     }
 }
 
-/// A pixel lies in a frame of size `seen` about the middle of a picture of size `size`, or close to it.
+/// A pixel lies in a frame of size `seen` about the middle of a picture of size `size`, or close to
+/// it.
 fn is_within(px: Point2<f64>, size: [f64; 2], seen: [f64; 2]) -> bool {
     is_within_side(px.x, size[0], seen[0]) && is_within_side(px.y, size[1], seen[1])
 }

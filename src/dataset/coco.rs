@@ -12,8 +12,8 @@ use serde_json::json;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// Numbers that one image has for its annotations. Ids are made from the number of the image and of the object, so they
-/// never change, whichever images are there.
+/// Numbers that one image has for its annotations. Ids are made from the number of the image and of
+/// the object, so they never change, whichever images are there.
 const IDS_PER_IMAGE: u64 = 1 << 16;
 
 /// Folder of the parts that are joined.
@@ -29,20 +29,23 @@ fn document(part: Part) -> PathBuf {
 
 /// Writes `annotations/instances_{train,val}.json`, joined from `coco/{train,val}/NNNNNN.json`.
 ///
-/// The id of an image is its number; categories are numbered from 1, since trainers take 0 for background, and so are
-/// annotations, since COCO's evaluation takes 0 for none. Objects that are to be ignored are `iscrowd`, with run lengths
-/// whatever `masks` says. Annotations also have `visible_fraction` and `topmost`, which other programs pass over.
+/// The id of an image is its number; categories are numbered from 1, since trainers take 0 for
+/// background, and so are annotations, since COCO's evaluation takes 0 for none. Objects that are
+/// to be ignored are `iscrowd`, with run lengths whatever `masks` says. Annotations also have
+/// `visible_fraction` and `topmost`, which other programs pass over.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Coco {
     /// How masks are written. Default: `rle`.
     pub masks: CocoMask,
-    /// Whether boxes and masks are those of the whole object or of what is seen. Default: `amodal`.
+    /// Whether boxes and masks are those of the whole object or of what is seen. Default:
+    /// `amodal`.
     pub boxes: Extent,
     /// Format of the pictures that it names; in a recipe, that of `pictures`.
     #[serde(skip)]
     pub pictures: PictureFormat,
-    /// How far polygons may be from the border of a mask, pixels; in a recipe, that of `labels`. Default: 0, along pixels.
+    /// How far polygons may be from the border of a mask, pixels; in a recipe, that of `labels`.
+    /// Default: 0, along pixels.
     #[serde(skip_deserializing, skip_serializing_if = "is_exact")]
     pub simplify: f64,
 }
@@ -54,7 +57,8 @@ pub enum CocoMask {
     /// Compressed run lengths: exact.
     #[default]
     Rle,
-    /// Polygons along the edges of pixels or near them (`labels.simplify`), one for each part, holes joined by slits.
+    /// Polygons along the edges of pixels or near them (`labels.simplify`), one for each part,
+    /// holes joined by slits.
     Polygon,
 }
 
@@ -213,7 +217,8 @@ fn coordinates_of(ring: &[Point2<f64>]) -> Vec<f64> {
     ring.iter().flat_map(|p| [p.x, p.y]).collect()
 }
 
-/// Writes the document of a part, one image or annotation a line; holds one image's share at a time.
+/// Writes the document of a part, one image or annotation a line; holds one image's share at a
+/// time.
 fn join<'a>(
     out: &mut dyn Write,
     folder: &Path,

@@ -11,19 +11,22 @@ use crate::scene::{Ablation, Recipe};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// What a dataset is made from and how: the recipe file. It only says what it wants otherwise than by default.
+/// What a dataset is made from and how: the recipe file. It only says what it wants otherwise than
+/// by default.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct DatasetConfig {
-    /// Folder that the recipe lies in, which names of files in it are relative to; in no file. Default: the working folder.
+    /// Folder that the recipe lies in, which names of files in it are relative to; in no file.
+    /// Default: the working folder.
     #[serde(skip)]
     pub folder: PathBuf,
     /// Folder of assets, relative to the file. Default: `assets`.
     pub assets: PathBuf,
-    /// Folder of photos of the place with their labels (`NAME.label.json`), relative to the file. Default: `backgrounds`.
+    /// Folder of photos of the place with their labels (`NAME.label.json`), relative to the file.
+    /// Default: `backgrounds`.
     pub backgrounds: PathBuf,
-    /// Width and height of the labelled rectangle, metres, for labels that do not say them: those of other programs.
-    /// Default: none.
+    /// Width and height of the labelled rectangle, metres, for labels that do not say them: those
+    /// of other programs. Default: none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub surface_size: Option<[f64; 2]>,
     /// Takes photos of the place whose cameras do not fit their labels. Default: false, an error.
@@ -58,10 +61,11 @@ impl Default for DatasetConfig {
 }
 
 impl DatasetConfig {
-    /// Reads a recipe file, some of its values replaced, and checks it; its folders become relative to the working
-    /// folder.
+    /// Reads a recipe file, some of its values replaced, and checks it; its folders become relative
+    /// to the working folder.
     ///
-    /// A recipe is its author's own: the folders and environment maps that it names may lie anywhere.
+    /// A recipe is its author's own: the folders and environment maps that it names may lie
+    /// anywhere.
     ///
     /// # Errors
     /// A file that cannot be read; an unknown key; a range that cannot be right.
@@ -115,8 +119,8 @@ impl DatasetConfig {
         self
     }
 
-    /// The setups of the paper's ablations: this one with one source of variation after another switched off, the scenes
-    /// in pairs.
+    /// The setups of the paper's ablations: this one with one source of variation after another
+    /// switched off, the scenes in pairs.
     pub fn ablations(&self) -> impl Iterator<Item = (Ablation, Self)> {
         let ablations = Ablation::PAPER.into_iter();
         ablations.map(|ablation| (ablation, self.without(&ablation)))

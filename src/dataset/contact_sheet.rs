@@ -105,7 +105,8 @@ fn shrunk(picture: &Image<LinearRgb>, width: usize) -> Image<LinearRgb> {
     resize(picture, width, (h * width).div_ceil(w.max(1)).max(1))
 }
 
-/// Lays out pictures in rows, each with its boxes and a caption, under a title and a legend of the classes.
+/// Lays out pictures in rows, each with its boxes and a caption, under a title and a legend of the
+/// classes.
 pub fn contact_sheet(
     tiles: &[ContactTile],
     classes: &[String],
@@ -134,8 +135,8 @@ fn title_height(title: &str) -> usize {
 /// The contact sheet of a dataset on disk: at most `most` of its pictures, evenly spread.
 ///
 /// # Errors
-/// When the folder is no dataset, or was written without the [`Pictures`](crate::dataset::Pictures) or the
-/// [`Sidecar`](crate::dataset::Sidecar) that the sheet is made from.
+/// When the folder is no dataset, or was written without the [`Pictures`](crate::dataset::Pictures)
+/// or the [`Sidecar`](crate::dataset::Sidecar) that the sheet is made from.
 pub fn contact_sheet_of(
     folder: &Path,
     most: usize,
@@ -234,8 +235,8 @@ fn cell_size(tiles: &[ContactTile]) -> [usize; 2] {
     ]
 }
 
-/// The number of columns with which a sheet comes closest to 3:2, the shape of screens; an empty place at its end weighs
-/// as much as being too wide by two pictures.
+/// The number of columns with which a sheet comes closest to 3:2, the shape of screens; an empty
+/// place at its end weighs as much as being too wide by two pictures.
 fn pleasing_columns(count: usize, cell: [usize; 2]) -> usize {
     (1..=count.max(1))
         .min_by_key(|&columns| shape_error(count, columns, cell))

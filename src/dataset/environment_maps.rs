@@ -42,17 +42,20 @@ impl EnvironmentMaps {
     /// The picture that a scene names.
     ///
     /// # Errors
-    /// A name that the recipe does not list and that leads out of its folder; a file that is no panorama.
+    /// A name that the recipe does not list and that leads out of its folder; a file that is no
+    /// panorama.
     pub(crate) fn picture(&self, name: &str) -> Result<Arc<Panorama>> {
         if let Some(picture) = self.find(name) {
             return Ok(picture);
         }
-        // Decoded before the list is locked: the work is parallel, and a thread that waits may come back here.
+        // Decoded before the list is locked: the work is parallel, and a thread that waits may come
+        // back here.
         let picture = Panorama::read(self.path(name)?)?;
         Ok(self.keep(name, picture))
     }
 
-    /// What a recipe lists may lie anywhere; what a scene names beside that, in the recipe's folder.
+    /// What a recipe lists may lie anywhere; what a scene names beside that, in the recipe's
+    /// folder.
     fn path(&self, name: &str) -> Result<PathBuf> {
         if self.listed.iter().any(|listed| listed == name) {
             return Ok(self.folder.join(name));

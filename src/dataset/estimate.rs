@@ -23,10 +23,11 @@ pub struct LongRun {
 }
 
 impl LongRun {
-    /// The run, if what it did on so many threads in this time says that the rest takes longer than an hour.
+    /// The run, if what it did on so many threads in this time says that the rest takes longer than
+    /// an hour.
     ///
-    /// Once each thread has made a picture, the rest is in proportion; before, every picture takes at least as long as
-    /// those that are still being made.
+    /// Once each thread has made a picture, the rest is in proportion; before, every picture takes
+    /// at least as long as those that are still being made.
     pub fn of(progress: &Progress, elapsed: Duration, threads: usize) -> Option<Self> {
         let left = progress.count.saturating_sub(progress.done);
         let (made, threads) = (progress.made, threads.max(1) as u64);

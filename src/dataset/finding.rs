@@ -64,7 +64,8 @@ impl Finding {
     }
 }
 
-/// As compilers print it: `labels/train/000001.txt:2: 4 columns, expected 5 [dataset.bad_label_row]`.
+/// As compilers print it: `labels/train/000001.txt:2: 4 columns, expected 5
+/// [dataset.bad_label_row]`.
 impl fmt::Display for Finding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.fmt_place(f)?;

@@ -10,8 +10,9 @@ use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Everything that decides what a picture or its labels are: values as they are, pictures by checksum; not where folders
-/// lie. Two datasets of equal fingerprint, seed and program have the same samples.
+/// Everything that decides what a picture or its labels are: values as they are, pictures by
+/// checksum; not where folders lie. Two datasets of equal fingerprint, seed and program have the
+/// same samples.
 ///
 /// Lists are in the order that draws choose by, so an entry that is added, lost or moved shows.
 ///

@@ -18,7 +18,8 @@ pub const JOURNAL: &str = "index.jsonl";
 /// Locked while a run writes; empty.
 const LOCK: &str = ".lock";
 
-/// Version of [`IDENTITY`] and of the journal: 2 records every input, and the lines of the journal have checksums.
+/// Version of [`IDENTITY`] and of the journal: 2 records every input, and the lines of the journal
+/// have checksums.
 const FORMAT_VERSION: u64 = 2;
 
 /// A claimed folder; free again when this is dropped.
@@ -109,7 +110,8 @@ fn format_of(identity: &Value) -> u64 {
     identity["format"].as_u64().unwrap_or(1)
 }
 
-/// Refuses what another petcomp recorded otherwise: nobody could tell whether its inputs are still the same.
+/// Refuses what another petcomp recorded otherwise: nobody could tell whether its inputs are still
+/// the same.
 pub(crate) fn of_this_format(identity: &Value, folder: &Path) -> Result<()> {
     let Some((what, others)) = other_petcomp(identity) else {
         return Ok(());
@@ -228,7 +230,8 @@ fn writer_settings(plan: &Plan) -> Vec<Value> {
 /// Where two documents differ, and how, if they do.
 type FieldComparison = std::result::Result<(), (String, String)>;
 
-/// Compares two documents and names the first field in which they differ; entries of lists by their own name or file.
+/// Compares two documents and names the first field in which they differ; entries of lists by their
+/// own name or file.
 pub(crate) fn same(before: &Value, now: &Value, at: &str) -> FieldComparison {
     match (before, now) {
         (Value::Object(a), Value::Object(b)) => same_keys(a, b, at),

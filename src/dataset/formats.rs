@@ -13,18 +13,18 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LabelConfig {
-    /// What happens to the labels of objects that something lies over: `drop`, `keep`, `ignore` or `class`. Default:
-    /// `drop`, as in the paper.
+    /// What happens to the labels of objects that something lies over: `drop`, `keep`, `ignore` or
+    /// `class`. Default: `drop`, as in the paper.
     pub obstructed: Obstructed,
-    /// Outlines are a pair of the topmost rule when their intersection over union is above this, 0 to 1. Default: 0, any
-    /// overlap.
+    /// Outlines are a pair of the topmost rule when their intersection over union is above this, 0
+    /// to 1. Default: 0, any overlap.
     pub overlap_iou: f64,
     /// A pixel belongs to an object when more than this share of it is covered. Default: 0.1.
     pub alpha_threshold: f32,
     /// What an amodal box is drawn around: `mask` or `outline`. Default: `mask`.
     pub amodal: AmodalBox,
-    /// How far polygons (YOLO's `segment`, COCO's `polygon`) may be from the border of a mask, pixels: fewer corners.
-    /// Default: 0, along the edges of pixels.
+    /// How far polygons (YOLO's `segment`, COCO's `polygon`) may be from the border of a mask,
+    /// pixels: fewer corners. Default: 0, along the edges of pixels.
     pub simplify: f64,
     /// Layouts to write beside the images and their scenes. Default: `["yolo"]`.
     pub formats: Vec<Format>,
@@ -121,8 +121,8 @@ impl LabelConfig {
         }
     }
 
-    /// The writers of the layouts, each once, in the order in which [`Format`] lists them: [`WebDataset`] packs what the
-    /// others write.
+    /// The writers of the layouts, each once, in the order in which [`Format`] lists them:
+    /// [`WebDataset`] packs what the others write.
     pub fn writers(&self, pictures: &Pictures) -> Vec<Box<dyn Writer>> {
         let formats = self.distinct_formats().into_iter();
         formats

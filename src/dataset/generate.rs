@@ -20,7 +20,8 @@ pub struct Plan {
     pub range: SampleRange,
     /// Seed, as it is told in the files; the samples come from the closure.
     pub seed: u64,
-    /// Everything else that decides what a sample is: a run into a folder that was made from another is refused.
+    /// Everything else that decides what a sample is: a run into a folder that was made from
+    /// another is refused.
     pub recipe: serde_json::Value,
     /// Names of the classes, in order.
     pub classes: Vec<String>,
@@ -30,13 +31,14 @@ pub struct Plan {
     pub obstructed: Obstructed,
     /// The files to write, in this order.
     pub writers: Vec<Box<dyn Writer>>,
-    /// Checksums of files that `recipe` tells of, to be kept in the folder. By default there are none.
+    /// Checksums of files that `recipe` tells of, to be kept in the folder. By default there are
+    /// none.
     pub inputs: Inputs,
 }
 
 impl Plan {
-    /// `count` samples in `folder` with labels of these classes, shared out by the default [`Split`]; its writers
-    /// are still to be named.
+    /// `count` samples in `folder` with labels of these classes, shared out by the default
+    /// [`Split`]; its writers are still to be named.
     pub fn new(folder: impl Into<PathBuf>, count: u64, classes: Vec<String>) -> Self {
         Self {
             folder: folder.into(),
@@ -61,21 +63,25 @@ impl Plan {
     }
 }
 
-/// Makes the samples that the plan asks for and that are not in its folder yet, and returns what the folder then holds.
+/// Makes the samples that the plan asks for and that are not in its folder yet, and returns what
+/// the folder then holds.
 ///
-/// `make(k)` gives sample `k`; it is called from several threads, for each `k` at most once, in no fixed order, and must
-/// depend on nothing but `k`. `progress` is called once at the start and after each sample, one call at a time. Once
-/// `stop` is true, samples in hand are finished and no more are begun.
+/// `make(k)` gives sample `k`; it is called from several threads, for each `k` at most once, in no
+/// fixed order, and must depend on nothing but `k`. `progress` is called once at the start and
+/// after each sample, one call at a time. Once `stop` is true, samples in hand are finished and no
+/// more are begun.
 ///
-/// The files depend on the plan alone: not on threads, order, time, or how often the run was interrupted. As many samples
-/// are in memory as the current rayon pool has threads; each works on its own, since pictures beside each other keep
-/// processors busier than rows of one picture. Files of many samples are joined when all are there; those of a shard
-/// stay apart until it is [merged](crate::dataset::merge).
+/// The files depend on the plan alone: not on threads, order, time, or how often the run was
+/// interrupted. As many samples are in memory as the current rayon pool has threads; each works on
+/// its own, since pictures beside each other keep processors busier than rows of one picture. Files
+/// of many samples are joined when all are there; those of a shard stay apart until it is
+/// [merged](crate::dataset::merge).
 ///
 /// # Errors
-/// [`Error::Interrupted`] after a stop; the first error of `make` or of a writer, in order of `k` among those in hand;
-/// a folder that is a file, holds something else, was made from another plan (the message names the field), or is being
-/// written by another run; a disk without room. In every case the folder stays valid, and the same call continues it.
+/// [`Error::Interrupted`] after a stop; the first error of `make` or of a writer, in order of `k`
+/// among those in hand; a folder that is a file, holds something else, was made from another plan
+/// (the message names the field), or is being written by another run; a disk without room. In every
+/// case the folder stays valid, and the same call continues it.
 pub fn generate(
     plan: &Plan,
     make: impl Fn(u64) -> Result<Sample> + Sync,

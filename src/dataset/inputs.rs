@@ -1,4 +1,5 @@
-//! Checksums of the files that a dataset is made from: each file is read once, and again only when it has changed.
+//! Checksums of the files that a dataset is made from: each file is read once, and again only when
+//! it has changed.
 
 use crate::error::{Error, Result};
 use crate::io::{self, Checksum};
@@ -9,11 +10,12 @@ use std::fs::Metadata;
 use std::path::Path;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-/// Name of the file that keeps the checksums: of the machine and its clock, and no part of the dataset.
+/// Name of the file that keeps the checksums: of the machine and its clock, and no part of the
+/// dataset.
 pub(crate) const INPUTS: &str = ".inputs.json";
 
-/// A file that changed less than this ago may change again within the same tick of its file system's clock (2 s on FAT),
-/// so nothing is concluded from its time.
+/// A file that changed less than this ago may change again within the same tick of its file
+/// system's clock (2 s on FAT), so nothing is concluded from its time.
 const SETTLED_AGE: Duration = Duration::from_secs(2);
 
 /// Checksums of a dataset's input files, kept in its folder from one run to the next.
@@ -92,7 +94,8 @@ impl Inputs {
         self.before.get(name).filter(|input| input.stamp == stamp)
     }
 
-    /// Keeps the checksums for the next run. They only save time: a folder without room for them is no error.
+    /// Keeps the checksums for the next run. They only save time: a folder without room for them is
+    /// no error.
     pub(crate) fn keep(&self, folder: &Path) {
         let settled = self.settled();
         if settled.is_empty() || settled == self.before.iter().collect() {

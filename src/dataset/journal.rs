@@ -1,8 +1,8 @@
 //! The journal: which samples of a dataset are finished.
 //!
-//! A sample exists if and only if its line is whole and its files have the size that the line says. Lines are added in
-//! the order in which samples finish; [`Journal::close`] puts them in order of number, so a finished folder does not show
-//! how it was made.
+//! A sample exists if and only if its line is whole and its files have the size that the line says.
+//! Lines are added in the order in which samples finish; [`Journal::close`] puts them in order of
+//! number, so a finished folder does not show how it was made.
 
 use crate::dataset::Inputs;
 use crate::dataset::folder::{self, JOURNAL};
@@ -15,7 +15,8 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, Read as _, Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
 
-/// Files of the last lines may not be on the disk yet: a run brings everything there at least this often.
+/// Files of the last lines may not be on the disk yet: a run brings everything there at least this
+/// often.
 const UNSYNCED_LINES: usize = 2 * 256;
 
 /// An open journal.
@@ -26,10 +27,11 @@ pub(crate) struct Journal {
 }
 
 impl Journal {
-    /// Opens the journal of a folder, or starts one. Lines that are torn, or whose files are not there, are forgotten.
+    /// Opens the journal of a folder, or starts one. Lines that are torn, or whose files are not
+    /// there, are forgotten.
     ///
-    /// What was written last may not have reached the disk when a machine went down: the files of the last lines are
-    /// compared by checksum.
+    /// What was written last may not have reached the disk when a machine went down: the files of
+    /// the last lines are compared by checksum.
     pub(crate) fn open(folder: &Path) -> Result<Self> {
         let path = folder.join(JOURNAL);
         let mut file = io::open_own(&path)?;
@@ -117,8 +119,9 @@ fn keyed_by_number(lines: impl IntoIterator<Item = JournalLine>) -> BTreeMap<u64
     lines.into_iter().map(|line| (line.k, line)).collect()
 }
 
-/// Compares the files of a dataset with what was written and marks samples that differ to be made again: returns how
-/// many samples are good and how many the next run makes again. That run also reads every input file anew.
+/// Compares the files of a dataset with what was written and marks samples that differ to be made
+/// again: returns how many samples are good and how many the next run makes again. That run also
+/// reads every input file anew.
 ///
 /// # Errors
 /// A folder that holds no dataset, one that an older petcomp began, or one that a run is writing.

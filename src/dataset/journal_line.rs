@@ -1,8 +1,8 @@
 //! A line of the journal: what is known of a finished sample, sealed by a checksum.
 //!
-//! A line is a JSON object whose last key, `crc32`, is the checksum of the bytes before it: a line that was torn or edited
-//! is ignored, and its sample is made again. Lines of datasets that were begun before there were checksums are
-//! read as they are, by what reads only.
+//! A line is a JSON object whose last key, `crc32`, is the checksum of the bytes before it: a line
+//! that was torn or edited is ignored, and its sample is made again. Lines of datasets that were
+//! begun before there were checksums are read as they are, by what reads only.
 
 use crate::dataset::folder::{IDENTITY, JOURNAL};
 use crate::dataset::{Entry, Part, Written};
@@ -20,7 +20,8 @@ pub(crate) struct JournalLine {
     pub(crate) k: u64,
     /// Its part.
     pub(crate) part: Part,
-    /// Objects of each class in the picture (of the class they are labelled as, if they are), and how many have a label.
+    /// Objects of each class in the picture (of the class they are labelled as, if they are), and
+    /// how many have a label.
     pub(crate) classes: Vec<[u32; 2]>,
     /// Objects that something lies over.
     #[serde(default)]
@@ -60,7 +61,8 @@ impl JournalLine {
         })
     }
 
-    /// Reads a line, if it is as it was written; `is_older` says that lines without a checksum are taken as well.
+    /// Reads a line, if it is as it was written; `is_older` says that lines without a checksum are
+    /// taken as well.
     pub(crate) fn parse(text: &[u8], is_older: bool) -> std::result::Result<Self, String> {
         let line = without_seal(text, is_older)?;
         let line: Self = serde_json::from_slice(&line).map_err(|e| e.to_string())?;
@@ -118,7 +120,8 @@ impl JournalLine {
             .all(|file| file.length(folder) == Some(file.bytes))
     }
 
-    /// Every file is there: in its full size where it is on the disk for sure, else with its very bytes.
+    /// Every file is there: in its full size where it is on the disk for sure, else with its very
+    /// bytes.
     pub(crate) fn has_files(&self, folder: &Path, is_synced: bool) -> bool {
         if is_synced {
             self.has_same_sizes(folder)
@@ -201,7 +204,8 @@ impl WrittenFile {
         }
     }
 
-    /// Fails where the path is none of a sample's: outside of the folder, hidden, or a file of the dataset as a whole.
+    /// Fails where the path is none of a sample's: outside of the folder, hidden, or a file of the
+    /// dataset as a whole.
     fn check_path(&self) -> std::result::Result<(), String> {
         io::below("", &self.path).map_err(|e| e.to_string())?;
         if is_reserved(&self.path) {

@@ -13,7 +13,8 @@ use crate::render::Cryptomatte;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// Writes `layers/{train,val}/NNNNNN.exr`: the scene-linear picture and what it was put together from, as 32-bit floats.
+/// Writes `layers/{train,val}/NNNNNN.exr`: the scene-linear picture and what it was put together
+/// from, as 32-bit floats.
 ///
 /// | channels | meaning |
 /// | --- | --- |

@@ -1,4 +1,5 @@
-//! The images of a dataset, part by part, and a choice of them: lists that trainers read, without copies.
+//! The images of a dataset, part by part, and a choice of them: lists that trainers read, without
+//! copies.
 
 use crate::dataset::paths::{absolute_path, folder_of};
 use crate::dataset::yolo_yaml::DataYaml;
@@ -21,7 +22,8 @@ pub struct Listing {
 }
 
 impl Listing {
-    /// Reads the `data.yaml` of a folder, whose parts are folders of images (in order of name) or lists (`.txt`).
+    /// Reads the `data.yaml` of a folder, whose parts are folders of images (in order of name) or
+    /// lists (`.txt`).
     ///
     /// # Errors
     /// No `data.yaml`; a folder or list that cannot be read.
@@ -43,8 +45,8 @@ impl Listing {
         all
     }
 
-    /// The first part of the images for training and the first part of those for validation, as the paper takes 25 % of
-    /// its photos "from the beginning".
+    /// The first part of the images for training and the first part of those for validation, as the
+    /// paper takes 25 % of its photos "from the beginning".
     ///
     /// # Errors
     /// A share that is not in `0..=1`.

@@ -15,19 +15,20 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
-/// Copies the samples of shards into one folder, checks each file against its checksum, and joins the files of many
-/// samples.
+/// Copies the samples of shards into one folder, checks each file against its checksum, and joins
+/// the files of many samples.
 ///
-/// The folder is then, byte for byte, what one run without shards makes. Nothing is taken from the shards. A merge that
-/// was interrupted goes on when it is called again.
+/// The folder is then, byte for byte, what one run without shards makes. Nothing is taken from the
+/// shards. A merge that was interrupted goes on when it is called again.
 ///
-/// A shard is a folder that anybody may have made: what its journal names is looked for in the shard alone, and only
-/// regular files are read.
+/// A shard is a folder that anybody may have made: what its journal names is looked for in the
+/// shard alone, and only regular files are read.
 ///
 /// # Errors
-/// Folders that are no shards, or not all of one dataset: another recipe, seed or program (the message names the field),
-/// a shard that is missing or given twice, a sample that is missing or not the shard's; a line of a journal or a file that
-/// is not as it was written. As [`generate`](crate::dataset::generate) for the folder that is written.
+/// Folders that are no shards, or not all of one dataset: another recipe, seed or program (the
+/// message names the field), a shard that is missing or given twice, a sample that is missing or
+/// not the shard's; a line of a journal or a file that is not as it was written. As
+/// [`generate`](crate::dataset::generate) for the folder that is written.
 pub fn merge(
     shards: &[PathBuf],
     folder: &Path,

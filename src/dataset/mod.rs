@@ -1,10 +1,11 @@
 //! Dataset: images and labels in the layouts that trainers read.
 //!
-//! A [`Pipeline`] opens what a recipe file ([`DatasetConfig`]) names and makes sample `k` of it: draws the scene, lets it settle,
-//! lights, renders and labels it.
+//! A [`Pipeline`] opens what a recipe file ([`DatasetConfig`]) names and makes sample `k` of it:
+//! draws the scene, lets it settle, lights, renders and labels it.
 //!
-//! [`generate`] makes samples, many at a time, and hands each to [`Writer`]s: [`Pictures`] writes the images, [`Sidecar`]
-//! everything that was drawn, [`Yolo`], [`Coco`], [`Voc`], [`WebDataset`] and [`Layers`] the labels. Sample `k` has the same files, to the byte, whatever the number of
+//! [`generate`] makes samples, many at a time, and hands each to [`Writer`]s: [`Pictures`] writes
+//! the images, [`Sidecar`] everything that was drawn, [`Yolo`], [`Coco`], [`Voc`], [`WebDataset`]
+//! and [`Layers`] the labels. Sample `k` has the same files, to the byte, whatever the number of
 //! threads, and after any interruption:
 //!
 //! ```text
@@ -171,7 +172,8 @@ impl Provenance {
 impl Sample {
     /// A picture from anywhere with its labels: all that most layouts need.
     ///
-    /// [`Layers`] needs `deep` as well, [`Sidecar`] writes a file only where there is a `provenance`.
+    /// [`Layers`] needs `deep` as well, [`Sidecar`] writes a file only where there is a
+    /// `provenance`.
     pub fn new(frame: Image<PremulRgba>, labels: Labels) -> Self {
         Self {
             frame,
@@ -247,7 +249,8 @@ pub struct Written {
 }
 
 impl Written {
-    /// The sample's file in a folder of the dataset: the first of `coco` is the one that COCO joins.
+    /// The sample's file in a folder of the dataset: the first of `coco` is the one that COCO
+    /// joins.
     ///
     /// # Errors
     /// When there is none.
@@ -266,13 +269,16 @@ impl Written {
 
 /// A layout that a dataset is written in.
 ///
-/// A layout with one file for many samples writes a file of its own for each sample first, and joins those when all are
-/// there: so every file of a sample can be made again alone, on any machine, and no run has to remember another.
+/// A layout with one file for many samples writes a file of its own for each sample first, and
+/// joins those when all are there: so every file of a sample can be made again alone, on any
+/// machine, and no run has to remember another.
 pub trait Writer: Sync {
-    /// Its name and settings: written into `dataset.json`, and compared before a dataset is continued.
+    /// Its name and settings: written into `dataset.json`, and compared before a dataset is
+    /// continued.
     fn settings(&self) -> serde_json::Value;
 
-    /// Writes what belongs to no one sample: folders, lists of classes. Called once in each run, before any sample.
+    /// Writes what belongs to no one sample: folders, lists of classes. Called once in each run,
+    /// before any sample.
     ///
     /// # Errors
     /// When a file cannot be written.
@@ -286,16 +292,18 @@ pub trait Writer: Sync {
     /// When a file cannot be written, or the sample is one that the layout cannot hold.
     fn write(&self, folder: &Path, entry: &Entry<'_>) -> Result<Vec<PathBuf>>;
 
-    /// The files that trainers are given, below the dataset's folder: those that name all others. By default none.
+    /// The files that trainers are given, below the dataset's folder: those that name all others.
+    /// By default none.
     fn for_trainers(&self) -> Vec<PathBuf> {
         Vec::new()
     }
 
-    /// Writes the files that hold many samples, from `samples`' own files, which are in order of number and all there;
-    /// takes away what an earlier call left and this one has no use for. By default there are no such files.
+    /// Writes the files that hold many samples, from `samples`' own files, which are in order of
+    /// number and all there; takes away what an earlier call left and this one has no use for.
+    /// By default there are no such files.
     ///
-    /// Called when a dataset is complete: at the end of a run, and after shards were joined. The bytes depend on nothing
-    /// but the samples' files, the classes and the settings.
+    /// Called when a dataset is complete: at the end of a run, and after shards were joined. The
+    /// bytes depend on nothing but the samples' files, the classes and the settings.
     ///
     /// # Errors
     /// When a file cannot be read or written.

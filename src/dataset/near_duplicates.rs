@@ -20,9 +20,9 @@ pub struct NearDuplicate {
     pub codes: f64,
 }
 
-/// Images that differ by less than this, in 8-bit grey values, are nearly the same: photos of a scene that nobody
-/// touched differ by noise, which the small copies average to below one code; an object of 1 % of the picture and a tenth
-/// of the full scale of contrast, moved, changes it by 3.
+/// Images that differ by less than this, in 8-bit grey values, are nearly the same: photos of a
+/// scene that nobody touched differ by noise, which the small copies average to below one code; an
+/// object of 1 % of the picture and a tenth of the full scale of contrast, moved, changes it by 3.
 pub const NEAR_DUPLICATE_RMS: f64 = 2.0;
 
 /// Sides of the small copies, pixels.
@@ -61,7 +61,8 @@ impl Thumbnail {
     }
 }
 
-/// For each of `val` the nearest of `train`, as places in the lists, where it is nearer than `codes`.
+/// For each of `val` the nearest of `train`, as places in the lists, where it is nearer than
+/// `codes`.
 pub(crate) fn nearest(
     train: &[Thumbnail],
     val: &[Thumbnail],

@@ -11,13 +11,15 @@ pub(crate) const OBSTRUCTED: &str = "obstructed";
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Obstructed {
-    /// They get none: a detector of what can be picked, as in the paper. A trainer takes them for background.
+    /// They get none: a detector of what can be picked, as in the paper. A trainer takes them for
+    /// background.
     #[default]
     Drop,
     /// They are labelled like the others.
     Keep,
-    /// They are labelled as to be ignored where a format can say so (COCO `iscrowd`, Pascal VOC `difficult`): finding
-    /// them is neither right nor wrong. YOLO cannot; there they get no label.
+    /// They are labelled as to be ignored where a format can say so (COCO `iscrowd`, Pascal VOC
+    /// `difficult`): finding them is neither right nor wrong. YOLO cannot; there they get no
+    /// label.
     Ignore,
     /// They are labelled as a class of their own, the last: `obstructed`.
     Class,

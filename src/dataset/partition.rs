@@ -12,8 +12,8 @@ use std::str::FromStr;
 /// How images are partitioned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Partition {
-    /// The first ones for training, the last for validation, as the paper does with series of photos; so many between
-    /// them for neither.
+    /// The first ones for training, the last for validation, as the paper does with series of
+    /// photos; so many between them for neither.
     Consecutive {
         /// Images that are left out.
         guard: usize,
@@ -68,8 +68,8 @@ impl FromStr for Group {
 /// What training and validation have in common.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Leakage {
-    /// For each [`Group`] that is known of the images: groups of the images for validation, and how many of them also
-    /// occur in training.
+    /// For each [`Group`] that is known of the images: groups of the images for validation, and
+    /// how many of them also occur in training.
     pub groups: Vec<(&'static str, [usize; 2])>,
     /// Images for validation that look like one for training.
     pub near_duplicates: Vec<NearDuplicate>,
@@ -97,8 +97,8 @@ impl Listing {
         })
     }
 
-    /// What leaks from training to validation; images are near when they differ by less than `max_codes` (root mean
-    /// square of 8-bit grey values of a small copy).
+    /// What leaks from training to validation; images are near when they differ by less than
+    /// `max_codes` (root mean square of 8-bit grey values of a small copy).
     ///
     /// # Errors
     /// An image that cannot be read.
@@ -116,7 +116,8 @@ impl Listing {
             .collect()
     }
 
-    /// Groups of the images for validation, and how many of them occur in training; none where they are not known.
+    /// Groups of the images for validation, and how many of them occur in training; none where they
+    /// are not known.
     fn shared_groups(&self, group: Group) -> Option<[usize; 2]> {
         let train = distinct_groups(&self.train, group)?;
         let val = distinct_groups(&self.val, group)?;

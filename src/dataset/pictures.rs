@@ -8,8 +8,8 @@ use crate::io::{self, WriteOptions};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// Writes `images/{train,val}/NNNNNN.png` or `.jpg`, 8-bit sRGB, on black where nothing lies behind the objects, and on
-/// request the scene-linear picture beside it as `exr/{train,val}/NNNNNN.exr`.
+/// Writes `images/{train,val}/NNNNNN.png` or `.jpg`, 8-bit sRGB, on black where nothing lies behind
+/// the objects, and on request the scene-linear picture beside it as `exr/{train,val}/NNNNNN.exr`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Pictures {

@@ -48,7 +48,8 @@ impl Pipeline {
     /// Opens the folders that a config names.
     ///
     /// # Errors
-    /// A folder, manifest, label or cut-out that cannot be used; each names the file, the field and what was expected.
+    /// A folder, manifest, label or cut-out that cannot be used; each names the file, the field and
+    /// what was expected.
     pub fn open(config: DatasetConfig) -> Result<Self> {
         let library = Library::open(&config.assets)?;
         Self::with_library(config, library)
@@ -70,7 +71,8 @@ impl Pipeline {
         places.try_for_each(|place| self.check_size_in(place))
     }
 
-    /// Refuses a place in whose pictures the median object is too small to have an outline: a length is in another unit.
+    /// Refuses a place in whose pictures the median object is too small to have an outline: a
+    /// length is in another unit.
     fn check_size_in(&self, place: &BackgroundPhoto) -> Result<()> {
         let (Some(median), CameraSource::Known(camera)) =
             (self.median_object_m(), &place.background.camera)
@@ -99,7 +101,8 @@ impl Pipeline {
         lengths.get(lengths.len() / 2).copied()
     }
 
-    /// The same for one scene that is there already: only cut-outs of the assets that it names are read, and known.
+    /// The same for one scene that is there already: only cut-outs of the assets that it names are
+    /// read, and known.
     ///
     /// # Errors
     /// As [`open`](Self::open).
@@ -146,8 +149,9 @@ impl Pipeline {
     /// A dataset of `count` pictures to be made in `folder` with the config's formats.
     ///
     /// # Errors
-    /// Classes that the config's policy for obstructed objects cannot add to; an asset that fits between the walls of some
-    /// background in no direction; a photo or an environment map that cannot be read.
+    /// Classes that the config's policy for obstructed objects cannot add to; an asset that fits
+    /// between the walls of some background in no direction; a photo or an environment map that
+    /// cannot be read.
     pub fn plan(&self, count: u64, seed: u64, folder: impl Into<PathBuf>) -> Result<Plan> {
         let (scene, labels) = (&self.config.scene, &self.config.labels);
         scene
@@ -265,7 +269,8 @@ impl Pipeline {
         })
     }
 
-    /// Labels a scene without making its picture: nothing is lit, and neither plate nor environment is read.
+    /// Labels a scene without making its picture: nothing is lit, and neither plate nor environment
+    /// is read.
     ///
     /// The labels are those of [`take`](Self::take).
     ///
@@ -287,7 +292,8 @@ impl Pipeline {
         (deep, frame)
     }
 
-    /// Finds out what is unknown in a scene: its camera, where its objects come to rest, its exposure.
+    /// Finds out what is unknown in a scene: its camera, where its objects come to rest, its
+    /// exposure.
     ///
     /// # Errors
     /// As [`take`](Self::take).

@@ -1,9 +1,9 @@
 //! What each [`Quality`] stands for, stage by stage.
 //!
-//! Each stage has settings on its own curve of error against time (`petcomp-report all` measures them); a [`Quality`] names
-//! one point on every curve at once. [`Quality::table`] lists them. What is not in it is exact, or so quick that nothing is
-//! gained: colour transfer, the keyer, labels (masks and boxes), and the camera, which is solved to its end in a fifth of a
-//! millisecond.
+//! Each stage has settings on its own curve of error against time (`petcomp-report all` measures
+//! them); a [`Quality`] names one point on every curve at once. [`Quality::table`] lists them. What
+//! is not in it is exact, or so quick that nothing is gained: colour transfer, the keyer, labels
+//! (masks and boxes), and the camera, which is solved to its end in a fifth of a millisecond.
 
 use crate::dataset::{DatasetConfig, Pictures};
 use crate::error::{Error, Result};

@@ -1,4 +1,5 @@
-//! One run over a dataset's folder: many samples at a time, each entered in the journal when its files are there.
+//! One run over a dataset's folder: many samples at a time, each entered in the journal when its
+//! files are there.
 
 use crate::dataset::folder;
 use crate::dataset::journal::Journal;
@@ -57,7 +58,8 @@ impl Progress {
     }
 }
 
-/// Most samples that a dataset may have: a number above is a slip of the finger, and no sum of counts can overflow.
+/// Most samples that a dataset may have: a number above is a slip of the finger, and no sum of
+/// counts can overflow.
 const MAX_SAMPLES: u64 = 1_000_000_000;
 
 /// Fails for a number of samples that nobody can mean.
@@ -71,8 +73,8 @@ pub(super) fn check_count(count: u64) -> Result<()> {
     }
 }
 
-/// Writes the samples of a plan that are not in its folder yet and returns what the folder then holds; `write` puts the
-/// files of a sample in their places.
+/// Writes the samples of a plan that are not in its folder yet and returns what the folder then
+/// holds; `write` puts the files of a sample in their places.
 pub(super) fn run(
     plan: &Plan,
     write: impl Fn(u64) -> Result<(JournalLine, Times)> + Sync,

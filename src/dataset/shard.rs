@@ -49,7 +49,8 @@ impl SampleRange {
     }
 }
 
-/// A share of the samples, every `of`-th: each machine makes its own and none has to know of another.
+/// A share of the samples, every `of`-th: each machine makes its own and none has to know of
+/// another.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Shard {
@@ -131,9 +132,9 @@ impl FromStr for ShardChoice {
 impl ShardChoice {
     /// The shard that is meant, `variable` telling the environment's variables.
     ///
-    /// `auto` understands the tasks of a Slurm array (`SLURM_ARRAY_TASK_ID` with `_MIN`, `_MAX`, `_STEP` and `_COUNT`) and
-    /// the pods of an indexed Kubernetes job (`JOB_COMPLETION_INDEX`, from 0; `auto/N` says of how many, since Kubernetes
-    /// does not).
+    /// `auto` understands the tasks of a Slurm array (`SLURM_ARRAY_TASK_ID` with `_MIN`, `_MAX`,
+    /// `_STEP` and `_COUNT`) and the pods of an indexed Kubernetes job (`JOB_COMPLETION_INDEX`,
+    /// from 0; `auto/N` says of how many, since Kubernetes does not).
     ///
     /// # Errors
     /// An environment of neither; an array with gaps; numbers that cannot be right.

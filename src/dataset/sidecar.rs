@@ -11,8 +11,8 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Writes `scenes/{train,val}/NNNNNN.json`, a [`SampleRecord`] each: label formats forget most of what is known of a picture,
-/// this one nothing.
+/// Writes `scenes/{train,val}/NNNNNN.json`, a [`SampleRecord`] each: label formats forget most of
+/// what is known of a picture, this one nothing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Sidecar;
 

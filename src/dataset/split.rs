@@ -50,7 +50,8 @@ impl Default for Split {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SplitOrder {
-    /// Evenly spread: at 20 percent every fifth, 0, 5, 10, ...; does not depend on how many samples there are.
+    /// Evenly spread: at 20 percent every fifth, 0, 5, 10, ...; does not depend on how many samples
+    /// there are.
     #[default]
     Interleaved,
     /// The last ones, as the paper splits its series of real photos.

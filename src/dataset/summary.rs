@@ -24,7 +24,8 @@ pub struct Summary {
     pub classes: Vec<String>,
     /// Images of both parts.
     pub images: [usize; 2],
-    /// Drawn numbers by the key of their distribution in the recipe: `scale`, `start.x`, `lights[0].height`.
+    /// Drawn numbers by the key of their distribution in the recipe: `scale`, `start.x`,
+    /// `lights[0].height`.
     pub drawn: BTreeMap<String, Vec<f64>>,
     /// How often each was chosen: photos of the place, assets, photos of an asset.
     pub chosen: BTreeMap<&'static str, BTreeMap<String, u64>>,
@@ -277,7 +278,8 @@ impl ReadSample {
     }
 }
 
-/// The key in the recipe of a draw's distribution; none for a choice from a list and for a rotation that was resampled.
+/// The key in the recipe of a draw's distribution; none for a choice from a list and for a rotation
+/// that was resampled.
 fn key(path: &str) -> Option<String> {
     if is_choice(path) || path.contains('#') {
         return None;

@@ -7,7 +7,8 @@ use std::io::Write as _;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// Name of the file that tells how long each run took: of the machine and the day, and no part of the dataset.
+/// Name of the file that tells how long each run took: of the machine and the day, and no part of
+/// the dataset.
 pub(crate) const RUNS: &str = ".runs.jsonl";
 
 /// Time that samples took, by stage: the sum over samples, not over the clock.
@@ -49,7 +50,8 @@ impl std::ops::AddAssign for Times {
 }
 
 impl Times {
-    /// Adds a line to the folder's list of runs. It is a note, so a disk without room for it is no error.
+    /// Adds a line to the folder's list of runs. It is a note, so a disk without room for it is no
+    /// error.
     pub(crate) fn append(&self, folder: &Path, made: u64, wall: Duration) {
         if made > 0
             && let Err(e) = RunTimes::new(self, made, wall).append(&folder.join(RUNS))

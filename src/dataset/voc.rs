@@ -11,8 +11,9 @@ use std::path::{Path, PathBuf};
 
 /// Writes `voc/{train,val}/NNNNNN.xml` and the lists `voc/{train,val}.txt`.
 ///
-/// Pixels are counted from 1 and the last is inside, as in the Pascal VOC challenges. `truncated` is an object that
-/// touches the picture's edge, `occluded` one that something lies over, `difficult` one that is to be ignored.
+/// Pixels are counted from 1 and the last is inside, as in the Pascal VOC challenges. `truncated`
+/// is an object that touches the picture's edge, `occluded` one that something lies over,
+/// `difficult` one that is to be ignored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Voc {

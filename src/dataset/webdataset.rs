@@ -8,11 +8,12 @@ use std::fs::File;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// Writes `webdataset/{train,val}-NNNNNN.tar`, each with the files of so many samples in order of number.
+/// Writes `webdataset/{train,val}-NNNNNN.tar`, each with the files of so many samples in order of
+/// number.
 ///
-/// Files of a sample are called by its number: `000012.png`, `000012.json`; where two writers have one of the same
-/// kind, the later one's is called `000012.FOLDER.json` after its folder. There is no empty archive. Times and owners are
-/// zero, so the same samples give the same bytes.
+/// Files of a sample are called by its number: `000012.png`, `000012.json`; where two writers have
+/// one of the same kind, the later one's is called `000012.FOLDER.json` after its folder. There is
+/// no empty archive. Times and owners are zero, so the same samples give the same bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct WebDataset {

@@ -21,12 +21,13 @@ pub(crate) const MIN_SIDE_PX: u32 = 10;
 
 /// Writes `labels/{train,val}/NNNNNN.txt` and `data.yaml`.
 ///
-/// Rows of `detect` are `class cx cy w h`, of `segment` `class x1 y1 x2 y2 ...`; positions are shares of the image's
-/// width and height, 0 to 1, six decimals. An image without objects has an empty file; equal rows are written once; objects
-/// that are to be ignored have none.
+/// Rows of `detect` are `class cx cy w h`, of `segment` `class x1 y1 x2 y2 ...`; positions are
+/// shares of the image's width and height, 0 to 1, six decimals. An image without objects has an
+/// empty file; equal rows are written once; objects that are to be ignored have none.
 ///
-/// `data.yaml` names its folders relative to itself, so the dataset may be moved: Ultralytics looks for them beside the
-/// file; YOLOv5 wants `path:` added, or to be started with the dataset as its working folder.
+/// `data.yaml` names its folders relative to itself, so the dataset may be moved: Ultralytics looks
+/// for them beside the file; YOLOv5 wants `path:` added, or to be started with the dataset as its
+/// working folder.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Yolo {
@@ -34,7 +35,8 @@ pub struct Yolo {
     pub task: YoloTask,
     /// Whether rows tell of the whole object or of what is seen. Default: `amodal`.
     pub boxes: Extent,
-    /// How far a border may be from that of the mask, pixels; in a recipe, that of `labels`. Default: 0, along pixels.
+    /// How far a border may be from that of the mask, pixels; in a recipe, that of `labels`.
+    /// Default: 0, along pixels.
     #[serde(skip_deserializing, skip_serializing_if = "is_exact")]
     pub simplify: f64,
 }
@@ -46,8 +48,8 @@ pub enum YoloTask {
     /// A box.
     #[default]
     Detect,
-    /// The border of the mask, along the edges of its pixels or near them (`labels.simplify`): one closed line, holes and
-    /// parts joined by slits.
+    /// The border of the mask, along the edges of its pixels or near them (`labels.simplify`): one
+    /// closed line, holes and parts joined by slits.
     Segment,
 }
 

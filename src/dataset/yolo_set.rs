@@ -19,8 +19,8 @@ pub struct YoloSet {
 }
 
 impl YoloSet {
-    /// Reads what `FOLDER/data.yaml` names: folders of images, or text files that list them; relative to its `path:`,
-    /// which is relative to the folder.
+    /// Reads what `FOLDER/data.yaml` names: folders of images, or text files that list them;
+    /// relative to its `path:`, which is relative to the folder.
     ///
     /// # Errors
     /// [`Error::File`] for a missing `data.yaml`, one without classes, or a part without images.

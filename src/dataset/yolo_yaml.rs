@@ -1,7 +1,8 @@
 //! `data.yaml`: the description of a YOLO dataset, written and read.
 //!
-//! It is read event by event with `saphyr-parser`: values that nobody asks for are skipped without being built, aliases
-//! are followed for texts and lists of texts alone, and findings name their line.
+//! It is read event by event with `saphyr-parser`: values that nobody asks for are skipped without
+//! being built, aliases are followed for texts and lists of texts alone, and findings name their
+//! line.
 
 use crate::dataset::Part;
 use saphyr_parser::{Event, Parser, ScalarStyle, ScanError, Span, StrInput};
@@ -64,7 +65,8 @@ impl DataYaml {
         yaml + &yaml_names(classes)
     }
 
-    /// Reads the keys that trainers need; all others are skipped. What could be read stays, whatever else is wrong.
+    /// Reads the keys that trainers need; all others are skipped. What could be read stays,
+    /// whatever else is wrong.
     pub(crate) fn read(text: &str) -> (Self, Vec<Problem>) {
         let (mut yaml, mut problems) = (Self::default(), Vec::new());
         let read = Reader::new(text).read_keys(|key, line, value| {

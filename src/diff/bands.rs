@@ -58,6 +58,11 @@ pub(super) fn grown(band: &Range<usize>, by: usize, height: usize) -> Range<usiz
     band.start.saturating_sub(by)..(band.end + by).min(height)
 }
 
+/// Rows as an image counts them that begins with the row `first`.
+pub(super) fn rows_from(first: usize, rows: &Range<usize>) -> Range<usize> {
+    rows.start - first..rows.end - first
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,12 +1,12 @@
 //! FLIP: how different two pictures look to someone who flips between them.
 
-use super::bands::{RowSource, bands, grown};
+use super::bands::{RowSource, bands, grown, rows_from};
 use crate::image::Image;
 use flip_rs::{DEFAULT_PPD, FlipError, RgbImage, ldr_flip};
 use std::ops::Range;
 
-/// Rows above and below a pixel that its difference depends on: the radius of the widest filter, three of its standard
-/// deviations, at 67 pixels per degree.
+/// Rows above and below a pixel that its difference depends on: the radius of the widest filter,
+/// three of its standard deviations, at 67 pixels per degree.
 pub(super) const REACH_ROWS: usize = 10;
 
 /// Mean LDR-FLIP of two display-encoded (sRGB, 0 to 1) pictures: 0 for equal ones, at most 1.
@@ -14,8 +14,9 @@ pub(super) const REACH_ROWS: usize = 10;
 /// None for pictures of different size or without pixels; NaN where a value is not finite.
 ///
 /// # Method
-/// [Andersson et al. 2020] at 67 pixels per degree, by the crate `flip-rs`: difference of colours after the eye's blur
-/// (HyAB in Hunt-adjusted CIELAB), raised to the power of one minus the difference of edges and points.
+/// [Andersson et al. 2020] at 67 pixels per degree, by the crate `flip-rs`: difference of colours
+/// after the eye's blur (HyAB in Hunt-adjusted CIELAB), raised to the power of one minus the
+/// difference of edges and points.
 ///
 /// [Andersson et al. 2020]: https://doi.org/10.1145/3406183
 pub fn flip(reference: &Image<[f32; 3]>, test: &Image<[f32; 3]>) -> Option<f64> {
@@ -26,7 +27,7 @@ pub fn flip(reference: &Image<[f32; 3]>, test: &Image<[f32; 3]>) -> Option<f64> 
     let sum: f64 = bands(test.size())
         .map(|band| {
             let outer = grown(&band, REACH_ROWS, test.height());
-            let inner = band.start - outer.start..band.end - outer.start;
+            let inner = rows_from(outer.start, &band);
             let [reference, test] = [reference, test].map(|p| p.read_rows(outer.clone()));
             row_sum(&reference, &test, inner)
         })
@@ -64,7 +65,8 @@ mod tests {
         assert_eq!(flip(&pattern(), &pattern()), Some(0.0));
     }
 
-    /// `evaluate(a, b, "LDR")` of flip-evaluator 1.7 for the same two pictures, by `golden/diff/reference.py`.
+    /// `evaluate(a, b, "LDR")` of flip-evaluator 1.7 for the same two pictures, by
+    /// `golden/diff/reference.py`.
     #[test]
     fn the_measure_is_that_of_its_authors() {
         let measured = flip(&pattern(), &changed()).unwrap();

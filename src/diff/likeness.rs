@@ -1,6 +1,6 @@
 //! How alike two pictures are, in the numbers that pictures are judged by.
 
-use super::bands::{RowSource, bands, grown};
+use super::bands::{RowSource, bands, grown, rows_from};
 use super::{flip, ssim};
 use crate::color::linear_to_srgb;
 use crate::image::Image;
@@ -15,8 +15,8 @@ pub struct Likeness {
     pub rmse: f64,
     /// Mean difference, scene-linear: positive where the picture is brighter than the reference.
     pub bias: f64,
-    /// Structural similarity of the displayed pictures ([`ssim`](super::ssim())); 1 is equal. None for pictures smaller than
-    /// its window of 11 x 11 pixels.
+    /// Structural similarity of the displayed pictures ([`ssim`](super::ssim())); 1 is equal. None
+    /// for pictures smaller than its window of 11 x 11 pixels.
     pub ssim: Option<f64>,
     /// LDR-FLIP of the displayed pictures ([`flip`](super::flip())); 0 is equal.
     pub flip: f64,
@@ -25,7 +25,8 @@ pub struct Likeness {
 impl Likeness {
     /// Compares a scene-linear picture with what it should be.
     ///
-    /// Displayed means clipped to 0 to 1 and sRGB-encoded. None for pictures of different size or without pixels.
+    /// Displayed means clipped to 0 to 1 and sRGB-encoded. None for pictures of different size or
+    /// without pixels.
     pub fn measure(
         picture: &impl RowSource<LinearRgb>,
         reference: &impl RowSource<LinearRgb>,
@@ -76,13 +77,13 @@ impl LikenessSums {
         band: Range<usize>,
         windows: Range<usize>,
     ) {
-        let band = band.start - first..band.end - first;
+        let band = rows_from(first, &band);
         for y in band.clone() {
             self.add_row(picture.row(y), reference.row(y));
         }
         let [shown, wanted] = [displayed(picture), displayed(reference)];
         if !windows.is_empty() {
-            let windows = windows.start - first..windows.end - first;
+            let windows = rows_from(first, &windows);
             self.ssim.extend(ssim::row_sums(&wanted, &shown, windows));
         }
         self.flip += flip::row_sum(&wanted, &shown, band);
@@ -116,14 +117,20 @@ fn displayed(image: &Image<LinearRgb>) -> Image<[f32; 3]> {
     image.map(|c| <[f32; 3]>::from(c).map(|v| linear_to_srgb(v.clamp(0.0, 1.0))))
 }
 
+impl Likeness {
+    fn write_ssim(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.ssim {
+            Some(ssim) => write!(f, "= {ssim:.6}"),
+            None => write!(f, "needs 11 x 11 pixels"),
+        }
+    }
+}
+
 impl fmt::Display for Likeness {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { rmse, bias, .. } = self;
         write!(f, "RMSE = {rmse:.6}, bias = {bias:+.7}, SSIM ")?;
-        match self.ssim {
-            Some(ssim) => write!(f, "= {ssim:.6}")?,
-            None => write!(f, "needs 11 x 11 pixels")?,
-        }
+        self.write_ssim(f)?;
         write!(f, ", FLIP = {:.6}", self.flip)
     }
 }

@@ -109,14 +109,16 @@ impl NamedChannels for [f32; 4] {
 
 /// Compares two pictures channel by channel.
 ///
-/// Pictures of different size are [`Verdict::Incomparable`]. Takes [`Image`](crate::Image)s, or anything else that has [`RowSource`].
+/// Pictures of different size are [`Verdict::Incomparable`]. Takes [`Image`](crate::Image)s, or
+/// anything else that has [`RowSource`].
 ///
 /// # Method
-/// The counts and the verdict of `idiff` 2.4.7: up to `allow_failures` failing pixels the pictures match, whatever
-/// else is asked; beyond that they fail by `fail_percent` or `hard_fail`, or else warn by `warn_percent` or
-/// `hard_warn`. Departs from it where it would let a broken picture pass: a NaN or an infinity that the other picture
-/// does not have in the same place and sign differs by infinity and counts (`idiff` passes over the first one), and
-/// pictures of different size are not compared (`idiff` continues the smaller one with zeros).
+/// The counts and the verdict of `idiff` 2.4.7: up to `allow_failures` failing pixels the pictures
+/// match, whatever else is asked; beyond that they fail by `fail_percent` or `hard_fail`, or else
+/// warn by `warn_percent` or `hard_warn`. Departs from it where it would let a broken picture pass:
+/// a NaN or an infinity that the other picture does not have in the same place and sign differs by
+/// infinity and counts (`idiff` passes over the first one), and pictures of different size are not
+/// compared (`idiff` continues the smaller one with zeros).
 pub fn compare<P: NamedChannels>(
     a: &impl RowSource<P>,
     b: &impl RowSource<P>,
@@ -152,6 +154,12 @@ fn compare_rows<P: NamedChannels>(
         tally.add_pixel(a, b, [x, y], thresholds);
     }
     tally
+}
+
+/// Whether two channels are no different: NaN is like NaN.
+#[inline]
+fn is_same(u: f32, v: f32) -> bool {
+    u == v || (u.is_nan() && v.is_nan())
 }
 
 #[cfg(test)]

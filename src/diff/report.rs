@@ -1,6 +1,6 @@
 //! What a comparison found, and its verdict.
 
-use super::{NamedChannels, Thresholds};
+use super::{NamedChannels, Thresholds, is_same};
 use std::fmt;
 
 /// The outcome of a comparison.
@@ -14,7 +14,8 @@ pub enum Verdict {
     Failure,
     /// Not pictures of the same size.
     Incomparable,
-    /// A file could not be read; never the outcome of a comparison, here so that all exit codes stand in one place.
+    /// A file could not be read; never the outcome of a comparison, here so that all exit codes
+    /// stand in one place.
     Unreadable,
 }
 
@@ -37,16 +38,19 @@ impl fmt::Display for Verdict {
     }
 }
 
-/// The statistics of two pictures' differences and a verdict; [`Display`](fmt::Display) gives the lines that `idiff` prints.
+/// The statistics of two pictures' differences and a verdict; [`Display`](fmt::Display) gives the
+/// lines that `idiff` prints.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Comparison {
     /// What they amount to.
     pub verdict: Verdict,
-    /// Mean absolute difference of all channels of all pixels; non-finite differences are left out.
+    /// Mean absolute difference of all channels of all pixels; non-finite differences are left
+    /// out.
     pub mean_error: f64,
     /// Root of the mean squared difference, likewise.
     pub rms_error: f64,
-    /// Peak signal to noise ratio in decibels; the peak is the largest value of both pictures, at least 1.
+    /// Peak signal to noise ratio in decibels; the peak is the largest value of both pictures, at
+    /// least 1.
     pub psnr: f64,
     /// The largest difference; infinite where a value is not finite in one picture only.
     pub max_error: f64,
@@ -105,18 +109,13 @@ impl Comparison {
             verdict: tally.verdict(pixels, thresholds),
             mean_error: tally.errors / values,
             rms_error,
-            psnr: 20.0 * libm::log10(f64::from(tally.peak) / rms_error),
+            psnr: tally.psnr_db(rms_error),
             max_error: tally.max_error,
             warned: tally.warned,
             failed: tally.failed,
             pixels,
             thresholds: *thresholds,
-            largest: tally.largest.map(|[x, y, c]| Largest {
-                x,
-                y,
-                channel: names[c],
-                values: tally.values,
-            }),
+            largest: tally.into_largest(names),
         }
     }
 }
@@ -179,7 +178,7 @@ impl DifferenceTally {
     /// Adds one value of both pictures and gives their distance.
     #[inline(always)]
     fn add_error(&mut self, u: f32, v: f32) -> f64 {
-        if u == v || (u.is_nan() && v.is_nan()) {
+        if is_same(u, v) {
             if u.is_finite() {
                 self.peak = self.peak.max(u);
             }
@@ -188,11 +187,29 @@ impl DifferenceTally {
         if !(u.is_finite() && v.is_finite()) {
             return f64::INFINITY;
         }
+        self.add_finite_error(u, v)
+    }
+
+    #[inline]
+    fn add_finite_error(&mut self, u: f32, v: f32) -> f64 {
         self.peak = self.peak.max(u).max(v);
         let error = f64::from((u - v).abs());
         self.errors += error;
         self.squares += error * error;
         error
+    }
+
+    fn psnr_db(&self, rms_error: f64) -> f64 {
+        20.0 * libm::log10(f64::from(self.peak) / rms_error)
+    }
+
+    fn into_largest(self, names: &[&'static str]) -> Option<Largest> {
+        self.largest.map(|[x, y, channel]| Largest {
+            x,
+            y,
+            channel: names[channel],
+            values: self.values,
+        })
     }
 
     /// This part followed by the next in reading order.
@@ -217,17 +234,21 @@ impl DifferenceTally {
     fn verdict(&self, pixels: usize, t: &Thresholds) -> Verdict {
         if self.failed <= t.allow_failures {
             Verdict::Match
-        } else if exceeds(self.failed, t.fail_percent, pixels)
-            || self.max_error > t.hard_fail.into()
-        {
+        } else if self.is_failure(pixels, t) {
             Verdict::Failure
-        } else if exceeds(self.warned, t.warn_percent, pixels)
-            || self.max_error > t.hard_warn.into()
-        {
+        } else if self.is_warning(pixels, t) {
             Verdict::Warning
         } else {
             Verdict::Match
         }
+    }
+
+    fn is_failure(&self, pixels: usize, t: &Thresholds) -> bool {
+        exceeds(self.failed, t.fail_percent, pixels) || self.max_error > t.hard_fail.into()
+    }
+
+    fn is_warning(&self, pixels: usize, t: &Thresholds) -> bool {
+        exceeds(self.warned, t.warn_percent, pixels) || self.max_error > t.hard_warn.into()
     }
 }
 
@@ -236,7 +257,8 @@ fn exceeds(count: usize, percent: f32, pixels: usize) -> bool {
     count as f64 > f64::from(percent) / 100.0 * pixels as f64
 }
 
-/// An error as a part of the mean magnitude of two values; an infinite one has no magnitude to be a part of.
+/// An error as a part of the mean magnitude of two values; an infinite one has no magnitude to be a
+/// part of.
 #[inline(always)]
 fn relative_error(error: f64, u: f32, v: f32) -> f64 {
     if error < f64::INFINITY {
@@ -251,14 +273,7 @@ impl fmt::Display for Comparison {
         if self.verdict == Verdict::Incomparable {
             return write!(f, "{}", self.verdict);
         }
-        writeln!(f, "  Mean error = {}", short(self.mean_error))?;
-        writeln!(f, "  RMS error = {}", short(self.rms_error))?;
-        writeln!(f, "  Peak SNR = {}", short(self.psnr))?;
-        write!(f, "  Max error  = {}", short(self.max_error))?;
-        if let Some(largest) = &self.largest {
-            write!(f, " @ {largest}")?;
-        }
-        writeln!(f)?;
+        self.write_errors(f)?;
         self.write_share(f, self.warned, self.thresholds.warn)?;
         self.write_share(f, self.failed, self.thresholds.fail)?;
         write!(f, "{}", self.verdict)
@@ -268,9 +283,25 @@ impl fmt::Display for Comparison {
 impl Comparison {
     /// The line on the pixels over a threshold.
     fn write_share(&self, f: &mut fmt::Formatter<'_>, count: usize, threshold: f32) -> fmt::Result {
-        let percent = 100.0 * count as f64 / self.pixels.max(1) as f64;
-        let (percent, threshold) = (general_format(percent, 3), short(threshold.into()));
+        let percent = general_format(self.percent(count), 3);
+        let threshold = short(threshold.into());
         writeln!(f, "  {count} pixels ({percent}%) over {threshold}")
+    }
+
+    fn write_errors(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "  Mean error = {}", short(self.mean_error))?;
+        writeln!(f, "  RMS error = {}", short(self.rms_error))?;
+        writeln!(f, "  Peak SNR = {}", short(self.psnr))?;
+        write!(f, "  Max error  = {}", short(self.max_error))?;
+        if let Some(largest) = &self.largest {
+            write!(f, " @ {largest}")?;
+        }
+        writeln!(f)
+    }
+
+    /// Of the pixels.
+    fn percent(&self, count: usize) -> f64 {
+        100.0 * count as f64 / self.pixels.max(1) as f64
     }
 }
 
@@ -292,7 +323,8 @@ fn short(x: f64) -> String {
     general_format(x, 6)
 }
 
-/// A number to some significant digits, in the way of C's `%g`: no zeros at the end, an exponent where it is short.
+/// A number to some significant digits, in the way of C's `%g`: no zeros at the end, an exponent
+/// where it is short.
 fn general_format(x: f64, digits: usize) -> String {
     let scientific = format!("{x:.*e}", digits - 1);
     let Some((mantissa, exponent)) = scientific.split_once('e') else {
@@ -303,6 +335,11 @@ fn general_format(x: f64, digits: usize) -> String {
         let decimals = (digits as i32 - 1 - exponent) as usize;
         return without_trailing_zeros(&format!("{x:.decimals$}")).into();
     }
+    scientific_format(mantissa, exponent)
+}
+
+/// With a sign and two digits of the exponent, as C prints it.
+fn scientific_format(mantissa: &str, exponent: i32) -> String {
     let sign = if exponent < 0 { '-' } else { '+' };
     let mantissa = without_trailing_zeros(mantissa);
     format!("{mantissa}e{sign}{:02}", exponent.abs())

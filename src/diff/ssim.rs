@@ -10,10 +10,12 @@ pub(super) const WINDOW_RADIUS_PX: usize = 5;
 const WINDOW_SIGMA_PX: f64 = 1.5;
 /// Stabilises the division where means are near 0: `(K1 L)^2` with K1 = 0.01 and the range L = 1.
 const MEAN_STABILIZER: f32 = 0.01 * 0.01;
-/// Stabilises the division where variances are near 0: `(K2 L)^2` with K2 = 0.03 and the range L = 1.
+/// Stabilises the division where variances are near 0: `(K2 L)^2` with K2 = 0.03 and the range L =
+/// 1.
 const VARIANCE_STABILIZER: f32 = 0.03 * 0.03;
 
-/// Mean structural similarity of two pictures of values from 0 to 1, averaged over the channels; 1 for equal ones.
+/// Mean structural similarity of two pictures of values from 0 to 1, averaged over the channels; 1
+/// for equal ones.
 ///
 /// None for pictures of different size, or smaller than the window of 11 pixels.
 ///
@@ -39,8 +41,12 @@ pub(super) fn window_centers(length: usize) -> Range<usize> {
 /// The measure of a picture from the sums of its rows that have windows; none where there are none.
 pub(super) fn mean(rows: &[[f64; 3]], (width, height): (usize, usize)) -> Option<f64> {
     let windows = window_centers(width).len() * window_centers(height).len();
-    let means = [0, 1, 2].map(|c| rows.iter().map(|row| row[c]).sum::<f64>() / windows as f64);
+    let means = [0, 1, 2].map(|c| channel_sum(rows, c) / windows as f64);
     (windows > 0).then(|| means.iter().sum::<f64>() / 3.0)
+}
+
+fn channel_sum(rows: &[[f64; 3]], c: usize) -> f64 {
+    rows.iter().map(|row| row[c]).sum()
 }
 
 /// Sums over the windows of some rows, which lie wholly inside, for each channel.
@@ -50,10 +56,14 @@ pub(super) fn row_sums(
     rows: Range<usize>,
 ) -> Vec<[f64; 3]> {
     let channels =
-        [0, 1, 2].map(|c| Moments::new(&a.map(|p| p[c]), &b.map(|p| p[c])).row_sums(rows.clone()));
+        [0, 1, 2].map(|c| Moments::new(&channel(a, c), &channel(b, c)).row_sums(rows.clone()));
     (0..rows.len())
         .map(|y| [0, 1, 2].map(|c| channels[c][y]))
         .collect()
+}
+
+fn channel(image: &Image<[f32; 3]>, c: usize) -> Image<f32> {
+    image.map(|p| p[c])
 }
 
 /// Means over windows of one channel of two pictures, of its squares and of their product.
@@ -100,14 +110,15 @@ struct Window {
     weights: Vec<f32>,
 }
 
+fn gaussian_weight(x: f64) -> f32 {
+    libm::exp(-x * x / (2.0 * WINDOW_SIGMA_PX * WINDOW_SIGMA_PX)) as f32
+}
+
 impl Window {
     fn gaussian() -> Self {
         let radius = WINDOW_RADIUS_PX as i32;
         let weights: Vec<f32> = (-radius..=radius)
-            .map(|i| {
-                let x = f64::from(i);
-                libm::exp(-x * x / (2.0 * WINDOW_SIGMA_PX * WINDOW_SIGMA_PX)) as f32
-            })
+            .map(|i| gaussian_weight(f64::from(i)))
             .collect();
         let sum: f32 = weights.iter().sum();
         Self {
@@ -152,8 +163,9 @@ mod tests {
         assert!((ssim(&pattern(), &pattern()).unwrap() - 1.0).abs() < 1e-7);
     }
 
-    /// `structural_similarity(a, b, gaussian_weights=True, sigma=1.5, use_sample_covariance=False, data_range=1,
-    /// channel_axis=2)` of scikit-image 0.26.0 for the same two pictures, by `golden/diff/reference.py`.
+    /// `structural_similarity(a, b, gaussian_weights=True, sigma=1.5, use_sample_covariance=False,
+    /// data_range=1, channel_axis=2)` of scikit-image 0.26.0 for the same two pictures, by
+    /// `golden/diff/reference.py`.
     #[test]
     fn the_measure_is_that_of_scikit_image() {
         let measured = ssim(&pattern(), &changed()).unwrap();

@@ -1,4 +1,5 @@
-//! Two pictures whose measures other programs have taken; `golden/diff/reference.py` makes the same.
+//! Two pictures whose measures other programs have taken; `golden/diff/reference.py` makes the
+//! same.
 
 use crate::image::Image;
 

@@ -1,13 +1,14 @@
 //! Differences to look at.
 
-use super::NamedChannels;
 use super::bands::{RowSource, bands};
+use super::{NamedChannels, is_same};
 use crate::image::Image;
 use crate::pixel::LinearRgb;
 
 /// How much [`triple`] makes of a difference.
 const DIFFERENCE_GAIN: f32 = 16.0;
-/// Light behind a transparent pixel in [`triple`]: photographic middle grey, so that neither black nor white hides.
+/// Light behind a transparent pixel in [`triple`]: photographic middle grey, so that neither black
+/// nor white hides.
 const MIDDLE_GREY: f32 = 0.18;
 
 /// `(a - b) * scale` of every channel.
@@ -53,8 +54,9 @@ fn combined_pixels<P: NamedChannels>(
 
 /// `expected | 16 times the difference | actual`, side by side, to be looked at as one picture.
 ///
-/// Transparent pixels show middle grey. Differences of alpha are grey; where one picture is not a number and the other
-/// is, the difference is white. The sizes may differ: what one picture does not have is black.
+/// Transparent pixels show middle grey. Differences of alpha are grey; where one picture is not a
+/// number and the other is, the difference is white. The sizes may differ: what one picture does
+/// not have is black.
 pub fn triple<P: NamedChannels>(expected: &Image<P>, actual: &Image<P>) -> Image<LinearRgb> {
     let width = expected.width().max(actual.width());
     let height = expected.height().max(actual.height());
@@ -106,7 +108,7 @@ fn channel_or_zero(values: &[f32], c: usize) -> f32 {
 
 /// The distance of two values, magnified; 1 where one of them is not a number.
 fn magnified_error(u: f32, v: f32) -> f32 {
-    if u == v || (u.is_nan() && v.is_nan()) {
+    if is_same(u, v) {
         0.0
     } else if (u - v).is_nan() {
         1.0

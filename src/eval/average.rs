@@ -7,15 +7,21 @@ pub(super) const RECALL_POINTS: usize = 101;
 
 /// The area under the interpolated precision envelope, by trapezoids over 101 recalls.
 ///
-/// The curve starts at precision 1 for recall 0 and ends at precision 0 for recall 1, so a perfect detector has 0.995.
+/// The curve starts at precision 1 for recall 0 and ends at precision 0 for recall 1, so a perfect
+/// detector has 0.995.
 ///
 /// # Method
 /// As YOLOv5 computes it (its file `utils/metrics.py`, function `compute_ap`, method `interp`).
 pub(super) fn trapezoid(recall: &[f64], precision: &[f64]) -> f64 {
     let read = envelope_samples(recall, precision);
-    (0..RECALL_POINTS - 1)
-        .map(|i| (recall_at(i + 1) - recall_at(i)) * (read[i + 1] + read[i]) / 2.0)
-        .sum()
+    let strips = 0..RECALL_POINTS - 1;
+    strips.map(|i| strip_area(i, [read[i], read[i + 1]])).sum()
+}
+
+/// Between the `i`-th recall and the next one.
+#[inline]
+fn strip_area(i: usize, heights: [f64; 2]) -> f64 {
+    (recall_at(i + 1) - recall_at(i)) * (heights[1] + heights[0]) / 2.0
 }
 
 /// The envelope of the precision at each of the recalls, linear between its points.
@@ -35,7 +41,8 @@ fn with_ends(first: f64, values: &[f64], last: f64) -> Vec<f64> {
     [&[first], values, &[last]].concat()
 }
 
-/// The mean of the precision envelope at 101 recalls, each read at the first detection that reaches it.
+/// The mean of the precision envelope at 101 recalls, each read at the first detection that reaches
+/// it.
 ///
 /// # Method
 /// As the COCO tools compute it (`COCOeval.accumulate`).
@@ -48,10 +55,14 @@ pub(super) fn samples(recall: &[f64], precision: &[f64]) -> [f64; RECALL_POINTS]
     let mut ys = precision.to_vec();
     make_envelope(&mut ys);
     std::array::from_fn(|i| {
-        ys.get(recall.partition_point(|&r| r < recall_at(i)))
-            .copied()
-            .unwrap_or(0.0)
+        let reached = first_reaching(recall_at(i), recall);
+        ys.get(reached).copied().unwrap_or(0.0)
     })
+}
+
+#[inline]
+fn first_reaching(recall: f64, recalls: &[f64]) -> usize {
+    recalls.partition_point(|&r| r < recall)
 }
 
 /// Recall and precision after each detection, `epsilon` keeping the divisions defined.
@@ -60,17 +71,20 @@ pub(super) fn recall_and_precision(
     truths: f64,
     epsilon: [f64; 2],
 ) -> (Vec<f64>, Vec<f64>) {
-    let both = sums.right.iter().zip(&sums.wrong);
-    let recall = sums
-        .right
-        .iter()
-        .map(|right| right / (truths + epsilon[0]))
-        .collect();
     (
-        recall,
-        both.map(|(right, wrong)| right / (right + wrong + epsilon[1]))
-            .collect(),
+        recalls(sums, truths + epsilon[0]),
+        precisions(sums, epsilon[1]),
     )
+}
+
+fn recalls(sums: &Running, truths: f64) -> Vec<f64> {
+    sums.right.iter().map(|right| right / truths).collect()
+}
+
+fn precisions(sums: &Running, epsilon: f64) -> Vec<f64> {
+    let both = sums.right.iter().zip(&sums.wrong);
+    both.map(|(right, wrong)| right / (right + wrong + epsilon))
+        .collect()
 }
 
 /// Piecewise linear reading as NumPy's `interp` does it; the last of equal positions counts.
@@ -83,10 +97,15 @@ fn between(x: f64, after: usize, xs: &[f64], ys: &[f64]) -> f64 {
     match after {
         0 => ys[0],
         n if n == xs.len() => ys[n - 1],
-        // What the line below gives there, without its division.
+        // What the line gives there, without its division.
         n if ys[n] == ys[n - 1] => ys[n],
-        n => (ys[n] - ys[n - 1]) / (xs[n] - xs[n - 1]) * (x - xs[n - 1]) + ys[n - 1],
+        n => on_line(x, [xs[n - 1], xs[n]], [ys[n - 1], ys[n]]),
     }
+}
+
+#[inline]
+fn on_line(x: f64, xs: [f64; 2], ys: [f64; 2]) -> f64 {
+    (ys[1] - ys[0]) / (xs[1] - xs[0]) * (x - xs[0]) + ys[0]
 }
 
 /// Makes values the greatest of those that follow.

@@ -17,8 +17,8 @@ pub struct Interval {
     pub high: f64,
 }
 
-/// mAP@0.5:0.95 with its percentile bootstrap interval over images: `rounds` times, as many images are drawn with
-/// replacement as there are. The same seed gives the same interval.
+/// mAP@0.5:0.95 with its percentile bootstrap interval over images: `rounds` times, as many images
+/// are drawn with replacement as there are. The same seed gives the same interval.
 ///
 /// # Method
 /// [Efron 1979], percentile interval.
@@ -68,15 +68,24 @@ fn quantile(values: &[f64], q: f64) -> f64 {
 
 /// How often each of `count` things is drawn in `count` draws.
 pub(crate) fn drawn(count: usize, seed: u64, round: u64) -> Vec<u32> {
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    rng.set_stream(round);
+    let mut rng = round_generator(seed, round);
     let mut times = vec![0; count];
     for _ in 0..count {
-        // Multiply-shift: a bias below 2^-32 for any number of images that fits into memory.
-        let draw = (u128::from(rng.next_u64()) * count as u128) >> 64;
-        times[draw as usize] += 1;
+        times[index_below(count, &mut rng)] += 1;
     }
     times
+}
+
+fn round_generator(seed: u64, round: u64) -> ChaCha8Rng {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    rng.set_stream(round);
+    rng
+}
+
+fn index_below(count: usize, rng: &mut impl Rng) -> usize {
+    // Multiply-shift: a bias below 2^-32 for any number of images that fits into memory.
+    let draw = (u128::from(rng.next_u64()) * count as u128) >> 64;
+    draw as usize
 }
 
 #[cfg(test)]

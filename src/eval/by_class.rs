@@ -1,7 +1,10 @@
-//! The boxes of every class, image by image: each box is looked at once, however many classes there are.
+//! The boxes of every class, image by image: each box is looked at once, however many classes there
+//! are.
 
 use super::{Detection, EvalImage, GroundTruth};
 use rayon::prelude::*;
+use std::cmp::Ordering;
+use std::iter::Peekable;
 
 /// Where a box stands.
 #[derive(Clone, Copy)]
@@ -51,34 +54,41 @@ fn places<'a, C: Iterator<Item = u32>>(
     sheets: &'a [EvalImage],
     classes: impl Fn(&'a EvalImage) -> C,
 ) -> Vec<BoxPlace> {
-    let mut places = Vec::new();
-    for (sheet, boxes) in sheets.iter().enumerate() {
-        for (index, class) in classes(boxes).enumerate() {
-            places.push(BoxPlace {
-                class,
-                sheet,
-                index,
-            });
-        }
-    }
-    places
+    let numbered = sheets.iter().enumerate();
+    numbered
+        .flat_map(|(sheet, boxes)| places_on(sheet, classes(boxes)))
+        .collect()
+}
+
+fn places_on(sheet: usize, classes: impl Iterator<Item = u32>) -> impl Iterator<Item = BoxPlace> {
+    let numbered = classes.enumerate();
+    numbered.map(move |(index, class)| BoxPlace {
+        class,
+        sheet,
+        index,
+    })
+}
+
+fn truth_places(sheets: &[EvalImage]) -> Vec<BoxPlace> {
+    let mut truth = places(sheets, |sheet| sheet.truth.iter().map(|t| t.class));
+    // It keeps the order of equal ones.
+    truth.par_sort_by_key(|p| p.class);
+    truth
+}
+
+fn found_places(sheets: &[EvalImage]) -> Vec<BoxPlace> {
+    let mut found = places(sheets, |sheet| sheet.found.iter().map(|f| f.class));
+    // It keeps the order of equal ones.
+    found.par_sort_by(|a, b| a.cmp_detections(b, sheets));
+    found
 }
 
 impl<'a> ByClass<'a> {
     pub(super) fn new(sheets: &'a [EvalImage]) -> Self {
-        let mut truth = places(sheets, |sheet| sheet.truth.iter().map(|t| t.class));
-        let mut found = places(sheets, |sheet| sheet.found.iter().map(|f| f.class));
-        // Both sorts keep the order of equal ones.
-        truth.par_sort_by_key(|p| p.class);
-        found.par_sort_by(|a, b| {
-            (a.class, a.sheet)
-                .cmp(&(b.class, b.sheet))
-                .then_with(|| b.confidence(sheets).total_cmp(&a.confidence(sheets)))
-        });
         Self {
             sheets,
-            truth,
-            found,
+            truth: truth_places(sheets),
+            found: found_places(sheets),
         }
     }
 
@@ -86,13 +96,18 @@ impl<'a> ByClass<'a> {
     pub(super) fn classes<'s>(&'s self) -> Vec<ClassBoxes<'s>> {
         self.truth
             .chunk_by(|a, b| a.class == b.class)
-            .map(|truth| ClassBoxes {
-                class: truth[0].class,
-                sheets: self.sheets,
-                truth,
-                found: self.found_of(truth[0].class),
-            })
+            .map(|truth| self.boxes_with(truth))
             .collect()
+    }
+
+    /// The boxes of the class that all of this truth has.
+    fn boxes_with<'s>(&'s self, truth: &'s [BoxPlace]) -> ClassBoxes<'s> {
+        ClassBoxes {
+            class: truth[0].class,
+            sheets: self.sheets,
+            truth,
+            found: self.found_of(truth[0].class),
+        }
     }
 
     /// The detections of a class.
@@ -110,13 +125,11 @@ impl<'a> ClassBoxes<'a> {
         let mut found = self.found.chunk_by(BoxPlace::is_on_same_sheet).peekable();
         let mut images = Vec::new();
         while let Some(sheet) = first_sheet([truth.peek(), found.peek()]) {
-            let truth = truth.next_if(|places| places[0].sheet == sheet);
-            let found = found.next_if(|places| places[0].sheet == sheet);
             images.push(ImageBoxes::new(
                 sheet,
                 &self.sheets[sheet],
-                truth.unwrap_or_default(),
-                found.unwrap_or_default(),
+                next_on(sheet, &mut truth),
+                next_on(sheet, &mut found),
             ));
         }
         images
@@ -128,10 +141,26 @@ impl BoxPlace {
         self.sheet == other.sheet
     }
 
+    /// Of detections: by class and image, the surest first.
+    fn cmp_detections(&self, other: &Self, sheets: &[EvalImage]) -> Ordering {
+        (self.class, self.sheet)
+            .cmp(&(other.class, other.sheet))
+            .then_with(|| other.confidence(sheets).total_cmp(&self.confidence(sheets)))
+    }
+
     /// Of a detection.
     fn confidence(&self, sheets: &[EvalImage]) -> f64 {
         sheets[self.sheet].found[self.index].confidence
     }
+}
+
+/// The next boxes where they lie on this sheet.
+fn next_on<'a>(
+    sheet: usize,
+    places: &mut Peekable<impl Iterator<Item = &'a [BoxPlace]>>,
+) -> &'a [BoxPlace] {
+    let next = places.next_if(|places| places[0].sheet == sheet);
+    next.unwrap_or_default()
 }
 
 /// The first sheet that any of the next boxes lie on.

@@ -3,10 +3,10 @@
 use super::average::{mean_of_samples, recall_and_precision};
 use super::by_class::{ByClass, ImageBoxes};
 use super::overlap::{BoxIndex, area, intersection, share};
-use super::rank::{Hit, Marks, Ranking, marked};
+use super::rank::{Hit, Marks, Ranking};
 use super::{
-    ClassScores, Definition, Detection, EvalImage, GroundTruth, Scores, THRESHOLDS, mean,
-    thresholds,
+    ClassScores, Definition, Detection, EvalImage, GroundTruth, Scores, THRESHOLDS, check_weights,
+    mean, thresholds,
 };
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -72,16 +72,18 @@ impl AreaRange {
 /// # Panics
 /// When there are weights and not one per sheet.
 pub fn coco(sheets: &[EvalImage], weights: &[u32]) -> CocoScores {
-    assert!(
-        weights.is_empty() || weights.len() == sheets.len(),
-        "one weight per sheet"
-    );
-    let classes = ByClass::new(sheets);
-    let rankings = AreaRange::ALL.map(|range| rankings(&classes, range));
+    check_weights(weights, sheets.len());
+    let rankings = rankings_by_area(sheets);
     let measured = rankings
         .each_ref()
         .map(|rankings| measured(rankings, weights));
     CocoScores::from_measured(&measured)
+}
+
+/// For each of [`AreaRange::ALL`].
+fn rankings_by_area(sheets: &[EvalImage]) -> [Vec<Ranking>; 4] {
+    let classes = ByClass::new(sheets);
+    AreaRange::ALL.map(|range| rankings(&classes, range))
 }
 
 impl CocoScores {
@@ -92,10 +94,7 @@ impl CocoScores {
             ap_by_area: by_area.map(|m| over(m, |m| mean(m.ap))),
             ar_by_count: MAX_DETECTIONS.map(|count| over(all, |m| mean(m.recall_within(count)))),
             ar_by_area: by_area.map(|m| over(m, |m| mean(m.recall))),
-            scores: Scores {
-                definition: Definition::Coco,
-                classes: all.iter().map(Measured::scores).collect(),
-            },
+            scores: class_scores(all),
         }
     }
 }
@@ -109,12 +108,13 @@ pub(super) fn rankings(classes: &ByClass<'_>, range: AreaRange) -> Vec<Ranking> 
 }
 
 pub(super) fn scores(rankings: &[Ranking], weights: &[u32]) -> Scores {
+    class_scores(&measured(rankings, weights))
+}
+
+fn class_scores(measured: &[Measured<'_>]) -> Scores {
     Scores {
         definition: Definition::Coco,
-        classes: measured(rankings, weights)
-            .iter()
-            .map(Measured::scores)
-            .collect(),
+        classes: measured.iter().map(Measured::scores).collect(),
     }
 }
 
@@ -147,11 +147,8 @@ struct Measured<'a> {
 impl<'a> Measured<'a> {
     /// None for a class without an object in the range.
     fn new(ranking: &'a Ranking, weights: &'a [u32]) -> Option<Self> {
-        let truths = Some(ranking.truths(weights)).filter(|&truths| truths > 0.0)?;
-        let turns = ranking.turns(weights);
-        let curves = turns
-            .each_ref()
-            .map(|sums| recall_and_precision(sums, truths, [0.0, PRECISION_EPSILON]));
+        let truths = ranking.truths_to_find(weights)?;
+        let curves = curves_at_thresholds(ranking, weights, truths);
         let curves = curves.each_ref();
         Some(Self {
             ranking,
@@ -166,14 +163,18 @@ impl<'a> Measured<'a> {
     /// Recall with so many detections an image.
     fn recall_within(&self, count: usize) -> [f64; THRESHOLDS] {
         let mut right = [0.0; THRESHOLDS];
-        for (hit, weight) in self.ranking.counting(self.weights) {
-            if (hit.place as usize) < count {
-                for t in marked(hit.right & !hit.ignored) {
-                    right[t] += weight;
-                }
+        for (hit, weight) in self.surest(count) {
+            for t in hit.true_positives() {
+                right[t] += weight;
             }
         }
         right.map(|sum| sum / self.truths)
+    }
+
+    /// The surest detections of each image.
+    fn surest(&self, count: usize) -> impl Iterator<Item = (&Hit, f64)> {
+        let hits = self.ranking.counting(self.weights);
+        hits.filter(move |(hit, _)| (hit.place as usize) < count)
     }
 
     fn scores(&self) -> ClassScores {
@@ -203,24 +204,24 @@ struct Target<'a> {
     taken: Marks,
 }
 
-/// The detections of a class in one image, matched with its boxes, and how many boxes there are to be found.
+/// The detections of a class in one image, matched with its boxes, and how many boxes there are to
+/// be found.
 fn match_image(image: &ImageBoxes<'_>, range: AreaRange) -> (Vec<Hit>, usize) {
     let mut targets = targets_of(image, range);
+    let hits = match_targets(image, &mut targets, range);
+    (hits, targets.iter().filter(|t| !t.ignored).count())
+}
+
+/// The surest detections, each with the targets that it takes.
+fn match_targets(image: &ImageBoxes<'_>, targets: &mut [Target<'_>], range: AreaRange) -> Vec<Hit> {
     let index = BoxIndex::new(targets.iter().map(|t| t.truth.bbox));
     let surest = image.found.iter().take(MAX_DETECTIONS[2]).enumerate();
-    let hits = surest.map(|(place, found)| {
-        let overlaps = overlaps_with(found, &targets, &index);
-        let (right, ignored) = marks(found, &mut targets, &overlaps, range);
-        Hit {
-            confidence: found.confidence,
-            sheet: image.sheet,
-            place: place as u32,
-            right,
-            ignored,
-        }
-    });
-    let hits = hits.collect();
-    (hits, targets.iter().filter(|t| !t.ignored).count())
+    surest
+        .map(|(place, found)| {
+            let overlaps = overlaps_with(found, targets, &index);
+            Hit::new(image, place, marks(found, targets, &overlaps, range))
+        })
+        .collect()
 }
 
 /// Places of the targets near a detection, and how far they overlap it.
@@ -246,6 +247,11 @@ impl<'a> Target<'a> {
             taken: 0,
         }
     }
+
+    /// At a threshold. Any number of detections may lie in a crowd.
+    fn is_free(&self, bit: Marks) -> bool {
+        self.taken & bit == 0 || self.truth.crowd
+    }
 }
 
 /// Thresholds at which a detection finds something, and at which it is ignored.
@@ -254,7 +260,7 @@ fn marks(
     targets: &mut [Target<'_>],
     overlaps: &[(usize, f64)],
     range: AreaRange,
-) -> (Marks, Marks) {
+) -> [Marks; 2] {
     let (mut right, mut ignored) = (0, 0);
     for (i, threshold) in thresholds().into_iter().enumerate() {
         let bit: Marks = 1 << i;
@@ -271,11 +277,11 @@ fn marks(
             None => {}
         }
     }
-    (right, ignored)
+    [right, ignored]
 }
 
-/// The free target with the greatest overlap from `threshold` on, the last of equal ones; those that count before
-/// ignored ones.
+/// The free target with the greatest overlap from `threshold` on, the last of equal ones; those
+/// that count before ignored ones.
 fn nearest(
     targets: &[Target<'_>],
     overlaps: &[(usize, f64)],
@@ -286,7 +292,7 @@ fn nearest(
     let mut best: Option<usize> = None;
     for &(k, overlap) in overlaps {
         let target = &targets[k];
-        if target.taken & bit != 0 && !target.truth.crowd {
+        if !target.is_free(bit) {
             continue;
         }
         if target.ignored && best.is_some_and(|b| !targets[b].ignored) {
@@ -302,15 +308,32 @@ fn nearest(
 /// Intersection over union; over the detection's own area where the truth is a crowd.
 fn overlap(found: &Detection, truth: &GroundTruth) -> f64 {
     let shared = intersection(&found.bbox, &truth.bbox);
-    let whole = match truth.crowd {
+    share(shared, whole_area(found, truth, shared))
+}
+
+/// What the shared area is measured against: in a crowd the detection alone.
+fn whole_area(found: &Detection, truth: &GroundTruth, shared: f64) -> f64 {
+    match truth.crowd {
         true => area(&found.bbox),
         false => area(&found.bbox) + area(&truth.bbox) - shared,
-    };
-    share(shared, whole)
+    }
 }
 
 fn last_of(values: &[f64]) -> f64 {
     values.last().copied().unwrap_or(0.0)
+}
+
+/// Recall and precision of a class after each detection, at every threshold.
+fn curves_at_thresholds(
+    ranking: &Ranking,
+    weights: &[u32],
+    truths: f64,
+) -> [(Vec<f64>, Vec<f64>); THRESHOLDS] {
+    let turns = ranking.turns(weights);
+    let epsilon = [0.0, PRECISION_EPSILON];
+    turns
+        .each_ref()
+        .map(|sums| recall_and_precision(sums, truths, epsilon))
 }
 
 #[cfg(test)]

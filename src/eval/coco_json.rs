@@ -69,8 +69,8 @@ pub struct CocoTruth {
 /// Reads `instances.json`: `images`, `annotations` (`bbox` as x, y, width, height), `categories`.
 ///
 /// # Errors
-/// [`Error::File`] for a file that is not such a document; [`Error::Field`] for an id that is there twice, an annotation
-/// of an unknown image or category, or a box that cannot be one.
+/// [`Error::File`] for a file that is not such a document; [`Error::Field`] for an id that is there
+/// twice, an annotation of an unknown image or category, or a box that cannot be one.
 pub fn read_coco_truth(path: &Path) -> Result<CocoTruth> {
     CocoTruth::new(&io::read_json_data(path)?).map_err(|e| e.in_file(path))
 }
@@ -96,18 +96,22 @@ pub(crate) fn sheets_of(truth: &str, found: &str) -> Result<Vec<EvalImage>> {
 
 impl CocoTruth {
     fn new(document: &CocoDocument) -> Result<Self> {
-        let images = places("images", document.images.iter().map(|image| image.id))?;
-        let categories = places("categories", document.categories.iter().map(|c| c.id))?;
-        let records: Vec<&ImageRecord> = images.values().map(|&i| &document.images[i]).collect();
-        let mut truth = Self {
+        let mut truth = Self::without_annotations(document)?;
+        truth.add_annotations(&document.annotations)?;
+        Ok(truth)
+    }
+
+    fn without_annotations(document: &CocoDocument) -> Result<Self> {
+        let images = document.image_places()?;
+        let categories = document.category_places()?;
+        let records = document.images_at(images.values());
+        Ok(Self {
             sheets: records.iter().map(|image| image.to_sheet()).collect(),
             classes: document.category_names(categories.values()),
             files: records.iter().map(|image| image.file()).collect(),
             images: images.keys().copied().zip(0..).collect(),
             categories: categories.into_keys().zip(0..).collect(),
-        };
-        truth.add_annotations(&document.annotations)?;
-        Ok(truth)
+        })
     }
 
     fn add_annotations(&mut self, annotations: &[CocoAnnotation]) -> Result<()> {
@@ -119,15 +123,8 @@ impl CocoTruth {
     }
 
     fn add_annotation(&mut self, annotation: &CocoAnnotation) -> Result<()> {
-        let (image, class) = self.place(annotation.image_id, annotation.category_id)?;
-        let bbox = corners(annotation.bbox)?;
-        let [_, _, width, height] = annotation.bbox;
-        self.sheets[image].truth.push(GroundTruth {
-            class,
-            bbox,
-            area: annotation.area.unwrap_or(width * height),
-            crowd: annotation.iscrowd != 0,
-        });
+        let (sheet, class) = self.sheet_mut(annotation.image_id, annotation.category_id)?;
+        sheet.truth.push(annotation.to_truth(class)?);
         Ok(())
     }
 
@@ -140,32 +137,28 @@ impl CocoTruth {
     }
 
     fn add_detection(&mut self, found: &CocoDetection) -> Result<()> {
-        let (image, class) = self.place(found.image_id, found.category_id)?;
-        let detection = Detection {
-            class,
-            bbox: corners(found.bbox)?,
-            confidence: found.score,
-        };
-        self.sheets[image].found.push(detection);
+        let (sheet, class) = self.sheet_mut(found.image_id, found.category_id)?;
+        sheet.found.push(found.to_detection(class)?);
         Ok(())
     }
 
+    /// The sheet of an image, and the class of a category.
+    fn sheet_mut(&mut self, image: i64, category: i64) -> Result<(&mut EvalImage, u32)> {
+        let (place, class) = self.place(image, category)?;
+        Ok((&mut self.sheets[place], class))
+    }
+
     fn place(&self, image: i64, category: i64) -> Result<(usize, u32)> {
-        let index = self.images.get(&image);
-        let class = self.categories.get(&category);
         Ok((
-            *index.ok_or_else(|| unlisted("image_id", image))?,
-            *class.ok_or_else(|| unlisted("category_id", category))?,
+            look_up(&self.images, "image_id", image)?,
+            look_up(&self.categories, "category_id", category)?,
         ))
     }
 
-    /// Where the images are: in `folder`, or where COCO and petcomp have them for a document at `path`. A file name that
-    /// leads out of a folder leads nowhere.
+    /// Where the images are: in `folder`, or where COCO and petcomp have them for a document at
+    /// `path`. A file name that leads out of a folder leads nowhere.
     pub fn pictures(&self, path: &Path, folder: Option<&Path>) -> Vec<Option<Picture>> {
-        let roots = match folder {
-            Some(folder) => vec![folder.to_path_buf()],
-            None => image_folders(path),
-        };
+        let roots = picture_roots(path, folder);
         let files = self.files.iter();
         files
             .map(|(name, size)| find_picture(&roots, name, *size))
@@ -176,20 +169,36 @@ impl CocoTruth {
 /// Folders that may hold the images of `annotations/instances_val2017.json`.
 fn image_folders(path: &Path) -> Vec<PathBuf> {
     let folder = path.parent().unwrap_or(Path::new(""));
-    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    let part = stem.rsplit('_').next().unwrap_or_default();
+    let part = last_word(path);
     [folder.to_path_buf(), folder.join("..")]
         .iter()
-        .flat_map(|root| {
-            let images = root.join("images");
-            [
-                root.clone(),
-                images.clone(),
-                root.join(part),
-                images.join(part),
-            ]
-        })
+        .flat_map(|root| folders_below(root, &part))
         .collect()
+}
+
+/// Where the images may be: in the folder that is given, or near the document.
+fn picture_roots(document: &Path, folder: Option<&Path>) -> Vec<PathBuf> {
+    match folder {
+        Some(folder) => vec![folder.to_path_buf()],
+        None => image_folders(document),
+    }
+}
+
+fn folders_below(root: &Path, part: &str) -> [PathBuf; 4] {
+    let images = root.join("images");
+    [
+        root.to_path_buf(),
+        images.clone(),
+        root.join(part),
+        images.join(part),
+    ]
+}
+
+/// Of a file's name without extension: what follows its last underscore.
+fn last_word(path: &Path) -> String {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let word = stem.rsplit('_').next();
+    word.unwrap_or_default().to_owned()
 }
 
 /// The image of this name below one of the folders, and its size where that is known.
@@ -197,10 +206,14 @@ fn find_picture(roots: &[PathBuf], name: &str, size: Option<[f64; 2]>) -> Option
     if !is_below(name) {
         return None;
     }
-    let mut paths = roots.iter().map(|root| root.join(name));
-    let path = paths.find(|path| path.is_file())?;
+    let path = existing_file(roots, name)?;
     let size = size.or_else(|| stored_size(&path))?;
     Some(Picture { path, size })
+}
+
+fn existing_file(roots: &[PathBuf], name: &str) -> Option<PathBuf> {
+    let mut paths = roots.iter().map(|root| root.join(name));
+    paths.find(|path| path.is_file())
 }
 
 /// A path that stays below the folder that it is joined to.
@@ -223,20 +236,31 @@ fn places(list: &str, ids: impl Iterator<Item = i64>) -> Result<BTreeMap<i64, us
     let mut places = BTreeMap::new();
     for (i, id) in ids.enumerate() {
         if let Some(first) = places.insert(id, i) {
-            let what = format!("{id}, as of {list}[{first}], expected another");
-            return Err(Error::value(format!("{list}[{i}].id"), what));
+            return Err(repeated_id(list, i, id, first));
         }
     }
     Ok(places)
 }
 
+fn repeated_id(list: &str, i: usize, id: i64, first: usize) -> Error {
+    let what = format!("{id}, as of {list}[{first}], expected another");
+    Error::value(format!("{list}[{i}].id"), what)
+}
+
+fn look_up<T: Copy>(places: &BTreeMap<i64, T>, field: &str, id: i64) -> Result<T> {
+    places.get(&id).copied().ok_or_else(|| unlisted(field, id))
+}
+
 impl ImageRecord {
     fn file(&self) -> (String, Option<[f64; 2]>) {
-        let name = match self.file_name.as_str() {
+        (self.listed_name().to_owned(), self.size())
+    }
+
+    fn listed_name(&self) -> &str {
+        match self.file_name.as_str() {
             "" => self.coco_url.rsplit('/').next().unwrap_or_default(),
             name => name,
-        };
-        (name.to_owned(), self.size())
+        }
     }
 
     fn size(&self) -> Option<[f64; 2]> {
@@ -250,8 +274,7 @@ impl ImageRecord {
 
     /// The file's name without folder and extension; the id of an image without a file.
     fn name(&self) -> String {
-        let (file, _) = self.file();
-        match Path::new(&file).file_stem() {
+        match Path::new(self.listed_name()).file_stem() {
             Some(stem) => stem.to_string_lossy().into_owned(),
             None => self.id.to_string(),
         }
@@ -265,20 +288,65 @@ fn corners([x, y, w, h]: [f64; 4]) -> Result<BBox> {
         x1: x + w,
         y1: y + h,
     };
-    let sides = [bbox.x0, bbox.y0, bbox.x1, bbox.y1];
-    if sides.iter().all(|v| v.abs() <= FARTHEST_PX) && w >= 0.0 && h >= 0.0 {
+    if is_near(&bbox) && w >= 0.0 && h >= 0.0 {
         return Ok(bbox);
     }
+    Err(impossible_box([x, y, w, h]))
+}
+
+fn is_near(b: &BBox) -> bool {
+    let sides = [b.x0, b.y0, b.x1, b.y1];
+    sides.iter().all(|v| v.abs() <= FARTHEST_PX)
+}
+
+fn impossible_box(bbox: [f64; 4]) -> Error {
     let what = format!(
-        "{:?}, expected x, y, width and height of at least 0, all within {FARTHEST_PX} pixels",
-        [x, y, w, h]
+        "{bbox:?}, expected x, y, width and height of at least 0, all within {FARTHEST_PX} pixels"
     );
-    Err(Error::value("bbox", what))
+    Error::value("bbox", what)
+}
+
+impl CocoAnnotation {
+    fn to_truth(&self, class: u32) -> Result<GroundTruth> {
+        Ok(GroundTruth {
+            class,
+            bbox: corners(self.bbox)?,
+            area: self.mask_or_box_area(),
+            crowd: self.iscrowd != 0,
+        })
+    }
+
+    fn mask_or_box_area(&self) -> f64 {
+        let [_, _, width, height] = self.bbox;
+        self.area.unwrap_or(width * height)
+    }
+}
+
+impl CocoDetection {
+    fn to_detection(&self, class: u32) -> Result<Detection> {
+        Ok(Detection {
+            class,
+            bbox: corners(self.bbox)?,
+            confidence: self.score,
+        })
+    }
 }
 
 impl CocoDocument {
     fn category_names<'a>(&self, places: impl Iterator<Item = &'a usize>) -> Vec<String> {
         places.map(|&i| self.categories[i].name.clone()).collect()
+    }
+
+    fn images_at<'a>(&self, places: impl Iterator<Item = &'a usize>) -> Vec<&ImageRecord> {
+        places.map(|&i| &self.images[i]).collect()
+    }
+
+    fn image_places(&self) -> Result<BTreeMap<i64, usize>> {
+        places("images", self.images.iter().map(|image| image.id))
+    }
+
+    fn category_places(&self) -> Result<BTreeMap<i64, usize>> {
+        places("categories", self.categories.iter().map(|c| c.id))
     }
 }
 

@@ -1,11 +1,12 @@
 //! Which class is found where which is true.
 
 use super::EvalImage;
-use super::pairing::pairs;
+use super::pairing::{BoxPair, pairs};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// How often each class was found where each was true; no class is the background. What never happened takes no room.
+/// How often each class was found where each was true; no class is the background. What never
+/// happened takes no room.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Confusion {
     /// Found and true class, none for the background, and how often.
@@ -31,21 +32,30 @@ impl Default for ConfusionOptions {
     }
 }
 
+/// Of the detection and of the box that it names.
+fn classes_in(sheet: &EvalImage, pair: BoxPair) -> [Option<u32>; 2] {
+    [
+        pair.found.map(|f| sheet.found[f].class),
+        pair.truth.map(|t| sheet.truth[t].class),
+    ]
+}
+
 impl Confusion {
-    /// Counts over all images, whatever the classes of two boxes that overlap. Pairs are made from the greatest overlap
-    /// down; crowds, and detections in them, are ignored.
+    /// Counts over all images, whatever the classes of two boxes that overlap. Pairs are made from
+    /// the greatest overlap down; crowds, and detections in them, are ignored.
     pub fn new(sheets: &[EvalImage], options: &ConfusionOptions) -> Self {
         let mut confusion = Self::default();
         for sheet in sheets {
-            for pair in pairs(sheet, options) {
-                let key = [
-                    pair.found.map(|f| sheet.found[f].class),
-                    pair.truth.map(|t| sheet.truth[t].class),
-                ];
-                *confusion.counts.entry(key).or_default() += 1;
-            }
+            confusion.add_sheet(sheet, options);
         }
         confusion
+    }
+
+    fn add_sheet(&mut self, sheet: &EvalImage, options: &ConfusionOptions) {
+        for pair in pairs(sheet, options) {
+            let classes = classes_in(sheet, pair);
+            *self.counts.entry(classes).or_default() += 1;
+        }
     }
 
     /// How often `found` was found where `truth` is.
@@ -58,8 +68,8 @@ impl Confusion {
         self.counts.keys().flatten().flatten().copied().collect()
     }
 
-    /// The classes that occur, those first with the most boxes missed, found where nothing is, or confused with another class;
-    /// of equal ones those first with the most boxes.
+    /// The classes that occur, those first with the most boxes missed, found where nothing is, or
+    /// confused with another class; of equal ones those first with the most boxes.
     pub fn worst(&self) -> Vec<u32> {
         let sums = self.sums_by_class();
         let mut classes: Vec<u32> = sums.keys().copied().collect();

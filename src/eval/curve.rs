@@ -43,13 +43,19 @@ pub(super) fn from_rankings(rankings: &[Ranking]) -> Curves {
 
 fn precision_recall(ranked: &Ranked<'_>) -> Vec<[f64; 2]> {
     let pairs = ranked.recall.iter().zip(&ranked.precision);
-    let count = pairs.len();
-    let step = count.div_ceil(RECALL_POINTS).max(1);
-    pairs
-        .enumerate()
-        .filter(|(i, _)| i % step == 0 || i + 1 == count)
-        .map(|(_, (&recall, &precision))| [recall, precision])
+    thinned(pairs)
+        .map(|(&recall, &precision)| [recall, precision])
         .collect()
+}
+
+/// About [`RECALL_POINTS`] of the points, evenly, and the last.
+fn thinned<T>(points: impl ExactSizeIterator<Item = T>) -> impl Iterator<Item = T> {
+    let count = points.len();
+    let step = count.div_ceil(RECALL_POINTS).max(1);
+    points
+        .enumerate()
+        .filter(move |(i, _)| i % step == 0 || i + 1 == count)
+        .map(|(_, point)| point)
 }
 
 fn mean_precision(ranked: &[Ranked<'_>]) -> Vec<[f64; 2]> {

@@ -3,10 +3,11 @@
 use super::by_class::ByClass;
 use super::coco::{self, AreaRange};
 use super::rank::Ranking;
-use super::{Curves, Definition, EvalImage, Scores, curve, mean, yolov5};
+use super::{Curves, Definition, EvalImage, Scores, check_weights, curve, mean, yolov5};
 use rayon::prelude::*;
 
-/// Detections matched with the truth once, which is what takes long: they can be scored for any weights of the images.
+/// Detections matched with the truth once, which is what takes long: they can be scored for any
+/// weights of the images.
 #[derive(Clone, Debug)]
 pub struct Matches {
     definition: Definition,
@@ -17,14 +18,10 @@ pub struct Matches {
 impl Matches {
     /// Matches all detections with the truth.
     pub fn new(sheets: &[EvalImage], definition: Definition) -> Self {
-        let rankings = match definition {
-            Definition::Yolov5 => yolov5::rankings(sheets),
-            Definition::Coco => coco::rankings(&ByClass::new(sheets), AreaRange::All),
-        };
         Self {
             definition,
             images: sheets.len(),
-            rankings,
+            rankings: rankings_by(definition, sheets),
         }
     }
 
@@ -51,15 +48,9 @@ impl Matches {
     /// When there are weights and not one per image.
     pub fn map(&self, weights: &[u32]) -> f64 {
         self.check(weights);
-        let average_precision = match self.definition {
-            Definition::Yolov5 => yolov5::average_precision,
-            Definition::Coco => coco::average_precision,
-        };
-        let each: Vec<f64> = self
-            .rankings
-            .par_iter()
-            .filter_map(|r| average_precision(r, weights))
-            .map(mean)
+        let rankings = self.rankings.par_iter();
+        let each: Vec<f64> = rankings
+            .filter_map(|ranking| self.class_map(ranking, weights))
             .collect();
         mean(each)
     }
@@ -69,11 +60,25 @@ impl Matches {
         curve::from_rankings(&self.rankings)
     }
 
+    /// Mean over the thresholds of a class' average precision.
+    fn class_map(&self, ranking: &Ranking, weights: &[u32]) -> Option<f64> {
+        let average_precision = match self.definition {
+            Definition::Yolov5 => yolov5::average_precision(ranking, weights),
+            Definition::Coco => coco::average_precision(ranking, weights),
+        };
+        average_precision.map(mean)
+    }
+
     fn check(&self, weights: &[u32]) {
-        assert!(
-            weights.is_empty() || weights.len() == self.images,
-            "one weight per sheet"
-        );
+        check_weights(weights, self.images);
+    }
+}
+
+/// The detections of every class, ranked as a definition matches them.
+fn rankings_by(definition: Definition, sheets: &[EvalImage]) -> Vec<Ranking> {
+    match definition {
+        Definition::Yolov5 => yolov5::rankings(sheets),
+        Definition::Coco => coco::rankings(&ByClass::new(sheets), AreaRange::All),
     }
 }
 

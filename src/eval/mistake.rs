@@ -1,7 +1,7 @@
 //! What a detector got wrong, box by box.
 
 use super::overlap::{BoxIndex, iou};
-use super::pairing::pairs;
+use super::pairing::{BoxPair, pairs};
 use super::{ConfusionOptions, EvalImage};
 use rayon::prelude::*;
 use std::cmp::Ordering;
@@ -32,14 +32,20 @@ pub struct Mistake {
     pub iou: f64,
 }
 
-/// All mistakes by the pairs that a [`Confusion`](super::Confusion) counts, the worst first: of detections the surest,
-/// of misses the box with the most area that no detection covers.
+/// All mistakes by the pairs that a [`Confusion`](super::Confusion) counts, the worst first: of
+/// detections the surest, of misses the box with the most area that no detection covers.
 pub fn mistakes(sheets: &[EvalImage], options: &ConfusionOptions) -> Vec<Mistake> {
-    let numbered = sheets.par_iter().enumerate();
-    let rated = numbered.flat_map_iter(|(i, sheet)| rated_mistakes(i, sheet, options));
-    let mut all: Vec<(f64, Mistake)> = rated.collect();
+    let mut all = all_rated(sheets, options);
     all.sort_by(worst_first);
     all.into_iter().map(|(_, mistake)| mistake).collect()
+}
+
+/// With the severity of each.
+fn all_rated(sheets: &[EvalImage], options: &ConfusionOptions) -> Vec<(f64, Mistake)> {
+    let numbered = sheets.par_iter().enumerate();
+    numbered
+        .flat_map_iter(|(i, sheet)| rated_mistakes(i, sheet, options))
+        .collect()
 }
 
 fn rated_mistakes(
@@ -76,56 +82,68 @@ impl<'a> MistakeFinder<'a> {
         Self {
             place,
             sheet,
-            truth: BoxIndex::new(sheet.truth.iter().map(|t| t.bbox)),
-            found: BoxIndex::new(sheet.found.iter().map(|f| f.bbox)),
+            truth: BoxIndex::for_truth(sheet),
+            found: BoxIndex::for_found(sheet),
         }
     }
 
     fn find(&self, options: &ConfusionOptions) -> Vec<Mistake> {
         pairs(self.sheet, options)
             .into_iter()
-            .filter_map(|pair| match (pair.found, pair.truth) {
-                (Some(f), Some(t)) => self.wrong_class(f, t),
-                (Some(f), None) => Some(self.false_alarm(f)),
-                (None, Some(t)) => Some(self.missed(t)),
-                (None, None) => None,
-            })
+            .filter_map(|pair| self.mistake_in(pair))
             .collect()
+    }
+
+    fn mistake_in(&self, pair: BoxPair) -> Option<Mistake> {
+        match (pair.found, pair.truth) {
+            (Some(f), Some(t)) => self.wrong_class(f, t),
+            (Some(f), None) => Some(self.false_alarm(f)),
+            (None, Some(t)) => Some(self.missed(t)),
+            (None, None) => None,
+        }
     }
 
     fn wrong_class(&self, f: usize, t: usize) -> Option<Mistake> {
         let is_wrong = self.sheet.found[f].class != self.sheet.truth[t].class;
-        is_wrong.then(|| Mistake {
-            sheet: self.place,
-            kind: MistakeKind::WrongClass,
-            found: Some(f),
-            truth: Some(t),
-            iou: self.overlap(f, t),
-        })
+        let pair = [Some(f), Some(t)];
+        is_wrong.then(|| self.mistake(MistakeKind::WrongClass, pair, self.overlap(f, t)))
     }
 
     fn false_alarm(&self, f: usize) -> Mistake {
-        let near = self.truth.near(&self.sheet.found[f].bbox);
-        let nearest = greatest(near, |t| self.overlap(f, t));
-        Mistake {
-            sheet: self.place,
-            kind: MistakeKind::FalseAlarm,
-            found: Some(f),
-            truth: nearest.map(|(t, _)| t),
-            iou: nearest.map_or(0.0, |(_, iou)| iou),
-        }
+        let (truth, iou) = self.nearest_truth(f).unzip();
+        self.mistake(
+            MistakeKind::FalseAlarm,
+            [Some(f), truth],
+            iou.unwrap_or(0.0),
+        )
     }
 
     fn missed(&self, t: usize) -> Mistake {
-        let near = self.found.near(&self.sheet.truth[t].bbox);
-        let nearest = greatest(near, |f| self.overlap(f, t));
+        let (found, iou) = self.nearest_found(t).unzip();
+        self.mistake(MistakeKind::Missed, [found, Some(t)], iou.unwrap_or(0.0))
+    }
+
+    fn mistake(&self, kind: MistakeKind, pair: [Option<usize>; 2], iou: f64) -> Mistake {
+        let [found, truth] = pair;
         Mistake {
             sheet: self.place,
-            kind: MistakeKind::Missed,
-            found: nearest.map(|(f, _)| f),
-            truth: Some(t),
-            iou: nearest.map_or(0.0, |(_, iou)| iou),
+            kind,
+            found,
+            truth,
+            iou,
         }
+    }
+
+    /// The box that a detection overlaps most, and how much.
+    fn nearest_truth(&self, f: usize) -> Option<(usize, f64)> {
+        let near = self.truth.near(&self.sheet.found[f].bbox);
+        greatest(near, |t| self.overlap(f, t))
+    }
+
+    /// The detection that overlaps a box most, and how much.
+    fn nearest_found(&self, t: usize) -> Option<(usize, f64)> {
+        let near = self.found.near(&self.sheet.truth[t].bbox);
+        greatest(near, |f| self.overlap(f, t))
     }
 
     fn overlap(&self, f: usize, t: usize) -> f64 {

@@ -1,9 +1,9 @@
 //! Eval: how well the boxes of a detector match the truth.
 //!
-//! Average precision has two definitions in use, and they differ by more than rounding: [`Definition::Yolov5`]
-//! integrates a precision curve over 101 points, [`Definition::Coco`] averages 101 readings of it, looks at no more
-//! than 100 detections an image and knows boxes that are ignored. Both are computed here from the same
-//! [`EvalImage`]s, one per image.
+//! Average precision has two definitions in use, and they differ by more than rounding:
+//! [`Definition::Yolov5`] integrates a precision curve over 101 points, [`Definition::Coco`]
+//! averages 101 readings of it, looks at no more than 100 detections an image and knows boxes that
+//! are ignored. Both are computed here from the same [`EvalImage`]s, one per image.
 //!
 //! ```
 //! use petcomp::eval::{Definition, Detection, EvalImage, GroundTruth, evaluate};
@@ -133,7 +133,8 @@ pub struct Picture {
     pub size: [f64; 2],
 }
 
-/// Boxes lie within so many pixels of the picture's corner: areas then are numbers, and so are overlaps.
+/// Boxes lie within so many pixels of the picture's corner: areas then are numbers, and so are
+/// overlaps.
 const FARTHEST_PX: f64 = 1e9;
 
 /// Which average precision is meant.
@@ -143,7 +144,8 @@ pub enum Definition {
     /// The trapezoid over 101 interpolated points, as YOLOv5 computes it.
     #[default]
     Yolov5,
-    /// The mean of 101 samples of the precision curve, at most 100 detections an image, as the COCO tools compute it.
+    /// The mean of 101 samples of the precision curve, at most 100 detections an image, as the COCO
+    /// tools compute it.
     Coco,
 }
 
@@ -195,8 +197,8 @@ impl ClassScores {
 
 /// Scores by the definition asked for; the names of the classes are not needed.
 ///
-/// `weights` says how often each image counts; empty means once. Confidences that are equal rank in the order of
-/// images, and within one as given.
+/// `weights` says how often each image counts; empty means once. Confidences that are equal rank in
+/// the order of images, and within one as given.
 ///
 /// # Panics
 /// When there are weights and not one per sheet.
@@ -223,11 +225,26 @@ fn mean(values: impl IntoIterator<Item = f64>) -> f64 {
         sum += value;
         count += 1;
     }
-    if count == 0 {
-        0.0
-    } else {
-        sum / f64::from(count)
-    }
+    overlap::share(sum, f64::from(count))
+}
+
+/// The lines of a text that are not blank, with their places in it.
+fn filled_lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
+    let lines = text.lines().enumerate();
+    lines.filter(|(_, line)| !line.trim().is_empty())
+}
+
+fn in_line(i: usize, what: &str) -> String {
+    format!("line {}: {what}", i + 1)
+}
+
+/// # Panics
+/// When there are weights and not one per sheet.
+fn check_weights(weights: &[u32], sheets: usize) {
+    assert!(
+        weights.is_empty() || weights.len() == sheets,
+        "one weight per sheet"
+    );
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! How much two boxes share.
 
+use super::EvalImage;
 use crate::geom::BBox;
 
 /// Intersection over union; 0 where the union is empty.
@@ -47,15 +48,19 @@ impl BoxIndex {
         } else {
             Vec::new()
         };
-        let reach = order.iter().scan(f64::NEG_INFINITY, |reach, &i| {
-            *reach = reach.max(boxes[i].x1);
-            Some(*reach)
-        });
         Self {
-            reach: reach.collect(),
+            reach: running_right_edges(&boxes, &order),
             order,
             boxes,
         }
+    }
+
+    pub(super) fn for_truth(sheet: &EvalImage) -> Self {
+        Self::new(sheet.truth.iter().map(|t| t.bbox))
+    }
+
+    pub(super) fn for_found(sheet: &EvalImage) -> Self {
+        Self::new(sheet.found.iter().map(|f| f.bbox))
     }
 
     /// Those that share more than an edge with a box, in order.
@@ -64,13 +69,27 @@ impl BoxIndex {
             let all = 0..self.boxes.len();
             return all.filter(|&i| self.boxes[i].overlaps(b)).collect();
         }
-        let end = self.order.partition_point(|&i| self.boxes[i].x0 < b.x1);
-        let start = self.reach[..end].partition_point(|&reach| reach <= b.x0);
-        let mut near = self.order[start..end].to_vec();
+        let mut near = self.side_by_side(b).to_vec();
         near.retain(|&i| self.boxes[i].overlaps(b));
         near.sort_unstable();
         near
     }
+
+    /// All boxes that may share columns with one, from the left.
+    fn side_by_side(&self, b: &BBox) -> &[usize] {
+        let end = self.order.partition_point(|&i| self.boxes[i].x0 < b.x1);
+        let start = self.reach[..end].partition_point(|&reach| reach <= b.x0);
+        &self.order[start..end]
+    }
+}
+
+/// How far to the right the boxes reach up to each in the order.
+fn running_right_edges(boxes: &[BBox], order: &[usize]) -> Vec<f64> {
+    let edges = order.iter().scan(f64::NEG_INFINITY, |reach, &i| {
+        *reach = reach.max(boxes[i].x1);
+        Some(*reach)
+    });
+    edges.collect()
 }
 
 /// Places of the boxes, from the leftmost.

@@ -2,23 +2,22 @@
 
 use super::overlap::{BoxIndex, area, intersection, iou, share};
 use super::{ConfusionOptions, EvalImage};
+use crate::geom::BBox;
 use std::collections::BinaryHeap;
 
-/// A detection and the box that it names, by their places in the sheet: without a box it is a false alarm, without a
-/// detection a miss.
+/// A detection and the box that it names, by their places in the sheet: without a box it is a false
+/// alarm, without a detection a miss.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct BoxPair {
     pub(super) found: Option<usize>,
     pub(super) truth: Option<usize>,
 }
 
-/// Every detection and every box that counts, once. Pairs are made from the greatest overlap down; detections in a
-/// crowd are ignored.
+/// Every detection and every box that counts, once. Pairs are made from the greatest overlap down;
+/// detections in a crowd are ignored.
 pub(super) fn pairs(sheet: &EvalImage, options: &ConfusionOptions) -> Vec<BoxPair> {
     let mut search = PairSearch::new(sheet, options);
-    let sure: Vec<usize> = (0..sheet.found.len())
-        .filter(|&f| sheet.found[f].confidence > options.confidence)
-        .collect();
+    let sure = sure_detections(sheet, options.confidence);
     let matched = search.match_boxes(&sure);
     let pairs = sure.iter().map(|&f| BoxPair {
         found: Some(f),
@@ -30,8 +29,16 @@ pub(super) fn pairs(sheet: &EvalImage, options: &ConfusionOptions) -> Vec<BoxPai
         .collect()
 }
 
-/// A detection and the free box that it overlaps most. The greatest comes first: of equal overlaps the first box, then
-/// the first detection.
+/// The places of those surer than this.
+fn sure_detections(sheet: &EvalImage, confidence: f64) -> Vec<usize> {
+    let places = 0..sheet.found.len();
+    places
+        .filter(|&f| sheet.found[f].confidence > confidence)
+        .collect()
+}
+
+/// A detection and the free box that it overlaps most. The greatest comes first: of equal overlaps
+/// the first box, then the first detection.
 #[derive(Clone, Copy, PartialEq)]
 struct PairCandidate {
     overlap: f64,
@@ -63,10 +70,9 @@ struct PairSearch<'a> {
 
 impl<'a> PairSearch<'a> {
     fn new(sheet: &'a EvalImage, options: &ConfusionOptions) -> Self {
-        let index = BoxIndex::new(sheet.truth.iter().map(|t| t.bbox));
         Self {
             sheet,
-            index,
+            index: BoxIndex::for_truth(sheet),
             taken: vec![false; sheet.truth.len()],
             min_iou: options.iou,
         }
@@ -79,7 +85,8 @@ impl<'a> PairSearch<'a> {
         let mut matched = vec![None; self.sheet.found.len()];
         while let Some(PairCandidate { truth, found, .. }) = open.pop() {
             if self.taken[truth] {
-                // Its box has been taken; boxes only get fewer, so its next one is no better than this was.
+                // Its box has been taken; boxes only get fewer, so its next one is no better than
+                // this was.
                 open.extend(self.best(found));
             } else {
                 self.taken[truth] = true;
@@ -92,37 +99,52 @@ impl<'a> PairSearch<'a> {
     /// The boxes that no detection names.
     fn missed(&self) -> impl Iterator<Item = BoxPair> {
         (0..self.sheet.truth.len())
-            .filter(|&t| !self.taken[t] && !self.sheet.truth[t].crowd)
+            .filter(|&t| self.is_open(t))
             .map(|t| BoxPair {
                 found: None,
                 truth: Some(t),
             })
     }
 
+    /// Whether a box is still to be found.
+    fn is_open(&self, t: usize) -> bool {
+        !self.taken[t] && !self.sheet.truth[t].crowd
+    }
+
     fn best(&self, found: usize) -> Option<PairCandidate> {
-        let bbox = &self.sheet.found[found].bbox;
-        self.index
-            .near(bbox)
-            .into_iter()
-            .filter(|&t| !self.taken[t] && !self.sheet.truth[t].crowd)
-            .map(|t| PairCandidate {
-                overlap: iou(&self.sheet.truth[t].bbox, bbox),
-                truth: t,
-                found,
-            })
+        let near = self.index.near(&self.sheet.found[found].bbox);
+        near.into_iter()
+            .filter(|&t| self.is_open(t))
+            .map(|t| self.candidate(t, found))
             .filter(|candidate| candidate.overlap > self.min_iou)
             .max()
+    }
+
+    fn candidate(&self, truth: usize, found: usize) -> PairCandidate {
+        PairCandidate {
+            overlap: self.overlap(truth, found),
+            truth,
+            found,
+        }
+    }
+
+    fn overlap(&self, t: usize, f: usize) -> f64 {
+        iou(&self.sheet.truth[t].bbox, &self.sheet.found[f].bbox)
     }
 
     /// As the COCO tools have it, by the share of the detection that lies in a crowd.
     fn in_crowd(&self, found: Option<usize>) -> bool {
         found.is_some_and(|f| {
             let bbox = &self.sheet.found[f].bbox;
-            self.index.near(bbox).into_iter().any(|t| {
-                let truth = &self.sheet.truth[t];
-                truth.crowd && share(intersection(bbox, &truth.bbox), area(bbox)) > self.min_iou
-            })
+            let near = self.index.near(bbox);
+            near.into_iter().any(|t| self.is_in_crowd(bbox, t))
         })
+    }
+
+    /// Whether so much of a detection lies in this box, and the box is a crowd.
+    fn is_in_crowd(&self, bbox: &BBox, t: usize) -> bool {
+        let truth = &self.sheet.truth[t];
+        truth.crowd && share(intersection(bbox, &truth.bbox), area(bbox)) > self.min_iou
     }
 }
 

@@ -1,12 +1,12 @@
 //! Curves and the confusion matrix as SVG.
 
 use super::{Confusion, Curves};
-use crate::label::clipped;
-use crate::plot::{Axis, Chart, escaped};
+use crate::plot::{Axis, Chart, clipped, escaped};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-/// Widest and narrowest side of a cell of the matrix, what all of them may take, and room for names, in SVG units.
+/// Widest and narrowest side of a cell of the matrix, what all of them may take, and room for
+/// names, in SVG units.
 const CELL_SIDES: [f64; 2] = [26.0, 56.0];
 const MAX_MATRIX_SIDE: f64 = 900.0;
 const NAME_ROOM: f64 = 150.0;
@@ -59,27 +59,29 @@ fn picture(
     let mut chart = empty_chart(title, axes);
     if curves.classes.len() > 1 {
         let name = format!("mean of {} classes", curves.classes.len());
-        chart.names.push(name);
-        chart.curves.push(mean.clone());
+        add_curve(&mut chart, name, mean);
     }
-    let places = shown
-        .iter()
-        .filter_map(|class| curves.classes.binary_search(class).ok());
-    for place in places.take(MAX_CURVES) {
+    for place in shown_places(curves, shown).take(MAX_CURVES) {
         let name = class_name(curves.classes[place], names);
-        chart.names.push(clipped(&name, MAX_NAME_LETTERS));
-        chart.curves.push(lines[place].clone());
+        add_curve(&mut chart, clipped(&name, MAX_NAME_LETTERS), &lines[place]);
     }
     Chart::row(&[chart])
 }
 
+fn add_curve(chart: &mut Chart, name: String, points: &CurvePoints) {
+    chart.names.push(name);
+    chart.curves.push(points.clone());
+}
+
+/// Where the classes to be shown have their curves.
+fn shown_places(curves: &Curves, shown: &[u32]) -> impl Iterator<Item = usize> {
+    let shown = shown.iter();
+    shown.filter_map(|class| curves.classes.binary_search(class).ok())
+}
+
 /// A chart of shares, both axes from 0 to 1.
 fn empty_chart(title: &str, axes: [&str; 2]) -> Chart {
-    let [across, up] = axes.map(|title| Axis {
-        title: title.into(),
-        range: [0.0, 1.0],
-        logarithmic: false,
-    });
+    let [across, up] = axes.map(unit_axis);
     Chart {
         title: title.into(),
         across,
@@ -88,13 +90,22 @@ fn empty_chart(title: &str, axes: [&str; 2]) -> Chart {
     }
 }
 
-/// Found against true classes, those to be `shown`: each column's shares as shades, counts in words. Others share a row
-/// and a column, and so does the background.
+/// From 0 to 1.
+fn unit_axis(title: &str) -> Axis {
+    Axis {
+        title: title.into(),
+        range: [0.0, 1.0],
+        logarithmic: false,
+    }
+}
+
+/// Found against true classes, those to be `shown`: each column's shares as shades, counts in
+/// words. Others share a row and a column, and so does the background.
 pub(crate) fn confusion_picture(confusion: &Confusion, names: &[String], shown: &[u32]) -> String {
     let matrix = ConfusionTable::new(confusion, names, shown);
-    let n = matrix.titles.len();
-    let cell = (MAX_MATRIX_SIDE / n as f64).clamp(CELL_SIDES[0], CELL_SIDES[1]);
-    let side = NAME_ROOM + cell * n as f64;
+    let n = matrix.titles.len() as f64;
+    let cell = cell_side(n);
+    let side = NAME_ROOM + cell * n;
     // The turned name of the last column reaches beyond it.
     let width = side + NAME_ROOM / 2.0;
     let mut svg = format!(
@@ -111,22 +122,38 @@ pub(crate) fn confusion_picture(confusion: &Confusion, names: &[String], shown: 
     svg + "</svg>\n"
 }
 
+/// Of a matrix with so many rows.
+fn cell_side(rows: f64) -> f64 {
+    (MAX_MATRIX_SIDE / rows).clamp(CELL_SIDES[0], CELL_SIDES[1])
+}
+
+/// A name beside its row, and turned above its column; both have the same middle.
+fn row_and_column_name(title: &str, middle: f64) -> String {
+    let edge = NAME_ROOM - 8.0;
+    let short = clipped(title, MAX_NAME_LETTERS);
+    let turned = format!(" transform=\"rotate(-40 {middle:.1} {edge})\"");
+    word([edge, middle + 4.0], "end", &short, "") + &word([middle, edge], "start", &short, &turned)
+}
+
 /// The classes to be shown, the others as one, and the background.
 fn titles(confusion: &Confusion, names: &[String], shown: &[u32]) -> Vec<String> {
     let mut titles: Vec<String> = shown
         .iter()
         .map(|&class| class_name(class, names))
         .collect();
-    let others = confusion
-        .classes()
-        .iter()
-        .filter(|class| !shown.contains(class))
-        .count();
+    let others = count_others(confusion, shown);
     if others > 0 {
         titles.push(format!("{others} others"));
     }
     titles.push("background".into());
     titles
+}
+
+/// How many classes are not shown.
+fn count_others(confusion: &Confusion, shown: &[u32]) -> usize {
+    let classes = confusion.classes();
+    let others = classes.iter().filter(|class| !shown.contains(class));
+    others.count()
 }
 
 /// A confusion as a table that is not longer than can be shown.
@@ -158,16 +185,10 @@ impl ConfusionTable {
 
     /// The names of the rows and columns.
     fn names(&self, cell: f64) -> String {
-        let mut svg = String::new();
-        let edge = NAME_ROOM - 8.0;
-        for (i, title) in self.titles.iter().enumerate() {
-            let middle = NAME_ROOM + cell * (i as f64 + 0.5);
-            let short = clipped(title, MAX_NAME_LETTERS);
-            svg += &word([edge, middle + 4.0], "end", &short, "");
-            let turned = format!(" transform=\"rotate(-40 {middle:.1} {edge})\"");
-            svg += &word([middle, edge], "start", &short, &turned);
-        }
-        svg
+        let titles = (0..).zip(&self.titles);
+        titles
+            .map(|(i, title)| row_and_column_name(title, NAME_ROOM + cell * (f64::from(i) + 0.5)))
+            .collect()
     }
 
     fn lines(&self, cell: f64) -> String {
@@ -188,8 +209,7 @@ impl ConfusionTable {
         let share = count as f64 / self.sums[column] as f64;
         let [x, y] = [column, row].map(|i| NAME_ROOM + cell * i as f64);
         let light = 255.0 - 200.0 * share;
-        let (found, truth) = (&self.titles[row], &self.titles[column]);
-        let title = escaped(&format!("found {found}, true {truth}: {count}"));
+        let title = self.cell_title([column, row], count);
         let rectangle = format!(
             "<rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"{cell:.1}\" height=\"{cell:.1}\" \
              fill=\"rgb({light:.0},{light:.0},255)\" stroke=\"#ccc\"><title>{title}</title></rect>\n"
@@ -197,6 +217,11 @@ impl ConfusionTable {
         let at = [x + cell / 2.0, y + cell / 2.0 + 4.0];
         let ink = if share > 0.6 { " fill=\"white\"" } else { "" };
         rectangle + &word(at, "middle", &short(count), ink)
+    }
+
+    fn cell_title(&self, [column, row]: [usize; 2], count: u64) -> String {
+        let (found, truth) = (&self.titles[row], &self.titles[column]);
+        escaped(&format!("found {found}, true {truth}: {count}"))
     }
 }
 

@@ -21,6 +21,30 @@ pub(super) struct Hit {
     pub(super) ignored: Marks,
 }
 
+impl Hit {
+    /// A detection with the thresholds at which it is right and at which it is ignored.
+    pub(super) fn new(image: &ImageBoxes<'_>, place: usize, [right, ignored]: [Marks; 2]) -> Self {
+        Self {
+            confidence: image.found[place].confidence,
+            sheet: image.sheet,
+            place: place as u32,
+            right,
+            ignored,
+        }
+    }
+
+    /// Thresholds at which it found something and counts.
+    pub(super) fn true_positives(&self) -> impl Iterator<Item = usize> {
+        marked(self.right & !self.ignored)
+    }
+
+    /// Whether it is right at a threshold; none where it is ignored.
+    fn is_right_at(&self, threshold: usize) -> Option<bool> {
+        let is_ignored = is_marked(self.ignored, threshold);
+        (!is_ignored).then(|| is_marked(self.right, threshold))
+    }
+}
+
 /// Running sums of true and false positives at one threshold, the surest detection first.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Running {
@@ -28,7 +52,8 @@ pub(super) struct Running {
     pub(super) wrong: Vec<f64>,
 }
 
-/// The detections of a class, matched with the truth once: they can be counted for any weights of the images.
+/// The detections of a class, matched with the truth once: they can be counted for any weights of
+/// the images.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Ranking {
     pub(super) class: u32,
@@ -39,7 +64,8 @@ pub(super) struct Ranking {
 }
 
 impl Ranking {
-    /// `match_image` gives the detections of an image, matched with its boxes, and how many of those there are to be found.
+    /// `match_image` gives the detections of an image, matched with its boxes, and how many of
+    /// those there are to be found.
     pub(super) fn new(
         boxes: &ClassBoxes<'_>,
         match_image: impl Fn(&ImageBoxes<'_>) -> (Vec<Hit>, usize) + Send + Sync,
@@ -69,6 +95,11 @@ impl Ranking {
             .sum()
     }
 
+    /// How many boxes there are to be found; none where there are no such boxes.
+    pub(super) fn truths_to_find(&self, weights: &[u32]) -> Option<f64> {
+        Some(self.truths(weights)).filter(|&truths| truths > 0.0)
+    }
+
     /// Those of images that count.
     pub(super) fn counting(&self, weights: &[u32]) -> impl Iterator<Item = (&Hit, f64)> {
         self.hits
@@ -82,38 +113,66 @@ impl Ranking {
         debug_assert!(threshold < THRESHOLDS);
         let (mut right, mut wrong, mut sums) = (0.0, 0.0, Running::default());
         for (hit, count) in self.counting(weights) {
-            match [hit.ignored, hit.right].map(|marks| marks >> threshold & 1 == 1) {
-                [true, _] => {}
-                [_, true] => right += count,
-                _ => wrong += count,
+            match hit.is_right_at(threshold) {
+                Some(true) => right += count,
+                Some(false) => wrong += count,
+                None => {}
             }
             sums.push(right, wrong);
         }
         sums
     }
 
-    /// Sums at every threshold where a precision curve can turn: at each true positive, before it, and at the end.
+    /// Sums at every threshold where a precision curve can turn: at each true positive, before it,
+    /// and at the end.
     ///
-    /// Between two true positives precision falls with every detection and recall stands still. So of those only the last
-    /// is ever read, and the envelope of precision is that of all of them.
+    /// Between two true positives precision falls with every detection and recall stands still. So
+    /// of those only the last is ever read, and the envelope of precision is that of all of
+    /// them.
     pub(super) fn turns(&self, weights: &[u32]) -> [Running; THRESHOLDS] {
-        let mut sums: [Running; THRESHOLDS] = Default::default();
-        let (mut right, mut ignored, mut all) = ([0.0; THRESHOLDS], [0.0; THRESHOLDS], 0.0);
+        let mut tallies: [TurnTally; THRESHOLDS] = Default::default();
+        let mut all = 0.0;
         for (hit, count) in self.counting(weights) {
             for t in marked(hit.ignored) {
-                ignored[t] += count;
+                tallies[t].ignored += count;
             }
-            for t in marked(hit.right & !hit.ignored) {
-                sums[t].turn(right[t], all - right[t] - ignored[t]);
-                right[t] += count;
-                sums[t].push(right[t], all + count - right[t] - ignored[t]);
+            for t in hit.true_positives() {
+                tallies[t].add_right(all, count);
             }
             all += count;
         }
-        for (t, sums) in sums.iter_mut().enumerate() {
-            sums.turn(right[t], all - right[t] - ignored[t]);
-        }
-        sums
+        tallies.map(|tally| tally.finish(all))
+    }
+}
+
+/// Sums at one threshold where a precision curve can turn, in the making.
+#[derive(Default)]
+struct TurnTally {
+    sums: Running,
+    right: f64,
+    ignored: f64,
+}
+
+impl TurnTally {
+    /// Adds a true positive that follows `all` detections.
+    fn add_right(&mut self, all: f64, count: f64) {
+        self.turn(all);
+        self.right += count;
+        self.sums.push(self.right, self.wrong(all + count));
+    }
+
+    fn finish(mut self, all: f64) -> Running {
+        self.turn(all);
+        self.sums
+    }
+
+    fn turn(&mut self, all: f64) {
+        self.sums.turn(self.right, self.wrong(all));
+    }
+
+    /// False positives among the first `all` detections.
+    fn wrong(&self, all: f64) -> f64 {
+        all - self.right - self.ignored
     }
 }
 
@@ -125,13 +184,14 @@ impl Running {
 
     /// Adds sums that are others than the last ones.
     fn turn(&mut self, right: f64, wrong: f64) {
-        let last = match (self.right.last(), self.wrong.last()) {
-            (Some(right), Some(wrong)) => (*right, *wrong),
-            _ => (0.0, 0.0),
-        };
-        if last != (right, wrong) {
+        if self.last() != (right, wrong) {
             self.push(right, wrong);
         }
+    }
+
+    fn last(&self) -> (f64, f64) {
+        let last = self.right.last().zip(self.wrong.last());
+        last.map_or((0.0, 0.0), |(right, wrong)| (*right, *wrong))
     }
 }
 
@@ -142,6 +202,11 @@ pub(super) fn marked(mut marks: Marks) -> impl Iterator<Item = usize> {
         marks &= marks - 1;
         Some(next)
     })
+}
+
+#[inline]
+fn is_marked(marks: Marks, threshold: usize) -> bool {
+    marks >> threshold & 1 == 1
 }
 
 /// How often an image counts.

@@ -1,5 +1,6 @@
 //! Tags of images (light, camera position, ..), for scores per factor.
 
+use super::{filled_lines, in_line};
 use crate::error::{Error, Result};
 use crate::io;
 use std::collections::{BTreeMap, BTreeSet};
@@ -13,23 +14,23 @@ pub struct Tags {
     levels: BTreeMap<String, Vec<String>>,
 }
 
-/// Reads a CSV whose first column is the image's name and whose others are factors; its first line names them.
+/// Reads a CSV whose first column is the image's name and whose others are factors; its first line
+/// names them.
 ///
 /// # Errors
-/// [`Error::File`] for a file without a line of names, a line of another length, or an image listed twice.
+/// [`Error::File`] for a file without a line of names, a line of another length, or an image listed
+/// twice.
 pub fn read_tags(path: &Path) -> Result<Tags> {
     let text = io::read_text(path)?;
     parse(&text).map_err(|what| Error::file(path, what))
 }
 
 fn parse(text: &str) -> std::result::Result<Tags, String> {
-    let lines = text.lines().enumerate();
-    let mut lines = lines.filter(|(_, line)| !line.trim().is_empty());
+    let mut lines = filled_lines(text);
     let titles = lines.next().map(|(_, line)| cells(line));
     let mut tags = Tags::with_titles(&titles.unwrap_or_default())?;
     for (i, line) in lines {
-        tags.add(cells(line))
-            .map_err(|what| format!("line {}: {what}", i + 1))?;
+        tags.add(cells(line)).map_err(|what| in_line(i, &what))?;
     }
     Ok(tags)
 }
@@ -38,19 +39,28 @@ fn cells(line: &str) -> Vec<String> {
     line.split(',').map(|cell| cell.trim().to_owned()).collect()
 }
 
+/// The name of an image without folder and extension.
+fn stem_of(name: &str) -> String {
+    let stem = Path::new(name).file_stem().unwrap_or_default();
+    stem.to_string_lossy().into_owned()
+}
+
 impl Tags {
     /// Adds a line: the image and its level of each factor.
     fn add(&mut self, row: Vec<String>) -> std::result::Result<(), String> {
-        let expected = 1 + self.factors.len();
-        if row.len() != expected {
-            return Err(format!("{} cells, expected {expected}", row.len()));
-        }
-        let stem = Path::new(&row[0]).file_stem().unwrap_or_default();
-        let stem = stem.to_string_lossy().into_owned();
-        match self.levels.insert(stem, row[1..].to_vec()) {
+        self.check_cells(&row)?;
+        match self.levels.insert(stem_of(&row[0]), row[1..].to_vec()) {
             None => Ok(()),
             Some(_) => Err(format!("image \"{}\" is listed twice", row[0])),
         }
+    }
+
+    fn check_cells(&self, row: &[String]) -> std::result::Result<(), String> {
+        let expected = 1 + self.factors.len();
+        if row.len() == expected {
+            return Ok(());
+        }
+        Err(format!("{} cells, expected {expected}", row.len()))
     }
 
     /// No tags yet, for the factors that the first line names behind the image.

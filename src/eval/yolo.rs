@@ -1,6 +1,6 @@
 //! Reads truth and detections from folders of YOLO text files.
 
-use super::{Detection, EvalImage, GroundTruth, Picture};
+use super::{Detection, EvalImage, GroundTruth, Picture, filled_lines, in_line};
 use crate::error::{Error, Result};
 use crate::geom::{BBox, Point2};
 use crate::io;
@@ -19,58 +19,66 @@ pub struct YoloTruth {
     pub pictures: Vec<Option<Picture>>,
 }
 
-/// Reads `NAME.txt` of a folder of labels: `class cx cy w h`, shares of the image, one box a line; outlines
-/// (`class x1 y1 x2 y2 ..`) give the box around them.
+/// Reads `NAME.txt` of a folder of labels: `class cx cy w h`, shares of the image, one box a line;
+/// outlines (`class x1 y1 x2 y2 ..`) give the box around them.
 ///
-/// Sizes come from the images, which are looked for where YOLO has them: the same path with its last `labels` replaced
-/// by `images`. `size` is taken for all where there are no images; overlaps do not depend on it, COCO's ranges of area do.
+/// Sizes come from the images, which are looked for where YOLO has them: the same path with its
+/// last `labels` replaced by `images`. `size` is taken for all where there are no images; overlaps
+/// do not depend on it, COCO's ranges of area do.
 ///
 /// # Errors
-/// [`Error::File`] for a folder without labels, a label without an image where no `size` is given, or a bad line.
+/// [`Error::File`] for a folder without labels, a label without an image where no `size` is given,
+/// or a bad line.
 pub fn read_yolo_truth(labels: &Path, size: Option<[u32; 2]>) -> Result<YoloTruth> {
-    let all: Vec<_> = text_files(labels)?
-        .par_iter()
-        .map(|(name, path)| read_labels(labels, name, path, size))
-        .collect::<Result<_>>()?;
+    let all = read_all_labels(labels, size)?;
     if all.is_empty() {
         return Err(Error::file(labels, "no label files, expected NAME.txt"));
     }
-    let mut truth = YoloTruth::default();
-    for (sheet, size, picture) in all {
-        truth.sheets.push(sheet);
-        truth.sizes.push(size);
-        truth.pictures.push(picture);
-    }
-    Ok(truth)
+    Ok(YoloTruth::from_images(all))
 }
 
-/// The truth of one image, its size, and the image where it is found.
+/// The truth of an image, its size, and the image where it is found.
+type LabelledImage = (EvalImage, [u32; 2], Option<Picture>);
+
+fn read_all_labels(labels: &Path, size: Option<[u32; 2]>) -> Result<Vec<LabelledImage>> {
+    let texts = text_files(labels)?;
+    texts
+        .par_iter()
+        .map(|(name, path)| read_labels(labels, name, path, size))
+        .collect()
+}
+
 fn read_labels(
     labels: &Path,
     name: &str,
     path: &Path,
     size: Option<[u32; 2]>,
-) -> Result<(EvalImage, [u32; 2], Option<Picture>)> {
+) -> Result<LabelledImage> {
     let image = image_of(labels, name);
     let size = match size {
         Some(size) => size,
         None => image_size(labels, name, image.as_deref())?,
     };
-    let rows = read_rows(path, 0)?.into_iter();
-    let boxes = rows.map(|row| row.truth(size)).collect();
-    let picture = image.map(|path| Picture {
+    let truth = read_truth(path, size)?;
+    let picture = image.map(|path| picture_of(path, size));
+    Ok((EvalImage::new(name, truth), size, picture))
+}
+
+fn picture_of(path: PathBuf, size: [u32; 2]) -> Picture {
+    Picture {
         path,
         size: size.map(f64::from),
-    });
-    Ok((EvalImage::new(name, boxes), size, picture))
+    }
 }
 
 /// Adds what a detector found, from `NAME.txt` of a folder: `class cx cy w h confidence`.
 ///
-/// An image without a file has no detections; a file without an image is refused, as it may be a misspelt name.
+/// An image without a file has no detections; a file without an image is refused, as it may be a
+/// misspelt name.
 ///
 /// # Errors
-/// [`Error::File`] for a folder that cannot be read, a name that the truth does not have, or a bad line.
+/// [`Error::File`] for a folder that cannot be read, a name that the truth does not have, or a bad
+/// line.
 pub fn read_yolo_detections(folder: &Path, truth: &mut YoloTruth) -> Result<()> {
     let known = truth.places_by_name();
     let found: Vec<(usize, Vec<Detection>)> = text_files(folder)?
@@ -89,6 +97,16 @@ pub fn read_yolo_detections(folder: &Path, truth: &mut YoloTruth) -> Result<()> 
 }
 
 impl YoloTruth {
+    fn from_images(images: Vec<LabelledImage>) -> Self {
+        let mut truth = Self::default();
+        for (sheet, size, picture) in images {
+            truth.sheets.push(sheet);
+            truth.sizes.push(size);
+            truth.pictures.push(picture);
+        }
+        truth
+    }
+
     fn places_by_name(&self) -> BTreeMap<&str, usize> {
         let names = self.sheets.iter().map(|sheet| sheet.image.as_str());
         names.zip(0..).collect()
@@ -100,9 +118,23 @@ fn unknown_image(name: &str, path: &Path, count: usize) -> Error {
     Error::file(path, what)
 }
 
+fn read_truth(path: &Path, size: [u32; 2]) -> Result<Vec<GroundTruth>> {
+    parse_truth(&io::read_text(path)?, size).map_err(|what| Error::file(path, what))
+}
+
 fn read_detections(path: &Path, size: [u32; 2]) -> Result<Vec<Detection>> {
-    let rows = read_rows(path, 1)?;
-    Ok(rows.into_iter().map(|row| row.found(size)).collect())
+    parse_detections(&io::read_text(path)?, size).map_err(|what| Error::file(path, what))
+}
+
+fn parse_truth(text: &str, size: [u32; 2]) -> std::result::Result<Vec<GroundTruth>, String> {
+    let rows = parse_rows(text, 0)?.into_iter();
+    Ok(rows.map(|row| row.truth(size)).collect())
+}
+
+/// With a confidence at the end of each line.
+fn parse_detections(text: &str, size: [u32; 2]) -> std::result::Result<Vec<Detection>, String> {
+    let rows = parse_rows(text, 1)?.into_iter();
+    Ok(rows.map(|row| row.found(size)).collect())
 }
 
 /// What a text of labels and one of detections give, for the fuzzers.
@@ -111,11 +143,10 @@ pub(crate) fn sheet_of(
     found: &str,
     size: [u32; 2],
 ) -> std::result::Result<EvalImage, String> {
-    let truth = parse_rows(truth, 0)?.into_iter().map(|row| row.truth(size));
-    let found = parse_rows(found, 1)?.into_iter().map(|row| row.found(size));
+    let truth = parse_truth(truth, size)?;
     Ok(EvalImage {
-        found: found.collect(),
-        ..EvalImage::new("", truth.collect())
+        found: parse_detections(found, size)?,
+        ..EvalImage::new("", truth)
     })
 }
 
@@ -160,14 +191,16 @@ fn image_of(labels: &Path, name: &str) -> Option<PathBuf> {
 }
 
 fn image_size(labels: &Path, name: &str, image: Option<&Path>) -> Result<[u32; 2]> {
-    let Some(image) = image else {
-        let what = format!(
-            "no image \"{name}\" (.jpg, .png, ..) to take the size from; give the size instead"
-        );
-        return Err(Error::file(images_of(labels), what));
-    };
+    let image = image.ok_or_else(|| missing_image(labels, name))?;
     let header = io::read_header(image)?;
     Ok([header.width as u32, header.height as u32])
+}
+
+fn missing_image(labels: &Path, name: &str) -> Error {
+    let what = format!(
+        "no image \"{name}\" (.jpg, .png, ..) to take the size from; give the size instead"
+    );
+    Error::file(images_of(labels), what)
 }
 
 /// A line: class, box in shares of the image, and what stands behind.
@@ -180,18 +213,10 @@ struct LabelRow {
 /// Boxes may reach beyond the image, but not so many times its side.
 const MAX_SHARE: f64 = 10.0;
 
-/// The lines of a file, with `extra` numbers (a confidence or nothing) at their ends.
-fn read_rows(path: &Path, extra: usize) -> Result<Vec<LabelRow>> {
-    parse_rows(&io::read_text(path)?, extra).map_err(|what| Error::file(path, what))
-}
-
+/// Lines with `extra` numbers (a confidence or nothing) at their ends.
 fn parse_rows(text: &str, extra: usize) -> std::result::Result<Vec<LabelRow>, String> {
-    let lines = text
-        .lines()
-        .enumerate()
-        .filter(|(_, line)| !line.trim().is_empty());
-    lines
-        .map(|(i, line)| parse_row(line, extra).map_err(|what| format!("line {}: {what}", i + 1)))
+    filled_lines(text)
+        .map(|(i, line)| parse_row(line, extra).map_err(|what| in_line(i, &what)))
         .collect()
 }
 
@@ -200,15 +225,20 @@ fn parse_row(line: &str, extra: usize) -> std::result::Result<LabelRow, String> 
     let class = parse_class(words.next().unwrap_or_default())?;
     let numbers = words.map(parse_finite);
     let numbers: Vec<f64> = numbers.collect::<std::result::Result<_, _>>()?;
-    let count = numbers.len().checked_sub(extra);
-    let count = count.ok_or_else(|| too_few(&numbers, extra))?;
-    let (place, rest) = numbers.split_at(count);
+    let (place, rest) = split_extra(&numbers, extra)?;
     check_shares(place)?;
     Ok(LabelRow {
         class,
         shares: box_around(place).ok_or_else(|| too_few(&numbers, extra))?,
         confidence: rest.first().copied().unwrap_or(1.0),
     })
+}
+
+/// The numbers of the place, and those behind them.
+fn split_extra(numbers: &[f64], extra: usize) -> std::result::Result<(&[f64], &[f64]), String> {
+    let count = numbers.len().checked_sub(extra);
+    let count = count.ok_or_else(|| too_few(numbers, extra))?;
+    Ok(numbers.split_at(count))
 }
 
 fn parse_class(text: &str) -> std::result::Result<u32, String> {
@@ -241,17 +271,21 @@ fn check_shares(place: &[f64]) -> std::result::Result<(), String> {
 /// The box of `cx cy w h`, or around an outline; none for any other count of numbers.
 fn box_around(place: &[f64]) -> Option<BBox> {
     match *place {
-        [cx, cy, w, h] => Some(BBox {
-            x0: cx - w / 2.0,
-            y0: cy - h / 2.0,
-            x1: cx + w / 2.0,
-            y1: cy + h / 2.0,
-        }),
+        [cx, cy, w, h] => Some(centered_box([cx, cy], [w, h])),
         _ if place.len() >= 6 && place.len().is_multiple_of(2) => {
             let points = place.chunks_exact(2);
             Some(BBox::around(points.map(|p| Point2::new(p[0], p[1]))))
         }
         _ => None,
+    }
+}
+
+fn centered_box([cx, cy]: [f64; 2], [w, h]: [f64; 2]) -> BBox {
+    BBox {
+        x0: cx - w / 2.0,
+        y0: cy - h / 2.0,
+        x1: cx + w / 2.0,
+        y1: cy + h / 2.0,
     }
 }
 

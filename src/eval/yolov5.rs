@@ -4,7 +4,7 @@ use super::average::{interpolated, recall_and_precision, trapezoid};
 use super::by_class::{ByClass, ImageBoxes};
 use super::overlap::BoxIndex;
 use super::rank::{Hit, Marks, Ranking, Running};
-use super::{ClassScores, Definition, Detection, EvalImage, Scores, THRESHOLDS};
+use super::{ClassScores, Definition, Detection, EvalImage, Scores, THRESHOLDS, check_weights};
 use crate::geom::BBox;
 use rayon::prelude::*;
 
@@ -14,26 +14,26 @@ pub(super) const CONFIDENCE_STEPS: usize = 1000;
 const RATIO_EPSILON: f64 = 1e-16;
 /// Keeps an intersection over union defined, square pixels, as in the original.
 const AREA_EPSILON: f32 = 1e-7;
-/// Half the width, in readings, of the window that F1 is smoothed with before its best confidence is taken.
+/// Half the width, in readings, of the window that F1 is smoothed with before its best confidence
+/// is taken.
 const SMOOTHING_READINGS: usize = 50;
 
-/// Average precision by the definition of YOLOv5, with precision and recall at the confidence of the best F1.
+/// Average precision by the definition of YOLOv5, with precision and recall at the confidence of
+/// the best F1.
 ///
-/// Each detection is held against the box of its class that it overlaps most; of those that name the same box the
-/// surest counts. Boxes marked as crowd are taken as any other: YOLO labels have no such mark.
+/// Each detection is held against the box of its class that it overlaps most; of those that name
+/// the same box the surest counts. Boxes marked as crowd are taken as any other: YOLO labels have
+/// no such mark.
 ///
 /// # Method
-/// YOLOv5 7.0: `val.py` (`process_batch`) and `utils/metrics.py` (`ap_per_class`); overlaps in single precision as there.
-/// Departs from it where confidences or overlaps are equal: there the order is that of an unstable sort, here that of
-/// the input.
+/// YOLOv5 7.0: `val.py` (`process_batch`) and `utils/metrics.py` (`ap_per_class`); overlaps in
+/// single precision as there. Departs from it where confidences or overlaps are equal: there the
+/// order is that of an unstable sort, here that of the input.
 ///
 /// # Panics
 /// When there are weights and not one per sheet.
 pub fn yolov5(sheets: &[EvalImage], weights: &[u32]) -> Scores {
-    assert!(
-        weights.is_empty() || weights.len() == sheets.len(),
-        "one weight per sheet"
-    );
+    check_weights(weights, sheets.len());
     scores(&rankings(sheets), weights)
 }
 
@@ -49,16 +49,23 @@ pub(super) fn rankings(sheets: &[EvalImage]) -> Vec<Ranking> {
 pub(super) fn scores(rankings: &[Ranking], weights: &[u32]) -> Scores {
     let classes = ranked(rankings, weights);
     let best = best_confidence(&classes);
-    let scores = classes.par_iter().map(|class| class.scores(best, weights));
     Scores {
         definition: Definition::Yolov5,
-        classes: scores.collect(),
+        classes: scores_at(best, &classes, weights),
     }
+}
+
+/// The scores of all classes at a reading of confidence.
+fn scores_at(reading: usize, classes: &[Ranked<'_>], weights: &[u32]) -> Vec<ClassScores> {
+    let scores = classes
+        .par_iter()
+        .map(|class| class.scores(reading, weights));
+    scores.collect()
 }
 
 /// Average precision of a class at every threshold; none where there is nothing to find.
 pub(super) fn average_precision(ranking: &Ranking, weights: &[u32]) -> Option<[f64; THRESHOLDS]> {
-    let truths = Some(ranking.truths(weights)).filter(|&truths| truths > 0.0)?;
+    let truths = ranking.truths_to_find(weights)?;
     let turns = ranking.turns(weights);
     Some(turns.each_ref().map(|sums| area_below(sums, truths)))
 }
@@ -92,17 +99,13 @@ pub(super) struct Ranked<'a> {
 
 impl<'a> Ranked<'a> {
     fn new(ranking: &'a Ranking, weights: &[u32]) -> Option<Self> {
-        let truths = ranking.truths(weights);
+        let truths = ranking.truths_to_find(weights)?;
         let (recall, precision) = curve(&ranking.running(0, weights), truths);
-        let confidences = ranking
-            .counting(weights)
-            .map(|(hit, _)| -hit.confidence)
-            .collect();
-        (truths > 0.0).then_some(Self {
+        Some(Self {
             ranking,
             recall,
             precision,
-            confidences,
+            confidences: negated_confidences(ranking, weights),
         })
     }
 
@@ -139,6 +142,11 @@ impl<'a> Ranked<'a> {
     }
 }
 
+fn negated_confidences(ranking: &Ranking, weights: &[u32]) -> Vec<f64> {
+    let counting = ranking.counting(weights);
+    counting.map(|(hit, _)| -hit.confidence).collect()
+}
+
 fn curve(sums: &Running, truths: f64) -> (Vec<f64>, Vec<f64>) {
     recall_and_precision(sums, truths, [RATIO_EPSILON, 0.0])
 }
@@ -150,18 +158,24 @@ pub(super) fn confidence(i: usize) -> f64 {
 
 /// Where the smoothed mean F1 of the classes is greatest.
 pub(super) fn best_confidence(classes: &[Ranked<'_>]) -> usize {
-    let f1: Vec<f64> = (0..CONFIDENCE_STEPS)
-        .into_par_iter()
-        .map(|i| {
-            classes
-                .iter()
-                .map(|class| class.f1_at(confidence(i)))
-                .sum::<f64>()
-        })
-        .collect();
+    let sums = f1_sums(classes);
+    first_greatest((0..CONFIDENCE_STEPS).map(|i| window_sum(&sums, i)))
+}
+
+/// The sum of the classes' F1 at every reading of confidence.
+fn f1_sums(classes: &[Ranked<'_>]) -> Vec<f64> {
+    let readings = (0..CONFIDENCE_STEPS).into_par_iter();
+    readings.map(|i| f1_sum(classes, confidence(i))).collect()
+}
+
+fn f1_sum(classes: &[Ranked<'_>], confidence: f64) -> f64 {
+    classes.iter().map(|class| class.f1_at(confidence)).sum()
+}
+
+/// Where the greatest value is; of equal ones the first.
+fn first_greatest(values: impl Iterator<Item = f64>) -> usize {
     let mut best = (0, f64::NEG_INFINITY);
-    for i in 0..CONFIDENCE_STEPS {
-        let value = window_sum(&f1, i);
+    for (i, value) in values.enumerate() {
         if value > best.1 {
             best = (i, value);
         }
@@ -180,30 +194,36 @@ fn window_sum(values: &[f64], i: usize) -> f64 {
     window.map(|i| values[i.clamp(0, last) as usize]).sum()
 }
 
-/// The detections of a class in one image, marked right where they found something, and how many boxes there are.
+/// The detections of a class in one image, marked right where they found something, and how many
+/// boxes there are.
 fn match_image(image: &ImageBoxes<'_>) -> (Vec<Hit>, usize) {
-    let index = BoxIndex::new(image.truth.iter().map(|t| t.bbox));
-    let mut taken: Vec<Marks> = vec![0; image.truth.len()];
-    let hits = image.found.iter().enumerate().map(|(place, found)| {
-        let right = nearest(image, &index, found).map_or(0, |(nearest, overlap)| {
-            let reached = reached(overlap);
-            let right = reached & !taken[nearest];
-            taken[nearest] |= reached;
-            right
-        });
-        Hit {
-            confidence: found.confidence,
-            sheet: image.sheet,
-            place: place as u32,
-            right,
-            ignored: 0,
-        }
-    });
+    let right = right_marks(image).into_iter().enumerate();
+    let hits = right.map(|(place, right)| Hit::new(image, place, [right, 0]));
     (hits.collect(), image.truth.len())
 }
 
-/// The box that a detection overlaps most; of equal overlaps the last: that is how the original's descending sort leaves
-/// them.
+/// The thresholds at which each detection found a box that no surer one has found.
+fn right_marks(image: &ImageBoxes<'_>) -> Vec<Marks> {
+    let index = BoxIndex::new(image.truth.iter().map(|t| t.bbox));
+    let mut taken: Vec<Marks> = vec![0; image.truth.len()];
+    let found = image.found.iter();
+    found
+        .map(|found| match nearest(image, &index, found) {
+            Some((truth, overlap)) => take_free(&mut taken[truth], reached(overlap)),
+            None => 0,
+        })
+        .collect()
+}
+
+/// Takes a box at the thresholds that are reached; returns those at which it was free.
+fn take_free(taken: &mut Marks, reached: Marks) -> Marks {
+    let free = reached & !*taken;
+    *taken |= reached;
+    free
+}
+
+/// The box that a detection overlaps most; of equal overlaps the last: that is how the original's
+/// descending sort leaves them.
 fn nearest(image: &ImageBoxes<'_>, index: &BoxIndex, found: &Detection) -> Option<(usize, f32)> {
     let near = index.near(&found.bbox).into_iter();
     let overlaps = near.map(|t| (t, overlap(&image.truth[t].bbox, &found.bbox)));
@@ -212,10 +232,20 @@ fn nearest(image: &ImageBoxes<'_>, index: &BoxIndex, found: &Detection) -> Optio
 
 /// Intersection over union in single precision.
 fn overlap(a: &BBox, b: &BBox) -> f32 {
-    let [a, b] = [a, b].map(|b| [b.x0, b.y0, b.x1, b.y1].map(|v| v as f32));
-    let shared =
-        (a[2].min(b[2]) - a[0].max(b[0])).max(0.0) * (a[3].min(b[3]) - a[1].max(b[1])).max(0.0);
+    let [a, b] = [corners_of(a), corners_of(b)];
+    let shared = shared_area(a, b);
     shared / (area_of(a) + area_of(b) - shared + AREA_EPSILON)
+}
+
+/// In single precision: left, top, right, bottom.
+#[inline]
+fn corners_of(b: &BBox) -> [f32; 4] {
+    [b.x0, b.y0, b.x1, b.y1].map(|v| v as f32)
+}
+
+#[inline]
+fn shared_area(a: [f32; 4], b: [f32; 4]) -> f32 {
+    (a[2].min(b[2]) - a[0].max(b[0])).max(0.0) * (a[3].min(b[3]) - a[1].max(b[1])).max(0.0)
 }
 
 #[inline]
@@ -255,7 +285,8 @@ mod tests {
         )];
         let hits = rankings(&sheets).remove(0).hits;
         assert_eq!(hits[0].confidence, 0.9);
-        // The surer one overlaps by 0.9 (just below, with the original's epsilon); the exact one has only the rest.
+        // The surer one overlaps by 0.9 (just below, with the original's epsilon); the exact one
+        // has only the rest.
         assert_eq!((hits[0].right | hits[1].right).count_ones(), 10);
         assert_eq!(hits[0].right & hits[1].right, 0);
         assert_eq!(hits[1].right & 1, 0);

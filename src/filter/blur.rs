@@ -4,10 +4,12 @@ use super::separable::{Taps, filter_sides};
 use crate::image::Image;
 use crate::pixel::Mix;
 
-/// Standard deviations at which the Gaussian window ends; what lies beyond weighs 6e-5 of the whole.
+/// Standard deviations at which the Gaussian window ends; what lies beyond weighs 6e-5 of the
+/// whole.
 const GAUSSIAN_REACH_SIGMAS: f64 = 4.0;
 
-/// A picture blurred by a Gaussian of standard deviation `sigma_px`; unchanged where that is 0 or less, or NaN.
+/// A picture blurred by a Gaussian of standard deviation `sigma_px`; unchanged where that is 0 or
+/// less, or NaN.
 ///
 /// # Method
 /// The Gaussian at pixel centres, ended at 4 sigma and made to add up to 1.
@@ -18,8 +20,8 @@ pub fn gaussian_blur<P: Mix>(image: &Image<P>, sigma_px: f32) -> Image<P> {
     filter_sides(image, |len| gaussian_taps(len, f64::from(sigma_px)))
 }
 
-/// A picture of which each pixel is the mean of the square of `2 radius + 1` pixels around it; unchanged where that is
-/// one pixel.
+/// A picture of which each pixel is the mean of the square of `2 radius + 1` pixels around it;
+/// unchanged where that is one pixel.
 pub fn box_blur<P: Mix>(image: &Image<P>, radius: usize) -> Image<P> {
     if radius == 0 {
         return image.clone();

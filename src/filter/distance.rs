@@ -4,7 +4,8 @@ use super::morphology::vertical_distances;
 use crate::image::{Image, Mask};
 use rayon::prelude::*;
 
-/// Distance of every set pixel's centre to the centre of the nearest one that is not set, pixels; 0 where not set.
+/// Distance of every set pixel's centre to the centre of the nearest one that is not set, pixels; 0
+/// where not set.
 ///
 /// Beyond the picture's border the mask continues; where nothing is unset the distance is infinite.
 ///

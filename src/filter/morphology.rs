@@ -4,14 +4,15 @@ use crate::image::{Image, Mask};
 use crate::work::{self, Kind};
 use rayon::prelude::*;
 
-/// The mask grown by `radius_px`: every pixel whose centre is at most that far from the centre of a set pixel.
+/// The mask grown by `radius_px`: every pixel whose centre is at most that far from the centre of a
+/// set pixel.
 ///
 /// Unchanged where `radius_px` is below 1 or NaN.
 ///
 /// # Method
-/// Exact and in time independent of the radius: each column knows how far its nearest set pixel is, and along a row a
-/// pixel at vertical distance `d` covers `sqrt(radius^2 - d^2)` to either side (the parabolas of
-/// [Felzenszwalb and Huttenlocher 2012], cut at one height).
+/// Exact and in time independent of the radius: each column knows how far its nearest set pixel is,
+/// and along a row a pixel at vertical distance `d` covers `sqrt(radius^2 - d^2)` to either side
+/// (the parabolas of [Felzenszwalb and Huttenlocher 2012], cut at one height).
 ///
 /// [Felzenszwalb and Huttenlocher 2012]: https://doi.org/10.4086/toc.2012.v008a019
 pub fn dilate(mask: &Mask, radius_px: f64) -> Mask {
@@ -28,14 +29,16 @@ pub fn dilate(mask: &Mask, radius_px: f64) -> Mask {
     out
 }
 
-/// The mask shrunk by `radius_px`: every pixel of it that is farther than that from every pixel outside it.
+/// The mask shrunk by `radius_px`: every pixel of it that is farther than that from every pixel
+/// outside it.
 ///
 /// Beyond the picture's border the mask continues. Unchanged where `radius_px` is below 1 or NaN.
 pub(crate) fn erode(mask: &Mask, radius_px: f64) -> Mask {
     dilate(&mask.complement(), radius_px).complement()
 }
 
-/// How far a set pixel reaches sideways at each vertical distance; farther than the list goes it does not reach.
+/// How far a set pixel reaches sideways at each vertical distance; farther than the list goes it
+/// does not reach.
 fn reach_by_distance(mask: &Mask, radius: f64) -> Vec<usize> {
     let last = radius.min(mask.height() as f64) as usize;
     (0..=last)
@@ -48,7 +51,8 @@ fn chord_half(radius: f64, distance: f64) -> f64 {
     ((radius - distance) * (radius + distance)).sqrt()
 }
 
-/// For every pixel the distance to the nearest set pixel of its column; very large where there is none.
+/// For every pixel the distance to the nearest set pixel of its column; very large where there is
+/// none.
 pub(super) fn vertical_distances(mask: &Mask) -> Vec<u32> {
     let (width, height) = mask.size();
     let pixels = mask.pixels().iter();
@@ -71,7 +75,8 @@ fn one_farther(neighbors: &[u32], distances: &mut [u32]) {
     }
 }
 
-/// Sets what the columns' nearest pixels reach along one row: from the left what lies right of them, then the rest.
+/// Sets what the columns' nearest pixels reach along one row: from the left what lies right of
+/// them, then the rest.
 fn mark_reached(row: &mut [bool], distances: &[u32], reach: &[usize]) {
     let mut end = 0;
     for (x, (pixel, &distance)) in row.iter_mut().zip(distances).enumerate() {

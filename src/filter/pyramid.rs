@@ -1,4 +1,5 @@
-//! Pictures at half the size, and half of that: plain averages, and the binomial kernel of Laplacian pyramids.
+//! Pictures at half the size, and half of that: plain averages, and the binomial kernel of
+//! Laplacian pyramids.
 
 use super::separable::{Taps, filter, filter_sides};
 use crate::image::Image;
@@ -6,7 +7,8 @@ use crate::pixel::Mix;
 use crate::work::{self, Kind};
 use std::sync::OnceLock;
 
-/// A picture at half the size, and half of that, down to one pixel; levels are made when they are first asked for.
+/// A picture at half the size, and half of that, down to one pixel; levels are made when they are
+/// first asked for.
 ///
 /// Each level is the 2 x 2 average of the one before ([`halve`]).
 #[derive(Debug, Default)]
@@ -43,8 +45,8 @@ impl<P: Mix> Pyramid<P> {
         if let Some(half) = self.halves[n].get() {
             return half;
         }
-        // Halved before the cell is locked: the work is parallel, and a thread that waits for its parts may be handed
-        // a task that asks for this very level.
+        // Halved before the cell is locked: the work is parallel, and a thread that waits for its
+        // parts may be handed a task that asks for this very level.
         let half = halved(self.level(n));
         self.halves[n].get_or_init(|| {
             work::add(Kind::Levels, 1);
@@ -53,7 +55,8 @@ impl<P: Mix> Pyramid<P> {
     }
 }
 
-/// A picture of half the size, each pixel the mean of the (up to) four it covers; odd sizes round up.
+/// A picture of half the size, each pixel the mean of the (up to) four it covers; odd sizes round
+/// up.
 pub fn halve<P: Mix>(image: &Image<P>) -> Image<P> {
     work::add(Kind::Filters, 1);
     halved(image)
@@ -79,11 +82,12 @@ fn halving_taps(len: usize) -> Vec<Taps> {
 
 /// A picture of half the size, smoothed by the binomial kernel (1 4 6 4 1)/16; odd sizes round up.
 ///
-/// Pixel `i` of the small picture lies on pixel `2 i` of the large one: sample positions, unlike those of [`halve`],
-/// do not lie in the middle of what they cover.
+/// Pixel `i` of the small picture lies on pixel `2 i` of the large one: sample positions, unlike
+/// those of [`halve`], do not lie in the middle of what they cover.
 ///
 /// # Method
-/// REDUCE of [Burt and Adelson 1983] with a = 3/8. Departs from it at the border, where the window is cut off.
+/// REDUCE of [Burt and Adelson 1983] with a = 3/8. Departs from it at the border, where the window
+/// is cut off.
 ///
 /// [Burt and Adelson 1983]: https://doi.org/10.1109/TCOM.1983.1095851
 pub fn reduce<P: Mix>(image: &Image<P>) -> Image<P> {
@@ -97,12 +101,14 @@ fn reducing_taps(len: usize) -> Vec<Taps> {
     })
 }
 
-/// The inverse of [`reduce`]: a smooth picture of `width` x `height` through the pixels of one of half that size.
+/// The inverse of [`reduce`]: a smooth picture of `width` x `height` through the pixels of one of
+/// half that size.
 ///
 /// A picture minus the expansion of its reduction is a level of its Laplacian pyramid.
 ///
 /// # Method
-/// EXPAND of [Burt and Adelson 1983] with a = 3/8: the small picture's pixels set apart by zeros and smoothed.
+/// EXPAND of [Burt and Adelson 1983] with a = 3/8: the small picture's pixels set apart by zeros
+/// and smoothed.
 ///
 /// # Panics
 /// When `width` x `height` is not a size that [`reduce`] takes to that of `image`.

@@ -5,11 +5,12 @@ use crate::image::Image;
 use crate::pixel::Mix;
 use crate::work::{self, Kind};
 
-/// A picture of another size: smoothly averaged where it shrinks, bilinear where it grows, untouched where it stays.
+/// A picture of another size: smoothly averaged where it shrinks, bilinear where it grows,
+/// untouched where it stays.
 ///
 /// # Method
-/// A triangle as wide as the scale, on pixel centres: its half width is one input pixel when the picture grows and one
-/// output pixel when it shrinks, so it neither aliases much nor rings.
+/// A triangle as wide as the scale, on pixel centres: its half width is one input pixel when the
+/// picture grows and one output pixel when it shrinks, so it neither aliases much nor rings.
 pub fn resize<P: Mix>(image: &Image<P>, width: usize, height: usize) -> Image<P> {
     if image.size() == (width, height) {
         return image.clone();

@@ -3,10 +3,12 @@
 use crate::image::Image;
 use crate::pixel::Mix;
 
-/// The bilinear value at `(x, y)` in pixels; everything outside the picture is empty (black and transparent).
+/// The bilinear value at `(x, y)` in pixels; everything outside the picture is empty (black and
+/// transparent).
 ///
-/// Pixel `(i, j)` has its centre at `(i + 0.5, j + 0.5)`, where its own value is returned. Towards the outside the
-/// outermost half pixel fades, and half a pixel further out all is 0. A position that is not finite gives 0.
+/// Pixel `(i, j)` has its centre at `(i + 0.5, j + 0.5)`, where its own value is returned. Towards
+/// the outside the outermost half pixel fades, and half a pixel further out all is 0. A position
+/// that is not finite gives 0.
 #[inline]
 pub(crate) fn sample_bilinear<P: Mix>(image: &Image<P>, x: f64, y: f64) -> P {
     bilinear(|i, j| pixel_or_empty(image, i, j), x, y)
@@ -26,8 +28,8 @@ fn has_pixel<P: Copy>(image: &Image<P>, i: isize, j: isize) -> bool {
     (0..image.width() as isize).contains(&i) && (0..image.height() as isize).contains(&j)
 }
 
-/// The bilinear value at `(x, y)` in pixels, going on outside the picture as the nearest pixel inside; 0 in an empty
-/// picture and at a position that is not finite.
+/// The bilinear value at `(x, y)` in pixels, going on outside the picture as the nearest pixel
+/// inside; 0 in an empty picture and at a position that is not finite.
 #[inline]
 pub(crate) fn sample_bilinear_clamped<P: Mix>(image: &Image<P>, x: f64, y: f64) -> P {
     if image.is_empty() {

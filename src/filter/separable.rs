@@ -1,20 +1,21 @@
-//! The engine of every linear filter here: each output pixel is a weighted mean of a rectangle of input pixels, its
-//! weights the product of a column's and a row's.
+//! The engine of every linear filter here: each output pixel is a weighted mean of a rectangle of
+//! input pixels, its weights the product of a column's and a row's.
 
 use crate::image::Image;
 use crate::pixel::Mix;
 use crate::work::{self, Kind};
 use rayon::prelude::*;
 
-/// The samples of one line that an output sample is the weighted mean of: the first one's index, and the weights from
-/// there on.
+/// The samples of one line that an output sample is the weighted mean of: the first one's index,
+/// and the weights from there on.
 pub(super) struct Taps {
     first: usize,
     weights: Vec<f32>,
 }
 
 impl Taps {
-    /// The samples `window` of a line of `len`, cut off at its ends, weighted by `weight` and made to add up to 1.
+    /// The samples `window` of a line of `len`, cut off at its ends, weighted by `weight` and made
+    /// to add up to 1.
     ///
     /// Samples at the ends of the window that weigh nothing are left out.
     pub(super) fn new(
@@ -69,9 +70,9 @@ pub(super) fn filter_sides<P: Mix>(
 
 /// A picture as large as there are `columns` and `rows`, filtered from `image`.
 ///
-/// Rows are mixed first, whole, so that the compiler can vectorise; the mixed row stays in the cache while it is mixed
-/// along itself. There is no picture in between. Neighbours with the same weights (a blur) are summed tap by tap, not
-/// pixel by pixel, for the same reason.
+/// Rows are mixed first, whole, so that the compiler can vectorise; the mixed row stays in the
+/// cache while it is mixed along itself. There is no picture in between. Neighbours with the same
+/// weights (a blur) are summed tap by tap, not pixel by pixel, for the same reason.
 pub(super) fn filter<P: Mix>(image: &Image<P>, columns: &[Taps], rows: &[Taps]) -> Image<P> {
     let runs: Vec<&[Taps]> = columns
         .chunk_by(|a, b| b.follows(a))

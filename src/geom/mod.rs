@@ -1,21 +1,23 @@
 //! Geometry, and every axis and pixel convention of the project, stated once.
 //!
 //! * **Lengths** are metres, angles radians, everything `f64`.
-//! * **World**: right-handed, `+z` up. The labelled rectangle is the plane `z = 0`, centred on the origin, `+x` along its
-//!   width, `+y` towards the top of the picture that it was labelled in.
+//! * **World**: right-handed, `+z` up. The labelled rectangle is the plane `z = 0`, centred on the
+//!   origin, `+x` along its width, `+y` towards the top of the picture that it was labelled in.
 //! * **Camera**: x right, y down, z forward (OpenCV).
-//! * **Pixels**: origin at the top-left *corner* of the top-left pixel, x right, y down; pixel `(i, j)` has its centre at
-//!   `(i + 0.5, j + 0.5)`, the picture covers `[0, width] x [0, height]`.
-//! * **Card**: the plane `z = 0` of its own frame, centred, `+x` along the texture's columns, texture row 0 at `+y`.
-//!   Texture coordinates `u, v` run from 0 to 1, right and *down*.
-//! * **Names**: a transform is called `target_from_source`, so that `camera_from_world * world_from_card` reads and cancels.
+//! * **Pixels**: origin at the top-left *corner* of the top-left pixel, x right, y down; pixel `(i,
+//!   j)` has its centre at `(i + 0.5, j + 0.5)`, the picture covers `[0, width] x [0, height]`.
+//! * **Card**: the plane `z = 0` of its own frame, centred, `+x` along the texture's columns,
+//!   texture row 0 at `+y`. Texture coordinates `u, v` run from 0 to 1, right and *down*.
+//! * **Names**: a transform is called `target_from_source`, so that `camera_from_world *
+//!   world_from_card` reads and cancels.
 
 mod bbox;
 
 pub use bbox::BBox;
 pub use nalgebra::{Point2, Point3, UnitQuaternion, Vector2, Vector3};
 
-/// A rigid placement: rotation, then translation in metres. Names say which frames it joins (`world_from_card`).
+/// A rigid placement: rotation, then translation in metres. Names say which frames it joins
+/// (`world_from_card`).
 ///
 /// In files: `{ rotation = [i, j, k, w], translation = [x, y, z] }` with a unit quaternion.
 pub type Pose = nalgebra::Isometry3<f64>;
@@ -56,7 +58,8 @@ impl Plane {
         }
     }
 
-    /// Ray parameter where `ray` meets the plane in front of its origin; none for a parallel ray or a plane behind.
+    /// Ray parameter where `ray` meets the plane in front of its origin; none for a parallel ray or
+    /// a plane behind.
     pub fn intersect(&self, ray: &Ray) -> Option<f64> {
         let slope = self.normal.dot(&ray.direction);
         let t = (self.offset - self.normal.dot(&ray.origin.coords)) / slope;
@@ -160,8 +163,8 @@ impl Line {
     }
 }
 
-/// The corners of a quadrangle whose sides are on these lines, the first between the last line and the first; none where
-/// neighbours are nearly parallel.
+/// The corners of a quadrangle whose sides are on these lines, the first between the last line and
+/// the first; none where neighbours are nearly parallel.
 pub(crate) fn corners_between(sides: &[Line; 4]) -> Option<[Point2<f64>; 4]> {
     let mut corners = [Point2::origin(); 4];
     for (i, corner) in corners.iter_mut().enumerate() {

@@ -122,7 +122,8 @@ pub(super) fn decode_elsewhere(
     }
 }
 
-/// The meaning of alpha in a TIFF comes from the file's own tag: OpenImageIO treats an unspecified one as associated.
+/// The meaning of alpha in a TIFF comes from the file's own tag: OpenImageIO treats an unspecified
+/// one as associated.
 #[cfg(feature = "oiio")]
 fn with_known_alpha(raster: Raster, source: &SourceFile) -> Raster {
     Raster {

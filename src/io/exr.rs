@@ -14,8 +14,8 @@ use std::path::Path;
 
 /// Writes float channels under names of their own, zip-compressed, with text attributes.
 ///
-/// `size` is width and height; every channel has `width * height` samples, row by row from the top. Names may hold a
-/// layer: `diffuse.R`.
+/// `size` is width and height; every channel has `width * height` samples, row by row from the top.
+/// Names may hold a layer: `diffuse.R`.
 ///
 /// # Errors
 /// [`Error::File`] for a channel of another size, a name twice, or a file that cannot be written.
@@ -58,11 +58,12 @@ fn encode(
     exr::encode(size, planes, exr::Compression::Zip, metadata)
 }
 
-/// Writes parts of one size (width, height) into one EXR file, losslessly compressed; the same parts give the same bytes.
+/// Writes parts of one size (width, height) into one EXR file, losslessly compressed; the same
+/// parts give the same bytes.
 ///
 /// # Errors
-/// [`Error::File`] for no part at all, a channel of another size, a name twice or not Latin-1, or a file that cannot be
-/// written.
+/// [`Error::File`] for no part at all, a channel of another size, a name twice or not Latin-1, or a
+/// file that cannot be written.
 pub fn write_parts(path: impl AsRef<Path>, size: (usize, usize), parts: &[Part]) -> Result<()> {
     write_encoded(path.as_ref(), exr::encode_parts(size, parts))
 }
@@ -76,8 +77,8 @@ fn write_encoded(path: &Path, encoded: std::result::Result<Vec<u8>, String>) -> 
 /// Reads every channel of the first part of an EXR file, and the picture's size.
 ///
 /// # Errors
-/// [`Error::File`] for a file that cannot be opened, is not an EXR, is damaged or goes beyond the default
-/// [`Limits`](super::Limits).
+/// [`Error::File`] for a file that cannot be opened, is not an EXR, is damaged or goes beyond the
+/// default [`Limits`](super::Limits).
 pub fn read_channels(path: impl AsRef<Path>) -> Result<((usize, usize), Vec<Channel>)> {
     let (path, limits) = (path.as_ref(), ReadOptions::default().limits);
     let source = SourceFile::open(path, &limits)?;

@@ -6,7 +6,8 @@ use super::format::Format;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Window {
-    /// What is meant to be shown: stored pixels outside are cut, missing ones are transparent black.
+    /// What is meant to be shown: stored pixels outside are cut, missing ones are transparent
+    /// black.
     #[default]
     Display,
     /// What is stored, wherever it lies: [`Header::data_at`].
@@ -23,18 +24,23 @@ pub struct Header {
     pub width: usize,
     /// Rows of the upright picture.
     pub height: usize,
-    /// Column and row of the first stored pixel, seen from the picture's first one. Other than (0, 0) only in EXR.
+    /// Column and row of the first stored pixel, seen from the picture's first one. Other than (0,
+    /// 0) only in EXR.
     pub data_at: [i64; 2],
-    /// Columns and rows that are stored: those of the picture, but for EXR, whose data window may be any other.
+    /// Columns and rows that are stored: those of the picture, but for EXR, whose data window may
+    /// be any other.
     pub data_size: [usize; 2],
     /// Names of the channels, `R G B A` first if present.
     pub channels: Vec<String>,
-    /// Bits of a sample: 8 and 16 are display-encoded integers (16 in an EXR: half floats), 32 is float.
+    /// Bits of a sample: 8 and 16 are display-encoded integers (16 in an EXR: half floats), 32 is
+    /// float.
     pub bits: u32,
-    /// Focal length that gives the same view on 36 x 24 mm film, millimetres, where the camera noted it, or the focal length
-    /// and the resolution of its sensor. Of the picture as it was taken.
+    /// Focal length that gives the same view on 36 x 24 mm film, millimetres, where the camera
+    /// noted it, or the focal length and the resolution of its sensor. Of the picture as it
+    /// was taken.
     pub focal_35mm: Option<f64>,
-    /// The camera enlarged the middle of its picture, so that its focal length may not be the picture's.
+    /// The camera enlarged the middle of its picture, so that its focal length may not be the
+    /// picture's.
     pub digital_zoom: bool,
     /// The camera noted a picture of another shape: a part was cut away.
     pub cropped: bool,

@@ -1,14 +1,15 @@
 //! What a file may ask for before a single pixel is decoded.
 //!
-//! A damaged or hostile header of 60 bytes can ask for 245 GB, and an allocation that fails aborts the process: so sizes
-//! are checked first, in arithmetic that cannot wrap.
+//! A damaged or hostile header of 60 bytes can ask for 245 GB, and an allocation that fails aborts
+//! the process: so sizes are checked first, in arithmetic that cannot wrap.
 
 use crate::error::{Error, Result};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::sync::OnceLock;
 
-/// Bounds on what a picture file may ask for; a file beyond them is refused before its pixels are touched.
+/// Bounds on what a picture file may ask for; a file beyond them is refused before its pixels are
+/// touched.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Limits {
@@ -20,7 +21,8 @@ pub struct Limits {
     pub channels: u64,
     /// Bytes of the decoded samples. Default: 1 GiB.
     pub decoded_bytes: u64,
-    /// Decoded bytes for each byte of the file, checked above 64 MiB of decoded bytes. Default: 10,000.
+    /// Decoded bytes for each byte of the file, checked above 64 MiB of decoded bytes. Default:
+    /// 10,000.
     pub ratio: u64,
     /// Bytes of the file itself. Default: 1 GiB.
     pub file_bytes: u64,
@@ -28,15 +30,16 @@ pub struct Limits {
     pub metadata_bytes: u64,
     /// Parts of a multi-part EXR. Default: 1,024.
     pub parts: u64,
-    /// Wall-clock seconds for a file in the OpenImageIO worker, and one more for each 10 million pixels; at most 86,400.
-    /// Default: 10.
+    /// Wall-clock seconds for a file in the OpenImageIO worker, and one more for each 10 million
+    /// pixels; at most 86,400. Default: 10.
     pub seconds: u64,
-    /// Bytes of a document (TOML, JSON, YAML, CSV): recipes, labels, manifests. Truth and detections in COCO's JSON are
-    /// data, for which `file_bytes` holds. Default: 16 MiB.
+    /// Bytes of a document (TOML, JSON, YAML, CSV): recipes, labels, manifests. Truth and
+    /// detections in COCO's JSON are data, for which `file_bytes` holds. Default: 16 MiB.
     pub document_bytes: u64,
     /// Levels that a document is nested, at most 80. Default: 64.
     pub document_depth: u64,
-    /// Share of the machine's memory that a picture may need, at 12 bytes for each pixel and channel, percent. Default: 50.
+    /// Share of the machine's memory that a picture may need, at 12 bytes for each pixel and
+    /// channel, percent. Default: 50.
     pub memory_percent: u64,
 }
 
@@ -52,7 +55,8 @@ const MAX_MEMORY_PERCENT: u64 = 10_000;
 /// Most bytes that a pixel takes in each channel in use: three floats.
 const BYTES_PER_SAMPLE: u64 = 12;
 
-/// Below this many decoded bytes no ratio is suspicious: a plain white picture compresses very well.
+/// Below this many decoded bytes no ratio is suspicious: a plain white picture compresses very
+/// well.
 const RATIO_FREE_BYTES: u64 = 64 << 20;
 
 impl Default for Limits {
@@ -236,8 +240,8 @@ impl Limits {
         at_most(bytes, self.metadata_bytes, what, "metadata_bytes")
     }
 
-    /// Refuses a picture that needs too much of the machine's memory; the text shows the sum. Where the system does not
-    /// report how much it has, nothing is refused.
+    /// Refuses a picture that needs too much of the machine's memory; the text shows the sum. Where
+    /// the system does not report how much it has, nothing is refused.
     pub(super) fn check_memory(
         &self,
         width: usize,
@@ -272,8 +276,8 @@ pub(super) fn saturating_product<const N: usize>(sizes: [u64; N]) -> u64 {
     sizes.into_iter().fold(1, u64::saturating_mul)
 }
 
-/// The memory of this machine, or of the control group that this process is confined to; none where the system does not
-/// report it. Asked once.
+/// The memory of this machine, or of the control group that this process is confined to; none where
+/// the system does not report it. Asked once.
 pub(super) fn machine_bytes() -> Option<u64> {
     static BYTES: OnceLock<Option<u64>> = OnceLock::new();
     *BYTES.get_or_init(usable_bytes)
@@ -330,7 +334,8 @@ pub(super) fn at_most(
     ))
 }
 
-/// Refuses what the system has no memory for, as far as it reports that: an allocation that fails ends the process.
+/// Refuses what the system has no memory for, as far as it reports that: an allocation that fails
+/// ends the process.
 pub(super) fn affordable(bytes: u64) -> std::result::Result<(), String> {
     if can_reserve(bytes) {
         return Ok(());

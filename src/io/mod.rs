@@ -1,6 +1,7 @@
 //! Input and output: the only place that opens pictures, and the only one that calls C++.
 //!
-//! A picture is read by its content, not by its name, and becomes the pixel type that the caller requests:
+//! A picture is read by its content, not by its name, and becomes the pixel type that the caller
+//! requests:
 //!
 //! ```
 //! use petcomp::{Image, LinearRgb, io};
@@ -18,42 +19,52 @@
 //! | integers (PNG, JPEG, TIFF) | decoded with the exact sRGB curve, unless a PNG states gamma 1 | straight unless a TIFF states otherwise | code / full scale, never decoded |
 //! | half and float (EXR, TIFF, HDR) | treated as scene-linear Rec. 709 | EXR premultiplied, TIFF as it states | as it is |
 //!
-//! Premultiplication happens here, in linear light. The orientation noted by a camera is applied. An EXR is cropped or
-//! padded with zeros from its data window to its display window ([`Window`] keeps the former), and converted if it names
-//! other primaries. A colour profile (ICC) of primaries and curves, such as Display P3 or Adobe RGB, is applied to display
-//! codes; others are named in a warning and the codes treated as sRGB. Inks (CMYK) are multiplied. Samples that are infinite or
-//! NaN are counted in a warning, and become codes of 0 or full scale where integers are written.
+//! Premultiplication happens here, in linear light. The orientation noted by a camera is applied.
+//! An EXR is cropped or padded with zeros from its data window to its display window ([`Window`]
+//! keeps the former), and converted if it names other primaries. A colour profile (ICC) of
+//! primaries and curves, such as Display P3 or Adobe RGB, is applied to display codes; others are
+//! named in a warning and the codes treated as sRGB. Inks (CMYK) are multiplied. Samples that are
+//! infinite or NaN are counted in a warning, and become codes of 0 or full scale where integers are
+//! written.
 //!
 //! # What holds for untrusted files
 //!
-//! No file crashes petcomp, hangs it, exhausts the machine's memory or leads out of its folder; what can be read is read
-//! correctly, what cannot is named in one line.
+//! No file crashes petcomp, hangs it, exhausts the machine's memory or leads out of its folder;
+//! what can be read is read correctly, what cannot is named in one line.
 //!
-//! * **What is opened.** Regular files only, by content and not by name: EXR, PNG, JPEG, TIFF, Radiance HDR; DPX and Cineon
-//!   only under their own names.
-//! * **What a file may ask for** is in [`Limits`], and checked before pixels are touched, in arithmetic that cannot wrap: by default
-//!   32,768 pixels along a side, 128 Mi in all, 64 channels, 1 GiB decoded, 10,000 times the file above 64 MiB, 64 MiB that
-//!   is not pixels. Memory that the system does not give is not attempted.
-//! * **Who decodes.** Decoders in Rust, in this process; one that panics has met a damaged file. What they do not know goes
-//!   to OpenImageIO in a worker process, which gets the file's bytes and gives samples through pipes. It may open no file
-//!   (Landlock, seccomp, file size 0), start nothing, connect nowhere, has memory for the current file only, and is killed when it takes
-//!   more than [`Limits::seconds`]. A file on which two workers die is named with the signal. The worker is not trusted either.
-//! * **What is written** goes to a temporary file beside its place, is synced, and moved there: whole or not at all. A link in
-//!   its place is replaced, not followed; `refuse_links` keeps outputs in their folder. No metadata of an input
-//!   gets into an output, so neither positions (GPS) nor serial numbers do.
-//! * **Where a document leads.** A path in a document that may come from anywhere (journal and manifest of a dataset or an
-//!   asset folder, label, scene, scene for another renderer) is looked for in the folder of that document alone: [`inside`] refuses `..`, links
-//!   that lead out, and all but regular files. Trusted are documents that people write for themselves and that name files
-//!   elsewhere on purpose: recipes (`assets`, `backgrounds`, `environment.files`), lists of photos, `data.yaml` and the lists it names.
-//!   What they name must be regular files within the limits too. Files that petcomp appends to (`.lock`, `index.jsonl`,
-//!   `.runs.jsonl`) are refused where a link is in their place.
-//! * **Documents** (JSON, TOML) are by default at most 16 MiB and nested 64 deep, without duplicate keys or numbers that are not
-//!   finite; a mistake is named with its line.
+//! * **What is opened.** Regular files only, by content and not by name: EXR, PNG, JPEG, TIFF,
+//!   Radiance HDR; DPX and Cineon only under their own names.
+//! * **What a file may ask for** is in [`Limits`], and checked before pixels are touched, in
+//!   arithmetic that cannot wrap: by default 32,768 pixels along a side, 128 Mi in all, 64
+//!   channels, 1 GiB decoded, 10,000 times the file above 64 MiB, 64 MiB that is not pixels. Memory
+//!   that the system does not give is not attempted.
+//! * **Who decodes.** Decoders in Rust, in this process; one that panics has met a damaged file.
+//!   What they do not know goes to OpenImageIO in a worker process, which gets the file's bytes and
+//!   gives samples through pipes. It may open no file (Landlock, seccomp, file size 0), start
+//!   nothing, connect nowhere, has memory for the current file only, and is killed when it takes
+//!   more than [`Limits::seconds`]. A file on which two workers die is named with the signal. The
+//!   worker is not trusted either.
+//! * **What is written** goes to a temporary file beside its place, is synced, and moved there:
+//!   whole or not at all. A link in its place is replaced, not followed; `refuse_links` keeps
+//!   outputs in their folder. No metadata of an input gets into an output, so neither positions
+//!   (GPS) nor serial numbers do.
+//! * **Where a document leads.** A path in a document that may come from anywhere (journal and
+//!   manifest of a dataset or an asset folder, label, scene, scene for another renderer) is looked
+//!   for in the folder of that document alone: [`inside`] refuses `..`, links that lead out, and
+//!   all but regular files. Trusted are documents that people write for themselves and that name
+//!   files elsewhere on purpose: recipes (`assets`, `backgrounds`, `environment.files`), lists of
+//!   photos, `data.yaml` and the lists it names. What they name must be regular files within the
+//!   limits too. Files that petcomp appends to (`.lock`, `index.jsonl`, `.runs.jsonl`) are refused
+//!   where a link is in their place.
+//! * **Documents** (JSON, TOML) are by default at most 16 MiB and nested 64 deep, without duplicate
+//!   keys or numbers that are not finite; a mistake is named with its line.
 //!
-//! Not guaranteed: that decoders have no bugs ([`oiio::read`] and [`Fallback::InProcess`] let OpenImageIO's into this process,
-//! and Debian does not fix them), that a kernel without Landlock or seccomp has an equal sandbox (one warning reports it;
-//! [`Fallback::StrictWorker`] refuses), that the stages behind reading fit into any memory, or anything against a person with an account on the machine. Half-grey
-//! pictures out of JPEGs that are damaged in the middle, with their end in place, cannot be distinguished from real ones.
+//! Not guaranteed: that decoders have no bugs ([`oiio::read`] and [`Fallback::InProcess`] let
+//! OpenImageIO's into this process, and Debian does not fix them), that a kernel without Landlock
+//! or seccomp has an equal sandbox (one warning reports it; [`Fallback::StrictWorker`] refuses),
+//! that the stages behind reading fit into any memory, or anything against a person with an account
+//! on the machine. Half-grey pictures out of JPEGs that are damaged in the middle, with their end
+//! in place, cannot be distinguished from real ones.
 
 mod codec;
 mod decode;

@@ -1,7 +1,9 @@
-//! Pictures through OpenImageIO in this process: for those who trust their files, and for comparisons.
+//! Pictures through OpenImageIO in this process: for those who trust their files, and for
+//! comparisons.
 //!
-//! A damaged file can crash OpenImageIO, and a program that calls this module links about 260 shared libraries.
-//! [`io::read`](super::read) calls it in a process of its own, for the kinds of file that the Rust decoders do not know.
+//! A damaged file can crash OpenImageIO, and a program that calls this module links about 260
+//! shared libraries. [`io::read`](super::read) calls it in a process of its own, for the kinds of
+//! file that the Rust decoders do not know.
 
 pub use super::worker::Linked;
 
@@ -27,7 +29,8 @@ pub fn in_process() -> Linked {
     Linked(openimageio::answer)
 }
 
-/// Reads a picture through OpenImageIO, in this process; pixels mean the same as in [`io::read`](super::read).
+/// Reads a picture through OpenImageIO, in this process; pixels mean the same as in
+/// [`io::read`](super::read).
 ///
 /// # Errors
 /// [`Error::File`] as [`io::read`](super::read). A damaged file may end the process instead.
@@ -42,7 +45,8 @@ pub fn read<P: FromFile>(path: impl AsRef<Path>) -> Result<Image<P>> {
 /// Writes a picture through OpenImageIO, encoded as [`io::write_with`](super::write_with) does.
 ///
 /// # Errors
-/// [`Error::File`] as [`io::write_with`](super::write_with); the file is written in place, not beside it.
+/// [`Error::File`] as [`io::write_with`](super::write_with); the file is written in place, not
+/// beside it.
 pub fn write_with<P: ToFile>(
     path: impl AsRef<Path>,
     image: &Image<P>,

@@ -15,9 +15,11 @@ pub enum Fallback {
     /// OpenImageIO in a process of its own, where petcomp was built with the feature `oiio`.
     #[default]
     Worker,
-    /// As `Worker`, but such files are refused where the system cannot sandbox it, with Landlock and seccomp.
+    /// As `Worker`, but such files are refused where the system cannot sandbox it, with Landlock
+    /// and seccomp.
     StrictWorker,
-    /// OpenImageIO in this process, for people who trust their files: [`oiio::in_process`](super::oiio::in_process).
+    /// OpenImageIO in this process, for people who trust their files:
+    /// [`oiio::in_process`](super::oiio::in_process).
     #[cfg(feature = "oiio")]
     InProcess(Linked),
 }
@@ -50,8 +52,8 @@ impl Default for ReadOptions {
 }
 
 impl ReadOptions {
-    /// Makes these the default of this process, for every file that a stage reads by itself. Decides which files are
-    /// read, never what is in them; for programs, once, at their start.
+    /// Makes these the default of this process, for every file that a stage reads by itself.
+    /// Decides which files are read, never what is in them; for programs, once, at their start.
     ///
     /// # Errors
     /// [`Error::Value`] when it was done before.

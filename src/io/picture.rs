@@ -84,7 +84,8 @@ impl Picture {
             .is_ok_and(|picked| picked.len() > 3)
     }
 
-    /// The colours of some rows, as [`read`](super::read) makes them; of `LinearRgb`, without a look at alpha.
+    /// The colours of some rows, as [`read`](super::read) makes them; of `LinearRgb`, without a
+    /// look at alpha.
     ///
     /// # Panics
     /// When the rows reach outside the picture, or the requested pixels are not colours.

@@ -18,13 +18,14 @@ use std::path::Path;
 
 /// Reads a picture as pixels of the requested type, with the default [`ReadOptions`].
 ///
-/// `LinearRgb` wants an opaque picture: one with alpha below 1 is refused, an alpha of 1 is dropped. `PremulRgba` and
-/// `StraightRgba` get alpha 1 from a file without alpha. `Coverage` is the only channel of a file, or `R`, `G` and `B` where
-/// they are equal and no alpha below 1 is beside them, or `A`; `Depth` the only one, or `Z`, in float.
+/// `LinearRgb` wants an opaque picture: one with alpha below 1 is refused, an alpha of 1 is
+/// dropped. `PremulRgba` and `StraightRgba` get alpha 1 from a file without alpha. `Coverage` is
+/// the only channel of a file, or `R`, `G` and `B` where they are equal and no alpha below 1 is
+/// beside them, or `A`; `Depth` the only one, or `Z`, in float.
 ///
 /// # Errors
-/// [`Error::File`] for a file that is missing, not regular, not a picture, damaged, beyond the limits, or without the
-/// required channels.
+/// [`Error::File`] for a file that is missing, not regular, not a picture, damaged, beyond the
+/// limits, or without the required channels.
 pub fn read<P: FromFile>(path: impl AsRef<Path>) -> Result<Image<P>> {
     read_with(path, &ReadOptions::default())
 }
@@ -93,7 +94,8 @@ pub(super) fn read_by<P: FromFile>(
     Picture::from_raster(raster, &source, &options.limits, P::WANTED)?.into_image()
 }
 
-/// Reads a picture through the OpenImageIO worker, even one that the Rust decoders could read: for comparisons.
+/// Reads a picture through the OpenImageIO worker, even one that the Rust decoders could read: for
+/// comparisons.
 ///
 /// # Errors
 /// As [`read_with`].

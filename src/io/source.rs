@@ -23,7 +23,8 @@ pub(super) struct OpenedSource {
 }
 
 impl OpenedSource {
-    /// Opens a picture file that is worth decoding: regular, not empty, of a known kind, not larger than allowed.
+    /// Opens a picture file that is worth decoding: regular, not empty, of a known kind, not larger
+    /// than allowed.
     pub(super) fn open(path: &Path, limits: &Limits) -> Result<Self> {
         let (file, bytes) = open_regular(path, (limits.file_bytes, "file_bytes"), "picture")?;
         let mut file = BufReader::new(file);
@@ -58,8 +59,8 @@ impl SourceFile {
 /// The kinds of file that messages name.
 const EXPECTED_FORMATS: &str = "expected EXR, PNG, JPEG, TIFF or HDR";
 
-/// The kind of a file by its first bytes. Film scans are read only under a name of their own: OpenImageIO has to read
-/// them, and what is called otherwise was not meant to be one.
+/// The kind of a file by its first bytes. Film scans are read only under a name of their own:
+/// OpenImageIO has to read them, and what is called otherwise was not meant to be one.
 fn recognized(path: &Path, start: &[u8]) -> std::result::Result<Format, String> {
     if start.is_empty() {
         return Err("empty file (0 bytes), expected a picture".into());

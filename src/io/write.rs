@@ -15,11 +15,13 @@ use std::path::Path;
 /// How a picture is written.
 #[derive(Clone, Debug)]
 pub struct WriteOptions {
-    /// Storage of a sample. Default: the format's own (PNG and JPEG 8 bits, TIFF 16 bits, EXR half; depths always float).
+    /// Storage of a sample. Default: the format's own (PNG and JPEG 8 bits, TIFF 16 bits, EXR
+    /// half; depths always float).
     pub bits: Option<Bits>,
     /// Compression of an EXR. Default: [`Compression::Zip`].
     pub compression: Compression,
-    /// How much work goes into compressing a PNG, which is lossless at any effort. Default: [`Quality::Normal`].
+    /// How much work goes into compressing a PNG, which is lossless at any effort. Default:
+    /// [`Quality::Normal`].
     pub png_effort: Quality,
     /// Quality of a JPEG, 1 to 100. Default: 95.
     pub jpeg_quality: u8,
@@ -39,7 +41,8 @@ impl Default for WriteOptions {
     }
 }
 
-/// Names the colour space of float files that petcomp writes; other programs drop or rename their own attribute for it.
+/// Names the colour space of float files that petcomp writes; other programs drop or rename their
+/// own attribute for it.
 const COLORSPACE: (&str, &str) = ("petcomp:colorspace", "scene-linear Rec. 709");
 
 /// Writes a picture with the defaults of [`WriteOptions`]; see [`write_with`].
@@ -52,13 +55,13 @@ pub fn write<P: ToFile>(path: impl AsRef<Path>, image: &Image<P>) -> Result<()> 
 
 /// Writes a picture in the format that the extension names: `exr`, `png`, `jpg`, `tif`.
 ///
-/// Colours go display-encoded (sRGB, straight alpha, clipped to 0 to 1) into integer samples and scene-linear
-/// (premultiplied, unclipped) into float ones; mattes are stored as they are. The file appears whole or not at all, and
-/// the same picture gives the same bytes.
+/// Colours go display-encoded (sRGB, straight alpha, clipped to 0 to 1) into integer samples and
+/// scene-linear (premultiplied, unclipped) into float ones; mattes are stored as they are. The file
+/// appears whole or not at all, and the same picture gives the same bytes.
 ///
 /// # Errors
-/// [`Error::File`] for an extension that is not written, samples that the format or the pixel cannot have, transparent
-/// pixels in a JPEG, an empty picture, and errors of the system.
+/// [`Error::File`] for an extension that is not written, samples that the format or the pixel
+/// cannot have, transparent pixels in a JPEG, an empty picture, and errors of the system.
 pub fn write_with<P: ToFile>(
     path: impl AsRef<Path>,
     image: &Image<P>,
@@ -136,8 +139,8 @@ pub(super) fn sample_storage<P: ToFile>(
     Err(format!("{} samples, expected {expected}", bits.name()))
 }
 
-/// What a format can store of a pixel that means something in integers (`coded`), or of one that does not; its own choice
-/// first.
+/// What a format can store of a pixel that means something in integers (`coded`), or of one that
+/// does not; its own choice first.
 fn possible_storage(
     format: Option<Format>,
     coded: bool,

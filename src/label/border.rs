@@ -5,7 +5,8 @@ use crate::label::{Labels, ObjectLabel, trace};
 use crate::pixel::ObjectId;
 use serde::{Deserialize, Serialize};
 
-/// The borders of an object's masks, pixels: one polygon for each part, clockwise in the picture, holes joined by slits.
+/// The borders of an object's masks, pixels: one polygon for each part, clockwise in the picture,
+/// holes joined by slits.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Border {
     /// Which object of the scene.

@@ -8,6 +8,7 @@ use crate::image::{Image, Roi};
 use crate::io;
 use crate::pixel::LinearRgb;
 use crate::plot::base64;
+pub(crate) use crate::plot::clipped;
 use crate::plot::markup::text;
 use maud::{Markup, PreEscaped, html};
 use std::ops::Range;
@@ -19,8 +20,8 @@ const JPEG_QUALITY: u8 = 82;
 /// Height of letters, as a share of the longer side of what is shown.
 const LETTER_SHARE: f64 = 0.045;
 
-/// What a page with galleries needs once. An enlarged picture is the target of the address, so no script is needed for
-/// it; the script adds the keys Escape and the arrows.
+/// What a page with galleries needs once. An enlarged picture is the target of the address, so no
+/// script is needed for it; the script adds the keys Escape and the arrows.
 pub(crate) const STYLE: &str = "<style>.gallery{display:grid;grid-template-columns:repeat(auto-fill,minmax(240px,1fr));\
     gap:14px;margin:1em 0}.gallery>div{min-width:0}.gallery figure{margin:0;overflow:visible}\
     .gallery .frame{display:block;position:relative;width:min(100%,calc(320px*var(--aspect)));background:#eee}\
@@ -51,12 +52,8 @@ impl Figure {
     /// A picture that cannot be read.
     pub(crate) fn cropped(path: &Path, size: [f64; 2], view: BBox) -> Result<Self> {
         let picture = io::read::<LinearRgb>(path)?;
-        let scale = [
-            picture.width() as f64 / size[0],
-            picture.height() as f64 / size[1],
-        ];
-        let columns = pixel_span([view.x0, view.x1], scale[0], picture.width());
-        let rows = pixel_span([view.y0, view.y1], scale[1], picture.height());
+        let scale = scale_of(&picture, size);
+        let [columns, rows] = visible_pixels(&picture, &view, scale);
         if columns.is_empty() || rows.is_empty() {
             let what = "nothing of it lies in the part to be shown";
             return Err(Error::file(path, what));
@@ -116,16 +113,39 @@ impl Figure {
 
     /// The picture under its drawing, which a click enlarges.
     fn frame(&self, address: &str) -> Markup {
-        let (w, h) = (self.view.width(), self.view.height());
-        let view_box = format!("{:.2} {:.2} {w:.2} {h:.2}", self.view.x0, self.view.y0);
+        let aspect = self.view.width() / self.view.height();
         let data = format!("data:image/jpeg;base64,{}", base64(&self.jpeg));
         html! {
-            a class="frame" href=(address) title="enlarge" style=(format_args!("--aspect:{:.4}", w / h)) {
+            a class="frame" href=(address) title="enlarge" style=(format_args!("--aspect:{aspect:.4}")) {
                 img alt=(text(&self.caption)) src=(data);
-                svg viewBox=(view_box) { (PreEscaped(&self.drawing)) }
+                svg viewBox=(self.view_box()) { (PreEscaped(&self.drawing)) }
             }
         }
     }
+
+    fn view_box(&self) -> String {
+        let (w, h) = (self.view.width(), self.view.height());
+        format!("{:.2} {:.2} {w:.2} {h:.2}", self.view.x0, self.view.y0)
+    }
+}
+
+/// Columns and rows of the picture that a view shows.
+fn visible_pixels(
+    picture: &Image<LinearRgb>,
+    view: &BBox,
+    [scale_x, scale_y]: [f64; 2],
+) -> [Range<usize>; 2] {
+    let columns = pixel_span([view.x0, view.x1], scale_x, picture.width());
+    let rows = pixel_span([view.y0, view.y1], scale_y, picture.height());
+    [columns, rows]
+}
+
+/// Pixels of the picture for each unit of a drawing of `size`.
+fn scale_of(picture: &Image<LinearRgb>, [width, height]: [f64; 2]) -> [f64; 2] {
+    [
+        picture.width() as f64 / width,
+        picture.height() as f64 / height,
+    ]
 }
 
 /// The whole pixels between two places of a drawing, of a picture `scale` times as large.
@@ -176,7 +196,8 @@ pub(crate) fn gallery(name: &str, figures: &[Figure]) -> String {
         + "\n"
 }
 
-/// A box with words at its upper left corner, inside it where there is no room above; `style` are attributes.
+/// A box with words at its upper left corner, inside it where there is no room above; `style` are
+/// attributes.
 pub(crate) fn marked_box(
     b: &BBox,
     content: &str,
@@ -189,13 +210,22 @@ pub(crate) fn marked_box(
     if content.is_empty() {
         return rect;
     }
+    rect + &words(
+        [b.x0, words_baseline(b, letter, top)],
+        content,
+        letter,
+        color,
+    )
+}
+
+/// Above the box where there is room, else inside.
+fn words_baseline(b: &BBox, letter: f64, top: f64) -> f64 {
     let has_room_above = b.y0 - 1.2 * letter >= top;
-    let y = if has_room_above {
+    if has_room_above {
         b.y0 - 0.25 * letter
     } else {
         b.y0 + letter
-    };
-    rect + &words([b.x0, y], content, letter, color)
+    }
 }
 
 fn rectangle(b: &BBox, color: &str, style: &str) -> String {
@@ -212,15 +242,6 @@ pub(crate) fn words([x, y]: [f64; 2], content: &str, letter: f64, color: &str) -
             fill=(color) { (text(content)) }
     }
     .into_string()
-}
-
-/// No more letters of a text than there is room for.
-pub(crate) fn clipped(text: &str, letters: usize) -> String {
-    if text.chars().count() <= letters {
-        return text.to_owned();
-    }
-    let kept = text.chars().take(letters.saturating_sub(1));
-    kept.chain(['…']).collect()
 }
 
 #[cfg(test)]

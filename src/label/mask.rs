@@ -6,9 +6,9 @@ use serde::{Deserialize, Serialize};
 
 /// Yes or no for each pixel of a picture, in the run lengths that COCO uses.
 ///
-/// The runs go down the columns, from left to right, and take turns: the first is of pixels outside, the second of pixels
-/// inside, and so on. In files: `{ size = [height, width], counts = "..." }`, COCO's compressed text. The default is the
-/// mask of a picture without pixels.
+/// The runs go down the columns, from left to right, and take turns: the first is of pixels
+/// outside, the second of pixels inside, and so on. In files: `{ size = [height, width], counts =
+/// "..." }`, COCO's compressed text. The default is the mask of a picture without pixels.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "rle::MaskText", into = "rle::MaskText")]
 pub struct RleMask {
@@ -19,7 +19,7 @@ pub struct RleMask {
 impl RleMask {
     /// From what `inside` says of column and row; `size` is width and height.
     pub fn from_fn(size: [u32; 2], mut inside: impl FnMut(u32, u32) -> bool) -> Self {
-        let pixels = (0..size[0]).flat_map(|x| (0..size[1]).map(move |y| (x, y)));
+        let pixels = pixels_by_column(size);
         Self::from_pixels(size, pixels.map(|(x, y)| inside(x, y)))
     }
 
@@ -39,9 +39,7 @@ impl RleMask {
 
     /// From runs; none unless they add up to the picture, no run but the first being empty.
     pub(crate) fn from_runs(size: [u32; 2], runs: Vec<u32>) -> Option<Self> {
-        let sum: u64 = runs.iter().map(|&n| u64::from(n)).sum();
-        let has_no_gap = runs.iter().skip(1).all(|&n| n > 0);
-        (has_no_gap && sum == pixel_count(size)).then_some(Self { size, runs })
+        are_runs_of(size, &runs).then_some(Self { size, runs })
     }
 
     /// Width and height of the picture.
@@ -96,10 +94,10 @@ impl RleMask {
 /// The box around the pixels from one to another, counted down the columns.
 fn bounds_of_run(first: u64, last: u64, height: u64) -> BBox {
     let [left, right] = [first, last].map(|i| i / height);
-    // A run that turns into the next column touches the picture's lower and upper edge.
     let [top, bottom] = if left == right {
         [first % height, last % height + 1]
     } else {
+        // A run that turns into the next column touches the picture's lower and upper edge.
         [0, height]
     };
     BBox {
@@ -108,6 +106,18 @@ fn bounds_of_run(first: u64, last: u64, height: u64) -> BBox {
         x1: (right + 1) as f64,
         y1: bottom as f64,
     }
+}
+
+/// Whether the runs fill a picture, and none but the first is empty.
+fn are_runs_of(size: [u32; 2], runs: &[u32]) -> bool {
+    let sum: u64 = runs.iter().map(|&n| u64::from(n)).sum();
+    let has_no_gap = runs.iter().skip(1).all(|&n| n > 0);
+    has_no_gap && sum == pixel_count(size)
+}
+
+#[inline]
+fn pixels_by_column([width, height]: [u32; 2]) -> impl Iterator<Item = (u32, u32)> {
+    (0..width).flat_map(move |x| (0..height).map(move |y| (x, y)))
 }
 
 /// A mask under construction: one bit a pixel, column by column.

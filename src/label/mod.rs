@@ -1,7 +1,8 @@
 //! Label: what is where in a picture, read from the same deep samples as the picture itself.
 //!
-//! Masks, boxes and visibility are folds over the deep samples, so a label cannot disagree with its picture. Outlines and the
-//! topmost rule are geometry: the cards' outlines as the camera sees them.
+//! Masks, boxes and visibility are folds over the deep samples, so a label cannot disagree with its
+//! picture. Outlines and the topmost rule are geometry: the cards' outlines as the camera sees
+//! them.
 //!
 //! ```
 //! use petcomp::geom::{Pose, Quad};
@@ -36,7 +37,6 @@ mod visibility;
 
 #[doc(hidden)]
 pub use border::{Border, borders};
-pub(crate) use gallery::clipped;
 pub use mask::RleMask;
 #[doc(hidden)]
 pub use overlay::overlay;
@@ -63,15 +63,16 @@ pub struct Labels {
 
 /// Everything known of one object in one picture.
 ///
-/// "Amodal" is the whole object as far as it lies in the picture, as if it were alone; "visible" is what is seen of it.
+/// "Amodal" is the whole object as far as it lies in the picture, as if it were alone; "visible" is
+/// what is seen of it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ObjectLabel {
     /// Which object of the scene.
     pub id: ObjectId,
     /// Index into the class list.
     pub class: u32,
-    /// Outline projected into the picture and clipped to it, pixels: one ring per part that the clipping leaves (a
-    /// convex outline leaves one), none for a card seen edge-on.
+    /// Outline projected into the picture and clipped to it, pixels: one ring per part that the
+    /// clipping leaves (a convex outline leaves one), none for a card seen edge-on.
     pub outline_px: Vec<Vec<Point2<f64>>>,
     /// Box around the whole object.
     pub amodal_box: BBox,
@@ -79,7 +80,8 @@ pub struct ObjectLabel {
     pub visible_box: BBox,
     /// Pixels that it covers, seen or not.
     pub amodal_mask: RleMask,
-    /// Pixels in which it is seen. See-through objects over each other are seen in the same pixels.
+    /// Pixels in which it is seen. See-through objects over each other are seen in the same
+    /// pixels.
     pub visible_mask: RleMask,
     /// Seen share of its coverage, 0 to 1: what half covers a pixel counts half.
     pub visible_fraction: f64,
@@ -104,10 +106,12 @@ impl ObjectLabel {
 pub struct LabelOptions {
     /// What the amodal box is drawn around. Default: `mask`.
     pub amodal: AmodalBox,
-    /// A pixel belongs to an object when more than this share of it is covered; counts for masks, not for sums of
-    /// coverage. Default: 0.1, under which thin film and the noise of a matte look alike.
+    /// A pixel belongs to an object when more than this share of it is covered; counts for masks,
+    /// not for sums of coverage. Default: 0.1, under which thin film and the noise of a matte
+    /// look alike.
     pub alpha_threshold: f32,
-    /// Outlines are a pair of the topmost rule when their intersection over union is above this. Default: 0, any overlap.
+    /// Outlines are a pair of the topmost rule when their intersection over union is above this.
+    /// Default: 0, any overlap.
     pub overlap_iou: f64,
 }
 
@@ -151,11 +155,7 @@ struct Silhouette<'a> {
 /// When `deep` does not have the size of the shot's camera.
 pub fn label(deep: &DeepImage, shot: &Shot, options: &LabelOptions) -> Labels {
     let image = shot.camera.image;
-    assert_eq!(
-        (deep.width(), deep.height()),
-        (image[0] as usize, image[1] as usize),
-        "deep picture and camera differ"
-    );
+    check_size(deep, image);
     let mut objects = silhouettes(deep, shot, options);
     objects.retain(|s| !s.amodal_box(options.amodal).is_empty());
     let occluders = topmost::occluders(&objects, &shot.camera, options.overlap_iou);
@@ -167,27 +167,44 @@ pub fn label(deep: &DeepImage, shot: &Shot, options: &LabelOptions) -> Labels {
     }
 }
 
+fn check_size(deep: &DeepImage, [width, height]: [u32; 2]) {
+    assert_eq!(
+        (deep.width(), deep.height()),
+        (width as usize, height as usize),
+        "deep picture and camera differ"
+    );
+}
+
 /// All cards of a shot as its camera sees them, in order of id.
 fn silhouettes<'a>(
     deep: &DeepImage,
     shot: &'a Shot,
     options: &LabelOptions,
 ) -> Vec<Silhouette<'a>> {
-    let mut cards: Vec<&Card> = shot.cards.iter().collect();
-    cards.sort_by_key(|card| card.id);
+    let cards = cards_by_id(shot);
     let ids: Vec<_> = cards.iter().map(|card| card.id).collect();
     let visibilities = visibility::fold_samples(deep, &ids, options);
     let pairs = cards.into_iter().zip(visibilities);
     pairs
-        .map(|(card, visibility)| Silhouette {
-            card,
-            region: outline::region(card, &shot.camera),
-            visibility,
-        })
+        .map(|(card, visibility)| Silhouette::new(card, &shot.camera, visibility))
         .collect()
 }
 
-impl Silhouette<'_> {
+fn cards_by_id(shot: &Shot) -> Vec<&Card> {
+    let mut cards: Vec<&Card> = shot.cards.iter().collect();
+    cards.sort_by_key(|card| card.id);
+    cards
+}
+
+impl<'a> Silhouette<'a> {
+    fn new(card: &'a Card, camera: &Camera, visibility: ObjectVisibility) -> Self {
+        Self {
+            card,
+            region: outline::region(card, camera),
+            visibility,
+        }
+    }
+
     fn amodal_box(&self, around: AmodalBox) -> BBox {
         match around {
             AmodalBox::Mask => self.visibility.amodal.bounds(),

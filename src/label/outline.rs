@@ -1,30 +1,35 @@
 //! Outlines of cards, projected into the picture and clipped to it.
 //!
 //! # Method
-//! The outline is clipped in space, before the division by depth, against the pyramid of the picture (Sutherland and
-//! Hodgman, "Reentrant Polygon Clipping", 1974), so a card that reaches behind the camera projects like any other. What
-//! that leaves along the picture's edge, and loops of an outline that crosses itself, a boolean operation of `geo` then
-//! resolves under the non-zero rule: whatever the outline winds around is inside.
+//! The outline is clipped in space, before the division by depth, against the pyramid of the
+//! picture (Sutherland and Hodgman, "Reentrant Polygon Clipping", 1974), so a card that reaches
+//! behind the camera projects like any other. What that leaves along the picture's edge, and loops
+//! of an outline that crosses itself, a boolean operation of `geo` then resolves under the non-zero
+//! rule: whatever the outline winds around is inside.
 
 use crate::camera::Camera;
 use crate::geom::BBox;
 use crate::geom::{Point2, Vector3};
 use crate::scene::Card;
 use geo::bool_ops::FillRule;
-use geo::{Area, BooleanOps, BoundingRect, Coord, LineString, MapCoords, MultiPolygon, Polygon};
+use geo::{
+    Area, BooleanOps, BoundingRect, Coord, LineString, MapCoords, MultiPolygon, Polygon, Rect,
+};
 
-/// Least distance from the camera that is projected, metres: closer than any lens focuses, far above rounding.
+/// Least distance from the camera that is projected, metres: closer than any lens focuses, far
+/// above rounding.
 const NEAR_PLANE_M: f64 = 1e-4;
 
-/// Parts of an outline smaller than this are rounding, square pixels: `geo` snaps to a grid of 2^-30 of the extent, which
-/// along the sides of a picture of 32,768 pixels makes slivers of a hundredth of this.
+/// Parts of an outline smaller than this are rounding, square pixels: `geo` snaps to a grid of
+/// 2^-30 of the extent, which along the sides of a picture of 32,768 pixels makes slivers of a
+/// hundredth of this.
 const SLIVER_AREA_PX2: f64 = 1e-2;
 
-/// The part of the picture that lies inside a card's outline; empty where the card is out of sight or edge-on.
+/// The part of the picture that lies inside a card's outline; empty where the card is out of sight
+/// or edge-on.
 pub(crate) fn region(card: &Card, camera: &Camera) -> MultiPolygon<f64> {
-    let seen = clip_to_view(in_camera(card, camera), camera);
-    let px: Vec<_> = seen.iter().map(|p| to_pixel(p, camera)).collect();
-    if px.len() < 3 || px.iter().any(|p| !p.x.is_finite() || !p.y.is_finite()) {
+    let px = projected(card, camera);
+    if !has_area(&px) {
         return MultiPolygon(Vec::new());
     }
     let outline = Polygon::new(LineString(px), Vec::new());
@@ -32,6 +37,16 @@ pub(crate) fn region(card: &Card, camera: &Camera) -> MultiPolygon<f64> {
     without_slivers(parts)
         .map(|part| part.map_coords(|c| clamp_to_picture(c, camera)))
         .collect()
+}
+
+/// The outline of the part in view, pixels.
+fn projected(card: &Card, camera: &Camera) -> Vec<Coord<f64>> {
+    let seen = clip_to_view(in_camera(card, camera), camera);
+    seen.iter().map(|p| to_pixel(p, camera)).collect()
+}
+
+fn has_area(px: &[Coord<f64>]) -> bool {
+    px.len() >= 3 && px.iter().all(|p| p.x.is_finite() && p.y.is_finite())
 }
 
 fn clamp_to_picture(c: Coord<f64>, camera: &Camera) -> Coord<f64> {
@@ -66,9 +81,10 @@ fn outer_ring(part: &Polygon<f64>) -> Vec<Point2<f64>> {
 
 /// The smallest box around a region.
 pub(crate) fn bounds(region: &MultiPolygon<f64>) -> BBox {
-    let Some(rect) = region.bounding_rect() else {
-        return BBox::default();
-    };
+    region.bounding_rect().map(bbox_of).unwrap_or_default()
+}
+
+fn bbox_of(rect: Rect<f64>) -> BBox {
     let (min, max) = (rect.min(), rect.max());
     BBox {
         x0: min.x,
@@ -139,8 +155,8 @@ mod tests {
     use proptest::prelude::*;
     use std::sync::Arc;
 
-    /// Outlines have their corners on a grid of so many cells a side, so that they often touch, cross themselves, run
-    /// back along themselves, and share edges.
+    /// Outlines have their corners on a grid of so many cells a side, so that they often touch,
+    /// cross themselves, run back along themselves, and share edges.
     const GRID: u32 = 8;
 
     /// Pixels of a cell; a card fills the picture.
@@ -198,7 +214,8 @@ mod tests {
             })
     }
 
-    /// Points between pixels' centres, away from every line through two points of the grid by more than rounding.
+    /// Points between pixels' centres, away from every line through two points of the grid by more
+    /// than rounding.
     fn points() -> impl Iterator<Item = Point2<f64>> {
         let along = |i: u32| f64::from(i) + 0.514_285_7;
         (0..SIDE as u32).flat_map(move |y| {

@@ -10,19 +10,22 @@ use crate::pixel::{PremulRgba, Srgb8};
 /// Colour of outlines without a label.
 pub(crate) const UNLABELLED: Srgb8 = draw::rgb(0xC8, 0xC8, 0xC8);
 
-/// Draws labels onto a scene-linear picture (over black where it is transparent): a box with the name of its class around
-/// each topmost object, the outlines of the others in thin grey.
+/// Draws labels onto a scene-linear picture (over black where it is transparent): a box with the
+/// name of its class around each topmost object, the outlines of the others in thin grey.
 ///
 /// `classes` are names in order; a class beyond them is named by its number.
 pub fn overlay(frame: &Image<PremulRgba>, labels: &Labels, classes: &[String]) -> Image<Srgb8> {
     let mut canvas = frame.map(|p| encode_srgb8(p.color()));
     draw_labels(&mut canvas, labels, ObjectLabel::is_topmost);
     for object in labels.objects.iter().filter(|o| o.is_topmost()) {
-        let name = classes.get(object.class as usize).cloned();
-        let name = name.unwrap_or_else(|| object.class.to_string());
-        draw_tag(&mut canvas, object, &name);
+        draw_tag(&mut canvas, object, &name_or_number(object.class, classes));
     }
     canvas
+}
+
+fn name_or_number(class: u32, names: &[String]) -> String {
+    let name = names.get(class as usize).cloned();
+    name.unwrap_or_else(|| class.to_string())
 }
 
 /// Draws boxes around the objects of `boxed` and outlines of the others onto a picture of any size.
@@ -31,19 +34,28 @@ pub(crate) fn draw_labels(
     labels: &Labels,
     boxed: impl Fn(&ObjectLabel) -> bool,
 ) {
-    let [width, height] = labels.image.map(|side| f64::from(side.max(1)));
-    let scale = [
-        canvas.width() as f64 / width,
-        canvas.height() as f64 / height,
-    ];
+    let scale = scale_of(canvas, labels.image);
     let (boxed, outlined): (Vec<_>, Vec<_>) = labels.objects.iter().partition(|o| boxed(o));
     for ring in outlined.into_iter().flat_map(|o| &o.outline_px) {
         draw::outline(canvas, &scaled_ring(ring, scale), UNLABELLED);
     }
     for object in boxed {
-        let b = scaled(&object.amodal_box, scale);
-        draw::border(canvas, &b, draw::class_color(object.class), 1);
+        draw_box(canvas, object, scale);
     }
+}
+
+fn draw_box(canvas: &mut Image<Srgb8>, object: &ObjectLabel, scale: [f64; 2]) {
+    let b = scaled(&object.amodal_box, scale);
+    draw::border(canvas, &b, draw::class_color(object.class), 1);
+}
+
+/// Pixels of the canvas for each of the labelled picture.
+fn scale_of(canvas: &Image<Srgb8>, image: [u32; 2]) -> [f64; 2] {
+    let [width, height] = image.map(|side| f64::from(side.max(1)));
+    [
+        canvas.width() as f64 / width,
+        canvas.height() as f64 / height,
+    ]
 }
 
 fn scaled_ring(ring: &[Point2<f64>], [scale_x, scale_y]: [f64; 2]) -> Vec<Point2<f64>> {

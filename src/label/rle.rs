@@ -1,10 +1,10 @@
 //! Run lengths as COCO writes them: one text for a mask.
 //!
 //! # Method
-//! COCO's "compressed RLE", as its annotations define it: from the fourth run on, the difference to the run two before
-//! is stored (runs of neighbouring columns are alike); each number goes, lowest bits first, into groups of five bits, the
-//! sixth bit of a group says that another follows, the highest bit of the last group is the sign; a group is the
-//! character that many places after `0`.
+//! COCO's "compressed RLE", as its annotations define it: from the fourth run on, the difference to
+//! the run two before is stored (runs of neighbouring columns are alike); each number goes, lowest
+//! bits first, into groups of five bits, the sixth bit of a group says that another follows, the
+//! highest bit of the last group is the sign; a group is the character that many places after `0`.
 
 use crate::bounds::{LONGEST_SIDE_PX, MOST_PIXELS};
 use crate::label::RleMask;
@@ -84,7 +84,7 @@ fn push_number(text: &mut String, mut number: i64) {
     loop {
         let group = (number as u8) & (MORE_FLAG - 1);
         number >>= GROUP_BITS;
-        let is_last = number == if group & SIGN_FLAG == 0 { 0 } else { -1 };
+        let is_last = number == sign_of(group);
         text.push(char::from(
             GROUP_ZERO + if is_last { group } else { group | MORE_FLAG },
         ));
@@ -92,6 +92,12 @@ fn push_number(text: &mut String, mut number: i64) {
             return;
         }
     }
+}
+
+/// All bits that follow the last group.
+#[inline]
+fn sign_of(group: u8) -> i64 {
+    if group & SIGN_FLAG == 0 { 0 } else { -1 }
 }
 
 /// The runs of a text; none where it is no text of runs.
@@ -109,21 +115,21 @@ pub(crate) fn decode(text: &str) -> Option<Vec<u32>> {
 fn pull_number(first: u8, rest: &mut impl Iterator<Item = u8>) -> Option<i64> {
     let (mut number, mut shift, mut byte) = (0, 0, first);
     loop {
-        let group = byte
-            .checked_sub(GROUP_ZERO)
-            .filter(|&group| group < 2 * MORE_FLAG)?;
+        let group = group_of(byte)?;
         number |= i64::from(group & (MORE_FLAG - 1)) << shift;
         shift += GROUP_BITS;
         if group & MORE_FLAG == 0 {
-            return Some(if group & SIGN_FLAG == 0 {
-                number
-            } else {
-                number | -1 << shift
-            });
+            return Some(number | sign_of(group) << shift);
         }
         // A difference of two runs has 33 bits: seven groups.
         byte = rest.next().filter(|_| shift < 7 * GROUP_BITS)?;
     }
+}
+
+#[inline]
+fn group_of(letter: u8) -> Option<u8> {
+    let group = letter.checked_sub(GROUP_ZERO);
+    group.filter(|&group| group < 2 * MORE_FLAG)
 }
 
 #[cfg(test)]

@@ -1,38 +1,38 @@
 //! Borders with fewer corners.
 //!
 //! # Method
-//! Corners are dropped one at a time, first the one that costs least (as Visvalingam and Whyatt, "Line generalisation by
-//! repeated elimination of points", 1993, with a distance in place of their area): the cost is the distance from the new
-//! line to the farthest corner of the first border that it passes over, so that no point of that border is ever farther from
-//! the new one than the tolerance. A corner stays while the triangle of it and its two neighbours holds another corner,
-//! its sides included, or its ring has three corners left. A line that crossed the new one would have to end in that
-//! triangle or cross one of the two lines that it replaces: so rings that did not cross never do, none turns over, none vanishes,
-//! and what lies in a hole stays there. (`docs/design.md` says what `geo`, which simplifies one polygon at a time, makes of the
+//! Corners are dropped one at a time, first the one that costs least (as Visvalingam and Whyatt,
+//! "Line generalisation by repeated elimination of points", 1993, with a distance in place of their
+//! area): the cost is the distance from the new line to the farthest corner of the first border
+//! that it passes over, so that no point of that border is ever farther from the new one than the
+//! tolerance. A corner stays while the triangle of it and its two neighbours holds another corner,
+//! its sides included, or its ring has three corners left. A line that crossed the new one would
+//! have to end in that triangle or cross one of the two lines that it replaces: so rings that did
+//! not cross never do, none turns over, none vanishes, and what lies in a hole stays there.
+//! (`docs/design.md` says what `geo`, which simplifies one polygon at a time, makes of the
 //! same rings.)
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
+use std::ops::Range;
 
 /// A closed line, without a repeated last point.
 pub(super) type Ring = Vec<[f64; 2]>;
 
-/// Rings with as few corners as the tolerance allows, pixels. Corners have whole coordinates of at least 0.
+/// Rings with as few corners as the tolerance allows, pixels. Corners have whole coordinates of at
+/// least 0.
 pub(super) fn simplified(rings: Vec<Ring>, tolerance_px: f64) -> Vec<Ring> {
     if tolerance_px <= 0.0 {
         return rings;
     }
     let mut corners = CornerLinks::new(&rings);
-    // What costs the same goes in the order of the rings.
-    let mut open: BinaryHeap<_> = (0..corners.positions.len())
-        .map(|at| Reverse(corners.candidate(at)))
-        .collect();
+    let mut open = corners.candidates();
     while let Some(Reverse(candidate)) = open.pop() {
-        let at = candidate.corner;
-        let is_outdated = !corners.kept[at] || corners.candidate(at) != candidate;
-        if is_outdated || candidate.cost() > tolerance_px || !corners.may_drop(at) {
+        let is_outdated = !corners.is_current(candidate);
+        if is_outdated || candidate.cost() > tolerance_px || !corners.may_drop(candidate.corner) {
             continue;
         }
-        let neighbours = corners.drop(at);
+        let neighbours = corners.drop(candidate.corner);
         open.extend(neighbours.map(|at| Reverse(corners.candidate(at))));
     }
     corners.rings()
@@ -74,6 +74,19 @@ struct RingSpan {
 }
 
 impl RingSpan {
+    fn new(first: usize, length: usize) -> Self {
+        Self {
+            first,
+            length,
+            left: length,
+        }
+    }
+
+    /// All that there were.
+    fn corners(&self) -> Range<usize> {
+        self.first..self.first + self.length
+    }
+
     /// The corner after another one, of all that there were.
     fn follower(&self, at: usize) -> usize {
         self.first + (at + 1 - self.first) % self.length
@@ -104,18 +117,24 @@ impl CornerLinks {
 
     /// Links the corners of the next ring.
     fn append(&mut self, length: usize) {
-        let first = self.ring_of.len();
-        let span = RingSpan {
-            first,
-            length,
-            left: length,
-        };
-        for at in first..first + length {
+        let span = RingSpan::new(self.ring_of.len(), length);
+        for at in span.corners() {
             self.before.push(span.leader(at));
             self.after.push(span.follower(at));
             self.ring_of.push(self.rings.len());
         }
         self.rings.push(span);
+    }
+
+    /// All corners; what costs the same goes in the order of the rings.
+    fn candidates(&self) -> BinaryHeap<Reverse<Candidate>> {
+        let corners = 0..self.positions.len();
+        corners.map(|at| Reverse(self.candidate(at))).collect()
+    }
+
+    /// Whether its corner is left and still costs what it did.
+    fn is_current(&self, candidate: Candidate) -> bool {
+        self.kept[candidate.corner] && self.candidate(candidate.corner) == candidate
     }
 
     fn candidate(&self, corner: usize) -> Candidate {
@@ -125,7 +144,8 @@ impl CornerLinks {
         }
     }
 
-    /// The farthest corner that there was, between the neighbours of a corner, from the line between those.
+    /// The farthest corner that there was, between the neighbours of a corner, from the line
+    /// between those.
     fn cost(&self, at: usize) -> f64 {
         let (a, b) = (self.before[at], self.after[at]);
         let line = [self.positions[a], self.positions[b]];
@@ -145,9 +165,13 @@ impl CornerLinks {
         }
         let own = [self.before[at], at, self.after[at]];
         let triangle = own.map(|i| self.positions[i]);
-        !self.corners_near(triangle).any(|i| {
-            self.kept[i] && !own.contains(&i) && triangle_holds(triangle, self.positions[i])
-        })
+        let mut near = self.corners_near(triangle);
+        !near.any(|i| self.is_held(i, triangle) && !own.contains(&i))
+    }
+
+    /// Whether a corner is left and lies in the triangle.
+    fn is_held(&self, i: usize, triangle: [[f64; 2]; 3]) -> bool {
+        self.kept[i] && triangle_holds(triangle, self.positions[i])
     }
 
     /// The corners within the bounds of a triangle.
@@ -173,19 +197,22 @@ impl CornerLinks {
     }
 
     fn kept_ring(&self, ring: &RingSpan) -> Ring {
-        let corners = ring.first..ring.first + ring.length;
-        let kept = corners.filter(|i| self.kept[*i]);
+        let kept = ring.corners().filter(|i| self.kept[*i]);
         kept.map(|i| self.positions[i]).collect()
     }
 }
 
 fn by_row(positions: &[[f64; 2]]) -> Vec<Vec<usize>> {
-    let bottom = positions.iter().map(|c| c[1] as usize).max().unwrap_or(0);
-    let mut rows = vec![Vec::new(); bottom + 1];
+    let mut rows = vec![Vec::new(); last_row(positions) + 1];
     for (i, position) in positions.iter().enumerate() {
         rows[position[1] as usize].push(i);
     }
     rows
+}
+
+fn last_row(positions: &[[f64; 2]]) -> usize {
+    let rows = positions.iter().map(|c| c[1] as usize);
+    rows.max().unwrap_or(0)
 }
 
 /// Least and greatest of coordinates of at least 0.
@@ -198,7 +225,8 @@ fn extent(values: [f64; 3]) -> [f64; 2] {
 
 /// Twice the signed area of a triangle: exact for integers.
 fn doubled_triangle_area(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
-    (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+    let (u, v) = (difference(b, a), difference(c, a));
+    u[0] * v[1] - u[1] * v[0]
 }
 
 /// Whether a point within a triangle's bounds lies in it or on its sides.
@@ -214,8 +242,12 @@ fn triangle_holds([a, b, c]: [[f64; 2]; 3], p: [f64; 2]) -> bool {
 /// From a point to a line between two.
 fn distance(p: [f64; 2], [a, b]: [[f64; 2]; 2]) -> f64 {
     let (along, from) = (difference(b, a), difference(p, a));
-    let share = (dot(from, along) / dot(along, along)).clamp(0.0, 1.0);
+    let share = share_along(from, along);
     libm::hypot(from[0] - share * along[0], from[1] - share * along[1])
+}
+
+fn share_along(from: [f64; 2], along: [f64; 2]) -> f64 {
+    (dot(from, along) / dot(along, along)).clamp(0.0, 1.0)
 }
 
 #[inline]

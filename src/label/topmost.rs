@@ -1,10 +1,11 @@
 //! Which object lies over which: the topmost rule.
 //!
 //! # Method
-//! The rule of "Synthetic Data Generation for Visual Detection of Flattened PET Bottles": outlines that overlap are a
-//! pair, the one nearer the camera lies over the other, and an object that nothing lies over is unobstructed. The paper
-//! compares one altitude per object; here a pair is compared *over its overlap*, which is right for tilted cards too. The
-//! inverse depth of a plane is an affine function of the pixel position, so its mean over the overlap is its value at
+//! The rule of "Synthetic Data Generation for Visual Detection of Flattened PET Bottles": outlines
+//! that overlap are a pair, the one nearer the camera lies over the other, and an object that
+//! nothing lies over is unobstructed. The paper compares one altitude per object; here a pair is
+//! compared *over its overlap*, which is right for tilted cards too. The inverse depth of a plane
+//! is an affine function of the pixel position, so its mean over the overlap is its value at
 //! the overlap's centroid: one comparison, exact, whatever the shape.
 
 use crate::camera::Camera;
@@ -18,8 +19,8 @@ use std::collections::BTreeSet;
 
 /// For each object, the ids of those that lie over it, in order of id.
 ///
-/// Two objects are a pair when the intersection over union of their outlines is above `iou`. Of two cards at exactly the
-/// same depth, the one given first lies over the other.
+/// Two objects are a pair when the intersection over union of their outlines is above `iou`. Of two
+/// cards at exactly the same depth, the one given first lies over the other.
 pub(crate) fn occluders(
     objects: &[Silhouette<'_>],
     camera: &Camera,
@@ -69,14 +70,15 @@ fn all_above(objects: &[ObjectLabel], id: ObjectId) -> BTreeSet<ObjectId> {
     let mut found = BTreeSet::new();
     let mut next = vec![id];
     while let Some(below) = next.pop() {
-        let over = objects
-            .iter()
-            .filter(|o| o.id == below)
-            .flat_map(|o| &o.covered_by)
-            .copied();
+        let over = directly_above(objects, below);
         next.extend(over.filter(|&id| found.insert(id)).collect::<Vec<_>>());
     }
     found
+}
+
+fn directly_above(objects: &[ObjectLabel], id: ObjectId) -> impl Iterator<Item = ObjectId> {
+    let below = objects.iter().filter(move |o| o.id == id);
+    below.flat_map(|o| &o.covered_by).copied()
 }
 
 /// Centroid of the overlap of a pair; none where they are no pair.

@@ -1,25 +1,27 @@
 //! The border of a mask as polygons, along the edges of its pixels.
 //!
 //! # Method
-//! Every side of a pixel inside that has a pixel outside beyond it is an edge, directed so that the inside lies to its
-//! right; edges chain into rings, and where two pixels touch only at a corner the chain turns right, so that each ring
-//! encloses pixels joined by their sides. Corners are then dropped as far as a tolerance allows, of all rings together
-//! (`simplify.rs`). Formats know neither holes nor several parts: a hole is joined to what lies
-//! left of it, and a part to the one before it, by a slit of no width, as triangulations do (Eberly, "Triangulation by
-//! Ear Clipping", 2002). Without a tolerance the area, by the shoelace formula, stays that of the mask.
+//! Every side of a pixel inside that has a pixel outside beyond it is an edge, directed so that the
+//! inside lies to its right; edges chain into rings, and where two pixels touch only at a corner
+//! the chain turns right, so that each ring encloses pixels joined by their sides. Corners are then
+//! dropped as far as a tolerance allows, of all rings together (`simplify.rs`). Formats know
+//! neither holes nor several parts: a hole is joined to what lies left of it, and a part to the one
+//! before it, by a slit of no width, as triangulations do (Eberly, "Triangulation by Ear Clipping",
+//! 2002). Without a tolerance the area, by the shoelace formula, stays that of the mask.
 
 use super::simplify::{Ring, simplified};
-use crate::geom::Point2;
+use crate::geom::{BBox, Point2};
 use crate::label::RleMask;
 
 /// Steps to the right, down, left and up: each a right turn from the one before.
 const STEPS: [[i64; 2]; 4] = [[1, 0], [0, 1], [-1, 0], [0, -1]];
 
-/// The parts of a mask, joined by the sides of their pixels: one closed polygon each, clockwise in the picture, holes
-/// joined by slits. Together they cover what the mask covers.
+/// The parts of a mask, joined by the sides of their pixels: one closed polygon each, clockwise in
+/// the picture, holes joined by slits. Together they cover what the mask covers.
 ///
-/// Corners that the border goes without are dropped: no point of it is then farther than `tolerance_px` from the polygons,
-/// and no side crosses another. 0 keeps all corners; parts and holes are kept at any tolerance.
+/// Corners that the border goes without are dropped: no point of it is then farther than
+/// `tolerance_px` from the polygons, and no side crosses another. 0 keeps all corners; parts and
+/// holes are kept at any tolerance.
 pub fn polygons(mask: &RleMask, tolerance_px: f64) -> Vec<Vec<Point2<f64>>> {
     joined_parts(mask, tolerance_px)
         .into_iter()
@@ -27,8 +29,8 @@ pub fn polygons(mask: &RleMask, tolerance_px: f64) -> Vec<Vec<Point2<f64>>> {
         .collect()
 }
 
-/// The whole mask as one closed polygon, parts and holes joined by slits, simplified as [`polygons`] are; without points
-/// for an empty mask.
+/// The whole mask as one closed polygon, parts and holes joined by slits, simplified as
+/// [`polygons`] are; without points for an empty mask.
 pub fn polygon(mask: &RleMask, tolerance_px: f64) -> Vec<Point2<f64>> {
     let mut parts = joined_parts(mask, tolerance_px).into_iter();
     let first = parts.next().unwrap_or_default();
@@ -63,31 +65,36 @@ struct Grid {
 
 impl Grid {
     fn new(mask: &RleMask) -> Self {
-        let b = mask.bounds();
+        let mut grid = Self::around(mask.bounds());
+        for (x, y) in mask.pixels() {
+            grid.add_pixel(x, y);
+        }
+        grid
+    }
+
+    /// Without a border.
+    fn around(b: BBox) -> Self {
         let [left, top, right, bottom] = [b.x0, b.y0, b.x1, b.y1].map(|v| v as i64);
         let (columns, rows) = (right - left + 1, bottom - top + 1);
-        let mut grid = Self {
+        Self {
             left,
             top,
             columns,
             rows,
             leaving: vec![0; (columns * rows) as usize],
-        };
-        for (x, y) in mask.pixels() {
-            grid.add_pixel(i64::from(x), i64::from(y));
         }
-        grid
     }
 
     /// The four sides of a pixel, clockwise.
-    fn add_pixel(&mut self, x: i64, y: i64) {
-        let corners = [[x, y], [x + 1, y], [x + 1, y + 1], [x, y + 1]];
+    fn add_pixel(&mut self, x: u32, y: u32) {
+        let corners = pixel_corners(x.into(), y.into());
         for (direction, corner) in corners.into_iter().enumerate() {
             self.add_side(corner, direction);
         }
     }
 
-    /// A side of a pixel, leaving `at` in direction `d`: border, unless the pixel beyond it has taken the opposite side.
+    /// A side of a pixel, leaving `at` in direction `d`: border, unless the pixel beyond it has
+    /// taken the opposite side.
     fn add_side(&mut self, at: [i64; 2], d: usize) {
         let end = self.index(step(at, d));
         let opposite = 1 << ((d + 2) % 4);
@@ -104,10 +111,9 @@ impl Grid {
     }
 
     fn rings(mut self) -> Vec<Ring> {
-        let columns = self.columns;
         let mut rings = Vec::new();
-        for i in 0..columns * self.rows {
-            let at = [self.left + i % columns, self.top + i / columns];
+        for i in 0..self.columns * self.rows {
+            let at = self.corner(i);
             // Every ring has an edge to the right.
             while self.leaving[self.index(at)] & 1 != 0 {
                 rings.push(self.walk_ring(at));
@@ -116,7 +122,20 @@ impl Grid {
         rings
     }
 
-    /// Takes the ring that leaves `start` to the right; corners where it goes straight on are left out.
+    #[inline]
+    fn corner(&self, i: i64) -> [i64; 2] {
+        [self.left + i % self.columns, self.top + i / self.columns]
+    }
+
+    /// Takes away an edge of the border.
+    #[inline]
+    fn take_edge(&mut self, at: [i64; 2], d: usize) {
+        let start = self.index(at);
+        self.leaving[start] &= !(1 << d);
+    }
+
+    /// Takes the ring that leaves `start` to the right; corners where it goes straight on are left
+    /// out.
     fn walk_ring(&mut self, start: [i64; 2]) -> Ring {
         let mut ring = Vec::new();
         let (mut at, mut d, mut came) = (start, 0, usize::MAX);
@@ -124,10 +143,10 @@ impl Grid {
             if d != came {
                 ring.push(at.map(|v| v as f64));
             }
-            let here = self.index(at);
-            self.leaving[here] &= !(1 << d);
+            self.take_edge(at, d);
             (at, came) = (step(at, d), d);
-            // Another ring may pass through the same corner: this one comes back from below, to turn right.
+            // Another ring may pass through the same corner: this one comes back from below, to
+            // turn right.
             let is_closed = at == start && d == 3;
             match self.next_direction(at, d).filter(|_| !is_closed) {
                 Some(next) => d = next,
@@ -136,7 +155,8 @@ impl Grid {
         }
     }
 
-    /// Where the border goes on from a corner that it came to in direction `d`: right, straight on or left.
+    /// Where the border goes on from a corner that it came to in direction `d`: right, straight on
+    /// or left.
     fn next_direction(&self, at: [i64; 2], d: usize) -> Option<usize> {
         let leaving = self.leaving[self.index(at)];
         [1, 0, 3]
@@ -146,16 +166,23 @@ impl Grid {
     }
 }
 
+/// Clockwise.
+#[inline]
+fn pixel_corners(x: i64, y: i64) -> [[i64; 2]; 4] {
+    [[x, y], [x + 1, y], [x + 1, y + 1], [x, y + 1]]
+}
+
 fn step([x, y]: [i64; 2], d: usize) -> [i64; 2] {
     [x + STEPS[d][0], y + STEPS[d][1]]
 }
 
 /// Twice the area; negative for a hole.
 fn doubled_area(ring: &Ring) -> f64 {
-    ring.iter()
-        .zip(ring.iter().cycle().skip(1))
-        .map(|(a, b)| a[0] * b[1] - b[0] * a[1])
-        .sum()
+    edges(ring).map(|(a, b)| a[0] * b[1] - b[0] * a[1]).sum()
+}
+
+fn edges(ring: &Ring) -> impl Iterator<Item = (&[f64; 2], &[f64; 2])> {
+    ring.iter().zip(ring.iter().cycle().skip(1))
 }
 
 /// From left to right, then from above.
@@ -197,23 +224,27 @@ struct BorderCrossing {
     corner: usize,
 }
 
-fn next_border_to_the_left(parts: &[Ring], [x, y]: [f64; 2]) -> Option<BorderCrossing> {
+fn next_border_to_the_left(parts: &[Ring], from: [f64; 2]) -> Option<BorderCrossing> {
     let mut nearest: Option<BorderCrossing> = None;
     for (part, ring) in parts.iter().enumerate() {
-        for (corner, (a, b)) in ring.iter().zip(ring.iter().cycle().skip(1)).enumerate() {
-            // Edges that go up have the inside to their right.
-            let goes_up = b[1] <= y && y < a[1];
-            let crossing = a[0] + (y - a[1]) * (b[0] - a[0]) / (b[1] - a[1]);
-            if goes_up && crossing < x && nearest.as_ref().is_none_or(|n| n.x < crossing) {
-                nearest = Some(BorderCrossing {
-                    x: crossing,
-                    part,
-                    corner,
-                });
+        for (corner, (a, b)) in edges(ring).enumerate() {
+            let Some(x) = crossing_to_the_left(from, *a, *b) else {
+                continue;
+            };
+            if nearest.as_ref().is_none_or(|n| n.x < x) {
+                nearest = Some(BorderCrossing { x, part, corner });
             }
         }
     }
     nearest
+}
+
+/// Where an edge that goes up, which has the inside to its right, is passed.
+#[inline]
+fn crossing_to_the_left([x, y]: [f64; 2], a: [f64; 2], b: [f64; 2]) -> Option<f64> {
+    let goes_up = b[1] <= y && y < a[1];
+    let crossing = a[0] + (y - a[1]) * (b[0] - a[0]) / (b[1] - a[1]);
+    (goes_up && crossing < x).then_some(crossing)
 }
 
 /// Joins a part to the corner that is nearest to its first.
@@ -254,7 +285,8 @@ mod tests {
     fn winding(ring: &[Point2<f64>], x: u32, y: u32) -> i32 {
         let (x, y) = (f64::from(x) + 0.5, f64::from(y) + 0.5);
         let edges = ring.iter().zip(ring.iter().cycle().skip(1));
-        // Edges along the axes and slits along rows or, between parts, slanted: the crossing with the row decides.
+        // Edges along the axes and slits along rows or, between parts, slanted: the crossing with
+        // the row decides.
         edges.fold(0, |n, (a, b)| {
             let at = a.x + (y - a.y) * (b.x - a.x) / (b.y - a.y);
             match (a.y <= y, b.y <= y) {

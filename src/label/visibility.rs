@@ -20,7 +20,8 @@ pub(crate) struct ObjectVisibility {
     pub(crate) depth: DepthRange,
 }
 
-/// Distances of an object along the optical axis, metres, over the pixels that it touches; zeros where it touches none.
+/// Distances of an object along the optical axis, metres, over the pixels that it touches; zeros
+/// where it touches none.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct DepthRange {
     /// Of its nearest pixel.
@@ -65,6 +66,12 @@ impl VisibilityTally {
         self.alpha_depth += alpha * depth;
         self.near = self.near.min(depth);
         self.far = self.far.max(depth);
+        self.mark(x, y, sample, threshold);
+    }
+
+    /// In the masks of what covers more than the threshold.
+    #[inline]
+    fn mark(&mut self, x: usize, y: usize, sample: &DeepSample, threshold: f32) {
         if sample.alpha > threshold {
             self.amodal.insert(x, y);
         }
@@ -74,22 +81,30 @@ impl VisibilityTally {
     }
 
     fn finish(self) -> ObjectVisibility {
-        let masks = ObjectVisibility {
-            amodal: self.amodal.mask(),
-            visible: self.visible.mask(),
-            ..ObjectVisibility::default()
-        };
+        let masks = self.masks();
         if self.alpha <= 0.0 {
             return masks;
         }
         ObjectVisibility {
             fraction: (self.visible_alpha / self.alpha).clamp(0.0, 1.0),
-            depth: DepthRange {
-                near: self.near,
-                mean: self.alpha_depth / self.alpha,
-                far: self.far,
-            },
+            depth: self.depth(),
             ..masks
+        }
+    }
+
+    fn masks(&self) -> ObjectVisibility {
+        ObjectVisibility {
+            amodal: self.amodal.mask(),
+            visible: self.visible.mask(),
+            ..ObjectVisibility::default()
+        }
+    }
+
+    fn depth(&self) -> DepthRange {
+        DepthRange {
+            near: self.near,
+            mean: self.alpha_depth / self.alpha,
+            far: self.far,
         }
     }
 }

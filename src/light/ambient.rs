@@ -3,7 +3,8 @@
 use crate::geom::Vector3;
 use std::f64::consts::TAU;
 
-/// Turn from one direction to the next: the golden angle spreads any number of points evenly over a disk.
+/// Turn from one direction to the next: the golden angle spreads any number of points evenly over a
+/// disk.
 const GOLDEN_TURN: f64 = 0.381_966_011_250_105_1;
 
 /// `count` unit directions about `+z`, distributed as the cosine with it; the same ones every time.

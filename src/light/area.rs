@@ -5,7 +5,8 @@ use crate::pixel::LinearRgb;
 use crate::scene::{AreaLight, LightShape};
 use std::f64::consts::{FRAC_PI_4, PI};
 
-/// An area light in the world: its sides run along `x` and `y`, it emits to the side of `normal` only.
+/// An area light in the world: its sides run along `x` and `y`, it emits to the side of `normal`
+/// only.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LightFrame {
     /// Centre.
@@ -21,8 +22,8 @@ pub struct LightFrame {
 /// The frame of a light at `position` whose face is turned to `target`.
 ///
 /// # Method
-/// The second side leans as far towards `+y` of the world as it can; a light that shines along the y axis takes `+x`
-/// instead. A light whose target is its own position shines straight down.
+/// The second side leans as far towards `+y` of the world as it can; a light that shines along the
+/// y axis takes `+x` instead. A light whose target is its own position shines straight down.
 pub fn frame(light: &AreaLight) -> LightFrame {
     let center = Point3::from(light.position);
     let way = center - Point3::from(light.target);
@@ -36,7 +37,8 @@ pub fn frame(light: &AreaLight) -> LightFrame {
     }
 }
 
-/// Within 2.6 degrees of the y axis "towards +y" is undefined; the limit is that of the reference script.
+/// Within 2.6 degrees of the y axis "towards +y" is undefined; the limit is that of the reference
+/// script.
 fn upwards(back: &Vector3<f64>) -> Vector3<f64> {
     if back.y.abs() < 0.999 {
         Vector3::y()
@@ -63,8 +65,8 @@ impl LightFrame {
     }
 }
 
-/// Shorter sides are raised to this: a light without size is the limit of small ones, a point, which no picture can
-/// distinguish from a light of a micrometre.
+/// Shorter sides are raised to this: a light without size is the limit of small ones, a point,
+/// which no picture can distinguish from a light of a micrometre.
 const MIN_SIDE_M: f64 = 1e-6;
 
 /// Side lengths (diameters of an ellipse), metres.
@@ -81,7 +83,8 @@ pub(crate) fn face_area(light: &AreaLight) -> f64 {
     }
 }
 
-/// Emitted radiance, the same from every point into every direction of the lit side: `power * color / (pi * area)`.
+/// Emitted radiance, the same from every point into every direction of the lit side: `power * color
+/// / (pi * area)`.
 pub fn radiance(light: &AreaLight) -> LinearRgb {
     light
         .color

@@ -9,7 +9,8 @@ use std::f64::consts::PI;
 
 /// Share of the plate's pixels that are darker than its white.
 ///
-/// High, since white is the bright end; not the maximum, since a highlight or a dead pixel is not paper.
+/// High, since white is the bright end; not the maximum, since a highlight or a dead pixel is not
+/// paper.
 const WHITE_PERCENTILE: f64 = 0.99;
 
 /// Estimates what a scene leaves to its plate: the colour of the light, the exposure, the noise.
@@ -19,16 +20,17 @@ pub fn match_plate(scene: Scene, plate: &Image<LinearRgb>) -> Scene {
     match_noise(expose(match_light_tint(scene, plate), plate), plate)
 }
 
-/// Turns [`Exposure::MatchPlate`] and [`Exposure::MatchSurface`] into [`Exposure::Ev`]; a scene whose exposure is known
-/// comes back as it is.
+/// Turns [`Exposure::MatchPlate`] and [`Exposure::MatchSurface`] into [`Exposure::Ev`]; a scene
+/// whose exposure is known comes back as it is.
 ///
-/// A matte white card (albedo 1) in the middle of the surface, under the scene's lights with nothing in their way, gets
-/// the luminance of `plate_white`, times `2^gain_ev`.
+/// A matte white card (albedo 1) in the middle of the surface, under the scene's lights with
+/// nothing in their way, gets the luminance of `plate_white`, times `2^gain_ev`.
 ///
-/// This is an assumption, not a measurement: one photograph does not show which of its pixels are white paper. It holds
-/// where the photo was exposed for the place and shows something bright; the surface itself is not used, since a tray
-/// may be of any grey. Where that grey is known, `MatchSurface` is the better choice. `gain_ev` overrides. Without any
-/// light in the scene, or on a black plate, the exposure is `gain_ev` alone.
+/// This is an assumption, not a measurement: one photograph does not show which of its pixels are
+/// white paper. It holds where the photo was exposed for the place and shows something bright; the
+/// surface itself is not used, since a tray may be of any grey. Where that grey is known,
+/// `MatchSurface` is the better choice. `gain_ev` overrides. Without any light in the scene, or on
+/// a black plate, the exposure is `gain_ev` alone.
 pub fn expose(scene: Scene, plate: &Image<LinearRgb>) -> Scene {
     let (wanted, gain_ev) = match scene.exposure {
         Exposure::Ev(_) => return scene,

@@ -16,8 +16,9 @@ const ELLIPSE_CORNERS: usize = 256;
 /// Irradiance at `point` on a surface of unit `normal`, where nothing is in the way.
 ///
 /// # Method
-/// Closed form for rectangles ([`polygon_irradiance`]), and for ellipses nearer than they are wide, as polygons of 256
-/// corners and of their area; a product rule of 16 x 32 points for ellipses farther away.
+/// Closed form for rectangles ([`polygon_irradiance`]), and for ellipses nearer than they are wide,
+/// as polygons of 256 corners and of their area; a product rule of 16 x 32 points for ellipses
+/// farther away.
 pub fn irradiance(light: &AreaLight, point: Point3<f64>, normal: Vector3<f64>) -> LinearRgb {
     let frame = frame(light);
     if frame.normal.dot(&(point - frame.center)) <= 0.0 {

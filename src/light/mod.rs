@@ -1,8 +1,9 @@
 //! Light: area lights, ambient, and the exposure that makes rendered light match a plate.
 //!
-//! There are three questions to a light: how bright it is (`radiance`), where it is sampled (`nodes`) and, where nothing is
-//! in the way, what it does in closed form ([`polygon_irradiance`], `irradiance`). [`match_plate`] is the stage: it
-//! turns what a scene leaves to its plate (exposure, colour of the light, noise) into numbers.
+//! There are three questions to a light: how bright it is (`radiance`), where it is sampled
+//! (`nodes`) and, where nothing is in the way, what it does in closed form ([`polygon_irradiance`],
+//! `irradiance`). [`match_plate`] is the stage: it turns what a scene leaves to its plate
+//! (exposure, colour of the light, noise) into numbers.
 //!
 //! ```
 //! use petcomp::LinearRgb;

@@ -16,13 +16,15 @@ pub struct Node {
 }
 
 impl Node {
-    /// Irradiance at `point` by unit radiance from this node: `cos cos / r^2 dA`; 0 below either horizon.
+    /// Irradiance at `point` by unit radiance from this node: `cos cos / r^2 dA`; 0 below either
+    /// horizon.
     pub fn irradiance(&self, frame: &LightFrame, point: Point3<f64>, normal: Vector3<f64>) -> f64 {
         geometry_term(&(self.point - point), &frame.normal, &normal) * self.area
     }
 }
 
-/// `cos cos / r^2` on the way from a point of unit normal to one of a light's face; 0 below either horizon.
+/// `cos cos / r^2` on the way from a point of unit normal to one of a light's face; 0 below either
+/// horizon.
 pub(crate) fn geometry_term(
     way: &Vector3<f64>,
     face_normal: &Vector3<f64>,
@@ -36,8 +38,8 @@ pub(crate) fn geometry_term(
 /// Sample points of a light, `per_side` (at least 1) along each side.
 ///
 /// # Method
-/// Rectangle: product of two Gauss-Legendre rules. Ellipse: Gauss-Legendre in the squared radius, twice as many equal
-/// steps in angle, every ring turned by half a step against the one before.
+/// Rectangle: product of two Gauss-Legendre rules. Ellipse: Gauss-Legendre in the squared radius,
+/// twice as many equal steps in angle, every ring turned by half a step against the one before.
 pub fn nodes(light: &AreaLight, per_side: usize) -> Vec<Node> {
     let rule = gauss_legendre(per_side.max(1));
     match light.shape {
@@ -83,13 +85,14 @@ fn ring_directions(steps: usize, k: usize) -> impl Iterator<Item = (f64, f64)> {
     (0..steps).map(move |i| libm::sincos(TAU * (i as f64 + 0.5 * (k % 2) as f64) / steps as f64))
 }
 
-/// Sample points of the part of a light that is above the plane through `point` with unit `normal`: those of [`nodes`]
-/// where the plane does not cut the light, else as many on what it leaves.
+/// Sample points of the part of a light that is above the plane through `point` with unit `normal`:
+/// those of [`nodes`] where the plane does not cut the light, else as many on what it leaves.
 ///
 /// # Method
-/// What is left of a rectangle is strips across the side that the plane turns away from fastest, each from the plane to
-/// the rectangle's end, with a Gauss-Legendre rule along them and one across. What is left of an ellipse is a segment of a
-/// disk, stretched: chords at equal angles' cosines.
+/// What is left of a rectangle is strips across the side that the plane turns away from fastest,
+/// each from the plane to the rectangle's end, with a Gauss-Legendre rule along them and one
+/// across. What is left of an ellipse is a segment of a disk, stretched: chords at equal angles'
+/// cosines.
 pub(crate) fn nodes_above(
     light: &AreaLight,
     per_side: usize,
@@ -110,8 +113,8 @@ pub(crate) fn nodes_above(
         .collect()
 }
 
-/// A receiver's plane as a light sees it: its height over the plane is `middle + rise . point`, with the light's sides
-/// running from -1 to 1.
+/// A receiver's plane as a light sees it: its height over the plane is `middle + rise . point`,
+/// with the light's sides running from -1 to 1.
 struct LightHorizon {
     middle: f64,
     rise: [f64; 2],
@@ -128,7 +131,8 @@ impl LightHorizon {
         }
     }
 
-    /// Points and areas of what the plane leaves, with the light's sides running from -1 to 1; none where it cuts nothing.
+    /// Points and areas of what the plane leaves, with the light's sides running from -1 to 1; none
+    /// where it cuts nothing.
     fn visible_part(&self, shape: LightShape, per_side: usize) -> Option<Vec<([f64; 2], f64)>> {
         match shape {
             LightShape::Rectangle => self.cuts_square().then(|| self.strips(per_side)),
@@ -194,7 +198,8 @@ impl LightHorizon {
     }
 }
 
-/// A point of the chord across a unit direction at a distance from the middle, so far from the chord's own middle.
+/// A point of the chord across a unit direction at a distance from the middle, so far from the
+/// chord's own middle.
 #[inline]
 fn point_on_chord([x, y]: [f64; 2], at: f64, along: f64) -> [f64; 2] {
     [at * x - along * y, at * y + along * x]
@@ -253,7 +258,8 @@ mod tests {
         }
     }
 
-    /// An upright light whose middle is so high above the origin's level plane, turned about its own axis.
+    /// An upright light whose middle is so high above the origin's level plane, turned about its
+    /// own axis.
     fn standing(shape: LightShape, height: f64, target: [f64; 3]) -> AreaLight {
         AreaLight {
             shape,

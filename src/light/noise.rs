@@ -9,15 +9,17 @@ use crate::scene::{Noise, Scene};
 const BRIGHTNESS_GROUPS: usize = 12;
 /// A group of fewer pixels has no noise that could be estimated.
 const MIN_GROUP_PIXELS: usize = 200;
-/// Texture only makes residuals larger, so the small ones show the noise: a quarter of a normal distribution's magnitudes
-/// lies below 0.3186 standard deviations.
+/// Texture only makes residuals larger, so the small ones show the noise: a quarter of a normal
+/// distribution's magnitudes lies below 0.3186 standard deviations.
 const QUARTILE_SIGMAS: f64 = 0.318_639;
-/// Standard deviation of the residual of noise of standard deviation 1: the root of the mask's summed squares.
+/// Standard deviation of the residual of noise of standard deviation 1: the root of the mask's
+/// summed squares.
 const MASK_GAIN: f64 = 6.0;
 /// Values from here on may be clipped.
 const NEARLY_WHITE: f32 = 0.95;
 
-/// Turns [`Noise::MatchPlate`] of a scene's finish into the noise of its plate; any other scene comes back as it is.
+/// Turns [`Noise::MatchPlate`] of a scene's finish into the noise of its plate; any other scene
+/// comes back as it is.
 pub(crate) fn match_noise(mut scene: Scene, plate: &Image<LinearRgb>) -> Scene {
     if scene.finish.noise == Noise::MatchPlate {
         scene.finish.noise = plate_noise(plate);
@@ -28,8 +30,9 @@ pub(crate) fn match_noise(mut scene: Scene, plate: &Image<LinearRgb>) -> Scene {
 /// The noise of a photograph, from its green channel: [`Noise::None`] for one that is too small.
 ///
 /// # Method
-/// The residual of the difference of two Laplacians, which passes over slopes and straight edges (J. Immerkær, "Fast Noise
-/// Variance Estimation", 1996); its lower quartile in groups of like brightness; a line through their variances.
+/// The residual of the difference of two Laplacians, which passes over slopes and straight edges
+/// (J. Immerkær, "Fast Noise Variance Estimation", 1996); its lower quartile in groups of like
+/// brightness; a line through their variances.
 pub fn plate_noise(plate: &Image<LinearRgb>) -> Noise {
     let mut residuals = residuals_of(plate);
     residuals.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -54,7 +57,8 @@ fn inner_pixels((width, height): (usize, usize)) -> impl Iterator<Item = (usize,
         .flat_map(move |y| (1..width.saturating_sub(1)).map(move |x| (x, y)))
 }
 
-/// Mean and magnitude of the residual around a pixel; none near white or where something is not finite.
+/// Mean and magnitude of the residual around a pixel; none near white or where something is not
+/// finite.
 fn residual_at(plate: &Image<LinearRgb>, x: usize, y: usize) -> Option<(f32, f32)> {
     const MASK: [f32; 9] = [1.0, -2.0, 1.0, -2.0, 4.0, -2.0, 1.0, -2.0, 1.0];
     let (mut mean, mut sum) = (0.0, 0.0);
@@ -139,7 +143,8 @@ mod tests {
     use super::*;
     use crate::scene::Draws;
 
-    /// A slope with noise of `shot * value + read^2`; sums of twelve uniform numbers are as good as normal.
+    /// A slope with noise of `shot * value + read^2`; sums of twelve uniform numbers are as good as
+    /// normal.
     fn noisy(shot: f64, read: f64) -> Image<LinearRgb> {
         Image::from_fn(160, 120, |x, y| {
             let value = 0.05 + 0.7 * x as f64 / 160.0 + 0.05 * (y as f64 / 9.0).sin();

@@ -2,14 +2,15 @@
 
 use crate::geom::{Point3, Vector3};
 
-/// Irradiance at `point` with unit `normal` from a polygon of unit radiance: pi times the form factor.
+/// Irradiance at `point` with unit `normal` from a polygon of unit radiance: pi times the form
+/// factor.
 ///
-/// `corners` in either order, of a flat convex polygon; the part below the receiver's horizon is cut off. Which side
-/// the polygon shines to is the caller's question.
+/// `corners` in either order, of a flat convex polygon; the part below the receiver's horizon is
+/// cut off. Which side the polygon shines to is the caller's question.
 ///
 /// # Method
-/// Lambert's formula: half the sum over edges of the angle that the edge subtends, times the cosine between the
-/// receiver's normal and the normal of the edge's fan triangle.
+/// Lambert's formula: half the sum over edges of the angle that the edge subtends, times the cosine
+/// between the receiver's normal and the normal of the edge's fan triangle.
 pub fn polygon_irradiance(
     corners: &[Point3<f64>],
     point: Point3<f64>,
@@ -48,7 +49,8 @@ fn above_horizon(rays: Vec<Vector3<f64>>, normal: Vector3<f64>) -> Vec<Vector3<f
     kept
 }
 
-/// How far along an edge between these heights the height is 0; none where both ends are on one side.
+/// How far along an edge between these heights the height is 0; none where both ends are on one
+/// side.
 fn crossing_share([from, to]: [f64; 2]) -> Option<f64> {
     let crosses = (from > 0.0 && to < 0.0) || (from < 0.0 && to > 0.0);
     crosses.then(|| from / (from - to))

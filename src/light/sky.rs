@@ -22,9 +22,11 @@ pub struct SkyPiece {
 /// Pieces add up to the irradiance of the whole map on the receiver, nothing in the way.
 ///
 /// # Method
-/// The map is cut into rectangles in the way that makes the errors of shadows smallest ([`Panorama::pieces`](crate::asset::Panorama::pieces)),
-/// so a sun is a piece of its own. A piece that the receiver's horizon does not cut gives exactly `n . integral of L w dw`; what the
-/// horizon cuts off others is made up for by scaling all to the irradiance that a sum over the whole map gives.
+/// The map is cut into rectangles in the way that makes the errors of shadows smallest
+/// ([`Panorama::pieces`](crate::asset::Panorama::pieces)), so a sun is a piece of its own. A piece
+/// that the receiver's horizon does not cut gives exactly `n . integral of L w dw`; what the
+/// horizon cuts off others is made up for by scaling all to the irradiance that a sum over the
+/// whole map gives.
 pub fn sky_pieces(map: &EnvironmentMap, count: usize, normal: &Vector3<f64>) -> Vec<SkyPiece> {
     scaled_pieces(map, &map.panorama.pieces(count), normal)
 }
@@ -55,7 +57,8 @@ fn scaled_pieces(map: &EnvironmentMap, pieces: &[Piece], normal: &Vector3<f64>) 
         .collect()
 }
 
-/// The pieces over a horizon; one piece for all of its light where a map gives some and none of its pieces does.
+/// The pieces over a horizon; one piece for all of its light where a map gives some and none of its
+/// pieces does.
 fn visible_pieces(
     pieces: &[Piece],
     normal: &Vector3<f64>,

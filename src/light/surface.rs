@@ -7,8 +7,8 @@ use crate::light::value_of_rank;
 use crate::pixel::LinearRgb;
 use crate::scene::{CameraSource, LightTint, Scene};
 
-/// The median colour, channel by channel, of the plate where the scene's labelled rectangle is seen; none where the
-/// camera is not known yet, or does not see it.
+/// The median colour, channel by channel, of the plate where the scene's labelled rectangle is
+/// seen; none where the camera is not known yet, or does not see it.
 pub(crate) fn surface_color(scene: &Scene, plate: &Image<LinearRgb>) -> Option<LinearRgb> {
     let CameraSource::Known(camera) = scene.camera else {
         return None;
@@ -50,10 +50,12 @@ fn median_of(colors: &[LinearRgb], channel: fn(&LinearRgb) -> f32) -> f32 {
     value_of_rank(values, colors.len() / 2)
 }
 
-/// Turns [`LightTint::MatchSurface`] into the colour of the surface's light; any other scene comes back as it is.
+/// Turns [`LightTint::MatchSurface`] into the colour of the surface's light; any other scene comes
+/// back as it is.
 ///
-/// The surface is assumed to be grey: its colour is then that of the light on it. A share below 1 takes only a part of
-/// that, since trays and tables may have a colour of their own. Luminance stays.
+/// The surface is assumed to be grey: its colour is then that of the light on it. A share below 1
+/// takes only a part of that, since trays and tables may have a colour of their own. Luminance
+/// stays.
 pub fn match_light_tint(scene: Scene, plate: &Image<LinearRgb>) -> Scene {
     let LightTint::MatchSurface { share } = scene.cast else {
         return scene;

@@ -33,7 +33,8 @@ pub enum ChannelLimit {
     Max,
 }
 
-/// Settings of [`channel_key`], under the names that Blender 3.4 gives them; channels are counted from 0.
+/// Settings of [`channel_key`], under the names that Blender 3.4 gives them; channels are counted
+/// from 0.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ChannelKeyOptions {
@@ -72,8 +73,8 @@ impl Default for ChannelKeyOptions {
 pub struct ChannelKeyed {
     /// How much of each pixel is foreground.
     pub matte: Image<Coverage>,
-    /// The photo seen through its matte, premultiplied. Blender 3.4 multiplies the channels of the colour space, offsets
-    /// and hue included: outside RGB its colours are odd.
+    /// The photo seen through its matte, premultiplied. Blender 3.4 multiplies the channels of the
+    /// colour space, offsets and hue included: outside RGB its colours are odd.
     pub cutout: Image<PremulRgba>,
 }
 
@@ -82,7 +83,8 @@ pub struct ChannelKeyed {
 /// Takes a scene-linear photo, opaque or premultiplied; returns pictures of the same size.
 ///
 /// # Method
-/// `a = 1 - (key - limit)`: the pixel's alpha above `limit_max`, 0 below `limit_min`, linear between, at most its alpha.
+/// `a = 1 - (key - limit)`: the pixel's alpha above `limit_max`, 0 below `limit_min`, linear
+/// between, at most its alpha.
 pub fn channel_key<P: Photo>(photo: &Image<P>, options: &ChannelKeyOptions) -> ChannelKeyed {
     let matte = photo.map(|p| {
         let p = p.premul();

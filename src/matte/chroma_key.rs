@@ -11,9 +11,11 @@ use serde::{Deserialize, Serialize};
 pub struct ChromaKeyOptions {
     /// Which Blender to be; `robust` and 4.2 are 3.4 here. Default: `blender-3.4`.
     pub profile: Profile,
-    /// Opening angle of the wedge that is keyed, radians (3.4 "acceptance", 4.5 "maximum"). Default: 30 degrees.
+    /// Opening angle of the wedge that is keyed, radians (3.4 "acceptance", 4.5 "maximum").
+    /// Default: 30 degrees.
     pub tolerance: f32,
-    /// Opening angle of the wedge that is keyed wholly, radians (3.4 "cutoff", 4.5 "minimum"). Default: 10 degrees.
+    /// Opening angle of the wedge that is keyed wholly, radians (3.4 "cutoff", 4.5 "minimum").
+    /// Default: 10 degrees.
     pub threshold: f32,
     /// Distance inside the wedge over which the matte falls to 0 (4.5 "falloff"). Default: 1.
     pub gain: f32,
@@ -33,12 +35,13 @@ impl Default for ChromaKeyOptions {
 
 /// Keys a photo by the angle between its colour differences and the screen's.
 ///
-/// Takes a scene-linear photo, opaque or premultiplied; returns a matte of the same size, at most the photo's alpha, and
-/// negative where a pixel lies deeper in the wedge than `gain`.
+/// Takes a scene-linear photo, opaque or premultiplied; returns a matte of the same size, at most
+/// the photo's alpha, and negative where a pixel lies deeper in the wedge than `gain`.
 ///
 /// # Method
-/// With the colour differences of BT.709 turned so that the screen lies along `x`, and `z` across: a pixel is inside the
-/// wedge by `g = x - |z| / tan(tolerance / 2)`. Where `g > 0` the matte is `1 - g / gain`, and 0 within `threshold`.
+/// With the colour differences of BT.709 turned so that the screen lies along `x`, and `z` across:
+/// a pixel is inside the wedge by `g = x - |z| / tan(tolerance / 2)`. Where `g > 0` the matte is
+/// `1 - g / gain`, and 0 within `threshold`.
 pub fn chroma_key<P: Photo>(
     photo: &Image<P>,
     screen: LinearRgb,

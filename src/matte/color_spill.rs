@@ -72,11 +72,12 @@ impl Default for ColorSpillOptions {
 
 /// Takes the excess of the screen's channel from a photo.
 ///
-/// Takes a scene-linear photo, opaque or premultiplied; returns it premultiplied, same size, alpha as it was.
+/// Takes a scene-linear photo, opaque or premultiplied; returns it premultiplied, same size, alpha
+/// as it was.
 ///
 /// # Method
-/// The excess of the spill channel over `ratio` times its limit is subtracted from it where positive, and handed to the
-/// other channels as the strengths say.
+/// The excess of the spill channel over `ratio` times its limit is subtracted from it where
+/// positive, and handed to the other channels as the strengths say.
 pub fn color_spill<P: Photo>(photo: &Image<P>, options: &ColorSpillOptions) -> Image<PremulRgba> {
     let spill = options.channel as usize;
     let strengths = strengths(options, spill);

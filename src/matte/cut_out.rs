@@ -23,9 +23,11 @@ use matted::Matted;
 /// An object without its background.
 #[derive(Clone, Debug)]
 pub struct CutOut {
-    /// The object's own light and what it lets through, scene-linear, trimmed to its hull and a margin.
+    /// The object's own light and what it lets through, scene-linear, trimmed to its hull and a
+    /// margin.
     pub film: Image<Film>,
-    /// Transmittance as measured, the object's own shadow on the screen included; 1 outside. Of the size of `film`.
+    /// Transmittance as measured, the object's own shadow on the screen included; 1 outside. Of
+    /// the size of `film`.
     pub transmittance: Image<LinearRgb>,
     /// Expected error of the transmittance, 0 to 1. Of the size of `film`.
     pub uncertainty: Image<f32>,
@@ -62,12 +64,13 @@ impl CutOut {
 
 /// Cuts the one object out of a photo on a uniform screen or board.
 ///
-/// `photo` is scene-linear. On a screen too grey to be keyed the transmittance of plastic is assumed, and a
-/// [`Diagnostic`] says so.
+/// `photo` is scene-linear. On a screen too grey to be keyed the transmittance of plastic is
+/// assumed, and a [`Diagnostic`] says so.
 ///
 /// # Errors
-/// Those of [`segment`](super::segment()) and of [`ScreenPlate::fit`]; [`Error::Value`](crate::Error::Value)
-/// (`key.clip_black`, `soften_px`, ..) for an option that cannot be right.
+/// Those of [`segment`](super::segment()) and of [`ScreenPlate::fit`];
+/// [`Error::Value`](crate::Error::Value) (`key.clip_black`, `soften_px`, ..) for an option that
+/// cannot be right.
 pub fn cut_out(photo: &Image<LinearRgb>, options: &CutOutOptions) -> Result<CutOut> {
     cut_out_on(photo, None, options)
 }
@@ -152,7 +155,8 @@ fn fitted_plate(
     mask: &Image<Coverage>,
     options: &PlateOptions,
 ) -> Result<ScreenPlate> {
-    // A margin around a large object may leave nothing; the mask alone then leaves a rim, which gives a colour.
+    // A margin around a large object may leave nothing; the mask alone then leaves a rim, which
+    // gives a colour.
     if !background.pixels().contains(&true) {
         let color = screen_color(photo, mask)?;
         return Ok(ScreenPlate::even(color, photo.size()));
@@ -162,7 +166,8 @@ fn fitted_plate(
 
 /// The part of a photo around the object: there is nothing to solve elsewhere.
 struct ObjectRegion {
-    /// Its place in the photo. Blurs near the object find in it what they would find in the whole photo.
+    /// Its place in the photo. Blurs near the object find in it what they would find in the whole
+    /// photo.
     around: Roi,
     /// The hull and the margin that is kept.
     kept: Roi,
@@ -184,7 +189,8 @@ impl ObjectRegion {
         }
     }
 
-    /// How pictures of the region become those of the cut-out, whose longer side is at most `longest_side`.
+    /// How pictures of the region become those of the cut-out, whose longer side is at most
+    /// `longest_side`.
     fn trim(&self, longest_side: usize) -> Trim {
         Trim {
             roi: self.kept,
@@ -311,7 +317,8 @@ fn clipped_share(photo: &Image<LinearRgb>, mask: &Image<Coverage>, clipped: f32)
     count as f32 / all.max(1) as f32
 }
 
-/// A matte that leaves more than this of the screen is worth a warning: what it leaves veils the object, too.
+/// A matte that leaves more than this of the screen is worth a warning: what it leaves veils the
+/// object, too.
 const MAX_RESIDUAL_MATTE: f32 = 0.2;
 
 /// Those of the segmentation, the matte and the screen.
@@ -344,8 +351,8 @@ fn residual_matte(share: f32) -> Diagnostic {
     )
 }
 
-/// A screen that is clipped in more of its pixels than this is worth a warning: a plate goes on under the object, so a
-/// corner beside a lamp may be clipped.
+/// A screen that is clipped in more of its pixels than this is worth a warning: a plate goes on
+/// under the object, so a corner beside a lamp may be clipped.
 const MAX_CLIPPED_SHARE: f32 = 0.1;
 
 /// The warning about a screen that is too bright for the camera in a share of its pixels.

@@ -31,11 +31,12 @@ impl Default for DifferenceKeyOptions {
 
 /// Keys a photo by its difference from a clean plate.
 ///
-/// Takes two scene-linear pictures of one size; returns a matte of that size, at most the photo's alpha.
+/// Takes two scene-linear pictures of one size; returns a matte of that size, at most the photo's
+/// alpha.
 ///
 /// # Method
-/// With `D` the mean of the absolute differences of R, G and B: 0 up to `tolerance`, then `(D - tolerance) / falloff`.
-/// # Errors
+/// With `D` the mean of the absolute differences of R, G and B: 0 up to `tolerance`, then `(D -
+/// tolerance) / falloff`. # Errors
 /// [`Error::Value`](crate::Error::Value) where the sizes differ.
 pub fn difference_key<P: Photo>(
     photo: &Image<P>,

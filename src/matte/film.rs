@@ -1,4 +1,5 @@
-//! Film: reflected light and transmittance of see-through plastic from one photo on a coloured screen.
+//! Film: reflected light and transmittance of see-through plastic from one photo on a coloured
+//! screen.
 
 mod bright;
 mod object;
@@ -33,16 +34,17 @@ use tint::{DARKEST_SHARE, Tint, TintSamples};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct FilmOptions {
-    /// Transmittance per channel of the plastic where it lies flat, as seen on a screen beneath it; none = from the
-    /// photo. Default: none.
+    /// Transmittance per channel of the plastic where it lies flat, as seen on a screen beneath
+    /// it; none = from the photo. Default: none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub flat: Option<LinearRgb>,
     /// Scene-linear value from which on a channel is clipped. Default: 0.98.
     pub clipped: f32,
-    /// How far the thickness of plastic scatters around that of two walls, as a share: the prior where the photo
-    /// shows too little. Default: 0.35.
+    /// How far the thickness of plastic scatters around that of two walls, as a share: the prior
+    /// where the photo shows too little. Default: 0.35.
     pub thickness_spread: f32,
-    /// How well the reflected light of the screen's channel is inferred from the others, as a share. Default: 0.15.
+    /// How well the reflected light of the screen's channel is inferred from the others, as a
+    /// share. Default: 0.15.
     pub reflection_error: f32,
 }
 
@@ -57,14 +59,15 @@ impl Default for FilmOptions {
     }
 }
 
-/// The film that one photo shows. `F + V * background` composites it over a background with light of its own,
-/// `F + T * background` over one that the object itself shades.
+/// The film that one photo shows. `F + V * background` composites it over a background with light
+/// of its own, `F + T * background` over one that the object itself shades.
 #[derive(Clone, Debug)]
 pub struct FilmMatte {
-    /// Reflected light F and opacity `1 - V` by the view transmittance V, which is *estimated* from T. Of the photo's size,
-    /// empty outside the object.
+    /// Reflected light F and opacity `1 - V` by the view transmittance V, which is *estimated*
+    /// from T. Of the photo's size, empty outside the object.
     pub film: Image<Film>,
-    /// Transmittance T per channel as *measured*: the screen seen through the object and in its shadow. 1 outside.
+    /// Transmittance T per channel as *measured*: the screen seen through the object and in its
+    /// shadow. 1 outside.
     pub transmittance: Image<LinearRgb>,
     /// Expected error of T in each pixel, 0 to 1: large where the photo does not fix it.
     pub uncertainty: Image<f32>,
@@ -77,7 +80,8 @@ pub struct FilmMatte {
 }
 
 impl FilmMatte {
-    /// Reflected light F and opacity `1 - T`: the film as it lay on the screen, its shadow included.
+    /// Reflected light F and opacity `1 - T`: the film as it lay on the screen, its shadow
+    /// included.
     pub fn shaded(&self) -> Image<Film> {
         self.film
             .zip_map(&self.transmittance, |film, t| Film::new(film.color, t))
@@ -86,26 +90,29 @@ impl FilmMatte {
 
 /// Solves `photo = F + T * plate` for the reflected light F and the transmittance T of one object.
 ///
-/// `photo` is scene-linear; `inside` is the object's coverage, soft at its outline, and cuts off everything else (the
-/// garbage matte). A screen with little colour shows little of T: then what may be plastic by its light is guessed to be
-/// that, and a [`Diagnostic`] says so.
+/// `photo` is scene-linear; `inside` is the object's coverage, soft at its outline, and cuts off
+/// everything else (the garbage matte). A screen with little colour shows little of T: then what
+/// may be plastic by its light is guessed to be that, and a [`Diagnostic`] says so.
 ///
 /// # Method
-/// Three values a pixel for six unknowns, so two models tie them together. *Transmittance*: the plastic is clear or has
-/// one of the dyes of PET ([Beer and Lambert]), found from the pixels that reflect least; a pixel is that plastic times
-/// one factor. *Reflection*: a neutral glint plus light scattered in the plastic, of half its tint, so that the screen's
-/// channel of F follows from the two others (colour difference is the special case of clear plastic). The factor is then
-/// one equation; where dark or strongly tinted plastic makes it ill-conditioned it is drawn to that of flat plastic, or
-/// to opaque where more is reflected than plastic can, by their variances, and the uncertainty says how much was measured.
-/// `F = photo - T * plate` leaves nothing of the screen's light: there is no spill to take away.
+/// Three values a pixel for six unknowns, so two models tie them together. *Transmittance*: the
+/// plastic is clear or has one of the dyes of PET ([Beer and Lambert]), found from the pixels that
+/// reflect least; a pixel is that plastic times one factor. *Reflection*: a neutral glint plus
+/// light scattered in the plastic, of half its tint, so that the screen's channel of F follows from
+/// the two others (colour difference is the special case of clear plastic). The factor is then
+/// one equation; where dark or strongly tinted plastic makes it ill-conditioned it is drawn to that
+/// of flat plastic, or to opaque where more is reflected than plastic can, by their variances, and
+/// the uncertainty says how much was measured. `F = photo - T * plate` leaves nothing of the
+/// screen's light: there is no spill to take away.
 ///
-/// What is brighter in the screen's hue than the screen itself through plastic, or has a colour that neither glints nor the
-/// plastic have, is opaque (a label, a cap). Glints hide what is seen through: the brighter, the more such pixels have the
-/// factor of their surroundings, clipped ones all of it.
+/// What is brighter in the screen's hue than the screen itself through plastic, or has a colour
+/// that neither glints nor the plastic have, is opaque (a label, a cap). Glints hide what is seen
+/// through: the brighter, the more such pixels have the factor of their surroundings, clipped ones
+/// all of it.
 ///
 /// # Errors
-/// [`Error::Photo`](crate::Error::Photo) where `inside` is empty or a pixel of the photo is not a finite number;
-/// [`Error::Value`](crate::Error::Value) for an option that cannot be right.
+/// [`Error::Photo`](crate::Error::Photo) where `inside` is empty or a pixel of the photo is not a
+/// finite number; [`Error::Value`](crate::Error::Value) for an option that cannot be right.
 /// # Panics
 /// When the sizes differ.
 ///
@@ -121,8 +128,8 @@ pub fn film(
     solve_film(FilmInput::whole(photo, plate, inside), options)
 }
 
-/// A photo on its screen, or the part of it around the object: there is nothing to solve elsewhere. All pictures are of
-/// one size.
+/// A photo on its screen, or the part of it around the object: there is nothing to solve elsewhere.
+/// All pictures are of one size.
 #[derive(Clone, Copy)]
 pub(super) struct FilmInput<'a> {
     /// Finite.
@@ -220,8 +227,8 @@ impl<'a> FilmSolution<'a> {
         grey.into_iter().chain(uncertainty.diagnostics()).collect()
     }
 
-    /// The given tint, or else that of the photo. On a grey screen all of the object is sampled, and that the tint may be
-    /// another is part of the guess.
+    /// The given tint, or else that of the photo. On a grey screen all of the object is sampled,
+    /// and that the tint may be another is part of the guess.
     fn tint(&self) -> Tint {
         match self.options.flat {
             Some(flat) => Tint::certain(flat.into()),
@@ -340,8 +347,8 @@ fn check_positive(at: &str, value: f32) -> Result<()> {
     check_value(value > 0.0, at, || format!("{value}, expected more than 0"))
 }
 
-/// Noise from which on the transmittance is measured in a blurred photo: a twentieth of what a screen at 0.4 shows through
-/// two clear walls.
+/// Noise from which on the transmittance is measured in a blurred photo: a twentieth of what a
+/// screen at 0.4 shows through two clear walls.
 const MAX_SHARP_NOISE: f32 = 0.01;
 /// Blur of a noisy photo, standard deviation in pixels: leaves a quarter of the noise, and folds.
 const NOISE_BLUR_PX: f32 = 1.0;

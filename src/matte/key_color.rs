@@ -27,7 +27,8 @@ pub enum KeyAverage {
 pub struct KeyColor {
     /// Scene-linear.
     pub color: LinearRgb,
-    /// Standard deviation of the pixels around it, per channel, by their median distance: noise and uneven light.
+    /// Standard deviation of the pixels around it, per channel, by their median distance: noise
+    /// and uneven light.
     pub spread: LinearRgb,
     /// A warning where the object has the screen's hue.
     pub diagnostics: Vec<Diagnostic>,
@@ -66,7 +67,8 @@ pub fn key_color(
     })
 }
 
-/// The pixels outside a mask and a margin around it; those outside the mask where the margin leaves nothing.
+/// The pixels outside a mask and a margin around it; those outside the mask where the margin leaves
+/// nothing.
 fn background(mask: &Image<Coverage>) -> Mask {
     let far = screen_pixels(mask);
     if far.pixels().contains(&true) {
@@ -78,7 +80,8 @@ fn background(mask: &Image<Coverage>) -> Mask {
 
 /// Pixels that are sampled: the median of a noise of 0.01 is known to 1e-4.
 const MAX_SAMPLES: usize = 20_000;
-/// Distance from the median beyond which nothing counts, in standard deviations (95 % efficient for a Gaussian).
+/// Distance from the median beyond which nothing counts, in standard deviations (95 % efficient for
+/// a Gaussian).
 const TUKEY_SIGMAS: f32 = 4.685;
 /// Standard deviation of a Gaussian over the median of its absolute values.
 const SIGMA_OF_MEDIAN: f32 = 1.4826;
@@ -135,8 +138,8 @@ fn median_or_zero(values: impl Iterator<Item = f32>) -> f32 {
     median(values, f32::total_cmp).unwrap_or(0.0)
 }
 
-/// The screen's own excess of its strongest channel, uneven light included, is below this multiple of its mean; see-through
-/// plastic shows less than that.
+/// The screen's own excess of its strongest channel, uneven light included, is below this multiple
+/// of its mean; see-through plastic shows less than that.
 const SCREEN_EXCESS_FACTOR: f32 = 1.25;
 /// Rim of the mask that is left out, as a share of the longer side: bare screen.
 const RIM_SHARE: f64 = 0.01;

@@ -20,15 +20,17 @@ const SHARPEST_SIGMA: f64 = 0.15;
 /// What smoothness 1 adds to it; Blender's.
 const SMOOTHNESS_SIGMA: f64 = 0.85;
 
-/// Makes a plate out of points, as Blender 4.5 does: a mean of all points, weighted by a Gaussian of their distance.
+/// Makes a plate out of points, as Blender 4.5 does: a mean of all points, weighted by a Gaussian
+/// of their distance.
 ///
-/// `smoothness` is 0 to 1. The plate does not pass through the colours of the points; distances are measured in
-/// widths and heights of the picture. Points outside the picture are skipped.
+/// `smoothness` is 0 to 1. The plate does not pass through the colours of the points; distances are
+/// measured in widths and heights of the picture. Points outside the picture are skipped.
 ///
 /// # Method
-/// `sum(w color) / sum(w)` with `w = exp(-d^2 / sigma^2)`, `sigma = 0.15 + 0.85 smoothness`, in double precision.
-/// # Errors
-/// [`Error::Value`](crate::Error::Value) where no point lies in the picture, or `smoothness` outside 0 to 1.
+/// `sum(w color) / sum(w)` with `w = exp(-d^2 / sigma^2)`, `sigma = 0.15 + 0.85 smoothness`, in
+/// double precision. # Errors
+/// [`Error::Value`](crate::Error::Value) where no point lies in the picture, or `smoothness`
+/// outside 0 to 1.
 pub fn keying_screen(
     (width, height): (usize, usize),
     points: &[ScreenPoint],
@@ -70,7 +72,8 @@ impl ScreenPoint {
 /// The plate at one place.
 fn screen_color(points: &[ScreenPoint], at: [f64; 2], size: [f64; 2], sigma: f64) -> LinearRgb {
     let squares = points.iter().map(|p| p.square_distance(at, size));
-    // Measured from the nearest point, the weights of far pixels do not all vanish; their ratios are the same.
+    // Measured from the nearest point, the weights of far pixels do not all vanish; their ratios
+    // are the same.
     let nearest = squares.clone().fold(f64::INFINITY, f64::min);
     let weights = squares.map(|square| libm::exp((nearest - square) / (sigma * sigma)));
     weighted_mean(weights.zip(points.iter().map(|p| p.color)))

@@ -10,8 +10,8 @@ use rayon::prelude::*;
 
 /// The border of what an object covers, in pixel-corner coordinates.
 ///
-/// Rings do not cross. Those around the object go clockwise as seen, those around holes the other way; none repeats its
-/// first point.
+/// Rings do not cross. Those around the object go clockwise as seen, those around holes the other
+/// way; none repeats its first point.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Outline {
     /// The rings, each directly followed by its holes.
@@ -59,8 +59,8 @@ impl Outline {
         self.rings.iter().map(|ring| signed_area(ring)).sum()
     }
 
-    /// How wide a long strip of this area and outline would be: twice the area over the length of its rings, pixels; 0
-    /// where there is nothing.
+    /// How wide a long strip of this area and outline would be: twice the area over the length of
+    /// its rings, pixels; 0 where there is nothing.
     pub fn width(&self) -> f64 {
         let around = self.length();
         if around > 0.0 {
@@ -165,7 +165,8 @@ pub(super) fn ring_length(ring: &[Point2<f64>]) -> f64 {
     sides(ring).map(|[a, b]| (b - a).norm()).sum()
 }
 
-/// Scan lines per row of pixels; each contributes exact spans, so only slanted sides are approximated.
+/// Scan lines per row of pixels; each contributes exact spans, so only slanted sides are
+/// approximated.
 const SCAN_LINES: usize = 8;
 /// The coverage of one of them.
 const LINE_COVERAGE: f32 = 1.0 / SCAN_LINES as f32;

@@ -19,13 +19,13 @@ use serde::{Deserialize, Serialize};
 pub struct PlateOptions {
     /// Highest degree of the polynomial, 0 to 6. Default: 4.
     pub max_degree: usize,
-    /// A higher degree must lower the residual by this share to be taken, 0 to 1. Default: 0.6: around
-    /// the object only, a higher degree fits shadows and swings beneath it.
+    /// A higher degree must lower the residual by this share to be taken, 0 to 1. Default: 0.6:
+    /// around the object only, a higher degree fits shadows and swings beneath it.
     pub least_gain: f64,
     /// Largest shift of an empty-screen photo, pixels. Default: 8.
     pub max_shift_px: f64,
-    /// An empty-screen photo may differ from the photo by this share of the screen's brightness once it is aligned and
-    /// its exposure matched, 0 to 1. Default: 0.05.
+    /// An empty-screen photo may differ from the photo by this share of the screen's brightness
+    /// once it is aligned and its exposure matched, 0 to 1. Default: 0.05.
     pub max_mismatch: f32,
 }
 
@@ -47,29 +47,32 @@ pub struct ScreenPlate {
     pub image: Image<LinearRgb>,
     /// How uneven the screen is: 1 minus darkest over brightest, of its strongest channel.
     pub unevenness: f32,
-    /// Standard deviation of the photo around the plate where the screen is free: noise, and what the plate misses.
+    /// Standard deviation of the photo around the plate where the screen is free: noise, and what
+    /// the plate misses.
     pub residual: LinearRgb,
     /// Degree of the fitted polynomial; nothing where the plate is a photo.
     pub degree: Option<usize>,
-    /// How far a photographed plate was moved to lie on the photo, pixels right and down; 0 for a fitted one.
+    /// How far a photographed plate was moved to lie on the photo, pixels right and down; 0 for a
+    /// fitted one.
     pub shift_px: [f64; 2],
 }
 
 impl ScreenPlate {
     /// Fits a smooth screen to the pixels of a photo that show it.
     ///
-    /// `photo` is scene-linear; `background` marks the pixels that surely show the screen. They may lie around the object only: the
-    /// polynomial goes on under it.
+    /// `photo` is scene-linear; `background` marks the pixels that surely show the screen. They may
+    /// lie around the object only: the polynomial goes on under it.
     ///
     /// # Method
-    /// The logarithm of each channel is a polynomial of the position, fitted to the means of small cells by iteratively
-    /// reweighted least squares with [Tukey]'s biweight, narrower on the dark side, so that shadows and dirt do not count. Light falls off by
-    /// factors and never goes below 0: hence the logarithm. The degree is the lowest that no higher one beats by
+    /// The logarithm of each channel is a polynomial of the position, fitted to the means of small
+    /// cells by iteratively reweighted least squares with [Tukey]'s biweight, narrower on the
+    /// dark side, so that shadows and dirt do not count. Light falls off by factors and never
+    /// goes below 0: hence the logarithm. The degree is the lowest that no higher one beats by
     /// `least_gain` in the residual of cells that were left out of the fit.
     ///
     /// # Errors
-    /// [`Error::Photo`](crate::Error::Photo) where there is not enough background, or no light on it;
-    /// [`Error::Value`](crate::Error::Value) for an option that cannot be right.
+    /// [`Error::Photo`](crate::Error::Photo) where there is not enough background, or no light on
+    /// it; [`Error::Value`](crate::Error::Value) for an option that cannot be right.
     /// # Panics
     /// When the sizes differ.
     ///
@@ -88,14 +91,14 @@ impl ScreenPlate {
 
     /// Takes a photo of the empty screen for the plate.
     ///
-    /// It is moved onto the photo (by the screen's texture and dirt, if it has any), its exposure and white balance
-    /// are matched channel by channel, and its noise is blurred.
+    /// It is moved onto the photo (by the screen's texture and dirt, if it has any), its exposure
+    /// and white balance are matched channel by channel, and its noise is blurred.
     ///
     /// # Errors
-    /// [`Error::Photo`](crate::Error::Photo) where the sizes differ, the empty screen lies farther off than
-    /// `max_shift_px`, or differs from what the photo shows of the screen by more than `max_mismatch`;
-    /// [`Error::Value`](crate::Error::Value) for an option that cannot be right.
-    /// # Panics
+    /// [`Error::Photo`](crate::Error::Photo) where the sizes differ, the empty screen lies farther
+    /// off than `max_shift_px`, or differs from what the photo shows of the screen by more than
+    /// `max_mismatch`; [`Error::Value`](crate::Error::Value) for an option that cannot be
+    /// right. # Panics
     /// When the sizes of photo and background differ.
     pub fn from_photo(
         empty: &Image<LinearRgb>,
@@ -127,7 +130,8 @@ impl ScreenPlate {
         Self::fit(photo, &screen_pixels(mask), options)
     }
 
-    /// [`ScreenPlate::from_photo`], checked on what an object's mask and a margin around it leave free.
+    /// [`ScreenPlate::from_photo`], checked on what an object's mask and a margin around it leave
+    /// free.
     ///
     /// # Errors
     /// Those of [`ScreenPlate::from_photo`].
@@ -197,15 +201,16 @@ impl ScreenPlate {
         }
     }
 
-    /// By how much the plate differs from what the photo shows of the screen, as a share of the screen's brightness.
+    /// By how much the plate differs from what the photo shows of the screen, as a share of the
+    /// screen's brightness.
     fn mismatch(&self, photo: &Image<LinearRgb>, background: &Mask) -> f32 {
         let [seen, expected] = cell_means([photo, &self.image], background);
         cells::mismatch(&seen, &expected)
     }
 }
 
-/// Blur of a photographed plate against its noise, standard deviation in pixels: a tenth of the noise is left, and screens
-/// have no finer structure that matters.
+/// Blur of a photographed plate against its noise, standard deviation in pixels: a tenth of the
+/// noise is left, and screens have no finer structure that matters.
 const PHOTO_BLUR_PX: f32 = 3.0;
 /// The highest degree: 28 coefficients a channel.
 const MAX_DEGREE: usize = 6;
@@ -254,7 +259,8 @@ fn check_share<T: Into<f64> + Copy + std::fmt::Display>(at: &str, value: T) -> R
     })
 }
 
-/// A photo of the empty screen, moved onto the photo, without its noise and of the photo's exposure.
+/// A photo of the empty screen, moved onto the photo, without its noise and of the photo's
+/// exposure.
 fn matched(
     empty: &Image<LinearRgb>,
     photo: &Image<LinearRgb>,
@@ -283,7 +289,8 @@ fn shift_onto(
     background: &Mask,
 ) -> Result<[f64; 2]> {
     let gain = gain_on_background(photo, empty, background)?;
-    // The object's edges must not be seen: the filters of the search reach over them into the free screen.
+    // The object's edges must not be seen: the filters of the search reach over them into the free
+    // screen.
     let without_object = free_or_empty(photo, empty, background, gain);
     Ok(register::shift(&without_object, empty, background, [1.0; 3]).shift_px)
 }

@@ -11,8 +11,8 @@ use std::borrow::Cow;
 pub(super) const MIN_SEARCH_SIZE_PX: usize = 32;
 /// Shortest side that can hold an object and its background, pixels.
 const MIN_PHOTO_SIDE_PX: usize = 16;
-/// A photo with a shorter longer side than this is enlarged for the search: bands and gaps of a few pixels are wide beside
-/// an object of 20.
+/// A photo with a shorter longer side than this is enlarged for the search: bands and gaps of a few
+/// pixels are wide beside an object of 20.
 const SMALL_PHOTO_PX: usize = 128;
 /// Longer side, at least, to which it is enlarged.
 const ENLARGED_PHOTO_PX: usize = 256;
@@ -21,7 +21,8 @@ const ENLARGED_PHOTO_PX: usize = 256;
 pub(super) struct Prepared<'a> {
     /// Scene-linear and finite.
     pub(super) photo: &'a Image<LinearRgb>,
-    /// The picture that is searched for the object: the photo itself, or a copy at another resolution.
+    /// The picture that is searched for the object: the photo itself, or a copy at another
+    /// resolution.
     pub(super) small: Cow<'a, Image<LinearRgb>>,
     /// Square roots of the photo, in which shot noise is the same everywhere.
     pub(super) sqrt: Image<LinearRgb>,
@@ -31,7 +32,8 @@ impl<'a> Prepared<'a> {
     /// Checks a photo and reduces it to a longer side of `working_size` pixels.
     ///
     /// # Errors
-    /// [`Error::Photo`](crate::Error::Photo) for a photo that is too small or has a pixel that is not finite.
+    /// [`Error::Photo`](crate::Error::Photo) for a photo that is too small or has a pixel that is
+    /// not finite.
     pub(super) fn new(photo: &'a Image<LinearRgb>, working_size: usize) -> Result<Self> {
         check_size(photo)?;
         check_finite(photo)?;

@@ -8,8 +8,8 @@ use nalgebra::{Matrix2, Vector2};
 /// Where a picture lies on another.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Registered {
-    /// Pixels right and down by which the second picture must be moved to lie on the first; 0 where there is too little
-    /// structure.
+    /// Pixels right and down by which the second picture must be moved to lie on the first; 0
+    /// where there is too little structure.
     pub(super) shift_px: [f64; 2],
     /// Standard deviation of the shift; infinite where there is no structure at all.
     pub(super) sigma_px: f64,
@@ -17,7 +17,8 @@ pub(super) struct Registered {
     pub(super) agreement: f64,
 }
 
-/// Levels of the pyramid that the search climbs down: shifts of up to 2 pixels of the coarsest are found.
+/// Levels of the pyramid that the search climbs down: shifts of up to 2 pixels of the coarsest are
+/// found.
 const PYRAMID_LEVELS: usize = 4;
 /// Shortest side of a picture that is still halved.
 const MIN_HALVED_SIDE_PX: usize = 32;
@@ -33,14 +34,15 @@ const MIN_AGREEMENT: f64 = 0.3;
 const MAX_STEP_PX: f64 = 2.0;
 /// A shift below this many standard deviations counts as none.
 const SIGNIFICANT_SIGMAS: f64 = 3.0;
-/// A search that moved by more than this share of the shorter side has diverged: there was nothing to hold on to.
+/// A search that moved by more than this share of the shorter side has diverged: there was nothing
+/// to hold on to.
 const MAX_SHIFT_SHARE: f64 = 0.25;
 
 /// The shift of `b` onto `a` where `mask` is set, by the light weighed by `weights`.
 ///
 /// # Method
-/// [Lucas and Kanade 1981] on high-passed pictures, from coarse to fine, with a factor between them solved for in each
-/// step.
+/// [Lucas and Kanade 1981] on high-passed pictures, from coarse to fine, with a factor between them
+/// solved for in each step.
 ///
 /// [Lucas and Kanade 1981]: https://www.ri.cmu.edu/pub_files/pub3/lucas_bruce_d_1981_2/lucas_bruce_d_1981_2.pdf
 pub(super) fn shift(
@@ -72,7 +74,8 @@ impl Registered {
         agreement: 0.0,
     };
 
-    /// The shift is a significant one between pictures of the same thing; `side` is the shorter one of the picture.
+    /// The shift is a significant one between pictures of the same thing; `side` is the shorter one
+    /// of the picture.
     fn is_reliable(&self, side: usize) -> bool {
         let is_unlike = self.agreement < MIN_AGREEMENT;
         let is_lost = self.length_px() > MAX_SHIFT_SHARE * side as f64;
@@ -147,7 +150,8 @@ impl PicturePair {
         found
     }
 
-    /// The shift by this level, of which a pixel is `at_full` of the first, from a start; both in pixels of the first.
+    /// The shift by this level, of which a pixel is `at_full` of the first, from a start; both in
+    /// pixels of the first.
     fn registered(&self, start_px: [f64; 2], at_full: f64) -> Option<Registered> {
         let start = Vector2::from(start_px) / at_full;
         let (at, last) = self.high_passed().refined(start)?;
@@ -162,7 +166,8 @@ impl PicturePair {
         }
     }
 
-    /// Gauss and Newton from a start; the shift and the last step, nothing where there is no structure.
+    /// Gauss and Newton from a start; the shift and the last step, nothing where there is no
+    /// structure.
     fn refined(&self, start: Vector2<f64>) -> Option<(Vector2<f64>, ShiftStep)> {
         let mut at = start;
         let mut last = self.step(at)?;
@@ -176,8 +181,8 @@ impl PicturePair {
         at.iter().all(|v| v.is_finite()).then_some((at, last))
     }
 
-    /// One step from a shift of `b`: the gain by regression of `a` on it, the shift by regression of what is left on the
-    /// gradient.
+    /// One step from a shift of `b`: the gain by regression of `a` on it, the shift by regression
+    /// of what is left on the gradient.
     fn step(&self, at: Vector2<f64>) -> Option<ShiftStep> {
         let b = moved(&self.b, at.into());
         let (gain, agreement) = self.gain_and_agreement(&b)?;
@@ -262,7 +267,8 @@ struct ShiftStep {
 }
 
 impl ShiftStep {
-    /// The shift that this was the last step to, at a level of which a pixel is `at_full` of the first.
+    /// The shift that this was the last step to, at a level of which a pixel is `at_full` of the
+    /// first.
     fn to_registered(&self, at: Vector2<f64>, at_full: f64) -> Registered {
         Registered {
             shift_px: (at * at_full).into(),

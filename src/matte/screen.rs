@@ -8,10 +8,12 @@ use crate::filter;
 use crate::image::{Image, Mask};
 use crate::pixel::{Coverage, LinearRgb};
 
-/// Width of the zone around the object that is left out, as a share of the longer side: contact shadows and spill.
+/// Width of the zone around the object that is left out, as a share of the longer side: contact
+/// shadows and spill.
 const SCREEN_MARGIN: f64 = 0.02;
 
-/// Mean scene-linear colour of a photo outside a mask and a margin around it (2 % of the longer side).
+/// Mean scene-linear colour of a photo outside a mask and a margin around it (2 % of the longer
+/// side).
 ///
 /// Where the margin leaves nothing, the mask alone is left out.
 ///
@@ -49,8 +51,8 @@ pub(super) fn masked_pixels(
     pixels.filter_map(|(p, set)| set.then_some(*p))
 }
 
-/// Mean of colours; none where there are none. Sums in double precision and in the order of the pixels: the same at any
-/// thread count.
+/// Mean of colours; none where there are none. Sums in double precision and in the order of the
+/// pixels: the same at any thread count.
 pub(super) fn mean_color(pixels: impl Iterator<Item = LinearRgb>) -> Option<LinearRgb> {
     let (sum, count) = pixels.fold(([0.0_f64; 3], 0_u64), |([r, g, b], count), p| {
         let sum = [r + f64::from(p.r), g + f64::from(p.g), b + f64::from(p.b)];
@@ -59,8 +61,8 @@ pub(super) fn mean_color(pixels: impl Iterator<Item = LinearRgb>) -> Option<Line
     (count > 0).then(|| sum.map(|s| (s / count as f64) as f32).into())
 }
 
-/// Least share by which the screen's largest channel must exceed the mean of the two others to be keyed: a painted
-/// screen has 0.6 and more, a white board in the light of a lamp up to 0.15.
+/// Least share by which the screen's largest channel must exceed the mean of the two others to be
+/// keyed: a painted screen has 0.6 and more, a white board in the light of a lamp up to 0.15.
 const MIN_KEYABLE_EXCESS: f32 = 0.3;
 
 /// The screen has enough colour to distinguish it from what is in front of it.

@@ -19,7 +19,8 @@ const SEARCH_SIZE_PX: usize = 1024;
 const MIN_SCREEN_SHARE: f64 = 0.1;
 /// What is darker has no hue but that of its noise, scene-linear.
 const MIN_BRIGHTNESS: f32 = 0.005;
-/// Steps of the circle of hues, how many of them to either side are one hue, and how many hues a photo has at most.
+/// Steps of the circle of hues, how many of them to either side are one hue, and how many hues a
+/// photo has at most.
 const HUE_STEPS: usize = 72;
 const SAME_HUE_STEPS: usize = 5;
 const MAX_HUES: usize = 4;
@@ -30,17 +31,20 @@ const RIM_PX: f64 = 8.0;
 const MIN_OBJECT_SHARE: f64 = 0.002;
 /// Times a corner of a rough quadrangle is moved, at most: it takes two or three rounds.
 const MAX_CORNER_MOVES: usize = 40;
-/// Stretches along each side, and the part of it near its corners that is left out: corners are worn.
+/// Stretches along each side, and the part of it near its corners that is left out: corners are
+/// worn.
 const PROBE_COUNT: usize = 96;
 const CORNER_PART: f64 = 0.08;
-/// How far across a side a probe reaches, pixels of the search, and samples to the pixel of the photo.
+/// How far across a side a probe reaches, pixels of the search, and samples to the pixel of the
+/// photo.
 const REACH_PX: f64 = 4.0;
 const STEPS_PER_PX: f64 = 2.0;
 /// The two sides of a border differ by this, scene-linear, or there is none.
 const MIN_CHANGE: f32 = 0.01;
 /// A border is found at most this share of the reach from where it is expected.
 const MAX_OFFSET_SHARE: f64 = 0.75;
-/// Probes farther from a side's line than this multiple of the median belong to something else: an object, a shadow.
+/// Probes farther from a side's line than this multiple of the median belong to something else: an
+/// object, a shadow.
 const OUTLIER_FACTOR: f64 = 3.0;
 /// Rounds in which such probes are dropped.
 const OUTLIER_ROUNDS: usize = 4;
@@ -60,17 +64,19 @@ pub struct ScreenCorners {
 
 /// Corners of the coloured screen in a photo, to a fraction of a pixel.
 ///
-/// `photo` is scene-linear; the screen is a rectangle on something of another colour, and all of it is seen.
+/// `photo` is scene-linear; the screen is a rectangle on something of another colour, and all of it
+/// is seen.
 ///
 /// # Method
-/// The largest connected region of each of the photo's hues; of those that do not reach the border the largest on which
-/// something lies. The four corners of its hull that enclose the most are rough ones; each side is then fitted
-/// as a line to where, along profiles across it, the colour changes from the screen's to what is beside it (the centre of
-/// gravity of the change in linear light, which blur does not move), and neighbours meet in the corners.
+/// The largest connected region of each of the photo's hues; of those that do not reach the border
+/// the largest on which something lies. The four corners of its hull that enclose the most are
+/// rough ones; each side is then fitted as a line to where, along profiles across it, the colour
+/// changes from the screen's to what is beside it (the centre of gravity of the change in linear
+/// light, which blur does not move), and neighbours meet in the corners.
 ///
 /// # Errors
-/// [`Error::Photo`] where there is no coloured screen, it reaches the border of the photo, or its outline is no
-/// rectangle's.
+/// [`Error::Photo`] where there is no coloured screen, it reaches the border of the photo, or its
+/// outline is no rectangle's.
 pub fn screen_corners(photo: &Image<LinearRgb>) -> Result<ScreenCorners> {
     if photo.width().min(photo.height()) == 0 {
         return Err(not_found("the photo is empty"));
@@ -289,7 +295,8 @@ fn largest_group(set: &Mask) -> usize {
 /// The four points of a convex polygon that enclose the most of it, in its order.
 ///
 /// # Method
-/// From any four, each in turn becomes the point that is farthest from the way between its neighbours, until none moves.
+/// From any four, each in turn becomes the point that is farthest from the way between its
+/// neighbours, until none moves.
 fn four_corners(ring: &[Point2<f64>]) -> Option<[Point2<f64>; 4]> {
     let n = ring.len();
     if n < 4 {
@@ -480,7 +487,8 @@ mod tests {
         b: 0.1,
     };
 
-    /// A green screen of 0.6 x 0.4 m on a table, unevenly lit, with a red slab on it; and its camera.
+    /// A green screen of 0.6 x 0.4 m on a table, unevenly lit, with a red slab on it; and its
+    /// camera.
     fn photo(tilt: f64, turn: f64, table: LinearRgb) -> (Image<LinearRgb>, Camera) {
         let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI + tilt)
             * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), turn);

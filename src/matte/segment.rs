@@ -42,13 +42,15 @@ pub struct Segmentation {
     pub hull: Vec<Point2<f64>>,
     /// The border of `tight`.
     pub outline: Outline,
-    /// Whether the object reaches the left, top, right and bottom border of the photo: then part of it is missing.
+    /// Whether the object reaches the left, top, right and bottom border of the photo: then part
+    /// of it is missing.
     pub touches: [bool; 4],
     /// How reliable all this is.
     pub confidence: Confidence,
     /// Which band of the pyramid served as the coarse one.
     pub levels: usize,
-    /// Pixels of the photo for a pixel of the picture that was searched; above 1 where noise or size called for a reduction.
+    /// Pixels of the photo for a pixel of the picture that was searched; above 1 where noise or
+    /// size called for a reduction.
     pub reduction: f64,
     /// Notes and warnings about the photo and the outline.
     pub diagnostics: Vec<Diagnostic>,
@@ -66,8 +68,8 @@ pub struct SegmentStep {
 }
 
 impl SegmentStep {
-    /// The picture in the range 0 to 1 that files show: where values go above 1, their logarithms as shares of the
-    /// largest.
+    /// The picture in the range 0 to 1 that files show: where values go above 1, their logarithms
+    /// as shares of the largest.
     pub fn shown(&self) -> Image<f32> {
         let pixels = self.image.pixels().iter();
         let most = pixels.fold(0.0f32, |most, v| most.max(*v));
@@ -81,25 +83,29 @@ impl SegmentStep {
 
 /// Finds the one object on a uniform background.
 ///
-/// `photo` is scene-linear, at least 16 pixels a side. The object may reach up to three borders of the photo (which gives
-/// a warning), but not all four.
+/// `photo` is scene-linear, at least 16 pixels a side. The object may reach up to three borders of
+/// the photo (which gives a warning), but not all four.
 ///
 /// # Method
-/// A cut of a Laplacian pyramid ([Burt and Adelson 1983]): the finest and the coarsest band, brought to full size, are
-/// binarised and combined by AND. Noise has no coarse structure and soft shadows have no fine one, so that what is left
-/// are the object's edges; the hull is theirs. Departs from the plain method in that
-/// * bands are those of the square roots of the three channels, in units of their noise along the border ([`LumaMode`]);
+/// A cut of a Laplacian pyramid ([Burt and Adelson 1983]): the finest and the coarsest band,
+/// brought to full size, are binarised and combined by AND. Noise has no coarse structure and soft
+/// shadows have no fine one, so that what is left are the object's edges; the hull is theirs.
+/// Departs from the plain method in that
+/// * bands are those of the square roots of the three channels, in units of their noise along the
+///   border ([`LumaMode`]);
 /// * the thresholds are Otsu's on a logarithmic scale ([`Threshold`]);
 /// * the coarsest band is spread by one of its pixels, since it passes through 0 on an edge;
 /// * edges are thinned to their ridge and specks dropped;
-/// * edges nearer than `join` form clusters, and only the cluster of most edge pixels is kept, so that dirt far away
-///   does not blow up the hull;
-/// * it is done at several depths and, against noise, picture sizes; the result that agrees best with the others and with
-///   the edges is taken, and how well it agrees is its [`Confidence`];
-/// * what the edges enclose, gaps bridged, is the object, and its outline is moved to where the photo itself changes.
+/// * edges nearer than `join` form clusters, and only the cluster of most edge pixels is kept, so
+///   that dirt far away does not blow up the hull;
+/// * it is done at several depths and, against noise, picture sizes; the result that agrees best
+///   with the others and with the edges is taken, and how well it agrees is its [`Confidence`];
+/// * what the edges enclose, gaps bridged, is the object, and its outline is moved to where the
+///   photo itself changes.
 /// # Errors
-/// [`Error::Photo`](crate::Error::Photo) when there is nothing, only a speck, more than one object, or no background around the object;
-/// [`Error::Value`](crate::Error::Value) for an option that cannot be right.
+/// [`Error::Photo`](crate::Error::Photo) when there is nothing, only a speck, more than one object,
+/// or no background around the object; [`Error::Value`](crate::Error::Value) for an option that
+/// cannot be right.
 ///
 /// [Burt and Adelson 1983]: https://doi.org/10.1109/TCOM.1983.1095851
 pub fn segment(photo: &Image<LinearRgb>, options: &SegmentOptions) -> Result<Segmentation> {
@@ -107,7 +113,8 @@ pub fn segment(photo: &Image<LinearRgb>, options: &SegmentOptions) -> Result<Seg
     segment_prepared(&Prepared::new(photo, options.working_size)?, options)
 }
 
-/// As [`segment`], with options that are checked and a photo that is prepared for their working size.
+/// As [`segment`], with options that are checked and a photo that is prepared for their working
+/// size.
 pub(super) fn segment_prepared(
     prepared: &Prepared<'_>,
     options: &SegmentOptions,

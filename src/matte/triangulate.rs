@@ -24,9 +24,11 @@ use serde::{Deserialize, Serialize};
 pub struct TriangulateOptions {
     /// Largest offset of the object from the first photo that is moved back, pixels. Default: 8.
     pub max_shift_px: f64,
-    /// Moved back, what the screens do not change must agree between the photos: least correlation, 0 to 1. Default: 0.5.
+    /// Moved back, what the screens do not change must agree between the photos: least
+    /// correlation, 0 to 1. Default: 0.5.
     pub least_agreement: f64,
-    /// A channel is determined where its transmittance has at most this standard deviation. Default: 0.05.
+    /// A channel is determined where its transmittance has at most this standard deviation.
+    /// Default: 0.05.
     pub max_sigma: f32,
 }
 
@@ -43,10 +45,11 @@ impl Default for TriangulateOptions {
 /// The film that two or more photos show.
 #[derive(Clone, Debug)]
 pub struct Triangulated {
-    /// Reflected light F and opacity `1 - V` by the view transmittance V, which is *estimated* from T. Of the photos' size,
-    /// empty outside the object.
+    /// Reflected light F and opacity `1 - V` by the view transmittance V, which is *estimated*
+    /// from T. Of the photos' size, empty outside the object.
     pub film: Image<Film>,
-    /// Transmittance T per channel as *measured*: the screen seen through the object and in its shadow. 1 outside.
+    /// Transmittance T per channel as *measured*: the screen seen through the object and in its
+    /// shadow. 1 outside.
     pub transmittance: Image<LinearRgb>,
     /// Expected error of T in each pixel, 0 to 1, of its least certain channel.
     pub uncertainty: Image<f32>,
@@ -54,32 +57,36 @@ pub struct Triangulated {
     pub determined: [bool; 3],
     /// T of the plastic where it lies flat: what relates V to T.
     pub flat: LinearRgb,
-    /// How far the object lay off the first photo in each, pixels right and down; it was moved back.
+    /// How far the object lay off the first photo in each, pixels right and down; it was moved
+    /// back.
     pub shift_px: Vec<[f64; 2]>,
-    /// Root mean square of what the film does not explain of the photos inside the object, scene-linear.
+    /// Root mean square of what the film does not explain of the photos inside the object,
+    /// scene-linear.
     pub residual: f32,
     /// Notes and warnings.
     pub diagnostics: Vec<Diagnostic>,
 }
 
-/// Solves `photo = F + T * plate` for F and T by least squares over several photos, each with its own screen.
+/// Solves `photo = F + T * plate` for F and T by least squares over several photos, each with its
+/// own screen.
 ///
-/// Photos are scene-linear, of one size, of the same object under the same light; the more the screens differ, the better.
-/// `inside` is the object's coverage in the first photo.
+/// Photos are scene-linear, of one size, of the same object under the same light; the more the
+/// screens differ, the better. `inside` is the object's coverage in the first photo.
 ///
 /// # Method
-/// [Smith and Blinn 1996], theorem 4, per channel: T is the slope and F the intercept of the photos' values over the
-/// screens'. A channel in which the screens are alike (red, on green and blue) leaves T open there. The determined ones
-/// give the dye of PET, and by how much a pixel is such plastic and by how much bare; what little the screens differ in
-/// the open channel corrects the dye over the whole object, and the pixel, by the variances.
+/// [Smith and Blinn 1996], theorem 4, per channel: T is the slope and F the intercept of the
+/// photos' values over the screens'. A channel in which the screens are alike (red, on green and
+/// blue) leaves T open there. The determined ones give the dye of PET, and by how much a pixel is
+/// such plastic and by how much bare; what little the screens differ in the open channel corrects
+/// the dye over the whole object, and the pixel, by the variances.
 ///
-/// Photos are aligned first. Between two screens grey film changes only along the difference of their colours; the light
-/// across it is the same in both photos, and shows how far they lie apart.
+/// Photos are aligned first. Between two screens grey film changes only along the difference of
+/// their colours; the light across it is the same in both photos, and shows how far they lie apart.
 ///
 /// # Errors
 /// [`Error::Value`](crate::Error::Value) (`photos`) for fewer than two or of different size;
-/// [`Error::Photo`](crate::Error::Photo) where no channel of the screens differs, the object moved farther than
-/// `max_shift_px`, turned, or moved otherwise (`least_agreement`).
+/// [`Error::Photo`](crate::Error::Photo) where no channel of the screens differs, the object moved
+/// farther than `max_shift_px`, turned, or moved otherwise (`least_agreement`).
 /// # Panics
 /// When a photo and its plate differ in size.
 ///
@@ -242,11 +249,12 @@ struct Aligner<'a> {
 }
 
 impl Aligner<'_> {
-    /// Pixels by which photo `number` (the first is 1) must be moved to lie on the first, by the light that the screens do
-    /// not change.
+    /// Pixels by which photo `number` (the first is 1) must be moved to lie on the first, by the
+    /// light that the screens do not change.
     ///
     /// # Errors
-    /// [`Error::Photo`](crate::Error::Photo) where it was moved too far, turned, or differs otherwise.
+    /// [`Error::Photo`](crate::Error::Photo) where it was moved too far, turned, or differs
+    /// otherwise.
     fn shift_px(
         &self,
         number: usize,
@@ -290,7 +298,8 @@ impl Aligner<'_> {
         ))
     }
 
-    /// How far the ends of the object moved apart, in pixels, where that is more than they may and certainly so.
+    /// How far the ends of the object moved apart, in pixels, where that is more than they may and
+    /// certainly so.
     fn turned_px(&self, photo: &Image<LinearRgb>, weights: [f32; 3]) -> Option<f64> {
         let [low, high] =
             halves(&self.near).map(|end| register::shift(self.first, photo, &end, weights));
@@ -338,7 +347,8 @@ fn span(mask: &Mask, axis: usize) -> [usize; 2] {
     [low.min(high), high]
 }
 
-/// The light that does not change between two screens: the mean of the channels without its part along the difference.
+/// The light that does not change between two screens: the mean of the channels without its part
+/// along the difference.
 fn unchanged_light(a: LinearRgb, b: LinearRgb) -> [f32; 3] {
     let even = [1.0_f32 / 3.0; 3];
     let along = [a.r - b.r, a.g - b.g, a.b - b.b];

@@ -59,7 +59,8 @@ pub struct Beside {
     pub apart: bool,
 }
 
-/// The points of a curve, from left to right; points that are not finite, or not positive on a logarithmic axis, are left out.
+/// The points of a curve, from left to right; points that are not finite, or not positive on a
+/// logarithmic axis, are left out.
 pub type Curve = Vec<[f64; 2]>;
 
 /// One direction of a chart.
@@ -74,20 +75,19 @@ pub struct Axis {
 }
 
 impl Axis {
-    /// A logarithmic axis over powers of ten that hold all positive values; 1 to 10 where there are none.
+    /// A logarithmic axis over powers of ten that hold all positive values; 1 to 10 where there are
+    /// none.
     pub fn over_decades(title: impl Into<String>, values: impl IntoIterator<Item = f64>) -> Self {
-        let [low, high] = positive_extent(values).unwrap_or([1.0, 10.0]);
-        let first = libm::floor(libm::log10(low));
-        let last = libm::ceil(libm::log10(high)).max(first + 1.0);
+        let extent = positive_extent(values).unwrap_or([1.0, 10.0]);
         Self {
             title: title.into(),
-            range: [first, last].map(libm::exp10),
+            range: decades_around(extent).map(libm::exp10),
             logarithmic: true,
         }
     }
 
-    /// A logarithmic axis that begins and ends at 1, 2 or 5 times a power of ten, as near to all positive values as can be; 1
-    /// to 10 where there are none.
+    /// A logarithmic axis that begins and ends at 1, 2 or 5 times a power of ten, as near to all
+    /// positive values as can be; 1 to 10 where there are none.
     pub fn around(title: impl Into<String>, values: impl IntoIterator<Item = f64>) -> Self {
         let Some([least, most]) = positive_extent(values) else {
             return Self::over_decades(title, []);
@@ -111,19 +111,25 @@ impl Axis {
 
     /// How far along a value is, from 0 to 1; none where it cannot be shown.
     fn fraction_of(&self, value: f64) -> Option<f64> {
-        let [low, high, value] = [self.range[0], self.range[1], value]
-            .map(|v| if self.logarithmic { libm::log10(v) } else { v });
+        let [low, high, value] = [self.range[0], self.range[1], value].map(|v| self.on_scale(v));
         let fraction = (value - low) / (high - low);
         fraction.is_finite().then(|| fraction.clamp(0.0, 1.0))
+    }
+
+    #[inline]
+    fn on_scale(&self, value: f64) -> f64 {
+        if self.logarithmic {
+            libm::log10(value)
+        } else {
+            value
+        }
     }
 
     /// Values with a line through the chart.
     fn marked_values(&self) -> Vec<f64> {
         let [low, high] = self.range;
         if !self.logarithmic {
-            return (0..=4)
-                .map(|i| low + (high - low) * f64::from(i) / 4.0)
-                .collect();
+            return quarters([low, high]);
         }
         let steps = if high > FEW_DECADES * low {
             &DECADE_STEPS[..1]
@@ -155,6 +161,24 @@ fn positive_extent(values: impl IntoIterator<Item = f64>) -> Option<[f64; 2]> {
         .filter(|v| v.is_finite() && *v > 0.0)
         .map(|v| [v, v])
         .reduce(|[low, high], [v, _]| [v.min(low), v.max(high)])
+}
+
+/// The exponents of the decades that hold a range, at least one.
+fn decades_around([low, high]: [f64; 2]) -> [f64; 2] {
+    let first = libm::floor(libm::log10(low));
+    [first, libm::ceil(libm::log10(high)).max(first + 1.0)]
+}
+
+/// The ends of a range and what divides it into four.
+fn quarters([low, high]: [f64; 2]) -> Vec<f64> {
+    (0..=4)
+        .map(|i| low + (high - low) * f64::from(i) / 4.0)
+        .collect()
+}
+
+fn polyline_points(places: &[[f64; 2]]) -> String {
+    let points = places.iter().map(|[x, y]| format!("{x:.1},{y:.1}"));
+    points.collect::<Vec<_>>().join(" ")
 }
 
 impl Chart {
@@ -299,13 +323,9 @@ impl Framed<'_> {
     /// The points of a curve, joined by a line where it is asked for.
     fn curve_svg(&self, curve: &Curve, color: &str, joined: bool) -> Markup {
         let places: Vec<_> = curve.iter().filter_map(|p| self.place(p)).collect();
-        let points: Vec<String> = places
-            .iter()
-            .map(|[x, y]| format!("{x:.1},{y:.1}"))
-            .collect();
         html! {
             @if joined {
-                polyline points=(points.join(" ")) fill="none" stroke=(color) stroke-width="1.5" {}
+                polyline points=(polyline_points(&places)) fill="none" stroke=(color) stroke-width="1.5" {}
             }
             @for [x, y] in places {
                 circle cx=(tenths(x)) cy=(tenths(y)) r="2.5" fill=(color) {}
@@ -376,8 +396,8 @@ impl Area {
     }
 }
 
-/// Words beside points, where they cover neither each other nor another point, and stay in the frame; lines that run behind
-/// them are kept off by a rim.
+/// Words beside points, where they cover neither each other nor another point, and stay in the
+/// frame; lines that run behind them are kept off by a rim.
 fn labels_beside(labels: Vec<([f64; 2], &str)>, points: Vec<[f64; 2]>, frame: Area) -> Markup {
     let taken = points.into_iter().map(Area::of_point).collect();
     html! {
@@ -397,14 +417,17 @@ fn free_places(
     let mut placed = Vec::new();
     for (point, word) in labels {
         let width = POINT_LABEL_LETTER_WIDTH * word.chars().count() as f64;
-        let mut places = places_beside(point, width).into_iter();
-        let free = places.find(|place| frame.has_room(&Area::of_word(*place, width), &taken));
-        if let Some(place) = free {
+        if let Some(place) = free_place(point, width, &taken, &frame) {
             taken.push(Area::of_word(place, width));
             placed.push((place, word));
         }
     }
     placed
+}
+
+fn free_place(point: [f64; 2], width: f64, taken: &[Area], frame: &Area) -> Option<[f64; 2]> {
+    let mut places = places_beside(point, width).into_iter();
+    places.find(|place| frame.has_room(&Area::of_word(*place, width), taken))
 }
 
 impl Area {

@@ -9,8 +9,8 @@ const CELL_SIDE: f64 = 9.0;
 /// Room for the title, SVG units.
 const TITLE_HEIGHT: f64 = 22.0;
 
-/// How many places, as shares of a picture's width and height, lie in each part of it: the darker the more. Those
-/// outside the picture are left out.
+/// How many places, as shares of a picture's width and height, lie in each part of it: the darker
+/// the more. Those outside the picture are left out.
 pub(crate) fn heat_map(title: &str, places: &[[f64; 2]]) -> String {
     let [width, height] = GRID_CELLS.map(|n| n as f64 * CELL_SIDE);
     let whole_height = height + TITLE_HEIGHT;

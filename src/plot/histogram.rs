@@ -1,6 +1,6 @@
 //! Histograms as SVG: what was drawn against what it was drawn from.
 
-use super::markup::{tenths, text};
+use super::markup::{clipped, tenths, text};
 use super::number::trimmed;
 use maud::{Markup, html};
 
@@ -41,8 +41,7 @@ impl Histogram {
         let last = counts.len() - 1;
         for value in values {
             let place = (value - low) / (high - low) * bins as f64;
-            let bin = if place > 0.0 { place as usize } else { 0 };
-            counts[bin.min(last)] += 1;
+            counts[bin_at(place).min(last)] += 1;
         }
         Self {
             title: title.into(),
@@ -59,21 +58,21 @@ impl Histogram {
         self
     }
 
-    /// Largest distance of a bin from what it should have, in standard deviations (of a binomial count); none where
-    /// nothing is expected.
+    /// Largest distance of a bin from what it should have, in standard deviations (of a binomial
+    /// count); none where nothing is expected.
     pub fn worst_deviation(&self) -> Option<f64> {
         let expected = self
             .expected
             .filter(|e| *e > 0.0 && self.counts.len() > 1)?;
-        let share = 1.0 / self.counts.len() as f64;
-        let deviation = (expected * (1.0 - share)).sqrt();
+        let deviation = self.deviation(expected);
         self.counts
             .iter()
             .map(|&n| (n as f64 - expected).abs() / deviation)
             .reduce(f64::max)
     }
 
-    /// An SVG document: bars, and a dashed line at what is expected with a band of two standard deviations around it.
+    /// An SVG document: bars, and a dashed line at what is expected with a band of two standard
+    /// deviations around it.
     pub fn svg(&self) -> String {
         let width = LEFT_MARGIN + FRAME_SIZE[0] + RIGHT_MARGIN;
         html! {
@@ -105,12 +104,17 @@ impl Histogram {
 
     /// Two standard deviations on either side of what is expected.
     fn expected_band(&self, expected: f64) -> Markup {
-        let spread = 2.0 * (expected * (1.0 - 1.0 / self.counts.len().max(1) as f64)).sqrt();
+        let spread = 2.0 * self.deviation(expected);
         let (top, bottom) = (self.y(expected + spread), self.y(expected - spread));
         html! {
             rect x=(LEFT_MARGIN) y=(tenths(top)) width=(FRAME_SIZE[0]) height=(tenths(bottom - top))
                 fill="#d55e00" opacity="0.15" {}
         }
+    }
+
+    /// Standard deviation of a count where all bins are as likely.
+    fn deviation(&self, expected: f64) -> f64 {
+        (expected * (1.0 - 1.0 / self.counts.len().max(1) as f64)).sqrt()
     }
 
     fn draw_bars(&self) -> Markup {
@@ -151,14 +155,13 @@ fn clipped_label([x, y]: [f64; 2], room: f64, anchor: &str, whole: &str) -> Mark
     }
 }
 
+fn bin_at(place: f64) -> usize {
+    if place > 0.0 { place as usize } else { 0 }
+}
+
 /// A text, cut where there is no more room for it.
 fn cut_to_room(text: &str, room: f64) -> String {
-    let most = (room / LETTER_WIDTH) as usize;
-    if text.chars().count() <= most {
-        return text.to_owned();
-    }
-    let kept = text.chars().take(most.saturating_sub(1));
-    kept.chain(['\u{2026}']).collect()
+    clipped(text, (room / LETTER_WIDTH) as usize)
 }
 
 /// A number with as many digits as help.

@@ -12,6 +12,7 @@ mod table;
 pub use chart::Beside;
 pub use chart::{Axis, Chart, Curve};
 pub use histogram::Histogram;
+pub(crate) use markup::clipped;
 pub use markup::escaped;
 #[doc(hidden)]
 pub use number::three;

@@ -50,17 +50,15 @@ impl Page {
 
     /// The first rows of a table that may be long, and where the others are.
     pub fn beginning(&mut self, table: &Table, rows: usize, file: &str) -> &mut Self {
-        self.table(&Table {
-            columns: table.columns.clone(),
-            rows: table.rows.iter().take(rows).cloned().collect(),
-        });
+        self.table(&table.first_rows(rows));
         match table.rows.len().saturating_sub(rows) {
             0 => self,
             more => self.text(&format!("{more} more rows are in {file}.")),
         }
     }
 
-    /// A drawing with what is to be seen in it; `svg` is an SVG document, e.g. of [`Chart::row`](super::Chart::row).
+    /// A drawing with what is to be seen in it; `svg` is an SVG document, e.g. of
+    /// [`Chart::row`](super::Chart::row).
     pub fn chart(&mut self, svg: &str, caption: &str) -> &mut Self {
         self.push(html! { figure { (PreEscaped(svg)) figcaption { (text(caption)) } } })
     }

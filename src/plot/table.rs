@@ -42,6 +42,14 @@ impl Table {
         }
     }
 
+    /// The table without the rows behind these.
+    pub(super) fn first_rows(&self, count: usize) -> Self {
+        Self {
+            columns: self.columns.clone(),
+            rows: self.rows.iter().take(count).cloned().collect(),
+        }
+    }
+
     /// As comma-separated values (RFC 4180), the titles first.
     pub fn csv(&self) -> String {
         self.lines()

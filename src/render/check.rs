@@ -7,13 +7,14 @@ use crate::scene::{AreaLight, Card, EnvironmentMap, Shot};
 
 /// Is a shot something that can be rendered?
 ///
-/// Reads every texel, so ask once per shot that comes from outside, not once per frame. [`render`](super::render) itself
-/// neither asks nor panics: a NaN in a texture then becomes a NaN in the picture. Cards that are edge-on, behind the
-/// eye or without area are fine; they are not seen.
+/// Reads every texel, so ask once per shot that comes from outside, not once per frame.
+/// [`render`](super::render) itself neither asks nor panics: a NaN in a texture then becomes a NaN
+/// in the picture. Cards that are edge-on, behind the eye or without area are fine; they are not
+/// seen.
 ///
 /// # Errors
-/// [`Error::Value`] that names the card: a texel that is NaN or infinite, an alpha outside 0..1, the id 0 or one used
-/// twice; a plate of another size; a light or an exposure that is not finite.
+/// [`Error::Value`] that names the card: a texel that is NaN or infinite, an alpha outside 0..1,
+/// the id 0 or one used twice; a plate of another size; a light or an exposure that is not finite.
 pub fn check(shot: &Shot) -> Result<()> {
     check_plate(shot)?;
     check_lights(&shot.lights)?;

@@ -1,10 +1,10 @@
 //! Cryptomatte: which objects are in a pixel, and how much of each is seen, in channels of floats.
 //!
 //! # Method
-//! Friedman and Jones, "Cryptomatte Specification" 1.2.0 (2019): an object's id is the MurmurHash3 of its name, made a
-//! float that is neither a NaN nor subnormal; a pixel's objects are ranked by coverage, two ranks to a set of four
-//! channels; text attributes name the layer, the hash and the objects. Readers need the floats exactly: no half, and no
-//! compression with loss.
+//! Friedman and Jones, "Cryptomatte Specification" 1.2.0 (2019): an object's id is the MurmurHash3
+//! of its name, made a float that is neither a NaN nor subnormal; a pixel's objects are ranked by
+//! coverage, two ranks to a set of four channels; text attributes name the layer, the hash and the
+//! objects. Readers need the floats exactly: no half, and no compression with loss.
 
 use crate::deep::{DeepImage, DeepSample};
 use crate::pixel::ObjectId;
@@ -28,9 +28,11 @@ pub struct Cryptomatte {
 }
 
 impl Cryptomatte {
-    /// The layer of the objects in a picture; `names` holds their names, and objects without one are left out.
+    /// The layer of the objects in a picture; `names` holds their names, and objects without one
+    /// are left out.
     ///
-    /// Coverage is what is seen of an object. Where more than six objects share a pixel, those with least are left out.
+    /// Coverage is what is seen of an object. Where more than six objects share a pixel, those with
+    /// least are left out.
     pub fn new(deep: &DeepImage, layer: &str, names: &[(ObjectId, String)]) -> Self {
         let ids = hashed_ids(names);
         Self {
@@ -74,7 +76,8 @@ fn push_ranks(planes: &mut [Vec<f32>], ranks: Vec<(f32, f32)>) {
     }
 }
 
-/// Ids and visible coverage of a pixel's objects, the most visible first; as many as there are ranks.
+/// Ids and visible coverage of a pixel's objects, the most visible first; as many as there are
+/// ranks.
 fn ranked_objects(
     samples: &[DeepSample],
     ids: &[(ObjectId, f32)],
@@ -134,7 +137,8 @@ pub(crate) fn hex_id(name: &str) -> String {
     format!("{:08x}", id_of_name(name).to_bits())
 }
 
-/// The id of a name: its hash as a float, the exponent moved away from those of zero, subnormals, infinity and NaN.
+/// The id of a name: its hash as a float, the exponent moved away from those of zero, subnormals,
+/// infinity and NaN.
 pub(crate) fn id_of_name(name: &str) -> f32 {
     const MANTISSA: u32 = (1 << 23) - 1;
     const SIGN: u32 = 1 << 31;

@@ -28,17 +28,20 @@ const TILE_SIDE_PX: usize = 32;
 /// Sub-samples a side from which on a sharper level of detail pays.
 const DENSE_SUBSAMPLES: usize = 4;
 
-/// Renders a shot: per pixel and card, its light and its coverage; per pixel, what shadows leave of the plate.
+/// Renders a shot: per pixel and card, its light and its coverage; per pixel, what shadows leave of
+/// the plate.
 ///
-/// Same bits for any number of threads and any order of the cards. Never fails: cards that cannot be seen are left out, and
-/// numbers in `options` are brought into the range that works. Ask `check` about shots from outside.
+/// Same bits for any number of threads and any order of the cards. Never fails: cards that cannot
+/// be seen are left out, and numbers in `options` are brought into the range that works. Ask
+/// `check` about shots from outside.
 ///
 /// # Method
-/// Everything is planar, so each map between two planes seen from a point is a homography. Irradiance is smooth: it is
-/// computed once per receiver on a lattice in the picture, as a sum over Gauss nodes of the lights and fixed directions
-/// of the environment, each seen through the product of `1 - alpha` of the cards in between. Textures are sharp: they are
-/// read at the quantiles of the pixel filter, from the mip level whose own blur makes up for what those leave over. Cards
-/// are ordered by depth block by block; blocks in which they cross are split.
+/// Everything is planar, so each map between two planes seen from a point is a homography.
+/// Irradiance is smooth: it is computed once per receiver on a lattice in the picture, as a sum
+/// over Gauss nodes of the lights and fixed directions of the environment, each seen through the
+/// product of `1 - alpha` of the cards in between. Textures are sharp: they are read at the
+/// quantiles of the pixel filter, from the mip level whose own blur makes up for what those leave
+/// over. Cards are ordered by depth block by block; blocks in which they cross are split.
 pub fn render(shot: &Shot, options: &RenderOptions) -> DeepImage {
     let options = options.clamped();
     let view = CameraView::from_camera(&shot.camera);
@@ -51,7 +54,8 @@ pub fn render(shot: &Shot, options: &RenderOptions) -> DeepImage {
     assemble_tiles(&view, &rendered)
 }
 
-/// Everything that tiles are rendered from: textures at their level of detail, and the light on them.
+/// Everything that tiles are rendered from: textures at their level of detail, and the light on
+/// them.
 fn layer_stack(shot: &Shot, view: &CameraView, options: &RenderOptions) -> LayerStack {
     let offsets = filter_quantiles(options.subsamples);
     let planes = visible_planes(shot);
@@ -128,7 +132,8 @@ fn lit_layers(
         .collect()
 }
 
-/// Where light is looked up: for each pixel, or for each sub-sample where nodes are closer than pixels.
+/// Where light is looked up: for each pixel, or for each sub-sample where nodes are closer than
+/// pixels.
 fn sample_grid(
     view: &CameraView,
     lattice: &Lattice,
@@ -202,7 +207,8 @@ fn visible_side<'a>(
     }
 }
 
-/// Level of detail by matching variance: what sub-samples leave of the pixel's window, the texture's own filter covers.
+/// Level of detail by matching variance: what sub-samples leave of the pixel's window, the
+/// texture's own filter covers.
 ///
 /// A level read bilinearly has variance `4^level / 4` texels.
 fn detail_level(

@@ -5,7 +5,8 @@ use crate::render::float4::Float4;
 use crate::render::texel_grid::SIMD_LANES;
 use crate::scene::Grade;
 
-/// Opacity of film whose transmittance is turned in hue and changed in saturation; grey stays as it is.
+/// Opacity of film whose transmittance is turned in hue and changed in saturation; grey stays as it
+/// is.
 pub(super) fn graded_opacity(opacity: LinearRgb, grade: &Grade) -> LinearRgb {
     if opacity.r == opacity.g && opacity.g == opacity.b {
         return opacity;
@@ -31,7 +32,8 @@ pub(super) fn grade_colors(texels: &mut [Float4], grade: &Grade) {
     }
 }
 
-/// Dense since it is compiled as one piece for each set of vector instructions, over channels apart.
+/// Dense since it is compiled as one piece for each set of vector instructions, over channels
+/// apart.
 #[multiversion::multiversion(targets(
     "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2",
     "x86_64+avx2",

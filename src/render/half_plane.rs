@@ -4,7 +4,8 @@ use crate::geom::Vector3;
 use crate::render::ranges::integer_range;
 use std::ops::Range;
 
-/// The `x` for which every `side . (x, y, 1)` is at least 0, as lowest and highest; reversed where there is none.
+/// The `x` for which every `side . (x, y, 1)` is at least 0, as lowest and highest; reversed where
+/// there is none.
 pub(super) fn row_span(sides: &[Vector3<f64>], y: f64) -> (f64, f64) {
     let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
     for side in sides {
@@ -30,7 +31,8 @@ pub(super) fn nodes_inside(
     integer_range(low, high, within)
 }
 
-/// Sides of the shape `0 <= u/w <= 1`, `0 <= v/w <= 1`, `w >= 0`, reaching further out by shares of it.
+/// Sides of the shape `0 <= u/w <= 1`, `0 <= v/w <= 1`, `w >= 0`, reaching further out by shares of
+/// it.
 pub(super) fn quad_sides(
     u: &Vector3<f64>,
     v: &Vector3<f64>,

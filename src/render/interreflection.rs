@@ -11,7 +11,8 @@ use crate::render::view::{
 };
 use crate::scene::{Card, Shot};
 
-/// How far light spreads on its way to and fro: the order of a pile's height; 4 to 16 mm do as well.
+/// How far light spreads on its way to and fro: the order of a pile's height; 4 to 16 mm do as
+/// well.
 const BOUNCE_SPREAD_M: f64 = 0.008;
 
 /// Distance of the grid's points on the surface.
@@ -23,14 +24,16 @@ const MAX_GRID_STEPS: f64 = 1024.0;
 /// A white surface under a white card would glow forever.
 const MAX_BOUNCE: f32 = 0.95;
 
-/// Brightens the surface by what cards above reflect back to it; for callers who know the surface's albedo.
+/// Brightens the surface by what cards above reflect back to it; for callers who know the surface's
+/// albedo.
 ///
-/// Not part of the definition, which leaves bounces out: [`render`](super::render) never does this. A black albedo changes
-/// no bit; shadow factors may come out above 1.
+/// Not part of the definition, which leaves bounces out: [`render`](super::render) never does this.
+/// A black albedo changes no bit; shadow factors may come out above 1.
 ///
 /// # Method
-/// `S` is divided by `1 - albedo R`, with `R` the light that comes back from straight above: the sum over cards upwards
-/// of their colour times the squared transmittance of what lies below, blurred over the surface.
+/// `S` is divided by `1 - albedo R`, with `R` the light that comes back from straight above: the
+/// sum over cards upwards of their colour times the squared transmittance of what lies below,
+/// blurred over the surface.
 pub fn interreflect(deep: DeepImage, shot: &Shot, albedo: LinearRgb) -> DeepImage {
     let view = CameraView::from_camera(&shot.camera);
     let surface = ProjectedPlane::from_above(&ScenePlane::shadow_catcher(shot.catcher), &view);

@@ -19,9 +19,11 @@ pub(super) struct IrradianceMap {
     values: Vec<Float4>,
 }
 
-/// The maps of all receivers, computed in parallel in bands of rows; the same bits for any number of threads.
+/// The maps of all receivers, computed in parallel in bands of rows; the same bits for any number
+/// of threads.
 ///
-/// Irradiance, or what shadows leave of it as a share; each with 1 as the fourth number. None in the dark.
+/// Irradiance, or what shadows leave of it as a share; each with 1 as the fourth number. None in
+/// the dark.
 pub(super) fn irradiance_maps(
     receivers: &[Option<ReceiverIrradiance>],
 ) -> Vec<Option<IrradianceMap>> {
@@ -142,7 +144,8 @@ fn remaining(relative: bool, open: &Float4, hidden: &Float4) -> Float4 {
     }
 }
 
-/// The value of a coarser row at the `i`-th node from `start`; the row begins at the node around `start`.
+/// The value of a coarser row at the `i`-th node from `start`; the row begins at the node around
+/// `start`.
 #[inline(always)]
 fn between_coarse(coarse: &[Float4], start: usize, i: usize) -> Float4 {
     let first = coarser_nodes(start)[0];
@@ -199,7 +202,8 @@ impl IrradianceMap {
         })
     }
 
-    /// The row of this coarser map that belongs to row `j` of a finer one, at all nodes around `requested`; 0 outside.
+    /// The row of this coarser map that belongs to row `j` of a finer one, at all nodes around
+    /// `requested`; 0 outside.
     fn enlarge_row(&self, j: usize, requested: &Range<usize>, out: &mut Vec<Float4>) {
         let (first, last) = (
             coarser_nodes(requested.start)[0],

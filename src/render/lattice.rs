@@ -1,8 +1,9 @@
 //! The lattice of picture positions at which light is computed.
 //!
-//! Light varies slowly where textures do not, so it is computed once per node and receiver, and looked up between nodes.
-//! The lattice lies in the *picture*, not on the receiver: nodes are as dense as pixels ask for, at any distance and
-//! slant, and nothing is spent on what the camera does not see.
+//! Light varies slowly where textures do not, so it is computed once per node and receiver, and
+//! looked up between nodes. The lattice lies in the *picture*, not on the receiver: nodes are as
+//! dense as pixels ask for, at any distance and slant, and nothing is spent on what the camera does
+//! not see.
 
 use crate::render::view::CameraView;
 use nalgebra::Matrix3;
@@ -31,7 +32,8 @@ impl Lattice {
         Self { cell, view }
     }
 
-    /// Lattice positions of the picture positions `i + 0.5 + offset`, for all `i` below `pixels` and all offsets in turn.
+    /// Lattice positions of the picture positions `i + 0.5 + offset`, for all `i` below `pixels`
+    /// and all offsets in turn.
     pub(super) fn positions_of(&self, pixels: usize, offsets: &[f64]) -> Vec<LatticePosition> {
         (0..pixels)
             .flat_map(|i| {
@@ -53,7 +55,8 @@ fn node_count(pixels: usize, cell: f64) -> usize {
     ((pixels as f64 + 1.0) / cell) as usize + 3
 }
 
-/// The two nodes of a lattice of twice the distance around a node, the same one twice where it lies on it.
+/// The two nodes of a lattice of twice the distance around a node, the same one twice where it lies
+/// on it.
 pub(super) fn coarser_nodes(node: usize) -> [usize; 2] {
     if node.is_multiple_of(2) {
         [node / 2, node / 2 + 1]

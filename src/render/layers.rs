@@ -1,8 +1,9 @@
 //! Cards as layers over the picture, walked front to back, block by block.
 //!
-//! The reciprocal of a plane's depth is linear in the picture, so if the same order of cards holds at the four corners of
-//! a block it holds in all of it. A block where it does not (cards cross) is split until it does, or until it is one
-//! pixel: order is decided by depth at the pixel's centre there. Inside a block each card is walked once, as a layer.
+//! The reciprocal of a plane's depth is linear in the picture, so if the same order of cards holds
+//! at the four corners of a block it holds in all of it. A block where it does not (cards cross) is
+//! split until it does, or until it is one pixel: order is decided by depth at the pixel's centre
+//! there. Inside a block each card is walked once, as a layer.
 
 use crate::deep::DeepSample;
 use crate::geom::Vector3;
@@ -46,7 +47,8 @@ pub(super) struct Layer {
 pub(super) struct SampleGrid {
     /// Positions along each side of a pixel, from its centre.
     pub(super) offsets: Vec<f64>,
-    /// Light is looked up for each sub-sample, not for each pixel: where the lattice is finer than pixels are.
+    /// Light is looked up for each sub-sample, not for each pixel: where the lattice is finer than
+    /// pixels are.
     pub(super) per_subsample: bool,
     /// Positions in the lattice: sub-sample by sub-sample, or the middles of pixels.
     pub(super) columns: Vec<LatticePosition>,
@@ -311,7 +313,8 @@ impl LayerStack {
         through.pass_layer(&layer.texture, run, row);
     }
 
-    /// Looks up the light at one sub-sample of some pixels: the column inside its pixel, the row inside the picture.
+    /// Looks up the light at one sub-sample of some pixels: the column inside its pixel, the row
+    /// inside the picture.
     fn light_subsamples(
         &self,
         layer: &Layer,
@@ -352,7 +355,8 @@ impl LayerStack {
         }
     }
 
-    /// What a pixel got from a layer: sums over its sub-samples of light and alpha, and what it hides.
+    /// What a pixel got from a layer: sums over its sub-samples of light and alpha, and what it
+    /// hides.
     #[inline(always)]
     fn deep_sample(
         &self,
@@ -373,7 +377,8 @@ impl LayerStack {
         }
     }
 
-    /// Light from a layer at a pixel, lit here where its sub-samples were not; `lit` counts the pixels that were.
+    /// Light from a layer at a pixel, lit here where its sub-samples were not; `lit` counts the
+    /// pixels that were.
     #[inline(always)]
     fn pixel_light(
         &self,
@@ -400,8 +405,8 @@ impl LayerStack {
 
     /// What shadows leave of the surface's light: the average over what is seen of it.
     ///
-    /// The definition divides average irradiances; the unshadowed one is the same all over a pixel (to about 1e-4 of
-    /// it), so that averaging the share itself is the same.
+    /// The definition divides average irradiances; the unshadowed one is the same all over a pixel
+    /// (to about 1e-4 of it), so that averaging the share itself is the same.
     fn shade_catcher(&self, part: &PixelBlock, through: &Transmittance, tile: &mut RenderedTile) {
         let (Some(map), Some(plane)) = (&self.catcher.share, &self.catcher.plane) else {
             return;
@@ -445,7 +450,8 @@ impl LayerStack {
         }
     }
 
-    /// The mean share of a pixel by what passes to each sub-sample; 1 beyond the end of the surface.
+    /// The mean share of a pixel by what passes to each sub-sample; 1 beyond the end of the
+    /// surface.
     fn mean_share(
         &self,
         map: &IrradianceMap,
@@ -524,7 +530,8 @@ fn common_span(spans: &[(f64, f64)]) -> (f64, f64) {
     (low, high)
 }
 
-/// The weighted mean of a share, per channel; 1 for no weight, and exactly 1 where the share is 1 all over.
+/// The weighted mean of a share, per channel; 1 for no weight, and exactly 1 where the share is 1
+/// all over.
 fn weighted_mean(sum: &Float4, weight: &Float4) -> LinearRgb {
     let [r, g, b] = [0, 1, 2].map(|c| channel_mean_share(sum.0[c], weight.0[c]));
     LinearRgb::new(r, g, b)

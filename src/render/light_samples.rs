@@ -8,7 +8,8 @@ use crate::scene::{AreaLight, Shot};
 use nalgebra::{Matrix3, Vector4};
 use std::f64::consts::PI;
 
-/// A point (`at.w = 1`) or a direction (`at.w = 0`) that light comes from, in homogeneous coordinates.
+/// A point (`at.w = 1`) or a direction (`at.w = 0`) that light comes from, in homogeneous
+/// coordinates.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LightSample {
     /// Where.
@@ -205,7 +206,8 @@ impl LightSample {
         }
     }
 
-    /// Cosines, distance and area at a point with unit normal: irradiance by unit radiance; 0 below a horizon.
+    /// Cosines, distance and area at a point with unit normal: irradiance by unit radiance; 0 below
+    /// a horizon.
     pub(super) fn irradiance(&self, point: &Vector3<f64>, normal: &Vector3<f64>) -> f64 {
         match self.kind {
             SampleKind::Sky { share } => share,

@@ -1,14 +1,16 @@
-//! Render: a [`Shot`](crate::Shot) becomes deep samples, from which the picture and its labels are both folded.
+//! Render: a [`Shot`](crate::Shot) becomes deep samples, from which the picture and its labels are
+//! both folded.
 //!
-//! Everything in a shot is planar, so each map between two planes seen from a point is a homography and visibility
-//! needs no ray tracing. Work is split by frequency: textures are sharp and are sampled several times a pixel
-//! (`layers`), irradiance is smooth and is computed once per receiver on a coarse lattice of the picture and looked up
-//! (`irradiance`). [`render_reference`] computes the same definition sample by sample without any of this, to test against.
+//! Everything in a shot is planar, so each map between two planes seen from a point is a homography
+//! and visibility needs no ray tracing. Work is split by frequency: textures are sharp and are
+//! sampled several times a pixel (`layers`), irradiance is smooth and is computed once per receiver
+//! on a coarse lattice of the picture and looked up (`irradiance`). [`render_reference`] computes
+//! the same definition sample by sample without any of this, to test against.
 //!
-//! The definition: cards are Lambert surfaces that scatter a share `alpha` of the light and let the rest pass; lights
-//! are seen through the product of `1 - alpha` of the cards in between; the plate is multiplied by the ratio of shadowed
-//! to unshadowed irradiance of the surface `z = 0`; a pixel is the average under a Blackman-Harris window three pixels
-//! wide.
+//! The definition: cards are Lambert surfaces that scatter a share `alpha` of the light and let the
+//! rest pass; lights are seen through the product of `1 - alpha` of the cards in between; the plate
+//! is multiplied by the ratio of shadowed to unshadowed irradiance of the surface `z = 0`; a pixel
+//! is the average under a Blackman-Harris window three pixels wide.
 //!
 //! ```
 //! use petcomp::geom::{Pose, Quad};

@@ -56,7 +56,8 @@ impl<'a> Occluder<'a> {
         }
     }
 
-    /// What a receiver sees of it, `toward` being the side of the light on its normal; and whether that is its back.
+    /// What a receiver sees of it, `toward` being the side of the light on its normal; and whether
+    /// that is its back.
     ///
     /// A receiver sees the side that is turned away from the light.
     pub(super) fn side_facing(&self, toward: f64) -> (&OpacityMips<'a>, bool) {

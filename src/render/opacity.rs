@@ -49,8 +49,8 @@ impl<'a> OpacityMips<'a> {
         }
     }
 
-    /// The coarsest opacity whose texels are no larger than `cell` metres, or a coarser one that blurs by `blur` metres;
-    /// on a card of this size.
+    /// The coarsest opacity whose texels are no larger than `cell` metres, or a coarser one that
+    /// blurs by `blur` metres; on a card of this size.
     pub(super) fn level_for(&self, size: [f64; 2], cell: f64, blur: f64) -> Arc<OpacityLevel> {
         let (width, height) = self.texture.size();
         let texel = (size[0] * size[1] / (width * height) as f64).sqrt();
@@ -64,7 +64,8 @@ impl<'a> OpacityMips<'a> {
         if let Some(opacity) = self.levels[level].get() {
             return opacity.clone();
         }
-        // Made outside of the lock: a pyramid may halve in parallel, and a thread that waits may come back here.
+        // Made outside of the lock: a pyramid may halve in parallel, and a thread that waits may
+        // come back here.
         let opacity = Arc::new(OpacityLevel::new(self.texture, &self.grade, level));
         let kept = self.levels[level].get_or_init(|| {
             work::add(Kind::Bakes, 1);
@@ -128,13 +129,15 @@ impl OpacityLevel {
         }
     }
 
-    /// How far inside of its sides an opaque texture is surely read as opaque, as shares of it; none for one that is not.
+    /// How far inside of its sides an opaque texture is surely read as opaque, as shares of it;
+    /// none for one that is not.
     pub(super) fn opaque_inset(&self) -> Option<[f64; 2]> {
         self.opaque
             .then(|| self.grid.texels.map(|n| (0.5 + POSITION_ERROR_TEXELS) / n))
     }
 
-    /// Multiplies what gets through, along a line over bordered texels from its sample `first` on, in one channel.
+    /// Multiplies what gets through, along a line over bordered texels from its sample `first` on,
+    /// in one channel.
     pub(super) fn attenuate(
         &self,
         channel: usize,
@@ -167,7 +170,8 @@ fn bordered_size((width, height): (usize, usize)) -> (usize, usize) {
     (width + 2 * BORDER_TEXELS, height + 2 * BORDER_TEXELS)
 }
 
-/// Dense since it is the innermost loop of shadows: compiled as one piece for each set of vector instructions, lanes apart.
+/// Dense since it is the innermost loop of shadows: compiled as one piece for each set of vector
+/// instructions, lanes apart.
 #[multiversion::multiversion(targets(
     "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2",
     "x86_64+avx2",

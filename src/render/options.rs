@@ -61,7 +61,8 @@ impl Default for RenderOptions {
     }
 }
 
-/// `Quality::Reference` has 6; beyond 16 the error is below a code of 8 bits, and the time without bounds.
+/// `Quality::Reference` has 6; beyond 16 the error is below a code of 8 bits, and the time without
+/// bounds.
 const SUBSAMPLES: Bounds = Bounds::new(1.0, 16.0, "quality reference has 6");
 const LIGHT_SAMPLES: Bounds = Bounds::new(1.0, 32.0, "quality reference has 8");
 const AMBIENT_SAMPLES: Bounds = Bounds::new(1.0, 4096.0, "quality reference has 400");
@@ -79,7 +80,8 @@ impl RenderOptions {
         CELL_PX.check("cell_px", self.cell_px)
     }
 
-    /// The same with every number inside the range that the arithmetic bears: at least one sample, cells of 0.25 to 16 pixels.
+    /// The same with every number inside the range that the arithmetic bears: at least one sample,
+    /// cells of 0.25 to 16 pixels.
     pub(super) fn clamped(self) -> Self {
         Self {
             subsamples: self.subsamples.clamp(1, 64),

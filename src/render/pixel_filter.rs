@@ -11,7 +11,8 @@ const WINDOW_VARIANCE_PX2: f64 = 0.17266;
 /// Coefficients of the Blackman-Harris window (Harris 1978, four terms, 92 dB).
 const WINDOW_TERMS: [f64; 4] = [0.35875, -0.48829, 0.14128, -0.01168];
 
-/// Positions, pixels from the centre, that split the window's weight into `count` equal parts at their middle.
+/// Positions, pixels from the centre, that split the window's weight into `count` equal parts at
+/// their middle.
 ///
 /// All samples of a pixel have the same weight then.
 pub(super) fn filter_quantiles(count: usize) -> Vec<f64> {
@@ -20,7 +21,8 @@ pub(super) fn filter_quantiles(count: usize) -> Vec<f64> {
         .collect()
 }
 
-/// What the positions leave of the window's width: the standard deviation that the texture's own filter must add.
+/// What the positions leave of the window's width: the standard deviation that the texture's own
+/// filter must add.
 pub(super) fn residual_sigma(offsets: &[f64]) -> f64 {
     let residual = WINDOW_VARIANCE_PX2 - mean_square(offsets);
     residual.max(0.0).sqrt()

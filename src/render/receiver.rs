@@ -1,7 +1,7 @@
 //! What reaches a card or the surface: all its light in the open, less what occluders take away.
 //!
-//! Keeping what is *lost* instead of what arrives makes work sparse, since most rays meet no occluder at most nodes, and
-//! makes light exact where nothing is in its way.
+//! Keeping what is *lost* instead of what arrives makes work sparse, since most rays meet no
+//! occluder at most nodes, and makes light exact where nothing is in its way.
 
 use crate::geom::Vector3;
 use crate::pixel::LinearRgb;
@@ -53,8 +53,8 @@ impl RayGroup {
     }
 }
 
-/// A receiver under area lights, whose shadows are sharp, and under the sky, whose shadows are soft enough for half the
-/// nodes.
+/// A receiver under area lights, whose shadows are sharp, and under the sky, whose shadows are soft
+/// enough for half the nodes.
 #[derive(Debug)]
 pub(super) struct ReceiverIrradiance {
     pub(super) fine: Receiver,
@@ -112,7 +112,8 @@ impl<'a> LightingContext<'a> {
         }
     }
 
-    /// What lights a plane on the side of the camera; none where it is seen edge-on. The normal is that of every lattice.
+    /// What lights a plane on the side of the camera; none where it is seen edge-on. The normal is
+    /// that of every lattice.
     fn light_samples(&self, plane: &ScenePlane) -> Option<LightSamples> {
         let projected = ProjectedPlane::new(plane, &self.fine.view)?;
         Some(LightSamples::above(
@@ -123,7 +124,8 @@ impl<'a> LightingContext<'a> {
         ))
     }
 
-    /// Card number `own`, at the nodes where the card is seen and one around. None where it is not seen at all.
+    /// Card number `own`, at the nodes where the card is seen and one around. None where it is not
+    /// seen at all.
     pub(super) fn card(&self, own: usize, reach: [f64; 2]) -> Option<ReceiverIrradiance> {
         let lights = self.light_samples(&self.occluders.cards[own].plane)?;
         let [faces, sky] = SelectedLights::split(&lights);
@@ -153,7 +155,8 @@ impl<'a> LightingContext<'a> {
         Some(self.receiver(projected, groups, lights, (outline, area)))
     }
 
-    /// The surface, at the nodes where a shadow may fall on it. None where there is no shadow, or none to be seen.
+    /// The surface, at the nodes where a shadow may fall on it. None where there is no shadow, or
+    /// none to be seen.
     pub(super) fn surface(&self) -> Option<ReceiverIrradiance> {
         let lights = self.light_samples(&self.occluders.surface)?;
         let [faces, sky] = SelectedLights::split(&lights);
@@ -220,7 +223,8 @@ impl<'a> SelectedLights<'a> {
     }
 }
 
-/// Sides of the requested nodes of a card: two nodes further out, for the finer lattice's one that lies between them.
+/// Sides of the requested nodes of a card: two nodes further out, for the finer lattice's one that
+/// lies between them.
 fn card_outline(plane: &ProjectedPlane, reach: [f64; 2]) -> Vec<Vector3<f64>> {
     let sides = plane.sides(reach);
     sides.iter().map(|s| grown_side(s, 2.0)).collect()
@@ -299,7 +303,8 @@ impl Receiver {
         nodes_inside(&self.outline, j, &self.columns)
     }
 
-    /// Open and hidden irradiance at the requested nodes of a row: the open sky and this receiver's own lights.
+    /// Open and hidden irradiance at the requested nodes of a row: the open sky and this receiver's
+    /// own lights.
     pub(super) fn gather_row(&self, j: usize, requested: &Range<usize>, buffers: &mut RowBuffers) {
         buffers.start_row(requested.len(), self.open_sky.into());
         if self.groups.iter().any(RayGroup::has_faces) {
@@ -316,7 +321,8 @@ impl Receiver {
         self.rows.len() > 1 && self.columns.len() > 1
     }
 
-    /// With the nodes that a receiver of twice the distance needs around its own, as far as the picture goes.
+    /// With the nodes that a receiver of twice the distance needs around its own, as far as the
+    /// picture goes.
     fn grown_around(self, coarse: &Self, view: &CameraView) -> Self {
         let rows = finer_union(&self.rows, &coarse.rows);
         let columns = finer_union(&self.columns, &coarse.columns);
@@ -346,7 +352,8 @@ impl Receiver {
         }
     }
 
-    /// Adds up a ray; returns the nodes (counted from the first requested one) where something is in its way.
+    /// Adds up a ray; returns the nodes (counted from the first requested one) where something is
+    /// in its way.
     fn gather_ray(
         &self,
         ray: &ShadowRay,

@@ -15,10 +15,12 @@ use crate::scene::{Card, Shot};
 use rayon::prelude::*;
 use std::f32::consts::PI;
 
-/// Renders a shot without any shortcut: every sub-sample of every pixel sends a ray to every light sample.
+/// Renders a shot without any shortcut: every sub-sample of every pixel sends a ray to every light
+/// sample.
 ///
-/// Textures are read at full size, colours are graded after interpolation, `cell_px` is not used. Takes minutes where
-/// [`render`](super::render) takes milliseconds; its error against the definition falls with the numbers in `options`.
+/// Textures are read at full size, colours are graded after interpolation, `cell_px` is not used.
+/// Takes minutes where [`render`](super::render) takes milliseconds; its error against the
+/// definition falls with the numbers in `options`.
 pub fn render_reference(shot: &Shot, options: &RenderOptions) -> DeepImage {
     let options = options.clamped();
     let world = ReferenceWorld::new(shot, &options);
@@ -149,7 +151,8 @@ impl<'a> ReferenceWorld<'a> {
         (samples, shadow.ratio())
     }
 
-    /// The cards that are not edge-on, the nearest at a pixel's centre first, with their depths there.
+    /// The cards that are not edge-on, the nearest at a pixel's centre first, with their depths
+    /// there.
     fn depth_order(&self, x: f64, y: f64) -> Vec<(usize, f64)> {
         let mut order: Vec<_> = (0..self.cards.len())
             .filter_map(|k| Some((k, self.cards[k].depth_at(x, y)?)))
@@ -168,7 +171,8 @@ impl<'a> ReferenceWorld<'a> {
             .collect()
     }
 
-    /// Adds what the cards do along one ray, front to back; returns what passes through all of them.
+    /// Adds what the cards do along one ray, front to back; returns what passes through all of
+    /// them.
     fn trace_cards(
         &self,
         [x, y]: [f64; 2],
@@ -350,7 +354,8 @@ struct ShadowRatio {
 }
 
 impl ShadowRatio {
-    /// Adds what passes to the surface, and the light there; where no light is, the plate stays as it is.
+    /// Adds what passes to the surface, and the light there; where no light is, the plate stays as
+    /// it is.
     fn add(&mut self, weight: LinearRgb, light: &PointIrradiance) {
         if light.open == LinearRgb::BLACK {
             self.outside = self.outside + weight;

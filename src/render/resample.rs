@@ -111,14 +111,16 @@ impl<'a, P: Copy, F: Fn(P) -> Float4> RowAverages<'a, P, F> {
     }
 }
 
-/// Up to three texels in a row and their weights, which add up to 1 (less at the end, where the picture ends).
+/// Up to three texels in a row and their weights, which add up to 1 (less at the end, where the
+/// picture ends).
 struct TexelWeights {
     first: usize,
     weights: [f32; 3],
     count: usize,
 }
 
-/// What each texel of a smaller picture takes from a larger one, along one side: averages over `step` texels (1 up to 2).
+/// What each texel of a smaller picture takes from a larger one, along one side: averages over
+/// `step` texels (1 up to 2).
 fn downsample_axis(len: usize, step: f64) -> Vec<TexelWeights> {
     let count = (len as f64 / step).ceil() as usize;
     (0..count)

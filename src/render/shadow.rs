@@ -1,4 +1,5 @@
-//! Shadows of cards and of the surface on a receiver: where they are, and how much light they let through.
+//! Shadows of cards and of the surface on a receiver: where they are, and how much light they let
+//! through.
 
 use crate::geom::Vector3;
 use crate::render::half_plane::{nodes_inside, quad_sides};
@@ -19,8 +20,9 @@ pub(super) const CONTACT_EPSILON_M: f64 = 1e-9;
 
 /// How much of the blur by a piece of light is given to a card's shadow.
 ///
-/// All of it would be right for one card. Piles are darkened by it, since a product of blurred shadows is not the blurred
-/// product (bias -0.003 in a pile of 20); a quarter takes the facets out of soft shadows and biases by 1e-4.
+/// All of it would be right for one card. Piles are darkened by it, since a product of blurred
+/// shadows is not the blurred product (bias -0.003 in a pile of 20); a quarter takes the facets out
+/// of soft shadows and biases by 1e-4.
 const PENUMBRA_BLUR_SHARE: f64 = 0.25;
 
 /// A receiver as shadows fall on it.
@@ -86,7 +88,8 @@ pub(super) struct ProjectedShadow {
     v: Vector3<f64>,
     w: Vector3<f64>,
     opacity: Option<Arc<OpacityLevel>>,
-    /// Where nothing gets through an opaque texture, whatever is read of it; none for one that is see-through.
+    /// Where nothing gets through an opaque texture, whatever is read of it; none for one that is
+    /// see-through.
     pub(super) inside: Option<[Vector3<f64>; 5]>,
 }
 
@@ -132,7 +135,8 @@ pub(super) struct ShadowProjection<'a> {
     pub(super) height: f64,
 }
 
-/// The homography from the lattice over a receiver, through a light sample, to a card; all rows times depth.
+/// The homography from the lattice over a receiver, through a light sample, to a card; all rows
+/// times depth.
 struct CardMap {
     u: Vector3<f64>,
     v: Vector3<f64>,
@@ -171,7 +175,8 @@ impl<'a> ShadowProjection<'a> {
         Some(map.into_shadow(area, self.receiver.plane.w, opacity))
     }
 
-    /// Height of the sample over a card's plane, metres (a cosine for a direction); negative behind it.
+    /// Height of the sample over a card's plane, metres (a cosine for a direction); negative behind
+    /// it.
     fn height_over(&self, plane: &ScenePlane) -> f64 {
         let at = &self.sample.at;
         plane.normal.dot(&at.xyz()) - at.w * plane.normal.dot(&plane.center)
@@ -195,15 +200,16 @@ impl<'a> ShadowProjection<'a> {
         CardMap { u, v, w, below }
     }
 
-    /// How far the piece of light that a sample stands for blurs a card's shadow, metres on the card, as the side of a
-    /// texel whose bilinear reading has the same variance.
+    /// How far the piece of light that a sample stands for blurs a card's shadow, metres on the
+    /// card, as the side of a texel whose bilinear reading has the same variance.
     ///
     /// A square of side b has variance `b^2 / 12`, texels of side t read bilinearly have `t^2 / 4`.
     fn blur_m(&self, plane: &ScenePlane) -> f64 {
         let corners = plane.corners();
         let heights = corners.iter().map(|corner| self.height_of(corner));
         let lowest = heights.fold(f64::INFINITY, f64::min);
-        // Cards that lean on the receiver are sharp where they touch it and blurred at the other end.
+        // Cards that lean on the receiver are sharp where they touch it and blurred at the other
+        // end.
         let way = 0.5 * (lowest + self.height_of(&plane.center)) / self.height;
         PENUMBRA_BLUR_SHARE * self.sample.width * way * libm::sqrt(4.0 / 12.0)
     }
@@ -253,7 +259,8 @@ impl<'a> ShadowProjection<'a> {
         self.receiver.own.is_some() && self.sample.at.w == 0.0 && self.sample.at.z < 0.0
     }
 
-    /// Part of the lattice that a shadow lies in: bounds of the four corners projected onto the receiver.
+    /// Part of the lattice that a shadow lies in: bounds of the four corners projected onto the
+    /// receiver.
     fn shadow_area(&self, plane: &ScenePlane) -> LatticeArea {
         let view = self.receiver.view;
         let mut corners = plane.corners();
@@ -266,8 +273,8 @@ impl<'a> ShadowProjection<'a> {
         view.area_around(&corners)
     }
 
-    /// Where a point throws its shadow on the receiver's plane; none for one beside or above the light, whose shadow falls
-    /// away from it, while those around it fall without end.
+    /// Where a point throws its shadow on the receiver's plane; none for one beside or above the
+    /// light, whose shadow falls away from it, while those around it fall without end.
     fn shadow_of(&self, point: &Vector3<f64>) -> Option<Vector3<f64>> {
         let h = self.receiver.plane.normal.dot(point) - self.plane_offset;
         let fall = self.height - self.sample.at.w * h;
@@ -322,7 +329,8 @@ impl ProjectedShadow {
         nodes_inside(&self.sides, j, within)
     }
 
-    /// Multiplies what gets through to these nodes of a row, in one channel; returns what had to be read for it.
+    /// Multiplies what gets through to these nodes of a row, in one channel; returns what had to be
+    /// read for it.
     pub(super) fn attenuate(
         &self,
         channel: usize,

@@ -14,7 +14,8 @@ pub(super) struct ShadowRay {
     pub(super) shadows: Vec<ProjectedShadow>,
 }
 
-/// The rays to a group of light samples that reach a receiver from above, with what may be in their way.
+/// The rays to a group of light samples that reach a receiver from above, with what may be in their
+/// way.
 pub(super) fn shadow_rays(
     occluders: &Occluders<'_>,
     receiver: &ShadowedReceiver<'_>,

@@ -2,7 +2,8 @@
 
 use crate::geom::Vector3;
 
-/// Transparent texels around a texture: what positions reach beyond its outermost ones, and one to read on.
+/// Transparent texels around a texture: what positions reach beyond its outermost ones, and one to
+/// read on.
 pub(super) const BORDER_TEXELS: usize = 2;
 
 /// Positions are worked out for this many samples at once: a register of AVX-512, two of AVX2.
@@ -52,15 +53,18 @@ impl TexelGrid {
     }
 }
 
-/// Positions along a line over bordered texels: numbers that grow evenly, the third the divisor of the others.
+/// Positions along a line over bordered texels: numbers that grow evenly, the third the divisor of
+/// the others.
 pub(super) type TexelLine = [(f32, f32); 3];
 
-/// The line from `first` on, one step to the right at a time; `u`, `v` and `w` give positions among bordered texels.
+/// The line from `first` on, one step to the right at a time; `u`, `v` and `w` give positions among
+/// bordered texels.
 pub(super) fn texel_line(rows: [Vector3<f64>; 3], first: &Vector3<f64>) -> TexelLine {
     rows.map(|row| (row.dot(first) as f32, row.x as f32))
 }
 
-/// Bilinear cells that a run of samples falls into: index of the first of the four texels, and the way to the others.
+/// Bilinear cells that a run of samples falls into: index of the first of the four texels, and the
+/// way to the others.
 #[derive(Default)]
 pub(super) struct BilinearCells {
     pub(super) at: [u32; SIMD_LANES],
@@ -69,7 +73,8 @@ pub(super) struct BilinearCells {
 }
 
 impl BilinearCells {
-    /// Samples `first`, `first + 1` and so on of a line; positions outside are moved to the nearest inside.
+    /// Samples `first`, `first + 1` and so on of a line; positions outside are moved to the nearest
+    /// inside.
     #[inline(always)]
     pub(super) fn along_line(
         [u, v, w]: &TexelLine,
@@ -93,8 +98,8 @@ impl BilinearCells {
 
 /// A position between texels 0 and `last` as the texel before it and the way on.
 ///
-/// By bits, since a conversion with all its checks keeps loops from being vectorised; a position on a texel may come as
-/// the one before and a way of 1, which is the same place.
+/// By bits, since a conversion with all its checks keeps loops from being vectorised; a position on
+/// a texel may come as the one before and a way of 1, which is the same place.
 #[inline(always)]
 fn integer_and_fraction(x: f32, last: f32) -> (u32, f32) {
     let x = x.max(INSET_TEXELS).min(last);

@@ -1,4 +1,5 @@
-//! Textures made ready for one picture: one level of detail, a transparent border, the card's colours.
+//! Textures made ready for one picture: one level of detail, a transparent border, the card's
+//! colours.
 
 use crate::asset::Texture;
 use crate::pixel::{Film, PremulRgba};
@@ -23,8 +24,8 @@ pub(super) struct BakedTexture {
 impl BakedTexture {
     /// A texture at a level of detail, which need not be an integer, in a card's own colours.
     ///
-    /// The level below is averaged further, so that there are no more texels than are needed and a reading costs four of
-    /// them.
+    /// The level below is averaged further, so that there are no more texels than are needed and a
+    /// reading costs four of them.
     pub(super) fn new(texture: &Texture, grade: &Grade, level: f64) -> Self {
         let level = level.clamp(0.0, (texture.levels() - 1) as f64);
         let (colors, opacity) = resample_texture(texture, DetailLevel::new(level));
@@ -58,7 +59,8 @@ impl BakedTexture {
         }
     }
 
-    /// Film of another hue lets another hue pass; how bright it reflects does not change what passes.
+    /// Film of another hue lets another hue pass; how bright it reflects does not change what
+    /// passes.
     fn grade_opacity(&mut self, grade: &Grade) {
         let through = Grade {
             value: 1.0,

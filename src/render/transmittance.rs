@@ -1,4 +1,5 @@
-//! What passes through the layers of a block so far, for each sub-sample, and a row of one more layer.
+//! What passes through the layers of a block so far, for each sub-sample, and a row of one more
+//! layer.
 
 #![expect(clippy::manual_clamp, reason = "turns NaN into 0")]
 
@@ -32,7 +33,8 @@ pub(super) struct Transmittance {
 pub(super) struct LayerRow {
     /// Pixels that the layer touches.
     pub(super) touched: Range<usize>,
-    /// Sum over sub-samples of its colour, as far as it is seen; the fourth number is the same of its alpha.
+    /// Sum over sub-samples of its colour, as far as it is seen; the fourth number is the same of
+    /// its alpha.
     pub(super) light: Vec<Float4>,
     /// The same of its opacity, where there is film.
     pub(super) hidden: Vec<Float4>,
@@ -132,8 +134,8 @@ impl Transmittance {
         grey.map(|&t| Float4([t; 4])).chain(tinted.copied())
     }
 
-    /// Passes a layer at one sub-sample of some pixels: adds to the row what is seen of the layer, and takes away what it
-    /// hides of all that comes later.
+    /// Passes a layer at one sub-sample of some pixels: adds to the row what is seen of the layer,
+    /// and takes away what it hides of all that comes later.
     pub(super) fn pass_layer(
         &mut self,
         texture: &BakedTexture,
@@ -159,7 +161,8 @@ impl Transmittance {
 
 /// A layer without film; `through` is one number a pixel.
 ///
-/// Dense since it is the renderer's innermost loop: it is compiled as one piece for each set of vector instructions.
+/// Dense since it is the renderer's innermost loop: it is compiled as one piece for each set of
+/// vector instructions.
 #[multiversion::multiversion(targets(
     "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2",
     "x86_64+avx2",
@@ -195,7 +198,8 @@ fn pass_grey(
 
 /// A layer where there is film; `through` and `hidden` are a number for each channel.
 ///
-/// Dense since it is the innermost loop where there is film: all that it reads and writes is at hand in one piece.
+/// Dense since it is the innermost loop where there is film: all that it reads and writes is at
+/// hand in one piece.
 fn pass_tinted(
     texture: &BakedTexture,
     line: &TexelLine,

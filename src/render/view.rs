@@ -1,4 +1,5 @@
-//! Cards and the surface as the camera sees them: every map is a row of three numbers times `(x, y, 1)`.
+//! Cards and the surface as the camera sees them: every map is a row of three numbers times `(x, y,
+//! 1)`.
 
 use crate::camera::Camera;
 use crate::geom::Vector3;
@@ -11,7 +12,8 @@ use std::ops::Range;
 /// Areas (square metres), distances (metres) and sines below this count as zero.
 const GEOMETRY_EPSILON: f64 = 1e-12;
 
-/// Depth beyond which a plane is its horizon, metres: keeps points finite where a plane is seen past its own edge.
+/// Depth beyond which a plane is its horizon, metres: keeps points finite where a plane is seen
+/// past its own edge.
 pub(super) const HORIZON_M: f64 = 1e6;
 
 /// A card or the surface as a plane in the world.
@@ -152,7 +154,8 @@ impl CameraView {
         self.eye + self.ray * Vector3::new(x, y, 1.0) * depth
     }
 
-    /// Picture positions `(x, y, 1)` of world points; none where one of them is at or behind the eye.
+    /// Picture positions `(x, y, 1)` of world points; none where one of them is at or behind the
+    /// eye.
     pub(super) fn project_points<const N: usize>(
         &self,
         world: &[Vector3<f64>; N],
@@ -179,7 +182,8 @@ impl CameraView {
         (0..self.height, 0..self.width)
     }
 
-    /// Rows and columns of projected points, one more on each side; all where one of the points is not in front.
+    /// Rows and columns of projected points, one more on each side; all where one of the points is
+    /// not in front.
     pub(super) fn area_around(&self, points: &[Vector3<f64>; 4]) -> LatticeArea {
         let corners = self.project_points(points);
         corners.map_or_else(|| self.whole_area(), |px| self.area_around_px(&px))
@@ -241,7 +245,8 @@ fn ray_from_pixel(camera: &Camera) -> Matrix3<f64> {
     )
 }
 
-/// How a plane lies in the picture: with `p = (x, y, 1)`, texture coordinates are `u.p / w.p` and `v.p / w.p`.
+/// How a plane lies in the picture: with `p = (x, y, 1)`, texture coordinates are `u.p / w.p` and
+/// `v.p / w.p`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ProjectedPlane {
     /// Numerator of the texture coordinate to the right, 0 to 1.
@@ -280,8 +285,8 @@ impl ProjectedPlane {
         Self::new(plane, view).filter(|plane| plane.normal.z > 0.0)
     }
 
-    /// Side of the square that a pixel (or lattice cell) covers on the plane's plane, metres, where it shows `target`; in
-    /// the middle of the picture where that is behind the eye.
+    /// Side of the square that a pixel (or lattice cell) covers on the plane's plane, metres, where
+    /// it shows `target`; in the middle of the picture where that is behind the eye.
     pub(super) fn cell_metres(&self, view: &CameraView, target: &Vector3<f64>) -> f64 {
         let p = view.position_of(target);
         let w = self.w.dot(&p).max(self.height / HORIZON_M);
@@ -291,7 +296,8 @@ impl ProjectedPlane {
         along_x.cross(&along_y).norm().sqrt()
     }
 
-    /// Linear conditions on `(x, y, 1)` inside the texture with a border of `reach`, and in front of the eye.
+    /// Linear conditions on `(x, y, 1)` inside the texture with a border of `reach`, and in front
+    /// of the eye.
     pub(super) fn sides(&self, reach: [f64; 2]) -> [Vector3<f64>; 5] {
         quad_sides(&self.u, &self.v, &self.w, reach)
     }
@@ -353,7 +359,8 @@ pub(super) fn texture_rows(
     }
 }
 
-/// The cards of a shot that have an area, a place and texels, with their planes, in the order of their ids.
+/// The cards of a shot that have an area, a place and texels, with their planes, in the order of
+/// their ids.
 pub(super) fn visible_planes(shot: &Shot) -> Vec<(&Card, ScenePlane)> {
     let mut planes: Vec<_> = shot.cards.iter().filter_map(visible_plane).collect();
     planes.sort_by_key(|plane| plane.0.id);

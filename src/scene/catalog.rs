@@ -11,7 +11,8 @@ pub struct AssetVariant {
     pub asset: String,
     /// Width and height of the card of each of its photos, metres; at least one.
     pub photo_sizes: Vec<[f64; 2]>,
-    /// Corners of the object's hull in each photo, as in [`Object::outline`]; empty where they are not known.
+    /// Corners of the object's hull in each photo, as in [`Object::outline`]; empty where they are
+    /// not known.
     pub photo_outlines: Vec<Vec<[f64; 2]>>,
     /// Thickness, metres.
     pub thickness: f64,

@@ -23,27 +23,40 @@ const OUTLINE_TOLERANCE: f64 = 1e-5;
 const MAX_OUTLINE_CORNERS: usize = 256;
 
 impl Scene {
-    /// Fails on the first impossible value, by its path: `objects[3].size: [0.0, 0.1], expected within
-    /// 1e-9 to 1000000 (metres)`.
+    /// Fails on the first impossible value, by its path: `objects[3].size: [0.0, 0.1], expected
+    /// within 1e-9 to 1000000 (metres)`.
     pub fn check(&self) -> Result<()> {
-        check_image(self.image)?;
-        check_surface(&self.surface)?;
-        check_camera(&self.camera)?;
-        check_count(self.objects.len(), "objects", MAX_OBJECTS)?;
-        check_each(&self.objects, "objects", check_object)?;
+        self.check_view()?;
+        self.check_objects()?;
         self.check_lights()?;
         self.finish.check("finish")?;
         check_exposure(self.exposure)
     }
 
+    fn check_view(&self) -> Result<()> {
+        check_image(self.image)?;
+        check_surface(&self.surface)?;
+        check_camera(&self.camera)
+    }
+
+    fn check_objects(&self) -> Result<()> {
+        check_count(self.objects.len(), "objects", MAX_OBJECTS)?;
+        check_each(&self.objects, "objects", check_object)
+    }
+
     fn check_lights(&self) -> Result<()> {
         check_count(self.lights.len(), "lights", MAX_LIGHTS)?;
         check_each(&self.lights, "lights", check_light)?;
-        check_color(self.ambient, "ambient")?;
-        if let Some(map) = &self.environment {
-            map.check("environment")?;
-        }
+        self.check_surroundings()?;
         check_cast(&self.cast)
+    }
+
+    fn check_surroundings(&self) -> Result<()> {
+        check_color(self.ambient, "ambient")?;
+        match &self.environment {
+            Some(map) => map.check("environment"),
+            None => Ok(()),
+        }
     }
 }
 
@@ -86,9 +99,13 @@ fn check_within(numbers: &[f64], at: &str, bounds: &Bounds) -> Result<()> {
 pub(super) fn check_image(image: [u32; 2]) -> Result<()> {
     let [w, h] = image;
     expect(w > 0 && h > 0, "image", image, "two numbers above 0")?;
-    let fits = w.max(h) <= LONGEST_SIDE_PX && u64::from(w) * u64::from(h) <= MOST_PIXELS;
+    let fits = is_within_limits(image);
     let expected = format_args!("at most {LONGEST_SIDE_PX} a side and {MOST_PIXELS} in all");
     expect(fits, "image", image, expected)
+}
+
+fn is_within_limits([w, h]: [u32; 2]) -> bool {
+    w.max(h) <= LONGEST_SIDE_PX && u64::from(w) * u64::from(h) <= MOST_PIXELS
 }
 
 /// No more of something than scenes may have.

@@ -12,9 +12,10 @@ use std::fmt;
 /// other draw.
 ///
 /// # Method
-/// ChaCha with 8 rounds, whose 32-byte key is the seed, the index `k` (both little-endian `u64`) and the 128-bit FNV-1a
-/// hash of the path's UTF-8 bytes (little-endian); the draw is the stream's first `u64`. [FNV] is not
-/// cryptographic, which does not matter: paths are few and it only has to keep them apart.
+/// ChaCha with 8 rounds, whose 32-byte key is the seed, the index `k` (both little-endian `u64`)
+/// and the 128-bit FNV-1a hash of the path's UTF-8 bytes (little-endian); the draw is the stream's
+/// first `u64`. [FNV] is not cryptographic, which does not matter: paths are few and it only has to
+/// keep them apart.
 ///
 /// [FNV]: http://www.isthe.com/chongo/tech/comp/fnv/
 #[derive(Clone, Copy, Debug)]

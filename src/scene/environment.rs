@@ -15,7 +15,8 @@ use std::sync::Arc;
 pub struct Environment {
     /// The picture: HDR or EXR, equirectangular, `+z` up.
     pub file: String,
-    /// Turn about `+z`: at 90 the world's `+x` shows what lies at `+y` in the picture, degrees. Default: 0.
+    /// Turn about `+z`: at 90 the world's `+x` shows what lies at `+y` in the picture, degrees.
+    /// Default: 0.
     #[serde(default)]
     pub rotation_deg: f64,
     /// Factor on its values. Default: 1.
@@ -36,10 +37,7 @@ impl Environment {
     /// Fails on the first impossible value.
     pub(super) fn check(&self, at: &str) -> Result<()> {
         if self.file.is_empty() {
-            return Err(Error::value(
-                format!("{at}.file"),
-                "\"\", expected the name of a picture",
-            ));
+            return Err(unnamed_picture(format!("{at}.file")));
         }
         TURN.check(&format!("{at}.rotation_deg"), self.rotation_deg)?;
         RADIANCE.check(&format!("{at}.strength"), self.strength)
@@ -51,7 +49,8 @@ impl Environment {
 pub struct EnvironmentMap {
     /// The picture.
     pub panorama: Arc<Panorama>,
-    /// Turn about `+z`, radians: a direction of the world is turned by this before it is looked up.
+    /// Turn about `+z`, radians: a direction of the world is turned by this before it is looked
+    /// up.
     pub rotation: f64,
     /// Factor on its values.
     pub strength: f32,
@@ -82,11 +81,16 @@ pub(crate) fn turned(direction: &Vector3<f64>, angle: f64) -> Vector3<f64> {
     Vector3::new(cos * d.x - sin * d.y, sin * d.x + cos * d.y, d.z)
 }
 
+fn unnamed_picture(at: String) -> Error {
+    Error::value(at, "\"\", expected the name of a picture")
+}
+
 /// What a scene's environment map is drawn from.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct EnvironmentRanges {
-    /// Pictures to choose from, relative to the recipe; none gives scenes without a map. Default: none.
+    /// Pictures to choose from, relative to the recipe; none gives scenes without a map. Default:
+    /// none.
     pub files: Vec<String>,
     /// Turn about the vertical, degrees. Default: `[-180, 180]`.
     pub rotation_deg: Range,
@@ -111,16 +115,20 @@ impl EnvironmentRanges {
             return None;
         }
         Some(Environment {
-            file: self.files[draws.choose("environment.file", self.files.len())].clone(),
+            file: self.draw_file(draws),
             rotation_deg: self.rotation_deg.draw(draws, "environment.rotation_deg"),
             strength: self.strength.draw(draws, "environment.strength"),
         })
     }
 
+    fn draw_file(&self, draws: &Draws) -> String {
+        let i = draws.choose("environment.file", self.files.len());
+        self.files[i].clone()
+    }
+
     pub(super) fn check(&self) -> Result<()> {
         if let Some(i) = self.files.iter().position(String::is_empty) {
-            let what = "\"\", expected the name of a picture";
-            return Err(Error::value(format!("environment.files[{i}]"), what));
+            return Err(unnamed_picture(format!("environment.files[{i}]")));
         }
         self.rotation_deg.check("environment.rotation_deg", &TURN)?;
         self.strength.check("environment.strength", &RADIANCE)

@@ -16,31 +16,35 @@ use serde::{Deserialize, Serialize};
 pub struct SettleOptions {
     /// How. Default: `fall`.
     pub mode: SettleMode,
-    /// Gravity in the frame of the surface, m/s^2. Its strength only sets how long a fall takes, not where things come
-    /// to lie; its direction tilts the box. Default: `[0, 0, -9.81]`.
+    /// Gravity in the frame of the surface, m/s^2. Its strength only sets how long a fall takes,
+    /// not where things come to lie; its direction tilts the box. Default: `[0, 0, -9.81]`.
     pub gravity: [f64; 3],
-    /// Least thickness of a falling body, as a share of its longer side; thinner cards are drawn thin but fall as
-    /// bodies of this thickness. Default: 0.01 (2 mm for 200 mm).
+    /// Least thickness of a falling body, as a share of its longer side; thinner cards are drawn
+    /// thin but fall as bodies of this thickness. Default: 0.01 (2 mm for 200 mm).
     pub thinnest: f64,
-    /// Deepest overlap of two bodies at rest that is accepted, as a share of the typical card's longer side.
-    /// Default: 0.0025 (0.5 mm for 200 mm).
+    /// Deepest overlap of two bodies at rest that is accepted, as a share of the typical card's
+    /// longer side. Default: 0.0025 (0.5 mm for 200 mm).
     pub max_overlap: f64,
     /// Largest rise of energy, potential and kinetic, between two steps, as a share of the drop's;
     /// more is [`SettleVerdict::Exploded`](crate::settle::SettleVerdict::Exploded). Default: 0.01.
     pub max_energy_rise: f64,
-    /// Longest fall, seconds of a world in which the typical card is 200 mm long, 0.01 to 600. Default: 30.
+    /// Longest fall, seconds of a world in which the typical card is 200 mm long, 0.01 to 600.
+    /// Default: 30.
     pub time_limit: f64,
     /// Attempts before giving up, 1 to 100; each starts from heights of its own. Default: 8.
     pub attempts: u32,
-    /// Time step in the same seconds, 0.0001 to 0.0042: with longer ones half of the heaps fail. Default: 1/480.
+    /// Time step in the same seconds, 0.0001 to 0.0042: with longer ones half of the heaps fail.
+    /// Default: 1/480.
     pub step: f64,
     /// Iterations of the contact solver in each step, 1 to 100. Default: 4.
     pub iterations: u32,
-    /// Times in a step that a body may be stopped at what it would fly through, 0 to 100. Default: 1.
+    /// Times in a step that a body may be stopped at what it would fly through, 0 to 100. Default:
+    /// 1.
     pub ccd: u32,
-    /// Most work for one picture, all attempts and redraws together, before it is refused: objects and pairs of objects near to
-    /// each other, summed over time steps, 1 to 1e12. Heaps of 30 take 0.2 million, of 100 some 2 million, of 200 up to 40
-    /// million, of 300 up to 80 million; what is laid flat takes less than one. Default: 100 million.
+    /// Most work for one picture, all attempts and redraws together, before it is refused: objects
+    /// and pairs of objects near to each other, summed over time steps, 1 to 1e12. Heaps of 30
+    /// take 0.2 million, of 100 some 2 million, of 200 up to 40 million, of 300 up to 80
+    /// million; what is laid flat takes less than one. Default: 100 million.
     pub most_work: u64,
 }
 
@@ -74,7 +78,8 @@ impl Default for SettleOptions {
 }
 
 impl SettleOptions {
-    /// Half lengths of the box that falls in place of an object, along the axes of its card, metres.
+    /// Half lengths of the box that falls in place of an object, along the axes of its card,
+    /// metres.
     pub fn half_body(&self, object: &Object) -> Vector3<f64> {
         let [w, h] = object.size;
         Vector3::new(w, h, object.thickness.max(self.thinnest * w.max(h))) / 2.0
@@ -104,7 +109,7 @@ impl SettleOptions {
 
     fn check_gravity(&self) -> Result<()> {
         let [x, y, z] = self.gravity;
-        if !(z < 0.0 && [x, y, z].iter().all(|g| g.is_finite())) {
+        if !self.falls_down() {
             return Err(Error::value(
                 "settle.gravity",
                 format!("{:?}, expected to point down", self.gravity),
@@ -112,13 +117,18 @@ impl SettleOptions {
         }
         GRAVITY.check("settle.gravity", libm::hypot(libm::hypot(x, y), z))
     }
+
+    fn falls_down(&self) -> bool {
+        self.gravity[2] < 0.0 && self.gravity.iter().all(|g| g.is_finite())
+    }
 }
 
 /// The nearest rotation that leaves a card level, on the side it already is nearer to.
 ///
 /// # Method
-/// Every rotation is a turn about the vertical followed by a tilt about a horizontal axis; the quaternion of the turn is
-/// the part (w, z) of the whole, normalised. A card that faces down is first turned over about its own `x`.
+/// Every rotation is a turn about the vertical followed by a tilt about a horizontal axis; the
+/// quaternion of the turn is the part (w, z) of the whole, normalised. A card that faces down is
+/// first turned over about its own `x`.
 pub(crate) fn level(rotation: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
     let over = UnitQuaternion::new_unchecked(Quaternion::new(0.0, 1.0, 0.0, 0.0));
     let faces_up = (rotation * Vector3::z()).z >= 0.0;

@@ -18,8 +18,8 @@ pub struct SceneFiles {
     /// Folder of the photo that the plate names, and of its label.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub backgrounds: Option<PathBuf>,
-    /// Folder that the name of the environment map is relative to. Default: that of the scene's file,
-    /// in which the map must then lie.
+    /// Folder that the name of the environment map is relative to. Default: that of the scene's
+    /// file, in which the map must then lie.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub environments: Option<PathBuf>,
 }
@@ -45,15 +45,20 @@ pub(crate) fn relative_to_file(path: &Path, file: &Path) -> Result<PathBuf> {
     Ok(io::relative(&absolute(path)?, folder))
 }
 
-/// The path from the root. `..` is resolved on the disk where the path is there, since a link may stand before it.
+/// The path from the root. `..` is resolved on the disk where the path is there, since a link may
+/// stand before it.
 fn absolute(path: &Path) -> Result<PathBuf> {
-    let climbs = path.components().any(|step| step == Component::ParentDir);
     match path.canonicalize() {
-        Ok(resolved) if climbs => Ok(resolved),
+        Ok(resolved) if climbs(path) => Ok(resolved),
         _ => std::path::absolute(path)
             .map(|path| without_parent_steps(&path))
             .map_err(|e| Error::file(path, e)),
     }
+}
+
+fn climbs(path: &Path) -> bool {
+    let mut steps = path.components();
+    steps.any(|step| step == Component::ParentDir)
 }
 
 fn without_parent_steps(path: &Path) -> PathBuf {

@@ -1,4 +1,5 @@
-//! The corners of the convex prism that falls in place of a cut-out: few, so that contacts are cheap and calm.
+//! The corners of the convex prism that falls in place of a cut-out: few, so that contacts are
+//! cheap and calm.
 
 use crate::geom::Point2;
 
@@ -7,13 +8,14 @@ pub(super) const MAX_CORNERS: usize = 8;
 /// Twice the area of a corner's triangle below which it is straight, as a share of the card's area.
 const MIN_CORNER_AREA_RATIO: f64 = 1e-6;
 
-/// Corners of a convex outline in texture coordinates (right and down, 0 to 1) as those of a prism on
-/// a card of this size, counter-clockwise with y up, metres; empty where the outline has no area.
+/// Corners of a convex outline in texture coordinates (right and down, 0 to 1) as those of a prism
+/// on a card of this size, counter-clockwise with y up, metres; empty where the outline has no
+/// area.
 ///
 /// # Method
-/// The corner whose loss takes the least area goes first, until [`MAX_CORNERS`] are left (Visvalingam
-/// and Whyatt 1993); what is left lies inside the outline, so a prism never touches what its outline
-/// does not.
+/// The corner whose loss takes the least area goes first, until [`MAX_CORNERS`] are left
+/// (Visvalingam and Whyatt 1993); what is left lies inside the outline, so a prism never touches
+/// what its outline does not.
 pub(super) fn prism_outline(outline_uv: &[Point2<f64>], size: [f64; 2]) -> Vec<[f64; 2]> {
     let mut ring: Vec<[f64; 2]> = outline_uv.iter().map(|p| on_card(p, size)).collect();
     if doubled_area(&ring) < 0.0 {
@@ -48,19 +50,25 @@ fn least_corner(ring: &[[f64; 2]]) -> Option<(usize, f64)> {
         .min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-/// Twice the area of the triangle of a corner and its neighbours; above 0 where the ring turns left.
+/// Twice the area of the triangle of a corner and its neighbours; above 0 where the ring turns
+/// left.
 pub(super) fn doubled_corner_area(ring: &[[f64; 2]], i: usize) -> f64 {
-    let [a, b, c] = [i + ring.len() - 1, i, i + 1].map(|i| ring[i % ring.len()]);
+    let [a, b, c] = with_neighbours(ring, i);
     (b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0])
+}
+
+/// A corner between the one before and the one after it.
+fn with_neighbours(ring: &[[f64; 2]], i: usize) -> [[f64; 2]; 3] {
+    [i + ring.len() - 1, i, i + 1].map(|i| ring[i % ring.len()])
 }
 
 /// Twice the area of a ring; above 0 where it turns left.
 pub(crate) fn doubled_area(ring: &[[f64; 2]]) -> f64 {
-    let next = ring.iter().cycle().skip(1);
-    ring.iter()
-        .zip(next)
-        .map(|(a, b)| a[0] * b[1] - a[1] * b[0])
-        .sum()
+    edges(ring).map(|(a, b)| a[0] * b[1] - a[1] * b[0]).sum()
+}
+
+fn edges(ring: &[[f64; 2]]) -> impl Iterator<Item = (&[f64; 2], &[f64; 2])> {
+    ring.iter().zip(ring.iter().cycle().skip(1))
 }
 
 #[cfg(test)]

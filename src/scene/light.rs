@@ -3,10 +3,11 @@
 use crate::pixel::LinearRgb;
 use serde::{Deserialize, Serialize};
 
-/// A flat light that emits from one side with the same radiance everywhere, `power * color / (pi * area)`.
+/// A flat light that emits from one side with the same radiance everywhere, `power * color / (pi *
+/// area)`.
 ///
-/// Its size is its softness: an occluder at height `z` under a light at distance `D` and of size `s` has a penumbra of
-/// about `z s / (D - z)`.
+/// Its size is its softness: an occluder at height `z` under a light at distance `D` and of size
+/// `s` has a penumbra of about `z s / (D - z)`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct AreaLight {
@@ -44,14 +45,14 @@ pub enum LightShape {
 pub enum Exposure {
     /// `2^ev`.
     Ev(f64),
-    /// Found by the `light` stage: a matte white card on the surface becomes as bright as the plate's own white, times
-    /// `2^gain_ev`.
+    /// Found by the `light` stage: a matte white card on the surface becomes as bright as the
+    /// plate's own white, times `2^gain_ev`.
     MatchPlate {
         /// Brighter (positive) or darker than the match.
         gain_ev: f64,
     },
-    /// Found by the `light` stage: a matte card of this albedo on the surface becomes as bright as the surface itself in
-    /// the plate, times `2^gain_ev`.
+    /// Found by the `light` stage: a matte card of this albedo on the surface becomes as bright as
+    /// the surface itself in the plate, times `2^gain_ev`.
     MatchSurface {
         /// Share of light that the surface reflects, above 0.
         albedo: f64,

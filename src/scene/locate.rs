@@ -4,12 +4,14 @@ use crate::camera::{Camera, Label, SolveOptions, solve};
 use crate::error::Result;
 use crate::scene::{CameraSource, Scene};
 
-/// Solves a scene's camera where it is still a labelled rectangle, and brings it to the scene's picture size.
+/// Solves a scene's camera where it is still a labelled rectangle, and brings it to the scene's
+/// picture size.
 ///
 /// A scene whose camera is known stays as it is: `locate(locate(s)) == locate(s)`.
 ///
 /// # Errors
-/// [`Error::Camera`](crate::Error::Camera) for corners that no camera can have seen, or that none fits.
+/// [`Error::Camera`](crate::Error::Camera) for corners that no camera can have seen, or that none
+/// fits.
 pub fn locate(scene: Scene) -> Result<Scene> {
     let CameraSource::Rectangle {
         corners_px,

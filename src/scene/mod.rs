@@ -1,9 +1,10 @@
 //! Scene: everything that is known of one picture, unknowns included.
 //!
-//! A [`Scene`] is plain data that reads and writes as TOML or JSON; any generator may write one and enter the pipeline
-//! here. What is not known yet is an enum variant ([`CameraSource::Rectangle`], [`Placement::Drop`],
-//! [`Exposure::MatchPlate`]); the stages `camera`, `settle` and `light` each turn their own unknown into the known one
-//! and leave the rest alone. [`Scene::resolve`] gives a [`Shot`], which has no unknowns. A [`Recipe`] draws scenes.
+//! A [`Scene`] is plain data that reads and writes as TOML or JSON; any generator may write one and
+//! enter the pipeline here. What is not known yet is an enum variant ([`CameraSource::Rectangle`],
+//! [`Placement::Drop`], [`Exposure::MatchPlate`]); the stages `camera`, `settle` and `light` each
+//! turn their own unknown into the known one and leave the rest alone. [`Scene::resolve`] gives a
+//! [`Shot`], which has no unknowns. A [`Recipe`] draws scenes.
 //!
 //! # Examples
 //! A scene is drawn from a recipe, and is a pure function of it, the seed and the number:
@@ -127,7 +128,8 @@ pub struct Scene {
     /// How bright rendered light is on the plate.
     #[serde(default)]
     pub exposure: Exposure,
-    /// Colour of the light, on top of that of lights and `ambient`; pictures of the surroundings bring their own.
+    /// Colour of the light, on top of that of lights and `ambient`; pictures of the surroundings
+    /// bring their own.
     #[serde(default, skip_serializing_if = "LightTint::is_white")]
     pub cast: LightTint,
     /// What happens to the finished frame.
@@ -142,7 +144,8 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// The same objects before the same camera in the dark, without a plate: what is left where only labels are asked.
+    /// The same objects before the same camera in the dark, without a plate: what is left where
+    /// only labels are asked.
     pub fn unlit(self) -> Self {
         Self {
             plate: String::new(),
@@ -163,8 +166,8 @@ impl Scene {
 pub struct Surface {
     /// Width (along x) and height (along y), metres.
     pub size: [f64; 2],
-    /// Coefficient of friction of everything that touches here, the cards among themselves too; the walls over the edges,
-    /// which are invisible, are smooth. Default: 0.5.
+    /// Coefficient of friction of everything that touches here, the cards among themselves too;
+    /// the walls over the edges, which are invisible, are smooth. Default: 0.5.
     #[serde(default = "Surface::default_friction")]
     pub friction: f64,
     /// Share of the speed that a bounce gives back, 0 to 1. Default: 0.

@@ -19,8 +19,8 @@ pub struct Object {
     pub size: [f64; 2],
     /// Thickness of the body that falls, metres.
     pub thickness: f64,
-    /// Corners of the convex prism that falls, counter-clockwise, in the card's plane (x right, y up from its middle),
-    /// metres; empty where the whole card falls as a box.
+    /// Corners of the convex prism that falls, counter-clockwise, in the card's plane (x right, y
+    /// up from its middle), metres; empty where the whole card falls as a box.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub outline: Vec<[f64; 2]>,
     /// Mass, kilograms.
@@ -61,7 +61,8 @@ pub enum Placement {
     },
 }
 
-/// A change of colour in hue, saturation and value of the linear colour; the default changes nothing.
+/// A change of colour in hue, saturation and value of the linear colour; the default changes
+/// nothing.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Grade {

@@ -8,7 +8,8 @@ use crate::scene::check::field;
 use crate::scene::{Draws, Range};
 use serde::{Deserialize, Serialize};
 
-/// Exposure, white balance, noise and sharpening of the whole frame, plate included; the default leaves every bit alone.
+/// Exposure, white balance, noise and sharpening of the whole frame, plate included; the default
+/// leaves every bit alone.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct PostProcess {
@@ -104,7 +105,8 @@ impl Noise {
 pub struct PostProcessRanges {
     /// Stops. Default: 0.
     pub exposure_ev: Range,
-    /// Temperature of the light that the camera treats as white, kelvin: below 6504 the frame becomes bluer. Default: 6504.
+    /// Temperature of the light that the camera treats as white, kelvin: below 6504 the frame
+    /// becomes bluer. Default: 6504.
     pub white_k: Range,
     /// Noise of rendered cards. Default: `"none"`.
     pub noise: Noise,

@@ -88,10 +88,14 @@ impl Range {
         if min == max {
             return bounds.check(at, min);
         }
-        if min < max && bounds.contains(min) && bounds.contains(max) {
+        if self.is_within(bounds) {
             return Ok(());
         }
         Err(Error::value(at, self.problem(bounds)))
+    }
+
+    fn is_within(&self, bounds: &Bounds) -> bool {
+        self.min < self.max && bounds.contains(self.min) && bounds.contains(self.max)
     }
 
     fn problem(&self, bounds: &Bounds) -> String {
@@ -103,13 +107,17 @@ impl Range {
     /// Fails unless both ends are integers within bounds.
     pub(crate) fn check_count(&self, at: &str, bounds: &Bounds) -> Result<()> {
         self.check(at, bounds)?;
-        if self.min.fract() == 0.0 && self.max.fract() == 0.0 {
+        if self.has_integer_ends() {
             return Ok(());
         }
         Err(Error::value(
             at,
             format!("[{}, {}], expected integers", self.min, self.max),
         ))
+    }
+
+    fn has_integer_ends(&self) -> bool {
+        self.min.fract() == 0.0 && self.max.fract() == 0.0
     }
 }
 

@@ -51,15 +51,15 @@ impl Scene {
     /// The shot that this scene describes, once nothing is unknown in it.
     ///
     /// `look` finds an object's asset and photo, or nothing; for a library that is
-    /// [`Appearance::from_library`]. `plate` is the background at the picture's size; none leaves it
-    /// transparent. `panorama` is the picture that the scene's environment names. Object `i` gets id
-    /// `i + 1`; the shadow catcher is the plane of the labelled surface, `CATCHER_RATIO` times as
-    /// large.
+    /// [`Appearance::from_library`]. `plate` is the background at the picture's size; none leaves
+    /// it transparent. `panorama` is the picture that the scene's environment names. Object `i`
+    /// gets id `i + 1`; the shadow catcher is the plane of the labelled surface,
+    /// `CATCHER_RATIO` times as large.
     ///
     /// # Errors
     /// The first unknown that is left (`objects[3].placement: still falling; settle it first`); an
-    /// impossible value ([`check`](Self::check)); an asset or photo that `look` does not find; a plate
-    /// of another size; an environment without its picture.
+    /// impossible value ([`check`](Self::check)); an asset or photo that `look` does not find; a
+    /// plate of another size; an environment without its picture.
     pub fn resolve(
         &self,
         look: impl Fn(&Object) -> Option<Appearance>,
@@ -88,11 +88,7 @@ impl Scene {
     fn cards(&self, look: impl Fn(&Object) -> Option<Appearance>) -> Result<Vec<Card>> {
         let numbered = self.objects.iter().enumerate();
         numbered
-            .map(|(i, object)| {
-                let pose = rest_pose(i, object)?;
-                let look = look(object).ok_or_else(|| unknown_asset(i, object))?;
-                Ok(look.into_card(ObjectId(object_id(i)?), object, pose))
-            })
+            .map(|(i, object)| resting_card(i, object, &look))
             .collect()
     }
 
@@ -120,17 +116,10 @@ impl Scene {
 
     fn known_camera(&self) -> Result<Camera> {
         let CameraSource::Known(camera) = self.camera else {
-            return Err(Error::value(
-                "camera",
-                "still a rectangle in a photo; locate it first",
-            ));
+            return Err(unsolved_camera());
         };
         if camera.image != self.image {
-            let what = format!(
-                "{:?}, expected the scene's image {:?}",
-                camera.image, self.image
-            );
-            return Err(Error::value("camera.known.image", what));
+            return Err(different_image(camera.image, self.image));
         }
         Ok(camera)
     }
@@ -176,14 +165,35 @@ fn missing_panorama(file: &str) -> Error {
     Error::value("environment.file", what)
 }
 
+fn resting_card(
+    i: usize,
+    object: &Object,
+    look: impl Fn(&Object) -> Option<Appearance>,
+) -> Result<Card> {
+    let pose = rest_pose(i, object)?;
+    let look = look(object).ok_or_else(|| unknown_asset(i, object))?;
+    Ok(look.into_card(ObjectId(object_id(i)?), object, pose))
+}
+
 fn rest_pose(i: usize, object: &Object) -> Result<Pose> {
     match object.placement {
         Placement::At(pose) => Ok(pose),
-        Placement::Drop { .. } => Err(Error::value(
-            format!("objects[{i}].placement"),
-            "still falling; settle it first",
-        )),
+        Placement::Drop { .. } => Err(still_falling(i)),
     }
+}
+
+fn still_falling(i: usize) -> Error {
+    let at = format!("objects[{i}].placement");
+    Error::value(at, "still falling; settle it first")
+}
+
+fn unsolved_camera() -> Error {
+    Error::value("camera", "still a rectangle in a photo; locate it first")
+}
+
+fn different_image(image: [u32; 2], expected: [u32; 2]) -> Error {
+    let what = format!("{image:?}, expected the scene's image {expected:?}");
+    Error::value("camera.known.image", what)
 }
 
 fn unknown_asset(i: usize, object: &Object) -> Error {

@@ -43,9 +43,9 @@ pub struct Card {
     pub quad: Quad,
     /// The cut-out, premultiplied, scene-linear.
     pub texture: Texture,
-    /// What the side that looks along `-z` of the card shows, right way round as seen from there; none where it is the
-    /// front seen through. Whoever looks through a card (the eye, or a receiver of light) looks through the side that
-    /// faces it.
+    /// What the side that looks along `-z` of the card shows, right way round as seen from there;
+    /// none where it is the front seen through. Whoever looks through a card (the eye, or a
+    /// receiver of light) looks through the side that faces it.
     pub back: Option<Texture>,
     /// Its outline in texture coordinates (0 to 1, right and down), in order.
     pub outline_uv: Arc<[Point2<f64>]>,

@@ -17,9 +17,11 @@ const FIT_TOLERANCE: f64 = 1e-12;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct DropRanges {
-    /// Position along the surface's width: -1 at the left wall, 1 at the right one, 0 in the middle. Default: `[-1, 1]`.
+    /// Position along the surface's width: -1 at the left wall, 1 at the right one, 0 in the
+    /// middle. Default: `[-1, 1]`.
     pub x: Range,
-    /// Position along the surface's height: -1 at the lower wall, 1 at the upper one. Default: `[-1, 1]`.
+    /// Position along the surface's height: -1 at the lower wall, 1 at the upper one. Default:
+    /// `[-1, 1]`.
     pub y: Range,
     /// Turn about the vertical, degrees. Default: `[-180, 180]`.
     pub yaw_deg: Range,
@@ -27,7 +29,8 @@ pub struct DropRanges {
     pub tilt_deg: Range,
     /// Direction of the horizontal axis that it tilts about, degrees. Default: `[-180, 180]`.
     pub tilt_axis_deg: Range,
-    /// Free height between an object and the highest point below it, metres. Default: `[0.005, 0.02]`.
+    /// Free height between an object and the highest point below it, metres. Default: `[0.005,
+    /// 0.02]`.
     pub gap: Range,
 }
 
@@ -75,11 +78,11 @@ pub(super) struct DropColumn<'a> {
 }
 
 impl DropColumn<'_> {
-    /// Places objects one over the other: between the walls over the edges of the surface, with a gap
-    /// under each.
+    /// Places objects one over the other: between the walls over the edges of the surface, with a
+    /// gap under each.
     ///
-    /// Gaps are between the bodies that fall ([`SettleOptions::half_body`]), by their true extents as
-    /// they are turned.
+    /// Gaps are between the bodies that fall ([`SettleOptions::half_body`]), by their true extents
+    /// as they are turned.
     ///
     /// # Errors
     /// An object that fits between the walls in no direction.
@@ -125,13 +128,13 @@ impl DropColumn<'_> {
     }
 
     /// The first rotation drawn with which the body fits between the walls, tilted as it starts and
-    /// level as it may end: what starts across a room that is too narrow for it never lies down there.
-    /// Where none does, one that fits level.
+    /// level as it may end: what starts across a room that is too narrow for it never lies down
+    /// there. Where none does, one that fits level.
     fn fitting_rotation(&self, half: &Vector3<f64>, path: &str) -> Option<UnitQuaternion<f64>> {
         let room = self.surface.size;
         (0..MAX_YAW_DRAWS)
             .map(|number| self.draw_rotation(path, number))
-            .find(|rotation| fits(room, half, rotation) && fits(room, half, &level(rotation)))
+            .find(|rotation| fits_level_too(room, half, rotation))
             .or_else(|| self.draw_level_rotation(half, path))
     }
 
@@ -141,15 +144,11 @@ impl DropColumn<'_> {
         (!turns.is_empty()).then(|| turns[self.draws.choose(&format!("{path}.turn"), turns.len())])
     }
 
-    /// First a turn about the vertical, drawn for this object for the `number`-th time, then the tilt.
+    /// First a turn about the vertical, drawn for this object for the `number`-th time, then the
+    /// tilt.
     fn draw_rotation(&self, path: &str, number: u32) -> UnitQuaternion<f64> {
-        let yaw_name = if number == 0 {
-            "yaw_deg".into()
-        } else {
-            format!("yaw_deg#{number}")
-        };
-        let yaw = level_turn(self.draw(&self.start.yaw_deg, path, &yaw_name));
-        self.draw_tilt(path) * yaw
+        let yaw = self.draw(&self.start.yaw_deg, path, &yaw_field(number));
+        self.draw_tilt(path) * level_turn(yaw)
     }
 
     /// A tilt about a horizontal axis.
@@ -161,13 +160,15 @@ impl DropColumn<'_> {
 }
 
 impl DropRanges {
-    /// Whether a card of this size, as thick as it may be, fits between walls in some direction that it may start in.
+    /// Whether a card of this size, as thick as it may be, fits between walls in some direction
+    /// that it may start in.
     pub(super) fn has_room(&self, surface: [f64; 2], [w, h]: [f64; 2]) -> bool {
         let half = Vector3::new(w, h, 0.0) / 2.0;
         self.level_turns(surface, &half).next().is_some()
     }
 
-    /// Turns with which a level body fits between the walls: the ends of the range, and whole degrees.
+    /// Turns with which a level body fits between the walls: the ends of the range, and whole
+    /// degrees.
     fn level_turns(
         &self,
         surface: [f64; 2],
@@ -176,6 +177,15 @@ impl DropRanges {
         whole_degrees(self.yaw_deg)
             .map(level_turn)
             .filter(move |rotation| fits(surface, half, rotation))
+    }
+}
+
+/// Every further draw of a yaw has a path of its own.
+fn yaw_field(number: u32) -> String {
+    if number == 0 {
+        "yaw_deg".into()
+    } else {
+        format!("yaw_deg#{number}")
     }
 }
 
@@ -207,6 +217,11 @@ fn fits(surface: [f64; 2], half: &Vector3<f64>, rotation: &UnitQuaternion<f64>) 
     free.iter()
         .zip(surface)
         .all(|(free, side)| *free >= -FIT_TOLERANCE * side)
+}
+
+/// Whether a body fits as it is turned, and without its tilt.
+fn fits_level_too(surface: [f64; 2], half: &Vector3<f64>, rotation: &UnitQuaternion<f64>) -> bool {
+    fits(surface, half, rotation) && fits(surface, half, &level(rotation))
 }
 
 /// The message for a card that fits nowhere.

@@ -1,7 +1,8 @@
 //! The paper's sources of variation, switched off one at a time.
 //!
-//! Draws are keyed by their path and not by what was drawn before, so two recipes that differ in one switch give scenes
-//! that differ in nothing else: scene `k` of one and scene `k` of the other are a pair.
+//! Draws are keyed by their path and not by what was drawn before, so two recipes that differ in
+//! one switch give scenes that differ in nothing else: scene `k` of one and scene `k` of the other
+//! are a pair.
 
 use serde::{Deserialize, Serialize};
 
@@ -15,8 +16,8 @@ pub enum Variation {
     Viewpoint,
     /// Photos of an asset: only its first is used.
     Photo,
-    /// Where lights are, how bright and of which colour: each stays at the middle of its ranges. How large they are,
-    /// which is how soft shadows are, still varies.
+    /// Where lights are, how bright and of which colour: each stays at the middle of its ranges.
+    /// How large they are, which is how soft shadows are, still varies.
     Light,
     /// New choices of objects for every scene: there are only 50, as in the paper.
     Selection,

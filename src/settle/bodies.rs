@@ -1,4 +1,5 @@
-//! The bodies that represent a scene's objects, and the lengths that a scene's tolerances scale with.
+//! The bodies that represent a scene's objects, and the lengths that a scene's tolerances scale
+//! with.
 
 use super::overlap::Solid;
 use crate::geom::{Pose, Vector3};

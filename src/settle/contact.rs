@@ -48,8 +48,8 @@ impl Contact {
     }
 }
 
-/// All contacts of bodies that fell: with the room, and of the pairs that touch. What is nearer than
-/// `reach` (metres) touches.
+/// All contacts of bodies that fell: with the room, and of the pairs that touch. What is nearer
+/// than `reach` (metres) touches.
 pub(super) fn contacts(
     solids: &[Solid],
     touching: &[Touch],

@@ -1,6 +1,7 @@
 //! Symmetric matrices that are zero away from the diagonal.
 
-/// The lower half of a symmetric matrix: of each row what lies from its first entry to the diagonal.
+/// The lower half of a symmetric matrix: of each row what lies from its first entry to the
+/// diagonal.
 #[derive(Clone, Debug)]
 pub(super) struct EnvelopeMatrix {
     first: Vec<usize>,

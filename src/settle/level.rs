@@ -32,8 +32,8 @@ fn is_past_walls(solid: &Solid, surface: [f64; 2]) -> bool {
     past_walls(solid, surface).iter().any(|&past| past > 0.0)
 }
 
-/// The falling objects, in groups that stand in columns of their own: however they turn in place, no
-/// card can touch one of another group.
+/// The falling objects, in groups that stand in columns of their own: however they turn in place,
+/// no card can touch one of another group.
 pub(super) fn columns(scene: &Scene, options: &SettleOptions) -> Vec<Vec<usize>> {
     let bodies = leveled_solids(scene, options);
     let mut columns: Vec<Vec<usize>> = Vec::new();
@@ -68,8 +68,8 @@ fn can_touch(a: &Solid, b: &Solid) -> bool {
 /// highest it meets.
 ///
 /// Cards that already are at rest are treated as the upright boxes around them. A card that reaches
-/// through a wall is moved in. The result is the poses of the objects that fall, in their order. Work
-/// is each object and each that it is laid on or beside.
+/// through a wall is moved in. The result is the poses of the objects that fall, in their order.
+/// Work is each object and each that it is laid on or beside.
 ///
 /// # Errors
 /// [`Allowance::take`].

@@ -3,9 +3,10 @@
 //! [`settle`] turns every [`Placement::Drop`] into a [`Placement::At`] and leaves the rest of the
 //! scene alone; a scene in which nothing falls comes back unchanged and no physics world is built.
 //! Objects fall as thin boxes ([`SettleOptions::half_body`]) or as convex prisms
-//! ([`Object::outline`](crate::scene::Object::outline)), between smooth walls that stand on the edges of the surface and have no
-//! top. A card lies in the *middle* plane of its body. Objects that are at rest already are
-//! obstacles that do not move; a card that can touch nothing needs no physics.
+//! ([`Object::outline`](crate::scene::Object::outline)), between smooth walls that stand on the
+//! edges of the surface and have no top. A card lies in the *middle* plane of its body. Objects
+//! that are at rest already are obstacles that do not move; a card that can touch nothing needs no
+//! physics.
 //!
 //! The result is judged by tests that share nothing with the physics engine: for overlap, for what
 //! supports each body, and by its energy. A failed attempt is repeated from other heights, with
@@ -76,7 +77,8 @@ pub struct Settled {
     pub rejected: Vec<SettleVerdict>,
     /// Length of the last fall, seconds.
     pub seconds: f64,
-    /// Deepest overlap of a dropped body with another body, the floor or a wall at the end, metres.
+    /// Deepest overlap of a dropped body with another body, the floor or a wall at the end,
+    /// metres.
     pub overlap: f64,
     /// Largest energy gain between two steps of the last fall, as a share of the energy that the
     /// drop released; a drop by less than a quarter of a card is treated as one by that much.
@@ -224,8 +226,8 @@ pub fn settle_within(
 /// Ids (index + 1) of objects that are unsupported at the end of a fall: no forces at their
 /// contacts hold them where they are, walls being smooth.
 ///
-/// Objects that fall in `before` fell; the others stand where their author put them and support what
-/// lies on them. None where they were laid without physics ([`SettleMode::Flat`]).
+/// Objects that fall in `before` fell; the others stand where their author put them and support
+/// what lies on them. None where they were laid without physics ([`SettleMode::Flat`]).
 ///
 /// # Errors
 /// An impossible scene or option; scenes with different numbers of objects.
@@ -469,7 +471,8 @@ mod tests {
         );
     }
 
-    /// What holds for the dimensions holds for the bits, where the factor on time is a power of two.
+    /// What holds for the dimensions holds for the bits, where the factor on time is a power of
+    /// two.
     #[test]
     fn the_strength_of_gravity_sets_the_time_and_nothing_else() {
         let with = |factor: f64| {

@@ -205,8 +205,8 @@ pub(super) fn overlap_depth(a: &Solid, b: &Solid) -> f64 {
 /// # Method
 /// Separating axes: two convex bodies are apart if and only if their projections are, on one of
 /// these directions: the faces' normals and the cross products of their edges ([Gottschalk, Lin and
-/// Manocha 1996]; 15 for two boxes). The greatest gap between projections is that of the bodies: the
-/// depth of an overlap, and a lower bound of a distance.
+/// Manocha 1996]; 15 for two boxes). The greatest gap between projections is that of the bodies:
+/// the depth of an overlap, and a lower bound of a distance.
 ///
 /// [Gottschalk, Lin and Manocha 1996]: https://doi.org/10.1145/237170.237244
 fn separation(a: &Solid, b: &Solid, reach: f64) -> Option<(f64, Vector3<f64>)> {
@@ -264,8 +264,8 @@ impl<'a> PrismDirections<'a> {
         Self { solid, axes, edges }
     }
 
-    /// How far another prism is ahead of this one in a direction, and how far behind it; negative where
-    /// they overlap.
+    /// How far another prism is ahead of this one in a direction, and how far behind it; negative
+    /// where they overlap.
     #[inline]
     fn gaps_to(&self, other: &Self, direction: &Vector3<f64>) -> [f64; 2] {
         let [low, high] = self.solid.projection(&self.axes, direction);
@@ -282,8 +282,8 @@ impl<'a> PrismDirections<'a> {
         base.iter().map(|edge| edge.cross(&self.up()))
     }
 
-    /// The directions that two prisms can be apart along: normals of faces, then normals of pairs of
-    /// edges.
+    /// The directions that two prisms can be apart along: normals of faces, then normals of pairs
+    /// of edges.
     fn separating(&self, other: &Self) -> impl Iterator<Item = Vector3<f64>> {
         let faces = [self.up(), other.up()]
             .into_iter()
@@ -390,7 +390,8 @@ mod tests {
             );
             let depth = overlap_depth(&a, &b);
             let shared = shares_a_point(&a, &b) || shares_a_point(&b, &a);
-            // A shared point proves an overlap; a deep overlap (twice the grid's step) must share a point.
+            // A shared point proves an overlap; a deep overlap (twice the grid's step) must share a
+            // point.
             assert!(!shared || depth > 0.0, "case {case}");
             assert!(shared || depth < 2.0 * 2.0 / 24.0, "case {case}: {depth}");
             found[usize::from(shared)] += 1;
@@ -426,7 +427,8 @@ mod tests {
         assert!(overlap_depth(&card, &post(0.1, 0.04)) > 0.0);
         assert_eq!(overlap_depth(&triangle(0.0), &post(0.1, 0.04)), 0.0);
         assert_eq!(overlap_depth(&triangle(0.0), &post(0.02, 0.02)), 0.0);
-        // The slanted side is x / 0.2 + y / 0.08 = 0; the post's corner (x - 0.01, y - 0.01) lies behind it.
+        // The slanted side is x / 0.2 + y / 0.08 = 0; the post's corner (x - 0.01, y - 0.01) lies
+        // behind it.
         let behind = |x: f64, y: f64| {
             -((x - 0.01) / 0.2 + (y - 0.01) / 0.08) / (1.0_f64 / 0.2).hypot(1.0 / 0.08)
         };

@@ -1,5 +1,5 @@
-//! A picture of where everything lies, from above and from the side: no textures, to see a fall at a
-//! glance.
+//! A picture of where everything lies, from above and from the side: no textures, to see a fall at
+//! a glance.
 
 use super::bodies::solids_at_rest;
 use super::overlap::{Solid, from_lowest};

@@ -1,17 +1,17 @@
 //! Does everything lie on something, down to the floor?
 //!
-//! At rest is what forces can hold: pushes at the contacts, with friction, that balance the weight of
-//! every body and its moments. Walls are smooth, so they may prop up a card whose lower edge stands
-//! on something, and carry none in the air: nothing but a chain of contacts down to the floor bears a
-//! weight, and only where the centre of mass is over it.
+//! At rest is what forces can hold: pushes at the contacts, with friction, that balance the weight
+//! of every body and its moments. Walls are smooth, so they may prop up a card whose lower edge
+//! stands on something, and carry none in the air: nothing but a chain of contacts down to the
+//! floor bears a weight, and only where the centre of mass is over it.
 //!
 //! # Method
 //! Each contact becomes stiff springs that only push: along the edges of its cone of friction, a
-//! pyramid. Each body hangs on a spring of its own that is softer by [`CONTACT_STIFFNESS`]. What the
-//! contacts can hold hardly moves; what they cannot is left to the soft spring and moves by up to its
-//! weight over that spring: a share of it that is 1 for a body in free fall. The energy of such
-//! springs is convex and made of pieces of parabolas: Newton's method finds its minimum in a few
-//! steps.
+//! pyramid. Each body hangs on a spring of its own that is softer by [`CONTACT_STIFFNESS`]. What
+//! the contacts can hold hardly moves; what they cannot is left to the soft spring and moves by up
+//! to its weight over that spring: a share of it that is 1 for a body in free fall. The energy of
+//! such springs is convex and made of pieces of parabolas: Newton's method finds its minimum in a
+//! few steps.
 
 use super::bodies::{touch_distance, typical_length};
 use super::contact::{Contact, contacts, perpendicular_axes};
@@ -23,8 +23,8 @@ use crate::scene::{Scene, SettleOptions};
 /// Factor on friction: bodies that would fall are sought, not those that would creep.
 const FRICTION_FACTOR: f64 = 2.0;
 /// Share of its weight above which a body that no contact supports counts as hanging. A card whose
-/// centre of mass is beyond what it lies on by a thirtieth of its length has as much; of 1,994 heaps
-/// at rest one had more, 1,985 none to four digits.
+/// centre of mass is beyond what it lies on by a thirtieth of its length has as much; of 1,994
+/// heaps at rest one had more, 1,985 none to four digits.
 const UNSUPPORTED_SHARE: f64 = 0.1;
 /// Stiffness of a contact over that of a body's own spring.
 const CONTACT_STIFFNESS: f64 = 1e6;
@@ -38,8 +38,8 @@ const MIN_ENERGY_GAIN: f64 = 1e-6;
 /// that of a rod.
 const GYRATION_RATIO: f64 = 0.3;
 
-/// Ids (index + 1) of the bodies that fell and that nothing holds where they are; `touching` are the
-/// pairs of bodies nearer than [`touch_distance`].
+/// Ids (index + 1) of the bodies that fell and that nothing holds where they are; `touching` are
+/// the pairs of bodies nearer than [`touch_distance`].
 pub(super) fn unsupported(
     scene: &Scene,
     options: &SettleOptions,
@@ -120,7 +120,8 @@ impl SpringModel {
         y
     }
 
-    /// Towards the minimum that the springs pressed at `y` would have; none where that gains nothing.
+    /// Towards the minimum that the springs pressed at `y` would have; none where that gains
+    /// nothing.
     fn newton_step(&self, y: &[f64], energy: f64) -> Option<(Vec<f64>, f64)> {
         self.line_search(y, &self.quadratic_minimum(&self.pressed(y)), energy)
     }
@@ -405,7 +406,8 @@ mod tests {
     use crate::settle::tests::{dropped, falling};
     use std::f64::consts::FRAC_PI_4;
 
-    /// Ids of what hangs among cards of 200 x 80 x 5 mm in a tray of 0.6 x 0.4 m, by their centres and tilts about x.
+    /// Ids of what hangs among cards of 200 x 80 x 5 mm in a tray of 0.6 x 0.4 m, by their centres
+    /// and tilts about x.
     fn hang(cards: &[([f64; 3], f64)]) -> Vec<usize> {
         hang_in([0.6, 0.4], cards)
     }

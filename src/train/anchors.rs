@@ -4,8 +4,8 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use serde::{Deserialize, Serialize};
 
-/// A box is within an anchor's reach when no side differs from the anchor's by this factor or more: what equation 1 can
-/// decode, and YOLOv5's default.
+/// A box is within an anchor's reach when no side differs from the anchor's by this factor or more:
+/// what equation 1 can decode, and YOLOv5's default.
 pub(crate) const MAX_SIDE_RATIO: f64 = 4.0;
 /// Rounds of the clustering; it rests after a few dozen.
 const MAX_ROUNDS: usize = 300;
@@ -15,15 +15,18 @@ const MAX_ROUNDS: usize = 300;
 pub struct Anchors {
     /// Width and height, by area, in the unit of the boxes.
     pub sizes: Vec<[f64; 2]>,
-    /// Mean intersection over union of a box with the anchor that fits it best, both about one centre.
+    /// Mean intersection over union of a box with the anchor that fits it best, both about one
+    /// centre.
     pub mean_iou: f64,
     /// Share of the boxes within reach of some anchor (`MAX_SIDE_RATIO`).
     pub best_possible_recall: f64,
 }
 
-/// `count` anchors for boxes of these widths and heights, in any unit; the same seed gives the same anchors.
+/// `count` anchors for boxes of these widths and heights, in any unit; the same seed gives the same
+/// anchors.
 ///
-/// Boxes without area are left out. Fewer boxes than anchors give one anchor per box; no boxes none.
+/// Boxes without area are left out. Fewer boxes than anchors give one anchor per box; no boxes
+/// none.
 ///
 /// # Method
 /// k-means with 1 - IoU as distance ([Redmon and Farhadi 2017], section 2), started by [k-means++].

@@ -38,7 +38,8 @@ impl Default for BatchOptions {
     }
 }
 
-/// The batches of an epoch: every image of both sources once, in an order that depends on seed and epoch alone.
+/// The batches of an epoch: every image of both sources once, in an order that depends on seed and
+/// epoch alone.
 ///
 /// A source's last batch may be smaller. `size` 0 counts as 1.
 pub fn batches(real: usize, synthetic: usize, epoch: u64, options: &BatchOptions) -> Vec<Batch> {

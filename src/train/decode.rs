@@ -16,8 +16,8 @@ pub fn decode(t: [f64; 4], cell: [f64; 2], anchor: [f64; 2]) -> [f64; 4] {
     ]
 }
 
-/// The numbers that [`decode`] takes to a box; none for a box that it cannot reach: a centre more than half a cell
-/// outside its cell, a side of 0 or of 4 anchors and more.
+/// The numbers that [`decode`] takes to a box; none for a box that it cannot reach: a centre more
+/// than half a cell outside its cell, a side of 0 or of 4 anchors and more.
 pub fn encode(bbox: [f64; 4], cell: [f64; 2], anchor: [f64; 2]) -> Option<[f64; 4]> {
     let [x, y, w, h] = bbox;
     let shares = [

@@ -1,8 +1,9 @@
 //! Train: what a detector's training needs beside images: equation numbers are those of the paper.
 //!
-//! Plain functions for any trainer: the balance of two sources of images ([`Balance`], equation 2), batches of one
-//! source each (`batches`), how a network's numbers become boxes (`decode`, equation 1), anchors that fit a
-//! dataset ([`anchors()`]), how many epochs make equally many updates ([`Updates`]), and a [`kit`] of files for PyTorch.
+//! Plain functions for any trainer: the balance of two sources of images ([`Balance`], equation 2),
+//! batches of one source each (`batches`), how a network's numbers become boxes (`decode`, equation
+//! 1), anchors that fit a dataset ([`anchors()`]), how many epochs make equally many updates
+//! ([`Updates`]), and a [`kit`] of files for PyTorch.
 
 mod anchors;
 mod balance;

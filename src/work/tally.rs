@@ -1,11 +1,13 @@
 //! Counts, added up for the job that asked for them.
 //!
 //! # Why threads of its own
-//! A value handed back by every function would have to go through filters, lazily made levels of detail and readers of
-//! files, which return what they make to whoever asks first. A global sum would mix scenes that are made side by side.
-//! So a job that is counted runs on threads of its own, which all know where to add; two jobs share no thread, hence no
-//! sum. Sums of integers do not depend on their order, and what may be made twice by threads that race for it is
-//! counted where it is kept, so the numbers are the same at any thread count. Nothing that is counted decides a byte.
+//! A value handed back by every function would have to go through filters, lazily made levels of
+//! detail and readers of files, which return what they make to whoever asks first. A global sum
+//! would mix scenes that are made side by side. So a job that is counted runs on threads of its
+//! own, which all know where to add; two jobs share no thread, hence no sum. Sums of integers do
+//! not depend on their order, and what may be made twice by threads that race for it is
+//! counted where it is kept, so the numbers are the same at any thread count. Nothing that is
+//! counted decides a byte.
 
 use super::Kind;
 use std::cell::RefCell;
@@ -45,8 +47,8 @@ thread_local! {
 
 /// Runs a job on as many threads as the current pool has, and returns what it did.
 ///
-/// A job inside of a job adds nothing to the outer one. Threads that the job starts by itself are not counted, other than
-/// those of this library.
+/// A job inside of a job adds nothing to the outer one. Threads that the job starts by itself are
+/// not counted, other than those of this library.
 ///
 /// # Errors
 /// When the system provides no threads.

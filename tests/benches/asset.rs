@@ -1,4 +1,5 @@
-//! A photo becomes an asset: read, cut out, written, shown on the contact sheet. One thread; a picture made in code.
+//! A photo becomes an asset: read, cut out, written, shown on the contact sheet. One thread; a
+//! picture made in code.
 //!
 //! `petcomp asset add -vv PHOTO ... -j 1` tells which stage takes how much of it.
 

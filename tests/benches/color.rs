@@ -8,7 +8,8 @@ use std::hint::black_box;
 /// 4K.
 const SIZE: (usize, usize) = (3840, 2160);
 
-/// Colours of every brightness, a little below 0 and above 1 too, without a pattern that a branch could learn.
+/// Colours of every brightness, a little below 0 and above 1 too, without a pattern that a branch
+/// could learn.
 fn picture() -> Image<LinearRgb> {
     let value = |i: usize| (i.wrapping_mul(2_654_435_761) >> 8 & 0xffff) as f32 / 60_000.0 - 0.02;
     Image::from_fn(SIZE.0, SIZE.1, |x, y| {

@@ -1,4 +1,5 @@
-//! A 4K half EXR through OpenImageIO: in this process, and through its worker once that runs. One run gives the ratio.
+//! A 4K half EXR through OpenImageIO: in this process, and through its worker once that runs. One
+//! run gives the ratio.
 
 use petcomp::io::{self, Bits, ReadOptions, WriteOptions};
 use petcomp::{Image, PremulRgba};

@@ -1,6 +1,7 @@
 //! The keyer against a plain copy of the same buffers, and the two ways to blur against each other.
 //!
-//! `cargo bench --bench matte`: every line is one 4K frame on all cores, into pictures that are already allocated.
+//! `cargo bench --bench matte`: every line is one 4K frame on all cores, into pictures that are
+//! already allocated.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use petcomp::matte::key::{Blur, KeyOptions, Keyed, Keying, Profile, Screen};

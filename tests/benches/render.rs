@@ -1,4 +1,5 @@
-//! Milliseconds per frame: 20 cards over a tray at 640 x 480, each setting, on one thread and on all.
+//! Milliseconds per frame: 20 cards over a tray at 640 x 480, each setting, on one thread and on
+//! all.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use petcomp::Quality;

@@ -176,7 +176,8 @@ fn same_image(case: &Case, file: &str, got: &Image<PremulRgba>) -> Result<(), St
     same_bits(file, got.width(), &pairs)
 }
 
-/// Equal as numbers, bit by bit; of NaN only that it is one, for which NaN it is differs between processors.
+/// Equal as numbers, bit by bit; of NaN only that it is one, for which NaN it is differs between
+/// processors.
 fn same(a: f32, b: f32) -> bool {
     a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan())
 }

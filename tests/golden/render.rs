@@ -1,8 +1,8 @@
 //! Rendered frames against Cycles.
 //!
-//! `scene.json` is the file that Blender rendered (its conventions are those of `golden/render/scene_reference.py`);
-//! `reference.exr` is the frame over the plate, scene-linear. Held to the root mean square error, the bias and the
-//! share of pixels that the case states.
+//! `scene.json` is the file that Blender rendered (its conventions are those of
+//! `golden/render/scene_reference.py`); `reference.exr` is the frame over the plate, scene-linear.
+//! Held to the root mean square error, the bias and the share of pixels that the case states.
 
 use crate::case::Case;
 use petcomp::Quality;

@@ -16,8 +16,9 @@ use std::path::{Path, PathBuf};
 pub(crate) enum AssetCommand {
     /// Cut out all photos of a list
     Build {
-        /// List (TOML or CSV), or a folder with photos.toml or photos.csv: file, asset, class and length (metres, by a tape
-        /// measure), px_per_metre, screen_size (0.60x0.40 in CSV) or marker_size
+        /// List (TOML or CSV), or a folder with photos.toml or photos.csv: file, asset, class and
+        /// length (metres, by a tape measure), px_per_metre, screen_size (0.60x0.40 in
+        /// CSV) or marker_size
         list: PathBuf,
         /// Asset folder
         #[arg(short, long, value_name = "FOLDER")]
@@ -25,7 +26,8 @@ pub(crate) enum AssetCommand {
     },
     /// Cut out photos of one object
     Add(Box<AddPhotoArgs>),
-    /// Show what an asset folder holds: name, class, size, how sure outline and colour are (0 to 1), file
+    /// Show what an asset folder holds: name, class, size, how sure outline and colour are (0 to
+    /// 1), file
     List {
         /// Asset folder
         folder: PathBuf,
@@ -62,18 +64,22 @@ pub(crate) struct AddPhotoArgs {
     /// Name of its class; one that the folder does not have is added behind those that it has
     #[arg(long)]
     class: String,
-    /// Names of all classes in order: a label's number is the place in this list, and no other class is taken
+    /// Names of all classes in order: a label's number is the place in this list, and no other
+    /// class is taken
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     classes: Vec<String>,
-    /// What it was photographed on: auto, a colour R,G,B (scene-linear), or a photo of the empty screen
+    /// What it was photographed on: auto, a colour R,G,B (scene-linear), or a photo of the empty
+    /// screen
     #[arg(long, value_name = "SCREEN", default_value = "auto")]
     screen: ScreenSource,
     #[command(flatten)]
     scale: ScaleArgs,
-    /// Corners of the screen for --screen-size, from the top left clockwise, pixels; by default they are found
+    /// Corners of the screen for --screen-size, from the top left clockwise, pixels; by default
+    /// they are found
     #[arg(long, value_name = "X,Y X,Y X,Y X,Y", value_parser = parse_corners, requires = "screen_size")]
     screen_corners: Option<[[f64; 2]; 4]>,
-    /// Thickness of the object as it lies, metres: with --screen-size or --marker-size its size is that at half its height
+    /// Thickness of the object as it lies, metres: with --screen-size or --marker-size its size is
+    /// that at half its height
     #[arg(long, value_name = "METRES", default_value_t = asset::DEFAULT_THICKNESS)]
     thickness: f64,
     /// draft, normal or reference: how finely the object is searched and kept
@@ -94,12 +100,12 @@ struct ScaleArgs {
     /// Or: scale of the photos at half the object's height, pixels per metre
     #[arg(long, value_name = "PX_PER_M")]
     scale: Option<f64>,
-    /// Or: width and height of the whole screen, metres: it lies on something of another colour, and all four corners are
-    /// seen
+    /// Or: width and height of the whole screen, metres: it lies on something of another colour,
+    /// and all four corners are seen
     #[arg(long, value_name = "WxH", value_parser = parse_metres)]
     screen_size: Option<[f64; 2]>,
-    /// Or: side of the black square of a printed marker on the screen, metres (AprilTag tag36h11 or ArUco DICT_4X4_50); cut
-    /// its paper to a white margin of at most a third of that
+    /// Or: side of the black square of a printed marker on the screen, metres (AprilTag tag36h11
+    /// or ArUco DICT_4X4_50); cut its paper to a white margin of at most a third of that
     #[arg(long, value_name = "METRES")]
     marker_size: Option<f64>,
 }

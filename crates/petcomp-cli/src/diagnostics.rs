@@ -3,7 +3,8 @@
 use petcomp::{Diagnostic, Severity};
 use std::fmt::Display;
 
-/// Logs what a stage noticed about a file: `FILE: message [code]`, each at the level of its severity.
+/// Logs what a stage noticed about a file: `FILE: message [code]`, each at the level of its
+/// severity.
 pub(crate) fn report_diagnostics(file: impl Display, diagnostics: &[Diagnostic]) {
     for diagnostic in diagnostics {
         log::log!(

@@ -193,8 +193,8 @@ fn pixel_rows<P: Copy + Send>(
     }
 }
 
-/// The values as the file stores them, which is what `idiff` compares: codes of integer formats as shares of full scale,
-/// floats as they are.
+/// The values as the file stores them, which is what `idiff` compares: codes of integer formats as
+/// shares of full scale, floats as they are.
 fn stored_values(picture: &Picture, rows: Range<usize>) -> Image<[f32; 4]> {
     if matches!(picture.format(), Format::Exr | Format::Hdr) {
         return picture

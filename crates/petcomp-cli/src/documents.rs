@@ -40,7 +40,8 @@ pub(crate) struct SceneArgs {
     /// Scene, TOML or JSON; what is unknown in it is solved first
     #[arg(value_name = "SCENE")]
     pub(crate) path: PathBuf,
-    /// Recipe file (TOML) that names the folders of assets and backgrounds; by default the scene's own `[files]` does
+    /// Recipe file (TOML) that names the folders of assets and backgrounds; by default the scene's
+    /// own `[files]` does
     #[arg(value_name = "RECIPE")]
     recipe: Option<PathBuf>,
     /// Replace a value of the recipe or of the scene's settings: render.subsamples=8

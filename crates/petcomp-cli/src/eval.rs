@@ -14,7 +14,8 @@ use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
 pub(crate) struct EvalArgs {
-    /// Predictions of one or more runs, then the truth: folders of YOLO labels (`class cx cy w h confidence`) or COCO JSON
+    /// Predictions of one or more runs, then the truth: folders of YOLO labels (`class cx cy w h
+    /// confidence`) or COCO JSON
     #[arg(required = true, num_args = 2.., value_names = ["PREDICTIONS", "TRUTH"])]
     paths: Vec<PathBuf>,
     /// CSV with a line `image,light,..` and what each image is: scores per factor
@@ -159,7 +160,8 @@ impl EvalArgs {
     }
 }
 
-/// Classes of the dataset that the labels belong to: `labels/val` lies two folders below its data.yaml.
+/// Classes of the dataset that the labels belong to: `labels/val` lies two folders below its
+/// data.yaml.
 fn dataset_classes(labels: &Path) -> Option<Vec<String>> {
     let folder = labels.parent()?.parent()?;
     Some(YoloSet::open(folder).ok()?.classes)

@@ -29,8 +29,9 @@ pub(crate) fn report_error(error: &anyhow::Error) -> ExitCode {
     ExitCode::from(status_of(error))
 }
 
-/// 1 where `--strict` found something to review, 2 where some of many files could not be used, 3 for data that cannot be
-/// right, 4 for files that cannot be used, 130 after an interruption. (2 is a wrong command line too; clap says that.)
+/// 1 where `--strict` found something to review, 2 where some of many files could not be used, 3
+/// for data that cannot be right, 4 for files that cannot be used, 130 after an interruption. (2 is
+/// a wrong command line too; clap says that.)
 fn status_of(error: &anyhow::Error) -> u8 {
     if error.is::<NeedsReview>() {
         return NEEDS_REVIEW_STATUS;

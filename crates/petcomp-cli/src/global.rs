@@ -20,15 +20,15 @@ pub(crate) struct GlobalArgs {
     /// Say nothing but results and errors: no progress, no notes, no warnings
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     quiet: bool,
-    /// How to show how far a long job is: `bar` (lines where there is no terminal) or `json`, an object a line on the
-    /// standard error
+    /// How to show how far a long job is: `bar` (lines where there is no terminal) or `json`, an
+    /// object a line on the standard error
     #[arg(long, value_name = "HOW", default_value = "bar", global = true)]
     progress: ProgressFormat,
     /// Say more; twice for everything
     #[arg(short, long, action = clap::ArgAction::Count, global = true)]
     verbose: u8,
-    /// Let pictures and documents ask for more, or less: side=65536, pixels=512M, decoded_bytes=4G, seconds=60,
-    /// document_bytes=64M, ...
+    /// Let pictures and documents ask for more, or less: side=65536, pixels=512M,
+    /// decoded_bytes=4G, seconds=60, document_bytes=64M, ...
     #[arg(long = "limit", value_name = "NAME=N", global = true)]
     limits: Vec<LimitOverride>,
     /// What reads pictures that petcomp's own decoders do not know
@@ -42,9 +42,11 @@ enum OpenImageIo {
     /// In a sandboxed process of its own
     #[default]
     Worker,
-    /// The same, and no such picture is read where the system lacks Landlock or seccomp for its sandbox
+    /// The same, and no such picture is read where the system lacks Landlock or seccomp for its
+    /// sandbox
     WorkerStrict,
-    /// In this process: a damaged file may crash it (needs a build with the feature in-process-oiio)
+    /// In this process: a damaged file may crash it (needs a build with the feature
+    /// in-process-oiio)
     InProcess,
     /// Not at all
     Off,
@@ -111,8 +113,8 @@ impl GlobalArgs {
         self.quiet
     }
 
-    /// Prints a line about the work (what was written, what to look at), except with `--quiet`. The results that a command
-    /// exists for go through [`print`] instead.
+    /// Prints a line about the work (what was written, what to look at), except with `--quiet`. The
+    /// results that a command exists for go through [`print`] instead.
     pub(crate) fn print_status(&self, line: impl Display) {
         if !self.quiet {
             print::line(line);
@@ -129,7 +131,8 @@ impl GlobalArgs {
         self.print_status(format_args!("look at {}", file.display()));
     }
 
-    /// A progress display: a bar on a terminal, plain lines elsewhere, nothing when quiet; or JSON, where that is asked for.
+    /// A progress display: a bar on a terminal, plain lines elsewhere, nothing when quiet; or JSON,
+    /// where that is asked for.
     pub(crate) fn start_progress(&self, job: &'static str) -> ProgressDisplay {
         ProgressDisplay::new(job, self.quiet, self.progress)
     }

@@ -6,14 +6,15 @@ use std::sync::Once;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// From the first Ctrl-C (or SIGTERM) to the end of the program at the latest: schedulers kill after 10 s and more.
+/// From the first Ctrl-C (or SIGTERM) to the end of the program at the latest: schedulers kill
+/// after 10 s and more.
 const GRACE_PERIOD: Duration = Duration::from_secs(8);
 
 static STOP: AtomicBool = AtomicBool::new(false);
 
-/// Turns true at the first Ctrl-C (or SIGTERM), so that a long job can stop between two pictures. What has not ended by
-/// itself after [`GRACE_PERIOD`] is ended in the middle, as the second signal ends it at once: every file is complete or
-/// absent, so the same command continues from there.
+/// Turns true at the first Ctrl-C (or SIGTERM), so that a long job can stop between two pictures.
+/// What has not ended by itself after [`GRACE_PERIOD`] is ended in the middle, as the second signal
+/// ends it at once: every file is complete or absent, so the same command continues from there.
 pub(crate) fn interruption() -> &'static AtomicBool {
     static ONCE: Once = Once::new();
     ONCE.call_once(catch_interrupts);

@@ -17,7 +17,8 @@ pub(crate) struct LabelArgs {
     /// Also write the picture with outlines and boxes drawn on it
     #[arg(long, value_name = "PNG")]
     overlay: Option<PathBuf>,
-    /// Also write the borders of the masks as polygons, simplified as the recipe's `labels.simplify` says
+    /// Also write the borders of the masks as polygons, simplified as the recipe's
+    /// `labels.simplify` says
     #[arg(long, value_name = "JSON")]
     polygons: Option<PathBuf>,
 }

@@ -31,8 +31,9 @@ use std::process::ExitCode;
 
 /// From photographs to labelled training images.
 ///
-/// Photos on a green or blue screen become cut-outs (matte, asset); a photo of a place with four marked corners becomes
-/// a camera (camera); a recipe becomes scenes (scene), which settle, are rendered over the photo and labelled (dataset).
+/// Photos on a green or blue screen become cut-outs (matte, asset); a photo of a place with four
+/// marked corners becomes a camera (camera); a recipe becomes scenes (scene), which settle, are
+/// rendered over the photo and labelled (dataset).
 #[derive(Parser)]
 #[command(
     name = "petcomp",

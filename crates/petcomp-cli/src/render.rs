@@ -16,7 +16,8 @@ pub(crate) struct RenderArgs {
     /// Picture to write: .png, .jpg, or .exr for scene-linear values with alpha
     #[arg(short, long, value_name = "PICTURE")]
     output: PathBuf,
-    /// draft, normal or reference: how finely everything is computed; by default as the recipe or the scene's settings say
+    /// draft, normal or reference: how finely everything is computed; by default as the recipe or
+    /// the scene's settings say
     #[arg(long)]
     quality: Option<Quality>,
     /// Parts of a multi-part .exr: beauty,coverage,shadow,id,depth,position,uv,cryptomatte,layers

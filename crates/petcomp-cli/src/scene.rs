@@ -16,7 +16,8 @@ pub(crate) enum SceneCommand {
         /// Scene, TOML or JSON
         scene: PathBuf,
     },
-    /// Write a scene for another renderer: JSON, plate and textures that Blender renders with one more command
+    /// Write a scene for another renderer: JSON, plate and textures that Blender renders with one
+    /// more command
     Export(ExportSceneArgs),
 }
 

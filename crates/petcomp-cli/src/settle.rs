@@ -16,7 +16,8 @@ pub(crate) struct SettleArgs {
     /// Settle options to use instead of the scene's own settings or the defaults, as TOML
     #[arg(long, value_name = "FILE")]
     options: Option<PathBuf>,
-    /// draft, normal or reference: how finely the fall is computed; by default what the options say
+    /// draft, normal or reference: how finely the fall is computed; by default what the options
+    /// say
     #[arg(long)]
     quality: Option<Quality>,
     /// Where every object was during the fall, as CSV: a line for each 60th of a second and object
@@ -27,7 +28,8 @@ pub(crate) struct SettleArgs {
     preview: Option<PathBuf>,
 }
 
-/// Steps of the simulation from one line of the trace to the next: 60 lines a second at the default step.
+/// Steps of the simulation from one line of the trace to the next: 60 lines a second at the default
+/// step.
 const TRACE_INTERVAL_STEPS: usize = 8;
 
 pub(crate) fn run(args: &SettleArgs, global: &GlobalArgs) -> anyhow::Result<()> {

@@ -39,7 +39,8 @@ impl Desk {
         out
     }
 
-    /// Runs what must fail and returns the one line that says why, having checked that nothing was left behind.
+    /// Runs what must fail and returns the one line that says why, having checked that nothing was
+    /// left behind.
     fn refused(&self, args: &[&str]) -> String {
         let before = self.files();
         let output = self.run(args);

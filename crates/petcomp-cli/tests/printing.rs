@@ -1,4 +1,5 @@
-//! What the program prints: nothing that a terminal obeys, no panic where nobody reads, and with `-q` the answer still.
+//! What the program prints: nothing that a terminal obeys, no panic where nobody reads, and with
+//! `-q` the answer still.
 #![cfg(unix)]
 
 use std::ffi::{OsStr, OsString};

@@ -1,4 +1,5 @@
-//! The real program under bad luck: broken inputs among good ones, little memory, signals, many runs on one folder.
+//! The real program under bad luck: broken inputs among good ones, little memory, signals, many
+//! runs on one folder.
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -32,7 +33,8 @@ impl Desk {
         self.command(args).output().unwrap()
     }
 
-    /// The program in a shell that may map so many KiB of memory, and take ten seconds of a processor.
+    /// The program in a shell that may map so many KiB of memory, and take ten seconds of a
+    /// processor.
     fn run_within(&self, kib: u64, args: &str) -> Output {
         let script = format!("ulimit -v {kib}; ulimit -t 10; exec {PETCOMP} {args}");
         Command::new("sh")
@@ -423,7 +425,8 @@ fn a_number_that_is_too_great_is_refused_at_once() {
     assert_eq!(run(&["--only", "999999999"]).0, Some(0));
 }
 
-/// A fall ends between two steps: the picture in hand is left to the run that goes on, and what is told is what is there.
+/// A fall ends between two steps: the picture in hand is left to the run that goes on, and what is
+/// told is what is there.
 #[test]
 fn a_signal_stops_a_fall() {
     let desk = Desk::new();
@@ -504,7 +507,8 @@ fn an_output_folder_with_a_link_inside_is_refused() {
 /// So many make the hundredths of a second that a shell counts in small.
 const HELPS: u32 = 50;
 
-/// What a shell says (`times`) that so many runs of the program took, whatever else the machine did meanwhile.
+/// What a shell says (`times`) that so many runs of the program took, whatever else the machine did
+/// meanwhile.
 fn processor_seconds_of_children(runs: u32, args: &str) -> f64 {
     let script = format!(
         "i=0; while [ $i -lt {runs} ]; do {PETCOMP} {args} >&2 || exit 1; i=$((i+1)); done; times"
@@ -515,7 +519,8 @@ fn processor_seconds_of_children(runs: u32, args: &str) -> f64 {
         .output()
         .unwrap();
     assert!(output.status.success());
-    // Two lines, the shell's own and that of its children, both `0m0.010000s 0m0.020000s` for user and system.
+    // Two lines, the shell's own and that of its children, both `0m0.010000s 0m0.020000s` for user
+    // and system.
     let text = String::from_utf8(output.stdout).unwrap();
     let seconds = |time: &str| -> Option<f64> {
         let (minutes, seconds) = time.strip_suffix('s')?.split_once('m')?;

@@ -92,7 +92,8 @@ fn a_worker_is_used_again() {
     );
 }
 
-/// Four readers, and somebody who kills a worker every few milliseconds: pictures are right, or the signal is named.
+/// Four readers, and somebody who kills a worker every few milliseconds: pictures are right, or the
+/// signal is named.
 #[test]
 fn killed_workers_spoil_no_picture() {
     let _alone = ALONE.lock().unwrap_or_else(|e| e.into_inner());
@@ -145,8 +146,8 @@ fn killed_workers_spoil_no_picture() {
     );
 }
 
-/// Starts so many workers, eight at a time, while every core has other work, and tells how those ended that gave no
-/// greeting or did not end well.
+/// Starts so many workers, eight at a time, while every core has other work, and tells how those
+/// ended that gave no greeting or did not end well.
 fn deaths_at_start(count: usize) -> Vec<String> {
     let (started, done) = (AtomicUsize::new(0), AtomicBool::new(false));
     let dead = Mutex::new(Vec::new());
@@ -210,7 +211,8 @@ fn none_of_a_thousand_workers_dies_at_its_start() {
     assert_eq!(dead, [""; 0]);
 }
 
-/// A file as bytes is all a worker gets: one whose name says nothing, in a folder it could not open.
+/// A file as bytes is all a worker gets: one whose name says nothing, in a folder it could not
+/// open.
 #[test]
 fn a_worker_reads_files_it_could_not_open() {
     let _alone = ALONE.lock().unwrap_or_else(|e| e.into_inner());

@@ -1,8 +1,9 @@
-//! Everything that is measured, in one document: error against run time of every approximate stage, the qualities that move
-//! along those curves, other programs, and extreme cases.
+//! Everything that is measured, in one document: error against run time of every approximate stage,
+//! the qualities that move along those curves, other programs, and extreme cases.
 //!
-//! Inputs are made in code or come with the repository (the golden scenes of Blender's Cycles), so that a fresh clone will
-//! do; photos with known mattes and other programs' measurements are added where they exist.
+//! Inputs are made in code or come with the repository (the golden scenes of Blender's Cycles), so
+//! that a fresh clone will do; photos with known mattes and other programs' measurements are added
+//! where they exist.
 
 use super::section::{Document, Section};
 use super::{
@@ -19,9 +20,11 @@ use std::path::{Path, PathBuf};
 pub struct AllOptions {
     /// Folder of golden scenes; one without scenes is left out. Default: `golden/render`.
     pub golden: PathBuf,
-    /// Folder of other programs' measurements ([`peers`]); one that is not there is left out. Default: `target/peers`.
+    /// Folder of other programs' measurements ([`peers`]); one that is not there is left out.
+    /// Default: `target/peers`.
     pub peers: PathBuf,
-    /// Folder of photos with known mattes, as the sample world has them; empty = photos made in code. Default: empty.
+    /// Folder of photos with known mattes, as the sample world has them; empty = photos made in
+    /// code. Default: empty.
     pub truth: PathBuf,
     /// Fewer runs and inputs: half a minute, with noisier times. Default: no.
     pub quick: bool,
@@ -100,11 +103,12 @@ const SLOW_SECTIONS: [fn() -> Result<Section>; 3] =
 
 /// Measures everything; `progress` gets the number of the step and of all steps.
 ///
-/// Times are CPU seconds of one thread. Takes about three minutes on two to four cores, half a minute when it is to be quick, which
-/// leaves out extreme cases, counted work and scale.
+/// Times are CPU seconds of one thread. Takes about three minutes on two to four cores, half a
+/// minute when it is to be quick, which leaves out extreme cases, counted work and scale.
 ///
 /// # Errors
-/// An input that cannot be read; a thread or scratch folder that cannot be made; memory and scale need Linux's `/proc`.
+/// An input that cannot be read; a thread or scratch folder that cannot be made; memory and scale
+/// need Linux's `/proc`.
 pub fn measure(options: &AllOptions, progress: impl Fn(u64, u64)) -> Result<Document> {
     let slow = options.slow_sections();
     let steps = (STAGES.len() + slow.len()) as u64;
@@ -141,7 +145,8 @@ fn measure_stages(options: &AllOptions, progress: impl Fn(u64)) -> Result<Vec<Di
     Ok(diagrams)
 }
 
-/// Measures everything and writes `report.html`, `report.md` and the data of each plot and table (`.csv`) into a folder.
+/// Measures everything and writes `report.html`, `report.md` and the data of each plot and table
+/// (`.csv`) into a folder.
 ///
 /// # Errors
 /// As [`measure`]; files that cannot be written. Nothing is written before everything is measured.

@@ -1,4 +1,5 @@
-//! The system's allocator, which reports large allocations to the library, for `petcomp-report work`.
+//! The system's allocator, which reports large allocations to the library, for `petcomp-report
+//! work`.
 
 #![expect(
     unsafe_code,
@@ -14,7 +15,8 @@ struct CountingAllocator;
 #[global_allocator]
 static ALLOCATOR: CountingAllocator = CountingAllocator;
 
-// SAFETY: all guarantees are those of `System`, which gets the same arguments; counting neither allocates nor panics.
+// SAFETY: all guarantees are those of `System`, which gets the same arguments; counting neither
+// allocates nor panics.
 unsafe impl GlobalAlloc for CountingAllocator {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         allocated(layout.size());

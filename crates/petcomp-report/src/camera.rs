@@ -1,7 +1,8 @@
 //! Error of the camera solver against run time and against tilt.
 //!
-//! Views are drawn by [`simulate`](petcomp::camera::simulate) from fixed seeds; every method sees the same ones. `joint` sees
-//! each of them with seven more photos of the same camera, at the same tilt.
+//! Views are drawn by [`simulate`](petcomp::camera::simulate) from fixed seeds; every method sees
+//! the same ones. `joint` sees each of them with seven more photos of the same camera, at the same
+//! tilt.
 
 mod coverage;
 mod diagram;
@@ -58,21 +59,25 @@ pub struct CameraRow {
     pub tilt_deg: f64,
     /// How the camera was found.
     pub method: SolveMethod,
-    /// How many views there were, and how many of them gave no camera; those count as infinitely wrong.
+    /// How many views there were, and how many of them gave no camera; those count as infinitely
+    /// wrong.
     pub views: usize,
     /// See [`views`](Self::views).
     pub failed: usize,
     /// Error of the focal length, percent: median and 95 % quantile.
     pub focal_percent: [f64; 2],
-    /// Error of where points 50 mm above the surface are seen, root mean square over the rectangle, pixels: median and 95 % quantile.
+    /// Error of where points 50 mm above the surface are seen, root mean square over the
+    /// rectangle, pixels: median and 95 % quantile.
     pub height_px: [f64; 2],
     /// Median CPU time of a photo, microseconds.
     pub time_us: f64,
 }
 
-/// Measures every method on every kind of view; `progress` gets the number of the step and of all steps.
+/// Measures every method on every kind of view; `progress` gets the number of the step and of all
+/// steps.
 ///
-/// One thread, so that run times mean something: about twenty seconds for 100 views on one core of a desktop of 2020.
+/// One thread, so that run times mean something: about twenty seconds for 100 views on one core of
+/// a desktop of 2020.
 pub fn measure(options: &CameraReportOptions, progress: impl Fn(u64, u64)) -> Vec<CameraRow> {
     let kinds = ViewKind::all();
     let mut rows = Vec::new();
@@ -185,8 +190,8 @@ fn focal_percent(view: &View, solution: &Solution) -> f64 {
     100.0 * (solution.camera.focal_px.x / view.camera.focal_px.x - 1.0).abs()
 }
 
-/// Root mean square over a grid above the rectangle: where the fitted camera sees it, and where the photo shows it; infinite where a point is
-/// behind either.
+/// Root mean square over a grid above the rectangle: where the fitted camera sees it, and where the
+/// photo shows it; infinite where a point is behind either.
 fn height_error_px(view: &View, solution: &Solution) -> f64 {
     let points = ERROR_GRID_SIDE * ERROR_GRID_SIDE;
     let sum: f64 = (0..points)
@@ -215,8 +220,8 @@ fn point_above([x, y]: [f64; 2], [w, h]: [f64; 2]) -> Point3<f64> {
     Point3::new(x * w, y * h, ERROR_HEIGHT_M)
 }
 
-/// Writes `camera.csv`, `camera_coverage.csv`, `camera.md` and the plots `camera_tilt_LENS.svg`, `camera_height_LENS.svg` and `camera_time_LENS.svg`
-/// into a folder.
+/// Writes `camera.csv`, `camera_coverage.csv`, `camera.md` and the plots `camera_tilt_LENS.svg`,
+/// `camera_height_LENS.svg` and `camera_time_LENS.svg` into a folder.
 ///
 /// # Errors
 /// [`Error::Value`] for no views; files that cannot be written.

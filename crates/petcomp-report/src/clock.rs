@@ -9,18 +9,21 @@ const SECONDS_PER_NANOSECOND: f64 = 1e-9;
 
 /// CPU seconds that this process has used, all its threads together.
 ///
-/// Unlike the time that passes, it does not depend on what else the machine does (but for caches and clock rates).
+/// Unlike the time that passes, it does not depend on what else the machine does (but for caches
+/// and clock rates).
 pub(super) fn cpu_seconds() -> f64 {
     let now = clock_gettime(ClockId::ProcessCPUTime);
     now.tv_sec as f64 + now.tv_nsec as f64 * SECONDS_PER_NANOSECOND
 }
 
-/// Quicker work than this is timed many times over, seconds: the clock's resolution and caches would show in it.
+/// Quicker work than this is timed many times over, seconds: the clock's resolution and caches
+/// would show in it.
 const MIN_TIMED_SECONDS: f64 = 2e-3;
 /// The largest number of repetitions.
 const MOST_REPEATS: f64 = 1000.0;
 
-/// The result of `work`, and the median CPU seconds of `runs` of it (at least 1); one thread, so that times can be compared.
+/// The result of `work`, and the median CPU seconds of `runs` of it (at least 1); one thread, so
+/// that times can be compared.
 ///
 /// # Errors
 /// The first of `work`; a thread that cannot be started.

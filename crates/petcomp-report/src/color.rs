@@ -1,7 +1,7 @@
 //! Colour transfer: exact curves against tables and against a plain power, error against run time.
 //!
-//! The reference is the closed form of IEC 61966-2-1, evaluated here with the standard library's power in double precision;
-//! the stage computes with `libm`.
+//! The reference is the closed form of IEC 61966-2-1, evaluated here with the standard library's
+//! power in double precision; the stage computes with `libm`.
 
 use super::clock::timed;
 use super::{Diagram, Point};
@@ -18,7 +18,8 @@ const PLAIN_GAMMA: f64 = 2.2;
 /// The largest codes of 8 and 16 bits.
 const MAX_CODE_8: f64 = 255.0;
 const MAX_CODE_16: f64 = 65_535.0;
-/// Rounding changes a value by up to half a code: uniformly distributed, its root mean square is this share of a code.
+/// Rounding changes a value by up to half a code: uniformly distributed, its root mean square is
+/// this share of a code.
 const ROUNDING_RMS: f64 = 0.288_675_134_594_812_9;
 
 /// Encoding and decoding, a point for each form.
@@ -59,7 +60,8 @@ fn decoded(value: f64) -> f64 {
     }
 }
 
-/// Values, what they must be converted to, and how the time and error of a form of the conversion are measured.
+/// Values, what they must be converted to, and how the time and error of a form of the conversion
+/// are measured.
 struct Conversion<'a> {
     values: &'a [f32],
     exact: fn(f64) -> f64,

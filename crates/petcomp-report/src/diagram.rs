@@ -6,7 +6,8 @@ use petcomp::plot::{Axis, Beside, Chart, Curve, Table, three};
 
 /// Costs closer than this are equal: the noise of timings, as a factor.
 const TIMING_NOISE_FACTOR: f64 = 1.1;
-/// How far the axis reaches below the least error where some errors are 0: so far that its edge is not read as an error.
+/// How far the axis reaches below the least error where some errors are 0: so far that its edge is
+/// not read as an error.
 const ZERO_ERROR_ROOM_FACTOR: f64 = 10.0;
 /// The largest invisible error of a picture: half of a code of 8 bits at middle grey.
 const INVISIBLE_ERROR: f64 = 0.004;
@@ -24,7 +25,8 @@ pub struct Diagram {
     pub error: String,
     /// What the cost is, with its unit.
     pub cost: String,
-    /// What results are compared with: another program with its version, a closed form, or a converged independent method.
+    /// What results are compared with: another program with its version, a closed form, or a
+    /// converged independent method.
     pub reference: String,
     /// The settings.
     pub points: Vec<Point>,
@@ -53,8 +55,9 @@ pub struct Point {
     pub qualities: Vec<Quality>,
 }
 
-/// The efficient front, the cheapest first: points of cost and error with no other that is at most as costly and at most as
-/// wrong, and better in one of the two. What is not finite is never among them.
+/// The efficient front, the cheapest first: points of cost and error with no other that is at most
+/// as costly and at most as wrong, and better in one of the two. What is not finite is never among
+/// them.
 pub fn front(points: &[[f64; 2]]) -> Vec<usize> {
     let mut kept: Vec<usize> = (0..points.len())
         .filter(|&i| is_unbeaten(points[i], points))
@@ -168,7 +171,8 @@ impl Diagram {
         self.points.iter().find(|p| p.is_default())
     }
 
-    /// The cheapest setting that is at least as exact as the default, where it is another and cheaper by more than noise.
+    /// The cheapest setting that is at least as exact as the default, where it is another and
+    /// cheaper by more than noise.
     pub fn cheaper_than_default(&self) -> Option<&Point> {
         let default = self.default_point()?;
         cheapest(self.rivals(default).filter(|p| p.clearly_beats(default)))
@@ -192,7 +196,8 @@ impl Diagram {
         cheapest(self.points.iter().filter(|p| p.error <= *limit))
     }
 
-    /// In words: where the default is, why, whether it is on the efficient front, and how far from it.
+    /// In words: where the default is, why, whether it is on the efficient front, and how far from
+    /// it.
     pub fn verdict(&self) -> String {
         let Some(default) = self.default_point() else {
             return self.why.clone();
@@ -219,7 +224,8 @@ impl Diagram {
         )
     }
 
-    /// How a setting compares with the cheapest one under the limit; nothing without a limit that some setting meets.
+    /// How a setting compares with the cheapest one under the limit; nothing without a limit that
+    /// some setting meets.
     fn limit_verdict(&self, point: &Point) -> String {
         let (Some((limit, why)), Some(best)) = (&self.limit, self.cheapest_under_limit()) else {
             return String::new();
@@ -305,7 +311,8 @@ impl Diagram {
         [point.cost, point.error.max(self.error_axis().range[0])]
     }
 
-    /// Labels of points. Those of points that a quality uses come first: labels without room are left out.
+    /// Labels of points. Those of points that a quality uses come first: labels without room are
+    /// left out.
     fn labels(&self) -> Vec<([f64; 2], String)> {
         let (used, unused): (Vec<_>, Vec<_>) =
             self.points.iter().partition(|p| !p.qualities.is_empty());

@@ -1,7 +1,7 @@
 //! Files of pictures: what a format loses against the time and the bytes it takes.
 //!
-//! The reference is the picture before it is written. Files are read back by petcomp's own readers, which the tests hold
-//! against OpenImageIO's.
+//! The reference is the picture before it is written. Files are read back by petcomp's own readers,
+//! which the tests hold against OpenImageIO's.
 
 use super::clock::timed;
 use super::pile::pile;

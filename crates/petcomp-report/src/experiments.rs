@@ -65,8 +65,8 @@ pub fn paper_rows() -> Vec<PaperRow> {
     paper.rows
 }
 
-/// Means and spreads of our runs by key (`combined/all`), from `RUNS/KEY/RUN/metrics.json` as `petcomp eval` writes it;
-/// mAP@0.5:0.95 in percent, by the definition of YOLOv5.
+/// Means and spreads of our runs by key (`combined/all`), from `RUNS/KEY/RUN/metrics.json` as
+/// `petcomp eval` writes it; mAP@0.5:0.95 in percent, by the definition of YOLOv5.
 ///
 /// # Errors
 /// [`Error::File`] for a folder that cannot be read or without any run.
@@ -133,7 +133,8 @@ impl From<Spread> for SampleMoments {
     }
 }
 
-/// Chance of a difference of means at least as large, if there were none; none where a spread is unknown or zero.
+/// Chance of a difference of means at least as large, if there were none; none where a spread is
+/// unknown or zero.
 ///
 /// # Method
 /// [Welch 1947], two-sided.
@@ -285,7 +286,8 @@ impl PaperTraining {
     }
 }
 
-/// Reads the runs and writes `experiments.csv`, `experiments.md`, `updates.csv` and `experiments.html`.
+/// Reads the runs and writes `experiments.csv`, `experiments.md`, `updates.csv` and
+/// `experiments.html`.
 ///
 /// # Errors
 /// As [`read_runs`], and [`Error::File`] for what cannot be written.

@@ -1,8 +1,9 @@
-//! Flags: whether a wrong cut-out is flagged for review, and a right one is not, on photos made harder in many ways.
+//! Flags: whether a wrong cut-out is flagged for review, and a right one is not, on photos made
+//! harder in many ways.
 //!
-//! A person reviews the flagged photos only, so two shares matter: *silently wrong* photos spoil a dataset, *false alarms*
-//! cost a review each. The photos are rendered, with known outlines; each [`PhotoVariant`] makes them harder in one way
-//! that keeps the outline known.
+//! A person reviews the flagged photos only, so two shares matter: *silently wrong* photos spoil a
+//! dataset, *false alarms* cost a review each. The photos are rendered, with known outlines; each
+//! [`PhotoVariant`] makes them harder in one way that keeps the outline known.
 
 mod variant;
 
@@ -47,8 +48,8 @@ pub struct FlagRow {
 /// How good the cut-out of a photo is.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Judgement {
-    /// Overlap (intersection over union) of the tight outline, and largest error of a side of the hull's box in pixels;
-    /// nothing where the photo was refused.
+    /// Overlap (intersection over union) of the tight outline, and largest error of a side of the
+    /// hull's box in pixels; nothing where the photo was refused.
     pub errors: Option<[f64; 2]>,
     /// How it ended.
     pub end: End,
@@ -93,8 +94,8 @@ impl End {
     }
 }
 
-/// Cuts out every photo of a folder with truth in every variant; `progress` is given the number of finished photos and of
-/// all photos.
+/// Cuts out every photo of a folder with truth in every variant; `progress` is given the number of
+/// finished photos and of all photos.
 ///
 /// # Errors
 /// A folder without truth, or files of it that cannot be read.
@@ -342,7 +343,8 @@ mod tests {
 
     #[test]
     fn nothing_ends_silently_wrong() {
-        // Not yet met: the ringing of strong compression around a drawn slab is treated as its edge, and not flagged.
+        // Not yet met: the ringing of strong compression around a drawn slab is treated as its
+        // edge, and not flagged.
         for variant in PhotoVariant::ALL
             .into_iter()
             .filter(|variant| *variant != PhotoVariant::Jpeg)

@@ -1,6 +1,7 @@
 //! The keyer's blur: Blender's sums against running sums, error against run time.
 //!
-//! The reference is the mean over the window in double precision, added up pixel by pixel from the matte before the blur.
+//! The reference is the mean over the window in double precision, added up pixel by pixel from the
+//! matte before the blur.
 
 use super::clock::timed;
 use super::{Diagram, Point};
@@ -107,7 +108,8 @@ fn disc_color(x: usize, y: usize) -> LinearRgb {
     }
 }
 
-/// Root mean squared difference between a blurred matte and the means of the sharp one's windows, cut off at the border.
+/// Root mean squared difference between a blurred matte and the means of the sharp one's windows,
+/// cut off at the border.
 fn rms_from_means(blurred: &Image<Coverage>, sharp: &Image<Coverage>, radius: usize) -> f64 {
     let (w, h) = sharp.size();
     let (mut squares, mut count) = (0.0, 0.0);

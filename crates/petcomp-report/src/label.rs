@@ -1,7 +1,9 @@
-//! Labels of a shape whose area is known: polygon against raster, error against run time and points.
+//! Labels of a shape whose area is known: polygon against raster, error against run time and
+//! points.
 //!
-//! The shape is an ellipse, the reference its closed form. The error is 1 - IoU: for the pixels of a mask by 16 x 16 points
-//! each; for a polygon inscribed in the ellipse it is the area that it lacks; for any other by chords along 16 lines a pixel.
+//! The shape is an ellipse, the reference its closed form. The error is 1 - IoU: for the pixels of
+//! a mask by 16 x 16 points each; for a polygon inscribed in the ellipse it is the area that it
+//! lacks; for any other by chords along 16 lines a pixel.
 
 mod ellipse;
 

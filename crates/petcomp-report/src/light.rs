@@ -1,8 +1,10 @@
-//! Light and shadow: the filtered form and plain samples against closed forms, error against run time.
+//! Light and shadow: the filtered form and plain samples against closed forms, error against run
+//! time.
 //!
-//! One opaque card hangs over the surface. What it leaves of a rectangular light at a point is Lambert's formula for the
-//! part of the light that the card does not hide: the light cut by the planes through the point and the card's sides. What
-//! it leaves of an even sky is 1 less the card's form factor. Neither shares anything with the renderer's sampling.
+//! One opaque card hangs over the surface. What it leaves of a rectangular light at a point is
+//! Lambert's formula for the part of the light that the card does not hide: the light cut by the
+//! planes through the point and the card's sides. What it leaves of an even sky is 1 less the
+//! card's form factor. Neither shares anything with the renderer's sampling.
 
 mod shadow;
 

@@ -42,7 +42,8 @@ impl ReportFlags {
         }
     }
 
-    /// Runs `measure`, which is given what shows the number of finished steps and of all steps on a terminal.
+    /// Runs `measure`, which is given what shows the number of finished steps and of all steps on a
+    /// terminal.
     pub(crate) fn with_progress<T>(
         &self,
         job: &'static str,

@@ -1,9 +1,10 @@
 //! Error of the matting methods against run time, on photos with known mattes.
 //!
-//! The truth is a renderer's: light added, transmittance with and without the object's own shadow, coverage, screen.
-//! Every method sees the same photos and finds the object itself. The two-screen method sees two shots made of the truth
-//! by `F + T K`, with the noise of the same sensor: on the photo's screen, green or blue, and on the other one. (The
-//! photo itself departs from the model by what blurs and refracts the screen, which a second shot would do alike.)
+//! The truth is a renderer's: light added, transmittance with and without the object's own shadow,
+//! coverage, screen. Every method sees the same photos and finds the object itself. The two-screen
+//! method sees two shots made of the truth by `F + T K`, with the noise of the same sensor: on the
+//! photo's screen, green or blue, and on the other one. (The photo itself departs from the model by
+//! what blurs and refracts the screen, which a second shot would do alike.)
 
 mod diagram;
 mod made;
@@ -59,7 +60,8 @@ const MS_PER_SECOND: f64 = 1e3;
 /// New backgrounds per photo.
 const BACKGROUNDS_PER_PHOTO: u64 = 3;
 
-/// Measures every method on every photo of a folder with truth; `progress` gets the number of the photo and of all photos.
+/// Measures every method on every photo of a folder with truth; `progress` gets the number of the
+/// photo and of all photos.
 ///
 /// # Errors
 /// A folder without truth, or files of it that cannot be read.

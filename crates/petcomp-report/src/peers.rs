@@ -1,5 +1,5 @@
-//! Other programs that do the same, measured beside petcomp in one run: `tests/benches/peers/<stage>.py` writes what is read
-//! here, `make peers` runs them.
+//! Other programs that do the same, measured beside petcomp in one run:
+//! `tests/benches/peers/<stage>.py` writes what is read here, `make peers` runs them.
 
 use super::{Diagram, Point};
 use petcomp::io;
@@ -133,7 +133,8 @@ impl PeerComparison {
         }
     }
 
-    /// Our point that another is compared with: the one that it names, or our default, or else our first.
+    /// Our point that another is compared with: the one that it names, or our default, or else our
+    /// first.
     fn our_counterpart(&self, other: &PeerPoint) -> Option<&PeerPoint> {
         let ours: Vec<_> = self.points.iter().filter(|m| m.program == OURS).collect();
         let named = ours

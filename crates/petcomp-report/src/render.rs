@@ -1,4 +1,5 @@
-//! Error of the renderer against run time: its presets beside Cycles at many sample counts, and the golden scenes.
+//! Error of the renderer against run time: its presets beside Cycles at many sample counts, and the
+//! golden scenes.
 //!
 //! Times are CPU seconds of the rendering itself, textures read and their pyramids built.
 
@@ -32,7 +33,8 @@ pub struct RenderReportOptions {
     pub scene: PathBuf,
     /// Size that it is rendered at, pixels. Default: 320 x 240.
     pub size: [u32; 2],
-    /// What `tests/benches/peers/render.py` wrote for that scene and size; a folder without `times.json` is left out.
+    /// What `tests/benches/peers/render.py` wrote for that scene and size; a folder without
+    /// `times.json` is left out.
     pub cycles: PathBuf,
     /// Folder of golden scenes; one without scenes is left out.
     pub golden: PathBuf,
@@ -48,7 +50,8 @@ impl RenderReportOptions {
 
 /// The quadrature renders a quarter of the picture's sides: it takes a thousand times as long.
 const QUADRATURE_SHRINK: u32 = 4;
-/// How finely the quadrature is sampled: sub-samples, light samples (a side each) and directions of the environment.
+/// How finely the quadrature is sampled: sub-samples, light samples (a side each) and directions of
+/// the environment.
 const QUADRATURE: RenderOptions = RenderOptions {
     subsamples: 6,
     light_samples: 6,
@@ -77,7 +80,8 @@ const PETCOMP: &str = "petcomp";
 /// The setting of which the sheet of golden scenes is made.
 const SHEET_SETTING: &str = "good";
 
-/// Points on the curve of error over run time, the quickest first: each [`Quality`], and two finer than the default.
+/// Points on the curve of error over run time, the quickest first: each [`Quality`], and two finer
+/// than the default.
 pub fn settings() -> [(&'static str, RenderOptions); 5] {
     let [draft, normal, reference] = Quality::ALL.map(|quality| (quality.name(), quality.render()));
     [draft, normal, ("good", GOOD), ("high", HIGH), reference]
@@ -104,8 +108,9 @@ impl RenderRow {
     }
 }
 
-/// Measures and writes `render.csv`, `render.md` and `render.svg` into a folder, and of the golden scenes
-/// `render_golden.csv` and the sheet `render_golden.png`: each scene as reference, 16 times the difference, and ours.
+/// Measures and writes `render.csv`, `render.md` and `render.svg` into a folder, and of the golden
+/// scenes `render_golden.csv` and the sheet `render_golden.png`: each scene as reference, 16 times
+/// the difference, and ours.
 ///
 /// # Errors
 /// A scene or a picture that cannot be read; files that cannot be written.

@@ -1,12 +1,14 @@
-//! Scale: how long pictures take and how much memory, from few pixels to many, few cards to many, one thread to all; and
-//! what that means for a million of them.
+//! Scale: how long pictures take and how much memory, from few pixels to many, few cards to many,
+//! one thread to all; and what that means for a million of them.
 //!
 //! # Method
-//! Every point is a dataset of its own, made by [`generate`](petcomp::dataset::generate) in a process of its own: pictures
-//! are rendered, labelled, encoded and written, one to a thread, as in any run. The time of a first picture decides how many
-//! more are made, in a few rounds of which the least counts. Seconds are the processor's (`CLOCK_PROCESS_CPUTIME_ID`), so
-//! that other programs on the machine disturb little; the rate is by the clock, and memory the most that was ever resident (`VmHWM`). Scenes are made in
-//! code, at rest; falling is measured by itself, in this process.
+//! Every point is a dataset of its own, made by [`generate`](petcomp::dataset::generate) in a
+//! process of its own: pictures are rendered, labelled, encoded and written, one to a thread, as in
+//! any run. The time of a first picture decides how many more are made, in a few rounds of which
+//! the least counts. Seconds are the processor's (`CLOCK_PROCESS_CPUTIME_ID`), so that other
+//! programs on the machine disturb little; the rate is by the clock, and memory the most that was
+//! ever resident (`VmHWM`). Scenes are made in code, at rest; falling is measured by itself, in
+//! this process.
 
 mod fit;
 mod forecast;
@@ -30,9 +32,11 @@ use std::path::{Path, PathBuf};
 /// Options of the report.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ScaleOptions {
-    /// The program that measures a point: `PROGRAM scale --case JSON` prints it. Default: the running one.
+    /// The program that measures a point: `PROGRAM scale --case JSON` prints it. Default: the
+    /// running one.
     pub program: PathBuf,
-    /// About how many seconds of work make a point; at least one picture per thread is made. Default: 1.
+    /// About how many seconds of work make a point; at least one picture per thread is made.
+    /// Default: 1.
     pub seconds: f64,
     /// Most threads, from 1 in powers of two. Default: one per core.
     pub threads: usize,
@@ -98,11 +102,12 @@ impl ScaleMeasurements {
     }
 }
 
-/// Measures every point of the grid, each in a process of its own; `progress` gets the number of the point and of all points.
+/// Measures every point of the grid, each in a process of its own; `progress` gets the number of
+/// the point and of all points.
 ///
 /// # Errors
-/// A program that cannot be run or does not print its point; where the system does not report time and memory of a process
-/// (it must have Linux's `/proc`).
+/// A program that cannot be run or does not print its point; where the system does not report time
+/// and memory of a process (it must have Linux's `/proc`).
 pub fn measure(options: &ScaleOptions, progress: impl Fn(u64, u64)) -> Result<ScaleMeasurements> {
     Ok(ScaleMeasurements {
         points: measure_points(options, progress)?,

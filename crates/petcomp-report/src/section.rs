@@ -1,4 +1,5 @@
-//! Sections of a document of measurements, which becomes a page, Markdown, and a file of data for each table and plot.
+//! Sections of a document of measurements, which becomes a page, Markdown, and a file of data for
+//! each table and plot.
 
 use super::Diagram;
 use petcomp::Result;
@@ -142,7 +143,8 @@ impl Document {
         format!("# {}\n{sections}", self.title)
     }
 
-    /// Writes `report.html`, `report.md` and the data of each table and plot (`.csv`) into a folder; the page comes last.
+    /// Writes `report.html`, `report.md` and the data of each table and plot (`.csv`) into a
+    /// folder; the page comes last.
     ///
     /// # Errors
     /// Files that cannot be written.

@@ -1,13 +1,15 @@
 //! Error of the settle stage against run time.
 //!
-//! Time step, solver iterations and CCD are changed one against another; each setting sees the same heaps and the same
-//! closed-form cases. Overlap is measured by the stage's own separating-axis test, which shares nothing with the engine.
+//! Time step, solver iterations and CCD are changed one against another; each setting sees the same
+//! heaps and the same closed-form cases. Overlap is measured by the stage's own separating-axis
+//! test, which shares nothing with the engine.
 //!
 //! # Why the default is 1/480 s and 4 iterations
-//! Contacts are as stiff as the rate of solver iterations (iterations / step) allows, and overlap falls with its square;
-//! run time grows with it. Of 150 heaps of 5 to 30 cards, half failed at 1/120 s, which is therefore refused; at 1/240 s
-//! the worst pair overlapped by 0.23 mm, half of what is accepted, and a fifth of the heaps gained energy; at 1/480 s
-//! nothing overlapped by more than 0.03 mm. Shorter steps gain what no picture shows.
+//! Contacts are as stiff as the rate of solver iterations (iterations / step) allows, and overlap
+//! falls with its square; run time grows with it. Of 150 heaps of 5 to 30 cards, half failed at
+//! 1/120 s, which is therefore refused; at 1/240 s the worst pair overlapped by 0.23 mm, half of
+//! what is accepted, and a fifth of the heaps gained energy; at 1/480 s nothing overlapped by more
+//! than 0.03 mm. Shorter steps gain what no picture shows.
 
 mod closed_form;
 mod diagram;
@@ -67,8 +69,8 @@ pub struct SettleRow {
     pub overlap_mm: [f64; 2],
     /// Energy that appeared between two steps, percent of the drop's: median and worst.
     pub energy_percent: [f64; 2],
-    /// How far the topmost of a stack of ten plates is from ten thicknesses, millimetres. Bodies keep two margins of 0.2 mm
-    /// between them, so a stack without any overlap has 4.
+    /// How far the topmost of a stack of ten plates is from ten thicknesses, millimetres. Bodies
+    /// keep two margins of 0.2 mm between them, so a stack without any overlap has 4.
     pub stack_mm: f64,
     /// Slopes on which a plate slides and should not, or the other way round.
     pub wrong_slopes: usize,
@@ -93,7 +95,8 @@ impl SettleRow {
     }
 }
 
-/// Measures every setting; `progress` gets the number of the setting and of all settings. One thread, so that run times mean something.
+/// Measures every setting; `progress` gets the number of the setting and of all settings. One
+/// thread, so that run times mean something.
 ///
 /// # Errors
 /// None that a caller can cause: the scenes are made here.

@@ -1,6 +1,7 @@
 //! Means and quantiles of what was measured.
 
-/// The value at a share of the sorted values, from 0 for the least to 1 for the greatest; 0 of nothing.
+/// The value at a share of the sorted values, from 0 for the least to 1 for the greatest; 0 of
+/// nothing.
 ///
 /// Of an even number, the median is the upper of the middle two.
 pub(crate) fn quantile(values: impl IntoIterator<Item = f64>, share: f64) -> f64 {

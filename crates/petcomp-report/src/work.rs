@@ -1,7 +1,9 @@
-//! What scenes pay for: every scene here has a feature or lacks it, and the table shows the work counted for it.
+//! What scenes pay for: every scene here has a feature or lacks it, and the table shows the work
+//! counted for it.
 //!
-//! Each scene takes the program's whole path: files are opened, what is unknown is solved for, the picture, its labels or
-//! a dataset is made and written. Numbers are the same at every run, on every machine, and at any thread count.
+//! Each scene takes the program's whole path: files are opened, what is unknown is solved for, the
+//! picture, its labels or a dataset is made and written. Numbers are the same at every run, on
+//! every machine, and at any thread count.
 
 mod cases;
 #[cfg(test)]
@@ -42,7 +44,8 @@ impl WorkRow {
     }
 }
 
-/// Makes every scene and counts; `progress` is given the number of finished scenes and of all scenes.
+/// Makes every scene and counts; `progress` is given the number of finished scenes and of all
+/// scenes.
 ///
 /// # Errors
 /// A temporary folder that cannot be written; no threads.
@@ -129,7 +132,8 @@ pub fn write(folder: impl AsRef<Path>, progress: impl Fn(u64, u64)) -> Result<Ve
     Ok(rows)
 }
 
-/// Scenes by kinds of work, as integers; a required zero is marked, and so is a count that should be zero but is not.
+/// Scenes by kinds of work, as integers; a required zero is marked, and so is a count that should
+/// be zero but is not.
 pub fn table(rows: &[WorkRow]) -> Table {
     scenes_by_kinds(rows, marked)
 }

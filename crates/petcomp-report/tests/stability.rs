@@ -1,5 +1,5 @@
-//! Every case of `petcomp-report stability` is a named test; those that take long or are known to fail are run by
-//! `-- --ignored`.
+//! Every case of `petcomp-report stability` is a named test; those that take long or are known to
+//! fail are run by `-- --ignored`.
 
 use libtest_mimic::{Arguments, Failed, Trial};
 use petcomp_report::stability::{HardCase, cases};

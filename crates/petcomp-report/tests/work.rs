@@ -37,7 +37,8 @@ fn every_scene_is_as_promised_with_allocations_counted_too() {
             .unwrap()
             .1
     };
-    // Of pictures of 320 x 240 pixels only the frame, 16 bytes a pixel, has a mebibyte; what finishes it makes new ones.
+    // Of pictures of 320 x 240 pixels only the frame, 16 bytes a pixel, has a mebibyte; what
+    // finishes it makes new ones.
     assert_eq!(
         ["labels", "nothing", "plate alone", "usual"].map(large),
         [0, 1, 1, 1]

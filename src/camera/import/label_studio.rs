@@ -1,15 +1,17 @@
-//! Label Studio: the exports JSON (tasks with annotations and results) and JSON-MIN (tasks with their results beside each
-//! other). Positions are in percent of the picture.
+//! Label Studio: the exports JSON (tasks with annotations and results) and JSON-MIN (tasks with
+//! their results beside each other). Positions are in percent of the picture.
 
 use super::{AnnotatedShape, Annotation, ShapeKind, turned_about, with_shapes};
 use crate::error::{Error, Result};
 use serde::Deserialize;
 use serde_json::Value;
 
-/// Length of what Label Studio puts before the name of an uploaded file: eight hexadecimal digits and a hyphen.
+/// Length of what Label Studio puts before the name of an uploaded file: eight hexadecimal digits
+/// and a hyphen.
 const UPLOAD_PREFIX_LENGTH: usize = 9;
 
-/// A result as both exports write it; JSON keeps the geometry in `value`, JSON-MIN in the result itself.
+/// A result as both exports write it; JSON keeps the geometry in `value`, JSON-MIN in the result
+/// itself.
 #[derive(Deserialize)]
 struct AnnotationResult {
     original_width: u32,

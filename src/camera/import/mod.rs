@@ -1,7 +1,8 @@
 //! Labels that were drawn in other programs: LabelMe, CVAT, Label Studio.
 //!
-//! Each format is read into [`Annotation`]s, a picture and the shapes on it; what they mean is decided here: one quadrangle,
-//! or else one upright rectangle, or else four points, is the surface.
+//! Each format is read into [`Annotation`]s, a picture and the shapes on it; what they mean is
+//! decided here: one quadrangle, or else one upright rectangle, or else four points, is the
+//! surface.
 
 mod cvat;
 mod label_studio;
@@ -70,7 +71,8 @@ fn json_annotations(value: Value) -> Result<Option<Vec<Annotation>>> {
 /// The label for a LabelMe file of a rectangle of `size` metres.
 ///
 /// # Errors
-/// [`Error::Value`] for text that is not LabelMe's, and for anything but one quadrangle, one rectangle or four points.
+/// [`Error::Value`] for text that is not LabelMe's, and for anything but one quadrangle, one
+/// rectangle or four points.
 pub fn from_labelme(text: &str, size: [f64; 2]) -> Result<Label> {
     let mut label = labelme::annotation(io::parse_json(text)?)?.label()?;
     label.surface.set_size(size);

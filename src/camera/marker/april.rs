@@ -14,7 +14,8 @@ pub(super) const CORNER_SIGMA_PX: f64 = 0.1;
 /// Wrong bits that are corrected; the least distance between two tags is 11.
 const MAX_WRONG_BITS: usize = 1;
 
-/// All tags in a scene-linear photo, with corners as they were printed; empty where the library gives up.
+/// All tags in a scene-linear photo, with corners as they were printed; empty where the library
+/// gives up.
 ///
 /// One thread and no decimation: the same corners every time, and the best.
 pub(super) fn find(photo: &Image<LinearRgb>, artwork: Artwork) -> Vec<Marker> {
@@ -39,8 +40,8 @@ fn exact_detector() -> Option<Detector> {
     Some(detector)
 }
 
-/// The photo in bytes, as bright as fits, and linear: an edge then is where half of the light is. (Display-encoded, white
-/// seems to grow by a quarter of a pixel.)
+/// The photo in bytes, as bright as fits, and linear: an edge then is where half of the light is.
+/// (Display-encoded, white seems to grow by a quarter of a pixel.)
 fn linear_grey(photo: &Image<LinearRgb>) -> Option<apriltag::Image> {
     if photo.is_empty() {
         return None;
@@ -67,7 +68,8 @@ fn clamped_luminance(pixel: &LinearRgb) -> f32 {
     pixel.luminance().clamp(0.0, 1.0)
 }
 
-/// The library lists corners anticlockwise from the bottom left of the official picture; OpenCV prints it upside down.
+/// The library lists corners anticlockwise from the bottom left of the official picture; OpenCV
+/// prints it upside down.
 fn marker(tag: &Detection, artwork: Artwork) -> Option<Marker> {
     let corners = tag.corners();
     Some(Marker {
@@ -95,8 +97,8 @@ mod tests {
     use crate::geom::Point3;
     use crate::pixel::PremulRgba;
 
-    /// The first tags of the family, and where each of their bits lies, from the highest: row and column in a square of
-    /// eight by eight cells (tag36h11.c of the AprilTag library).
+    /// The first tags of the family, and where each of their bits lies, from the highest: row and
+    /// column in a square of eight by eight cells (tag36h11.c of the AprilTag library).
     const CODES: [u64; 4] = [0xd_7e00_984b, 0xd_da66_4ca7, 0xd_c4a1_c821, 0xe_17b4_70e9];
     const ROW_AND_COLUMN: [u8; 36] = [
         11, 12, 13, 14, 15, 22, 23, 24, 33, 16, 26, 36, 46, 56, 25, 35, 45, 34, 66, 65, 64, 63, 62,

@@ -7,7 +7,8 @@ use crate::image::{Image, Mask};
 use crate::pixel::LinearRgb;
 use std::collections::BTreeMap;
 
-/// Half the window of the local mean, in longer picture sides: larger than a marker's border, smaller than its ground.
+/// Half the window of the local mean, in longer picture sides: larger than a marker's border,
+/// smaller than its ground.
 const WINDOW_SIDES: f64 = 1.0 / 40.0;
 /// Darker than the local mean by this, display-encoded, is dark.
 const DARK_DIFFERENCE: f32 = 0.03;
@@ -59,7 +60,8 @@ fn dark_regions(mut dark: Mask) -> Vec<Vec<Point2<f64>>> {
     found
 }
 
-/// Number of pixels and ends of the rows of the region around a pixel, which is taken out of the mask.
+/// Number of pixels and ends of the rows of the region around a pixel, which is taken out of the
+/// mask.
 fn take_region(dark: &mut Mask, start: usize) -> (usize, RowEnds) {
     let (width, height) = dark.size();
     let (mut pixels, mut ends) = (0, RowEnds::new());
@@ -111,7 +113,8 @@ fn quad(outline: &[Point2<f64>]) -> Option<[Point2<f64>; 4]> {
     let a = farthest(outline, mean_point(outline).into())?;
     let c = farthest(outline, a)?;
     let [b, d] = extremes_beside(outline, a, c)?;
-    // b lies to the left of the way from a to c, so that a, b, c, d run clockwise where y runs down.
+    // b lies to the left of the way from a to c, so that a, b, c, d run clockwise where y runs
+    // down.
     let corners = [a, b, c, d];
     let fills_hull = polygon_area(&corners) >= MIN_HULL_SHARE * hull_area(outline);
     (has_long_sides(&corners) && fills_hull).then_some(corners)

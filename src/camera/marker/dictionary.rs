@@ -16,8 +16,8 @@ const MIN_CONTRAST: f32 = 1.6;
 /// From here on a white cell counts as too bright for the sensor, scene-linear.
 const OVEREXPOSED_LIGHT: f32 = 0.95;
 
-/// `DICT_4X4_50` of OpenCV 5.0 (`getPredefinedDictionary`, `getBitsFromByteList`): row by row from the top left, the
-/// highest bit first, 1 is white.
+/// `DICT_4X4_50` of OpenCV 5.0 (`getPredefinedDictionary`, `getBitsFromByteList`): row by row from
+/// the top left, the highest bit first, 1 is white.
 const DICT_4X4_50: [u16; 50] = [
     0xb532, 0x0f9a, 0x332d, 0x9946, 0x549e, 0x79cd, 0x9e2e, 0xc4f2, 0xfeda, 0xcf56, 0xf991, 0x11a7,
     0x0eb7, 0x2a0f, 0x24b1, 0x263e, 0x4665, 0x6600, 0x6c5e, 0x76af, 0x868b, 0xb02b, 0xccd5, 0xdd82,

@@ -10,14 +10,15 @@ const SIDE_PROBES: usize = 32;
 const CORNER_PART: f64 = 0.12;
 /// Samples per pixel across a side.
 const SAMPLES_PER_PX: f64 = 4.0;
-/// How far across is looked, in cells of the marker as they are seen across that side: its border is one cell wide, and so
-/// should be the paper's margin.
+/// How far across is looked, in cells of the marker as they are seen across that side: its border
+/// is one cell wide, and so should be the paper's margin.
 const REACH_CELLS: f64 = 0.6;
 /// Longest and shortest such reach, pixels.
 const REACH_PX: std::ops::RangeInclusive<f64> = 1.2..=5.0;
 /// The same for edges inside the pattern.
 const INNER_REACH_CELLS: f64 = 0.45;
-/// White that has grown by more, pixels, has another cause; fewer edges than these are not conclusive.
+/// White that has grown by more, pixels, has another cause; fewer edges than these are not
+/// conclusive.
 const MAX_GROWTH_PX: f64 = 1.0;
 const MIN_EDGES: usize = 6;
 /// Times the sides are fitted anew, at most; corners that move by less stay.
@@ -25,8 +26,8 @@ const MAX_ROUNDS: usize = 6;
 const SETTLED_PX: f64 = 0.01;
 /// Noise of a corner of a marker that is seen as sharp as can be, pixels.
 const MIN_SIGMA_PX: f64 = 0.03;
-/// Errors of the outline over those of the cells' edges, which are measured by fewer pixels: on rendered views of 0 to 59
-/// degrees, sharp and blurred, it is 0.4 to 0.8.
+/// Errors of the outline over those of the cells' edges, which are measured by fewer pixels: on
+/// rendered views of 0 to 59 degrees, sharp and blurred, it is 0.4 to 0.8.
 const OUTLINE_ERROR_SHARE: f64 = 0.5;
 /// Probes farther than this from the fitted line do not belong to it, pixels.
 const MAX_OFF_LINE_PX: f64 = 0.7;
@@ -72,10 +73,11 @@ fn fitted_sides(light: &Image<f32>, corners: &[Point2<f64>; 4]) -> Option<[Line;
 
 /// The corners of a marker, corrected by the edges between its cells.
 ///
-/// In a picture that is too bright for the sensor white has grown over black: a pixel that is half white is as white as one
-/// that is all white, and every edge moves into the dark. The cells show by how much: each edge between them that rises
-/// along an axis has moved back, each that falls, forward, while the grid they should lie on has shrunk with the outline.
-/// Least squares over all edges of the pattern. How far they are off after that is the uncertainty of the outline: blur
+/// In a picture that is too bright for the sensor white has grown over black: a pixel that is half
+/// white is as white as one that is all white, and every edge moves into the dark. The cells show
+/// by how much: each edge between them that rises along an axis has moved back, each that falls,
+/// forward, while the grid they should lie on has shrunk with the outline. Least squares over all
+/// edges of the pattern. How far they are off after that is the uncertainty of the outline: blur
 /// moves both where cells are narrow.
 pub(super) fn by_cells(
     light: &Image<f32>,
@@ -93,8 +95,8 @@ pub(super) fn by_cells(
     })
 }
 
-/// By how much the corners between four lines are farther off than the lines: lines that meet at an acute angle meet far
-/// away when one is off.
+/// By how much the corners between four lines are farther off than the lines: lines that meet at an
+/// acute angle meet far away when one is off.
 fn mean_square_spread(lines: &[Line; 4]) -> f64 {
     let squares = (0..4).map(|i| lines[(i + 3) % 4].normal.perp(&lines[i].normal).powi(-2));
     squares.sum::<f64>() / 4.0
@@ -111,8 +113,8 @@ fn moved_side(corners: &[Point2<f64>; 4], first: usize, outwards_px: f64) -> Lin
 
 /// How far the edges between the cells of a marker are from where its corners put them.
 struct EdgeShifts {
-    /// For each edge by how much a growth of white by a pixel would move it, and by how much it is moved, both towards
-    /// where it rises along its axis, pixels.
+    /// For each edge by how much a growth of white by a pixel would move it, and by how much it is
+    /// moved, both towards where it rises along its axis, pixels.
     moved: Vec<[f64; 2]>,
 }
 
@@ -137,8 +139,8 @@ impl EdgeShifts {
         (xy / xx).clamp(-MAX_GROWTH_PX, MAX_GROWTH_PX)
     }
 
-    /// Root mean square distance of the edges from their places when white has grown so far, pixels; of too few edges a
-    /// pixel.
+    /// Root mean square distance of the edges from their places when white has grown so far,
+    /// pixels; of too few edges a pixel.
     fn rms_px(&self, growth: f64) -> f64 {
         if self.moved.len() < MIN_EDGES {
             return 1.0;
@@ -186,7 +188,8 @@ impl InnerEdge {
         })
     }
 
-    /// By how much a growth of white by a pixel would move the edge, and by how much it is moved; none where it is not found.
+    /// By how much a growth of white by a pixel would move the edge, and by how much it is moved;
+    /// none where it is not found.
     fn shift(&self, light: &Image<f32>, photo_from_square: &Homography) -> Option<[f64; 2]> {
         let along = self.along as f64;
         let foot = self.position(photo_from_square, along);
@@ -225,7 +228,8 @@ fn edges_of_line(
     (1..MARKER_CELLS).filter_map(move |along| InnerEdge::between(white, upright, across, along))
 }
 
-/// The edge near the side from a corner to the next, dark on its right-hand side (clockwise corners, y down).
+/// The edge near the side from a corner to the next, dark on its right-hand side (clockwise
+/// corners, y down).
 fn fitted_side(light: &Image<f32>, corners: &[Point2<f64>; 4], first: usize) -> Option<Line> {
     let [a, b, c, d] = [0, 1, 2, 3].map(|i| corners[(first + i) % 4]);
     let outward = outward_normal(a, b);
@@ -265,7 +269,8 @@ fn drop_outliers(points: &mut Vec<Point2<f64>>) -> Option<()> {
     Some(())
 }
 
-/// The line through the probes of a side, without those that are off it; none where half of them are.
+/// The line through the probes of a side, without those that are off it; none where half of them
+/// are.
 fn line_through_most(mut points: Vec<Point2<f64>>) -> Option<Line> {
     for _ in 0..2 {
         drop_outliers(&mut points)?;
@@ -277,7 +282,8 @@ fn line_through_most(mut points: Vec<Point2<f64>>) -> Option<Line> {
     }
 }
 
-/// Where the light rises along a direction: the centre of gravity of its slope, which blur does not move.
+/// Where the light rises along a direction: the centre of gravity of its slope, which blur does not
+/// move.
 fn crossing(
     light: &Image<f32>,
     foot: Point2<f64>,

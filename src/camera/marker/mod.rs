@@ -1,12 +1,15 @@
-//! Printed square markers in a photo, with corners to a fraction of a pixel: ArUco `DICT_4X4_50` by our own means, AprilTags
-//! (`tag36h11`) by the AprilTag library where petcomp is built with the feature `markers`.
+//! Printed square markers in a photo, with corners to a fraction of a pixel: ArUco `DICT_4X4_50` by
+//! our own means, AprilTags (`tag36h11`) by the AprilTag library where petcomp is built with the
+//! feature `markers`.
 //!
 //! # Method
-//! Dark regions of a locally thresholded picture whose hull has four corners are candidates; each side is then fitted as a
-//! straight edge in linear light, neighbours meet in the corners, and the cells in between are read as bits. Their edges
-//! show how far an overexposed white has grown over the black, and the corners are moved back by that; they also show the
-//! uncertainty of the outline, which from a steep side and out of focus is larger than from above. The bits are looked up
-//! in the dictionary in all four rotations, one wrong bit allowed, so that corner 0 is the printed top left.
+//! Dark regions of a locally thresholded picture whose hull has four corners are candidates; each
+//! side is then fitted as a straight edge in linear light, neighbours meet in the corners, and the
+//! cells in between are read as bits. Their edges show how far an overexposed white has grown over
+//! the black, and the corners are moved back by that; they also show the uncertainty of the
+//! outline, which from a steep side and out of focus is larger than from above. The bits are looked
+//! up in the dictionary in all four rotations, one wrong bit allowed, so that corner 0 is the
+//! printed top left.
 
 #[cfg(feature = "markers")]
 mod april;
@@ -26,8 +29,8 @@ use crate::pixel::LinearRgb;
 
 /// The family of markers that is always found.
 pub(crate) const FAMILY: &str = "DICT_4X4_50";
-/// Least noise of a corner that a label states, pixels: lenses bend and paper is not flat, which no marker by itself shows.
-/// Root mean square on the sample background with markers.
+/// Least noise of a corner that a label states, pixels: lenses bend and paper is not flat, which no
+/// marker by itself shows. Root mean square on the sample background with markers.
 const MIN_STATED_SIGMA_PX: f64 = 0.15;
 /// Markers that fit less well than this are tried in the other directions, too.
 const POOR_FIT_P: f64 = 1e-4;
@@ -37,13 +40,15 @@ const POOR_FIT_P: f64 = 1e-4;
 pub struct Marker {
     /// Its number in the dictionary.
     pub id: u32,
-    /// Corners of its black square as printed: top left, top right, bottom right, bottom left, pixels.
+    /// Corners of its black square as printed: top left, top right, bottom right, bottom left,
+    /// pixels.
     pub corners_px: [Point2<f64>; 4],
     /// Standard deviation of their coordinates, pixels.
     pub sigma_px: f64,
 }
 
-/// All markers of the family DICT_4X4_50 in a scene-linear photo, in order of number and then of place.
+/// All markers of the family DICT_4X4_50 in a scene-linear photo, in order of number and then of
+/// place.
 pub fn find_markers(photo: &Image<LinearRgb>) -> Vec<Marker> {
     let light = photo.map(LinearRgb::luminance);
     let mut found: Vec<Marker> = candidate::quads(photo)
@@ -94,12 +99,13 @@ fn dictionary_markers(photo: &Image<LinearRgb>) -> Vec<Marker> {
 
 /// The label with the corners of its markers, found in its photo, as points of known place.
 ///
-/// Where the corners fit the map only when every marker is turned by the same angle, they are turned, with a message in
-/// the log: another program's artwork was printed, or the map's axes are other ones.
+/// Where the corners fit the map only when every marker is turned by the same angle, they are
+/// turned, with a message in the log: another program's artwork was printed, or the map's axes are
+/// other ones.
 ///
 /// # Errors
-/// [`Error::Value`] for a label without a marker map, one of a family that is not known, and a photo that shows none of
-/// its markers.
+/// [`Error::Value`] for a label without a marker map, one of a family that is not known, and a
+/// photo that shows none of its markers.
 pub fn with_markers(label: Label, photo: &Image<LinearRgb>) -> Result<Label> {
     let layout = MarkerLayout::find(&label, photo)?;
     let turns = layout.fitting_turns();
@@ -170,7 +176,8 @@ impl<'a> MarkerLayout<'a> {
 }
 
 impl MarkerLayout<'_> {
-    /// The label with the corners of the markers as points, each marker turned by `turns` right angles.
+    /// The label with the corners of the markers as points, each marker turned by `turns` right
+    /// angles.
     fn label_turned(&self, turns: usize) -> Label {
         let mut label = self.label.clone();
         for marker in &self.found {
@@ -198,8 +205,8 @@ impl MarkerLayout<'_> {
         (px - Vector2::repeat(self.label.pixel_origin.offset_px())).into()
     }
 
-    /// By how many right angles the markers have to be turned for a camera to fit clearly better than as they are; 0 where
-    /// the photo does not decide it.
+    /// By how many right angles the markers have to be turned for a camera to fit clearly better
+    /// than as they are; 0 where the photo does not decide it.
     fn fitting_turns(&self) -> usize {
         let straight = self.fit(0);
         if straight.is_some_and(|fit| fit.p_value.is_none_or(|p| p >= POOR_FIT_P)) {
@@ -324,7 +331,8 @@ mod tests {
         })
     }
 
-    /// Distances of a found marker's corners from the truth, in those that its standard deviation makes expect.
+    /// Distances of a found marker's corners from the truth, in those that its standard deviation
+    /// makes expect.
     fn ratios(found: &Marker, camera: &crate::Camera) -> [f64; 4] {
         let places = [[-0.15, 0.15], [0.15, 0.15], [0.15, -0.15], [-0.15, -0.15]];
         let expected = found.sigma_px * (std::f64::consts::PI / 2.0).sqrt();

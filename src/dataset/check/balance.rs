@@ -59,7 +59,8 @@ impl Checked {
         sides
     }
 
-    /// What is not wrong but good to know: classes with no labels or few, boxes that are very small.
+    /// What is not wrong but good to know: classes with no labels or few, boxes that are very
+    /// small.
     pub fn notes(&self) -> Vec<Diagnostic> {
         let classes = (0..self.classes.len()).flat_map(|class| self.class_notes(class));
         classes.chain(self.tiny_boxes()).collect()

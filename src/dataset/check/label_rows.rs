@@ -10,7 +10,8 @@ pub(super) type LabelRow = (usize, Option<[f64; 2]>);
 /// A row with more columns makes its file one of outlines, as trainers have it.
 const MAX_BOX_COLUMNS: usize = 6;
 
-/// The good rows of a label file, and what is wrong with the others. Without a number of classes there are no good rows.
+/// The good rows of a label file, and what is wrong with the others. Without a number of classes
+/// there are no good rows.
 pub(super) fn read_rows(
     path: &Path,
     text: &str,

@@ -49,17 +49,22 @@ pub struct CheckedBox {
     pub sides: Option<[f64; 2]>,
 }
 
-/// Checks a YOLO dataset as YOLOv5 and Ultralytics do on loading it, and more strictly where they only warn.
+/// Checks a YOLO dataset as YOLOv5 and Ultralytics do on loading it, and more strictly where they
+/// only warn.
 ///
-/// * `data.yaml` has `train`, `val` and names, as many as `nc` says, and its folders exist and hold images;
-/// * every image decodes to its end and has sides of at least 10 pixels; no two that show something have the same bytes;
-/// * no image for validation looks like one for training ([`NEAR_DUPLICATE_RMS`]), unless it shows nothing;
+/// * `data.yaml` has `train`, `val` and names, as many as `nc` says, and its folders exist and hold
+///   images;
+/// * every image decodes to its end and has sides of at least 10 pixels; no two that show something
+///   have the same bytes;
+/// * no image for validation looks like one for training ([`NEAR_DUPLICATE_RMS`]), unless it shows
+///   nothing;
 /// * every image has a label file and every label file an image;
-/// * rows have 5 columns (or, in files of outlines, 7 or more, an odd number), an integer class below `nc`, shares in
-///   0..1, sides above 0, and no duplicate in the same file;
+/// * rows have 5 columns (or, in files of outlines, 7 or more, an odd number), an integer class
+///   below `nc`, shares in 0..1, sides above 0, and no duplicate in the same file;
 /// * where sidecar files have the objects' poses, something holds each of them up
 ///   ([`hanging`](crate::settle::hanging));
-/// * where there is a journal, the files it names have the sizes and checksums that it says, and it names every image.
+/// * where there is a journal, the files it names have the sizes and checksums that it says, and it
+///   names every image.
 ///
 /// # Errors
 /// When `folder` is not a folder that can be listed. Everything else is a [`Finding`].

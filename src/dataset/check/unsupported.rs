@@ -19,7 +19,8 @@ struct SettledScene {
     scene: Scene,
 }
 
-/// A finding for each sidecar file with objects that hang in the air, and for each that cannot be read.
+/// A finding for each sidecar file with objects that hang in the air, and for each that cannot be
+/// read.
 pub(super) fn find(dataset: &Path) -> Vec<Finding> {
     let options = settle_options(dataset);
     scene_files(dataset)

@@ -32,7 +32,8 @@ const ROOM_BELOW: f64 = 24.0;
 const OURS: &str = "#0072b2";
 const THEIRS: &str = "#d55e00";
 
-/// Puts the two side by side, what differs most first, with at most `max_figures` of the others' pictures.
+/// Puts the two side by side, what differs most first, with at most `max_figures` of the others'
+/// pictures.
 pub(super) fn add_comparison(
     page: &mut Page,
     ours: &LabelledSet,
@@ -198,7 +199,8 @@ fn mean(values: impl Iterator<Item = f32>) -> f64 {
 }
 
 fn figure(set: &LabelledSet, picture: &LabelledPicture) -> Option<Figure> {
-    // Boxes are shares of the picture, which is a square of 100 then; the frame gives it its shape back.
+    // Boxes are shares of the picture, which is a square of 100 then; the frame gives it its shape
+    // back.
     let header = io::read_header(&picture.path).ok()?;
     let size = [header.width as f64, header.height as f64];
     let figure = Figure::whole(&picture.path, size);

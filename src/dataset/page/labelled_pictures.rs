@@ -39,7 +39,8 @@ impl LabelledPicture {
 }
 
 impl LabelledSet {
-    /// A YOLO dataset, or a folder with images that have YOLO labels beside them or in `labels` instead of `images`.
+    /// A YOLO dataset, or a folder with images that have YOLO labels beside them or in `labels`
+    /// instead of `images`.
     ///
     /// # Errors
     /// A folder without images; a label that cannot be read.

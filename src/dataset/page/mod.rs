@@ -1,5 +1,5 @@
-//! A dataset on one page: pictures with their labels, every drawn value against its distribution, what can be seen, and
-//! the user's own pictures beside it.
+//! A dataset on one page: pictures with their labels, every drawn value against its distribution,
+//! what can be seen, and the user's own pictures beside it.
 
 mod all_pictures;
 mod beside;
@@ -24,7 +24,8 @@ pub struct DatasetReportOptions {
     pub most: usize,
     /// Folder that the page is written into, for links to the pictures; by default the dataset's.
     pub page: Option<PathBuf>,
-    /// The user's own pictures, to be shown beside: a YOLO dataset, or a folder of images with labels. Default: none.
+    /// The user's own pictures, to be shown beside: a YOLO dataset, or a folder of images with
+    /// labels. Default: none.
     pub beside: Option<PathBuf>,
 }
 

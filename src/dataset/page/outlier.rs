@@ -33,8 +33,8 @@ const SIGMA_PER_MEAN_DEVIATION: f64 = 1.2533;
 /// The rows that are unlike the others by at least one feature, the strangest first.
 ///
 /// # Method
-/// The modified z-score of Iglewicz and Hoaglin: distance from the median over the median absolute deviation, or over the
-/// mean one where most values are the same.
+/// The modified z-score of Iglewicz and Hoaglin: distance from the median over the median absolute
+/// deviation, or over the mean one where most values are the same.
 pub(crate) fn outliers(features: &[Feature<'_>]) -> Vec<Outlier> {
     let mut all: Vec<Outlier> = worst_by_row(features).into_values().collect();
     all.sort_by(|a, b| b.deviations.total_cmp(&a.deviations));

@@ -13,8 +13,9 @@ use crate::plot::{Page, escaped};
 use rayon::prelude::*;
 use std::fmt::Write;
 
-/// Boxes and masks are shown and hidden without a script: a ticked box decides what its neighbours look like. Words over
-/// the objects are for enlarged pictures; the list of all pictures loads what is seen of it.
+/// Boxes and masks are shown and hidden without a script: a ticked box decides what its neighbours
+/// look like. Words over the objects are for enlarged pictures; the list of all pictures loads what
+/// is seen of it.
 pub(super) const SAMPLES_STYLE: &str = "<style>.samples text{display:none}.samples figure:target text{display:block}\
     #boxes:not(:checked)~.samples .boxes,#masks:not(:checked)~.samples .masks,#others:not(:checked)~.samples .others\
     {display:none}.histograms{display:flex;flex-wrap:wrap;gap:10px}\

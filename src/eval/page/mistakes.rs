@@ -20,10 +20,12 @@ const THIN: &str = "stroke-width=\"1.5\"";
 const DASHED: &str = "stroke-width=\"1.5\" stroke-dasharray=\"5 3\"";
 const THICK_DASHED: &str = "stroke-width=\"3\" stroke-dasharray=\"7 4\"";
 
-/// What is seen around a box: so many times its longer side, but at least this share of the picture's.
+/// What is seen around a box: so many times its longer side, but at least this share of the
+/// picture's.
 const VIEW_SCALE: f64 = 3.0;
 const MIN_VIEW_SHARE: f64 = 0.15;
-/// Boxes that a picture shows beside those that it is about: more would hide it, and make the page grow without end.
+/// Boxes that a picture shows beside those that it is about: more would hide it, and make the page
+/// grow without end.
 const MAX_OTHER_BOXES: usize = 100;
 
 /// All mistakes of a run, one a row.
@@ -63,6 +65,10 @@ pub(crate) fn add_to(
         return;
     }
     page.html(gallery::STYLE).html(&legend());
+    add_galleries(page, run, mistakes, options);
+}
+
+fn add_galleries(page: &mut Page, run: &Run, mistakes: &[Mistake], options: &EvalReportOptions) {
     let (misses, detections): (Vec<&Mistake>, Vec<&Mistake>) =
         mistakes.iter().partition(|m| m.kind == MistakeKind::Missed);
     let title = "False alarms and wrong classes, the surest first";
@@ -92,13 +98,7 @@ fn add_figures(
     mistakes: &[&Mistake],
     options: &EvalReportOptions,
 ) {
-    let shown: Vec<&Mistake> = mistakes
-        .iter()
-        .copied()
-        .filter(|m| options.pictures.get(m.sheet).is_some_and(Option::is_some))
-        .take(options.shown)
-        .collect();
-    let figures: Vec<Figure> = shown
+    let figures: Vec<Figure> = with_pictures(mistakes, options)
         .par_iter()
         .filter_map(|mistake| figure(run, mistake, options))
         .collect();
@@ -109,20 +109,24 @@ fn add_figures(
     }
 }
 
+/// The first that have a picture.
+fn with_pictures<'a>(mistakes: &[&'a Mistake], options: &EvalReportOptions) -> Vec<&'a Mistake> {
+    let shown = mistakes.iter().copied();
+    shown
+        .filter(|m| options.picture(m.sheet).is_some())
+        .take(options.shown)
+        .collect()
+}
+
 /// None for a picture that cannot be read, which is only warned of: the scores do not depend on it.
 fn figure(run: &Run, mistake: &Mistake, options: &EvalReportOptions) -> Option<Figure> {
     let shown = ShownMistake::new(run, mistake);
-    let Picture { path, size } = options.pictures.get(mistake.sheet)?.as_ref()?;
+    let Picture { path, size } = options.picture(mistake.sheet)?;
     let view = shown.view(*size);
     let mut figure = Figure::cropped(path, *size, view)
         .inspect_err(|error| log::warn!("{error}"))
         .ok()?;
-    let canvas = Canvas {
-        letter: figure.letter_height(),
-        top: figure.top(),
-        options,
-    };
-    figure.drawing = shown.drawing(&view, &canvas);
+    figure.drawing = shown.drawing(&view, &Canvas::new(&figure, options));
     figure.caption = shown.caption(options);
     Some(figure)
 }
@@ -136,7 +140,15 @@ struct Canvas<'a> {
     options: &'a EvalReportOptions,
 }
 
-impl Canvas<'_> {
+impl<'a> Canvas<'a> {
+    fn new(figure: &Figure, options: &'a EvalReportOptions) -> Self {
+        Self {
+            letter: figure.letter_height(),
+            top: figure.top(),
+            options,
+        }
+    }
+
     fn marked(&self, bbox: &BBox, words: &str, color: &str, style: &str) -> String {
         marked_box(bbox, words, self.letter, self.top, color, style)
     }
@@ -217,16 +229,20 @@ impl<'a> ShownMistake<'a> {
     }
 
     fn found_mark(&self, found: &Detection, canvas: &Canvas<'_>) -> String {
-        let (color, style) = if self.is_miss() {
-            (FOUND, DASHED)
-        } else {
-            (WRONG, THICK_DASHED)
-        };
+        let (color, style) = self.found_style();
         let words = format!("{} {:.2}", canvas.class_name(found.class), found.confidence);
         // Apart from the words of the truth, which stand at the upper corner.
         let at = [found.bbox.x0, found.bbox.y1 + 1.2 * canvas.letter];
         canvas.marked(&found.bbox, "", color, style)
             + &gallery::words(at, &words, canvas.letter, color)
+    }
+
+    fn found_style(&self) -> (&'static str, &'static str) {
+        if self.is_miss() {
+            (FOUND, DASHED)
+        } else {
+            (WRONG, THICK_DASHED)
+        }
     }
 
     /// Its row in the table of mistakes.
@@ -262,7 +278,7 @@ impl<'a> ShownMistake<'a> {
     /// Boxes of the truth in the view that the mistake is not about.
     fn other_boxes(&self, view: &BBox) -> Vec<&'a GroundTruth> {
         let seen = self.sheet.truth.iter().filter(|t| t.bbox.overlaps(view));
-        seen.filter(|&t| !self.truth.is_some_and(|own| std::ptr::eq(own, t)))
+        seen.filter(|&t| !is_same(self.truth, t))
             .take(MAX_OTHER_BOXES)
             .collect()
     }
@@ -272,7 +288,7 @@ impl<'a> ShownMistake<'a> {
         let found = self.sheet.found.iter();
         let mut seen: Vec<&Detection> = found
             .filter(|f| f.confidence > confidence)
-            .filter(|&f| !self.found.is_some_and(|own| std::ptr::eq(own, f)))
+            .filter(|&f| !is_same(self.found, f))
             .filter(|f| f.bbox.overlaps(view))
             .collect();
         seen.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
@@ -281,10 +297,13 @@ impl<'a> ShownMistake<'a> {
     }
 
     fn caption(&self, options: &EvalReportOptions) -> String {
+        format!("{}: {}", self.sheet.image, self.describe(options))
+    }
+
+    fn describe(&self, options: &EvalReportOptions) -> String {
         let (truth, iou) = (self.true_class(options), self.mistake.iou);
-        let confidence = self.found.map_or(0.0, |f| f.confidence);
-        let found = format!("{} {confidence:.2}", self.found_class(options));
-        let what = match (self.mistake.kind, self.truth, self.found) {
+        let found = self.found_words(options);
+        match (self.mistake.kind, self.truth, self.found) {
             (MistakeKind::Missed, _, Some(_)) => {
                 format!("{truth} missed; nearest detection: {found}, IoU {iou:.2}")
             }
@@ -292,8 +311,13 @@ impl<'a> ShownMistake<'a> {
             (MistakeKind::WrongClass, ..) => format!("{found} for {truth}, IoU {iou:.2}"),
             (_, Some(_), _) => format!("false alarm: {found}; nearest box: {truth}, IoU {iou:.2}"),
             _ => format!("false alarm: {found}; no box near"),
-        };
-        format!("{}: {what}", self.sheet.image)
+        }
+    }
+
+    /// Class and confidence of the detection.
+    fn found_words(&self, options: &EvalReportOptions) -> String {
+        let confidence = self.found.map_or(0.0, |f| f.confidence);
+        format!("{} {confidence:.2}", self.found_class(options))
     }
 }
 
@@ -328,8 +352,7 @@ fn legend_key(color: &str, style: &str, words: &str) -> String {
 
 /// The part of a picture that shows a box with its surroundings.
 fn square_around(shown: &BBox, [width, height]: [f64; 2]) -> BBox {
-    let side =
-        (VIEW_SCALE * shown.width().max(shown.height())).max(MIN_VIEW_SHARE * width.max(height));
+    let side = view_side(shown, width.max(height));
     let (w, h, middle) = (side.min(width), side.min(height), shown.center());
     let x0 = (middle.x - w / 2.0).clamp(0.0, width - w);
     let y0 = (middle.y - h / 2.0).clamp(0.0, height - h);
@@ -339,6 +362,15 @@ fn square_around(shown: &BBox, [width, height]: [f64; 2]) -> BBox {
         x1: x0 + w,
         y1: y0 + h,
     }
+}
+
+fn view_side(shown: &BBox, longer_side: f64) -> f64 {
+    (VIEW_SCALE * shown.width().max(shown.height())).max(MIN_VIEW_SHARE * longer_side)
+}
+
+/// Whether this very box is the own one.
+fn is_same<T>(own: Option<&T>, other: &T) -> bool {
+    own.is_some_and(|own| std::ptr::eq(own, other))
 }
 
 #[cfg(test)]

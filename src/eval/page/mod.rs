@@ -41,6 +41,13 @@ pub struct EvalReportOptions {
     pub shown: usize,
 }
 
+impl EvalReportOptions {
+    /// Of a sheet, where it is found.
+    fn picture(&self, sheet: usize) -> Option<&Picture> {
+        self.pictures.get(sheet)?.as_ref()
+    }
+}
+
 impl Default for EvalReportOptions {
     fn default() -> Self {
         Self {
@@ -132,11 +139,17 @@ impl Metrics {
             .ok()
             .map(|i| &classes[i])
     }
+
+    /// How many of the classes are in the truth.
+    fn count_scored(&self, classes: &[u32]) -> usize {
+        let scored = classes.iter().filter(|class| self.class(**class).is_some());
+        scored.count()
+    }
 }
 
-/// Evaluates runs and writes `metrics.json` (one run) or `NAME.json` each, `scores.csv`, `classes.csv`, `factors.csv`,
-/// of the first run `confusion.csv`, `mistakes.csv` and its charts as SVG, and everything as one page, `eval.html`, with
-/// pictures of its worst mistakes.
+/// Evaluates runs and writes `metrics.json` (one run) or `NAME.json` each, `scores.csv`,
+/// `classes.csv`, `factors.csv`, of the first run `confusion.csv`, `mistakes.csv` and its charts as
+/// SVG, and everything as one page, `eval.html`, with pictures of its worst mistakes.
 ///
 /// # Errors
 /// [`Error::File`](crate::Error::File) for what cannot be written.
@@ -144,19 +157,34 @@ pub fn write(folder: &Path, runs: &[Run], options: &EvalReportOptions) -> Result
     let all: Vec<Metrics> = runs.iter().map(|run| Metrics::of(run, options)).collect();
     io::create_folder(folder)?;
     write_metrics(folder, &all)?;
-    let confusion = runs.first().map(|run| confusion_of(run, options));
-    let confusion = confusion.unwrap_or_default();
-    let shown = shown_classes(&all, &confusion);
+    let page = write_parts(folder, runs, &all, options)?;
+    io::write_text(folder.join("eval.html"), &page.document())?;
+    Ok(all)
+}
+
+/// The tables and pictures as files, and the page that shows them.
+fn write_parts(
+    folder: &Path,
+    runs: &[Run],
+    all: &[Metrics],
+    options: &EvalReportOptions,
+) -> Result<Page> {
+    let confusion = first_confusion(runs, options);
+    let shown = shown_classes(all, &confusion);
     let mut page = Page::new("Detections against the truth");
-    let [scores, factors] = [scores_table(&all, options), factors_table(runs, options)];
+    let [scores, factors] = [scores_table(all, options), factors_table(runs, options)];
     add_table(&mut page, folder, "Scores", "scores.csv", [&scores; 2])?;
-    add_classes(&mut page, folder, &all, &shown, options)?;
+    add_classes(&mut page, folder, all, &shown, options)?;
     add_table(&mut page, folder, "Factors", "factors.csv", [&factors; 2])?;
     if let Some(run) = runs.first() {
         add_run(folder, &mut page, run, &confusion, &shown, options)?;
     }
-    io::write_text(folder.join("eval.html"), &page.document())?;
-    Ok(all)
+    Ok(page)
+}
+
+fn first_confusion(runs: &[Run], options: &EvalReportOptions) -> Confusion {
+    let first = runs.first().map(|run| confusion_of(run, options));
+    first.unwrap_or_default()
 }
 
 fn confusion_of(run: &Run, options: &EvalReportOptions) -> Confusion {
@@ -226,6 +254,15 @@ fn add_run(
     }
     let counts = confusion_table(confusion, options);
     io::write_text(folder.join("confusion.csv"), &counts.csv())?;
+    add_mistakes(folder, page, run, options)
+}
+
+fn add_mistakes(
+    folder: &Path,
+    page: &mut Page,
+    run: &Run,
+    options: &EvalReportOptions,
+) -> Result<()> {
     let mistakes = eval::mistakes(&run.sheets, &options.confusion);
     let table = mistakes::table(run, &mistakes, options);
     io::write_text(folder.join("mistakes.csv"), &table.csv())?;
@@ -235,30 +272,28 @@ fn add_run(
 
 /// All classes in order, or of many those with the most mistakes, those first.
 fn shown_classes(all: &[Metrics], confusion: &Confusion) -> Vec<u32> {
-    let known = all
-        .iter()
-        .flat_map(|m| m.yolov5.classes.iter().map(|c| c.class))
-        .chain(confusion.classes());
-    let known: BTreeSet<u32> = known.collect();
+    let known = known_classes(all, confusion);
     if known.len() <= MAX_SHOWN_CLASSES {
-        known.into_iter().collect()
-    } else {
-        confusion
-            .worst()
-            .into_iter()
-            .take(MAX_SHOWN_CLASSES)
-            .collect()
+        return known.into_iter().collect();
     }
+    let worst = confusion.worst().into_iter();
+    worst.take(MAX_SHOWN_CLASSES).collect()
+}
+
+/// Those of the truth and those that were found.
+fn known_classes(all: &[Metrics], confusion: &Confusion) -> BTreeSet<u32> {
+    scored_classes(all).chain(confusion.classes()).collect()
+}
+
+/// The classes in the truth of the runs, one after the other.
+fn scored_classes(all: &[Metrics]) -> impl Iterator<Item = u32> {
+    let scored = all.iter().flat_map(|metrics| &metrics.yolov5.classes);
+    scored.map(|class| class.class)
 }
 
 fn classes_title(all: &[Metrics], shown: &[u32]) -> String {
     let count = all.first().map_or(0, |m| m.yolov5.classes.len());
-    let seen = all.first().map_or(0, |m| {
-        shown
-            .iter()
-            .filter(|class| m.class(**class).is_some())
-            .count()
-    });
+    let seen = all.first().map_or(0, |m| m.count_scored(shown));
     match count - seen {
         0 => "Classes".into(),
         others => format!(
@@ -270,13 +305,17 @@ fn classes_title(all: &[Metrics], shown: &[u32]) -> String {
 fn confusion_table(confusion: &Confusion, options: &EvalReportOptions) -> Table {
     let mut table = Table::new(["found", "true", "count"]);
     for (classes, count) in &confusion.counts {
-        let [found, truth] = classes.map(|class| match class {
-            Some(class) => eval::class_name(class, &options.classes),
-            None => "background".into(),
-        });
+        let [found, truth] = classes.map(|class| class_title(class, options));
         table.push([found, truth, count.to_string()]);
     }
     table
+}
+
+fn class_title(class: Option<u32>, options: &EvalReportOptions) -> String {
+    match class {
+        Some(class) => eval::class_name(class, &options.classes),
+        None => "background".into(),
+    }
 }
 
 /// A row per run, and one over all where there are several.
@@ -296,10 +335,15 @@ pub fn scores_table(all: &[Metrics], options: &EvalReportOptions) -> Table {
         table.push(metrics.scores_row("coco", &metrics.coco.scores, String::new()));
     }
     if all.len() > 1 {
-        let maps: Vec<f64> = all.iter().map(|m| m.yolov5.map()).collect();
-        table.push(spread_row(&Spread::from_values(&maps, options.seed)));
+        table.push(spread_row(&spread_of(all, options.seed)));
     }
     table
+}
+
+/// Of the mAP by YOLOv5's definition.
+fn spread_of(all: &[Metrics], seed: u64) -> Spread {
+    let maps: Vec<f64> = all.iter().map(|m| m.yolov5.map()).collect();
+    Spread::from_values(&maps, seed)
 }
 
 fn spread_row(spread: &Spread) -> [String; 7] {
@@ -320,12 +364,12 @@ fn range_text(interval: &Interval) -> String {
 
 /// Average precision per class and threshold by the definition of YOLOv5.
 pub fn classes_table(all: &[Metrics], options: &EvalReportOptions) -> Table {
-    let classes = all.iter().flat_map(|metrics| &metrics.yolov5.classes);
-    let classes: BTreeSet<u32> = classes.map(|class| class.class).collect();
+    let classes: BTreeSet<u32> = scored_classes(all).collect();
     classes_among(all, options, &Vec::from_iter(classes))
 }
 
-/// The same for a terminal: of many classes those with the lowest average precision, and how many others there are.
+/// The same for a terminal: of many classes those with the lowest average precision, and how many
+/// others there are.
 pub fn classes_in_brief(all: &[Metrics], options: &EvalReportOptions) -> (Table, usize) {
     let order = classes_by_precision(all);
     let others = order.len().saturating_sub(MAX_SHOWN_CLASSES);
@@ -338,29 +382,24 @@ pub fn classes_in_brief(all: &[Metrics], options: &EvalReportOptions) -> (Table,
 
 /// The classes by the lowest average precision of any run.
 fn classes_by_precision(all: &[Metrics]) -> Vec<u32> {
-    let mut lowest: BTreeMap<u32, f64> = BTreeMap::new();
-    for class in all.iter().flat_map(|m| &m.yolov5.classes) {
-        let least = lowest.entry(class.class).or_insert(f64::INFINITY);
-        *least = least.min(class.mean());
-    }
-    let mut order: Vec<(u32, f64)> = lowest.into_iter().collect();
+    let mut order: Vec<(u32, f64)> = lowest_precisions(all).into_iter().collect();
     order.sort_by(|a, b| a.1.total_cmp(&b.1));
     order.into_iter().map(|(class, _)| class).collect()
 }
 
+/// The lowest average precision of each class in any run.
+fn lowest_precisions(all: &[Metrics]) -> BTreeMap<u32, f64> {
+    let mut lowest = BTreeMap::new();
+    for class in all.iter().flat_map(|m| &m.yolov5.classes) {
+        let least = lowest.entry(class.class).or_insert(f64::INFINITY);
+        *least = least.min(class.mean());
+    }
+    lowest
+}
+
 fn classes_among(all: &[Metrics], options: &EvalReportOptions, classes: &[u32]) -> Table {
-    let columns = [
-        "run",
-        "class",
-        "objects",
-        "precision",
-        "recall",
-        "AP@0.5:0.95",
-    ]
-    .map(String::from);
-    let thresholds = thresholds().map(|t| format!("AP@{t:.2}"));
     let mut table = Table {
-        columns: columns.into_iter().chain(thresholds).collect(),
+        columns: class_columns(),
         rows: Vec::new(),
     };
     for metrics in all {
@@ -371,14 +410,32 @@ fn classes_among(all: &[Metrics], options: &EvalReportOptions, classes: &[u32]) 
     table
 }
 
+fn class_columns() -> Vec<String> {
+    let columns = [
+        "run",
+        "class",
+        "objects",
+        "precision",
+        "recall",
+        "AP@0.5:0.95",
+    ];
+    let thresholds = thresholds().map(|t| format!("AP@{t:.2}"));
+    let columns = columns.map(String::from).into_iter();
+    columns.chain(thresholds).collect()
+}
+
 fn class_row(run: &str, class: &ClassScores, options: &EvalReportOptions) -> Vec<String> {
-    let name = options.classes.get(class.class as usize).cloned();
-    let name = name.unwrap_or_else(|| class.class.to_string());
     let scores = [class.precision, class.recall, class.mean()];
+    let name = name_or_number(class.class, options);
     [run.to_owned(), name, class.truths.to_string()]
         .into_iter()
         .chain(scores.into_iter().chain(class.ap).map(share))
         .collect()
+}
+
+fn name_or_number(class: u32, options: &EvalReportOptions) -> String {
+    let name = options.classes.get(class as usize).cloned();
+    name.unwrap_or_else(|| class.to_string())
 }
 
 /// mAP per level of every factor; empty without tags.

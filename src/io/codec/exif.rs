@@ -6,7 +6,8 @@ use std::io::{BufRead, Seek};
 
 /// Diagonal of 36 mm x 24 mm film, which equivalents of focal lengths refer to, millimetres.
 const FILM_DIAGONAL_MM: f64 = 43.266_615_305_567_87;
-/// Ratios of sides closer than this belong to one shape: sizes are rounded, and to multiples of 16 at times.
+/// Ratios of sides closer than this belong to one shape: sizes are rounded, and to multiples of 16
+/// at times.
 const SHAPE_TOLERANCE: f64 = 0.01;
 /// The same for sizes: no more than the middle of a lens is uncertain anyway.
 const SIZE_TOLERANCE: f64 = 0.005;
@@ -35,7 +36,8 @@ impl Default for CameraNotes {
 }
 
 impl CameraNotes {
-    /// The notes in a JPEG, TIFF or PNG file. A photo without notes, or with damaged ones, is as good as another.
+    /// The notes in a JPEG, TIFF or PNG file. A photo without notes, or with damaged ones, is as
+    /// good as another.
     pub(crate) fn read(mut file: impl BufRead + Seek) -> Self {
         let exif = read_exif(&mut file);
         exif.map_or_else(Self::default, |exif| Self::from_exif(&exif))
@@ -61,7 +63,8 @@ impl CameraNotes {
         }
     }
 
-    /// The camera noted the size that the file has, or an integer multiple of it, whichever way up: nothing was cut away.
+    /// The camera noted the size that the file has, or an integer multiple of it, whichever way up:
+    /// nothing was cut away.
     pub(crate) fn has_same_size(&self, stored: [usize; 2]) -> bool {
         let stored = longer_first(stored.map(|s| s as f64));
         let taken = self.size.map(longer_first);
@@ -109,7 +112,8 @@ fn aspect_ratio([w, h]: [f64; 2]) -> f64 {
     w.max(h) / w.min(h)
 }
 
-/// The 35 mm equivalent by the picture's diagonal, from the focal length and the sensor's pixels per length.
+/// The 35 mm equivalent by the picture's diagonal, from the focal length and the sensor's pixels
+/// per length.
 fn focal_35mm_by_sensor(exif: &Exif, size: [f64; 2]) -> Option<f64> {
     let unit_mm = resolution_unit_mm(exif)?;
     let focal_mm = rational(exif, Tag::FocalLength).filter(|&mm| mm > 0.0)?;

@@ -25,7 +25,8 @@ const XYZ_SPACE: RgbSpace = RgbSpace {
 /// Characters of a line that are shown where it is no size.
 const LONGEST_SHOWN: usize = 40;
 
-/// A file that the decoder reads as one of rows from the top in its own primaries, and what it really is.
+/// A file that the decoder reads as one of rows from the top in its own primaries, and what it
+/// really is.
 struct OpenedHdr<R: Read> {
     decoder: HdrDecoder<R>,
     orientation: Orientation,
@@ -56,7 +57,8 @@ fn open(
     })
 }
 
-/// The lines up to the empty one as the decoder knows them, and whether light is in CIE XYZ by them.
+/// The lines up to the empty one as the decoder knows them, and whether light is in CIE XYZ by
+/// them.
 fn plain_head(file: &mut impl BufRead) -> Result<(Vec<u8>, bool), Refusal> {
     read_line(file)?;
     let (mut head, mut is_xyz) = (FIRST_LINE.to_vec(), false);
@@ -81,8 +83,8 @@ fn read_line(file: &mut impl BufRead) -> Result<Vec<u8>, Refusal> {
     }
 }
 
-/// Length and number of the rows that are stored, and how they lie in the picture: the axis and sense of the rows come
-/// first, those of the pixels in a row second; `-Y` goes down.
+/// Length and number of the rows that are stored, and how they lie in the picture: the axis and
+/// sense of the rows come first, those of the pixels in a row second; `-Y` goes down.
 fn resolution(line: &[u8]) -> Result<([u32; 2], Orientation), Refusal> {
     let text = String::from_utf8_lossy(line);
     parsed_resolution(&text).ok_or_else(|| unknown_resolution(&text))

@@ -11,12 +11,14 @@ use image::codecs::jpeg::{JpegDecoder, JpegEncoder};
 use image::{ExtendedColorType, ImageDecoder, ImageError};
 use std::io::{Cursor, Read};
 
-// Markers of ISO/IEC 10918-1, table B.1: end of image, start of scan, comment, application segment 2.
+// Markers of ISO/IEC 10918-1, table B.1: end of image, start of scan, comment, application segment
+// 2.
 const EOI: u8 = 0xd9;
 const SOS: u8 = 0xda;
 const COM: u8 = 0xfe;
 const APP2: u8 = 0xe2;
-/// First bytes of a segment with a part of a colour profile (ICC.1:2022, B.4); its number and their count follow.
+/// First bytes of a segment with a part of a colour profile (ICC.1:2022, B.4); its number and their
+/// count follow.
 const ICC_SIGNATURE: &[u8] = b"ICC_PROFILE\0";
 
 impl From<ImageError> for Refusal {
@@ -86,7 +88,8 @@ fn append(bytes: &mut Vec<u8>, file: &mut impl Read, count: usize) -> Result<(),
         .map_err(|_| "truncated JPEG (no picture)".into())
 }
 
-/// Refuses kinds of JPEG that our decoder does not know, by their frame's marker (ISO/IEC 10918-1, table B.1) and bits.
+/// Refuses kinds of JPEG that our decoder does not know, by their frame's marker (ISO/IEC 10918-1,
+/// table B.1) and bits.
 fn check_kind(marker: u8, bits: Option<&u8>) -> Result<(), Refusal> {
     let kind = match (marker, bits) {
         (0xc0..=0xc2, Some(8)) => return Ok(()),
@@ -160,7 +163,8 @@ fn check_complete(bytes: &[u8]) -> Result<(), Refusal> {
     }
 }
 
-/// Decodes a complete file; decoders return a half-grey picture for one that was cut, so that is looked at first.
+/// Decodes a complete file; decoders return a half-grey picture for one that was cut, so that is
+/// looked at first.
 pub(crate) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Refusal> {
     read_before_scan(&mut &bytes[..], limits)?;
     check_complete(bytes)?;
@@ -184,8 +188,8 @@ struct JpegSegment<'a> {
     data: &'a [u8],
 }
 
-/// The segments in order, scans skipped; ends early where the file does. An EXIF thumbnail, a JPEG in itself, lies inside
-/// a segment and so does not end the file.
+/// The segments in order, scans skipped; ends early where the file does. An EXIF thumbnail, a JPEG
+/// in itself, lies inside a segment and so does not end the file.
 fn segments(bytes: &[u8]) -> impl Iterator<Item = JpegSegment<'_>> {
     let mut rest = bytes.get(2..).unwrap_or_default();
     let mut after_scan = false;
@@ -216,7 +220,8 @@ fn split_segment(mut bytes: &[u8]) -> Option<(JpegSegment<'_>, &[u8])> {
     Some((JpegSegment { marker, data }, &tail[length..]))
 }
 
-/// Where the entropy-coded data ends: at a marker that is neither a stuffed byte, a restart nor padding.
+/// Where the entropy-coded data ends: at a marker that is neither a stuffed byte, a restart nor
+/// padding.
 fn end_of_scan(bytes: &[u8]) -> usize {
     bytes.windows(2).position(is_marker).unwrap_or(bytes.len())
 }

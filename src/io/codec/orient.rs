@@ -22,7 +22,8 @@ impl Orientation {
         }
     }
 
-    /// Where the upright pixel `(x, y)` lies in the file, whose last column and row are `right` and `bottom`.
+    /// Where the upright pixel `(x, y)` lies in the file, whose last column and row are `right` and
+    /// `bottom`.
     fn stored(self, x: usize, y: usize, right: usize, bottom: usize) -> (usize, usize) {
         match self.0 {
             2 => (right - x, y),
@@ -86,7 +87,8 @@ mod tests {
             .collect()
     }
 
-    /// EXIF 2.3, tag 274: "the 0th row is at the visual (top, bottom, left, right), the 0th column at the visual ...".
+    /// EXIF 2.3, tag 274: "the 0th row is at the visual (top, bottom, left, right), the 0th column
+    /// at the visual ...".
     #[test]
     fn all_eight_orientations_are_those_of_the_standard() {
         assert_eq!(turned(1), ["ab", "cd", "ef"]);

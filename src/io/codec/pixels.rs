@@ -1,7 +1,7 @@
 //! Pixels made from the samples of a file: the one place where samples get their meaning.
 //!
-//! The rule: integer samples are display-encoded sRGB and their alpha is straight, float samples are scene-linear, unless
-//! the file states otherwise. A matte or a depth is never display-encoded.
+//! The rule: integer samples are display-encoded sRGB and their alpha is straight, float samples
+//! are scene-linear, unless the file states otherwise. A matte or a depth is never display-encoded.
 
 use super::channels::Wanted;
 use super::profile::DisplayProfile;
@@ -23,7 +23,8 @@ pub trait FromFile: Copy + Send + Sync + Default + Zeroable + 'static {
     fn check(_: &SampleRows<'_>) -> Result<(), String> {
         Ok(())
     }
-    /// The channel that they are made from, where only the values of all rows show which of several it is.
+    /// The channel that they are made from, where only the values of all rows show which of several
+    /// it is.
     #[doc(hidden)]
     fn channel(_: &SampleRows<'_>) -> Result<Option<usize>, String> {
         Ok(None)
@@ -227,7 +228,8 @@ impl ColorChannels {
 /// Alpha from which on a pixel is opaque: half floats next to 1 are 0.0005 apart.
 const OPAQUE_ALPHA: f32 = 0.999;
 
-/// How far apart the three channels of a grey may lie: conversions of colour round by an 8-bit code.
+/// How far apart the three channels of a grey may lie: conversions of colour round by an 8-bit
+/// code.
 const GREY_TOLERANCE: f32 = 1.01 / 255.0;
 
 /// Rows of a [`Raster`], which only `io` can look into, and the colour profile of its file.
@@ -259,8 +261,8 @@ impl SampleRows<'_> {
         self.count_values(|value| value(a) < OPAQUE_ALPHA)
     }
 
-    /// The channel of the matte. Programs that know no grey write it into `R`, `G` and `B`, with an alpha of 1 or without;
-    /// where both could be meant, alpha is.
+    /// The channel of the matte. Programs that know no grey write it into `R`, `G` and `B`, with an
+    /// alpha of 1 or without; where both could be meant, alpha is.
     fn matte_channel(&self) -> Result<usize, String> {
         let picked = Wanted::Coverage.pick(&self.raster.names)?;
         let &[r, g, b, ref alpha @ ..] = &picked[..] else {
@@ -323,9 +325,11 @@ impl SampleRows<'_> {
         }
     }
 
-    /// Colours in the form that the file has them; `decode` takes its display codes, `light` display values.
+    /// Colours in the form that the file has them; `decode` takes its display codes, `light`
+    /// display values.
     ///
-    /// Long since each of the four forms that a file may have is a loop without a branch for every pixel.
+    /// Long since each of the four forms that a file may have is a loop without a branch for every
+    /// pixel.
     fn convert_colors<T: FileSample, P: Colored>(
         &self,
         samples: &[T],
@@ -459,8 +463,8 @@ impl Raster {
         Ok(Image::from_vec(width, height, pixels))
     }
 
-    /// All pixels, from the last row up; the samples' memory is given back on the way, so that never much more than one
-    /// of the two is there.
+    /// All pixels, from the last row up; the samples' memory is given back on the way, so that
+    /// never much more than one of the two is there.
     pub(crate) fn into_image<P: FromFile>(
         mut self,
         profile: Option<&DisplayProfile>,

@@ -85,8 +85,9 @@ fn utf8_note(text: &png::text_metadata::ITXtChunk) -> Option<(String, String)> {
     Some(note(&text.keyword, &text.get_text().ok()?))
 }
 
-/// How the file describes its colours, by the chunk that takes precedence (PNG 3rd edition, 4.3): code points, a profile,
-/// sRGB, or the exponent and the primaries. None for sRGB, and without a description.
+/// How the file describes its colours, by the chunk that takes precedence (PNG 3rd edition, 4.3):
+/// code points, a profile, sRGB, or the exponent and the primaries. None for sRGB, and without a
+/// description.
 pub(crate) fn color_description(bytes: &[u8], limits: &Limits) -> Option<ColorDescription> {
     let reader = open(Cursor::new(bytes), bytes.len() as u64, limits).ok()?;
     let info = reader.info();
@@ -156,7 +157,8 @@ fn big_endian_codes(bytes: &[u8]) -> Vec<u16> {
         .collect()
 }
 
-/// Effort of deflate and of the filters before it; the default takes a few milliseconds for 640 x 480.
+/// Effort of deflate and of the filters before it; the default takes a few milliseconds for 640 x
+/// 480.
 fn compression(effort: Quality) -> Compression {
     match effort {
         Quality::Draft => Compression::Fastest,

@@ -1,12 +1,13 @@
-//! How files describe their display codes: colour profiles (ICC), and the curve and primaries that a PNG names.
+//! How files describe their display codes: colour profiles (ICC), and the curve and primaries that
+//! a PNG names.
 //!
-//! Profiles of three primaries and three curves (sRGB, Display P3, Adobe RGB, ProPhoto, ...) and of one grey curve are
-//! applied; others are named in a warning and the codes treated as sRGB.
+//! Profiles of three primaries and three curves (sRGB, Display P3, Adobe RGB, ProPhoto, ...) and of
+//! one grey curve are applied; others are named in a warning and the codes treated as sRGB.
 //!
 //! # Method
-//! ICC.1:2022: curves to linear light (10.6, 10.18), the matrix of the colorant columns to XYZ under D50 (F.3), Bradford to D65
-//! (E.3), and from there to Rec. 709. Evaluated here, not by the crate that parses the profile, so that the bits are the
-//! same on every machine.
+//! ICC.1:2022: curves to linear light (10.6, 10.18), the matrix of the colorant columns to XYZ
+//! under D50 (F.3), Bradford to D65 (E.3), and from there to Rec. 709. Evaluated here, not by the
+//! crate that parses the profile, so that the bits are the same on every machine.
 
 use crate::color::{ColorMatrix, RgbSpace, bradford, rgb_from_rgb, rgb_from_xyz, srgb_to_linear};
 use moxcms::{ColorProfile, DataColorSpace, ToneReprCurve};
@@ -18,7 +19,8 @@ const D50_WHITE: [f64; 2] = [0.345_70, 0.358_54];
 const CODE_COUNT: usize = 1 << 16;
 /// The largest of them.
 const LARGEST_CODE: f32 = 65_535.0;
-/// Curves and matrices that differ by less are sRGB's, written with fewer digits or measured from a table.
+/// Curves and matrices that differ by less are sRGB's, written with fewer digits or measured from a
+/// table.
 const SRGB_TOLERANCE: f32 = 2e-3;
 /// The exponent of screens: files name it that mean sRGB, in steps of a hundredth and coarser.
 const SCREEN_EXPONENTS: std::ops::RangeInclusive<f64> = 2.16..=2.24;
@@ -188,7 +190,8 @@ fn curve_table(curve: impl Fn(f64) -> f64) -> Option<Vec<f32>> {
     light.iter().all(|v| v.is_finite()).then_some(light)
 }
 
-/// ICC.1:2022, 10.6 (tables, or a gamma of 8.8 bits) and 10.18 (functions of one to seven parameters).
+/// ICC.1:2022, 10.6 (tables, or a gamma of 8.8 bits) and 10.18 (functions of one to seven
+/// parameters).
 fn evaluate(curve: &ToneReprCurve, x: f64) -> f64 {
     match curve {
         ToneReprCurve::Lut(table) => match table[..] {
@@ -203,7 +206,8 @@ fn evaluate(curve: &ToneReprCurve, x: f64) -> f64 {
     }
 }
 
-/// ICC.1:2022, table 68: a power where `x` is at least a bound, and a straight line below it. A row of the table is a line.
+/// ICC.1:2022, table 68: a power where `x` is at least a bound, and a straight line below it. A row
+/// of the table is a line.
 fn evaluate_parametric(parameters: &[f64], x: f64) -> f64 {
     match *parameters {
         [g] => libm::pow(x, g),
@@ -226,7 +230,8 @@ fn interpolated(table: &[u16], x: f64) -> f64 {
     (low + (high - low) * (at - i as f64)) / f64::from(LARGEST_CODE)
 }
 
-/// The matrix to the library's primaries from those that a file names; none where they are the same.
+/// The matrix to the library's primaries from those that a file names; none where they are the
+/// same.
 ///
 /// # Errors
 /// For primaries and a white that no colour space has.
@@ -323,7 +328,8 @@ mod tests {
                 let light = nalgebra::Vector3::from(display.map(curve));
                 let expected = rgb_from_rgb(&RgbSpace::REC709, &space) * light;
                 let got = profile.light(display.map(|v| v as f32));
-                // Colorants are stored in steps of 1/65536, and some programs round their curves to 1/256.
+                // Colorants are stored in steps of 1/65536, and some programs round their curves to
+                // 1/256.
                 for (v, w) in got.iter().zip(expected.iter()) {
                     assert!(
                         (f64::from(*v) - w).abs() < 1e-3,

@@ -25,8 +25,8 @@ impl From<&str> for Refusal {
 
 #[cfg(feature = "oiio")]
 impl Refusal {
-    /// With what the first decoder could not read, where it named that: it is the file's own property, and the reason why
-    /// another decoder was asked.
+    /// With what the first decoder could not read, where it named that: it is the file's own
+    /// property, and the reason why another decoder was asked.
     pub(crate) fn after(self, what: &str) -> Self {
         match self {
             Self::Broken(why) if what.starts_with("unsupported") => {

@@ -1,5 +1,6 @@
-//! TIFF: integers display-encoded, half, float and double scene-linear; grey or RGB, with or without alpha, in strips or
-//! tiles, planes side by side or apart. Other kinds are left to OpenImageIO.
+//! TIFF: integers display-encoded, half, float and double scene-linear; grey or RGB, with or
+//! without alpha, in strips or tiles, planes side by side or apart. Other kinds are left to
+//! OpenImageIO.
 
 use super::codes::{CodedImage, Codes};
 use super::raster::{Raster, Samples, default_names};
@@ -121,8 +122,9 @@ fn is_alpha(extra: &[u16]) -> bool {
     matches!(extra, [ASSOCIATED_ALPHA | UNASSOCIATED_ALPHA])
 }
 
-/// The file up to its first picture. Tiles under the tags of strips, which old writers left and libtiff reads, are not
-/// known to our decoder: it calls their number wrong, or treats them as strips where that happens to be right.
+/// The file up to its first picture. Tiles under the tags of strips, which old writers left and
+/// libtiff reads, are not known to our decoder: it calls their number wrong, or treats them as
+/// strips where that happens to be right.
 fn first_picture<R: Read + Seek>(mut file: R) -> Result<Decoder<R>, Refusal> {
     let tags = first_tags(&mut file).unwrap_or_default();
     file.rewind().map_err(TiffError::from)?;
@@ -142,7 +144,8 @@ fn first_tags(file: &mut (impl Read + Seek)) -> std::io::Result<Vec<u16>> {
     let mut start = [0; 4];
     file.read_exact(&mut start)?;
     let (little, big) = (start.starts_with(b"II"), start.contains(&43));
-    // Bytes of an offset, of a count and of an entry; BigTIFF states how long its offsets are, which is 8.
+    // Bytes of an offset, of a count and of an entry; BigTIFF states how long its offsets are,
+    // which is 8.
     let (offset, count, entry) = if big { (8, 8, 20) } else { (4, 2, 12) };
     if big {
         read_integer(file, 4, little)?;
@@ -243,7 +246,8 @@ pub(crate) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Refusal> {
     })
 }
 
-/// Codes from the lowest bit up, as before 1990: such data begins with the clear code (TIFF 6.0, section 13).
+/// Codes from the lowest bit up, as before 1990: such data begins with the clear code (TIFF 6.0,
+/// section 13).
 fn refuse_old_lzw(decoder: &mut Decoder<impl Read + Seek>, bytes: &[u8]) -> Result<(), Refusal> {
     if decoder.find_tag_unsigned(Tag::Compression)? != Some(LZW_COMPRESSION) {
         return Ok(());
@@ -310,7 +314,8 @@ impl ChunkGrid {
         )
     }
 
-    /// Puts the samples of a strip or tile, of which `columns` and `rows` are there, into the picture.
+    /// Puts the samples of a strip or tile, of which `columns` and `rows` are there, into the
+    /// picture.
     fn put<T: Copy>(&self, to: &mut [T], from: &[T], index: usize, [columns, rows]: [usize; 2]) {
         let plane = index / self.count();
         let (left, top) = self.corner(index % self.count());
@@ -352,8 +357,8 @@ impl ChunkGrid {
     }
 }
 
-/// The samples of the picture, strip by strip or tile by tile: the decoder's own way to read all at once leaves columns
-/// black where tiles reach over the border, and knows no planes.
+/// The samples of the picture, strip by strip or tile by tile: the decoder's own way to read all at
+/// once leaves columns black where tiles reach over the border, and knows no planes.
 fn read_chunks(file: &mut OpenedTiff<impl Read + Seek>) -> Result<Samples, Refusal> {
     if !file.bits.is_multiple_of(8) {
         return Err(unsupported(&format!("{} bits a sample", file.bits)));
@@ -379,8 +384,8 @@ fn read_chunk(
     Ok((chunk, [columns as usize, rows as usize]))
 }
 
-/// Doubles become floats and integers of other kinds 16 bits: full scale stays full scale, and what is below zero becomes
-/// zero.
+/// Doubles become floats and integers of other kinds 16 bits: full scale stays full scale, and what
+/// is below zero becomes zero.
 ///
 /// Long since every kind of samples has its line.
 fn known_samples(decoded: DecodingResult) -> Samples {
@@ -419,8 +424,8 @@ fn doubled(x: u16) -> u16 {
     x << 1 | x >> 14
 }
 
-/// Red, green and blue that cyan, magenta, yellow and black leave of white, display-encoded as the inks were; a colour
-/// profile would be more exact, and is not applied to inks.
+/// Red, green and blue that cyan, magenta, yellow and black leave of white, display-encoded as the
+/// inks were; a colour profile would be more exact, and is not applied to inks.
 fn light_left_by_inks(inks: Samples) -> Result<Samples, Refusal> {
     match inks {
         Samples::U8(v) => Ok(Samples::U8(left_by_inks(&v, u8::MAX.into()))),
@@ -454,7 +459,8 @@ pub(crate) fn encode_codes(
     }
 }
 
-/// A whole file of scene-linear floats of one, three or four channels; colours are multiplied by alpha.
+/// A whole file of scene-linear floats of one, three or four channels; colours are multiplied by
+/// alpha.
 pub(crate) fn encode_floats(
     size: (usize, usize),
     channels: usize,

@@ -6,8 +6,8 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// Parses a JSON document and refuses an object with a key twice (most readers silently keep the last of them) and what is
-/// nested deeper than `max_depth` levels.
+/// Parses a JSON document and refuses an object with a key twice (most readers silently keep the
+/// last of them) and what is nested deeper than `max_depth` levels.
 pub(super) fn check_json(text: &str, max_depth: u64) -> serde_json::Result<()> {
     let mut document = serde_json::Deserializer::from_str(text);
     KeyCheck {
@@ -89,8 +89,8 @@ impl<'de> Visitor<'de> for KeyCheck {
     }
 }
 
-/// What a TOML document holds that JSON cannot express, and where: a number that is infinite or NaN; or nesting deeper than
-/// `max_depth` levels.
+/// What a TOML document holds that JSON cannot express, and where: a number that is infinite or
+/// NaN; or nesting deeper than `max_depth` levels.
 pub(super) fn find_invalid_toml(
     document: &Spanned<DeTable<'_>>,
     max_depth: u64,

@@ -20,8 +20,8 @@ use toml::de::DeTable;
 /// Reads a TOML document.
 ///
 /// # Errors
-/// [`Error::File`] for a file that cannot be read or is not TOML; [`Error::Field`] for a value that does not fit, with
-/// the key that was probably meant where one is unknown.
+/// [`Error::File`] for a file that cannot be read or is not TOML; [`Error::Field`] for a value that
+/// does not fit, with the key that was probably meant where one is unknown.
 pub fn read_toml<T: DeserializeOwned>(path: impl AsRef<Path>) -> Result<T> {
     let path = path.as_ref();
     parse_toml(&read_text(path)?).map_err(|e| e.in_file(path))
@@ -54,8 +54,8 @@ fn apply_all(overrides: &[Override], document: &mut toml::Table) -> Result<()> {
 /// Settings from overrides alone: all of them lie in the table of that name.
 ///
 /// # Errors
-/// An override outside the table or of a value that cannot be there; a key that `T` does not know, with the one that was
-/// probably meant; a value that does not fit.
+/// An override outside the table or of a value that cannot be there; a key that `T` does not know,
+/// with the one that was probably meant; a value that does not fit.
 pub fn from_overrides<T: DeserializeOwned>(table: &str, overrides: &[Override]) -> Result<T> {
     let mut document = toml::Table::new();
     document.insert(table.into(), toml::Table::new().into());
@@ -140,8 +140,8 @@ pub fn read_json<T: DeserializeOwned>(path: impl AsRef<Path>) -> Result<T> {
     parse_json(&read_text(path)?).map_err(|e| e.in_file(path))
 }
 
-/// Reads a JSON document that holds data, not settings (truth and detections as COCO has them): as large as a picture may
-/// be ([`Limits::file_bytes`](super::Limits::file_bytes)).
+/// Reads a JSON document that holds data, not settings (truth and detections as COCO has them): as
+/// large as a picture may be ([`Limits::file_bytes`](super::Limits::file_bytes)).
 ///
 /// # Errors
 /// As [`read_toml`].
@@ -209,7 +209,8 @@ pub fn write_text(path: impl AsRef<Path>, text: &str) -> Result<()> {
 /// Parses a TOML document in memory.
 ///
 /// # Errors
-/// [`Error::Value`] for what is not TOML, a key twice, a number that is not finite, and values that do not fit.
+/// [`Error::Value`] for what is not TOML, a key twice, a number that is not finite, and values that
+/// do not fit.
 pub(crate) fn parse_toml<T: DeserializeOwned>(text: &str) -> Result<T> {
     parse_toml_lines(text, |byte| Some(line_of(text, byte)))
 }

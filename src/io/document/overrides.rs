@@ -1,4 +1,5 @@
-//! Single values of a document, given on a command line: `camera.focal_px=2900`, `objects[0].grade.hue_deg=30`.
+//! Single values of a document, given on a command line: `camera.focal_px=2900`,
+//! `objects[0].grade.hue_deg=30`.
 
 use crate::error::{Error, Result};
 use std::str::FromStr;
@@ -48,7 +49,8 @@ fn is_finite(value: &Value) -> bool {
 }
 
 impl Override {
-    /// Puts the value into a document; tables on the way are made where they are missing, list entries are not.
+    /// Puts the value into a document; tables on the way are made where they are missing, list
+    /// entries are not.
     pub(super) fn apply(&self, document: &mut toml::Table) -> Result<()> {
         let place = self.place_in(document);
         *place.map_err(|what| Error::value(&self.path, what))? = self.value.clone();

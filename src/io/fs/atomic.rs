@@ -1,4 +1,5 @@
-//! Whole files or none: everything is written beside its place, put on the disk, and then moved there.
+//! Whole files or none: everything is written beside its place, put on the disk, and then moved
+//! there.
 
 use super::open::reason;
 use crate::error::{Error, Result};
@@ -87,7 +88,8 @@ fn sync_folder(_: &Path) -> std::io::Result<()> {
     Ok(())
 }
 
-/// Brings everything that was written to the file system of a folder to the disk, so that it outlives a power cut.
+/// Brings everything that was written to the file system of a folder to the disk, so that it
+/// outlives a power cut.
 ///
 /// Where it cannot be done nothing is lost but time: what is not there is made again.
 pub fn sync(folder: impl AsRef<Path>) {
@@ -100,7 +102,8 @@ pub fn sync(folder: impl AsRef<Path>) {
     let _ = folder;
 }
 
-/// A new file that vanishes if it is not moved to its place, readable like any other file of the user.
+/// A new file that vanishes if it is not moved to its place, readable like any other file of the
+/// user.
 fn new_beside(folder: &Path) -> std::io::Result<tempfile::NamedTempFile> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(".petcomp-").suffix(".tmp");

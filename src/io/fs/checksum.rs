@@ -27,8 +27,8 @@ impl Checksum {
     }
 }
 
-/// Copies a file in one step, if it is as it was: of another length or with other bytes it is refused, and nothing is
-/// written.
+/// Copies a file in one step, if it is as it was: of another length or with other bytes it is
+/// refused, and nothing is written.
 ///
 /// # Errors
 /// [`Error::File`] for the one that cannot be read or written.

@@ -7,8 +7,8 @@ use std::fs::{File, Metadata};
 use std::io::Read;
 use std::path::Path;
 
-/// Opens a regular file, and no other: a FIFO would block, a device never ends. Also gives its length. `most` is the
-/// largest length, and the name of that limit.
+/// Opens a regular file, and no other: a FIFO would block, a device never ends. Also gives its
+/// length. `most` is the largest length, and the name of that limit.
 pub(crate) fn open_regular(path: &Path, most: (u64, &str), expected: &str) -> Result<(File, u64)> {
     open_checked(path, expected)
         .and_then(|(file, bytes)| {
@@ -18,8 +18,8 @@ pub(crate) fn open_regular(path: &Path, most: (u64, &str), expected: &str) -> Re
         .map_err(|e| Error::file(path, e))
 }
 
-/// A regular file and its length. Looked at before it is opened, because opening may wait, and after, because it may be
-/// another by then.
+/// A regular file and its length. Looked at before it is opened, because opening may wait, and
+/// after, because it may be another by then.
 fn open_checked(path: &Path, expected: &str) -> std::result::Result<(File, u64), String> {
     let before = std::fs::metadata(path).map_err(|e| reason(&e))?;
     check_regular(&before, expected)?;

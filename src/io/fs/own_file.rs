@@ -5,10 +5,12 @@ use crate::error::{Error, Result};
 use std::fs::{File, OpenOptions};
 use std::path::Path;
 
-/// Opens a file of petcomp's own in an output folder, to be read and appended to; it is made where it is not there.
+/// Opens a file of petcomp's own in an output folder, to be read and appended to; it is made where
+/// it is not there.
 ///
 /// # Errors
-/// [`Error::File`] for a link, which would lead to a file of somebody else's, and for anything but a regular file.
+/// [`Error::File`] for a link, which would lead to a file of somebody else's, and for anything but
+/// a regular file.
 pub(crate) fn open_own(path: &Path) -> Result<File> {
     refuse_foreign(path)?;
     let file = own_options()
@@ -48,7 +50,8 @@ fn foreign(path: &Path) -> Error {
     )
 }
 
-/// A link that takes the file's place after it was looked at is not followed, and a FIFO is not waited for.
+/// A link that takes the file's place after it was looked at is not followed, and a FIFO is not
+/// waited for.
 #[cfg(unix)]
 fn own_flags() -> i32 {
     (rustix::fs::OFlags::NOFOLLOW | rustix::fs::OFlags::NONBLOCK).bits() as i32

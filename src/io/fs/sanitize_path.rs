@@ -22,13 +22,14 @@ pub fn below(folder: impl AsRef<Path>, file: impl AsRef<Path>) -> Result<PathBuf
     Ok(folder.as_ref().join(file))
 }
 
-/// The file below a folder that a document names: the one way from a path in a document to a file that is read.
+/// The file below a folder that a document names: the one way from a path in a document to a file
+/// that is read.
 ///
 /// Links are followed where they stay in the folder; the folder itself may be one.
 ///
 /// # Errors
-/// [`Error::Value`] as [`below`]; [`Error::File`] for a link that leads out of the folder, for a file that is not there, and
-/// for anything but a regular file, which may block or never end.
+/// [`Error::Value`] as [`below`]; [`Error::File`] for a link that leads out of the folder, for a
+/// file that is not there, and for anything but a regular file, which may block or never end.
 pub fn inside(folder: impl AsRef<Path>, file: impl AsRef<Path>) -> Result<PathBuf> {
     found_inside(folder.as_ref(), file.as_ref()).map(|(path, _)| path)
 }
@@ -94,7 +95,8 @@ fn or_working_folder(folder: &Path) -> &Path {
     }
 }
 
-/// Refuses an output folder that holds symbolic links to folders, which would lead outside. The folder itself may be one.
+/// Refuses an output folder that holds symbolic links to folders, which would lead outside. The
+/// folder itself may be one.
 ///
 /// # Errors
 /// [`Error::File`] naming the link, or a folder that cannot be looked into.

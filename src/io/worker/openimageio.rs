@@ -55,7 +55,8 @@ pub(crate) fn shape(source: &SourceFile, limits: &Limits) -> Result<Shape, Refus
     })
 }
 
-/// Samples as the file has them, in the requested window; `reserve` gets the number of their bytes before they are read.
+/// Samples as the file has them, in the requested window; `reserve` gets the number of their bytes
+/// before they are read.
 pub(crate) fn decode(
     source: &SourceFile,
     limits: &Limits,
@@ -209,8 +210,8 @@ fn copy_picked<T: Copy>(to: &mut [T], pixel: &[T], picked: &[usize]) {
     }
 }
 
-/// Samples with their meaning, and whether they are display-encoded: the rule of [`io`](crate::io) for integers and
-/// floats, while film scans name the meaning of their codes themselves.
+/// Samples with their meaning, and whether they are display-encoded: the rule of [`io`](crate::io)
+/// for integers and floats, while film scans name the meaning of their codes themselves.
 fn interpret(samples: Samples, format: Format, space: &str) -> Result<(Samples, bool), Refusal> {
     let is_scan = matches!(format, Format::Dpx | Format::Cineon);
     let is_integer = !samples.are_float();

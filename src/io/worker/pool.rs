@@ -1,8 +1,9 @@
-//! OpenImageIO in processes of their own: a file that crashes it ends such a process and is named, and programs that
-//! never meet such a file never load it.
+//! OpenImageIO in processes of their own: a file that crashes it ends such a process and is named,
+//! and programs that never meet such a file never load it.
 //!
-//! A worker lives as long as this program and answers one request at a time; there are as many as ever asked at once.
-//! One that dies is replaced and the file tried once more, one that takes too long is killed.
+//! A worker lives as long as this program and answers one request at a time; there are as many as
+//! ever asked at once. One that dies is replaced and the file tried once more, one that takes too
+//! long is killed.
 
 use super::protocol::{
     Greeting, Request, Response, Shape, receive_line, receive_samples, receive_shape, send_request,
@@ -31,7 +32,8 @@ const START_TIMEOUT: Duration = Duration::from_secs(60);
 const PIXELS_PER_SECOND: u64 = 10_000_000;
 /// How often a file is tried.
 const MAX_ATTEMPTS: usize = 2;
-/// How often a worker is started that ends before it greets: it has seen no file yet, so none is to blame.
+/// How often a worker is started that ends before it greets: it has seen no file yet, so none is to
+/// blame.
 const MAX_STARTS: usize = 3;
 /// A worker that closed its pipes is ending, and is waited for so long before it is killed.
 const EXIT_TIMEOUT: Duration = Duration::from_secs(2);
@@ -41,7 +43,8 @@ static IDLE: WorkerPool = WorkerPool {
     idle: Mutex::new(Vec::new()),
 };
 
-/// A worker's response about a file. A strict request is sent to no worker that the system does not sandbox.
+/// A worker's response about a file. A strict request is sent to no worker that the system does not
+/// sandbox.
 pub(crate) fn ask(
     source: &SourceFile,
     limits: &Limits,
@@ -66,7 +69,8 @@ pub fn worker_version() -> Result<String> {
     Ok(format!("OpenImageIO {}", worker.greeting.openimageio))
 }
 
-/// Beside the running program; one folder up serves test programs, which cargo puts below the others.
+/// Beside the running program; one folder up serves test programs, which cargo puts below the
+/// others.
 fn find_program() -> Option<PathBuf> {
     if let Some(named) = std::env::var_os(PROGRAM_VARIABLE) {
         return Some(named.into());
@@ -120,7 +124,8 @@ impl WorkerPool {
         Err(format!("unreadable: OpenImageIO died on it {MAX_ATTEMPTS} times ({cause})").into())
     }
 
-    /// An idle one or a new one; the second attempt is for a worker that nothing has happened to yet.
+    /// An idle one or a new one; the second attempt is for a worker that nothing has happened to
+    /// yet.
     fn worker(
         &self,
         attempt: usize,
@@ -348,8 +353,9 @@ mod tests {
     use crate::io::header::Window;
     use std::io::Write;
 
-    /// Written by a process of its own: a program that this one had open for writing cannot be started while any other
-    /// test's child, forked at that moment, still holds it open (ETXTBSY).
+    /// Written by a process of its own: a program that this one had open for writing cannot be
+    /// started while any other test's child, forked at that moment, still holds it open
+    /// (ETXTBSY).
     fn write_program(program: &Path, text: &str) {
         let mut shell = Command::new("/bin/sh");
         shell

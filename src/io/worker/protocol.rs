@@ -1,8 +1,9 @@
 //! What petcomp and its worker program send each other.
 //!
-//! The worker is started with [`Limits`] as its argument and sends a greeting. A request is a line of JSON and the bytes
-//! of a file; a response is a line of JSON and, where pixels were requested, the samples in native byte order. The side
-//! that asks trusts nothing: it checks every size itself.
+//! The worker is started with [`Limits`] as its argument and sends a greeting. A request is a line
+//! of JSON and the bytes of a file; a response is a line of JSON and, where pixels were requested,
+//! the samples in native byte order. The side that asks trusts nothing: it checks every size
+//! itself.
 
 use crate::io::codec::Wanted;
 use crate::io::codec::raster::{Raster, SampleKind, Samples};
@@ -147,7 +148,8 @@ pub(super) fn send_raster(to: &mut impl Write, raster: &Raster) -> Result<()> {
     to.flush()
 }
 
-/// Receives the first line of a response. A shape beyond the limits, which the worker knows too, is invalid.
+/// Receives the first line of a response. A shape beyond the limits, which the worker knows too, is
+/// invalid.
 pub(crate) fn receive_shape(
     from: &mut impl BufRead,
     limits: &Limits,

@@ -1,15 +1,18 @@
-//! What the worker program gives up before it looks at a file: it gets bytes and gives bytes, so it needs nothing else.
+//! What the worker program gives up before it looks at a file: it gets bytes and gives bytes, so it
+//! needs nothing else.
 //!
 //! Whatever of this the system cannot do is named, and the worker goes on with the rest.
 
 use crate::io::limits::Limits;
 use rustix::process::{Resource, Rlimit, setrlimit};
 
-/// Address space beyond what is mapped at the start and what a file may ask for: the decoders' own needs.
+/// Address space beyond what is mapped at the start and what a file may ask for: the decoders' own
+/// needs.
 const HEADROOM_BYTES: u64 = 256 << 20;
 /// Copies of a picture that exist at a time: in the decoder, as handed over, and cut to its window.
 const PICTURE_COPIES: u64 = 3;
-/// CPU time of one worker, seconds: an honest one is replaced after this, one that spins was killed long before.
+/// CPU time of one worker, seconds: an honest one is replaced after this, one that spins was killed
+/// long before.
 const CPU_SECONDS: u64 = 600;
 /// Open files; it opens none itself.
 const MAX_OPEN_FILES: u64 = 64;
@@ -60,7 +63,8 @@ fn mapped_bytes() -> Option<u64> {
 }
 
 fn limit_resource(resource: Resource, current: u64, maximum: u64) {
-    // Lowering one's own limits is always allowed; a system without one of them has no such danger either.
+    // Lowering one's own limits is always allowed; a system without one of them has no such danger
+    // either.
     let _ = setrlimit(
         resource,
         Rlimit {
@@ -70,7 +74,8 @@ fn limit_resource(resource: Resource, current: u64, maximum: u64) {
     );
 }
 
-/// Gives up everything but memory, the pipes that are open, and some CPU time. Returns what the system could not do.
+/// Gives up everything but memory, the pipes that are open, and some CPU time. Returns what the
+/// system could not do.
 pub(super) fn enter_sandbox(limits: &Limits) -> (MemoryLimit, Vec<String>) {
     let memory = MemoryLimit::new(limits);
     memory.allow(0, 0);
@@ -112,7 +117,8 @@ mod linux {
         Ok(rustix::thread::set_no_new_privs(true)?)
     }
 
-    /// No file or folder may be opened, no socket connected, no other process signalled: a rule set without a rule.
+    /// No file or folder may be opened, no socket connected, no other process signalled: a rule set
+    /// without a rule.
     fn forbid_files() -> Outcome {
         // What a kernel does not know of this is left out.
         let abi = ABI::V6;
@@ -126,9 +132,10 @@ mod linux {
         }
     }
 
-    /// What a decoder that opens nothing calls: its own memory, its pipes, the clock, and its end. And what a thread calls
-    /// before its first line (`rseq`, `set_robust_list`): libraries start theirs when they are loaded, and on a busy machine
-    /// those have not run yet when the filter falls; the C library ends the process where `rseq` is refused.
+    /// What a decoder that opens nothing calls: its own memory, its pipes, the clock, and its end.
+    /// And what a thread calls before its first line (`rseq`, `set_robust_list`): libraries
+    /// start theirs when they are loaded, and on a busy machine those have not run yet when the
+    /// filter falls; the C library ends the process where `rseq` is refused.
     const ALLOWED_CALLS: [i64; 36] = [
         libc::SYS_read,
         libc::SYS_readv,
@@ -168,7 +175,8 @@ mod linux {
         libc::SYS_exit_group,
     ];
 
-    /// Every other call fails with EPERM, among them all that open, execute, connect, trace and start.
+    /// Every other call fails with EPERM, among them all that open, execute, connect, trace and
+    /// start.
     fn filter_calls() -> Outcome {
         let filter = SeccompFilter::new(
             call_rules()?,

@@ -7,7 +7,8 @@ use std::io::{Error, ErrorKind, Read, Result, Write};
 use std::os::fd::{AsFd, OwnedFd};
 use std::time::Instant;
 
-/// Large buffers save turns between the two processes; more than this takes a privilege (`pipe(7)`).
+/// Large buffers save turns between the two processes; more than this takes a privilege
+/// (`pipe(7)`).
 const PIPE_BYTES: usize = 1 << 20;
 
 /// One end of a pipe. Reading or writing past the deadline fails with [`ErrorKind::TimedOut`].

@@ -22,7 +22,8 @@ pub struct CutOutOptions {
     pub film: FilmOptions,
     /// How the object is keyed, where the method is `key`.
     pub key: KeyOptions,
-    /// Colour of an evenly lit screen, scene-linear; nothing = fitted to the photo. Default: nothing.
+    /// Colour of an evenly lit screen, scene-linear; nothing = fitted to the photo. Default:
+    /// nothing.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub screen: Option<LinearRgb>,
     /// Where the matte comes from; nothing = physical. Default: nothing.
@@ -59,13 +60,15 @@ impl Default for CutOutOptions {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum MatteMethod {
-    /// From reflected light and transmittance, solved for in every pixel: see-through plastic keeps its own light only.
-    /// Assumed to be that of plastic on a screen without a hue, with a warning.
+    /// From reflected light and transmittance, solved for in every pixel: see-through plastic keeps
+    /// its own light only. Assumed to be that of plastic on a screen without a hue, with a
+    /// warning.
     #[default]
     Physical,
     /// From the screen's colour, as Blender's Keying node does: see-through plastic is see-through.
     Key,
-    /// From the object's outline alone: nothing is see-through, and what shines through is part of the object.
+    /// From the object's outline alone: nothing is see-through, and what shines through is part of
+    /// the object.
     Outline,
 }
 

@@ -15,8 +15,9 @@ const PAINT_BLUR_PX: f32 = 2.0;
 /// Shares of the blurred mask between which a pixel turns opaque.
 const PAINT_SHARE: RangeInclusive<f32> = 0.4..=0.7;
 
-/// Makes opaque what is painted: in the screen's hue, or in colours that the plastic has not. Bare screen that a wide mask
-/// lets in is not paint. Gives the share of the object that has the screen's hue.
+/// Makes opaque what is painted: in the screen's hue, or in colours that the plastic has not. Bare
+/// screen that a wide mask lets in is not paint. Gives the share of the object that has the
+/// screen's hue.
 ///
 /// `longer_side` is that of the whole photo, pixels.
 pub(super) fn make_opaque(
@@ -69,20 +70,23 @@ fn softened(painted: &Mask) -> Image<f32> {
     filter::gaussian_blur(&painted.to_coverage(), PAINT_BLUR_PX).map(|p| ramp(p.0, &PAINT_SHARE))
 }
 
-/// Scene-linear reflected light between which a glint goes from hiding nothing to hiding all that lies behind.
+/// Scene-linear reflected light between which a glint goes from hiding nothing to hiding all that
+/// lies behind.
 const GLINT_LIGHT: RangeInclusive<f32> = 0.14..=0.96;
-/// Reach of the surroundings that hidden pixels are filled from, standard deviation as a share of the side of a square of
-/// the object's area.
+/// Reach of the surroundings that hidden pixels are filled from, standard deviation as a share of
+/// the side of a square of the object's area.
 const FILL_REACH: f32 = 0.01;
 /// The same in small pictures, pixels.
 const MIN_FILL_REACH_PX: f32 = 3.0;
 /// Weight of surroundings, as a share of the window, that is enough.
 const MIN_FILL_WEIGHT: f32 = 0.05;
-/// Standard deviation of a factor that is only its surroundings': that of plastic around its median.
+/// Standard deviation of a factor that is only its surroundings': that of plastic around its
+/// median.
 const FILLED_SIGMA: f32 = 0.35;
 
-/// Gives pixels under glints the factor of their surroundings, as far as they are hidden: clipped ones wholly, others
-/// only more of it, since what reflects much is treated as paint by itself. Gives the share of the object that is clipped.
+/// Gives pixels under glints the factor of their surroundings, as far as they are hidden: clipped
+/// ones wholly, others only more of it, since what reflects much is treated as paint by itself.
+/// Gives the share of the object that is clipped.
 pub(super) fn fill_glints(
     factors: &mut Image<Factor>,
     photo: &Image<LinearRgb>,
@@ -113,8 +117,8 @@ fn fill_hidden(factors: &mut Image<Factor>, hidden: &Image<f32>, around: &Image<
     });
 }
 
-/// Weight (`r`) and weighted factor (`g`) of what is not hidden around each pixel, at half the size, which is enough for
-/// what is smooth. Both ride in one picture: one blur for both.
+/// Weight (`r`) and weighted factor (`g`) of what is not hidden around each pixel, at half the
+/// size, which is enough for what is smooth. Both ride in one picture: one blur for both.
 fn surroundings(
     factors: &Image<Factor>,
     hidden: &Image<f32>,

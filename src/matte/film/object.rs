@@ -12,7 +12,8 @@ pub(in crate::matte) const OPAQUE: f32 = 0.99;
 const RIM_WIDTH: f64 = 0.01;
 /// The same in small photos, pixels.
 const MIN_RIM_PX: f64 = 2.0;
-/// Bare screen is its plate in some shade: so far from that, as a share of the plate's strongest channel, it may be.
+/// Bare screen is its plate in some shade: so far from that, as a share of the plate's strongest
+/// channel, it may be.
 const MAX_SCREEN_DEVIATION: f32 = 0.06;
 
 /// The object without its rim; `longer_side` is that of the whole photo, pixels.

@@ -4,9 +4,10 @@ use crate::image::Image;
 use crate::io::{TRANSMITTANCE, VIEW_TRANSMITTANCE};
 use crate::pixel::{Film, LinearRgb};
 
-/// The channels that a film is kept in: `R G B` the reflected light F, `A` its mean opacity along the line of sight (together
-/// premultiplied RGBA for programs that know no film), `TR TG TB` the transmittance as measured with the object's own
-/// shadow, `VR VG VB` that of the line of sight alone.
+/// The channels that a film is kept in: `R G B` the reflected light F, `A` its mean opacity along
+/// the line of sight (together premultiplied RGBA for programs that know no film), `TR TG TB` the
+/// transmittance as measured with the object's own shadow, `VR VG VB` that of the line of sight
+/// alone.
 ///
 /// `film` is F with opacity `1 - V`, `transmittance` is T; samples lie row by row from the top.
 ///

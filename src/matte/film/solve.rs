@@ -54,20 +54,22 @@ pub(super) struct Solver {
 
 /// Tints must differ by this share of the largest to separate glint from scattered light.
 const MIN_TINT_CONTRAST: f32 = 0.25;
-/// Least light of the key channel over the others': with less no pixel measures anything. Its square is still a normal
-/// number.
+/// Least light of the key channel over the others': with less no pixel measures anything. Its
+/// square is still a normal number.
 const MIN_GAIN: f32 = 1e-12;
 /// Noise of a pixel at least: coded pictures are no finer.
 const MIN_NOISE: f32 = 0.004;
-/// Clear plastic reflects neutrally: this much of the error of the key channel's reflection is due to the tint.
+/// Clear plastic reflects neutrally: this much of the error of the key channel's reflection is due
+/// to the tint.
 const TINT_ERROR_SHARE: f32 = 0.8;
-/// Scene-linear value from which on to which reflected light passes from that of plastic to that of paint. An exposure that
-/// has the screen at 0.3 to 0.45 has white paper at 0.5.
+/// Scene-linear value from which on to which reflected light passes from that of plastic to that of
+/// paint. An exposure that has the screen at 0.3 to 0.45 has white paper at 0.5.
 const PAINT_LIGHT: RangeInclusive<f32> = 0.15..=0.3;
-/// Difference of two channels from what plastic can reflect, as a share of the larger, beyond which it is paint; lights a
-/// fifth warmer or colder than the photo's white make a third of it.
+/// Difference of two channels from what plastic can reflect, as a share of the larger, beyond which
+/// it is paint; lights a fifth warmer or colder than the photo's white make a third of it.
 const MAX_CAST_DIFFERENCE: f32 = 0.4;
-/// The same, scene-linear light, that noise and rounding leave in dark places; single pixels of noise are no paint yet.
+/// The same, scene-linear light, that noise and rounding leave in dark places; single pixels of
+/// noise are no paint yet.
 const MAX_DARK_CAST_DIFFERENCE: f32 = 0.02;
 
 impl Solver {
@@ -95,8 +97,9 @@ impl Solver {
         self.combine(pixel, &measured, plastic_factor(brightest))
     }
 
-    /// The factor on a screen that has too little hue to measure much: that of flat plastic unless more light is left than
-    /// plastic throws back. The deviation is that of something that may or may not be plastic.
+    /// The factor on a screen that has too little hue to measure much: that of flat plastic unless
+    /// more light is left than plastic throws back. The deviation is that of something that may
+    /// or may not be plastic.
     pub(super) fn guess(&self, pixel: [f32; 3], screen: [f32; 3]) -> Factor {
         let measured = self.measure(pixel, screen);
         let left = measured.most_left(pixel);
@@ -163,7 +166,8 @@ impl Solver {
         beyond > MAX_DARK_CAST_DIFFERENCE + MAX_CAST_DIFFERENCE * a.abs().max(b.abs())
     }
 
-    /// What plastic reflects in the second of the other channels, least and most, where it reflects `a` in the first.
+    /// What plastic reflects in the second of the other channels, least and most, where it reflects
+    /// `a` in the first.
     #[inline]
     fn plastic_range(&self, a: f32) -> [f32; 2] {
         if self.cast < 1.0 {
@@ -209,8 +213,8 @@ fn plastic_factor(brightest: f32) -> f32 {
     ((high - brightest) / (high - low)).clamp(0.0, 1.0)
 }
 
-/// The shares of two channels' light that make up the third's, for light of which a part is neutral and the rest has the
-/// colour `scattered`; half and half where the two do not differ.
+/// The shares of two channels' light that make up the third's, for light of which a part is neutral
+/// and the rest has the colour `scattered`; half and half where the two do not differ.
 fn shares(key: usize, [a, b]: [usize; 2], scattered: [f32; 3]) -> [f32; 2] {
     let soft = MIN_TINT_CONTRAST * largest(scattered);
     let differ = scattered[a] - scattered[b];

@@ -90,7 +90,8 @@ impl World {
         film(&photo, &plate, &inside(), &FilmOptions::default()).unwrap()
     }
 
-    /// Mean absolute error inside, over a grey background in the object's shadow, of what a function chooses.
+    /// Mean absolute error inside, over a grey background in the object's shadow, of what a
+    /// function chooses.
     fn error(&self, found: &FilmMatte, of: impl Fn(usize) -> bool) -> f32 {
         let shaded = found.shaded();
         let behind = LinearRgb::new(0.5, 0.35, 0.3);

@@ -34,15 +34,18 @@ struct TintHypothesis {
     misfit: f32,
 }
 
-/// Transmittance of two clear walls of PET, looked through and lit through: 8 surfaces that reflect 5 to 10 % each.
+/// Transmittance of two clear walls of PET, looked through and lit through: 8 surfaces that reflect
+/// 5 to 10 % each.
 pub(in crate::matte) const CLEAR_TRANSMITTANCE: f32 = 0.56;
 
-/// Absorbances per channel of the dyes that PET bottles have: light blue, green and brown, the fractions that
-/// recyclers sort clear bottles from. Only the ratios count; the amount is fitted.
+/// Absorbances per channel of the dyes that PET bottles have: light blue, green and brown, the
+/// fractions that recyclers sort clear bottles from. Only the ratios count; the amount is fitted.
 const DYE_ABSORBANCES: [[f32; 3]; 3] = [[1.0, 0.32, 0.03], [1.0, 0.25, 0.78], [0.3, 0.72, 1.0]];
-/// Amounts of a dye that are tried: the least that differs from clear, the most that leaves any light, the step.
+/// Amounts of a dye that are tried: the least that differs from clear, the most that leaves any
+/// light, the step.
 const DYE_AMOUNTS: [f32; 3] = [0.3, 5.0, 0.1];
-/// Least transmittance of the screen's channel; plastic that passes less cannot be distinguished from opaque.
+/// Least transmittance of the screen's channel; plastic that passes less cannot be distinguished
+/// from opaque.
 const MIN_KEY_TRANSMITTANCE: f32 = 0.005;
 /// Share of the object that reflects least, and shows its tint.
 pub(super) const DARKEST_SHARE: f64 = 0.25;
@@ -50,8 +53,8 @@ pub(super) const DARKEST_SHARE: f64 = 0.25;
 const OBJECT_SAMPLES: usize = 20_000;
 /// Pixels among the darkest that are sampled for the tint.
 const TINT_SAMPLES: usize = 400;
-/// Share of the screen's strongest channel from which on, in the screen's shade, a pixel is bare screen: plastic passes
-/// three quarters at most.
+/// Share of the screen's strongest channel from which on, in the screen's shade, a pixel is bare
+/// screen: plastic passes three quarters at most.
 const MIN_BARE_SHARE: f32 = 0.9;
 /// Noise of a pixel: least, and as a share of its value.
 const PIXEL_NOISE: [f32; 2] = [0.004, 0.05];
@@ -104,8 +107,9 @@ struct ScreenPair {
 }
 
 impl TintSamples {
-    /// A share of the object, the darkest first in the channels that the screen has little of: pixels wholly inside that are
-    /// no bare screen. All of it where a screen has no hue, since what is dark there may as well be paint.
+    /// A share of the object, the darkest first in the channels that the screen has little of:
+    /// pixels wholly inside that are no bare screen. All of it where a screen has no hue, since
+    /// what is dark there may as well be paint.
     pub(super) fn new(
         photo: &Image<LinearRgb>,
         plate: &ScreenPlate,
@@ -131,9 +135,9 @@ impl TintSamples {
     /// The tint that explains the pixels best.
     ///
     /// # Method
-    /// Each hypothesis, clear or a dye of some amount, is compared with every pixel: how far it is from
-    /// `u * flat * screen + f * scattered` with the best thickness factor u and reflection f that are not negative. The
-    /// lowest median wins.
+    /// Each hypothesis, clear or a dye of some amount, is compared with every pixel: how far it is
+    /// from `u * flat * screen + f * scattered` with the best thickness factor u and reflection
+    /// f that are not negative. The lowest median wins.
     pub(super) fn fit(&self) -> Tint {
         let tried = self.hypotheses();
         let best = lowest_misfit(&tried);
@@ -270,7 +274,8 @@ impl ScreenPair {
     }
 }
 
-/// The factors of `through` (no more than plastic can have) and of `body` whose sum is nearest to `seen`.
+/// The factors of `through` (no more than plastic can have) and of `body` whose sum is nearest to
+/// `seen`.
 #[inline(always)]
 fn non_negative_fit(seen: [f32; 3], through: [f32; 3], body: [f32; 3]) -> (f32, f32) {
     let (aa, bb, ab) = (dot(through, through), dot(body, body), dot(through, body));

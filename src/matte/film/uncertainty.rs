@@ -9,25 +9,28 @@ use crate::pixel::Coverage;
 /// What makes the colours of a cut-out wrong, 0 where nothing does.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ColorUncertainty {
-    /// Share of the object that looks like bare screen in its middle, where plastic is: it was keyed away, and may be paint
-    /// of the screen's hue.
+    /// Share of the object that looks like bare screen in its middle, where plastic is: it was
+    /// keyed away, and may be paint of the screen's hue.
     pub keyed_away: f32,
-    /// Share of the object that is brighter in the screen's hue than the screen through plastic, and was treated as opaque.
+    /// Share of the object that is brighter in the screen's hue than the screen through plastic,
+    /// and was treated as opaque.
     pub screen_hue: f32,
     /// Share of the object that is clipped.
     pub clipped: f32,
-    /// Transmittance that is not measured in the photo but is the prior of plastic, mean over the object.
+    /// Transmittance that is not measured in the photo but is the prior of plastic, mean over the
+    /// object.
     pub guessed: f32,
     /// How far other tints that explain the photo as well differ in what they let through.
     pub tint: f32,
 }
 
 impl ColorUncertainty {
-    /// From which on a person should look at a cut-out. Of 48 rendered photos with ground truth the 7 that have more keyed
-    /// away had lost a cap, a label or their tint to the screen; the most of the others is 0.0022, one of which had lost
-    /// some, too. The tint of 9 of 10 bottles of the screen's own hue is less certain, that of no other by more than 0.024.
-    /// Hue: caps and labels (a fifth of a bottle) are treated as opaque, which they are; where more has it, it is the
-    /// plastic itself.
+    /// From which on a person should look at a cut-out. Of 48 rendered photos with ground truth the
+    /// 7 that have more keyed away had lost a cap, a label or their tint to the screen; the
+    /// most of the others is 0.0022, one of which had lost some, too. The tint of 9 of 10
+    /// bottles of the screen's own hue is less certain, that of no other by more than 0.024.
+    /// Hue: caps and labels (a fifth of a bottle) are treated as opaque, which they are; where more
+    /// has it, it is the plastic itself.
     pub const NEEDS_REVIEW: Self = Self {
         keyed_away: 0.005,
         screen_hue: 0.25,
@@ -36,7 +39,8 @@ impl ColorUncertainty {
         tint: 0.04,
     };
 
-    /// How certain colour and transmittance are, 0 to 1: 0.5 where one cause reaches [`NEEDS_REVIEW`](Self::NEEDS_REVIEW).
+    /// How certain colour and transmittance are, 0 to 1: 0.5 where one cause reaches
+    /// [`NEEDS_REVIEW`](Self::NEEDS_REVIEW).
     pub fn confidence(self) -> f64 {
         let all = self.causes().into_iter().zip(Self::NEEDS_REVIEW.causes());
         all.map(|(cause, limit)| certainty(cause.into(), limit.into()))
@@ -76,7 +80,8 @@ impl ColorUncertainty {
         )
     }
 
-    /// `share` of the object is brighter in the screen's hue than plastic in front of the screen can be.
+    /// `share` of the object is brighter in the screen's hue than plastic in front of the screen
+    /// can be.
     pub(in crate::matte) fn screen_hue(share: f32) -> Diagnostic {
         Diagnostic::new(
             Code::ScreenHue,
@@ -122,8 +127,8 @@ fn warning_above(limit: f32, value: f32) -> Severity {
 const MIN_REPORTED_HUE: f32 = 0.002;
 /// Share of the object that may be clipped without a report: glints.
 const MIN_REPORTED_CLIPPED: f32 = 0.03;
-/// Transmittance of the screen's channel from which on nothing seems to lie on the screen: two clear walls pass 0.56, one of
-/// them three quarters.
+/// Transmittance of the screen's channel from which on nothing seems to lie on the screen: two
+/// clear walls pass 0.56, one of them three quarters.
 const BARE_TRANSMITTANCE: f32 = 0.85;
 
 /// 1 without a cause, 0.5 where it reaches its limit.
@@ -131,8 +136,9 @@ fn certainty(cause: f64, limit: f64) -> f64 {
     limit / (limit + cause)
 }
 
-/// The share of the object that looks like bare screen, away from its rim, and was left see-through. `flat` is what flat
-/// plastic passes in the screen's channel, `longer_side` that of the whole photo, pixels.
+/// The share of the object that looks like bare screen, away from its rim, and was left
+/// see-through. `flat` is what flat plastic passes in the screen's channel, `longer_side` that of
+/// the whole photo, pixels.
 pub(super) fn keyed_away(
     factors: &Image<Factor>,
     inside: &Image<Coverage>,
@@ -157,8 +163,8 @@ fn prior_share(factor: &Factor, spread: f32) -> f64 {
     }
 }
 
-/// How much of the transmittance is the prior's, mean over the object: none of it where there is paint. `spread` is the
-/// deviation of the prior, `flat` the most that flat plastic passes.
+/// How much of the transmittance is the prior's, mean over the object: none of it where there is
+/// paint. `spread` is the deviation of the prior, `flat` the most that flat plastic passes.
 pub(super) fn guessed(
     factors: &Image<Factor>,
     inside: &Image<Coverage>,

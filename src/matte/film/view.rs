@@ -1,10 +1,12 @@
 //! From what a screen under the object shows to what the line of sight lets through.
 //!
-//! A screen is seen through the object *and* lit through it: `T = V * S`, V the share of the line of sight, S the share of
-//! the light that still reaches the screen there. Where the plastic lies flat the light comes the way the sight goes, so
-//! `S = V` and `T = V^2`. What makes T vary around that depends on where it is. At the rim the wall turns away and blocks
-//! the sight as it blocks the light. Deep inside it lies flat: what dims the screen there is mostly shadow, light that the
-//! folds above sent elsewhere, and the sight goes on; only what lets hardly anything through is a label or a fold.
+//! A screen is seen through the object *and* lit through it: `T = V * S`, V the share of the line
+//! of sight, S the share of the light that still reaches the screen there. Where the plastic lies
+//! flat the light comes the way the sight goes, so `S = V` and `T = V^2`. What makes T vary around
+//! that depends on where it is. At the rim the wall turns away and blocks the sight as it blocks
+//! the light. Deep inside it lies flat: what dims the screen there is mostly shadow, light that the
+//! folds above sent elsewhere, and the sight goes on; only what lets hardly anything through is a
+//! label or a fold.
 
 use super::object::{ramp, side_px};
 use crate::filter;
@@ -12,28 +14,33 @@ use crate::image::Image;
 use crate::pixel::{Coverage, LinearRgb, PremulRgba};
 use std::ops::RangeInclusive;
 
-// The numbers below are a least absolute fit over 48 rendered photos of 24 bottles, halfway between that for T as film()
-// finds it and that for the true T. The powers are those of a free fit, rounded.
+// The numbers below are a least absolute fit over 48 rendered photos of 24 bottles, halfway between
+// that for T as film() finds it and that for the true T. The powers are those of a free fit,
+// rounded.
 
 /// V of flat plastic over the root of its T.
 const FLAT_VIEW_GAIN: f32 = 1.033;
 /// At the rim V falls with u, T over that of flat plastic, like this times `u^(5/4)`.
 const RIM_GAIN: f32 = 0.77;
-/// Deep inside it is that of flat plastic, and turns to nothing around this u, with its third power.
+/// Deep inside it is that of flat plastic, and turns to nothing around this u, with its third
+/// power.
 const OPAQUE_RATIO: f32 = 0.45;
-/// Depth below the outline where both weigh the same, with its power 5/2, as a share of the side of a square of the
-/// object's area.
+/// Depth below the outline where both weigh the same, with its power 5/2, as a share of the side of
+/// a square of the object's area.
 const RIM_DEPTH: f32 = 0.05;
-/// Blur of T, standard deviation as a share of that side: finer than that are only grains of light on the screen.
+/// Blur of T, standard deviation as a share of that side: finer than that are only grains of light
+/// on the screen.
 const GRAIN_SIZE: f32 = 0.0025;
 /// No plastic passes more than this many times what flat plastic does.
 const MAX_RATIO: f32 = 1.3;
 /// From the first transmittance on to the second a pixel turns to bare screen.
 const BARE_TRANSMITTANCE: RangeInclusive<f32> = 0.9..=0.97;
 
-/// View transmittance from the measured one, channel by channel, of plastic that where it lies flat measures `flat`.
+/// View transmittance from the measured one, channel by channel, of plastic that where it lies flat
+/// measures `flat`.
 ///
-/// `transmittance` is that of the object alone, wherever `inside` is not 0; elsewhere it is ignored.
+/// `transmittance` is that of the object alone, wherever `inside` is not 0; elsewhere it is
+/// ignored.
 pub(in crate::matte) fn view(
     transmittance: &Image<LinearRgb>,
     flat: LinearRgb,
@@ -71,7 +78,8 @@ fn pixel_view(smooth: LinearRgb, flat: LinearRgb, t: LinearRgb, inner: f32) -> L
     )
 }
 
-/// View transmittance of one channel: `smooth` is its T without grain, `flat` that of flat plastic, `t` its own T.
+/// View transmittance of one channel: `smooth` is its T without grain, `flat` that of flat plastic,
+/// `t` its own T.
 #[inline(always)]
 fn channel_view(smooth: f32, flat: f32, t: f32, inner: f32) -> f32 {
     let plastic = plastic_view(smooth, flat, inner);

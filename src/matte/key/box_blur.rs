@@ -40,8 +40,8 @@ struct BoxBlur<S> {
 enum BoxKernel {
     /// Cut off at the border: the mean of the samples inside, `radius` to each side.
     CutOff { radius: usize, columns: Vec<f32> },
-    /// Repeating the border: the weights of the centre and of the samples at distance 1, 2, ..., and what they make of a
-    /// plane of 1.
+    /// Repeating the border: the weights of the centre and of the samples at distance 1, 2, ...,
+    /// and what they make of a plane of 1.
     Repeat { weights: Vec<f32>, of_ones: f32 },
 }
 

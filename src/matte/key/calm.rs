@@ -1,19 +1,21 @@
 //! Where a plane is calm: extremes of its values, block by block of a row.
 //!
-//! Most of a matte is exactly 0 or 1, and a window that sees one value only has nothing to compute. The extremes of every
-//! block of a row are noted once, when the row is made; what the many windows over it then ask is cheap. The shortcuts
-//! taken on that account give the same bits as the computation that they replace.
+//! Most of a matte is exactly 0 or 1, and a window that sees one value only has nothing to compute.
+//! The extremes of every block of a row are noted once, when the row is made; what the many windows
+//! over it then ask is cheap. The shortcuts taken on that account give the same bits as the
+//! computation that they replace.
 
 use super::rows::rows_around;
 use std::ops::Range;
 
 /// Columns of a block: a few vectors wide, narrow enough to fit between the edges of a subject.
 const BLOCK_COLUMNS: usize = 64;
-/// Columns computed at once where a plane is not calm: what the computation keeps fits the first cache.
+/// Columns computed at once where a plane is not calm: what the computation keeps fits the first
+/// cache.
 pub(super) const RUN_COLUMNS: usize = 512;
 
-/// The least and the greatest value of some part of a plane, in the total order of floats: a NaN is an extreme, so that
-/// no comparison with it holds.
+/// The least and the greatest value of some part of a plane, in the total order of floats: a NaN is
+/// an extreme, so that no comparison with it holds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Extremes {
     pub(super) least: f32,
@@ -89,8 +91,9 @@ impl Calm {
         }
     }
 
-    /// Fills row `y` of a result. `settled` is given the extremes of every block and of the window `rows` x `reach` around
-    /// it, and may know the one value that the block becomes; all other columns go to `compute`, at most [`RUN_COLUMNS`] at once.
+    /// Fills row `y` of a result. `settled` is given the extremes of every block and of the window
+    /// `rows` x `reach` around it, and may know the one value that the block becomes; all other
+    /// columns go to `compute`, at most [`RUN_COLUMNS`] at once.
     pub(super) fn fill_row(
         &mut self,
         out: &mut [f32],

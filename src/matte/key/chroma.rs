@@ -1,7 +1,8 @@
 //! Chroma pre-blur: the colour difference signals of a photo blurred, its brightness left sharp.
 //!
-//! The signals are those of ITU-R BT.709 with studio swing, in the rounding of Blender's own table. Its two matrices are
-//! not exact inverses of each other: even without blurring, colours move by up to 7e-4 per unit.
+//! The signals are those of ITU-R BT.709 with studio swing, in the rounding of Blender's own table.
+//! Its two matrices are not exact inverses of each other: even without blurring, colours move by up
+//! to 7e-4 per unit.
 
 use super::box_blur::box_blurred;
 use super::model::{Behaviour, Model, Robust};

@@ -1,14 +1,15 @@
 //! Dilate and erode: the largest or smallest value within a disc.
 //!
-//! A row of the disc is a run of samples, and the extreme of a run is that of two shorter runs that overlap. So every row
-//! of the source is kept with the extremes of all runs of 1, 2, 4, ... samples, and a disc of any size takes two
-//! look-ups a row instead of a sum over its area.
+//! A row of the disc is a run of samples, and the extreme of a run is that of two shorter runs that
+//! overlap. So every row of the source is kept with the extremes of all runs of 1, 2, 4, ...
+//! samples, and a disc of any size takes two look-ups a row instead of a sum over its area.
 
 use super::model::Behaviour;
 use super::options::{KeyOptions, Profile};
 use super::rows::{Pad, Rows, Source, Window, rows_around, window_rows};
 
-/// Blender up to 4.3 offers the disc no more than a window of this half-size, one short to the right and upwards.
+/// Blender up to 4.3 offers the disc no more than a window of this half-size, one short to the
+/// right and upwards.
 const MIN_LOPSIDED_DISTANCE: usize = 3;
 
 /// A matte grown or shrunk by a disc.
@@ -31,7 +32,8 @@ struct Disc {
 }
 
 impl Disc {
-    /// How far the disc reaches to the left and to the right, `dy` rows from its centre (upwards positive).
+    /// How far the disc reaches to the left and to the right, `dy` rows from its centre (upwards
+    /// positive).
     fn row_reach(self, dy: isize) -> Option<(usize, usize)> {
         let d = self.distance;
         let cut = self.lopsided && d >= MIN_LOPSIDED_DISTANCE;
@@ -115,7 +117,8 @@ impl Dilate<'_> {
         });
     }
 
-    /// The extremes of two runs of row `near`, for every pixel, that together reach from `left` to `right` of it.
+    /// The extremes of two runs of row `near`, for every pixel, that together reach from `left` to
+    /// `right` of it.
     fn two_runs(&self, near: usize, (left, right): (usize, usize)) -> [&[f32]; 2] {
         let (margin, width) = (self.shape.distance, self.width);
         let stride = width + 2 * margin;

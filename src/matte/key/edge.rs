@@ -81,7 +81,8 @@ impl<'a> EdgeSearch<'a> {
 
     fn search_row(&mut self, y: usize, half: usize, matte: &mut [f32], edges: &mut [f32]) {
         let (width, height, repeat) = (matte.len(), self.height, self.behaviour.repeats_border());
-        // Longer than elsewhere: window, source and notes are borrowed at once, and each row is searched while it is cached.
+        // Longer than elsewhere: window, source and notes are borrowed at once, and each row is
+        // searched while it is cached.
         let pad = Pad::repeat_or(repeat, f32::NAN);
         self.window
             .cover_rows(rows_around(y, half, height), |y, row| {
@@ -91,7 +92,8 @@ impl<'a> EdgeSearch<'a> {
             });
         matte.copy_from_slice(&self.window.row(y)[half..half + width]);
         let rows = rows_around(y, half, height);
-        // Where the whole window is alike no pixel is an edge; a lone pixel has no neighbours to be like.
+        // Where the whole window is alike no pixel is an edge; a lone pixel has no neighbours to be
+        // like.
         let alike = |_, near: Extremes| {
             (near.greatest - near.least < self.tolerance && width * height > 1).then_some(0.0)
         };
@@ -136,7 +138,8 @@ fn alike_value(a: f32, b: f32, tolerance: f32) -> f32 {
     if (a - b).abs() < tolerance { 1.0 } else { 0.0 }
 }
 
-/// Counts, for every pixel of a row, the samples of a padded row that lie in its window and are like it.
+/// Counts, for every pixel of a row, the samples of a padded row that lie in its window and are
+/// like it.
 #[multiversion::multiversion(targets(
     "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2",
     "x86_64+avx2",

@@ -1,4 +1,5 @@
-//! Feather: the matte grows along a falloff, and blends into a Gaussian blur of itself where it does.
+//! Feather: the matte grows along a falloff, and blends into a Gaussian blur of itself where it
+//! does.
 
 use super::calm::{Calm, Extremes, RUN_COLUMNS};
 use super::model::Behaviour;
@@ -103,7 +104,8 @@ fn total_from_left(gauss: &[f32]) -> f32 {
         .fold(0.0, |sum, g| sum + g)
 }
 
-/// The Gaussian at a share `t` of the feather distance, single precision but for the exponential, which is rounded once.
+/// The Gaussian at a share `t` of the feather distance, single precision but for the exponential,
+/// which is rounded once.
 fn gaussian_weight(t: f32) -> f32 {
     let q = t * GAUSSIAN_REACH;
     let height = 1.0 / (std::f32::consts::PI * TWICE_VARIANCE).sqrt();
@@ -165,7 +167,8 @@ impl Rows for Feather<'_> {
             calm_source.note_row(0, row);
             kernel.pad_row(row, candidates, samples);
             kernel.along_x([candidates, samples], columns, calm_source, row);
-            // The pass along x ends by turning its result back, the pass along y begins by turning it again.
+            // The pass along x ends by turning its result back, the pass along y begins by turning
+            // it again.
             kernel.invert_if_inward(row);
             kernel.invert_if_inward(row);
             calm.note_row(y, row);
@@ -175,7 +178,8 @@ impl Rows for Feather<'_> {
     }
 }
 
-/// A row of candidates and the same row as samples of a sum, with the falloff and the Gaussian weight at its distance.
+/// A row of candidates and the same row as samples of a sum, with the falloff and the Gaussian
+/// weight at its distance.
 type Tap<'r> = ([&'r [f32]; 2], [f32; 2]);
 
 impl FeatherKernel {
@@ -200,7 +204,8 @@ impl FeatherKernel {
         }
     }
 
-    /// The Gaussian weights whose samples lie inside the picture, added up in the order of the visit.
+    /// The Gaussian weights whose samples lie inside the picture, added up in the order of the
+    /// visit.
     fn weight_inside(&self, at: usize, length: usize) -> f32 {
         rows_around(at, self.radius(), length)
             .fold(0.0, |sum, other| sum + self.gauss[other.abs_diff(at)])
@@ -235,8 +240,8 @@ impl FeatherKernel {
         );
     }
 
-    /// The order of the samples that lie inside, `up` rows above the bottom. Windows that are cut off keep the middle of the
-    /// order, which runs upwards for them.
+    /// The order of the samples that lie inside, `up` rows above the bottom. Windows that are cut
+    /// off keep the middle of the order, which runs upwards for them.
     fn order_inside(&self, up: usize, height: usize) -> &[isize] {
         match self.behaviour {
             Behaviour::V45 => &self.order[..],
@@ -273,8 +278,8 @@ impl FeatherKernel {
         );
     }
 
-    /// Visits every sample of the window in order, and blends: the best candidate where there was one, elsewhere more and
-    /// more of the Gaussian mean.
+    /// Visits every sample of the window in order, and blends: the best candidate where there was
+    /// one, elsewhere more and more of the Gaussian mean.
     fn visit_taps<'r>(
         &self,
         order: &[isize],
@@ -282,7 +287,8 @@ impl FeatherKernel {
         totals: &[f32],
         out: &mut [f32],
     ) {
-        // Longer than elsewhere: three buffers on the stack are lent to one loop for every kind of window.
+        // Longer than elsewhere: three buffers on the stack are lent to one loop for every kind of
+        // window.
         let tap = |side: isize| -> Tap<'r> {
             let i = side.unsigned_abs();
             (row(side), [self.falloff[i], self.gauss[i]])
@@ -324,7 +330,8 @@ fn blend_row(
     }
 }
 
-/// Taps offered in one go, so that what was found stays in registers; the order is that of one at a time.
+/// Taps offered in one go, so that what was found stays in registers; the order is that of one at a
+/// time.
 const TAPS_AT_ONCE: usize = 4;
 
 /// Offers all taps in order to the pixels of a row: best candidate, its weight, sum of the blur.
@@ -358,7 +365,8 @@ fn offer_taps<const LIMITED: bool, const N: usize>(
     blur: &mut [f32],
     taps: [Tap<'_>; N],
 ) {
-    // Longer than elsewhere: all that happens to a pixel stands in one loop, which is made vectors of.
+    // Longer than elsewhere: all that happens to a pixel stands in one loop, which is made vectors
+    // of.
     let len = best.len();
     let (weight, blur) = (&mut weight[..len], &mut blur[..len]);
     let rows = taps.map(|([candidates, samples], _)| (&candidates[..len], &samples[..len]));

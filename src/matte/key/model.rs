@@ -1,11 +1,13 @@
-//! The three behaviours of the raw matte, one type each, so that a row loop is compiled for exactly one of them.
+//! The three behaviours of the raw matte, one type each, so that a row loop is compiled for exactly
+//! one of them.
 
 use super::options::Profile;
 use crate::pixel::{LinearRgb, PremulRgba};
 
 /// What the profiles compute differently at a single pixel.
 pub(super) trait Model: 'static {
-    /// The balance mix of the two channels that are not the key's: `b lo + (1 - b) hi`, in one of two roundings.
+    /// The balance mix of the two channels that are not the key's: `b lo + (1 - b) hi`, in one of
+    /// two roundings.
     #[inline(always)]
     fn mix(balance: f32, lo: f32, hi: f32) -> f32 {
         balance * lo + (1.0 - balance) * hi
@@ -61,7 +63,8 @@ impl Model for Robust {
     }
 }
 
-/// Largest magnitude that the robust profile computes with: beyond it, sums in single precision could reach infinity.
+/// Largest magnitude that the robust profile computes with: beyond it, sums in single precision
+/// could reach infinity.
 const MAX_USABLE: f32 = 1e30;
 
 /// The second of two numbers where it is less, else the first.
@@ -70,7 +73,8 @@ fn lesser(a: f32, b: f32) -> f32 {
     if b < a { b } else { a }
 }
 
-/// Whether the robust profile takes a pixel as it is: no channel is NaN, infinite or too large to compute with.
+/// Whether the robust profile takes a pixel as it is: no channel is NaN, infinite or too large to
+/// compute with.
 #[inline(always)]
 pub(super) fn is_usable(p: PremulRgba) -> bool {
     // `&` instead of `&&`: without branches the row loops vectorise.

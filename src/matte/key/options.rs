@@ -17,8 +17,8 @@ pub enum Profile {
     /// Blender 4.5 and 5.0, bit for bit.
     #[serde(rename = "blender-4.5")]
     Blender45,
-    /// Blender 3.4 made safe: refuses keys that cannot work, gives defined output for every input, and counts what it
-    /// changed (see [`Deviations`](super::Deviations)).
+    /// Blender 3.4 made safe: refuses keys that cannot work, gives defined output for every input,
+    /// and counts what it changed (see [`Deviations`](super::Deviations)).
     #[serde(rename = "robust")]
     Robust,
 }
@@ -71,35 +71,39 @@ pub enum Blur {
     /// Sample by sample in Blender's order: Blender's bits.
     #[default]
     Exact,
-    /// By running sums, whose cost does not depend on the size: nearer the true mean than Blender is. Samples are rounded
-    /// to 2^-24 and held within 65504 (half precision's largest); NaN counts as 0. An edge that only
-    /// just is one may not be found, so that the levels clip it.
+    /// By running sums, whose cost does not depend on the size: nearer the true mean than Blender
+    /// is. Samples are rounded to 2^-24 and held within 65504 (half precision's largest); NaN
+    /// counts as 0. An edge that only just is one may not be found, so that the levels clip it.
     ///
-    /// Worth it beyond a size of about ten: on a 4K frame with both blurs at 6, 20 and 60 it takes 1.1, 0.6 and 0.3 of
-    /// the time and differs by 1.8e-7, 3.6e-7 and 6.6e-7 at most (`cargo bench --bench matte`).
+    /// Worth it beyond a size of about ten: on a 4K frame with both blurs at 6, 20 and 60 it takes
+    /// 1.1, 0.6 and 0.3 of the time and differs by 1.8e-7, 3.6e-7 and 6.6e-7 at most (`cargo
+    /// bench --bench matte`).
     RunningSum,
 }
 
 /// Settings of the [keyer](super), under the names that Blender 3.4 gives its Keying node.
 ///
-/// The ranges are Blender's. [`Keying::run`](super::Keying::run) refuses values outside them, [`key`](super::key) moves
-/// them to the nearest end.
+/// The ranges are Blender's. [`Keying::run`](super::Keying::run) refuses values outside them,
+/// [`key`](super::key) moves them to the nearest end.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct KeyOptions {
     /// Which keyer to be. Default: `blender-3.4`.
     pub profile: Profile,
-    /// Size of the blur of the chroma before keying, 0 to 2048 pixels; against noise and chroma subsampling. Default: 0.
+    /// Size of the blur of the chroma before keying, 0 to 2048 pixels; against noise and chroma
+    /// subsampling. Default: 0.
     pub blur_pre: u32,
     /// How both blurs add up. Not a setting of Blender's. Default: `exact`.
     pub blur: Blur,
-    /// Which of the two other channels the key is weighed against: 0 = the later one, 1 = the earlier one. Default: 0.5.
+    /// Which of the two other channels the key is weighed against: 0 = the later one, 1 = the
+    /// earlier one. Default: 0.5.
     pub screen_balance: f32,
     /// Raw matte at or below this becomes 0, in 0..1. Default: 0.
     pub clip_black: f32,
     /// Raw matte at or above this becomes 1, in 0..1. Default: 1.
     pub clip_white: f32,
-    /// Half-size of the window in which edges are found, which are not clipped, 0 to 100 pixels. Default: 3.
+    /// Half-size of the window in which edges are found, which are not clipped, 0 to 100 pixels.
+    /// Default: 3.
     pub edge_kernel_radius: u32,
     /// Matte values closer than this are alike for the edge search, in 0..1. Default: 0.1.
     pub edge_kernel_tolerance: f32,
@@ -107,20 +111,25 @@ pub struct KeyOptions {
     pub blur_post: u32,
     /// Pixels by which the matte grows, or shrinks where negative, -100 to 100. Default: 0.
     pub dilate_distance: i32,
-    /// Pixels over which the matte is feathered, outwards or, where negative, inwards, -100 to 100. Default: 0.
+    /// Pixels over which the matte is feathered, outwards or, where negative, inwards, -100 to
+    /// 100. Default: 0.
     pub feather_distance: i32,
     /// Shape of the feathered edge. Default: `SMOOTH`.
     pub feather_falloff: Falloff,
-    /// How much of the screen's colour that exceeds the other channels is taken away, in 0..1. Default: 1.
+    /// How much of the screen's colour that exceeds the other channels is taken away, in 0..1.
+    /// Default: 1.
     pub despill_factor: f32,
-    /// Which of the two other channels the despill compares with, as `screen_balance`. Default: 0.5.
+    /// Which of the two other channels the despill compares with, as `screen_balance`. Default:
+    /// 0.5.
     pub despill_balance: f32,
-    /// Leaves out the factor `|1 - v|` that ties the matte to brightness. Not Blender's matte. Default: false.
+    /// Leaves out the factor `|1 - v|` that ties the matte to brightness. Not Blender's matte.
+    /// Default: false.
     pub ignore_brightness: bool,
-    /// The picture loses what is left of the screen, `max(0, I - (1 - M) K)`, instead of being multiplied by its matte
-    /// and despilled. Not Blender's picture. Default: false.
+    /// The picture loses what is left of the screen, `max(0, I - (1 - M) K)`, instead of being
+    /// multiplied by its matte and despilled. Not Blender's picture. Default: false.
     pub subtract_screen: bool,
-    /// Lets the `robust` profile key against a screen too grey to be distinguished from the foreground. Default: false.
+    /// Lets the `robust` profile key against a screen too grey to be distinguished from the
+    /// foreground. Default: false.
     pub accept_weak_key: bool,
 }
 
@@ -186,7 +195,8 @@ impl KeyOptions {
         })
     }
 
-    /// Every setting moved to the nearest value that Blender's node can hold; a fraction that is NaN becomes 0.
+    /// Every setting moved to the nearest value that Blender's node can hold; a fraction that is
+    /// NaN becomes 0.
     pub fn clamped(&self) -> Self {
         Self {
             blur_pre: self.blur_pre.min(MAX_BLUR_SIZE),

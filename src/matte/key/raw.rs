@@ -61,7 +61,8 @@ impl Terms {
     }
 }
 
-/// The raw matte of one pixel against a screen of its own; the primary channel is the screen's, or the one given.
+/// The raw matte of one pixel against a screen of its own; the primary channel is the screen's, or
+/// the one given.
 #[inline(always)]
 pub(super) fn matte_against<M: Model>(
     p: PremulRgba,

@@ -1,4 +1,5 @@
-//! What the robust profile adds: keys that cannot work are refused, holes in plates are filled, and all is counted.
+//! What the robust profile adds: keys that cannot work are refused, holes in plates are filled, and
+//! all is counted.
 
 use super::model::{is_usable, primary_channel};
 use super::options::{KeyOptions, Profile};
@@ -12,14 +13,15 @@ use crate::pixel::{Coverage, LinearRgb, PremulRgba};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Least excess of a key's primary channel over the other two, and least saturation: below, noise of half a percent
-/// becomes matte noise of a quarter.
+/// Least excess of a key's primary channel over the other two, and least saturation: below, noise
+/// of half a percent becomes matte noise of a quarter.
 const MIN_KEY_STRENGTH: f32 = 0.02;
 
 /// Channel names for messages.
 const CHANNEL_NAMES: [&str; 3] = ["red", "green", "blue"];
 
-/// How far a colour exceeds the grey of its other channels in `channel`: the lesser of excess and saturation.
+/// How far a colour exceeds the grey of its other channels in `channel`: the lesser of excess and
+/// saturation.
 fn key_strength(key: LinearRgb, channel: usize, balance: f32) -> f32 {
     let c = key.channels();
     let (lo, hi) = other_channels(c, channel);
@@ -76,8 +78,8 @@ pub(super) struct FilledPlate {
 /// Fills the pixels of a plate that are no usable key from those around them.
 ///
 /// # Method
-/// A pyramid of halved means that count only the usable pixels; a hole takes the colour of the finest level that has one.
-/// # Errors
+/// A pyramid of halved means that count only the usable pixels; a hole takes the colour of the
+/// finest level that has one. # Errors
 /// [`Error::Value`] where no pixel of the plate is usable.
 pub(super) fn fill_plate(plate: &Image<LinearRgb>, options: &KeyOptions) -> Result<FilledPlate> {
     let channel = primary_channel(usable_mean(plate));
@@ -176,7 +178,8 @@ fn unusable_in_row<P: Photo>(keying: &Keying<'_, P>, y: usize) -> Deviations {
     }
 }
 
-/// The screen as the robust profile keys against it: a plate without holes, its mean's primary channel.
+/// The screen as the robust profile keys against it: a plate without holes, its mean's primary
+/// channel.
 pub(super) fn without_holes(
     screen: Screen<'_>,
     options: &KeyOptions,

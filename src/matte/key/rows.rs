@@ -1,11 +1,12 @@
 //! Planes that exist a few rows at a time.
 //!
-//! Every stage of the keyer turns one plane of matte values into another. A stage that kept whole planes would send a 4K
-//! frame through main memory again and again; instead each stage is asked for one row, asks the stage before it for the
-//! rows that this takes, and keeps those that the next row needs again. A frame then passes through main memory once.
+//! Every stage of the keyer turns one plane of matte values into another. A stage that kept whole
+//! planes would send a 4K frame through main memory again and again; instead each stage is asked
+//! for one row, asks the stage before it for the rows that this takes, and keeps those that the
+//! next row needs again. A frame then passes through main memory once.
 //!
-//! For this the functions of rows are longer than elsewhere: they borrow the buffers of their stage all at once, and loops
-//! that a compiler is to make vectors of stand in one piece.
+//! For this the functions of rows are longer than elsewhere: they borrow the buffers of their stage
+//! all at once, and loops that a compiler is to make vectors of stand in one piece.
 
 use std::ops::Range;
 
@@ -78,7 +79,8 @@ pub(super) fn rows_around(y: usize, radius: usize, height: usize) -> Range<usize
     y.saturating_sub(radius)..y.saturating_add(radius).saturating_add(1).min(height)
 }
 
-/// The rows that a window of that radius looks at, from the top: cut off at the border, or repeating it.
+/// The rows that a window of that radius looks at, from the top: cut off at the border, or
+/// repeating it.
 pub(super) fn looked_at(
     y: usize,
     radius: usize,

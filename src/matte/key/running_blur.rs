@@ -1,15 +1,15 @@
 //! Box blur by running sums: its cost does not depend on its size, its bits are nearly Blender's.
 //!
-//! Samples are held to a grid so coarse that sums of them are exact. What enters a sum leaves it without a trace, and a
-//! band of rows finds the same sums wherever it starts.
+//! Samples are held to a grid so coarse that sums of them are exact. What enters a sum leaves it
+//! without a trace, and a band of rows finds the same sums wherever it starts.
 
 use super::rows::{Pad, Rows, Window, rows_around, window_rows};
 use std::ops::Range;
 
 /// Largest magnitude of a sample: that of half precision.
 const MAX_SAMPLE: f32 = 65_504.0;
-/// Adding and subtracting this rounds a double to multiples of 2^-24; a sum of 4095 samples up to [`MAX_SAMPLE`] then takes 52
-/// of a double's 53 bits.
+/// Adding and subtracting this rounds a double to multiples of 2^-24; a sum of 4095 samples up to
+/// [`MAX_SAMPLE`] then takes 52 of a double's 53 bits.
 const GRID_ROUNDER: f64 = 1.5 * (1u64 << 28) as f64;
 
 /// Which samples a box covers.

@@ -130,7 +130,8 @@ impl<'a, P: Photo> Stream<'a, P> {
         }
     }
 
-    /// A band starts by computing the rows above it that its windows reach; longer bands do so less often.
+    /// A band starts by computing the rows above it that its windows reach; longer bands do so less
+    /// often.
     fn band_rows(&self, height: usize) -> usize {
         let threads = rayon::current_num_threads();
         let rounds = height / (threads * self.min_band_rows());
@@ -210,7 +211,8 @@ impl<'a, P: Photo> Stream<'a, P> {
                 careful,
             });
         }
-        // Blender 4.5 applies a core matte of 0 where none is given, which matters below a garbage matte above 1.
+        // Blender 4.5 applies a core matte of 0 where none is given, which matters below a garbage
+        // matte above 1.
         if needs_core {
             source = Box::new(Core {
                 source,
@@ -253,8 +255,8 @@ impl<'a, P: Photo> Stream<'a, P> {
     }
 }
 
-/// Makes a picture that size, keeping it where it is. Its memory is first touched by the threads that fill it: making
-/// 4K pictures on one thread takes several times as long as keying.
+/// Makes a picture that size, keeping it where it is. Its memory is first touched by the threads
+/// that fill it: making 4K pictures on one thread takes several times as long as keying.
 pub(super) fn fit_size<Q: Zeroable + Copy>(image: &mut Image<Q>, width: usize, height: usize) {
     if image.size() != (width, height) {
         *image = Image::from_vec(

@@ -1,5 +1,5 @@
-//! Single pixels and rows with the digits that Blender prints. Whole pictures are held against Blender in `tests/golden`, numbers
-//! at their extremes are rows of `petcomp-report stability`.
+//! Single pixels and rows with the digits that Blender prints. Whole pictures are held against
+//! Blender in `tests/golden`, numbers at their extremes are rows of `petcomp-report stability`.
 
 #![expect(
     clippy::excessive_precision,
@@ -300,16 +300,18 @@ fn running_sums_are_blenders_up_to_its_own_rounding() {
                 both.map(|(a, b)| f64::from((a.0 - b.0).abs()))
                     .fold(0.0, f64::max)
             };
-            // A pass adds up to 2 size samples within 0 to 1 in single precision, each addition wrong by half a step at
-            // most; the running sum rounds each sample by as little, once.
+            // A pass adds up to 2 size samples within 0 to 1 in single precision, each addition
+            // wrong by half a step at most; the running sum rounds each sample by as
+            // little, once.
             let bound = f64::from(2 * (2 * size + 2)) * 2f64.powi(-24);
             assert!(
                 differ(0) <= bound,
                 "{profile:?} {size}: {} > {bound}",
                 differ(0)
             );
-            // An error e of both colour differences moves green by at most 0.75 e and the mean of the others by 1.95 e,
-            // hence the matte by less than 4 e / S, with S = 0.51 for this screen.
+            // An error e of both colour differences moves green by at most 0.75 e and the mean of
+            // the others by 1.95 e, hence the matte by less than 4 e / S, with S = 0.51
+            // for this screen.
             let bound = bound * (1.0 + 4.0 / 0.51);
             assert!(
                 differ(size) <= bound,

@@ -1,4 +1,5 @@
-//! Means over small cells of the picture: little noise, few numbers, and medians where outliers must not count.
+//! Means over small cells of the picture: little noise, few numbers, and medians where outliers
+//! must not count.
 
 use crate::image::{Image, Mask};
 use crate::matte::arrays::largest_difference;
@@ -6,7 +7,8 @@ use crate::matte::median::median;
 use crate::pixel::LinearRgb;
 use std::ops::Range;
 
-/// Cells along the longer side of a picture: enough for any smooth screen, few enough to be fitted in no time.
+/// Cells along the longer side of a picture: enough for any smooth screen, few enough to be fitted
+/// in no time.
 const CELLS_ALONG_SIDE: usize = 48;
 /// A cell counts if at least this share of its pixels shows the screen.
 const MIN_SCREEN_SHARE: f64 = 0.5;
@@ -108,7 +110,8 @@ fn add_to<const N: usize>(sums: &mut [f64; N], values: [f64; N]) {
     }
 }
 
-/// The factor per channel from the second picture's cells to the first's: the median of their quotients.
+/// The factor per channel from the second picture's cells to the first's: the median of their
+/// quotients.
 pub(super) fn gain(photo: &[Cell], plate: &[Cell]) -> Option<LinearRgb> {
     let [r, g, b] = [0, 1, 2].map(|c| {
         let quotients = pairs(photo, plate)
@@ -119,7 +122,8 @@ pub(super) fn gain(photo: &[Cell], plate: &[Cell]) -> Option<LinearRgb> {
     Some([r? as f32, g? as f32, b? as f32].into())
 }
 
-/// Median over the cells of the largest difference between the channels, as a share of the brightest channel.
+/// Median over the cells of the largest difference between the channels, as a share of the
+/// brightest channel.
 pub(super) fn mismatch(photo: &[Cell], plate: &[Cell]) -> f32 {
     let differences = pairs(photo, plate).map(|(a, b)| a.relative_difference(b));
     median(differences, f64::total_cmp).unwrap_or(0.0) as f32
@@ -147,8 +151,8 @@ fn pairs<'a>(a: &'a [Cell], b: &'a [Cell]) -> impl Iterator<Item = (&'a Cell, &'
     })
 }
 
-/// Standard deviation of a photo around a plate where the screen is free, channel by channel, by the median of the
-/// absolute differences: what is not screen after all does not count.
+/// Standard deviation of a photo around a plate where the screen is free, channel by channel, by
+/// the median of the absolute differences: what is not screen after all does not count.
 pub(super) fn deviation(
     photo: &Image<LinearRgb>,
     plate: &Image<LinearRgb>,

@@ -18,14 +18,17 @@ pub(super) struct Polynomial {
     coefficients: [DVector<f64>; 3],
 }
 
-/// A channel that is darker than this share of the brightest is held there: the logarithm of nothing is not fitted.
+/// A channel that is darker than this share of the brightest is held there: the logarithm of
+/// nothing is not fitted.
 const MIN_BRIGHTNESS: f64 = 1e-4;
 /// Rounds of reweighting.
 const REWEIGHTING_ROUNDS: usize = 8;
-/// Residual in standard deviations beyond which a cell does not count at all (Tukey's biweight, 95 % efficient).
+/// Residual in standard deviations beyond which a cell does not count at all (Tukey's biweight, 95
+/// % efficient).
 const TUKEY_SIGMAS: f64 = 4.685;
-/// The same for what is darker than the fit, in standard deviations of what is brighter: objects darken the screen around
-/// them far and wide and never brighten it, so that the brighter cells show the noise, and the darker ones the shadow.
+/// The same for what is darker than the fit, in standard deviations of what is brighter: objects
+/// darken the screen around them far and wide and never brighten it, so that the brighter cells
+/// show the noise, and the darker ones the shadow.
 const SHADOW_SIGMAS: f64 = 1.5;
 /// Relative noise of a cell below which nothing is an outlier: the coding of an 8-bit picture.
 const CELL_NOISE: f64 = 2e-3;
@@ -34,7 +37,8 @@ const MIN_CELLS_PER_COEFFICIENT: usize = 4;
 /// One cell in this many is left out of the fit that chooses the degree.
 const HELD_OUT_STRIDE: usize = 3;
 
-/// A cell as the fit sees it: the monomials of its place, lower degrees first, and its channels' logarithms.
+/// A cell as the fit sees it: the monomials of its place, lower degrees first, and its channels'
+/// logarithms.
 struct FitSample {
     basis: Vec<f64>,
     log: [f64; 3],
@@ -86,7 +90,8 @@ impl Polynomial {
     }
 }
 
-/// The exponential of a polynomial, lowest coefficient first, at many places: whole rows, so that they are vectorised.
+/// The exponential of a polynomial, lowest coefficient first, at many places: whole rows, so that
+/// they are vectorised.
 fn exponentials(coefficients: &[f32], at: &[f32]) -> Vec<f32> {
     let mut values = vec![0.0_f32; at.len()];
     for k in coefficients.iter().rev() {
@@ -99,14 +104,17 @@ fn exponentials(coefficients: &[f32], at: &[f32]) -> Vec<f32> {
     values
 }
 
-/// Added to a number and taken away again it leaves the nearest integer: its unit in the last place is 1.
+/// Added to a number and taken away again it leaves the nearest integer: its unit in the last place
+/// is 1.
 const NEAREST_INTEGER: f32 = 1.5 * (1 << 23) as f32;
-/// The logarithm of 2 as the sum of a number of few bits, of which any multiple here is exact, and a small rest.
+/// The logarithm of 2 as the sum of a number of few bits, of which any multiple here is exact, and
+/// a small rest.
 const LN_2: [f32; 2] = [355.0 / 512.0, -2.121_944_4e-4];
 /// Where the result would be too small or too large for a normal number.
 const EXP_RANGE: [f32; 2] = [-87.0, 88.0];
 
-/// `e^x` to two units in the last place, without the branches of `libm` that keep it from being vectorised.
+/// `e^x` to two units in the last place, without the branches of `libm` that keep it from being
+/// vectorised.
 ///
 /// `e^x = 2^k e^r` with `|r| <= ln 2 / 2`, the latter by its series.
 fn exp(x: f32) -> f32 {
@@ -182,7 +190,8 @@ fn monomials(exponents: &[[usize; 2]], [u, v]: [f64; 2]) -> Vec<f64> {
         .collect()
 }
 
-/// The lowest degree that no higher one beats by the least gain, by the error at cells that are left out.
+/// The lowest degree that no higher one beats by the least gain, by the error at cells that are
+/// left out.
 fn chosen_degree(samples: &[FitSample], options: &PlateOptions) -> usize {
     let degrees = usable_degrees(samples.len(), options.max_degree);
     let split = HeldOut::new(samples);
@@ -216,8 +225,8 @@ impl<'a> HeldOut<'a> {
         }
     }
 
-    /// Median absolute error at the cells that were left out, of the brightest channel: the others have its shape and more
-    /// noise.
+    /// Median absolute error at the cells that were left out, of the brightest channel: the others
+    /// have its shape and more noise.
     fn error(&self, degree: usize) -> f64 {
         if self.fitted.len() < terms(degree) {
             return f64::MAX;
@@ -274,7 +283,8 @@ fn robust_sigma<'a>(residuals: impl Iterator<Item = &'a f64>) -> f64 {
     cells::robust_sigma(residuals.map(|r| r.abs())).max(CELL_NOISE)
 }
 
-/// Weighted least squares by the first `n` monomials, a trace of the identity added so that too few cells are no disaster.
+/// Weighted least squares by the first `n` monomials, a trace of the identity added so that too few
+/// cells are no disaster.
 fn least_squares(
     samples: &[&FitSample],
     channel: usize,

@@ -89,8 +89,8 @@ impl Bands {
 
     /// What is about `2^level` pixels wide, brought to the photo's size; `level` is 2 or more.
     ///
-    /// Each pixel holds the largest of the 3 x 3 values around it: a band passes through 0 on the very edge that it
-    /// shows.
+    /// Each pixel holds the largest of the 3 x 3 values around it: a band passes through 0 on the
+    /// very edge that it shows.
     pub(super) fn at_full_size(&self, level: usize) -> Image<f32> {
         let band = self.coarser[level - 2].clone();
         let finer = self.sizes[..level - 1].iter().rev();
@@ -100,9 +100,9 @@ impl Bands {
 
 /// Weighted mean of the square roots of the channels.
 ///
-/// The square root makes the shot noise of a sensor the same everywhere (the transform of Anscombe without its offset)
-/// and is near to what a display-encoded picture holds. Equal weights keep a blue screen from going black, which
-/// luminance would do.
+/// The square root makes the shot noise of a sensor the same everywhere (the transform of Anscombe
+/// without its offset) and is near to what a display-encoded picture holds. Equal weights keep a
+/// blue screen from going black, which luminance would do.
 pub(super) fn luma_root(photo: &Image<LinearRgb>, weights: [f32; 3]) -> Image<f32> {
     let sum: f32 = weights.iter().sum();
     let shares = weights.map(|w| w / sum);
@@ -124,8 +124,8 @@ fn band_magnitudes(picture: Image<f32>, count: usize) -> Vec<Image<f32>> {
 
 /// The bands of some channels as one, in units of noise: root of the sum of squares.
 ///
-/// No channel counts as less noisy than half their median: square roots have the same shot noise in all of them, and one
-/// that seems to have none is clipped.
+/// No channel counts as less noisy than half their median: square roots have the same shot noise in
+/// all of them, and one that seems to have none is clipped.
 fn in_units_of_noise(bands: Vec<Image<f32>>) -> Image<f32> {
     let noises: Vec<f32> = bands.iter().map(noise_sigma).collect();
     let least = 0.5 * median_noise(&noises);
@@ -190,11 +190,12 @@ const QUARTILE_OF_NORMAL: f32 = 0.318_64;
 /// Least noise: the rounding of an 8-bit picture, one step over the square root of 12.
 const ROUNDING_SIGMA: f32 = 1.0 / 255.0 / 3.464;
 
-/// Standard deviation of a band on the background, robust against an object that reaches into the frame.
+/// Standard deviation of a band on the background, robust against an object that reaches into the
+/// frame.
 ///
 /// # Method
-/// As the median absolute deviation, but from the lower quartile and along the border of the picture, where an object
-/// is not: `quartile / 0.3186` for normal noise.
+/// As the median absolute deviation, but from the lower quartile and along the border of the
+/// picture, where an object is not: `quartile / 0.3186` for normal noise.
 fn noise_sigma(magnitudes: &Image<f32>) -> f32 {
     let quartile = quantile(frame_values(magnitudes), QUIET_SHARE, f32::total_cmp);
     quartile.map_or(ROUNDING_SIGMA, |quartile| {
@@ -262,7 +263,8 @@ mod tests {
                 if x < 90 || y < 50 { 0.5 } else { quiet[(x, y)] }
             },
         );
-        // Two thirds of the frame are covered: the lower quartile is then the 0.76 quantile of the noise, 3.7 times its own.
+        // Two thirds of the frame are covered: the lower quartile is then the 0.76 quantile of the
+        // noise, 3.7 times its own.
         assert!(noise_sigma(&busy) < 4.0 * noise_sigma(&quiet));
     }
 

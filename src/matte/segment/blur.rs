@@ -7,23 +7,26 @@ use crate::matte::median::median;
 use crate::pixel::LinearRgb;
 use rayon::prelude::*;
 
-/// How far to either side of the outline a profile goes, pixels of the picture that was searched: an edge blurred by 2
-/// pixels is over.
+/// How far to either side of the outline a profile goes, pixels of the picture that was searched:
+/// an edge blurred by 2 pixels is over.
 const PROFILE_REACH_PX: i32 = 5;
 /// Distance of the profiles along the outline, likewise.
 const PROFILE_SPACING_PX: f64 = 2.0;
-/// Least change along a profile (of square roots) that has a measurable blur: ten steps of an 8-bit picture.
+/// Least change along a profile (of square roots) that has a measurable blur: ten steps of an 8-bit
+/// picture.
 const MIN_CHANGE: f32 = 0.04;
-/// Highest slope of a step of height 1 that is blurred by a Gaussian of deviation 1: `1 / sqrt(2 pi)`.
+/// Highest slope of a step of height 1 that is blurred by a Gaussian of deviation 1: `1 / sqrt(2
+/// pi)`.
 const GAUSSIAN_SLOPE: f64 = 0.398_942;
 
-/// Standard deviation of the edges' blur, in pixels of the picture that was searched; 0 where no edge is clear enough.
+/// Standard deviation of the edges' blur, in pixels of the picture that was searched; 0 where no
+/// edge is clear enough.
 ///
 /// `scale` is pixels of the photo for one of those.
 ///
 /// # Method
-/// Along profiles across the outline, the steepest change over one pixel as a share of the whole change: `1 / (sqrt(2 pi)
-/// sigma)` for a blurred step. The median over the outline.
+/// Along profiles across the outline, the steepest change over one pixel as a share of the whole
+/// change: `1 / (sqrt(2 pi) sigma)` for a blurred step. The median over the outline.
 pub(super) fn edge_blur_px(outline: &Outline, roots: &Image<LinearRgb>, scale: f64) -> f64 {
     let spacing = PROFILE_SPACING_PX * scale.max(1.0);
     let points: Vec<_> = outline
@@ -46,7 +49,8 @@ fn profile(roots: &Image<LinearRgb>, point: &EdgePoint, scale: f64) -> Vec<Linea
         .collect()
 }
 
-/// The steepest change over a pixel, as a share of the whole change; nothing where hardly anything changes.
+/// The steepest change over a pixel, as a share of the whole change; nothing where hardly anything
+/// changes.
 fn steepest_share(profile: &[LinearRgb]) -> Option<f32> {
     let pairs = (0..profile.len()).flat_map(|i| profile[i..].iter().map(move |b| (&profile[i], b)));
     let whole = largest_distance(pairs);
@@ -79,7 +83,8 @@ mod tests {
         };
         for sigma in [1.0f32, 1.5, 2.0] {
             let found = edge_blur_px(&circle, &filter::gaussian_blur(&sharp, sigma), 1.0);
-            // The slope is taken over a pixel, and pixels and sampling blur by about half of one themselves.
+            // The slope is taken over a pixel, and pixels and sampling blur by about half of one
+            // themselves.
             assert!(
                 (found - f64::from(sigma)).abs() < 0.3,
                 "{found} for {sigma}"

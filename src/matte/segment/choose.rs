@@ -31,10 +31,11 @@ pub(super) struct ChosenSearch<'a> {
 
 /// A picture size and the depths to search it at, the default one first.
 ///
-/// Half the size sees half the noise, and a third of it at a quarter; the bands then are as wide as those of one depth more.
+/// Half the size sees half the noise, and a third of it at a quarter; the bands then are as wide as
+/// those of one depth more.
 const SEARCHED_SIZES: [(usize, &[usize]); 3] = [(1, &[4, 3, 5, 2]), (2, &[3, 2, 4]), (4, &[2, 3])];
-/// The coarsest band has at least this many pixels along the longer side: below that, it does not separate an object from
-/// the rest.
+/// The coarsest band has at least this many pixels along the longer side: below that, it does not
+/// separate an object from the rest.
 const MIN_COARSEST_SIDE: usize = 30;
 /// Shorter side of a smaller picture, at least, pixels.
 const MIN_SEARCHED_SIDE_PX: usize = 32;
@@ -46,10 +47,10 @@ const COMPARED_SIDE_PX: usize = 256;
 /// Searches the picture at several sizes and depths.
 ///
 /// # Method
-/// An outline is right where it lies on edges and where it does not depend on how it was searched for. Each search scores
-/// the share of its outline that lies on edges times its mean overlap (intersection over union) with what the other
-/// searches found; a search that finds nothing overlaps with nothing. The best score wins, the finer picture when in
-/// doubt.
+/// An outline is right where it lies on edges and where it does not depend on how it was searched
+/// for. Each search scores the share of its outline that lies on edges times its mean overlap
+/// (intersection over union) with what the other searches found; a search that finds nothing
+/// overlaps with nothing. The best score wins, the finer picture when in doubt.
 /// # Errors
 /// That of the default search when more than half of the searches fail.
 pub(super) fn best_search<'a>(
@@ -93,8 +94,8 @@ fn confidences(searched: &[SearchResult], size: (usize, usize)) -> Vec<Confidenc
     confidence.collect()
 }
 
-/// The first search, finer pictures before coarser ones, that scores almost as well as the best; of those at a depth that
-/// was asked for, if one was.
+/// The first search, finer pictures before coarser ones, that scores almost as well as the best; of
+/// those at a depth that was asked for, if one was.
 fn best_candidate(
     searched: &[SearchResult],
     confidences: &[Confidence],
@@ -166,7 +167,8 @@ fn searched_sizes((w, h): (usize, usize)) -> Vec<(usize, &'static [usize])> {
         .collect()
 }
 
-/// The depths at which a picture of a longer side still has enough pixels in its coarsest band, and the one that is asked for.
+/// The depths at which a picture of a longer side still has enough pixels in its coarsest band, and
+/// the one that is asked for.
 fn usable_depths(depths: &[usize], longer: usize, asked: Option<usize>) -> Vec<usize> {
     let mut usable: Vec<usize> = depths
         .iter()
@@ -202,8 +204,9 @@ fn searches(scales: &[SearchScale<'_>], options: &SegmentOptions) -> Vec<SearchR
 /// Factor of the finest band's threshold in a stricter search: half a step of exposure.
 const STRICTER_FACTOR: f32 = 1.4;
 
-/// How far a side of the hull's box moves when edges must be stronger, or when the same picture is searched at another
-/// depth, pixels of the whole picture. What such a search does not find at all moves by the picture's longer side.
+/// How far a side of the hull's box moves when edges must be stronger, or when the same picture is
+/// searched at another depth, pixels of the whole picture. What such a search does not find at all
+/// moves by the picture's longer side.
 fn drift_px(
     searched: &[SearchResult],
     pick: usize,
@@ -302,7 +305,8 @@ fn overlap(a: &Mask, b: &Mask) -> f64 {
 }
 
 impl ChosenSearch<'_> {
-    /// What it left out or saw only in part; `asked` is the width of the picture that should have been searched.
+    /// What it left out or saw only in part; `asked` is the width of the picture that should have
+    /// been searched.
     pub(super) fn diagnostics(&self, asked: usize) -> Vec<Diagnostic> {
         let mut diagnostics = self.pass.diagnostics.clone();
         diagnostics.extend(truncated(self.pass.touches));
@@ -315,7 +319,8 @@ impl ChosenSearch<'_> {
         holes::object_area(&self.picture, &self.pass.inside)
     }
 
-    /// The pictures (a) to (e) of the paper's Figure 2, and what lies between; `whole` is the picture at full search size.
+    /// The pictures (a) to (e) of the paper's Figure 2, and what lies between; `whole` is the
+    /// picture at full search size.
     pub(super) fn into_steps(self, whole: &Image<LinearRgb>) -> Vec<SegmentStep> {
         let pass = self.pass;
         let both = self
@@ -369,7 +374,8 @@ fn truncated_at(borders: &[&str]) -> Diagnostic {
     )
 }
 
-/// The warning about an object that was found at a lower resolution than asked for; from the widths of the pictures.
+/// The warning about an object that was found at a lower resolution than asked for; from the widths
+/// of the pictures.
 fn noisy(asked: usize, searched: usize) -> Option<Diagnostic> {
     let reduction = asked as f64 / searched as f64;
     (reduction > 1.0).then(|| {

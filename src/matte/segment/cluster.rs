@@ -96,8 +96,8 @@ fn runs_of(row: &[bool]) -> impl Iterator<Item = Range<usize>> {
     })
 }
 
-/// Adds a run, joined with those of the row above that it touches. What of `above` ends before it is dropped: it touches
-/// no later run of the row either.
+/// Adds a run, joined with those of the row above that it touches. What of `above` ends before it
+/// is dropped: it touches no later run of the row either.
 fn push_joined(
     runs: &mut Vec<PixelRun>,
     row: usize,
@@ -158,8 +158,8 @@ pub(super) fn without_specks(set: &Mask, least: usize) -> Mask {
     groups.only(|group| sizes[group] >= least)
 }
 
-/// The set with its holes filled: all that cannot be reached from the border of the picture. Outlines must be two
-/// pixels thick, since the way around goes over corners too.
+/// The set with its holes filled: all that cannot be reached from the border of the picture.
+/// Outlines must be two pixels thick, since the way around goes over corners too.
 pub(super) fn filled(set: &Mask) -> Mask {
     let groups = PixelGroups::new(&set.complement());
     let reaching = groups.reaching_border();

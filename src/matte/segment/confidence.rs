@@ -10,32 +10,36 @@ pub struct Confidence {
     pub support: f64,
     /// Mean overlap (intersection over union) with what searches at other depths found, 0 to 1.
     pub agreement: f64,
-    /// How far a side of the hull's box moves when edges must be stronger, or at another depth: pixels of the picture that
-    /// was searched.
+    /// How far a side of the hull's box moves when edges must be stronger, or at another depth:
+    /// pixels of the picture that was searched.
     pub drift_px: f64,
-    /// How far a side of the hull's box lies beyond that of the outline: pixels of the picture that was searched.
+    /// How far a side of the hull's box lies beyond that of the outline: pixels of the picture
+    /// that was searched.
     pub stray_px: f64,
     /// Blur of the object's edges, standard deviation in pixels of the picture that was searched.
     pub blur_px: f64,
-    /// How wide the object is, if it were a long strip: pixels of the picture that was searched, or of the photo where that
-    /// is smaller. Twice the area over the outline's length.
+    /// How wide the object is, if it were a long strip: pixels of the picture that was searched,
+    /// or of the photo where that is smaller. Twice the area over the outline's length.
     pub width_px: f64,
 }
 
-/// An outline with less of itself on edges gives a warning: where it is open, a faint part of the object may lie beyond. On
-/// 24 photos in 29 variants, the outlines that were wrong without another warning had up to 0.8, one in twelve of those that
-/// were right had.
+/// An outline with less of itself on edges gives a warning: where it is open, a faint part of the
+/// object may lie beyond. On 24 photos in 29 variants, the outlines that were wrong without another
+/// warning had up to 0.8, one in twelve of those that were right had.
 const MIN_SUPPORT: f64 = 0.8;
 /// An outline that agrees less with other searches gives a warning.
 const MIN_AGREEMENT: f64 = 0.75;
 /// A box that moves by more than its tolerance gives a warning.
 const MAX_DRIFT_PX: f64 = 2.0;
-/// A box that lies farther beyond the outline than its tolerance gives a warning: what is there encloses no area.
+/// A box that lies farther beyond the outline than its tolerance gives a warning: what is there
+/// encloses no area.
 const MAX_STRAY_PX: f64 = 2.0;
-/// Edges that are softer than this give a warning: their band reaches 2 pixels, the tolerance of a box, to either side
-/// (twice a Gaussian's deviation). Photos in focus have 0.9 at most, and those of a camera that moved by 6 pixels 0.97.
+/// Edges that are softer than this give a warning: their band reaches 2 pixels, the tolerance of a
+/// box, to either side (twice a Gaussian's deviation). Photos in focus have 0.9 at most, and those
+/// of a camera that moved by 6 pixels 0.97.
 const MAX_BLUR_PX: f64 = 0.95;
-/// Narrower objects give a warning: half a pixel around them is 3 % of them, and their tips are fainter than that.
+/// Narrower objects give a warning: half a pixel around them is 3 % of them, and their tips are
+/// fainter than that.
 const MIN_WIDTH_PX: f64 = 30.0;
 
 impl Confidence {

@@ -10,16 +10,20 @@ use crate::matte::prepared::longer_side;
 use crate::matte::screen::{is_keyable, masked_pixels};
 use crate::pixel::LinearRgb;
 
-/// Width of the zone around the object that is not used as background, as a share of the longer side: contact shadows.
+/// Width of the zone around the object that is not used as background, as a share of the longer
+/// side: contact shadows.
 const BACKGROUND_MARGIN: f64 = 0.04;
-/// A pixel is like the screen when no channel differs from the plate by more than this share, or this many times the noise.
+/// A pixel is like the screen when no channel differs from the plate by more than this share, or
+/// this many times the noise.
 const LIKE_SHARE: f32 = 0.06;
 const LIKE_SIGMAS: f32 = 3.0;
-/// A pixel is unlike the screen when a channel differs by this share of the plate's strongest channel.
+/// A pixel is unlike the screen when a channel differs by this share of the plate's strongest
+/// channel.
 const UNLIKE_SHARE: f32 = 0.3;
 /// Least area of a hole as a share of what is enclosed; smaller ones are left to the matte.
 const MIN_HOLE_AREA: f64 = 0.005;
-/// Share of the rim that must be unlike the screen: clear plastic is like it, and then what it encloses is the object.
+/// Share of the rim that must be unlike the screen: clear plastic is like it, and then what it
+/// encloses is the object.
 const OPAQUE_RIM_SHARE: f64 = 0.8;
 /// The rim lies so far around a hole: past the blur of its edge.
 const RIM_PX: [f64; 2] = [2.0, 5.0];
@@ -63,7 +67,8 @@ pub(super) fn object_area(picture: &Image<LinearRgb>, inside: &Mask) -> ObjectAr
 
 /// What is enclosed, without the holes.
 ///
-/// A hole looks like the screen all over and has a rim that does not: a rim of clear plastic encloses clear plastic.
+/// A hole looks like the screen all over and has a rim that does not: a rim of clear plastic
+/// encloses clear plastic.
 fn without_holes(picture: &Image<LinearRgb>, inside: &Mask, background: &Mask) -> Mask {
     let Ok(plate) = ScreenPlate::fit(picture, background, &PlateOptions::default()) else {
         return inside.clone();

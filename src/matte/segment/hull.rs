@@ -6,10 +6,12 @@ use crate::matte::arrays::largest_difference;
 use crate::matte::outline::points_of;
 use geo::{Area, ConvexHull, MultiPoint, Point};
 
-/// Convex hull of the object whose edges these pixels are, in order, clockwise as seen; empty where there is no area.
+/// Convex hull of the object whose edges these pixels are, in order, clockwise as seen; empty where
+/// there is no area.
 ///
-/// It goes through the pixels' centres: an edge marks the pixel on either side of it, so that the outer one's centre is
-/// nearer to the edge than its outer corner. Where a pixel lies on the border of the picture, so does the hull.
+/// It goes through the pixels' centres: an edge marks the pixel on either side of it, so that the
+/// outer one's centre is nearer to the edge than its outer corner. Where a pixel lies on the border
+/// of the picture, so does the hull.
 pub(super) fn convex_hull(edges: &Mask) -> Vec<Point2<f64>> {
     let (w, h) = edges.size();
     let points =
@@ -18,7 +20,8 @@ pub(super) fn convex_hull(edges: &Mask) -> Vec<Point2<f64>> {
     if hull.unsigned_area() <= 0.0 {
         return Vec::new();
     }
-    // geo goes counter-clockwise with y up, which is clockwise as seen, and repeats the first point.
+    // geo goes counter-clockwise with y up, which is clockwise as seen, and repeats the first
+    // point.
     let (ring, _) = hull.into_inner();
     points_of(ring.0.get(1..).unwrap_or_default())
 }
@@ -59,7 +62,8 @@ pub(super) fn farthest_side(a: &[Point2<f64>], b: &[Point2<f64>]) -> f64 {
     largest_difference(sides(a), sides(b))
 }
 
-/// By how much the side of one polygon's box that lies farthest beyond another's does so; 0 where none does.
+/// By how much the side of one polygon's box that lies farthest beyond another's does so; 0 where
+/// none does.
 pub(super) fn growth(from: &[Point2<f64>], to: &[Point2<f64>]) -> f64 {
     let ([l, t, r, b], [left, top, right, bottom]) = (sides(from), sides(to));
     [l - left, t - top, right - r, bottom - b]

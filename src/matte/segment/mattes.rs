@@ -6,7 +6,8 @@ use crate::image::{Image, Mask};
 use crate::matte::screen::{screen_pixels, strongest_channel};
 use crate::pixel::{Coverage, LinearRgb};
 
-/// Width of the zone around the outline that is left to the keyer, pixels of the search: what an outline may be wrong.
+/// Width of the zone around the outline that is left to the keyer, pixels of the search: what an
+/// outline may be wrong.
 const GARBAGE_MARGIN_PX: f64 = 2.0;
 /// Least depth of core pixels below the outline, pixels: beyond the blur of a lens.
 const CORE_DEPTH_PX: f64 = 2.0;
@@ -19,8 +20,8 @@ impl Segmentation {
         screen_pixels(&self.mask)
     }
 
-    /// Garbage and core matte of a photo on a screen plate, as a keyer takes them: what it leaves of the screen beside the
-    /// object goes, and what surely lets nothing through stays.
+    /// Garbage and core matte of a photo on a screen plate, as a keyer takes them: what it leaves
+    /// of the screen beside the object goes, and what surely lets nothing through stays.
     ///
     /// # Panics
     /// When the sizes differ.
@@ -44,8 +45,8 @@ impl Segmentation {
     /// Core matte: 1 where the object is surely opaque, given the photo and its screen plate.
     ///
     /// # Method
-    /// Reflected light is not negative, so from `photo = F + T plate` follows `T <= photo / plate` in every channel; where
-    /// the screen is strongest, that is below a tenth in the core.
+    /// Reflected light is not negative, so from `photo = F + T plate` follows `T <= photo / plate`
+    /// in every channel; where the screen is strongest, that is below a tenth in the core.
     /// # Panics
     /// When the sizes differ.
     pub fn core(&self, photo: &Image<LinearRgb>, plate: &Image<LinearRgb>) -> Image<Coverage> {
@@ -67,7 +68,8 @@ mod tests {
 
     const GREEN: LinearRgb = LinearRgb::new(0.04, 0.4, 0.08);
 
-    /// A slab with its corner at (40, 30), red on the left and clear film on the right, and a stain on the screen.
+    /// A slab with its corner at (40, 30), red on the left and clear film on the right, and a stain
+    /// on the screen.
     fn photo() -> Image<LinearRgb> {
         Image::from_fn(160, 100, |x, y| match (x, y) {
             (40..80, 30..70) => LinearRgb::new(0.5, 0.02, 0.02),

@@ -13,8 +13,8 @@ use serde::{Deserialize, Serialize};
 pub struct SegmentOptions {
     /// What the pyramid is made of. Default: each channel by itself.
     pub tone: LumaMode,
-    /// Which band of the pyramid is the coarse one, 2 to 8; the fine one is the finest. Default: nothing = the depth that
-    /// the others agree with best.
+    /// Which band of the pyramid is the coarse one, 2 to 8; the fine one is the finest. Default:
+    /// nothing = the depth that the others agree with best.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub levels: Option<usize>,
     /// Threshold of the finest band (`first_threshold` in files). Default: Otsu.
@@ -23,15 +23,19 @@ pub struct SegmentOptions {
     /// Threshold of the coarsest band (`last_threshold` in files). Default: Otsu.
     #[serde(rename = "last_threshold")]
     pub coarsest_threshold: Threshold,
-    /// An edge exceeds at least this multiple of the noise, regardless of the finest band's threshold. Default: 6.
+    /// An edge exceeds at least this multiple of the noise, regardless of the finest band's
+    /// threshold. Default: 6.
     pub least_contrast: f32,
-    /// An edge pixel has at least this share of the strongest value within 2 pixels, 0 to 1: thins edges. Default: 0.6.
+    /// An edge pixel has at least this share of the strongest value within 2 pixels, 0 to 1: thins
+    /// edges. Default: 0.6.
     pub ridge: f32,
     /// Groups of fewer edge pixels are dirt or noise. Default: 4.
     pub speck: usize,
-    /// Edges nearer to each other than this share of the longer side belong together. Default: 0.04.
+    /// Edges nearer to each other than this share of the longer side belong together. Default:
+    /// 0.04.
     pub join: f64,
-    /// Longer side of the picture that is searched, pixels; larger photos are reduced to it. Default: 640.
+    /// Longer side of the picture that is searched, pixels; larger photos are reduced to it.
+    /// Default: 640.
     pub working_size: usize,
 }
 

@@ -1,4 +1,5 @@
-//! One search of a picture: two of its bands become edges, a cluster of edges, and what they enclose.
+//! One search of a picture: two of its bands become edges, a cluster of edges, and what they
+//! enclose.
 
 use super::SegmentOptions;
 use super::band::{self, Bands};
@@ -56,7 +57,8 @@ impl Pass {
 
 /// How far the finest band smears an edge, pixels: the reach of its kernel.
 const SMEAR_PX: usize = 2;
-/// Edges nearer than this belong together in the smallest picture, too, pixels: the width of a smeared edge.
+/// Edges nearer than this belong together in the smallest picture, too, pixels: the width of a
+/// smeared edge.
 const MIN_JOIN_PX: f64 = 6.0;
 
 impl Search {
@@ -139,12 +141,13 @@ fn ridges(band: &Image<f32>, share: f32) -> Mask {
     band.zip_map(&strongest, |v, most| v >= share * most)
 }
 
-/// Two clusters are two objects when the smaller one has at least this share of the larger one's edge pixels.
+/// Two clusters are two objects when the smaller one has at least this share of the larger one's
+/// edge pixels.
 const RIVAL_SHARE: f64 = 0.3;
 /// A smaller cluster is worth a warning from this share on.
 const REMNANT_SHARE: f64 = 0.05;
-/// This many clusters too small for a warning each give one together: where they lie on the screen, one may lie beside the
-/// object.
+/// This many clusters too small for a warning each give one together: where they lie on the screen,
+/// one may lie beside the object.
 const SPECK_COUNT: usize = 2;
 
 /// Edge pixels in clusters; the largest cluster is the main one.
@@ -225,8 +228,9 @@ impl<'a> EdgeClusters<'a> {
 
 /// The edges of the one object.
 ///
-/// Edges nearer to each other than `join_px` form a cluster; the object is the cluster of most edge pixels and what
-/// lies inside its hull. A cluster outside it is an error if it could be an object of its own, else it is left out.
+/// Edges nearer to each other than `join_px` form a cluster; the object is the cluster of most edge
+/// pixels and what lies inside its hull. A cluster outside it is an error if it could be an object
+/// of its own, else it is left out.
 fn main_object(edges: &Mask, join_px: f64) -> Result<(Mask, Vec<Diagnostic>)> {
     let clusters = EdgeClusters::new(edges, join_px).ok_or_else(|| {
         refused(
@@ -261,10 +265,12 @@ fn specks_on_screen(count: usize) -> Diagnostic {
     )
 }
 
-/// Edges that fall apart into two clusters when they are joined over this share of the gap may be of two objects.
+/// Edges that fall apart into two clusters when they are joined over this share of the gap may be
+/// of two objects.
 const CLOSER_JOIN_SHARE: f64 = 0.5;
 
-/// The warning about an object whose edges are two clusters beside each other unless gaps of `join_px` are bridged.
+/// The warning about an object whose edges are two clusters beside each other unless gaps of
+/// `join_px` are bridged.
 fn possibly_two_objects(object: &Mask, join_px: f64) -> Option<Diagnostic> {
     let clusters = EdgeClusters::new(object, join_px)?;
     let least = RIVAL_SHARE * clusters.sizes[clusters.main] as f64;
@@ -298,11 +304,13 @@ fn mean_percent(coordinates: impl ExactSizeIterator<Item = f64>, len: usize) -> 
     (100.0 * coordinates.sum::<f64>() / n / len as f64).round()
 }
 
-/// The area may grow by this factor when twice the gap is bridged; if it grows by more, it had leaked.
+/// The area may grow by this factor when twice the gap is bridged; if it grows by more, it had
+/// leaked.
 const LEAK_AREA_RATIO: f64 = 1.1;
 
-/// The area inside the hull that the edges enclose, gaps up to twice `join_px` bridged; wider ones while that makes the
-/// area jump, for then the outline had a gap through which the inside leaked out.
+/// The area inside the hull that the edges enclose, gaps up to twice `join_px` bridged; wider ones
+/// while that makes the area jump, for then the outline had a gap through which the inside leaked
+/// out.
 fn enclosed_area(edges: &Mask, join_px: f64) -> Mask {
     let hull = under_hull(edges, 0.5);
     let mut narrow = closed(edges, &hull, join_px / 2.0);
@@ -321,8 +329,8 @@ fn closed(edges: &Mask, hull: &Mask, radius_px: f64) -> Mask {
     both(&filter::erode(&filled, radius_px), hull)
 }
 
-/// An object whose edges come so near to the border, pixels, may go on beyond: an edge has two sides, and a faint tip is
-/// seen a few pixels late.
+/// An object whose edges come so near to the border, pixels, may go on beyond: an edge has two
+/// sides, and a faint tip is seen a few pixels late.
 const NEAR_BORDER_PX: usize = 4;
 
 /// Whether a set comes near the left, top, right and bottom border.

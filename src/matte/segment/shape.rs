@@ -12,8 +12,9 @@ use crate::pixel::Coverage;
 
 /// Blur that turns the cracks between pixels into a line, pixels of the search.
 const CRACK_BLUR_PX: f32 = 0.7;
-/// By how much the hull of the edges is drawn in before it widens that of the outline, pixels of the search: edges are
-/// accurate to a pixel; tips that are too thin to enclose anything reach farther than that.
+/// By how much the hull of the edges is drawn in before it widens that of the outline, pixels of
+/// the search: edges are accurate to a pixel; tips that are too thin to enclose anything reach
+/// farther than that.
 const TIP_INSET_PX: f64 = 1.0;
 
 /// Pixels of the photo for a pixel of the picture that was searched, in x and y.
@@ -46,7 +47,8 @@ pub(super) struct ObjectShape {
 }
 
 impl ObjectShape {
-    /// The outline around the object's area, moved to where the photo changes, and the hull of it and of its thin tips.
+    /// The outline around the object's area, moved to where the photo changes, and the hull of it
+    /// and of its thin tips.
     pub(super) fn new(prepared: &Prepared<'_>, chosen: &ChosenSearch<'_>, area: &Mask) -> Self {
         let scale = PixelScale::new(prepared.photo.size(), area.size());
         let rough = rough_outline(area).map(|p| scale.to_photo(p));

@@ -9,7 +9,8 @@ use crate::matte::outline::{ring_length, sides};
 use crate::pixel::LinearRgb;
 use rayon::prelude::*;
 
-/// How far to either side of the outline the change is searched for, in pixels of the picture that was searched.
+/// How far to either side of the outline the change is searched for, in pixels of the picture that
+/// was searched.
 const PROFILE_REACH_PX: f64 = 1.5;
 /// Where the outside is taken from, beyond the reach, likewise.
 const OUTSIDE_PX: f64 = 2.0;
@@ -28,15 +29,17 @@ const ROUNDING_STEP: f32 = 1.0 / 255.0;
 /// Points to either side whose median a displacement becomes.
 const MEDIAN_REACH: usize = 2;
 
-/// An outline whose points lie where the photo changes halfway from the outside to the object's rim.
+/// An outline whose points lie where the photo changes halfway from the outside to the object's
+/// rim.
 ///
-/// `roots` are the square roots of the photo, `scale` is its pixels for one of the picture that was searched. Points without a clear change stay.
+/// `roots` are the square roots of the photo, `scale` is its pixels for one of the picture that was
+/// searched. Points without a clear change stay.
 ///
 /// # Method
-/// Along the normal through each point, from the outside inwards: the first local maximum of the difference from the
-/// outside (of square roots, all channels) that stands out of the noise; the outline is where the difference has half
-/// that value. Displacements pass a median of five along the outline. A blurred step has half its height at its true
-/// place, whatever the blur.
+/// Along the normal through each point, from the outside inwards: the first local maximum of the
+/// difference from the outside (of square roots, all channels) that stands out of the noise; the
+/// outline is where the difference has half that value. Displacements pass a median of five along
+/// the outline. A blurred step has half its height at its true place, whatever the blur.
 pub(super) fn snapped(outline: &Outline, roots: &Image<LinearRgb>, scale: f64) -> Outline {
     let rings = outline
         .rings
@@ -104,7 +107,8 @@ pub(super) struct EdgePoint {
 }
 
 impl EdgePoint {
-    /// A point of a ring that goes clockwise as seen, and two neighbours of it, the earlier one first.
+    /// A point of a ring that goes clockwise as seen, and two neighbours of it, the earlier one
+    /// first.
     fn new(at: Point2<f64>, [before, after]: [Point2<f64>; 2]) -> Self {
         let along = after - before;
         let normal = Vector2::new(along.y, -along.x)
@@ -266,7 +270,8 @@ mod tests {
                 .iter()
                 .map(|p| ((p.x - 50.0).hypot(p.y - 45.0) - 30.3).abs())
                 .fold(0.0, f64::max);
-            // From a pixel outside, the reach ends before the blurred edge has its full height: half of less lies farther out.
+            // From a pixel outside, the reach ends before the blurred edge has its full height:
+            // half of less lies farther out.
             assert!(worst < 0.6, "from {radius}: {worst} px off");
         }
     }

@@ -6,7 +6,8 @@ use rand::{RngExt, SeedableRng};
 const GREEN: LinearRgb = LinearRgb::new(0.04, 0.4, 0.08);
 const WHITE: LinearRgb = LinearRgb::new(0.8, 0.82, 0.78);
 
-/// A screen with vignetting and sensor noise (shot and read noise of a small camera) and what lies on it.
+/// A screen with vignetting and sensor noise (shot and read noise of a small camera) and what lies
+/// on it.
 fn photo(
     w: usize,
     h: usize,

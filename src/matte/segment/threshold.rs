@@ -33,12 +33,13 @@ impl Threshold {
 /// Bins of the histogram that Otsu's threshold is found in.
 const HISTOGRAM_BINS: usize = 256;
 
-/// The value that maximises the variance between the two groups it makes; the largest one where all is noise.
+/// The value that maximises the variance between the two groups it makes; the largest one where all
+/// is noise.
 ///
 /// # Method
-/// [Otsu 1979], on 256 equal bins of the *logarithm*, from the noise (1) to the largest magnitude. Edges of clear
-/// plastic and highlights differ by a factor of a hundred; on a linear scale the threshold falls between those two
-/// instead of between edges and background.
+/// [Otsu 1979], on 256 equal bins of the *logarithm*, from the noise (1) to the largest magnitude.
+/// Edges of clear plastic and highlights differ by a factor of a hundred; on a linear scale the
+/// threshold falls between those two instead of between edges and background.
 ///
 /// [Otsu 1979]: https://doi.org/10.1109/TSMC.1979.4310076
 fn otsu(band: &Image<f32>) -> f32 {
@@ -83,8 +84,8 @@ fn best_split(histogram: &[u64; HISTOGRAM_BINS]) -> usize {
     best_bin
 }
 
-/// Variance between two groups with these counts and sums, times the square of the total count; negative where a
-/// group is empty.
+/// Variance between two groups with these counts and sums, times the square of the total count;
+/// negative where a group is empty.
 fn variance_between(counts: [u64; 2], sums: [u64; 2]) -> f64 {
     if counts.contains(&0) {
         return -1.0;

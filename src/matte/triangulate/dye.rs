@@ -1,4 +1,5 @@
-//! The plastic of an object whose transmittance is known in some channels: what it is in the others.
+//! The plastic of an object whose transmittance is known in some channels: what it is in the
+//! others.
 
 use super::lines::{PixelLines, opaque_pixels};
 use crate::image::Image;
@@ -8,15 +9,17 @@ use crate::pixel::Coverage;
 
 /// Pixels that are sampled.
 const DYE_SAMPLES: usize = 400;
-/// Standard deviation of a pixel's transmittance around flat plastic of another thickness, beside its noise.
+/// Standard deviation of a pixel's transmittance around flat plastic of another thickness, beside
+/// its noise.
 const SCATTER_SIGMA: f32 = 0.04;
 /// Misfit by which a dye must be better than clear plastic; as in [`tint`], where less is known.
 const DYE_HANDICAP: f32 = 0.4;
 /// Weight of thickness: the misfit of plastic that is twice as see-through as it should be.
 const THICKNESS_WEIGHT: f32 = 1.0;
 
-/// Transmittance per channel of flat plastic with the dye, or none, that explains the determined channels best: by the
-/// median over the clearer half of the object of how far a pixel is from that plastic times any factor.
+/// Transmittance per channel of flat plastic with the dye, or none, that explains the determined
+/// channels best: by the median over the clearer half of the object of how far a pixel is from that
+/// plastic times any factor.
 pub(super) fn fit(
     pixels: &Image<PixelLines>,
     inside: &Image<Coverage>,
@@ -70,7 +73,8 @@ struct DyeSamples {
 }
 
 impl DyeSamples {
-    /// Median misfit of plastic in standard deviations squared, and what its thickness and a handicap add.
+    /// Median misfit of plastic in standard deviations squared, and what its thickness and a
+    /// handicap add.
     fn misfit(&self, flat: [f32; 3], handicap: f32) -> f32 {
         let fits = self.pixels.iter().map(|pixel| self.explained(pixel, flat));
         let (misfits, factors): (Vec<f32>, Vec<f32>) = fits.unzip();

@@ -67,18 +67,21 @@ impl PixelLines {
 const UNKNOWN_SIGMA: f32 = 1e3;
 /// Standard deviation of a transmittance inferred from other channels around what it is.
 const INFERRED_SIGMA: f32 = 0.06;
-/// Standard deviation of an open channel of the plastic that is inferred from its dye, as a share of it.
+/// Standard deviation of an open channel of the plastic that is inferred from its dye, as a share
+/// of it.
 const DYE_SIGMA: f32 = 0.15;
 /// Relative error of plates.
 const PLATE_ERROR: f32 = 0.01;
-/// Prior of a pixel's share of flat plastic, standard deviation around 0: plastic up to one and a half times as clear as
-/// flat.
+/// Prior of a pixel's share of flat plastic, standard deviation around 0: plastic up to one and a
+/// half times as clear as flat.
 const SHARE_SIGMA: f32 = 1.5;
-/// Prior of a pixel's bare share, standard deviation around 0: occasionally a rim with screen beside it.
+/// Prior of a pixel's bare share, standard deviation around 0: occasionally a rim with screen
+/// beside it.
 const BARE_SIGMA: f32 = 0.27;
 /// Standard deviation of transmittances around any sum of plastic and nothing.
 const MODEL_SIGMA: f32 = 0.015;
-/// Pixels that pass at least this share of what the clearest do are plastic that lies flat, or nearly.
+/// Pixels that pass at least this share of what the clearest do are plastic that lies flat, or
+/// nearly.
 const MIN_FLAT_SHARE: f32 = 0.5;
 /// The clearest: this share of the object passes more.
 const CLEAREST_SHARE: f64 = 0.05;
@@ -99,7 +102,8 @@ impl SolvedFilm {
     }
 }
 
-/// How the channels that the screens leave open follow from the others: a pixel is plastic in some share, and bare in some.
+/// How the channels that the screens leave open follow from the others: a pixel is plastic in some
+/// share, and bare in some.
 pub(super) struct Inferred {
     determined: [bool; 3],
     /// Transmittance of the plastic where it lies flat.
@@ -107,8 +111,8 @@ pub(super) struct Inferred {
 }
 
 impl Inferred {
-    /// `plastic` is the prior of flat plastic; in open channels it is scaled by what little the screens differ there, over
-    /// the whole object, mixed by the variances.
+    /// `plastic` is the prior of flat plastic; in open channels it is scaled by what little the
+    /// screens differ there, over the whole object, mixed by the variances.
     pub(super) fn fit(
         pixels: &Image<PixelLines>,
         inside: &Image<Coverage>,
@@ -138,8 +142,8 @@ impl Inferred {
         }
     }
 
-    /// By what the plastic of an open channel must be multiplied by its own lines, and the variance of that: noise, and
-    /// plates that are a little off.
+    /// By what the plastic of an open channel must be multiplied by its own lines, and the variance
+    /// of that: noise, and plates that are a little off.
     fn gain(
         &self,
         pixels: &Image<PixelLines>,
@@ -159,7 +163,8 @@ impl Inferred {
         (gain, (1.0 / bottom) as f32 + off * off)
     }
 
-    /// The part of an open channel's transmittance that is plastic, by its own line and by the other channels.
+    /// The part of an open channel's transmittance that is plastic, by its own line and by the
+    /// other channels.
     #[inline]
     fn measured_and_expected(&self, pixel: &PixelLines, channel: usize) -> (f64, f64) {
         let (share, bare) = self.shares(pixel);
@@ -170,8 +175,9 @@ impl Inferred {
         )
     }
 
-    /// The share of flat plastic, and of nothing, that a pixel's determined channels are made of: least squares, with priors
-    /// that hold where the channels do not separate them. No less than nothing is bare.
+    /// The share of flat plastic, and of nothing, that a pixel's determined channels are made of:
+    /// least squares, with priors that hold where the channels do not separate them. No less
+    /// than nothing is bare.
     fn shares(&self, pixel: &PixelLines) -> (f32, f32) {
         let mut sums = ShareSums::prior();
         for c in (0..3).filter(|&c| self.determined[c]) {
@@ -181,7 +187,8 @@ impl Inferred {
         sums.shares()
     }
 
-    /// The film of one pixel: what is measured, mixed with what follows from the other channels by the variances.
+    /// The film of one pixel: what is measured, mixed with what follows from the other channels by
+    /// the variances.
     pub(super) fn complete(&self, pixel: &PixelLines) -> SolvedFilm {
         let (share, bare) = self.shares(pixel);
         let channels = [0, 1, 2].map(|c| {
@@ -196,7 +203,8 @@ impl Inferred {
     }
 }
 
-/// Weighted sums of the products of flat plastic (p), nothing (b) and the measured transmittance (t) of some channels.
+/// Weighted sums of the products of flat plastic (p), nothing (b) and the measured transmittance
+/// (t) of some channels.
 struct ShareSums {
     pp: f32,
     pb: f32,
@@ -254,7 +262,8 @@ impl SolvedFilm {
     }
 }
 
-/// Transmittance of the plastic in an open channel, between its dye's and what the lines give, by the variances.
+/// Transmittance of the plastic in an open channel, between its dye's and what the lines give, by
+/// the variances.
 fn scaled_plastic(plastic: f32, (gain, variance): (f32, f32)) -> f32 {
     let dye = DYE_SIGMA * DYE_SIGMA;
     (plastic * (variance + gain * dye) / (variance + dye)).clamp(0.0, 1.0)
@@ -266,7 +275,8 @@ fn median_lever(levers: Vec<f32>) -> f32 {
         .min(UNKNOWN_SIGMA)
 }
 
-/// A measured transmittance and one inferred from other channels, mixed by their variances, and the deviation of that.
+/// A measured transmittance and one inferred from other channels, mixed by their variances, and the
+/// deviation of that.
 #[inline(always)]
 fn mixed(slope: f32, sigma: f32, inferred: f32) -> (f32, f32) {
     let (measured, prior) = (
@@ -295,7 +305,8 @@ pub(super) fn opaque_pixels<'a, P: Copy>(
     pixels.filter_map(|(p, c)| (c.0 >= OPAQUE).then_some(p))
 }
 
-/// Transmittance per channel where the plastic lies flat: the median over what is not much darker than the clearest.
+/// Transmittance per channel where the plastic lies flat: the median over what is not much darker
+/// than the clearest.
 pub(super) fn flat_transmittance(
     solved: &Image<SolvedFilm>,
     inside: &Image<Coverage>,

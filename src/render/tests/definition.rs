@@ -133,7 +133,8 @@ fn shadows_of_a_square_hit_the_published_numbers() {
         for (alpha, s) in [(1.0, opaque), (0.6, translucent)] {
             let shot = Shot::new(above(3, 3, 100.0)).with_light(square_light());
             let caster = level(1, [0.06, 0.02, 0.1], 0.1, grey(alpha));
-            // The card would hide the surface from above; looked at from a slant it is out of the way.
+            // The card would hide the surface from above; looked at from a slant it is out of the
+            // way.
             let shot = seen_from_the_side(shot.with_card(caster), x, y);
             for way in [render, render_reference] {
                 let found = way(&shot, &sharp()).shadow()[(1, 1)].g;
@@ -187,7 +188,8 @@ fn each_layer_takes_its_share() {
         for way in [render, render_reference] {
             let deep = way(&shot, &RenderOptions::default());
             let left = 0.8f32.powi(n as i32);
-            // All cards cover the whole light: the surface keeps the same share, the eye sees it through the same.
+            // All cards cover the whole light: the surface keeps the same share, the eye sees it
+            // through the same.
             assert!(
                 (deep.shadow()[(2, 2)].r - left).abs() < 1e-5,
                 "{n} layers, light"
@@ -243,7 +245,8 @@ fn ambient_alone_lights_a_card_by_its_albedo() {
     }
 }
 
-/// A 4 x 4 texture of all different texels, one texel to 10 pixels, under even light that shows colours as they are.
+/// A 4 x 4 texture of all different texels, one texel to 10 pixels, under even light that shows
+/// colours as they are.
 fn magnified() -> (Shot, Image<PremulRgba>) {
     let texture = Image::from_fn(4, 4, |x, y| {
         let v = 0.05 * (4 * y + x) as f32;
@@ -398,7 +401,8 @@ fn ways_agree_on_a_pile() {
     }
 }
 
-/// Five tilted cards of soft blobs that partly run through each other, partly over the picture's edge.
+/// Five tilted cards of soft blobs that partly run through each other, partly over the picture's
+/// edge.
 fn pile() -> Shot {
     let blob = |hue: f32| {
         Image::from_fn(48, 32, move |x, y| {
@@ -538,7 +542,8 @@ fn a_finite_catcher_ends_the_shadow() {
     }
 }
 
-/// Shots in which something is missing or of one colour; `petcomp-report stability` has those that are hard to look at.
+/// Shots in which something is missing or of one colour; `petcomp-report stability` has those that
+/// are hard to look at.
 fn awkward() -> Vec<(&'static str, Shot)> {
     let base = || {
         Shot::new(above(16, 12, 20.0))
@@ -779,7 +784,8 @@ fn the_shadow_of_a_sun_lies_across_from_it_at_any_rotation() {
         let shot =
             Shot::new(above(81, 81, 100.0)).with_card(level(1, [0.0, 0.0, 0.1], 0.1, grey(1.0)));
         let shot = shot.with_environment(sun(rotation));
-        // A direction of the world is turned by the rotation before it is looked up: the sun stands at minus that.
+        // A direction of the world is turned by the rotation before it is looked up: the sun stands
+        // at minus that.
         let (sin, cos) = libm::sincos(-rotation);
         let (x, y) = (-0.1 * cos, -0.1 * sin);
         let pixel = ((40.5 + 100.0 * x) as usize, (40.5 - 100.0 * y) as usize);

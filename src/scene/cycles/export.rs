@@ -23,13 +23,15 @@ const SAMPLES_PER_PIXEL: u32 = 1024;
 /// Side of an endless surface for a program that needs a number, metres.
 const ENDLESS_SIDE_M: f64 = 1000.0;
 
-/// Writes `scene.json`, its plate, textures and environment (float EXR), and the script that renders them in Blender.
+/// Writes `scene.json`, its plate, textures and environment (float EXR), and the script that
+/// renders them in Blender.
 ///
-/// `size` is that of the labelled surface, metres. The picture that the script makes, `beauty.exr`, is the shot's frame:
-/// the exposure is multiplied into the lights.
+/// `size` is that of the labelled surface, metres. The picture that the script makes, `beauty.exr`,
+/// is the shot's frame: the exposure is multiplied into the lights.
 ///
 /// # Errors
-/// [`Error::File`] for what cannot be written; [`Error::Value`] for ids beyond 65 535, which Blender does not have.
+/// [`Error::File`] for what cannot be written; [`Error::Value`] for ids beyond 65 535, which
+/// Blender does not have.
 pub fn export(shot: &Shot, size: [f64; 2], folder: impl AsRef<Path>) -> Result<()> {
     let folder = folder.as_ref();
     io::create_folder(folder)?;
@@ -77,12 +79,15 @@ fn write_plate(folder: &Path, shot: &Shot) -> Result<Option<CyclesPicture>> {
 }
 
 fn write_picture<P: io::ToFile>(folder: &Path, name: &str, image: &Image<P>) -> Result<String> {
-    let options = WriteOptions {
+    io::write_with(folder.join(name), image, &float_options())?;
+    Ok(name.into())
+}
+
+fn float_options() -> WriteOptions {
+    WriteOptions {
         bits: Some(Bits::Float),
         ..Default::default()
-    };
-    io::write_with(folder.join(name), image, &options)?;
-    Ok(name.into())
+    }
 }
 
 fn cycles_camera(camera: &Camera) -> CyclesCamera {
@@ -118,8 +123,12 @@ fn checked_id(card: &Card) -> Result<u32> {
     if (1..=u32::from(u16::MAX)).contains(&id) {
         return Ok(id);
     }
+    Err(id_out_of_range(id))
+}
+
+fn id_out_of_range(id: u32) -> Error {
     let what = format!("id {id}, expected 1 to {}", u16::MAX);
-    Err(Error::value("cards", what))
+    Error::value("cards", what)
 }
 
 fn matrix_rows<const N: usize>(m: SMatrix<f64, N, N>) -> [[f64; N]; N] {
@@ -150,15 +159,21 @@ fn write_opacity(folder: &Path, name: &str, film: &Image<Film>) -> Result<String
 
 fn cycles_light(light: &AreaLight, exposure: f32) -> CyclesLight {
     CyclesLight {
-        shape: match light.shape {
-            LightShape::Rectangle => CyclesShape::Rectangle,
-            LightShape::Ellipse => CyclesShape::Ellipse,
-        },
+        shape: light.shape.into(),
         size: CyclesSize::Two(light.size),
         power: light.power * f64::from(exposure),
         color: light.color,
         position: light.position,
         target: light_target(light),
+    }
+}
+
+impl From<LightShape> for CyclesShape {
+    fn from(shape: LightShape) -> Self {
+        match shape {
+            LightShape::Rectangle => Self::Rectangle,
+            LightShape::Ellipse => Self::Ellipse,
+        }
     }
 }
 

@@ -56,7 +56,8 @@ pub(super) struct CyclesPicture {
     pub(super) path: String,
 }
 
-/// A card; `texture` is premultiplied, or what a film adds where there is `film`: its opacity per channel.
+/// A card; `texture` is premultiplied, or what a film adds where there is `film`: its opacity per
+/// channel.
 #[derive(Serialize, Deserialize)]
 pub(super) struct CyclesQuad {
     pub(super) id: u32,

@@ -14,10 +14,11 @@ use crate::scene::{AreaLight, CATCHER_RATIO, Card, EnvironmentMap, Shot};
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
-/// The shot that a scene file of the reference renderer describes, at the file's own size or another.
+/// The shot that a scene file of the reference renderer describes, at the file's own size or
+/// another.
 ///
-/// Every quad has its pose, and its texture is a premultiplied scene-linear EXR. The plate is averaged
-/// over the pixels of the picture, as the script does.
+/// Every quad has its pose, and its texture is a premultiplied scene-linear EXR. The plate is
+/// averaged over the pixels of the picture, as the script does.
 ///
 /// # Errors
 /// A file that cannot be read or misses a key; a picture that it names and that cannot be read.
@@ -36,7 +37,8 @@ pub fn import(path: impl AsRef<Path>, size: Option<[u32; 2]>) -> Result<Shot> {
     Ok(shot)
 }
 
-/// The pictures of a scene: they lie in its folder or, where scenes share them, in the folder beside it.
+/// The pictures of a scene: they lie in its folder or, where scenes share them, in the folder
+/// beside it.
 struct PictureFolder {
     /// The scene's file.
     scene: PathBuf,
@@ -118,8 +120,7 @@ impl PictureFolder {
         if size == expected {
             return Ok(opacity);
         }
-        let what = format!("{size:?} pixels, but its colour has {expected:?}");
-        Err(Error::file(path, what))
+        Err(different_size(&path, size, expected))
     }
 
     /// Gives a shot the lights and the environment of a file.
@@ -182,9 +183,17 @@ fn camera_pose(camera: &CyclesCamera) -> Pose {
 }
 
 fn world_from_card(pose: &[[f64; 4]; 4]) -> Pose {
-    let axes = std::array::from_fn(|i| std::array::from_fn(|j| pose[i][j]));
     let at = Vector3::new(pose[0][3], pose[1][3], pose[2][3]);
-    Pose::from_parts(at.into(), rotation_from_rows(axes))
+    Pose::from_parts(at.into(), rotation_from_rows(axes_of(pose)))
+}
+
+fn axes_of(pose: &[[f64; 4]; 4]) -> [[f64; 3]; 3] {
+    std::array::from_fn(|i| std::array::from_fn(|j| pose[i][j]))
+}
+
+fn different_size(path: &Path, size: (usize, usize), expected: (usize, usize)) -> Error {
+    let what = format!("{size:?} pixels, but its colour has {expected:?}");
+    Error::file(path, what)
 }
 
 fn rotation_from_rows(rows: [[f64; 3]; 3]) -> UnitQuaternion<f64> {
@@ -203,8 +212,8 @@ fn area_light(light: &CyclesLight) -> AreaLight {
     }
 }
 
-/// Each pixel the mean over the part of the photo that it covers, whether that is more than one of its
-/// pixels or less.
+/// Each pixel the mean over the part of the photo that it covers, whether that is more than one of
+/// its pixels or less.
 fn averaged(photo: &Image<LinearRgb>, [width, height]: [u32; 2]) -> Image<LinearRgb> {
     let (width, height) = (width as usize, height as usize);
     if photo.size() == (width, height) {
@@ -244,11 +253,16 @@ fn covered_shares(n: usize, len: usize) -> Vec<Vec<(usize, f32)>> {
 fn shares_between(start: f64, end: f64, scale: f64, len: usize) -> Vec<(usize, f32)> {
     (start as usize..len)
         .map(|i| {
-            let covered = end.min((i + 1) as f64) - start.max(i as f64);
+            let covered = covered_length(i, start, end);
             (i, (covered / scale) as f32)
         })
         .take_while(|&(_, share)| share > 0.0)
         .collect()
+}
+
+/// Of the pixel.
+fn covered_length(i: usize, start: f64, end: f64) -> f64 {
+    end.min((i + 1) as f64) - start.max(i as f64)
 }
 
 #[cfg(test)]

@@ -141,12 +141,12 @@ fn pick_background<'a>(draws: &Draws, backgrounds: &'a [Background]) -> Result<&
     }
 }
 
-/// Radiance of the constant environment that gives `share` of the lights' irradiance at the surface's
-/// centre; `share` itself, white, when there is no light.
+/// Radiance of the constant environment that gives `share` of the lights' irradiance at the
+/// surface's centre; `share` itself, white, when there is no light.
 ///
 /// # Method
-/// A small Lambertian light of power P faces the centre from distance d and height h: its irradiance
-/// there is `P h / (pi d^3)`. A constant environment of radiance L gives `pi L`.
+/// A small Lambertian light of power P faces the centre from distance d and height h: its
+/// irradiance there is `P h / (pi d^3)`. A constant environment of radiance L gives `pi L`.
 fn ambient_radiance(lights: &[AreaLight], share: f64) -> LinearRgb {
     if lights.is_empty() {
         return LinearRgb::WHITE.scale(share as f32);

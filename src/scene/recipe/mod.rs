@@ -22,7 +22,8 @@ use serde::{Deserialize, Serialize};
 
 const OBJECT_COUNT: Bounds = Bounds::new(0.0, MAX_OBJECTS as f64, "what comes to rest in a heap");
 
-/// What scenes are drawn from; every [`Range`] is a uniform distribution named by its path in this document.
+/// What scenes are drawn from; every [`Range`] is a uniform distribution named by its path in this
+/// document.
 ///
 /// Every field has a default, so a file only holds what differs from it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -30,9 +31,11 @@ const OBJECT_COUNT: Bounds = Bounds::new(0.0, MAX_OBJECTS as f64, "what comes to
 pub struct Recipe {
     /// Width and height of the pictures, pixels. Default: `[640, 480]`.
     pub image: [u32; 2],
-    /// Sources of variation that are switched off; all other draws stay as they are. Default: none.
+    /// Sources of variation that are switched off; all other draws stay as they are. Default:
+    /// none.
     pub off: Vec<Variation>,
-    /// Labelled backgrounds that are used, each a viewpoint: all, or the first ones. Default: `"all"`.
+    /// Labelled backgrounds that are used, each a viewpoint: all, or the first ones. Default:
+    /// `"all"`.
     pub viewpoints: Take,
     /// Photos of each asset that are used: all, or the first ones. Default: `"all"`.
     pub photos: Take,
@@ -40,7 +43,8 @@ pub struct Recipe {
     pub objects: Range,
     /// Share of the scenes that stay empty: pictures of the place alone, 0 to 1. Default: 0.
     pub negatives: f64,
-    /// How many different choices of objects there are. Default: `"unique"`, a new one for every scene.
+    /// How many different choices of objects there are. Default: `"unique"`, a new one for every
+    /// scene.
     pub selections: Selections,
     /// Factor on an object's size and thickness, its mass following. Default: `[0.9, 1.1]`.
     pub scale: Range,
@@ -50,8 +54,8 @@ pub struct Recipe {
     pub grade: GradeRanges,
     /// Lights; `lights = []` makes scenes without shadows. Default: one.
     pub lights: Vec<LightRanges>,
-    /// Irradiance of the constant environment on the surface, as a share of what the lights give at its centre; the
-    /// radiance itself when there is no light. Default: `[0.3, 0.8]`.
+    /// Irradiance of the constant environment on the surface, as a share of what the lights give
+    /// at its centre; the radiance itself when there is no light. Default: `[0.3, 0.8]`.
     pub ambient: Range,
     /// Light from a picture of the surroundings, on top of `ambient`.
     pub environment: EnvironmentRanges,
@@ -63,11 +67,12 @@ pub struct Recipe {
     pub restitution: Range,
     /// What falls in place of a cut-out. Default: `box`.
     pub collider: Collider,
-    /// Share of light that the surface reflects, where it is known: the exposure is then matched to the surface instead of
-    /// the plate's white. Default: not known.
+    /// Share of light that the surface reflects, where it is known: the exposure is then matched
+    /// to the surface instead of the plate's white. Default: not known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub surface_albedo: Option<f64>,
-    /// Colour of the light: `{ match_surface = { share = 0.5 } }` takes half of the surface's. Default: white.
+    /// Colour of the light: `{ match_surface = { share = 0.5 } }` takes half of the surface's.
+    /// Default: white.
     pub cast: LightTint,
     /// What happens to the finished frame. Default: nothing.
     pub finish: PostProcessRanges,
@@ -104,20 +109,20 @@ impl Default for Recipe {
 }
 
 impl Recipe {
-    /// Scene `k`: a pure function of the recipe, `seed` and `k`, the backgrounds and the catalog (both
-    /// in their order).
+    /// Scene `k`: a pure function of the recipe, `seed` and `k`, the backgrounds and the catalog
+    /// (both in their order).
     ///
-    /// Objects are dropped: they start in a stack over the surface, without overlap, within its walls.
-    /// The camera and the exposure are left for the stages that know the photo.
+    /// Objects are dropped: they start in a stack over the surface, without overlap, within its
+    /// walls. The camera and the exposure are left for the stages that know the photo.
     ///
     /// # Method
-    /// Every number is drawn by its own path ([`Draws`](crate::scene::Draws)), so that one more object
-    /// or another range changes no other draw. Objects are drawn without repetition until the catalog
-    /// is used up, then again from all of it.
+    /// Every number is drawn by its own path ([`Draws`](crate::scene::Draws)), so that one more
+    /// object or another range changes no other draw. Objects are drawn without repetition
+    /// until the catalog is used up, then again from all of it.
     ///
     /// # Errors
-    /// An impossible range; no background; an empty catalog while there should be objects; a card that
-    /// fits the surface in no direction.
+    /// An impossible range; no background; an empty catalog while there should be objects; a card
+    /// that fits the surface in no direction.
     pub fn scene(
         &self,
         seed: u64,
@@ -184,11 +189,7 @@ impl Recipe {
         check_image(self.image)?;
         self.check_objects()?;
         self.check_light()?;
-        self.friction.check("friction", &FRICTION)?;
-        self.restitution.check("restitution", &SHARE)?;
-        if let Some(albedo) = self.surface_albedo {
-            ALBEDO.check("surface_albedo", albedo)?;
-        }
+        self.check_surface()?;
         check_cast(&self.cast)?;
         self.finish.check()?;
         self.settle.check()
@@ -200,6 +201,15 @@ impl Recipe {
         self.scale.check("scale", &SCALE)?;
         self.start.check()?;
         self.grade.check("grade")
+    }
+
+    fn check_surface(&self) -> Result<()> {
+        self.friction.check("friction", &FRICTION)?;
+        self.restitution.check("restitution", &SHARE)?;
+        match self.surface_albedo {
+            Some(albedo) => ALBEDO.check("surface_albedo", albedo),
+            None => Ok(()),
+        }
     }
 
     fn check_light(&self) -> Result<()> {

@@ -39,7 +39,8 @@ pub struct LightRanges {
     pub power: Range,
     /// Red, green and blue, scene-linear. Default: `[1, 1, 1]`.
     pub color: [Range; 3],
-    /// Colour temperature, kelvin, 1667 to 25 000, on top of `color`; power keeps its luminance. Default: that of white.
+    /// Colour temperature, kelvin, 1667 to 25 000, on top of `color`; power keeps its luminance.
+    /// Default: that of white.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub temperature_k: Option<Range>,
 }
@@ -102,17 +103,20 @@ impl LightRanges {
     fn draw_offset(&self, draws: &Draws, path: &str) -> [f64; 2] {
         let offset = self.offset.draw_field(draws, path, "offset");
         let azimuth = self.azimuth_deg.draw_field(draws, path, "azimuth_deg");
-        let azimuth = azimuth.to_radians();
-        [offset * libm::cos(azimuth), offset * libm::sin(azimuth)]
+        from_polar(offset, azimuth.to_radians())
     }
 
     fn draw_color(&self, draws: &Draws, path: &str) -> LinearRgb {
         let tint =
             [0, 1, 2].map(|c| self.color[c].draw(draws, &format!("{path}.color[{c}]")) as f32);
-        let glow = self.temperature_k.map_or(LinearRgb::WHITE, |range| {
+        LinearRgb::from(tint) * self.draw_glow(draws, path)
+    }
+
+    /// The colour of its temperature.
+    fn draw_glow(&self, draws: &Draws, path: &str) -> LinearRgb {
+        self.temperature_k.map_or(LinearRgb::WHITE, |range| {
             planckian(range.draw_field(draws, path, "temperature_k"))
-        });
-        LinearRgb::from(tint) * glow
+        })
     }
 
     /// The light at the middle of its ranges, its size still varying.
@@ -148,4 +152,8 @@ impl LightRanges {
             ("power", &self.power, &RADIANCE),
         ]
     }
+}
+
+fn from_polar(radius: f64, azimuth: f64) -> [f64; 2] {
+    [radius * libm::cos(azimuth), radius * libm::sin(azimuth)]
 }

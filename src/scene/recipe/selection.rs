@@ -18,7 +18,8 @@ pub enum Collider {
 
 /// How many different choices of objects there are; in files `"unique"` or a number above 0.
 ///
-/// A choice is the number of objects and the asset and photo of each; size, colour and start are drawn for every scene.
+/// A choice is the number of objects and the asset and photo of each; size, colour and start are
+/// drawn for every scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "SelectionsInFile", into = "SelectionsInFile")]
 pub enum Selections {

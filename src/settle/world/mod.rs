@@ -4,9 +4,9 @@
 //! Rapier 0.36 with stiff, short contacts: its defaults are made for bodies of a metre and sink
 //! 200 mm cards into each other by more than their thickness. The numbers below were tried on 60
 //! boxes of 200 x 80 x 2-20 mm dropped from up to 8 m. The engine has absolute tolerances, so every
-//! scene is first brought to that scale ([`WorldUnits`]): lengths so that the typical card is 200 mm
-//! long, masses so that the typical one is 30 g, and time so that gravity is 9.81 m/s^2. The result
-//! does not depend on the unit of length, of mass, or on the strength of gravity.
+//! scene is first brought to that scale ([`WorldUnits`]): lengths so that the typical card is 200
+//! mm long, masses so that the typical one is 30 g, and time so that gravity is 9.81 m/s^2. The
+//! result does not depend on the unit of length, of mass, or on the strength of gravity.
 
 mod prism;
 mod run;
@@ -42,8 +42,8 @@ const MASS_SPREAD: f64 = 3.2;
 const CONTACT_MARGIN_M: f32 = 0.0002;
 /// Nothing falls faster in the world, m/s.
 const MAX_SPEED_M_PER_S: f64 = 4.0;
-/// Share of its start's height that the highest object falls at least: what lies under it is no heap
-/// of that height.
+/// Share of its start's height that the highest object falls at least: what lies under it is no
+/// heap of that height.
 const MIN_FALL_SHARE: f64 = 0.5;
 /// Objects that may lie on each other at the step of the options. What lies under many sinks in, by
 /// their weight over the square of the rate of steps and iterations: heaps of 100 do at 1/480 s and
@@ -63,9 +63,9 @@ const ANGULAR_DAMPING: f32 = 0.5;
 const SLEEP_SPEED: f32 = 0.2;
 /// Damping ratio of contacts.
 const CONTACT_DAMPING_RATIO: f32 = 2.0;
-/// Limits on what pushes bodies apart, which must not become speed. Of 150 heaps 19 gained more than
-/// 1 % of their energy in a step at 10 and one unbiased pass, and none at these; at 2 they overlap
-/// ten times as far, by 0.3 mm.
+/// Limits on what pushes bodies apart, which must not become speed. Of 150 heaps 19 gained more
+/// than 1 % of their energy in a step at 10 and one unbiased pass, and none at these; at 2 they
+/// overlap ten times as far, by 0.3 mm.
 const MAX_CORRECTIVE_SPEED: f32 = 4.0;
 const STABILIZATION_ITERATIONS: usize = 2;
 
@@ -175,8 +175,8 @@ impl Drop<'_> {
         }
     }
 
-    /// Work of a step for each object and pair: iterations, as often as a step may be cut at what is
-    /// in the way.
+    /// Work of a step for each object and pair: iterations, as often as a step may be cut at what
+    /// is in the way.
     fn work_per_pair(&self) -> u64 {
         u64::from(self.options.iterations.div_ceil(ITERATIONS_PER_WORK))
             * u64::from(self.options.ccd.clamp(1, MAX_SUBSTEPS))
@@ -220,8 +220,8 @@ impl Drop<'_> {
         soften(&mut p.static_contact_softness, rate / 2.0);
     }
 
-    /// Adds the floor and four walls, which reach above the highest start. The walls are smooth: what
-    /// is invisible supports nothing.
+    /// Adds the floor and four walls, which reach above the highest start. The walls are smooth:
+    /// what is invisible supports nothing.
     fn add_room(&self, world: &mut PhysicsWorld, units: &WorldUnits, members: &[usize]) {
         let surface = &self.scene.surface;
         let half_sides = surface.size.map(|length| length * units.length / 2.0);
@@ -297,8 +297,8 @@ struct Slab {
     half: [f64; 3],
 }
 
-/// The floor, then the walls: `x` and `y` are half sides of the surface, `middle` is half the walls'
-/// height.
+/// The floor, then the walls: `x` and `y` are half sides of the surface, `middle` is half the
+/// walls' height.
 fn room_slabs([x, y]: [f64; 2], middle: f64) -> [Slab; 5] {
     let wall = WALL_HALF_M;
     let (wide, high) = (x.max(y) + 2.0 * wall, middle + wall);

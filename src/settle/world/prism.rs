@@ -9,8 +9,8 @@ use rapier3d::prelude::{ColliderBuilder, Vector};
 ///
 /// # Method
 /// The engine makes contacts with four corners of a face and not more, so a plate with more corners
-/// would rest on a part of itself. A prism is therefore cut across into prisms of four corners, which
-/// move as one body.
+/// would rest on a part of itself. A prism is therefore cut across into prisms of four corners,
+/// which move as one body.
 pub(super) fn colliders(
     object: &Object,
     half: &Vector3<f64>,

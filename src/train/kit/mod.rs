@@ -43,7 +43,8 @@ impl KitOptions {
     }
 }
 
-/// A way to train that the paper compares: which images to learn from and to choose the best epoch by.
+/// A way to train that the paper compares: which images to learn from and to choose the best epoch
+/// by.
 struct Variant {
     name: &'static str,
     train: &'static [&'static str],
@@ -79,12 +80,14 @@ const VARIANTS: [Variant; 5] = [
     },
 ];
 
-/// Writes the kit: lists of images, one `VARIANT.yaml` each, `hyp.yaml`, `balance.json`, `balanced.py`, `commands.sh`.
+/// Writes the kit: lists of images, one `VARIANT.yaml` each, `hyp.yaml`, `balance.json`,
+/// `balanced.py`, `commands.sh`.
 ///
 /// Lists hold whole paths, so the kit may be anywhere, but the datasets may not move.
 ///
 /// # Errors
-/// Those of [`YoloSet::open`] and [`Balance::weights`]; [`Error::Value`] when the two datasets name other classes.
+/// Those of [`YoloSet::open`] and [`Balance::weights`]; [`Error::Value`] when the two datasets name
+/// other classes.
 pub fn write(folder: &Path, options: &KitOptions) -> Result<()> {
     let real = open_set(&options.real)?;
     let synthetic = open_set(&options.synthetic)?;

@@ -1,7 +1,9 @@
-//! petcomp's library where a peer is a library too: one piece of work, done a number of times in one process.
+//! petcomp's library where a peer is a library too: one piece of work, done a number of times in
+//! one process.
 //!
-//! `peers TIMES WORK FILES..` is run by the scripts beside this file, on as many threads as it is given cores. With 0 times
-//! it only reads: the difference of two processes is what the work costs. `convert` reads and writes each time.
+//! `peers TIMES WORK FILES..` is run by the scripts beside this file, on as many threads as it is
+//! given cores. With 0 times it only reads: the difference of two processes is what the work costs.
+//! `convert` reads and writes each time.
 
 use petcomp::camera::{self, SolveOptions};
 use petcomp::eval;

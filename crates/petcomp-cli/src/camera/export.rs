@@ -13,7 +13,8 @@ pub(crate) struct ExportCameraArgs {
     /// For which program
     #[arg(long)]
     to: CameraFormat,
-    /// File (blender, opencv: of one camera) or folder (colmap) to write; without it, blender and opencv are printed
+    /// File (blender, opencv: of one camera) or folder (colmap) to write; without it, blender and
+    /// opencv are printed
     #[arg(short, long)]
     output: Option<PathBuf>,
 }

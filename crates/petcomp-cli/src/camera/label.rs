@@ -17,8 +17,8 @@ pub(crate) struct InitLabelArgs {
     /// Its corners in pixels, "x,y x,y x,y x,y": top left, top right, bottom right, bottom left
     #[arg(long, value_name = "CORNERS", value_parser = parse_corners)]
     corners: Option<[[f64; 2]; 4]>,
-    /// Label of another photo of the same rectangle: its size, its markers and its camera's name are taken over, and the
-    /// markers looked for
+    /// Label of another photo of the same rectangle: its size, its markers and its camera's name
+    /// are taken over, and the markers looked for
     #[arg(long, value_name = "LABEL")]
     like: Option<PathBuf>,
     /// Label to write instead of NAME.label.json beside the photo
@@ -115,7 +115,8 @@ pub(super) fn add_markers(args: &MarkersArgs, global: &GlobalArgs) -> anyhow::Re
     Ok(())
 }
 
-/// The label with the corners of the photo's markers; an error names the file that is to be changed.
+/// The label with the corners of the photo's markers; an error names the file that is to be
+/// changed.
 fn with_markers_of(label: Label, photo: &Path, blamed: &Path) -> petcomp::Result<Label> {
     let photo: Image<LinearRgb> = io::read(photo)?;
     camera::with_markers(label, &photo).map_err(|e| e.in_file(blamed))

@@ -9,7 +9,8 @@ use crate::global::GlobalArgs;
 
 #[derive(clap::Subcommand)]
 pub(crate) enum CameraCommand {
-    /// Write a label for a photo, with everything that is known already; its corners are filled in by hand or by markers
+    /// Write a label for a photo, with everything that is known already; its corners are filled in
+    /// by hand or by markers
     Init(label::InitLabelArgs),
     /// Solve the camera of each label; write NAME.camera.json and NAME.overlay.png beside it
     Solve(solve::SolveArgs),
@@ -19,7 +20,8 @@ pub(crate) enum CameraCommand {
     Doctor(solve::LabelFileArgs),
     /// Write solved cameras as another program does
     Export(export::ExportCameraArgs),
-    /// Find printed markers (ArUco DICT_4X4_50, AprilTag tag36h11) in a photo and add their corners to a label as points
+    /// Find printed markers (ArUco DICT_4X4_50, AprilTag tag36h11) in a photo and add their corners
+    /// to a label as points
     Markers(label::MarkersArgs),
     /// Turn a photo into a metric top view of the surface, or lay a picture on it
     Rectify(rectify::RectifyArgs),

@@ -12,7 +12,8 @@ use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
 pub(crate) struct LabelFileArgs {
-    /// Labels: NAME.label.json, or files of LabelMe, CVAT (for images) or Label Studio together with --size
+    /// Labels: NAME.label.json, or files of LabelMe, CVAT (for images) or Label Studio together
+    /// with --size
     #[arg(required = true)]
     labels: Vec<PathBuf>,
     /// Width and height of the rectangle in metres, for labels that do not say them
@@ -52,7 +53,8 @@ impl LabelFileArgs {
         camera::read_labels(path, self.size)
     }
 
-    /// Does something with every label; where there are several, one that cannot be used does not stop the others.
+    /// Does something with every label; where there are several, one that cannot be used does not
+    /// stop the others.
     fn for_each(&self, act: impl Fn(&LabelledPhoto) -> anyhow::Result<()>) -> anyhow::Result<()> {
         if let [path] = &self.labels[..]
             && let [labelled] = &self.read_file(path)?[..]

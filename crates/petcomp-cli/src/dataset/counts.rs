@@ -52,7 +52,8 @@ fn obstructed_labels(policy: Obstructed) -> &'static str {
     }
 }
 
-/// What a dataset's trainers are given: the files that name all others, or the folder where there are none.
+/// What a dataset's trainers are given: the files that name all others, or the folder where there
+/// are none.
 pub(crate) fn trainer_inputs(counts: &DatasetCounts, folder: &Path) -> Vec<PathBuf> {
     match counts.for_trainers.as_slice() {
         [] => vec![folder.into()],

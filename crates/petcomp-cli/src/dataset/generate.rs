@@ -16,7 +16,8 @@ use std::path::{Path, PathBuf};
 pub(crate) struct GenerateArgs {
     #[command(flatten)]
     recipe: RecipeArgs,
-    /// Number of pictures of the whole dataset, at most a thousand million; a folder that holds more is refused
+    /// Number of pictures of the whole dataset, at most a thousand million; a folder that holds
+    /// more is refused
     #[arg(short = 'n', long, value_name = "N", required_unless_present_any = ["only", "preview"])]
     count: Option<u64>,
     /// Seed; the same one gives the same files
@@ -25,23 +26,23 @@ pub(crate) struct GenerateArgs {
     /// Folder to write into
     #[arg(short, long, value_name = "FOLDER")]
     output: PathBuf,
-    /// draft, normal or reference: how finely everything is computed; by default what the recipe says. Falls differ between
-    /// qualities, and so do the places where things come to lie
+    /// draft, normal or reference: how finely everything is computed; by default what the recipe
+    /// says. Falls differ between qualities, and so do the places where things come to lie
     #[arg(long)]
     quality: Option<Quality>,
-    /// Go on with a dataset that was begun before: refuse a new folder, and check every file against its checksum, inputs
-    /// too
+    /// Go on with a dataset that was begun before: refuse a new folder, and check every file
+    /// against its checksum, inputs too
     #[arg(long)]
     resume: bool,
     /// Make only image K, whether it is there or not
     #[arg(long, value_name = "K", conflicts_with_all = ["shard", "preview"])]
     only: Option<u64>,
-    /// Make every N-th image, from the I-th (1 to N), in a folder of its own below the output; `auto` or `auto/N` asks the
-    /// Slurm array or the indexed Kubernetes job that this runs in
+    /// Make every N-th image, from the I-th (1 to N), in a folder of its own below the output;
+    /// `auto` or `auto/N` asks the Slurm array or the indexed Kubernetes job that this runs in
     #[arg(long, value_name = "I/N", conflicts_with = "preview")]
     shard: Option<ShardChoice>,
-    /// Make the first N images (of those that -n asks for) at half their width and height, and a sheet of them: a look in
-    /// seconds
+    /// Make the first N images (of those that -n asks for) at half their width and height, and a
+    /// sheet of them: a look in seconds
     #[arg(long, value_name = "N", num_args = 0..=1, default_missing_value = "16")]
     preview: Option<u64>,
     #[command(flatten)]

@@ -11,9 +11,11 @@ use std::path::{Path, PathBuf};
 
 #[derive(clap::Subcommand)]
 pub(crate) enum InspectCommand {
-    /// Look for what trainers refuse, and for what makes results too good: duplicates, leaks between the parts
+    /// Look for what trainers refuse, and for what makes results too good: duplicates, leaks
+    /// between the parts
     Check(CheckArgs),
-    /// Write one HTML page: pictures with their labels, what was drawn, what can be seen, how long it took
+    /// Write one HTML page: pictures with their labels, what was drawn, what can be seen, how long
+    /// it took
     Report(ReportArgs),
     /// Draw a sheet of the first pictures with their boxes
     Sheet(SheetArgs),

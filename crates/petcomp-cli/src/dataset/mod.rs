@@ -23,7 +23,8 @@ pub(crate) enum DatasetCommand {
     Recipe(recipe::RecipeCommand),
     /// Make a dataset; the same command goes on where an interrupted one stopped
     Generate(generate::GenerateArgs),
-    /// Make the paper's datasets: all variation, one source of it switched off in each, all off; scenes are in pairs
+    /// Make the paper's datasets: all variation, one source of it switched off in each, all off;
+    /// scenes are in pairs
     Ablate(ablate::AblateArgs),
     /// Join the shards that several machines made
     Merge(merge::MergeArgs),

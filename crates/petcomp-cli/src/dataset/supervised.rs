@@ -1,4 +1,5 @@
-//! A run under supervision: it shows its progress, stops when interrupted, and asks before it takes hours.
+//! A run under supervision: it shows its progress, stops when interrupted, and asks before it takes
+//! hours.
 
 use crate::global::GlobalArgs;
 use crate::interruption::interruption;
@@ -15,13 +16,14 @@ const ESTIMATE_INTERVAL: Duration = Duration::from_millis(500);
 /// Whether a job may take very long.
 #[derive(clap::Args)]
 pub(crate) struct LongRunConsent {
-    /// Go on with a job that would take more than an hour; without, it stops with an estimate after its first pictures
+    /// Go on with a job that would take more than an hour; without, it stops with an estimate
+    /// after its first pictures
     #[arg(long)]
     yes: bool,
 }
 
-/// Makes the dataset, showing progress, and stops between two pictures when interrupted, or when the first ones show that
-/// it takes longer than an hour and nobody has agreed to that.
+/// Makes the dataset, showing progress, and stops between two pictures when interrupted, or when
+/// the first ones show that it takes longer than an hour and nobody has agreed to that.
 pub(crate) fn generate_supervised(
     pipeline: &Pipeline,
     plan: &Plan,
@@ -61,7 +63,8 @@ impl RunWatch {
         *self.last.lock().unwrap_or_else(PoisonError::into_inner) = Some(progress);
     }
 
-    /// Runs the job and, where that is asked for, stops it when it would take too long; returns the estimate, too.
+    /// Runs the job and, where that is asked for, stops it when it would take too long; returns the
+    /// estimate, too.
     fn over<T>(&self, is_limited: bool, job: impl FnOnce() -> T) -> (T, Option<LongRun>) {
         std::thread::scope(|scope| {
             let watching = is_limited.then(|| scope.spawn(|| self.stop_long_run()));

@@ -15,10 +15,12 @@ use std::path::{Path, PathBuf};
 /// What both commands read and write.
 #[derive(clap::Args)]
 pub(crate) struct FilmOptionArgs {
-    /// Film to write, an EXR: R G B A as seen alone, TR TG TB as measured, VR VG VB along the line of sight
+    /// Film to write, an EXR: R G B A as seen alone, TR TG TB as measured, VR VG VB along the line
+    /// of sight
     #[arg(short, long, value_name = "EXR")]
     output: PathBuf,
-    /// Photo of the empty screen, one for each photo; without, the screen is fitted around the object
+    /// Photo of the empty screen, one for each photo; without, the screen is fitted around the
+    /// object
     #[arg(long = "plate", value_name = "PHOTO")]
     plates: Vec<PathBuf>,
     /// Coverage of the object in the (first) photo; without, it is searched for

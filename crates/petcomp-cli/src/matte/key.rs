@@ -36,7 +36,8 @@ pub(crate) struct KeyArgs {
     /// A matte of what is surely foreground
     #[arg(long, value_name = "FILE")]
     core: Option<PathBuf>,
-    /// Find the object first: what lies around it is garbage, and what surely lets nothing through is core
+    /// Find the object first: what lies around it is garbage, and what surely lets nothing through
+    /// is core
     #[arg(long, conflicts_with_all = ["garbage", "core"])]
     auto_mattes: bool,
     /// Which keyer to be: blender-3.4, blender-4.2, blender-4.5 or robust

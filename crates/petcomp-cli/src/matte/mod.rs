@@ -11,7 +11,8 @@ use crate::global::GlobalArgs;
 
 #[derive(clap::Subcommand)]
 pub(crate) enum MatteCommand {
-    /// Find the object and write every intermediate picture, and the garbage and core matte that a keyer takes
+    /// Find the object and write every intermediate picture, and the garbage and core matte that a
+    /// keyer takes
     Segment(segment::SegmentArgs),
     /// Find the object, key it, and write it without its background
     Cut(cut::CutArgs),

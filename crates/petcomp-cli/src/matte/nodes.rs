@@ -1,4 +1,5 @@
-//! `petcomp matte chroma-key`, `channel-key`, `difference-key`, `color-spill`, `keying-screen`: Blender's other keyers.
+//! `petcomp matte chroma-key`, `channel-key`, `difference-key`, `color-spill`, `keying-screen`:
+//! Blender's other keyers.
 
 use super::picture_files::{write_optional, write_picture};
 use crate::values::{parse_color, parse_pixel};

@@ -54,7 +54,8 @@ fn search_pictures(found: &Segmentation) -> Vec<NamedPicture> {
         .collect()
 }
 
-/// The mattes for a keyer. An object that leaves no screen has no plate, and what is opaque of it is unknown.
+/// The mattes for a keyer. An object that leaves no screen has no plate, and what is opaque of it
+/// is unknown.
 fn keyer_mattes(photo: &Image<LinearRgb>, found: &Segmentation) -> Vec<NamedPicture> {
     let plate = ScreenPlate::fit_outside(photo, &found.mask, &PlateOptions::default());
     let Ok(plate) = plate else {

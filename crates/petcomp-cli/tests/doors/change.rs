@@ -1,4 +1,5 @@
-//! Valid documents and command lines with values changed to what is huge, negative, no number or of another kind.
+//! Valid documents and command lines with values changed to what is huge, negative, no number or of
+//! another kind.
 
 use petcomp::scene::Draws;
 use serde_json::Value;
@@ -201,7 +202,8 @@ fn change(document: &mut Value, place: &str, chance: &mut Chance, words: &mut Ve
     }
 }
 
-/// A text with one to three of its words changed, doubled or taken away; words are what stands between separators.
+/// A text with one to three of its words changed, doubled or taken away; words are what stands
+/// between separators.
 pub(crate) fn text(valid: &str, chance: &mut Chance) -> String {
     let mut text = valid.to_owned();
     for _ in 0..=chance.below(3) {

@@ -1,5 +1,5 @@
-//! The doors through which documents come: each writes a changed one where the valid one lies and does what a command does
-//! with it first.
+//! The doors through which documents come: each writes a changed one where the valid one lies and
+//! does what a command does with it first.
 
 use crate::change::{self, Chance};
 use crate::world::{LIST, World};
@@ -261,7 +261,8 @@ fn ends<T>(result: Result<T>) -> Option<T> {
     }
 }
 
-/// Most pixels, samples and steps of what is computed here: what takes longer is asked of other tests.
+/// Most pixels, samples and steps of what is computed here: what takes longer is asked of other
+/// tests.
 const FEW_PIXELS: u64 = 128 * 96;
 const FEW_STEPS: f64 = 20_000.0;
 const FEW_SAMPLES: usize = 500;

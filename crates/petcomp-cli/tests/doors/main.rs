@@ -1,9 +1,11 @@
-//! No number, word or nesting in any argument or document ends the program otherwise than by a result or an error: every
-//! door, with values that are huge, negative, no numbers or of another kind.
+//! No number, word or nesting in any argument or document ends the program otherwise than by a
+//! result or an error: every door, with values that are huge, negative, no numbers or of another
+//! kind.
 //!
-//! Documents are tried in a process of their own with 4 GiB of address space, so that an allocation without end is seen
-//! as what it is: the end of the process. `PETCOMP_DRAWS=100000 cargo test --release --test doors -- --nocapture` tries
-//! more of them, `PETCOMP_DOOR=recipe` at one door only, `PETCOMP_KEEP=FOLDER` keeps the documents that fail.
+//! Documents are tried in a process of their own with 4 GiB of address space, so that an allocation
+//! without end is seen as what it is: the end of the process. `PETCOMP_DRAWS=100000 cargo test
+//! --release --test doors -- --nocapture` tries more of them, `PETCOMP_DOOR=recipe` at one door
+//! only, `PETCOMP_KEEP=FOLDER` keeps the documents that fail.
 #![cfg(target_os = "linux")]
 
 mod arguments;
@@ -100,8 +102,8 @@ fn knock(door: &str, count: u64, world: &mut World) -> Vec<Failure> {
     failures
 }
 
-/// Draws from `first` on until the process ends: what it told, the last draw that it began, and how it ended otherwise
-/// than by itself.
+/// Draws from `first` on until the process ends: what it told, the last draw that it began, and how
+/// it ended otherwise than by itself.
 fn one_life(
     door: &str,
     first: u64,

@@ -1,4 +1,5 @@
-//! A small world of valid files: photos, assets, a label, a recipe, a scene, a dataset and its shards.
+//! A small world of valid files: photos, assets, a label, a recipe, a scene, a dataset and its
+//! shards.
 
 use petcomp::asset::{self, PhotoEntry, Scale};
 use petcomp::dataset::{DatasetConfig, Pipeline, SampleRange, Shard, generate};
@@ -75,7 +76,8 @@ impl World {
         }
     }
 
-    /// A dataset in all formats, the shards of another, and a scene of it for the reference renderer.
+    /// A dataset in all formats, the shards of another, and a scene of it for the reference
+    /// renderer.
     fn dataset(&self) {
         let formats = "labels.formats=[\"yolo\", \"coco\"]".parse().unwrap();
         let setup = DatasetConfig::read(self.path("recipe.toml"), &[formats]).unwrap();

@@ -112,8 +112,8 @@ fn codes_apart(image: &Image<impl ToFile>) -> Vec<u8> {
         .collect()
 }
 
-/// JPEG lets decoders differ by a code in each of Y, Cb and Cr (ISO/IEC 10918-2); blue is Y + 1.772 Cb, so two codes of
-/// colour can come of it.
+/// JPEG lets decoders differ by a code in each of Y, Cb and Cr (ISO/IEC 10918-2); blue is Y + 1.772
+/// Cb, so two codes of colour can come of it.
 #[test]
 fn jpegs_differ_by_a_code_of_each_component_at_most() {
     let grey = Image::from_fn(64, 48, |x, y| Coverage(((x * y) % 97) as f32 / 96.0));

@@ -60,7 +60,8 @@ pub(crate) fn stored(data: &[u8]) -> Vec<u8> {
     out
 }
 
-/// A megabyte of zeros a thousand times over, compressed: gzip inside the system's own tool would do the same.
+/// A megabyte of zeros a thousand times over, compressed: gzip inside the system's own tool would
+/// do the same.
 pub(crate) fn zeros(megabytes: usize) -> Vec<u8> {
     let mut encoder = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::best());
     let block = vec![0; 1 << 20];

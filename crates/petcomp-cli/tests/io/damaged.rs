@@ -1,4 +1,5 @@
-//! A suite of small files that are damaged or hostile, each made here: bombs, cuts, edited headers, loops, wrong names.
+//! A suite of small files that are damaged or hostile, each made here: bombs, cuts, edited headers,
+//! loops, wrong names.
 
 use crate::build::{
     attribute, end_of_attributes, find, ihdr, inserted, png, segment, stored, tags, with, zeros,
@@ -660,7 +661,8 @@ fn others() -> Vec<Case> {
     ]
 }
 
-/// The most memory that this process and its workers ever had, bytes; none where the system does not tell.
+/// The most memory that this process and its workers ever had, bytes; none where the system does
+/// not tell.
 fn peak() -> Option<u64> {
     let of = |pid: &str| -> Option<u64> {
         status(pid).lines().find_map(|l| {

@@ -1,4 +1,5 @@
-//! The doors of `fuzz/` without a fuzzer: seeds with bytes changed, cut, doubled and swapped, on the stable compiler.
+//! The doors of `fuzz/` without a fuzzer: seeds with bytes changed, cut, doubled and swapped, on
+//! the stable compiler.
 
 use crate::promptness::quickly;
 use crate::sweep::Random;
@@ -85,7 +86,8 @@ fn varied(random: &mut Random, seed: &[u8]) -> Vec<u8> {
     if bytes.is_empty() { vec![0] } else { bytes }
 }
 
-/// Knocks at every door while `goes_on`, which hears how often and for how long; a panic is the failure.
+/// Knocks at every door while `goes_on`, which hears how often and for how long; a panic is the
+/// failure.
 fn knock(goes_on: impl Fn(u64, Duration) -> bool) {
     for (name, door, seeds) in doors() {
         let (mut random, start, mut count) = (Random(3), Instant::now(), 0_u64);

@@ -1,10 +1,12 @@
-//! Kinds of file that petcomp does not write, by another program (`files/make.py`): both ways of reading agree on each.
+//! Kinds of file that petcomp does not write, by another program (`files/make.py`): both ways of
+//! reading agree on each.
 
 use petcomp::io::{self, ReadOptions};
 use petcomp::{Image, Srgb8, StraightRgba, color};
 use std::path::PathBuf;
 
-/// Codes by which decoders of the same JPEG may differ (see `both_paths`), and by which CMYK may be rounded.
+/// Codes by which decoders of the same JPEG may differ (see `both_paths`), and by which CMYK may be
+/// rounded.
 const JPEG: u8 = 2;
 const CMYK: u8 = 1;
 

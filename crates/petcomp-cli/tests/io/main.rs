@@ -1,4 +1,5 @@
-//! Pictures in and out: what they mean, that both decoders agree, and that bad files are met with one clear line.
+//! Pictures in and out: what they mean, that both decoders agree, and that bad files are met with
+//! one clear line.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 

@@ -11,7 +11,8 @@ fn with_bits(bits: Bits) -> WriteOptions {
     }
 }
 
-/// 128/255 of the light of white is displayed as 188. Multiplying display values gives 128, decoding that again 55.
+/// 128/255 of the light of white is displayed as 188. Multiplying display values gives 128,
+/// decoding that again 55.
 #[test]
 fn half_alpha_white_over_black_is_displayed_as_188() {
     let folder = Folder::new();
@@ -311,7 +312,8 @@ fn cameras_held_any_way_give_upright_pictures() {
     }
 }
 
-/// The same stored picture as JPEG, PNG and TIFF, with an orientation noted in each format's own way.
+/// The same stored picture as JPEG, PNG and TIFF, with an orientation noted in each format's own
+/// way.
 fn oriented(
     folder: &Folder,
     stored: &Image<Srgb8>,

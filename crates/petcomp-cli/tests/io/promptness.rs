@@ -7,7 +7,8 @@ const QUICK: Duration = Duration::from_secs(2);
 /// What is slow because the machine was busy is not so every time; what is slow by itself is.
 const TRIES: usize = 5;
 
-/// What `work` gives, and how long it took; it is tried again while that is two seconds or more, and panics where it always is.
+/// What `work` gives, and how long it took; it is tried again while that is two seconds or more,
+/// and panics where it always is.
 pub(crate) fn quickly<T>(what: &str, work: impl FnMut() -> T) -> (T, Duration) {
     within(QUICK, what, work)
 }

@@ -1,4 +1,5 @@
-//! Kinds of valid file that few programs write: they are read, and read right, or named for what they are.
+//! Kinds of valid file that few programs write: they are read, and read right, or named for what
+//! they are.
 
 use crate::build::{ihdr, png, stored};
 use crate::make::{Folder, behind, tiff};
@@ -80,8 +81,8 @@ fn assert_codes(path: &Path, size: (usize, usize)) {
     assert_eq!(read.pixels(), expected.pixels(), "{}", path.display());
 }
 
-/// As caspian.tif of libtiff's sample pictures: OpenImageIO cannot go back from the last row of a plane to the next of
-/// the first.
+/// As caspian.tif of libtiff's sample pictures: OpenImageIO cannot go back from the last row of a
+/// plane to the next of the first.
 #[test]
 fn compressed_planes_of_a_tiff_are_read() {
     let folder = Folder::new();
@@ -152,7 +153,8 @@ fn tiles_larger_than_the_picture_are_cut() {
     );
 }
 
-/// As quad-tile.tif and cramps-tile.tif of libtiff's sample pictures: what is in tiles stands under the tags of strips.
+/// As quad-tile.tif and cramps-tile.tif of libtiff's sample pictures: what is in tiles stands under
+/// the tags of strips.
 #[test]
 fn tiles_under_the_tags_of_strips_are_read() {
     let folder = Folder::new();
@@ -409,7 +411,8 @@ fn the_part_with_colours_is_taken_wherever_it_stands() {
     );
 }
 
-/// An EXR of 4 x 4 halves with luminance for each pixel and a pair of colour differences for four of them.
+/// An EXR of 4 x 4 halves with luminance for each pixel and a pair of colour differences for four
+/// of them.
 fn chroma_exr(by: [f32; 4], ry: [f32; 4]) -> Vec<u8> {
     let text = |name: &str, kind: &str, value: &[u8]| {
         [

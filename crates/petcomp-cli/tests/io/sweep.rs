@@ -1,4 +1,5 @@
-//! Valid files with something taken away or changed: a picture as it was, or a line that says what is wrong.
+//! Valid files with something taken away or changed: a picture as it was, or a line that says what
+//! is wrong.
 
 use crate::make::Folder;
 use crate::promptness::quickly;
@@ -98,7 +99,8 @@ impl Random {
     }
 }
 
-/// Reads so many damaged files and returns what became of them; panics where one was not met as it should be.
+/// Reads so many damaged files and returns what became of them; panics where one was not met as it
+/// should be.
 fn damaged_files(count: usize, seed: u64) {
     let folder = Folder::new();
     let mut random = Random(seed);
@@ -119,7 +121,8 @@ fn damaged_files(count: usize, seed: u64) {
     for i in 0..count {
         let (name, whole) = &files[i % files.len()];
         let path = folder.with(name, &random.damage(whole));
-        // Every seventh is shown to OpenImageIO where our decoders do not know it: its confinement makes that slower.
+        // Every seventh is shown to OpenImageIO where our decoders do not know it: its confinement
+        // makes that slower.
         let options = if i % 7 == 0 { &quick } else { &alone };
         let numbered = format!("{name} ({i})");
         let (outcome, time) = quickly(&numbered, || read(&path, options));

@@ -1,4 +1,5 @@
-//! Files that only OpenImageIO reads come through its worker; programs that meet none do not load it.
+//! Files that only OpenImageIO reads come through its worker; programs that meet none do not load
+//! it.
 
 use crate::make::{Folder, palette_tiff};
 use petcomp::io::{self, WriteOptions};

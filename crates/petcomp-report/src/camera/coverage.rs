@@ -1,4 +1,5 @@
-//! How often the truth lies within the stated error, with the principal point in the middle of the picture and off it.
+//! How often the truth lies within the stated error, with the principal point in the middle of the
+//! picture and off it.
 
 use super::show::three;
 use super::{focal_percent, height_error_px};
@@ -7,7 +8,8 @@ use crate::statistics::quantile;
 use petcomp::camera::simulate::{Scenario, View};
 use petcomp::camera::{Framing, Solution, SolveOptions, solve};
 
-/// Distances of the principal point from the picture's middle, in longer sides: a whole picture, and cropped ones.
+/// Distances of the principal point from the picture's middle, in longer sides: a whole picture,
+/// and cropped ones.
 const OFF_CENTER: [f64; 4] = [0.0, 0.05, 0.1, 0.23];
 /// Noise of the corners, pixels.
 const NOISES_PX: [f64; 2] = [0.5, 1.0];
@@ -200,8 +202,8 @@ mod tests {
         for row in measure(120) {
             println!("{row:?}");
             assert_eq!(row.refused, 0, "{row:?}");
-            // A normal error is within one standard deviation in 68 % of all cases; off the middle by 23 % every view is
-            // one of twice what is expected of a cropped one.
+            // A normal error is within one standard deviation in 68 % of all cases; off the middle
+            // by 23 % every view is one of twice what is expected of a cropped one.
             let extreme = row.off_center > 0.2;
             let least = if extreme {
                 [0.5, 0.75, 0.95]

@@ -11,9 +11,11 @@ const JOINT_KAPPA_SIGMA: f64 = 0.01;
 /// What the camera is really like, and what the solver assumes of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Lens {
-    /// A perfect pinhole over a perfect rectangle, and the solver knows; nothing is known of the focal length.
+    /// A perfect pinhole over a perfect rectangle, and the solver knows; nothing is known of the
+    /// focal length.
     Ideal,
-    /// Principal point, distortion and tape measure are as uncertain as they usually are, with the default priors.
+    /// Principal point, distortion and tape measure are as uncertain as they usually are, with the
+    /// default priors.
     Realistic,
 }
 

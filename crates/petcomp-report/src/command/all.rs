@@ -12,7 +12,8 @@ pub(crate) struct Args {
     /// Other programs' measurements, as `make peers` writes them; left out where there are none
     #[arg(long, value_name = "FOLDER", default_value = "target/peers")]
     peers: PathBuf,
-    /// Photos with their truth, as the sample world has them, for the mattes; by default photos made in code
+    /// Photos with their truth, as the sample world has them, for the mattes; by default photos
+    /// made in code
     #[arg(long, value_name = "FOLDER")]
     truth: Option<PathBuf>,
     /// Golden scenes with Cycles' pictures; left out where there are none

@@ -6,7 +6,8 @@ use std::path::PathBuf;
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Folder of runs: KEY/RUN/metrics.json as `petcomp eval -o` writes it, with KEY such as combined/all or real/25
+    /// Folder of runs: KEY/RUN/metrics.json as `petcomp eval -o` writes it, with KEY such as
+    /// combined/all or real/25
     runs: PathBuf,
     /// Folder to write
     #[arg(short, long, value_name = "FOLDER", default_value = "report")]

@@ -29,9 +29,11 @@ pub(crate) struct TruthArgs {
 
 #[derive(clap::Subcommand)]
 pub(crate) enum Command {
-    /// Everything that is measured on one page, in about three minutes: report.html, report.md and the data as CSV
+    /// Everything that is measured on one page, in about three minutes: report.html, report.md and
+    /// the data as CSV
     All(all::Args),
-    /// Error of the camera solver against run time and against tilt: camera.csv, camera.md and plots (SVG)
+    /// Error of the camera solver against run time and against tilt: camera.csv, camera.md and
+    /// plots (SVG)
     Camera(camera::Args),
     /// Error of the settle stage against run time: settle.csv, settle.md and a plot (SVG)
     Settle(settle::Args),
@@ -39,15 +41,19 @@ pub(crate) enum Command {
     Stability(stability::Args),
     /// Our trained models beside the values of the paper, with intervals and a test
     Experiments(experiments::Args),
-    /// Error of the matting methods against run time, on photos with known mattes: matte.csv, matte.md, matte.svg, matte.html
+    /// Error of the matting methods against run time, on photos with known mattes: matte.csv,
+    /// matte.md, matte.svg, matte.html
     Matte(TruthArgs),
-    /// Whether wrong cut-outs are flagged, on photos with known outlines made harder in many ways: flags.csv, flags.md
+    /// Whether wrong cut-outs are flagged, on photos with known outlines made harder in many ways:
+    /// flags.csv, flags.md
     Flags(TruthArgs),
-    /// Error of the renderer against run time, beside Cycles: render.csv, render.md, a plot and the golden scenes
+    /// Error of the renderer against run time, beside Cycles: render.csv, render.md, a plot and the
+    /// golden scenes
     Render(render::Args),
     /// What scenes pay for, counted: work.csv and work.md
     Work(work::Args),
-    /// Memory and rate by threads, pixels and cards, and a million pictures: scale.csv, scale.md and charts (SVG)
+    /// Memory and rate by threads, pixels and cards, and a million pictures: scale.csv, scale.md
+    /// and charts (SVG)
     Scale(scale::Args),
 }
 

@@ -1,4 +1,5 @@
-//! `petcomp-report render`: the renderer against Cycles and against the quadrature of its definition.
+//! `petcomp-report render`: the renderer against Cycles and against the quadrature of its
+//! definition.
 
 use super::count;
 use crate::ReportFlags;

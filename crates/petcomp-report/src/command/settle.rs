@@ -18,7 +18,8 @@ pub(crate) struct Args {
         value_parser = clap::value_parser!(u64).range(1..=10_000)
     )]
     heaps: u64,
-    /// Instead, settle heaps for a comparison with another program: writes their scenes, ends and times as JSON
+    /// Instead, settle heaps for a comparison with another program: writes their scenes, ends and
+    /// times as JSON
     #[arg(long, value_name = "FILE")]
     peers: Option<PathBuf>,
 }

@@ -366,7 +366,8 @@ impl<'a> VariantSource<'a> {
     }
 }
 
-/// A photo whose every pixel has its own share of the light; positions are those of pixels' centres.
+/// A photo whose every pixel has its own share of the light; positions are those of pixels'
+/// centres.
 fn scaled(photo: &Image<LinearRgb>, light: impl Fn(f64, f64) -> f32 + Sync) -> Image<LinearRgb> {
     Image::from_fn(photo.width(), photo.height(), |x, y| {
         photo[(x, y)].scale(light(x as f64 + 0.5, y as f64 + 0.5))

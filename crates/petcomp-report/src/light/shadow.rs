@@ -64,7 +64,8 @@ fn square_light() -> AreaLight {
     }
 }
 
-/// What the card leaves of the light at each pixel's centre; nothing where the card itself is seen, or near its border.
+/// What the card leaves of the light at each pixel's centre; nothing where the card itself is seen,
+/// or near its border.
 pub(super) fn exact_shares(shot: &Shot, kind: LightKind) -> Vec<Option<f64>> {
     let card = shot.cards[0].quad.corners();
     let [w, h] = shot.camera.image;
@@ -110,7 +111,8 @@ fn level_irradiance(polygon: &[Point3<f64>], point: Point3<f64>) -> f64 {
     polygon_irradiance(polygon, point, Vector3::z())
 }
 
-/// The part of a light's face that a card hides from a point: cut by the planes through the point and each side.
+/// The part of a light's face that a card hides from a point: cut by the planes through the point
+/// and each side.
 fn shadowed_part(
     face: &[Point3<f64>; 4],
     card: &[Point3<f64>; 4],

@@ -11,8 +11,8 @@ use std::path::Path;
 
 const SECONDS_PER_MS: f64 = 1e-3;
 
-/// Error over new backgrounds and overlap of the outline, each against time: on photos with truth of a folder, or on made ones
-/// where that is empty.
+/// Error over new backgrounds and overlap of the outline, each against time: on photos with truth
+/// of a folder, or on made ones where that is empty.
 ///
 /// # Errors
 /// A folder without truth, or files of it that cannot be read.

@@ -1,8 +1,10 @@
-//! Photos of see-through objects made in code, with all that a renderer would know of them: for a repository without any.
+//! Photos of see-through objects made in code, with all that a renderer would know of them: for a
+//! repository without any.
 //!
-//! A bottle is two walls of film around a closed outline, with wrinkles, a bright streak and an opaque label, on a screen that
-//! is darker towards its corners. Two flat walls of clear PET pass three quarters of the light (four surfaces, each of which
-//! reflects some 7 %), and dye takes its share; the screen is seen through the object and lit through it. In folds and rims the
+//! A bottle is two walls of film around a closed outline, with wrinkles, a bright streak and an
+//! opaque label, on a screen that is darker towards its corners. Two flat walls of clear PET pass
+//! three quarters of the light (four surfaces, each of which reflects some 7 %), and dye takes its
+//! share; the screen is seen through the object and lit through it. In folds and rims the
 //! sight meets more plastic, while the light, which comes from all around, does not.
 
 use super::truth::{Known, PhotoNoise};
@@ -52,7 +54,8 @@ pub(super) fn photo(i: usize) -> Known {
     enlarged_photo(i, 1)
 }
 
-/// Photo `i` by a camera with `times` the pixels along each side: as sharp, and as noisy in each pixel.
+/// Photo `i` by a camera with `times` the pixels along each side: as sharp, and as noisy in each
+/// pixel.
 pub(super) fn enlarged_photo(i: usize, times: usize) -> Known {
     let known = truth(i, times);
     let photo = known.on(&known.screen, FIRST_NOISE_SEED + i as u64);
@@ -218,7 +221,8 @@ fn streak(x: f64, depth: f64) -> f64 {
     0.5 * across * (0.5 + 0.5 * libm::sin(0.05 * x)).powi(4)
 }
 
-/// How far along the axis a point is, 0 to 1, and how deep inside the outline, pixels; negative outside.
+/// How far along the axis a point is, 0 to 1, and how deep inside the outline, pixels; negative
+/// outside.
 ///
 /// # Method
 /// The hull of two discs, by the distance to a cone of round ends.

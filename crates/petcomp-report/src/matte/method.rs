@@ -166,11 +166,12 @@ impl MethodCutOut {
     }
 }
 
-/// Colour difference against the screen's own colour, and what the screen does not explain of the pixel.
+/// Colour difference against the screen's own colour, and what the screen does not explain of the
+/// pixel.
 ///
 /// # Method
-/// `1 - a = (I_p - max(I_others)) / (K_p - max(K_others))` for the screen's strongest channel `p` (Vlahos' colour
-/// difference); the foreground is `I - (1 - a) K`.
+/// `1 - a = (I_p - max(I_others)) / (K_p - max(K_others))` for the screen's strongest channel `p`
+/// (Vlahos' colour difference); the foreground is `I - (1 - a) K`.
 fn color_difference(pixel: LinearRgb, screen: LinearRgb) -> PremulRgba {
     let (i, k): ([f32; 3], [f32; 3]) = (pixel.into(), screen.into());
     let through = share_of_screen(i, k);

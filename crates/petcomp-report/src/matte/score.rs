@@ -24,11 +24,13 @@ pub struct Score {
     pub mse: f64,
     /// Sum of squared differences of the gradient's length of alpha, thousands.
     pub gradient: f64,
-    /// Mean absolute error over new backgrounds that are lit by themselves (F + V B), linear light.
+    /// Mean absolute error over new backgrounds that are lit by themselves (F + V B), linear
+    /// light.
     pub mae_lit: f64,
     /// The same as a peak signal-to-noise ratio, decibels for a peak of 1.
     pub psnr_lit: f64,
-    /// Mean absolute error over new backgrounds in the object's own shadow (F + T B), linear light.
+    /// Mean absolute error over new backgrounds in the object's own shadow (F + T B), linear
+    /// light.
     pub mae_shaded: f64,
     /// The same as a peak signal-to-noise ratio.
     pub psnr_shaded: f64,

@@ -1,6 +1,8 @@
-//! How large a picture the object is searched in: error of the outline and of the box against run time.
+//! How large a picture the object is searched in: error of the outline and of the box against run
+//! time.
 //!
-//! Bottles made in code have an outline in closed form; each is photographed by cameras of fewer and of more pixels.
+//! Bottles made in code have an outline in closed form; each is photographed by cameras of fewer
+//! and of more pixels.
 
 use super::made;
 use super::score::box_error;
@@ -14,7 +16,8 @@ use petcomp::Quality;
 use petcomp::Result;
 use petcomp::matte::{CutOutOptions, SegmentOptions, segment};
 
-/// Longer sides of the picture that is searched, pixels: those of the qualities, half of the least and double the most.
+/// Longer sides of the picture that is searched, pixels: those of the qualities, half of the least
+/// and double the most.
 const SEARCH_SIDES_PX: [usize; 5] = [160, 320, 640, 1280, 2560];
 /// Pixels of the photos along each side, as multiples of the least.
 const PHOTO_SCALES: [usize; 3] = [1, 2, 4];
@@ -41,7 +44,8 @@ struct MeasuredSearch {
     mean: SearchErrors,
 }
 
-/// Overlap of the outline, and the box, each against time, of four bottles, or fewer for a quick report.
+/// Overlap of the outline, and the box, each against time, of four bottles, or fewer for a quick
+/// report.
 ///
 /// # Errors
 /// As [`segment`]; a thread that cannot be started.

@@ -61,7 +61,8 @@ pub fn details(rows: &[MatteRow]) -> Table {
     table_of(&DETAIL_COLUMNS, rows)
 }
 
-/// Error against run time, a point per method: over backgrounds lit by themselves, and in the object's own shadow.
+/// Error against run time, a point per method: over backgrounds lit by themselves, and in the
+/// object's own shadow.
 pub fn chart(summaries: &[MethodSummary]) -> String {
     let lit = error_chart(summaries, "new background, lit by itself", |s| s.mae_lit);
     let shaded = error_chart(summaries, "new background, shaded by the object", |s| {

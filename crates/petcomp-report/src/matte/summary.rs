@@ -14,7 +14,8 @@ pub struct MethodSummary {
     pub failed: usize,
     /// Share of the photos whose box is right to 2 pixels.
     pub box_within_2_px: f64,
-    /// Photos with a box more than 2 pixels off or an outline overlapping by less than 0.95, and no warning.
+    /// Photos with a box more than 2 pixels off or an outline overlapping by less than 0.95, and
+    /// no warning.
     pub silently_wrong: usize,
     /// Median run time, milliseconds.
     pub time_ms: f64,

@@ -166,7 +166,8 @@ fn one_outside(transmittance: LinearRgb, coverage: Coverage) -> LinearRgb {
 }
 
 impl Known {
-    /// The empty screen painted green where it is blue, and blue where it is green, under the same light.
+    /// The empty screen painted green where it is blue, and blue where it is green, under the same
+    /// light.
     pub(super) fn other_screen(&self) -> Image<LinearRgb> {
         let other = if self.paint.g > self.paint.b {
             BLUE_PAINT

@@ -21,7 +21,8 @@ const PIXEL_SAMPLES: [usize; 4] = [1, 3, 4, 6];
 const LIGHT_SAMPLES: [usize; 4] = [1, 2, 4, 6];
 const SKY_SAMPLES: [usize; 4] = [8, 16, 64, 128];
 const CELLS_PX: [f64; 4] = [4.0, 2.0, 1.0, 0.66];
-/// The scene on which filtered samples stand beside plain ones, which take a thousand times as long.
+/// The scene on which filtered samples stand beside plain ones, which take a thousand times as
+/// long.
 const PLAIN_SCENE: &str = "tilted_translucent";
 /// Samples along each side of a pixel there.
 const PLAIN_SIDES: [usize; 5] = [1, 2, 3, 4, 6];
@@ -33,7 +34,8 @@ struct SceneCost {
     pixels: f64,
 }
 
-/// The golden scenes at many settings, `runs` times each, and filtered samples beside plain ones; none without scenes.
+/// The golden scenes at many settings, `runs` times each, and filtered samples beside plain ones;
+/// none without scenes.
 ///
 /// # Errors
 /// A scene or a picture that cannot be read.
@@ -254,7 +256,8 @@ fn squared_differences(a: &PremulRgba, b: &LinearRgb) -> [f64; 3] {
     [a.r - b.r, a.g - b.g, a.b - b.b].map(|d| f64::from(d).powi(2))
 }
 
-/// Root mean squared error over scenes, all of the same weight, and the CPU seconds of all of them per megapixel.
+/// Root mean squared error over scenes, all of the same weight, and the CPU seconds of all of them
+/// per megapixel.
 fn mean_point<'a>(
     curve: &str,
     setting: &str,

@@ -73,7 +73,8 @@ impl GoldenScene {
     }
 }
 
-/// Every golden scene at every setting, and a sheet of all of them at one of them; no sheet where there are no scenes.
+/// Every golden scene at every setting, and a sheet of all of them at one of them; no sheet where
+/// there are no scenes.
 ///
 /// # Errors
 /// A scene or a reference that cannot be read.

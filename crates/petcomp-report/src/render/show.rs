@@ -49,8 +49,8 @@ fn number_or_empty(value: Option<f64>, digits: usize) -> String {
     value.map_or(String::new(), |v| format!("{v:.digits$}"))
 }
 
-/// How many times as long the other program takes for the same error, on a straight line between its pictures in a plot
-/// of logarithms; none beyond its last one.
+/// How many times as long the other program takes for the same error, on a straight line between
+/// its pictures in a plot of logarithms; none beyond its last one.
 pub fn speed_up(row: &RenderRow, rows: &[RenderRow]) -> Option<f64> {
     let error = row.cycles?.rmse;
     if !row.is_petcomp() {

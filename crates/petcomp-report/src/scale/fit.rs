@@ -32,8 +32,9 @@ pub struct CostModel {
 /// What is paid for, and how much of it a point has.
 type Term = (&'static str, fn(&ScalePoint) -> f64);
 
-/// Light is looked up on a lattice that is finest along the sides of cards, however small these are in the picture, and every
-/// place of it looks through as many layers as may lie above; and any card may stand in another's light.
+/// Light is looked up on a lattice that is finest along the sides of cards, however small these are
+/// in the picture, and every place of it looks through as many layers as may lie above; and any
+/// card may stand in another's light.
 const TIME_TERMS: [Term; 6] = [
     ("picture", |_| 1.0),
     ("megapixel", |p| p.case.megapixels()),
@@ -65,7 +66,8 @@ fn in_hand(point: &ScalePoint, of_picture: f64) -> f64 {
     point.case.threads as f64 * of_picture
 }
 
-/// Thousands of pixels along the sides of all cards, were each a square: the root of each card's megapixels.
+/// Thousands of pixels along the sides of all cards, were each a square: the root of each card's
+/// megapixels.
 fn card_sides(point: &ScalePoint) -> f64 {
     let cards = point.case.cards as f64;
     cards * (point.case.megapixels() * point.layers / cards.max(1.0)).sqrt()
@@ -118,12 +120,14 @@ fn fit_terms(
 }
 
 impl CostFit {
-    /// Fits prices to measured costs, a row for each of how much it has of each term; none without a measurement above 0.
+    /// Fits prices to measured costs, a row for each of how much it has of each term; none without
+    /// a measurement above 0.
     ///
     /// # Method
-    /// Non-negative least squares of relative errors, since costs span decades. The best fit with some prices at 0 and the
-    /// others free is looked for among all sets of prices, of which there are few; that it exists is a theorem of Lawson
-    /// and Hanson ("Solving Least Squares Problems", 1974, chapter 23).
+    /// Non-negative least squares of relative errors, since costs span decades. The best fit with
+    /// some prices at 0 and the others free is looked for among all sets of prices, of which
+    /// there are few; that it exists is a theorem of Lawson and Hanson ("Solving Least Squares
+    /// Problems", 1974, chapter 23).
     pub fn new(terms: &[&'static str], rows: &[Vec<f64>], costs: &[f64]) -> Option<Self> {
         let data = Costs { rows, costs };
         let prices = data.fit_without(None)?;
@@ -215,7 +219,8 @@ fn subsets(terms: usize) -> impl Iterator<Item = Vec<usize>> {
     sets.map(move |set| (0..terms).filter(|k| set >> k & 1 == 1).collect())
 }
 
-/// Makes columns of length 1, so that a term of few per thousand is not mistaken for rounding; returns their lengths.
+/// Makes columns of length 1, so that a term of few per thousand is not mistaken for rounding;
+/// returns their lengths.
 fn normalize_columns(matrix: &mut DMatrix<f64>) -> Vec<f64> {
     let columns = matrix.column_iter_mut();
     columns

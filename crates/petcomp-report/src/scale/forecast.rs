@@ -12,7 +12,8 @@ pub struct Forecast {
     pub images: f64,
     /// Kind of the pictures.
     pub case: ScaleCase,
-    /// Seconds of a processor per picture, its cards already lying: what the model says, and between what nine in ten lie.
+    /// Seconds of a processor per picture, its cards already lying: what the model says, and
+    /// between what nine in ten lie.
     pub picture_seconds: [f64; 3],
     /// Seconds of a processor until its cards lie.
     pub fall_seconds: f64,
@@ -99,7 +100,8 @@ impl Forecast {
 pub(super) mod tests {
     use super::*;
 
-    /// Measurements of a machine that is exactly as the model says, and half as good on two threads.
+    /// Measurements of a machine that is exactly as the model says, and half as good on two
+    /// threads.
     pub(in super::super) fn measured() -> ScaleMeasurements {
         let point = |case: ScaleCase| {
             let layers = 0.01 * case.cards as f64 * case.scale * case.scale;

@@ -41,7 +41,8 @@ const CARDS: [(usize, f64); 12] = [
     (10, 2.0),
     (30, 2.0),
 ];
-/// Corners of the grid, where terms that only fit along its edges would show: few pixels, many pixels and no layers.
+/// Corners of the grid, where terms that only fit along its edges would show: few pixels, many
+/// pixels and no layers.
 const CORNERS: [([u32; 2], usize, f64); 4] = [
     ([160, 120], 12, 1.0),
     ([160, 120], 100, 1.0),

@@ -181,8 +181,8 @@ fn heap_card(case: &ScaleCase, k: usize) -> Object {
     }
 }
 
-/// Spread evenly by the plastic number's sequence (Roberts, "The unreasonable effectiveness of quasirandom sequences",
-/// 2018), each a little higher than the one before it.
+/// Spread evenly by the plastic number's sequence (Roberts, "The unreasonable effectiveness of
+/// quasirandom sequences", 2018), each a little higher than the one before it.
 fn heap_pose(k: usize, rise: f64) -> Pose {
     let [x, y] = [1, 2].map(|power| plastic_share(k, power));
     let center = Vector3::new(ROOM_M[0] * x, ROOM_M[1] * y, rise * (k + 1) as f64);

@@ -9,7 +9,8 @@ use petcomp::settle::{SettleOptions, heap, settle};
 use petcomp::{Error, Result, work};
 use std::time::Instant;
 
-/// What else the machine does only ever adds to the time of a picture: the fastest of these rounds counts.
+/// What else the machine does only ever adds to the time of a picture: the fastest of these rounds
+/// counts.
 const MAX_ROUNDS: u64 = 3;
 const MAX_PICTURES_PER_ROUND: f64 = 1000.0;
 /// Pictures do not take less than this, for the number of them in a round.
@@ -17,7 +18,8 @@ const LEAST_PICTURE_SECONDS: f64 = 1e-3;
 /// Heaps whose falls are timed.
 const TIMED_HEAPS: u64 = 5;
 
-/// Makes pictures of a kind for about this many seconds of work, one on each thread at least, and returns what they took.
+/// Makes pictures of a kind for about this many seconds of work, one on each thread at least, and
+/// returns what they took.
 ///
 /// For a process that does nothing else: memory is that of the whole process.
 ///
@@ -67,7 +69,8 @@ impl Round {
         })
     }
 
-    /// Rounds, and the pictures of each, that fill this many seconds if pictures take as long as this one.
+    /// Rounds, and the pictures of each, that fill this many seconds if pictures take as long as
+    /// this one.
     fn plan_more(&self, threads: usize, seconds: f64) -> (u64, u64) {
         // A picture that takes all of the time is made once more, others in several rounds.
         let rounds = if self.cpu < seconds { MAX_ROUNDS } else { 1 };
@@ -110,7 +113,8 @@ mod tests {
         let point = run(&SMALL, 0.0).unwrap();
         assert_eq!((point.case, point.pictures), (SMALL, 2));
         assert!(point.rate > 0.0 && point.peak_bytes > 1e6 && point.cpu_seconds >= 0.0);
-        // Five cards of 7 x 21 cm over 94 x 71 cm, of which bottles fill 0.79; soft borders touch a few pixels more.
+        // Five cards of 7 x 21 cm over 94 x 71 cm, of which bottles fill 0.79; soft borders touch a
+        // few pixels more.
         assert!((0.08..0.13).contains(&point.layers), "{}", point.layers);
     }
 }

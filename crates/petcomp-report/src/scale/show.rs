@@ -14,7 +14,8 @@ const MACHINES: [usize; 3] = [1, 10, 100];
 const MB_PER_BYTE: f64 = 1e-6;
 const MS_PER_SECOND: f64 = 1e3;
 
-/// Tables with their titles: all points and residuals first, then the model, threads, falls, and a million pictures.
+/// Tables with their titles: all points and residuals first, then the model, threads, falls, and a
+/// million pictures.
 ///
 /// # Errors
 /// As [`CostModel::fit`] and [`forecast()`].

@@ -40,7 +40,8 @@ fn make_plate(object: &mut Object, bottom: f64) {
     };
 }
 
-/// How far the top of a stack of n plates is from n times their thickness, metres; infinite where it does not rest.
+/// How far the top of a stack of n plates is from n times their thickness, metres; infinite where
+/// it does not rest.
 pub(super) fn stack_error_m(options: &SettleOptions) -> Result<f64> {
     let end = settle(plate_stack()?, &accepting_any_error(options))?;
     let top = end.scene.objects.last().and_then(rest_position);
@@ -82,7 +83,8 @@ pub(super) fn count_wrong_slopes(options: &SettleOptions) -> Result<usize> {
     Ok(wrong)
 }
 
-/// Whether a plate on a slope of `share` times the critical one slides where that is more than 1, and else stays.
+/// Whether a plate on a slope of `share` times the critical one slides where that is more than 1,
+/// and else stays.
 fn slides_rightly(share: f64, options: &SettleOptions) -> Result<bool> {
     let scene = plate_on_slope()?;
     let options = SettleOptions {

@@ -10,11 +10,12 @@ use petcomp::scene::SettleOptions;
 
 /// Length of the heap's typical card, of which limits are shares.
 const CARD_LENGTH_MM: f64 = 200.0;
-/// Bodies keep two contact margins of 0.2 mm between them, so that a stack without overlap is higher by as much for each plate.
+/// Bodies keep two contact margins of 0.2 mm between them, so that a stack without overlap is
+/// higher by as much for each plate.
 const PLATE_GAP_MM: f64 = 0.4;
 
-/// Measures every setting with a number of heaps: worst overlap, worst energy rise and the error of a stack, each against the
-/// time of a heap.
+/// Measures every setting with a number of heaps: worst overlap, worst energy rise and the error of
+/// a stack, each against the time of a heap.
 ///
 /// # Errors
 /// None that a caller can cause.
@@ -129,7 +130,8 @@ impl SettleRow {
     }
 }
 
-/// What no single error shows: which settings are right in everything, and which of them costs least.
+/// What no single error shows: which settings are right in everything, and which of them costs
+/// least.
 fn why_default(rows: &[SettleRow]) -> String {
     let right: Vec<&SettleRow> = rows.iter().filter(|row| row.is_right()).collect();
     let best = right.iter().min_by(|a, b| a.cpu_ms.total_cmp(&b.cpu_ms));

@@ -28,7 +28,8 @@ pub fn table(rows: &[SettleRow]) -> Table {
     table_of(&COLUMNS, rows)
 }
 
-/// The sweep as charts against run time: worst overlap, energy rise, and error of the stack; a ring where the default is.
+/// The sweep as charts against run time: worst overlap, energy rise, and error of the stack; a ring
+/// where the default is.
 pub fn charts(rows: &[SettleRow]) -> Vec<Chart> {
     let swept = with_default_ccd(rows);
     vec![

@@ -1,5 +1,5 @@
-//! Synthetic photos of a bottle whose outline is known: a waisted body of film with a rim, glints, a striped label and a
-//! cap, in its own soft shadow.
+//! Synthetic photos of a bottle whose outline is known: a waisted body of film with a rim, glints,
+//! a striped label and a cap, in its own soft shadow.
 
 use crate::flags::{bounding_sides, is_right, largest_difference};
 use crate::matte::normal;
@@ -222,7 +222,8 @@ pub(super) struct OutlineAccuracy {
     pub(super) box_px: f64,
     /// It is within the bounds of a good outline.
     pub(super) is_right: bool,
-    /// Why the outline needs review; what film cannot know on a screen of its own hue is another matter.
+    /// Why the outline needs review; what film cannot know on a screen of its own hue is another
+    /// matter.
     pub(super) reasons: Vec<String>,
 }
 

@@ -1,4 +1,5 @@
-//! Labels that are hard to solve a camera from: nearly no perspective, grazing, tiny, huge, degenerate, wrong.
+//! Labels that are hard to solve a camera from: nearly no perspective, grazing, tiny, huge,
+//! degenerate, wrong.
 
 use super::{HardCase, Outcome};
 use petcomp::camera::simulate::{Scenario, View};
@@ -45,7 +46,8 @@ fn focal_error(view: &View, solution: &Solution) -> f64 {
     (solution.camera.focal_px.x / view.camera.focal_px.x - 1.0).abs()
 }
 
-/// No number of a solution is NaN, those of the camera are finite, and the camera is above the surface.
+/// No number of a solution is NaN, those of the camera are finite, and the camera is above the
+/// surface.
 fn is_sound(solution: &Solution) -> bool {
     is_camera_sound(&solution.camera) && is_fit_finite(solution) && !has_nan_sigma(solution)
 }
@@ -152,7 +154,8 @@ fn extreme_cameras() -> Vec<HardCase> {
     ]
 }
 
-/// Corners are doubles of up to 20 000 px: the perspective in them, over their size, bounds the accuracy.
+/// Corners are doubles of up to 20 000 px: the perspective in them, over their size, bounds the
+/// accuracy.
 fn focal_recovery(name: &str, scenario: Scenario, limit: f64) -> HardCase {
     let input = format!("exact corners of {VIEW_COUNT} views at 25 degrees");
     let expectation =

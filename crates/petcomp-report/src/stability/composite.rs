@@ -1,4 +1,5 @@
-//! Pictures that are hard to put together: very many layers, everything off, values at the ends of their range.
+//! Pictures that are hard to put together: very many layers, everything off, values at the ends of
+//! their range.
 
 use super::staged::{camera_above, rendered};
 use super::{HardCase, Outcome};

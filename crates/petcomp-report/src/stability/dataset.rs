@@ -1,4 +1,5 @@
-//! Datasets that are hard to write: of empty pictures, of crowds, cut off in the middle, with numbers at their ends.
+//! Datasets that are hard to write: of empty pictures, of crowds, cut off in the middle, with
+//! numbers at their ends.
 
 use super::staged::{
     camera_above, empty_scene, grey, level_card, one_deep_pixel, rendered, temporary_folder,

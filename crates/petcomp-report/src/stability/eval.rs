@@ -10,7 +10,8 @@ use petcomp::geom::BBox;
 
 /// Boxes of the largest case.
 const MOST_BOXES: usize = 100_000;
-/// Precision of a detector that makes no error, by YOLOv5's trapezoid, whose curve ends at precision 0.
+/// Precision of a detector that makes no error, by YOLOv5's trapezoid, whose curve ends at
+/// precision 0.
 const PERFECT_YOLO: f64 = 0.995;
 
 pub(super) fn cases() -> Result<Vec<HardCase>> {

@@ -1,4 +1,5 @@
-//! Files that are hard to write or to read: values beyond a half float, the smallest ones, cut and lying headers, 16k.
+//! Files that are hard to write or to read: values beyond a half float, the smallest ones, cut and
+//! lying headers, 16k.
 
 use super::staged::temporary_folder;
 use super::{HardCase, Outcome, memory};
@@ -191,7 +192,8 @@ fn write_one_pixel(format: &str) -> Result<Outcome> {
     let found = through_file(&format!("a.{format}"), &[0.5], &WriteOptions::default())?;
     let errors = found.iter().map(|v| f64::from(v - 0.5).abs());
     let off = errors.fold(0.0, f64::max);
-    // A code is at most 1/255 of the curve, whose slope in linear light at 1/2 is below 1.7; JPEG's YCbCr adds one.
+    // A code is at most 1/255 of the curve, whose slope in linear light at 1/2 is below 1.7; JPEG's
+    // YCbCr adds one.
     let passed = found.len() == 1 && off < 2.0 * 1.7 / 255.0;
     Ok(Outcome::new(
         format!("{} px, {off:.4} off", found.len()),
@@ -258,7 +260,8 @@ fn read_truncated_files(format: &str) -> Result<Outcome> {
 /// What a header, a message and the decoders' buffers may take, GiB.
 const SMALL_GROWTH_GIB: f64 = 0.064;
 
-/// A file whose header asks for more than is allowed: refused by the name of the limit, before memory is taken.
+/// A file whose header asks for more than is allowed: refused by the name of the limit, before
+/// memory is taken.
 fn lying(
     name: &str,
     input: &str,

@@ -1,4 +1,5 @@
-//! Keys that barely differ from grey and pixels that are barely colours, in every profile of the keyer.
+//! Keys that barely differ from grey and pixels that are barely colours, in every profile of the
+//! keyer.
 
 use super::{HardCase, Outcome};
 use petcomp::matte::key::Profile;
@@ -255,7 +256,8 @@ fn key_no_pixels() -> Result<Outcome> {
     Ok(Outcome::none(pixels.iter().sum(), "px"))
 }
 
-/// Period of the pattern in the largest photo, and how far from the border its matte repeats, pixels.
+/// Period of the pattern in the largest photo, and how far from the border its matte repeats,
+/// pixels.
 const TILE_PX: usize = 64;
 
 fn twelve_megapixels() -> HardCase {

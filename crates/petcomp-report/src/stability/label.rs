@@ -1,4 +1,5 @@
-//! Objects that are hard to label: one pixel large, hidden, cut by the border, hundreds in one pixel, none.
+//! Objects that are hard to label: one pixel large, hidden, cut by the border, hundreds in one
+//! pixel, none.
 
 use super::staged::{camera_above, card, grey, level_card, one_deep_pixel, rendered, tilted};
 use super::{HardCase, Outcome};
@@ -41,7 +42,8 @@ fn labels_of(image: [u32; 2], cards: impl IntoIterator<Item = Card>) -> Vec<Obje
     label(&rendered(&shot), &shot, &LabelOptions::default()).objects
 }
 
-/// The labels of a shot of cards in which pixel (3, 2) alone has samples, front to back, one for each card.
+/// The labels of a shot of cards in which pixel (3, 2) alone has samples, front to back, one for
+/// each card.
 fn labels_of_one_pixel(samples: &[DeepSample]) -> Vec<ObjectLabel> {
     let cards = samples
         .iter()
@@ -75,7 +77,8 @@ fn whole_box([w, h]: [f64; 2]) -> BBox {
     }
 }
 
-/// About as wide as it should be: the window of a pixel is three wide, and counts where it covers more than a tenth.
+/// About as wide as it should be: the window of a pixel is three wide, and counts where it covers
+/// more than a tenth.
 fn is_about(found: f64, expected: f64) -> bool {
     (found - expected).abs() <= 2.0
 }

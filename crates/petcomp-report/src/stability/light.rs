@@ -272,7 +272,8 @@ fn exposed(name: &str, plate: Image<LinearRgb>, expected_ev: f64) -> HardCase {
     exposed_under(LinearRgb::WHITE, name, plate, expected_ev)
 }
 
-/// Even light of 1 shows white as 1: the exposure must be the plate's white in stops, and 0 where there is none.
+/// Even light of 1 shows white as 1: the exposure must be the plate's white in stops, and 0 where
+/// there is none.
 fn exposed_under(
     ambient: LinearRgb,
     name: &str,

@@ -1,8 +1,8 @@
 //! Stability: every stage on stiff and extreme input, checked against a known result.
 //!
-//! The expected result is a closed form, a conservation law, the limit of easier neighbours, or an error that names its
-//! cause; it is never what came out before. A case that panics, or that fails where it should not, becomes a failed row,
-//! and the others still run.
+//! The expected result is a closed form, a conservation law, the limit of easier neighbours, or an
+//! error that names its cause; it is never what came out before. A case that panics, or that fails
+//! where it should not, becomes a failed row, and the others still run.
 
 mod bottle;
 mod camera;
@@ -109,7 +109,8 @@ fn unknown_stage(stage: &str) -> Error {
     Error::value("stage", format!("\"{stage}\", expected one of {names}"))
 }
 
-/// Runs every case of every stage; `progress` is given the number of finished cases and of all cases.
+/// Runs every case of every stage; `progress` is given the number of finished cases and of all
+/// cases.
 ///
 /// # Errors
 /// None that a caller can cause: cases are made in code.
@@ -166,7 +167,8 @@ fn case_counts(rows: &[CaseResult], stage: &str) -> [usize; 2] {
     [of_stage.len(), passed]
 }
 
-/// Runs the cases of a stage, or of all (an empty name), and writes `stability.csv` and `stability.md` into a folder.
+/// Runs the cases of a stage, or of all (an empty name), and writes `stability.csv` and
+/// `stability.md` into a folder.
 ///
 /// # Errors
 /// As [`cases`]; files that cannot be written. A case that fails is a row, not an error.

@@ -1,4 +1,5 @@
-//! Shots that are hard to render: very many layers, very near, edge-on, very bright beside very dim, very small and large.
+//! Shots that are hard to render: very many layers, very near, edge-on, very bright beside very
+//! dim, very small and large.
 
 use super::staged::{
     camera_above, camera_looking_at, card, grey, lamp, level_card, projected_area, rendered,
@@ -175,7 +176,8 @@ fn near_and_grazing() -> HardCase {
 
 fn render_near_and_grazing() -> Result<Outcome> {
     let deep = rendered(&grazing_shot());
-    // Where the card ends 10 m away: slightly under the horizon, 60 tan(10 degrees) above the middle.
+    // Where the card ends 10 m away: slightly under the horizon, 60 tan(10 degrees) above the
+    // middle.
     let horizon = 24.0 - 60.0 * libm::tan(10_f64.to_radians());
     // The window of a pixel is three wide.
     let rows = (0..48).filter(|&y| (y as f64 + 0.5 - horizon).abs() > 2.0);
@@ -209,9 +211,11 @@ const STEEP_SIDE_M: f64 = 0.2;
 /// The height of a steep card, whose centre is 0.9 m from the camera, in the picture: pixels.
 const STEEP_SIDE_PX: f64 = STEEP_SIDE_M * STEEP_FOCAL_PX / 0.9;
 
-/// A card that is nearly edge-on: its coverage, in pixels, must be the area of its projected corners.
+/// A card that is nearly edge-on: its coverage, in pixels, must be the area of its projected
+/// corners.
 ///
-/// Each row of the picture has two samples a pixel: a strip thinner than their distance is hit or missed, depending on where it is.
+/// Each row of the picture has two samples a pixel: a strip thinner than their distance is hit or
+/// missed, depending on where it is.
 fn steep_card(degrees: f64) -> HardCase {
     let area = area_of_card(&steep_shot(degrees, 0));
     // Half the height of the card: a row of samples.
@@ -347,10 +351,11 @@ pub(super) fn largest(a: f64, b: f64) -> f64 {
 
 /// Pixels along a side of the largest picture.
 const LARGEST_SIDE_PX: u32 = 16_384;
-/// What that picture may take at most: factors on the plate and offsets of samples are 4 GiB, samples a quarter.
+/// What that picture may take at most: factors on the plate and offsets of samples are 4 GiB,
+/// samples a quarter.
 const SIXTEEN_K_GIB: f64 = 6.0;
-/// What it shows of a card of 2000 x 2000 pixels and 64 x 64 texels: alpha falls to one half over the outermost half texel,
-/// which takes an eighth of a texel off each side.
+/// What it shows of a card of 2000 x 2000 pixels and 64 x 64 texels: alpha falls to one half over
+/// the outermost half texel, which takes an eighth of a texel off each side.
 const SHOWN_PX: f64 = (2000.0 * (1.0 - 0.25 / 64.0)) * (2000.0 * (1.0 - 0.25 / 64.0));
 
 fn sixteen_k() -> HardCase {
@@ -391,7 +396,8 @@ fn sixteen_k_shot() -> Shot {
         .with_card(sheet)
 }
 
-/// Shots in which nothing can be seen of the card: no sample in any pixel, and a plate that keeps its bits.
+/// Shots in which nothing can be seen of the card: no sample in any pixel, and a plate that keeps
+/// its bits.
 fn nothing_to_see() -> Vec<HardCase> {
     let behind = level_card(1, [0.0, 0.0, 2.0], 0.3, grey(0.8));
     let transparent = level_card(1, [0.0, 0.0, 0.1], 0.2, PremulRgba::TRANSPARENT);
@@ -480,7 +486,8 @@ fn card_through_the_eye() -> Shot {
 
 /// The same of textures without a neighbouring texel.
 fn awkward_textures() -> [HardCase; 2] {
-    // A lone texel is 0.8 in its middle and half of that at the card's edge, 4.4 pixels away; a pixel's window reaches 1.5.
+    // A lone texel is 0.8 in its middle and half of that at the card's edge, 4.4 pixels away; a
+    // pixel's window reaches 1.5.
     let faded = [0.8 * libm::pow(1.0 - 1.5 * 0.5 / 4.4, 2.0), 0.8];
     let [texel, column] = [1, 7].map(|height| {
         let texture = Image::filled(1, height, grey(0.8));

@@ -1,4 +1,5 @@
-//! Light that is hard to render: grazing, without size, in the middle of a card, very bright beside very dim.
+//! Light that is hard to render: grazing, without size, in the middle of a card, very bright beside
+//! very dim.
 
 use super::staged::{camera_above, card, grey, lamp, level_card, small_shot, tilted};
 use super::{HardCase, Outcome};
@@ -32,7 +33,8 @@ pub(super) fn cases() -> Vec<HardCase> {
     cases
 }
 
-/// Light that the middle of a white level card at the origin reflects upwards, in a picture of 5 x 5.
+/// Light that the middle of a white level card at the origin reflects upwards, in a picture of 5 x
+/// 5.
 fn light_reflected(shot: Shot, options: &RenderOptions) -> f64 {
     let white = PremulRgba::new(1.0, 1.0, 1.0, 1.0);
     let card = level_card(1, [0.0; 3], 1.0, white);
@@ -45,7 +47,8 @@ fn lit_by(light: AreaLight) -> f64 {
     light_reflected(small_shot().with_light(light), &RenderOptions::default())
 }
 
-/// A point that shines like a small flat light turned to the origin, seen by a level white card: `P cos / (pi r)^2`.
+/// A point that shines like a small flat light turned to the origin, seen by a level white card: `P
+/// cos / (pi r)^2`.
 fn from_a_point(light: &AreaLight) -> f64 {
     let to = Vector3::from(light.position);
     light.power * to.normalize().z / (PI * PI * to.norm_squared())
@@ -106,7 +109,8 @@ fn reflected_from_upper_half(light: &AreaLight) -> f64 {
     polygon_irradiance(&corners, Point3::origin(), Vector3::z()) * white
 }
 
-/// A camera that sees 3 x 3 pixels of the surface around `x`, 0 from straight above and very near to it.
+/// A camera that sees 3 x 3 pixels of the surface around `x`, 0 from straight above and very near
+/// to it.
 fn closeup_at(x: f64) -> Camera {
     let mut camera = camera_above([3, 3], 1e6);
     camera.camera_from_world.translation.vector.x = -x;
@@ -205,10 +209,12 @@ fn sunny_map() -> Result<EnvironmentMap> {
     Ok(EnvironmentMap::new(Arc::new(Panorama::new(sunny_sky())?)))
 }
 
-/// Cells of the midpoint rule, four times as dense as texels, over the upper half of the map: columns and rows.
+/// Cells of the midpoint rule, four times as dense as texels, over the upper half of the map:
+/// columns and rows.
 const SKY_CELLS: [usize; 2] = [512 * 4, 128 * 4];
 
-/// Irradiance of a level receiver by the midpoint rule over the upper half of the map, from the part of the sky that `counts`.
+/// Irradiance of a level receiver by the midpoint rule over the upper half of the map, from the
+/// part of the sky that `counts`.
 fn irradiance_by_brute_force(map: &EnvironmentMap, counts: impl Fn(&Vector3<f64>) -> bool) -> f64 {
     let [columns, rows] = SKY_CELLS;
     (0..rows)
@@ -286,7 +292,8 @@ fn card_before_the_sun() -> Card {
     card(1, (to_sun * 0.1).into(), facing, [0.02; 2], texture)
 }
 
-/// The share of the light from directions that the card before the sun does not hide: 5.7 degrees around the sun.
+/// The share of the light from directions that the card before the sun does not hide: 5.7 degrees
+/// around the sun.
 fn share_without_the_sun(map: &EnvironmentMap) -> f64 {
     let to_sun = direction_to_sun();
     let hidden = irradiance_by_brute_force(map, |d| d.dot(&to_sun) > libm::cos(0.09));

@@ -1,4 +1,5 @@
-//! Falls that are hard to settle: very thin and thick cards, very many, very small and large, very unequal, started badly.
+//! Falls that are hard to settle: very thin and thick cards, very many, very small and large, very
+//! unequal, started badly.
 
 use super::{HardCase, Outcome};
 use petcomp::Result;

@@ -74,7 +74,8 @@ pub(super) fn card(
     }
 }
 
-/// A level square card of one texel value, with so many texels that the fade of the outermost half is small.
+/// A level square card of one texel value, with so many texels that the fade of the outermost half
+/// is small.
 pub(super) fn level_card(id: u32, center: [f64; 3], size: f64, texel: PremulRgba) -> Card {
     let texture = Image::filled(64, 64, texel);
     card(id, center, UnitQuaternion::identity(), [size; 2], texture)

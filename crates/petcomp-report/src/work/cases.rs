@@ -40,7 +40,8 @@ const THROUGH: &[Kind] = &[Transmittances];
 const PICTURE: &[Kind] = &[Encodes];
 const LABELS: &[Kind] = &[LabelSamples, Masks];
 
-/// Work that every scene may take: what it is read from and written to, and levels of detail where cards are small.
+/// Work that every scene may take: what it is read from and written to, and levels of detail where
+/// cards are small.
 const ALWAYS_ALLOWED: [Kind; 5] = [BytesWritten, FilesRead, BytesRead, Levels, LargeAllocations];
 
 impl WorkCase {

@@ -1,4 +1,5 @@
-//! What must hold of work: zero where a feature is absent, more than zero where it is present, and switches that are off.
+//! What must hold of work: zero where a feature is absent, more than zero where it is present, and
+//! switches that are off.
 
 use super::world::dropped;
 use super::*;

@@ -1,4 +1,5 @@
-//! The input files of the scenes, made in code: three assets, one labelled photo, one environment map.
+//! The input files of the scenes, made in code: three assets, one labelled photo, one environment
+//! map.
 
 use crate::pile::lamp;
 use petcomp::asset::{Asset, Manifest, PhotoRecord};
@@ -30,7 +31,8 @@ const CARD_RISE_M: f64 = 0.02;
 /// File of the environment map.
 const PANORAMA: &str = "sky.exr";
 
-/// Names of the assets: a cut-out that is half see-through, one that is opaque all over, one that tints.
+/// Names of the assets: a cut-out that is half see-through, one that is opaque all over, one that
+/// tints.
 pub(super) const SEE_THROUGH: &str = "bottle";
 pub(super) const OPAQUE: &str = "box";
 pub(super) const FILM: &str = "film";
@@ -95,7 +97,8 @@ impl FixtureFolder {
         }
     }
 
-    /// A few see-through cards at rest over the photo, one on another, under a lamp and an even sky.
+    /// A few see-through cards at rest over the photo, one on another, under a lamp and an even
+    /// sky.
     pub(super) fn scene(&self) -> Scene {
         Scene {
             image: IMAGE,

@@ -60,8 +60,9 @@ pub(super) fn end_of_text(file: &[u8], at: usize) -> Option<usize> {
     Some(at + file.get(at..)?.iter().position(|&b| b == 0)? + 1)
 }
 
-/// Puts the attributes of the header that starts at `start` in the order of their names, as OpenEXR's own library does:
-/// the `exr` crate keeps them in a hash map, whose order differs from run to run. Returns where they end.
+/// Puts the attributes of the header that starts at `start` in the order of their names, as
+/// OpenEXR's own library does: the `exr` crate keeps them in a hash map, whose order differs from
+/// run to run. Returns where they end.
 pub(super) fn sort_attributes(file: &mut [u8], start: usize) -> Option<usize> {
     let mut attributes = Vec::new();
     let mut at = start;

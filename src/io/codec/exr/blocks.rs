@@ -191,7 +191,8 @@ impl<'a> SampleBuffer<'a> {
         }
     }
 
-    /// Rows that lie between samples, interpolated linearly from one to the next; the last is repeated.
+    /// Rows that lie between samples, interpolated linearly from one to the next; the last is
+    /// repeated.
     fn interpolate_rows(&mut self, sampling: &Sampling) {
         let stored = overlap(self.top, self.rows, self.height);
         for (slot, &channel) in self.picked.iter().enumerate() {

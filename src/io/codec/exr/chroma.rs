@@ -1,9 +1,11 @@
-//! EXR channels with fewer samples than pixels: colour of half the size beside luminance (`Y`, `RY`, `BY`).
+//! EXR channels with fewer samples than pixels: colour of half the size beside luminance (`Y`,
+//! `RY`, `BY`).
 //!
 //! # Method
-//! OpenEXR's technical introduction, "Luminance/Chroma Images": `RY = (R - Y) / Y`, `BY = (B - Y) / Y`, and `Y` is the sum
-//! of the colours by the weights of their primaries. Samples of colour lie on the first of the pixels they stand for;
-//! between them it is interpolated linearly, where OpenEXR has a longer filter.
+//! OpenEXR's technical introduction, "Luminance/Chroma Images": `RY = (R - Y) / Y`, `BY = (B - Y) /
+//! Y`, and `Y` is the sum of the colours by the weights of their primaries. Samples of colour lie
+//! on the first of the pixels they stand for; between them it is interpolated linearly, where
+//! OpenEXR has a longer filter.
 
 use super::attributes::{FIRST_ATTRIBUTE, RawAttribute, end_of_text};
 use super::samples::{SampleLine, to_floats};
@@ -20,15 +22,17 @@ pub(super) const LUMINANCE_CHROMA: [&str; 3] = ["Y", "RY", "BY"];
 const MAX_SAMPLING: u32 = 4;
 /// The sampling of a channel with a sample for each pixel, as bytes.
 const FULL_SAMPLING: [u8; 8] = [1, 0, 0, 0, 1, 0, 0, 0];
-/// Bytes between the name of a channel and its sampling: the kind of its samples, a flag, and three that mean nothing.
+/// Bytes between the name of a channel and its sampling: the kind of its samples, a flag, and three
+/// that mean nothing.
 const BEFORE_SAMPLING: usize = 4 + 1 + 3;
 
 /// Pixels for a sample of each channel, along x and y.
 pub(super) struct Sampling(Vec<[usize; 2]>);
 
 impl Sampling {
-    /// The sampling of a file's first part, and the file as if it had a sample for each pixel, which the decoder can take
-    /// in. None for a file that has one, or that is not what it should be.
+    /// The sampling of a file's first part, and the file as if it had a sample for each pixel,
+    /// which the decoder can take in. None for a file that has one, or that is not what it
+    /// should be.
     pub(super) fn find(file: &[u8]) -> Option<(Self, Vec<u8>)> {
         let offsets = sampling_offsets(file)?;
         let pairs: Option<Vec<[usize; 2]>> =
@@ -61,7 +65,8 @@ impl Sampling {
         self.0[channel][1]
     }
 
-    /// The samples of a block of rows, enlarged along x; rows that lie between samples repeat those before them.
+    /// The samples of a block of rows, enlarged along x; rows that lie between samples repeat those
+    /// before them.
     pub(super) fn decode_lines(
         &self,
         header: &Header,
@@ -238,7 +243,8 @@ fn read_sampling(file: &[u8], at: usize) -> Option<usize> {
     (1..=MAX_SAMPLING).contains(&n).then_some(n as usize)
 }
 
-/// Turns luminance and differences, the first three of `n` interleaved channels, into red, green and blue of a space.
+/// Turns luminance and differences, the first three of `n` interleaved channels, into red, green
+/// and blue of a space.
 pub(super) fn to_rgb(samples: &mut [f32], n: usize, space: &RgbSpace) {
     let weights = xyz_from_rgb(space);
     let [wr, wg, wb] = [0, 1, 2].map(|c| weights[(1, c)] as f32);

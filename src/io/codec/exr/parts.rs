@@ -12,7 +12,8 @@ use std::io::Cursor;
 pub struct Part {
     /// Its name, different from every other part's.
     pub name: String,
-    /// Channels, in any order; each has as many samples as the picture has pixels, row by row from the top.
+    /// Channels, in any order; each has as many samples as the picture has pixels, row by row from
+    /// the top.
     pub channels: Vec<(String, ChannelSamples)>,
     /// Texts to store with it, by name.
     pub metadata: Vec<(String, String)>,
@@ -42,7 +43,8 @@ impl ChannelSamples {
     }
 }
 
-/// A whole file of parts of one size (width, height), losslessly compressed; the same parts give the same bytes.
+/// A whole file of parts of one size (width, height), losslessly compressed; the same parts give
+/// the same bytes.
 pub(crate) fn encode_parts(size: (usize, usize), parts: &[Part]) -> Result<Vec<u8>, String> {
     check_parts(size, parts)?;
     let layers = parts.iter().map(|part| part_layer(size, part));
@@ -110,8 +112,8 @@ pub(super) fn check_count(
 const FLAGS_BYTE: usize = 5;
 const SEVERAL_PARTS_FLAG: u8 = 0x10;
 
-/// Puts the attributes of every header in the order of their names. One header ends with a zero, the list of several
-/// with another.
+/// Puts the attributes of every header in the order of their names. One header ends with a zero,
+/// the list of several with another.
 fn sort_headers(bytes: &mut [u8]) -> Option<()> {
     let mut at = FIRST_ATTRIBUTE;
     while *bytes.get(at)? != 0 {

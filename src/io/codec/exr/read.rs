@@ -192,7 +192,8 @@ fn window_size(window: IntegerBounds) -> (usize, usize) {
     (window.size.x(), window.size.y())
 }
 
-/// The headers alone, checked against the limits: data and display window of every part, and their sum.
+/// The headers alone, checked against the limits: data and display window of every part, and their
+/// sum.
 fn read_meta(file: impl Read, file_bytes: u64, limits: &Limits) -> Result<MetaData, Refusal> {
     let meta = read_limited_meta(file, file_bytes, limits)?;
     at_most(meta.headers.len() as u64, limits.parts, "parts", "parts")?;
@@ -369,7 +370,8 @@ pub(crate) fn decode(
     })
 }
 
-/// Luminance with its differences where there are those, and what is chosen of other channels elsewhere.
+/// Luminance with its differences where there are those, and what is chosen of other channels
+/// elsewhere.
 fn choose_channels(wanted: Wanted, names: &[String]) -> Result<Choice, String> {
     match (wanted, luminance_chroma(names)) {
         (Wanted::Color | Wanted::Film, Some(picked)) => Ok((ChannelMatch::Named, picked)),
@@ -404,8 +406,6 @@ fn convert_colors(
     }
     Ok(())
 }
-
-/// The first three of `n` interleaved channels in other primaries; alpha stays.
 
 #[cfg(test)]
 mod tests {

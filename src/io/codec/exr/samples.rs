@@ -31,8 +31,8 @@ pub(super) fn to_floats(bytes: &[u8], kind: SampleType, floats: &mut Vec<f32>) {
     }
 }
 
-/// Floats as halves, rounded to nearest; what is finite stays so, 65504 at most: programs blur and scale what they read,
-/// and one infinite pixel would take its neighbours along.
+/// Floats as halves, rounded to nearest; what is finite stays so, 65504 at most: programs blur and
+/// scale what they read, and one infinite pixel would take its neighbours along.
 fn to_halves(samples: &[f32]) -> Vec<f16> {
     let mut out = vec![f16::ZERO; samples.len()];
     out.as_mut_slice().convert_from_f32_slice(samples);

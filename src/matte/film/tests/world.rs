@@ -1,5 +1,6 @@
-//! Against rendered photos with ground truth: `PETCOMP_WORLD=FOLDER cargo test --release --lib film::tests::world -- --ignored --nocapture`,
-//! FOLDER holding photos with their `_fg`, `_trans`, `_view`, `_mask` and `_plate` pictures.
+//! Against rendered photos with ground truth: `PETCOMP_WORLD=FOLDER cargo test --release --lib
+//! film::tests::world -- --ignored --nocapture`, FOLDER holding photos with their `_fg`, `_trans`,
+//! `_view`, `_mask` and `_plate` pictures.
 
 use super::*;
 use crate::image::Mask;

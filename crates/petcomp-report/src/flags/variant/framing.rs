@@ -150,7 +150,8 @@ pub(super) fn thin_object(known: &Known, whole: Trial) -> Trial {
     shrunk(known, whole, scale)
 }
 
-/// The object made smaller by factors across and down, in the middle of its screen: `F + T K`, with the sensor's noise.
+/// The object made smaller by factors across and down, in the middle of its screen: `F + T K`, with
+/// the sensor's noise.
 fn shrunk(known: &Known, whole: Trial, scale: [f64; 2]) -> Trial {
     let inset = Inset::new(known.photo.size(), scale);
     Trial {
@@ -192,7 +193,8 @@ impl Inset {
         self.image(|_, _, inside| inside.map_or(Coverage(0.0), |at| small[at]))
     }
 
-    /// A picture of the old frame from the pixels of it and, where there is one, of the smaller picture.
+    /// A picture of the old frame from the pixels of it and, where there is one, of the smaller
+    /// picture.
     fn image<P: Copy + Send + Sync>(
         &self,
         pixel: impl Fn(usize, usize, Option<(usize, usize)>) -> P + Sync,

@@ -44,8 +44,8 @@ const SHADOW_LIGHT: f64 = 0.6;
 /// Width of the shadow's edge, pixels.
 const PENUMBRA_PX: f64 = 1.5;
 
-/// A slanted shadow from the right; its edge lies `beyond` of the way from the object's box to the border, or, below 0,
-/// by so much of the object's width within it.
+/// A slanted shadow from the right; its edge lies `beyond` of the way from the object's box to the
+/// border, or, below 0, by so much of the object's width within it.
 pub(super) fn shadowed(known: &Known, beyond: f64) -> Image<LinearRgb> {
     let edge = shadow_edge(known, beyond);
     let h = known.photo.height() as f64;
@@ -86,8 +86,8 @@ const CAST_SHADOW_REACH: f64 = 0.08;
 /// Blur of its edge, standard deviation in pixels.
 const CAST_BLUR_PX: f32 = 1.0;
 
-/// The shadow of the object in the light of a lamp behind the photographer, on the screen beside it: denser where the
-/// object lets less through.
+/// The shadow of the object in the light of a lamp behind the photographer, on the screen beside
+/// it: denser where the object lets less through.
 pub(super) fn cast_shadow(known: &Known, direction: f64) -> Image<LinearRgb> {
     let (w, h) = known.photo.size();
     let soft = soft_shadow(known, direction);

@@ -45,7 +45,8 @@ const OPAQUE_TRANSMITTANCE: f32 = 0.15;
 /// The smallest share of an object that is painted where it is opaque.
 const MIN_PAINTED_SHARE: f64 = 0.02;
 
-/// The object with its opaque parts painted in the screen's hue, as bright as they were; nothing where it has none.
+/// The object with its opaque parts painted in the screen's hue, as bright as they were; nothing
+/// where it has none.
 pub(super) fn hued(known: &Known) -> Option<Image<LinearRgb>> {
     let opaque = opaque_parts(known);
     let object = known.mask.pixels().iter().filter(|c| c.0 > 0.5).count();
@@ -83,7 +84,8 @@ fn channel_sum(c: LinearRgb) -> f32 {
     c.r + c.g + c.b
 }
 
-/// The photo with the screen's light changed by a factor, as much of it as is seen through the object.
+/// The photo with the screen's light changed by a factor, as much of it as is seen through the
+/// object.
 fn relit(known: &Known, light: impl Fn(f64, f64) -> f32 + Sync) -> Image<LinearRgb> {
     let (w, h) = known.photo.size();
     Image::from_fn(w, h, |x, y| {
