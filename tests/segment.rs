@@ -1,5 +1,7 @@
 //! The sample bottles against what their renderer knows of them.
 
+#![cfg(feature = "pipeline")]
+
 use geo::{Area, BooleanOps, BoundingRect, LineString, Polygon};
 use petcomp::{Image, LinearRgb, asset, io, matte};
 use std::path::{Path, PathBuf};

@@ -132,6 +132,7 @@ fn with_known_alpha(raster: Raster, source: &SourceFile) -> Raster {
     }
 }
 
+#[cfg(feature = "oiio")]
 fn is_premultiplied(raster: &Raster, source: &SourceFile) -> bool {
     match source.format {
         Format::Tiff => CameraNotes::has_associated_alpha(&source.bytes),

@@ -464,7 +464,7 @@ fn dot(a: LinearRgb, b: LinearRgb) -> f32 {
     a.r * b.r + a.g * b.g + a.b * b.b
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "pipeline"))]
 mod tests {
     use super::*;
     use crate::geom::{Pose, UnitQuaternion, Vector3};
