@@ -2,6 +2,8 @@
 # make test   every test
 # Both install the Debian packages they need if they are missing, and need nothing else but Rust.
 #
+# make experiment   whether the data teaches a detector: see experiments/README.md; make world makes its reality,
+#                   make experiment-smoke runs all of it with tiny sizes
 # make soak   100,000 damaged pictures; make fuzz   each reader of text and headers, a minute each
 
 CARGO     := cargo
@@ -12,6 +14,9 @@ OUT       := demo
 EXAMPLES  := target/example-output
 REPORT    := target/report
 PYTHON    := $(CURDIR)/target/python/bin/python
+# What Blender's module for Python links.
+BPY       := python3-venv libgl1 libsm6 libxi6 libxkbcommon0 libxrender1
+WORLD     := experiments/cache/world
 BENCHES   := $(notdir $(basename $(wildcard tests/benches/*.rs)))
 # Each set of features that stands alone; the first, empty one is the matte without a C++ compiler.
 FEATURES  := "" pipeline markers oiio settle
@@ -25,7 +30,7 @@ PEERS        := blender python3-numpy python3-venv openimageio-tools ffmpeg
 PEERS_PYTHON := numpy OpenEXR opencv-python-headless pymatting pybullet pycocotools
 CORE         := 0
 
-.PHONY: peers demo test examples lint bench golden formats python packages blender soak soak-dataset fuzz
+.PHONY: world experiment experiment-smoke peers demo test examples lint bench golden formats python packages blender soak soak-dataset fuzz
 
 demo: packages
 	$(CARGO) build --release --locked -p petcomp-cli
@@ -38,6 +43,24 @@ test: packages python
 	  $(CARGO) check --release --locked -p petcomp --no-default-features --features "$$f" --lib --tests --quiet || exit 1; \
 	done
 	$(MAKE) examples
+	$(MAKE) experiment-smoke
+
+# The reality of the experiments; it goes on where it stopped.
+world:
+	@$(call install,$(BPY))
+	@[ -x $(WORLD)-python/bin/python ] || python3 -m venv $(WORLD)-python
+	$(WORLD)-python/bin/python -m pip install --quiet -r experiments/world/requirements.txt
+	$(WORLD)-python/bin/python experiments/world/make.py --out $(WORLD)
+
+experiment: packages world
+	$(CARGO) build --release --locked -p petcomp-cli
+	experiments/run --headline
+
+# Without PyTorch nothing is trained; without pip nothing is done. Either way it says so.
+experiment-smoke: packages
+	@$(call install,python3-venv)
+	$(CARGO) build --release --locked -p petcomp-cli
+	experiments/run --smoke
 
 # Every program in examples/, the last one on two scenes of the sample recipe. They are built with the tests, whose
 # features the library then has already.

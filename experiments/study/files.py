@@ -1,0 +1,25 @@
+"""Files that are whole or not there."""
+
+import json
+import os
+from pathlib import Path
+
+CLASSES = ["cap_label", "cap", "label", "none"]
+
+
+def write_text(path, text):
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_name(path.name + ".part")
+    part.write_text(text)
+    os.replace(part, path)
+    return path
+
+
+def write_json(path, value):
+    return write_text(path, json.dumps(value, indent=1) + "\n")
+
+
+def label_of(picture):
+    """Where the labels of a picture are: YOLO's rule, `labels` for the last `images`."""
+    before, after = str(picture).rsplit("/images/", 1)
+    return Path(before, "labels", after).with_suffix(".txt")

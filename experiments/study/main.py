@@ -1,0 +1,70 @@
+"""What `experiments/run` does, once Python has what it needs."""
+
+import importlib.util
+import shutil
+import tomllib
+
+from . import page, results, study as studies
+
+HERE = studies.HERE
+
+
+def run(options, cache, program):
+    study = smoke(cache / "smoke", program) if options.smoke else full(cache, program)
+    if options.smoke and not options.write:
+        shutil.rmtree(study.cache, ignore_errors=True)
+    names = chosen(options, study.arms)
+    seeds = options.seeds or study.arms["training"]["seeds"]
+    if not options.write:
+        studies.train_all(study, studies.trainings(study, names, seeds), options.processes)
+    folder = study.cache / "results" if options.smoke else HERE / "results"
+    write(study, list(study.arms["arms"]), seeds, folder)
+
+
+def full(cache, program):
+    return studies.Study(read_arms(), cache, cache / "world", program)
+
+
+def smoke(cache, program):
+    """The same with tiny sizes."""
+    arms = read_arms()
+    tiny = arms["smoke"]
+    for part in ("training", "reality", "synthetic"):
+        arms[part] |= tiny[part]
+    arms["arms"] = {name: arms["arms"][name] for name in tiny["arms"]}
+    world, photos, backgrounds = ((HERE / tiny[name]).resolve() for name in ("world", "photos", "backgrounds"))
+    return studies.Study(arms, cache, world, program, photos, backgrounds, tiny_trainer(arms))
+
+
+def tiny_trainer(arms):
+    if importlib.util.find_spec("ultralytics"):
+        return "study.train"
+    print("no PyTorch here: nothing is trained, boxes near the true ones stand in for a detector's")
+    arms["training"]["model"] = "stand-in"
+    return "study.stand_in"
+
+
+def read_arms():
+    return tomllib.loads((HERE / "arms.toml").read_text())
+
+
+def chosen(options, arms):
+    if options.headline:
+        return [name for name, arm in arms["arms"].items() if arm.get("headline")]
+    for name in options.arms or []:
+        if name not in arms["arms"]:
+            raise SystemExit(f"--arms: no arm {name}, expected some of {', '.join(arms['arms'])}")
+    return options.arms or list(arms["arms"])
+
+
+def write(study, names, seeds, folder):
+    rows, matches = results.scored(study, names, seeds)
+    if not rows:
+        raise SystemExit("nothing is trained yet")
+    drawn = results.drawn(matches)
+    summary = results.summary(study, matches, drawn)
+    ratios = results.ratios(study, matches, drawn)
+    results.write_csv(folder / "results.csv", results.COLUMNS, rows)
+    results.write_csv(folder / "summary.csv", results.SUMMARY_COLUMNS, results.summary_rows(summary))
+    page.write(study, rows, summary, ratios, folder / "index.html")
+    print(f"see {folder / 'index.html'}")

@@ -1,0 +1,105 @@
+"""Tables of a study: every score with what is needed to repeat it, and means with intervals."""
+
+import csv
+import io
+
+import numpy as np
+
+from . import bootstrap, files, reality, score, study as studies
+
+COLUMNS = (
+    "arm seed room pictures map50 map50_95 classes real synthetic mix images model image_size device "
+    "cpu_seconds petcomp commit ultralytics torch"
+).split()
+SUMMARY_COLUMNS = "arm seeds mean low high against ratio ratio_low ratio_high".split()
+
+
+def scored(study, arms, seeds):
+    """Rows of `results.csv`, and the matches by arm, seed and room, of what is trained."""
+    rows, matches = [], {}
+    for arm in arms:
+        for seed in range(seeds):
+            if study.is_trained(arm, seed):
+                of_rooms = matches.setdefault(arm, {}).setdefault(seed, {})
+                rows += [room_row(study, arm, seed, room, of_rooms) for room in study.rooms]
+    return rows, matches
+
+
+def room_row(study, arm, seed, room, of_rooms):
+    folder, classes = study.folder(arm, seed), study.classes(arm)
+    count = study.arms["reality"]["pictures"]
+    truth = reality.truth(study.world, room, count, classes, study.cache / f"truth/{room}_{classes}")
+    found = score.score(
+        study, folder / "predictions" / str(room), truth, reality.SIZE, classes, folder / f"eval/{room}"
+    )
+    (map50, map50_95), of_rooms[str(room)] = found
+    training = studies.training_of(study, arm, seed)
+    known = {key: training[key] for key in COLUMNS if key in training and not isinstance(training[key], list)}
+    return known | {
+        "arm": arm,
+        "room": room,
+        "pictures": count,
+        "map50": f"{map50:.6f}",
+        "map50_95": f"{map50_95:.6f}",
+        "real": len(training["real"]),
+        "synthetic": len(training["synthetic"]),
+    }
+
+
+def drawn(matches):
+    """mAP@0.5:0.95 of each arm in each round of the bootstrap."""
+    return {arm: bootstrap.samples(arm, of_arm) for arm, of_arm in matches.items()}
+
+
+def summary(study, matches, drawn):
+    """Mean over seeds and rooms of mAP@0.5:0.95 of each arm, its interval, and its ratio to the arm
+    that it is held against."""
+    means = {arm: mean_score(of_arm) for arm, of_arm in matches.items()}
+    return {
+        arm: {
+            "seeds": len(matches[arm]),
+            "mean": means[arm],
+            "interval": bootstrap.interval(drawn[arm]),
+            **against(arm, study.arms["arms"][arm].get("against", "real"), means, drawn),
+        }
+        for arm in matches
+    }
+
+
+def ratios(study, matches, drawn):
+    """Those of the headline, as far as their arms are trained."""
+    means = {arm: mean_score(of_arm) for arm, of_arm in matches.items()}
+    return [one | against(*one["arms"], means, drawn) for one in study.arms["ratios"]]
+
+
+def against(arm, other, means, drawn):
+    """The ratio of two arms, where both are there and the other one has found anything."""
+    if arm == other or arm not in means or means.get(other, 0) == 0:
+        return {}
+    rounds = drawn[arm] / np.maximum(drawn[other], np.finfo(float).tiny)
+    ratio = means[arm] / means[other]
+    return {"against": other, "ratio": ratio, "ratio_interval": bootstrap.interval(rounds)}
+
+
+def mean_score(of_arm):
+    of_rooms = [
+        bootstrap.map_of(matches, np.ones_like(matches[0].truths))
+        for rooms in of_arm.values()
+        for matches in rooms.values()
+    ]
+    return float(np.mean(of_rooms))
+
+
+def summary_rows(summary):
+    for arm, one in summary.items():
+        low, high = one["interval"]
+        ratio_low, ratio_high = one.get("ratio_interval", ("", ""))
+        yield {"arm": arm, "low": low, "high": high, "ratio_low": ratio_low, "ratio_high": ratio_high} | one
+
+
+def write_csv(path, columns, rows):
+    text = io.StringIO()
+    writer = csv.DictWriter(text, columns, lineterminator="\n", restval="", extrasaction="ignore")
+    writer.writeheader()
+    writer.writerows(rows)
+    return files.write_text(path, text.getvalue())

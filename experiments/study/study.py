@@ -1,0 +1,107 @@
+"""One study: the arms, where everything lies, and what is done in which order."""
+
+import concurrent.futures
+import json
+import os
+import subprocess
+import sys
+import threading
+from dataclasses import dataclass
+from pathlib import Path
+
+from . import files, reality, synthetic
+
+HERE = Path(__file__).parents[1]
+
+
+@dataclass
+class Study:
+    """`cache` holds what can be made again; `world` the reality."""
+
+    arms: dict
+    cache: Path
+    world: Path
+    program: Path
+    # Lists of photos and of backgrounds, where they are not those of the world.
+    photos: Path | None = None
+    backgrounds: Path | None = None
+    # The module that trains.
+    trainer: str = "study.train"
+
+    @property
+    def rooms(self):
+        return self.arms["reality"]["rooms"]
+
+    def petcomp(self, *words):
+        done = subprocess.run([self.program, "-q", *map(str, words)], capture_output=True, text=True)
+        if done.returncode != 0:
+            raise SystemExit(f"petcomp {' '.join(map(str, words))}\n{done.stderr}")
+
+    def version(self):
+        program = subprocess.run([self.program, "--version"], capture_output=True, text=True).stdout
+        commit = subprocess.run(
+            ["git", "describe", "--always", "--dirty"], cwd=HERE, capture_output=True, text=True
+        ).stdout
+        return {"petcomp": program.split()[1], "commit": commit.strip()}
+
+    def classes(self, arm):
+        return self.arms["arms"][arm].get("classes", self.arms["training"]["classes"])
+
+    def folder(self, arm, seed):
+        return self.cache / "runs" / arm / str(seed)
+
+    def is_trained(self, arm, seed):
+        return (self.folder(arm, seed) / "training.done.json").exists()
+
+
+def trainings(study, names, seeds):
+    """What is to be done, seed by seed: the first figures of all arms come before better ones."""
+    return [(arm, seed) for seed in range(seeds) for arm in names if not study.is_trained(arm, seed)]
+
+
+def train_all(study, todo, processes):
+    """Trains in `processes` processes of one thread each; more of them than threads of one."""
+    data = threading.Lock()
+    with concurrent.futures.ThreadPoolExecutor(processes) as pool:
+        jobs = [pool.submit(train, study, arm, seed, data) for arm, seed in todo]
+        for count, job in enumerate(concurrent.futures.as_completed(jobs), 1):
+            print(f"{count} of {len(todo)} trainings: {job.result()}", flush=True)
+
+
+def train(study, arm, seed, data):
+    with data:  # two processes of petcomp must not write into one folder
+        training = describe(study, arm, seed)
+    folder = study.folder(arm, seed)
+    path = files.write_json(folder / "training.json", training)
+    environment = os.environ | {"OMP_NUM_THREADS": "1", "YOLO_CONFIG_DIR": str(study.cache)}
+    with (folder / "log.txt").open("a") as log:
+        command = [sys.executable, "-m", study.trainer, path]
+        done = subprocess.run(command, cwd=HERE, env=environment, stdout=log, stderr=log)
+    if done.returncode != 0:
+        raise SystemExit(f"{arm}, seed {seed}: the training failed, see {folder / 'log.txt'}")
+    return f"{arm}, seed {seed}"
+
+
+def describe(study, arm, seed):
+    """All that a training depends on."""
+    options = study.arms["arms"][arm]
+    settings = {key: value for key, value in study.arms["training"].items() if key != "seeds"}
+    count = study.arms["reality"]["pictures"]
+    share = round(options.get("real", 0) * count)
+    generator = options.get("synthetic")
+    pictures, made_by = synthetic.pictures(study, generator) if generator else ([], study.version())
+    return settings | made_by | {
+        "classes": study.classes(arm),
+        "seed": seed,
+        "threads": 1,
+        "mix": options.get("mix", "concatenate"),
+        "real": [path for room in study.rooms for path in reality.pictures(study.world, room, "real", share)],
+        "synthetic": pictures,
+        "test": {str(room): reality.pictures(study.world, room, "test", count) for room in study.rooms},
+    }
+
+
+def training_of(study, arm, seed):
+    folder = study.folder(arm, seed)
+    done = json.loads((folder / "training.done.json").read_text())
+    return json.loads((folder / "training.json").read_text()) | done

@@ -1,0 +1,43 @@
+"""Synthetic pictures: petcomp's by a recipe, or naive cut-and-paste."""
+
+import json
+
+from . import files, naive, reality
+
+
+def pictures(study, name):
+    """The pictures of a generator, made if they are not there, and what made them."""
+    generator = study.arms["generators"][name]
+    folder = study.cache / "synthetic" / name
+    count = study.arms["synthetic"]["pictures"]
+    assets = build_assets(study, generator.get("cut_out", {}))
+    backgrounds = study.backgrounds or reality.backgrounds(study.world, study.rooms, study.cache / "backgrounds")
+    if generator.get("program") == "naive":
+        naive.generate(assets, backgrounds, count, study.arms["synthetic"]["seed"], folder)
+    else:
+        generate(study, generator, assets, backgrounds, count, folder)
+    made_by = folder / "made_by.json"
+    if not made_by.exists():
+        files.write_json(made_by, study.version())
+    return [str(path) for path in sorted((folder / "images").rglob("*.jpg"))], json.loads(made_by.read_text())
+
+
+def build_assets(study, cut_out):
+    method = "_".join(cut_out.values()) or "physical"
+    folder = study.cache / "assets" / method
+    photos = study.photos or reality.photo_list(
+        study.world, study.arms["reality"]["bottles"], cut_out, study.cache / "photos" / method
+    )
+    study.petcomp("asset", "build", photos, "-o", folder)
+    return folder
+
+
+def generate(study, generator, assets, backgrounds, count, folder):
+    recipe = files.write_text(
+        study.cache / "recipes" / f"{folder.name}.toml",
+        f"assets = {json.dumps(str(assets))}\nbackgrounds = {json.dumps(str(backgrounds))}\n",
+    )
+    changes = study.arms["synthetic"]["set"] + generator.get("set", [])
+    options = [word for change in changes for word in ("--set", change)]
+    seed = study.arms["synthetic"]["seed"]
+    study.petcomp("dataset", "generate", recipe, *options, "-n", count, "--seed", seed, "--yes", "-o", folder)

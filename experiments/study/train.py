@@ -1,0 +1,251 @@
+"""One training of a detector, and what it then finds in the test pictures.
+
+    python -m study.train TRAINING.json
+
+The file says everything (see `arms.training`). A training that was broken off goes on from its last
+checkpoint; what was found stands in `predictions/ROOM/NAME.txt` beside the file, and
+`training.done.json` is written last.
+"""
+
+import json
+import random
+import runpy
+import sys
+import time
+from pathlib import Path
+
+import cv2
+import torch
+import ultralytics
+from ultralytics import YOLO
+from ultralytics.data.dataset import YOLODataset
+from ultralytics.models.yolo.detect import DetectionTrainer
+from ultralytics.nn.tasks import DetectionModel
+
+from . import files
+
+KIT = Path(__file__).parents[2] / "src/train/kit/balanced.py"
+# Checkpoints of a training: what an interruption loses at most is one part of it.
+PARTS = 10
+# Parts at the end without mosaics, so that the detector sees whole pictures too.
+WHOLE_PICTURE_PARTS = 2
+# A detector is asked for everything it has, as average precision wants it.
+LEAST_CONFIDENCE = 0.001
+MOST_DETECTIONS = 100
+
+
+def main(path):
+    training = json.loads(path.read_text())
+    torch.set_num_threads(training["threads"])
+    cv2.setNumThreads(1)
+    began = time.process_time()
+    weights = train(training, path.parent)
+    seconds = time.process_time() - began
+    for room, pictures in training["test"].items():
+        predict(training, weights, pictures, path.parent / "predictions" / room)
+    done = {"cpu_seconds": round(seconds, 1), "ultralytics": ultralytics.__version__, "torch": torch.__version__}
+    files.write_json(path.with_suffix(".done.json"), done)
+
+
+def train(training, folder):
+    """The last weights."""
+    last = folder / "detector/weights/last.pt"
+    if last.exists() and is_finished(last):
+        return last
+    trainer(training, folder)(overrides=settings(training, folder, last)).train()
+    return last
+
+
+def is_finished(last):
+    return torch.load(last, map_location="cpu", weights_only=False)["epoch"] == -1
+
+
+def settings(training, folder, last):
+    if last.exists():
+        return {"resume": str(last), "model": str(last)}
+    return {
+        "model": training["model"],
+        "pretrained": False,
+        "data": str(data_file(training, folder)),
+        "epochs": PARTS,
+        "batch": training["batch"],
+        "nbs": training["batch"],
+        "imgsz": training["image_size"],
+        "single_cls": training["classes"] == 1,
+        "seed": training["seed"],
+        "device": training["device"],
+        "amp": training["device"] != "cpu" and "bf16",
+        "close_mosaic": WHOLE_PICTURE_PARTS,
+        "optimizer": "AdamW",
+        "lr0": 0.002,
+        "warmup_bias_lr": 0.0,
+        "warmup_epochs": 0.3,
+        "cos_lr": True,
+        "cache": "ram",
+        "workers": 0,
+        "val": False,
+        "plots": False,
+        "verbose": False,
+        "project": str(folder),
+        "name": "detector",
+        "exist_ok": True,
+    }
+
+
+def data_file(training, folder):
+    """Ultralytics wants a list of pictures of its own; ours come by `Streams`."""
+    pictures = training["real"] or training["synthetic"]
+    list_file(folder, "few", pictures[: training["batch"]])
+    names = "".join(f"  {k}: {name}\n" for k, name in enumerate(files.CLASSES))
+    text = f"path: {folder}\ntrain: few.txt\nval: few.txt\nnames:\n{names}"
+    return files.write_text(folder / "data.yaml", text)
+
+
+def list_file(folder, name, pictures):
+    return str(files.write_text(folder / f"{name}.txt", "\n".join(pictures) + "\n"))
+
+
+class Model(DetectionModel):
+    """Computes its loss with 16-bit floats on a processor, which Ultralytics does on GPUs alone."""
+
+    def loss(self, batch, preds=None):
+        with torch.autocast(batch["img"].device.type, torch.bfloat16, enabled=batch["img"].device.type == "cpu"):
+            return super().loss(batch, preds)
+
+
+class Streams(torch.utils.data.Sampler):
+    """The batches of a part: indices into [real pictures..., synthetic pictures...].
+
+    Each source is an endless stream of shuffled passes that depends on the seed alone, so a training
+    that goes on sees what one in one piece would have seen.
+    """
+
+    def __init__(self, training, part):
+        self.training, self.part = training, part
+        self.counts = [len(training["real"]), len(training["synthetic"])]
+
+    def __len__(self):
+        return self.training["images"] // PARTS // self.training["batch"]
+
+    def __iter__(self):
+        first = self.part() * len(self)
+        return (self.batch(first + k) for k in range(len(self)))
+
+    def batch(self, number):
+        real, synthetic = self.counts
+        size = self.training["batch"]
+        if self.training["mix"] == "balanced":
+            half = size // 2
+            theirs = [real + k for k in self.stream("synthetic", synthetic, number * half, half)]
+            return self.stream("real", real, number * half, half) + theirs
+        if self.training["mix"] == "equation2":
+            return self.single_source_batch(number)
+        return self.stream("all", real + synthetic, number * size, size)
+
+    def single_source_batch(self, number):
+        """Of each source as many batches as it has pictures, in an order of chance."""
+        real, synthetic = self.counts
+        size = self.training["batch"]
+        is_real = [slot < real for slot in self.stream("order", real + synthetic, 0, number + 1)]
+        earlier = sum(is_real[number] == other for other in is_real[:number])
+        if is_real[number]:
+            return self.stream("real", real, earlier * size, size)
+        return [real + k for k in self.stream("synthetic", synthetic, earlier * size, size)]
+
+    def stream(self, name, count, first, length):
+        return [self.shuffled(name, count, at // count)[at % count] for at in range(first, first + length)]
+
+    def shuffled(self, name, count, turn):
+        rng = random.Random(f"{self.training['seed']} {name} {turn}")
+        return rng.sample(range(count), count)
+
+
+class Both(torch.utils.data.ConcatDataset):
+    """Each source keeps its own mosaics, so that no picture mixes the two."""
+
+    @property
+    def labels(self):
+        return [label for part in self.datasets for label in part.labels]
+
+    def close_mosaic(self, hyp):
+        for part in self.datasets:
+            part.close_mosaic(hyp)
+
+
+class Loader(torch.utils.data.DataLoader):
+    # Torch says None where batches come from a sampler of batches; the trainer divides by it.
+    batch_size = property(lambda self: self.batch_sampler.training["batch"], lambda self, value: None)
+
+    def reset(self):
+        """No workers are kept: nothing to do."""
+
+
+def trainer(training, folder):
+    """Ultralytics' trainer with our batches, and equation 2 of the paper where the arm asks for it."""
+    factors = loss_factors(training)
+    real = set(training["real"])
+
+    class Trainer(DetectionTrainer):
+        def get_model(self, cfg=None, weights=None, verbose=True):
+            model = Model(cfg, nc=self.data["nc"], ch=self.data["channels"], verbose=False)
+            if weights:
+                model.load(weights)
+            return model.to(memory_format=torch.channels_last)
+
+        def get_dataloader(self, dataset_path, batch_size=16, rank=0, mode="train"):
+            if mode != "train":
+                return super().get_dataloader(dataset_path, batch_size, rank, mode)
+            sources = [name for name in ("real", "synthetic") if training[name]]
+            lists = [list_file(folder, name, training[name]) for name in sources]
+            parts = [self.build_dataset(source, mode, batch_size) for source in lists]
+            streams = Streams(training, lambda: self.epoch)
+            return Loader(Both(parts), batch_sampler=streams, collate_fn=YOLODataset.collate_fn)
+
+        def preprocess_batch(self, batch):
+            batch = super().preprocess_batch(batch)
+            batch["img"] = batch["img"].contiguous(memory_format=torch.channels_last)
+            self.factor = factors[batch["im_file"][0] not in real]
+            return batch
+
+        # The training loop assigns the loss of a batch here before it goes backward.
+        loss = property(lambda self: self.weighted, lambda self, value: self.weigh(value))
+
+        def weigh(self, value):
+            self.weighted = value * self.factor if torch.is_tensor(value) else value
+            self.factor = 1.0  # once a batch
+
+        def validate(self):
+            return {}, 0.0
+
+        def final_eval(self):
+            """The test pictures are none of the trainer's business."""
+
+    return Trainer
+
+
+def loss_factors(training):
+    if training["mix"] != "equation2":
+        return (1.0, 1.0)
+    weights = runpy.run_path(str(KIT))["weights"]
+    return weights(len(training["real"]), len(training["synthetic"]))
+
+
+def predict(training, weights, pictures, folder):
+    folder.mkdir(parents=True, exist_ok=True)
+    found = YOLO(weights).predict(
+        pictures,
+        stream=True,
+        imgsz=training["image_size"],
+        conf=LEAST_CONFIDENCE,
+        max_det=MOST_DETECTIONS,
+        device=training["device"],
+        verbose=False,
+    )
+    for picture, result in zip(pictures, found):
+        boxes = zip(result.boxes.cls.tolist(), result.boxes.xywhn.tolist(), result.boxes.conf.tolist())
+        rows = [f"{int(c)} {' '.join(f'{v:.6f}' for v in box)} {p:.6f}\n" for c, box, p in boxes]
+        files.write_text(folder / f"{Path(picture).stem}.txt", "".join(rows))
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))
