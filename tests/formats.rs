@@ -10,8 +10,8 @@
 use petcomp::asset::Texture;
 use petcomp::camera::Camera;
 use petcomp::dataset::{
-    LabelConfig, Obstructed, Pictures, Plan, Provenance, Sample, SampleRange, Sidecar, Split,
-    generate,
+    LabelConfig, Obstructed, Pictures, Plan, Provenance, Sample, SampleRange, SampleRecord,
+    Sidecar, Split, generate,
 };
 use petcomp::filter::Pyramid;
 use petcomp::geom::{Point2, Pose, Quad, UnitQuaternion, Vector2, Vector3};
@@ -94,10 +94,14 @@ fn shot(k: u64) -> Shot {
 }
 
 fn sample(k: u64) -> Result<Sample> {
+    sample_with(k, &LabelOptions::default())
+}
+
+fn sample_with(k: u64, options: &LabelOptions) -> Result<Sample> {
     let shot = shot(k);
     let deep = render::render(&shot, &Default::default());
     let frame = composite::frame(&deep, shot.plate.as_deref());
-    let labels = label(&deep, &shot, &LabelOptions::default());
+    let labels = label(&deep, &shot, options);
     let scene = Scene {
         image: IMAGE,
         plate: "grey".into(),
@@ -146,6 +150,8 @@ fn made(labels: &str) -> tempfile::TempDir {
         inputs: Default::default(),
     };
     plan.writers.extend(setup.writers(&pictures));
+    let options = setup.options();
+    let sample = |k| sample_with(k, &options);
     generate(&plan, sample, &|_| {}, &AtomicBool::new(false)).unwrap();
     dir
 }
@@ -250,6 +256,50 @@ fn a_voc_document_tells_class_box_and_flags() {
         std::fs::read_to_string(dir.path().join("voc/val.txt")).unwrap(),
         "000000\n000005\n000010\n"
     );
+}
+
+/// What the files of a picture say of its objects, when those are labelled that are seen enough.
+fn check_seen(folder: &Path, k: u64, min_visible: f64) -> SampleRecord {
+    let part = if k % 5 == 0 { "val" } else { "train" };
+    let path = |kind: &str, end: &str| folder.join(format!("{kind}/{part}/{k:06}.{end}"));
+    let record: SampleRecord = io::read_json(path("scenes", "json")).unwrap();
+    let objects = record.labels.objects.iter();
+    let seen = objects.filter(|object| object.visible_pixel_fraction >= min_visible);
+    let seen: Vec<_> = seen.map(|object| object.id).collect();
+    assert_eq!((&record.topmost, &record.labelled), (&seen, &seen));
+    let text = |kind, end| std::fs::read_to_string(path(kind, end)).unwrap();
+    assert_eq!(text("labels", "txt").lines().count(), seen.len());
+    let voc = text("voc", "xml");
+    assert_eq!(voc.matches("<occluded>0</occluded>").count(), seen.len());
+    assert!(!voc.contains("<occluded>1</occluded>"));
+    let document = folder.join(format!("annotations/instances_{part}.json"));
+    let coco: serde_json::Value = io::read_json(document).unwrap();
+    let annotations = coco["annotations"].as_array().unwrap().iter();
+    let own: Vec<_> = annotations.filter(|a| a["image_id"] == k).collect();
+    assert_eq!(own.len(), seen.len());
+    assert!(own.iter().all(|a| a["topmost"] == true));
+    record
+}
+
+#[test]
+fn every_format_labels_the_objects_that_are_seen_enough() {
+    for (min_visible, is_enough) in [(0.25, true), (0.9, false)] {
+        // Of an object under a ring nothing is seen by this threshold.
+        let dir = made(&format!(
+            "alpha_threshold = 0.5\nmin_visible = {min_visible}\nformats = [\"yolo\", \"coco\", \"voc\"]"
+        ));
+        let records: Vec<_> = (0..12)
+            .map(|k| check_seen(dir.path(), k, min_visible))
+            .collect();
+        let below = &records[3].labels.objects[0];
+        assert_eq!(below.covered_by, [ObjectId(2)]);
+        assert_eq!(
+            below.is_topmost(),
+            is_enough,
+            "{}",
+            below.visible_pixel_fraction
+        );
+    }
 }
 
 #[test]

@@ -8,7 +8,8 @@ use petcomp::camera::Camera;
 use petcomp::geom::BBox;
 use petcomp::geom::{Point2, Pose, UnitQuaternion, Vector2, Vector3};
 use petcomp::label::{
-    AmodalBox, DepthRange, LabelOptions, Labels, ObjectLabel, cyclic_overlaps, label,
+    AmodalBox, DepthRange, LabelOptions, Labels, ObjectLabel, ObstructionRule, cyclic_overlaps,
+    label,
 };
 use petcomp::scene::{Card, Grade};
 use petcomp::{DeepImage, DeepSample};
@@ -297,7 +298,8 @@ proptest! {
         }
         let iou: f64 = if all > 0.0 { shared / all } else { 0.0 };
         let covered_at = |iou| {
-            let options = LabelOptions { overlap_iou: iou, ..LabelOptions::default() };
+            let obstruction = ObstructionRule::Overlap { overlap_iou: iou };
+            let options = LabelOptions { obstruction, ..LabelOptions::default() };
             label(&deep, &scene, &options).objects.iter().any(|o| !o.is_topmost())
         };
         // A raster of 8 x 8 rays a pixel knows the area of shapes of this size to a few percent.
@@ -385,6 +387,71 @@ fn masks_and_depth_are_those_of_the_card() {
         "{:?}",
         below.depth
     );
+}
+
+/// Card 1, of 50 x 40 pixels, under card 2, which hides so many of its columns at the right.
+fn partly_hidden(columns: f64) -> Shot {
+    let (depth, px) = (0.8, 0.008);
+    let below = card(1, [0.0, 0.0, 1.0 - depth], [0.0; 3], [0.4, 0.32], &WHOLE);
+    let left = (25.0 - columns) * px;
+    // At three quarters of the depth the same pixels are three quarters as wide.
+    let above = card(
+        2,
+        [0.75 * (left + 0.1), 0.0, 1.0 - 0.75 * depth],
+        [0.0; 3],
+        [0.15, 0.3],
+        &WHOLE,
+    );
+    shot([below, above])
+}
+
+/// Labels by the rule of visibility.
+fn seen_at_least(scene: &Shot, min_visible: f64) -> Labels {
+    let obstruction = ObstructionRule::Visibility { min_visible };
+    let options = LabelOptions {
+        obstruction,
+        ..LabelOptions::default()
+    };
+    labels(scene, &options)
+}
+
+#[test]
+fn a_card_of_which_enough_is_seen_is_topmost_by_visibility_alone() {
+    for (columns, share, topmost) in [(1.0, 0.98, true), (5.0, 0.9, false)] {
+        let scene = partly_hidden(columns);
+        let found = seen_at_least(&scene, 0.97);
+        let below = &found.objects[0];
+        assert_eq!(below.visible_pixel_fraction, share);
+        assert_eq!(
+            (below.is_topmost(), below.obstructed),
+            (topmost, Some(!topmost))
+        );
+        assert_eq!(below.covered_by, [ObjectId(2)]);
+        assert!(found.objects[1].is_topmost());
+        let by_overlap = labels(&scene, &LabelOptions::default());
+        assert!(!by_overlap.objects[0].is_topmost());
+    }
+}
+
+#[test]
+fn the_least_visible_share_itself_is_enough() {
+    let scene = partly_hidden(1.0);
+    let is_topmost = |share: f64| seen_at_least(&scene, share).objects[0].is_topmost();
+    assert!(is_topmost(0.0) && is_topmost(0.98));
+    assert!(!is_topmost(0.98_f64.next_up()) && !is_topmost(1.0));
+    assert!(seen_at_least(&scene, 1.0).objects[1].is_topmost());
+}
+
+#[test]
+fn the_rules_of_obstruction_differ_in_what_they_decide_alone() {
+    let scene = partly_hidden(5.0);
+    let mut by_visibility = seen_at_least(&scene, 0.97);
+    for object in &mut by_visibility.objects {
+        object.obstructed = None;
+    }
+    assert_eq!(by_visibility, labels(&scene, &LabelOptions::default()));
+    let told = serde_json::to_string(&by_visibility).unwrap();
+    assert!(!told.contains("obstructed"), "{told}");
 }
 
 #[test]

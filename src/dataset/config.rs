@@ -201,33 +201,78 @@ mod tests {
             [""; 0],
             "not in template.toml, or otherwise"
         );
-        assert_eq!(missing(&all, &told, ""), [""; 0], "only in template.toml");
+        assert_eq!(
+            missing(&all, &told, ""),
+            examples(),
+            "only in template.toml"
+        );
         assert_eq!(
             toml::from_str::<DatasetConfig>(DatasetConfig::template()).unwrap(),
             DatasetConfig::default()
         );
     }
 
-    /// What the template says a key may be: its path, and the ends of "A to B" in its comment.
-    fn told_bounds() -> Vec<(String, [f64; 2])> {
+    /// Keys without a default, of which the template has an example: `path = value`.
+    fn examples() -> Vec<String> {
+        told_keys()
+            .into_iter()
+            .filter(|told| told.comment.contains("no default"))
+            .map(|told| format!("{} = {}", told.path, told.value))
+            .collect()
+    }
+
+    #[test]
+    fn an_example_in_the_template_is_taken_as_it_stands() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("recipe.toml");
+        assert_eq!(examples().len(), 1);
+        for example in examples() {
+            io::write_text(&path, &example).unwrap();
+            let config = DatasetConfig::read(&path, &[]).unwrap();
+            let (taken, told) = (Table::try_from(config).unwrap(), example.parse().unwrap());
+            assert_eq!(missing(&taken, &told, ""), [""; 0]);
+        }
+    }
+
+    /// A key in the template, with the comment above it.
+    struct ToldKey {
+        path: String,
+        value: &'static str,
+        comment: String,
+    }
+
+    fn told_keys() -> Vec<ToldKey> {
         let (mut table, mut comment, mut told) = (String::new(), String::new(), Vec::new());
         for line in DatasetConfig::template().lines() {
             if let Some(header) = line.strip_prefix('[') {
                 table = header
                     .trim_matches(['[', ']'])
                     .replace("scene.lights", "scene.lights[0]");
-            } else if let Some((key, _)) = line
+            } else if let Some((key, value)) = line
                 .strip_prefix('#')
                 .and_then(|l| l.split_once(" = "))
                 .filter(is_key)
             {
-                told.extend(ends(&comment).map(|ends| (format!("{table}.{key}"), ends)));
+                told.push(ToldKey {
+                    path: format!("{table}.{key}"),
+                    value,
+                    comment: std::mem::take(&mut comment),
+                });
+            } else if line.is_empty() {
                 comment.clear();
             } else {
                 comment = format!("{comment} {}", line.trim_start_matches('#'));
             }
         }
         told
+    }
+
+    /// What the template says a key may be: its path, and the ends of "A to B" in its comment.
+    fn told_bounds() -> Vec<(String, [f64; 2])> {
+        told_keys()
+            .into_iter()
+            .filter_map(|told| Some((told.path, ends(&told.comment)?)))
+            .collect()
     }
 
     fn is_key((key, _): &(&str, &str)) -> bool {

@@ -20,15 +20,15 @@ pub struct DatasetCounts {
     pub objects: u64,
     /// Objects that have a label.
     pub labelled: u64,
-    /// Objects that something lies over, labelled or not.
+    /// Objects that are obstructed, labelled or not.
     pub obstructed: u64,
-    /// Objects in cyclic overlap: none of them is on top.
+    /// Objects in cyclic overlap: something lies over each of them.
     pub knotted: u64,
     /// Scenes that were drawn and rejected.
     pub retries: u64,
     /// The same by class, in order.
     pub classes: Vec<ClassCount>,
-    /// What became of the labels of objects that something lies over.
+    /// What became of the labels of obstructed objects.
     pub policy: Obstructed,
     /// Files below the folder that trainers are given, as far as they are there.
     pub for_trainers: Vec<PathBuf>,

@@ -1,24 +1,25 @@
 //! The part of a recipe that says how labels are made and written: its table `[labels]`.
 
 use crate::bounds::Bounds;
+use crate::dataset::label_table::LabelTable;
 use crate::dataset::{
     Coco, Layers, Obstructed, PictureFormat, Pictures, Voc, WebDataset, Writer, Yolo,
 };
 use crate::error::Result;
 use crate::geom::BBox;
-use crate::label::{AmodalBox, LabelOptions, ObjectLabel, RleMask};
+use crate::label::{AmodalBox, LabelOptions, ObjectLabel, ObstructionRule, RleMask};
 use serde::{Deserialize, Serialize};
 
 /// How labels are made and written: the table `[labels]` of a recipe.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+#[serde(try_from = "LabelTable", into = "LabelTable")]
 pub struct LabelConfig {
-    /// What happens to the labels of objects that something lies over: `drop`, `keep`, `ignore` or
-    /// `class`. Default: `drop`, as in the paper.
+    /// What happens to the labels of obstructed objects: `drop`, `keep`, `ignore` or `class`.
+    /// Default: `drop`, as in the paper.
     pub obstructed: Obstructed,
-    /// Outlines are a pair of the topmost rule when their intersection over union is above this, 0
-    /// to 1. Default: 0, any overlap.
-    pub overlap_iou: f64,
+    /// When an object is obstructed: the key `overlap_iou` or the key `min_visible`. Default:
+    /// `overlap_iou = 0`, when another lies over it, any overlap.
+    pub obstruction: ObstructionRule,
     /// A pixel belongs to an object when more than this share of it is covered. Default: 0.1.
     pub alpha_threshold: f32,
     /// What an amodal box is drawn around: `mask` or `outline`. Default: `mask`.
@@ -82,11 +83,11 @@ impl Default for LabelConfig {
         let LabelOptions {
             amodal,
             alpha_threshold,
-            overlap_iou,
+            obstruction,
         } = LabelOptions::default();
         Self {
             obstructed: Obstructed::default(),
-            overlap_iou,
+            obstruction,
             alpha_threshold,
             amodal,
             simplify: 0.0,
@@ -104,9 +105,8 @@ impl LabelConfig {
     /// # Errors
     /// [`Error::Value`](crate::Error::Value) for the first number that cannot be right.
     pub fn check(&self) -> Result<()> {
-        let share = Bounds::new(0.0, 1.0, "a share");
-        share.check("overlap_iou", self.overlap_iou)?;
-        share.check("alpha_threshold", self.alpha_threshold.into())?;
+        self.obstruction.check()?;
+        Bounds::new(0.0, 1.0, "a share").check("alpha_threshold", self.alpha_threshold.into())?;
         Bounds::new(0.0, 1000.0, "pixels").check("simplify", self.simplify)?;
         Bounds::new(1.0, 1e6, "samples in an archive")
             .check("webdataset.samples", self.webdataset.samples as f64)
@@ -117,7 +117,7 @@ impl LabelConfig {
         LabelOptions {
             amodal: self.amodal,
             alpha_threshold: self.alpha_threshold,
-            overlap_iou: self.overlap_iou,
+            obstruction: self.obstruction,
         }
     }
 
@@ -202,6 +202,8 @@ mod tests {
             ("simplify = inf", "simplify: inf"),
             ("alpha_threshold = 2", "alpha_threshold: 2"),
             ("overlap_iou = nan", "overlap_iou: NaN"),
+            ("min_visible = 1.01", "min_visible: 1.01"),
+            ("min_visible = -0.1", "min_visible: -0.1"),
         ] {
             let e = toml::from_str::<LabelConfig>(recipe)
                 .unwrap()

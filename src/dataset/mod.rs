@@ -33,6 +33,7 @@ mod generate;
 mod inputs;
 mod journal;
 mod journal_line;
+mod label_table;
 mod layers;
 mod listing;
 mod merge;

@@ -1,4 +1,4 @@
-//! What happens to objects that something lies over.
+//! What happens to obstructed objects.
 
 use crate::error::{Error, Result};
 use crate::label::{Labels, ObjectLabel};
@@ -7,7 +7,8 @@ use serde::{Deserialize, Serialize};
 /// Name of the class of [`Obstructed::Class`].
 pub(crate) const OBSTRUCTED: &str = "obstructed";
 
-/// What happens to the labels of objects that something lies over.
+/// What happens to the labels of obstructed objects, those that are not
+/// [topmost](ObjectLabel::is_topmost).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Obstructed {

@@ -178,6 +178,7 @@ fn backgrounds_folder(files: &SceneFiles, plate: &str, folder: &Path) -> Result<
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::label::ObstructionRule;
     use crate::pixel::LinearRgb;
     use crate::scene::{CameraSource, Environment, Surface};
 
@@ -213,6 +214,7 @@ mod tests {
         };
         config.render.subsamples += 1;
         config.scene.settle.attempts = 3;
+        config.labels.obstruction = ObstructionRule::Visibility { min_visible: 0.97 };
         config.scene.image = [64, 48];
         let map = Environment {
             file: "../sky.exr".into(),

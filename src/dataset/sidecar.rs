@@ -33,7 +33,7 @@ pub struct SampleRecord {
     pub part: Part,
     /// Objects that have a label in the dataset's other files.
     pub labelled: Vec<ObjectId>,
-    /// Objects that nothing lies over, by the topmost rule.
+    /// Objects that are not obstructed, by the recipe's rule.
     pub topmost: Vec<ObjectId>,
     /// Objects in cyclic overlap.
     pub knotted: Vec<ObjectId>,

@@ -71,7 +71,7 @@ pub struct SampleSummary {
 /// Why an object has no label.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum UnlabelledReason {
-    /// Another lies over it, by the topmost rule.
+    /// Another lies over it: it is obstructed.
     Covered,
     /// Nothing of it lies in the picture.
     Outside,

@@ -1,8 +1,8 @@
 //! Label: what is where in a picture, read from the same deep samples as the picture itself.
 //!
 //! Masks, boxes and visibility are folds over the deep samples, so a label cannot disagree with its
-//! picture. Outlines and the topmost rule are geometry: the cards' outlines as the camera sees
-//! them.
+//! picture. Outlines and what lies over what are geometry: the cards' outlines as the camera sees
+//! them. An [`ObstructionRule`] says which of the two decides what is topmost.
 //!
 //! ```
 //! use petcomp::geom::{Pose, Quad};
@@ -26,6 +26,7 @@
 mod border;
 pub(crate) mod gallery;
 mod mask;
+mod obstruction;
 mod outline;
 pub(crate) mod overlay;
 mod rle;
@@ -38,6 +39,8 @@ mod visibility;
 #[doc(hidden)]
 pub use border::{Border, borders};
 pub use mask::RleMask;
+pub use obstruction::ObstructionRule;
+pub(crate) use obstruction::RuleInFile;
 #[doc(hidden)]
 pub use overlay::overlay;
 pub use topmost::cyclic_overlaps;
@@ -89,14 +92,21 @@ pub struct ObjectLabel {
     pub visible_pixel_fraction: f64,
     /// How far away it is.
     pub depth: DepthRange,
-    /// Objects that lie over it, by the topmost rule, in order of id.
+    /// Objects that lie over it, by their outlines, in order of id.
     pub covered_by: Vec<ObjectId>,
+    /// Whether too little of it is seen, by [`ObstructionRule::Visibility`]; none by
+    /// [`ObstructionRule::Overlap`], where `covered_by` tells.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub obstructed: Option<bool>,
 }
 
 impl ObjectLabel {
-    /// Nothing lies over it: it can be picked.
+    /// It is not obstructed, by the rule that it was labelled with: it can be picked.
     pub fn is_topmost(&self) -> bool {
-        self.covered_by.is_empty()
+        match self.obstructed {
+            Some(obstructed) => !obstructed,
+            None => self.covered_by.is_empty(),
+        }
     }
 }
 
@@ -110,9 +120,9 @@ pub struct LabelOptions {
     /// not for sums of coverage. Default: 0.1, under which thin film and the noise of a matte
     /// look alike.
     pub alpha_threshold: f32,
-    /// Outlines are a pair of the topmost rule when their intersection over union is above this.
-    /// Default: 0, any overlap.
-    pub overlap_iou: f64,
+    /// When an object is obstructed. Default: when another lies over it, any overlap.
+    #[serde(flatten)]
+    pub obstruction: ObstructionRule,
 }
 
 impl Default for LabelOptions {
@@ -120,7 +130,7 @@ impl Default for LabelOptions {
         Self {
             amodal: AmodalBox::Mask,
             alpha_threshold: 0.1,
-            overlap_iou: 0.0,
+            obstruction: ObstructionRule::default(),
         }
     }
 }
@@ -158,9 +168,9 @@ pub fn label(deep: &DeepImage, shot: &Shot, options: &LabelOptions) -> Labels {
     check_size(deep, image);
     let mut objects = silhouettes(deep, shot, options);
     objects.retain(|s| !s.amodal_box(options.amodal).is_empty());
-    let occluders = topmost::occluders(&objects, &shot.camera, options.overlap_iou);
+    let occluders = topmost::occluders(&objects, &shot.camera, options.obstruction.pair_iou());
     let pairs = objects.into_iter().zip(occluders);
-    let labels = pairs.map(|(object, covered_by)| object.into_label(options.amodal, covered_by));
+    let labels = pairs.map(|(object, covered_by)| object.into_label(options, covered_by));
     Labels {
         image,
         objects: labels.collect(),
@@ -212,9 +222,10 @@ impl<'a> Silhouette<'a> {
         }
     }
 
-    fn into_label(self, amodal: AmodalBox, covered_by: Vec<ObjectId>) -> ObjectLabel {
-        let amodal_box = self.amodal_box(amodal);
+    fn into_label(self, options: &LabelOptions, covered_by: Vec<ObjectId>) -> ObjectLabel {
+        let amodal_box = self.amodal_box(options.amodal);
         let seen = self.visibility;
+        let visible_pixel_fraction = area_fraction(&seen.visible, &seen.amodal);
         ObjectLabel {
             id: self.card.id,
             class: self.card.class,
@@ -222,11 +233,12 @@ impl<'a> Silhouette<'a> {
             amodal_box,
             visible_box: seen.visible.bounds(),
             visible_fraction: seen.fraction,
-            visible_pixel_fraction: area_fraction(&seen.visible, &seen.amodal),
+            visible_pixel_fraction,
             amodal_mask: seen.amodal,
             visible_mask: seen.visible,
             depth: seen.depth,
             covered_by,
+            obstructed: options.obstruction.is_obstructed(visible_pixel_fraction),
         }
     }
 }

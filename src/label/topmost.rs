@@ -1,7 +1,7 @@
-//! Which object lies over which: the topmost rule.
+//! Which object lies over which.
 //!
 //! # Method
-//! The rule of "Synthetic Data Generation for Visual Detection of Flattened PET Bottles": outlines
+//! The topmost rule of "Synthetic Data Generation for Visual Detection of Flattened PET Bottles": outlines
 //! that overlap are a pair, the one nearer the camera lies over the other, and an object that
 //! nothing lies over is unobstructed. The paper compares one altitude per object; here a pair is
 //! compared *over its overlap*, which is right for tilted cards too. The inverse depth of a plane

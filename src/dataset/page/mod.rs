@@ -233,14 +233,26 @@ fn add_unlabelled(page: &mut Page, summary: &Summary) {
         page.text("All have one.");
         return;
     }
-    let policy = summary.identity["obstructed"].as_str().unwrap_or("drop");
-    page.table(&unlabelled_reasons(summary)).text(&format!(
-        "The recipe's obstructed = \"{policy}\" decides about objects that others lie over, by the topmost rule, however \
-         little of them is hidden; \"keep\" labels them too."
-    ));
+    page.table(&unlabelled_reasons(summary))
+        .text(&obstruction_note(&summary.identity));
     let title = "seen share of objects without a label";
     let histogram = distributions::visible_histogram(title, &summary.unlabelled_visible);
     distributions::add_histograms(page, &[histogram]);
+}
+
+/// What the recipe's policy decides about.
+fn obstruction_note(identity: &serde_json::Value) -> String {
+    let policy = identity["obstructed"].as_str().unwrap_or("drop");
+    let obstructed = match &identity["recipe"]["label"]["min_visible"] {
+        serde_json::Value::Number(share) => {
+            format!("objects that are seen in less than min_visible = {share} of their pixels")
+        }
+        _ => "objects that others lie over, by the topmost rule, however little of them is hidden"
+            .to_owned(),
+    };
+    format!(
+        "The recipe's obstructed = \"{policy}\" decides about {obstructed}; \"keep\" labels them too."
+    )
 }
 
 fn unlabelled_reasons(summary: &Summary) -> Table {

@@ -266,10 +266,12 @@ fn outline_of(
 }
 
 fn why_unlabelled(object: &ObjectLabel, reason: UnlabelledReason) -> String {
-    if reason != UnlabelledReason::Covered {
+    let above = ids_above(object);
+    // Objects can hide pixels of each other where their outlines only touch.
+    if reason != UnlabelledReason::Covered || above.is_empty() {
         return reason.description().to_owned();
     }
-    format!("under {}", ids_above(object).join(", "))
+    format!("under {}", above.join(", "))
 }
 
 fn ids_above(object: &ObjectLabel) -> Vec<String> {

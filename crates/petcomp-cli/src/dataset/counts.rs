@@ -42,7 +42,7 @@ fn objects_line(counts: &DatasetCounts) -> String {
     )
 }
 
-/// What became of the labels of objects that something lies over.
+/// What became of the labels of obstructed objects.
 fn obstructed_labels(policy: Obstructed) -> &'static str {
     match policy {
         Obstructed::Drop => "without a label",

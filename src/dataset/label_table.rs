@@ -1,0 +1,146 @@
+//! The table `[labels]` as files have it: one rule, of which each variant has a key of its own.
+
+use crate::dataset::{Coco, Format, LabelConfig, Layers, Obstructed, Voc, WebDataset, Yolo};
+use crate::label::{AmodalBox, ObstructionRule, RuleInFile};
+use serde::{Deserialize, Serialize};
+
+/// A [`LabelConfig`] by the keys of a file.
+#[derive(Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub(super) struct LabelTable {
+    obstructed: Obstructed,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    overlap_iou: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    min_visible: Option<f64>,
+    alpha_threshold: f32,
+    amodal: AmodalBox,
+    simplify: f64,
+    formats: Vec<Format>,
+    yolo: Yolo,
+    coco: Coco,
+    voc: Voc,
+    webdataset: WebDataset,
+    layers: Layers,
+}
+
+impl Default for LabelTable {
+    /// Without a rule: a file that gives the key of one does not give the other.
+    fn default() -> Self {
+        Self {
+            overlap_iou: None,
+            min_visible: None,
+            ..LabelConfig::default().into()
+        }
+    }
+}
+
+impl From<LabelConfig> for LabelTable {
+    fn from(config: LabelConfig) -> Self {
+        let rule = RuleInFile::from(config.obstruction);
+        Self {
+            obstructed: config.obstructed,
+            overlap_iou: rule.overlap_iou,
+            min_visible: rule.min_visible,
+            alpha_threshold: config.alpha_threshold,
+            amodal: config.amodal,
+            simplify: config.simplify,
+            formats: config.formats,
+            yolo: config.yolo,
+            coco: config.coco,
+            voc: config.voc,
+            webdataset: config.webdataset,
+            layers: config.layers,
+        }
+    }
+}
+
+impl TryFrom<LabelTable> for LabelConfig {
+    type Error = String;
+
+    fn try_from(table: LabelTable) -> Result<Self, String> {
+        Ok(Self {
+            obstruction: table.rule()?,
+            obstructed: table.obstructed,
+            alpha_threshold: table.alpha_threshold,
+            amodal: table.amodal,
+            simplify: table.simplify,
+            formats: table.formats,
+            yolo: table.yolo,
+            coco: table.coco,
+            voc: table.voc,
+            webdataset: table.webdataset,
+            layers: table.layers,
+        })
+    }
+}
+
+impl LabelTable {
+    fn rule(&self) -> Result<ObstructionRule, String> {
+        let rule = RuleInFile {
+            overlap_iou: self.overlap_iou,
+            min_visible: self.min_visible,
+        };
+        rule.try_into()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dataset::DatasetConfig;
+    use crate::io;
+
+    fn written(config: &LabelConfig) -> String {
+        toml::to_string(config).unwrap()
+    }
+
+    #[test]
+    fn a_table_without_a_rule_is_written_as_before_there_were_two() {
+        let config: LabelConfig = toml::from_str("").unwrap();
+        assert_eq!(config, LabelConfig::default());
+        let begin = "obstructed = \"drop\"\noverlap_iou = 0.0\nalpha_threshold = 0.1\namodal = ";
+        assert!(written(&config).starts_with(begin), "{}", written(&config));
+        assert!(!written(&config).contains("min_visible"));
+    }
+
+    #[test]
+    fn a_least_visible_share_is_written_without_an_overlap() {
+        let config: LabelConfig = toml::from_str("min_visible = 0.97").unwrap();
+        let rule = ObstructionRule::Visibility { min_visible: 0.97 };
+        assert_eq!(
+            (config.options().obstruction, config.check().is_ok()),
+            (rule, true)
+        );
+        assert!(!written(&config).contains("overlap_iou"));
+        assert_eq!(
+            toml::from_str::<LabelConfig>(&written(&config)).unwrap(),
+            config
+        );
+    }
+
+    fn error_of(labels: &str, overrides: &[io::Override]) -> String {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("recipe.toml");
+        io::write_text(&path, &format!("[labels]\n{labels}\n")).unwrap();
+        DatasetConfig::read(&path, overrides)
+            .unwrap_err()
+            .to_string()
+    }
+
+    #[test]
+    fn both_rules_at_once_are_refused_by_name_even_at_the_default() {
+        let both = "labels: both overlap_iou and min_visible are given, expected one of them";
+        let told = error_of("overlap_iou = 0\nmin_visible = 0.97", &[]);
+        assert!(told.contains(both), "{told}");
+        let override_ = "labels.min_visible=0.97".parse().unwrap();
+        let told = error_of("overlap_iou = 0.1", &[override_]);
+        assert!(told.contains(both), "{told}");
+    }
+
+    #[test]
+    fn a_misspelt_rule_is_answered_with_the_right_one() {
+        let told = error_of("min_visibel = 0.97", &[]);
+        assert!(told.contains("did you mean \"min_visible\"?"), "{told}");
+    }
+}

@@ -1,0 +1,141 @@
+//! When an object is obstructed: one of two rules.
+
+use crate::bounds::Bounds;
+use crate::error::Result;
+use serde::{Deserialize, Serialize};
+
+/// When an object is obstructed.
+///
+/// In files it is one of two keys, `overlap_iou` or `min_visible`; both at once are an error.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "RuleInFile", into = "RuleInFile")]
+pub enum ObstructionRule {
+    /// Another object lies over it, however little that hides of it: the paper's rule.
+    Overlap {
+        /// Outlines are a pair when their intersection over union is above this, 0 to 1.
+        overlap_iou: f64,
+    },
+    /// Less than a share of it is seen, whatever lies over it.
+    Visibility {
+        /// Least share of its amodal pixels in which it is seen, 0 to 1. At 1 one hidden pixel
+        /// obstructs it; an object without a pixel has the share 0.
+        min_visible: f64,
+    },
+}
+
+/// The keys of a rule, of which a file gives one or none.
+#[derive(Clone, Copy, Serialize, Deserialize)]
+pub(crate) struct RuleInFile {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) overlap_iou: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) min_visible: Option<f64>,
+}
+
+impl Default for ObstructionRule {
+    /// Any overlap.
+    fn default() -> Self {
+        Self::Overlap { overlap_iou: 0.0 }
+    }
+}
+
+impl ObstructionRule {
+    /// # Errors
+    /// [`Error::Value`](crate::Error::Value) for a share that is none.
+    pub(crate) fn check(self) -> Result<()> {
+        let share = Bounds::new(0.0, 1.0, "a share");
+        match self {
+            Self::Overlap { overlap_iou } => share.check("overlap_iou", overlap_iou),
+            Self::Visibility { min_visible } => share.check("min_visible", min_visible),
+        }
+    }
+
+    /// Intersection over union above which outlines are a pair. By visibility any overlap makes
+    /// one: what lies over an object is known even where too little is hidden to obstruct it.
+    pub(crate) fn pair_iou(self) -> f64 {
+        match self {
+            Self::Overlap { overlap_iou } => overlap_iou,
+            Self::Visibility { .. } => 0.0,
+        }
+    }
+
+    /// Whether an object of this visible share is obstructed; none where overlaps decide.
+    ///
+    /// Takes the quotient of two counts, so that 97 of 100 pixels are not less than 0.97.
+    pub(crate) fn is_obstructed(self, visible_pixel_fraction: f64) -> Option<bool> {
+        match self {
+            Self::Overlap { .. } => None,
+            Self::Visibility { min_visible } => Some(visible_pixel_fraction < min_visible),
+        }
+    }
+}
+
+impl TryFrom<RuleInFile> for ObstructionRule {
+    type Error = String;
+
+    fn try_from(written: RuleInFile) -> std::result::Result<Self, String> {
+        match (written.overlap_iou, written.min_visible) {
+            (None, None) => Ok(Self::default()),
+            (Some(overlap_iou), None) => Ok(Self::Overlap { overlap_iou }),
+            (None, Some(min_visible)) => Ok(Self::Visibility { min_visible }),
+            (Some(_), Some(_)) => {
+                Err("both overlap_iou and min_visible are given, expected one of them".into())
+            }
+        }
+    }
+}
+
+impl From<ObstructionRule> for RuleInFile {
+    fn from(rule: ObstructionRule) -> Self {
+        let (overlap_iou, min_visible) = match rule {
+            ObstructionRule::Overlap { overlap_iou } => (Some(overlap_iou), None),
+            ObstructionRule::Visibility { min_visible } => (None, Some(min_visible)),
+        };
+        Self {
+            overlap_iou,
+            min_visible,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::label::LabelOptions;
+
+    #[test]
+    fn exactly_the_least_share_is_not_obstructed() {
+        for percent in 1..=100 {
+            let min_visible = format!("{percent}e-2").parse().unwrap();
+            let rule = ObstructionRule::Visibility { min_visible };
+            let share = f64::from(percent) / 100.0;
+            assert_eq!(rule.is_obstructed(share), Some(false), "{rule:?}");
+            assert_eq!(
+                rule.is_obstructed(share.next_down()),
+                Some(true),
+                "{rule:?}"
+            );
+        }
+        assert_eq!(ObstructionRule::default().is_obstructed(0.0), None);
+    }
+
+    #[test]
+    fn options_are_told_by_the_key_of_their_rule_alone() {
+        let told = |options: &LabelOptions| serde_json::to_string(options).unwrap();
+        let default = r#"{"amodal":"mask","alpha_threshold":0.1,"overlap_iou":0.0}"#;
+        assert_eq!(told(&LabelOptions::default()), default);
+        let by_visibility = r#"{"amodal":"mask","alpha_threshold":0.1,"min_visible":0.97}"#;
+        let read: LabelOptions = serde_json::from_str(by_visibility).unwrap();
+        assert_eq!(told(&read), by_visibility);
+        let wrong = [
+            r#"{"overlap_iou":0.0,"min_visible":0.97}"#,
+            r#"{"min_seen":0.97}"#,
+        ];
+        for text in wrong {
+            assert!(
+                serde_json::from_str::<LabelOptions>(text).is_err(),
+                "{text}"
+            );
+        }
+    }
+}
