@@ -9,6 +9,8 @@ from . import files
 SIZE = (480, 360)
 # How well a person clicks on a corner, pixels.
 CLICK_SIGMA_PX = 1.0
+# How well a person measures the thickness of a crumpled thing, metres.
+THICKNESS_STEP = 0.005
 
 
 def pictures(world, room, name, count):
@@ -30,25 +32,29 @@ def truth(world, room, count, classes, folder):
     return folder
 
 
-def photo_list(world, count, cut_out, folder):
-    """What a user writes of the photos of bottles: class, and the length by a tape measure."""
+def photo_list(world, count, cut_out, has_thickness, folder):
+    """What a user writes of the photos of bottles: class, and by a tape measure the length and, if
+    asked for, the thickness."""
     lines = [f"classes = {json.dumps(files.CLASSES)}\n"]
     if cut_out:
         lines += ["[cut_out]\n", *(f"{key} = {json.dumps(value)}\n" for key, value in cut_out.items())]
     for index in range(count):
         bottle = json.loads((world / f"photos/bottles/b{index:04d}.json").read_text())
-        lines += [entry(world, bottle["instance"]["index"], photo) for photo in bottle["photos"]]
+        lines += [entry(world, bottle["instance"]["index"], photo, has_thickness) for photo in bottle["photos"]]
     return files.write_text(folder / "photos.toml", "\n".join(lines))
 
 
-def entry(world, index, photo):
-    length = round(max(photo["size_m"]["length"], photo["size_m"]["width"]), 3)
+def entry(world, index, photo, has_thickness):
+    size = photo["size_m"]
+    length = round(max(size["length"], size["width"]), 3)
+    thickness = f"thickness = {round(size['thickness'] / THICKNESS_STEP) * THICKNESS_STEP:.3f}\n" if has_thickness else ""
     return (
         "[[photos]]\n"
         f"file = {json.dumps(str(world / 'photos/bottles' / photo['files']['photo_png']))}\n"
         f'asset = "b{index:04d}"\n'
         f'class = "{files.CLASSES[photo["class_id"]]}"\n'
         f"length = {length}\n"
+        f"{thickness}"
     )
 
 

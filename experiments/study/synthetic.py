@@ -10,7 +10,7 @@ def pictures(study, name):
     generator = study.arms["generators"][name]
     folder = study.cache / "synthetic" / name
     count = study.arms["synthetic"]["pictures"]
-    assets = build_assets(study, generator.get("cut_out", {}))
+    assets = build_assets(study, generator.get("cut_out", {}), generator.get("thickness", False))
     backgrounds = study.backgrounds or reality.backgrounds(study.world, study.rooms, study.cache / "backgrounds")
     if generator.get("program") == "naive":
         naive.generate(assets, backgrounds, count, study.arms["synthetic"]["seed"], folder)
@@ -22,11 +22,12 @@ def pictures(study, name):
     return [str(path) for path in sorted((folder / "images").rglob("*.jpg"))], json.loads(made_by.read_text())
 
 
-def build_assets(study, cut_out):
-    method = "_".join(cut_out.values()) or "physical"
-    folder = study.cache / "assets" / method
+def build_assets(study, cut_out, has_thickness):
+    name = "_".join([*cut_out.values(), *(["thickness"] if has_thickness else [])]) or "default"
+    folder = study.cache / "assets" / name
+    count = study.arms["reality"]["bottles"]
     photos = study.photos or reality.photo_list(
-        study.world, study.arms["reality"]["bottles"], cut_out, study.cache / "photos" / method
+        study.world, count, cut_out, has_thickness, study.cache / "photos" / name
     )
     study.petcomp("asset", "build", photos, "-o", folder)
     return folder

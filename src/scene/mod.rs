@@ -44,6 +44,7 @@ mod draw;
 mod environment;
 mod fall;
 mod files;
+mod footprint;
 mod hull;
 mod light;
 mod locate;
