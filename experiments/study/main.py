@@ -10,19 +10,23 @@ HERE = studies.HERE
 
 
 def run(options, cache, program):
-    study = smoke(cache / "smoke", program) if options.smoke else full(cache, program)
+    study = smoke(cache / "smoke", program) if options.smoke else full(options, cache, program)
     if options.smoke and not options.write:
         shutil.rmtree(study.cache, ignore_errors=True)
     names = chosen(options, study.arms)
     seeds = options.seeds or study.arms["training"]["seeds"]
     if not options.write:
         studies.train_all(study, studies.trainings(study, names, seeds), options.processes)
-    folder = study.cache / "results" if options.smoke else HERE / "results"
+    folder = study.cache / "results" if options.smoke else HERE / "results" / study.name
     write(study, list(study.arms["arms"]), seeds, folder)
 
 
-def full(cache, program):
-    return studies.Study(read_arms(), cache, cache / "world", program)
+def full(options, cache, program):
+    """Other rooms are another study: nothing of it was seen while choosing."""
+    arms = read_arms()
+    arms["reality"]["rooms"] = options.rooms or arms["reality"]["rooms"]
+    name = "rooms_" + "_".join(map(str, arms["reality"]["rooms"]))
+    return studies.Study(arms, cache / name, cache / "world", program)
 
 
 def smoke(cache, program):

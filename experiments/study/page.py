@@ -27,14 +27,17 @@ THUMBNAIL = (240, 180)
 def write(study, rows, summary, drawn_ratios, path):
     parts = [
         "<h1>Does the data teach a detector?</h1>",
-        f"<p>{html.escape(description(study))}</p>",
+        f"<p>{html.escape(description(study, rows))}</p>",
         "<h2>Goals</h2>",
         table(["ratio of mAP@0.5:0.95", "measured", "95 % interval", "paper", "goal"], ratio_rows(drawn_ratios)),
+        "<h2>Shares of the real pictures</h2>",
+        shares_plot(study, summary),
         "<h2>Arms</h2>",
         arms_plot(summary),
         table(["arm", "seeds", "mAP@0.5:0.95", "95 % interval", "ratio", "95 % interval", "to"], arm_rows(summary)),
         "<h2>Rooms</h2>",
         table(["arm", *map(str, study.rooms)], room_rows(rows, study.rooms)),
+        table(["ratio", *map(str, study.rooms)], room_ratio_rows(rows, study)),
         "<h2>The pictures</h2>",
         *sheets(study),
     ]
@@ -42,14 +45,23 @@ def write(study, rows, summary, drawn_ratios, path):
     files.write_text(path, text + "\n".join(parts) + "\n")
 
 
-def description(study):
+def description(study, rows):
     training, reality = study.arms["training"], study.arms["reality"]
+    detector = f"{training['model']} of Ultralytics from random weights"
+    if training["model"] == "stand-in":
+        detector = "No detector, but boxes near the true ones"
     return (
-        f"{training['model']} of Ultralytics from random weights, {training['image_size']} px, "
+        f"{detector}, {training['image_size']} px, "
         f"{training['images']} image iterations of batch {training['batch']}, in every arm. Tested on "
         f"{reality['pictures']} pictures of each of the rooms {', '.join(map(str, study.rooms))}; intervals "
-        "are 95 % by bootstrap over pictures and seeds. A difference whose interval holds 0 (a ratio's: 1) is none."
+        "are 95 % by bootstrap over pictures and seeds. A difference whose interval holds 0 (a ratio's: 1) is none. "
+        f"The trainings took {cpu_hours(rows):.1f} CPU hours."
     )
+
+
+def cpu_hours(rows):
+    trainings = {(row["arm"], row["seed"]): row["cpu_seconds"] for row in rows}
+    return sum(trainings.values()) / 3600
 
 
 def table(head, rows):
@@ -61,7 +73,7 @@ def table(head, rows):
 def ratio_rows(ratios):
     for ratio in ratios:
         measured = f"{ratio['ratio']:.2f}" if "ratio" in ratio else "not measured"
-        yield [ratio["name"], measured, span(ratio.get("ratio_interval"), 2), ratio.get("paper", ""), ratio["goal"]]
+        yield [ratio["name"], measured, span(ratio.get("ratio_interval"), 2), ratio.get("paper", ""), ratio.get("goal", "")]
 
 
 def arm_rows(summary):
@@ -76,10 +88,47 @@ def span(interval, digits):
 
 
 def room_rows(rows, rooms):
-    arms = dict.fromkeys(row["arm"] for row in rows)
-    for arm in arms:
-        scores = {room: [float(r["map50_95"]) for r in rows if (r["arm"], r["room"]) == (arm, room)] for room in rooms}
-        yield [arm, *(f"{np.mean(scores[room]):.4f}" for room in rooms)]
+    for arm in dict.fromkeys(row["arm"] for row in rows):
+        yield [arm, *(f"{room_mean(rows, arm, room):.4f}" for room in rooms)]
+
+
+def room_ratio_rows(rows, study):
+    trained = {row["arm"] for row in rows}
+    for ratio in study.arms["ratios"]:
+        if trained.issuperset(ratio["arms"]):
+            means = [[room_mean(rows, arm, room) for arm in ratio["arms"]] for room in study.rooms]
+            yield [ratio["name"], *(f"{a / b:.2f}" if b else "" for a, b in means)]
+
+
+def room_mean(rows, arm, room):
+    return np.mean([float(row["map50_95"]) for row in rows if (row["arm"], row["room"]) == (arm, room)])
+
+
+def shares_plot(study, summary):
+    """How far each share of the real pictures gets, alone and with each generator."""
+    figure, axes = pyplot.subplots(figsize=(8, 4))
+    for generator, arms in by_generator(study, summary).items():
+        shares = [study.arms["arms"][arm].get("real", 0) for arm in arms]
+        intervals = np.array([summary[arm]["interval"] for arm in arms])
+        line = axes.plot(shares, [summary[arm]["mean"] for arm in arms], "o-", label=generator or "real only")
+        axes.fill_between(shares, *intervals.T, alpha=0.15, color=line[0].get_color())
+    axes.set_ylim(bottom=0)
+    axes.set_xlabel("share of the real pictures")
+    axes.set_ylabel("mAP@0.5:0.95")
+    axes.legend()
+    axes.grid(alpha=0.3)
+    return svg(figure)
+
+
+def by_generator(study, summary):
+    """Arms of one class and length whose sources are balanced, by their generator, in the order of their shares."""
+    lines = {}
+    for arm in sorted(summary, key=lambda arm: study.arms["arms"][arm].get("real", 0)):
+        options = study.arms["arms"][arm]
+        comparable = not {"classes", "images"} & options.keys() and options.get("mix", "balanced") == "balanced"
+        if comparable:
+            lines.setdefault(options.get("synthetic"), []).append(arm)
+    return {generator: arms for generator, arms in lines.items() if len(arms) > 1}
 
 
 def arms_plot(summary):

@@ -29,6 +29,10 @@ class Study:
     trainer: str = "study.train"
 
     @property
+    def name(self):
+        return self.cache.name
+
+    @property
     def rooms(self):
         return self.arms["reality"]["rooms"]
 
@@ -92,6 +96,7 @@ def describe(study, arm, seed):
     pictures, made_by = synthetic.pictures(study, generator) if generator else ([], study.version())
     return settings | made_by | {
         "classes": study.classes(arm),
+        "images": options.get("images", settings["images"]),
         "seed": seed,
         "threads": 1,
         "mix": options.get("mix", "concatenate"),
