@@ -260,7 +260,7 @@ fn a_voc_document_tells_class_box_and_flags() {
 
 /// What the files of a picture say of its objects, when those are labelled that are seen enough.
 fn check_seen(folder: &Path, k: u64, min_visible: f64) -> SampleRecord {
-    let part = if k % 5 == 0 { "val" } else { "train" };
+    let part = if k.is_multiple_of(5) { "val" } else { "train" };
     let path = |kind: &str, end: &str| folder.join(format!("{kind}/{part}/{k:06}.{end}"));
     let record: SampleRecord = io::read_json(path("scenes", "json")).unwrap();
     let objects = record.labels.objects.iter();

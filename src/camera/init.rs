@@ -5,7 +5,7 @@ use super::read::apply_exif;
 use crate::error::{Error, Result};
 use crate::io;
 use serde::Serialize;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// The label, to be written to `path`, of a photo: its size, what its EXIF data say of the lens and
 /// of its framing, and the surface, markers and camera of another label of the same rectangle. Its
@@ -69,20 +69,16 @@ fn without_height(camera: &LabelCamera) -> LabelCamera {
 
 /// The photo as a label at `path` names it.
 fn file_below(photo: &Path, path: &Path) -> Result<String> {
-    let folder = absolute(path)?
+    let folder = io::absolute(path)?
         .parent()
         .map(Path::to_path_buf)
         .unwrap_or_default();
-    let relative = io::relative(&absolute(photo)?, &folder);
+    let relative = io::relative(&io::absolute(photo)?, &folder);
     if io::below("", &relative).is_err() {
         let what = format!("does not lie beside {} nor above it", photo.display());
         return Err(Error::file(path, what));
     }
     Ok(relative.to_string_lossy().replace('\\', "/"))
-}
-
-fn absolute(path: &Path) -> Result<PathBuf> {
-    std::path::absolute(path).map_err(|e| Error::file(path, e))
 }
 
 /// A label as text, with comments on what is left to be filled in.

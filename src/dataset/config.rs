@@ -1,7 +1,7 @@
 //! The file that a dataset is made from.
 
 use crate::dataset::environment_maps::seen_from;
-use crate::dataset::paths::{absolute_path, folder_of};
+use crate::dataset::paths::folder_of;
 use crate::dataset::yolo::MIN_SIDE_PX;
 use crate::dataset::{LabelConfig, Pictures, Split};
 use crate::error::Result;
@@ -103,10 +103,10 @@ impl DatasetConfig {
     /// When it cannot be written.
     pub fn write(&self, path: impl AsRef<Path>) -> Result<()> {
         let path = path.as_ref();
-        let folder = absolute_path(folder_of(path))?;
+        let folder = io::absolute(folder_of(path))?;
         let mut config = self.clone();
-        config.assets = io::relative(&absolute_path(&config.assets)?, &folder);
-        config.backgrounds = io::relative(&absolute_path(&config.backgrounds)?, &folder);
+        config.assets = io::relative(&io::absolute(&config.assets)?, &folder);
+        config.backgrounds = io::relative(&io::absolute(&config.backgrounds)?, &folder);
         for file in &mut config.scene.environment.files {
             *file = seen_from(&folder, &self.folder, file)?;
         }

@@ -2,7 +2,6 @@
 
 use crate::asset::Panorama;
 use crate::dataset::DatasetConfig;
-use crate::dataset::paths::absolute_path;
 use crate::error::{Error, Result};
 use crate::io;
 use std::path::{Path, PathBuf};
@@ -110,7 +109,7 @@ fn total_bytes(kept: &[(String, Arc<Panorama>)]) -> usize {
 
 /// A name in a recipe as it is seen from another folder.
 pub(crate) fn seen_from(folder: &Path, own: &Path, name: &str) -> Result<String> {
-    let file = absolute_path(&own.join(name))?;
+    let file = io::absolute(&own.join(name))?;
     Ok(io::relative(&file, folder).to_string_lossy().into_owned())
 }
 

@@ -1,7 +1,7 @@
 //! The images of a dataset, part by part, and a choice of them: lists that trainers read, without
 //! copies.
 
-use crate::dataset::paths::{absolute_path, folder_of};
+use crate::dataset::paths::folder_of;
 use crate::dataset::yolo_yaml::DataYaml;
 use crate::dataset::{Part, SampleRecord};
 use crate::error::{Error, Result};
@@ -28,7 +28,7 @@ impl Listing {
     /// # Errors
     /// No `data.yaml`; a folder or list that cannot be read.
     pub fn read(folder: &Path) -> Result<Self> {
-        let folder = absolute_path(folder)?;
+        let folder = io::absolute(folder)?;
         let (yaml, _) = DataYaml::read(&io::read_text(folder.join("data.yaml"))?);
         let [train, val] = Part::ALL.map(|part| images_of(&folder, yaml.folders(part)));
         Ok(Self {
@@ -65,7 +65,7 @@ impl Listing {
     /// When a file cannot be written.
     pub fn write(&self, folder: &Path) -> Result<()> {
         io::create_folder(folder)?;
-        let folder = absolute_path(folder)?;
+        let folder = io::absolute(folder)?;
         for (part, images) in Part::ALL.into_iter().zip([&self.train, &self.val]) {
             write_list(part, images, &folder)?;
         }

@@ -1,17 +1,13 @@
 //! Paths that several parts of a dataset need.
 
 use crate::dataset::Part;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// The folder that a file lies in; empty for a bare name.
 pub(super) fn folder_of(file: &Path) -> &Path {
     file.parent().unwrap_or(Path::new(""))
-}
-
-pub(super) fn absolute_path(path: &Path) -> Result<PathBuf> {
-    std::path::absolute(path).map_err(|e| Error::file(path, e))
 }
 
 /// Creates a folder for each part below a folder of the dataset.

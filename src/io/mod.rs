@@ -108,7 +108,7 @@ pub use document::{read_document, write_document};
 #[doc(hidden)]
 pub use format::Format;
 #[doc(hidden)]
-pub use fs::{Checksum, below, copy, create_folder, inside, relative, sync};
+pub use fs::{Checksum, absolute, below, copy, create_folder, inside, relative, sync};
 pub(crate) use fs::{refuse_links, write_through};
 pub use header::Header;
 #[doc(hidden)]

@@ -1,6 +1,6 @@
 //! What a scene needs beside its own file: folders, and settings that its picture is made with.
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::io;
 use serde::{Deserialize, Serialize};
 use std::path::{Component, Path, PathBuf};
@@ -50,9 +50,7 @@ pub(crate) fn relative_to_file(path: &Path, file: &Path) -> Result<PathBuf> {
 fn absolute(path: &Path) -> Result<PathBuf> {
     match path.canonicalize() {
         Ok(resolved) if climbs(path) => Ok(resolved),
-        _ => std::path::absolute(path)
-            .map(|path| without_parent_steps(&path))
-            .map_err(|e| Error::file(path, e)),
+        _ => Ok(without_parent_steps(&io::absolute(path)?)),
     }
 }
 

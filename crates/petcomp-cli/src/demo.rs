@@ -55,8 +55,8 @@ impl DemoArgs {
     }
 
     fn relative_backgrounds(&self) -> petcomp::Result<PathBuf> {
-        let backgrounds = absolute_path(&self.samples.join("backgrounds"))?;
-        Ok(io::relative(&backgrounds, &absolute_path(&self.output)?))
+        let backgrounds = io::absolute(&self.samples.join("backgrounds"))?;
+        Ok(io::relative(&backgrounds, &io::absolute(&self.output)?))
     }
 
     /// A recipe file that names its folders and nothing else.
@@ -84,8 +84,4 @@ impl DemoArgs {
         }
         print::line(format_args!("change       {}", recipe.display()));
     }
-}
-
-fn absolute_path(path: &Path) -> petcomp::Result<PathBuf> {
-    std::path::absolute(path).map_err(|e| Error::file(path, e))
 }

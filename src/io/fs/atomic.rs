@@ -112,6 +112,14 @@ fn new_beside(folder: &Path) -> std::io::Result<tempfile::NamedTempFile> {
     builder.tempfile_in(folder)
 }
 
+/// A path from the root, as it is named: links and `..` stay.
+///
+/// # Errors
+/// [`Error::File`] for an empty path, and where the working folder is gone.
+pub fn absolute(path: &Path) -> Result<PathBuf> {
+    std::path::absolute(path).map_err(|e| Error::file(path, e))
+}
+
 /// The relative path from a folder to a file or folder, both absolute.
 pub fn relative(to: &Path, from: &Path) -> PathBuf {
     let shared = to

@@ -7,7 +7,7 @@ mod open;
 mod own_file;
 mod sanitize_path;
 
-pub use atomic::{create_folder, relative, sync};
+pub use atomic::{absolute, create_folder, relative, sync};
 pub use checksum::{Checksum, copy};
 pub use sanitize_path::{below, inside};
 

@@ -50,7 +50,7 @@ struct PictureFolder {
 
 impl PictureFolder {
     fn for_scene(scene: &Path) -> Result<Self> {
-        let whole = std::path::absolute(scene).map_err(|e| Error::file(scene, e))?;
+        let whole = io::absolute(scene)?;
         let folder = whole.parent().unwrap_or(&whole);
         let root = folder.parent().unwrap_or(folder).to_path_buf();
         Ok(Self {
