@@ -1,0 +1,48 @@
+"""How bottles lie in reality and in synthetic pictures.
+
+    python -m study.heaps WORLD SYNTHETIC...
+
+A line each for the piles of a world (all rooms) and for folders of datasets: where their bottles are, as
+shares of half the surface's width and height, and how many of them are labelled.
+"""
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+
+FAR = 0.6
+
+
+def main(world, datasets):
+    print("| | pictures | mean abs(x) | mean abs(y) | x beyond 0.6 | y beyond 0.6 | labelled | in a picture |")
+    print("| --- | --- | --- | --- | --- | --- | --- | --- |")
+    report("reality", [real_pile(path) for path in world.glob("room*/real/piles/truth/*.json")])
+    for folder in datasets:
+        report(folder.name, [synthetic_heap(path) for path in (folder / "scenes").rglob("*.json")])
+
+
+def real_pile(path):
+    """`(x, y, labelled)` of each bottle."""
+    pile = json.loads(path.read_text())
+    half = np.array(pile["tray"]["floor_m"]) / 2
+    poses = [np.array(bottle["pose"])[:2, 3] / half for bottle in pile["bottles"]]
+    return [(*place, bottle["unobstructed"]) for place, bottle in zip(poses, pile["bottles"])]
+
+
+def synthetic_heap(path):
+    record = json.loads(path.read_text())
+    half = np.array(record["scene"]["surface"]["size"]) / 2
+    places = [np.array(one["placement"]["at"]["translation"])[:2] / half for one in record["scene"]["objects"]]
+    return [(*place, number in record["labelled"]) for number, place in enumerate(places, 1)]
+
+
+def report(name, pictures):
+    x, y, labelled = np.abs(np.array([row for picture in pictures for row in picture], float)).T
+    cells = [x.mean(), y.mean(), (x > FAR).mean(), (y > FAR).mean(), labelled.mean(), labelled.sum() / len(pictures)]
+    print(f"| {name} | {len(pictures)} | " + " | ".join(f"{cell:.2f}" for cell in cells) + " |")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), [Path(name) for name in sys.argv[2:]])
