@@ -17,7 +17,6 @@ pub(super) const TURN: Bounds = Bounds::new(-3600.0, 3600.0, "degrees; a turn is
 pub(super) const TILT: Bounds = Bounds::new(-180.0, 180.0, "degrees");
 pub(super) const ACROSS: Bounds = Bounds::new(-1.0, 1.0, "the walls");
 pub(super) const GAP: Bounds = Bounds::metres(1e-6, 1.0, "objects are stacked before they fall");
-pub(super) const CANDIDATES: Bounds = Bounds::new(1.0, 100.0, "places drawn for each object");
 pub(super) const GRADE: Bounds = Bounds::new(0.0, 100.0, "a factor");
 pub(super) const LIGHT_HEIGHT: Bounds =
     Bounds::metres(0.001, 1000.0, "farther off a light is a sun");

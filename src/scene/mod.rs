@@ -44,7 +44,6 @@ mod draw;
 mod environment;
 mod fall;
 mod files;
-mod footprint;
 mod hull;
 mod light;
 mod locate;

@@ -2,9 +2,8 @@
 
 use crate::error::{Error, Result};
 use crate::geom::{UnitQuaternion, Vector3};
-use crate::scene::bounds::{ACROSS, CANDIDATES, GAP, TILT, TURN};
+use crate::scene::bounds::{ACROSS, GAP, TILT, TURN};
 use crate::scene::fall::{half_extent, level};
-use crate::scene::footprint::Footprint;
 use crate::scene::{Draws, Object, Placement, Range, SettleOptions, Surface};
 use nalgebra::Unit;
 use serde::{Deserialize, Serialize};
@@ -33,10 +32,6 @@ pub struct DropRanges {
     /// Free height between an object and the highest point below it, metres. Default: `[0.005,
     /// 0.02]`.
     pub gap: Range,
-    /// Places and turns drawn for an object, of which it gets the one with the fewest objects
-    /// below: with more, objects lie side by side as they do where round ones roll off each other.
-    /// Default: 1.
-    pub candidates: u32,
 }
 
 impl Default for DropRanges {
@@ -48,7 +43,6 @@ impl Default for DropRanges {
             tilt_deg: Range::new(0.0, 15.0),
             tilt_axis_deg: Range::new(-180.0, 180.0),
             gap: Range::new(0.005, 0.02),
-            candidates: 1,
         }
     }
 }
@@ -69,18 +63,8 @@ impl DropRanges {
         self.yaw_deg.check("start.yaw_deg", &TURN)?;
         self.tilt_deg.check("start.tilt_deg", &TILT)?;
         self.tilt_axis_deg.check("start.tilt_axis_deg", &TURN)?;
-        self.gap.check("start.gap", &GAP)?;
-        CANDIDATES.check("start.candidates", self.candidates.into())
+        self.gap.check("start.gap", &GAP)
     }
-}
-
-/// A place and a turn that an object may start from.
-struct Start {
-    above: [f64; 2],
-    rotation: UnitQuaternion<f64>,
-    /// Half lengths of the upright box around the body.
-    extent: Vector3<f64>,
-    footprint: Footprint,
 }
 
 /// The column over a surface that objects are stacked in.
@@ -104,44 +88,26 @@ impl DropColumn<'_> {
     /// An object that fits between the walls in no direction.
     pub(super) fn stack(&self, objects: &mut [Object]) -> Result<()> {
         let mut top = 0.0;
-        let mut below = Vec::with_capacity(objects.len());
         for (i, object) in objects.iter_mut().enumerate() {
+            let rotation = self.rotation_of(i, object)?;
+            let extent = half_extent(&rotation, &self.options.half_body(object));
             let path = format!("objects[{i}].start");
-            let start = self.emptiest_start(object, &path, &below).ok_or_else(|| {
-                Error::value(format!("objects[{i}].size"), self.fit_problem(object))
-            })?;
-            let height = top + self.draw(&self.start.gap, &path, "gap") + start.extent.z;
-            top = height + start.extent.z;
-            below.push(start.footprint);
+            let above = self.draw_position(&extent, &path);
+            let height = top + self.draw(&self.start.gap, &path, "gap") + extent.z;
+            top = height + extent.z;
             object.placement = Placement::Drop {
-                above: start.above,
+                above,
                 height,
-                rotation: start.rotation,
+                rotation,
             };
         }
         Ok(())
     }
 
-    /// Of the candidates the first one with the fewest objects below.
-    fn emptiest_start(&self, object: &Object, path: &str, below: &[Footprint]) -> Option<Start> {
+    fn rotation_of(&self, i: usize, object: &Object) -> Result<UnitQuaternion<f64>> {
         let half = self.options.half_body(object);
-        (0..self.start.candidates)
-            .map_while(|candidate| self.draw_start(&half, path, candidate))
-            .map(|start| (start.footprint.crowding(below), start))
-            .min_by(|(a, _), (b, _)| a.total_cmp(b))
-            .map(|(_, start)| start)
-    }
-
-    fn draw_start(&self, half: &Vector3<f64>, path: &str, candidate: u32) -> Option<Start> {
-        let rotation = self.fitting_rotation(half, path, candidate)?;
-        let extent = half_extent(&rotation, half);
-        let above = self.draw_position(&extent, path, candidate);
-        Some(Start {
-            above,
-            rotation,
-            extent,
-            footprint: Footprint::new(above, &rotation, half),
-        })
+        self.fitting_rotation(&half, &format!("objects[{i}].start"))
+            .ok_or_else(|| Error::value(format!("objects[{i}].size"), self.fit_problem(object)))
     }
 
     fn draw(&self, range: &Range, path: &str, name: &str) -> f64 {
@@ -149,9 +115,9 @@ impl DropColumn<'_> {
     }
 
     /// A point of the surface over which a body of this half extent is between the walls.
-    fn draw_position(&self, extent: &Vector3<f64>, path: &str, candidate: u32) -> [f64; 2] {
-        let x = self.draw(&self.start.x, path, &numbered("x", candidate));
-        let y = self.draw(&self.start.y, path, &numbered("y", candidate));
+    fn draw_position(&self, extent: &Vector3<f64>, path: &str) -> [f64; 2] {
+        let x = self.draw(&self.start.x, path, "x");
+        let y = self.draw(&self.start.y, path, "y");
         let [free_x, free_y] = free_offsets(self.surface.size, extent);
         [x * free_x, y * free_y]
     }
@@ -164,15 +130,10 @@ impl DropColumn<'_> {
     /// The first rotation drawn with which the body fits between the walls, tilted as it starts and
     /// level as it may end: what starts across a room that is too narrow for it never lies down
     /// there. Where none does, one that fits level.
-    fn fitting_rotation(
-        &self,
-        half: &Vector3<f64>,
-        path: &str,
-        candidate: u32,
-    ) -> Option<UnitQuaternion<f64>> {
+    fn fitting_rotation(&self, half: &Vector3<f64>, path: &str) -> Option<UnitQuaternion<f64>> {
         let room = self.surface.size;
         (0..MAX_YAW_DRAWS)
-            .map(|number| self.draw_rotation(path, candidate * MAX_YAW_DRAWS + number))
+            .map(|number| self.draw_rotation(path, number))
             .find(|rotation| fits_level_too(room, half, rotation))
             .or_else(|| self.draw_level_rotation(half, path))
     }
@@ -186,7 +147,7 @@ impl DropColumn<'_> {
     /// First a turn about the vertical, drawn for this object for the `number`-th time, then the
     /// tilt.
     fn draw_rotation(&self, path: &str, number: u32) -> UnitQuaternion<f64> {
-        let yaw = self.draw(&self.start.yaw_deg, path, &numbered("yaw_deg", number));
+        let yaw = self.draw(&self.start.yaw_deg, path, &yaw_field(number));
         self.draw_tilt(path) * level_turn(yaw)
     }
 
@@ -219,12 +180,12 @@ impl DropRanges {
     }
 }
 
-/// Every further draw of a field has a path of its own.
-fn numbered(field: &str, number: u32) -> String {
+/// Every further draw of a yaw has a path of its own.
+fn yaw_field(number: u32) -> String {
     if number == 0 {
-        field.into()
+        "yaw_deg".into()
     } else {
-        format!("{field}#{number}")
+        format!("yaw_deg#{number}")
     }
 }
 
@@ -343,39 +304,6 @@ mod tests {
                 top = z().fold(0.0, f64::max);
             }
         }
-    }
-
-    /// Mean number of objects below a point of an object.
-    fn mean_crowding(objects: &[Object]) -> f64 {
-        let half = Vector3::new(0.1, 0.04, 0.0);
-        let prints: Vec<_> = objects
-            .iter()
-            .map(|object| match object.placement {
-                Placement::Drop {
-                    above, rotation, ..
-                } => Footprint::new(above, &rotation, &half),
-                Placement::At(_) => panic!("not dropped"),
-            })
-            .collect();
-        let crowding = (0..prints.len()).map(|i| prints[i].crowding(&prints[..i]));
-        crowding.sum::<f64>() / prints.len() as f64
-    }
-
-    #[test]
-    fn more_candidates_spread_the_heap_and_leave_its_first_object_alone() {
-        let spread = DropRanges {
-            candidates: 8,
-            ..DropRanges::default()
-        };
-        let (mut heaped, mut apart) = (0.0, 0.0);
-        for k in 0..50 {
-            let one = stacked(k, &DropRanges::default(), cards(10, [0.2, 0.08])).unwrap();
-            let eight = stacked(k, &spread, cards(10, [0.2, 0.08])).unwrap();
-            assert_eq!(one[0], eight[0]);
-            heaped += mean_crowding(&one);
-            apart += mean_crowding(&eight);
-        }
-        assert!(apart < 0.6 * heaped, "{apart} against {heaped}");
     }
 
     #[test]
