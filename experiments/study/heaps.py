@@ -1,13 +1,14 @@
 """How bottles lie in reality and in synthetic pictures.
 
-    python -m study.heaps WORLD SYNTHETIC...
+    python -m study.heaps [--rooms 21,22] WORLD SYNTHETIC...
 
-A line each for the piles of a world (all rooms) and for folders of datasets: where their bottles are, as
-shares of half the surface's width and height, and how many of them are labelled.
+A line each for the piles of a world and for folders of datasets: where their bottles are, as shares of
+half the surface's width and height, and how many of them are labelled. Of reality it takes the pictures
+for training, of the rooms for choosing.
 """
 
+import argparse
 import json
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -15,11 +16,17 @@ import numpy as np
 FAR = 0.6
 
 
-def main(world, datasets):
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--rooms", default="21,22", help="comma list (default 21,22)")
+    parser.add_argument("world", type=Path)
+    parser.add_argument("datasets", type=Path, nargs="*")
+    options = parser.parse_args()
+    folders = [options.world / f"room{room}/real/piles/truth" for room in options.rooms.split(",")]
     print("| | pictures | mean abs(x) | mean abs(y) | x beyond 0.6 | y beyond 0.6 | labelled | in a picture |")
     print("| --- | --- | --- | --- | --- | --- | --- | --- |")
-    report("reality", [real_pile(path) for path in world.glob("room*/real/piles/truth/*.json")])
-    for folder in datasets:
+    report("reality", [real_pile(path) for folder in folders for path in folder.glob("*.json")])
+    for folder in options.datasets:
         report(folder.name, [synthetic_heap(path) for path in (folder / "scenes").rglob("*.json")])
 
 
@@ -45,4 +52,4 @@ def report(name, pictures):
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), [Path(name) for name in sys.argv[2:]])
+    main()
