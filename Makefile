@@ -43,7 +43,7 @@ test: packages python
 	  $(CARGO) check --release --locked -p petcomp --no-default-features --features "$$f" --lib --tests --quiet || exit 1; \
 	done
 	$(MAKE) examples
-	$(MAKE) experiment-smoke
+	experiments/run --smoke
 
 # The reality of the experiments; it goes on where it stopped.
 world:
