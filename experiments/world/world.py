@@ -7,13 +7,9 @@ Three kinds of pictures, all deterministic for given seeds and settings:
   world.py backgrounds  a table with a plastic tray and a robot arm, from above
   world.py piles        the same bottles piled physically in the tray
 
-Run with Python 3.11 and the bpy package, or inside Blender:
+Run with Python 3.11 and the bpy package:
 
   python3 world.py bottles --out OUT --library-seed 1 --count 4
-  blender -b --factory-startup --python-use-system-env -P world.py -- bottles --out OUT
-
-Inside Debian's Blender 3.4 NumPy must be reachable through PYTHONPATH; that
-build cannot denoise, so raise --spp there.
 """
 
 import argparse
@@ -146,4 +142,4 @@ def main(argv):
 
 
 if __name__ == "__main__":
-    main(sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else sys.argv[1:])
+    main(sys.argv[1:])
