@@ -65,9 +65,9 @@ def write(study, names, seeds, folder):
     rows, matches = results.scored(study, names, seeds)
     if not rows:
         raise SystemExit("nothing is trained yet")
-    drawn = results.drawn(matches)
-    summary = results.summary(study, matches, drawn)
-    ratios = results.ratios(study, matches, drawn)
+    means, drawn = results.means(matches), results.drawn(matches)
+    summary = results.summary(study, matches, means, drawn)
+    ratios = results.ratios(study, means, drawn)
     results.write_csv(folder / "results.csv", results.COLUMNS, rows)
     results.write_csv(folder / "summary.csv", results.SUMMARY_COLUMNS, results.summary_rows(summary))
     page.write(study, rows, summary, ratios, folder / "index.html")

@@ -51,10 +51,14 @@ def drawn(matches):
     return {arm: bootstrap.samples(arm, of_arm) for arm, of_arm in matches.items()}
 
 
-def summary(study, matches, drawn):
+def means(matches):
+    """mAP@0.5:0.95 of each arm, over seeds and rooms."""
+    return {arm: mean_score(of_arm) for arm, of_arm in matches.items()}
+
+
+def summary(study, matches, means, drawn):
     """Mean over seeds and rooms of mAP@0.5:0.95 of each arm, its interval, and its ratio to the arm
     that it is held against."""
-    means = {arm: mean_score(of_arm) for arm, of_arm in matches.items()}
     return {
         arm: {
             "seeds": len(matches[arm]),
@@ -66,9 +70,8 @@ def summary(study, matches, drawn):
     }
 
 
-def ratios(study, matches, drawn):
+def ratios(study, means, drawn):
     """Those of the headline, as far as their arms are trained."""
-    means = {arm: mean_score(of_arm) for arm, of_arm in matches.items()}
     return [one | against(*one["arms"], means, drawn) for one in study.arms["ratios"]]
 
 

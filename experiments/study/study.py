@@ -6,7 +6,7 @@ import os
 import subprocess
 import sys
 import threading
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from . import files, reality, synthetic
@@ -27,6 +27,8 @@ class Study:
     backgrounds: Path | None = None
     # The module that trains.
     trainer: str = "study.train"
+    # What each generator made, once it is known: every seed of an arm asks for the same pictures.
+    made: dict = field(default_factory=dict)
 
     @property
     def name(self):
@@ -47,6 +49,11 @@ class Study:
             ["git", "describe", "--always", "--dirty"], cwd=HERE, capture_output=True, text=True
         ).stdout
         return {"petcomp": program.split()[1], "commit": commit.strip()}
+
+    def synthetic(self, generator):
+        if generator not in self.made:
+            self.made[generator] = synthetic.pictures(self, generator)
+        return self.made[generator]
 
     def classes(self, arm):
         return self.arms["arms"][arm].get("classes", self.arms["training"]["classes"])
@@ -93,7 +100,7 @@ def describe(study, arm, seed):
     count = study.arms["reality"]["pictures"]
     share = round(options.get("real", 0) * count)
     generator = options.get("synthetic")
-    pictures, made_by = synthetic.pictures(study, generator) if generator else ([], study.version())
+    pictures, made_by = study.synthetic(generator) if generator else ([], study.version())
     return settings | made_by | {
         "classes": study.classes(arm),
         "images": options.get("images", settings["images"]),
