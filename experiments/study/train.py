@@ -9,7 +9,6 @@ checkpoint; what was found stands in `predictions/ROOM/NAME.txt` beside the file
 
 import json
 import random
-import runpy
 import sys
 import time
 from pathlib import Path
@@ -24,7 +23,10 @@ from ultralytics.nn.tasks import DetectionModel
 
 from . import files
 
-KIT = Path(__file__).parents[2] / "src/train/kit/balanced.py"
+# Equation 2 is that of `petcomp dataset train-kit`.
+sys.path.append(str(Path(__file__).parents[2] / "src/train/kit"))
+import balanced
+
 # Checkpoints of a training: what an interruption loses at most is one part of it.
 PARTS = 10
 # Parts at the end without mosaics, so that the detector sees whole pictures too.
@@ -121,19 +123,19 @@ class Streams(torch.utils.data.Sampler):
     """
 
     def __init__(self, training, part):
-        self.training, self.part = training, part
+        self.training, self.part, self.batch = training, part, training["batch"]
         self.counts = [len(training["real"]), len(training["synthetic"])]
 
     def __len__(self):
-        return self.training["images"] // PARTS // self.training["batch"]
+        return self.training["images"] // PARTS // self.batch
 
     def __iter__(self):
         first = self.part() * len(self)
-        return (self.batch(first + k) for k in range(len(self)))
+        return (self.indices(first + k) for k in range(len(self)))
 
-    def batch(self, number):
+    def indices(self, number):
         real, synthetic = self.counts
-        size = self.training["batch"]
+        size = self.batch
         if self.training["mix"] == "balanced":
             half = size // 2
             theirs = [real + k for k in self.stream("synthetic", synthetic, number * half, half)]
@@ -145,7 +147,7 @@ class Streams(torch.utils.data.Sampler):
     def single_source_batch(self, number):
         """Of each source as many batches as it has pictures, in an order of chance."""
         real, synthetic = self.counts
-        size = self.training["batch"]
+        size = self.batch
         is_real = [slot < real for slot in self.stream("order", real + synthetic, 0, number + 1)]
         earlier = sum(is_real[number] == other for other in is_real[:number])
         if is_real[number]:
@@ -160,32 +162,12 @@ class Streams(torch.utils.data.Sampler):
         return rng.sample(range(count), count)
 
 
-class Both(torch.utils.data.ConcatDataset):
-    """Each source keeps its own mosaics, so that no picture mixes the two."""
-
-    @property
-    def labels(self):
-        return [label for part in self.datasets for label in part.labels]
-
-    def close_mosaic(self, hyp):
-        for part in self.datasets:
-            part.close_mosaic(hyp)
-
-
-class Loader(torch.utils.data.DataLoader):
-    # Torch says None where batches come from a sampler of batches; the trainer divides by it.
-    batch_size = property(lambda self: self.batch_sampler.training["batch"], lambda self, value: None)
-
-    def reset(self):
-        """No workers are kept: nothing to do."""
-
-
 def trainer(training, folder):
     """Ultralytics' trainer with our batches, and equation 2 of the paper where the arm asks for it."""
     factors = loss_factors(training)
     real = set(training["real"])
 
-    class Trainer(DetectionTrainer):
+    class Trainer(balanced.WeightedLoss, DetectionTrainer):
         def get_model(self, cfg=None, weights=None, verbose=True):
             model = Model(cfg, nc=self.data["nc"], ch=self.data["channels"], verbose=False)
             if weights:
@@ -199,20 +181,13 @@ def trainer(training, folder):
             lists = [list_file(folder, name, training[name]) for name in sources]
             parts = [self.build_dataset(source, mode, batch_size) for source in lists]
             streams = Streams(training, lambda: self.epoch)
-            return Loader(Both(parts), batch_sampler=streams, collate_fn=YOLODataset.collate_fn)
+            return balanced.Loader(balanced.Both(parts), batch_sampler=streams, collate_fn=YOLODataset.collate_fn)
 
         def preprocess_batch(self, batch):
             batch = super().preprocess_batch(batch)
             batch["img"] = batch["img"].contiguous(memory_format=torch.channels_last)
             self.factor = factors[batch["im_file"][0] not in real]
             return batch
-
-        # The training loop assigns the loss of a batch here before it goes backward.
-        loss = property(lambda self: self.weighted, lambda self, value: self.weigh(value))
-
-        def weigh(self, value):
-            self.weighted = value * self.factor if torch.is_tensor(value) else value
-            self.factor = 1.0  # once a batch
 
         def validate(self):
             return {}, 0.0
@@ -226,8 +201,7 @@ def trainer(training, folder):
 def loss_factors(training):
     if training["mix"] != "equation2":
         return (1.0, 1.0)
-    weights = runpy.run_path(str(KIT))["weights"]
-    return weights(len(training["real"]), len(training["synthetic"]))
+    return balanced.weights(len(training["real"]), len(training["synthetic"]))
 
 
 def predict(training, weights, pictures, folder):

@@ -44,6 +44,39 @@ class SingleSource(torch.utils.data.Sampler):
         return sum(-(-len(part) // self.batch) for part in self.parts)
 
 
+class Both(torch.utils.data.ConcatDataset):
+    """Each source keeps its own mosaic, so that no picture mixes the two."""
+
+    @property
+    def labels(self):
+        return [label for part in self.datasets for label in part.labels]
+
+    def close_mosaic(self, hyp):
+        for part in self.datasets:
+            part.close_mosaic(hyp)
+
+
+class Loader(torch.utils.data.DataLoader):
+    """What Ultralytics' trainer asks of a loader whose sampler gives whole batches."""
+
+    # Torch says None where batches come from a sampler of batches; the trainer divides by it.
+    batch_size = property(lambda self: self.batch_sampler.batch, lambda self, value: None)
+
+    def reset(self):
+        """Workers start anew with every epoch: nothing to do."""
+
+
+class WeightedLoss:
+    """For a trainer: the loss of each batch times the `factor` that `preprocess_batch` sets."""
+
+    # The training loop assigns the batch's loss here before it goes backward; the model stays Ultralytics' own.
+    loss = property(lambda self: self.weighted, lambda self, value: self.weigh(value))
+
+    def weigh(self, value):
+        self.weighted = value * self.factor if torch.is_tensor(value) else value
+        self.factor = 1.0  # once a batch
+
+
 def ultralytics_trainer(batch_size, seed):
     """An Ultralytics trainer class that follows equation 2."""
     from ultralytics.data.dataset import YOLODataset
@@ -53,25 +86,7 @@ def ultralytics_trainer(batch_size, seed):
     factor = (balance["weights"]["real"], balance["weights"]["synthetic"])
     real = frozenset((HERE / "real_train.txt").read_text().split("\n"))
 
-    class Both(torch.utils.data.ConcatDataset):
-        """Each source keeps its own mosaic, so that no picture mixes the two."""
-
-        @property
-        def labels(self):
-            return [label for part in self.datasets for label in part.labels]
-
-        def close_mosaic(self, hyp):
-            for part in self.datasets:
-                part.close_mosaic(hyp)
-
-    class Loader(torch.utils.data.DataLoader):
-        # Torch says None where batches come from a sampler of batches; the trainer divides by it.
-        batch_size = property(lambda self: batch_size, lambda self, value: None)
-
-        def reset(self):
-            """Workers start anew with every epoch: nothing to do."""
-
-    class Balanced(DetectionTrainer):
+    class Balanced(WeightedLoss, DetectionTrainer):
         def get_dataloader(self, dataset_path, batch_size=batch_size, rank=0, mode="train"):
             if mode != "train":
                 return super().get_dataloader(dataset_path, batch_size, rank, mode)
@@ -89,13 +104,6 @@ def ultralytics_trainer(batch_size, seed):
                 raise ValueError("a batch of both sources")
             self.factor = factor[sources.pop()]
             return batch
-
-        # The training loop assigns the batch's loss here before it goes backward; the model stays Ultralytics' own.
-        loss = property(lambda self: self.weighted, lambda self, value: self.weigh(value))
-
-        def weigh(self, value):
-            self.weighted = value * self.factor if torch.is_tensor(value) else value
-            self.factor = 1.0  # once a batch
 
     return Balanced
 
