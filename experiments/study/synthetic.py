@@ -7,9 +7,9 @@ from . import files, naive, reality
 
 def pictures(study, name):
     """The pictures of a generator, made if they are not there, and what made them."""
-    generator = study.arms["generators"][name]
+    generator = described(study.arms["generators"], name)
     folder = study.cache / "synthetic" / name
-    count = study.arms["synthetic"]["pictures"]
+    count = generator.get("pictures", study.arms["synthetic"]["pictures"])
     assets = build_assets(study, generator.get("cut_out", {}), generator.get("thickness", False))
     backgrounds = study.backgrounds or reality.backgrounds(study.world, study.rooms, study.cache / "backgrounds")
     if generator.get("program") == "naive":
@@ -20,6 +20,15 @@ def pictures(study, name):
     if not made_by.exists():
         files.write_json(made_by, study.version())
     return [str(path) for path in sorted((folder / "images").rglob("*.jpg"))], json.loads(made_by.read_text())
+
+
+def described(generators, name):
+    """A generator with all that it takes over from its `base`."""
+    own = generators[name]
+    if "base" not in own:
+        return own
+    base = described(generators, own["base"])
+    return base | own | {"set": base.get("set", []) + own.get("set", [])}
 
 
 def build_assets(study, cut_out, has_thickness):

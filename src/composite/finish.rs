@@ -1,11 +1,11 @@
-//! The frame as a camera would have given it: noise where there was none, white balance, exposure,
-//! sharpening.
+//! The frame as a camera would have given it: blur and noise where there were none, white balance,
+//! exposure, sharpening.
 
 use crate::deep::DeepImage;
 use crate::filter::gaussian_blur;
 use crate::image::Image;
-use crate::pixel::{LinearRgb, Mix, PremulRgba};
-use crate::scene::{Noise, PostProcess};
+use crate::pixel::{Film, LinearRgb, Mix, PremulRgba};
+use crate::scene::{Blur, Noise, PostProcess};
 use crate::work::{self, Kind};
 use std::f64::consts::TAU;
 
@@ -15,13 +15,14 @@ const SHARPENING_SIGMA_PX: f32 = 1.0;
 /// Finishes a frame of deep samples over `plate`; scene-linear, premultiplied.
 /// [`PostProcess::default`] gives the same bits.
 ///
-/// Cards get the noise that a photograph of them would have, and no pixel more than that: what is
-/// seen of the plate already has its own, so that a pixel without card or shadow keeps its bits.
+/// Cards and shadows get the blur and the noise that a photograph of them would have: what is seen
+/// of the plate already has its own, so that a pixel far from card and shadow keeps its bits.
 /// Exposure, white balance and sharpening are the whole frame's.
 ///
 /// # Method
-/// Noise is Gaussian, its variance `shot * value + read^2` less what the plate's own share brings
-/// along. It depends on the seed, the pixel and the channel only. Noise still to be matched
+/// What the cards send and what they and the shadows let pass is blurred, the plate is not. Noise is
+/// Gaussian, its variance `shot * value + read^2` less what the plate's own share brings along. It
+/// depends on the seed, the pixel and the channel only. What is still to be matched
 /// ([`Noise::MatchPlate`]) is none.
 pub fn finish(
     frame: Image<PremulRgba>,
@@ -29,6 +30,10 @@ pub fn finish(
     plate: Option<&Image<LinearRgb>>,
     finish: &PostProcess,
 ) -> Image<PremulRgba> {
+    let frame = match finish.blur_px {
+        Blur::Known(sigma_px) if sigma_px > 0.0 => blur(&frame, deep, plate, sigma_px as f32),
+        _ => frame,
+    };
     let noisy = match SensorNoise::new(finish) {
         Some(noise) => noise.add_to(&frame, deep, plate),
         None => frame,
@@ -38,6 +43,27 @@ pub fn finish(
         return exposed;
     }
     sharpen(&exposed, finish.sharpening as f32)
+}
+
+/// The frame with cards and shadows blurred.
+fn blur(
+    frame: &Image<PremulRgba>,
+    deep: &DeepImage,
+    plate: Option<&Image<LinearRgb>>,
+    sigma_px: f32,
+) -> Image<PremulRgba> {
+    let Some(plate) = plate else {
+        return gaussian_blur(frame, sigma_px);
+    };
+    let change = Image::from_fn(frame.width(), frame.height(), |x, y| change_at(deep, x, y));
+    let soft = gaussian_blur(&change, sigma_px);
+    soft.zip_map(plate, |film, behind| film.over_color(behind).opaque())
+}
+
+/// What cards and shadows do to the plate at a pixel.
+fn change_at(deep: &DeepImage, x: usize, y: usize) -> Film {
+    let film = deep.flat(x, y);
+    Film::new(film.color, film.transmittance() * deep.shadow()[(x, y)])
 }
 
 /// Exposure and white balance.
@@ -298,6 +324,20 @@ mod tests {
         });
         let (p, q) = (before[(3, 9)], after[(3, 9)]);
         assert_eq!([q.r, q.g, q.b, q.a], [p.r, 2.0 * p.g, 4.0 * p.b, 1.0]);
+    }
+
+    #[test]
+    fn blur_is_of_cards_alone() {
+        let (before, after) = finished(PostProcess {
+            blur_px: Blur::Known(1.0),
+            ..PostProcess::default()
+        });
+        assert_eq!(before[(20, 30)], after[(20, 30)]);
+        // Far from its edges the card stays, on its edge it is half as strong.
+        assert!((after[(50, 30)].g - 0.5).abs() < 1e-6);
+        let plate = before[(31, 30)].g;
+        let mean = (after[(31, 30)].g + after[(32, 30)].g - plate - 0.5).abs();
+        assert!(mean < 0.01 && after[(31, 30)].g > plate + 0.05, "{mean}");
     }
 
     #[test]

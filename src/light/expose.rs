@@ -2,7 +2,9 @@
 
 use crate::geom::{Point3, Vector3};
 use crate::image::Image;
-use crate::light::{irradiance, match_light_tint, match_noise, surface_color, value_of_rank};
+use crate::light::{
+    irradiance, match_blur, match_light_tint, match_noise, surface_color, value_of_rank,
+};
 use crate::pixel::LinearRgb;
 use crate::scene::{Exposure, Scene};
 use std::f64::consts::PI;
@@ -13,11 +15,12 @@ use std::f64::consts::PI;
 /// paper.
 const WHITE_PERCENTILE: f64 = 0.99;
 
-/// Estimates what a scene leaves to its plate: the colour of the light, the exposure, the noise.
+/// Estimates what a scene leaves to its plate: the colour of the light, the exposure, the blur, the noise.
 ///
 /// A scene that leaves nothing comes back as it is.
 pub fn match_plate(scene: Scene, plate: &Image<LinearRgb>) -> Scene {
-    match_noise(expose(match_light_tint(scene, plate), plate), plate)
+    let exposed = expose(match_light_tint(scene, plate), plate);
+    match_noise(match_blur(exposed, plate), plate)
 }
 
 /// Turns [`Exposure::MatchPlate`] and [`Exposure::MatchSurface`] into [`Exposure::Ev`]; a scene

@@ -3,7 +3,7 @@
 //! There are three questions to a light: how bright it is (`radiance`), where it is sampled
 //! (`nodes`) and, where nothing is in the way, what it does in closed form ([`polygon_irradiance`],
 //! `irradiance`). [`match_plate`] is the stage: it turns what a scene leaves to its plate
-//! (exposure, colour of the light, noise) into numbers.
+//! (exposure, colour of the light, blur, noise) into numbers.
 //!
 //! ```
 //! use petcomp::LinearRgb;
@@ -27,6 +27,7 @@
 
 mod ambient;
 mod area;
+mod blur;
 mod expose;
 mod irradiance;
 mod nodes;
@@ -39,6 +40,9 @@ mod surface;
 pub(crate) use ambient::ambient_directions;
 #[doc(hidden)]
 pub use area::{LightFrame, frame, radiance};
+pub(crate) use blur::match_blur;
+#[doc(hidden)]
+pub use blur::plate_blur;
 #[doc(hidden)]
 pub use expose::expose;
 pub use expose::match_plate;

@@ -79,9 +79,9 @@ pub(crate) use hull::doubled_area;
 pub use light::{AreaLight, Exposure, LightShape, LightTint};
 pub use locate::locate;
 pub use placement::{Grade, Object, Placement};
-pub use post_process::{Noise, PostProcess};
 #[doc(hidden)]
-pub use post_process::{PostProcessRanges, white_balance};
+pub use post_process::{Blur, PostProcessRanges, white_balance};
+pub use post_process::{Noise, PostProcess};
 pub use range::Range;
 pub use recipe::{Collider, Recipe};
 #[doc(hidden)]

@@ -3,13 +3,13 @@
 use crate::color::planckian;
 use crate::error::{Error, Result};
 use crate::pixel::LinearRgb;
-use crate::scene::bounds::{EV, GAIN, KELVIN, NOISE, SHARPENING};
+use crate::scene::bounds::{BLUR, EV, GAIN, KELVIN, NOISE, SHARPENING};
 use crate::scene::check::field;
 use crate::scene::{Draws, Range};
 use serde::{Deserialize, Serialize};
 
-/// Exposure, white balance, noise and sharpening of the whole frame, plate included; the default
-/// leaves every bit alone.
+/// Blur and noise of what is rendered, exposure, white balance and sharpening of the whole frame,
+/// plate included; the default leaves every bit alone.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct PostProcess {
@@ -17,6 +17,8 @@ pub struct PostProcess {
     pub exposure_ev: f64,
     /// Factor on each channel. Default: 1, 1, 1.
     pub white_balance: LinearRgb,
+    /// Blur that rendered cards and shadows get, as the plate has it. Default: 0.
+    pub blur_px: Blur,
     /// Noise that rendered cards get, as the plate has it. Default: none.
     pub noise: Noise,
     /// Where in the noise: another number is another frame of it. Default: 0.
@@ -30,11 +32,60 @@ impl Default for PostProcess {
         Self {
             exposure_ev: 0.0,
             white_balance: LinearRgb::WHITE,
+            blur_px: Blur::NONE,
             noise: Noise::default(),
             noise_seed: 0,
             sharpening: 0.0,
         }
     }
+}
+
+/// Blur of a lens and a sensor: a Gaussian of this standard deviation, pixels; in files the number
+/// or `"match_plate"`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(from = "BlurInFile<Px>", into = "BlurInFile<Px>")]
+#[serde(bound(serialize = "Px: Clone + Serialize"))]
+pub enum Blur<Px = f64> {
+    /// This much.
+    Known(Px),
+    /// Found by the `light` stage: as much as the plate has.
+    MatchPlate,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(untagged, expecting = "expected pixels or \"match_plate\"")]
+enum BlurInFile<Px> {
+    Known(Px),
+    Word(BlurWord),
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum BlurWord {
+    MatchPlate,
+}
+
+impl<Px> From<BlurInFile<Px>> for Blur<Px> {
+    fn from(written: BlurInFile<Px>) -> Self {
+        match written {
+            BlurInFile::Known(sigma_px) => Self::Known(sigma_px),
+            BlurInFile::Word(BlurWord::MatchPlate) => Self::MatchPlate,
+        }
+    }
+}
+
+impl<Px> From<Blur<Px>> for BlurInFile<Px> {
+    fn from(blur: Blur<Px>) -> Self {
+        match blur {
+            Blur::Known(sigma_px) => Self::Known(sigma_px),
+            Blur::MatchPlate => Self::Word(BlurWord::MatchPlate),
+        }
+    }
+}
+
+impl Blur {
+    /// Nothing is blurred.
+    pub const NONE: Self = Self::Known(0.0);
 }
 
 /// Noise of a sensor: variance `shot * value + read^2` of each scene-linear channel.
@@ -61,12 +112,14 @@ impl PostProcess {
         let Self {
             exposure_ev,
             white_balance,
+            blur_px,
             noise,
             noise_seed: _,
             sharpening,
         } = *self;
         exposure_ev == 0.0
             && white_balance == LinearRgb::WHITE
+            && blur_px == Blur::NONE
             && noise == Noise::None
             && sharpening == 0.0
     }
@@ -76,6 +129,9 @@ impl PostProcess {
         EV.check(&field(at, "exposure_ev"), self.exposure_ev)?;
         check_gains(self.white_balance, &field(at, "white_balance"))?;
         SHARPENING.check(&field(at, "sharpening"), self.sharpening)?;
+        if let Blur::Known(sigma_px) = self.blur_px {
+            BLUR.check(&field(at, "blur_px"), sigma_px)?;
+        }
         self.noise.check(&field(at, "noise"))
     }
 }
@@ -108,6 +164,8 @@ pub struct PostProcessRanges {
     /// Temperature of the light that the camera treats as white, kelvin: below 6504 the frame
     /// becomes bluer. Default: 6504.
     pub white_k: Range,
+    /// Blur of rendered cards and shadows, pixels. Default: 0.
+    pub blur_px: Blur<Range>,
     /// Noise of rendered cards. Default: `"none"`.
     pub noise: Noise,
     /// Amount of sharpening. Default: 0.
@@ -122,6 +180,7 @@ impl Default for PostProcessRanges {
         Self {
             exposure_ev: Range::fixed(0.0),
             white_k: Range::fixed(NEUTRAL_K),
+            blur_px: Blur::Known(Range::fixed(0.0)),
             noise: Noise::None,
             sharpening: Range::fixed(0.0),
         }
@@ -133,9 +192,17 @@ impl PostProcessRanges {
         PostProcess {
             exposure_ev: self.exposure_ev.draw(draws, "finish.exposure_ev"),
             white_balance: white_balance(self.white_k.draw(draws, "finish.white_k")),
+            blur_px: self.draw_blur(draws),
             noise: self.noise,
             noise_seed: self.draw_noise_seed(draws),
             sharpening: self.sharpening.draw(draws, "finish.sharpening"),
+        }
+    }
+
+    fn draw_blur(&self, draws: &Draws) -> Blur {
+        match self.blur_px {
+            Blur::Known(sigma_px) => Blur::Known(sigma_px.draw(draws, "finish.blur_px")),
+            Blur::MatchPlate => Blur::MatchPlate,
         }
     }
 
@@ -151,6 +218,9 @@ impl PostProcessRanges {
         self.exposure_ev.check("finish.exposure_ev", &EV)?;
         self.white_k.check("finish.white_k", &KELVIN)?;
         self.sharpening.check("finish.sharpening", &SHARPENING)?;
+        if let Blur::Known(sigma_px) = self.blur_px {
+            sigma_px.check("finish.blur_px", &BLUR)?;
+        }
         self.noise.check("finish.noise")
     }
 }

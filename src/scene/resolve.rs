@@ -7,8 +7,8 @@ use crate::geom::{Point2, Pose, Quad};
 use crate::image::Image;
 use crate::pixel::{LinearRgb, ObjectId};
 use crate::scene::{
-    AreaLight, CameraSource, Card, EnvironmentMap, Exposure, LightTint, Noise, Object, Placement,
-    Scene, Shot,
+    AreaLight, Blur, CameraSource, Card, EnvironmentMap, Exposure, LightTint, Noise, Object,
+    Placement, Scene, Shot,
 };
 use std::sync::Arc;
 
@@ -136,6 +136,9 @@ impl Scene {
     fn known_cast(&self) -> Result<LinearRgb> {
         if self.finish.noise == Noise::MatchPlate {
             return Err(unmatched("finish.noise"));
+        }
+        if self.finish.blur_px == Blur::MatchPlate {
+            return Err(unmatched("finish.blur_px"));
         }
         match self.cast {
             LightTint::Known(color) => Ok(color),
@@ -309,6 +312,11 @@ mod tests {
         assert_eq!(
             reported,
             "finish.noise: still to be matched to the plate; light it first"
+        );
+        let reported = complaint(|s| s.finish.blur_px = Blur::MatchPlate);
+        assert_eq!(
+            reported,
+            "finish.blur_px: still to be matched to the plate; light it first"
         );
         let rectangle = CameraSource::Rectangle {
             corners_px: [[0.0; 2]; 4],

@@ -2,11 +2,12 @@
 
 use crate::error::{Error, Result};
 use crate::geom::{UnitQuaternion, Vector3};
-use crate::scene::bounds::{ACROSS, GAP, TILT, TURN};
+use crate::scene::bounds::{ACROSS, GAP, SHARE, TILT, TURN};
 use crate::scene::fall::{half_extent, level};
 use crate::scene::{Draws, Object, Placement, Range, SettleOptions, Surface};
 use nalgebra::Unit;
 use serde::{Deserialize, Serialize};
+use std::f64::consts::PI;
 
 /// Times that the direction of a card is drawn until it fits between the walls.
 const MAX_YAW_DRAWS: u32 = 64;
@@ -32,6 +33,9 @@ pub struct DropRanges {
     /// Free height between an object and the highest point below it, metres. Default: `[0.005,
     /// 0.02]`.
     pub gap: Range,
+    /// Share of the objects that start turned over, 0 to 1: their backs are seen, which are the
+    /// fronts seen through. Default: 0.
+    pub face_down: f64,
 }
 
 impl Default for DropRanges {
@@ -43,6 +47,7 @@ impl Default for DropRanges {
             tilt_deg: Range::new(0.0, 15.0),
             tilt_axis_deg: Range::new(-180.0, 180.0),
             gap: Range::new(0.005, 0.02),
+            face_down: 0.0,
         }
     }
 }
@@ -63,7 +68,8 @@ impl DropRanges {
         self.yaw_deg.check("start.yaw_deg", &TURN)?;
         self.tilt_deg.check("start.tilt_deg", &TILT)?;
         self.tilt_axis_deg.check("start.tilt_axis_deg", &TURN)?;
-        self.gap.check("start.gap", &GAP)
+        self.gap.check("start.gap", &GAP)?;
+        SHARE.check("start.face_down", self.face_down)
     }
 }
 
@@ -144,11 +150,21 @@ impl DropColumn<'_> {
         (!turns.is_empty()).then(|| turns[self.draws.choose(&format!("{path}.turn"), turns.len())])
     }
 
-    /// First a turn about the vertical, drawn for this object for the `number`-th time, then the
-    /// tilt.
+    /// First it is turned over or not, then about the vertical, drawn for this object for the
+    /// `number`-th time, then the tilt.
     fn draw_rotation(&self, path: &str, number: u32) -> UnitQuaternion<f64> {
         let yaw = self.draw(&self.start.yaw_deg, path, &yaw_field(number));
-        self.draw_tilt(path) * level_turn(yaw)
+        self.draw_tilt(path) * level_turn(yaw) * self.draw_side(path)
+    }
+
+    /// Half a turn about its width for what starts face down.
+    fn draw_side(&self, path: &str) -> UnitQuaternion<f64> {
+        let share = self.start.face_down;
+        if share > 0.0 && self.draw(&Range::new(0.0, 1.0), path, "face_down") < share {
+            UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI)
+        } else {
+            UnitQuaternion::identity()
+        }
     }
 
     /// A tilt about a horizontal axis.
@@ -319,6 +335,37 @@ mod tests {
                     "scene {k}: {corner}"
                 );
             }
+        }
+    }
+
+    #[test]
+    fn the_share_asked_for_starts_face_down_and_lies_where_it_would() {
+        let start = |face_down| DropRanges {
+            face_down,
+            ..DropRanges::default()
+        };
+        let (mut down, mut all) = (0, 0);
+        for k in 0..100 {
+            let up = stacked(k, &start(0.0), cards(5, [0.2, 0.08])).unwrap();
+            let some = stacked(k, &start(0.3), cards(5, [0.2, 0.08])).unwrap();
+            for (up, some) in up.iter().zip(&some) {
+                let is_down = normal(some).z < 0.0;
+                assert!(normal(up).z > 0.0 && (lying(up) - lying(some)).norm() < 1e-9);
+                assert!(
+                    (normal(up) * if is_down { -1.0 } else { 1.0 } - normal(some)).norm() < 1e-9
+                );
+                all += 1;
+                down += usize::from(is_down);
+            }
+        }
+        // Binomial: standard deviation 10.2.
+        assert!(down.abs_diff(all * 3 / 10) < 41, "{down} of {all}");
+    }
+
+    fn normal(object: &Object) -> Vector3<f64> {
+        match object.placement {
+            Placement::Drop { rotation, .. } => rotation * Vector3::z(),
+            Placement::At(_) => panic!("not dropped"),
         }
     }
 
