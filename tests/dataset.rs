@@ -40,6 +40,7 @@ fn scene(k: u64) -> Scene {
         environment: None,
         exposure: Exposure::default(),
         cast: Default::default(),
+        view: Default::default(),
         finish: Default::default(),
         files: None,
         settings: Default::default(),

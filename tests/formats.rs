@@ -113,6 +113,7 @@ fn sample_with(k: u64, options: &LabelOptions) -> Result<Sample> {
         environment: None,
         exposure: Exposure::default(),
         cast: LightTint::default(),
+        view: Default::default(),
         finish: PostProcess::default(),
         files: None,
         settings: Default::default(),

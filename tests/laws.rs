@@ -13,6 +13,7 @@ use rayon::prelude::*;
 
 fn tray() -> Background {
     Background {
+        albedo: None,
         name: "tray".into(),
         size: [0.6, 0.4],
         camera: CameraSource::Rectangle {
@@ -254,6 +255,7 @@ fn nothing_at_rest_lies_in_another() {
 fn tight(times: f64, narrow: f64) -> Background {
     let longest = 0.28 * recipe(Range::fixed(1.0)).scale.max;
     Background {
+        albedo: None,
         size: [longest * times, longest * times * narrow],
         ..tray()
     }
@@ -351,6 +353,7 @@ fn a_tray_smaller_than_the_longest_card_is_refused_with_both_named() {
     let trays = [
         tray(),
         Background {
+            albedo: None,
             name: "box".into(),
             ..tight(0.99, 0.5)
         },

@@ -9,6 +9,8 @@ from . import files
 SIZE = (480, 360)
 # How well a person clicks on a corner, pixels.
 CLICK_SIGMA_PX = 1.0
+# How well a person measures the reflectance of a surface beside a sheet of white paper, as a share of it.
+ALBEDO_SIGMA = 0.1
 # How well a person measures the thickness of a crumpled thing, metres.
 THICKNESS_STEP = 0.005
 
@@ -58,7 +60,7 @@ def entry(world, index, photo, has_thickness):
     )
 
 
-def backgrounds(world, rooms, folder):
+def backgrounds(world, rooms, has_albedo, folder):
     """Photos of the empty trays, with four corners that a person clicked on."""
     for room in rooms:
         for path in sorted((world / f"room{room}/backgrounds").glob("*.json")):
@@ -66,11 +68,11 @@ def backgrounds(world, rooms, folder):
             name = f"room{room}_{photo['name']}"
             folder.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(path.with_suffix(".jpg"), folder / f"{name}.jpg")
-            files.write_json(folder / f"{name}.label.json", plane_label(photo, name, room))
+            files.write_json(folder / f"{name}.label.json", plane_label(photo, name, room, has_albedo))
     return folder
 
 
-def plane_label(photo, name, room):
+def plane_label(photo, name, room, has_albedo):
     rng = random.Random(name)
     camera, tray = photo["camera"], photo["tray"]
     corners = [[round(v + rng.gauss(0, CLICK_SIGMA_PX), 1) for v in corner] for corner in tray["corners_px"]]
@@ -83,7 +85,15 @@ def plane_label(photo, name, room):
             "width_m": tray["floor_m"][0],
             "height_m": tray["floor_m"][1],
             "corners_px": corners,
+            **measured_albedo(tray, room, has_albedo),
         },
         # As EXIF tells it: a whole number of millimetres.
         "camera": {"id": name, "focal_35mm": round(camera["fx"] / camera["width"] * 36)},
     }
+
+
+def measured_albedo(tray, room, has_albedo):
+    """Of each place once."""
+    if not has_albedo:
+        return {}
+    return {"albedo": round(tray["albedo"] * (1 + random.Random(room).gauss(0, ALBEDO_SIGMA)), 3)}

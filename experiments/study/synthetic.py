@@ -11,7 +11,7 @@ def pictures(study, name):
     folder = study.cache / "synthetic" / name
     count = generator.get("pictures", study.arms["synthetic"]["pictures"])
     assets = build_assets(study, generator.get("cut_out", {}), generator.get("thickness", False))
-    backgrounds = study.backgrounds or reality.backgrounds(study.world, study.rooms, study.cache / "backgrounds")
+    backgrounds = study.backgrounds or place_photos(study, generator.get("albedo", False))
     if generator.get("program") == "naive":
         naive.generate(assets, backgrounds, count, study.arms["synthetic"]["seed"], folder)
     else:
@@ -29,6 +29,11 @@ def described(generators, name):
         return own
     base = described(generators, own["base"])
     return base | own | {"set": base.get("set", []) + own.get("set", [])}
+
+
+def place_photos(study, has_albedo):
+    folder = study.cache / ("backgrounds_albedo" if has_albedo else "backgrounds")
+    return reality.backgrounds(study.world, study.rooms, has_albedo, folder)
 
 
 def build_assets(study, cut_out, has_thickness):

@@ -127,6 +127,10 @@ pub struct LabelSurface {
     /// Who found the corners: `manual`, a program's name.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub source: Option<String>,
+    /// Share of the light that the surface reflects: 0.04 for black plastic, 0.2 for mid grey, 0.8
+    /// for white paper.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub albedo: Option<f64>,
 }
 
 /// What is known of the camera of a label.

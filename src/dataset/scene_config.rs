@@ -198,6 +198,7 @@ mod tests {
             environment: None,
             exposure: Default::default(),
             cast: Default::default(),
+            view: Default::default(),
             finish: Default::default(),
             files: None,
             settings: Default::default(),

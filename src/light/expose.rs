@@ -113,6 +113,7 @@ mod tests {
             environment: None,
             exposure,
             cast: Default::default(),
+            view: Default::default(),
             finish: Default::default(),
             files: None,
             settings: Default::default(),

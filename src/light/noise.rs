@@ -1,5 +1,6 @@
 //! The noise of a photograph.
 
+use crate::filter::halve;
 use crate::image::Image;
 use crate::light::value_of_rank;
 use crate::pixel::LinearRgb;
@@ -15,6 +16,12 @@ const QUARTILE_SIGMAS: f64 = 0.318_639;
 /// Standard deviation of the residual of noise of standard deviation 1: the root of the mask's
 /// summed squares.
 const MASK_GAIN: f64 = 6.0;
+/// Factor on the variance of noise when a picture is brought to its full size again.
+const HALVING: f64 = 4.0;
+/// Brightness at which the noise of two pictures is compared.
+const MID_GREY: f64 = 0.18;
+/// Variances further apart than this factor do not differ by chance.
+const TAKEN_AWAY: f64 = 1.5;
 /// Values from here on may be clipped.
 const NEARLY_WHITE: f32 = 0.95;
 
@@ -29,11 +36,39 @@ pub(crate) fn match_noise(mut scene: Scene, plate: &Image<LinearRgb>) -> Scene {
 
 /// The noise of a photograph, from its green channel: [`Noise::None`] for one that is too small.
 ///
+/// JPEG and the denoising of phones take away the finest noise, and a photo at 94 % quality shows
+/// a third of it between neighbours, but 0.7 of it between pairs of pixels: the larger figure counts.
+///
 /// # Method
 /// The residual of the difference of two Laplacians, which passes over slopes and straight edges
 /// (J. Immerkær, "Fast Noise Variance Estimation", 1996); its lower quartile in groups of like
 /// brightness; a line through their variances.
 pub fn plate_noise(plate: &Image<LinearRgb>) -> Noise {
+    let fine = noise_between_pixels(plate);
+    match noise_between_pixels(&halve(plate)) {
+        Noise::Known { shot, read } if fine != Noise::None => {
+            let coarse = Noise::Known {
+                shot: HALVING * shot,
+                read: HALVING.sqrt() * read,
+            };
+            surely_larger(coarse, fine)
+        }
+        _ => fine,
+    }
+}
+
+/// The coarse noise where the fine one was taken away.
+fn surely_larger(coarse: Noise, fine: Noise) -> Noise {
+    let [found, expected] = [coarse, fine].map(|noise| noise.variance(MID_GREY));
+    if found > TAKEN_AWAY * expected {
+        coarse
+    } else {
+        fine
+    }
+}
+
+/// The noise that neighbouring pixels show.
+fn noise_between_pixels(plate: &Image<LinearRgb>) -> Noise {
     let mut residuals = residuals_of(plate);
     residuals.sort_by(|a, b| a.0.total_cmp(&b.0));
     let size = residuals.len() / BRIGHTNESS_GROUPS;
@@ -141,6 +176,7 @@ impl FitSums {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::pixel::Mix;
     use crate::scene::Draws;
 
     /// A slope with noise of `shot * value + read^2`; sums of twelve uniform numbers are as good as
@@ -162,6 +198,30 @@ mod tests {
         let at = |v: f64| (shot * v + read * read) / (0.002 * v + 0.0001);
         assert!(
             [0.1, 0.4, 0.7].iter().all(|&v| (at(v) - 1.0).abs() < 0.15),
+            "{shot} {read}"
+        );
+    }
+
+    /// What compression leaves: a third of the noise within blocks of four pixels, all of it between
+    /// them.
+    fn compressed(image: &Image<LinearRgb>) -> Image<LinearRgb> {
+        let blocks = halve(image);
+        Image::from_fn(image.width(), image.height(), |x, y| {
+            let mean = blocks[(x / 2, y / 2)].scale(2.0 / 3.0);
+            mean.add_scaled(1.0 / 3.0, image[(x, y)])
+        })
+    }
+
+    #[test]
+    fn compression_does_not_hide_noise() {
+        let Noise::Known { shot, read } = plate_noise(&compressed(&noisy(0.002, 0.01))) else {
+            panic!("nothing found")
+        };
+        let ratio = |v: f64| (shot * v + read * read) / (0.002 * v + 0.0001);
+        assert!(
+            [0.1, 0.4, 0.7]
+                .iter()
+                .all(|&v| (ratio(v) - 1.0).abs() < 0.3),
             "{shot} {read}"
         );
     }

@@ -104,6 +104,7 @@ pub(super) mod tests {
             environment: None,
             exposure: Exposure::Ev(0.0),
             cast,
+            view: Default::default(),
             finish: Default::default(),
             files: None,
             settings: Default::default(),

@@ -35,6 +35,7 @@ pub(super) const CAST_SHARE: Bounds = Bounds::new(
     10.0,
     "0 is white light, 1 treats the surface as grey",
 );
+pub(super) const ZOOM: Bounds = Bounds::new(1.0, 100.0, "a factor; 1 shows all of the photo");
 pub(super) const BLUR: Bounds = Bounds::new(0.0, 100.0, "pixels; a sharp photo has 0.3 to 0.7");
 pub(super) const SHARPENING: Bounds = Bounds::new(0.0, 100.0, "a share of what a blur takes away");
 pub(super) const NOISE: Bounds = Bounds::new(0.0, 1e3, "scene-linear; 1 is white");

@@ -29,6 +29,8 @@ pub struct Background {
     pub size: [f64; 2],
     /// The camera that took it, or what that can be found from.
     pub camera: CameraSource,
+    /// Share of the light that its surface reflects, where that is known.
+    pub albedo: Option<f64>,
 }
 
 /// The assets of a library as a recipe sees them, in the library's order.

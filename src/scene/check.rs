@@ -36,7 +36,8 @@ impl Scene {
     fn check_view(&self) -> Result<()> {
         check_image(self.image)?;
         check_surface(&self.surface)?;
-        check_camera(&self.camera)
+        check_camera(&self.camera)?;
+        self.view.check("view")
     }
 
     fn check_objects(&self) -> Result<()> {
@@ -307,6 +308,7 @@ mod tests {
             environment: None,
             exposure: Exposure::MatchPlate { gain_ev: 0.25 },
             cast: Default::default(),
+            view: Default::default(),
             finish: Default::default(),
             files: None,
             settings: Default::default(),

@@ -66,6 +66,7 @@ mod tests {
             environment: None,
             exposure: Exposure::default(),
             cast: Default::default(),
+            view: Default::default(),
             finish: Default::default(),
             files: None,
             settings: Default::default(),

@@ -15,6 +15,7 @@
 //! let tray = Background {
 //!     name: "tray".into(),
 //!     size: [0.6, 0.4],
+//!     albedo: None,
 //!     camera: CameraSource::Rectangle {
 //!         corners_px: [[20.0, 40.0], [620.0, 40.0], [620.0, 440.0], [20.0, 440.0]],
 //!         photo: [640, 480],
@@ -56,6 +57,7 @@ mod shot;
 mod stack;
 mod take;
 mod variation;
+mod view;
 
 pub use catalog::Background;
 #[doc(hidden)]
@@ -95,6 +97,8 @@ pub use stack::DropRanges;
 pub use take::Take;
 #[doc(hidden)]
 pub use variation::{Ablation, Variation};
+#[doc(hidden)]
+pub use view::{View, ViewRanges};
 
 use crate::camera::Camera;
 use crate::pixel::LinearRgb;
@@ -111,6 +115,9 @@ pub struct Scene {
     pub plate: String,
     /// The camera, or what it can be found from.
     pub camera: CameraSource,
+    /// Which part of what that camera sees is shown.
+    #[serde(default, skip_serializing_if = "View::is_whole")]
+    pub view: View,
     /// The surface `z = 0` that objects lie on.
     pub surface: Surface,
     /// Objects; the first has id 1.

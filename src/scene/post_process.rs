@@ -146,6 +146,14 @@ fn check_gains(gains: LinearRgb, at: &str) -> Result<()> {
 }
 
 impl Noise {
+    /// Variance of a scene-linear value; 0 where it is not known.
+    pub(crate) fn variance(&self, value: f64) -> f64 {
+        match *self {
+            Self::Known { shot, read } => shot * value.max(0.0) + read * read,
+            Self::None | Self::MatchPlate => 0.0,
+        }
+    }
+
     fn check(&self, at: &str) -> Result<()> {
         let Self::Known { shot, read } = *self else {
             return Ok(());

@@ -74,8 +74,8 @@ impl Scene {
             self.check_plate(plate)?;
         }
         Ok(Shot {
-            camera,
-            plate,
+            camera: self.view.camera(&camera),
+            plate: plate.map(|plate| self.shown_plate(&camera, plate)),
             catcher: self.surface.size.map(|side| CATCHER_RATIO * side),
             cards: self.cards(look)?,
             lights: self.tinted_lights(cast),
@@ -83,6 +83,15 @@ impl Scene {
             environment: self.environment_map(panorama)?,
             exposure,
         })
+    }
+
+    /// The part of the plate that is seen.
+    fn shown_plate(&self, camera: &Camera, plate: Arc<Image<LinearRgb>>) -> Arc<Image<LinearRgb>> {
+        if self.view.is_whole() {
+            plate
+        } else {
+            Arc::new(self.view.plate(camera, &plate))
+        }
     }
 
     fn cards(&self, look: impl Fn(&Object) -> Option<Appearance>) -> Result<Vec<Card>> {
@@ -250,6 +259,7 @@ mod tests {
             environment: None,
             exposure: Exposure::Ev(1.0),
             cast: Default::default(),
+            view: Default::default(),
             finish: Default::default(),
             files: None,
             settings: Default::default(),

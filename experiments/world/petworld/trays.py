@@ -159,12 +159,27 @@ def cable(points, radius, material):
     return studio.mesh_object("cable", v.reshape(-1, 3), bottle.quads(len(c), 10), material=material)
 
 
+TRAY_COLOURS = [(0.30, 0.31, 0.32), (0.62, 0.62, 0.60), (0.045, 0.13, 0.33), (0.06, 0.06, 0.065), (0.50, 0.46, 0.38)]
+# Share of the tray's surface that is darker, at most.
+SPECKLE = 0.20
+
+
+def tray_colour(rng):
+    """The first draw of a room."""
+    return TRAY_COLOURS[int(rng.integers(len(TRAY_COLOURS)))]
+
+
+def tray_albedo(room_seed):
+    """Share of the light that the tray reflects: half of the speckle on average, down to 0.35 of the colour."""
+    luminance = float(np.dot(tray_colour(bottle.seeded("room", room_seed)), (0.2126, 0.7152, 0.0722)))
+    return round(luminance * (1 - 0.5 * SPECKLE * 0.65), 4)
+
+
 def build_room(room_seed, tray):
     """Table, tray, arm and clutter of one room; returns what the truth needs."""
     rng = bottle.seeded("room", room_seed)
     length, width = tray
-    colour = [(0.30, 0.31, 0.32), (0.62, 0.62, 0.60), (0.045, 0.13, 0.33), (0.06, 0.06, 0.065), (0.50, 0.46, 0.38)][int(rng.integers(5))]
-    tray_mat = studio.plastic_material("tray", colour, float(rng.uniform(0.4, 0.6)), noise=0.20, scale=35.0)
+    tray_mat = studio.plastic_material("tray", tray_colour(rng), float(rng.uniform(0.4, 0.6)), noise=SPECKLE, scale=35.0)
     tray_mesh(length, width, tray_mat)
     top = wood(rng) if rng.random() < 0.65 else brushed(rng)
     z = -0.0045
@@ -279,8 +294,8 @@ def tray_camera(rng, view, args, azimuth=None):
     return cam, dict(view=view, tilt_deg=round(math.degrees(tilt), 3), azimuth_deg=round(math.degrees(az), 2), distance_m=round(dist, 4))
 
 
-def tray_truth(tray, cam):
-    l, w = tray
+def tray_truth(args, cam):
+    l, w = args.tray
     world = np.array([[-l / 2, w / 2, 0], [l / 2, w / 2, 0], [l / 2, -w / 2, 0], [-l / 2, -w / 2, 0]])
     uv, _ = raster.project(world, cam)
     dg = bpy.context.evaluated_depsgraph_get()
@@ -291,7 +306,7 @@ def tray_truth(tray, cam):
         ln = np.linalg.norm(d)
         hit, at, *_ = bpy.context.scene.ray_cast(dg, tuple(cam["position"]), tuple(d / ln))
         seen.append(bool(not hit or np.linalg.norm(np.array(at) - cam["position"]) > ln - 0.004))
-    return dict(floor_m=[l, w], wall_height_m=WALL_HEIGHT,
+    return dict(floor_m=[l, w], wall_height_m=WALL_HEIGHT, albedo=tray_albedo(args.room_seed),
                 corners_m=[[round(float(v), 6) for v in q] for q in world],
                 corners_px=[[round(float(v), 3) for v in q] for q in uv], corners_visible=seen)
 
@@ -333,7 +348,7 @@ def run_backgrounds(args):
         img, sensor = expose(lin, rng, light, args)
         name = f"bg{i:04d}"
         rec = dict(name=name, files=dict(picture=f"{name}.{args.format}"), room_seed=args.room_seed,
-                   **where, light=light, tray=tray_truth(args.tray, cam), camera=studio.camera_json(cam),
+                   **where, light=light, tray=tray_truth(args, cam), camera=studio.camera_json(cam),
                    sensor=sensor, spp=args.spp)
         save_picture(os.path.join(out, rec["files"]["picture"]), img, args.format)
         pixels.write_json(os.path.join(out, name + ".json"), rec)
@@ -584,7 +599,7 @@ def run_piles(args):
                                 f"{(x1 - x0) / args.width:.6f} {(y1 - y0) / args.height:.6f}\n")
             rec = dict(name=name, image=f"images/{name}.{args.format}", mask=f"masks/{name}.png", label=f"labels/{name}.txt",
                        light=li, camera_position=v, **where, room_seed=args.room_seed, library_seed=args.library_seed,
-                       tray=tray_truth(args.tray, cam), camera=studio.camera_json(cam), sensor=sensor,
+                       tray=tray_truth(args, cam), camera=studio.camera_json(cam), sensor=sensor,
                        visible_threshold=args.visible, wall=args.wall, spp=args.spp, bottles=recs)
             pixels.write_json(os.path.join(dirs["truth"], name + ".json"), rec)
             costs.append(dict(cpu_s=round(time.process_time() - t0[0], 1), wall_s=round(time.time() - t0[1], 1)))

@@ -69,12 +69,13 @@ impl Recipe {
             image: self.image,
             plate: background.name.clone(),
             camera: background.camera,
+            view: self.view.draw(draws),
             surface,
             objects,
             ambient: ambient_radiance(&lights, self.ambient.draw(draws, "ambient")),
             lights,
             environment: self.environment.draw(draws),
-            exposure: self.exposure(self.gain_ev.draw(draws, "gain_ev")),
+            exposure: self.exposure(background, self.gain_ev.draw(draws, "gain_ev")),
             cast: self.cast,
             finish: self.finish.draw(draws),
             files: None,
@@ -102,8 +103,8 @@ impl Recipe {
             .collect()
     }
 
-    fn exposure(&self, gain_ev: f64) -> Exposure {
-        match self.surface_albedo {
+    fn exposure(&self, background: &Background, gain_ev: f64) -> Exposure {
+        match self.surface_albedo.or(background.albedo) {
             None => Exposure::MatchPlate { gain_ev },
             Some(albedo) => Exposure::MatchSurface { albedo, gain_ev },
         }

@@ -15,7 +15,7 @@ use crate::scene::check::{check_cast, check_count, check_each, check_image};
 use crate::scene::stack::too_large;
 use crate::scene::{
     AssetVariant, Background, DrawLog, Drawn, DropRanges, EnvironmentRanges, LightTint,
-    PostProcessRanges, Range, Scene, SettleOptions, Surface, Take, Variation,
+    PostProcessRanges, Range, Scene, SettleOptions, Surface, Take, Variation, ViewRanges,
 };
 use compose::SceneNumber;
 use serde::{Deserialize, Serialize};
@@ -37,6 +37,8 @@ pub struct Recipe {
     /// Labelled backgrounds that are used, each a viewpoint: all, or the first ones. Default:
     /// `"all"`.
     pub viewpoints: Take,
+    /// Which part of the photo is shown. Default: all of it.
+    pub view: ViewRanges,
     /// Photos of each asset that are used: all, or the first ones. Default: `"all"`.
     pub photos: Take,
     /// Objects in a scene. Default: `[4, 12]`.
@@ -68,7 +70,7 @@ pub struct Recipe {
     /// What falls in place of a cut-out. Default: `box`.
     pub collider: Collider,
     /// Share of light that the surface reflects, where it is known: the exposure is then matched
-    /// to the surface instead of the plate's white. Default: not known.
+    /// to the surface instead of the plate's white. Default: what the background's label says.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub surface_albedo: Option<f64>,
     /// Colour of the light: `{ match_surface = { share = 0.5 } }` takes half of the surface's.
@@ -86,6 +88,7 @@ impl Default for Recipe {
             image: [640, 480],
             off: Vec::new(),
             viewpoints: Take::All,
+            view: ViewRanges::default(),
             photos: Take::All,
             objects: Range::new(4.0, 12.0),
             negatives: 0.0,
@@ -187,6 +190,7 @@ impl Recipe {
     /// Fails on the first impossible value.
     pub fn check(&self) -> Result<()> {
         check_image(self.image)?;
+        self.view.check()?;
         self.check_objects()?;
         self.check_light()?;
         self.check_surface()?;

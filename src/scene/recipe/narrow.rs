@@ -1,7 +1,7 @@
 //! A recipe with some of its sources of variation switched off.
 
 use crate::scene::{
-    EnvironmentRanges, GradeRanges, LightRanges, Recipe, Selections, Take, Variation,
+    EnvironmentRanges, GradeRanges, LightRanges, Recipe, Selections, Take, Variation, ViewRanges,
 };
 
 /// Selections of objects where they repeat (the paper's 50).
@@ -26,6 +26,7 @@ impl Recipe {
             },
             Variation::Viewpoint => Self {
                 viewpoints: Take::First(1),
+                view: ViewRanges::default(),
                 ..self
             },
             Variation::Photo => Self {
@@ -82,6 +83,7 @@ mod tests {
         let place = |name: &str| Background {
             name: name.into(),
             size: [0.6, 0.4],
+            albedo: None,
             camera,
         };
         let choice = |i| AssetVariant {

@@ -1,6 +1,6 @@
 use super::*;
 use crate::pixel::LinearRgb;
-use crate::scene::{AssetVariant, Background, CameraSource, Object, Placement};
+use crate::scene::{AssetVariant, Background, CameraSource, Exposure, Object, Placement};
 use std::collections::BTreeSet;
 use std::f64::consts::PI;
 
@@ -8,6 +8,7 @@ fn tray(name: &str) -> Background {
     Background {
         name: name.into(),
         size: [0.6, 0.4],
+        albedo: None,
         camera: CameraSource::Rectangle {
             corners_px: [[0.0, 0.0], [60.0, 0.0], [60.0, 40.0], [0.0, 40.0]],
             photo: [60, 40],
@@ -31,6 +32,32 @@ fn scene(recipe: &Recipe, k: u64) -> Scene {
     recipe
         .scene(7, k, &[tray("a"), tray("b")], &catalog(10))
         .unwrap()
+}
+
+#[test]
+fn a_surface_of_known_albedo_decides_the_exposure() {
+    let known = Background {
+        albedo: Some(0.2),
+        ..tray("a")
+    };
+    let exposure = |recipe: Recipe| {
+        let scene = recipe.scene(7, 0, &[known.clone()], &catalog(10));
+        scene.unwrap().exposure
+    };
+    let fixed = Recipe {
+        gain_ev: Range::fixed(0.0),
+        ..Recipe::default()
+    };
+    let matched = |albedo| Exposure::MatchSurface {
+        albedo,
+        gain_ev: 0.0,
+    };
+    assert_eq!(exposure(fixed.clone()), matched(0.2));
+    let own = Recipe {
+        surface_albedo: Some(0.5),
+        ..fixed
+    };
+    assert_eq!(exposure(own), matched(0.5));
 }
 
 fn names(scene: &Scene) -> Vec<(&str, usize)> {

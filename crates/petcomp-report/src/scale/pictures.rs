@@ -148,6 +148,7 @@ fn heap_scene(case: &ScaleCase) -> Scene {
         environment: None,
         exposure: Exposure::Ev(0.0),
         cast: Default::default(),
+        view: Default::default(),
         finish: Default::default(),
         files: None,
         settings: Default::default(),

@@ -134,6 +134,7 @@ pub(super) fn empty_scene(camera: Camera) -> Scene {
         environment: None,
         exposure: Exposure::Ev(0.0),
         cast: Default::default(),
+        view: Default::default(),
         finish: Default::default(),
         files: None,
         settings: Default::default(),

@@ -113,6 +113,7 @@ impl FixtureFolder {
             environment: None,
             exposure: Exposure::Ev(0.0),
             cast: Default::default(),
+            view: Default::default(),
             finish: Default::default(),
             files: None,
             settings: Default::default(),
