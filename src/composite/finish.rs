@@ -5,7 +5,7 @@ use crate::deep::DeepImage;
 use crate::filter::gaussian_blur;
 use crate::image::Image;
 use crate::pixel::{Film, LinearRgb, Mix, PremulRgba};
-use crate::scene::{Blur, Noise, PostProcess};
+use crate::scene::{Blur, CameraNoise, Noise, PostProcess};
 use crate::work::{self, Kind};
 use std::f64::consts::TAU;
 
@@ -17,7 +17,7 @@ const SHARPENING_SIGMA_PX: f32 = 1.0;
 ///
 /// Cards and shadows get the blur and the noise that a photograph of them would have: what is seen
 /// of the plate already has its own, so that a pixel far from card and shadow keeps its bits.
-/// Exposure, white balance and sharpening are the whole frame's.
+/// The camera's blur and noise, exposure, white balance and sharpening are the whole frame's.
 ///
 /// # Method
 /// What the cards send and what they and the shadows let pass is blurred, the plate is not. Noise is
@@ -34,15 +34,27 @@ pub fn finish(
         Blur::Known(sigma_px) if sigma_px > 0.0 => blur(&frame, deep, plate, sigma_px as f32),
         _ => frame,
     };
-    let noisy = match SensorNoise::new(finish) {
+    let noisy = match SensorNoise::of_cards(finish) {
         Some(noise) => noise.add_to(&frame, deep, plate),
         None => frame,
     };
-    let exposed = apply_gain(noisy, finish);
+    let exposed = apply_gain(through_camera(noisy, finish), finish);
     if finish.sharpening == 0.0 {
         return exposed;
     }
     sharpen(&exposed, finish.sharpening as f32)
+}
+
+/// The whole frame with the blur and the noise of a camera.
+fn through_camera(frame: Image<PremulRgba>, finish: &PostProcess) -> Image<PremulRgba> {
+    let soft = match finish.camera_blur_px {
+        0.0 => frame,
+        sigma_px => gaussian_blur(&frame, sigma_px as f32),
+    };
+    match SensorNoise::of_camera(finish) {
+        Some(noise) => noise.add_to_all(&soft),
+        None => soft,
+    }
 }
 
 /// The frame with cards and shadows blurred.
@@ -133,16 +145,32 @@ fn seen_plate(
 }
 
 impl SensorNoise {
-    /// None where no noise is added.
-    fn new(finish: &PostProcess) -> Option<Self> {
+    /// That of cards; none where no noise is added.
+    fn of_cards(finish: &PostProcess) -> Option<Self> {
         match finish.noise {
-            Noise::Known { shot, read } if shot > 0.0 || read > 0.0 => Some(Self {
-                shot,
-                read,
-                seed: finish.noise_seed,
-            }),
-            Noise::Known { .. } | Noise::None | Noise::MatchPlate => None,
+            Noise::Known { shot, read } => Self::new(shot, read, finish.noise_seed),
+            Noise::None | Noise::MatchPlate => None,
         }
+    }
+
+    /// That of the whole frame; none where no noise is added.
+    fn of_camera(finish: &PostProcess) -> Option<Self> {
+        let CameraNoise { shot, read } = finish.camera_noise;
+        Self::new(shot, read, split_mix(finish.noise_seed))
+    }
+
+    fn new(shot: f64, read: f64, seed: u64) -> Option<Self> {
+        (shot > 0.0 || read > 0.0).then_some(Self { shot, read, seed })
+    }
+
+    fn add_to_all(&self, frame: &Image<PremulRgba>) -> Image<PremulRgba> {
+        work::add(Kind::NoisyPixels, frame.pixels().len() as u64);
+        let nothing_known = ([0.0; 3], [0.0; 3]);
+        Image::from_fn(frame.width(), frame.height(), |x, y| {
+            let p = frame[(x, y)];
+            let index = 3 * (y * frame.width() + x) as u64;
+            with_color(p, self.noisy_color(p.color(), nothing_known, index))
+        })
     }
 
     fn add_to(
@@ -295,6 +323,45 @@ mod tests {
             mean.abs() < 4.0 * (variance / noise.len() as f64).sqrt(),
             "{mean}"
         );
+    }
+
+    #[test]
+    fn noise_of_the_camera_falls_everywhere_and_is_another_one() {
+        let camera_noise = CameraNoise {
+            shot: 0.0,
+            read: 0.01,
+        };
+        let (before, after) = finished(PostProcess {
+            camera_noise,
+            ..PostProcess::default()
+        });
+        let of =
+            |image: &Image<PremulRgba>, x| (0..64).map(|y| image[(x, y)].g).collect::<Vec<_>>();
+        let variance = (0..64).map(|x| {
+            let pairs = of(&before, x).into_iter().zip(of(&after, x));
+            pairs.map(|(b, a)| f64::from(a - b).powi(2)).sum::<f64>() / 64.0
+        });
+        // 64 values each: the standard deviation of the variance is 18 %.
+        assert!(variance.into_iter().all(|v| (v / 0.0001 - 1.0).abs() < 0.9));
+        let noise = Noise::Known {
+            shot: 0.0,
+            read: 0.01,
+        };
+        let cards = finished(PostProcess {
+            noise,
+            ..PostProcess::default()
+        });
+        assert_ne!(of(&cards.1, 50), of(&after, 50));
+    }
+
+    #[test]
+    fn blur_of_the_camera_is_of_the_whole_frame() {
+        let (before, after) = finished(PostProcess {
+            camera_blur_px: 1.5,
+            ..PostProcess::default()
+        });
+        let contrast = |image: &Image<PremulRgba>| (image[(3, 10)].g - image[(4, 10)].g).abs();
+        assert!(contrast(&after) < 0.5 * contrast(&before));
     }
 
     #[test]

@@ -82,7 +82,7 @@ pub use light::{AreaLight, Exposure, LightShape, LightTint};
 pub use locate::locate;
 pub use placement::{Grade, Object, Placement};
 #[doc(hidden)]
-pub use post_process::{Blur, PostProcessRanges, white_balance};
+pub use post_process::{Blur, CameraNoise, PostProcessRanges, white_balance};
 pub use post_process::{Noise, PostProcess};
 pub use range::Range;
 pub use recipe::{Collider, Recipe};

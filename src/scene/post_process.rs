@@ -8,8 +8,8 @@ use crate::scene::check::field;
 use crate::scene::{Draws, Range};
 use serde::{Deserialize, Serialize};
 
-/// Blur and noise of what is rendered, exposure, white balance and sharpening of the whole frame,
-/// plate included; the default leaves every bit alone.
+/// Blur and noise that what is rendered lacks, then those of a camera, exposure, white balance and
+/// sharpening of the whole frame, plate included; the default leaves every bit alone.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct PostProcess {
@@ -23,6 +23,10 @@ pub struct PostProcess {
     pub noise: Noise,
     /// Where in the noise: another number is another frame of it. Default: 0.
     pub noise_seed: u64,
+    /// Blur of the whole frame by the camera that is to look at the place, pixels. Default: 0.
+    pub camera_blur_px: f64,
+    /// Noise of the whole frame by that camera. Default: none.
+    pub camera_noise: CameraNoise,
     /// Amount of sharpening (unsharp mask of one pixel). Default: 0.
     pub sharpening: f64,
 }
@@ -35,6 +39,8 @@ impl Default for PostProcess {
             blur_px: Blur::NONE,
             noise: Noise::default(),
             noise_seed: 0,
+            camera_blur_px: 0.0,
+            camera_noise: CameraNoise::default(),
             sharpening: 0.0,
         }
     }
@@ -106,6 +112,16 @@ pub enum Noise {
     MatchPlate,
 }
 
+/// Noise of a sensor as in [`Noise::Known`], or what that is drawn from; the default is none.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct CameraNoise<T: Default = f64> {
+    /// Variance per value: photon noise. Default: 0.
+    pub shot: T,
+    /// Standard deviation in the dark. Default: 0.
+    pub read: T,
+}
+
 impl PostProcess {
     /// Whether it leaves the frame alone.
     pub fn is_identity(&self) -> bool {
@@ -115,12 +131,16 @@ impl PostProcess {
             blur_px,
             noise,
             noise_seed: _,
+            camera_blur_px,
+            camera_noise,
             sharpening,
         } = *self;
         exposure_ev == 0.0
             && white_balance == LinearRgb::WHITE
             && blur_px == Blur::NONE
             && noise == Noise::None
+            && camera_blur_px == 0.0
+            && camera_noise == CameraNoise::default()
             && sharpening == 0.0
     }
 
@@ -129,6 +149,9 @@ impl PostProcess {
         EV.check(&field(at, "exposure_ev"), self.exposure_ev)?;
         check_gains(self.white_balance, &field(at, "white_balance"))?;
         SHARPENING.check(&field(at, "sharpening"), self.sharpening)?;
+        BLUR.check(&field(at, "camera_blur_px"), self.camera_blur_px)?;
+        NOISE.check(&field(at, "camera_noise.shot"), self.camera_noise.shot)?;
+        NOISE.check(&field(at, "camera_noise.read"), self.camera_noise.read)?;
         if let Blur::Known(sigma_px) = self.blur_px {
             BLUR.check(&field(at, "blur_px"), sigma_px)?;
         }
@@ -176,6 +199,10 @@ pub struct PostProcessRanges {
     pub blur_px: Blur<Range>,
     /// Noise of rendered cards. Default: `"none"`.
     pub noise: Noise,
+    /// Blur of the whole frame, pixels. Default: 0.
+    pub camera_blur_px: Range,
+    /// Noise of the whole frame. Default: none.
+    pub camera_noise: CameraNoise<Range>,
     /// Amount of sharpening. Default: 0.
     pub sharpening: Range,
 }
@@ -190,6 +217,8 @@ impl Default for PostProcessRanges {
             white_k: Range::fixed(NEUTRAL_K),
             blur_px: Blur::Known(Range::fixed(0.0)),
             noise: Noise::None,
+            camera_blur_px: Range::fixed(0.0),
+            camera_noise: CameraNoise::default(),
             sharpening: Range::fixed(0.0),
         }
     }
@@ -203,6 +232,17 @@ impl PostProcessRanges {
             blur_px: self.draw_blur(draws),
             noise: self.noise,
             noise_seed: self.draw_noise_seed(draws),
+            camera_blur_px: self.camera_blur_px.draw(draws, "finish.camera_blur_px"),
+            camera_noise: CameraNoise {
+                shot: self
+                    .camera_noise
+                    .shot
+                    .draw(draws, "finish.camera_noise.shot"),
+                read: self
+                    .camera_noise
+                    .read
+                    .draw(draws, "finish.camera_noise.read"),
+            },
             sharpening: self.sharpening.draw(draws, "finish.sharpening"),
         }
     }
@@ -215,7 +255,7 @@ impl PostProcessRanges {
     }
 
     fn draw_noise_seed(&self, draws: &Draws) -> u64 {
-        if self.noise == Noise::None {
+        if self.noise == Noise::None && self.camera_noise == CameraNoise::default() {
             0
         } else {
             draws.bits("finish.noise") >> 11
@@ -226,6 +266,13 @@ impl PostProcessRanges {
         self.exposure_ev.check("finish.exposure_ev", &EV)?;
         self.white_k.check("finish.white_k", &KELVIN)?;
         self.sharpening.check("finish.sharpening", &SHARPENING)?;
+        self.camera_blur_px.check("finish.camera_blur_px", &BLUR)?;
+        self.camera_noise
+            .shot
+            .check("finish.camera_noise.shot", &NOISE)?;
+        self.camera_noise
+            .read
+            .check("finish.camera_noise.read", &NOISE)?;
         if let Blur::Known(sigma_px) = self.blur_px {
             sigma_px.check("finish.blur_px", &BLUR)?;
         }

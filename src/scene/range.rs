@@ -43,6 +43,13 @@ impl From<Range> for RangeInFile {
     }
 }
 
+impl Default for Range {
+    /// Always 0.
+    fn default() -> Self {
+        Self::fixed(0.0)
+    }
+}
+
 impl Range {
     /// Uniform from `min` to `max`.
     pub const fn new(min: f64, max: f64) -> Self {
