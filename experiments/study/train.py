@@ -31,6 +31,8 @@ import balanced
 PARTS = 10
 # Parts at the end without mosaics, so that the detector sees whole pictures too.
 WHOLE_PICTURE_PARTS = 2
+# Parts at the end with real pictures alone, where the arm asks for fine-tuning.
+FINE_TUNING_PARTS = 3
 # A detector is asked for everything it has, as average precision wants it.
 LEAST_CONFIDENCE = 0.001
 MOST_DETECTIONS = 100
@@ -137,12 +139,25 @@ class Streams(torch.utils.data.Sampler):
         real, synthetic = self.counts
         size = self.batch
         if self.training["mix"] == "balanced":
-            half = size // 2
-            theirs = [real + k for k in self.stream("synthetic", synthetic, number * half, half)]
-            return self.stream("real", real, number * half, half) + theirs
+            return self.balanced(number)
         if self.training["mix"] == "equation2":
             return self.single_source_batch(number)
+        if self.training["mix"] == "fine_tune":
+            return self.balanced_then_real(number)
         return self.stream("all", real + synthetic, number * size, size)
+
+    def balanced(self, number):
+        """Half of each batch from each source."""
+        real, synthetic = self.counts
+        half = self.batch // 2
+        theirs = [real + k for k in self.stream("synthetic", synthetic, number * half, half)]
+        return self.stream("real", real, number * half, half) + theirs
+
+    def balanced_then_real(self, number):
+        """Both sources, and at the end real pictures alone."""
+        if number < (PARTS - FINE_TUNING_PARTS) * len(self):
+            return self.balanced(number)
+        return self.stream("fine_tuning", self.counts[0], number * self.batch, self.batch)
 
     def single_source_batch(self, number):
         """Of each source as many batches as it has pictures, in an order of chance."""

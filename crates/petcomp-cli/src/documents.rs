@@ -28,6 +28,12 @@ impl RecipeArgs {
         Ok(DatasetConfig::read(&self.recipe, &self.overrides)?)
     }
 
+    /// Reads the recipe, one more of its values replaced.
+    pub(crate) fn read_config_with(&self, switch: &Override) -> anyhow::Result<DatasetConfig> {
+        let overrides: Vec<_> = self.overrides.iter().chain([switch]).cloned().collect();
+        Ok(DatasetConfig::read(&self.recipe, &overrides)?)
+    }
+
     /// Opens the folders that the recipe names.
     pub(crate) fn open_pipeline(&self) -> anyhow::Result<Pipeline> {
         Ok(Pipeline::open(self.read_config()?)?)

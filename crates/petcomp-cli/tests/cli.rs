@@ -302,6 +302,40 @@ fn an_unknown_key_is_met_with_the_one_that_was_meant() {
 }
 
 #[test]
+fn ablations_differ_in_the_switch_that_is_asked_for() {
+    let desk = Desk::new();
+    desk.write("recipe.toml", "[scene]\nobjects = 3\n");
+    let ablate = ["dataset", "ablate", "recipe.toml", "-n", "0", "-o"];
+    let switches = [
+        "--switch",
+        "scene.friction=0.1",
+        "--switch",
+        "scene.scale=[1, 2]",
+    ];
+    let out = desk.ok(&[&ablate[..], &["mine"], &switches[..]].concat());
+    assert_eq!(out.lines().count(), 3, "{out}");
+    let recipe =
+        |folder: &str| std::fs::read_to_string(desk.path(folder).join("recipe.toml")).unwrap();
+    let all = recipe("mine/all");
+    assert!(
+        all.contains("objects = 3") && !all.contains("friction"),
+        "{all}"
+    );
+    let slippery = recipe("mine/scene.friction=0.1");
+    assert!(
+        slippery.contains("objects = 3") && slippery.contains("friction = 0.1"),
+        "{slippery}"
+    );
+    assert!(recipe("mine/scene.scale=[1,2]").contains("scale = [1"));
+    assert_eq!(
+        desk.ok(&[&ablate[..], &["paper"]].concat()).lines().count(),
+        7
+    );
+    let wrong = [&ablate[..], &["never", "--switch", "scene.frictoin=0.1"]].concat();
+    assert!(desk.refused(&wrong).contains("did you mean \"friction\"?"));
+}
+
+#[test]
 fn an_impossible_range_is_named() {
     let desk = Desk::new();
     desk.write("recipe.toml", "[scene]\nscale = [0.0, -1.0]\n");

@@ -2,6 +2,7 @@
 //! `objects[0].grade.hue_deg=30`.
 
 use crate::error::{Error, Result};
+use std::fmt::{self, Display, Formatter};
 use std::str::FromStr;
 use toml::Value;
 
@@ -27,6 +28,12 @@ impl FromStr for Override {
         }
         let what = format!("{value}, expected a finite number");
         Err(Error::value(path, what))
+    }
+}
+
+impl Display for Override {
+    fn fmt(&self, f: &mut Formatter) -> fmt::Result {
+        write!(f, "{}={}", self.path, self.value)
     }
 }
 

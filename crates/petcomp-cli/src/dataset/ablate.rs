@@ -1,4 +1,5 @@
-//! `petcomp dataset ablate`: the paper's datasets, one source of variation switched off in each.
+//! `petcomp dataset ablate`: datasets of the same scenes that differ in one switch of the recipe,
+//! the paper's or any other.
 
 use super::{LongRunConsent, generate_supervised, print_counts};
 use crate::documents::RecipeArgs;
@@ -6,13 +7,17 @@ use crate::global::GlobalArgs;
 use crate::interruption::interruption;
 use crate::print;
 use petcomp::dataset::{DatasetConfig, Pipeline};
-use petcomp::io;
+use petcomp::io::{self, Override};
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
 pub(crate) struct AblateArgs {
     #[command(flatten)]
     recipe: RecipeArgs,
+    /// Value of the recipe that one of the datasets has, beside one with the recipe as it is; may
+    /// be repeated. By default the paper's datasets: one source of variation switched off in each
+    #[arg(long = "switch", value_name = "KEY=VALUE")]
+    switches: Vec<Override>,
     /// Number of pictures of each dataset; 0 writes the recipes only
     #[arg(short = 'n', long, value_name = "N")]
     count: u64,
@@ -27,8 +32,8 @@ pub(crate) struct AblateArgs {
 }
 
 pub(crate) fn run(args: &AblateArgs, global: &GlobalArgs) -> anyhow::Result<()> {
-    for (ablation, config) in args.recipe.read_config()?.ablations() {
-        let folder = args.output.join(ablation.name);
+    for (name, config) in args.datasets()? {
+        let folder = args.output.join(name);
         io::create_folder(&folder)?;
         let recipe = folder.join("recipe.toml");
         config.write(&recipe)?;
@@ -41,6 +46,25 @@ pub(crate) fn run(args: &AblateArgs, global: &GlobalArgs) -> anyhow::Result<()> 
 }
 
 impl AblateArgs {
+    /// Names, as of their folders, and recipes.
+    fn datasets(&self) -> anyhow::Result<Vec<(String, DatasetConfig)>> {
+        let base = self.recipe.read_config()?;
+        if self.switches.is_empty() {
+            let paper = base.ablations();
+            return Ok(paper
+                .map(|(ablation, config)| (ablation.name.into(), config))
+                .collect());
+        }
+        let switched = self.switches.iter().map(|switch| {
+            let config = self.recipe.read_config_with(switch)?;
+            Ok((folder_name(switch), config))
+        });
+        [Ok(("all".into(), base))]
+            .into_iter()
+            .chain(switched)
+            .collect()
+    }
+
     fn generate(&self, recipe: &Path, folder: &Path, global: &GlobalArgs) -> anyhow::Result<()> {
         let config = DatasetConfig::read(recipe, &[])?;
         let pipeline = Pipeline::open(config)?.stopped_by(interruption());
@@ -48,5 +72,30 @@ impl AblateArgs {
         let counts = generate_supervised(&pipeline, &plan, &self.consent, global)?;
         print_counts(&counts);
         Ok(())
+    }
+}
+
+/// The switch without what file names cannot have everywhere.
+fn folder_name(switch: &Override) -> String {
+    let text = switch.to_string().replace([' ', '"'], "");
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "._-=,[]".contains(c);
+    text.chars()
+        .map(|c| if is_plain(c) { c } else { '_' })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_is_named_for_its_switch() {
+        let name = |switch: &str| folder_name(&switch.parse().unwrap());
+        assert_eq!(name("scene.objects=[4, 12]"), "scene.objects=[4,12]");
+        assert_eq!(
+            name("scene.finish.noise=\"match_plate\""),
+            "scene.finish.noise=match_plate"
+        );
+        assert_eq!(name("assets=../b"), "assets=.._b");
     }
 }

@@ -8,7 +8,7 @@ use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 /// Command lines that are right and quick; each word with a digit in it may be changed.
-const LINES: [&str; 34] = [
+const LINES: [&str; 35] = [
     "scene draw recipe.toml -k 3 --seed 1 -o drawn.toml",
     "scene check scene.toml -j 2",
     "dataset explain recipe.toml --index 1 --seed 0",
@@ -20,6 +20,7 @@ const LINES: [&str; 34] = [
     "dataset generate recipe.toml -n 1 -o out --set scene.image=[64,48]",
     "dataset generate recipe.toml -n 1 -o out --set render.subsamples=1 --set render.cell_px=2.0",
     "dataset ablate recipe.toml -n 0 --seed 3 -o out",
+    "dataset ablate recipe.toml -n 0 --switch scene.friction=0.1 -o out",
     "dataset split dataset --ratio 0.5 --guard 0 --seed 1 --by consecutive -o out",
     "dataset split dataset --ratio 0.5 --seed 1 --by random -o out",
     "dataset subset dataset --head 0.5 -o out",
