@@ -5,18 +5,19 @@ use crate::dataset::paths::create_part_folders;
 use crate::dataset::{Entry, Writer};
 use crate::error::Result;
 use crate::io::{self, WriteOptions};
+use crate::scene::{Draws, Range};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 /// Writes `images/{train,val}/NNNNNN.png` or `.jpg`, 8-bit sRGB, on black where nothing lies behind
 /// the objects, and on request the scene-linear picture beside it as `exr/{train,val}/NNNNNN.exr`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Pictures {
     /// Format. Default: `png`.
     pub format: PictureFormat,
-    /// Quality of a `jpg`, 1 to 100. Default: 95.
-    pub jpeg_quality: u8,
+    /// Quality of a `jpg`, 1 to 100, drawn for each picture. Default: 95.
+    pub jpeg_quality: Range,
     /// Also write the scene-linear picture with its alpha. Default: no.
     pub exr: bool,
 }
@@ -26,7 +27,7 @@ impl Default for Pictures {
         let format = PictureFormat::default();
         Self {
             format,
-            jpeg_quality: WriteOptions::default().jpeg_quality,
+            jpeg_quality: Range::fixed(WriteOptions::default().jpeg_quality.into()),
             exr: false,
         }
     }
@@ -34,7 +35,8 @@ impl Default for Pictures {
 
 impl Pictures {
     pub(crate) fn check(&self) -> Result<()> {
-        Bounds::new(1.0, 100.0, "a JPEG's quality").check("jpeg_quality", self.jpeg_quality.into())
+        let bounds = Bounds::new(1.0, 100.0, "a JPEG's quality");
+        self.jpeg_quality.check_count("jpeg_quality", &bounds)
     }
 }
 
@@ -59,11 +61,18 @@ impl PictureFormat {
 }
 
 impl Pictures {
-    fn write_options(&self) -> WriteOptions {
+    fn write_options(&self, entry: &Entry<'_>) -> WriteOptions {
         WriteOptions {
-            jpeg_quality: self.jpeg_quality,
+            jpeg_quality: self.quality(entry.seed, entry.k),
             ..WriteOptions::default()
         }
+    }
+
+    /// That of a picture of a dataset.
+    fn quality(&self, seed: u64, k: u64) -> u8 {
+        let draws = Draws::new(seed, k);
+        self.jpeg_quality
+            .draw_count(&draws, "pictures.jpeg_quality") as u8
     }
 }
 
@@ -99,7 +108,7 @@ impl Pictures {
     fn write_displayed(&self, folder: &Path, entry: &Entry<'_>) -> Result<PathBuf> {
         let path = entry.path("images", self.format.extension());
         let displayed = entry.sample.frame.map(|p| p.color());
-        io::write_with(folder.join(&path), &displayed, &self.write_options())?;
+        io::write_with(folder.join(&path), &displayed, &self.write_options(entry))?;
         Ok(path)
     }
 }
@@ -108,4 +117,33 @@ fn write_exr(folder: &Path, entry: &Entry<'_>) -> Result<PathBuf> {
     let path = entry.path("exr", "exr");
     io::write(folder.join(&path), &entry.sample.frame)?;
     Ok(path)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn quality_is_drawn_for_each_picture() {
+        let pictures = Pictures {
+            jpeg_quality: Range::new(80.0, 84.0),
+            ..Pictures::default()
+        };
+        let drawn: BTreeSet<u8> = (0..100).map(|k| pictures.quality(3, k)).collect();
+        assert_eq!(drawn, BTreeSet::from([80, 81, 82, 83, 84]));
+        assert_eq!(Pictures::default().quality(3, 0), 95);
+    }
+
+    #[test]
+    fn quality_that_no_jpeg_has_is_refused() {
+        for (min, max) in [(0.0, 90.0), (90.0, 101.0), (80.5, 90.0)] {
+            let jpeg_quality = Range::new(min, max);
+            let wrong = Pictures {
+                jpeg_quality,
+                ..Pictures::default()
+            };
+            assert!(wrong.check().is_err(), "{min} {max}");
+        }
+    }
 }
