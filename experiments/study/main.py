@@ -14,11 +14,10 @@ def run(options, cache, program):
     if options.smoke and not options.write:
         shutil.rmtree(study.cache, ignore_errors=True)
     names = chosen(options, study.arms)
-    seeds = options.seeds or study.arms["training"]["seeds"]
     if not options.write:
-        studies.train_all(study, studies.trainings(study, names, seeds), options.processes)
+        studies.train_all(study, studies.trainings(study, names, options.seeds), options.processes)
     folder = study.cache / "results" if options.smoke else HERE / "results" / study.name
-    write(study, list(study.arms["arms"]), seeds, folder)
+    write(study, list(study.arms["arms"]), options.seeds, folder)
 
 
 def full(options, cache, program):

@@ -18,7 +18,7 @@ def scored(study, arms, seeds):
     """Rows of `results.csv`, and the matches by arm, seed and room, of what is trained."""
     rows, matches = [], {}
     for arm in arms:
-        for seed in range(seeds):
+        for seed in study.seeds(arm, seeds):
             if study.is_trained(arm, seed):
                 of_rooms = matches.setdefault(arm, {}).setdefault(seed, {})
                 rows += [room_row(study, arm, seed, room, of_rooms) for room in study.rooms]

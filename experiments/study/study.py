@@ -58,6 +58,16 @@ class Study:
     def classes(self, arm):
         return self.arms["arms"][arm].get("classes", self.arms["training"]["classes"])
 
+    def training(self, arm):
+        """How its detectors are trained."""
+        settings = dict(self.arms["training"])
+        short = settings.pop("short", {})
+        return settings | (short if self.arms["arms"][arm].get("short") else {})
+
+    def seeds(self, arm, count=None):
+        """Those that are asked for, or as many as the arm has."""
+        return range(count or self.training(arm)["seeds"])
+
     def folder(self, arm, seed):
         return self.cache / "runs" / arm / str(seed)
 
@@ -67,7 +77,8 @@ class Study:
 
 def trainings(study, names, seeds):
     """What is to be done, seed by seed: the first figures of all arms come before better ones."""
-    return [(arm, seed) for seed in range(seeds) for arm in names if not study.is_trained(arm, seed)]
+    all_of_them = [(seed, place, arm) for place, arm in enumerate(names) for seed in study.seeds(arm, seeds)]
+    return [(arm, seed) for seed, _, arm in sorted(all_of_them) if not study.is_trained(arm, seed)]
 
 
 def train_all(study, todo, processes):
@@ -96,7 +107,7 @@ def train(study, arm, seed, data):
 def describe(study, arm, seed):
     """All that a training depends on."""
     options = study.arms["arms"][arm]
-    settings = {key: value for key, value in study.arms["training"].items() if key != "seeds"}
+    settings = {key: value for key, value in study.training(arm).items() if key != "seeds"}
     count = study.arms["reality"]["pictures"]
     share = round(options.get("real", 0) * count)
     generator = options.get("synthetic")
