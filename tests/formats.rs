@@ -265,7 +265,7 @@ fn check_seen(folder: &Path, k: u64, min_visible: f64) -> SampleRecord {
     let path = |kind: &str, end: &str| folder.join(format!("{kind}/{part}/{k:06}.{end}"));
     let record: SampleRecord = io::read_json(path("scenes", "json")).unwrap();
     let objects = record.labels.objects.iter();
-    let seen = objects.filter(|object| object.visible_pixel_fraction >= min_visible);
+    let seen = objects.filter(|object| object.uncovered_fraction.unwrap() >= min_visible);
     let seen: Vec<_> = seen.map(|object| object.id).collect();
     assert_eq!((&record.topmost, &record.labelled), (&seen, &seen));
     let text = |kind, end| std::fs::read_to_string(path(kind, end)).unwrap();
@@ -298,7 +298,7 @@ fn every_format_labels_the_objects_that_are_seen_enough() {
             below.is_topmost(),
             is_enough,
             "{}",
-            below.visible_pixel_fraction
+            below.uncovered_fraction.unwrap()
         );
     }
 }

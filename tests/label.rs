@@ -375,10 +375,7 @@ fn masks_and_depth_are_those_of_the_card() {
             .pixels()
             .all(|(x, _)| f64::from(x) <= edge)
     );
-    assert!(
-        (below.visible_pixel_fraction - 0.5).abs() < 0.05
-            && (below.visible_fraction - 0.5).abs() < 0.02
-    );
+    assert!((below.visible_fraction - 0.5).abs() < 0.02);
     let DepthRange { near, mean, far } = below.depth;
     assert!(
         [near, mean, far]
@@ -421,7 +418,8 @@ fn a_card_of_which_enough_is_seen_is_topmost_by_visibility_alone() {
         let scene = partly_hidden(columns);
         let found = seen_at_least(&scene, 0.97);
         let below = &found.objects[0];
-        assert_eq!(below.visible_pixel_fraction, share);
+        let uncovered = below.uncovered_fraction.unwrap();
+        assert!((uncovered - share).abs() < 1e-6, "{uncovered}");
         assert_eq!(
             (below.is_topmost(), below.obstructed),
             (topmost, Some(!topmost))
@@ -434,11 +432,50 @@ fn a_card_of_which_enough_is_seen_is_topmost_by_visibility_alone() {
 }
 
 #[test]
+fn what_lies_under_glass_is_obstructed_though_it_is_seen() {
+    let mut scene = partly_hidden(5.0);
+    let glass = Image::filled(4, 4, PremulRgba::new(0.01, 0.01, 0.01, 0.2));
+    scene.cards[1].texture = glass.into();
+    let obstruction = ObstructionRule::Visibility { min_visible: 0.97 };
+    let options = LabelOptions {
+        obstruction,
+        ..LabelOptions::default()
+    };
+    let found = label(
+        &petcomp::render::render(&scene, &Default::default()),
+        &scene,
+        &options,
+    );
+    let below = &found.objects[0];
+    assert_eq!(below.visible_mask, below.amodal_mask);
+    assert!(!below.is_topmost());
+}
+
+#[test]
+fn what_two_lie_over_counts_once() {
+    let over = |id, x| card(id, [x, 0.0, 0.2], [0.0; 3], [0.1, 0.1], &WHOLE);
+    let under = card(1, [0.0; 3], [0.0; 3], [0.4; 2], &WHOLE);
+    let share = |above: [Card; 2]| {
+        let scene = shot([vec![under.clone()], above.into()].concat());
+        let found = seen_at_least(&scene, 0.5);
+        found.objects[0].uncovered_fraction.unwrap()
+    };
+    let (twice, apart) = (
+        share([over(2, 0.0), over(3, 0.0)]),
+        share([over(2, -0.07), over(3, 0.07)]),
+    );
+    assert!(
+        (1.0 - apart - 2.0 * (1.0 - twice)).abs() < 1e-6,
+        "{twice} {apart}"
+    );
+}
+
+#[test]
 fn the_least_visible_share_itself_is_enough() {
     let scene = partly_hidden(1.0);
     let is_topmost = |share: f64| seen_at_least(&scene, share).objects[0].is_topmost();
-    assert!(is_topmost(0.0) && is_topmost(0.98));
-    assert!(!is_topmost(0.98_f64.next_up()) && !is_topmost(1.0));
+    assert!(is_topmost(0.0) && is_topmost(0.98 - 1e-6));
+    assert!(!is_topmost(0.98 + 1e-6) && !is_topmost(1.0));
     assert!(seen_at_least(&scene, 1.0).objects[1].is_topmost());
 }
 
@@ -448,6 +485,7 @@ fn the_rules_of_obstruction_differ_in_what_they_decide_alone() {
     let mut by_visibility = seen_at_least(&scene, 0.97);
     for object in &mut by_visibility.objects {
         object.obstructed = None;
+        object.uncovered_fraction = None;
     }
     assert_eq!(by_visibility, labels(&scene, &LabelOptions::default()));
     let told = serde_json::to_string(&by_visibility).unwrap();
@@ -558,5 +596,5 @@ fn film_seen_through_film_counts_as_seen() {
             y1: 2.0
         }
     );
-    assert_eq!(found.objects[1].visible_pixel_fraction, 1.0);
+    assert_eq!(found.objects[1].visible_mask, found.objects[1].amodal_mask);
 }

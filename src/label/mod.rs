@@ -88,13 +88,15 @@ pub struct ObjectLabel {
     pub visible_mask: RleMask,
     /// Seen share of its coverage, 0 to 1: what half covers a pixel counts half.
     pub visible_fraction: f64,
-    /// Pixels of the visible mask over pixels of the amodal one, 0 to 1.
-    pub visible_pixel_fraction: f64,
     /// How far away it is.
     pub depth: DepthRange,
     /// Objects that lie over it, by their outlines, in order of id.
     pub covered_by: Vec<ObjectId>,
-    /// Whether too little of it is seen, by [`ObstructionRule::Visibility`]; none by
+    /// Share of its outline that no other one lies over, 0 to 1; none by
+    /// [`ObstructionRule::Overlap`], which does not ask.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub uncovered_fraction: Option<f64>,
+    /// Whether that is too little, by [`ObstructionRule::Visibility`]; none by
     /// [`ObstructionRule::Overlap`], where `covered_by` tells.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub obstructed: Option<bool>,
@@ -169,12 +171,28 @@ pub fn label(deep: &DeepImage, shot: &Shot, options: &LabelOptions) -> Labels {
     let mut objects = silhouettes(deep, shot, options);
     objects.retain(|s| !s.amodal_box(options.amodal).is_empty());
     let occluders = topmost::occluders(&objects, &shot.camera, options.obstruction.pair_iou());
-    let pairs = objects.into_iter().zip(occluders);
-    let labels = pairs.map(|(object, covered_by)| object.into_label(options, covered_by));
+    let uncovered: Vec<_> =
+        uncovered_fractions(&objects, &occluders, options.obstruction).collect();
+    let pairs = objects.into_iter().zip(occluders).zip(uncovered);
+    let labels = pairs
+        .map(|((object, covered_by), uncovered)| object.into_label(options, covered_by, uncovered));
     Labels {
         image,
         objects: labels.collect(),
     }
+}
+
+/// How much of each object no other one lies over, where the rule asks for it.
+fn uncovered_fractions(
+    objects: &[Silhouette<'_>],
+    occluders: &[Vec<ObjectId>],
+    rule: ObstructionRule,
+) -> impl Iterator<Item = Option<f64>> {
+    let pairs = objects.iter().zip(occluders);
+    pairs.map(move |(object, over)| {
+        rule.asks_for_share()
+            .then(|| topmost::uncovered_fraction(object, over, objects))
+    })
 }
 
 fn check_size(deep: &DeepImage, [width, height]: [u32; 2]) {
@@ -222,10 +240,14 @@ impl<'a> Silhouette<'a> {
         }
     }
 
-    fn into_label(self, options: &LabelOptions, covered_by: Vec<ObjectId>) -> ObjectLabel {
+    fn into_label(
+        self,
+        options: &LabelOptions,
+        covered_by: Vec<ObjectId>,
+        uncovered_fraction: Option<f64>,
+    ) -> ObjectLabel {
         let amodal_box = self.amodal_box(options.amodal);
         let seen = self.visibility;
-        let visible_pixel_fraction = area_fraction(&seen.visible, &seen.amodal);
         ObjectLabel {
             id: self.card.id,
             class: self.card.class,
@@ -233,18 +255,13 @@ impl<'a> Silhouette<'a> {
             amodal_box,
             visible_box: seen.visible.bounds(),
             visible_fraction: seen.fraction,
-            visible_pixel_fraction,
             amodal_mask: seen.amodal,
             visible_mask: seen.visible,
             depth: seen.depth,
             covered_by,
-            obstructed: options.obstruction.is_obstructed(visible_pixel_fraction),
+            uncovered_fraction,
+            obstructed: uncovered_fraction
+                .and_then(|share| options.obstruction.is_obstructed(share)),
         }
     }
-}
-
-/// Pixels of a mask over those of another one; 0 where that is empty.
-fn area_fraction(part: &RleMask, whole: &RleMask) -> f64 {
-    let [part, whole] = [part, whole].map(|mask| mask.area() as f64);
-    if whole > 0.0 { part / whole } else { 0.0 }
 }

@@ -15,10 +15,10 @@ pub enum ObstructionRule {
         /// Outlines are a pair when their intersection over union is above this, 0 to 1.
         overlap_iou: f64,
     },
-    /// Less than a share of it is seen, whatever lies over it.
+    /// Others lie over more than a share of it.
     Visibility {
-        /// Least share of its amodal pixels in which it is seen, 0 to 1. At 1 one hidden pixel
-        /// obstructs it; an object without a pixel has the share 0.
+        /// Least share of its outline that no other one lies over, see-through or not, 0 to 1; an
+        /// object seen edge-on has the share 0.
         min_visible: f64,
     },
 }
@@ -59,13 +59,17 @@ impl ObstructionRule {
         }
     }
 
-    /// Whether an object of this visible share is obstructed; none where overlaps decide.
-    ///
-    /// Takes the quotient of two counts, so that 97 of 100 pixels are not less than 0.97.
-    pub(crate) fn is_obstructed(self, visible_pixel_fraction: f64) -> Option<bool> {
+    /// It is a share of an object that decides.
+    pub(crate) fn asks_for_share(self) -> bool {
+        matches!(self, Self::Visibility { .. })
+    }
+
+    /// Whether an object of which this share is not covered is obstructed; none where overlaps
+    /// decide.
+    pub(crate) fn is_obstructed(self, uncovered_fraction: f64) -> Option<bool> {
         match self {
             Self::Overlap { .. } => None,
-            Self::Visibility { min_visible } => Some(visible_pixel_fraction < min_visible),
+            Self::Visibility { min_visible } => Some(uncovered_fraction < min_visible),
         }
     }
 }

@@ -14,7 +14,7 @@ use crate::label::outline::{bounds, overlap};
 use crate::label::{ObjectLabel, Silhouette};
 use crate::pixel::ObjectId;
 use crate::scene::Card;
-use geo::{Area, Centroid, MultiPolygon};
+use geo::{Area, BooleanOps, Centroid, MultiPolygon};
 use std::collections::BTreeSet;
 
 /// For each object, the ids of those that lie over it, in order of id.
@@ -38,6 +38,27 @@ pub(crate) fn occluders(
         }
     }
     occluders
+}
+
+/// Share of an object's outline that none of those `over` it covers, in the picture; 0 where it has
+/// no area.
+///
+/// Outlines cover whatever lies under them, see-through objects too: what is under one cannot be
+/// picked.
+pub(crate) fn uncovered_fraction(
+    object: &Silhouette<'_>,
+    over: &[ObjectId],
+    objects: &[Silhouette<'_>],
+) -> f64 {
+    let whole = object.region.unsigned_area();
+    if whole == 0.0 {
+        return 0.0;
+    }
+    let covering = objects.iter().filter(|other| over.contains(&other.card.id));
+    let free = covering.fold(object.region.clone(), |free, other| {
+        free.difference(&other.region)
+    });
+    free.unsigned_area() / whole
 }
 
 /// None where the two do not overlap enough.

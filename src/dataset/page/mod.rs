@@ -245,7 +245,9 @@ fn obstruction_note(identity: &serde_json::Value) -> String {
     let policy = identity["obstructed"].as_str().unwrap_or("drop");
     let obstructed = match &identity["recipe"]["label"]["min_visible"] {
         serde_json::Value::Number(share) => {
-            format!("objects that are seen in less than min_visible = {share} of their pixels")
+            format!(
+                "objects over whose outlines others lie, but for less than min_visible = {share} of them"
+            )
         }
         _ => "objects that others lie over, by the topmost rule, however little of them is hidden"
             .to_owned(),
