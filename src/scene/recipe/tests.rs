@@ -41,7 +41,7 @@ fn a_surface_of_known_albedo_decides_the_exposure() {
         ..tray("a")
     };
     let exposure = |recipe: Recipe| {
-        let scene = recipe.scene(7, 0, &[known.clone()], &catalog(10));
+        let scene = recipe.scene(7, 0, std::slice::from_ref(&known), &catalog(10));
         scene.unwrap().exposure
     };
     let fixed = Recipe {
