@@ -47,6 +47,14 @@ pub enum SolveError {
         /// What it was.
         value: f64,
     },
+    /// A share is not one.
+    #[error("{at}: {value}, expected a share of more than 0 and at most 1")]
+    NotShare {
+        /// Which value.
+        at: &'static str,
+        /// What it was.
+        value: f64,
+    },
     /// Two corners coincide.
     #[error(
         "surface.corners_px: corners {first} and {second} are {distance_px:.1} px apart, expected at least {limit_px:.1}"

@@ -26,6 +26,7 @@ fn check_surface(surface: &LabelSurface) -> Result<(), SolveError> {
         check_finite("surface.corners_px", corners.as_flattened())?;
     }
     check_positive("surface.corner_sigma_px", surface.corner_sigma_px)?;
+    check_share("surface.albedo", surface.albedo)?;
     check_not_negative("surface.dimension_sigma_m", surface.dimension_sigma_m)
 }
 
@@ -65,6 +66,13 @@ fn check_positive(at: &'static str, value: Option<f64>) -> Result<(), SolveError
     }
 }
 
+fn check_share(at: &'static str, value: Option<f64>) -> Result<(), SolveError> {
+    match value {
+        Some(value) if !(value > 0.0 && value <= 1.0) => Err(SolveError::NotShare { at, value }),
+        _ => Ok(()),
+    }
+}
+
 /// Finite, and small enough for squares and products of a few of them.
 fn check_finite(at: &'static str, values: &[f64]) -> Result<(), SolveError> {
     values.iter().try_for_each(|&value| match value.abs() {
@@ -86,5 +94,26 @@ fn out_of_range(at: &'static str, value: f64) -> SolveError {
         at,
         value,
         most: MAX_MAGNITUDE,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::Scenario;
+
+    fn refusal_of(albedo: f64) -> String {
+        let mut label = Scenario::default().view(1, 0).label;
+        label.surface.albedo = Some(albedo);
+        check_label(&label).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_surface_reflects_some_of_the_light_and_at_most_all() {
+        for impossible in [-0.5, 0.0, 1.5] {
+            let refusal = refusal_of(impossible);
+            assert!(refusal.contains("surface.albedo"), "{refusal}");
+            assert!(refusal.contains(&impossible.to_string()), "{refusal}");
+        }
     }
 }
