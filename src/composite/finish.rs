@@ -35,7 +35,7 @@ pub fn finish(
         _ => frame,
     };
     let noisy = match SensorNoise::of_cards(finish) {
-        Some(noise) => noise.add_to(&frame, deep, plate),
+        Some(noise) => noise.add_to(&frame, |at, p| seen_plate(deep, plate, at, p)),
         None => frame,
     };
     let exposed = apply_gain(through_camera(noisy, finish), finish);
@@ -52,7 +52,7 @@ fn through_camera(frame: Image<PremulRgba>, finish: &PostProcess) -> Image<Premu
         sigma_px => gaussian_blur(&frame, sigma_px as f32),
     };
     match SensorNoise::of_camera(finish) {
-        Some(noise) => noise.add_to_all(&soft),
+        Some(noise) => noise.add_to(&soft, |_, _| NO_PLATE),
         None => soft,
     }
 }
@@ -127,6 +127,9 @@ struct ExposedValue {
     plate: f32,
 }
 
+/// What [`seen_plate`] is where all noise is still to come.
+const NO_PLATE: ([f32; 3], [f32; 3]) = ([0.0; 3], [0.0; 3]);
+
 /// Factor on the plate at a pixel, and the plate; black where there is none.
 #[inline(always)]
 fn seen_plate(
@@ -163,28 +166,18 @@ impl SensorNoise {
         (shot > 0.0 || read > 0.0).then_some(Self { shot, read, seed })
     }
 
-    fn add_to_all(&self, frame: &Image<PremulRgba>) -> Image<PremulRgba> {
-        work::add(Kind::NoisyPixels, frame.pixels().len() as u64);
-        let nothing_known = ([0.0; 3], [0.0; 3]);
-        Image::from_fn(frame.width(), frame.height(), |x, y| {
-            let p = frame[(x, y)];
-            let index = 3 * (y * frame.width() + x) as u64;
-            with_color(p, self.noisy_color(p.color(), nothing_known, index))
-        })
-    }
-
+    /// To a frame of which `seen` says, of a pixel, the factor on a plate that has this noise
+    /// already, and that plate.
     fn add_to(
         &self,
         frame: &Image<PremulRgba>,
-        deep: &DeepImage,
-        plate: Option<&Image<LinearRgb>>,
+        seen: impl Fn((usize, usize), PremulRgba) -> ([f32; 3], [f32; 3]) + Sync,
     ) -> Image<PremulRgba> {
         work::add(Kind::NoisyPixels, frame.pixels().len() as u64);
         Image::from_fn(frame.width(), frame.height(), |x, y| {
             let p = frame[(x, y)];
-            let seen = seen_plate(deep, plate, (x, y), p);
             let index = 3 * (y * frame.width() + x) as u64;
-            with_color(p, self.noisy_color(p.color(), seen, index))
+            with_color(p, self.noisy_color(p.color(), seen((x, y), p), index))
         })
     }
 

@@ -3,7 +3,7 @@
 use crate::filter::gaussian_blur;
 use crate::geom::Vector2;
 use crate::image::Image;
-use crate::light::value_of_rank;
+use crate::light::{inner_pixels, value_of_rank};
 use crate::pixel::LinearRgb;
 use crate::scene::{Blur, Scene};
 
@@ -45,10 +45,10 @@ pub(crate) fn match_blur(mut scene: Scene, plate: &Image<LinearRgb>) -> Scene {
 /// things have soft edges of their own.
 pub fn plate_blur(plate: &Image<LinearRgb>) -> Blur {
     let green = plate.map(|p| p.g);
-    let (sharp, soft) = (Slopes(&green), &gaussian_blur(&green, ADDED_SIGMA_PX));
-    let sigmas: Vec<f32> = sharp
+    let soft = gaussian_blur(&green, ADDED_SIGMA_PX);
+    let sigmas: Vec<f32> = Slopes(&green)
         .edges()
-        .filter_map(|edge| sigma_at(edge, &Slopes(soft)))
+        .filter_map(|edge| sigma_at(edge, &Slopes(&soft)))
         .collect();
     if sigmas.len() < MIN_EDGES {
         return Blur::NONE;
@@ -97,22 +97,13 @@ impl Slopes<'_> {
 
     /// Pixels around which an edge can be seen whole.
     fn inner_pixels(&self) -> impl Iterator<Item = (usize, usize)> + use<> {
-        let margin = CLEAR_PX as usize + 1;
-        let (width, height) = self.0.size();
-        let (right, bottom) = (width.saturating_sub(margin), height.saturating_sub(margin));
-        (margin..bottom).flat_map(move |y| (margin..right).map(move |x| (x, y)))
+        inner_pixels(self.0.size(), CLEAR_PX as usize + 1)
     }
 
     /// The slope that few pixels have; infinite where there are none.
     fn steep(&self) -> f32 {
-        let slopes: Vec<f32> = self
-            .inner_pixels()
-            .map(|(x, y)| self.at(x, y).norm())
-            .collect();
-        let finite: Vec<f32> = slopes
-            .into_iter()
-            .filter(|slope| slope.is_finite())
-            .collect();
+        let slopes = self.inner_pixels().map(|(x, y)| self.at(x, y).norm());
+        let finite: Vec<f32> = slopes.filter(|slope| slope.is_finite()).collect();
         if finite.is_empty() {
             return f32::INFINITY;
         }

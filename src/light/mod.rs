@@ -67,3 +67,12 @@ pub(crate) use surface::surface_color;
 fn value_of_rank(mut values: Vec<f32>, rank: usize) -> f32 {
     *values.select_nth_unstable_by(rank, f32::total_cmp).1
 }
+
+/// The pixels that are at least `margin` away from every border, row by row.
+fn inner_pixels(
+    (width, height): (usize, usize),
+    margin: usize,
+) -> impl Iterator<Item = (usize, usize)> {
+    let (right, bottom) = (width.saturating_sub(margin), height.saturating_sub(margin));
+    (margin..bottom).flat_map(move |y| (margin..right).map(move |x| (x, y)))
+}

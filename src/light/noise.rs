@@ -2,7 +2,7 @@
 
 use crate::filter::halve;
 use crate::image::Image;
-use crate::light::value_of_rank;
+use crate::light::{inner_pixels, value_of_rank};
 use crate::pixel::LinearRgb;
 use crate::scene::{Noise, Scene};
 
@@ -37,7 +37,8 @@ pub(crate) fn match_noise(mut scene: Scene, plate: &Image<LinearRgb>) -> Scene {
 /// The noise of a photograph, from its green channel: [`Noise::None`] for one that is too small.
 ///
 /// JPEG and the denoising of phones take away the finest noise, and a photo at 94 % quality shows
-/// a third of it between neighbours, but 0.7 of it between pairs of pixels: the larger figure counts.
+/// a third of it between neighbours, but 0.7 of it between pairs of pixels: where those show clearly
+/// more, they count.
 ///
 /// # Method
 /// The residual of the difference of two Laplacians, which passes over slopes and straight edges
@@ -81,15 +82,9 @@ fn noise_between_pixels(plate: &Image<LinearRgb>) -> Noise {
 
 /// The residuals around all pixels but the outermost.
 fn residuals_of(plate: &Image<LinearRgb>) -> Vec<(f32, f32)> {
-    inner_pixels(plate.size())
+    inner_pixels(plate.size(), 1)
         .filter_map(|(x, y)| residual_at(plate, x, y))
         .collect()
-}
-
-/// Those that have eight neighbours, row by row.
-fn inner_pixels((width, height): (usize, usize)) -> impl Iterator<Item = (usize, usize)> {
-    (1..height.saturating_sub(1))
-        .flat_map(move |y| (1..width.saturating_sub(1)).map(move |x| (x, y)))
 }
 
 /// Mean and magnitude of the residual around a pixel; none near white or where something is not

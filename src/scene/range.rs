@@ -73,6 +73,12 @@ impl Range {
         value
     }
 
+    /// Whether something happens that happens in this share of the cases; nothing is drawn where it
+    /// never does.
+    pub(super) fn chance(share: f64, draws: &Draws, path: &str) -> bool {
+        share > 0.0 && Self::new(0.0, 1.0).draw(draws, path) < share
+    }
+
     /// The value of a field at a path.
     pub(super) fn draw_field(&self, draws: &Draws, path: &str, field: &str) -> f64 {
         self.draw(draws, &format!("{path}.{field}"))

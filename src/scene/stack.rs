@@ -159,8 +159,11 @@ impl DropColumn<'_> {
 
     /// Half a turn about its width for what starts face down.
     fn draw_side(&self, path: &str) -> UnitQuaternion<f64> {
-        let share = self.start.face_down;
-        if share > 0.0 && self.draw(&Range::new(0.0, 1.0), path, "face_down") < share {
+        if Range::chance(
+            self.start.face_down,
+            self.draws,
+            &format!("{path}.face_down"),
+        ) {
             UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI)
         } else {
             UnitQuaternion::identity()

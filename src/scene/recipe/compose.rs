@@ -85,7 +85,7 @@ impl Recipe {
 
     /// Whether the scene stays empty.
     fn draw_negative(&self, draws: &Draws) -> bool {
-        self.negatives > 0.0 && Range::new(0.0, 1.0).draw(draws, "negative") < self.negatives
+        Range::chance(self.negatives, draws, "negative")
     }
 
     fn draw_surface(&self, draws: &Draws, size: [f64; 2]) -> Surface {
