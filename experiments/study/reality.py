@@ -4,13 +4,19 @@ import json
 import random
 import shutil
 
+import cv2
+import numpy as np
+
 from . import files
 
 SIZE = (480, 360)
 # How well a person clicks on a corner, pixels.
 CLICK_SIGMA_PX = 1.0
-# How well a person measures the reflectance of a surface beside a sheet of white paper, as a share of it.
-ALBEDO_SIGMA = 0.1
+# Share of light that white paper reflects, as docs/label.md tells users.
+PAPER_ALBEDO = 0.8
+LUMINANCE = (0.2126, 0.7152, 0.0722)
+# Ten pixels on either side of an edge.
+EDGE = np.ones((21, 21), np.uint8)
 # How well a person measures the thickness of a crumpled thing, metres.
 THICKNESS_STEP = 0.005
 
@@ -60,19 +66,20 @@ def entry(world, index, photo, has_thickness):
     )
 
 
-def backgrounds(world, rooms, has_albedo, folder):
-    """Photos of the empty trays, with four corners that a person clicked on."""
+def backgrounds(world, rooms, measured, folder):
+    """Photos of the empty trays, with four corners that a person clicked on, and what else was `measured`."""
     for room in rooms:
+        albedo = measured_albedo(world, room, measured)
         for path in sorted((world / f"room{room}/backgrounds").glob("*.json")):
             photo = json.loads(path.read_text())
             name = f"room{room}_{photo['name']}"
             folder.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(path.with_suffix(".jpg"), folder / f"{name}.jpg")
-            files.write_json(folder / f"{name}.label.json", plane_label(photo, name, room, has_albedo))
+            files.write_json(folder / f"{name}.label.json", plane_label(photo, name, room, albedo))
     return folder
 
 
-def plane_label(photo, name, room, has_albedo):
+def plane_label(photo, name, room, albedo):
     rng = random.Random(name)
     camera, tray = photo["camera"], photo["tray"]
     corners = [[round(v + rng.gauss(0, CLICK_SIGMA_PX), 1) for v in corner] for corner in tray["corners_px"]]
@@ -85,15 +92,44 @@ def plane_label(photo, name, room, has_albedo):
             "width_m": tray["floor_m"][0],
             "height_m": tray["floor_m"][1],
             "corners_px": corners,
-            **measured_albedo(tray, room, has_albedo),
+            **albedo,
         },
         # As EXIF tells it: a whole number of millimetres.
         "camera": {"id": name, "focal_35mm": round(camera["fx"] / camera["width"] * 36)},
     }
 
 
-def measured_albedo(tray, room, has_albedo):
-    """Of each place once."""
-    if not has_albedo:
+def measured_albedo(world, room, measured):
+    """Of each place once, in a photo with a sheet of white paper: its luminance, or its colour."""
+    if not measured:
         return {}
-    return {"albedo": round(tray["albedo"] * (1 + random.Random(room).gauss(0, ALBEDO_SIGMA)), 3)}
+    path = world / f"room{room}/paper/backgrounds/bg0000.json"
+    photo = json.loads(path.read_text())
+    linear = linear_picture(path.with_suffix(".jpg"))
+    is_paper = inside(photo["paper_px"], linear.shape)
+    is_surface = inside(photo["tray"]["corners_px"], linear.shape) & ~is_paper
+    # The sheet's edge belongs to neither.
+    is_surface &= ~dilated(is_paper)
+    surface, paper = (np.median(linear[where], axis=0) for where in (is_surface, eroded(is_paper)))
+    if measured == "luminance":
+        return {"albedo": round(PAPER_ALBEDO * float(surface @ LUMINANCE / (paper @ LUMINANCE)), 3)}
+    return {"albedo": [round(PAPER_ALBEDO * float(ratio), 3) for ratio in surface / paper]}
+
+
+def linear_picture(path):
+    """Scene-linear red, green and blue."""
+    display = cv2.imread(str(path))[..., ::-1] / 255
+    return np.where(display <= 0.04045, display / 12.92, ((display + 0.055) / 1.055) ** 2.4)
+
+
+def inside(corners, shape):
+    mask = np.zeros(shape[:2], np.uint8)
+    return cv2.fillConvexPoly(mask, np.round(corners).astype(np.int32), 1) > 0
+
+
+def dilated(mask):
+    return cv2.dilate(mask.astype(np.uint8), EDGE) > 0
+
+
+def eroded(mask):
+    return cv2.erode(mask.astype(np.uint8), EDGE) > 0

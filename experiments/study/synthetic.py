@@ -11,7 +11,7 @@ def pictures(study, name):
     folder = study.cache / "synthetic" / name
     count = generator.get("pictures", study.arms["synthetic"]["pictures"])
     assets = build_assets(study, generator.get("cut_out", {}), generator.get("thickness", False))
-    backgrounds = study.backgrounds or place_photos(study, generator.get("albedo", False))
+    backgrounds = study.backgrounds or place_photos(study, generator.get("albedo", ""))
     if generator.get("program") == "naive":
         naive.generate(assets, backgrounds, count, study.arms["synthetic"]["seed"], folder)
     else:
@@ -31,9 +31,9 @@ def described(generators, name):
     return base | own | {"set": base.get("set", []) + own.get("set", [])}
 
 
-def place_photos(study, has_albedo):
-    folder = study.cache / ("backgrounds_albedo" if has_albedo else "backgrounds")
-    return reality.backgrounds(study.world, study.rooms, has_albedo, folder)
+def place_photos(study, albedo):
+    folder = study.cache / "_".join(["backgrounds", *([albedo] if albedo else [])])
+    return reality.backgrounds(study.world, study.rooms, albedo, folder)
 
 
 def build_assets(study, cut_out, has_thickness):

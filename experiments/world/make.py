@@ -79,12 +79,16 @@ def photos(options):
 
 
 def backgrounds(options):
+    """Photos of the empty trays, and of each one with a sheet of white paper in it."""
     for room in options.rooms:
         out = options.out / f"room{room}"
         command = ["backgrounds", "--room-seed", room, "--tray", TRAYS[room], "--format", "jpg", "--spp", 8]
         for index in range(options.backgrounds):
             done = out / "backgrounds" / f"bg{index:04d}.json"
             yield {"out": out, "command": command, "index": index, "done": done}
+        beside_paper = [*command, "--paper", "--lights", "ambient"]
+        done = out / "paper" / "backgrounds" / "bg0000.json"
+        yield {"out": out / "paper", "command": beside_paper, "index": 0, "done": done}
 
 
 def pile(options, name, room, index):

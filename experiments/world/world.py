@@ -90,6 +90,8 @@ def parser():
     g.add_argument("--views", default="fronto,above,tilted", help="comma list of fronto, above, tilted, extreme; taken in turn")
     g.add_argument("--lights", default="bright,dim,ambient", help="comma list of bright, dim, ambient; taken in turn")
 
+    g.add_argument("--paper", action="store_true", help="with a sheet of white paper in the tray")
+
     l = common("piles", "bottles piled in the tray, with detection ground truth")
     library(l)
     tray(l)

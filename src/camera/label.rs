@@ -1,5 +1,6 @@
 //! Label files: the corners of a surface in a photo, as a person labelled them (`NAME.label.json`).
 
+use crate::color::Albedo;
 use crate::geom::{Point2, Vector2};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -128,9 +129,9 @@ pub struct LabelSurface {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub source: Option<String>,
     /// Share of the light that the surface reflects: 0.04 for black plastic, 0.2 for mid grey, 0.8
-    /// for white paper.
+    /// for white paper; or its colour, which tells that of the light too.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub albedo: Option<f64>,
+    pub albedo: Option<Albedo>,
 }
 
 /// What is known of the camera of a label.

@@ -2,6 +2,7 @@
 
 use super::error::SolveError;
 use super::label::{Label, LabelCamera, LabelPoint, LabelSurface};
+use crate::color::Albedo;
 
 /// No meaningful label holds larger numbers, or positive ones smaller than one over this.
 pub(crate) const MAX_MAGNITUDE: f64 = 1e9;
@@ -26,7 +27,7 @@ fn check_surface(surface: &LabelSurface) -> Result<(), SolveError> {
         check_finite("surface.corners_px", corners.as_flattened())?;
     }
     check_positive("surface.corner_sigma_px", surface.corner_sigma_px)?;
-    check_share("surface.albedo", surface.albedo)?;
+    check_albedo("surface.albedo", surface.albedo)?;
     check_not_negative("surface.dimension_sigma_m", surface.dimension_sigma_m)
 }
 
@@ -66,10 +67,11 @@ fn check_positive(at: &'static str, value: Option<f64>) -> Result<(), SolveError
     }
 }
 
-fn check_share(at: &'static str, value: Option<f64>) -> Result<(), SolveError> {
-    match value {
-        Some(value) if !(value > 0.0 && value <= 1.0) => Err(SolveError::NotShare { at, value }),
-        _ => Ok(()),
+fn check_albedo(at: &'static str, albedo: Option<Albedo>) -> Result<(), SolveError> {
+    let mut shares = albedo.iter().flat_map(Albedo::range);
+    match shares.find(|share| !(*share > 0.0 && *share <= 1.0)) {
+        Some(value) => Err(SolveError::NotShare { at, value }),
+        None => Ok(()),
     }
 }
 
@@ -100,9 +102,10 @@ fn out_of_range(at: &'static str, value: f64) -> SolveError {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::Scenario;
+    use crate::camera::simulate::Scenario;
+    use crate::pixel::LinearRgb;
 
-    fn refusal_of(albedo: f64) -> String {
+    fn refusal_of(albedo: Albedo) -> String {
         let mut label = Scenario::default().view(1, 0).label;
         label.surface.albedo = Some(albedo);
         check_label(&label).unwrap_err().to_string()
@@ -111,9 +114,12 @@ mod tests {
     #[test]
     fn a_surface_reflects_some_of_the_light_and_at_most_all() {
         for impossible in [-0.5, 0.0, 1.5] {
-            let refusal = refusal_of(impossible);
-            assert!(refusal.contains("surface.albedo"), "{refusal}");
-            assert!(refusal.contains(&impossible.to_string()), "{refusal}");
+            let color = LinearRgb::new(0.5, impossible as f32, 0.5);
+            for albedo in [Albedo::Luminance(impossible), Albedo::Color(color)] {
+                let refusal = refusal_of(albedo);
+                assert!(refusal.contains("surface.albedo"), "{refusal}");
+                assert!(refusal.contains(&impossible.to_string()), "{refusal}");
+            }
         }
     }
 }

@@ -8,6 +8,7 @@
 //! system's own `powf`: the same input gives the same bytes on every machine. Matrices are derived
 //! in `f64` from primaries and white points and stored as `f32`.
 
+mod albedo;
 mod hsv;
 mod quantize;
 mod space;
@@ -15,6 +16,8 @@ mod temperature;
 mod transfer;
 mod ycbcr;
 
+#[doc(hidden)]
+pub use albedo::Albedo;
 #[doc(hidden)]
 pub use hsv::{Hsv, hsv_to_rgb, rgb_to_hsv, shift_hsv};
 #[doc(hidden)]

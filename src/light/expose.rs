@@ -1,5 +1,6 @@
 //! The exposure that puts rendered light and a photographed plate on one scale.
 
+use crate::color::Albedo;
 use crate::geom::{Point3, Vector3};
 use crate::image::Image;
 use crate::light::{
@@ -39,7 +40,7 @@ pub fn expose(scene: Scene, plate: &Image<LinearRgb>) -> Scene {
         Exposure::Ev(_) => return scene,
         Exposure::MatchPlate { gain_ev } => (f64::from(plate_white(plate)), gain_ev),
         Exposure::MatchSurface { albedo, gain_ev } => {
-            (surface_luminance(&scene, plate) / albedo, gain_ev)
+            (luminance_of_white(&scene, plate, albedo), gain_ev)
         }
     };
     let match_ev = stops_of(wanted / f64::from(white_card(&scene)));
@@ -49,10 +50,10 @@ pub fn expose(scene: Scene, plate: &Image<LinearRgb>) -> Scene {
     }
 }
 
-/// Luminance of the surface in the plate; 0 where it is not seen.
-fn surface_luminance(scene: &Scene, plate: &Image<LinearRgb>) -> f64 {
+/// Luminance of white paper beside the surface in the plate; 0 where that is not seen.
+fn luminance_of_white(scene: &Scene, plate: &Image<LinearRgb>, albedo: Albedo) -> f64 {
     let surface = surface_color(scene, plate).unwrap_or_default();
-    f64::from(surface.luminance())
+    f64::from(albedo.white_beside(surface).luminance())
 }
 
 /// A ratio of luminances in stops; 0 for one that cannot be.
@@ -155,7 +156,7 @@ mod tests {
     fn a_card_as_grey_as_the_surface_gets_the_surface_s_brightness() {
         let plate = Image::filled(40, 30, LinearRgb::grey(0.3));
         let exposure = Exposure::MatchSurface {
-            albedo: 0.5,
+            albedo: Albedo::Luminance(0.5),
             gain_ev: 0.0,
         };
         let scene = Scene {

@@ -1,6 +1,7 @@
 //! The colour of the light on the labelled surface, from the plate.
 
 use crate::camera::Camera;
+use crate::color::Albedo;
 use crate::geom::{Plane, Point2, Point3};
 use crate::image::Image;
 use crate::light::value_of_rank;
@@ -53,15 +54,15 @@ fn median_of(colors: &[LinearRgb], channel: fn(&LinearRgb) -> f32) -> f32 {
 /// Turns [`LightTint::MatchSurface`] into the colour of the surface's light; any other scene comes
 /// back as it is.
 ///
-/// The surface is assumed to be grey: its colour is then that of the light on it. A share below 1
-/// takes only a part of that, since trays and tables may have a colour of their own. Luminance
-/// stays.
+/// What the surface has beside its own albedo is the colour of the light on it. Where that albedo
+/// is not known the surface counts as grey, and a share below 1 takes only a part, since trays and
+/// tables may have a colour of their own. Luminance stays.
 pub fn match_light_tint(scene: Scene, plate: &Image<LinearRgb>) -> Scene {
-    let LightTint::MatchSurface { share } = scene.cast else {
+    let LightTint::MatchSurface { share, albedo } = scene.cast else {
         return scene;
     };
-    let color = surface_color(&scene, plate).unwrap_or(LinearRgb::WHITE);
-    let tint = tint_of(color, share);
+    let surface = surface_color(&scene, plate).unwrap_or(LinearRgb::BLACK);
+    let tint = tint_of(Albedo::Color(albedo).white_beside(surface), share);
     Scene {
         cast: LightTint::Known(tint.scale(1.0 / tint.luminance())),
         ..scene
@@ -128,26 +129,39 @@ pub(super) mod tests {
         );
     }
 
+    fn taken(share: f64) -> LightTint {
+        LightTint::MatchSurface {
+            share,
+            albedo: LinearRgb::WHITE,
+        }
+    }
+
     #[test]
     fn the_tint_is_the_surface_s_colour_at_luminance_one() {
-        let LightTint::Known(tint) =
-            match_light_tint(scene(LightTint::MatchSurface { share: 1.0 }), &plate()).cast
-        else {
+        let LightTint::Known(tint) = match_light_tint(scene(taken(1.0)), &plate()).cast else {
             panic!("still unknown")
         };
         assert!((tint.luminance() - 1.0).abs() < 1e-6 && (tint.r / tint.g - 2.0).abs() < 1e-5);
-        let none = match_light_tint(scene(LightTint::MatchSurface { share: 0.0 }), &plate()).cast;
+        let none = match_light_tint(scene(taken(0.0)), &plate()).cast;
         assert_eq!(none, LightTint::Known(LinearRgb::WHITE));
         let known = scene(LightTint::Known(LinearRgb::new(2.0, 1.0, 0.5)));
         assert_eq!(match_light_tint(known.clone(), &plate()), known);
     }
 
     #[test]
+    fn light_on_a_surface_of_known_colour_has_its_own() {
+        let albedo = LinearRgb::new(0.8, 0.2, 0.05);
+        let cast = LightTint::MatchSurface { share: 1.0, albedo };
+        let LightTint::Known(tint) = match_light_tint(scene(cast), &plate()).cast else {
+            panic!("still unknown")
+        };
+        // The surface is seen as (0.4, 0.2, 0.1), so the light is (0.5, 1, 2) of white.
+        assert!((tint.r / tint.g - 0.5).abs() < 1e-5 && (tint.b / tint.g - 2.0).abs() < 1e-5);
+    }
+
+    #[test]
     fn a_black_plate_has_no_tint() {
-        let black = match_light_tint(
-            scene(LightTint::MatchSurface { share: 1.0 }),
-            &Image::filled(40, 30, LinearRgb::BLACK),
-        );
+        let black = match_light_tint(scene(taken(1.0)), &Image::filled(40, 30, LinearRgb::BLACK));
         assert_eq!(black.cast, LightTint::Known(LinearRgb::WHITE));
     }
 }

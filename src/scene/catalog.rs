@@ -1,6 +1,7 @@
 //! What recipes and shots can choose from: the assets of a library, and labelled backgrounds.
 
 use crate::asset::{Asset, Library, Photo};
+use crate::color::Albedo;
 use crate::scene::hull::prism_outline;
 use crate::scene::{Appearance, CameraSource, Object};
 
@@ -30,7 +31,7 @@ pub struct Background {
     /// The camera that took it, or what that can be found from.
     pub camera: CameraSource,
     /// Share of the light that its surface reflects, where that is known.
-    pub albedo: Option<f64>,
+    pub albedo: Option<Albedo>,
 }
 
 /// The assets of a library as a recipe sees them, in the library's order.

@@ -2,6 +2,7 @@
 
 use crate::bounds::{Bounds, LONGEST_SIDE_PX, MASS, MOST_PIXELS};
 use crate::camera::Camera;
+use crate::color::Albedo;
 use crate::error::{Error, Result};
 use crate::geom::{Pose, UnitQuaternion};
 use crate::pixel::LinearRgb;
@@ -145,8 +146,18 @@ fn check_pose(pose: &Pose, at: &str) -> Result<()> {
 pub(super) fn check_cast(cast: &LightTint) -> Result<()> {
     match *cast {
         LightTint::Known(color) => check_color(color, "cast.known"),
-        LightTint::MatchSurface { share } => CAST_SHARE.check("cast.match_surface.share", share),
+        LightTint::MatchSurface { share, albedo } => {
+            CAST_SHARE.check("cast.match_surface.share", share)?;
+            check_albedo(Albedo::Color(albedo), "cast.match_surface.albedo")
+        }
     }
+}
+
+pub(super) fn check_albedo(albedo: Albedo, at: &str) -> Result<()> {
+    albedo
+        .range()
+        .iter()
+        .try_for_each(|&share| ALBEDO.check(at, share))
 }
 
 fn check_exposure(exposure: Exposure) -> Result<()> {
@@ -154,7 +165,7 @@ fn check_exposure(exposure: Exposure) -> Result<()> {
         Exposure::Ev(ev) => EV.check("exposure.ev", ev),
         Exposure::MatchPlate { gain_ev } => EV.check("exposure.match_plate.gain_ev", gain_ev),
         Exposure::MatchSurface { albedo, gain_ev } => {
-            ALBEDO.check("exposure.match_surface.albedo", albedo)?;
+            check_albedo(albedo, "exposure.match_surface.albedo")?;
             EV.check("exposure.match_surface.gain_ev", gain_ev)
         }
     }

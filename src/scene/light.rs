@@ -1,5 +1,6 @@
 //! Lights and exposure as a scene gives them.
 
+use crate::color::Albedo;
 use crate::pixel::LinearRgb;
 use serde::{Deserialize, Serialize};
 
@@ -54,8 +55,8 @@ pub enum Exposure {
     /// Found by the `light` stage: a matte card of this albedo on the surface becomes as bright as
     /// the surface itself in the plate, times `2^gain_ev`.
     MatchSurface {
-        /// Share of light that the surface reflects, above 0.
-        albedo: f64,
+        /// Share of light that the surface reflects.
+        albedo: Albedo,
         /// Brighter (positive) or darker than the match.
         gain_ev: f64,
     },
@@ -67,10 +68,14 @@ pub enum Exposure {
 pub enum LightTint {
     /// This one.
     Known(LinearRgb),
-    /// Found by the `light` stage: that of the surface in the plate, to the power of `share`.
+    /// Found by the `light` stage: that of the surface in the plate over its albedo, to the power
+    /// of `share`.
     MatchSurface {
-        /// 0 keeps white light, 1 treats the surface as grey.
+        /// 0 keeps white light, 1 takes all of the colour.
         share: f64,
+        /// What the surface reflects. Default: of all colours the same.
+        #[serde(default = "default_color", skip_serializing_if = "is_white")]
+        albedo: LinearRgb,
     },
 }
 
@@ -91,6 +96,10 @@ impl Default for Exposure {
     fn default() -> Self {
         Self::Ev(0.0)
     }
+}
+
+fn is_white(color: &LinearRgb) -> bool {
+    *color == LinearRgb::WHITE
 }
 
 fn default_color() -> LinearRgb {

@@ -313,7 +313,12 @@ mod tests {
             reported,
             "exposure: still to be matched to the plate; light it first"
         );
-        let reported = complaint(|s| s.cast = LightTint::MatchSurface { share: 1.0 });
+        let reported = complaint(|s| {
+            s.cast = LightTint::MatchSurface {
+                share: 1.0,
+                albedo: LinearRgb::WHITE,
+            }
+        });
         assert_eq!(
             reported,
             "cast: still to be matched to the plate; light it first"

@@ -159,27 +159,16 @@ def cable(points, radius, material):
     return studio.mesh_object("cable", v.reshape(-1, 3), bottle.quads(len(c), 10), material=material)
 
 
+# Share of light that a sheet of paper reflects.
+PAPER = 0.8
 TRAY_COLOURS = [(0.30, 0.31, 0.32), (0.62, 0.62, 0.60), (0.045, 0.13, 0.33), (0.06, 0.06, 0.065), (0.50, 0.46, 0.38)]
-# Share of the tray's surface that is darker, at most.
-SPECKLE = 0.20
-
-
-def tray_colour(rng):
-    """The first draw of a room."""
-    return TRAY_COLOURS[int(rng.integers(len(TRAY_COLOURS)))]
-
-
-def tray_albedo(room_seed):
-    """Share of the light that the tray reflects: half of the speckle on average, down to 0.35 of the colour."""
-    luminance = float(np.dot(tray_colour(bottle.seeded("room", room_seed)), (0.2126, 0.7152, 0.0722)))
-    return round(luminance * (1 - 0.5 * SPECKLE * 0.65), 4)
 
 
 def build_room(room_seed, tray):
     """Table, tray, arm and clutter of one room; returns what the truth needs."""
     rng = bottle.seeded("room", room_seed)
     length, width = tray
-    tray_mat = studio.plastic_material("tray", tray_colour(rng), float(rng.uniform(0.4, 0.6)), noise=SPECKLE, scale=35.0)
+    tray_mat = studio.plastic_material("tray", TRAY_COLOURS[int(rng.integers(len(TRAY_COLOURS)))], float(rng.uniform(0.4, 0.6)), noise=0.20, scale=35.0)
     tray_mesh(length, width, tray_mat)
     top = wood(rng) if rng.random() < 0.65 else brushed(rng)
     z = -0.0045
@@ -280,6 +269,13 @@ def expose(lin, rng, kind, args):
                      saturates_at=4.0, **{k: round(v, 6) for k, v in noise.items()})
 
 
+def lay_paper():
+    """A blank white sheet in the middle of the tray, beside which its colour can be measured; returns its corners."""
+    w, h = 0.105, 0.148
+    flat_picture("sheet", np.full((8, 8, 3), pixels.srgb_encode(PAPER)), (0, 0, 0.0006), w, h, 0.0)
+    return np.array([[-w / 2, h / 2, 0], [w / 2, h / 2, 0], [w / 2, -h / 2, 0], [-w / 2, -h / 2, 0]])
+
+
 def tray_camera(rng, view, args, azimuth=None):
     w, h = args.width, args.height
     lo, hi = VIEWS[view]
@@ -306,7 +302,7 @@ def tray_truth(args, cam):
         ln = np.linalg.norm(d)
         hit, at, *_ = bpy.context.scene.ray_cast(dg, tuple(cam["position"]), tuple(d / ln))
         seen.append(bool(not hit or np.linalg.norm(np.array(at) - cam["position"]) > ln - 0.004))
-    return dict(floor_m=[l, w], wall_height_m=WALL_HEIGHT, albedo=tray_albedo(args.room_seed),
+    return dict(floor_m=[l, w], wall_height_m=WALL_HEIGHT,
                 corners_m=[[round(float(v), 6) for v in q] for q in world],
                 corners_px=[[round(float(v), 3) for v in q] for q in uv], corners_visible=seen)
 
@@ -339,6 +335,7 @@ def run_backgrounds(args):
         if sc.cycles.use_denoising:
             sc.cycles.denoising_prefilter = "FAST"      # nothing transparent here
         build_room(args.room_seed, args.tray)
+        sheet = lay_paper() if args.paper else None
         view = args.views[i % len(args.views)]
         light = args.lights[(i + i // len(args.views)) % len(args.lights)]
         cam, where = tray_camera(rng, view, args)
@@ -350,6 +347,8 @@ def run_backgrounds(args):
         rec = dict(name=name, files=dict(picture=f"{name}.{args.format}"), room_seed=args.room_seed,
                    **where, light=light, tray=tray_truth(args, cam), camera=studio.camera_json(cam),
                    sensor=sensor, spp=args.spp)
+        if args.paper:
+            rec["paper_px"] = [[round(float(v), 3) for v in q] for q in raster.project(sheet, cam)[0]]
         save_picture(os.path.join(out, rec["files"]["picture"]), img, args.format)
         pixels.write_json(os.path.join(out, name + ".json"), rec)
         costs.append(dict(cpu_s=round(time.process_time() - began[0], 1), wall_s=round(time.time() - began[1], 1)))

@@ -1,11 +1,12 @@
 //! One scene of a recipe: what is drawn, in which order.
 
+use crate::color::Albedo;
 use crate::error::{Error, Result};
 use crate::pixel::LinearRgb;
 use crate::scene::stack::DropColumn;
 use crate::scene::{
-    AreaLight, AssetVariant, Background, DrawLog, Draws, Exposure, Grade, Object, Range, Recipe,
-    Scene, SceneSettings, Surface,
+    AreaLight, AssetVariant, Background, DrawLog, Draws, Exposure, Grade, LightTint, Object, Range,
+    Recipe, Scene, SceneSettings, Surface,
 };
 use std::f64::consts::PI;
 
@@ -76,7 +77,7 @@ impl Recipe {
             lights,
             environment: self.environment.draw(draws),
             exposure: self.exposure(background, self.gain_ev.draw(draws, "gain_ev")),
-            cast: self.cast,
+            cast: self.cast(background),
             finish: self.finish.draw(draws),
             files: None,
             settings: SceneSettings::default(),
@@ -104,9 +105,26 @@ impl Recipe {
     }
 
     fn exposure(&self, background: &Background, gain_ev: f64) -> Exposure {
-        match self.surface_albedo.or(background.albedo) {
+        match self.albedo_of(background) {
             None => Exposure::MatchPlate { gain_ev },
             Some(albedo) => Exposure::MatchSurface { albedo, gain_ev },
+        }
+    }
+
+    fn albedo_of(&self, background: &Background) -> Option<Albedo> {
+        self.surface_albedo.or(background.albedo)
+    }
+
+    /// The recipe's, or that of the light where the surface's own colour is known.
+    fn cast(&self, background: &Background) -> LightTint {
+        match (self.albedo_of(background), self.cast) {
+            (Some(Albedo::Color(albedo)), LightTint::MatchSurface { share, .. }) => {
+                LightTint::MatchSurface { share, albedo }
+            }
+            (Some(Albedo::Color(albedo)), cast) if cast.is_white() => {
+                LightTint::MatchSurface { share: 1.0, albedo }
+            }
+            (_, cast) => cast,
         }
     }
 

@@ -9,9 +9,10 @@ pub use ranges::{GradeRanges, LightRanges};
 pub use selection::{Collider, Selections};
 
 use crate::bounds::Bounds;
+use crate::color::Albedo;
 use crate::error::{Error, Result};
-use crate::scene::bounds::{ALBEDO, EV, FRICTION, MAX_LIGHTS, MAX_OBJECTS, RADIANCE, SCALE, SHARE};
-use crate::scene::check::{check_cast, check_count, check_each, check_image};
+use crate::scene::bounds::{EV, FRICTION, MAX_LIGHTS, MAX_OBJECTS, RADIANCE, SCALE, SHARE};
+use crate::scene::check::{check_albedo, check_cast, check_count, check_each, check_image};
 use crate::scene::stack::too_large;
 use crate::scene::{
     AssetVariant, Background, DrawLog, Drawn, DropRanges, EnvironmentRanges, LightTint,
@@ -70,9 +71,9 @@ pub struct Recipe {
     /// What falls in place of a cut-out. Default: `box`.
     pub collider: Collider,
     /// Share of light that the surface reflects, where it is known: the exposure is then matched
-    /// to the surface instead of the plate's white. Default: what the background's label says.
+    /// to the surface instead of the plate's white; and the light's colour, where the surface's is known. Default: what the background's label says.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub surface_albedo: Option<f64>,
+    pub surface_albedo: Option<Albedo>,
     /// Colour of the light: `{ match_surface = { share = 0.5 } }` takes half of the surface's.
     /// Default: white.
     pub cast: LightTint,
@@ -211,7 +212,7 @@ impl Recipe {
         self.friction.check("friction", &FRICTION)?;
         self.restitution.check("restitution", &SHARE)?;
         match self.surface_albedo {
-            Some(albedo) => ALBEDO.check("surface_albedo", albedo),
+            Some(albedo) => check_albedo(albedo, "surface_albedo"),
             None => Ok(()),
         }
     }

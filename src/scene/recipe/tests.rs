@@ -1,4 +1,5 @@
 use super::*;
+use crate::color::Albedo;
 use crate::pixel::LinearRgb;
 use crate::scene::{AssetVariant, Background, CameraSource, Exposure, Object, Placement};
 use std::collections::BTreeSet;
@@ -37,7 +38,7 @@ fn scene(recipe: &Recipe, k: u64) -> Scene {
 #[test]
 fn a_surface_of_known_albedo_decides_the_exposure() {
     let known = Background {
-        albedo: Some(0.2),
+        albedo: Some(Albedo::Luminance(0.2)),
         ..tray("a")
     };
     let exposure = |recipe: Recipe| {
@@ -49,15 +50,37 @@ fn a_surface_of_known_albedo_decides_the_exposure() {
         ..Recipe::default()
     };
     let matched = |albedo| Exposure::MatchSurface {
-        albedo,
+        albedo: Albedo::Luminance(albedo),
         gain_ev: 0.0,
     };
     assert_eq!(exposure(fixed.clone()), matched(0.2));
     let own = Recipe {
-        surface_albedo: Some(0.5),
+        surface_albedo: Some(Albedo::Luminance(0.5)),
         ..fixed
     };
     assert_eq!(exposure(own), matched(0.5));
+}
+
+#[test]
+fn a_surface_of_known_colour_tells_that_of_the_light_too() {
+    let albedo = LinearRgb::new(0.1, 0.2, 0.4);
+    let blue = Background {
+        albedo: Some(Albedo::Color(albedo)),
+        ..tray("a")
+    };
+    let cast = |cast| {
+        let recipe = Recipe {
+            cast,
+            ..Recipe::default()
+        };
+        let scene = recipe.scene(7, 0, std::slice::from_ref(&blue), &catalog(10));
+        scene.unwrap().cast
+    };
+    let matched = |share, albedo| LightTint::MatchSurface { share, albedo };
+    assert_eq!(cast(LightTint::default()), matched(1.0, albedo));
+    assert_eq!(cast(matched(0.5, LinearRgb::WHITE)), matched(0.5, albedo));
+    let own = LightTint::Known(LinearRgb::new(2.0, 1.0, 0.5));
+    assert_eq!(cast(own), own);
 }
 
 fn names(scene: &Scene) -> Vec<(&str, usize)> {

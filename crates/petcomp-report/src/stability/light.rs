@@ -319,7 +319,10 @@ fn distance_from_white(plate: &Image<LinearRgb>) -> Outcome {
 }
 
 fn tint_of_surface(plate: &Image<LinearRgb>) -> LightTint {
-    let matched = LightTint::MatchSurface { share: 1.0 };
+    let matched = LightTint::MatchSurface {
+        share: 1.0,
+        albedo: LinearRgb::WHITE,
+    };
     let scene = unexposed_scene(Exposure::Ev(0.0), matched, LinearRgb::WHITE);
     match_light_tint(scene, plate).cast
 }
