@@ -58,7 +58,7 @@ fn card(id: u32, center: [f64; 3], turn: f64, size: [f64; 2]) -> Card {
     let corners = (0..12).map(|i| f64::from(i) * std::f64::consts::TAU / 12.0);
     Card {
         id: ObjectId(id),
-        class: id % 2,
+        class: Some(id % 2),
         quad: Quad {
             world_from_card: Pose::from_parts(Vector3::from(center).into(), rotation),
             size,

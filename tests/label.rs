@@ -37,7 +37,7 @@ fn card(id: u32, center: [f64; 3], angles: [f64; 3], size: [f64; 2], outline: &[
     let world_from_card = Pose::from_parts(Vector3::from(center).into(), rotation);
     Card {
         id: ObjectId(id),
-        class: id % 4,
+        class: Some(id % 4),
         quad: petcomp::geom::Quad {
             world_from_card,
             size,

@@ -20,6 +20,12 @@ use std::path::{Path, PathBuf};
 /// class = "cap"
 /// length = 0.265              # metres by a tape measure, and width where it is known
 /// # or: px_per_metre = 1966.7, screen_size = [0.60, 0.40], marker_size = 0.05
+///
+/// [[photos]]
+/// file = "IMG_0002.jpg"
+/// asset = "ring_01"
+/// role = "distractor"         # falls and hides others, but has no class and no label
+/// length = 0.031
 /// ```
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -67,7 +73,7 @@ impl List {
     /// [`Error::Value`] for the first value that cannot be right, naming the entry.
     pub(super) fn check(&self, manifest: &mut Manifest) -> Result<()> {
         self.cut_out.check().map_err(|e| e.within("cut_out"))?;
-        let classes = self.photos.iter().map(|photo| photo.class.as_str());
+        let classes = self.photos.iter().filter_map(PhotoEntry::label_class);
         manifest.add_classes(&self.classes, classes)?;
         if self.photos.is_empty() {
             return Err(Error::value("photos", "empty, expected at least one"));

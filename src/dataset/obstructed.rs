@@ -112,6 +112,7 @@ mod tests {
         Labels {
             image: [8, 8],
             objects: vec![below, above],
+            ..Labels::default()
         }
     }
 

@@ -24,6 +24,7 @@
 //! ```
 
 mod border;
+mod distractor;
 pub(crate) mod gallery;
 mod mask;
 mod obstruction;
@@ -38,6 +39,8 @@ mod visibility;
 
 #[doc(hidden)]
 pub use border::{Border, borders};
+#[doc(hidden)]
+pub use distractor::Distractor;
 pub use mask::RleMask;
 pub use obstruction::ObstructionRule;
 pub(crate) use obstruction::RuleInFile;
@@ -62,6 +65,9 @@ pub struct Labels {
     pub image: [u32; 2],
     /// One entry per object that touches the picture, in order of id.
     pub objects: Vec<ObjectLabel>,
+    /// What touches the picture and has no label: it is in the way, in order of id.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub distractors: Vec<Distractor>,
 }
 
 /// Everything known of one object in one picture.
@@ -90,7 +96,7 @@ pub struct ObjectLabel {
     pub visible_fraction: f64,
     /// How far away it is.
     pub depth: DepthRange,
-    /// Objects that lie over it, by their outlines, in order of id.
+    /// Objects and distractors that lie over it, by their outlines, in order of id.
     pub covered_by: Vec<ObjectId>,
     /// Share of its outline that no other one lies over, 0 to 1; none by
     /// [`ObstructionRule::Overlap`], which does not ask.
@@ -103,6 +109,15 @@ pub struct ObjectLabel {
 }
 
 impl ObjectLabel {
+    /// The same with the share of its outline that no other one lies over, where a rule asks.
+    fn uncovered(self, fraction: Option<f64>, rule: ObstructionRule) -> Self {
+        Self {
+            uncovered_fraction: fraction,
+            obstructed: fraction.and_then(|share| rule.is_obstructed(share)),
+            ..self
+        }
+    }
+
     /// It is not obstructed, by the rule that it was labelled with: it can be picked.
     pub fn is_topmost(&self) -> bool {
         match self.obstructed {
@@ -173,13 +188,20 @@ pub fn label(deep: &DeepImage, shot: &Shot, options: &LabelOptions) -> Labels {
     let occluders = topmost::occluders(&objects, &shot.camera, options.obstruction.pair_iou());
     let uncovered: Vec<_> =
         uncovered_fractions(&objects, &occluders, options.obstruction).collect();
-    let pairs = objects.into_iter().zip(occluders).zip(uncovered);
-    let labels = pairs
-        .map(|((object, covered_by), uncovered)| object.into_label(options, covered_by, uncovered));
-    Labels {
+    let mut labels = Labels {
         image,
-        objects: labels.collect(),
+        ..Labels::default()
+    };
+    for ((object, covered_by), uncovered) in objects.into_iter().zip(occluders).zip(uncovered) {
+        match object.card.class {
+            Some(class) => {
+                let label = object.into_label(class, options, covered_by);
+                labels.objects.push(label.uncovered(uncovered, options.obstruction));
+            }
+            None => labels.distractors.push(object.into_distractor(options, covered_by)),
+        }
     }
+    labels
 }
 
 /// How much of each object no other one lies over, where the rule asks for it.
@@ -242,15 +264,15 @@ impl<'a> Silhouette<'a> {
 
     fn into_label(
         self,
+        class: u32,
         options: &LabelOptions,
         covered_by: Vec<ObjectId>,
-        uncovered_fraction: Option<f64>,
     ) -> ObjectLabel {
         let amodal_box = self.amodal_box(options.amodal);
         let seen = self.visibility;
         ObjectLabel {
             id: self.card.id,
-            class: self.card.class,
+            class,
             outline_px: outline::rings(&self.region),
             amodal_box,
             visible_box: seen.visible.bounds(),
@@ -259,9 +281,24 @@ impl<'a> Silhouette<'a> {
             visible_mask: seen.visible,
             depth: seen.depth,
             covered_by,
-            uncovered_fraction,
-            obstructed: uncovered_fraction
-                .and_then(|share| options.obstruction.is_obstructed(share)),
+            uncovered_fraction: None,
+            obstructed: None,
+        }
+    }
+
+    fn into_distractor(self, options: &LabelOptions, covered_by: Vec<ObjectId>) -> Distractor {
+        let amodal_box = self.amodal_box(options.amodal);
+        let seen = self.visibility;
+        Distractor {
+            id: self.card.id,
+            outline_px: outline::rings(&self.region),
+            amodal_box,
+            visible_box: seen.visible.bounds(),
+            visible_fraction: seen.fraction,
+            amodal_mask: seen.amodal,
+            visible_mask: seen.visible,
+            depth: seen.depth,
+            covered_by,
         }
     }
 }

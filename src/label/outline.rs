@@ -184,7 +184,7 @@ mod tests {
         };
         let card = Card {
             id: ObjectId(1),
-            class: 0,
+            class: Some(0),
             quad: Quad {
                 world_from_card: Pose::identity(),
                 size: [1.0; 2],

@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::eval::class_name;
 use crate::geom::{BBox, Point2};
 use crate::label::gallery::{self, Figure, gallery};
-use crate::label::{ObjectLabel, trace};
+use crate::label::{Distractor, ObjectLabel, trace};
 use crate::plot::{Page, escaped};
 use rayon::prelude::*;
 use std::fmt::Write;
@@ -189,6 +189,9 @@ fn figure(shown: &ShownSample, classes: &[String], why: Option<&str>) -> Result<
             Some(reason) => others += &outline_of(object, classes, reason, letter),
         }
     }
+    for distractor in &record.labels.distractors {
+        others += &outline_of_distractor(distractor);
+    }
     figure.drawing = format!(
         "<g class=\"masks\">{masks}</g><g class=\"others\">{others}</g><g class=\"boxes\">{boxes}</g>"
     );
@@ -259,10 +262,15 @@ fn outline_of(
     let id = object.id.0;
     let (name, seen) = (class_name(object.class, classes), percent_seen(object));
     let title = format!("{id} {name}: no label, {why}; {seen:.0} % seen");
-    let rings = titled_rings(object, &escaped(&title));
+    let rings = titled_rings(&object.outline_px, &escaped(&title));
     let center = object.amodal_box.center();
     let at = [center.x - 2.0 * letter, center.y];
     rings + &gallery::words(at, &format!("{id} {why}"), 0.7 * letter, "#555")
+}
+
+fn outline_of_distractor(distractor: &Distractor) -> String {
+    let title = format!("{} distractor: no label", distractor.id.0);
+    titled_rings(&distractor.outline_px, &title)
 }
 
 fn why_unlabelled(object: &ObjectLabel, reason: UnlabelledReason) -> String {
@@ -284,8 +292,8 @@ fn svg_points(ring: &[Point2<f64>]) -> String {
     points.collect::<Vec<_>>().join(" ")
 }
 
-fn titled_rings(object: &ObjectLabel, title: &str) -> String {
-    let rings = object.outline_px.iter();
+fn titled_rings(rings: &[Vec<Point2<f64>>], title: &str) -> String {
+    let rings = rings.iter();
     rings.map(|ring| titled_polygon(ring, title)).collect()
 }
 

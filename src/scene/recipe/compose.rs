@@ -5,7 +5,7 @@ use crate::pixel::LinearRgb;
 use crate::scene::stack::DropColumn;
 use crate::scene::{
     AreaLight, AssetVariant, Background, DrawLog, Draws, Exposure, Grade, Object, Range, Recipe,
-    Scene, SceneSettings, Surface,
+    Scene, SceneSettings, Surface, draw_paths,
 };
 use std::f64::consts::PI;
 
@@ -111,8 +111,9 @@ impl Recipe {
     }
 
     fn vary_objects(&self, objects: &mut [Object], draws: &Draws) {
-        for (i, object) in objects.iter_mut().enumerate() {
-            self.vary_object(object, draws, &format!("objects[{i}]"));
+        let paths = draw_paths(objects);
+        for (object, path) in objects.iter_mut().zip(paths) {
+            self.vary_object(object, draws, &path);
         }
     }
 

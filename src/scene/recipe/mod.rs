@@ -14,7 +14,7 @@ use crate::scene::bounds::{ALBEDO, EV, FRICTION, MAX_LIGHTS, MAX_OBJECTS, RADIAN
 use crate::scene::check::{check_cast, check_count, check_each, check_image};
 use crate::scene::stack::too_large;
 use crate::scene::{
-    AssetVariant, Background, DrawLog, Drawn, DropRanges, EnvironmentRanges, LightTint,
+    AssetVariant, Background, Count, DrawLog, Drawn, DropRanges, EnvironmentRanges, LightTint,
     PostProcessRanges, Range, Scene, SettleOptions, Surface, Take, Variation, ViewRanges,
 };
 use compose::SceneNumber;
@@ -42,8 +42,13 @@ pub struct Recipe {
     /// Photos of each asset that are used: all, or the first ones. Default: `"all"`.
     pub photos: Take,
     /// Objects in a scene. Default: `[4, 12]`.
-    pub objects: Range,
-    /// Share of the scenes that stay empty: pictures of the place alone, 0 to 1. Default: 0.
+    pub objects: Count,
+    /// Distractors in a scene: assets of that role fall among the objects, hide them and cast
+    /// shadows, but have no label. Default: 0.
+    #[serde(skip_serializing_if = "Count::is_zero")]
+    pub distractors: Count,
+    /// Share of the scenes that stay empty, without distractors too: pictures of the place alone, 0
+    /// to 1. Default: 0.
     pub negatives: f64,
     /// How many different choices of objects there are. Default: `"unique"`, a new one for every
     /// scene.
@@ -90,7 +95,8 @@ impl Default for Recipe {
             viewpoints: Take::All,
             view: ViewRanges::default(),
             photos: Take::All,
-            objects: Range::new(4.0, 12.0),
+            objects: Range::new(4.0, 12.0).into(),
+            distractors: Count::default(),
             negatives: 0.0,
             selections: Selections::Unique,
             scale: Range::new(0.9, 1.1),
@@ -161,11 +167,8 @@ impl Recipe {
     /// direction: a scene with both would be refused, however late it comes.
     pub fn check_room(&self, backgrounds: &[Background], catalog: &[AssetVariant]) -> Result<()> {
         let recipe = self.narrowed();
-        if recipe.objects.max < 1.0 {
-            return Ok(());
-        }
         for background in recipe.viewpoints.slice_of(backgrounds) {
-            for variant in catalog {
+            for variant in catalog.iter().filter(|v| recipe.draws_from(v.role)) {
                 recipe.check_fit(background, variant)?;
             }
         }
@@ -200,7 +203,8 @@ impl Recipe {
     }
 
     fn check_objects(&self) -> Result<()> {
-        self.objects.check_count("objects", &OBJECT_COUNT)?;
+        self.objects.check("objects", &OBJECT_COUNT)?;
+        self.distractors.check("distractors", &OBJECT_COUNT)?;
         SHARE.check("negatives", self.negatives)?;
         self.scale.check("scale", &SCALE)?;
         self.start.check()?;

@@ -1,8 +1,9 @@
 //! Which assets a scene shows: their number, and the photo of each.
 
 use super::compose::SceneNumber;
+use crate::asset::Role;
 use crate::error::{Error, Result};
-use crate::scene::{AssetVariant, DrawLog, Draws, DropRanges, Grade, Object, Recipe, Take};
+use crate::scene::{AssetVariant, Count, DrawLog, Draws, DropRanges, Grade, Object, Recipe, Take};
 use serde::{Deserialize, Serialize};
 
 /// What falls in place of a cut-out, as thick as the asset.
@@ -72,8 +73,18 @@ impl Selections {
     }
 }
 
+/// What is chosen from one part of the catalog: objects, or distractors.
+struct Choice<'a> {
+    role: Role,
+    count: &'a Count,
+    /// Path of the count in the recipe.
+    at: &'static str,
+    /// Path of each choice, before its number.
+    path: &'static str,
+}
+
 impl Recipe {
-    /// Assets and photos of one selection, at their own size and colour.
+    /// Assets and photos of one selection, at their own size and colour: objects, then distractors.
     pub(super) fn select_objects(
         &self,
         number: SceneNumber,
@@ -82,34 +93,86 @@ impl Recipe {
     ) -> Result<Vec<Object>> {
         let selection = self.selections.index_for(number.k)?;
         let draws = Draws::new(number.seed, selection).logged(log);
-        let count = self.objects.draw_count(&draws, "selection.objects");
-        check_catalog(count, catalog)?;
+        let mut selected = self.select(&self.choice_of(Role::Object), &draws, catalog)?;
+        if !self.distractors.is_zero() {
+            let distractors = self.choice_of(Role::Distractor);
+            selected.extend(self.select(&distractors, &draws, catalog)?);
+        }
+        Ok(selected)
+    }
+
+    fn choice_of(&self, role: Role) -> Choice<'_> {
+        let (count, at, path) = match role {
+            Role::Object => (&self.objects, "objects", "selection"),
+            Role::Distractor => (&self.distractors, "distractors", "distractors"),
+        };
+        Choice {
+            role,
+            count,
+            at,
+            path,
+        }
+    }
+
+    fn select(
+        &self,
+        choice: &Choice<'_>,
+        draws: &Draws,
+        catalog: &[AssetVariant],
+    ) -> Result<Vec<Object>> {
+        let part = choice.part_of(catalog);
+        let count = choice
+            .count
+            .draw(draws, &format!("selection.{}", choice.at));
+        choice.check_part(count, &part)?;
         let mut left = Vec::new();
         (0..count)
             .map(|i| {
-                let place = draw_without_repetition(&draws, i, &mut left, catalog.len());
-                let path = format!("selection[{i}].photo");
-                catalog[place].draw_object(&draws, &path, self.photos, self.collider)
+                let path = format!("{}[{i}]", choice.path);
+                let place = draw_without_repetition(draws, &path, &mut left, part.len());
+                let path = format!("{path}.photo");
+                part[place].draw_object(draws, &path, self.photos, self.collider)
             })
             .collect()
     }
+
+    /// Whether pictures can hold assets of a role.
+    pub(super) fn draws_from(&self, role: Role) -> bool {
+        !self.choice_of(role).count.is_zero()
+    }
 }
 
-/// Fails on an empty catalog while there should be objects.
-fn check_catalog(count: usize, catalog: &[AssetVariant]) -> Result<()> {
-    if count == 0 || !catalog.is_empty() {
-        return Ok(());
+impl Choice<'_> {
+    /// The part of a catalog that it chooses from.
+    fn part_of<'a>(&self, catalog: &'a [AssetVariant]) -> Vec<&'a AssetVariant> {
+        let part = catalog.iter().filter(|variant| variant.role == self.role);
+        part.collect()
     }
-    let what = format!("{count} asked for, but there is no asset to choose from");
-    Err(Error::value("objects", what))
+
+    /// Fails on an empty part while there should be something of it.
+    fn check_part(&self, count: usize, part: &[&AssetVariant]) -> Result<()> {
+        if count == 0 || !part.is_empty() {
+            return Ok(());
+        }
+        let what = match self.role {
+            Role::Object => "there is no asset to choose from",
+            Role::Distractor => "no asset has the role \"distractor\"",
+        };
+        Err(Error::value(self.at, format!("{count} asked for, but {what}")))
+    }
 }
 
 /// A place in a catalog of this length that is still `left`; all of them are once none is.
-fn draw_without_repetition(draws: &Draws, i: usize, left: &mut Vec<usize>, length: usize) -> usize {
+fn draw_without_repetition(
+    draws: &Draws,
+    path: &str,
+    left: &mut Vec<usize>,
+    length: usize,
+) -> usize {
     if left.is_empty() {
         *left = (0..length).collect();
     }
-    left.swap_remove(draws.choose(&format!("selection[{i}].asset"), left.len()))
+    left.swap_remove(draws.choose(&format!("{path}.asset"), left.len()))
 }
 
 impl AssetVariant {
@@ -125,6 +188,7 @@ impl AssetVariant {
         let photo = draws.choose(path, photos.slice_of(&self.photo_sizes).len());
         Ok(Object {
             asset: self.asset.clone(),
+            role: self.role,
             photo,
             back: None,
             size: self.photo_sizes[photo],
