@@ -224,7 +224,10 @@ mod tests {
         let folder = folder_with(Some((40, 20)));
         let library = Library::open(folder.path()).unwrap();
         let asset = library.find("a").unwrap();
-        assert_eq!((library.class_number(asset), asset.photos.len()), (Some(2), 1));
+        assert_eq!(
+            (library.class_number(asset), asset.photos.len()),
+            (Some(2), 1)
+        );
         assert_eq!(
             asset.photos[0].texture.texel(3, 3),
             PremulRgba::new(0.25, 0.5, 0.125, 0.75).into()

@@ -194,6 +194,26 @@ mod tests {
     }
 
     #[test]
+    fn a_distractor_of_a_list_has_no_class_in_either_form() {
+        let folder = tempfile::tempdir().unwrap();
+        let csv = "file,asset,role,class,length\na.png,a,,cap,0.2\nb.png,b,distractor,,0.03\n";
+        let toml = "[[photos]]\nfile = \"a.png\"\nasset = \"a\"\nclass = \"cap\"\nlength = 0.2\n\
+                    [[photos]]\nfile = \"b.png\"\nasset = \"b\"\nrole = \"distractor\"\nlength = 0.03\n";
+        for (name, text) in [("photos.csv", csv), ("photos.toml", toml)] {
+            let path = folder.path().join(name);
+            std::fs::write(&path, text).unwrap();
+            let mut list = List::read(&path).unwrap();
+            let mut manifest = Manifest::default();
+            list.check(&mut manifest).unwrap();
+            assert_eq!(manifest.classes, ["cap"], "{name}");
+            list.photos[0].class.clear();
+            let told = list.check(&mut manifest).unwrap_err().to_string();
+            let expected = "photos[0].class: missing, expected its name, or role = \"distractor\"";
+            assert_eq!(told, expected);
+        }
+    }
+
+    #[test]
     fn paths_begin_at_the_list() {
         let text = "[[photos]]\nfile = \"a.png\"\nasset = \"a\"\nclass = \"c\"\nlength = 0.2\n\
                     screen = \"empty.png\"\n";

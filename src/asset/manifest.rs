@@ -632,6 +632,45 @@ pub(super) mod tests {
         );
     }
 
+    fn with_ring() -> Manifest {
+        let ring = Asset {
+            role: Role::Distractor,
+            ..asset("ring", "")
+        };
+        let mut manifest = two();
+        manifest.assets.push(ring);
+        manifest
+    }
+
+    #[test]
+    fn a_distractor_needs_no_class_and_adds_none() {
+        let folder = tempfile::tempdir().unwrap();
+        with_ring().write(folder.path()).unwrap();
+        let path = folder.path().join(MANIFEST);
+        let text = std::fs::read_to_string(&path).unwrap();
+        assert_eq!(text.matches("role = ").count(), 1, "{text}");
+        let mut undeclared = with_ring();
+        undeclared.assets[2].class = "rubbish".into();
+        undeclared.classes.clear();
+        std::fs::write(&path, toml::to_string(&undeclared).unwrap()).unwrap();
+        assert_eq!(
+            Manifest::read(folder.path()).unwrap().classes,
+            ["cap", "none"]
+        );
+        undeclared.assets.retain(|asset| !asset.role.is_object());
+        undeclared.write(folder.path()).unwrap();
+    }
+
+    #[test]
+    fn an_object_does_not_become_a_distractor_by_another_photo() {
+        let mut manifest = with_ring();
+        let told = manifest
+            .insert(asset("ring", "cap"))
+            .unwrap_err()
+            .to_string();
+        assert_eq!(told, "role: object, but asset \"ring\" is distractor");
+    }
+
     #[test]
     fn names_of_any_language_are_names_and_paths_are_none() {
         for name in ["Flasche_gr\u{fc}n", "\u{74f6}-1", "a.b"] {

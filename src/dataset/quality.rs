@@ -194,7 +194,11 @@ mod tests {
         config.pictures.exr = true;
         let draft = Quality::Draft.config(config.clone());
         assert_eq!(
-            (draft.scene.objects.clone(), draft.labels.clone(), draft.pictures),
+            (
+                draft.scene.objects.clone(),
+                draft.labels.clone(),
+                draft.pictures
+            ),
             (config.scene.objects, config.labels, config.pictures)
         );
         assert_eq!(draft.render, Quality::Draft.render());

@@ -76,6 +76,8 @@ pub enum UnlabelledReason {
     Covered,
     /// Nothing of it lies in the picture.
     Outside,
+    /// Too much of it lies outside of the picture.
+    Truncated,
     /// The recipe or the format leaves it out.
     LeftOut,
 }
@@ -86,6 +88,7 @@ impl UnlabelledReason {
         match self {
             Self::Covered => "another object lies over it",
             Self::Outside => "nothing of it lies in the picture",
+            Self::Truncated => "too much of it lies outside of the picture",
             Self::LeftOut => "left out by the recipe",
         }
     }
@@ -96,6 +99,7 @@ impl UnlabelledReason {
         match (labelled, object.amodal_box.is_empty(), object.is_topmost()) {
             (_, true, _) => Some(Self::Outside),
             (true, ..) => None,
+            (false, ..) if object.is_too_truncated() => Some(Self::Truncated),
             (false, _, false) => Some(Self::Covered),
             (false, ..) => Some(Self::LeftOut),
         }

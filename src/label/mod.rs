@@ -35,6 +35,7 @@ mod simplify;
 mod topmost;
 #[doc(hidden)]
 pub mod trace;
+mod truncation;
 mod visibility;
 
 #[doc(hidden)]
@@ -47,6 +48,8 @@ pub(crate) use obstruction::RuleInFile;
 #[doc(hidden)]
 pub use overlay::overlay;
 pub use topmost::cyclic_overlaps;
+#[doc(hidden)]
+pub use truncation::Truncation;
 pub use visibility::DepthRange;
 
 use crate::camera::Camera;
@@ -106,6 +109,10 @@ pub struct ObjectLabel {
     /// [`ObstructionRule::Overlap`], where `covered_by` tells.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub obstructed: Option<bool>,
+    /// How far it reaches out of the picture; none where
+    /// [`max_truncation`](LabelOptions::max_truncation) does not ask.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub truncation: Option<Truncation>,
 }
 
 impl ObjectLabel {
@@ -125,6 +132,12 @@ impl ObjectLabel {
             None => self.covered_by.is_empty(),
         }
     }
+
+    /// More of it lies outside of the picture than the options allow: it has no label.
+    pub fn is_too_truncated(&self) -> bool {
+        self.truncation
+            .is_some_and(|truncation| truncation.above_max)
+    }
 }
 
 /// How [`label()`] decides.
@@ -137,6 +150,10 @@ pub struct LabelOptions {
     /// not for sums of coverage. Default: 0.1, under which thin film and the noise of a matte
     /// look alike.
     pub alpha_threshold: f32,
+    /// An object has no label when more than this share of its outline lies outside of the picture,
+    /// 0 to 1. Default: none, however little of it is inside; then truncation is not measured.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_truncation: Option<f64>,
     /// When an object is obstructed. Default: when another lies over it, any overlap.
     #[serde(flatten)]
     pub obstruction: ObstructionRule,
@@ -147,6 +164,7 @@ impl Default for LabelOptions {
         Self {
             amodal: AmodalBox::Mask,
             alpha_threshold: 0.1,
+            max_truncation: None,
             obstruction: ObstructionRule::default(),
         }
     }
@@ -195,10 +213,17 @@ pub fn label(deep: &DeepImage, shot: &Shot, options: &LabelOptions) -> Labels {
     for ((object, covered_by), uncovered) in objects.into_iter().zip(occluders).zip(uncovered) {
         match object.card.class {
             Some(class) => {
+                let truncation = object.truncation(&shot.camera, options.max_truncation);
                 let label = object.into_label(class, options, covered_by);
-                labels.objects.push(label.uncovered(uncovered, options.obstruction));
+                let label = label.uncovered(uncovered, options.obstruction);
+                labels.objects.push(ObjectLabel {
+                    truncation,
+                    ..label
+                });
             }
-            None => labels.distractors.push(object.into_distractor(options, covered_by)),
+            None => labels
+                .distractors
+                .push(object.into_distractor(options, covered_by)),
         }
     }
     labels
@@ -262,6 +287,12 @@ impl<'a> Silhouette<'a> {
         }
     }
 
+    /// Measured where there is a most.
+    fn truncation(&self, camera: &Camera, max: Option<f64>) -> Option<Truncation> {
+        let max = max?;
+        Some(Truncation::new(self.card, camera, &self.region, max))
+    }
+
     fn into_label(
         self,
         class: u32,
@@ -283,6 +314,7 @@ impl<'a> Silhouette<'a> {
             covered_by,
             uncovered_fraction: None,
             obstructed: None,
+            truncation: None,
         }
     }
 

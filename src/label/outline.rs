@@ -23,7 +23,7 @@ const NEAR_PLANE_M: f64 = 1e-4;
 /// Parts of an outline smaller than this are rounding, square pixels: `geo` snaps to a grid of
 /// 2^-30 of the extent, which along the sides of a picture of 32,768 pixels makes slivers of a
 /// hundredth of this.
-const SLIVER_AREA_PX2: f64 = 1e-2;
+pub(crate) const SLIVER_AREA_PX2: f64 = 1e-2;
 
 /// The part of the picture that lies inside a card's outline; empty where the card is out of sight
 /// or edge-on.
@@ -37,6 +37,21 @@ pub(crate) fn region(card: &Card, camera: &Camera) -> MultiPolygon<f64> {
     without_slivers(parts)
         .map(|part| part.map_coords(|c| clamp_to_picture(c, camera)))
         .collect()
+}
+
+/// All that lies inside a card's outline, beyond the picture's edges too; empty where the card is
+/// behind the camera or edge-on.
+pub(crate) fn whole(card: &Card, camera: &Camera) -> MultiPolygon<f64> {
+    let in_front = clip_to_front(in_camera(card, camera));
+    let px: Vec<_> = in_front.iter().map(|p| to_pixel(p, camera)).collect();
+    if !has_area(&px) {
+        return MultiPolygon(Vec::new());
+    }
+    let outline = Polygon::new(LineString(px), Vec::new());
+    let around = outline.bounding_rect().map(|rect| rect.to_polygon());
+    let parts =
+        around.map(|around| outline.intersection_with_fill_rule(&around, FillRule::NonZero));
+    without_slivers(parts.unwrap_or(MultiPolygon(Vec::new()))).collect()
 }
 
 /// The outline of the part in view, pixels.
@@ -104,11 +119,15 @@ fn in_camera(card: &Card, camera: &Camera) -> Vec<Vector3<f64>> {
 fn clip_to_view(outline: Vec<Vector3<f64>>, camera: &Camera) -> Vec<Vector3<f64>> {
     let [w, h] = camera.image.map(f64::from);
     let (f, c) = (camera.focal_px, camera.principal_px);
-    let far_enough = clip_to_half_space(outline, |p| p.z - NEAR_PLANE_M);
-    let right_of_left = clip_to_half_space(far_enough, |p| f.x * p.x + c.x * p.z);
+    let right_of_left = clip_to_half_space(clip_to_front(outline), |p| f.x * p.x + c.x * p.z);
     let left_of_right = clip_to_half_space(right_of_left, |p| (w - c.x) * p.z - f.x * p.x);
     let below_top = clip_to_half_space(left_of_right, |p| f.y * p.y + c.y * p.z);
     clip_to_half_space(below_top, |p| (h - c.y) * p.z - f.y * p.y)
+}
+
+/// The part that is far enough before the camera.
+fn clip_to_front(outline: Vec<Vector3<f64>>) -> Vec<Vector3<f64>> {
+    clip_to_half_space(outline, |p| p.z - NEAR_PLANE_M)
 }
 
 /// The part of a polygon where a linear function of the position is not negative.

@@ -199,7 +199,10 @@ mod tests {
         // Chi squared of 3 bins that can occur, 2 degrees of freedom: below 13.8 in 999 of 1000.
         let expected = |weight: f64| n as f64 * weight / 10.0;
         let times = |value: u32| drawn.iter().filter(|d| **d == value as usize).count() as f64;
-        let bins = values.iter().zip(weights).filter(|(_, weight)| *weight > 0.0);
+        let bins = values
+            .iter()
+            .zip(weights)
+            .filter(|(_, weight)| *weight > 0.0);
         let chi2: f64 = bins
             .map(|(value, weight)| (times(*value) - expected(weight)).powi(2) / expected(weight))
             .sum();
@@ -228,8 +231,14 @@ mod tests {
         let most = Bounds::new(0.0, 9.0, "");
         let told = |count: Count| count.check("n", &most).unwrap_err().to_string();
         let cases = [
-            (weighted(&[], &[]), "n.values: empty, expected at least one number"),
-            (weighted(&[1, 10], &[1.0, 1.0]), "n.values: 10, expected 0 to 9"),
+            (
+                weighted(&[], &[]),
+                "n.values: empty, expected at least one number",
+            ),
+            (
+                weighted(&[1, 10], &[1.0, 1.0]),
+                "n.values: 10, expected 0 to 9",
+            ),
             (
                 weighted(&[2, 2], &[1.0, 1.0]),
                 "n.values: 2 before 2, expected ascending numbers",
@@ -246,7 +255,10 @@ mod tests {
                 weighted(&[1], &[-1.0]),
                 "n.weights: -1, expected 0 to 1000000000000000 (a share or a count)",
             ),
-            (Range::new(1.0, 2.5).into(), "n: [1, 2.5], expected integers"),
+            (
+                Range::new(1.0, 2.5).into(),
+                "n: [1, 2.5], expected integers",
+            ),
         ];
         for (count, expected) in cases {
             assert_eq!(told(count), expected);

@@ -52,7 +52,10 @@ impl Object {
 /// Paths of the draws of each object, distractors coming last: `objects[2]`, `distractors[0]`. Each
 /// role has numbers of its own, so that one more of either moves no draw of the other.
 pub(super) fn draw_paths(objects: &[Object]) -> Vec<String> {
-    let count = objects.iter().filter(|object| object.role.is_object()).count();
+    let count = objects
+        .iter()
+        .filter(|object| object.role.is_object())
+        .count();
     let indices = 0..objects.len();
     indices
         .map(|i| match i.checked_sub(count) {

@@ -128,7 +128,8 @@ impl DropColumn<'_> {
 
     /// A place before, between or behind so many others.
     fn draw_place(&self, path: &str, others: usize) -> usize {
-        self.draws.choose(&format!("{path}.start.order"), others + 1)
+        self.draws
+            .choose(&format!("{path}.start.order"), others + 1)
     }
 
     fn rotation_of(&self, i: usize, object: &Object, path: &str) -> Result<UnitQuaternion<f64>> {

@@ -17,7 +17,7 @@ use crate::scene::{
     AssetVariant, Background, Count, DrawLog, Drawn, DropRanges, EnvironmentRanges, LightTint,
     PostProcessRanges, Range, Scene, SettleOptions, Surface, Take, Variation, ViewRanges,
 };
-use compose::SceneNumber;
+use compose::{Places, SceneNumber};
 use serde::{Deserialize, Serialize};
 
 const OBJECT_COUNT: Bounds = Bounds::new(0.0, MAX_OBJECTS as f64, "what comes to rest in a heap");
@@ -34,8 +34,8 @@ pub struct Recipe {
     /// Sources of variation that are switched off; all other draws stay as they are. Default:
     /// none.
     pub off: Vec<Variation>,
-    /// Labelled backgrounds that are used, each a viewpoint: all, or the first ones. Default:
-    /// `"all"`.
+    /// Labelled backgrounds that objects fall on, each a viewpoint: all, or the first ones.
+    /// Default: `"all"`.
     pub viewpoints: Take,
     /// Which part of the photo is shown. Default: all of it.
     pub view: ViewRanges,
@@ -47,8 +47,12 @@ pub struct Recipe {
     /// shadows, but have no label. Default: 0.
     #[serde(skip_serializing_if = "Count::is_zero")]
     pub distractors: Count,
+    /// No asset is twice in a scene: more objects (or distractors) than there are assets are an
+    /// error. Default: false, assets come again once all are in the scene.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub at_most_once: bool,
     /// Share of the scenes that stay empty, without distractors too: pictures of the place alone, 0
-    /// to 1. Default: 0.
+    /// to 1; they come from all backgrounds, whatever `viewpoints` says. Default: 0.
     pub negatives: f64,
     /// How many different choices of objects there are. Default: `"unique"`, a new one for every
     /// scene.
@@ -97,6 +101,7 @@ impl Default for Recipe {
             photos: Take::All,
             objects: Range::new(4.0, 12.0).into(),
             distractors: Count::default(),
+            at_most_once: false,
             negatives: 0.0,
             selections: Selections::Unique,
             scale: Range::new(0.9, 1.1),
@@ -127,7 +132,7 @@ impl Recipe {
     /// # Method
     /// Every number is drawn by its own path ([`Draws`](crate::scene::Draws)), so that one more
     /// object or another range changes no other draw. Objects are drawn without repetition
-    /// until the catalog is used up, then again from all of it.
+    /// until the catalog is used up, then again from all of it; distractors likewise from theirs.
     ///
     /// # Errors
     /// An impossible range; no background; an empty catalog while there should be objects; a card
@@ -158,15 +163,29 @@ impl Recipe {
         let recipe = self.narrowed();
         recipe.check()?;
         let number = SceneNumber { seed, k };
-        let backgrounds = recipe.viewpoints.slice_of(backgrounds);
-        let scene = recipe.compose(number, &log, backgrounds, catalog)?;
+        let places = Places {
+            viewpoints: recipe.viewpoints.slice_of(backgrounds),
+            negatives: self.places_of_negatives(backgrounds),
+        };
+        let scene = recipe.compose(number, &log, places, catalog)?;
         Ok((scene, log.into_draws()))
     }
 
+    /// The backgrounds of scenes that stay empty: all, unless it is they that are switched off.
+    fn places_of_negatives<'a>(&self, backgrounds: &'a [Background]) -> &'a [Background] {
+        let take = match self.off.contains(&Variation::Viewpoint) {
+            true => Take::First(1),
+            false => Take::All,
+        };
+        take.slice_of(backgrounds)
+    }
+
     /// Fails on the first asset that at its largest fits between the walls of some background in no
-    /// direction: a scene with both would be refused, however late it comes.
+    /// direction, and where [`at_most_once`](Self::at_most_once) leaves too few assets: a scene like
+    /// that would be refused, however late it comes.
     pub fn check_room(&self, backgrounds: &[Background], catalog: &[AssetVariant]) -> Result<()> {
         let recipe = self.narrowed();
+        recipe.check_repetition(catalog)?;
         for background in recipe.viewpoints.slice_of(backgrounds) {
             for variant in catalog.iter().filter(|v| recipe.draws_from(v.role)) {
                 recipe.check_fit(background, variant)?;

@@ -124,7 +124,10 @@ impl Recipe {
         let count = choice
             .count
             .draw(draws, &format!("selection.{}", choice.at));
-        choice.check_part(count, &part)?;
+        choice.check_part(count, part.len())?;
+        if self.at_most_once {
+            choice.check_once(count, part.len())?;
+        }
         let mut left = Vec::new();
         (0..count)
             .map(|i| {
@@ -134,6 +137,19 @@ impl Recipe {
                 part[place].draw_object(draws, &path, self.photos, self.collider)
             })
             .collect()
+    }
+
+    /// Fails where more may be asked for than there are assets, and none may be there twice.
+    pub(super) fn check_repetition(&self, catalog: &[AssetVariant]) -> Result<()> {
+        if !self.at_most_once {
+            return Ok(());
+        }
+        [Role::Object, Role::Distractor]
+            .into_iter()
+            .try_for_each(|role| {
+                let choice = self.choice_of(role);
+                choice.check_once(choice.count.max(), choice.part_of(catalog).len())
+            })
     }
 
     /// Whether pictures can hold assets of a role.
@@ -150,15 +166,31 @@ impl Choice<'_> {
     }
 
     /// Fails on an empty part while there should be something of it.
-    fn check_part(&self, count: usize, part: &[&AssetVariant]) -> Result<()> {
-        if count == 0 || !part.is_empty() {
+    fn check_part(&self, count: usize, assets: usize) -> Result<()> {
+        if count == 0 || assets > 0 {
             return Ok(());
         }
         let what = match self.role {
             Role::Object => "there is no asset to choose from",
             Role::Distractor => "no asset has the role \"distractor\"",
         };
-        Err(Error::value(self.at, format!("{count} asked for, but {what}")))
+        Err(Error::value(
+            self.at,
+            format!("{count} asked for, but {what}"),
+        ))
+    }
+
+    /// Fails where something would have to be there twice.
+    fn check_once(&self, count: usize, assets: usize) -> Result<()> {
+        if count <= assets {
+            return Ok(());
+        }
+        let (at, role) = (self.at, self.role);
+        let what = format!(
+            "{count} asked for, but there are {assets} assets of role \"{role}\" and at_most_once is true; \
+             expected {at} up to {assets}"
+        );
+        Err(Error::value(at, what))
     }
 }
 

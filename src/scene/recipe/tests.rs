@@ -82,7 +82,10 @@ fn distractors_come_from_their_own_part_and_move_no_draw_of_an_object() {
         let bare = scene(&Recipe::default(), k);
         let (mixed, _) = with_caps(Range::new(1.0, 5.0).into(), k);
         let (objects, caps) = mixed.objects.split_at(bare.objects.len());
-        assert!(caps.iter().all(|o| o.role == Role::Distractor && o.asset.starts_with("cap")));
+        assert!(
+            caps.iter()
+                .all(|o| o.role == Role::Distractor && o.asset.starts_with("cap"))
+        );
         assert!((1..=5).contains(&caps.len()));
         assert!(objects.iter().all(|o| o.role == Role::Object));
         let same = |objects: &[Object]| objects.iter().map(apart_from_height).collect::<Vec<_>>();
@@ -118,7 +121,10 @@ fn distractors_fall_among_the_objects_none_touching_another() {
         assert!(sorted.windows(2).all(|pair| pair[1] - pair[0] > 0.005));
     }
     // 4 to 12 bottles: one place of 5 to 13 is the lowest, one the highest.
-    assert!((1..30).contains(&lowest) && (1..30).contains(&highest), "{lowest} {highest}");
+    assert!(
+        (1..30).contains(&lowest) && (1..30).contains(&highest),
+        "{lowest} {highest}"
+    );
 }
 
 #[test]
@@ -138,6 +144,54 @@ fn distractors_that_no_asset_is_are_told() {
     assert!(Recipe::default().check_room(&[tray("a")], &huge).is_ok());
     let told = recipe.check_room(&[tray("a")], &huge).unwrap_err();
     assert!(told.to_string().contains("cap0"), "{told}");
+}
+
+#[test]
+fn negatives_come_from_all_backgrounds_whatever_the_viewpoints() {
+    let recipe = Recipe {
+        negatives: 0.5,
+        viewpoints: Take::First(1),
+        ..Recipe::default()
+    };
+    let scenes: Vec<Scene> = (0..200).map(|k| scene(&recipe, k)).collect();
+    let (empty, full): (Vec<_>, Vec<_>) = scenes.iter().partition(|s| s.objects.is_empty());
+    assert!(full.iter().all(|s| s.plate == "a"));
+    // Binomial, about 100 draws: 50 +- 5.
+    let on_second = empty.iter().filter(|s| s.plate == "b").count();
+    assert!(on_second.abs_diff(empty.len() / 2) < 25, "{on_second}");
+    // But for the ablation, which is of nothing else.
+    let off = Recipe {
+        off: vec![Variation::Viewpoint],
+        ..recipe
+    };
+    assert!((0..200).all(|k| scene(&off, k).plate == "a"));
+}
+
+#[test]
+fn at_most_once_is_an_error_where_there_are_too_few_assets() {
+    let once = |objects: Range| Recipe {
+        objects: objects.into(),
+        at_most_once: true,
+        ..Recipe::default()
+    };
+    let told = |recipe: &Recipe| {
+        let e = recipe.check_room(&[tray("a")], &catalog(10)).unwrap_err();
+        e.to_string()
+    };
+    let expected = "objects: 12 asked for, but there are 10 assets of role \"object\" and \
+                    at_most_once is true; expected objects up to 10";
+    assert_eq!(told(&once(Range::new(4.0, 12.0))), expected);
+    let fixed = once(Range::fixed(12.0));
+    let drawn = fixed.scene(7, 0, &[tray("a")], &catalog(10)).unwrap_err();
+    assert_eq!(drawn.to_string(), expected);
+    let few = once(Range::new(4.0, 10.0));
+    assert!(few.check_room(&[tray("a")], &catalog(10)).is_ok());
+    // What is not there twice anyhow stays as it is.
+    let usual = Recipe {
+        at_most_once: false,
+        ..few.clone()
+    };
+    assert!((0..20).all(|k| scene(&few, k) == scene(&usual, k)));
 }
 
 #[test]
