@@ -192,6 +192,7 @@ struct Silhouette<'a> {
     card: &'a Card,
     region: MultiPolygon<f64>,
     visibility: ObjectVisibility,
+    truncation: Option<Truncation>,
 }
 
 /// Labels the picture `deep` of `shot`: every object with a box in the picture, in order of id.
@@ -211,22 +212,32 @@ pub fn label(deep: &DeepImage, shot: &Shot, options: &LabelOptions) -> Labels {
         ..Labels::default()
     };
     for ((object, covered_by), uncovered) in objects.into_iter().zip(occluders).zip(uncovered) {
-        match object.card.class {
-            Some(class) => {
-                let truncation = object.truncation(&shot.camera, options.max_truncation);
-                let label = object.into_label(class, options, covered_by);
-                let label = label.uncovered(uncovered, options.obstruction);
-                labels.objects.push(ObjectLabel {
-                    truncation,
-                    ..label
-                });
-            }
-            None => labels
-                .distractors
-                .push(object.into_distractor(options, covered_by)),
-        }
+        labels.push(object, options, covered_by, uncovered);
     }
     labels
+}
+
+impl Labels {
+    /// Adds a card as what it is: an object of a class, or a distractor.
+    fn push(
+        &mut self,
+        silhouette: Silhouette<'_>,
+        options: &LabelOptions,
+        covered_by: Vec<ObjectId>,
+        uncovered: Option<f64>,
+    ) {
+        match silhouette.card.class {
+            Some(class) => {
+                let label = silhouette.into_label(class, options, covered_by);
+                self.objects
+                    .push(label.uncovered(uncovered, options.obstruction));
+            }
+            None => {
+                let distractor = silhouette.into_distractor(options, covered_by);
+                self.distractors.push(distractor);
+            }
+        }
+    }
 }
 
 /// How much of each object no other one lies over, where the rule asks for it.
@@ -262,6 +273,7 @@ fn silhouettes<'a>(
     let pairs = cards.into_iter().zip(visibilities);
     pairs
         .map(|(card, visibility)| Silhouette::new(card, &shot.camera, visibility))
+        .map(|silhouette| silhouette.measured(&shot.camera, options.max_truncation))
         .collect()
 }
 
@@ -277,6 +289,16 @@ impl<'a> Silhouette<'a> {
             card,
             region: outline::region(card, camera),
             visibility,
+            truncation: None,
+        }
+    }
+
+    /// The same with its truncation, where there is a most.
+    fn measured(self, camera: &Camera, max_truncation: Option<f64>) -> Self {
+        Self {
+            truncation: max_truncation
+                .map(|max| Truncation::new(self.card, camera, &self.region, max)),
+            ..self
         }
     }
 
@@ -285,12 +307,6 @@ impl<'a> Silhouette<'a> {
             AmodalBox::Mask => self.visibility.amodal.bounds(),
             AmodalBox::Outline => outline::bounds(&self.region),
         }
-    }
-
-    /// Measured where there is a most.
-    fn truncation(&self, camera: &Camera, max: Option<f64>) -> Option<Truncation> {
-        let max = max?;
-        Some(Truncation::new(self.card, camera, &self.region, max))
     }
 
     fn into_label(
@@ -314,7 +330,7 @@ impl<'a> Silhouette<'a> {
             covered_by,
             uncovered_fraction: None,
             obstructed: None,
-            truncation: None,
+            truncation: self.truncation,
         }
     }
 

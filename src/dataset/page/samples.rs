@@ -178,7 +178,13 @@ fn longer_sides(sample: &SampleSummary) -> impl Iterator<Item = f64> {
 fn figure(shown: &ShownSample, classes: &[String], why: Option<&str>) -> Result<Figure> {
     let record = &shown.record;
     let mut figure = Figure::whole(&shown.picture, record.labels.image.map(f64::from))?;
-    let letter = figure.letter_height();
+    figure.drawing = drawing_of(record, classes, figure.letter_height());
+    figure.caption = figure_caption(record, why);
+    Ok(figure)
+}
+
+/// Masks, outlines without a label, and boxes, as SVG.
+fn drawing_of(record: &SampleRecord, classes: &[String], letter: f64) -> String {
     let (mut boxes, mut masks, mut others) = (String::new(), String::new(), String::new());
     for object in &record.labels.objects {
         match UnlabelledReason::of(object, record) {
@@ -189,14 +195,10 @@ fn figure(shown: &ShownSample, classes: &[String], why: Option<&str>) -> Result<
             Some(reason) => others += &outline_of(object, classes, reason, letter),
         }
     }
-    for distractor in &record.labels.distractors {
-        others += &outline_of_distractor(distractor);
-    }
-    figure.drawing = format!(
+    others.extend(record.labels.distractors.iter().map(outline_of_distractor));
+    format!(
         "<g class=\"masks\">{masks}</g><g class=\"others\">{others}</g><g class=\"boxes\">{boxes}</g>"
-    );
-    figure.caption = figure_caption(record, why);
-    Ok(figure)
+    )
 }
 
 fn figure_caption(record: &SampleRecord, why: Option<&str>) -> String {

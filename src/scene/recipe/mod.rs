@@ -203,7 +203,7 @@ impl Recipe {
         match largest.find(|size| !self.start.has_room(room, *size)) {
             Some(size) => {
                 let what = too_large(&variant.asset, size, &background.name, room);
-                Err(Error::value("objects", what))
+                Err(Error::value(self.choice_of(variant.role).at, what))
             }
             None => Ok(()),
         }

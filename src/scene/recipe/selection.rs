@@ -74,11 +74,11 @@ impl Selections {
 }
 
 /// What is chosen from one part of the catalog: objects, or distractors.
-struct Choice<'a> {
+pub(super) struct Choice<'a> {
     role: Role,
     count: &'a Count,
     /// Path of the count in the recipe.
-    at: &'static str,
+    pub(super) at: &'static str,
     /// Path of each choice, before its number.
     path: &'static str,
 }
@@ -101,7 +101,7 @@ impl Recipe {
         Ok(selected)
     }
 
-    fn choice_of(&self, role: Role) -> Choice<'_> {
+    pub(super) fn choice_of(&self, role: Role) -> Choice<'_> {
         let (count, at, path) = match role {
             Role::Object => (&self.objects, "objects", "selection"),
             Role::Distractor => (&self.distractors, "distractors", "distractors"),
@@ -121,9 +121,7 @@ impl Recipe {
         catalog: &[AssetVariant],
     ) -> Result<Vec<Object>> {
         let part = choice.part_of(catalog);
-        let count = choice
-            .count
-            .draw(draws, &format!("selection.{}", choice.at));
+        let count = choice.draw_count(draws);
         choice.check_part(count, part.len())?;
         if self.at_most_once {
             choice.check_once(count, part.len())?;
@@ -132,9 +130,8 @@ impl Recipe {
         (0..count)
             .map(|i| {
                 let path = format!("{}[{i}]", choice.path);
-                let place = draw_without_repetition(draws, &path, &mut left, part.len());
-                let path = format!("{path}.photo");
-                part[place].draw_object(draws, &path, self.photos, self.collider)
+                let variant = draw_without_repetition(draws, &path, &mut left, &part);
+                variant.draw_object(draws, &path, self.photos, self.collider)
             })
             .collect()
     }
@@ -159,6 +156,10 @@ impl Recipe {
 }
 
 impl Choice<'_> {
+    fn draw_count(&self, draws: &Draws) -> usize {
+        self.count.draw(draws, &format!("selection.{}", self.at))
+    }
+
     /// The part of a catalog that it chooses from.
     fn part_of<'a>(&self, catalog: &'a [AssetVariant]) -> Vec<&'a AssetVariant> {
         let part = catalog.iter().filter(|variant| variant.role == self.role);
@@ -194,17 +195,17 @@ impl Choice<'_> {
     }
 }
 
-/// A place in a catalog of this length that is still `left`; all of them are once none is.
-fn draw_without_repetition(
+/// One of a part of the catalog whose place is still `left`; all of them are once none is.
+fn draw_without_repetition<'a>(
     draws: &Draws,
     path: &str,
     left: &mut Vec<usize>,
-    length: usize,
-) -> usize {
+    part: &[&'a AssetVariant],
+) -> &'a AssetVariant {
     if left.is_empty() {
-        *left = (0..length).collect();
+        *left = (0..part.len()).collect();
     }
-    left.swap_remove(draws.choose(&format!("{path}.asset"), left.len()))
+    part[left.swap_remove(draws.choose(&format!("{path}.asset"), left.len()))]
 }
 
 impl AssetVariant {
@@ -217,7 +218,10 @@ impl AssetVariant {
         collider: Collider,
     ) -> Result<Object> {
         self.check_photos()?;
-        let photo = draws.choose(path, photos.slice_of(&self.photo_sizes).len());
+        let photo = draws.choose(
+            &format!("{path}.photo"),
+            photos.slice_of(&self.photo_sizes).len(),
+        );
         Ok(Object {
             asset: self.asset.clone(),
             role: self.role,
