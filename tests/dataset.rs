@@ -89,6 +89,7 @@ fn sample(k: u64) -> Result<Sample> {
     let labels = Labels {
         image: IMAGE,
         objects: objects.collect(),
+        ..Labels::default()
     };
     let drawn = Scene {
         exposure: Exposure::MatchPlate { gain_ev: 0.1 },
@@ -425,7 +426,7 @@ fn what_a_writer_cannot_hold_is_an_error() {
         s.frame = Image::new(9, 40);
         s.labels = Labels {
             image: [9, 40],
-            objects: vec![],
+            ..Labels::default()
         };
     });
     assert_eq!(
@@ -611,6 +612,7 @@ fn a_check_finds_every_fault_and_its_place() {
 /// A card that fell, one that fell on it, and one that its sidecar file has so far up.
 fn with_a_card_up_at(k: u64, height: f64) -> Sample {
     let card = |placement| Object {
+        role: Default::default(),
         asset: "bottle".into(),
         photo: 0,
         back: None,

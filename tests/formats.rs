@@ -58,7 +58,7 @@ fn card(id: u32, center: [f64; 3], turn: f64, size: [f64; 2]) -> Card {
     let corners = (0..12).map(|i| f64::from(i) * std::f64::consts::TAU / 12.0);
     Card {
         id: ObjectId(id),
-        class: id % 2,
+        class: Some(id % 2),
         quad: Quad {
             world_from_card: Pose::from_parts(Vector3::from(center).into(), rotation),
             size,
@@ -98,7 +98,10 @@ fn sample(k: u64) -> Result<Sample> {
 }
 
 fn sample_with(k: u64, options: &LabelOptions) -> Result<Sample> {
-    let shot = shot(k);
+    sample_of(shot(k), options)
+}
+
+fn sample_of(shot: Shot, options: &LabelOptions) -> Result<Sample> {
     let deep = render::render(&shot, &Default::default());
     let frame = composite::frame(&deep, shot.plate.as_deref());
     let labels = label(&deep, &shot, options);
@@ -135,6 +138,11 @@ fn classes() -> Vec<String> {
 
 /// Makes 12 samples with the formats and settings of a table `[labels]`.
 fn made(labels: &str) -> tempfile::TempDir {
+    made_of(labels, shot)
+}
+
+/// The same of other pictures.
+fn made_of(labels: &str, shot: fn(u64) -> Shot) -> tempfile::TempDir {
     let dir = tempfile::tempdir().unwrap();
     let setup: LabelConfig = toml::from_str(labels).unwrap();
     let pictures = Pictures::default();
@@ -152,7 +160,7 @@ fn made(labels: &str) -> tempfile::TempDir {
     };
     plan.writers.extend(setup.writers(&pictures));
     let options = setup.options();
-    let sample = |k| sample_with(k, &options);
+    let sample = |k| sample_of(shot(k), &options);
     generate(&plan, sample, &|_| {}, &AtomicBool::new(false)).unwrap();
     dir
 }
@@ -301,6 +309,116 @@ fn every_format_labels_the_objects_that_are_seen_enough() {
             below.uncovered_fraction.unwrap()
         );
     }
+}
+
+/// The annotations of picture 3.
+fn annotations_of_third(folder: &Path) -> Vec<serde_json::Value> {
+    let document = folder.join("annotations/instances_train.json");
+    let coco: serde_json::Value = io::read_json(document).unwrap();
+    let annotations = coco["annotations"].as_array().unwrap().iter();
+    let own = annotations.filter(|a| a["image_id"] == 3);
+    own.cloned().collect()
+}
+
+fn text_of(folder: &Path, name: &str) -> String {
+    std::fs::read_to_string(folder.join(name)).unwrap()
+}
+
+/// The pictures with the ring that lies over another a distractor.
+fn shot_with_distractor(k: u64) -> Shot {
+    let mut shot = shot(k);
+    for card in shot.cards.iter_mut().filter(|card| card.id == ObjectId(2)) {
+        card.class = None;
+    }
+    shot
+}
+
+#[test]
+fn a_distractor_is_in_the_picture_and_the_sidecar_and_in_no_label() {
+    let labels = "formats = [\"yolo\", \"coco\", \"voc\", \"layers\"]\nlayers = { cards = true }";
+    let (plain, mixed) = (made(labels), made_of(labels, shot_with_distractor));
+    let same = ["images/train/000003.png", "data.yaml"];
+    for name in same {
+        let bytes = |dir: &tempfile::TempDir| std::fs::read(dir.path().join(name)).unwrap();
+        assert_eq!(bytes(&plain), bytes(&mixed), "{name}");
+    }
+    let record: SampleRecord =
+        io::read_json(mixed.path().join("scenes/train/000003.json")).unwrap();
+    let ids: Vec<_> = record.labels.objects.iter().map(|o| o.id.0).collect();
+    assert_eq!((ids, record.labels.distractors[0].id.0), (vec![1, 3], 2));
+    assert_eq!(record.labels.objects[0].covered_by, [ObjectId(2)]);
+    assert_eq!(record.labelled, [ObjectId(3)]);
+    let [only] = &annotations_of_third(mixed.path())[..] else {
+        panic!("one annotation")
+    };
+    assert_eq!(only["category_id"], 2);
+    assert_eq!(
+        text_of(mixed.path(), "labels/train/000003.txt")
+            .lines()
+            .count(),
+        1
+    );
+    let voc = text_of(mixed.path(), "voc/train/000003.xml");
+    assert_eq!(voc.matches("<object>").count(), 1);
+    let journal = text_of(mixed.path(), "index.jsonl");
+    let line = journal
+        .lines()
+        .find(|line| line.contains("\"k\":3,"))
+        .unwrap();
+    assert!(
+        line.contains("\"classes\":[[0,0],[2,1]],\"obstructed\":1"),
+        "{line}"
+    );
+    // Its light is in the picture, so it has layers; its name says what it is.
+    let exr = std::fs::read(mixed.path().join("layers/train/000003.exr")).unwrap();
+    let names = String::from_utf8_lossy(&exr);
+    assert!(names.contains("object002_distractor") && names.contains("object002.R"));
+}
+
+#[test]
+fn formats_tell_truncation_and_both_boxes_where_they_are_asked_for() {
+    let formats = "formats = [\"yolo\", \"coco\", \"voc\"]";
+    let keys = ["truncation", "amodal_bbox", "visible_bbox"];
+    let plain = made(formats);
+    let cut = |folder: &Path| {
+        let annotations = annotations_of_third(folder).into_iter();
+        annotations
+            .filter(|a| a["id"] == 3 * 65536 + 3)
+            .collect::<Vec<_>>()
+    };
+    assert!(
+        keys.iter()
+            .all(|key| cut(plain.path())[0].get(key).is_none())
+    );
+    let dir = made(&format!("max_truncation = 0.9\n{formats}"));
+    let told = &cut(dir.path())[0];
+    let numbers = |key: &str| -> Vec<f64> { serde_json::from_value(told[key].clone()).unwrap() };
+    let right = |b: &[f64]| b[0] + b[2];
+    assert!(
+        (0.05..0.6).contains(&told["truncation"].as_f64().unwrap()),
+        "{told}"
+    );
+    assert!(right(&numbers("amodal_bbox")) > 97.0, "{told}");
+    assert_eq!(right(&numbers("bbox")), 96.0);
+    assert_eq!(right(&numbers("visible_bbox")), 96.0);
+    let voc = |folder: &Path| text_of(folder, "voc/train/000003.xml");
+    assert_eq!(
+        voc(dir.path()).matches("<truncated>1</truncated>").count(),
+        1
+    );
+    // The other files are as they were, but for the hash of the settings in the sidecar.
+    for name in ["labels/train/000003.txt", "voc/train/000003.xml"] {
+        assert_eq!(text_of(plain.path(), name), text_of(dir.path(), name));
+    }
+    let strict = made(&format!("max_truncation = 0.05\n{formats}"));
+    assert!(cut(strict.path()).is_empty() && !voc(strict.path()).contains("<truncated>1"));
+    let rows = |dir: &tempfile::TempDir| text_of(dir.path(), "labels/train/000003.txt");
+    assert_eq!(
+        rows(&strict).lines().count() + 1,
+        rows(&plain).lines().count()
+    );
+    let ignoring = format!("obstructed = \"ignore\"\nmax_truncation = 0.05\n{formats}");
+    assert_eq!(cut(made(&ignoring).path())[0]["iscrowd"], 1);
 }
 
 #[test]

@@ -11,7 +11,7 @@ use petcomp::label::{
     AmodalBox, DepthRange, LabelOptions, Labels, ObjectLabel, ObstructionRule, cyclic_overlaps,
     label,
 };
-use petcomp::scene::{Card, Grade};
+use petcomp::scene::{Card, Grade, View};
 use petcomp::{DeepImage, DeepSample};
 use petcomp::{Depth, Image, LinearRgb, ObjectId, PremulRgba, Shot};
 use proptest::prelude::*;
@@ -37,7 +37,7 @@ fn card(id: u32, center: [f64; 3], angles: [f64; 3], size: [f64; 2], outline: &[
     let world_from_card = Pose::from_parts(Vector3::from(center).into(), rotation);
     Card {
         id: ObjectId(id),
-        class: id % 4,
+        class: Some(id % 4),
         quad: petcomp::geom::Quad {
             world_from_card,
             size,
@@ -597,4 +597,158 @@ fn film_seen_through_film_counts_as_seen() {
         }
     );
     assert_eq!(found.objects[1].visible_mask, found.objects[1].amodal_mask);
+}
+
+/// Corners of a card in the part of a photo that a view shows: projected into the photo, then turned
+/// and enlarged about the middle of that part, pixels.
+fn in_view(view: &View, card: &Card) -> Vec<Point2<f64>> {
+    let half = Vector2::new(48.0, 36.0);
+    let (sin, cos) = view.turn_deg.to_radians().sin_cos();
+    let reach = Vector2::new(
+        cos.abs() * half.x + sin.abs() * half.y,
+        sin.abs() * half.x + cos.abs() * half.y,
+    );
+    let zoom = view.zoom.max((reach.x / half.x).max(reach.y / half.y));
+    let room = half - reach / zoom;
+    let middle = half + Vector2::new(room.x * view.shift[0], room.y * view.shift[1]);
+    let corners = card.outline_uv.iter();
+    corners
+        .map(|uv| {
+            let (px, _) = camera().project(card.quad.point(uv.x, uv.y)).unwrap();
+            let p = px.coords - middle;
+            let turned = Vector2::new(cos * p.x + sin * p.y, cos * p.y - sin * p.x);
+            Point2::from(half + zoom * turned)
+        })
+        .collect()
+}
+
+fn box_around(points: &[Point2<f64>]) -> BBox {
+    let ends = |of: fn(&Point2<f64>) -> f64| {
+        let values = points.iter().map(of);
+        values.fold([f64::MAX, f64::MIN], |[low, high], v| {
+            [low.min(v), high.max(v)]
+        })
+    };
+    let ([x0, x1], [y0, y1]) = (ends(|p| p.x), ends(|p| p.y));
+    BBox { x0, y0, x1, y1 }
+}
+
+/// Share of a polygon's area outside of the picture, by points on a fine grid.
+fn share_outside(corners: &[Point2<f64>]) -> f64 {
+    const STEPS: usize = 600;
+    let ring: Vec<_> = corners.iter().map(|p| (p.x, p.y)).collect();
+    let polygon = geo::Polygon::new(ring.into(), vec![]);
+    let b = box_around(corners);
+    let along =
+        |low: f64, high: f64, i: usize| low + (high - low) * (i as f64 + 0.5) / STEPS as f64;
+    let points = (0..STEPS * STEPS)
+        .map(|i| geo::Point::new(along(b.x0, b.x1, i % STEPS), along(b.y0, b.y1, i / STEPS)));
+    let inside: Vec<_> = points.filter(|p| polygon.contains(p)).collect();
+    let is_outside =
+        |p: &&geo::Point| !(0.0..96.0).contains(&p.x()) || !(0.0..72.0).contains(&p.y());
+    inside.iter().filter(is_outside).count() as f64 / inside.len() as f64
+}
+
+fn measured(max_truncation: f64) -> LabelOptions {
+    LabelOptions {
+        max_truncation: Some(max_truncation),
+        ..LabelOptions::default()
+    }
+}
+
+#[test]
+fn what_a_view_cuts_off_is_told_by_the_whole_outline_and_by_what_is_seen() {
+    let view = View {
+        zoom: 2.0,
+        shift: [0.6, -0.4],
+        turn_deg: 10.0,
+    };
+    let cards = [
+        card(1, [0.33, 0.05, 0.02], [0.1, -0.05, 0.4], [0.3, 0.2], &WHOLE),
+        card(2, [0.1, 0.1, 0.0], [0.0, 0.0, 1.0], [0.12, 0.08], &WHOLE),
+    ];
+    let scene = Shot {
+        camera: view.camera(&camera()),
+        ..shot(cards.clone())
+    };
+    let found = labels(&scene, &measured(1.0));
+    let mut is_cut = Vec::new();
+    for (object, card) in found.objects.iter().zip(&cards) {
+        let (truncation, corners) = (object.truncation.unwrap(), in_view(&view, card));
+        assert!(off(&truncation.whole_box, &box_around(&corners)) < 1e-6);
+        assert!((truncation.fraction - share_outside(&corners)).abs() < 0.005);
+        for b in [object.visible_box, object.amodal_box] {
+            assert!(
+                b.x0 >= 0.0 && b.y0 >= 0.0 && b.x1 <= 96.0 && b.y1 <= 72.0,
+                "{b:?}"
+            );
+        }
+        is_cut.push(truncation.fraction > 0.1);
+    }
+    assert_eq!(is_cut, [true, false], "{:?}", found.objects);
+    // Not cut at all: nothing is lost to rounding.
+    assert_eq!(found.objects[1].truncation.unwrap().fraction, 0.0);
+}
+
+#[test]
+fn truncation_is_measured_and_decides_where_it_is_asked_for_alone() {
+    // A third of it is to the right of the picture.
+    let scene = shot([card(1, [0.38, 0.0, 0.0], [0.0; 3], [0.3, 0.1], &WHOLE)]);
+    let by_default = labels(&scene, &LabelOptions::default());
+    assert!(
+        by_default.objects[0].truncation.is_none() && !by_default.objects[0].is_too_truncated()
+    );
+    for (max, is_too_much) in [(0.16, true), (0.17, false)] {
+        let found = labels(&scene, &measured(max)).objects.remove(0);
+        let fraction = found.truncation.unwrap().fraction;
+        assert!((fraction - 0.05 / 0.3).abs() < 1e-9, "{fraction}");
+        assert_eq!(found.is_too_truncated(), is_too_much);
+        let without = ObjectLabel {
+            truncation: None,
+            ..found
+        };
+        assert_eq!(without, by_default.objects[0]);
+    }
+}
+
+#[test]
+fn what_crosses_the_picture_is_cut_on_both_sides_and_what_reaches_behind_the_lens_almost_all() {
+    let across = shot([card(1, [0.0; 3], [0.0; 3], [1.92, 0.1], &WHOLE)]);
+    let truncation = labels(&across, &measured(1.0)).objects[0]
+        .truncation
+        .unwrap();
+    assert!((truncation.fraction - 0.5).abs() < 1e-9);
+    assert!((truncation.whole_box.x0 + 48.0).abs() < 1e-6);
+    assert!((truncation.whole_box.x1 - 144.0).abs() < 1e-6);
+    let strip = card(1, [0.6, 0.0, 0.7], [0.0, -0.9, 0.0], [2.0, 0.1], &WHOLE);
+    let behind = labels(&shot([strip]), &measured(1.0)).objects[0].truncation;
+    let fraction = behind.unwrap().fraction;
+    assert!((0.9..1.0).contains(&fraction), "{fraction}");
+}
+
+#[test]
+fn a_distractor_obstructs_and_is_no_object() {
+    let mut scene = partly_hidden(5.0);
+    let as_object = labels(&scene, &LabelOptions::default());
+    scene.cards[1].class = None;
+    for found in [
+        labels(&scene, &LabelOptions::default()),
+        seen_at_least(&scene, 0.97),
+    ] {
+        let [below] = &found.objects[..] else {
+            panic!("one object: {found:?}")
+        };
+        assert!(!below.is_topmost() && below.covered_by == [ObjectId(2)]);
+        let [above] = &found.distractors[..] else {
+            panic!("one distractor: {found:?}")
+        };
+        let same = &as_object.objects[1];
+        assert_eq!(
+            (above.id, &above.visible_mask),
+            (same.id, &same.visible_mask)
+        );
+        assert_eq!(above.visible_box, same.visible_box);
+    }
+    let told = serde_json::to_string(&as_object).unwrap();
+    assert!(!told.contains("distractors") && !told.contains("truncation"));
 }

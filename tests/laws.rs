@@ -30,6 +30,7 @@ fn catalog() -> Vec<AssetVariant> {
         let step = i as f64 / 19.0;
         AssetVariant {
             asset: format!("b{i}"),
+            role: Default::default(),
             photo_sizes: vec![
                 [0.16 + 0.12 * step, 0.1 - 0.04 * step],
                 [0.15 + 0.12 * step, 0.1 - 0.04 * step],
@@ -44,7 +45,7 @@ fn catalog() -> Vec<AssetVariant> {
 
 fn recipe(objects: Range) -> Recipe {
     Recipe {
-        objects,
+        objects: objects.into(),
         ..Recipe::default()
     }
 }
@@ -158,6 +159,7 @@ fn cards_come_to_rest_at_the_same_bits_at_any_thread_count() {
 /// Made by hand, so that no other default can change it.
 fn pile() -> Scene {
     let card = |i: usize| Object {
+        role: Default::default(),
         asset: format!("b{i}"),
         photo: 0,
         back: None,

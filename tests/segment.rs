@@ -70,7 +70,7 @@ fn the_sample_list_becomes_a_library_of_all_four_classes() {
     let mut classes: Vec<u32> = library
         .assets
         .iter()
-        .map(|asset| library.class_number(asset))
+        .filter_map(|asset| library.class_number(asset))
         .collect();
     classes.sort_unstable();
     classes.dedup();

@@ -152,6 +152,7 @@ fn fitted<P: Mix>(cutout: &Image<P>) -> Image<P> {
 mod tests {
     use super::super::manifest::Asset;
     use super::super::manifest::tests::photo;
+    use super::super::role::Role;
     use super::*;
     use crate::diagnostic::{Code, Diagnostic};
     use crate::pixel::PremulRgba;
@@ -164,6 +165,7 @@ mod tests {
             .collect();
         let one = Photo::new(Image::filled(480, 240, PremulRgba::TRANSPARENT), record);
         let asset = Asset {
+            role: Role::Object,
             name: "a".into(),
             class: "cap".into(),
             thickness: 0.01,

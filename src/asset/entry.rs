@@ -1,6 +1,7 @@
 //! A photo and what is known of its object.
 
 use super::manifest::{Asset, Manifest, PhotoRecord, check_class, check_name};
+use super::role::Role;
 use super::scale::Scale;
 use super::screen_source::ScreenSource;
 use super::{DEFAULT_MASS, DEFAULT_THICKNESS};
@@ -19,7 +20,13 @@ pub struct PhotoEntry {
     pub file: PathBuf,
     /// Name of the object: letters and digits of any language, `_`, `-` and `.`.
     pub asset: String,
-    /// Name of its class.
+    /// What the object is in pictures for: `object`, or `distractor` for what only hides others.
+    /// Default: `object`.
+    #[serde(default, skip_serializing_if = "Role::is_object")]
+    pub role: Role,
+    /// Name of its class. Of a distractor, which is labelled as none, a word for people; it may be
+    /// missing.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
     pub class: String,
     /// Pixels of the photo for a metre, at half the object's height.
     #[serde(
@@ -75,6 +82,7 @@ impl PhotoEntry {
         let mut entry = Self {
             file: file.into(),
             asset: asset.into(),
+            role: Role::Object,
             class: class.into(),
             px_per_metre: None,
             length: None,
@@ -161,17 +169,34 @@ impl PhotoEntry {
             Error::Value { what, .. } => Error::value("asset", what),
             other => other,
         })?;
-        check_class(&self.class)?;
-        manifest.class(&self.class)?;
+        self.check_class(manifest)?;
         scale.check()?;
         THICKNESS.check("thickness", self.thickness)?;
         MASS.check("mass", self.mass)
+    }
+
+    /// An object needs a class that the folder has; a distractor needs none.
+    fn check_class(&self, manifest: &Manifest) -> Result<()> {
+        if self.role.is_object() && self.class.is_empty() {
+            let what = "missing, expected its name, or role = \"distractor\"";
+            return Err(Error::value("class", what));
+        }
+        if self.role.is_object() {
+            check_class(&self.class)?;
+        }
+        manifest.check_class_of(self.role, &self.class)
+    }
+
+    /// Name of the class that its object is labelled as; none of a distractor.
+    pub(super) fn label_class(&self) -> Option<&str> {
+        self.role.is_object().then_some(&self.class)
     }
 
     /// The object of this entry with one cut-out.
     pub(super) fn asset_with(&self, photo: PhotoRecord) -> Asset<PhotoRecord> {
         Asset {
             name: self.asset.clone(),
+            role: self.role,
             class: self.class.clone(),
             thickness: self.thickness,
             mass: self.mass,

@@ -38,7 +38,7 @@ pub fn add_photo(
 ) -> Result<Photo> {
     let folder = folder.as_ref();
     let mut manifest = read_or_new(folder)?;
-    manifest.add_classes(classes, std::iter::once(entry.class.as_str()))?;
+    manifest.add_classes(classes, entry.label_class().into_iter())?;
     entry.check(&manifest)?;
     let writer = CutOutWriter {
         folder,

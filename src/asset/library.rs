@@ -87,12 +87,13 @@ impl Library {
         self.assets.iter().find(|asset| asset.name == name)
     }
 
-    /// Place of an asset's class in the list.
+    /// Place of an asset's class in the list; none of a distractor.
     ///
     /// # Panics
     /// When the asset is none of this library and has a class of its own.
-    pub fn class_number(&self, asset: &Asset<Photo>) -> u32 {
-        class_number(&self.classes, &asset.class).expect("a class of the library")
+    pub fn class_number(&self, asset: &Asset<Photo>) -> Option<u32> {
+        let class = asset.label_class()?;
+        Some(class_number(&self.classes, class).expect("a class of the library"))
     }
 }
 
@@ -189,6 +190,7 @@ fn texture_coordinates(outline_px: &[[f64; 2]], (w, h): (usize, usize)) -> Arc<[
 #[cfg(test)]
 mod tests {
     use super::super::manifest::tests::photo;
+    use super::super::role::Role;
     use super::*;
     use crate::pixel::PremulRgba;
 
@@ -197,6 +199,7 @@ mod tests {
         let photos = vec![photo("a.exr")];
         let record = Asset {
             name: "a".into(),
+            role: Role::Object,
             class: "label".into(),
             thickness: 0.01,
             mass: 0.02,
@@ -221,7 +224,10 @@ mod tests {
         let folder = folder_with(Some((40, 20)));
         let library = Library::open(folder.path()).unwrap();
         let asset = library.find("a").unwrap();
-        assert_eq!((library.class_number(asset), asset.photos.len()), (2, 1));
+        assert_eq!(
+            (library.class_number(asset), asset.photos.len()),
+            (Some(2), 1)
+        );
         assert_eq!(
             asset.photos[0].texture.texel(3, 3),
             PremulRgba::new(0.25, 0.5, 0.125, 0.75).into()

@@ -20,6 +20,12 @@ use std::path::{Path, PathBuf};
 /// class = "cap"
 /// length = 0.265              # metres by a tape measure, and width where it is known
 /// # or: px_per_metre = 1966.7, screen_size = [0.60, 0.40], marker_size = 0.05
+///
+/// [[photos]]
+/// file = "IMG_0002.jpg"
+/// asset = "ring_01"
+/// role = "distractor"         # falls and hides others, but has no class and no label
+/// length = 0.031
 /// ```
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -67,7 +73,7 @@ impl List {
     /// [`Error::Value`] for the first value that cannot be right, naming the entry.
     pub(super) fn check(&self, manifest: &mut Manifest) -> Result<()> {
         self.cut_out.check().map_err(|e| e.within("cut_out"))?;
-        let classes = self.photos.iter().map(|photo| photo.class.as_str());
+        let classes = self.photos.iter().filter_map(PhotoEntry::label_class);
         manifest.add_classes(&self.classes, classes)?;
         if self.photos.is_empty() {
             return Err(Error::value("photos", "empty, expected at least one"));
@@ -185,6 +191,26 @@ mod tests {
             with_actual_spelling(folder.path().join("a.jpg")),
             folder.path().join("a.jpg")
         );
+    }
+
+    #[test]
+    fn a_distractor_of_a_list_has_no_class_in_either_form() {
+        let folder = tempfile::tempdir().unwrap();
+        let csv = "file,asset,role,class,length\na.png,a,,cap,0.2\nb.png,b,distractor,,0.03\n";
+        let toml = "[[photos]]\nfile = \"a.png\"\nasset = \"a\"\nclass = \"cap\"\nlength = 0.2\n\
+                    [[photos]]\nfile = \"b.png\"\nasset = \"b\"\nrole = \"distractor\"\nlength = 0.03\n";
+        for (name, text) in [("photos.csv", csv), ("photos.toml", toml)] {
+            let path = folder.path().join(name);
+            std::fs::write(&path, text).unwrap();
+            let mut list = List::read(&path).unwrap();
+            let mut manifest = Manifest::default();
+            list.check(&mut manifest).unwrap();
+            assert_eq!(manifest.classes, ["cap"], "{name}");
+            list.photos[0].class.clear();
+            let told = list.check(&mut manifest).unwrap_err().to_string();
+            let expected = "photos[0].class: missing, expected its name, or role = \"distractor\"";
+            assert_eq!(told, expected);
+        }
     }
 
     #[test]

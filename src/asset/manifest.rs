@@ -1,6 +1,7 @@
 //! The manifest of an asset folder: what is in it, as TOML.
 
 use super::MANIFEST;
+use super::role::Role;
 use crate::bounds::{Bounds, MASS, OBJECT, PX_PER_METRE, THICKNESS, WIDTH};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
@@ -32,7 +33,12 @@ pub struct Manifest {
 pub struct Asset<P> {
     /// Its name: letters and digits of any language, `_`, `-` and `.`.
     pub name: String,
-    /// Name of its class.
+    /// What it is in pictures for. Default: `object`.
+    #[serde(default, skip_serializing_if = "Role::is_object")]
+    pub role: Role,
+    /// Name of its class; of a distractor a word for people, which is in no list of classes and
+    /// may be missing.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
     pub class: String,
     /// Thickness of the body that falls, metres.
     pub thickness: f64,
@@ -122,10 +128,16 @@ impl From<CodedOrPlain> for Diagnostic {
 }
 
 impl<P> Asset<P> {
+    /// Name of the class that it is labelled as; none of a distractor.
+    pub(super) fn label_class(&self) -> Option<&str> {
+        self.role.is_object().then_some(&self.class)
+    }
+
     /// The same object with its photos in another form.
     pub(super) fn with_photos<Q>(self, photos: Vec<Q>) -> Asset<Q> {
         Asset {
             name: self.name,
+            role: self.role,
             class: self.class,
             thickness: self.thickness,
             mass: self.mass,
@@ -158,7 +170,7 @@ impl Manifest {
         let mut manifest: Self = io::read_toml(&path)?;
         if manifest.classes.is_empty() {
             let Self { classes, assets } = &mut manifest;
-            append_new(classes, assets.iter().map(|asset| asset.class.as_str()));
+            append_new(classes, assets.iter().filter_map(Asset::label_class));
         }
         manifest.check().map_err(|e| e.in_file(&path))?;
         Ok(manifest)
@@ -236,8 +248,17 @@ impl Manifest {
         })
     }
 
+    /// Fails on a class of objects that is not in the list; that of a distractor is in none.
+    pub(super) fn check_class_of(&self, role: Role, class: &str) -> Result<()> {
+        match role {
+            Role::Object => self.class(class).map(drop),
+            Role::Distractor if class.is_empty() => Ok(()),
+            Role::Distractor => check_class(class),
+        }
+    }
+
     fn check(&self) -> Result<()> {
-        if self.classes.is_empty() {
+        if self.classes.is_empty() && self.assets.iter().any(|asset| asset.role.is_object()) {
             return Err(Error::value("classes", "empty, expected at least one"));
         }
         check_unique("classes", self.classes.iter().map(String::as_str))?;
@@ -246,7 +267,7 @@ impl Manifest {
         check_unique("assets", names)?;
         check_each(&self.assets, "assets", |asset| {
             asset.check()?;
-            self.class(&asset.class).map(drop)
+            self.check_class_of(asset.role, &asset.class)
         })
     }
 }
@@ -254,6 +275,7 @@ impl Manifest {
 impl Asset<PhotoRecord> {
     /// Takes in the photos and the body of the same asset.
     fn merge(&mut self, asset: Self) -> Result<()> {
+        self.check_same_role(asset.role)?;
         if self.class != asset.class {
             let what = format!(
                 "\"{}\", but asset \"{}\" is \"{}\"",
@@ -267,6 +289,14 @@ impl Asset<PhotoRecord> {
             self.photos.push(photo);
         }
         Ok(())
+    }
+
+    fn check_same_role(&self, role: Role) -> Result<()> {
+        if self.role == role {
+            return Ok(());
+        }
+        let what = format!("{role}, but asset \"{}\" is {}", self.name, self.role);
+        Err(Error::value("role", what))
     }
 
     fn check(&self) -> Result<()> {
@@ -476,6 +506,7 @@ pub(super) mod tests {
         let photos = vec![photo(&format!("{name}/1.exr"))];
         Asset {
             name: name.into(),
+            role: Role::Object,
             class: class.into(),
             thickness: 0.005,
             mass: 0.02,
@@ -599,6 +630,45 @@ pub(super) mod tests {
                 .unwrap_err()
                 .contains("is there twice")
         );
+    }
+
+    fn with_ring() -> Manifest {
+        let ring = Asset {
+            role: Role::Distractor,
+            ..asset("ring", "")
+        };
+        let mut manifest = two();
+        manifest.assets.push(ring);
+        manifest
+    }
+
+    #[test]
+    fn a_distractor_needs_no_class_and_adds_none() {
+        let folder = tempfile::tempdir().unwrap();
+        with_ring().write(folder.path()).unwrap();
+        let path = folder.path().join(MANIFEST);
+        let text = std::fs::read_to_string(&path).unwrap();
+        assert_eq!(text.matches("role = ").count(), 1, "{text}");
+        let mut undeclared = with_ring();
+        undeclared.assets[2].class = "rubbish".into();
+        undeclared.classes.clear();
+        std::fs::write(&path, toml::to_string(&undeclared).unwrap()).unwrap();
+        assert_eq!(
+            Manifest::read(folder.path()).unwrap().classes,
+            ["cap", "none"]
+        );
+        undeclared.assets.retain(|asset| !asset.role.is_object());
+        undeclared.write(folder.path()).unwrap();
+    }
+
+    #[test]
+    fn an_object_does_not_become_a_distractor_by_another_photo() {
+        let mut manifest = with_ring();
+        let told = manifest
+            .insert(asset("ring", "cap"))
+            .unwrap_err()
+            .to_string();
+        assert_eq!(told, "role: object, but asset \"ring\" is distractor");
     }
 
     #[test]

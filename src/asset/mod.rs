@@ -23,6 +23,7 @@ mod measure;
 mod moments;
 mod panorama;
 mod rectified;
+mod role;
 mod scale;
 mod screen_pose;
 mod screen_source;
@@ -51,6 +52,8 @@ pub use manifest::{Manifest, PhotoRecord};
 #[doc(hidden)]
 pub use moments::{Moments, Piece};
 pub use panorama::Panorama;
+#[doc(hidden)]
+pub use role::Role;
 pub use scale::Scale;
 pub use screen_source::ScreenSource;
 pub use texture::Texture;

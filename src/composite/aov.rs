@@ -250,7 +250,7 @@ mod tests {
         };
         let card = |id, z: f64, alpha: f32| Card {
             id: ObjectId(id),
-            class: 0,
+            class: Some(0),
             quad: Quad {
                 world_from_card: Pose::translation(0.02 * z, 0.0, z),
                 size: [0.4, 0.3],

@@ -4,9 +4,9 @@ use crate::dataset::formats::is_exact;
 use crate::dataset::paths::create_part_folders;
 use crate::dataset::{Entry, Extent, LabelledObject, Part, PictureFormat, Writer, Written};
 use crate::error::{Error, Result};
-use crate::geom::Point2;
+use crate::geom::{BBox, Point2};
 use crate::io;
-use crate::label::{RleMask, trace};
+use crate::label::{ObjectLabel, RleMask, trace};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use std::io::Write;
@@ -32,7 +32,10 @@ fn document(part: Part) -> PathBuf {
 /// The id of an image is its number; categories are numbered from 1, since trainers take 0 for
 /// background, and so are annotations, since COCO's evaluation takes 0 for none. Objects that are
 /// to be ignored are `iscrowd`, with run lengths whatever `masks` says. Annotations also have
-/// `visible_fraction` and `topmost`, which other programs pass over.
+/// `visible_fraction` and `topmost`, which other programs pass over; with `labels.max_truncation`
+/// also `truncation` (the share outside of the picture), `amodal_bbox` (around the whole outline,
+/// beyond the picture's edges too) and `visible_bbox` (around what is seen; missing where nothing
+/// is).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Coco {
@@ -87,6 +90,13 @@ struct Annotation {
     iscrowd: u8,
     visible_fraction: f64,
     topmost: bool,
+    /// Share of it outside of the picture, and both boxes, where `max_truncation` asks.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    truncation: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    amodal_bbox: Option<[f64; 4]>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    visible_bbox: Option<[f64; 4]>,
     segmentation: Segmentation,
 }
 
@@ -166,11 +176,14 @@ impl Coco {
             id: annotation_id(k, object.id.0)?,
             image_id: k,
             category_id: label.class + 1,
-            bbox: [b.x0, b.y0, b.width(), b.height()],
+            bbox: bbox_of(&b),
             area: mask.area(),
             iscrowd: u8::from(label.ignored),
             visible_fraction: object.visible_fraction,
             topmost: object.is_topmost(),
+            truncation: object.truncation.map(|t| t.fraction),
+            amodal_bbox: object.truncation.map(|t| bbox_of(&t.whole_box)),
+            visible_bbox: visible_bbox(object),
             segmentation: self.segmentation(mask, label.ignored),
         }))
     }
@@ -192,6 +205,17 @@ impl Coco {
             _ => Vec::new(),
         }
     }
+}
+
+/// Left, top, width, height.
+fn bbox_of(b: &BBox) -> [f64; 4] {
+    [b.x0, b.y0, b.width(), b.height()]
+}
+
+/// Beside the box of the whole object; none where nothing of it is seen.
+fn visible_bbox(object: &ObjectLabel) -> Option<[f64; 4]> {
+    let is_told = object.truncation.is_some() && !object.visible_box.is_empty();
+    is_told.then(|| bbox_of(&object.visible_box))
 }
 
 fn annotation_id(k: u64, object: u32) -> Result<u64> {

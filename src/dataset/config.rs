@@ -201,11 +201,12 @@ mod tests {
             [""; 0],
             "not in template.toml, or otherwise"
         );
-        assert_eq!(
-            missing(&all, &told, ""),
-            examples(),
-            "only in template.toml"
-        );
+        let mut only_told = missing(&all, &told, "");
+        // A key that files need not have is there by its default.
+        only_told.retain(|line| {
+            toml::from_str::<DatasetConfig>(line).ok() != Some(DatasetConfig::default())
+        });
+        assert_eq!(only_told, examples(), "only in template.toml");
         assert_eq!(
             toml::from_str::<DatasetConfig>(DatasetConfig::template()).unwrap(),
             DatasetConfig::default()
@@ -225,7 +226,7 @@ mod tests {
     fn an_example_in_the_template_is_taken_as_it_stands() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("recipe.toml");
-        assert_eq!(examples().len(), 1);
+        assert_eq!(examples().len(), 2);
         for example in examples() {
             io::write_text(&path, &example).unwrap();
             let config = DatasetConfig::read(&path, &[]).unwrap();

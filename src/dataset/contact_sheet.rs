@@ -10,8 +10,8 @@ use crate::error::Result;
 use crate::filter::resize;
 use crate::image::Image;
 use crate::io;
-use crate::label::Labels;
 use crate::label::overlay::{UNLABELLED, draw_labels};
+use crate::label::{Labels, ObjectLabel};
 use crate::pixel::{LinearRgb, ObjectId, Srgb8};
 use rayon::prelude::*;
 use std::path::Path;
@@ -295,9 +295,19 @@ impl LegendEntry {
 fn legend_entries(classes: &[String], tiles: &[ContactTile], width: usize) -> Vec<LegendEntry> {
     let (labelled, unlabelled) = count_objects(classes.len(), tiles);
     let mut entries = class_entries(classes, &labelled);
-    let text = format!("no label, another lies over it ({unlabelled})");
-    entries.push((UNLABELLED, text));
+    let why = why_unlabelled(tiles);
+    entries.push((UNLABELLED, format!("no label, {why} ({unlabelled})")));
     place_entries(entries, width)
+}
+
+/// Truncation takes a label only where it was measured.
+fn why_unlabelled(tiles: &[ContactTile]) -> &'static str {
+    let mut objects = tiles.iter().flat_map(|tile| &tile.labels.objects);
+    if objects.any(ObjectLabel::is_too_truncated) {
+        "another lies over it, or the picture's edge cuts it off"
+    } else {
+        "another lies over it"
+    }
 }
 
 fn class_entries(classes: &[String], counts: &[usize]) -> Vec<(Srgb8, String)> {

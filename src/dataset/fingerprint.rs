@@ -44,13 +44,17 @@ pub(super) fn fingerprint(
 }
 
 fn of_asset(asset: &Asset<Photo>) -> Value {
-    json!({
+    let mut told = json!({
         "name": asset.name,
         "class": asset.class,
         "thickness": asset.thickness,
         "mass": asset.mass,
         "photos": asset.photos.iter().map(of_photo).collect::<Vec<_>>(),
-    })
+    });
+    if !asset.role.is_object() {
+        told["role"] = json!(asset.role);
+    }
+    told
 }
 
 fn of_photo(photo: &Photo) -> Value {

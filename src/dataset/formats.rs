@@ -20,6 +20,9 @@ pub struct LabelConfig {
     /// When an object is obstructed: the key `overlap_iou` or the key `min_visible`. Default:
     /// `overlap_iou = 0`, when another lies over it, any overlap.
     pub obstruction: ObstructionRule,
+    /// An object has no label when more than this share of its outline lies outside of the picture,
+    /// 0 to 1; truncation and the box of the whole outline are then told as well. Default: none.
+    pub max_truncation: Option<f64>,
     /// A pixel belongs to an object when more than this share of it is covered. Default: 0.1.
     pub alpha_threshold: f32,
     /// What an amodal box is drawn around: `mask` or `outline`. Default: `mask`.
@@ -83,11 +86,13 @@ impl Default for LabelConfig {
         let LabelOptions {
             amodal,
             alpha_threshold,
+            max_truncation,
             obstruction,
         } = LabelOptions::default();
         Self {
             obstructed: Obstructed::default(),
             obstruction,
+            max_truncation,
             alpha_threshold,
             amodal,
             simplify: 0.0,
@@ -106,7 +111,11 @@ impl LabelConfig {
     /// [`Error::Value`](crate::Error::Value) for the first number that cannot be right.
     pub fn check(&self) -> Result<()> {
         self.obstruction.check()?;
-        Bounds::new(0.0, 1.0, "a share").check("alpha_threshold", self.alpha_threshold.into())?;
+        let share = Bounds::new(0.0, 1.0, "a share");
+        if let Some(max) = self.max_truncation {
+            share.check("max_truncation", max)?;
+        }
+        share.check("alpha_threshold", self.alpha_threshold.into())?;
         Bounds::new(0.0, 1000.0, "pixels").check("simplify", self.simplify)?;
         Bounds::new(1.0, 1e6, "samples in an archive")
             .check("webdataset.samples", self.webdataset.samples as f64)
@@ -117,6 +126,7 @@ impl LabelConfig {
         LabelOptions {
             amodal: self.amodal,
             alpha_threshold: self.alpha_threshold,
+            max_truncation: self.max_truncation,
             obstruction: self.obstruction,
         }
     }
@@ -204,6 +214,8 @@ mod tests {
             ("overlap_iou = nan", "overlap_iou: NaN"),
             ("min_visible = 1.01", "min_visible: 1.01"),
             ("min_visible = -0.1", "min_visible: -0.1"),
+            ("max_truncation = 1.5", "max_truncation: 1.5"),
+            ("max_truncation = -0.5", "max_truncation: -0.5"),
         ] {
             let e = toml::from_str::<LabelConfig>(recipe)
                 .unwrap()

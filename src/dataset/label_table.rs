@@ -13,6 +13,8 @@ pub(super) struct LabelTable {
     overlap_iou: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     min_visible: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    max_truncation: Option<f64>,
     alpha_threshold: f32,
     amodal: AmodalBox,
     simplify: f64,
@@ -42,6 +44,7 @@ impl From<LabelConfig> for LabelTable {
             obstructed: config.obstructed,
             overlap_iou: rule.overlap_iou,
             min_visible: rule.min_visible,
+            max_truncation: config.max_truncation,
             alpha_threshold: config.alpha_threshold,
             amodal: config.amodal,
             simplify: config.simplify,
@@ -62,6 +65,7 @@ impl TryFrom<LabelTable> for LabelConfig {
         Ok(Self {
             obstruction: table.rule()?,
             obstructed: table.obstructed,
+            max_truncation: table.max_truncation,
             alpha_threshold: table.alpha_threshold,
             amodal: table.amodal,
             simplify: table.simplify,

@@ -1,5 +1,6 @@
 //! One EXR file for each image with everything a compositor asks for.
 
+use crate::asset::Role;
 use crate::dataset::paths::create_part_folders;
 use crate::dataset::{Entry, Sample, Writer};
 use crate::deep::{DeepImage, DeepSample};
@@ -25,7 +26,8 @@ use std::path::{Path, PathBuf};
 /// | `object003.R G B A` | light of one object that reaches the eye, and its seen share (`cards`) |
 /// | `object003.Z`, `amodal003.A` | its depth, and its coverage as if alone (`cards`) |
 ///
-/// Objects are called `object003_CLASS` in the Cryptomatte's list. Without film,
+/// Objects are called `object003_CLASS` in the Cryptomatte's list, distractors
+/// `object003_distractor`. Without film,
 /// `RGB = sum of object RGB + background * shadow * (1 - sum of object A)`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -56,8 +58,8 @@ impl Writer for Layers {
         let mut channels = picture_channels(&sample.frame, &sample.deep);
         channels.extend(ids.channels);
         if self.cards {
-            let objects = sample.labels.objects.iter();
-            channels.extend(objects.flat_map(|o| object_channels(&sample.deep, o.id)));
+            let ids = object_names(entry).into_iter().map(|(id, _)| id);
+            channels.extend(ids.flat_map(|id| object_channels(&sample.deep, id)));
         }
         let mut notes = ids.metadata;
         notes.extend(provenance(entry));
@@ -67,12 +69,13 @@ impl Writer for Layers {
     }
 }
 
-fn name(id: ObjectId, class: u32, classes: &[String]) -> String {
-    let class = classes
-        .get(class as usize)
-        .cloned()
-        .unwrap_or_else(|| class.to_string());
-    format!("object{:03}_{class}", id.0)
+fn name(id: ObjectId, what: &str) -> String {
+    format!("object{:03}_{what}", id.0)
+}
+
+fn class_name(class: u32, classes: &[String]) -> String {
+    let name = classes.get(class as usize).cloned();
+    name.unwrap_or_else(|| class.to_string())
 }
 
 /// What the file says of where it comes from.
@@ -142,10 +145,12 @@ fn cryptomatte(entry: &Entry<'_>) -> Cryptomatte {
 }
 
 fn object_names(entry: &Entry<'_>) -> Vec<(ObjectId, String)> {
-    let objects = entry.sample.labels.objects.iter();
-    objects
-        .map(|o| (o.id, name(o.id, o.class, entry.classes)))
-        .collect()
+    let labels = &entry.sample.labels;
+    let objects = labels.objects.iter();
+    let objects = objects.map(|o| (o.id, name(o.id, &class_name(o.class, entry.classes))));
+    let distractors = labels.distractors.iter();
+    let distractors = distractors.map(|d| (d.id, name(d.id, &Role::Distractor.to_string())));
+    objects.chain(distractors).collect()
 }
 
 /// Depth of the first sample of a pixel of which enough is seen to belong to a mask.

@@ -9,6 +9,9 @@ pub(crate) const OBSTRUCTED: &str = "obstructed";
 
 /// What happens to the labels of obstructed objects, those that are not
 /// [topmost](ObjectLabel::is_topmost).
+///
+/// Objects that are [too truncated](ObjectLabel::is_too_truncated) have no label, obstructed or not;
+/// under `ignore` they are labelled as to be ignored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Obstructed {
@@ -66,14 +69,17 @@ impl Obstructed {
             class: object.class,
             ignored: false,
         };
+        let ignored = LabelledObject {
+            ignored: true,
+            ..plain
+        };
         match self {
+            Self::Ignore if object.is_too_truncated() => Some(ignored),
+            _ if object.is_too_truncated() => None,
             _ if object.is_topmost() => Some(plain),
             Self::Drop => None,
             Self::Keep => Some(plain),
-            Self::Ignore => Some(LabelledObject {
-                ignored: true,
-                ..plain
-            }),
+            Self::Ignore => Some(ignored),
             Self::Class => Some(LabelledObject {
                 class: class_count.saturating_sub(1) as u32,
                 ..plain
@@ -95,6 +101,7 @@ fn check_is_free(classes: &[String]) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::label::Truncation;
     use crate::pixel::ObjectId;
 
     fn pair() -> Labels {
@@ -112,6 +119,7 @@ mod tests {
         Labels {
             image: [8, 8],
             objects: vec![below, above],
+            ..Labels::default()
         }
     }
 
@@ -132,6 +140,24 @@ mod tests {
         assert_eq!(told(Obstructed::Keep), [(1, 1, false), (2, 0, false)]);
         assert_eq!(told(Obstructed::Ignore), [(1, 1, true), (2, 0, false)]);
         assert_eq!(told(Obstructed::Class), [(1, 2, false), (2, 0, false)]);
+    }
+
+    #[test]
+    fn what_is_cut_off_too_much_has_no_label_or_one_to_be_ignored() {
+        let mut labels = pair();
+        labels.objects[1].truncation = Some(Truncation {
+            above_max: true,
+            ..Truncation::default()
+        });
+        let told = |policy: Obstructed| {
+            let labelled = policy.labelled(&labels, 2);
+            let told = labelled.iter().map(|l| (l.object.id.0, l.ignored));
+            told.collect::<Vec<_>>()
+        };
+        assert_eq!(told(Obstructed::Drop), []);
+        assert_eq!(told(Obstructed::Keep), [(1, false)]);
+        assert_eq!(told(Obstructed::Class), [(1, false)]);
+        assert_eq!(told(Obstructed::Ignore), [(1, true), (2, true)]);
     }
 
     #[test]

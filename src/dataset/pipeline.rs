@@ -92,9 +92,10 @@ impl Pipeline {
         Err(Error::value("surface", what).in_file(&place.label))
     }
 
-    /// Median length of the objects in the library.
+    /// Median length of the objects in the library, distractors left out.
     fn median_object_m(&self) -> Option<f64> {
-        let photos = self.library.assets.iter().flat_map(|asset| &asset.photos);
+        let objects = self.library.assets.iter().filter(|a| a.role.is_object());
+        let photos = objects.flat_map(|asset| &asset.photos);
         let lengths = photos.map(|photo| photo.record.object_m[0]);
         let mut lengths: Vec<f64> = lengths.collect();
         lengths.sort_by(f64::total_cmp);

@@ -190,11 +190,15 @@ mod tests {
             (odd.gravity, odd.attempts)
         );
         let mut config = DatasetConfig::default();
-        config.scene.objects = crate::scene::Range::fixed(3.0);
+        config.scene.objects = crate::scene::Count::fixed(3);
         config.pictures.exr = true;
         let draft = Quality::Draft.config(config.clone());
         assert_eq!(
-            (draft.scene.objects, draft.labels.clone(), draft.pictures),
+            (
+                draft.scene.objects.clone(),
+                draft.labels.clone(),
+                draft.pictures
+            ),
             (config.scene.objects, config.labels, config.pictures)
         );
         assert_eq!(draft.render, Quality::Draft.render());

@@ -1,5 +1,6 @@
 //! Everything a dataset on disk tells of itself, gathered for a report.
 
+use crate::asset::Role;
 use crate::dataset::folder;
 use crate::dataset::journal::lines_of;
 use crate::dataset::journal_line::JournalLine;
@@ -9,7 +10,7 @@ use crate::error::Result;
 use crate::geom::BBox;
 use crate::io;
 use crate::label::ObjectLabel;
-use crate::scene::{Recipe, Scene};
+use crate::scene::{Distribution, Recipe, Scene};
 use rayon::prelude::*;
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -75,6 +76,8 @@ pub enum UnlabelledReason {
     Covered,
     /// Nothing of it lies in the picture.
     Outside,
+    /// Too much of it lies outside of the picture.
+    Truncated,
     /// The recipe or the format leaves it out.
     LeftOut,
 }
@@ -85,6 +88,7 @@ impl UnlabelledReason {
         match self {
             Self::Covered => "another object lies over it",
             Self::Outside => "nothing of it lies in the picture",
+            Self::Truncated => "too much of it lies outside of the picture",
             Self::LeftOut => "left out by the recipe",
         }
     }
@@ -95,6 +99,7 @@ impl UnlabelledReason {
         match (labelled, object.amodal_box.is_empty(), object.is_topmost()) {
             (_, true, _) => Some(Self::Outside),
             (true, ..) => None,
+            (false, ..) if object.is_too_truncated() => Some(Self::Truncated),
             (false, _, false) => Some(Self::Covered),
             (false, ..) => Some(Self::LeftOut),
         }
@@ -171,13 +176,21 @@ impl Summary {
         })
     }
 
-    /// The distribution of a drawn number: least and greatest value, and whether it is an integer.
-    pub fn range(&self, key: &str) -> Option<([f64; 2], bool)> {
+    /// The distribution of a drawn number.
+    pub fn distribution(&self, key: &str) -> Option<Distribution> {
         let range = match self.narrowed_recipe()?.pointer(&json_pointer(key))? {
-            Value::Array(ends) if ends.len() == 2 => [ends[0].as_f64()?, ends[1].as_f64()?],
+            Value::Array(ends) => ends_of(ends)?,
+            Value::Object(histogram) => {
+                let values = histogram.get("values")?.as_array()?;
+                return Some(Distribution::Weighted(ends_of(values)?));
+            }
             fixed => [fixed.as_f64()?; 2],
         };
-        Some((range, key == "objects"))
+        Some(if ["objects", "distractors"].contains(&key) {
+            Distribution::Whole(range)
+        } else {
+            Distribution::Uniform(range)
+        })
     }
 
     /// As JSON, without what is switched off.
@@ -212,7 +225,10 @@ impl Summary {
     fn add_choices(&mut self, drawn: &Scene) {
         self.count("background", drawn.plate.clone());
         for object in &drawn.objects {
-            self.count("asset", object.asset.clone());
+            match object.role {
+                Role::Object => self.count("asset", object.asset.clone()),
+                Role::Distractor => self.count("distractor", object.asset.clone()),
+            }
             self.count("photo of the asset", object.photo.to_string());
         }
     }
@@ -289,13 +305,15 @@ fn key(path: &str) -> Option<String> {
 }
 
 fn is_choice(path: &str) -> bool {
-    let names = [".asset", ".photo", ".file"];
+    let names = [".asset", ".photo", ".file", ".order"];
     path == "background" || names.iter().any(|name| path.ends_with(name))
 }
 
-/// `hue` of `objects[2].hue`.
+/// `hue` of `objects[2].hue` and of `distractors[0].hue`.
 fn object_key(path: &str) -> Option<&str> {
-    let (_, own) = path.strip_prefix("objects[")?.split_once("].")?;
+    let roles = ["objects[", "distractors["];
+    let numbered = roles.iter().find_map(|role| path.strip_prefix(role))?;
+    let (_, own) = numbered.split_once("].")?;
     Some(own)
 }
 
@@ -309,6 +327,11 @@ fn labelled_objects(record: &SampleRecord) -> Vec<&ObjectLabel> {
 
 fn count_in_part(lines: &[JournalLine], part: Part) -> usize {
     lines.iter().filter(|line| line.part == part).count()
+}
+
+/// The first and the last of ascending numbers.
+fn ends_of(numbers: &[Value]) -> Option<[f64; 2]> {
+    Some([numbers.first()?.as_f64()?, numbers.last()?.as_f64()?])
 }
 
 /// `/objects/2/hue` of `objects[2].hue`.
@@ -352,6 +375,8 @@ mod tests {
             "lights[0].color[1]",
             "selection.objects",
             "selection[3].asset",
+            "distractors[0].start.order",
+            "distractors[0].start.gap",
         ]
         .map(key);
         assert_eq!(
@@ -360,7 +385,9 @@ mod tests {
                 Some("start.x".into()),
                 Some("lights[0].color[1]".into()),
                 Some("objects".into()),
-                None
+                None,
+                None,
+                Some("start.gap".into()),
             ]
         );
         assert_eq!(key("objects[1].start.yaw_deg#3"), None);

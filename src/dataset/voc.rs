@@ -5,6 +5,7 @@ use crate::dataset::{Entry, Extent, LabelledObject, Part, PictureFormat, Writer,
 use crate::error::Result;
 use crate::geom::BBox;
 use crate::io;
+use crate::label::ObjectLabel;
 use serde::{Deserialize, Serialize};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -12,8 +13,9 @@ use std::path::{Path, PathBuf};
 /// Writes `voc/{train,val}/NNNNNN.xml` and the lists `voc/{train,val}.txt`.
 ///
 /// Pixels are counted from 1 and the last is inside, as in the Pascal VOC challenges. `truncated`
-/// is an object that touches the picture's edge, `occluded` one that something lies over,
-/// `difficult` one that is to be ignored.
+/// is an object that touches the picture's edge, with `labels.max_truncation` one whose outline
+/// reaches beyond it; `occluded` is one that something lies over, `difficult` one that is to be
+/// ignored. Boxes end at the picture's edges.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Voc {
@@ -79,7 +81,7 @@ impl Voc {
         }
         let name = class_name(entry, label.class);
         let claims = [
-            ("truncated", is_cut(&b, entry.sample.labels.image)),
+            ("truncated", is_truncated(label.object, &b, entry)),
             ("difficult", label.ignored),
             ("occluded", !label.object.is_topmost()),
         ];
@@ -122,6 +124,14 @@ fn side_elements(b: &BBox) -> String {
     pixels(b)
         .map(|(side, at)| format!("      <{side}>{at}</{side}>\n"))
         .concat()
+}
+
+/// By its outline, where that was measured.
+fn is_truncated(object: &ObjectLabel, b: &BBox, entry: &Entry<'_>) -> bool {
+    match object.truncation {
+        Some(truncation) => truncation.fraction > 0.0,
+        None => is_cut(b, entry.sample.labels.image),
+    }
 }
 
 /// The object reaches a border of the image.

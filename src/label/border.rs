@@ -55,6 +55,7 @@ mod tests {
         let labels = Labels {
             image: [9, 9],
             objects: vec![object],
+            ..Labels::default()
         };
         let [exact, loose] = [0.0, 1.0].map(|tolerance| borders(&labels, tolerance).remove(0));
         assert_eq!(

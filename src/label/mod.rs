@@ -24,6 +24,7 @@
 //! ```
 
 mod border;
+mod distractor;
 pub(crate) mod gallery;
 mod mask;
 mod obstruction;
@@ -34,16 +35,21 @@ mod simplify;
 mod topmost;
 #[doc(hidden)]
 pub mod trace;
+mod truncation;
 mod visibility;
 
 #[doc(hidden)]
 pub use border::{Border, borders};
+#[doc(hidden)]
+pub use distractor::Distractor;
 pub use mask::RleMask;
 pub use obstruction::ObstructionRule;
 pub(crate) use obstruction::RuleInFile;
 #[doc(hidden)]
 pub use overlay::overlay;
 pub use topmost::cyclic_overlaps;
+#[doc(hidden)]
+pub use truncation::Truncation;
 pub use visibility::DepthRange;
 
 use crate::camera::Camera;
@@ -62,6 +68,9 @@ pub struct Labels {
     pub image: [u32; 2],
     /// One entry per object that touches the picture, in order of id.
     pub objects: Vec<ObjectLabel>,
+    /// What touches the picture and has no label: it is in the way, in order of id.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub distractors: Vec<Distractor>,
 }
 
 /// Everything known of one object in one picture.
@@ -90,7 +99,7 @@ pub struct ObjectLabel {
     pub visible_fraction: f64,
     /// How far away it is.
     pub depth: DepthRange,
-    /// Objects that lie over it, by their outlines, in order of id.
+    /// Objects and distractors that lie over it, by their outlines, in order of id.
     pub covered_by: Vec<ObjectId>,
     /// Share of its outline that no other one lies over, 0 to 1; none by
     /// [`ObstructionRule::Overlap`], which does not ask.
@@ -100,15 +109,34 @@ pub struct ObjectLabel {
     /// [`ObstructionRule::Overlap`], where `covered_by` tells.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub obstructed: Option<bool>,
+    /// How far it reaches out of the picture; none where
+    /// [`max_truncation`](LabelOptions::max_truncation) does not ask.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub truncation: Option<Truncation>,
 }
 
 impl ObjectLabel {
+    /// The same with the share of its outline that no other one lies over, where a rule asks.
+    fn uncovered(self, fraction: Option<f64>, rule: ObstructionRule) -> Self {
+        Self {
+            uncovered_fraction: fraction,
+            obstructed: fraction.and_then(|share| rule.is_obstructed(share)),
+            ..self
+        }
+    }
+
     /// It is not obstructed, by the rule that it was labelled with: it can be picked.
     pub fn is_topmost(&self) -> bool {
         match self.obstructed {
             Some(obstructed) => !obstructed,
             None => self.covered_by.is_empty(),
         }
+    }
+
+    /// More of it lies outside of the picture than the options allow: it has no label.
+    pub fn is_too_truncated(&self) -> bool {
+        self.truncation
+            .is_some_and(|truncation| truncation.above_max)
     }
 }
 
@@ -122,6 +150,10 @@ pub struct LabelOptions {
     /// not for sums of coverage. Default: 0.1, under which thin film and the noise of a matte
     /// look alike.
     pub alpha_threshold: f32,
+    /// An object has no label when more than this share of its outline lies outside of the picture,
+    /// 0 to 1. Default: none, however little of it is inside; then truncation is not measured.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_truncation: Option<f64>,
     /// When an object is obstructed. Default: when another lies over it, any overlap.
     #[serde(flatten)]
     pub obstruction: ObstructionRule,
@@ -132,6 +164,7 @@ impl Default for LabelOptions {
         Self {
             amodal: AmodalBox::Mask,
             alpha_threshold: 0.1,
+            max_truncation: None,
             obstruction: ObstructionRule::default(),
         }
     }
@@ -159,6 +192,7 @@ struct Silhouette<'a> {
     card: &'a Card,
     region: MultiPolygon<f64>,
     visibility: ObjectVisibility,
+    truncation: Option<Truncation>,
 }
 
 /// Labels the picture `deep` of `shot`: every object with a box in the picture, in order of id.
@@ -173,12 +207,36 @@ pub fn label(deep: &DeepImage, shot: &Shot, options: &LabelOptions) -> Labels {
     let occluders = topmost::occluders(&objects, &shot.camera, options.obstruction.pair_iou());
     let uncovered: Vec<_> =
         uncovered_fractions(&objects, &occluders, options.obstruction).collect();
-    let pairs = objects.into_iter().zip(occluders).zip(uncovered);
-    let labels = pairs
-        .map(|((object, covered_by), uncovered)| object.into_label(options, covered_by, uncovered));
-    Labels {
+    let mut labels = Labels {
         image,
-        objects: labels.collect(),
+        ..Labels::default()
+    };
+    for ((object, covered_by), uncovered) in objects.into_iter().zip(occluders).zip(uncovered) {
+        labels.push(object, options, covered_by, uncovered);
+    }
+    labels
+}
+
+impl Labels {
+    /// Adds a card as what it is: an object of a class, or a distractor.
+    fn push(
+        &mut self,
+        silhouette: Silhouette<'_>,
+        options: &LabelOptions,
+        covered_by: Vec<ObjectId>,
+        uncovered: Option<f64>,
+    ) {
+        match silhouette.card.class {
+            Some(class) => {
+                let label = silhouette.into_label(class, options, covered_by);
+                self.objects
+                    .push(label.uncovered(uncovered, options.obstruction));
+            }
+            None => {
+                let distractor = silhouette.into_distractor(options, covered_by);
+                self.distractors.push(distractor);
+            }
+        }
     }
 }
 
@@ -215,6 +273,7 @@ fn silhouettes<'a>(
     let pairs = cards.into_iter().zip(visibilities);
     pairs
         .map(|(card, visibility)| Silhouette::new(card, &shot.camera, visibility))
+        .map(|silhouette| silhouette.measured(&shot.camera, options.max_truncation))
         .collect()
 }
 
@@ -230,6 +289,16 @@ impl<'a> Silhouette<'a> {
             card,
             region: outline::region(card, camera),
             visibility,
+            truncation: None,
+        }
+    }
+
+    /// The same with its truncation, where there is a most.
+    fn measured(self, camera: &Camera, max_truncation: Option<f64>) -> Self {
+        Self {
+            truncation: max_truncation
+                .map(|max| Truncation::new(self.card, camera, &self.region, max)),
+            ..self
         }
     }
 
@@ -242,15 +311,15 @@ impl<'a> Silhouette<'a> {
 
     fn into_label(
         self,
+        class: u32,
         options: &LabelOptions,
         covered_by: Vec<ObjectId>,
-        uncovered_fraction: Option<f64>,
     ) -> ObjectLabel {
         let amodal_box = self.amodal_box(options.amodal);
         let seen = self.visibility;
         ObjectLabel {
             id: self.card.id,
-            class: self.card.class,
+            class,
             outline_px: outline::rings(&self.region),
             amodal_box,
             visible_box: seen.visible.bounds(),
@@ -259,9 +328,25 @@ impl<'a> Silhouette<'a> {
             visible_mask: seen.visible,
             depth: seen.depth,
             covered_by,
-            uncovered_fraction,
-            obstructed: uncovered_fraction
-                .and_then(|share| options.obstruction.is_obstructed(share)),
+            uncovered_fraction: None,
+            obstructed: None,
+            truncation: self.truncation,
+        }
+    }
+
+    fn into_distractor(self, options: &LabelOptions, covered_by: Vec<ObjectId>) -> Distractor {
+        let amodal_box = self.amodal_box(options.amodal);
+        let seen = self.visibility;
+        Distractor {
+            id: self.card.id,
+            outline_px: outline::rings(&self.region),
+            amodal_box,
+            visible_box: seen.visible.bounds(),
+            visible_fraction: seen.fraction,
+            amodal_mask: seen.amodal,
+            visible_mask: seen.visible,
+            depth: seen.depth,
+            covered_by,
         }
     }
 }

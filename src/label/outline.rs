@@ -23,7 +23,7 @@ const NEAR_PLANE_M: f64 = 1e-4;
 /// Parts of an outline smaller than this are rounding, square pixels: `geo` snaps to a grid of
 /// 2^-30 of the extent, which along the sides of a picture of 32,768 pixels makes slivers of a
 /// hundredth of this.
-const SLIVER_AREA_PX2: f64 = 1e-2;
+pub(crate) const SLIVER_AREA_PX2: f64 = 1e-2;
 
 /// The part of the picture that lies inside a card's outline; empty where the card is out of sight
 /// or edge-on.
@@ -37,6 +37,24 @@ pub(crate) fn region(card: &Card, camera: &Camera) -> MultiPolygon<f64> {
     without_slivers(parts)
         .map(|part| part.map_coords(|c| clamp_to_picture(c, camera)))
         .collect()
+}
+
+/// All that lies inside a card's outline, beyond the picture's edges too; empty where the card is
+/// behind the camera or edge-on.
+pub(crate) fn whole(card: &Card, camera: &Camera) -> MultiPolygon<f64> {
+    let in_front = clip_to_front(in_camera(card, camera));
+    let px: Vec<_> = in_front.iter().map(|p| to_pixel(p, camera)).collect();
+    if !has_area(&px) {
+        return MultiPolygon(Vec::new());
+    }
+    let outline = Polygon::new(LineString(px), Vec::new());
+    without_slivers(unwound(&outline)).collect()
+}
+
+/// What an outline winds around.
+fn unwound(outline: &Polygon<f64>) -> MultiPolygon<f64> {
+    let nothing = MultiPolygon(Vec::new());
+    outline.union_with_fill_rule(&nothing, FillRule::NonZero)
 }
 
 /// The outline of the part in view, pixels.
@@ -104,11 +122,15 @@ fn in_camera(card: &Card, camera: &Camera) -> Vec<Vector3<f64>> {
 fn clip_to_view(outline: Vec<Vector3<f64>>, camera: &Camera) -> Vec<Vector3<f64>> {
     let [w, h] = camera.image.map(f64::from);
     let (f, c) = (camera.focal_px, camera.principal_px);
-    let far_enough = clip_to_half_space(outline, |p| p.z - NEAR_PLANE_M);
-    let right_of_left = clip_to_half_space(far_enough, |p| f.x * p.x + c.x * p.z);
+    let right_of_left = clip_to_half_space(clip_to_front(outline), |p| f.x * p.x + c.x * p.z);
     let left_of_right = clip_to_half_space(right_of_left, |p| (w - c.x) * p.z - f.x * p.x);
     let below_top = clip_to_half_space(left_of_right, |p| f.y * p.y + c.y * p.z);
     clip_to_half_space(below_top, |p| (h - c.y) * p.z - f.y * p.y)
+}
+
+/// The part that is far enough before the camera.
+fn clip_to_front(outline: Vec<Vector3<f64>>) -> Vec<Vector3<f64>> {
+    clip_to_half_space(outline, |p| p.z - NEAR_PLANE_M)
 }
 
 /// The part of a polygon where a linear function of the position is not negative.
@@ -176,15 +198,19 @@ mod tests {
 
     /// The part of the picture inside an outline on the grid.
     fn on_grid(corners: &[[u32; 2]]) -> MultiPolygon<f64> {
+        region(&card_on_grid(corners), &camera())
+    }
+
+    fn card_on_grid(corners: &[[u32; 2]]) -> Card {
         let uv = |&[x, y]: &[u32; 2]| {
             Point2::new(
                 f64::from(x) / f64::from(GRID),
                 f64::from(y) / f64::from(GRID),
             )
         };
-        let card = Card {
+        Card {
             id: ObjectId(1),
-            class: 0,
+            class: Some(0),
             quad: Quad {
                 world_from_card: Pose::identity(),
                 size: [1.0; 2],
@@ -193,8 +219,7 @@ mod tests {
             back: None,
             outline_uv: corners.iter().map(uv).collect::<Arc<[_]>>(),
             grade: Grade::default(),
-        };
-        region(&card, &camera())
+        }
     }
 
     /// Times that an outline winds around a point, by crossings of the line to its right.
@@ -244,6 +269,9 @@ mod tests {
             // A raster of one point a pixel is off by less than half a pixel for each pixel of border.
             let border = 2.0 * SIDE * corners.len() as f64;
             prop_assert!((found.unsigned_area() - count).abs() <= 0.5 * border);
+            // All of it lies in the picture.
+            let all = whole(&card_on_grid(&corners), &camera());
+            prop_assert!((all.unsigned_area() - found.unsigned_area()).abs() < 0.1);
         }
 
         #[test]

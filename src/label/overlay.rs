@@ -11,16 +11,21 @@ use crate::pixel::{PremulRgba, Srgb8};
 pub(crate) const UNLABELLED: Srgb8 = draw::rgb(0xC8, 0xC8, 0xC8);
 
 /// Draws labels onto a scene-linear picture (over black where it is transparent): a box with the
-/// name of its class around each topmost object, the outlines of the others in thin grey.
+/// name of its class around each topmost object that is not cut off too much, the outlines of the
+/// others in thin grey.
 ///
 /// `classes` are names in order; a class beyond them is named by its number.
 pub fn overlay(frame: &Image<PremulRgba>, labels: &Labels, classes: &[String]) -> Image<Srgb8> {
     let mut canvas = frame.map(|p| encode_srgb8(p.color()));
-    draw_labels(&mut canvas, labels, ObjectLabel::is_topmost);
-    for object in labels.objects.iter().filter(|o| o.is_topmost()) {
+    draw_labels(&mut canvas, labels, is_boxed);
+    for object in labels.objects.iter().filter(|o| is_boxed(o)) {
         draw_tag(&mut canvas, object, &name_or_number(object.class, classes));
     }
     canvas
+}
+
+fn is_boxed(object: &ObjectLabel) -> bool {
+    object.is_topmost() && !object.is_too_truncated()
 }
 
 fn name_or_number(class: u32, names: &[String]) -> String {

@@ -151,7 +151,7 @@ mod tests {
         let turn = UnitQuaternion::from_euler_angles(tilt, 0.2, 0.7);
         let card = Card {
             id: ObjectId(1),
-            class: 0,
+            class: Some(0),
             quad: Quad {
                 world_from_card: Pose::from_parts(Vector3::new(0.02, 0.0, 0.12).into(), turn),
                 size: [0.3, 0.2],

@@ -1,6 +1,6 @@
 //! What recipes and shots can choose from: the assets of a library, and labelled backgrounds.
 
-use crate::asset::{Asset, Library, Photo};
+use crate::asset::{Asset, Library, Photo, Role};
 use crate::color::Albedo;
 use crate::scene::hull::prism_outline;
 use crate::scene::{Appearance, CameraSource, Object};
@@ -10,6 +10,8 @@ use crate::scene::{Appearance, CameraSource, Object};
 pub struct AssetVariant {
     /// Name of the asset.
     pub asset: String,
+    /// Which part of the catalog it belongs to: objects or distractors.
+    pub role: Role,
     /// Width and height of the card of each of its photos, metres; at least one.
     pub photo_sizes: Vec<[f64; 2]>,
     /// Corners of the object's hull in each photo, as in [`Object::outline`]; empty where they are
@@ -43,6 +45,7 @@ impl From<&Asset<Photo>> for AssetVariant {
     fn from(asset: &Asset<Photo>) -> Self {
         Self {
             asset: asset.name.clone(),
+            role: asset.role,
             photo_sizes: asset.photos.iter().map(Photo::size).collect(),
             photo_outlines: asset.photos.iter().map(collider_outline).collect(),
             thickness: asset.thickness,
@@ -65,7 +68,10 @@ impl Appearance {
             None => None,
         };
         Some(Self {
-            class: library.class_number(asset),
+            class: match object.role {
+                Role::Object => library.class_number(asset),
+                Role::Distractor => None,
+            },
             texture: photo.texture.clone(),
             back,
             outline_uv: photo.outline_uv.clone(),

@@ -275,6 +275,7 @@ mod tests {
 
     fn scene() -> Scene {
         let object = Object {
+            role: Default::default(),
             asset: "b1".into(),
             photo: 0,
             back: None,

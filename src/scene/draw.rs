@@ -40,7 +40,7 @@ pub struct Drawn {
     pub value: f64,
 }
 
-/// What a value is drawn from, every part of it equally likely.
+/// What a value is drawn from, every part of it equally likely but for a histogram's.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Distribution {
@@ -48,18 +48,26 @@ pub enum Distribution {
     Uniform([f64; 2]),
     /// Integers from the first to the second, both included.
     Whole([f64; 2]),
+    /// Integers from the first to the second, as likely as the weights of a histogram say.
+    Weighted([f64; 2]),
     /// The places in a list of this length.
     Choice(usize),
+}
+
+impl Distribution {
+    /// Whether it is a range of one value.
+    pub(crate) fn is_fixed(&self) -> bool {
+        matches!(self, Self::Uniform([min, max]) | Self::Whole([min, max]) if min == max)
+    }
 }
 
 impl fmt::Display for Distribution {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Uniform([min, max]) | Self::Whole([min, max]) if min == max => {
-                write!(f, "fixed")
-            }
+            from if from.is_fixed() => write!(f, "fixed"),
             Self::Uniform([min, max]) => write!(f, "uniform [{min}, {max}]"),
             Self::Whole([min, max]) => write!(f, "integer [{min}, {max}]"),
+            Self::Weighted([min, max]) => write!(f, "histogram [{min}, {max}]"),
             Self::Choice(of) => write!(f, "one of {of}"),
         }
     }

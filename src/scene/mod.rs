@@ -24,6 +24,7 @@
 //! };
 //! let bottle = AssetVariant {
 //!     asset: "bottle".into(),
+//!     role: Default::default(),
 //!     photo_sizes: vec![[0.2, 0.07]],
 //!     photo_outlines: vec![],
 //!     thickness: 0.005,
@@ -39,6 +40,7 @@
 pub(crate) mod bounds;
 mod catalog;
 mod check;
+mod count;
 #[doc(hidden)]
 pub mod cycles;
 mod draw;
@@ -62,6 +64,8 @@ mod view;
 pub use catalog::Background;
 #[doc(hidden)]
 pub use catalog::{AssetVariant, catalog};
+#[doc(hidden)]
+pub use count::Count;
 pub use draw::Distribution;
 #[doc(hidden)]
 pub use draw::{DrawLog, Drawn, Draws};
@@ -80,6 +84,7 @@ pub use files::{SceneFiles, SceneSettings};
 pub(crate) use hull::doubled_area;
 pub use light::{AreaLight, Exposure, LightShape, LightTint};
 pub use locate::locate;
+use placement::draw_paths;
 pub use placement::{Grade, Object, Placement};
 #[doc(hidden)]
 pub use post_process::{Blur, CameraNoise, PostProcessRanges, white_balance};

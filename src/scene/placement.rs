@@ -1,5 +1,6 @@
 //! Objects and where they are.
 
+use crate::asset::Role;
 use crate::geom::{Pose, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 
@@ -9,6 +10,10 @@ use serde::{Deserialize, Serialize};
 pub struct Object {
     /// Name of the asset.
     pub asset: String,
+    /// What it is in the picture for: a distractor has no label, whatever its asset is; an asset
+    /// that is a distractor never has one. Default: `object`.
+    #[serde(default, skip_serializing_if = "Role::is_object")]
+    pub role: Role,
     /// Which of the asset's photos, from 0.
     #[serde(default)]
     pub photo: usize,
@@ -42,6 +47,22 @@ impl Object {
         self.thickness *= factor;
         self.mass *= factor * factor * factor;
     }
+}
+
+/// Paths of the draws of each object, distractors coming last: `objects[2]`, `distractors[0]`. Each
+/// role has numbers of its own, so that one more of either moves no draw of the other.
+pub(super) fn draw_paths(objects: &[Object]) -> Vec<String> {
+    let count = objects
+        .iter()
+        .filter(|object| object.role.is_object())
+        .count();
+    let indices = 0..objects.len();
+    indices
+        .map(|i| match i.checked_sub(count) {
+            None => format!("objects[{i}]"),
+            Some(j) => format!("distractors[{j}]"),
+        })
+        .collect()
 }
 
 /// Where an object is, or how it gets there.

@@ -19,8 +19,8 @@ pub(crate) const CATCHER_RATIO: f64 = 3.0;
 /// What an object looks like: all that a shot needs from its asset.
 #[derive(Clone, Debug)]
 pub struct Appearance {
-    /// Index into the class list.
-    pub class: u32,
+    /// Index into the class list; none of a distractor.
+    pub class: Option<u32>,
     /// The cut-out, premultiplied, scene-linear.
     pub texture: Texture,
     /// What its back shows; none where that is the front seen through.
@@ -240,6 +240,7 @@ mod tests {
         let object = Object {
             outline: vec![],
             asset: "b1".into(),
+            role: Default::default(),
             photo: 0,
             back: None,
             size: [0.2, 0.1],
@@ -270,7 +271,7 @@ mod tests {
         let texture = Texture::from(Image::filled(2, 2, PremulRgba::default()));
         let outline_uv: Arc<[Point2<f64>]> = Arc::from([Point2::new(0.0, 0.0)]);
         (object.asset == "b1").then_some(Appearance {
-            class: 3,
+            class: Some(3),
             texture,
             back: None,
             outline_uv,
@@ -292,7 +293,7 @@ mod tests {
         );
         assert_eq!(
             (shot.exposure, shot.catcher, shot.cards[0].class),
-            (2.0, [0.4, 0.3].map(|side| CATCHER_RATIO * side), 3)
+            (2.0, [0.4, 0.3].map(|side| CATCHER_RATIO * side), Some(3))
         );
     }
 

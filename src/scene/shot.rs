@@ -37,8 +37,9 @@ pub struct Shot {
 pub struct Card {
     /// Its name in labels; not 0.
     pub id: ObjectId,
-    /// Index into the class list.
-    pub class: u32,
+    /// Index into the class list; none of a distractor, which is drawn like any other but has no
+    /// label.
+    pub class: Option<u32>,
     /// Where it lies and how large it is.
     pub quad: Quad,
     /// The cut-out, premultiplied, scene-linear.
@@ -59,7 +60,7 @@ impl Card {
         let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
         Self {
             id,
-            class: 0,
+            class: Some(0),
             quad,
             texture: texture.into(),
             back: None,

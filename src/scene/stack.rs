@@ -1,10 +1,11 @@
 //! The start of a fall: cards stacked over the surface, none touching another.
 
+use crate::asset::Role;
 use crate::error::{Error, Result};
 use crate::geom::{UnitQuaternion, Vector3};
 use crate::scene::bounds::{ACROSS, GAP, SHARE, TILT, TURN};
 use crate::scene::fall::{half_extent, level};
-use crate::scene::{Draws, Object, Placement, Range, SettleOptions, Surface};
+use crate::scene::{Draws, Object, Placement, Range, SettleOptions, Surface, draw_paths};
 use nalgebra::Unit;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
@@ -85,7 +86,7 @@ pub(super) struct DropColumn<'a> {
 
 impl DropColumn<'_> {
     /// Places objects one over the other: between the walls over the edges of the surface, with a
-    /// gap under each.
+    /// gap under each. Distractors fall among them.
     ///
     /// Gaps are between the bodies that fall ([`SettleOptions::half_body`]), by their true extents
     /// as they are turned.
@@ -93,11 +94,12 @@ impl DropColumn<'_> {
     /// # Errors
     /// An object that fits between the walls in no direction.
     pub(super) fn stack(&self, objects: &mut [Object]) -> Result<()> {
+        let paths = draw_paths(objects);
         let mut top = 0.0;
-        for (i, object) in objects.iter_mut().enumerate() {
-            let rotation = self.rotation_of(i, object)?;
+        for i in self.drop_order(objects, &paths) {
+            let (object, path) = (&mut objects[i], format!("{}.start", paths[i]));
+            let rotation = self.rotation_of(i, object, &path)?;
             let extent = half_extent(&rotation, &self.options.half_body(object));
-            let path = format!("objects[{i}].start");
             let above = self.draw_position(&extent, &path);
             let height = top + self.draw(&self.start.gap, &path, "gap") + extent.z;
             top = height + extent.z;
@@ -110,9 +112,29 @@ impl DropColumn<'_> {
         Ok(())
     }
 
-    fn rotation_of(&self, i: usize, object: &Object) -> Result<UnitQuaternion<f64>> {
+    /// Indices from the lowest to the highest: objects as they come, each distractor at a place
+    /// among those before it that is drawn.
+    fn drop_order(&self, objects: &[Object], paths: &[String]) -> Vec<usize> {
+        let mut order = Vec::with_capacity(objects.len());
+        for (i, object) in objects.iter().enumerate() {
+            let place = match object.role {
+                Role::Object => order.len(),
+                Role::Distractor => self.draw_place(&paths[i], order.len()),
+            };
+            order.insert(place, i);
+        }
+        order
+    }
+
+    /// A place before, between or behind so many others.
+    fn draw_place(&self, path: &str, others: usize) -> usize {
+        self.draws
+            .choose(&format!("{path}.start.order"), others + 1)
+    }
+
+    fn rotation_of(&self, i: usize, object: &Object, path: &str) -> Result<UnitQuaternion<f64>> {
         let half = self.options.half_body(object);
-        self.fitting_rotation(&half, &format!("objects[{i}].start"))
+        self.fitting_rotation(&half, path)
             .ok_or_else(|| Error::value(format!("objects[{i}].size"), self.fit_problem(object)))
     }
 
@@ -260,6 +282,7 @@ mod tests {
     fn cards(n: usize, size: [f64; 2]) -> Vec<Object> {
         let placement = DropRanges::unplaced();
         let card = |i: usize| Object {
+            role: Role::Object,
             asset: format!("b{i}"),
             photo: 0,
             back: None,

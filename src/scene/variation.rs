@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 pub enum Variation {
     /// Change of the objects' colours: they keep those of their photos.
     Colour,
-    /// Labelled photos of the place: only the first is used.
+    /// Labelled photos of the place: only the first is used, for pictures without objects too.
     Viewpoint,
     /// Photos of an asset: only its first is used.
     Photo,

@@ -9,7 +9,7 @@ const CATALOG_SIZE: usize = 20;
 /// Cards of 200 x 70 and 190 x 80 mm, 2 to 11 mm thick, over a surface of 0.6 x 0.4 m: scene `k`.
 pub fn heap(k: u64, cards: usize) -> Result<Scene> {
     let recipe = Recipe {
-        objects: Range::fixed(cards as f64),
+        objects: Range::fixed(cards as f64).into(),
         ..Recipe::default()
     };
     let catalog: Vec<AssetVariant> = (0..CATALOG_SIZE).map(bottle).collect();
@@ -32,6 +32,7 @@ fn tray() -> Background {
 /// One of ten thicknesses and masses.
 fn bottle(i: usize) -> AssetVariant {
     AssetVariant {
+        role: Default::default(),
         asset: format!("b{i}"),
         photo_sizes: vec![[0.2, 0.07], [0.19, 0.08]],
         photo_outlines: vec![],

@@ -37,7 +37,7 @@ fn card(id: u32) -> Card {
     let angle = |i: usize| std::f64::consts::TAU * i as f64 / 40.0;
     Card {
         id: ObjectId(id),
-        class: id % 4,
+        class: Some(id % 4),
         quad: Quad {
             world_from_card: Pose::from_parts(place.into(), rotation),
             size: [0.2, 0.07],

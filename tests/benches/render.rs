@@ -75,7 +75,7 @@ fn shot() -> Shot {
         );
         shot.with_card(Card {
             id: ObjectId(k + 1),
-            class: 0,
+            class: Some(0),
             quad: Quad {
                 world_from_card: Pose::from_parts(center.into(), rotation),
                 size: [0.07, 0.21],

@@ -17,6 +17,7 @@ fn scene(cards: u32, k: u64) -> Scene {
         },
     };
     let bottle = AssetVariant {
+        role: Default::default(),
         asset: "b".into(),
         photo_sizes: vec![[0.2, 0.08]],
         photo_outlines: vec![],
@@ -24,7 +25,7 @@ fn scene(cards: u32, k: u64) -> Scene {
         mass: 0.03,
     };
     let recipe = Recipe {
-        objects: Range::fixed(cards.into()),
+        objects: Range::fixed(cards.into()).into(),
         ..Recipe::default()
     };
     recipe

@@ -7,7 +7,7 @@ use crate::global::GlobalArgs;
 use crate::print;
 use crate::values::{parse_corners, parse_metres};
 use petcomp::asset::{self, Asset, Built, Library, Manifest};
-use petcomp::asset::{Photo, PhotoEntry, PhotoRecord, Scale, ScreenSource};
+use petcomp::asset::{Photo, PhotoEntry, PhotoRecord, Role, Scale, ScreenSource};
 use petcomp::matte::CutOutOptions;
 use petcomp::{Quality, io};
 use std::path::{Path, PathBuf};
@@ -18,7 +18,7 @@ pub(crate) enum AssetCommand {
     Build {
         /// List (TOML or CSV), or a folder with photos.toml or photos.csv: file, asset, class and
         /// length (metres, by a tape measure), px_per_metre, screen_size (0.60x0.40 in
-        /// CSV) or marker_size
+        /// CSV) or marker_size; role = distractor for what has no label
         list: PathBuf,
         /// Asset folder
         #[arg(short, long, value_name = "FOLDER")]
@@ -61,9 +61,13 @@ pub(crate) struct AddPhotoArgs {
     /// Name of the asset; by default that of the first photo
     #[arg(long)]
     name: Option<String>,
-    /// Name of its class; one that the folder does not have is added behind those that it has
-    #[arg(long)]
-    class: String,
+    /// Name of its class; one that the folder does not have is added behind those that it has. A
+    /// distractor needs none
+    #[arg(long, required_unless_present = "role")]
+    class: Option<String>,
+    /// object (to be found), or distractor: falls, hides others and casts shadows, but has no label
+    #[arg(long, default_value_t)]
+    role: Role,
     /// Names of all classes in order: a label's number is the place in this list, and no other
     /// class is taken
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
@@ -265,10 +269,16 @@ impl AddPhotoArgs {
     fn entry_for(&self, photo: &Path) -> PhotoEntry {
         let scale = self.scale.scale(self.screen_corners);
         PhotoEntry {
+            role: self.role,
             screen: self.screen.clone(),
             thickness: self.thickness,
-            ..PhotoEntry::new(photo, self.asset_name(), &self.class, scale)
+            ..PhotoEntry::new(photo, self.asset_name(), self.class_name(), scale)
         }
+    }
+
+    /// Empty where none is given, as a distractor needs none.
+    fn class_name(&self) -> &str {
+        self.class.as_deref().unwrap_or_default()
     }
 
     /// The name that is given, or that of the first photo.
@@ -309,7 +319,7 @@ fn list_photos(folder: &Path) -> anyhow::Result<()> {
 
 /// Name, class, size, how sure outline and colour are, file.
 fn list_line(asset: &Asset<PhotoRecord>, photo: &PhotoRecord) -> String {
-    let (name, class) = (&asset.name, &asset.class);
+    let (name, class) = (&asset.name, class_column(asset));
     let [length, width, error] =
         [photo.object_m[0], photo.object_m[1], photo.error_m].map(|metres| metres * 1e3);
     let outline = photo.outline_confidence;
@@ -317,6 +327,13 @@ fn list_line(asset: &Asset<PhotoRecord>, photo: &PhotoRecord) -> String {
     format!(
         "{name:12} {class:10} {length:4.0} x {width:3.0} mm (+- {error:.1})  {outline:.2}  {color}  {file}"
     )
+}
+
+fn class_column(asset: &Asset<PhotoRecord>) -> String {
+    match asset.role {
+        Role::Object => asset.class.clone(),
+        role => role.to_string(),
+    }
 }
 
 fn color_column(confidence: Option<f64>) -> String {

@@ -67,7 +67,7 @@ pub(super) fn pile(cards: u32, image: [u32; 2]) -> Shot {
 fn bottle_card(k: u32, textures: &[Texture]) -> Card {
     Card {
         id: ObjectId(k + 1),
-        class: 0,
+        class: Some(0),
         quad: Quad {
             world_from_card: scattered_pose(f64::from(k)),
             size: CARD_SIZE_M,

@@ -5,6 +5,7 @@ use crate::dataset::{SampleSummary, Summary};
 use crate::label::gallery;
 use crate::plot::heat::heat_map;
 use crate::plot::{Histogram, Page, Table};
+use crate::scene::Distribution;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -37,20 +38,23 @@ fn drawn_values(summary: &Summary) -> (Vec<Histogram>, Table) {
     let mut fixed = Table::new(["not varying", "value"]);
     let mut charts = Vec::new();
     for (key, values) in &summary.drawn {
-        match summary.range(key) {
-            Some(([low, high], _)) if low == high => fixed.push([key.clone(), low.to_string()]),
-            range => charts.push(drawn_histogram(key, values, range)),
+        match summary.distribution(key) {
+            Some(from) if from.is_fixed() => fixed.push([key.clone(), values[0].to_string()]),
+            from => charts.push(drawn_histogram(key, values, from)),
         }
     }
     (charts, fixed)
 }
 
-/// Values of one draw, against its range in the recipe and whether it draws integers.
-fn drawn_histogram(key: &str, values: &[f64], range: Option<([f64; 2], bool)>) -> Histogram {
-    match range {
-        Some((range, true)) => integer_histogram(key, values, range),
-        Some((range, false)) => Histogram::new(key, values, range, HISTOGRAM_BINS).uniform(),
-        None => Histogram::new(key, values, extremes(values), HISTOGRAM_BINS),
+/// Values of one draw, against its distribution in the recipe.
+fn drawn_histogram(key: &str, values: &[f64], from: Option<Distribution>) -> Histogram {
+    match from {
+        Some(Distribution::Whole(range)) => integer_histogram(key, values, range).uniform(),
+        Some(Distribution::Weighted(range)) => integer_histogram(key, values, range),
+        Some(Distribution::Uniform(range)) => {
+            Histogram::new(key, values, range, HISTOGRAM_BINS).uniform()
+        }
+        _ => Histogram::new(key, values, extremes(values), HISTOGRAM_BINS),
     }
 }
 
@@ -60,7 +64,7 @@ fn integer_histogram(key: &str, values: &[f64], [low, high]: [f64; 2]) -> Histog
     let histogram = Histogram::new(key, values, [low - 0.5, high + 0.5], bars);
     Histogram {
         ends: [low.to_string(), high.to_string()],
-        ..histogram.uniform()
+        ..histogram
     }
 }
 

@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::eval::class_name;
 use crate::geom::{BBox, Point2};
 use crate::label::gallery::{self, Figure, gallery};
-use crate::label::{ObjectLabel, trace};
+use crate::label::{Distractor, ObjectLabel, trace};
 use crate::plot::{Page, escaped};
 use rayon::prelude::*;
 use std::fmt::Write;
@@ -178,7 +178,13 @@ fn longer_sides(sample: &SampleSummary) -> impl Iterator<Item = f64> {
 fn figure(shown: &ShownSample, classes: &[String], why: Option<&str>) -> Result<Figure> {
     let record = &shown.record;
     let mut figure = Figure::whole(&shown.picture, record.labels.image.map(f64::from))?;
-    let letter = figure.letter_height();
+    figure.drawing = drawing_of(record, classes, figure.letter_height());
+    figure.caption = figure_caption(record, why);
+    Ok(figure)
+}
+
+/// Masks, outlines without a label, and boxes, as SVG.
+fn drawing_of(record: &SampleRecord, classes: &[String], letter: f64) -> String {
     let (mut boxes, mut masks, mut others) = (String::new(), String::new(), String::new());
     for object in &record.labels.objects {
         match UnlabelledReason::of(object, record) {
@@ -189,11 +195,10 @@ fn figure(shown: &ShownSample, classes: &[String], why: Option<&str>) -> Result<
             Some(reason) => others += &outline_of(object, classes, reason, letter),
         }
     }
-    figure.drawing = format!(
+    others.extend(record.labels.distractors.iter().map(outline_of_distractor));
+    format!(
         "<g class=\"masks\">{masks}</g><g class=\"others\">{others}</g><g class=\"boxes\">{boxes}</g>"
-    );
-    figure.caption = figure_caption(record, why);
-    Ok(figure)
+    )
 }
 
 fn figure_caption(record: &SampleRecord, why: Option<&str>) -> String {
@@ -259,10 +264,15 @@ fn outline_of(
     let id = object.id.0;
     let (name, seen) = (class_name(object.class, classes), percent_seen(object));
     let title = format!("{id} {name}: no label, {why}; {seen:.0} % seen");
-    let rings = titled_rings(object, &escaped(&title));
+    let rings = titled_rings(&object.outline_px, &escaped(&title));
     let center = object.amodal_box.center();
     let at = [center.x - 2.0 * letter, center.y];
     rings + &gallery::words(at, &format!("{id} {why}"), 0.7 * letter, "#555")
+}
+
+fn outline_of_distractor(distractor: &Distractor) -> String {
+    let title = format!("{} distractor: no label", distractor.id.0);
+    titled_rings(&distractor.outline_px, &title)
 }
 
 fn why_unlabelled(object: &ObjectLabel, reason: UnlabelledReason) -> String {
@@ -284,8 +294,8 @@ fn svg_points(ring: &[Point2<f64>]) -> String {
     points.collect::<Vec<_>>().join(" ")
 }
 
-fn titled_rings(object: &ObjectLabel, title: &str) -> String {
-    let rings = object.outline_px.iter();
+fn titled_rings(rings: &[Vec<Point2<f64>>], title: &str) -> String {
+    let rings = rings.iter();
     rings.map(|ring| titled_polygon(ring, title)).collect()
 }
 

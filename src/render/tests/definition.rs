@@ -62,7 +62,7 @@ fn card(
 ) -> Card {
     Card {
         id: ObjectId(id),
-        class: 0,
+        class: Some(0),
         quad: Quad {
             world_from_card: Pose::from_parts(Vector3::from(center).into(), rotation),
             size,

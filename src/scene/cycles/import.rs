@@ -315,7 +315,7 @@ mod tests {
         );
         let card = Card {
             id: ObjectId(4),
-            class: 0,
+            class: Some(0),
             quad: Quad {
                 world_from_card: Pose::translation(0.1, 0.0, 0.05),
                 size: [0.2, 0.1],

@@ -6,7 +6,7 @@ use crate::pixel::LinearRgb;
 use crate::scene::stack::DropColumn;
 use crate::scene::{
     AreaLight, AssetVariant, Background, DrawLog, Draws, Exposure, Grade, LightTint, Object, Range,
-    Recipe, Scene, SceneSettings, Surface,
+    Recipe, Scene, SceneSettings, Surface, draw_paths,
 };
 use std::f64::consts::PI;
 
@@ -17,22 +17,34 @@ pub(super) struct SceneNumber {
     pub(super) k: u64,
 }
 
+/// The backgrounds that a scene may have.
+#[derive(Clone, Copy)]
+pub(super) struct Places<'a> {
+    /// With objects.
+    pub(super) viewpoints: &'a [Background],
+    /// Without.
+    pub(super) negatives: &'a [Background],
+}
+
 impl Recipe {
     /// A scene of a recipe whose switches have been applied.
     pub(super) fn compose(
         &self,
         number: SceneNumber,
         log: &DrawLog,
-        backgrounds: &[Background],
+        places: Places<'_>,
         catalog: &[AssetVariant],
     ) -> Result<Scene> {
         let draws = Draws::new(number.seed, number.k).logged(log);
-        let background = pick_background(&draws, backgrounds)?;
-        let mut objects = if self.draw_negative(&draws) {
-            Vec::new()
+        let (backgrounds, mut objects) = if self.draw_negative(&draws) {
+            (places.negatives, Vec::new())
         } else {
-            self.select_objects(number, log, catalog)?
+            (
+                places.viewpoints,
+                self.select_objects(number, log, catalog)?,
+            )
         };
+        let background = pick_background(&draws, backgrounds)?;
         self.vary_objects(&mut objects, &draws);
         let surface = self.draw_surface(&draws, background.size);
         self.drop_column(background, surface, &draws)
@@ -129,8 +141,9 @@ impl Recipe {
     }
 
     fn vary_objects(&self, objects: &mut [Object], draws: &Draws) {
-        for (i, object) in objects.iter_mut().enumerate() {
-            self.vary_object(object, draws, &format!("objects[{i}]"));
+        let paths = draw_paths(objects);
+        for (object, path) in objects.iter_mut().zip(paths) {
+            self.vary_object(object, draws, &path);
         }
     }
 

@@ -15,10 +15,10 @@ use crate::scene::bounds::{EV, FRICTION, MAX_LIGHTS, MAX_OBJECTS, RADIANCE, SCAL
 use crate::scene::check::{check_albedo, check_cast, check_count, check_each, check_image};
 use crate::scene::stack::too_large;
 use crate::scene::{
-    AssetVariant, Background, DrawLog, Drawn, DropRanges, EnvironmentRanges, LightTint,
+    AssetVariant, Background, Count, DrawLog, Drawn, DropRanges, EnvironmentRanges, LightTint,
     PostProcessRanges, Range, Scene, SettleOptions, Surface, Take, Variation, ViewRanges,
 };
-use compose::SceneNumber;
+use compose::{Places, SceneNumber};
 use serde::{Deserialize, Serialize};
 
 const OBJECT_COUNT: Bounds = Bounds::new(0.0, MAX_OBJECTS as f64, "what comes to rest in a heap");
@@ -35,16 +35,25 @@ pub struct Recipe {
     /// Sources of variation that are switched off; all other draws stay as they are. Default:
     /// none.
     pub off: Vec<Variation>,
-    /// Labelled backgrounds that are used, each a viewpoint: all, or the first ones. Default:
-    /// `"all"`.
+    /// Labelled backgrounds that objects fall on, each a viewpoint: all, or the first ones.
+    /// Default: `"all"`.
     pub viewpoints: Take,
     /// Which part of the photo is shown. Default: all of it.
     pub view: ViewRanges,
     /// Photos of each asset that are used: all, or the first ones. Default: `"all"`.
     pub photos: Take,
     /// Objects in a scene. Default: `[4, 12]`.
-    pub objects: Range,
-    /// Share of the scenes that stay empty: pictures of the place alone, 0 to 1. Default: 0.
+    pub objects: Count,
+    /// Distractors in a scene: assets of that role fall among the objects, hide them and cast
+    /// shadows, but have no label. Default: 0.
+    #[serde(skip_serializing_if = "Count::is_zero")]
+    pub distractors: Count,
+    /// No asset is twice in a scene: more objects (or distractors) than there are assets are an
+    /// error. Default: false, assets come again once all are in the scene.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub at_most_once: bool,
+    /// Share of the scenes that stay empty, without distractors too: pictures of the place alone, 0
+    /// to 1; they come from all backgrounds, whatever `viewpoints` says. Default: 0.
     pub negatives: f64,
     /// How many different choices of objects there are. Default: `"unique"`, a new one for every
     /// scene.
@@ -91,7 +100,9 @@ impl Default for Recipe {
             viewpoints: Take::All,
             view: ViewRanges::default(),
             photos: Take::All,
-            objects: Range::new(4.0, 12.0),
+            objects: Range::new(4.0, 12.0).into(),
+            distractors: Count::default(),
+            at_most_once: false,
             negatives: 0.0,
             selections: Selections::Unique,
             scale: Range::new(0.9, 1.1),
@@ -122,7 +133,7 @@ impl Recipe {
     /// # Method
     /// Every number is drawn by its own path ([`Draws`](crate::scene::Draws)), so that one more
     /// object or another range changes no other draw. Objects are drawn without repetition
-    /// until the catalog is used up, then again from all of it.
+    /// until the catalog is used up, then again from all of it; distractors likewise from theirs.
     ///
     /// # Errors
     /// An impossible range; no background; an empty catalog while there should be objects; a card
@@ -153,20 +164,31 @@ impl Recipe {
         let recipe = self.narrowed();
         recipe.check()?;
         let number = SceneNumber { seed, k };
-        let backgrounds = recipe.viewpoints.slice_of(backgrounds);
-        let scene = recipe.compose(number, &log, backgrounds, catalog)?;
+        let places = Places {
+            viewpoints: recipe.viewpoints.slice_of(backgrounds),
+            negatives: self.places_of_negatives(backgrounds),
+        };
+        let scene = recipe.compose(number, &log, places, catalog)?;
         Ok((scene, log.into_draws()))
     }
 
+    /// The backgrounds of scenes that stay empty: all, unless it is they that are switched off.
+    fn places_of_negatives<'a>(&self, backgrounds: &'a [Background]) -> &'a [Background] {
+        let take = match self.off.contains(&Variation::Viewpoint) {
+            true => Take::First(1),
+            false => Take::All,
+        };
+        take.slice_of(backgrounds)
+    }
+
     /// Fails on the first asset that at its largest fits between the walls of some background in no
-    /// direction: a scene with both would be refused, however late it comes.
+    /// direction, and where [`at_most_once`](Self::at_most_once) leaves too few assets: a scene like
+    /// that would be refused, however late it comes.
     pub fn check_room(&self, backgrounds: &[Background], catalog: &[AssetVariant]) -> Result<()> {
         let recipe = self.narrowed();
-        if recipe.objects.max < 1.0 {
-            return Ok(());
-        }
+        recipe.check_repetition(catalog)?;
         for background in recipe.viewpoints.slice_of(backgrounds) {
-            for variant in catalog {
+            for variant in catalog.iter().filter(|v| recipe.draws_from(v.role)) {
                 recipe.check_fit(background, variant)?;
             }
         }
@@ -182,7 +204,7 @@ impl Recipe {
         match largest.find(|size| !self.start.has_room(room, *size)) {
             Some(size) => {
                 let what = too_large(&variant.asset, size, &background.name, room);
-                Err(Error::value("objects", what))
+                Err(Error::value(self.choice_of(variant.role).at, what))
             }
             None => Ok(()),
         }
@@ -201,7 +223,8 @@ impl Recipe {
     }
 
     fn check_objects(&self) -> Result<()> {
-        self.objects.check_count("objects", &OBJECT_COUNT)?;
+        self.objects.check("objects", &OBJECT_COUNT)?;
+        self.distractors.check("distractors", &OBJECT_COUNT)?;
         SHARE.check("negatives", self.negatives)?;
         self.scale.check("scale", &SCALE)?;
         self.start.check()?;

@@ -88,6 +88,7 @@ mod tests {
         };
         let choice = |i| AssetVariant {
             asset: format!("b{i}"),
+            role: Default::default(),
             photo_sizes: vec![[0.2, 0.07]; 3],
             photo_outlines: vec![],
             thickness: 0.005,

@@ -1,8 +1,9 @@
 //! Which assets a scene shows: their number, and the photo of each.
 
 use super::compose::SceneNumber;
+use crate::asset::Role;
 use crate::error::{Error, Result};
-use crate::scene::{AssetVariant, DrawLog, Draws, DropRanges, Grade, Object, Recipe, Take};
+use crate::scene::{AssetVariant, Count, DrawLog, Draws, DropRanges, Grade, Object, Recipe, Take};
 use serde::{Deserialize, Serialize};
 
 /// What falls in place of a cut-out, as thick as the asset.
@@ -72,8 +73,18 @@ impl Selections {
     }
 }
 
+/// What is chosen from one part of the catalog: objects, or distractors.
+pub(super) struct Choice<'a> {
+    role: Role,
+    count: &'a Count,
+    /// Path of the count in the recipe.
+    pub(super) at: &'static str,
+    /// Path of each choice, before its number.
+    path: &'static str,
+}
+
 impl Recipe {
-    /// Assets and photos of one selection, at their own size and colour.
+    /// Assets and photos of one selection, at their own size and colour: objects, then distractors.
     pub(super) fn select_objects(
         &self,
         number: SceneNumber,
@@ -82,34 +93,119 @@ impl Recipe {
     ) -> Result<Vec<Object>> {
         let selection = self.selections.index_for(number.k)?;
         let draws = Draws::new(number.seed, selection).logged(log);
-        let count = self.objects.draw_count(&draws, "selection.objects");
-        check_catalog(count, catalog)?;
+        let mut selected = self.select(&self.choice_of(Role::Object), &draws, catalog)?;
+        if !self.distractors.is_zero() {
+            let distractors = self.choice_of(Role::Distractor);
+            selected.extend(self.select(&distractors, &draws, catalog)?);
+        }
+        Ok(selected)
+    }
+
+    pub(super) fn choice_of(&self, role: Role) -> Choice<'_> {
+        let (count, at, path) = match role {
+            Role::Object => (&self.objects, "objects", "selection"),
+            Role::Distractor => (&self.distractors, "distractors", "distractors"),
+        };
+        Choice {
+            role,
+            count,
+            at,
+            path,
+        }
+    }
+
+    fn select(
+        &self,
+        choice: &Choice<'_>,
+        draws: &Draws,
+        catalog: &[AssetVariant],
+    ) -> Result<Vec<Object>> {
+        let part = choice.part_of(catalog);
+        let count = choice.draw_count(draws);
+        choice.check_part(count, part.len())?;
+        if self.at_most_once {
+            choice.check_once(count, part.len())?;
+        }
         let mut left = Vec::new();
         (0..count)
             .map(|i| {
-                let place = draw_without_repetition(&draws, i, &mut left, catalog.len());
-                let path = format!("selection[{i}].photo");
-                catalog[place].draw_object(&draws, &path, self.photos, self.collider)
+                let path = format!("{}[{i}]", choice.path);
+                let variant = draw_without_repetition(draws, &path, &mut left, &part);
+                variant.draw_object(draws, &path, self.photos, self.collider)
             })
             .collect()
     }
-}
 
-/// Fails on an empty catalog while there should be objects.
-fn check_catalog(count: usize, catalog: &[AssetVariant]) -> Result<()> {
-    if count == 0 || !catalog.is_empty() {
-        return Ok(());
+    /// Fails where more may be asked for than there are assets, and none may be there twice.
+    pub(super) fn check_repetition(&self, catalog: &[AssetVariant]) -> Result<()> {
+        if !self.at_most_once {
+            return Ok(());
+        }
+        [Role::Object, Role::Distractor]
+            .into_iter()
+            .try_for_each(|role| {
+                let choice = self.choice_of(role);
+                choice.check_once(choice.count.max(), choice.part_of(catalog).len())
+            })
     }
-    let what = format!("{count} asked for, but there is no asset to choose from");
-    Err(Error::value("objects", what))
+
+    /// Whether pictures can hold assets of a role.
+    pub(super) fn draws_from(&self, role: Role) -> bool {
+        !self.choice_of(role).count.is_zero()
+    }
 }
 
-/// A place in a catalog of this length that is still `left`; all of them are once none is.
-fn draw_without_repetition(draws: &Draws, i: usize, left: &mut Vec<usize>, length: usize) -> usize {
+impl Choice<'_> {
+    fn draw_count(&self, draws: &Draws) -> usize {
+        self.count.draw(draws, &format!("selection.{}", self.at))
+    }
+
+    /// The part of a catalog that it chooses from.
+    fn part_of<'a>(&self, catalog: &'a [AssetVariant]) -> Vec<&'a AssetVariant> {
+        let part = catalog.iter().filter(|variant| variant.role == self.role);
+        part.collect()
+    }
+
+    /// Fails on an empty part while there should be something of it.
+    fn check_part(&self, count: usize, assets: usize) -> Result<()> {
+        if count == 0 || assets > 0 {
+            return Ok(());
+        }
+        let what = match self.role {
+            Role::Object => "there is no asset to choose from",
+            Role::Distractor => "no asset has the role \"distractor\"",
+        };
+        Err(Error::value(
+            self.at,
+            format!("{count} asked for, but {what}"),
+        ))
+    }
+
+    /// Fails where something would have to be there twice.
+    fn check_once(&self, count: usize, assets: usize) -> Result<()> {
+        if count <= assets {
+            return Ok(());
+        }
+        let (at, role) = (self.at, self.role);
+        let what = format!(
+            "{count} asked for, but there are {assets} assets of role \"{role}\" and at_most_once is true; \
+             expected {at} up to {assets}"
+        );
+        Err(Error::value(at, what))
+    }
+}
+
+/// One of a part of the catalog whose place is still `left`; all of them are once none is.
+fn draw_without_repetition<'a>(
+    draws: &Draws,
+    path: &str,
+    left: &mut Vec<usize>,
+    part: &[&'a AssetVariant],
+) -> &'a AssetVariant {
     if left.is_empty() {
-        *left = (0..length).collect();
+        *left = (0..part.len()).collect();
     }
-    left.swap_remove(draws.choose(&format!("selection[{i}].asset"), left.len()))
+    part[left.swap_remove(draws.choose(&format!("{path}.asset"), left.len()))]
 }
 
 impl AssetVariant {
@@ -122,9 +218,13 @@ impl AssetVariant {
         collider: Collider,
     ) -> Result<Object> {
         self.check_photos()?;
-        let photo = draws.choose(path, photos.slice_of(&self.photo_sizes).len());
+        let photo = draws.choose(
+            &format!("{path}.photo"),
+            photos.slice_of(&self.photo_sizes).len(),
+        );
         Ok(Object {
             asset: self.asset.clone(),
+            role: self.role,
             photo,
             back: None,
             size: self.photo_sizes[photo],

@@ -1,4 +1,5 @@
 use super::*;
+use crate::asset::Role;
 use crate::color::Albedo;
 use crate::pixel::LinearRgb;
 use crate::scene::{AssetVariant, Background, CameraSource, Exposure, Object, Placement};
@@ -21,6 +22,7 @@ fn tray(name: &str) -> Background {
 fn catalog(n: usize) -> Vec<AssetVariant> {
     let choice = |i| AssetVariant {
         asset: format!("b{i}"),
+        role: Role::Object,
         photo_sizes: vec![[0.2, 0.07], [0.19, 0.08]],
         photo_outlines: vec![vec![[-0.1, -0.03], [0.1, -0.03], [0.0, 0.035]], vec![]],
         thickness: 0.005,
@@ -33,6 +35,175 @@ fn scene(recipe: &Recipe, k: u64) -> Scene {
     recipe
         .scene(7, k, &[tray("a"), tray("b")], &catalog(10))
         .unwrap()
+}
+
+/// The same with caps that are distractors among the bottles.
+fn catalog_with_caps() -> Vec<AssetVariant> {
+    let caps = (0..3).map(|i| AssetVariant {
+        asset: format!("cap{i}"),
+        role: Role::Distractor,
+        photo_sizes: vec![[0.03, 0.03]],
+        ..catalog(1).remove(0)
+    });
+    let mut all: Vec<_> = caps.collect();
+    all.extend(catalog(10));
+    all
+}
+
+fn with_caps(distractors: Count, k: u64) -> (Scene, Vec<Drawn>) {
+    let recipe = Recipe {
+        distractors,
+        ..Recipe::default()
+    };
+    let places = [tray("a"), tray("b")];
+    recipe
+        .explained(7, k, &places, &catalog_with_caps())
+        .unwrap()
+}
+
+fn start_height(object: &Object) -> f64 {
+    match object.placement {
+        Placement::Drop { height, .. } => height,
+        Placement::At(_) => panic!("objects of a recipe fall"),
+    }
+}
+
+/// The object without its place in the stack.
+fn apart_from_height(object: &Object) -> Object {
+    let mut object = object.clone();
+    if let Placement::Drop { height, .. } = &mut object.placement {
+        *height = 0.0;
+    }
+    object
+}
+
+#[test]
+fn distractors_come_from_their_own_part_and_move_no_draw_of_an_object() {
+    for k in 0..40 {
+        let bare = scene(&Recipe::default(), k);
+        let (mixed, _) = with_caps(Range::new(1.0, 5.0).into(), k);
+        let (objects, caps) = mixed.objects.split_at(bare.objects.len());
+        assert!(
+            caps.iter()
+                .all(|o| o.role == Role::Distractor && o.asset.starts_with("cap"))
+        );
+        assert!((1..=5).contains(&caps.len()));
+        assert!(objects.iter().all(|o| o.role == Role::Object));
+        let same = |objects: &[Object]| objects.iter().map(apart_from_height).collect::<Vec<_>>();
+        assert_eq!(same(objects), same(&bare.objects));
+        let without = Scene {
+            objects: bare.objects.clone(),
+            ..mixed.clone()
+        };
+        assert_eq!(without, bare);
+    }
+}
+
+#[test]
+fn where_there_are_no_distractors_nothing_is_drawn_for_them() {
+    let (scene_of_default, draws) = with_caps(Count::default(), 3);
+    assert_eq!(scene_of_default, scene(&Recipe::default(), 3));
+    assert!(draws.iter().all(|draw| !draw.path.contains("distractor")));
+    let text = toml::to_string(&Recipe::default()).unwrap();
+    assert!(!text.contains("distractors"), "{text}");
+}
+
+#[test]
+fn distractors_fall_among_the_objects_none_touching_another() {
+    let (mut lowest, mut highest) = (0, 0);
+    for k in 0..60 {
+        let (scene, _) = with_caps(Count::fixed(1), k);
+        let heights: Vec<f64> = scene.objects.iter().map(start_height).collect();
+        let (cap, bottles) = heights.split_last().unwrap();
+        lowest += usize::from(bottles.iter().all(|height| height > cap));
+        highest += usize::from(bottles.iter().all(|height| height < cap));
+        let mut sorted = heights.clone();
+        sorted.sort_by(f64::total_cmp);
+        assert!(sorted.windows(2).all(|pair| pair[1] - pair[0] > 0.005));
+    }
+    // 4 to 12 bottles: one place of 5 to 13 is the lowest, one the highest.
+    assert!(
+        (1..30).contains(&lowest) && (1..30).contains(&highest),
+        "{lowest} {highest}"
+    );
+}
+
+#[test]
+fn distractors_that_no_asset_is_are_told() {
+    let recipe = Recipe {
+        distractors: Count::fixed(2),
+        ..Recipe::default()
+    };
+    let told = recipe.scene(7, 0, &[tray("a")], &catalog(10)).unwrap_err();
+    assert_eq!(
+        told.to_string(),
+        "distractors: 2 asked for, but no asset has the role \"distractor\""
+    );
+    // What is never drawn may be as large as it likes.
+    let mut huge = catalog_with_caps();
+    huge[0].photo_sizes = vec![[3.0, 3.0]];
+    assert!(Recipe::default().check_room(&[tray("a")], &huge).is_ok());
+    let told = recipe.check_room(&[tray("a")], &huge).unwrap_err();
+    assert!(told.to_string().contains("cap0"), "{told}");
+}
+
+#[test]
+fn negatives_come_from_all_backgrounds_whatever_the_viewpoints() {
+    let recipe = Recipe {
+        negatives: 0.5,
+        viewpoints: Take::First(1),
+        ..Recipe::default()
+    };
+    let scenes: Vec<Scene> = (0..200).map(|k| scene(&recipe, k)).collect();
+    let (empty, full): (Vec<_>, Vec<_>) = scenes.iter().partition(|s| s.objects.is_empty());
+    assert!(full.iter().all(|s| s.plate == "a"));
+    // Binomial, about 100 draws: 50 +- 5.
+    let on_second = empty.iter().filter(|s| s.plate == "b").count();
+    assert!(on_second.abs_diff(empty.len() / 2) < 25, "{on_second}");
+    // But for the ablation, which is of nothing else.
+    let off = Recipe {
+        off: vec![Variation::Viewpoint],
+        ..recipe
+    };
+    assert!((0..200).all(|k| scene(&off, k).plate == "a"));
+}
+
+#[test]
+fn at_most_once_is_an_error_where_there_are_too_few_assets() {
+    let once = |objects: Range| Recipe {
+        objects: objects.into(),
+        at_most_once: true,
+        ..Recipe::default()
+    };
+    let told = |recipe: &Recipe| {
+        let e = recipe.check_room(&[tray("a")], &catalog(10)).unwrap_err();
+        e.to_string()
+    };
+    let expected = "objects: 12 asked for, but there are 10 assets of role \"object\" and \
+                    at_most_once is true; expected objects up to 10";
+    assert_eq!(told(&once(Range::new(4.0, 12.0))), expected);
+    let fixed = once(Range::fixed(12.0));
+    let drawn = fixed.scene(7, 0, &[tray("a")], &catalog(10)).unwrap_err();
+    assert_eq!(drawn.to_string(), expected);
+    let few = once(Range::new(4.0, 10.0));
+    assert!(few.check_room(&[tray("a")], &catalog(10)).is_ok());
+    // What is not there twice anyhow stays as it is.
+    let usual = Recipe {
+        at_most_once: false,
+        ..few.clone()
+    };
+    assert!((0..20).all(|k| scene(&few, k) == scene(&usual, k)));
+}
+
+#[test]
+fn counts_are_drawn_from_a_histogram() {
+    let text = "objects = { values = [2, 7], weights = [1, 3] }";
+    let recipe: Recipe = toml::from_str(text).unwrap();
+    let counts: Vec<usize> = (0..400).map(|k| scene(&recipe, k).objects.len()).collect();
+    let sevens = counts.iter().filter(|count| **count == 7).count();
+    assert!(counts.iter().all(|count| [2, 7].contains(count)));
+    // Binomial: 300 +- 8.7; four standard deviations.
+    assert!(sevens.abs_diff(300) < 35, "{sevens}");
 }
 
 #[test]
@@ -140,7 +311,7 @@ fn a_file_says_only_what_it_wants_otherwise() {
     let recipe: Recipe = toml::from_str(text).unwrap();
     assert_eq!(
         (recipe.objects, recipe.selections),
-        (Range::fixed(3.0), Selections::Count(5))
+        (Count::fixed(3), Selections::Count(5))
     );
     assert_eq!(
         (recipe.lights.len(), recipe.lights[0].size),
@@ -190,7 +361,7 @@ fn nothing_to_choose_from_is_told() {
 #[test]
 fn no_object_asked_for_is_an_empty_scene() {
     let recipe = Recipe {
-        objects: Range::fixed(0.0),
+        objects: Range::fixed(0.0).into(),
         ..Recipe::default()
     };
     assert!(
@@ -207,7 +378,7 @@ fn one_more_object_re_rolls_nothing_else() {
     let with = |n| {
         scene(
             &Recipe {
-                objects: Range::fixed(n),
+                objects: Range::fixed(n).into(),
                 ..Recipe::default()
             },
             4,
@@ -252,7 +423,7 @@ fn assets_repeat_only_when_the_stock_is_used_up() {
     for k in 0..30 {
         let all = scene(
             &Recipe {
-                objects: Range::fixed(25.0),
+                objects: Range::fixed(25.0).into(),
                 ..Recipe::default()
             },
             k,
@@ -275,7 +446,7 @@ fn assets_repeat_only_when_the_stock_is_used_up() {
 #[test]
 fn every_asset_photo_and_background_is_used_as_often() {
     let recipe = Recipe {
-        objects: Range::fixed(2.0),
+        objects: Range::fixed(2.0).into(),
         ..Recipe::default()
     };
     let scenes: Vec<Scene> = (0..2000).map(|k| scene(&recipe, k)).collect();
@@ -299,7 +470,7 @@ fn so_many_selections_are_made_as_are_asked_for() {
     let distinct = |selections| {
         let recipe = Recipe {
             selections,
-            objects: Range::new(4.0, 6.0),
+            objects: Range::new(4.0, 6.0).into(),
             ..Recipe::default()
         };
         let scenes: Vec<Scene> = (0..60).map(|k| scene(&recipe, k)).collect();
@@ -376,7 +547,7 @@ fn hulls_fall_only_where_they_are_asked_for_and_known_and_grow_with_their_card()
         scene(
             &Recipe {
                 collider,
-                objects: Range::fixed(9.0),
+                objects: Range::fixed(9.0).into(),
                 ..Recipe::default()
             },
             2,

@@ -3,6 +3,7 @@
 use crate::documents::RecipeArgs;
 use crate::global::GlobalArgs;
 use crate::print;
+use petcomp::asset::Role;
 use petcomp::dataset::{DatasetConfig, Provenance};
 use petcomp::scene::Drawn;
 use petcomp::{Error, Scene, io};
@@ -124,15 +125,25 @@ fn print_rows(rows: &[DrawRow]) {
 
 /// The name of what a choice chose.
 fn chosen_name<'a>(draw: &Drawn, scene: &'a Scene) -> &'a str {
-    match asset_index(&draw.path) {
-        Some(i) => scene.objects.get(i).map_or("", |object| &object.asset),
+    match chosen_asset(&draw.path) {
+        Some((role, i)) => asset_name(scene, role, i),
         None if draw.path == "background" => &scene.plate,
         None => "",
     }
 }
 
-/// `2` of `selection[2].asset`.
-fn asset_index(path: &str) -> Option<usize> {
-    let index = path.strip_prefix("selection[")?.strip_suffix("].asset")?;
-    index.parse().ok()
+/// The asset of the `i`-th object of a role.
+fn asset_name(scene: &Scene, role: Role, i: usize) -> &str {
+    let mut objects = scene.objects.iter().filter(|object| object.role == role);
+    objects.nth(i).map_or("", |object| &object.asset)
+}
+
+/// Object 2 of `selection[2].asset`, distractor 0 of `distractors[0].asset`.
+fn chosen_asset(path: &str) -> Option<(Role, usize)> {
+    let (part, index) = path.strip_suffix("].asset")?.split_once('[')?;
+    let role = match part {
+        "distractors" => Role::Distractor,
+        _ => Role::Object,
+    };
+    Some((role, index.parse().ok()?))
 }

@@ -197,7 +197,7 @@ fn given(door: &Door, world: &World) {
 fn full_recipe() -> String {
     let mut setup: DatasetConfig = toml::from_str(DatasetConfig::template()).unwrap();
     setup.scene.image = [64, 48];
-    setup.scene.objects = petcomp::scene::Range::new(1.0, 3.0);
+    setup.scene.objects = petcomp::scene::Range::new(1.0, 3.0).into();
     setup.scene.surface_albedo = Some(petcomp::color::Albedo::Luminance(0.5));
     setup.scene.lights[0].temperature_k = Some(petcomp::scene::Range::new(3000.0, 5000.0));
     toml::to_string(&setup).unwrap()

@@ -134,7 +134,7 @@ impl Ellipse {
         let turns = (0..corners).map(|i| TAU * i as f64 / corners as f64);
         Shot::new(camera_above(self.image, 1.0)).with_card(Card {
             id: ObjectId(1),
-            class: 0,
+            class: Some(0),
             quad: bounding_quad(),
             texture: Image::<PremulRgba>::new(2, 2).into(),
             back: None,

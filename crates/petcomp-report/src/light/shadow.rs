@@ -35,7 +35,7 @@ pub(super) fn shadow_shot(kind: LightKind) -> Shot {
 fn opaque_card() -> Card {
     Card {
         id: ObjectId(1),
-        class: 0,
+        class: Some(0),
         quad: Quad {
             world_from_card: card_pose(),
             size: CARD_SIZE_M,

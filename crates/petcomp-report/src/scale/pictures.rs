@@ -88,7 +88,7 @@ impl PictureInputs {
 
 fn appearance(object: &Object, textures: &[Texture]) -> Appearance {
     Appearance {
-        class: 0,
+        class: Some(0),
         texture: textures[object.photo % textures.len()].clone(),
         back: None,
         outline_uv: whole_card_uv(),
@@ -166,6 +166,7 @@ fn heap_camera(image: [u32; 2]) -> Camera {
 fn heap_card(case: &ScaleCase, k: usize) -> Object {
     let rise = MAX_RISE_M.min(PILE_HEIGHT_M / case.cards as f64);
     Object {
+        role: Default::default(),
         asset: "bottle".into(),
         photo: k,
         back: None,

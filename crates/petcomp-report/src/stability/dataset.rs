@@ -446,7 +446,7 @@ fn draw_empty_scenes() -> Result<Outcome> {
 
 fn without_objects() -> Recipe {
     Recipe {
-        objects: Range::fixed(0.0),
+        objects: Range::fixed(0.0).into(),
         ..Recipe::default()
     }
 }
@@ -505,9 +505,11 @@ fn invalid_recipes() -> Vec<HardCase> {
         refused("recipe without a background", "background", &[], |_| ()),
         on_tray("recipe without a catalog", "no asset", |_| ()),
         on_tray("pictures of 0 x 48", "image", |r| r.image = [0, 48]),
-        on_tray("10^9 objects", "objects", |r| r.objects = Range::fixed(1e9)),
+        on_tray("10^9 objects", "objects", |r| {
+            r.objects = Range::fixed(1e9).into()
+        }),
         on_tray("reversed range", "objects", |r| {
-            r.objects = Range::new(5.0, 2.0)
+            r.objects = Range::new(5.0, 2.0).into()
         }),
         on_tray("range of NaN", "scale", |r| {
             r.scale = Range::fixed(f64::NAN)

@@ -161,6 +161,7 @@ fn grain(x: usize, y: usize) -> LinearRgb {
 /// Card `k` of a scene, at rest.
 fn card_at_rest(asset: &str, k: usize) -> Object {
     Object {
+        role: Default::default(),
         asset: asset.into(),
         photo: 0,
         back: None,
@@ -208,6 +209,7 @@ fn file_of(asset: &str) -> String {
 fn asset_record(asset: &str) -> Asset<PhotoRecord> {
     Asset {
         name: asset.into(),
+        role: Default::default(),
         class: "none".into(),
         thickness: 0.005,
         mass: 0.02,

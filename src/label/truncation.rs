@@ -1,0 +1,48 @@
+//! How far an object reaches out of the picture.
+//!
+//! # Method
+//! Truncation as KITTI has it ("refers to the object leaving image boundaries", 0 to 1), by area:
+//! the share of the outline, as the camera sees it, that lies beyond the picture's edges. Samples
+//! end at the edges, outlines do not.
+
+use crate::camera::Camera;
+use crate::geom::BBox;
+use crate::label::outline::{self, SLIVER_AREA_PX2};
+use crate::scene::Card;
+use geo::{Area, MultiPolygon};
+use serde::{Deserialize, Serialize};
+
+/// How far an object reaches out of the picture.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Truncation {
+    /// Share of its outline's area beyond the picture's edges, 0 to 1.
+    pub fraction: f64,
+    /// Box around all of its outline, in the picture or not.
+    pub whole_box: BBox,
+    /// The share is above [`LabelOptions::max_truncation`](crate::label::LabelOptions).
+    pub above_max: bool,
+}
+
+impl Truncation {
+    /// Of a card whose part inside of the picture is known.
+    pub(crate) fn new(card: &Card, camera: &Camera, inside: &MultiPolygon<f64>, max: f64) -> Self {
+        let whole = outline::whole(card, camera);
+        let fraction = outside_fraction(&whole, inside);
+        Self {
+            fraction,
+            whole_box: outline::bounds(&whole),
+            above_max: fraction > max,
+        }
+    }
+}
+
+/// What is outside by less than rounding is inside.
+fn outside_fraction(whole: &MultiPolygon<f64>, inside: &MultiPolygon<f64>) -> f64 {
+    let all = whole.unsigned_area();
+    let outside = all - inside.unsigned_area();
+    if outside <= SLIVER_AREA_PX2 {
+        return 0.0;
+    }
+    outside / all
+}
