@@ -8,7 +8,7 @@ use crate::geom::{Point2, Point3, Vector2};
 use crate::image::{Image, Roi};
 use crate::io;
 use crate::pixel::LinearRgb;
-use crate::scene::{Background, CameraSource};
+use crate::scene::{Background, CameraSource, Wall};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
@@ -90,6 +90,7 @@ impl BackgroundPhoto {
                 size: seen.size,
                 camera: CameraSource::Known(camera),
                 albedo: labelled.label.surface.albedo,
+                wall: wall_of(labelled, seen.size),
             },
             label: labelled.source.clone(),
             photo,
@@ -236,6 +237,12 @@ fn warn_of_shapes(places: &[BackgroundPhoto]) {
              scene.image or crop them"
         );
     }
+}
+
+/// The walls of a surface of this size, as its label says.
+fn wall_of(labelled: &LabelledPhoto, size: [f64; 2]) -> Option<Wall> {
+    let wall = labelled.label.surface.wall?;
+    Some(Wall::new(size, wall.height_m, wall.slope_deg))
 }
 
 /// The photo that a label names, in the label's folder.

@@ -82,12 +82,16 @@ fn photo_files(places: &[BackgroundPhoto]) -> Vec<(String, &Path)> {
 fn of_place(place: &BackgroundPhoto, photo: u32) -> Value {
     let (background, kept) = (&place.background, &place.kept);
     let kept = [kept.x, kept.y, kept.width, kept.height];
-    json!({
+    let mut place_values = json!({
         "name": background.name,
         "size": background.size,
         "camera": digest(&(background.camera, kept)),
         "photo": shown(photo),
-    })
+    });
+    if let Some(wall) = background.wall {
+        place_values["wall"] = json!(wall);
+    }
+    place_values
 }
 
 /// What a person should know of the backgrounds, by their names: the report shows it.

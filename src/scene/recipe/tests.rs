@@ -9,6 +9,7 @@ fn tray(name: &str) -> Background {
         name: name.into(),
         size: [0.6, 0.4],
         albedo: None,
+        wall: None,
         camera: CameraSource::Rectangle {
             corners_px: [[0.0, 0.0], [60.0, 0.0], [60.0, 40.0], [0.0, 40.0]],
             photo: [60, 40],
@@ -38,6 +39,7 @@ fn scene(recipe: &Recipe, k: u64) -> Scene {
 fn a_surface_of_known_albedo_decides_the_exposure() {
     let known = Background {
         albedo: Some(0.2),
+        wall: None,
         ..tray("a")
     };
     let exposure = |recipe: Recipe| {
