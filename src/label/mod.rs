@@ -25,6 +25,7 @@
 
 mod border;
 pub(crate) mod gallery;
+mod holdout;
 mod mask;
 mod obstruction;
 mod outline;
@@ -92,12 +93,13 @@ pub struct ObjectLabel {
     pub depth: DepthRange,
     /// Objects that lie over it, by their outlines, in order of id.
     pub covered_by: Vec<ObjectId>,
-    /// Share of its outline that no other one lies over, 0 to 1; none by
-    /// [`ObstructionRule::Overlap`], which does not ask.
+    /// Share of its outline that no other one lies over and the place does not hide, 0 to 1; none
+    /// by [`ObstructionRule::Overlap`], which does not ask.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub uncovered_fraction: Option<f64>,
-    /// Whether that is too little, by [`ObstructionRule::Visibility`]; none by
-    /// [`ObstructionRule::Overlap`], where `covered_by` tells.
+    /// Whether that is too little, by [`ObstructionRule::Visibility`]; by
+    /// [`ObstructionRule::Overlap`] it is true where the place hides more than that share of it, and
+    /// else none: `covered_by` tells.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub obstructed: Option<bool>,
 }
@@ -172,10 +174,17 @@ pub fn label(deep: &DeepImage, shot: &Shot, options: &LabelOptions) -> Labels {
     objects.retain(|s| !s.amodal_box(options.amodal).is_empty());
     let occluders = topmost::occluders(&objects, &shot.camera, options.obstruction.pair_iou());
     let uncovered: Vec<_> =
-        uncovered_fractions(&objects, &occluders, options.obstruction).collect();
+        uncovered_fractions(&objects, &occluders, shot, options.obstruction).collect();
     let pairs = objects.into_iter().zip(occluders).zip(uncovered);
-    let labels = pairs
-        .map(|((object, covered_by), uncovered)| object.into_label(options, covered_by, uncovered));
+    let labels = pairs.map(|((object, covered_by), uncovered)| {
+        let obstructed = options.obstruction.verdict(&object, uncovered, shot);
+        ObjectLabel {
+            covered_by,
+            uncovered_fraction: uncovered,
+            obstructed,
+            ..object.into_label(options)
+        }
+    });
     Labels {
         image,
         objects: labels.collect(),
@@ -186,13 +195,24 @@ pub fn label(deep: &DeepImage, shot: &Shot, options: &LabelOptions) -> Labels {
 fn uncovered_fractions(
     objects: &[Silhouette<'_>],
     occluders: &[Vec<ObjectId>],
+    shot: &Shot,
     rule: ObstructionRule,
 ) -> impl Iterator<Item = Option<f64>> {
     let pairs = objects.iter().zip(occluders);
     pairs.map(move |(object, over)| {
         rule.asks_for_share()
-            .then(|| topmost::uncovered_fraction(object, over, objects))
+            .then(|| topmost::uncovered_fraction(object, over, objects, shot))
     })
+}
+
+impl ObstructionRule {
+    /// Whether an object is obstructed; none where only those over it tell.
+    fn verdict(self, object: &Silhouette<'_>, uncovered: Option<f64>, shot: &Shot) -> Option<bool> {
+        match uncovered {
+            Some(share) => self.is_obstructed(share),
+            None => topmost::is_held_out(object, self.pair_iou(), shot).then_some(true),
+        }
+    }
 }
 
 fn check_size(deep: &DeepImage, [width, height]: [u32; 2]) {
@@ -240,12 +260,8 @@ impl<'a> Silhouette<'a> {
         }
     }
 
-    fn into_label(
-        self,
-        options: &LabelOptions,
-        covered_by: Vec<ObjectId>,
-        uncovered_fraction: Option<f64>,
-    ) -> ObjectLabel {
+    /// All but what lies over it.
+    fn into_label(self, options: &LabelOptions) -> ObjectLabel {
         let amodal_box = self.amodal_box(options.amodal);
         let seen = self.visibility;
         ObjectLabel {
@@ -258,10 +274,7 @@ impl<'a> Silhouette<'a> {
             amodal_mask: seen.amodal,
             visible_mask: seen.visible,
             depth: seen.depth,
-            covered_by,
-            uncovered_fraction,
-            obstructed: uncovered_fraction
-                .and_then(|share| options.obstruction.is_obstructed(share)),
+            ..ObjectLabel::default()
         }
     }
 }

@@ -46,6 +46,7 @@ mod draw;
 mod environment;
 mod fall;
 mod files;
+mod holdout;
 mod hull;
 mod light;
 mod locate;

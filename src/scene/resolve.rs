@@ -73,8 +73,10 @@ impl Scene {
         if let Some(plate) = &plate {
             self.check_plate(plate)?;
         }
+        let seen = self.view.camera(&camera);
         Ok(Shot {
-            camera: self.view.camera(&camera),
+            holdout: self.surface.holdout(&seen).map(Arc::new),
+            camera: seen,
             plate: plate.map(|plate| self.shown_plate(&camera, plate)),
             catcher: self.surface.size.map(|side| CATCHER_RATIO * side),
             cards: self.cards(look)?,

@@ -1,9 +1,9 @@
 //! Attempts at letting a scene come to rest: from which heights, with which steps, and how each
 //! ended.
 
-use super::bodies::{bodies_in_room, is_dropped, max_overlap, touch_distance, typical_length};
+use super::bodies::{is_dropped, max_overlap, touch_distance, typical_length};
 use super::overlap::{self, Solid, Touch};
-use super::room::Room;
+use super::room::{Room, bodies_in_room};
 use super::world::{Drop, Fall};
 use super::{SettleVerdict, columns, level, support};
 use crate::allowance::Allowance;

@@ -2,7 +2,6 @@
 //! with.
 
 use super::overlap::Solid;
-use super::room::Room;
 use crate::geom::{Pose, Vector3};
 use crate::scene::{Object, Placement, Scene, SettleOptions};
 
@@ -48,13 +47,6 @@ pub(super) fn max_overlap(scene: &Scene, options: &SettleOptions) -> f64 {
 pub(super) fn solids_at_rest(start: &Scene, end: &Scene, options: &SettleOptions) -> Vec<Solid> {
     let poses: Vec<Option<Pose>> = end.objects.iter().map(current_pose).collect();
     solids(start, options, &poses)
-}
-
-/// The same, and behind them the floor and the walls that are built.
-pub(super) fn bodies_in_room(start: &Scene, end: &Scene, options: &SettleOptions) -> Vec<Solid> {
-    let mut bodies = solids_at_rest(start, end, options);
-    bodies.extend(Room::new(start).parts);
-    bodies
 }
 
 /// Where an object is, or from where it falls; none where it is gone.

@@ -65,7 +65,8 @@ pub use crate::allowance::Allowance;
 use crate::error::{Error, Result};
 use crate::scene::{Placement, Scene};
 use attempt::{Attempt, AttemptSeries};
-use bodies::{bodies_in_room, is_dropped, touch_distance};
+use bodies::{is_dropped, touch_distance};
+use room::bodies_in_room;
 
 /// The result of dropping a scene's objects.
 #[derive(Clone, Debug, PartialEq)]

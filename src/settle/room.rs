@@ -5,10 +5,10 @@
 //! neither floor nor table: what goes over the rim is gone. The walls of a scene that names none
 //! are planes without a top that everything slides along.
 
-use super::bodies::{rectangle, typical_length};
+use super::bodies::{rectangle, solids_at_rest, typical_length};
 use super::overlap::Solid;
 use crate::geom::{Pose, UnitQuaternion, Vector3};
-use crate::scene::{Scene, Wall};
+use crate::scene::{Scene, SettleOptions, Wall};
 use std::f64::consts::FRAC_PI_2;
 
 /// Thickness of walls, as a share of the typical card's longer side: 10 mm for 200 mm.
@@ -63,6 +63,14 @@ impl Room {
         let is_beside = center.x.abs() > x || center.y.abs() > y;
         self.invisible.is_none() && center.z < 0.0 && is_beside
     }
+}
+
+/// The bodies at the end of a fall, and behind them the floor and the walls that are built; those
+/// fell that fall at its start.
+pub(super) fn bodies_in_room(start: &Scene, end: &Scene, options: &SettleOptions) -> Vec<Solid> {
+    let mut bodies = solids_at_rest(start, end, options);
+    bodies.extend(Room::new(start).parts);
+    bodies
 }
 
 /// One of four walls, as it stands on the edge at `+x`.
@@ -135,7 +143,7 @@ fn standing(half: Vector3<f64>, world_from_body: Pose) -> Solid {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Placement, SettleOptions};
+    use crate::scene::Placement;
     use crate::settle::tests::{dropped, falling};
     use crate::settle::{SettleVerdict, hanging, settle};
 
