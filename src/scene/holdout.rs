@@ -155,9 +155,10 @@ fn merged(pixel: HoldoutSample, coverage: f64, depth: f64) -> HoldoutSample {
 
 /// Offsets of the sub-samples of a pixel from its centre.
 fn subsamples() -> impl Iterator<Item = Vector2<f64>> {
-    let place = |i: usize| (i as f64 + 0.5) / SUBSAMPLES as f64 - 0.5;
-    (0..SUBSAMPLES * SUBSAMPLES)
-        .map(move |i| Vector2::new(place(i % SUBSAMPLES), place(i / SUBSAMPLES)))
+    (0..SUBSAMPLES * SUBSAMPLES).map(|i| {
+        let cell = Vector2::new((i % SUBSAMPLES) as f64, (i / SUBSAMPLES) as f64);
+        cell.add_scalar(0.5) / SUBSAMPLES as f64 - Vector2::repeat(0.5)
+    })
 }
 
 /// A polygon as a camera sees it, pixels: the part in front of the camera.

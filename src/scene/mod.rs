@@ -179,8 +179,8 @@ impl Scene {
 pub struct Surface {
     /// Width (along x) and height (along y), metres.
     pub size: [f64; 2],
-    /// Coefficient of friction of everything that touches here, the cards among themselves too; of
-    /// walls that are not there (`wall`) nothing is rubbed. Default: 0.5.
+    /// Coefficient of friction of everything that touches here, the cards among themselves too;
+    /// invisible walls are smooth. Default: 0.5.
     #[serde(default = "Surface::default_friction")]
     pub friction: f64,
     /// Share of the speed that a bounce gives back, 0 to 1. Default: 0.

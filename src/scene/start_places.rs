@@ -99,23 +99,29 @@ impl StartPlaces<'_> {
         let columns = rows[0].len();
         let weights: Vec<f64> = rows.concat();
         let sum = Range::new(0.0, weights.iter().sum());
-        let mut left = sum.draw_field(self.draws, path, "cell");
-        let holds = |weight: &f64| {
-            left -= weight;
-            left < 0.0
-        };
-        let place = weights.iter().position(holds);
-        // Rounding may leave a little beyond the last one.
-        let place = place.or(weights.iter().rposition(|w| *w > 0.0));
-        let place = place.unwrap_or_default();
+        let place = place_at(&weights, sum.draw_field(self.draws, path, "cell"));
         (place / columns, place % columns)
     }
 }
 
+/// The place in a list of weights at which their sum is above a number.
+fn place_at(weights: &[f64], number: f64) -> usize {
+    let sums = weights.iter().scan(0.0, |sum, weight| {
+        *sum += weight;
+        Some(*sum)
+    });
+    let mut numbered = sums.enumerate();
+    let found = numbered.find(|(_, sum)| *sum > number);
+    // Rounding may leave a number that is the whole sum.
+    let last = weights.iter().rposition(|weight| *weight > 0.0);
+    found.map(|(i, _)| i).or(last).unwrap_or_default()
+}
+
 /// One of `of` equal parts of a range.
 fn cell(range: &Range, i: usize, of: usize) -> Range {
-    let end = |i: usize| range.min + (range.max - range.min) * i as f64 / of as f64;
-    Range::new(end(i), end(i + 1))
+    let [low, high] = [i, i + 1].map(|end| end as f64 / of as f64);
+    let length = range.max - range.min;
+    Range::new(range.min + low * length, range.min + high * length)
 }
 
 /// Points that cover the surface evenly however many they are, drawn towards the middle.

@@ -40,10 +40,7 @@ impl Wall {
     pub fn inner_faces(&self, size: [f64; 2]) -> [[Vector3<f64>; 4]; 4] {
         let (edge, out) = (size.map(|side| side / 2.0), self.outset());
         let rim = edge.map(|half| half + out);
-        let ring = |[x, y]: [f64; 2], z| {
-            [[-x, y], [x, y], [x, -y], [-x, -y]].map(|[x, y]| Vector3::new(x, y, z))
-        };
-        let (low, high) = (ring(edge, 0.0), ring(rim, self.height));
+        let (low, high) = (rectangle_at(0.0, edge), rectangle_at(self.height, rim));
         [0, 1, 2, 3].map(|i| {
             let next = (i + 1) % 4;
             [low[i], high[i], high[next], low[next]]
@@ -54,6 +51,11 @@ impl Wall {
         WALL_HEIGHT.check(&format!("{at}.height"), self.height)?;
         SLOPE.check(&format!("{at}.slope_deg"), self.slope_deg)
     }
+}
+
+/// Corners of a level rectangle with these half sides, clockwise from above, from `(-x, y)`.
+fn rectangle_at(z: f64, [x, y]: [f64; 2]) -> [Vector3<f64>; 4] {
+    [[-x, y], [x, y], [x, -y], [-x, -y]].map(|[x, y]| Vector3::new(x, y, z))
 }
 
 /// What the walls of a scene are drawn from, instead of what the background's label says.
@@ -72,13 +74,13 @@ pub struct WallRanges {
 impl WallRanges {
     /// Walls along a surface of this size whose label says `labelled`.
     pub(super) fn draw(&self, draws: &Draws, size: [f64; 2], labelled: Option<Wall>) -> Wall {
-        let drawn = |range: &Option<Range>, name| {
-            let range = range.as_ref()?;
-            Some(range.draw_field(draws, "walls", name))
-        };
-        let height = drawn(&self.height, "height").or(labelled.map(|wall| wall.height));
-        let slope_deg = drawn(&self.slope_deg, "slope_deg").or(labelled.map(|wall| wall.slope_deg));
-        Wall::new(size, height, slope_deg)
+        let height = drawn(&self.height, draws, "walls.height");
+        let slope_deg = drawn(&self.slope_deg, draws, "walls.slope_deg");
+        Wall::new(
+            size,
+            height.or(labelled.map(|wall| wall.height)),
+            slope_deg.or(labelled.map(|wall| wall.slope_deg)),
+        )
     }
 
     pub(super) fn check(&self) -> Result<()> {
@@ -90,6 +92,11 @@ impl WallRanges {
             None => Ok(()),
         }
     }
+}
+
+/// Nothing is drawn from what is not given.
+fn drawn(range: &Option<Range>, draws: &Draws, path: &str) -> Option<f64> {
+    range.as_ref().map(|range| range.draw(draws, path))
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@
 //! scene alone; a scene in which nothing falls comes back unchanged and no physics world is built.
 //! Objects fall as thin boxes ([`SettleOptions::half_body`]) or as convex prisms
 //! ([`Object::outline`](crate::scene::Object::outline)), between smooth walls that stand on the
-//! edges of the surface and have no top, or between those that the surface has ([`room`]). A card
+//! edges of the surface and have no top, or between those that the surface has. A card
 //! lies in the *middle* plane of its body. Objects that are at rest already are obstacles that do
 //! not move; a card that can touch nothing needs no physics.
 //!

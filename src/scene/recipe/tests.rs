@@ -1,6 +1,6 @@
 use super::*;
 use crate::pixel::LinearRgb;
-use crate::scene::{AssetVariant, Background, CameraSource, Exposure, Object, Placement};
+use crate::scene::{AssetVariant, Background, CameraSource, Exposure, Object, Placement, Wall};
 use std::collections::BTreeSet;
 use std::f64::consts::PI;
 
@@ -39,7 +39,6 @@ fn scene(recipe: &Recipe, k: u64) -> Scene {
 fn a_surface_of_known_albedo_decides_the_exposure() {
     let known = Background {
         albedo: Some(0.2),
-        wall: None,
         ..tray("a")
     };
     let exposure = |recipe: Recipe| {
@@ -399,4 +398,52 @@ fn the_ambient_is_a_share_of_the_light_at_the_centre() {
         ..Recipe::default()
     };
     assert_eq!(scene(&dark, 0).ambient, LinearRgb::grey(0.5));
+}
+
+/// Where the objects of a scene start.
+fn starts(scene: &mut Scene) -> Vec<&mut [f64; 2]> {
+    let starts = scene
+        .objects
+        .iter_mut()
+        .map(|object| match &mut object.placement {
+            Placement::Drop { above, .. } => above,
+            _ => panic!("not dropped"),
+        });
+    starts.collect()
+}
+
+#[test]
+fn walls_and_places_move_no_other_draw() {
+    let read = |text: &str| toml::from_str::<Recipe>(text).unwrap();
+    let walls = read("walls = { height = [0.02, 0.1], slope_deg = [0, 20] }");
+    let even = read("start = { spread = [0.5, 1] }");
+    let by_cells = read("start = { positions = [[1, 0, 1]] }");
+    for k in 0..20 {
+        let plain = scene(&Recipe::default(), k);
+        assert_eq!(plain.surface.wall, None);
+        let mut walled = scene(&walls, k);
+        let wall = walled.surface.wall.take().unwrap();
+        assert!((0.02..0.1).contains(&wall.height) && (0.0..20.0).contains(&wall.slope_deg));
+        assert_eq!(walled, plain);
+        for recipe in [&even, &by_cells] {
+            let mut moved = scene(recipe, k);
+            assert_ne!(moved, plain);
+            let mut plain = plain.clone();
+            for (moved, plain) in starts(&mut moved).into_iter().zip(starts(&mut plain)) {
+                *moved = *plain;
+            }
+            assert_eq!(moved, plain);
+        }
+    }
+}
+
+#[test]
+fn labelled_walls_are_those_of_the_scene() {
+    let wall = Wall::new([0.6, 0.4], Some(0.07), None);
+    let labelled = Background {
+        wall: Some(wall),
+        ..tray("a")
+    };
+    let scene = Recipe::default().scene(7, 0, &[labelled], &catalog(10));
+    assert_eq!(scene.unwrap().surface.wall, Some(wall));
 }
