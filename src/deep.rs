@@ -1,7 +1,7 @@
 //! Deep samples: per pixel, front to back, what each object does to the pixel.
 
 use crate::image::Image;
-use crate::pixel::{Depth, Film, LinearRgb, ObjectId};
+use crate::pixel::{Coverage, Depth, Film, LinearRgb, Mix, ObjectId};
 
 /// What one object contributes to one pixel, averaged over the pixel.
 ///
@@ -19,6 +19,24 @@ pub struct DeepSample {
     pub alpha: f32,
     /// The part of `alpha` that is seen through what lies in front.
     pub visible: f32,
+}
+
+/// What of the place itself stands in front of objects in one pixel; the default is nothing.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct HoldoutSample {
+    /// Share of the pixel that it fills.
+    pub coverage: Coverage,
+    /// How far away it is, metres along the optical axis: what is nearer is in front of it. 0 is in
+    /// front of everything.
+    pub depth: Depth,
+}
+
+impl HoldoutSample {
+    /// Whether it hides anything of what is this far away.
+    #[inline]
+    pub(crate) fn hides(&self, depth: f64) -> bool {
+        self.coverage.0 > 0.0 && depth > f64::from(self.depth.0)
+    }
 }
 
 /// A picture of deep samples, and what the shadows leave of the surface's light.
@@ -189,6 +207,46 @@ impl DeepImage {
     ) -> Self {
         let shadow = Image::from_fn(self.width, self.height, |x, y| f(x, y, self.shadow[(x, y)]));
         Self { shadow, ..self }
+    }
+
+    /// The same picture behind what of the place stands in front: the objects are as they were
+    /// (`alpha`), less of them is seen, and the plate shows in their place, without the shadows of
+    /// what it hides.
+    ///
+    /// # Panics
+    /// When the sizes differ.
+    pub(crate) fn held_out(mut self, holdout: Option<&Image<HoldoutSample>>) -> Self {
+        let Some(holdout) = holdout else {
+            return self;
+        };
+        let size = (self.width, self.height);
+        assert_eq!(holdout.size(), size, "holdout and picture differ in size");
+        for y in 0..self.height {
+            for x in 0..self.width {
+                self.hold_out_pixel(x, y, &holdout[(x, y)]);
+            }
+        }
+        self
+    }
+
+    fn hold_out_pixel(&mut self, x: usize, y: usize, place: &HoldoutSample) {
+        let passes = 1.0 - place.coverage.0;
+        if passes >= 1.0 {
+            return;
+        }
+        for i in self.sample_range(x, y) {
+            if place.hides(self.samples[i].depth.0.into()) {
+                self.samples[i].light = self.samples[i].light.scale(passes);
+                self.samples[i].visible *= passes;
+                if let Some(tint) = self.tints.get_mut(i) {
+                    *tint = tint.scale(passes);
+                }
+            }
+        }
+        let shadow = &mut self.shadow[(x, y)];
+        *shadow = shadow
+            .scale(passes)
+            .add_scaled(place.coverage.0, LinearRgb::WHITE);
     }
 
     /// The factor on the plate, per channel.

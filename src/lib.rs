@@ -97,6 +97,8 @@ pub use allowance::Allowance;
 #[cfg(feature = "pipeline")]
 pub use camera::Camera;
 #[cfg(feature = "pipeline")]
+#[doc(hidden)]
+pub use deep::HoldoutSample;
 pub use deep::{DeepImage, DeepSample};
 pub use diagnostic::{Code, Diagnostic, Severity};
 #[doc(hidden)]

@@ -15,7 +15,7 @@ use petcomp::geom::BBox;
 use petcomp::geom::{Point2, Pose, UnitQuaternion, Vector2};
 use petcomp::label::{Labels, ObjectLabel, RleMask};
 use petcomp::scene::{CameraSource, Exposure, Grade, Object, Placement, Surface};
-use petcomp::{Error, Image, LinearRgb, ObjectId, PremulRgba, Result, Scene, io};
+use petcomp::{Coverage, Error, Image, LinearRgb, ObjectId, PremulRgba, Result, Scene, io};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -1440,6 +1440,11 @@ fn whatever_decides_a_picture_or_a_label_is_compared_before_a_dataset_goes_on() 
         &Image::filled(4, 2, LinearRgb::WHITE),
     )
     .unwrap();
+    let front = world.join("photos/tray.front.png");
+    io::write(&front, &Image::filled(64, 48, Coverage(1.0))).unwrap();
+    let refused = run(4).unwrap_err().to_string();
+    assert!(refused.contains("backgrounds[tray]"), "{refused}");
+    std::fs::remove_file(front).unwrap();
     assert_eq!(before, bytes(&out));
     assert_eq!(run(4).unwrap().made, 1, "everything is as it was");
 }
@@ -1467,4 +1472,50 @@ fn a_photo_that_a_label_or_a_manifest_names_is_one_of_its_folder() {
             "{said}"
         );
     }
+}
+
+#[test]
+fn what_a_mask_beside_the_photo_hides_is_the_place_in_picture_and_labels() {
+    let dir = tempfile::tempdir().unwrap();
+    write_world(dir.path());
+    let open = || {
+        let rule = ["labels.min_visible=0.9".parse().unwrap()];
+        Pipeline::open(DatasetConfig::read(dir.path().join("recipe.toml"), &rule).unwrap()).unwrap()
+    };
+    let free = open().sample(1, 0).unwrap();
+    let mask = Image::from_fn(64, 48, |x, _| Coverage(f32::from(x < 32)));
+    io::write(dir.path().join("photos/tray.front.png"), &mask).unwrap();
+    let held = open().sample(1, 0).unwrap();
+    for (x, y) in (0..64 * 48).map(|i| (i % 64, i / 64)) {
+        let expected = if x < 32 {
+            LinearRgb::grey(0.25).opaque()
+        } else {
+            free.frame[(x, y)]
+        };
+        assert_eq!(held.frame[(x, y)], expected, "{x} {y}");
+    }
+    let mut cut = 0;
+    for (held, free) in held.labels.objects.iter().zip(&free.labels.objects) {
+        assert_eq!((held.id, &held.amodal_mask), (free.id, &free.amodal_mask));
+        let seen = free.visible_mask.pixels().filter(|(x, _)| *x >= 32);
+        assert!(held.visible_mask.pixels().eq(seen));
+        let [held, free] = [held, free].map(|o| o.uncovered_fraction.unwrap());
+        assert!(held <= free);
+        cut += usize::from(held < free);
+    }
+    assert!(cut > 2);
+    let drawn = held.provenance.unwrap().drawn;
+    assert_eq!(open().label(drawn).unwrap(), held.labels);
+}
+
+#[test]
+fn a_mask_of_another_size_is_told() {
+    let dir = tempfile::tempdir().unwrap();
+    write_world(dir.path());
+    let path = dir.path().join("photos/tray.front.png");
+    io::write(&path, &Image::filled(32, 24, Coverage(1.0))).unwrap();
+    let config = DatasetConfig::read(dir.path().join("recipe.toml"), &[]).unwrap();
+    let told = Pipeline::open(config).unwrap().sample(1, 0).unwrap_err();
+    let what = "tray.front.png: 32 x 24 pixels, but its label says 64 x 48";
+    assert!(told.to_string().ends_with(what), "{told}");
 }

@@ -14,6 +14,7 @@ use rayon::prelude::*;
 fn tray() -> Background {
     Background {
         albedo: None,
+        wall: None,
         name: "tray".into(),
         size: [0.6, 0.4],
         camera: CameraSource::Rectangle {
@@ -258,6 +259,7 @@ fn tight(times: f64, narrow: f64) -> Background {
     let longest = 0.28 * recipe(Range::fixed(1.0)).scale.max;
     Background {
         albedo: None,
+        wall: None,
         size: [longest * times, longest * times * narrow],
         ..tray()
     }
@@ -277,7 +279,7 @@ fn heaped_up(scene: &Scene) -> bool {
         .fold(0.0, f64::max);
     let height = |object: &Object| match object.placement {
         Placement::At(pose) => pose.translation.z,
-        Placement::Drop { .. } => f64::INFINITY,
+        Placement::Drop { .. } | Placement::Gone => f64::INFINITY,
     };
     scene.objects.iter().map(height).fold(0.0, f64::max) > thickness + longest
 }
@@ -356,6 +358,7 @@ fn a_tray_smaller_than_the_longest_card_is_refused_with_both_named() {
         tray(),
         Background {
             albedo: None,
+            wall: None,
             name: "box".into(),
             ..tight(0.99, 0.5)
         },

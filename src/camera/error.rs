@@ -55,6 +55,16 @@ pub enum SolveError {
         /// What it was.
         value: f64,
     },
+    /// Walls do not lean outwards.
+    #[error("{at}: {value}, expected 0 to {most} degrees from upright, outwards")]
+    NotSlope {
+        /// Which value.
+        at: &'static str,
+        /// What it was.
+        value: f64,
+        /// The largest one.
+        most: f64,
+    },
     /// Two corners coincide.
     #[error(
         "surface.corners_px: corners {first} and {second} are {distance_px:.1} px apart, expected at least {limit_px:.1}"

@@ -335,10 +335,12 @@ impl SolvedFrom {
     }
 }
 
-/// CRC-32 of a label as we would write it.
+/// CRC-32 of a label as we would write it, without what no camera depends on.
 pub(crate) fn checksum(label: &Label) -> u32 {
+    let mut label = label.clone();
+    label.surface.wall = None;
     // A label is made of texts and numbers: all of them have a form in JSON.
-    crc32fast::hash(&serde_json::to_vec(label).unwrap_or_default())
+    crc32fast::hash(&serde_json::to_vec(&label).unwrap_or_default())
 }
 
 impl FoundCamera {

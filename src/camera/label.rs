@@ -132,6 +132,21 @@ pub struct LabelSurface {
     /// for white paper; or its colour, which tells that of the light too.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub albedo: Option<Albedo>,
+    /// The walls on all its sides, where it has any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub wall: Option<LabelWall>,
+}
+
+/// The walls of a labelled rectangle.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct LabelWall {
+    /// Height of the rim over the rectangle, metres; 0 is a table without walls. Default: a lip.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub height_m: Option<f64>,
+    /// How far they lean outwards, degrees from upright. Default: 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub slope_deg: Option<f64>,
 }
 
 /// What is known of the camera of a label.

@@ -1,7 +1,8 @@
 //! Checks for impossible numbers in a label.
 
 use super::error::SolveError;
-use super::label::{Label, LabelCamera, LabelPoint, LabelSurface};
+use super::label::{Label, LabelCamera, LabelPoint, LabelSurface, LabelWall};
+use crate::bounds::MAX_SLOPE_DEG;
 use crate::color::Albedo;
 
 /// No meaningful label holds larger numbers, or positive ones smaller than one over this.
@@ -28,7 +29,20 @@ fn check_surface(surface: &LabelSurface) -> Result<(), SolveError> {
     }
     check_positive("surface.corner_sigma_px", surface.corner_sigma_px)?;
     check_albedo("surface.albedo", surface.albedo)?;
-    check_not_negative("surface.dimension_sigma_m", surface.dimension_sigma_m)
+    check_not_negative("surface.dimension_sigma_m", surface.dimension_sigma_m)?;
+    surface.wall.iter().try_for_each(check_wall)
+}
+
+fn check_wall(wall: &LabelWall) -> Result<(), SolveError> {
+    check_not_negative("surface.wall.height_m", wall.height_m)?;
+    match wall.slope_deg {
+        Some(value) if !(0.0..=MAX_SLOPE_DEG).contains(&value) => Err(SolveError::NotSlope {
+            at: "surface.wall.slope_deg",
+            value,
+            most: MAX_SLOPE_DEG,
+        }),
+        _ => Ok(()),
+    }
 }
 
 fn check_point(point: &LabelPoint) -> Result<(), SolveError> {
@@ -104,6 +118,36 @@ mod tests {
     use super::*;
     use crate::camera::simulate::Scenario;
     use crate::pixel::LinearRgb;
+
+    fn refusal_of_wall(wall: LabelWall) -> String {
+        let mut label = Scenario::default().view(1, 0).label;
+        label.surface.wall = Some(wall);
+        check_label(&label).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn walls_are_not_below_the_surface_and_lean_outwards() {
+        let height = refusal_of_wall(LabelWall {
+            height_m: Some(-0.07),
+            slope_deg: None,
+        });
+        assert_eq!(
+            height,
+            "surface.wall.height_m: -0.07, expected a positive number"
+        );
+        for slope in [-8.0, 90.0, f64::NAN] {
+            let refusal = refusal_of_wall(LabelWall {
+                height_m: None,
+                slope_deg: Some(slope),
+            });
+            assert_eq!(
+                refusal,
+                format!(
+                    "surface.wall.slope_deg: {slope}, expected 0 to 80 degrees from upright, outwards"
+                )
+            );
+        }
+    }
 
     fn refusal_of(albedo: Albedo) -> String {
         let mut label = Scenario::default().view(1, 0).label;

@@ -64,7 +64,7 @@ pub use init::{commented, init_label};
 #[doc(hidden)]
 pub use joint::{Joint, OutlierPhoto, group_by_camera, solve_joint};
 #[doc(hidden)]
-pub use label::{Artwork, Crop, Framing, LabelFormat, PixelOrigin};
+pub use label::{Artwork, Crop, Framing, LabelFormat, LabelWall, PixelOrigin};
 pub use label::{Label, LabelCamera, LabelImage, LabelPoint, LabelSurface, MarkerMap};
 pub(crate) use marker::any_markers;
 #[cfg(test)]

@@ -6,9 +6,9 @@ use crate::error::{Error, Result};
 use crate::filter;
 use crate::geom::{Point2, Point3, Vector2};
 use crate::image::{Image, Roi};
-use crate::io;
-use crate::pixel::LinearRgb;
-use crate::scene::{Background, CameraSource};
+use crate::io::{self, FromFile};
+use crate::pixel::{Coverage, LinearRgb, Mix};
+use crate::scene::{Background, CameraSource, Wall};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
@@ -34,6 +34,9 @@ pub(crate) struct BackgroundPhoto {
     taken: [u32; 2],
     image: [u32; 2],
     plate: OnceLock<Arc<Image<LinearRgb>>>,
+    /// The mask of what hides objects, beside the photo.
+    pub(crate) front: Option<PathBuf>,
+    front_mask: OnceLock<Arc<Image<Coverage>>>,
 }
 
 /// How labelled photos are opened.
@@ -90,14 +93,17 @@ impl BackgroundPhoto {
                 size: seen.size,
                 camera: CameraSource::Known(camera),
                 albedo: labelled.label.surface.albedo,
+                wall: wall_of(labelled, seen.size),
             },
             label: labelled.source.clone(),
-            photo,
             notes: seen.warnings.iter().map(ToString::to_string).collect(),
             taken,
             kept,
             image,
             plate: OnceLock::new(),
+            front: front_beside(&photo),
+            front_mask: OnceLock::new(),
+            photo,
         }
     }
 
@@ -170,24 +176,41 @@ impl BackgroundPhoto {
         if let Some(plate) = self.plate.get() {
             return Ok(plate.clone());
         }
-        let photo = io::read::<LinearRgb>(&self.photo)?;
-        self.check_size(photo.size())?;
-        let [width, height] = self.image.map(|side| side as usize);
-        let plate = Arc::new(filter::resize(&photo.crop(self.kept), width, height));
+        let plate = Arc::new(self.shown_part::<LinearRgb>(&self.photo)?);
         Ok(self.plate.get_or_init(|| plate).clone())
     }
 
-    fn check_size(&self, (w, h): (usize, usize)) -> Result<()> {
+    /// What of the place hides objects, at the picture's size, where a mask says so; read once.
+    pub(crate) fn front_mask(&self) -> Result<Option<Arc<Image<Coverage>>>> {
+        let Some(path) = &self.front else {
+            return Ok(None);
+        };
+        if let Some(mask) = self.front_mask.get() {
+            return Ok(Some(mask.clone()));
+        }
+        let mask = Arc::new(self.shown_part::<Coverage>(path)?);
+        Ok(Some(self.front_mask.get_or_init(|| mask).clone()))
+    }
+
+    /// The part that is seen of a picture of the photo's size, at the size of the pictures.
+    fn shown_part<P: FromFile + Mix + Send + Sync>(&self, path: &Path) -> Result<Image<P>> {
+        let photo = io::read::<P>(path)?;
+        self.check_size(path, photo.size())?;
+        let [width, height] = self.image.map(|side| side as usize);
+        Ok(filter::resize(&photo.crop(self.kept), width, height))
+    }
+
+    fn check_size(&self, path: &Path, (w, h): (usize, usize)) -> Result<()> {
         if [w, h] == self.taken.map(|side| side as usize) {
             return Ok(());
         }
-        Err(self.size_mismatch(w, h))
+        Err(self.size_mismatch(path, w, h))
     }
 
-    fn size_mismatch(&self, w: usize, h: usize) -> Error {
+    fn size_mismatch(&self, path: &Path, w: usize, h: usize) -> Error {
         let [label_w, label_h] = self.taken;
         let what = format!("{w} x {h} pixels, but its label says {label_w} x {label_h}");
-        Error::file(&self.photo, what)
+        Error::file(path, what)
     }
 }
 
@@ -236,6 +259,18 @@ fn warn_of_shapes(places: &[BackgroundPhoto]) {
              scene.image or crop them"
         );
     }
+}
+
+/// The walls of a surface of this size, as its label says.
+fn wall_of(labelled: &LabelledPhoto, size: [f64; 2]) -> Option<Wall> {
+    let wall = labelled.label.surface.wall?;
+    Some(Wall::new(size, wall.height_m, wall.slope_deg))
+}
+
+/// The mask beside a photo of what hides objects, `NAME.front.png`, where there is one.
+fn front_beside(photo: &Path) -> Option<PathBuf> {
+    let mask = photo.with_extension("front.png");
+    mask.is_file().then_some(mask)
 }
 
 /// The photo that a label names, in the label's folder.

@@ -69,8 +69,20 @@ fn of_photo(photo: &Photo) -> Value {
 
 fn of_places(places: &[BackgroundPhoto], inputs: &mut Inputs) -> Result<Vec<Value>> {
     let photos = inputs.checksums(&photo_files(places))?;
+    let mut fronts = inputs.checksums(&front_files(places))?.into_iter();
     let pairs = places.iter().zip(photos);
-    Ok(pairs.map(|(place, photo)| of_place(place, photo)).collect())
+    Ok(pairs
+        .map(|(place, photo)| of_place(place, photo, place.front.as_ref().and(fronts.next())))
+        .collect())
+}
+
+/// The masks beside backgrounds of what hides objects, by the names of their inputs.
+fn front_files(places: &[BackgroundPhoto]) -> Vec<(String, &Path)> {
+    let masks = places.iter().filter_map(|place| {
+        let name = format!("front of {}", place.background.name);
+        Some((name, place.front.as_deref()?))
+    });
+    masks.collect()
 }
 
 /// The photos of backgrounds, by the names of their inputs.
@@ -83,15 +95,22 @@ fn photo_files(places: &[BackgroundPhoto]) -> Vec<(String, &Path)> {
         .collect()
 }
 
-fn of_place(place: &BackgroundPhoto, photo: u32) -> Value {
+fn of_place(place: &BackgroundPhoto, photo: u32, front: Option<u32>) -> Value {
     let (background, kept) = (&place.background, &place.kept);
     let kept = [kept.x, kept.y, kept.width, kept.height];
-    json!({
+    let mut place_values = json!({
         "name": background.name,
         "size": background.size,
         "camera": digest(&(background.camera, kept)),
         "photo": shown(photo),
-    })
+    });
+    if let Some(wall) = background.wall {
+        place_values["wall"] = json!(wall);
+    }
+    if let Some(front) = front {
+        place_values["front"] = json!(shown(front));
+    }
+    place_values
 }
 
 /// What a person should know of the backgrounds, by their names: the report shows it.

@@ -278,7 +278,9 @@ impl Pipeline {
     /// # Errors
     /// As [`take`](Self::take).
     pub fn label(&self, scene: Scene) -> Result<Labels> {
-        let (_, shot) = self.resolve(scene.unlit())?;
+        let plate = scene.plate.clone();
+        let (scene, shot) = self.resolve(scene.unlit())?;
+        let shot = self.behind_front(&plate, &scene, shot)?;
         Ok(label::label(
             &render::render_coverage(&shot, &self.config.render),
             &shot,
@@ -318,7 +320,28 @@ impl Pipeline {
             plate,
             self.panorama(&scene)?,
         )?;
+        let shot = self.behind_front(&scene.plate, &scene, shot)?;
         Ok((scene, shot))
+    }
+
+    /// A shot whose objects are behind what the mask beside the plate says, where there is one: it
+    /// takes the place of what the walls hide.
+    fn behind_front(&self, plate: &str, scene: &Scene, shot: Shot) -> Result<Shot> {
+        let place = self.place(plate);
+        let mask = place.map_or(Ok(None), BackgroundPhoto::front_mask)?;
+        Ok(match (mask, scene.camera) {
+            (Some(mask), CameraSource::Known(camera)) => Shot {
+                holdout: Some(Arc::new(scene.holdout_of_mask(&camera, &mask))),
+                ..shot
+            },
+            _ => shot,
+        })
+    }
+
+    fn place(&self, name: &str) -> Option<&BackgroundPhoto> {
+        self.places
+            .iter()
+            .find(|place| place.background.name == name)
     }
 
     #[cfg(feature = "settle")]
@@ -345,8 +368,7 @@ impl Pipeline {
         if name.is_empty() {
             return Ok(None);
         }
-        let mut places = self.places.iter();
-        match places.find(|place| place.background.name == name) {
+        match self.place(name) {
             Some(place) => place.plate().map(Some),
             None => Err(self.unknown_plate(name)),
         }

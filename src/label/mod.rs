@@ -26,6 +26,7 @@
 mod border;
 mod distractor;
 pub(crate) mod gallery;
+mod holdout;
 mod mask;
 mod obstruction;
 mod outline;
@@ -101,12 +102,13 @@ pub struct ObjectLabel {
     pub depth: DepthRange,
     /// Objects and distractors that lie over it, by their outlines, in order of id.
     pub covered_by: Vec<ObjectId>,
-    /// Share of its outline that no other one lies over, 0 to 1; none by
-    /// [`ObstructionRule::Overlap`], which does not ask.
+    /// Share of its outline that no other one lies over and the place does not hide, 0 to 1; none
+    /// by [`ObstructionRule::Overlap`], which does not ask.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub uncovered_fraction: Option<f64>,
-    /// Whether that is too little, by [`ObstructionRule::Visibility`]; none by
-    /// [`ObstructionRule::Overlap`], where `covered_by` tells.
+    /// Whether that is too little, by [`ObstructionRule::Visibility`]; by
+    /// [`ObstructionRule::Overlap`] it is true where the place hides more than that share of it, and
+    /// else none: `covered_by` tells.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub obstructed: Option<bool>,
     /// How far it reaches out of the picture; none where
@@ -116,15 +118,6 @@ pub struct ObjectLabel {
 }
 
 impl ObjectLabel {
-    /// The same with the share of its outline that no other one lies over, where a rule asks.
-    fn uncovered(self, fraction: Option<f64>, rule: ObstructionRule) -> Self {
-        Self {
-            uncovered_fraction: fraction,
-            obstructed: fraction.and_then(|share| rule.is_obstructed(share)),
-            ..self
-        }
-    }
-
     /// It is not obstructed, by the rule that it was labelled with: it can be picked.
     pub fn is_topmost(&self) -> bool {
         match self.obstructed {
@@ -206,15 +199,30 @@ pub fn label(deep: &DeepImage, shot: &Shot, options: &LabelOptions) -> Labels {
     objects.retain(|s| !s.amodal_box(options.amodal).is_empty());
     let occluders = topmost::occluders(&objects, &shot.camera, options.obstruction.pair_iou());
     let uncovered: Vec<_> =
-        uncovered_fractions(&objects, &occluders, options.obstruction).collect();
+        uncovered_fractions(&objects, &occluders, shot, options.obstruction).collect();
     let mut labels = Labels {
         image,
         ..Labels::default()
     };
     for ((object, covered_by), uncovered) in objects.into_iter().zip(occluders).zip(uncovered) {
-        labels.push(object, options, covered_by, uncovered);
+        labels.push(
+            object,
+            shot,
+            options,
+            Cover {
+                by: covered_by,
+                free: uncovered,
+            },
+        );
     }
     labels
+}
+
+/// What lies over a card: others by their ids, and the share that neither they nor the place cover,
+/// where a rule asks.
+struct Cover {
+    by: Vec<ObjectId>,
+    free: Option<f64>,
 }
 
 impl Labels {
@@ -222,18 +230,19 @@ impl Labels {
     fn push(
         &mut self,
         silhouette: Silhouette<'_>,
+        shot: &Shot,
         options: &LabelOptions,
-        covered_by: Vec<ObjectId>,
-        uncovered: Option<f64>,
+        cover: Cover,
     ) {
         match silhouette.card.class {
-            Some(class) => {
-                let label = silhouette.into_label(class, options, covered_by);
-                self.objects
-                    .push(label.uncovered(uncovered, options.obstruction));
-            }
+            Some(class) => self.objects.push(ObjectLabel {
+                obstructed: options.obstruction.verdict(&silhouette, cover.free, shot),
+                covered_by: cover.by,
+                uncovered_fraction: cover.free,
+                ..silhouette.into_label(class, options)
+            }),
             None => {
-                let distractor = silhouette.into_distractor(options, covered_by);
+                let distractor = silhouette.into_distractor(options, cover.by);
                 self.distractors.push(distractor);
             }
         }
@@ -244,13 +253,24 @@ impl Labels {
 fn uncovered_fractions(
     objects: &[Silhouette<'_>],
     occluders: &[Vec<ObjectId>],
+    shot: &Shot,
     rule: ObstructionRule,
 ) -> impl Iterator<Item = Option<f64>> {
     let pairs = objects.iter().zip(occluders);
     pairs.map(move |(object, over)| {
         rule.asks_for_share()
-            .then(|| topmost::uncovered_fraction(object, over, objects))
+            .then(|| topmost::uncovered_fraction(object, over, objects, shot))
     })
+}
+
+impl ObstructionRule {
+    /// Whether an object is obstructed; none where only those over it tell.
+    fn verdict(self, object: &Silhouette<'_>, uncovered: Option<f64>, shot: &Shot) -> Option<bool> {
+        match uncovered {
+            Some(share) => self.is_obstructed(share),
+            None => topmost::is_held_out(object, self.pair_iou(), shot).then_some(true),
+        }
+    }
 }
 
 fn check_size(deep: &DeepImage, [width, height]: [u32; 2]) {
@@ -309,12 +329,8 @@ impl<'a> Silhouette<'a> {
         }
     }
 
-    fn into_label(
-        self,
-        class: u32,
-        options: &LabelOptions,
-        covered_by: Vec<ObjectId>,
-    ) -> ObjectLabel {
+    /// All but what lies over it.
+    fn into_label(self, class: u32, options: &LabelOptions) -> ObjectLabel {
         let amodal_box = self.amodal_box(options.amodal);
         let seen = self.visibility;
         ObjectLabel {
@@ -327,10 +343,8 @@ impl<'a> Silhouette<'a> {
             amodal_mask: seen.amodal,
             visible_mask: seen.visible,
             depth: seen.depth,
-            covered_by,
-            uncovered_fraction: None,
-            obstructed: None,
             truncation: self.truncation,
+            ..ObjectLabel::default()
         }
     }
 

@@ -10,10 +10,11 @@
 
 use crate::camera::Camera;
 use crate::geom::Point2;
+use crate::label::holdout::hidden_area;
 use crate::label::outline::{bounds, overlap};
 use crate::label::{ObjectLabel, Silhouette};
 use crate::pixel::ObjectId;
-use crate::scene::Card;
+use crate::scene::{Card, Shot};
 use geo::{Area, BooleanOps, Centroid, MultiPolygon};
 use std::collections::BTreeSet;
 
@@ -40,8 +41,8 @@ pub(crate) fn occluders(
     occluders
 }
 
-/// Share of an object's outline that none of those `over` it covers, in the picture; 0 where it has
-/// no area.
+/// Share of an object's outline that neither those `over` it nor the place covers, in the picture;
+/// 0 where it has no area.
 ///
 /// Outlines cover whatever lies under them, see-through objects too: what is under one cannot be
 /// picked.
@@ -49,6 +50,7 @@ pub(crate) fn uncovered_fraction(
     object: &Silhouette<'_>,
     over: &[ObjectId],
     objects: &[Silhouette<'_>],
+    shot: &Shot,
 ) -> f64 {
     let whole = object.region.unsigned_area();
     if whole == 0.0 {
@@ -58,7 +60,14 @@ pub(crate) fn uncovered_fraction(
     let free = covering.fold(object.region.clone(), |free, other| {
         free.difference(&other.region)
     });
-    free.unsigned_area() / whole
+    let seen = free.unsigned_area() - hidden_area(&free, object.card, shot);
+    seen.max(0.0) / whole
+}
+
+/// Whether the place hides more than this share of an object's outline.
+pub(crate) fn is_held_out(object: &Silhouette<'_>, share: f64, shot: &Shot) -> bool {
+    let hidden = hidden_area(&object.region, object.card, shot);
+    hidden > share * object.region.unsigned_area()
 }
 
 /// None where the two do not overlap enough.
@@ -74,7 +83,7 @@ fn is_first_above(
 
 /// Of two cards that meet at a pixel position, the first is at least as near.
 fn is_above(first: &Card, second: &Card, camera: &Camera, px: Point2<f64>) -> bool {
-    inverse_depth(first, camera, px) >= inverse_depth(second, camera, px)
+    first.inverse_depth(camera, px) >= second.inverse_depth(camera, px)
 }
 
 /// The objects of cyclic overlaps: each lies, through others, over itself (A over B over C over A).
@@ -109,14 +118,6 @@ fn overlap_center(a: &MultiPolygon<f64>, b: &MultiPolygon<f64>, iou: f64) -> Opt
     let union = a.unsigned_area() + b.unsigned_area() - area;
     let center = shared.centroid()?;
     (area > iou * union).then(|| Point2::new(center.x(), center.y()))
-}
-
-/// Inverse depth of a card's plane at a pixel position, 1/metres; larger is nearer.
-fn inverse_depth(card: &Card, camera: &Camera, px: Point2<f64>) -> f64 {
-    let plane = card.quad.plane();
-    let ray = camera.ray(px);
-    let distance = plane.offset - plane.normal.dot(&ray.origin.coords);
-    plane.normal.dot(&ray.direction) / distance
 }
 
 #[cfg(test)]

@@ -51,7 +51,7 @@ pub fn render(shot: &Shot, options: &RenderOptions) -> DeepImage {
         .into_par_iter()
         .map(|tile| stack.render_tile(tile))
         .collect();
-    assemble_tiles(&view, &rendered)
+    assemble_tiles(&view, &rendered).held_out(shot.holdout.as_deref())
 }
 
 /// Everything that tiles are rendered from: textures at their level of detail, and the light on

@@ -31,7 +31,8 @@ pub fn render_reference(shot: &Shot, options: &RenderOptions) -> DeepImage {
         Vec::new()
     };
     let shadow = Image::from_vec(world.view.width, world.view.height, shadow);
-    deep_image(shadow, lists).with_tints(tints)
+    let deep = deep_image(shadow, lists).with_tints(tints);
+    deep.held_out(shot.holdout.as_deref())
 }
 
 fn deep_image(shadow: Image<LinearRgb>, lists: Vec<Vec<ReferenceSample>>) -> DeepImage {

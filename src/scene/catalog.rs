@@ -3,7 +3,7 @@
 use crate::asset::{Asset, Library, Photo, Role};
 use crate::color::Albedo;
 use crate::scene::hull::prism_outline;
-use crate::scene::{Appearance, CameraSource, Object};
+use crate::scene::{Appearance, CameraSource, Object, Wall};
 
 /// An asset as a recipe sees it: what may be chosen, without its pictures.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,6 +34,8 @@ pub struct Background {
     pub camera: CameraSource,
     /// Share of the light that its surface reflects, where that is known.
     pub albedo: Option<Albedo>,
+    /// The walls on the edges of that rectangle, where there are any.
+    pub wall: Option<Wall>,
 }
 
 /// The assets of a library as a recipe sees them, in the library's order.

@@ -118,7 +118,10 @@ pub(super) fn check_count(count: usize, at: &str, most: usize) -> Result<()> {
 fn check_surface(surface: &Surface) -> Result<()> {
     check_within(&surface.size, "surface.size", &LENGTH)?;
     FRICTION.check("surface.friction", surface.friction)?;
-    SHARE.check("surface.restitution", surface.restitution)
+    SHARE.check("surface.restitution", surface.restitution)?;
+    surface
+        .wall
+        .map_or(Ok(()), |wall| wall.check("surface.wall"))
 }
 
 fn check_color(color: LinearRgb, at: &str) -> Result<()> {
@@ -222,6 +225,7 @@ fn check_grade(grade: &Grade, at: &str) -> Result<()> {
 
 fn check_placement(placement: &Placement, at: &str) -> Result<()> {
     match placement {
+        Placement::Gone => Ok(()),
         Placement::At(pose) => check_pose(pose, &field(at, "at")),
         Placement::Drop {
             above,

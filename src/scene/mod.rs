@@ -16,6 +16,7 @@
 //!     name: "tray".into(),
 //!     size: [0.6, 0.4],
 //!     albedo: None,
+//!     wall: None,
 //!     camera: CameraSource::Rectangle {
 //!         corners_px: [[20.0, 40.0], [620.0, 40.0], [620.0, 440.0], [20.0, 440.0]],
 //!         photo: [640, 480],
@@ -47,6 +48,7 @@ mod draw;
 mod environment;
 mod fall;
 mod files;
+mod holdout;
 mod hull;
 mod light;
 mod locate;
@@ -57,9 +59,11 @@ mod recipe;
 mod resolve;
 mod shot;
 mod stack;
+mod start_places;
 mod take;
 mod variation;
 mod view;
+mod wall;
 
 pub use catalog::Background;
 #[doc(hidden)]
@@ -104,6 +108,8 @@ pub use take::Take;
 pub use variation::{Ablation, Variation};
 #[doc(hidden)]
 pub use view::{View, ViewRanges};
+#[doc(hidden)]
+pub use wall::{Wall, WallRanges};
 
 use crate::camera::Camera;
 use crate::pixel::LinearRgb;
@@ -179,12 +185,16 @@ pub struct Surface {
     /// Width (along x) and height (along y), metres.
     pub size: [f64; 2],
     /// Coefficient of friction of everything that touches here, the cards among themselves too;
-    /// the walls over the edges, which are invisible, are smooth. Default: 0.5.
+    /// invisible walls are smooth. Default: 0.5.
     #[serde(default = "Surface::default_friction")]
     pub friction: f64,
     /// Share of the speed that a bounce gives back, 0 to 1. Default: 0.
     #[serde(default)]
     pub restitution: f64,
+    /// The walls that stand on its edges. Default: invisible ones, upright, smooth and without a
+    /// top.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub wall: Option<Wall>,
 }
 
 impl Surface {
@@ -194,6 +204,7 @@ impl Surface {
             size,
             friction: Self::default_friction(),
             restitution: 0.0,
+            wall: None,
         }
     }
 

@@ -80,6 +80,8 @@ pub enum Placement {
         /// Its orientation at the start.
         rotation: UnitQuaternion<f64>,
     },
+    /// Went over the rim: in no picture.
+    Gone,
 }
 
 /// A change of colour in hue, saturation and value of the linear colour; the default changes

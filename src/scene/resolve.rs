@@ -73,8 +73,10 @@ impl Scene {
         if let Some(plate) = &plate {
             self.check_plate(plate)?;
         }
+        let seen = self.view.camera(&camera);
         Ok(Shot {
-            camera: self.view.camera(&camera),
+            holdout: self.surface.holdout(&seen).map(Arc::new),
+            camera: seen,
             plate: plate.map(|plate| self.shown_plate(&camera, plate)),
             catcher: self.surface.size.map(|side| CATCHER_RATIO * side),
             cards: self.cards(look)?,
@@ -97,6 +99,7 @@ impl Scene {
     fn cards(&self, look: impl Fn(&Object) -> Option<Appearance>) -> Result<Vec<Card>> {
         let numbered = self.objects.iter().enumerate();
         numbered
+            .filter(|(_, object)| object.placement != Placement::Gone)
             .map(|(i, object)| resting_card(i, object, &look))
             .collect()
     }
@@ -182,16 +185,11 @@ fn resting_card(
     object: &Object,
     look: impl Fn(&Object) -> Option<Appearance>,
 ) -> Result<Card> {
-    let pose = rest_pose(i, object)?;
+    let Placement::At(pose) = object.placement else {
+        return Err(still_falling(i));
+    };
     let look = look(object).ok_or_else(|| unknown_asset(i, object))?;
     Ok(look.into_card(ObjectId(object_id(i)?), object, pose))
-}
-
-fn rest_pose(i: usize, object: &Object) -> Result<Pose> {
-    match object.placement {
-        Placement::At(pose) => Ok(pose),
-        Placement::Drop { .. } => Err(still_falling(i)),
-    }
 }
 
 fn still_falling(i: usize) -> Error {

@@ -2,6 +2,7 @@
 
 use crate::asset::Texture;
 use crate::camera::Camera;
+use crate::deep::HoldoutSample;
 use crate::geom::{Point2, Quad};
 use crate::image::Image;
 use crate::pixel::{LinearRgb, ObjectId};
@@ -30,6 +31,9 @@ pub struct Shot {
     pub environment: Option<EnvironmentMap>,
     /// Factor from rendered radiance to plate values.
     pub exposure: f32,
+    /// What of the place stands in front of objects, of the picture's size; none where nothing
+    /// does.
+    pub holdout: Option<Arc<Image<HoldoutSample>>>,
 }
 
 /// A flat, textured, see-through object in space.
@@ -70,6 +74,16 @@ impl Card {
     }
 }
 
+impl Card {
+    /// Inverse depth of its plane at a pixel position, 1/metres; larger is nearer.
+    pub(crate) fn inverse_depth(&self, camera: &Camera, px: Point2<f64>) -> f64 {
+        let plane = self.quad.plane();
+        let ray = camera.ray(px);
+        let distance = plane.offset - plane.normal.dot(&ray.origin.coords);
+        plane.normal.dot(&ray.direction) / distance
+    }
+}
+
 impl Shot {
     /// An empty shot: no plate, no card, no light, black ambient.
     pub fn new(camera: Camera) -> Self {
@@ -82,6 +96,7 @@ impl Shot {
             ambient: LinearRgb::BLACK,
             environment: None,
             exposure: 1.0,
+            holdout: None,
         }
     }
 

@@ -16,7 +16,7 @@ const MAX_YAW_DRAWS: u32 = 64;
 const FIT_TOLERANCE: f64 = 1e-12;
 
 /// How objects start: each over the one before it.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct DropRanges {
     /// Position along the surface's width: -1 at the left wall, 1 at the right one, 0 in the
@@ -25,6 +25,16 @@ pub struct DropRanges {
     /// Position along the surface's height: -1 at the lower wall, 1 at the upper one. Default:
     /// `[-1, 1]`.
     pub y: Range,
+    /// How far objects start from each other, drawn once for a scene, 0 to 1: 0 is a heap, all over
+    /// the middle of `x` and `y`; 1 covers all of them evenly, and what would reach through a wall
+    /// starts along it. Default: each anywhere that it is between the walls, whatever the others do.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub spread: Option<Range>,
+    /// How often objects start in each cell of a grid over `x` and `y`, as weights: rows from the
+    /// upper wall to the lower one, each from left to right; what would reach through a wall starts
+    /// along it. Default: none, everywhere as often.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub positions: Vec<Vec<f64>>,
     /// Turn about the vertical, degrees. Default: `[-180, 180]`.
     pub yaw_deg: Range,
     /// Tilt from level, degrees. Default: `[0, 15]`.
@@ -44,6 +54,8 @@ impl Default for DropRanges {
         Self {
             x: Range::new(-1.0, 1.0),
             y: Range::new(-1.0, 1.0),
+            spread: None,
+            positions: Vec::new(),
             yaw_deg: Range::new(-180.0, 180.0),
             tilt_deg: Range::new(0.0, 15.0),
             tilt_axis_deg: Range::new(-180.0, 180.0),
@@ -66,6 +78,7 @@ impl DropRanges {
     pub(super) fn check(&self) -> Result<()> {
         self.x.check("start.x", &ACROSS)?;
         self.y.check("start.y", &ACROSS)?;
+        self.check_places()?;
         self.yaw_deg.check("start.yaw_deg", &TURN)?;
         self.tilt_deg.check("start.tilt_deg", &TILT)?;
         self.tilt_axis_deg.check("start.tilt_axis_deg", &TURN)?;
@@ -95,12 +108,15 @@ impl DropColumn<'_> {
     /// An object that fits between the walls in no direction.
     pub(super) fn stack(&self, objects: &mut [Object]) -> Result<()> {
         let paths = draw_paths(objects);
+        let places = self.start.places(self.draws);
+        let half = self.surface.size.map(|side| side / 2.0);
         let mut top = 0.0;
         for i in self.drop_order(objects, &paths) {
             let (object, path) = (&mut objects[i], format!("{}.start", paths[i]));
             let rotation = self.rotation_of(i, object, &path)?;
             let extent = half_extent(&rotation, &self.options.half_body(object));
-            let above = self.draw_position(&extent, &path);
+            let free = free_offsets(self.surface.size, &extent);
+            let above = places.place(i, &path, half, free);
             let height = top + self.draw(&self.start.gap, &path, "gap") + extent.z;
             top = height + extent.z;
             object.placement = Placement::Drop {
@@ -140,14 +156,6 @@ impl DropColumn<'_> {
 
     fn draw(&self, range: &Range, path: &str, name: &str) -> f64 {
         range.draw_field(self.draws, path, name)
-    }
-
-    /// A point of the surface over which a body of this half extent is between the walls.
-    fn draw_position(&self, extent: &Vector3<f64>, path: &str) -> [f64; 2] {
-        let x = self.draw(&self.start.x, path, "x");
-        let y = self.draw(&self.start.y, path, "y");
-        let [free_x, free_y] = free_offsets(self.surface.size, extent);
-        [x * free_x, y * free_y]
     }
 
     fn fit_problem(&self, object: &Object) -> String {
@@ -391,7 +399,7 @@ mod tests {
     fn normal(object: &Object) -> Vector3<f64> {
         match object.placement {
             Placement::Drop { rotation, .. } => rotation * Vector3::z(),
-            Placement::At(_) => panic!("not dropped"),
+            Placement::At(_) | Placement::Gone => panic!("not dropped"),
         }
     }
 

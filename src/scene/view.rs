@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::filter::sample_bilinear_clamped;
 use crate::geom::{Pose, UnitQuaternion, Vector2, Vector3};
 use crate::image::Image;
-use crate::pixel::LinearRgb;
+use crate::pixel::Mix;
 use crate::scene::bounds::{ACROSS, TURN, ZOOM};
 use crate::scene::check::field;
 use crate::scene::{Draws, Range};
@@ -67,7 +67,7 @@ impl View {
 
     /// The part of a plate that is seen, as large as the plate, between whose pixels is
     /// interpolated; `photo` is the camera of the whole plate.
-    pub fn plate(&self, photo: &Camera, plate: &Image<LinearRgb>) -> Image<LinearRgb> {
+    pub fn plate<P: Mix + Send + Sync>(&self, photo: &Camera, plate: &Image<P>) -> Image<P> {
         let (camera, turn) = (self.camera(photo), self.turn());
         Image::from_fn(plate.width(), plate.height(), |x, y| {
             let px = Vector2::new(x as f64 + 0.5, y as f64 + 0.5) - camera.principal_px.coords;
@@ -166,6 +166,7 @@ impl ViewRanges {
 mod tests {
     use super::*;
     use crate::geom::{Point2, Point3};
+    use crate::pixel::LinearRgb;
 
     fn photo() -> Camera {
         let level = Camera::look_at(

@@ -1,8 +1,9 @@
 //! Attempts at letting a scene come to rest: from which heights, with which steps, and how each
 //! ended.
 
-use super::bodies::{is_dropped, max_overlap, solids_at_rest, touch_distance, typical_length};
+use super::bodies::{is_dropped, max_overlap, touch_distance, typical_length};
 use super::overlap::{self, Solid, Touch};
+use super::room::{Room, bodies_in_room};
 use super::world::{Drop, Fall};
 use super::{SettleVerdict, columns, level, support};
 use crate::allowance::Allowance;
@@ -93,8 +94,9 @@ impl AttemptSeries<'_> {
     }
 
     fn lay_flat(&self) -> Result<Fall> {
+        let poses = level::flat(self.scene, self.options, self.allowance)?;
         Ok(Fall {
-            poses: level::flat(self.scene, self.options, self.allowance)?,
+            poses: poses.into_iter().map(Some).collect(),
             rests: true,
             ..Fall::default()
         })
@@ -122,13 +124,14 @@ impl AttemptSeries<'_> {
 
     /// The verdict on a fall, and the deepest overlap at its end.
     fn judge(&self, end: &Scene, fall: &Fall) -> (SettleVerdict, f64) {
-        let bodies = solids_at_rest(self.scene, end, self.options);
-        let escaped = overlap::escaped_ids(&bodies, end.surface.size);
+        let bodies = bodies_in_room(self.scene, end, self.options);
+        let room = Room::new(self.scene);
+        let escaped = overlap::escaped_ids(&bodies, room.limits);
         if !escaped.is_empty() {
             return (SettleVerdict::Escaped(escaped), f64::INFINITY);
         }
         let touching = overlap::touching_pairs(&bodies, touch_distance(self.scene));
-        let depth = overlap::deepest(&bodies, &touching, end.surface.size);
+        let depth = overlap::deepest(&bodies, &touching, room.invisible);
         let failure = self.judge_motion(fall, depth);
         let verdict = failure.unwrap_or_else(|| self.judge_support(&bodies, &touching));
         (verdict, depth)
@@ -201,14 +204,16 @@ fn own_height(object: &Object) -> f64 {
     match object.placement {
         Placement::Drop { height, .. } => height,
         Placement::At(pose) => pose.translation.z,
+        Placement::Gone => 0.0,
     }
 }
 
-/// The scene with these poses for the objects that fall, in their order.
-fn with_poses(mut scene: Scene, poses: &[Pose]) -> Scene {
+/// The scene with these poses for the objects that fall, in their order; those without one are
+/// gone.
+fn with_poses(mut scene: Scene, poses: &[Option<Pose>]) -> Scene {
     let falling = scene.objects.iter_mut().filter(|object| is_dropped(object));
     for (object, pose) in falling.zip(poses) {
-        object.placement = Placement::At(*pose);
+        object.placement = pose.map_or(Placement::Gone, Placement::At);
     }
     scene
 }

@@ -45,37 +45,39 @@ pub(super) fn max_overlap(scene: &Scene, options: &SettleOptions) -> f64 {
 
 /// The bodies at the end of a fall; those fell that fall at its start.
 pub(super) fn solids_at_rest(start: &Scene, end: &Scene, options: &SettleOptions) -> Vec<Solid> {
-    let poses: Vec<Pose> = end.objects.iter().map(current_pose).collect();
+    let poses: Vec<Option<Pose>> = end.objects.iter().map(current_pose).collect();
     solids(start, options, &poses)
 }
 
-/// Where an object is, or from where it falls.
-pub(super) fn current_pose(object: &Object) -> Pose {
+/// Where an object is, or from where it falls; none where it is gone.
+pub(super) fn current_pose(object: &Object) -> Option<Pose> {
     match object.placement {
-        Placement::At(pose) => pose,
+        Placement::Gone => None,
+        Placement::At(pose) => Some(pose),
         Placement::Drop {
             above: [x, y],
             height,
             rotation,
-        } => Pose::from_parts([x, y, height].into(), rotation),
+        } => Some(Pose::from_parts([x, y, height].into(), rotation)),
     }
 }
 
 /// The bodies that represent the objects at these poses, one for each object.
-pub(super) fn solids(scene: &Scene, options: &SettleOptions, poses: &[Pose]) -> Vec<Solid> {
+pub(super) fn solids(scene: &Scene, options: &SettleOptions, poses: &[Option<Pose>]) -> Vec<Solid> {
     let posed = scene.objects.iter().zip(poses);
     posed
         .map(|(object, pose)| solid_for(object, *pose, options))
         .collect()
 }
 
-fn solid_for(object: &Object, world_from_body: Pose, options: &SettleOptions) -> Solid {
+fn solid_for(object: &Object, pose: Option<Pose>, options: &SettleOptions) -> Solid {
     let half = options.half_body(object);
     Solid {
-        world_from_body,
+        world_from_body: pose.unwrap_or_else(Pose::identity),
         half,
         outline: outline_or_box(object, &half),
-        falls: is_dropped(object),
+        falls: pose.is_some() && is_dropped(object),
+        is_gone: pose.is_none(),
     }
 }
 

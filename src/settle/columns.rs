@@ -57,7 +57,7 @@ fn fall_alone(scene: &Scene, options: &SettleOptions, i: usize) -> Option<Fall> 
     let radius = options.half_body(&scene.objects[i]).norm();
     let center = [pose.translation.x, pose.translation.y];
     Some(Fall {
-        poses: vec![pose],
+        poses: vec![Some(pose)],
         rests: true,
         swept: center.map(|at| [at - radius, at + radius]),
         ..Fall::default()
@@ -97,7 +97,7 @@ fn merge_columns(columns: Vec<FallenColumn>) -> Fall {
 }
 
 /// The poses in the order of their numbers.
-fn sorted_poses(mut numbered: Vec<(usize, Pose)>) -> Vec<Pose> {
+fn sorted_poses(mut numbered: Vec<(usize, Option<Pose>)>) -> Vec<Option<Pose>> {
     numbered.sort_by_key(|(i, _)| *i);
     numbered.into_iter().map(|(_, pose)| pose).collect()
 }
@@ -147,7 +147,7 @@ mod tests {
     fn heights(scene: &Scene) -> Vec<f64> {
         let height = |placement: &Placement| match placement {
             Placement::Drop { height, .. } => *height,
-            Placement::At(_) => 0.0,
+            Placement::At(_) | Placement::Gone => 0.0,
         };
         scene
             .objects

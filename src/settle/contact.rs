@@ -48,16 +48,19 @@ impl Contact {
     }
 }
 
-/// All contacts of bodies that fell: with the room, and of the pairs that touch. What is nearer
-/// than `reach` (metres) touches.
+/// All contacts of bodies that fell: of the pairs that touch, and with the floor and the walls over
+/// the edges of a surface where those are `invisible`. What is nearer than `reach` (metres) touches.
 pub(super) fn contacts(
     solids: &[Solid],
     touching: &[Touch],
-    surface: [f64; 2],
+    invisible: Option<[f64; 2]>,
     reach: f64,
 ) -> Vec<Contact> {
     let fell = (0..solids.len()).filter(|&i| solids[i].falls);
-    let with_room = fell.flat_map(|i| room_contacts(i, &solids[i], surface, reach));
+    let with_room = invisible.into_iter().flat_map(|surface| {
+        let fell = fell.clone();
+        fell.flat_map(move |i| room_contacts(i, &solids[i], surface, reach))
+    });
     let with_bodies = touching
         .iter()
         .flat_map(|touch| pair_contacts(solids, touch, reach));
@@ -280,11 +283,12 @@ mod tests {
             half,
             outline,
             falls: true,
+            is_gone: false,
         }
     }
 
     fn all(solids: &[Solid]) -> Vec<Contact> {
-        contacts(solids, &touching_pairs(solids, REACH), ROOM, REACH)
+        contacts(solids, &touching_pairs(solids, REACH), Some(ROOM), REACH)
     }
 
     /// Contacts of two plates with each other, the second over the first.

@@ -21,6 +21,7 @@ fn tray() -> Background {
         name: "tray".into(),
         size: [0.6, 0.4],
         albedo: None,
+        wall: None,
         camera: CameraSource::Rectangle {
             corners_px: [[0.0, 0.0], [60.0, 0.0], [60.0, 40.0], [0.0, 40.0]],
             photo: [60, 40],

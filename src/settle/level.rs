@@ -24,7 +24,7 @@ pub(super) fn rest_alone(scene: &Scene, options: &SettleOptions, i: usize) -> Op
 
 /// Whether a body can touch one that does not fall.
 fn meets_standing(bodies: &[Solid], i: usize) -> bool {
-    let mut standing = bodies.iter().filter(|other| !other.falls);
+    let mut standing = bodies.iter().filter(|other| stands(other));
     standing.any(|other| can_touch(&bodies[i], other))
 }
 
@@ -92,8 +92,12 @@ pub(super) fn flat(
 
 /// The upright boxes around what is at rest.
 fn boxes_at_rest(bodies: &[Solid]) -> Vec<Solid> {
-    let at_rest = bodies.iter().filter(|solid| !solid.falls);
+    let at_rest = bodies.iter().filter(|solid| stands(solid));
     at_rest.map(upright_box).collect()
+}
+
+fn stands(solid: &Solid) -> bool {
+    !solid.falls && !solid.is_gone
 }
 
 /// Height of the highest body that lies under one; 0 is the surface.
@@ -106,16 +110,16 @@ fn top_below(solid: &Solid, lying: &[Solid]) -> f64 {
 
 /// The bodies, those that fall turned level where they start.
 fn leveled_solids(scene: &Scene, options: &SettleOptions) -> Vec<Solid> {
-    let poses: Vec<Pose> = scene.objects.iter().map(leveled_pose).collect();
+    let poses: Vec<Option<Pose>> = scene.objects.iter().map(leveled_pose).collect();
     solids(scene, options, &poses)
 }
 
-fn leveled_pose(object: &Object) -> Pose {
-    let mut pose = current_pose(object);
+fn leveled_pose(object: &Object) -> Option<Pose> {
+    let mut pose = current_pose(object)?;
     if is_dropped(object) {
         pose.rotation = level(&pose.rotation);
     }
-    pose
+    Some(pose)
 }
 
 /// The pose with its underside at this height; that of a card at rest is unchanged.
@@ -213,13 +217,17 @@ mod tests {
             let (scene, options) = (dropped(k, 15), SettleOptions::default());
             // 15 objects and 105 pairs.
             let allowance = Allowance::new(120);
-            let lying = solids(
-                &scene,
-                &options,
-                &flat(&scene, &options, &allowance).unwrap(),
-            );
+            let poses = flat(&scene, &options, &allowance).unwrap();
+            let poses: Vec<_> = poses.into_iter().map(Some).collect();
+            let lying = solids(&scene, &options, &poses);
             assert!(allowance.is_spent());
-            assert!(deepest(&lying, &touching_pairs(&lying, 0.0), scene.surface.size) < 1e-12);
+            assert!(
+                deepest(
+                    &lying,
+                    &touching_pairs(&lying, 0.0),
+                    Some(scene.surface.size)
+                ) < 1e-12
+            );
             for (i, solid) in lying.iter().enumerate() {
                 assert!(((solid.world_from_body * Vector3::z()).z.abs() - 1.0).abs() < 1e-12);
                 let bottom = solid.center().z - solid.half.z;

@@ -19,6 +19,8 @@ pub(super) struct Solid {
     pub(super) outline: Vec<[f64; 2]>,
     /// Whether it was dropped; the others stand where their author put them.
     pub(super) falls: bool,
+    /// Whether it went over the rim: it is nowhere and touches nothing.
+    pub(super) is_gone: bool,
 }
 
 impl Solid {
@@ -112,17 +114,18 @@ fn are_oblique(a: &Vector3<f64>, b: &Vector3<f64>) -> bool {
     a.cross(b).norm() > PARALLEL_SINE
 }
 
-/// Ids (index + 1) of dropped bodies whose centre is not over the surface, below it, or not finite.
-pub(super) fn escaped_ids(solids: &[Solid], surface: [f64; 2]) -> Vec<usize> {
+/// Ids (index + 1) of dropped bodies whose centre is beyond these distances along x and y, below
+/// the surface, or not finite.
+pub(super) fn escaped_ids(solids: &[Solid], limits: [f64; 2]) -> Vec<usize> {
     let numbered = solids.iter().enumerate();
     numbered
-        .filter(|(_, solid)| solid.falls && !is_inside(&solid.center(), surface))
+        .filter(|(_, solid)| solid.falls && !is_inside(&solid.center(), limits))
         .map(|(i, _)| i + 1)
         .collect()
 }
 
-fn is_inside(center: &Vector3<f64>, surface: [f64; 2]) -> bool {
-    center.x.abs() <= surface[0] / 2.0 && center.y.abs() <= surface[1] / 2.0 && center.z >= 0.0
+fn is_inside(center: &Vector3<f64>, limits: [f64; 2]) -> bool {
+    center.x.abs() <= limits[0] && center.y.abs() <= limits[1] && center.z >= 0.0
 }
 
 /// Two bodies that are near to each other, one of which was dropped.
@@ -140,9 +143,13 @@ pub(super) struct Touch {
 pub(super) fn touching_pairs(solids: &[Solid], reach: f64) -> Vec<Touch> {
     let pairs = (1..solids.len()).flat_map(|i| (0..i).map(move |j| [i, j]));
     pairs
-        .filter(|&[i, j]| solids[i].falls || solids[j].falls)
+        .filter(|&[i, j]| can_touch(&solids[i], &solids[j]))
         .filter_map(|pair| Touch::between(solids, pair, reach))
         .collect()
+}
+
+fn can_touch(a: &Solid, b: &Solid) -> bool {
+    (a.falls || b.falls) && !a.is_gone && !b.is_gone
 }
 
 impl Touch {
@@ -154,13 +161,14 @@ impl Touch {
     }
 }
 
-/// Deepest overlap of a dropped body with any other, with the floor `z = 0` or with the walls over
-/// the surface's edges, metres; 0 when nothing overlaps.
-pub(super) fn deepest(solids: &[Solid], touching: &[Touch], surface: [f64; 2]) -> f64 {
+/// Deepest overlap of a dropped body with any other, and with the floor `z = 0` and the walls over
+/// the edges of a surface where those are `invisible`, metres; 0 when nothing overlaps.
+pub(super) fn deepest(solids: &[Solid], touching: &[Touch], invisible: Option<[f64; 2]>) -> f64 {
+    let in_room = invisible.map_or(0.0, |surface| deepest_in_room(solids, surface));
     touching
         .iter()
         .map(|touch| -touch.gap)
-        .fold(deepest_in_room(solids, surface), f64::max)
+        .fold(in_room, f64::max)
 }
 
 fn deepest_in_room(solids: &[Solid], surface: [f64; 2]) -> f64 {
@@ -316,6 +324,7 @@ mod tests {
             half: half.into(),
             outline,
             falls: true,
+            is_gone: false,
         }
     }
 
@@ -436,22 +445,36 @@ mod tests {
             (overlap_depth(&triangle(0.0), &post(0.01, 0.009)) - behind(0.01, 0.009)).abs() < 1e-12
         );
         // Through the left wall by 0.05, with its vertical side.
-        assert!((deepest(&[triangle(-0.15)], &[], [0.4, 0.3]) - 0.05).abs() < 1e-12);
+        assert!((deepest(&[triangle(-0.15)], &[], Some([0.4, 0.3])) - 0.05).abs() < 1e-12);
     }
 
     #[test]
     fn floor_and_walls_count() {
         let half = [0.1, 0.04, 0.003];
         assert!(
-            (deepest(&[solid(0.0, 0.0, 0.002, [0.0; 3], half)], &[], [0.4, 0.3]) - 0.001).abs()
+            (deepest(
+                &[solid(0.0, 0.0, 0.002, [0.0; 3], half)],
+                &[],
+                Some([0.4, 0.3])
+            ) - 0.001)
+                .abs()
                 < 1e-15
         );
         assert!(
-            (deepest(&[solid(0.11, 0.0, 0.1, [0.0; 3], half)], &[], [0.4, 0.3]) - 0.01).abs()
+            (deepest(
+                &[solid(0.11, 0.0, 0.1, [0.0; 3], half)],
+                &[],
+                Some([0.4, 0.3])
+            ) - 0.01)
+                .abs()
                 < 1e-15
         );
         assert_eq!(
-            deepest(&[solid(0.1, 0.0, 0.003, [0.0; 3], half)], &[], [0.4, 0.3]),
+            deepest(
+                &[solid(0.1, 0.0, 0.003, [0.0; 3], half)],
+                &[],
+                Some([0.4, 0.3])
+            ),
             0.0
         );
     }
@@ -463,7 +486,7 @@ mod tests {
         assert_eq!(
             escaped_ids(
                 &[gone, solid(0.0, 0.0, 0.1, [0.0; 3], [0.1; 3]), lost],
-                [0.4, 0.3]
+                [0.2, 0.15]
             ),
             [1, 3]
         );

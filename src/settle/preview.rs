@@ -7,7 +7,7 @@ use crate::draw::{TextSize, class_color, ink_on, outline, rgb, text};
 use crate::geom::{Point2, Point3};
 use crate::image::Image;
 use crate::pixel::Srgb8;
-use crate::scene::{Scene, SettleOptions};
+use crate::scene::{Scene, SettleOptions, Surface, Wall};
 
 /// Width of the picture, pixels.
 const WIDTH_PX: usize = 640;
@@ -23,10 +23,13 @@ const WALL_COLOR: Srgb8 = rgb(0x60, 0x60, 0x60);
 /// where it starts. Numbers are ids.
 pub fn preview(scene: &Scene, options: &SettleOptions) -> Image<Srgb8> {
     let bodies = solids_at_rest(scene, scene, options);
-    let views = Views::new(scene.surface.size, &bodies);
+    let views = Views::new(&scene.surface, &bodies);
     let mut canvas = Image::filled(WIDTH_PX, views.height_px(), PAPER_COLOR);
     views.draw_room(&mut canvas);
-    for i in from_lowest(&bodies) {
+    for i in from_lowest(&bodies)
+        .into_iter()
+        .filter(|&i| !bodies[i].is_gone)
+    {
         views.draw_body(&mut canvas, i, &bodies[i]);
     }
     canvas
@@ -36,6 +39,8 @@ pub fn preview(scene: &Scene, options: &SettleOptions) -> Image<Srgb8> {
 struct Views {
     /// Of the surface, metres.
     size: [f64; 2],
+    /// Its walls.
+    wall: Option<Wall>,
     /// Height of the highest point in the front view, metres.
     top: f64,
     /// Pixels in a metre.
@@ -45,11 +50,13 @@ struct Views {
 }
 
 impl Views {
-    fn new([w, h]: [f64; 2], bodies: &[Solid]) -> Self {
+    fn new(surface: &Surface, bodies: &[Solid]) -> Self {
+        let [w, h] = surface.size;
         let scale = (WIDTH_PX as f64 - 2.0 * MARGIN_PX) / w;
         let tops = bodies.iter().map(Solid::top);
         Self {
             size: [w, h],
+            wall: surface.wall,
             top: tops.fold(w / MAX_ASPECT_RATIO, f64::max),
             scale,
             above_height: h * scale + 2.0 * MARGIN_PX,
@@ -88,8 +95,12 @@ impl Views {
     }
 
     fn walls(&self) -> [Point2<f64>; 4] {
-        let (x, top) = (self.size[0] / 2.0, self.top);
-        [(-x, 0.0), (x, 0.0), (x, top), (-x, top)]
+        let x = self.size[0] / 2.0;
+        let (rim, top) = match self.wall {
+            Some(wall) => (x + wall.outset(), wall.height),
+            None => (x, self.top),
+        };
+        [(-x, 0.0), (x, 0.0), (rim, top), (-rim, top)]
             .map(|(x, z)| self.seen_from_front(Point3::new(x, 0.0, z)))
     }
 

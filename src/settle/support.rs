@@ -17,6 +17,7 @@ use super::bodies::{touch_distance, typical_length};
 use super::contact::{Contact, contacts, perpendicular_axes};
 use super::envelope::EnvelopeMatrix;
 use super::overlap::{Solid, Touch, falling_from_lowest};
+use super::room::Room;
 use crate::geom::Vector3;
 use crate::scene::{Scene, SettleOptions};
 
@@ -46,7 +47,8 @@ pub(super) fn unsupported(
     solids: &[Solid],
     touching: &[Touch],
 ) -> Vec<usize> {
-    let contacts = contacts(solids, touching, scene.surface.size, touch_distance(scene));
+    let invisible = Room::new(scene).invisible;
+    let contacts = contacts(solids, touching, invisible, touch_distance(scene));
     let model = SpringModel::new(scene, options, solids, &contacts);
     let mut ids = model.hanging_ids();
     ids.sort_unstable();

@@ -76,5 +76,6 @@ fn height_of(placement: &Placement) -> f64 {
     match placement {
         Placement::At(pose) => pose.translation.z,
         Placement::Drop { height, .. } => *height,
+        Placement::Gone => 0.0,
     }
 }

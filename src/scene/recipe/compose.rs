@@ -46,7 +46,7 @@ impl Recipe {
         };
         let background = pick_background(&draws, backgrounds)?;
         self.vary_objects(&mut objects, &draws);
-        let surface = self.draw_surface(&draws, background.size);
+        let surface = self.draw_surface(&draws, background);
         self.drop_column(background, surface, &draws)
             .stack(&mut objects)?;
         let scene = self.lit_scene(&draws, background, surface, objects);
@@ -101,9 +101,11 @@ impl Recipe {
         Range::chance(self.negatives, draws, "negative")
     }
 
-    fn draw_surface(&self, draws: &Draws, size: [f64; 2]) -> Surface {
+    fn draw_surface(&self, draws: &Draws, background: &Background) -> Surface {
+        let Background { size, wall, .. } = *background;
         Surface {
             size,
+            wall: (self.walls.as_ref()).map_or(wall, |own| Some(own.draw(draws, size, wall))),
             friction: self.friction.draw(draws, "friction"),
             restitution: self.restitution.draw(draws, "restitution"),
         }

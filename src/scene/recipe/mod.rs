@@ -17,6 +17,7 @@ use crate::scene::stack::too_large;
 use crate::scene::{
     AssetVariant, Background, Count, DrawLog, Drawn, DropRanges, EnvironmentRanges, LightTint,
     PostProcessRanges, Range, Scene, SettleOptions, Surface, Take, Variation, ViewRanges,
+    WallRanges,
 };
 use compose::{Places, SceneNumber};
 use serde::{Deserialize, Serialize};
@@ -77,6 +78,10 @@ pub struct Recipe {
     pub friction: Range,
     /// Share of the speed that a bounce gives back, [`Surface::restitution`]. Default: 0.
     pub restitution: Range,
+    /// Walls on the edges of the surface. Default: what the background's label says; without a
+    /// word of it, invisible ones that nothing gets over.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub walls: Option<WallRanges>,
     /// What falls in place of a cut-out. Default: `box`.
     pub collider: Collider,
     /// Share of light that the surface reflects, where it is known: the exposure is then matched
@@ -114,6 +119,7 @@ impl Default for Recipe {
             gain_ev: Range::new(-0.3, 0.3),
             friction: Range::fixed(Surface::new([0.0; 2]).friction),
             restitution: Range::fixed(0.0),
+            walls: None,
             collider: Collider::Box,
             surface_albedo: None,
             cast: LightTint::default(),
@@ -234,6 +240,7 @@ impl Recipe {
     fn check_surface(&self) -> Result<()> {
         self.friction.check("friction", &FRICTION)?;
         self.restitution.check("restitution", &SHARE)?;
+        self.walls.map_or(Ok(()), |walls| walls.check())?;
         match self.surface_albedo {
             Some(albedo) => check_albedo(albedo, "surface_albedo"),
             None => Ok(()),

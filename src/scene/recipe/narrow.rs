@@ -84,6 +84,7 @@ mod tests {
             name: name.into(),
             size: [0.6, 0.4],
             albedo: None,
+            wall: None,
             camera,
         };
         let choice = |i| AssetVariant {

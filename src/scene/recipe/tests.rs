@@ -2,7 +2,7 @@ use super::*;
 use crate::asset::Role;
 use crate::color::Albedo;
 use crate::pixel::LinearRgb;
-use crate::scene::{AssetVariant, Background, CameraSource, Exposure, Object, Placement};
+use crate::scene::{AssetVariant, Background, CameraSource, Exposure, Object, Placement, Wall};
 use std::collections::BTreeSet;
 use std::f64::consts::PI;
 
@@ -11,6 +11,7 @@ fn tray(name: &str) -> Background {
         name: name.into(),
         size: [0.6, 0.4],
         albedo: None,
+        wall: None,
         camera: CameraSource::Rectangle {
             corners_px: [[0.0, 0.0], [60.0, 0.0], [60.0, 40.0], [0.0, 40.0]],
             photo: [60, 40],
@@ -64,7 +65,7 @@ fn with_caps(distractors: Count, k: u64) -> (Scene, Vec<Drawn>) {
 fn start_height(object: &Object) -> f64 {
     match object.placement {
         Placement::Drop { height, .. } => height,
-        Placement::At(_) => panic!("objects of a recipe fall"),
+        Placement::At(_) | Placement::Gone => panic!("objects of a recipe fall"),
     }
 }
 
@@ -591,4 +592,52 @@ fn the_ambient_is_a_share_of_the_light_at_the_centre() {
         ..Recipe::default()
     };
     assert_eq!(scene(&dark, 0).ambient, LinearRgb::grey(0.5));
+}
+
+/// Where the objects of a scene start.
+fn starts(scene: &mut Scene) -> Vec<&mut [f64; 2]> {
+    let starts = scene
+        .objects
+        .iter_mut()
+        .map(|object| match &mut object.placement {
+            Placement::Drop { above, .. } => above,
+            _ => panic!("not dropped"),
+        });
+    starts.collect()
+}
+
+#[test]
+fn walls_and_places_move_no_other_draw() {
+    let read = |text: &str| toml::from_str::<Recipe>(text).unwrap();
+    let walls = read("walls = { height = [0.02, 0.1], slope_deg = [0, 20] }");
+    let even = read("start = { spread = [0.5, 1] }");
+    let by_cells = read("start = { positions = [[1, 0, 1]] }");
+    for k in 0..20 {
+        let plain = scene(&Recipe::default(), k);
+        assert_eq!(plain.surface.wall, None);
+        let mut walled = scene(&walls, k);
+        let wall = walled.surface.wall.take().unwrap();
+        assert!((0.02..0.1).contains(&wall.height) && (0.0..20.0).contains(&wall.slope_deg));
+        assert_eq!(walled, plain);
+        for recipe in [&even, &by_cells] {
+            let mut moved = scene(recipe, k);
+            assert_ne!(moved, plain);
+            let mut plain = plain.clone();
+            for (moved, plain) in starts(&mut moved).into_iter().zip(starts(&mut plain)) {
+                *moved = *plain;
+            }
+            assert_eq!(moved, plain);
+        }
+    }
+}
+
+#[test]
+fn labelled_walls_are_those_of_the_scene() {
+    let wall = Wall::new([0.6, 0.4], Some(0.07), None);
+    let labelled = Background {
+        wall: Some(wall),
+        ..tray("a")
+    };
+    let scene = Recipe::default().scene(7, 0, &[labelled], &catalog(10));
+    assert_eq!(scene.unwrap().surface.wall, Some(wall));
 }

@@ -12,7 +12,8 @@ mod prism;
 mod run;
 mod units;
 
-use super::bodies::is_dropped;
+use super::overlap::Solid;
+use super::room::Room;
 use super::trace::MotionSample;
 use crate::allowance::Allowance;
 use crate::error::Result;
@@ -86,7 +87,8 @@ pub(super) struct Drop<'a> {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Fall {
     /// Pose of each of the objects that fell, in their order; metres of the scene.
-    pub(super) poses: Vec<Pose>,
+    /// None for what went over the rim.
+    pub(super) poses: Vec<Option<Pose>>,
     /// Whether everything came to rest before the time limit.
     pub(super) rests: bool,
     /// Simulated time, seconds.
@@ -127,6 +129,7 @@ impl Drop<'_> {
             world,
             bodies,
             ids: members.iter().map(|i| i + 1).collect(),
+            room: Room::new(self.scene),
             units,
             pace,
             work_per_pair: self.work_per_pair(),
@@ -160,7 +163,8 @@ impl Drop<'_> {
     }
 
     fn add_standing(&self, world: &mut PhysicsWorld, units: &WorldUnits) {
-        let standing = self.scene.objects.iter().filter(|o| !is_dropped(o));
+        let objects = self.scene.objects.iter();
+        let standing = objects.filter(|o| matches!(o.placement, Placement::At(_)));
         for object in standing {
             self.add_body(world, object, 0.0, units);
         }
@@ -220,9 +224,29 @@ impl Drop<'_> {
         soften(&mut p.static_contact_softness, rate / 2.0);
     }
 
+    fn add_room(&self, world: &mut PhysicsWorld, units: &WorldUnits, members: &[usize]) {
+        let room = Room::new(self.scene);
+        if room.invisible.is_some() {
+            self.add_invisible_room(world, units, members);
+        }
+        for part in &room.parts {
+            self.add_part(world, part, units);
+        }
+    }
+
+    /// Adds the floor or a wall that is built.
+    fn add_part(&self, world: &mut PhysicsWorld, part: &Solid, units: &WorldUnits) {
+        let [hx, hy, hz] = (part.half * units.length)
+            .map(|length| length as f32)
+            .into();
+        let collider = ColliderBuilder::cuboid(hx, hy, hz);
+        let placed = collider.position(units.to_world(&part.world_from_body));
+        world.insert_collider(self.with_contacts(placed), None);
+    }
+
     /// Adds the floor and four walls, which reach above the highest start. The walls are smooth:
     /// what is invisible supports nothing.
-    fn add_room(&self, world: &mut PhysicsWorld, units: &WorldUnits, members: &[usize]) {
+    fn add_invisible_room(&self, world: &mut PhysicsWorld, units: &WorldUnits, members: &[usize]) {
         let surface = &self.scene.surface;
         let half_sides = surface.size.map(|length| length * units.length / 2.0);
         let middle = self.highest_top(members) * units.length / 2.0;
@@ -326,8 +350,12 @@ fn body_mass(object: &Object, units: &WorldUnits) -> f64 {
 }
 
 /// A body that stands or falls, and its pose at the start.
+///
+/// # Panics
+/// When it is gone.
 fn start_of(object: &Object, height: f64) -> (RigidBodyBuilder, Pose) {
     match object.placement {
+        Placement::Gone => unreachable!("what is gone is not in the world"),
         Placement::At(pose) => (RigidBodyBuilder::fixed(), pose),
         Placement::Drop {
             above: [x, y],

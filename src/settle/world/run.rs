@@ -11,6 +11,8 @@ use super::units::WorldUnits;
 use super::{CARD_LENGTH_M, CARD_MASS_KG, Fall, GRAVITY_M_PER_S2};
 use crate::allowance::Allowance;
 use crate::error::Result;
+use crate::geom::Pose;
+use crate::settle::room::Room;
 use crate::settle::trace::MotionSample;
 use crate::work::{self, Kind};
 use rapier3d::prelude::{
@@ -33,6 +35,7 @@ pub(super) struct FallRun<'a> {
     pub(super) bodies: Vec<RigidBodyHandle>,
     /// Of the objects that fall, in the order of `bodies`.
     pub(super) ids: Vec<usize>,
+    pub(super) room: Room,
     pub(super) units: WorldUnits,
     pub(super) pace: Pace,
     /// Work of a step, for each body and pair.
@@ -57,7 +60,9 @@ impl FallRun<'_> {
             // Nothing is active before the first step.
             self.step_world()?;
             let comes_to_rest = record.add_step(&self, step);
-            if comes_to_rest {
+            if self.let_go() {
+                record.energy.rebase(&self);
+            } else if comes_to_rest {
                 record.fall.rests = self.world.quarantine().is_empty();
                 break;
             }
@@ -72,6 +77,26 @@ impl FallRun<'_> {
         Ok(())
     }
 
+    /// Takes out of the world what has gone over the rim; returns whether anything has.
+    fn let_go(&mut self) -> bool {
+        let gone = self.gone_bodies();
+        for body in &gone {
+            self.world.bodies[*body].set_enabled(false);
+        }
+        !gone.is_empty()
+    }
+
+    fn gone_bodies(&self) -> Vec<RigidBodyHandle> {
+        let bodies = self.bodies.iter().copied();
+        bodies.filter(|body| self.has_gone(*body)).collect()
+    }
+
+    fn has_gone(&self, body: RigidBodyHandle) -> bool {
+        let body = &self.world.bodies[body];
+        let pose = self.units.to_scene(body.position());
+        body.is_enabled() && self.room.is_gone(&pose.translation.vector)
+    }
+
     fn step_work(&self) -> u64 {
         let contacts = self.world.narrow_phase.contact_graph().raw_graph();
         (self.bodies.len() + contacts.raw_edges().len()) as u64 * self.work_per_pair
@@ -81,8 +106,19 @@ impl FallRun<'_> {
         self.world.islands.active_bodies().count() == 0
     }
 
+    /// All that fell and is not gone.
     fn moving_bodies(&self) -> impl Iterator<Item = &RigidBody> {
-        self.bodies.iter().map(|body| &self.world.bodies[*body])
+        let bodies = self.bodies.iter().map(|body| &self.world.bodies[*body]);
+        bodies.filter(|body| body.is_enabled())
+    }
+
+    /// Where everything is that fell; none for what is gone.
+    fn poses(&self) -> impl Iterator<Item = Option<Pose>> {
+        let bodies = self.bodies.iter().map(|body| &self.world.bodies[*body]);
+        bodies.map(|body| {
+            body.is_enabled()
+                .then(|| self.units.to_scene(body.position()))
+        })
     }
 
     fn moving_poses(&self) -> impl Iterator<Item = &RapierPose> {
@@ -119,8 +155,11 @@ impl FallRun<'_> {
 
     fn samples_at(&self, step: usize) -> impl Iterator<Item = MotionSample> {
         let seconds = step as f64 * self.pace.step / self.units.time;
-        let bodies = self.ids.iter().zip(self.moving_bodies());
-        bodies.map(move |(&id, body)| self.motion_sample(id, body, seconds))
+        let bodies = self.ids.iter().zip(&self.bodies);
+        bodies
+            .map(|(&id, body)| (id, &self.world.bodies[*body]))
+            .filter(|(_, body)| body.is_enabled())
+            .map(move |(id, body)| self.motion_sample(id, body, seconds))
     }
 
     fn motion_sample(&self, object: usize, body: &RigidBody, seconds: f64) -> MotionSample {
@@ -170,9 +209,8 @@ impl FallRecord {
     }
 
     fn finish(mut self, run: &FallRun) -> Fall {
-        let poses = run.moving_poses().map(|pose| run.units.to_scene(pose));
         self.fall.energy_rise = self.energy.relative_rise();
-        self.fall.poses = poses.collect();
+        self.fall.poses = run.poses().collect();
         self.fall
     }
 }
@@ -235,6 +273,13 @@ impl EnergyTrack {
         kinetic
     }
 
+    /// Goes on without what has just been taken out of the world.
+    fn rebase(&mut self, run: &FallRun) {
+        let now = run.kinetic_energy() + potential_of_all(run);
+        self.start += now - self.last;
+        self.last = now;
+    }
+
     /// The greatest rise between two steps as a share of what the drop released.
     fn relative_rise(&self) -> f64 {
         self.max_rise / (self.start - self.last).max(self.min_drop)
@@ -257,7 +302,7 @@ struct Stillness {
 impl Stillness {
     /// Whether no end of a card has moved by [`REST_MOTION_M`] for [`REST_TIME_S`].
     fn lasts(&mut self, run: &FallRun, now: f64) -> bool {
-        let still = self.poses.len() == run.bodies.len() && self.is_near(run);
+        let still = self.poses.len() == run.moving_bodies().count() && self.is_near(run);
         if !still {
             self.poses = run.moving_poses().copied().collect();
             self.since = now;

@@ -70,7 +70,7 @@ fn accepting_any_error(options: &SettleOptions) -> SettleOptions {
 fn rest_position(object: &Object) -> Option<[f64; 2]> {
     match object.placement {
         Placement::At(pose) => Some([pose.translation.x, pose.translation.z]),
-        Placement::Drop { .. } => None,
+        Placement::Drop { .. } | Placement::Gone => None,
     }
 }
 

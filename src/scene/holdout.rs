@@ -1,0 +1,285 @@
+//! What of the place stands in front of objects: the near walls of the surface, or what a mask
+//! says.
+//!
+//! # Method
+//! An object between walls is hidden by one where the ray to it leaves the room through the wall's
+//! inner side, and not over the rim: that side, of the walls that turn their outer side to the
+//! camera, is projected, and what lies behind it is held out.
+
+use crate::camera::Camera;
+use crate::deep::HoldoutSample;
+use crate::geom::{Plane, Point2, Point3, Vector2, Vector3};
+use crate::image::Image;
+use crate::pixel::{Coverage, Depth};
+use crate::scene::{Scene, Surface};
+use std::ops::Range;
+
+/// Least distance from the camera that is projected, metres: closer than any lens focuses.
+const NEAR_PLANE_M: f64 = 1e-4;
+/// Sub-samples a side of pixels on the outline of a wall.
+const SUBSAMPLES: usize = 8;
+/// Half the diagonal of a pixel: what an edge is farther away than does not pass through it.
+const PIXEL_RADIUS_PX: f64 = std::f64::consts::FRAC_1_SQRT_2;
+
+impl Scene {
+    /// The part of a mask of what hides objects that the picture shows; it is in front of all of
+    /// them. `photo` is the camera of the whole mask.
+    pub(crate) fn holdout_of_mask(
+        &self,
+        photo: &Camera,
+        mask: &Image<Coverage>,
+    ) -> Image<HoldoutSample> {
+        let shown;
+        let mask = if self.view.is_whole() {
+            mask
+        } else {
+            shown = self.view.plate(photo, mask);
+            &shown
+        };
+        mask.map(|coverage| HoldoutSample {
+            coverage: Coverage(coverage.0.clamp(0.0, 1.0)),
+            depth: Depth(0.0),
+        })
+    }
+}
+
+impl Surface {
+    /// What the walls hide from a camera; none where they hide nothing.
+    pub(crate) fn holdout(&self, camera: &Camera) -> Option<Image<HoldoutSample>> {
+        let faces = self.hiding_faces(camera);
+        if faces.is_empty() {
+            return None;
+        }
+        let [width, height] = camera.image.map(|side| side as usize);
+        let mut picture = Image::filled(width, height, HoldoutSample::default());
+        for face in &faces {
+            face.draw(camera, &mut picture);
+        }
+        Some(picture)
+    }
+
+    /// The inner sides of the walls that the camera sees from outside, as far as they are in the
+    /// picture.
+    fn hiding_faces(&self, camera: &Camera) -> Vec<ProjectedFace> {
+        let faces = self.wall.map(|wall| wall.inner_faces(self.size));
+        faces
+            .into_iter()
+            .flatten()
+            .filter_map(|face| ProjectedFace::new(&face, camera))
+            .collect()
+    }
+}
+
+/// The inner side of a wall, in the picture of a camera that sees it from behind.
+struct ProjectedFace {
+    plane: Plane,
+    /// Lines around it, each with its unit normal inwards and its distance, pixels.
+    sides: Vec<(Vector2<f64>, f64)>,
+    columns: Range<usize>,
+    rows: Range<usize>,
+}
+
+impl ProjectedFace {
+    /// None for one that is seen from the front, edge-on or not at all.
+    fn new(face: &[Vector3<f64>; 4], camera: &Camera) -> Option<Self> {
+        // Its corners turn clockwise as seen from inside of the room.
+        let outward = (face[1] - face[0]).cross(&(face[3] - face[0]));
+        let normal = outward.try_normalize(0.0)?;
+        if normal.dot(&(camera.center().coords - face[0])) <= 0.0 {
+            return None;
+        }
+        let ring = seen_ring(face, camera);
+        let [columns, rows] = [0, 1].map(|axis| pixels_around(&ring, axis, camera.image[axis]));
+        let is_seen = ring.len() > 2 && !columns.is_empty() && !rows.is_empty();
+        is_seen.then(|| Self {
+            plane: Plane {
+                normal,
+                offset: normal.dot(&face[0]),
+            },
+            sides: inner_sides(&ring),
+            columns,
+            rows,
+        })
+    }
+
+    fn draw(&self, camera: &Camera, picture: &mut Image<HoldoutSample>) {
+        for y in self.rows.clone() {
+            for x in self.columns.clone() {
+                let center = Point2::new(x as f64 + 0.5, y as f64 + 0.5);
+                let coverage = self.coverage(center);
+                if coverage > 0.0 {
+                    let pixel = &mut picture[(x, y)];
+                    *pixel = merged(*pixel, coverage, self.depth(camera, center));
+                }
+            }
+        }
+    }
+
+    fn depth(&self, camera: &Camera, px: Point2<f64>) -> f64 {
+        let depth = self.plane.intersect(&camera.ray(px));
+        depth.unwrap_or(f64::INFINITY)
+    }
+
+    /// Share of a pixel that it covers.
+    fn coverage(&self, center: Point2<f64>) -> f64 {
+        let inside = self.inset(center);
+        if inside.abs() >= PIXEL_RADIUS_PX {
+            return f64::from(inside > 0.0);
+        }
+        let hits = subsamples().filter(|offset| self.inset(center + offset) >= 0.0);
+        hits.count() as f64 / (SUBSAMPLES * SUBSAMPLES) as f64
+    }
+
+    /// How far a point is from the nearest side, pixels; negative outside.
+    fn inset(&self, px: Point2<f64>) -> f64 {
+        let distances = self
+            .sides
+            .iter()
+            .map(|(n, offset)| n.dot(&px.coords) - offset);
+        distances.fold(f64::INFINITY, f64::min)
+    }
+}
+
+/// Adjoining walls share the pixels of their common edge.
+fn merged(pixel: HoldoutSample, coverage: f64, depth: f64) -> HoldoutSample {
+    let nearest = if pixel.coverage.0 > 0.0 {
+        f64::from(pixel.depth.0).min(depth)
+    } else {
+        depth
+    };
+    HoldoutSample {
+        coverage: Coverage((pixel.coverage.0 + coverage as f32).min(1.0)),
+        depth: Depth(nearest as f32),
+    }
+}
+
+/// Offsets of the sub-samples of a pixel from its centre.
+fn subsamples() -> impl Iterator<Item = Vector2<f64>> {
+    (0..SUBSAMPLES * SUBSAMPLES).map(|i| {
+        let cell = Vector2::new((i % SUBSAMPLES) as f64, (i / SUBSAMPLES) as f64);
+        cell.add_scalar(0.5) / SUBSAMPLES as f64 - Vector2::repeat(0.5)
+    })
+}
+
+/// A polygon as a camera sees it, pixels: the part in front of the camera.
+fn seen_ring(face: &[Vector3<f64>; 4], camera: &Camera) -> Vec<Point2<f64>> {
+    let in_camera = face.map(|corner| camera.camera_from_world * Point3::from(corner));
+    let mut ring = Vec::new();
+    for i in 0..4 {
+        let (a, b) = (in_camera[i], in_camera[(i + 1) % 4]);
+        ring.extend((a.z >= NEAR_PLANE_M).then_some(a));
+        if (a.z >= NEAR_PLANE_M) != (b.z >= NEAR_PLANE_M) {
+            ring.push(a + (b - a) * ((NEAR_PLANE_M - a.z) / (b.z - a.z)));
+        }
+    }
+    ring.iter().map(|p| pixel_of(p, camera)).collect()
+}
+
+fn pixel_of(p: &Point3<f64>, camera: &Camera) -> Point2<f64> {
+    let seen = (p.coords.xy() / p.z).component_mul(&camera.focal_px);
+    camera.principal_px + seen
+}
+
+/// The pixels of a picture's side that the box around a ring touches.
+fn pixels_around(ring: &[Point2<f64>], axis: usize, side: u32) -> Range<usize> {
+    let ends = ring.iter().map(|p| p[axis].clamp(0.0, side.into()));
+    let low = ends.clone().fold(f64::INFINITY, f64::min);
+    let high = ends.fold(0.0, f64::max);
+    low.floor() as usize..high.ceil() as usize
+}
+
+/// The lines along a convex ring, their normals inwards, whichever way it turns.
+fn inner_sides(ring: &[Point2<f64>]) -> Vec<(Vector2<f64>, f64)> {
+    let next = ring.iter().cycle().skip(1);
+    let edges: Vec<_> = ring.iter().zip(next).map(|(a, b)| (a, b - a)).collect();
+    let area: f64 = edges.iter().map(|(a, edge)| a.coords.perp(edge)).sum();
+    edges
+        .into_iter()
+        .filter_map(|(a, edge)| {
+            let inward = Vector2::new(-edge.y, edge.x) * area.signum();
+            let normal = inward.try_normalize(0.0)?;
+            Some((normal, normal.dot(&a.coords)))
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Wall;
+
+    fn tray(slope_deg: f64) -> Surface {
+        let wall = Wall {
+            height: 0.075,
+            slope_deg,
+        };
+        Surface {
+            wall: Some(wall),
+            ..Surface::new([0.56, 0.37])
+        }
+    }
+
+    fn camera() -> Camera {
+        let eye = Point3::new(0.25, -0.9, 0.8);
+        Camera::look_at(eye, Point3::origin(), 160.0, [160, 120])
+    }
+
+    /// Of a point in the room: whether the ray to the camera leaves it through a wall, found by
+    /// walking along the ray.
+    fn is_hidden(point: Vector3<f64>, eye: Vector3<f64>, surface: &Surface) -> bool {
+        let wall = surface.wall.unwrap();
+        let slope = wall.slope_deg.to_radians().tan();
+        let steps = (0..20_000).map(|i| point + (eye - point) * (f64::from(i) / 20_000.0));
+        let mut inside = steps.take_while(|p| p.z <= wall.height);
+        inside.any(|p| (0..2).any(|axis| p[axis].abs() > surface.size[axis] / 2.0 + slope * p.z))
+    }
+
+    #[test]
+    fn what_a_ray_leaves_through_a_wall_is_hidden() {
+        let (camera, mut hidden) = (camera(), 0);
+        for slope in [0.0, 8.0] {
+            let surface = tray(slope);
+            let holdout = surface.holdout(&camera).unwrap();
+            for i in 0..1_000 {
+                let share = |k: u32| f64::from(i * k % 1009) / 1009.0;
+                let x = 0.55 * (share(97) - 0.5);
+                let point = Vector3::new(x, -0.18 + 0.2 * share(31), 0.06 * share(7));
+                let (px, depth) = camera.project(point.into()).unwrap();
+                let at = holdout[(px.x as usize, px.y as usize)];
+                let expected = is_hidden(point, camera.center().coords, &surface);
+                // Pixels on the outline are partly covered.
+                if at.coverage.0 == 0.0 || at.coverage.0 == 1.0 {
+                    let found = at.coverage.0 == 1.0 && depth > f64::from(at.depth.0);
+                    assert_eq!(found, expected, "{point} {at:?}");
+                }
+                hidden += usize::from(expected);
+            }
+        }
+        assert!((100..1_900).contains(&hidden), "{hidden}");
+    }
+
+    #[test]
+    fn coverage_adds_up_to_the_area_of_the_wall() {
+        let (camera, surface) = (camera(), tray(0.0));
+        let face = surface.wall.unwrap().inner_faces(surface.size)[2];
+        let ring = seen_ring(&face, &camera);
+        let doubled: f64 = (0..4)
+            .map(|i| ring[i].coords.perp(&ring[(i + 1) % 4].coords))
+            .sum();
+        let holdout = surface.holdout(&camera).unwrap();
+        let covered: f32 = holdout.pixels().iter().map(|p| p.coverage.0).sum();
+        assert!((f64::from(covered) / (doubled.abs() / 2.0) - 1.0).abs() < 0.005);
+    }
+
+    #[test]
+    fn from_above_nothing_is_hidden_and_nothing_is_made() {
+        let above = Camera::look_at(
+            Point3::new(0.0, 0.0, 1.2),
+            Point3::origin(),
+            160.0,
+            [160, 120],
+        );
+        assert!(tray(8.0).holdout(&above).is_none());
+        assert!(Surface::new([0.56, 0.37]).holdout(&camera()).is_none());
+    }
+}
