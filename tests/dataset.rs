@@ -1486,9 +1486,10 @@ fn what_a_mask_beside_the_photo_hides_is_the_place_in_picture_and_labels() {
     let mask = Image::from_fn(64, 48, |x, _| Coverage(f32::from(x < 32)));
     io::write(dir.path().join("photos/tray.front.png"), &mask).unwrap();
     let held = open().sample(1, 0).unwrap();
+    let plate = io::read::<LinearRgb>(dir.path().join("photos/tray.tif")).unwrap();
     for (x, y) in (0..64 * 48).map(|i| (i % 64, i / 64)) {
         let expected = if x < 32 {
-            LinearRgb::grey(0.25).opaque()
+            plate[(x, y)].opaque()
         } else {
             free.frame[(x, y)]
         };
