@@ -112,6 +112,7 @@ mod tests {
             ambient: LinearRgb::grey(0.1),
             environment: None,
             exposure,
+            edges: Default::default(),
             cast: Default::default(),
             view: Default::default(),
             finish: Default::default(),

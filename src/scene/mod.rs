@@ -36,18 +36,21 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod bend;
 pub(crate) mod bounds;
 mod catalog;
 mod check;
 #[doc(hidden)]
 pub mod cycles;
 mod draw;
+mod edges;
 mod environment;
 mod fall;
 mod files;
 mod hull;
 mod light;
 mod locate;
+mod palette;
 mod placement;
 mod post_process;
 mod range;
@@ -59,12 +62,17 @@ mod take;
 mod variation;
 mod view;
 
+#[doc(hidden)]
+pub use bend::Bend;
+pub(crate) use bend::Cylinder;
 pub use catalog::Background;
 #[doc(hidden)]
 pub use catalog::{AssetVariant, catalog};
 pub use draw::Distribution;
 #[doc(hidden)]
 pub use draw::{DrawLog, Drawn, Draws};
+#[doc(hidden)]
+pub use edges::Edges;
 #[doc(hidden)]
 pub use environment::EnvironmentRanges;
 pub(crate) use environment::turned;
@@ -80,6 +88,8 @@ pub use files::{SceneFiles, SceneSettings};
 pub(crate) use hull::doubled_area;
 pub use light::{AreaLight, Exposure, LightShape, LightTint};
 pub use locate::locate;
+#[doc(hidden)]
+pub use palette::{PaletteColor, PaletteEntry, PlasticColor, WeightedColor};
 pub use placement::{Grade, Object, Placement};
 #[doc(hidden)]
 pub use post_process::{Blur, CameraNoise, PostProcessRanges, white_balance};
@@ -139,6 +149,9 @@ pub struct Scene {
     /// bring their own.
     #[serde(default, skip_serializing_if = "LightTint::is_white")]
     pub cast: LightTint,
+    /// How the edges of cut-outs are treated.
+    #[serde(default, skip_serializing_if = "Edges::are_as_is")]
+    pub edges: Edges,
     /// What happens to the finished frame.
     #[serde(default, skip_serializing_if = "PostProcess::is_identity")]
     pub finish: PostProcess,
@@ -161,6 +174,7 @@ impl Scene {
             environment: None,
             exposure: Exposure::Ev(0.0),
             cast: LightTint::default(),
+            edges: Edges::AsIs,
             finish: PostProcess::default(),
             ..self
         }

@@ -1,11 +1,11 @@
 //! A scene with nothing left to find out: what the renderer takes.
 
-use crate::asset::Texture;
+use crate::asset::{SurfaceCache, Texture};
 use crate::camera::Camera;
 use crate::geom::{Point2, Quad};
 use crate::image::Image;
 use crate::pixel::{LinearRgb, ObjectId};
-use crate::scene::{AreaLight, EnvironmentMap, Grade};
+use crate::scene::{AreaLight, Bend, Edges, EnvironmentMap, Grade};
 use std::sync::Arc;
 
 /// Everything a picture is made of, in memory and known.
@@ -30,9 +30,11 @@ pub struct Shot {
     pub environment: Option<EnvironmentMap>,
     /// Factor from rendered radiance to plate values.
     pub exposure: f32,
+    /// How the edges of cards are treated; labels are made from those that are left as they are.
+    pub edges: Edges,
 }
 
-/// A flat, textured, see-through object in space.
+/// A textured, see-through object in space, flat or curved.
 #[derive(Clone, Debug)]
 pub struct Card {
     /// Its name in labels; not 0.
@@ -51,6 +53,11 @@ pub struct Card {
     pub outline_uv: Arc<[Point2<f64>]>,
     /// Change of its colours.
     pub grade: Grade,
+    /// How it is curved.
+    pub bend: Bend,
+    /// What the texels of its front and of its back are of.
+    #[doc(hidden)]
+    pub surfaces: [SurfaceCache; 2],
 }
 
 impl Card {
@@ -65,6 +72,8 @@ impl Card {
             back: None,
             outline_uv: corners.map(Point2::from).into(),
             grade: Grade::default(),
+            bend: Bend::FLAT,
+            surfaces: Default::default(),
         }
     }
 }
@@ -81,6 +90,7 @@ impl Shot {
             ambient: LinearRgb::BLACK,
             environment: None,
             exposure: 1.0,
+            edges: Edges::AsIs,
         }
     }
 
