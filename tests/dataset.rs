@@ -14,7 +14,7 @@ use petcomp::dataset::{
 use petcomp::geom::BBox;
 use petcomp::geom::{Point2, Pose, UnitQuaternion, Vector2};
 use petcomp::label::{Labels, ObjectLabel, RleMask};
-use petcomp::scene::{CameraSource, Edges, Exposure, Grade, Object, Placement, Surface};
+use petcomp::scene::{CameraSource, EdgeTreatment, Exposure, Grade, Object, Placement, Surface};
 use petcomp::{Error, Image, LinearRgb, ObjectId, PremulRgba, Result, Scene, io};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -1324,15 +1324,19 @@ fn write_world(folder: &Path) {
 fn treated_edges_change_the_picture_and_no_label() {
     let dir = tempfile::tempdir().unwrap();
     write_world(dir.path());
-    let sample = |edges: &[Edges], k: u64| {
+    let sample = |edges: &[EdgeTreatment], k: u64| {
         let mut setup = DatasetConfig::read(dir.path().join("recipe.toml"), &[]).unwrap();
         setup.scene.edges = edges.to_vec();
         Pipeline::open(setup).unwrap().sample(1, k).unwrap()
     };
     for k in 0..3 {
         let plain = sample(&[], k);
-        assert_eq!(sample(&[Edges::AsIs], k).frame, plain.frame);
-        for edges in [Edges::Soft, Edges::Eroded, Edges::Poisson] {
+        assert_eq!(sample(&[EdgeTreatment::AsIs], k).frame, plain.frame);
+        for edges in [
+            EdgeTreatment::Soft,
+            EdgeTreatment::Eroded,
+            EdgeTreatment::Poisson,
+        ] {
             let treated = sample(&[edges], k);
             assert_eq!(treated.labels, plain.labels, "{edges:?}");
             assert_ne!(treated.frame, plain.frame, "{edges:?}");

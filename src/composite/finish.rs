@@ -6,7 +6,7 @@ use crate::deep::DeepImage;
 use crate::filter::gaussian_blur;
 use crate::image::Image;
 use crate::pixel::{Film, LinearRgb, Mix, PremulRgba};
-use crate::scene::{Blur, CameraNoise, Edges, Noise, PostProcess};
+use crate::scene::{Blur, CameraNoise, EdgeTreatment, Noise, PostProcess};
 use crate::work::{self, Kind};
 use std::f64::consts::TAU;
 
@@ -31,7 +31,7 @@ pub fn finish(
     plate: Option<&Image<LinearRgb>>,
     finish: &PostProcess,
 ) -> Image<PremulRgba> {
-    finish_blended(frame, deep, plate, finish, Edges::AsIs)
+    finish_blended(frame, deep, plate, finish, EdgeTreatment::AsIs)
 }
 
 /// The same with objects blended into the plate where edges ask for it, which is after their blur
@@ -41,13 +41,13 @@ pub fn finish_blended(
     deep: &DeepImage,
     plate: Option<&Image<LinearRgb>>,
     finish: &PostProcess,
-    edges: Edges,
+    edges: EdgeTreatment,
 ) -> Image<PremulRgba> {
     let frame = match finish.blur_px {
         Blur::Known(sigma_px) if sigma_px > 0.0 => blur(&frame, deep, plate, sigma_px as f32),
         _ => frame,
     };
-    let frame = if edges == Edges::Poisson && plate.is_some() {
+    let frame = if edges == EdgeTreatment::Poisson && plate.is_some() {
         blend(&frame, deep)
     } else {
         frame

@@ -88,8 +88,8 @@ struct PixelEquation {
     count: usize,
     /// Sum of the differences to the neighbours behind.
     jump: LinearRgb,
-    /// Reciprocal of the factor on its own correction.
-    scale: f32,
+    /// Factor on its own correction.
+    factor: f32,
 }
 
 fn equations(
@@ -107,32 +107,41 @@ fn equations(
 fn equation(
     frame: &Image<PremulRgba>,
     top: &Image<(u32, f32)>,
-    (x, y): (usize, usize),
+    at: (usize, usize),
 ) -> PixelEquation {
-    let (own, depth) = top[(x, y)];
-    let mut equation = PixelEquation {
-        pixel: y * frame.width() + x,
-        same: [0; 4],
-        count: 0,
-        jump: LinearRgb::BLACK,
-        scale: 1.0 / (REACH_PX * REACH_PX),
-    };
-    for (q, number) in neighbors(frame, x, y) {
-        let (object, far) = top[q];
-        if object == own {
-            equation.same[equation.count] = number;
-            equation.count += 1;
-        } else if far > depth {
-            let jump = frame[q].color().add_scaled(-1.0, frame[(x, y)].color());
-            equation.jump = equation.jump + jump;
-        } else {
+    let mut equation = PixelEquation::new(at.1 * frame.width() + at.0);
+    for (q, number) in neighbors(frame, at.0, at.1) {
+        if top[q].0 == top[at].0 {
+            equation.add_same(number);
+        } else if top[q].1 > top[at].1 {
             // What is in front has an outline of its own.
-            continue;
+            equation.add_behind(frame[at].color(), frame[q].color());
         }
-        equation.scale += 1.0;
     }
-    equation.scale = 1.0 / equation.scale;
     equation
+}
+
+impl PixelEquation {
+    fn new(pixel: usize) -> Self {
+        Self {
+            pixel,
+            same: [0; 4],
+            count: 0,
+            jump: LinearRgb::BLACK,
+            factor: 1.0 / (REACH_PX * REACH_PX),
+        }
+    }
+
+    fn add_same(&mut self, number: usize) {
+        self.same[self.count] = number;
+        self.count += 1;
+        self.factor += 1.0;
+    }
+
+    fn add_behind(&mut self, own: LinearRgb, behind: LinearRgb) {
+        self.jump = self.jump + behind.add_scaled(-1.0, own);
+        self.factor += 1.0;
+    }
 }
 
 fn solve(pixels: &[PixelEquation], width: usize, height: usize) -> Image<LinearRgb> {
@@ -157,7 +166,7 @@ fn relax<'a>(pixels: impl Iterator<Item = &'a PixelEquation>, values: &mut [Line
     for p in pixels {
         let same = p.same[..p.count].iter();
         let sum = same.fold(p.jump, |sum, &q| sum + values[q]);
-        let value = sum.scale(p.scale);
+        let value = sum.scale(1.0 / p.factor);
         let change = value.add_scaled(-1.0, values[p.pixel]);
         largest = largest.max(change.map(f32::abs).max_channel());
         values[p.pixel] = value;

@@ -19,8 +19,8 @@ use crate::light;
 use crate::pixel::{LinearRgb, PremulRgba};
 use crate::render::{self};
 use crate::scene::{
-    Appearance, AssetVariant, Background, CameraSource, Drawn, Draws, Edges, Scene, Shot, catalog,
-    locate,
+    Appearance, AssetVariant, Background, CameraSource, Drawn, Draws, EdgeTreatment, Scene, Shot,
+    catalog, locate,
 };
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -277,7 +277,7 @@ impl Pipeline {
             return label::label(deep, shot, &options);
         }
         let plain = Shot {
-            edges: Edges::AsIs,
+            edges: EdgeTreatment::AsIs,
             ..shot.clone()
         };
         let deep = render::render_coverage(&plain, &self.config.render);

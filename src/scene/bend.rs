@@ -100,6 +100,11 @@ impl Cylinder {
         (self.along * -libm::sin(turn)).push(libm::cos(turn))
     }
 
+    /// The point of the flat card's plane on the ray of an eye to a place.
+    pub(crate) fn on_plane(&self, eye: &Point3<f64>, place: &Point3<f64>) -> Point2<f64> {
+        (eye + (place - eye) * (eye.z / (eye.z - place.z))).xy()
+    }
+
     /// The point of the flat card that an eye sees where it sees `p` of the flat card's plane; not
     /// finite where it sees past the cylinder.
     ///

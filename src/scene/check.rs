@@ -10,7 +10,6 @@ use crate::scene::bounds::{
     PIXEL, PLACE, RADIANCE, SHARE, TURN,
 };
 use crate::scene::hull::doubled_corner_area;
-use crate::scene::palette::check_tint;
 use crate::scene::{
     AreaLight, CameraSource, Exposure, Grade, LightTint, Object, Placement, Scene, Surface,
 };
@@ -210,7 +209,7 @@ fn check_grade(grade: &Grade, at: &str) -> Result<()> {
     GRADE.check(&field(at, "saturation"), grade.saturation.into())?;
     GRADE.check(&field(at, "value"), grade.value.into())?;
     GRADE.check(&field(at, "glints"), grade.glints.into())?;
-    check_tint(grade.tint, &field(at, "tint"))
+    grade.check_tint(&field(at, "tint"))
 }
 
 fn check_placement(placement: &Placement, at: &str) -> Result<()> {

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 /// [Dwibedi, Misra and Hebert 2017]: https://arxiv.org/abs/1708.01642
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Edges {
+pub enum EdgeTreatment {
     /// As the cut-out has them.
     #[default]
     AsIs,
@@ -24,7 +24,7 @@ pub enum Edges {
     Poisson,
 }
 
-impl Edges {
+impl EdgeTreatment {
     /// Whether they are left alone.
     pub fn are_as_is(&self) -> bool {
         *self == Self::AsIs

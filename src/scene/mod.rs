@@ -72,7 +72,7 @@ pub use draw::Distribution;
 #[doc(hidden)]
 pub use draw::{DrawLog, Drawn, Draws};
 #[doc(hidden)]
-pub use edges::Edges;
+pub use edges::EdgeTreatment;
 #[doc(hidden)]
 pub use environment::EnvironmentRanges;
 pub(crate) use environment::turned;
@@ -150,8 +150,8 @@ pub struct Scene {
     #[serde(default, skip_serializing_if = "LightTint::is_white")]
     pub cast: LightTint,
     /// How the edges of cut-outs are treated.
-    #[serde(default, skip_serializing_if = "Edges::are_as_is")]
-    pub edges: Edges,
+    #[serde(default, skip_serializing_if = "EdgeTreatment::are_as_is")]
+    pub edges: EdgeTreatment,
     /// What happens to the finished frame.
     #[serde(default, skip_serializing_if = "PostProcess::is_identity")]
     pub finish: PostProcess,
@@ -174,7 +174,7 @@ impl Scene {
             environment: None,
             exposure: Exposure::Ev(0.0),
             cast: LightTint::default(),
-            edges: Edges::AsIs,
+            edges: EdgeTreatment::AsIs,
             finish: PostProcess::default(),
             ..self
         }

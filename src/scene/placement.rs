@@ -1,8 +1,10 @@
 //! Objects and where they are.
 
+use crate::error::Result;
 use crate::geom::{Pose, UnitQuaternion};
 use crate::pixel::LinearRgb;
 use crate::scene::Bend;
+use crate::scene::palette::check_tint;
 use serde::{Deserialize, Serialize};
 
 /// One occurrence of an asset in a scene.
@@ -98,6 +100,11 @@ impl Grade {
     /// Whether plastic is dyed or glints are changed.
     pub fn changes_surface(&self) -> bool {
         !is_white(&self.tint) || !is_one(&self.glints)
+    }
+
+    /// Fails on a dye that gives light.
+    pub(super) fn check_tint(&self, at: &str) -> Result<()> {
+        check_tint(self.tint, at)
     }
 }
 

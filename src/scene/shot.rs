@@ -5,7 +5,7 @@ use crate::camera::Camera;
 use crate::geom::{Point2, Quad};
 use crate::image::Image;
 use crate::pixel::{LinearRgb, ObjectId};
-use crate::scene::{AreaLight, Bend, Edges, EnvironmentMap, Grade};
+use crate::scene::{AreaLight, Bend, EdgeTreatment, EnvironmentMap, Grade};
 use std::sync::Arc;
 
 /// Everything a picture is made of, in memory and known.
@@ -31,7 +31,7 @@ pub struct Shot {
     /// Factor from rendered radiance to plate values.
     pub exposure: f32,
     /// How the edges of cards are treated; labels are made from those that are left as they are.
-    pub edges: Edges,
+    pub edges: EdgeTreatment,
 }
 
 /// A textured, see-through object in space, flat or curved.
@@ -90,7 +90,7 @@ impl Shot {
             ambient: LinearRgb::BLACK,
             environment: None,
             exposure: 1.0,
-            edges: Edges::AsIs,
+            edges: EdgeTreatment::AsIs,
         }
     }
 

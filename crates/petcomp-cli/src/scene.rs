@@ -88,7 +88,7 @@ fn export_scene(args: &ExportSceneArgs, global: &GlobalArgs) -> anyhow::Result<(
     let (scene, shot) = pipeline
         .resolve(scene)
         .map_err(|e| e.in_file(&args.scene))?;
-    let retouched = render::retouched_fully(&shot, &pipeline.config().render);
+    let retouched = petcomp::render::retouched_fully(&shot, &pipeline.config().render);
     cycles::export(&retouched, scene.surface.size, &args.folder)?;
     let cards = shot.cards.len();
     global.print_written(&args.folder, format_args!("{cards} cards; render it with"));

@@ -1,9 +1,9 @@
 //! Curved cards as flat ones that look alike.
 
 use super::Darkroom;
-use super::canvas::Canvas;
+use super::painted_plane::PaintedPlane;
 use crate::filter::sample_bilinear;
-use crate::geom::{Point2, Point3, Vector3};
+use crate::geom::{BBox, Point2, Point3, Vector3};
 use crate::image::Image;
 use crate::light;
 use crate::pixel::{Film, LinearRgb, Mix};
@@ -18,8 +18,8 @@ const SHADING_NODES: usize = 17;
 /// Points along each side of a card whose places bound those of all of it.
 const SIDE_POINTS: usize = 17;
 /// Least height of the eye over a card, as a share of the card's reach, from which it is seen as a
-/// curved one; flatter views see it almost edge-on.
-const LEAST_EYE_HEIGHT_RATIO: f64 = 0.1;
+/// curved one. From lower down it is almost edge-on, and a bend of 60 degrees reaches halfway up.
+const LEAST_EYE_HEIGHT_RATIO: f64 = 0.5;
 
 /// What the eye sees of a curved card, painted on the plane of the flat one.
 ///
@@ -32,12 +32,12 @@ const LEAST_EYE_HEIGHT_RATIO: f64 = 0.1;
 /// about the height of the arc, an eighth of the angle times the length: 9 mm for 200 mm bent by 20
 /// degrees.
 pub(super) fn bend(
-    flat: &Canvas,
+    flat: &PaintedPlane,
     card: &Card,
     cylinder: &Cylinder,
     shading: &BentShading,
     eye: &Point3<f64>,
-) -> Canvas {
+) -> PaintedPlane {
     if eye.z.abs() < LEAST_EYE_HEIGHT_RATIO * cylinder.reach {
         return flat.padded(0);
     }
@@ -52,26 +52,24 @@ pub(super) fn bend(
             ..film
         }
     });
-    Canvas { film, ..empty }
+    PaintedPlane { film, ..empty }
 }
 
-/// An empty canvas, its texels as large as those of another, where the eye sees a curved card.
-fn seen_area(flat: &Canvas, card: &Card, cylinder: &Cylinder, eye: &Point3<f64>) -> Canvas {
-    let border = border_points(card.quad.size).map(|p| {
-        let place = cylinder.point(&p);
-        flat.position(&(eye + (place - eye) * (eye.z / (eye.z - place.z))).xy())
-    });
-    let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-    for at in border {
-        for axis in 0..2 {
-            low[axis] = low[axis].min(at[axis].floor() - 1.0);
-            high[axis] = high[axis].max(at[axis].ceil() + 1.0);
-        }
-    }
-    let [columns, rows] = [0, 1].map(|axis| (high[axis] - low[axis]).max(0.0) as usize);
-    Canvas {
-        film: Image::new(columns, rows),
-        corner: flat.point(low[0], low[1]),
+/// An empty plane, its texels as large as those of another, where the eye sees a curved card.
+fn seen_area(
+    flat: &PaintedPlane,
+    card: &Card,
+    cylinder: &Cylinder,
+    eye: &Point3<f64>,
+) -> PaintedPlane {
+    let border = border_points(card.quad.size);
+    let seen = border.map(|p| cylinder.on_plane(eye, &cylinder.point(&p)));
+    let seen = BBox::around(seen.map(|p| flat.position(&p).into()));
+    let (left, top) = (seen.x0.floor() - 1.0, seen.y0.floor() - 1.0);
+    let columns = (seen.x1 + 1.0 - left).ceil() as usize;
+    PaintedPlane {
+        film: Image::new(columns, (seen.y1 + 1.0 - top).ceil() as usize),
+        corner: flat.point(left, top),
         texel: flat.texel,
     }
 }

@@ -1,11 +1,11 @@
 //! Edges of cut-outs, softer or further in.
 
-use super::canvas::{Canvas, padded};
+use super::painted_plane::{PaintedPlane, padded};
 use crate::asset::SurfaceTexel;
 use crate::filter::gaussian_blur;
 use crate::image::Image;
 use crate::pixel::{Film, Mix};
-use crate::scene::Edges;
+use crate::scene::EdgeTreatment;
 
 /// Standard deviation of what edges are softened and eroded by, pixels of the picture.
 const SIGMA_PX: f32 = 0.5;
@@ -15,24 +15,24 @@ const BAND_SIGMA_PX: f32 = 1.0;
 /// quarter and three quarters of a pixel further in, `Phi(0.5)` and `Phi(1.5)`.
 const ERODED: [f32; 2] = [0.691_5, 0.933_2];
 
-/// Treats the edges of what is on a canvas; `pixel` is the side of the picture's pixels in texels.
+/// Treats the edges of what is painted on a plane; `pixel` is the side of the picture's pixels in texels.
 ///
 /// # Method
 /// The edge is where the coverage by the object, blurred by a Gaussian, is a half; along a straight
 /// one the blurred coverage tells the distance. An eroded matte is one of the blurred coverage with
 /// a higher threshold.
 pub(super) fn treat(
-    canvas: &mut Canvas,
-    surface: Image<SurfaceTexel>,
-    treatment: Edges,
+    plane: &mut PaintedPlane,
+    surface: &Image<SurfaceTexel>,
+    treatment: EdgeTreatment,
     pixel: f32,
 ) {
     let margin = (3.0 * BAND_SIGMA_PX * pixel).ceil() as usize;
-    *canvas = canvas.padded(margin);
+    *plane = plane.padded(margin);
     let body = padded(&surface.map(|texel| texel.body), margin);
-    canvas.film = match treatment {
-        Edges::Soft => soft(&canvas.film, &body, pixel),
-        _ => eroded(&canvas.film, &body, pixel),
+    plane.film = match treatment {
+        EdgeTreatment::Soft => soft(&plane.film, &body, pixel),
+        _ => eroded(&plane.film, &body, pixel),
     };
 }
 
@@ -64,7 +64,7 @@ mod tests {
     use crate::pixel::LinearRgb;
 
     /// An opaque white square of 60 texels.
-    fn treated(treatment: Edges, pixel: f32) -> Image<Film> {
+    fn treated(treatment: EdgeTreatment, pixel: f32) -> Image<Film> {
         let is_inside = |x: usize, y: usize| (20..80).contains(&x) && (20..80).contains(&y);
         let film = Image::from_fn(100, 100, |x, y| {
             let level = if is_inside(x, y) {
@@ -81,15 +81,15 @@ mod tests {
             body: film.opacity.r,
             glint: 0.0,
         });
-        let mut canvas = Canvas {
+        let mut plane = PaintedPlane {
             film,
             corner: Point2::new(-0.5, 0.5),
             texel: [0.01; 2],
         };
-        treat(&mut canvas, surface, treatment, pixel);
-        let [x, y] = canvas.position(&Point2::new(-0.5, 0.5));
+        treat(&mut plane, &surface, treatment, pixel);
+        let [x, y] = plane.position(&Point2::new(-0.5, 0.5));
         assert_eq!([x, y], [(3.0 * pixel).ceil() as f64; 2].map(|m| m as f64));
-        canvas.film
+        plane.film
     }
 
     fn area(film: &Image<Film>) -> f32 {
@@ -99,7 +99,7 @@ mod tests {
     #[test]
     fn an_eroded_square_is_half_a_pixel_smaller_on_each_side() {
         for pixel in [2.0_f32, 3.3, 7.0] {
-            let side = area(&treated(Edges::Eroded, pixel)).sqrt();
+            let side = area(&treated(EdgeTreatment::Eroded, pixel)).sqrt();
             let lost = (60.0 - side) / 2.0 / pixel;
             assert!((lost - 0.5).abs() < 0.1, "{pixel}: {lost} pixels");
         }
@@ -107,7 +107,7 @@ mod tests {
 
     #[test]
     fn a_soft_square_keeps_its_area_its_middle_and_its_colour() {
-        let film = treated(Edges::Soft, 3.0);
+        let film = treated(EdgeTreatment::Soft, 3.0);
         assert!((area(&film) / 3600.0 - 1.0).abs() < 2e-3);
         let margin = 9;
         assert_eq!(film[(50 + margin, 50 + margin)].opacity.g, 1.0);

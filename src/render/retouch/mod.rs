@@ -6,18 +6,19 @@
 //! asks for nothing is passed on as it is.
 
 mod bend;
-mod canvas;
 mod dye;
 mod edges;
+mod painted_plane;
 
-use crate::asset::{SurfaceCache, Texture};
+use crate::asset::{SurfaceCache, SurfaceTexel, Texture};
+use crate::image::Image;
 use crate::render::RenderOptions;
 use crate::render::detail::{detail_level, texels_per_pixel};
 use crate::render::pixel_filter::filter_quantiles;
 use crate::render::view::{CameraView, ProjectedPlane, ScenePlane};
-use crate::scene::{Card, Edges, Grade, Shot};
+use crate::scene::{Card, Cylinder, EdgeTreatment, Grade, Shot};
 use bend::BentShading;
-use canvas::Canvas;
+use painted_plane::PaintedPlane;
 use rayon::prelude::*;
 use std::borrow::Cow;
 
@@ -48,7 +49,7 @@ fn retouch<'a>(
     let cards = shot.cards.par_iter();
     Cow::Owned(Shot {
         cards: cards.map(|card| darkroom.retouch_card(card)).collect(),
-        edges: Edges::AsIs,
+        edges: EdgeTreatment::AsIs,
         ..shot.clone()
     })
 }
@@ -119,23 +120,52 @@ impl Darkroom<'_> {
     }
 
     fn retouch_side(&self, card: &Card, plane: &ScenePlane, side: &SeenSide<'_>) -> Card {
-        let level = self.level(card, side);
-        let mut canvas = Canvas::new(card, side.texture, side.mirrored, level);
-        let body = || canvas::body(side.surface.of(side.texture), side.mirrored, level);
+        let flat = self.paint(card, side);
+        let painted = match card.bend.cylinder(card.quad.size) {
+            Some(cylinder) => self.bend(&flat, card, plane, &cylinder),
+            None => flat,
+        };
+        painted.into_card(card)
+    }
+
+    /// A side in its final colours and with its final edges.
+    fn paint(&self, card: &Card, side: &SeenSide<'_>) -> PaintedPlane {
+        let (level, edges) = (self.level(card, side), self.shot.edges);
+        let mut painted = PaintedPlane::new(card, side.texture, side.mirrored, level);
         if card.grade.changes_surface() {
-            dye::dye(&mut canvas.film, &body(), &card.grade);
+            dye::dye(&mut painted.film, &side.surface_level(level), &card.grade);
         }
-        if self.shot.edges.reshape_cut_outs() {
+        if edges.reshape_cut_outs() {
             let pixel = side.texels_per_pixel / libm::exp2(level as f64);
-            edges::treat(&mut canvas, body(), self.shot.edges, pixel as f32);
+            edges::treat(
+                &mut painted,
+                &side.surface_level(level),
+                edges,
+                pixel as f32,
+            );
         }
-        if let Some(cylinder) = card.bend.cylinder(card.quad.size) {
-            let eye = self.shot.camera.center();
-            let eye = card.quad.world_from_card.inverse_transform_point(&eye);
-            let shading = BentShading::new(self, card, plane, &cylinder);
-            canvas = bend::bend(&canvas, card, &cylinder, &shading, &eye);
-        }
-        canvas.into_card(card)
+        painted
+    }
+
+    fn bend(
+        &self,
+        flat: &PaintedPlane,
+        card: &Card,
+        plane: &ScenePlane,
+        cylinder: &Cylinder,
+    ) -> PaintedPlane {
+        let world_from_card = &card.quad.world_from_card;
+        let eye = world_from_card.inverse_transform_point(&self.shot.camera.center());
+        let shading = BentShading::new(self, card, plane, cylinder);
+        bend::bend(flat, card, cylinder, &shading, &eye)
+    }
+}
+
+impl SeenSide<'_> {
+    /// What the texels at a level of detail are of.
+    fn surface_level(&self, level: usize) -> Image<SurfaceTexel> {
+        let surface = self.surface.of(self.texture);
+        painted_plane::turned(surface.level(level).clone(), self.mirrored)
     }
 }
 

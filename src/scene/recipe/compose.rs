@@ -5,8 +5,8 @@ use crate::error::{Error, Result};
 use crate::pixel::LinearRgb;
 use crate::scene::stack::DropColumn;
 use crate::scene::{
-    AreaLight, AssetVariant, Background, Bend, DrawLog, Draws, Edges, Exposure, Object, Range,
-    Recipe, Scene, SceneSettings, Surface,
+    AreaLight, AssetVariant, Background, Bend, DrawLog, Draws, EdgeTreatment, Exposure, Object,
+    Range, Recipe, Scene, SceneSettings, Surface,
 };
 use std::f64::consts::PI;
 
@@ -78,7 +78,7 @@ impl Recipe {
             environment: self.environment.draw(draws),
             exposure: self.exposure(background, self.gain_ev.draw(draws, "gain_ev")),
             cast: self.cast,
-            edges: Edges::draw(&self.edges, draws),
+            edges: EdgeTreatment::draw(&self.edges, draws),
             finish: self.finish.draw(draws),
             files: None,
             settings: SceneSettings::default(),

@@ -16,8 +16,9 @@ use crate::scene::bounds::{
 use crate::scene::check::{check_cast, check_count, check_each, check_image};
 use crate::scene::stack::too_large;
 use crate::scene::{
-    AssetVariant, Background, DrawLog, Drawn, DropRanges, Edges, EnvironmentRanges, LightTint,
-    PostProcessRanges, Range, Scene, SettleOptions, Surface, Take, Variation, ViewRanges,
+    AssetVariant, Background, DrawLog, Drawn, DropRanges, EdgeTreatment, EnvironmentRanges,
+    LightTint, PostProcessRanges, Range, Scene, SettleOptions, Surface, Take, Variation,
+    ViewRanges,
 };
 use compose::SceneNumber;
 use serde::{Deserialize, Serialize};
@@ -62,12 +63,10 @@ pub struct Recipe {
     pub grade: GradeRanges,
     /// Degrees that an object's card is curved by from one end to the other, about an axis of any
     /// direction in it; above 0 its ends are nearer to whoever looks at its front. Default: 0.
-    #[serde(skip_serializing_if = "is_flat")]
     pub bend_deg: Range,
     /// Treatments of the edges of cut-outs, one of them for each picture. Default: none, they are
     /// left as they are.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub edges: Vec<Edges>,
+    pub edges: Vec<EdgeTreatment>,
     /// Lights; `lights = []` makes scenes without shadows. Default: one.
     pub lights: Vec<LightRanges>,
     /// Irradiance of the constant environment on the surface, as a share of what the lights give

@@ -22,10 +22,8 @@ pub struct GradeRanges {
     pub value: Range,
     /// Colours of see-through plastic to choose from in place of a turn of the hue; they are dyes
     /// on top of the plastic's own colour. Default: none.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub palette: Vec<PaletteEntry>,
     /// Factor on the glints of the studio's light. Default: 1.
-    #[serde(skip_serializing_if = "are_unchanged")]
     pub glints: Range,
 }
 

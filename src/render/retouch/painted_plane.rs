@@ -1,15 +1,15 @@
 //! A part of a card's plane as a picture.
 
 use super::remaining_grade;
-use crate::asset::{SurfaceTexel, Texture};
-use crate::filter::Pyramid;
+use crate::asset::Texture;
 use crate::geom::{Point2, Pose, Quad};
 use crate::image::Image;
 use crate::pixel::Film;
 use crate::scene::{Bend, Card};
+use std::sync::Arc;
 
 /// What is painted on a card's plane, x right and y up from its middle, metres.
-pub(super) struct Canvas {
+pub(super) struct PaintedPlane {
     pub(super) film: Image<Film>,
     /// Upper left corner.
     pub(super) corner: Point2<f64>,
@@ -17,7 +17,7 @@ pub(super) struct Canvas {
     pub(super) texel: [f64; 2],
 }
 
-impl Canvas {
+impl PaintedPlane {
     /// What a texture shows on its card at a level of detail. Texels of halved odd sizes reach
     /// beyond the card.
     pub(super) fn new(card: &Card, texture: &Texture, mirrored: bool, level: usize) -> Self {
@@ -66,20 +66,9 @@ impl Canvas {
 
     /// A flat card that shows it where another one is, seen through from its back.
     pub(super) fn into_card(self, card: &Card) -> Card {
-        let (columns, rows) = (self.film.width() as f64, self.film.height() as f64);
-        let middle = self.point(0.5 * columns, 0.5 * rows);
-        let outline = card.outline_uv.iter().map(|uv| {
-            let [w, h] = card.quad.size;
-            let [x, y] = self.position(&Point2::new((uv.x - 0.5) * w, (0.5 - uv.y) * h));
-            Point2::new(x / columns, y / rows)
-        });
         Card {
-            quad: Quad {
-                world_from_card: card.quad.world_from_card
-                    * Pose::translation(middle.x, middle.y, 0.0),
-                size: [columns * self.texel[0], rows * self.texel[1]],
-            },
-            outline_uv: outline.collect(),
+            quad: self.quad(&card.quad),
+            outline_uv: self.outline(card),
             texture: self.film.into(),
             back: None,
             grade: remaining_grade(&card.grade),
@@ -87,6 +76,29 @@ impl Canvas {
             surfaces: Default::default(),
             ..card.clone()
         }
+    }
+
+    /// Where it lies, in the plane of a card.
+    fn quad(&self, card: &Quad) -> Quad {
+        let size = [
+            self.texel[0] * self.film.width() as f64,
+            self.texel[1] * self.film.height() as f64,
+        ];
+        let [x, y] = [self.corner.x + 0.5 * size[0], self.corner.y - 0.5 * size[1]];
+        Quad {
+            world_from_card: card.world_from_card * Pose::translation(x, y, 0.0),
+            size,
+        }
+    }
+
+    /// The outline of a card in its own texture coordinates.
+    fn outline(&self, card: &Card) -> Arc<[Point2<f64>]> {
+        let ([w, h], corners) = (card.quad.size, card.outline_uv.iter());
+        let (columns, rows) = (self.film.width() as f64, self.film.height() as f64);
+        corners
+            .map(|uv| self.position(&Point2::new((uv.x - 0.5) * w, (0.5 - uv.y) * h)))
+            .map(|[x, y]| Point2::new(x / columns, y / rows))
+            .collect()
     }
 }
 
@@ -103,16 +115,8 @@ pub(super) fn padded<P: Copy + Default + Send + Sync>(image: &Image<P>, margin: 
     })
 }
 
-/// A level of a surface map as it lies on the card.
-pub(super) fn body(
-    surface: &Pyramid<SurfaceTexel>,
-    mirrored: bool,
-    level: usize,
-) -> Image<SurfaceTexel> {
-    turned(surface.level(level).clone(), mirrored)
-}
-
-fn turned<P: Copy + Send + Sync>(image: Image<P>, mirrored: bool) -> Image<P> {
+/// A picture, the other way round where it is that of a back.
+pub(super) fn turned<P: Copy + Send + Sync>(image: Image<P>, mirrored: bool) -> Image<P> {
     if !mirrored {
         return image;
     }
