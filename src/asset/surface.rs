@@ -69,7 +69,7 @@ pub(super) fn surface_map(cut_out: &Image<Film>) -> Image<SurfaceTexel> {
     let neutral = cut_out.map(|film| least_channel(film).max(0.0));
     let level = diffuse_level(&neutral, &body);
     let glints = neutral.zip_map(&level, |light, level| (light - level).max(0.0));
-    let glints = glints.zip_map(cut_out, |excess, film| glint(excess, film));
+    let glints = glints.zip_map(cut_out, glint);
     body.zip_map(&glints, |body, glint| SurfaceTexel { body, glint })
 }
 

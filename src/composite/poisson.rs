@@ -214,7 +214,7 @@ mod tests {
         for k in 0..10 {
             let expected = 0.8 + first * root.powi(k);
             let found = f64::from(out[(20 + k as usize, 15)].g);
-            assert!((found - expected).abs() < 2e-3, "{k}: {found} {expected}");
+            assert!((found - expected).abs() < 4e-3, "{k}: {found} {expected}");
         }
         assert!((out[(30, 15)].g - 0.8).abs() < 5e-3);
     }
