@@ -14,7 +14,7 @@ use petcomp::dataset::{
 use petcomp::geom::BBox;
 use petcomp::geom::{Point2, Pose, UnitQuaternion, Vector2};
 use petcomp::label::{Labels, ObjectLabel, RleMask};
-use petcomp::scene::{CameraSource, Exposure, Grade, Object, Placement, Surface};
+use petcomp::scene::{CameraSource, EdgeTreatment, Exposure, Grade, Object, Placement, Surface};
 use petcomp::{Coverage, Error, Image, LinearRgb, ObjectId, PremulRgba, Result, Scene, io};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -39,6 +39,7 @@ fn scene(k: u64) -> Scene {
         ambient: LinearRgb::grey(0.1),
         environment: None,
         exposure: Exposure::default(),
+        edges: Default::default(),
         cast: Default::default(),
         view: Default::default(),
         finish: Default::default(),
@@ -622,6 +623,7 @@ fn with_a_card_up_at(k: u64, height: f64) -> Sample {
         mass: 0.03,
         placement,
         grade: Grade::default(),
+        bend: Default::default(),
     };
     let mut sample = sample(k).unwrap();
     let falls = |i: usize| {
@@ -1318,6 +1320,31 @@ fn write_world(folder: &Path) {
     .unwrap();
     let recipe = "backgrounds = 'photos'\n[scene]\nimage = [64, 48]\nenvironment = { files = ['sky.exr'] }\n";
     write("recipe.toml", recipe.into());
+}
+
+#[test]
+fn treated_edges_change_the_picture_and_no_label() {
+    let dir = tempfile::tempdir().unwrap();
+    write_world(dir.path());
+    let sample = |edges: &[EdgeTreatment], k: u64| {
+        let mut setup = DatasetConfig::read(dir.path().join("recipe.toml"), &[]).unwrap();
+        setup.scene.edges = edges.to_vec();
+        Pipeline::open(setup).unwrap().sample(1, k).unwrap()
+    };
+    for k in 0..3 {
+        let plain = sample(&[], k);
+        assert_eq!(sample(&[EdgeTreatment::AsIs], k).frame, plain.frame);
+        for edges in [
+            EdgeTreatment::Soft,
+            EdgeTreatment::Eroded,
+            EdgeTreatment::Poisson,
+        ] {
+            let treated = sample(&[edges], k);
+            assert_eq!(treated.labels, plain.labels, "{edges:?}");
+            assert_ne!(treated.frame, plain.frame, "{edges:?}");
+            assert_eq!(treated.provenance.unwrap().scene.edges, edges);
+        }
+    }
 }
 
 /// Replaces the first `from` in a file, which keeps its size if both are as long.

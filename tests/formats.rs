@@ -69,6 +69,8 @@ fn card(id: u32, center: [f64; 3], turn: f64, size: [f64; 2]) -> Card {
             .collect(),
         grade: Grade::default(),
         back: None,
+        bend: Default::default(),
+        surfaces: Default::default(),
     }
 }
 
@@ -117,6 +119,7 @@ fn sample_of(shot: Shot, options: &LabelOptions) -> Result<Sample> {
         exposure: Exposure::default(),
         cast: LightTint::default(),
         view: Default::default(),
+        edges: Default::default(),
         finish: PostProcess::default(),
         files: None,
         settings: Default::default(),

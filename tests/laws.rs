@@ -174,6 +174,7 @@ fn pile() -> Scene {
             rotation: UnitQuaternion::from_euler_angles(0.1, 0.05 * i as f64, 0.7 * i as f64),
         },
         grade: Default::default(),
+        bend: Default::default(),
     };
     Scene {
         objects: (0..8).map(card).collect(),

@@ -2,6 +2,7 @@
 
 use super::MANIFEST;
 use super::manifest::{Asset, Manifest, PhotoRecord, class_number};
+use super::surface::SurfaceCache;
 use super::texture::Texture;
 use crate::error::{Error, Result};
 use crate::geom::Point2;
@@ -28,6 +29,9 @@ pub struct Photo {
     pub texture: Texture,
     /// The object's convex hull in texture coordinates (0 to 1, right and down), in order.
     pub outline_uv: Arc<[Point2<f64>]>,
+    /// What its texels are of.
+    #[doc(hidden)]
+    pub surface: SurfaceCache,
     /// Its entry in the manifest.
     pub record: PhotoRecord,
 }
@@ -170,6 +174,7 @@ impl Photo {
         Self {
             outline_uv: texture_coordinates(&record.outline_px, texture.size()),
             texture,
+            surface: SurfaceCache::default(),
             record,
         }
     }

@@ -29,6 +29,7 @@ mod screen_pose;
 mod screen_source;
 mod size;
 mod spreadsheet;
+mod surface;
 mod texture;
 mod thumbnail;
 mod top_view;
@@ -56,6 +57,8 @@ pub use panorama::Panorama;
 pub use role::Role;
 pub use scale::Scale;
 pub use screen_source::ScreenSource;
+#[doc(hidden)]
+pub use surface::{SurfaceCache, SurfaceTexel};
 pub use texture::Texture;
 
 /// Name of the manifest in an asset folder.

@@ -65,6 +65,14 @@ impl Texture {
         }
     }
 
+    /// The picture halved `level` times as film.
+    pub fn film_level(&self, level: usize) -> Image<Film> {
+        match self {
+            Self::Rgba(pyramid) => pyramid.level(level).map(Film::from),
+            Self::Film(pyramid) => pyramid.level(level).clone(),
+        }
+    }
+
     /// CRC-32 of the texels at full detail.
     pub fn checksum(&self) -> u32 {
         match self {

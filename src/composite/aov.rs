@@ -264,6 +264,8 @@ mod tests {
             back: None,
             outline_uv: std::sync::Arc::new([]),
             grade: Grade::default(),
+            bend: Default::default(),
+            surfaces: Default::default(),
         };
         Shot::new(camera)
             .with_card(card(3, 0.1, 0.5))

@@ -1,11 +1,12 @@
 //! The frame as a camera would have given it: blur and noise where there were none, white balance,
 //! exposure, sharpening.
 
+use crate::composite::poisson::blend;
 use crate::deep::DeepImage;
 use crate::filter::gaussian_blur;
 use crate::image::Image;
 use crate::pixel::{Film, LinearRgb, Mix, PremulRgba};
-use crate::scene::{Blur, CameraNoise, Noise, PostProcess};
+use crate::scene::{Blur, CameraNoise, EdgeTreatment, Noise, PostProcess};
 use crate::work::{self, Kind};
 use std::f64::consts::TAU;
 
@@ -30,9 +31,26 @@ pub fn finish(
     plate: Option<&Image<LinearRgb>>,
     finish: &PostProcess,
 ) -> Image<PremulRgba> {
+    finish_blended(frame, deep, plate, finish, EdgeTreatment::AsIs)
+}
+
+/// The same with objects blended into the plate where edges ask for it, which is after their blur
+/// and before all noise.
+pub fn finish_blended(
+    frame: Image<PremulRgba>,
+    deep: &DeepImage,
+    plate: Option<&Image<LinearRgb>>,
+    finish: &PostProcess,
+    edges: EdgeTreatment,
+) -> Image<PremulRgba> {
     let frame = match finish.blur_px {
         Blur::Known(sigma_px) if sigma_px > 0.0 => blur(&frame, deep, plate, sigma_px as f32),
         _ => frame,
+    };
+    let frame = if edges == EdgeTreatment::Poisson && plate.is_some() {
+        blend(&frame, deep)
+    } else {
+        frame
     };
     let noisy = match SensorNoise::of_cards(finish) {
         Some(noise) => noise.add_to(&frame, |at, p| seen_plate(deep, plate, at, p)),

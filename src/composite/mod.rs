@@ -20,6 +20,7 @@ mod cryptomatte;
 mod finish;
 mod frame;
 mod part;
+mod poisson;
 mod porter_duff;
 
 #[doc(hidden)]
@@ -27,6 +28,8 @@ pub use aov::{Aov, front, parts};
 #[doc(hidden)]
 pub use cryptomatte::cryptomatte;
 pub use finish::finish;
+#[doc(hidden)]
+pub use finish::finish_blended;
 #[doc(hidden)]
 pub use frame::film;
 pub use frame::{frame, picture};

@@ -19,7 +19,8 @@ use crate::light;
 use crate::pixel::{LinearRgb, PremulRgba};
 use crate::render::{self};
 use crate::scene::{
-    Appearance, AssetVariant, Background, CameraSource, Drawn, Draws, Scene, Shot, catalog, locate,
+    Appearance, AssetVariant, Background, CameraSource, Drawn, Draws, EdgeTreatment, Scene, Shot,
+    catalog, locate,
 };
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -252,7 +253,7 @@ impl Pipeline {
         let (resolved, settle) = timed(|| self.resolve_within(scene, allowance));
         let (scene, shot) = resolved?;
         let ((deep, frame), render) = timed(|| self.shoot(&scene, &shot));
-        let (labels, label) = timed(|| label::label(&deep, &shot, &self.config.labels.options()));
+        let (labels, label) = timed(|| self.label_shot(&deep, &shot));
         Ok(Sample {
             frame,
             deep,
@@ -268,6 +269,20 @@ impl Pipeline {
                 ..Times::default()
             },
         })
+    }
+
+    /// Labels of a shot with these deep samples, whatever becomes of its edges.
+    fn label_shot(&self, deep: &DeepImage, shot: &Shot) -> Labels {
+        let options = self.config.labels.options();
+        if !shot.edges.reshape_cut_outs() {
+            return label::label(deep, shot, &options);
+        }
+        let plain = Shot {
+            edges: EdgeTreatment::AsIs,
+            ..shot.clone()
+        };
+        let deep = render::render_coverage(&plain, &self.config.render);
+        label::label(&deep, &plain, &options)
     }
 
     /// Labels a scene without making its picture: nothing is lit, and neither plate nor environment
@@ -404,5 +419,6 @@ fn redraw_seed(seed: u64, k: u64, n: usize) -> u64 {
 
 fn finished_frame(deep: &DeepImage, scene: &Scene, shot: &Shot) -> Image<PremulRgba> {
     let plate = shot.plate.as_deref();
-    composite::finish(composite::frame(deep, plate), deep, plate, &scene.finish)
+    let frame = composite::frame(deep, plate);
+    composite::finish_blended(frame, deep, plate, &scene.finish, scene.edges)
 }

@@ -197,6 +197,7 @@ mod tests {
             ambient: LinearRgb::BLACK,
             environment: None,
             exposure: Default::default(),
+            edges: Default::default(),
             cast: Default::default(),
             view: Default::default(),
             finish: Default::default(),

@@ -113,9 +113,9 @@ fn bbox_of(rect: Rect<f64>) -> BBox {
 }
 
 fn in_camera(card: &Card, camera: &Camera) -> Vec<Vector3<f64>> {
-    card.outline_uv
-        .iter()
-        .map(|uv| (camera.camera_from_world * card.quad.point(uv.x, uv.y)).coords)
+    card.outline()
+        .into_iter()
+        .map(|point| (camera.camera_from_world * point).coords)
         .collect()
 }
 
@@ -219,6 +219,8 @@ mod tests {
             back: None,
             outline_uv: corners.iter().map(uv).collect::<Arc<[_]>>(),
             grade: Grade::default(),
+            bend: Default::default(),
+            surfaces: Default::default(),
         }
     }
 

@@ -113,6 +113,7 @@ mod tests {
             ambient: LinearRgb::grey(0.1),
             environment: None,
             exposure,
+            edges: Default::default(),
             cast: Default::default(),
             view: Default::default(),
             finish: Default::default(),

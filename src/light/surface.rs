@@ -104,6 +104,7 @@ pub(super) mod tests {
             ambient: LinearRgb::WHITE,
             environment: None,
             exposure: Exposure::Ev(0.0),
+            edges: Default::default(),
             cast,
             view: Default::default(),
             finish: Default::default(),

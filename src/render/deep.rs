@@ -7,12 +7,13 @@ use crate::image::Image;
 use crate::pixel::LinearRgb;
 use crate::render::RenderOptions;
 use crate::render::block::PixelBlock;
-
+use crate::render::detail::{detail_level, texels_per_pixel};
 use crate::render::irradiance::{IrradianceMap, irradiance_maps};
 use crate::render::lattice::Lattice;
 use crate::render::layers::{Layer, LayerStack, RenderedTile, SampleGrid, ShadowCatcher};
-use crate::render::pixel_filter::{filter_quantiles, residual_sigma};
+use crate::render::pixel_filter::filter_quantiles;
 use crate::render::receiver::{LightingContext, ReceiverIrradiance};
+use crate::render::retouch::retouched;
 use crate::render::texture::BakedTexture;
 use crate::render::view::{
     CameraView, ProjectedPlane, ScenePlane, rows_and_columns, visible_planes,
@@ -24,9 +25,6 @@ use std::ops::Range;
 
 /// Side of the blocks that the picture is put together from.
 const TILE_SIDE_PX: usize = 32;
-
-/// Sub-samples a side from which on a sharper level of detail pays.
-const DENSE_SUBSAMPLES: usize = 4;
 
 /// Renders a shot: per pixel and card, its light and its coverage; per pixel, what shadows leave of
 /// the plate.
@@ -44,6 +42,7 @@ const DENSE_SUBSAMPLES: usize = 4;
 /// over. Cards are ordered by depth block by block; blocks in which they cross are split.
 pub fn render(shot: &Shot, options: &RenderOptions) -> DeepImage {
     let options = options.clamped();
+    let shot = &*retouched(shot, &options);
     let view = CameraView::from_camera(&shot.camera);
     let tiles = PixelBlock::tiles_of(view.width, view.height, TILE_SIDE_PX);
     let stack = layer_stack(shot, &view, &options);
@@ -169,7 +168,8 @@ impl<'a> ProjectedCard<'a> {
         }
         work::add(Kind::Bakes, 1);
         let (projected, texture) = visible_side(card, plane, projected, &view.eye);
-        let level = detail_level(texture, plane, &projected, view, offsets);
+        let texels = texels_per_pixel(texture, plane, &projected, view, &plane.center);
+        let level = detail_level(texels, offsets);
         let texture = BakedTexture::new(texture, &card.grade, level);
         let (rows, columns) = rows_and_columns(plane, texture.grid.reach, view);
         Some(Self {
@@ -204,35 +204,6 @@ fn visible_side<'a>(
     match &card.back {
         Some(back) if plane.is_seen_from_behind(eye) => (projected.mirrored(), back),
         _ => (projected, &card.texture),
-    }
-}
-
-/// Level of detail by matching variance: what sub-samples leave of the pixel's window, the
-/// texture's own filter covers.
-///
-/// A level read bilinearly has variance `4^level / 4` texels.
-fn detail_level(
-    texture: &Texture,
-    plane: &ScenePlane,
-    projected: &ProjectedPlane,
-    view: &CameraView,
-    offsets: &[f64],
-) -> f64 {
-    let (width, height) = texture.size();
-    let texels = (width * height) as f64;
-    let per_pixel = projected.cell_metres(view, &plane.center)
-        * (texels / (plane.size[0] * plane.size[1])).sqrt();
-    let level = libm::log2(2.0 * residual_sigma(offsets) * per_pixel) - sharpening(offsets.len());
-    // A NaN from a card that fills the horizon reads the full texture.
-    level.clamp(0.0, 32.0).max(0.0)
-}
-
-/// How much sharper a level many sub-samples a side read.
-fn sharpening(subsamples: usize) -> f64 {
-    if subsamples >= DENSE_SUBSAMPLES {
-        0.25
-    } else {
-        0.0
     }
 }
 

@@ -63,16 +63,26 @@ impl LightSamples {
         point: &Vector3<f64>,
         normal: &Vector3<f64>,
     ) -> Self {
-        let (count, point) = (options.light_samples, (*point).into());
-        let faces = shot
-            .lights
-            .iter()
-            .map(|l| LightGroup::area_light(l, light::nodes_above(l, count, point, normal)));
+        let faces = Self::faces_above(shot, options, point, normal);
         let shining = shot.environment.iter().filter(|map| map.strength != 0.0);
         let pieces =
             shining.flat_map(|map| light::sky_pieces(map, options.ambient_samples, normal));
         let ambient = LightGroup::constant(shot, options, normal);
-        Self::from_parts(faces, ambient, pieces)
+        Self::from_parts(faces.into_iter(), ambient, pieces)
+    }
+
+    /// The area lights of it alone.
+    pub(super) fn faces_above(
+        shot: &Shot,
+        options: &RenderOptions,
+        point: &Vector3<f64>,
+        normal: &Vector3<f64>,
+    ) -> Vec<LightGroup> {
+        let (count, point) = (options.light_samples, (*point).into());
+        let lights = shot.lights.iter();
+        lights
+            .map(|l| LightGroup::area_light(l, light::nodes_above(l, count, point, normal)))
+            .collect()
     }
 
     /// The same for a plain quadrature: whole lights, and the map in even rectangles.

@@ -32,6 +32,7 @@ mod block;
 mod check;
 mod cryptomatte;
 mod deep;
+mod detail;
 mod float4;
 mod grade;
 mod half_plane;
@@ -48,6 +49,7 @@ mod ranges;
 mod receiver;
 mod reference;
 mod resample;
+mod retouch;
 mod shadow;
 mod shadow_ray;
 #[cfg(test)]
@@ -67,6 +69,8 @@ pub use interreflection::interreflect;
 pub use options::RenderOptions;
 #[doc(hidden)]
 pub use reference::render_reference;
+#[doc(hidden)]
+pub use retouch::retouched_fully;
 
 /// Fills a buffer with `n` times a value; it keeps its memory.
 #[inline]

@@ -10,6 +10,7 @@ use crate::render::RenderOptions;
 use crate::render::grade::{channel_mean, graded_opacity};
 use crate::render::light_samples::{LightGroup, LightSample, LightSamples, SampleKind};
 use crate::render::pixel_filter::filter_quantiles;
+use crate::render::retouch::retouched_fully;
 use crate::render::view::{CameraView, ProjectedPlane, ScenePlane, is_on_texture, visible_planes};
 use crate::scene::{Card, Shot};
 use rayon::prelude::*;
@@ -23,6 +24,7 @@ use std::f32::consts::PI;
 /// definition falls with the numbers in `options`.
 pub fn render_reference(shot: &Shot, options: &RenderOptions) -> DeepImage {
     let options = options.clamped();
+    let shot = &*retouched_fully(shot, &options);
     let world = ReferenceWorld::new(shot, &options);
     let (lists, shadow) = world.render_pixels(&filter_quantiles(options.subsamples));
     let tints = if world.tinted {

@@ -160,6 +160,8 @@ mod tests {
             back: None,
             outline_uv: Arc::new([]),
             grade: Grade::default(),
+            bend: Default::default(),
+            surfaces: Default::default(),
         };
         Shot::new(camera())
             .with_light(light())

@@ -110,6 +110,7 @@ mod tests {
             hue_deg: 40.0,
             saturation: 0.8,
             value: 1.2,
+            ..Grade::default()
         };
         let (a, b) = (
             BakedTexture::new(&alpha, &grade, 0.6),

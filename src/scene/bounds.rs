@@ -18,6 +18,10 @@ pub(super) const TILT: Bounds = Bounds::new(-180.0, 180.0, "degrees");
 pub(super) const ACROSS: Bounds = Bounds::new(-1.0, 1.0, "the walls");
 pub(super) const GAP: Bounds = Bounds::metres(1e-6, 1.0, "objects are stacked before they fall");
 pub(super) const GRADE: Bounds = Bounds::new(0.0, 100.0, "a factor");
+pub(super) const WEIGHT: Bounds = Bounds::new(0.0, 1e6, "how likely beside the others");
+/// Degrees that a card turns from one end to the other. Beyond 60 it hides parts of itself from a
+/// camera that looks down on it by 45 degrees, and its body would no longer fall as a flat one.
+pub(super) const BEND: Bounds = Bounds::new(-60.0, 60.0, "degrees from end to end");
 pub(super) const LIGHT_HEIGHT: Bounds =
     Bounds::metres(0.001, 1000.0, "farther off a light is a sun");
 pub(super) const LIGHT_OFFSET: Bounds = Bounds::metres(0.0, 1000.0, "farther off a light is a sun");

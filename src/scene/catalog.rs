@@ -66,17 +66,19 @@ impl Appearance {
         let asset = library.find(&object.asset)?;
         let photo = asset.photos.get(object.photo)?;
         let back = match object.back {
-            Some(i) => Some(asset.photos.get(i)?.texture.clone()),
+            Some(i) => Some(asset.photos.get(i)?),
             None => None,
         };
+        let surfaces = [Some(photo), back].map(|photo| photo.map(|photo| photo.surface.clone()));
         Some(Self {
             class: match object.role {
                 Role::Object => library.class_number(asset),
                 Role::Distractor => None,
             },
             texture: photo.texture.clone(),
-            back,
+            back: back.map(|photo| photo.texture.clone()),
             outline_uv: photo.outline_uv.clone(),
+            surfaces: surfaces.map(Option::unwrap_or_default),
         })
     }
 }

@@ -214,13 +214,16 @@ fn check_object(object: &Object, at: &str) -> Result<()> {
     check_outline(&object.outline, object.size, &field(at, "outline"))?;
     MASS.check(&field(at, "mass"), object.mass)?;
     check_grade(&object.grade, &field(at, "grade"))?;
+    object.bend.check(&field(at, "bend"))?;
     check_placement(&object.placement, &field(at, "placement"))
 }
 
 fn check_grade(grade: &Grade, at: &str) -> Result<()> {
     TURN.check(&field(at, "hue_deg"), grade.hue_deg.into())?;
     GRADE.check(&field(at, "saturation"), grade.saturation.into())?;
-    GRADE.check(&field(at, "value"), grade.value.into())
+    GRADE.check(&field(at, "value"), grade.value.into())?;
+    GRADE.check(&field(at, "glints"), grade.glints.into())?;
+    grade.check_tint(&field(at, "tint"))
 }
 
 fn check_placement(placement: &Placement, at: &str) -> Result<()> {
@@ -289,6 +292,7 @@ mod tests {
             mass: 0.03,
             placement: Placement::At(Pose::translation(0.1, 0.0, 0.01)),
             grade: Grade::default(),
+            bend: Default::default(),
         };
         let falling = Placement::Drop {
             above: [0.0; 2],
@@ -323,6 +327,7 @@ mod tests {
             ambient: LinearRgb::grey(0.5),
             environment: None,
             exposure: Exposure::MatchPlate { gain_ev: 0.25 },
+            edges: Default::default(),
             cast: Default::default(),
             view: Default::default(),
             finish: Default::default(),

@@ -65,6 +65,7 @@ mod tests {
             ambient: LinearRgb::BLACK,
             environment: None,
             exposure: Exposure::default(),
+            edges: Default::default(),
             cast: Default::default(),
             view: Default::default(),
             finish: Default::default(),

@@ -38,6 +38,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod bend;
 pub(crate) mod bounds;
 mod catalog;
 mod check;
@@ -45,6 +46,7 @@ mod count;
 #[doc(hidden)]
 pub mod cycles;
 mod draw;
+mod edges;
 mod environment;
 mod fall;
 mod files;
@@ -52,6 +54,7 @@ mod holdout;
 mod hull;
 mod light;
 mod locate;
+mod palette;
 mod placement;
 mod post_process;
 mod range;
@@ -65,6 +68,9 @@ mod variation;
 mod view;
 mod wall;
 
+#[doc(hidden)]
+pub use bend::Bend;
+pub(crate) use bend::Cylinder;
 pub use catalog::Background;
 #[doc(hidden)]
 pub use catalog::{AssetVariant, catalog};
@@ -73,6 +79,8 @@ pub use count::Count;
 pub use draw::Distribution;
 #[doc(hidden)]
 pub use draw::{DrawLog, Drawn, Draws};
+#[doc(hidden)]
+pub use edges::EdgeTreatment;
 #[doc(hidden)]
 pub use environment::EnvironmentRanges;
 pub(crate) use environment::turned;
@@ -88,6 +96,8 @@ pub use files::{SceneFiles, SceneSettings};
 pub(crate) use hull::doubled_area;
 pub use light::{AreaLight, Exposure, LightShape, LightTint};
 pub use locate::locate;
+#[doc(hidden)]
+pub use palette::{PaletteColor, PaletteEntry, PlasticColor, WeightedColor};
 use placement::draw_paths;
 pub use placement::{Grade, Object, Placement};
 #[doc(hidden)]
@@ -150,6 +160,9 @@ pub struct Scene {
     /// bring their own.
     #[serde(default, skip_serializing_if = "LightTint::is_white")]
     pub cast: LightTint,
+    /// How the edges of cut-outs are treated.
+    #[serde(default, skip_serializing_if = "EdgeTreatment::are_as_is")]
+    pub edges: EdgeTreatment,
     /// What happens to the finished frame.
     #[serde(default, skip_serializing_if = "PostProcess::is_identity")]
     pub finish: PostProcess,
@@ -172,6 +185,7 @@ impl Scene {
             environment: None,
             exposure: Exposure::Ev(0.0),
             cast: LightTint::default(),
+            edges: EdgeTreatment::AsIs,
             finish: PostProcess::default(),
             ..self
         }

@@ -1,7 +1,11 @@
 //! Objects and where they are.
 
 use crate::asset::Role;
+use crate::error::Result;
 use crate::geom::{Pose, UnitQuaternion};
+use crate::pixel::LinearRgb;
+use crate::scene::Bend;
+use crate::scene::palette::check_tint;
 use serde::{Deserialize, Serialize};
 
 /// One occurrence of an asset in a scene.
@@ -35,6 +39,9 @@ pub struct Object {
     /// Change of its colours.
     #[serde(default)]
     pub grade: Grade,
+    /// How its card is curved; its body falls as a flat one.
+    #[serde(default, skip_serializing_if = "Bend::is_flat")]
+    pub bend: Bend,
 }
 
 impl Object {
@@ -84,8 +91,8 @@ pub enum Placement {
     Gone,
 }
 
-/// A change of colour in hue, saturation and value of the linear colour; the default changes
-/// nothing.
+/// A change of colour: a dye in what is see-through, the strength of glints, then hue, saturation
+/// and value of the linear colour; the default changes nothing.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Grade {
@@ -95,6 +102,33 @@ pub struct Grade {
     pub saturation: f32,
     /// Value times this. Default: 1.
     pub value: f32,
+    /// Transmittance of a dye in see-through plastic, on top of its own colour. Default: 1, 1, 1.
+    #[serde(skip_serializing_if = "is_white")]
+    pub tint: LinearRgb,
+    /// Glints of the studio's light times this. Default: 1.
+    #[serde(skip_serializing_if = "is_one")]
+    pub glints: f32,
+}
+
+fn is_white(tint: &LinearRgb) -> bool {
+    *tint == LinearRgb::WHITE
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "as serde calls it")]
+fn is_one(factor: &f32) -> bool {
+    *factor == 1.0
+}
+
+impl Grade {
+    /// Whether plastic is dyed or glints are changed.
+    pub fn changes_surface(&self) -> bool {
+        !is_white(&self.tint) || !is_one(&self.glints)
+    }
+
+    /// Fails on a dye that gives light.
+    pub(super) fn check_tint(&self, at: &str) -> Result<()> {
+        check_tint(self.tint, at)
+    }
 }
 
 impl Default for Grade {
@@ -103,6 +137,8 @@ impl Default for Grade {
             hue_deg: 0.0,
             saturation: 1.0,
             value: 1.0,
+            tint: LinearRgb::WHITE,
+            glints: 1.0,
         }
     }
 }

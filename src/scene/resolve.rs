@@ -1,6 +1,6 @@
 //! From a scene with nothing unknown to a shot.
 
-use crate::asset::{Panorama, Texture};
+use crate::asset::{Panorama, SurfaceCache, Texture};
 use crate::camera::Camera;
 use crate::error::{Error, Result};
 use crate::geom::{Point2, Pose, Quad};
@@ -27,6 +27,9 @@ pub struct Appearance {
     pub back: Option<Texture>,
     /// Its outline in texture coordinates (0 to 1, right and down), in order.
     pub outline_uv: Arc<[Point2<f64>]>,
+    /// What the texels of its front and of its back are of.
+    #[doc(hidden)]
+    pub surfaces: [SurfaceCache; 2],
 }
 
 impl Appearance {
@@ -43,6 +46,8 @@ impl Appearance {
             back: self.back,
             outline_uv: self.outline_uv,
             grade: object.grade,
+            bend: object.bend,
+            surfaces: self.surfaces,
         }
     }
 }
@@ -84,6 +89,7 @@ impl Scene {
             ambient: self.ambient * cast,
             environment: self.environment_map(panorama)?,
             exposure,
+            edges: self.edges,
         })
     }
 
@@ -246,6 +252,7 @@ mod tests {
             mass: 0.03,
             placement: Placement::At(Pose::translation(0.1, 0.0, 0.01)),
             grade: Grade::default(),
+            bend: Default::default(),
         };
         Scene {
             image: [8, 6],
@@ -257,6 +264,7 @@ mod tests {
             ambient: LinearRgb::WHITE,
             environment: None,
             exposure: Exposure::Ev(1.0),
+            edges: Default::default(),
             cast: Default::default(),
             view: Default::default(),
             finish: Default::default(),
@@ -273,6 +281,7 @@ mod tests {
             texture,
             back: None,
             outline_uv,
+            surfaces: Default::default(),
         })
     }
 

@@ -1,12 +1,12 @@
 //! A scene with nothing left to find out: what the renderer takes.
 
-use crate::asset::Texture;
+use crate::asset::{SurfaceCache, Texture};
 use crate::camera::Camera;
 use crate::deep::HoldoutSample;
 use crate::geom::{Point2, Quad};
 use crate::image::Image;
 use crate::pixel::{LinearRgb, ObjectId};
-use crate::scene::{AreaLight, EnvironmentMap, Grade};
+use crate::scene::{AreaLight, Bend, EdgeTreatment, EnvironmentMap, Grade};
 use std::sync::Arc;
 
 /// Everything a picture is made of, in memory and known.
@@ -34,9 +34,11 @@ pub struct Shot {
     /// What of the place stands in front of objects, of the picture's size; none where nothing
     /// does.
     pub holdout: Option<Arc<Image<HoldoutSample>>>,
+    /// How the edges of cards are treated; labels are made from those that are left as they are.
+    pub edges: EdgeTreatment,
 }
 
-/// A flat, textured, see-through object in space.
+/// A textured, see-through object in space, flat or curved.
 #[derive(Clone, Debug)]
 pub struct Card {
     /// Its name in labels; not 0.
@@ -56,6 +58,11 @@ pub struct Card {
     pub outline_uv: Arc<[Point2<f64>]>,
     /// Change of its colours.
     pub grade: Grade,
+    /// How it is curved.
+    pub bend: Bend,
+    /// What the texels of its front and of its back are of.
+    #[doc(hidden)]
+    pub surfaces: [SurfaceCache; 2],
 }
 
 impl Card {
@@ -70,6 +77,8 @@ impl Card {
             back: None,
             outline_uv: corners.map(Point2::from).into(),
             grade: Grade::default(),
+            bend: Bend::FLAT,
+            surfaces: Default::default(),
         }
     }
 }
@@ -97,6 +106,7 @@ impl Shot {
             environment: None,
             exposure: 1.0,
             holdout: None,
+            edges: EdgeTreatment::AsIs,
         }
     }
 

@@ -300,6 +300,7 @@ mod tests {
             mass: 0.03,
             placement,
             grade: Grade::default(),
+            bend: Default::default(),
         };
         (0..n).map(card).collect()
     }

@@ -48,6 +48,8 @@ fn card(id: u32) -> Card {
             .map(|i| Point2::new(0.5 + 0.5 * angle(i).cos(), 0.5 + 0.5 * angle(i).sin()))
             .collect(),
         grade: Grade::default(),
+        bend: Default::default(),
+        surfaces: Default::default(),
     }
 }
 

@@ -87,7 +87,10 @@ fn shot() -> Shot {
                 hue_deg: 7.0 * k as f32,
                 saturation: 0.9,
                 value: 1.1,
+                ..Grade::default()
             },
+            bend: Default::default(),
+            surfaces: Default::default(),
         })
     })
 }

@@ -88,7 +88,8 @@ fn export_scene(args: &ExportSceneArgs, global: &GlobalArgs) -> anyhow::Result<(
     let (scene, shot) = pipeline
         .resolve(scene)
         .map_err(|e| e.in_file(&args.scene))?;
-    cycles::export(&shot, scene.surface.size, &args.folder)?;
+    let retouched = petcomp::render::retouched_fully(&shot, &pipeline.config().render);
+    cycles::export(&retouched, scene.surface.size, &args.folder)?;
     let cards = shot.cards.len();
     global.print_written(&args.folder, format_args!("{cards} cards; render it with"));
     global.print_status(format_args!("  {}", blender_command(&args.folder)));

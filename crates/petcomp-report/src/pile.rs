@@ -76,6 +76,8 @@ fn bottle_card(k: u32, textures: &[Texture]) -> Card {
         back: None,
         outline_uv: whole_card_uv(),
         grade: Grade::default(),
+        bend: Default::default(),
+        surfaces: Default::default(),
     }
 }
 

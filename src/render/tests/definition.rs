@@ -71,6 +71,8 @@ fn card(
         back: None,
         outline_uv: Arc::new([]),
         grade: Grade::default(),
+        bend: Default::default(),
+        surfaces: Default::default(),
     }
 }
 

@@ -81,6 +81,7 @@ impl CyclesQuad {
             hue_deg: self.hue_shift,
             saturation: self.saturation,
             value: self.value,
+            ..Grade::default()
         }
     }
 }

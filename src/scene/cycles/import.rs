@@ -327,7 +327,10 @@ mod tests {
                 hue_deg: 10.0,
                 saturation: 0.75,
                 value: 1.5,
+                ..Grade::default()
             },
+            bend: Default::default(),
+            surfaces: Default::default(),
         };
         let light = AreaLight {
             shape: LightShape::Ellipse,

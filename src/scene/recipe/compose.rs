@@ -1,12 +1,13 @@
 //! One scene of a recipe: what is drawn, in which order.
 
+use super::is_flat;
 use crate::color::Albedo;
 use crate::error::{Error, Result};
 use crate::pixel::LinearRgb;
 use crate::scene::stack::DropColumn;
 use crate::scene::{
-    AreaLight, AssetVariant, Background, DrawLog, Draws, Exposure, Grade, LightTint, Object, Range,
-    Recipe, Scene, SceneSettings, Surface, draw_paths,
+    AreaLight, AssetVariant, Background, Bend, DrawLog, Draws, EdgeTreatment, Exposure, LightTint,
+    Object, Range, Recipe, Scene, SceneSettings, Surface, draw_paths,
 };
 use std::f64::consts::PI;
 
@@ -90,6 +91,7 @@ impl Recipe {
             environment: self.environment.draw(draws),
             exposure: self.exposure(background, self.gain_ev.draw(draws, "gain_ev")),
             cast: self.cast(background),
+            edges: EdgeTreatment::draw(&self.edges, draws),
             finish: self.finish.draw(draws),
             files: None,
             settings: SceneSettings::default(),
@@ -152,15 +154,18 @@ impl Recipe {
     /// Gives an object its scale and its colours.
     fn vary_object(&self, object: &mut Object, draws: &Draws, path: &str) {
         object.scale_by(self.scale.draw_field(draws, path, "scale"));
-        object.grade = self.draw_grade(draws, path);
+        object.grade = self.grade.draw(draws, &format!("{path}.grade"));
+        object.bend = self.draw_bend(draws, &format!("{path}.bend"));
     }
 
-    fn draw_grade(&self, draws: &Draws, path: &str) -> Grade {
-        let (grade, path) = (&self.grade, format!("{path}.grade"));
-        Grade {
-            hue_deg: grade.hue_deg.draw_field(draws, &path, "hue_deg") as f32,
-            saturation: grade.saturation.draw_field(draws, &path, "saturation") as f32,
-            value: grade.value.draw_field(draws, &path, "value") as f32,
+    /// A bend about an axis of any direction; flat, and nothing drawn, where the range is 0.
+    fn draw_bend(&self, draws: &Draws, path: &str) -> Bend {
+        if is_flat(&self.bend_deg) {
+            return Bend::FLAT;
+        }
+        Bend {
+            deg: self.bend_deg.draw_field(draws, path, "deg"),
+            axis_deg: Range::new(0.0, 180.0).draw_field(draws, path, "axis_deg"),
         }
     }
 }

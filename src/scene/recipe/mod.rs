@@ -11,16 +11,20 @@ pub use selection::{Collider, Selections};
 use crate::bounds::Bounds;
 use crate::color::Albedo;
 use crate::error::{Error, Result};
-use crate::scene::bounds::{EV, FRICTION, MAX_LIGHTS, MAX_OBJECTS, RADIANCE, SCALE, SHARE};
+use crate::scene::bounds::{BEND, EV, FRICTION, MAX_LIGHTS, MAX_OBJECTS, RADIANCE, SCALE, SHARE};
 use crate::scene::check::{check_albedo, check_cast, check_count, check_each, check_image};
 use crate::scene::stack::too_large;
 use crate::scene::{
-    AssetVariant, Background, Count, DrawLog, Drawn, DropRanges, EnvironmentRanges, LightTint,
-    PostProcessRanges, Range, Scene, SettleOptions, Surface, Take, Variation, ViewRanges,
-    WallRanges,
+    AssetVariant, Background, Count, DrawLog, Drawn, DropRanges, EdgeTreatment, EnvironmentRanges,
+    LightTint, PostProcessRanges, Range, Scene, SettleOptions, Surface, Take, Variation,
+    ViewRanges, WallRanges,
 };
 use compose::{Places, SceneNumber};
 use serde::{Deserialize, Serialize};
+
+fn is_flat(bend_deg: &Range) -> bool {
+    *bend_deg == Range::fixed(0.0)
+}
 
 const OBJECT_COUNT: Bounds = Bounds::new(0.0, MAX_OBJECTS as f64, "what comes to rest in a heap");
 
@@ -65,6 +69,12 @@ pub struct Recipe {
     pub start: DropRanges,
     /// Change of an object's colours.
     pub grade: GradeRanges,
+    /// Degrees that an object's card is curved by from one end to the other, about an axis of any
+    /// direction in it; above 0 its ends are nearer to whoever looks at its front. Default: 0.
+    pub bend_deg: Range,
+    /// Treatments of the edges of cut-outs, one of them for each picture. Default: none, they are
+    /// left as they are.
+    pub edges: Vec<EdgeTreatment>,
     /// Lights; `lights = []` makes scenes without shadows. Default: one.
     pub lights: Vec<LightRanges>,
     /// Irradiance of the constant environment on the surface, as a share of what the lights give
@@ -113,6 +123,8 @@ impl Default for Recipe {
             scale: Range::new(0.9, 1.1),
             start: DropRanges::default(),
             grade: GradeRanges::default(),
+            bend_deg: Range::fixed(0.0),
+            edges: Vec::new(),
             lights: vec![LightRanges::default()],
             ambient: Range::new(0.3, 0.8),
             environment: EnvironmentRanges::default(),
@@ -234,6 +246,7 @@ impl Recipe {
         SHARE.check("negatives", self.negatives)?;
         self.scale.check("scale", &SCALE)?;
         self.start.check()?;
+        self.bend_deg.check("bend_deg", &BEND)?;
         self.grade.check("grade")
     }
 

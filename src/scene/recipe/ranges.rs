@@ -6,11 +6,12 @@ use crate::error::Result;
 use crate::pixel::LinearRgb;
 use crate::scene::bounds::{GRADE, KELVIN, LIGHT_HEIGHT, LIGHT_OFFSET, LIGHT_SIZE, RADIANCE, TURN};
 use crate::scene::check::check_each;
-use crate::scene::{AreaLight, Draws, LightShape, Range};
+use crate::scene::palette::{PaletteEntry, check_palette, draw_tint};
+use crate::scene::{AreaLight, Draws, Grade, LightShape, Range};
 use serde::{Deserialize, Serialize};
 
 /// Change of an object's colours, see [`Grade`](crate::scene::Grade).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct GradeRanges {
     /// Degrees. Default: `[-20, 20]`.
@@ -19,6 +20,15 @@ pub struct GradeRanges {
     pub saturation: Range,
     /// Factor. Default: `[0.8, 1.2]`.
     pub value: Range,
+    /// Colours of see-through plastic to choose from in place of a turn of the hue; they are dyes
+    /// on top of the plastic's own colour. Default: none.
+    pub palette: Vec<PaletteEntry>,
+    /// Factor on the glints of the studio's light. Default: 1.
+    pub glints: Range,
+}
+
+fn are_unchanged(glints: &Range) -> bool {
+    *glints == Range::fixed(1.0)
 }
 
 /// An area light that faces the centre of the surface.
@@ -51,6 +61,8 @@ impl Default for GradeRanges {
             hue_deg: Range::new(-20.0, 20.0),
             saturation: Range::new(0.8, 1.2),
             value: Range::new(0.8, 1.2),
+            palette: Vec::new(),
+            glints: Range::fixed(1.0),
         }
     }
 }
@@ -76,12 +88,44 @@ impl GradeRanges {
         hue_deg: Range::fixed(0.0),
         saturation: Range::fixed(1.0),
         value: Range::fixed(1.0),
+        palette: Vec::new(),
+        glints: Range::fixed(1.0),
     };
+
+    /// The change of an object at a path.
+    pub(super) fn draw(&self, draws: &Draws, path: &str) -> Grade {
+        Grade {
+            hue_deg: self.draw_hue(draws, path) as f32,
+            saturation: self.saturation.draw_field(draws, path, "saturation") as f32,
+            value: self.value.draw_field(draws, path, "value") as f32,
+            tint: draw_tint(&self.palette, draws, &format!("{path}.palette")),
+            glints: self.draw_glints(draws, path) as f32,
+        }
+    }
+
+    /// Degrees; none where there is a palette.
+    fn draw_hue(&self, draws: &Draws, path: &str) -> f64 {
+        if self.palette.is_empty() {
+            self.hue_deg.draw_field(draws, path, "hue_deg")
+        } else {
+            0.0
+        }
+    }
+
+    fn draw_glints(&self, draws: &Draws, path: &str) -> f64 {
+        if are_unchanged(&self.glints) {
+            1.0
+        } else {
+            self.glints.draw_field(draws, path, "glints")
+        }
+    }
 
     pub(super) fn check(&self, at: &str) -> Result<()> {
         self.hue_deg.check(&format!("{at}.hue_deg"), &TURN)?;
         self.saturation.check(&format!("{at}.saturation"), &GRADE)?;
-        self.value.check(&format!("{at}.value"), &GRADE)
+        self.value.check(&format!("{at}.value"), &GRADE)?;
+        self.glints.check(&format!("{at}.glints"), &GRADE)?;
+        check_palette(&self.palette, &format!("{at}.palette"))
     }
 }
 

@@ -233,6 +233,7 @@ impl AssetVariant {
             mass: self.mass,
             placement: DropRanges::unplaced(),
             grade: Grade::default(),
+            bend: Default::default(),
         })
     }
 

@@ -2,7 +2,9 @@ use super::*;
 use crate::asset::Role;
 use crate::color::Albedo;
 use crate::pixel::LinearRgb;
-use crate::scene::{AssetVariant, Background, CameraSource, Exposure, Object, Placement, Wall};
+use crate::scene::{
+    AssetVariant, Background, Bend, CameraSource, Exposure, GradeRanges, Object, Placement, Wall,
+};
 use std::collections::BTreeSet;
 use std::f64::consts::PI;
 
@@ -640,4 +642,79 @@ fn labelled_walls_are_those_of_the_scene() {
     };
     let scene = Recipe::default().scene(7, 0, &[labelled], &catalog(10));
     assert_eq!(scene.unwrap().surface.wall, Some(wall));
+}
+
+/// A recipe with everything that is made of a photo beyond its cut-out.
+fn retouching() -> Recipe {
+    let text = "bend_deg = [-20, 20]\nedges = ['as_is', 'soft', 'eroded', 'poisson']\n\
+                [grade]\nhue_deg = 0\nglints = [0.2, 0.9]\npalette = ['clear', 'light_blue', 'green', 'brown']";
+    toml::from_str(text).unwrap()
+}
+
+#[test]
+fn what_retouches_photos_is_drawn_for_each_object_and_changes_nothing_else() {
+    let plain = Recipe {
+        grade: GradeRanges {
+            hue_deg: Range::fixed(0.0),
+            ..GradeRanges::default()
+        },
+        ..Recipe::default()
+    };
+    let (mut tints, mut edges) = (BTreeSet::new(), BTreeSet::new());
+    for k in 0..40 {
+        let mut retouched = scene(&retouching(), k);
+        edges.insert(format!("{:?}", std::mem::take(&mut retouched.edges)));
+        for object in &mut retouched.objects {
+            let grade = &mut object.grade;
+            tints.insert(grade.tint.channels().map(f32::to_bits));
+            assert!((0.2..0.9).contains(&grade.glints) && grade.hue_deg == 0.0);
+            assert!(object.bend.deg.abs() <= 20.0 && !object.bend.is_flat());
+            (grade.tint, grade.glints) = (LinearRgb::WHITE, 1.0);
+            object.bend = Bend::FLAT;
+        }
+        assert_eq!(retouched, scene(&plain, k));
+    }
+    assert_eq!((tints.len(), edges.len()), (4, 4));
+}
+
+#[test]
+fn nothing_is_drawn_or_written_of_retouching_where_it_is_not_asked_for() {
+    let (drawn, draws) = Recipe::default()
+        .explained(7, 3, &[tray("a")], &catalog(10))
+        .unwrap();
+    let new = ["palette", "glints", "bend", "edges"];
+    assert!(
+        draws
+            .iter()
+            .all(|d| !new.iter().any(|name| d.path.contains(name)))
+    );
+    let written = toml::to_string(&drawn).unwrap();
+    assert!(!written.contains("tint") && !new.iter().any(|name| written.contains(name)));
+    let text = toml::to_string(&scene(&retouching(), 3)).unwrap();
+    assert_eq!(
+        toml::from_str::<Scene>(&text).unwrap(),
+        scene(&retouching(), 3)
+    );
+}
+
+#[test]
+fn retouching_that_no_photo_bears_is_refused() {
+    let refused = |text: &str| {
+        let recipe: Recipe = toml::from_str(text).unwrap();
+        recipe.check().unwrap_err().to_string()
+    };
+    assert!(refused("bend_deg = [0, 90]").starts_with("bend_deg: [0, 90], expected"));
+    assert!(refused("grade.glints = -1").starts_with("grade.glints: -1, expected"));
+    assert!(
+        refused("grade.palette = [[2, 0, 0]]").starts_with("grade.palette[0]: [2.0, 0.0, 0.0]")
+    );
+    let unknown = toml::from_str::<Recipe>("edges = ['sharp']").unwrap_err();
+    assert!(unknown.to_string().contains("as_is"), "{unknown}");
+    let mut bad = scene(&retouching(), 0);
+    bad.objects[0].bend.deg = f64::NAN;
+    let reported = bad.check().unwrap_err().to_string();
+    assert!(
+        reported.starts_with("objects[0].bend.deg: NaN"),
+        "{reported}"
+    );
 }

@@ -140,6 +140,8 @@ impl Ellipse {
             back: None,
             outline_uv: turns.map(place_uv).collect(),
             grade: Grade::default(),
+            bend: Default::default(),
+            surfaces: Default::default(),
         })
     }
 

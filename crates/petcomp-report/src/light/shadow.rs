@@ -45,6 +45,8 @@ fn opaque_card() -> Card {
         back: None,
         outline_uv: [].into(),
         grade: Grade::default(),
+        bend: Default::default(),
+        surfaces: Default::default(),
     }
 }
 

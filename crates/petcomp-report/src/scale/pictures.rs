@@ -92,6 +92,7 @@ fn appearance(object: &Object, textures: &[Texture]) -> Appearance {
         texture: textures[object.photo % textures.len()].clone(),
         back: None,
         outline_uv: whole_card_uv(),
+        surfaces: Default::default(),
     }
 }
 
@@ -147,6 +148,7 @@ fn heap_scene(case: &ScaleCase) -> Scene {
         ambient: LinearRgb::grey(0.3),
         environment: None,
         exposure: Exposure::Ev(0.0),
+        edges: Default::default(),
         cast: Default::default(),
         view: Default::default(),
         finish: Default::default(),
@@ -179,7 +181,9 @@ fn heap_card(case: &ScaleCase, k: usize) -> Object {
             hue_deg: (7 * k % 60) as f32,
             saturation: 0.9,
             value: 1.1,
+            ..Grade::default()
         },
+        bend: Default::default(),
     }
 }
 

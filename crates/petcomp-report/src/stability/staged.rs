@@ -71,6 +71,8 @@ pub(super) fn card(
         back: None,
         outline_uv: Arc::new(WHOLE.map(Point2::from)),
         grade: Grade::default(),
+        bend: Default::default(),
+        surfaces: Default::default(),
     }
 }
 
@@ -133,6 +135,7 @@ pub(super) fn empty_scene(camera: Camera) -> Scene {
         ambient: LinearRgb::BLACK,
         environment: None,
         exposure: Exposure::Ev(0.0),
+        edges: Default::default(),
         cast: Default::default(),
         view: Default::default(),
         finish: Default::default(),

@@ -112,6 +112,7 @@ impl FixtureFolder {
             ambient: LinearRgb::grey(0.3),
             environment: None,
             exposure: Exposure::Ev(0.0),
+            edges: Default::default(),
             cast: Default::default(),
             view: Default::default(),
             finish: Default::default(),
@@ -171,6 +172,7 @@ fn card_at_rest(asset: &str, k: usize) -> Object {
         mass: 0.02,
         placement: Placement::At(pose_at_rest(k)),
         grade: Grade::default(),
+        bend: Default::default(),
     }
 }
 

@@ -1,0 +1,43 @@
+//! At which level of detail a card's texture is read.
+
+use crate::asset::Texture;
+use crate::geom::Vector3;
+use crate::render::pixel_filter::residual_sigma;
+use crate::render::view::{CameraView, ProjectedPlane, ScenePlane};
+
+/// Sub-samples a side from which on a sharper level of detail pays.
+const DENSE_SUBSAMPLES: usize = 4;
+
+/// Level of detail by matching variance: what sub-samples leave of the pixel's window, the
+/// texture's own filter covers.
+///
+/// A level read bilinearly has variance `4^level / 4` texels.
+pub(super) fn detail_level(texels_per_pixel: f64, offsets: &[f64]) -> f64 {
+    let level = libm::log2(2.0 * residual_sigma(offsets) * texels_per_pixel);
+    // A NaN from a card that fills the horizon reads the full texture.
+    (level - sharpening(offsets.len()))
+        .clamp(0.0, 32.0)
+        .max(0.0)
+}
+
+/// Texels of the full texture along the side of a pixel that shows `target`.
+pub(super) fn texels_per_pixel(
+    texture: &Texture,
+    plane: &ScenePlane,
+    projected: &ProjectedPlane,
+    view: &CameraView,
+    target: &Vector3<f64>,
+) -> f64 {
+    let (width, height) = texture.size();
+    let texels = (width * height) as f64;
+    projected.cell_metres(view, target) * (texels / (plane.size[0] * plane.size[1])).sqrt()
+}
+
+/// How much sharper a level many sub-samples a side read.
+fn sharpening(subsamples: usize) -> f64 {
+    if subsamples >= DENSE_SUBSAMPLES {
+        0.25
+    } else {
+        0.0
+    }
+}

@@ -1,0 +1,183 @@
+//! Cut-outs retouched: dyed, with other glints, other edges, or curved.
+//!
+//! What a card asks for beyond its own texture is done to the texture before anything is rendered,
+//! at the level of detail that the picture reads and on that part of the card's plane that it is
+//! seen in. All that follows knows flat cards in their own colours, other renderers included; what
+//! asks for nothing is passed on as it is.
+
+mod bend;
+mod dye;
+mod edges;
+mod painted_plane;
+
+use crate::asset::{SurfaceCache, SurfaceTexel, Texture};
+use crate::image::Image;
+use crate::render::RenderOptions;
+use crate::render::detail::{detail_level, texels_per_pixel};
+use crate::render::pixel_filter::filter_quantiles;
+use crate::render::view::{CameraView, ProjectedPlane, ScenePlane};
+use crate::scene::{Card, Cylinder, EdgeTreatment, Grade, Shot};
+use bend::BentShading;
+use painted_plane::PaintedPlane;
+use rayon::prelude::*;
+use std::borrow::Cow;
+
+/// A shot whose cards are flat and have their final textures, as finely as a picture needs.
+pub(super) fn retouched<'a>(shot: &'a Shot, options: &RenderOptions) -> Cow<'a, Shot> {
+    retouch(shot, options, Some(filter_quantiles(options.subsamples)))
+}
+
+/// The same at full detail, for renderers that read nothing coarser.
+pub fn retouched_fully<'a>(shot: &'a Shot, options: &RenderOptions) -> Cow<'a, Shot> {
+    retouch(shot, &options.clamped(), None)
+}
+
+fn retouch<'a>(
+    shot: &'a Shot,
+    options: &RenderOptions,
+    offsets: Option<Vec<f64>>,
+) -> Cow<'a, Shot> {
+    if !shot.cards.iter().any(|card| asks_for_retouch(card, shot)) {
+        return Cow::Borrowed(shot);
+    }
+    let darkroom = Darkroom {
+        shot,
+        options,
+        offsets,
+        view: CameraView::from_camera(&shot.camera),
+    };
+    let cards = shot.cards.par_iter();
+    Cow::Owned(Shot {
+        cards: cards.map(|card| darkroom.retouch_card(card)).collect(),
+        edges: EdgeTreatment::AsIs,
+        ..shot.clone()
+    })
+}
+
+fn asks_for_retouch(card: &Card, shot: &Shot) -> bool {
+    card.grade.changes_surface() || !card.bend.is_flat() || shot.edges.reshape_cut_outs()
+}
+
+/// What cards are retouched by.
+struct Darkroom<'a> {
+    shot: &'a Shot,
+    options: &'a RenderOptions,
+    /// Sub-samples along each side of a pixel; none for full detail.
+    offsets: Option<Vec<f64>>,
+    view: CameraView,
+}
+
+/// The side of a card that is seen, and how large its texels are.
+struct SeenSide<'a> {
+    texture: &'a Texture,
+    surface: &'a SurfaceCache,
+    /// It is the back, whose texture runs the other way.
+    mirrored: bool,
+    texels_per_pixel: f64,
+}
+
+impl Darkroom<'_> {
+    /// Cards that cannot be seen stay as they are.
+    fn retouch_card(&self, card: &Card) -> Card {
+        let seen = ScenePlane::from_card(card)
+            .filter(|_| asks_for_retouch(card, self.shot) && !card.texture.is_empty())
+            .and_then(|plane| Some((plane, self.seen_side(card, &plane)?)));
+        seen.map_or_else(
+            || card.clone(),
+            |(plane, side)| self.retouch_side(card, &plane, &side),
+        )
+    }
+
+    /// None where the card is seen edge-on.
+    fn seen_side<'c>(&self, card: &'c Card, plane: &ScenePlane) -> Option<SeenSide<'c>> {
+        let projected = ProjectedPlane::new(plane, &self.view)?;
+        let behind = plane.is_seen_from_behind(&self.view.eye);
+        let (texture, surface) = match &card.back {
+            Some(back) if behind => (back, &card.surfaces[1]),
+            _ => (&card.texture, &card.surfaces[0]),
+        };
+        let corners = plane.corners();
+        let texels = corners
+            .iter()
+            .map(|corner| texels_per_pixel(texture, plane, &projected, &self.view, corner));
+        Some(SeenSide {
+            texture,
+            surface,
+            mirrored: behind && card.back.is_some(),
+            texels_per_pixel: texels.fold(f64::INFINITY, f64::min),
+        })
+    }
+
+    /// The level that the nearest corner of a card is read from, or the one before it where texels
+    /// are moved.
+    fn level(&self, card: &Card, side: &SeenSide<'_>) -> usize {
+        let Some(offsets) = &self.offsets else {
+            return 0;
+        };
+        let level = detail_level(side.texels_per_pixel, offsets) as usize;
+        let moved = !card.bend.is_flat() || self.shot.edges.reshape_cut_outs();
+        level.saturating_sub(usize::from(moved))
+    }
+
+    fn retouch_side(&self, card: &Card, plane: &ScenePlane, side: &SeenSide<'_>) -> Card {
+        let flat = self.paint(card, side);
+        let painted = match card.bend.cylinder(card.quad.size) {
+            Some(cylinder) => self.bend(&flat, card, plane, &cylinder),
+            None => flat,
+        };
+        painted.into_card(card)
+    }
+
+    /// A side in its final colours and with its final edges.
+    fn paint(&self, card: &Card, side: &SeenSide<'_>) -> PaintedPlane {
+        let (level, edges) = (self.level(card, side), self.shot.edges);
+        let mut painted = PaintedPlane::new(card, side.texture, side.mirrored, level);
+        if card.grade.changes_surface() {
+            dye::dye(&mut painted.film, &side.surface_level(level), &card.grade);
+        }
+        if edges.reshape_cut_outs() {
+            let pixel = side.texels_per_pixel / libm::exp2(level as f64);
+            edges::treat(
+                &mut painted,
+                &side.surface_level(level),
+                edges,
+                pixel as f32,
+            );
+        }
+        painted
+    }
+
+    fn bend(
+        &self,
+        flat: &PaintedPlane,
+        card: &Card,
+        plane: &ScenePlane,
+        cylinder: &Cylinder,
+    ) -> PaintedPlane {
+        let world_from_card = &card.quad.world_from_card;
+        let eye = world_from_card.inverse_transform_point(&self.shot.camera.center());
+        let shading = BentShading::new(self, card, plane, cylinder);
+        bend::bend(flat, card, cylinder, &shading, &eye)
+    }
+}
+
+impl SeenSide<'_> {
+    /// What the texels at a level of detail are of.
+    fn surface_level(&self, level: usize) -> Image<SurfaceTexel> {
+        let surface = self.surface.of(self.texture);
+        painted_plane::turned(surface.level(level).clone(), self.mirrored)
+    }
+}
+
+/// The grade that is left once surfaces have changed.
+fn remaining_grade(grade: &Grade) -> Grade {
+    Grade {
+        hue_deg: grade.hue_deg,
+        saturation: grade.saturation,
+        value: grade.value,
+        ..Grade::default()
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,232 @@
+//! Retouched cards beside what they stand for.
+
+use super::*;
+use crate::camera::Camera;
+use crate::composite;
+use crate::deep::DeepImage;
+use crate::filter::halve;
+use crate::geom::{Point2, Point3, Pose, Quad, UnitQuaternion};
+use crate::image::{Image, Mask};
+use crate::label::{LabelOptions, label};
+use crate::pixel::{Film, LinearRgb, ObjectId, PremulRgba};
+use crate::render::{render, render_coverage, render_reference};
+use crate::scene::{AreaLight, Bend, LightShape};
+use geo::Area;
+
+const OPTIONS: RenderOptions = RenderOptions {
+    subsamples: 3,
+    light_samples: 3,
+    ambient_samples: 32,
+    cell_px: 1.5,
+};
+
+fn camera() -> Camera {
+    let eye = Point3::new(0.3, -0.35, 0.7);
+    Camera::look_at(eye, Point3::new(0.0, 0.0, 0.05), 420.0, [240, 180])
+}
+
+/// An ellipse of the texture.
+fn is_inside(u: f64, v: f64) -> bool {
+    ((u - 0.5) / 0.42).powi(2) + ((v - 0.5) / 0.36).powi(2) < 1.0
+}
+
+/// An opaque ellipse of odd size, turned in every way.
+fn card(bend: Bend, roll: f64) -> Card {
+    let rotation = UnitQuaternion::from_euler_angles(0.2 + roll, -0.15, 0.5);
+    let quad = Quad {
+        world_from_card: Pose::from_parts(nalgebra::Vector3::new(0.01, 0.0, 0.06).into(), rotation),
+        size: [0.26, 0.12],
+    };
+    let texture = Image::from_fn(601, 279, |x, y| {
+        let [u, v] = [(x as f64 + 0.5) / 601.0, (y as f64 + 0.5) / 279.0];
+        let a = if is_inside(u, v) { 1.0 } else { 0.0 };
+        PremulRgba::new(0.5 * a, 0.5 * a, 0.5 * a, a)
+    });
+    let outline = (0..90).map(|k| {
+        let turn = f64::from(k).to_radians() * 4.0;
+        Point2::new(0.5 + 0.42 * turn.cos(), 0.5 + 0.36 * turn.sin())
+    });
+    Card {
+        outline_uv: outline.collect(),
+        bend,
+        ..Card::new(ObjectId(1), quad, texture)
+    }
+}
+
+fn shot(card: Card) -> Shot {
+    Shot::new(camera()).with_card(card)
+}
+
+/// Pixels that the card covers by more than a half: of four by four parts of a pixel, those that
+/// points of it fall into.
+fn pixels_hit(card: &Card) -> Mask {
+    let (camera, mut hit) = (camera(), Image::filled(960, 720, 0.0_f32));
+    for i in 0..3000 {
+        for j in 0..1400 {
+            let [u, v] = [(f64::from(i) + 0.5) / 3000.0, (f64::from(j) + 0.5) / 1400.0];
+            if is_inside(u, v) {
+                let (px, _) = camera.project(card.point(u, v)).unwrap();
+                hit[((4.0 * px.x) as usize, (4.0 * px.y) as usize)] = 1.0;
+            }
+        }
+    }
+    halve(&halve(&hit)).map(|share| share > 0.5)
+}
+
+fn alpha(deep: &DeepImage) -> Image<f32> {
+    Image::from_fn(deep.width(), deep.height(), |x, y| {
+        deep.at(x, y).iter().map(|sample| sample.alpha).sum()
+    })
+}
+
+#[test]
+fn what_asks_for_nothing_is_passed_on() {
+    let shot = shot(card(Bend::FLAT, 0.0));
+    assert!(matches!(retouched(&shot, &OPTIONS), Cow::Borrowed(_)));
+    assert!(matches!(retouched_fully(&shot, &OPTIONS), Cow::Borrowed(_)));
+}
+
+#[test]
+fn a_bent_card_and_its_outline_are_seen_where_the_cylinder_is() {
+    let bends = [(40.0, 90.0), (-40.0, 90.0), (30.0, 20.0)];
+    for ((deg, axis_deg), roll) in bends.into_iter().zip([0.0, 0.0, std::f64::consts::PI]) {
+        let bent = card(Bend { deg, axis_deg }, roll);
+        let hit = pixels_hit(&bent);
+        let shot = shot(bent);
+        let deep = render_coverage(&shot, &OPTIONS);
+        let wrong = |hit: &Mask| {
+            let inside = alpha(&deep).map(|a| a > 0.5);
+            let differ = inside.zip_map(hit, |a, b| a != b);
+            differ.count()
+        };
+        let [same, other] = [&hit, &pixels_hit(&card(Bend::FLAT, roll))].map(wrong);
+        assert!(
+            same < 60 && other > 2 * same,
+            "{deg}: {same} {other} of {}",
+            hit.count()
+        );
+
+        let labels = label(&deep, &shot, &LabelOptions::default());
+        let ring = &labels.objects[0].outline_px[0];
+        let ring: Vec<_> = ring.iter().map(|p| geo::Coord { x: p.x, y: p.y }).collect();
+        let outlined = geo::Polygon::new(geo::LineString(ring), Vec::new()).unsigned_area();
+        let covered: f32 = alpha(&deep).pixels().iter().sum();
+        assert!(
+            (outlined / f64::from(covered) - 1.0).abs() < 0.01,
+            "{outlined} {covered}"
+        );
+        let (a, b) = (
+            labels.objects[0].amodal_box,
+            outline_box(&labels.objects[0].outline_px[0]),
+        );
+        let sides = [a.x0 - b[0], a.y0 - b[1], a.x1 - b[2], a.y1 - b[3]];
+        assert!(sides.iter().all(|d| d.abs() < 1.5), "{sides:?}");
+    }
+}
+
+fn outline_box(ring: &[Point2<f64>]) -> [f64; 4] {
+    let all = [f64::MAX, f64::MAX, f64::MIN, f64::MIN];
+    ring.iter().fold(all, |b, p| {
+        [b[0].min(p.x), b[1].min(p.y), b[2].max(p.x), b[3].max(p.y)]
+    })
+}
+
+#[test]
+fn light_on_a_bent_card_follows_its_normal() {
+    // So far away that its direction is the same all over the card.
+    let sun = AreaLight {
+        shape: LightShape::Rectangle,
+        position: [60.0, 10.0, 60.0],
+        target: [0.0; 3],
+        size: [0.1; 2],
+        power: 1e5,
+        color: LinearRgb::WHITE,
+    };
+    let quad = Quad {
+        world_from_card: Pose::translation(0.0, 0.0, 0.06),
+        size: [0.26, 0.12],
+    };
+    let texture = Image::filled(521, 241, PremulRgba::new(0.5, 0.5, 0.5, 1.0));
+    let bent = Card {
+        bend: Bend {
+            deg: -36.0,
+            axis_deg: 90.0,
+        },
+        ..Card::new(ObjectId(1), quad, texture)
+    };
+    let shot = Shot::new(camera()).with_light(sun).with_card(bent.clone());
+    let deep = render(&shot, &OPTIONS);
+    let to_sun = nalgebra::Vector3::new(60.0, 10.0, 60.0).normalize();
+    // The sum of a quarter turn over 0.26 m, by the circle's own equation.
+    let radius = 0.26 / 36_f64.to_radians();
+    let light = |u: f64| {
+        let (px, _) = camera().project(bent.point(u, 0.5)).unwrap();
+        f64::from(deep.at(px.x as usize, px.y as usize)[0].light.g)
+    };
+    let expected = |u: f64| {
+        let turn = (u - 0.5) * 0.26 / radius;
+        nalgebra::Vector3::new(turn.sin(), 0.0, turn.cos()).dot(&to_sun)
+    };
+    for u in [0.1, 0.3, 0.5, 0.7, 0.9] {
+        let found = light(u) / light(0.5) / (expected(u) / expected(0.5));
+        assert!((found - 1.0).abs() < 0.015, "{u}: {found}");
+    }
+}
+
+#[test]
+fn retouching_nothing_at_another_level_changes_next_to_nothing() {
+    let plain = card(Bend::FLAT, 0.0);
+    let grade = Grade {
+        glints: 0.5,
+        ..Grade::default()
+    };
+    // No texel of it is a glint.
+    let retouched = Card {
+        grade,
+        ..plain.clone()
+    };
+    let [a, b] = [plain, retouched].map(|card| {
+        let shot = shot(card).with_ambient(LinearRgb::WHITE);
+        composite::film(&render(&shot, &OPTIONS))
+    });
+    let differences = a.zip_map(&b, |a, b| (a.color.g - b.color.g).abs());
+    let worst = differences.pixels().iter().fold(0.0_f32, |m, &d| m.max(d));
+    assert!(worst < 0.01, "{worst}");
+}
+
+#[test]
+fn a_dyed_card_colours_what_is_seen_through_it_as_in_the_definition() {
+    let film = Image::from_fn(300, 140, |x, y| {
+        let is_bottle = (20..280).contains(&x) && (20..120).contains(&y);
+        let a = if is_bottle { 0.2 } else { 0.0 };
+        PremulRgba::new(0.1 * a, 0.1 * a, 0.1 * a, a)
+    });
+    let quad = Quad {
+        world_from_card: Pose::translation(0.0, 0.0, 0.06),
+        size: [0.26, 0.12],
+    };
+    let tint = LinearRgb::new(0.25, 0.61, 0.32);
+    let dyed = Card {
+        grade: Grade {
+            tint,
+            ..Grade::default()
+        },
+        ..Card::new(ObjectId(1), quad, film)
+    };
+    let shot = shot(dyed).with_ambient(LinearRgb::WHITE);
+    let fast = composite::film(&render(&shot, &OPTIONS));
+    let exact = composite::film(&render_reference(&shot, &OPTIONS));
+    let middle: Film = fast[(120, 90)];
+    let expected = tint.scale(0.8).channels();
+    let passes = middle.transmittance().channels();
+    assert!(
+        passes
+            .iter()
+            .zip(expected)
+            .all(|(a, b)| (a - b).abs() < 1e-3),
+        "{passes:?}"
+    );
+    let worst = fast.zip_map(&exact, |a, b| (a.opacity.r - b.opacity.r).abs());
+    let worst = worst.pixels().iter().fold(0.0_f32, |m, &d| m.max(d));
+    assert!(worst < 0.08, "{worst}");
+}

@@ -1,0 +1,189 @@
+//! Colours of plastic to choose from.
+
+use crate::error::{Error, Result};
+use crate::pixel::LinearRgb;
+use crate::scene::bounds::{SHARE, WEIGHT};
+use crate::scene::check::{check_each, field};
+use crate::scene::{Draws, Range};
+use serde::{Deserialize, Serialize};
+
+/// Colours that PET bottles have, by what their plastic lets pass beside clear plastic.
+///
+/// # Method
+/// The mean transmittance of label-free plastic in the cut-outs of `tests/samples/bottles` (two
+/// green, two brown and two light blue views), over that of the clear ones (0.74): both walls of a
+/// bottle, scene-linear.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PlasticColor {
+    /// As it was photographed.
+    Clear,
+    /// Of water.
+    LightBlue,
+    /// Of lemonade.
+    Green,
+    /// Of beer and some juices.
+    Brown,
+}
+
+impl PlasticColor {
+    /// Transmittance of the dye.
+    pub fn tint(self) -> LinearRgb {
+        match self {
+            Self::Clear => LinearRgb::WHITE,
+            Self::LightBlue => LinearRgb::new(0.55, 0.80, 0.93),
+            Self::Green => LinearRgb::new(0.25, 0.61, 0.32),
+            Self::Brown => LinearRgb::new(0.44, 0.18, 0.10),
+        }
+    }
+}
+
+/// A colour to choose from: a name, red, green and blue, or a table with a weight.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(
+    untagged,
+    expecting = "expected \"clear\", \"light_blue\", \"green\", \"brown\", three numbers, or { color = .., weight = .. }"
+)]
+pub enum PaletteEntry {
+    /// As likely as any other.
+    Plain(PaletteColor),
+    /// This many times as likely.
+    Weighted(WeightedColor),
+}
+
+/// A colour by its name or by what passes of red, green and blue.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum PaletteColor {
+    /// A colour of PET.
+    Named(PlasticColor),
+    /// Transmittance of the dye, scene-linear, 0 to 1.
+    Known(LinearRgb),
+}
+
+/// A colour and how likely it is.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WeightedColor {
+    /// The colour.
+    pub color: PaletteColor,
+    /// How likely it is beside the others.
+    pub weight: f64,
+}
+
+impl PaletteEntry {
+    fn tint(&self) -> LinearRgb {
+        match self.color() {
+            PaletteColor::Named(name) => name.tint(),
+            PaletteColor::Known(tint) => tint,
+        }
+    }
+
+    fn color(&self) -> PaletteColor {
+        match *self {
+            Self::Plain(color) => color,
+            Self::Weighted(WeightedColor { color, .. }) => color,
+        }
+    }
+
+    fn weight(&self) -> f64 {
+        match self {
+            Self::Plain(_) => 1.0,
+            Self::Weighted(weighted) => weighted.weight,
+        }
+    }
+
+    fn check(&self, at: &str) -> Result<()> {
+        WEIGHT.check(&field(at, "weight"), self.weight())?;
+        check_tint(self.tint(), at)
+    }
+}
+
+/// A transmittance of each channel.
+pub(super) fn check_tint(tint: LinearRgb, at: &str) -> Result<()> {
+    let shares = tint.channels();
+    if shares.iter().all(|&share| SHARE.contains(share.into())) {
+        return Ok(());
+    }
+    let what = format!("{shares:?}, expected three numbers of {SHARE}");
+    Err(Error::value(at, what))
+}
+
+/// Fails on the first colour that no plastic has, and where none has any weight.
+pub(super) fn check_palette(palette: &[PaletteEntry], at: &str) -> Result<()> {
+    check_each(palette, at, PaletteEntry::check)?;
+    if palette.is_empty() || total_weight(palette) > 0.0 {
+        return Ok(());
+    }
+    let what = "weights of 0 alone, expected one above 0";
+    Err(Error::value(at, what))
+}
+
+fn total_weight(palette: &[PaletteEntry]) -> f64 {
+    palette.iter().map(PaletteEntry::weight).sum()
+}
+
+/// The tint at a path; white, and nothing drawn, where there is nothing to choose from.
+pub(super) fn draw_tint(palette: &[PaletteEntry], draws: &Draws, path: &str) -> LinearRgb {
+    if palette.is_empty() {
+        return LinearRgb::WHITE;
+    }
+    let mut rest = Range::new(0.0, total_weight(palette)).draw(draws, path);
+    let chosen = palette.iter().find(|entry| {
+        rest -= entry.weight();
+        rest < 0.0
+    });
+    chosen.map_or(LinearRgb::WHITE, PaletteEntry::tint)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[derive(Serialize, Deserialize)]
+    struct File {
+        palette: Vec<PaletteEntry>,
+    }
+
+    fn read(text: &str) -> Vec<PaletteEntry> {
+        let read: std::result::Result<File, _> = toml::from_str(&format!("palette = {text}"));
+        read.unwrap().palette
+    }
+
+    #[test]
+    fn names_numbers_and_weights_are_read_and_written_back() {
+        let palette = read("['green', [0.5, 1, 0.25], { color = 'brown', weight = 3 }]");
+        assert_eq!(palette[0].tint(), PlasticColor::Green.tint());
+        assert_eq!(palette[1].tint(), LinearRgb::new(0.5, 1.0, 0.25));
+        assert_eq!(palette[2].weight(), 3.0);
+        let written = toml::to_string(&File {
+            palette: palette.clone(),
+        });
+        let again: File = toml::from_str(&written.unwrap()).unwrap();
+        assert_eq!(again.palette, palette);
+    }
+
+    #[test]
+    fn colours_come_as_often_as_they_weigh() {
+        let palette =
+            read("['clear', { color = 'green', weight = 3 }, { color = [0, 0, 0], weight = 0 }]");
+        let green = (0..4000).filter(|&k| {
+            let tint = draw_tint(&palette, &Draws::new(1, k), "a");
+            assert_ne!(tint, LinearRgb::BLACK);
+            tint == PlasticColor::Green.tint()
+        });
+        // Binomial: standard deviation 27.
+        assert!((green.count() as f64 - 3000.0).abs() < 5.0 * 27.0);
+        assert_eq!(draw_tint(&[], &Draws::new(1, 2), "a"), LinearRgb::WHITE);
+    }
+
+    #[test]
+    fn colours_that_no_plastic_has_are_refused() {
+        let refused = |text| check_palette(&read(text), "p").unwrap_err().to_string();
+        assert!(refused("[[0.5, 1.5, 0.2]]").starts_with("p[0]: [0.5, 1.5, 0.2], expected"));
+        assert!(refused("[{ color = 'green', weight = -1 }]").starts_with("p[0].weight: -1,"));
+        assert!(refused("[{ color = 'green', weight = 0 }]").contains("expected one above 0"));
+        assert!(check_palette(&[], "p").is_ok());
+        assert!(toml::from_str::<File>("palette = ['pink']").is_err());
+    }
+}
