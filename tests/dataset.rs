@@ -41,6 +41,7 @@ fn scene(k: u64) -> Scene {
         exposure: Exposure::default(),
         cast: Default::default(),
         view: Default::default(),
+        lens: Default::default(),
         finish: Default::default(),
         files: None,
         settings: Default::default(),

@@ -114,6 +114,7 @@ fn sample_with(k: u64, options: &LabelOptions) -> Result<Sample> {
         exposure: Exposure::default(),
         cast: LightTint::default(),
         view: Default::default(),
+        lens: Default::default(),
         finish: PostProcess::default(),
         files: None,
         settings: Default::default(),

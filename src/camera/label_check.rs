@@ -100,7 +100,7 @@ fn out_of_range(at: &'static str, value: f64) -> SolveError {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::Scenario;
+    use crate::camera::simulate::Scenario;
 
     fn refusal_of(albedo: f64) -> String {
         let mut label = Scenario::default().view(1, 0).label;

@@ -23,6 +23,7 @@ mod init;
 mod joint;
 mod label;
 mod label_check;
+mod lens;
 mod marker;
 mod model;
 mod options;
@@ -72,6 +73,8 @@ pub(crate) use marker::printed;
 #[doc(hidden)]
 pub use marker::with_markers;
 pub use marker::{Marker, find_markers};
+#[doc(hidden)]
+pub use lens::RadialDistortion;
 pub use options::{CornerOrder, Priors, SolveOptions};
 #[doc(hidden)]
 pub use overlay::overlay;

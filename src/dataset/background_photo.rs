@@ -89,6 +89,7 @@ impl BackgroundPhoto {
                 name: labelled.name.clone(),
                 size: seen.size,
                 camera: CameraSource::Known(camera),
+                k1: seen.k1,
                 albedo: labelled.label.surface.albedo,
             },
             label: labelled.source.clone(),

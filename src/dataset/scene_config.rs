@@ -199,6 +199,7 @@ mod tests {
             exposure: Default::default(),
             cast: Default::default(),
             view: Default::default(),
+            lens: Default::default(),
             finish: Default::default(),
             files: None,
             settings: Default::default(),

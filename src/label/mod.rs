@@ -46,7 +46,7 @@ pub use overlay::overlay;
 pub use topmost::cyclic_overlaps;
 pub use visibility::DepthRange;
 
-use crate::camera::Camera;
+use crate::camera::{Camera, RadialDistortion};
 use crate::deep::DeepImage;
 use crate::geom::{BBox, Point2};
 use crate::pixel::ObjectId;
@@ -151,7 +151,8 @@ pub enum AmodalBox {
 /// The outline of a card as the camera sees it, clipped to the picture: one ring per part, pixels.
 #[doc(hidden)]
 pub fn outline_of(card: &Card, camera: &Camera) -> Vec<Vec<Point2<f64>>> {
-    outline::rings(&outline::region(card, camera))
+    let pinhole = RadialDistortion::new(camera, 0.0);
+    outline::rings(&outline::region(card, camera, &pinhole))
 }
 
 /// A card as the camera sees it.
@@ -170,7 +171,7 @@ pub fn label(deep: &DeepImage, shot: &Shot, options: &LabelOptions) -> Labels {
     check_size(deep, image);
     let mut objects = silhouettes(deep, shot, options);
     objects.retain(|s| !s.amodal_box(options.amodal).is_empty());
-    let occluders = topmost::occluders(&objects, &shot.camera, options.obstruction.pair_iou());
+    let occluders = topmost::occluders(&objects, shot, options.obstruction.pair_iou());
     let uncovered: Vec<_> =
         uncovered_fractions(&objects, &occluders, options.obstruction).collect();
     let pairs = objects.into_iter().zip(occluders).zip(uncovered);
@@ -214,7 +215,7 @@ fn silhouettes<'a>(
     let visibilities = visibility::fold_samples(deep, &ids, options);
     let pairs = cards.into_iter().zip(visibilities);
     pairs
-        .map(|(card, visibility)| Silhouette::new(card, &shot.camera, visibility))
+        .map(|(card, visibility)| Silhouette::new(card, shot, visibility))
         .collect()
 }
 
@@ -225,10 +226,10 @@ fn cards_by_id(shot: &Shot) -> Vec<&Card> {
 }
 
 impl<'a> Silhouette<'a> {
-    fn new(card: &'a Card, camera: &Camera, visibility: ObjectVisibility) -> Self {
+    fn new(card: &'a Card, shot: &Shot, visibility: ObjectVisibility) -> Self {
         Self {
             card,
-            region: outline::region(card, camera),
+            region: outline::region(card, &shot.camera, &shot.distortion()),
             visibility,
         }
     }

@@ -6,8 +6,11 @@
 //! behind the camera projects like any other. What that leaves along the picture's edge, and loops
 //! of an outline that crosses itself, a boolean operation of `geo` then resolves under the non-zero
 //! rule: whatever the outline winds around is inside.
+//!
+//! Where the lens bends straight lines, the pyramid is that of all that it lets into the picture,
+//! and the sides of the outline are cut into short ones before the lens bends them.
 
-use crate::camera::Camera;
+use crate::camera::{Camera, RadialDistortion};
 use crate::geom::BBox;
 use crate::geom::{Point2, Vector3};
 use crate::scene::Card;
@@ -25,10 +28,14 @@ const NEAR_PLANE_M: f64 = 1e-4;
 /// hundredth of this.
 const SLIVER_AREA_PX2: f64 = 1e-2;
 
+/// Length of the sides that a lens bends, pixels: within one, a line that k1 = 0.1 bends is straight
+/// to a hundredth of a pixel.
+const BENT_SIDE_PX: f64 = 8.0;
+
 /// The part of the picture that lies inside a card's outline; empty where the card is out of sight
 /// or edge-on.
-pub(crate) fn region(card: &Card, camera: &Camera) -> MultiPolygon<f64> {
-    let px = projected(card, camera);
+pub(crate) fn region(card: &Card, camera: &Camera, lens: &RadialDistortion) -> MultiPolygon<f64> {
+    let px = projected(card, camera, lens);
     if !has_area(&px) {
         return MultiPolygon(Vec::new());
     }
@@ -40,9 +47,37 @@ pub(crate) fn region(card: &Card, camera: &Camera) -> MultiPolygon<f64> {
 }
 
 /// The outline of the part in view, pixels.
-fn projected(card: &Card, camera: &Camera) -> Vec<Coord<f64>> {
-    let seen = clip_to_view(in_camera(card, camera), camera);
-    seen.iter().map(|p| to_pixel(p, camera)).collect()
+fn projected(card: &Card, camera: &Camera, lens: &RadialDistortion) -> Vec<Coord<f64>> {
+    let bounds = lens.undistorted_bounds();
+    let seen = clip_to_view(in_camera(card, camera), camera, bounds);
+    let px = seen.iter().map(|p| to_pixel(p, camera)).collect();
+    if lens.is_none() {
+        return px;
+    }
+    bent(&px, lens)
+}
+
+/// A ring of pinhole positions as a lens shows it.
+fn bent(ring: &[Coord<f64>], lens: &RadialDistortion) -> Vec<Coord<f64>> {
+    let ends = ring.iter().cycle().skip(1);
+    let sides = ring.iter().zip(ends);
+    sides
+        .flat_map(|(a, b)| points_along(*a, *b))
+        .map(|p| {
+            let seen = lens.distort(Point2::new(p.x, p.y));
+            Coord {
+                x: seen.x,
+                y: seen.y,
+            }
+        })
+        .collect()
+}
+
+/// The start of a side, and what cuts it into short ones.
+fn points_along(a: Coord<f64>, b: Coord<f64>) -> impl Iterator<Item = Coord<f64>> {
+    let side = b - a;
+    let pieces = (libm::hypot(side.x, side.y) / BENT_SIDE_PX).ceil().max(1.0);
+    (0..pieces as u32).map(move |i| a + side * (f64::from(i) / pieces))
 }
 
 fn has_area(px: &[Coord<f64>]) -> bool {
@@ -101,14 +136,18 @@ fn in_camera(card: &Card, camera: &Camera) -> Vec<Vector3<f64>> {
         .collect()
 }
 
-fn clip_to_view(outline: Vec<Vector3<f64>>, camera: &Camera) -> Vec<Vector3<f64>> {
-    let [w, h] = camera.image.map(f64::from);
+/// The part of an outline that is seen between two positions of the pinhole's picture.
+fn clip_to_view(
+    outline: Vec<Vector3<f64>>,
+    camera: &Camera,
+    [low, high]: [Point2<f64>; 2],
+) -> Vec<Vector3<f64>> {
     let (f, c) = (camera.focal_px, camera.principal_px);
     let far_enough = clip_to_half_space(outline, |p| p.z - NEAR_PLANE_M);
-    let right_of_left = clip_to_half_space(far_enough, |p| f.x * p.x + c.x * p.z);
-    let left_of_right = clip_to_half_space(right_of_left, |p| (w - c.x) * p.z - f.x * p.x);
-    let below_top = clip_to_half_space(left_of_right, |p| f.y * p.y + c.y * p.z);
-    clip_to_half_space(below_top, |p| (h - c.y) * p.z - f.y * p.y)
+    let right_of_left = clip_to_half_space(far_enough, |p| f.x * p.x + (c.x - low.x) * p.z);
+    let left_of_right = clip_to_half_space(right_of_left, |p| (high.x - c.x) * p.z - f.x * p.x);
+    let below_top = clip_to_half_space(left_of_right, |p| f.y * p.y + (c.y - low.y) * p.z);
+    clip_to_half_space(below_top, |p| (high.y - c.y) * p.z - f.y * p.y)
 }
 
 /// The part of a polygon where a linear function of the position is not negative.
@@ -194,7 +233,7 @@ mod tests {
             outline_uv: corners.iter().map(uv).collect::<Arc<[_]>>(),
             grade: Grade::default(),
         };
-        region(&card, &camera())
+        region(&card, &camera(), &RadialDistortion::new(&camera(), 0.0))
     }
 
     /// Times that an outline winds around a point, by crossings of the line to its right.

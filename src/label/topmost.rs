@@ -13,7 +13,7 @@ use crate::geom::Point2;
 use crate::label::outline::{bounds, overlap};
 use crate::label::{ObjectLabel, Silhouette};
 use crate::pixel::ObjectId;
-use crate::scene::Card;
+use crate::scene::{Card, Shot};
 use geo::{Area, BooleanOps, Centroid, MultiPolygon};
 use std::collections::BTreeSet;
 
@@ -23,14 +23,14 @@ use std::collections::BTreeSet;
 /// cards at exactly the same depth, the one given first lies over the other.
 pub(crate) fn occluders(
     objects: &[Silhouette<'_>],
-    camera: &Camera,
+    shot: &Shot,
     iou: f64,
 ) -> Vec<Vec<ObjectId>> {
     let boxes: Vec<_> = objects.iter().map(|o| bounds(&o.region)).collect();
     let mut occluders = vec![Vec::new(); objects.len()];
     for j in 0..objects.len() {
         for i in (0..j).filter(|i| boxes[*i].overlaps(&boxes[j])) {
-            let Some(first_is_above) = is_first_above(&objects[i], &objects[j], camera, iou) else {
+            let Some(first_is_above) = is_first_above(&objects[i], &objects[j], shot, iou) else {
                 continue;
             };
             let (above, below) = if first_is_above { (i, j) } else { (j, i) };
@@ -65,11 +65,12 @@ pub(crate) fn uncovered_fraction(
 fn is_first_above(
     first: &Silhouette<'_>,
     second: &Silhouette<'_>,
-    camera: &Camera,
+    shot: &Shot,
     iou: f64,
 ) -> Option<bool> {
     let center = overlap_center(&first.region, &second.region, iou)?;
-    Some(is_above(first.card, second.card, camera, center))
+    let ideal = shot.distortion().undistort(center);
+    Some(is_above(first.card, second.card, &shot.camera, ideal))
 }
 
 /// Of two cards that meet at a pixel position, the first is at least as near.

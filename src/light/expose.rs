@@ -114,6 +114,7 @@ mod tests {
             exposure,
             cast: Default::default(),
             view: Default::default(),
+            lens: Default::default(),
             finish: Default::default(),
             files: None,
             settings: Default::default(),

@@ -37,7 +37,8 @@ impl Scene {
         check_image(self.image)?;
         check_surface(&self.surface)?;
         check_camera(&self.camera)?;
-        self.view.check("view")
+        self.view.check("view")?;
+        self.lens.check("lens")
     }
 
     fn check_objects(&self) -> Result<()> {
@@ -309,6 +310,7 @@ mod tests {
             exposure: Exposure::MatchPlate { gain_ev: 0.25 },
             cast: Default::default(),
             view: Default::default(),
+            lens: Default::default(),
             finish: Default::default(),
             files: None,
             settings: Default::default(),

@@ -67,6 +67,7 @@ mod tests {
             exposure: Exposure::default(),
             cast: Default::default(),
             view: Default::default(),
+            lens: Default::default(),
             finish: Default::default(),
             files: None,
             settings: Default::default(),

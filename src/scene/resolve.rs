@@ -73,8 +73,11 @@ impl Scene {
         if let Some(plate) = &plate {
             self.check_plate(plate)?;
         }
+        self.lens.check_fold(&camera)?;
         Ok(Shot {
-            camera: self.view.camera(&camera),
+            camera: self.view.camera(&self.lens.camera(&camera)),
+            k1: self.lens.k1,
+            thin_lens: self.lens.thin_lens(&camera),
             plate: plate.map(|plate| self.shown_plate(&camera, plate)),
             catcher: self.surface.size.map(|side| CATCHER_RATIO * side),
             cards: self.cards(look)?,
@@ -87,11 +90,15 @@ impl Scene {
 
     /// The part of the plate that is seen.
     fn shown_plate(&self, camera: &Camera, plate: Arc<Image<LinearRgb>>) -> Arc<Image<LinearRgb>> {
-        if self.view.is_whole() {
-            plate
-        } else {
-            Arc::new(self.view.plate(camera, &plate))
+        let lens = &self.lens;
+        if self.view.is_whole() && !lens.moves_plate() {
+            return plate;
         }
+        let bent = lens.camera(camera);
+        let shown = self
+            .view
+            .plate(&bent, &plate, |px| lens.photo_px(camera, px));
+        Arc::new(shown)
     }
 
     fn cards(&self, look: impl Fn(&Object) -> Option<Appearance>) -> Result<Vec<Card>> {
@@ -260,6 +267,7 @@ mod tests {
             exposure: Exposure::Ev(1.0),
             cast: Default::default(),
             view: Default::default(),
+            lens: Default::default(),
             finish: Default::default(),
             files: None,
             settings: Default::default(),

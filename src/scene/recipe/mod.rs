@@ -14,7 +14,7 @@ use crate::scene::bounds::{ALBEDO, EV, FRICTION, MAX_LIGHTS, MAX_OBJECTS, RADIAN
 use crate::scene::check::{check_cast, check_count, check_each, check_image};
 use crate::scene::stack::too_large;
 use crate::scene::{
-    AssetVariant, Background, DrawLog, Drawn, DropRanges, EnvironmentRanges, LightTint,
+    AssetVariant, Background, DrawLog, Drawn, DropRanges, EnvironmentRanges, LensRanges, LightTint,
     PostProcessRanges, Range, Scene, SettleOptions, Surface, Take, Variation, ViewRanges,
 };
 use compose::SceneNumber;
@@ -39,6 +39,8 @@ pub struct Recipe {
     pub viewpoints: Take,
     /// Which part of the photo is shown. Default: all of it.
     pub view: ViewRanges,
+    /// Lens of the camera. Default: that of the photo, in focus everywhere.
+    pub lens: LensRanges,
     /// Photos of each asset that are used: all, or the first ones. Default: `"all"`.
     pub photos: Take,
     /// Objects in a scene. Default: `[4, 12]`.
@@ -89,6 +91,7 @@ impl Default for Recipe {
             off: Vec::new(),
             viewpoints: Take::All,
             view: ViewRanges::default(),
+            lens: LensRanges::default(),
             photos: Take::All,
             objects: Range::new(4.0, 12.0),
             negatives: 0.0,
@@ -191,6 +194,7 @@ impl Recipe {
     pub fn check(&self) -> Result<()> {
         check_image(self.image)?;
         self.view.check()?;
+        self.lens.check()?;
         self.check_objects()?;
         self.check_light()?;
         self.check_surface()?;

@@ -149,6 +149,7 @@ fn heap_scene(case: &ScaleCase) -> Scene {
         exposure: Exposure::Ev(0.0),
         cast: Default::default(),
         view: Default::default(),
+        lens: Default::default(),
         finish: Default::default(),
         files: None,
         settings: Default::default(),

@@ -417,6 +417,7 @@ fn tray() -> Background {
     Background {
         name: "tray".into(),
         size: [0.6, 0.4],
+        k1: 0.0,
         albedo: None,
         camera: CameraSource::Rectangle {
             corners_px: [[0.0, 0.0], [60.0, 0.0], [60.0, 40.0], [0.0, 40.0]],

@@ -135,6 +135,7 @@ pub(super) fn empty_scene(camera: Camera) -> Scene {
         exposure: Exposure::Ev(0.0),
         cast: Default::default(),
         view: Default::default(),
+        lens: Default::default(),
         finish: Default::default(),
         files: None,
         settings: Default::default(),

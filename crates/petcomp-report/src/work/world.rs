@@ -114,6 +114,7 @@ impl FixtureFolder {
             exposure: Exposure::Ev(0.0),
             cast: Default::default(),
             view: Default::default(),
+            lens: Default::default(),
             finish: Default::default(),
             files: None,
             settings: Default::default(),
