@@ -381,5 +381,6 @@ fn redraw_seed(seed: u64, k: u64, n: usize) -> u64 {
 
 fn finished_frame(deep: &DeepImage, scene: &Scene, shot: &Shot) -> Image<PremulRgba> {
     let plate = shot.plate.as_deref();
+    let deep = &*composite::defocus(deep, shot);
     composite::finish(composite::frame(deep, plate), deep, plate, &scene.finish)
 }

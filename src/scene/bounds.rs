@@ -42,6 +42,8 @@ pub(super) const F_NUMBER: Bounds =
 pub(super) const FOCUS: Bounds = Bounds::metres(0.001, 1e6, "farther off is at infinity");
 pub(super) const SENSOR: Bounds =
     Bounds::new(0.1, 1000.0, "millimetres; phones have 5 to 10, a 35 mm camera 36");
+pub(super) const CHROMATIC: Bounds =
+    Bounds::new(-50.0, 50.0, "pixels; cheap lenses have 1 in the corners");
 pub(super) const BLUR: Bounds = Bounds::new(0.0, 100.0, "pixels; a sharp photo has 0.3 to 0.7");
 pub(super) const SHARPENING: Bounds = Bounds::new(0.0, 100.0, "a share of what a blur takes away");
 pub(super) const NOISE: Bounds = Bounds::new(0.0, 1e3, "scene-linear; 1 is white");

@@ -226,3 +226,164 @@ fn draw_optional(range: Option<Range>, draws: &Draws, path: &str) -> Option<f64>
 fn check_optional_range(range: Option<Range>, at: &str, bounds: &Bounds) -> Result<()> {
     range.map_or(Ok(()), |range| range.check(at, bounds))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geom::{Point3, Vector2};
+    use crate::scene::{DrawLog, View};
+
+    fn photo() -> Camera {
+        let level = Camera::look_at(
+            Point3::new(0.1, -0.4, 1.2),
+            Point3::new(0.02, 0.03, 0.0),
+            150.0,
+            [160, 120],
+        );
+        Camera {
+            focal_px: Vector2::new(150.0, 152.0),
+            principal_px: Point2::new(77.0, 64.0),
+            ..level
+        }
+    }
+
+    fn views() -> [View; 3] {
+        let zoomed = View {
+            zoom: 1.5,
+            shift: [0.7, -1.0],
+            turn_deg: 20.0,
+        };
+        let turned = View {
+            turn_deg: -90.0,
+            ..View::default()
+        };
+        [View::default(), zoomed, turned]
+    }
+
+    /// Where the picture shows a point, and where the photo does.
+    fn seen(lens: &Lens, view: &View, world: Point3<f64>) -> [Point2<f64>; 2] {
+        let camera = view.camera(&lens.camera(&photo()));
+        let (ideal, _) = camera.project(world).unwrap();
+        let px = RadialDistortion::new(&camera, lens.k1).distort(ideal);
+        let (straight, _) = photo().project(world).unwrap();
+        let photo_k1 = if lens.bends_plate { 0.0 } else { lens.k1 };
+        [px, RadialDistortion::new(&photo(), photo_k1).distort(straight)]
+    }
+
+    #[test]
+    fn photo_and_cards_are_bent_alike() {
+        for (k1, bends_plate) in [(-0.2, true), (0.2, true), (-0.2, false), (0.1, false)] {
+            let lens = Lens {
+                k1,
+                bends_plate,
+                ..Lens::default()
+            };
+            for view in views() {
+                let bent = lens.camera(&photo());
+                // The plate's colours are its positions.
+                let plate = view.plate(&bent, |px| {
+                    let at = lens.photo_px(&photo(), px);
+                    crate::pixel::LinearRgb::new(at.x as f32, at.y as f32, 0.0)
+                });
+                for (x, y) in [(5, 5), (80, 60), (150, 10), (30, 110)] {
+                    let camera = view.camera(&bent);
+                    let px = Point2::new(x as f64 + 0.5, y as f64 + 0.5);
+                    let ideal = RadialDistortion::new(&camera, k1).undistort(px);
+                    let [back, expected] = seen(&lens, &view, camera.ray(ideal).at(0.9));
+                    let shown = plate[(x, y)];
+                    let found = Point2::new(f64::from(shown.r), f64::from(shown.g));
+                    assert!((back - px).norm() < 1e-9);
+                    assert!((found - expected).norm() < 1e-3, "{lens:?} {view:?}: {found} {expected}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_the_photo_does_not_show_is_never_seen() {
+        for k1 in [-0.3, -0.1, 0.1, 0.3] {
+            let lens = Lens {
+                k1,
+                bends_plate: true,
+                ..Lens::default()
+            };
+            let corners = [[0.0, 0.0], [160.0, 0.0], [160.0, 120.0], [0.0, 120.0], [80.0, 0.0]];
+            let seen = corners.map(|px| lens.photo_px(&photo(), px.into()));
+            assert!(seen.iter().all(|p| p.x > -1e-9 && p.x < 160.0 + 1e-9), "{k1}: {seen:?}");
+            assert!(seen.iter().all(|p| p.y > -1e-9 && p.y < 120.0 + 1e-9), "{k1}: {seen:?}");
+            // A barrel shows all of it: the farthest corner is its own.
+            let nearest = seen[1].x.max(seen[2].x);
+            assert!(k1 > 0.0 || nearest > 155.0, "{k1}: {seen:?}");
+        }
+    }
+
+    #[test]
+    fn nothing_is_drawn_by_default_and_a_photo_keeps_its_own_lens() {
+        let log = DrawLog::default();
+        let draws = Draws::new(3, 4).logged(&log);
+        assert!(LensRanges::default().draw(&draws, 0.0).is_pinhole());
+        let ranges = LensRanges {
+            k1: Range::new(-0.2, 0.1),
+            ..LensRanges::default()
+        };
+        let own = ranges.draw(&draws, -0.07);
+        assert_eq!((own.k1, own.bends_plate), (-0.07, false));
+        assert!(log.into_draws().is_empty());
+        let drawn = ranges.draw(&Draws::new(3, 4), 0.0);
+        assert!(drawn.bends_plate && (-0.2..0.1).contains(&drawn.k1));
+        assert_eq!(drawn, ranges.draw(&Draws::new(3, 4), 0.0));
+    }
+
+    #[test]
+    fn an_aperture_is_that_of_the_sensor() {
+        let lens = Lens {
+            f_number: Some(2.0),
+            sensor_mm: 8.0,
+            ..Lens::default()
+        };
+        let thin = lens.thin_lens(&photo()).unwrap();
+        // 152 of 160 pixels are 7.6 mm of 8.
+        assert!((thin.aperture_m - 0.0038).abs() < 1e-12, "{thin:?}");
+        let (_, center_m) = photo().project(Point3::origin()).unwrap();
+        assert!((thin.focus_m - center_m).abs() < 1e-12);
+        assert_eq!(Lens::default().thin_lens(&photo()), None);
+    }
+
+    #[test]
+    fn what_cannot_be_right_is_told() {
+        let reported = |lens: Lens| lens.check("lens").unwrap_err().to_string();
+        let good = Lens::default();
+        let nan = Lens {
+            k1: f64::NAN,
+            ..good
+        };
+        assert!(reported(nan).starts_with("lens.k1: NaN"));
+        let closed = Lens {
+            f_number: Some(0.0),
+            ..good
+        };
+        assert!(reported(closed).starts_with("lens.f_number: 0, expected within 0.5"));
+        for bends_plate in [false, true] {
+            let lens = Lens {
+                k1: -1.5,
+                bends_plate,
+                ..good
+            };
+            let told = lens.check_fold(&photo()).unwrap_err().to_string();
+            assert!(told.starts_with("lens.k1: -1.5, expected at least -0."), "{told}");
+            let least = Lens {
+                k1: lens.least_k1(&photo()),
+                ..lens
+            };
+            assert!(least.check_fold(&photo()).is_ok());
+            let bent = RadialDistortion::new(&least.camera(&photo()), least.k1);
+            assert!(bent.reach() < 2.0 / 3.0 * bent.fold(), "{least:?}");
+        }
+    }
+
+    #[test]
+    fn old_scenes_have_no_lens() {
+        assert!(toml::from_str::<Lens>("").unwrap().is_pinhole());
+        assert!(toml::from_str::<Lens>("k2 = 0.1").is_err());
+    }
+}

@@ -3,6 +3,7 @@
 use crate::asset::{Panorama, Texture};
 use crate::camera::Camera;
 use crate::error::{Error, Result};
+use crate::filter::{sample_bilinear_clamped, sample_cubic_clamped};
 use crate::geom::{Point2, Pose, Quad};
 use crate::image::Image;
 use crate::pixel::{LinearRgb, ObjectId};
@@ -91,14 +92,17 @@ impl Scene {
     /// The part of the plate that is seen.
     fn shown_plate(&self, camera: &Camera, plate: Arc<Image<LinearRgb>>) -> Arc<Image<LinearRgb>> {
         let lens = &self.lens;
-        if self.view.is_whole() && !lens.moves_plate() {
+        if lens.moves_plate() {
+            return Arc::new(self.view.plate(&lens.camera(camera), |px| {
+                let at = lens.photo_px(camera, px);
+                sample_cubic_clamped(&plate, at.x, at.y).map(|v| v.max(0.0))
+            }));
+        }
+        if self.view.is_whole() {
             return plate;
         }
-        let bent = lens.camera(camera);
-        let shown = self
-            .view
-            .plate(&bent, &plate, |px| lens.photo_px(camera, px));
-        Arc::new(shown)
+        let bilinear = |at: Point2<f64>| sample_bilinear_clamped(&plate, at.x, at.y);
+        Arc::new(self.view.plate(camera, bilinear))
     }
 
     fn cards(&self, look: impl Fn(&Object) -> Option<Appearance>) -> Result<Vec<Card>> {
