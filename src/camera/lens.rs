@@ -187,6 +187,8 @@ impl RadialDistortion {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::camera::simulate::Scenario;
+    use crate::camera::{SolveOptions, distorted, solve};
     use crate::geom::{Point3, Vector3};
 
     const LENSES: [f64; 5] = [-0.3, -0.02, 0.0, 0.05, 0.4];
@@ -231,6 +233,22 @@ mod tests {
         let (ideal, _) = camera.project(Point3::new(0.3, 0.2, 0.05)).unwrap();
         let found = RadialDistortion::new(&camera, k1).distort(ideal);
         assert!((found - expected).norm() < 1e-11, "{found} {expected}");
+    }
+
+    #[test]
+    fn a_solved_camera_and_the_pictures_share_a_lens() {
+        let mut label = Scenario::default().tilted(25.0).view(1, 0).label;
+        label.camera.k1 = Some(-0.05);
+        let solution = solve(&label, &SolveOptions::default()).unwrap();
+        let k1 = k1_from_kappa(&solution.camera, solution.kappa);
+        assert!((k1 + 0.05).abs() < 1e-4, "{k1}");
+        let lens = RadialDistortion::new(&solution.camera, k1);
+        for at in [[0.2, 0.1, 0.0], [-0.3, 0.2, 0.05]] {
+            let world = Point3::from(at);
+            let (ideal, _) = solution.camera.project(world).unwrap();
+            let solved = distorted(&solution.camera, solution.kappa, world);
+            assert!((lens.distort(ideal) - solved).norm() < 1e-8, "{solved}");
+        }
     }
 
     #[test]

@@ -30,6 +30,8 @@ use std::ops::Range;
 const SAME_RADIUS_PX: f64 = 0.25;
 /// Coverage below this is none: a fortieth of a code of 8 bits.
 const LEAST_ALPHA: f32 = 1e-4;
+/// Seen share of an object's coverage from which on its colour is known in a pixel.
+const KNOWN_SHARE: f32 = 0.05;
 /// Weight of the surface's shadow where nothing is seen of it.
 const HIDDEN_WEIGHT: f32 = 0.01;
 
@@ -73,11 +75,13 @@ struct SoftObject {
     columns: Range<usize>,
     rows: Range<usize>,
     pixels: Vec<SoftPixel>,
+    /// Pixels to the farthest that a circle of confusion of the picture reaches.
+    reach: isize,
 }
 
 /// An object in a pixel out of focus.
-struct SoftSample {
-    object: ObjectId,
+struct SoftSample<'a> {
+    of: &'a SoftObject,
     depth: f32,
     pixel: SoftPixel,
 }
@@ -138,6 +142,7 @@ impl<'a> Focus<'a> {
             pixels: vec![SoftPixel::default(); columns.len() * rows.len()],
             columns,
             rows,
+            reach: discs.reach() as isize,
         };
         for sample in samples {
             let radius = self.radius_px(sample.sample.depth.0);
@@ -149,14 +154,20 @@ impl<'a> Focus<'a> {
     /// What is in a pixel, front to back, with what each object hides per channel.
     fn pixel(&self, objects: &[SoftObject], at: [usize; 2]) -> Vec<(DeepSample, LinearRgb)> {
         let mut seen: Vec<_> = objects.iter().filter_map(|soft| soft.at(at)).collect();
-        seen.sort_by(|a, b| a.depth.total_cmp(&b.depth).then(a.object.cmp(&b.object)));
+        seen.sort_by(|a, b| {
+            let by_id = a.of.object.cmp(&b.of.object);
+            a.depth.total_cmp(&b.depth).then(by_id)
+        });
         let apart = self.share_apart(&seen);
         let mut through = LinearRgb::WHITE;
-        seen.iter().map(|s| s.behind(&mut through, apart)).collect()
+        let samples = seen.iter();
+        samples
+            .map(|s| s.mixed_behind(&mut through, at, apart))
+            .collect()
     }
 
     /// 0 for objects that are equally far out of focus, 1 for those that are not at all.
-    fn share_apart(&self, seen: &[SoftSample]) -> f32 {
+    fn share_apart(&self, seen: &[SoftSample<'_>]) -> f32 {
         let radii = seen.iter().map(|s| self.radius_px(s.depth));
         let low = radii.clone().fold(f64::INFINITY, f64::min);
         let high = radii.fold(0.0, f64::max);
@@ -243,13 +254,27 @@ impl SoftObject {
     }
 
     /// What there is of it in a pixel.
-    fn at(&self, [x, y]: [usize; 2]) -> Option<SoftSample> {
+    fn at(&self, [x, y]: [usize; 2]) -> Option<SoftSample<'_>> {
         let pixel = self.pixels[self.index([x as isize, y as isize])?];
         (pixel.alpha > LEAST_ALPHA).then(|| SoftSample {
-            object: self.object,
+            of: self,
             depth: pixel.alpha_depth / pixel.alpha,
             pixel,
         })
+    }
+
+    /// What is seen of it around a pixel, close by above all: as far as something nearer that is
+    /// out of focus lets it shine through.
+    fn around(&self, [x, y]: [usize; 2]) -> SoftPixel {
+        let side = -self.reach..=self.reach;
+        let mut sum = SoftPixel::default();
+        for (dx, dy) in side.clone().flat_map(|dy| side.clone().map(move |dx| (dx, dy))) {
+            if let Some(i) = self.index([x as isize + dx, y as isize + dy]) {
+                let nearness = 1.0 / (1 + dx * dx + dy * dy) as f32;
+                sum.add_seen(&self.pixels[i], nearness * nearness);
+            }
+        }
+        sum
     }
 }
 
@@ -263,43 +288,92 @@ impl SoftPixel {
         self.hidden = self.hidden.add_scaled(weight, *hidden);
     }
 
-    /// How much more there would be of it if nothing hid it.
-    fn unhidden(&self) -> f32 {
-        if self.visible > 0.0 {
-            self.alpha / self.visible
-        } else {
-            0.0
-        }
+    /// Adds what is seen of another pixel of the same object.
+    fn add_seen(&mut self, other: &Self, weight: f32) {
+        self.visible += weight * other.visible;
+        self.light = self.light.add_scaled(weight, other.light);
+        self.hidden = self.hidden.add_scaled(weight, other.hidden);
     }
 }
 
-impl SoftSample {
+/// What an object sends and hides in a pixel.
+struct Effect {
+    light: LinearRgb,
+    hidden: LinearRgb,
+}
+
+impl SoftSample<'_> {
     /// The sample behind what lets this much pass, which becomes what passes through both.
     ///
-    /// `apart` leads from the sum of what is seen, 0, to the soft object behind soft ones, 1.
-    fn behind(&self, through: &mut LinearRgb, apart: f32) -> (DeepSample, LinearRgb) {
-        let SoftPixel {
-            alpha,
-            visible,
-            light,
-            hidden,
-            ..
-        } = self.pixel;
-        let whole = self.pixel.unhidden();
-        let opacity = hidden.scale(whole).map(|o| o.min(1.0));
-        let light_behind = light.scale(whole) * *through;
-        let hidden_behind = opacity * *through;
-        *through = *through * opacity.map(|o| 1.0 - o);
-        let hidden = mixed(hidden, hidden_behind, apart);
-        let seen = visible + (mean(hidden_behind) - visible) * apart;
-        let sample = DeepSample {
-            object: self.object,
-            depth: Depth(self.depth),
-            light: mixed(light, light_behind, apart),
-            alpha: alpha.min(1.0),
-            visible: seen.min(alpha.min(1.0)),
+    /// `apart` leads from the sum of what is seen, 0, to a soft object behind soft ones, 1.
+    fn mixed_behind(
+        &self,
+        through: &mut LinearRgb,
+        at: [usize; 2],
+        apart: f32,
+    ) -> (DeepSample, LinearRgb) {
+        let SoftPixel { light, hidden, .. } = self.pixel;
+        if apart == 0.0 {
+            return self.sample(Effect { light, hidden }, self.pixel.visible);
+        }
+        let behind = self.behind(through, at);
+        let seen = self.pixel.visible * (1.0 - apart) + mean(behind.hidden) * apart;
+        let both = Effect {
+            light: mixed(light, behind.light, apart),
+            hidden: mixed(hidden, behind.hidden, apart),
         };
-        (sample, hidden)
+        self.sample(both, seen)
+    }
+
+    /// What it does behind what lets this much pass.
+    fn behind(&self, through: &mut LinearRgb, at: [usize; 2]) -> Effect {
+        if through.r.max(through.g).max(through.b) < LEAST_ALPHA {
+            return Effect {
+                light: LinearRgb::BLACK,
+                hidden: LinearRgb::BLACK,
+            };
+        }
+        let alone = self.alone(at);
+        let opacity = alone.hidden.map(|o| o.min(1.0));
+        let effect = Effect {
+            light: alone.light * *through,
+            hidden: opacity * *through,
+        };
+        *through = *through * opacity.map(|o| 1.0 - o);
+        effect
+    }
+
+    /// What it would do if nothing hid it.
+    fn alone(&self, at: [usize; 2]) -> Effect {
+        let known = self.pixel.visible > KNOWN_SHARE * self.pixel.alpha;
+        let seen = if known {
+            self.pixel
+        } else {
+            self.of.around(at)
+        };
+        if seen.visible <= 0.0 {
+            return Effect {
+                light: LinearRgb::BLACK,
+                hidden: LinearRgb::grey(self.pixel.alpha),
+            };
+        }
+        let whole = self.pixel.alpha / seen.visible;
+        Effect {
+            light: seen.light.scale(whole),
+            hidden: seen.hidden.scale(whole),
+        }
+    }
+
+    fn sample(&self, effect: Effect, visible: f32) -> (DeepSample, LinearRgb) {
+        let alpha = self.pixel.alpha.min(1.0);
+        let sample = DeepSample {
+            object: self.of.object,
+            depth: Depth(self.depth),
+            light: effect.light,
+            alpha,
+            visible: visible.min(alpha),
+        };
+        (sample, effect.hidden)
     }
 }
 

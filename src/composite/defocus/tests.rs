@@ -74,7 +74,7 @@ fn a_point_spreads_over_its_circle() {
         let radius = circle_px(0.03, depth.into(), 400.0);
         let wanted = 0.25 * radius * radius;
         assert!((sum - 0.5).abs() < 1e-3, "{sum}");
-        assert!((spread / sum / wanted - 1.0).abs() < 0.03, "{depth}: {} {wanted}", spread / sum);
+        assert!((spread / sum / wanted - 1.0).abs() < 0.05, "{depth}: {} {wanted}", spread / sum);
     }
 }
 
