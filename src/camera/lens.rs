@@ -59,7 +59,11 @@ impl RadialDistortion {
             return px;
         }
         let x = self.in_focal_lengths(px);
-        self.in_pixels(x / self.growth(self.undistorted_radius(x.norm())))
+        let shown = x.norm();
+        if shown == 0.0 {
+            return px;
+        }
+        self.in_pixels(x * (self.undistorted_radius(shown) / shown))
     }
 
     /// The affine map that [`undistort`](Self::undistort) is close to a position, for `(x, y, 1)`.
@@ -67,19 +71,15 @@ impl RadialDistortion {
         let slope = self.undistort_slope(px);
         let offset = self.undistort(px) - slope * px;
         let [along_x, along_y] = [slope.column(0), slope.column(1)];
-        Matrix3::from_columns(&[
-            along_x.push(0.0),
-            along_y.push(0.0),
-            offset.push(1.0),
-        ])
+        Matrix3::from_columns(&[along_x.push(0.0), along_y.push(0.0), offset.push(1.0)])
     }
 
     /// How many pixels of a pinhole camera a pixel of the picture is at a position, along both
     /// axes.
     fn undistort_slope(&self, px: Point2<f64>) -> Matrix2<f64> {
         let x = self.in_focal_lengths(self.undistort(px));
-        let bent = Matrix2::identity() * self.growth(x.norm())
-            + x * x.transpose() * (2.0 * self.k1);
+        let bent =
+            Matrix2::identity() * self.growth(x.norm()) + x * x.transpose() * (2.0 * self.k1);
         let [fx, fy] = [self.focal_px.x, self.focal_px.y];
         let inverse = bent.try_inverse().unwrap_or_else(Matrix2::identity);
         Matrix2::new(
@@ -292,8 +292,14 @@ mod tests {
             let lens = RadialDistortion::new(&camera(), k1);
             let [low, high] = lens.undistorted_bounds();
             let seen: Vec<_> = positions().map(|px| lens.undistort(px)).collect();
-            assert!(seen.iter().all(|p| p.x >= low.x - 1e-9 && p.x <= high.x + 1e-9));
-            assert!(seen.iter().all(|p| p.y >= low.y - 1e-9 && p.y <= high.y + 1e-9));
+            assert!(
+                seen.iter()
+                    .all(|p| p.x >= low.x - 1e-9 && p.x <= high.x + 1e-9)
+            );
+            assert!(
+                seen.iter()
+                    .all(|p| p.y >= low.y - 1e-9 && p.y <= high.y + 1e-9)
+            );
             let least = seen.iter().fold(f64::MAX, |m, p| m.min(p.x));
             assert!((least - low.x).abs() < 0.1, "{k1}: {least} {low}");
         }
@@ -304,7 +310,10 @@ mod tests {
         let lens = RadialDistortion::new(&camera(), -3.0);
         assert!((lens.fold() - 1.0 / 3.0).abs() < 1e-12);
         let beyond = lens.undistort(Point2::new(1000.0, 64.0));
-        assert!((beyond - Point2::new(127.0, 64.0)).norm() < 1e-9, "{beyond}");
+        assert!(
+            (beyond - Point2::new(127.0, 64.0)).norm() < 1e-9,
+            "{beyond}"
+        );
         let away = Vector3::new(0.0, 0.0, 1.0);
         assert!(lens.undistort_near(camera().principal_px).row(2) == away.transpose());
     }

@@ -67,14 +67,14 @@ pub use joint::{Joint, OutlierPhoto, group_by_camera, solve_joint};
 #[doc(hidden)]
 pub use label::{Artwork, Crop, Framing, LabelFormat, PixelOrigin};
 pub use label::{Label, LabelCamera, LabelImage, LabelPoint, LabelSurface, MarkerMap};
+#[doc(hidden)]
+pub use lens::RadialDistortion;
 pub(crate) use marker::any_markers;
 #[cfg(test)]
 pub(crate) use marker::printed;
 #[doc(hidden)]
 pub use marker::with_markers;
 pub use marker::{Marker, find_markers};
-#[doc(hidden)]
-pub use lens::RadialDistortion;
 pub use options::{CornerOrder, Priors, SolveOptions};
 #[doc(hidden)]
 pub use overlay::overlay;

@@ -184,10 +184,7 @@ impl AovSource<'_> {
     fn world_point(&self, (x, y): (usize, usize), sample: &DeepSample) -> Point3<f64> {
         let px = Point2::new(x as f64 + 0.5, y as f64 + 0.5);
         let ideal = self.shot.distortion().undistort(px);
-        self.shot
-            .camera
-            .ray(ideal)
-            .at(f64::from(sample.depth.0))
+        self.shot.camera.ray(ideal).at(f64::from(sample.depth.0))
     }
 }
 

@@ -218,11 +218,14 @@ fn samples_by_object(deep: &DeepImage) -> BTreeMap<ObjectId, Vec<PlacedSample>> 
         let tints = deep.tints(x, y);
         for (i, sample) in deep.at(x, y).iter().enumerate() {
             let tint = tints.get(i).copied();
-            objects.entry(sample.object).or_default().push(PlacedSample {
-                at: [x, y],
-                sample: *sample,
-                hidden: tint.unwrap_or(LinearRgb::grey(sample.visible)),
-            });
+            objects
+                .entry(sample.object)
+                .or_default()
+                .push(PlacedSample {
+                    at: [x, y],
+                    sample: *sample,
+                    hidden: tint.unwrap_or(LinearRgb::grey(sample.visible)),
+                });
         }
     }
     objects
@@ -268,7 +271,10 @@ impl SoftObject {
     fn around(&self, [x, y]: [usize; 2]) -> SoftPixel {
         let side = -self.reach..=self.reach;
         let mut sum = SoftPixel::default();
-        for (dx, dy) in side.clone().flat_map(|dy| side.clone().map(move |dx| (dx, dy))) {
+        for (dx, dy) in side
+            .clone()
+            .flat_map(|dy| side.clone().map(move |dx| (dx, dy)))
+        {
             if let Some(i) = self.index([x as isize + dx, y as isize + dy]) {
                 let nearness = 1.0 / (1 + dx * dx + dy * dy) as f32;
                 sum.add_seen(&self.pixels[i], nearness * nearness);

@@ -401,7 +401,10 @@ mod tests {
         // In the corners, at 32 pixels on either side, it would be 0.8 / sqrt(2).
         let moved = 24.0 / 32.0 * 0.8 / 2.0_f64.sqrt();
         assert!((red - green - moved).abs() < 0.03, "{red} {green} {moved}");
-        assert!((green - blue - moved).abs() < 0.03, "{green} {blue} {moved}");
+        assert!(
+            (green - blue - moved).abs() < 0.03,
+            "{green} {blue} {moved}"
+        );
     }
 
     #[test]

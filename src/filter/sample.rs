@@ -128,7 +128,10 @@ mod tests {
         let found = f64::from(sample_cubic_clamped(&img, x, y));
         assert!((found - expected).abs() < 1e-5, "{found} {expected}");
         assert_eq!(sample_cubic_clamped(&img, -7.0, 1.5), img[(0, 1)]);
-        assert_eq!(sample_cubic_clamped(&Image::<f32>::new(0, 0), 1.0, 1.0), 0.0);
+        assert_eq!(
+            sample_cubic_clamped(&Image::<f32>::new(0, 0), 1.0, 1.0),
+            0.0
+        );
     }
 
     #[test]

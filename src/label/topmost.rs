@@ -21,11 +21,7 @@ use std::collections::BTreeSet;
 ///
 /// Two objects are a pair when the intersection over union of their outlines is above `iou`. Of two
 /// cards at exactly the same depth, the one given first lies over the other.
-pub(crate) fn occluders(
-    objects: &[Silhouette<'_>],
-    shot: &Shot,
-    iou: f64,
-) -> Vec<Vec<ObjectId>> {
+pub(crate) fn occluders(objects: &[Silhouette<'_>], shot: &Shot, iou: f64) -> Vec<Vec<ObjectId>> {
     let boxes: Vec<_> = objects.iter().map(|o| bounds(&o.region)).collect();
     let mut occluders = vec![Vec::new(); objects.len()];
     for j in 0..objects.len() {

@@ -10,8 +10,8 @@ use crate::render::block::PixelBlock;
 
 use crate::render::irradiance::{IrradianceMap, irradiance_maps};
 use crate::render::lattice::Lattice;
-use crate::render::lens::LensView;
 use crate::render::layers::{Layer, LayerStack, RenderedTile, SampleGrid, ShadowCatcher};
+use crate::render::lens::LensView;
 use crate::render::pixel_filter::{filter_quantiles, residual_sigma};
 use crate::render::receiver::{LightingContext, ReceiverIrradiance};
 use crate::render::texture::BakedTexture;

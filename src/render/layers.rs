@@ -282,7 +282,9 @@ impl LayerStack {
         let area = bent.ideal_area(block);
         let touching = self.layers.iter().filter(|layer| layer.touches(&area));
         Self {
-            layers: touching.map(|layer| layer.seen_through(map, block)).collect(),
+            layers: touching
+                .map(|layer| layer.seen_through(map, block))
+                .collect(),
             catcher: ShadowCatcher {
                 plane: self.catcher.plane.map(|plane| plane.seen_through(map)),
                 share: self.catcher.share.clone(),

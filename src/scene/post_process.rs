@@ -289,8 +289,7 @@ impl PostProcessRanges {
         self.exposure_ev.check("finish.exposure_ev", &EV)?;
         self.white_k.check("finish.white_k", &KELVIN)?;
         self.sharpening.check("finish.sharpening", &SHARPENING)?;
-        self.chromatic_px
-            .check("finish.chromatic_px", &CHROMATIC)?;
+        self.chromatic_px.check("finish.chromatic_px", &CHROMATIC)?;
         self.camera_blur_px.check("finish.camera_blur_px", &BLUR)?;
         self.camera_noise
             .shot

@@ -55,7 +55,10 @@ fn the_circle_is_that_of_the_lens_equation() {
         let found = LENS.blur_radius_px(depth, 400.0);
         for focal_m in [0.01, 0.03, 0.1] {
             let expected = circle_px(focal_m, depth, 400.0);
-            assert!((found - expected).abs() < 1e-9, "{depth}: {found} {expected}");
+            assert!(
+                (found - expected).abs() < 1e-9,
+                "{depth}: {found} {expected}"
+            );
         }
     }
 }
@@ -74,7 +77,11 @@ fn a_point_spreads_over_its_circle() {
         let radius = circle_px(0.03, depth.into(), 400.0);
         let wanted = 0.25 * radius * radius;
         assert!((sum - 0.5).abs() < 1e-3, "{sum}");
-        assert!((spread / sum / wanted - 1.0).abs() < 0.05, "{depth}: {} {wanted}", spread / sum);
+        assert!(
+            (spread / sum / wanted - 1.0).abs() < 0.05,
+            "{depth}: {} {wanted}",
+            spread / sum
+        );
     }
 }
 
@@ -106,11 +113,20 @@ fn nothing_shines_through_where_a_soft_card_ends_over_a_sharp_one() {
     let radius = LENS.blur_radius_px(0.4, 400.0);
     assert!(radius > 1.4, "{radius}");
     for x in 8..56 {
-        assert!((hidden(&soft, x, 24) - 1.0).abs() < 0.02, "{x}: {}", hidden(&soft, x, 24));
+        assert!(
+            (hidden(&soft, x, 24) - 1.0).abs() < 0.02,
+            "{x}: {}",
+            hidden(&soft, x, 24)
+        );
         assert!((soft.flat(x, 24).color.g - 0.5).abs() < 0.02, "{x}");
     }
     // Its edge is soft as far as its circle reaches.
-    let near = |x: usize| soft.at(x, 24).iter().find(|s| s.object == ObjectId(1)).map(|s| s.alpha);
+    let near = |x: usize| {
+        soft.at(x, 24)
+            .iter()
+            .find(|s| s.object == ObjectId(1))
+            .map(|s| s.alpha)
+    };
     assert!(near(32).is_some_and(|alpha| alpha > 0.05 && alpha < 0.5));
     assert_eq!(near(36), None);
 }
@@ -127,7 +143,9 @@ fn equal_blur_is_that_of_the_whole_picture() {
     let sharp = frame(&deep, None);
     let blurred = frame(&soft, None);
     for (x, y) in [(20, 20), (31, 24), (40, 33)] {
-        let taps = disc.of_radius(LENS.blur_radius_px(f64::from(0.4_f32), 400.0)).taps();
+        let taps = disc
+            .of_radius(LENS.blur_radius_px(f64::from(0.4_f32), 400.0))
+            .taps();
         let expected: f32 = taps
             .iter()
             .map(|(dx, dy, w)| {
@@ -136,7 +154,10 @@ fn equal_blur_is_that_of_the_whole_picture() {
             })
             .sum();
         let found = blurred[(x as usize, y as usize)].g;
-        assert!((found - expected).abs() < 1e-5, "{x} {y}: {found} {expected}");
+        assert!(
+            (found - expected).abs() < 1e-5,
+            "{x} {y}: {found} {expected}"
+        );
     }
 }
 
@@ -148,10 +169,16 @@ fn shadows_are_as_soft_as_the_surface_is() {
     // The surface is half a metre away: in focus.
     let sharp = defocus(&deep, &shot(Some(LENS)));
     assert_eq!(sharp.shadow()[(31, 20)].g, 0.5);
-    let near = ThinLens { focus_m: 0.4, ..LENS };
+    let near = ThinLens {
+        focus_m: 0.4,
+        ..LENS
+    };
     let soft = defocus(&deep, &shot(Some(near)));
     let (inner, outer) = (soft.shadow()[(31, 20)].g, soft.shadow()[(32, 20)].g);
-    assert!(inner > 0.55 && outer < 0.95 && (inner + outer - 1.5).abs() < 1e-3, "{inner} {outer}");
+    assert!(
+        inner > 0.55 && outer < 0.95 && (inner + outer - 1.5).abs() < 1e-3,
+        "{inner} {outer}"
+    );
 }
 
 #[test]
@@ -162,7 +189,10 @@ fn film_keeps_its_tint() {
     let deep = deep.with_tints(vec![red; count]);
     let soft = defocus(&deep, &shot(Some(LENS)));
     let inside = soft.flat(20, 20).opacity;
-    assert!((inside.r - 0.2).abs() < 1e-4 && (inside.g - 0.8).abs() < 1e-4, "{inside:?}");
+    assert!(
+        (inside.r - 0.2).abs() < 1e-4 && (inside.g - 0.8).abs() < 1e-4,
+        "{inside:?}"
+    );
     let edge = soft.flat(32, 20).opacity;
     assert!((edge.g / edge.r - 4.0).abs() < 1e-2, "{edge:?}");
 }
@@ -173,9 +203,17 @@ fn the_surface_is_seen_where_the_axis_meets_it() {
     let focus = Focus::new(&shot, LENS);
     assert_eq!(focus.surface_radius_px(32, 24), 0.0);
     let higher = Shot {
-        camera: Camera::look_at(Point3::new(0.0, 0.0, 0.8), Point3::origin(), 400.0, [64, 48]),
+        camera: Camera::look_at(
+            Point3::new(0.0, 0.0, 0.8),
+            Point3::origin(),
+            400.0,
+            [64, 48],
+        ),
         ..shot.clone()
     };
     let off = Focus::new(&higher, LENS).surface_radius_px(5, 40);
-    assert!((off - LENS.blur_radius_px(0.8, 400.0)).abs() < 1e-6, "{off}");
+    assert!(
+        (off - LENS.blur_radius_px(0.8, 400.0)).abs() < 1e-6,
+        "{off}"
+    );
 }

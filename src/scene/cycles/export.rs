@@ -1,8 +1,8 @@
 //! A shot as a folder for the reference renderer.
 
 use super::file::{
-    CyclesAperture, CyclesCamera, CyclesEnvironment, CyclesFile, CyclesGround, CyclesLight, CyclesPicture,
-    CyclesQuad, CyclesRender, CyclesShape, CyclesSide, CyclesSize, CyclesTray,
+    CyclesAperture, CyclesCamera, CyclesEnvironment, CyclesFile, CyclesGround, CyclesLight,
+    CyclesPicture, CyclesQuad, CyclesRender, CyclesShape, CyclesSide, CyclesSize, CyclesTray,
 };
 use crate::asset::Texture;
 use crate::error::{Error, Result};

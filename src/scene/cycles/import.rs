@@ -1,8 +1,8 @@
 //! A shot from a file of the reference renderer.
 
 use super::file::{
-    CyclesAperture,
-    CyclesCamera, CyclesEnvironment, CyclesFile, CyclesLight, CyclesQuad, CyclesSide,
+    CyclesAperture, CyclesCamera, CyclesEnvironment, CyclesFile, CyclesLight, CyclesQuad,
+    CyclesSide,
 };
 use crate::asset::{Panorama, Texture};
 use crate::camera::Camera;
