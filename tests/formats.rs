@@ -120,6 +120,7 @@ fn sample_of(shot: Shot, options: &LabelOptions) -> Result<Sample> {
         cast: LightTint::default(),
         view: Default::default(),
         edges: Default::default(),
+        lens: Default::default(),
         finish: PostProcess::default(),
         files: None,
         settings: Default::default(),

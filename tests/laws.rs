@@ -13,6 +13,7 @@ use rayon::prelude::*;
 
 fn tray() -> Background {
     Background {
+        k1: 0.0,
         albedo: None,
         wall: None,
         name: "tray".into(),
@@ -259,6 +260,7 @@ fn nothing_at_rest_lies_in_another() {
 fn tight(times: f64, narrow: f64) -> Background {
     let longest = 0.28 * recipe(Range::fixed(1.0)).scale.max;
     Background {
+        k1: 0.0,
         albedo: None,
         wall: None,
         size: [longest * times, longest * times * narrow],
@@ -358,6 +360,7 @@ fn a_tray_smaller_than_the_longest_card_is_refused_with_both_named() {
     let trays = [
         tray(),
         Background {
+            k1: 0.0,
             albedo: None,
             wall: None,
             name: "box".into(),

@@ -40,7 +40,10 @@ render        width*, height*, samples (128), seed (0), threads (0 = all),
 camera*       either K*, R*, t*, resolution ([width, height] K belongs to,
               default the render size), pixel_center (0.5), or
               blender: {matrix_world*, lens* (mm), sensor_width (36),
-              shift_x (0), shift_y (0)}.  Optional clip: [near, far].
+              shift_x (0), shift_y (0)}.  Optional clip: [near, far];
+              k1: OpenCV's first coefficient of radial distortion (0), for
+              square pixels and the principal point in the middle;
+              aperture: {diameter* (m), focus* (m)} of a thin lens.
 tray*         size*.
 plate         path*, encoding ("linear" | "srgb", default by file type).
 quads*        list of {id* (1..65535), size*, pose (needed unless simulated),
@@ -241,9 +244,17 @@ def load_scene(path, needs_pose):
         "factory_defaults": bool(r.get("factory_defaults", False)),
     }
 
-    c = _keys(raw["camera"], ("K", "R", "t", "resolution", "pixel_center", "blender", "clip"),
-              "camera")
-    cam = {"clip": _vector(c.get("clip", [0.01, 100.0]), 2, "camera.clip", 1e-4)}
+    c = _keys(raw["camera"], ("K", "R", "t", "resolution", "pixel_center", "blender", "clip",
+                              "k1", "aperture"), "camera")
+    cam = {"clip": _vector(c.get("clip", [0.01, 100.0]), 2, "camera.clip", 1e-4),
+           "k1": _number(c.get("k1", 0.0), "camera.k1")}
+    if "aperture" in c:
+        a = _keys(c["aperture"], ("diameter", "focus"), "camera.aperture")
+        for key in ("diameter", "focus"):
+            if key not in a:
+                _fail("camera.aperture", "missing key: %s" % key)
+        cam["aperture"] = {key: _number(a[key], "camera.aperture." + key, 1e-9)
+                           for key in ("diameter", "focus")}
     if "blender" in c:
         b = _keys(c["blender"], ("matrix_world", "lens", "sensor_width", "shift_x", "shift_y"),
                   "camera.blender")
@@ -614,6 +625,24 @@ def camera_to_blender(cam, width, height):
     return rows, lens, sensor, shift_x, shift_y, aspect_x, aspect_y
 
 
+def lens_polynomial(k1, focal_mm, reach_mm):
+    """Coefficients of Cycles' "Fisheye Lens Polynomial" that make OpenCV's k1, and its largest error in mm.
+
+    That camera sends the ray of a point r millimetres from the middle of the sensor out at an angle
+    -(c0 + c1 r + c2 r^2 + c3 r^3 + c4 r^4) from its axis; a pinhole with k1 at atan(u), where
+    u (1 + k1 u^2) = r / focal.  The fit is by least squares over all radii of the picture.
+    """
+    import numpy as np
+    r = np.linspace(0.0, reach_mm, 4001)
+    u = r / focal_mm
+    for _ in range(60):
+        u = u - (u * (1.0 + k1 * u * u) - r / focal_mm) / (1.0 + 3.0 * k1 * u * u)
+    powers = np.stack([(r / reach_mm) ** n for n in range(1, 5)], axis=1)
+    scaled, *_ = np.linalg.lstsq(powers, np.arctan(u), rcond=None)
+    error = np.abs(powers @ scaled - np.arctan(u)) * focal_mm * (1.0 + u * u) * (1.0 + 3.0 * k1 * u * u)
+    return [0.0] + [-float(c) / reach_mm ** n for n, c in enumerate(scaled, 1)], float(error.max())
+
+
 class Builder:
     """Builds the Blender scene for one scene dict."""
 
@@ -864,9 +893,32 @@ class Builder:
         data.shift_x = shift_x
         data.shift_y = shift_y
         data.clip_start, data.clip_end = self.spec["camera"]["clip"]
+        cam = self.spec["camera"]
+        if cam["k1"]:
+            self.add_distortion(data, cam["k1"], (shift_x, shift_y, ax - ay))
+        if "aperture" in cam:
+            data.dof.use_dof = True
+            data.dof.focus_distance = cam["aperture"]["focus"]
+            data.dof.aperture_fstop = 1e-3 * lens / cam["aperture"]["diameter"]
+            data.dof.aperture_blades = 0
         self.scene.render.pixel_aspect_x = ax
         self.scene.render.pixel_aspect_y = ay
         self.scene.camera = self.link("camera", data, rows)
+
+    def add_distortion(self, data, k1, off_axis):
+        if max(abs(v) for v in off_axis) > 1e-6:
+            _fail("camera.k1", "needs square pixels and the principal point in the middle")
+        if "aperture" in self.spec["camera"]:
+            _fail("camera.k1", "cannot be had together with camera.aperture")
+        r = self.spec["render"]
+        height = data.sensor_width * r["height"] / r["width"]
+        coefficients, error = lens_polynomial(k1, data.lens, 0.5 * math.hypot(data.sensor_width, height))
+        print("lens polynomial: at most %.5f px off" % (error * r["width"] / data.sensor_width))
+        data.type = "PANO"
+        data.cycles.panorama_type = "FISHEYE_LENS_POLYNOMIAL"
+        data.cycles.fisheye_fov = math.pi
+        for n, value in enumerate(coefficients):
+            setattr(data.cycles, "fisheye_polynomial_k%d" % n, value)
 
     def add_lights(self):
         for n, spec in enumerate(self.spec["lights"]):

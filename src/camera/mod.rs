@@ -23,6 +23,7 @@ mod init;
 mod joint;
 mod label;
 mod label_check;
+mod lens;
 mod marker;
 mod model;
 mod options;
@@ -66,6 +67,8 @@ pub use joint::{Joint, OutlierPhoto, group_by_camera, solve_joint};
 #[doc(hidden)]
 pub use label::{Artwork, Crop, Framing, LabelFormat, LabelWall, PixelOrigin};
 pub use label::{Label, LabelCamera, LabelImage, LabelPoint, LabelSurface, MarkerMap};
+#[doc(hidden)]
+pub use lens::RadialDistortion;
 pub(crate) use marker::any_markers;
 #[cfg(test)]
 pub(crate) use marker::printed;

@@ -3,6 +3,7 @@
 use super::error::SolveError;
 use super::file::{CameraFile, SolvedFrom, checksum};
 use super::label::Label;
+use super::lens::k1_from_kappa;
 use super::options::SolveOptions;
 use super::pinhole::Camera;
 use super::read::LabelledPhoto;
@@ -19,6 +20,8 @@ use std::path::{Path, PathBuf};
 pub struct PhotoCamera {
     /// The camera.
     pub camera: Camera,
+    /// OpenCV's first coefficient of its lens's radial distortion.
+    pub k1: f64,
     /// Width and height of the rectangle as fitted, metres.
     pub size: [f64; 2],
     /// Warnings to review.
@@ -72,6 +75,7 @@ impl PhotoCamera {
     fn stored(file: &CameraFile) -> Self {
         Self {
             camera: file.camera(),
+            k1: k1_from_kappa(&file.camera(), file.found.model.kappa),
             size: file.size(),
             warnings: file.found.warnings.clone(),
             stored: true,
@@ -99,6 +103,7 @@ impl From<Solution> for PhotoCamera {
     fn from(solution: Solution) -> Self {
         Self {
             camera: solution.camera,
+            k1: k1_from_kappa(&solution.camera, solution.kappa),
             size: solution.size,
             warnings: solution.warnings,
             stored: false,

@@ -182,10 +182,9 @@ impl AovSource<'_> {
 
     /// The point of the world that a sample shows at its pixel's centre.
     fn world_point(&self, (x, y): (usize, usize), sample: &DeepSample) -> Point3<f64> {
-        self.shot
-            .camera
-            .ray(Point2::new(x as f64 + 0.5, y as f64 + 0.5))
-            .at(f64::from(sample.depth.0))
+        let px = Point2::new(x as f64 + 0.5, y as f64 + 0.5);
+        let ideal = self.shot.distortion().undistort(px);
+        self.shot.camera.ray(ideal).at(f64::from(sample.depth.0))
     }
 }
 

@@ -3,7 +3,7 @@
 
 use crate::composite::poisson::blend;
 use crate::deep::DeepImage;
-use crate::filter::gaussian_blur;
+use crate::filter::{gaussian_blur, sample_cubic_clamped};
 use crate::image::Image;
 use crate::pixel::{Film, LinearRgb, Mix, PremulRgba};
 use crate::scene::{Blur, CameraNoise, EdgeTreatment, Noise, PostProcess};
@@ -18,7 +18,7 @@ const SHARPENING_SIGMA_PX: f32 = 1.0;
 ///
 /// Cards and shadows get the blur and the noise that a photograph of them would have: what is seen
 /// of the plate already has its own, so that a pixel far from card and shadow keeps its bits.
-/// The camera's blur and noise, exposure, white balance and sharpening are the whole frame's.
+/// The camera's colour fringes, blur and noise, exposure, white balance and sharpening are the whole frame's.
 ///
 /// # Method
 /// What the cards send and what they and the shadows let pass is blurred, the plate is not. Noise is
@@ -63,16 +63,38 @@ pub fn finish_blended(
     sharpen(&exposed, finish.sharpening as f32)
 }
 
-/// The whole frame with the blur and the noise of a camera.
+/// The whole frame with the colour fringes, the blur and the noise of a camera.
 fn through_camera(frame: Image<PremulRgba>, finish: &PostProcess) -> Image<PremulRgba> {
-    let soft = match finish.camera_blur_px {
+    let fringed = match finish.chromatic_px {
         0.0 => frame,
-        sigma_px => gaussian_blur(&frame, sigma_px as f32),
+        corner_px => spread_colors(&frame, corner_px),
+    };
+    let soft = match finish.camera_blur_px {
+        0.0 => fringed,
+        sigma_px => gaussian_blur(&fringed, sigma_px as f32),
     };
     match SensorNoise::of_camera(finish) {
         Some(noise) => noise.add_to(&soft, |_, _| NO_PLATE),
         None => soft,
     }
+}
+
+/// The frame with red magnified and blue made smaller about its middle, by so many pixels in the
+/// corners.
+fn spread_colors(frame: &Image<PremulRgba>, corner_px: f64) -> Image<PremulRgba> {
+    work::add(Kind::Filters, 1);
+    let [w, h] = [frame.width() as f64, frame.height() as f64];
+    let share = 2.0 * corner_px / libm::hypot(w, h);
+    let color_at = |scale: f64, x: usize, y: usize| {
+        let from_middle = |i: usize, side: f64| (i as f64 + 0.5 - 0.5 * side) / scale + 0.5 * side;
+        let p = sample_cubic_clamped(frame, from_middle(x, w), from_middle(y, h));
+        p.color().map(|v| v.max(0.0))
+    };
+    Image::from_fn(frame.width(), frame.height(), |x, y| PremulRgba {
+        r: color_at(1.0 + share, x, y).r,
+        b: color_at(1.0 - share, x, y).b,
+        ..frame[(x, y)]
+    })
 }
 
 /// The frame with cards and shadows blurred.
@@ -373,6 +395,34 @@ mod tests {
         });
         let contrast = |image: &Image<PremulRgba>| (image[(3, 10)].g - image[(4, 10)].g).abs();
         assert!(contrast(&after) < 0.5 * contrast(&before));
+    }
+
+    #[test]
+    fn red_lies_farther_out_and_blue_farther_in() {
+        // A blob in every corner of the frame, two pixels wide.
+        let blob = |x: usize, y: usize| {
+            let off = |i: usize| (i as f64 + 0.5 - 32.0).abs() - 24.0;
+            libm::exp(-(off(x).powi(2) + off(y).powi(2)) / 8.0) as f32
+        };
+        let frame = Image::from_fn(64, 64, |x, y| LinearRgb::grey(blob(x, y)).opaque());
+        let fringed = spread_colors(&frame, 0.8);
+        let place = |channel: fn(&PremulRgba) -> f32| {
+            let (mut sum, mut at) = (0.0, 0.0);
+            for x in 32..64 {
+                let light: f32 = (32..64).map(|y| channel(&fringed[(x, y)])).sum();
+                sum += f64::from(light);
+                at += f64::from(light) * (x as f64 + 0.5 - 32.0);
+            }
+            at / sum
+        };
+        let (red, green, blue) = (place(|p| p.r), place(|p| p.g), place(|p| p.b));
+        // In the corners, at 32 pixels on either side, it would be 0.8 / sqrt(2).
+        let moved = 24.0 / 32.0 * 0.8 / 2.0_f64.sqrt();
+        assert!((red - green - moved).abs() < 0.03, "{red} {green} {moved}");
+        assert!(
+            (green - blue - moved).abs() < 0.03,
+            "{green} {blue} {moved}"
+        );
     }
 
     #[test]

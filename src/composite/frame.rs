@@ -1,5 +1,6 @@
 //! The finished frame: what objects add, over what their shadows leave of the plate.
 
+use crate::composite::defocus::defocus;
 use crate::deep::DeepImage;
 use crate::image::Image;
 use crate::pixel::{Film, LinearRgb, PremulRgba};
@@ -28,7 +29,8 @@ pub fn frame(deep: &DeepImage, plate: Option<&Image<LinearRgb>>) -> Image<Premul
     })
 }
 
-/// The picture of a shot in one call: its deep samples over its plate; scene-linear, premultiplied.
+/// The picture of a shot in one call: its deep samples, out of focus where its lens has them so,
+/// over its plate; scene-linear, premultiplied.
 ///
 /// ```
 /// use petcomp::geom::{Pose, Quad};
@@ -49,7 +51,8 @@ pub fn frame(deep: &DeepImage, plate: Option<&Image<LinearRgb>>) -> Image<Premul
 /// # Panics
 /// When the plate's size is not the camera's.
 pub fn picture(shot: &Shot, options: &RenderOptions) -> Image<PremulRgba> {
-    frame(&render(shot, options), shot.plate.as_deref())
+    let deep = render(shot, options);
+    frame(&defocus(&deep, shot), shot.plate.as_deref())
 }
 
 /// Folds deep samples into a picture of their light and of what they let pass, per channel;

@@ -17,6 +17,7 @@
 
 mod aov;
 mod cryptomatte;
+mod defocus;
 mod finish;
 mod frame;
 mod part;
@@ -27,6 +28,8 @@ mod porter_duff;
 pub use aov::{Aov, front, parts};
 #[doc(hidden)]
 pub use cryptomatte::cryptomatte;
+#[doc(hidden)]
+pub use defocus::defocus;
 pub use finish::finish;
 #[doc(hidden)]
 pub use finish::finish_blended;

@@ -92,6 +92,7 @@ impl BackgroundPhoto {
                 name: labelled.name.clone(),
                 size: seen.size,
                 camera: CameraSource::Known(camera),
+                k1: seen.k1,
                 albedo: labelled.label.surface.albedo,
                 wall: wall_of(labelled, seen.size),
             },

@@ -5,6 +5,7 @@ use crate::dataset::background_photo::BackgroundPhoto;
 use crate::dataset::environment_maps::EnvironmentMaps;
 use crate::dataset::{DatasetConfig, Inputs};
 use crate::error::Result;
+use crate::scene::Background;
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -101,7 +102,7 @@ fn of_place(place: &BackgroundPhoto, photo: u32, front: Option<u32>) -> Value {
     let mut place_values = json!({
         "name": background.name,
         "size": background.size,
-        "camera": digest(&(background.camera, kept)),
+        "camera": camera_digest(background, kept),
         "photo": shown(photo),
     });
     if let Some(wall) = background.wall {
@@ -111,6 +112,15 @@ fn of_place(place: &BackgroundPhoto, photo: u32, front: Option<u32>) -> Value {
         place_values["front"] = json!(shown(front));
     }
     place_values
+}
+
+/// Checksum of a camera, the part of its photo that is shown, and its lens where that is not ideal.
+fn camera_digest(background: &Background, kept: [usize; 4]) -> String {
+    let camera = background.camera;
+    match background.k1 {
+        0.0 => digest(&(camera, kept)),
+        k1 => digest(&(camera, kept, k1)),
+    }
 }
 
 /// What a person should know of the backgrounds, by their names: the report shows it.

@@ -27,4 +27,6 @@ pub use pyramid::Pyramid;
 pub use pyramid::{expand, halve, reduce};
 #[doc(hidden)]
 pub use resize::resize;
-pub(crate) use sample::{sample_bilinear, sample_bilinear_clamped, sample_nearest};
+pub(crate) use sample::{
+    sample_bilinear, sample_bilinear_clamped, sample_cubic_clamped, sample_nearest,
+};

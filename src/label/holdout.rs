@@ -1,6 +1,5 @@
 //! How much of an object the place hides.
 
-use crate::camera::Camera;
 use crate::deep::HoldoutSample;
 use crate::geom::Point2;
 use crate::image::Image;
@@ -17,15 +16,16 @@ pub(crate) fn hidden_area(region: &MultiPolygon<f64>, card: &Card, shot: &Shot) 
     };
     let covered = covered_pixels(region, holdout);
     covered
-        .filter(|(px, sample)| is_behind(card, &shot.camera, *px, sample))
+        .filter(|(px, sample)| is_behind(card, shot, *px, sample))
         .filter(|(px, _)| region.contains(&Point::new(px.x, px.y)))
         .map(|(_, sample)| f64::from(sample.coverage.0))
         .sum()
 }
 
 /// Whether a card lies behind the place at a pixel.
-fn is_behind(card: &Card, camera: &Camera, px: Point2<f64>, sample: &HoldoutSample) -> bool {
-    sample.hides(1.0 / card.inverse_depth(camera, px))
+fn is_behind(card: &Card, shot: &Shot, px: Point2<f64>, sample: &HoldoutSample) -> bool {
+    let seen = shot.distortion().undistort(px);
+    sample.hides(1.0 / card.inverse_depth(&shot.camera, seen))
 }
 
 /// Centres of the pixels around a region that the place covers, and how far.

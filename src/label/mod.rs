@@ -53,7 +53,7 @@ pub use topmost::cyclic_overlaps;
 pub use truncation::Truncation;
 pub use visibility::DepthRange;
 
-use crate::camera::Camera;
+use crate::camera::{Camera, RadialDistortion};
 use crate::deep::DeepImage;
 use crate::geom::{BBox, Point2};
 use crate::pixel::ObjectId;
@@ -177,7 +177,8 @@ pub enum AmodalBox {
 /// The outline of a card as the camera sees it, clipped to the picture: one ring per part, pixels.
 #[doc(hidden)]
 pub fn outline_of(card: &Card, camera: &Camera) -> Vec<Vec<Point2<f64>>> {
-    outline::rings(&outline::region(card, camera))
+    let pinhole = RadialDistortion::new(camera, 0.0);
+    outline::rings(&outline::region(card, camera, &pinhole))
 }
 
 /// A card as the camera sees it.
@@ -197,7 +198,7 @@ pub fn label(deep: &DeepImage, shot: &Shot, options: &LabelOptions) -> Labels {
     check_size(deep, image);
     let mut objects = silhouettes(deep, shot, options);
     objects.retain(|s| !s.amodal_box(options.amodal).is_empty());
-    let occluders = topmost::occluders(&objects, &shot.camera, options.obstruction.pair_iou());
+    let occluders = topmost::occluders(&objects, shot, options.obstruction.pair_iou());
     let uncovered: Vec<_> =
         uncovered_fractions(&objects, &occluders, shot, options.obstruction).collect();
     let mut labels = Labels {
@@ -292,8 +293,8 @@ fn silhouettes<'a>(
     let visibilities = visibility::fold_samples(deep, &ids, options);
     let pairs = cards.into_iter().zip(visibilities);
     pairs
-        .map(|(card, visibility)| Silhouette::new(card, &shot.camera, visibility))
-        .map(|silhouette| silhouette.measured(&shot.camera, options.max_truncation))
+        .map(|(card, visibility)| Silhouette::new(card, shot, visibility))
+        .map(|silhouette| silhouette.measured(shot, options.max_truncation))
         .collect()
 }
 
@@ -304,20 +305,20 @@ fn cards_by_id(shot: &Shot) -> Vec<&Card> {
 }
 
 impl<'a> Silhouette<'a> {
-    fn new(card: &'a Card, camera: &Camera, visibility: ObjectVisibility) -> Self {
+    fn new(card: &'a Card, shot: &Shot, visibility: ObjectVisibility) -> Self {
         Self {
             card,
-            region: outline::region(card, camera),
+            region: outline::region(card, &shot.camera, &shot.distortion()),
             visibility,
             truncation: None,
         }
     }
 
     /// The same with its truncation, where there is a most.
-    fn measured(self, camera: &Camera, max_truncation: Option<f64>) -> Self {
+    fn measured(self, shot: &Shot, max_truncation: Option<f64>) -> Self {
         Self {
             truncation: max_truncation
-                .map(|max| Truncation::new(self.card, camera, &self.region, max)),
+                .map(|max| Truncation::new(self.card, shot, &self.region, max)),
             ..self
         }
     }

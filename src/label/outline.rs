@@ -6,8 +6,11 @@
 //! behind the camera projects like any other. What that leaves along the picture's edge, and loops
 //! of an outline that crosses itself, a boolean operation of `geo` then resolves under the non-zero
 //! rule: whatever the outline winds around is inside.
+//!
+//! Where the lens bends straight lines, the pyramid is that of all that it lets into the picture,
+//! and the sides of the outline are cut into short ones before the lens bends them.
 
-use crate::camera::Camera;
+use crate::camera::{Camera, RadialDistortion};
 use crate::geom::BBox;
 use crate::geom::{Point2, Vector3};
 use crate::scene::Card;
@@ -25,10 +28,16 @@ const NEAR_PLANE_M: f64 = 1e-4;
 /// hundredth of this.
 pub(crate) const SLIVER_AREA_PX2: f64 = 1e-2;
 
+/// Length of the sides that a lens bends, pixels: within one, a line that k1 = 0.1 bends is straight
+/// to a hundredth of a pixel.
+const BENT_SIDE_PX: f64 = 8.0;
+/// Most pieces of a side, which may be as long as it likes outside of the picture.
+const MAX_PIECES: f64 = 4096.0;
+
 /// The part of the picture that lies inside a card's outline; empty where the card is out of sight
 /// or edge-on.
-pub(crate) fn region(card: &Card, camera: &Camera) -> MultiPolygon<f64> {
-    let px = projected(card, camera);
+pub(crate) fn region(card: &Card, camera: &Camera, lens: &RadialDistortion) -> MultiPolygon<f64> {
+    let px = projected(card, camera, lens);
     if !has_area(&px) {
         return MultiPolygon(Vec::new());
     }
@@ -41,9 +50,9 @@ pub(crate) fn region(card: &Card, camera: &Camera) -> MultiPolygon<f64> {
 
 /// All that lies inside a card's outline, beyond the picture's edges too; empty where the card is
 /// behind the camera or edge-on.
-pub(crate) fn whole(card: &Card, camera: &Camera) -> MultiPolygon<f64> {
+pub(crate) fn whole(card: &Card, camera: &Camera, lens: &RadialDistortion) -> MultiPolygon<f64> {
     let in_front = clip_to_front(in_camera(card, camera));
-    let px: Vec<_> = in_front.iter().map(|p| to_pixel(p, camera)).collect();
+    let px = shown(&in_front, camera, lens);
     if !has_area(&px) {
         return MultiPolygon(Vec::new());
     }
@@ -58,9 +67,44 @@ fn unwound(outline: &Polygon<f64>) -> MultiPolygon<f64> {
 }
 
 /// The outline of the part in view, pixels.
-fn projected(card: &Card, camera: &Camera) -> Vec<Coord<f64>> {
-    let seen = clip_to_view(in_camera(card, camera), camera);
-    seen.iter().map(|p| to_pixel(p, camera)).collect()
+fn projected(card: &Card, camera: &Camera, lens: &RadialDistortion) -> Vec<Coord<f64>> {
+    let bounds = lens.undistorted_bounds();
+    let seen = clip_to_view(in_camera(card, camera), camera, bounds);
+    shown(&seen, camera, lens)
+}
+
+/// Where the picture shows a ring of points before the camera.
+fn shown(ring: &[Vector3<f64>], camera: &Camera, lens: &RadialDistortion) -> Vec<Coord<f64>> {
+    let px = ring.iter().map(|p| to_pixel(p, camera)).collect();
+    if lens.is_none() {
+        return px;
+    }
+    bent(&px, lens)
+}
+
+/// A ring of pinhole positions as a lens shows it.
+fn bent(ring: &[Coord<f64>], lens: &RadialDistortion) -> Vec<Coord<f64>> {
+    let ends = ring.iter().cycle().skip(1);
+    let sides = ring.iter().zip(ends);
+    sides
+        .flat_map(|(a, b)| points_along(*a, *b))
+        .map(|p| {
+            let seen = lens.distort(Point2::new(p.x, p.y));
+            Coord {
+                x: seen.x,
+                y: seen.y,
+            }
+        })
+        .collect()
+}
+
+/// The start of a side, and what cuts it into short ones.
+fn points_along(a: Coord<f64>, b: Coord<f64>) -> impl Iterator<Item = Coord<f64>> {
+    let side = b - a;
+    let pieces = (libm::hypot(side.x, side.y) / BENT_SIDE_PX)
+        .ceil()
+        .clamp(1.0, MAX_PIECES);
+    (0..pieces as u32).map(move |i| a + side * (f64::from(i) / pieces))
 }
 
 fn has_area(px: &[Coord<f64>]) -> bool {
@@ -119,13 +163,18 @@ fn in_camera(card: &Card, camera: &Camera) -> Vec<Vector3<f64>> {
         .collect()
 }
 
-fn clip_to_view(outline: Vec<Vector3<f64>>, camera: &Camera) -> Vec<Vector3<f64>> {
-    let [w, h] = camera.image.map(f64::from);
+/// The part of an outline that is seen between two positions of the pinhole's picture.
+fn clip_to_view(
+    outline: Vec<Vector3<f64>>,
+    camera: &Camera,
+    [low, high]: [Point2<f64>; 2],
+) -> Vec<Vector3<f64>> {
     let (f, c) = (camera.focal_px, camera.principal_px);
-    let right_of_left = clip_to_half_space(clip_to_front(outline), |p| f.x * p.x + c.x * p.z);
-    let left_of_right = clip_to_half_space(right_of_left, |p| (w - c.x) * p.z - f.x * p.x);
-    let below_top = clip_to_half_space(left_of_right, |p| f.y * p.y + c.y * p.z);
-    clip_to_half_space(below_top, |p| (h - c.y) * p.z - f.y * p.y)
+    let far_enough = clip_to_front(outline);
+    let right_of_left = clip_to_half_space(far_enough, |p| f.x * p.x + (c.x - low.x) * p.z);
+    let left_of_right = clip_to_half_space(right_of_left, |p| (high.x - c.x) * p.z - f.x * p.x);
+    let below_top = clip_to_half_space(left_of_right, |p| f.y * p.y + (c.y - low.y) * p.z);
+    clip_to_half_space(below_top, |p| (high.y - c.y) * p.z - f.y * p.y)
 }
 
 /// The part that is far enough before the camera.
@@ -198,7 +247,11 @@ mod tests {
 
     /// The part of the picture inside an outline on the grid.
     fn on_grid(corners: &[[u32; 2]]) -> MultiPolygon<f64> {
-        region(&card_on_grid(corners), &camera())
+        region(
+            &card_on_grid(corners),
+            &camera(),
+            &RadialDistortion::new(&camera(), 0.0),
+        )
     }
 
     fn card_on_grid(corners: &[[u32; 2]]) -> Card {
@@ -272,7 +325,7 @@ mod tests {
             let border = 2.0 * SIDE * corners.len() as f64;
             prop_assert!((found.unsigned_area() - count).abs() <= 0.5 * border);
             // All of it lies in the picture.
-            let all = whole(&card_on_grid(&corners), &camera());
+            let all = whole(&card_on_grid(&corners), &camera(), &RadialDistortion::new(&camera(), 0.0));
             prop_assert!((all.unsigned_area() - found.unsigned_area()).abs() < 0.1);
         }
 

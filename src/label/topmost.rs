@@ -22,16 +22,12 @@ use std::collections::BTreeSet;
 ///
 /// Two objects are a pair when the intersection over union of their outlines is above `iou`. Of two
 /// cards at exactly the same depth, the one given first lies over the other.
-pub(crate) fn occluders(
-    objects: &[Silhouette<'_>],
-    camera: &Camera,
-    iou: f64,
-) -> Vec<Vec<ObjectId>> {
+pub(crate) fn occluders(objects: &[Silhouette<'_>], shot: &Shot, iou: f64) -> Vec<Vec<ObjectId>> {
     let boxes: Vec<_> = objects.iter().map(|o| bounds(&o.region)).collect();
     let mut occluders = vec![Vec::new(); objects.len()];
     for j in 0..objects.len() {
         for i in (0..j).filter(|i| boxes[*i].overlaps(&boxes[j])) {
-            let Some(first_is_above) = is_first_above(&objects[i], &objects[j], camera, iou) else {
+            let Some(first_is_above) = is_first_above(&objects[i], &objects[j], shot, iou) else {
                 continue;
             };
             let (above, below) = if first_is_above { (i, j) } else { (j, i) };
@@ -74,11 +70,12 @@ pub(crate) fn is_held_out(object: &Silhouette<'_>, share: f64, shot: &Shot) -> b
 fn is_first_above(
     first: &Silhouette<'_>,
     second: &Silhouette<'_>,
-    camera: &Camera,
+    shot: &Shot,
     iou: f64,
 ) -> Option<bool> {
     let center = overlap_center(&first.region, &second.region, iou)?;
-    Some(is_above(first.card, second.card, camera, center))
+    let ideal = shot.distortion().undistort(center);
+    Some(is_above(first.card, second.card, &shot.camera, ideal))
 }
 
 /// Of two cards that meet at a pixel position, the first is at least as near.

@@ -5,10 +5,9 @@
 //! the share of the outline, as the camera sees it, that lies beyond the picture's edges. Samples
 //! end at the edges, outlines do not.
 
-use crate::camera::Camera;
 use crate::geom::BBox;
 use crate::label::outline::{self, SLIVER_AREA_PX2};
-use crate::scene::Card;
+use crate::scene::{Card, Shot};
 use geo::{Area, MultiPolygon};
 use serde::{Deserialize, Serialize};
 
@@ -26,8 +25,8 @@ pub struct Truncation {
 
 impl Truncation {
     /// Of a card whose part inside of the picture is known.
-    pub(crate) fn new(card: &Card, camera: &Camera, inside: &MultiPolygon<f64>, max: f64) -> Self {
-        let whole = outline::whole(card, camera);
+    pub(crate) fn new(card: &Card, shot: &Shot, inside: &MultiPolygon<f64>, max: f64) -> Self {
+        let whole = outline::whole(card, &shot.camera, &shot.distortion());
         let fraction = outside_fraction(&whole, inside);
         Self {
             fraction,

@@ -1,6 +1,6 @@
 //! The colour of the light on the labelled surface, from the plate.
 
-use crate::camera::Camera;
+use crate::camera::{Camera, RadialDistortion};
 use crate::color::Albedo;
 use crate::geom::{Plane, Point2, Point3};
 use crate::image::Image;
@@ -14,7 +14,8 @@ pub(crate) fn surface_color(scene: &Scene, plate: &Image<LinearRgb>) -> Option<L
     let CameraSource::Known(camera) = scene.camera else {
         return None;
     };
-    let seen = surface_pixels(&camera, scene.surface.size, plate);
+    let lens = scene.lens.distortion_of_plate(&camera);
+    let seen = surface_pixels((&camera, &lens), scene.surface.size, plate);
     if seen.is_empty() {
         return None;
     }
@@ -26,10 +27,14 @@ pub(crate) fn surface_color(scene: &Scene, plate: &Image<LinearRgb>) -> Option<L
 }
 
 /// The finite pixels of a plate that show a surface of this size.
-fn surface_pixels(camera: &Camera, size: [f64; 2], plate: &Image<LinearRgb>) -> Vec<LinearRgb> {
+fn surface_pixels(
+    by: (&Camera, &RadialDistortion),
+    size: [f64; 2],
+    plate: &Image<LinearRgb>,
+) -> Vec<LinearRgb> {
     let places = (0..plate.height()).flat_map(|y| (0..plate.width()).map(move |x| (x, y)));
     places
-        .filter(|&(x, y)| surface_point(camera, x, y).is_some_and(|p| is_on_surface(&p, size)))
+        .filter(|&(x, y)| surface_point(by, x, y).is_some_and(|p| is_on_surface(&p, size)))
         .map(|at| plate[at])
         .filter(|c| c.is_finite())
         .collect()
@@ -40,8 +45,13 @@ fn is_on_surface(point: &Point3<f64>, [w, h]: [f64; 2]) -> bool {
 }
 
 /// The point of the plane `z = 0` that a pixel shows.
-fn surface_point(camera: &Camera, x: usize, y: usize) -> Option<Point3<f64>> {
-    let ray = camera.ray(Point2::new(x as f64 + 0.5, y as f64 + 0.5));
+fn surface_point(
+    (camera, lens): (&Camera, &RadialDistortion),
+    x: usize,
+    y: usize,
+) -> Option<Point3<f64>> {
+    let px = Point2::new(x as f64 + 0.5, y as f64 + 0.5);
+    let ray = camera.ray(lens.undistort(px));
     Plane::surface().intersect(&ray).map(|t| ray.at(t))
 }
 
@@ -107,6 +117,7 @@ pub(super) mod tests {
             edges: Default::default(),
             cast,
             view: Default::default(),
+            lens: Default::default(),
             finish: Default::default(),
             files: None,
             settings: Default::default(),

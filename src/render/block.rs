@@ -33,6 +33,18 @@ impl PixelBlock {
             .map(|[x, y]| Vector3::new(x, y, 1.0))
     }
 
+    /// Its own four corners, where its pixels end.
+    pub(super) fn ends(&self) -> [[f64; 2]; 4] {
+        let [left, right] = [self.x.start, self.x.end].map(|x| x as f64);
+        let [top, bottom] = [self.y.start, self.y.end].map(|y| y as f64);
+        [[left, top], [right, top], [left, bottom], [right, bottom]]
+    }
+
+    /// Its middle.
+    pub(super) fn middle(&self) -> [f64; 2] {
+        [&self.x, &self.y].map(|side| 0.5 * (side.start + side.end) as f64)
+    }
+
     /// Two halves across the longer side.
     pub(super) fn halves(&self) -> [Self; 2] {
         if self.x.len() >= self.y.len() {

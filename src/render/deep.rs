@@ -11,6 +11,7 @@ use crate::render::detail::{detail_level, texels_per_pixel};
 use crate::render::irradiance::{IrradianceMap, irradiance_maps};
 use crate::render::lattice::Lattice;
 use crate::render::layers::{Layer, LayerStack, RenderedTile, SampleGrid, ShadowCatcher};
+use crate::render::lens::LensView;
 use crate::render::pixel_filter::filter_quantiles;
 use crate::render::receiver::{LightingContext, ReceiverIrradiance};
 use crate::render::retouch::retouched;
@@ -22,6 +23,7 @@ use crate::scene::{Card, Shot};
 use crate::work::{self, Kind};
 use rayon::prelude::*;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// Side of the blocks that the picture is put together from.
 const TILE_SIDE_PX: usize = 32;
@@ -43,14 +45,39 @@ const TILE_SIDE_PX: usize = 32;
 pub fn render(shot: &Shot, options: &RenderOptions) -> DeepImage {
     let options = options.clamped();
     let shot = &*retouched(shot, &options);
+    let free = match LensView::new(shot) {
+        None => render_pinhole(shot, &options),
+        Some(lens) => render_bent(shot, &lens, &options),
+    };
+    free.held_out(shot.holdout.as_deref())
+}
+
+fn render_pinhole(shot: &Shot, options: &RenderOptions) -> DeepImage {
     let view = CameraView::from_camera(&shot.camera);
-    let tiles = PixelBlock::tiles_of(view.width, view.height, TILE_SIDE_PX);
-    let stack = layer_stack(shot, &view, &options);
-    let rendered: Vec<_> = tiles
-        .into_par_iter()
-        .map(|tile| stack.render_tile(tile))
-        .collect();
-    assemble_tiles(&view, &rendered).held_out(shot.holdout.as_deref())
+    let stack = layer_stack(shot, &view, options);
+    render_tiles(shot, TILE_SIDE_PX, |tile| stack.render_tile(tile))
+}
+
+/// The picture that a lens makes of what a pinhole camera sees.
+fn render_bent(shot: &Shot, lens: &LensView, options: &RenderOptions) -> DeepImage {
+    let view = CameraView::from_camera(&lens.pinhole);
+    let stack = layer_stack(shot, &view, options);
+    let lattice = Lattice::new(&view, options.cell_px);
+    render_tiles(shot, lens.tile_side(), |tile| {
+        lens.stack_in(&stack, lattice, &tile).render_tile(tile)
+    })
+}
+
+/// The picture of a shot's camera from its tiles.
+fn render_tiles(
+    shot: &Shot,
+    side: usize,
+    render_tile: impl Fn(PixelBlock) -> RenderedTile + Sync + Send,
+) -> DeepImage {
+    let [width, height] = shot.camera.image.map(|side| side as usize);
+    let tiles = PixelBlock::tiles_of(width, height, side);
+    let rendered: Vec<_> = tiles.into_par_iter().map(render_tile).collect();
+    assemble_tiles([width, height], &rendered)
 }
 
 /// Everything that tiles are rendered from: textures at their level of detail, and the light on
@@ -64,7 +91,7 @@ fn layer_stack(shot: &Shot, view: &CameraView, options: &RenderOptions) -> Layer
     let mut maps = irradiance_maps(&receivers);
     let catcher = ShadowCatcher {
         plane: ProjectedPlane::new(&context.occluders.surface, view),
-        share: maps.pop().flatten(),
+        share: maps.pop().flatten().map(Arc::new),
     };
     LayerStack {
         layers: lit_layers(cards, &receivers, maps),
@@ -146,6 +173,7 @@ fn sample_grid(
         rows: lattice.positions_of(view.height, looked_up),
         per_subsample,
         offsets,
+        bent: None,
     }
 }
 
@@ -186,8 +214,8 @@ impl<'a> ProjectedCard<'a> {
             id: self.card.id,
             plane: self.plane,
             sides: self.plane.sides(self.texture.grid.reach),
-            texture: self.texture,
-            light,
+            texture: Arc::new(self.texture),
+            light: light.map(Arc::new),
             columns: self.columns,
             rows: self.rows,
         }
@@ -208,15 +236,15 @@ fn visible_side<'a>(
 }
 
 /// Puts the tiles' pixels in order.
-fn assemble_tiles(view: &CameraView, tiles: &[RenderedTile]) -> DeepImage {
+fn assemble_tiles(size: [usize; 2], tiles: &[RenderedTile]) -> DeepImage {
     let samples = tiles.iter().flat_map(|tile| &tile.samples.samples).copied();
     let tints = tiles.iter().flat_map(|tile| &tile.samples.tints).copied();
-    DeepImage::from_samples(assemble_shadow(view, tiles), samples, tints)
+    DeepImage::from_samples(assemble_shadow(size, tiles), samples, tints)
 }
 
 /// The factor on the plate, 1 where no tile has one.
-fn assemble_shadow(view: &CameraView, tiles: &[RenderedTile]) -> Image<LinearRgb> {
-    let mut shadow = Image::filled(view.width, view.height, LinearRgb::WHITE);
+fn assemble_shadow([width, height]: [usize; 2], tiles: &[RenderedTile]) -> Image<LinearRgb> {
+    let mut shadow = Image::filled(width, height, LinearRgb::WHITE);
     for tile in tiles {
         copy_shadow(tile, &mut shadow);
     }

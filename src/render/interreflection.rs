@@ -40,9 +40,13 @@ pub fn interreflect(deep: DeepImage, shot: &Shot, albedo: LinearRgb) -> DeepImag
     let (Some(surface), Some(bounce)) = (surface, BounceMap::new(shot)) else {
         return deep;
     };
-    deep.map_shadow(|x, y, factor| match surface.point_at(&pixel_center(x, y)) {
-        Some(point) => factor * endless_bounces(albedo * bounce.at(&point)),
-        None => factor,
+    let lens = shot.distortion();
+    deep.map_shadow(|x, y, factor| {
+        let ideal = lens.undistort(pixel_center(x, y).xy().into());
+        match surface.point_at(&ideal.to_homogeneous()) {
+            Some(point) => factor * endless_bounces(albedo * bounce.at(&point)),
+            None => factor,
+        }
     })
 }
 

@@ -44,6 +44,11 @@ impl Lattice {
             .collect()
     }
 
+    /// Where a position of the picture is on the lattice.
+    pub(super) fn position_of(&self, x: f64, y: f64) -> (LatticePosition, LatticePosition) {
+        (self.position_at(x), self.position_at(y))
+    }
+
     fn position_at(&self, pixel: f64) -> LatticePosition {
         let node = (pixel / self.cell + 1.0).max(0.0);
         (node as u32, (node - node.floor()) as f32)

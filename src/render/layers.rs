@@ -13,15 +13,17 @@ use crate::render::float4::Float4;
 use crate::render::grade::channel_mean;
 use crate::render::half_plane::row_span;
 use crate::render::irradiance::IrradianceMap;
-use crate::render::lattice::LatticePosition;
+use crate::render::lattice::{Lattice, LatticePosition};
 use crate::render::ranges::{integer_range, range_overlap, ranges_meet};
 use crate::render::texel_grid::{TexelLine, texel_line};
 use crate::render::texture::BakedTexture;
 use crate::render::transmittance::{LayerRow, SubsampleRun, Transmittance};
 use crate::render::view::{ProjectedPlane, pixel_center};
 use crate::work::{self, Kind};
+use nalgebra::Matrix3;
 use std::f32::consts::PI;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// A card in the picture.
 #[derive(Debug)]
@@ -31,9 +33,9 @@ pub(super) struct Layer {
     /// How it lies.
     pub(super) plane: ProjectedPlane,
     /// Its colours.
-    pub(super) texture: BakedTexture,
+    pub(super) texture: Arc<BakedTexture>,
     /// Light on it; none in the dark.
-    pub(super) light: Option<IrradianceMap>,
+    pub(super) light: Option<Arc<IrradianceMap>>,
     /// Where it ends, its texture's soft border included.
     pub(super) sides: [Vector3<f64>; 5],
     /// Pixels it may touch.
@@ -54,6 +56,24 @@ pub(super) struct SampleGrid {
     pub(super) columns: Vec<LatticePosition>,
     /// Positions in the lattice, the same way.
     pub(super) rows: Vec<LatticePosition>,
+    /// Where the lattice lies under a part of a picture that a lens bends; `columns` and `rows` are
+    /// not used then.
+    pub(super) bent: Option<BentLattice>,
+}
+
+/// A lattice over what a pinhole camera sees, under a part of what a lens makes of that.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct BentLattice {
+    pub(super) lattice: Lattice,
+    /// Position of the pinhole camera's picture, from the picture's.
+    pub(super) ideal_from_picture: Matrix3<f64>,
+}
+
+impl BentLattice {
+    fn position_of(&self, px: [f64; 2]) -> (LatticePosition, LatticePosition) {
+        let ideal = self.ideal_from_picture * Vector3::new(px[0], px[1], 1.0);
+        self.lattice.position_of(ideal.x, ideal.y)
+    }
 }
 
 /// The surface under the cards, which their shadows fall on.
@@ -62,7 +82,7 @@ pub(super) struct ShadowCatcher {
     /// How it lies; none where the camera does not look down on it.
     pub(super) plane: Option<ProjectedPlane>,
     /// What shadows leave of its light; none where there is no shadow.
-    pub(super) share: Option<IrradianceMap>,
+    pub(super) share: Option<Arc<IrradianceMap>>,
 }
 
 /// A picture's parts, ready to be put together.
@@ -118,6 +138,41 @@ impl RenderedTile {
     }
 }
 
+impl BentLattice {
+    /// Pixels of the pinhole camera's picture that a block of the picture shows, and some around.
+    fn ideal_area(&self, block: &PixelBlock) -> PixelBlock {
+        let ends = block.ends().map(|[x, y]| {
+            let ideal = self.ideal_from_picture * Vector3::new(x, y, 1.0);
+            [ideal.x, ideal.y]
+        });
+        let [x, y] = [0, 1].map(|axis: usize| range_around(ends.map(|end| end[axis])));
+        PixelBlock { x, y }
+    }
+
+    /// Columns and rows of the nodes around a block, one more on either side.
+    fn nodes_around(&self, block: &PixelBlock) -> (Range<usize>, Range<usize>) {
+        let nodes = block.ends().map(|end| self.position_of(end));
+        let columns = nodes.map(|(column, _)| column.0 as usize);
+        (
+            range_of_nodes(columns),
+            range_of_nodes(nodes.map(|(_, row)| row.0 as usize)),
+        )
+    }
+}
+
+/// The integers between some numbers, and two more on each side.
+fn range_around(numbers: [f64; 4]) -> Range<usize> {
+    let low = numbers.into_iter().fold(f64::INFINITY, f64::min);
+    let high = numbers.into_iter().fold(0.0, f64::max);
+    (low.max(0.0) as usize).saturating_sub(2)..high as usize + 3
+}
+
+fn range_of_nodes(nodes: [usize; 4]) -> Range<usize> {
+    let low = nodes.into_iter().fold(usize::MAX, usize::min);
+    let high = nodes.into_iter().fold(0, usize::max);
+    low.saturating_sub(1)..high + 3
+}
+
 impl SampleGrid {
     /// Lattice positions along a side of a pixel.
     fn positions_per_side(&self) -> usize {
@@ -140,14 +195,32 @@ impl SampleGrid {
         self.offsets.iter().fold(0.0, |m: f64, o| m.max(o.abs()))
     }
 
-    /// Where a pixel is on the lattice, where light is looked up once for each.
+    /// Where a position of the grid is on the lattice: a pixel, where light is looked up once for
+    /// each, or a sub-sample.
     #[inline(always)]
     fn position_of(&self, x: usize, y: usize) -> (LatticePosition, LatticePosition) {
-        (self.columns[x], self.rows[y])
+        match &self.bent {
+            None => (self.columns[x], self.rows[y]),
+            Some(bent) => bent.position_of([self.coordinate_of(x), self.coordinate_of(y)]),
+        }
+    }
+
+    /// Where a position of the grid is in the picture, along one axis.
+    fn coordinate_of(&self, index: usize) -> f64 {
+        let n = self.positions_per_side();
+        let offset = if self.per_subsample {
+            self.offsets[index % n]
+        } else {
+            0.0
+        };
+        (index / n) as f64 + 0.5 + offset
     }
 
     /// Columns and rows of the lattice nodes around a block.
     fn nodes_around(&self, block: &PixelBlock) -> (Range<usize>, Range<usize>) {
+        if let Some(bent) = &self.bent {
+            return bent.nodes_around(block);
+        }
         let columns = self.node_range(&block.x, &self.columns);
         (columns, self.node_range(&block.y, &self.rows))
     }
@@ -186,7 +259,47 @@ impl Layer {
     }
 }
 
+impl Layer {
+    /// The layer in a block of a picture that an affine map leads to this one.
+    fn seen_through(&self, map: &Matrix3<f64>, block: &PixelBlock) -> Self {
+        let transposed = map.transpose();
+        Self {
+            id: self.id,
+            plane: self.plane.seen_through(map),
+            texture: Arc::clone(&self.texture),
+            light: self.light.clone(),
+            sides: self.sides.map(|side| transposed * side),
+            columns: block.x.clone(),
+            rows: block.y.clone(),
+        }
+    }
+}
+
 impl LayerStack {
+    /// The same for a block of a picture that a lens bends: the layers that it may show.
+    pub(super) fn bent(&self, bent: BentLattice, block: &PixelBlock) -> Self {
+        let map = &bent.ideal_from_picture;
+        let area = bent.ideal_area(block);
+        let touching = self.layers.iter().filter(|layer| layer.touches(&area));
+        Self {
+            layers: touching
+                .map(|layer| layer.seen_through(map, block))
+                .collect(),
+            catcher: ShadowCatcher {
+                plane: self.catcher.plane.map(|plane| plane.seen_through(map)),
+                share: self.catcher.share.clone(),
+            },
+            samples: SampleGrid {
+                columns: Vec::new(),
+                rows: Vec::new(),
+                offsets: self.samples.offsets.clone(),
+                bent: Some(bent),
+                ..self.samples
+            },
+            ..*self
+        }
+    }
+
     /// Renders all of a block.
     pub(super) fn render_tile(&self, block: PixelBlock) -> RenderedTile {
         let layers: Vec<_> = (0..self.layers.len())
@@ -325,12 +438,9 @@ impl LayerStack {
     ) {
         let Some(light) = &layer.light else { return };
         let (samples, r) = (&self.samples, self.samples.offsets.len());
-        row.look_up_light(
-            light,
-            pixels.clone(),
-            |i| samples.columns[(block.x.start + i) * r + sx],
-            samples.rows[row_of_samples],
-        );
+        row.look_up_light(light, pixels.clone(), |i| {
+            samples.position_of((block.x.start + i) * r + sx, row_of_samples)
+        });
     }
 
     /// Keeps what a row's pixels got from a layer.
@@ -390,7 +500,8 @@ impl LayerStack {
         match &layer.light {
             Some(map) if !self.samples.per_subsample && sum.alpha() > 0.0 => {
                 *lit += 1;
-                sum.times(map.value_at(self.samples.columns[x], self.samples.rows[y]))
+                let (column, row) = self.samples.position_of(x, y);
+                sum.times(map.value_at(column, row))
             }
             Some(_) => sum,
             None => Float4::ZERO.with_fourth(sum.alpha()),

@@ -40,6 +40,7 @@ mod interreflection;
 mod irradiance;
 mod lattice;
 mod layers;
+mod lens;
 mod light_samples;
 mod occluders;
 mod opacity;

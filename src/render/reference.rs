@@ -1,6 +1,7 @@
 //! The definition, sample by sample: slow and obviously right.
 
 use crate::asset::Texture;
+use crate::camera::RadialDistortion;
 use crate::deep::{DeepImage, DeepSample};
 use crate::filter::sample_bilinear;
 use crate::geom::Vector3;
@@ -86,6 +87,7 @@ struct ReferenceCard<'a> {
 struct ReferenceWorld<'a> {
     shot: &'a Shot,
     view: CameraView,
+    lens: RadialDistortion,
     cards: Vec<ReferenceCard<'a>>,
     surface: Option<ProjectedPlane>,
     surface_lights: Vec<LightGroup>,
@@ -117,6 +119,7 @@ impl<'a> ReferenceWorld<'a> {
         Self {
             shot,
             view,
+            lens: shot.distortion(),
             surface: ProjectedPlane::from_above(&surface, &view),
             surface_lights: LightSamples::plain(shot, options, &Vector3::z()),
             tinted: cards.iter().any(ReferenceCard::is_film),
@@ -138,13 +141,14 @@ impl<'a> ReferenceWorld<'a> {
 
     /// Samples of one pixel and the factor on its plate.
     fn render_pixel(&self, x: f64, y: f64, offsets: &[f64]) -> (Vec<ReferenceSample>, LinearRgb) {
-        let order = self.depth_order(x, y);
+        let [ideal_x, ideal_y] = self.ideal_px([x, y]);
+        let order = self.depth_order(ideal_x, ideal_y);
         let mut samples = self.empty_samples(&order);
         let weight = 1.0 / (offsets.len() * offsets.len()) as f32;
         let mut shadow = ShadowRatio::default();
         for oy in offsets {
             for ox in offsets {
-                let at = [x + ox, y + oy];
+                let at = self.ideal_px([x + ox, y + oy]);
                 let through = self.trace_cards(at, &order, weight, &mut samples);
                 shadow.add(through.scale(weight), &self.surface_light(at));
             }
@@ -152,6 +156,11 @@ impl<'a> ReferenceWorld<'a> {
         samples.retain(|sample| sample.deep.alpha > 0.0);
         samples.iter_mut().for_each(ReferenceSample::finish);
         (samples, shadow.ratio())
+    }
+
+    /// Where the camera without its lens sees what the picture shows at a position.
+    fn ideal_px(&self, px: [f64; 2]) -> [f64; 2] {
+        self.lens.undistort(px.into()).into()
     }
 
     /// The cards that are not edge-on, the nearest at a pixel's centre first, with their depths

@@ -101,13 +101,14 @@ impl LayerRow {
         &mut self,
         light: &IrradianceMap,
         pixels: Range<usize>,
-        column: impl Fn(usize) -> LatticePosition,
-        row: LatticePosition,
+        position: impl Fn(usize) -> (LatticePosition, LatticePosition),
     ) {
         self.irradiance.clear();
         self.lit += pixels.len();
-        self.irradiance
-            .extend(pixels.map(|i| light.value_at(column(i), row)));
+        self.irradiance.extend(pixels.map(|i| {
+            let (column, row) = position(i);
+            light.value_at(column, row)
+        }));
     }
 }
 

@@ -302,6 +302,18 @@ impl ProjectedPlane {
         quad_sides(&self.u, &self.v, &self.w, reach)
     }
 
+    /// The same plane in a picture that an affine map leads to this one.
+    pub(super) fn seen_through(&self, map: &Matrix3<f64>) -> Self {
+        let transposed = map.transpose();
+        Self {
+            u: transposed * self.u,
+            v: transposed * self.v,
+            w: transposed * self.w,
+            point: self.point * map,
+            ..*self
+        }
+    }
+
     /// The same plane with its texture the other way round.
     pub(super) fn mirrored(self) -> Self {
         Self {

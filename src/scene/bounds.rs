@@ -43,6 +43,20 @@ pub(super) const CAST_SHARE: Bounds = Bounds::new(
     "0 is white light, 1 treats the surface as grey",
 );
 pub(super) const ZOOM: Bounds = Bounds::new(1.0, 100.0, "a factor; 1 shows all of the photo");
+pub(super) const K1: Bounds = Bounds::new(-10.0, 10.0, "OpenCV's k1, negative for a barrel");
+pub(super) const F_NUMBER: Bounds = Bounds::new(
+    0.5,
+    1000.0,
+    "focal length over aperture; photo lenses have 1 to 32",
+);
+pub(super) const FOCUS: Bounds = Bounds::metres(0.001, 1e6, "farther off is at infinity");
+pub(super) const SENSOR: Bounds = Bounds::new(
+    0.1,
+    1000.0,
+    "millimetres; phones have 5 to 10, a 35 mm camera 36",
+);
+pub(super) const CHROMATIC: Bounds =
+    Bounds::new(-50.0, 50.0, "pixels; cheap lenses have 1 in the corners");
 pub(super) const BLUR: Bounds = Bounds::new(0.0, 100.0, "pixels; a sharp photo has 0.3 to 0.7");
 pub(super) const SHARPENING: Bounds = Bounds::new(0.0, 100.0, "a share of what a blur takes away");
 pub(super) const NOISE: Bounds = Bounds::new(0.0, 1e3, "scene-linear; 1 is white");

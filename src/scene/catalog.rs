@@ -32,6 +32,8 @@ pub struct Background {
     pub size: [f64; 2],
     /// The camera that took it, or what that can be found from.
     pub camera: CameraSource,
+    /// OpenCV's first coefficient of that camera's radial distortion; 0 where it has none.
+    pub k1: f64,
     /// Share of the light that its surface reflects, where that is known.
     pub albedo: Option<Albedo>,
     /// The walls on the edges of that rectangle, where there are any.

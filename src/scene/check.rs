@@ -38,7 +38,8 @@ impl Scene {
         check_image(self.image)?;
         check_surface(&self.surface)?;
         check_camera(&self.camera)?;
-        self.view.check("view")
+        self.view.check("view")?;
+        self.lens.check("lens")
     }
 
     fn check_objects(&self) -> Result<()> {
@@ -330,6 +331,7 @@ mod tests {
             edges: Default::default(),
             cast: Default::default(),
             view: Default::default(),
+            lens: Default::default(),
             finish: Default::default(),
             files: None,
             settings: Default::default(),

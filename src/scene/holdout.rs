@@ -6,8 +6,9 @@
 //! inner side, and not over the rim: that side, of the walls that turn their outer side to the
 //! camera, is projected, and what lies behind it is held out.
 
-use crate::camera::Camera;
+use crate::camera::{Camera, RadialDistortion};
 use crate::deep::HoldoutSample;
+use crate::filter::sample_bilinear_clamped;
 use crate::geom::{Plane, Point2, Point3, Vector2, Vector3};
 use crate::image::Image;
 use crate::pixel::{Coverage, Depth};
@@ -30,10 +31,10 @@ impl Scene {
         mask: &Image<Coverage>,
     ) -> Image<HoldoutSample> {
         let shown;
-        let mask = if self.view.is_whole() {
+        let mask = if self.view.is_whole() && !self.lens.moves_plate() {
             mask
         } else {
-            shown = self.view.plate(photo, mask);
+            shown = self.shown(photo, |at| sample_bilinear_clamped(mask, at.x, at.y));
             &shown
         };
         mask.map(|coverage| HoldoutSample {
@@ -45,27 +46,31 @@ impl Scene {
 
 impl Surface {
     /// What the walls hide from a camera; none where they hide nothing.
-    pub(crate) fn holdout(&self, camera: &Camera) -> Option<Image<HoldoutSample>> {
-        let faces = self.hiding_faces(camera);
+    pub(crate) fn holdout(
+        &self,
+        camera: &Camera,
+        lens: &RadialDistortion,
+    ) -> Option<Image<HoldoutSample>> {
+        let faces = self.hiding_faces(camera, lens);
         if faces.is_empty() {
             return None;
         }
         let [width, height] = camera.image.map(|side| side as usize);
         let mut picture = Image::filled(width, height, HoldoutSample::default());
         for face in &faces {
-            face.draw(camera, &mut picture);
+            face.draw(camera, lens, &mut picture);
         }
         Some(picture)
     }
 
     /// The inner sides of the walls that the camera sees from outside, as far as they are in the
     /// picture.
-    fn hiding_faces(&self, camera: &Camera) -> Vec<ProjectedFace> {
+    fn hiding_faces(&self, camera: &Camera, lens: &RadialDistortion) -> Vec<ProjectedFace> {
         let faces = self.wall.map(|wall| wall.inner_faces(self.size));
         faces
             .into_iter()
             .flatten()
-            .filter_map(|face| ProjectedFace::new(&face, camera))
+            .filter_map(|face| ProjectedFace::new(&face, camera, lens))
             .collect()
     }
 }
@@ -81,7 +86,7 @@ struct ProjectedFace {
 
 impl ProjectedFace {
     /// None for one that is seen from the front, edge-on or not at all.
-    fn new(face: &[Vector3<f64>; 4], camera: &Camera) -> Option<Self> {
+    fn new(face: &[Vector3<f64>; 4], camera: &Camera, lens: &RadialDistortion) -> Option<Self> {
         // Its corners turn clockwise as seen from inside of the room.
         let outward = (face[1] - face[0]).cross(&(face[3] - face[0]));
         let normal = outward.try_normalize(0.0)?;
@@ -89,7 +94,8 @@ impl ProjectedFace {
             return None;
         }
         let ring = seen_ring(face, camera);
-        let [columns, rows] = [0, 1].map(|axis| pixels_around(&ring, axis, camera.image[axis]));
+        let [columns, rows] =
+            [0, 1].map(|axis| pixels_around(&ring, axis, camera.image[axis], lens));
         let is_seen = ring.len() > 2 && !columns.is_empty() && !rows.is_empty();
         is_seen.then(|| Self {
             plane: Plane {
@@ -102,10 +108,10 @@ impl ProjectedFace {
         })
     }
 
-    fn draw(&self, camera: &Camera, picture: &mut Image<HoldoutSample>) {
+    fn draw(&self, camera: &Camera, lens: &RadialDistortion, picture: &mut Image<HoldoutSample>) {
         for y in self.rows.clone() {
             for x in self.columns.clone() {
-                let center = Point2::new(x as f64 + 0.5, y as f64 + 0.5);
+                let center = lens.undistort(Point2::new(x as f64 + 0.5, y as f64 + 0.5));
                 let coverage = self.coverage(center);
                 if coverage > 0.0 {
                     let pixel = &mut picture[(x, y)];
@@ -181,7 +187,17 @@ fn pixel_of(p: &Point3<f64>, camera: &Camera) -> Point2<f64> {
 }
 
 /// The pixels of a picture's side that the box around a ring touches.
-fn pixels_around(ring: &[Point2<f64>], axis: usize, side: u32) -> Range<usize> {
+///
+/// Through a lens any of them: where it shows the ring is not asked.
+fn pixels_around(
+    ring: &[Point2<f64>],
+    axis: usize,
+    side: u32,
+    lens: &RadialDistortion,
+) -> Range<usize> {
+    if !lens.is_none() {
+        return 0..side as usize;
+    }
     let ends = ring.iter().map(|p| p[axis].clamp(0.0, side.into()));
     let low = ends.clone().fold(f64::INFINITY, f64::min);
     let high = ends.fold(0.0, f64::max);
@@ -219,6 +235,10 @@ mod tests {
         }
     }
 
+    fn no_lens(camera: &Camera) -> RadialDistortion {
+        RadialDistortion::new(camera, 0.0)
+    }
+
     fn camera() -> Camera {
         let eye = Point3::new(0.25, -0.9, 0.8);
         Camera::look_at(eye, Point3::origin(), 160.0, [160, 120])
@@ -239,7 +259,7 @@ mod tests {
         let (camera, mut hidden) = (camera(), 0);
         for slope in [0.0, 8.0] {
             let surface = tray(slope);
-            let holdout = surface.holdout(&camera).unwrap();
+            let holdout = surface.holdout(&camera, &no_lens(&camera)).unwrap();
             for i in 0..1_000 {
                 let share = |k: u32| f64::from(i * k % 1009) / 1009.0;
                 let x = 0.55 * (share(97) - 0.5);
@@ -266,7 +286,9 @@ mod tests {
         let doubled: f64 = (0..4)
             .map(|i| ring[i].coords.perp(&ring[(i + 1) % 4].coords))
             .sum();
-        let holdout = surface.holdout(&camera).unwrap();
+        let holdout = surface
+            .holdout(&camera, &RadialDistortion::new(&camera, 0.0))
+            .unwrap();
         let covered: f32 = holdout.pixels().iter().map(|p| p.coverage.0).sum();
         assert!((f64::from(covered) / (doubled.abs() / 2.0) - 1.0).abs() < 0.005);
     }
@@ -279,7 +301,11 @@ mod tests {
             160.0,
             [160, 120],
         );
-        assert!(tray(8.0).holdout(&above).is_none());
-        assert!(Surface::new([0.56, 0.37]).holdout(&camera()).is_none());
+        assert!(tray(8.0).holdout(&above, &no_lens(&above)).is_none());
+        assert!(
+            Surface::new([0.56, 0.37])
+                .holdout(&camera(), &no_lens(&camera()))
+                .is_none()
+        );
     }
 }

@@ -15,6 +15,7 @@
 //! let tray = Background {
 //!     name: "tray".into(),
 //!     size: [0.6, 0.4],
+//!     k1: 0.0,
 //!     albedo: None,
 //!     wall: None,
 //!     camera: CameraSource::Rectangle {
@@ -52,6 +53,7 @@ mod fall;
 mod files;
 mod holdout;
 mod hull;
+mod lens;
 mod light;
 mod locate;
 mod palette;
@@ -94,6 +96,8 @@ pub(crate) use files::relative_to_file;
 pub use files::{SceneFiles, SceneSettings};
 #[cfg(feature = "settle")]
 pub(crate) use hull::doubled_area;
+#[doc(hidden)]
+pub use lens::{Lens, LensRanges, ThinLens};
 pub use light::{AreaLight, Exposure, LightShape, LightTint};
 pub use locate::locate;
 #[doc(hidden)]
@@ -139,6 +143,9 @@ pub struct Scene {
     /// Which part of what that camera sees is shown.
     #[serde(default, skip_serializing_if = "View::is_whole")]
     pub view: View,
+    /// What the camera's lens does that a pinhole does not.
+    #[serde(default, skip_serializing_if = "Lens::is_pinhole")]
+    pub lens: Lens,
     /// The surface `z = 0` that objects lie on.
     pub surface: Surface,
     /// Objects; the first has id 1.

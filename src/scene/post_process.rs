@@ -3,7 +3,7 @@
 use crate::color::planckian;
 use crate::error::{Error, Result};
 use crate::pixel::LinearRgb;
-use crate::scene::bounds::{BLUR, EV, GAIN, KELVIN, NOISE, SHARPENING};
+use crate::scene::bounds::{BLUR, CHROMATIC, EV, GAIN, KELVIN, NOISE, SHARPENING};
 use crate::scene::check::field;
 use crate::scene::{Draws, Range};
 use serde::{Deserialize, Serialize};
@@ -23,12 +23,20 @@ pub struct PostProcess {
     pub noise: Noise,
     /// Where in the noise: another number is another frame of it. Default: 0.
     pub noise_seed: u64,
-    /// Blur of the whole frame by the camera that is to look at the place, pixels. Default: 0.
+    /// Lateral chromatic aberration of the camera that is to look at the place: in the frame's
+    /// corners red lies so many pixels farther out than green, and blue farther in. Default: 0.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub chromatic_px: f64,
+    /// Blur of the whole frame by that camera, pixels. Default: 0.
     pub camera_blur_px: f64,
     /// Noise of the whole frame by that camera. Default: none.
     pub camera_noise: CameraNoise,
     /// Amount of sharpening (unsharp mask of one pixel). Default: 0.
     pub sharpening: f64,
+}
+
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
 }
 
 impl Default for PostProcess {
@@ -39,6 +47,7 @@ impl Default for PostProcess {
             blur_px: Blur::NONE,
             noise: Noise::default(),
             noise_seed: 0,
+            chromatic_px: 0.0,
             camera_blur_px: 0.0,
             camera_noise: CameraNoise::default(),
             sharpening: 0.0,
@@ -131,6 +140,7 @@ impl PostProcess {
             blur_px,
             noise,
             noise_seed: _,
+            chromatic_px,
             camera_blur_px,
             camera_noise,
             sharpening,
@@ -139,6 +149,7 @@ impl PostProcess {
             && white_balance == LinearRgb::WHITE
             && blur_px == Blur::NONE
             && noise == Noise::None
+            && chromatic_px == 0.0
             && camera_blur_px == 0.0
             && camera_noise == CameraNoise::default()
             && sharpening == 0.0
@@ -149,6 +160,7 @@ impl PostProcess {
         EV.check(&field(at, "exposure_ev"), self.exposure_ev)?;
         check_gains(self.white_balance, &field(at, "white_balance"))?;
         SHARPENING.check(&field(at, "sharpening"), self.sharpening)?;
+        CHROMATIC.check(&field(at, "chromatic_px"), self.chromatic_px)?;
         BLUR.check(&field(at, "camera_blur_px"), self.camera_blur_px)?;
         NOISE.check(&field(at, "camera_noise.shot"), self.camera_noise.shot)?;
         NOISE.check(&field(at, "camera_noise.read"), self.camera_noise.read)?;
@@ -199,6 +211,8 @@ pub struct PostProcessRanges {
     pub blur_px: Blur<Range>,
     /// Noise of rendered cards. Default: `"none"`.
     pub noise: Noise,
+    /// Lateral chromatic aberration in the frame's corners, pixels. Default: 0.
+    pub chromatic_px: Range,
     /// Blur of the whole frame, pixels. Default: 0.
     pub camera_blur_px: Range,
     /// Noise of the whole frame. Default: none.
@@ -217,6 +231,7 @@ impl Default for PostProcessRanges {
             white_k: Range::fixed(NEUTRAL_K),
             blur_px: Blur::Known(Range::fixed(0.0)),
             noise: Noise::None,
+            chromatic_px: Range::fixed(0.0),
             camera_blur_px: Range::fixed(0.0),
             camera_noise: CameraNoise::default(),
             sharpening: Range::fixed(0.0),
@@ -232,6 +247,7 @@ impl PostProcessRanges {
             blur_px: self.draw_blur(draws),
             noise: self.noise,
             noise_seed: self.draw_noise_seed(draws),
+            chromatic_px: self.draw_chromatic(draws),
             camera_blur_px: self.camera_blur_px.draw(draws, "finish.camera_blur_px"),
             camera_noise: CameraNoise {
                 shot: self
@@ -254,6 +270,13 @@ impl PostProcessRanges {
         }
     }
 
+    fn draw_chromatic(&self, draws: &Draws) -> f64 {
+        match self.chromatic_px {
+            none if none == Range::fixed(0.0) => 0.0,
+            range => range.draw(draws, "finish.chromatic_px"),
+        }
+    }
+
     fn draw_noise_seed(&self, draws: &Draws) -> u64 {
         if self.noise == Noise::None && self.camera_noise == CameraNoise::default() {
             0
@@ -266,6 +289,7 @@ impl PostProcessRanges {
         self.exposure_ev.check("finish.exposure_ev", &EV)?;
         self.white_k.check("finish.white_k", &KELVIN)?;
         self.sharpening.check("finish.sharpening", &SHARPENING)?;
+        self.chromatic_px.check("finish.chromatic_px", &CHROMATIC)?;
         self.camera_blur_px.check("finish.camera_blur_px", &BLUR)?;
         self.camera_noise
             .shot

@@ -1,8 +1,9 @@
 //! From a scene with nothing unknown to a shot.
 
 use crate::asset::{Panorama, SurfaceCache, Texture};
-use crate::camera::Camera;
+use crate::camera::{Camera, RadialDistortion};
 use crate::error::{Error, Result};
+use crate::filter::{sample_bilinear_clamped, sample_cubic_clamped};
 use crate::geom::{Point2, Pose, Quad};
 use crate::image::Image;
 use crate::pixel::{LinearRgb, ObjectId};
@@ -78,10 +79,14 @@ impl Scene {
         if let Some(plate) = &plate {
             self.check_plate(plate)?;
         }
-        let seen = self.view.camera(&camera);
+        self.lens.check_fold(&camera)?;
+        let seen = self.view.camera(&self.lens.camera(&camera));
+        let distortion = RadialDistortion::new(&seen, self.lens.k1);
         Ok(Shot {
-            holdout: self.surface.holdout(&seen).map(Arc::new),
+            holdout: self.surface.holdout(&seen, &distortion).map(Arc::new),
             camera: seen,
+            k1: self.lens.k1,
+            thin_lens: self.lens.thin_lens(&camera),
             plate: plate.map(|plate| self.shown_plate(&camera, plate)),
             catcher: self.surface.size.map(|side| CATCHER_RATIO * side),
             cards: self.cards(look)?,
@@ -95,11 +100,31 @@ impl Scene {
 
     /// The part of the plate that is seen.
     fn shown_plate(&self, camera: &Camera, plate: Arc<Image<LinearRgb>>) -> Arc<Image<LinearRgb>> {
-        if self.view.is_whole() {
-            plate
-        } else {
-            Arc::new(self.view.plate(camera, &plate))
+        if self.lens.moves_plate() {
+            return Arc::new(self.shown(camera, |at| {
+                sample_cubic_clamped(&plate, at.x, at.y).map(|v| v.max(0.0))
+            }));
         }
+        if self.view.is_whole() {
+            return plate;
+        }
+        Arc::new(self.shown(camera, |at| sample_bilinear_clamped(&plate, at.x, at.y)))
+    }
+
+    /// What the view and the lens show of something that is known all over the photo; `camera` is
+    /// that of the whole photo.
+    pub(crate) fn shown<P: Copy + Send + Sync>(
+        &self,
+        camera: &Camera,
+        value: impl Fn(Point2<f64>) -> P + Sync,
+    ) -> Image<P> {
+        if self.lens.moves_plate() {
+            let bent = self.lens.camera(camera);
+            return self
+                .view
+                .plate(&bent, |px| value(self.lens.photo_px(camera, px)));
+        }
+        self.view.plate(camera, value)
     }
 
     fn cards(&self, look: impl Fn(&Object) -> Option<Appearance>) -> Result<Vec<Card>> {
@@ -267,6 +292,7 @@ mod tests {
             edges: Default::default(),
             cast: Default::default(),
             view: Default::default(),
+            lens: Default::default(),
             finish: Default::default(),
             files: None,
             settings: Default::default(),

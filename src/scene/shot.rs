@@ -1,12 +1,12 @@
 //! A scene with nothing left to find out: what the renderer takes.
 
 use crate::asset::{SurfaceCache, Texture};
-use crate::camera::Camera;
+use crate::camera::{Camera, RadialDistortion};
 use crate::deep::HoldoutSample;
 use crate::geom::{Point2, Quad};
 use crate::image::Image;
 use crate::pixel::{LinearRgb, ObjectId};
-use crate::scene::{AreaLight, Bend, EdgeTreatment, EnvironmentMap, Grade};
+use crate::scene::{AreaLight, Bend, EdgeTreatment, EnvironmentMap, Grade, ThinLens};
 use std::sync::Arc;
 
 /// Everything a picture is made of, in memory and known.
@@ -17,6 +17,10 @@ use std::sync::Arc;
 pub struct Shot {
     /// The camera; its `image` is the size of the picture.
     pub camera: Camera,
+    /// OpenCV's first coefficient of its lens's radial distortion; the plate shows it.
+    pub k1: f64,
+    /// Its aperture and focus; none where all is sharp.
+    pub thin_lens: Option<ThinLens>,
     /// Background, of the picture's size; none is transparent.
     pub plate: Option<Arc<Image<LinearRgb>>>,
     /// Width and height of the part of `z = 0` that receives shadows, metres, centred.
@@ -98,6 +102,8 @@ impl Shot {
     pub fn new(camera: Camera) -> Self {
         Self {
             camera,
+            k1: 0.0,
+            thin_lens: None,
             plate: None,
             catcher: [f64::INFINITY; 2],
             cards: Vec::new(),
@@ -119,6 +125,19 @@ impl Shot {
         assert_eq!(plate.size(), size, "plate and camera differ in size");
         self.plate = Some(plate);
         self
+    }
+
+    /// With a lens of this k1, which the plate shows.
+    #[doc(hidden)]
+    pub fn with_k1(mut self, k1: f64) -> Self {
+        self.k1 = k1;
+        self
+    }
+
+    /// From where the camera would see a point without its lens to where the picture shows it.
+    #[doc(hidden)]
+    pub fn distortion(&self) -> RadialDistortion {
+        RadialDistortion::new(&self.camera, self.k1)
     }
 
     /// With one more card.

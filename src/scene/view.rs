@@ -2,10 +2,8 @@
 
 use crate::camera::Camera;
 use crate::error::Result;
-use crate::filter::sample_bilinear_clamped;
-use crate::geom::{Pose, UnitQuaternion, Vector2, Vector3};
+use crate::geom::{Point2, Pose, UnitQuaternion, Vector2, Vector3};
 use crate::image::Image;
-use crate::pixel::Mix;
 use crate::scene::bounds::{ACROSS, TURN, ZOOM};
 use crate::scene::check::field;
 use crate::scene::{Draws, Range};
@@ -65,15 +63,21 @@ impl View {
         }
     }
 
-    /// The part of a plate that is seen, as large as the plate, between whose pixels is
-    /// interpolated; `photo` is the camera of the whole plate.
-    pub fn plate<P: Mix + Send + Sync>(&self, photo: &Camera, plate: &Image<P>) -> Image<P> {
+    /// The part of a plate that is seen, as large as the plate; `photo` is the camera of the whole
+    /// plate, of which `value` is known between pixels.
+    ///
+    /// A turn and a zoom about the principal point keep a radial distortion as it is.
+    pub fn plate<P: Copy + Send + Sync>(
+        &self,
+        photo: &Camera,
+        value: impl Fn(Point2<f64>) -> P + Sync,
+    ) -> Image<P> {
         let (camera, turn) = (self.camera(photo), self.turn());
-        Image::from_fn(plate.width(), plate.height(), |x, y| {
+        let [width, height] = photo.image.map(|side| side as usize);
+        Image::from_fn(width, height, |x, y| {
             let px = Vector2::new(x as f64 + 0.5, y as f64 + 0.5) - camera.principal_px.coords;
             let ray = turn * px.component_div(&camera.focal_px).push(1.0);
-            let at = photo.principal_px + ray.xy().component_mul(&photo.focal_px);
-            sample_bilinear_clamped(plate, at.x, at.y)
+            value(photo.principal_px + ray.xy().component_mul(&photo.focal_px))
         })
     }
 
@@ -165,7 +169,8 @@ impl ViewRanges {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geom::{Point2, Point3};
+    use crate::filter::sample_bilinear_clamped;
+    use crate::geom::Point3;
     use crate::pixel::LinearRgb;
 
     fn photo() -> Camera {
@@ -197,6 +202,11 @@ mod tests {
         })
     }
 
+    fn seen_by(view: &View) -> Image<LinearRgb> {
+        let plate = plate();
+        view.plate(&photo(), |at| sample_bilinear_clamped(&plate, at.x, at.y))
+    }
+
     /// Columns and rows of the photo as its colours.
     fn plate() -> Image<LinearRgb> {
         Image::from_fn(160, 120, |x, y| {
@@ -207,7 +217,7 @@ mod tests {
     #[test]
     fn camera_and_plate_show_the_same() {
         for view in views() {
-            let (camera, seen) = (view.camera(&photo()), view.plate(&photo(), &plate()));
+            let (camera, seen) = (view.camera(&photo()), seen_by(&view));
             for (x, y) in [(0, 0), (80, 60), (159, 3), (40, 119)] {
                 let px = Point2::new(x as f64 + 0.5, y as f64 + 0.5);
                 let point = camera.ray(px).at(0.9);
@@ -250,7 +260,7 @@ mod tests {
         assert_eq!(View::default().camera(&photo()), photo());
         let drawn = ViewRanges::default().draw(&Draws::new(1, 2));
         assert!(drawn.is_whole());
-        assert_eq!(drawn.plate(&photo(), &plate()), plate());
+        assert_eq!(seen_by(&drawn), plate());
     }
 
     #[test]
@@ -260,7 +270,7 @@ mod tests {
             zoom: 2.0,
             ..View::default()
         };
-        let seen = view.plate(&photo(), &plate());
+        let seen = seen_by(&view);
         // What was on the right is now at the top.
         assert!(seen[(80, 5)].r > seen[(80, 110)].r + 20.0);
     }

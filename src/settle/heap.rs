@@ -20,6 +20,7 @@ fn tray() -> Background {
     Background {
         name: "tray".into(),
         size: [0.6, 0.4],
+        k1: 0.0,
         albedo: None,
         wall: None,
         camera: CameraSource::Rectangle {

@@ -9,6 +9,7 @@ fn scene(cards: u32, k: u64) -> Scene {
     let tray = Background {
         name: "tray".into(),
         size: [0.6, 0.4],
+        k1: 0.0,
         albedo: None,
         wall: None,
         camera: CameraSource::Rectangle {

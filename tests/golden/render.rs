@@ -6,9 +6,9 @@
 
 use crate::case::Case;
 use petcomp::Quality;
-use petcomp::render::{RenderOptions, check, render};
+use petcomp::render::{RenderOptions, check};
 use petcomp::scene::cycles;
-use petcomp::{Image, LinearRgb, PremulRgba, Shot, composite, io};
+use petcomp::{Image, LinearRgb, PremulRgba, composite, io};
 
 /// Between the default and a reference.
 const GOOD: RenderOptions = RenderOptions {
@@ -43,13 +43,15 @@ pub(crate) fn run(case: &Case) -> Result<(), String> {
             .as_float()
             .ok_or_else(|| format!("limits.{name}: expected a number"))?;
         let options = sampling(name)?;
-        judge(case, name, &picture_of(&shot, &options), &reference, limit)?;
+        judge(
+            case,
+            name,
+            &composite::picture(&shot, &options),
+            &reference,
+            limit,
+        )?;
     }
     Ok(())
-}
-
-fn picture_of(shot: &Shot, options: &RenderOptions) -> Image<PremulRgba> {
-    composite::frame(&render(shot, options), shot.plate.as_deref())
 }
 
 fn judge(

@@ -23,7 +23,7 @@ const GOOD: RenderOptions = RenderOptions {
 };
 
 /// The same with 3 x 3 samples a pixel, 6 x 6 a light.
-const HIGH: RenderOptions = RenderOptions {
+pub(super) const HIGH: RenderOptions = RenderOptions {
     subsamples: 3,
     light_samples: 6,
     ambient_samples: 100,
@@ -31,7 +31,7 @@ const HIGH: RenderOptions = RenderOptions {
 };
 
 /// A camera at height 1 over the surface, looking straight down; picture up is world `+y`.
-fn above(width: u32, height: u32, focal_px: f64) -> Camera {
+pub(super) fn above(width: u32, height: u32, focal_px: f64) -> Camera {
     let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI);
     Camera {
         image: [width, height],
@@ -53,7 +53,7 @@ fn square_light() -> AreaLight {
     }
 }
 
-fn card(
+pub(super) fn card(
     id: u32,
     center: [f64; 3],
     rotation: UnitQuaternion<f64>,
@@ -343,7 +343,7 @@ fn an_edge_is_as_soft_as_the_window() {
     }
 }
 
-fn plate(width: usize, height: usize) -> Image<LinearRgb> {
+pub(super) fn plate(width: usize, height: usize) -> Image<LinearRgb> {
     Image::from_fn(width, height, |x, y| {
         LinearRgb::new(0.1 + 0.01 * x as f32, 0.3, 0.013 * y as f32)
     })
@@ -405,7 +405,7 @@ fn ways_agree_on_a_pile() {
 
 /// Five tilted cards of soft blobs that partly run through each other, partly over the picture's
 /// edge.
-fn pile() -> Shot {
+pub(super) fn pile() -> Shot {
     let blob = |hue: f32| {
         Image::from_fn(48, 32, move |x, y| {
             let r = ((x as f32 - 23.5) / 24.0).hypot((y as f32 - 15.5) / 16.0);
@@ -431,7 +431,7 @@ fn pile() -> Shot {
     shot
 }
 
-fn same(a: &DeepImage, b: &DeepImage) -> bool {
+pub(super) fn same(a: &DeepImage, b: &DeepImage) -> bool {
     let pixels = || (0..a.height()).flat_map(|y| (0..a.width()).map(move |x| (x, y)));
     a.shadow() == b.shadow() && pixels().all(|(x, y)| a.at(x, y) == b.at(x, y))
 }
@@ -678,7 +678,7 @@ fn both_ways_agree_on_film() {
     assert!(difference(&a, &b) < 0.006, "{}", difference(&a, &b));
 }
 
-fn difference(a: &Image<PremulRgba>, b: &Image<PremulRgba>) -> f64 {
+pub(super) fn difference(a: &Image<PremulRgba>, b: &Image<PremulRgba>) -> f64 {
     let squares = a
         .pixels()
         .iter()

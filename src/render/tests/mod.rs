@@ -1,3 +1,4 @@
 //! The renderer against its definition.
 
 mod definition;
+mod lens;

@@ -1,11 +1,10 @@
 //! A shot as a folder for the reference renderer.
 
 use super::file::{
-    CyclesCamera, CyclesEnvironment, CyclesFile, CyclesGround, CyclesLight, CyclesPicture,
-    CyclesQuad, CyclesRender, CyclesShape, CyclesSide, CyclesSize, CyclesTray,
+    CyclesAperture, CyclesCamera, CyclesEnvironment, CyclesFile, CyclesGround, CyclesLight,
+    CyclesPicture, CyclesQuad, CyclesRender, CyclesShape, CyclesSide, CyclesSize, CyclesTray,
 };
 use crate::asset::Texture;
-use crate::camera::Camera;
 use crate::error::{Error, Result};
 use crate::geom::Vector3;
 use crate::image::Image;
@@ -45,7 +44,7 @@ fn scene_file(shot: &Shot, size: [f64; 2], folder: &Path) -> Result<CyclesFile> 
     let lights = shot.lights.iter();
     Ok(CyclesFile {
         render: render_settings(shot.camera.image),
-        camera: cycles_camera(&shot.camera),
+        camera: cycles_camera(shot),
         tray: CyclesTray { size },
         plate: write_plate(folder, shot)?,
         quads: cards
@@ -90,13 +89,19 @@ fn float_options() -> WriteOptions {
     }
 }
 
-fn cycles_camera(camera: &Camera) -> CyclesCamera {
+fn cycles_camera(shot: &Shot) -> CyclesCamera {
+    let camera = &shot.camera;
     let pose = &camera.camera_from_world;
     CyclesCamera {
         K: matrix_rows(camera.intrinsics()),
         R: matrix_rows(*pose.rotation.to_rotation_matrix().matrix()),
         t: pose.translation.vector.into(),
         resolution: Some(camera.image),
+        k1: shot.k1,
+        aperture: shot.thin_lens.map(|lens| CyclesAperture {
+            diameter: lens.aperture_m,
+            focus: lens.focus_m,
+        }),
     }
 }
 

@@ -39,6 +39,22 @@ pub(super) struct CyclesCamera {
     pub(super) t: [f64; 3],
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) resolution: Option<[u32; 2]>,
+    /// OpenCV's first coefficient of radial distortion.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub(super) k1: f64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) aperture: Option<CyclesAperture>,
+}
+
+/// Diameter of the aperture, and the depth that is in focus.
+#[derive(Clone, Copy, Serialize, Deserialize)]
+pub(super) struct CyclesAperture {
+    pub(super) diameter: f64,
+    pub(super) focus: f64,
+}
+
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
 }
 
 #[derive(Serialize, Deserialize)]

@@ -1,7 +1,8 @@
 //! A shot from a file of the reference renderer.
 
 use super::file::{
-    CyclesCamera, CyclesEnvironment, CyclesFile, CyclesLight, CyclesQuad, CyclesSide,
+    CyclesAperture, CyclesCamera, CyclesEnvironment, CyclesFile, CyclesLight, CyclesQuad,
+    CyclesSide,
 };
 use crate::asset::{Panorama, Texture};
 use crate::camera::Camera;
@@ -10,7 +11,7 @@ use crate::geom::{Point2, Pose, Quad, UnitQuaternion, Vector2, Vector3};
 use crate::image::Image;
 use crate::io;
 use crate::pixel::{Film, LinearRgb, Mix, ObjectId, PremulRgba};
-use crate::scene::{AreaLight, CATCHER_RATIO, Card, EnvironmentMap, Shot};
+use crate::scene::{AreaLight, CATCHER_RATIO, Card, EnvironmentMap, Shot, ThinLens};
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
@@ -27,7 +28,8 @@ pub fn import(path: impl AsRef<Path>, size: Option<[u32; 2]>) -> Result<Shot> {
     let file: CyclesFile = io::read_json(path)?;
     let folder = PictureFolder::for_scene(path)?;
     let size = size.unwrap_or([file.render.width, file.render.height]);
-    let mut shot = Shot::new(known_camera(&file).resized(size));
+    let mut shot = Shot::new(known_camera(&file).resized(size)).with_k1(file.camera.k1);
+    shot.thin_lens = file.camera.aperture.map(thin_lens);
     if let Some(plate) = &file.plate {
         shot = shot.with_plate(Arc::new(folder.read_plate(&plate.path, size)?));
     }
@@ -174,6 +176,13 @@ fn known_camera(file: &CyclesFile) -> Camera {
         focal_px: Vector2::new(c.K[0][0], c.K[1][1]),
         principal_px: Point2::new(c.K[0][2], c.K[1][2]),
         camera_from_world: camera_pose(c),
+    }
+}
+
+fn thin_lens(aperture: CyclesAperture) -> ThinLens {
+    ThinLens {
+        aperture_m: aperture.diameter,
+        focus_m: aperture.focus,
     }
 }
 

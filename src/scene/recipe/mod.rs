@@ -16,8 +16,8 @@ use crate::scene::check::{check_albedo, check_cast, check_count, check_each, che
 use crate::scene::stack::too_large;
 use crate::scene::{
     AssetVariant, Background, Count, DrawLog, Drawn, DropRanges, EdgeTreatment, EnvironmentRanges,
-    LightTint, PostProcessRanges, Range, Scene, SettleOptions, Surface, Take, Variation,
-    ViewRanges, WallRanges,
+    LensRanges, LightTint, PostProcessRanges, Range, Scene, SettleOptions, Surface, Take,
+    Variation, ViewRanges, WallRanges,
 };
 use compose::{Places, SceneNumber};
 use serde::{Deserialize, Serialize};
@@ -45,6 +45,8 @@ pub struct Recipe {
     pub viewpoints: Take,
     /// Which part of the photo is shown. Default: all of it.
     pub view: ViewRanges,
+    /// Lens of the camera. Default: that of the photo, in focus everywhere.
+    pub lens: LensRanges,
     /// Photos of each asset that are used: all, or the first ones. Default: `"all"`.
     pub photos: Take,
     /// Objects in a scene. Default: `[4, 12]`.
@@ -114,6 +116,7 @@ impl Default for Recipe {
             off: Vec::new(),
             viewpoints: Take::All,
             view: ViewRanges::default(),
+            lens: LensRanges::default(),
             photos: Take::All,
             objects: Range::new(4.0, 12.0).into(),
             distractors: Count::default(),
@@ -232,6 +235,7 @@ impl Recipe {
     pub fn check(&self) -> Result<()> {
         check_image(self.image)?;
         self.view.check()?;
+        self.lens.check()?;
         self.check_objects()?;
         self.check_light()?;
         self.check_surface()?;

@@ -83,6 +83,7 @@ mod tests {
         let place = |name: &str| Background {
             name: name.into(),
             size: [0.6, 0.4],
+            k1: 0.0,
             albedo: None,
             wall: None,
             camera,

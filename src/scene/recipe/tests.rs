@@ -12,6 +12,7 @@ fn tray(name: &str) -> Background {
     Background {
         name: name.into(),
         size: [0.6, 0.4],
+        k1: 0.0,
         albedo: None,
         wall: None,
         camera: CameraSource::Rectangle {

@@ -1,0 +1,411 @@
+//! Depth of field: what is rendered out of focus is as soft as a thin lens makes it.
+//!
+//! # Method
+//! Every deep sample spreads over its circle of confusion, a disc whose radius is that of its own
+//! depth (Potmesil and Chakravarty, "A lens and aperture camera model for synthetic image
+//! generation", 1981), object by object: what an object hides in part is known by its own coverage,
+//! which samples keep, and its colour there is that of what is seen of it close by. Where the
+//! objects in a pixel are equally far out of focus their soft light simply adds up, as that of any
+//! blur; else the nearer ones hide the others behind them by their soft coverage.
+//!
+//! The plate is a photo and has its own depth of field: of it only the shadows are blurred.
+
+mod disc;
+
+use crate::camera::{Camera, RadialDistortion};
+use crate::deep::{DeepImage, DeepSample};
+use crate::geom::{Plane, Point2};
+use crate::image::Image;
+use crate::pixel::{Depth, LinearRgb, Mix, ObjectId};
+use crate::scene::{Shot, ThinLens};
+use crate::work::{self, Kind};
+use disc::{Disc, Discs};
+use rayon::prelude::*;
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+/// Radii of the objects in a pixel that differ by less are the same, and by more than three times
+/// as much have nothing in common, pixels.
+const SAME_RADIUS_PX: f64 = 0.25;
+/// Coverage below this is none: a fortieth of a code of 8 bits.
+const LEAST_ALPHA: f32 = 1e-4;
+/// Seen share of an object's coverage from which on its colour is known in a pixel.
+const KNOWN_SHARE: f32 = 0.05;
+/// Weight of the surface's shadow where nothing is seen of it.
+const HIDDEN_WEIGHT: f32 = 0.01;
+
+/// The deep picture as a shot's lens sees it; the same where that is sharp everywhere.
+///
+/// Coverage becomes soft with the light: labels are made of the picture before.
+pub fn defocus<'a>(deep: &'a DeepImage, shot: &Shot) -> Cow<'a, DeepImage> {
+    match shot.thin_lens {
+        None => Cow::Borrowed(deep),
+        Some(lens) => Cow::Owned(Focus::new(shot, lens).of(deep)),
+    }
+}
+
+/// A lens in front of a shot's camera.
+struct Focus<'a> {
+    lens: ThinLens,
+    camera: &'a Camera,
+    distortion: RadialDistortion,
+}
+
+/// A deep sample, where it is, and what it hides per channel.
+struct PlacedSample {
+    at: [usize; 2],
+    sample: DeepSample,
+    hidden: LinearRgb,
+}
+
+/// Sums over the samples of an object whose circles of confusion reach a pixel.
+#[derive(Clone, Copy, Default)]
+struct SoftPixel {
+    alpha: f32,
+    visible: f32,
+    alpha_depth: f32,
+    light: LinearRgb,
+    hidden: LinearRgb,
+}
+
+/// An object out of focus, in the part of the picture that it reaches.
+struct SoftObject {
+    object: ObjectId,
+    columns: Range<usize>,
+    rows: Range<usize>,
+    pixels: Vec<SoftPixel>,
+    /// Pixels to the farthest that a circle of confusion of the picture reaches.
+    reach: isize,
+}
+
+/// An object in a pixel out of focus.
+struct SoftSample<'a> {
+    of: &'a SoftObject,
+    depth: f32,
+    pixel: SoftPixel,
+}
+
+impl<'a> Focus<'a> {
+    fn new(shot: &'a Shot, lens: ThinLens) -> Self {
+        Self {
+            lens,
+            camera: &shot.camera,
+            distortion: shot.distortion(),
+        }
+    }
+
+    fn of(&self, deep: &DeepImage) -> DeepImage {
+        work::add(Kind::Filters, 1);
+        let soft = self.soft_objects(deep);
+        let (width, height) = (deep.width(), deep.height());
+        let pixels: Vec<_> = (0..width * height)
+            .into_par_iter()
+            .map(|i| self.pixel(&soft, [i % width, i / width]))
+            .collect();
+        let tints = if is_tinted(deep) {
+            pixels.iter().flatten().map(|(_, tint)| *tint).collect()
+        } else {
+            Vec::new()
+        };
+        let samples = pixels.into_iter().map(without_tints);
+        DeepImage::from_pixels(self.soft_shadow(deep), samples).with_tints(tints)
+    }
+
+    fn radius_px(&self, depth: f32) -> f64 {
+        self.lens
+            .blur_radius_px(f64::from(depth), self.camera.focal_px.x)
+    }
+
+    /// Every object, each spread on its own.
+    fn soft_objects(&self, deep: &DeepImage) -> Vec<SoftObject> {
+        let objects = samples_by_object(deep);
+        let depths = objects.values().flatten().map(|s| s.sample.depth.0);
+        let discs = Discs::of_radii(depths.map(|depth| self.radius_px(depth)));
+        let size = [deep.width(), deep.height()];
+        objects
+            .into_par_iter()
+            .map(|(object, samples)| self.soft_object(object, &samples, &discs, size))
+            .collect()
+    }
+
+    fn soft_object(
+        &self,
+        object: ObjectId,
+        samples: &[PlacedSample],
+        discs: &Discs,
+        size: [usize; 2],
+    ) -> SoftObject {
+        let [columns, rows] = [0, 1].map(|axis| reached(samples, discs.reach(), axis, size));
+        let mut soft = SoftObject {
+            object,
+            pixels: vec![SoftPixel::default(); columns.len() * rows.len()],
+            columns,
+            rows,
+            reach: discs.reach() as isize,
+        };
+        for sample in samples {
+            let radius = self.radius_px(sample.sample.depth.0);
+            soft.spread(sample, discs.of_radius(radius));
+        }
+        soft
+    }
+
+    /// What is in a pixel, front to back, with what each object hides per channel.
+    fn pixel(&self, objects: &[SoftObject], at: [usize; 2]) -> Vec<(DeepSample, LinearRgb)> {
+        let mut seen: Vec<_> = objects.iter().filter_map(|soft| soft.at(at)).collect();
+        seen.sort_by(|a, b| {
+            let by_id = a.of.object.cmp(&b.of.object);
+            a.depth.total_cmp(&b.depth).then(by_id)
+        });
+        let apart = self.share_apart(&seen);
+        let mut through = LinearRgb::WHITE;
+        let samples = seen.iter();
+        samples
+            .map(|s| s.mixed_behind(&mut through, at, apart))
+            .collect()
+    }
+
+    /// 0 for objects that are equally far out of focus, 1 for those that are not at all.
+    fn share_apart(&self, seen: &[SoftSample<'_>]) -> f32 {
+        let radii = seen.iter().map(|s| self.radius_px(s.depth));
+        let low = radii.clone().fold(f64::INFINITY, f64::min);
+        let high = radii.fold(0.0, f64::max);
+        let beyond = (high - low) / SAME_RADIUS_PX - 1.0;
+        (0.5 * beyond).clamp(0.0, 1.0) as f32
+    }
+
+    /// The shadows on the surface, each pixel as soft as the surface is there.
+    fn soft_shadow(&self, deep: &DeepImage) -> Image<LinearRgb> {
+        let shadow = deep.shadow();
+        if shadow.pixels().iter().all(|s| *s == LinearRgb::WHITE) {
+            return shadow.clone();
+        }
+        let radii = Image::from_fn(shadow.width(), shadow.height(), |x, y| {
+            self.surface_radius_px(x, y)
+        });
+        let discs = Discs::of_radii(radii.pixels().iter().copied());
+        Image::from_fn(shadow.width(), shadow.height(), |x, y| {
+            mean_shadow(deep, [x, y], discs.of_radius(radii[(x, y)]))
+        })
+    }
+
+    /// Radius of the circle of confusion of the surface at a pixel; 0 where it is not seen.
+    fn surface_radius_px(&self, x: usize, y: usize) -> f64 {
+        let px = Point2::new(x as f64 + 0.5, y as f64 + 0.5);
+        let ray = self.camera.ray(self.distortion.undistort(px));
+        let depth = Plane::surface().intersect(&ray);
+        depth.map_or(0.0, |depth| self.radius_px(depth as f32))
+    }
+}
+
+fn without_tints(pixel: Vec<(DeepSample, LinearRgb)>) -> Vec<DeepSample> {
+    pixel.into_iter().map(|(sample, _)| sample).collect()
+}
+
+fn is_tinted(deep: &DeepImage) -> bool {
+    places(deep).any(|[x, y]| !deep.tints(x, y).is_empty())
+}
+
+fn places(deep: &DeepImage) -> impl Iterator<Item = [usize; 2]> {
+    let (width, height) = (deep.width(), deep.height());
+    (0..height).flat_map(move |y| (0..width).map(move |x| [x, y]))
+}
+
+fn samples_by_object(deep: &DeepImage) -> BTreeMap<ObjectId, Vec<PlacedSample>> {
+    let mut objects: BTreeMap<ObjectId, Vec<PlacedSample>> = BTreeMap::new();
+    for [x, y] in places(deep) {
+        let tints = deep.tints(x, y);
+        for (i, sample) in deep.at(x, y).iter().enumerate() {
+            let tint = tints.get(i).copied();
+            objects
+                .entry(sample.object)
+                .or_default()
+                .push(PlacedSample {
+                    at: [x, y],
+                    sample: *sample,
+                    hidden: tint.unwrap_or(LinearRgb::grey(sample.visible)),
+                });
+        }
+    }
+    objects
+}
+
+/// Columns (or rows) that the circles of confusion of some samples reach.
+fn reached(samples: &[PlacedSample], reach: usize, axis: usize, size: [usize; 2]) -> Range<usize> {
+    let places = samples.iter().map(|s| s.at[axis]);
+    let low = places.clone().min().unwrap_or(0).saturating_sub(reach);
+    let high = places.max().map_or(0, |last| last + 1 + reach);
+    low..high.min(size[axis])
+}
+
+impl SoftObject {
+    /// Adds a sample to every pixel of its disc.
+    fn spread(&mut self, placed: &PlacedSample, disc: &Disc) {
+        for (dx, dy, weight) in disc.taps() {
+            let at = [placed.at[0] as isize + dx, placed.at[1] as isize + dy];
+            if let Some(i) = self.index(at) {
+                self.pixels[i].add(placed, *weight);
+            }
+        }
+    }
+
+    fn index(&self, [x, y]: [isize; 2]) -> Option<usize> {
+        let (x, y) = (usize::try_from(x).ok()?, usize::try_from(y).ok()?);
+        let inside = self.columns.contains(&x) && self.rows.contains(&y);
+        inside.then(|| (y - self.rows.start) * self.columns.len() + x - self.columns.start)
+    }
+
+    /// What there is of it in a pixel.
+    fn at(&self, [x, y]: [usize; 2]) -> Option<SoftSample<'_>> {
+        let pixel = self.pixels[self.index([x as isize, y as isize])?];
+        (pixel.alpha > LEAST_ALPHA).then(|| SoftSample {
+            of: self,
+            depth: pixel.alpha_depth / pixel.alpha,
+            pixel,
+        })
+    }
+
+    /// What is seen of it around a pixel, close by above all: as far as something nearer that is
+    /// out of focus lets it shine through.
+    fn around(&self, [x, y]: [usize; 2]) -> SoftPixel {
+        let side = -self.reach..=self.reach;
+        let mut sum = SoftPixel::default();
+        for (dx, dy) in side
+            .clone()
+            .flat_map(|dy| side.clone().map(move |dx| (dx, dy)))
+        {
+            if let Some(i) = self.index([x as isize + dx, y as isize + dy]) {
+                let nearness = 1.0 / (1 + dx * dx + dy * dy) as f32;
+                sum.add_seen(&self.pixels[i], nearness * nearness);
+            }
+        }
+        sum
+    }
+}
+
+impl SoftPixel {
+    #[inline]
+    fn add(&mut self, PlacedSample { sample, hidden, .. }: &PlacedSample, weight: f32) {
+        self.alpha += weight * sample.alpha;
+        self.visible += weight * sample.visible;
+        self.alpha_depth += weight * sample.alpha * sample.depth.0;
+        self.light = self.light.add_scaled(weight, sample.light);
+        self.hidden = self.hidden.add_scaled(weight, *hidden);
+    }
+
+    /// Adds what is seen of another pixel of the same object.
+    fn add_seen(&mut self, other: &Self, weight: f32) {
+        self.visible += weight * other.visible;
+        self.light = self.light.add_scaled(weight, other.light);
+        self.hidden = self.hidden.add_scaled(weight, other.hidden);
+    }
+}
+
+/// What an object sends and hides in a pixel.
+struct Effect {
+    light: LinearRgb,
+    hidden: LinearRgb,
+}
+
+impl SoftSample<'_> {
+    /// The sample behind what lets this much pass, which becomes what passes through both.
+    ///
+    /// `apart` leads from the sum of what is seen, 0, to a soft object behind soft ones, 1.
+    fn mixed_behind(
+        &self,
+        through: &mut LinearRgb,
+        at: [usize; 2],
+        apart: f32,
+    ) -> (DeepSample, LinearRgb) {
+        let SoftPixel { light, hidden, .. } = self.pixel;
+        if apart == 0.0 {
+            return self.sample(Effect { light, hidden }, self.pixel.visible);
+        }
+        let behind = self.behind(through, at);
+        let seen = self.pixel.visible * (1.0 - apart) + mean(behind.hidden) * apart;
+        let both = Effect {
+            light: mixed(light, behind.light, apart),
+            hidden: mixed(hidden, behind.hidden, apart),
+        };
+        self.sample(both, seen)
+    }
+
+    /// What it does behind what lets this much pass.
+    fn behind(&self, through: &mut LinearRgb, at: [usize; 2]) -> Effect {
+        if through.r.max(through.g).max(through.b) < LEAST_ALPHA {
+            return Effect {
+                light: LinearRgb::BLACK,
+                hidden: LinearRgb::BLACK,
+            };
+        }
+        let alone = self.alone(at);
+        let opacity = alone.hidden.map(|o| o.min(1.0));
+        let effect = Effect {
+            light: alone.light * *through,
+            hidden: opacity * *through,
+        };
+        *through = *through * opacity.map(|o| 1.0 - o);
+        effect
+    }
+
+    /// What it would do if nothing hid it.
+    fn alone(&self, at: [usize; 2]) -> Effect {
+        let known = self.pixel.visible > KNOWN_SHARE * self.pixel.alpha;
+        let seen = if known {
+            self.pixel
+        } else {
+            self.of.around(at)
+        };
+        if seen.visible <= 0.0 {
+            return Effect {
+                light: LinearRgb::BLACK,
+                hidden: LinearRgb::grey(self.pixel.alpha),
+            };
+        }
+        let whole = self.pixel.alpha / seen.visible;
+        Effect {
+            light: seen.light.scale(whole),
+            hidden: seen.hidden.scale(whole),
+        }
+    }
+
+    fn sample(&self, effect: Effect, visible: f32) -> (DeepSample, LinearRgb) {
+        let alpha = self.pixel.alpha.min(1.0);
+        let sample = DeepSample {
+            object: self.of.object,
+            depth: Depth(self.depth),
+            light: effect.light,
+            alpha,
+            visible: visible.min(alpha),
+        };
+        (sample, effect.hidden)
+    }
+}
+
+fn mixed(a: LinearRgb, b: LinearRgb, share: f32) -> LinearRgb {
+    a.scale(1.0 - share).add_scaled(share, b)
+}
+
+fn mean(color: LinearRgb) -> f32 {
+    (color.r + color.g + color.b) / 3.0
+}
+
+/// The mean factor on the plate over a disc, by what is seen of the surface.
+fn mean_shadow(deep: &DeepImage, at: [usize; 2], disc: &Disc) -> LinearRgb {
+    let (mut sum, mut total) = (LinearRgb::BLACK, 0.0);
+    for (dx, dy, weight) in disc.taps() {
+        let (x, y) = (at[0] as isize + dx, at[1] as isize + dy);
+        let inside = x >= 0 && y >= 0 && x < deep.width() as isize && y < deep.height() as isize;
+        if inside {
+            let (x, y) = (x as usize, y as usize);
+            let seen = mean(deep.flat(x, y).transmittance()) + HIDDEN_WEIGHT;
+            sum = sum.add_scaled(weight * seen, deep.shadow()[(x, y)]);
+            total += weight * seen;
+        }
+    }
+    sum.scale(1.0 / total)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,219 @@
+use super::*;
+use crate::composite::frame;
+use crate::geom::Point3;
+
+/// Thirty millimetres at f/2, in focus half a metre away.
+const LENS: ThinLens = ThinLens {
+    aperture_m: 0.015,
+    focus_m: 0.5,
+};
+
+fn shot(thin_lens: Option<ThinLens>) -> Shot {
+    Shot {
+        thin_lens,
+        ..Shot::new(Camera::looking_down(0.5, 400.0, [64, 48]))
+    }
+}
+
+fn sample(object: u32, depth: f32, alpha: f32, through: f32) -> DeepSample {
+    DeepSample {
+        object: ObjectId(object),
+        depth: Depth(depth),
+        light: LinearRgb::grey(0.5 * alpha * through),
+        alpha,
+        visible: alpha * through,
+    }
+}
+
+fn picture(pixel: impl Fn(usize, usize) -> Vec<DeepSample>) -> DeepImage {
+    let pixels = (0..64 * 48).map(|i| pixel(i % 64, i / 64));
+    DeepImage::from_pixels(Image::filled(64, 48, LinearRgb::WHITE), pixels)
+}
+
+fn hidden(deep: &DeepImage, x: usize, y: usize) -> f32 {
+    deep.flat(x, y).opacity.g
+}
+
+/// The circle on the sensor by the lens equation: a point at `depth` is in focus at v, the sensor
+/// stands where `focus` is, and the cone from the aperture to v is so wide there.
+fn circle_px(focal_m: f64, depth: f64, focal_px: f64) -> f64 {
+    let image_of = |depth: f64| 1.0 / (1.0 / focal_m - 1.0 / depth);
+    let (sensor, focused) = (image_of(LENS.focus_m), image_of(depth));
+    let diameter_m = LENS.aperture_m * (sensor - focused).abs() / focused;
+    0.5 * diameter_m * focal_px / sensor
+}
+
+#[test]
+fn a_sharp_lens_leaves_the_picture_alone() {
+    let deep = picture(|x, y| vec![sample(1, 0.4, 1.0, 1.0); usize::from(x > y)]);
+    assert!(matches!(defocus(&deep, &shot(None)), Cow::Borrowed(_)));
+}
+
+#[test]
+fn the_circle_is_that_of_the_lens_equation() {
+    for depth in [0.3, 0.45, 0.5, 0.7, 5.0] {
+        let found = LENS.blur_radius_px(depth, 400.0);
+        for focal_m in [0.01, 0.03, 0.1] {
+            let expected = circle_px(focal_m, depth, 400.0);
+            assert!(
+                (found - expected).abs() < 1e-9,
+                "{depth}: {found} {expected}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_point_spreads_over_its_circle() {
+    for depth in [0.3_f32, 0.4, 0.7] {
+        let dot = picture(|x, y| vec![sample(1, depth, 1.0, 1.0); usize::from((x, y) == (32, 24))]);
+        let soft = defocus(&dot, &shot(Some(LENS)));
+        let (mut sum, mut spread) = (0.0, 0.0);
+        for [x, y] in places(&soft) {
+            let light = f64::from(soft.flat(x, y).color.g);
+            sum += light;
+            spread += light * (x as f64 - 32.0).powi(2);
+        }
+        let radius = circle_px(0.03, depth.into(), 400.0);
+        let wanted = 0.25 * radius * radius;
+        assert!((sum - 0.5).abs() < 1e-3, "{sum}");
+        assert!(
+            (spread / sum / wanted - 1.0).abs() < 0.05,
+            "{depth}: {} {wanted}",
+            spread / sum
+        );
+    }
+}
+
+#[test]
+fn what_is_in_focus_keeps_its_bits() {
+    let deep = picture(|x, y| {
+        let above = sample(1, 0.5, 0.25, 1.0);
+        let below = sample(2, 0.5, 0.5, 0.75);
+        [above, below][..(x + y) % 3].to_vec()
+    });
+    let soft = defocus(&deep, &shot(Some(LENS)));
+    for [x, y] in places(&deep) {
+        assert_eq!(soft.at(x, y), deep.at(x, y), "{x} {y}");
+    }
+}
+
+#[test]
+fn nothing_shines_through_where_a_soft_card_ends_over_a_sharp_one() {
+    // The near card covers the left half and hides the far one there, which is everywhere.
+    let deep = picture(|x, _| {
+        let near = sample(1, 0.4, 1.0, 1.0);
+        if x < 32 {
+            vec![near, sample(2, 0.5, 1.0, 0.0)]
+        } else {
+            vec![sample(2, 0.5, 1.0, 1.0)]
+        }
+    });
+    let soft = defocus(&deep, &shot(Some(LENS)));
+    let radius = LENS.blur_radius_px(0.4, 400.0);
+    assert!(radius > 1.4, "{radius}");
+    for x in 8..56 {
+        assert!(
+            (hidden(&soft, x, 24) - 1.0).abs() < 0.02,
+            "{x}: {}",
+            hidden(&soft, x, 24)
+        );
+        assert!((soft.flat(x, 24).color.g - 0.5).abs() < 0.02, "{x}");
+    }
+    // Its edge is soft as far as its circle reaches.
+    let near = |x: usize| {
+        soft.at(x, 24)
+            .iter()
+            .find(|s| s.object == ObjectId(1))
+            .map(|s| s.alpha)
+    };
+    assert!(near(32).is_some_and(|alpha| alpha > 0.05 && alpha < 0.5));
+    assert_eq!(near(36), None);
+}
+
+#[test]
+fn equal_blur_is_that_of_the_whole_picture() {
+    let deep = picture(|x, y| match (x / 8 + y / 8) % 3 {
+        0 => vec![],
+        1 => vec![sample(1, 0.4, 0.5, 1.0), sample(2, 0.4, 1.0, 0.5)],
+        _ => vec![sample(2, 0.4, 1.0, 1.0)],
+    });
+    let soft = defocus(&deep, &shot(Some(LENS)));
+    let disc = Discs::of_radii([LENS.blur_radius_px(f64::from(0.4_f32), 400.0)].into_iter());
+    let sharp = frame(&deep, None);
+    let blurred = frame(&soft, None);
+    for (x, y) in [(20, 20), (31, 24), (40, 33)] {
+        let taps = disc
+            .of_radius(LENS.blur_radius_px(f64::from(0.4_f32), 400.0))
+            .taps();
+        let expected: f32 = taps
+            .iter()
+            .map(|(dx, dy, w)| {
+                let at = ((x + dx) as usize, (y + dy) as usize);
+                w * sharp[at].g
+            })
+            .sum();
+        let found = blurred[(x as usize, y as usize)].g;
+        assert!(
+            (found - expected).abs() < 1e-5,
+            "{x} {y}: {found} {expected}"
+        );
+    }
+}
+
+#[test]
+fn shadows_are_as_soft_as_the_surface_is() {
+    let step = |x: usize| LinearRgb::grey(if x < 32 { 0.5 } else { 1.0 });
+    let shadow = Image::from_fn(64, 48, |x, _| step(x));
+    let deep = DeepImage::from_pixels(shadow, (0..64 * 48).map(|_| vec![]));
+    // The surface is half a metre away: in focus.
+    let sharp = defocus(&deep, &shot(Some(LENS)));
+    assert_eq!(sharp.shadow()[(31, 20)].g, 0.5);
+    let near = ThinLens {
+        focus_m: 0.4,
+        ..LENS
+    };
+    let soft = defocus(&deep, &shot(Some(near)));
+    let (inner, outer) = (soft.shadow()[(31, 20)].g, soft.shadow()[(32, 20)].g);
+    assert!(
+        inner > 0.55 && outer < 0.95 && (inner + outer - 1.5).abs() < 1e-3,
+        "{inner} {outer}"
+    );
+}
+
+#[test]
+fn film_keeps_its_tint() {
+    let red = LinearRgb::new(0.2, 0.8, 0.8);
+    let deep = picture(|x, _| vec![sample(1, 0.4, 0.6, 1.0); usize::from(x < 32)]);
+    let count = 32 * 48;
+    let deep = deep.with_tints(vec![red; count]);
+    let soft = defocus(&deep, &shot(Some(LENS)));
+    let inside = soft.flat(20, 20).opacity;
+    assert!(
+        (inside.r - 0.2).abs() < 1e-4 && (inside.g - 0.8).abs() < 1e-4,
+        "{inside:?}"
+    );
+    let edge = soft.flat(32, 20).opacity;
+    assert!((edge.g / edge.r - 4.0).abs() < 1e-2, "{edge:?}");
+}
+
+#[test]
+fn the_surface_is_seen_where_the_axis_meets_it() {
+    let shot = shot(Some(LENS));
+    let focus = Focus::new(&shot, LENS);
+    assert_eq!(focus.surface_radius_px(32, 24), 0.0);
+    let higher = Shot {
+        camera: Camera::look_at(
+            Point3::new(0.0, 0.0, 0.8),
+            Point3::origin(),
+            400.0,
+            [64, 48],
+        ),
+        ..shot.clone()
+    };
+    let off = Focus::new(&higher, LENS).surface_radius_px(5, 40);
+    assert!(
+        (off - LENS.blur_radius_px(0.8, 400.0)).abs() < 1e-6,
+        "{off}"
+    );
+}
