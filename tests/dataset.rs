@@ -1548,3 +1548,18 @@ fn a_mask_of_another_size_is_told() {
     let what = "tray.front.png: 32 x 24 pixels, but its label says 64 x 48";
     assert!(told.to_string().ends_with(what), "{told}");
 }
+
+#[test]
+fn what_the_place_hides_is_not_on_top_by_overlaps_either() {
+    let dir = tempfile::tempdir().unwrap();
+    write_world(dir.path());
+    let mask = Image::filled(64, 48, Coverage(1.0));
+    io::write(dir.path().join("photos/tray.front.png"), &mask).unwrap();
+    let config = DatasetConfig::read(dir.path().join("recipe.toml"), &[]).unwrap();
+    let hidden = Pipeline::open(config).unwrap().sample(1, 0).unwrap();
+    assert!(hidden.labels.objects.len() > 2);
+    for object in &hidden.labels.objects {
+        assert!(!object.is_topmost() && object.visible_mask.is_empty());
+        assert!(!object.amodal_mask.is_empty() && object.visible_fraction == 0.0);
+    }
+}
