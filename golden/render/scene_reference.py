@@ -912,6 +912,8 @@ class Builder:
             _fail("camera.k1", "cannot be had together with camera.aperture")
         r = self.spec["render"]
         height = data.sensor_width * r["height"] / r["width"]
+        # Cycles takes the height of a panoramic sensor as it stands.
+        data.sensor_height = height
         coefficients, error = lens_polynomial(k1, data.lens, 0.5 * math.hypot(data.sensor_width, height))
         print("lens polynomial: at most %.5f px off" % (error * r["width"] / data.sensor_width))
         data.type = "PANO"
