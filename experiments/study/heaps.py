@@ -41,8 +41,10 @@ def real_pile(path):
 def synthetic_heap(path):
     record = json.loads(path.read_text())
     half = np.array(record["scene"]["surface"]["size"]) / 2
-    places = [np.array(one["placement"]["at"]["translation"])[:2] / half for one in record["scene"]["objects"]]
-    return [(*place, number in record["labelled"]) for number, place in enumerate(places, 1)]
+    # What went over the rim is in no picture.
+    numbered = [(k, one["placement"]) for k, one in enumerate(record["scene"]["objects"], 1) if one["placement"] != "gone"]
+    places = [(k, np.array(placement["at"]["translation"])[:2] / half) for k, placement in numbered]
+    return [(*place, k in record["labelled"]) for k, place in places]
 
 
 def report(name, pictures):

@@ -105,6 +105,9 @@ fn of_place(place: &BackgroundPhoto, photo: u32, front: Option<u32>) -> Value {
         "camera": camera_digest(background, kept),
         "photo": shown(photo),
     });
+    if let Some(albedo) = background.albedo {
+        place_values["albedo"] = json!(albedo);
+    }
     if let Some(wall) = background.wall {
         place_values["wall"] = json!(wall);
     }
