@@ -12,6 +12,8 @@ const OUTLINE_STEP: f64 = 0.02;
 /// Steps towards the point of a cylinder that is seen: micrometres are left at 60 degrees, after
 /// five of them nothing at 20.
 const CROSSING_STEPS: usize = 10;
+/// A step shorter than this, metres, is the last: texels are a tenth of a millimetre at the least.
+const CROSSING_TOLERANCE_M: f64 = 1e-6;
 
 /// How a card is curved: a part of a cylinder whose axis is parallel to the card.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -116,7 +118,11 @@ impl Cylinder {
         let (mut arc, mut met) = (self.arc_of(p), *p);
         for _ in 0..CROSSING_STEPS {
             met = p + (eye.xy() - p) * (self.height(arc) / eye.z);
+            let last = arc;
             arc = libm::asin(self.curvature * self.arc_of(&met)) / self.curvature;
+            if (arc - last).abs() < CROSSING_TOLERANCE_M {
+                break;
+            }
         }
         met + self.along * (arc - self.arc_of(&met))
     }
