@@ -13,7 +13,7 @@ JOBS.json is a list of objects, all done in one Blender session:
     prefix    outputs are written to PREFIX + name + ".exr" as 32-bit float
     outputs   {"Image": "name", "Matte": "name", "Edges": "name"}: which outputs of the node, and their names
     linked    optional: the output that the Composite node gets; the first one where it is not given
-    repeats   optional: render so many times more and print the processor seconds of each
+    repeats   optional: render so many times more, writing nothing, and print the processor seconds of each
 
 There is no colour conversion anywhere, and the compositor runs on the CPU in full precision.  Tried with Blender 3.4.1
 and with bpy 4.2.0 and 4.5.15, whose options are sockets where 3.4 has properties.
@@ -133,7 +133,7 @@ def make_node(tree, job):
 
 
 def add_file_output(tree, socket, folder, name):
-    """A File Output node that writes one 32-bit float EXR called NAME and a frame number."""
+    """Returns a File Output node that writes one 32-bit float EXR called NAME and a frame number."""
     node = tree.nodes.new("CompositorNodeOutputFile")
     node.base_path = folder
     node.file_slots[0].path = name
@@ -145,6 +145,7 @@ def add_file_output(tree, socket, folder, name):
         except TypeError:  # older versions cannot write a one-channel EXR: three equal ones then
             form.color_mode = "RGB"
     tree.links.new(socket, node.inputs[0])
+    return node
 
 
 def collect(folder, name, target):
@@ -173,11 +174,12 @@ def do(job):
     sink = tree.nodes.new("CompositorNodeComposite")
     tree.links.new(node.outputs[job.get("linked", 0)], sink.inputs["Image"])
     with tempfile.TemporaryDirectory(prefix="keying_") as folder:
-        for output, name in job["outputs"].items():
-            add_file_output(tree, node.outputs[output], folder, name + "_")
+        writers = [add_file_output(tree, node.outputs[output], folder, name + "_") for output, name in job["outputs"].items()]
         render()
         for name in job["outputs"].values():
             collect(folder, name, job["prefix"] + name + ".exr")
+        for writer in writers:
+            tree.nodes.remove(writer)
         return [render() for _ in range(job.get("repeats", 0))]
 
 
