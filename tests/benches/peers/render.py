@@ -22,8 +22,8 @@ import tempfile
 from side_by_side import CORES, INSIDE, Comparison, arguments, pinned, spent, told, version
 
 SCRIPT = "golden/render/scene_reference.py"
-DEFAULT_PRESET = "fast"
-PRESETS = ("draft", "fast", "good", "high", "reference")
+DEFAULT_PRESET = "normal"
+PRESETS = ("draft", "normal", "good", "high", "reference")
 
 
 class Cycles:
