@@ -289,12 +289,12 @@ mod tests {
                 .photos,
             2
         );
-        std::fs::write(folder.path().join("photos.csv"), "file,asset\none.png,a\n").unwrap();
+        std::fs::write(folder.path().join("photos.csv"), "file,class\none.png,cap\n").unwrap();
         let reported = List::read(folder.path().join("photos.csv"))
             .unwrap_err()
             .to_string();
         assert!(
-            reported.ends_with("photos.csv: line 2: missing key \"class\""),
+            reported.ends_with("photos.csv: line 2: missing key \"asset\""),
             "{reported}"
         );
     }

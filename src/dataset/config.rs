@@ -230,7 +230,7 @@ mod tests {
     fn an_example_in_the_template_is_taken_as_it_stands() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("recipe.toml");
-        assert_eq!(examples().len(), 4);
+        assert_eq!(examples().len(), 5);
         for example in examples() {
             io::write_text(&path, &example).unwrap();
             let config = DatasetConfig::read(&path, &[]).unwrap();

@@ -253,7 +253,7 @@ mod tests {
             ),
             (
                 weighted(&[1], &[-1.0]),
-                "n.weights: -1, expected 0 to 1000000000000000 (a share or a count)",
+                "n.weights: -1, expected 0 to 1e15 (a share or a count)",
             ),
             (
                 Range::new(1.0, 2.5).into(),
