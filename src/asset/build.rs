@@ -289,7 +289,11 @@ mod tests {
                 .photos,
             2
         );
-        std::fs::write(folder.path().join("photos.csv"), "file,class\none.png,cap\n").unwrap();
+        std::fs::write(
+            folder.path().join("photos.csv"),
+            "file,class\none.png,cap\n",
+        )
+        .unwrap();
         let reported = List::read(folder.path().join("photos.csv"))
             .unwrap_err()
             .to_string();

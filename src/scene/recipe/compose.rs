@@ -27,6 +27,16 @@ pub(super) struct Places<'a> {
     pub(super) negatives: &'a [Background],
 }
 
+impl<'a> Places<'a> {
+    fn of(&self, is_negative: bool) -> &'a [Background] {
+        if is_negative {
+            self.negatives
+        } else {
+            self.viewpoints
+        }
+    }
+}
+
 impl Recipe {
     /// A scene of a recipe whose switches have been applied.
     pub(super) fn compose(
@@ -37,15 +47,13 @@ impl Recipe {
         catalog: &[AssetVariant],
     ) -> Result<Scene> {
         let draws = Draws::new(number.seed, number.k).logged(log);
-        let (backgrounds, mut objects) = if self.draw_negative(&draws) {
-            (places.negatives, Vec::new())
+        let is_negative = self.draw_negative(&draws);
+        let background = pick_background(&draws, places.of(is_negative))?;
+        let mut objects = if is_negative {
+            Vec::new()
         } else {
-            (
-                places.viewpoints,
-                self.select_objects(number, log, catalog)?,
-            )
+            self.select_objects(number, log, catalog)?
         };
-        let background = pick_background(&draws, backgrounds)?;
         self.vary_objects(&mut objects, &draws);
         let surface = self.draw_surface(&draws, background);
         self.drop_column(background, surface, &draws)
