@@ -99,6 +99,7 @@ pub use camera::Camera;
 #[cfg(feature = "pipeline")]
 #[doc(hidden)]
 pub use deep::HoldoutSample;
+#[cfg(feature = "pipeline")]
 pub use deep::{DeepImage, DeepSample};
 pub use diagnostic::{Code, Diagnostic, Severity};
 #[doc(hidden)]
