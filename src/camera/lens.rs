@@ -185,7 +185,7 @@ impl RadialDistortion {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::camera::simulate::Scenario;
     use crate::camera::{SolveOptions, distorted, solve};
@@ -193,7 +193,8 @@ mod tests {
 
     const LENSES: [f64; 5] = [-0.3, -0.02, 0.0, 0.05, 0.4];
 
-    fn camera() -> Camera {
+    /// A tilted camera whose pixels are not square and whose principal point is off the middle.
+    pub(crate) fn camera() -> Camera {
         let level = Camera::look_at(
             Point3::new(0.1, -0.4, 1.2),
             Point3::new(0.02, 0.03, 0.0),

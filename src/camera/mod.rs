@@ -69,6 +69,8 @@ pub use label::{Artwork, Crop, Framing, LabelFormat, LabelWall, PixelOrigin};
 pub use label::{Label, LabelCamera, LabelImage, LabelPoint, LabelSurface, MarkerMap};
 #[doc(hidden)]
 pub use lens::RadialDistortion;
+#[cfg(test)]
+pub(crate) use lens::tests::camera as tilted_camera;
 pub(crate) use marker::any_markers;
 #[cfg(test)]
 pub(crate) use marker::printed;

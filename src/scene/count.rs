@@ -2,6 +2,7 @@
 
 use crate::bounds::Bounds;
 use crate::error::{Error, Result};
+use crate::scene::draw::weighted_place;
 use crate::scene::{Distribution, Draws, Range};
 use serde::{Deserialize, Serialize};
 
@@ -98,15 +99,7 @@ fn draw_weighted(values: &[u32], weights: &[f64], draws: &Draws, path: &str) -> 
 }
 
 fn value_at(share: f64, values: &[u32], weights: &[f64]) -> u32 {
-    let mut sum = 0.0;
-    for (value, weight) in values.iter().zip(weights) {
-        sum += weight;
-        if share < sum {
-            return *value;
-        }
-    }
-    // Rounded up to the whole sum.
-    last_weighted(values, weights)
+    values[weighted_place(weights, share)]
 }
 
 fn check_values(at: &str, values: &[u32], bounds: &Bounds) -> Result<()> {

@@ -139,6 +139,18 @@ impl<'a> Draws<'a> {
     }
 }
 
+/// The place in a list of weights at which their sum comes above a number; the last one that has a
+/// weight where rounding leaves a number that is the whole sum.
+pub(super) fn weighted_place(weights: &[f64], number: f64) -> usize {
+    let mut sums = weights.iter().scan(0.0, |sum, weight| {
+        *sum += weight;
+        Some(*sum)
+    });
+    let found = sums.position(|sum| sum > number);
+    let last = weights.iter().rposition(|weight| *weight > 0.0);
+    found.or(last).unwrap_or_default()
+}
+
 /// FNV-1a, 128 bits; constants of Fowler, Noll and Vo.
 fn fnv1a_128(bytes: &[u8]) -> u128 {
     const FNV_OFFSET: u128 = 0x6c62_272e_07bb_0142_62b8_2175_6295_c58d;

@@ -205,8 +205,8 @@ impl LensRanges {
         Lens {
             k1,
             bends_plate,
-            f_number: draw_optional(self.f_number, draws, "lens.f_number"),
-            focus_m: draw_optional(self.focus_m, draws, "lens.focus_m"),
+            f_number: Range::draw_optional(self.f_number, draws, "lens.f_number"),
+            focus_m: Range::draw_optional(self.focus_m, draws, "lens.focus_m"),
             sensor_mm: self.sensor_mm,
         }
     }
@@ -214,36 +214,22 @@ impl LensRanges {
     pub(super) fn check(&self) -> Result<()> {
         self.k1.check("lens.k1", &K1)?;
         SENSOR.check("lens.sensor_mm", self.sensor_mm)?;
-        check_optional_range(self.f_number, "lens.f_number", &F_NUMBER)?;
-        check_optional_range(self.focus_m, "lens.focus_m", &FOCUS)
+        Range::check_optional(self.f_number, "lens.f_number", &F_NUMBER)?;
+        Range::check_optional(self.focus_m, "lens.focus_m", &FOCUS)
     }
-}
-
-fn draw_optional(range: Option<Range>, draws: &Draws, path: &str) -> Option<f64> {
-    range.map(|range| range.draw(draws, path))
-}
-
-fn check_optional_range(range: Option<Range>, at: &str, bounds: &Bounds) -> Result<()> {
-    range.map_or(Ok(()), |range| range.check(at, bounds))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::camera::tilted_camera;
     use crate::geom::{Point3, Vector2};
     use crate::scene::{DrawLog, View};
 
     fn photo() -> Camera {
-        let level = Camera::look_at(
-            Point3::new(0.1, -0.4, 1.2),
-            Point3::new(0.02, 0.03, 0.0),
-            150.0,
-            [160, 120],
-        );
         Camera {
             focal_px: Vector2::new(150.0, 152.0),
-            principal_px: Point2::new(77.0, 64.0),
-            ..level
+            ..tilted_camera()
         }
     }
 

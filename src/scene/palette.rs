@@ -4,6 +4,7 @@ use crate::error::{Error, Result};
 use crate::pixel::LinearRgb;
 use crate::scene::bounds::{SHARE, WEIGHT};
 use crate::scene::check::{check_each, field};
+use crate::scene::draw::weighted_place;
 use crate::scene::{Draws, Range};
 use serde::{Deserialize, Serialize};
 
@@ -112,15 +113,11 @@ pub(super) fn check_tint(tint: LinearRgb, at: &str) -> Result<()> {
 /// Fails on the first colour that no plastic has, and where none has any weight.
 pub(super) fn check_palette(palette: &[PaletteEntry], at: &str) -> Result<()> {
     check_each(palette, at, PaletteEntry::check)?;
-    if palette.is_empty() || total_weight(palette) > 0.0 {
+    if palette.is_empty() || palette.iter().any(|entry| entry.weight() > 0.0) {
         return Ok(());
     }
     let what = "weights of 0 alone, expected one above 0";
     Err(Error::value(at, what))
-}
-
-fn total_weight(palette: &[PaletteEntry]) -> f64 {
-    palette.iter().map(PaletteEntry::weight).sum()
 }
 
 /// The tint at a path; white, and nothing drawn, where there is nothing to choose from.
@@ -128,12 +125,9 @@ pub(super) fn draw_tint(palette: &[PaletteEntry], draws: &Draws, path: &str) -> 
     if palette.is_empty() {
         return LinearRgb::WHITE;
     }
-    let mut rest = Range::new(0.0, total_weight(palette)).draw(draws, path);
-    let chosen = palette.iter().find(|entry| {
-        rest -= entry.weight();
-        rest < 0.0
-    });
-    chosen.map_or(LinearRgb::WHITE, PaletteEntry::tint)
+    let weights: Vec<f64> = palette.iter().map(PaletteEntry::weight).collect();
+    let number = Range::new(0.0, weights.iter().sum()).draw(draws, path);
+    palette[weighted_place(&weights, number)].tint()
 }
 
 #[cfg(test)]

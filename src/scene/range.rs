@@ -79,6 +79,16 @@ impl Range {
         share > 0.0 && Self::new(0.0, 1.0).draw(draws, path) < share
     }
 
+    /// The value at a path; nothing is drawn where no range is given.
+    pub(super) fn draw_optional(range: Option<Self>, draws: &Draws, path: &str) -> Option<f64> {
+        range.map(|range| range.draw(draws, path))
+    }
+
+    /// Fails as [`check`](Self::check) where a range is given.
+    pub(super) fn check_optional(range: Option<Self>, at: &str, bounds: &Bounds) -> Result<()> {
+        range.map_or(Ok(()), |range| range.check(at, bounds))
+    }
+
     /// The value of a field at a path.
     pub(super) fn draw_field(&self, draws: &Draws, path: &str, field: &str) -> f64 {
         self.draw(draws, &format!("{path}.{field}"))

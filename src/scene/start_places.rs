@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::scene::bounds::SHARE;
+use crate::scene::draw::weighted_place;
 use crate::scene::{Draws, DropRanges, Range};
 
 /// Most rows and columns of a histogram of positions.
@@ -98,22 +99,9 @@ impl StartPlaces<'_> {
         let columns = rows[0].len();
         let weights: Vec<f64> = rows.concat();
         let sum = Range::new(0.0, weights.iter().sum());
-        let place = place_at(&weights, sum.draw_field(self.draws, path, "cell"));
+        let place = weighted_place(&weights, sum.draw_field(self.draws, path, "cell"));
         (place / columns, place % columns)
     }
-}
-
-/// The place in a list of weights at which their sum is above a number.
-fn place_at(weights: &[f64], number: f64) -> usize {
-    let sums = weights.iter().scan(0.0, |sum, weight| {
-        *sum += weight;
-        Some(*sum)
-    });
-    let mut numbered = sums.enumerate();
-    let found = numbered.find(|(_, sum)| *sum > number);
-    // Rounding may leave a number that is the whole sum.
-    let last = weights.iter().rposition(|weight| *weight > 0.0);
-    found.map(|(i, _)| i).or(last).unwrap_or_default()
 }
 
 /// One of `of` equal parts of a range.

@@ -169,23 +169,9 @@ impl ViewRanges {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::camera::tilted_camera as photo;
     use crate::filter::sample_bilinear_clamped;
-    use crate::geom::Point3;
     use crate::pixel::LinearRgb;
-
-    fn photo() -> Camera {
-        let level = Camera::look_at(
-            Point3::new(0.1, -0.4, 1.2),
-            Point3::new(0.02, 0.03, 0.0),
-            150.0,
-            [160, 120],
-        );
-        Camera {
-            focal_px: Vector2::new(150.0, 170.0),
-            principal_px: Point2::new(77.0, 64.0),
-            ..level
-        }
-    }
 
     fn views() -> impl Iterator<Item = View> {
         let turns = [-170.0, -12.0, 0.0, 3.0, 90.0];

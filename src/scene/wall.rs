@@ -74,8 +74,8 @@ pub struct WallRanges {
 impl WallRanges {
     /// Walls along a surface of this size whose label says `labelled`.
     pub(super) fn draw(&self, draws: &Draws, size: [f64; 2], labelled: Option<Wall>) -> Wall {
-        let height = drawn(&self.height, draws, "walls.height");
-        let slope_deg = drawn(&self.slope_deg, draws, "walls.slope_deg");
+        let height = Range::draw_optional(self.height, draws, "walls.height");
+        let slope_deg = Range::draw_optional(self.slope_deg, draws, "walls.slope_deg");
         Wall::new(
             size,
             height.or(labelled.map(|wall| wall.height)),
@@ -84,19 +84,9 @@ impl WallRanges {
     }
 
     pub(super) fn check(&self) -> Result<()> {
-        if let Some(height) = &self.height {
-            height.check("walls.height", &WALL_HEIGHT)?;
-        }
-        match &self.slope_deg {
-            Some(slope) => slope.check("walls.slope_deg", &SLOPE),
-            None => Ok(()),
-        }
+        Range::check_optional(self.height, "walls.height", &WALL_HEIGHT)?;
+        Range::check_optional(self.slope_deg, "walls.slope_deg", &SLOPE)
     }
-}
-
-/// Nothing is drawn from what is not given.
-fn drawn(range: &Option<Range>, draws: &Draws, path: &str) -> Option<f64> {
-    range.as_ref().map(|range| range.draw(draws, path))
 }
 
 #[cfg(test)]

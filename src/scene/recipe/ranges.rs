@@ -179,9 +179,7 @@ impl LightRanges {
         for (name, range, bounds) in self.bounded_ranges() {
             range.check(&format!("{at}.{name}"), bounds)?;
         }
-        if let Some(range) = &self.temperature_k {
-            range.check(&format!("{at}.temperature_k"), &KELVIN)?;
-        }
+        Range::check_optional(self.temperature_k, &format!("{at}.temperature_k"), &KELVIN)?;
         check_each(&self.color, &format!("{at}.color"), |range, at| {
             range.check(at, &RADIANCE)
         })
