@@ -41,6 +41,7 @@ fn scene(k: u64) -> Scene {
         exposure: Exposure::default(),
         edges: Default::default(),
         cast: Default::default(),
+        light_map: Default::default(),
         view: Default::default(),
         lens: Default::default(),
         finish: Default::default(),

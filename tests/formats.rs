@@ -118,6 +118,7 @@ fn sample_of(shot: Shot, options: &LabelOptions) -> Result<Sample> {
         environment: None,
         exposure: Exposure::default(),
         cast: LightTint::default(),
+        light_map: Default::default(),
         view: Default::default(),
         edges: Default::default(),
         lens: Default::default(),

@@ -199,6 +199,7 @@ mod tests {
             exposure: Default::default(),
             edges: Default::default(),
             cast: Default::default(),
+            light_map: Default::default(),
             view: Default::default(),
             lens: Default::default(),
             finish: Default::default(),

@@ -3,6 +3,7 @@
 use crate::color::Albedo;
 use crate::geom::{Point3, Vector3};
 use crate::image::Image;
+use crate::light::light_map::match_light_map;
 use crate::light::{
     irradiance, match_blur, match_light_tint, match_noise, surface_color, value_of_rank,
 };
@@ -16,11 +17,13 @@ use std::f64::consts::PI;
 /// paper.
 const WHITE_PERCENTILE: f64 = 0.99;
 
-/// Estimates what a scene leaves to its plate: the colour of the light, the exposure, the blur, the noise.
+/// Estimates what a scene leaves to its plate: the colour of the light, how it is spread, the
+/// exposure, the blur, the noise.
 ///
 /// A scene that leaves nothing comes back as it is.
 pub fn match_plate(scene: Scene, plate: &Image<LinearRgb>) -> Scene {
-    let exposed = expose(match_light_tint(scene, plate), plate);
+    let lit = match_light_map(match_light_tint(scene, plate), plate);
+    let exposed = expose(lit, plate);
     match_noise(match_blur(exposed, plate), plate)
 }
 
@@ -43,7 +46,7 @@ pub fn expose(scene: Scene, plate: &Image<LinearRgb>) -> Scene {
             (luminance_of_white(&scene, plate, albedo), gain_ev)
         }
     };
-    let match_ev = stops_of(wanted / f64::from(white_card(&scene)));
+    let match_ev = stops_of(wanted / f64::from(white_card_at(&scene, Point3::origin())));
     Scene {
         exposure: Exposure::Ev(match_ev + gain_ev),
         ..scene
@@ -82,12 +85,12 @@ fn finite_luminances(plate: &Image<LinearRgb>) -> Vec<f32> {
     finite.map(|c| c.luminance()).collect()
 }
 
-/// Luminance of a white card in the middle of the surface.
-fn white_card(scene: &Scene) -> f32 {
+/// Luminance of a white card on a point of the surface, with nothing in the way of the light.
+pub(super) fn white_card_at(scene: &Scene, point: Point3<f64>) -> f32 {
     let lit: f32 = scene
         .lights
         .iter()
-        .map(|light| irradiance(light, Point3::origin(), Vector3::z()).luminance())
+        .map(|light| irradiance(light, point, Vector3::z()).luminance())
         .sum();
     lit / PI as f32 + scene.ambient.luminance()
 }
@@ -115,6 +118,7 @@ mod tests {
             exposure,
             edges: Default::default(),
             cast: Default::default(),
+            light_map: Default::default(),
             view: Default::default(),
             lens: Default::default(),
             finish: Default::default(),

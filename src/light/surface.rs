@@ -11,11 +11,7 @@ use crate::scene::{CameraSource, LightTint, Scene};
 /// The median colour, channel by channel, of the plate where the scene's labelled rectangle is
 /// seen; none where the camera is not known yet, or does not see it.
 pub(crate) fn surface_color(scene: &Scene, plate: &Image<LinearRgb>) -> Option<LinearRgb> {
-    let CameraSource::Known(camera) = scene.camera else {
-        return None;
-    };
-    let lens = scene.lens.distortion_of_plate(&camera);
-    let seen = surface_pixels((&camera, &lens), scene.surface.size, plate);
+    let seen = seen_surface(scene, plate);
     if seen.is_empty() {
         return None;
     }
@@ -26,17 +22,20 @@ pub(crate) fn surface_color(scene: &Scene, plate: &Image<LinearRgb>) -> Option<L
     ))
 }
 
-/// The finite pixels of a plate that show a surface of this size.
-fn surface_pixels(
-    by: (&Camera, &RadialDistortion),
-    size: [f64; 2],
+/// The points of a scene's surface that the plate shows, and their colours where those are finite;
+/// none where the camera is not known yet, or does not see it.
+pub(super) fn seen_surface(
+    scene: &Scene,
     plate: &Image<LinearRgb>,
-) -> Vec<LinearRgb> {
+) -> Vec<(Point3<f64>, LinearRgb)> {
+    let CameraSource::Known(camera) = scene.camera else {
+        return Vec::new();
+    };
+    let lens = scene.lens.distortion_of_plate(&camera);
     let places = (0..plate.height()).flat_map(|y| (0..plate.width()).map(move |x| (x, y)));
     places
-        .filter(|&(x, y)| surface_point(by, x, y).is_some_and(|p| is_on_surface(&p, size)))
-        .map(|at| plate[at])
-        .filter(|c| c.is_finite())
+        .filter_map(|(x, y)| Some((surface_point((&camera, &lens), x, y)?, plate[(x, y)])))
+        .filter(|(point, color)| is_on_surface(point, scene.surface.size) && color.is_finite())
         .collect()
 }
 
@@ -56,9 +55,9 @@ fn surface_point(
 }
 
 /// The median of a channel; the upper one of two.
-fn median_of(colors: &[LinearRgb], channel: fn(&LinearRgb) -> f32) -> f32 {
-    let values = colors.iter().map(channel).collect();
-    value_of_rank(values, colors.len() / 2)
+fn median_of(seen: &[(Point3<f64>, LinearRgb)], channel: fn(&LinearRgb) -> f32) -> f32 {
+    let values = seen.iter().map(|(_, color)| channel(color)).collect();
+    value_of_rank(values, seen.len() / 2)
 }
 
 /// Turns [`LightTint::MatchSurface`] into the colour of the surface's light; any other scene comes
@@ -116,6 +115,7 @@ pub(super) mod tests {
             exposure: Exposure::Ev(0.0),
             edges: Default::default(),
             cast,
+            light_map: Default::default(),
             view: Default::default(),
             lens: Default::default(),
             finish: Default::default(),

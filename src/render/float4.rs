@@ -18,6 +18,12 @@ impl Float4 {
         Self([r, g, b, 1.0])
     }
 
+    /// A light that is so many times as bright.
+    #[inline(always)]
+    pub(super) fn light_scaled(self, factor: f32) -> Self {
+        Self::light_from_fn(|channel| factor * self.0[channel])
+    }
+
     #[inline(always)]
     pub(super) fn rgb(self) -> LinearRgb {
         LinearRgb::new(self.0[0], self.0[1], self.0[2])

@@ -132,6 +132,7 @@ fn fill_combined_row(
         let soft = between_coarse(&buffers.coarse, requested.start, i);
         *out = remaining(lit.relative, open, &hidden.add_scaled(1.0, soft));
     }
+    lit.spread_light(j, &requested, out, buffers);
 }
 
 /// What is left of open irradiance, or that as a share of it.

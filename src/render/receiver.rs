@@ -17,7 +17,7 @@ use crate::render::view::{
     CameraView, HORIZON_M, LatticeArea, ProjectedPlane, ScenePlane, rows_and_columns,
 };
 use crate::render::{RenderOptions, refill};
-use crate::scene::{Card, Shot};
+use crate::scene::{Card, LightGrid, Shot};
 use crate::work::{self, Kind};
 use std::ops::Range;
 
@@ -61,12 +61,33 @@ pub(super) struct ReceiverIrradiance {
     pub(super) coarse: Receiver,
     /// The share of open irradiance is requested, not irradiance itself.
     pub(super) relative: bool,
+    /// How the light is spread; the plate of a surface shows its own.
+    light_grid: Option<LightGrid>,
 }
 
 impl ReceiverIrradiance {
     /// No light shines on it.
     pub(super) fn is_dark(&self) -> bool {
         self.fine.groups.is_empty() && self.coarse.groups.is_empty()
+    }
+
+    /// Spreads the light at the requested nodes of a row as the shot says.
+    pub(super) fn spread_light(
+        &self,
+        j: usize,
+        requested: &Range<usize>,
+        out: &mut [Float4],
+        buffers: &mut RowBuffers,
+    ) {
+        let Some(grid) = &self.light_grid else {
+            return;
+        };
+        self.fine
+            .fill_positions(j, requested, &mut buffers.position);
+        let [x, y, _] = &buffers.position;
+        for (out, (x, y)) in out.iter_mut().zip(x.iter().zip(y)) {
+            *out = out.light_scaled(grid.factor_at(f64::from(*x), f64::from(*y)));
+        }
     }
 
     /// The value of nodes that are not requested.
@@ -133,6 +154,7 @@ impl<'a> LightingContext<'a> {
             fine: self.card_on(&self.fine, own, reach, faces)?,
             coarse: self.card_on(&self.coarse, own, reach, sky)?,
             relative: false,
+            light_grid: self.shot.light_grid.clone(),
         })
     }
 
@@ -167,6 +189,7 @@ impl<'a> LightingContext<'a> {
             fine,
             coarse,
             relative: true,
+            light_grid: None,
         })
     }
 

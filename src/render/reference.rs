@@ -211,7 +211,8 @@ impl<'a> ReferenceWorld<'a> {
     fn light_on(&self, k: usize, [x, y]: [f64; 2], hit: &CardHit) -> LinearRgb {
         let point = self.view.point_at(x, y, hit.depth);
         let light = self.irradiance(&point, &hit.normal, &self.cards[k].lights, Some(k));
-        light.shadowed
+        let factor = self.shot.light_factor_at(&point);
+        light.shadowed.scale(factor)
     }
 
     /// Irradiance of the surface where a camera ray meets it; none beside it.

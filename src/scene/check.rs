@@ -51,7 +51,8 @@ impl Scene {
         check_count(self.lights.len(), "lights", MAX_LIGHTS)?;
         check_each(&self.lights, "lights", check_light)?;
         self.check_surroundings()?;
-        check_cast(&self.cast)
+        check_cast(&self.cast)?;
+        self.light_map.check()
     }
 
     fn check_surroundings(&self) -> Result<()> {
@@ -330,6 +331,7 @@ mod tests {
             exposure: Exposure::MatchPlate { gain_ev: 0.25 },
             edges: Default::default(),
             cast: Default::default(),
+            light_map: Default::default(),
             view: Default::default(),
             lens: Default::default(),
             finish: Default::default(),

@@ -67,6 +67,7 @@ mod tests {
             exposure: Exposure::default(),
             edges: Default::default(),
             cast: Default::default(),
+            light_map: Default::default(),
             view: Default::default(),
             lens: Default::default(),
             finish: Default::default(),

@@ -55,6 +55,7 @@ mod holdout;
 mod hull;
 mod lens;
 mod light;
+mod light_map;
 mod locate;
 mod palette;
 mod placement;
@@ -99,6 +100,8 @@ pub(crate) use hull::doubled_area;
 #[doc(hidden)]
 pub use lens::{Lens, LensRanges, ThinLens};
 pub use light::{AreaLight, Exposure, LightShape, LightTint};
+#[doc(hidden)]
+pub use light_map::{LightGrid, LightMap};
 pub use locate::locate;
 #[doc(hidden)]
 pub use palette::{PaletteColor, PaletteEntry, PlasticColor, WeightedColor};
@@ -167,6 +170,9 @@ pub struct Scene {
     /// bring their own.
     #[serde(default, skip_serializing_if = "LightTint::is_white")]
     pub cast: LightTint,
+    /// How the light is spread over the surface, on top of what lights and environment do.
+    #[serde(default, skip_serializing_if = "LightMap::is_even")]
+    pub light_map: LightMap,
     /// How the edges of cut-outs are treated.
     #[serde(default, skip_serializing_if = "EdgeTreatment::are_as_is")]
     pub edges: EdgeTreatment,
@@ -192,6 +198,7 @@ impl Scene {
             environment: None,
             exposure: Exposure::Ev(0.0),
             cast: LightTint::default(),
+            light_map: LightMap::default(),
             edges: EdgeTreatment::AsIs,
             finish: PostProcess::default(),
             ..self

@@ -8,8 +8,8 @@ use crate::geom::{Point2, Pose, Quad};
 use crate::image::Image;
 use crate::pixel::{LinearRgb, ObjectId};
 use crate::scene::{
-    AreaLight, Blur, CameraSource, Card, EnvironmentMap, Exposure, LightTint, Noise, Object,
-    Placement, Scene, Shot,
+    AreaLight, Blur, CameraSource, Card, EnvironmentMap, Exposure, LightGrid, LightMap, LightTint,
+    Noise, Object, Placement, Scene, Shot,
 };
 use std::sync::Arc;
 
@@ -92,6 +92,7 @@ impl Scene {
             cards: self.cards(look)?,
             lights: self.tinted_lights(cast),
             ambient: self.ambient * cast,
+            light_grid: self.light_grid()?,
             environment: self.environment_map(panorama)?,
             exposure,
             edges: self.edges,
@@ -186,6 +187,13 @@ impl Scene {
         match self.cast {
             LightTint::Known(color) => Ok(color),
             LightTint::MatchSurface { .. } => Err(unmatched("cast")),
+        }
+    }
+
+    fn light_grid(&self) -> Result<Option<LightGrid>> {
+        match &self.light_map {
+            LightMap::Known(rows) => Ok(LightGrid::new(rows, self.surface.size)),
+            LightMap::MatchSurface { .. } => Err(unmatched("light_map")),
         }
     }
 
@@ -291,6 +299,7 @@ mod tests {
             exposure: Exposure::Ev(1.0),
             edges: Default::default(),
             cast: Default::default(),
+            light_map: Default::default(),
             view: Default::default(),
             lens: Default::default(),
             finish: Default::default(),

@@ -3,10 +3,10 @@
 use crate::asset::{SurfaceCache, Texture};
 use crate::camera::{Camera, RadialDistortion};
 use crate::deep::HoldoutSample;
-use crate::geom::{Point2, Quad};
+use crate::geom::{Point2, Quad, Vector3};
 use crate::image::Image;
 use crate::pixel::{LinearRgb, ObjectId};
-use crate::scene::{AreaLight, Bend, EdgeTreatment, EnvironmentMap, Grade, ThinLens};
+use crate::scene::{AreaLight, Bend, EdgeTreatment, EnvironmentMap, Grade, LightGrid, ThinLens};
 use std::sync::Arc;
 
 /// Everything a picture is made of, in memory and known.
@@ -33,6 +33,8 @@ pub struct Shot {
     pub ambient: LinearRgb,
     /// Light from a picture of the surroundings, on top of `ambient`.
     pub environment: Option<EnvironmentMap>,
+    /// Factors on the light that falls on cards, by where they are over the surface.
+    pub light_grid: Option<LightGrid>,
     /// Factor from rendered radiance to plate values.
     pub exposure: f32,
     /// What of the place stands in front of objects, of the picture's size; none where nothing
@@ -98,6 +100,12 @@ impl Card {
 }
 
 impl Shot {
+    /// How much of its light a card at a point gets.
+    pub(crate) fn light_factor_at(&self, point: &Vector3<f64>) -> f32 {
+        let grid = self.light_grid.as_ref();
+        grid.map_or(1.0, |grid| grid.factor_at(point.x, point.y))
+    }
+
     /// An empty shot: no plate, no card, no light, black ambient.
     pub fn new(camera: Camera) -> Self {
         Self {
@@ -110,6 +118,7 @@ impl Shot {
             lights: Vec::new(),
             ambient: LinearRgb::BLACK,
             environment: None,
+            light_grid: None,
             exposure: 1.0,
             holdout: None,
             edges: EdgeTreatment::AsIs,

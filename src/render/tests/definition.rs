@@ -10,7 +10,7 @@ use crate::light;
 use crate::pixel::{Film, LinearRgb, ObjectId, PremulRgba};
 use crate::quality::Quality;
 use crate::render::{RenderOptions, check, interreflect, render, render_reference};
-use crate::scene::{AreaLight, Card, EnvironmentMap, Grade, LightShape, Shot};
+use crate::scene::{AreaLight, Card, EnvironmentMap, Grade, LightGrid, LightShape, Shot};
 use std::f64::consts::PI;
 use std::sync::Arc;
 
@@ -244,6 +244,42 @@ fn ambient_alone_lights_a_card_by_its_albedo() {
             (c.r - 0.25).abs() < 1e-5 && (c.b - 1.0).abs() < 1e-5,
             "{c:?}"
         );
+    }
+}
+
+/// The light map's cells are as large as pixels; shadows of the plate stay.
+#[test]
+fn a_light_map_is_a_factor_on_the_light_of_cards_alone() {
+    let factors = [vec![0.5, 1.0], vec![2.0, 4.0]];
+    let shot = Shot {
+        light_grid: LightGrid::new(&factors, [0.02; 2]),
+        ..Shot::new(above(2, 2, 100.0))
+            .with_ambient(LinearRgb::new(0.5, 1.0, 2.0))
+            .with_light(square_light())
+            .with_card(level(1, [0.0; 3], 1.0, grey(0.5)))
+    };
+    let even = Shot {
+        light_grid: None,
+        ..shot.clone()
+    };
+    let close = RenderOptions {
+        cell_px: 0.25,
+        ..sharp()
+    };
+    for way in [render, render_reference] {
+        let (mapped, plain) = (way(&shot, &close), way(&even, &close));
+        assert_eq!(mapped.shadow(), plain.shadow());
+        for (i, factor) in factors.concat().into_iter().enumerate() {
+            let [mapped, plain] = [&mapped, &plain].map(|deep| deep.at(i % 2, i / 2)[0].light);
+            assert!(
+                (mapped.r / plain.r - factor).abs() < 0.02,
+                "{factor}: {mapped:?} {plain:?}"
+            );
+            assert!(
+                (mapped.b / plain.b - factor).abs() < 0.02,
+                "{factor}: {mapped:?} {plain:?}"
+            );
+        }
     }
 }
 

@@ -28,6 +28,8 @@ const ENDLESS_SIDE_M: f64 = 1000.0;
 /// `size` is that of the labelled surface, metres. The picture that the script makes, `beauty.exr`,
 /// is the shot's frame: the exposure is multiplied into the lights.
 ///
+/// Cycles has nothing like a light map or a holdout mask: those are left out.
+///
 /// # Errors
 /// [`Error::File`] for what cannot be written; [`Error::Value`] for ids beyond 65 535, which
 /// Blender does not have.

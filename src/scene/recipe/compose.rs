@@ -100,6 +100,7 @@ impl Recipe {
             environment: self.environment.draw(draws),
             exposure: self.exposure(background, self.gain_ev.draw(draws, "gain_ev")),
             cast: self.cast(background),
+            light_map: self.light_map.clone(),
             edges: EdgeTreatment::draw(&self.edges, draws),
             finish: self.finish.draw(draws),
             files: None,

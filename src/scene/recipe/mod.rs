@@ -16,7 +16,7 @@ use crate::scene::check::{check_albedo, check_cast, check_count, check_each, che
 use crate::scene::stack::too_large;
 use crate::scene::{
     AssetVariant, Background, Count, DrawLog, Drawn, DropRanges, EdgeTreatment, EnvironmentRanges,
-    LensRanges, LightTint, PostProcessRanges, Range, Scene, SettleOptions, Surface, Take,
+    LensRanges, LightMap, LightTint, PostProcessRanges, Range, Scene, SettleOptions, Surface, Take,
     Variation, ViewRanges, WallRanges,
 };
 use compose::{Places, SceneNumber};
@@ -103,6 +103,10 @@ pub struct Recipe {
     /// Colour of the light: `{ match_surface = { share = 0.5 } }` takes half of the surface's.
     /// Default: white.
     pub cast: LightTint,
+    /// How the light is spread over the surface: `{ match_surface = { share = 1 } }` takes the
+    /// gradients that the plate shows. Default: evenly.
+    #[serde(skip_serializing_if = "LightMap::is_even")]
+    pub light_map: LightMap,
     /// What happens to the finished frame. Default: nothing.
     pub finish: PostProcessRanges,
     /// How objects come to rest.
@@ -138,6 +142,7 @@ impl Default for Recipe {
             collider: Collider::Box,
             surface_albedo: None,
             cast: LightTint::default(),
+            light_map: LightMap::default(),
             finish: PostProcessRanges::default(),
             settle: SettleOptions::default(),
         }
@@ -240,6 +245,7 @@ impl Recipe {
         self.check_light()?;
         self.check_surface()?;
         check_cast(&self.cast)?;
+        self.light_map.check()?;
         self.finish.check()?;
         self.settle.check()
     }

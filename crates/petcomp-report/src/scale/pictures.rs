@@ -150,6 +150,7 @@ fn heap_scene(case: &ScaleCase) -> Scene {
         exposure: Exposure::Ev(0.0),
         edges: Default::default(),
         cast: Default::default(),
+        light_map: Default::default(),
         view: Default::default(),
         lens: Default::default(),
         finish: Default::default(),

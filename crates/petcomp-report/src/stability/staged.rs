@@ -137,6 +137,7 @@ pub(super) fn empty_scene(camera: Camera) -> Scene {
         exposure: Exposure::Ev(0.0),
         edges: Default::default(),
         cast: Default::default(),
+        light_map: Default::default(),
         view: Default::default(),
         lens: Default::default(),
         finish: Default::default(),

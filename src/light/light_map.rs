@@ -1,0 +1,182 @@
+//! How light is spread over the labelled surface, from the plate.
+
+use crate::geom::Point3;
+use crate::image::Image;
+use crate::light::expose::white_card_at;
+use crate::light::surface::seen_surface;
+use crate::light::value_of_rank;
+use crate::pixel::LinearRgb;
+use crate::scene::{LightMap, Scene};
+
+/// Columns and rows of the cells that the surface is looked at in: lamps make gradients, and a
+/// pattern on the surface should not be taken for light.
+const CELLS: [usize; 2] = [5, 4];
+/// What is darker or brighter by more is no gradient of light.
+const MOST: f32 = 4.0;
+
+/// Turns [`LightMap::MatchSurface`] into factors; any other scene comes back as it is.
+///
+/// # Method
+/// The median luminance of the plate in each cell of the surface over that of all of it, divided by
+/// what the scene's own lights give there over what they give in its middle. Cells that are not
+/// seen have 1, and so has everything where the camera does not see the surface. It takes the
+/// surface for one of the same colour all over: its patterns pass for light where they fill half a
+/// cell.
+pub(crate) fn match_light_map(scene: Scene, plate: &Image<LinearRgb>) -> Scene {
+    let LightMap::MatchSurface { share } = scene.light_map else {
+        return scene;
+    };
+    let seen = seen_surface(&scene, plate);
+    let map = SeenCells::new(&seen, scene.surface.size).map(|cells| cells.rows(&scene, share));
+    Scene {
+        light_map: LightMap::Known(map.unwrap_or_default()),
+        ..scene
+    }
+}
+
+/// Luminances of the surface by cells, the upper row first.
+struct SeenCells {
+    size: [f64; 2],
+    luminances: Vec<Vec<f32>>,
+    median: f32,
+}
+
+impl SeenCells {
+    /// None where nothing is seen, or nothing but darkness.
+    fn new(seen: &[(Point3<f64>, LinearRgb)], size: [f64; 2]) -> Option<Self> {
+        let median = median(seen.iter().map(|(_, color)| color.luminance()).collect())?;
+        let mut luminances = vec![Vec::new(); CELLS[0] * CELLS[1]];
+        for (point, color) in seen {
+            luminances[cell_of(point, size)].push(color.luminance());
+        }
+        (median > 0.0).then_some(Self {
+            size,
+            luminances,
+            median,
+        })
+    }
+
+    fn rows(self, scene: &Scene, share: f64) -> Vec<Vec<f32>> {
+        let middle = white_card_at(scene, Point3::origin());
+        let points = cell_middles(self.size);
+        let factors = points.zip(self.luminances).map(|(point, luminances)| {
+            let plate = median(luminances).map_or(1.0, |here| here / self.median);
+            let own = white_card_at(scene, point) / middle;
+            factor(plate, own, share)
+        });
+        let factors: Vec<f32> = factors.collect();
+        factors.chunks(CELLS[0]).map(<[f32]>::to_vec).collect()
+    }
+}
+
+/// What is missing from the scene's own light to that of the plate.
+fn factor(plate: f32, own: f32, share: f64) -> f32 {
+    let missing = plate / own;
+    if !missing.is_finite() {
+        return 1.0;
+    }
+    libm::pow(f64::from(missing.clamp(1.0 / MOST, MOST)), share) as f32
+}
+
+fn median(values: Vec<f32>) -> Option<f32> {
+    let middle = values.len() / 2;
+    (!values.is_empty()).then(|| value_of_rank(values, middle))
+}
+
+/// The number of the cell that a point of the surface lies in.
+fn cell_of(point: &Point3<f64>, [w, h]: [f64; 2]) -> usize {
+    let [u, v] = [point.x / w + 0.5, 0.5 - point.y / h];
+    let [column, row] = [(u, CELLS[0]), (v, CELLS[1])]
+        .map(|(place, cells)| ((place * cells as f64) as usize).min(cells - 1));
+    row * CELLS[0] + column
+}
+
+/// The middles of the cells, in order.
+fn cell_middles([w, h]: [f64; 2]) -> impl Iterator<Item = Point3<f64>> {
+    (0..CELLS[0] * CELLS[1]).map(move |i| {
+        let (column, row) = (i % CELLS[0], i / CELLS[0]);
+        let u = (column as f64 + 0.5) / CELLS[0] as f64;
+        let v = (row as f64 + 0.5) / CELLS[1] as f64;
+        Point3::new((u - 0.5) * w, (0.5 - v) * h, 0.0)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{AreaLight, LightShape};
+
+    fn scene() -> Scene {
+        Scene {
+            light_map: LightMap::MatchSurface { share: 1.0 },
+            ..crate::light::surface::tests::scene(Default::default())
+        }
+    }
+
+    fn rows(scene: Scene, plate: &Image<LinearRgb>) -> Vec<Vec<f32>> {
+        let LightMap::Known(rows) = match_light_map(scene, plate).light_map else {
+            panic!("still unknown")
+        };
+        rows
+    }
+
+    /// The surface fills columns 10 to 30 and rows 7 to 23 or so.
+    fn gradient() -> Image<LinearRgb> {
+        Image::from_fn(40, 30, |x, _| LinearRgb::grey(0.01 * (x as f32 + 0.5)))
+    }
+
+    #[test]
+    fn a_gradient_across_the_plate_is_found() {
+        let rows = rows(scene(), &gradient());
+        assert_eq!((rows.len(), rows[0].len()), (4, 5));
+        for row in rows {
+            for (column, factor) in row.iter().enumerate() {
+                // Cells are 4 pixels wide.
+                let brightness = 12.0 + 4.0 * column as f32;
+                assert!(
+                    (factor - brightness / 20.0).abs() < 0.06,
+                    "{column}: {factor}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn an_even_surface_a_dark_one_and_one_that_is_not_seen_have_no_gradient() {
+        let even = rows(scene(), &Image::filled(40, 30, LinearRgb::grey(0.3)));
+        assert!(even.iter().flatten().all(|factor| *factor == 1.0));
+        let dark = rows(scene(), &Image::filled(40, 30, LinearRgb::BLACK));
+        assert!(dark.is_empty());
+    }
+
+    /// A lamp of the scene that makes the gradient of the plate needs no factor.
+    #[test]
+    fn what_the_scene_s_own_lights_do_is_not_done_twice() {
+        let lamp = AreaLight {
+            shape: LightShape::Ellipse,
+            position: [0.3, 0.0, 0.3],
+            target: [0.0; 3],
+            size: [0.02; 2],
+            power: 10.0,
+            color: LinearRgb::WHITE,
+        };
+        let lit = Scene {
+            lights: vec![lamp],
+            ambient: LinearRgb::BLACK,
+            ..scene()
+        };
+        let middle = white_card_at(&lit, Point3::origin());
+        // The camera looks from a metre above with a focal length of 40 pixels, y up.
+        let plate = Image::from_fn(40, 30, |x, y| {
+            let [x, y] = [x as f64 + 0.5 - 20.0, 15.0 - y as f64 - 0.5].map(|px| px / 40.0);
+            LinearRgb::grey(white_card_at(&lit, Point3::new(x, y, 0.0)) / middle)
+        });
+        let factors = rows(lit, &plate).concat();
+        let (least, most) = (
+            factors.iter().copied().fold(f32::MAX, f32::min),
+            factors.iter().copied().fold(0.0, f32::max),
+        );
+        // The median is not the middle; what is left is one factor for all.
+        assert!(most / least < 1.15, "{factors:?}");
+    }
+}
