@@ -4,7 +4,7 @@ import importlib.util
 import shutil
 import tomllib
 
-from . import page, results, study as studies
+from . import page, results, screening, study as studies
 
 HERE = studies.HERE
 
@@ -48,12 +48,16 @@ def tiny_trainer(arms):
 
 
 def read_arms():
-    return tomllib.loads((HERE / "arms.toml").read_text())
+    arms = tomllib.loads((HERE / "arms.toml").read_text())
+    screening.add_arms(arms)
+    return arms
 
 
 def chosen(options, arms):
     if options.headline:
         return [name for name, arm in arms["arms"].items() if arm.get("headline")]
+    if options.screening:
+        return screening.names(arms)
     for name in options.arms or []:
         if name not in arms["arms"]:
             raise SystemExit(f"--arms: no arm {name}, expected some of {', '.join(arms['arms'])}")
@@ -67,7 +71,9 @@ def write(study, names, seeds, folder):
     means, drawn = results.means(matches), results.drawn(matches)
     summary = results.summary(study, matches, means, drawn)
     ratios = results.ratios(study, means, drawn)
+    effects = screening.effects(study, means, drawn)
     results.write_csv(folder / "results.csv", results.COLUMNS, rows)
     results.write_csv(folder / "summary.csv", results.SUMMARY_COLUMNS, results.summary_rows(summary))
-    page.write(study, rows, summary, ratios, folder / "index.html")
+    results.write_csv(folder / "switches.csv", results.SWITCH_COLUMNS, effects)
+    page.write(study, rows, summary, ratios, effects, folder / "index.html")
     print(f"see {folder / 'index.html'}")

@@ -9,7 +9,7 @@ import cv2
 import matplotlib
 import numpy as np
 
-from . import files
+from . import files, screening
 
 matplotlib.use("svg")
 from matplotlib import pyplot
@@ -24,7 +24,7 @@ SHEET = (4, 2)
 THUMBNAIL = (240, 180)
 
 
-def write(study, rows, summary, drawn_ratios, path):
+def write(study, rows, summary, drawn_ratios, effects, path):
     parts = [
         "<h1>Does the data teach a detector?</h1>",
         f"<p>{html.escape(description(study, rows))}</p>",
@@ -35,6 +35,7 @@ def write(study, rows, summary, drawn_ratios, path):
         "<h2>Arms</h2>",
         arms_plot(summary),
         table(["arm", "seeds", "mAP@0.5:0.95", "95 % interval", "ratio", "95 % interval", "to"], arm_rows(summary)),
+        *switches(study, effects),
         "<h2>Rooms</h2>",
         table(["arm", *map(str, study.rooms)], room_rows(rows, study.rooms)),
         table(["ratio", *map(str, study.rooms)], room_ratio_rows(rows, study)),
@@ -81,6 +82,18 @@ def arm_rows(summary):
         ratio = f"{one['ratio']:.2f}" if "ratio" in one else ""
         mean = f"{one['mean']:.4f}"
         yield [arm, one["seeds"], mean, span(one["interval"], 4), ratio, span(one.get("ratio_interval"), 2), one.get("against", "")]
+
+
+def switches(study, effects):
+    """What each switch gives in a design in which each is on in half of the generators."""
+    if not effects:
+        return []
+    rows = [
+        [one["switch"], f"{one['ratio']:.2f}", span([one["low"], one["high"]], 2)]
+        for one in sorted(effects, key=lambda one: -one["ratio"])
+    ]
+    said = f"On top of {study.arms['screening']['base']}, each on in half of {len(screening.names(study.arms))} generators."
+    return ["<h2>Switches</h2>", f"<p>{html.escape(said)}</p>", table(["switch", "on / off", "95 % interval"], rows)]
 
 
 def span(interval, digits):

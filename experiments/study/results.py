@@ -11,6 +11,7 @@ COLUMNS = (
     "arm seed room pictures map50 map50_95 classes real synthetic mix images model image_size device "
     "cpu_seconds petcomp commit ultralytics torch"
 ).split()
+SWITCH_COLUMNS = "switch ratio low high".split()
 SUMMARY_COLUMNS = "arm seeds mean low high against ratio ratio_low ratio_high".split()
 
 
