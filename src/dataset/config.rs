@@ -3,7 +3,7 @@
 use crate::dataset::environment_maps::seen_from;
 use crate::dataset::paths::folder_of;
 use crate::dataset::yolo::MIN_SIDE_PX;
-use crate::dataset::{LabelConfig, Pictures, Split};
+use crate::dataset::{LabelConfig, Pictures, Preset, Split};
 use crate::error::Result;
 use crate::io;
 use crate::render::RenderOptions;
@@ -20,6 +20,9 @@ pub struct DatasetConfig {
     /// Default: the working folder.
     #[serde(skip)]
     pub folder: PathBuf,
+    /// What the recipe was laid over; the other fields hold its values. Default: `paper`.
+    #[serde(skip_serializing)]
+    pub preset: Preset,
     /// Folder of assets, relative to the file. Default: `assets`.
     pub assets: PathBuf,
     /// Folder of photos of the place with their labels (`NAME.label.json`), relative to the file.
@@ -47,6 +50,7 @@ impl Default for DatasetConfig {
     fn default() -> Self {
         Self {
             folder: PathBuf::new(),
+            preset: Preset::default(),
             assets: "assets".into(),
             backgrounds: "backgrounds".into(),
             surface_size: None,
@@ -71,7 +75,7 @@ impl DatasetConfig {
     /// A file that cannot be read; an unknown key; a range that cannot be right.
     pub fn read(path: impl AsRef<Path>, overrides: &[io::Override]) -> Result<Self> {
         let path = path.as_ref();
-        let mut config: Self = io::read_toml_with(path, overrides)?;
+        let mut config: Self = io::read_toml_with(path, overrides, Preset::lay_under)?;
         config.check().map_err(|e| e.in_file(path))?;
         let folder = folder_of(path);
         config.assets = folder.join(&config.assets);
@@ -190,11 +194,12 @@ mod tests {
         let bare = |line: &str| {
             let key = line
                 .strip_prefix('#')
-                .filter(|rest| rest.starts_with(|c: char| c.is_ascii_lowercase()));
+                .filter(|rest| rest.starts_with(|c: char| c.is_ascii_lowercase() || c == '['));
             key.unwrap_or(line).to_owned()
         };
         let template: Vec<String> = DatasetConfig::template().lines().map(bare).collect();
-        let told: Table = template.join("\n").parse().unwrap();
+        let mut told: Table = template.join("\n").parse().unwrap();
+        assert_eq!(told.remove("preset"), Some("real".into()));
         let all = Table::try_from(DatasetConfig::default()).unwrap();
         assert_eq!(
             missing(&told, &all, ""),
@@ -209,10 +214,41 @@ mod tests {
         let mut examples = examples();
         examples.sort();
         assert_eq!(only_told, examples, "only in template.toml");
-        assert_eq!(
-            toml::from_str::<DatasetConfig>(DatasetConfig::template()).unwrap(),
-            DatasetConfig::default()
-        );
+        let proposed = DatasetConfig {
+            preset: Preset::Real,
+            ..DatasetConfig::default()
+        };
+        assert_eq!(toml::from_str(DatasetConfig::template()), Ok(proposed));
+    }
+
+    #[test]
+    fn the_template_tells_every_value_of_the_preset() {
+        let told = told_keys();
+        let told_value = |path: &str| {
+            let key = told.iter().find(|told| told.path == path);
+            let comment = key.map_or("", |key| &key.comment);
+            let value = comment
+                .split_once("Preset \"real\": ")
+                .unwrap_or_default()
+                .1;
+            format!("value = {}", value.trim_end_matches('.'))
+        };
+        let preset = Preset::Real.table();
+        for (path, value) in leaves(&preset, "") {
+            if path != "scene.lights" {
+                let told: Table = told_value(&path).parse().unwrap_or_default();
+                assert_eq!(told.get("value"), Some(value), "{path}");
+            }
+        }
+    }
+
+    /// The values of a document, by their paths.
+    fn leaves<'t>(table: &'t Table, at: &str) -> Vec<(String, &'t Value)> {
+        let of = |(key, value): (&'t String, &'t Value)| match value {
+            Value::Table(inner) => leaves(inner, &format!("{at}{key}.")),
+            value => vec![(format!("{at}{key}"), value)],
+        };
+        table.iter().flat_map(of).collect()
     }
 
     /// Keys without a default, of which the template has an example: `path = value`.
@@ -249,7 +285,7 @@ mod tests {
     fn told_keys() -> Vec<ToldKey> {
         let (mut table, mut comment, mut told) = (String::new(), String::new(), Vec::new());
         for line in DatasetConfig::template().lines() {
-            if let Some(header) = line.strip_prefix('[') {
+            if let Some(header) = line.trim_start_matches('#').strip_prefix('[') {
                 table = header
                     .trim_matches(['[', ']'])
                     .replace("scene.lights", "scene.lights[0]");
@@ -301,7 +337,8 @@ mod tests {
     fn the_template_tells_the_bounds_that_are_checked() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("recipe.toml");
-        io::write_text(&path, DatasetConfig::template()).unwrap();
+        let template = DatasetConfig::template().replace("#[[scene.lights]]", "[[scene.lights]]");
+        io::write_text(&path, &template).unwrap();
         let with = |key: &str, value: f64| {
             DatasetConfig::read(&path, &[format!("{key}={value}").parse().unwrap()])
         };

@@ -45,6 +45,7 @@ mod partition;
 mod paths;
 mod pictures;
 mod pipeline;
+mod preset;
 mod quality;
 mod run;
 mod scene_config;
@@ -96,6 +97,8 @@ pub use obstructed::{LabelledObject, Obstructed};
 pub use partition::{Group, Leakage, Partition};
 pub use pictures::{PictureFormat, Pictures};
 pub use pipeline::Pipeline;
+#[doc(hidden)]
+pub use preset::Preset;
 pub use run::Progress;
 #[doc(hidden)]
 pub use shard::ShardChoice;

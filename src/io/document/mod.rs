@@ -27,24 +27,30 @@ pub fn read_toml<T: DeserializeOwned>(path: impl AsRef<Path>) -> Result<T> {
     parse_toml(&read_text(path)?).map_err(|e| e.in_file(path))
 }
 
-/// Reads a TOML document, some of its values replaced.
+/// Reads a TOML document, some of its values replaced and then changed by `change`.
 ///
 /// # Errors
 /// As [`read_toml`]; an override of a value that cannot be there.
 pub(crate) fn read_toml_with<T: DeserializeOwned>(
     path: impl AsRef<Path>,
     overrides: &[Override],
+    change: impl FnOnce(&mut toml::Table),
 ) -> Result<T> {
     let path = path.as_ref();
-    if overrides.is_empty() {
-        return read_toml(path);
-    }
-    let mut document: toml::Table = read_toml(path)?;
-    apply_all(overrides, &mut document).map_err(|e| e.in_file(path))?;
-    let text =
-        toml::to_string(&document).map_err(|e| Error::file(path, one_line(&e.to_string())))?;
-    // Lines of that text are not those of the file.
-    parse_toml_lines(&text, |_| None).map_err(|e| e.in_file(path))
+    let text = read_text(path)?;
+    parse_toml_with(&text, overrides, change).map_err(|e| e.in_file(path))
+}
+
+fn parse_toml_with<T: DeserializeOwned>(
+    text: &str,
+    overrides: &[Override],
+    change: impl FnOnce(&mut toml::Table),
+) -> Result<T> {
+    let mut document: toml::Table = parse_toml(text)?;
+    apply_all(overrides, &mut document)?;
+    change(&mut document);
+    // The text itself knows the line of a mistake.
+    from_table(document).map_err(|e| parse_toml::<T>(text).err().unwrap_or(e))
 }
 
 fn apply_all(overrides: &[Override], document: &mut toml::Table) -> Result<()> {

@@ -1,0 +1,133 @@
+//! Presets: recipes that others are laid over.
+
+use serde::{Deserialize, Serialize};
+use toml::{Table, Value};
+
+/// What a recipe takes where it says nothing itself: the values of a recipe of ours, and the
+/// defaults where that says nothing either.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Preset {
+    /// The defaults, which are those of the paper.
+    #[default]
+    Paper,
+    /// What made the best detectors of those that were compared (`experiments/` in the
+    /// repository).
+    Real,
+}
+
+impl Preset {
+    fn named(name: &str) -> Option<Self> {
+        Self::deserialize(Value::from(name)).ok()
+    }
+
+    fn text(self) -> &'static str {
+        match self {
+            Self::Paper => "",
+            Self::Real => include_str!("preset_real.toml"),
+        }
+    }
+
+    pub(super) fn table(self) -> Table {
+        self.text().parse().expect("a document of ours")
+    }
+
+    /// Lays a recipe over the preset that it names, if it names one that there is.
+    pub(super) fn lay_under(recipe: &mut Table) {
+        let name = recipe.get("preset").and_then(Value::as_str);
+        if let Some(preset) = name.and_then(Self::named) {
+            fill_in(recipe, preset.table());
+        }
+    }
+}
+
+/// Keys of one table of which only one can be given: a recipe with one of them does without the
+/// preset's other one.
+const ALTERNATIVES: [[&str; 2]; 2] = [["min_visible", "overlap_iou"], ["spread", "positions"]];
+
+fn has_alternative(table: &Table, key: &str) -> bool {
+    let mut pairs = ALTERNATIVES.into_iter().filter(|pair| pair.contains(&key));
+    pairs.any(|pair| pair.into_iter().any(|other| table.contains_key(other)))
+}
+
+/// Adds what a table does not hold; inner tables alike.
+fn fill_in(table: &mut Table, below: Table) {
+    let given = table.clone();
+    for (key, value) in below {
+        match (table.get_mut(&key), value) {
+            (Some(Value::Table(inner)), Value::Table(below)) => fill_in(inner, below),
+            (None, value) if !has_alternative(&given, &key) => _ = table.insert(key, value),
+            _ => (),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dataset::DatasetConfig;
+    use crate::io;
+    use crate::scene::Range;
+
+    fn read(text: &str, overrides: &[&str]) -> crate::Result<DatasetConfig> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("recipe.toml");
+        io::write_text(&path, text).unwrap();
+        let overrides: Vec<_> = overrides.iter().map(|o| o.parse().unwrap()).collect();
+        let config = DatasetConfig::read(path, &overrides)?;
+        Ok(DatasetConfig {
+            folder: Default::default(),
+            assets: Default::default(),
+            backgrounds: Default::default(),
+            ..config
+        })
+    }
+
+    #[test]
+    fn a_recipe_goes_before_its_preset_and_the_preset_before_the_defaults() {
+        let recipe = "preset = 'real'\n[scene]\nfriction = 0.3\n[scene.grade]\nsaturation = 1\n";
+        let config = read(recipe, &[]).unwrap();
+        let preset = read("preset = 'real'", &[]).unwrap();
+        assert_eq!(config.scene.friction, Range::fixed(0.3));
+        assert_eq!(config.scene.grade.saturation, Range::fixed(1.0));
+        assert_eq!(config.scene.grade.hue_deg, preset.scene.grade.hue_deg);
+        assert_eq!(config.labels, preset.labels);
+        assert_ne!(preset.scene, DatasetConfig::default().scene);
+    }
+
+    #[test]
+    fn a_key_goes_before_the_other_one_that_the_preset_has_in_its_place() {
+        let config = read("preset = 'real'\n[labels]\noverlap_iou = 0.1", &[]).unwrap();
+        assert_eq!(
+            config.labels,
+            read("[labels]\noverlap_iou = 0.1", &[]).unwrap().labels
+        );
+        let own = read("preset = 'real'\n[labels]\nmin_visible = 0.5", &[]).unwrap();
+        assert_eq!(
+            own.labels,
+            read("[labels]\nmin_visible = 0.5", &[]).unwrap().labels
+        );
+    }
+
+    #[test]
+    fn a_preset_is_the_recipe_that_it_stands_for() {
+        let named = read("preset = 'real'", &[]).unwrap();
+        let written = read(Preset::Real.text(), &[]).unwrap();
+        assert_eq!(written.scene, named.scene);
+        assert_eq!(written.labels, named.labels);
+        assert_eq!(read("", &["preset=real"]).unwrap(), named);
+        let paper = read("preset = 'paper'", &[]).unwrap();
+        assert_eq!(paper, read("", &[]).unwrap());
+    }
+
+    #[test]
+    fn an_unknown_preset_and_a_mistake_over_a_preset_are_told_with_their_line() {
+        let told = |text| read(text, &[]).unwrap_err().to_string();
+        let unknown = told("\npreset = 'reel'");
+        assert!(unknown.contains("preset: unknown"), "{unknown}");
+        assert!(unknown.ends_with("(line 2)"), "{unknown}");
+        let mistake = told("preset = 'real'\n[scene]\nobject = 3");
+        assert!(mistake.contains("did you mean \"objects\""), "{mistake}");
+        assert!(mistake.ends_with("(line 3)"), "{mistake}");
+    }
+}
