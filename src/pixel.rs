@@ -208,6 +208,11 @@ impl LinearRgb {
         Self { r, g, b }
     }
 
+    /// Whether there is no light in any channel.
+    pub(crate) fn is_black(&self) -> bool {
+        *self == Self::BLACK
+    }
+
     /// The same value in every channel.
     #[inline(always)]
     pub const fn grey(v: f32) -> Self {

@@ -42,6 +42,7 @@ fn scene(k: u64) -> Scene {
         edges: Default::default(),
         cast: Default::default(),
         light_map: Default::default(),
+        interreflection: Default::default(),
         view: Default::default(),
         lens: Default::default(),
         finish: Default::default(),

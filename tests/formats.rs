@@ -119,6 +119,7 @@ fn sample_of(shot: Shot, options: &LabelOptions) -> Result<Sample> {
         exposure: Exposure::default(),
         cast: LightTint::default(),
         light_map: Default::default(),
+        interreflection: Default::default(),
         view: Default::default(),
         edges: Default::default(),
         lens: Default::default(),

@@ -34,6 +34,14 @@ impl Albedo {
         }
     }
 
+    /// The same in every channel where the surface's colour is not known.
+    pub(crate) fn color(&self) -> LinearRgb {
+        match *self {
+            Self::Luminance(albedo) => LinearRgb::grey(albedo as f32),
+            Self::Color(albedo) => albedo,
+        }
+    }
+
     /// The smallest and the largest share.
     pub(crate) fn range(&self) -> [f64; 2] {
         match *self {

@@ -200,6 +200,7 @@ mod tests {
             edges: Default::default(),
             cast: Default::default(),
             light_map: Default::default(),
+            interreflection: Default::default(),
             view: Default::default(),
             lens: Default::default(),
             finish: Default::default(),

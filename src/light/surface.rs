@@ -116,6 +116,7 @@ pub(super) mod tests {
             edges: Default::default(),
             cast,
             light_map: Default::default(),
+            interreflection: Default::default(),
             view: Default::default(),
             lens: Default::default(),
             finish: Default::default(),

@@ -8,6 +8,7 @@ use crate::pixel::LinearRgb;
 use crate::render::RenderOptions;
 use crate::render::block::PixelBlock;
 use crate::render::detail::{detail_level, texels_per_pixel};
+use crate::render::interreflection::interreflect;
 use crate::render::irradiance::{IrradianceMap, irradiance_maps};
 use crate::render::lattice::Lattice;
 use crate::render::layers::{Layer, LayerStack, RenderedTile, SampleGrid, ShadowCatcher};
@@ -49,7 +50,7 @@ pub fn render(shot: &Shot, options: &RenderOptions) -> DeepImage {
         None => render_pinhole(shot, &options),
         Some(lens) => render_bent(shot, &lens, &options),
     };
-    free.held_out(shot.holdout.as_deref())
+    interreflect(free, shot).held_out(shot.holdout.as_deref())
 }
 
 fn render_pinhole(shot: &Shot, options: &RenderOptions) -> DeepImage {
@@ -122,6 +123,7 @@ pub fn render_coverage(shot: &Shot, options: &RenderOptions) -> DeepImage {
         lights: Vec::new(),
         ambient: LinearRgb::BLACK,
         environment: None,
+        interreflection: LinearRgb::BLACK,
         plate: None,
         ..shot.clone()
     };

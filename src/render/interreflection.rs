@@ -24,17 +24,19 @@ const MAX_GRID_STEPS: f64 = 1024.0;
 /// A white surface under a white card would glow forever.
 const MAX_BOUNCE: f32 = 0.95;
 
-/// Brightens the surface by what cards above reflect back to it; for callers who know the surface's
-/// albedo.
+/// Brightens the surface by what cards above reflect back to it, where the shot asks for it.
 ///
-/// Not part of the definition, which leaves bounces out: [`render`](super::render) never does this.
-/// A black albedo changes no bit; shadow factors may come out above 1.
+/// Shadow factors may come out above 1.
 ///
 /// # Method
 /// `S` is divided by `1 - albedo R`, with `R` the light that comes back from straight above: the
 /// sum over cards upwards of their colour times the squared transmittance of what lies below,
 /// blurred over the surface.
-pub fn interreflect(deep: DeepImage, shot: &Shot, albedo: LinearRgb) -> DeepImage {
+pub(super) fn interreflect(deep: DeepImage, shot: &Shot) -> DeepImage {
+    let albedo = shot.interreflection;
+    if albedo.is_black() {
+        return deep;
+    }
     let view = CameraView::from_camera(&shot.camera);
     let surface = ProjectedPlane::from_above(&ScenePlane::shadow_catcher(shot.catcher), &view);
     let (Some(surface), Some(bounce)) = (surface, BounceMap::new(shot)) else {

@@ -65,8 +65,6 @@ pub use check::check;
 pub use cryptomatte::Cryptomatte;
 pub(crate) use cryptomatte::{attribute_name, hex_id, id_of_name};
 pub use deep::{render, render_coverage};
-#[doc(hidden)]
-pub use interreflection::interreflect;
 pub use options::RenderOptions;
 #[doc(hidden)]
 pub use reference::render_reference;

@@ -9,6 +9,7 @@ use crate::image::Image;
 use crate::pixel::{Depth, Film, LinearRgb, Mix, ObjectId};
 use crate::render::RenderOptions;
 use crate::render::grade::{channel_mean, graded_opacity};
+use crate::render::interreflection::interreflect;
 use crate::render::light_samples::{LightGroup, LightSample, LightSamples, SampleKind};
 use crate::render::pixel_filter::filter_quantiles;
 use crate::render::retouch::retouched_fully;
@@ -35,7 +36,7 @@ pub fn render_reference(shot: &Shot, options: &RenderOptions) -> DeepImage {
     };
     let shadow = Image::from_vec(world.view.width, world.view.height, shadow);
     let deep = deep_image(shadow, lists).with_tints(tints);
-    deep.held_out(shot.holdout.as_deref())
+    interreflect(deep, shot).held_out(shot.holdout.as_deref())
 }
 
 fn deep_image(shadow: Image<LinearRgb>, lists: Vec<Vec<ReferenceSample>>) -> DeepImage {

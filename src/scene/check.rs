@@ -52,7 +52,8 @@ impl Scene {
         check_each(&self.lights, "lights", check_light)?;
         self.check_surroundings()?;
         check_cast(&self.cast)?;
-        self.light_map.check()
+        self.light_map.check()?;
+        check_shares(self.interreflection, "interreflection")
     }
 
     fn check_surroundings(&self) -> Result<()> {
@@ -156,6 +157,11 @@ pub(super) fn check_cast(cast: &LightTint) -> Result<()> {
             check_albedo(Albedo::Color(albedo), "cast.match_surface.albedo")
         }
     }
+}
+
+fn check_shares(color: LinearRgb, at: &str) -> Result<()> {
+    let [r, g, b] = [color.r, color.g, color.b].map(f64::from);
+    check_within(&[r, g, b], at, &SHARE)
 }
 
 pub(super) fn check_albedo(albedo: Albedo, at: &str) -> Result<()> {
@@ -332,6 +338,7 @@ mod tests {
             edges: Default::default(),
             cast: Default::default(),
             light_map: Default::default(),
+            interreflection: Default::default(),
             view: Default::default(),
             lens: Default::default(),
             finish: Default::default(),

@@ -173,6 +173,10 @@ pub struct Scene {
     /// How the light is spread over the surface, on top of what lights and environment do.
     #[serde(default, skip_serializing_if = "LightMap::is_even")]
     pub light_map: LightMap,
+    /// Albedo of the surface for light that goes to and fro between it and the objects over it, and
+    /// brightens it there. Default: black, which leaves that out.
+    #[serde(default, skip_serializing_if = "LinearRgb::is_black")]
+    pub interreflection: LinearRgb,
     /// How the edges of cut-outs are treated.
     #[serde(default, skip_serializing_if = "EdgeTreatment::are_as_is")]
     pub edges: EdgeTreatment,
@@ -199,6 +203,7 @@ impl Scene {
             exposure: Exposure::Ev(0.0),
             cast: LightTint::default(),
             light_map: LightMap::default(),
+            interreflection: LinearRgb::BLACK,
             edges: EdgeTreatment::AsIs,
             finish: PostProcess::default(),
             ..self

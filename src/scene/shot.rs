@@ -35,6 +35,9 @@ pub struct Shot {
     pub environment: Option<EnvironmentMap>,
     /// Factors on the light that falls on cards, by where they are over the surface.
     pub light_grid: Option<LightGrid>,
+    /// Albedo of the surface for light that goes to and fro between it and the cards; black leaves
+    /// that out.
+    pub interreflection: LinearRgb,
     /// Factor from rendered radiance to plate values.
     pub exposure: f32,
     /// What of the place stands in front of objects, of the picture's size; none where nothing
@@ -119,6 +122,7 @@ impl Shot {
             ambient: LinearRgb::BLACK,
             environment: None,
             light_grid: None,
+            interreflection: LinearRgb::BLACK,
             exposure: 1.0,
             holdout: None,
             edges: EdgeTreatment::AsIs,

@@ -16,6 +16,9 @@ use std::path::Path;
 
 /// The script that renders the folder, written beside the scene.
 pub const SCRIPT: &str = "scene_reference.py";
+/// How often light may bounce in a shot with interreflection.
+const MAX_BOUNCES: u32 = 4;
+
 const SCRIPT_TEXT: &str = include_str!("../../../golden/render/scene_reference.py");
 /// Samples of a pixel that the scene asks for: noise of about 1e-3.
 const SAMPLES_PER_PIXEL: u32 = 1024;
@@ -45,7 +48,7 @@ fn scene_file(shot: &Shot, size: [f64; 2], folder: &Path) -> Result<CyclesFile> 
     let cards = shot.cards.iter();
     let lights = shot.lights.iter();
     Ok(CyclesFile {
-        render: render_settings(shot.camera.image),
+        render: render_settings(shot),
         camera: cycles_camera(shot),
         tray: CyclesTray { size },
         plate: write_plate(folder, shot)?,
@@ -58,16 +61,22 @@ fn scene_file(shot: &Shot, size: [f64; 2], folder: &Path) -> Result<CyclesFile> 
         environment: Some(write_environment(folder, shot)?),
         ground: Some(CyclesGround {
             extent: shot.catcher.map(|side| side.min(ENDLESS_SIDE_M)),
+            albedo: Some(shot.interreflection.luminance()).filter(|&albedo| albedo > 0.0),
         }),
     })
 }
 
-fn render_settings([width, height]: [u32; 2]) -> CyclesRender {
+fn render_settings(shot: &Shot) -> CyclesRender {
+    let [width, height] = shot.camera.image;
     CyclesRender {
         width,
         height,
         samples: SAMPLES_PER_PIXEL,
-        max_bounces: 0,
+        max_bounces: if shot.interreflection.is_black() {
+            0
+        } else {
+            MAX_BOUNCES
+        },
     }
 }
 

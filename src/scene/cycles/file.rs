@@ -65,6 +65,9 @@ pub(super) struct CyclesTray {
 #[derive(Serialize, Deserialize)]
 pub(super) struct CyclesGround {
     pub(super) extent: [f64; 2],
+    /// Of light that bounces, where any does.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) albedo: Option<f32>,
 }
 
 #[derive(Serialize, Deserialize)]

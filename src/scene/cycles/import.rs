@@ -34,6 +34,7 @@ pub fn import(path: impl AsRef<Path>, size: Option<[u32; 2]>) -> Result<Shot> {
         shot = shot.with_plate(Arc::new(folder.read_plate(&plate.path, size)?));
     }
     shot.catcher = catcher_size(&file);
+    shot.interreflection = bounced_albedo(&file);
     shot.cards = folder.read_cards(&file.quads)?;
     folder.light(&mut shot, &file)?;
     Ok(shot)
@@ -159,6 +160,13 @@ fn catcher_size(file: &CyclesFile) -> [f64; 2] {
         Some(ground) => ground.extent,
         None => file.tray.size.map(|side| CATCHER_RATIO * side),
     }
+}
+
+/// What the surface sends back, where light bounces at all.
+fn bounced_albedo(file: &CyclesFile) -> LinearRgb {
+    let ground = file.ground.as_ref().filter(|_| file.render.max_bounces > 0);
+    let albedo = ground.and_then(|ground| ground.albedo);
+    albedo.map_or(LinearRgb::BLACK, LinearRgb::grey)
 }
 
 fn film_pixel(color: PremulRgba, opacity: PremulRgba) -> Film {

@@ -101,6 +101,7 @@ impl Recipe {
             exposure: self.exposure(background, self.gain_ev.draw(draws, "gain_ev")),
             cast: self.cast(background),
             light_map: self.light_map.clone(),
+            interreflection: self.draw_interreflection(draws, background),
             edges: EdgeTreatment::draw(&self.edges, draws),
             finish: self.finish.draw(draws),
             files: None,
@@ -135,6 +136,14 @@ impl Recipe {
             None => Exposure::MatchPlate { gain_ev },
             Some(albedo) => Exposure::MatchSurface { albedo, gain_ev },
         }
+    }
+
+    fn draw_interreflection(&self, draws: &Draws, background: &Background) -> LinearRgb {
+        let share = self.interreflection.draw(draws, "interreflection") as f32;
+        let albedo = self.albedo_of(background);
+        albedo
+            .map_or(LinearRgb::WHITE, |albedo| albedo.color())
+            .scale(share)
     }
 
     fn albedo_of(&self, background: &Background) -> Option<Albedo> {

@@ -22,6 +22,10 @@ use crate::scene::{
 use compose::{Places, SceneNumber};
 use serde::{Deserialize, Serialize};
 
+fn is_none(range: &Range) -> bool {
+    *range == Range::fixed(0.0)
+}
+
 fn is_flat(bend_deg: &Range) -> bool {
     *bend_deg == Range::fixed(0.0)
 }
@@ -107,6 +111,10 @@ pub struct Recipe {
     /// gradients that the plate shows. Default: evenly.
     #[serde(skip_serializing_if = "LightMap::is_even")]
     pub light_map: LightMap,
+    /// Light that goes to and fro between the surface and the objects over it: share of the
+    /// surface's albedo; where that is not known, the albedo itself. Default: 0, none.
+    #[serde(skip_serializing_if = "is_none")]
+    pub interreflection: Range,
     /// What happens to the finished frame. Default: nothing.
     pub finish: PostProcessRanges,
     /// How objects come to rest.
@@ -143,6 +151,7 @@ impl Default for Recipe {
             surface_albedo: None,
             cast: LightTint::default(),
             light_map: LightMap::default(),
+            interreflection: Range::fixed(0.0),
             finish: PostProcessRanges::default(),
             settle: SettleOptions::default(),
         }
@@ -246,6 +255,7 @@ impl Recipe {
         self.check_surface()?;
         check_cast(&self.cast)?;
         self.light_map.check()?;
+        self.interreflection.check("interreflection", &SHARE)?;
         self.finish.check()?;
         self.settle.check()
     }

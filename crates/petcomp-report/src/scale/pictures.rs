@@ -151,6 +151,7 @@ fn heap_scene(case: &ScaleCase) -> Scene {
         edges: Default::default(),
         cast: Default::default(),
         light_map: Default::default(),
+        interreflection: Default::default(),
         view: Default::default(),
         lens: Default::default(),
         finish: Default::default(),

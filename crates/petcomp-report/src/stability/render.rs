@@ -9,7 +9,7 @@ use super::{HardCase, Outcome, memory, render_light};
 use crate::render::GOOD;
 use petcomp::composite;
 use petcomp::geom::UnitQuaternion;
-use petcomp::render::{RenderOptions, interreflect, render, render_reference};
+use petcomp::render::{RenderOptions, render, render_reference};
 use petcomp::scene::{Card, Shot};
 use petcomp::{DeepImage, DeepSample, Film, Image, LinearRgb, PremulRgba, Quality, Result};
 use std::f64::consts::FRAC_PI_2;
@@ -323,8 +323,11 @@ fn reflect_between_planes() -> Result<Outcome> {
 }
 
 fn brightest_between_planes() -> f64 {
-    let shot = white_card_shot();
-    let deep = interreflect(rendered(&shot), &shot, LinearRgb::WHITE);
+    let shot = Shot {
+        interreflection: LinearRgb::WHITE,
+        ..white_card_shot()
+    };
+    let deep = rendered(&shot);
     let shadow = deep.shadow().pixels().iter();
     shadow.map(brightest_channel).fold(0.0, largest)
 }

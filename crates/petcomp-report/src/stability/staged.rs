@@ -138,6 +138,7 @@ pub(super) fn empty_scene(camera: Camera) -> Scene {
         edges: Default::default(),
         cast: Default::default(),
         light_map: Default::default(),
+        interreflection: Default::default(),
         view: Default::default(),
         lens: Default::default(),
         finish: Default::default(),

@@ -115,6 +115,7 @@ impl FixtureFolder {
             edges: Default::default(),
             cast: Default::default(),
             light_map: Default::default(),
+            interreflection: Default::default(),
             view: Default::default(),
             lens: Default::default(),
             finish: Default::default(),
