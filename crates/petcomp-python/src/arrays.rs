@@ -119,7 +119,9 @@ pub(crate) fn matte_of(name: &str, argument: &Bound<'_, PyAny>) -> PyResult<Imag
     check_size(name, [width, height])?;
     if is_of::<bool>(array) {
         let inside = foreign::<bool, u8>(array, [width, height])?;
-        return Ok(copied(inside.view()).map(|code| Coverage(f32::from(u8::from(code != 0)))));
+        let codes = copied(inside.view()).into_vec().into_iter();
+        let shares = codes.map(|code| Coverage(f32::from(u8::from(code != 0))));
+        return Ok(Image::from_vec(width, height, shares.collect()));
     }
     if !is_of::<f32>(array) {
         let found = array.dtype();

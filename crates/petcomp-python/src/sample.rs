@@ -180,7 +180,7 @@ impl Sample {
             frame.linear.clone()
         };
         let linear = linear.ok_or_else(|| internal("a sample without a picture"))?;
-        let shown = py.detach(|| displayed(&linear));
+        let shown = work::run(py, move || Ok(displayed(&linear)))?;
         let array = to_array::<Srgb8, u8>(py, shown)?.unbind();
         let mut frame = locked(&self.frame);
         Ok(frame.shown.get_or_insert(array).clone_ref(py))
@@ -201,12 +201,12 @@ impl Sample {
 
     fn depth<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
         let facts = self.facts.clone();
-        to_array(py, py.detach(move || facts.depths()))
+        to_array(py, work::run(py, move || Ok(facts.depths()))?)
     }
 
     fn ids<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<u32>>> {
         let facts = self.facts.clone();
-        to_array(py, py.detach(move || facts.ids()))
+        to_array(py, work::run(py, move || Ok(facts.ids()))?)
     }
 
     /// One row an object: x0, y0, x1, y1.

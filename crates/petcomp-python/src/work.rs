@@ -2,7 +2,8 @@
 //!
 //! A job gets a pool that nobody else uses while it runs: one that waits in the middle of a picture
 //! must not begin another. Pools are kept for the next job of the same process; a fork has none of
-//! its parent's threads, and begins anew.
+//! its parent's threads, and begins anew. For the same reason nothing that works on rows side by
+//! side is called outside of a job: rayon's own pool would not be there.
 
 use crate::errors::{internal, to_python};
 use crate::messages;
