@@ -10,9 +10,18 @@ from typing import Any
 
 from .errors import ArgumentTypeError, InvalidValueError
 
-__all__ = ["dumped", "loaded", "overrides", "path_of"]
+__all__ = ["check_count", "dumped", "loaded", "overrides", "path_of"]
 
 _MOST_LEVELS = 60
+#: An array that only says that it is large must not be written out.
+_MOST_NUMBERS = 10_000_000
+
+
+def check_count(name: str, value: Any) -> None:
+    """Refuses arrays with more numbers than a document may have, before any is looked at."""
+    size = getattr(value, "size", 0)
+    if isinstance(size, int) and size > _MOST_NUMBERS:
+        raise InvalidValueError(f"{name}: {size} numbers, expected at most {_MOST_NUMBERS}")
 
 
 def loaded(text: str) -> Any:
@@ -47,6 +56,7 @@ def _key(at: str, key: Any) -> str:
 
 def _plain_scalar(at: str, value: Any, level: int) -> Any:
     if hasattr(value, "tolist"):
+        check_count(at, value)
         return _plain(at, value.tolist(), level + 1)
     if isinstance(value, os.PathLike):
         return os.fspath(value)

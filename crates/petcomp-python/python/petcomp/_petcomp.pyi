@@ -9,6 +9,28 @@ import numpy.typing as npt
 _Float = npt.NDArray[np.float32]
 _Place = tuple[int, int | None, Sequence[float], Sequence[float], Sequence[Sequence[float]]]
 
+__all__ = [
+    "Camera",
+    "Pipeline",
+    "Sample",
+    "build_assets",
+    "check_config",
+    "check_scene",
+    "cut_out",
+    "evaluate_boxes",
+    "evaluate_files",
+    "generate_from",
+    "generate_with",
+    "key",
+    "list_assets",
+    "read_picture",
+    "render_shot",
+    "run_program",
+    "set_threads",
+    "solve_camera",
+    "write_picture",
+]
+
 @final
 class Camera:
     @staticmethod

@@ -39,10 +39,15 @@ def shown(image: npt.NDArray[Any]) -> npt.NDArray[np.uint8]:
     if image.dtype == np.uint8:
         return image
     if image.ndim == 2:
-        return np.round(255 * np.clip(image, 0, 1)).astype(np.uint8)
+        return _codes(np.clip(image, 0, 1))
     light = np.clip(image[..., :3], 0, 1)
     curve = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
-    return np.round(255 * curve).astype(np.uint8)
+    return _codes(curve)
+
+
+def _codes(values: npt.NDArray[Any]) -> npt.NDArray[np.uint8]:
+    codes: npt.NDArray[np.uint8] = np.round(255 * values).astype(np.uint8)
+    return codes
 
 
 def image_tag(codes: npt.NDArray[np.uint8]) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _petcomp
-from ._documents import dumped, loaded
+from ._documents import check_count, dumped, loaded
 from ._show import table
 from .errors import InvalidValueError
 
@@ -24,6 +24,7 @@ Numbers = Sequence[float] | npt.NDArray[np.floating[Any]]
 
 def _floats(name: str, value: Any, shape: tuple[int, ...]) -> list[Any]:
     """Finite numbers of a shape, -1 being any length."""
+    check_count(name, value)
     try:
         array = np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 from . import _petcomp
 from ._documents import dumped, loaded, path_of
@@ -16,7 +16,8 @@ from .sample import Sample
 __all__ = ["DatasetCounts", "Progress", "generate"]
 
 
-class Progress(NamedTuple):
+@dataclass(frozen=True)
+class Progress:
     """How far a run is."""
 
     #: Samples in the folder, those of an earlier run included.

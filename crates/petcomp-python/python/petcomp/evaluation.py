@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from . import _petcomp
-from ._documents import loaded, path_of
+from ._documents import check_count, loaded, path_of
 from ._show import table
 from .errors import ArgumentTypeError, InvalidValueError
 from .pipeline import _number
@@ -75,15 +75,15 @@ def evaluate(
     lists, one mapping for each image: ``boxes`` (n x 4: left, top, right, bottom, pixels) and ``classes``
     (n), and of predictions ``scores`` (n).
     """
-    number = {"rounds": _number("rounds", rounds), "seed": _number("seed", seed)}
+    rounds, seed = _number("rounds", rounds), _number("seed", seed)
     if isinstance(predictions, (str, os.PathLike)) and isinstance(truth, (str, os.PathLike)):
         shape = None if size is None else [_number("size", side) for side in size]
         place = None if output is None else path_of("output", output)
         paths = path_of("predictions", predictions), path_of("truth", truth)
-        text = _petcomp.evaluate_files(*paths, list(classes), shape, place, **number)
+        text = _petcomp.evaluate_files(*paths, list(classes), shape, place, rounds, seed)
     else:
         sheets = _sheets(predictions, truth)
-        text = _petcomp.evaluate_boxes(sheets, list(classes), **number)
+        text = _petcomp.evaluate_boxes(sheets, list(classes), rounds, seed)
     record = loaded(text)
     return Metrics(record["metrics"], record["classes"])
 
@@ -100,9 +100,10 @@ def _sheets(predictions: Any, truth: Any) -> list[Any]:
 
 def _rows(at: str, labels: Any, scored: bool) -> list[tuple[Any, ...]]:
     try:
+        check_count(at, labels["boxes"])
         boxes = np.asarray(labels["boxes"], dtype=np.float64).reshape(-1, 4).tolist()
         numbers = [int(number) for number in labels["classes"]]
-        columns = [numbers, boxes]
+        columns: list[list[Any]] = [numbers, boxes]
         if scored:
             columns.append([float(score) for score in labels["scores"]])
     except (KeyError, TypeError, ValueError) as error:
