@@ -5,8 +5,7 @@ use crate::foreign::Foreign;
 use bytemuck::Pod;
 use numpy::ndarray::{ArrayD, IxDyn};
 use numpy::{
-    Element, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyUntypedArray,
-    PyUntypedArrayMethods,
+    Element, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods,
 };
 use petcomp::color::{decode_row, decode_srgb8};
 use petcomp::{
@@ -134,10 +133,16 @@ pub(crate) fn matte_of(name: &str, argument: &Bound<'_, PyAny>) -> PyResult<Imag
 }
 
 fn check_coverage(name: &str, matte: &Image<Coverage>) -> Result<()> {
-    let bad = matte.pixels().iter().position(|c| !(0.0..=1.0).contains(&c.0));
+    let bad = matte
+        .pixels()
+        .iter()
+        .position(|c| !(0.0..=1.0).contains(&c.0));
     bad.map_or(Ok(()), |i| {
         let (value, at) = (matte.pixels()[i].0, place(i, matte.width()));
-        Err(Error::value(name, format!("{value} at {at}, expected 0 to 1")))
+        Err(Error::value(
+            name,
+            format!("{value} at {at}, expected 0 to 1"),
+        ))
     })
 }
 

@@ -24,7 +24,9 @@ pub(crate) fn build_assets(
         let Some(callable) = &progress else {
             return Ok(());
         };
-        steps.into_iter().try_for_each(|step| callable.call1(py, step).map(drop))
+        steps
+            .into_iter()
+            .try_for_each(|step| callable.call1(py, step).map(drop))
     };
     work::run_beside(py, &|_| (), &mut deliver, move || {
         let report = |done, total| locked(&own).push((done, total));

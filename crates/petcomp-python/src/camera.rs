@@ -23,7 +23,10 @@ fn checked(camera: petcomp::Camera) -> PyResult<Camera> {
 fn check_finite(name: &str, numbers: &[f64]) -> PyResult<()> {
     match numbers.iter().find(|number| !number.is_finite()) {
         None => Ok(()),
-        Some(bad) => Err(wrong_value(name, format_args!("{bad}, expected finite numbers"))),
+        Some(bad) => Err(wrong_value(
+            name,
+            format_args!("{bad}, expected finite numbers"),
+        )),
     }
 }
 
@@ -50,9 +53,17 @@ impl Camera {
         check_finite("target", &target)?;
         check_finite("focal_px", &[focal_px])?;
         if eye == target {
-            return Err(wrong_value("target", format_args!("{target:?}, expected another place than eye")));
+            return Err(wrong_value(
+                "target",
+                format_args!("{target:?}, expected another place than eye"),
+            ));
         }
-        checked(petcomp::Camera::look_at(eye.into(), target.into(), focal_px, image))
+        checked(petcomp::Camera::look_at(
+            eye.into(),
+            target.into(),
+            focal_px,
+            image,
+        ))
     }
 
     #[getter]
@@ -99,7 +110,9 @@ impl Camera {
 
     /// Pixel and depth of each point; NaN at or behind the camera.
     fn project(&self, points: Vec<[f64; 3]>) -> Vec<[f64; 3]> {
-        let projected = points.into_iter().map(|point| self.0.project(Point3::from(point)));
+        let projected = points
+            .into_iter()
+            .map(|point| self.0.project(Point3::from(point)));
         let nowhere = [f64::NAN; 3];
         projected
             .map(|seen| seen.map_or(nowhere, |(px, depth)| [px.x, px.y, depth]))
@@ -119,11 +132,7 @@ fn rows(matrix: &Matrix3<f64>) -> [[f64; 3]; 3] {
 
 /// The camera of a label, and what `NAME.camera.json` would say of it.
 #[pyfunction]
-pub(crate) fn solve_camera(
-    py: Python<'_>,
-    label: &str,
-    force: bool,
-) -> PyResult<(Camera, String)> {
+pub(crate) fn solve_camera(py: Python<'_>, label: &str, force: bool) -> PyResult<(Camera, String)> {
     let label: Label = parse("label", label).map_err(to_python)?;
     let (camera, record) = work::run(py, move || solved(&label, force))?;
     Ok((Camera(camera), record))

@@ -124,7 +124,10 @@ pub(crate) fn evaluate_boxes(
         ..EvalReportOptions::default()
     };
     work::run(py, move || {
-        let sheets = sheets.iter().enumerate().map(|(i, sheet)| sheet_of(i, sheet));
+        let sheets = sheets
+            .iter()
+            .enumerate()
+            .map(|(i, sheet)| sheet_of(i, sheet));
         let run = Run {
             name: "predictions".into(),
             sheets: sheets.collect(),
@@ -144,7 +147,10 @@ fn check_boxes(sheets: &[Sheet]) -> Result<()> {
         }
         if let Some((_, _, score)) = found.iter().find(|(_, _, score)| !score.is_finite()) {
             let what = format!("{score}, expected a finite number");
-            return Err(petcomp::Error::value(format!("predictions[{i}].scores"), what));
+            return Err(petcomp::Error::value(
+                format!("predictions[{i}].scores"),
+                what,
+            ));
         }
     }
     Ok(())
@@ -157,7 +163,10 @@ fn check_box(image: usize, bbox: &[f64; 4]) -> Result<()> {
         return Ok(());
     }
     let what = format!("{bbox:?}, expected x0 <= x1 and y0 <= y1, pixels");
-    Err(petcomp::Error::value(format!("boxes of image {image}"), what))
+    Err(petcomp::Error::value(
+        format!("boxes of image {image}"),
+        what,
+    ))
 }
 
 fn sheet_of(i: usize, (truth, found): &Sheet) -> EvalImage {

@@ -57,7 +57,10 @@ fn counts_json(counts: &DatasetCounts) -> Result<String> {
 /// Which samples of a dataset are made.
 fn range_of(only: Option<u64>, shard: Option<[u64; 2]>) -> PyResult<SampleRange> {
     match (only, shard) {
-        (Some(_), Some(_)) => Err(wrong_value("only", "given together with shard, expected one of them")),
+        (Some(_), Some(_)) => Err(wrong_value(
+            "only",
+            "given together with shard, expected one of them",
+        )),
         (Some(k), None) => Ok(SampleRange::One(k)),
         (None, Some([index, of])) => {
             let shard = Shard::new(index, of).map_err(to_python)?;
@@ -97,14 +100,19 @@ pub(crate) fn generate_from(
         falls.store(stopped, Ordering::Relaxed);
         run.stop();
     };
-    work::run_beside(py, &stop, &mut |py| run.deliver(py, progress.as_ref()), move || {
-        let pipeline = opened.pipeline;
-        let plan = Plan {
-            range,
-            ..pipeline.plan(count, seed, folder)?
-        };
-        worker.generate(&plan, |k| pipeline.sample(seed, k))
-    })
+    work::run_beside(
+        py,
+        &stop,
+        &mut |py| run.deliver(py, progress.as_ref()),
+        move || {
+            let pipeline = opened.pipeline;
+            let plan = Plan {
+                range,
+                ..pipeline.plan(count, seed, folder)?
+            };
+            worker.generate(&plan, |k| pipeline.sample(seed, k))
+        },
+    )
 }
 
 /// How a dataset of a function's pictures is written.
@@ -162,17 +170,22 @@ pub(crate) fn generate_with(
     let raised = Raised::default();
     let (worker, keep) = (run.clone(), raised.clone());
     let stop = |_| run.stop();
-    let made = work::run_beside(py, &stop, &mut |py| run.deliver(py, progress.as_ref()), move || {
-        let plan = Plan {
-            range,
-            seed,
-            split: layout.split,
-            obstructed: layout.labels.obstructed,
-            writers: layout.writers(),
-            ..Plan::new(folder, count, layout.labels.obstructed.classes(&classes)?)
-        };
-        worker.generate(&plan, |k| keep.sample(&make, k))
-    });
+    let made = work::run_beside(
+        py,
+        &stop,
+        &mut |py| run.deliver(py, progress.as_ref()),
+        move || {
+            let plan = Plan {
+                range,
+                seed,
+                split: layout.split,
+                obstructed: layout.labels.obstructed,
+                writers: layout.writers(),
+                ..Plan::new(folder, count, layout.labels.obstructed.classes(&classes)?)
+            };
+            worker.generate(&plan, |k| keep.sample(&make, k))
+        },
+    );
     // What the function raised says more than that it did.
     match locked(&raised.0).take() {
         Some((_, error)) if made.is_err() => Err(error),

@@ -31,7 +31,9 @@ pub(crate) fn deliver(py: Python<'_>) -> PyResult<()> {
     if waiting.is_empty() {
         return Ok(());
     }
-    let logger = py.import("logging")?.call_method1("getLogger", ("petcomp",))?;
+    let logger = py
+        .import("logging")?
+        .call_method1("getLogger", ("petcomp",))?;
     for (level, text) in waiting {
         logger.call_method1("log", (level, "%s", text))?;
     }

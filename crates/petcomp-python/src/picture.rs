@@ -34,7 +34,8 @@ pub(crate) fn key<'py>(
 ) -> PyResult<(FloatArray<'py>, FloatArray<'py>, String)> {
     let photo = Given::from_argument("image", image)?;
     let screen = ScreenArgument::new(screen)?;
-    let matte = |name, matte: Option<Bound<'py, PyAny>>| matte.map(|m| matte_of(name, &m)).transpose();
+    let matte =
+        |name, matte: Option<Bound<'py, PyAny>>| matte.map(|m| matte_of(name, &m)).transpose();
     let (garbage, core) = (matte("garbage", garbage)?, matte("core", core)?);
     let options = parse("options", options).map_err(to_python)?;
     let keyed = work::run(py, move || {
@@ -49,7 +50,11 @@ pub(crate) fn key<'py>(
         keyed(&photo.decoded("image")?, &known)
     })?;
     let changed = deviations_json(&keyed.deviations);
-    Ok((to_array(py, keyed.matte)?, to_array(py, keyed.cutout)?, changed))
+    Ok((
+        to_array(py, keyed.matte)?,
+        to_array(py, keyed.cutout)?,
+        changed,
+    ))
 }
 
 /// A colour, or a photo of the screen.
@@ -90,10 +95,7 @@ fn keyed(photo: &Photo, known: &Known) -> Result<Keyed> {
     }
 }
 
-fn keyed_pixels<P: Floats + matte::key::Photo>(
-    pixels: &Pixels<P>,
-    known: &Known,
-) -> Result<Keyed> {
+fn keyed_pixels<P: Floats + matte::key::Photo>(pixels: &Pixels<P>, known: &Known) -> Result<Keyed> {
     let color = Screen::Color(known.color);
     let screen = known.plate.as_ref().map_or(color, Screen::Plate);
     let mut keying = Keying::of_view(pixels.view(), screen);
@@ -125,7 +127,9 @@ pub(crate) fn cut_out<'py>(
     options: &str,
 ) -> PyResult<(FloatArray<'py>, FloatArray<'py>, String)> {
     let photo = Given::from_argument("image", image)?;
-    let empty = empty.map(|e| Given::from_argument("empty", &e)).transpose()?;
+    let empty = empty
+        .map(|e| Given::from_argument("empty", &e))
+        .transpose()?;
     let options: CutOutOptions = parse("options", options).map_err(to_python)?;
     let (rgba, transmittance, record) = work::run(py, move || {
         let photo = photo.decoded("image")?.into_opaque("image")?;
@@ -168,11 +172,18 @@ pub(crate) fn read_picture<'py>(
 
 /// A picture to a file, its format by the extension.
 #[pyfunction]
-pub(crate) fn write_picture(py: Python<'_>, path: PathBuf, image: &Bound<'_, PyAny>) -> PyResult<()> {
+pub(crate) fn write_picture(
+    py: Python<'_>,
+    path: PathBuf,
+    image: &Bound<'_, PyAny>,
+) -> PyResult<()> {
     let extension = path.extension().unwrap_or_default().to_string_lossy();
     if !["exr", "png", "jpg", "jpeg", "tif", "tiff"].contains(&&*extension.to_lowercase()) {
         let what = "expected the extension .exr, .png, .jpg or .tif";
-        return Err(wrong_value("path", format_args!("{}: {what}", path.display())));
+        return Err(wrong_value(
+            "path",
+            format_args!("{}: {what}", path.display()),
+        ));
     }
     let image = Given::from_argument("image", image)?;
     work::run(py, move || match image.decoded("image")? {
@@ -189,7 +200,10 @@ fn check_sound(image: &Image<PremulRgba>) -> Result<()> {
     let bad = image.pixels().iter().position(|pixel| !pixel.is_sound());
     bad.map_or(Ok(()), |i| {
         let (x, y) = (i % image.width(), i / image.width());
-        let what = format!("alpha {} in column {x}, row {y}, expected 0 to 1", image.pixels()[i].a);
+        let what = format!(
+            "alpha {} in column {x}, row {y}, expected 0 to 1",
+            image.pixels()[i].a
+        );
         Err(Error::value("image", what))
     })
 }

@@ -81,7 +81,9 @@ impl Opened {
 
 impl Pipeline {
     pub(crate) fn opened(&self) -> PyResult<Opened> {
-        locked(&self.opened).clone().ok_or_else(|| closed("the pipeline"))
+        locked(&self.opened)
+            .clone()
+            .ok_or_else(|| closed("the pipeline"))
     }
 }
 

@@ -107,7 +107,10 @@ impl Facts {
     fn mask(&self, place: usize) -> PyResult<&RleMask> {
         let labelled = self.labelled();
         let label = labelled.get(place).ok_or_else(|| {
-            PyIndexError::new_err(format!("mask {place}, expected less than {}", labelled.len()))
+            PyIndexError::new_err(format!(
+                "mask {place}, expected less than {}",
+                labelled.len()
+            ))
         })?;
         Ok(self.mask_of(label))
     }
@@ -212,16 +215,24 @@ impl Sample {
     /// One row an object: x0, y0, x1, y1.
     fn boxes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let labelled = self.facts.labelled();
-        let boxes = labelled.iter().map(|label| self.facts.policy.extent.of(label.object).0);
+        let boxes = labelled
+            .iter()
+            .map(|label| self.facts.policy.extent.of(label.object).0);
         let numbers: Vec<f64> = boxes.flat_map(|b| [b.x0, b.y0, b.x1, b.y1]).collect();
         let array = Array2::from_shape_vec((labelled.len(), 4), numbers);
-        Ok(PyArray2::from_owned_array(py, array.map_err(|e| internal(&e.to_string()))?))
+        Ok(PyArray2::from_owned_array(
+            py,
+            array.map_err(|e| internal(&e.to_string()))?,
+        ))
     }
 
     /// Number, class, and whether to be ignored, of each labelled object.
     fn labelled(&self) -> Vec<(u32, u32, bool)> {
         let labelled = self.facts.labelled();
-        labelled.iter().map(|label| (label.object.id.0, label.class, label.ignored)).collect()
+        labelled
+            .iter()
+            .map(|label| (label.object.id.0, label.class, label.ignored))
+            .collect()
     }
 
     fn class_names(&self) -> Vec<String> {
@@ -262,11 +273,20 @@ impl Sample {
 fn check_classes(object_classes: &[u32], masks: usize, classes: usize) -> PyResult<()> {
     if object_classes.len() != masks {
         let count = object_classes.len();
-        return Err(wrong_value("object_classes", format_args!("{count}, expected one for each of {masks} masks")));
+        return Err(wrong_value(
+            "object_classes",
+            format_args!("{count}, expected one for each of {masks} masks"),
+        ));
     }
-    match object_classes.iter().find(|class| **class as usize >= classes) {
+    match object_classes
+        .iter()
+        .find(|class| **class as usize >= classes)
+    {
         None => Ok(()),
-        Some(class) => Err(wrong_value("object_classes", format_args!("{class}, but there are {classes} classes"))),
+        Some(class) => Err(wrong_value(
+            "object_classes",
+            format_args!("{class}, but there are {classes} classes"),
+        )),
     }
 }
 
@@ -309,4 +329,3 @@ fn object_of(id: u32, mask: &Image<Coverage>, class: u32) -> ObjectLabel {
         ..ObjectLabel::default()
     }
 }
-

@@ -10,7 +10,9 @@ use pyo3::prelude::*;
 /// A scene as it is read, every default told that is not left out in files.
 #[pyfunction]
 pub(crate) fn check_scene(json: &str) -> PyResult<String> {
-    scene_of(json).and_then(|scene| text(&scene)).map_err(to_python)
+    scene_of(json)
+        .and_then(|scene| text(&scene))
+        .map_err(to_python)
 }
 
 pub(crate) fn scene_of(json: &str) -> Result<Scene> {
@@ -22,7 +24,9 @@ pub(crate) fn scene_of(json: &str) -> Result<Scene> {
 /// A recipe as it is read.
 #[pyfunction]
 pub(crate) fn check_config(json: &str) -> PyResult<String> {
-    config_of(json).and_then(|config| text(&config)).map_err(to_python)
+    config_of(json)
+        .and_then(|config| text(&config))
+        .map_err(to_python)
 }
 
 pub(crate) fn config_of(json: &str) -> Result<DatasetConfig> {

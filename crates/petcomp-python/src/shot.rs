@@ -43,9 +43,13 @@ pub(crate) fn render_shot(
     settings: &str,
 ) -> PyResult<Sample> {
     let camera = camera.get().0;
-    let plate = plate.map(|p| Given::from_argument("plate", &p)).transpose()?;
-    let textures: PyResult<Vec<Given>> =
-        textures.iter().map(|t| Given::from_argument("texture", t)).collect();
+    let plate = plate
+        .map(|p| Given::from_argument("plate", &p))
+        .transpose()?;
+    let textures: PyResult<Vec<Given>> = textures
+        .iter()
+        .map(|t| Given::from_argument("texture", t))
+        .collect();
     let textures = textures?;
     let settings: Settings = parse("shot", settings).map_err(to_python)?;
     check_places(&places, textures.len(), &settings)?;
@@ -60,13 +64,22 @@ pub(crate) fn render_shot(
 fn check_places(places: &[Place], textures: usize, settings: &Settings) -> PyResult<()> {
     let ids: BTreeSet<u32> = places.iter().map(|place| place.0).collect();
     if ids.len() != places.len() || ids.contains(&0) || textures != places.len() {
-        return Err(wrong_value("cards", "expected ids of their own, and none of 0"));
+        return Err(wrong_value(
+            "cards",
+            "expected ids of their own, and none of 0",
+        ));
     }
     let classes = settings.classes.len();
-    let unknown = places.iter().filter_map(|place| place.1).find(|class| *class as usize >= classes);
+    let unknown = places
+        .iter()
+        .filter_map(|place| place.1)
+        .find(|class| *class as usize >= classes);
     match unknown {
         None => Ok(()),
-        Some(class) => Err(wrong_value("cards", format_args!("class {class}, but there are {classes} classes"))),
+        Some(class) => Err(wrong_value(
+            "cards",
+            format_args!("class {class}, but there are {classes} classes"),
+        )),
     }
 }
 
@@ -140,14 +153,27 @@ fn with_plate(shot: Shot, plate: Given) -> Result<Shot> {
 }
 
 fn card_of((id, class, size, position, rotation): Place, texture: Given) -> Result<Card> {
-    check_numbers("size", &size, |side| (LEAST_SIDE_M..=MOST_SIDE_M).contains(&side), "0.000001 to 1000 (metres)")?;
-    check_numbers("position", &position, |p| p.abs() <= MOST_SIDE_M, "within 1000 metres")?;
+    check_numbers(
+        "size",
+        &size,
+        |side| (LEAST_SIDE_M..=MOST_SIDE_M).contains(&side),
+        "0.000001 to 1000 (metres)",
+    )?;
+    check_numbers(
+        "position",
+        &position,
+        |p| p.abs() <= MOST_SIDE_M,
+        "within 1000 metres",
+    )?;
     let texture: petcomp::Image<PremulRgba> = match texture.decoded("texture")? {
         Photo::Rgb(pixels) => Photo::Rgb(pixels).into_premul(),
         Photo::Rgba(pixels) => pixels.into_image(),
     };
     if let Some(bad) = texture.pixels().iter().find(|pixel| !pixel.is_sound()) {
-        return Err(Error::value("texture", format!("alpha {}, expected 0 to 1", bad.a)));
+        return Err(Error::value(
+            "texture",
+            format!("alpha {}, expected 0 to 1", bad.a),
+        ));
     }
     let pose = Pose::from_parts(Vector3::from(position).into(), rotation_of(&rotation)?);
     let quad = Quad {
@@ -164,11 +190,19 @@ const MOST_SIDE_M: f64 = 1000.0;
 /// What a matrix of a few decimals may miss a rotation by.
 const ROTATION_TOLERANCE: f64 = 1e-5;
 
-fn check_numbers(at: &str, numbers: &[f64], is_right: impl Fn(f64) -> bool, expected: &str) -> Result<()> {
+fn check_numbers(
+    at: &str,
+    numbers: &[f64],
+    is_right: impl Fn(f64) -> bool,
+    expected: &str,
+) -> Result<()> {
     if numbers.iter().all(|&number| is_right(number)) {
         return Ok(());
     }
-    Err(Error::value(at, format!("{numbers:?}, expected {expected}")))
+    Err(Error::value(
+        at,
+        format!("{numbers:?}, expected {expected}"),
+    ))
 }
 
 fn rotation_of(rows: &[[f64; 3]; 3]) -> Result<UnitQuaternion<f64>> {
@@ -178,5 +212,8 @@ fn rotation_of(rows: &[[f64; 3]; 3]) -> Result<UnitQuaternion<f64>> {
         let rotation = Rotation3::from_matrix_unchecked(matrix);
         return Ok(UnitQuaternion::from_rotation_matrix(&rotation));
     }
-    Err(Error::value("rotation", format!("{rows:?}, expected the rows of a rotation matrix")))
+    Err(Error::value(
+        "rotation",
+        format!("{rows:?}, expected the rows of a rotation matrix"),
+    ))
 }
