@@ -59,32 +59,47 @@ impl Given {
     pub(crate) fn from_argument(name: &str, argument: &Bound<'_, PyAny>) -> PyResult<Self> {
         let array = array_of(name, argument)?;
         let [height, width, channels] = shape_of(name, array)?;
-        check_size(name, [width, height])?;
         let size = [width, height];
-        match (is_of::<f32>(array), is_of::<u8>(array), channels) {
-            (true, _, 3) => Ok(Self::Rgb(foreign::<f32, _>(array, size)?)),
-            (true, _, 4) => Ok(Self::Rgba(foreign::<f32, _>(array, size)?)),
-            (_, true, 3) => Ok(Self::Codes(foreign::<u8, _>(array, size)?)),
-            (_, true, 4) => Ok(Self::CodesAlpha(foreign::<u8, _>(array, size)?)),
-            (false, false, _) => Err(wrong_dtype(name, array)),
-            _ => Err(wrong_shape(name, array)),
+        check_size(name, size)?;
+        if is_of::<f32>(array) {
+            Self::of_floats(array, size, channels)
+        } else if is_of::<u8>(array) {
+            Self::of_codes(array, size, channels)
+        } else {
+            Err(wrong_dtype(name, array))
+        }
+    }
+
+    fn of_floats(
+        array: &Bound<'_, PyUntypedArray>,
+        size: [usize; 2],
+        channels: usize,
+    ) -> PyResult<Self> {
+        match channels {
+            3 => foreign::<f32, _>(array, size).map(Self::Rgb),
+            _ => foreign::<f32, _>(array, size).map(Self::Rgba),
+        }
+    }
+
+    fn of_codes(
+        array: &Bound<'_, PyUntypedArray>,
+        size: [usize; 2],
+        channels: usize,
+    ) -> PyResult<Self> {
+        match channels {
+            3 => foreign::<u8, _>(array, size).map(Self::Codes),
+            _ => foreign::<u8, _>(array, size).map(Self::CodesAlpha),
         }
     }
 
     /// Scene-linear pixels; numbers that are none are refused.
     pub(crate) fn decoded(self, name: &str) -> Result<Photo> {
-        let photo = match self {
-            Self::Rgb(pixels) => Photo::Rgb(Pixels::Given(pixels)),
-            Self::Rgba(pixels) => Photo::Rgba(Pixels::Given(pixels)),
+        Ok(match self {
+            Self::Rgb(pixels) => Photo::Rgb(finite(name, pixels)?),
+            Self::Rgba(pixels) => Photo::Rgba(finite(name, pixels)?),
             Self::Codes(codes) => Photo::Rgb(Pixels::Made(decoded(codes.view()))),
             Self::CodesAlpha(codes) => Photo::Rgba(Pixels::Made(premultiplied(codes.view()))),
-        };
-        match &photo {
-            Photo::Rgb(Pixels::Given(pixels)) => check_finite(name, pixels.view())?,
-            Photo::Rgba(Pixels::Given(pixels)) => check_finite(name, pixels.view())?,
-            _ => (),
-        }
-        Ok(photo)
+        })
     }
 }
 
@@ -109,27 +124,35 @@ impl Photo {
 /// A matte of an argument: float32 from 0 to 1, or bool, height x width.
 pub(crate) fn matte_of(name: &str, argument: &Bound<'_, PyAny>) -> PyResult<Image<Coverage>> {
     let array = array_of(name, argument)?;
-    let &[height, width] = array.shape() else {
-        return Err(wrong_value(
-            name,
-            format_args!("shape {:?}, expected (height, width)", array.shape()),
-        ));
-    };
-    check_size(name, [width, height])?;
+    let size = matte_size(name, array)?;
     if is_of::<bool>(array) {
-        let inside = foreign::<bool, u8>(array, [width, height])?;
-        let codes = copied(inside.view()).into_vec().into_iter();
-        let shares = codes.map(|code| Coverage(f32::from(u8::from(code != 0))));
-        return Ok(Image::from_vec(width, height, shares.collect()));
+        return Ok(matte_of_mask(foreign::<bool, u8>(array, size)?.view()));
     }
     if !is_of::<f32>(array) {
         let found = array.dtype();
         let what = format!("dtype {found}, expected float32 (0 to 1) or bool");
         return Err(wrong_type(name, &what));
     }
-    let matte = copied(foreign::<f32, Coverage>(array, [width, height])?.view());
+    let matte = copied(foreign::<f32, Coverage>(array, size)?.view());
     check_coverage(name, &matte).map_err(crate::errors::to_python)?;
     Ok(matte)
+}
+
+fn matte_size(name: &str, array: &Bound<'_, PyUntypedArray>) -> PyResult<[usize; 2]> {
+    let &[height, width] = array.shape() else {
+        let found = array.shape();
+        let what = format!("shape {found:?}, expected (height, width)");
+        return Err(wrong_value(name, what));
+    };
+    check_size(name, [width, height])?;
+    Ok([width, height])
+}
+
+fn matte_of_mask(inside: ImageView<'_, u8>) -> Image<Coverage> {
+    let (width, height) = inside.size();
+    let codes = copied(inside).into_vec().into_iter();
+    let shares = codes.map(|code| Coverage(f32::from(u8::from(code != 0))));
+    Image::from_vec(width, height, shares.collect())
 }
 
 fn check_coverage(name: &str, matte: &Image<Coverage>) -> Result<()> {
@@ -264,15 +287,16 @@ impl Floats for PremulRgba {
     }
 }
 
-fn check_finite<P: Floats>(name: &str, view: ImageView<'_, P>) -> Result<()> {
-    let (_, height) = view.size();
-    for y in 0..height {
+/// Pixels of which every number is one.
+fn finite<P: Floats>(name: &str, pixels: Foreign<P>) -> Result<Pixels<P>> {
+    let view = pixels.view();
+    for y in 0..view.size().1 {
         if let Some(x) = view.row(y).iter().position(|pixel| !pixel.are_finite()) {
             let what = format!("not finite in column {x}, row {y}, expected finite numbers");
             return Err(Error::value(name, what));
         }
     }
-    Ok(())
+    Ok(Pixels::Given(pixels))
 }
 
 fn place(i: usize, width: usize) -> String {

@@ -1,7 +1,8 @@
 //! Cut-outs with real size and class, kept in a folder.
 
 use crate::document::text;
-use crate::work::{self, locked};
+use crate::lock::locked;
+use crate::work;
 use petcomp::Result;
 use petcomp::asset::{self, Built, Manifest};
 use pyo3::prelude::*;

@@ -21,31 +21,36 @@ struct Files {
     size: Option<[u32; 2]>,
 }
 
+/// What is asked of the scores: names of the classes, rounds of the bootstrap, its seed.
+type Question = (Vec<String>, usize, u64);
+
+fn options_of((classes, rounds, seed): Question) -> EvalReportOptions {
+    EvalReportOptions {
+        classes,
+        rounds: rounds.min(MOST_ROUNDS),
+        seed,
+        ..EvalReportOptions::default()
+    }
+}
+
 /// The scores of predictions in files, as `metrics.json` has them; with a folder, the whole report.
 #[pyfunction]
-#[pyo3(signature = (predictions, truth, classes, size, output, rounds, seed))]
 pub(crate) fn evaluate_files(
     py: Python<'_>,
     predictions: PathBuf,
     truth: PathBuf,
-    classes: Vec<String>,
     size: Option<[u32; 2]>,
     output: Option<PathBuf>,
-    rounds: usize,
-    seed: u64,
+    question: Question,
 ) -> PyResult<String> {
     let files = Files {
         predictions,
         truth,
         size,
     };
-    let options = EvalReportOptions {
-        classes,
-        rounds: rounds.min(MOST_ROUNDS),
-        seed,
-        ..EvalReportOptions::default()
-    };
-    work::run(py, move || files.evaluate(options, output.as_deref()))
+    work::run(py, move || {
+        files.evaluate(options_of(question), output.as_deref())
+    })
 }
 
 /// As on the command line.
@@ -112,17 +117,9 @@ type Sheet = (Vec<(u32, [f64; 4])>, Vec<(u32, [f64; 4], f64)>);
 pub(crate) fn evaluate_boxes(
     py: Python<'_>,
     sheets: Vec<Sheet>,
-    classes: Vec<String>,
-    rounds: usize,
-    seed: u64,
+    question: Question,
 ) -> PyResult<String> {
     check_boxes(&sheets).map_err(to_python)?;
-    let options = EvalReportOptions {
-        classes,
-        rounds: rounds.min(MOST_ROUNDS),
-        seed,
-        ..EvalReportOptions::default()
-    };
     work::run(py, move || {
         let sheets = sheets
             .iter()
@@ -132,7 +129,7 @@ pub(crate) fn evaluate_boxes(
             name: "predictions".into(),
             sheets: sheets.collect(),
         };
-        metrics_json(&run, &options)
+        metrics_json(&run, &options_of(question))
     })
 }
 

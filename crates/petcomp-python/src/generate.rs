@@ -1,15 +1,16 @@
 //! Datasets, by a pipeline or by a function of Python's.
 
 use crate::document::{parse, text};
-use crate::errors::{to_python, wrong_value};
+use crate::errors::to_python;
+use crate::lock::locked;
 use crate::pipeline::Pipeline;
 use crate::sample::Sample;
-use crate::work::{self, locked};
-use petcomp::Result;
+use crate::work;
 use petcomp::dataset::{
     self, DatasetCounts, LabelConfig, Pictures, Plan, Progress, SampleRange, Shard, Sidecar, Split,
     Writer,
 };
+use petcomp::{Error, Result};
 use pyo3::prelude::*;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -39,6 +40,16 @@ impl Run {
         Ok(())
     }
 
+    fn generate_from(&self, pipeline: &dataset::Pipeline, target: Target) -> Result<String> {
+        let (folder, count, seed, only, shard) = target;
+        let range = range_of(only, shard)?;
+        let plan = Plan {
+            range,
+            ..pipeline.plan(count, seed, folder_of(folder, range))?
+        };
+        self.generate(&plan, |k| pipeline.sample(seed, k))
+    }
+
     fn generate(
         &self,
         plan: &Plan,
@@ -54,19 +65,19 @@ fn counts_json(counts: &DatasetCounts) -> Result<String> {
     text(counts)
 }
 
+/// Where a dataset is written, and which samples: folder, count, seed, the only one, the shard.
+type Target = (PathBuf, u64, u64, Option<u64>, Option<[u64; 2]>);
+
 /// Which samples of a dataset are made.
-fn range_of(only: Option<u64>, shard: Option<[u64; 2]>) -> PyResult<SampleRange> {
+fn range_of(only: Option<u64>, shard: Option<[u64; 2]>) -> Result<SampleRange> {
     match (only, shard) {
-        (Some(_), Some(_)) => Err(wrong_value(
-            "only",
-            "given together with shard, expected one of them",
-        )),
-        (Some(k), None) => Ok(SampleRange::One(k)),
-        (None, Some([index, of])) => {
-            let shard = Shard::new(index, of).map_err(to_python)?;
-            Ok(SampleRange::Shard(shard))
-        }
         (None, None) => Ok(SampleRange::All),
+        (Some(k), None) => Ok(SampleRange::One(k)),
+        (None, Some([index, of])) => Shard::new(index, of).map(SampleRange::Shard),
+        (Some(_), Some(_)) => {
+            let what = "given together with shard, expected one of them";
+            Err(Error::value("only", what))
+        }
     }
 }
 
@@ -80,39 +91,23 @@ fn folder_of(folder: PathBuf, range: SampleRange) -> PathBuf {
 
 /// Makes a dataset of a pipeline's pictures.
 #[pyfunction]
-#[pyo3(signature = (pipeline, folder, count, seed, only, shard, progress))]
 pub(crate) fn generate_from(
     py: Python<'_>,
     pipeline: &Bound<'_, Pipeline>,
-    folder: PathBuf,
-    count: u64,
-    seed: u64,
-    only: Option<u64>,
-    shard: Option<[u64; 2]>,
+    target: Target,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<String> {
     let opened = pipeline.get().opened()?;
-    let range = range_of(only, shard)?;
-    let folder = folder_of(folder, range);
     let (run, falls) = (Run::default(), opened.stop);
     let worker = run.clone();
     let stop = |stopped| {
         falls.store(stopped, Ordering::Relaxed);
         run.stop();
     };
-    work::run_beside(
-        py,
-        &stop,
-        &mut |py| run.deliver(py, progress.as_ref()),
-        move || {
-            let pipeline = opened.pipeline;
-            let plan = Plan {
-                range,
-                ..pipeline.plan(count, seed, folder)?
-            };
-            worker.generate(&plan, |k| pipeline.sample(seed, k))
-        },
-    )
+    let mut beside = |py: Python<'_>| run.deliver(py, progress.as_ref());
+    work::run_beside(py, &stop, &mut beside, move || {
+        worker.generate_from(&opened.pipeline, target)
+    })
 }
 
 /// How a dataset of a function's pictures is written.
@@ -123,7 +118,7 @@ struct Layout {
 }
 
 impl Layout {
-    fn new(labels: &str, pictures: &str, split: &str) -> Result<Self> {
+    fn new([labels, pictures, split]: &[String; 3]) -> Result<Self> {
         let layout = Self {
             labels: parse("labels", labels)?,
             pictures: parse("pictures", pictures)?,
@@ -140,6 +135,23 @@ impl Layout {
         Ok(layout)
     }
 
+    fn plan(&self, classes: &[String], target: Target) -> Result<Plan> {
+        let (folder, count, seed, only, shard) = target;
+        let (range, obstructed) = (range_of(only, shard)?, self.labels.obstructed);
+        Ok(Plan {
+            range,
+            seed,
+            split: self.split,
+            obstructed,
+            writers: self.writers(),
+            ..Plan::new(
+                folder_of(folder, range),
+                count,
+                obstructed.classes(classes)?,
+            )
+        })
+    }
+
     fn writers(&self) -> Vec<Box<dyn Writer>> {
         let mut writers: Vec<Box<dyn Writer>> = vec![Box::new(self.pictures), Box::new(Sidecar)];
         writers.extend(self.labels.writers(&self.pictures));
@@ -149,48 +161,22 @@ impl Layout {
 
 /// Makes a dataset of the samples that a function of Python's returns for their numbers.
 #[pyfunction]
-#[pyo3(signature = (make, classes, layout, folder, count, seed, only, shard, progress))]
 pub(crate) fn generate_with(
     py: Python<'_>,
     make: Py<PyAny>,
     classes: Vec<String>,
     layout: [String; 3],
-    folder: PathBuf,
-    count: u64,
-    seed: u64,
-    only: Option<u64>,
-    shard: Option<[u64; 2]>,
+    target: Target,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<String> {
-    let range = range_of(only, shard)?;
-    let folder = folder_of(folder, range);
-    let [labels, pictures, split] = &layout;
-    let layout = Layout::new(labels, pictures, split).map_err(to_python)?;
-    let run = Run::default();
-    let raised = Raised::default();
+    let layout = Layout::new(&layout).map_err(to_python)?;
+    let (run, raised) = (Run::default(), Raised::default());
     let (worker, keep) = (run.clone(), raised.clone());
-    let stop = |_| run.stop();
-    let made = work::run_beside(
-        py,
-        &stop,
-        &mut |py| run.deliver(py, progress.as_ref()),
-        move || {
-            let plan = Plan {
-                range,
-                seed,
-                split: layout.split,
-                obstructed: layout.labels.obstructed,
-                writers: layout.writers(),
-                ..Plan::new(folder, count, layout.labels.obstructed.classes(&classes)?)
-            };
-            worker.generate(&plan, |k| keep.sample(&make, k))
-        },
-    );
-    // What the function raised says more than that it did.
-    match locked(&raised.0).take() {
-        Some((_, error)) if made.is_err() => Err(error),
-        _ => made,
-    }
+    let mut beside = |py: Python<'_>| run.deliver(py, progress.as_ref());
+    let made = work::run_beside(py, &|_| run.stop(), &mut beside, move || {
+        worker.generate(&layout.plan(&classes, target)?, |k| keep.sample(&make, k))
+    });
+    raised.or_else(made)
 }
 
 /// The exception of the sample with the lowest number.
@@ -198,6 +184,14 @@ pub(crate) fn generate_with(
 struct Raised(Arc<Mutex<Option<(u64, PyErr)>>>);
 
 impl Raised {
+    /// A run's outcome; what the function raised says more than that the run failed.
+    fn or_else(&self, made: PyResult<String>) -> PyResult<String> {
+        match locked(&self.0).take() {
+            Some((_, error)) if made.is_err() => Err(error),
+            _ => made,
+        }
+    }
+
     fn sample(&self, make: &Py<PyAny>, k: u64) -> Result<dataset::Sample> {
         let made = Python::attach(|py| {
             let sample = make.bind(py).call1((k,))?;

@@ -13,6 +13,7 @@ mod errors;
 mod evaluate;
 mod foreign;
 mod generate;
+mod lock;
 mod messages;
 mod picture;
 mod pipeline;

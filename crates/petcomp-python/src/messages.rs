@@ -3,7 +3,7 @@
 //! Threads at work never wait for the interpreter: they leave their messages here, and who waits for
 //! them delivers.
 
-use crate::work::locked;
+use crate::lock::locked;
 use log::{Level, LevelFilter, Log, Metadata, Record};
 use pyo3::prelude::*;
 use std::sync::{Mutex, Once};

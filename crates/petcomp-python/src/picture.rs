@@ -1,6 +1,6 @@
 //! Pictures: read, written, keyed, cut out.
 
-use crate::arrays::{Floats, Given, Photo, Pixels, matte_of, to_array};
+use crate::arrays::{Given, Photo, matte_of, to_array};
 use crate::document::{parse, text};
 use crate::errors::{to_python, wrong_value};
 use crate::work;
@@ -13,15 +13,6 @@ use std::path::PathBuf;
 
 type FloatArray<'py> = Bound<'py, PyArrayDyn<f32>>;
 
-/// What a keyer is given beside the photo.
-struct Known {
-    color: LinearRgb,
-    plate: Option<Image<LinearRgb>>,
-    garbage: Option<Image<Coverage>>,
-    core: Option<Image<Coverage>>,
-    options: KeyOptions,
-}
-
 /// Matte and cut-out of a photo before a screen, and what the robust profile changed.
 #[pyfunction]
 pub(crate) fn key<'py>(
@@ -33,28 +24,46 @@ pub(crate) fn key<'py>(
     options: &str,
 ) -> PyResult<(FloatArray<'py>, FloatArray<'py>, String)> {
     let photo = Given::from_argument("image", image)?;
-    let screen = ScreenArgument::new(screen)?;
-    let matte =
-        |name, matte: Option<Bound<'py, PyAny>>| matte.map(|m| matte_of(name, &m)).transpose();
-    let (garbage, core) = (matte("garbage", garbage)?, matte("core", core)?);
-    let options = parse("options", options).map_err(to_python)?;
-    let keyed = work::run(py, move || {
-        let (color, plate) = screen.decoded()?;
-        let known = Known {
-            color,
-            plate,
-            garbage,
-            core,
-            options,
-        };
-        keyed(&photo.decoded("image")?, &known)
-    })?;
+    let known = Known {
+        screen: ScreenArgument::new(screen)?,
+        garbage: garbage.map(|m| matte_of("garbage", &m)).transpose()?,
+        core: core.map(|m| matte_of("core", &m)).transpose()?,
+        options: parse("options", options).map_err(to_python)?,
+    };
+    let keyed = work::run(py, move || known.keyed(photo))?;
     let changed = deviations_json(&keyed.deviations);
-    Ok((
-        to_array(py, keyed.matte)?,
-        to_array(py, keyed.cutout)?,
-        changed,
-    ))
+    let matte = to_array(py, keyed.matte)?;
+    Ok((matte, to_array(py, keyed.cutout)?, changed))
+}
+
+/// What a keyer is given beside the photo.
+struct Known {
+    screen: ScreenArgument,
+    garbage: Option<Image<Coverage>>,
+    core: Option<Image<Coverage>>,
+    options: KeyOptions,
+}
+
+impl Known {
+    fn keyed(mut self, photo: Given) -> Result<Keyed> {
+        let plate = self.screen.take_plate()?;
+        let color = Screen::Color(self.screen.color());
+        let screen = plate.as_ref().map_or(color, Screen::Plate);
+        match photo.decoded("image")? {
+            Photo::Rgb(pixels) => self.run(Keying::of_view(pixels.view(), screen)),
+            Photo::Rgba(pixels) => self.run(Keying::of_view(pixels.view(), screen)),
+        }
+    }
+
+    fn run<'a, P: matte::key::Photo>(&'a self, mut keying: Keying<'a, P>) -> Result<Keyed> {
+        if let Some(garbage) = &self.garbage {
+            keying = keying.with_garbage(garbage);
+        }
+        if let Some(core) = &self.core {
+            keying = keying.with_core(core);
+        }
+        keying.run(&self.options)
+    }
 }
 
 /// A colour, or a photo of the screen.
@@ -77,35 +86,20 @@ impl ScreenArgument {
         }
     }
 
-    fn decoded(self) -> Result<(LinearRgb, Option<Image<LinearRgb>>)> {
+    fn color(&self) -> LinearRgb {
         match self {
-            Self::Color(color) => Ok((color.into(), None)),
-            Self::Plate(plate) => {
-                let plate = plate.decoded("screen")?.into_opaque("screen")?;
-                Ok((LinearRgb::BLACK, Some(plate)))
-            }
+            Self::Color(color) => LinearRgb::from(*color),
+            Self::Plate(_) => LinearRgb::BLACK,
         }
     }
-}
 
-fn keyed(photo: &Photo, known: &Known) -> Result<Keyed> {
-    match photo {
-        Photo::Rgb(pixels) => keyed_pixels(pixels, known),
-        Photo::Rgba(pixels) => keyed_pixels(pixels, known),
+    /// The photo of the screen, where there is one.
+    fn take_plate(&mut self) -> Result<Option<Image<LinearRgb>>> {
+        match std::mem::replace(self, Self::Color(self.color().channels())) {
+            Self::Color(_) => Ok(None),
+            Self::Plate(plate) => plate.decoded("screen")?.into_opaque("screen").map(Some),
+        }
     }
-}
-
-fn keyed_pixels<P: Floats + matte::key::Photo>(pixels: &Pixels<P>, known: &Known) -> Result<Keyed> {
-    let color = Screen::Color(known.color);
-    let screen = known.plate.as_ref().map_or(color, Screen::Plate);
-    let mut keying = Keying::of_view(pixels.view(), screen);
-    if let Some(garbage) = &known.garbage {
-        keying = keying.with_garbage(garbage);
-    }
-    if let Some(core) = &known.core {
-        keying = keying.with_core(core);
-    }
-    keying.run(&known.options)
 }
 
 fn deviations_json(deviations: &Deviations) -> String {
@@ -127,18 +121,25 @@ pub(crate) fn cut_out<'py>(
     options: &str,
 ) -> PyResult<(FloatArray<'py>, FloatArray<'py>, String)> {
     let photo = Given::from_argument("image", image)?;
-    let empty = empty
-        .map(|e| Given::from_argument("empty", &e))
-        .transpose()?;
+    let empty = empty.map(|e| Given::from_argument("empty", &e));
+    let empty = empty.transpose()?;
     let options: CutOutOptions = parse("options", options).map_err(to_python)?;
-    let (rgba, transmittance, record) = work::run(py, move || {
-        let photo = photo.decoded("image")?.into_opaque("image")?;
-        let empty = empty.map(|e| e.decoded("empty")?.into_opaque("empty"));
-        let cut = matte::cut_out_on(&photo, empty.transpose()?.as_ref(), &options)?;
-        let record = text(&cut_out_record(&cut))?;
-        Ok((cut.to_rgba(), cut.transmittance, record))
+    let (rgba, cut) = work::run(py, move || {
+        let cut = cut_out_of(photo, empty, &options)?;
+        Ok((cut.to_rgba(), cut))
     })?;
-    Ok((to_array(py, rgba)?, to_array(py, transmittance)?, record))
+    let record = text(&cut_out_record(&cut)).map_err(to_python)?;
+    Ok((
+        to_array(py, rgba)?,
+        to_array(py, cut.transmittance)?,
+        record,
+    ))
+}
+
+fn cut_out_of(photo: Given, empty: Option<Given>, options: &CutOutOptions) -> Result<CutOut> {
+    let photo = photo.decoded("image")?.into_opaque("image")?;
+    let empty = empty.map(|e| e.decoded("empty")?.into_opaque("empty"));
+    matte::cut_out_on(&photo, empty.transpose()?.as_ref(), options)
 }
 
 fn cut_out_record(cut: &CutOut) -> serde_json::Value {

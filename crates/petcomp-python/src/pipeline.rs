@@ -2,9 +2,10 @@
 
 use crate::document::text;
 use crate::errors::{closed, to_python};
+use crate::lock::locked;
 use crate::sample::{Policy, Sample};
 use crate::scene::{config_of, scene_of};
-use crate::work::{self, locked};
+use crate::work;
 use petcomp::dataset::{self, DatasetConfig};
 use petcomp::io::Override;
 use petcomp::{Quality, Result, Scene};

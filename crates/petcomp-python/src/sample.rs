@@ -3,7 +3,8 @@
 use crate::arrays::{Given, matte_of, to_array};
 use crate::document::text;
 use crate::errors::{internal, to_python, wrong_value};
-use crate::work::{self, locked};
+use crate::lock::locked;
+use crate::work;
 use numpy::ndarray::Array2;
 use numpy::{PyArray2, PyArrayDyn};
 use petcomp::dataset::{self, Extent, LabelledObject, Obstructed, Provenance};

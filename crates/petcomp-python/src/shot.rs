@@ -1,6 +1,6 @@
 //! A picture from what is in memory: cards over a plate.
 
-use crate::arrays::{Given, Photo};
+use crate::arrays::Given;
 use crate::camera::Camera;
 use crate::document::parse;
 use crate::errors::{to_python, wrong_value};
@@ -12,7 +12,7 @@ use petcomp::dataset::{self, LabelConfig};
 use petcomp::geom::{Pose, Quad, Vector3};
 use petcomp::render::{self, RenderOptions};
 use petcomp::scene::{AreaLight, Card};
-use petcomp::{Error, LinearRgb, ObjectId, PremulRgba, Result, Shot, composite, label};
+use petcomp::{Error, Image, LinearRgb, ObjectId, PremulRgba, Result, Shot, composite, label};
 use pyo3::prelude::*;
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -46,11 +46,7 @@ pub(crate) fn render_shot(
     let plate = plate
         .map(|p| Given::from_argument("plate", &p))
         .transpose()?;
-    let textures: PyResult<Vec<Given>> = textures
-        .iter()
-        .map(|t| Given::from_argument("texture", t))
-        .collect();
-    let textures = textures?;
+    let textures = pictures_of(&textures)?;
     let settings: Settings = parse("shot", settings).map_err(to_python)?;
     check_places(&places, textures.len(), &settings)?;
     let policy = settings.policy();
@@ -59,6 +55,13 @@ pub(crate) fn render_shot(
         Ok(settings.sample(&shot))
     })?;
     Ok(Sample::new(sample, policy))
+}
+
+fn pictures_of(textures: &[Bound<'_, PyAny>]) -> PyResult<Vec<Given>> {
+    let textures = textures.iter();
+    textures
+        .map(|texture| Given::from_argument("texture", texture))
+        .collect()
 }
 
 fn check_places(places: &[Place], textures: usize, settings: &Settings) -> PyResult<()> {
@@ -153,36 +156,33 @@ fn with_plate(shot: Shot, plate: Given) -> Result<Shot> {
 }
 
 fn card_of((id, class, size, position, rotation): Place, texture: Given) -> Result<Card> {
-    check_numbers(
-        "size",
-        &size,
-        |side| (LEAST_SIDE_M..=MOST_SIDE_M).contains(&side),
-        "0.000001 to 1000 (metres)",
-    )?;
-    check_numbers(
-        "position",
-        &position,
-        |p| p.abs() <= MOST_SIDE_M,
-        "within 1000 metres",
-    )?;
-    let texture: petcomp::Image<PremulRgba> = match texture.decoded("texture")? {
-        Photo::Rgb(pixels) => Photo::Rgb(pixels).into_premul(),
-        Photo::Rgba(pixels) => pixels.into_image(),
-    };
-    if let Some(bad) = texture.pixels().iter().find(|pixel| !pixel.is_sound()) {
-        return Err(Error::value(
-            "texture",
-            format!("alpha {}, expected 0 to 1", bad.a),
-        ));
-    }
-    let pose = Pose::from_parts(Vector3::from(position).into(), rotation_of(&rotation)?);
+    check_place(&size, &position)?;
     let quad = Quad {
-        world_from_card: pose,
+        world_from_card: Pose::from_parts(Vector3::from(position).into(), rotation_of(&rotation)?),
         size,
     };
-    let mut card = Card::new(ObjectId(id), quad, texture);
-    card.class = class;
-    Ok(card)
+    Ok(Card {
+        class,
+        ..Card::new(ObjectId(id), quad, texture_of(texture)?)
+    })
+}
+
+fn check_place(size: &[f64; 2], position: &[f64; 3]) -> Result<()> {
+    let is_side = |side| (LEAST_SIDE_M..=MOST_SIDE_M).contains(&side);
+    check_numbers("size", size, is_side, "0.000001 to 1000 (metres)")?;
+    let is_near = |place: f64| place.abs() <= MOST_SIDE_M;
+    check_numbers("position", position, is_near, "within 1000 metres")
+}
+
+fn texture_of(texture: Given) -> Result<Image<PremulRgba>> {
+    let texture = texture.decoded("texture")?.into_premul();
+    match texture.pixels().iter().find(|pixel| !pixel.is_sound()) {
+        None => Ok(texture),
+        Some(bad) => Err(Error::value(
+            "texture",
+            format!("alpha {}, expected 0 to 1", bad.a),
+        )),
+    }
 }
 
 const LEAST_SIDE_M: f64 = 1e-6;

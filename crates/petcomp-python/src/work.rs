@@ -6,12 +6,13 @@
 //! side is called outside of a job: rayon's own pool would not be there.
 
 use crate::errors::{internal, to_python};
+use crate::lock::locked;
 use crate::messages;
 use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// How often signals, messages and progress are looked for.
@@ -42,11 +43,6 @@ pub(crate) fn set_threads(count: usize) -> PyResult<()> {
     }
     THREADS.store(count, Ordering::Relaxed);
     Ok(())
-}
-
-/// A lock, whatever became of who held it before.
-pub(crate) fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// What a job leaves for the thread that waits for it.
@@ -148,19 +144,29 @@ fn give_back(pool: IdlePool) {
 }
 
 fn idle_pool() -> PyResult<IdlePool> {
-    let (process, threads) = (std::process::id(), THREADS.load(Ordering::Relaxed));
+    let threads = THREADS.load(Ordering::Relaxed);
+    match take_idle_pool(std::process::id(), threads) {
+        Some(pool) => Ok(pool),
+        None => new_pool(threads),
+    }
+}
+
+/// A pool of this process with so many threads that nobody uses.
+fn take_idle_pool(process: u32, threads: usize) -> Option<IdlePool> {
     let mut idle = locked(&IDLE_POOLS);
     if idle.iter().any(|pool| pool.process != process) {
         // Those of the process that this one was forked from: nobody is there to end them.
         idle.drain(..).for_each(std::mem::forget);
     }
-    if let Some(place) = idle.iter().position(|pool| pool.threads == threads) {
-        return Ok(idle.swap_remove(place));
-    }
+    let place = idle.iter().position(|pool| pool.threads == threads)?;
+    Some(idle.swap_remove(place))
+}
+
+fn new_pool(threads: usize) -> PyResult<IdlePool> {
     let pool = ThreadPoolBuilder::new().num_threads(threads).build();
     let pool = pool.map_err(|e| to_python(petcomp::Error::value("threads", e)))?;
     Ok(IdlePool {
-        process,
+        process: std::process::id(),
         threads,
         pool,
     })

@@ -7,6 +7,8 @@ import numpy as np
 import numpy.typing as npt
 
 _Float = npt.NDArray[np.float32]
+_Question = tuple[Sequence[str], int, int]
+_Target = tuple[str, int, int, int | None, Sequence[int] | None]
 _Place = tuple[int, int | None, Sequence[float], Sequence[float], Sequence[Sequence[float]]]
 
 __all__ = [
@@ -105,36 +107,24 @@ def check_scene(json: str) -> str: ...
 def cut_out(
     image: npt.NDArray[Any], empty: npt.NDArray[Any] | None, options: str
 ) -> tuple[_Float, _Float, str]: ...
-def evaluate_boxes(
-    sheets: Sequence[Any], classes: Sequence[str], rounds: int, seed: int
-) -> str: ...
+def evaluate_boxes(sheets: Sequence[Any], question: _Question) -> str: ...
 def evaluate_files(
     predictions: str,
     truth: str,
-    classes: Sequence[str],
     size: Sequence[int] | None,
     output: str | None,
-    rounds: int,
-    seed: int,
+    question: _Question,
 ) -> str: ...
 def generate_from(
     pipeline: Pipeline,
-    folder: str,
-    count: int,
-    seed: int,
-    only: int | None,
-    shard: Sequence[int] | None,
+    target: _Target,
     progress: Callable[[int, int, int], object] | None,
 ) -> str: ...
 def generate_with(
     make: Callable[[int], Sample],
     classes: Sequence[str],
     layout: Sequence[str],
-    folder: str,
-    count: int,
-    seed: int,
-    only: int | None,
-    shard: Sequence[int] | None,
+    target: _Target,
     progress: Callable[[int, int, int], object] | None,
 ) -> str: ...
 def key(

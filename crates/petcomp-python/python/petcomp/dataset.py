@@ -89,28 +89,23 @@ def generate(
     shares = None if shard is None else [_number("shard", number) for number in shard]
     if shares is not None and len(shares) != 2:
         raise InvalidValueError(f"shard: {shard}, expected two numbers")
-    place = (
-        path_of("folder", folder),
-        _number("count", count),
-        None if only is None else _number("only", only),
-        shares,
-        report,
-    )
+    target = path_of("folder", folder), _number("count", count)
+    part = None if only is None else _number("only", only), shares
     if callable(source) and not isinstance(source, (Mapping, Pipeline)):
-        layout = [dumped("labels", labels or {}), dumped("pictures", pictures or {}), dumped("split", split or {})]
-        return _counts(_with(source, classes, layout, _number("seed", seed or 0), place))
+        tables = {"labels": labels, "pictures": pictures, "split": split}
+        layout = [dumped(name, table or {}) for name, table in tables.items()]
+        number = _number("seed", seed or 0)
+        return _counts(_with(source, classes, layout, (*target, number, *part), report))
     if labels is not None or pictures is not None or split is not None or classes is not None:
         raise InvalidValueError("classes, labels, pictures, split: are those of the recipe; set changes them")
     pipeline = _opened(source, seed, set, quality)
     number = pipeline.seed if seed is None else _number("seed", seed)
-    target, total, one, part, told = place
-    return _counts(_petcomp.generate_from(pipeline._native, target, total, number, one, part, told))
+    return _counts(_petcomp.generate_from(pipeline._native, (*target, number, *part), report))
 
 
-def _with(make: Any, classes: Sequence[str] | None, layout: list[str], seed: int, place: Any) -> str:
+def _with(make: Any, classes: Sequence[str] | None, layout: list[str], target: Any, report: Any) -> str:
     if classes is None:
         raise ArgumentTypeError("classes: missing, expected the names of the classes")
-    target, total, one, part, told = place
 
     def native(k: int) -> _petcomp.Sample:
         sample = make(k)
@@ -118,7 +113,7 @@ def _with(make: Any, classes: Sequence[str] | None, layout: list[str], seed: int
             return sample._native
         raise ArgumentTypeError(f"source: returned {type(sample).__name__} for {k}, expected a Sample")
 
-    return _petcomp.generate_with(native, list(classes), layout, target, total, seed, one, part, told)
+    return _petcomp.generate_with(native, list(classes), layout, target, report)
 
 
 def _opened(source: Any, seed: int | None, set: Mapping[str, Any] | None, quality: str | None) -> Pipeline:

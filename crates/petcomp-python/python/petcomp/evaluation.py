@@ -80,10 +80,10 @@ def evaluate(
         shape = None if size is None else [_number("size", side) for side in size]
         place = None if output is None else path_of("output", output)
         paths = path_of("predictions", predictions), path_of("truth", truth)
-        text = _petcomp.evaluate_files(*paths, list(classes), shape, place, rounds, seed)
+        text = _petcomp.evaluate_files(*paths, shape, place, (list(classes), rounds, seed))
     else:
         sheets = _sheets(predictions, truth)
-        text = _petcomp.evaluate_boxes(sheets, list(classes), rounds, seed)
+        text = _petcomp.evaluate_boxes(sheets, (list(classes), rounds, seed))
     record = loaded(text)
     return Metrics(record["metrics"], record["classes"])
 
