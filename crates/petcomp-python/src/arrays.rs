@@ -1,12 +1,10 @@
 //! Arrays of NumPy as pictures, and pictures as arrays.
 
 use crate::errors::{wrong_type, wrong_value};
-use crate::foreign::Foreign;
+use crate::foreign::{Foreign, foreign};
 use bytemuck::Pod;
 use numpy::ndarray::{ArrayD, IxDyn};
-use numpy::{
-    Element, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods,
-};
+use numpy::{Element, PyArrayDescrMethods, PyArrayDyn, PyUntypedArray, PyUntypedArrayMethods};
 use petcomp::color::{decode_row, decode_srgb8};
 use petcomp::{
     Coverage, Error, Image, ImageView, LinearRgb, PremulRgba, Result, Srgb8, Srgba8, StraightRgba,
@@ -213,24 +211,6 @@ fn check_size(name: &str, [width, height]: [usize; 2]) -> PyResult<()> {
         "{width} x {height} pixels, expected at least 1 x 1 and at most {LONGEST_SIDE} a side and {MOST_PIXELS} in all"
     );
     Err(wrong_value(name, what))
-}
-
-/// The pixels of an array of numbers where they are; where they do not lie row by row, those of a
-/// copy.
-#[allow(unsafe_code, reason = "the layout is asked for just before")]
-fn foreign<T: Element, P: Pod>(
-    array: &Bound<'_, PyUntypedArray>,
-    size: [usize; 2],
-) -> PyResult<Foreign<P>> {
-    let py = array.py();
-    let plain = py
-        .import("numpy")?
-        .call_method1("require", (array, numpy::dtype::<T>(py), ["C", "A"]))?;
-    let plain = plain.cast_into::<PyArrayDyn<T>>()?;
-    let first = plain.data().cast::<P>().cast_const();
-    // SAFETY: NumPy was asked for contiguous, aligned numbers, and `P` is made of as many of them as
-    // the last axis has.
-    Ok(unsafe { Foreign::new(plain.into_any().unbind(), first, size) })
 }
 
 fn copied<P: Pod>(view: ImageView<'_, P>) -> Image<P> {

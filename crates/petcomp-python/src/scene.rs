@@ -2,10 +2,12 @@
 
 use crate::document::{parse, text};
 use crate::errors::to_python;
+use crate::work;
 use petcomp::dataset::DatasetConfig;
 use petcomp::scene::{CameraSource, Surface};
-use petcomp::{Camera, Result, Scene};
+use petcomp::{Camera, Result, Scene, io};
 use pyo3::prelude::*;
+use std::path::PathBuf;
 
 /// A scene as it is read, every default told that is not left out in files.
 #[pyfunction]
@@ -13,6 +15,23 @@ pub(crate) fn check_scene(json: &str) -> PyResult<String> {
     scene_of(json)
         .and_then(|scene| text(&scene))
         .map_err(to_python)
+}
+
+/// A scene of a file, TOML or JSON.
+#[pyfunction]
+pub(crate) fn read_scene(py: Python<'_>, path: PathBuf) -> PyResult<String> {
+    work::run(py, move || {
+        let scene: Scene = io::read_document(&path)?;
+        scene.check().map_err(|e| e.in_file(&path))?;
+        text(&scene)
+    })
+}
+
+/// A scene to a file, TOML or JSON by its name.
+#[pyfunction]
+pub(crate) fn write_scene(py: Python<'_>, path: PathBuf, json: &str) -> PyResult<()> {
+    let scene = scene_of(json).map_err(to_python)?;
+    work::run(py, move || io::write_document(path, &scene))
 }
 
 pub(crate) fn scene_of(json: &str) -> Result<Scene> {

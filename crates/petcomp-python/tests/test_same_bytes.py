@@ -100,6 +100,18 @@ def test_take_renders_what_was_drawn(recipe):
     assert petcomp.Scene.from_dict(solved.to_dict()) == solved
 
 
+@pytest.mark.parametrize("name", ["scene.toml", "scene.json"])
+def test_scenes_are_the_programs_files(recipe, tmp_path, program, name):
+    program("scene", "draw", recipe, "-k", 1, "-o", tmp_path / name)
+    scene = petcomp.Scene.read(tmp_path / name)
+    drawn = petcomp.Pipeline(recipe).draw(1)
+    assert scene.replace(files=None, settings={}) == drawn.replace(files=None, settings={})
+    scene.write(tmp_path / f"again-{name}")
+    assert petcomp.Scene.read(tmp_path / f"again-{name}") == scene
+    with pytest.raises(petcomp.errors.FileError, match="no such file"):
+        petcomp.Scene.read(tmp_path / "none.toml")
+
+
 def test_a_recipe_may_be_plain_data(recipe):
     document = petcomp.Pipeline(recipe).config
     document.pop("folder", None)

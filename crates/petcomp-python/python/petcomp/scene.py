@@ -10,7 +10,6 @@ from typing import Any
 from . import _petcomp
 from ._documents import dumped, loaded, path_of
 from .camera import Camera
-from .errors import FileError
 
 __all__ = ["Scene"]
 
@@ -47,19 +46,14 @@ class Scene:
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> Scene:
-        """From a scene file in JSON."""
-        path = path_of("path", path)
-        try:
-            with open(path, encoding="utf-8") as file:
-                document = json.load(file)
-        except (OSError, ValueError) as error:
-            raise FileError(f"{path}: {error}") from None
-        return cls.from_dict(document)
+        """From a scene file, TOML or JSON."""
+        scene = cls.__new__(cls)
+        scene._fields = loaded(_petcomp.read_scene(path_of("path", path)))
+        return scene
 
     def write(self, path: str | os.PathLike[str]) -> None:
-        """To a scene file in JSON."""
-        with open(path_of("path", path), "w", encoding="utf-8") as file:
-            json.dump(self._fields, file, indent=1)
+        """To a scene file, TOML or JSON by its name."""
+        _petcomp.write_scene(path_of("path", path), dumped("scene", self._fields))
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data, as scene files have it; the caller's to change."""
