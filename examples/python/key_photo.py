@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """A photo on a green screen becomes a cut-out, in two ways.
 
-    key_photo.py PHOTO FOLDER
+key_photo.py PHOTO FOLDER
 """
 
 import sys

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Pictures of a generator of your own, written as a dataset that trainers read: here, one leaning card each.
 
-    own_generator.py FOLDER
+own_generator.py FOLDER
 """
 
 import sys

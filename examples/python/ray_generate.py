@@ -45,7 +45,9 @@ def main():
     shards = sorted((folder / "shards").iterdir())
     program = [sys.executable, "-m", "petcomp"]
     subprocess.run([*program, "dataset", "merge", *shards, "-o", folder / "dataset", "-q"], check=True)
-    print(f"{folder / 'dataset'}: {count} pictures by {SHARDS} tasks, one of which was killed; the last runs made {made}")
+    print(
+        f"{folder / 'dataset'}: {count} pictures by {SHARDS} tasks, one of which was killed; the last runs made {made}"
+    )
 
 
 if __name__ == "__main__":

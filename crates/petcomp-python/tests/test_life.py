@@ -3,9 +3,7 @@
 import concurrent.futures
 import logging
 import multiprocessing
-import os
 import pickle
-import signal
 import subprocess
 import sys
 import threading
@@ -91,7 +89,8 @@ except KeyboardInterrupt:
     "work",
     [
         "petcomp.generate({recipe!r}, 100000, {folder!r})",
-        "p = petcomp.Pipeline({recipe!r}, set={{'scene.image': [3000, 3000], 'render.subsamples': 8}}); p[0]; p[1]; p[2]; p[3]",
+        "p = petcomp.Pipeline({recipe!r}, set={{'scene.image': [3000, 3000], 'render.subsamples': 8}})\n"
+        "    for k in range(9): p[k]",
         "p = petcomp.Pipeline({recipe!r}, set={{'scene.objects': 40}})\n    for k in range(10**6): p[k]",
     ],
 )
@@ -170,7 +169,9 @@ def test_warnings_reach_logging(caplog):
 def test_the_program_is_inside():
     done = subprocess.run([sys.executable, "-m", "petcomp", "--version"], capture_output=True, text=True)
     assert done.returncode == 0 and done.stdout == f"petcomp {petcomp.__version__}\n"
-    done = subprocess.run([sys.executable, "-m", "petcomp", "asset", "list", "/nowhere"], capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-m", "petcomp", "asset", "list", "/nowhere"], capture_output=True, text=True
+    )
     assert done.returncode == 4 and done.stderr.startswith("error: ")
 
 

@@ -27,7 +27,19 @@ def test_a_pixel_is_keyed_as_in_the_documentation():
 def test_key_is_the_programs(photo, tmp_path, program):
     screen = ",".join(map(str, GREEN))
     out, matte = tmp_path / "cut.exr", tmp_path / "matte.tif"
-    program("matte", "key", PHOTO, "--screen", screen, "--profile", "blender-4.5", "--set", "key.clip_black=0.1", "-o", tmp_path / "a.tif")
+    program(
+        "matte",
+        "key",
+        PHOTO,
+        "--screen",
+        screen,
+        "--profile",
+        "blender-4.5",
+        "--set",
+        "key.clip_black=0.1",
+        "-o",
+        tmp_path / "a.tif",
+    )
     keyed = petcomp.matte.key(photo, screen=GREEN, profile="blender-4.5", clip_black=0.1)
     petcomp.io.write(tmp_path / "b.tif", keyed.cutout)
     assert (tmp_path / "a.tif").read_bytes() == (tmp_path / "b.tif").read_bytes()
@@ -72,7 +84,9 @@ def test_codes_are_decoded_as_files_are(tmp_path):
 
 def test_a_plate_of_one_colour_is_that_colour(photo):
     plate = np.broadcast_to(np.array(GREEN, np.float32), photo.shape)
-    assert np.allclose(petcomp.matte.key(photo, screen=plate).matte, petcomp.matte.key(photo, screen=GREEN).matte, atol=1e-6)
+    assert np.allclose(
+        petcomp.matte.key(photo, screen=plate).matte, petcomp.matte.key(photo, screen=GREEN).matte, atol=1e-6
+    )
 
 
 def test_garbage_and_core_hold(photo):
@@ -145,7 +159,9 @@ def test_a_shot_is_rendered_and_labelled():
 
 
 def test_a_card_above_covers_the_one_below():
-    two = shot().with_card(petcomp.Card(id=2, texture=np.full((4, 4, 3), 200, np.uint8), size=(0.2, 0.1), position=(0, 0, 0.1)))
+    two = shot().with_card(
+        petcomp.Card(id=2, texture=np.full((4, 4, 3), 200, np.uint8), size=(0.2, 0.1), position=(0, 0, 0.1))
+    )
     sample = petcomp.render(two)
     assert sample.object_ids.tolist() == [2]
     kept = petcomp.render(petcomp.Shot(**{**vars(two), "labels": {"obstructed": "keep"}}))

@@ -56,7 +56,9 @@ def test_everything_public_has_help():
             thing = getattr(module, word)
             assert thing.__doc__, word
             if inspect.isclass(thing):
-                missing = [n for n, m in vars(thing).items() if not n.startswith("_") and needs_help(m) and not m.__doc__]
+                missing = [
+                    n for n, m in vars(thing).items() if not n.startswith("_") and needs_help(m) and not m.__doc__
+                ]
                 assert not missing, (word, missing)
 
 

@@ -84,9 +84,7 @@ class CutOut:
         return png(shown(self.rgba))
 
 
-def cut_out(
-    image: npt.NDArray[Any], *, empty: npt.NDArray[Any] | None = None, **options: Any
-) -> CutOut:
+def cut_out(image: npt.NDArray[Any], *, empty: npt.NDArray[Any] | None = None, **options: Any) -> CutOut:
     """Cuts the one object out of a photo on a uniform screen.
 
     ``image`` and ``empty`` (a photo of the empty screen): height x width x 3, float32 (scene-linear) or

@@ -167,9 +167,7 @@ def _class_number(value: Any) -> int:
     raise InvalidValueError(f"object_classes: {value!r}, expected numbers of classes from 0")
 
 
-def _draw_box(
-    image: npt.NDArray[np.uint8], box: npt.NDArray[np.float64], color: tuple[int, int, int]
-) -> None:
+def _draw_box(image: npt.NDArray[np.uint8], box: npt.NDArray[np.float64], color: tuple[int, int, int]) -> None:
     height, width = image.shape[:2]
     x0, y0 = max(int(box[0]), 0), max(int(box[1]), 0)
     x1, y1 = min(int(box[2]), width) - 1, min(int(box[3]), height) - 1
