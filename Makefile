@@ -154,7 +154,8 @@ wheel:
 	rm -rf target/wheel-out
 	python3 -m venv $(PACKAGE)/maturin && $(PACKAGE)/maturin/bin/pip install --quiet --retries 1 "maturin[zig]>=1.9,<2"
 	PATH="$(CURDIR)/$(PACKAGE)/maturin/bin:$$PATH" maturin build --locked --zig --compatibility manylinux_2_28 \
-	  --target $$(uname -m)-unknown-linux-gnu -m crates/petcomp-python/Cargo.toml --target-dir target/wheel -o target/wheel-out
+	  --target $$(uname -m)-unknown-linux-gnu -m crates/petcomp-python/Cargo.toml \
+	  --target-dir $(CURDIR)/target/wheel -o $(CURDIR)/target/wheel-out
 	@ls -l target/wheel-out
 	@test $$(stat -c %s target/wheel-out/*.whl) -le $$(($(MOST_WHEEL_MB) * 1000000))
 	@$(call pytest_of,target/wheel-out)
@@ -173,8 +174,9 @@ blender:
 
 # Installs the wheel of a folder into a fresh virtual environment, and tests it there.
 define pytest_of
-$(call install,python3-venv); rm -rf $(PACKAGE)/python; python3 -m venv $(PACKAGE)/python && \
-if $(PACKAGE)/python/bin/pip install --quiet --retries 1 $(1)/*.whl $(PYTEST); then \
+$(call install,python3-venv); rm -rf $(PACKAGE)/python; \
+if python3 -m venv $(PACKAGE)/python && $(PACKAGE)/python/bin/pip install --quiet --retries 1 $(PYTEST); then \
+  $(PACKAGE)/python/bin/pip install --quiet --no-index $(1)/*.whl && \
   $(PACKAGE)/python/bin/python -m pytest -q -rs -p no:cacheprovider crates/petcomp-python/tests; \
 else \
   echo "$(PYTEST) cannot be installed: the package for Python is not tested"; \
