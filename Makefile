@@ -4,6 +4,8 @@
 #
 # make experiment   whether the data teaches a detector: see experiments/README.md; make world makes its reality,
 #                   make experiment-smoke runs all of it with tiny sizes
+# make wheel   the package for Python, in target/wheel-out: one wheel for every Python from 3.10, built by maturin and zig
+#
 # make soak   100,000 damaged pictures; make fuzz   each reader of text and headers, a minute each
 
 CARGO     := cargo
@@ -17,6 +19,11 @@ PYTHON    := $(CURDIR)/target/python/bin/python
 # What Blender's module for Python links.
 BPY       := python3-venv libgl1 libsm6 libxi6 libxkbcommon0 libxrender1
 WORLD     := experiments/cache/world
+# What the package for Python is tested with, in a virtual environment of its own.
+PACKAGE   := target/package
+PYTEST    := numpy pytest hypothesis mypy nbclient nbformat ipykernel
+# A manylinux wheel must not be larger.
+MOST_WHEEL_MB := 15
 BENCHES   := $(notdir $(basename $(wildcard tests/benches/*.rs)))
 # Each set of features that stands alone; the first, empty one is the matte without a C++ compiler.
 FEATURES  := "" pipeline markers oiio settle
@@ -30,19 +37,20 @@ PEERS        := blender python3-numpy python3-venv openimageio-tools ffmpeg
 PEERS_PYTHON := numpy OpenEXR opencv-python-headless pymatting pybullet pycocotools
 CORE         := 0
 
-.PHONY: world experiment experiment-smoke peers demo test examples lint bench golden formats python packages blender soak soak-dataset fuzz
+.PHONY: python-package wheel world experiment experiment-smoke peers demo test examples lint bench golden formats python packages blender soak soak-dataset fuzz
 
 demo: packages
 	$(CARGO) build --release --locked -p petcomp-cli
 	target/release/petcomp demo -o $(OUT)
 
 test: packages python
-	PETCOMP_PYTHON=$(PYTHON) $(CARGO) test --release --locked
+	PETCOMP_PYTHON=$(PYTHON) $(CARGO) test --release --locked --workspace
 	@for f in $(FEATURES); do \
 	  echo "features [$$f] alone"; \
 	  $(CARGO) check --release --locked -p petcomp --no-default-features --features "$$f" --lib --tests --quiet || exit 1; \
 	done
 	$(MAKE) examples
+	$(MAKE) python-package
 	experiments/run --smoke
 
 # The reality of the experiments; it goes on where it stopped.
@@ -65,7 +73,7 @@ experiment-smoke: packages
 # Every program in examples/, the last one on two scenes of the sample recipe. They are built with the tests, whose
 # features the library then has already.
 examples: packages
-	$(CARGO) test --release --locked --no-run --quiet
+	$(CARGO) test --release --locked --workspace --no-run --quiet
 	rm -rf $(EXAMPLES) && mkdir -p $(EXAMPLES)
 	target/release/examples/cut_out tests/samples/bottles/b0002_0.png $(EXAMPLES)/cut_out.exr
 	target/release/examples/key_like_blender
@@ -102,7 +110,7 @@ fuzz: packages
 
 lint: packages
 	$(CARGO) fmt --check
-	$(CARGO) clippy --release --locked --all-targets -- -D warnings
+	$(CARGO) clippy --release --locked --workspace --all-targets -- -D warnings
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --release --locked --no-deps --lib -p petcomp
 
 # Only the tests that ask the programs that datasets are written for, and what those say.
@@ -133,6 +141,25 @@ peers: packages
 golden: blender
 	golden/make.sh
 
+# The tests of the package for Python, on the extension that was built with all other tests, packed as a wheel and
+# installed into a fresh virtual environment. What cannot be installed is said, and its tests are skipped.
+python-package: packages
+	$(CARGO) test --release --locked --workspace --no-run --quiet
+	python3 crates/petcomp-python/pack.py target/release/deps/lib_petcomp.so $(PACKAGE)/wheel
+	@$(call pytest_of,$(PACKAGE)/wheel)
+
+# Compiles everything once more, for an old system (manylinux_2_28) and without OpenImageIO.
+wheel:
+	@$(call install,python3-venv)
+	rm -rf target/wheel-out
+	python3 -m venv $(PACKAGE)/maturin && $(PACKAGE)/maturin/bin/pip install --quiet --retries 1 "maturin[zig]>=1.9,<2"
+	PATH="$(CURDIR)/$(PACKAGE)/maturin/bin:$$PATH" maturin build --locked --zig --compatibility manylinux_2_28 \
+	  --target $$(uname -m)-unknown-linux-gnu -m crates/petcomp-python/Cargo.toml \
+	  --target-dir $(CURDIR)/target/wheel -o $(CURDIR)/target/wheel-out
+	@ls -l target/wheel-out
+	@test $$(stat -c %s target/wheel-out/*.whl) -le $$(($(MOST_WHEEL_MB) * 1000000))
+	@$(call pytest_of,target/wheel-out)
+
 # pycocotools and webdataset, for the tests that ask them; where they cannot be had the tests say so and pass.
 python:
 	@[ -x $(PYTHON) ] || { ($(call install,python3-venv)) && python3 -m venv target/python && \
@@ -144,6 +171,17 @@ packages:
 
 blender:
 	@$(call install,$(BLENDER))
+
+# Installs the wheel of a folder into a fresh virtual environment, and tests it there.
+define pytest_of
+$(call install,python3-venv); rm -rf $(PACKAGE)/python; \
+if python3 -m venv $(PACKAGE)/python && $(PACKAGE)/python/bin/pip install --quiet --retries 1 $(PYTEST); then \
+  $(PACKAGE)/python/bin/pip install --quiet --no-index $(1)/*.whl && \
+  $(PACKAGE)/python/bin/python -m pytest -q -rs -p no:cacheprovider crates/petcomp-python/tests; \
+else \
+  echo "$(PYTEST) cannot be installed: the package for Python is not tested"; \
+fi
+endef
 
 # Installs what dpkg does not list as installed, and says so.
 define install

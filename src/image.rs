@@ -15,6 +15,61 @@ pub struct Image<P> {
     pixels: Vec<P>,
 }
 
+/// Pixels in somebody else's memory, row by row from the top: a picture that need not be copied to be read.
+#[doc(hidden)]
+#[derive(Debug)]
+pub struct ImageView<'a, P> {
+    width: usize,
+    height: usize,
+    pixels: &'a [P],
+}
+
+impl<P> Clone for ImageView<'_, P> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<P> Copy for ImageView<'_, P> {}
+
+impl<'a, P> ImageView<'a, P> {
+    /// # Panics
+    /// When `pixels.len() != width * height`.
+    pub fn new(width: usize, height: usize, pixels: &'a [P]) -> Self {
+        assert_eq!(
+            Some(pixels.len()),
+            width.checked_mul(height),
+            "pixel count does not match {width} x {height}"
+        );
+        Self {
+            width,
+            height,
+            pixels,
+        }
+    }
+
+    /// Number of columns.
+    #[inline(always)]
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// `(width, height)`.
+    #[inline(always)]
+    pub fn size(&self) -> (usize, usize) {
+        (self.width, self.height)
+    }
+
+    /// One row.
+    ///
+    /// # Panics
+    /// When `y >= height`.
+    #[inline(always)]
+    pub fn row(&self, y: usize) -> &'a [P] {
+        &self.pixels[y * self.width..][..self.width]
+    }
+}
+
 /// Yes or no for every pixel; [`RleMask`](crate::label::RleMask) is what label files hold of one.
 pub type Mask = Image<bool>;
 
@@ -145,6 +200,16 @@ impl<P: Copy> Image<P> {
     #[inline(always)]
     pub fn pixels_mut(&mut self) -> &mut [P] {
         &mut self.pixels
+    }
+
+    /// The same pixels, to be read.
+    #[doc(hidden)]
+    pub fn view(&self) -> ImageView<'_, P> {
+        ImageView {
+            width: self.width,
+            height: self.height,
+            pixels: &self.pixels,
+        }
     }
 
     /// The pixels without the picture.

@@ -105,6 +105,8 @@ pub use diagnostic::{Code, Diagnostic, Severity};
 #[doc(hidden)]
 pub use error::printable;
 pub use error::{Error, Result};
+#[doc(hidden)]
+pub use image::ImageView;
 pub use image::{Image, Mask, Roi};
 #[doc(hidden)]
 pub use pixel::Mix;

@@ -12,7 +12,6 @@ use std::ffi::OsString;
 use std::fmt::Display;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 
 /// Exit status: 0 match, 1 warning, 2 failure, 3 not comparable, 4 a picture cannot be read.
 #[derive(clap::Args)]
@@ -100,7 +99,7 @@ fn with_two_dashes(word: OsString) -> OsString {
     }
 }
 
-pub(crate) fn run(args: &DiffArgs, global: &GlobalArgs) -> anyhow::Result<ExitCode> {
+pub(crate) fn run(args: &DiffArgs, global: &GlobalArgs) -> anyhow::Result<u8> {
     let pair = match PicturePair::read(args) {
         Ok(pair) => pair,
         Err(error) => return Ok(exit_unreadable(&error)),
@@ -111,12 +110,12 @@ pub(crate) fn run(args: &DiffArgs, global: &GlobalArgs) -> anyhow::Result<ExitCo
     }
     print_comparison(args, &report, global);
     pair.print_likeness(global);
-    Ok(ExitCode::from(report.verdict.exit_code()))
+    Ok(report.verdict.exit_code())
 }
 
-fn exit_unreadable(error: &impl Display) -> ExitCode {
+fn exit_unreadable(error: &impl Display) -> u8 {
     print::aside(format_args!("error: {error}"));
-    ExitCode::from(Verdict::Unreadable.exit_code())
+    Verdict::Unreadable.exit_code()
 }
 
 fn print_comparison(args: &DiffArgs, report: &Comparison, global: &GlobalArgs) {

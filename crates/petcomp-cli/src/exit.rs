@@ -3,8 +3,8 @@
 use crate::batch::Incomplete;
 use crate::print;
 use std::fmt;
-use std::process::ExitCode;
 
+pub(crate) const SUCCESS_STATUS: u8 = 0;
 const NEEDS_REVIEW_STATUS: u8 = 1;
 const INCOMPLETE_STATUS: u8 = 2;
 const DATA_STATUS: u8 = 3;
@@ -24,9 +24,9 @@ impl fmt::Display for NeedsReview {
 impl std::error::Error for NeedsReview {}
 
 /// Prints an error and its causes in one line and gives the exit status.
-pub(crate) fn report_error(error: &anyhow::Error) -> ExitCode {
+pub(crate) fn report_error(error: &anyhow::Error) -> u8 {
     print::aside(format_args!("error: {error:#}"));
-    ExitCode::from(status_of(error))
+    status_of(error)
 }
 
 /// 1 where `--strict` found something to review, 2 where some of many files could not be used, 3

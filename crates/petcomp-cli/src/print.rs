@@ -3,7 +3,6 @@
 use petcomp::{Error, printable};
 use std::fmt::Display;
 use std::io::{ErrorKind, Write};
-use std::process::ExitCode;
 
 /// The status of a program that SIGPIPE ended.
 const BROKEN_PIPE_STATUS: i32 = 141;
@@ -24,15 +23,15 @@ pub(crate) fn aside(line: impl Display) {
 }
 
 /// Clap's message, help or a wrong command line, and the exit status that goes with it.
-pub(crate) fn usage(message: &clap::Error) -> ExitCode {
+pub(crate) fn usage(message: &clap::Error) -> u8 {
     match print_usage(message) {
         Err(error) if !message.use_stderr() => exit_unwritable(&error),
         _ => usage_exit_code(message),
     }
 }
 
-fn usage_exit_code(message: &clap::Error) -> ExitCode {
-    u8::try_from(message.exit_code()).unwrap_or(u8::MAX).into()
+fn usage_exit_code(message: &clap::Error) -> u8 {
+    u8::try_from(message.exit_code()).unwrap_or(u8::MAX)
 }
 
 /// With its colours, unless an argument brings some of its own.

@@ -9,7 +9,7 @@ use super::model::{Behaviour, Model, Robust};
 use super::options::{KeyOptions, Profile};
 use super::photo::Photo;
 use super::rows::{Rows, Source};
-use crate::image::Image;
+use crate::image::ImageView;
 use crate::pixel::PremulRgba;
 
 /// Code value 1.0.
@@ -89,7 +89,7 @@ fn usable_pixel(p: PremulRgba, careful: bool) -> PremulRgba {
 
 /// Rows of one colour difference, unit scale.
 struct Difference<'a, P> {
-    photo: &'a Image<P>,
+    photo: ImageView<'a, P>,
     careful: bool,
     weights: [f32; 3],
     behaviour: Behaviour,
@@ -155,7 +155,7 @@ fn recolored_row<P: Photo>(
 
 /// Rows of a photo whose chroma is blurred.
 pub(super) struct ChromaBlur<'a, P> {
-    photo: &'a Image<P>,
+    photo: ImageView<'a, P>,
     careful: bool,
     behaviour: Behaviour,
     blurred: [Source<'a>; 2],
@@ -163,7 +163,7 @@ pub(super) struct ChromaBlur<'a, P> {
 }
 
 impl<'a, P: Photo> ChromaBlur<'a, P> {
-    pub(super) fn new(photo: &'a Image<P>, options: &KeyOptions) -> Self {
+    pub(super) fn new(photo: ImageView<'a, P>, options: &KeyOptions) -> Self {
         let (behaviour, careful) = (
             options.profile.behaviour(),
             options.profile == Profile::Robust,

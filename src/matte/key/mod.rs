@@ -98,7 +98,7 @@ pub use options::{KeyOptions, Profile};
 pub use photo::Photo;
 
 use crate::error::{Error, Result};
-use crate::image::Image;
+use crate::image::{Image, ImageView};
 use crate::matte::check::check_size;
 use crate::pixel::{Coverage, LinearRgb, PremulRgba};
 use stream::{Plane, Stream, fit_size};
@@ -156,7 +156,7 @@ pub fn key(photo: &Image<LinearRgb>, screen: LinearRgb, options: &KeyOptions) ->
 /// A photo to key, its screen, and the mattes that are known of it.
 #[derive(Clone, Copy, Debug)]
 pub struct Keying<'a, P> {
-    photo: &'a Image<P>,
+    photo: ImageView<'a, P>,
     screen: Screen<'a>,
     garbage: Option<&'a Image<Coverage>>,
     core: Option<&'a Image<Coverage>>,
@@ -165,6 +165,12 @@ pub struct Keying<'a, P> {
 impl<'a, P: Photo> Keying<'a, P> {
     /// A photo before a screen.
     pub fn new(photo: &'a Image<P>, screen: Screen<'a>) -> Self {
+        Self::of_view(photo.view(), screen)
+    }
+
+    /// A photo in somebody else's memory before a screen.
+    #[doc(hidden)]
+    pub fn of_view(photo: ImageView<'a, P>, screen: Screen<'a>) -> Self {
         Self {
             photo,
             screen,

@@ -12,7 +12,7 @@ use super::photo::{Keyer, Photo};
 use super::robust;
 use super::rows::{Rows, Source};
 use super::{Deviations, Keying};
-use crate::image::Image;
+use crate::image::{Image, ImageView};
 use crate::pixel::{Coverage, PremulRgba};
 use bytemuck::Zeroable;
 use rayon::prelude::*;
@@ -25,7 +25,7 @@ const BAND_PER_HALO: usize = 6;
 
 /// Rows of the raw matte.
 struct RawMatte<'a, P> {
-    photo: &'a Image<P>,
+    photo: ImageView<'a, P>,
     keyer: Keyer<'a, P>,
 }
 

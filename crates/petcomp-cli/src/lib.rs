@@ -1,0 +1,136 @@
+//! The `petcomp` program: reads arguments, calls the library, writes results. A library itself, so that
+//! the package for Python has the program inside.
+// What prints, and does not panic where nobody can take it, is print.rs.
+#![warn(clippy::unwrap_used, clippy::print_stderr, clippy::print_stdout)]
+
+mod asset;
+mod batch;
+mod camera;
+mod dataset;
+mod demo;
+mod diagnostics;
+mod diff;
+mod doctor;
+mod documents;
+mod eval;
+mod exit;
+mod global;
+mod interruption;
+mod label;
+mod matte;
+mod print;
+mod progress;
+mod render;
+mod scene;
+mod settle;
+mod short_help;
+mod values;
+
+use crate::global::GlobalArgs;
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+use std::ffi::OsString;
+
+/// From photographs to labelled training images.
+///
+/// Photos on a green or blue screen become cut-outs (matte, asset); a photo of a place with four
+/// marked corners becomes a camera (camera); a recipe becomes scenes (scene), which settle, are
+/// rendered over the photo and labelled (dataset).
+#[derive(Parser)]
+#[command(
+    name = "petcomp",
+    version,
+    propagate_version = true,
+    infer_subcommands = false
+)]
+struct Program {
+    #[command(flatten)]
+    global: GlobalArgs,
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+#[derive(Subcommand)]
+enum Verb {
+    /// Make a sample dataset from the photographs in the repository
+    Demo(demo::DemoArgs),
+    #[command(flatten)]
+    Stage(StageVerb),
+    /// Detections against the truth: average precision, curves, confusion
+    Eval(eval::EvalArgs),
+    /// Compare two pictures, with the flags and exit codes of OpenImageIO's idiff
+    Diff(diff::DiffArgs),
+    /// What this machine has, and whether petcomp works on it
+    Doctor(doctor::DoctorArgs),
+}
+
+/// The stages, in the order of the data.
+#[derive(Subcommand)]
+enum StageVerb {
+    /// Photo -> matte and cut-out
+    #[command(subcommand)]
+    Matte(matte::MatteCommand),
+    /// Cut-outs with real size and class, kept in a folder
+    #[command(subcommand)]
+    Asset(asset::AssetCommand),
+    /// Four labelled corners -> camera
+    #[command(subcommand)]
+    Camera(camera::CameraCommand),
+    /// Recipe -> scene
+    #[command(subcommand)]
+    Scene(scene::SceneCommand),
+    /// Let a scene's dropped objects come to rest
+    Settle(settle::SettleArgs),
+    /// Scene -> picture
+    Render(render::RenderArgs),
+    /// Scene -> outlines, boxes, visibility
+    Label(label::LabelArgs),
+    /// Recipe -> images with labels, ready to train on
+    #[command(subcommand)]
+    Dataset(dataset::DatasetCommand),
+}
+
+/// Runs a command line, the program's name first, and returns its exit status. To be called once in
+/// a process: it sets up threads, messages and the handling of Ctrl-C.
+pub fn run(words: impl Iterator<Item = OsString>) -> u8 {
+    match parse_command_line(words) {
+        Ok(program) => program
+            .start()
+            .unwrap_or_else(|error| exit::report_error(&error)),
+        Err(message) => print::usage(&message),
+    }
+}
+
+fn parse_command_line(words: impl Iterator<Item = OsString>) -> Result<Program, clap::Error> {
+    let words = diff::accept_idiff_spelling(words);
+    let program = short_help::with_short_help(Program::command());
+    Program::from_arg_matches(&program.try_get_matches_from(words)?)
+}
+
+impl Program {
+    fn start(&self) -> anyhow::Result<u8> {
+        self.global.apply()?;
+        match &self.verb {
+            Verb::Demo(args) => demo::run(args, &self.global)?,
+            Verb::Stage(stage) => stage.run(&self.global)?,
+            Verb::Eval(args) => eval::run(args, &self.global)?,
+            Verb::Diff(args) => return diff::run(args, &self.global),
+            Verb::Doctor(args) => return doctor::run(args),
+        }
+        Ok(exit::SUCCESS_STATUS)
+    }
+}
+
+impl StageVerb {
+    fn run(&self, global: &GlobalArgs) -> anyhow::Result<()> {
+        match self {
+            Self::Matte(command) => matte::run(command, global),
+            Self::Asset(command) => asset::run(command, global),
+            Self::Camera(command) => camera::run(command, global),
+            Self::Scene(command) => scene::run(command, global),
+            Self::Settle(args) => settle::run(args, global),
+            Self::Render(args) => render::run(args, global),
+            Self::Label(args) => label::run(args, global),
+            Self::Dataset(command) => dataset::run(command, global),
+        }
+    }
+}

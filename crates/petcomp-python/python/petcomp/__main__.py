@@ -1,0 +1,5 @@
+"""``python -m petcomp``: the program."""
+
+from ._program import main
+
+main()

@@ -1,0 +1,53 @@
+"""Cut-outs with real size and class, kept in a folder."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from . import _petcomp
+from ._documents import loaded, path_of
+
+__all__ = ["Built", "build", "list_folder"]
+
+
+@dataclass(frozen=True)
+class Built:
+    """What became of the photos of a list."""
+
+    #: Photos that were cut out.
+    photos: int
+    #: Lengths of the objects and their standard errors, metres, in the order of the list.
+    lengths: list[tuple[float, float]]
+    #: Photos that gave no cut-out, and why.
+    refused: list[str]
+    #: Records of cut-outs that a person should review.
+    needs_review: list[dict[str, Any]]
+    #: Names of the classes, in order.
+    classes: list[str]
+    #: Names of all assets in the folder.
+    assets: list[str]
+
+
+def build(
+    list: str | os.PathLike[str],
+    folder: str | os.PathLike[str],
+    progress: Callable[[int, int], object] | None = None,
+) -> Built:
+    """Cuts out all photos of a list (TOML or CSV, or a folder with one) into an asset folder.
+
+    ``progress`` is called with the photos done and their number, in the calling thread. After Ctrl-C
+    the photos in hand may still be written, but not the manifest that names them.
+    """
+    report = _petcomp.build_assets(path_of("list", list), path_of("folder", folder), progress)
+    record = loaded(report)
+    record["lengths"] = [tuple(pair) for pair in record["lengths"]]
+    return Built(**record)
+
+
+def list_folder(folder: str | os.PathLike[str]) -> dict[str, Any]:
+    """What an asset folder holds: its manifest as plain data."""
+    manifest: dict[str, Any] = loaded(_petcomp.list_assets(path_of("folder", folder)))
+    return manifest

@@ -1,0 +1,247 @@
+"""Where a picture is seen from: a pinhole camera, and the camera that sees a rectangle of known size."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _petcomp
+from ._documents import check_count, dumped, loaded
+from ._show import table
+from .errors import InvalidValueError
+
+__all__ = ["Camera", "Solution", "solve"]
+
+_log = logging.getLogger("petcomp")
+
+Numbers = Sequence[float] | npt.NDArray[np.floating[Any]]
+
+
+def _floats(name: str, value: Any, shape: tuple[int, ...]) -> list[Any]:
+    """Finite numbers of a shape, -1 being any length."""
+    check_count(name, value)
+    try:
+        array = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InvalidValueError(f"{name}: {value!r}, expected numbers of shape {shape}") from None
+    fits = array.ndim == len(shape) and all(want in (-1, got) for want, got in zip(shape, array.shape))
+    if not fits:
+        raise InvalidValueError(f"{name}: shape {array.shape}, expected {shape}")
+    if not np.isfinite(array).all():
+        raise InvalidValueError(f"{name}: {value!r}, expected finite numbers")
+    result: list[Any] = array.tolist()
+    return result
+
+
+def _pixels(name: str, value: Any) -> list[int]:
+    """Width and height of a picture."""
+    numbers = _floats(name, value, (2,))
+    if all(1 <= n <= 2**31 and n == int(n) for n in numbers):
+        return [int(n) for n in numbers]
+    raise InvalidValueError(f"{name}: {value!r}, expected two whole numbers above 0")
+
+
+class Camera:
+    """A pinhole camera without distortion: where it stands and how it maps the world to pixels.
+
+    Axes are those of OpenCV (x right, y down, z forward); the world is in metres, its z axis up. Pixel
+    ``(i, j)`` has its centre at ``+0.5``.
+    """
+
+    __slots__ = ("_native",)
+
+    def __init__(self, native: _petcomp.Camera) -> None:
+        if not isinstance(native, _petcomp.Camera):
+            raise InvalidValueError("camera: made by from_rectangle, looking_down, look_at or from_dict")
+        self._native = native
+
+    @classmethod
+    def from_rectangle(
+        cls,
+        corners: Numbers | Sequence[Sequence[float]],
+        size: Numbers,
+        image: Sequence[int],
+        focal_px: float | None = None,
+    ) -> Camera:
+        """The camera that sees a rectangle of known size at four corners.
+
+        ``corners`` are pixels, clockwise from the rectangle's top left; ``size`` is its width and height
+        in metres; ``image`` is width and height of the picture in pixels. The rectangle becomes the
+        world's plane ``z = 0``, centred, ``+x`` along its width. What a person should look at is logged
+        as warnings (``logging``, logger ``petcomp``).
+
+        Raises ``CameraError`` where no camera can have seen it.
+        """
+        label: dict[str, Any] = {
+            "format": "plane-label",
+            "version": 1,
+            "image": dict(zip(("file", "width", "height"), ("", *_pixels("image", image)))),
+            "surface": {
+                "id": "",
+                **dict(zip(("width_m", "height_m"), _floats("size", size, (2,)))),
+                "corners_px": _floats("corners", corners, (4, 2)),
+            },
+        }
+        if focal_px is not None:
+            label["camera"] = {"focal_px": focal_px, "focal_fixed": True}
+        solution = solve(label)
+        for warning in solution.warnings:
+            _log.warning("%s [%s]", warning["message"], warning["code"])
+        return solution.camera
+
+    @classmethod
+    def looking_down(cls, height: float, focal_px: float, image: Sequence[int]) -> Camera:
+        """Straight above the origin, ``height`` in metres, the picture's top towards ``+y``."""
+        return cls(_petcomp.Camera.looking_down(height, focal_px, _pixels("image", image)))
+
+    @classmethod
+    def look_at(cls, eye: Numbers, target: Numbers, focal_px: float, image: Sequence[int]) -> Camera:
+        """At ``eye``, looking at ``target`` (both metres), upright."""
+        eye, target = _floats("eye", eye, (3,)), _floats("target", target, (3,))
+        return cls(_petcomp.Camera.look_at(eye, target, focal_px, _pixels("image", image)))
+
+    @classmethod
+    def from_dict(cls, document: Mapping[str, Any]) -> Camera:
+        """From plain data, as scene files have it."""
+        return cls(_petcomp.Camera.from_json(dumped("camera", document)))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data, as scene files have it."""
+        document: dict[str, Any] = loaded(self._native.to_json())
+        return document
+
+    @property
+    def image(self) -> tuple[int, int]:
+        """Width and height of its picture, pixels."""
+        width, height = self._native.image
+        return width, height
+
+    @property
+    def focal_px(self) -> tuple[float, float]:
+        """Focal lengths along x and y, pixels."""
+        x, y = self._native.focal_px
+        return x, y
+
+    @property
+    def principal_px(self) -> tuple[float, float]:
+        """Principal point, pixels from the picture's top-left corner."""
+        x, y = self._native.principal_px
+        return x, y
+
+    @property
+    def center(self) -> npt.NDArray[np.float64]:
+        """Where it is in the world: 3, float64, metres."""
+        return np.array(self._native.center)
+
+    @property
+    def tilt(self) -> float:
+        """Angle between the optical axis and straight down, radians."""
+        return self._native.tilt
+
+    @property
+    def intrinsics(self) -> npt.NDArray[np.float64]:
+        """K: 3 x 3, float64, pixels."""
+        return np.array(self._native.intrinsics())
+
+    @property
+    def camera_from_world(self) -> npt.NDArray[np.float64]:
+        """Pose of the world in the camera's frame: 4 x 4, float64, metres."""
+        return np.array(self._native.camera_from_world())
+
+    @property
+    def pixel_from_surface(self) -> npt.NDArray[np.float64]:
+        """Homography from the plane ``z = 0`` (metres) to pixels: 3 x 3, float64."""
+        return np.array(self._native.pixel_from_surface())
+
+    def project(self, points: Any) -> npt.NDArray[np.float64]:
+        """Where points (n x 3, metres) are seen: n x 3, float64: x and y in pixels, depth in metres.
+
+        NaN at or behind the camera.
+        """
+        seen = self._native.project(_floats("points", points, (-1, 3)))
+        return np.array(seen, dtype=np.float64).reshape(-1, 3)
+
+    def rays(self, pixels: Any) -> npt.NDArray[np.float64]:
+        """Directions through pixels (n x 2): n x 3, float64, of depth 1 along the optical axis."""
+        rays = self._native.rays(_floats("pixels", pixels, (-1, 2)))
+        return np.array(rays, dtype=np.float64).reshape(-1, 3)
+
+    def resized(self, image: Sequence[int]) -> Camera:
+        """The same view at another picture size."""
+        return Camera(self._native.resized(_pixels("image", image)))
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Camera) and self._native == other._native
+
+    def __hash__(self) -> int:
+        return hash((self.image, self.focal_px, self.principal_px))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _camera, (self.to_dict(),)
+
+    def __repr__(self) -> str:
+        (w, h), (fx, _), (x, y, z) = self.image, self.focal_px, self.center
+        tilt = np.degrees(self.tilt)
+        return f"Camera({w} x {h}, {fx:.1f} px, at [{x:.3f}, {y:.3f}, {z:.3f}] m, {tilt:.1f} degrees)"
+
+    def _repr_html_(self) -> str:
+        (w, h), (fx, fy), (cx, cy) = self.image, self.focal_px, self.principal_px
+        x, y, z = self.center
+        rows = [
+            ("picture", f"{w} x {h} px"),
+            ("focal length", f"{fx:.2f}, {fy:.2f} px"),
+            ("principal point", f"{cx:.2f}, {cy:.2f} px"),
+            ("centre", f"{x:.4f}, {y:.4f}, {z:.4f} m"),
+            ("tilt", f"{np.degrees(self.tilt):.2f} degrees"),
+        ]
+        return table(("camera", ""), rows)
+
+
+def _camera(document: dict[str, Any]) -> Camera:
+    return Camera.from_dict(document)
+
+
+@dataclass(frozen=True)
+class Solution:
+    """A solved camera, and how reliable it is."""
+
+    #: The camera; the labelled rectangle is the plane ``z = 0``, centred.
+    camera: Camera
+    #: Width and height of the rectangle as fitted, metres.
+    size: tuple[float, float]
+    #: Root mean square distance of the projected corners from the labelled ones, pixels.
+    rms_px: float
+    #: Probability of a worse fit by chance; None without degrees of freedom.
+    p_value: float | None
+    #: Relative standard deviation of the focal length; None where nothing is known.
+    focal_sigma: float | None
+    #: Standard deviation of the tilt, radians.
+    tilt_sigma: float | None
+    #: What a person should look at: ``code``, ``severity`` and ``message`` of each.
+    warnings: list[dict[str, str]]
+    #: The camera file that ``petcomp camera solve`` writes.
+    file: dict[str, Any]
+
+
+def solve(label: Mapping[str, Any], force: bool = False) -> Solution:
+    """The camera of a label: plain data as ``NAME.label.json`` has it.
+
+    With ``force`` a camera that does not fit its label is returned, too. Raises ``CameraError``.
+    """
+    camera, text = _petcomp.solve_camera(dumped("label", label), force)
+    record = loaded(text)
+    return Solution(
+        camera=Camera(camera),
+        size=tuple(record["size"]),
+        rms_px=record["rms_px"],
+        p_value=record["p_value"],
+        focal_sigma=record["focal_sigma"],
+        tilt_sigma=record["tilt_sigma"],
+        warnings=record["warnings"],
+        file=record["file"],
+    )

@@ -1,0 +1,91 @@
+"""Pictures made while a detector learns: a data set for PyTorch, which only this module imports."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import torch
+from torch.utils.data import Dataset as _Dataset
+
+from .pipeline import Pipeline, _number
+from .sample import Sample
+
+__all__ = ["Dataset", "collate", "to_tensors"]
+
+
+def to_tensors(sample: Sample) -> tuple[torch.Tensor, dict[str, torch.Tensor]]:
+    """A sample as torchvision's detectors take it.
+
+    The picture: 3 x height x width, float32, 0 to 1, sRGB. The target: ``boxes`` (n x 4, float32: left,
+    top, right, bottom, pixels), ``labels`` (n, int64: class + 1, for 0 is the background), ``image_id``,
+    ``area`` (n, float32) and ``iscrowd`` (n, int64).
+    """
+    picture = torch.from_numpy(sample.image).permute(2, 0, 1).to(torch.float32) / 255
+    boxes = torch.from_numpy(sample.boxes).to(torch.float32)
+    sides = boxes[:, 2:] - boxes[:, :2]
+    target = {
+        "boxes": boxes,
+        "labels": torch.from_numpy(sample.classes) + 1,
+        "area": sides[:, 0] * sides[:, 1],
+        "iscrowd": torch.from_numpy(sample.ignored).to(torch.int64),
+    }
+    return picture, target
+
+
+class Dataset(_Dataset[Any]):
+    """Samples ``0`` to ``count - 1`` of a recipe, made when they are asked for.
+
+    Sample ``k`` is that of ``petcomp dataset generate``, whichever worker makes it, forked or spawned.
+    Each worker opens the recipe once and computes with ``threads`` threads (1 where there are workers,
+    which share the processors already). ``transform`` gets the ``Sample``; by default ``to_tensors``.
+    """
+
+    def __init__(
+        self,
+        recipe: str | os.PathLike[str] | Mapping[str, Any],
+        count: int,
+        *,
+        seed: int = 0,
+        set: Mapping[str, Any] | None = None,
+        quality: str | None = None,
+        transform: Callable[[Sample], Any] = to_tensors,
+        threads: int = 1,
+    ) -> None:
+        self._count = _number("count", count)
+        self._transform = transform
+        self._threads = _number("threads", threads)
+        # Opened here, so that what is wrong with the recipe is said at once; and shared by forks.
+        self._pipeline = Pipeline(recipe, seed=seed, set=set, quality=quality)
+        self._worker_process: int | None = None
+
+    @property
+    def classes(self) -> list[str]:
+        """Names of the classes, in order."""
+        return self._pipeline.classes
+
+    def __len__(self) -> int:
+        return self._count
+
+    def __getitem__(self, index: int) -> Any:
+        k = index + self._count if index < 0 else index
+        if not 0 <= k < self._count:
+            raise IndexError(f"sample {index} of {self._count}")
+        self._set_threads()
+        return self._transform(self._pipeline[k])
+
+    def _set_threads(self) -> None:
+        """In a worker, once."""
+        from . import set_threads
+
+        process = os.getpid()
+        if torch.utils.data.get_worker_info() is not None and self._worker_process != process:
+            set_threads(self._threads)
+            self._worker_process = process
+
+
+def collate(batch: list[tuple[Any, Any]]) -> tuple[list[Any], list[Any]]:
+    """Pictures and targets of a batch as lists: each picture has its own number of boxes."""
+    pictures, targets = zip(*batch)
+    return list(pictures), list(targets)

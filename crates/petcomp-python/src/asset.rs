@@ -1,0 +1,53 @@
+//! Cut-outs with real size and class, kept in a folder.
+
+use crate::document::text;
+use crate::lock::locked;
+use crate::work;
+use petcomp::Result;
+use petcomp::asset::{self, Built, Manifest};
+use pyo3::prelude::*;
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex};
+
+/// Cuts out all photos of a list; returns what became of them.
+#[pyfunction]
+#[pyo3(signature = (list, folder, progress))]
+pub(crate) fn build_assets(
+    py: Python<'_>,
+    list: PathBuf,
+    folder: PathBuf,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<String> {
+    let steps: Arc<Mutex<Vec<(usize, usize)>>> = Arc::default();
+    let own = steps.clone();
+    let mut deliver = |py: Python<'_>| {
+        let steps = std::mem::take(&mut *locked(&steps));
+        let Some(callable) = &progress else {
+            return Ok(());
+        };
+        steps
+            .into_iter()
+            .try_for_each(|step| callable.call1(py, step).map(drop))
+    };
+    work::run_beside(py, &|_| (), &mut deliver, move || {
+        let report = |done, total| locked(&own).push((done, total));
+        built_json(&asset::build(list, folder, &report)?)
+    })
+}
+
+fn built_json(built: &Built) -> Result<String> {
+    text(&serde_json::json!({
+        "photos": built.photos,
+        "lengths": built.lengths,
+        "refused": built.refused,
+        "needs_review": built.needs_review,
+        "classes": built.library.classes,
+        "assets": built.library.assets.iter().map(|asset| &asset.name).collect::<Vec<_>>(),
+    }))
+}
+
+/// The manifest of an asset folder.
+#[pyfunction]
+pub(crate) fn list_assets(py: Python<'_>, folder: PathBuf) -> PyResult<String> {
+    work::run(py, move || text(&Manifest::read(folder)?))
+}

@@ -1,0 +1,189 @@
+//! Detections against the truth.
+
+use crate::document::text;
+use crate::errors::to_python;
+use crate::work;
+use petcomp::Result;
+use petcomp::dataset::YoloSet;
+use petcomp::eval::page::{self, EvalReportOptions, Metrics, Run};
+use petcomp::eval::{
+    Detection, EvalImage, GroundTruth, read_coco_results, read_coco_truth, read_yolo_detections,
+    read_yolo_truth,
+};
+use petcomp::geom::BBox;
+use pyo3::prelude::*;
+use std::path::{Path, PathBuf};
+
+/// Files of predictions and of the truth.
+struct Files {
+    predictions: PathBuf,
+    truth: PathBuf,
+    size: Option<[u32; 2]>,
+}
+
+/// What is asked of the scores: names of the classes, rounds of the bootstrap, its seed.
+type Question = (Vec<String>, usize, u64);
+
+fn options_of((classes, rounds, seed): Question) -> EvalReportOptions {
+    EvalReportOptions {
+        classes,
+        rounds: rounds.min(MOST_ROUNDS),
+        seed,
+        ..EvalReportOptions::default()
+    }
+}
+
+/// The scores of predictions in files, as `metrics.json` has them; with a folder, the whole report.
+#[pyfunction]
+pub(crate) fn evaluate_files(
+    py: Python<'_>,
+    predictions: PathBuf,
+    truth: PathBuf,
+    size: Option<[u32; 2]>,
+    output: Option<PathBuf>,
+    question: Question,
+) -> PyResult<String> {
+    let files = Files {
+        predictions,
+        truth,
+        size,
+    };
+    work::run(py, move || {
+        files.evaluate(options_of(question), output.as_deref())
+    })
+}
+
+/// As on the command line.
+const MOST_ROUNDS: usize = 100_000;
+
+impl Files {
+    fn evaluate(&self, mut options: EvalReportOptions, output: Option<&Path>) -> Result<String> {
+        let sheets = if self.truth.extension().is_some_and(|e| e == "json") {
+            self.read_coco(&mut options)?
+        } else {
+            self.read_yolo(&mut options)?
+        };
+        let stem = self.predictions.file_stem().unwrap_or_default();
+        let run = Run {
+            name: stem.to_string_lossy().into_owned(),
+            sheets,
+        };
+        if let Some(folder) = output {
+            page::write(folder, std::slice::from_ref(&run), &options)?;
+        }
+        metrics_json(&run, &options)
+    }
+
+    fn read_coco(&self, options: &mut EvalReportOptions) -> Result<Vec<EvalImage>> {
+        let mut all = read_coco_truth(&self.truth)?;
+        read_coco_results(&self.predictions, &mut all)?;
+        if options.classes.is_empty() {
+            options.classes.clone_from(&all.classes);
+        }
+        options.pictures = all.pictures(&self.truth, None);
+        Ok(all.sheets)
+    }
+
+    fn read_yolo(&self, options: &mut EvalReportOptions) -> Result<Vec<EvalImage>> {
+        let mut all = read_yolo_truth(&self.truth, self.size)?;
+        read_yolo_detections(&self.predictions, &mut all)?;
+        if options.classes.is_empty() {
+            options.classes = dataset_classes(&self.truth).unwrap_or_default();
+        }
+        options.pictures = all.pictures;
+        Ok(all.sheets)
+    }
+}
+
+/// Classes of the dataset that the labels belong to: `labels/val` lies two folders below its
+/// data.yaml.
+fn dataset_classes(labels: &Path) -> Option<Vec<String>> {
+    let folder = labels.parent()?.parent()?;
+    Some(YoloSet::open(folder).ok()?.classes)
+}
+
+fn metrics_json(run: &Run, options: &EvalReportOptions) -> Result<String> {
+    text(&serde_json::json!({
+        "classes": options.classes,
+        "metrics": Metrics::of(run, options),
+    }))
+}
+
+/// What is in a picture and what was found in it: class and box of each, and how sure.
+type Sheet = (Vec<(u32, [f64; 4])>, Vec<(u32, [f64; 4], f64)>);
+
+/// The scores of predictions in memory.
+#[pyfunction]
+pub(crate) fn evaluate_boxes(
+    py: Python<'_>,
+    sheets: Vec<Sheet>,
+    question: Question,
+) -> PyResult<String> {
+    check_boxes(&sheets).map_err(to_python)?;
+    work::run(py, move || {
+        let sheets = sheets
+            .iter()
+            .enumerate()
+            .map(|(i, sheet)| sheet_of(i, sheet));
+        let run = Run {
+            name: "predictions".into(),
+            sheets: sheets.collect(),
+        };
+        metrics_json(&run, &options_of(question))
+    })
+}
+
+/// Boxes within so many pixels have areas and overlaps that are numbers.
+const FARTHEST_PX: f64 = 1e9;
+
+fn check_boxes(sheets: &[Sheet]) -> Result<()> {
+    for (i, (truth, found)) in sheets.iter().enumerate() {
+        let truth = truth.iter().map(|(_, bbox)| bbox);
+        for bbox in truth.chain(found.iter().map(|(_, bbox, _)| bbox)) {
+            check_box(i, bbox)?;
+        }
+        if let Some((_, _, score)) = found.iter().find(|(_, _, score)| !score.is_finite()) {
+            let what = format!("{score}, expected a finite number");
+            return Err(petcomp::Error::value(
+                format!("predictions[{i}].scores"),
+                what,
+            ));
+        }
+    }
+    Ok(())
+}
+
+fn check_box(image: usize, bbox: &[f64; 4]) -> Result<()> {
+    let [x0, y0, x1, y1] = bbox;
+    let within = bbox.iter().all(|side| side.abs() <= FARTHEST_PX);
+    if within && x0 <= x1 && y0 <= y1 {
+        return Ok(());
+    }
+    let what = format!("{bbox:?}, expected x0 <= x1 and y0 <= y1, pixels");
+    Err(petcomp::Error::value(
+        format!("boxes of image {image}"),
+        what,
+    ))
+}
+
+fn sheet_of(i: usize, (truth, found): &Sheet) -> EvalImage {
+    let truth = truth.iter().map(|&(class, bbox)| GroundTruth {
+        class,
+        bbox: bbox_of(bbox),
+        area: bbox_of(bbox).width() * bbox_of(bbox).height(),
+        crowd: false,
+    });
+    let found = found.iter().map(|&(class, bbox, confidence)| Detection {
+        class,
+        bbox: bbox_of(bbox),
+        confidence,
+    });
+    EvalImage {
+        found: found.collect(),
+        ..EvalImage::new(format!("{i:06}"), truth.collect())
+    }
+}
+
+fn bbox_of([x0, y0, x1, y1]: [f64; 4]) -> BBox {
+    BBox { x0, y0, x1, y1 }
+}

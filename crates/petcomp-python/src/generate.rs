@@ -1,0 +1,215 @@
+//! Datasets, by a pipeline or by a function of Python's.
+
+use crate::document::{parse, text};
+use crate::errors::to_python;
+use crate::lock::locked;
+use crate::pipeline::Pipeline;
+use crate::sample::Sample;
+use crate::work;
+use petcomp::dataset::{
+    self, DatasetCounts, LabelConfig, Pictures, Plan, Progress, SampleRange, Shard, Sidecar, Split,
+    Writer,
+};
+use petcomp::{Error, Result};
+use pyo3::prelude::*;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+
+/// What the threads of a run tell the one that waits for them.
+#[derive(Clone, Default)]
+struct Run {
+    stop: Arc<AtomicBool>,
+    progress: Arc<Mutex<Vec<Progress>>>,
+}
+
+impl Run {
+    fn stop(&self) {
+        self.stop.store(true, Ordering::Relaxed);
+    }
+
+    /// Hands all progress to a function of Python's.
+    fn deliver(&self, py: Python<'_>, callable: Option<&Py<PyAny>>) -> PyResult<()> {
+        let steps = std::mem::take(&mut *locked(&self.progress));
+        let Some(callable) = callable else {
+            return Ok(());
+        };
+        for step in steps {
+            callable.call1(py, (step.done, step.count, step.made))?;
+        }
+        Ok(())
+    }
+
+    fn generate_from(&self, pipeline: &dataset::Pipeline, target: Target) -> Result<String> {
+        let (folder, count, seed, only, shard) = target;
+        let range = range_of(only, shard)?;
+        let plan = Plan {
+            range,
+            ..pipeline.plan(count, seed, folder_of(folder, range))?
+        };
+        self.generate(&plan, |k| pipeline.sample(seed, k))
+    }
+
+    fn generate(
+        &self,
+        plan: &Plan,
+        make: impl Fn(u64) -> Result<dataset::Sample> + Sync,
+    ) -> Result<String> {
+        let report = |progress| locked(&self.progress).push(progress);
+        let counts = dataset::generate(plan, make, &report, &self.stop)?;
+        counts_json(&counts)
+    }
+}
+
+fn counts_json(counts: &DatasetCounts) -> Result<String> {
+    text(counts)
+}
+
+/// Where a dataset is written, and which samples: folder, count, seed, the only one, the shard.
+type Target = (PathBuf, u64, u64, Option<u64>, Option<[u64; 2]>);
+
+/// Which samples of a dataset are made.
+fn range_of(only: Option<u64>, shard: Option<[u64; 2]>) -> Result<SampleRange> {
+    match (only, shard) {
+        (None, None) => Ok(SampleRange::All),
+        (Some(k), None) => Ok(SampleRange::One(k)),
+        (None, Some([index, of])) => Shard::new(index, of).map(SampleRange::Shard),
+        (Some(_), Some(_)) => {
+            let what = "given together with shard, expected one of them";
+            Err(Error::value("only", what))
+        }
+    }
+}
+
+/// Where a shard is written, as by the program.
+fn folder_of(folder: PathBuf, range: SampleRange) -> PathBuf {
+    match range {
+        SampleRange::Shard(shard) => folder.join(shard.folder()),
+        _ => folder,
+    }
+}
+
+/// Makes a dataset of a pipeline's pictures.
+#[pyfunction]
+pub(crate) fn generate_from(
+    py: Python<'_>,
+    pipeline: &Bound<'_, Pipeline>,
+    target: Target,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<String> {
+    let opened = pipeline.get().opened()?;
+    let (run, falls) = (Run::default(), opened.stop);
+    let worker = run.clone();
+    let stop = |stopped| {
+        falls.store(stopped, Ordering::Relaxed);
+        run.stop();
+    };
+    let mut beside = |py: Python<'_>| run.deliver(py, progress.as_ref());
+    work::run_beside(py, &stop, &mut beside, move || {
+        worker.generate_from(&opened.pipeline, target)
+    })
+}
+
+/// How a dataset of a function's pictures is written.
+struct Layout {
+    labels: LabelConfig,
+    pictures: Pictures,
+    split: Split,
+}
+
+impl Layout {
+    fn new([labels, pictures, split]: &[String; 3]) -> Result<Self> {
+        let layout = Self {
+            labels: parse("labels", labels)?,
+            pictures: parse("pictures", pictures)?,
+            split: parse("split", split)?,
+        };
+        // The checks of a recipe, whose tables these are.
+        let config = dataset::DatasetConfig {
+            labels: layout.labels.clone(),
+            pictures: layout.pictures,
+            split: layout.split,
+            ..Default::default()
+        };
+        config.check()?;
+        Ok(layout)
+    }
+
+    fn plan(&self, classes: &[String], target: Target) -> Result<Plan> {
+        let (folder, count, seed, only, shard) = target;
+        let (range, obstructed) = (range_of(only, shard)?, self.labels.obstructed);
+        Ok(Plan {
+            range,
+            seed,
+            split: self.split,
+            obstructed,
+            writers: self.writers(),
+            ..Plan::new(
+                folder_of(folder, range),
+                count,
+                obstructed.classes(classes)?,
+            )
+        })
+    }
+
+    fn writers(&self) -> Vec<Box<dyn Writer>> {
+        let mut writers: Vec<Box<dyn Writer>> = vec![Box::new(self.pictures), Box::new(Sidecar)];
+        writers.extend(self.labels.writers(&self.pictures));
+        writers
+    }
+}
+
+/// Makes a dataset of the samples that a function of Python's returns for their numbers.
+#[pyfunction]
+pub(crate) fn generate_with(
+    py: Python<'_>,
+    make: Py<PyAny>,
+    classes: Vec<String>,
+    layout: [String; 3],
+    target: Target,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<String> {
+    let layout = Layout::new(&layout).map_err(to_python)?;
+    let (run, raised) = (Run::default(), Raised::default());
+    let (worker, keep) = (run.clone(), raised.clone());
+    let mut beside = |py: Python<'_>| run.deliver(py, progress.as_ref());
+    let made = work::run_beside(py, &|_| run.stop(), &mut beside, move || {
+        worker.generate(&layout.plan(&classes, target)?, |k| keep.sample(&make, k))
+    });
+    raised.or_else(made)
+}
+
+/// The exception of the sample with the lowest number.
+#[derive(Clone, Default)]
+struct Raised(Arc<Mutex<Option<(u64, PyErr)>>>);
+
+impl Raised {
+    /// A run's outcome; what the function raised says more than that the run failed.
+    fn or_else(&self, made: PyResult<String>) -> PyResult<String> {
+        match locked(&self.0).take() {
+            Some((_, error)) if made.is_err() => Err(error),
+            _ => made,
+        }
+    }
+
+    fn sample(&self, make: &Py<PyAny>, k: u64) -> Result<dataset::Sample> {
+        let made = Python::attach(|py| {
+            let sample = make.bind(py).call1((k,))?;
+            let sample = sample.cast::<Sample>().map_err(|_| {
+                let found = sample.get_type();
+                crate::errors::wrong_type("make", &format!("returned {found}, expected a Sample"))
+            })?;
+            sample.get().to_dataset_sample(py)
+        });
+        made.map_err(|error| self.keep(k, error))
+    }
+
+    fn keep(&self, k: u64, error: PyErr) -> petcomp::Error {
+        let what = format!("sample {k}: {error}");
+        let mut first = locked(&self.0);
+        if first.as_ref().is_none_or(|(other, _)| k < *other) {
+            *first = Some((k, error));
+        }
+        petcomp::Error::value("make", what)
+    }
+}

@@ -1,0 +1,210 @@
+//! Pictures: read, written, keyed, cut out.
+
+use crate::arrays::{Given, Photo, matte_of, to_array};
+use crate::document::{parse, text};
+use crate::errors::{to_python, wrong_value};
+use crate::work;
+use numpy::PyArrayDyn;
+use petcomp::matte::key::{Deviations, KeyOptions, Keyed, Keying, Screen};
+use petcomp::matte::{self, CutOut, CutOutOptions};
+use petcomp::{Coverage, Error, Image, LinearRgb, PremulRgba, Result, io};
+use pyo3::prelude::*;
+use std::path::PathBuf;
+
+type FloatArray<'py> = Bound<'py, PyArrayDyn<f32>>;
+
+/// Matte and cut-out of a photo before a screen, and what the robust profile changed.
+#[pyfunction]
+pub(crate) fn key<'py>(
+    py: Python<'py>,
+    image: &Bound<'py, PyAny>,
+    screen: &Bound<'py, PyAny>,
+    garbage: Option<Bound<'py, PyAny>>,
+    core: Option<Bound<'py, PyAny>>,
+    options: &str,
+) -> PyResult<(FloatArray<'py>, FloatArray<'py>, String)> {
+    let photo = Given::from_argument("image", image)?;
+    let known = Known {
+        screen: ScreenArgument::new(screen)?,
+        garbage: garbage.map(|m| matte_of("garbage", &m)).transpose()?,
+        core: core.map(|m| matte_of("core", &m)).transpose()?,
+        options: parse("options", options).map_err(to_python)?,
+    };
+    let keyed = work::run(py, move || known.keyed(photo))?;
+    let changed = deviations_json(&keyed.deviations);
+    let matte = to_array(py, keyed.matte)?;
+    Ok((matte, to_array(py, keyed.cutout)?, changed))
+}
+
+/// What a keyer is given beside the photo.
+struct Known {
+    screen: ScreenArgument,
+    garbage: Option<Image<Coverage>>,
+    core: Option<Image<Coverage>>,
+    options: KeyOptions,
+}
+
+impl Known {
+    fn keyed(mut self, photo: Given) -> Result<Keyed> {
+        let plate = self.screen.take_plate()?;
+        let color = Screen::Color(self.screen.color());
+        let screen = plate.as_ref().map_or(color, Screen::Plate);
+        match photo.decoded("image")? {
+            Photo::Rgb(pixels) => self.run(Keying::of_view(pixels.view(), screen)),
+            Photo::Rgba(pixels) => self.run(Keying::of_view(pixels.view(), screen)),
+        }
+    }
+
+    fn run<'a, P: matte::key::Photo>(&'a self, mut keying: Keying<'a, P>) -> Result<Keyed> {
+        if let Some(garbage) = &self.garbage {
+            keying = keying.with_garbage(garbage);
+        }
+        if let Some(core) = &self.core {
+            keying = keying.with_core(core);
+        }
+        keying.run(&self.options)
+    }
+}
+
+/// A colour, or a photo of the screen.
+enum ScreenArgument {
+    Color([f32; 3]),
+    Plate(Given),
+}
+
+impl ScreenArgument {
+    fn new(argument: &Bound<'_, PyAny>) -> PyResult<Self> {
+        match argument.extract::<[f32; 3]>() {
+            Ok(color) => Ok(Self::Color(color)),
+            Err(_) if argument.hasattr("shape")? => {
+                Given::from_argument("screen", argument).map(Self::Plate)
+            }
+            Err(_) => Err(crate::errors::wrong_type(
+                "screen",
+                "expected three numbers (a scene-linear colour) or a picture of the screen",
+            )),
+        }
+    }
+
+    fn color(&self) -> LinearRgb {
+        match self {
+            Self::Color(color) => LinearRgb::from(*color),
+            Self::Plate(_) => LinearRgb::BLACK,
+        }
+    }
+
+    /// The photo of the screen, where there is one.
+    fn take_plate(&mut self) -> Result<Option<Image<LinearRgb>>> {
+        match std::mem::replace(self, Self::Color(self.color().channels())) {
+            Self::Color(_) => Ok(None),
+            Self::Plate(plate) => plate.decoded("screen")?.into_opaque("screen").map(Some),
+        }
+    }
+}
+
+fn deviations_json(deviations: &Deviations) -> String {
+    serde_json::json!({
+        "unusable_pixels": deviations.unusable_pixels,
+        "filled_plate": deviations.filled_plate,
+        "unusable_mattes": deviations.unusable_mattes,
+        "clamped": deviations.clamped,
+    })
+    .to_string()
+}
+
+/// The one object of a photo without its screen, and what is known of it.
+#[pyfunction]
+pub(crate) fn cut_out<'py>(
+    py: Python<'py>,
+    image: &Bound<'py, PyAny>,
+    empty: Option<Bound<'py, PyAny>>,
+    options: &str,
+) -> PyResult<(FloatArray<'py>, FloatArray<'py>, String)> {
+    let photo = Given::from_argument("image", image)?;
+    let empty = empty.map(|e| Given::from_argument("empty", &e));
+    let empty = empty.transpose()?;
+    let options: CutOutOptions = parse("options", options).map_err(to_python)?;
+    let (rgba, cut) = work::run(py, move || {
+        let cut = cut_out_of(photo, empty, &options)?;
+        Ok((cut.to_rgba(), cut))
+    })?;
+    let record = text(&cut_out_record(&cut)).map_err(to_python)?;
+    Ok((
+        to_array(py, rgba)?,
+        to_array(py, cut.transmittance)?,
+        record,
+    ))
+}
+
+fn cut_out_of(photo: Given, empty: Option<Given>, options: &CutOutOptions) -> Result<CutOut> {
+    let photo = photo.decoded("image")?.into_opaque("image")?;
+    let empty = empty.map(|e| e.decoded("empty")?.into_opaque("empty"));
+    matte::cut_out_on(&photo, empty.transpose()?.as_ref(), options)
+}
+
+fn cut_out_record(cut: &CutOut) -> serde_json::Value {
+    let hull: Vec<[f64; 2]> = cut.hull.iter().map(|p| [p.x, p.y]).collect();
+    serde_json::json!({
+        "hull": hull,
+        "roi": [cut.roi.x, cut.roi.y, cut.roi.width, cut.roi.height],
+        "scale": cut.scale,
+        "screen": cut.screen.channels(),
+        "unevenness": cut.unevenness,
+        "method": cut.method.to_string(),
+        "residual_matte": cut.residual_matte,
+        "diagnostics": cut.diagnostics,
+    })
+}
+
+/// A picture file as float32, scene-linear.
+#[pyfunction]
+pub(crate) fn read_picture<'py>(
+    py: Python<'py>,
+    path: PathBuf,
+    alpha: bool,
+) -> PyResult<FloatArray<'py>> {
+    if alpha {
+        let image: Image<PremulRgba> = work::run(py, move || io::read(path))?;
+        return to_array(py, image);
+    }
+    let image: Image<LinearRgb> = work::run(py, move || io::read(path))?;
+    to_array(py, image)
+}
+
+/// A picture to a file, its format by the extension.
+#[pyfunction]
+pub(crate) fn write_picture(
+    py: Python<'_>,
+    path: PathBuf,
+    image: &Bound<'_, PyAny>,
+) -> PyResult<()> {
+    let extension = path.extension().unwrap_or_default().to_string_lossy();
+    if !["exr", "png", "jpg", "jpeg", "tif", "tiff"].contains(&&*extension.to_lowercase()) {
+        let what = "expected the extension .exr, .png, .jpg or .tif";
+        return Err(wrong_value(
+            "path",
+            format_args!("{}: {what}", path.display()),
+        ));
+    }
+    let image = Given::from_argument("image", image)?;
+    work::run(py, move || match image.decoded("image")? {
+        Photo::Rgb(pixels) => io::write(path, &pixels.into_image()),
+        Photo::Rgba(pixels) => {
+            let image = pixels.into_image();
+            check_sound(&image)?;
+            io::write(path, &image)
+        }
+    })
+}
+
+fn check_sound(image: &Image<PremulRgba>) -> Result<()> {
+    let bad = image.pixels().iter().position(|pixel| !pixel.is_sound());
+    bad.map_or(Ok(()), |i| {
+        let (x, y) = (i % image.width(), i / image.width());
+        let what = format!(
+            "alpha {} in column {x}, row {y}, expected 0 to 1",
+            image.pixels()[i].a
+        );
+        Err(Error::value("image", what))
+    })
+}

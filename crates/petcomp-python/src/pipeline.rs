@@ -1,0 +1,154 @@
+//! The pipeline: recipe and number in, labelled picture out.
+
+use crate::document::text;
+use crate::errors::{closed, to_python};
+use crate::lock::locked;
+use crate::sample::{Policy, Sample};
+use crate::scene::{config_of, scene_of};
+use crate::work;
+use petcomp::dataset::{self, DatasetConfig};
+use petcomp::io::Override;
+use petcomp::{Quality, Result, Scene};
+use pyo3::prelude::*;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+
+/// Everything that pictures are made from, opened once.
+#[pyclass(frozen, module = "petcomp._petcomp")]
+pub(crate) struct Pipeline {
+    /// None once it is closed.
+    opened: Mutex<Option<Opened>>,
+}
+
+/// What the threads of jobs share.
+#[derive(Clone)]
+pub(crate) struct Opened {
+    pub(crate) pipeline: Arc<dataset::Pipeline>,
+    pub(crate) policy: Policy,
+    /// Turns true when falls are to end.
+    pub(crate) stop: &'static AtomicBool,
+}
+
+/// What a pipeline is opened from: a recipe file, or a document and values to be changed.
+struct Source {
+    path: Option<PathBuf>,
+    json: Option<String>,
+    overrides: Vec<String>,
+    quality: Option<String>,
+}
+
+impl Source {
+    fn config(&self) -> Result<DatasetConfig> {
+        let overrides: Result<Vec<Override>> = self.overrides.iter().map(|o| o.parse()).collect();
+        let config = match (&self.path, &self.json) {
+            (Some(path), _) => DatasetConfig::read(path, &overrides?)?,
+            (None, json) => config_of(json.as_deref().unwrap_or("{}"))?,
+        };
+        Ok(match &self.quality {
+            Some(quality) => quality.parse::<Quality>()?.config(config),
+            None => config,
+        })
+    }
+}
+
+impl Opened {
+    fn new(source: &Source, stop: &'static AtomicBool) -> Result<Self> {
+        let pipeline = dataset::Pipeline::open(source.config()?)?.stopped_by(stop);
+        let labels = &pipeline.config().labels;
+        let policy = Policy {
+            classes: labels.obstructed.classes(&pipeline.library().classes)?,
+            obstructed: labels.obstructed,
+            extent: labels.yolo.boxes,
+        };
+        Ok(Self {
+            pipeline: Arc::new(pipeline),
+            policy,
+            stop,
+        })
+    }
+
+    /// Runs a job of this pipeline, whose falls Ctrl-C ends.
+    fn run<T: Send + 'static>(
+        &self,
+        py: Python<'_>,
+        job: impl FnOnce(&dataset::Pipeline) -> Result<T> + Send + 'static,
+    ) -> PyResult<T> {
+        let (pipeline, stop) = (self.pipeline.clone(), self.stop);
+        let stop = |stopped| stop.store(stopped, Ordering::Relaxed);
+        work::run_beside(py, &stop, &mut |_| Ok(()), move || job(&pipeline))
+    }
+}
+
+impl Pipeline {
+    pub(crate) fn opened(&self) -> PyResult<Opened> {
+        locked(&self.opened)
+            .clone()
+            .ok_or_else(|| closed("the pipeline"))
+    }
+}
+
+#[pymethods]
+impl Pipeline {
+    #[new]
+    #[pyo3(signature = (path, json, overrides, quality))]
+    fn new(
+        py: Python<'_>,
+        path: Option<PathBuf>,
+        json: Option<String>,
+        overrides: Vec<String>,
+        quality: Option<String>,
+    ) -> PyResult<Self> {
+        let source = Source {
+            path,
+            json,
+            overrides,
+            quality,
+        };
+        let stop = work::new_flag();
+        let opened = work::run(py, move || Opened::new(&source, stop))?;
+        Ok(Self {
+            opened: Mutex::new(Some(opened)),
+        })
+    }
+
+    fn close(&self) {
+        let opened = locked(&self.opened).take();
+        drop(opened);
+    }
+
+    fn is_closed(&self) -> bool {
+        locked(&self.opened).is_none()
+    }
+
+    fn class_names(&self) -> PyResult<Vec<String>> {
+        Ok(self.opened()?.policy.classes)
+    }
+
+    fn config_json(&self) -> PyResult<String> {
+        text(self.opened()?.pipeline.config()).map_err(to_python)
+    }
+
+    fn sample(&self, py: Python<'_>, seed: u64, k: u64) -> PyResult<Sample> {
+        let opened = self.opened()?;
+        let sample = opened.run(py, move |pipeline| pipeline.sample(seed, k))?;
+        Ok(Sample::new(sample, opened.policy))
+    }
+
+    /// Finds out what is unknown in a scene, renders it and labels it.
+    fn take(&self, py: Python<'_>, scene: &str) -> PyResult<Sample> {
+        let (opened, scene) = (self.opened()?, scene_of(scene).map_err(to_python)?);
+        let sample = opened.run(py, move |pipeline| pipeline.take(scene))?;
+        Ok(Sample::new(sample, opened.policy))
+    }
+
+    fn draw(&self, py: Python<'_>, seed: u64, k: u64) -> PyResult<String> {
+        let opened = self.opened()?;
+        opened.run(py, move |pipeline| text(&pipeline.draw(seed, k)?))
+    }
+
+    fn resolve(&self, py: Python<'_>, scene: &str) -> PyResult<String> {
+        let (opened, scene): (_, Scene) = (self.opened()?, scene_of(scene).map_err(to_python)?);
+        opened.run(py, move |pipeline| text(&pipeline.resolve(scene)?.0))
+    }
+}

@@ -1,0 +1,332 @@
+//! A picture and its labels.
+
+use crate::arrays::{Given, matte_of, to_array};
+use crate::document::text;
+use crate::errors::{internal, to_python, wrong_value};
+use crate::lock::locked;
+use crate::work;
+use numpy::ndarray::Array2;
+use numpy::{PyArray2, PyArrayDyn};
+use petcomp::dataset::{self, Extent, LabelledObject, Obstructed, Provenance};
+use petcomp::label::{Labels, ObjectLabel, RleMask};
+use petcomp::{Coverage, DeepImage, Image, ObjectId, PremulRgba, Srgb8, color, composite};
+use pyo3::exceptions::PyIndexError;
+use pyo3::prelude::*;
+use std::sync::{Arc, Mutex};
+
+/// How a sample's labels are read.
+#[derive(Clone)]
+pub(crate) struct Policy {
+    pub(crate) classes: Vec<String>,
+    pub(crate) obstructed: Obstructed,
+    pub(crate) extent: Extent,
+}
+
+/// A picture and its labels.
+#[pyclass(frozen, module = "petcomp._petcomp")]
+pub(crate) struct Sample {
+    facts: Arc<Facts>,
+    frame: Mutex<Frame>,
+}
+
+/// All but the picture.
+struct Facts {
+    size: [usize; 2],
+    deep: DeepImage,
+    labels: Labels,
+    provenance: Option<Provenance>,
+    policy: Policy,
+}
+
+/// The picture, until it is moved into an array, and what is made from it.
+struct Frame {
+    linear: Option<Arc<Image<PremulRgba>>>,
+    array: Option<Py<PyArrayDyn<f32>>>,
+    shown: Option<Py<PyArrayDyn<u8>>>,
+}
+
+impl Sample {
+    pub(crate) fn new(sample: dataset::Sample, policy: Policy) -> Self {
+        let (width, height) = sample.frame.size();
+        Self {
+            facts: Arc::new(Facts {
+                size: [width, height],
+                deep: sample.deep,
+                labels: sample.labels,
+                provenance: sample.provenance,
+                policy,
+            }),
+            frame: Mutex::new(Frame {
+                linear: Some(Arc::new(sample.frame)),
+                array: None,
+                shown: None,
+            }),
+        }
+    }
+
+    /// What the library's writers take.
+    pub(crate) fn to_dataset_sample(&self, py: Python<'_>) -> PyResult<dataset::Sample> {
+        Ok(dataset::Sample {
+            deep: self.facts.deep.clone(),
+            provenance: self.facts.provenance.clone(),
+            ..dataset::Sample::new(self.frame_again(py)?, self.facts.labels.clone())
+        })
+    }
+
+    /// The picture, as whoever has its array may have changed it.
+    fn frame_again(&self, py: Python<'_>) -> PyResult<Image<PremulRgba>> {
+        let frame = locked(&self.frame);
+        match (&frame.linear, &frame.array) {
+            (Some(linear), _) => Ok(Image::clone(linear)),
+            (None, Some(array)) => {
+                let array = array.bind(py).clone().into_any();
+                drop(frame);
+                let pixels = Given::from_argument("image_linear", &array)?;
+                let pixels = pixels.decoded("image_linear").map_err(to_python)?;
+                Ok(pixels.into_premul())
+            }
+            (None, None) => Err(internal("a sample without a picture")),
+        }
+    }
+}
+
+/// As a display shows it, on black.
+fn displayed(frame: &Image<PremulRgba>) -> Image<Srgb8> {
+    color::to_srgb8(&frame.map(PremulRgba::color))
+}
+
+impl Facts {
+    fn labelled(&self) -> Vec<LabelledObject<'_>> {
+        let count = self.policy.classes.len();
+        self.policy.obstructed.labelled(&self.labels, count)
+    }
+
+    fn mask_of<'a>(&self, label: &LabelledObject<'a>) -> &'a RleMask {
+        self.policy.extent.of(label.object).1
+    }
+
+    fn mask(&self, place: usize) -> PyResult<&RleMask> {
+        let labelled = self.labelled();
+        let label = labelled.get(place).ok_or_else(|| {
+            PyIndexError::new_err(format!(
+                "mask {place}, expected less than {}",
+                labelled.len()
+            ))
+        })?;
+        Ok(self.mask_of(label))
+    }
+
+    /// Of the objects in front; infinite where there is none.
+    fn depths(&self) -> Image<f32> {
+        let [width, height] = self.size;
+        Image::from_fn(width, height, |x, y| {
+            let front = composite::front(self.samples(x, y));
+            front.map_or(f32::INFINITY, |sample| sample.depth.0)
+        })
+    }
+
+    fn ids(&self) -> Image<u32> {
+        let [width, height] = self.size;
+        Image::from_fn(width, height, |x, y| {
+            composite::front(self.samples(x, y)).map_or(0, |sample| sample.object.0)
+        })
+    }
+
+    /// None for a picture that was made in another way.
+    fn samples(&self, x: usize, y: usize) -> &[petcomp::DeepSample] {
+        if self.deep.width() == 0 {
+            return &[];
+        }
+        self.deep.at(x, y)
+    }
+}
+
+#[pymethods]
+impl Sample {
+    /// A picture from anywhere, with the masks of its objects.
+    #[staticmethod]
+    fn from_masks(
+        py: Python<'_>,
+        image: &Bound<'_, PyAny>,
+        masks: Vec<Bound<'_, PyAny>>,
+        object_classes: Vec<u32>,
+        classes: Vec<String>,
+    ) -> PyResult<Self> {
+        let image = Given::from_argument("image", image)?;
+        let masks: PyResult<Vec<_>> = masks.iter().map(|mask| matte_of("masks", mask)).collect();
+        let masks = masks?;
+        check_classes(&object_classes, masks.len(), classes.len())?;
+        let policy = Policy {
+            classes,
+            obstructed: Obstructed::Keep,
+            extent: Extent::Amodal,
+        };
+        let sample = work::run(py, move || {
+            let frame = image.decoded("image")?.into_premul();
+            let labels = labels_of(frame.size(), &masks, &object_classes)?;
+            Ok(dataset::Sample::new(frame, labels))
+        })?;
+        Ok(Self::new(sample, policy))
+    }
+
+    #[getter]
+    fn size(&self) -> [usize; 2] {
+        self.facts.size
+    }
+
+    /// height x width x 3, uint8, sRGB.
+    fn image(&self, py: Python<'_>) -> PyResult<Py<PyArrayDyn<u8>>> {
+        let linear = {
+            let frame = locked(&self.frame);
+            if let Some(shown) = &frame.shown {
+                return Ok(shown.clone_ref(py));
+            }
+            frame.linear.clone()
+        };
+        let linear = linear.ok_or_else(|| internal("a sample without a picture"))?;
+        let shown = work::run(py, move || Ok(displayed(&linear)))?;
+        let array = to_array::<Srgb8, u8>(py, shown)?.unbind();
+        let mut frame = locked(&self.frame);
+        Ok(frame.shown.get_or_insert(array).clone_ref(py))
+    }
+
+    /// height x width x 4, float32, scene-linear, premultiplied.
+    fn image_linear(&self, py: Python<'_>) -> PyResult<Py<PyArrayDyn<f32>>> {
+        // What is shown is made first: the array is the caller's to change.
+        self.image(py)?;
+        let mut frame = locked(&self.frame);
+        if let Some(linear) = frame.linear.take() {
+            let linear = Arc::try_unwrap(linear).unwrap_or_else(|shared| Image::clone(&shared));
+            frame.array = Some(to_array::<PremulRgba, f32>(py, linear)?.unbind());
+        }
+        let array = frame.array.as_ref().map(|array| array.clone_ref(py));
+        array.ok_or_else(|| internal("a sample without a picture"))
+    }
+
+    fn depth<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
+        let facts = self.facts.clone();
+        to_array(py, work::run(py, move || Ok(facts.depths()))?)
+    }
+
+    fn ids<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<u32>>> {
+        let facts = self.facts.clone();
+        to_array(py, work::run(py, move || Ok(facts.ids()))?)
+    }
+
+    /// One row an object: x0, y0, x1, y1.
+    fn boxes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let labelled = self.facts.labelled();
+        let boxes = labelled
+            .iter()
+            .map(|label| self.facts.policy.extent.of(label.object).0);
+        let numbers: Vec<f64> = boxes.flat_map(|b| [b.x0, b.y0, b.x1, b.y1]).collect();
+        let array = Array2::from_shape_vec((labelled.len(), 4), numbers);
+        Ok(PyArray2::from_owned_array(
+            py,
+            array.map_err(|e| internal(&e.to_string()))?,
+        ))
+    }
+
+    /// Number, class, and whether to be ignored, of each labelled object.
+    fn labelled(&self) -> Vec<(u32, u32, bool)> {
+        let labelled = self.facts.labelled();
+        labelled
+            .iter()
+            .map(|label| (label.object.id.0, label.class, label.ignored))
+            .collect()
+    }
+
+    fn class_names(&self) -> Vec<String> {
+        self.facts.policy.classes.clone()
+    }
+
+    /// COCO's compressed run lengths of a labelled object, as JSON.
+    fn mask_json(&self, place: usize) -> PyResult<String> {
+        text(self.facts.mask(place)?).map_err(to_python)
+    }
+
+    /// height x width, bool.
+    fn mask<'py>(&self, py: Python<'py>, place: usize) -> PyResult<Bound<'py, PyArray2<bool>>> {
+        let [width, height] = self.facts.size;
+        let mut inside = Array2::from_elem((height, width), false);
+        for (x, y) in self.facts.mask(place)?.pixels() {
+            inside[(y as usize, x as usize)] = true;
+        }
+        Ok(PyArray2::from_owned_array(py, inside))
+    }
+
+    fn labels_json(&self) -> PyResult<String> {
+        text(&self.facts.labels).map_err(to_python)
+    }
+
+    fn scene_json(&self) -> PyResult<Option<String>> {
+        let scene = self.facts.provenance.as_ref().map(|p| text(&p.scene));
+        scene.transpose().map_err(to_python)
+    }
+
+    /// Every draw by its path.
+    fn draws(&self) -> Vec<(String, f64)> {
+        let draws = self.facts.provenance.iter().flat_map(|p| &p.draws);
+        draws.map(|draw| (draw.path.clone(), draw.value)).collect()
+    }
+}
+
+fn check_classes(object_classes: &[u32], masks: usize, classes: usize) -> PyResult<()> {
+    if object_classes.len() != masks {
+        let count = object_classes.len();
+        return Err(wrong_value(
+            "object_classes",
+            format_args!("{count}, expected one for each of {masks} masks"),
+        ));
+    }
+    match object_classes
+        .iter()
+        .find(|class| **class as usize >= classes)
+    {
+        None => Ok(()),
+        Some(class) => Err(wrong_value(
+            "object_classes",
+            format_args!("{class}, but there are {classes} classes"),
+        )),
+    }
+}
+
+fn labels_of(
+    (width, height): (usize, usize),
+    masks: &[Image<Coverage>],
+    classes: &[u32],
+) -> petcomp::Result<Labels> {
+    let objects = (1..).zip(masks).zip(classes);
+    let objects: petcomp::Result<Vec<_>> = objects
+        .map(|((id, mask), class)| {
+            if mask.size() != (width, height) {
+                let (w, h) = mask.size();
+                let what = format!("{w} x {h}, but the picture has {width} x {height}");
+                return Err(petcomp::Error::value(format!("masks[{}]", id - 1), what));
+            }
+            Ok(object_of(id, mask, *class))
+        })
+        .collect();
+    Ok(Labels {
+        image: [width as u32, height as u32],
+        objects: objects?,
+        ..Labels::default()
+    })
+}
+
+fn object_of(id: u32, mask: &Image<Coverage>, class: u32) -> ObjectLabel {
+    let (width, height) = mask.size();
+    let mask = RleMask::from_fn([width as u32, height as u32], |x, y| {
+        mask[(x as usize, y as usize)].0 > 0.5
+    });
+    ObjectLabel {
+        id: ObjectId(id),
+        class,
+        amodal_box: mask.bounds(),
+        visible_box: mask.bounds(),
+        amodal_mask: mask.clone(),
+        visible_mask: mask,
+        visible_fraction: 1.0,
+        ..ObjectLabel::default()
+    }
+}

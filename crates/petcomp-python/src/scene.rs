@@ -1,0 +1,82 @@
+//! Scenes and recipes as documents.
+
+use crate::document::{parse, text};
+use crate::errors::to_python;
+use crate::work;
+use petcomp::dataset::DatasetConfig;
+use petcomp::scene::{CameraSource, Surface};
+use petcomp::{Camera, Result, Scene, io};
+use pyo3::prelude::*;
+use std::path::PathBuf;
+
+/// A scene as it is read, every default told that is not left out in files.
+#[pyfunction]
+pub(crate) fn check_scene(json: &str) -> PyResult<String> {
+    scene_of(json)
+        .and_then(|scene| text(&scene))
+        .map_err(to_python)
+}
+
+/// A scene of a file, TOML or JSON.
+#[pyfunction]
+pub(crate) fn read_scene(py: Python<'_>, path: PathBuf) -> PyResult<String> {
+    work::run(py, move || {
+        let scene: Scene = io::read_document(&path)?;
+        scene.check().map_err(|e| e.in_file(&path))?;
+        text(&scene)
+    })
+}
+
+/// A scene to a file, TOML or JSON by its name.
+#[pyfunction]
+pub(crate) fn write_scene(py: Python<'_>, path: PathBuf, json: &str) -> PyResult<()> {
+    let scene = scene_of(json).map_err(to_python)?;
+    work::run(py, move || io::write_document(path, &scene))
+}
+
+pub(crate) fn scene_of(json: &str) -> Result<Scene> {
+    let scene: Scene = parse("scene", json)?;
+    scene.check()?;
+    Ok(scene)
+}
+
+/// A recipe as it is read.
+#[pyfunction]
+pub(crate) fn check_config(json: &str) -> PyResult<String> {
+    config_of(json)
+        .and_then(|config| text(&config))
+        .map_err(to_python)
+}
+
+pub(crate) fn config_of(json: &str) -> Result<DatasetConfig> {
+    let config: DatasetConfig = parse("recipe", json)?;
+    config.check()?;
+    Ok(config)
+}
+
+/// An empty scene that this camera sees.
+pub(crate) fn empty_scene(camera: &Camera) -> Scene {
+    Scene {
+        image: camera.image,
+        plate: String::new(),
+        camera: CameraSource::Known(*camera),
+        view: Default::default(),
+        lens: Default::default(),
+        surface: Surface::new([1.0, 1.0]),
+        objects: Vec::new(),
+        lights: Vec::new(),
+        ambient: petcomp::LinearRgb::BLACK,
+        environment: None,
+        exposure: Default::default(),
+        cast: Default::default(),
+        edges: Default::default(),
+        finish: Default::default(),
+        files: None,
+        settings: Default::default(),
+    }
+}
+
+/// A camera that a scene may have.
+pub(crate) fn check_camera(camera: &Camera) -> Result<()> {
+    empty_scene(camera).check()
+}

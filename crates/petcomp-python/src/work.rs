@@ -1,0 +1,184 @@
+//! Work beside the interpreter: on threads of its own, with its lock released, stopped by Ctrl-C.
+//!
+//! A job gets a pool that nobody else uses while it runs: one that waits in the middle of a picture
+//! must not begin another. Pools are kept for the next job of the same process; a fork has none of
+//! its parent's threads, and begins anew. For the same reason nothing that works on rows side by
+//! side is called outside of a job: rayon's own pool would not be there.
+
+use crate::errors::{internal, to_python};
+use crate::lock::locked;
+use crate::messages;
+use pyo3::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+/// How often signals, messages and progress are looked for.
+const POLL_INTERVAL: Duration = Duration::from_millis(50);
+/// How long an interrupted job is waited for; what takes longer ends by itself, unseen.
+const GRACE_PERIOD: Duration = Duration::from_millis(700);
+/// Most threads that may be asked for, as on the command line.
+const MAX_THREADS: usize = 1024;
+
+/// Threads of a job; 0 is one per core.
+static THREADS: AtomicUsize = AtomicUsize::new(0);
+
+/// Pools that nobody uses, with the processes that they belong to.
+static IDLE_POOLS: Mutex<Vec<IdlePool>> = Mutex::new(Vec::new());
+
+struct IdlePool {
+    process: u32,
+    threads: usize,
+    pool: ThreadPool,
+}
+
+/// Sets how many threads a job has; 0 is one per core.
+#[pyfunction]
+pub(crate) fn set_threads(count: usize) -> PyResult<()> {
+    if count > MAX_THREADS {
+        let what = format!("{count}, expected 0 to {MAX_THREADS}");
+        return Err(to_python(petcomp::Error::value("threads", what)));
+    }
+    THREADS.store(count, Ordering::Relaxed);
+    Ok(())
+}
+
+/// What a job leaves for the thread that waits for it.
+type Outcome<T> = Arc<(Mutex<Option<Result<T, String>>>, Condvar)>;
+
+/// What to do beside waiting for a job, with the interpreter's lock held.
+type Beside<'a> = &'a mut dyn FnMut(Python<'_>) -> PyResult<()>;
+
+/// Runs a job that cannot be stopped in the middle; Ctrl-C leaves it behind.
+pub(crate) fn run<T: Send + 'static>(
+    py: Python<'_>,
+    job: impl FnOnce() -> petcomp::Result<T> + Send + 'static,
+) -> PyResult<T> {
+    run_beside(py, &|_| (), &mut |_| Ok(()), job)
+}
+
+/// Runs a job. After Ctrl-C, or an error of what is done beside it, `stop(true)` asks it to end;
+/// `stop(false)` takes that back when it has, or is left behind.
+pub(crate) fn run_beside<T: Send + 'static>(
+    py: Python<'_>,
+    stop: &dyn Fn(bool),
+    beside: Beside<'_>,
+    job: impl FnOnce() -> petcomp::Result<T> + Send + 'static,
+) -> PyResult<T> {
+    messages::start();
+    let outcome: Outcome<petcomp::Result<T>> = Arc::default();
+    start(job, &outcome)?;
+    let waited = wait(py, &outcome, beside);
+    if waited.is_err() {
+        stop(true);
+        let end = Instant::now() + GRACE_PERIOD;
+        py.detach(|| while Instant::now() < end && !is_there(&outcome, POLL_INTERVAL) {});
+        stop(false);
+    }
+    messages::deliver(py)?;
+    waited?;
+    taken(&outcome)
+}
+
+fn taken<T>(outcome: &Outcome<petcomp::Result<T>>) -> PyResult<T> {
+    match locked(&outcome.0).take() {
+        Some(Ok(result)) => result.map_err(to_python),
+        Some(Err(panic)) => Err(internal(&panic)),
+        None => Err(internal("a job without a result")),
+    }
+}
+
+/// Until the job has ended; an error when it is not to be waited for any more.
+fn wait<T>(py: Python<'_>, outcome: &Outcome<T>, beside: Beside<'_>) -> PyResult<()>
+where
+    T: Send,
+{
+    loop {
+        let ended = py.detach(|| is_there(outcome, POLL_INTERVAL));
+        beside(py)?;
+        if ended {
+            return Ok(());
+        }
+        py.check_signals()?;
+        messages::deliver(py)?;
+    }
+}
+
+/// Whether there is an outcome, now or before long.
+fn is_there<T>((result, there): &(Mutex<Option<T>>, Condvar), patience: Duration) -> bool {
+    let result = locked(result);
+    let waited = there.wait_timeout_while(result, patience, |result| result.is_none());
+    waited.unwrap_or_else(PoisonError::into_inner).0.is_some()
+}
+
+/// Starts a job in a pool of its own.
+fn start<T: Send + 'static>(
+    job: impl FnOnce() -> T + Send + 'static,
+    outcome: &Outcome<T>,
+) -> PyResult<()> {
+    let pool = Arc::new(idle_pool()?);
+    let (outcome, own) = (outcome.clone(), pool.clone());
+    pool.pool.spawn(move || {
+        let result = catch_unwind(AssertUnwindSafe(job)).map_err(|panic| panic_message(&*panic));
+        if let Some(pool) = Arc::into_inner(own) {
+            give_back(pool);
+        }
+        *locked(&outcome.0) = Some(result);
+        outcome.1.notify_all();
+    });
+    give_back_last(pool);
+    Ok(())
+}
+
+/// The starting thread's share of a pool, where the job has ended already.
+fn give_back_last(pool: Arc<IdlePool>) {
+    if let Some(pool) = Arc::into_inner(pool) {
+        give_back(pool);
+    }
+}
+
+fn give_back(pool: IdlePool) {
+    locked(&IDLE_POOLS).push(pool);
+}
+
+fn idle_pool() -> PyResult<IdlePool> {
+    let threads = THREADS.load(Ordering::Relaxed);
+    match take_idle_pool(std::process::id(), threads) {
+        Some(pool) => Ok(pool),
+        None => new_pool(threads),
+    }
+}
+
+/// A pool of this process with so many threads that nobody uses.
+fn take_idle_pool(process: u32, threads: usize) -> Option<IdlePool> {
+    let mut idle = locked(&IDLE_POOLS);
+    if idle.iter().any(|pool| pool.process != process) {
+        // Those of the process that this one was forked from: nobody is there to end them.
+        idle.drain(..).for_each(std::mem::forget);
+    }
+    let place = idle.iter().position(|pool| pool.threads == threads)?;
+    Some(idle.swap_remove(place))
+}
+
+fn new_pool(threads: usize) -> PyResult<IdlePool> {
+    let pool = ThreadPoolBuilder::new().num_threads(threads).build();
+    let pool = pool.map_err(|e| to_python(petcomp::Error::value("threads", e)))?;
+    Ok(IdlePool {
+        process: std::process::id(),
+        threads,
+        pool,
+    })
+}
+
+fn panic_message(panic: &(dyn std::any::Any + Send)) -> String {
+    let text = panic.downcast_ref::<&str>().copied();
+    let text = text.or_else(|| panic.downcast_ref::<String>().map(String::as_str));
+    text.unwrap_or("no message").to_owned()
+}
+
+/// A flag that lives as long as the process, which the library's pipelines want.
+pub(crate) fn new_flag() -> &'static AtomicBool {
+    Box::leak(Box::default())
+}

@@ -1,0 +1,185 @@
+"""Threads, processes, interruption, handles, messages."""
+
+import concurrent.futures
+import logging
+import multiprocessing
+import pickle
+import subprocess
+import sys
+import threading
+import time
+
+import numpy as np
+import petcomp
+import pytest
+
+
+def picture_of(recipe, k):
+    return petcomp.Pipeline(recipe)[k].image
+
+
+def test_a_fork_makes_the_same_picture(recipe):
+    want = picture_of(recipe, 1)
+    context = multiprocessing.get_context("fork")
+    with context.Pool(2) as pool:
+        for image in pool.starmap(picture_of, [(recipe, 1)] * 4):
+            assert (image == want).all()
+
+
+def test_a_spawned_process_makes_the_same_picture(recipe):
+    pipeline = petcomp.Pipeline(recipe, seed=2, set={"scene.objects": 1})
+    again = pickle.loads(pickle.dumps(pipeline))
+    assert (again[0].image == pipeline[0].image).all()
+    script = (
+        "import sys, pickle; pipeline = pickle.load(sys.stdin.buffer); "
+        "sys.stdout.buffer.write(pipeline[0].image.tobytes())"
+    )
+    done = subprocess.run([sys.executable, "-c", script], input=pickle.dumps(pipeline), capture_output=True, check=True)
+    assert done.stdout == pipeline[0].image.tobytes()
+
+
+def test_threads_share_a_pipeline(recipe):
+    pipeline = petcomp.Pipeline(recipe)
+    want = [pipeline[k].image for k in range(4)]
+    with concurrent.futures.ThreadPoolExecutor(4) as pool:
+        for k, sample in zip([0, 1, 2, 3] * 4, pool.map(pipeline.sample, [0, 1, 2, 3] * 4)):
+            assert (sample.image == want[k]).all()
+
+
+def test_one_sample_in_many_threads(recipe):
+    sample = petcomp.Pipeline(recipe)[0]
+    native = sample._native
+    with concurrent.futures.ThreadPoolExecutor(8) as pool:
+        shown = list(pool.map(lambda i: native.image_linear() if i % 2 else native.image(), range(64)))
+    assert all(image is shown[0] for image in shown[::2])
+    assert all(image is shown[1] for image in shown[1::2])
+
+
+def test_the_interpreter_goes_on_beside_the_work(recipe):
+    pipeline = petcomp.Pipeline(recipe, set={"scene.image": [1280, 960], "render.subsamples": 4})
+    steps, done = 0, threading.Event()
+
+    def work():
+        pipeline.sample(0)
+        done.set()
+
+    threading.Thread(target=work).start()
+    while not done.is_set():
+        time.sleep(0.001)
+        steps += 1
+    assert steps > 20
+
+
+INTERRUPTED = """
+import signal, sys, threading, time, os
+import petcomp
+def strike():
+    time.sleep(1.5)
+    print(time.monotonic(), flush=True)
+    os.kill(os.getpid(), signal.SIGINT)
+threading.Thread(target=strike, daemon=True).start()
+try:
+    {work}
+except KeyboardInterrupt:
+    print(time.monotonic(), flush=True)
+"""
+
+
+@pytest.mark.parametrize(
+    "work",
+    [
+        "petcomp.generate({recipe!r}, 100000, {folder!r})",
+        "p = petcomp.Pipeline({recipe!r}, set={{'scene.image': [3000, 3000], 'render.subsamples': 8}})\n"
+        "    for k in range(9): p[k]",
+        "p = petcomp.Pipeline({recipe!r}, set={{'scene.objects': 40}})\n    for k in range(10**6): p[k]",
+    ],
+)
+def test_ctrl_c_stops_within_a_second(recipe, tmp_path, work):
+    folder = str(tmp_path / "set")
+    script = INTERRUPTED.format(work=work.format(recipe=str(recipe), folder=folder))
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=120)
+    struck, stopped = map(float, done.stdout.split())
+    assert stopped - struck < 1.0, done.stderr
+
+
+def test_an_interrupted_dataset_goes_on(recipe, tmp_path):
+    def stop(progress):
+        if progress.made == 2:
+            raise StopIteration("enough")
+
+    with pytest.raises(StopIteration, match="enough"):
+        petcomp.generate(recipe, 200, tmp_path / "set", progress=stop)
+    end = time.monotonic() + 20
+    while True:
+        # The picture in hand may still be written: the folder is its own until then.
+        try:
+            counts = petcomp.generate(recipe, 200, tmp_path / "set", only=3)
+            break
+        except petcomp.Error:
+            assert time.monotonic() < end
+            time.sleep(0.1)
+    assert 3 <= counts.images < 200
+
+
+def test_an_exception_of_the_own_function_is_the_callers(tmp_path):
+    def make(k):
+        raise RuntimeError(f"no picture {k}")
+
+    with pytest.raises(RuntimeError, match="no picture"):
+        petcomp.generate(make, 3, tmp_path / "set", classes=["a"])
+    with pytest.raises(TypeError, match="expected a Sample"):
+        petcomp.generate(lambda k: k, 3, tmp_path / "other", classes=["a"])
+
+
+def test_a_closed_pipeline_says_so(recipe):
+    with petcomp.Pipeline(recipe) as pipeline:
+        sample = pipeline[0]
+    assert pipeline.closed
+    for use in (lambda: pipeline[0], lambda: pipeline.classes, lambda: pipeline.draw(0)):
+        with pytest.raises(petcomp.errors.ClosedError, match="the pipeline is closed"):
+            use()
+    pipeline.close()
+    assert sample.image.shape == (120, 160, 3)
+
+
+def test_closing_beside_the_work_is_harmless(recipe):
+    for _ in range(5):
+        pipeline = petcomp.Pipeline(recipe)
+        with concurrent.futures.ThreadPoolExecutor(3) as pool:
+            jobs = [pool.submit(pipeline.sample, k) for k in range(6)]
+            pipeline.close()
+            for job in jobs:
+                error = job.exception()
+                assert error is None or isinstance(error, petcomp.errors.ClosedError)
+
+
+def test_arrays_outlive_their_sample(recipe):
+    image, linear = (lambda s: (s.image, s.image_linear))(petcomp.Pipeline(recipe)[0])
+    assert image.sum() > 0 and np.isfinite(linear).all()
+    linear[:] = 0
+
+
+def test_warnings_reach_logging(caplog):
+    caplog.set_level(logging.WARNING, logger="petcomp")
+    corners = [[100, 100], [540, 100], [540, 380], [100, 380]]
+    petcomp.Camera.from_rectangle(corners, [0.44, 0.28], [640, 480])
+    assert all(record.name == "petcomp" for record in caplog.records)
+
+
+def test_the_program_is_inside():
+    done = subprocess.run([sys.executable, "-m", "petcomp", "--version"], capture_output=True, text=True)
+    assert done.returncode == 0 and done.stdout == f"petcomp {petcomp.__version__}\n"
+    done = subprocess.run(
+        [sys.executable, "-m", "petcomp", "asset", "list", "/nowhere"], capture_output=True, text=True
+    )
+    assert done.returncode == 4 and done.stderr.startswith("error: ")
+
+
+def test_threads_are_set():
+    petcomp.set_threads(1)
+    try:
+        assert petcomp.matte.key(np.zeros((4, 4, 3), np.float32), screen=(0.1, 0.7, 0.2)).matte.shape == (4, 4)
+    finally:
+        petcomp.set_threads(0)
+    with pytest.raises(ValueError, match="threads: 5000"):
+        petcomp.set_threads(5000)

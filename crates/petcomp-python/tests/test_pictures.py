@@ -1,0 +1,219 @@
+"""Keying, cut-outs, cameras, shots, evaluation: the library's answers in arrays."""
+
+import json
+import math
+import pickle
+
+import numpy as np
+import petcomp
+import pytest
+from conftest import SAMPLES
+
+GREEN = (0.1, 0.75, 0.2)
+PHOTO = sorted((SAMPLES / "bottles").glob("*.png"))[0]
+
+
+@pytest.fixture(scope="module")
+def photo():
+    return petcomp.io.read(PHOTO)
+
+
+def test_a_pixel_is_keyed_as_in_the_documentation():
+    photo = np.array([[[0.3, 0.55, 0.25]]], np.float32)
+    keyed = petcomp.matte.key(photo, screen=GREEN)
+    assert keyed.matte[0, 0] == np.float32(0.609068632)
+
+
+def test_key_is_the_programs(photo, tmp_path, program):
+    screen = ",".join(map(str, GREEN))
+    out, matte = tmp_path / "cut.exr", tmp_path / "matte.tif"
+    program(
+        "matte",
+        "key",
+        PHOTO,
+        "--screen",
+        screen,
+        "--profile",
+        "blender-4.5",
+        "--set",
+        "key.clip_black=0.1",
+        "-o",
+        tmp_path / "a.tif",
+    )
+    keyed = petcomp.matte.key(photo, screen=GREEN, profile="blender-4.5", clip_black=0.1)
+    petcomp.io.write(tmp_path / "b.tif", keyed.cutout)
+    assert (tmp_path / "a.tif").read_bytes() == (tmp_path / "b.tif").read_bytes()
+    assert not out.exists() and not matte.exists()
+
+
+def test_layouts_give_the_same_matte(photo):
+    want = petcomp.matte.key(photo, screen=GREEN).matte
+    turned = np.asfortranarray(photo)
+    padded = np.zeros((photo.shape[0], photo.shape[1] + 3, 3), np.float32)
+    padded[:, :-3] = photo
+    flipped = photo[::-1].copy()[::-1]
+    shifted = np.frombuffer(b"x" + photo.tobytes(), np.uint8)[1:].view(np.float32).reshape(photo.shape)
+    assert not shifted.flags.aligned
+    for other in (turned, padded[:, :-3], flipped, shifted, photo.astype(np.float32).copy()):
+        assert (petcomp.matte.key(other, screen=GREEN).matte == want).all()
+
+
+def test_a_contiguous_photo_is_not_copied(photo):
+    import tracemalloc
+
+    owners = photo.__array_interface__["data"][0]
+    tracemalloc.start()
+    petcomp.matte.key(photo, screen=GREEN)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    # NumPy tells tracemalloc of its arrays: a copy would be photo.nbytes.
+    assert peak < photo.nbytes / 4
+    assert photo.__array_interface__["data"][0] == owners
+
+
+def test_codes_are_decoded_as_files_are(tmp_path):
+    random = np.random.default_rng(0)
+    codes = random.integers(0, 256, (20, 30, 4), dtype=np.uint8)
+    petcomp.io.write(tmp_path / "a.tif", codes)
+    petcomp.io.write(tmp_path / "b.png", codes[..., :3].copy())
+    linear = petcomp.io.read(tmp_path / "b.png")
+    assert linear.shape == (20, 30, 3)
+    screens = [petcomp.matte.key(image, screen=GREEN).matte for image in (linear, codes[..., :3])]
+    assert (screens[0] == screens[1]).all()
+
+
+def test_a_plate_of_one_colour_is_that_colour(photo):
+    plate = np.broadcast_to(np.array(GREEN, np.float32), photo.shape)
+    assert np.allclose(
+        petcomp.matte.key(photo, screen=plate).matte, petcomp.matte.key(photo, screen=GREEN).matte, atol=1e-6
+    )
+
+
+def test_garbage_and_core_hold(photo):
+    where = np.zeros(photo.shape[:2], bool)
+    where[:50] = True
+    assert (petcomp.matte.key(photo, screen=GREEN, garbage=where).matte[:50] == 0).all()
+    assert (petcomp.matte.key(photo, screen=GREEN, core=where.astype(np.float32)).matte[:50] == 1).all()
+
+
+def test_a_photo_is_cut_out(photo):
+    cut = petcomp.matte.cut_out(photo)
+    assert cut.rgba.shape[2] == 4 and cut.rgba.shape[:2] == cut.transmittance.shape[:2]
+    assert cut.rgba[..., 3].max() > 0.5 and cut.hull.shape[1] == 2
+    assert cut._repr_png_().startswith(b"\x89PNG")
+
+
+def test_assets_are_built_as_by_the_program(world, tmp_path):
+    steps = []
+    built = petcomp.asset.build(world / "photos.csv", tmp_path / "assets", progress=lambda *s: steps.append(s))
+    assert built.photos == 2 and built.classes == ["bottle"]
+    assert steps[0] == (0, 2) and max(steps) == (2, 2)
+    ours, theirs = tmp_path / "assets/assets.toml", world / "assets/assets.toml"
+    assert ours.read_text() == theirs.read_text()
+    assert petcomp.asset.list_folder(tmp_path / "assets")["classes"] == ["bottle"]
+
+
+def test_a_rectangle_gives_its_camera():
+    true = petcomp.Camera.look_at([0.1, -0.7, 0.8], [0, 0, 0], 800.0, [640, 480])
+    corners = [[-0.3, 0.2, 0], [0.3, 0.2, 0], [0.3, -0.2, 0], [-0.3, -0.2, 0]]
+    seen = true.project(corners)[:, :2]
+    found = petcomp.Camera.from_rectangle(seen, [0.6, 0.4], [640, 480], focal_px=800.0)
+    assert np.abs(found.project(corners)[:, :2] - seen).max() < 0.5
+    assert abs(found.tilt - true.tilt) < math.radians(0.5)
+
+
+def test_a_camera_projects_as_its_matrices_say():
+    camera = petcomp.Camera.look_at([0.3, -0.7, 0.8], [0.1, 0, 0], 700.0, [640, 480])
+    points = np.random.default_rng(1).uniform(-0.2, 0.2, (50, 3))
+    inside = np.c_[points, np.ones(50)] @ camera.camera_from_world.T[:, :3]
+    pixels = inside @ camera.intrinsics.T
+    seen = camera.project(points)
+    assert np.allclose(seen[:, :2], pixels[:, :2] / pixels[:, 2:], atol=1e-9)
+    assert np.allclose(seen[:, 2], inside[:, 2])
+    ends = camera.center + camera.rays(seen[:, :2]) * seen[:, 2:]
+    assert np.allclose(ends, points, atol=1e-9)
+    assert np.isnan(camera.project([2 * camera.center - points[0]])).all()
+    assert pickle.loads(pickle.dumps(camera)) == camera
+    assert camera.resized([320, 240]).focal_px == (350.0, 350.0)
+
+
+def shot(**fields):
+    film = np.zeros((8, 8, 4), np.float32)
+    film[:] = [0.3, 0.05, 0.05, 0.5]
+    camera = petcomp.Camera.looking_down(1.0, 80.0, [64, 48])
+    card = petcomp.Card(id=1, texture=film, size=(0.2, 0.1), position=(0, 0, 0.05))
+    plate = np.full((48, 64, 3), 0.5, np.float32)
+    return petcomp.Shot(camera, **fields).with_plate(plate).with_card(card).with_ambient(1.0)
+
+
+def test_a_shot_is_rendered_and_labelled():
+    sample = petcomp.render(shot())
+    red, green = sample.image_linear[24, 32, :2]
+    # Film of 0.3 over a plate of 0.5 that it half hides, in its own shadow.
+    assert 0.3 < red < 0.3 + 0.25 + 1e-6 and red > green
+    pixels = 80.0 / 0.95
+    want = [32 - 0.1 * pixels, 24 - 0.05 * pixels, 32 + 0.1 * pixels, 24 + 0.05 * pixels]
+    assert np.abs(sample.boxes[0] - want).max() < 1.0
+    assert abs(sample.depth[24, 32] - 0.95) < 1e-6 and sample.ids[24, 32] == 1
+    assert sample.scene is None and "Sample(64 x 48, 1 labels)" == repr(sample)
+
+
+def test_a_card_above_covers_the_one_below():
+    two = shot().with_card(
+        petcomp.Card(id=2, texture=np.full((4, 4, 3), 200, np.uint8), size=(0.2, 0.1), position=(0, 0, 0.1))
+    )
+    sample = petcomp.render(two)
+    assert sample.object_ids.tolist() == [2]
+    kept = petcomp.render(petcomp.Shot(**{**vars(two), "labels": {"obstructed": "keep"}}))
+    assert kept.object_ids.tolist() == [1, 2]
+    assert kept.labels["objects"][0]["covered_by"] == [2]
+
+
+def test_evaluation_in_memory_is_that_of_files(tmp_path, program):
+    random = np.random.default_rng(0)
+    truth, found = [], []
+    for folder in ("truth", "found"):
+        (tmp_path / folder).mkdir()
+    for i in range(6):
+        corner = random.uniform(0, 50, (3, 2))
+        boxes = np.c_[corner, corner + random.uniform(10, 40, (3, 2))]
+        moved = boxes + random.uniform(-3, 3, (3, 1))
+        classes, scores = random.integers(0, 2, 3), random.uniform(0.3, 1, 3)
+        write(tmp_path / f"truth/{i:06}.txt", classes, boxes)
+        write(tmp_path / f"found/{i:06}.txt", classes, moved, scores)
+        truth.append({"boxes": boxes, "classes": classes})
+        found.append({"boxes": moved, "classes": classes, "scores": scores})
+    files = petcomp.evaluate(tmp_path / "found", tmp_path / "truth", size=(100, 100), output=tmp_path / "page")
+    program("eval", tmp_path / "found", tmp_path / "truth", "--size", "100x100", "-o", tmp_path / "theirs")
+    metrics = json.loads((tmp_path / "theirs/metrics.json").read_text())
+    assert files.to_dict() == (metrics[0] if isinstance(metrics, list) else metrics)
+    assert (tmp_path / "page/eval.html").exists()
+    memory = petcomp.evaluate(found, truth)
+    assert abs(memory.map - files.map) < 1e-3 and 0 < memory.map < 1
+    assert memory.interval[0] <= memory.map <= memory.interval[1] and len(memory.by_class) == 2
+
+
+def write(path, classes, boxes, scores=None):
+    rows = []
+    for i, (number, (x0, y0, x1, y1)) in enumerate(zip(classes, boxes)):
+        row = f"{number} {(x0 + x1) / 200:.9f} {(y0 + y1) / 200:.9f} {(x1 - x0) / 100:.9f} {(y1 - y0) / 100:.9f}"
+        rows.append(row if scores is None else f"{row} {scores[i]:.9f}")
+    path.write_text("\n".join(rows) + "\n")
+
+
+def test_notebooks_see_pictures_and_tables(recipe):
+    sample = petcomp.Pipeline(recipe)[0]
+    assert sample._repr_png_().startswith(b"\x89PNG")
+    assert "<img" in sample._repr_html_() and "<table>" in sample._repr_html_()
+    assert "focal length" in petcomp.Camera.looking_down(1, 80, [64, 48])._repr_html_()
+    keyed = petcomp.matte.key(np.full((4, 4, 3), 0.5, np.float32), screen=GREEN)
+    assert keyed._repr_png_().startswith(b"\x89PNG") and keyed._repr_html_().count("<img") == 2
+
+
+def test_a_png_for_notebooks_is_the_picture(tmp_path):
+    from petcomp._show import png
+
+    codes = np.random.default_rng(0).integers(0, 256, (7, 5, 3), dtype=np.uint8)
+    (tmp_path / "a.png").write_bytes(png(codes))
+    petcomp.io.write(tmp_path / "b.png", codes)
+    assert (petcomp.io.read(tmp_path / "a.png") == petcomp.io.read(tmp_path / "b.png")).all()

@@ -1,0 +1,148 @@
+"""What Python makes is what the program makes."""
+
+import hashlib
+import json
+
+import numpy as np
+import petcomp
+import pytest
+
+COUNT = 4
+
+
+def files_of(folder):
+    """Digests of all files but the clock's."""
+    found = {}
+    for path in sorted(folder.rglob("*")):
+        if path.is_file() and path.name not in {".runs.jsonl", ".lock", ".inputs.json"}:
+            found[str(path.relative_to(folder))] = hashlib.sha256(path.read_bytes()).hexdigest()
+    return found
+
+
+@pytest.fixture(scope="module")
+def written(recipe, tmp_path_factory, program):
+    folder = tmp_path_factory.mktemp("written") / "set"
+    program("dataset", "generate", recipe, "-n", COUNT, "--seed", 5, "-o", folder, "-q")
+    return folder
+
+
+def test_generate_writes_the_programs_files(recipe, written, tmp_path):
+    steps = []
+    counts = petcomp.generate(recipe, COUNT, tmp_path / "set", seed=5, progress=steps.append)
+    ours, theirs = files_of(tmp_path / "set"), files_of(written)
+    assert ours == theirs
+    assert counts.images == COUNT and counts.made == COUNT
+    assert [step.done for step in steps] == list(range(COUNT + 1))
+    assert all(step.count == COUNT for step in steps)
+
+
+def test_a_second_call_makes_nothing(recipe, tmp_path):
+    petcomp.generate(recipe, 2, tmp_path / "set")
+    assert petcomp.generate(recipe, 2, tmp_path / "set").made == 0
+
+
+def test_a_sample_is_the_programs_picture(recipe, written):
+    pipeline = petcomp.Pipeline(recipe, seed=5)
+    for k in range(COUNT):
+        path = next(written.glob(f"images/*/{k:06}.png"))
+        sample = pipeline[k]
+        petcomp.io.write(written.parent / "own.png", sample.image)
+        assert (written.parent / "own.png").read_bytes() == path.read_bytes()
+
+
+def test_labels_are_the_programs(recipe, written):
+    pipeline = petcomp.Pipeline(recipe, seed=5)
+    for k in range(COUNT):
+        sample = pipeline[k]
+        record = json.loads(next(written.glob(f"scenes/*/{k:06}.json")).read_text())
+        assert sample.labels == record["labels"]
+        assert sample.scene.to_dict() == record["scene"]
+        assert sample.object_ids.tolist() == record["labelled"]
+        assert sample.draws == record["draws"]
+        rows = next(written.glob(f"labels/*/{k:06}.txt")).read_text().splitlines()
+        width, height = sample.size
+        ours = {
+            f"{c} {(b[0] + b[2]) / 2 / width:.6f} {(b[1] + b[3]) / 2 / height:.6f} "
+            f"{(b[2] - b[0]) / width:.6f} {(b[3] - b[1]) / height:.6f}"
+            for c, b in zip(sample.classes, sample.boxes)
+        }
+        assert ours == set(rows)
+
+
+def test_masks_boxes_and_depth_agree(recipe):
+    sample = petcomp.Pipeline(recipe, seed=5)[1]
+    masks = sample.mask_arrays()
+    assert masks.shape == (len(sample), sample.size[1], sample.size[0])
+    for mask, box, run in zip(masks, sample.boxes, sample.masks):
+        rows, columns = np.nonzero(mask)
+        assert box.tolist() == [columns.min(), rows.min(), columns.max() + 1, rows.max() + 1]
+        assert run["size"] == [sample.size[1], sample.size[0]]
+    assert ((sample.ids > 0) == np.isfinite(sample.depth)).all()
+    assert set(np.unique(sample.ids)) - {0} <= {o["id"] for o in sample.labels["objects"]}
+
+
+def test_image_is_the_linear_one_encoded(recipe):
+    sample = petcomp.Pipeline(recipe)[0]
+    linear = sample.image_linear
+    assert linear.dtype == np.float32 and linear.shape == (120, 160, 4)
+    assert sample.image.dtype == np.uint8 and sample.image.shape == (120, 160, 3)
+    light = np.clip(linear[..., :3].astype(np.float64), 0, 1)
+    codes = 255 * np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+    assert np.abs(codes - sample.image).max() <= 0.51
+
+
+def test_take_renders_what_was_drawn(recipe):
+    pipeline = petcomp.Pipeline(recipe, seed=5)
+    drawn = pipeline.draw(2)
+    assert (pipeline.take(drawn).image == pipeline[2].image).all()
+    solved = pipeline.resolve(drawn)
+    assert solved == pipeline[2].scene
+    assert petcomp.Scene.from_dict(solved.to_dict()) == solved
+
+
+@pytest.mark.parametrize("name", ["scene.toml", "scene.json"])
+def test_scenes_are_the_programs_files(recipe, tmp_path, program, name):
+    program("scene", "draw", recipe, "-k", 1, "-o", tmp_path / name)
+    scene = petcomp.Scene.read(tmp_path / name)
+    drawn = petcomp.Pipeline(recipe).draw(1)
+    assert scene.replace(files=None, settings={}) == drawn.replace(files=None, settings={})
+    scene.write(tmp_path / f"again-{name}")
+    assert petcomp.Scene.read(tmp_path / f"again-{name}") == scene
+    with pytest.raises(petcomp.errors.FileError, match="no such file"):
+        petcomp.Scene.read(tmp_path / "none.toml")
+
+
+def test_a_recipe_may_be_plain_data(recipe):
+    document = petcomp.Pipeline(recipe).config
+    document.pop("folder", None)
+    one = petcomp.Pipeline(document, seed=3)[0]
+    assert (one.image == petcomp.Pipeline(recipe, seed=3)[0].image).all()
+
+
+def test_set_changes_a_value(recipe):
+    pipeline = petcomp.Pipeline(recipe, set={"scene.objects": 1, "scene.image": [80, 60]})
+    assert pipeline[0].size == (80, 60)
+    assert len(pipeline[0].scene["objects"]) == 1
+
+
+def test_own_samples_become_a_dataset(tmp_path, program):
+    def make(k):
+        image = np.full((24, 32, 3), 40 * k, np.uint8)
+        mask = np.zeros((24, 32), bool)
+        mask[3 : 10 + k, 5:20] = True
+        return petcomp.Sample.from_masks(image, [mask], [1], ["a", "b"])
+
+    counts = petcomp.generate(make, 3, tmp_path / "set", classes=["a", "b"], labels={"formats": ["yolo", "coco"]})
+    assert counts.images == 3 and counts.labelled == 3
+    row = (tmp_path / "set/labels/val/000000.txt").read_text().split()
+    assert row == ["1", "0.390625", "0.270833", "0.468750", "0.291667"]
+    program("dataset", "check", tmp_path / "set")
+
+
+def test_shards_are_merged_to_the_whole(recipe, written, tmp_path, program):
+    for i in (1, 2):
+        petcomp.generate(recipe, COUNT, tmp_path / "parts", seed=5, shard=(i, 2))
+    parts = sorted(path for path in (tmp_path / "parts").iterdir())
+    program("dataset", "merge", *parts, "-o", tmp_path / "whole", "-q")
+    ours, theirs = files_of(tmp_path / "whole"), files_of(written)
+    assert {k: v for k, v in ours.items() if "/" in k} == {k: v for k, v in theirs.items() if "/" in k}

@@ -1,0 +1,59 @@
+"""Training loops get the program's samples, from whichever worker."""
+
+import hashlib
+
+import petcomp
+import pytest
+
+torch = pytest.importorskip("torch", reason="PyTorch is not installed")
+
+COUNT = 6
+
+
+def digest(sample):
+    return hashlib.sha256(sample.image.tobytes() + sample.boxes.tobytes() + sample.classes.tobytes()).hexdigest()
+
+
+def dataset(recipe, **options):
+    from petcomp.torch import Dataset
+
+    return Dataset(recipe, COUNT, seed=5, **options)
+
+
+@pytest.mark.parametrize("context", ["fork", "spawn", "forkserver"])
+def test_workers_make_the_same_samples(recipe, context):
+    pipeline = petcomp.Pipeline(recipe, seed=5)
+    want = [digest(pipeline[k]) for k in range(COUNT)]
+    loader = torch.utils.data.DataLoader(
+        dataset(recipe, transform=digest), batch_size=None, num_workers=2, multiprocessing_context=context
+    )
+    assert list(loader) == want
+    assert list(loader) == want, "a second epoch"
+
+
+def test_samples_are_the_programs_files(recipe, tmp_path, program):
+    program("dataset", "generate", recipe, "-n", COUNT, "--seed", 5, "-o", tmp_path / "set", "-q")
+    for k, (picture, target) in enumerate(dataset(recipe)):
+        path = next(tmp_path.glob(f"set/images/*/{k:06}.png"))
+        codes = (picture * 255).round().to(torch.uint8).permute(1, 2, 0).contiguous().numpy()
+        petcomp.io.write(tmp_path / "own.png", codes)
+        assert (tmp_path / "own.png").read_bytes() == path.read_bytes()
+        rows = next(tmp_path.glob(f"set/labels/*/{k:06}.txt")).read_text().splitlines()
+        assert len(rows) == len(target["boxes"]) == len(target["labels"])
+        assert target["boxes"].dtype == torch.float32 and target["labels"].min() >= 1
+
+
+def test_any_index_any_order(recipe):
+    data = dataset(recipe, transform=digest)
+    assert len(data) == COUNT and data[-1] == data[COUNT - 1]
+    assert data[3] == dataset(recipe, transform=digest)[3]
+    with pytest.raises(IndexError):
+        data[COUNT]
+
+
+def test_batches_of_lists(recipe):
+    from petcomp.torch import collate
+
+    loader = torch.utils.data.DataLoader(dataset(recipe), batch_size=3, collate_fn=collate, shuffle=True)
+    for pictures, targets in loader:
+        assert len(pictures) == len(targets) == 3 and pictures[0].shape == (3, 120, 160)

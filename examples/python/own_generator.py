@@ -1,0 +1,31 @@
+#!/usr/bin/env python3
+"""Pictures of a generator of your own, written as a dataset that trainers read: here, one leaning card each.
+
+own_generator.py FOLDER
+"""
+
+import sys
+
+import numpy as np
+import petcomp
+
+
+def sample(k):
+    """Picture k and its labels: they depend on nothing but k."""
+    camera = petcomp.Camera.look_at([0.0, -0.8, 0.8], [0.0, 0.0, 0.0], 500.0, [320, 240])
+    green = np.full((8, 8, 4), [0.05, 0.3, 0.1, 0.6], np.float32)
+    card = petcomp.Card(
+        id=1, texture=green, size=(0.25, 0.10), position=(0.0, 0.0, 0.1), rotation=(0.1 * k, 0.0, 0.3 * k)
+    )
+    plate = np.full((240, 320, 3), 0.4, np.float32)
+    return petcomp.render(petcomp.Shot(camera).with_plate(plate).with_card(card).with_ambient(1.0))
+
+
+def main():
+    folder = sys.argv[1]
+    counts = petcomp.generate(sample, 10, folder, classes=["film"], progress=print)
+    print(f"{folder}: {counts.images} images, {counts.labelled} labels")
+
+
+if __name__ == "__main__":
+    main()
