@@ -1,0 +1,231 @@
+//! How far objects start from each other: the spread whose falls leave labels where the real ones
+//! are.
+
+use super::counts::{LabelOdds, object_weights};
+use super::falls::{Fall, log_size};
+use super::statistics::{
+    AGREEMENT, Moments, Weighted, earth_mover, once, redrawn, rounds, sort_by_value,
+};
+use crate::scene::{Range, Recipe};
+
+/// The spreads that are tried, from a heap to all over the surface.
+pub(super) const SPREADS: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
+/// Spreads within these shares of the rounds of a bootstrap are the fitted range.
+const KEPT: [f64; 2] = [0.1, 0.9];
+/// What is compared of places: see [`places_of`].
+const MEASURES: usize = 4;
+
+/// Values of each picture.
+pub(super) type ByPicture = Vec<Vec<f64>>;
+
+/// Where the labels of pictures are: centres from the left and from the top, distance of each from
+/// the nearest other, and how much of it the next one overlaps.
+pub(super) fn places_of<'a>(
+    pictures: impl Iterator<Item = &'a [[f64; 4]]>,
+) -> [ByPicture; MEASURES] {
+    let mut places: [ByPicture; MEASURES] = Default::default();
+    for boxes in pictures {
+        places[0].push(boxes.iter().map(|b| b[0]).collect());
+        places[1].push(boxes.iter().map(|b| b[1]).collect());
+        places[2].push(nearest_distances(boxes));
+        places[3].push(overlaps(boxes));
+    }
+    places
+}
+
+fn nearest_distances(boxes: &[[f64; 4]]) -> Vec<f64> {
+    of_each(boxes, |a, b| (a[0] - b[0]).hypot(a[1] - b[1]), f64::min)
+}
+
+/// Greatest intersection over union of each box with another.
+pub(super) fn overlaps(boxes: &[[f64; 4]]) -> Vec<f64> {
+    of_each(boxes, iou, f64::max)
+}
+
+/// What holds of each box and some other one; nothing of a box that is alone.
+fn of_each(
+    boxes: &[[f64; 4]],
+    of_pair: fn(&[f64; 4], &[f64; 4]) -> f64,
+    better: fn(f64, f64) -> f64,
+) -> Vec<f64> {
+    let others = |i: usize| boxes.iter().enumerate().filter(move |(j, _)| *j != i);
+    let best = |(i, a)| others(i).map(|(_, b)| of_pair(a, b)).reduce(better);
+    boxes.iter().enumerate().filter_map(best).collect()
+}
+
+fn iou(a: &[f64; 4], b: &[f64; 4]) -> f64 {
+    let along = |i: usize| {
+        let end = (a[i] + a[i + 2] / 2.0).min(b[i] + b[i + 2] / 2.0);
+        (end - (a[i] - a[i + 2] / 2.0).max(b[i] - b[i + 2] / 2.0)).max(0.0)
+    };
+    let shared = along(0) * along(1);
+    shared / (a[2] * a[3] + b[2] * b[3] - shared).max(f64::MIN_POSITIVE)
+}
+
+/// A way to start, its falls, and the numbers of objects that explain the real labels with it.
+pub(super) struct StartCandidate {
+    /// None where it is as the recipe has it.
+    pub(super) spread: Option<f64>,
+    pub(super) falls: Vec<Fall>,
+    pub(super) odds: LabelOdds,
+    pub(super) weights: Vec<f64>,
+    places: [Vec<Weighted>; MEASURES],
+}
+
+impl StartCandidate {
+    pub(super) fn new(spread: Option<f64>, falls: Vec<Fall>, times: &[f64]) -> Self {
+        let odds = LabelOdds::new(&falls, times.len() - 1);
+        let weights = object_weights(&odds, times);
+        let of_falls = odds.fall_weights(&falls, &weights);
+        let by_fall = places_of(falls.iter().map(|fall| fall.boxes.as_slice()));
+        let places = by_fall.map(|values| sort_by_value(weighted(&values, &of_falls)));
+        Self {
+            spread,
+            falls,
+            odds,
+            weights,
+            places,
+        }
+    }
+
+    /// Sizes of its boxes.
+    pub(super) fn log_sizes(&self) -> Vec<Weighted> {
+        let of_falls = self.odds.fall_weights(&self.falls, &self.weights);
+        let boxes = self.falls.iter().map(|fall| fall.boxes.as_slice());
+        weighted(&log_sizes_of(boxes), &of_falls)
+    }
+
+    /// Mean earth mover's distance of its places from real ones, in standard deviations of those.
+    fn distance(&self, real: &[Vec<Weighted>; MEASURES]) -> f64 {
+        let pairs = self.places.iter().zip(real);
+        let distances: Vec<f64> = pairs.filter_map(|(own, real)| apart(own, real)).collect();
+        distances.iter().sum::<f64>() / distances.len().max(1) as f64
+    }
+}
+
+/// Sizes of the boxes of each picture, natural logarithm.
+pub(super) fn log_sizes_of<'a>(pictures: impl Iterator<Item = &'a [[f64; 4]]>) -> ByPicture {
+    pictures.map(|boxes| boxes.iter().map(log_size).collect()).collect()
+}
+
+fn weighted(by_picture: &[Vec<f64>], weights: &[f64]) -> Vec<Weighted> {
+    let pairs = by_picture.iter().zip(weights).filter(|(_, w)| **w > 0.0);
+    pairs
+        .flat_map(|(values, weight)| values.iter().map(|value| (*value, *weight)))
+        .collect()
+}
+
+/// None where one has no values or all real ones are the same.
+fn apart(own: &[Weighted], real: &[Weighted]) -> Option<f64> {
+    let sigma = Moments::new(real)?.variance.sqrt();
+    (sigma > 0.0 && !own.is_empty()).then(|| earth_mover(own, real) / sigma)
+}
+
+/// The way to start that fits best.
+pub(super) struct FittedStart {
+    /// Its place among the candidates.
+    pub(super) best: usize,
+    /// The spread, unless the pictures do not decide against the recipe's way.
+    pub(super) spread: Option<Range>,
+    /// Distance of each candidate from the real pictures.
+    pub(super) distances: Vec<f64>,
+    /// Share of the rounds of a bootstrap in which the best is nearer than the recipe's way.
+    pub(super) agreement: f64,
+}
+
+/// Chooses between candidates, of which the first is the recipe's way, by the boxes of real
+/// pictures.
+pub(super) fn choose(
+    candidates: &[StartCandidate],
+    real: &[ByPicture; MEASURES],
+    seed: u64,
+) -> FittedStart {
+    let distances = distances(candidates, real.each_ref().map(|values| once(values)));
+    let redrawn: Vec<Vec<f64>> = rounds(real[0].len(), seed)
+        .map(|times| self::distances(candidates, real.each_ref().map(|v| redrawn(v, &times))))
+        .collect();
+    let best = least_place(&distances);
+    let agreeing = redrawn.iter().filter(|round| round[best] < round[0]).count();
+    let agreement = agreeing as f64 / redrawn.len() as f64;
+    FittedStart {
+        best,
+        spread: (agreement >= AGREEMENT).then(|| kept_spreads(candidates, best, &redrawn)),
+        distances,
+        agreement,
+    }
+}
+
+fn distances(candidates: &[StartCandidate], real: [Vec<Weighted>; MEASURES]) -> Vec<f64> {
+    let real = real.map(sort_by_value);
+    candidates.iter().map(|c| c.distance(&real)).collect()
+}
+
+fn least_place(distances: &[f64]) -> usize {
+    let places = distances.iter().enumerate();
+    let least = places.min_by(|a, b| a.1.total_cmp(b.1));
+    least.map_or(0, |(place, _)| place)
+}
+
+/// The range of the spreads that fit best in most rounds, the best one included.
+fn kept_spreads(candidates: &[StartCandidate], best: usize, rounds: &[Vec<f64>]) -> Range {
+    let chosen = rounds.iter().filter_map(|round| candidates[least_place(round)].spread);
+    let mut spreads: Vec<f64> = chosen.collect();
+    spreads.sort_by(f64::total_cmp);
+    let last = spreads.len().saturating_sub(1) as f64;
+    let ends = KEPT.map(|share| spreads.get((share * last).round() as usize).copied());
+    let own = candidates[best].spread.unwrap_or_default();
+    let [low, high] = ends.map(|end| end.unwrap_or(own));
+    Range::new(low.min(own), high.max(own))
+}
+
+/// The recipe with objects that start this far from each other.
+pub(super) fn with_spread(recipe: &Recipe, spread: Range) -> Recipe {
+    let mut recipe = recipe.clone();
+    recipe.start.spread = Some(spread);
+    recipe
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Draws;
+
+    /// Pictures of four labels each, within `reach` of the middle.
+    fn pictures(reach: f64, seed: u64) -> Vec<Vec<[f64; 4]>> {
+        let share = |k: u64, path: String| 0.5 + reach * (Draws::new(seed, k).unit(&path) - 0.5);
+        let place = |k, i| [share(k, format!("{i}x")), share(k, format!("{i}y")), 0.1, 0.1];
+        (0..20).map(|k| (0..4).map(|i| place(k, i)).collect()).collect()
+    }
+
+    fn candidate(spread: Option<f64>, reach: f64) -> StartCandidate {
+        let falls = pictures(reach, 1)
+            .into_iter()
+            .map(|boxes| Fall { objects: 4, boxes });
+        StartCandidate::new(spread, falls.collect(), &[0.0, 0.0, 0.0, 0.0, 20.0])
+    }
+
+    #[test]
+    fn the_spread_that_leaves_labels_there_is_chosen() {
+        let mut candidates = vec![candidate(None, 0.6)];
+        candidates.extend(SPREADS.map(|s| candidate(Some(s), 0.2 + 0.8 * s)));
+        let fitted = |reach: f64| {
+            let real = pictures(reach, 2);
+            choose(&candidates, &places_of(real.iter().map(Vec::as_slice)), 3)
+        };
+        let wide = fitted(1.0).spread.unwrap();
+        assert!(wide.min >= 0.75 && wide.max == 1.0, "{wide:?}");
+        let heap = fitted(0.2).spread.unwrap();
+        assert!(heap.min == 0.0 && heap.max <= 0.25, "{heap:?}");
+        // Spread 0.5 is as good as what the recipe has.
+        assert_eq!(fitted(0.6).spread, None);
+    }
+
+    #[test]
+    fn boxes_overlap_by_the_share_of_both() {
+        let boxes = [[0.5, 0.5, 0.2, 0.2], [0.6, 0.5, 0.2, 0.2], [0.1, 0.1, 0.1, 0.1]];
+        let expected = [1.0 / 3.0, 1.0 / 3.0, 0.0];
+        let found = overlaps(&boxes);
+        assert!((0..3).all(|i| (found[i] - expected[i]).abs() < 1e-12), "{found:?}");
+        assert!(overlaps(&boxes[..1]).is_empty());
+    }
+}
