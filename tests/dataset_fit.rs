@@ -94,7 +94,9 @@ fn mean_of(count: &Count) -> f64 {
         Count::Uniform(range) => (range.min + range.max) / 2.0,
         Count::Weighted { values, weights } => {
             let pairs = values.iter().zip(weights);
-            let sum: f64 = pairs.map(|(value, weight)| f64::from(*value) * weight).sum();
+            let sum: f64 = pairs
+                .map(|(value, weight)| f64::from(*value) * weight)
+                .sum();
             sum / weights.iter().sum::<f64>()
         }
     }
@@ -113,8 +115,15 @@ fn what_made_the_pictures_is_found() {
     let fitted = desk.fit(&recipe, Some(real.clone()), &NEVER).unwrap();
     let found = desk.scene_of(&fitted);
     let objects = mean_of(&found.objects);
-    assert!((objects - 11.0).abs() < 2.2, "{objects} objects, expected 11");
-    assert!((middle(found.scale) - 0.8).abs() < 0.05, "{:?}", found.scale);
+    assert!(
+        (objects - 11.0).abs() < 2.2,
+        "{objects} objects, expected 11"
+    );
+    assert!(
+        (middle(found.scale) - 0.8).abs() < 0.05,
+        "{:?}",
+        found.scale
+    );
     let spread = found.start.spread.unwrap();
     assert!(spread.min >= 0.5, "{spread:?}, expected 1");
     let ev = middle(found.finish.exposure_ev);
@@ -122,7 +131,10 @@ fn what_made_the_pictures_is_found() {
     assert!(is_near_noise(&found), "{:?}", found.finish.camera_noise);
     assert!(fitted.has_comments && fitted.text.contains("# mine"));
     let again = desk.fit(&recipe, Some(real), &NEVER).unwrap();
-    assert_eq!((again.text, again.page.document()), (fitted.text, fitted.page.document()));
+    assert_eq!(
+        (again.text, again.page.document()),
+        (fitted.text, fitted.page.document())
+    );
 }
 
 /// In mid grey within a third, as variance.
@@ -140,10 +152,26 @@ fn pictures_of_the_recipe_itself_leave_its_camera_and_size() {
     let real = desk.pictures(&recipe, 12);
     let fitted = desk.fit(&recipe, Some(real), &NEVER).unwrap();
     let found = desk.scene_of(&fitted);
-    assert!((middle(found.scale) - 1.0).abs() < 0.08, "{:?}", found.scale);
-    assert!((mean_of(&found.objects) - 4.5).abs() < 1.0, "{:?}", found.objects);
-    assert!(middle(found.finish.exposure_ev).abs() < 0.1, "{:?}", found.finish);
-    assert!(middle(found.finish.camera_blur_px) < 0.2, "{:?}", found.finish);
+    assert!(
+        (middle(found.scale) - 1.0).abs() < 0.08,
+        "{:?}",
+        found.scale
+    );
+    assert!(
+        (mean_of(&found.objects) - 4.5).abs() < 1.0,
+        "{:?}",
+        found.objects
+    );
+    assert!(
+        middle(found.finish.exposure_ev).abs() < 0.1,
+        "{:?}",
+        found.finish
+    );
+    assert!(
+        middle(found.finish.camera_blur_px) < 0.2,
+        "{:?}",
+        found.finish
+    );
 }
 
 #[test]

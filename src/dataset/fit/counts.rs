@@ -29,7 +29,9 @@ impl LabelOdds {
     pub(super) fn new(falls: &[Fall], most: usize) -> Self {
         let nodes = nodes_of(falls);
         let last = nodes.last().map_or(0, |(objects, _)| *objects);
-        let rows = (0..=last).map(|objects| row(&nodes, objects, most)).collect();
+        let rows = (0..=last)
+            .map(|objects| row(&nodes, objects, most))
+            .collect();
         Self { nodes, rows }
     }
 
@@ -48,7 +50,7 @@ impl LabelOdds {
     /// that are nearest to its own.
     pub(super) fn fall_weights(&self, falls: &[Fall], weights: &[f64]) -> Vec<f64> {
         let mut of_node: BTreeMap<usize, f64> = BTreeMap::new();
-        for (objects, weight) in weights.iter().enumerate() {
+        for (objects, weight) in weights.iter().enumerate().skip(1) {
             *of_node.entry(self.nearest(objects)).or_default() += weight;
         }
         let count = |objects| falls.iter().filter(|fall| fall.objects == objects).count();
@@ -62,9 +64,7 @@ impl LabelOdds {
 
     fn nearest(&self, objects: usize) -> usize {
         let nodes = self.nodes.iter().map(|(node, _)| *node).skip(1);
-        nodes
-            .min_by_key(|node| node.abs_diff(objects))
-            .unwrap_or(0)
+        nodes.min_by_key(|node| node.abs_diff(objects)).unwrap_or(0)
     }
 }
 
@@ -240,7 +240,9 @@ mod tests {
     /// Falls of which each object has a label with this chance.
     fn falls(chance: f64) -> Vec<Fall> {
         let objects = [1, 2, 4, 6, 9, 13, 18, 24];
-        let all = objects.into_iter().flat_map(|n| (0..60).map(move |k| (n, k)));
+        let all = objects
+            .into_iter()
+            .flat_map(|n| (0..60).map(move |k| (n, k)));
         all.map(|(n, k)| fall(n, labels(n, k, chance))).collect()
     }
 
@@ -268,7 +270,10 @@ mod tests {
         let weights = object_weights(&odds, &times);
         let [low, middle, high] = deciles(&weights);
         assert!((mean_of(&weights) - 10.0).abs() < 0.8, "{weights:?}");
-        assert!((4..=7).contains(&low) && (9..=11).contains(&middle), "{low} {middle}");
+        assert!(
+            (4..=7).contains(&low) && (9..=11).contains(&middle),
+            "{low} {middle}"
+        );
         assert!((13..=17).contains(&high), "{high}");
     }
 

@@ -2,7 +2,7 @@
 //! the mean and the variance of that.
 
 use super::measured::PixelMeasures;
-use super::statistics::{Bootstrapped, Moments, Weighted, once, redrawn, rounds};
+use super::statistics::{Bootstrapped, Moments, Weighted, once, redrawn, reweighted, rounds};
 use crate::eval::Interval;
 use crate::scene::{Range, Recipe, white_balance};
 
@@ -119,19 +119,26 @@ pub(super) struct Difference {
 }
 
 impl Difference {
-    /// Of values of each real picture and weighted ones of the recipe's; none where either has
-    /// none.
+    /// Of values of each real picture and weighted ones of the recipe's, both drawn again; none
+    /// where either has none.
     pub(super) fn new(real: &[Vec<f64>], own: &[Weighted], seed: u64) -> Option<Self> {
-        let own = Moments::new(own)?;
-        let whole = Moments::new(&once(real))?;
-        let resampled: Vec<Moments> = rounds(real.len(), seed)
-            .filter_map(|times| Moments::new(&redrawn(real, &times)))
+        let (whole, own_whole) = (Moments::new(&once(real))?, Moments::new(own)?);
+        let real_rounds =
+            rounds(real.len(), seed).map(|times| Moments::new(&redrawn(real, &times)));
+        // Other numbers than those of the real pictures, of which there may be as many.
+        let own_rounds =
+            rounds(own.len(), !seed).map(|times| Moments::new(&reweighted(own, &times)));
+        let resampled: Vec<[Moments; 2]> = real_rounds
+            .zip(own_rounds)
+            .filter_map(|(real, own)| Some([real?, own?]))
             .collect();
-        let means = resampled.iter().map(|m| m.mean - own.mean);
-        let variances = resampled.iter().map(|m| m.variance - own.variance);
+        let differences = |of: fn(&Moments) -> f64| {
+            let redrawn = resampled.iter().map(move |[real, own]| of(real) - of(own));
+            Bootstrapped::new(of(&whole) - of(&own_whole), redrawn)
+        };
         Some(Self {
-            mean: Bootstrapped::new(whole.mean - own.mean, means),
-            variance: Bootstrapped::new(whole.variance - own.variance, variances),
+            mean: differences(|moments| moments.mean),
+            variance: differences(|moments| moments.variance),
         })
     }
 
@@ -225,7 +232,10 @@ mod tests {
             .map(|k| places[k as usize] + range.draw(&Draws::new(4, k), "ev"))
             .collect();
         let found = fitted(&real, &places).unwrap();
-        assert!((found.min - 0.5).abs() < 0.25 && (found.max - 2.5).abs() < 0.25, "{found:?}");
+        assert!(
+            (found.min - 0.5).abs() < 0.25 && (found.max - 2.5).abs() < 0.25,
+            "{found:?}"
+        );
     }
 
     #[test]

@@ -86,7 +86,12 @@ impl PixelMeasures {
     /// Of a picture and its surroundings of boxes.
     pub(super) fn around(picture: &Image<LinearRgb>, boxes: &[ShareBox]) -> Option<Self> {
         let around = surroundings(picture, boxes);
-        let seen: Vec<LinearRgb> = around.pixels().iter().copied().filter(|p| p.is_finite()).collect();
+        let seen: Vec<LinearRgb> = around
+            .pixels()
+            .iter()
+            .copied()
+            .filter(|p| p.is_finite())
+            .collect();
         if (seen.len() as f64) < LEAST_SHARE * picture.pixels().len() as f64 {
             return None;
         }

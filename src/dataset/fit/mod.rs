@@ -121,6 +121,7 @@ pub fn fit(
     let pipeline = Pipeline::open(config.clone())?.stopped_by(stop);
     let plates = plates::measured_plates(&pipeline)?;
     let fitting = Fitting {
+        moved_paths: moved_paths(&config, &plan.recipe, &plan.output)?,
         pipeline,
         config,
         options: plan.options,
@@ -142,6 +143,8 @@ struct Fitting<'a> {
     config: DatasetConfig,
     options: FitOptions,
     keys: Vec<FittedKey>,
+    /// What names files, for the fitted recipe's folder.
+    moved_paths: Vec<KeyText>,
     steps: Steps<'a>,
     stop: &'static AtomicBool,
 }
@@ -149,19 +152,28 @@ struct Fitting<'a> {
 impl Fitting<'_> {
     fn to_plates(mut self, plates: &[MeasuredPlate], plan: &FitPlan) -> Result<Fit> {
         self.keys = plates::match_objects(&mut self.config, plates);
-        self.keys.extend(plates::vary_light(&mut self.config, plates));
+        self.keys
+            .extend(plates::vary_light(&mut self.config, plates));
         let mut page = report::begin("Recipe fitted to its plates", &self.keys);
-        page.text(PLATES_ALONE).heading("Plates").table(&plates::table(plates));
+        page.text(PLATES_ALONE)
+            .heading("Plates")
+            .table(&plates::table(plates));
         self.finish(plan, page)
     }
 
-    fn to_pictures(mut self, folder: &Path, plates: &[MeasuredPlate], plan: &FitPlan) -> Result<Fit> {
+    fn to_pictures(
+        mut self,
+        folder: &Path,
+        plates: &[MeasuredPlate],
+        plan: &FitPlan,
+    ) -> Result<Fit> {
         let real = MeasuredSet::read(folder, self.config.scene.image[0])?;
         check_labels(folder, &real)?;
         self.steps.expect(self.expected_steps());
         let before = self.rendered()?;
         let weights = self.fit_places(&real)?;
-        self.keys.extend(plates::match_objects(&mut self.config, plates));
+        self.keys
+            .extend(plates::match_objects(&mut self.config, plates));
         self.fit_camera(&real, &before)?;
         let after = self.rendered()?;
         let mut page = report::begin("Recipe fitted to real pictures", &self.keys);
@@ -183,7 +195,7 @@ impl Fitting<'_> {
     }
 
     fn finish(self, plan: &FitPlan, page: Page) -> Result<Fit> {
-        let mut keys = moved_paths(&self.config, &plan.recipe, &plan.output)?;
+        let mut keys = self.moved_paths;
         let fitted = self.keys.iter();
         keys.extend(fitted.filter_map(|key| Some((key.key.clone(), key.fitted.clone()?))));
         let text = io::read_text(&plan.recipe)?;
@@ -243,26 +255,37 @@ fn check_labels(folder: &Path, real: &MeasuredSet) -> Result<()> {
     if real.set.boxes().next().is_some() {
         return Ok(());
     }
-    Err(Error::file(folder, "no label, expected images with YOLO labels"))
+    Err(Error::file(
+        folder,
+        "no label, expected images with YOLO labels",
+    ))
 }
 
 /// What names files, where the fitted recipe lies in another folder.
 fn moved_paths(config: &DatasetConfig, recipe: &Path, output: &Path) -> Result<Vec<KeyText>> {
-    let [from, to] = [recipe, output].map(|file| io::absolute(folder_of(file)));
-    let (from, to) = (from?, to?);
-    if from == to {
+    let (from, to) = (io::absolute(recipe)?, io::absolute(output)?);
+    let to = folder_of(&to);
+    if folder_of(&from) == to {
         return Ok(Vec::new());
     }
     let mut keys = Vec::new();
-    for (key, folder) in [("assets", &config.assets), ("backgrounds", &config.backgrounds)] {
-        let folder = io::relative(&io::absolute(folder)?, &to);
+    for (key, folder) in [
+        ("assets", &config.assets),
+        ("backgrounds", &config.backgrounds),
+    ] {
+        let folder = io::relative(&io::absolute(folder)?, to);
         keys.push((key.to_owned(), text_of(&folder.to_string_lossy())));
     }
     let files = config.scene.environment.files.iter();
-    let files: Result<Vec<String>> = files.map(|file| seen_from(&to, &config.folder, file)).collect();
+    let files: Result<Vec<String>> = files
+        .map(|file| seen_from(to, &config.folder, file))
+        .collect();
     let files: Vec<String> = files?.iter().map(|file| text_of(file)).collect();
     if !files.is_empty() {
-        keys.push(("scene.environment.files".into(), format!("[{}]", files.join(", "))));
+        keys.push((
+            "scene.environment.files".into(),
+            format!("[{}]", files.join(", ")),
+        ));
     }
     Ok(keys)
 }
@@ -403,7 +426,11 @@ impl Fitting<'_> {
     ) -> Result<StartCandidate> {
         let start = &self.config.scene.start;
         let before = start.spread.map_or_else(|| "none".into(), range_text);
-        let mut key = unfitted("scene.start.spread", before, "start.positions is given".into());
+        let mut key = unfitted(
+            "scene.start.spread",
+            before,
+            "start.positions is given".into(),
+        );
         if !start.positions.is_empty() {
             self.keys.push(key);
             return Ok(own);
@@ -441,8 +468,12 @@ impl Fitting<'_> {
 
     fn describe_objects(&self, counts: &[usize], own: &StartCandidate, gain: f64) -> String {
         let mean = |weights: &[f64]| counts::mean_of(weights);
-        let redrawn = rounds(counts.len(), self.options.seed)
-            .map(|times| mean(&counts::object_weights(&own.odds, &histogram_of(counts, &times))));
+        let redrawn = rounds(counts.len(), self.options.seed).map(|times| {
+            mean(&counts::object_weights(
+                &own.odds,
+                &histogram_of(counts, &times),
+            ))
+        });
         let interval = crate::eval::interval(mean(&own.weights), redrawn.collect());
         let [low, middle, high] = counts::deciles(&own.weights);
         format!(
@@ -460,7 +491,11 @@ impl Fitting<'_> {
         let scene = &mut self.config.scene;
         let before = (knob.get)(scene);
         let Some(difference) = difference else {
-            return unfitted(knob.key, range_text(before), "nothing could be measured".into());
+            return unfitted(
+                knob.key,
+                range_text(before),
+                "nothing could be measured".into(),
+            );
         };
         let mut key = unfitted(knob.key, range_text(before), describe(knob, difference));
         if let Some(fitted) = knob.fitted(scene, difference) {
@@ -487,7 +522,10 @@ fn histogram_of(counts: &[usize], times: &[u32]) -> Vec<f64> {
 }
 
 fn label_moments(falls: &[Fall]) -> Option<[f64; 2]> {
-    let labels: Vec<Weighted> = falls.iter().map(|fall| (fall.boxes.len() as f64, 1.0)).collect();
+    let labels: Vec<Weighted> = falls
+        .iter()
+        .map(|fall| (fall.boxes.len() as f64, 1.0))
+        .collect();
     let moments = statistics::Moments::new(&labels)?;
     Some([moments.mean, moments.variance.sqrt()])
 }
@@ -524,7 +562,11 @@ fn describe(knob: &Knob, difference: &Difference) -> String {
     let mean = difference.mean_interval();
     let [value, low, high] = [mean.value, mean.low, mean.high].map(knobs::three_digits);
     let unit = knob.unit;
-    format!("real pictures differ by {value} ({low} to {high}) {unit} on average")
+    let limit = match value < 0.0 && knob.least == 0.0 {
+        true => "; no key takes away what the photos of the place have",
+        false => "",
+    };
+    format!("real pictures differ by {value} ({low} to {high}) {unit} on average{limit}")
 }
 
 /// The camera and the light.
@@ -560,8 +602,16 @@ impl Fitting<'_> {
     }
 
     fn difference(&self, knob: &Knob, real: &MeasuredSet, own: &MeasuredSet) -> Option<Difference> {
-        let real: Vec<Vec<f64>> = real.values(knob.of_picture).into_iter().map(|v| vec![v]).collect();
-        let own: Vec<Weighted> = own.values(knob.of_picture).into_iter().map(|v| (v, 1.0)).collect();
+        let real: Vec<Vec<f64>> = real
+            .values(knob.of_picture)
+            .into_iter()
+            .map(|v| vec![v])
+            .collect();
+        let own: Vec<Weighted> = own
+            .values(knob.of_picture)
+            .into_iter()
+            .map(|v| (v, 1.0))
+            .collect();
         Difference::new(&real, &own, self.options.seed)
     }
 }

@@ -31,7 +31,10 @@ pub(super) struct MeasuredPlate {
 pub(super) fn measured_plates(pipeline: &Pipeline) -> Result<Vec<MeasuredPlate>> {
     let mut measured = Vec::new();
     for place in pipeline.places() {
-        let wall = place.background.wall.map(|wall| format!("{} m", wall.height));
+        let wall = place
+            .background
+            .wall
+            .map(|wall| format!("{} m", wall.height));
         let pixels = PixelMeasures::around(&*place.plate()?, &[]);
         measured.extend(pixels.map(|pixels| MeasuredPlate {
             name: place.background.name.clone(),
@@ -59,26 +62,42 @@ pub(super) fn table(plates: &[MeasuredPlate]) -> Table {
             plate.pixels.red_over_blue.exp(),
         ];
         let numbers = numbers.map(|number| format!("{number:.2}"));
-        table.push([plate.name.clone()].into_iter().chain(numbers).chain([plate.wall.clone()]));
+        table.push(
+            [plate.name.clone()]
+                .into_iter()
+                .chain(numbers)
+                .chain([plate.wall.clone()]),
+        );
     }
     table
 }
 
 /// Gives objects the noise and blur that the photos have, where the recipe does not say which.
-pub(super) fn match_objects(config: &mut DatasetConfig, plates: &[MeasuredPlate]) -> Vec<FittedKey> {
+pub(super) fn match_objects(
+    config: &mut DatasetConfig,
+    plates: &[MeasuredPlate],
+) -> Vec<FittedKey> {
     let finish = &mut config.scene.finish;
     let mut keys = Vec::new();
     let noise = median(plates, PixelMeasures::grey_noise);
     if finish.noise == Noise::None {
         let fitted = noise > LEAST_NOISE;
-        finish.noise = if fitted { Noise::MatchPlate } else { finish.noise };
+        finish.noise = if fitted {
+            Noise::MatchPlate
+        } else {
+            finish.noise
+        };
         let why = format!("the photos have {noise:.2} codes of noise in mid grey");
         keys.push(matched("scene.finish.noise", "\"none\"", fitted, why));
     }
     let blur = median(plates, PixelMeasures::blur_px);
     if finish.blur_px == Blur::Known(Range::fixed(0.0)) {
         let fitted = blur > LEAST_BLUR_PX;
-        finish.blur_px = if fitted { Blur::MatchPlate } else { finish.blur_px };
+        finish.blur_px = if fitted {
+            Blur::MatchPlate
+        } else {
+            finish.blur_px
+        };
         let why = format!("the photos have a blur of {blur:.2} px");
         keys.push(matched("scene.finish.blur_px", "0", fitted, why));
     }
@@ -117,10 +136,15 @@ fn vary(knob: &Knob, config: &mut DatasetConfig, plates: &[MeasuredPlate]) -> Fi
     if before.min != before.max {
         return unfitted("the recipe says how it varies".into());
     }
-    let values: Vec<Weighted> = plates.iter().map(|p| ((knob.of_picture)(&p.pixels), 1.0)).collect();
+    let values: Vec<Weighted> = plates
+        .iter()
+        .map(|p| ((knob.of_picture)(&p.pixels), 1.0))
+        .collect();
     let moments = Moments::new(&values).filter(|_| plates.len() >= MIN_PLATES);
     let Some(moments) = moments else {
-        return unfitted(format!("fewer than {MIN_PLATES} photos do not tell how it varies"));
+        return unfitted(format!(
+            "fewer than {MIN_PLATES} photos do not tell how it varies"
+        ));
     };
     let (middle, sigma) = ((knob.to_measure)(before.min), moments.variance.sqrt());
     let ends = [middle - sigma, middle + sigma].map(|end| three_digits((knob.to_value)(end)));

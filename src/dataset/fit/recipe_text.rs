@@ -39,7 +39,9 @@ fn lines_of(text: &str) -> Vec<String> {
 
 fn with_key(mut lines: Vec<String>, (path, value): &KeyText) -> Vec<String> {
     if let Some((at, key)) = line_of_key(&lines, path) {
-        let comment = lines[at].find(" #").map(|from| lines[at][from..].to_owned());
+        let comment = lines[at]
+            .find(" #")
+            .map(|from| lines[at][from..].to_owned());
         lines[at] = format!("{key} = {value}{}", comment.unwrap_or_default());
         return lines;
     }
@@ -86,7 +88,11 @@ fn section(lines: &[String], table: &str) -> Option<(usize, usize)> {
     let header = |line: &String| header_of(line).is_some();
     let from = match table {
         "" => 0,
-        _ => 1 + lines.iter().position(|line| header_of(line) == Some(table))?,
+        _ => {
+            1 + lines
+                .iter()
+                .position(|line| header_of(line) == Some(table))?
+        }
     };
     let length = lines[from..].iter().position(header);
     Some((from, length.map_or(lines.len(), |length| from + length)))
@@ -137,7 +143,10 @@ mod tests {
         let (text, is_kept) = edited(DatasetConfig::template(), &keys);
         assert!(is_kept);
         // The spread has no line of a default.
-        assert_eq!(text.lines().count(), DatasetConfig::template().lines().count() + 1);
+        assert_eq!(
+            text.lines().count(),
+            DatasetConfig::template().lines().count() + 1
+        );
         let config: DatasetConfig = toml::from_str(&text).unwrap();
         assert_eq!(config.scene.finish.camera_noise.read.min, 0.01);
         assert_eq!(config.scene.start.spread.unwrap().max, 0.75);

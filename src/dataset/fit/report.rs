@@ -26,7 +26,10 @@ pub(super) struct Compared<'a> {
 
 pub(super) fn begin(title: &str, keys: &[FittedKey]) -> Page {
     let mut page = Page::new(title);
-    page.html(STYLE).heading("Keys").table(&key_table(keys)).text(UNKNOWN);
+    page.html(STYLE)
+        .heading("Keys")
+        .table(&key_table(keys))
+        .text(UNKNOWN);
     page
 }
 
@@ -44,7 +47,10 @@ pub(super) fn add_counts(page: &mut Page, weights: &[f64]) {
     let histogram = Histogram {
         title: "objects in a picture, fitted, of 1000".into(),
         ends: ["0".into(), (weights.len() - 1).to_string()],
-        counts: weights.iter().map(|w| (1000.0 * w).round() as u64).collect(),
+        counts: weights
+            .iter()
+            .map(|w| (1000.0 * w).round() as u64)
+            .collect(),
         expected: None,
     };
     page.html(&histogram.svg());
@@ -52,10 +58,17 @@ pub(super) fn add_counts(page: &mut Page, weights: &[f64]) {
 
 pub(super) fn add_comparison(page: &mut Page, sets: &Compared<'_>) {
     let [real, before, after] = [sets.real, sets.before, sets.after].map(measures);
-    let rows: Vec<_> = real.into_iter().zip(before.into_iter().zip(after)).collect();
-    let known = rows.iter().filter(|(r, (b, a))| ![r, b, a].iter().any(|m| m.1.is_empty()));
+    let rows: Vec<_> = real
+        .into_iter()
+        .zip(before.into_iter().zip(after))
+        .collect();
+    let known = rows
+        .iter()
+        .filter(|(r, (b, a))| ![r, b, a].iter().any(|m| m.1.is_empty()));
     let pairs: Vec<MeasurePair> = known.map(|(r, (b, a))| MeasurePair::new(r, b, a)).collect();
-    page.heading("Before and after").text(&introduction(sets)).table(&distances(&pairs));
+    page.heading("Before and after")
+        .text(&introduction(sets))
+        .table(&distances(&pairs));
     let charts: String = pairs.iter().map(MeasurePair::svg).collect();
     page.html(&format!("<div class=\"pairs\">\n{charts}</div>\n"));
     add_maps(page, sets);
@@ -76,7 +89,9 @@ fn add_maps(page: &mut Page, sets: &Compared<'_>) {
         ("before", sets.before),
         ("after", sets.after),
     ];
-    let maps: String = titled.map(|(title, set)| heat_map(title, &set.set.centres())).concat();
+    let maps: String = titled
+        .map(|(title, set)| heat_map(title, &set.set.centres()))
+        .concat();
     page.html(&format!("<div class=\"histograms\">\n{maps}</div>\n"));
 }
 
@@ -85,10 +100,15 @@ fn measures(set: &MeasuredSet) -> Vec<Measure> {
     let mut measures = Vec::from(measure_boxes(&set.set));
     let boxes = set.boxes();
     let overlaps = boxes.iter().flat_map(|boxes| overlaps(boxes)).collect();
-    measures.push(("overlap of a box with the next one, intersection over union", overlaps));
+    measures.push((
+        "overlap of a box with the next one, intersection over union",
+        overlaps,
+    ));
     let of_pixels: [(&'static str, fn(&PixelMeasures) -> f64); 6] = [
         ("brightness of a picture, mean code", |p| p.brightness),
-        ("contrast of a picture, standard deviation of codes", |p| p.contrast),
+        ("contrast of a picture, standard deviation of codes", |p| {
+            p.contrast
+        }),
         ("median luminance, EV", |p| p.exposure_ev),
         ("white balance, red over blue", |p| p.red_over_blue.exp()),
         ("noise in mid grey, codes", PixelMeasures::grey_noise),
@@ -139,7 +159,12 @@ fn distances(pairs: &[MeasurePair]) -> Table {
         let [before, after] = pair.compared.each_ref().map(|measure| measure.distance);
         let distances = [before, after, pair.chance].map(|d| format!("{d:.2}"));
         let quantiles = pair.quantiles.iter().cloned();
-        table.push([pair.title.to_owned()].into_iter().chain(quantiles).chain(distances));
+        table.push(
+            [pair.title.to_owned()]
+                .into_iter()
+                .chain(quantiles)
+                .chain(distances),
+        );
     }
     table
 }

@@ -3,13 +3,14 @@
 
 use super::counts::{LabelOdds, object_weights};
 use super::falls::{Fall, log_size};
-use super::statistics::{
-    AGREEMENT, Moments, Weighted, earth_mover, once, redrawn, rounds, sort_by_value,
-};
+use super::statistics::{Moments, Weighted, earth_mover, once, redrawn, rounds, sort_by_value};
 use crate::scene::{Range, Recipe};
 
 /// The spreads that are tried, from a heap to all over the surface.
 pub(super) const SPREADS: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
+/// Share of the rounds of a bootstrap in which the best spread must be nearer than the recipe's way
+/// to start.
+const AGREEMENT: f64 = 0.9;
 /// Spreads within these shares of the rounds of a bootstrap are the fitted range.
 const KEPT: [f64; 2] = [0.1, 0.9];
 /// What is compared of places: see [`places_of`].
@@ -105,7 +106,9 @@ impl StartCandidate {
 
 /// Sizes of the boxes of each picture, natural logarithm.
 pub(super) fn log_sizes_of<'a>(pictures: impl Iterator<Item = &'a [[f64; 4]]>) -> ByPicture {
-    pictures.map(|boxes| boxes.iter().map(log_size).collect()).collect()
+    pictures
+        .map(|boxes| boxes.iter().map(log_size).collect())
+        .collect()
 }
 
 fn weighted(by_picture: &[Vec<f64>], weights: &[f64]) -> Vec<Weighted> {
@@ -145,7 +148,10 @@ pub(super) fn choose(
         .map(|times| self::distances(candidates, real.each_ref().map(|v| redrawn(v, &times))))
         .collect();
     let best = least_place(&distances);
-    let agreeing = redrawn.iter().filter(|round| round[best] < round[0]).count();
+    let agreeing = redrawn
+        .iter()
+        .filter(|round| round[best] < round[0])
+        .count();
     let agreement = agreeing as f64 / redrawn.len() as f64;
     FittedStart {
         best,
@@ -168,7 +174,9 @@ fn least_place(distances: &[f64]) -> usize {
 
 /// The range of the spreads that fit best in most rounds, the best one included.
 fn kept_spreads(candidates: &[StartCandidate], best: usize, rounds: &[Vec<f64>]) -> Range {
-    let chosen = rounds.iter().filter_map(|round| candidates[least_place(round)].spread);
+    let chosen = rounds
+        .iter()
+        .filter_map(|round| candidates[least_place(round)].spread);
     let mut spreads: Vec<f64> = chosen.collect();
     spreads.sort_by(f64::total_cmp);
     let last = spreads.len().saturating_sub(1) as f64;
@@ -193,8 +201,17 @@ mod tests {
     /// Pictures of four labels each, within `reach` of the middle.
     fn pictures(reach: f64, seed: u64) -> Vec<Vec<[f64; 4]>> {
         let share = |k: u64, path: String| 0.5 + reach * (Draws::new(seed, k).unit(&path) - 0.5);
-        let place = |k, i| [share(k, format!("{i}x")), share(k, format!("{i}y")), 0.1, 0.1];
-        (0..20).map(|k| (0..4).map(|i| place(k, i)).collect()).collect()
+        let place = |k, i| {
+            [
+                share(k, format!("{i}x")),
+                share(k, format!("{i}y")),
+                0.1,
+                0.1,
+            ]
+        };
+        (0..20)
+            .map(|k| (0..4).map(|i| place(k, i)).collect())
+            .collect()
     }
 
     fn candidate(spread: Option<f64>, reach: f64) -> StartCandidate {
@@ -222,10 +239,17 @@ mod tests {
 
     #[test]
     fn boxes_overlap_by_the_share_of_both() {
-        let boxes = [[0.5, 0.5, 0.2, 0.2], [0.6, 0.5, 0.2, 0.2], [0.1, 0.1, 0.1, 0.1]];
+        let boxes = [
+            [0.5, 0.5, 0.2, 0.2],
+            [0.6, 0.5, 0.2, 0.2],
+            [0.1, 0.1, 0.1, 0.1],
+        ];
         let expected = [1.0 / 3.0, 1.0 / 3.0, 0.0];
         let found = overlaps(&boxes);
-        assert!((0..3).all(|i| (found[i] - expected[i]).abs() < 1e-12), "{found:?}");
+        assert!(
+            (0..3).all(|i| (found[i] - expected[i]).abs() < 1e-12),
+            "{found:?}"
+        );
         assert!(overlaps(&boxes[..1]).is_empty());
     }
 }

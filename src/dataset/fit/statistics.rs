@@ -4,8 +4,9 @@ use crate::eval::{Interval, drawn, interval};
 
 /// Rounds of every bootstrap.
 pub(super) const ROUNDS: u64 = 200;
-/// Share of the rounds that must agree before anything is decided.
-pub(super) const AGREEMENT: f64 = 0.9;
+/// Share of the rounds that must agree on the sign of a statistic before it is decided: its
+/// interval of 95 % is on one side of zero.
+const SAME_SIGN: f64 = 0.975;
 
 /// A value and how often it occurs, in any unit.
 pub(super) type Weighted = (f64, f64);
@@ -73,6 +74,14 @@ pub(super) fn redrawn(by_picture: &[Vec<f64>], times: &[u32]) -> Vec<Weighted> {
     values.filter(|(_, weight)| *weight > 0.0).collect()
 }
 
+/// Weighted values, each as often as it was drawn.
+pub(super) fn reweighted(values: &[Weighted], times: &[u32]) -> Vec<Weighted> {
+    let pairs = values.iter().zip(times).filter(|(_, times)| **times > 0);
+    pairs
+        .map(|((value, weight), times)| (*value, weight * f64::from(*times)))
+        .collect()
+}
+
 /// Each picture once.
 pub(super) fn once(by_picture: &[Vec<f64>]) -> Vec<Weighted> {
     redrawn(by_picture, &vec![1; by_picture.len()])
@@ -105,7 +114,7 @@ impl Bootstrapped {
     /// Most rounds agree on which side of zero it lies.
     pub(super) fn is_decided(&self) -> bool {
         let same = self.rounds.iter().filter(|v| **v * self.value > 0.0);
-        same.count() as f64 >= AGREEMENT * self.rounds.len() as f64
+        same.count() as f64 >= SAME_SIGN * self.rounds.len() as f64
     }
 
     /// Holds 95 of 100 rounds.
@@ -139,8 +148,8 @@ mod tests {
     #[test]
     fn what_most_rounds_agree_on_is_decided() {
         let rounds = |below: usize| (0..100).map(move |i| if i < below { -1.0 } else { 1.0 });
-        assert!(Bootstrapped::new(1.0, rounds(9)).is_decided());
-        assert!(!Bootstrapped::new(1.0, rounds(11)).is_decided());
+        assert!(Bootstrapped::new(1.0, rounds(2)).is_decided());
+        assert!(!Bootstrapped::new(1.0, rounds(3)).is_decided());
         assert!(!Bootstrapped::new(0.0, rounds(50)).is_decided());
     }
 }

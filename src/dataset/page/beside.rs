@@ -319,11 +319,7 @@ fn compare_measures(ours: &LabelledSet, theirs: &LabelledSet) -> Vec<ComparedMea
 }
 
 impl ComparedMeasure {
-    pub(in crate::dataset) fn new(
-        title: &'static str,
-        ours: Vec<f64>,
-        theirs: Vec<f64>,
-    ) -> Self {
+    pub(in crate::dataset) fn new(title: &'static str, ours: Vec<f64>, theirs: Vec<f64>) -> Self {
         Self {
             title,
             distance: distance(ours.clone(), theirs.clone()),
