@@ -46,6 +46,14 @@ impl LabelOdds {
         rows.map(|(weight, row)| weight * row[labels]).sum::<f64>() + LEAST_ODDS
     }
 
+    /// Labels of a picture on average, where numbers of objects have weights.
+    pub(super) fn mean_labels(&self, weights: &[f64]) -> f64 {
+        let pairs = weights.iter().enumerate();
+        pairs
+            .map(|(objects, weight)| weight * between(&self.nodes, objects).mean)
+            .sum()
+    }
+
     /// The weight of each fall, where numbers of objects have these: a fall stands for all numbers
     /// that are nearest to its own.
     pub(super) fn fall_weights(&self, falls: &[Fall], weights: &[f64]) -> Vec<f64> {
@@ -249,6 +257,7 @@ mod tests {
     fn fall(objects: usize, labels: usize) -> Fall {
         Fall {
             objects,
+            plate: String::new(),
             boxes: vec![[0.5, 0.5, 0.1, 0.1]; labels],
         }
     }

@@ -15,6 +15,8 @@ const NUMBERS_APART: u64 = 1_000_000;
 pub(super) struct Fall {
     /// Objects that fell.
     pub(super) objects: usize,
+    /// The photo of the place.
+    pub(super) plate: String,
     /// Centre, width and height of each label's box, as shares of the picture's.
     pub(super) boxes: Vec<[f64; 4]>,
 }
@@ -49,6 +51,7 @@ impl FallPlan<'_> {
         }
         let k = objects as u64 * NUMBERS_APART + i;
         let (scene, _) = self.pipeline.explain_with(recipe, self.seed, k)?;
+        let plate = scene.plate.clone();
         let labels = match self.pipeline.label(scene) {
             Err(Error::Unsettled { .. }) => None,
             labels => Some(labels?),
@@ -56,6 +59,7 @@ impl FallPlan<'_> {
         (self.step)();
         Ok(labels.map(|labels| Fall {
             objects,
+            plate,
             boxes: self.boxes(&labels),
         }))
     }

@@ -2,7 +2,7 @@
 //! the mean and the variance of that.
 
 use super::measured::PixelMeasures;
-use super::statistics::{Bootstrapped, Moments, Weighted, once, redrawn, reweighted, rounds};
+use super::statistics::{Bootstrapped, Moments, Weighted, redrawn, rounds};
 use crate::eval::Interval;
 use crate::scene::{Range, Recipe, white_balance};
 
@@ -119,18 +119,19 @@ pub(super) struct Difference {
 }
 
 impl Difference {
-    /// Of values of each real picture and weighted ones of the recipe's, both drawn again; none
-    /// where either has none.
-    pub(super) fn new(real: &[Vec<f64>], own: &[Weighted], seed: u64) -> Option<Self> {
-        let (whole, own_whole) = (Moments::new(&once(real))?, Moments::new(own)?);
-        let real_rounds =
-            rounds(real.len(), seed).map(|times| Moments::new(&redrawn(real, &times)));
-        // Other numbers than those of the real pictures, of which there may be as many.
-        let own_rounds =
-            rounds(own.len(), !seed).map(|times| Moments::new(&reweighted(own, &times)));
-        let resampled: Vec<[Moments; 2]> = real_rounds
-            .zip(own_rounds)
-            .filter_map(|(real, own)| Some([real?, own?]))
+    /// Of values of groups, which are drawn again: each real picture, and all pictures of the
+    /// recipe before one photo of the place; none where either has none.
+    pub(super) fn new(real: &[Vec<Weighted>], own: &[Vec<Weighted>], seed: u64) -> Option<Self> {
+        let (whole, own_whole) = (Moments::new(&real.concat())?, Moments::new(&own.concat())?);
+        // Not the numbers of the real pictures, of which there may be as many.
+        let pairs = rounds(real.len(), seed).zip(rounds(own.len(), !seed));
+        let resampled: Vec<[Moments; 2]> = pairs
+            .filter_map(|(a, b)| {
+                Some([
+                    Moments::new(&redrawn(real, &a))?,
+                    Moments::new(&redrawn(own, &b))?,
+                ])
+            })
             .collect();
         let differences = |of: fn(&Moments) -> f64| {
             let redrawn = resampled.iter().map(move |[real, own]| of(real) - of(own));
@@ -218,8 +219,8 @@ mod tests {
     }
 
     fn fitted(real: &[f64], own: &[f64]) -> Option<Range> {
-        let real: Vec<Vec<f64>> = real.iter().map(|v| vec![*v]).collect();
-        let own: Vec<Weighted> = own.iter().map(|v| (*v, 1.0)).collect();
+        let [real, own] = [real, own].map(|values| values.iter().map(|v| vec![(*v, 1.0)]));
+        let (real, own): (Vec<_>, Vec<_>) = (real.collect(), own.collect());
         let difference = Difference::new(&real, &own, 1).unwrap();
         KNOBS[0].fitted(&Recipe::default(), &difference)
     }
@@ -253,8 +254,8 @@ mod tests {
 
     #[test]
     fn a_key_cannot_take_away_what_it_only_adds() {
-        let real = vec![vec![0.1]; 9];
-        let difference = Difference::new(&real, &[(0.5, 1.0)], 1).unwrap();
+        let real = vec![vec![(0.1, 1.0)]; 9];
+        let difference = Difference::new(&real, &[vec![(0.5, 1.0)]], 1).unwrap();
         let blur = &KNOBS[2];
         assert_eq!(blur.fitted(&Recipe::default(), &difference), None);
     }

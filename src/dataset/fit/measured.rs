@@ -1,5 +1,6 @@
 //! Labelled pictures and what their pixels are like around the labels.
 
+use super::statistics::Weighted;
 use crate::dataset::page::beside::PixelStatistics;
 use crate::dataset::page::labelled_pictures::{LabelledPicture, LabelledSet, ShareBox};
 use crate::error::Result;
@@ -10,6 +11,7 @@ use crate::light::{plate_blur, plate_noise};
 use crate::pixel::LinearRgb;
 use crate::scene::{Blur, Noise};
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// So many pictures are read for their pixels.
@@ -20,8 +22,8 @@ const LEAST_SHARE: f64 = 0.1;
 /// Pictures, and what can be measured of them.
 pub(super) struct MeasuredSet {
     pub(super) set: LabelledSet,
-    /// Of those whose pixels were read.
-    pub(super) pixels: Vec<PixelMeasures>,
+    /// Of those whose pixels were read, with their file's name.
+    pub(super) pixels: Vec<(String, PixelMeasures)>,
 }
 
 /// What the pixels of a picture are like.
@@ -50,7 +52,10 @@ impl MeasuredSet {
     pub(super) fn read(folder: &Path, width: u32) -> Result<Self> {
         let set = LabelledSet::read(folder)?;
         let pictures = set.spread(MAX_MEASURED).into_par_iter();
-        let pixels = pictures.filter_map(|picture| PixelMeasures::read(picture, width as usize));
+        let pixels = pictures.filter_map(|picture| {
+            let pixels = PixelMeasures::read(picture, width as usize)?;
+            Some((picture.path.to_string_lossy().into_owned(), pixels))
+        });
         Ok(Self {
             pixels: pixels.collect(),
             set,
@@ -68,7 +73,26 @@ impl MeasuredSet {
 
     /// One number of each measured picture.
     pub(super) fn values(&self, value: fn(&PixelMeasures) -> f64) -> Vec<f64> {
-        self.pixels.iter().map(value).collect()
+        self.pixels
+            .iter()
+            .map(|(_, pixels)| value(pixels))
+            .collect()
+    }
+
+    /// The same in groups by what a picture's name stands for.
+    pub(super) fn grouped(
+        &self,
+        value: fn(&PixelMeasures) -> f64,
+        group: impl Fn(&str) -> String,
+    ) -> Vec<Vec<Weighted>> {
+        let mut groups: BTreeMap<String, Vec<Weighted>> = BTreeMap::new();
+        for (name, pixels) in &self.pixels {
+            groups
+                .entry(group(name))
+                .or_default()
+                .push((value(pixels), 1.0));
+        }
+        groups.into_values().collect()
     }
 }
 

@@ -26,13 +26,13 @@ use crate::io;
 use crate::plot::Page;
 use crate::scene::{Count, Range, Recipe};
 use counts::label_histogram;
-use falls::{Fall, FallPlan, stopped};
+use falls::{Fall, FallPlan, log_size, stopped};
 use knobs::{Difference, KNOBS, Knob, SCALE};
 use measured::MeasuredSet;
 use plates::MeasuredPlate;
 use recipe_text::KeyText;
 use report::Compared;
-use starts::{SPREADS, StartCandidate, log_sizes_of, places_of};
+use starts::{Candidate, LEVERS, Lever, places_of};
 use statistics::{Weighted, rounds};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -191,7 +191,8 @@ impl Fitting<'_> {
     /// About so many falls and pictures.
     fn expected_steps(&self) -> u64 {
         let row = (OBJECT_COUNTS.len() / 2 + 2) * self.options.falls;
-        (row * (1 + SPREADS.len())) as u64 + 3 * self.options.pictures
+        let tried: usize = LEVERS.iter().map(|lever| lever.values.len()).sum();
+        (row * (1 + tried)) as u64 + 3 * self.options.pictures
     }
 
     fn finish(self, plan: &FitPlan, page: Page) -> Result<Fit> {
@@ -344,8 +345,8 @@ impl<'a> Steps<'a> {
 
 /// Where objects are, how many and how large.
 impl Fitting<'_> {
-    /// Fits scale, spread and number of objects, in this order, and returns the weights of the
-    /// numbers.
+    /// Fits scale, spread, friction and number of objects, in this order, and returns the weights of
+    /// the numbers.
     fn fit_places(&mut self, real: &MeasuredSet) -> Result<Vec<f64>> {
         let boxes = real.boxes();
         let counts: Vec<usize> = boxes.iter().map(Vec::len).collect();
@@ -354,18 +355,20 @@ impl Fitting<'_> {
         if self.fit_scale(&boxes, &own) {
             own = self.candidate(None, &times)?;
         }
-        let own = self.fit_spread(&boxes, own, &times)?;
+        for lever in &LEVERS {
+            own = self.fit_lever(lever, &boxes, own, &times)?;
+        }
         self.fit_objects(&counts, &own);
         Ok(own.weights)
     }
 
-    fn candidate(&self, spread: Option<f64>, times: &[f64]) -> Result<StartCandidate> {
-        let recipe = match spread {
-            Some(spread) => starts::with_spread(&self.config.scene, Range::fixed(spread)),
-            None => self.config.scene.clone(),
-        };
+    fn candidate(&self, value: Option<(&Lever, f64)>, times: &[f64]) -> Result<Candidate> {
+        let mut recipe = self.config.scene.clone();
+        if let Some((lever, value)) = value {
+            (lever.set)(&mut recipe, Range::fixed(value));
+        }
         let falls = self.falls(&recipe, times.len() - 1)?;
-        Ok(StartCandidate::new(spread, falls, times))
+        Ok(Candidate::new(value.map(|(_, value)| value), falls, times))
     }
 
     /// Falls of more and more objects, until even few labels are more than the most that are
@@ -408,8 +411,9 @@ impl Fitting<'_> {
     }
 
     /// Fits the size of objects; whether it is another now.
-    fn fit_scale(&mut self, boxes: &[Vec<[f64; 4]>], own: &StartCandidate) -> bool {
-        let real = log_sizes_of(boxes.iter().map(Vec::as_slice));
+    fn fit_scale(&mut self, boxes: &[Vec<[f64; 4]>], own: &Candidate) -> bool {
+        let sizes = |boxes: &Vec<[f64; 4]>| boxes.iter().map(|b| (log_size(b), 1.0)).collect();
+        let real: Vec<Vec<Weighted>> = boxes.iter().map(sizes).collect();
         let difference = Difference::new(&real, &own.log_sizes(), self.options.seed);
         let fitted = self.fit_knob(&SCALE, difference.as_ref());
         let is_fitted = fitted.fitted.is_some();
@@ -417,48 +421,50 @@ impl Fitting<'_> {
         is_fitted
     }
 
-    /// Fits how far objects start from each other, and returns the candidate that it is nearest to.
-    fn fit_spread(
+    /// Fits where objects come to lie by a lever, and returns the candidate that it is nearest to.
+    fn fit_lever(
         &mut self,
+        lever: &Lever,
         boxes: &[Vec<[f64; 4]>],
-        own: StartCandidate,
+        own: Candidate,
         times: &[f64],
-    ) -> Result<StartCandidate> {
-        let start = &self.config.scene.start;
-        let before = start.spread.map_or_else(|| "none".into(), range_text);
-        let mut key = unfitted(
-            "scene.start.spread",
-            before,
-            "start.positions is given".into(),
-        );
-        if !start.positions.is_empty() {
+    ) -> Result<Candidate> {
+        let before = (lever.before)(&self.config.scene);
+        let mut key = unfitted(lever.key, before, "start.positions is given".into());
+        if !lever.applies_to(&self.config.scene) {
             self.keys.push(key);
             return Ok(own);
         }
         let mut candidates = vec![own];
-        for spread in SPREADS {
-            candidates.push(self.candidate(Some(spread), times)?);
+        for value in lever.values {
+            candidates.push(self.candidate(Some((lever, *value)), times)?);
         }
         let places = places_of(boxes.iter().map(Vec::as_slice));
         let fitted = starts::choose(&candidates, &places, self.options.seed);
-        key.why = describe_start(&candidates, &fitted);
-        key.fitted = fitted.spread.map(range_text);
-        if fitted.spread.is_some() {
-            self.config.scene.start.spread = fitted.spread;
-        }
+        key.why = describe_lever(lever, &candidates, &fitted);
+        key.fitted = fitted.range.map(lever.text);
         self.keys.push(key);
-        let chosen = fitted.spread.map_or(0, |_| fitted.best);
-        Ok(candidates.swap_remove(chosen))
+        let Some(range) = fitted.range else {
+            return Ok(candidates.swap_remove(0));
+        };
+        (lever.set)(&mut self.config.scene, range);
+        let best = candidates.swap_remove(fitted.best);
+        Ok(best.of_recipe())
     }
 
-    fn fit_objects(&mut self, counts: &[usize], own: &StartCandidate) {
+    fn fit_objects(&mut self, counts: &[usize], own: &Candidate) {
         let times = label_histogram(counts);
         let before = &self.config.scene.objects;
         let others = counts::weights_of(before, own.odds.most_objects());
         let gain = counts::gain_on_pictures_left_out(&own.odds, &times, &others);
-        let why = self.describe_objects(counts, own, gain);
+        let mut why = self.describe_objects(counts, own, gain);
+        let labels = own.odds.mean_labels(&own.weights);
+        let is_explained = self.is_mean_of(counts, labels);
+        if !is_explained {
+            why += &unexplained(labels);
+        }
         let mut key = unfitted("scene.objects", count_text(before), why);
-        if gain > 0.0 {
+        if gain > 0.0 && is_explained {
             let fitted = counts::count_of(&own.weights);
             key.fitted = Some(count_text(&fitted));
             self.config.scene.objects = fitted;
@@ -466,7 +472,22 @@ impl Fitting<'_> {
         self.keys.push(key);
     }
 
-    fn describe_objects(&self, counts: &[usize], own: &StartCandidate, gain: f64) -> String {
+    /// Whether pictures with so many labels on average could be the real ones.
+    fn is_mean_of(&self, counts: &[usize], labels: f64) -> bool {
+        let mean = |times: &[u32]| {
+            let sum: f64 = counts
+                .iter()
+                .zip(times)
+                .map(|(n, t)| *n as f64 * f64::from(*t))
+                .sum();
+            sum / counts.len() as f64
+        };
+        let redrawn = rounds(counts.len(), self.options.seed).map(|times| mean(&times));
+        let interval = crate::eval::interval(mean(&vec![1; counts.len()]), redrawn.collect());
+        (interval.low..=interval.high).contains(&labels)
+    }
+
+    fn describe_objects(&self, counts: &[usize], own: &Candidate, gain: f64) -> String {
         let mean = |weights: &[f64]| counts::mean_of(weights);
         let redrawn = rounds(counts.len(), self.options.seed).map(|times| {
             mean(&counts::object_weights(
@@ -512,6 +533,12 @@ impl Fitting<'_> {
     }
 }
 
+fn unexplained(labels: f64) -> String {
+    format!(
+        "; but even these have {labels:.1} labels a picture, unlike the real ones: objects fall otherwise there (see          scene.walls, scene.friction, scene.collider and the assets' thickness), and their number cannot be told"
+    )
+}
+
 /// How many pictures have each number of labels, when pictures are drawn so often.
 fn histogram_of(counts: &[usize], times: &[u32]) -> Vec<f64> {
     let mut histogram = vec![0.0; counts.iter().copied().max().unwrap_or(0) + 1];
@@ -544,17 +571,26 @@ fn unfitted(key: &str, before: String, why: String) -> FittedKey {
     }
 }
 
-fn describe_start(candidates: &[StartCandidate], fitted: &starts::FittedStart) -> String {
-    let named = |spread: Option<f64>| spread.map_or("as it was".into(), |s| format!("spread {s}"));
+fn describe_lever(lever: &Lever, candidates: &[Candidate], fitted: &starts::FittedLever) -> String {
+    let named = |value: Option<f64>| match value {
+        Some(value) => (lever.text)(Range::fixed(value)),
+        None => "as it was".into(),
+    };
     let pairs = candidates.iter().zip(&fitted.distances);
     let distances: Vec<String> = pairs
-        .map(|(candidate, distance)| format!("{} {distance:.2}", named(candidate.spread)))
+        .map(|(candidate, distance)| format!("{} {distance:.2}", named(candidate.value)))
         .collect();
+    let best = match fitted.best {
+        0 => String::new(),
+        best => format!(
+            "; {} is nearer than as it was in {:.0} % of bootstraps",
+            named(candidates[best].value),
+            100.0 * fitted.agreement
+        ),
+    };
     format!(
-        "distance of places and overlaps, standard deviations: {}; {} is nearer than as it was in {:.0} % of bootstraps",
-        distances.join(", "),
-        named(candidates[fitted.best].spread),
-        100.0 * fitted.agreement
+        "distance of labels, their numbers and places, in standard deviations: {}{best}",
+        distances.join(", ")
     )
 }
 
@@ -602,16 +638,17 @@ impl Fitting<'_> {
     }
 
     fn difference(&self, knob: &Knob, real: &MeasuredSet, own: &MeasuredSet) -> Option<Difference> {
-        let real: Vec<Vec<f64>> = real
-            .values(knob.of_picture)
-            .into_iter()
-            .map(|v| vec![v])
-            .collect();
-        let own: Vec<Weighted> = own
-            .values(knob.of_picture)
-            .into_iter()
-            .map(|v| (v, 1.0))
-            .collect();
+        let real = real.grouped(knob.of_picture, str::to_owned);
+        let own = own.grouped(knob.of_picture, |name| self.plate_of(name));
         Difference::new(&real, &own, self.options.seed)
+    }
+
+    /// The photo behind a picture of the recipe, by the number that is its name.
+    fn plate_of(&self, picture: &str) -> String {
+        let number = Path::new(picture)
+            .file_stem()
+            .and_then(|stem| stem.to_str()?.parse().ok());
+        let scene = number.and_then(|k| self.pipeline.draw(self.options.seed, k).ok());
+        scene.map_or_else(String::new, |scene| scene.plate)
     }
 }

@@ -14,8 +14,8 @@ const STYLE: &str = "<style>.pairs{display:grid;grid-template-columns:repeat(aut
     .pairs div{white-space:nowrap}</style>\n";
 
 /// What no picture with labels tells.
-const UNKNOWN: &str = "Labels and pixels do not tell friction, the walls' height and slope, what falls in place of an object \
-    (scene.collider), the lights, nor how colours vary from object to object: those keys are as they were.";
+const UNKNOWN: &str = "Labels and pixels do not tell the walls' height and slope, how thick objects are, the lights, nor \
+    how colours vary from object to object: those keys are as they were.";
 
 /// Real pictures, and the recipe's before and after fitting.
 pub(super) struct Compared<'a> {
@@ -100,10 +100,7 @@ fn measures(set: &MeasuredSet) -> Vec<Measure> {
     let mut measures = Vec::from(measure_boxes(&set.set));
     let boxes = set.boxes();
     let overlaps = boxes.iter().flat_map(|boxes| overlaps(boxes)).collect();
-    measures.push((
-        "overlap of a box with the next one, intersection over union",
-        overlaps,
-    ));
+    measures.push(("overlap of a box with the next one, IoU", overlaps));
     let of_pixels: [(&'static str, fn(&PixelMeasures) -> f64); 6] = [
         ("brightness of a picture, mean code", |p| p.brightness),
         ("contrast of a picture, standard deviation of codes", |p| {

@@ -1,26 +1,82 @@
-//! How far objects start from each other: the spread whose falls leave labels where the real ones
-//! are.
+//! How objects start and slide: the spread and the friction whose falls leave labels where the real
+//! ones are.
 
 use super::counts::{LabelOdds, object_weights};
 use super::falls::{Fall, log_size};
-use super::statistics::{Moments, Weighted, earth_mover, once, redrawn, rounds, sort_by_value};
-use crate::scene::{Range, Recipe};
+use super::statistics::{
+    Moments, Weighted, earth_mover, equally_weighted, redrawn, rounds, sort_by_value,
+};
+use crate::dataset::fit::range_text;
+use crate::scene::{Collider, Range, Recipe};
+use std::collections::BTreeMap;
 
-/// The spreads that are tried, from a heap to all over the surface.
-pub(super) const SPREADS: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
-/// Share of the rounds of a bootstrap in which the best spread must be nearer than the recipe's way
-/// to start.
+/// A key of the recipe that decides where objects come to lie, and the values that are tried.
+pub(super) struct Lever {
+    pub(super) key: &'static str,
+    pub(super) values: &'static [f64],
+    pub(super) set: fn(&mut Recipe, Range),
+    /// Its value in a recipe, and a fitted one, as TOML.
+    pub(super) before: fn(&Recipe) -> String,
+    pub(super) text: fn(Range) -> String,
+}
+
+/// In the order in which they are fitted.
+pub(super) const LEVERS: [Lever; 3] = [SPREAD, FRICTION, COLLIDER];
+
+/// From a heap to all over the surface.
+const SPREAD: Lever = Lever {
+    key: "scene.start.spread",
+    values: &[0.0, 0.25, 0.5, 0.75, 1.0],
+    set: |recipe, range| recipe.start.spread = Some(range),
+    before: |recipe| {
+        recipe
+            .start
+            .spread
+            .map_or_else(|| "none".into(), range_text)
+    },
+    text: range_text,
+};
+
+/// From what slides and rolls apart to what heaps up.
+const FRICTION: Lever = Lever {
+    key: "scene.friction",
+    values: &[0.01, 0.03, 0.1, 0.3],
+    set: |recipe, range| recipe.friction = range,
+    before: |recipe| range_text(recipe.friction),
+    text: range_text,
+};
+
+/// A box around a photo needs more room than what it shows. There is one other value.
+const COLLIDER: Lever = Lever {
+    key: "scene.collider",
+    values: &[1.0],
+    set: |recipe, _| recipe.collider = Collider::Hull,
+    before: |recipe| match recipe.collider {
+        Collider::Box => "\"box\"".into(),
+        Collider::Hull => "\"hull\"".into(),
+    },
+    text: |_| "\"hull\"".into(),
+};
+
+impl Lever {
+    /// Whether the recipe leaves it open: a histogram of positions takes the place of a spread.
+    pub(super) fn applies_to(&self, recipe: &Recipe) -> bool {
+        self.key != SPREAD.key || recipe.start.positions.is_empty()
+    }
+}
+
+/// Share of the rounds of a bootstrap in which the best value must be nearer than the recipe's.
 const AGREEMENT: f64 = 0.9;
-/// Spreads within these shares of the rounds of a bootstrap are the fitted range.
+/// Values within these shares of the rounds of a bootstrap are the fitted range.
 const KEPT: [f64; 2] = [0.1, 0.9];
 /// What is compared of places: see [`places_of`].
-const MEASURES: usize = 4;
+const MEASURES: usize = 5;
 
 /// Values of each picture.
 pub(super) type ByPicture = Vec<Vec<f64>>;
 
-/// Where the labels of pictures are: centres from the left and from the top, distance of each from
-/// the nearest other, and how much of it the next one overlaps.
+/// How many labels pictures have and where: centres from the left and from the top, distance of
+/// each from the nearest other, and how much of it the next one overlaps.
 pub(super) fn places_of<'a>(
     pictures: impl Iterator<Item = &'a [[f64; 4]]>,
 ) -> [ByPicture; MEASURES] {
@@ -30,6 +86,7 @@ pub(super) fn places_of<'a>(
         places[1].push(boxes.iter().map(|b| b[1]).collect());
         places[2].push(nearest_distances(boxes));
         places[3].push(overlaps(boxes));
+        places[4].push(vec![boxes.len() as f64]);
     }
     places
 }
@@ -63,25 +120,25 @@ fn iou(a: &[f64; 4], b: &[f64; 4]) -> f64 {
     shared / (a[2] * a[3] + b[2] * b[3] - shared).max(f64::MIN_POSITIVE)
 }
 
-/// A way to start, its falls, and the numbers of objects that explain the real labels with it.
-pub(super) struct StartCandidate {
+/// A value of a lever, its falls, and the numbers of objects that explain the real labels with it.
+pub(super) struct Candidate {
     /// None where it is as the recipe has it.
-    pub(super) spread: Option<f64>,
+    pub(super) value: Option<f64>,
     pub(super) falls: Vec<Fall>,
     pub(super) odds: LabelOdds,
     pub(super) weights: Vec<f64>,
     places: [Vec<Weighted>; MEASURES],
 }
 
-impl StartCandidate {
-    pub(super) fn new(spread: Option<f64>, falls: Vec<Fall>, times: &[f64]) -> Self {
+impl Candidate {
+    pub(super) fn new(value: Option<f64>, falls: Vec<Fall>, times: &[f64]) -> Self {
         let odds = LabelOdds::new(&falls, times.len() - 1);
         let weights = object_weights(&odds, times);
         let of_falls = odds.fall_weights(&falls, &weights);
         let by_fall = places_of(falls.iter().map(|fall| fall.boxes.as_slice()));
         let places = by_fall.map(|values| sort_by_value(weighted(&values, &of_falls)));
         Self {
-            spread,
+            value,
             falls,
             odds,
             weights,
@@ -89,11 +146,23 @@ impl StartCandidate {
         }
     }
 
-    /// Sizes of its boxes.
-    pub(super) fn log_sizes(&self) -> Vec<Weighted> {
+    /// The same, once the recipe has its value.
+    pub(super) fn of_recipe(self) -> Self {
+        Self {
+            value: None,
+            ..self
+        }
+    }
+
+    /// Sizes of its boxes, of each photo of the place.
+    pub(super) fn log_sizes(&self) -> Vec<Vec<Weighted>> {
         let of_falls = self.odds.fall_weights(&self.falls, &self.weights);
-        let boxes = self.falls.iter().map(|fall| fall.boxes.as_slice());
-        weighted(&log_sizes_of(boxes), &of_falls)
+        let mut by_plate: BTreeMap<&str, Vec<Weighted>> = BTreeMap::new();
+        for (fall, weight) in self.falls.iter().zip(of_falls).filter(|(_, w)| *w > 0.0) {
+            let sizes = fall.boxes.iter().map(|b| (log_size(b), weight));
+            by_plate.entry(&fall.plate).or_default().extend(sizes);
+        }
+        by_plate.into_values().collect()
     }
 
     /// Mean earth mover's distance of its places from real ones, in standard deviations of those.
@@ -102,13 +171,6 @@ impl StartCandidate {
         let distances: Vec<f64> = pairs.filter_map(|(own, real)| apart(own, real)).collect();
         distances.iter().sum::<f64>() / distances.len().max(1) as f64
     }
-}
-
-/// Sizes of the boxes of each picture, natural logarithm.
-pub(super) fn log_sizes_of<'a>(pictures: impl Iterator<Item = &'a [[f64; 4]]>) -> ByPicture {
-    pictures
-        .map(|boxes| boxes.iter().map(log_size).collect())
-        .collect()
 }
 
 fn weighted(by_picture: &[Vec<f64>], weights: &[f64]) -> Vec<Weighted> {
@@ -124,26 +186,27 @@ fn apart(own: &[Weighted], real: &[Weighted]) -> Option<f64> {
     (sigma > 0.0 && !own.is_empty()).then(|| earth_mover(own, real) / sigma)
 }
 
-/// The way to start that fits best.
-pub(super) struct FittedStart {
+/// The value of a lever that fits best.
+pub(super) struct FittedLever {
     /// Its place among the candidates.
     pub(super) best: usize,
-    /// The spread, unless the pictures do not decide against the recipe's way.
-    pub(super) spread: Option<Range>,
+    /// The range of values, unless the pictures do not decide against the recipe's.
+    pub(super) range: Option<Range>,
     /// Distance of each candidate from the real pictures.
     pub(super) distances: Vec<f64>,
-    /// Share of the rounds of a bootstrap in which the best is nearer than the recipe's way.
+    /// Share of the rounds of a bootstrap in which the best is nearer than the recipe's.
     pub(super) agreement: f64,
 }
 
-/// Chooses between candidates, of which the first is the recipe's way, by the boxes of real
+/// Chooses between candidates, of which the first is the recipe's own, by the boxes of real
 /// pictures.
 pub(super) fn choose(
-    candidates: &[StartCandidate],
+    candidates: &[Candidate],
     real: &[ByPicture; MEASURES],
     seed: u64,
-) -> FittedStart {
-    let distances = distances(candidates, real.each_ref().map(|values| once(values)));
+) -> FittedLever {
+    let real = real.each_ref().map(|pictures| weighted_alike(pictures));
+    let distances = distances(candidates, real.each_ref().map(|groups| groups.concat()));
     let redrawn: Vec<Vec<f64>> = rounds(real[0].len(), seed)
         .map(|times| self::distances(candidates, real.each_ref().map(|v| redrawn(v, &times))))
         .collect();
@@ -153,15 +216,22 @@ pub(super) fn choose(
         .filter(|round| round[best] < round[0])
         .count();
     let agreement = agreeing as f64 / redrawn.len() as f64;
-    FittedStart {
+    FittedLever {
         best,
-        spread: (agreement >= AGREEMENT).then(|| kept_spreads(candidates, best, &redrawn)),
+        range: (agreement >= AGREEMENT).then(|| kept_values(candidates, best, &redrawn)),
         distances,
         agreement,
     }
 }
 
-fn distances(candidates: &[StartCandidate], real: [Vec<Weighted>; MEASURES]) -> Vec<f64> {
+fn weighted_alike(by_picture: &[Vec<f64>]) -> Vec<Vec<Weighted>> {
+    by_picture
+        .iter()
+        .map(|values| equally_weighted(values))
+        .collect()
+}
+
+fn distances(candidates: &[Candidate], real: [Vec<Weighted>; MEASURES]) -> Vec<f64> {
     let real = real.map(sort_by_value);
     candidates.iter().map(|c| c.distance(&real)).collect()
 }
@@ -172,25 +242,18 @@ fn least_place(distances: &[f64]) -> usize {
     least.map_or(0, |(place, _)| place)
 }
 
-/// The range of the spreads that fit best in most rounds, the best one included.
-fn kept_spreads(candidates: &[StartCandidate], best: usize, rounds: &[Vec<f64>]) -> Range {
+/// The range of the values that fit best in most rounds, the best one included.
+fn kept_values(candidates: &[Candidate], best: usize, rounds: &[Vec<f64>]) -> Range {
     let chosen = rounds
         .iter()
-        .filter_map(|round| candidates[least_place(round)].spread);
-    let mut spreads: Vec<f64> = chosen.collect();
-    spreads.sort_by(f64::total_cmp);
-    let last = spreads.len().saturating_sub(1) as f64;
-    let ends = KEPT.map(|share| spreads.get((share * last).round() as usize).copied());
-    let own = candidates[best].spread.unwrap_or_default();
+        .filter_map(|round| candidates[least_place(round)].value);
+    let mut values: Vec<f64> = chosen.collect();
+    values.sort_by(f64::total_cmp);
+    let last = values.len().saturating_sub(1) as f64;
+    let ends = KEPT.map(|share| values.get((share * last).round() as usize).copied());
+    let own = candidates[best].value.unwrap_or_default();
     let [low, high] = ends.map(|end| end.unwrap_or(own));
     Range::new(low.min(own), high.max(own))
-}
-
-/// The recipe with objects that start this far from each other.
-pub(super) fn with_spread(recipe: &Recipe, spread: Range) -> Recipe {
-    let mut recipe = recipe.clone();
-    recipe.start.spread = Some(spread);
-    recipe
 }
 
 #[cfg(test)]
@@ -214,27 +277,34 @@ mod tests {
             .collect()
     }
 
-    fn candidate(spread: Option<f64>, reach: f64) -> StartCandidate {
-        let falls = pictures(reach, 1)
-            .into_iter()
-            .map(|boxes| Fall { objects: 4, boxes });
-        StartCandidate::new(spread, falls.collect(), &[0.0, 0.0, 0.0, 0.0, 20.0])
+    fn candidate(value: Option<f64>, reach: f64) -> Candidate {
+        let falls = pictures(reach, 1).into_iter().map(|boxes| Fall {
+            objects: 4,
+            boxes,
+            plate: String::new(),
+        });
+        Candidate::new(value, falls.collect(), &[0.0, 0.0, 0.0, 0.0, 20.0])
     }
 
     #[test]
     fn the_spread_that_leaves_labels_there_is_chosen() {
         let mut candidates = vec![candidate(None, 0.6)];
-        candidates.extend(SPREADS.map(|s| candidate(Some(s), 0.2 + 0.8 * s)));
+        candidates.extend(
+            SPREAD
+                .values
+                .iter()
+                .map(|s| candidate(Some(*s), 0.2 + 0.8 * s)),
+        );
         let fitted = |reach: f64| {
             let real = pictures(reach, 2);
             choose(&candidates, &places_of(real.iter().map(Vec::as_slice)), 3)
         };
-        let wide = fitted(1.0).spread.unwrap();
+        let wide = fitted(1.0).range.unwrap();
         assert!(wide.min >= 0.75 && wide.max == 1.0, "{wide:?}");
-        let heap = fitted(0.2).spread.unwrap();
+        let heap = fitted(0.2).range.unwrap();
         assert!(heap.min == 0.0 && heap.max <= 0.25, "{heap:?}");
         // Spread 0.5 is as good as what the recipe has.
-        assert_eq!(fitted(0.6).spread, None);
+        assert_eq!(fitted(0.6).range, None);
     }
 
     #[test]

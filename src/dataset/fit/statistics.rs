@@ -66,25 +66,17 @@ fn take_equal(values: &[Weighted], value: f64, below: &mut f64) -> usize {
     equal.inspect(|(_, weight)| *below += weight).count()
 }
 
-/// Values of pictures, drawn again with their pictures: `times[i]` is how often picture `i` is
-/// there.
-pub(super) fn redrawn(by_picture: &[Vec<f64>], times: &[u32]) -> Vec<Weighted> {
-    let pictures = by_picture.iter().zip(times);
-    let values = pictures.flat_map(|(values, n)| values.iter().map(|v| (*v, f64::from(*n))));
-    values.filter(|(_, weight)| *weight > 0.0).collect()
-}
-
-/// Weighted values, each as often as it was drawn.
-pub(super) fn reweighted(values: &[Weighted], times: &[u32]) -> Vec<Weighted> {
-    let pairs = values.iter().zip(times).filter(|(_, times)| **times > 0);
+/// Values of groups, drawn again with their groups: `times[i]` is how often group `i` is there.
+pub(super) fn redrawn(groups: &[Vec<Weighted>], times: &[u32]) -> Vec<Weighted> {
+    let pairs = groups.iter().zip(times).filter(|(_, times)| **times > 0);
     pairs
-        .map(|((value, weight), times)| (*value, weight * f64::from(*times)))
+        .flat_map(|(values, times)| values.iter().map(|(v, w)| (*v, w * f64::from(*times))))
         .collect()
 }
 
-/// Each picture once.
-pub(super) fn once(by_picture: &[Vec<f64>]) -> Vec<Weighted> {
-    redrawn(by_picture, &vec![1; by_picture.len()])
+/// Values that all weigh the same.
+pub(super) fn equally_weighted(values: &[f64]) -> Vec<Weighted> {
+    values.iter().map(|value| (*value, 1.0)).collect()
 }
 
 pub(super) fn sort_by_value(mut values: Vec<Weighted>) -> Vec<Weighted> {
