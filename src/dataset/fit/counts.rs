@@ -61,13 +61,15 @@ impl LabelOdds {
         for (objects, weight) in weights.iter().enumerate().skip(1) {
             *of_node.entry(self.nearest(objects)).or_default() += weight;
         }
-        let count = |objects| falls.iter().filter(|fall| fall.objects == objects).count();
-        let shares: BTreeMap<usize, f64> = of_node
-            .into_iter()
-            .map(|(objects, weight)| (objects, weight / count(objects).max(1) as f64))
-            .collect();
-        let of_fall = falls.iter().map(|fall| shares.get(&fall.objects));
-        of_fall.map(|share| share.copied().unwrap_or(0.0)).collect()
+        let mut count: BTreeMap<usize, f64> = BTreeMap::new();
+        for fall in falls {
+            *count.entry(fall.objects).or_default() += 1.0;
+        }
+        let weight = |fall: &Fall| of_node.get(&fall.objects).copied().unwrap_or(0.0);
+        falls
+            .iter()
+            .map(|fall| weight(fall) / count[&fall.objects])
+            .collect()
     }
 
     fn nearest(&self, objects: usize) -> usize {

@@ -22,6 +22,8 @@ pub(super) struct Knob {
     pub(super) to_value: fn(f64) -> f64,
     /// The least that the key can add to the measure.
     pub(super) least: f64,
+    /// The measure is of neighbouring pixels: of pictures of another size it is another.
+    pub(super) is_of_pixels: bool,
 }
 
 /// Camera and light of the whole picture.
@@ -35,6 +37,7 @@ pub(super) const KNOBS: [Knob; 5] = [
         to_measure: |ev| ev,
         to_value: |ev| ev,
         least: f64::NEG_INFINITY,
+        is_of_pixels: false,
     },
     Knob {
         key: "scene.finish.white_k",
@@ -45,6 +48,7 @@ pub(super) const KNOBS: [Knob; 5] = [
         to_measure: log_red_over_blue,
         to_value: white_for,
         least: f64::NEG_INFINITY,
+        is_of_pixels: false,
     },
     Knob {
         key: "scene.finish.camera_blur_px",
@@ -55,6 +59,7 @@ pub(super) const KNOBS: [Knob; 5] = [
         to_measure: |sigma| sigma * sigma,
         to_value: f64::sqrt,
         least: 0.0,
+        is_of_pixels: true,
     },
     Knob {
         key: "scene.finish.camera_noise.shot",
@@ -65,6 +70,7 @@ pub(super) const KNOBS: [Knob; 5] = [
         to_measure: |shot| shot,
         to_value: |shot| shot,
         least: 0.0,
+        is_of_pixels: true,
     },
     Knob {
         key: "scene.finish.camera_noise.read",
@@ -75,6 +81,7 @@ pub(super) const KNOBS: [Knob; 5] = [
         to_measure: |read| read * read,
         to_value: f64::sqrt,
         least: 0.0,
+        is_of_pixels: true,
     },
 ];
 
@@ -110,6 +117,7 @@ pub(super) const SCALE: Knob = Knob {
     to_measure: f64::ln,
     to_value: f64::exp,
     least: f64::NEG_INFINITY,
+    is_of_pixels: false,
 };
 
 /// How a measure of real pictures differs from that of the recipe's.
@@ -122,7 +130,7 @@ impl Difference {
     /// Of values of groups, which are drawn again: each real picture, and all pictures of the
     /// recipe before one photo of the place; none where either has none.
     pub(super) fn new(real: &[Vec<Weighted>], own: &[Vec<Weighted>], seed: u64) -> Option<Self> {
-        let (whole, own_whole) = (Moments::new(&real.concat())?, Moments::new(&own.concat())?);
+        let whole = [Moments::new(&real.concat())?, Moments::new(&own.concat())?];
         // Not the numbers of the real pictures, of which there may be as many.
         let pairs = rounds(real.len(), seed).zip(rounds(own.len(), !seed));
         let resampled: Vec<[Moments; 2]> = pairs
@@ -133,13 +141,9 @@ impl Difference {
                 ])
             })
             .collect();
-        let differences = |of: fn(&Moments) -> f64| {
-            let redrawn = resampled.iter().map(move |[real, own]| of(real) - of(own));
-            Bootstrapped::new(of(&whole) - of(&own_whole), redrawn)
-        };
         Some(Self {
-            mean: differences(|moments| moments.mean),
-            variance: differences(|moments| moments.variance),
+            mean: bootstrapped(&whole, &resampled, |moments| moments.mean),
+            variance: bootstrapped(&whole, &resampled, |moments| moments.variance),
         })
     }
 
@@ -157,6 +161,16 @@ impl Difference {
     pub(super) fn mean_interval(&self) -> Interval {
         self.mean.interval()
     }
+}
+
+/// How one moment of the first of two samples differs from that of the second.
+fn bootstrapped(
+    whole: &[Moments; 2],
+    resampled: &[[Moments; 2]],
+    of: fn(&Moments) -> f64,
+) -> Bootstrapped {
+    let difference = |[real, own]: &[Moments; 2]| of(real) - of(own);
+    Bootstrapped::new(difference(whole), resampled.iter().map(difference))
 }
 
 impl Knob {

@@ -29,7 +29,9 @@ pub(super) struct MeasuredSet {
 /// What the pixels of a picture are like.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PixelMeasures {
-    /// Mean and standard deviation of the whole picture's codes of 8 bits.
+    /// Width of the picture, pixels.
+    pub(super) width: usize,
+    /// Mean and standard deviation of its codes of 8 bits.
     pub(super) brightness: f64,
     pub(super) contrast: f64,
     /// What follows is of the surroundings of the labels. Binary logarithm of the median luminance.
@@ -69,6 +71,12 @@ impl MeasuredSet {
         labelled
             .map(|boxes| boxes.iter().map(|(_, shares)| *shares).collect())
             .collect()
+    }
+
+    /// Whether some picture is narrower than this.
+    pub(super) fn is_narrower_than(&self, width: u32) -> bool {
+        let mut pictures = self.pixels.iter();
+        pictures.any(|(_, pixels)| pixels.width < width as usize)
     }
 
     /// One number of each measured picture.
@@ -122,6 +130,7 @@ impl PixelMeasures {
         let whole = PixelStatistics::of_whole(picture);
         let (shot, dark) = noise_of(&around);
         Some(Self {
+            width: picture.width(),
             brightness: whole.brightness,
             contrast: whole.contrast,
             exposure_ev: median_luminance(&seen).max(f64::MIN_POSITIVE).log2(),

@@ -2,10 +2,10 @@
 
 use super::knobs::{KNOBS, Knob, three_digits};
 use super::measured::PixelMeasures;
-use super::statistics::{Moments, Weighted};
-use super::{FittedKey, range_text};
+use super::statistics::{Moments, equally_weighted};
+use super::{FittedKey, range_text, unfitted};
 use crate::dataset::{DatasetConfig, Pipeline};
-use crate::error::Result;
+use crate::error;
 use crate::plot::Table;
 use crate::scene::{Blur, Noise, Range};
 
@@ -14,6 +14,7 @@ const MIN_PLATES: usize = 3;
 /// Noise (codes of 8 bits) and blur (pixels) below which objects need none.
 const LEAST_NOISE: f64 = 0.3;
 const LEAST_BLUR_PX: f64 = 0.2;
+const MATCH_PLATE: &str = "\"match_plate\"";
 /// The keys whose ranges come from how the photos differ: exposure and white balance.
 const LIGHT_KNOBS: &[Knob] = KNOBS.split_at(2).0;
 
@@ -28,7 +29,7 @@ pub(super) struct MeasuredPlate {
 ///
 /// # Errors
 /// One that cannot be read.
-pub(super) fn measured_plates(pipeline: &Pipeline) -> Result<Vec<MeasuredPlate>> {
+pub(super) fn measured_plates(pipeline: &Pipeline) -> error::Result<Vec<MeasuredPlate>> {
     let mut measured = Vec::new();
     for place in pipeline.places() {
         let wall = place
@@ -78,38 +79,36 @@ pub(super) fn match_objects(
     plates: &[MeasuredPlate],
 ) -> Vec<FittedKey> {
     let finish = &mut config.scene.finish;
-    let mut keys = Vec::new();
-    let noise = median(plates, PixelMeasures::grey_noise);
-    if finish.noise == Noise::None {
-        let fitted = noise > LEAST_NOISE;
-        finish.noise = if fitted {
-            Noise::MatchPlate
-        } else {
-            finish.noise
-        };
-        let why = format!("the photos have {noise:.2} codes of noise in mid grey");
-        keys.push(matched("scene.finish.noise", "\"none\"", fitted, why));
+    let noise = (finish.noise == Noise::None).then(|| median(plates, PixelMeasures::grey_noise));
+    let no_blur = Blur::Known(Range::fixed(0.0));
+    let blur = (finish.blur_px == no_blur).then(|| median(plates, PixelMeasures::blur_px));
+    if noise.is_some_and(|noise| noise > LEAST_NOISE) {
+        finish.noise = Noise::MatchPlate;
     }
-    let blur = median(plates, PixelMeasures::blur_px);
-    if finish.blur_px == Blur::Known(Range::fixed(0.0)) {
-        let fitted = blur > LEAST_BLUR_PX;
-        finish.blur_px = if fitted {
-            Blur::MatchPlate
-        } else {
-            finish.blur_px
-        };
-        let why = format!("the photos have a blur of {blur:.2} px");
-        keys.push(matched("scene.finish.blur_px", "0", fitted, why));
+    if blur.is_some_and(|blur| blur > LEAST_BLUR_PX) {
+        finish.blur_px = Blur::MatchPlate;
     }
-    keys
+    [noise.map(noise_key), blur.map(blur_key)]
+        .into_iter()
+        .flatten()
+        .collect()
 }
 
-fn matched(key: &str, before: &str, fitted: bool, why: String) -> FittedKey {
+fn noise_key(noise: f64) -> FittedKey {
     FittedKey {
-        key: key.into(),
-        before: before.into(),
-        fitted: fitted.then(|| "\"match_plate\"".into()),
-        why,
+        key: "scene.finish.noise".into(),
+        before: "\"none\"".into(),
+        fitted: (noise > LEAST_NOISE).then(|| MATCH_PLATE.into()),
+        why: format!("the photos of the place have {noise:.2} codes of noise in mid grey"),
+    }
+}
+
+fn blur_key(blur_px: f64) -> FittedKey {
+    FittedKey {
+        key: "scene.finish.blur_px".into(),
+        before: "0".into(),
+        fitted: (blur_px > LEAST_BLUR_PX).then(|| MATCH_PLATE.into()),
+        why: format!("the photos of the place have a blur of {blur_px:.2} px"),
     }
 }
 
@@ -127,31 +126,32 @@ pub(super) fn vary_light(config: &mut DatasetConfig, plates: &[MeasuredPlate]) -
 
 fn vary(knob: &Knob, config: &mut DatasetConfig, plates: &[MeasuredPlate]) -> FittedKey {
     let before = (knob.get)(&config.scene);
-    let unfitted = |why: String| FittedKey {
-        key: knob.key.into(),
-        before: range_text(before),
-        fitted: None,
-        why,
-    };
-    if before.min != before.max {
-        return unfitted("the recipe says how it varies".into());
+    let mut key = unfitted(knob.key, range_text(before), String::new());
+    match varied(knob, before, plates) {
+        Err(why) => key.why = why,
+        Ok(fitted) => {
+            (knob.set)(&mut config.scene, fitted);
+            key.fitted = Some(range_text(fitted));
+            key.why = "one standard deviation between the photos, either way".into();
+        }
     }
-    let values: Vec<Weighted> = plates
-        .iter()
-        .map(|p| ((knob.of_picture)(&p.pixels), 1.0))
-        .collect();
-    let moments = Moments::new(&values).filter(|_| plates.len() >= MIN_PLATES);
-    let Some(moments) = moments else {
-        return unfitted(format!(
+    key
+}
+
+/// A fixed value with the photos' standard deviation about it, or why there is none.
+fn varied(knob: &Knob, before: Range, plates: &[MeasuredPlate]) -> Result<Range, String> {
+    if before.min != before.max {
+        return Err("the recipe says how it varies".into());
+    }
+    if plates.len() < MIN_PLATES {
+        return Err(format!(
             "fewer than {MIN_PLATES} photos do not tell how it varies"
         ));
-    };
-    let (middle, sigma) = ((knob.to_measure)(before.min), moments.variance.sqrt());
-    let ends = [middle - sigma, middle + sigma].map(|end| three_digits((knob.to_value)(end)));
-    let fitted = Range::new(ends[0], ends[1]);
-    (knob.set)(&mut config.scene, fitted);
-    FittedKey {
-        fitted: Some(range_text(fitted)),
-        ..unfitted("one standard deviation between the photos, either way".into())
     }
+    let values = plates.iter().map(|plate| (knob.of_picture)(&plate.pixels));
+    let values: Vec<f64> = values.collect();
+    let moments = Moments::new(&equally_weighted(&values)).ok_or("nothing could be measured")?;
+    let (middle, sigma) = ((knob.to_measure)(before.min), moments.variance.sqrt());
+    let [min, max] = [middle - sigma, middle + sigma].map(|end| (knob.to_value)(end));
+    Ok(Range::new(three_digits(min), three_digits(max)))
 }

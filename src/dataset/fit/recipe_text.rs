@@ -38,23 +38,27 @@ fn lines_of(text: &str) -> Vec<String> {
 }
 
 fn with_key(mut lines: Vec<String>, (path, value): &KeyText) -> Vec<String> {
-    if let Some((at, key)) = line_of_key(&lines, path) {
-        let comment = lines[at]
-            .find(" #")
-            .map(|from| lines[at][from..].to_owned());
-        lines[at] = format!("{key} = {value}{}", comment.unwrap_or_default());
-        return lines;
+    match line_of_key(&lines, path) {
+        Some((at, key)) => {
+            let comment = lines[at].find(" #").map_or("", |from| &lines[at][from..]);
+            lines[at] = format!("{key} = {value}{comment}");
+        }
+        None => add_key(&mut lines, path, value),
     }
+    lines
+}
+
+/// Adds a key that no line sets.
+fn add_key(lines: &mut Vec<String>, path: &str, value: &str) {
     let (table, key) = path.rsplit_once('.').unwrap_or(("", path));
     let line = format!("{key} = {value}");
-    match section(&lines, table) {
+    match section(lines, table) {
         Some((from, to)) => match default_line(&lines[from..to], key) {
             Some(at) => lines[from + at] = line,
             None => lines.insert(from, line),
         },
         None => lines.extend([String::new(), format!("[{table}]"), line]),
     }
-    lines
 }
 
 /// The line that sets a key, and the key as it is called there: `start.spread` within `[scene]`.

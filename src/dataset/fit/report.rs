@@ -2,6 +2,7 @@
 
 use super::FittedKey;
 use super::measured::{MeasuredSet, PixelMeasures};
+use super::plates::{self, MeasuredPlate};
 use super::starts::overlaps;
 use crate::dataset::page::beside::{ComparedMeasure, Measure, measure_boxes, quantiles};
 use crate::plot::{Histogram, Page, Table, heat::heat_map};
@@ -18,13 +19,42 @@ const UNKNOWN: &str = "Labels and pixels do not tell the walls' height and slope
     how colours vary from object to object: those keys are as they were.";
 
 /// Real pictures, and the recipe's before and after fitting.
-pub(super) struct Compared<'a> {
-    pub(super) real: &'a MeasuredSet,
-    pub(super) before: &'a MeasuredSet,
-    pub(super) after: &'a MeasuredSet,
+pub(super) struct Compared {
+    pub(super) real: MeasuredSet,
+    pub(super) before: MeasuredSet,
+    pub(super) after: MeasuredSet,
 }
 
-pub(super) fn begin(title: &str, keys: &[FittedKey]) -> Page {
+/// What is missing without pictures.
+const PLATES_ALONE: &str = "Without labelled pictures of the place nothing tells how many objects there are, where they lie, how \
+    large they look, nor what noise, blur and exposure the camera has that will look at them: give some, 5 to 50.";
+
+pub(super) fn of_plates(keys: &[FittedKey], plates: &[MeasuredPlate]) -> Page {
+    let mut page = begin("Recipe fitted to its plates", keys);
+    page.text(PLATES_ALONE);
+    add_plates(&mut page, plates);
+    page
+}
+
+/// `weights` are those of numbers of objects.
+pub(super) fn of_pictures(
+    keys: &[FittedKey],
+    weights: &[f64],
+    sets: &Compared,
+    plates: &[MeasuredPlate],
+) -> Page {
+    let mut page = begin("Recipe fitted to real pictures", keys);
+    add_counts(&mut page, weights);
+    add_comparison(&mut page, sets);
+    add_plates(&mut page, plates);
+    page
+}
+
+fn add_plates(page: &mut Page, plates: &[MeasuredPlate]) {
+    page.heading("Plates").table(&plates::table(plates));
+}
+
+fn begin(title: &str, keys: &[FittedKey]) -> Page {
     let mut page = Page::new(title);
     page.html(STYLE)
         .heading("Keys")
@@ -43,7 +73,7 @@ fn key_table(keys: &[FittedKey]) -> Table {
 }
 
 /// The fitted weights of numbers of objects.
-pub(super) fn add_counts(page: &mut Page, weights: &[f64]) {
+fn add_counts(page: &mut Page, weights: &[f64]) {
     let histogram = Histogram {
         title: "objects in a picture, fitted, of 1000".into(),
         ends: ["0".into(), (weights.len() - 1).to_string()],
@@ -56,16 +86,8 @@ pub(super) fn add_counts(page: &mut Page, weights: &[f64]) {
     page.html(&histogram.svg());
 }
 
-pub(super) fn add_comparison(page: &mut Page, sets: &Compared<'_>) {
-    let [real, before, after] = [sets.real, sets.before, sets.after].map(measures);
-    let rows: Vec<_> = real
-        .into_iter()
-        .zip(before.into_iter().zip(after))
-        .collect();
-    let known = rows
-        .iter()
-        .filter(|(r, (b, a))| ![r, b, a].iter().any(|m| m.1.is_empty()));
-    let pairs: Vec<MeasurePair> = known.map(|(r, (b, a))| MeasurePair::new(r, b, a)).collect();
+fn add_comparison(page: &mut Page, sets: &Compared) {
+    let pairs = compared_measures(sets);
     page.heading("Before and after")
         .text(&introduction(sets))
         .table(&distances(&pairs));
@@ -74,8 +96,25 @@ pub(super) fn add_comparison(page: &mut Page, sets: &Compared<'_>) {
     add_maps(page, sets);
 }
 
-fn introduction(sets: &Compared<'_>) -> String {
-    let [real, before, after] = [sets.real, sets.before, sets.after].map(|s| s.set.pictures.len());
+/// What all sets have values of.
+fn compared_measures(sets: &Compared) -> Vec<MeasurePair> {
+    let [real, before, after] = sets.each().map(measures);
+    let rows = real.into_iter().zip(before.into_iter().zip(after));
+    rows.map(|(real, (before, after))| [real, before, after])
+        .filter(|row| row.iter().all(|(_, values)| !values.is_empty()))
+        .map(|[real, before, after]| MeasurePair::new(&real, &before, &after))
+        .collect()
+}
+
+impl Compared {
+    /// The real one, then before and after.
+    fn each(&self) -> [&MeasuredSet; 3] {
+        [&self.real, &self.before, &self.after]
+    }
+}
+
+fn introduction(sets: &Compared) -> String {
+    let [real, before, after] = sets.each().map(|set| set.set.pictures.len());
     format!(
         "{real} real pictures (orange) beside {before} of the recipe as it was (blue, left) and {after} of the fitted one (blue, \
          right). The distance is that of Kolmogorov and Smirnov, 0 for the same distribution; chance leaves less than the last \
@@ -83,17 +122,28 @@ fn introduction(sets: &Compared<'_>) -> String {
     )
 }
 
-fn add_maps(page: &mut Page, sets: &Compared<'_>) {
-    let titled = [
-        ("centres of real labels", sets.real),
-        ("before", sets.before),
-        ("after", sets.after),
-    ];
-    let maps: String = titled
+fn add_maps(page: &mut Page, sets: &Compared) {
+    let titles = ["centres of real labels", "before", "after"];
+    let maps = titles.iter().zip(sets.each());
+    let maps: String = maps
         .map(|(title, set)| heat_map(title, &set.set.centres()))
-        .concat();
+        .collect();
     page.html(&format!("<div class=\"histograms\">\n{maps}</div>\n"));
 }
+
+/// The title of a measure and how the pixels of a picture give it.
+type PixelMeasure = (&'static str, fn(&PixelMeasures) -> f64);
+
+const PIXEL_MEASURES: [PixelMeasure; 6] = [
+    ("brightness of a picture, mean code", |p| p.brightness),
+    ("contrast of a picture, standard deviation of codes", |p| {
+        p.contrast
+    }),
+    ("median luminance, EV", |p| p.exposure_ev),
+    ("white balance, red over blue", |p| p.red_over_blue.exp()),
+    ("noise in mid grey, codes", PixelMeasures::grey_noise),
+    ("blur, px", PixelMeasures::blur_px),
+];
 
 /// What is compared, with its values in a set.
 fn measures(set: &MeasuredSet) -> Vec<Measure> {
@@ -101,17 +151,7 @@ fn measures(set: &MeasuredSet) -> Vec<Measure> {
     let boxes = set.boxes();
     let overlaps = boxes.iter().flat_map(|boxes| overlaps(boxes)).collect();
     measures.push(("overlap of a box with the next one, IoU", overlaps));
-    let of_pixels: [(&'static str, fn(&PixelMeasures) -> f64); 6] = [
-        ("brightness of a picture, mean code", |p| p.brightness),
-        ("contrast of a picture, standard deviation of codes", |p| {
-            p.contrast
-        }),
-        ("median luminance, EV", |p| p.exposure_ev),
-        ("white balance, red over blue", |p| p.red_over_blue.exp()),
-        ("noise in mid grey, codes", PixelMeasures::grey_noise),
-        ("blur, px", PixelMeasures::blur_px),
-    ];
-    measures.extend(of_pixels.map(|(title, value)| (title, set.values(value))));
+    measures.extend(PIXEL_MEASURES.map(|(title, value)| (title, set.values(value))));
     measures
 }
 

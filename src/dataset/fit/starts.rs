@@ -207,21 +207,24 @@ pub(super) fn choose(
 ) -> FittedLever {
     let real = real.each_ref().map(|pictures| weighted_alike(pictures));
     let distances = distances(candidates, real.each_ref().map(|groups| groups.concat()));
-    let redrawn: Vec<Vec<f64>> = rounds(real[0].len(), seed)
-        .map(|times| self::distances(candidates, real.each_ref().map(|v| redrawn(v, &times))))
+    let rounds: Vec<Vec<f64>> = rounds(real[0].len(), seed)
+        .map(|times| real.each_ref().map(|groups| redrawn(groups, &times)))
+        .map(|drawn| self::distances(candidates, drawn))
         .collect();
     let best = least_place(&distances);
-    let agreeing = redrawn
-        .iter()
-        .filter(|round| round[best] < round[0])
-        .count();
-    let agreement = agreeing as f64 / redrawn.len() as f64;
+    let agreement = share_nearer(&rounds, best);
     FittedLever {
         best,
-        range: (agreement >= AGREEMENT).then(|| kept_values(candidates, best, &redrawn)),
+        range: (agreement >= AGREEMENT).then(|| kept_values(candidates, best, &rounds)),
         distances,
         agreement,
     }
+}
+
+/// Share of the rounds in which a candidate is nearer than the recipe's own.
+fn share_nearer(rounds: &[Vec<f64>], best: usize) -> f64 {
+    let nearer = rounds.iter().filter(|round| round[best] < round[0]);
+    nearer.count() as f64 / rounds.len() as f64
 }
 
 fn weighted_alike(by_picture: &[Vec<f64>]) -> Vec<Vec<Weighted>> {

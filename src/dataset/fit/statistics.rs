@@ -21,7 +21,7 @@ pub(super) struct Moments {
 impl Moments {
     /// None of values without weight.
     pub(super) fn new(values: &[Weighted]) -> Option<Self> {
-        let weight: f64 = values.iter().map(|(_, weight)| weight).sum();
+        let weight = weight_of(values);
         let sum: f64 = values.iter().map(|(value, weight)| weight * value).sum();
         if weight <= 0.0 {
             return None;
@@ -40,18 +40,21 @@ impl Moments {
 /// # Method
 /// The area between their distribution functions.
 pub(super) fn earth_mover(a: &[Weighted], b: &[Weighted]) -> f64 {
-    let [whole_a, whole_b] = [a, b].map(|s| s.iter().map(|(_, weight)| weight).sum::<f64>());
+    let [whole_a, whole_b] = [weight_of(a), weight_of(b)];
     let (mut i, mut j, mut below_a, mut below_b) = (0, 0, 0.0, 0.0);
-    let (mut area, mut last) = (0.0, f64::NAN);
+    let (mut area, mut last) = (0.0, None);
     while let Some(next) = least(a.get(i), b.get(j)) {
-        if last.is_finite() {
-            area += (next - last) * (below_a / whole_a - below_b / whole_b as f64).abs();
-        }
-        last = next;
+        let width = next - last.unwrap_or(next);
+        area += width * f64::abs(below_a / whole_a - below_b / whole_b);
+        last = Some(next);
         i += take_equal(&a[i..], next, &mut below_a);
         j += take_equal(&b[j..], next, &mut below_b);
     }
     area
+}
+
+fn weight_of(values: &[Weighted]) -> f64 {
+    values.iter().map(|(_, weight)| weight).sum()
 }
 
 /// The smaller of two values that are next.
