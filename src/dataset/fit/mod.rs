@@ -3,9 +3,9 @@
 //! Labels tell of what is labelled, and what is obstructed has none: how many objects there were is
 //! not their number. So objects of the recipe fall and are labelled, without pixels, for numbers of
 //! objects and for ways to start; the weights of those numbers are what explains the real labels
-//! best ([`counts`]), and the spread is that whose labels lie as the real ones do ([`starts`]).
+//! best (`counts`), and the spread is that whose labels lie as the real ones do (`starts`).
 //! Ranges of camera and light are fitted by the mean and the variance of what they add to
-//! ([`knobs`]), measured around the labels on pictures of the recipe as on the real ones. What the
+//! (`knobs`), measured around the labels on pictures of the recipe as on the real ones. What the
 //! pictures do not decide, by a bootstrap over them, stays as it is.
 
 mod camera;
@@ -121,8 +121,8 @@ pub fn fit(
         stop,
     };
     match &plan.real {
-        None => fitting.to_plates(&plates, plan),
-        Some(folder) => fitting.to_pictures(folder, &plates, plan),
+        None => fitting.fit_to_plates(&plates, plan),
+        Some(folder) => fitting.fit_to_pictures(folder, &plates, plan),
     }
 }
 
@@ -141,7 +141,7 @@ struct Fitting<'a> {
 }
 
 impl Fitting<'_> {
-    fn to_plates(mut self, plates: &[MeasuredPlate], plan: &FitPlan) -> Result<Fit> {
+    fn fit_to_plates(mut self, plates: &[MeasuredPlate], plan: &FitPlan) -> Result<Fit> {
         self.keys = plates::match_objects(&mut self.config, plates);
         self.keys
             .extend(plates::vary_light(&mut self.config, plates));
@@ -149,7 +149,7 @@ impl Fitting<'_> {
         self.finish(plan, page)
     }
 
-    fn to_pictures(
+    fn fit_to_pictures(
         mut self,
         folder: &Path,
         plates: &[MeasuredPlate],

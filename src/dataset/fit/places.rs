@@ -17,9 +17,11 @@ use crate::scene::{Count, Range, Recipe};
 pub(super) const OBJECT_COUNTS: [usize; 17] = [
     1, 2, 3, 4, 6, 8, 11, 15, 20, 27, 36, 48, 64, 85, 113, 151, 200,
 ];
-/// From so many objects on, labels that hardly become more end the row: a heap shows no more.
+/// From so many objects on, labels that hardly become more end the row: a heap shows no more. Not
+/// the first time, which may be chance.
 const MIN_SATURATED: usize = 8;
 const SATURATED_RATIO: f64 = 1.05;
+const MAX_FLAT: usize = 2;
 
 impl Fitting<'_> {
     /// Fits scale, spread, friction and number of objects, in this order, and returns the weights of
@@ -57,18 +59,19 @@ impl Fitting<'_> {
             each: self.options.falls,
             step: &|| self.steps.step(),
         };
-        let (mut falls, mut last) = (Vec::new(), 0.0);
+        let (mut falls, mut most, mut flat) = (Vec::new(), 0.0, 0);
         for objects in self.counts_with_room(recipe) {
             let more = plan.falls(recipe, objects)?;
             let Some([mean, sigma]) = label_moments(&more) else {
                 continue;
             };
             falls.extend(more);
-            let is_saturated = objects >= MIN_SATURATED && mean < SATURATED_RATIO * last;
-            if is_saturated || mean - sigma > most_labels as f64 {
+            let rises = objects < MIN_SATURATED || mean > SATURATED_RATIO * most;
+            flat = if rises { 0 } else { flat + 1 };
+            most = mean.max(most);
+            if flat == MAX_FLAT || mean - sigma > most_labels as f64 {
                 break;
             }
-            last = mean;
         }
         match falls.is_empty() {
             true => Err(no_rest()),
@@ -195,7 +198,7 @@ impl Fitting<'_> {
 
 fn unexplained(labels: f64) -> String {
     format!(
-        "; but even these have {labels:.1} labels a picture, unlike the real ones: objects fall otherwise there (see          scene.walls, scene.friction, scene.collider and the assets' thickness), and their number cannot be told"
+        "; but even these have {labels:.1} labels a picture, unlike the real ones: objects fall otherwise there (see scene.walls, scene.friction, scene.collider and the assets' thickness), and their number cannot be told"
     )
 }
 
