@@ -198,7 +198,8 @@ impl Fitting<'_> {
 
 fn unexplained(labels: f64) -> String {
     format!(
-        "; but even these have {labels:.1} labels a picture, unlike the real ones: objects fall otherwise there (see scene.walls, scene.friction, scene.collider and the assets' thickness), and their number cannot be told"
+        "; but even these have {labels:.1} labels a picture, unlike the real ones: objects fall otherwise there \
+         (see scene.walls, scene.friction, scene.collider and the assets' thickness), and their number cannot be told"
     )
 }
 
