@@ -14,8 +14,9 @@ use std::sync::atomic::AtomicBool;
 static NEVER: AtomicBool = AtomicBool::new(false);
 static ALWAYS: AtomicBool = AtomicBool::new(true);
 
-/// What is known of the place: small pictures, without lamps.
-const PLACE: &str = "# mine\n[scene]\nimage = [240, 180]\nlights = []\nambient = 1\n";
+/// What is known of the place: small pictures without lamps, from where the first photo was taken.
+const PLACE: &str =
+    "# mine\n[scene]\nimage = [240, 180]\nviewpoints = 1\nlights = []\nambient = 1\n";
 /// What is to be found.
 const REALITY: &str = "objects = [9, 13]\nscale = 0.8\nfriction = 0.1\nstart.spread = 1\n\
     finish.exposure_ev = [0.5, 0.7]\nfinish.camera_noise = { shot = 0.001, read = 0.004 }\n";

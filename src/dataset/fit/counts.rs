@@ -43,7 +43,7 @@ impl LabelOdds {
     /// The chance of a number of labels where numbers of objects have weights.
     fn chance(&self, weights: &[f64], labels: usize) -> f64 {
         let rows = weights.iter().zip(&self.rows);
-        rows.map(|(weight, row)| weight * row[labels]).sum::<f64>() + LEAST_ODDS
+        rows.map(|(weight, row)| weight * row[labels]).sum()
     }
 
     /// Labels of a picture on average, where numbers of objects have weights.
@@ -100,8 +100,8 @@ fn row(nodes: &[(usize, Moments)], objects: usize, most: usize) -> Vec<f64> {
     let share = |labels: usize| below(labels as f64 + 0.5) - below(labels as f64 - 0.5);
     (0..=most)
         .map(|labels| match labels <= objects {
-            true => share(labels) / whole.max(f64::MIN_POSITIVE),
-            false => 0.0,
+            true => LEAST_ODDS + share(labels) / whole.max(f64::MIN_POSITIVE),
+            false => LEAST_ODDS,
         })
         .collect()
 }
@@ -158,7 +158,7 @@ fn maximised(odds: &LabelOdds, times: &[f64], weights: &[f64]) -> Vec<f64> {
     for (labels, times) in times.iter().enumerate().filter(|(_, times)| **times > 0.0) {
         let chance = odds.chance(weights, labels);
         for ((sum, weight), row) in explained.iter_mut().zip(weights).zip(&odds.rows) {
-            *sum += times * weight * row[labels] / chance;
+            *sum += times * weight * row[labels] / chance.max(f64::MIN_POSITIVE);
         }
     }
     explained
@@ -188,7 +188,8 @@ pub(super) fn gain_on_pictures_left_out(odds: &LabelOdds, times: &[f64], others:
         let mut rest = times.to_vec();
         rest[labels] -= 1.0;
         let fitted = object_weights(odds, &rest);
-        n * (odds.chance(&fitted, labels) / odds.chance(others, labels)).ln()
+        let [fitted, others] = [&fitted, others].map(|weights| odds.chance(weights, labels));
+        n * (fitted.max(LEAST_ODDS) / others.max(LEAST_ODDS)).ln()
     });
     gains.sum::<f64>() / times.iter().sum::<f64>()
 }
@@ -299,6 +300,20 @@ mod tests {
         };
         assert!(gain(Count::fixed(8)) < 0.0);
         assert!(gain(Count::fixed(16)) > 0.5);
+    }
+
+    #[test]
+    fn labels_that_no_fall_leaves_are_explained_by_what_comes_nearest() {
+        let heaps = [1, 4, 8]
+            .into_iter()
+            .flat_map(|n| (0..9).map(move |_| fall(n, 1)));
+        let odds = LabelOdds::new(&heaps.collect::<Vec<_>>(), 6);
+        let weights = object_weights(&odds, &label_histogram(&[5, 6, 6]));
+        assert!(
+            (weights.iter().sum::<f64>() - 1.0).abs() < 1e-9,
+            "{weights:?}"
+        );
+        assert!((odds.mean_labels(&weights) - 1.0).abs() < 1e-9);
     }
 
     #[test]

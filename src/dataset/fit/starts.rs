@@ -180,10 +180,14 @@ fn weighted(by_picture: &[Vec<f64>], weights: &[f64]) -> Vec<Weighted> {
         .collect()
 }
 
-/// None where one has no values or all real ones are the same.
+/// None where all real values are the same, or there are none; infinite where only they have some.
 fn apart(own: &[Weighted], real: &[Weighted]) -> Option<f64> {
     let sigma = Moments::new(real)?.variance.sqrt();
-    (sigma > 0.0 && !own.is_empty()).then(|| earth_mover(own, real) / sigma)
+    let distance = || match own.is_empty() {
+        true => f64::INFINITY,
+        false => earth_mover(own, real) / sigma,
+    };
+    (sigma > 0.0).then(distance)
 }
 
 /// The value of a lever that fits best.
@@ -308,6 +312,21 @@ mod tests {
         assert!(heap.min == 0.0 && heap.max <= 0.25, "{heap:?}");
         // Spread 0.5 is as good as what the recipe has.
         assert_eq!(fitted(0.6).range, None);
+    }
+
+    #[test]
+    fn labels_that_are_alone_are_far_from_such_that_are_not() {
+        let heap = |_| Fall {
+            objects: 4,
+            boxes: vec![[0.5, 0.5, 0.1, 0.1]],
+            plate: String::new(),
+        };
+        let times = [0.0, 0.0, 0.0, 0.0, 20.0];
+        let alone = Candidate::new(None, (0..9).map(heap).collect(), &times);
+        let candidates = [alone, candidate(Some(0.5), 0.6)];
+        let real = pictures(1.0, 2);
+        let fitted = choose(&candidates, &places_of(real.iter().map(Vec::as_slice)), 3);
+        assert_eq!((fitted.best, fitted.agreement), (1, 1.0));
     }
 
     #[test]
