@@ -27,6 +27,8 @@ mod environment_maps;
 mod estimate;
 mod finding;
 mod fingerprint;
+#[doc(hidden)]
+pub mod fit;
 mod folder;
 mod formats;
 mod generate;

@@ -19,12 +19,12 @@ use crate::light;
 use crate::pixel::{LinearRgb, PremulRgba};
 use crate::render::{self};
 use crate::scene::{
-    Appearance, AssetVariant, Background, CameraSource, Drawn, Draws, EdgeTreatment, Scene, Shot,
-    catalog, locate,
+    Appearance, AssetVariant, Background, CameraSource, Drawn, Draws, EdgeTreatment, Recipe, Scene,
+    Shot, catalog, locate,
 };
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Everything that pictures are made from, opened once: assets, labelled photos, options.
 #[derive(Debug)]
@@ -156,9 +156,7 @@ impl Pipeline {
     /// cannot be read.
     pub fn plan(&self, count: u64, seed: u64, folder: impl Into<PathBuf>) -> Result<Plan> {
         let (scene, labels) = (&self.config.scene, &self.config.labels);
-        scene
-            .check_room(&self.backgrounds, &self.catalog)
-            .map_err(|e| e.within("scene"))?;
+        self.check_room_with(scene)?;
         let folder = folder.into();
         let mut inputs = Inputs::kept(&folder);
         Ok(Plan {
@@ -205,9 +203,33 @@ impl Pipeline {
     /// # Errors
     /// As [`draw`](Self::draw).
     pub fn explain(&self, seed: u64, k: u64) -> Result<(Scene, Vec<Drawn>)> {
-        self.config
-            .scene
-            .explained(seed, k, &self.backgrounds, &self.catalog)
+        self.explain_with(&self.config.scene, seed, k)
+    }
+
+    /// The same of another recipe for the same assets and photos.
+    pub(super) fn explain_with(
+        &self,
+        recipe: &Recipe,
+        seed: u64,
+        k: u64,
+    ) -> Result<(Scene, Vec<Drawn>)> {
+        recipe.explained(seed, k, &self.backgrounds, &self.catalog)
+    }
+
+    /// Fails where a scene of another recipe could not be composed of the same assets and photos.
+    pub(super) fn check_room_with(&self, recipe: &Recipe) -> Result<()> {
+        let checked = recipe.check_room(&self.backgrounds, &self.catalog);
+        checked.map_err(|e| e.within("scene"))
+    }
+
+    /// The labelled photos that the config names.
+    pub(super) fn places(&self) -> &[BackgroundPhoto] {
+        &self.places
+    }
+
+    /// Whether somebody has stopped it.
+    pub(super) fn is_stopped(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
     }
 
     /// Sample `k`: a pure function of what was opened, `seed` and `k`.

@@ -97,7 +97,7 @@ pub use codec::codes::ToFile;
 pub use codec::exr::Compression;
 #[doc(hidden)]
 pub use codec::jpeg::through_jpeg;
-#[cfg(feature = "fuzzing")]
+#[cfg(feature = "pipeline")]
 pub(crate) use document::parse_toml;
 #[doc(hidden)]
 pub use document::{

@@ -94,7 +94,7 @@ fn measure(set: &LabelledSet) -> Vec<Measure> {
     measures
 }
 
-fn measure_boxes(set: &LabelledSet) -> [Measure; 6] {
+pub(in crate::dataset) fn measure_boxes(set: &LabelledSet) -> [Measure; 6] {
     let counts = set
         .pictures
         .iter()
@@ -146,9 +146,9 @@ fn pixel_statistics(set: &LabelledSet) -> Vec<PixelStatistics> {
 }
 
 /// What the pixels of a picture are like as a whole, in codes of 8 bits.
-struct PixelStatistics {
-    brightness: f64,
-    contrast: f64,
+pub(in crate::dataset) struct PixelStatistics {
+    pub(in crate::dataset) brightness: f64,
+    pub(in crate::dataset) contrast: f64,
     saturation: f64,
     detail: f64,
 }
@@ -159,7 +159,11 @@ impl PixelStatistics {
         let picture = io::read::<LinearRgb>(path)
             .inspect_err(|error| log::warn!("{error}"))
             .ok()?;
-        Some(Self::new(&shrunk(&picture)))
+        Some(Self::of_whole(&picture))
+    }
+
+    pub(in crate::dataset) fn of_whole(picture: &Image<LinearRgb>) -> Self {
+        Self::new(&shrunk(picture))
     }
 
     fn new(picture: &Image<LinearRgb>) -> Self {
@@ -282,7 +286,7 @@ fn distances(measures: &[ComparedMeasure]) -> Table {
     table
 }
 
-fn quantiles(values: &[f64]) -> String {
+pub(in crate::dataset) fn quantiles(values: &[f64]) -> String {
     [0.05, 0.5, 0.95]
         .map(|share| {
             quantile(values.to_vec(), share)
@@ -293,14 +297,14 @@ fn quantiles(values: &[f64]) -> String {
 }
 
 /// A measure's name, and its values.
-type Measure = (&'static str, Vec<f64>);
+pub(in crate::dataset) type Measure = (&'static str, Vec<f64>);
 
 /// One measure of both.
-struct ComparedMeasure {
+pub(in crate::dataset) struct ComparedMeasure {
     title: &'static str,
     ours: Vec<f64>,
     theirs: Vec<f64>,
-    distance: f64,
+    pub(in crate::dataset) distance: f64,
 }
 
 /// What both have values of, what differs most first.
@@ -315,7 +319,7 @@ fn compare_measures(ours: &LabelledSet, theirs: &LabelledSet) -> Vec<ComparedMea
 }
 
 impl ComparedMeasure {
-    fn new(title: &'static str, ours: Vec<f64>, theirs: Vec<f64>) -> Self {
+    pub(in crate::dataset) fn new(title: &'static str, ours: Vec<f64>, theirs: Vec<f64>) -> Self {
         Self {
             title,
             distance: distance(ours.clone(), theirs.clone()),
@@ -332,7 +336,7 @@ impl ComparedMeasure {
         ]
     }
     /// Shares of each in bins of the same width: ours as bars, the others as steps.
-    fn svg(&self) -> String {
+    pub(in crate::dataset) fn svg(&self) -> String {
         let [w, h] = FRAME;
         let (width, height) = (ROOM_LEFT + w + ROOM_RIGHT, ROOM_ABOVE + h + ROOM_BELOW);
         let (line, title) = (ROOM_ABOVE + h, escaped(self.title));

@@ -15,25 +15,25 @@ const MAX_IMAGES: usize = 200_000;
 
 /// Pictures with boxes, from wherever.
 #[derive(Default)]
-pub(super) struct LabelledSet {
+pub(in crate::dataset) struct LabelledSet {
     /// Names of the classes, in order; may be fewer than occur.
-    pub(super) classes: Vec<String>,
-    pub(super) pictures: Vec<LabelledPicture>,
+    pub(in crate::dataset) classes: Vec<String>,
+    pub(in crate::dataset) pictures: Vec<LabelledPicture>,
 }
 
 /// Class of a box, and its centre, width and height as shares of the picture's.
-pub(super) type ShareBox = (u32, [f64; 4]);
+pub(in crate::dataset) type ShareBox = (u32, [f64; 4]);
 
 /// A picture and its boxes.
 #[derive(Clone)]
-pub(super) struct LabelledPicture {
-    pub(super) path: PathBuf,
+pub(in crate::dataset) struct LabelledPicture {
+    pub(in crate::dataset) path: PathBuf,
     /// None for a picture without a label file.
-    pub(super) boxes: Option<Vec<ShareBox>>,
+    pub(in crate::dataset) boxes: Option<Vec<ShareBox>>,
 }
 
 impl LabelledPicture {
-    pub(super) fn file_name(&self) -> Cow<'_, str> {
+    pub(in crate::dataset) fn file_name(&self) -> Cow<'_, str> {
         self.path.file_name().unwrap_or_default().to_string_lossy()
     }
 }
@@ -44,7 +44,7 @@ impl LabelledSet {
     ///
     /// # Errors
     /// A folder without images; a label that cannot be read.
-    pub(super) fn read(folder: &Path) -> Result<Self> {
+    pub(in crate::dataset) fn read(folder: &Path) -> Result<Self> {
         let (classes, images) = listed_images(folder)?;
         if images.is_empty() {
             let what = "no images, expected a YOLO dataset or a folder of images with labels";
@@ -58,7 +58,7 @@ impl LabelledSet {
     }
 
     /// The pictures of a dataset that petcomp made.
-    pub(super) fn from_summary(folder: &Path, summary: &Summary) -> Self {
+    pub(in crate::dataset) fn from_summary(folder: &Path, summary: &Summary) -> Self {
         Self {
             classes: summary.classes.clone(),
             pictures: summary
@@ -69,22 +69,22 @@ impl LabelledSet {
         }
     }
 
-    pub(super) fn name(&self, class: u32) -> String {
+    pub(in crate::dataset) fn name(&self, class: u32) -> String {
         eval::class_name(class, &self.classes)
     }
 
-    pub(super) fn boxes(&self) -> impl Iterator<Item = &ShareBox> {
+    pub(in crate::dataset) fn boxes(&self) -> impl Iterator<Item = &ShareBox> {
         self.pictures
             .iter()
             .filter_map(|picture| picture.boxes.as_ref())
             .flatten()
     }
 
-    pub(super) fn centres(&self) -> Vec<[f64; 2]> {
+    pub(in crate::dataset) fn centres(&self) -> Vec<[f64; 2]> {
         self.boxes().map(|(_, [x, y, ..])| [*x, *y]).collect()
     }
 
-    pub(super) fn centres_of(&self, class: u32) -> Vec<[f64; 2]> {
+    pub(in crate::dataset) fn centres_of(&self, class: u32) -> Vec<[f64; 2]> {
         self.boxes()
             .filter(|(own, _)| *own == class)
             .map(|(_, [x, y, ..])| [*x, *y])
@@ -92,7 +92,7 @@ impl LabelledSet {
     }
 
     /// Some of the pictures, evenly spread.
-    pub(super) fn spread(&self, max_count: usize) -> Vec<&LabelledPicture> {
+    pub(in crate::dataset) fn spread(&self, max_count: usize) -> Vec<&LabelledPicture> {
         let count = max_count.min(self.pictures.len());
         (0..count)
             .map(|i| &self.pictures[i * self.pictures.len() / count])
@@ -184,7 +184,7 @@ fn images_below(folder: &Path) -> Result<Vec<PathBuf>> {
 }
 
 /// Centre and sides of a box as shares of its picture.
-fn shares_of(b: &BBox, [w, h]: [f64; 2]) -> [f64; 4] {
+pub(in crate::dataset) fn shares_of(b: &BBox, [w, h]: [f64; 2]) -> [f64; 4] {
     let center = b.center();
     [center.x / w, center.y / h, b.width() / w, b.height() / h]
 }

@@ -2,10 +2,10 @@
 //! what can be seen, and the user's own pictures beside it.
 
 mod all_pictures;
-mod beside;
+pub(super) mod beside;
 mod distributions;
-mod labelled_pictures;
-mod outlier;
+pub(super) mod labelled_pictures;
+pub(super) mod outlier;
 mod samples;
 
 use crate::dataset::Summary;

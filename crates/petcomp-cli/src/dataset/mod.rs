@@ -2,6 +2,7 @@
 
 mod ablate;
 mod counts;
+mod fit;
 mod generate;
 mod inspect;
 mod merge;
@@ -21,6 +22,8 @@ use crate::global::GlobalArgs;
 pub(crate) enum DatasetCommand {
     #[command(flatten)]
     Recipe(recipe::RecipeCommand),
+    /// Fit a recipe to labelled pictures of the real place, or to its photos of the place alone
+    Fit(fit::FitArgs),
     /// Make a dataset; the same command goes on where an interrupted one stopped
     Generate(generate::GenerateArgs),
     /// Make the paper's datasets: all variation, one source of it switched off in each, all off;
@@ -39,6 +42,7 @@ pub(crate) enum DatasetCommand {
 pub(crate) fn run(command: &DatasetCommand, global: &GlobalArgs) -> anyhow::Result<()> {
     match command {
         DatasetCommand::Recipe(command) => recipe::run(command, global),
+        DatasetCommand::Fit(args) => fit::run(args, global),
         DatasetCommand::Generate(args) => generate::run(args, global),
         DatasetCommand::Ablate(args) => ablate::run(args, global),
         DatasetCommand::Merge(args) => merge::run(args, global),

@@ -1,0 +1,77 @@
+//! `petcomp dataset fit`: a recipe comes nearer to the real place.
+
+use crate::global::GlobalArgs;
+use crate::interruption::interruption;
+use crate::print;
+use petcomp::dataset::fit::{Fit, FitOptions, FitPlan, FittedKey, fit};
+use petcomp::io;
+use std::path::PathBuf;
+
+#[derive(clap::Args)]
+pub(crate) struct FitArgs {
+    /// Labelled pictures of the place, 5 to 50: a YOLO dataset, or a folder of images with YOLO
+    /// labels. Without, what the recipe's photos of the place tell
+    #[arg(value_name = "REAL")]
+    real: Option<PathBuf>,
+    /// Recipe file (TOML) to fit; it stays as it is
+    #[arg(long, value_name = "RECIPE")]
+    recipe: PathBuf,
+    /// Recipe file to write
+    #[arg(short, long, value_name = "FITTED")]
+    output: PathBuf,
+    /// Page with every distribution before and after; by default the recipe's name with .html
+    #[arg(long, value_name = "HTML")]
+    page: Option<PathBuf>,
+    /// Seed; the same one gives the same files
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+}
+
+pub(crate) fn run(args: &FitArgs, global: &GlobalArgs) -> anyhow::Result<()> {
+    let display = global.start_progress("falls and pictures");
+    let plan = args.plan();
+    let fitted = fit(&plan, &|done, of| display.update(done, of), interruption())?;
+    drop(display);
+    if !fitted.has_comments {
+        let recipe = args.recipe.display();
+        log::warn!("{recipe}: its comments are not kept: some keys are in tables within lines");
+    }
+    io::write_text(&args.output, &fitted.text)?;
+    io::write_text(args.page_path(), &fitted.page.document())?;
+    print_keys(&fitted);
+    global.print_status(args.output.display());
+    global.print_look_at(&args.page_path());
+    Ok(())
+}
+
+impl FitArgs {
+    fn plan(&self) -> FitPlan {
+        FitPlan {
+            recipe: self.recipe.clone(),
+            real: self.real.clone(),
+            output: self.output.clone(),
+            options: FitOptions {
+                seed: self.seed,
+                ..FitOptions::default()
+            },
+        }
+    }
+
+    fn page_path(&self) -> PathBuf {
+        let beside = || self.output.with_extension("html");
+        self.page.clone().unwrap_or_else(beside)
+    }
+}
+
+/// Prints what was fitted, and what stays.
+fn print_keys(fitted: &Fit) {
+    for FittedKey {
+        key, fitted, why, ..
+    } in &fitted.keys
+    {
+        match fitted {
+            Some(value) => print::line(format_args!("{key} = {value}")),
+            None => print::line(format_args!("{key} stays: {why}")),
+        }
+    }
+}

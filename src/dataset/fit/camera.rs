@@ -1,0 +1,100 @@
+//! Ranges that are fitted by how a measure of the real pictures differs: camera, light, size.
+
+use super::knobs::{self, Difference, KNOBS, Knob};
+use super::measured::MeasuredSet;
+use super::{FittedKey, Fitting, range_text, unfitted};
+use crate::error::Result;
+use std::path::Path;
+
+impl Fitting<'_> {
+    /// Sets a range by how a measure differs, and says so.
+    pub(super) fn fit_knob(&mut self, knob: &Knob, difference: Option<&Difference>) -> FittedKey {
+        let scene = &mut self.config.scene;
+        let before = (knob.get)(scene);
+        let Some(difference) = difference else {
+            return unfitted(
+                knob.key,
+                range_text(before),
+                "nothing could be measured".into(),
+            );
+        };
+        let mut key = unfitted(knob.key, range_text(before), describe(knob, difference));
+        if let Some(fitted) = knob.fitted(scene, difference) {
+            let mut changed = scene.clone();
+            (knob.set)(&mut changed, fitted);
+            if let Err(error) = changed.check().and(self.pipeline.check_room_with(&changed)) {
+                key.why = format!("{} was found, but: {error}", range_text(fitted));
+                return key;
+            }
+            *scene = changed;
+            key.fitted = Some(range_text(fitted));
+        }
+        key
+    }
+
+    /// Fits the ranges of the whole picture, then once more by pictures made with them.
+    pub(super) fn fit_camera(&mut self, real: &MeasuredSet, before: &MeasuredSet) -> Result<()> {
+        let mut fitted: Vec<(&Knob, FittedKey)> = Vec::new();
+        for knob in &KNOBS {
+            let difference = self.difference(knob, real, before);
+            let key = match knob.is_of_pixels && real.is_narrower_than(self.config.scene.image[0]) {
+                true => self.too_small_for(knob),
+                false => self.fit_knob(knob, difference.as_ref()),
+            };
+            fitted.push((knob, key));
+        }
+        if fitted.iter().any(|(_, key)| key.fitted.is_some()) {
+            self.refine_camera(real, &mut fitted)?;
+        }
+        self.keys.extend(fitted.into_iter().map(|(_, key)| key));
+        Ok(())
+    }
+
+    fn too_small_for(&self, knob: &Knob) -> FittedKey {
+        let before = range_text((knob.get)(&self.config.scene));
+        let why = "real pictures are smaller than scene.image, and show it otherwise";
+        unfitted(knob.key, before, why.into())
+    }
+
+    fn refine_camera(
+        &mut self,
+        real: &MeasuredSet,
+        fitted: &mut [(&Knob, FittedKey)],
+    ) -> Result<()> {
+        let trial = self.rendered()?;
+        for (knob, key) in fitted.iter_mut().filter(|(_, key)| key.fitted.is_some()) {
+            let difference = self.difference(knob, real, &trial);
+            if let Some(range) = difference.and_then(|d| knob.moved(&self.config.scene, &d)) {
+                (knob.set)(&mut self.config.scene, range);
+                key.fitted = Some(range_text(range));
+            }
+        }
+        Ok(())
+    }
+
+    fn difference(&self, knob: &Knob, real: &MeasuredSet, own: &MeasuredSet) -> Option<Difference> {
+        let real = real.grouped(knob.of_picture, str::to_owned);
+        let own = own.grouped(knob.of_picture, |name| self.plate_of(name));
+        Difference::new(&real, &own, self.options.seed)
+    }
+
+    /// The photo behind a picture of the recipe, by the number that is its name.
+    fn plate_of(&self, picture: &str) -> String {
+        let number = Path::new(picture)
+            .file_stem()
+            .and_then(|stem| stem.to_str()?.parse().ok());
+        let scene = number.and_then(|k| self.pipeline.draw(self.options.seed, k).ok());
+        scene.map_or_else(String::new, |scene| scene.plate)
+    }
+}
+
+fn describe(knob: &Knob, difference: &Difference) -> String {
+    let mean = difference.mean_interval();
+    let [value, low, high] = [mean.value, mean.low, mean.high].map(knobs::three_digits);
+    let unit = knob.unit;
+    let limit = match value < 0.0 && knob.least == 0.0 {
+        true => "; no key takes away what the photos of the place have",
+        false => "",
+    };
+    format!("real pictures differ by {value} ({low} to {high}) {unit} on average{limit}")
+}

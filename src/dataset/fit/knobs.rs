@@ -1,0 +1,282 @@
+//! Keys of the recipe that are ranges, each with what it changes of a picture: a range is fitted by
+//! the mean and the variance of that.
+
+use super::measured::PixelMeasures;
+use super::statistics::{Bootstrapped, Moments, Weighted, redrawn, rounds};
+use crate::eval::Interval;
+use crate::scene::{Range, Recipe, white_balance};
+
+/// A range of the recipe and a measure of pictures that moves with it, in units in which the one
+/// adds to the other.
+pub(super) struct Knob {
+    /// Its path in a recipe.
+    pub(super) key: &'static str,
+    /// The measure's unit, in words.
+    pub(super) unit: &'static str,
+    /// What is measured of a picture.
+    pub(super) of_picture: fn(&PixelMeasures) -> f64,
+    pub(super) get: fn(&Recipe) -> Range,
+    pub(super) set: fn(&mut Recipe, Range),
+    /// From a value of the key to the measure's unit, and back.
+    pub(super) to_measure: fn(f64) -> f64,
+    pub(super) to_value: fn(f64) -> f64,
+    /// The least that the key can add to the measure.
+    pub(super) least: f64,
+    /// The measure is of neighbouring pixels: of pictures of another size it is another.
+    pub(super) is_of_pixels: bool,
+}
+
+/// Camera and light of the whole picture.
+pub(super) const KNOBS: [Knob; 5] = [
+    Knob {
+        key: "scene.finish.exposure_ev",
+        unit: "EV",
+        of_picture: |p| p.exposure_ev,
+        get: |recipe| recipe.finish.exposure_ev,
+        set: |recipe, range| recipe.finish.exposure_ev = range,
+        to_measure: |ev| ev,
+        to_value: |ev| ev,
+        least: f64::NEG_INFINITY,
+        is_of_pixels: false,
+    },
+    Knob {
+        key: "scene.finish.white_k",
+        unit: "in the logarithm of red over blue",
+        of_picture: |p| p.red_over_blue,
+        get: |recipe| recipe.finish.white_k,
+        set: |recipe, range| recipe.finish.white_k = range,
+        to_measure: log_red_over_blue,
+        to_value: white_for,
+        least: f64::NEG_INFINITY,
+        is_of_pixels: false,
+    },
+    Knob {
+        key: "scene.finish.camera_blur_px",
+        unit: "px^2 of blur",
+        of_picture: |p| p.blur,
+        get: |recipe| recipe.finish.camera_blur_px,
+        set: |recipe, range| recipe.finish.camera_blur_px = range,
+        to_measure: |sigma| sigma * sigma,
+        to_value: f64::sqrt,
+        least: 0.0,
+        is_of_pixels: true,
+    },
+    Knob {
+        key: "scene.finish.camera_noise.shot",
+        unit: "of variance for a unit of light",
+        of_picture: |p| p.shot,
+        get: |recipe| recipe.finish.camera_noise.shot,
+        set: |recipe, range| recipe.finish.camera_noise.shot = range,
+        to_measure: |shot| shot,
+        to_value: |shot| shot,
+        least: 0.0,
+        is_of_pixels: true,
+    },
+    Knob {
+        key: "scene.finish.camera_noise.read",
+        unit: "of variance in the dark",
+        of_picture: |p| p.dark,
+        get: |recipe| recipe.finish.camera_noise.read,
+        set: |recipe, range| recipe.finish.camera_noise.read = range,
+        to_measure: |read| read * read,
+        to_value: f64::sqrt,
+        least: 0.0,
+        is_of_pixels: true,
+    },
+];
+
+/// Temperatures that a camera's white has, kelvin.
+const WHITES_K: [f64; 2] = [1667.0, 25_000.0];
+
+/// What a white balance does to red over blue, natural logarithm.
+fn log_red_over_blue(white_k: f64) -> f64 {
+    let gains = white_balance(white_k);
+    f64::from(gains.r / gains.b).ln()
+}
+
+/// The white that does this, by bisection: higher ones make pictures redder.
+fn white_for(wanted: f64) -> f64 {
+    let [mut low, mut high] = WHITES_K;
+    while high - low > 1.0 {
+        let middle = (low + high) / 2.0;
+        match log_red_over_blue(middle) < wanted {
+            true => low = middle,
+            false => high = middle,
+        }
+    }
+    (low + high) / 2.0
+}
+
+/// Size of objects, whose measure is of boxes and not of pictures.
+pub(super) const SCALE: Knob = Knob {
+    key: "scene.scale",
+    unit: "in the logarithm of the root of a box's area",
+    of_picture: |_| f64::NAN,
+    get: |recipe| recipe.scale,
+    set: |recipe, range| recipe.scale = range,
+    to_measure: f64::ln,
+    to_value: f64::exp,
+    least: f64::NEG_INFINITY,
+    is_of_pixels: false,
+};
+
+/// How a measure of real pictures differs from that of the recipe's.
+pub(super) struct Difference {
+    mean: Bootstrapped,
+    variance: Bootstrapped,
+}
+
+impl Difference {
+    /// Of values of groups, which are drawn again: each real picture, and all pictures of the
+    /// recipe before one photo of the place; none where either has none.
+    pub(super) fn new(real: &[Vec<Weighted>], own: &[Vec<Weighted>], seed: u64) -> Option<Self> {
+        let whole = [Moments::new(&real.concat())?, Moments::new(&own.concat())?];
+        // Not the numbers of the real pictures, of which there may be as many.
+        let pairs = rounds(real.len(), seed).zip(rounds(own.len(), !seed));
+        let resampled: Vec<[Moments; 2]> = pairs
+            .filter_map(|(a, b)| {
+                Some([
+                    Moments::new(&redrawn(real, &a))?,
+                    Moments::new(&redrawn(own, &b))?,
+                ])
+            })
+            .collect();
+        Some(Self {
+            mean: bootstrapped(&whole, &resampled, |moments| moments.mean),
+            variance: bootstrapped(&whole, &resampled, |moments| moments.variance),
+        })
+    }
+
+    /// Moments with what is decided added; none where nothing is.
+    fn corrected(&self, before: Moments) -> Option<Moments> {
+        let [mean, variance] = [&self.mean, &self.variance]
+            .map(|difference| difference.is_decided().then_some(difference.value));
+        (mean.is_some() || variance.is_some()).then(|| Moments {
+            mean: before.mean + mean.unwrap_or(0.0),
+            variance: (before.variance + variance.unwrap_or(0.0)).max(0.0),
+        })
+    }
+
+    /// That of the means.
+    pub(super) fn mean_interval(&self) -> Interval {
+        self.mean.interval()
+    }
+}
+
+/// How one moment of the first of two samples differs from that of the second.
+fn bootstrapped(
+    whole: &[Moments; 2],
+    resampled: &[[Moments; 2]],
+    of: fn(&Moments) -> f64,
+) -> Bootstrapped {
+    let difference = |[real, own]: &[Moments; 2]| of(real) - of(own);
+    Bootstrapped::new(difference(whole), resampled.iter().map(difference))
+}
+
+impl Knob {
+    /// Mean and variance that the recipe's range adds to the measure.
+    fn moments(&self, recipe: &Recipe) -> Moments {
+        let range = (self.get)(recipe);
+        let [low, high] = [range.min, range.max].map(self.to_measure);
+        Moments {
+            mean: (low + high) / 2.0,
+            variance: (high - low).powi(2) / 12.0,
+        }
+    }
+
+    /// The range whose pictures would be like the real ones; none where those do not decide that it
+    /// should be another.
+    pub(super) fn fitted(&self, recipe: &Recipe, difference: &Difference) -> Option<Range> {
+        let wanted = difference.corrected(self.moments(recipe))?;
+        self.range_of(wanted, recipe)
+    }
+
+    /// The range moved by the whole difference of the means, decided or not: the second step
+    /// towards what was decided before.
+    pub(super) fn moved(&self, recipe: &Recipe, difference: &Difference) -> Option<Range> {
+        let before = self.moments(recipe);
+        let wanted = Moments {
+            mean: before.mean + difference.mean.value,
+            ..before
+        };
+        self.range_of(wanted, recipe)
+    }
+
+    /// The range of these moments; none where it is the recipe's.
+    fn range_of(&self, wanted: Moments, recipe: &Recipe) -> Option<Range> {
+        let half = (3.0 * wanted.variance).sqrt();
+        let ends = [wanted.mean - half, wanted.mean + half].map(|end| end.max(self.least));
+        let [min, max] = ends.map(|end| three_digits((self.to_value)(end)));
+        let fitted = Range::new(min, max);
+        (fitted != (self.get)(recipe)).then_some(fitted)
+    }
+}
+
+/// A number without the digits that no measurement has.
+pub(super) fn three_digits(value: f64) -> f64 {
+    if value == 0.0 || !value.is_finite() {
+        return 0.0;
+    }
+    let digits = (2 - value.abs().log10().floor() as i32).clamp(0, 12);
+    let unit = 10_f64.powi(digits);
+    (value * unit).round() / unit
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Draws;
+
+    fn drawn(range: Range, count: u64) -> Vec<f64> {
+        let values = (0..count).map(|k| range.draw(&Draws::new(9, k), "v"));
+        values.collect()
+    }
+
+    fn fitted(real: &[f64], own: &[f64]) -> Option<Range> {
+        let [real, own] = [real, own].map(|values| values.iter().map(|v| vec![(*v, 1.0)]));
+        let (real, own): (Vec<_>, Vec<_>) = (real.collect(), own.collect());
+        let difference = Difference::new(&real, &own, 1).unwrap();
+        KNOBS[0].fitted(&Recipe::default(), &difference)
+    }
+
+    #[test]
+    fn a_range_is_found_from_what_it_adds() {
+        let places = drawn(Range::new(-4.0, -3.0), 200);
+        let range = Range::new(0.5, 2.5);
+        let real: Vec<f64> = (0..50)
+            .map(|k| places[k as usize] + range.draw(&Draws::new(4, k), "ev"))
+            .collect();
+        let found = fitted(&real, &places).unwrap();
+        assert!(
+            (found.min - 0.5).abs() < 0.25 && (found.max - 2.5).abs() < 0.25,
+            "{found:?}"
+        );
+    }
+
+    #[test]
+    fn what_few_pictures_leave_open_stays() {
+        let places = drawn(Range::new(-4.0, -3.0), 200);
+        assert_eq!(fitted(&places[..6], &places), None);
+    }
+
+    #[test]
+    fn white_is_found_from_what_it_does() {
+        for white in [2500.0, 5000.0, 6504.0, 9000.0] {
+            assert!((white_for(log_red_over_blue(white)) - white).abs() < 2.0);
+        }
+    }
+
+    #[test]
+    fn a_key_cannot_take_away_what_it_only_adds() {
+        let real = vec![vec![(0.1, 1.0)]; 9];
+        let difference = Difference::new(&real, &[vec![(0.5, 1.0)]], 1).unwrap();
+        let blur = &KNOBS[2];
+        assert_eq!(blur.fitted(&Recipe::default(), &difference), None);
+    }
+
+    #[test]
+    fn digits_are_those_that_count() {
+        let rounded = [0.000123456, 1.23456, -45678.9, 0.0].map(three_digits);
+        assert_eq!(rounded, [0.000123, 1.23, -45679.0, 0.0]);
+    }
+}

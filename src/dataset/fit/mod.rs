@@ -1,0 +1,287 @@
+//! A recipe fitted to the real place: by a few labelled pictures of it, or by its plates alone.
+//!
+//! Labels tell of what is labelled, and what is obstructed has none: how many objects there were is
+//! not their number. So objects of the recipe fall and are labelled, without pixels, for numbers of
+//! objects and for ways to start; the weights of those numbers are what explains the real labels
+//! best (`counts`), and the spread is that whose labels lie as the real ones do (`starts`).
+//! Ranges of camera and light are fitted by the mean and the variance of what they add to
+//! (`knobs`), measured around the labels on pictures of the recipe as on the real ones. What the
+//! pictures do not decide, by a bootstrap over them, stays as it is.
+
+mod camera;
+mod counts;
+mod falls;
+mod knobs;
+mod measured;
+mod moved_paths;
+mod places;
+mod plates;
+mod recipe_text;
+mod report;
+mod starts;
+mod statistics;
+
+use crate::dataset::{DatasetConfig, Format, LabelConfig, Pictures, Pipeline, Yolo, generate};
+use crate::error::{Error, Result};
+use crate::io;
+use crate::plot::Page;
+use crate::scene::Range;
+use falls::stopped;
+use measured::MeasuredSet;
+use moved_paths::moved_paths;
+use places::OBJECT_COUNTS;
+use plates::MeasuredPlate;
+use recipe_text::KeyText;
+use report::Compared;
+use starts::LEVERS;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+/// How finely a recipe is fitted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FitOptions {
+    /// Seed of all that is drawn. Default: 0.
+    pub seed: u64,
+    /// Pictures made of the recipe before and after. Default: 48.
+    pub pictures: u64,
+    /// Falls of each number of objects, for each way to start. Default: 12.
+    pub falls: usize,
+}
+
+impl Default for FitOptions {
+    fn default() -> Self {
+        Self {
+            seed: 0,
+            pictures: 48,
+            falls: 12,
+        }
+    }
+}
+
+/// What is fitted to what.
+#[derive(Clone, Debug)]
+pub struct FitPlan {
+    /// The recipe's file.
+    pub recipe: PathBuf,
+    /// Labelled pictures of the place: a YOLO dataset, or a folder of images with labels. None
+    /// takes what the plates tell.
+    pub real: Option<PathBuf>,
+    /// The file that the fitted recipe is to be written to.
+    pub output: PathBuf,
+    /// How finely.
+    pub options: FitOptions,
+}
+
+/// A key that was looked at.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FittedKey {
+    /// Its path in the recipe.
+    pub key: String,
+    /// Its value before, as TOML.
+    pub before: String,
+    /// Its value now; none where it is as it was.
+    pub fitted: Option<String>,
+    /// What decided.
+    pub why: String,
+}
+
+/// A fitted recipe.
+#[derive(Clone, Debug)]
+pub struct Fit {
+    /// Its text.
+    pub text: String,
+    /// Whether the text has the comments of the recipe that was fitted.
+    pub has_comments: bool,
+    /// The keys that were looked at.
+    pub keys: Vec<FittedKey>,
+    /// Every distribution before and after, beside the real one.
+    pub page: Page,
+}
+
+/// Fits a recipe: a pure function of the files and the options.
+///
+/// # Errors
+/// A recipe, folder or label that cannot be read; no picture with a label file;
+/// [`Error::Interrupted`] once the flag is true.
+pub fn fit(
+    plan: &FitPlan,
+    progress: &(dyn Fn(u64, u64) + Sync),
+    stop: &'static AtomicBool,
+) -> Result<Fit> {
+    let config = DatasetConfig::read(&plan.recipe, &[])?;
+    let pipeline = Pipeline::open(config.clone())?.stopped_by(stop);
+    let plates = plates::measured_plates(&pipeline)?;
+    let fitting = Fitting {
+        moved_paths: moved_paths(&config, &plan.recipe, &plan.output)?,
+        pipeline,
+        config,
+        options: plan.options,
+        keys: Vec::new(),
+        steps: Steps::new(progress),
+        stop,
+    };
+    match &plan.real {
+        None => fitting.fit_to_plates(&plates, plan),
+        Some(folder) => fitting.fit_to_pictures(folder, &plates, plan),
+    }
+}
+
+/// A recipe on its way.
+struct Fitting<'a> {
+    /// Of the recipe as it was.
+    pipeline: Pipeline,
+    /// The recipe as far as it is fitted.
+    config: DatasetConfig,
+    options: FitOptions,
+    keys: Vec<FittedKey>,
+    /// What names files, for the fitted recipe's folder.
+    moved_paths: Vec<KeyText>,
+    steps: Steps<'a>,
+    stop: &'static AtomicBool,
+}
+
+impl Fitting<'_> {
+    fn fit_to_plates(mut self, plates: &[MeasuredPlate], plan: &FitPlan) -> Result<Fit> {
+        self.keys = plates::match_objects(&mut self.config, plates);
+        self.keys
+            .extend(plates::vary_light(&mut self.config, plates));
+        let page = report::of_plates(&self.keys, plates);
+        self.finish(plan, page)
+    }
+
+    fn fit_to_pictures(
+        mut self,
+        folder: &Path,
+        plates: &[MeasuredPlate],
+        plan: &FitPlan,
+    ) -> Result<Fit> {
+        let real = MeasuredSet::read(folder, self.config.scene.image[0])?;
+        check_labels(folder, &real)?;
+        self.steps.expect(self.expected_steps());
+        let before = self.rendered()?;
+        let weights = self.fit_places(&real)?;
+        let matched = plates::match_objects(&mut self.config, plates);
+        self.keys.extend(matched);
+        self.fit_camera(&real, &before)?;
+        let sets = Compared {
+            after: self.rendered()?,
+            real,
+            before,
+        };
+        let page = report::of_pictures(&self.keys, &weights, &sets, plates);
+        self.finish(plan, page)
+    }
+
+    /// About so many falls and pictures.
+    fn expected_steps(&self) -> u64 {
+        let row = (OBJECT_COUNTS.len() / 2 + 2) * self.options.falls;
+        let tried: usize = LEVERS.iter().map(|lever| lever.values.len()).sum();
+        (row * (1 + tried)) as u64 + 3 * self.options.pictures
+    }
+
+    fn finish(self, plan: &FitPlan, page: Page) -> Result<Fit> {
+        let mut keys = self.moved_paths;
+        let fitted = self.keys.iter();
+        keys.extend(fitted.filter_map(|key| Some((key.key.clone(), key.fitted.clone()?))));
+        let text = io::read_text(&plan.recipe)?;
+        let edited = recipe_text::with_keys(&text, &keys).map_err(|e| e.in_file(&plan.recipe));
+        let (text, has_comments) = edited?;
+        Ok(Fit {
+            text,
+            has_comments,
+            keys: self.keys,
+            page,
+        })
+    }
+
+    /// Pictures of the recipe as far as it is fitted, written and read as a trainer would.
+    fn rendered(&self) -> Result<MeasuredSet> {
+        let folder = tempfile::tempdir().map_err(|e| Error::file(std::env::temp_dir(), e))?;
+        match self.render_into(folder.path()) {
+            // That of the temporary folder says how to go on with it.
+            Err(Error::Interrupted { .. }) => Err(stopped()),
+            Err(error) => Err(error),
+            Ok(()) => MeasuredSet::read(folder.path(), self.config.scene.image[0]),
+        }
+    }
+
+    fn render_into(&self, folder: &Path) -> Result<()> {
+        let pipeline = Pipeline::open(plain_pictures(&self.config))?.stopped_by(self.stop);
+        let FitOptions { pictures, seed, .. } = self.options;
+        let plan = pipeline.plan(pictures, seed, folder)?;
+        let sample = |k| pipeline.sample(seed, k).inspect(|_| self.steps.step());
+        generate(&plan, sample, &|_| {}, self.stop).map(|_| ())
+    }
+}
+
+/// The recipe's pictures with boxes and nothing beside them.
+fn plain_pictures(config: &DatasetConfig) -> DatasetConfig {
+    DatasetConfig {
+        labels: LabelConfig {
+            formats: vec![Format::Yolo],
+            yolo: Yolo {
+                boxes: config.labels.yolo.boxes,
+                ..Yolo::default()
+            },
+            ..config.labels.clone()
+        },
+        pictures: Pictures {
+            exr: false,
+            ..config.pictures
+        },
+        ..config.clone()
+    }
+}
+
+fn check_labels(folder: &Path, real: &MeasuredSet) -> Result<()> {
+    if real.set.boxes().next().is_some() {
+        return Ok(());
+    }
+    Err(Error::file(
+        folder,
+        "no label, expected images with YOLO labels",
+    ))
+}
+
+/// A range as TOML.
+fn range_text(range: Range) -> String {
+    match range.min == range.max {
+        true => range.min.to_string(),
+        false => format!("[{}, {}]", range.min, range.max),
+    }
+}
+
+fn unfitted(key: &str, before: String, why: String) -> FittedKey {
+    FittedKey {
+        key: key.into(),
+        before,
+        fitted: None,
+        why,
+    }
+}
+
+/// How far the work is.
+struct Steps<'a> {
+    done: AtomicU64,
+    expected: AtomicU64,
+    progress: &'a (dyn Fn(u64, u64) + Sync),
+}
+
+impl<'a> Steps<'a> {
+    fn new(progress: &'a (dyn Fn(u64, u64) + Sync)) -> Self {
+        Self {
+            done: AtomicU64::new(0),
+            expected: AtomicU64::new(0),
+            progress,
+        }
+    }
+
+    fn expect(&self, steps: u64) {
+        self.expected.store(steps, Ordering::Relaxed);
+    }
+
+    fn step(&self) {
+        let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
+        (self.progress)(done, self.expected.load(Ordering::Relaxed).max(done));
+    }
+}

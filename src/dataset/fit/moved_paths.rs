@@ -1,0 +1,84 @@
+//! What names files in a recipe, once it lies in another folder.
+
+use super::recipe_text::KeyText;
+use crate::dataset::DatasetConfig;
+use crate::dataset::environment_maps::seen_from;
+use crate::dataset::paths::folder_of;
+use crate::error::Result;
+use crate::io;
+use std::path::Path;
+
+/// The keys that name files as they must be in a recipe file `output`; none where that is in the
+/// folder of the recipe that was read.
+pub(super) fn moved_paths(
+    config: &DatasetConfig,
+    recipe: &Path,
+    output: &Path,
+) -> Result<Vec<KeyText>> {
+    let (from, to) = (io::absolute(recipe)?, io::absolute(output)?);
+    let to = folder_of(&to);
+    if folder_of(&from) == to {
+        return Ok(Vec::new());
+    }
+    let folders = [
+        ("assets", &config.assets),
+        ("backgrounds", &config.backgrounds),
+    ];
+    let folders = folders.map(|(key, folder)| moved_folder(key, folder, to));
+    let files = environment_files(config, to).transpose();
+    folders.into_iter().chain(files).collect()
+}
+
+fn moved_folder(key: &str, folder: &Path, to: &Path) -> Result<KeyText> {
+    let folder = io::relative(&io::absolute(folder)?, to);
+    Ok((key.to_owned(), quoted(&folder.to_string_lossy())))
+}
+
+fn environment_files(config: &DatasetConfig, to: &Path) -> Result<Option<KeyText>> {
+    let files = config.scene.environment.files.iter();
+    let files: Result<Vec<String>> = files
+        .map(|file| Ok(quoted(&seen_from(to, &config.folder, file)?)))
+        .collect();
+    let files = files?;
+    let text = format!("[{}]", files.join(", "));
+    Ok((!files.is_empty()).then(|| ("scene.environment.files".into(), text)))
+}
+
+/// A string as TOML.
+fn quoted(text: &str) -> String {
+    toml::Value::String(text.into()).to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_lead_to_the_same_files_from_another_folder() {
+        let mut config = DatasetConfig {
+            folder: "a".into(),
+            assets: "a/assets".into(),
+            backgrounds: "b".into(),
+            ..DatasetConfig::default()
+        };
+        let moved = |config: &DatasetConfig, output: &str| {
+            moved_paths(config, Path::new("a/recipe.toml"), Path::new(output)).unwrap()
+        };
+        assert_eq!(moved(&config, "a/fitted.toml"), []);
+        config.scene.environment.files = vec!["sky.hdr".into()];
+        let expected = [
+            ("assets", "\"../a/assets\""),
+            ("backgrounds", "\"../b\""),
+            ("scene.environment.files", "[\"../a/sky.hdr\"]"),
+        ];
+        let expected = expected.map(|(key, text)| (key.to_owned(), text.to_owned()));
+        assert_eq!(moved(&config, "c/fitted.toml"), expected);
+    }
+
+    #[test]
+    fn bare_names_lie_in_the_working_folder() {
+        let paths = ["recipe.toml", "fitted.toml"].map(Path::new);
+        let moved = moved_paths(&DatasetConfig::default(), paths[0], paths[1]);
+        assert_eq!(moved.unwrap(), []);
+    }
+}

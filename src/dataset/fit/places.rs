@@ -1,0 +1,264 @@
+//! Where objects of a recipe come to lie, how many there are and how large they look: fitted to labels
+//! by falls.
+
+use super::counts::{self, label_histogram};
+use super::falls::{Fall, FallPlan, log_size};
+use super::knobs::{Difference, SCALE};
+use super::measured::MeasuredSet;
+use super::starts::{self, Candidate, FittedLever, LEVERS, Lever, places_of};
+use super::statistics::{Moments, Weighted, rounds};
+use super::{FittedKey, Fitting, range_text, unfitted};
+use crate::error::{Error, Result};
+use crate::eval::interval;
+use crate::scene::{Count, Range, Recipe};
+
+/// Numbers of objects that fall, each about a third more than the one before; as far as the real
+/// numbers of labels need.
+pub(super) const OBJECT_COUNTS: [usize; 17] = [
+    1, 2, 3, 4, 6, 8, 11, 15, 20, 27, 36, 48, 64, 85, 113, 151, 200,
+];
+/// From so many objects on, labels that hardly become more end the row: a heap shows no more. Not
+/// the first time, which may be chance.
+const MIN_SATURATED: usize = 8;
+const SATURATED_RATIO: f64 = 1.05;
+const MAX_FLAT: usize = 2;
+
+impl Fitting<'_> {
+    /// Fits scale, spread, friction and number of objects, in this order, and returns the weights of
+    /// the numbers.
+    pub(super) fn fit_places(&mut self, real: &MeasuredSet) -> Result<Vec<f64>> {
+        let boxes = real.boxes();
+        let counts: Vec<usize> = boxes.iter().map(Vec::len).collect();
+        let times = label_histogram(&counts);
+        let mut own = self.candidate(None, &times)?;
+        if self.fit_scale(&boxes, &own) {
+            own = self.candidate(None, &times)?;
+        }
+        for lever in &LEVERS {
+            own = self.fit_lever(lever, &boxes, own, &times)?;
+        }
+        self.fit_objects(&counts, &own);
+        Ok(own.weights)
+    }
+
+    fn candidate(&self, value: Option<(&Lever, f64)>, times: &[f64]) -> Result<Candidate> {
+        let mut recipe = self.config.scene.clone();
+        if let Some((lever, value)) = value {
+            (lever.set)(&mut recipe, Range::fixed(value));
+        }
+        let falls = self.falls(&recipe, times.len() - 1)?;
+        Ok(Candidate::new(value.map(|(_, value)| value), falls, times))
+    }
+
+    /// Falls of more and more objects, until even few labels are more than the most that are
+    /// looked for, or labels do not become more.
+    fn falls(&self, recipe: &Recipe, most_labels: usize) -> Result<Vec<Fall>> {
+        let plan = FallPlan {
+            pipeline: &self.pipeline,
+            seed: self.options.seed,
+            each: self.options.falls,
+            step: &|| self.steps.step(),
+        };
+        let (mut falls, mut most, mut flat) = (Vec::new(), 0.0, 0);
+        for objects in self.counts_with_room(recipe) {
+            let more = plan.falls(recipe, objects)?;
+            let Some([mean, sigma]) = label_moments(&more) else {
+                continue;
+            };
+            falls.extend(more);
+            let rises = objects < MIN_SATURATED || mean > SATURATED_RATIO * most;
+            flat = if rises { 0 } else { flat + 1 };
+            most = mean.max(most);
+            if flat == MAX_FLAT || mean - sigma > most_labels as f64 {
+                break;
+            }
+        }
+        match falls.is_empty() {
+            true => Err(no_rest()),
+            false => Ok(falls),
+        }
+    }
+
+    /// The numbers of objects that there are assets and room for.
+    fn counts_with_room(&self, recipe: &Recipe) -> impl Iterator<Item = usize> {
+        let counts = OBJECT_COUNTS.into_iter();
+        counts.take_while(|objects| self.has_room(recipe, *objects))
+    }
+
+    fn has_room(&self, recipe: &Recipe, objects: usize) -> bool {
+        let recipe = Recipe {
+            objects: Count::fixed(objects as u32),
+            ..recipe.clone()
+        };
+        self.pipeline.check_room_with(&recipe).is_ok()
+    }
+
+    /// Fits the size of objects; whether it is another now.
+    fn fit_scale(&mut self, boxes: &[Vec<[f64; 4]>], own: &Candidate) -> bool {
+        let sizes = |boxes: &Vec<[f64; 4]>| boxes.iter().map(|b| (log_size(b), 1.0)).collect();
+        let real: Vec<Vec<Weighted>> = boxes.iter().map(sizes).collect();
+        let difference = Difference::new(&real, &own.log_sizes(), self.options.seed);
+        let fitted = self.fit_knob(&SCALE, difference.as_ref());
+        let is_fitted = fitted.fitted.is_some();
+        self.keys.push(fitted);
+        is_fitted
+    }
+
+    /// Fits where objects come to lie by a lever, and returns the candidate that it is nearest to.
+    fn fit_lever(
+        &mut self,
+        lever: &Lever,
+        boxes: &[Vec<[f64; 4]>],
+        own: Candidate,
+        times: &[f64],
+    ) -> Result<Candidate> {
+        if !lever.applies_to(&self.config.scene) {
+            self.keys.push(self.unfitted_lever(lever));
+            return Ok(own);
+        }
+        let mut candidates = self.candidates(lever, own, times)?;
+        let places = places_of(boxes.iter().map(Vec::as_slice));
+        let fitted = starts::choose(&candidates, &places, self.options.seed);
+        self.keys.push(FittedKey {
+            fitted: fitted.range.map(lever.text),
+            why: describe_lever(lever, &candidates, &fitted),
+            ..self.unfitted_lever(lever)
+        });
+        let chosen = fitted.range.map_or(0, |_| fitted.best);
+        if let Some(range) = fitted.range {
+            (lever.set)(&mut self.config.scene, range);
+        }
+        Ok(candidates.swap_remove(chosen).of_recipe())
+    }
+
+    fn unfitted_lever(&self, lever: &Lever) -> FittedKey {
+        let before = (lever.before)(&self.config.scene);
+        unfitted(lever.key, before, "start.positions is given".into())
+    }
+
+    /// The recipe's own candidate, and those of a lever's values.
+    fn candidates(&self, lever: &Lever, own: Candidate, times: &[f64]) -> Result<Vec<Candidate>> {
+        let values = lever.values.iter();
+        let tried = values.map(|value| self.candidate(Some((lever, *value)), times));
+        [Ok(own)].into_iter().chain(tried).collect()
+    }
+
+    fn fit_objects(&mut self, counts: &[usize], own: &Candidate) {
+        let times = label_histogram(counts);
+        let before = self.config.scene.objects.clone();
+        let others = counts::weights_of(&before, own.odds.most_objects());
+        let gain = counts::gain_on_pictures_left_out(&own.odds, &times, &others);
+        let why = self.describe_objects(counts, own, gain);
+        let mut key = unfitted("scene.objects", count_text(&before), why);
+        let labels = own.odds.mean_labels(&own.weights);
+        if !self.is_mean_of(counts, labels) {
+            key.why += &unexplained(labels);
+        } else if gain > 0.0 {
+            self.config.scene.objects = counts::count_of(&own.weights);
+            key.fitted = Some(count_text(&self.config.scene.objects));
+        }
+        self.keys.push(key);
+    }
+
+    /// Whether pictures with so many labels on average could be the real ones.
+    fn is_mean_of(&self, counts: &[usize], labels: f64) -> bool {
+        let mean = |times: &[u32]| {
+            let sum: f64 = counts
+                .iter()
+                .zip(times)
+                .map(|(n, t)| *n as f64 * f64::from(*t))
+                .sum();
+            sum / counts.len() as f64
+        };
+        let redrawn = rounds(counts.len(), self.options.seed).map(|times| mean(&times));
+        let interval = interval(mean(&vec![1; counts.len()]), redrawn.collect());
+        (interval.low..=interval.high).contains(&labels)
+    }
+
+    fn describe_objects(&self, counts: &[usize], own: &Candidate, gain: f64) -> String {
+        let mean = |weights: &[f64]| counts::mean_of(weights);
+        let redrawn = rounds(counts.len(), self.options.seed).map(|times| {
+            mean(&counts::object_weights(
+                &own.odds,
+                &histogram_of(counts, &times),
+            ))
+        });
+        let interval = interval(mean(&own.weights), redrawn.collect());
+        let [low, middle, high] = counts::deciles(&own.weights);
+        format!(
+            "on average {:.1} objects ({:.1} to {:.1}), a tenth of the pictures with at most {low}, half with at most {middle}, nine \
+             tenths with at most {high}; a picture left out is likelier than with the recipe by a factor of {:.2}",
+            interval.value,
+            interval.low,
+            interval.high,
+            gain.exp()
+        )
+    }
+}
+
+fn unexplained(labels: f64) -> String {
+    format!(
+        "; but even these have {labels:.1} labels a picture, unlike the real ones: objects fall otherwise there \
+         (see scene.walls, scene.friction, scene.collider and the assets' thickness), and their number cannot be told"
+    )
+}
+
+/// How many pictures have each number of labels, when pictures are drawn so often.
+fn histogram_of(counts: &[usize], times: &[u32]) -> Vec<f64> {
+    let mut histogram = vec![0.0; counts.iter().copied().max().unwrap_or(0) + 1];
+    for (labels, times) in counts.iter().zip(times) {
+        histogram[*labels] += f64::from(*times);
+    }
+    histogram
+}
+
+fn label_moments(falls: &[Fall]) -> Option<[f64; 2]> {
+    let labels: Vec<Weighted> = falls
+        .iter()
+        .map(|fall| (fall.boxes.len() as f64, 1.0))
+        .collect();
+    let moments = Moments::new(&labels)?;
+    Some([moments.mean, moments.variance.sqrt()])
+}
+
+fn no_rest() -> Error {
+    let what = "no objects came to rest in any fall".into();
+    Error::Unsettled { what }
+}
+
+fn describe_lever(lever: &Lever, candidates: &[Candidate], fitted: &FittedLever) -> String {
+    let named = |value: Option<f64>| match value {
+        Some(value) => (lever.text)(Range::fixed(value)),
+        None => "as it was".into(),
+    };
+    let pairs = candidates.iter().zip(&fitted.distances);
+    let distances: Vec<String> = pairs
+        .map(|(candidate, distance)| format!("{} {distance:.2}", named(candidate.value)))
+        .collect();
+    let best = match fitted.best {
+        0 => String::new(),
+        best => format!(
+            "; {} is nearer than as it was in {:.0} % of bootstraps",
+            named(candidates[best].value),
+            100.0 * fitted.agreement
+        ),
+    };
+    format!(
+        "distance of labels, their numbers and places, in standard deviations: {}{best}",
+        distances.join(", ")
+    )
+}
+
+fn count_text(count: &Count) -> String {
+    match count {
+        Count::Uniform(range) => range_text(*range),
+        Count::Weighted { values, weights } => {
+            format!("{{ values = {values:?}, weights = {} }}", listed(weights))
+        }
+    }
+}
+
+fn listed(numbers: &[f64]) -> String {
+    let texts: Vec<String> = numbers.iter().map(f64::to_string).collect();
+    format!("[{}]", texts.join(", "))
+}
