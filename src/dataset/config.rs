@@ -84,6 +84,19 @@ impl DatasetConfig {
         Ok(config)
     }
 
+    /// A recipe in memory, laid over the preset that it names; its folders are relative to the
+    /// working folder.
+    ///
+    /// # Errors
+    /// An unknown key; a range that cannot be right.
+    #[doc(hidden)]
+    pub fn from_table(mut recipe: toml::Table) -> Result<Self> {
+        Preset::lay_under(&mut recipe);
+        let config: Self = io::from_table(recipe)?;
+        config.check()?;
+        Ok(config)
+    }
+
     /// Fails on the first value that cannot be right, by its path: `render.subsamples`.
     ///
     /// # Errors

@@ -49,9 +49,7 @@ pub(crate) fn check_config(json: &str) -> PyResult<String> {
 }
 
 pub(crate) fn config_of(json: &str) -> Result<DatasetConfig> {
-    let config: DatasetConfig = parse("recipe", json)?;
-    config.check()?;
-    Ok(config)
+    DatasetConfig::from_table(parse("recipe", json)?)
 }
 
 /// An empty scene that this camera sees.
@@ -69,6 +67,8 @@ pub(crate) fn empty_scene(camera: &Camera) -> Scene {
         environment: None,
         exposure: Default::default(),
         cast: Default::default(),
+        light_map: Default::default(),
+        interreflection: Default::default(),
         edges: Default::default(),
         finish: Default::default(),
         files: None,
