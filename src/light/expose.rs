@@ -1,15 +1,13 @@
 //! The exposure that puts rendered light and a photographed plate on one scale.
 
 use crate::color::Albedo;
-use crate::geom::{Point3, Vector3};
+use crate::geom::Point3;
 use crate::image::Image;
+use crate::light::irradiance::white_card_at;
 use crate::light::light_map::match_light_map;
-use crate::light::{
-    irradiance, match_blur, match_light_tint, match_noise, surface_color, value_of_rank,
-};
+use crate::light::{match_blur, match_light_tint, match_noise, surface_color, value_of_rank};
 use crate::pixel::LinearRgb;
 use crate::scene::{Exposure, Scene};
-use std::f64::consts::PI;
 
 /// Share of the plate's pixels that are darker than its white.
 ///
@@ -85,21 +83,12 @@ fn finite_luminances(plate: &Image<LinearRgb>) -> Vec<f32> {
     finite.map(|c| c.luminance()).collect()
 }
 
-/// Luminance of a white card on a point of the surface, with nothing in the way of the light.
-pub(super) fn white_card_at(scene: &Scene, point: Point3<f64>) -> f32 {
-    let lit: f32 = scene
-        .lights
-        .iter()
-        .map(|light| irradiance(light, point, Vector3::z()).luminance())
-        .sum();
-    lit / PI as f32 + scene.ambient.luminance()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::light::area::tests::square;
     use crate::scene::{CameraSource, Surface};
+    use std::f64::consts::PI;
 
     fn scene(exposure: Exposure) -> Scene {
         Scene {

@@ -5,8 +5,8 @@ use crate::light::area::{LightFrame, frame, radiance, side_lengths};
 use crate::light::nodes::nodes;
 use crate::light::polygon::polygon_irradiance;
 use crate::pixel::LinearRgb;
-use crate::scene::{AreaLight, LightShape};
-use std::f64::consts::TAU;
+use crate::scene::{AreaLight, LightShape, Scene};
+use std::f64::consts::{PI, TAU};
 
 /// Samples along each side of an ellipse where its irradiance is computed without shadows.
 const ELLIPSE_SAMPLES: usize = 16;
@@ -34,6 +34,16 @@ pub fn irradiance(light: &AreaLight, point: Point3<f64>, normal: Vector3<f64>) -
         LightShape::Ellipse => sampled_irradiance(light, &frame, point, normal),
     };
     radiance(light).scale(factor as f32)
+}
+
+/// Luminance of a white card on a point of the surface, with nothing in the way of the light.
+pub(super) fn white_card_at(scene: &Scene, point: Point3<f64>) -> f32 {
+    let lit: f32 = scene
+        .lights
+        .iter()
+        .map(|light| irradiance(light, point, Vector3::z()).luminance())
+        .sum();
+    lit / PI as f32 + scene.ambient.luminance()
 }
 
 /// That of unit radiance, by a product rule.

@@ -2,7 +2,7 @@
 
 use crate::geom::Point3;
 use crate::image::Image;
-use crate::light::expose::white_card_at;
+use crate::light::irradiance::white_card_at;
 use crate::light::surface::seen_surface;
 use crate::light::value_of_rank;
 use crate::pixel::LinearRgb;

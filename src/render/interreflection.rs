@@ -5,7 +5,7 @@ use crate::filter::{gaussian_blur, sample_bilinear};
 use crate::geom::Vector3;
 use crate::image::Image;
 use crate::pixel::{Film, LinearRgb};
-use crate::render::reference::card_texel;
+use crate::render::card_texel::card_texel;
 use crate::render::view::{
     CameraView, ProjectedPlane, ScenePlane, is_on_texture, pixel_center, visible_planes,
 };

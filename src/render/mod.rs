@@ -29,6 +29,7 @@
 //! ```
 
 mod block;
+mod card_texel;
 mod check;
 mod cryptomatte;
 mod deep;

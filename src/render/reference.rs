@@ -3,12 +3,12 @@
 use crate::asset::Texture;
 use crate::camera::RadialDistortion;
 use crate::deep::{DeepImage, DeepSample};
-use crate::filter::sample_bilinear;
 use crate::geom::Vector3;
 use crate::image::Image;
 use crate::pixel::{Depth, Film, LinearRgb, Mix, ObjectId};
 use crate::render::RenderOptions;
-use crate::render::grade::{channel_mean, graded_opacity};
+use crate::render::card_texel::card_texel;
+use crate::render::grade::channel_mean;
 use crate::render::interreflection::interreflect;
 use crate::render::light_samples::{LightGroup, LightSample, LightSamples, SampleKind};
 use crate::render::pixel_filter::filter_quantiles;
@@ -328,33 +328,6 @@ impl<'a> ReferenceCard<'a> {
 
     fn texel(&self, uv: [f64; 2], from: &Vector3<f64>) -> Film {
         card_texel(self.card, &self.plane, uv, from)
-    }
-}
-
-/// What a card shows seen from a point: full detail, nothing outside of its texture.
-pub(super) fn card_texel(
-    card: &Card,
-    plane: &ScenePlane,
-    [u, v]: [f64; 2],
-    from: &Vector3<f64>,
-) -> Film {
-    let film = match &card.back {
-        Some(back) if plane.is_seen_from_behind(from) => texture_at(back, 1.0 - u, v),
-        _ => texture_at(&card.texture, u, v),
-    };
-    let grade = &card.grade;
-    Film {
-        color: crate::color::shift_hsv(film.color, grade.hue_deg, grade.saturation, grade.value),
-        opacity: graded_opacity(film.opacity, grade),
-    }
-}
-
-fn texture_at(texture: &Texture, u: f64, v: f64) -> Film {
-    let (width, height) = texture.size();
-    let (x, y) = (u * width as f64, v * height as f64);
-    match texture {
-        Texture::Rgba(pyramid) => sample_bilinear(pyramid.base(), x, y).into(),
-        Texture::Film(pyramid) => sample_bilinear(pyramid.base(), x, y),
     }
 }
 
