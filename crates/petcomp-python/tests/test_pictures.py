@@ -2,6 +2,7 @@
 
 import json
 import math
+import os
 import pickle
 
 import numpy as np
@@ -217,3 +218,14 @@ def test_a_png_for_notebooks_is_the_picture(tmp_path):
     (tmp_path / "a.png").write_bytes(png(codes))
     petcomp.io.write(tmp_path / "b.png", codes)
     assert (petcomp.io.read(tmp_path / "a.png") == petcomp.io.read(tmp_path / "b.png")).all()
+
+
+def test_a_recipe_is_laid_over_its_preset_in_a_file_and_in_a_dict(world, recipe):
+    preset = world / "preset.toml"
+    preset.write_text('preset = "real"\n' + recipe.read_text())
+    plain = petcomp.Pipeline(recipe).config
+    folders = {name: os.path.abspath(plain[name]) for name in ("assets", "backgrounds")}
+    data = {"preset": "real", "scene": {"image": [160, 120], "objects": [2, 3]}}
+    of_file = petcomp.Pipeline(preset).config["scene"]
+    assert of_file == petcomp.Pipeline(data | folders).config["scene"]
+    assert of_file["lights"] == [] != plain["scene"]["lights"]
