@@ -3,8 +3,8 @@
 use crate::geom::Point3;
 use crate::image::Image;
 use crate::light::irradiance::white_card_at;
+use crate::light::median;
 use crate::light::surface::seen_surface;
-use crate::light::value_of_rank;
 use crate::pixel::LinearRgb;
 use crate::scene::{LightMap, Scene};
 
@@ -76,11 +76,6 @@ fn factor(plate: f32, own: f32, share: f64) -> f32 {
         return 1.0;
     }
     libm::pow(f64::from(missing.clamp(1.0 / MOST, MOST)), share) as f32
-}
-
-fn median(values: Vec<f32>) -> Option<f32> {
-    let middle = values.len() / 2;
-    (!values.is_empty()).then(|| value_of_rank(values, middle))
 }
 
 /// The number of the cell that a point of the surface lies in.

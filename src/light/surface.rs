@@ -4,7 +4,7 @@ use crate::camera::{Camera, RadialDistortion};
 use crate::color::Albedo;
 use crate::geom::{Plane, Point2, Point3};
 use crate::image::Image;
-use crate::light::value_of_rank;
+use crate::light::median;
 use crate::pixel::LinearRgb;
 use crate::scene::{CameraSource, LightTint, Scene};
 
@@ -12,13 +12,10 @@ use crate::scene::{CameraSource, LightTint, Scene};
 /// seen; none where the camera is not known yet, or does not see it.
 pub(crate) fn surface_color(scene: &Scene, plate: &Image<LinearRgb>) -> Option<LinearRgb> {
     let seen = seen_surface(scene, plate);
-    if seen.is_empty() {
-        return None;
-    }
     Some(LinearRgb::new(
-        median_of(&seen, |c| c.r),
-        median_of(&seen, |c| c.g),
-        median_of(&seen, |c| c.b),
+        median_of(&seen, |c| c.r)?,
+        median_of(&seen, |c| c.g)?,
+        median_of(&seen, |c| c.b)?,
     ))
 }
 
@@ -54,10 +51,9 @@ fn surface_point(
     Plane::surface().intersect(&ray).map(|t| ray.at(t))
 }
 
-/// The median of a channel; the upper one of two.
-fn median_of(seen: &[(Point3<f64>, LinearRgb)], channel: fn(&LinearRgb) -> f32) -> f32 {
-    let values = seen.iter().map(|(_, color)| channel(color)).collect();
-    value_of_rank(values, seen.len() / 2)
+/// The median of a channel.
+fn median_of(seen: &[(Point3<f64>, LinearRgb)], channel: fn(&LinearRgb) -> f32) -> Option<f32> {
+    median(seen.iter().map(|(_, color)| channel(color)).collect())
 }
 
 /// Turns [`LightTint::MatchSurface`] into the colour of the surface's light; any other scene comes

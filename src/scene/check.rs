@@ -159,6 +159,17 @@ pub(super) fn check_cast(cast: &LightTint) -> Result<()> {
     }
 }
 
+/// Most rows and columns of a grid over the surface.
+pub(super) const MAX_CELLS: usize = 64;
+
+/// Whether rows are a grid: as many cells in each, and not too many; no rows are one too.
+pub(super) fn is_grid<T>(rows: &[Vec<T>]) -> bool {
+    let columns = rows.first().map_or(1, Vec::len);
+    let sizes = 1..=MAX_CELLS;
+    let fits = rows.len() <= MAX_CELLS && sizes.contains(&columns);
+    fits && rows.iter().all(|row| row.len() == columns)
+}
+
 fn check_shares(color: LinearRgb, at: &str) -> Result<()> {
     let [r, g, b] = [color.r, color.g, color.b].map(f64::from);
     check_within(&[r, g, b], at, &SHARE)

@@ -5,10 +5,8 @@ use crate::error::{Error, Result};
 use crate::filter::sample_bilinear_clamped;
 use crate::image::Image;
 use crate::scene::bounds::SHARE;
+use crate::scene::check::{MAX_CELLS, is_grid};
 use serde::{Deserialize, Serialize};
-
-/// Most rows and columns of a light map.
-const MAX_CELLS: usize = 64;
 
 const FACTOR: Bounds = Bounds::new(0.0, 1000.0, "light a thousand times as bright as elsewhere");
 
@@ -53,9 +51,7 @@ impl LightMap {
 }
 
 fn check_rows(rows: &[Vec<f32>]) -> Result<()> {
-    let columns = rows.first().map_or(0, Vec::len);
-    let is_grid = rows.iter().all(|row| row.len() == columns && columns > 0);
-    if !is_grid || rows.len().max(columns) > MAX_CELLS {
+    if !is_grid(rows) {
         let what = format!("{rows:?}, expected at most {MAX_CELLS} rows of as many factors each");
         return Err(Error::value("light_map.known", what));
     }

@@ -79,6 +79,11 @@ impl Range {
         share > 0.0 && Self::new(0.0, 1.0).draw(draws, path) < share
     }
 
+    /// Whether nothing but 0 is in it.
+    pub(super) fn is_zero(&self) -> bool {
+        *self == Self::fixed(0.0)
+    }
+
     /// The value at a path; nothing is drawn where no range is given.
     pub(super) fn draw_optional(range: Option<Self>, draws: &Draws, path: &str) -> Option<f64> {
         range.map(|range| range.draw(draws, path))

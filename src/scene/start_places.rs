@@ -2,11 +2,10 @@
 
 use crate::error::{Error, Result};
 use crate::scene::bounds::SHARE;
+use crate::scene::check::{MAX_CELLS, is_grid};
 use crate::scene::draw::weighted_place;
 use crate::scene::{Draws, DropRanges, Range};
 
-/// Most rows and columns of a histogram of positions.
-const MAX_CELLS: usize = 64;
 /// What one point of the even sequence is beyond the one before it: the inverse of the plastic
 /// number, and its square.
 const EVEN_STEP: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3];
@@ -27,10 +26,7 @@ impl DropRanges {
 
     fn check_positions(&self) -> Result<()> {
         let rows = &self.positions;
-        let columns = rows.first().map_or(0, Vec::len);
-        let is_grid = rows.iter().all(|row| row.len() == columns);
-        let fits = rows.len() <= MAX_CELLS && columns <= MAX_CELLS;
-        if rows.is_empty() || (is_grid && fits && are_weights(rows)) {
+        if rows.is_empty() || (is_grid(rows) && are_weights(rows)) {
             return Ok(());
         }
         let what = format!(

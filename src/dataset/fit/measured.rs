@@ -7,7 +7,7 @@ use crate::error::Result;
 use crate::filter::resize;
 use crate::image::Image;
 use crate::io;
-use crate::light::{plate_blur, plate_noise};
+use crate::light::{median, plate_blur, plate_noise};
 use crate::pixel::LinearRgb;
 use crate::scene::{Blur, Noise};
 use rayon::prelude::*;
@@ -186,9 +186,8 @@ fn pixels_within(middle: f64, length: f64, side: usize) -> std::ops::Range<usize
 }
 
 fn median_luminance(pixels: &[LinearRgb]) -> f64 {
-    let mut luminances: Vec<f32> = pixels.iter().map(|p| p.luminance()).collect();
-    let middle = luminances.len() / 2;
-    f64::from(*luminances.select_nth_unstable_by(middle, f32::total_cmp).1)
+    let luminances = pixels.iter().map(|p| p.luminance()).collect();
+    f64::from(median(luminances).unwrap_or_default())
 }
 
 fn red_over_blue(pixels: &[LinearRgb]) -> f64 {

@@ -7,6 +7,8 @@ use super::statistics::{
     Moments, Weighted, earth_mover, equally_weighted, redrawn, rounds, sort_by_value,
 };
 use crate::dataset::fit::range_text;
+use crate::eval::iou;
+use crate::geom::BBox;
 use crate::scene::{Collider, Range, Recipe};
 use std::collections::BTreeMap;
 
@@ -97,7 +99,7 @@ fn nearest_distances(boxes: &[[f64; 4]]) -> Vec<f64> {
 
 /// Greatest intersection over union of each box with another.
 pub(super) fn overlaps(boxes: &[[f64; 4]]) -> Vec<f64> {
-    of_each(boxes, iou, f64::max)
+    of_each(boxes, share_iou, f64::max)
 }
 
 /// What holds of each box and some other one; nothing of a box that is alone.
@@ -111,13 +113,17 @@ fn of_each(
     boxes.iter().enumerate().filter_map(best).collect()
 }
 
-fn iou(a: &[f64; 4], b: &[f64; 4]) -> f64 {
-    let along = |i: usize| {
-        let end = (a[i] + a[i + 2] / 2.0).min(b[i] + b[i + 2] / 2.0);
-        (end - (a[i] - a[i + 2] / 2.0).max(b[i] - b[i + 2] / 2.0)).max(0.0)
-    };
-    let shared = along(0) * along(1);
-    shared / (a[2] * a[3] + b[2] * b[3] - shared).max(f64::MIN_POSITIVE)
+fn share_iou(a: &[f64; 4], b: &[f64; 4]) -> f64 {
+    iou(&box_of(a), &box_of(b))
+}
+
+fn box_of(&[x, y, w, h]: &[f64; 4]) -> BBox {
+    BBox {
+        x0: x - w / 2.0,
+        y0: y - h / 2.0,
+        x1: x + w / 2.0,
+        y1: y + h / 2.0,
+    }
 }
 
 /// A value of a lever, its falls, and the numbers of objects that explain the real labels with it.

@@ -1,6 +1,5 @@
 //! One scene of a recipe: what is drawn, in which order.
 
-use super::is_flat;
 use crate::color::Albedo;
 use crate::error::{Error, Result};
 use crate::pixel::LinearRgb;
@@ -179,7 +178,7 @@ impl Recipe {
 
     /// A bend about an axis of any direction; flat, and nothing drawn, where the range is 0.
     fn draw_bend(&self, draws: &Draws, path: &str) -> Bend {
-        if is_flat(&self.bend_deg) {
+        if self.bend_deg.is_zero() {
             return Bend::FLAT;
         }
         Bend {

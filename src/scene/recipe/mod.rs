@@ -22,14 +22,6 @@ use crate::scene::{
 use compose::{Places, SceneNumber};
 use serde::{Deserialize, Serialize};
 
-fn is_none(range: &Range) -> bool {
-    *range == Range::fixed(0.0)
-}
-
-fn is_flat(bend_deg: &Range) -> bool {
-    *bend_deg == Range::fixed(0.0)
-}
-
 const OBJECT_COUNT: Bounds = Bounds::new(0.0, MAX_OBJECTS as f64, "what comes to rest in a heap");
 
 /// What scenes are drawn from; every [`Range`] is a uniform distribution named by its path in this
@@ -113,7 +105,7 @@ pub struct Recipe {
     pub light_map: LightMap,
     /// Light that goes to and fro between the surface and the objects over it: share of the
     /// surface's albedo; where that is not known, the albedo itself. Default: 0, none.
-    #[serde(skip_serializing_if = "is_none")]
+    #[serde(skip_serializing_if = "Range::is_zero")]
     pub interreflection: Range,
     /// What happens to the finished frame. Default: nothing.
     pub finish: PostProcessRanges,
