@@ -4,6 +4,7 @@
 #
 # make experiment   whether the data teaches a detector: see experiments/README.md; make world makes its reality,
 #                   make experiment-smoke runs all of it with tiny sizes
+# make c   header, libraries and pkg-config file for C, in target/c or where PREFIX says
 # make wheel   the package for Python, in target/wheel-out: one wheel for every Python from 3.10, built by maturin and zig
 #
 # make soak   100,000 damaged pictures; make fuzz   each reader of text and headers, a minute each
@@ -22,6 +23,10 @@ WORLD     := experiments/cache/world
 # What the package for Python is tested with, in a virtual environment of its own.
 PACKAGE   := target/package
 PYTEST    := numpy pytest hypothesis mypy nbclient nbformat ipykernel
+# Where `make c` installs, and the major version that programs ask for when they start.
+PREFIX    := $(CURDIR)/target/c
+C_VERSION := $(shell sed -n 's/^version = "\(.*\)"/\1/p' crates/petcomp-c/Cargo.toml)
+C_MAJOR   := $(firstword $(subst ., ,$(C_VERSION)))
 # A manylinux wheel must not be larger.
 MOST_WHEEL_MB := 15
 BENCHES   := $(notdir $(basename $(wildcard tests/benches/*.rs)))
@@ -37,13 +42,13 @@ PEERS        := blender python3-numpy python3-venv openimageio-tools ffmpeg
 PEERS_PYTHON := numpy OpenEXR opencv-python-headless pymatting pybullet pycocotools
 CORE         := 0
 
-.PHONY: python-package wheel world experiment experiment-smoke peers demo test examples lint bench golden formats python packages blender soak soak-dataset fuzz
+.PHONY: c valgrind python-package wheel world experiment experiment-smoke peers demo test examples lint bench golden formats python packages blender soak soak-dataset fuzz
 
 demo: packages
 	$(CARGO) build --release --locked -p petcomp-cli
 	target/release/petcomp demo -o $(OUT)
 
-test: packages python
+test: packages python valgrind
 	PETCOMP_PYTHON=$(PYTHON) $(CARGO) test --release --locked --workspace
 	@for f in $(FEATURES); do \
 	  echo "features [$$f] alone"; \
@@ -141,6 +146,20 @@ peers: packages
 golden: blender
 	golden/make.sh
 
+# Everything that a C program needs; cargo-c does the same (`cargo cinstall -p petcomp-c`).
+c: packages
+	$(CARGO) build --release --locked -p petcomp-c
+	$(CARGO) rustc --release --locked -p petcomp-c --crate-type staticlib
+	install -d $(PREFIX)/include $(PREFIX)/lib/pkgconfig
+	install -m 644 crates/petcomp-c/include/petcomp.h $(PREFIX)/include
+	install -m 644 target/release/libpetcomp_c.a $(PREFIX)/lib/libpetcomp.a
+	install target/release/libpetcomp_c.so $(PREFIX)/lib/libpetcomp.so.$(C_VERSION)
+	strip --strip-unneeded $(PREFIX)/lib/libpetcomp.so.$(C_VERSION)
+	ln -sf libpetcomp.so.$(C_VERSION) $(PREFIX)/lib/libpetcomp.so.$(C_MAJOR)
+	ln -sf libpetcomp.so.$(C_MAJOR) $(PREFIX)/lib/libpetcomp.so
+	sed 's|@PREFIX@|$(PREFIX)|; s|@VERSION@|$(C_VERSION)|' crates/petcomp-c/petcomp.pc.in > $(PREFIX)/lib/pkgconfig/petcomp.pc
+	@echo "cc -I$(PREFIX)/include examples/c/sample.c -L$(PREFIX)/lib -lpetcomp -o sample"
+
 # The tests of the package for Python, on the extension that was built with all other tests, packed as a wheel and
 # installed into a fresh virtual environment. What cannot be installed is said, and its tests are skipped.
 python-package: packages
@@ -171,6 +190,10 @@ packages:
 
 blender:
 	@$(call install,$(BLENDER))
+
+# Looks at the memory of the C program in the tests; where it cannot be had they say so and run it alone.
+valgrind:
+	@($(call install,valgrind)) || echo "valgrind cannot be installed: nothing looks at the memory of a C program"
 
 # Installs the wheel of a folder into a fresh virtual environment, and tests it there.
 define pytest_of

@@ -137,6 +137,22 @@ impl Limits {
         Ok(self)
     }
 
+    /// Refuses a picture in memory of a size that no file may have; the text says what was expected.
+    ///
+    /// # Errors
+    /// A size of nothing, and one over the limits of sides and of pixels.
+    #[doc(hidden)]
+    pub fn check_size(&self, [width, height]: [usize; 2]) -> std::result::Result<(), String> {
+        let (side, pixels) = (self.side, self.pixels);
+        let count = (width as u64).saturating_mul(height as u64);
+        if count > 0 && width.max(height) as u64 <= side && count <= pixels {
+            return Ok(());
+        }
+        Err(format!(
+            "{width} x {height} pixels, expected at least 1 x 1 and at most {side} a side and {pixels} in all"
+        ))
+    }
+
     /// Every limit with its name and its largest value.
     fn named(&mut self) -> [(&'static str, &mut u64, u64); 12] {
         [

@@ -6,14 +6,11 @@ use bytemuck::Pod;
 use numpy::ndarray::{ArrayD, IxDyn};
 use numpy::{Element, PyArrayDescrMethods, PyArrayDyn, PyUntypedArray, PyUntypedArrayMethods};
 use petcomp::color::{decode_row, decode_srgb8};
+use petcomp::io::Limits;
 use petcomp::{
     Coverage, Error, Image, ImageView, LinearRgb, PremulRgba, Result, Srgb8, Srgba8, StraightRgba,
 };
 use pyo3::prelude::*;
-
-/// What a picture may have: the limits of files.
-const LONGEST_SIDE: usize = 32_768;
-const MOST_PIXELS: usize = 128 << 20;
 
 /// A picture that was given: scene-linear numbers, or codes for a display.
 pub(crate) enum Given {
@@ -202,15 +199,9 @@ fn wrong_dtype(name: &str, array: &Bound<'_, PyUntypedArray>) -> PyErr {
     wrong_type(name, &what)
 }
 
-fn check_size(name: &str, [width, height]: [usize; 2]) -> PyResult<()> {
-    let pixels = width.saturating_mul(height);
-    if pixels > 0 && width.max(height) <= LONGEST_SIDE && pixels <= MOST_PIXELS {
-        return Ok(());
-    }
-    let what = format!(
-        "{width} x {height} pixels, expected at least 1 x 1 and at most {LONGEST_SIDE} a side and {MOST_PIXELS} in all"
-    );
-    Err(wrong_value(name, what))
+fn check_size(name: &str, size: [usize; 2]) -> PyResult<()> {
+    let checked = Limits::default().check_size(size);
+    checked.map_err(|what| wrong_value(name, what))
 }
 
 fn copied<P: Pod>(view: ImageView<'_, P>) -> Image<P> {

@@ -1,0 +1,121 @@
+//! The camera that sees a rectangle of known size at four corners.
+#![expect(unsafe_code, reason = "called from C")]
+
+use crate::memory::{array, put, store_text};
+use crate::status::{Failure, Status, call};
+use bytemuck::{Pod, Zeroable};
+use petcomp::camera::{self, CameraFile, Label, LabelCamera, LabelImage, LabelSurface};
+use petcomp::{Camera, Error};
+use std::ffi::c_char;
+
+/// A pinhole camera without distortion, with OpenCV's axes: x right, y down, z forward.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct CameraModel {
+    /// Focal lengths along x and y, pixels.
+    pub focal_px: [f64; 2],
+    /// Where the optical axis meets the picture, pixels; (0, 0) is the upper left corner of the
+    /// upper left pixel.
+    pub principal_px: [f64; 2],
+    /// Three rows of rotation and translation (metres): camera point = matrix * (world point, 1).
+    pub camera_from_world: [[f64; 4]; 3],
+}
+
+impl From<&Camera> for CameraModel {
+    fn from(camera: &Camera) -> Self {
+        let matrix = camera.camera_from_world.to_homogeneous();
+        Self {
+            focal_px: camera.focal_px.into(),
+            principal_px: camera.principal_px.into(),
+            camera_from_world: std::array::from_fn(|i| std::array::from_fn(|j| matrix[(i, j)])),
+        }
+    }
+}
+
+/// Solves the camera that sees a rectangle of known size at four corners.
+///
+/// `corners_px`: eight numbers, x and y of top left, top right, bottom right and bottom left, pixels.
+/// `size_m`: width and height of the rectangle, metres. `image`: width and height of the picture,
+/// pixels. `focal_px`: the focal length where it is known, otherwise 0. The rectangle becomes the
+/// world's plane z = 0, centred, +x along its width, +z towards the camera.
+///
+/// `report`, where it is not null, gets the text of petcomp's NAME.camera.json: the camera, standard
+/// deviations of all that was solved, warnings. `report_length`, where it is not null, gets the bytes
+/// that the text takes with its NUL. With too small a buffer for it `camera` is still written.
+///
+/// # Safety
+/// Each pointer is null or points to what is said here; `report` has room for `report_capacity` bytes.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn petcomp_camera_solve(
+    corners_px: *const f64,
+    size_m: *const f64,
+    image: *const u32,
+    focal_px: f64,
+    camera: *mut CameraModel,
+    report: *mut c_char,
+    report_capacity: usize,
+    report_length: *mut usize,
+) -> Status {
+    call(|| {
+        // SAFETY: promised by the caller.
+        let (corners, size, image) = unsafe {
+            let corners: [f64; 8] = array("corners_px", corners_px)?;
+            (corners, array("size_m", size_m)?, array("image", image)?)
+        };
+        let (model, text) = solved(&label_of(corners, size, image, focal_px)?)?;
+        // SAFETY: promised by the caller.
+        unsafe {
+            put("camera", model, camera)?;
+            if report.is_null() && report_length.is_null() {
+                return Ok(());
+            }
+            store_text("report", &text, report, report_capacity, report_length)
+        }
+    })
+}
+
+fn label_of(
+    corners: [f64; 8],
+    [width_m, height_m]: [f64; 2],
+    [width, height]: [u32; 2],
+    focal_px: f64,
+) -> Result<Label, Failure> {
+    if !(focal_px.is_finite() && focal_px >= 0.0) {
+        let what = format_args!("{focal_px}, expected pixels, or 0 for an unknown focal length");
+        return Err(Failure::argument("focal_px", what));
+    }
+    let known = (focal_px > 0.0).then_some(focal_px);
+    Ok(Label {
+        format: Default::default(),
+        version: 1,
+        image: LabelImage {
+            width,
+            height,
+            ..Default::default()
+        },
+        pixel_origin: Default::default(),
+        surface: LabelSurface {
+            width_m: Some(width_m),
+            height_m: Some(height_m),
+            corners_px: Some(std::array::from_fn(|i| {
+                [corners[2 * i], corners[2 * i + 1]]
+            })),
+            ..Default::default()
+        },
+        camera: LabelCamera {
+            focal_px: known,
+            focal_fixed: known.is_some(),
+            ..Default::default()
+        },
+        points: Vec::new(),
+        markers: None,
+    })
+}
+
+fn solved(label: &Label) -> Result<(CameraModel, String), Failure> {
+    let solution = camera::solve(label, &Default::default()).map_err(Error::from)?;
+    let solution = solution.fitting().map_err(Error::from)?;
+    let text = serde_json::to_string(&CameraFile::new(label, &solution));
+    let text = text.map_err(|e| Error::value("report", e))?;
+    Ok(((&solution.camera).into(), text))
+}

@@ -1,0 +1,50 @@
+//! What C holds: numbers that are never used twice, so that what was closed is known to be.
+
+use crate::status::{Failure, Status};
+use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// Of all tables together: a sample's number is no pipeline's.
+static NEXT: AtomicU64 = AtomicU64::new(1);
+
+/// Everything of one kind that is open.
+pub(crate) struct Handles<T> {
+    kind: &'static str,
+    open: Mutex<BTreeMap<u64, Arc<T>>>,
+}
+
+impl<T> Handles<T> {
+    pub(crate) const fn new(kind: &'static str) -> Self {
+        Self {
+            kind,
+            open: Mutex::new(BTreeMap::new()),
+        }
+    }
+
+    pub(crate) fn open(&self, value: T) -> u64 {
+        let id = NEXT.fetch_add(1, Ordering::Relaxed);
+        self.locked().insert(id, Arc::new(value));
+        id
+    }
+
+    pub(crate) fn get(&self, id: u64) -> Result<Arc<T>, Failure> {
+        let value = self.locked().get(&id).cloned();
+        value.ok_or_else(|| self.closed(id))
+    }
+
+    /// Who still works with it may finish.
+    pub(crate) fn close(&self, id: u64) -> Result<(), Failure> {
+        let value = self.locked().remove(&id);
+        value.map(drop).ok_or_else(|| self.closed(id))
+    }
+
+    fn closed(&self, id: u64) -> Failure {
+        let message = format!("{} {id}: closed, or never opened", self.kind);
+        Failure::new(Status::Closed, message)
+    }
+
+    fn locked(&self) -> MutexGuard<'_, BTreeMap<u64, Arc<T>>> {
+        self.open.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}

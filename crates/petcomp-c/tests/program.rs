@@ -1,0 +1,185 @@
+//! A C program makes what petcomp itself makes, and valgrind has nothing to say of it.
+
+use petcomp::asset;
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+const SEED: &str = "5";
+const K: &str = "1";
+/// Exit status of valgrind where it has found something.
+const FOUND: &str = "99";
+
+fn repository() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+/// The library was built for this test, beside it.
+fn built_library() -> PathBuf {
+    let test = std::env::current_exe().unwrap();
+    test.with_file_name("libpetcomp_c.so")
+}
+
+/// The library under the names that it is installed with.
+fn install(folder: &Path) {
+    for name in ["libpetcomp.so", "libpetcomp.so.0"] {
+        std::os::unix::fs::symlink(built_library(), folder.join(name)).unwrap();
+    }
+}
+
+/// A recipe for small pictures of two bottles.
+fn write_recipe(folder: &Path) -> PathBuf {
+    let samples = repository().canonicalize().unwrap().join("tests/samples");
+    let mut list = String::from("file,asset,class,length\n");
+    for name in ["b0000_0", "b0001_0"] {
+        let photo = samples.join("bottles").join(name).with_extension("png");
+        list += &format!("{},{name},bottle,0.25\n", photo.display());
+    }
+    std::fs::write(folder.join("photos.csv"), list).unwrap();
+    asset::build(folder.join("photos.csv"), folder.join("assets"), &|_, _| {}).unwrap();
+    let recipe = format!(
+        "assets = \"assets\"\nbackgrounds = {:?}\n[scene]\nimage = [160, 120]\nobjects = [2, 3]\n\
+         [labels]\nobstructed = \"keep\"\n[render]\nsubsamples = 1\nambient_samples = 8\n",
+        samples.join("backgrounds")
+    );
+    std::fs::write(folder.join("recipe.toml"), recipe).unwrap();
+    folder.join("recipe.toml")
+}
+
+/// As somebody types it.
+fn generate(recipe: &Path, folder: &Path) {
+    let words = [
+        "petcomp", "dataset", "generate", "-q", "-n", "2", "--seed", SEED, "-o",
+    ];
+    let paths = [folder, recipe].map(|path| path.as_os_str().to_owned());
+    assert_eq!(
+        petcomp_cli::run(words.map(OsString::from).into_iter().chain(paths)),
+        0
+    );
+}
+
+/// Every warning is an error.
+fn compile(folder: &Path, compiler: &str, source: &Path, arguments: &[&str]) {
+    let done = Command::new(compiler)
+        .args(["-Wall", "-Wextra", "-Wpedantic", "-Werror", "-g", "-I"])
+        .arg(include_folder())
+        .arg(source)
+        .args(arguments)
+        .current_dir(folder)
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&done.stderr);
+    assert!(done.status.success(), "{said}");
+}
+
+fn include_folder() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("include")
+}
+
+fn run(mut command: Command, folder: &Path, recipe: &Path) -> Output {
+    command
+        .arg(recipe)
+        .args([SEED, K, "picture.ppm", "labels.json"])
+        .env("LD_LIBRARY_PATH", folder)
+        .current_dir(folder)
+        .output()
+        .unwrap()
+}
+
+/// Under valgrind, where it is installed; optimised code alone is quick enough for it.
+fn run_checked(folder: &Path, recipe: &Path) -> Output {
+    let mut valgrind = Command::new("valgrind");
+    if cfg!(debug_assertions) || valgrind.arg("--version").output().is_err() {
+        println!(
+            "valgrind is not installed, or this is not a release build: nothing looks at the program's memory"
+        );
+        return run(Command::new(folder.join("sample")), folder, recipe);
+    }
+    let mut valgrind = Command::new("valgrind");
+    valgrind
+        .args([
+            "-q",
+            "--leak-check=full",
+            "--errors-for-leak-kinds=definite",
+        ])
+        .arg(format!("--error-exitcode={FOUND}"))
+        .arg("./sample");
+    run(valgrind, folder, recipe)
+}
+
+#[test]
+fn c_program_makes_the_programs_sample() {
+    let temporary = tempfile::tempdir().unwrap();
+    let folder = temporary.path();
+    install(folder);
+    let recipe = write_recipe(folder);
+    generate(&recipe, &folder.join("set"));
+    let source = repository().join("examples/c/sample.c");
+    let program = ["-std=c11", "-o", "sample", "-L.", "-lpetcomp"];
+    compile(folder, "cc", &source, &program);
+
+    let done = run_checked(folder, &recipe);
+    let (out, err) = (
+        String::from_utf8_lossy(&done.stdout),
+        String::from_utf8_lossy(&done.stderr),
+    );
+    assert!(done.status.success(), "{out}{err}");
+    let version = env!("CARGO_PKG_VERSION");
+    assert!(
+        out.starts_with(&format!("petcomp {version}\nmatte 0.")),
+        "{out}"
+    );
+
+    let theirs = image::open(one_of(folder, "images", "png"))
+        .unwrap()
+        .to_rgb8();
+    assert_eq!(
+        image::open(folder.join("picture.ppm")).unwrap().to_rgb8(),
+        theirs
+    );
+    assert_eq!(own_labels(folder), program_labels(folder));
+}
+
+/// Sample K is in one part or the other.
+fn one_of(folder: &Path, kind: &str, extension: &str) -> PathBuf {
+    let parts =
+        ["train", "val"].map(|part| folder.join(format!("set/{kind}/{part}/00000{K}.{extension}")));
+    parts.into_iter().find(|path| path.exists()).unwrap()
+}
+
+fn json(path: &Path) -> serde_json::Value {
+    serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
+}
+
+/// Class, visible share and mask of each labelled object.
+fn own_labels(folder: &Path) -> Vec<serde_json::Value> {
+    let objects = json(&folder.join("labels.json"))["objects"].clone();
+    let objects = objects.as_array().unwrap().iter();
+    objects
+        .map(|o| serde_json::json!([o["class"], o["visible_fraction"], o["mask"]]))
+        .collect()
+}
+
+fn program_labels(folder: &Path) -> Vec<serde_json::Value> {
+    let record = json(&one_of(folder, "scenes", "json"));
+    let objects = record["labels"]["objects"].as_array().unwrap().iter();
+    let labels: Vec<_> = objects
+        .map(|o| serde_json::json!([o["class"], o["visible_fraction"], o["amodal_mask"]]))
+        .collect();
+    assert_eq!(labels.len(), record["labelled"].as_array().unwrap().len());
+    assert!(!labels.is_empty());
+    labels
+}
+
+#[test]
+fn header_is_one_of_cpp_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let source = folder.path().join("empty.cpp");
+    std::fs::write(&source, "#include <petcomp.h>\n").unwrap();
+    compile(
+        folder.path(),
+        "c++",
+        &source,
+        &["-std=c++17", "-fsyntax-only"],
+    );
+}
