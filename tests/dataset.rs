@@ -8,8 +8,8 @@ use petcomp::camera::Camera;
 use petcomp::dataset::{
     ContactSheetOptions, DatasetConfig, DatasetCounts, LabelConfig, Obstructed, PictureFormat,
     Pictures, Pipeline, Plan, Progress, Provenance, Sample, SampleRange, SampleRecord, Shard,
-    Sidecar, Split, SplitOrder, Writer, Yolo, YoloTask, check, contact_sheet_of, generate, merge,
-    repair,
+    Sidecar, Split, SplitOrder, WebDataset, Writer, Yolo, YoloTask, check, contact_sheet_of,
+    generate, merge, repair,
 };
 use petcomp::geom::BBox;
 use petcomp::geom::{Point2, Pose, UnitQuaternion, Vector2};
@@ -18,6 +18,7 @@ use petcomp::scene::{CameraSource, EdgeTreatment, Exposure, Grade, Object, Place
 use petcomp::{Coverage, Error, Image, LinearRgb, ObjectId, PremulRgba, Result, Scene, io};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 const IMAGE: [u32; 2] = [64, 48];
@@ -126,10 +127,11 @@ fn plan(folder: &Path, count: u64) -> Plan {
         split: Split::default(),
         obstructed: Obstructed::Drop,
         writers: vec![
-            Box::new(Pictures::default()),
-            Box::new(Yolo::default()),
-            Box::new(Sidecar),
+            Arc::new(Pictures::default()),
+            Arc::new(Yolo::default()),
+            Arc::new(Sidecar),
         ],
+        archives: None,
         inputs: Default::default(),
     }
 }
@@ -141,7 +143,7 @@ fn full_plan(folder: &Path, count: u64) -> Plan {
     let labels: LabelConfig = toml::from_str(formats).unwrap();
     let mut plan = plan(folder, count);
     plan.writers.truncate(1);
-    plan.writers.push(Box::new(Sidecar));
+    plan.writers.push(Arc::new(Sidecar));
     plan.writers.extend(labels.writers(&Pictures::default()));
     plan
 }
@@ -339,7 +341,7 @@ fn another_plan_in_the_same_folder_is_refused_by_name() {
             .contains("recipe.light: the dataset was begun with null")
     );
     assert!(refused(&|p| p.obstructed = Obstructed::Keep).contains("obstructed"));
-    assert!(refused(&|p| p.writers = vec![Box::new(Yolo::default())]).contains("writers"));
+    assert!(refused(&|p| p.writers = vec![Arc::new(Yolo::default())]).contains("writers"));
     assert!(
         refused(&|p| p.split = Split {
             val_percent: 20,
@@ -493,12 +495,12 @@ fn segments_hold_borders_and_jpegs_are_accepted() {
     let dir = tempfile::tempdir().unwrap();
     let mut plan = plan(dir.path(), 8);
     plan.writers = vec![
-        Box::new(Pictures {
+        Arc::new(Pictures {
             format: PictureFormat::Jpg,
             exr: true,
             ..Pictures::default()
         }),
-        Box::new(Yolo {
+        Arc::new(Yolo {
             task: YoloTask::Segment,
             ..Yolo::default()
         }),
@@ -524,7 +526,7 @@ fn segments_hold_borders_and_jpegs_are_accepted() {
     };
     make(&Plan {
         folder: simplified.path().into(),
-        writers: vec![Box::new(yolo)],
+        writers: vec![Arc::new(yolo)],
         ..plan
     })
     .unwrap();
@@ -646,7 +648,7 @@ fn with_a_card_up_at(k: u64, height: f64) -> Sample {
 #[test]
 fn a_sample_without_a_scene_is_written_and_its_layers_are_refused() {
     let bare = |k| sample(k).map(|made| Sample::new(made.frame, made.labels));
-    let write = |writers: Vec<Box<dyn Writer>>| {
+    let write = |writers: Vec<Arc<dyn Writer>>| {
         let dir = tempfile::tempdir().unwrap();
         let classes = ["cap_label", "cap", "label"].map(String::from).to_vec();
         let plan = Plan {
@@ -657,12 +659,12 @@ fn a_sample_without_a_scene_is_written_and_its_layers_are_refused() {
         made.map(|counts| (counts.images, check(dir.path()).unwrap().findings))
     };
     let most = write(vec![
-        Box::new(Pictures::default()),
-        Box::new(Sidecar),
-        Box::new(Yolo::default()),
+        Arc::new(Pictures::default()),
+        Arc::new(Sidecar),
+        Arc::new(Yolo::default()),
     ]);
     assert_eq!(most.unwrap(), (4, vec![]));
-    let e = write(vec![Box::new(petcomp::dataset::Layers::default())]).unwrap_err();
+    let e = write(vec![Arc::new(petcomp::dataset::Layers::default())]).unwrap_err();
     assert!(
         e.to_string()
             .contains("deep: 0 x 0 pixels, expected the picture's 64 x 48"),
@@ -753,7 +755,7 @@ fn a_writer_of_one_s_own_takes_part() {
     }
     let dir = tempfile::tempdir().unwrap();
     make(&Plan {
-        writers: vec![Box::new(Count)],
+        writers: vec![Arc::new(Count)],
         ..plan(dir.path(), 4)
     })
     .unwrap();
@@ -809,6 +811,103 @@ fn shard(folder: &Path, count: u64, index: u64, of: u64) -> Plan {
         range: SampleRange::Shard(Shard::new(index, of).unwrap()),
         ..full_plan(folder, count)
     }
+}
+
+/// Samples that go into archives of four numbers as they are made.
+fn archive_plan(folder: &Path, count: u64) -> Plan {
+    Plan {
+        archives: Some(WebDataset { samples: 4 }),
+        ..plan(folder, count)
+    }
+}
+
+/// Everything in a folder, hidden or not.
+fn names(folder: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).unwrap();
+    let names = entries.map(|e| e.unwrap().file_name().to_string_lossy().into_owned());
+    let mut names: Vec<String> = names.collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn archives_alone_leave_no_other_file_and_are_those_packed_from_files() {
+    let (loose, streamed) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let mut packed = plan(loose.path(), 30);
+    packed.writers.push(Arc::new(WebDataset { samples: 4 }));
+    make(&packed).unwrap();
+    let report = make(&archive_plan(streamed.path(), 30)).unwrap();
+    assert_eq!((report.images, report.val, report.made), (30, 6, 30));
+    assert_eq!(report.objects, make(&packed).unwrap().objects);
+    assert_eq!(names(streamed.path()), ["dataset.json", "webdataset"]);
+    let archives = |folder: &Path| bytes(&folder.join("webdataset"));
+    assert_eq!(archives(loose.path()), archives(streamed.path()));
+    assert_eq!(archives(loose.path()).len(), 8 + 6);
+}
+
+#[test]
+fn archives_that_are_there_are_not_made_again() {
+    let dir = tempfile::tempdir().unwrap();
+    make(&archive_plan(dir.path(), 30)).unwrap();
+    let before = bytes(dir.path());
+    std::fs::remove_file(dir.path().join("webdataset/val-000002.tar")).unwrap();
+    let report = make(&archive_plan(dir.path(), 30)).unwrap();
+    assert_eq!((report.images, report.made), (30, 4));
+    assert_eq!(before, bytes(dir.path()));
+    let e = make(&archive_plan(dir.path(), 31)).unwrap_err().to_string();
+    assert!(
+        e.ends_with("count: the dataset was begun with 30, this run has 31"),
+        "{e}"
+    );
+}
+
+#[test]
+fn a_run_broken_off_within_an_archive_goes_on_there() {
+    let (whole, broken) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    make(&archive_plan(whole.path(), 30)).unwrap();
+    let stop = AtomicBool::new(false);
+    let after_some = |p: Progress| stop.store(p.made >= 10, Ordering::Relaxed);
+    let run = || generate(&archive_plan(broken.path(), 30), sample, &after_some, &stop);
+    let e = threads(1, run).unwrap_err();
+    assert!(
+        matches!(&e, Error::Interrupted { what } if what.starts_with("8 of 30 samples are in ")),
+        "{e}"
+    );
+    assert_eq!(names(&broken.path().join("webdataset")).len(), 4);
+    assert_eq!(make(&archive_plan(broken.path(), 30)).unwrap().made, 20);
+    assert_eq!(bytes(whole.path()), bytes(broken.path()));
+    assert_eq!(names(broken.path()), ["dataset.json", "webdataset"]);
+}
+
+#[test]
+fn shards_share_the_folder_of_archives() {
+    let (whole, shared) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    make(&archive_plan(whole.path(), 30)).unwrap();
+    std::thread::scope(|scope| {
+        for index in [3, 1, 2] {
+            let range = SampleRange::Shard(Shard::new(index, 3).unwrap());
+            let plan = Plan {
+                range,
+                ..archive_plan(shared.path(), 30)
+            };
+            scope.spawn(move || make(&plan).unwrap());
+        }
+    });
+    assert_eq!(bytes(whole.path()), bytes(shared.path()));
+}
+
+#[test]
+fn one_sample_of_an_archive_cannot_be_made() {
+    let dir = tempfile::tempdir().unwrap();
+    let one = Plan {
+        range: SampleRange::One(3),
+        ..archive_plan(dir.path(), 30)
+    };
+    let e = make(&one).unwrap_err().to_string();
+    assert_eq!(
+        e,
+        "only: a dataset of archives, expected all of its samples or a shard"
+    );
 }
 
 /// Shards of 20 samples in every format, made in an order of their own.

@@ -85,7 +85,7 @@ def webdataset(folder):
         samples = list(webdataset.WebDataset(archives, shardshuffle=False))
         assert [int(sample["__key__"]) for sample in samples] == numbers
         for sample in samples:
-            key = sample["__key__"]
+            key = f"{int(sample['__key__']):06}"
             assert sample["png"] == (folder / f"images/{part}/{key}.png").read_bytes()
             assert sample["txt"] == (folder / f"labels/{part}/{key}.txt").read_bytes()
             assert json.loads(sample["json"])["index"] == json.loads(sample["coco.json"])["image"]["id"] == int(key)

@@ -133,6 +133,9 @@ impl DatasetConfig {
     /// The same in pictures of half the width and height, for a first look: the same scenes.
     pub fn preview(mut self) -> Self {
         self.scene.image = self.scene.image.map(|side| (side / 2).max(MIN_SIDE_PX));
+        if self.labels.archives().is_some() {
+            self.labels.formats.clear();
+        }
         self
     }
 

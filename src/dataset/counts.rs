@@ -1,8 +1,9 @@
 //! How many images, objects and labels a dataset holds.
 
 use crate::dataset::journal_line::JournalLine;
-use crate::dataset::{Obstructed, Part, Plan};
+use crate::dataset::{Obstructed, Part, Plan, Writer};
 use serde::{Deserialize, Serialize};
+use std::ops::AddAssign;
 use std::path::PathBuf;
 
 /// What a dataset holds.
@@ -71,6 +72,24 @@ impl DatasetCounts {
     }
 }
 
+impl AddAssign for DatasetCounts {
+    /// Adds images of the same dataset.
+    fn add_assign(&mut self, more: Self) {
+        self.images += more.images;
+        self.val += more.val;
+        self.made += more.made;
+        self.objects += more.objects;
+        self.labelled += more.labelled;
+        self.obstructed += more.obstructed;
+        self.knotted += more.knotted;
+        self.retries += more.retries;
+        for (class, more) in self.classes.iter_mut().zip(more.classes) {
+            class.objects += more.objects;
+            class.labelled += more.labelled;
+        }
+    }
+}
+
 impl ClassCount {
     fn for_classes(names: &[String], lines: &[JournalLine]) -> Vec<Self> {
         let counts = (0..).map(|class| count_class(lines, class));
@@ -81,9 +100,10 @@ impl ClassCount {
 
 /// The files that trainers are given, as far as they are there.
 fn files_for_trainers(plan: &Plan) -> Vec<PathBuf> {
-    plan.writers
-        .iter()
-        .flat_map(|writer| writer.for_trainers())
+    let archives = plan.archives.iter().flat_map(Writer::for_trainers);
+    let writers = plan.writers.iter().flat_map(|w| w.for_trainers());
+    archives
+        .chain(writers)
         .filter(|path| plan.folder.join(path).exists())
         .collect()
 }

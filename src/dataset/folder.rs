@@ -1,7 +1,7 @@
 //! A dataset's folder: claimed by one run at a time, and only for the plan that it was begun with.
 
 use crate::dataset::times::RUNS;
-use crate::dataset::{Plan, SampleRange, Shard, SplitOrder};
+use crate::dataset::{Plan, SampleRange, Shard, SplitOrder, Writer};
 use crate::error::{Error, Result};
 use crate::io;
 use serde_json::{Map, Value, json};
@@ -30,19 +30,38 @@ pub(crate) struct Claim {
 /// Claims the folder of a plan: makes or checks it, locks it, and lets the writers begin.
 pub(crate) fn claim(plan: &Plan) -> Result<Claim> {
     let folder = plan.folder.as_path();
+    let before = enter(folder)?;
+    refuse_foreign_files(folder)?;
+    let lock = lock(folder)?;
+    sign(plan, before)?;
+    sweep(folder)?;
+    begin_writers(plan)?;
+    Ok(Claim { _lock: lock })
+}
+
+/// Makes or checks the folder of a plan that several runs write to at once, no two of them the same
+/// file.
+pub(crate) fn share(plan: &Plan) -> Result<()> {
+    let before = enter(&plan.folder)?;
+    sign(plan, before)
+}
+
+/// Makes a folder if it is not there, and returns what it was made from otherwise.
+fn enter(folder: &Path) -> Result<Option<Value>> {
     let before = claimable_identity(folder)?;
     io::create_folder(folder)?;
     io::refuse_links(folder)?;
-    refuse_foreign_files(folder)?;
-    let lock = lock(folder)?;
+    Ok(before)
+}
+
+/// Says in the folder what it is made from, if that is what it was begun with.
+fn sign(plan: &Plan, before: Option<Value>) -> Result<()> {
+    let folder = plan.folder.as_path();
     let now = plan_identity(plan)?;
     if let Some(before) = before {
         check_same_plan(&before, &now, folder)?;
     }
-    sweep(folder)?;
-    io::write_json(identity_file(folder), &now)?;
-    begin_writers(plan)?;
-    Ok(Claim { _lock: lock })
+    io::write_json(identity_file(folder), &now)
 }
 
 fn refuse_foreign_files(folder: &Path) -> Result<()> {
@@ -211,8 +230,13 @@ fn plan_identity(plan: &Plan) -> Result<Value> {
         "writers": writer_settings(plan),
         "recipe": plan.recipe,
     });
-    if let SampleRange::Shard(Shard { index, of }) = plan.range {
-        identity["shard"] = json!({ "index": index, "of": of, "count": plan.count });
+    match (plan.archives, plan.range) {
+        // The last archive ends with the last sample; shards share the folder.
+        (Some(_), _) => identity["count"] = plan.count.into(),
+        (None, SampleRange::Shard(Shard { index, of })) => {
+            identity["shard"] = json!({ "index": index, "of": of, "count": plan.count });
+        }
+        (None, _) => {}
     }
     if plan.split.order == SplitOrder::Consecutive {
         identity["count"] = plan.count.into();
@@ -221,10 +245,9 @@ fn plan_identity(plan: &Plan) -> Result<Value> {
 }
 
 fn writer_settings(plan: &Plan) -> Vec<Value> {
-    plan.writers
-        .iter()
-        .map(|writer| writer.settings())
-        .collect()
+    let archives = plan.archives.iter().map(Writer::settings);
+    let writers = plan.writers.iter().map(|writer| writer.settings());
+    writers.chain(archives).collect()
 }
 
 /// Where two documents differ, and how, if they do.

@@ -9,6 +9,7 @@ use crate::error::Result;
 use crate::geom::BBox;
 use crate::label::{AmodalBox, LabelOptions, ObjectLabel, ObstructionRule, RleMask};
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
 /// How labels are made and written: the table `[labels]` of a recipe.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -133,11 +134,16 @@ impl LabelConfig {
 
     /// The writers of the layouts, each once, in the order in which [`Format`] lists them:
     /// [`WebDataset`] packs what the others write.
-    pub fn writers(&self, pictures: &Pictures) -> Vec<Box<dyn Writer>> {
+    pub fn writers(&self, pictures: &Pictures) -> Vec<Arc<dyn Writer>> {
         let formats = self.distinct_formats().into_iter();
         formats
             .map(|format| self.writer(format, pictures))
             .collect()
+    }
+
+    /// The archives that samples are written to as they are made, where nothing else is asked for.
+    pub fn archives(&self) -> Option<WebDataset> {
+        (self.distinct_formats() == [Format::WebDataset]).then_some(self.webdataset)
     }
 
     fn distinct_formats(&self) -> Vec<Format> {
@@ -147,16 +153,16 @@ impl LabelConfig {
         formats
     }
 
-    fn writer(&self, format: Format, pictures: &Pictures) -> Box<dyn Writer> {
+    fn writer(&self, format: Format, pictures: &Pictures) -> Arc<dyn Writer> {
         match format {
-            Format::Yolo => Box::new(self.yolo_writer()),
-            Format::Coco => Box::new(self.coco_writer(pictures.format)),
-            Format::Voc => Box::new(Voc {
+            Format::Yolo => Arc::new(self.yolo_writer()),
+            Format::Coco => Arc::new(self.coco_writer(pictures.format)),
+            Format::Voc => Arc::new(Voc {
                 pictures: pictures.format,
                 ..self.voc
             }),
-            Format::Layers => Box::new(self.layers),
-            Format::WebDataset => Box::new(self.webdataset),
+            Format::Layers => Arc::new(self.layers),
+            Format::WebDataset => Arc::new(self.webdataset),
         }
     }
 

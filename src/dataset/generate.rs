@@ -1,16 +1,19 @@
 //! Makes a dataset, many samples at a time, in a folder that survives any interruption.
 
+use crate::dataset::archives::generate_archives;
 use crate::dataset::journal_line::JournalLine;
-use crate::dataset::run::{Progress, run};
+use crate::dataset::run::{Progress, Report, run};
 use crate::dataset::times::{Times, timed};
 use crate::dataset::{
-    DatasetCounts, Entry, Inputs, Obstructed, Sample, SampleRange, Split, Writer,
+    DatasetCounts, Entry, Inputs, Obstructed, Sample, SampleRange, Split, WebDataset, Writer,
 };
 use crate::error::{Error, Result};
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 /// A dataset to make.
+#[derive(Clone)]
 pub struct Plan {
     /// Where; made if it is not there.
     pub folder: PathBuf,
@@ -29,8 +32,11 @@ pub struct Plan {
     pub split: Split,
     /// What happens to the labels of objects that something lies over.
     pub obstructed: Obstructed,
-    /// The files to write, in this order.
-    pub writers: Vec<Box<dyn Writer>>,
+    /// The files to write of each sample, in this order.
+    pub writers: Vec<Arc<dyn Writer>>,
+    /// Archives that the files of samples are moved into as they are made, so that none lies about;
+    /// by default files stay where they are.
+    pub archives: Option<WebDataset>,
     /// Checksums of files that `recipe` tells of, to be kept in the folder. By default there are
     /// none.
     pub inputs: Inputs,
@@ -50,6 +56,7 @@ impl Plan {
             split: Split::default(),
             obstructed: Obstructed::default(),
             writers: Vec::new(),
+            archives: None,
             inputs: Inputs::default(),
         }
     }
@@ -75,7 +82,8 @@ impl Plan {
 /// interrupted. As many samples are in memory as the current rayon pool has threads; each works on
 /// its own, since pictures beside each other keep processors busier than rows of one picture. Files
 /// of many samples are joined when all are there; those of a shard stay apart until it is
-/// [merged](crate::dataset::merge).
+/// [merged](crate::dataset::merge). With [`Plan::archives`] each archive is there whole or not at
+/// all, shards write theirs into one folder, and what counts objects counts those of this run.
 ///
 /// # Errors
 /// [`Error::Interrupted`] after a stop; the first error of `make` or of a writer, in order of `k`
@@ -86,6 +94,22 @@ pub fn generate(
     plan: &Plan,
     make: impl Fn(u64) -> Result<Sample> + Sync,
     progress: &(dyn Fn(Progress) + Sync),
+    stop: &AtomicBool,
+) -> Result<DatasetCounts> {
+    match plan.archives {
+        Some(archives) => {
+            let files = |part: &Plan, progress: Report| generate_files(part, &make, progress, stop);
+            generate_archives(plan, archives, &files, progress)
+        }
+        None => generate_files(plan, make, progress, stop),
+    }
+}
+
+/// Leaves the files of samples where the writers put them.
+fn generate_files(
+    plan: &Plan,
+    make: impl Fn(u64) -> Result<Sample> + Sync,
+    progress: Report,
     stop: &AtomicBool,
 ) -> Result<DatasetCounts> {
     let recipe_hash = plan.recipe_hash();

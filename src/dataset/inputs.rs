@@ -21,7 +21,7 @@ const SETTLED_AGE: Duration = Duration::from_secs(2);
 /// Checksums of a dataset's input files, kept in its folder from one run to the next.
 ///
 /// A checksum is taken as it was while the file has the same size, times and place on the disk.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Inputs {
     before: BTreeMap<String, Input>,
     now: BTreeMap<String, Input>,

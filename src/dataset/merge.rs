@@ -13,6 +13,7 @@ use crate::io;
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 /// Copies the samples of shards into one folder, checks each file against its checksum, and joins
@@ -223,12 +224,13 @@ fn merged_plan(mut document: Map<String, Value>, count: u64, folder: &Path) -> R
         classes: field(&mut document, "classes")?,
         split: field(&mut document, "split")?,
         obstructed: field(&mut document, "obstructed")?,
+        archives: None,
         inputs: Inputs::default(),
     })
 }
 
 /// The writers that wrote with these settings.
-fn writers_of(settings: Vec<Map<String, Value>>) -> Result<Vec<Box<dyn Writer>>> {
+fn writers_of(settings: Vec<Map<String, Value>>) -> Result<Vec<Arc<dyn Writer>>> {
     let pictures = pictures_of(&settings)?;
     let named = settings.into_iter().flatten();
     named
@@ -252,10 +254,10 @@ fn field<T: serde::de::DeserializeOwned>(
 }
 
 /// The writer of a name and settings, as [`Writer::settings`] told them.
-fn writer_of(name: &str, settings: Value, pictures: &Pictures) -> Result<Box<dyn Writer>> {
+fn writer_of(name: &str, settings: Value, pictures: &Pictures) -> Result<Arc<dyn Writer>> {
     match name {
-        "pictures" => Ok(Box::new(*pictures)),
-        "sidecar" => Ok(Box::new(Sidecar)),
+        "pictures" => Ok(Arc::new(*pictures)),
+        "sidecar" => Ok(Arc::new(Sidecar)),
         format => label_writer(format, settings, pictures)
             .map_err(|what| Error::value(format!("writers.{name}"), what)),
     }
@@ -265,7 +267,7 @@ fn label_writer(
     format: &str,
     settings: Value,
     pictures: &Pictures,
-) -> std::result::Result<Box<dyn Writer>, String> {
+) -> std::result::Result<Arc<dyn Writer>, String> {
     let mut config = json!({ "formats": [format] });
     if settings.as_object().is_some_and(|map| !map.is_empty()) {
         config[format] = settings;

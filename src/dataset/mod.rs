@@ -17,6 +17,7 @@
 //! index.jsonl                    one line for each finished sample
 //! ```
 
+mod archives;
 mod background_photo;
 mod check;
 mod coco;
@@ -278,7 +279,7 @@ impl Written {
 /// A layout with one file for many samples writes a file of its own for each sample first, and
 /// joins those when all are there: so every file of a sample can be made again alone, on any
 /// machine, and no run has to remember another.
-pub trait Writer: Sync {
+pub trait Writer: Send + Sync {
     /// Its name and settings: written into `dataset.json`, and compared before a dataset is
     /// continued.
     fn settings(&self) -> serde_json::Value;

@@ -169,6 +169,7 @@ impl Pipeline {
             split: self.config.split,
             obstructed: labels.obstructed,
             writers: self.writers(),
+            archives: labels.archives(),
             inputs,
         })
     }
@@ -183,10 +184,12 @@ impl Pipeline {
         )
     }
 
-    fn writers(&self) -> Vec<Box<dyn Writer>> {
+    fn writers(&self) -> Vec<Arc<dyn Writer>> {
         let pictures = &self.config.pictures;
-        let mut writers: Vec<Box<dyn Writer>> = vec![Box::new(*pictures), Box::new(Sidecar)];
-        writers.extend(self.config.labels.writers(pictures));
+        let mut writers: Vec<Arc<dyn Writer>> = vec![Arc::new(*pictures), Arc::new(Sidecar)];
+        if self.config.labels.archives().is_none() {
+            writers.extend(self.config.labels.writers(pictures));
+        }
         writers
     }
 

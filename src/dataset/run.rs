@@ -18,7 +18,7 @@ use std::time::Instant;
 const SAMPLES_PER_SYNC: u64 = 256;
 
 /// How far a run is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Progress {
     /// Samples in the folder, those of an earlier run included.
     pub done: u64,
@@ -46,9 +46,18 @@ impl Progress {
         Err(Error::Interrupted { what })
     }
 
-    fn describe(&self, folder: &Path) -> String {
+    pub(super) fn describe(&self, folder: &Path) -> String {
         let (done, asked, folder) = (self.done, self.count, folder.display());
         format!("{done} of {asked} samples are in {folder}; the same command goes on")
+    }
+
+    /// That of a run of which another one is a part.
+    pub(super) fn with(self, part: Self) -> Self {
+        Self {
+            done: self.done + part.done,
+            count: self.count,
+            made: self.made + part.made,
+        }
     }
 
     /// Counts a sample that was made.
@@ -57,6 +66,9 @@ impl Progress {
         self.made += 1;
     }
 }
+
+/// Who is told how far a run is.
+pub(super) type Report<'a> = &'a (dyn Fn(Progress) + Sync);
 
 /// Most samples that a dataset may have: a number above is a slip of the finger, and no sum of
 /// counts can overflow.

@@ -1,8 +1,10 @@
 //! Which samples of a dataset a run makes: all, one machine's share, or one.
 
+use crate::dataset::WebDataset;
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::fmt;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 /// Which samples of a dataset a run makes.
@@ -15,6 +17,8 @@ pub enum SampleRange {
     Shard(Shard),
     /// This one, whether it is there or not.
     One(u64),
+    /// Those from the first number to before the second that are missing.
+    Span(u64, u64),
 }
 
 impl SampleRange {
@@ -24,6 +28,17 @@ impl SampleRange {
             Self::All => true,
             Self::Shard(shard) => shard.contains(k),
             Self::One(one) => k == one,
+            Self::Span(first, end) => (first..end).contains(&k),
+        }
+    }
+
+    /// Where they are written, given the folder of the dataset: a shard has one of its own, unless it
+    /// makes archives.
+    #[doc(hidden)]
+    pub fn folder(self, dataset: &Path, archives: Option<WebDataset>) -> PathBuf {
+        match (self, archives) {
+            (Self::Shard(shard), None) => dataset.join(shard.folder()),
+            _ => dataset.into(),
         }
     }
 
@@ -45,6 +60,7 @@ impl SampleRange {
             Self::All => (0, 1, count),
             Self::Shard(Shard { index, of }) => (index.saturating_sub(1), of.max(1), count),
             Self::One(k) => (k, 1, count.min(k.saturating_add(1))),
+            Self::Span(first, end) => (first, 1, count.min(end)),
         }
     }
 }
@@ -133,7 +149,8 @@ impl ShardChoice {
     /// The shard that is meant, `variable` telling the environment's variables.
     ///
     /// `auto` understands the tasks of a Slurm array (`SLURM_ARRAY_TASK_ID` with `_MIN`, `_MAX`,
-    /// `_STEP` and `_COUNT`) and the pods of an indexed Kubernetes job (`JOB_COMPLETION_INDEX`,
+    /// `_STEP` and `_COUNT`), the children of an AWS Batch array job (`AWS_BATCH_JOB_ARRAY_INDEX`, from
+    /// 0, and `AWS_BATCH_JOB_ARRAY_SIZE`) and the pods of an indexed Kubernetes job (`JOB_COMPLETION_INDEX`,
     /// from 0; `auto/N` says of how many, since Kubernetes does not).
     ///
     /// # Errors
@@ -144,9 +161,12 @@ impl ShardChoice {
             Self::Auto { of } => of,
         };
         let environment = JobEnvironment { variable };
-        match environment.number("SLURM_ARRAY_TASK_ID")? {
-            Some(id) => environment.slurm_shard(id, of),
-            None => environment.kubernetes_shard(of),
+        let slurm = environment.number("SLURM_ARRAY_TASK_ID")?;
+        let aws = environment.number("AWS_BATCH_JOB_ARRAY_INDEX")?;
+        match (slurm, aws) {
+            (Some(id), _) => environment.slurm_shard(id, of),
+            (None, Some(index)) => environment.aws_batch_shard(index, of),
+            (None, None) => environment.kubernetes_shard(of),
         }
     }
 }
@@ -176,11 +196,20 @@ impl<V: Fn(&str) -> Option<String>> JobEnvironment<V> {
 
     fn kubernetes_shard(&self, of: Option<u64>) -> Result<Shard> {
         let Some(index) = self.number("JOB_COMPLETION_INDEX")? else {
-            let what = "auto, but neither SLURM_ARRAY_TASK_ID nor JOB_COMPLETION_INDEX is set";
+            let what = "auto, but none of SLURM_ARRAY_TASK_ID, AWS_BATCH_JOB_ARRAY_INDEX and JOB_COMPLETION_INDEX is set";
             return Err(Error::value("shard", what));
         };
         let of = of.ok_or_else(|| {
             let what = "Kubernetes does not tell the number of shards: say auto/N";
+            Error::value("shard", what)
+        })?;
+        Shard::new(index.saturating_add(1), of)
+    }
+
+    fn aws_batch_shard(&self, index: u64, of: Option<u64>) -> Result<Shard> {
+        let of = of.or(self.number("AWS_BATCH_JOB_ARRAY_SIZE")?);
+        let of = of.ok_or_else(|| {
+            let what = "AWS_BATCH_JOB_ARRAY_SIZE is not set: say auto/N";
             Error::value("shard", what)
         })?;
         Shard::new(index.saturating_add(1), of)
@@ -273,6 +302,7 @@ mod tests {
             shard(1, 3),
             shard(3, 3),
             shard(9, 9),
+            SampleRange::Span(3, 9),
         ] {
             for count in [0, 1, 7, 8, 50] {
                 let wanted: Vec<u64> = (0..count).filter(|&k| numbers.contains(k)).collect();
@@ -374,7 +404,7 @@ mod tests {
         let most = u64::MAX.to_string();
         assert!(within("auto/4", &[("JOB_COMPLETION_INDEX", &most)]).is_err());
         assert!(within("auto/4", &[("SLURM_ARRAY_TASK_ID", &most)]).is_err());
-        assert!(within("auto", &[]).unwrap_err().contains("neither"));
+        assert!(within("auto", &[]).unwrap_err().contains("none of"));
         let last = [("JOB_COMPLETION_INDEX", "18446744073709551615")];
         assert!(
             within("auto/4", &last)
@@ -387,6 +417,17 @@ mod tests {
                 .unwrap_err()
                 .contains("expected at most 4/4")
         );
+    }
+
+    #[test]
+    fn an_aws_batch_array_tells_the_shard() {
+        let index = ("AWS_BATCH_JOB_ARRAY_INDEX", "2");
+        let size = ("AWS_BATCH_JOB_ARRAY_SIZE", "8");
+        assert_eq!(within("auto", &[index, size]).unwrap(), "3/8");
+        assert_eq!(within("auto/4", &[index, size]).unwrap(), "3/4");
+        assert!(within("auto", &[index]).unwrap_err().contains("say auto/N"));
+        let beyond = [("AWS_BATCH_JOB_ARRAY_INDEX", "8"), size];
+        assert!(within("auto", &beyond).unwrap_err().contains("at most 8/8"));
     }
 
     #[test]

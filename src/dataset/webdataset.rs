@@ -4,21 +4,23 @@ use crate::dataset::{Entry, Part, Writer, Written};
 use crate::error::{Error, Result};
 use crate::io;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// Writes `webdataset/{train,val}-NNNNNN.tar`, each with the files of so many samples in order of
-/// number.
+/// Writes `webdataset/{train,val}-NNNNNN.tar`, each with the files of a span of numbers: at the
+/// default of 500 number 2 holds the samples 1000 to 1499, those for training and those for validation
+/// apart.
 ///
-/// Files of a sample are called by its number: `000012.png`, `000012.json`; where two writers have
-/// one of the same kind, the later one's is called `000012.FOLDER.json` after its folder. There is
-/// no empty archive. Times and owners are zero, so the same samples give the same bytes.
+/// Files of a sample are called by its number: `000000012.png`, `000000012.json`; where two writers
+/// have one of the same kind, the later one's is called `000000012.FOLDER.json` after its folder.
+/// There is no empty archive. Times and owners are zero, so the same samples give the same bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct WebDataset {
-    /// Samples in an archive, at least 1. Default: 500.
-    pub samples: usize,
+    /// Numbers that an archive has room for, at least 1. Default: 500.
+    pub samples: u64,
 }
 
 impl Default for WebDataset {
@@ -39,12 +41,7 @@ impl Writer for WebDataset {
     }
 
     fn begin(&self, folder: &Path, _classes: &[String]) -> Result<()> {
-        if self.samples == 0 {
-            return Err(Error::value(
-                "labels.webdataset.samples",
-                "0, expected at least 1",
-            ));
-        }
+        self.check()?;
         io::create_folder(folder.join(KIND))
     }
 
@@ -57,27 +54,53 @@ impl Writer for WebDataset {
     }
 
     fn finish(&self, folder: &Path, _classes: &[String], samples: &[Written]) -> Result<()> {
-        for part in Part::ALL {
-            let of_part = samples.iter().filter(|sample| sample.part == part);
-            let of_part: Vec<_> = of_part.collect();
-            self.write_archives(folder, part, &of_part)?;
-        }
-        Ok(())
+        Part::ALL
+            .into_iter()
+            .try_for_each(|part| self.write_archives(folder, part, samples))
     }
 }
 
 impl WebDataset {
-    fn write_archives(&self, folder: &Path, part: Part, samples: &[&Written]) -> Result<()> {
-        let archives = samples.chunks(self.samples.max(1));
-        let count = archives.len();
-        for (i, samples) in archives.enumerate() {
-            io::write_through(&archive(folder, part, i), |out| pack(out, folder, samples))?;
+    pub(super) fn check(&self) -> Result<()> {
+        match self.samples {
+            0 => Err(Error::value(
+                "labels.webdataset.samples",
+                "0, expected at least 1",
+            )),
+            _ => Ok(()),
         }
-        remove_archives_from(folder, part, count)
+    }
+
+    /// The first number of an archive, and the first of the next one, of a dataset of `count`.
+    pub(super) fn span(&self, archive: u64, count: u64) -> (u64, u64) {
+        let first = archive.saturating_mul(self.samples);
+        (first, first.saturating_add(self.samples).min(count))
+    }
+
+    fn write_archives(&self, folder: &Path, part: Part, samples: &[Written]) -> Result<()> {
+        let of_part = samples.iter().filter(|sample| sample.part == part);
+        let of_part: Vec<_> = of_part.collect();
+        let mut kept = BTreeSet::new();
+        for samples in of_part.chunk_by(|a, b| self.number_of(a) == self.number_of(b)) {
+            let path = archive(folder, part, self.number_of(samples[0]));
+            write_archive(&path, folder, samples)?;
+            kept.insert(path);
+        }
+        remove_archives_but(&kept, folder, part)
+    }
+
+    fn number_of(&self, sample: &Written) -> u64 {
+        sample.k / self.samples
     }
 }
 
-fn archive(folder: &Path, part: Part, i: usize) -> PathBuf {
+/// Writes an archive of samples whose files lie in a folder.
+pub(super) fn write_archive(path: &Path, folder: &Path, samples: &[&Written]) -> Result<()> {
+    io::write_through(path, |out| pack(out, folder, samples))
+}
+
+/// Where an archive of a dataset is.
+pub(super) fn archive(folder: &Path, part: Part, i: u64) -> PathBuf {
     folder
         .join(KIND)
         .join(format!("{}-{i:06}.tar", part.name()))
@@ -109,27 +132,36 @@ fn header_of(file: &File) -> std::io::Result<tar::Header> {
     Ok(header)
 }
 
-/// Removes the archives of a dataset that had more samples before.
-fn remove_archives_from(folder: &Path, part: Part, first: usize) -> Result<()> {
-    for i in first.. {
-        let path = archive(folder, part, i);
-        if !path.exists() {
-            break;
+/// Removes the archives of a dataset that had other samples before.
+fn remove_archives_but(kept: &BTreeSet<PathBuf>, folder: &Path, part: Part) -> Result<()> {
+    let folder = folder.join(KIND);
+    let entries = std::fs::read_dir(&folder).map_err(|e| Error::file(&folder, e))?;
+    for entry in entries.flatten() {
+        let path = entry.path();
+        if is_archive(&entry.file_name().to_string_lossy(), part) && !kept.contains(&path) {
+            std::fs::remove_file(&path).map_err(|e| Error::file(&path, e))?;
         }
-        std::fs::remove_file(&path).map_err(|e| Error::file(&path, e))?;
     }
     Ok(())
 }
+
+fn is_archive(name: &str, part: Part) -> bool {
+    name.starts_with(&format!("{}-", part.name())) && name.ends_with(".tar")
+}
+
+/// Digits of a sample's number, so that names are in order up to the largest dataset.
+const KEY_DIGITS: usize = 9;
 
 /// The files of a sample and their names in an archive.
 fn named(sample: &Written) -> Vec<(String, &Path)> {
     let mut named: Vec<(String, &Path)> = Vec::new();
     for file in &sample.files {
         let extension = file.extension().unwrap_or_default().to_string_lossy();
-        let mut name = format!("{:06}.{extension}", sample.k);
+        let key = format!("{:0KEY_DIGITS$}", sample.k);
+        let mut name = format!("{key}.{extension}");
         if named.iter().any(|(known, _)| *known == name) {
             let kind = file.iter().next().unwrap_or_default().to_string_lossy();
-            name = format!("{:06}.{kind}.{extension}", sample.k);
+            name = format!("{key}.{kind}.{extension}");
         }
         named.push((name, file));
     }
@@ -154,6 +186,9 @@ mod tests {
             files: files.to_vec(),
         };
         let names: Vec<_> = named(&sample).into_iter().map(|(name, _)| name).collect();
-        assert_eq!(names, ["000007.png", "000007.json", "000007.coco.json"]);
+        assert_eq!(
+            names,
+            ["000000007.png", "000000007.json", "000000007.coco.json"]
+        );
     }
 }

@@ -43,9 +43,10 @@ impl Run {
     fn generate_from(&self, pipeline: &dataset::Pipeline, target: Target) -> Result<String> {
         let (folder, count, seed, only, shard) = target;
         let range = range_of(only, shard)?;
+        let archives = pipeline.config().labels.archives();
         let plan = Plan {
             range,
-            ..pipeline.plan(count, seed, folder_of(folder, range))?
+            ..pipeline.plan(count, seed, range.folder(&folder, archives))?
         };
         self.generate(&plan, |k| pipeline.sample(seed, k))
     }
@@ -78,14 +79,6 @@ fn range_of(only: Option<u64>, shard: Option<[u64; 2]>) -> Result<SampleRange> {
             let what = "given together with shard, expected one of them";
             Err(Error::value("only", what))
         }
-    }
-}
-
-/// Where a shard is written, as by the program.
-fn folder_of(folder: PathBuf, range: SampleRange) -> PathBuf {
-    match range {
-        SampleRange::Shard(shard) => folder.join(shard.folder()),
-        _ => folder,
     }
 }
 
@@ -145,15 +138,15 @@ impl Layout {
             obstructed,
             writers: self.writers(),
             ..Plan::new(
-                folder_of(folder, range),
+                range.folder(&folder, None),
                 count,
                 obstructed.classes(classes)?,
             )
         })
     }
 
-    fn writers(&self) -> Vec<Box<dyn Writer>> {
-        let mut writers: Vec<Box<dyn Writer>> = vec![Box::new(self.pictures), Box::new(Sidecar)];
+    fn writers(&self) -> Vec<Arc<dyn Writer>> {
+        let mut writers: Vec<Arc<dyn Writer>> = vec![Arc::new(self.pictures), Arc::new(Sidecar)];
         writers.extend(self.labels.writers(&self.pictures));
         writers
     }

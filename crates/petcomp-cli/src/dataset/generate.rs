@@ -37,8 +37,9 @@ pub(crate) struct GenerateArgs {
     /// Make only image K, whether it is there or not
     #[arg(long, value_name = "K", conflicts_with_all = ["shard", "preview"])]
     only: Option<u64>,
-    /// Make every N-th image, from the I-th (1 to N), in a folder of its own below the output;
-    /// `auto` or `auto/N` asks the Slurm array or the indexed Kubernetes job that this runs in
+    /// Make every N-th image, from the I-th (1 to N), in a folder of its own below the output (of a
+    /// dataset of archives: every N-th archive, in the output itself);
+    /// `auto` or `auto/N` asks the Slurm array, the AWS Batch array job or the indexed Kubernetes job that this runs in
     #[arg(long, value_name = "I/N", conflicts_with = "preview")]
     shard: Option<ShardChoice>,
     /// Make the first N images (of those that -n asks for) at half their width and height, and a
@@ -51,8 +52,9 @@ pub(crate) struct GenerateArgs {
 
 pub(crate) fn run(args: &GenerateArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     let (config, range) = (args.config()?, args.sample_range()?);
-    let folder = args.folder_of(range);
-    if args.resume {
+    let archives = config.labels.archives();
+    let folder = range.folder(&args.output, archives);
+    if args.resume && archives.is_none() {
         repair_folder(&folder)?;
     }
     let pipeline = Pipeline::open(config)?.stopped_by(interruption());
@@ -101,14 +103,6 @@ impl GenerateArgs {
         match self.shard {
             Some(choice) => shard_range(choice),
             None => Ok(self.only.map_or(SampleRange::All, SampleRange::One)),
-        }
-    }
-
-    /// A shard has a folder of its own.
-    fn folder_of(&self, range: SampleRange) -> PathBuf {
-        match range {
-            SampleRange::Shard(shard) => self.output.join(shard.folder()),
-            _ => self.output.clone(),
         }
     }
 }

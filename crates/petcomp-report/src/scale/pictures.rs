@@ -114,15 +114,16 @@ fn dataset_plan(folder: &Path, count: u64) -> Plan {
         split: Split::default(),
         obstructed: Obstructed::Keep,
         writers: writers(),
+        archives: None,
         inputs: Default::default(),
     }
 }
 
-fn writers() -> Vec<Box<dyn Writer>> {
+fn writers() -> Vec<Arc<dyn Writer>> {
     vec![
-        Box::new(Pictures::default()),
-        Box::new(Sidecar),
-        Box::new(Yolo::default()),
+        Arc::new(Pictures::default()),
+        Arc::new(Sidecar),
+        Arc::new(Yolo::default()),
     ]
 }
 

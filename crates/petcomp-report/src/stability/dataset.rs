@@ -15,6 +15,7 @@ use petcomp::label::{LabelOptions, label};
 use petcomp::scene::{Background, CameraSource, Range, Recipe, Scene, Shot};
 use petcomp::{DeepImage, DeepSample, Error, LinearRgb, ObjectId, Result};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 /// Objects in one pixel.
@@ -109,6 +110,7 @@ impl TestDataset {
             split: Split::default(),
             obstructed: Obstructed::Keep,
             writers: all_writers(),
+            archives: None,
             inputs: Default::default(),
         }
     }
@@ -152,12 +154,12 @@ fn cut_off_file(path: &Path, length: impl Fn(usize) -> usize) -> Result<()> {
     std::fs::write(path, bytes).map_err(|e| Error::file(path, e))
 }
 
-fn all_writers() -> Vec<Box<dyn Writer>> {
+fn all_writers() -> Vec<Arc<dyn Writer>> {
     let config = LabelConfig {
         formats: vec![Format::Yolo, Format::Coco, Format::Voc],
         ..LabelConfig::default()
     };
-    let mut writers: Vec<Box<dyn Writer>> = vec![Box::new(Pictures::default()), Box::new(Sidecar)];
+    let mut writers: Vec<Arc<dyn Writer>> = vec![Arc::new(Pictures::default()), Arc::new(Sidecar)];
     writers.extend(config.writers(&Pictures::default()));
     writers
 }

@@ -1,0 +1,180 @@
+//! A dataset of archives alone: each holds a fixed span of numbers, and is there whole or not at all.
+//!
+//! The samples of an archive are made in a hidden folder, as a dataset of their own: a run that was
+//! broken off in the middle of an archive goes on there. What is finished is packed, moved to its
+//! place in one step, and the folder goes.
+
+use crate::dataset::journal::Journal;
+use crate::dataset::run::{Report, check_count};
+use crate::dataset::webdataset::{archive, write_archive};
+use crate::dataset::{
+    DatasetCounts, Inputs, Part, Plan, Progress, SampleRange, WebDataset, Written, folder, run,
+};
+use crate::error::{Error, Result};
+use crate::io;
+use std::path::{Path, PathBuf};
+
+/// Makes a dataset of files.
+type MakeFiles<'a> = &'a dyn Fn(&Plan, Report) -> Result<DatasetCounts>;
+
+/// Makes the archives of a plan that are not there; see [`generate`](crate::dataset::generate).
+/// `files` is called for each archive.
+pub(super) fn generate_archives(
+    plan: &Plan,
+    archives: WebDataset,
+    files: MakeFiles,
+    progress: Report,
+) -> Result<DatasetCounts> {
+    archives.check()?;
+    check_range(plan.range)?;
+    check_count(plan.count)?;
+    folder::share(plan)?;
+    plan.inputs.keep(&plan.folder);
+    io::create_folder(parent(&archive(&plan.folder, Part::Train, 0)))?;
+    let mut run = ArchiveRun::new(plan, archives);
+    progress(run.progress);
+    for number in run.missing() {
+        run.add(number, files, progress)?;
+    }
+    Ok(run.counts())
+}
+
+/// An archive cannot be made in part.
+fn check_range(range: SampleRange) -> Result<()> {
+    match range {
+        SampleRange::All | SampleRange::Shard(_) => Ok(()),
+        SampleRange::One(_) | SampleRange::Span(..) => Err(Error::value(
+            "only",
+            "a dataset of archives, expected all of its samples or a shard",
+        )),
+    }
+}
+
+fn parent(path: &Path) -> &Path {
+    path.parent().unwrap_or(path)
+}
+
+/// What one run has done so far.
+struct ArchiveRun<'a> {
+    plan: &'a Plan,
+    archives: WebDataset,
+    /// In archives that are whole.
+    progress: Progress,
+    /// Of what this run has made.
+    made: DatasetCounts,
+}
+
+impl<'a> ArchiveRun<'a> {
+    fn new(plan: &'a Plan, archives: WebDataset) -> Self {
+        let mut run = Self {
+            plan,
+            archives,
+            progress: Progress::default(),
+            made: DatasetCounts::new(&[], plan, plan.count, 0),
+        };
+        run.progress.count = run.numbers().map(|number| run.size(number)).sum();
+        run.progress.done = run
+            .numbers()
+            .filter(|&n| run.is_there(n))
+            .map(|n| run.size(n))
+            .sum();
+        run
+    }
+
+    /// The archives that this run is to make: all, or a machine's share.
+    fn numbers(&self) -> impl Iterator<Item = u64> + use<> {
+        let count = self.plan.count.div_ceil(self.archives.samples);
+        self.plan.range.below(count)
+    }
+
+    fn missing(&self) -> Vec<u64> {
+        self.numbers().filter(|&n| !self.is_there(n)).collect()
+    }
+
+    /// Samples of an archive.
+    fn size(&self, number: u64) -> u64 {
+        let (first, end) = self.archives.span(number, self.plan.count);
+        end - first
+    }
+
+    fn is_there(&self, number: u64) -> bool {
+        self.files(number).all(|(_, path)| path.exists())
+    }
+
+    /// The file of each part that has a sample in an archive.
+    fn files(&self, number: u64) -> impl Iterator<Item = (Part, PathBuf)> {
+        let (first, end) = self.archives.span(number, self.plan.count);
+        let (split, count) = (self.plan.split, self.plan.count);
+        let parts = Part::ALL.into_iter();
+        let parts = parts.filter(move |&part| (first..end).any(|k| split.part(k, count) == part));
+        parts.map(move |part| (part, archive(&self.plan.folder, part, number)))
+    }
+
+    /// Makes an archive, or goes on with it.
+    fn add(&mut self, number: u64, files: MakeFiles, progress: Report) -> Result<()> {
+        let plan = self.plan_of(number);
+        let before = self.progress;
+        let made = files(&plan, &|inner| progress(before.with(inner)));
+        let made = made.map_err(|error| self.told(error))?;
+        self.pack(number, &plan)?;
+        self.progress = before.with(Progress {
+            done: self.size(number),
+            count: 0,
+            made: made.made,
+        });
+        self.made += made;
+        Ok(())
+    }
+
+    /// The plan for the samples of one archive.
+    fn plan_of(&self, number: u64) -> Plan {
+        let (first, end) = self.archives.span(number, self.plan.count);
+        Plan {
+            folder: self.plan.folder.join(format!(".archive-{number:06}")),
+            range: SampleRange::Span(first, end),
+            archives: None,
+            inputs: Inputs::default(),
+            ..self.plan.clone()
+        }
+    }
+
+    /// An interruption as it concerns the whole dataset.
+    fn told(&self, error: Error) -> Error {
+        match error {
+            Error::Interrupted { .. } => Error::Interrupted {
+                what: self.progress.describe(&self.plan.folder),
+            },
+            other => other,
+        }
+    }
+
+    /// Packs the samples of an archive, in order of number, and takes their folder away.
+    fn pack(&self, number: u64, plan: &Plan) -> Result<()> {
+        let lines = Journal::open(&plan.folder)?.close(plan.count)?;
+        let samples: Vec<Written> = lines.iter().map(|line| line.written()).collect();
+        for (part, path) in self.files(number) {
+            let of_part: Vec<_> = samples.iter().filter(|s| s.part == part).collect();
+            let packed = plan.folder.join(part.name()).with_extension("tar");
+            write_archive(&packed, &plan.folder, &of_part)?;
+            io::sync(&plan.folder);
+            std::fs::rename(&packed, &path).map_err(|e| Error::file(&path, e))?;
+        }
+        std::fs::remove_dir_all(&plan.folder).map_err(|e| Error::file(&plan.folder, e))
+    }
+
+    /// What is there now; objects are counted in what this run has made.
+    fn counts(self) -> DatasetCounts {
+        let (split, count) = (self.plan.split, self.plan.count);
+        let is_val = |k: &u64| split.part(*k, count) == Part::Val;
+        let there = self.numbers().filter(|&n| self.is_there(n));
+        let spans = there.map(|n| self.archives.span(n, count));
+        DatasetCounts {
+            images: self.progress.done,
+            val: spans
+                .map(|(first, end)| (first..end).filter(is_val).count() as u64)
+                .sum(),
+            for_trainers: DatasetCounts::new(&[], self.plan, count, 0).for_trainers,
+            ..self.made
+        }
+    }
+}
