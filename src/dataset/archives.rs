@@ -8,7 +8,7 @@ use crate::dataset::journal::Journal;
 use crate::dataset::run::{Report, check_count};
 use crate::dataset::webdataset::{archive, write_archive};
 use crate::dataset::{
-    DatasetCounts, Inputs, Part, Plan, Progress, SampleRange, WebDataset, Written, folder, run,
+    DatasetCounts, Inputs, Part, Plan, Progress, SampleRange, WebDataset, Written, folder,
 };
 use crate::error::{Error, Result};
 use crate::io;

@@ -17,7 +17,9 @@ pub struct DatasetCounts {
     pub val: u64,
     /// Images made by this run; the others were there.
     pub made: u64,
-    /// Objects in the images, labelled or not.
+    /// Images whose objects are counted: all that are there, or, of archives, those of this run.
+    pub counted: u64,
+    /// Objects in these images, labelled or not.
     pub objects: u64,
     /// Objects that have a label.
     pub labelled: u64,
@@ -60,6 +62,7 @@ impl DatasetCounts {
             images: lines.len() as u64,
             val: sum_of(lines, |line| u32::from(line.part == Part::Val)),
             made,
+            counted: lines.len() as u64,
             objects: classes.iter().map(|c| c.objects).sum(),
             labelled: classes.iter().map(|c| c.labelled).sum(),
             obstructed: sum_of(lines, |line| line.obstructed),
@@ -78,6 +81,7 @@ impl AddAssign for DatasetCounts {
         self.images += more.images;
         self.val += more.val;
         self.made += more.made;
+        self.counted += more.counted;
         self.objects += more.objects;
         self.labelled += more.labelled;
         self.obstructed += more.obstructed;

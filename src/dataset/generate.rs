@@ -83,7 +83,7 @@ impl Plan {
 /// its own, since pictures beside each other keep processors busier than rows of one picture. Files
 /// of many samples are joined when all are there; those of a shard stay apart until it is
 /// [merged](crate::dataset::merge). With [`Plan::archives`] each archive is there whole or not at
-/// all, shards write theirs into one folder, and what counts objects counts those of this run.
+/// all, shards write theirs into one folder, and [`DatasetCounts::counted`] are those of this run.
 ///
 /// # Errors
 /// [`Error::Interrupted`] after a stop; the first error of `make` or of a writer, in order of `k`

@@ -7,6 +7,9 @@ use std::path::{Path, PathBuf};
 /// Prints what is in the folder: a result, so also where quiet is asked for.
 pub(crate) fn print_counts(counts: &DatasetCounts) {
     print::line(images_line(counts));
+    if counts.counted == 0 && counts.images > 0 {
+        return;
+    }
     print::line(objects_line(counts));
     for class in &counts.classes {
         print::line(class_line(class));
@@ -34,12 +37,21 @@ fn images_line(counts: &DatasetCounts) -> String {
 
 fn objects_line(counts: &DatasetCounts) -> String {
     format!(
-        "objects      {}, {} labelled, {} obstructed ({})",
+        "objects      {}{}, {} labelled, {} obstructed ({})",
         counts.objects,
+        counted_in(counts),
         counts.labelled,
         counts.obstructed,
         obstructed_labels(counts.policy)
     )
+}
+
+/// Which images the objects are in, where it is not all of them.
+fn counted_in(counts: &DatasetCounts) -> String {
+    match counts.counted {
+        all if all == counts.images => String::new(),
+        some => format!(" in {some} of the images"),
+    }
 }
 
 /// What became of the labels of obstructed objects.

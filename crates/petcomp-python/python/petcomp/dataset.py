@@ -40,7 +40,9 @@ class DatasetCounts:
     val: int
     #: Images made by this run; the others were there.
     made: int
-    #: Objects in the images, labelled or not.
+    #: Images whose objects are counted: all that are there, or, of archives, those of this run.
+    counted: int
+    #: Objects in these images, labelled or not.
     objects: int
     #: Objects that have a label.
     labelled: int
