@@ -179,10 +179,10 @@ wheel:
 	@test $$(stat -c %s target/wheel-out/*.whl) -le $$(($(MOST_WHEEL_MB) * 1000000))
 	@$(call pytest_of,target/wheel-out)
 
-# pycocotools and webdataset, for the tests that ask them; where they cannot be had the tests say so and pass.
+# pycocotools, webdataset and kubernetes-validate, for the tests that ask them; where they cannot be had the tests say so and pass.
 python:
 	@[ -x $(PYTHON) ] || { ($(call install,python3-venv)) && python3 -m venv target/python && \
-	  $(PYTHON) -m pip install --quiet --retries 1 pycocotools webdataset; } || \
+	  $(PYTHON) -m pip install --quiet --retries 1 pycocotools webdataset kubernetes-validate; } || \
 	  { rm -rf target/python; echo "pycocotools cannot be installed: its tests are skipped"; }
 
 packages:

@@ -92,6 +92,15 @@ def webdataset(folder):
     print("webdataset: 12 samples in order, their files unchanged")
 
 
+def kubernetes(folder):
+    import kubernetes_validate
+    import yaml
+
+    job = yaml.safe_load((folder / "kubernetes_job.yaml").read_text())
+    version = kubernetes_validate.validate(job, kubernetes_validate.latest_version(), strict=True)
+    print(f"kubernetes: the job is one of version {version}")
+
+
 if __name__ == "__main__":
     check, folder = sys.argv[1], pathlib.Path(sys.argv[2])
     {
@@ -100,4 +109,5 @@ if __name__ == "__main__":
         "segment": lambda: ultralytics(folder, True),
         "yolov5": lambda: yolov5(folder),
         "webdataset": lambda: webdataset(folder),
+        "kubernetes": lambda: kubernetes(folder),
     }[check]()

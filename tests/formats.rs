@@ -458,6 +458,12 @@ fn webdataset_reads_archives() {
 }
 
 #[test]
+fn kubernetes_takes_the_job_of_the_examples() {
+    let cluster = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/cluster");
+    python("kubernetes", "kubernetes_validate", &cluster);
+}
+
+#[test]
 fn layers_add_up_to_the_picture_and_ids_to_what_is_seen() {
     let dir = made("formats = [\"layers\"]\nlayers = { cards = true }");
     let ((w, h), channels) = read_channels(dir.path().join("layers/train/000003.exr")).unwrap();
