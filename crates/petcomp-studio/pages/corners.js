@@ -427,8 +427,8 @@ async function solveTogether() {
     for (const { photo, focal_px: focal } of solved) entryOf(photo).camera = focal !== null;
     showMarks();
     const shared = solved.filter((one) => one.together > 1).length;
-    await choice("Solved together",
-      table(solved), ["Close"]);
+    say("");
+    await choice("Solved together", table(solved), ["Close"]);
     say(shared ? `${shared} of ${solved.length} photos share a camera` : "no two photos share a camera: give them the same name of a camera", shared ? "good" : "");
   });
 }

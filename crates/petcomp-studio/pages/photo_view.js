@@ -6,7 +6,7 @@ const GRAB = 14;
 const SLACK = 4;
 /** The magnifier shows the brightest of what it shows so bright, by so much at most. */
 const BRIGHT = 225;
-const MAX_GAIN = 6;
+const MAX_GAIN = 3;
 const MAGNIFIER = { size: 176, zoom: 8, margin: 12 };
 
 /** The colours of what is drawn over photos: on any photo, in light and dark. */
