@@ -263,7 +263,8 @@ mod tests {
         };
         review(Review::new((120, 80), vec![right.clone()]));
         for _ in 0..2 {
-            assert!((length_px(&built().unwrap()) - 40.0).abs() <= 2.0);
+            let length = length_px(&built().unwrap());
+            assert!((length - 40.0).abs() <= 2.0, "{length}");
         }
         review(Review::new((600, 400), vec![right]));
         let said = built().unwrap_err().to_string();

@@ -44,8 +44,8 @@ pub use chroma_key::{ChromaKeyOptions, chroma_key};
 #[doc(hidden)]
 pub use color_spill::{ColorSpillOptions, SpillChannel, SpillLimit, color_spill};
 #[doc(hidden)]
-pub use cut_out::{Boundary, cut_out_corrected, cut_out_on};
-pub use cut_out::{CutOut, CutOutOptions, MatteMethod, cut_out};
+pub use cut_out::{Boundary, cut_out_on};
+pub use cut_out::{CutOut, CutOutOptions, MatteMethod, cut_out, cut_out_corrected};
 #[doc(hidden)]
 pub use difference_key::{DifferenceKeyOptions, difference_key};
 #[doc(hidden)]

@@ -107,11 +107,28 @@ impl Search {
         self.pass(levels, &finest_binary, options)
     }
 
-    /// Where both bands have an edge, thinned, without groups of fewer pixels than a speck; and
-    /// what is said to be the object, but not what is said not to be.
+    /// Where both bands have an edge, thinned, without groups of fewer pixels than a speck.
     fn thin_edges(&self, finest: &Mask, coarsest: &Mask, speck: usize) -> Mask {
         let thin = both(&both(finest, coarsest), &self.ridges);
-        self.corrected(cluster::without_specks(&thin, speck))
+        cluster::without_specks(&thin, speck)
+    }
+
+    /// What the object's edges enclose, as a person corrected it; `found` are all edges before.
+    ///
+    /// A person who cuts through an object takes away edges without which the rest encloses nothing:
+    /// then it is what all of it encloses, cut.
+    fn inside(&self, object: &Mask, found: &Mask, join_px: f64) -> Mask {
+        let inside = self.corrected(enclosed_area(object, join_px));
+        if self.claims.is_none() {
+            return inside;
+        }
+        let whole = clusters_with(found, object, join_px);
+        let cut = self.corrected(enclosed_area(&whole, join_px));
+        if cut.count() as f64 > LEAK_AREA_RATIO * inside.count() as f64 {
+            cut
+        } else {
+            inside
+        }
     }
 
     /// A set of the object's pixels, as a person corrected it.
@@ -122,13 +139,14 @@ impl Search {
     fn pass(&self, levels: usize, finest_binary: &Mask, options: &SegmentOptions) -> Result<Pass> {
         let coarsest = self.bands.at_full_size(levels);
         let coarsest_binary = options.coarsest_threshold.binarised(&coarsest);
-        let edges = self.thin_edges(finest_binary, &coarsest_binary, options.speck);
+        let found = self.thin_edges(finest_binary, &coarsest_binary, options.speck);
+        let edges = self.corrected(found.clone());
         let join_px = (options.join * longer_side(&edges) as f64).max(MIN_JOIN_PX);
         let (object, diagnostics) = main_object(&edges, self.claims.as_ref(), join_px)?;
         let hull = hull::convex_hull(&object);
         let touches = reached_borders(&object);
         check_object(&hull, touches, edges.size())?;
-        let inside = self.corrected(enclosed_area(&object, join_px));
+        let inside = self.inside(&object, &found, join_px);
         Ok(Pass {
             coarsest,
             coarsest_binary,
@@ -140,6 +158,14 @@ impl Search {
             diagnostics,
         })
     }
+}
+
+/// Edges and the clusters of others that they are part of.
+fn clusters_with(others: &Mask, edges: &Mask, join_px: f64) -> Mask {
+    let all = edges.zip_map(others, |a, b| a || b);
+    let groups = PixelGroups::new(&filter::dilate(&all, join_px / 2.0));
+    let sizes = groups.sizes(edges);
+    both(&groups.only(|i| sizes[i] > 0), &all)
 }
 
 /// What two sets have in common.
