@@ -1,6 +1,7 @@
 // Mattes: each photo of a list with its cut-out, strokes that correct it, and a verdict.
-import { api, at, element, frame, picture, query, say, shortcuts, trying } from "./studio.js";
 import { INKS, Stage } from "./mattes_stage.js";
+import { photoList } from "./photo_list.js";
+import { api, at, element, frame, picture, query, say, shortcuts, trying } from "./studio.js";
 
 const LAYERS = [
   ["checker", "Checker", "1"],
@@ -31,11 +32,14 @@ const TOOLS = [
 ];
 
 const VERDICTS = { accepted: ["accepted", "good"], rejected: ["rejected", "bad"] };
+const EMPTY = "There is no list of photos in this folder. Write photos.csv with the columns file, asset, class and length, and a line for each photo.";
 /** The finest brush and the coarsest, shares of the photo's longer side. */
 const BRUSHES = [0.002, 0.12];
 
 const stage = new Stage(at("canvas"), paint);
-const state = { photos: [], plates: [], current: null, layer: "checker", review: null, undone: [], solved: null, shown: null, saving: Promise.resolve() };
+const list = photoList(at("photos"), open, mark);
+/** `entry` is the photo that is shown, `shown` the layer that was asked for last, `unsaved` why it is not kept. */
+const state = { entry: null, plates: [], layer: "checker", review: null, undone: [], solved: null, shown: null, saving: Promise.resolve(), unsaved: null };
 
 frame("mattes");
 
@@ -43,51 +47,21 @@ frame("mattes");
 
 const base = (path) => path.split("/").at(-1);
 
-function listItem(photo, i) {
-  return element("li", {},
-    element("button", { onclick: () => open(i), title: `${photo.photo}: ${photo.asset}` },
-      element("img", { src: query("api/photo", { file: photo.photo, side: 112 }), alt: "", loading: "lazy" }),
-      element("span", { class: "name" }, base(photo.photo)),
-      markOf(photo)));
+function mark({ verdict, strokes }) {
+  return VERDICTS[verdict] ?? [strokes ? `${strokes} ${strokes === 1 ? "stroke" : "strokes"}` : "", ""];
 }
 
-function markOf({ verdict, strokes }) {
-  const [word, kind] = VERDICTS[verdict] ?? [strokes ? `${strokes} strokes` : "", ""];
-  return element("span", { class: `mark ${kind}` }, word);
-}
-
-function showList() {
-  const items = [];
-  let list = null;
-  state.photos.forEach((photo, i) => {
-    if (photo.list !== list) items.push(element("li", { class: "folder" }, photo.list));
-    list = photo.list;
-    items.push(listItem(photo, i));
-  });
-  at("photos").replaceChildren(...items);
-}
-
-/** Marks the photo that is shown, and what was said of it. */
-function showCurrent() {
-  const buttons = [...document.querySelectorAll("#photos button")];
-  buttons.forEach((button, i) => button.toggleAttribute("aria-current", i === state.current));
-  const button = buttons[state.current];
-  const photo = state.photos[state.current];
-  button?.lastChild.replaceWith(markOf({ verdict: state.review?.verdict ?? photo.verdict, strokes: (state.review?.strokes ?? []).length }));
-  button?.scrollIntoView({ block: "nearest", inline: "nearest" });
-}
-
-async function open(i) {
-  if (!state.photos[i]) return;
-  Object.assign(state, { current: i, review: null, solved: null, undone: [], shown: null });
+async function open(photo) {
+  const entry = list.entryOf(photo);
+  Object.assign(state, { entry, review: null, solved: null, undone: [], shown: null, unsaved: null });
   Object.assign(stage, { size: null, strokes: [] });
   stage.draw();
-  showCurrent();
+  list.choose(photo);
   showReview();
   await trying(async () => {
     await state.saving;
-    const review = await api(query("api/mattes/review", { photo: state.photos[i].photo }));
-    if (state.current !== i) return;
+    const review = await api(query("api/mattes/review", { photo }));
+    if (state.entry !== entry) return;
     state.review = review;
     stage.strokes = review.strokes;
     showReview();
@@ -95,22 +69,14 @@ async function open(i) {
   });
 }
 
-const step = (by) => open(Math.min(Math.max((state.current ?? 0) + by, 0), state.photos.length - 1));
-
-/** After a verdict: the next photo that has none. */
-function next() {
-  const rest = state.photos.findIndex((photo, i) => i > state.current && !photo.verdict);
-  if (rest >= 0) open(rest);
-}
-
 // Cutting out, and what is seen of it.
 
 async function solve() {
-  const { list, photo } = state.photos[state.current];
+  const { list: name, photo } = state.entry;
   const { strokes } = state.review;
   at("stage").classList.add("busy");
-  say(`cutting out ${base(photo)} …`);
-  const solved = await api("api/mattes/solve", { list, photo, strokes });
+  say(`cutting out ${base(photo)} ...`);
+  const solved = await api("api/mattes/solve", { list: name, photo, strokes });
   if (state.review?.strokes !== strokes) return;
   state.solved = solved;
   if (!stage.size) stage.open(solved.size);
@@ -118,8 +84,8 @@ async function solve() {
   showSolved();
   await showLayers();
   at("stage").classList.remove("busy");
-  if (solved.refused) say(solved.refused, "bad");
-  else say(`${base(photo)}: cut out in ${(1000 * solved.seconds).toFixed(0)} ms`, "good");
+  const trouble = state.unsaved ?? solved.refused;
+  say(trouble ?? `${base(photo)}: cut out in ${(1000 * solved.seconds).toFixed(0)} ms`, trouble ? "bad" : "good");
 }
 
 async function loaded(path) {
@@ -173,6 +139,7 @@ function setTool(tool) {
   stage.tool = tool;
   for (const button of at("tools").children) button.setAttribute("aria-pressed", button.dataset.tool === (tool ?? ""));
   at("canvas").classList.toggle("brushes", tool !== null);
+  at("radius").disabled = tool === null;
   stage.draw();
 }
 
@@ -227,18 +194,26 @@ function setVerdict(verdict) {
   state.review.verdict = state.review.verdict === verdict ? null : verdict;
   showReview();
   keep();
-  if (state.review.verdict) next();
+  if (state.review.verdict) list.next(({ verdict }) => !verdict);
 }
 
 /** Saves the review of the photo, after what is being saved already. */
 function keep() {
-  const [photo, review, { size }] = [state.photos[state.current], state.review, state.solved];
-  Object.assign(photo, { verdict: review.verdict, strokes: review.strokes.length });
+  const { entry, review, solved: { size } } = state;
+  Object.assign(entry, { verdict: review.verdict, strokes: review.strokes.length });
+  list.showMarks();
+  const { strokes, verdict } = review;
   state.saving = state.saving.then(() => trying(async () => {
-    const { strokes, verdict, version } = review;
-    const saved = await api("api/mattes/review", { photo: photo.photo, size, strokes, verdict, version });
-    review.version = saved.version;
-    at("canvas").dataset.saved = `${saved.file} ${saved.version}`;
+    try {
+      const saved = await api("api/mattes/review", { photo: entry.photo, size, strokes, verdict, version: review.version });
+      Object.assign(review, { version: saved.version });
+      state.unsaved = null;
+      at("canvas").dataset.saved = `${saved.file} ${saved.version}`;
+      say(`saved ${saved.file}`, "good");
+    } catch (error) {
+      state.unsaved = error.message;
+      throw error;
+    }
   }));
 }
 
@@ -250,7 +225,6 @@ function showReview() {
     at(id).disabled = !state.review;
     at(id).setAttribute("aria-pressed", verdict === said);
   }
-  showCurrent();
 }
 
 // The page.
@@ -301,20 +275,17 @@ shortcuts([
   ["0", "all of it", () => stage.fit()],
   ["a", "accept, and to the next one", () => setVerdict("accepted")],
   ["x", "reject, and to the next one", () => setVerdict("rejected")],
-  ["ArrowDown", "next photo", () => step(1)],
-  ["ArrowUp", "photo before", () => step(-1)],
+  ["ArrowDown", "next photo", () => list.step(1)],
+  ["ArrowUp", "photo before", () => list.step(-1)],
 ]);
 
+setTool(null);
+setLayer("checker");
 await trying(async () => {
   const { photos, problems, plates } = await api("api/mattes/photos");
-  Object.assign(state, { photos, plates });
+  state.plates = plates;
   at("plate").replaceChildren(...plates.map((plate) => element("option", { value: plate }, plate)));
-  showList();
-  setTool(null);
-  setLayer("checker");
-  const asked = new URLSearchParams(location.search).get("photo");
-  if (photos.length) return open(Math.max(photos.findIndex(({ photo }) => photo === asked), 0));
-  at("empty").hidden = false;
-  at("empty").textContent = problems.length ? problems.join("\n")
-    : "There is no list of photos in this folder. Write photos.csv with the columns file, asset, class and length, a line for each photo.";
-}).then(() => undefined);
+  at("empty").hidden = photos.length > 0;
+  at("empty").textContent = problems.join("\n") || EMPTY;
+  if (photos.length) await list.fill(photos, ({ verdict }) => !verdict);
+});

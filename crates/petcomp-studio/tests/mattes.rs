@@ -70,7 +70,7 @@ fn a_matte_is_corrected_by_strokes_that_a_build_keeps_to() {
     let folder = folder();
     let studio = Studio::over(folder.path());
     showing(&mut browser, |browser| browser.go(&studio.page("mattes")));
-    assert_eq!(browser.text("#photos button .name"), "a <b>one</b>.png");
+    assert!(browser.text("#photos button .name").starts_with("a <b>one</b>.png"));
     assert_eq!(browser.text("#flags li"), "nothing");
     assert_eq!(review(folder.path()), None);
 
