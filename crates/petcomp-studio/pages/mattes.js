@@ -39,7 +39,7 @@ const BRUSHES = [0.002, 0.12];
 const stage = new Stage(at("canvas"), paint);
 const list = photoList(at("photos"), open, mark);
 /** `entry` is the photo that is shown, `shown` the layer that was asked for last, `unsaved` why it is not kept. */
-const state = { entry: null, plates: [], layer: "checker", review: null, undone: [], solved: null, shown: null, saving: Promise.resolve(), unsaved: null };
+const state = { entry: null, layer: "checker", review: null, undone: [], solved: null, shown: null, saving: Promise.resolve(), unsaved: null };
 
 frame("mattes");
 
@@ -115,7 +115,6 @@ async function showLayers() {
 function setLayer(layer) {
   state.layer = layer;
   for (const button of at("layers").children) button.setAttribute("aria-pressed", button.dataset.layer === layer);
-  at("plate").hidden = layer !== "plate" || !state.plates.length;
   say(LAYERS_IN_WORDS[layer]);
   trying(showLayers);
 }
@@ -252,7 +251,7 @@ at("accept").addEventListener("click", () => setVerdict("accepted"));
 at("reject").addEventListener("click", () => setVerdict("rejected"));
 at("wipe").addEventListener("input", () => setWipe(at("wipe").value));
 at("radius").addEventListener("input", setRadius);
-at("plate").addEventListener("change", () => trying(showLayers));
+at("plate").addEventListener("change", () => setLayer("plate"));
 
 function showStrokes() {
   stage.showsStrokes = !stage.showsStrokes;
@@ -283,8 +282,9 @@ setTool(null);
 setLayer("checker");
 await trying(async () => {
   const { photos, problems, plates } = await api("api/mattes/photos");
-  state.plates = plates;
-  at("plate").replaceChildren(...plates.map((plate) => element("option", { value: plate }, plate)));
+  const options = plates.map((plate) => element("option", { value: plate }, plate));
+  at("plate").replaceChildren(...(options.length ? options : [element("option", { value: "" }, "no labelled photo of a place")]));
+  at("plate").disabled = !plates.length;
   at("empty").hidden = photos.length > 0;
   at("empty").textContent = problems.join("\n") || EMPTY;
   if (photos.length) await list.fill(photos, ({ verdict }) => !verdict);
