@@ -4,7 +4,8 @@
 export const INKS = { object: "#37c871", not_object: "#ff5a4f", see_through: "#4db5ff", opaque: "#ffc233" };
 
 const MAX_ZOOM = 16;
-const INK_ALPHA = 0.5;
+/** How strongly a stroke is drawn while it is painted, and when it has done its work. */
+const INK_ALPHA = { fresh: 0.55, kept: 0.22 };
 
 export class Stage {
   /** `painted(stroke)` is called with what was painted with the tool that is set. */
@@ -147,8 +148,8 @@ export class Stage {
     context.setTransform(ratio * scale, 0, 0, ratio * scale, ratio * x, ratio * y);
     context.imageSmoothingEnabled = scale < 3;
     this.#drawImages(context);
-    if (this.showsStrokes) for (const stroke of this.strokes) drawStroke(context, stroke);
-    if (this.current) drawStroke(context, this.current);
+    if (this.showsStrokes) for (const stroke of this.strokes) drawStroke(context, stroke, INK_ALPHA.kept);
+    if (this.current) drawStroke(context, this.current, INK_ALPHA.fresh);
     this.#drawLine(context, scale);
     this.#drawBrush(context, scale);
   }
@@ -185,10 +186,10 @@ export class Stage {
   }
 }
 
-function drawStroke(context, { says, radius_px, points_px }) {
+function drawStroke(context, { says, radius_px, points_px }, alpha) {
   const [first, ...rest] = points_px;
   context.save();
-  context.globalAlpha = INK_ALPHA;
+  context.globalAlpha = alpha;
   context.lineCap = "round";
   context.lineJoin = "round";
   context.lineWidth = 2 * radius_px;

@@ -41,6 +41,14 @@ fn on_page(browser: &mut Browser, points: &[[f64; 2]]) -> Vec<[f64; 2]> {
     placed.collect()
 }
 
+/// Moves the slider of the brush, 0 to 100.
+fn set_brush(browser: &mut Browser, value: &str) {
+    let radius = "document.querySelector('#radius')";
+    browser.eval(&format!(
+        "{radius}.value = {value}; {radius}.dispatchEvent(new Event('input'))"
+    ));
+}
+
 /// Does something that changes what is shown, and waits until it is shown.
 fn showing(browser: &mut Browser, act: impl FnOnce(&mut Browser)) {
     let shown = "document.querySelector('#canvas')?.dataset.shown";
@@ -93,10 +101,7 @@ fn a_matte_is_corrected_by_strokes_that_a_build_keeps_to() {
     ];
     let third = on_page(&mut browser, &third);
     browser.press("n", 0);
-    let radius = "document.querySelector('#radius')";
-    browser.eval(&format!(
-        "{radius}.value = 88; {radius}.dispatchEvent(new Event('input'))"
-    ));
+    set_brush(&mut browser, "88");
     showing(&mut browser, |browser| {
         saved(browser, |browser| browser.drag(&third));
     });
@@ -148,6 +153,17 @@ fn what_another_tab_has_saved_is_not_overwritten() {
     assert_eq!(review(folder.path()), Some(other));
 }
 
+/// What a person paints on the label and on the cap of the first bottle.
+const LABEL: &[[f64; 2]] = &[
+    [238.0, 100.0],
+    [252.0, 202.0],
+    [284.0, 92.0],
+    [304.0, 192.0],
+    [330.0, 84.0],
+    [348.0, 184.0],
+];
+const CAP: &[[f64; 2]] = &[[530.0, 82.0], [532.0, 112.0], [546.0, 80.0], [546.0, 108.0]];
+
 #[test]
 fn bottles_are_seen_in_every_way() {
     let Some(mut browser) = Browser::open(1280, 800) else {
@@ -166,15 +182,16 @@ fn bottles_are_seen_in_every_way() {
         browser.screenshot(&format!("studio_mattes_{key}"));
     }
     showing(&mut browser, |browser| browser.press("1", 0));
-    for _ in 0..9 {
+    for _ in 0..7 {
         browser.press("ArrowRight", 0);
     }
-    browser.press("t", 0);
-    let stroke = on_page(
-        &mut browser,
-        &[[330.0, 90.0], [360.0, 120.0], [400.0, 130.0]],
-    );
-    showing(&mut browser, |browser| browser.drag(&stroke));
+    // Label and cap have the colours of bottle and screen.
+    browser.press("p", 0);
+    for (brush, line) in [("74", LABEL), ("50", CAP)] {
+        set_brush(&mut browser, brush);
+        let line = on_page(&mut browser, line);
+        showing(&mut browser, |browser| browser.drag(&line));
+    }
     browser.wait("!document.querySelector('.busy')");
     browser.screenshot("studio_mattes");
     browser.prefer_dark(true);
