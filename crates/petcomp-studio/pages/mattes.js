@@ -76,14 +76,13 @@ async function solve() {
   const { strokes } = state.review;
   at("stage").classList.add("busy");
   say(`cutting out ${base(photo)} ...`);
-  const solved = await api("api/mattes/solve", { list: name, photo, strokes });
+  const solved = await api("api/mattes/solve", { list: name, photo, strokes }).finally(() => at("stage").classList.remove("busy"));
   if (state.review?.strokes !== strokes) return;
   state.solved = solved;
   if (!stage.size) stage.open(solved.size);
   setRadius();
   showSolved();
   await showLayers();
-  at("stage").classList.remove("busy");
   const trouble = state.unsaved ?? solved.refused;
   say(trouble ?? `${base(photo)}: cut out in ${(1000 * solved.seconds).toFixed(0)} ms`, trouble ? "bad" : "good");
 }

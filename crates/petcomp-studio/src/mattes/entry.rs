@@ -1,5 +1,6 @@
 //! The photos that can be cut out: the entries of the folder's lists.
 
+use super::review::review_of;
 use crate::folder::Folder;
 use crate::refusal::{Answer, Refusal};
 use crate::studio::Studio;
@@ -7,7 +8,7 @@ use crate::turn::blocking;
 use axum::Json;
 use axum::extract::State;
 use axum::http::StatusCode;
-use petcomp::asset::{List, PhotoEntry, Review, ScreenSource, Verdict};
+use petcomp::asset::{List, PhotoEntry, ScreenSource, Verdict};
 use petcomp::matte::CutOutOptions;
 use serde::{Deserialize, Serialize};
 use std::path::{Component, Path, PathBuf};
@@ -121,11 +122,11 @@ fn is_list(path: &Path) -> bool {
 fn listed(folder: &Folder, list: &str, read: &List) -> Vec<ListedPhoto> {
     let entries = read.photos.iter();
     let listed = entries.map(|entry| {
-        let review = Review::of_photo(&entry.file).ok().flatten();
-        let review = review.unwrap_or_default();
+        let photo = photo_name(folder, entry);
+        let review = review_of(folder, &photo).unwrap_or_default();
         ListedPhoto {
             list: list.into(),
-            photo: photo_name(folder, entry),
+            photo,
             asset: entry.asset.clone(),
             class: entry.class.clone(),
             verdict: review.verdict,
