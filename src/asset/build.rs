@@ -142,12 +142,13 @@ fn record_to_review(photo: &Photo) -> Option<PhotoRecord> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{MANIFEST, PhotoRecord, contact_sheet};
+    use super::super::{MANIFEST, PhotoRecord, Review, Verdict, contact_sheet};
     use super::*;
     use crate::diagnostic::Code;
     use crate::geom::Point2;
     use crate::image::Image;
     use crate::io;
+    use crate::matte::{Claim, Stroke};
     use crate::pixel::LinearRgb;
 
     /// A red slab of 60 x 30 pixels on a green screen.
@@ -240,6 +241,47 @@ mod tests {
             std::fs::read(folder.path().join("out").join(MANIFEST)).unwrap()
         };
         assert_eq!(manifest(), manifest());
+    }
+
+    #[test]
+    fn what_a_person_said_of_a_photo_holds_whenever_it_is_built() {
+        let folder = folder_with(TWO);
+        let (list, out) = (folder.path().join("photos.toml"), folder.path().join("out"));
+        let built = || build(&list, &out, &|_, _| ());
+        let review = |review: Review| {
+            std::fs::write(folder.path().join("one.review.json"), review.to_json()).unwrap();
+        };
+        let length_px = |built: &Built| {
+            let photo = &built.library.assets[0].photos[0];
+            photo.record.object_m[0] * photo.record.px_per_metre
+        };
+        // The right third of the slab is none of the object.
+        let right = Stroke {
+            says: Claim::NotObject,
+            radius_px: 10.0,
+            points_px: vec![[80.0, 20.0], [80.0, 60.0], [88.0, 60.0], [88.0, 20.0]],
+        };
+        review(Review::new((120, 80), vec![right.clone()]));
+        for _ in 0..2 {
+            let length = length_px(&built().unwrap());
+            assert!((length - 40.0).abs() <= 2.0, "{length}");
+        }
+        review(Review::new((600, 400), vec![right]));
+        let said = built().unwrap_err().to_string();
+        assert!(
+            said.contains(
+                "one.review.json: photos[0].size_px: 600 x 400, expected the photo's 120 x 80"
+            ),
+            "{said}"
+        );
+        review(Review {
+            verdict: Some(Verdict::Rejected),
+            ..Review::new((120, 80), Vec::new())
+        });
+        let [refused] = &built().unwrap().refused[..] else {
+            panic!("one photo is refused")
+        };
+        assert!(refused.contains("one.png: rejected in"), "{refused}");
     }
 
     #[test]

@@ -6,17 +6,17 @@ use super::files;
 use super::library::{Photo, check_pixels};
 use super::manifest::{Manifest, PhotoRecord};
 use super::measure::MeasuredSize;
+use super::open_photo::OpenPhoto;
 use super::rectified::RectifiedPhoto;
-use super::scale::Scale;
+use super::review::{Review, Verdict};
 use super::screen_source::EmptyScreens;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::io;
-use crate::matte::{ColorUncertainty, CutOut, CutOutOptions, cut_out_on};
-use crate::pixel::{Film, LinearRgb};
+use crate::matte::{ColorUncertainty, CutOut, CutOutOptions};
+use crate::pixel::Film;
 use crate::stopwatch::Stopwatch;
-use std::borrow::Cow;
 use std::path::Path;
 
 /// Cuts the object out of a photo and adds it to an asset folder, which is made if it is not there.
@@ -71,29 +71,19 @@ impl CutOutWriter<'_> {
     /// back.
     pub(super) fn write(&self, entry: &PhotoEntry) -> Result<Photo> {
         let mut watch = Stopwatch::start();
-        let photo = read_rectified(entry).map_err(|e| with_name(e, &entry.file))?;
-        let empty = self.empty_screen(entry, &photo)?;
+        let review = review_of(&entry.file)?;
+        let photo = OpenPhoto::beside(entry, &self.empty_screens, self.options)?;
+        check_reviewed_size(&review, entry, &photo)?;
         watch.lap("read");
-        let cut = self.cut_out(entry, &photo.photo, empty.as_deref())?;
+        let cut = photo.cut_out(&review.strokes)?;
+        log_diagnostics(&cut, &entry.file);
         watch.lap("cut out");
-        let record = new_record(&cut, entry, &photo)?;
+        let record = new_record(&cut, entry, &photo.rectified)?.reviewed(review.verdict);
         watch.lap("measure");
         let film = self.write_files(&cut, &record)?;
         watch.lap("write");
         watch.log(entry.file.display());
         Ok(Photo::new(film, record))
-    }
-
-    fn cut_out(
-        &self,
-        entry: &PhotoEntry,
-        photo: &Image<LinearRgb>,
-        empty: Option<&Image<LinearRgb>>,
-    ) -> Result<CutOut> {
-        let cut = cut_out_on(photo, empty, &self.options_for(entry));
-        let cut = cut.map_err(|e| with_name(e, &entry.file))?;
-        log_diagnostics(&cut, &entry.file);
-        Ok(cut)
     }
 
     fn write_files(&self, cut: &CutOut, record: &PhotoRecord) -> Result<Image<Film>> {
@@ -103,49 +93,29 @@ impl CutOutWriter<'_> {
         check_pixels(&film).map_err(|what| Error::file(path, what))?;
         Ok(film)
     }
-
-    /// The empty screen as the photo shows it, where there is a photo of it.
-    fn empty_screen(
-        &self,
-        entry: &PhotoEntry,
-        photo: &RectifiedPhoto,
-    ) -> Result<Option<Cow<'_, Image<LinearRgb>>>> {
-        let empty = self.empty_screens.get(&entry.screen)?;
-        empty.map(|empty| photo.same_view(empty)).transpose()
-    }
-
-    fn options_for(&self, entry: &PhotoEntry) -> CutOutOptions {
-        CutOutOptions {
-            screen: entry.screen.color().or(self.options.screen),
-            ..self.options.clone()
-        }
-    }
 }
 
-/// The photo, seen from straight above where something in it shows the screen's plane.
-fn read_rectified(entry: &PhotoEntry) -> Result<RectifiedPhoto> {
-    let (scale, file) = (entry.scale()?, &entry.file);
-    let (photo, height) = (io::read(file)?, entry.thickness / 2.0);
-    match scale {
-        Scale::PxPerMetre(_) | Scale::Length(_) | Scale::Size(_) => {
-            Ok(RectifiedPhoto::unchanged(photo))
-        }
-        Scale::Screen(size, corners) => {
-            RectifiedPhoto::by_corners(photo, size, corners, height, &io::read_header(file)?)
-        }
-        Scale::Marker(side) => {
-            RectifiedPhoto::by_marker(photo, side, height, &io::read_header(file)?)
-        }
+/// What a person said of the cut-out of a photo, or a review that says nothing.
+///
+/// # Errors
+/// Those of [`Review::of_photo`]; [`Error::Photo`] where it was rejected.
+fn review_of(photo: &Path) -> Result<Review> {
+    let review = Review::of_photo(photo)?.unwrap_or_default();
+    if review.verdict != Some(Verdict::Rejected) {
+        return Ok(review);
     }
+    let path = Review::path_of(photo);
+    let what = format!("{}: rejected in {}", photo.display(), path.display());
+    Err(Error::Photo { what })
 }
 
-fn with_name(error: Error, photo: &Path) -> Error {
-    match error {
-        Error::Photo { what } => Error::Photo {
-            what: format!("{}: {what}", photo.display()),
-        },
-        other => other,
+/// Fails where strokes were painted on a picture of another size.
+fn check_reviewed_size(review: &Review, entry: &PhotoEntry, photo: &OpenPhoto<'_>) -> Result<()> {
+    if review.strokes.is_empty() {
+        return Ok(());
     }
+    let checked = review.check_size(photo.picture().size());
+    checked.map_err(|e| e.in_file(Review::path_of(&entry.file)))
 }
 
 fn log_diagnostics(cut: &CutOut, photo: &Path) {

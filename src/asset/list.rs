@@ -98,7 +98,8 @@ impl List {
     }
 
     /// The same with the paths of a list in `folder` relative to the working folder.
-    pub(super) fn located_in(mut self, folder: &Path) -> Self {
+    #[doc(hidden)]
+    pub fn located_in(mut self, folder: &Path) -> Self {
         for photo in &mut self.photos {
             photo.file = with_actual_spelling(folder.join(&photo.file));
             photo.screen.locate_in(folder);

@@ -1,6 +1,7 @@
 //! The manifest of an asset folder: what is in it, as TOML.
 
 use super::MANIFEST;
+use super::review::Verdict;
 use super::role::Role;
 use crate::bounds::{Bounds, MASS, OBJECT, PX_PER_METRE, THICKNESS, WIDTH};
 use crate::diagnostic::{Code, Diagnostic};
@@ -367,6 +368,18 @@ impl PhotoRecord {
             truncated: false,
             outline_px,
             diagnostics: Vec::new(),
+        }
+    }
+
+    /// The same after a person's verdict: what was accepted is in question no more.
+    pub(super) fn reviewed(self, verdict: Option<Verdict>) -> Self {
+        match verdict {
+            Some(Verdict::Accepted) => Self {
+                outline_confidence: full_confidence(),
+                diagnostics: Vec::new(),
+                ..self
+            },
+            _ => self,
         }
     }
 

@@ -21,8 +21,10 @@ mod list;
 mod manifest;
 mod measure;
 mod moments;
+mod open_photo;
 mod panorama;
 mod rectified;
+mod review;
 mod role;
 mod scale;
 mod screen_pose;
@@ -52,7 +54,10 @@ pub use manifest::Asset;
 pub use manifest::{Manifest, PhotoRecord};
 #[doc(hidden)]
 pub use moments::{Moments, Piece};
+#[doc(hidden)]
+pub use open_photo::OpenPhoto;
 pub use panorama::Panorama;
+pub use review::{Review, Verdict};
 #[doc(hidden)]
 pub use role::Role;
 pub use scale::Scale;

@@ -11,6 +11,7 @@ use super::plate::{PlateOptions, ScreenPlate};
 use super::prepared::Prepared;
 use super::screen::{screen_color, screen_pixels};
 use super::segment::{Segmentation, segment_prepared};
+use super::stroke::{Claims, Stroke, StrokesOnPhoto, check_strokes, corrected_coverage, unclaimed};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::Result;
 use crate::filter;
@@ -84,14 +85,40 @@ pub fn cut_out_on(
     empty: Option<&Image<LinearRgb>>,
     options: &CutOutOptions,
 ) -> Result<CutOut> {
+    cut_out_corrected(photo, empty, &[], options)
+}
+
+/// As [`cut_out_on`], corrected by what a person painted on the photo.
+///
+/// # Errors
+/// Those of [`cut_out_on`]; [`Error::Value`](crate::Error::Value) (`strokes[2].radius_px`) for a
+/// stroke that cannot be right.
+pub fn cut_out_corrected(
+    photo: &Image<LinearRgb>,
+    empty: Option<&Image<LinearRgb>>,
+    strokes: &[Stroke],
+    options: &CutOutOptions,
+) -> Result<CutOut> {
     options.check()?;
+    check_strokes(strokes)?;
     let mut watch = Stopwatch::start();
     let prepared = Prepared::new(photo, options.segment.working_size)?;
-    let segmentation = segment_prepared(&prepared, &options.segment)?;
+    let strokes = StrokesOnPhoto::new(strokes, photo);
+    let claims = PhotoClaims::new(strokes);
+    let segmentation = segment_prepared(&prepared, strokes, &options.segment)?;
     watch.lap("segment");
-    let screen = CleanScreen::new(photo, empty, &segmentation, options)?;
+    let screen = CleanScreen::new(photo, empty, &segmentation, &claims, options)?;
     watch.lap("plate");
-    let cut = cut_segmented(&prepared, segmentation, &screen, options, &mut watch)?;
+    let region = ObjectRegion::new(&prepared, &segmentation, &claims, options);
+    watch.lap("cut");
+    let cut = cut_segmented(
+        &prepared,
+        segmentation,
+        &screen,
+        &region,
+        options,
+        &mut watch,
+    )?;
     watch.log("cut out");
     Ok(cut)
 }
@@ -101,12 +128,11 @@ fn cut_segmented(
     prepared: &Prepared<'_>,
     segmentation: Segmentation,
     screen: &CleanScreen,
+    region: &ObjectRegion,
     options: &CutOutOptions,
     watch: &mut Stopwatch,
 ) -> Result<CutOut> {
-    let region = ObjectRegion::new(prepared, &segmentation, options);
-    watch.lap("cut");
-    let matted = Matted::new(prepared, screen, &region, options)?;
+    let matted = Matted::new(prepared, screen, region, options)?;
     watch.lap("matte");
     let cut = CutOut {
         diagnostics: diagnostics(prepared.photo, &segmentation, &matted, options),
@@ -116,6 +142,21 @@ fn cut_segmented(
     };
     watch.lap("trim");
     Ok(cut)
+}
+
+/// What a person says of the pixels of a photo.
+struct PhotoClaims {
+    outline: Option<Claims>,
+    transmittance: Option<Claims>,
+}
+
+impl PhotoClaims {
+    fn new(strokes: StrokesOnPhoto<'_>) -> Self {
+        Self {
+            outline: strokes.about_outline(strokes.photo),
+            transmittance: strokes.about_transmittance(),
+        }
+    }
 }
 
 /// The screen around and behind the object.
@@ -132,9 +173,11 @@ impl CleanScreen {
         photo: &Image<LinearRgb>,
         empty: Option<&Image<LinearRgb>>,
         found: &Segmentation,
+        claims: &PhotoClaims,
         options: &CutOutOptions,
     ) -> Result<Self> {
-        let background = screen_pixels(&found.mask);
+        // What is said not to be the object may be dirt.
+        let background = unclaimed(screen_pixels(&found.mask), claims.outline.as_ref());
         let plate = match (empty, options.screen) {
             (Some(empty), _) => ScreenPlate::from_photo(empty, photo, &background, &options.plate)?,
             (None, Some(color)) => ScreenPlate::even(color, photo.size()),
@@ -174,18 +217,28 @@ struct ObjectRegion {
     photo: Image<LinearRgb>,
     /// What the matte is cut to.
     cut: Image<Coverage>,
+    /// What a person says of the transmittance.
+    claims: Option<Claims>,
 }
 
 impl ObjectRegion {
-    fn new(prepared: &Prepared<'_>, found: &Segmentation, options: &CutOutOptions) -> Self {
+    fn new(
+        prepared: &Prepared<'_>,
+        found: &Segmentation,
+        claims: &PhotoClaims,
+        options: &CutOutOptions,
+    ) -> Self {
         let size = prepared.photo.size();
         let around = hull_roi(&found.hull, options.margin_px.max(options.reach_px()), size);
+        let cropped = |claims: &Option<Claims>| claims.as_ref().map(|said| said.crop(around));
         let boundary = options.within.of_object(found).crop(around);
+        let boundary = corrected_coverage(boundary, cropped(&claims.outline).as_ref());
         Self {
             around,
             kept: hull_roi(&found.hull, options.margin_px, size),
             photo: prepared.photo.crop(around),
             cut: softened(&boundary, options.soften_px),
+            claims: cropped(&claims.transmittance),
         }
     }
 
@@ -196,6 +249,14 @@ impl ObjectRegion {
             roi: self.kept,
             in_region: self.kept_in_region(),
             scale: self.kept_scale(longest_side),
+        }
+    }
+
+    /// A keyed picture of the region with the photo itself where a person says that it is opaque.
+    fn with_core(&self, keyed: Image<PremulRgba>) -> Image<PremulRgba> {
+        match &self.claims {
+            Some(claims) => keyed.zip3_map(&self.photo, claims, core_or_keyed),
+            None => keyed,
         }
     }
 
@@ -210,6 +271,14 @@ impl ObjectRegion {
     fn kept_scale(&self, longest_side: usize) -> f64 {
         let longer = self.kept.width.max(self.kept.height);
         (longest_side as f64 / longer as f64).min(1.0)
+    }
+}
+
+fn core_or_keyed(keyed: PremulRgba, photo: LinearRgb, claim: Option<bool>) -> PremulRgba {
+    if claim == Some(false) {
+        photo.opaque()
+    } else {
+        keyed
     }
 }
 
@@ -369,6 +438,7 @@ fn clipped_screen(share: f32) -> Diagnostic {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::matte::Claim;
     use crate::matte::segment::{SegmentOptions, Threshold};
 
     const GREEN: LinearRgb = LinearRgb::new(0.04, 0.4, 0.08);
@@ -434,6 +504,130 @@ mod tests {
                     .all(|c| (0.0..=1.0).contains(&c.0) && c.0 > 0.999)
             );
         }
+    }
+
+    fn painted(says: Claim, radius_px: f64, points_px: &[[f64; 2]]) -> Stroke {
+        Stroke {
+            says,
+            radius_px,
+            points_px: points_px.into(),
+        }
+    }
+
+    fn corrected(photo: &Image<LinearRgb>, strokes: &[Stroke]) -> Result<CutOut> {
+        cut_out_corrected(photo, None, strokes, &CutOutOptions::default())
+    }
+
+    /// The film at a pixel of the photo; nothing outside the cut-out.
+    fn film_at(cut: &CutOut, [x, y]: [usize; 2]) -> Film {
+        let [x, y] = [x.wrapping_sub(cut.roi.x), y.wrapping_sub(cut.roi.y)];
+        let (w, h) = cut.film.size();
+        if x < w && y < h {
+            cut.film[(x, y)]
+        } else {
+            Film::default()
+        }
+    }
+
+    fn opacity_at(cut: &CutOut, at: [usize; 2]) -> f32 {
+        film_at(cut, at).to_rgba().a
+    }
+
+    #[test]
+    fn what_is_said_to_be_the_object_is_cut_out_with_it_and_what_is_not_is_left() {
+        let slab = slab(GREEN);
+        let ear = painted(Claim::Object, 5.0, &[[60.0, 25.0], [60.0, 15.0]]);
+        let bite = painted(Claim::NotObject, 6.0, &[[30.0, 40.0]]);
+        let whole = corrected(&slab, &[]).unwrap();
+        let cut = corrected(&slab, &[ear, bite]).unwrap();
+        let covered = |cut: &CutOut, at| cut.segmentation.tight[at].0;
+        assert_eq!(
+            (covered(&whole, (60, 15)), covered(&cut, (60, 15))),
+            (0.0, 1.0)
+        );
+        assert_eq!(
+            (covered(&whole, (33, 40)), covered(&cut, (33, 40))),
+            (1.0, 0.0)
+        );
+        assert!(opacity_at(&whole, [32, 40]) > 0.9 && opacity_at(&cut, [32, 40]) < 0.01);
+        assert!(cut.hull.iter().any(|p| p.y + (cut.roi.y as f64) < 12.0));
+    }
+
+    #[test]
+    fn a_second_thing_is_no_object_where_a_person_says_so() {
+        let mut photo = slab(GREEN);
+        for (x, y) in (5..15).flat_map(|x| (5..70).map(move |y| (x, y))) {
+            photo[(x, y)] = LinearRgb::new(0.1, 0.1, 0.6);
+        }
+        let said = corrected(&photo, &[]).unwrap_err().to_string();
+        assert!(said.contains("two objects"), "{said}");
+        let other = painted(Claim::NotObject, 9.0, &[[10.0, 2.0], [10.0, 73.0]]);
+        let cut = corrected(&photo, &[other]).unwrap();
+        assert!(cut.hull.iter().all(|p| p.x + cut.roi.x as f64 > 28.0));
+        let both = painted(Claim::Object, 4.0, &[[10.0, 40.0], [60.0, 40.0]]);
+        let cut = corrected(&photo, &[both]).unwrap();
+        assert!(opacity_at(&cut, [9, 20]) > 0.9 && opacity_at(&cut, [60, 40]) > 0.9);
+    }
+
+    #[test]
+    fn paint_of_the_screen_s_colour_is_opaque_where_a_person_says_so() {
+        // A clear slab with a patch that looks like bare screen.
+        let photo = Image::from_fn(120, 80, |x, y| match (x, y) {
+            (50..70, 30..50) => GREEN,
+            (30..90, 25..55) => GREEN.scale(0.56) + LinearRgb::grey(0.02),
+            _ => GREEN,
+        });
+        let patch = painted(Claim::Opaque, 9.0, &[[60.0, 40.0]]);
+        let (found, cut) = (
+            corrected(&photo, &[]).unwrap(),
+            corrected(&photo, &[patch]).unwrap(),
+        );
+        let [before, after] = [&found, &cut].map(|cut| opacity_at(cut, [60, 40]));
+        assert!(before < 0.2 && after > 0.99, "{before} {after}");
+        let color = film_at(&cut, [60, 40]).color;
+        assert!((color.g - GREEN.g).abs() < 0.01, "{color:?}");
+        let beside = [&found, &cut].map(|cut| opacity_at(cut, [40, 30]));
+        assert!((beside[0] - beside[1]).abs() < 0.02, "{beside:?}");
+    }
+
+    #[test]
+    fn coloured_light_on_plastic_hides_nothing_where_a_person_says_so() {
+        // A clear slab with an orange patch.
+        let photo = Image::from_fn(120, 80, |x, y| {
+            let clear = GREEN.scale(0.56) + LinearRgb::grey(0.02);
+            match (x, y) {
+                (50..70, 30..50) => clear + LinearRgb::new(0.3, 0.1, 0.0),
+                (30..90, 25..55) => clear,
+                _ => GREEN,
+            }
+        });
+        let patch = painted(Claim::SeeThrough, 14.0, &[[60.0, 40.0]]);
+        let (found, cut) = (
+            corrected(&photo, &[]).unwrap(),
+            corrected(&photo, &[patch]).unwrap(),
+        );
+        let [before, after] = [&found, &cut].map(|cut| opacity_at(cut, [60, 40]));
+        assert!(before > 0.9 && after < 0.4, "{before} {after}");
+    }
+
+    #[test]
+    fn strokes_correct_a_keyed_cut_out_too() {
+        let clear = Image::from_fn(120, 80, |x, y| match (x, y) {
+            (30..90, 25..55) => GREEN.scale(0.56) + LinearRgb::grey(0.02),
+            _ => GREEN,
+        });
+        let options = CutOutOptions {
+            method: Some(MatteMethod::Key),
+            within: Boundary::Hull,
+            ..Default::default()
+        };
+        let strokes = [
+            painted(Claim::Opaque, 5.0, &[[60.0, 40.0]]),
+            painted(Claim::NotObject, 5.0, &[[80.0, 40.0]]),
+        ];
+        let cut = cut_out_corrected(&clear, None, &strokes, &options).unwrap();
+        assert!(opacity_at(&cut, [60, 40]) > 0.99 && opacity_at(&cut, [80, 40]) < 0.01);
+        assert!((0.05..0.95).contains(&opacity_at(&cut, [45, 40])));
     }
 
     #[test]

@@ -2,6 +2,7 @@
 //! screen.
 
 mod bright;
+mod claimed;
 mod object;
 mod planes;
 mod solve;
@@ -19,6 +20,7 @@ use super::check::{check_photo, check_value};
 use super::plate::ScreenPlate;
 use super::prepared::{check_finite, longer_side};
 use super::screen::{is_keyable, strongest_channel};
+use super::stroke::Claims;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::Result;
 use crate::filter;
@@ -141,6 +143,8 @@ pub(super) struct FilmInput<'a> {
     pub(super) screen: LinearRgb,
     /// Longer side of the whole photo, pixels.
     pub(super) longer_side: usize,
+    /// Which pixels a person says are see-through, and which are not.
+    pub(super) claims: Option<&'a Claims>,
 }
 
 /// As [`film`], with options that are checked.
@@ -175,6 +179,7 @@ impl<'a> FilmInput<'a> {
             inside,
             screen: plate.color(),
             longer_side: longer_side(photo),
+            claims: None,
         }
     }
 
@@ -252,14 +257,30 @@ impl<'a> FilmSolution<'a> {
         } else {
             Solver::guess
         };
-        self.calm
+        let factors = self
+            .calm
             .zip3_map(&plate.image, inside, |pixel, screen, inside| {
                 if inside.0 > 0.0 {
                     factor(&solver, pixel.into(), screen.into())
                 } else {
                     Factor::default()
                 }
-            })
+            });
+        self.claimed_factors(factors, &solver)
+    }
+
+    /// The factors as a person corrected them.
+    fn claimed_factors(&self, mut factors: Image<Factor>, solver: &Solver) -> Image<Factor> {
+        let Some(claims) = self.object.claims else {
+            return factors;
+        };
+        let plate = &self.object.plate.image;
+        let plastic = self.calm.zip3_map(plate, claims, |pixel, screen, claim| {
+            (claim == Some(true)).then(|| solver.see_through(pixel.into(), screen.into()))
+        });
+        factors = factors.zip_map(&plastic, |factor, plastic| plastic.unwrap_or(factor));
+        claimed::make_opaque(&mut factors, Some(claims));
+        factors
     }
 
     /// Makes paint opaque, fills what glints hide, and says how certain the colours are.
@@ -274,15 +295,23 @@ impl<'a> FilmSolution<'a> {
             plate,
             inside,
             longer_side,
+            claims,
             ..
         } = self.object;
         let most = largest(flat);
         let guessed = uncertainty::guessed(factors, inside, self.options.thickness_spread, most);
-        let screen_hue =
-            bright::make_opaque(factors, &self.calm, &plate.image, inside, longer_side);
+        let screen_hue = bright::make_opaque(
+            factors,
+            &self.calm,
+            &plate.image,
+            inside,
+            longer_side,
+            claims,
+        );
         let keyed_away = uncertainty::keyed_away(factors, inside, flat[self.key], longer_side);
         watch.lap("paint");
         let clipped = bright::fill_glints(factors, photo, inside, self.options.clipped);
+        claimed::make_opaque(factors, claims);
         watch.lap("glints");
         ColorUncertainty {
             keyed_away,
@@ -306,7 +335,8 @@ impl<'a> FilmSolution<'a> {
         let inside = self.object.inside;
         let plastic = factors.map(|f| flat.map(|t| (f.value * t).clamp(0.0, 1.0)));
         let transmittance = plastic.zip_map(inside, covered);
-        let seen = view(&plastic, flat, inside);
+        let lit = claimed::without_shadow(&plastic, flat, self.object.claims);
+        let seen = view(&lit, flat, inside);
         let reflected = self.reflected(&transmittance);
         let film = reflected.zip3_map(&seen, inside, |f, v, c| {
             Film::new(f.scale(c.0), covered(v, c))

@@ -34,6 +34,7 @@ mod register;
 mod screen;
 mod screen_corners;
 mod segment;
+mod stroke;
 mod triangulate;
 
 #[doc(hidden)]
@@ -44,7 +45,7 @@ pub use chroma_key::{ChromaKeyOptions, chroma_key};
 pub use color_spill::{ColorSpillOptions, SpillChannel, SpillLimit, color_spill};
 #[doc(hidden)]
 pub use cut_out::{Boundary, cut_out_on};
-pub use cut_out::{CutOut, CutOutOptions, MatteMethod, cut_out};
+pub use cut_out::{CutOut, CutOutOptions, MatteMethod, cut_out, cut_out_corrected};
 #[doc(hidden)]
 pub use difference_key::{DifferenceKeyOptions, difference_key};
 #[doc(hidden)]
@@ -67,4 +68,6 @@ pub use screen_corners::{ScreenCorners, screen_corners};
 pub use segment::{Confidence, SegmentOptions, Segmentation, segment};
 #[doc(hidden)]
 pub use segment::{LumaMode, SegmentStep, Threshold};
+pub(crate) use stroke::check_strokes;
+pub use stroke::{Claim, Stroke};
 pub use triangulate::{TriangulateOptions, Triangulated, triangulate};

@@ -22,6 +22,7 @@ pub use threshold::Threshold;
 
 use super::Outline;
 use super::prepared::Prepared;
+use super::stroke::StrokesOnPhoto;
 use crate::diagnostic::Diagnostic;
 use crate::error::Result;
 use crate::geom::Point2;
@@ -110,21 +111,24 @@ impl SegmentStep {
 /// [Burt and Adelson 1983]: https://doi.org/10.1109/TCOM.1983.1095851
 pub fn segment(photo: &Image<LinearRgb>, options: &SegmentOptions) -> Result<Segmentation> {
     options.check()?;
-    segment_prepared(&Prepared::new(photo, options.working_size)?, options)
+    let prepared = Prepared::new(photo, options.working_size)?;
+    let strokes = StrokesOnPhoto::new(&[], photo);
+    segment_prepared(&prepared, strokes, options)
 }
 
 /// As [`segment`], with options that are checked and a photo that is prepared for their working
-/// size.
+/// size; what strokes say of the outline holds.
 pub(super) fn segment_prepared(
     prepared: &Prepared<'_>,
+    strokes: StrokesOnPhoto<'_>,
     options: &SegmentOptions,
 ) -> Result<Segmentation> {
     let mut watch = Stopwatch::start();
-    let chosen = choose::best_search(&prepared.small, options)?;
+    let chosen = choose::best_search(&prepared.small, strokes, options)?;
     watch.lap("search");
     let object = chosen.object_area();
     watch.lap("holes");
-    let shape = ObjectShape::new(prepared, &chosen, &object.solid);
+    let shape = ObjectShape::new(prepared, &chosen, &object.solid, strokes);
     let confidence = shape.confidence(prepared, chosen.confidence);
     watch.lap("outline");
     let mut diagnostics = chosen.diagnostics(prepared.small.width());

@@ -1,3 +1,290 @@
-import { frame } from "./studio.js";
+// Mattes: each photo of a list with its cut-out, strokes that correct it, and a verdict.
+import { INKS, Stage } from "./mattes_stage.js";
+import { photoList } from "./photo_list.js";
+import { api, at, element, frame, picture, query, say, shortcuts, trying } from "./studio.js";
+
+const LAYERS = [
+  ["checker", "Checker", "1"],
+  ["black", "Black", "2"],
+  ["white", "White", "3"],
+  ["plate", "Plate", "4"],
+  ["matte", "Matte", "5"],
+  ["transmittance", "V", "6"],
+  ["uncertainty", "Uncertainty", "7"],
+];
+
+const LAYERS_IN_WORDS = {
+  checker: "the cut-out over a checkerboard",
+  black: "the cut-out over black",
+  white: "the cut-out over white",
+  plate: "the cut-out in the photo of a place",
+  matte: "opacity: white hides what is behind",
+  transmittance: "what the line of sight lets through, in its colour",
+  uncertainty: "how far the transmittance may be off: dark not at all, yellow by half",
+};
+
+const TOOLS = [
+  [null, "Move", "m", "move the photo (or hold the middle button)"],
+  ["object", "Object", "o", "this is the object"],
+  ["not_object", "Not object", "n", "this is not the object"],
+  ["see_through", "See-through", "t", "one sees through this"],
+  ["opaque", "Opaque", "p", "nothing is seen through this"],
+];
+
+const VERDICTS = { accepted: ["accepted", "good"], rejected: ["rejected", "bad"] };
+const EMPTY = "There is no list of photos in this folder. Write photos.csv with the columns file, asset, class and length, and a line for each photo.";
+/** The finest brush and the coarsest, shares of the photo's longer side. */
+const BRUSHES = [0.002, 0.12];
+
+const stage = new Stage(at("canvas"), paint);
+const list = photoList(at("photos"), open, mark);
+/** `entry` is the photo that is shown, `shown` the layer that was asked for last, `unsaved` why it is not kept. */
+const state = { entry: null, layer: "checker", review: null, undone: [], solved: null, shown: null, saving: Promise.resolve(), unsaved: null };
 
 frame("mattes");
+
+// The photos.
+
+const base = (path) => path.split("/").at(-1);
+
+function mark({ verdict, strokes }) {
+  return VERDICTS[verdict] ?? [strokes ? `${strokes} ${strokes === 1 ? "stroke" : "strokes"}` : "", ""];
+}
+
+async function open(photo) {
+  const entry = list.entryOf(photo);
+  Object.assign(state, { entry, review: null, solved: null, undone: [], shown: null, unsaved: null });
+  Object.assign(stage, { size: null, strokes: [] });
+  stage.draw();
+  list.choose(photo);
+  showReview();
+  await trying(async () => {
+    await state.saving;
+    const review = await api(query("api/mattes/review", { photo }));
+    if (state.entry !== entry) return;
+    state.review = review;
+    stage.strokes = review.strokes;
+    showReview();
+    await solve();
+  });
+}
+
+// Cutting out, and what is seen of it.
+
+async function solve() {
+  const { list: name, photo } = state.entry;
+  const { strokes } = state.review;
+  at("stage").classList.add("busy");
+  say(`cutting out ${base(photo)} ...`);
+  const solved = await api("api/mattes/solve", { list: name, photo, strokes }).finally(() => at("stage").classList.remove("busy"));
+  if (state.review?.strokes !== strokes) return;
+  state.solved = solved;
+  if (!stage.size) stage.open(solved.size);
+  setRadius();
+  showSolved();
+  await showLayers();
+  const trouble = state.unsaved ?? solved.refused;
+  say(trouble ?? `${base(photo)}: cut out in ${(1000 * solved.seconds).toFixed(0)} ms`, trouble ? "bad" : "good");
+}
+
+async function loaded(path) {
+  const image = new Image();
+  const address = await picture(path);
+  image.src = address;
+  await image.decode();
+  URL.revokeObjectURL(address);
+  return image;
+}
+
+/** Fetches what is shown now; what another request has replaced since is dropped. */
+async function showLayers() {
+  const { solved, layer } = state;
+  if (!solved) return;
+  const shown = `${solved.number} ${layer} ${at("plate").value}`;
+  state.shown = shown;
+  const address = (name) => query("api/mattes/layer", { number: solved.number, layer: name, plate: name === "plate" ? at("plate").value || null : null });
+  const photo = stage.images.photo ?? await loaded(address("photo"));
+  const cut = solved.refused ? null : await loaded(address(layer));
+  if (state.shown !== shown) return;
+  stage.images = { photo, layer: cut };
+  stage.draw();
+  at("canvas").dataset.shown = shown;
+}
+
+function setLayer(layer) {
+  state.layer = layer;
+  for (const button of at("layers").children) button.setAttribute("aria-pressed", button.dataset.layer === layer);
+  say(LAYERS_IN_WORDS[layer]);
+  trying(showLayers);
+}
+
+const percent = (share) => share === null ? "unknown" : `${(100 * share).toFixed(0)} %`;
+
+function showSolved() {
+  const { refused, diagnostics, outline_confidence, color_confidence } = state.solved;
+  const flags = diagnostics.map(({ severity, message }) => element("li", { class: severity === "note" ? "" : "warn" }, message));
+  if (refused) flags.unshift(element("li", { class: "bad" }, refused, " (or paint what is the object and what is not)"));
+  if (!flags.length) flags.push(element("li", { class: "good" }, "nothing"));
+  at("flags").replaceChildren(...flags);
+  at("facts").replaceChildren(...(refused ? [] : [
+    element("dt", {}, "outline is certain to"), element("dd", {}, percent(outline_confidence)),
+    element("dt", {}, "colour is certain to"), element("dd", {}, percent(color_confidence))]));
+}
+
+// Strokes.
+
+function setTool(tool) {
+  stage.tool = tool;
+  for (const button of at("tools").children) button.setAttribute("aria-pressed", button.dataset.tool === (tool ?? ""));
+  at("canvas").classList.toggle("brushes", tool !== null);
+  at("radius").disabled = tool === null;
+  stage.draw();
+}
+
+function setRadius() {
+  if (!state.solved) return;
+  const [fine, coarse] = BRUSHES.map((share) => share * Math.max(...state.solved.size));
+  stage.radius = Math.round(10 * Math.max(fine * (coarse / fine) ** (at("radius").value / 100), 0.5)) / 10;
+  stage.draw();
+}
+
+function changeRadius(by) {
+  at("radius").value = Number(at("radius").value) + by;
+  setRadius();
+}
+
+function paint(stroke) {
+  if (!state.review) return;
+  state.undone = [];
+  setStrokes([...state.review.strokes, stroke]);
+}
+
+function undo() {
+  const strokes = state.review?.strokes ?? [];
+  if (!strokes.length) return;
+  state.undone.push(strokes.at(-1));
+  setStrokes(strokes.slice(0, -1));
+}
+
+function redo() {
+  const stroke = state.undone.pop();
+  if (stroke) setStrokes([...state.review.strokes, stroke]);
+}
+
+function clear() {
+  if (!state.review?.strokes.length) return;
+  state.undone = [...state.review.strokes].reverse();
+  setStrokes([]);
+}
+
+/** What is painted is solved and kept at once; a verdict was on what was there before. */
+function setStrokes(strokes) {
+  Object.assign(state.review, { strokes, verdict: null });
+  stage.strokes = strokes;
+  stage.draw();
+  showReview();
+  keep();
+  trying(solve);
+}
+
+function setVerdict(verdict) {
+  if (!state.solved || !state.review) return;
+  state.review.verdict = state.review.verdict === verdict ? null : verdict;
+  showReview();
+  keep();
+  if (state.review.verdict) list.next(({ verdict }) => !verdict);
+}
+
+/** Saves the review of the photo, after what is being saved already. */
+function keep() {
+  const { entry, review, solved: { size } } = state;
+  Object.assign(entry, { verdict: review.verdict, strokes: review.strokes.length });
+  list.showMarks();
+  const { strokes, verdict } = review;
+  state.saving = state.saving.then(() => trying(async () => {
+    try {
+      const saved = await api("api/mattes/review", { photo: entry.photo, size, strokes, verdict, version: review.version });
+      Object.assign(review, { version: saved.version });
+      state.unsaved = null;
+      at("canvas").dataset.saved = `${saved.file} ${saved.version}`;
+      say(`saved ${saved.file}`, "good");
+    } catch (error) {
+      state.unsaved = error.message;
+      throw error;
+    }
+  }));
+}
+
+function showReview() {
+  const { strokes, verdict } = state.review ?? { strokes: [], verdict: null };
+  at("undo").disabled = at("clear").disabled = !strokes.length;
+  at("redo").disabled = !state.undone.length;
+  for (const [id, said] of [["accept", "accepted"], ["reject", "rejected"]]) {
+    at(id).disabled = !state.review;
+    at(id).setAttribute("aria-pressed", verdict === said);
+  }
+}
+
+// The page.
+
+function choice(label, key, attributes) {
+  return element("button", { ...attributes, "aria-pressed": "false" }, label, element("kbd", {}, key.toUpperCase()));
+}
+
+function setWipe(percent) {
+  at("wipe").value = percent;
+  stage.wipe = at("wipe").value / 100;
+  stage.draw();
+}
+
+at("layers").replaceChildren(...LAYERS.map(([layer, title, key]) =>
+  choice(title, key, { "data-layer": layer, title: LAYERS_IN_WORDS[layer], onclick: () => setLayer(layer) })));
+at("tools").replaceChildren(...TOOLS.map(([tool, title, key, what]) =>
+  choice(title, key, { "data-tool": tool ?? "", title: what, onclick: () => setTool(tool) })));
+for (const button of at("tools").children) {
+  const ink = INKS[button.dataset.tool];
+  if (ink) button.style.setProperty("--ink-of-tool", ink);
+}
+for (const [id, act] of [["undo", undo], ["redo", redo], ["clear", clear]]) at(id).addEventListener("click", act);
+at("accept").addEventListener("click", () => setVerdict("accepted"));
+at("reject").addEventListener("click", () => setVerdict("rejected"));
+at("wipe").addEventListener("input", () => setWipe(at("wipe").value));
+at("radius").addEventListener("input", setRadius);
+at("plate").addEventListener("change", () => setLayer("plate"));
+
+function showStrokes() {
+  stage.showsStrokes = !stage.showsStrokes;
+  stage.draw();
+}
+
+shortcuts([
+  ...LAYERS.map(([layer, , key]) => [key, LAYERS_IN_WORDS[layer], () => setLayer(layer)]),
+  ...TOOLS.map(([tool, , key, what]) => [key, what, () => setTool(tool)]),
+  ["[", "finer brush", () => changeRadius(-8)],
+  ["]", "coarser brush", () => changeRadius(8)],
+  ["Ctrl+z", "take back the last stroke", undo],
+  ["Ctrl+Shift+z", "paint it again", redo],
+  ["h", "hide or show the strokes", showStrokes],
+  ["ArrowLeft", "more of the cut-out", () => setWipe(stage.wipe * 100 - 5)],
+  ["ArrowRight", "more of the photo", () => setWipe(stage.wipe * 100 + 5)],
+  ["b", "photo or cut-out", () => setWipe(stage.wipe > 0.5 ? 0 : 100)],
+  ["+", "larger", () => stage.zoom(1.5)],
+  ["-", "smaller", () => stage.zoom(1 / 1.5)],
+  ["0", "all of it", () => stage.fit()],
+  ["a", "accept, and to the next one", () => setVerdict("accepted")],
+  ["x", "reject, and to the next one", () => setVerdict("rejected")],
+  ["ArrowDown", "next photo", () => list.step(1)],
+  ["ArrowUp", "photo before", () => list.step(-1)],
+]);
+
+setTool(null);
+setLayer("checker");
+await trying(async () => {
+  const { photos, problems, plates } = await api("api/mattes/photos");
+  const options = plates.map((plate) => element("option", { value: plate }, plate));
+  at("plate").replaceChildren(...(options.length ? options : [element("option", { value: "" }, "no labelled photo of a place")]));
+  at("plate").disabled = !plates.length;
+  at("empty").hidden = photos.length > 0;
+  at("empty").textContent = problems.join("\n") || EMPTY;
+  if (photos.length) await list.fill(photos, ({ verdict }) => !verdict);
+});

@@ -53,6 +53,7 @@ impl Matted {
             inside: &region.cut,
             screen: screen.color,
             longer_side: prepared.longer_side(),
+            claims: region.claims.as_ref(),
         };
         solve_film(object, &options.film).map(Self::from)
     }
@@ -66,7 +67,7 @@ impl Matted {
         let keyed = Keying::new(prepared.photo, Screen::Plate(&screen.plate.image))
             .run(&options.key)
             .map_err(|e| e.within("key"))?;
-        let cutout = keyed.cutout.crop(region.around);
+        let cutout = region.with_core(keyed.cutout.crop(region.around));
         Ok(Self::grey(
             MatteMethod::Key,
             cutout.zip_map(&region.cut, |p, m| p.masked(m)),

@@ -1,9 +1,11 @@
 //! Pixels that are not bare plastic: paint, and glints that hide what is behind them.
 
+use super::claimed;
 use super::object::{interior, is_screen, ramp, share, side_px};
 use super::solve::Factor;
 use crate::filter;
 use crate::image::{Image, Mask};
+use crate::matte::stroke::Claims;
 use crate::pixel::{Coverage, LinearRgb};
 use rayon::prelude::*;
 use std::ops::RangeInclusive;
@@ -16,8 +18,8 @@ const PAINT_BLUR_PX: f32 = 2.0;
 const PAINT_SHARE: RangeInclusive<f32> = 0.4..=0.7;
 
 /// Makes opaque what is painted: in the screen's hue, or in colours that the plastic has not. Bare
-/// screen that a wide mask lets in is not paint. Gives the share of the object that has the
-/// screen's hue.
+/// screen that a wide mask lets in is not paint, nor is what a person says is see-through. Gives the
+/// share of the object that has the screen's hue.
 ///
 /// `longer_side` is that of the whole photo, pixels.
 pub(super) fn make_opaque(
@@ -26,13 +28,15 @@ pub(super) fn make_opaque(
     plate: &Image<LinearRgb>,
     inside: &Image<Coverage>,
     longer_side: usize,
+    claims: Option<&Claims>,
 ) -> f32 {
     let bright = brighter_than_screen(factors, photo, plate);
     let painted = factors.zip_map(&bright, |f, bright| f.coloured || bright);
     if !painted.pixels().contains(&true) {
         return 0.0;
     }
-    let paint = softened(&painted.zip_map(&interior(inside, longer_side), |p, i| p && i));
+    let mut paint = softened(&painted.zip_map(&interior(inside, longer_side), |p, i| p && i));
+    claimed::clear_paint(&mut paint, claims);
     cover_with_paint(factors, &paint);
     let of_hue = paint
         .pixels()

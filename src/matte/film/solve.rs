@@ -22,6 +22,24 @@ pub(super) struct Factor {
 }
 
 impl Factor {
+    /// Of what surely lets nothing through.
+    pub(super) const OPAQUE: Self = Self {
+        value: 0.0,
+        sigma: 0.0,
+        raw: 0.0,
+        reflected: 0.0,
+        coloured: false,
+    };
+
+    /// As something that is plastic, whatever it looks like.
+    fn of_plastic(self) -> Self {
+        Self {
+            raw: self.value,
+            coloured: false,
+            ..self
+        }
+    }
+
     /// As something that may or may not be plastic, whose factors have the deviation `spread`.
     fn guessed(self, spread: f32) -> Self {
         Self {
@@ -37,6 +55,9 @@ impl Factor {
         self.sigma = self.sigma.max(least);
     }
 }
+
+/// The factor of flat plastic.
+const FLAT_FACTOR: f32 = 1.0;
 
 /// What is the same for all pixels of a photo.
 pub(super) struct Solver {
@@ -105,6 +126,12 @@ impl Solver {
         let left = measured.most_left(pixel);
         self.combine(pixel, &measured, plastic_factor(left))
             .guessed(self.spread)
+    }
+
+    /// The factor of what is known to be plastic, however bright or coloured.
+    pub(super) fn see_through(&self, pixel: [f32; 3], screen: [f32; 3]) -> Factor {
+        let measured = self.measure(pixel, screen);
+        self.combine(pixel, &measured, FLAT_FACTOR).of_plastic()
     }
 
     /// What the photo alone gives.

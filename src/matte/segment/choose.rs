@@ -9,6 +9,7 @@ use crate::error::Result;
 use crate::filter;
 use crate::image::{Image, Mask};
 use crate::matte::prepared::{longer_side, scaled_sides};
+use crate::matte::stroke::{Claims, StrokesOnPhoto};
 use crate::pixel::LinearRgb;
 use rayon::prelude::*;
 use std::borrow::Cow;
@@ -27,6 +28,8 @@ pub(super) struct ChosenSearch<'a> {
     pub(super) levels: usize,
     /// How well it agrees.
     pub(super) confidence: Confidence,
+    /// What a person says of the outline, in the picture that it searched.
+    claims: Option<Claims>,
 }
 
 /// A picture size and the depths to search it at, the default one first.
@@ -51,13 +54,15 @@ const COMPARED_SIDE_PX: usize = 256;
 /// for. Each search scores the share of its outline that lies on edges times its mean overlap
 /// (intersection over union) with what the other searches found; a search that finds nothing
 /// overlaps with nothing. The best score wins, the finer picture when in doubt.
+/// What strokes say of the outline holds in each of them.
 /// # Errors
 /// That of the default search when more than half of the searches fail.
 pub(super) fn best_search<'a>(
     picture: &'a Image<LinearRgb>,
+    strokes: StrokesOnPhoto<'_>,
     options: &SegmentOptions,
 ) -> Result<ChosenSearch<'a>> {
-    let scales = scales(picture, options);
+    let scales = scales(picture, strokes, options);
     let mut searched = searches(&scales, options);
     if let Some(failed) = first_of_many_failures(&searched) {
         return searched
@@ -123,12 +128,14 @@ impl<'a> SearchScale<'a> {
         whole: &'a Image<LinearRgb>,
         reduction: usize,
         depths: Vec<usize>,
+        strokes: StrokesOnPhoto<'_>,
         options: &SegmentOptions,
     ) -> Self {
         let picture = reduced(whole, reduction);
+        let claims = strokes.about_outline(picture.size());
         Self {
             reduction,
-            search: Search::new(&picture, options, deepest(&depths)),
+            search: Search::new(&picture, options, deepest(&depths), claims),
             picture,
             depths,
         }
@@ -147,14 +154,18 @@ fn reduced(picture: &Image<LinearRgb>, reduction: usize) -> Cow<'_, Image<Linear
     Cow::Owned(filter::resize(picture, w / reduction, h / reduction))
 }
 
-fn scales<'a>(picture: &'a Image<LinearRgb>, options: &SegmentOptions) -> Vec<SearchScale<'a>> {
+fn scales<'a>(
+    picture: &'a Image<LinearRgb>,
+    strokes: StrokesOnPhoto<'_>,
+    options: &SegmentOptions,
+) -> Vec<SearchScale<'a>> {
     let longer = longer_side(picture);
     searched_sizes(picture.size())
         .par_iter()
         .map(|&(reduction, depths)| {
             let asked = options.levels.filter(|_| reduction == 1);
             let depths = usable_depths(depths, longer / reduction, asked);
-            SearchScale::new(picture, reduction, depths, options)
+            SearchScale::new(picture, reduction, depths, strokes, options)
         })
         .collect()
 }
@@ -243,7 +254,7 @@ impl SearchResult {
         confidence: Confidence,
     ) -> Result<ChosenSearch<'_>> {
         let scale = scales.swap_remove(self.scale);
-        let (finest, finest_binary) = scale.search.into_finest();
+        let (finest, finest_binary, claims) = scale.search.into_parts();
         Ok(ChosenSearch {
             pass: self.pass?,
             picture: scale.picture,
@@ -251,6 +262,7 @@ impl SearchResult {
             finest_binary,
             levels: self.levels,
             confidence,
+            claims,
         })
     }
 
@@ -314,9 +326,10 @@ impl ChosenSearch<'_> {
         diagnostics
     }
 
-    /// What the edges enclose, without holes.
+    /// What the edges enclose, without holes, as a person corrected it.
     pub(super) fn object_area(&self) -> ObjectArea {
-        holes::object_area(&self.picture, &self.pass.inside)
+        let found = holes::object_area(&self.picture, &self.pass.inside);
+        found.corrected(self.claims.as_ref())
     }
 
     /// The pictures (a) to (e) of the paper's Figure 2, and what lies between; `whole` is the
@@ -420,6 +433,7 @@ mod tests {
         for levels in [2, 3, 6] {
             let chosen = best_search(
                 &photo,
+                StrokesOnPhoto::default(),
                 &SegmentOptions {
                     levels: Some(levels),
                     ..Default::default()
@@ -438,9 +452,10 @@ mod tests {
             LinearRgb::grey(if disc(x as f64, y as f64) { 0.8 } else { 0.1 })
         });
         let options = SegmentOptions::default();
-        let whole = best_search(&photo, &options).unwrap();
+        let strokes = StrokesOnPhoto::default();
+        let whole = best_search(&photo, strokes, &options).unwrap();
         assert!(matches!(whole.picture, Cow::Borrowed(picture) if std::ptr::eq(picture, &photo)));
-        for scale in scales(&photo, &options) {
+        for scale in scales(&photo, strokes, &options) {
             let searched = scale.search.at_depth(2, &options).unwrap().inside.size();
             assert_eq!(scale.picture.size(), searched);
         }

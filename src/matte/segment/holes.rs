@@ -8,6 +8,7 @@ use crate::matte::arrays::largest;
 use crate::matte::plate::{PlateOptions, ScreenPlate};
 use crate::matte::prepared::longer_side;
 use crate::matte::screen::{is_keyable, masked_pixels};
+use crate::matte::stroke::{Claims, corrected};
 use crate::pixel::LinearRgb;
 
 /// Width of the zone around the object that is not used as background, as a share of the longer
@@ -37,6 +38,14 @@ pub(super) struct ObjectArea {
 }
 
 impl ObjectArea {
+    /// With what a person says is in it, without what is not.
+    pub(super) fn corrected(self, claims: Option<&Claims>) -> Self {
+        Self {
+            solid: corrected(self.solid, claims),
+            ..self
+        }
+    }
+
     /// The warning about parts that look like the screen.
     pub(super) fn diagnostic(&self) -> Option<Diagnostic> {
         self.has_screen_like_parts.then(|| {

@@ -13,6 +13,7 @@ use crate::image::{Image, Mask};
 use crate::matte::Outline;
 use crate::matte::check::refused;
 use crate::matte::prepared::longer_side;
+use crate::matte::stroke::{Claims, corrected};
 use crate::pixel::LinearRgb;
 use std::cmp::Reverse;
 use std::ops::Range;
@@ -26,6 +27,8 @@ pub(super) struct Search {
     finest_binary: Mask,
     /// Where the finest band is more than the smear of a stronger edge.
     ridges: Mask,
+    /// What a person says of the outline.
+    claims: Option<Claims>,
 }
 
 /// What a search at one depth found, in pixels of the picture that was searched.
@@ -62,11 +65,13 @@ const SMEAR_PX: usize = 2;
 const MIN_JOIN_PX: f64 = 6.0;
 
 impl Search {
-    /// Splits a picture into bands, `deepest` of them.
+    /// Splits a picture into bands, `deepest` of them; a person may say of some pixels whether they
+    /// are of the object.
     pub(super) fn new(
         picture: &Image<LinearRgb>,
         options: &SegmentOptions,
         deepest: usize,
+        claims: Option<Claims>,
     ) -> Self {
         let bands = Bands::new(picture, options.tone, deepest);
         let otsu_or_given = options.finest_threshold.of_band(&bands.finest);
@@ -76,12 +81,13 @@ impl Search {
             ridges: ridges(&bands.finest, options.ridge),
             bands,
             threshold,
+            claims,
         }
     }
 
-    /// The finest band and where it is above its threshold.
-    pub(super) fn into_finest(self) -> (Image<f32>, Mask) {
-        (self.bands.finest, self.finest_binary)
+    /// The finest band, where it is above its threshold, and what is said of the outline.
+    pub(super) fn into_parts(self) -> (Image<f32>, Mask, Option<Claims>) {
+        (self.bands.finest, self.finest_binary, self.claims)
     }
 
     /// Finds the object with band `levels` as the coarsest one.
@@ -107,16 +113,40 @@ impl Search {
         cluster::without_specks(&thin, speck)
     }
 
+    /// What the object's edges enclose, as a person corrected it; `found` are all edges before.
+    ///
+    /// A person who cuts through an object takes away edges without which the rest encloses nothing:
+    /// then it is what all of it encloses, cut.
+    fn inside(&self, object: &Mask, found: &Mask, join_px: f64) -> Mask {
+        let inside = self.corrected(enclosed_area(object, join_px));
+        if self.claims.is_none() {
+            return inside;
+        }
+        let whole = clusters_with(found, object, join_px);
+        let cut = self.corrected(enclosed_area(&whole, join_px));
+        if cut.count() as f64 > LEAK_AREA_RATIO * inside.count() as f64 {
+            cut
+        } else {
+            inside
+        }
+    }
+
+    /// A set of the object's pixels, as a person corrected it.
+    fn corrected(&self, set: Mask) -> Mask {
+        corrected(set, self.claims.as_ref())
+    }
+
     fn pass(&self, levels: usize, finest_binary: &Mask, options: &SegmentOptions) -> Result<Pass> {
         let coarsest = self.bands.at_full_size(levels);
         let coarsest_binary = options.coarsest_threshold.binarised(&coarsest);
-        let edges = self.thin_edges(finest_binary, &coarsest_binary, options.speck);
+        let found = self.thin_edges(finest_binary, &coarsest_binary, options.speck);
+        let edges = self.corrected(found.clone());
         let join_px = (options.join * longer_side(&edges) as f64).max(MIN_JOIN_PX);
-        let (object, diagnostics) = main_object(&edges, join_px)?;
+        let (object, diagnostics) = main_object(&edges, self.claims.as_ref(), join_px)?;
         let hull = hull::convex_hull(&object);
         let touches = reached_borders(&object);
         check_object(&hull, touches, edges.size())?;
-        let inside = enclosed_area(&object, join_px);
+        let inside = self.inside(&object, &found, join_px);
         Ok(Pass {
             coarsest,
             coarsest_binary,
@@ -128,6 +158,14 @@ impl Search {
             diagnostics,
         })
     }
+}
+
+/// Edges and the clusters of others that they are part of.
+fn clusters_with(others: &Mask, edges: &Mask, join_px: f64) -> Mask {
+    let all = edges.zip_map(others, |a, b| a || b);
+    let groups = PixelGroups::new(&filter::dilate(&all, join_px / 2.0));
+    let sizes = groups.sizes(edges);
+    both(&groups.only(|i| sizes[i] > 0), &all)
 }
 
 /// What two sets have in common.
@@ -150,12 +188,15 @@ const REMNANT_SHARE: f64 = 0.05;
 /// one may lie beside the object.
 const SPECK_COUNT: usize = 2;
 
-/// Edge pixels in clusters; the largest cluster is the main one.
+/// Edge pixels in clusters; the largest cluster is the main one, or the one with most pixels that are
+/// said to be the object.
 struct EdgeClusters<'a> {
     edges: &'a Mask,
     groups: PixelGroups,
     /// Edge pixels of each cluster.
     sizes: Vec<usize>,
+    /// Those that a person says are of the object.
+    core_sizes: Vec<usize>,
     main: usize,
     /// Edge pixels of each cluster within the hull of the main one.
     sizes_inside: Vec<usize>,
@@ -163,16 +204,18 @@ struct EdgeClusters<'a> {
 
 impl<'a> EdgeClusters<'a> {
     /// Edges nearer to each other than `join_px` form a cluster; nothing where there are no edges.
-    fn new(edges: &'a Mask, join_px: f64) -> Option<Self> {
+    fn new(edges: &'a Mask, claims: Option<&Claims>, join_px: f64) -> Option<Self> {
         let groups = PixelGroups::new(&filter::dilate(edges, join_px / 2.0));
         let sizes = groups.sizes(edges);
-        let main = (0..sizes.len()).max_by_key(|&i| (sizes[i], Reverse(i)))?;
+        let core_sizes = core_sizes(&groups, claims, sizes.len());
+        let main = (0..sizes.len()).max_by_key(|&i| (core_sizes[i], sizes[i], Reverse(i)))?;
         let hull = under_hull(&both(&groups.only(|i| i == main), edges), 0.0);
         Some(Self {
             edges,
             sizes_inside: groups.sizes(&both(edges, &hull)),
             groups,
             sizes,
+            core_sizes,
             main,
         })
     }
@@ -187,9 +230,11 @@ impl<'a> EdgeClusters<'a> {
         [self.main, other].map(|cluster| place(&self.only(|i| i == cluster)))
     }
 
-    /// At least half of a cluster lies within the hull of the main one, or it is that.
+    /// At least half of a cluster lies within the hull of the main one, or it is that, or a person
+    /// says so.
     fn belongs(&self, cluster: usize) -> bool {
-        cluster == self.main || 2 * self.sizes_inside[cluster] >= self.sizes[cluster]
+        let is_claimed = self.core_sizes[cluster] > 0;
+        is_claimed || cluster == self.main || 2 * self.sizes_inside[cluster] >= self.sizes[cluster]
     }
 
     /// The warnings about what is left out.
@@ -226,20 +271,33 @@ impl<'a> EdgeClusters<'a> {
     }
 }
 
+/// Pixels of each of `count` groups that a person says are of the object.
+fn core_sizes(groups: &PixelGroups, claims: Option<&Claims>, count: usize) -> Vec<usize> {
+    let none = || vec![0; count];
+    claims.map_or_else(none, |claims| {
+        groups.sizes(&claims.map(|claim| claim == Some(true)))
+    })
+}
+
 /// The edges of the one object.
 ///
 /// Edges nearer to each other than `join_px` form a cluster; the object is the cluster of most edge
 /// pixels and what lies inside its hull. A cluster outside it is an error if it could be an object
 /// of its own, else it is left out.
-fn main_object(edges: &Mask, join_px: f64) -> Result<(Mask, Vec<Diagnostic>)> {
-    let clusters = EdgeClusters::new(edges, join_px).ok_or_else(|| {
+fn main_object(
+    edges: &Mask,
+    claims: Option<&Claims>,
+    join_px: f64,
+) -> Result<(Mask, Vec<Diagnostic>)> {
+    let clusters = EdgeClusters::new(edges, claims, join_px).ok_or_else(|| {
         refused(
             "nothing stands out from what is along the borders; is there an object, in focus, with background all around it?",
         )
     })?;
     let mut diagnostics = clusters.judge_others()?;
     let object = clusters.only(|i| clusters.belongs(i));
-    diagnostics.extend(possibly_two_objects(&object, CLOSER_JOIN_SHARE * join_px));
+    let closer_px = CLOSER_JOIN_SHARE * join_px;
+    diagnostics.extend(possibly_two_objects(&object, claims, closer_px));
     Ok((object, diagnostics))
 }
 
@@ -271,8 +329,12 @@ const CLOSER_JOIN_SHARE: f64 = 0.5;
 
 /// The warning about an object whose edges are two clusters beside each other unless gaps of
 /// `join_px` are bridged.
-fn possibly_two_objects(object: &Mask, join_px: f64) -> Option<Diagnostic> {
-    let clusters = EdgeClusters::new(object, join_px)?;
+fn possibly_two_objects(
+    object: &Mask,
+    claims: Option<&Claims>,
+    join_px: f64,
+) -> Option<Diagnostic> {
+    let clusters = EdgeClusters::new(object, claims, join_px)?;
     let least = RIVAL_SHARE * clusters.sizes[clusters.main] as f64;
     let (other, _) = clusters
         .others()

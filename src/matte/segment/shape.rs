@@ -8,6 +8,7 @@ use crate::geom::Point2;
 use crate::image::{Image, Mask};
 use crate::matte::Outline;
 use crate::matte::prepared::Prepared;
+use crate::matte::stroke::{StrokesOnPhoto, corrected_coverage};
 use crate::pixel::Coverage;
 
 /// Blur that turns the cracks between pixels into a line, pixels of the search.
@@ -47,12 +48,18 @@ pub(super) struct ObjectShape {
 }
 
 impl ObjectShape {
-    /// The outline around the object's area, moved to where the photo changes, and the hull of it
-    /// and of its thin tips.
-    pub(super) fn new(prepared: &Prepared<'_>, chosen: &ChosenSearch<'_>, area: &Mask) -> Self {
+    /// The outline around the object's area, moved to where the photo changes or a person says, and
+    /// the hull of it and of its thin tips.
+    pub(super) fn new(
+        prepared: &Prepared<'_>,
+        chosen: &ChosenSearch<'_>,
+        area: &Mask,
+        strokes: StrokesOnPhoto<'_>,
+    ) -> Self {
         let scale = PixelScale::new(prepared.photo.size(), area.size());
         let rough = rough_outline(area).map(|p| scale.to_photo(p));
-        let outline = snap::snapped(&rough, &prepared.sqrt, scale.reduction());
+        let snapped = snap::snapped(&rough, &prepared.sqrt, scale.reduction());
+        let outline = painted(snapped, strokes);
         let tips = inset(&chosen.pass.hull, TIP_INSET_PX).map(|p| scale.to_photo(p));
         let mut rings = outline.rings.clone();
         rings.push(tips.collect());
@@ -81,6 +88,16 @@ impl ObjectShape {
             ..search
         }
     }
+}
+
+/// An outline in the photo that keeps to what strokes say of it, to a pixel.
+fn painted(outline: Outline, strokes: StrokesOnPhoto<'_>) -> Outline {
+    let (w, h) = strokes.photo;
+    let Some(claims) = strokes.about_outline((w, h)) else {
+        return outline;
+    };
+    let covered = corrected_coverage(outline.coverage(w, h), Some(&claims));
+    Outline::around(&covered)
 }
 
 /// The outline of a set, in its pixels.

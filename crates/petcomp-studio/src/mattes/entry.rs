@@ -1,0 +1,177 @@
+//! The photos that can be cut out: the entries of the folder's lists.
+
+use super::review::review_of;
+use crate::folder::Folder;
+use crate::refusal::{Answer, Refusal};
+use crate::studio::Studio;
+use crate::turn::blocking;
+use axum::Json;
+use axum::extract::State;
+use axum::http::StatusCode;
+use petcomp::asset::{List, PhotoEntry, ScreenSource, Verdict};
+use petcomp::matte::CutOutOptions;
+use serde::{Deserialize, Serialize};
+use std::path::{Component, Path, PathBuf};
+use std::sync::Arc;
+
+/// An entry of a list: where that is and which photo it names, with slashes from the folder.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+pub(super) struct EntryName {
+    list: String,
+    photo: String,
+}
+
+impl EntryName {
+    /// The entry, its paths below the folder, and how its list has it cut out.
+    pub(super) fn find(&self, folder: &Folder) -> Answer<(PhotoEntry, CutOutOptions)> {
+        let list = read_list(folder, &self.list)?;
+        let mut entries = list.photos.into_iter();
+        let entry = entries.find(|entry| photo_name(folder, entry) == self.photo);
+        let entry = entry.ok_or_else(|| missing(self))?;
+        Ok((inside(folder, entry)?, list.cut_out))
+    }
+}
+
+fn missing(EntryName { list, photo }: &EntryName) -> Refusal {
+    let what = format!("{photo}: not in {list} (any more), expected one of its photos");
+    Refusal::new(StatusCode::NOT_FOUND, petcomp::printable(&what))
+}
+
+/// A list with paths from the working folder.
+fn read_list(folder: &Folder, name: &str) -> Answer<List> {
+    let path = folder.file(name)?;
+    let list = List::read(&path)?;
+    Ok(list.located_in(path.parent().unwrap_or(Path::new(""))))
+}
+
+/// The photo of an entry, as browsers say it.
+fn photo_name(folder: &Folder, entry: &PhotoEntry) -> String {
+    folder.name_of(&straightened(&entry.file))
+}
+
+/// An entry whose pictures lie in the folder.
+fn inside(folder: &Folder, mut entry: PhotoEntry) -> Answer<PhotoEntry> {
+    entry.file = folder.file(&photo_name(folder, &entry))?;
+    if let ScreenSource::Photo(empty) = &entry.screen {
+        let name = folder.name_of(&straightened(empty));
+        entry.screen = ScreenSource::Photo(folder.file(&name)?);
+    }
+    Ok(entry)
+}
+
+/// `a/c.jpg` of `a/b/../c.jpg`.
+fn straightened(path: &Path) -> PathBuf {
+    let mut straight = PathBuf::new();
+    for part in path.components() {
+        match (part, straight.file_name().is_some()) {
+            (Component::ParentDir, true) => drop(straight.pop()),
+            (Component::CurDir, _) => {}
+            _ => straight.push(part),
+        }
+    }
+    straight
+}
+
+/// What can be looked at.
+#[derive(Serialize)]
+pub(super) struct Photos {
+    photos: Vec<ListedPhoto>,
+    /// Lists that cannot be used, and why.
+    problems: Vec<String>,
+    /// Labelled photos of places to put cut-outs into.
+    plates: Vec<String>,
+}
+
+/// A photo of a list, and what was said of its cut-out.
+#[derive(Serialize)]
+struct ListedPhoto {
+    list: String,
+    photo: String,
+    asset: String,
+    class: String,
+    verdict: Option<Verdict>,
+    strokes: usize,
+}
+
+pub(super) async fn photos(State(studio): State<Arc<Studio>>) -> Answer<Json<Photos>> {
+    blocking(move || Ok(Json(Photos::of(&studio.folder)))).await
+}
+
+impl Photos {
+    fn of(folder: &Folder) -> Self {
+        let (mut photos, mut problems) = (Vec::new(), Vec::new());
+        for list in folder.find(is_list) {
+            match read_list(folder, &list) {
+                Ok(read) => photos.extend(listed(folder, &list, &read)),
+                Err(refusal) => problems.push(refusal.what),
+            }
+        }
+        Self {
+            photos,
+            problems,
+            plates: plates(folder),
+        }
+    }
+}
+
+fn is_list(path: &Path) -> bool {
+    let name = path.file_name().unwrap_or_default();
+    name == "photos.toml" || name == "photos.csv"
+}
+
+fn listed(folder: &Folder, list: &str, read: &List) -> Vec<ListedPhoto> {
+    let entries = read.photos.iter();
+    let listed = entries.map(|entry| {
+        let photo = photo_name(folder, entry);
+        let review = review_of(folder, &photo).unwrap_or_default();
+        ListedPhoto {
+            list: list.into(),
+            photo,
+            asset: entry.asset.clone(),
+            class: entry.class.clone(),
+            verdict: review.verdict,
+            strokes: review.strokes.len(),
+        }
+    });
+    listed.collect()
+}
+
+/// The photos that have a label beside them.
+fn plates(folder: &Folder) -> Vec<String> {
+    let photos = folder.find(crate::picture::may_be_photo).into_iter();
+    let is_labelled = |photo: &String| {
+        let label = Path::new(photo).with_extension("label.json");
+        folder.file(&label.to_string_lossy()).is_ok()
+    };
+    photos.filter(is_labelled).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pictures_outside_of_the_folder_are_refused() {
+        let dir = tempfile::tempdir().unwrap();
+        let root = dir.path().join("folder");
+        std::fs::create_dir_all(root.join("lists")).unwrap();
+        std::fs::write(dir.path().join("secret.png"), "").unwrap();
+        std::fs::write(root.join("a.png"), "").unwrap();
+        let entry = |file: &str, more: &str| {
+            format!(
+                "[[photos]]\nfile = \"{file}\"\nasset = \"{more}\"\nclass = \"c\"\nlength = 0.2\n"
+            )
+        };
+        let text = [entry("../a.png", "a"), entry("../../secret.png", "b")].concat();
+        std::fs::write(root.join("lists/photos.toml"), text).unwrap();
+        let folder = Folder::open(&root).unwrap();
+        let found = |photo: &str| {
+            let (list, photo) = ("lists/photos.toml".into(), photo.into());
+            EntryName { list, photo }.find(&folder)
+        };
+        assert_eq!(found("a.png").unwrap().0.file, root.join("a.png"));
+        let all = Photos::of(&folder);
+        assert_eq!(all.photos[0].photo, "a.png");
+        assert!(found(&all.photos[1].photo).is_err());
+    }
+}

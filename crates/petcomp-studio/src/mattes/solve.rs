@@ -1,0 +1,223 @@
+//! Cutting out: photos that are open, and the cut-outs that were made of them last.
+
+use super::entry::EntryName;
+use crate::folder::Folder;
+use crate::refusal::{Answer, Refusal};
+use crate::studio::Studio;
+use crate::turn::{Tab, Turns};
+use axum::Json;
+use axum::extract::State;
+use axum::http::StatusCode;
+use petcomp::asset::{OpenPhoto, PhotoEntry};
+use petcomp::matte::{CutOut, CutOutOptions, Stroke};
+use petcomp::{Diagnostic, Error, Film, Image, LinearRgb, Roi};
+use serde::{Deserialize, Serialize};
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Instant, SystemTime};
+
+/// Photos that are kept in memory: one that is worked on, and its neighbour.
+const OPEN_PHOTOS: usize = 2;
+/// Cut-outs that are kept until their layers are asked for: a few tabs' worth.
+const SOLVED: usize = 6;
+
+/// What the page keeps between requests.
+#[derive(Default)]
+pub(crate) struct Mattes {
+    turns: Turns,
+    open: Recent<PhotoKey, OpenPhoto<'static>>,
+    solved: Recent<u64, Solved>,
+}
+
+/// The last few things that were made, by what they were made of.
+struct Recent<K, V>(Mutex<VecDeque<(K, Arc<V>)>>);
+
+impl<K, V> Default for Recent<K, V> {
+    fn default() -> Self {
+        Self(Mutex::default())
+    }
+}
+
+impl<K: PartialEq, V> Recent<K, V> {
+    fn get(&self, key: &K) -> Option<Arc<V>> {
+        let kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let found = kept.iter().find(|(known, _)| known == key);
+        found.map(|(_, value)| value.clone())
+    }
+
+    fn keep(&self, key: K, value: Arc<V>, most: usize) {
+        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        kept.retain(|(known, _)| *known != key);
+        kept.truncate(most - 1);
+        kept.push_front((key, value));
+    }
+}
+
+/// What an open photo was read from: it is read again when any of this changes.
+#[derive(PartialEq)]
+struct PhotoKey {
+    entry: PhotoEntry,
+    options: CutOutOptions,
+    modified: Option<SystemTime>,
+}
+
+impl PhotoKey {
+    fn new(name: &EntryName, folder: &Folder) -> Answer<Self> {
+        let (entry, options) = name.find(folder)?;
+        let metadata = std::fs::metadata(&entry.file);
+        Ok(Self {
+            modified: metadata.and_then(|m| m.modified()).ok(),
+            entry,
+            options,
+        })
+    }
+}
+
+/// A photo and what was cut out of it.
+pub(super) struct Solved {
+    pub(super) photo: Arc<OpenPhoto<'static>>,
+    /// Nothing where the photo gives no cut-out.
+    pub(super) cut: Option<ShownCut>,
+}
+
+/// What is shown of a cut-out.
+pub(super) struct ShownCut {
+    pub(super) film: Image<Film>,
+    pub(super) uncertainty: Image<f32>,
+    /// The part of the photo that it shows.
+    pub(super) roi: Roi,
+    /// Mean colour of the screen.
+    pub(super) screen: LinearRgb,
+}
+
+impl Mattes {
+    fn open(&self, key: PhotoKey) -> Answer<Arc<OpenPhoto<'static>>> {
+        if let Some(open) = self.open.get(&key) {
+            return Ok(open);
+        }
+        let open = Arc::new(OpenPhoto::read(&key.entry, &key.options)?);
+        self.open.keep(key, open.clone(), OPEN_PHOTOS);
+        Ok(open)
+    }
+
+    /// What was solved under a number.
+    pub(super) fn solved(&self, number: u64) -> Answer<Arc<Solved>> {
+        self.solved.get(&number).ok_or_else(|| {
+            let what = "this cut-out is not kept any more: load the page again";
+            Refusal::new(StatusCode::NOT_FOUND, what)
+        })
+    }
+
+    fn keep(&self, solved: Solved) -> u64 {
+        let number = next_number();
+        self.solved.keep(number, Arc::new(solved), SOLVED);
+        number
+    }
+}
+
+fn next_number() -> u64 {
+    use std::sync::atomic::{AtomicU64, Ordering};
+    static NEXT: AtomicU64 = AtomicU64::new(1);
+    NEXT.fetch_add(1, Ordering::Relaxed)
+}
+
+#[derive(Deserialize)]
+pub(super) struct SolveRequest {
+    #[serde(flatten)]
+    name: EntryName,
+    strokes: Vec<Stroke>,
+}
+
+/// A cut-out in words; its layers are asked for by its number.
+#[derive(Serialize)]
+pub(super) struct SolvedInWords {
+    number: u64,
+    /// Width and height of what strokes are painted on, pixels.
+    size: [usize; 2],
+    /// Why there is no cut-out.
+    refused: Option<String>,
+    diagnostics: Vec<Diagnostic>,
+    outline_confidence: Option<f64>,
+    color_confidence: Option<f64>,
+    seconds: f64,
+}
+
+pub(super) async fn solve(
+    State(studio): State<Arc<Studio>>,
+    tab: Tab,
+    Json(request): Json<SolveRequest>,
+) -> Answer<Json<SolvedInWords>> {
+    let turns = studio.mattes.turns.clone();
+    let work = move |turn: &crate::turn::Turn| {
+        let photo = studio
+            .mattes
+            .open(PhotoKey::new(&request.name, &studio.folder)?)?;
+        turn.check()?;
+        cut_out(&studio.mattes, photo, &request.strokes).map(Json)
+    };
+    turns.run(tab, work).await
+}
+
+fn cut_out(
+    mattes: &Mattes,
+    photo: Arc<OpenPhoto<'static>>,
+    strokes: &[Stroke],
+) -> Answer<SolvedInWords> {
+    let start = Instant::now();
+    let outcome = photo.cut_out(strokes);
+    let seconds = start.elapsed().as_secs_f64();
+    let words = SolvedInWords::new(&outcome, photo.picture().size(), seconds);
+    let cut = match outcome {
+        Ok(cut) => Some(ShownCut::from(cut)),
+        // A photo in which nothing was found can be painted on, too.
+        Err(Error::Photo { .. }) => None,
+        Err(other) => return Err(other.into()),
+    };
+    let number = mattes.keep(Solved { photo, cut });
+    Ok(SolvedInWords { number, ..words })
+}
+
+impl SolvedInWords {
+    /// Without its number.
+    fn new(outcome: &petcomp::Result<CutOut>, size: (usize, usize), seconds: f64) -> Self {
+        let cut = outcome.as_ref().ok();
+        Self {
+            number: 0,
+            size: size.into(),
+            refused: outcome.as_ref().err().map(ToString::to_string),
+            diagnostics: cut.map(|cut| cut.diagnostics.clone()).unwrap_or_default(),
+            outline_confidence: cut.map(|cut| cut.segmentation.confidence.value()),
+            color_confidence: cut
+                .and_then(|cut| cut.color_uncertainty)
+                .map(|uncertainty| uncertainty.confidence()),
+            seconds,
+        }
+    }
+}
+
+impl From<CutOut> for ShownCut {
+    fn from(cut: CutOut) -> Self {
+        Self {
+            film: cut.film,
+            uncertainty: cut.uncertainty,
+            roi: cut.roi,
+            screen: cut.screen,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_kept_longest_goes_first() {
+        let recent = Recent::default();
+        for key in [1, 2, 1, 3] {
+            recent.keep(key, Arc::new(10 * key), 2);
+        }
+        assert_eq!(recent.get(&3).as_deref(), Some(&30));
+        assert_eq!(recent.get(&1).as_deref(), Some(&10));
+        assert!(recent.get(&2).is_none());
+    }
+}

@@ -1,0 +1,54 @@
+//! Pixels of which a person says whether they are see-through.
+
+use super::solve::Factor;
+use crate::image::Image;
+use crate::matte::stroke::Claims;
+use crate::pixel::LinearRgb;
+use std::borrow::Cow;
+
+/// Lets nothing through where a person says so.
+pub(super) fn make_opaque(factors: &mut Image<Factor>, claims: Option<&Claims>) {
+    for (factor, claim) in claimed(factors, claims) {
+        if claim == Some(false) {
+            *factor = Factor::OPAQUE;
+        }
+    }
+}
+
+/// Takes paint away where a person says that the plastic is see-through.
+pub(super) fn clear_paint(paint: &mut Image<f32>, claims: Option<&Claims>) {
+    for (paint, claim) in claimed(paint, claims) {
+        if claim == Some(true) {
+            *paint = 0.0;
+        }
+    }
+}
+
+/// The pixels of a picture with what is said of each; none where nothing is.
+fn claimed<'a, P: Copy + Default>(
+    image: &'a mut Image<P>,
+    claims: Option<&'a Claims>,
+) -> impl Iterator<Item = (&'a mut P, Option<bool>)> {
+    let claims = claims.into_iter().flat_map(|claims| claims.pixels());
+    image.pixels_mut().iter_mut().zip(claims.copied())
+}
+
+/// The measured transmittance without the shadow on the screen, where a person says that it is see
+/// through: at least that of flat plastic.
+pub(super) fn without_shadow<'a>(
+    transmittance: &'a Image<LinearRgb>,
+    flat: LinearRgb,
+    claims: Option<&Claims>,
+) -> Cow<'a, Image<LinearRgb>> {
+    match claims {
+        Some(claims) => Cow::Owned(transmittance.zip_map(claims, |t, claim| match claim {
+            Some(true) => larger(t, flat),
+            _ => t,
+        })),
+        None => Cow::Borrowed(transmittance),
+    }
+}
+
+fn larger(a: LinearRgb, b: LinearRgb) -> LinearRgb {
+    LinearRgb::new(a.r.max(b.r), a.g.max(b.g), a.b.max(b.b))
+}
