@@ -49,8 +49,12 @@ mod pictures;
 mod pipeline;
 mod preset;
 mod quality;
+#[doc(hidden)]
+pub mod recipe_text;
 mod run;
 mod scene_config;
+#[doc(hidden)]
+pub mod settings;
 mod shard;
 mod sidecar;
 mod split;
