@@ -24,6 +24,7 @@ mod render;
 mod scene;
 mod settle;
 mod short_help;
+mod studio;
 mod values;
 
 use crate::global::GlobalArgs;
@@ -59,6 +60,8 @@ enum Verb {
     Eval(eval::EvalArgs),
     /// Compare two pictures, with the flags and exit codes of OpenImageIO's idiff
     Diff(diff::DiffArgs),
+    /// Pages in the browser: label corners, look at mattes, tune a recipe, browse a dataset
+    Studio(studio::StudioArgs),
     /// What this machine has, and whether petcomp works on it
     Doctor(doctor::DoctorArgs),
 }
@@ -114,6 +117,7 @@ impl Program {
             Verb::Stage(stage) => stage.run(&self.global)?,
             Verb::Eval(args) => eval::run(args, &self.global)?,
             Verb::Diff(args) => return diff::run(args, &self.global),
+            Verb::Studio(args) => studio::run(args, &self.global)?,
             Verb::Doctor(args) => return doctor::run(args),
         }
         Ok(exit::SUCCESS_STATUS)

@@ -1,0 +1,28 @@
+//! `petcomp studio`: pages in the browser of this machine.
+
+use crate::global::GlobalArgs;
+use crate::print;
+use petcomp_studio::Server;
+use std::path::PathBuf;
+
+#[derive(clap::Args)]
+pub(crate) struct StudioArgs {
+    /// Folder with photos, labels, assets, recipes and datasets; nothing outside of it is read or
+    /// written
+    #[arg(value_name = "FOLDER", default_value = ".")]
+    folder: PathBuf,
+    /// Port of 127.0.0.1; 0 is any free one
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    port: u16,
+}
+
+/// Prints the address, and answers until Ctrl-C.
+pub(crate) fn run(args: &StudioArgs, global: &GlobalArgs) -> anyhow::Result<()> {
+    let server = Server::open(&args.folder, args.port)?;
+    print::line(server.address());
+    global.print_status("open this address in a browser of this machine; Ctrl-C ends the studio");
+    let stop = server.stop();
+    ctrlc::set_handler(move || stop.stop())?;
+    server.run();
+    Ok(())
+}

@@ -1,0 +1,3 @@
+import { frame } from "./studio.js";
+
+frame("corners");

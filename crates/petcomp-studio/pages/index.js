@@ -1,0 +1,32 @@
+import { api, element, frame, trying } from "./studio.js";
+
+frame("");
+
+const count = (list, one, many = `${one}s`) => `${list.length} ${list.length === 1 ? one : many}`;
+
+/** What each page is for, and how far this folder is. */
+const CARDS = [
+  ["corners", "Corners", "Click the four corners of a surface, and see the camera at once.",
+    (found) => `${count(found.photos, "photo")}, ${count(found.labels, "label")}, ${count(found.cameras, "camera")}`],
+  ["scale", "Scale", "Click the two ends of a ruler, or the corners of the screen: pixels per metre.",
+    (found) => count(found.photos, "photo")],
+  ["mattes", "Mattes", "Look at every cut-out, and correct it with a few strokes.",
+    (found) => count(found.assets, "folder of assets", "folders of assets")],
+  ["recipe", "Recipe", "Move a slider, and see what the pictures become.",
+    (found) => count(found.recipes, "recipe")],
+  ["dataset", "Dataset", "Pictures with their labels, outliers first.",
+    (found) => count(found.datasets, "dataset")],
+];
+
+function card([page, title, what, state], found) {
+  return element("a", { class: "card", href: page },
+    element("h2", {}, title), element("p", {}, what), element("p", { class: "soft" }, state(found)));
+}
+
+await trying(async () => {
+  const found = await api("api/overview");
+  document.title = `${found.folder} · petcomp studio`;
+  document.querySelector("main").replaceChildren(
+    element("h1", {}, found.folder),
+    element("nav", { class: "cards" }, ...CARDS.map((each) => card(each, found))));
+});

@@ -1,0 +1,272 @@
+//! The folder that is worked on: the one place where a name from a browser becomes a path.
+
+use crate::refusal::{Answer, Refusal};
+use axum::http::StatusCode;
+use petcomp::{Error, Result, io};
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+
+/// How deep below the folder files are looked for.
+const MAX_DEPTH: usize = 4;
+/// Entries that are looked at, at most, when files are looked for.
+const MAX_ENTRIES: usize = 200_000;
+
+/// A folder; nothing outside of it is read or written.
+pub(crate) struct Folder {
+    root: PathBuf,
+    /// Between the look at a file's version and its replacement nobody else saves.
+    saving: Mutex<()>,
+}
+
+/// What a file holds, and a mark of that state of it.
+#[derive(Debug, serde::Serialize)]
+pub(crate) struct Versioned {
+    pub(crate) text: String,
+    pub(crate) version: String,
+}
+
+impl Folder {
+    /// # Errors
+    /// [`Error::File`] where there is no such folder.
+    pub(crate) fn open(root: &Path) -> Result<Self> {
+        if !root.is_dir() {
+            return Err(Error::file(root, "no such folder"));
+        }
+        // Files are then named as a person would name them.
+        let root = if root == Path::new(".") {
+            PathBuf::new()
+        } else {
+            root.into()
+        };
+        Ok(Self {
+            root,
+            saving: Mutex::default(),
+        })
+    }
+
+    /// The folder's own name, for titles.
+    pub(crate) fn name(&self) -> String {
+        let path = self.here().canonicalize().unwrap_or_default();
+        let name = path.file_name().unwrap_or(OsStr::new("/"));
+        name.to_string_lossy().into_owned()
+    }
+
+    fn here(&self) -> &Path {
+        if self.root.as_os_str().is_empty() {
+            Path::new(".")
+        } else {
+            &self.root
+        }
+    }
+
+    /// A file that is there, by its name with slashes.
+    ///
+    /// # Errors
+    /// 404 for one that is not there, and for a name that leads out, a link that does, and what is
+    /// no regular file.
+    pub(crate) fn file(&self, name: &str) -> Answer<PathBuf> {
+        check_name(name)?;
+        io::inside(&self.root, name).map_err(not_found)
+    }
+
+    /// A folder that is there; the empty name is the folder itself.
+    ///
+    /// # Errors
+    /// As [`Folder::file`].
+    pub(crate) fn folder(&self, name: &str) -> Answer<PathBuf> {
+        if name.is_empty() {
+            return Ok(self.root.clone());
+        }
+        check_name(name)?;
+        let path = io::below(&self.root, name).map_err(not_found)?;
+        self.check_stays(&path, name)?;
+        Ok(path)
+    }
+
+    /// Where a file may be written: in a folder that is there. A link in its place is replaced, not
+    /// followed.
+    ///
+    /// # Errors
+    /// As [`Folder::file`] for the folder that it is to lie in.
+    pub(crate) fn place(&self, name: &str) -> Answer<PathBuf> {
+        check_name(name)?;
+        let path = io::below(&self.root, name).map_err(not_found)?;
+        let parent = Path::new(name).parent().and_then(Path::to_str);
+        self.folder(parent.unwrap_or_default())?;
+        Ok(path)
+    }
+
+    /// The name of a path inside, as browsers say it.
+    pub(crate) fn name_of(&self, path: &Path) -> String {
+        let inside = path.strip_prefix(&self.root).unwrap_or(path);
+        let parts = inside.components();
+        let parts = parts.map(|part| part.as_os_str().to_string_lossy());
+        parts.collect::<Vec<_>>().join("/")
+    }
+
+    /// A path is a folder below this one, whatever links lead there.
+    fn check_stays(&self, path: &Path, name: &str) -> Answer<()> {
+        let (root, target) = (self.here().canonicalize(), path.canonicalize());
+        match (root, target) {
+            (Ok(root), Ok(target)) if target.starts_with(&root) && target.is_dir() => Ok(()),
+            _ => Err(missing(name, "folder")),
+        }
+    }
+
+    /// The text of a file, with its version.
+    ///
+    /// # Errors
+    /// As [`Folder::file`], and for what is no text.
+    pub(crate) fn read_text(&self, name: &str) -> Answer<Versioned> {
+        let text = io::read_text(self.file(name)?)?;
+        let version = version_of(&text);
+        Ok(Versioned { text, version })
+    }
+
+    /// The version of a file; none where there is none.
+    fn version(&self, name: &str) -> Option<String> {
+        let versioned = self.read_text(name);
+        versioned.ok().map(|file| file.version)
+    }
+
+    /// Saves a text, whole or not at all, if the file is as it was when the page read it (`version`;
+    /// none: there was no file), and returns the new version.
+    ///
+    /// # Errors
+    /// [`Refusal::stale`] where it has changed since; as [`Folder::place`].
+    pub(crate) fn save(&self, name: &str, text: &str, version: Option<&str>) -> Answer<String> {
+        let path = self.place(name)?;
+        let _alone = self.saving.lock().unwrap_or_else(PoisonError::into_inner);
+        if self.version(name).as_deref() != version {
+            return Err(Refusal::stale(name));
+        }
+        io::write_text(path, text)?;
+        Ok(version_of(text))
+    }
+
+    /// The names of all files below that `wanted` takes, sorted; hidden ones are left out, and so is
+    /// what links lead to.
+    pub(crate) fn find(&self, wanted: impl Fn(&Path) -> bool) -> Vec<String> {
+        let mut found = Vec::new();
+        let mut open = vec![(self.here().to_path_buf(), 0)];
+        let mut left = MAX_ENTRIES;
+        while let Some((folder, depth)) = open.pop() {
+            for entry in visible_entries(&folder).take(left) {
+                left -= 1;
+                let kind = entry.file_type();
+                if kind.as_ref().is_ok_and(|kind| kind.is_dir()) && depth < MAX_DEPTH {
+                    open.push((entry.path(), depth + 1));
+                } else if kind.is_ok_and(|kind| kind.is_file()) && wanted(&entry.path()) {
+                    found.push(self.name_of(&without_dot(entry.path())));
+                }
+            }
+        }
+        found.sort();
+        found
+    }
+}
+
+/// `a.jpg` of `./a.jpg`.
+fn without_dot(path: PathBuf) -> PathBuf {
+    match path.strip_prefix("./") {
+        Ok(inside) => inside.into(),
+        Err(_) => path,
+    }
+}
+
+fn visible_entries(folder: &Path) -> impl Iterator<Item = std::fs::DirEntry> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    entries.filter(|entry| !entry.file_name().to_string_lossy().starts_with('.'))
+}
+
+/// A name as petcomp's own pages say it: parts between slashes, nothing hidden in them.
+fn check_name(name: &str) -> Answer<()> {
+    let plain = |part: &str| !matches!(part, "" | "." | "..") && !part.contains(['\\', '\0']);
+    if name.split('/').all(plain) {
+        Ok(())
+    } else {
+        Err(missing(name, "file or folder"))
+    }
+}
+
+fn missing(name: &str, expected: &str) -> Refusal {
+    let name = petcomp::printable(name);
+    let what = format!("{name}: no such {expected} in the folder of this studio");
+    Refusal::new(StatusCode::NOT_FOUND, what)
+}
+
+fn not_found(error: Error) -> Refusal {
+    Refusal::new(StatusCode::NOT_FOUND, error.to_string())
+}
+
+/// A mark of a text: FNV-1a of 64 bits (Fowler, Noll and Vo), with its length.
+fn version_of(text: &str) -> String {
+    const OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
+    const PRIME: u64 = 0x0100_0000_01b3;
+    let fold = |hash: u64, byte: u8| (hash ^ u64::from(byte)).wrapping_mul(PRIME);
+    format!("{:x}-{:016x}", text.len(), text.bytes().fold(OFFSET, fold))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn studio() -> (tempfile::TempDir, Folder) {
+        let dir = tempfile::tempdir().unwrap();
+        let root = dir.path().join("folder");
+        std::fs::create_dir_all(root.join("sub")).unwrap();
+        std::fs::write(root.join("sub/a.txt"), "a").unwrap();
+        std::fs::write(dir.path().join("secret.txt"), "b").unwrap();
+        let folder = Folder::open(&root).unwrap();
+        (dir, folder)
+    }
+
+    #[test]
+    fn names_that_lead_out_are_refused() {
+        let (_dir, folder) = studio();
+        assert!(folder.file("sub/a.txt").is_ok());
+        let bad = [
+            "",
+            ".",
+            "..",
+            "../secret.txt",
+            "sub/../../secret.txt",
+            "/etc/passwd",
+            "sub//a.txt",
+            "./sub/a.txt",
+            "..\\secret.txt",
+            "sub/a.txt\0",
+        ];
+        for name in bad {
+            assert!(folder.file(name).is_err(), "{name:?}");
+            assert!(folder.place(name).is_err(), "{name:?}");
+            assert!(name.is_empty() || folder.folder(name).is_err(), "{name:?}");
+        }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_that_lead_out_are_refused() {
+        let (dir, folder) = studio();
+        let root = dir.path().join("folder");
+        std::os::unix::fs::symlink("../secret.txt", root.join("far.txt")).unwrap();
+        std::os::unix::fs::symlink(dir.path(), root.join("up")).unwrap();
+        assert!(folder.file("far.txt").is_err() && folder.file("up/secret.txt").is_err());
+        assert!(folder.folder("up").is_err() && folder.place("up/new.txt").is_err());
+        assert!(folder.find(|_| true) == ["sub/a.txt"]);
+    }
+
+    #[test]
+    fn a_stale_save_is_refused() {
+        let (_dir, folder) = studio();
+        let first = folder.save("b.txt", "one", None).unwrap();
+        assert_eq!(
+            folder.save("b.txt", "two", None).unwrap_err().status,
+            StatusCode::CONFLICT
+        );
+        let second = folder.save("b.txt", "two", Some(&first)).unwrap();
+        assert!(folder.save("b.txt", "three", Some(&first)).is_err());
+        assert_eq!(folder.read_text("b.txt").unwrap().version, second);
+    }
+}

@@ -1,0 +1,105 @@
+//! Pictures for pages: a photo as the browser can show it, and small ones.
+
+use crate::refusal::{Answer, Refusal};
+use crate::studio::Studio;
+use crate::turn::blocking;
+use axum::Router;
+use axum::extract::{Query, State};
+use axum::http::header::{CACHE_CONTROL, CONTENT_TYPE};
+use axum::response::{IntoResponse, Response};
+use axum::routing::get;
+use petcomp::io::{Format, ToFile};
+use petcomp::{Image, LinearRgb, Mix, filter, io};
+use serde::Deserialize;
+use std::path::Path;
+use std::sync::Arc;
+
+/// Extensions of what may be a photo.
+const EXTENSIONS: [&str; 9] = [
+    "jpg", "jpeg", "png", "tif", "tiff", "exr", "hdr", "webp", "heic",
+];
+const JPEG_QUALITY: u8 = 88;
+/// The largest file that a browser gets as it is.
+const MAX_PLAIN_BYTES: u64 = 64 << 20;
+/// Longer sides of pictures that are made smaller, pixels.
+const MIN_SIDE_PX: usize = 16;
+const MAX_SIDE_PX: usize = 4096;
+
+/// A file that is called as pictures are.
+pub(crate) fn may_be_photo(path: &Path) -> bool {
+    let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+    extension.is_some_and(|extension| EXTENSIONS.contains(&extension.as_str()))
+}
+
+/// A JPEG as an answer.
+pub(crate) fn jpeg<P: ToFile>(image: &Image<P>) -> Answer<Response> {
+    Ok(of_type("image/jpeg", io::jpeg_bytes(image, JPEG_QUALITY)?))
+}
+
+/// A PNG as an answer.
+pub(crate) fn png<P: ToFile>(image: &Image<P>) -> Answer<Response> {
+    Ok(of_type("image/png", io::png_bytes(image)?))
+}
+
+fn of_type(kind: &'static str, bytes: Vec<u8>) -> Response {
+    ([(CONTENT_TYPE, kind)], bytes).into_response()
+}
+
+/// A picture whose longer side has so many pixels at most.
+pub(crate) fn at_most<P: Mix>(image: Image<P>, side_px: usize) -> Image<P> {
+    let (width, height) = image.size();
+    let longer = width.max(height);
+    if longer <= side_px {
+        return image;
+    }
+    let scaled = |side: usize| (side * side_px / longer).max(1);
+    filter::resize(&image, scaled(width), scaled(height))
+}
+
+pub(crate) fn routes() -> Router<Arc<Studio>> {
+    Router::new().route("/api/photo", get(photo))
+}
+
+#[derive(Deserialize)]
+struct PhotoQuery {
+    file: String,
+    /// Longer side, pixels; all of the photo without it.
+    side: Option<usize>,
+}
+
+/// A photo: the file itself where the browser can show it whole, or else a JPEG of it.
+async fn photo(
+    State(studio): State<Arc<Studio>>,
+    Query(query): Query<PhotoQuery>,
+) -> Answer<Response> {
+    let path = studio.folder.file(&query.file)?;
+    let response = blocking(move || shown(&path, query.side)).await?;
+    Ok(([(CACHE_CONTROL, "private, max-age=60")], response).into_response())
+}
+
+fn shown(path: &Path, side: Option<usize>) -> Answer<Response> {
+    let plain = plain_type(path)?;
+    match (side, plain) {
+        (None, Some(kind)) => Ok(of_type(kind, std::fs::read(path).map_err(unreadable)?)),
+        (side, _) => {
+            let side = side.unwrap_or(MAX_SIDE_PX).clamp(MIN_SIDE_PX, MAX_SIDE_PX);
+            jpeg(&at_most(io::read::<LinearRgb>(path)?, side))
+        }
+    }
+}
+
+/// The type of a file that every browser shows as petcomp reads it.
+fn plain_type(path: &Path) -> Answer<Option<&'static str>> {
+    let header = io::read_header(path)?;
+    let bytes = std::fs::metadata(path).map_err(unreadable)?.len();
+    Ok(match header.format {
+        _ if bytes > MAX_PLAIN_BYTES => None,
+        Format::Jpeg => Some("image/jpeg"),
+        Format::Png if header.bits == 8 => Some("image/png"),
+        _ => None,
+    })
+}
+
+fn unreadable(error: std::io::Error) -> Refusal {
+    petcomp::Error::file("photo", error).into()
+}

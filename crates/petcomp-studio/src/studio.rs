@@ -1,0 +1,31 @@
+//! What all requests share: the folder, and what each room keeps between them.
+
+use crate::corners::Corners;
+use crate::dataset::Dataset;
+use crate::folder::Folder;
+use crate::mattes::Mattes;
+use crate::recipe::Recipe;
+use crate::scale::Scale;
+
+/// The folder that is worked on, and the state of each room.
+pub(crate) struct Studio {
+    pub(crate) folder: Folder,
+    pub(crate) corners: Corners,
+    pub(crate) scale: Scale,
+    pub(crate) mattes: Mattes,
+    pub(crate) recipe: Recipe,
+    pub(crate) dataset: Dataset,
+}
+
+impl Studio {
+    pub(crate) fn new(folder: Folder) -> Self {
+        Self {
+            folder,
+            corners: Corners::default(),
+            scale: Scale::default(),
+            mattes: Mattes::default(),
+            recipe: Recipe::default(),
+            dataset: Dataset::default(),
+        }
+    }
+}

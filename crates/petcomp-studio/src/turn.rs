@@ -1,0 +1,108 @@
+//! Heavy work: away from the threads that answer, and given up where a newer request of the same tab
+//! replaces it.
+
+use crate::refusal::{Answer, Refusal};
+use axum::extract::FromRequestParts;
+use axum::http::StatusCode;
+use axum::http::request::Parts;
+use std::collections::HashMap;
+use std::convert::Infallible;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// The header by which a tab says which one it is.
+const TAB_HEADER: &str = "x-tab";
+
+/// Runs heavy work where it holds up nobody else.
+pub(crate) async fn blocking<T: Send + 'static>(
+    work: impl FnOnce() -> Answer<T> + Send + 'static,
+) -> Answer<T> {
+    let outcome = tokio::task::spawn_blocking(work).await;
+    outcome.unwrap_or_else(|_| Err(broken()))
+}
+
+fn broken() -> Refusal {
+    let what = "petcomp failed at this; its message is in the terminal";
+    Refusal::new(StatusCode::INTERNAL_SERVER_ERROR, what)
+}
+
+/// Which tab of the browser asks. A tab of its own where a request does not say.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
+pub(crate) struct Tab(String);
+
+impl<S: Sync> FromRequestParts<S> for Tab {
+    type Rejection = Infallible;
+
+    async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Infallible> {
+        let name = parts.headers.get(TAB_HEADER);
+        let name = name.and_then(|value| value.to_str().ok());
+        Ok(Self(name.unwrap_or_default().into()))
+    }
+}
+
+/// Requests of which only the newest of each tab matters: a slider that moves, a corner that is
+/// dragged.
+#[derive(Clone, Default)]
+pub(crate) struct Turns(Arc<Mutex<HashMap<Tab, u64>>>);
+
+/// The turn of one request.
+#[derive(Clone)]
+pub(crate) struct Turn {
+    turns: Turns,
+    tab: Tab,
+    number: u64,
+}
+
+impl Turns {
+    /// Runs heavy work, unless a newer request of the tab came before it began. Long work asks
+    /// [`Turn::check`] now and then.
+    pub(crate) async fn run<T: Send + 'static>(
+        &self,
+        tab: Tab,
+        work: impl FnOnce(&Turn) -> Answer<T> + Send + 'static,
+    ) -> Answer<T> {
+        let turn = self.take(tab);
+        blocking(move || {
+            turn.check()?;
+            work(&turn)
+        })
+        .await
+    }
+
+    fn take(&self, tab: Tab) -> Turn {
+        let mut newest = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let number = newest.entry(tab.clone()).or_default();
+        *number += 1;
+        Turn {
+            turns: self.clone(),
+            number: *number,
+            tab,
+        }
+    }
+}
+
+impl Turn {
+    /// # Errors
+    /// [`Refusal::superseded`] where the tab has asked again since.
+    pub(crate) fn check(&self) -> Answer<()> {
+        let newest = self.turns.0.lock().unwrap_or_else(PoisonError::into_inner);
+        match newest.get(&self.tab) {
+            Some(&number) if number == self.number => Ok(()),
+            _ => Err(Refusal::superseded()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_newer_request_ends_older_ones_of_its_tab_alone() {
+        let turns = Turns::default();
+        let (here, there) = (Tab("a".into()), Tab("b".into()));
+        let (old, other) = (turns.take(here.clone()), turns.take(there));
+        assert!(old.check().is_ok());
+        let new = turns.take(here);
+        assert!(old.check().is_err() && new.check().is_ok() && other.check().is_ok());
+    }
+}
