@@ -25,6 +25,7 @@ mod contact_sheet;
 mod counts;
 mod environment_maps;
 mod estimate;
+mod falls;
 mod finding;
 mod fingerprint;
 #[doc(hidden)]
@@ -32,6 +33,8 @@ pub mod fit;
 mod folder;
 mod formats;
 mod generate;
+#[doc(hidden)]
+pub mod index;
 mod inputs;
 mod journal;
 mod journal_line;

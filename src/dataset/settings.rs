@@ -23,8 +23,8 @@ pub struct Setting {
     pub path: String,
     /// What it does, in which unit.
     pub docs: String,
-    /// The default as TOML; an example where there is none.
-    pub value: String,
+    /// The default; an example where there is none.
+    pub value: Value,
     /// Whether it has no default, and `value` is an example.
     pub is_example: bool,
     /// The ends of what is taken at all.
@@ -60,13 +60,9 @@ pub fn settings() -> Vec<SettingGroup> {
     groups
 }
 
-/// Every value of a recipe that says nothing but its preset, by its path; the lights of an empty
-/// list have none.
-pub fn values_below(preset: Preset) -> Vec<(String, Value)> {
-    let mut recipe = Table::new();
-    recipe.insert("preset".into(), preset.name().into());
-    let config = DatasetConfig::from_table(recipe).expect("a recipe of ours");
-    values_by_path(&Table::try_from(config).expect("is a document"), "")
+/// The values of a preset, by their paths.
+pub fn preset_values(preset: Preset) -> Vec<(String, Value)> {
+    values_by_path(&preset.table(), "")
 }
 
 /// The values of a document by their paths; lists of tables entry by entry.
@@ -185,10 +181,16 @@ impl From<ToldKey> for Setting {
             ends: ends(&told.comment),
             path: told.path,
             docs: told.comment,
-            value: told.value.to_owned(),
+            value: value_of(told.value),
             takes: Kinds::default(),
         }
     }
+}
+
+fn value_of(text: &str) -> Value {
+    let table = format!("value = {text}").parse::<Table>();
+    let value = table.ok().and_then(|mut table| table.remove("value"));
+    value.expect("the template is TOML")
 }
 
 /// The ends of the last "A to B" in a comment.
@@ -273,7 +275,8 @@ mod tests {
     #[test]
     fn a_setting_has_its_words_its_default_and_its_ends() {
         let scale = setting("scene.scale");
-        assert_eq!((&scale.value[..], scale.ends), ("[0.9, 1.1]", Some([0.01, 100.0])));
+        assert_eq!(scale.value.to_string(), "[0.9, 1.1]");
+        assert_eq!(scale.ends, Some([0.01, 100.0]));
         assert!(scale.docs.starts_with("Size: factor on an object's width"));
         assert!(setting("scene.finish.camera_noise.read").docs.starts_with("Standard"));
         assert!(setting("scene.walls").is_example);
@@ -304,14 +307,19 @@ mod tests {
     }
 
     #[test]
-    fn a_preset_changes_what_stands_where_nothing_is_said() {
-        let value = |preset, path: &str| {
-            let mut values = values_below(preset).into_iter();
-            values.find(|(own, _)| own == path).map(|(_, value)| value.to_string())
-        };
-        assert_eq!(value(Preset::Paper, "scene.friction").unwrap(), "0.5");
-        assert_eq!(value(Preset::Real, "scene.friction").unwrap(), "0.01");
-        assert!(value(Preset::Paper, "scene.lights[0].power").is_some());
-        assert!(value(Preset::Real, "scene.lights[0].power").is_none());
+    fn a_preset_has_values_of_its_own() {
+        let friction = preset_values(Preset::Real)
+            .into_iter()
+            .find(|(path, _)| path == "scene.friction");
+        assert_eq!(friction.unwrap().1, Value::Float(0.01));
+        assert!(preset_values(Preset::Paper).is_empty());
+    }
+
+    #[test]
+    fn values_have_paths_through_tables_and_lists() {
+        let table = "a = 1\n[b]\nc = [1, 2]\n[[d]]\ne = 3\n".parse().unwrap();
+        let paths = values_by_path(&table, "").into_iter().map(|(path, _)| path);
+        let expected = ["a", "b", "b.c", "d", "d[0]", "d[0].e"];
+        assert_eq!(paths.collect::<Vec<_>>(), expected);
     }
 }
