@@ -131,7 +131,7 @@ const FRAMING_QUESTION: &str =
     "image: add \"cropped\": false if nothing was cut off the picture, true if something was";
 
 /// Pretty JSON, its lists of numbers in one line each.
-fn with_folded_lists(text: &str) -> String {
+pub fn with_folded_lists(text: &str) -> String {
     let mut folded = FoldedLines::default();
     for line in text.lines() {
         folded.push(line);

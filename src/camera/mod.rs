@@ -39,6 +39,8 @@ mod search;
 mod sides;
 #[doc(hidden)]
 pub mod simulate;
+mod sketch;
+mod snap;
 mod solution;
 mod solve;
 mod stored;
@@ -61,7 +63,7 @@ pub use focal::focal_from_equivalent;
 #[doc(hidden)]
 pub use import::from_labelme;
 #[doc(hidden)]
-pub use init::{commented, init_label};
+pub use init::{commented, init_label, with_folded_lists};
 #[doc(hidden)]
 pub use joint::{Joint, OutlierPhoto, group_by_camera, solve_joint};
 #[doc(hidden)]
@@ -71,12 +73,11 @@ pub use label::{Label, LabelCamera, LabelImage, LabelPoint, LabelSurface, Marker
 pub use lens::RadialDistortion;
 #[cfg(test)]
 pub(crate) use lens::tests::camera as tilted_camera;
-pub(crate) use marker::any_markers;
 #[cfg(test)]
 pub(crate) use marker::printed;
-#[doc(hidden)]
-pub use marker::with_markers;
 pub use marker::{Marker, find_markers};
+#[doc(hidden)]
+pub use marker::{any_markers, with_markers};
 pub use options::{CornerOrder, Priors, SolveOptions};
 #[doc(hidden)]
 pub use overlay::overlay;
@@ -85,11 +86,15 @@ pub use pinhole::Camera;
 pub use pinhole::distorted;
 pub use read::read_label;
 #[doc(hidden)]
-pub use read::{LabelledPhoto, check_distance, read_labels};
+pub use read::{LabelledPhoto, check_distance, read_labels, with_photo};
 pub(crate) use read::{apply_exif, labels_in};
 pub use rectify::warp;
 #[doc(hidden)]
 pub use rectify::{project_picture, rectify};
+#[doc(hidden)]
+pub use sketch::Sketch;
+#[doc(hidden)]
+pub use snap::{SnappedCorners, snap_corners};
 pub use solution::{Fit, Solution};
 #[doc(hidden)]
 pub use solution::{FocalFinding, Sigma};

@@ -189,7 +189,7 @@ fn camera_text(solution: &Solution) -> String {
 }
 
 /// Lines of a grid over a rectangle: both ends, metres.
-fn grid(size: [f64; 2]) -> impl Iterator<Item = [Point3<f64>; 2]> {
+pub(super) fn grid(size: [f64; 2]) -> impl Iterator<Item = [Point3<f64>; 2]> {
     let step = grid_step(size);
     let [x, y] = size.map(|s| s / 2.0);
     let upright = multiples(step, x).map(move |at| [on_surface(at, -y), on_surface(at, y)]);
@@ -207,7 +207,7 @@ fn multiples(step: f64, most: f64) -> impl Iterator<Item = f64> {
     (-count..=count).map(move |i| f64::from(i) * step)
 }
 
-fn grid_step(size: [f64; 2]) -> f64 {
+pub(super) fn grid_step(size: [f64; 2]) -> f64 {
     round_step(size[0].max(size[1]) / MAX_GRID_LINES)
 }
 

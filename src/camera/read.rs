@@ -332,7 +332,7 @@ fn completed(mut labelled: LabelledPhoto, size: Option<[f64; 2]>) -> Result<Labe
 ///
 /// # Errors
 /// A photo that cannot be read, or has another size than the label says.
-pub(crate) fn with_photo(mut label: Label, path: impl AsRef<Path>) -> Result<Label> {
+pub fn with_photo(mut label: Label, path: impl AsRef<Path>) -> Result<Label> {
     let path = path.as_ref();
     let Some(photo) = photo_of(&label, path) else {
         return Ok(label);

@@ -208,6 +208,22 @@ pub fn label_checksums<'a>(
         .collect()
 }
 
+impl CameraFile {
+    /// The camera of a photo, with the checksums of those that it was solved together with, itself
+    /// among them.
+    pub fn solved_together(
+        member: &LabelledPhoto,
+        solution: &Solution,
+        all: &[LabelledPhoto],
+    ) -> Self {
+        let mut file = Self::new(&member.label, solution);
+        if let Some(from) = file.solved_from.as_mut().filter(|_| all.len() > 1) {
+            from.together = label_checksums(all);
+        }
+        file
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

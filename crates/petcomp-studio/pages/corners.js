@@ -1,3 +1,515 @@
-import { frame } from "./studio.js";
+// Corners: four clicks on a photo become a label, and its camera is seen at once.
+
+import { api, at, choice, element, frame, query, say, shortcuts, trying } from "./studio.js";
+import { INK, PhotoView, viewKeys } from "./photo_view.js";
 
 frame("corners");
+
+const NAMES = ["top left", "top right", "bottom right", "bottom left"];
+const UNIT_KEY = "petcomp unit";
+
+const photos = [];
+/** What was changed and is not saved, by photo. */
+const drafts = new Map();
+/** The photo on the stage: { photo, label, version, corners, history, view, markers }. */
+let open = null;
+/** The photo that was saved last: new labels begin like its. */
+let last = null;
+
+const view = new PhotoView(at("stage"), {
+  click: addCorner,
+  move: () => changed(false),
+  moved: () => changed(true),
+  choose: showHint,
+  draw: drawCamera,
+});
+
+// Photos.
+
+function entryOf(photo) {
+  return photos.find((entry) => entry.photo === photo);
+}
+
+function mark(entry) {
+  if (drafts.has(entry.photo)) return ["edited", "warn"];
+  if (entry.camera) return ["camera", "good"];
+  return entry.label ? ["label", "warn"] : ["", ""];
+}
+
+function folderOf(photo) {
+  return photo.includes("/") ? photo.slice(0, photo.lastIndexOf("/")) : "";
+}
+
+function showPhotos() {
+  let folder = "";
+  const rows = photos.flatMap((entry) => {
+    const heading = folderOf(entry.photo) !== folder && (folder = folderOf(entry.photo));
+    return [heading && element("li", { class: "folder" }, heading), photoRow(entry)].filter(Boolean);
+  });
+  at("photos").replaceChildren(...rows);
+}
+
+function photoRow(entry) {
+  const [text, kind] = mark(entry);
+  return element("li", { "data-photo": entry.photo },
+    element("button", { type: "button", title: entry.photo, "aria-current": open?.photo === entry.photo ? "true" : null, onclick: () => show(entry.photo) },
+      element("img", { loading: "lazy", alt: "", src: query("api/photo", { file: entry.photo, side: 112 }) }),
+      element("span", { class: "name" }, entry.photo.split("/").pop()),
+      element("span", { class: `mark ${kind}` }, text)));
+}
+
+/** Shows anew how far photos are; their pictures stay. */
+function showMarks() {
+  for (const row of at("photos").querySelectorAll("[data-photo]")) {
+    const entry = entryOf(row.dataset.photo);
+    const [text, kind] = mark(entry);
+    row.querySelector(".mark").className = `mark ${kind}`;
+    row.querySelector(".mark").textContent = text;
+    row.querySelector("button").toggleAttribute("aria-current", open?.photo === entry.photo);
+  }
+  at("joint").disabled = photos.filter((entry) => entry.label).length < 2;
+}
+
+async function show(photo) {
+  const draft = drafts.get(photo);
+  const [state] = await Promise.all([
+    draft ?? load(photo),
+    trying(() => view.open(query("api/photo", { file: photo }))),
+  ]);
+  if (!state) return;
+  open = state;
+  history.replaceState(null, "", query("corners", { photo }));
+  document.title = `${photo.split("/").pop()} · Corners`;
+  at("title").textContent = photo.split("/").pop();
+  view.setPoints(open.corners, -1);
+  showFields();
+  showMarks();
+  showHint();
+  at("photos").querySelector("[aria-current]")?.scrollIntoView({ block: "nearest" });
+  solve();
+  if (open.label.markers && !open.version) findMarkers();
+}
+
+/** The label that a new one begins like: that of the last photo that was saved, or the nearest one in the list. */
+function likeOf(photo) {
+  const here = photos.indexOf(entryOf(photo));
+  const labelled = photos.filter((entry) => entry.label && entry.photo !== photo);
+  const distance = (entry) => Math.abs(photos.indexOf(entry) - here);
+  return last ?? labelled.sort((a, b) => distance(a) - distance(b))[0]?.photo;
+}
+
+async function load(photo) {
+  const like = entryOf(photo)?.label ? null : likeOf(photo);
+  return trying(async () => {
+    const { label, version } = await api(query("api/corners/label", { photo, like }));
+    return { photo, label, version, corners: fromLabel(label), history: [], camera: null, markers: [] };
+  });
+}
+
+// The label, and its corners in our convention: 0 is the edge of the picture.
+
+const originOf = (label) => (label.pixel_origin === "center" ? 0.5 : 0);
+
+function fromLabel(label) {
+  return (label.surface.corners_px ?? []).map(([x, y]) => [x + originOf(label), y + originOf(label)]);
+}
+
+const rounded = (value) => Math.round(value * 100) / 100;
+
+function labelNow() {
+  const label = structuredClone(open.label);
+  const origin = originOf(label);
+  if (open.corners.length === 4) {
+    label.surface.corners_px = open.corners.map(([x, y]) => [rounded(x - origin), rounded(y - origin)]);
+    label.surface.source ??= "manual";
+  } else {
+    delete label.surface.corners_px;
+  }
+  return label;
+}
+
+function remember() {
+  open.history.push(open.corners.map((corner) => [...corner]));
+}
+
+function changed(finished) {
+  if (!drafts.has(open.photo)) {
+    drafts.set(open.photo, open);
+    showMarks();
+  }
+  if (finished) remember();
+  solve();
+}
+
+function setCorners(corners, chosen) {
+  open.corners = corners;
+  view.setPoints(corners, chosen);
+  changed(true);
+  showHint();
+}
+
+/** A click: the next corner; near a corner of a marker, that one. */
+function addCorner(px) {
+  if (!open || open.corners.length === 4) return;
+  const near = open.markers.flatMap((marker) => marker.corners_px)
+    .find((corner) => Math.hypot(corner[0] - px[0], corner[1] - px[1]) * view.zoom < 8);
+  const corners = [...open.corners, near ? [...near] : px];
+  setCorners(corners.length === 4 ? clockwise(corners) : corners, corners.length - 1);
+}
+
+/** Corners in the order around their middle, from the first one on. */
+function clockwise(corners) {
+  const middle = [0, 1].map((i) => corners.reduce((sum, corner) => sum + corner[i], 0) / corners.length);
+  const angle = ([x, y]) => Math.atan2(y - middle[1], x - middle[0]);
+  const first = angle(corners[0]);
+  const turn = (corner) => (angle(corner) - first + 4 * Math.PI) % (2 * Math.PI);
+  return [corners[0], ...corners.slice(1).sort((a, b) => turn(a) - turn(b))];
+}
+
+function undo() {
+  if (!open?.history.length) return;
+  open.history.pop();
+  open.corners = (open.history.at(-1) ?? fromLabel(open.label)).map((corner) => [...corner]);
+  view.setPoints(open.corners);
+  showHint();
+  solve();
+}
+
+function removeCorner() {
+  if (!open?.corners.length) return;
+  const i = view.chosen >= 0 ? view.chosen : open.corners.length - 1;
+  setCorners(open.corners.filter((_, k) => k !== i), -1);
+}
+
+/** The next corner becomes the first: the side that is the width becomes the height. */
+function turn() {
+  if (open?.corners.length === 4) setCorners([...open.corners.slice(1), open.corners[0]], view.chosen);
+}
+
+async function snap() {
+  if (open?.corners.length !== 4) return;
+  const here = open;
+  say("looking for edges ...");
+  await trying(async () => {
+    const snapped = await api("api/corners/snap", { photo: here.photo, corners_px: here.corners });
+    if (open !== here) return;
+    const found = snapped.found.filter(Boolean).length;
+    setCorners(snapped.corners_px, view.chosen);
+    say(found === 4 ? "all four sides lie on edges" : `${found} of 4 sides show an edge; the others stay`, found === 4 ? "good" : "");
+  });
+}
+
+async function findMarkers() {
+  if (!open) return;
+  const here = open;
+  say("looking for markers ...");
+  await trying(async () => {
+    const { markers, label } = await api("api/corners/markers", { photo: here.photo, label: labelNow() });
+    here.markers = markers;
+    if (label) {
+      here.label = label;
+      drafts.set(here.photo, here);
+    }
+    if (open !== here) return;
+    const known = label ? `, ${label.points.length} corners of known place` : markers.length ? "; a click near a corner of one takes it" : "";
+    say(`${markers.length} ${markers.length === 1 ? "marker" : "markers"}${known}`, markers.length ? "good" : "");
+    showMarks();
+    view.draw();
+    solve();
+  });
+}
+
+// Fields.
+
+const unit = () => Number(at("unit").value);
+/** Lengths by the fields that show them: how to read and write each in a label. */
+const LENGTHS = {
+  width: [(label) => label.surface.width_m, (label, value) => set(label.surface, "width_m", value)],
+  height: [(label) => label.surface.height_m, (label, value) => set(label.surface, "height_m", value)],
+  lens: [(label) => label.camera.height_m, setLens],
+  wall: [(label) => label.surface.wall?.height_m, setWall],
+};
+
+function set(table, key, value) {
+  if (value === null || value === "") delete table[key];
+  else table[key] = value;
+}
+
+/** A tape's height is known to 3 %, as the doctor takes it, unless the label says otherwise. */
+function setLens(label, value) {
+  set(label.camera, "height_m", value);
+  set(label.camera, "height_sigma_m", value === null ? null : rounded(3 * value) / 100);
+}
+
+function setWall(label, value) {
+  set(label.surface, "wall", value === null ? null : { ...label.surface.wall, height_m: value });
+}
+
+function shownLength(metres) {
+  return metres === undefined || metres === null ? "" : String(Number((metres / unit()).toPrecision(6)));
+}
+
+function showFields() {
+  const { label } = open;
+  for (const [id, [read]] of Object.entries(LENGTHS)) at(id).value = shownLength(read(label));
+  at("surface").value = label.surface.id;
+  at("camera").value = label.camera.id ?? "";
+  at("cropped").value = label.image.cropped === undefined ? "" : String(label.image.cropped);
+}
+
+/** A length in metres; null for none, undefined for what is none. */
+function lengthOf(text) {
+  const value = Number(text.trim().replace(",", "."));
+  if (text.trim() === "") return null;
+  return Number.isFinite(value) && value >= 0 ? Number((value * unit()).toPrecision(9)) : undefined;
+}
+
+function readLength(id) {
+  const value = lengthOf(at(id).value);
+  at(id).setCustomValidity(value === undefined ? "a length, expected a number" : "");
+  if (value === undefined || !open) return;
+  LENGTHS[id][1](open.label, value);
+  changed(false);
+}
+
+for (const id of Object.keys(LENGTHS)) at(id).addEventListener("input", () => readLength(id));
+at("surface").addEventListener("input", () => edit((label) => { label.surface.id = at("surface").value || "surface"; }));
+at("camera").addEventListener("input", () => edit((label) => set(label.camera, "id", at("camera").value)));
+at("cropped").addEventListener("change", () => edit((label) => set(label.image, "cropped", at("cropped").value && at("cropped").value === "true")));
+at("unit").value = localStorage.getItem(UNIT_KEY) ?? "1";
+at("unit").addEventListener("change", () => {
+  localStorage.setItem(UNIT_KEY, at("unit").value);
+  if (open) showFields();
+});
+
+function edit(change) {
+  if (!open) return;
+  change(open.label);
+  changed(false);
+}
+
+// The camera, solved anew while corners move: one request at a time, the last state always.
+
+let solving = false;
+let again = false;
+
+async function solve() {
+  if (solving) {
+    again = true;
+    return;
+  }
+  solving = true;
+  do {
+    again = false;
+    await solveOnce();
+  } while (again);
+  solving = false;
+}
+
+async function solveOnce() {
+  const here = open;
+  if (!isComplete()) {
+    here.camera = null;
+    showCamera(missing());
+    return;
+  }
+  try {
+    here.camera = await api("api/corners/solve", { photo: here.photo, label: labelNow() });
+    if (open === here) showCamera();
+  } catch (error) {
+    if (error.superseded) return;
+    here.camera = null;
+    if (open === here) showCamera(error.message, "bad");
+  }
+}
+
+function hasSide() {
+  return open.label.surface.width_m || open.label.surface.height_m;
+}
+
+function isComplete() {
+  return (open.corners.length === 4 && hasSide()) || open.label.points?.length >= 4;
+}
+
+function missing() {
+  return open.corners.length < 4 ? "Four corners and a size, and the camera is here." : "Type the size of the rectangle.";
+}
+
+const plusMinus = (value, sigma, digits) => `${value.toFixed(digits)} ± ${sigma.toFixed(digits)}`;
+
+function facts(camera) {
+  const focal = camera.focal_sigma === null ? "not known" : `± ${(100 * camera.focal_sigma).toFixed(1)} %`;
+  return [
+    ["Height of the lens", `${plusMinus(camera.height[0], camera.height[1], 3)} m`],
+    ["Tilt from straight down", `${plusMinus(camera.tilt_deg[0], camera.tilt_deg[1], 1)}°`],
+    ["Focal length", `${camera.focal_px.toFixed(0)} px ${focal}`],
+    ["Corners fit to", `${camera.rms_px.toFixed(2)} px`],
+    ["Rectangle", `${camera.size.map((side) => side.toFixed(3)).join(" × ")} m`],
+    ["Scale in its middle", `${camera.px_per_metre.toFixed(0)} px/m`],
+    [`${(1000 * camera.reference_height).toFixed(0)} mm above it`, `to ${camera.height_px.toFixed(1)} px`],
+    ["Grid", `${camera.sketch.grid_step} m`],
+  ];
+}
+
+/** Lines of the doctor that the numbers do not say already. */
+function advice(camera) {
+  return camera.advice
+    .filter((line) => /^(Warning|This camera|Measure)|not known|do not show/.test(line))
+    .map((line) => element("li", { class: /^This camera/.test(line) ? "bad" : /^Warning/.test(line) ? "warn" : "" }, line));
+}
+
+function showCamera(why, kind = "") {
+  const { camera } = open;
+  const rows = camera ? facts(camera) : [];
+  at("facts").replaceChildren(...rows.flatMap(([term, text]) => [element("dt", {}, term), element("dd", {}, text)]));
+  const lines = camera ? advice(camera) : [element("li", { class: kind }, why)];
+  at("advice").replaceChildren(...(lines.length ? lines : [element("li", { class: "good" }, "Everything is known well.")]));
+  at("snap").disabled = at("turn").disabled = open.corners.length !== 4;
+  at("undo").disabled = open.history.length === 0;
+  at("save").disabled = false;
+  view.draw();
+}
+
+function showHint() {
+  if (!open) return;
+  const count = open.corners.length;
+  at("hint").textContent = count < 4
+    ? `Click the ${NAMES[count]} corner${count === 0 ? " of the surface (its inner edge)" : ""}.`
+    : view.chosen < 0 ? "Drag a corner, or choose one and press the arrows." : `Corner ${view.chosen + 1}, ${NAMES[view.chosen]}.`;
+}
+
+function middle(a, b) {
+  return [(a[0] + b[0]) / 2, (a[1] + b[1]) / 2];
+}
+
+function drawCamera() {
+  if (!open) return;
+  const sketch = open.camera?.sketch;
+  for (const marker of open.markers) {
+    view.line([...marker.corners_px, marker.corners_px[0]], INK.marker, 2);
+    view.word(String(marker.id), middle(marker.corners_px[0], marker.corners_px[2]), INK.marker);
+  }
+  sketch?.grid.forEach((line) => view.line(line, INK.grid, 1));
+  sketch?.walls.forEach((line) => view.line(line, INK.walls, 1.5));
+  if (sketch?.horizon) view.line(sketch.horizon, INK.horizon, 1.5, [8, 6]);
+  if (sketch) sketch.rectangle.forEach((line) => view.line(line, INK.rectangle, 2));
+  else view.line(open.corners.length === 4 ? [...open.corners, open.corners[0]] : open.corners, INK.rectangle, 1.5, [4, 4]);
+  if (open.corners.length === 4) {
+    const { width_m: width, height_m: height } = open.label.surface;
+    view.word(width ? `width ${shownLength(width)}` : "width", middle(open.corners[0], open.corners[1]));
+    view.word(height ? `height ${shownLength(height)}` : "height", middle(open.corners[1], open.corners[2]));
+  }
+}
+
+// Saving.
+
+async function save(next = true) {
+  if (!open || at("panel").querySelector(":invalid")) return;
+  const here = open;
+  await trying(async () => {
+    const saved = await saveOrAsk(here);
+    if (!saved) return;
+    here.version = saved.version;
+    drafts.delete(here.photo);
+    last = here.photo;
+    Object.assign(entryOf(here.photo), { label: true, camera: Boolean(saved.camera) });
+    showMarks();
+    say(saved.camera ? `saved ${saved.name} and ${saved.camera}` : `saved ${saved.name}; no camera: ${saved.why}`, saved.camera ? "good" : "bad");
+    if (next && saved.camera) showNext();
+  });
+}
+
+/** Saves; where somebody else has saved since, asks whose label it shall be. */
+async function saveOrAsk(here) {
+  const { photo } = here;
+  try {
+    return await api("api/corners/save", { photo, label: labelNow(), version: here.version });
+  } catch (error) {
+    if (!error.stale) throw error;
+  }
+  const mine = await choice("This label has changed since you opened it",
+    "Another tab or program has saved it. Whose shall it be?", ["Load theirs", "Save mine"]);
+  if (mine === "Save mine") {
+    const { version } = await api(query("api/corners/label", { photo }));
+    return api("api/corners/save", { photo, label: labelNow(), version });
+  }
+  if (mine === "Load theirs") {
+    drafts.delete(photo);
+    await show(photo);
+  }
+  return null;
+}
+
+function showNext() {
+  const from = photos.indexOf(entryOf(open.photo));
+  const order = [...photos.slice(from + 1), ...photos.slice(0, from)];
+  const next = order.find((entry) => !entry.label);
+  if (next) show(next.photo);
+}
+
+function step(way) {
+  const i = photos.indexOf(entryOf(open?.photo));
+  const next = photos[i + way];
+  if (next) show(next.photo);
+}
+
+async function solveTogether() {
+  const labelled = photos.filter((entry) => entry.label).map((entry) => entry.photo);
+  say("solving ...");
+  await trying(async () => {
+    const solved = await api("api/corners/joint", { photos: labelled });
+    for (const { photo, focal_px: focal } of solved) entryOf(photo).camera = focal !== null;
+    showMarks();
+    const shared = solved.filter((one) => one.together > 1).length;
+    await choice("Solved together",
+      table(solved), ["Close"]);
+    say(shared ? `${shared} of ${solved.length} photos share a camera` : "no two photos share a camera: give them the same name of a camera", shared ? "good" : "");
+  });
+}
+
+function table(solved) {
+  const row = (cell, cells) => element("tr", {}, ...cells.map((text) => element(cell, {}, text)));
+  return element("table", { class: "solved" },
+    row("th", ["Photo", "Shares", "Focal length", "Corners"]),
+    ...solved.map((one) => row("td", [
+      one.photo.split("/").pop(),
+      one.together > 1 ? `${one.together} photos` : "alone",
+      one.focal_px === null ? one.why : `${one.focal_px.toFixed(0)} px ± ${(100 * one.focal_sigma).toFixed(1)} %`,
+      one.rms_px === null ? "" : `${one.rms_px.toFixed(2)} px`,
+    ])));
+}
+
+at("panel").addEventListener("submit", (event) => {
+  event.preventDefault();
+  save();
+});
+for (const [id, act] of [["snap", snap], ["turn", turn], ["undo", undo], ["markers", findMarkers], ["joint", solveTogether]]) {
+  at(id).addEventListener("click", act);
+}
+addEventListener("beforeunload", (event) => drafts.size && event.preventDefault());
+
+shortcuts([
+  ["Enter", "save, and on to the next photo", () => save()],
+  ["Ctrl+s", "save", () => save(false)],
+  ["s", "snap corners to edges", snap],
+  ["m", "find markers", findMarkers],
+  ["r", "turn: the next corner is the first", turn],
+  ...[1, 2, 3, 4].map((i) => [String(i), i === 1 ? "choose corner 1 (to 4)" : "", () => view.choose(i - 1)]),
+  ...viewKeys(view),
+  ["Ctrl+z", "undo", undo],
+  ["Delete", "remove the corner", removeCorner],
+  ["Backspace", "", removeCorner],
+  ["n", "next photo", () => step(1)],
+  ["p", "photo before", () => step(-1)],
+  ["g", "type the size", () => at("width").select()],
+]);
+
+await trying(async () => {
+  photos.push(...await api("api/corners/photos"));
+  showPhotos();
+  showMarks();
+  const asked = new URLSearchParams(location.search).get("photo");
+  const first = entryOf(asked) ?? photos.find((entry) => !entry.label) ?? photos[0];
+  if (first) await show(first.photo);
+  else say("no photo in this folder: put some there, and load this page again");
+});

@@ -156,6 +156,22 @@ export function showKeys() {
   dialog.showModal();
 }
 
+/** Asks a person to choose one of some buttons; null where they would not. `what` is a text or an element. */
+export function choice(title, what, options) {
+  return new Promise((resolve) => {
+    const buttons = options.map((option, i) => element("button", { class: i === options.length - 1 ? "main" : null, value: option }, option));
+    const dialog = element("dialog", { "aria-label": title },
+      element("h2", {}, title),
+      element("form", { method: "dialog", class: "choice" }, element("div", {}, what), element("div", { class: "buttons" }, ...buttons)));
+    dialog.addEventListener("close", () => {
+      dialog.remove();
+      resolve(dialog.returnValue || null);
+    });
+    document.body.append(dialog);
+    dialog.showModal();
+  });
+}
+
 /** Fills the frame: navigation, and the keys that every page has. */
 export function frame(current) {
   const links = PAGES.map(([path, title]) =>

@@ -21,7 +21,7 @@ pub(crate) const PAGES: &[Page] = &[
 ];
 
 pub(crate) fn routes() -> Router<Arc<Studio>> {
-    Router::new().route("/api/overview", get(overview))
+    Router::new().route("/overview", get(overview))
 }
 
 /// What was found in the folder, names with slashes.

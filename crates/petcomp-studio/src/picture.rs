@@ -57,7 +57,7 @@ pub(crate) fn at_most<P: Mix>(image: Image<P>, side_px: usize) -> Image<P> {
 }
 
 pub(crate) fn routes() -> Router<Arc<Studio>> {
-    Router::new().route("/api/photo", get(photo))
+    Router::new().route("/photo", get(photo))
 }
 
 #[derive(Deserialize)]

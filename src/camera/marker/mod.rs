@@ -77,7 +77,7 @@ fn marker_at(light: &Image<f32>, rough: &[Point2<f64>; 4]) -> Option<Marker> {
 }
 
 /// The markers of every known family, for when only their size is given.
-pub(crate) fn any_markers(photo: &Image<LinearRgb>) -> Vec<Marker> {
+pub fn any_markers(photo: &Image<LinearRgb>) -> Vec<Marker> {
     #[cfg(feature = "markers")]
     {
         let tags = april::find(photo, super::label::Artwork::Apriltag);

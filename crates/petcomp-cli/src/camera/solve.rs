@@ -143,23 +143,10 @@ fn accept_member(
     global: &GlobalArgs,
 ) -> anyhow::Result<()> {
     let solution = accepted(outcome.map_err(|e| located(e, member))?, member, force)?;
-    let file = joint_camera_file(member, &solution, all);
+    let file = CameraFile::solved_together(member, &solution, all);
     write_camera(&member.beside("camera.json"), member, &file, &solution)?;
     report_solution(member, &solution, global);
     Ok(())
-}
-
-/// The camera of a photo, with the checksums of those that it was solved together with.
-fn joint_camera_file(
-    member: &LabelledPhoto,
-    solution: &Solution,
-    all: &[LabelledPhoto],
-) -> CameraFile {
-    let mut file = CameraFile::new(&member.label, solution);
-    if let Some(from) = file.solved_from.as_mut().filter(|_| all.len() > 1) {
-        from.together = camera::label_checksums(all);
-    }
-    file
 }
 
 /// Says in plain words how well each camera is known.

@@ -105,29 +105,33 @@ impl Server {
 fn app(studio: Arc<Studio>, token: Token, port: u16) -> Router {
     let below = format!("/{token}");
     let guard = Arc::new(Guard::new(token, port));
-    Router::new()
-        .nest(&below, rooms())
+    pages::routes(&below, &all_pages())
+        .nest(&format!("{below}/api"), rooms())
         .fallback(pages::not_found)
         .layer(DefaultBodyLimit::max(MAX_BODY_BYTES))
         .layer(axum::middleware::from_fn_with_state(guard, guard::check))
         .with_state(studio)
 }
 
-fn rooms() -> Router<Arc<Studio>> {
-    let all = [
+fn all_pages() -> Vec<Page> {
+    [
         overview::PAGES,
         corners::PAGES,
         scale::PAGES,
         mattes::PAGES,
         recipe::PAGES,
         dataset::PAGES,
-    ];
-    pages::routes(&all.concat())
+    ]
+    .concat()
+}
+
+fn rooms() -> Router<Arc<Studio>> {
+    Router::new()
         .merge(overview::routes())
         .merge(picture::routes())
-        .nest("/api/corners", corners::routes())
-        .nest("/api/scale", scale::routes())
-        .nest("/api/mattes", mattes::routes())
-        .nest("/api/recipe", recipe::routes())
-        .nest("/api/dataset", dataset::routes())
+        .nest("/corners", corners::routes())
+        .nest("/scale", scale::routes())
+        .nest("/mattes", mattes::routes())
+        .nest("/recipe", recipe::routes())
+        .nest("/dataset", dataset::routes())
 }

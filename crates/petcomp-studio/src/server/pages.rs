@@ -62,9 +62,11 @@ impl Page {
     }
 }
 
-pub(super) fn routes(pages: &[Page]) -> Router<Arc<Studio>> {
+/// The pages, below a path without a slash at its end.
+pub(super) fn routes(below: &str, pages: &[Page]) -> Router<Arc<Studio>> {
     pages.iter().fold(Router::new(), |router, &page| {
-        router.route(&page.route(), get(move || async move { answer(page) }))
+        let path = format!("{below}{}", page.route());
+        router.route(&path, get(move || async move { answer(page) }))
     })
 }
 

@@ -3,7 +3,7 @@
 //! Where no Chromium is installed, [`Browser::open`] says so and gives none, and the test passes.
 #![allow(dead_code, reason = "each test uses a part")]
 
-pub mod studio;
+pub(crate) mod studio;
 
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader};
@@ -19,24 +19,24 @@ const PATIENCE: Duration = Duration::from_secs(60);
 const PAUSE: Duration = Duration::from_millis(25);
 
 /// A page of a browser of its own. Its methods panic where the browser does not do what is asked.
-pub struct Browser {
+pub(crate) struct Browser {
     process: Child,
     _profile: tempfile::TempDir,
     socket: WebSocket<TcpStream>,
     session: String,
     calls: u64,
     /// Everything that the page complained of: exceptions, refused loads, errors on the console.
-    pub complaints: Vec<String>,
+    pub(crate) complaints: Vec<String>,
 }
 
 /// Keys that are held while others are pressed, as the protocol counts them.
-pub const ALT: u64 = 1;
-pub const CTRL: u64 = 2;
-pub const SHIFT: u64 = 8;
+pub(crate) const ALT: u64 = 1;
+pub(crate) const CTRL: u64 = 2;
+pub(crate) const SHIFT: u64 = 8;
 
 impl Browser {
     /// A browser with a page of so many pixels; none where Chromium is not installed.
-    pub fn open(width: u32, height: u32) -> Option<Self> {
+    pub(crate) fn open(width: u32, height: u32) -> Option<Self> {
         let profile = tempfile::tempdir().unwrap();
         let Some(mut process) = start(profile.path()) else {
             eprintln!("chromium is not installed: nothing is tested in a browser");
@@ -68,13 +68,13 @@ impl Browser {
     }
 
     /// The page's size in CSS pixels.
-    pub fn resize(&mut self, width: u32, height: u32) {
+    pub(crate) fn resize(&mut self, width: u32, height: u32) {
         let size = json!({ "width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600 });
         self.call("Emulation.setDeviceMetricsOverride", size);
     }
 
     /// Shows pages as to a person who likes them dark, or light.
-    pub fn prefer_dark(&mut self, dark: bool) {
+    pub(crate) fn prefer_dark(&mut self, dark: bool) {
         let value = if dark { "dark" } else { "light" };
         let feature = json!({ "name": "prefers-color-scheme", "value": value });
         self.call(
@@ -84,7 +84,7 @@ impl Browser {
     }
 
     /// Opens an address, and waits until its scripts have begun.
-    pub fn go(&mut self, address: &str) {
+    pub(crate) fn go(&mut self, address: &str) {
         let gone = self.call("Page.navigate", json!({ "url": address }));
         assert!(gone.get("errorText").is_none(), "{address}: {gone}");
         let here = json!(address.split('?').next());
@@ -94,7 +94,7 @@ impl Browser {
     }
 
     /// What a script gives; a promise is awaited.
-    pub fn eval(&mut self, script: &str) -> Value {
+    pub(crate) fn eval(&mut self, script: &str) -> Value {
         let asked = json!({ "expression": script, "awaitPromise": true, "returnByValue": true });
         let answer = self.call("Runtime.evaluate", asked);
         assert!(
@@ -105,7 +105,7 @@ impl Browser {
     }
 
     /// The text that is shown in the first element of a CSS selector.
-    pub fn text(&mut self, selector: &str) -> String {
+    pub(crate) fn text(&mut self, selector: &str) -> String {
         let script = format!(
             "document.querySelector({})?.innerText ?? ''",
             json!(selector)
@@ -114,7 +114,7 @@ impl Browser {
     }
 
     /// Waits until a script gives something true.
-    pub fn wait(&mut self, script: &str) {
+    pub(crate) fn wait(&mut self, script: &str) {
         let start = Instant::now();
         while !is_true(&self.eval(script)) {
             let news = "document.querySelector('footer')?.innerText";
@@ -129,19 +129,19 @@ impl Browser {
     }
 
     /// Waits until an element is there.
-    pub fn wait_for(&mut self, selector: &str) {
+    pub(crate) fn wait_for(&mut self, selector: &str) {
         self.wait(&format!("!!document.querySelector({})", json!(selector)));
     }
 
     /// Clicks at a place of the page, CSS pixels.
-    pub fn click(&mut self, [x, y]: [f64; 2]) {
+    pub(crate) fn click(&mut self, [x, y]: [f64; 2]) {
         self.mouse("mouseMoved", [x, y], "none");
         self.mouse("mousePressed", [x, y], "left");
         self.mouse("mouseReleased", [x, y], "left");
     }
 
     /// Moves the pointer with the button held.
-    pub fn drag(&mut self, path: &[[f64; 2]]) {
+    pub(crate) fn drag(&mut self, path: &[[f64; 2]]) {
         let (first, last) = (path[0], path[path.len() - 1]);
         self.mouse("mouseMoved", first, "none");
         self.mouse("mousePressed", first, "left");
@@ -152,12 +152,12 @@ impl Browser {
     }
 
     /// Moves the pointer without a button.
-    pub fn hover(&mut self, at: [f64; 2]) {
+    pub(crate) fn hover(&mut self, at: [f64; 2]) {
         self.mouse("mouseMoved", at, "none");
     }
 
     /// Turns the wheel at a place; negative is away from the person.
-    pub fn wheel(&mut self, [x, y]: [f64; 2], delta: f64) {
+    pub(crate) fn wheel(&mut self, [x, y]: [f64; 2], delta: f64) {
         let turned = json!({ "type": "mouseWheel", "x": x, "y": y, "deltaX": 0, "deltaY": delta });
         self.call("Input.dispatchMouseEvent", turned);
     }
@@ -169,14 +169,14 @@ impl Browser {
     }
 
     /// Clicks into the middle of an element.
-    pub fn click_on(&mut self, selector: &str) {
+    pub(crate) fn click_on(&mut self, selector: &str) {
         self.wait_for(selector);
         let [x, y, width, height] = self.place(selector);
         self.click([x + width / 2.0, y + height / 2.0]);
     }
 
     /// Left, top, width and height of an element, which is scrolled into sight.
-    pub fn place(&mut self, selector: &str) -> [f64; 4] {
+    pub(crate) fn place(&mut self, selector: &str) -> [f64; 4] {
         let script = format!(
             "(() => {{ const e = document.querySelector({}); e.scrollIntoView({{block: 'nearest'}}); \
              const b = e.getBoundingClientRect(); return [b.x, b.y, b.width, b.height]; }})()",
@@ -186,7 +186,7 @@ impl Browser {
     }
 
     /// Presses a key by its name (`ArrowLeft`, `Enter`, `s`), some others held.
-    pub fn press(&mut self, key: &str, held: u64) {
+    pub(crate) fn press(&mut self, key: &str, held: u64) {
         let text = match key {
             "Enter" => Some("\r"),
             key if key.chars().count() == 1 && held & (ALT | CTRL) == 0 => Some(key),
@@ -200,7 +200,7 @@ impl Browser {
     }
 
     /// Replaces what an input holds, as by typing and leaving it.
-    pub fn fill(&mut self, selector: &str, text: &str) {
+    pub(crate) fn fill(&mut self, selector: &str, text: &str) {
         let select = format!(
             "(() => {{ const e = document.querySelector({}); e.focus(); e.select?.(); }})()",
             json!(selector)
@@ -211,7 +211,7 @@ impl Browser {
     }
 
     /// Saves what is shown as a picture, PNG, if `PETCOMP_SCREENSHOTS` names a folder for it.
-    pub fn screenshot(&mut self, name: &str) {
+    pub(crate) fn screenshot(&mut self, name: &str) {
         let Some(folder) = std::env::var_os("PETCOMP_SCREENSHOTS") else {
             return;
         };
@@ -222,12 +222,12 @@ impl Browser {
     }
 
     /// The page has complained of nothing since it was opened.
-    pub fn assert_content(&self) {
+    pub(crate) fn assert_content(&self) {
         assert_eq!(self.complaints, Vec::<String>::new());
     }
 
     /// Calls a method of the protocol and returns its result.
-    pub fn call(&mut self, method: &str, params: Value) -> Value {
+    pub(crate) fn call(&mut self, method: &str, params: Value) -> Value {
         self.calls += 1;
         let mut message =
             json!({ "id": self.calls, "method": method, "params": without_nulls(params) });

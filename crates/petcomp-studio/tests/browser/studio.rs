@@ -7,14 +7,14 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// A studio that listens.
-pub struct Studio {
+pub(crate) struct Studio {
     /// `http://127.0.0.1:PORT/TOKEN/`
-    pub address: String,
+    pub(crate) address: String,
     stop: Stop,
 }
 
 impl Studio {
-    pub fn over(folder: &Path) -> Self {
+    pub(crate) fn over(folder: &Path) -> Self {
         let server = Server::open(folder, 0).unwrap();
         let studio = Self {
             address: server.address(),
@@ -25,23 +25,23 @@ impl Studio {
     }
 
     /// The address of a page: `corners`.
-    pub fn page(&self, name: &str) -> String {
+    pub(crate) fn page(&self, name: &str) -> String {
         format!("{}{name}", self.address)
     }
 
     /// `127.0.0.1:PORT`
-    pub fn host(&self) -> &str {
+    pub(crate) fn host(&self) -> &str {
         self.address.split('/').nth(2).unwrap()
     }
 
     /// `/TOKEN/`
-    pub fn root(&self) -> &str {
+    pub(crate) fn root(&self) -> &str {
         &self.address[7 + self.host().len()..]
     }
 
     /// Sends bytes and returns all that comes back, until the server closes or says nothing more for
     /// a while.
-    pub fn send(&self, request: &[u8]) -> String {
+    pub(crate) fn send(&self, request: &[u8]) -> String {
         let mut stream = TcpStream::connect(self.host()).unwrap();
         let patience = Some(Duration::from_secs(15));
         stream.set_read_timeout(patience).unwrap();
@@ -53,7 +53,7 @@ impl Studio {
     }
 
     /// What a GET of a path below the token gives: status line, headers and body.
-    pub fn get(&self, path: &str) -> String {
+    pub(crate) fn get(&self, path: &str) -> String {
         let (root, host) = (self.root(), self.host());
         self.send(
             format!("GET {root}{path} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n")
@@ -62,7 +62,7 @@ impl Studio {
     }
 
     /// What a POST of JSON to a path below the token gives.
-    pub fn post(&self, path: &str, body: &str) -> String {
+    pub(crate) fn post(&self, path: &str, body: &str) -> String {
         let (root, host, length) = (self.root(), self.host(), body.len());
         self.send(
             format!(
@@ -81,13 +81,13 @@ impl Drop for Studio {
 }
 
 /// A folder of the repository's samples: `backgrounds`, `bottles`.
-pub fn samples(name: &str) -> PathBuf {
+pub(crate) fn samples(name: &str) -> PathBuf {
     let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/samples");
     Path::new(root).join(name)
 }
 
 /// Copies the files of a folder whose names `wanted` takes.
-pub fn copy_files(from: &Path, to: &Path, wanted: impl Fn(&str) -> bool) {
+pub(crate) fn copy_files(from: &Path, to: &Path, wanted: impl Fn(&str) -> bool) {
     std::fs::create_dir_all(to).unwrap();
     for entry in std::fs::read_dir(from).unwrap().flatten() {
         let name = entry.file_name();

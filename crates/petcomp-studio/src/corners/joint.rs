@@ -1,0 +1,84 @@
+//! Photos of one camera, solved together.
+
+use super::label_file::labelled;
+use super::photos::beside;
+use crate::folder::Folder;
+use crate::refusal::Answer;
+use petcomp::camera::{self, CameraFile, Label, LabelledPhoto, Solution, SolveError, SolveOptions};
+use petcomp::{Error, io};
+use serde::Serialize;
+
+/// What became of one of the photos.
+#[derive(Serialize)]
+pub(super) struct JointPhoto {
+    photo: String,
+    /// How many photos share its camera.
+    together: usize,
+    focal_px: Option<f64>,
+    focal_sigma: Option<f64>,
+    rms_px: Option<f64>,
+    /// Why it has no camera, or what is odd about it.
+    why: Option<String>,
+}
+
+/// Solves the labels of photos, those of each camera together, and writes the cameras, as
+/// `petcomp camera joint` does.
+pub(super) fn solve(folder: &Folder, photos: &[String]) -> Answer<Vec<JointPhoto>> {
+    let all: Vec<LabelledPhoto> = photos
+        .iter()
+        .map(|photo| labelled(folder, photo))
+        .collect::<Answer<_>>()?;
+    let mut solved = Vec::new();
+    for group in camera::group_by_camera(&labels_of(&all)) {
+        let names = group.iter().map(|&i| photos[i].as_str());
+        let members: Vec<LabelledPhoto> = group.iter().map(|&i| all[i].clone()).collect();
+        solved.extend(solve_group(folder, &names.collect::<Vec<_>>(), &members)?);
+    }
+    solved.sort_by(|a, b| a.photo.cmp(&b.photo));
+    Ok(solved)
+}
+
+fn labels_of(photos: &[LabelledPhoto]) -> Vec<Label> {
+    photos.iter().map(|photo| photo.label.clone()).collect()
+}
+
+fn solve_group(
+    folder: &Folder,
+    names: &[&str],
+    members: &[LabelledPhoto],
+) -> Answer<Vec<JointPhoto>> {
+    let labels = labels_of(members);
+    let joint = camera::solve_joint(&labels, &SolveOptions::default()).map_err(Error::from)?;
+    let mut solved = Vec::new();
+    for ((name, member), outcome) in names.iter().zip(members).zip(joint.photos) {
+        solved.push(written(folder, name, member, outcome, members)?);
+    }
+    for outlier in &joint.outliers {
+        solved[outlier.photo].why = Some(outlier.diagnostic().to_string());
+    }
+    Ok(solved)
+}
+
+/// Writes the camera of a photo where it has one that fits.
+fn written(
+    folder: &Folder,
+    name: &str,
+    member: &LabelledPhoto,
+    outcome: Result<Solution, SolveError>,
+    all: &[LabelledPhoto],
+) -> Answer<JointPhoto> {
+    let outcome = outcome.and_then(Solution::fitting);
+    if let Ok(solution) = &outcome {
+        let file = CameraFile::solved_together(member, solution, all);
+        io::write_json(folder.place(&beside(name, "camera.json"))?, &file)?;
+    }
+    let found = outcome.as_ref().ok();
+    Ok(JointPhoto {
+        photo: name.into(),
+        together: all.len(),
+        focal_px: found.map(|solution| solution.camera.focal_px.x),
+        focal_sigma: found.map(|solution| solution.sigma.ln_focal),
+        rms_px: found.map(|solution| solution.rms_px),
+        why: outcome.as_ref().err().map(ToString::to_string),
+    })
+}

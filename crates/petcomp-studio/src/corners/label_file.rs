@@ -1,0 +1,199 @@
+//! Label files: read or begun for a photo, and saved with their cameras.
+
+use super::photos::beside;
+use crate::folder::Folder;
+use crate::refusal::{Answer, Refusal};
+use axum::http::StatusCode;
+use petcomp::camera::{self, CameraFile, Label, LabelledPhoto, Solution, SolveOptions};
+use petcomp::{Error, io};
+use serde::Serialize;
+use serde_json::Value;
+use std::path::PathBuf;
+
+/// The label of a photo, as its file says it or as it begins.
+#[derive(Serialize)]
+pub(super) struct LabelFile {
+    name: String,
+    label: Label,
+    /// The state of the file; none where there is none yet.
+    version: Option<String>,
+}
+
+/// Where the label of a photo lies.
+pub(super) fn path(folder: &Folder, photo: &str) -> Answer<PathBuf> {
+    folder.file(photo)?;
+    folder.place(&beside(photo, "label.json"))
+}
+
+/// The label of a photo, or a new one, which the label of another photo (`like`) lends what they
+/// share.
+pub(super) fn read(folder: &Folder, photo: &str, like: Option<&str>) -> Answer<LabelFile> {
+    let name = beside(photo, "label.json");
+    if let Ok(file) = folder.read_text(&name) {
+        return Ok(LabelFile {
+            label: io::read_json(path(folder, photo)?)?,
+            version: Some(file.version),
+            name,
+        });
+    }
+    let like = like.map(|photo| label_of(folder, photo)).transpose()?;
+    let label = camera::init_label(&folder.file(photo)?, &path(folder, photo)?, like.as_ref())?;
+    Ok(LabelFile {
+        name,
+        label,
+        version: None,
+    })
+}
+
+fn label_of(folder: &Folder, photo: &str) -> Answer<Label> {
+    Ok(io::read_json(folder.file(&beside(photo, "label.json"))?)?)
+}
+
+/// What became of a save.
+#[derive(Serialize)]
+pub(super) struct Saved {
+    name: String,
+    version: String,
+    /// The camera file, if the label has a camera.
+    camera: Option<String>,
+    /// Why it has none.
+    why: Option<String>,
+}
+
+/// Saves a label, with the remarks that its file has, and then the camera that is solved from it.
+/// A label without a camera is saved, too, and the camera of before removed: it is another one's.
+pub(super) fn save(
+    folder: &Folder,
+    photo: &str,
+    label: Label,
+    version: Option<&str>,
+) -> Answer<Saved> {
+    let name = beside(photo, "label.json");
+    check_photo(&label, photo)?;
+    let text = text_of(folder, &name, &label)?;
+    let version = folder.save(&name, &text, version)?;
+    let outcome = write_camera(folder, photo);
+    Ok(Saved {
+        name,
+        version,
+        why: outcome.as_ref().err().map(|refusal| refusal.what.clone()),
+        camera: outcome.ok(),
+    })
+}
+
+/// A label names the photo that it lies beside.
+fn check_photo(label: &Label, photo: &str) -> Answer<()> {
+    let file = photo.rsplit('/').next().unwrap_or(photo);
+    if label.image.file == file {
+        return Ok(());
+    }
+    let what = format!("image.file: {}, expected {file}", label.image.file);
+    Err(Refusal::new(StatusCode::UNPROCESSABLE_ENTITY, what))
+}
+
+/// The text of a label as `petcomp camera init` writes it; remarks of the file that is there stay.
+fn text_of(folder: &Folder, name: &str, label: &Label) -> Answer<String> {
+    let text = camera::commented(label)?;
+    let remarks = folder.read_text(name).ok().and_then(|file| {
+        let value: Value = serde_json::from_str(&file.text).ok()?;
+        Some(remarks_of(value).as_object()?.clone()).filter(|remarks| !remarks.is_empty())
+    });
+    let Some(remarks) = remarks else {
+        return Ok(text);
+    };
+    let mut value: Value = serde_json::from_str(&text).map_err(|e| Error::value("label", e))?;
+    merge(&mut value, Value::Object(remarks));
+    let text = serde_json::to_string_pretty(&value).map_err(|e| Error::value("label", e))?;
+    Ok(camera::with_folded_lists(&text) + "\n")
+}
+
+/// What a person has written for persons: keys that begin with `_`, and the tables that they are
+/// in. `_todo` is petcomp's own.
+fn remarks_of(value: Value) -> Value {
+    let Value::Object(table) = value else {
+        return Value::Null;
+    };
+    let kept = table.into_iter().filter_map(|(key, value)| {
+        let kept = if key.starts_with('_') && key != "_todo" {
+            value
+        } else {
+            remarks_of(value)
+        };
+        let is_empty = kept.is_null() || kept.as_object().is_some_and(serde_json::Map::is_empty);
+        (!is_empty).then_some((key, kept))
+    });
+    Value::Object(kept.collect())
+}
+
+/// Puts remarks where they were.
+fn merge(label: &mut Value, remarks: Value) {
+    let (Value::Object(label), Value::Object(remarks)) = (label, remarks) else {
+        return;
+    };
+    for (key, value) in remarks {
+        match label.get_mut(&key) {
+            Some(table) => merge(table, value),
+            None if key.starts_with('_') => drop(label.insert(key, value)),
+            None => {}
+        }
+    }
+}
+
+/// Solves the label of a photo and writes the camera beside it, as `petcomp camera solve` does.
+fn write_camera(folder: &Folder, photo: &str) -> Answer<String> {
+    let name = beside(photo, "camera.json");
+    let place = folder.place(&name)?;
+    let solved = labelled(folder, photo).and_then(|labelled| {
+        let solution = solved(&labelled)?;
+        Ok(CameraFile::new(&labelled.label, &solution))
+    });
+    match solved {
+        Ok(file) => {
+            io::write_json(place, &file)?;
+            Ok(name)
+        }
+        Err(refusal) => {
+            // It is of another label.
+            let _ = std::fs::remove_file(place);
+            Err(refusal)
+        }
+    }
+}
+
+/// The label of a photo as a stage reads it.
+pub(super) fn labelled(folder: &Folder, photo: &str) -> Answer<LabelledPhoto> {
+    let mut labels = camera::read_labels(path(folder, photo)?, None)?;
+    match labels.len() {
+        1 => Ok(labels.remove(0)),
+        n => {
+            let what = format!("{}: {n} labels, expected one", beside(photo, "label.json"));
+            Err(Refusal::new(StatusCode::UNPROCESSABLE_ENTITY, what))
+        }
+    }
+}
+
+/// A camera that fits its label.
+fn solved(labelled: &LabelledPhoto) -> Answer<Solution> {
+    let solution = camera::solve(&labelled.label, &SolveOptions::default())
+        .and_then(Solution::fitting)
+        .map_err(Error::from)?;
+    camera::check_distance(&solution.camera)?;
+    Ok(solution)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn remarks_stay_where_they_were() {
+        let before = json!({ "_by": "Ada", "_todo": [], "image": { "file": "a.jpg", "_lens": 2 },
+            "markers": { "_sheet": "A4" } });
+        let mut after = json!({ "image": { "file": "a.jpg" }, "camera": {} });
+        merge(&mut after, remarks_of(before));
+        let expected =
+            json!({ "_by": "Ada", "image": { "file": "a.jpg", "_lens": 2 }, "camera": {} });
+        assert_eq!(after, expected);
+    }
+}

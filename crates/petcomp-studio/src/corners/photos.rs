@@ -1,0 +1,60 @@
+//! The photos of a folder, and which of them have a label and a camera.
+
+use crate::folder::Folder;
+use crate::picture::may_be_photo;
+use serde::Serialize;
+use std::collections::BTreeSet;
+use std::path::Path;
+
+/// Endings of pictures that petcomp writes beside photos.
+const OWN_ENDINGS: [&str; 4] = [".overlay", ".front", ".matte", "contact_sheet"];
+
+/// A photo, and how far it is.
+#[derive(Serialize)]
+pub(super) struct PhotoEntry {
+    /// Its path with slashes.
+    photo: String,
+    label: bool,
+    camera: bool,
+}
+
+/// All photos below a folder, in order of name.
+pub(super) fn list(folder: &Folder) -> Vec<PhotoEntry> {
+    let json = folder.find(|path| path.extension().is_some_and(|ending| ending == "json"));
+    let documents: BTreeSet<String> = json.into_iter().collect();
+    let photos = folder.find(|path| may_be_photo(path) && !is_own(path));
+    photos
+        .into_iter()
+        .map(|photo| PhotoEntry {
+            label: documents.contains(&beside(&photo, "label.json")),
+            camera: documents.contains(&beside(&photo, "camera.json")),
+            photo,
+        })
+        .collect()
+}
+
+fn is_own(path: &Path) -> bool {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    OWN_ENDINGS.iter().any(|ending| stem.ends_with(ending))
+}
+
+/// `sub/a.label.json` of `sub/a.jpg`.
+pub(super) fn beside(photo: &str, ending: &str) -> String {
+    let file = photo.rfind('/').map_or(0, |slash| slash + 1);
+    let end = photo[file..].rfind('.').filter(|&dot| dot > 0);
+    let end = end.map_or(photo.len(), |dot| file + dot);
+    format!("{}.{ending}", &photo[..end])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_label_is_called_as_its_photo() {
+        let label = |photo: &str| beside(photo, "label.json");
+        assert_eq!(label("a.jpg"), "a.label.json");
+        assert_eq!(label("b.c/a.b.JPG"), "b.c/a.b.label.json");
+        assert_eq!(label("b.c/a"), "b.c/a.label.json");
+    }
+}
