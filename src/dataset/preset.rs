@@ -21,14 +21,6 @@ impl Preset {
         Self::deserialize(Value::from(name)).ok()
     }
 
-    /// Its name in a recipe.
-    pub(super) fn name(self) -> &'static str {
-        match self {
-            Self::Paper => "paper",
-            Self::Real => "real",
-        }
-    }
-
     fn text(self) -> &'static str {
         match self {
             Self::Paper => "",

@@ -24,6 +24,7 @@ use filter::{Filter, Order};
 use sample::SampleShown;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 pub(crate) const PAGES: &[Page] = &[crate::page!("dataset.html"), crate::page!("dataset.js")];
@@ -173,7 +174,8 @@ async fn sample(
 ) -> Answer<Json<SampleShown>> {
     blocking(move || {
         let catalog = studio.dataset.catalogs.get(&studio.folder, &asked.folder)?;
-        SampleShown::of(&catalog.index, catalog.checked(asked.row)?).map(Json)
+        picture_file(&studio.folder, &catalog, asked.row)?;
+        SampleShown::of(&catalog.index, asked.row).map(Json)
     })
     .await
 }
@@ -184,14 +186,19 @@ async fn picture(
 ) -> Answer<Response> {
     let response = blocking(move || {
         let catalog = studio.dataset.catalogs.get(&studio.folder, &asked.folder)?;
-        let file = catalog.index.file(catalog.checked(asked.row)?)?;
-        if !studio.folder.holds(&file) {
-            return Err(outside(&catalog));
-        }
-        shown(&file, asked.side)
+        shown(&picture_file(&studio.folder, &catalog, asked.row)?, asked.side)
     })
     .await?;
     Ok(([(CACHE_CONTROL, "private, max-age=300")], response).into_response())
+}
+
+/// The file of a picture, which a list may say to be anywhere.
+fn picture_file(folder: &Folder, catalog: &Catalog, row: usize) -> Answer<PathBuf> {
+    let file = catalog.index.file(catalog.checked(row)?)?;
+    if folder.holds(&file) {
+        return Ok(file);
+    }
+    Err(outside(catalog))
 }
 
 fn outside(catalog: &Catalog) -> Refusal {

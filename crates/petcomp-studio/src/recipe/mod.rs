@@ -16,6 +16,7 @@ use petcomp::dataset::DatasetConfig;
 use petcomp::dataset::settings::{SettingGroup, settings};
 use preview::{PictureAsked, Pipelines};
 use serde::{Deserialize, Serialize};
+use std::path::Path;
 use std::sync::Arc;
 
 pub(crate) const PAGES: &[Page] = &[crate::page!("recipe.html"), crate::page!("recipe.js")];
@@ -29,12 +30,25 @@ pub(crate) struct Recipe {
 
 pub(crate) fn routes() -> Router<Arc<Studio>> {
     Router::new()
+        .route("/files", get(files))
         .route("/settings", get(told_settings))
         .route("/open", get(open))
         .route("/new", post(begin))
         .route("/draft", post(draft))
         .route("/save", post(save))
         .route("/picture", post(picture))
+}
+
+/// The recipes of the folder: documents that `petcomp dataset generate` takes.
+async fn files(State(studio): State<Arc<Studio>>) -> Answer<Json<Vec<String>>> {
+    blocking(move || {
+        let is_recipe = |path: &Path| {
+            let is_toml = path.extension().is_some_and(|extension| extension == "toml");
+            is_toml && DatasetConfig::read(path, &[]).is_ok()
+        };
+        Ok(Json(studio.folder.find(is_recipe)))
+    })
+    .await
 }
 
 async fn told_settings() -> Answer<Json<Vec<SettingGroup>>> {
