@@ -11,6 +11,8 @@
 CARGO     := cargo
 SUDO      := $(shell [ "$$(id -u)" = 0 ] || echo sudo)
 BUILD     := g++ pkg-config libopenimageio-dev
+# What the pages of `petcomp studio` are tested in.
+BROWSER   := chromium fonts-dejavu-core
 BLENDER   := blender python3-numpy python3-venv
 OUT       := demo
 EXAMPLES  := target/example-output
@@ -37,13 +39,13 @@ PEERS        := blender python3-numpy python3-venv openimageio-tools ffmpeg
 PEERS_PYTHON := numpy OpenEXR opencv-python-headless pymatting pybullet pycocotools
 CORE         := 0
 
-.PHONY: python-package wheel world experiment experiment-smoke peers demo test examples lint bench golden formats python packages blender soak soak-dataset fuzz
+.PHONY: python-package wheel world experiment experiment-smoke peers demo test examples lint bench golden formats python browser packages blender soak soak-dataset fuzz
 
 demo: packages
 	$(CARGO) build --release --locked -p petcomp-cli
 	target/release/petcomp demo -o $(OUT)
 
-test: packages python
+test: packages python browser
 	PETCOMP_PYTHON=$(PYTHON) $(CARGO) test --release --locked --workspace
 	@for f in $(FEATURES); do \
 	  echo "features [$$f] alone"; \
@@ -165,6 +167,10 @@ python:
 	@[ -x $(PYTHON) ] || { ($(call install,python3-venv)) && python3 -m venv target/python && \
 	  $(PYTHON) -m pip install --quiet --retries 1 pycocotools webdataset; } || \
 	  { rm -rf target/python; echo "pycocotools cannot be installed: its tests are skipped"; }
+
+# For the tests of petcomp studio; where it cannot be had they say so and pass.
+browser:
+	@{ $(call install,$(BROWSER)); } || echo "chromium cannot be installed: pages are not tested in a browser"
 
 packages:
 	@$(call install,$(BUILD))

@@ -5,7 +5,7 @@
 //! most, relative to what there is, may be an edge; the line that most profiles agree on, the near
 //! ones of them first, is the side (RANSAC over all pairs, Fischler and Bolles 1981), and is fitted
 //! to the centres of gravity of the changes in linear light, which blur does not move. Neighbours
-//! meet in the corners.
+//! meet in the corners. Then once more, from these corners and nearer to them.
 
 use crate::filter::sample_bilinear_clamped;
 use crate::geom::{Line, Point2, Vector2};
@@ -14,8 +14,11 @@ use crate::pixel::LinearRgb;
 use std::ops::Range;
 
 /// Profiles along a side, and the part of it near each corner that is not looked at.
-const PROFILES: usize = 64;
+const PROFILES: usize = 48;
 const CORNER_PART: f64 = 0.06;
+/// Lines a pixel apart whose light makes up a profile: noise is less, and an edge that is not quite
+/// parallel still sharp.
+const LINES_PER_PROFILE: usize = 5;
 /// Samples per pixel of a profile.
 const SAMPLES_PER_PX: usize = 4;
 /// Edges of a profile that are considered: the strongest.
@@ -24,7 +27,7 @@ const MAX_EDGES: usize = 4;
 const MIN_CONTRAST: f64 = 0.04;
 const DARKNESS: f64 = 0.01;
 /// Half the way over which light changes at an edge, pixels.
-const EDGE_REACH_PX: f64 = 2.0;
+const EDGE_REACH_PX: f64 = 1.25;
 /// Edges this near to a line are on it, pixels.
 const ON_LINE_PX: f64 = 1.0;
 /// Share of the profiles that have to agree on a line.
@@ -34,6 +37,8 @@ const FAR_WEIGHT: f64 = 0.4;
 /// Pixels of the picture's diagonal for each pixel of the reach, and the least reach.
 const DIAGONALS_PER_REACH: f64 = 150.0;
 const MIN_REACH_PX: f64 = 6.0;
+/// The reach from corners that were moved already.
+const FINE_REACH_PX: f64 = 3.0;
 
 /// Where clicked corners belong.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
@@ -47,8 +52,17 @@ pub struct SnappedCorners {
 /// Moves roughly clicked corners (in order around the rectangle, pixels) to where straight edges
 /// near the sides between them meet. Sides without an edge stay.
 pub fn snap_corners(photo: &Image<LinearRgb>, rough: [[f64; 2]; 4]) -> SnappedCorners {
+    let first = snap_within(photo, rough, reach_px(photo.size()));
+    let again = snap_within(photo, first.corners_px, FINE_REACH_PX);
+    if again.found == first.found {
+        again
+    } else {
+        first
+    }
+}
+
+fn snap_within(photo: &Image<LinearRgb>, rough: [[f64; 2]; 4], reach: f64) -> SnappedCorners {
     let corners = rough.map(Point2::from);
-    let reach = reach_px(photo.size());
     let sides = [0, 1, 2, 3].map(|i| [corners[i], corners[(i + 1) % 4]]);
     let edges = sides.map(|ends| edge_near(photo, ends, reach));
     let lines = [0, 1, 2, 3].map(|i| edges[i].or_else(|| Line::through(&sides[i])));
@@ -158,6 +172,17 @@ impl Side {
         self.from + self.along * along + self.normal * across
     }
 
+    /// The light at some distance across the side, around some part of it.
+    fn mean_light(&self, photo: &Image<LinearRgb>, along: f64, across: f64) -> f64 {
+        let pixel = 1.0 / self.along.norm();
+        let lines = (0..LINES_PER_PROFILE).map(|i| {
+            let aside = (i as f64 - (LINES_PER_PROFILE - 1) as f64 / 2.0) * pixel;
+            let at = self.point(along + aside, across);
+            f64::from(sample_bilinear_clamped(photo, at.x, at.y).luminance())
+        });
+        lines.sum::<f64>() / LINES_PER_PROFILE as f64
+    }
+
     /// The strongest edges of the profile across the side at some part of it.
     fn edges(&self, photo: &Image<LinearRgb>, along: f64, reach: f64) -> Vec<Edge> {
         let profile = Profile::across(self, photo, along, reach);
@@ -187,8 +212,7 @@ impl Profile {
         let reach = reach + EDGE_REACH_PX;
         let count = (2.0 * reach) as usize * SAMPLES_PER_PX + 1;
         let light = (0..count).map(|i| {
-            let at = side.point(along, i as f64 / SAMPLES_PER_PX as f64 - reach);
-            f64::from(sample_bilinear_clamped(photo, at.x, at.y).luminance())
+            side.mean_light(photo, along, i as f64 / SAMPLES_PER_PX as f64 - reach)
         });
         Self {
             light: light.collect(),
@@ -228,7 +252,7 @@ impl Profile {
 
 /// Samples in half the way over which light changes at an edge.
 fn half_edge() -> usize {
-    EDGE_REACH_PX as usize * SAMPLES_PER_PX
+    (EDGE_REACH_PX * SAMPLES_PER_PX as f64) as usize
 }
 
 fn neighbours(k: usize, count: usize) -> Range<usize> {

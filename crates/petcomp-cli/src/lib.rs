@@ -24,6 +24,7 @@ mod render;
 mod scene;
 mod settle;
 mod short_help;
+#[cfg(feature = "studio")]
 mod studio;
 mod values;
 
@@ -61,6 +62,7 @@ enum Verb {
     /// Compare two pictures, with the flags and exit codes of OpenImageIO's idiff
     Diff(diff::DiffArgs),
     /// Pages in the browser: label corners, look at mattes, tune a recipe, browse a dataset
+    #[cfg(feature = "studio")]
     Studio(studio::StudioArgs),
     /// What this machine has, and whether petcomp works on it
     Doctor(doctor::DoctorArgs),
@@ -117,6 +119,7 @@ impl Program {
             Verb::Stage(stage) => stage.run(&self.global)?,
             Verb::Eval(args) => eval::run(args, &self.global)?,
             Verb::Diff(args) => return diff::run(args, &self.global),
+            #[cfg(feature = "studio")]
             Verb::Studio(args) => studio::run(args, &self.global)?,
             Verb::Doctor(args) => return doctor::run(args),
         }

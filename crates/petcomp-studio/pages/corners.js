@@ -1,14 +1,13 @@
 // Corners: four clicks on a photo become a label, and its camera is seen at once.
 
-import { api, at, choice, element, frame, query, say, shortcuts, trying } from "./studio.js";
+import { api, at, choice, element, frame, lengths, query, say, shortcuts, trying } from "./studio.js";
+import { photoList } from "./photo_list.js";
 import { INK, PhotoView, viewKeys } from "./photo_view.js";
 
 frame("corners");
 
 const NAMES = ["top left", "top right", "bottom right", "bottom left"];
-const UNIT_KEY = "petcomp unit";
 
-const photos = [];
 /** What was changed and is not saved, by photo. */
 const drafts = new Map();
 /** The photo on the stage: { photo, label, version, corners, history, view, markers }. */
@@ -26,47 +25,18 @@ const view = new PhotoView(at("stage"), {
 
 // Photos.
 
-function entryOf(photo) {
-  return photos.find((entry) => entry.photo === photo);
-}
+const list = photoList(at("photos"), show, mark);
+const { entries: photos, entryOf } = list;
+const units = lengths(at("unit"), () => open && showFields());
 
 function mark(entry) {
-  if (drafts.has(entry.photo)) return ["edited", "warn"];
+  if (drafts.has(entry.photo)) return ["not saved", "warn"];
   if (entry.camera) return ["camera", "good"];
-  return entry.label ? ["label", "warn"] : ["", ""];
+  return entry.label ? ["label, no camera", "warn"] : ["", ""];
 }
 
-function folderOf(photo) {
-  return photo.includes("/") ? photo.slice(0, photo.lastIndexOf("/")) : "";
-}
-
-function showPhotos() {
-  let folder = "";
-  const rows = photos.flatMap((entry) => {
-    const heading = folderOf(entry.photo) !== folder && (folder = folderOf(entry.photo));
-    return [heading && element("li", { class: "folder" }, heading), photoRow(entry)].filter(Boolean);
-  });
-  at("photos").replaceChildren(...rows);
-}
-
-function photoRow(entry) {
-  const [text, kind] = mark(entry);
-  return element("li", { "data-photo": entry.photo },
-    element("button", { type: "button", title: entry.photo, "aria-current": open?.photo === entry.photo ? "true" : null, onclick: () => show(entry.photo) },
-      element("img", { loading: "lazy", alt: "", src: query("api/photo", { file: entry.photo, side: 112 }) }),
-      element("span", { class: "name" }, entry.photo.split("/").pop()),
-      element("span", { class: `mark ${kind}` }, text)));
-}
-
-/** Shows anew how far photos are; their pictures stay. */
 function showMarks() {
-  for (const row of at("photos").querySelectorAll("[data-photo]")) {
-    const entry = entryOf(row.dataset.photo);
-    const [text, kind] = mark(entry);
-    row.querySelector(".mark").className = `mark ${kind}`;
-    row.querySelector(".mark").textContent = text;
-    row.querySelector("button").toggleAttribute("aria-current", open?.photo === entry.photo);
-  }
+  list.showMarks();
   at("joint").disabled = photos.filter((entry) => entry.label).length < 2;
 }
 
@@ -83,9 +53,9 @@ async function show(photo) {
   at("title").textContent = photo.split("/").pop();
   view.setPoints(open.corners, -1);
   showFields();
+  list.choose(photo);
   showMarks();
   showHint();
-  at("photos").querySelector("[aria-current]")?.scrollIntoView({ block: "nearest" });
   solve();
   if (open.label.markers && !open.version) findMarkers();
 }
@@ -221,7 +191,6 @@ async function findMarkers() {
 
 // Fields.
 
-const unit = () => Number(at("unit").value);
 /** Lengths by the fields that show them: how to read and write each in a label. */
 const LENGTHS = {
   width: [(label) => label.surface.width_m, (label, value) => set(label.surface, "width_m", value)],
@@ -245,28 +214,16 @@ function setWall(label, value) {
   set(label.surface, "wall", value === null ? null : { ...label.surface.wall, height_m: value });
 }
 
-function shownLength(metres) {
-  return metres === undefined || metres === null ? "" : String(Number((metres / unit()).toPrecision(6)));
-}
-
 function showFields() {
   const { label } = open;
-  for (const [id, [read]] of Object.entries(LENGTHS)) at(id).value = shownLength(read(label));
+  for (const [id, [read]] of Object.entries(LENGTHS)) at(id).value = units.shown(read(label));
   at("surface").value = label.surface.id;
   at("camera").value = label.camera.id ?? "";
   at("cropped").value = label.image.cropped === undefined ? "" : String(label.image.cropped);
 }
 
-/** A length in metres; null for none, undefined for what is none. */
-function lengthOf(text) {
-  const value = Number(text.trim().replace(",", "."));
-  if (text.trim() === "") return null;
-  return Number.isFinite(value) && value >= 0 ? Number((value * unit()).toPrecision(9)) : undefined;
-}
-
 function readLength(id) {
-  const value = lengthOf(at(id).value);
-  at(id).setCustomValidity(value === undefined ? "a length, expected a number" : "");
+  const value = units.read(at(id));
   if (value === undefined || !open) return;
   LENGTHS[id][1](open.label, value);
   changed(false);
@@ -276,11 +233,6 @@ for (const id of Object.keys(LENGTHS)) at(id).addEventListener("input", () => re
 at("surface").addEventListener("input", () => edit((label) => { label.surface.id = at("surface").value || "surface"; }));
 at("camera").addEventListener("input", () => edit((label) => set(label.camera, "id", at("camera").value)));
 at("cropped").addEventListener("change", () => edit((label) => set(label.image, "cropped", at("cropped").value && at("cropped").value === "true")));
-at("unit").value = localStorage.getItem(UNIT_KEY) ?? "1";
-at("unit").addEventListener("change", () => {
-  localStorage.setItem(UNIT_KEY, at("unit").value);
-  if (open) showFields();
-});
 
 function edit(change) {
   if (!open) return;
@@ -340,22 +292,49 @@ const plusMinus = (value, sigma, digits) => `${value.toFixed(digits)} ± ${sigma
 function facts(camera) {
   const focal = camera.focal_sigma === null ? "not known" : `± ${(100 * camera.focal_sigma).toFixed(1)} %`;
   return [
-    ["Height of the lens", `${plusMinus(camera.height[0], camera.height[1], 3)} m`],
-    ["Tilt from straight down", `${plusMinus(camera.tilt_deg[0], camera.tilt_deg[1], 1)}°`],
+    ["Lens above surface", `${plusMinus(camera.height[0], camera.height[1], 3)} m`],
+    ["Tilt", `${plusMinus(camera.tilt_deg[0], camera.tilt_deg[1], 1)}°`],
     ["Focal length", `${camera.focal_px.toFixed(0)} px ${focal}`],
     ["Corners fit to", `${camera.rms_px.toFixed(2)} px`],
     ["Rectangle", `${camera.size.map((side) => side.toFixed(3)).join(" × ")} m`],
-    ["Scale in its middle", `${camera.px_per_metre.toFixed(0)} px/m`],
-    [`${(1000 * camera.reference_height).toFixed(0)} mm above it`, `to ${camera.height_px.toFixed(1)} px`],
+    ["Scale", `${camera.px_per_metre.toFixed(0)} px/m`],
+    [`${(1000 * camera.reference_height).toFixed(0)} mm above it, drawn to`, `${camera.height_px.toFixed(1)} px`],
     ["Grid", `${camera.sketch.grid_step} m`],
   ];
 }
+
+/** The doctor's words for files, as this page says them. */
+const IN_THIS_PAGE = [
+  [/ If it is, write "cropped": false under "image": the principal point is then its middle( and)?/, " If it is, say so below:"],
+  [/ and write it as camera\.height_m/, " and type it below"],
+  [/\(camera joint\)/, "(solve all together)"],
+  [/\+-/g, "±"],
+];
 
 /** Lines of the doctor that the numbers do not say already. */
 function advice(camera) {
   return camera.advice
     .filter((line) => /^(Warning|This camera|Measure)|not known|do not show/.test(line))
-    .map((line) => element("li", { class: /^This camera/.test(line) ? "bad" : /^Warning/.test(line) ? "warn" : "" }, line));
+    .map((line) => element("li", { class: /^This camera/.test(line) ? "bad" : /^Warning/.test(line) ? "warn" : "" },
+      IN_THIS_PAGE.reduce((text, [words, here]) => text.replace(words, here), line),
+      ...remedies(line)));
+}
+
+/** Buttons that do what a line advises. */
+function remedies(line) {
+  if (line.includes("\"cropped\": false")) return [element("button", { type: "button", onclick: sayWhole }, "Nothing was cut off")];
+  if (line.startsWith("Measure")) return [element("button", { type: "button", onclick: askLens }, "Type the height")];
+  return [];
+}
+
+function sayWhole() {
+  at("cropped").value = "false";
+  edit((label) => set(label.image, "cropped", false));
+}
+
+function askLens() {
+  at("more").open = true;
+  at("lens").focus();
 }
 
 function showCamera(why, kind = "") {
@@ -396,8 +375,8 @@ function drawCamera() {
   else view.line(open.corners.length === 4 ? [...open.corners, open.corners[0]] : open.corners, INK.rectangle, 1.5, [4, 4]);
   if (open.corners.length === 4) {
     const { width_m: width, height_m: height } = open.label.surface;
-    view.word(width ? `width ${shownLength(width)}` : "width", middle(open.corners[0], open.corners[1]));
-    view.word(height ? `height ${shownLength(height)}` : "height", middle(open.corners[1], open.corners[2]));
+    view.word(width ? `width ${units.shown(width)}` : "width", middle(open.corners[0], open.corners[1]));
+    view.word(height ? `height ${units.shown(height)}` : "height", middle(open.corners[1], open.corners[2]));
   }
 }
 
@@ -415,7 +394,7 @@ async function save(next = true) {
     Object.assign(entryOf(here.photo), { label: true, camera: Boolean(saved.camera) });
     showMarks();
     say(saved.camera ? `saved ${saved.name} and ${saved.camera}` : `saved ${saved.name}; no camera: ${saved.why}`, saved.camera ? "good" : "bad");
-    if (next && saved.camera) showNext();
+    if (next && saved.camera) list.next((entry) => !entry.label);
   });
 }
 
@@ -440,19 +419,6 @@ async function saveOrAsk(here) {
   return null;
 }
 
-function showNext() {
-  const from = photos.indexOf(entryOf(open.photo));
-  const order = [...photos.slice(from + 1), ...photos.slice(0, from)];
-  const next = order.find((entry) => !entry.label);
-  if (next) show(next.photo);
-}
-
-function step(way) {
-  const i = photos.indexOf(entryOf(open?.photo));
-  const next = photos[i + way];
-  if (next) show(next.photo);
-}
-
 async function solveTogether() {
   const labelled = photos.filter((entry) => entry.label).map((entry) => entry.photo);
   say("solving ...");
@@ -461,8 +427,8 @@ async function solveTogether() {
     for (const { photo, focal_px: focal } of solved) entryOf(photo).camera = focal !== null;
     showMarks();
     const shared = solved.filter((one) => one.together > 1).length;
-    await choice("Solved together",
-      table(solved), ["Close"]);
+    say("");
+    await choice("Solved together", table(solved), ["Close"]);
     say(shared ? `${shared} of ${solved.length} photos share a camera` : "no two photos share a camera: give them the same name of a camera", shared ? "good" : "");
   });
 }
@@ -499,17 +465,12 @@ shortcuts([
   ["Ctrl+z", "undo", undo],
   ["Delete", "remove the corner", removeCorner],
   ["Backspace", "", removeCorner],
-  ["n", "next photo", () => step(1)],
-  ["p", "photo before", () => step(-1)],
+  ["n", "next photo", () => list.step(1)],
+  ["p", "photo before", () => list.step(-1)],
   ["g", "type the size", () => at("width").select()],
 ]);
 
 await trying(async () => {
-  photos.push(...await api("api/corners/photos"));
-  showPhotos();
+  await list.fill(await api("api/corners/photos"), (entry) => !entry.label);
   showMarks();
-  const asked = new URLSearchParams(location.search).get("photo");
-  const first = entryOf(asked) ?? photos.find((entry) => !entry.label) ?? photos[0];
-  if (first) await show(first.photo);
-  else say("no photo in this folder: put some there, and load this page again");
 });

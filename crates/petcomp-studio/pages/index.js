@@ -1,4 +1,4 @@
-import { api, element, frame, trying } from "./studio.js";
+import { api, element, frame, query, trying } from "./studio.js";
 
 frame("");
 
@@ -18,9 +18,24 @@ const CARDS = [
     (found) => count(found.datasets, "dataset")],
 ];
 
+/** A few photos that a page is about. */
+const SAMPLES = {
+  corners: (found) => found.labels.map((label) => label.replace(/\.label\.json$/, ".")),
+  scale: (found) => found.photo_lists.map((list) => list.replace(/photos\.[^/]*$/, "")),
+};
+const MOST_SAMPLES = 3;
+
+function strip(page, found) {
+  const beginnings = SAMPLES[page]?.(found) ?? [];
+  const photos = found.photos.filter((photo) => beginnings.some((beginning) => photo.startsWith(beginning)));
+  const shown = photos.slice(0, MOST_SAMPLES);
+  return shown.length > 0 && element("div", { class: "strip" },
+    ...shown.map((file) => element("img", { alt: "", src: query("api/photo", { file, side: 240 }) })));
+}
+
 function card([page, title, what, state], found) {
   return element("a", { class: "card", href: page },
-    element("h2", {}, title), element("p", {}, what), element("p", { class: "soft" }, state(found)));
+    element("h2", {}, title), element("p", {}, what), element("p", { class: "soft" }, state(found)), strip(page, found));
 }
 
 await trying(async () => {

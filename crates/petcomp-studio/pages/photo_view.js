@@ -4,6 +4,9 @@ const MAX_ZOOM = 32;
 /** How near to a point a press takes it, and how far a press may move and still be a click: CSS pixels. */
 const GRAB = 14;
 const SLACK = 4;
+/** The magnifier shows the brightest of what it shows so bright, by so much at most. */
+const BRIGHT = 225;
+const MAX_GAIN = 3;
 const MAGNIFIER = { size: 176, zoom: 8, margin: 12 };
 
 /** The colours of what is drawn over photos: on any photo, in light and dark. */
@@ -25,6 +28,8 @@ export class PhotoView {
     this.points = [];
     this.chosen = -1;
     this.zoom = 1;
+    /** How much brighter than it is the photo is shown. */
+    this.light = 1;
     this.left = 0;
     this.top = 0;
     this.pointers = new Map();
@@ -93,6 +98,11 @@ export class PhotoView {
     const center = this.points[this.chosen];
     const at = center ? this.onStage(center) : [this.canvas.clientWidth / 2, this.canvas.clientHeight / 2];
     this.zoomAt(at, factor);
+  }
+
+  brighten() {
+    this.light = this.light >= 4 ? 1 : 2 * this.light;
+    this.draw();
   }
 
   setPoints(points, chosen = this.chosen) {
@@ -210,7 +220,9 @@ export class PhotoView {
     const [width, height] = this.size;
     context.imageSmoothingEnabled = this.zoom < 3;
     context.imageSmoothingQuality = "high";
+    context.filter = this.light > 1 ? `brightness(${this.light})` : "none";
     context.drawImage(this.photo, this.left, this.top, width * this.zoom, height * this.zoom);
+    context.filter = "none";
     this.events.draw?.(this);
     this.points.forEach((point, i) => this.drawPoint(point, i));
     this.drawMagnifier();
@@ -268,6 +280,18 @@ export class PhotoView {
     return this.points[this.chosen] ?? null;
   }
 
+  /** How much brighter the magnifier is, so that what is dark around a position is seen. */
+  gainAt([x, y], side) {
+    const count = Math.ceil(side);
+    this.sampler ??= new OffscreenCanvas(count, count).getContext("2d", { willReadFrequently: true });
+    const { canvas } = this.sampler;
+    this.sampler.clearRect(0, 0, canvas.width, canvas.height);
+    this.sampler.drawImage(this.photo, x - side / 2, y - side / 2, side, side, 0, 0, canvas.width, canvas.height);
+    const bytes = this.sampler.getImageData(0, 0, canvas.width, canvas.height).data;
+    const brightest = bytes.reduce((most, byte, i) => (i % 4 < 3 && byte > most ? byte : most), 1);
+    return Math.min(Math.max(BRIGHT / brightest, 1), MAX_GAIN);
+  }
+
   drawMagnifier() {
     const center = this.magnified();
     const { size, margin } = MAGNIFIER;
@@ -292,6 +316,7 @@ export class PhotoView {
     context.translate(-center[0], -center[1]);
     const [x, y] = [Math.max(Math.floor(center[0] - shown), 0), Math.max(Math.floor(center[1] - shown), 0)];
     const [width, height] = [2 * shown + 2, 2 * shown + 2].map(Math.ceil);
+    context.filter = `brightness(${this.gainAt(center, shown)})`;
     context.drawImage(this.photo, x, y, width, height, x, y, width, height);
     context.restore();
     context.save();
@@ -333,6 +358,7 @@ export function viewKeys(view) {
     ...arrows("", 0.1, "move the point by 0.1 pixel (all four arrows)"),
     ...arrows("Shift+", 1, "by a pixel"),
     ...arrows("Ctrl+", 10, "by 10 pixels"),
+    ["b", "a brighter photo, to see dark corners", () => view.brighten()],
     ["f", "the whole photo", () => view.fit()],
     ["+", "nearer (or the wheel)", () => view.zoomBy(1.5)],
     ["=", "", () => view.zoomBy(1.5)],

@@ -156,6 +156,31 @@ export function showKeys() {
   dialog.showModal();
 }
 
+/** Lengths in the unit that `select` shows, which every page remembers; `changed` when it is another one. */
+export function lengths(select, changed) {
+  const key = "petcomp unit";
+  select.value = localStorage.getItem(key) ?? "1";
+  select.addEventListener("change", () => {
+    localStorage.setItem(key, select.value);
+    changed();
+  });
+  const unit = () => Number(select.value);
+  return {
+    /** A length as a field shows it. */
+    shown(metres) {
+      return metres === undefined || metres === null ? "" : String(Number((metres / unit()).toPrecision(6)));
+    },
+    /** What a field says, in metres; null for nothing, undefined for what is no length: the field then says so. */
+    read(field) {
+      const text = field.value.trim().replace(",", ".");
+      const value = text === "" ? null : Number((Number(text) * unit()).toPrecision(9));
+      const wrong = value !== null && !(value >= 0);
+      field.setCustomValidity(wrong ? "expected a length, a number" : "");
+      return wrong ? undefined : value;
+    },
+  };
+}
+
 /** Asks a person to choose one of some buttons; null where they would not. `what` is a text or an element. */
 export function choice(title, what, options) {
   return new Promise((resolve) => {

@@ -34,12 +34,27 @@ struct Overview {
     /// `manifest.json` of folders of assets.
     assets: Vec<String>,
     recipes: Vec<String>,
+    /// Lists of photos of objects.
+    photo_lists: Vec<String>,
     /// `data.yaml` of datasets.
     datasets: Vec<String>,
 }
 
 async fn overview(State(studio): State<Arc<Studio>>) -> Answer<Json<Overview>> {
     blocking(move || Ok(Json(Overview::of(&studio)))).await
+}
+
+/// The TOML documents that name backgrounds, as every recipe does.
+fn recipes(studio: &Studio) -> Vec<String> {
+    let documents = studio
+        .folder
+        .find(|path| path.extension().is_some_and(|e| e == "toml"));
+    let is_recipe = |name: &String| {
+        let text = studio.folder.read_text(name).ok();
+        let table = text.and_then(|file| file.text.parse::<toml::Table>().ok());
+        table.is_some_and(|table| table.contains_key("backgrounds"))
+    };
+    documents.into_iter().filter(is_recipe).collect()
 }
 
 impl Overview {
@@ -54,7 +69,8 @@ impl Overview {
             labels: named(".label.json"),
             cameras: named(".camera.json"),
             assets: named("/manifest.json"),
-            recipes: named(".toml"),
+            recipes: recipes(studio),
+            photo_lists: [named("/photos.toml"), named("/photos.csv")].concat(),
             datasets: named("/data.yaml"),
         }
     }

@@ -5,13 +5,11 @@ use crate::dataset::Dataset;
 use crate::folder::Folder;
 use crate::mattes::Mattes;
 use crate::recipe::Recipe;
-use crate::scale::Scale;
 
 /// The folder that is worked on, and the state of each room.
 pub(crate) struct Studio {
     pub(crate) folder: Folder,
     pub(crate) corners: Corners,
-    pub(crate) scale: Scale,
     pub(crate) mattes: Mattes,
     pub(crate) recipe: Recipe,
     pub(crate) dataset: Dataset,
@@ -22,7 +20,6 @@ impl Studio {
         Self {
             folder,
             corners: Corners::default(),
-            scale: Scale::default(),
             mattes: Mattes::default(),
             recipe: Recipe::default(),
             dataset: Dataset::default(),

@@ -26,6 +26,7 @@ use view::CameraView;
 pub(crate) const PAGES: &[Page] = &[
     crate::page!("corners.html"),
     crate::page!("corners.js"),
+    crate::page!("photo_list.js"),
     crate::page!("photo_view.js"),
 ];
 
@@ -183,7 +184,7 @@ async fn solve_together(
 
 impl Studio {
     /// A photo of the folder, the last one read again only when its file has changed.
-    fn photo(&self, name: &str) -> Answer<Arc<Image<LinearRgb>>> {
+    pub(crate) fn photo(&self, name: &str) -> Answer<Arc<Image<LinearRgb>>> {
         let path = self.folder.file(name)?;
         Ok(self.corners.photo.read(&path)?)
     }

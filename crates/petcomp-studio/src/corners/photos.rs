@@ -18,11 +18,14 @@ pub(super) struct PhotoEntry {
     camera: bool,
 }
 
-/// All photos below a folder, in order of name.
+/// All photos below a folder, in order of name; those of objects, which a list names, come last.
 pub(super) fn list(folder: &Folder) -> Vec<PhotoEntry> {
     let json = folder.find(|path| path.extension().is_some_and(|ending| ending == "json"));
     let documents: BTreeSet<String> = json.into_iter().collect();
-    let photos = folder.find(|path| may_be_photo(path) && !is_own(path));
+    let mut photos = folder.find(|path| may_be_photo(path) && !is_own(path));
+    let lists = folder.find(is_list);
+    let folders: BTreeSet<&str> = lists.iter().map(|list| parent_of(list)).collect();
+    photos.sort_by_key(|photo| folders.contains(parent_of(photo)));
     photos
         .into_iter()
         .map(|photo| PhotoEntry {
@@ -31,6 +34,17 @@ pub(super) fn list(folder: &Folder) -> Vec<PhotoEntry> {
             photo,
         })
         .collect()
+}
+
+/// A list of photos of objects.
+fn is_list(path: &Path) -> bool {
+    ["photos.toml", "photos.csv"]
+        .iter()
+        .any(|name| path.ends_with(name))
+}
+
+fn parent_of(name: &str) -> &str {
+    name.rsplit_once('/').map_or("", |(folder, _)| folder)
 }
 
 fn is_own(path: &Path) -> bool {

@@ -1,16 +1,111 @@
-//! The page `scale`.
+//! The page `scale`: two ends of a ruler, or the corners of the screen, and a photo has its pixels
+//! per metre.
 
+mod photo_list;
+
+use crate::picture::may_be_photo;
+use crate::refusal::Answer;
 use crate::server::Page;
 use crate::studio::Studio;
-use axum::Router;
+use crate::turn::blocking;
+use axum::extract::{Query, State};
+use axum::routing::{get, post};
+use axum::{Json, Router};
+use petcomp::matte;
+use photo_list::{ListedPhoto, PhotoScale, ScaledPhoto};
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 pub(crate) const PAGES: &[Page] = &[crate::page!("scale.html"), crate::page!("scale.js")];
 
-/// What the page keeps between requests.
-#[derive(Default)]
-pub(crate) struct Scale {}
-
 pub(crate) fn routes() -> Router<Arc<Studio>> {
     Router::new()
+        .route("/photos", get(list_photos))
+        .route("/photo", get(read_photo))
+        .route("/screen", post(find_screen))
+        .route("/save", post(save))
+}
+
+/// A photo, and whether its list says how large things in it are.
+#[derive(Serialize)]
+struct PhotoEntry {
+    photo: String,
+    scaled: bool,
+}
+
+async fn list_photos(State(studio): State<Arc<Studio>>) -> Answer<Json<Vec<PhotoEntry>>> {
+    blocking(move || {
+        let photos = studio.folder.find(may_be_photo);
+        let scaled = photo_list::scaled_photos(&studio.folder, &photos);
+        let entries = photos.into_iter().map(|photo| PhotoEntry {
+            scaled: scaled.contains(&photo),
+            photo,
+        });
+        Ok(Json(entries.collect()))
+    })
+    .await
+}
+
+#[derive(Deserialize)]
+struct PhotoName {
+    photo: String,
+}
+
+async fn read_photo(
+    State(studio): State<Arc<Studio>>,
+    Query(asked): Query<PhotoName>,
+) -> Answer<Json<ListedPhoto>> {
+    blocking(move || {
+        studio.folder.file(&asked.photo)?;
+        Ok(Json(photo_list::read(&studio.folder, &asked.photo)?))
+    })
+    .await
+}
+
+/// Where the corners of the screen are seen, pixels.
+#[derive(Serialize)]
+struct FoundScreen {
+    corners_px: [[f64; 2]; 4],
+}
+
+async fn find_screen(
+    State(studio): State<Arc<Studio>>,
+    Json(asked): Json<PhotoName>,
+) -> Answer<Json<FoundScreen>> {
+    blocking(move || {
+        let photo = studio.photo(&asked.photo)?;
+        let corners_px = matte::screen_corners(&photo)?.corners_px.map(Into::into);
+        Ok(Json(FoundScreen { corners_px }))
+    })
+    .await
+}
+
+#[derive(Deserialize)]
+struct Save {
+    photo: String,
+    version: Option<String>,
+    scale: PhotoScale,
+    /// What the list calls the object, where the photo is new in it.
+    #[serde(default)]
+    asset: String,
+    #[serde(default)]
+    class: String,
+}
+
+async fn save(
+    State(studio): State<Arc<Studio>>,
+    Json(asked): Json<Save>,
+) -> Answer<Json<ListedPhoto>> {
+    blocking(move || {
+        studio.folder.file(&asked.photo)?;
+        let new = ScaledPhoto {
+            photo: &asked.photo,
+            scale: asked.scale,
+            asset: &asked.asset,
+            class: &asked.class,
+        };
+        photo_list::save(&studio.folder, &new, asked.version.as_deref())?;
+        Ok(Json(photo_list::read(&studio.folder, &asked.photo)?))
+    })
+    .await
 }

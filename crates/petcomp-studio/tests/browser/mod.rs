@@ -215,6 +215,7 @@ impl Browser {
         let Some(folder) = std::env::var_os("PETCOMP_SCREENSHOTS") else {
             return;
         };
+        self.wait("[...document.images].every((image) => image.complete)");
         let shot = self.call("Page.captureScreenshot", json!({ "format": "png" }));
         let bytes = base64(shot["data"].as_str().unwrap());
         std::fs::create_dir_all(&folder).unwrap();
