@@ -211,9 +211,8 @@ impl Profile {
         // Changes at the very end of the reach are seen whole.
         let reach = reach + EDGE_REACH_PX;
         let count = (2.0 * reach) as usize * SAMPLES_PER_PX + 1;
-        let light = (0..count).map(|i| {
-            side.mean_light(photo, along, i as f64 / SAMPLES_PER_PX as f64 - reach)
-        });
+        let light = (0..count)
+            .map(|i| side.mean_light(photo, along, i as f64 / SAMPLES_PER_PX as f64 - reach));
         Self {
             light: light.collect(),
             reach,

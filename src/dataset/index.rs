@@ -104,7 +104,10 @@ impl DatasetIndex {
         }
         let (classes, images) = listed_images(folder)?;
         if images.is_empty() {
-            return Err(Error::file(folder, "no images, expected a dataset or a folder of images"));
+            return Err(Error::file(
+                folder,
+                "no images, expected a dataset or a folder of images",
+            ));
         }
         Ok(Self {
             folder: folder.into(),
@@ -182,16 +185,27 @@ impl DatasetIndex {
         let rows = 0..self.pictures.len();
         let of = |name, number: &dyn Fn(usize) -> Option<f64>| Feature {
             name,
-            values: rows.clone().map(|row| number(row).unwrap_or(f64::NAN)).collect(),
+            values: rows
+                .clone()
+                .map(|row| number(row).unwrap_or(f64::NAN))
+                .collect(),
         };
         let written = |row: usize| self.pictures[row].written.as_ref();
         let features = [
             of("objects", &|row| self.count(row, facts(row), 0)),
             of("labels", &|row| self.count(row, facts(row), 1)),
-            of("objects under others", &|row| Some(written(row)?.obstructed.into())),
-            of("rejected scenes", &|row| Some(written(row)?.rejected.into())),
-            of("bytes of the picture", &|row| Some(written(row)?.bytes as f64)),
-            of("percent seen of the one seen least", &|row| facts(row)?.least_visible_percent()),
+            of("objects under others", &|row| {
+                Some(written(row)?.obstructed.into())
+            }),
+            of("rejected scenes", &|row| {
+                Some(written(row)?.rejected.into())
+            }),
+            of("bytes of the picture", &|row| {
+                Some(written(row)?.bytes as f64)
+            }),
+            of("percent seen of the one seen least", &|row| {
+                facts(row)?.least_visible_percent()
+            }),
         ];
         let unlike = outliers(&features).into_iter();
         unlike
@@ -266,7 +280,9 @@ impl PictureFacts {
     fn least_visible_percent(&self) -> Option<f64> {
         let labelled = self.objects.iter().filter(|object| object.labelled);
         let visible = labelled.filter_map(|object| object.visible);
-        visible.reduce(f32::min).map(|share| f64::from(100.0 * share))
+        visible
+            .reduce(f32::min)
+            .map(|share| f64::from(100.0 * share))
     }
 }
 
@@ -356,9 +372,15 @@ mod tests {
             std::fs::create_dir_all(path.parent().unwrap()).unwrap();
             std::fs::write(path, text).unwrap();
         };
-        write("dataset.json", r#"{ "format": 2, "classes": ["cap", "none"] }"#);
+        write(
+            "dataset.json",
+            r#"{ "format": 2, "classes": ["cap", "none"] }"#,
+        );
         let objects = [1, 1, 2, 1, 40, 1, 1];
-        let lines = objects.iter().zip(0..).map(|(&count, k)| line(k, count).text());
+        let lines = objects
+            .iter()
+            .zip(0..)
+            .map(|(&count, k)| line(k, count).text());
         write(JOURNAL, &lines.collect::<String>());
         write("images/train/0.png", "");
         write("scenes/train/0.json", RECORD);

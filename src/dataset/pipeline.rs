@@ -474,7 +474,13 @@ fn open_backgrounds(config: &DatasetConfig) -> Result<Vec<BackgroundPhoto>> {
 
 /// Whether two configs take the same photos in the same way.
 fn has_same_places(a: &DatasetConfig, b: &DatasetConfig) -> bool {
-    let taken = |config: &DatasetConfig| (config.scene.image, config.surface_size, config.force_cameras);
+    let taken = |config: &DatasetConfig| {
+        (
+            config.scene.image,
+            config.surface_size,
+            config.force_cameras,
+        )
+    };
     a.backgrounds == b.backgrounds && taken(a) == taken(b)
 }
 

@@ -201,7 +201,9 @@ fn with_list_begun(text: &str, steps: &[Step]) -> Edited {
     }
     let header = format!("[[{}]]", table_of(&steps[..index]));
     let mut lines = lines_of(text);
-    let shown = lines.iter_mut().find(|line| line[..] == *format!("#{header}"));
+    let shown = lines
+        .iter_mut()
+        .find(|line| line[..] == *format!("#{header}"));
     if let Some(line) = shown {
         *line = header;
     }
@@ -256,6 +258,10 @@ fn down_mut<'d>(item: &'d mut Item, step: &Step) -> Option<&'d mut Item> {
 fn insert(item: &mut Item, steps: &[Step], value: Value) -> std::result::Result<(), String> {
     match steps {
         [] => *item = Item::Value(value),
+        [Step::Key(key)] => {
+            let table = item.as_table_like_mut().ok_or("goes into a value")?;
+            table.insert(key, Item::Value(value));
+        }
         [Step::Key(key), rest @ ..] => {
             let table = item.as_table_like_mut().ok_or("goes into a value")?;
             if !table.contains_key(key) {
@@ -274,12 +280,11 @@ fn insert(item: &mut Item, steps: &[Step], value: Value) -> std::result::Result<
     Ok(())
 }
 
-/// What a key holds before its value is there.
+/// What a key holds before what is below it is there.
 fn empty_for(rest: &[Step]) -> Item {
     match rest {
-        [] => Item::None,
         [Step::Index(_), ..] => Item::ArrayOfTables(ArrayOfTables::new()),
-        [Step::Key(_), ..] => {
+        _ => {
             let mut table = Table::new();
             table.set_implicit(rest.len() > 1);
             Item::Table(table)
@@ -403,10 +408,14 @@ mod tests {
 
     #[test]
     fn a_value_in_a_table_within_a_line_changes_alone() {
-        let text = "# kept\n[scene] # too\nfinish = { sharpening = 1, white_k = 5000 } # and this\n";
+        let text =
+            "# kept\n[scene] # too\nfinish = { sharpening = 1, white_k = 5000 } # and this\n";
         let text = edited(
             text,
-            &[("scene.finish.exposure_ev", "0.5"), ("scene.finish.sharpening", "2")],
+            &[
+                ("scene.finish.exposure_ev", "0.5"),
+                ("scene.finish.sharpening", "2"),
+            ],
         );
         let expected = "# kept\n[scene] # too\nfinish = { sharpening = 2, white_k = 5000, exposure_ev = 0.5 } # and this\n";
         assert_eq!(text, expected);
@@ -420,7 +429,10 @@ mod tests {
     #[test]
     fn lights_are_added_and_taken_away() {
         let template = DatasetConfig::template();
-        let two = edited(template, &[("scene.lights[0]", "{}"), ("scene.lights[1].power", "3")]);
+        let two = edited(
+            template,
+            &[("scene.lights[0]", "{}"), ("scene.lights[1].power", "3")],
+        );
         let config: DatasetConfig = toml::from_str(&two).unwrap();
         assert_eq!(config.scene.lights.len(), 2);
         assert_eq!(config.scene.lights[1].power.min, 3.0);

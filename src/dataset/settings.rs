@@ -74,9 +74,14 @@ pub fn values_by_path(table: &Table, at: &str) -> Vec<(String, Value)> {
 fn values_at(value: &Value, at: &str) -> Vec<(String, Value)> {
     let own = || std::iter::once((at.to_owned(), value.clone()));
     match value {
-        Value::Table(inner) => own().chain(values_by_path(inner, &format!("{at}."))).collect(),
+        Value::Table(inner) => own()
+            .chain(values_by_path(inner, &format!("{at}.")))
+            .collect(),
         Value::Array(list) => {
-            let entries = list.iter().enumerate().filter(|(_, entry)| entry.is_table());
+            let entries = list
+                .iter()
+                .enumerate()
+                .filter(|(_, entry)| entry.is_table());
             let entries = entries.flat_map(|(i, entry)| values_at(entry, &format!("{at}[{i}]")));
             own().chain(entries).collect()
         }
@@ -87,7 +92,9 @@ fn values_at(value: &Value, at: &str) -> Vec<(String, Value)> {
 /// What the template shows for a path.
 pub(crate) fn told_value(path: &str) -> Option<&'static str> {
     let generic = of_first_entry(path);
-    told_keys().find(|told| told.path == generic).map(|told| told.value)
+    told_keys()
+        .find(|told| told.path == generic)
+        .map(|told| told.value)
 }
 
 /// The path with every index 0, as the template has it.
@@ -95,7 +102,9 @@ fn of_first_entry(path: &str) -> String {
     let is_digit = |c: char| c.is_ascii_digit();
     let mut parts = path.split('[');
     let first = parts.next().unwrap_or_default().to_owned();
-    parts.fold(first, |path, part| path + "[0" + part.trim_start_matches(is_digit))
+    parts.fold(first, |path, part| {
+        path + "[0" + part.trim_start_matches(is_digit)
+    })
 }
 
 /// A key as the template tells it.
@@ -134,7 +143,9 @@ fn told_sections() -> Vec<ToldSection> {
         } else if line.is_empty() {
             comment.clear();
         } else {
-            comment = format!("{comment} {}", line.trim_start_matches(['#', ' '])).trim().into();
+            comment = format!("{comment} {}", line.trim_start_matches(['#', ' ']))
+                .trim()
+                .into();
         }
     }
     sections
@@ -151,7 +162,9 @@ fn table_of(line: &str) -> Option<String> {
 /// The key that a line sets, be it as a comment.
 fn key_and_value(line: &'static str) -> Option<(&'static str, &'static str)> {
     let (key, value) = line.strip_prefix('#').unwrap_or(line).split_once(" = ")?;
-    let is_key = key.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_');
+    let is_key = key
+        .chars()
+        .all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_');
     is_key.then_some((key, value))
 }
 
@@ -278,7 +291,11 @@ mod tests {
         assert_eq!(scale.value.to_string(), "[0.9, 1.1]");
         assert_eq!(scale.ends, Some([0.01, 100.0]));
         assert!(scale.docs.starts_with("Size: factor on an object's width"));
-        assert!(setting("scene.finish.camera_noise.read").docs.starts_with("Standard"));
+        assert!(
+            setting("scene.finish.camera_noise.read")
+                .docs
+                .starts_with("Standard")
+        );
         assert!(setting("scene.walls").is_example);
         assert_eq!(told_value("scene.lights[3].power"), Some("10"));
     }
@@ -286,7 +303,13 @@ mod tests {
     #[test]
     fn kinds_are_those_that_a_recipe_is_read_with() {
         let kinds = |path: &str| setting(path).takes;
-        let ranges = ["scene.scale", "scene.objects", "scene.grade.hue_deg", "scene.lights[0].height", "scene.view.zoom"];
+        let ranges = [
+            "scene.scale",
+            "scene.objects",
+            "scene.grade.hue_deg",
+            "scene.lights[0].height",
+            "scene.view.zoom",
+        ];
         for path in ranges {
             assert!(kinds(path).range && kinds(path).number, "{path}");
         }
@@ -299,7 +322,10 @@ mod tests {
         assert!(samples.number && samples.whole && !samples.range);
         assert!(kinds("scene.at_most_once").switch);
         assert_eq!(kinds("preset").words, ["real", "paper"]);
-        assert_eq!(kinds("scene.lights[0].shape").words, ["ellipse", "rectangle"]);
+        assert_eq!(
+            kinds("scene.lights[0].shape").words,
+            ["ellipse", "rectangle"]
+        );
         assert_eq!(kinds("scene.off").lists.len(), 5);
         assert_eq!(kinds("labels.formats").lists.len(), 5);
         let blur = kinds("scene.finish.blur_px");

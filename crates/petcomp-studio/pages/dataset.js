@@ -3,7 +3,7 @@ import { api, at, element, frame, query, say, shortcuts, trying } from "./studio
 frame("dataset");
 
 /** Size of a tile of the grid, pixels: picture, caption, gap. */
-const TILE = { width: 236, picture: 168, caption: 40, gap: 12 };
+const TILE = { width: 236, picture: 177, caption: 40, gap: 12 };
 /** Longer side of a small picture, pixels. */
 const SIDE_PX = 320;
 /** Rows of tiles that are made ready above and below what is seen. */
@@ -431,14 +431,14 @@ function showDetails(pane) {
   at("details").replaceChildren(
     element("h2", {}, sample.name),
     element("dl", { class: "facts" }, ...facts.flatMap(([name, value]) => [element("dt", {}, name), element("dd", {}, String(value))])),
-    advice(sample), objectTable(pane), ...drawTable(sample));
+    ...advice(sample), objectTable(pane), ...drawTable(sample));
   return undefined;
 }
 
 function advice(sample) {
   const lines = sample.rejected.map((why) => `a scene was rejected: ${why}`);
   if (sample.knotted.length) lines.push(`objects ${sample.knotted.join(", ")} lie over each other in a circle`);
-  return lines.length ? element("ul", { class: "advice" }, ...lines.map((line) => element("li", { class: "warn" }, line))) : null;
+  return lines.length ? [element("ul", { class: "advice" }, ...lines.map((line) => element("li", { class: "warn" }, line)))] : [];
 }
 
 function objectTable(pane) {

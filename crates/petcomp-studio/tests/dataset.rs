@@ -29,12 +29,18 @@ fn a_dataset_is_filtered_and_looked_at() {
     };
     let dir = tempfile::tempdir().unwrap();
     let dataset = tray::with_dataset(dir.path(), COUNT);
-    copy_files(&dataset.join("images/train"), &dir.path().join("real"), |_| true);
+    copy_files(
+        &dataset.join("images/train"),
+        &dir.path().join("real"),
+        |_| true,
+    );
     let studio = Studio::over(dir.path());
     browser.go(&studio.page("dataset?folder=dataset"));
     browser.wait_for(".tile .caption b");
     assert_eq!(found(&mut browser), format!("{COUNT} pictures"));
-    browser.wait("[...document.querySelectorAll('.tile img')].every((image) => image.naturalWidth > 0)");
+    browser.wait(
+        "[...document.querySelectorAll('.tile img')].every((image) => image.naturalWidth > 0)",
+    );
     browser.screenshot("studio_dataset_grid");
 
     // Filters by what the list says, and by what only records say.
@@ -46,7 +52,9 @@ fn a_dataset_is_filtered_and_looked_at() {
     let hidden = found(&mut browser);
     assert!(hidden.contains(&format!("of {COUNT} pictures")), "{hidden}");
     browser.eval("document.querySelector('[type=reset]').click()");
-    browser.wait(&format!("document.querySelector('#found').innerText === '{COUNT} pictures'"));
+    browser.wait(&format!(
+        "document.querySelector('#found').innerText === '{COUNT} pictures'"
+    ));
 
     // A picture with everything that is known of it, by keys.
     browser.eval("document.querySelector('.tile').click()");
@@ -90,7 +98,11 @@ fn listed_only(folder: &Path, count: usize) {
         .unwrap();
     }
     io::write_text(folder.join("index.jsonl"), &lines).unwrap();
-    io::write_text(folder.join("data.yaml"), "train: images\nval: images\nnames: [cap, none]\n").unwrap();
+    io::write_text(
+        folder.join("data.yaml"),
+        "train: images\nval: images\nnames: [cap, none]\n",
+    )
+    .unwrap();
 }
 
 #[test]
@@ -104,11 +116,16 @@ fn a_hundred_thousand_pictures_are_listed_without_reading_them() {
     let start = std::time::Instant::now();
     browser.go(&studio.page("dataset?folder=large"));
     browser.wait("document.querySelector('#found').innerText === '100,000 pictures'");
-    eprintln!("100,000 pictures are listed after {:.1} s", start.elapsed().as_secs_f64());
+    eprintln!(
+        "100,000 pictures are listed after {:.1} s",
+        start.elapsed().as_secs_f64()
+    );
     let tiles = "document.querySelectorAll('.tile').length";
     assert!(browser.eval(tiles).as_u64().unwrap() < 100);
     // To the last one at once.
-    browser.eval("(() => { const e = document.querySelector('#grid'); e.scrollTop = e.scrollHeight; })()");
+    browser.eval(
+        "(() => { const e = document.querySelector('#grid'); e.scrollTop = e.scrollHeight; })()",
+    );
     browser.wait("!!document.querySelector(\".tile[data-row='99999']\")");
     assert!(browser.eval(tiles).as_u64().unwrap() < 100);
     choose(&mut browser, "fewest", "50");
@@ -124,8 +141,16 @@ fn no_picture_outside_of_the_folder_is_shown() {
         io::create_folder(folder).unwrap();
     }
     std::fs::write(outside.join("a.png"), "").unwrap();
-    io::write_text(inside.join("list.txt"), &format!("{}\n", outside.join("a.png").display())).unwrap();
-    io::write_text(inside.join("data.yaml"), "train: list.txt\nval: list.txt\nnames: [cap]\n").unwrap();
+    io::write_text(
+        inside.join("list.txt"),
+        &format!("{}\n", outside.join("a.png").display()),
+    )
+    .unwrap();
+    io::write_text(
+        inside.join("data.yaml"),
+        "train: list.txt\nval: list.txt\nnames: [cap]\n",
+    )
+    .unwrap();
     let studio = Studio::over(&dir.path().join("studio"));
     for path in ["picture", "sample"] {
         let answer = studio.get(&format!("api/dataset/{path}?folder=set&row=0"));

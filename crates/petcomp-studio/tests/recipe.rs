@@ -45,7 +45,10 @@ fn a_slider_changes_the_pictures_and_the_file_keeps_its_comments() {
     browser.go(&studio.page("recipe?file=recipe.toml"));
     browser.wait_for(".setting");
     wait_for_pictures(&mut browser);
-    eprintln!("first pictures after {} ms", browser.eval("document.body.dataset.firstMs"));
+    eprintln!(
+        "first pictures after {} ms",
+        browser.eval("document.body.dataset.firstMs")
+    );
 
     // Every setting of the template is there, with its words.
     let told = browser.eval("document.querySelectorAll('.setting').length");
@@ -54,18 +57,31 @@ fn a_slider_changes_the_pictures_and_the_file_keeps_its_comments() {
 
     // A slider that moves shows pictures on its way; keys are as good as a mouse.
     let first = src(&mut browser);
-    browser.eval(&format!("document.querySelector(\"{RANGE} [type=range]:last-of-type\").focus()"));
+    browser.eval(&format!(
+        "document.querySelector(\"{RANGE} [type=range]:last-of-type\").focus()"
+    ));
     for _ in 0..12 {
         browser.press("ArrowRight", 0);
     }
-    browser.wait(&format!("document.querySelector('#pictures [data-what=after]').src !== '{first}'"));
+    browser.wait(&format!(
+        "document.querySelector('#pictures [data-what=after]').src !== '{first}'"
+    ));
     wait_for_pictures(&mut browser);
-    eprintln!("after a move {} ms", browser.eval("document.body.dataset.firstMs"));
-    assert_eq!(browser.eval("document.querySelector('.setting.edited').dataset.path"), "scene.scale");
+    eprintln!(
+        "after a move {} ms",
+        browser.eval("document.body.dataset.firstMs")
+    );
+    assert_eq!(
+        browser.eval("document.querySelector('.setting.edited').dataset.path"),
+        "scene.scale"
+    );
 
     // Brighter objects; before and after side by side.
     browser.eval("document.querySelector('#compare').click()");
-    browser.fill(".setting[data-path='scene.gain_ev'] input[type=number]", "2.5");
+    browser.fill(
+        ".setting[data-path='scene.gain_ev'] input[type=number]",
+        "2.5",
+    );
     browser.wait("document.querySelectorAll('.setting.edited').length === 2");
     wait_for_pictures(&mut browser);
     browser.wait("[...document.querySelectorAll('#pictures [data-what=before]')].every((image) => image.naturalWidth > 0)");
@@ -75,9 +91,18 @@ fn a_slider_changes_the_pictures_and_the_file_keeps_its_comments() {
     browser.screenshot("studio_recipe");
 
     // A value that cannot be is refused in words.
-    browser.fill(".setting[data-path='scene.negatives'] input[type=number]", "3");
+    browser.fill(
+        ".setting[data-path='scene.negatives'] input[type=number]",
+        "3",
+    );
     browser.wait("document.querySelector('footer').className === 'bad'");
-    assert!(browser.text("footer").contains("scene.negatives: 3, expected"), "{}", browser.text("footer"));
+    assert!(
+        browser
+            .text("footer")
+            .contains("scene.negatives: 3, expected"),
+        "{}",
+        browser.text("footer")
+    );
     browser.eval("document.activeElement.blur()");
     browser.press("z", CTRL);
     browser.wait("document.querySelectorAll('.setting.edited').length === 2");
@@ -93,7 +118,9 @@ fn a_slider_changes_the_pictures_and_the_file_keeps_its_comments() {
     assert!(config.scene.scale.max > 1.1, "{text}");
     assert_eq!(config.scene.gain_ev.max, 2.5);
     // The value that was refused is one that the browser complains of, too.
-    browser.complaints.retain(|complaint| !complaint.contains("422"));
+    browser
+        .complaints
+        .retain(|complaint| !complaint.contains("422"));
     browser.assert_content();
 }
 
@@ -103,10 +130,14 @@ fn a_recipe_that_leads_out_of_the_folder_is_refused() {
     let recipe = "assets = '../assets'\nbackgrounds = '/'\n";
     io::write_text(dir.path().join("recipe.toml"), recipe).unwrap();
     let studio = Studio::over(dir.path());
-    let asked = r#"{ "file": "recipe.toml", "edits": [], "seed": 0, "k": 0, "side": 64, "slot": "a" }"#;
+    let asked =
+        r#"{ "file": "recipe.toml", "edits": [], "seed": 0, "k": 0, "side": 64, "slot": "a" }"#;
     let answer = studio.post("api/recipe/picture", asked);
     assert!(answer.starts_with("HTTP/1.1 422"), "{answer}");
-    assert!(answer.contains("is not in the folder of this studio"), "{answer}");
+    assert!(
+        answer.contains("is not in the folder of this studio"),
+        "{answer}"
+    );
 }
 
 #[test]
@@ -117,5 +148,8 @@ fn a_stale_save_is_refused() {
     let save = r#"{ "file": "recipe.toml", "edits": [["scene.scale", "1"]], "version": "0" }"#;
     let answer = studio.post("api/recipe/save", save);
     assert!(answer.starts_with("HTTP/1.1 409"), "{answer}");
-    assert_eq!(io::read_text(dir.path().join("recipe.toml")).unwrap(), DatasetConfig::template());
+    assert_eq!(
+        io::read_text(dir.path().join("recipe.toml")).unwrap(),
+        DatasetConfig::template()
+    );
 }

@@ -177,7 +177,9 @@ impl Catalog {
             Flag::Unreadable,
         ];
         let raised = all.into_iter();
-        raised.filter(|flag| self.has_flag(row, *flag) == Some(true)).collect()
+        raised
+            .filter(|flag| self.has_flag(row, *flag) == Some(true))
+            .collect()
     }
 
     /// Whether a picture has a flag; none where that is not known yet.
@@ -187,7 +189,9 @@ impl Catalog {
             Flag::Knotted => Some(written.is_some_and(|written| written.knotted > 0)),
             Flag::Rejected => Some(written.is_some_and(|written| written.rejected > 0)),
             Flag::Empty => Some(self.counts(row)?[0] == 0),
-            Flag::Unlabelled => self.counts(row).map(|[objects, labels]| objects > 0 && labels == 0),
+            Flag::Unlabelled => self
+                .counts(row)
+                .map(|[objects, labels]| objects > 0 && labels == 0),
             Flag::Distractors => self.of_facts(row, |facts| facts.distractors > 0),
             Flag::Unreadable => Some(self.known(row)?.is_none()),
         }
@@ -203,7 +207,11 @@ impl Catalog {
     }
 
     /// Something that only the record tells: false where that cannot be read, none before it was.
-    pub(super) fn of_facts(&self, row: usize, is_so: impl Fn(&PictureFacts) -> bool) -> Option<bool> {
+    pub(super) fn of_facts(
+        &self,
+        row: usize,
+        is_so: impl Fn(&PictureFacts) -> bool,
+    ) -> Option<bool> {
         let facts = self.known(row)?;
         Some(facts.as_ref().is_some_and(is_so))
     }

@@ -50,7 +50,10 @@ impl Order {
 impl Filter {
     /// It takes what the records say and the list does not.
     pub(super) fn needs_facts(&self, index: &DatasetIndex) -> bool {
-        let lists_objects = index.pictures.iter().all(|picture| picture.written.is_some());
+        let lists_objects = index
+            .pictures
+            .iter()
+            .all(|picture| picture.written.is_some());
         let by_count = self.objects.is_some() || self.flag.is_some() || self.class.is_some();
         self.visible.is_some()
             || self.background.is_some()
@@ -69,9 +72,9 @@ impl Filter {
                 Some((least..=most).contains(&objects))
             }),
             self.flag.map(|flag| catalog.has_flag(row, flag)),
-            self.background.as_ref().map(|name| {
-                catalog.of_facts(row, |facts| facts.background == *name)
-            }),
+            self.background
+                .as_ref()
+                .map(|name| catalog.of_facts(row, |facts| facts.background == *name)),
             self.asks_objects().then(|| self.has_object(catalog, row)),
         ];
         let mut answers = asked.into_iter().flatten();
@@ -89,14 +92,19 @@ impl Filter {
                 let counts = written.classes.get(class as usize);
                 Some(counts.is_some_and(|[objects, _]| *objects > 0))
             }
-            _ => catalog.of_facts(row, |facts| facts.objects.iter().any(|object| self.is_met(object))),
+            _ => catalog.of_facts(row, |facts| {
+                facts.objects.iter().any(|object| self.is_met(object))
+            }),
         }
     }
 
     fn is_met(&self, object: &ObjectFacts) -> bool {
-        let is_seen = |[least, most]: [f32; 2]| object.visible.is_some_and(|v| v >= least && v <= most);
+        let is_seen =
+            |[least, most]: [f32; 2]| object.visible.is_some_and(|v| v >= least && v <= most);
         self.class.is_none_or(|class| class == object.class)
-            && self.labelled.is_none_or(|labelled| labelled == object.labelled)
+            && self
+                .labelled
+                .is_none_or(|labelled| labelled == object.labelled)
             && self.visible.is_none_or(is_seen)
     }
 }
@@ -127,5 +135,7 @@ pub(super) fn found(catalog: &Catalog, filter: &Filter, order: Order) -> (Vec<us
 fn least_visible(catalog: &Catalog, row: usize) -> f32 {
     let facts = catalog.known(row).and_then(Option::as_ref);
     let objects = facts.iter().flat_map(|facts| &facts.objects);
-    objects.filter_map(|object| object.visible).fold(1.0, f32::min)
+    objects
+        .filter_map(|object| object.visible)
+        .fold(1.0, f32::min)
 }

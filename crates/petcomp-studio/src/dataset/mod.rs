@@ -55,11 +55,19 @@ async fn folders(State(studio): State<Arc<Studio>>) -> Answer<Json<Vec<String>>>
 
 fn folders_of(folder: &Folder) -> Vec<String> {
     let files = folder.find(|path| path.ends_with("data.yaml") || may_be_photo(path));
-    let parent = |file: &String| file.rsplit_once('/').map_or("", |(parent, _)| parent).to_owned();
-    let (lists, images): (Vec<_>, Vec<_>) = files.iter().partition(|file| file.ends_with("data.yaml"));
+    let parent = |file: &String| {
+        file.rsplit_once('/')
+            .map_or("", |(parent, _)| parent)
+            .to_owned()
+    };
+    let (lists, images): (Vec<_>, Vec<_>) =
+        files.iter().partition(|file| file.ends_with("data.yaml"));
     let datasets: BTreeSet<String> = lists.into_iter().map(parent).collect();
     let is_within = |name: &String, dataset: &String| {
-        dataset.is_empty() || name.strip_prefix(dataset).is_some_and(|rest| rest.starts_with('/'))
+        dataset.is_empty()
+            || name
+                .strip_prefix(dataset)
+                .is_some_and(|rest| rest.starts_with('/'))
     };
     let images: BTreeSet<String> = images.into_iter().map(parent).collect();
     let others = images.into_iter().filter(|name| {
@@ -92,7 +100,10 @@ async fn open(
         Ok(Json(Opened {
             count: index.pictures.len(),
             classes: index.classes.clone(),
-            has_records: index.pictures.iter().any(|picture| picture.written.is_some()),
+            has_records: index
+                .pictures
+                .iter()
+                .any(|picture| picture.written.is_some()),
         }))
     })
     .await
@@ -123,13 +134,20 @@ async fn find(
     Json(wanted): Json<Wanted>,
 ) -> Answer<Json<FoundRows>> {
     blocking(move || {
-        let catalog = studio.dataset.catalogs.get(&studio.folder, &wanted.folder)?;
+        let catalog = studio
+            .dataset
+            .catalogs
+            .get(&studio.folder, &wanted.folder)?;
         let must_read = wanted.filter.needs_facts(&catalog.index) || wanted.order.needs_facts();
         if must_read {
             catalog.read_in_background();
         }
         let (rows, why) = filter::found(&catalog, &wanted.filter, wanted.order);
-        let of = if must_read { catalog.index.pictures.len() } else { 0 };
+        let of = if must_read {
+            catalog.index.pictures.len()
+        } else {
+            0
+        };
         Ok(Json(FoundRows {
             rows,
             why,
@@ -186,7 +204,10 @@ async fn picture(
 ) -> Answer<Response> {
     let response = blocking(move || {
         let catalog = studio.dataset.catalogs.get(&studio.folder, &asked.folder)?;
-        shown(&picture_file(&studio.folder, &catalog, asked.row)?, asked.side)
+        shown(
+            &picture_file(&studio.folder, &catalog, asked.row)?,
+            asked.side,
+        )
     })
     .await?;
     Ok(([(CACHE_CONTROL, "private, max-age=300")], response).into_response())

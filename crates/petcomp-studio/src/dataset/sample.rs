@@ -55,7 +55,10 @@ impl SampleShown {
             None => Self::of_boxes(index, row)?,
         };
         let picture = &index.pictures[row];
-        let file = picture.file.strip_prefix(&index.folder).unwrap_or(&picture.file);
+        let file = picture
+            .file
+            .strip_prefix(&index.folder)
+            .unwrap_or(&picture.file);
         Ok(Self {
             name: picture.name.clone(),
             file: file.to_string_lossy().into_owned(),
@@ -70,8 +73,15 @@ impl SampleShown {
             file: String::new(),
             image: record.labels.image,
             background: record.drawn.plate.clone(),
-            objects: objects.map(|object| ObjectShown::of(object, &record)).collect(),
-            distractors: record.labels.distractors.iter().map(|d| sides(&d.amodal_box)).collect(),
+            objects: objects
+                .map(|object| ObjectShown::of(object, &record))
+                .collect(),
+            distractors: record
+                .labels
+                .distractors
+                .iter()
+                .map(|d| sides(&d.amodal_box))
+                .collect(),
             knotted: record.knotted,
             rejected: record.rejected,
             draws: record.draws,
@@ -88,7 +98,9 @@ impl SampleShown {
             file: String::new(),
             image,
             background: String::new(),
-            objects: boxes.map(|((class, shares), id)| ObjectShown::of_box(id, class, shares, image)).collect(),
+            objects: boxes
+                .map(|((class, shares), id)| ObjectShown::of_box(id, class, shares, image))
+                .collect(),
             distractors: Vec::new(),
             knotted: Vec::new(),
             rejected: Vec::new(),

@@ -43,7 +43,9 @@ pub(crate) fn routes() -> Router<Arc<Studio>> {
 async fn files(State(studio): State<Arc<Studio>>) -> Answer<Json<Vec<String>>> {
     blocking(move || {
         let is_recipe = |path: &Path| {
-            let is_toml = path.extension().is_some_and(|extension| extension == "toml");
+            let is_toml = path
+                .extension()
+                .is_some_and(|extension| extension == "toml");
             is_toml && DatasetConfig::read(path, &[]).is_ok()
         };
         Ok(Json(studio.folder.find(is_recipe)))

@@ -163,7 +163,10 @@ fn small(mut config: DatasetConfig, side: u32) -> DatasetConfig {
     let side = side.clamp(*SIDES_PX.start(), *SIDES_PX.end());
     let longer = config.scene.image[0].max(config.scene.image[1]);
     let factor = (f64::from(side) / f64::from(longer)).min(1.0);
-    config.scene.image = config.scene.image.map(|side| (f64::from(side) * factor).round() as u32);
+    config.scene.image = config
+        .scene
+        .image
+        .map(|side| (f64::from(side) * factor).round() as u32);
     config.render = RenderOptions::from(Quality::Draft);
     config.scene.settle.most_work = config.scene.settle.most_work.min(MOST_WORK);
     let finish = &mut config.scene.finish;
