@@ -298,7 +298,7 @@ function facts(camera) {
     ["Corners fit to", `${camera.rms_px.toFixed(2)} px`],
     ["Rectangle", `${camera.size.map((side) => side.toFixed(3)).join(" × ")} m`],
     ["Scale", `${camera.px_per_metre.toFixed(0)} px/m`],
-    [`${(1000 * camera.reference_height).toFixed(0)} mm above it, drawn to`, `${camera.height_px.toFixed(1)} px`],
+    [`${(1000 * camera.reference_height).toFixed(0)} mm above it`, `drawn to ${camera.height_px.toFixed(1)} px`],
     ["Grid", `${camera.sketch.grid_step} m`],
   ];
 }

@@ -157,22 +157,30 @@ impl Folder {
     /// The names of all files below that `wanted` takes, sorted; hidden ones are left out, and so is
     /// what links lead to.
     pub(crate) fn find(&self, wanted: impl Fn(&Path) -> bool) -> Vec<String> {
-        let mut found = Vec::new();
+        let files = self.files().into_iter().map(without_dot);
+        let wanted = files.filter(|path| wanted(path));
+        let mut found: Vec<String> = wanted.map(|path| self.name_of(&path)).collect();
+        found.sort();
+        found
+    }
+
+    fn files(&self) -> Vec<PathBuf> {
+        let mut files = Vec::new();
         let mut open = vec![(self.here().to_path_buf(), 0)];
         let mut left = MAX_ENTRIES;
         while let Some((folder, depth)) = open.pop() {
             for entry in visible_entries(&folder).take(left) {
                 left -= 1;
-                let kind = entry.file_type();
-                if kind.as_ref().is_ok_and(|kind| kind.is_dir()) && depth < MAX_DEPTH {
-                    open.push((entry.path(), depth + 1));
-                } else if kind.is_ok_and(|kind| kind.is_file()) && wanted(&entry.path()) {
-                    found.push(self.name_of(&without_dot(entry.path())));
+                match entry.file_type() {
+                    Ok(kind) if kind.is_file() => files.push(entry.path()),
+                    Ok(kind) if kind.is_dir() && depth < MAX_DEPTH => {
+                        open.push((entry.path(), depth + 1));
+                    }
+                    _ => {}
                 }
             }
         }
-        found.sort();
-        found
+        files
     }
 }
 

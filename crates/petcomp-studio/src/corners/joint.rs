@@ -24,18 +24,19 @@ pub(super) struct JointPhoto {
 /// Solves the labels of photos, those of each camera together, and writes the cameras, as
 /// `petcomp camera joint` does.
 pub(super) fn solve(folder: &Folder, photos: &[String]) -> Answer<Vec<JointPhoto>> {
-    let all: Vec<LabelledPhoto> = photos
-        .iter()
-        .map(|photo| labelled(folder, photo))
-        .collect::<Answer<_>>()?;
+    let labelled = photos.iter().map(|photo| labelled(folder, photo));
+    let all: Vec<LabelledPhoto> = labelled.collect::<Answer<_>>()?;
     let mut solved = Vec::new();
     for group in camera::group_by_camera(&labels_of(&all)) {
-        let names = group.iter().map(|&i| photos[i].as_str());
-        let members: Vec<LabelledPhoto> = group.iter().map(|&i| all[i].clone()).collect();
-        solved.extend(solve_group(folder, &names.collect::<Vec<_>>(), &members)?);
+        let (names, members) = (chosen(photos, &group), chosen(&all, &group));
+        solved.extend(solve_group(folder, &names, &members)?);
     }
     solved.sort_by(|a, b| a.photo.cmp(&b.photo));
     Ok(solved)
+}
+
+fn chosen<T: Clone>(all: &[T], places: &[usize]) -> Vec<T> {
+    places.iter().map(|&i| all[i].clone()).collect()
 }
 
 fn labels_of(photos: &[LabelledPhoto]) -> Vec<Label> {
@@ -44,7 +45,7 @@ fn labels_of(photos: &[LabelledPhoto]) -> Vec<Label> {
 
 fn solve_group(
     folder: &Folder,
-    names: &[&str],
+    names: &[String],
     members: &[LabelledPhoto],
 ) -> Answer<Vec<JointPhoto>> {
     let labels = labels_of(members);

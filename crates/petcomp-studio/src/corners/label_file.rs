@@ -94,16 +94,24 @@ fn check_photo(label: &Label, photo: &str) -> Answer<()> {
 /// The text of a label as `petcomp camera init` writes it; remarks of the file that is there stay.
 fn text_of(folder: &Folder, name: &str, label: &Label) -> Answer<String> {
     let text = camera::commented(label)?;
-    let remarks = folder.read_text(name).ok().and_then(|file| {
-        let value: Value = serde_json::from_str(&file.text).ok()?;
-        Some(remarks_of(value).as_object()?.clone()).filter(|remarks| !remarks.is_empty())
-    });
-    let Some(remarks) = remarks else {
-        return Ok(text);
-    };
-    let mut value: Value = serde_json::from_str(&text).map_err(|e| Error::value("label", e))?;
-    merge(&mut value, Value::Object(remarks));
-    let text = serde_json::to_string_pretty(&value).map_err(|e| Error::value("label", e))?;
+    match stored_remarks(folder, name) {
+        Some(remarks) => Ok(with_remarks(&text, remarks).map_err(|e| Error::value("label", e))?),
+        None => Ok(text),
+    }
+}
+
+/// The remarks in a label file, if it has any.
+fn stored_remarks(folder: &Folder, name: &str) -> Option<Value> {
+    let file = folder.read_text(name).ok()?;
+    let remarks = remarks_of(serde_json::from_str(&file.text).ok()?);
+    let has_any = remarks.as_object().is_some_and(|table| !table.is_empty());
+    has_any.then_some(remarks)
+}
+
+fn with_remarks(text: &str, remarks: Value) -> serde_json::Result<String> {
+    let mut label: Value = serde_json::from_str(text)?;
+    merge(&mut label, remarks);
+    let text = serde_json::to_string_pretty(&label)?;
     Ok(camera::with_folded_lists(&text) + "\n")
 }
 

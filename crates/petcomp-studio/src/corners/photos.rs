@@ -22,18 +22,20 @@ pub(super) struct PhotoEntry {
 pub(super) fn list(folder: &Folder) -> Vec<PhotoEntry> {
     let json = folder.find(|path| path.extension().is_some_and(|ending| ending == "json"));
     let documents: BTreeSet<String> = json.into_iter().collect();
+    let entry = |photo: String| PhotoEntry {
+        label: documents.contains(&beside(&photo, "label.json")),
+        camera: documents.contains(&beside(&photo, "camera.json")),
+        photo,
+    };
+    photos(folder).into_iter().map(entry).collect()
+}
+
+fn photos(folder: &Folder) -> Vec<String> {
     let mut photos = folder.find(|path| may_be_photo(path) && !is_own(path));
     let lists = folder.find(is_list);
-    let folders: BTreeSet<&str> = lists.iter().map(|list| parent_of(list)).collect();
-    photos.sort_by_key(|photo| folders.contains(parent_of(photo)));
+    let of_objects: BTreeSet<&str> = lists.iter().map(|list| parent_of(list)).collect();
+    photos.sort_by_key(|photo| of_objects.contains(parent_of(photo)));
     photos
-        .into_iter()
-        .map(|photo| PhotoEntry {
-            label: documents.contains(&beside(&photo, "label.json")),
-            camera: documents.contains(&beside(&photo, "camera.json")),
-            photo,
-        })
-        .collect()
 }
 
 /// A list of photos of objects.

@@ -51,10 +51,7 @@ impl CameraView {
         let sigma = &solution.sigma;
         let reference_height = sigma.reference_height;
         Self {
-            height: [
-                solution.camera.center().z,
-                sigma.center[(2, 2)].max(0.0).sqrt(),
-            ],
+            height: height_of(solution),
             tilt_deg: [solution.camera.tilt(), sigma.tilt].map(f64::to_degrees),
             focal_px: solution.camera.focal_px.x,
             focal_sigma: Some(sigma.ln_focal).filter(|sigma| sigma.is_finite()),
@@ -69,6 +66,12 @@ impl CameraView {
             sketch: Sketch::new(solution, wall_height(label).unwrap_or(reference_height)),
         }
     }
+}
+
+/// Height of the lens over the surface and its standard deviation, metres.
+fn height_of(solution: &Solution) -> [f64; 2] {
+    let variance = solution.sigma.center[(2, 2)];
+    [solution.camera.center().z, variance.max(0.0).sqrt()]
 }
 
 /// The height of the walls that the label states, metres.

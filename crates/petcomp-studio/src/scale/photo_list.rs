@@ -164,16 +164,25 @@ fn with_scale(text: &str, new: &ScaledPhoto<'_>) -> String {
     let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
     match block_of(&lines, file) {
         Some(block) => {
-            let kept = lines[block.clone()].iter().filter(|line| !is_scale(line));
-            let mut changed: Vec<String> = kept.cloned().collect();
-            let end = changed.iter().rposition(|line| !line.trim().is_empty());
-            let end = end.map_or(changed.len(), |last| last + 1);
-            changed.splice(end..end, scale_lines(new.scale));
+            let changed = changed_block(&lines[block.clone()], new.scale);
             lines.splice(block, changed);
         }
         None => lines.extend(new_block(new, lines.is_empty())),
     }
     lines.join("\n") + "\n"
+}
+
+/// The lines of a photo's table with another scale, before the empty ones at its end.
+fn changed_block(block: &[String], scale: PhotoScale) -> Vec<String> {
+    let mut lines: Vec<String> = block
+        .iter()
+        .filter(|line| !is_scale(line))
+        .cloned()
+        .collect();
+    let last = lines.iter().rposition(|line| !line.trim().is_empty());
+    let end = last.map_or(0, |last| last + 1);
+    lines.splice(end..end, scale_lines(scale));
+    lines
 }
 
 /// The lines of a photo's table, its header among them.
@@ -210,20 +219,25 @@ fn scale_lines(scale: PhotoScale) -> Vec<String> {
 
 fn new_block(new: &ScaledPhoto<'_>, is_first: bool) -> Vec<String> {
     let (_, file) = list_of(new.photo);
-    let stem = Path::new(file).file_stem().unwrap_or_default();
-    let asset = Some(new.asset).filter(|name| !name.is_empty());
-    let asset = asset.map_or(stem.to_string_lossy().into_owned(), str::to_owned);
-    let mut lines = vec![
-        HEADER.into(),
-        format!("file = {}", quoted(file)),
-        format!("asset = {}", quoted(&asset)),
-    ];
-    lines.extend((!new.class.is_empty()).then(|| format!("class = {}", quoted(new.class))));
-    lines.extend(scale_lines(new.scale));
-    if !is_first {
-        lines.insert(0, String::new());
+    let mut lines: Vec<String> = (!is_first).then(String::new).into_iter().collect();
+    lines.push(HEADER.into());
+    lines.push(format!("file = {}", quoted(file)));
+    lines.push(format!("asset = {}", quoted(&asset_name(new.asset, file))));
+    if !new.class.is_empty() {
+        lines.push(format!("class = {}", quoted(new.class)));
     }
+    lines.extend(scale_lines(new.scale));
     lines
+}
+
+/// The name that was given, or else the file's.
+fn asset_name(given: &str, file: &str) -> String {
+    if given.is_empty() {
+        let stem = Path::new(file).file_stem().unwrap_or_default();
+        stem.to_string_lossy().into_owned()
+    } else {
+        given.into()
+    }
 }
 
 fn quoted(text: &str) -> String {
