@@ -75,7 +75,17 @@ impl DatasetConfig {
     /// A file that cannot be read; an unknown key; a range that cannot be right.
     pub fn read(path: impl AsRef<Path>, overrides: &[io::Override]) -> Result<Self> {
         let path = path.as_ref();
-        let mut config: Self = io::read_toml_with(path, overrides, Preset::lay_under)?;
+        Self::parse(&io::read_text(path)?, path, overrides)
+    }
+
+    /// The text of a recipe as if it were the file at `path`.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read).
+    #[doc(hidden)]
+    pub fn parse(text: &str, path: &Path, overrides: &[io::Override]) -> Result<Self> {
+        let read = io::parse_toml_with(text, overrides, Preset::lay_under);
+        let mut config: Self = read.map_err(|e| e.in_file(path))?;
         config.check().map_err(|e| e.in_file(path))?;
         let folder = folder_of(path);
         config.assets = folder.join(&config.assets);
@@ -159,6 +169,7 @@ impl DatasetConfig {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::dataset::settings::{ends, told_keys};
     use toml::{Table, Value};
 
     /// Whole numbers and broken ones that are equal are the same.
@@ -239,7 +250,7 @@ mod tests {
 
     #[test]
     fn the_template_tells_every_value_of_the_preset() {
-        let told = told_keys();
+        let told: Vec<_> = told_keys().collect();
         let told_value = |path: &str| {
             let key = told.iter().find(|told| told.path == path);
             let comment = key.map_or("", |key| &key.comment);
@@ -270,7 +281,6 @@ mod tests {
     /// Keys without a default, of which the template has an example: `path = value`.
     fn examples() -> Vec<String> {
         let mut examples: Vec<_> = told_keys()
-            .into_iter()
             .filter(|told| told.comment.contains("no default"))
             .map(|told| format!("{} = {}", told.path, told.value))
             .collect();
@@ -282,7 +292,7 @@ mod tests {
     fn an_example_in_the_template_is_taken_as_it_stands() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("recipe.toml");
-        assert_eq!(examples().len(), 5);
+        assert_eq!(examples().len(), 9);
         for example in examples() {
             io::write_text(&path, &example).unwrap();
             let config = DatasetConfig::read(&path, &[]).unwrap();
@@ -291,62 +301,11 @@ mod tests {
         }
     }
 
-    /// A key in the template, with the comment above it.
-    struct ToldKey {
-        path: String,
-        value: &'static str,
-        comment: String,
-    }
-
-    fn told_keys() -> Vec<ToldKey> {
-        let (mut table, mut comment, mut told) = (String::new(), String::new(), Vec::new());
-        for line in DatasetConfig::template().lines() {
-            if let Some(header) = line.trim_start_matches('#').strip_prefix('[') {
-                table = header
-                    .trim_matches(['[', ']'])
-                    .replace("scene.lights", "scene.lights[0]");
-            } else if let Some((key, value)) = line
-                .strip_prefix('#')
-                .and_then(|l| l.split_once(" = "))
-                .filter(is_key)
-            {
-                told.push(ToldKey {
-                    path: format!("{table}.{key}"),
-                    value,
-                    comment: std::mem::take(&mut comment),
-                });
-            } else if line.is_empty() {
-                comment.clear();
-            } else {
-                comment = format!("{comment} {}", line.trim_start_matches('#'));
-            }
-        }
-        told
-    }
-
     /// What the template says a key may be: its path, and the ends of "A to B" in its comment.
     fn told_bounds() -> Vec<(String, [f64; 2])> {
         told_keys()
-            .into_iter()
             .filter_map(|told| Some((told.path, ends(&told.comment)?)))
             .collect()
-    }
-
-    fn is_key((key, _): &(&str, &str)) -> bool {
-        key.chars().all(|c| c.is_ascii_lowercase() || c == '_')
-    }
-
-    fn ends(comment: &str) -> Option<[f64; 2]> {
-        let words: Vec<&str> = comment
-            .split_whitespace()
-            .map(|w| w.trim_end_matches([',', '.', ';', ':']))
-            .collect();
-        words.windows(3).rev().find_map(|w| {
-            Some([
-                w[0].parse().ok().filter(|_| w[1] == "to")?,
-                w[2].parse().ok()?,
-            ])
-        })
     }
 
     #[test]

@@ -31,6 +31,11 @@ impl EnvironmentMaps {
         }
     }
 
+    /// Whether a config names the same pictures.
+    pub(crate) fn are_of(&self, config: &DatasetConfig) -> bool {
+        self.folder == config.folder && self.listed == config.scene.environment.files
+    }
+
     /// Name and path of each picture that the recipe lists.
     pub(crate) fn files(&self) -> impl Iterator<Item = (&str, PathBuf)> {
         self.listed

@@ -26,6 +26,7 @@ mod contact_sheet;
 mod counts;
 mod environment_maps;
 mod estimate;
+mod falls;
 mod finding;
 mod fingerprint;
 #[doc(hidden)]
@@ -33,6 +34,8 @@ pub mod fit;
 mod folder;
 mod formats;
 mod generate;
+#[doc(hidden)]
+pub mod index;
 mod inputs;
 mod journal;
 mod journal_line;
@@ -50,8 +53,12 @@ mod pictures;
 mod pipeline;
 mod preset;
 mod quality;
+#[doc(hidden)]
+pub mod recipe_text;
 mod run;
 mod scene_config;
+#[doc(hidden)]
+pub mod settings;
 mod shard;
 mod sidecar;
 mod split;

@@ -6,6 +6,7 @@ use crate::bounds::LEAST_OBJECT_PX;
 use crate::composite;
 use crate::dataset::background_photo::{BackgroundOptions, BackgroundPhoto};
 use crate::dataset::environment_maps::EnvironmentMaps;
+use crate::dataset::falls::Falls;
 use crate::dataset::fingerprint::fingerprint;
 use crate::dataset::times::timed;
 use crate::dataset::{
@@ -30,17 +31,21 @@ use std::sync::atomic::{AtomicBool, Ordering};
 #[derive(Debug)]
 pub struct Pipeline {
     config: DatasetConfig,
-    library: Library,
-    places: Vec<BackgroundPhoto>,
+    library: Arc<Library>,
+    places: Arc<[BackgroundPhoto]>,
     backgrounds: Vec<Background>,
     catalog: Vec<AssetVariant>,
-    surroundings: EnvironmentMaps,
+    surroundings: Arc<EnvironmentMaps>,
+    falls: Arc<Falls>,
     /// Turns true when no picture is to be finished any more.
     stop: &'static AtomicBool,
 }
 
 /// Nobody stops a pipeline by itself.
 static NEVER: AtomicBool = AtomicBool::new(false);
+
+/// So many falls are remembered while a recipe is tuned.
+const REMEMBERED_FALLS: usize = 256;
 
 /// Scenes that do not settle are resampled this often.
 const MAX_RESAMPLES: usize = 8;
@@ -61,10 +66,43 @@ impl Pipeline {
     /// # Errors
     /// As [`open`](Self::open).
     pub fn with_library(config: DatasetConfig, library: Library) -> Result<Self> {
-        let places = open_backgrounds(&config)?;
-        let pipeline = Self::new(config, library, places)?;
-        pipeline.check_sizes()?;
-        Ok(pipeline)
+        let places = open_backgrounds(&config)?.into();
+        Self::new(config, library.into(), places).with_checked_sizes()
+    }
+
+    /// The same with another config: what both name is not opened again, and objects that fall as
+    /// they fell before do not fall again. For a recipe that is being tuned.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    #[doc(hidden)]
+    pub fn with_config(&self, config: DatasetConfig) -> Result<Self> {
+        let library = match self.config.assets == config.assets {
+            true => self.library.clone(),
+            false => Library::open(&config.assets)?.into(),
+        };
+        let places = match has_same_places(&self.config, &config) {
+            true => self.places.clone(),
+            false => open_backgrounds(&config)?.into(),
+        };
+        let falls = match self.falls.remembers() {
+            true => self.falls.clone(),
+            false => Arc::new(Falls::of_last(REMEMBERED_FALLS)),
+        };
+        let has_same_maps = self.surroundings.are_of(&config);
+        let mut tuned = Self {
+            falls,
+            ..Self::new(config, library, places)
+        };
+        if has_same_maps {
+            tuned.surroundings = self.surroundings.clone();
+        }
+        tuned.with_checked_sizes()
+    }
+
+    fn with_checked_sizes(self) -> Result<Self> {
+        self.check_sizes()?;
+        Ok(self)
     }
 
     fn check_sizes(&self) -> Result<()> {
@@ -117,20 +155,21 @@ impl Pipeline {
         } else {
             open_backgrounds(&config)?
         };
-        Self::new(config, library, places)
+        Ok(Self::new(config, library.into(), places.into()))
     }
 
-    fn new(config: DatasetConfig, library: Library, places: Vec<BackgroundPhoto>) -> Result<Self> {
+    fn new(config: DatasetConfig, library: Arc<Library>, places: Arc<[BackgroundPhoto]>) -> Self {
         let backgrounds = places.iter().map(|place| place.background.clone());
-        Ok(Self {
+        Self {
             backgrounds: backgrounds.collect(),
             catalog: catalog(&library),
-            surroundings: EnvironmentMaps::of(&config),
+            surroundings: EnvironmentMaps::of(&config).into(),
             config,
             library,
             places,
+            falls: Arc::default(),
             stop: &NEVER,
-        })
+        }
     }
 
     /// The same, whose falls end with [`Error::Interrupted`] once a flag is true.
@@ -386,9 +425,11 @@ impl Pipeline {
 
     #[cfg(feature = "settle")]
     fn rest(&self, scene: Scene, allowance: &Allowance) -> Result<Scene> {
-        crate::settle::settle_within(scene, &self.config.scene.settle, 0, allowance)?
-            .0
-            .into_scene()
+        let options = &self.config.scene.settle;
+        self.falls.settled(scene, options, |scene| {
+            let (settled, _) = crate::settle::settle_within(scene, options, 0, allowance)?;
+            settled.into_scene()
+        })
     }
 
     #[cfg(not(feature = "settle"))]
@@ -432,6 +473,18 @@ fn open_backgrounds(config: &DatasetConfig) -> Result<Vec<BackgroundPhoto>> {
         force: config.force_cameras,
     };
     BackgroundPhoto::all(&config.backgrounds, options)
+}
+
+/// Whether two configs take the same photos in the same way.
+fn has_same_places(a: &DatasetConfig, b: &DatasetConfig) -> bool {
+    let taken = |config: &DatasetConfig| {
+        (
+            config.scene.image,
+            config.surface_size,
+            config.force_cameras,
+        )
+    };
+    a.backgrounds == b.backgrounds && taken(a) == taken(b)
 }
 
 /// The seed of the `n`-th try of scene `k`: the first is the dataset's own.

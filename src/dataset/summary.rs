@@ -84,7 +84,7 @@ pub enum UnlabelledReason {
 
 impl UnlabelledReason {
     /// In words.
-    pub(crate) fn description(self) -> &'static str {
+    pub fn description(self) -> &'static str {
         match self {
             Self::Covered => "another object lies over it",
             Self::Outside => "nothing of it lies in the picture",

@@ -103,7 +103,7 @@ pub(crate) use document::parse_toml;
 pub use document::{
     Override, from_overrides, read_json, read_text, read_toml, write_json, write_text, write_toml,
 };
-pub(crate) use document::{parse_json, read_json_data, read_toml_with};
+pub(crate) use document::{parse_json, parse_toml_with, read_json_data};
 pub use document::{read_document, write_document};
 #[doc(hidden)]
 pub use format::Format;

@@ -97,6 +97,15 @@ impl Folder {
         Ok(path)
     }
 
+    /// Whether a path that a file of the folder names leads into the folder, whatever links there
+    /// are.
+    pub(crate) fn holds(&self, path: &Path) -> bool {
+        match (self.here().canonicalize(), path.canonicalize()) {
+            (Ok(root), Ok(target)) => target.starts_with(root),
+            _ => false,
+        }
+    }
+
     /// The name of a path inside, as browsers say it.
     pub(crate) fn name_of(&self, path: &Path) -> String {
         let inside = path.strip_prefix(&self.root).unwrap_or(path);

@@ -82,7 +82,8 @@ async fn photo(
     Ok(([(CACHE_CONTROL, "private, max-age=60")], response).into_response())
 }
 
-fn shown(path: &Path, side: Option<usize>) -> Answer<Response> {
+/// A picture as the browser can show it, small where a longer side is given.
+pub(crate) fn shown(path: &Path, side: Option<usize>) -> Answer<Response> {
     let plain = plain_type(path)?;
     match (side, plain) {
         (None, Some(kind)) => Ok(of_type(kind, std::fs::read(path).map_err(unreadable)?)),

@@ -29,6 +29,13 @@ fn broken() -> Refusal {
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
 pub(crate) struct Tab(String);
 
+impl Tab {
+    /// A part of the tab, whose requests replace each other and none of another part.
+    pub(crate) fn part(&self, name: &str) -> Self {
+        Self(format!("{}/{name}", self.0))
+    }
+}
+
 impl<S: Sync> FromRequestParts<S> for Tab {
     type Rejection = Infallible;
 

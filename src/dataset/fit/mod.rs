@@ -16,11 +16,11 @@ mod measured;
 mod moved_paths;
 mod places;
 mod plates;
-mod recipe_text;
 mod report;
 mod starts;
 mod statistics;
 
+use crate::dataset::recipe_text::{KeyEdit, with_edits};
 use crate::dataset::{DatasetConfig, Format, LabelConfig, Pictures, Pipeline, Yolo, generate};
 use crate::error::{Error, Result};
 use crate::io;
@@ -31,7 +31,6 @@ use measured::MeasuredSet;
 use moved_paths::moved_paths;
 use places::OBJECT_COUNTS;
 use plates::MeasuredPlate;
-use recipe_text::KeyText;
 use report::Compared;
 use starts::LEVERS;
 use std::path::{Path, PathBuf};
@@ -90,8 +89,6 @@ pub struct FittedKey {
 pub struct Fit {
     /// Its text.
     pub text: String,
-    /// Whether the text has the comments of the recipe that was fitted.
-    pub has_comments: bool,
     /// The keys that were looked at.
     pub keys: Vec<FittedKey>,
     /// Every distribution before and after, beside the real one.
@@ -135,7 +132,7 @@ struct Fitting<'a> {
     options: FitOptions,
     keys: Vec<FittedKey>,
     /// What names files, for the fitted recipe's folder.
-    moved_paths: Vec<KeyText>,
+    moved_paths: Vec<KeyEdit>,
     steps: Steps<'a>,
     stop: &'static AtomicBool,
 }
@@ -180,15 +177,13 @@ impl Fitting<'_> {
     }
 
     fn finish(self, plan: &FitPlan, page: Page) -> Result<Fit> {
-        let mut keys = self.moved_paths;
+        let mut edits = self.moved_paths;
         let fitted = self.keys.iter();
-        keys.extend(fitted.filter_map(|key| Some((key.key.clone(), key.fitted.clone()?))));
+        edits.extend(fitted.filter_map(|key| Some(KeyEdit::set(&key.key, key.fitted.clone()?))));
         let text = io::read_text(&plan.recipe)?;
-        let edited = recipe_text::with_keys(&text, &keys).map_err(|e| e.in_file(&plan.recipe));
-        let (text, has_comments) = edited?;
+        let text = with_edits(&text, &edits).map_err(|e| e.in_file(&plan.recipe))?;
         Ok(Fit {
             text,
-            has_comments,
             keys: self.keys,
             page,
         })

@@ -1,9 +1,9 @@
 //! What names files in a recipe, once it lies in another folder.
 
-use super::recipe_text::KeyText;
 use crate::dataset::DatasetConfig;
 use crate::dataset::environment_maps::seen_from;
 use crate::dataset::paths::folder_of;
+use crate::dataset::recipe_text::KeyEdit;
 use crate::error::Result;
 use crate::io;
 use std::path::Path;
@@ -14,7 +14,7 @@ pub(super) fn moved_paths(
     config: &DatasetConfig,
     recipe: &Path,
     output: &Path,
-) -> Result<Vec<KeyText>> {
+) -> Result<Vec<KeyEdit>> {
     let (from, to) = (io::absolute(recipe)?, io::absolute(output)?);
     let to = folder_of(&to);
     if folder_of(&from) == to {
@@ -29,19 +29,19 @@ pub(super) fn moved_paths(
     folders.into_iter().chain(files).collect()
 }
 
-fn moved_folder(key: &str, folder: &Path, to: &Path) -> Result<KeyText> {
+fn moved_folder(key: &str, folder: &Path, to: &Path) -> Result<KeyEdit> {
     let folder = io::relative(&io::absolute(folder)?, to);
-    Ok((key.to_owned(), quoted(&folder.to_string_lossy())))
+    Ok(KeyEdit::set(key, quoted(&folder.to_string_lossy())))
 }
 
-fn environment_files(config: &DatasetConfig, to: &Path) -> Result<Option<KeyText>> {
+fn environment_files(config: &DatasetConfig, to: &Path) -> Result<Option<KeyEdit>> {
     let files = config.scene.environment.files.iter();
     let files: Result<Vec<String>> = files
         .map(|file| Ok(quoted(&seen_from(to, &config.folder, file)?)))
         .collect();
     let files = files?;
     let text = format!("[{}]", files.join(", "));
-    Ok((!files.is_empty()).then(|| ("scene.environment.files".into(), text)))
+    Ok((!files.is_empty()).then(|| KeyEdit::set("scene.environment.files", text)))
 }
 
 /// A string as TOML.
@@ -71,7 +71,7 @@ mod tests {
             ("backgrounds", "\"../b\""),
             ("scene.environment.files", "[\"../a/sky.hdr\"]"),
         ];
-        let expected = expected.map(|(key, text)| (key.to_owned(), text.to_owned()));
+        let expected = expected.map(|(key, text)| KeyEdit::set(key, text));
         assert_eq!(moved(&config, "c/fitted.toml"), expected);
     }
 

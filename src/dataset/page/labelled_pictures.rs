@@ -101,7 +101,7 @@ impl LabelledSet {
 }
 
 impl LabelledPicture {
-    fn read(path: PathBuf) -> Result<Self> {
+    pub(in crate::dataset) fn read(path: PathBuf) -> Result<Self> {
         let label = label_beside(&path);
         let boxes = label.map(|label| read_boxes(&label)).transpose()?;
         Ok(Self { path, boxes })
@@ -167,7 +167,7 @@ fn check_image_count(count: usize, folder: &Path) -> Result<()> {
 }
 
 /// Classes and images of a YOLO dataset, or all images below a folder.
-fn listed_images(folder: &Path) -> Result<(Vec<String>, Vec<PathBuf>)> {
+pub(in crate::dataset) fn listed_images(folder: &Path) -> Result<(Vec<String>, Vec<PathBuf>)> {
     if folder.join("data.yaml").is_file() {
         let listing = Listing::read(folder)?;
         let images = listing.series();

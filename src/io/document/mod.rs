@@ -27,21 +27,11 @@ pub fn read_toml<T: DeserializeOwned>(path: impl AsRef<Path>) -> Result<T> {
     parse_toml(&read_text(path)?).map_err(|e| e.in_file(path))
 }
 
-/// Reads a TOML document, some of its values replaced and then changed by `change`.
+/// A TOML document in memory, some of its values replaced and then changed by `change`.
 ///
 /// # Errors
-/// As [`read_toml`]; an override of a value that cannot be there.
-pub(crate) fn read_toml_with<T: DeserializeOwned>(
-    path: impl AsRef<Path>,
-    overrides: &[Override],
-    change: impl FnOnce(&mut toml::Table),
-) -> Result<T> {
-    let path = path.as_ref();
-    let text = read_text(path)?;
-    parse_toml_with(&text, overrides, change).map_err(|e| e.in_file(path))
-}
-
-fn parse_toml_with<T: DeserializeOwned>(
+/// As [`parse_toml`]; an override of a value that cannot be there.
+pub(crate) fn parse_toml_with<T: DeserializeOwned>(
     text: &str,
     overrides: &[Override],
     change: impl FnOnce(&mut toml::Table),

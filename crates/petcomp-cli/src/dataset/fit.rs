@@ -32,10 +32,6 @@ pub(crate) fn run(args: &FitArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     let plan = args.plan();
     let fitted = fit(&plan, &|done, of| display.update(done, of), interruption())?;
     drop(display);
-    if !fitted.has_comments {
-        let recipe = args.recipe.display();
-        log::warn!("{recipe}: its comments are not kept: some keys are in tables within lines");
-    }
     io::write_text(&args.output, &fitted.text)?;
     io::write_text(args.page_path(), &fitted.page.document())?;
     print_keys(&fitted);

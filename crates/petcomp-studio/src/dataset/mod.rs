@@ -1,16 +1,229 @@
-//! The page `dataset`.
+//! The page `dataset`: its pictures with what is known of them, however many there are.
+//!
+//! A folder is listed when it is opened; what is in a picture is read once somebody looks at it, or
+//! asks for something that only the records of all pictures can answer.
 
+mod catalog;
+mod filter;
+mod sample;
+
+use crate::folder::Folder;
+use crate::picture::{may_be_photo, shown};
+use crate::refusal::{Answer, Refusal};
 use crate::server::Page;
 use crate::studio::Studio;
-use axum::Router;
+use crate::turn::blocking;
+use axum::extract::{Query, State};
+use axum::http::StatusCode;
+use axum::http::header::CACHE_CONTROL;
+use axum::response::{IntoResponse, Response};
+use axum::routing::{get, post};
+use axum::{Json, Router};
+use catalog::{Catalog, Catalogs, Row};
+use filter::{Filter, Order};
+use sample::SampleShown;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 pub(crate) const PAGES: &[Page] = &[crate::page!("dataset.html"), crate::page!("dataset.js")];
 
 /// What the page keeps between requests.
 #[derive(Default)]
-pub(crate) struct Dataset {}
+pub(crate) struct Dataset {
+    catalogs: Catalogs,
+}
+
+/// Most rows that are answered at a time: more than fit on any screen.
+const MAX_ROWS: usize = 500;
 
 pub(crate) fn routes() -> Router<Arc<Studio>> {
     Router::new()
+        .route("/folders", get(folders))
+        .route("/open", get(open))
+        .route("/find", post(find))
+        .route("/rows", post(rows))
+        .route("/sample", get(sample))
+        .route("/picture", get(picture))
+}
+
+/// Folders to look at: datasets, and what holds images outside of them.
+async fn folders(State(studio): State<Arc<Studio>>) -> Answer<Json<Vec<String>>> {
+    blocking(move || Ok(Json(folders_of(&studio.folder)))).await
+}
+
+fn folders_of(folder: &Folder) -> Vec<String> {
+    let files = folder.find(|path| path.ends_with("data.yaml") || may_be_photo(path));
+    let parent = |file: &String| {
+        file.rsplit_once('/')
+            .map_or("", |(parent, _)| parent)
+            .to_owned()
+    };
+    let (lists, images): (Vec<_>, Vec<_>) =
+        files.iter().partition(|file| file.ends_with("data.yaml"));
+    let datasets: BTreeSet<String> = lists.into_iter().map(parent).collect();
+    let is_within = |name: &String, dataset: &String| {
+        dataset.is_empty()
+            || name
+                .strip_prefix(dataset)
+                .is_some_and(|rest| rest.starts_with('/'))
+    };
+    let images: BTreeSet<String> = images.into_iter().map(parent).collect();
+    let others = images.into_iter().filter(|name| {
+        !datasets.contains(name) && !datasets.iter().any(|dataset| is_within(name, dataset))
+    });
+    datasets.iter().cloned().chain(others).collect()
+}
+
+#[derive(Deserialize)]
+struct FolderName {
+    folder: String,
+}
+
+/// A folder as it was listed.
+#[derive(Serialize)]
+struct Opened {
+    count: usize,
+    classes: Vec<String>,
+    /// Whether petcomp made it, and wrote down everything.
+    has_records: bool,
+}
+
+async fn open(
+    State(studio): State<Arc<Studio>>,
+    Query(FolderName { folder }): Query<FolderName>,
+) -> Answer<Json<Opened>> {
+    blocking(move || {
+        let catalog = studio.dataset.catalogs.open(&studio.folder, &folder)?;
+        let index = &catalog.index;
+        Ok(Json(Opened {
+            count: index.pictures.len(),
+            classes: index.classes.clone(),
+            has_records: index
+                .pictures
+                .iter()
+                .any(|picture| picture.written.is_some()),
+        }))
+    })
+    .await
+}
+
+#[derive(Deserialize)]
+struct Wanted {
+    folder: String,
+    filter: Filter,
+    order: Order,
+}
+
+/// The pictures that are wanted, as far as they are known.
+#[derive(Serialize)]
+struct FoundRows {
+    rows: Vec<usize>,
+    /// Why a picture is unlike the others, in the order of the rows.
+    why: Vec<String>,
+    /// Photos of the place that were seen so far.
+    backgrounds: BTreeSet<String>,
+    /// So many pictures were read of so many that must be; equal once the rows are final.
+    read: usize,
+    of: usize,
+}
+
+async fn find(
+    State(studio): State<Arc<Studio>>,
+    Json(wanted): Json<Wanted>,
+) -> Answer<Json<FoundRows>> {
+    blocking(move || {
+        let catalog = studio
+            .dataset
+            .catalogs
+            .get(&studio.folder, &wanted.folder)?;
+        let must_read = wanted.filter.needs_facts(&catalog.index) || wanted.order.needs_facts();
+        if must_read {
+            catalog.read_in_background();
+        }
+        let (rows, why) = filter::found(&catalog, &wanted.filter, wanted.order);
+        let of = if must_read {
+            catalog.index.pictures.len()
+        } else {
+            0
+        };
+        Ok(Json(FoundRows {
+            rows,
+            why,
+            backgrounds: catalog.backgrounds(),
+            read: catalog.read_count().min(of),
+            of,
+        }))
+    })
+    .await
+}
+
+#[derive(Deserialize)]
+struct SomeRows {
+    folder: String,
+    rows: Vec<usize>,
+}
+
+async fn rows(
+    State(studio): State<Arc<Studio>>,
+    Json(SomeRows { folder, rows }): Json<SomeRows>,
+) -> Answer<Json<Vec<Row>>> {
+    blocking(move || {
+        let catalog = studio.dataset.catalogs.get(&studio.folder, &folder)?;
+        let rows = rows.into_iter().take(MAX_ROWS);
+        let rows: Answer<_> = rows.map(|row| catalog.row(row)).collect();
+        rows.map(Json)
+    })
+    .await
+}
+
+#[derive(Deserialize)]
+struct OneRow {
+    folder: String,
+    row: usize,
+    /// Longer side of a small picture, pixels; all of it without it.
+    side: Option<usize>,
+}
+
+async fn sample(
+    State(studio): State<Arc<Studio>>,
+    Query(asked): Query<OneRow>,
+) -> Answer<Json<SampleShown>> {
+    blocking(move || {
+        let catalog = studio.dataset.catalogs.get(&studio.folder, &asked.folder)?;
+        picture_file(&studio.folder, &catalog, asked.row)?;
+        SampleShown::of(&catalog.index, asked.row).map(Json)
+    })
+    .await
+}
+
+async fn picture(
+    State(studio): State<Arc<Studio>>,
+    Query(asked): Query<OneRow>,
+) -> Answer<Response> {
+    let response = blocking(move || {
+        let catalog = studio.dataset.catalogs.get(&studio.folder, &asked.folder)?;
+        shown(
+            &picture_file(&studio.folder, &catalog, asked.row)?,
+            asked.side,
+        )
+    })
+    .await?;
+    Ok(([(CACHE_CONTROL, "private, max-age=300")], response).into_response())
+}
+
+/// The file of a picture, which a list may say to be anywhere.
+fn picture_file(folder: &Folder, catalog: &Catalog, row: usize) -> Answer<PathBuf> {
+    let file = catalog.index.file(catalog.checked(row)?)?;
+    if folder.holds(&file) {
+        return Ok(file);
+    }
+    Err(outside(catalog))
+}
+
+fn outside(catalog: &Catalog) -> Refusal {
+    let folder = petcomp::printable(&catalog.index.folder.to_string_lossy());
+    let what = format!("{folder}: lists a picture that is not in the folder of this studio");
+    Refusal::new(StatusCode::NOT_FOUND, what)
 }

@@ -1,16 +1,152 @@
-//! The page `recipe`.
+//! The page `recipe`: every setting of a recipe, and what pictures become of it at once.
 
+mod draft;
+mod preview;
+
+use crate::refusal::Answer;
 use crate::server::Page;
 use crate::studio::Studio;
-use axum::Router;
+use crate::turn::{Tab, Turns, blocking};
+use axum::extract::{Query, State};
+use axum::response::Response;
+use axum::routing::{get, post};
+use axum::{Json, Router};
+use draft::{Draft, Edits};
+use petcomp::dataset::DatasetConfig;
+use petcomp::dataset::settings::{SettingGroup, settings};
+use preview::{PictureAsked, Pipelines};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
 use std::sync::Arc;
 
 pub(crate) const PAGES: &[Page] = &[crate::page!("recipe.html"), crate::page!("recipe.js")];
 
 /// What the page keeps between requests.
 #[derive(Default)]
-pub(crate) struct Recipe {}
+pub(crate) struct Recipe {
+    turns: Turns,
+    pipelines: Arc<Pipelines>,
+}
 
 pub(crate) fn routes() -> Router<Arc<Studio>> {
     Router::new()
+        .route("/files", get(files))
+        .route("/settings", get(told_settings))
+        .route("/open", get(open))
+        .route("/new", post(begin))
+        .route("/draft", post(draft))
+        .route("/save", post(save))
+        .route("/picture", post(picture))
+}
+
+/// The recipes of the folder: documents that `petcomp dataset generate` takes.
+async fn files(State(studio): State<Arc<Studio>>) -> Answer<Json<Vec<String>>> {
+    blocking(move || {
+        let is_recipe = |path: &Path| {
+            let is_toml = path
+                .extension()
+                .is_some_and(|extension| extension == "toml");
+            is_toml && DatasetConfig::read(path, &[]).is_ok()
+        };
+        Ok(Json(studio.folder.find(is_recipe)))
+    })
+    .await
+}
+
+async fn told_settings() -> Answer<Json<Vec<SettingGroup>>> {
+    blocking(|| Ok(Json(settings()))).await
+}
+
+#[derive(Deserialize)]
+struct FileName {
+    file: String,
+}
+
+/// A recipe as its file has it.
+#[derive(Serialize)]
+struct Opened {
+    version: String,
+    #[serde(flatten)]
+    draft: Draft,
+}
+
+async fn open(
+    State(studio): State<Arc<Studio>>,
+    Query(FileName { file }): Query<FileName>,
+) -> Answer<Json<Opened>> {
+    blocking(move || {
+        let read = studio.folder.read_text(&file)?;
+        // Assets and photos may be others by now.
+        studio.recipe.pipelines.forget();
+        let draft = Draft::of(&read.text, &studio.folder.file(&file)?)?;
+        let version = read.version;
+        Ok(Json(Opened { version, draft }))
+    })
+    .await
+}
+
+/// Begins a recipe with the template, which names every setting.
+async fn begin(
+    State(studio): State<Arc<Studio>>,
+    Json(FileName { file }): Json<FileName>,
+) -> Answer<Json<String>> {
+    blocking(move || {
+        let saved = studio.folder.save(&file, DatasetConfig::template(), None);
+        saved.map(Json)
+    })
+    .await
+}
+
+/// A recipe with edits that are not saved.
+#[derive(Deserialize)]
+struct Edited {
+    file: String,
+    edits: Edits,
+}
+
+async fn draft(
+    State(studio): State<Arc<Studio>>,
+    Json(Edited { file, edits }): Json<Edited>,
+) -> Answer<Json<Draft>> {
+    blocking(move || {
+        let text = edits.apply(&studio.folder.read_text(&file)?.text)?;
+        Ok(Json(Draft::of(&text, &studio.folder.file(&file)?)?))
+    })
+    .await
+}
+
+#[derive(Deserialize)]
+struct Saved {
+    #[serde(flatten)]
+    edited: Edited,
+    version: String,
+}
+
+async fn save(
+    State(studio): State<Arc<Studio>>,
+    Json(Saved { edited, version }): Json<Saved>,
+) -> Answer<Json<String>> {
+    blocking(move || {
+        let Edited { file, edits } = edited;
+        let text = edits.apply(&studio.folder.read_text(&file)?.text)?;
+        Draft::of(&text, &studio.folder.file(&file)?)?;
+        studio.folder.save(&file, &text, Some(&version)).map(Json)
+    })
+    .await
+}
+
+/// A picture of an edited recipe. Of each slot of the page only the newest request counts.
+async fn picture(
+    State(studio): State<Arc<Studio>>,
+    tab: Tab,
+    Json(asked): Json<PictureAsked>,
+) -> Answer<Response> {
+    let turns = studio.recipe.turns.clone();
+    let slot = tab.part(&asked.slot);
+    turns
+        .run(slot, move |turn| {
+            let pipelines = studio.recipe.pipelines.clone();
+            pipelines.picture(&studio.folder, &asked, turn)
+        })
+        .await
 }

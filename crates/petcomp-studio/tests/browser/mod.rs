@@ -4,6 +4,7 @@
 #![allow(dead_code, reason = "each test uses a part")]
 
 pub(crate) mod studio;
+pub(crate) mod tray;
 
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader};

@@ -1,0 +1,218 @@
+//! Folders that were listed, and what was read of their pictures so far.
+
+use crate::folder::Folder;
+use crate::refusal::{Answer, Refusal};
+use axum::http::StatusCode;
+use petcomp::dataset::index::{DatasetIndex, ObjectFacts, PictureFacts};
+use serde::Serialize;
+use std::collections::{BTreeSet, VecDeque};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+
+/// Folders that are kept: two beside each other, and one before.
+const KEPT: usize = 3;
+
+/// The folders that were opened last.
+#[derive(Default)]
+pub(super) struct Catalogs(Mutex<VecDeque<(String, Arc<Catalog>)>>);
+
+impl Catalogs {
+    /// Lists a folder, anew if it was listed before.
+    pub(super) fn open(&self, folder: &Folder, name: &str) -> Answer<Arc<Catalog>> {
+        let index = DatasetIndex::open(&folder.folder(name)?)?;
+        let catalog = Arc::new(Catalog::new(index));
+        let mut kept = self.kept();
+        kept.retain(|(known, _)| known != name);
+        kept.push_back((name.to_owned(), catalog.clone()));
+        if kept.len() > KEPT {
+            kept.pop_front();
+        }
+        Ok(catalog)
+    }
+
+    /// A folder as it was listed last.
+    pub(super) fn get(&self, folder: &Folder, name: &str) -> Answer<Arc<Catalog>> {
+        let known = self.find(name);
+        known.map_or_else(|| self.open(folder, name), Ok)
+    }
+
+    fn find(&self, name: &str) -> Option<Arc<Catalog>> {
+        let kept = self.kept();
+        let (_, catalog) = kept.iter().find(|(known, _)| known == name)?;
+        Some(catalog.clone())
+    }
+
+    fn kept(&self) -> MutexGuard<'_, VecDeque<(String, Arc<Catalog>)>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// A folder's pictures.
+pub(super) struct Catalog {
+    pub(super) index: DatasetIndex,
+    /// None for a picture whose record cannot be read.
+    facts: Vec<OnceLock<Option<PictureFacts>>>,
+    read: AtomicUsize,
+    is_reading: AtomicBool,
+}
+
+/// A picture as a list shows it.
+#[derive(Debug, Serialize)]
+pub(super) struct Row {
+    row: usize,
+    name: String,
+    part: Option<petcomp::dataset::Part>,
+    background: String,
+    objects: Vec<ObjectFacts>,
+    flags: Vec<Flag>,
+}
+
+/// What somebody may want to look at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(super) enum Flag {
+    /// Objects lie over each other in a circle.
+    Knotted,
+    /// A scene was rejected before this one.
+    Rejected,
+    /// There is no object.
+    Empty,
+    /// There are objects, and none has a label.
+    Unlabelled,
+    /// Objects without a class are in the way.
+    Distractors,
+    /// What was written of it cannot be read.
+    Unreadable,
+}
+
+impl Catalog {
+    fn new(index: DatasetIndex) -> Self {
+        Self {
+            facts: index.pictures.iter().map(|_| OnceLock::new()).collect(),
+            read: AtomicUsize::new(0),
+            is_reading: AtomicBool::new(false),
+            index,
+        }
+    }
+
+    /// A row that there is.
+    pub(super) fn checked(&self, row: usize) -> Answer<usize> {
+        let count = self.index.pictures.len();
+        if row < count {
+            return Ok(row);
+        }
+        let what = format!("row: {row}, expected less than {count}");
+        Err(Refusal::new(StatusCode::NOT_FOUND, what))
+    }
+
+    /// What is in a picture; read now if it was not before, none where it cannot be.
+    pub(super) fn facts(&self, row: usize) -> Option<&PictureFacts> {
+        let facts = self.facts[row].get_or_init(|| {
+            self.read.fetch_add(1, Ordering::Relaxed);
+            let read = self.index.facts(row);
+            read.inspect_err(|error| log::warn!("{error}")).ok()
+        });
+        facts.as_ref()
+    }
+
+    /// What is known of a picture without reading anything; none where it is not known yet.
+    pub(super) fn known(&self, row: usize) -> Option<&Option<PictureFacts>> {
+        self.facts[row].get()
+    }
+
+    /// How many pictures were read.
+    pub(super) fn read_count(&self) -> usize {
+        self.read.load(Ordering::Relaxed)
+    }
+
+    /// Reads all that was not read, while others look at what is known.
+    pub(super) fn read_in_background(self: &Arc<Self>) {
+        let is_done = self.read_count() == self.index.pictures.len();
+        if is_done || self.is_reading.swap(true, Ordering::Relaxed) {
+            return;
+        }
+        let catalog = Arc::downgrade(self);
+        tokio::task::spawn_blocking(move || {
+            let mut row = 0;
+            // Ends where the folder was listed anew.
+            while let Some(catalog) = catalog.upgrade() {
+                if row == catalog.index.pictures.len() {
+                    break;
+                }
+                catalog.facts(row);
+                row += 1;
+            }
+        });
+    }
+
+    /// Photos of the place in the pictures that were read.
+    pub(super) fn backgrounds(&self) -> BTreeSet<String> {
+        let known = self.facts.iter().filter_map(|facts| facts.get()?.as_ref());
+        let named = known.filter(|facts| !facts.background.is_empty());
+        named.map(|facts| facts.background.clone()).collect()
+    }
+
+    /// A picture for a list.
+    pub(super) fn row(&self, row: usize) -> Answer<Row> {
+        let picture = &self.index.pictures[self.checked(row)?];
+        let facts = self.facts(row).cloned().unwrap_or_default();
+        Ok(Row {
+            row,
+            name: picture.name.clone(),
+            part: picture.part,
+            background: facts.background,
+            objects: facts.objects,
+            flags: self.flags(row),
+        })
+    }
+
+    /// The flags of a picture, as far as they are known.
+    pub(super) fn flags(&self, row: usize) -> Vec<Flag> {
+        let all = [
+            Flag::Knotted,
+            Flag::Rejected,
+            Flag::Empty,
+            Flag::Unlabelled,
+            Flag::Distractors,
+            Flag::Unreadable,
+        ];
+        let raised = all.into_iter();
+        raised
+            .filter(|flag| self.has_flag(row, *flag) == Some(true))
+            .collect()
+    }
+
+    /// Whether a picture has a flag; none where that is not known yet.
+    pub(super) fn has_flag(&self, row: usize, flag: Flag) -> Option<bool> {
+        let written = self.index.pictures[row].written.as_ref();
+        match flag {
+            Flag::Knotted => Some(written.is_some_and(|written| written.knotted > 0)),
+            Flag::Rejected => Some(written.is_some_and(|written| written.rejected > 0)),
+            Flag::Empty => Some(self.counts(row)?[0] == 0),
+            Flag::Unlabelled => self
+                .counts(row)
+                .map(|[objects, labels]| objects > 0 && labels == 0),
+            Flag::Distractors => self.of_facts(row, |facts| facts.distractors > 0),
+            Flag::Unreadable => Some(self.known(row)?.is_none()),
+        }
+    }
+
+    /// How many objects and labels a picture has; none where that is not known yet.
+    pub(super) fn counts(&self, row: usize) -> Option<[usize; 2]> {
+        if let Some(written) = &self.index.pictures[row].written {
+            return Some([0, 1].map(|which| written.count(which) as usize));
+        }
+        let facts = self.known(row)?.as_ref()?;
+        Some([facts.objects.len(); 2])
+    }
+
+    /// Something that only the record tells: false where that cannot be read, none before it was.
+    pub(super) fn of_facts(
+        &self,
+        row: usize,
+        is_so: impl Fn(&PictureFacts) -> bool,
+    ) -> Option<bool> {
+        let facts = self.known(row)?;
+        Some(facts.as_ref().is_some_and(is_so))
+    }
+}

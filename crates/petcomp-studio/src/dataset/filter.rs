@@ -1,0 +1,141 @@
+//! Which pictures are wanted, and in which order.
+
+use super::catalog::{Catalog, Flag};
+use petcomp::dataset::Part;
+use petcomp::dataset::index::{DatasetIndex, ObjectFacts};
+use serde::Deserialize;
+use std::cmp::Reverse;
+
+/// What a picture must have; nothing is asked by default.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub(super) struct Filter {
+    part: Option<Part>,
+    /// An object of this class.
+    class: Option<u32>,
+    /// That object has a label, or none.
+    labelled: Option<bool>,
+    /// That object is seen by shares in this range, 0 to 1.
+    visible: Option<[f32; 2]>,
+    /// So many objects, both ends included.
+    objects: Option<[usize; 2]>,
+    /// This photo of the place.
+    background: Option<String>,
+    flag: Option<Flag>,
+}
+
+/// In which order pictures are shown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(super) enum Order {
+    /// As they are listed.
+    Listed,
+    /// The strangest first, and only what is unlike the rest.
+    Unlike,
+    /// Those with most objects first.
+    MostObjects,
+    /// Those with fewest objects first.
+    FewestObjects,
+    /// Those with an object that is hidden most first.
+    LeastVisible,
+}
+
+impl Order {
+    /// It takes what all records say.
+    pub(super) fn needs_facts(self) -> bool {
+        matches!(self, Self::Unlike | Self::LeastVisible)
+    }
+}
+
+impl Filter {
+    /// It takes what the records say and the list does not.
+    pub(super) fn needs_facts(&self, index: &DatasetIndex) -> bool {
+        let lists_objects = index
+            .pictures
+            .iter()
+            .all(|picture| picture.written.is_some());
+        let by_count = self.objects.is_some() || self.flag.is_some() || self.class.is_some();
+        self.visible.is_some()
+            || self.background.is_some()
+            || self.labelled.is_some()
+            || matches!(self.flag, Some(Flag::Distractors | Flag::Unreadable))
+            || (by_count && !lists_objects)
+    }
+
+    /// Whether a picture is wanted; none where that is not known yet.
+    fn admits(&self, catalog: &Catalog, row: usize) -> Option<bool> {
+        let picture = &catalog.index.pictures[row];
+        let asked = [
+            self.part.map(|part| Some(picture.part == Some(part))),
+            self.objects.map(|[least, most]| {
+                let [objects, _] = catalog.counts(row)?;
+                Some((least..=most).contains(&objects))
+            }),
+            self.flag.map(|flag| catalog.has_flag(row, flag)),
+            self.background
+                .as_ref()
+                .map(|name| catalog.of_facts(row, |facts| facts.background == *name)),
+            self.asks_objects().then(|| self.has_object(catalog, row)),
+        ];
+        let mut answers = asked.into_iter().flatten();
+        answers.try_fold(true, |all, answer| Some(all && answer?))
+    }
+
+    fn asks_objects(&self) -> bool {
+        self.class.is_some() || self.labelled.is_some() || self.visible.is_some()
+    }
+
+    fn has_object(&self, catalog: &Catalog, row: usize) -> Option<bool> {
+        let written = catalog.index.pictures[row].written.as_ref();
+        match (self.class, written) {
+            (Some(class), Some(written)) if self.labelled.is_none() && self.visible.is_none() => {
+                let counts = written.classes.get(class as usize);
+                Some(counts.is_some_and(|[objects, _]| *objects > 0))
+            }
+            _ => catalog.of_facts(row, |facts| {
+                facts.objects.iter().any(|object| self.is_met(object))
+            }),
+        }
+    }
+
+    fn is_met(&self, object: &ObjectFacts) -> bool {
+        let is_seen =
+            |[least, most]: [f32; 2]| object.visible.is_some_and(|v| v >= least && v <= most);
+        self.class.is_none_or(|class| class == object.class)
+            && self
+                .labelled
+                .is_none_or(|labelled| labelled == object.labelled)
+            && self.visible.is_none_or(is_seen)
+    }
+}
+
+/// The rows that are known to be wanted, and why they are unlike others where that is asked.
+pub(super) fn found(catalog: &Catalog, filter: &Filter, order: Order) -> (Vec<usize>, Vec<String>) {
+    let admitted = |row: &usize| filter.admits(catalog, *row) == Some(true);
+    if order == Order::Unlike {
+        let unlike = catalog.index.unlike(|row| catalog.known(row)?.as_ref());
+        let unlike = unlike.into_iter().filter(|unlike| admitted(&unlike.row));
+        return unlike.map(|unlike| (unlike.row, unlike.why)).unzip();
+    }
+    let mut rows: Vec<usize> = (0..catalog.index.pictures.len()).filter(admitted).collect();
+    let objects = |row: usize| catalog.counts(row).map_or(0, |[objects, _]| objects);
+    match order {
+        Order::MostObjects => rows.sort_by_key(|&row| Reverse(objects(row))),
+        Order::FewestObjects => rows.sort_by_key(|&row| objects(row)),
+        Order::LeastVisible => rows.sort_by(|&a, &b| {
+            let [a, b] = [a, b].map(|row| least_visible(catalog, row));
+            a.total_cmp(&b)
+        }),
+        Order::Listed | Order::Unlike => {}
+    }
+    (rows, Vec::new())
+}
+
+/// Seen share of the object that is hidden most.
+fn least_visible(catalog: &Catalog, row: usize) -> f32 {
+    let facts = catalog.known(row).and_then(Option::as_ref);
+    let objects = facts.iter().flat_map(|facts| &facts.objects);
+    objects
+        .filter_map(|object| object.visible)
+        .fold(1.0, f32::min)
+}

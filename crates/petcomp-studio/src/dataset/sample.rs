@@ -1,0 +1,155 @@
+//! A picture with everything that is known of it, as the page draws it.
+
+use crate::refusal::Answer;
+use petcomp::dataset::index::DatasetIndex;
+use petcomp::dataset::{SampleRecord, UnlabelledReason};
+use petcomp::geom::{BBox, Point2};
+use petcomp::label::{ObjectLabel, RleMask};
+use petcomp::{ObjectId, io};
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// A picture and what is in it.
+#[derive(Debug, Serialize)]
+pub(super) struct SampleShown {
+    name: String,
+    /// Its file, below the dataset's folder.
+    file: String,
+    /// Width and height, pixels.
+    image: [u32; 2],
+    background: String,
+    objects: Vec<ObjectShown>,
+    /// Boxes of what is in the way and has no label.
+    distractors: Vec<[f64; 4]>,
+    knotted: Vec<ObjectId>,
+    /// Why scenes before this one were rejected.
+    rejected: Vec<String>,
+    /// Every drawn value by its name.
+    draws: BTreeMap<String, f64>,
+}
+
+/// An object in it; places in pixels.
+#[derive(Debug, Serialize)]
+struct ObjectShown {
+    id: u32,
+    class: u32,
+    /// The asset that it shows; empty where that is not known.
+    asset: String,
+    /// Left, top, right and bottom of the whole object.
+    bbox: [f64; 4],
+    /// The same of what is seen of it.
+    visible_box: Option<[f64; 4]>,
+    outline: Vec<Vec<[f64; 2]>>,
+    /// Runs of pixels that show it, column by column, the first outside.
+    mask: Vec<u32>,
+    visible: Option<f64>,
+    covered_by: Vec<ObjectId>,
+    /// Why it has no label; none where it has one.
+    unlabelled: Option<&'static str>,
+}
+
+impl SampleShown {
+    pub(super) fn of(index: &DatasetIndex, row: usize) -> Answer<Self> {
+        let shown = match index.record(row)? {
+            Some(record) => Self::of_record(record),
+            None => Self::of_boxes(index, row)?,
+        };
+        let picture = &index.pictures[row];
+        let file = picture
+            .file
+            .strip_prefix(&index.folder)
+            .unwrap_or(&picture.file);
+        Ok(Self {
+            name: picture.name.clone(),
+            file: file.to_string_lossy().into_owned(),
+            ..shown
+        })
+    }
+
+    fn of_record(record: SampleRecord) -> Self {
+        let objects = record.labels.objects.iter();
+        Self {
+            name: String::new(),
+            file: String::new(),
+            image: record.labels.image,
+            background: record.drawn.plate.clone(),
+            objects: objects
+                .map(|object| ObjectShown::of(object, &record))
+                .collect(),
+            distractors: record
+                .labels
+                .distractors
+                .iter()
+                .map(|d| sides(&d.amodal_box))
+                .collect(),
+            knotted: record.knotted,
+            rejected: record.rejected,
+            draws: record.draws,
+        }
+    }
+
+    /// Of a picture from elsewhere, which has boxes at most.
+    fn of_boxes(index: &DatasetIndex, row: usize) -> Answer<Self> {
+        let header = io::read_header(index.file(row)?)?;
+        let image = [header.width as u32, header.height as u32];
+        let boxes = index.boxes(row)?.unwrap_or_default().into_iter().zip(1..);
+        Ok(Self {
+            name: String::new(),
+            file: String::new(),
+            image,
+            background: String::new(),
+            objects: boxes
+                .map(|((class, shares), id)| ObjectShown::of_box(id, class, shares, image))
+                .collect(),
+            distractors: Vec::new(),
+            knotted: Vec::new(),
+            rejected: Vec::new(),
+            draws: BTreeMap::new(),
+        })
+    }
+}
+
+impl ObjectShown {
+    fn of(object: &ObjectLabel, record: &SampleRecord) -> Self {
+        let place = (object.id.0 as usize).wrapping_sub(1);
+        let drawn = record.drawn.objects.get(place);
+        let is_seen = !object.visible_box.is_empty();
+        Self {
+            id: object.id.0,
+            class: object.class,
+            asset: drawn.map(|drawn| drawn.asset.clone()).unwrap_or_default(),
+            bbox: sides(&object.amodal_box),
+            visible_box: is_seen.then(|| sides(&object.visible_box)),
+            outline: object.outline_px.iter().map(|ring| points(ring)).collect(),
+            mask: RleMask::runs(&object.visible_mask).to_vec(),
+            visible: Some(object.visible_fraction),
+            covered_by: object.covered_by.clone(),
+            unlabelled: UnlabelledReason::of(object, record).map(UnlabelledReason::description),
+        }
+    }
+
+    fn of_box(id: u32, class: u32, [x, y, w, h]: [f64; 4], image: [u32; 2]) -> Self {
+        let [width, height] = image.map(f64::from);
+        let (left, top) = ((x - w / 2.0) * width, (y - h / 2.0) * height);
+        Self {
+            id,
+            class,
+            asset: String::new(),
+            bbox: [left, top, left + w * width, top + h * height],
+            visible_box: None,
+            outline: Vec::new(),
+            mask: Vec::new(),
+            visible: None,
+            covered_by: Vec::new(),
+            unlabelled: None,
+        }
+    }
+}
+
+fn sides(b: &BBox) -> [f64; 4] {
+    [b.x0, b.y0, b.x1, b.y1]
+}
+
+fn points(ring: &[Point2<f64>]) -> Vec<[f64; 2]> {
+    ring.iter().map(|point| [point.x, point.y]).collect()
+}

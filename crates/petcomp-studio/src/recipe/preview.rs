@@ -1,0 +1,183 @@
+//! Pictures of a recipe while it is edited: small, coarse and soon.
+//!
+//! What stays the same from one picture to the next is kept: assets, photos and their cameras, and
+//! falls, which take most of the time and which few settings change.
+
+use super::draft::Edits;
+use crate::folder::Folder;
+use crate::picture::jpeg;
+use crate::refusal::{Answer, Refusal};
+use crate::turn::Turn;
+use axum::http::StatusCode;
+use axum::response::Response;
+use petcomp::color::encode_srgb8;
+use petcomp::dataset::{DatasetConfig, Pipeline, Sample};
+use petcomp::label::overlay;
+use petcomp::render::RenderOptions;
+use petcomp::scene::{Blur, Range};
+use petcomp::{Image, Quality, Srgb8};
+use serde::Deserialize;
+use std::path::Path;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// Most work of a picture that is looked at while a slider moves; a heap of 100 objects has some 2
+/// million.
+const MOST_WORK: u64 = 10_000_000;
+/// Longer sides of small pictures, pixels.
+const SIDES_PX: std::ops::RangeInclusive<u32> = 64..=1024;
+/// Opened recipes that are kept: before and after, small and whole.
+const KEPT: usize = 4;
+
+/// Which picture is asked for.
+#[derive(Debug, Deserialize)]
+pub(super) struct PictureAsked {
+    file: String,
+    edits: Edits,
+    seed: u64,
+    /// Number of the scene.
+    k: u64,
+    /// Longer side of a small picture, pixels; without it the picture is as a dataset has it.
+    side: Option<u32>,
+    /// With boxes and outlines.
+    #[serde(default)]
+    labels: bool,
+    /// Where it is shown: a newer request for the same place ends this one.
+    pub(super) slot: String,
+}
+
+/// Opened recipes, the last used at the end, and lanes in which pictures wait for each other.
+pub(super) struct Pipelines {
+    kept: Mutex<Vec<Arc<Pipeline>>>,
+    /// As many as there are cores.
+    lanes: Vec<Mutex<()>>,
+}
+
+impl Default for Pipelines {
+    fn default() -> Self {
+        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        Self {
+            kept: Mutex::default(),
+            lanes: (0..cores).map(|_| Mutex::default()).collect(),
+        }
+    }
+}
+
+impl Pipelines {
+    /// Has everything opened again.
+    pub(super) fn forget(&self) {
+        self.kept().clear();
+    }
+
+    /// A picture of a recipe, unless it is not wanted any more once it is its turn.
+    pub(super) fn picture(
+        &self,
+        folder: &Folder,
+        asked: &PictureAsked,
+        turn: &Turn,
+    ) -> Answer<Response> {
+        let lane = &self.lanes[(asked.k % self.lanes.len() as u64) as usize];
+        let _lane = lane.lock().unwrap_or_else(PoisonError::into_inner);
+        turn.check()?;
+        let config = asked.config(folder)?;
+        let pipeline = self.opened(config)?.with_config(asked.config(folder)?)?;
+        turn.check()?;
+        let sample = pipeline.sample(asked.seed, asked.k)?;
+        jpeg(&asked.shown(&sample, &pipeline))
+    }
+
+    /// A pipeline with the assets and photos of a config.
+    fn opened(&self, config: DatasetConfig) -> Answer<Arc<Pipeline>> {
+        let mut kept = self.kept();
+        if let Some(place) = kept.iter().position(|known| opens_same(known, &config)) {
+            kept[place..].rotate_left(1);
+            return Ok(kept[kept.len() - 1].clone());
+        }
+        let opened = Pipeline::open(config.clone())?.with_config(config)?;
+        let opened = Arc::new(opened);
+        kept.push(opened.clone());
+        let surplus = kept.len().saturating_sub(KEPT);
+        kept.drain(..surplus);
+        Ok(opened)
+    }
+
+    fn kept(&self) -> MutexGuard<'_, Vec<Arc<Pipeline>>> {
+        self.kept.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+fn opens_same(known: &Pipeline, config: &DatasetConfig) -> bool {
+    let known = known.config();
+    (&known.assets, &known.backgrounds, known.scene.image)
+        == (&config.assets, &config.backgrounds, config.scene.image)
+}
+
+impl PictureAsked {
+    fn config(&self, folder: &Folder) -> Answer<DatasetConfig> {
+        let path = folder.file(&self.file)?;
+        let text = self.edits.apply(&folder.read_text(&self.file)?.text)?;
+        let config = DatasetConfig::parse(&text, &path, &[])?;
+        check_stays_inside(&config, folder)?;
+        Ok(match self.side {
+            Some(side) => small(config, side),
+            None => config,
+        })
+    }
+
+    fn shown(&self, sample: &Sample, pipeline: &Pipeline) -> Image<Srgb8> {
+        if self.labels {
+            overlay(&sample.frame, &sample.labels, &pipeline.library().classes)
+        } else {
+            sample.frame.map(|pixel| encode_srgb8(pixel.color()))
+        }
+    }
+}
+
+/// A recipe may name folders anywhere; a studio opens those in its own folder.
+fn check_stays_inside(config: &DatasetConfig, folder: &Folder) -> Answer<()> {
+    let maps = config.scene.environment.files.iter();
+    let maps = maps.map(|file| ("scene.environment.files", config.folder.join(file)));
+    let folders = [
+        ("assets", config.assets.clone()),
+        ("backgrounds", config.backgrounds.clone()),
+    ];
+    folders.into_iter().chain(maps).try_for_each(|(key, path)| {
+        if folder.holds(&path) {
+            return Ok(());
+        }
+        Err(outside(key, &path))
+    })
+}
+
+fn outside(key: &str, path: &Path) -> Refusal {
+    let path = petcomp::printable(&path.to_string_lossy());
+    let what = format!(
+        "{key}: {path} is not in the folder of this studio, expected one that is there; \
+         `petcomp studio` opens a folder that holds the recipe and all that it names"
+    );
+    Refusal::new(StatusCode::UNPROCESSABLE_ENTITY, what)
+}
+
+/// The recipe in small and coarse pictures of the same scenes; what it says in pixels shrinks with
+/// them.
+fn small(mut config: DatasetConfig, side: u32) -> DatasetConfig {
+    let side = side.clamp(*SIDES_PX.start(), *SIDES_PX.end());
+    let longer = config.scene.image[0].max(config.scene.image[1]);
+    let factor = (f64::from(side) / f64::from(longer)).min(1.0);
+    config.scene.image = config
+        .scene
+        .image
+        .map(|side| (f64::from(side) * factor).round() as u32);
+    config.render = RenderOptions::from(Quality::Draft);
+    config.scene.settle.most_work = config.scene.settle.most_work.min(MOST_WORK);
+    let finish = &mut config.scene.finish;
+    finish.camera_blur_px = scaled(finish.camera_blur_px, factor);
+    finish.chromatic_px = scaled(finish.chromatic_px, factor);
+    if let Blur::Known(px) = finish.blur_px {
+        finish.blur_px = Blur::Known(scaled(px, factor));
+    }
+    config
+}
+
+fn scaled(range: Range, factor: f64) -> Range {
+    Range::new(range.min * factor, range.max * factor)
+}

@@ -1,0 +1,155 @@
+//! A recipe is changed by its sliders, in a real browser.
+
+mod browser;
+
+use browser::studio::Studio;
+use browser::{Browser, CTRL, tray};
+use petcomp::dataset::DatasetConfig;
+use petcomp::io;
+
+const RANGE: &str = ".setting[data-path='scene.scale']";
+
+/// Waits until all pictures of what was last changed are shown.
+fn wait_for_pictures(browser: &mut Browser) {
+    browser.wait("[...document.querySelectorAll('#pictures figure')].length > 0");
+    browser.wait(
+        "[...document.querySelectorAll('#pictures figure')].every((figure) => !figure.classList.contains('old') \
+         && figure.querySelector('[data-what=after]').complete && figure.querySelector('[data-what=after]').naturalWidth > 0)",
+    );
+}
+
+/// The mean of a shown picture's codes.
+fn brightness(browser: &mut Browser, scene: usize, what: &str) -> f64 {
+    let script = format!(
+        "(() => {{ const image = document.querySelectorAll('#pictures [data-what={what}]')[{scene}]; \
+         const canvas = Object.assign(document.createElement('canvas'), {{ width: 64, height: 48 }}); \
+         const pen = canvas.getContext('2d'); pen.drawImage(image, 0, 0, 64, 48); \
+         const {{ data }} = pen.getImageData(0, 0, 64, 48); return data.reduce((a, b) => a + b) / data.length; }})()"
+    );
+    browser.eval(&script).as_f64().unwrap()
+}
+
+fn src(browser: &mut Browser) -> String {
+    let image = "document.querySelector('#pictures [data-what=after]').src";
+    browser.eval(image).as_str().unwrap().into()
+}
+
+#[test]
+fn a_slider_changes_the_pictures_and_the_file_keeps_its_comments() {
+    let Some(mut browser) = Browser::open(1440, 900) else {
+        return;
+    };
+    let dir = tempfile::tempdir().unwrap();
+    tray::fill(dir.path());
+    let studio = Studio::over(dir.path());
+    browser.go(&studio.page("recipe?file=recipe.toml"));
+    browser.wait_for(".setting");
+    wait_for_pictures(&mut browser);
+    eprintln!(
+        "first pictures after {} ms",
+        browser.eval("document.body.dataset.firstMs")
+    );
+
+    // Every setting of the template is there, with its words.
+    let told = browser.eval("document.querySelectorAll('.setting').length");
+    assert!(told.as_u64().unwrap() > 60, "{told}");
+    assert!(browser.text(RANGE).contains("factor on an object's width"));
+
+    // A slider that moves shows pictures on its way; keys are as good as a mouse.
+    let first = src(&mut browser);
+    browser.eval(&format!(
+        "document.querySelector(\"{RANGE} [type=range]:last-of-type\").focus()"
+    ));
+    for _ in 0..12 {
+        browser.press("ArrowRight", 0);
+    }
+    browser.wait(&format!(
+        "document.querySelector('#pictures [data-what=after]').src !== '{first}'"
+    ));
+    wait_for_pictures(&mut browser);
+    eprintln!(
+        "after a move {} ms",
+        browser.eval("document.body.dataset.firstMs")
+    );
+    assert_eq!(
+        browser.eval("document.querySelector('.setting.edited').dataset.path"),
+        "scene.scale"
+    );
+
+    // Brighter objects; before and after side by side.
+    browser.eval("document.querySelector('#compare').click()");
+    browser.fill(
+        ".setting[data-path='scene.gain_ev'] input[type=number]",
+        "2.5",
+    );
+    browser.wait("document.querySelectorAll('.setting.edited').length === 2");
+    wait_for_pictures(&mut browser);
+    browser.wait("[...document.querySelectorAll('#pictures [data-what=before]')].every((image) => image.naturalWidth > 0)");
+    let [before, after] = ["before", "after"].map(|what| brightness(&mut browser, 0, what));
+    assert!(after > before + 1.0, "{before} {after}");
+    browser.eval("document.querySelector('#settings').parentElement.scrollTop = 0");
+    browser.screenshot("studio_recipe");
+
+    // A value that cannot be is refused in words.
+    browser.fill(
+        ".setting[data-path='scene.negatives'] input[type=number]",
+        "3",
+    );
+    browser.wait("document.querySelector('footer').className === 'bad'");
+    assert!(
+        browser
+            .text("footer")
+            .contains("scene.negatives: 3, expected"),
+        "{}",
+        browser.text("footer")
+    );
+    browser.eval("document.activeElement.blur()");
+    browser.press("z", CTRL);
+    browser.wait("document.querySelectorAll('.setting.edited').length === 2");
+
+    // What is saved is what the command line reads, with the comments of its author.
+    browser.press("s", CTRL);
+    browser.wait("document.querySelector('#save').disabled");
+    let text = io::read_text(dir.path().join("recipe.toml")).unwrap();
+    for line in tray::RECIPE.lines() {
+        assert!(text.contains(line), "{line:?} is missing in {text}");
+    }
+    let config = DatasetConfig::read(dir.path().join("recipe.toml"), &[]).unwrap();
+    assert!(config.scene.scale.max > 1.1, "{text}");
+    assert_eq!(config.scene.gain_ev.max, 2.5);
+    // The value that was refused is one that the browser complains of, too.
+    browser
+        .complaints
+        .retain(|complaint| !complaint.contains("422"));
+    browser.assert_content();
+}
+
+#[test]
+fn a_recipe_that_leads_out_of_the_folder_is_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let recipe = "assets = '../assets'\nbackgrounds = '/'\n";
+    io::write_text(dir.path().join("recipe.toml"), recipe).unwrap();
+    let studio = Studio::over(dir.path());
+    let asked =
+        r#"{ "file": "recipe.toml", "edits": [], "seed": 0, "k": 0, "side": 64, "slot": "a" }"#;
+    let answer = studio.post("api/recipe/picture", asked);
+    assert!(answer.starts_with("HTTP/1.1 422"), "{answer}");
+    assert!(
+        answer.contains("is not in the folder of this studio"),
+        "{answer}"
+    );
+}
+
+#[test]
+fn a_stale_save_is_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    io::write_text(dir.path().join("recipe.toml"), DatasetConfig::template()).unwrap();
+    let studio = Studio::over(dir.path());
+    let save = r#"{ "file": "recipe.toml", "edits": [["scene.scale", "1"]], "version": "0" }"#;
+    let answer = studio.post("api/recipe/save", save);
+    assert!(answer.starts_with("HTTP/1.1 409"), "{answer}");
+    assert_eq!(
+        io::read_text(dir.path().join("recipe.toml")).unwrap(),
+        DatasetConfig::template()
+    );
+}

@@ -1,0 +1,125 @@
+//! Falls that were computed before: what does not change how objects fall needs no new one.
+
+use crate::error::Result;
+use crate::scene::{Grade, Placement, Scene, SettleOptions};
+use std::collections::VecDeque;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// Where objects came to rest, of the last scenes that fell; of none by default.
+#[derive(Debug, Default)]
+pub(crate) struct Falls {
+    most: usize,
+    /// What fell, and where it came to rest, the latest last.
+    known: Mutex<VecDeque<(String, Vec<Placement>)>>,
+}
+
+impl Falls {
+    /// Of so many scenes.
+    pub(crate) fn of_last(most: usize) -> Self {
+        let known = Mutex::default();
+        Self { most, known }
+    }
+
+    /// Whether it keeps any.
+    pub(crate) fn remembers(&self) -> bool {
+        self.most > 0
+    }
+
+    /// The scene with its objects at rest, by `fall` where that is not known.
+    pub(crate) fn settled(
+        &self,
+        scene: Scene,
+        options: &SettleOptions,
+        fall: impl FnOnce(Scene) -> Result<Scene>,
+    ) -> Result<Scene> {
+        if !self.remembers() {
+            return fall(scene);
+        }
+        let key = what_falls(&scene, options);
+        if let Some(placements) = self.find(&key) {
+            return Ok(placed(scene, placements));
+        }
+        let scene = fall(scene)?;
+        self.keep(key, &scene);
+        Ok(scene)
+    }
+
+    fn find(&self, key: &str) -> Option<Vec<Placement>> {
+        let known = self.known();
+        let (_, placements) = known.iter().find(|(own, _)| own == key)?;
+        Some(placements.clone())
+    }
+
+    fn keep(&self, key: String, scene: &Scene) {
+        let mut known = self.known();
+        if known.len() == self.most {
+            known.pop_front();
+        }
+        let placements = scene.objects.iter().map(|object| object.placement);
+        known.push_back((key, placements.collect()));
+    }
+
+    fn known(&self) -> MutexGuard<'_, VecDeque<(String, Vec<Placement>)>> {
+        self.known.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// All of a scene that decides how it falls.
+fn what_falls(scene: &Scene, options: &SettleOptions) -> String {
+    let mut scene = scene.clone().unlit();
+    for object in &mut scene.objects {
+        object.grade = Grade::default();
+    }
+    let falling = (scene.camera, scene.surface, scene.objects, options);
+    serde_json::to_string(&falling).expect("numbers and names are JSON")
+}
+
+fn placed(mut scene: Scene, placements: Vec<Placement>) -> Scene {
+    for (object, placement) in scene.objects.iter_mut().zip(placements) {
+        object.placement = placement;
+    }
+    scene
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geom::Pose;
+    use std::cell::Cell;
+
+    const SCENE: &str = "image = [64, 48]\n\
+        camera = { rectangle = { corners_px = [[1, 1], [9, 1], [9, 9], [1, 9]], photo = [10, 10] } }\n\
+        surface = { size = [0.4, 0.3] }\n\
+        [[objects]]\nasset = 'a'\nsize = [0.1, 0.1]\nthickness = 0.01\nmass = 0.1\n\
+        placement = { drop = { above = [0, 0], height = 0.1, rotation = [0, 0, 0, 1] } }\n";
+
+    #[test]
+    fn only_what_changes_the_fall_is_settled_again() {
+        let scene: Scene = toml::from_str(SCENE).unwrap();
+        let (options, count) = (SettleOptions::default(), Cell::new(0));
+        let falls = Falls::of_last(1);
+        let settled = |falls: &Falls, scene: &Scene| {
+            let rest = falls.settled(scene.clone(), &options, |mut scene| {
+                count.set(count.get() + 1);
+                scene.objects[0].placement = Placement::At(Pose::translation(0.0, 0.0, 0.005));
+                Ok(scene)
+            });
+            rest.unwrap()
+        };
+        let first = settled(&falls, &scene);
+        let mut redder = scene.clone();
+        redder.objects[0].grade.hue_deg = 20.0;
+        let redder = settled(&falls, &redder);
+        assert_eq!(count.get(), 1);
+        assert_eq!(redder.objects[0].placement, first.objects[0].placement);
+        assert_eq!(redder.objects[0].grade.hue_deg, 20.0);
+        let mut larger = scene.clone();
+        larger.objects[0].size = [0.2, 0.1];
+        settled(&falls, &larger);
+        settled(&falls, &scene);
+        assert_eq!(count.get(), 3, "the last one alone is known");
+        settled(&Falls::default(), &scene);
+        settled(&Falls::default(), &scene);
+        assert_eq!(count.get(), 5);
+    }
+}

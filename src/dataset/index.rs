@@ -1,0 +1,423 @@
+//! Which pictures a folder holds, listed without opening them; what is in a picture is read when
+//! somebody asks.
+
+use crate::dataset::folder;
+use crate::dataset::journal::lines_of;
+use crate::dataset::journal_line::JournalLine;
+use crate::dataset::page::labelled_pictures::{
+    LabelledPicture, ShareBox, listed_images, shares_of,
+};
+use crate::dataset::page::outlier::{Feature, outliers};
+use crate::dataset::{JOURNAL, Part, SampleRecord};
+use crate::error::{Error, Result};
+use crate::geom::BBox;
+use crate::io;
+use crate::pixel::ObjectId;
+use serde::de::IgnoredAny;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// The pictures of a dataset, or of any folder.
+#[derive(Clone, Debug)]
+pub struct DatasetIndex {
+    /// The folder.
+    pub folder: PathBuf,
+    /// Names of the classes, in order; none where nobody says them.
+    pub classes: Vec<String>,
+    /// The pictures, in order.
+    pub pictures: Vec<IndexedPicture>,
+}
+
+/// A picture that nobody has opened.
+#[derive(Clone, Debug, PartialEq)]
+pub struct IndexedPicture {
+    /// Its number, or its file's name.
+    pub name: String,
+    /// The part that it belongs to, if that is said.
+    pub part: Option<Part>,
+    /// Its file, below the dataset's folder for petcomp's own.
+    pub file: PathBuf,
+    /// What petcomp wrote of it.
+    pub written: Option<WrittenPicture>,
+}
+
+/// What the list of petcomp's own pictures says of one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WrittenPicture {
+    /// The file of its record, below the dataset's folder.
+    pub record: String,
+    /// Objects of each class, and how many of them have a label.
+    pub classes: Vec<[u32; 2]>,
+    /// Objects that something lies over.
+    pub obstructed: u32,
+    /// Objects in cyclic overlap.
+    pub knotted: u32,
+    /// Scenes that were rejected before this one.
+    pub rejected: u32,
+    /// Size of the picture's file.
+    pub bytes: u64,
+}
+
+/// What is in a picture, in brief.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct PictureFacts {
+    /// Name of the photo of the place; empty where that is not known.
+    pub background: String,
+    /// Its objects with or without a label.
+    pub objects: Vec<ObjectFacts>,
+    /// Objects without a class that are in the way.
+    pub distractors: usize,
+    /// Whether it has a label file or a record at all.
+    pub is_labelled: bool,
+}
+
+/// An object of a picture, in brief.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct ObjectFacts {
+    /// Index into the class list.
+    pub class: u32,
+    /// It has a label.
+    pub labelled: bool,
+    /// Seen share of it, 0 to 1; none where that is not known.
+    pub visible: Option<f32>,
+    /// Centre, width and height of the box of the whole object, shares of the picture's.
+    pub bbox: [f32; 4],
+}
+
+/// A picture that is unlike the others.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct UnlikePicture {
+    /// Its place in the index.
+    pub row: usize,
+    /// By what: `objects 17, as a rule 8`.
+    pub why: String,
+}
+
+impl DatasetIndex {
+    /// Lists a dataset of petcomp's, a YOLO dataset, or a folder of images.
+    ///
+    /// # Errors
+    /// A list or folder that cannot be read; no image.
+    pub fn open(folder: &Path) -> Result<Self> {
+        if folder.join(JOURNAL).is_file() {
+            return Self::of_journal(folder);
+        }
+        let (classes, images) = listed_images(folder)?;
+        if images.is_empty() {
+            return Err(Error::file(
+                folder,
+                "no images, expected a dataset or a folder of images",
+            ));
+        }
+        Ok(Self {
+            folder: folder.into(),
+            classes,
+            pictures: images.into_iter().map(IndexedPicture::found).collect(),
+        })
+    }
+
+    fn of_journal(folder: &Path) -> Result<Self> {
+        let identity = folder::known_identity(folder)?;
+        let lines = lines_of(folder)?;
+        let pictures = lines.into_iter().map(IndexedPicture::from_line);
+        Ok(Self {
+            folder: folder.into(),
+            classes: folder::known_classes(&identity),
+            pictures: pictures.collect::<Option<_>>().ok_or_else(|| {
+                Error::file(folder.join(JOURNAL), "a sample without picture or record")
+            })?,
+        })
+    }
+
+    /// The file of a picture.
+    ///
+    /// # Errors
+    /// A picture of petcomp's that is not in the folder any more.
+    pub fn file(&self, row: usize) -> Result<PathBuf> {
+        let picture = &self.pictures[row];
+        match picture.written {
+            Some(_) => io::inside(&self.folder, &picture.file),
+            None => Ok(picture.file.clone()),
+        }
+    }
+
+    /// What is in a picture.
+    ///
+    /// # Errors
+    /// A record or label that cannot be read.
+    pub fn facts(&self, row: usize) -> Result<PictureFacts> {
+        let picture = &self.pictures[row];
+        match &picture.written {
+            Some(written) => {
+                let brief: BriefRecord = io::read_json(io::inside(&self.folder, &written.record)?)?;
+                Ok(brief.facts())
+            }
+            None => Ok(PictureFacts::from_boxes(self.boxes(row)?)),
+        }
+    }
+
+    /// Everything that petcomp wrote of a picture; none for one from elsewhere.
+    ///
+    /// # Errors
+    /// A record that cannot be read.
+    pub fn record(&self, row: usize) -> Result<Option<SampleRecord>> {
+        let written = self.pictures[row].written.as_ref();
+        let read = written.map(|written| io::read_json(io::inside(&self.folder, &written.record)?));
+        read.transpose()
+    }
+
+    /// The boxes of a picture from elsewhere: class, centre, width and height as shares of the
+    /// picture's; none without a label file.
+    ///
+    /// # Errors
+    /// A label that cannot be read.
+    pub fn boxes(&self, row: usize) -> Result<Option<Vec<(u32, [f64; 4])>>> {
+        let picture = LabelledPicture::read(self.pictures[row].file.clone())?;
+        Ok(picture.boxes)
+    }
+
+    /// The pictures that are unlike the others, the strangest first, by what the list and `facts`
+    /// say.
+    pub fn unlike<'f>(
+        &self,
+        facts: impl Fn(usize) -> Option<&'f PictureFacts>,
+    ) -> Vec<UnlikePicture> {
+        let rows = 0..self.pictures.len();
+        let of = |name, number: &dyn Fn(usize) -> Option<f64>| Feature {
+            name,
+            values: rows
+                .clone()
+                .map(|row| number(row).unwrap_or(f64::NAN))
+                .collect(),
+        };
+        let written = |row: usize| self.pictures[row].written.as_ref();
+        let features = [
+            of("objects", &|row| self.count(row, facts(row), 0)),
+            of("labels", &|row| self.count(row, facts(row), 1)),
+            of("objects under others", &|row| {
+                Some(written(row)?.obstructed.into())
+            }),
+            of("rejected scenes", &|row| {
+                Some(written(row)?.rejected.into())
+            }),
+            of("bytes of the picture", &|row| {
+                Some(written(row)?.bytes as f64)
+            }),
+            of("percent seen of the one seen least", &|row| {
+                facts(row)?.least_visible_percent()
+            }),
+        ];
+        let unlike = outliers(&features).into_iter();
+        unlike
+            .map(|outlier| UnlikePicture {
+                row: outlier.row,
+                why: outlier.why,
+            })
+            .collect()
+    }
+
+    /// How many objects (0) or labels (1) a picture has, as far as it is known.
+    fn count(&self, row: usize, facts: Option<&PictureFacts>, which: usize) -> Option<f64> {
+        let written = self.pictures[row].written.as_ref();
+        let written = written.map(|written| f64::from(written.count(which)));
+        written.or_else(|| Some(facts?.objects.len() as f64))
+    }
+}
+
+impl IndexedPicture {
+    fn found(file: PathBuf) -> Self {
+        let name = file.file_name().unwrap_or_default();
+        Self {
+            name: name.to_string_lossy().into_owned(),
+            part: None,
+            written: None,
+            file,
+        }
+    }
+
+    fn from_line(line: JournalLine) -> Option<Self> {
+        let of = |kind: &str| line.files.iter().find(|file| file.path.starts_with(kind));
+        let (picture, record) = (of("images/")?, of("scenes/")?);
+        Some(Self {
+            name: line.k.to_string(),
+            part: Some(line.part),
+            file: picture.path.split('/').collect(),
+            written: Some(WrittenPicture {
+                record: record.path.clone(),
+                bytes: picture.bytes,
+                obstructed: line.obstructed,
+                knotted: line.knotted,
+                rejected: line.retries,
+                classes: line.classes,
+            }),
+        })
+    }
+}
+
+impl WrittenPicture {
+    /// Objects (0) or labels (1) of all classes.
+    pub fn count(&self, which: usize) -> u32 {
+        self.classes.iter().map(|counts| counts[which]).sum()
+    }
+}
+
+impl PictureFacts {
+    fn from_boxes(boxes: Option<Vec<ShareBox>>) -> Self {
+        let object = |(class, shares): &ShareBox| ObjectFacts {
+            class: *class,
+            labelled: true,
+            visible: None,
+            bbox: shares.map(|share| share as f32),
+        };
+        Self {
+            is_labelled: boxes.is_some(),
+            objects: boxes.iter().flatten().map(object).collect(),
+            ..Self::default()
+        }
+    }
+
+    /// Of the labelled object that is seen least.
+    fn least_visible_percent(&self) -> Option<f64> {
+        let labelled = self.objects.iter().filter(|object| object.labelled);
+        let visible = labelled.filter_map(|object| object.visible);
+        visible
+            .reduce(f32::min)
+            .map(|share| f64::from(100.0 * share))
+    }
+}
+
+/// What of a record tells what is in the picture, without masks and scenes.
+#[derive(Deserialize)]
+struct BriefRecord {
+    labelled: Vec<ObjectId>,
+    labels: BriefLabels,
+    drawn: BriefScene,
+}
+
+#[derive(Deserialize)]
+struct BriefLabels {
+    image: [u32; 2],
+    objects: Vec<BriefObject>,
+    #[serde(default)]
+    distractors: Vec<IgnoredAny>,
+}
+
+#[derive(Deserialize)]
+struct BriefObject {
+    id: ObjectId,
+    class: u32,
+    visible_fraction: f64,
+    #[serde(default)]
+    amodal_box: BBox,
+}
+
+#[derive(Deserialize)]
+struct BriefScene {
+    #[serde(default)]
+    plate: String,
+}
+
+impl BriefRecord {
+    fn facts(self) -> PictureFacts {
+        let object = |object: &BriefObject| ObjectFacts {
+            class: object.class,
+            labelled: self.labelled.contains(&object.id),
+            visible: Some(object.visible_fraction as f32),
+            bbox: shares_of(&object.amodal_box, self.labels.image.map(f64::from))
+                .map(|share| share as f32),
+        };
+        PictureFacts {
+            objects: self.labels.objects.iter().map(object).collect(),
+            distractors: self.labels.distractors.len(),
+            background: self.drawn.plate,
+            is_labelled: true,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dataset::journal_line::WrittenFile;
+
+    const RECORD: &str = r#"{ "labelled": [2], "drawn": { "plate": "tray" }, "more": [1, 2],
+        "labels": { "image": [8, 6], "objects": [
+            { "id": 1, "class": 0, "visible_fraction": 0.25, "more": {} },
+            { "id": 2, "class": 1, "visible_fraction": 1.0 } ] } }"#;
+
+    fn line(k: u64, objects: u32) -> JournalLine {
+        let file = |path: String| WrittenFile {
+            bytes: 10,
+            crc32: 0,
+            path,
+        };
+        JournalLine {
+            k,
+            part: Part::Train,
+            classes: vec![[objects, 0], [1, 1]],
+            obstructed: 1,
+            knotted: 0,
+            retries: 0,
+            files: vec![
+                file(format!("images/train/{k}.png")),
+                file(format!("scenes/train/{k}.json")),
+            ],
+        }
+    }
+
+    fn dataset() -> tempfile::TempDir {
+        let folder = tempfile::tempdir().unwrap();
+        let write = |path: &str, text: &str| {
+            let path = folder.path().join(path);
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(path, text).unwrap();
+        };
+        write(
+            "dataset.json",
+            r#"{ "format": 2, "classes": ["cap", "none"] }"#,
+        );
+        let objects = [1, 1, 2, 1, 40, 1, 1];
+        let lines = objects
+            .iter()
+            .zip(0..)
+            .map(|(&count, k)| line(k, count).text());
+        write(JOURNAL, &lines.collect::<String>());
+        write("images/train/0.png", "");
+        write("scenes/train/0.json", RECORD);
+        write("labels/train/0.txt", "1 0.5 0.5 0.2 0.1\n");
+        folder
+    }
+
+    #[test]
+    fn a_dataset_is_listed_by_its_journal_and_read_by_its_records() {
+        let folder = dataset();
+        let index = DatasetIndex::open(folder.path()).unwrap();
+        assert_eq!((index.pictures.len(), index.classes.len()), (7, 2));
+        let facts = index.facts(0).unwrap();
+        assert_eq!((&facts.background[..], facts.objects.len()), ("tray", 2));
+        assert_eq!(facts.objects[0].visible, Some(0.25));
+        assert!(!facts.objects[0].labelled && facts.objects[1].labelled);
+        assert!(index.file(0).unwrap().is_file());
+        assert!(index.file(1).is_err() && index.facts(1).is_err());
+    }
+
+    #[test]
+    fn the_strangest_picture_comes_first() {
+        let index = DatasetIndex::open(dataset().path()).unwrap();
+        let unlike = index.unlike(|_| None);
+        assert_eq!((unlike.len(), unlike[0].row), (2, 4));
+        assert_eq!(unlike[0].why, "objects 41, as a rule 2");
+    }
+
+    #[test]
+    fn a_folder_of_images_is_listed_without_records() {
+        let folder = dataset();
+        let index = DatasetIndex::open(&folder.path().join("images")).unwrap();
+        assert_eq!(index.record(0).unwrap(), None);
+        let facts = index.facts(0).unwrap();
+        assert!(facts.is_labelled && facts.objects[0].class == 1);
+        let empty = tempfile::tempdir().unwrap();
+        let error = DatasetIndex::open(empty.path()).unwrap_err().to_string();
+        assert!(error.contains("no images"), "{error}");
+    }
+}
