@@ -8,6 +8,7 @@
 
 use petcomp::dataset::{DatasetConfig, Pictures, Pipeline, Plan, Sample, Yolo, generate};
 use petcomp::{Error, Result, Scene, io};
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 fn main() -> Result<()> {
@@ -19,7 +20,7 @@ fn main() -> Result<()> {
     };
     let classes = open(first)?.0.library().classes.clone();
     let plan = Plan {
-        writers: vec![Box::new(Pictures::default()), Box::new(Yolo::default())],
+        writers: vec![Arc::new(Pictures::default()), Arc::new(Yolo::default())],
         ..Plan::new(&folder, paths.len() as u64, classes)
     };
     let sample = |k| sample(&paths[k as usize]);
