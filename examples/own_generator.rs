@@ -17,7 +17,7 @@ fn main() -> Result<()> {
         .nth(1)
         .unwrap_or_else(|| "own_dataset".into());
     let plan = Plan {
-        writers: vec![Box::new(Pictures::default()), Box::new(Yolo::default())],
+        writers: vec![Arc::new(Pictures::default()), Arc::new(Yolo::default())],
         ..Plan::new(&folder, 10, vec!["film".into()])
     };
     let counts = generate(&plan, sample, &|_| (), &AtomicBool::new(false))?;

@@ -121,9 +121,9 @@ pub use options::ReadOptions;
 #[doc(hidden)]
 pub use picture::Picture;
 pub use read::{read, read_header, read_with};
-pub use write::{WriteOptions, write, write_with};
 #[doc(hidden)]
-pub use write::{jpeg_bytes, png_bytes};
+pub use write::jpeg_bytes;
+pub use write::{WriteOptions, write, write_with};
 
 #[cfg(feature = "oiio")]
 #[doc(hidden)]

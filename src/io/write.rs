@@ -81,19 +81,7 @@ pub fn jpeg_bytes<P: ToFile>(image: &Image<P>, quality: u8) -> Result<Vec<u8>> {
         jpeg_quality: quality,
         ..WriteOptions::default()
     };
-    bytes_of("picture.jpg", image, &options)
-}
-
-/// The bytes of a PNG file.
-///
-/// # Errors
-/// An image without pixels.
-pub fn png_bytes<P: ToFile>(image: &Image<P>) -> Result<Vec<u8>> {
-    bytes_of("picture.png", image, &WriteOptions::default())
-}
-
-fn bytes_of<P: ToFile>(name: &str, image: &Image<P>, options: &WriteOptions) -> Result<Vec<u8>> {
-    encode(Path::new(name), image, options).map_err(|what| Error::value("picture", what))
+    encode(Path::new("picture.jpg"), image, &options).map_err(|what| Error::value("picture", what))
 }
 
 fn encode<P: ToFile>(

@@ -36,11 +36,6 @@ pub(crate) fn jpeg<P: ToFile>(image: &Image<P>) -> Answer<Response> {
     Ok(of_type("image/jpeg", io::jpeg_bytes(image, JPEG_QUALITY)?))
 }
 
-/// A PNG as an answer.
-pub(crate) fn png<P: ToFile>(image: &Image<P>) -> Answer<Response> {
-    Ok(of_type("image/png", io::png_bytes(image)?))
-}
-
 fn of_type(kind: &'static str, bytes: Vec<u8>) -> Response {
     ([(CONTENT_TYPE, kind)], bytes).into_response()
 }
