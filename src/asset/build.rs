@@ -269,9 +269,7 @@ mod tests {
         review(Review::new((600, 400), vec![right]));
         let said = built().unwrap_err().to_string();
         assert!(
-            said.contains(
-                "one.review.json: photos[0].size_px: 600 x 400, expected the photo's 120 x 80"
-            ),
+            said.contains("one.review.json: size_px: 600 x 400, expected the photo's 120 x 80"),
             "{said}"
         );
         review(Review {
