@@ -353,8 +353,8 @@ export function viewKeys(view) {
   const arrows = (modifier, by, shown) => [["ArrowUp", 0, -by], ["ArrowDown", 0, by], ["ArrowLeft", -by, 0], ["ArrowRight", by, 0]]
     .map(([key, dx, dy], i) => [modifier + key, i ? "" : shown, move(dx, dy)]);
   return [
-    ["Tab", "next point", step(1)],
-    ["Shift+Tab", "", step(-1)],
+    [".", "next point", step(1)],
+    [",", "point before", step(-1)],
     ...arrows("", 0.1, "move the point by 0.1 pixel (all four arrows)"),
     ...arrows("Shift+", 1, "by a pixel"),
     ...arrows("Ctrl+", 10, "by 10 pixels"),

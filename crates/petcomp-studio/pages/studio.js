@@ -126,8 +126,14 @@ function isTyping(target) {
   return target instanceof Element && target.matches("input:not([type=range]):not([type=checkbox]):not([type=radio]), select, textarea");
 }
 
+/** What a key presses that has the focus: it goes first. */
+function isPressed(target, key) {
+  return (key === "Enter" || key === " ") && target instanceof Element && target.matches("button, a, summary");
+}
+
 function pressed(event) {
   const name = keyName(event);
+  if (isPressed(event.target, event.key)) return;
   if (document.querySelector("dialog[open]") || (isTyping(event.target) && !name.startsWith("Ctrl+"))) return;
   const found = keys.find(([key]) => key.toLowerCase() === name.toLowerCase());
   if (!found) return;
@@ -214,4 +220,6 @@ export function frame(current) {
     ...PAGES.map(([path, title], i) => [`Alt+${i + 1}`, i ? `to ${title.toLowerCase()}` : "to the overview", () => location.assign(path || "./")]),
   ]);
   addEventListener("keydown", pressed);
+  // A button that the mouse has pressed does not take the next Enter.
+  addEventListener("click", (event) => event.detail > 0 && event.target.closest("button")?.blur());
 }

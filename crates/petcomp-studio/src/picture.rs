@@ -73,6 +73,11 @@ async fn photo(
     Query(query): Query<PhotoQuery>,
 ) -> Answer<Response> {
     let path = studio.folder.file(&query.file)?;
+    // The file itself need not wait for small pictures of others.
+    let _permit = match query.side {
+        Some(_) => Some(studio.decoding.acquire().await),
+        None => None,
+    };
     let response = blocking(move || shown(&path, query.side)).await?;
     Ok(([(CACHE_CONTROL, "private, max-age=60")], response).into_response())
 }

@@ -236,3 +236,35 @@ fn a_name_with_markup_in_it_is_shown_as_it_is() {
     assert_ne!(browser.eval("document.title"), "evil");
     browser.assert_content();
 }
+
+#[test]
+fn another_sites_page_reads_nothing_even_if_it_knows_the_token() {
+    let Some(mut browser) = Browser::open(800, 600) else {
+        return;
+    };
+    let dir = tempfile::tempdir().unwrap();
+    let photo = browser::studio::samples("backgrounds/bg0000.jpg");
+    std::fs::copy(photo, dir.path().join("a.jpg")).unwrap();
+    let studio = Studio::over(dir.path());
+    let (page, picture) = (
+        studio.page("api/overview"),
+        studio.page("api/photo?file=a.jpg"),
+    );
+    assert_eq!(status(&studio.get("api/photo?file=a.jpg")), "200");
+    // The page about:blank is of no site.
+    let read = format!("fetch('{page}').then((r) => r.ok, () => false)");
+    assert_eq!(browser.eval(&read), false);
+    let posted = format!(
+        "fetch('{page}', {{method: 'POST', mode: 'no-cors'}}).then((r) => r.ok, () => false)"
+    );
+    assert_eq!(browser.eval(&posted), false);
+    for element in ["img", "script", "iframe"] {
+        let load = format!(
+            "new Promise((done) => {{ const e = document.createElement('{element}'); e.onload = () => done('{element}' !== 'iframe'); \
+             e.onerror = () => done(false); e.src = '{picture}'; document.body.append(e); }})"
+        );
+        assert_eq!(browser.eval(&load), false, "{element}");
+    }
+    let framed = "(() => { try { return document.querySelector('iframe').contentDocument?.images.length ?? 0 } catch { return 0 } })()";
+    assert_eq!(browser.eval(framed), 0);
+}

@@ -154,14 +154,17 @@ fn without_points(mut label: Label) -> Label {
 }
 
 #[derive(Deserialize)]
-struct Save {
+struct NewLabel {
     photo: String,
     label: Label,
     /// The state of the file that the page read; none: there was none.
     version: Option<String>,
 }
 
-async fn save(State(studio): State<Arc<Studio>>, Json(asked): Json<Save>) -> Answer<Json<Saved>> {
+async fn save(
+    State(studio): State<Arc<Studio>>,
+    Json(asked): Json<NewLabel>,
+) -> Answer<Json<Saved>> {
     blocking(move || {
         let (photo, version) = (&asked.photo, asked.version.as_deref());
         let saved = label_file::save(&studio.folder, photo, asked.label, version)?;

@@ -28,16 +28,16 @@ pub(crate) fn routes() -> Router<Arc<Studio>> {
 
 /// A photo, and whether its list says how large things in it are.
 #[derive(Serialize)]
-struct PhotoEntry {
+struct ListEntry {
     photo: String,
     scaled: bool,
 }
 
-async fn list_photos(State(studio): State<Arc<Studio>>) -> Answer<Json<Vec<PhotoEntry>>> {
+async fn list_photos(State(studio): State<Arc<Studio>>) -> Answer<Json<Vec<ListEntry>>> {
     blocking(move || {
         let photos = studio.folder.find(may_be_photo);
         let scaled = photo_list::scaled_photos(&studio.folder, &photos);
-        let entries = photos.into_iter().map(|photo| PhotoEntry {
+        let entries = photos.into_iter().map(|photo| ListEntry {
             scaled: scaled.contains(&photo),
             photo,
         });
@@ -81,7 +81,7 @@ async fn find_screen(
 }
 
 #[derive(Deserialize)]
-struct Save {
+struct NewScale {
     photo: String,
     version: Option<String>,
     scale: PhotoScale,
@@ -94,7 +94,7 @@ struct Save {
 
 async fn save(
     State(studio): State<Arc<Studio>>,
-    Json(asked): Json<Save>,
+    Json(asked): Json<NewScale>,
 ) -> Answer<Json<ListedPhoto>> {
     blocking(move || {
         studio.folder.file(&asked.photo)?;
