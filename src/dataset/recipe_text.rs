@@ -261,6 +261,9 @@ fn insert(item: &mut Item, steps: &[Step], value: Value) -> std::result::Result<
         [Step::Key(key)] => {
             let table = item.as_table_like_mut().ok_or("goes into a value")?;
             table.insert(key, Item::Value(value));
+            if let Some(inline) = item.as_inline_table_mut() {
+                inline.fmt();
+            }
         }
         [Step::Key(key), rest @ ..] => {
             let table = item.as_table_like_mut().ok_or("goes into a value")?;
