@@ -94,12 +94,11 @@ fn not_finite(i: usize, [x, y]: [f64; 2]) -> Error {
 /// # Errors
 /// [`Error::Value`] (`strokes[2].radius_px`).
 pub(crate) fn check_strokes(strokes: &[Stroke]) -> Result<()> {
-    let numbered = strokes.iter().enumerate();
-    let check = |(i, stroke): (usize, &Stroke)| {
+    let mut numbered = strokes.iter().enumerate();
+    numbered.try_for_each(|(i, stroke)| {
         let checked = stroke.check();
         checked.map_err(|e| e.within(&format!("strokes[{i}]")))
-    };
-    numbered.map(check).collect()
+    })
 }
 
 /// What is said of each pixel; nothing of most.
