@@ -150,7 +150,8 @@ fn replaced(text: &str, span: Range<usize>, by: &str) -> String {
 /// Whether a value's key is the first on its line, so that the line can become a comment.
 fn begins_line(text: &str, span: &Range<usize>) -> bool {
     let line = &text[line_start(text, span.start)..span.start];
-    key_of(line).is_some_and(|key| key.chars().all(|c| !"{[\"'".contains(c)))
+    let key = line.trim_end().strip_suffix('=');
+    key.is_some_and(|key| !key.contains(['=', '{', '[']))
 }
 
 fn line_start(text: &str, at: usize) -> usize {
