@@ -67,6 +67,7 @@ fn snap_within(photo: &Image<LinearRgb>, rough: [[f64; 2]; 4], reach: f64) -> Sn
     let edges = sides.map(|ends| edge_near(photo, ends, reach));
     let lines = [0, 1, 2, 3].map(|i| edges[i].or_else(|| Line::through(&sides[i])));
     let corner = |i: usize| {
+        edges[(i + 3) % 4].or(edges[i])?;
         let met = lines[(i + 3) % 4]?.meeting(&lines[i]?)?;
         // A corner that flies away is no improvement.
         ((met - corners[i]).norm() < 2.0 * reach).then_some(met)
