@@ -1,12 +1,12 @@
 //! Which pictures a folder holds, listed without opening them; what is in a picture is read when
 //! somebody asks.
 
+pub use crate::dataset::page::labelled_pictures::ShareBox;
+
 use crate::dataset::folder;
 use crate::dataset::journal::lines_of;
 use crate::dataset::journal_line::JournalLine;
-use crate::dataset::page::labelled_pictures::{
-    LabelledPicture, ShareBox, listed_images, shares_of,
-};
+use crate::dataset::page::labelled_pictures::{LabelledPicture, listed_images, shares_of};
 use crate::dataset::page::outlier::{Feature, outliers};
 use crate::dataset::{JOURNAL, Part, SampleRecord};
 use crate::error::{Error, Result};
@@ -171,7 +171,7 @@ impl DatasetIndex {
     ///
     /// # Errors
     /// A label that cannot be read.
-    pub fn boxes(&self, row: usize) -> Result<Option<Vec<(u32, [f64; 4])>>> {
+    pub fn boxes(&self, row: usize) -> Result<Option<Vec<ShareBox>>> {
         let picture = LabelledPicture::read(self.pictures[row].file.clone())?;
         Ok(picture.boxes)
     }
@@ -182,16 +182,23 @@ impl DatasetIndex {
         &self,
         facts: impl Fn(usize) -> Option<&'f PictureFacts>,
     ) -> Vec<UnlikePicture> {
-        let rows = 0..self.pictures.len();
-        let of = |name, number: &dyn Fn(usize) -> Option<f64>| Feature {
-            name,
-            values: rows
-                .clone()
-                .map(|row| number(row).unwrap_or(f64::NAN))
-                .collect(),
-        };
+        let unlike = outliers(&self.features(facts)).into_iter();
+        unlike
+            .map(|outlier| UnlikePicture {
+                row: outlier.row,
+                why: outlier.why,
+            })
+            .collect()
+    }
+
+    /// What pictures are compared by.
+    fn features<'f>(
+        &self,
+        facts: impl Fn(usize) -> Option<&'f PictureFacts>,
+    ) -> [Feature<'static>; 6] {
+        let of = |name, number: &dyn Fn(usize) -> Option<f64>| self.feature(name, number);
         let written = |row: usize| self.pictures[row].written.as_ref();
-        let features = [
+        [
             of("objects", &|row| self.count(row, facts(row), 0)),
             of("labels", &|row| self.count(row, facts(row), 1)),
             of("objects under others", &|row| {
@@ -206,14 +213,21 @@ impl DatasetIndex {
             of("percent seen of the one seen least", &|row| {
                 facts(row)?.least_visible_percent()
             }),
-        ];
-        let unlike = outliers(&features).into_iter();
-        unlike
-            .map(|outlier| UnlikePicture {
-                row: outlier.row,
-                why: outlier.why,
-            })
-            .collect()
+        ]
+    }
+
+    /// A number of each picture; none where it is not known.
+    fn feature(
+        &self,
+        name: &'static str,
+        number: &dyn Fn(usize) -> Option<f64>,
+    ) -> Feature<'static> {
+        let rows = 0..self.pictures.len();
+        let values = rows.map(|row| number(row).unwrap_or(f64::NAN));
+        Feature {
+            name,
+            values: values.collect(),
+        }
     }
 
     /// How many objects (0) or labels (1) a picture has, as far as it is known.

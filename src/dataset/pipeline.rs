@@ -85,19 +85,28 @@ impl Pipeline {
             true => self.places.clone(),
             false => open_backgrounds(&config)?.into(),
         };
-        let falls = match self.falls.remembers() {
-            true => self.falls.clone(),
-            false => Arc::new(Falls::of_last(REMEMBERED_FALLS)),
-        };
-        let has_same_maps = self.surroundings.are_of(&config);
-        let mut tuned = Self {
+        let (falls, surroundings) = (self.tuned_falls(), self.surroundings_for(&config));
+        let tuned = Self {
             falls,
+            surroundings,
             ..Self::new(config, library, places)
         };
-        if has_same_maps {
-            tuned.surroundings = self.surroundings.clone();
-        }
         tuned.with_checked_sizes()
+    }
+
+    /// Its falls where it remembers any, else room for some.
+    fn tuned_falls(&self) -> Arc<Falls> {
+        match self.falls.remembers() {
+            true => self.falls.clone(),
+            false => Arc::new(Falls::of_last(REMEMBERED_FALLS)),
+        }
+    }
+
+    fn surroundings_for(&self, config: &DatasetConfig) -> Arc<EnvironmentMaps> {
+        match self.surroundings.are_of(config) {
+            true => self.surroundings.clone(),
+            false => EnvironmentMaps::of(config).into(),
+        }
     }
 
     fn with_checked_sizes(self) -> Result<Self> {

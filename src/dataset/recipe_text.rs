@@ -150,7 +150,8 @@ fn replaced(text: &str, span: Range<usize>, by: &str) -> String {
 /// Whether a value's key is the first on its line, so that the line can become a comment.
 fn begins_line(text: &str, span: &Range<usize>) -> bool {
     let line = &text[line_start(text, span.start)..span.start];
-    key_of(line).is_some_and(|key| key.chars().all(|c| !"{[\"'".contains(c)))
+    let key = line.trim_end().strip_suffix('=');
+    key.is_some_and(|key| !key.contains(['=', '{', '[']))
 }
 
 fn line_start(text: &str, at: usize) -> usize {
@@ -258,29 +259,37 @@ fn down_mut<'d>(item: &'d mut Item, step: &Step) -> Option<&'d mut Item> {
 fn insert(item: &mut Item, steps: &[Step], value: Value) -> std::result::Result<(), String> {
     match steps {
         [] => *item = Item::Value(value),
-        [Step::Key(key)] => {
-            let table = item.as_table_like_mut().ok_or("goes into a value")?;
-            table.insert(key, Item::Value(value));
-            if let Some(inline) = item.as_inline_table_mut() {
-                inline.fmt();
-            }
-        }
-        [Step::Key(key), rest @ ..] => {
-            let table = item.as_table_like_mut().ok_or("goes into a value")?;
-            if !table.contains_key(key) {
-                table.insert(key, empty_for(rest));
-            }
-            insert(table.get_mut(key).ok_or("no such key")?, rest, value)?;
-        }
+        [Step::Key(key)] => insert_key(item, key, value)?,
+        [Step::Key(key), rest @ ..] => insert(entry(item, key, rest)?, rest, value)?,
+        [Step::Index(i)] if is_empty_table(&value) => grow(item, *i)?,
         [Step::Index(i), rest @ ..] => {
             grow(item, *i)?;
-            if rest.is_empty() && is_empty_table(&value) {
-                return Ok(());
-            }
             insert(item.get_mut(i).ok_or("no such entry")?, rest, value)?;
         }
     }
     Ok(())
+}
+
+fn insert_key(item: &mut Item, key: &str, value: Value) -> std::result::Result<(), String> {
+    let table = item.as_table_like_mut().ok_or("goes into a value")?;
+    table.insert(key, Item::Value(value));
+    if let Some(inline) = item.as_inline_table_mut() {
+        inline.fmt();
+    }
+    Ok(())
+}
+
+/// What is below a key, made where it is not there.
+fn entry<'i>(
+    item: &'i mut Item,
+    key: &str,
+    rest: &[Step],
+) -> std::result::Result<&'i mut Item, &'static str> {
+    let table = item.as_table_like_mut().ok_or("goes into a value")?;
+    if !table.contains_key(key) {
+        table.insert(key, empty_for(rest));
+    }
+    table.get_mut(key).ok_or("no such key")
 }
 
 /// What a key holds before what is below it is there.

@@ -134,21 +134,34 @@ fn told_sections() -> Vec<ToldSection> {
         if let Some(table) = table_of(line) {
             let (docs, keys) = (std::mem::take(&mut comment), Vec::new());
             sections.push(ToldSection { table, docs, keys });
-        } else if let Some((key, value)) = key_and_value(line) {
-            here.keys.push(ToldKey {
-                path: joined(&here.table, key),
-                value,
-                comment: std::mem::take(&mut comment),
-            });
-        } else if line.is_empty() {
-            comment.clear();
+        } else if let Some(key) = key_and_value(line) {
+            here.add(key, std::mem::take(&mut comment));
         } else {
-            comment = format!("{comment} {}", line.trim_start_matches(['#', ' ']))
-                .trim()
-                .into();
+            comment = continued(&comment, line);
         }
     }
     sections
+}
+
+impl ToldSection {
+    fn add(&mut self, (key, value): (&str, &'static str), comment: String) {
+        let path = joined(&self.table, key);
+        self.keys.push(ToldKey {
+            path,
+            value,
+            comment,
+        });
+    }
+}
+
+/// A comment and its next line; an empty line ends it.
+fn continued(comment: &str, line: &str) -> String {
+    let line = line.trim_start_matches(['#', ' ']);
+    match (comment, line) {
+        (_, "") => String::new(),
+        ("", line) => line.to_owned(),
+        (comment, line) => format!("{comment} {line}"),
+    }
 }
 
 /// The table that a line begins, be it as a comment; of a list its first entry.

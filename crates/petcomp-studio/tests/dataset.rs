@@ -78,6 +78,11 @@ fn a_dataset_is_filtered_and_looked_at() {
     browser.wait("document.querySelectorAll('.pane img')[1].naturalWidth > 0");
     browser.press("x", 0);
     browser.screenshot("studio_dataset");
+    // A phone's screen, for reviewing.
+    browser.prefer_dark(true);
+    browser.resize(400, 820);
+    browser.screenshot("studio_dataset_phone");
+    browser.resize(1440, 900);
     browser.press("Escape", 0);
     browser.wait("document.querySelector('#viewer').hidden");
     browser.assert_content();

@@ -89,6 +89,8 @@ fn a_slider_changes_the_pictures_and_the_file_keeps_its_comments() {
     assert!(after > before + 1.0, "{before} {after}");
     browser.eval("document.querySelector('#settings').parentElement.scrollTop = 0");
     browser.screenshot("studio_recipe");
+    browser.prefer_dark(true);
+    browser.screenshot("studio_recipe_dark");
 
     // A value that cannot be is refused in words.
     browser.fill(

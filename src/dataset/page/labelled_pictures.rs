@@ -22,7 +22,7 @@ pub(in crate::dataset) struct LabelledSet {
 }
 
 /// Class of a box, and its centre, width and height as shares of the picture's.
-pub(in crate::dataset) type ShareBox = (u32, [f64; 4]);
+pub type ShareBox = (u32, [f64; 4]);
 
 /// A picture and its boxes.
 #[derive(Clone)]

@@ -67,10 +67,7 @@ impl Filter {
         let picture = &catalog.index.pictures[row];
         let asked = [
             self.part.map(|part| Some(picture.part == Some(part))),
-            self.objects.map(|[least, most]| {
-                let [objects, _] = catalog.counts(row)?;
-                Some((least..=most).contains(&objects))
-            }),
+            self.objects.map(|range| has_count(catalog, row, range)),
             self.flag.map(|flag| catalog.has_flag(row, flag)),
             self.background
                 .as_ref()
@@ -109,6 +106,12 @@ impl Filter {
     }
 }
 
+/// Whether a picture has so many objects, both ends included; none where that is not known yet.
+fn has_count(catalog: &Catalog, row: usize, [least, most]: [usize; 2]) -> Option<bool> {
+    let [objects, _] = catalog.counts(row)?;
+    Some((least..=most).contains(&objects))
+}
+
 /// The rows that are known to be wanted, and why they are unlike others where that is asked.
 pub(super) fn found(catalog: &Catalog, filter: &Filter, order: Order) -> (Vec<usize>, Vec<String>) {
     let admitted = |row: &usize| filter.admits(catalog, *row) == Some(true);
@@ -118,6 +121,11 @@ pub(super) fn found(catalog: &Catalog, filter: &Filter, order: Order) -> (Vec<us
         return unlike.map(|unlike| (unlike.row, unlike.why)).unzip();
     }
     let mut rows: Vec<usize> = (0..catalog.index.pictures.len()).filter(admitted).collect();
+    sort(&mut rows, catalog, order);
+    (rows, Vec::new())
+}
+
+fn sort(rows: &mut [usize], catalog: &Catalog, order: Order) {
     let objects = |row: usize| catalog.counts(row).map_or(0, |[objects, _]| objects);
     match order {
         Order::MostObjects => rows.sort_by_key(|&row| Reverse(objects(row))),
@@ -128,7 +136,6 @@ pub(super) fn found(catalog: &Catalog, filter: &Filter, order: Order) -> (Vec<us
         }),
         Order::Listed | Order::Unlike => {}
     }
-    (rows, Vec::new())
 }
 
 /// Seen share of the object that is hidden most.

@@ -24,7 +24,7 @@ use filter::{Filter, Order};
 use sample::SampleShown;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 pub(crate) const PAGES: &[Page] = &[crate::page!("dataset.html"), crate::page!("dataset.js")];
@@ -54,26 +54,28 @@ async fn folders(State(studio): State<Arc<Studio>>) -> Answer<Json<Vec<String>>>
 }
 
 fn folders_of(folder: &Folder) -> Vec<String> {
-    let files = folder.find(|path| path.ends_with("data.yaml") || may_be_photo(path));
+    let is_list = |path: &Path| path.ends_with("data.yaml");
+    let datasets = parents(&folder.find(is_list));
+    let mut folders: Vec<String> = datasets.iter().cloned().collect();
+    let images = parents(&folder.find(may_be_photo)).into_iter();
+    folders.extend(images.filter(|name| !datasets.iter().any(|dataset| is_within(name, dataset))));
+    folders
+}
+
+/// The folders that files lie in.
+fn parents(files: &[String]) -> BTreeSet<String> {
     let parent = |file: &String| {
         file.rsplit_once('/')
             .map_or("", |(parent, _)| parent)
             .to_owned()
     };
-    let (lists, images): (Vec<_>, Vec<_>) =
-        files.iter().partition(|file| file.ends_with("data.yaml"));
-    let datasets: BTreeSet<String> = lists.into_iter().map(parent).collect();
-    let is_within = |name: &String, dataset: &String| {
-        dataset.is_empty()
-            || name
-                .strip_prefix(dataset)
-                .is_some_and(|rest| rest.starts_with('/'))
-    };
-    let images: BTreeSet<String> = images.into_iter().map(parent).collect();
-    let others = images.into_iter().filter(|name| {
-        !datasets.contains(name) && !datasets.iter().any(|dataset| is_within(name, dataset))
-    });
-    datasets.iter().cloned().chain(others).collect()
+    files.iter().map(parent).collect()
+}
+
+/// Whether a folder is another one, or lies below it.
+fn is_within(name: &str, outer: &str) -> bool {
+    let rest = name.strip_prefix(outer);
+    outer.is_empty() || rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
 }
 
 #[derive(Deserialize)]

@@ -14,7 +14,7 @@ use petcomp::color::encode_srgb8;
 use petcomp::dataset::{DatasetConfig, Pipeline, Sample};
 use petcomp::label::overlay;
 use petcomp::render::RenderOptions;
-use petcomp::scene::{Blur, Range};
+use petcomp::scene::{Blur, PostProcessRanges, Range};
 use petcomp::{Image, Quality, Srgb8};
 use serde::Deserialize;
 use std::path::Path;
@@ -169,13 +169,16 @@ fn small(mut config: DatasetConfig, side: u32) -> DatasetConfig {
         .map(|side| (f64::from(side) * factor).round() as u32);
     config.render = RenderOptions::from(Quality::Draft);
     config.scene.settle.most_work = config.scene.settle.most_work.min(MOST_WORK);
-    let finish = &mut config.scene.finish;
+    shrink(&mut config.scene.finish, factor);
+    config
+}
+
+fn shrink(finish: &mut PostProcessRanges, factor: f64) {
     finish.camera_blur_px = scaled(finish.camera_blur_px, factor);
     finish.chromatic_px = scaled(finish.chromatic_px, factor);
     if let Blur::Known(px) = finish.blur_px {
         finish.blur_px = Blur::Known(scaled(px, factor));
     }
-    config
 }
 
 fn scaled(range: Range, factor: f64) -> Range {
