@@ -221,22 +221,30 @@ impl Profile {
     }
 
     /// Where light changes most among its neighbours, pixels across, and by which share of it.
+    ///
+    /// The change itself says where: its share of the light is largest beside the edge, in the dark.
     fn peaks(&self) -> impl Iterator<Item = (f64, f64)> {
         let half = half_edge();
-        let contrasts: Vec<f64> = (half..self.light.len().saturating_sub(half))
-            .map(|i| self.contrast(i))
+        let changes: Vec<f64> = (half..self.light.len().saturating_sub(half))
+            .map(|i| self.change(i))
             .collect();
-        (0..contrasts.len()).filter_map(move |k| {
-            let near = &contrasts[neighbours(k, contrasts.len())];
-            let is_peak = contrasts[k] > MIN_CONTRAST && near.iter().all(|c| *c <= contrasts[k]);
-            is_peak.then(|| (self.center(k + half), contrasts[k]))
+        (0..changes.len()).filter_map(move |k| {
+            let near = &changes[neighbours(k, changes.len())];
+            let contrast = self.contrast(k + half);
+            let is_peak = contrast > MIN_CONTRAST && near.iter().all(|c| *c <= changes[k]);
+            is_peak.then(|| (self.center(k + half), contrast))
         })
+    }
+
+    /// By how much light changes around a sample.
+    fn change(&self, i: usize) -> f64 {
+        (self.light[i + half_edge()] - self.light[i - half_edge()]).abs()
     }
 
     /// By which share of it light changes around a sample.
     fn contrast(&self, i: usize) -> f64 {
-        let (before, after) = (self.light[i - half_edge()], self.light[i + half_edge()]);
-        (after - before).abs() / (before.max(after) + DARKNESS)
+        let brighter = self.light[i + half_edge()].max(self.light[i - half_edge()]);
+        self.change(i) / (brighter + DARKNESS)
     }
 
     /// The centre of gravity of the change around a sample, pixels across.
