@@ -1,4 +1,8 @@
 //! Falls that were computed before: what does not change how objects fall needs no new one.
+#![cfg_attr(
+    not(feature = "settle"),
+    allow(dead_code, reason = "without physics nothing falls")
+)]
 
 use crate::error::Result;
 use crate::scene::{Grade, Placement, Scene, SettleOptions};
