@@ -6,10 +6,10 @@
 use petcomp::DeepImage;
 use petcomp::camera::Camera;
 use petcomp::dataset::{
-    ContactSheetOptions, DatasetConfig, DatasetCounts, LabelConfig, Obstructed, PictureFormat,
-    Pictures, Pipeline, Plan, Progress, Provenance, Sample, SampleRange, SampleRecord, Shard,
-    Sidecar, Split, SplitOrder, WebDataset, Writer, Yolo, YoloTask, check, contact_sheet_of,
-    generate, merge, repair,
+    ArchiveStore, ContactSheetOptions, DatasetConfig, DatasetCounts, LabelConfig, Obstructed,
+    PictureFormat, Pictures, Pipeline, Plan, Progress, Provenance, Sample, SampleRange,
+    SampleRecord, Shard, Sidecar, Split, SplitOrder, WebDataset, Writer, Yolo, YoloTask, check,
+    contact_sheet_of, generate, merge, repair,
 };
 use petcomp::geom::BBox;
 use petcomp::geom::{Point2, Pose, UnitQuaternion, Vector2};
@@ -18,8 +18,8 @@ use petcomp::scene::{CameraSource, EdgeTreatment, Exposure, Grade, Object, Place
 use petcomp::{Coverage, Error, Image, LinearRgb, ObjectId, PremulRgba, Result, Scene, io};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
 
 const IMAGE: [u32; 2] = [64, 48];
 
@@ -132,6 +132,7 @@ fn plan(folder: &Path, count: u64) -> Plan {
             Arc::new(Sidecar),
         ],
         archives: None,
+        store: None,
         inputs: Default::default(),
     }
 }
@@ -908,6 +909,169 @@ fn one_sample_of_an_archive_cannot_be_made() {
         e,
         "only: a dataset of archives, expected all of its samples or a shard"
     );
+}
+
+/// An object store in memory that takes some puts and is full then.
+#[derive(Default)]
+struct MemoryStore {
+    objects: Mutex<BTreeMap<String, Vec<u8>>>,
+    puts: AtomicUsize,
+    /// Puts before it is full; 0 for no end.
+    room: usize,
+}
+
+impl ArchiveStore for MemoryStore {
+    fn url(&self) -> &str {
+        "s3://bucket/prefix"
+    }
+
+    fn put(&self, name: &str, content: Vec<u8>) -> Result<bool> {
+        let before = self.puts.fetch_add(1, Ordering::Relaxed);
+        if self.room > 0 && before >= self.room {
+            return Err(Error::file(format!("s3://bucket/prefix/{name}"), "full"));
+        }
+        let mut objects = self.objects.lock().unwrap();
+        let is_new = !objects.contains_key(name);
+        objects.entry(name.into()).or_insert(content);
+        Ok(is_new)
+    }
+
+    fn get(&self, name: &str) -> Result<Vec<u8>> {
+        Ok(self.objects.lock().unwrap()[name].clone())
+    }
+
+    fn names(&self, folder: &str) -> Result<Vec<String>> {
+        let objects = self.objects.lock().unwrap();
+        let below = objects.keys().filter_map(|name| name.strip_prefix(folder));
+        Ok(below
+            .map(|name| name.trim_matches('/').to_owned())
+            .collect())
+    }
+}
+
+impl MemoryStore {
+    /// Its archives, as they are in a folder.
+    fn archives(&self) -> BTreeMap<PathBuf, Vec<u8>> {
+        let objects = self.objects.lock().unwrap();
+        let archives = objects
+            .iter()
+            .filter(|(name, _)| name.starts_with("webdataset/"));
+        archives
+            .map(|(name, bytes)| (name["webdataset/".len()..].into(), bytes.clone()))
+            .collect()
+    }
+}
+
+fn store_plan(folder: &Path, count: u64, store: &Arc<MemoryStore>) -> Plan {
+    Plan {
+        store: Some(store.clone()),
+        ..archive_plan(folder, count)
+    }
+}
+
+/// The archives of 30 samples, made into a folder.
+fn archives_of_30() -> BTreeMap<PathBuf, Vec<u8>> {
+    let dir = tempfile::tempdir().unwrap();
+    make(&archive_plan(dir.path(), 30)).unwrap();
+    bytes(&dir.path().join("webdataset"))
+}
+
+#[test]
+fn a_store_gets_the_archives_of_a_folder_and_a_receipt_for_each() {
+    let (scratch, store) = (
+        tempfile::tempdir().unwrap(),
+        Arc::new(MemoryStore::default()),
+    );
+    let report = make(&store_plan(scratch.path(), 30, &store)).unwrap();
+    assert_eq!((report.images, report.val, report.made), (30, 6, 30));
+    assert_eq!(store.archives(), archives_of_30());
+    assert_eq!(names(scratch.path()), ["dataset.json"]);
+    assert_eq!(store.names("receipts").unwrap().len(), 8);
+    let archive = &store.archives()[Path::new("train-000002.tar")];
+    let receipt: serde_json::Value =
+        serde_json::from_slice(&store.get("receipts/000002.json").unwrap()).unwrap();
+    let of_train = serde_json::json!({
+        "name": "webdataset/train-000002.tar",
+        "bytes": archive.len(),
+        "crc32": crc32fast::hash(archive),
+    });
+    assert_eq!(receipt["files"][0], of_train);
+}
+
+#[test]
+fn a_store_that_was_full_is_filled_up_later() {
+    let expected = archives_of_30();
+    for room in [1, 2, 5, 9] {
+        let dir = tempfile::tempdir().unwrap();
+        let full = Arc::new(MemoryStore {
+            room,
+            ..MemoryStore::default()
+        });
+        let e = make(&store_plan(dir.path(), 30, &full)).unwrap_err();
+        assert!(e.to_string().ends_with("full"), "{e}");
+        let larger = Arc::new(MemoryStore {
+            objects: Mutex::new(full.objects.lock().unwrap().clone()),
+            ..MemoryStore::default()
+        });
+        // By another machine, which has nothing of the first one's scratch folder.
+        let other = tempfile::tempdir().unwrap();
+        let report = make(&store_plan(other.path(), 30, &larger)).unwrap();
+        assert_eq!(report.images, 30);
+        assert_eq!(larger.archives(), expected);
+        // And once more, when all is there.
+        assert_eq!(make(&store_plan(dir.path(), 30, &larger)).unwrap().made, 0);
+    }
+}
+
+#[test]
+fn shards_share_a_store() {
+    let store = Arc::new(MemoryStore::default());
+    std::thread::scope(|scope| {
+        // The second shard runs twice, as it does where a cluster took the first machine for dead.
+        for index in [3, 1, 2, 2] {
+            let store = &store;
+            scope.spawn(move || {
+                let scratch = tempfile::tempdir().unwrap();
+                let range = SampleRange::Shard(Shard::new(index, 3).unwrap());
+                let plan = Plan {
+                    range,
+                    ..store_plan(scratch.path(), 30, store)
+                };
+                make(&plan).unwrap()
+            });
+        }
+    });
+    assert_eq!(store.archives(), archives_of_30());
+    assert_eq!(store.names("receipts").unwrap().len(), 8);
+}
+
+#[test]
+fn a_store_of_something_else_is_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let store = Arc::new(MemoryStore::default());
+    make(&store_plan(dir.path(), 30, &store)).unwrap();
+    let other = tempfile::tempdir().unwrap();
+    let refused = |plan: Plan| make(&plan).unwrap_err().to_string();
+    assert_eq!(
+        refused(store_plan(other.path(), 31, &store)),
+        "s3://bucket/prefix/dataset.json: count: the dataset was begun with 30, this run has 31"
+    );
+    // An archive that no receipt vouches for, and that has other bytes.
+    store.objects.lock().unwrap().remove("receipts/000001.json");
+    let name = "webdataset/train-000001.tar".to_owned();
+    store.objects.lock().unwrap().insert(name, vec![7; 3]);
+    let e = refused(store_plan(other.path(), 30, &store));
+    assert!(
+        e.starts_with("s3://bucket/prefix/webdataset/train-000001.tar: holds 3 bytes that this run does not make"),
+        "{e}"
+    );
+    let loose = Plan {
+        archives: None,
+        ..store_plan(other.path(), 30, &store)
+    };
+    assert!(refused(loose).starts_with("labels.formats: files of single samples"));
+    let e = refused(plan(Path::new("s3://bucket/prefix"), 1));
+    assert_eq!(e, "s3://bucket/prefix: is a URL, expected a folder");
 }
 
 /// Shards of 20 samples in every format, made in an order of their own.

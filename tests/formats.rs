@@ -163,6 +163,7 @@ fn made_of(labels: &str, shot: fn(u64) -> Shot) -> tempfile::TempDir {
         obstructed: setup.obstructed,
         writers: vec![Arc::new(pictures), Arc::new(Sidecar)],
         archives: None,
+        store: None,
         inputs: Default::default(),
     };
     plan.writers.extend(setup.writers(&pictures));

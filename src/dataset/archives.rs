@@ -4,6 +4,7 @@
 //! broken off in the middle of an archive goes on there. What is finished is packed, moved to its
 //! place in one step, and the folder goes.
 
+use crate::dataset::archive_store::{self, ArchiveStore};
 use crate::dataset::journal::Journal;
 use crate::dataset::run::{Report, check_count};
 use crate::dataset::webdataset::{archive, write_archive};
@@ -12,6 +13,7 @@ use crate::dataset::{
 };
 use crate::error::{Error, Result};
 use crate::io;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Makes a dataset of files.
@@ -28,10 +30,12 @@ pub(super) fn generate_archives(
     archives.check()?;
     check_range(plan.range)?;
     check_count(plan.count)?;
+    if let Some(store) = &plan.store {
+        archive_store::claim(&**store, plan)?;
+    }
     folder::share(plan)?;
     plan.inputs.keep(&plan.folder);
-    io::create_folder(parent(&archive(&plan.folder, Part::Train, 0)))?;
-    let mut run = ArchiveRun::new(plan, archives);
+    let mut run = ArchiveRun::new(plan, archives)?;
     progress(run.progress);
     for number in run.missing() {
         run.add(number, files, progress)?;
@@ -58,6 +62,8 @@ fn parent(path: &Path) -> &Path {
 struct ArchiveRun<'a> {
     plan: &'a Plan,
     archives: WebDataset,
+    /// Numbers of the archives that are whole.
+    present: BTreeSet<u64>,
     /// In archives that are whole.
     progress: Progress,
     /// Of what this run has made.
@@ -65,20 +71,33 @@ struct ArchiveRun<'a> {
 }
 
 impl<'a> ArchiveRun<'a> {
-    fn new(plan: &'a Plan, archives: WebDataset) -> Self {
+    fn new(plan: &'a Plan, archives: WebDataset) -> Result<Self> {
         let mut run = Self {
             plan,
             archives,
+            present: BTreeSet::new(),
             progress: Progress::default(),
             made: DatasetCounts::new(&[], plan, plan.count, 0),
         };
-        run.progress.count = run.numbers().map(|number| run.size(number)).sum();
-        run.progress.done = run
-            .numbers()
-            .filter(|&n| run.is_there(n))
-            .map(|n| run.size(n))
-            .sum();
-        run
+        run.present = run.find_present()?;
+        run.progress.count = run.numbers().map(|n| run.size(n)).sum();
+        run.progress.done = run.present.iter().map(|&n| run.size(n)).sum();
+        Ok(run)
+    }
+
+    /// Those of this run's archives that are whole.
+    fn find_present(&self) -> Result<BTreeSet<u64>> {
+        if let Some(store) = self.store() {
+            let present = archive_store::present(store)?;
+            return Ok(self.numbers().filter(|n| present.contains(n)).collect());
+        }
+        io::create_folder(parent(&archive(&self.plan.folder, Part::Train, 0)))?;
+        let is_whole = |&number: &u64| self.files(number).all(|(_, path)| path.exists());
+        Ok(self.numbers().filter(is_whole).collect())
+    }
+
+    fn store(&self) -> Option<&dyn ArchiveStore> {
+        self.plan.store.as_deref()
     }
 
     /// The archives that this run is to make: all, or a machine's share.
@@ -88,17 +107,15 @@ impl<'a> ArchiveRun<'a> {
     }
 
     fn missing(&self) -> Vec<u64> {
-        self.numbers().filter(|&n| !self.is_there(n)).collect()
+        self.numbers()
+            .filter(|n| !self.present.contains(n))
+            .collect()
     }
 
     /// Samples of an archive.
     fn size(&self, number: u64) -> u64 {
         let (first, end) = self.archives.span(number, self.plan.count);
         end - first
-    }
-
-    fn is_there(&self, number: u64) -> bool {
-        self.files(number).all(|(_, path)| path.exists())
     }
 
     /// The file of each part that has a sample in an archive.
@@ -117,6 +134,7 @@ impl<'a> ArchiveRun<'a> {
         let made = files(&plan, &|inner| progress(before.with(inner)));
         let made = made.map_err(|error| self.told(error))?;
         self.pack(number, &plan)?;
+        self.present.insert(number);
         self.progress = before.with(Progress {
             done: self.size(number),
             count: 0,
@@ -133,6 +151,7 @@ impl<'a> ArchiveRun<'a> {
             folder: self.plan.folder.join(format!(".archive-{number:06}")),
             range: SampleRange::Span(first, end),
             archives: None,
+            store: None,
             inputs: Inputs::default(),
             ..self.plan.clone()
         }
@@ -142,32 +161,54 @@ impl<'a> ArchiveRun<'a> {
     fn told(&self, error: Error) -> Error {
         match error {
             Error::Interrupted { .. } => Error::Interrupted {
-                what: self.progress.describe(&self.plan.folder),
+                what: archive_store::describe(self.store(), &self.plan.folder, self.progress),
             },
             other => other,
         }
     }
 
-    /// Packs the samples of an archive, in order of number, and takes their folder away.
+    /// Packs the samples of an archive, in order of number, keeps it, and takes their folder away.
     fn pack(&self, number: u64, plan: &Plan) -> Result<()> {
         let lines = Journal::open(&plan.folder)?.close(plan.count)?;
         let samples: Vec<Written> = lines.iter().map(|line| line.written()).collect();
+        let mut packed = Vec::new();
         for (part, path) in self.files(number) {
             let of_part: Vec<_> = samples.iter().filter(|s| s.part == part).collect();
-            let packed = plan.folder.join(part.name()).with_extension("tar");
-            write_archive(&packed, &plan.folder, &of_part)?;
-            io::sync(&plan.folder);
-            std::fs::rename(&packed, &path).map_err(|e| Error::file(&path, e))?;
+            let aside = plan.folder.join(part.name()).with_extension("tar");
+            write_archive(&aside, &plan.folder, &of_part)?;
+            packed.push((aside, path));
         }
+        self.keep(number, &plan.folder, &packed)?;
         std::fs::remove_dir_all(&plan.folder).map_err(|e| Error::file(&plan.folder, e))
+    }
+
+    /// Puts the files of an archive, each with the path that it is to have, where they belong.
+    fn keep(&self, number: u64, folder: &Path, packed: &[(PathBuf, PathBuf)]) -> Result<()> {
+        if let Some(store) = self.store() {
+            let named = packed
+                .iter()
+                .map(|(aside, path)| (self.name_of(path), aside.clone()));
+            return archive_store::keep(store, number, &named.collect::<Vec<_>>());
+        }
+        io::sync(folder);
+        let mut packed = packed.iter();
+        packed.try_for_each(|(aside, path)| {
+            std::fs::rename(aside, path).map_err(|e| Error::file(path, e))
+        })
+    }
+
+    /// The path of an archive within the dataset, with slashes.
+    fn name_of(&self, path: &Path) -> String {
+        let inside = path.strip_prefix(&self.plan.folder).unwrap_or(path);
+        let parts = inside.iter().map(|part| part.to_string_lossy());
+        parts.collect::<Vec<_>>().join("/")
     }
 
     /// What is there now; objects are counted in what this run has made.
     fn counts(self) -> DatasetCounts {
         let (split, count) = (self.plan.split, self.plan.count);
         let is_val = |k: &u64| split.part(*k, count) == Part::Val;
-        let there = self.numbers().filter(|&n| self.is_there(n));
-        let spans = there.map(|n| self.archives.span(n, count));
+        let spans = self.present.iter().map(|&n| self.archives.span(n, count));
         DatasetCounts {
             images: self.progress.done,
             val: spans

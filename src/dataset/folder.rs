@@ -48,10 +48,18 @@ pub(crate) fn share(plan: &Plan) -> Result<()> {
 
 /// Makes a folder if it is not there, and returns what it was made from otherwise.
 fn enter(folder: &Path) -> Result<Option<Value>> {
+    refuse_url(folder)?;
     let before = claimable_identity(folder)?;
     io::create_folder(folder)?;
     io::refuse_links(folder)?;
     Ok(before)
+}
+
+fn refuse_url(folder: &Path) -> Result<()> {
+    match folder.to_string_lossy().contains("://") {
+        false => Ok(()),
+        true => Err(Error::file(folder, "is a URL, expected a folder")),
+    }
 }
 
 /// Says in the folder what it is made from, if that is what it was begun with.
@@ -94,7 +102,7 @@ fn check_is_folder(folder: &Path) -> Result<()> {
 }
 
 /// Fails where the folder was begun with another plan, naming the field.
-fn check_same_plan(before: &Value, now: &Value, folder: &Path) -> Result<()> {
+pub(super) fn check_same_plan(before: &Value, now: &Value, folder: &Path) -> Result<()> {
     of_this_format(before, folder)?;
     same(before, now, "")
         .map_err(|(at, what)| Error::value(at, what).in_file(identity_file(folder)))
@@ -219,7 +227,7 @@ fn is_half_written(name: &OsStr) -> bool {
 }
 
 /// Everything that decides the bytes of a dataset's samples, as it reads back from a file.
-fn plan_identity(plan: &Plan) -> Result<Value> {
+pub(super) fn plan_identity(plan: &Plan) -> Result<Value> {
     let mut identity = json!({
         "format": FORMAT_VERSION,
         "petcomp": env!("CARGO_PKG_VERSION"),

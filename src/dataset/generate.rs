@@ -1,5 +1,6 @@
 //! Makes a dataset, many samples at a time, in a folder that survives any interruption.
 
+use crate::dataset::archive_store::ArchiveStore;
 use crate::dataset::archives::generate_archives;
 use crate::dataset::journal_line::JournalLine;
 use crate::dataset::run::{Progress, Report, run};
@@ -37,6 +38,9 @@ pub struct Plan {
     /// Archives that the files of samples are moved into as they are made, so that none lies about;
     /// by default files stay where they are.
     pub archives: Option<WebDataset>,
+    /// Where finished archives are kept, while `folder` holds what is not finished; by default it
+    /// keeps both.
+    pub store: Option<Arc<dyn ArchiveStore>>,
     /// Checksums of files that `recipe` tells of, to be kept in the folder. By default there are
     /// none.
     pub inputs: Inputs,
@@ -57,6 +61,7 @@ impl Plan {
             obstructed: Obstructed::default(),
             writers: Vec::new(),
             archives: None,
+            store: None,
             inputs: Inputs::default(),
         }
     }
@@ -83,7 +88,8 @@ impl Plan {
 /// its own, since pictures beside each other keep processors busier than rows of one picture. Files
 /// of many samples are joined when all are there; those of a shard stay apart until it is
 /// [merged](crate::dataset::merge). With [`Plan::archives`] each archive is there whole or not at
-/// all, shards write theirs into one folder, and [`DatasetCounts::counted`] are those of this run.
+/// all, shards write theirs into one folder, and [`DatasetCounts::counted`] are those of this run;
+/// [`Plan::store`] has them sent away as they are finished.
 ///
 /// # Errors
 /// [`Error::Interrupted`] after a stop; the first error of `make` or of a writer, in order of `k`
@@ -101,6 +107,10 @@ pub fn generate(
             let files = |part: &Plan, progress: Report| generate_files(part, &make, progress, stop);
             generate_archives(plan, archives, &files, progress)
         }
+        None if plan.store.is_some() => Err(Error::value(
+            "labels.formats",
+            "files of single samples, expected [\"webdataset\"] alone: an object store takes archives",
+        )),
         None => generate_files(plan, make, progress, stop),
     }
 }

@@ -225,6 +225,7 @@ fn merged_plan(mut document: Map<String, Value>, count: u64, folder: &Path) -> R
         split: field(&mut document, "split")?,
         obstructed: field(&mut document, "obstructed")?,
         archives: None,
+        store: None,
         inputs: Inputs::default(),
     })
 }

@@ -17,6 +17,7 @@
 //! index.jsonl                    one line for each finished sample
 //! ```
 
+mod archive_store;
 mod archives;
 mod background_photo;
 mod check;
@@ -70,6 +71,8 @@ mod yolo;
 mod yolo_set;
 mod yolo_yaml;
 
+#[doc(hidden)]
+pub use archive_store::ArchiveStore;
 pub use check::{Checked, check};
 pub use coco::Coco;
 #[doc(hidden)]

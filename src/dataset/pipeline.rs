@@ -218,6 +218,7 @@ impl Pipeline {
             obstructed: labels.obstructed,
             writers: self.writers(),
             archives: labels.archives(),
+            store: None,
             inputs,
         })
     }

@@ -1,5 +1,6 @@
 //! `petcomp dataset generate`: a recipe becomes images with labels.
 
+use super::output::Output;
 use super::{
     LongRunConsent, generate_supervised, print_counts, print_trainer_inputs, write_contact_sheet,
 };
@@ -7,6 +8,7 @@ use crate::documents::{RecipeArgs, at_quality};
 use crate::global::GlobalArgs;
 use crate::interruption::interruption;
 use crate::print;
+use clap::builder::{OsStringValueParser, TypedValueParser};
 use petcomp::Quality;
 use petcomp::dataset::{self, DatasetConfig, Pipeline, Plan};
 use petcomp::dataset::{SampleRange, ShardChoice};
@@ -23,9 +25,14 @@ pub(crate) struct GenerateArgs {
     /// Seed; the same one gives the same files
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// Folder to write into
-    #[arg(short, long, value_name = "FOLDER")]
-    output: PathBuf,
+    /// Folder to write into, or an object store for a dataset of archives: s3://BUCKET/PREFIX, gs://..
+    /// or az://.. (credentials from the environment)
+    #[arg(short, long, value_name = "FOLDER|URL", value_parser = OsStringValueParser::new().try_map(Output::parse))]
+    output: Output,
+    /// Where the output is an object store: folder for what is not finished [default: one of the
+    /// system's temporary folder]
+    #[arg(long, value_name = "FOLDER")]
+    scratch: Option<PathBuf>,
     /// draft, normal or reference: how finely everything is computed; by default what the recipe
     /// says. Falls differ between qualities, and so do the places where things come to lie
     #[arg(long)]
@@ -53,7 +60,7 @@ pub(crate) struct GenerateArgs {
 pub(crate) fn run(args: &GenerateArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     let (config, range) = (args.config()?, args.sample_range()?);
     let archives = config.labels.archives();
-    let folder = range.folder(&args.output, archives);
+    let folder = range.folder(&args.output.folder(args.scratch.as_deref()), archives);
     if args.resume && archives.is_none() {
         repair_folder(&folder)?;
     }
@@ -64,7 +71,10 @@ pub(crate) fn run(args: &GenerateArgs, global: &GlobalArgs) -> anyhow::Result<()
     if args.preview.is_some() {
         write_preview_sheet(&folder, args.image_count())?;
     }
-    print_trainer_inputs(&counts, &folder);
+    match &args.output {
+        Output::Folder(_) => print_trainer_inputs(&counts, &folder),
+        Output::Store(url) => print::line(format_args!("{url}/webdataset")),
+    }
     Ok(())
 }
 
@@ -86,6 +96,7 @@ impl GenerateArgs {
     ) -> petcomp::Result<Plan> {
         Ok(Plan {
             range,
+            store: self.output.open()?,
             ..pipeline.plan(self.image_count(), self.seed, folder)?
         })
     }

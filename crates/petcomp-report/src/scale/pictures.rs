@@ -115,6 +115,7 @@ fn dataset_plan(folder: &Path, count: u64) -> Plan {
         obstructed: Obstructed::Keep,
         writers: writers(),
         archives: None,
+        store: None,
         inputs: Default::default(),
     }
 }

@@ -111,6 +111,7 @@ impl TestDataset {
             obstructed: Obstructed::Keep,
             writers: all_writers(),
             archives: None,
+            store: None,
             inputs: Default::default(),
         }
     }
