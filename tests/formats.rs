@@ -70,6 +70,7 @@ fn card(id: u32, center: [f64; 3], turn: f64, size: [f64; 2]) -> Card {
         grade: Grade::default(),
         back: None,
         bend: Default::default(),
+        refraction: Default::default(),
         surfaces: Default::default(),
     }
 }

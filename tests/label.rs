@@ -47,6 +47,7 @@ fn card(id: u32, center: [f64; 3], angles: [f64; 3], size: [f64; 2], outline: &[
         outline_uv: outline.iter().map(|&[u, v]| Point2::new(u, v)).collect(),
         grade: Grade::default(),
         bend: Default::default(),
+        refraction: Default::default(),
         surfaces: Default::default(),
     }
 }

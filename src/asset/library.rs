@@ -8,6 +8,7 @@ use crate::error::{Error, Result};
 use crate::geom::Point2;
 use crate::image::Image;
 use crate::io;
+use crate::matte::Flow;
 use crate::pixel::Film;
 use rayon::prelude::*;
 use std::path::Path;
@@ -29,6 +30,9 @@ pub struct Photo {
     pub texture: Texture,
     /// The object's convex hull in texture coordinates (0 to 1, right and down), in order.
     pub outline_uv: Arc<[Point2<f64>]>,
+    /// How it bends what is seen through it; none where that was not measured.
+    #[doc(hidden)]
+    pub flow: Option<Arc<Flow>>,
     /// What its texels are of.
     #[doc(hidden)]
     pub surface: SurfaceCache,
@@ -174,6 +178,7 @@ impl Photo {
         Self {
             outline_uv: texture_coordinates(&record.outline_px, texture.size()),
             texture,
+            flow: None,
             surface: SurfaceCache::default(),
             record,
         }

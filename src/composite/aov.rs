@@ -264,6 +264,7 @@ mod tests {
             outline_uv: std::sync::Arc::new([]),
             grade: Grade::default(),
             bend: Default::default(),
+            refraction: Default::default(),
             surfaces: Default::default(),
         };
         Shot::new(camera)

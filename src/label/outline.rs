@@ -273,6 +273,7 @@ mod tests {
             outline_uv: corners.iter().map(uv).collect::<Arc<[_]>>(),
             grade: Grade::default(),
             bend: Default::default(),
+            refraction: Default::default(),
             surfaces: Default::default(),
         }
     }

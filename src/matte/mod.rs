@@ -23,6 +23,7 @@ mod color_spill;
 mod cut_out;
 mod difference_key;
 mod film;
+mod flow;
 pub mod key;
 mod key_color;
 mod keying_screen;
@@ -51,6 +52,8 @@ pub use difference_key::{DifferenceKeyOptions, difference_key};
 #[doc(hidden)]
 pub use film::{ColorUncertainty, film_planes};
 pub use film::{FilmMatte, FilmOptions, film};
+#[doc(hidden)]
+pub use flow::Flow;
 #[doc(hidden)]
 pub use key::{KeyOptions, Keyed, Keying, Screen, key};
 #[doc(hidden)]

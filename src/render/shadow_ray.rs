@@ -161,6 +161,7 @@ mod tests {
             outline_uv: Arc::new([]),
             grade: Grade::default(),
             bend: Default::default(),
+            refraction: Default::default(),
             surfaces: Default::default(),
         };
         Shot::new(camera())

@@ -80,6 +80,10 @@ impl Appearance {
             texture: photo.texture.clone(),
             back: back.map(|photo| photo.texture.clone()),
             outline_uv: photo.outline_uv.clone(),
+            flows: [
+                photo.flow.clone(),
+                back.and_then(|photo| photo.flow.clone()),
+            ],
             surfaces: surfaces.map(Option::unwrap_or_default),
         })
     }

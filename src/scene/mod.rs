@@ -62,6 +62,7 @@ mod placement;
 mod post_process;
 mod range;
 mod recipe;
+mod refraction;
 mod resolve;
 mod shot;
 mod stack;
@@ -114,6 +115,8 @@ pub use range::Range;
 pub use recipe::{Collider, Recipe};
 #[doc(hidden)]
 pub use recipe::{GradeRanges, LightRanges, Selections};
+#[doc(hidden)]
+pub use refraction::Refraction;
 pub use resolve::Appearance;
 pub(crate) use resolve::CATCHER_RATIO;
 pub use shot::{Card, Shot};

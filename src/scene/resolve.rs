@@ -6,10 +6,11 @@ use crate::error::{Error, Result};
 use crate::filter::{sample_bilinear_clamped, sample_cubic_clamped};
 use crate::geom::{Point2, Pose, Quad};
 use crate::image::Image;
+use crate::matte::Flow;
 use crate::pixel::{LinearRgb, ObjectId};
 use crate::scene::{
     AreaLight, Blur, CameraSource, Card, EnvironmentMap, Exposure, LightGrid, LightMap, LightTint,
-    Noise, Object, Placement, Scene, Shot,
+    Noise, Object, Placement, Refraction, Scene, Shot,
 };
 use std::sync::Arc;
 
@@ -28,6 +29,9 @@ pub struct Appearance {
     pub back: Option<Texture>,
     /// Its outline in texture coordinates (0 to 1, right and down), in order.
     pub outline_uv: Arc<[Point2<f64>]>,
+    /// How its front and its back bend what is seen through them.
+    #[doc(hidden)]
+    pub flows: [Option<Arc<Flow>>; 2],
     /// What the texels of its front and of its back are of.
     #[doc(hidden)]
     pub surfaces: [SurfaceCache; 2],
@@ -48,6 +52,10 @@ impl Appearance {
             outline_uv: self.outline_uv,
             grade: object.grade,
             bend: object.bend,
+            refraction: Refraction {
+                flows: self.flows,
+                thickness: object.thickness,
+            },
             surfaces: self.surfaces,
         }
     }
@@ -318,6 +326,7 @@ mod tests {
             texture,
             back: None,
             outline_uv,
+            flows: Default::default(),
             surfaces: Default::default(),
         })
     }

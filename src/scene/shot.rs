@@ -6,7 +6,9 @@ use crate::deep::HoldoutSample;
 use crate::geom::{Point2, Quad, Vector3};
 use crate::image::Image;
 use crate::pixel::{LinearRgb, ObjectId};
-use crate::scene::{AreaLight, Bend, EdgeTreatment, EnvironmentMap, Grade, LightGrid, ThinLens};
+use crate::scene::{
+    AreaLight, Bend, EdgeTreatment, EnvironmentMap, Grade, LightGrid, Refraction, ThinLens,
+};
 use std::sync::Arc;
 
 /// Everything a picture is made of, in memory and known.
@@ -69,6 +71,9 @@ pub struct Card {
     pub grade: Grade,
     /// How it is curved.
     pub bend: Bend,
+    /// How it bends what is seen through it.
+    #[doc(hidden)]
+    pub refraction: Refraction,
     /// What the texels of its front and of its back are of.
     #[doc(hidden)]
     pub surfaces: [SurfaceCache; 2],
@@ -87,6 +92,7 @@ impl Card {
             outline_uv: corners.map(Point2::from).into(),
             grade: Grade::default(),
             bend: Bend::FLAT,
+            refraction: Refraction::default(),
             surfaces: Default::default(),
         }
     }

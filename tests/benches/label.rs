@@ -49,6 +49,7 @@ fn card(id: u32) -> Card {
             .collect(),
         grade: Grade::default(),
         bend: Default::default(),
+        refraction: Default::default(),
         surfaces: Default::default(),
     }
 }

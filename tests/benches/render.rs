@@ -90,6 +90,7 @@ fn shot() -> Shot {
                 ..Grade::default()
             },
             bend: Default::default(),
+            refraction: Default::default(),
             surfaces: Default::default(),
         })
     })

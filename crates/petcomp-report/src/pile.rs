@@ -77,6 +77,7 @@ fn bottle_card(k: u32, textures: &[Texture]) -> Card {
         outline_uv: whole_card_uv(),
         grade: Grade::default(),
         bend: Default::default(),
+        refraction: Default::default(),
         surfaces: Default::default(),
     }
 }

@@ -347,6 +347,7 @@ mod tests {
                 ..Grade::default()
             },
             bend: Default::default(),
+            refraction: Default::default(),
             surfaces: Default::default(),
         };
         let light = AreaLight {

@@ -141,6 +141,7 @@ impl Ellipse {
             outline_uv: turns.map(place_uv).collect(),
             grade: Grade::default(),
             bend: Default::default(),
+            refraction: Default::default(),
             surfaces: Default::default(),
         })
     }

@@ -46,6 +46,7 @@ fn opaque_card() -> Card {
         outline_uv: [].into(),
         grade: Grade::default(),
         bend: Default::default(),
+        refraction: Default::default(),
         surfaces: Default::default(),
     }
 }

@@ -92,6 +92,7 @@ fn appearance(object: &Object, textures: &[Texture]) -> Appearance {
         texture: textures[object.photo % textures.len()].clone(),
         back: None,
         outline_uv: whole_card_uv(),
+        flows: Default::default(),
         surfaces: Default::default(),
     }
 }

@@ -72,6 +72,7 @@ pub(super) fn card(
         outline_uv: Arc::new(WHOLE.map(Point2::from)),
         grade: Grade::default(),
         bend: Default::default(),
+        refraction: Default::default(),
         surfaces: Default::default(),
     }
 }
