@@ -21,6 +21,8 @@ REPORT    := target/report
 PYTHON    := $(CURDIR)/target/python/bin/python
 # What Blender's module for Python links.
 BPY       := python3-venv libgl1 libsm6 libxi6 libxkbcommon0 libxrender1
+# An S3 server for tests.
+S3_SERVER := 'moto[s3]' flask flask-cors
 WORLD     := experiments/cache/world
 # What the package for Python is tested with, in a virtual environment of its own.
 PACKAGE   := target/package
@@ -57,6 +59,9 @@ test: packages python valgrind browser
 	  $(CARGO) check --release --locked -p petcomp --no-default-features --features "$$f" --lib --tests --quiet || exit 1; \
 	done
 	$(MAKE) examples
+	@if [ -x $(PYTHON) ]; then \
+	  $(PYTHON) tests/cluster/object_store.py target/release/petcomp $(EXAMPLES)/demo/recipe.toml; \
+	else echo "object stores are not tested"; fi
 	$(MAKE) python-package
 	experiments/run --smoke
 
@@ -181,10 +186,10 @@ wheel:
 	@test $$(stat -c %s target/wheel-out/*.whl) -le $$(($(MOST_WHEEL_MB) * 1000000))
 	@$(call pytest_of,target/wheel-out)
 
-# pycocotools, webdataset and kubernetes-validate, for the tests that ask them; where they cannot be had the tests say so and pass.
+# pycocotools, webdataset, kubernetes-validate and an S3 server, for the tests that ask them; where they cannot be had the tests say so and pass.
 python:
 	@[ -x $(PYTHON) ] || { ($(call install,python3-venv)) && python3 -m venv target/python && \
-	  $(PYTHON) -m pip install --quiet --retries 1 pycocotools webdataset kubernetes-validate; } || \
+	  $(PYTHON) -m pip install --quiet --retries 1 pycocotools webdataset kubernetes-validate $(S3_SERVER); } || \
 	  { rm -rf target/python; echo "pycocotools cannot be installed: its tests are skipped"; }
 
 # For the tests of petcomp studio; where it cannot be had they say so and pass.

@@ -10,6 +10,8 @@ const CARDS = [
     (found) => `${count(found.photos, "photo")}, ${count(found.labels, "label")}, ${count(found.cameras, "camera")}`],
   ["scale", "Scale", "Click the two ends of a ruler, or the corners of the screen: pixels per metre.",
     (found) => count(found.photos, "photo")],
+  ["capture", "Capture", "Photograph objects on a display that shows black, white and stripes.",
+    () => "for what they let through, measured"],
   ["mattes", "Mattes", "Look at every cut-out, and correct it with a few strokes.",
     (found) => count(found.assets, "folder of assets", "folders of assets")],
   ["recipe", "Recipe", "Move a slider, and see what the pictures become.",

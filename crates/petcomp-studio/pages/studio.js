@@ -7,6 +7,7 @@ const PAGES = [
   ["", "Overview"],
   ["corners", "Corners"],
   ["scale", "Scale"],
+  ["capture", "Capture"],
   ["mattes", "Mattes"],
   ["recipe", "Recipe"],
   ["dataset", "Dataset"],

@@ -1,7 +1,7 @@
 //! `petcomp studio`: pages in the browser of this machine for what hands and eyes do better than a
 //! command line. A photo's corners, the scale of a photo, mattes, a recipe, a dataset.
 //!
-//! Each page is a room of its own (`corners`, `scale`, `mattes`, `recipe`, `dataset`) with routes, and
+//! Each page is a room of its own (`corners`, `scale`, `capture`, `mattes`, `recipe`, `dataset`) with routes, and
 //! pages of plain HTML, CSS and modules in `pages/` that are part of the program. What rooms share:
 //!
 //! * [`Server`] listens on 127.0.0.1 and answers nobody without its token (`server`).
@@ -12,6 +12,7 @@
 //! * `refusal` is what a page is told when something cannot be done.
 #![warn(clippy::unwrap_used, clippy::print_stderr, clippy::print_stdout)]
 
+mod capture;
 mod corners;
 mod dataset;
 mod folder;

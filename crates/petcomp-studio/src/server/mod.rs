@@ -16,7 +16,7 @@ pub(crate) use pages::Page;
 
 use crate::folder::Folder;
 use crate::studio::Studio;
-use crate::{corners, dataset, mattes, overview, picture, recipe, scale};
+use crate::{capture, corners, dataset, mattes, overview, picture, recipe, scale};
 use axum::Router;
 use axum::extract::DefaultBodyLimit;
 use guard::Guard;
@@ -118,6 +118,7 @@ fn all_pages() -> Vec<Page> {
         overview::PAGES,
         corners::PAGES,
         scale::PAGES,
+        capture::PAGES,
         mattes::PAGES,
         recipe::PAGES,
         dataset::PAGES,
@@ -131,6 +132,7 @@ fn rooms() -> Router<Arc<Studio>> {
         .merge(picture::routes())
         .nest("/corners", corners::routes())
         .nest("/scale", scale::routes())
+        .nest("/capture", capture::routes())
         .nest("/mattes", mattes::routes())
         .nest("/recipe", recipe::routes())
         .nest("/dataset", dataset::routes())

@@ -1,0 +1,87 @@
+//! The page `capture`: the frames that a luminous display shows below an object, on this machine's
+//! own display or in a folder for another one.
+
+use crate::refusal::Answer;
+use crate::server::Page;
+use crate::studio::Studio;
+use crate::turn::blocking;
+use axum::extract::{Query, State};
+use axum::http::header::{CONTENT_SECURITY_POLICY, CONTENT_TYPE};
+use axum::response::{IntoResponse, Response};
+use axum::routing::{get, post};
+use axum::{Json, Router};
+use petcomp::capture::{Display, write_frames};
+use petcomp::{Error, io};
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+pub(crate) const PAGES: &[Page] = &[crate::page!("capture.html"), crate::page!("capture.js")];
+
+/// Where frames for another display are written.
+const FOLDER: &str = "capture";
+
+/// The page that shows frames has its style, script and pictures in itself. The sandbox keeps it
+/// from everything else: to the studio it is another site's page.
+const ALONE: &str = "sandbox allow-scripts; default-src 'none'; script-src 'unsafe-inline'; \
+     style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+
+pub(crate) fn routes() -> Router<Arc<Studio>> {
+    Router::new()
+        .route("/show", get(show))
+        .route("/write", post(write))
+}
+
+/// A display, and what it is to show.
+#[derive(Deserialize)]
+struct Asked {
+    width_px: u32,
+    height_px: u32,
+    /// Metres.
+    width: Option<f64>,
+    #[serde(default)]
+    stripes: bool,
+}
+
+impl Asked {
+    fn display(&self) -> Display {
+        Display {
+            size_px: [self.width_px, self.height_px],
+            width: self.width,
+        }
+    }
+}
+
+/// The page that shows the frames full screen.
+async fn show(Query(asked): Query<Asked>) -> Answer<Response> {
+    let page = blocking(move || {
+        let folder = tempfile::tempdir().map_err(|e| Error::value("capture", e))?;
+        let page = write_frames(folder.path(), &asked.display(), asked.stripes)?;
+        Ok(io::read_text(page)?)
+    })
+    .await?;
+    let headers = [
+        (CONTENT_TYPE, "text/html; charset=utf-8"),
+        (CONTENT_SECURITY_POLICY, ALONE),
+    ];
+    Ok((headers, page).into_response())
+}
+
+/// What was written.
+#[derive(Serialize)]
+struct Written {
+    page: String,
+}
+
+async fn write(
+    State(studio): State<Arc<Studio>>,
+    Json(asked): Json<Asked>,
+) -> Answer<Json<Written>> {
+    blocking(move || {
+        let folder = studio.folder.place(FOLDER)?;
+        io::refuse_links(&folder)?;
+        let page = write_frames(&folder, &asked.display(), asked.stripes)?;
+        let page = studio.folder.name_of(&page);
+        Ok(Json(Written { page }))
+    })
+    .await
+}
