@@ -26,7 +26,9 @@ WHITE_LEVEL = 0.8                           # of the white display in a photo
 FINE, COARSE = 16, 160                      # periods of stripes, pixels of the display
 BACKGROUNDS = ("checker", "text", "noise", "bottle", "plain")
 PLACES = ("soft", "window")                 # their lights
+STRIPED = ("soft",)                         # places whose stripes are kept
 PAINTS = ("green", "blue")
+CAMERA_HEIGHT = 1.0                         # metres over the display
 MARGIN = 16                                 # pixels around a bottle
 
 
@@ -145,9 +147,8 @@ class Place:
         self.sheets, self.names = [], []
         self.glass = glass(64)
         self.paper = photos.Screen()
-        height = 1.0
-        at = (rng.normal(0, 0.006), rng.normal(0, 0.006), height)
-        self.camera = studio.look_at_camera(*VIEW_PX, height / PITCH, at, (0, 0, 0))
+        at = (rng.normal(0, 0.006), rng.normal(0, 0.006), CAMERA_HEIGHT)
+        self.camera = studio.look_at_camera(*VIEW_PX, CAMERA_HEIGHT / PITCH, at, (0, 0, 0))
         studio.set_camera(sc, self.camera)
 
     def add_pictures(self, shown):
@@ -179,13 +180,14 @@ class Place:
         self.glass.hide_render = not glass
         self.paper.ob.hide_render = not paper
 
-    def homography(self):
-        """Display pixels from photo pixels."""
-        k, r, t = self.camera["K"], self.camera["R"], self.camera["t"]
-        photo_from_plane = k @ np.stack([r[:, 0], r[:, 1], t], 1)
-        display_from_plane = np.array([[1 / PITCH, 0, SIZE_PX[0] / 2], [0, -1 / PITCH, SIZE_PX[1] / 2], [0, 0, 1]])
-        m = display_from_plane @ np.linalg.inv(photo_from_plane)
-        return m / m[2, 2]
+
+def homography(camera):
+    """Display pixels from photo pixels."""
+    k, r, t = camera["K"], camera["R"], camera["t"]
+    photo_from_plane = k @ np.stack([r[:, 0], r[:, 1], t], 1)
+    display_from_plane = np.array([[1 / PITCH, 0, SIZE_PX[0] / 2], [0, -1 / PITCH, SIZE_PX[1] / 2], [0, 0, 1]])
+    m = display_from_plane @ np.linalg.inv(photo_from_plane)
+    return m / m[2, 2]
 
 
 def render_passes(sc, crop, samples, seed, denoise):
@@ -225,6 +227,8 @@ def run(args):
     os.makedirs(cache, exist_ok=True)
     for index in range(len(PLACES)):
         render_place(args, index, cache)
+    for index in range(len(PLACES)):
+        write_place(args, index, cache)
 
 
 def render_place(args, index, cache):
@@ -307,3 +311,125 @@ def lay_bottle(args, i, camera=None):
 def remove(obs):
     for ob in obs:
         bpy.data.objects.remove(ob, do_unlink=True)
+
+
+# ----------------------------------------------------------- photographs
+
+SENSOR = dict(shot=0.006, read=0.002, blur=0.35, vignette=0.0)
+PAINT_LEVEL = 0.4                           # of the brightest channel of a painted screen
+CAPTURE_QUALITY = 92                        # JPEG, as phones write it
+STRIPES = [f"stripes_{axis}_{kind}_{k}" for kind in ("coarse", "fine") for axis in "xy" for k in (1, 2, 3, 4)]
+
+
+class Developer:
+    """Turns light into photos of one exposure."""
+
+    def __init__(self, place):
+        """From the light of a place without a bottle."""
+        paper = float(np.median(place["paper"]))
+        white = float(np.median(place["seen_white"]))
+        self.display = WHITE_LIGHT * paper / white           # of the display, in the units of the room's light
+        dark = float(np.median(place["dark"]))
+        self.gain = WHITE_LEVEL / (dark + self.display * white)
+        self.paint_gain = {p: PAINT_LEVEL * WHITE_PAPER / (paper * max(photos.SCREENS[p])) for p in PAINTS}
+
+    def shown(self, light, name):
+        """A photo's light while the display shows a picture; none where it is off."""
+        own = self.display * light[f"seen_{name}"].astype(float) if name else 0.0
+        return self.gain * (light["dark"] + own)
+
+    def photo(self, linear, rng):
+        seen = studio.develop(np.asarray(linear, float), rng, **SENSOR)
+        return pixels.to_u8(pixels.srgb_encode(seen))
+
+
+def write_place(args, index, cache):
+    place = load(light_file(cache, f"place{index}"))
+    developer = Developer(place)
+    name = f"{PLACES[index]}"
+    folder = os.path.join(args.out, name)
+    os.makedirs(folder, exist_ok=True)
+    rng = bottle.seeded("display empty", index)
+    for frame in ("black", "white"):
+        light = developer.shown(place, None if frame == "black" else frame)
+        write_jpeg(os.path.join(folder, f"empty_{frame}.jpg"), developer.photo(light, rng))
+    for k in BACKGROUNDS:
+        write_truth(os.path.join(folder, f"empty_{k}.png"), developer.shown(place, k))
+    bottles = [i for i in range(args.first, args.first + args.count) if i % len(PLACES) == index]
+    camera = Place(index, args.threads, args.spp).camera
+    display_from_photo = homography(camera)
+    records = [write_bottle(developer, display_from_photo, args, folder, cache, i) for i in bottles]
+    pixels.write_json(os.path.join(folder, "place.json"), dict(
+        light=name, view_px=list(VIEW_PX), display_px=list(SIZE_PX), display_m=[s * PITCH for s in SIZE_PX],
+        display_from_photo=[[float(v) for v in row] for row in display_from_photo],
+        camera=studio.camera_json(camera), gain={"display": developer.gain, **developer.paint_gain},
+        sensor=SENSOR, spp=args.spp, bottles=records))
+
+
+def write_bottle(developer, display_from_photo, args, folder, cache, i):
+    light = load(light_file(cache, f"b{i:04d}"))
+    rng = bottle.seeded("display photos", i)
+    name = f"b{i:02d}"
+    for paint in PAINTS:
+        write_jpeg(path_of(folder, name, paint), developer.photo(developer.paint_gain[paint] * light[paint], rng))
+    with_stripes = os.path.basename(folder) in STRIPED
+    for frame in ("black", "white", *(STRIPES if with_stripes else ())):
+        shown = developer.shown(light, None if frame == "black" else frame)
+        write_jpeg(path_of(folder, name, frame), developer.photo(shown, rng))
+    near = cv2.dilate((light["cover"] > 0).astype(np.uint8), np.ones((5, 5)))[..., None]
+    for k in BACKGROUNDS:
+        write_truth(os.path.join(folder, f"{name}_over_{k}.png"), near * developer.shown(light, k))
+    if with_stripes:
+        flow = near * displacement(light, display_from_photo)
+        write_small_png(os.path.join(folder, f"{name}_flow.png"), flow.astype(np.uint8))
+    pixels.write_png(os.path.join(folder, f"{name}_mask.png"), pixels.to_u8(light["cover"]))
+    desc = bottle.describe(args.library_seed, i, {})
+    return dict(name=name, crop_px=[int(v) for v in light["crop"]], thickness=round(float(light["size"][2]), 5),
+                with_stripes=with_stripes, colour=desc["colour"], litres=desc["litres"], class_name=desc["class_name"])
+
+
+def write_truth(path, light):
+    """Without a sensor's noise, on 8 bits."""
+    write_small_png(path, pixels.to_u8(pixels.srgb_encode(light)))
+
+
+def write_small_png(path, codes):
+    cv2.imwrite(path, codes[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 9, cv2.IMWRITE_PNG_STRATEGY, 1])
+
+
+def displacement(light, display_from_photo):
+    """How far on the display each pixel's line of sight is displaced, by the coarse stripes without noise.
+
+    Red and green are to the right and down, 128 is none and 4 codes are a display pixel; blue is the stripes' contrast,
+    255 is that of the display alone.
+    """
+    white = float(np.median(light["seen_white"][:4, :4].astype(float)))
+    x0, y0, x1, y1 = light["crop"]
+    y, x = np.mgrid[y0:y1, x0:x1] + 0.5
+    straight = np.einsum("ij,jyx->iyx", display_from_photo, np.stack([x, y, np.ones_like(x)]))
+    straight = straight[:2] / straight[2]
+    ends = [axis_ends(light, axis, straight[axis], white) for axis in (0, 1)]
+    moved = [128 + 4 * (ends[axis][0] - straight[axis]) for axis in (0, 1)]
+    contrast = 255 * np.minimum(ends[0][1], ends[1][1])
+    return np.clip(np.round(np.stack([*moved, contrast], -1)), 0, 255)
+
+
+def axis_ends(light, axis, straight, white):
+    """Where lines of sight end along an axis, and the contrast of the stripes."""
+    a, b, c, d = (light[f"seen_stripes_{'xy'[axis]}_coarse_{k}"].astype(float).mean(-1) for k in (1, 2, 3, 4))
+    phase = np.arctan2(d - b, a - c) / (2 * math.pi)
+    ends = COARSE * (phase + np.round(straight / COARSE - phase))
+    return ends, np.clip(np.hypot(d - b, a - c) / white, 0, 1)
+
+
+def path_of(folder, bottle_name, frame):
+    return os.path.join(folder, f"{bottle_name}_{frame}.jpg")
+
+
+def write_jpeg(path, codes, quality=CAPTURE_QUALITY):
+    cv2.imwrite(path, codes[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, quality])
+
+
+def load(path):
+    with np.load(path) as z:
+        return {k: z[k] for k in z.files}
