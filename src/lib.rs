@@ -45,6 +45,8 @@ pub mod asset;
 mod bounds;
 #[cfg(feature = "pipeline")]
 pub mod camera;
+#[cfg(feature = "pipeline")]
+pub mod capture;
 pub mod color;
 #[cfg(feature = "pipeline")]
 pub mod composite;

@@ -28,6 +28,7 @@ const FLOORS: &[&[&str]] = &[
     ],
     &["diff", "io"],
     &["camera", "matte"],
+    &["capture"],
     &["asset"],
     &["scene"],
     &["label", "light", "settle"],

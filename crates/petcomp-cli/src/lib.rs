@@ -6,6 +6,7 @@
 mod asset;
 mod batch;
 mod camera;
+mod capture;
 mod dataset;
 mod demo;
 mod diagnostics;
@@ -74,6 +75,9 @@ enum StageVerb {
     /// Photo -> matte and cut-out
     #[command(subcommand)]
     Matte(matte::MatteCommand),
+    /// Frames for a display to show: what an object lets through and how it bends light, measured
+    #[command(subcommand)]
+    Capture(capture::CaptureCommand),
     /// Cut-outs with real size and class, kept in a folder
     #[command(subcommand)]
     Asset(asset::AssetCommand),
@@ -131,6 +135,7 @@ impl StageVerb {
     fn run(&self, global: &GlobalArgs) -> anyhow::Result<()> {
         match self {
             Self::Matte(command) => matte::run(command, global),
+            Self::Capture(command) => capture::run(command, global),
             Self::Asset(command) => asset::run(command, global),
             Self::Camera(command) => camera::run(command, global),
             Self::Scene(command) => scene::run(command, global),

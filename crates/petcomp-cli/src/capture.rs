@@ -1,0 +1,59 @@
+//! `petcomp capture`: an object on a luminous display.
+
+use crate::global::GlobalArgs;
+use crate::values::parse_pixel_size;
+use petcomp::capture::{Display, Frame, write_frames};
+use std::path::PathBuf;
+
+#[derive(clap::Subcommand)]
+pub(crate) enum CaptureCommand {
+    /// Write the frames that a tablet or monitor shows below the object, and a page that shows them
+    /// one after the other; photos of them go to `petcomp asset add --captured`
+    Frames(FramesArgs),
+}
+
+#[derive(clap::Args)]
+pub(crate) struct FramesArgs {
+    /// Folder to write
+    #[arg(short, long, value_name = "FOLDER")]
+    output: PathBuf,
+    /// Pixels of the display: best its own number, so that nothing is scaled
+    #[arg(long, value_name = "WxH", value_parser = parse_pixel_size)]
+    size: [u32; 2],
+    /// Width of the picture on the display, metres, by a ruler; can be given later, to `asset add`
+    #[arg(long, value_name = "METRES", conflicts_with = "diagonal")]
+    width: Option<f64>,
+    /// Or: diagonal of the picture on the display, inches
+    #[arg(long, value_name = "INCHES")]
+    diagonal: Option<f64>,
+    /// Sixteen frames of stripes, too: they measure how the object bends light
+    #[arg(long)]
+    stripes: bool,
+}
+
+const METRES_IN_INCH: f64 = 0.0254;
+
+pub(crate) fn run(command: &CaptureCommand, global: &GlobalArgs) -> anyhow::Result<()> {
+    match command {
+        CaptureCommand::Frames(args) => args.write(global),
+    }
+}
+
+impl FramesArgs {
+    fn write(&self, global: &GlobalArgs) -> anyhow::Result<()> {
+        let page = write_frames(&self.output, &self.display(), self.stripes)?;
+        let frames = Frame::all(self.stripes).count();
+        global.print_written(&self.output, format_args!("{frames} frames"));
+        global.print_look_at(&page);
+        Ok(())
+    }
+
+    fn display(&self) -> Display {
+        let of_diagonal =
+            |inches: f64| Display::width_of_diagonal(self.size, METRES_IN_INCH * inches);
+        Display {
+            size_px: self.size,
+            width: self.width.or(self.diagonal.map(of_diagonal)),
+        }
+    }
+}
