@@ -1,8 +1,10 @@
 //! Bottles photographed on a display and over new backgrounds: the files of a place.
 
+use nalgebra::{Matrix3, RowVector3};
+use petcomp::color::linear_to_srgb;
 use petcomp::geom::Homography;
 use petcomp::io;
-use petcomp::{Coverage, Error, Image, LinearRgb, Result, Srgb8};
+use petcomp::{Coverage, Error, Image, LinearRgb, Result};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -21,7 +23,7 @@ pub(super) struct Place {
     /// Width and height of the display, metres.
     pub(super) display_m: [f64; 2],
     /// From photos of the view to the display, pixels.
-    pub(super) display_from_photo: Homography,
+    display_from_photo: [[f64; 3]; 3],
     /// Factors of the photos' exposures, by what the display showed or the screen was painted.
     gain: BTreeMap<String, f32>,
     pub(super) bottles: Vec<Bottle>,
@@ -57,6 +59,12 @@ impl Place {
     fn open(folder: PathBuf) -> Result<Self> {
         let place: Self = io::read_json(&folder.join(RECORD))?;
         Ok(Self { folder, ..place })
+    }
+
+    /// From photos of the view to the display, pixels.
+    pub(super) fn display_from_photo(&self) -> Homography {
+        let rows = self.display_from_photo.map(RowVector3::from);
+        Homography(Matrix3::from_rows(&rows))
     }
 
     /// Name of a bottle among those of all places.
@@ -95,10 +103,13 @@ impl Place {
     /// How far lines of sight are displaced on the display, and the contrast of coarse stripes, 0
     /// to 1.
     pub(super) fn true_flow(&self, bottle: &Bottle) -> Result<Image<([f64; 2], f64)>> {
-        let codes: Image<Srgb8> = io::read(self.folder.join(format!("{}_flow.png", bottle.name)))?;
-        Ok(codes.map(|code| {
-            let pixels = |c: u8| (f64::from(c) - 128.0) / 4.0;
-            ([pixels(code.r), pixels(code.g)], f64::from(code.b) / 255.0)
+        // Codes and not light: numbers in 8 bits.
+        let file = self.folder.join(format!("{}_flow.png", bottle.name));
+        let codes: Image<LinearRgb> = io::read(file)?;
+        Ok(codes.map(|light| {
+            let [x, y, contrast] = light.channels().map(|v| f64::from(linear_to_srgb(v)));
+            let pixels = |share: f64| (255.0 * share - 128.0) / 4.0;
+            ([pixels(x), pixels(y)], contrast)
         }))
     }
 

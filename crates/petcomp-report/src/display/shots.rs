@@ -2,11 +2,11 @@
 
 use super::place::{Bottle, Place};
 use crate::matte::normal;
+use petcomp::Mix;
 use petcomp::capture::{Display, Frame, FramePhoto, Measured, Photos, Sources, View};
 use petcomp::capture::{draw_frame, measure};
 use petcomp::color::srgb_to_linear;
 use petcomp::geom::{Homography, Point2};
-use petcomp::pixel::Mix;
 use petcomp::{Image, LinearRgb, Result, Srgb8};
 
 /// A sensor's noise: the variance of a value is `shot^2 * value + read^2`.
@@ -81,7 +81,7 @@ impl<'a> Stage<'a> {
     ) -> Image<LinearRgb> {
         let shown = draw_frame(&self.display, frame);
         let [left, top] = self.corner.map(|side| side as f64);
-        let place = &self.place.display_from_photo;
+        let place = &self.place.display_from_photo();
         let [w, h] = self.display.size_px.map(|side| side as usize);
         let mut photo = Image::from_fn(w, h, |x, y| {
             let view = Point2::new(x as f64 + 0.5 - left, y as f64 + 0.5 - top);

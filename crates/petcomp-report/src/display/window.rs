@@ -2,11 +2,11 @@
 
 use super::place::{Bottle, Place};
 use nalgebra::Matrix3;
+use petcomp::Mix;
+use petcomp::Roi;
 use petcomp::camera::warp;
 use petcomp::filter::Pyramid;
 use petcomp::geom::{Homography, Point2};
-use petcomp::image::Roi;
-use petcomp::pixel::Mix;
 use petcomp::{Image, LinearRgb};
 
 /// Pixels of the display, a whole number from its upper left corner.
@@ -26,10 +26,10 @@ impl Window {
     pub(super) fn of(place: &Place, bottle: &Bottle) -> Self {
         let [x0, y0, x1, y1] = bottle.crop_px;
         let corner = place
-            .display_from_photo
+            .display_from_photo()
             .map(Point2::new(x0 as f64, y0 as f64));
         let [x, y] = [corner.x.ceil(), corner.y.ceil()];
-        let to_view = place.display_from_photo.0.try_inverse();
+        let to_view = place.display_from_photo().0.try_inverse();
         let to_view = to_view.unwrap_or_else(Matrix3::identity) * moved_by(x, y);
         Self {
             roi: Roi {
