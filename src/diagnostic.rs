@@ -139,6 +139,15 @@ codes! {
     ClippedObject "matte.clipped_object" "A part of the object is overexposed"
     Moved "matte.moved" "The object moved between two photos and was aligned"
     SimilarScreens "matte.similar_screens" "The screens do not differ in a channel"
+    // Capture.
+    MissingFrames "capture.missing_frames" "Some frames of the stripes have no photo"
+    ExposureDrift "capture.exposure_drift" "The exposure or colour of a photo differs from the others"
+    ClippedWhite "capture.clipped_white" "Some of the white frame is overexposed"
+    Banding "capture.banding" "The display is uneven around the object"
+    ColorByAngle "capture.color_by_angle" "The display changes its colour from one side to the other"
+    CameraMoved "capture.camera_moved" "The camera moved between two photos"
+    ObjectMoved "capture.object_moved" "The object moved or the light changed between two photos"
+    FlowUnknown "capture.flow_unknown" "Refraction is not known on much of the object"
     // Dataset.
     UnreadableFile "dataset.unreadable_file" "A file is missing or cannot be read"
     BadDataYaml "dataset.bad_data_yaml" "data.yaml lacks a key or has a wrong value"

@@ -304,7 +304,7 @@ mod tests {
             printed(&declared("[\"cap\", \"cap\"]")).contains("classes[1]: \"cap\" is there twice")
         );
         assert!(printed(&TWO.replace("length = 0.3", "")).contains(
-            "photos[0].length: missing, expected length, px_per_metre, screen_size or marker_size"
+            "photos[0].length: missing, expected length, px_per_metre, screen_size, marker_size or captured"
         ));
         assert!(
             printed(&TWO.replace("length = 0.3", "length = -1.0")).contains("photos[0].length: -1")

@@ -1,7 +1,9 @@
-//! A sheet of all cut-outs of a folder over four backgrounds, so that a person sees faults at once.
+//! A sheet of all cut-outs of a folder over four backgrounds, so that a person sees faults at once;
+//! of captured ones what was measured, too.
 
+use super::flow_sheet;
 use super::library::{Library, Photo};
-use super::manifest::PhotoRecord;
+use super::manifest::{CaptureRecord, PhotoRecord};
 use super::texture::Texture;
 use super::thumbnail::{checkerboard, fitted_size};
 use crate::color::to_srgb8;
@@ -86,13 +88,31 @@ fn strip(photo: &Photo) -> Image<Srgb8> {
     let cutout = small(&photo.texture);
     let lines = lines_of(&photo.record);
     let text_height = lines.len() * TextSize::Small.height() + GAP_PX / 2;
-    let mut canvas = Image::filled(STRIP_WIDTH_PX, text_height + cutout.height(), PAPER);
+    let rows = tile_rows(photo, &cutout);
+    let row_height = cutout.height() + GAP_PX;
+    let height = text_height + rows.len() * row_height - GAP_PX;
+    let mut canvas = Image::filled(STRIP_WIDTH_PX, height, PAPER);
     write_lines(&mut canvas, &lines);
-    for (i, background) in BACKGROUNDS.iter().enumerate() {
-        let at = [i * (CUT_OUT_SIDE_PX + GAP_PX), text_height];
-        draw::paste(&mut canvas, at, &over_background(&cutout, *background));
+    for (j, row) in rows.iter().enumerate() {
+        paste_tiles(&mut canvas, text_height + j * row_height, row);
     }
     canvas
+}
+
+/// A cut-out over all backgrounds; below, what was measured on a display.
+fn tile_rows(photo: &Photo, cutout: &Image<Film>) -> Vec<Vec<Image<Srgb8>>> {
+    let over = BACKGROUNDS
+        .iter()
+        .map(|background| over_background(cutout, *background));
+    let measured = photo.record.captured.is_some();
+    let measured = measured.then(|| flow_sheet::tiles(photo, cutout));
+    [over.collect()].into_iter().chain(measured).collect()
+}
+
+fn paste_tiles(canvas: &mut Image<Srgb8>, top: usize, tiles: &[Image<Srgb8>]) {
+    for (i, tile) in tiles.iter().enumerate() {
+        draw::paste(canvas, [i * (CUT_OUT_SIDE_PX + GAP_PX), top], tile);
+    }
 }
 
 fn over_background(cutout: &Image<Film>, background: Background) -> Image<Srgb8> {
@@ -111,9 +131,11 @@ fn write_lines(canvas: &mut Image<Srgb8>, lines: &[(String, Srgb8)]) {
 /// What is written over a cut-out: its size, and why it needs a review.
 fn lines_of(record: &PhotoRecord) -> Vec<(String, Srgb8)> {
     let title = wrapped_in(INK, &title(record));
+    let captured = record.captured.iter().map(CaptureRecord::summary);
+    let captured = captured.flat_map(|summary| wrapped_in(INK, &summary));
     let messages = record.diagnostics.iter().map(|d| &d.message);
     let reasons = messages.flat_map(|message| wrapped_in(WARNING, message));
-    title.into_iter().chain(reasons).collect()
+    title.into_iter().chain(captured).chain(reasons).collect()
 }
 
 /// The lines of a text in one colour.

@@ -1,5 +1,6 @@
 //! A photo and what is known of its object.
 
+use super::capture_entry::CaptureEntry;
 use super::manifest::{Asset, Manifest, PhotoRecord, check_class, check_name};
 use super::role::Role;
 use super::scale::Scale;
@@ -51,6 +52,9 @@ pub struct PhotoEntry {
     /// Or: side of the black square of a printed marker on the screen, metres.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub marker_size: Option<f64>,
+    /// Or: `file` is one of several photos on a luminous display, which gives the scale.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub captured: Option<CaptureEntry>,
     /// What it was photographed on: `auto`, a colour `R,G,B` or a photo of the empty screen.
     /// Default: `auto`.
     #[serde(default)]
@@ -90,6 +94,7 @@ impl PhotoEntry {
             screen_size: None,
             screen_corners: None,
             marker_size: None,
+            captured: None,
             screen: ScreenSource::Auto,
             thickness: DEFAULT_THICKNESS,
             mass: DEFAULT_MASS,
@@ -109,6 +114,7 @@ impl PhotoEntry {
                 (self.screen_size, self.screen_corners) = (Some(size), corners);
             }
             Scale::Marker(side) => self.marker_size = Some(side),
+            Scale::Display => self.captured = Some(CaptureEntry::default()),
         }
     }
 
@@ -118,7 +124,7 @@ impl PhotoEntry {
     /// [`Error::Value`] where nothing gives it, or more than one thing.
     pub fn scale(&self) -> Result<Scale> {
         self.check_companions()?;
-        let names = "length, px_per_metre, screen_size or marker_size";
+        let names = "length, px_per_metre, screen_size, marker_size or captured";
         match self.scales().into_iter().flatten().collect::<Vec<_>>()[..] {
             [scale] => Ok(scale),
             [] => Err(Error::value("length", format!("missing, expected {names}"))),
@@ -140,13 +146,14 @@ impl PhotoEntry {
         Ok(())
     }
 
-    fn scales(&self) -> [Option<Scale>; 4] {
+    fn scales(&self) -> [Option<Scale>; 5] {
         [
             self.object_scale(),
             self.px_per_metre.map(Scale::PxPerMetre),
             self.screen_size
                 .map(|size| Scale::Screen(size, self.screen_corners)),
             self.marker_size.map(Scale::Marker),
+            self.captured.is_some().then_some(Scale::Display),
         ]
     }
 
@@ -171,6 +178,7 @@ impl PhotoEntry {
         })?;
         self.check_class(manifest)?;
         scale.check()?;
+        self.captured.as_ref().map_or(Ok(()), CaptureEntry::check)?;
         THICKNESS.check("thickness", self.thickness)?;
         MASS.check("mass", self.mass)
     }
@@ -265,7 +273,8 @@ mod tests {
             "screen_size = [0.6, 0.4]\nscreen_corners = {corners:?}"
         ));
         assert_eq!(reported, Ok(Scale::Screen([0.6, 0.4], Some(corners))));
-        let missing = "length: missing, expected length, px_per_metre, screen_size or marker_size";
+        let missing =
+            "length: missing, expected length, px_per_metre, screen_size, marker_size or captured";
         assert_eq!(scale("").unwrap_err(), missing);
         assert!(
             scale("length = 0.2\nmarker_size = 0.05")

@@ -5,7 +5,6 @@ use crate::error::Result;
 use crate::geom::Point2;
 use crate::image::Image;
 use crate::io;
-use crate::matte::CutOut;
 use crate::pixel::{Film, LinearRgb};
 use crate::stopwatch::Stopwatch;
 use half::f16;
@@ -18,15 +17,22 @@ use std::path::Path;
 /// opacity along the line of sight (together: premultiplied RGBA for programs that know no film),
 /// `TR TG TB` the transmittance as measured, the object's own shadow included, and `VR VG VB` that
 /// of the line of sight alone.
-pub(super) fn write(path: &Path, cut: &CutOut) -> Result<Image<Film>> {
+pub(super) fn write(
+    path: &Path,
+    film: &Image<Film>,
+    transmittance: &Image<LinearRgb>,
+) -> Result<Image<Film>> {
     let mut watch = Stopwatch::start();
-    let channels = channels(cut);
+    let channels = channels(film, transmittance);
     watch.lap("planes");
-    write_film(path, cut.film.size(), &channels)?;
+    write_film(path, film.size(), &channels)?;
     watch.lap("film");
-    io::write(path.with_extension("png"), &thumbnail(&cut.to_rgba()))?;
+    io::write(
+        path.with_extension("png"),
+        &thumbnail(&film.map(Film::to_rgba)),
+    )?;
     watch.lap("thumbnail");
-    let stored = cut.film.map(as_stored);
+    let stored = film.map(as_stored);
     watch.lap("stored film");
     watch.log("write");
     Ok(stored)
@@ -44,12 +50,11 @@ fn write_film(path: &Path, size: (usize, usize), channels: &[NamedPlane]) -> Res
 type NamedPlane = (&'static str, Vec<f32>);
 
 /// The channels of a cut-out's file; see [`write`].
-fn channels(cut: &CutOut) -> Vec<NamedPlane> {
-    let film = &cut.film;
+fn channels(film: &Image<Film>, transmittance: &Image<LinearRgb>) -> Vec<NamedPlane> {
     let alpha = film.pixels().iter().map(|f| f.to_rgba().a).collect();
     let mut channels = Vec::from(rgb_planes(["R", "G", "B"], film, |f| f.color));
     channels.push(("A", alpha));
-    channels.extend(rgb_planes(["TR", "TG", "TB"], &cut.transmittance, |t| *t));
+    channels.extend(rgb_planes(["TR", "TG", "TB"], transmittance, |t| *t));
     channels.extend(rgb_planes(["VR", "VG", "VB"], film, |f| f.transmittance()));
     channels
 }
@@ -82,6 +87,12 @@ fn through_half(value: f32) -> f32 {
         value
     };
     f16::from_f32(kept).to_f32()
+}
+
+/// Name of the flow of a cut-out, beside it: `bottle/one.flow.exr`.
+pub(super) fn flow_file(cut_out: &str) -> String {
+    let stem = cut_out.strip_suffix(".exr").unwrap_or(cut_out);
+    format!("{stem}.flow.exr")
 }
 
 /// As exact as a pixel coordinate needs to be in a file that people read.

@@ -1,8 +1,11 @@
 //! Putting photos into an asset folder.
 
 use super::MANIFEST;
+use super::capture_entry::CaptureEntry;
+use super::captured::{CapturedObject, captured_object};
 use super::entry::PhotoEntry;
 use super::files;
+use super::flow_file;
 use super::library::{Photo, check_pixels};
 use super::manifest::{Manifest, PhotoRecord};
 use super::measure::MeasuredSize;
@@ -15,9 +18,10 @@ use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::io;
 use crate::matte::{ColorUncertainty, CutOut, CutOutOptions};
-use crate::pixel::Film;
+use crate::pixel::{Film, LinearRgb};
 use crate::stopwatch::Stopwatch;
 use std::path::Path;
+use std::sync::Arc;
 
 /// Cuts the object out of a photo and adds it to an asset folder, which is made if it is not there.
 ///
@@ -70,6 +74,34 @@ impl CutOutWriter<'_> {
     /// Writes the cut-out and the thumbnail of one photo, and returns the photo as it would be read
     /// back.
     pub(super) fn write(&self, entry: &PhotoEntry) -> Result<Photo> {
+        match &entry.captured {
+            Some(captured) => self.write_captured(entry, captured),
+            None => self.write_cut_out(entry),
+        }
+    }
+
+    /// Measures an object that was captured on a display.
+    fn write_captured(&self, entry: &PhotoEntry, captured: &CaptureEntry) -> Result<Photo> {
+        let CapturedObject {
+            film,
+            flow,
+            modulation,
+            record,
+        } = captured_object(entry, captured, self.options)?;
+        // A display shines through the object once: nothing of what is seen is its shadow.
+        let passed = film.map(Film::transmittance);
+        let film = self.write_film(&film, &passed, &record)?;
+        let path = self.folder.join(files::flow_file(&record.file));
+        let flow = flow
+            .map(|flow| flow_file::write(&path, &flow, &modulation))
+            .transpose()?;
+        Ok(Photo {
+            flow: flow.map(Arc::new),
+            ..Photo::new(film, record)
+        })
+    }
+
+    fn write_cut_out(&self, entry: &PhotoEntry) -> Result<Photo> {
         let mut watch = Stopwatch::start();
         let review = review_of(&entry.file)?;
         let photo = OpenPhoto::beside(entry, &self.empty_screens, self.options)?;
@@ -80,16 +112,21 @@ impl CutOutWriter<'_> {
         watch.lap("cut out");
         let record = new_record(&cut, entry, &photo.rectified)?.reviewed(review.verdict);
         watch.lap("measure");
-        let film = self.write_files(&cut, &record)?;
+        let film = self.write_film(&cut.film, &cut.transmittance, &record)?;
         watch.lap("write");
         watch.log(entry.file.display());
         Ok(Photo::new(film, record))
     }
 
-    fn write_files(&self, cut: &CutOut, record: &PhotoRecord) -> Result<Image<Film>> {
+    fn write_film(
+        &self,
+        film: &Image<Film>,
+        transmittance: &Image<LinearRgb>,
+        record: &PhotoRecord,
+    ) -> Result<Image<Film>> {
         let path = self.folder.join(&record.file);
         io::create_folder(path.parent().unwrap_or(self.folder))?;
-        let film = files::write(&path, cut)?;
+        let film = files::write(&path, film, transmittance)?;
         check_pixels(&film).map_err(|what| Error::file(path, what))?;
         Ok(film)
     }

@@ -1,6 +1,7 @@
 //! An asset folder in memory, ready to be put into scenes.
 
 use super::MANIFEST;
+use super::flow_file;
 use super::manifest::{Asset, Manifest, PhotoRecord, class_number};
 use super::surface::SurfaceCache;
 use super::texture::Texture;
@@ -135,7 +136,12 @@ fn load(folder: &Path, record: &PhotoRecord, at: &str) -> Result<Photo> {
     let image: Image<Film> = io::read(&path)?;
     check_size(&image, record).map_err(|e| in_manifest(e, folder, at))?;
     check_pixels(&image).map_err(|what| Error::file(path, what))?;
-    Ok(Photo::new(image, record.clone()))
+    let flow =
+        flow_file::read(folder, record, image.size()).map_err(|e| in_manifest(e, folder, at))?;
+    Ok(Photo {
+        flow: flow.map(Arc::new),
+        ..Photo::new(image, record.clone())
+    })
 }
 
 fn in_manifest(error: Error, folder: &Path, at: &str) -> Error {

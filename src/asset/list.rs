@@ -19,7 +19,8 @@ use std::path::{Path, PathBuf};
 /// asset = "bottle_01"
 /// class = "cap"
 /// length = 0.265              # metres by a tape measure, and width where it is known
-/// # or: px_per_metre = 1966.7, screen_size = [0.60, 0.40], marker_size = 0.05
+/// # or: px_per_metre = 1966.7, screen_size = [0.60, 0.40], marker_size = 0.05,
+/// # captured = { photos = ["IMG_0003.jpg"], display = "display.toml" }
 ///
 /// [[photos]]
 /// file = "IMG_0002.jpg"
@@ -103,6 +104,11 @@ impl List {
         for photo in &mut self.photos {
             photo.file = with_actual_spelling(folder.join(&photo.file));
             photo.screen.locate_in(folder);
+            let located = |path| with_actual_spelling(folder.join(path));
+            photo.captured = photo
+                .captured
+                .take()
+                .map(|captured| captured.located(located));
         }
         self
     }

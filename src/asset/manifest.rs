@@ -85,6 +85,9 @@ pub struct PhotoRecord {
     /// Confidence in colour and transmittance, 0 to 1; missing where it was not estimated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub color_confidence: Option<f64>,
+    /// What was measured on a luminous display; missing where the cut-out is of one photo.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub captured: Option<CaptureRecord>,
     /// The object reached a border of the photo: part of it is missing.
     #[serde(default)]
     pub truncated: bool,
@@ -98,6 +101,47 @@ pub struct PhotoRecord {
         skip_serializing_if = "Vec::is_empty"
     )]
     pub diagnostics: Vec<Diagnostic>,
+}
+
+/// How well an object was measured on a luminous display.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CaptureRecord {
+    /// Number of photos.
+    pub photos: usize,
+    /// Mean standard error of the transmittance of the line of sight, 0 to 1.
+    pub transmittance_sigma: f64,
+    /// How lines of sight are bent, relative to the folder: EXR, displacement on the display in
+    /// metres. Missing without stripes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub flow: Option<String>,
+    /// Height of the object's middle over the display, metres.
+    pub height: f64,
+    /// Share of what is see-through where the refraction is known, 0 to 1.
+    #[serde(default)]
+    pub known: f64,
+}
+
+impl CaptureRecord {
+    /// What was measured and how well, one line.
+    pub fn summary(&self) -> String {
+        let refraction = match self.flow {
+            Some(_) => format!("refraction known on {:.0} %", 100.0 * self.known),
+            None => "refraction not measured".into(),
+        };
+        format!(
+            "captured: {} photos, transmittance to {:.3}, {refraction}",
+            self.photos, self.transmittance_sigma
+        )
+    }
+
+    fn check(&self) -> Result<()> {
+        CONFIDENCE.check("transmittance_sigma", self.transmittance_sigma)?;
+        CONFIDENCE.check("known", self.known)?;
+        THICKNESS.check("height", self.height)?;
+        let flow = self.flow.as_ref();
+        flow.map_or(Ok(()), |flow| io::below("flow", flow).map(drop))
+    }
 }
 
 /// Reads diagnostics, and the plain texts (`doubts`) that earlier versions wrote in their place.
@@ -365,6 +409,7 @@ impl PhotoRecord {
             unevenness: 0.0,
             outline_confidence: full_confidence(),
             color_confidence: None,
+            captured: None,
             truncated: false,
             outline_px,
             diagnostics: Vec::new(),
@@ -410,6 +455,9 @@ impl PhotoRecord {
         CONFIDENCE.check("outline_confidence", self.outline_confidence)?;
         if let Some(confidence) = self.color_confidence {
             CONFIDENCE.check("color_confidence", confidence)?;
+        }
+        if let Some(captured) = &self.captured {
+            captured.check().map_err(|e| e.within("captured"))?;
         }
         self.check_outline()
     }

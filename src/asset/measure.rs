@@ -51,7 +51,7 @@ impl MeasuredSize {
 fn scale_of_outline(tight: [f64; 2], scale: Scale, screen_scale: f64, enlargement: f64) -> f64 {
     match scale {
         Scale::PxPerMetre(photo_scale) => photo_scale * enlargement,
-        Scale::Screen(..) | Scale::Marker(_) => screen_scale * enlargement,
+        Scale::Screen(..) | Scale::Marker(_) | Scale::Display => screen_scale * enlargement,
         Scale::Length(length) => tight[0] / length,
         Scale::Size(size) => least_squares_scale(tight, size),
     }

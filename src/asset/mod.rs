@@ -2,18 +2,23 @@
 //!
 //! An asset folder holds `assets.toml` ([`Manifest`]) and, in a folder for each asset, its cut-outs
 //! (half-float EXR, scene-linear: `R G B A` premultiplied, `TR TG TB` transmittance as measured,
-//! `VR VG VB` that of the line of sight) with a thumbnail PNG beside each. The manifest is written
-//! last and whole, so that a folder never names a picture that is not there.
+//! `VR VG VB` that of the line of sight) with a thumbnail PNG beside each and, where stripes
+//! measured it, the refraction (`NAME.flow.exr`). The manifest is written last and whole, so that a
+//! folder never names a picture that is not there.
 //!
 //! ```text
 //! photos.toml -build-> folder and Library        folder -Library::open-> Library        photo -add_photo-> the same folder
 //! ```
 
 mod build;
+mod capture_entry;
+mod captured;
 mod contact_sheet;
 mod entry;
 mod equirectangular;
 mod files;
+mod flow_file;
+mod flow_sheet;
 mod folder;
 mod inpaint;
 mod library;
@@ -40,6 +45,8 @@ mod top_view;
 pub use build::Built;
 pub use build::build;
 #[doc(hidden)]
+pub use capture_entry::CaptureEntry;
+#[doc(hidden)]
 pub use contact_sheet::contact_sheet;
 pub use entry::PhotoEntry;
 #[cfg(test)]
@@ -51,7 +58,7 @@ pub use library::{Library, Photo};
 pub use list::List;
 pub use manifest::Asset;
 #[doc(hidden)]
-pub use manifest::{Manifest, PhotoRecord};
+pub use manifest::{CaptureRecord, Manifest, PhotoRecord};
 #[doc(hidden)]
 pub use moments::{Moments, Piece};
 #[doc(hidden)]

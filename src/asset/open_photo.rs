@@ -99,6 +99,9 @@ fn read_rectified(entry: &PhotoEntry) -> Result<RectifiedPhoto> {
         Scale::Marker(side) => {
             RectifiedPhoto::by_marker(photo, side, height, &io::read_header(file)?)
         }
+        Scale::Display => Err(Error::Photo {
+            what: "one of the photos of a capture, which is measured, not cut out".into(),
+        }),
     }
 }
 

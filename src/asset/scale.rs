@@ -19,6 +19,8 @@ pub enum Scale {
     /// Side of the black square of a printed marker that lies on the screen (AprilTag tag36h11 or
     /// ArUco DICT_4X4_50), metres.
     Marker(f64),
+    /// The markers of a luminous display that shows frames below the object.
+    Display,
 }
 
 impl Scale {
@@ -33,6 +35,7 @@ impl Scale {
                 .into_iter()
                 .try_for_each(|side| SURFACE.check("screen_size", side)),
             Self::Marker(side) => OBJECT.check("marker_size", side),
+            Self::Display => Ok(()),
         }
     }
 
@@ -63,7 +66,7 @@ impl Scale {
     /// object.
     fn measured_field(self) -> Option<(&'static str, String)> {
         match self {
-            Self::Length(_) | Self::Size(_) => None,
+            Self::Length(_) | Self::Size(_) | Self::Display => None,
             Self::PxPerMetre(scale) => Some(("px_per_metre", number(scale))),
             Self::Screen([w, h], _) => {
                 Some(("screen_size", format!("{} x {}", number(w), number(h))))

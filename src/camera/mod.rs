@@ -47,6 +47,7 @@ mod stored;
 mod uncertainty;
 
 pub(crate) use chi::CHI2_99;
+pub(crate) use dlt::homography;
 #[doc(hidden)]
 pub use doctor::doctor;
 pub use error::SolveError;

@@ -73,11 +73,6 @@ impl Frame {
             Self::Stripes(stripes) => 2 + stripes.number(),
         }
     }
-
-    /// The frame of a number.
-    pub(super) fn of_number(number: usize) -> Option<Self> {
-        Self::all(true).nth(number)
-    }
 }
 
 impl std::fmt::Display for Frame {
@@ -106,9 +101,8 @@ mod tests {
         let all: Vec<_> = Frame::all(true).collect();
         assert_eq!((all.len(), Frame::all(false).count()), (18, 2));
         for (i, frame) in all.iter().enumerate() {
-            assert_eq!((frame.number(), Frame::of_number(i)), (i, Some(*frame)));
+            assert_eq!(frame.number(), i);
         }
         assert_eq!(all[5].to_string(), "stripes_x_coarse_4");
-        assert_eq!(Frame::of_number(18), None);
     }
 }

@@ -3,13 +3,25 @@
 //!
 //! ```text
 //! display -draw-> frames, shown one after the other -camera-> photos
+//! photos -recognise-> frames -stack-> seen from above -solve-> film, -bend-> displacement
 //! ```
 
+mod bend;
+mod check;
 mod display;
 mod draw;
 mod frame;
+mod measure;
+mod object;
 mod page;
+mod recognise;
+mod solve;
+mod stack;
+mod stripes;
 mod tag;
+#[cfg(test)]
+mod tests;
+mod view;
 mod write;
 
 #[doc(hidden)]
@@ -19,6 +31,14 @@ pub use draw::draw_frame;
 #[doc(hidden)]
 pub use frame::{Frame, Stripes};
 #[doc(hidden)]
+pub use measure::{Measured, Refraction, measure};
+#[doc(hidden)]
 pub use page::page;
+#[doc(hidden)]
+pub use recognise::FramePhoto;
+#[doc(hidden)]
+pub use stack::{Photos, Sources};
+#[doc(hidden)]
+pub use view::View;
 #[doc(hidden)]
 pub use write::write_frames;

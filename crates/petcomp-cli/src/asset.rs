@@ -7,7 +7,7 @@ use crate::global::GlobalArgs;
 use crate::print;
 use crate::values::{parse_corners, parse_metres};
 use petcomp::asset::{self, Asset, Built, Library, Manifest};
-use petcomp::asset::{Photo, PhotoEntry, PhotoRecord, Role, Scale, ScreenSource};
+use petcomp::asset::{CaptureEntry, Photo, PhotoEntry, PhotoRecord, Role, Scale, ScreenSource};
 use petcomp::matte::CutOutOptions;
 use petcomp::{Quality, io};
 use std::path::{Path, PathBuf};
@@ -82,13 +82,31 @@ pub(crate) struct AddPhotoArgs {
     /// they are found
     #[arg(long, value_name = "X,Y X,Y X,Y X,Y", value_parser = parse_corners, requires = "screen_size")]
     screen_corners: Option<[[f64; 2]; 4]>,
-    /// Thickness of the object as it lies, metres: with --screen-size or --marker-size its size is
-    /// that at half its height
+    #[command(flatten)]
+    capture: CaptureArgs,
+    /// Thickness of the object as it lies, metres: with --screen-size, --marker-size or --captured
+    /// its size is that at half its height
     #[arg(long, value_name = "METRES", default_value_t = asset::DEFAULT_THICKNESS)]
     thickness: f64,
     /// draft, normal or reference: how finely the object is searched and kept
     #[arg(long, default_value_t)]
     quality: Quality,
+}
+
+/// What belongs to photos on a luminous display.
+#[derive(clap::Args)]
+struct CaptureArgs {
+    /// With --captured: photos of the same frames without the object, from the same place
+    #[arg(long, value_name = "PHOTO", num_args = 1.., requires = "captured")]
+    empty: Vec<PathBuf>,
+    /// With --captured: what `capture frames` wrote about the display; by default display.toml
+    /// beside the first photo
+    #[arg(long, value_name = "FILE", requires = "captured")]
+    display: Option<PathBuf>,
+    /// With --captured: width of the whole picture on the display, metres, by a ruler; by default
+    /// what display.toml says
+    #[arg(long, value_name = "METRES", requires = "captured")]
+    display_width: Option<f64>,
 }
 
 /// How large the object is, by one of these.
@@ -112,6 +130,10 @@ struct ScaleArgs {
     /// or ArUco DICT_4X4_50); cut its paper to a white margin of at most a third of that
     #[arg(long, value_name = "METRES")]
     marker_size: Option<f64>,
+    /// Or: the photos are one object on a luminous display that shows the frames of `capture
+    /// frames`, in any order; its markers give the scale
+    #[arg(long)]
+    captured: bool,
 }
 
 impl ScaleArgs {
@@ -121,6 +143,7 @@ impl ScaleArgs {
         let scale = self.scale.map(Scale::PxPerMetre);
         let scale = scale.or_else(|| self.object_size()).or(screen);
         let scale = scale.or(self.marker_size.map(Scale::Marker));
+        let scale = scale.or(self.captured.then_some(Scale::Display));
         scale.unwrap_or(Scale::Length(self.length.unwrap_or_default()))
     }
 
@@ -149,6 +172,7 @@ const SHEET: &str = "contact_sheet.png";
 fn check_folder(folder: &Path, strict: bool) -> anyhow::Result<()> {
     let library = Library::open(folder)?;
     let records: Vec<_> = records_of(&library).collect();
+    records.iter().for_each(|record| list_capture(record));
     let to_review = list_to_review(&records);
     let (folder, assets, cut_outs) = (folder.display(), library.assets.len(), records.len());
     print::line(format_args!(
@@ -176,6 +200,13 @@ fn records_of(library: &Library) -> impl Iterator<Item = &PhotoRecord> {
 fn list_reasons(record: &PhotoRecord) {
     for diagnostic in &record.diagnostics {
         print::line(located(&record.file, diagnostic));
+    }
+}
+
+/// Prints what was measured on a display.
+fn list_capture(record: &PhotoRecord) {
+    if let Some(captured) = &record.captured {
+        print::line(format_args!("{}: {}", record.file, captured.summary()));
     }
 }
 
@@ -236,6 +267,9 @@ fn add_photos(args: &AddPhotoArgs, global: &GlobalArgs) -> anyhow::Result<()> {
 
 fn report_added(record: &PhotoRecord, global: &GlobalArgs) {
     global.print_status(describe_size(record));
+    if let Some(captured) = &record.captured {
+        global.print_status(captured.summary());
+    }
     report_diagnostics(&record.file, &record.diagnostics);
 }
 
@@ -248,7 +282,13 @@ fn describe_size(record: &PhotoRecord) -> String {
 impl AddPhotoArgs {
     fn add_each(&self, global: &GlobalArgs) -> petcomp::Result<Vec<Photo>> {
         let options = self.quality.cut_out(CutOutOptions::default());
-        let photos = self.photos.iter();
+        // All photos of a capture are of one cut-out.
+        let count = if self.scale.captured {
+            1
+        } else {
+            self.photos.len()
+        };
+        let photos = self.photos.iter().take(count);
         photos
             .map(|photo| self.add_photo(photo, &options, global))
             .collect()
@@ -272,7 +312,17 @@ impl AddPhotoArgs {
             role: self.role,
             screen: self.screen.clone(),
             thickness: self.thickness,
+            captured: self.scale.captured.then(|| self.capture_entry()),
             ..PhotoEntry::new(photo, self.asset_name(), self.class_name(), scale)
+        }
+    }
+
+    fn capture_entry(&self) -> CaptureEntry {
+        CaptureEntry {
+            photos: self.photos.iter().skip(1).cloned().collect(),
+            empty: self.capture.empty.clone(),
+            display: self.capture.display.clone(),
+            width: self.capture.display_width,
         }
     }
 

@@ -1,0 +1,130 @@
+//! What a capture measured, as pictures: transmittance, refraction as colour, and a checkerboard
+//! seen through the object.
+
+use super::library::Photo;
+use crate::color::{Hsv, hsv_to_rgb, to_srgb8};
+use crate::image::Image;
+use crate::matte::Flow;
+use crate::pixel::{Film, LinearRgb, Srgb8};
+use std::f64::consts::TAU;
+
+/// Side of a square of the checkerboard, pixels: larger than what film is shown over, so that its
+/// edges are seen to bend.
+const SQUARE_PX: f64 = 16.0;
+const CHECKER_GREYS: [f32; 2] = [0.08, 0.6];
+/// Light of what the object covers where refraction is not known.
+const UNKNOWN: LinearRgb = LinearRgb::grey(0.05);
+/// Share of the known displacements that are shown with less than full saturation.
+const SATURATED_SHARE: f64 = 0.95;
+
+/// Transmittance; with a flow, that as colour and a checkerboard seen through it, too.
+pub(super) fn tiles(photo: &Photo, film: &Image<Film>) -> Vec<Image<Srgb8>> {
+    let transmittance = to_srgb8(&film.map(Film::transmittance));
+    let flow = photo.flow.iter().flat_map(|flow| {
+        [
+            to_srgb8(&flow_colors(flow, film)),
+            to_srgb8(&bent_checkerboard(flow, film)),
+        ]
+    });
+    [transmittance].into_iter().chain(flow).collect()
+}
+
+/// Direction as hue, from red to the right clockwise, and length as saturation.
+fn flow_colors(flow: &Flow, film: &Image<Film>) -> Image<LinearRgb> {
+    let full = full_saturation(flow);
+    over_texture(film, |uv, film| match flow.at(uv) {
+        Some(d) => wheel_color(d, full),
+        None if film.opacity.is_black() => LinearRgb::WHITE,
+        None => UNKNOWN,
+    })
+}
+
+/// The length, metres, that most displacements do not reach.
+fn full_saturation(flow: &Flow) -> f32 {
+    let pixels = flow.displacement.pixels().iter().zip(flow.known.pixels());
+    let lengths = pixels
+        .filter(|(_, known)| **known)
+        .map(|(d, _)| libm::hypotf(d[0], d[1]));
+    let mut lengths: Vec<f32> = lengths.collect();
+    let rank = (SATURATED_SHARE * lengths.len() as f64) as usize;
+    if rank >= lengths.len() {
+        return 1.0;
+    }
+    *lengths.select_nth_unstable_by(rank, f32::total_cmp).1
+}
+
+fn wheel_color([x, y]: [f32; 2], full: f32) -> LinearRgb {
+    let angle = libm::atan2(y.into(), x.into()) / TAU;
+    hsv_to_rgb(Hsv {
+        h: angle.rem_euclid(1.0) as f32,
+        s: (libm::hypotf(x, y) / full.max(f32::MIN_POSITIVE)).min(1.0),
+        v: 1.0,
+    })
+}
+
+/// A checkerboard on which the object lies, as it lay on the display.
+fn bent_checkerboard(flow: &Flow, film: &Image<Film>) -> Image<LinearRgb> {
+    let px_per_metre = film.width() as f64 / flow.width;
+    let size = [film.width() as f64, film.height() as f64];
+    over_texture(film, |uv, film| {
+        let d = flow.at(uv).unwrap_or([0.0; 2]);
+        let at = [0, 1].map(|i| uv[i] * size[i] + f64::from(d[i]) * px_per_metre);
+        film.over_color(checkerboard(at))
+    })
+}
+
+fn checkerboard([x, y]: [f64; 2]) -> LinearRgb {
+    let squares = (x / SQUARE_PX).floor() + (y / SQUARE_PX).floor();
+    LinearRgb::grey(CHECKER_GREYS[squares.rem_euclid(2.0) as usize])
+}
+
+/// A picture by texture coordinates and film.
+fn over_texture(
+    film: &Image<Film>,
+    color: impl Fn([f64; 2], Film) -> LinearRgb + Sync,
+) -> Image<LinearRgb> {
+    let (w, h) = film.size();
+    Image::from_fn(w, h, |x, y| {
+        let uv = [(x as f64 + 0.5) / w as f64, (y as f64 + 0.5) / h as f64];
+        color(uv, film[(x, y)])
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::manifest::tests::photo;
+    use super::*;
+    use std::sync::Arc;
+
+    #[test]
+    fn a_displacement_moves_what_is_seen_and_has_a_colour() {
+        let film = Image::filled(64, 32, Film::new(LinearRgb::BLACK, LinearRgb::WHITE));
+        // One square of the checkerboard to the right.
+        let flow = Flow {
+            displacement: Image::filled(64, 32, [0.1, 0.0]),
+            known: Image::filled(64, 32, true),
+            width: 0.4,
+            height: 0.01,
+        };
+        let still = bent_checkerboard(
+            &Flow {
+                displacement: Image::filled(64, 32, [0.0; 2]),
+                ..flow.clone()
+            },
+            &film,
+        );
+        let bent = bent_checkerboard(&flow, &film);
+        assert!(
+            bent.pixels()
+                .iter()
+                .zip(still.pixels())
+                .all(|(a, b)| a != b)
+        );
+        let colors = flow_colors(&flow, &film);
+        assert!(colors[(5, 5)].r > 0.9 && colors[(5, 5)].g < 0.1);
+        let mut captured = Photo::new(film.clone(), photo("a.exr"));
+        assert_eq!(tiles(&captured, &film).len(), 1);
+        captured.flow = Some(Arc::new(flow));
+        assert_eq!(tiles(&captured, &film).len(), 3);
+    }
+}

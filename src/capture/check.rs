@@ -1,0 +1,187 @@
+//! What can be wrong with a capture, by what the display looks like around the object.
+
+use super::recognise::refused;
+use super::solve::BlackAndWhite;
+use super::stripes::SeenStripes;
+use super::view::grey;
+use crate::diagnostic::{Code, Diagnostic};
+use crate::error::Result;
+use crate::image::{Image, Mask};
+use crate::pixel::{Coverage, LinearRgb};
+
+/// A channel from here on is clipped, in photos that end at 1.
+const CLIPPED: f32 = 0.985;
+/// Pictures that are brighter than this somewhere do not end at 1.
+const UNLIMITED: f32 = 1.05;
+/// Share of the display that may be clipped: glints.
+const MAX_CLIPPED: f64 = 0.001;
+/// From here on nothing can be measured.
+const REFUSED_CLIPPED: f64 = 0.05;
+
+/// # Errors
+/// [`Error::Photo`](crate::Error::Photo) where much of the white frame is clipped.
+pub(super) fn clipping(white: &Image<LinearRgb>, free: &Mask) -> Result<Option<Diagnostic>> {
+    let brightest = white
+        .pixels()
+        .iter()
+        .map(|p| p.max_channel())
+        .fold(0.0, f32::max);
+    let clipped = white.zip_map(free, |p, free| free && p.max_channel() >= CLIPPED);
+    let share = clipped.count() as f64 / free.count().max(1) as f64;
+    if brightest > UNLIMITED || share <= MAX_CLIPPED {
+        return Ok(None);
+    }
+    let what = format!(
+        "{:.1} % of the white frame is clipped, expected at most {:.1} %; use a shorter exposure or a darker display",
+        100.0 * share,
+        100.0 * MAX_CLIPPED
+    );
+    if share > REFUSED_CLIPPED {
+        return Err(refused(&what));
+    }
+    Ok(Some(Diagnostic::warning(Code::ClippedWhite, what)))
+}
+
+/// Side of the blocks whose means show bands, pixels.
+const BLOCK_PX: usize = 12;
+/// Bands up to this share of white are noise and dirt.
+const MAX_BANDS: f64 = 0.015;
+/// From here on transmittance would be off by as much.
+const REFUSED_BANDS: f64 = 0.05;
+
+/// # Errors
+/// [`Error::Photo`](crate::Error::Photo) where the white frame is far from smooth.
+pub(super) fn bands(frames: &BlackAndWhite<'_>, free: &Mask) -> Result<Option<Diagnostic>> {
+    let ratio = frames
+        .white
+        .zip_map(frames.empty_white, |p, e| grey(p) / grey(e).max(1e-6) - 1.0);
+    let deviation = deviation_of_blocks(&ratio, free);
+    if deviation <= MAX_BANDS {
+        return Ok(None);
+    }
+    let what = format!(
+        "around the object the white frame is uneven by {:.1} %, expected at most {:.1} %: bands of a flickering display, \
+         reflections or shadows; expose for 1/30 s or longer at full brightness of the display, and darken the room",
+        100.0 * deviation,
+        100.0 * MAX_BANDS
+    );
+    if deviation > REFUSED_BANDS {
+        return Err(refused(&what));
+    }
+    Ok(Some(Diagnostic::warning(Code::Banding, what)))
+}
+
+/// Root mean square of the means over blocks that are free.
+fn deviation_of_blocks(image: &Image<f32>, free: &Mask) -> f64 {
+    let (w, h) = image.size();
+    let corners = (0..h / BLOCK_PX)
+        .flat_map(|j| (0..w / BLOCK_PX).map(move |i| (i * BLOCK_PX, j * BLOCK_PX)));
+    let means = corners.filter_map(|corner| block_mean(image, free, corner));
+    let (sum, count) = means.fold((0.0, 0.0), |(sum, n), mean| (sum + mean * mean, n + 1.0));
+    (sum / f64::max(count, 1.0)).sqrt()
+}
+
+fn block_mean(image: &Image<f32>, free: &Mask, (x, y): (usize, usize)) -> Option<f64> {
+    let pixels = (0..BLOCK_PX * BLOCK_PX).map(|i| (x + i % BLOCK_PX, y + i / BLOCK_PX));
+    let mut sum = 0.0;
+    for at in pixels {
+        if !free[at] {
+            return None;
+        }
+        sum += f64::from(image[at]);
+    }
+    Some(sum / (BLOCK_PX * BLOCK_PX) as f64)
+}
+
+/// Ratios of channels may change across the display by this share.
+const MAX_COLOR_CHANGE: f32 = 0.2;
+
+/// The warning about a display whose white changes its colour from one side to the other.
+pub(super) fn color_change(empty_white: &Image<LinearRgb>, free: &Mask) -> Option<Diagnostic> {
+    let pixels = empty_white.pixels().iter().zip(free.pixels());
+    let ratios = pixels
+        .filter(|(_, free)| **free)
+        .map(|(p, _)| [p.r, p.b].map(|c| c / p.g.max(1e-6)));
+    let ends = ratios.fold([[f32::MAX, 0.0]; 2], |ends, ratio| {
+        [0, 1].map(|i: usize| [ends[i][0].min(ratio[i]), ends[i][1].max(ratio[i])])
+    });
+    let change = ends
+        .map(|[low, high]| high / low.max(1e-6) - 1.0)
+        .into_iter()
+        .fold(0.0, f32::max);
+    (change > MAX_COLOR_CHANGE).then(|| {
+        let what = format!(
+            "white changes its colour across the display by {:.0} %, expected at most {:.0} %; \
+             photograph from straight above and from farther away",
+            100.0 * change,
+            100.0 * MAX_COLOR_CHANGE
+        );
+        Diagnostic::warning(Code::ColorByAngle, what)
+    })
+}
+
+/// Motion of the camera that leaves double edges, pixels of the photo.
+const MAX_MOTION_PX: f64 = 2.0;
+
+/// The warning about a camera that moved.
+pub(super) fn camera_motion(motion_px: f64) -> Option<Diagnostic> {
+    (motion_px > MAX_MOTION_PX).then(|| {
+        let what = format!(
+            "the camera moved by up to {motion_px:.1} px between photos, expected at most {MAX_MOTION_PX}: \
+             the display is aligned, what rises above it is not; put the camera on a stand"
+        );
+        Diagnostic::warning(Code::CameraMoved, what)
+    })
+}
+
+/// What the stripes on average differ from the mean of black and white, as a share of white.
+const MAX_CHANGE: f64 = 0.05;
+
+/// The warning about an object that moved between black, white and stripes, or a room whose light
+/// changed: the mean of the stripes is half of white over black, wherever lines of sight end.
+pub(super) fn object_motion(
+    frames: &BlackAndWhite<'_>,
+    seen: &SeenStripes,
+    coverage: &Image<Coverage>,
+    free: &Mask,
+) -> Option<Diagnostic> {
+    let passed = frames.white.zip_map(frames.black, |w, k| grey(w) - grey(k));
+    let above = seen.mean.zip_map(frames.black, |mean, k| mean - grey(k));
+    let share = ratio_where(&above, &passed, free);
+    let light = frames.light();
+    let off = above.zip3_map(&passed, &light, |above, passed, light| {
+        (above - share * passed) / grey(light).max(1e-6)
+    });
+    let pixels = off
+        .pixels()
+        .iter()
+        .zip(coverage.pixels())
+        .filter(|(_, c)| c.0 > 0.5);
+    let (sum, count) = pixels.fold((0.0, 0.0), |(sum, n), (v, _)| {
+        (sum + f64::from(v * v), n + 1.0)
+    });
+    let change = (sum / f64::max(count, 1.0)).sqrt();
+    (change > MAX_CHANGE).then(|| {
+        let what = format!(
+            "inside the object the stripes are on average {:.1} % of white off black and white, expected at most {:.1} %: \
+             did it move, or did the room's light change?",
+            100.0 * change,
+            100.0 * MAX_CHANGE
+        );
+        Diagnostic::warning(Code::ObjectMoved, what)
+    })
+}
+
+/// Sum of one picture over that of another, where a mask is set.
+fn ratio_where(a: &Image<f32>, b: &Image<f32>, mask: &Mask) -> f32 {
+    let pixels = a
+        .pixels()
+        .iter()
+        .zip(b.pixels())
+        .zip(mask.pixels())
+        .filter(|(_, set)| **set);
+    let (sum_a, sum_b) = pixels.fold((0.0_f64, 0.0_f64), |(p, q), ((a, b), _)| {
+        (p + f64::from(*a), q + f64::from(*b))
+    });
+    (sum_a / sum_b.max(1e-9)) as f32
+}

@@ -1,0 +1,270 @@
+//! What an object on a display lets through, reflects and bends.
+
+use super::bend::{Bend, BendInput};
+use super::check;
+use super::display::Display;
+use super::frame::Frame;
+use super::object::{Object, evidence};
+use super::recognise::{FramePhoto, refused};
+use super::solve::BlackAndWhite;
+use super::stack::{Alignment, Photos, Stack};
+use super::stripes::SeenStripes;
+use super::view::{View, grey};
+use crate::diagnostic::Diagnostic;
+use crate::error::Result;
+use crate::filter;
+use crate::image::{Image, Mask};
+use crate::matte::{Outline, PlateOptions, ScreenPlate};
+use crate::pixel::{Coverage, Film, LinearRgb};
+
+/// An object as it was measured, over the whole display seen from above.
+pub struct Measured {
+    /// Reflected light and transmittance of the line of sight; empty outside the object.
+    pub film: Image<Film>,
+    /// Standard deviation of the transmittance in its least certain channel; 0 outside.
+    pub sigma: Image<f32>,
+    /// Border of the object.
+    pub outline: Outline,
+    /// Share of the border at which the object stands out well.
+    pub distinct: f64,
+    /// Mean light of white over black.
+    pub light: LinearRgb,
+    /// How uneven that is: 1 minus darkest over brightest.
+    pub unevenness: f32,
+    /// How lines of sight are bent, where stripes were photographed.
+    pub refraction: Option<Refraction>,
+    /// Notes and warnings about the capture.
+    pub diagnostics: Vec<Diagnostic>,
+}
+
+/// How lines of sight through an object are bent.
+pub struct Refraction {
+    /// How far from where it would end without the object a line of sight ends on the display,
+    /// pixels of the display, right and down; 0 where it is not known.
+    pub displacement_px: Image<[f64; 2]>,
+    /// Where it was measured: on the object alone.
+    pub known: Mask,
+    /// What scattering leaves of the contrast of fine stripes, 0 to 1.
+    pub modulation: Image<f32>,
+    /// How far the empty display is from where the fit has it, root mean square, pixels of the
+    /// display.
+    pub residual_px: f64,
+}
+
+/// Pixels around the object that may show something of it.
+const OBJECT_MARGIN_PX: f64 = 6.0;
+/// The film is kept so far beyond the outline, pixels: blur.
+const KEPT_RIM_PX: f64 = 1.5;
+/// Softness of the end of that, standard deviation in pixels.
+const RIM_SOFTNESS_PX: f32 = 0.6;
+
+/// Solves for the object that the photos of a capture show; `empty` are photos without it, where
+/// there are some.
+///
+/// # Errors
+/// Those of reading photos; [`Error::Photo`](crate::Error::Photo) where the black or the white
+/// frame is missing, white is clipped or uneven, or no object lies within the display.
+pub fn measure(
+    display: &Display,
+    view: &View,
+    photos: &Photos<'_>,
+    empty: &Photos<'_>,
+) -> Result<Measured> {
+    let reference = photos
+        .first_of(Frame::White)
+        .ok_or_else(|| refused("no photo of the white frame"))?;
+    let all: Vec<&FramePhoto> = photos.recognised.iter().chain(empty.recognised).collect();
+    let alignment = Alignment::new(display, *view, reference, &all);
+    let stack = alignment.stack(photos)?;
+    let empty_stack = if empty.recognised.is_empty() {
+        None
+    } else {
+        Some(alignment.stack(empty)?)
+    };
+    let mut diagnostics: Vec<Diagnostic> = photos.drifts(reference);
+    diagnostics.extend(empty.drifts(reference));
+    diagnostics.extend(photos.incomplete_stripes());
+    diagnostics.extend(check::camera_motion(alignment.motion_px));
+    let scene = Scene::new(display, view, &stack, empty_stack.as_ref())?;
+    scene.solve(diagnostics)
+}
+
+/// All that is seen, and where the object is in it.
+struct Scene<'a> {
+    display: &'a Display,
+    view: &'a View,
+    stack: &'a Stack,
+    empty_stack: Option<&'a Stack>,
+    /// The display without the object.
+    empty: EmptyDisplay,
+    object: Object,
+    /// What surely shows the empty display.
+    free: Mask,
+}
+
+impl<'a> Scene<'a> {
+    fn new(
+        display: &'a Display,
+        view: &'a View,
+        stack: &'a Stack,
+        empty_stack: Option<&'a Stack>,
+    ) -> Result<Self> {
+        let area = view.free_area(display);
+        let mut free = area.clone();
+        let mut found: Option<(EmptyDisplay, Object)> = None;
+        // Once with all of the display, which the object shades a little, once without the object.
+        for _ in 0..2 {
+            let empty = EmptyDisplay::new(stack, empty_stack, &free)?;
+            let evidence = evidence([&stack.black, &stack.white], [&empty.black, &empty.white]);
+            let object = Object::find(&evidence, &area)?;
+            let near = filter::dilate(&object.coverage.map(|c| c.0 > 0.0), OBJECT_MARGIN_PX);
+            free = area.zip_map(&near, |area, near| area && !near);
+            found = Some((empty, object));
+        }
+        let (empty, object) = found.ok_or_else(|| refused("nothing lies on the display"))?;
+        Ok(Self {
+            display,
+            view,
+            stack,
+            empty_stack,
+            empty,
+            object,
+            free,
+        })
+    }
+
+    fn frames(&self) -> BlackAndWhite<'_> {
+        BlackAndWhite {
+            black: &self.stack.black,
+            white: &self.stack.white,
+            empty_black: &self.empty.black,
+            empty_white: &self.empty.white,
+        }
+    }
+
+    fn solve(self, mut diagnostics: Vec<Diagnostic>) -> Result<Measured> {
+        let frames = self.frames();
+        diagnostics.extend(check::clipping(frames.white, &self.free)?);
+        diagnostics.extend(check::bands(&frames, &self.free)?);
+        diagnostics.extend(check::color_change(frames.empty_white, &self.free));
+        let film = frames.film(&self.kept());
+        let refraction = self.refraction(&film, &mut diagnostics);
+        let mut noise = frames.noise(&self.free);
+        if self.empty_stack.is_some() {
+            noise.empty = noise.of_white(grey(mean_where(frames.empty_white, &self.free)));
+        }
+        let light = frames.light();
+        Ok(Measured {
+            sigma: frames.sigma(&film, &noise),
+            distinct: self.object.distinct,
+            light: mean_where(&light, &self.free),
+            unevenness: unevenness(&light, &self.free),
+            outline: self.object.outline,
+            film,
+            refraction,
+            diagnostics,
+        })
+    }
+
+    /// How much of the solution is kept: the object and a rim of blur.
+    fn kept(&self) -> Image<Coverage> {
+        let inside = self.object.coverage.map(|c| c.0 >= 0.5);
+        let grown = filter::dilate(&inside, KEPT_RIM_PX).to_coverage();
+        filter::gaussian_blur(&grown, RIM_SOFTNESS_PX).map(|c| Coverage(c.0.clamp(0.0, 1.0)))
+    }
+
+    fn refraction(
+        &self,
+        film: &Image<Film>,
+        diagnostics: &mut Vec<Diagnostic>,
+    ) -> Option<Refraction> {
+        let read = |stack: &Stack| {
+            let light = stack.stripes.as_ref()?;
+            Some(SeenStripes::read(light, self.display, self.view))
+        };
+        let seen = read(self.stack)?;
+        let empty = self.empty_stack.and_then(read);
+        let frames = self.frames();
+        diagnostics.extend(check::object_motion(
+            &frames,
+            &seen,
+            &self.object.coverage,
+            &self.free,
+        ));
+        let input = BendInput {
+            display: self.display,
+            view: self.view,
+            seen: &seen,
+            empty: empty.as_ref(),
+            free: &self.free,
+            transmittance: &film.map(|film| grey(film.transmittance())),
+            light: &frames.light().map(grey),
+        };
+        Some(Refraction::on_object(input.solve(), &self.object.coverage))
+    }
+}
+
+impl Refraction {
+    fn on_object(bend: Bend, coverage: &Image<Coverage>) -> Self {
+        let known = bend.known.zip_map(coverage, |known, c| known && c.0 >= 0.5);
+        Self {
+            displacement_px: bend
+                .displacement_px
+                .zip_map(&known, |d, known| if known { d } else { [0.0; 2] }),
+            known,
+            modulation: bend.modulation,
+            residual_px: bend.residual_px,
+        }
+    }
+}
+
+/// What black and white look like without the object.
+struct EmptyDisplay {
+    black: Image<LinearRgb>,
+    white: Image<LinearRgb>,
+}
+
+impl EmptyDisplay {
+    /// As it was photographed, or else fitted to where it is free.
+    fn new(stack: &Stack, photographed: Option<&Stack>, free: &Mask) -> Result<Self> {
+        if let Some(Stack { black, white, .. }) = photographed {
+            return Ok(Self {
+                black: black.clone(),
+                white: white.clone(),
+            });
+        }
+        let plate = |photo: &Image<LinearRgb>, name: &str| {
+            let plate = ScreenPlate::fit(photo, free, &PlateOptions::default());
+            plate.map(|plate| plate.image).map_err(|e| e.within(name))
+        };
+        Ok(Self {
+            black: plate(&stack.black, "black")?,
+            white: plate(&stack.white, "white")?,
+        })
+    }
+}
+
+fn mean_where(image: &Image<LinearRgb>, mask: &Mask) -> LinearRgb {
+    let pixels = image
+        .pixels()
+        .iter()
+        .zip(mask.pixels())
+        .filter(|(_, set)| **set);
+    let (sum, count) = pixels.fold(([0.0_f64; 3], 0.0), |(sum, n), (p, _)| {
+        let p = p.channels();
+        ([0, 1, 2].map(|c: usize| sum[c] + f64::from(p[c])), n + 1.0)
+    });
+    LinearRgb::from(sum.map(|s| (s / f64::max(count, 1.0)) as f32))
+}
+
+fn unevenness(light: &Image<LinearRgb>, mask: &Mask) -> f32 {
+    let pixels = light
+        .pixels()
+        .iter()
+        .zip(mask.pixels())
+        .filter(|(_, set)| **set);
+    let ends = pixels.fold([f32::MAX, 0.0], |[low, high], (p, _)| {
+        [low.min(grey(*p)), high.max(grey(*p))]
+    });
+    (1.0 - ends[0] / ends[1].max(1e-6)).clamp(0.0, 1.0)
+}

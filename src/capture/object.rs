@@ -1,0 +1,261 @@
+//! Where the object is: where the display looks otherwise than empty.
+
+use super::recognise::refused;
+use super::view::grey;
+use crate::error::Result;
+use crate::filter;
+use crate::image::{Image, Mask};
+use crate::matte::Outline;
+use crate::pixel::{Coverage, LinearRgb};
+
+/// The object in the view.
+pub(super) struct Object {
+    /// What it covers.
+    pub(super) coverage: Image<Coverage>,
+    /// The border of that.
+    pub(super) outline: Outline,
+    /// Share of the border at which the object stands out well.
+    pub(super) distinct: f64,
+}
+
+/// Blur of the evidence before it is judged, pixels.
+const EVIDENCE_BLUR_PX: f32 = 0.7;
+/// A display that looks different by less than this share of its white may be dirt or a plate that
+/// is off.
+const MIN_EVIDENCE: f32 = 0.03;
+/// Evidence in units of what it is outside the object, in the median.
+const EVIDENCE_MEDIANS: f32 = 8.0;
+/// Half width of the neighbourhood whose strongest evidence says where an edge is half, pixels.
+const EDGE_REACH_PX: usize = 3;
+/// Gaps in the evidence up to twice this are closed, as a share of the view's shorter side.
+const CLOSED_SHARE: f64 = 0.006;
+/// Smallest object, as a share of the view.
+const MIN_AREA: f64 = 1e-3;
+
+/// How much otherwise than empty the display looks, as a share of its white.
+pub(super) fn evidence(
+    [black, white]: [&Image<LinearRgb>; 2],
+    [empty_black, empty_white]: [&Image<LinearRgb>; 2],
+) -> Image<f32> {
+    let in_white = white.zip_map(empty_white, |p, e| {
+        (grey(p) - grey(e)).abs() / grey(e).max(f32::MIN_POSITIVE)
+    });
+    let in_black = black.zip3_map(empty_black, empty_white, |p, e, w| {
+        (grey(p) - grey(e)).abs() / grey(w).max(f32::MIN_POSITIVE)
+    });
+    let strongest = in_white.zip_map(&in_black, f32::max);
+    filter::gaussian_blur(&strongest, EVIDENCE_BLUR_PX)
+}
+
+impl Object {
+    /// The largest thing in the free area of the display.
+    ///
+    /// # Errors
+    /// [`Error::Photo`](crate::Error::Photo) where nothing lies there, or something that is larger
+    /// than the area.
+    pub(super) fn find(evidence: &Image<f32>, free: &Mask) -> Result<Self> {
+        let threshold = threshold(evidence, free);
+        let strongest = local_maximum(evidence, EDGE_REACH_PX);
+        let rough = evidence.zip3_map(&strongest, free, |e, most, free| {
+            free && most > threshold && e >= 0.5 * most
+        });
+        let mask = solid(&rough);
+        let area = mask.count() as f64 / mask.pixels().len() as f64;
+        if area < MIN_AREA {
+            return Err(refused(
+                "nothing lies on the display, or nothing that differs from it",
+            ));
+        }
+        check_within(&mask, free)?;
+        let coverage = soft_coverage(&mask, evidence, &strongest);
+        let distinct = distinct_share(&mask, &strongest, threshold);
+        Ok(Self {
+            outline: Outline::around(&coverage),
+            coverage,
+            distinct,
+        })
+    }
+}
+
+fn threshold(evidence: &Image<f32>, free: &Mask) -> f32 {
+    let pixels = evidence.pixels().iter().zip(free.pixels());
+    let mut values: Vec<f32> = pixels.filter(|(_, free)| **free).map(|(e, _)| *e).collect();
+    let middle = values.len() / 2;
+    if values.is_empty() {
+        return MIN_EVIDENCE;
+    }
+    let (_, median, _) = values.select_nth_unstable_by(middle, f32::total_cmp);
+    MIN_EVIDENCE.max(EVIDENCE_MEDIANS * *median)
+}
+
+/// The largest value around each pixel.
+fn local_maximum(image: &Image<f32>, reach: usize) -> Image<f32> {
+    let (w, h) = image.size();
+    let reach = reach as isize;
+    let along_x = Image::from_fn(w, h, |x, y| {
+        (-reach..=reach)
+            .map(|d| image.nearest(x as isize + d, y as isize))
+            .fold(0.0, f32::max)
+    });
+    Image::from_fn(w, h, |x, y| {
+        (-reach..=reach)
+            .map(|d| along_x.nearest(x as isize, y as isize + d))
+            .fold(0.0, f32::max)
+    })
+}
+
+/// The largest piece of a mask without gaps and holes.
+fn solid(rough: &Mask) -> Mask {
+    let (w, h) = rough.size();
+    let radius = (CLOSED_SHARE * w.min(h) as f64).max(2.0);
+    let closed = filled(&filter::dilate(rough, radius));
+    largest_piece(&filter::erode(&closed, radius))
+}
+
+/// A mask with what it encloses.
+fn filled(mask: &Mask) -> Mask {
+    let (w, h) = mask.size();
+    let border = (0..w)
+        .flat_map(|x| [(x, 0), (x, h - 1)])
+        .chain((0..h).flat_map(|y| [(0, y), (w - 1, y)]));
+    let mut outside = Image::filled(w, h, false);
+    for start in border {
+        flood(mask, false, start, &mut outside);
+    }
+    outside.complement()
+}
+
+/// The connected piece of most pixels.
+fn largest_piece(mask: &Mask) -> Mask {
+    let (w, h) = mask.size();
+    let mut seen = Image::filled(w, h, false);
+    let (mut best, mut most) = ((0, 0), 0);
+    for start in (0..h).flat_map(|y| (0..w).map(move |x| (x, y))) {
+        let area = flood(mask, true, start, &mut seen);
+        if area > most {
+            (best, most) = (start, area);
+        }
+    }
+    let mut piece = Image::filled(w, h, false);
+    flood(mask, true, best, &mut piece);
+    piece
+}
+
+/// Marks the pixels of a value that are connected with a start and not marked yet; returns their
+/// number.
+fn flood(mask: &Mask, value: bool, start: (usize, usize), marked: &mut Mask) -> usize {
+    let (w, h) = mask.size();
+    let (mut open, mut area) = (vec![start], 0);
+    while let Some((x, y)) = open.pop() {
+        if mask[(x, y)] != value || marked[(x, y)] {
+            continue;
+        }
+        marked[(x, y)] = true;
+        area += 1;
+        open.extend(
+            [(x + 1, y), (x, y + 1)]
+                .into_iter()
+                .filter(|&(x, y)| x < w && y < h),
+        );
+        open.extend(
+            [(x.wrapping_sub(1), y), (x, y.wrapping_sub(1))]
+                .into_iter()
+                .filter(|&(x, y)| x < w && y < h),
+        );
+    }
+    area
+}
+
+/// Fails where an object reaches the end of the free area.
+fn check_within(mask: &Mask, free: &Mask) -> Result<()> {
+    let inner = filter::erode(free, 2.0);
+    let beyond = mask.zip_map(&inner, |object, free| object && !free);
+    if beyond.count() == 0 {
+        return Ok(());
+    }
+    let i = beyond
+        .pixels()
+        .iter()
+        .position(|beyond| *beyond)
+        .unwrap_or(0);
+    let (w, h) = mask.size();
+    let side = match ((i % w) * 3 / w, (i / w) * 3 / h) {
+        (0, _) => "left",
+        (2, _) => "right",
+        (_, 0) => "top",
+        _ => "bottom",
+    };
+    Err(refused(&format!(
+        "the object reaches the markers or the border of the display ({side}), expected it to lie inside; \
+         use a larger display, or lay it diagonally"
+    )))
+}
+
+/// What a mask covers, its border where the evidence is half of what it is inside.
+fn soft_coverage(mask: &Mask, evidence: &Image<f32>, strongest: &Image<f32>) -> Image<Coverage> {
+    let core = filter::erode(mask, EDGE_REACH_PX as f64);
+    let around = filter::dilate(mask, 1.5);
+    let share = evidence.zip_map(strongest, |e, most| e / most.max(f32::MIN_POSITIVE));
+    let rim = share.zip3_map(&around, mask, |share, around, inside| {
+        if !around {
+            0.0
+        } else if inside {
+            share.max(0.5)
+        } else {
+            share.min(0.5)
+        }
+    });
+    rim.zip_map(&core, |rim, core| {
+        Coverage(if core { 1.0 } else { rim.clamp(0.0, 1.0) })
+    })
+}
+
+/// Share of the border near which the evidence is at least twice what is asked.
+fn distinct_share(mask: &Mask, strongest: &Image<f32>, threshold: f32) -> f64 {
+    let core = filter::erode(mask, 1.5);
+    let border = mask.zip_map(&core, |inside, core| inside && !core);
+    let distinct = border.zip_map(strongest, |border, most| border && most > 2.0 * threshold);
+    distinct.count() as f64 / border.count().max(1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ring_is_found_with_what_it_encloses_and_specks_are_not() {
+        let far = |x: usize, y: usize| libm::hypotf(x as f32 - 60.0, y as f32 - 40.0);
+        let evidence = Image::from_fn(120, 80, |x, y| {
+            let rim = if (far(x, y) - 25.0).abs() < 2.0 {
+                0.5
+            } else {
+                0.002
+            };
+            if (x, y) == (5, 5) { 0.5 } else { rim }
+        });
+        let free = Image::filled(120, 80, true);
+        let object = Object::find(&evidence, &free).unwrap();
+        let area: f32 = object.coverage.pixels().iter().map(|c| c.0).sum();
+        let expected = std::f32::consts::PI * 27.0 * 27.0;
+        assert!(
+            (area / expected - 1.0).abs() < 0.06,
+            "{area} for {expected}"
+        );
+        assert!(object.distinct > 0.99);
+    }
+
+    #[test]
+    fn what_reaches_the_border_is_refused_and_nothing_too() {
+        let free = Image::from_fn(120, 80, |x, y| {
+            (3..117).contains(&x) && (3..77).contains(&y)
+        });
+        let bar = Image::from_fn(
+            120,
+            80,
+            |_, y| if (30..50).contains(&y) { 0.5 } else { 0.0 },
+        );
+        let told = |evidence: &Image<f32>| Object::find(evidence, &free).err().unwrap().to_string();
+        assert!(told(&bar).contains("(left)"), "{}", told(&bar));
+        assert!(told(&Image::filled(120, 80, 0.001)).contains("nothing lies on the display"));
+    }
+}

@@ -1,0 +1,167 @@
+//! Which frame a photo shows, and where the display is in it, by the markers.
+
+use super::display::{Display, marker_id};
+use super::frame::{CORNERS, Frame};
+use crate::camera::{Marker, any_markers, homography};
+use crate::error::{Error, Result};
+use crate::filter;
+use crate::geom::{Homography, Point2};
+use crate::image::Image;
+use crate::pixel::LinearRgb;
+use std::collections::BTreeMap;
+
+/// Fewer markers do not show that the display is where they say.
+const MIN_MARKERS: usize = 3;
+const CORNER_NAMES: [&str; CORNERS] = ["top left", "top right", "bottom right", "bottom left"];
+
+/// A photo of a frame, without its pixels.
+#[derive(Clone, Debug)]
+pub struct FramePhoto {
+    /// The frame that it shows.
+    pub frame: Frame,
+    /// Width and height, pixels.
+    pub size_px: [u32; 2],
+    /// From pixels of the display to those of the photo.
+    pub photo_from_display: Homography,
+    /// Corners of the markers: on the display, in the photo.
+    pub(super) pairs: Vec<(Point2<f64>, Point2<f64>)>,
+    /// Light of the paper of each marker, where it is seen.
+    pub(super) paper: [Option<LinearRgb>; CORNERS],
+}
+
+impl FramePhoto {
+    /// Reads the markers of a scene-linear photo.
+    ///
+    /// # Errors
+    /// [`Error::Photo`] where fewer than three markers of one frame are seen.
+    pub fn read(photo: &Image<LinearRgb>, display: &Display) -> Result<Self> {
+        let (frame, markers) = markers_of_frame(&tags(photo)?)?;
+        let pairs = corner_pairs(display, &markers);
+        let photo_from_display = homography(&pairs).ok_or_else(|| {
+            refused("its markers lie on one line, expected the corners of a display")
+        })?;
+        let paper = std::array::from_fn(|corner| {
+            markers
+                .contains_key(&corner)
+                .then(|| paper_light(photo, display, corner, &photo_from_display))
+        });
+        let size_px = [photo.width() as u32, photo.height() as u32];
+        Ok(Self {
+            frame,
+            size_px,
+            photo_from_display,
+            pairs,
+            paper,
+        })
+    }
+
+    /// Corners of the display in the photo, from the display's top left, clockwise, pixels.
+    pub fn display_corners_px(&self, display: &Display) -> [Point2<f64>; 4] {
+        let [w, h] = display.size_px.map(f64::from);
+        [[0.0, 0.0], [w, 0.0], [w, h], [0.0, h]].map(|at| self.photo_from_display.map(at.into()))
+    }
+
+    /// How far the display lies off where it is in another photo, pixels: at its worst corner.
+    pub(super) fn motion_px(&self, other: &Self, display: &Display) -> f64 {
+        let corners = self.display_corners_px(display).into_iter();
+        let moved = corners
+            .zip(other.display_corners_px(display))
+            .map(|(a, b)| (a - b).norm());
+        moved.fold(0.0, f64::max)
+    }
+
+    /// Factors that make the light of this photo that of another, by the paper that both show.
+    pub(super) fn exposure_to(&self, other: &Self) -> [f32; 3] {
+        let both = self
+            .paper
+            .iter()
+            .zip(&other.paper)
+            .filter_map(|(a, b)| Some(((*a)?, (*b)?)));
+        let zero = (LinearRgb::BLACK, LinearRgb::BLACK);
+        let (own, theirs) = both.fold(zero, |(a, b), (c, d)| (a + c, b + d));
+        let [own, theirs] = [own, theirs].map(|light| light.channels());
+        std::array::from_fn(|c| {
+            if own[c] > 0.0 {
+                theirs[c] / own[c]
+            } else {
+                1.0
+            }
+        })
+    }
+}
+
+/// The tags of a photo.
+fn tags(photo: &Image<LinearRgb>) -> Result<Vec<Marker>> {
+    if cfg!(feature = "markers") {
+        return Ok(any_markers(photo));
+    }
+    Err(refused(
+        "its markers cannot be read: petcomp was built without the feature markers",
+    ))
+}
+
+/// The frame that most markers tell, and its markers by corner.
+fn markers_of_frame(found: &[Marker]) -> Result<(Frame, BTreeMap<usize, Marker>)> {
+    let frames = Frame::all(true).map(|frame| (frame, by_corner(frame, found)));
+    let Some((frame, markers)) = frames.max_by_key(|(_, markers)| markers.len()) else {
+        return Err(refused("shows no frame"));
+    };
+    if markers.len() >= MIN_MARKERS {
+        return Ok((frame, markers));
+    }
+    let missing: Vec<_> = (0..CORNERS)
+        .filter(|corner| !markers.contains_key(corner))
+        .collect();
+    let names: Vec<_> = missing.iter().map(|&corner| CORNER_NAMES[corner]).collect();
+    Err(refused(&format!(
+        "{} of the 4 markers of a frame were found, expected at least {MIN_MARKERS} (missing: {}); \
+         are they hidden, blurred or cut off?",
+        markers.len(),
+        names.join(", ")
+    )))
+}
+
+fn by_corner(frame: Frame, found: &[Marker]) -> BTreeMap<usize, Marker> {
+    let corners = (0..CORNERS).filter_map(|corner| {
+        let marker = found
+            .iter()
+            .find(|marker| marker.id == marker_id(frame, corner))?;
+        Some((corner, *marker))
+    });
+    corners.collect()
+}
+
+/// The corners of markers: on the display, in the photo.
+fn corner_pairs(
+    display: &Display,
+    markers: &BTreeMap<usize, Marker>,
+) -> Vec<(Point2<f64>, Point2<f64>)> {
+    let squares = display.markers().map(|marker| marker.square_px());
+    let pairs = markers.iter().flat_map(|(corner, marker)| {
+        let on_display = squares[*corner].into_iter().map(Point2::from);
+        on_display.zip(marker.corners_px)
+    });
+    pairs.collect()
+}
+
+/// Mean light of the paper around a marker.
+fn paper_light(
+    photo: &Image<LinearRgb>,
+    display: &Display,
+    corner: usize,
+    photo_from_display: &Homography,
+) -> LinearRgb {
+    let marker = display.markers()[corner];
+    let places = marker
+        .paper_points_px()
+        .map(|at| photo_from_display.map(at.into()));
+    let light = places.map(|at| filter::sample_bilinear_clamped(photo, at.x, at.y));
+    let (sum, count) = light.fold((LinearRgb::BLACK, 0.0_f32), |(sum, n), p| {
+        (sum + p, n + 1.0)
+    });
+    sum.scale(1.0 / count.max(1.0))
+}
+
+pub(super) fn refused(what: &str) -> Error {
+    Error::Photo { what: what.into() }
+}

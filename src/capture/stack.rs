@@ -1,0 +1,250 @@
+//! All photos of a capture: aligned, equally exposed, seen from above.
+
+use super::display::Display;
+use super::frame::{Frame, SHIFTS, Stripes};
+use super::recognise::{FramePhoto, refused};
+use super::view::{View, grey};
+use crate::camera::homography;
+use crate::diagnostic::{Code, Diagnostic};
+use crate::error::{Error, Result};
+use crate::geom::Homography;
+use crate::image::Image;
+use crate::pixel::LinearRgb;
+use rayon::prelude::*;
+
+/// Photos that are read when they are needed.
+#[derive(Clone, Copy)]
+pub struct Sources<'a> {
+    /// What messages call them.
+    pub names: &'a [String],
+    /// Reads one, scene-linear.
+    pub read: &'a (dyn Fn(usize) -> Result<Image<LinearRgb>> + Sync),
+}
+
+impl Sources<'_> {
+    /// Which frame each shows, and where.
+    ///
+    /// # Errors
+    /// Those of reading, and of [`FramePhoto::read`], naming the photo.
+    pub fn recognised(&self, display: &Display) -> Result<Vec<FramePhoto>> {
+        let numbers = 0..self.names.len();
+        numbers
+            .into_par_iter()
+            .map(|i| FramePhoto::read(&(self.read)(i)?, display).map_err(|e| self.named(i, e)))
+            .collect()
+    }
+
+    fn named(&self, i: usize, error: Error) -> Error {
+        match error {
+            Error::Photo { what } => refused(&format!("{}: {what}", self.names[i])),
+            other => other,
+        }
+    }
+}
+
+/// The photos of a capture, and what is known of each.
+pub struct Photos<'a> {
+    /// Where their pixels are.
+    pub sources: Sources<'a>,
+    /// What each shows.
+    pub recognised: &'a [FramePhoto],
+}
+
+/// What the display shows with the object or without, as a camera above sees it.
+pub(super) struct Stack {
+    pub(super) black: Image<LinearRgb>,
+    pub(super) white: Image<LinearRgb>,
+    /// The four shifts of each stripes; nothing where some are missing.
+    pub(super) stripes: Option<StripeLight>,
+}
+
+/// Grey light of the stripes, by period (coarse first) and axis, each with its four shifts.
+pub(super) type StripeLight = [[[Image<f32>; SHIFTS]; 2]; 2];
+
+/// Motion of the display in the photos up to which the camera stood still: noise of the markers.
+const STEADY_PX: f64 = 0.5;
+/// Exposures that differ by more are worth a warning.
+const MAX_DRIFT: f32 = 0.2;
+
+/// How photos are brought to the view.
+pub(super) struct Alignment<'a> {
+    view: View,
+    /// The photo whose exposure all others get.
+    reference: &'a FramePhoto,
+    /// One map for all photos, where the camera stood still.
+    steady: Option<Homography>,
+    /// Largest motion of the display between photos, pixels.
+    pub(super) motion_px: f64,
+}
+
+impl<'a> Alignment<'a> {
+    /// For all photos of a capture, the first list with the white frame that is the reference.
+    pub(super) fn new(
+        display: &'a Display,
+        view: View,
+        reference: &'a FramePhoto,
+        all: &[&FramePhoto],
+    ) -> Self {
+        let motions = all.iter().map(|photo| photo.motion_px(reference, display));
+        let motion_px = motions.fold(0.0, f64::max);
+        let pairs: Vec<_> = all.iter().flat_map(|photo| &photo.pairs).copied().collect();
+        let steady = (motion_px <= STEADY_PX)
+            .then(|| homography(&pairs))
+            .flatten();
+        Self {
+            view,
+            reference,
+            steady,
+            motion_px,
+        }
+    }
+
+    /// A photo in the view, exposed as the reference.
+    fn aligned(&self, photos: &Photos<'_>, i: usize) -> Result<Image<LinearRgb>> {
+        let photo = &photos.recognised[i];
+        let map = self.steady.unwrap_or(photo.photo_from_display);
+        let [r, g, b] = photo.exposure_to(self.reference);
+        let seen = self.view.seen((photos.sources.read)(i)?, &map);
+        Ok(seen.map(|p| LinearRgb::new(r * p.r, g * p.g, b * p.b)))
+    }
+
+    /// The mean of all photos of a frame; none where there is none.
+    fn frame(&self, photos: &Photos<'_>, frame: Frame) -> Result<Option<Image<LinearRgb>>> {
+        let numbers = photos.of_frame(frame);
+        let mut sum: Option<Image<LinearRgb>> = None;
+        for &i in &numbers {
+            let seen = self.aligned(photos, i)?;
+            sum = Some(sum.map_or(seen.clone(), |sum| sum.zip_map(&seen, |a, b| a + b)));
+        }
+        let share = 1.0 / numbers.len().max(1) as f32;
+        Ok(sum.map(|sum| sum.map(|p| p.scale(share))))
+    }
+
+    /// All photos of a capture.
+    ///
+    /// # Errors
+    /// Those of reading; [`Error::Photo`] without a black or a white frame.
+    pub(super) fn stack(&self, photos: &Photos<'_>) -> Result<Stack> {
+        Ok(Stack {
+            black: self.needed(photos, Frame::Black)?,
+            white: self.needed(photos, Frame::White)?,
+            stripes: self.stripes(photos)?,
+        })
+    }
+
+    fn needed(&self, photos: &Photos<'_>, frame: Frame) -> Result<Image<LinearRgb>> {
+        self.frame(photos, frame)?.ok_or_else(|| {
+            let names = photos.sources.names.join(", ");
+            refused(&format!(
+                "no photo of the {frame} frame among {names}; expected black and white at least"
+            ))
+        })
+    }
+
+    /// The stripes, where there are photos of all of them.
+    fn stripes(&self, photos: &Photos<'_>) -> Result<Option<StripeLight>> {
+        if !photos.missing_stripes().is_empty() {
+            return Ok(None);
+        }
+        let light = |stripes| {
+            let seen = self.frame(photos, Frame::Stripes(stripes))?;
+            Ok(seen.map_or(Image::new(0, 0), |seen| seen.map(grey)))
+        };
+        let all = [false, true].map(|is_fine| {
+            [0, 1].map(|axis| {
+                [0, 1, 2, 3].map(|shift| {
+                    light(Stripes {
+                        axis,
+                        is_fine,
+                        shift,
+                    })
+                })
+            })
+        });
+        all_right(all).map(Some)
+    }
+}
+
+/// All values, or the first error.
+fn all_right(all: [[[Result<Image<f32>>; SHIFTS]; 2]; 2]) -> Result<StripeLight> {
+    let mut failed = None;
+    let light = all.map(|axes| {
+        axes.map(|shifts| {
+            shifts.map(|light| {
+                light.unwrap_or_else(|error| {
+                    failed.get_or_insert(error);
+                    Image::new(0, 0)
+                })
+            })
+        })
+    });
+    failed.map_or(Ok(light), Err)
+}
+
+impl Photos<'_> {
+    fn of_frame(&self, frame: Frame) -> Vec<usize> {
+        let photos = self.recognised.iter().enumerate();
+        photos
+            .filter(|(_, photo)| photo.frame == frame)
+            .map(|(i, _)| i)
+            .collect()
+    }
+
+    /// The first photo of a frame.
+    pub fn first_of(&self, frame: Frame) -> Option<&FramePhoto> {
+        self.recognised.iter().find(|photo| photo.frame == frame)
+    }
+
+    /// The stripes that no photo shows.
+    pub(super) fn missing_stripes(&self) -> Vec<Frame> {
+        let stripes = Frame::all(true).filter(|frame| matches!(frame, Frame::Stripes(_)));
+        stripes
+            .filter(|frame| self.first_of(*frame).is_none())
+            .collect()
+    }
+
+    /// Some stripes were photographed, but not all.
+    pub(super) fn incomplete_stripes(&self) -> Option<Diagnostic> {
+        let missing = self.missing_stripes();
+        let some = self
+            .recognised
+            .iter()
+            .any(|photo| matches!(photo.frame, Frame::Stripes(_)));
+        (some && !missing.is_empty()).then(|| {
+            let names: Vec<_> = missing.iter().map(ToString::to_string).collect();
+            let what = format!(
+                "no photo of {}: refraction is not measured; photograph them, too",
+                names.join(", ")
+            );
+            Diagnostic::warning(Code::MissingFrames, what)
+        })
+    }
+
+    /// Exposures that differ much from that of the reference.
+    pub(super) fn drifts(&self, reference: &FramePhoto) -> Vec<Diagnostic> {
+        let photos = self.recognised.iter().zip(self.sources.names);
+        let factors = photos.map(|(photo, name)| (name, photo.exposure_to(reference)));
+        let drifts = factors.map(|(name, factors)| (name, largest_drift(factors)));
+        drifts
+            .filter(|(_, drift)| *drift > MAX_DRIFT)
+            .map(|(name, drift)| drift_warning(name, drift))
+            .collect()
+    }
+}
+
+fn largest_drift(factors: [f32; 3]) -> f32 {
+    factors
+        .into_iter()
+        .map(|f| (f - 1.0).abs())
+        .fold(0.0, f32::max)
+}
+
+fn drift_warning(photo: &str, drift: f32) -> Diagnostic {
+    let what = format!(
+        "{photo}: its exposure or colour is {:.0} % off that of the white frame, expected at most {:.0} %; \
+         lock exposure and white balance, and switch the display's automatic brightness off",
+        100.0 * drift,
+        100.0 * MAX_DRIFT
+    );
+    Diagnostic::warning(Code::ExposureDrift, what)
+}

@@ -1,0 +1,402 @@
+//! Captures of a known object, made from the formulas.
+
+use super::*;
+use crate::color::{from_srgb8, to_srgb8};
+use crate::filter;
+use crate::geom::{Homography, Point2};
+use crate::image::Image;
+use crate::io::through_jpeg;
+use crate::pixel::{LinearRgb, Mix};
+
+const DISPLAY: Display = Display {
+    size_px: [640, 400],
+    width: Some(0.32),
+};
+const PHOTO: (usize, usize) = (960, 660);
+/// Middle and radii of the object, pixels of the display.
+const MIDDLE: [f64; 2] = [320.0, 205.0];
+const RADII: [f64; 2] = [150.0, 60.0];
+/// What the display reflects of the room.
+const ROOM: f32 = 0.02;
+
+/// What photographing does to the light.
+#[derive(Clone, Copy)]
+struct Conditions {
+    noise: f32,
+    is_jpeg: bool,
+    /// Exposure of a frame.
+    exposure: fn(Frame) -> f32,
+    /// Motion of a photo, pixels.
+    motion: fn(Frame) -> [f64; 2],
+    has_object: bool,
+}
+
+const STILL: Conditions = Conditions {
+    noise: 0.004,
+    is_jpeg: false,
+    exposure: |_| 0.8,
+    motion: |_| [0.0; 2],
+    has_object: true,
+};
+
+/// Place in the object, -1 to 1 across it.
+fn across([u, v]: [f64; 2]) -> [f64; 2] {
+    [(u - MIDDLE[0]) / RADII[0], (v - MIDDLE[1]) / RADII[1]]
+}
+
+fn is_inside(at: [f64; 2]) -> bool {
+    let [a, b] = across(at);
+    a * a + b * b < 1.0
+}
+
+/// A cap is opaque.
+fn is_cap(at: [f64; 2]) -> bool {
+    across(at)[0] > 0.6
+}
+
+fn transmittance(at: [f64; 2]) -> LinearRgb {
+    let [a, b] = across(at);
+    let wall = (0.9 - 0.4 * (a * a + b * b)) as f32;
+    if is_cap(at) {
+        LinearRgb::BLACK
+    } else {
+        LinearRgb::new(0.9 * wall, wall, 0.8 * wall)
+    }
+}
+
+fn reflected(at: [f64; 2]) -> LinearRgb {
+    if is_cap(at) {
+        LinearRgb::new(0.3, 0.05, 0.04)
+    } else {
+        LinearRgb::new(0.01, 0.02, 0.01)
+    }
+}
+
+/// Pixels of the display.
+fn displacement(at: [f64; 2]) -> [f64; 2] {
+    let [a, b] = across(at);
+    [9.0 * a * (1.0 - b * b), -14.0 * b * (1.0 - a * a)]
+}
+
+/// Unit noise by place.
+fn noise(seed: u64) -> f32 {
+    let mixed = (seed + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    let mixed = (mixed ^ (mixed >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    ((mixed >> 40) as f32 / (1_u64 << 24) as f32 - 0.5) * libm::sqrtf(12.0)
+}
+
+/// What a photo shows of the display's plane, by a camera that is tilted a little.
+fn display_from_photo([dx, dy]: [f64; 2]) -> Homography {
+    let photo_from_display = nalgebra::Matrix3::new(
+        1.36,
+        0.03,
+        40.0 + dx,
+        -0.02,
+        1.38,
+        42.0 + dy,
+        2e-5,
+        4e-5,
+        1.0,
+    );
+    Homography(photo_from_display).inverse().unwrap()
+}
+
+fn photo(frame: Frame, conditions: Conditions) -> Image<LinearRgb> {
+    let shown = from_srgb8(&draw_frame(&DISPLAY, frame));
+    let map = display_from_photo((conditions.motion)(frame));
+    let sharp = Image::from_fn(2 * PHOTO.0, 2 * PHOTO.1, |x, y| {
+        let at = map.map(Point2::new((x as f64 + 0.5) / 2.0, (y as f64 + 0.5) / 2.0));
+        light(&shown, [at.x, at.y], conditions.has_object)
+    });
+    let seen = filter::gaussian_blur(&filter::halve(&sharp), 0.6);
+    let (exposure, sigma) = ((conditions.exposure)(frame), conditions.noise);
+    let seen = Image::from_fn(PHOTO.0, PHOTO.1, |x, y| {
+        let seed = 3 * ((frame.number() * PHOTO.1 + y) * PHOTO.0 + x) as u64;
+        let p = seen[(x, y)].scale(exposure);
+        LinearRgb::new(
+            p.r + sigma * noise(seed),
+            p.g + sigma * noise(seed + 1),
+            p.b + sigma * noise(seed + 2),
+        )
+    });
+    if conditions.is_jpeg {
+        from_srgb8(&through_jpeg(&to_srgb8(&seen), 92).unwrap())
+    } else {
+        seen
+    }
+}
+
+/// Light from a place of the display, through the object where it is.
+fn light(shown: &Image<LinearRgb>, at: [f64; 2], has_object: bool) -> LinearRgb {
+    if !has_object || !is_inside(at) {
+        return emitted(shown, at);
+    }
+    let d = displacement(at);
+    reflected(at) + transmittance(at) * emitted(shown, [at[0] + d[0], at[1] + d[1]])
+}
+
+fn emitted(shown: &Image<LinearRgb>, [u, v]: [f64; 2]) -> LinearRgb {
+    let [w, h] = DISPLAY.size_px.map(f64::from);
+    if !(0.0..w).contains(&u) || !(0.0..h).contains(&v) {
+        return LinearRgb::grey(ROOM);
+    }
+    // A little darker to one side, and a display's white.
+    let shine = (0.95 - 0.1 * u / w) as f32;
+    let white = LinearRgb::new(1.0, 0.97, 0.93).scale(shine);
+    LinearRgb::grey(ROOM) + white * filter::sample_bilinear_clamped(shown, u, v)
+}
+
+fn frames(with_stripes: bool) -> Vec<Frame> {
+    Frame::all(with_stripes).collect()
+}
+
+/// Measures photos of some frames, and of some without the object.
+fn measured(
+    frames: &[Frame],
+    empty: &[Frame],
+    conditions: Conditions,
+) -> crate::Result<(View, Measured)> {
+    let shots = |frames: &[Frame], has_object| -> Vec<Image<LinearRgb>> {
+        let conditions = Conditions {
+            has_object,
+            ..conditions
+        };
+        frames
+            .iter()
+            .map(|&frame| photo(frame, conditions))
+            .collect()
+    };
+    measured_of(&shots(frames, true), &shots(empty, false))
+}
+
+fn measured_of(
+    photos: &[Image<LinearRgb>],
+    empty: &[Image<LinearRgb>],
+) -> crate::Result<(View, Measured)> {
+    let names = |count: usize| (0..count).map(|i| format!("photo {i}")).collect::<Vec<_>>();
+    let (names, empty_names) = (names(photos.len()), names(empty.len()));
+    let (read, read_empty) = (
+        |i: usize| Ok(photos[i].clone()),
+        |i: usize| Ok(empty[i].clone()),
+    );
+    let sources = Sources {
+        names: &names,
+        read: &read,
+    };
+    let empty_sources = Sources {
+        names: &empty_names,
+        read: &read_empty,
+    };
+    let (recognised, empty_recognised) = (
+        sources.recognised(&DISPLAY)?,
+        empty_sources.recognised(&DISPLAY)?,
+    );
+    let photos = Photos {
+        sources,
+        recognised: &recognised,
+    };
+    let empty = Photos {
+        sources: empty_sources,
+        recognised: &empty_recognised,
+    };
+    let view = View::of_photo(
+        &DISPLAY,
+        photos.first_of(Frame::White).unwrap_or(&recognised[0]),
+    );
+    measure(&DISPLAY, &view, &photos, &empty).map(|measured| (view, measured))
+}
+
+/// Pixels of the view that show the object, not its rim or the cap's, and their places.
+fn inner_places(view: &View) -> Vec<((usize, usize), [f64; 2])> {
+    let (w, h) = view.size;
+    let all = (0..h).flat_map(|y| (0..w).map(move |x| (x, y)));
+    let places = all.map(|(x, y)| ((x, y), view.display_at(x, y)));
+    places
+        .filter(|(_, at)| {
+            let [a, b] = across(*at);
+            a * a + b * b < 0.9 && (a - 0.6).abs() > 0.04
+        })
+        .collect()
+}
+
+/// Mean absolute errors of V and F inside the object.
+fn film_errors(view: &View, measured: &Measured) -> [f32; 2] {
+    let places = inner_places(view);
+    let mut sums = [0.0_f32; 2];
+    for (pixel, at) in &places {
+        let film = measured.film[*pixel];
+        let off = |a: LinearRgb, b: LinearRgb| a.add_scaled(-1.0, b).map(f32::abs);
+        let errors = [
+            off(film.transmittance(), transmittance(*at)),
+            off(film.color, reflected(*at).scale(0.8)),
+        ];
+        for (sum, error) in sums.iter_mut().zip(errors) {
+            *sum += (error.r + error.g + error.b) / 3.0;
+        }
+    }
+    sums.map(|sum| sum / places.len() as f32)
+}
+
+/// Share of the clear part where the displacement is known, and the 90 % quantile of its error,
+/// pixels of the photo.
+fn bend_errors(view: &View, measured: &Measured) -> [f64; 2] {
+    let refraction = measured.refraction.as_ref().unwrap();
+    let clear: Vec<_> = inner_places(view)
+        .into_iter()
+        .filter(|(_, at)| !is_cap(*at))
+        .collect();
+    let known = clear.iter().filter(|(pixel, _)| refraction.known[*pixel]);
+    let mut errors: Vec<f64> = known
+        .map(|(pixel, at)| {
+            let (got, expected) = (refraction.displacement_px[*pixel], displacement(*at));
+            libm::hypot(got[0] - expected[0], got[1] - expected[1]) / view.display_px
+        })
+        .collect();
+    errors.sort_by(f64::total_cmp);
+    [
+        errors.len() as f64 / clear.len() as f64,
+        errors[errors.len() * 9 / 10],
+    ]
+}
+
+#[test]
+fn black_and_white_give_transmittance_and_reflected_light() {
+    let (view, measured) = measured(&frames(false), &[], STILL).unwrap();
+    let [v, f] = film_errors(&view, &measured);
+    println!("V to {v:.4}, F to {f:.4}");
+    assert!(v < 0.01 && f < 0.005, "{v} {f}");
+    assert!(measured.refraction.is_none());
+    assert_eq!(measured.diagnostics, []);
+    let area = measured.outline.area() * view.display_px * view.display_px;
+    let expected = std::f64::consts::PI * RADII[0] * RADII[1];
+    assert!(
+        (area / expected - 1.0).abs() < 0.02,
+        "{area} for {expected}"
+    );
+    let stated = measured.sigma.pixels().iter().filter(|s| **s > 0.0);
+    let (sum, count) = stated.fold((0.0, 0), |(sum, n), s| (sum + s, n + 1));
+    let stated = sum / count as f32;
+    assert!((0.002..0.012).contains(&stated), "{stated}");
+}
+
+#[test]
+fn exposures_may_drift_and_photos_be_jpegs_of_an_empty_display_too() {
+    let conditions = Conditions {
+        is_jpeg: true,
+        exposure: |frame| if frame == Frame::Black { 0.68 } else { 0.8 },
+        ..STILL
+    };
+    let (view, measured) = measured(&frames(false), &frames(false), conditions).unwrap();
+    let [v, f] = film_errors(&view, &measured);
+    println!("V to {v:.4}, F to {f:.4}");
+    assert!(v < 0.012 && f < 0.008, "{v} {f}");
+    assert_eq!(measured.diagnostics, []);
+}
+
+#[test]
+fn stripes_give_the_displacement() {
+    let (view, measured) = measured(&frames(true), &[], STILL).unwrap();
+    let [share, off] = bend_errors(&view, &measured);
+    println!("known on {share:.3}, to {off:.3} px on 90 %");
+    assert!(share > 0.97 && off < 0.7, "{share} {off}");
+    let refraction = measured.refraction.unwrap();
+    let cap = inner_places(&view)
+        .into_iter()
+        .filter(|(_, at)| is_cap(*at));
+    assert!(
+        cap.into_iter().all(|(pixel, _)| !refraction.known[pixel]),
+        "nothing is seen through a cap"
+    );
+    let known = refraction.known.zip_map(&measured.film, |known, film| {
+        known && film.opacity.is_black()
+    });
+    assert_eq!(known.count(), 0);
+}
+
+#[test]
+fn a_camera_that_moves_a_little_is_followed() {
+    let conditions = Conditions {
+        motion: |frame| {
+            let k = frame.number() as f64;
+            [1.3 * libm::sin(1.7 * k), 1.1 * libm::cos(2.3 * k)]
+        },
+        ..STILL
+    };
+    let (view, measured) = measured(&frames(true), &[], conditions).unwrap();
+    let ([v, _], [share, off]) = (film_errors(&view, &measured), bend_errors(&view, &measured));
+    println!("V to {v:.4}, known on {share:.3}, to {off:.3} px on 90 %");
+    assert!(v < 0.012 && share > 0.95 && off < 1.0, "{v} {share} {off}");
+    assert!(
+        measured
+            .diagnostics
+            .iter()
+            .any(|d| d.code == crate::Code::CameraMoved)
+    );
+}
+
+#[test]
+fn what_is_wrong_with_a_capture_is_said() {
+    let told = |frames: &[Frame], conditions| match measured(frames, &[], conditions) {
+        Ok((_, measured)) => measured
+            .diagnostics
+            .iter()
+            .map(ToString::to_string)
+            .collect::<Vec<_>>()
+            .join("; "),
+        Err(error) => error.to_string(),
+    };
+    let white = told(&[Frame::Black], STILL);
+    assert!(white.contains("no photo of the white frame"), "{white}");
+    let black = told(&[Frame::White], STILL);
+    assert!(
+        black.contains("no photo of the black frame among photo 0"),
+        "{black}"
+    );
+    let some = told(&frames(true)[..17], STILL);
+    assert!(
+        some.contains("no photo of stripes_y_fine_4: refraction is not measured"),
+        "{some}"
+    );
+    let drifting = Conditions {
+        exposure: |frame| if frame == Frame::Black { 0.5 } else { 0.8 },
+        ..STILL
+    };
+    let drift = told(&frames(false), drifting);
+    assert!(
+        drift.contains("photo 0: its exposure or colour is 60 % off that of the white frame"),
+        "{drift}"
+    );
+    let nothing = told(
+        &frames(false),
+        Conditions {
+            has_object: false,
+            ..STILL
+        },
+    );
+    assert!(nothing.contains("nothing lies on the display"), "{nothing}");
+}
+
+#[test]
+fn a_photo_that_clips_or_has_no_markers_is_refused() {
+    let bright = Conditions {
+        exposure: |_| 1.6,
+        ..STILL
+    };
+    let photos: Vec<_> = frames(false)
+        .into_iter()
+        .map(|frame| photo(frame, bright).map(|p| p.map(|v| v.min(1.0))))
+        .collect();
+    let error = measured_of(&photos, &[]).err().unwrap().to_string();
+    assert!(
+        error.contains(
+            "of the white frame is clipped, expected at most 0.1 %; use a shorter exposure"
+        ),
+        "{error}"
+    );
+    let blank = Image::filled(320, 240, LinearRgb::grey(0.5));
+    let error = measured_of(&[blank], &[]).err().unwrap().to_string();
+    assert!(
+        error.contains("photo 0: 0 of the 4 markers of a frame were found"),
+        "{error}"
+    );
+}
