@@ -1,6 +1,6 @@
 //! Irradiance of each receiver at the nodes of the lattice, to be looked up between them.
 
-use crate::render::float4::Float4;
+use crate::render::float4::{Blend, Float4};
 use crate::render::lattice::{LatticePosition, coarser_nodes};
 use crate::render::ranges::{range_overlap, ranges_meet};
 use crate::render::receiver::{Receiver, ReceiverIrradiance, RowBuffers};

@@ -6,13 +6,14 @@
 use crate::geom::Vector3;
 use crate::pixel::LinearRgb;
 use crate::render::float4::Float4;
-use crate::render::half_plane::{grown_side, nodes_inside};
+use crate::render::half_plane::{ConvexShape, grown_side};
 use crate::render::lattice::Lattice;
 use crate::render::light_samples::{LightGroup, LightSamples};
 use crate::render::occluders::Occluders;
 use crate::render::ranges::{range_union, range_until};
 use crate::render::shadow::{ProjectedShadow, ShadowedReceiver, TexelReads};
 use crate::render::shadow_ray::{ShadowRay, shadow_rays};
+use crate::render::texture::BakedTexture;
 use crate::render::view::{
     CameraView, HORIZON_M, LatticeArea, ProjectedPlane, ScenePlane, rows_and_columns,
 };
@@ -26,12 +27,10 @@ use std::ops::Range;
 pub(super) struct Receiver {
     plane: ProjectedPlane,
     /// Nodes outside of these sides are not requested.
-    outline: Vec<Vector3<f64>>,
+    outline: ConvexShape,
     pub(super) columns: Range<usize>,
     pub(super) rows: Range<usize>,
     groups: Vec<RayGroup>,
-    /// Channels that occluders differ in: 1, or 3 where there is film.
-    channels: usize,
     /// Irradiance that comes from other lights than these, before anything is lost.
     open_sky: LinearRgb,
 }
@@ -145,14 +144,14 @@ impl<'a> LightingContext<'a> {
         ))
     }
 
-    /// Card number `own`, at the nodes where the card is seen and one around. None where it is not
-    /// seen at all.
-    pub(super) fn card(&self, own: usize, reach: [f64; 2]) -> Option<ReceiverIrradiance> {
+    /// Card number `own`, at the nodes where anything is seen on it and one around. None where the
+    /// card is not seen at all.
+    pub(super) fn card(&self, own: usize, seen: &SeenSide<'_>) -> Option<ReceiverIrradiance> {
         let lights = self.light_samples(&self.occluders.cards[own].plane)?;
         let [faces, sky] = SelectedLights::split(&lights);
         Some(ReceiverIrradiance {
-            fine: self.card_on(&self.fine, own, reach, faces)?,
-            coarse: self.card_on(&self.coarse, own, reach, sky)?,
+            fine: self.card_on(&self.fine, own, seen, faces)?,
+            coarse: self.card_on(&self.coarse, own, seen, sky)?,
             relative: false,
             light_grid: self.shot.light_grid.clone(),
         })
@@ -162,18 +161,18 @@ impl<'a> LightingContext<'a> {
         &self,
         lattice: &Lattice,
         own: usize,
-        reach: [f64; 2],
+        seen: &SeenSide<'_>,
         lights: SelectedLights<'_>,
     ) -> Option<Receiver> {
         let (view, plane) = (&lattice.view, &self.occluders.cards[own].plane);
         let projected = ProjectedPlane::new(plane, view)?;
-        let area = rows_and_columns(plane, reach, view);
+        let area = rows_and_columns(plane, seen.texture.grid.reach, view);
         if area.0.len() < 2 || area.1.len() < 2 {
             return None;
         }
         let shadowed = ShadowedReceiver::new(&projected, &area, view, Some(own), &plane.center);
         let groups = self.ray_groups(&shadowed, lights);
-        let outline = card_outline(&projected, reach);
+        let outline = seen.outline(&projected);
         Some(self.receiver(projected, groups, lights, (outline, area)))
     }
 
@@ -201,7 +200,12 @@ impl<'a> LightingContext<'a> {
         let shadowed = ShadowedReceiver::new(&projected, &everywhere, view, None, &origin);
         let groups = self.ray_groups(&shadowed, lights);
         let area = shadowed_area(&groups);
-        Some(self.receiver(projected, groups, lights, (vec![projected.w], area)))
+        Some(self.receiver(
+            projected,
+            groups,
+            lights,
+            (ConvexShape::new(&[projected.w]), area),
+        ))
     }
 
     fn ray_groups(
@@ -224,11 +228,10 @@ impl<'a> LightingContext<'a> {
         plane: ProjectedPlane,
         groups: Vec<RayGroup>,
         lights: SelectedLights<'_>,
-        (outline, (rows, columns)): (Vec<Vector3<f64>>, LatticeArea),
+        (outline, (rows, columns)): (ConvexShape, LatticeArea),
     ) -> Receiver {
         Receiver {
             groups,
-            channels: if self.occluders.tinted { 3 } else { 1 },
             open_sky: lights.open_sky,
             plane,
             outline,
@@ -246,11 +249,20 @@ impl<'a> SelectedLights<'a> {
     }
 }
 
-/// Sides of the requested nodes of a card: two nodes further out, for the finer lattice's one that
-/// lies between them.
-fn card_outline(plane: &ProjectedPlane, reach: [f64; 2]) -> Vec<Vector3<f64>> {
-    let sides = plane.sides(reach);
-    sides.iter().map(|s| grown_side(s, 2.0)).collect()
+/// The side of a card that is turned to the camera.
+pub(super) struct SeenSide<'a> {
+    pub(super) texture: &'a BakedTexture,
+    /// Its texture runs the other way.
+    pub(super) mirrored: bool,
+}
+
+impl SeenSide<'_> {
+    /// The requested nodes of a card: two further out than anything is seen on it, for the finer
+    /// lattice's one that lies between them.
+    fn outline(&self, plane: &ProjectedPlane) -> ConvexShape {
+        let sides = self.texture.sides_on(&plane.mirrored_if(self.mirrored));
+        ConvexShape::new(&sides.map(|side| grown_side(&side, 2.0)))
+    }
 }
 
 /// Bounds of all shadows on a receiver.
@@ -288,8 +300,8 @@ pub(super) struct RowBuffers {
     ray: Vec<f32>,
     group: Vec<f32>,
     /// Share of a ray that passes the occluders, and what a group loses to them, per channel.
-    through: [Vec<f32>; 3],
-    lost: [Vec<f32>; 3],
+    through: Vec<Float4>,
+    lost: Vec<Float4>,
     /// Nodes that each shadow of a ray touches.
     touched: Vec<(usize, Range<usize>)>,
     /// Irradiance in the open.
@@ -323,7 +335,7 @@ impl RayCounts {
 impl Receiver {
     /// The requested nodes of a row.
     pub(super) fn requested_nodes(&self, j: usize) -> Range<usize> {
-        nodes_inside(&self.outline, j, &self.columns)
+        self.outline.nodes(j, &self.columns)
     }
 
     /// Open and hidden irradiance at the requested nodes of a row: the open sky and this receiver's
@@ -363,7 +375,7 @@ impl Receiver {
         requested: &Range<usize>,
         buffers: &mut RowBuffers,
     ) {
-        buffers.start_group(requested.len(), group.has_faces(), self.channels);
+        buffers.start_group(requested.len(), group.has_faces());
         let touched = group
             .rays
             .iter()
@@ -371,7 +383,7 @@ impl Receiver {
             .reduce(range_union);
         add_open(&mut buffers.open, &buffers.group, group.radiance.into());
         if let Some(touched) = touched.filter(|t| !t.is_empty()) {
-            buffers.add_hidden_light(touched, self.channels, group.radiance);
+            buffers.add_hidden_light(touched, group.radiance.into());
         }
     }
 
@@ -398,10 +410,8 @@ impl Receiver {
             ray.unit_irradiance().fill([&[]; 3], strength);
         }
         buffers.counts.shadow += all.len();
-        for channel in 0..self.channels {
-            buffers.fill_through(ray, channel, j, &all);
-            buffers.add_lost(channel, here.clone());
-        }
+        buffers.fill_through(ray, j, &all);
+        buffers.add_lost(here.clone());
         here
     }
 
@@ -427,25 +437,25 @@ impl RowBuffers {
     }
 
     /// Empties what is added up for one group.
-    fn start_group(&mut self, n: usize, has_faces: bool, channels: usize) {
+    fn start_group(&mut self, n: usize, has_faces: bool) {
         refill(&mut self.group, if has_faces { n } else { 0 }, 0.0);
-        for lost in self.lost.iter_mut().take(channels) {
-            refill(lost, n, 0.0);
-        }
+        refill(&mut self.lost, n, Float4::ZERO);
     }
 
     /// Adds what a group loses at some nodes to what is hidden there.
-    fn add_hidden_light(&mut self, nodes: Range<usize>, channels: usize, radiance: LinearRgb) {
-        let lost = [0, 1, 2].map(|c: usize| &self.lost[c.min(channels - 1)][nodes.clone()]);
-        add_hidden(&mut self.hidden[nodes.clone()], lost, radiance);
+    fn add_hidden_light(&mut self, nodes: Range<usize>, radiance: Float4) {
+        let hidden = self.hidden[nodes.clone()].iter_mut();
+        for (hidden, &lost) in hidden.zip(&self.lost[nodes]) {
+            *hidden = hidden.add_product(lost, radiance);
+        }
     }
 
-    /// Adds what a ray loses at some nodes to what its group loses, in one channel.
-    fn add_lost(&mut self, channel: usize, nodes: Range<usize>) {
-        let lost = self.lost[channel][nodes.clone()].iter_mut();
-        let passes = self.ray[nodes].iter().zip(&self.through[channel]);
-        for (lost, (e, t)) in lost.zip(passes) {
-            *lost += e * (1.0 - t);
+    /// Adds what a ray loses at some nodes to what its group loses.
+    fn add_lost(&mut self, nodes: Range<usize>) {
+        let lost = self.lost[nodes.clone()].iter_mut();
+        let passes = self.ray[nodes].iter().zip(&self.through);
+        for (lost, (&e, through)) in lost.zip(passes) {
+            *lost = lost.add_scaled(e, through.complement());
         }
     }
 
@@ -478,13 +488,12 @@ impl RowBuffers {
         touched.reduce(range_union)
     }
 
-    /// Computes what passes all shadows of a ray at these nodes, in one channel.
-    fn fill_through(&mut self, ray: &ShadowRay, channel: usize, j: usize, all: &Range<usize>) {
-        let through = &mut self.through[channel];
-        refill(through, all.len(), 1.0);
+    /// Computes what passes all shadows of a ray at these nodes.
+    fn fill_through(&mut self, ray: &ShadowRay, j: usize, all: &Range<usize>) {
+        refill(&mut self.through, all.len(), Float4::ONE);
         for (k, nodes) in &self.touched {
-            let through = &mut through[nodes.start - all.start..nodes.end - all.start];
-            self.counts.through += ray.shadows[*k].attenuate(channel, j, nodes, through);
+            let through = &mut self.through[nodes.start - all.start..nodes.end - all.start];
+            self.counts.through += ray.shadows[*k].attenuate(j, nodes, through);
         }
     }
 }
@@ -501,17 +510,5 @@ fn fill_quotients(p: (f64, f64), w: (f64, f64), lowest: f64, out: &mut [f32]) {
 fn add_open(open: &mut [Float4], group: &[f32], radiance: Float4) {
     for (o, &e) in open.iter_mut().zip(group) {
         *o = o.add_scaled(e, radiance);
-    }
-}
-
-fn add_hidden(hidden: &mut [Float4], [r, g, b]: [&[f32]; 3], radiance: LinearRgb) {
-    for (((h, &r), &g), &b) in hidden.iter_mut().zip(r).zip(g).zip(b) {
-        let [x, y, z, _] = h.0;
-        *h = Float4([
-            x + r * radiance.r,
-            y + g * radiance.g,
-            z + b * radiance.b,
-            0.0,
-        ]);
     }
 }
