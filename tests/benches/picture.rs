@@ -23,7 +23,14 @@ const ROWS: [([u32; 2], u32); 5] = [
     ([640, 480], 30),
     ([1920, 1080], 30),
 ];
-const STAGES: [&str; 6] = ["settle", "render", "frame", "label", "encode", "labels alone"];
+const STAGES: [&str; 6] = [
+    "settle",
+    "render",
+    "frame",
+    "label",
+    "encode",
+    "labels alone",
+];
 
 fn main() -> Result<()> {
     let single = rayon::ThreadPoolBuilder::new().num_threads(1).build();
@@ -35,7 +42,11 @@ fn print_table() -> Result<()> {
     let pictures = pictures.unwrap_or(PICTURES);
     let samples = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/samples");
     let folder = tempfile::tempdir().expect("a temporary folder can be made");
-    asset::build(samples.join("bottles/photos.toml"), folder.path(), &|_, _| ())?;
+    asset::build(
+        samples.join("bottles/photos.toml"),
+        folder.path(),
+        &|_, _| (),
+    )?;
     println!("CPU ms a picture, mean of {pictures}; all but the last column add up to `picture`");
     println!("size         objects  picture  {}", STAGES.join("  "));
     for (image, objects) in ROWS {
@@ -68,7 +79,11 @@ fn print_row(pipeline: &Pipeline, pictures: u64) -> Result<()> {
     let scene = &pipeline.config().scene;
     let [w, h] = scene.image;
     let picture: f64 = means[..STAGES.len() - 1].iter().sum();
-    print!("{:12} {:7} {picture:8.1}", format!("{w} x {h}"), scene.objects.max());
+    print!(
+        "{:12} {:7} {picture:8.1}",
+        format!("{w} x {h}"),
+        scene.objects.max()
+    );
     for (stage, ms) in STAGES.iter().zip(means) {
         print!("  {ms:>width$.1}", width = stage.len());
     }
@@ -85,7 +100,8 @@ fn take_picture(pipeline: &Pipeline, k: u64) -> Result<[f64; STAGES.len()]> {
     let (deep, render) = timed(|| petcomp::render::render(&shot, options));
     let (frame, compose) = timed(|| petcomp::composite::frame(&deep, shot.plate.as_deref()));
     let (labels, labelling) = timed(|| label(&deep, &shot, &LabelOptions::default()));
-    let (jpeg, encode) = timed(|| io::jpeg_bytes(&frame.map(|p| -> LinearRgb { p.color() }), JPEG_QUALITY));
+    let (jpeg, encode) =
+        timed(|| io::jpeg_bytes(&frame.map(|p| -> LinearRgb { p.color() }), JPEG_QUALITY));
     let (alone, labels_alone) = timed(|| pipeline.label(scene));
     black_box((jpeg?, labels, alone?));
     Ok([settle, render, compose, labelling, encode, labels_alone])
