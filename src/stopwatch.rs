@@ -1,4 +1,5 @@
-//! Where the time of a job goes, for the log: `petcomp -vv asset add ...` shows it.
+//! Where the time of a job goes, for the log: `petcomp -vv asset add ...` and `petcomp -vv dataset
+//! generate ...` show it.
 
 use std::fmt;
 use std::time::{Duration, Instant};
@@ -22,6 +23,13 @@ impl Stopwatch {
         let now = Instant::now();
         self.stages.push((stage, now - self.last));
         self.last = now;
+    }
+
+    /// What a stage took that is over.
+    #[cfg(feature = "pipeline")]
+    pub(crate) fn took(&self, stage: &str) -> Duration {
+        let laps = self.stages.iter().filter(|(name, _)| *name == stage);
+        laps.map(|(_, took)| *took).sum()
     }
 
     /// Logs what the stages of a job took.
@@ -89,5 +97,19 @@ mod tests {
         assert!(
             watch.stages[0].1 >= Duration::from_millis(2) && watch.stages[1].1 < watch.stages[0].1
         );
+    }
+
+    #[cfg(feature = "pipeline")]
+    #[test]
+    fn a_stage_that_came_twice_took_both_times() {
+        let laps = [("read", 30), ("write", 90), ("read", 5)];
+        let watch = Stopwatch {
+            stages: laps
+                .map(|(stage, ms)| (stage, Duration::from_millis(ms)))
+                .to_vec(),
+            last: Instant::now(),
+        };
+        assert_eq!(watch.took("read"), Duration::from_millis(35));
+        assert_eq!(watch.took("eat"), Duration::ZERO);
     }
 }

@@ -71,7 +71,7 @@ kinds! {
     LightSamples, "light samples";
     /// Places on receivers times samples of lights and sky that a card, or the surface, may be in the way of
     ShadowRays, "shadow rays";
-    /// Readings of how much light a see-through card lets pass: one for each card in the way of a shadow ray, 3 with film
+    /// Readings of how much light a see-through card lets pass: one for each card in the way of a shadow ray
     Transmittances, "transmittances";
     /// The same for cards that are opaque all over, whose textures are read along their edges alone
     OpaqueEdges, "opaque edges";

@@ -6,6 +6,7 @@ use crate::dataset::{Entry, Writer};
 use crate::error::Result;
 use crate::io::{self, WriteOptions};
 use crate::scene::{Draws, Range};
+use crate::stopwatch::Stopwatch;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -107,8 +108,11 @@ impl Pictures {
 
     fn write_displayed(&self, folder: &Path, entry: &Entry<'_>) -> Result<PathBuf> {
         let path = entry.path("images", self.format.extension());
+        let mut watch = Stopwatch::start();
         let displayed = entry.sample.frame.map(|p| p.color());
         io::write_with(folder.join(&path), &displayed, &self.write_options(entry))?;
+        watch.lap("encode");
+        watch.log(path.display());
         Ok(path)
     }
 }

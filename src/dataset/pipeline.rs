@@ -8,7 +8,6 @@ use crate::dataset::background_photo::{BackgroundOptions, BackgroundPhoto};
 use crate::dataset::environment_maps::EnvironmentMaps;
 use crate::dataset::falls::Falls;
 use crate::dataset::fingerprint::fingerprint;
-use crate::dataset::times::timed;
 use crate::dataset::{
     DatasetConfig, Inputs, Plan, Provenance, Sample, SampleRange, Sidecar, Times, Writer,
 };
@@ -18,11 +17,12 @@ use crate::image::Image;
 use crate::label::{self, Labels};
 use crate::light;
 use crate::pixel::{LinearRgb, PremulRgba};
-use crate::render::{self};
+use crate::render;
 use crate::scene::{
     Appearance, AssetVariant, Background, CameraSource, Drawn, Draws, EdgeTreatment, Recipe, Scene,
     Shot, catalog, locate,
 };
+use crate::stopwatch::Stopwatch;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -324,10 +324,16 @@ impl Pipeline {
 
     fn take_within(&self, scene: Scene, allowance: &Allowance) -> Result<Sample> {
         let drawn = scene.clone();
-        let (resolved, settle) = timed(|| self.resolve_within(scene, allowance));
-        let (scene, shot) = resolved?;
-        let ((deep, frame), render) = timed(|| self.shoot(&scene, &shot));
-        let (labels, label) = timed(|| self.label_shot(&deep, &shot));
+        let mut watch = Stopwatch::start();
+        let (scene, shot) = self.resolve_within(scene, allowance)?;
+        watch.lap("settle");
+        let deep = render::render(&shot, &self.config.render);
+        watch.lap("render");
+        let frame = finished_frame(&deep, &scene, &shot);
+        watch.lap("composite");
+        let labels = self.label_shot(&deep, &shot);
+        watch.lap("label");
+        watch.log("picture");
         Ok(Sample {
             frame,
             deep,
@@ -337,9 +343,9 @@ impl Pipeline {
                 ..Provenance::from_scene(scene)
             }),
             times: Times {
-                settle,
-                render,
-                label,
+                settle: watch.took("settle"),
+                render: watch.took("render") + watch.took("composite"),
+                label: watch.took("label"),
                 ..Times::default()
             },
         })

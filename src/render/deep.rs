@@ -14,7 +14,7 @@ use crate::render::lattice::Lattice;
 use crate::render::layers::{Layer, LayerStack, RenderedTile, SampleGrid, ShadowCatcher};
 use crate::render::lens::LensView;
 use crate::render::pixel_filter::filter_quantiles;
-use crate::render::receiver::{LightingContext, ReceiverIrradiance};
+use crate::render::receiver::{LightingContext, ReceiverIrradiance, SeenSide};
 use crate::render::refraction::refract;
 use crate::render::retouch::retouched;
 use crate::render::texture::BakedTexture;
@@ -22,6 +22,7 @@ use crate::render::view::{
     CameraView, ProjectedPlane, ScenePlane, rows_and_columns, visible_planes,
 };
 use crate::scene::{Card, Shot};
+use crate::stopwatch::Stopwatch;
 use crate::work::{self, Kind};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -46,10 +47,15 @@ const TILE_SIDE_PX: usize = 32;
 /// over. Cards are ordered by depth block by block; blocks in which they cross are split.
 pub fn render(shot: &Shot, options: &RenderOptions) -> DeepImage {
     let options = options.clamped();
+    let mut watch = Stopwatch::start();
     let finished = &*retouched(shot, &options);
+    watch.lap("retouch");
     let bounces = Bounces::new(finished);
-    let stack = SeenStack::new(finished, &options);
-    let free = bounces.brighten(stack.render(|_| true));
+    let stack = SeenStack::new(finished, &options, &mut watch);
+    let layers = stack.render(|_| true);
+    watch.lap("layers");
+    let free = bounces.brighten(layers);
+    watch.lap("interreflection");
     let bent = if options.refraction {
         let offsets = &stack.stack.samples.offsets;
         refract(free, shot, offsets, |card, reached| {
@@ -58,7 +64,10 @@ pub fn render(shot: &Shot, options: &RenderOptions) -> DeepImage {
     } else {
         free
     };
-    bent.held_out(shot.holdout.as_deref())
+    let deep = bent.held_out(shot.holdout.as_deref());
+    watch.lap("refraction and holdout");
+    watch.log("render");
+    deep
 }
 
 /// All that a picture is put together from, seen through the shot's lens.
@@ -71,12 +80,12 @@ struct SeenStack {
 }
 
 impl SeenStack {
-    fn new(shot: &Shot, options: &RenderOptions) -> Self {
+    fn new(shot: &Shot, options: &RenderOptions, watch: &mut Stopwatch) -> Self {
         let lens = LensView::new(shot);
         let camera = lens.as_ref().map_or(&shot.camera, |lens| &lens.pinhole);
         let view = CameraView::from_camera(camera);
         Self {
-            stack: layer_stack(shot, &view, options),
+            stack: layer_stack(shot, &view, options, watch),
             lens: lens.map(|lens| (lens, Lattice::new(&view, options.cell_px))),
             image: shot.camera.image.map(|side| side as usize),
         }
@@ -115,13 +124,25 @@ impl SeenStack {
 
 /// Everything that tiles are rendered from: textures at their level of detail, and the light on
 /// them.
-fn layer_stack(shot: &Shot, view: &CameraView, options: &RenderOptions) -> LayerStack {
+fn layer_stack(
+    shot: &Shot,
+    view: &CameraView,
+    options: &RenderOptions,
+    watch: &mut Stopwatch,
+) -> LayerStack {
     let offsets = filter_quantiles(options.subsamples);
     let planes = visible_planes(shot);
     let context = LightingContext::new(shot, &planes, view, *options);
-    let cards = projected_cards(&planes, view, &offsets);
+    let detail = PictureDetail {
+        offsets: &offsets,
+        with_film: context.occluders.tinted,
+    };
+    let cards = projected_cards(&planes, view, &detail);
+    watch.lap("bake");
     let receivers = receivers(&context, &cards);
+    watch.lap("shadows");
     let mut maps = irradiance_maps(&receivers);
+    watch.lap("irradiance");
     let catcher = ShadowCatcher {
         plane: ProjectedPlane::new(&context.occluders.surface, view),
         share: maps.pop().flatten().map(Arc::new),
@@ -139,11 +160,11 @@ fn layer_stack(shot: &Shot, view: &CameraView, options: &RenderOptions) -> Layer
 fn projected_cards<'a>(
     planes: &[(&'a Card, ScenePlane)],
     view: &CameraView,
-    offsets: &[f64],
+    detail: &PictureDetail<'_>,
 ) -> Vec<Option<ProjectedCard<'a>>> {
     planes
         .par_iter()
-        .map(|(card, plane)| ProjectedCard::new(card, plane, view, offsets))
+        .map(|(card, plane)| ProjectedCard::new(card, plane, view, detail))
         .collect()
 }
 
@@ -175,7 +196,7 @@ fn receivers(
     (0..=cards.len())
         .into_par_iter()
         .map(|k| match cards.get(k) {
-            Some(card) => context.card(k, card.as_ref()?.texture.grid.reach),
+            Some(card) => context.card(k, &card.as_ref()?.seen_side()),
             None => context.surface(),
         })
         .collect()
@@ -216,61 +237,79 @@ fn sample_grid(
     }
 }
 
+/// What textures are made ready for.
+struct PictureDetail<'a> {
+    /// Sub-samples along each side of a pixel.
+    offsets: &'a [f64],
+    /// Some card is film.
+    with_film: bool,
+}
+
 /// A card in the picture, before it is lit.
 struct ProjectedCard<'a> {
     card: &'a Card,
     plane: ProjectedPlane,
     texture: BakedTexture,
+    /// Its texture runs the other way.
+    mirrored: bool,
     columns: Range<usize>,
     rows: Range<usize>,
 }
 
 impl<'a> ProjectedCard<'a> {
     /// None for a card that is edge-on or outside the picture.
-    fn new(card: &'a Card, plane: &ScenePlane, view: &CameraView, offsets: &[f64]) -> Option<Self> {
+    fn new(
+        card: &'a Card,
+        plane: &ScenePlane,
+        view: &CameraView,
+        detail: &PictureDetail<'_>,
+    ) -> Option<Self> {
         let projected = ProjectedPlane::new(plane, view)?;
         let (rows, columns) = rows_and_columns(plane, [0.0; 2], view);
         if rows.is_empty() || columns.is_empty() {
             return None;
         }
         work::add(Kind::Bakes, 1);
-        let (projected, texture) = visible_side(card, plane, projected, &view.eye);
+        let (texture, mirrored) = visible_side(card, plane, &view.eye);
+        let projected = projected.mirrored_if(mirrored);
         let texels = texels_per_pixel(texture, plane, &projected, view, &plane.center);
-        let level = detail_level(texels, offsets);
-        let texture = BakedTexture::new(texture, &card.grade, level);
+        let level = detail_level(texels, detail.offsets);
+        let texture = BakedTexture::new(texture, &card.grade, level, detail.with_film);
         let (rows, columns) = rows_and_columns(plane, texture.grid.reach, view);
         Some(Self {
             card,
             plane: projected,
             texture,
+            mirrored,
             columns,
             rows,
         })
     }
 
-    fn into_layer(self, light: Option<IrradianceMap>) -> Layer {
-        Layer {
-            id: self.card.id,
-            plane: self.plane,
-            sides: self.plane.sides(self.texture.grid.reach),
-            texture: Arc::new(self.texture),
-            light: light.map(Arc::new),
-            columns: self.columns,
-            rows: self.rows,
+    fn seen_side(&self) -> SeenSide<'_> {
+        SeenSide {
+            texture: &self.texture,
+            mirrored: self.mirrored,
         }
+    }
+
+    fn into_layer(self, light: Option<IrradianceMap>) -> Layer {
+        let area = (self.rows, self.columns);
+        let texture = Arc::new(self.texture);
+        Layer::new(
+            self.card.id,
+            (self.plane, texture),
+            light.map(Arc::new),
+            area,
+        )
     }
 }
 
-/// The side of a card that is turned to the camera, and how it lies in the picture.
-fn visible_side<'a>(
-    card: &'a Card,
-    plane: &ScenePlane,
-    projected: ProjectedPlane,
-    eye: &Vector3<f64>,
-) -> (ProjectedPlane, &'a Texture) {
+/// The side of a card that is turned to the camera, and whether its texture runs the other way.
+fn visible_side<'a>(card: &'a Card, plane: &ScenePlane, eye: &Vector3<f64>) -> (&'a Texture, bool) {
     match &card.back {
-        Some(back) if plane.is_seen_from_behind(eye) => (projected.mirrored(), back),
-        _ => (projected, &card.texture),
+        Some(back) if plane.is_seen_from_behind(eye) => (back, true),
+        _ => (&card.texture, false),
     }
 }
 

@@ -1,9 +1,24 @@
 //! Four numbers that are worked on together, as one vector register.
 
 use crate::pixel::{LinearRgb, PremulRgba};
+use bytemuck::{Pod, Zeroable};
+
+/// Numbers between which others lie.
+pub(super) trait Blend: Copy {
+    /// `self` at 0, `o` at 1; exactly the value where both are the same.
+    fn lerp(self, o: Self, t: f32) -> Self;
+
+    /// Between four corners of a cell.
+    #[inline(always)]
+    fn bilinear(top: [Self; 2], bottom: [Self; 2], fx: f32, fy: f32) -> Self {
+        top[0]
+            .lerp(top[1], fx)
+            .lerp(bottom[0].lerp(bottom[1], fx), fy)
+    }
+}
 
 /// Red, green, blue and a fourth: alpha of a texel, 1 of a light.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C, align(16))]
 pub(super) struct Float4(pub(super) [f32; 4]);
 
@@ -56,26 +71,26 @@ impl Float4 {
         Self(self.0.map(|v| 1.0 - v))
     }
 
+    /// Every number brought into 0 to 1; NaN becomes 0.
+    #[inline(always)]
+    #[expect(clippy::manual_clamp, reason = "turns NaN into 0")]
+    pub(super) fn clamped(self) -> Self {
+        Self(self.0.map(|v| v.max(0.0).min(1.0)))
+    }
+
     /// The same with another fourth number.
     #[inline(always)]
     pub(super) fn with_fourth(self, fourth: f32) -> Self {
         Self([self.0[0], self.0[1], self.0[2], fourth])
     }
+}
 
-    /// `self` at 0, `o` at 1; exactly the value where both are the same.
+impl Blend for Float4 {
     #[inline(always)]
-    pub(super) fn lerp(self, o: Self, t: f32) -> Self {
+    fn lerp(self, o: Self, t: f32) -> Self {
         Self(std::array::from_fn(|i| {
             self.0[i] + t * (o.0[i] - self.0[i])
         }))
-    }
-
-    /// Between four corners of a cell.
-    #[inline(always)]
-    pub(super) fn bilinear(top: [Self; 2], bottom: [Self; 2], fx: f32, fy: f32) -> Self {
-        top[0]
-            .lerp(top[1], fx)
-            .lerp(bottom[0].lerp(bottom[1], fx), fy)
     }
 }
 

@@ -2,17 +2,26 @@
 
 use crate::pixel::LinearRgb;
 use crate::render::float4::Float4;
+use crate::render::float8::Float8;
 use crate::render::texel_grid::SIMD_LANES;
 use crate::scene::Grade;
 
 /// Opacity of film whose transmittance is turned in hue and changed in saturation; grey stays as it
 /// is.
 pub(super) fn graded_opacity(opacity: LinearRgb, grade: &Grade) -> LinearRgb {
-    if opacity.r == opacity.g && opacity.g == opacity.b {
-        return opacity;
-    }
+    shifted_opacity(opacity, grade.hue_deg, grade.saturation)
+}
+
+#[inline(always)]
+fn shifted_opacity(opacity: LinearRgb, hue_deg: f32, saturation: f32) -> LinearRgb {
     let through = opacity.map(|o| 1.0 - o);
-    crate::color::shift_hsv(through, grade.hue_deg, grade.saturation, 1.0).map(|t| 1.0 - t.min(1.0))
+    let shifted = crate::color::shift_hsv(through, hue_deg, saturation, 1.0);
+    let is_grey = opacity.r == opacity.g && opacity.g == opacity.b;
+    if is_grey {
+        opacity
+    } else {
+        shifted.map(|t| 1.0 - t.min(1.0))
+    }
 }
 
 /// The mean over channels; exactly the channels' value where they are the same.
@@ -25,37 +34,78 @@ pub(super) fn channel_mean(c: LinearRgb) -> f32 {
     }
 }
 
-/// Grades the colours of texels; their fourth numbers stay.
-pub(super) fn grade_colors(texels: &mut [Float4], grade: &Grade) {
+/// Grades the colours of texels, and what film among them lets pass.
+pub(super) fn grade_texels(texels: &mut [Float8], grade: &Grade) {
+    let halves: &mut [Float4] = bytemuck::cast_slice_mut(texels);
     if *grade != Grade::default() {
-        shift_colors(texels, grade.hue_deg, grade.saturation, grade.value);
+        shift_colors(halves, grade.hue_deg, grade.saturation, grade.value);
+    }
+    if turns_opacity(grade) {
+        shift_opacities(halves, 2, grade.hue_deg, grade.saturation);
     }
 }
 
-/// Dense since it is compiled as one piece for each set of vector instructions, over channels
-/// apart.
+/// Grades opacities as [`graded_opacity`] does each.
+pub(super) fn grade_opacities(opacities: &mut [Float4], grade: &Grade) {
+    if turns_opacity(grade) {
+        shift_opacities(opacities, 1, grade.hue_deg, grade.saturation);
+    }
+}
+
+/// Film of another hue lets another hue pass; how bright it reflects does not matter.
+fn turns_opacity(grade: &Grade) -> bool {
+    (grade.hue_deg, grade.saturation) != (0.0, 1.0)
+}
+
+/// Every second one is a colour.
 #[multiversion::multiversion(targets(
     "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2",
     "x86_64+avx2",
     "aarch64+neon"
 ))]
-fn shift_colors(texels: &mut [Float4], hue_deg: f32, saturation: f32, value: f32) {
+fn shift_colors(halves: &mut [Float4], hue_deg: f32, saturation: f32, value: f32) {
+    map_colors(halves, 2, 0, |color| {
+        crate::color::shift_hsv(color, hue_deg, saturation, value)
+    });
+}
+
+/// The last one of every `step` is an opacity.
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2",
+    "x86_64+avx2",
+    "aarch64+neon"
+))]
+fn shift_opacities(texels: &mut [Float4], step: usize, hue_deg: f32, saturation: f32) {
+    map_colors(texels, step, step - 1, |opacity| {
+        shifted_opacity(opacity, hue_deg, saturation)
+    });
+}
+
+/// Changes one of every `step` colours, over channels apart, so that it is vectorised; empty ones
+/// stay.
+#[inline(always)]
+fn map_colors(
+    texels: &mut [Float4],
+    step: usize,
+    first: usize,
+    change: impl Fn(LinearRgb) -> LinearRgb,
+) {
     for run in texels
-        .chunks_mut(SIMD_LANES)
+        .chunks_mut(step * SIMD_LANES)
         .filter(|run| run.iter().any(|t| t.0 != [0.0; 4]))
     {
         let mut colors = [[0.0; SIMD_LANES]; 3];
-        for (lane, t) in run.iter().enumerate() {
+        for (lane, t) in run.iter().skip(first).step_by(step).enumerate() {
             (0..3).for_each(|c| colors[c][lane] = t.0[c]);
         }
-        // By index: three arrays are read and written at the same lane, and vectorised.
+        // By index: three arrays are read and written at the same lane.
         #[allow(clippy::needless_range_loop)]
         for lane in 0..SIMD_LANES {
             let color = LinearRgb::new(colors[0][lane], colors[1][lane], colors[2][lane]);
-            let LinearRgb { r, g, b } = crate::color::shift_hsv(color, hue_deg, saturation, value);
+            let LinearRgb { r, g, b } = change(color);
             (colors[0][lane], colors[1][lane], colors[2][lane]) = (r, g, b);
         }
-        for (lane, t) in run.iter_mut().enumerate() {
+        for (lane, t) in run.iter_mut().skip(first).step_by(step).enumerate() {
             (0..3).for_each(|c| t.0[c] = colors[c][lane]);
         }
     }

@@ -21,6 +21,56 @@ pub(super) fn row_span(sides: &[Vector3<f64>], y: f64) -> (f64, f64) {
     (low, high)
 }
 
+/// A convex shape, ready to be asked for its rows.
+#[derive(Debug)]
+pub(super) struct ConvexShape {
+    /// Lines `x = a y + b` that it lies to the right of, then those that it lies to the left of,
+    /// then conditions `a y + b >= 0` on whole rows.
+    lines: Vec<[f64; 2]>,
+    /// Where the second and the third of these begin.
+    starts: [usize; 2],
+}
+
+impl ConvexShape {
+    /// Where all conditions on `(x, y, 1)` hold.
+    pub(super) fn new(sides: &[Vector3<f64>]) -> Self {
+        let bounding = |sign: f64| {
+            let facing = sides.iter().filter(move |side| sign * side.x > 0.0);
+            facing.map(|side| [-side.y / side.x, -side.z / side.x])
+        };
+        let level = sides.iter().filter(|side| side.x == 0.0);
+        let left = bounding(1.0).count();
+        Self {
+            lines: bounding(1.0)
+                .chain(bounding(-1.0))
+                .chain(level.map(|side| [side.y, side.z]))
+                .collect(),
+            starts: [left, left + bounding(-1.0).count()],
+        }
+    }
+
+    /// The nodes of row `j` of a lattice inside of it.
+    pub(super) fn nodes(&self, j: usize, within: &Range<usize>) -> Range<usize> {
+        let (low, high) = self.row_span(j as f64);
+        integer_range(low, high, within)
+    }
+
+    /// As the function [`row_span`].
+    pub(super) fn row_span(&self, y: f64) -> (f64, f64) {
+        let at = |[a, b]: &[f64; 2]| a * y + b;
+        let [right, level] = self.starts;
+        if self.lines[level..].iter().any(|line| at(line) < 0.0) {
+            return (f64::INFINITY, f64::NEG_INFINITY);
+        }
+        let lows = self.lines[..right].iter().map(at);
+        let highs = self.lines[right..level].iter().map(at);
+        (
+            lows.fold(f64::NEG_INFINITY, |m, x| if x > m { x } else { m }),
+            highs.fold(f64::INFINITY, |m, x| if x < m { x } else { m }),
+        )
+    }
+}
+
 /// The nodes of row `j` of a lattice inside all sides.
 pub(super) fn nodes_inside(
     sides: &[Vector3<f64>],
@@ -70,5 +120,8 @@ mod tests {
         assert_eq!(integer_range(low - 0.5, high - 0.5, &(0..100)), 2..12);
         let (low, high) = row_span(&shape, 12.5);
         assert!(integer_range(low, high, &(0..100)).is_empty());
+        let shape = ConvexShape::new(&shape);
+        assert_eq!(shape.nodes(7, &(0..100)), 2..13);
+        assert!(shape.nodes(13, &(0..100)).is_empty());
     }
 }

@@ -1,9 +1,9 @@
 //! Irradiance of each receiver at the nodes of the lattice, to be looked up between them.
 
-use crate::render::float4::Float4;
+use crate::render::float4::{Blend, Float4};
 use crate::render::lattice::{LatticePosition, coarser_nodes};
 use crate::render::ranges::{range_overlap, ranges_meet};
-use crate::render::receiver::{Receiver, ReceiverIrradiance, RowBuffers};
+use crate::render::receiver::{BandBuffers, Receiver, ReceiverIrradiance, RowSums};
 use crate::render::refill;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -31,9 +31,9 @@ pub(super) fn irradiance_maps(
     let mut maps = maps_of(receivers, |lit| {
         IrradianceMap::filled(&lit.fine, lit.unlit_value())
     });
-    fill_maps(receivers, &mut maps, |band, j, out, buffers| {
+    fill_maps(receivers, &mut maps, |band, buffers| {
         if let Some(soft) = &soft[band.number] {
-            fill_combined_row(band.lit, soft, j, out, buffers);
+            fill_combined_rows(band, soft, buffers);
         }
     });
     maps
@@ -44,9 +44,7 @@ fn hidden_maps(receivers: &[Option<ReceiverIrradiance>]) -> Vec<Option<Irradianc
     let mut maps = maps_of(receivers, |lit| {
         IrradianceMap::filled(&lit.coarse, Float4::ZERO)
     });
-    fill_maps(receivers, &mut maps, |band, j, out, buffers| {
-        fill_hidden_row(&band.lit.coarse, j, out, buffers);
-    });
+    fill_maps(receivers, &mut maps, fill_hidden_rows);
     maps
 }
 
@@ -73,19 +71,29 @@ fn maps_of(
         .collect()
 }
 
-/// Fills maps row by row, in parallel bands; `row` gets the band and the number of the row.
+impl MapBand<'_> {
+    /// Numbers of its rows.
+    fn rows(&self) -> Range<usize> {
+        self.first..self.first + self.values.len() / self.width
+    }
+
+    /// The values of nodes of its `n`-th row.
+    fn values_of(&mut self, n: usize, nodes: &Range<usize>, first_column: usize) -> &mut [Float4] {
+        let start = n * self.width + nodes.start - first_column;
+        &mut self.values[start..][..nodes.len()]
+    }
+}
+
+/// Fills maps band by band, in parallel.
 fn fill_maps(
     receivers: &[Option<ReceiverIrradiance>],
     maps: &mut [Option<IrradianceMap>],
-    row: impl Fn(&MapBand<'_>, usize, &mut [Float4], &mut RowBuffers) + Sync,
+    fill: impl Fn(&mut MapBand<'_>, &mut BandBuffers) + Sync,
 ) {
     map_bands(receivers, maps).into_par_iter().for_each_init(
-        RowBuffers::default,
+        BandBuffers::default,
         |buffers, mut band| {
-            let values = std::mem::take(&mut band.values);
-            for (n, out) in values.chunks_exact_mut(band.width).enumerate() {
-                row(&band, band.first + n, out, buffers);
-            }
+            fill(&mut band, buffers);
         },
     );
 }
@@ -102,37 +110,38 @@ fn map_bands<'a>(
         .collect()
 }
 
-/// One row of what occluders hide of a receiver's lights.
-fn fill_hidden_row(receiver: &Receiver, j: usize, out: &mut [Float4], buffers: &mut RowBuffers) {
-    let requested = receiver.requested_nodes(j);
-    if !requested.is_empty() {
-        receiver.gather_row(j, &requested, buffers);
-        out[requested.start - receiver.columns.start..][..requested.len()]
-            .copy_from_slice(&buffers.hidden);
+/// What occluders hide of a receiver's lights.
+fn fill_hidden_rows(band: &mut MapBand<'_>, buffers: &mut BandBuffers) {
+    let lit = band.lit;
+    let receiver = &lit.coarse;
+    receiver.gather_band(band.rows(), buffers);
+    for (n, row) in wanted_rows(&mut buffers.rows) {
+        let out = band.values_of(n, &row.requested, receiver.columns.start);
+        out.copy_from_slice(&row.hidden);
     }
 }
 
-/// One row of irradiance or of its share, from the sharp part and the soft one.
-fn fill_combined_row(
-    lit: &ReceiverIrradiance,
-    soft: &IrradianceMap,
-    j: usize,
-    out: &mut [Float4],
-    buffers: &mut RowBuffers,
-) {
-    let requested = lit.fine.requested_nodes(j);
-    if requested.is_empty() {
-        return;
+/// Irradiance or its share, from the sharp part and the soft one.
+fn fill_combined_rows(band: &mut MapBand<'_>, soft: &IrradianceMap, buffers: &mut BandBuffers) {
+    let lit = band.lit;
+    lit.fine.gather_band(band.rows(), buffers);
+    for (n, row) in wanted_rows(&mut buffers.rows) {
+        let requested = row.requested.clone();
+        soft.enlarge_row(band.first + n, &requested, &mut buffers.coarse);
+        let out = band.values_of(n, &requested, lit.fine.columns.start);
+        let sums = row.open.iter().zip(&row.hidden);
+        for (i, (out, (open, hidden))) in out.iter_mut().zip(sums).enumerate() {
+            let soft = between_coarse(&buffers.coarse, requested.start, i);
+            *out = remaining(lit.relative, open, &hidden.add_scaled(1.0, soft));
+        }
+        lit.spread_light(row, out);
     }
-    lit.fine.gather_row(j, &requested, buffers);
-    soft.enlarge_row(j, &requested, &mut buffers.coarse);
-    let out = &mut out[requested.start - lit.fine.columns.start..][..requested.len()];
-    let sums = buffers.open.iter().zip(&buffers.hidden);
-    for (i, (out, (open, hidden))) in out.iter_mut().zip(sums).enumerate() {
-        let soft = between_coarse(&buffers.coarse, requested.start, i);
-        *out = remaining(lit.relative, open, &hidden.add_scaled(1.0, soft));
-    }
-    lit.spread_light(j, &requested, out, buffers);
+}
+
+/// The rows of which any node is requested, with their numbers in the band.
+fn wanted_rows(rows: &mut [RowSums]) -> impl Iterator<Item = (usize, &mut RowSums)> {
+    let rows = rows.iter_mut().enumerate();
+    rows.filter(|(_, row)| !row.requested.is_empty())
 }
 
 /// What is left of open irradiance, or that as a share of it.

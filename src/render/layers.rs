@@ -11,14 +11,14 @@ use crate::pixel::{Depth, LinearRgb, ObjectId};
 use crate::render::block::PixelBlock;
 use crate::render::float4::Float4;
 use crate::render::grade::channel_mean;
-use crate::render::half_plane::row_span;
+use crate::render::half_plane::{ConvexShape, row_span};
 use crate::render::irradiance::IrradianceMap;
 use crate::render::lattice::{Lattice, LatticePosition};
 use crate::render::ranges::{integer_range, range_overlap, ranges_meet};
 use crate::render::texel_grid::{TexelLine, texel_line};
 use crate::render::texture::BakedTexture;
 use crate::render::transmittance::{LayerRow, SubsampleRun, Transmittance};
-use crate::render::view::{ProjectedPlane, pixel_center};
+use crate::render::view::{LatticeArea, ProjectedPlane, pixel_center};
 use crate::work::{self, Kind};
 use nalgebra::Matrix3;
 use std::f32::consts::PI;
@@ -36,8 +36,10 @@ pub(super) struct Layer {
     pub(super) texture: Arc<BakedTexture>,
     /// Light on it; none in the dark.
     pub(super) light: Option<Arc<IrradianceMap>>,
-    /// Where it ends, its texture's soft border included.
-    pub(super) sides: [Vector3<f64>; 5],
+    /// Where anything is seen on it.
+    shape: ConvexShape,
+    /// Position among the texels, times `w`.
+    texel_rows: [Vector3<f64>; 2],
     /// Pixels it may touch.
     pub(super) columns: Range<usize>,
     /// Pixels it may touch.
@@ -260,18 +262,30 @@ impl Layer {
 }
 
 impl Layer {
+    /// A texture on a plane that may touch these rows and columns of pixels.
+    pub(super) fn new(
+        id: ObjectId,
+        (plane, texture): (ProjectedPlane, Arc<BakedTexture>),
+        light: Option<Arc<IrradianceMap>>,
+        (rows, columns): LatticeArea,
+    ) -> Self {
+        Self {
+            id,
+            shape: ConvexShape::new(&texture.sides_on(&plane)),
+            texel_rows: texture.grid.texel_rows(&plane.u, &plane.v, &plane.w),
+            plane,
+            texture,
+            light,
+            columns,
+            rows,
+        }
+    }
+
     /// The layer in a block of a picture that an affine map leads to this one.
     fn seen_through(&self, map: &Matrix3<f64>, block: &PixelBlock) -> Self {
-        let transposed = map.transpose();
-        Self {
-            id: self.id,
-            plane: self.plane.seen_through(map),
-            texture: Arc::clone(&self.texture),
-            light: self.light.clone(),
-            sides: self.sides.map(|side| transposed * side),
-            columns: block.x.clone(),
-            rows: block.y.clone(),
-        }
+        let (plane, texture) = (self.plane.seen_through(map), Arc::clone(&self.texture));
+        let area = (block.y.clone(), block.x.clone());
+        Self::new(self.id, (plane, texture), self.light.clone(), area)
     }
 }
 
@@ -495,8 +509,9 @@ impl LayerStack {
         let weight = self.samples.sample_weight();
         for i in row.touched.clone().filter(|&i| row.alpha[i] > 0.0) {
             let x = block.x.start + i;
-            let hidden = row.hidden_by(i, self.tinted).scale(weight);
-            let light = self.pixel_light(layer, [x, y], row.light[i], &mut row.lit);
+            let (light, hidden) = row.seen_at(i, self.tinted);
+            let hidden = hidden.scale(weight);
+            let light = self.pixel_light(layer, [x, y], light, &mut row.lit);
             let sample = self.deep_sample(layer, [x, y], light, row.alpha[i], hidden);
             out.samples.push((x as u32, y as u32, sample));
             if self.tinted {
@@ -708,8 +723,8 @@ struct LayerLine {
 impl LayerLine {
     fn new(layer: &Layer, left: usize, y: f64) -> Self {
         let plane = &layer.plane;
-        let (low, high) = row_span(&layer.sides, y);
-        let [u, v] = layer.texture.grid.texel_rows(&plane.u, &plane.v, &plane.w);
+        let (low, high) = layer.shape.row_span(y);
+        let [u, v] = layer.texel_rows;
         let left = left as f64;
         Self {
             low: (low - left) as f32,

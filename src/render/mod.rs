@@ -35,6 +35,7 @@ mod cryptomatte;
 mod deep;
 mod detail;
 mod float4;
+mod float8;
 mod grade;
 mod half_plane;
 mod interreflection;
@@ -57,6 +58,7 @@ mod shadow;
 mod shadow_ray;
 #[cfg(test)]
 mod tests;
+mod texel_extent;
 mod texel_grid;
 mod texture;
 mod transmittance;

@@ -1,22 +1,17 @@
 //! Opacity alone, for what falls into shadow.
 
-#![expect(
-    clippy::needless_range_loop,
-    reason = "several arrays in step, which vectorises"
-)]
-#![expect(clippy::manual_clamp, reason = "turns NaN into 0")]
-
 use crate::asset::Texture;
 use crate::image::Image;
 use crate::pixel::{Film, LinearRgb, PremulRgba};
-use crate::render::grade::graded_opacity;
-use crate::render::texel_grid::{BORDER_TEXELS, BilinearCells, SIMD_LANES, TexelGrid, TexelLine};
+use crate::render::float4::Float4;
+use crate::render::grade::grade_opacities;
+use crate::render::texel_extent::TexelExtent;
+use crate::render::texel_grid::{
+    BORDER_TEXELS, BilinearCells, POSITION_ERROR_TEXELS, SIMD_LANES, TexelGrid, TexelLine,
+};
 use crate::scene::Grade;
 use crate::work::{self, Kind};
 use std::sync::{Arc, OnceLock};
-
-/// Positions in single precision are off by less than this, texels.
-const POSITION_ERROR_TEXELS: f64 = 1.0 / 8.0;
 
 /// A texture's opacity at each halving, made on first use; shared by the cards that show it.
 #[derive(Debug)]
@@ -86,8 +81,10 @@ pub(super) struct OpacityLevel {
     pub(super) grid: TexelGrid,
     width: usize,
     height: usize,
-    /// One plane of alpha, or one for each channel of film.
-    pub(super) planes: Vec<Vec<f32>>,
+    /// Opacity per channel: alpha in all of them for a texture that is no film.
+    pub(super) texels: Vec<Float4>,
+    /// Where it stops any light.
+    pub(super) extent: TexelExtent,
     /// Every texel stops all light.
     opaque: bool,
 }
@@ -98,34 +95,26 @@ impl OpacityLevel {
         let grid = TexelGrid::new(texture.size(), level as f64);
         match texture {
             Texture::Rgba(pyramid) => {
-                Self::from_channels(grid, pyramid.level(level), &[&|p: PremulRgba| p.a])
+                let alpha = |p: PremulRgba| Float4([p.a; 4]);
+                Self::from_texels(grid, bordered(pyramid.level(level), alpha))
             }
-            Texture::Film(pyramid) => Self::from_film(grid, pyramid.level(level), grade),
+            Texture::Film(pyramid) => {
+                let mut film = bordered(pyramid.level(level), |p: Film| p.opacity.into());
+                grade_opacities(film.pixels_mut(), grade);
+                Self::from_texels(grid, film)
+            }
         }
     }
 
-    fn from_film(grid: TexelGrid, image: &Image<Film>, grade: &Grade) -> Self {
-        let graded = image.map(|p| graded_opacity(p.opacity, grade));
-        let channels: [&dyn Fn(LinearRgb) -> f32; 3] = [&|o| o.r, &|o| o.g, &|o| o.b];
-        Self::from_channels(grid, &graded, &channels)
-    }
-
-    fn from_channels<P: Copy>(
-        grid: TexelGrid,
-        image: &Image<P>,
-        channels: &[&dyn Fn(P) -> f32],
-    ) -> Self {
-        let (width, height) = bordered_size(image.size());
-        let planes = channels
-            .iter()
-            .map(|channel| bordered_plane(image, channel));
-        let mut pixels = image.pixels().iter();
+    fn from_texels(grid: TexelGrid, texels: Image<Float4>) -> Self {
+        let (width, height) = texels.size();
         Self {
             grid,
             width,
             height,
-            planes: planes.collect(),
-            opaque: pixels.all(|&p| channels.iter().all(|channel| channel(p) == 1.0)),
+            extent: TexelExtent::around(texels.pixels(), width, &grid),
+            opaque: is_opaque(&texels),
+            texels: texels.into_vec(),
         }
     }
 
@@ -136,72 +125,53 @@ impl OpacityLevel {
             .then(|| self.grid.texels.map(|n| (0.5 + POSITION_ERROR_TEXELS) / n))
     }
 
-    /// Multiplies what gets through, along a line over bordered texels from its sample `first` on,
-    /// in one channel.
-    pub(super) fn attenuate(
-        &self,
-        channel: usize,
-        line: &TexelLine,
-        first: usize,
-        through: &mut [f32],
-    ) {
+    /// Multiplies what gets through, along a line over bordered texels from its sample `first` on.
+    pub(super) fn attenuate(&self, line: &TexelLine, first: usize, through: &mut [Float4]) {
         let size = (self.width, self.height);
-        attenuate_line(self.plane(channel), size, line, first as f32, through);
-    }
-
-    /// Opacities of a channel; a grey level has one plane for all.
-    fn plane(&self, channel: usize) -> &[f32] {
-        &self.planes[channel.min(self.planes.len() - 1)]
+        attenuate_line(&self.texels, size, line, first as f32, through);
     }
 }
 
-/// One channel of an image, with a border of zeros.
-fn bordered_plane<P: Copy>(image: &Image<P>, channel: impl Fn(P) -> f32) -> Vec<f32> {
-    let (width, height) = bordered_size(image.size());
-    let mut plane = vec![0.0; width * height];
+/// An image as opacities, with a border of none.
+fn bordered<P: Copy>(image: &Image<P>, opacity: impl Fn(P) -> Float4) -> Image<Float4> {
+    let [width, height] = [image.width(), image.height()].map(|n| n + 2 * BORDER_TEXELS);
+    let mut texels = Image::filled(width, height, Float4::ZERO);
     for (y, row) in image.rows().enumerate() {
-        let line = &mut plane[(y + BORDER_TEXELS) * width + BORDER_TEXELS..][..row.len()];
-        line.iter_mut().zip(row).for_each(|(a, &p)| *a = channel(p));
+        let line = &mut texels.row_mut(y + BORDER_TEXELS)[BORDER_TEXELS..];
+        line.iter_mut().zip(row).for_each(|(o, &p)| *o = opacity(p));
     }
-    plane
+    texels
 }
 
-fn bordered_size((width, height): (usize, usize)) -> (usize, usize) {
-    (width + 2 * BORDER_TEXELS, height + 2 * BORDER_TEXELS)
+/// Every texel inside of the border stops all light.
+fn is_opaque(texels: &Image<Float4>) -> bool {
+    let inner = |n: usize| BORDER_TEXELS..n - BORDER_TEXELS;
+    let stops_all = |o: &Float4| o.rgb() == LinearRgb::WHITE;
+    let mut rows = inner(texels.height()).map(|y| &texels.row(y)[inner(texels.width())]);
+    rows.all(|row| row.iter().all(stops_all))
 }
 
 /// Dense since it is the innermost loop of shadows: compiled as one piece for each set of vector
-/// instructions, lanes apart.
+/// instructions.
 #[multiversion::multiversion(targets(
     "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2",
     "x86_64+avx2",
     "aarch64+neon"
 ))]
 fn attenuate_line(
-    opacity: &[f32],
+    opacity: &[Float4],
     size: (usize, usize),
     line: &TexelLine,
     first: f32,
-    through: &mut [f32],
+    through: &mut [Float4],
 ) {
     let mut first = first;
     for run in through.chunks_mut(SIMD_LANES) {
         let cells = BilinearCells::along_line(line, first, size);
-        let mut corners = [[0.0; SIMD_LANES]; 4];
-        for lane in 0..SIMD_LANES {
-            let at = cells.at[lane] as usize;
-            let (top, bottom) = (&opacity[at..][..2], &opacity[at + size.0..][..2]);
-            (corners[0][lane], corners[1][lane]) = (top[0], top[1]);
-            (corners[2][lane], corners[3][lane]) = (bottom[0], bottom[1]);
+        for (lane, through) in run.iter_mut().enumerate() {
+            let hidden = cells.texel(lane, opacity, size.0).clamped();
+            *through = through.times(hidden.complement());
         }
-        let mut passes = [0.0; SIMD_LANES];
-        for lane in 0..SIMD_LANES {
-            let (fx, fy) = (cells.fx[lane], cells.fy[lane]);
-            let top = corners[0][lane] + fx * (corners[1][lane] - corners[0][lane]);
-            let bottom = corners[2][lane] + fx * (corners[3][lane] - corners[2][lane]);
-            passes[lane] = 1.0 - (top + fy * (bottom - top)).max(0.0).min(1.0);
-        }
-        run.iter_mut().zip(&passes).for_each(|(t, p)| *t *= p);
         first += SIMD_LANES as f32;
     }
 }

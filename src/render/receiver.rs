@@ -6,13 +6,14 @@
 use crate::geom::Vector3;
 use crate::pixel::LinearRgb;
 use crate::render::float4::Float4;
-use crate::render::half_plane::{grown_side, nodes_inside};
+use crate::render::half_plane::{ConvexShape, grown_side};
 use crate::render::lattice::Lattice;
 use crate::render::light_samples::{LightGroup, LightSamples};
 use crate::render::occluders::Occluders;
 use crate::render::ranges::{range_union, range_until};
 use crate::render::shadow::{ProjectedShadow, ShadowedReceiver, TexelReads};
 use crate::render::shadow_ray::{ShadowRay, shadow_rays};
+use crate::render::texture::BakedTexture;
 use crate::render::view::{
     CameraView, HORIZON_M, LatticeArea, ProjectedPlane, ScenePlane, rows_and_columns,
 };
@@ -26,12 +27,10 @@ use std::ops::Range;
 pub(super) struct Receiver {
     plane: ProjectedPlane,
     /// Nodes outside of these sides are not requested.
-    outline: Vec<Vector3<f64>>,
+    outline: ConvexShape,
     pub(super) columns: Range<usize>,
     pub(super) rows: Range<usize>,
     groups: Vec<RayGroup>,
-    /// Channels that occluders differ in: 1, or 3 where there is film.
-    channels: usize,
     /// Irradiance that comes from other lights than these, before anything is lost.
     open_sky: LinearRgb,
 }
@@ -72,19 +71,13 @@ impl ReceiverIrradiance {
     }
 
     /// Spreads the light at the requested nodes of a row as the shot says.
-    pub(super) fn spread_light(
-        &self,
-        j: usize,
-        requested: &Range<usize>,
-        out: &mut [Float4],
-        buffers: &mut RowBuffers,
-    ) {
+    pub(super) fn spread_light(&self, row: &mut RowSums, out: &mut [Float4]) {
         let Some(grid) = &self.light_grid else {
             return;
         };
         self.fine
-            .fill_positions(j, requested, &mut buffers.position);
-        let [x, y, _] = &buffers.position;
+            .fill_positions(row.j, &row.requested, &mut row.position);
+        let [x, y, _] = &row.position;
         for (out, (x, y)) in out.iter_mut().zip(x.iter().zip(y)) {
             *out = out.light_scaled(grid.factor_at(f64::from(*x), f64::from(*y)));
         }
@@ -145,14 +138,14 @@ impl<'a> LightingContext<'a> {
         ))
     }
 
-    /// Card number `own`, at the nodes where the card is seen and one around. None where it is not
-    /// seen at all.
-    pub(super) fn card(&self, own: usize, reach: [f64; 2]) -> Option<ReceiverIrradiance> {
+    /// Card number `own`, at the nodes where anything is seen on it and one around. None where the
+    /// card is not seen at all.
+    pub(super) fn card(&self, own: usize, seen: &SeenSide<'_>) -> Option<ReceiverIrradiance> {
         let lights = self.light_samples(&self.occluders.cards[own].plane)?;
         let [faces, sky] = SelectedLights::split(&lights);
         Some(ReceiverIrradiance {
-            fine: self.card_on(&self.fine, own, reach, faces)?,
-            coarse: self.card_on(&self.coarse, own, reach, sky)?,
+            fine: self.card_on(&self.fine, own, seen, faces)?,
+            coarse: self.card_on(&self.coarse, own, seen, sky)?,
             relative: false,
             light_grid: self.shot.light_grid.clone(),
         })
@@ -162,18 +155,18 @@ impl<'a> LightingContext<'a> {
         &self,
         lattice: &Lattice,
         own: usize,
-        reach: [f64; 2],
+        seen: &SeenSide<'_>,
         lights: SelectedLights<'_>,
     ) -> Option<Receiver> {
         let (view, plane) = (&lattice.view, &self.occluders.cards[own].plane);
         let projected = ProjectedPlane::new(plane, view)?;
-        let area = rows_and_columns(plane, reach, view);
+        let area = rows_and_columns(plane, seen.texture.grid.reach, view);
         if area.0.len() < 2 || area.1.len() < 2 {
             return None;
         }
         let shadowed = ShadowedReceiver::new(&projected, &area, view, Some(own), &plane.center);
         let groups = self.ray_groups(&shadowed, lights);
-        let outline = card_outline(&projected, reach);
+        let outline = seen.outline(&projected);
         Some(self.receiver(projected, groups, lights, (outline, area)))
     }
 
@@ -201,7 +194,12 @@ impl<'a> LightingContext<'a> {
         let shadowed = ShadowedReceiver::new(&projected, &everywhere, view, None, &origin);
         let groups = self.ray_groups(&shadowed, lights);
         let area = shadowed_area(&groups);
-        Some(self.receiver(projected, groups, lights, (vec![projected.w], area)))
+        Some(self.receiver(
+            projected,
+            groups,
+            lights,
+            (ConvexShape::new(&[projected.w]), area),
+        ))
     }
 
     fn ray_groups(
@@ -224,11 +222,10 @@ impl<'a> LightingContext<'a> {
         plane: ProjectedPlane,
         groups: Vec<RayGroup>,
         lights: SelectedLights<'_>,
-        (outline, (rows, columns)): (Vec<Vector3<f64>>, LatticeArea),
+        (outline, (rows, columns)): (ConvexShape, LatticeArea),
     ) -> Receiver {
         Receiver {
             groups,
-            channels: if self.occluders.tinted { 3 } else { 1 },
             open_sky: lights.open_sky,
             plane,
             outline,
@@ -246,11 +243,20 @@ impl<'a> SelectedLights<'a> {
     }
 }
 
-/// Sides of the requested nodes of a card: two nodes further out, for the finer lattice's one that
-/// lies between them.
-fn card_outline(plane: &ProjectedPlane, reach: [f64; 2]) -> Vec<Vector3<f64>> {
-    let sides = plane.sides(reach);
-    sides.iter().map(|s| grown_side(s, 2.0)).collect()
+/// The side of a card that is turned to the camera.
+pub(super) struct SeenSide<'a> {
+    pub(super) texture: &'a BakedTexture,
+    /// Its texture runs the other way.
+    pub(super) mirrored: bool,
+}
+
+impl SeenSide<'_> {
+    /// The requested nodes of a card: two further out than anything is seen on it, for the finer
+    /// lattice's one that lies between them.
+    fn outline(&self, plane: &ProjectedPlane) -> ConvexShape {
+        let sides = self.texture.sides_on(&plane.mirrored_if(self.mirrored));
+        ConvexShape::new(&sides.map(|side| grown_side(&side, 2.0)))
+    }
 }
 
 /// Bounds of all shadows on a receiver.
@@ -279,29 +285,49 @@ fn finer_nodes(coarse: &Range<usize>) -> Range<usize> {
     }
 }
 
-/// Scratch of one task, a value per node of a row.
+/// Scratch of one task.
 #[derive(Default)]
-pub(super) struct RowBuffers {
+pub(super) struct BandBuffers {
+    /// The rows of the band.
+    pub(super) rows: Vec<RowSums>,
+    /// A row of hidden irradiance of the coarser lattice.
+    pub(super) coarse: Vec<Float4>,
+    ray: RayBuffers,
+}
+
+/// What is added up for a row: a value per requested node.
+#[derive(Default)]
+pub(super) struct RowSums {
+    /// Its number.
+    j: usize,
+    pub(super) requested: Range<usize>,
     /// World position.
     position: [Vec<f32>; 3],
-    /// Irradiance by unit radiance of one ray, and of all rays of a group.
-    ray: Vec<f32>,
+    /// Irradiance by unit radiance of all rays of a group in the open, and what the group loses to
+    /// occluders, per channel, nothing between groups.
     group: Vec<f32>,
-    /// Share of a ray that passes the occluders, and what a group loses to them, per channel.
-    through: [Vec<f32>; 3],
-    lost: [Vec<f32>; 3],
-    /// Nodes that each shadow of a ray touches.
-    touched: Vec<(usize, Range<usize>)>,
+    lost: Vec<Float4>,
+    /// Where it loses anything, counted from the first requested node.
+    touched: Range<usize>,
     /// Irradiance in the open.
     pub(super) open: Vec<Float4>,
     /// Irradiance that occluders take away.
     pub(super) hidden: Vec<Float4>,
-    /// A row of hidden irradiance of the coarser lattice.
-    pub(super) coarse: Vec<Float4>,
+}
+
+/// A row of one ray.
+#[derive(Default)]
+struct RayBuffers {
+    /// Irradiance by unit radiance.
+    strength: Vec<f32>,
+    /// Share that passes the occluders, per channel.
+    through: Vec<Float4>,
+    /// Nodes that each shadow touches.
+    touched: Vec<(usize, Range<usize>)>,
     counts: RayCounts,
 }
 
-/// What one row took.
+/// What some rows took.
 #[derive(Default)]
 struct RayCounts {
     light: usize,
@@ -323,20 +349,26 @@ impl RayCounts {
 impl Receiver {
     /// The requested nodes of a row.
     pub(super) fn requested_nodes(&self, j: usize) -> Range<usize> {
-        nodes_inside(&self.outline, j, &self.columns)
+        self.outline.nodes(j, &self.columns)
     }
 
-    /// Open and hidden irradiance at the requested nodes of a row: the open sky and this receiver's
-    /// own lights.
-    pub(super) fn gather_row(&self, j: usize, requested: &Range<usize>, buffers: &mut RowBuffers) {
-        buffers.start_row(requested.len(), self.open_sky.into());
-        if self.groups.iter().any(RayGroup::has_faces) {
-            self.fill_positions(j, requested, &mut buffers.position);
+    /// Open and hidden irradiance at the requested nodes of some rows: the open sky and this
+    /// receiver's own lights.
+    ///
+    /// Ray by ray, so that the part of a texture that throws a shadow on the rows is read at once.
+    pub(super) fn gather_band(&self, rows: Range<usize>, buffers: &mut BandBuffers) {
+        buffers.rows.resize_with(rows.len(), RowSums::default);
+        let has_faces = self.groups.iter().any(RayGroup::has_faces);
+        for (row, j) in buffers.rows.iter_mut().zip(rows) {
+            row.start(j, self.requested_nodes(j), self.open_sky.into());
+            if has_faces {
+                self.fill_positions(j, &row.requested, &mut row.position);
+            }
         }
         for group in &self.groups {
-            self.gather_group(group, j, requested, buffers);
+            gather_group(group, &mut buffers.rows, &mut buffers.ray);
         }
-        work::add_all(std::mem::take(&mut buffers.counts).into_work());
+        work::add_all(std::mem::take(&mut buffers.ray.counts).into_work());
     }
 
     /// Whether there are two nodes along each side.
@@ -356,55 +388,6 @@ impl Receiver {
         }
     }
 
-    fn gather_group(
-        &self,
-        group: &RayGroup,
-        j: usize,
-        requested: &Range<usize>,
-        buffers: &mut RowBuffers,
-    ) {
-        buffers.start_group(requested.len(), group.has_faces(), self.channels);
-        let touched = group
-            .rays
-            .iter()
-            .map(|ray| self.gather_ray(ray, j, requested, buffers))
-            .reduce(range_union);
-        add_open(&mut buffers.open, &buffers.group, group.radiance.into());
-        if let Some(touched) = touched.filter(|t| !t.is_empty()) {
-            buffers.add_hidden_light(touched, self.channels, group.radiance);
-        }
-    }
-
-    /// Adds up a ray; returns the nodes (counted from the first requested one) where something is
-    /// in its way.
-    fn gather_ray(
-        &self,
-        ray: &ShadowRay,
-        j: usize,
-        requested: &Range<usize>,
-        buffers: &mut RowBuffers,
-    ) -> Range<usize> {
-        buffers.ray.resize(requested.len(), 0.0);
-        // What the sky gives in the open is in `open_sky`.
-        if ray.is_face() {
-            buffers.add_face(ray);
-        }
-        let Some(all) = buffers.touch_shadows(ray, j, requested) else {
-            return 0..0;
-        };
-        let here = all.start - requested.start..all.end - requested.start;
-        if !ray.is_face() {
-            let strength = &mut buffers.ray[here.clone()];
-            ray.unit_irradiance().fill([&[]; 3], strength);
-        }
-        buffers.counts.shadow += all.len();
-        for channel in 0..self.channels {
-            buffers.fill_through(ray, channel, j, &all);
-            buffers.add_lost(channel, here.clone());
-        }
-        here
-    }
-
     /// World positions of a row's nodes.
     fn fill_positions(&self, j: usize, requested: &Range<usize>, out: &mut [Vec<f32>; 3]) {
         let plane = &self.plane;
@@ -419,46 +402,89 @@ impl Receiver {
     }
 }
 
-impl RowBuffers {
-    /// Empties what is added up for one row: nothing but the open sky, and nothing hidden.
-    fn start_row(&mut self, n: usize, open_sky: Float4) {
-        refill(&mut self.open, n, open_sky);
-        refill(&mut self.hidden, n, Float4::ZERO);
+/// Adds up a group of rays.
+fn gather_group(group: &RayGroup, rows: &mut [RowSums], buffers: &mut RayBuffers) {
+    let has_faces = group.has_faces();
+    for row in rows.iter_mut() {
+        row.start_group(has_faces);
+    }
+    for ray in &group.rays {
+        let wanted = rows.iter_mut().filter(|row| !row.requested.is_empty());
+        wanted.for_each(|row| row.add_ray(ray, buffers));
+    }
+    for row in rows {
+        row.add_group(group.radiance.into());
+    }
+}
+
+impl RowSums {
+    /// Empties what is added up: nothing but the open sky, and nothing hidden.
+    fn start(&mut self, j: usize, requested: Range<usize>, open_sky: Float4) {
+        refill(&mut self.open, requested.len(), open_sky);
+        refill(&mut self.hidden, requested.len(), Float4::ZERO);
+        refill(&mut self.lost, requested.len(), Float4::ZERO);
+        (self.j, self.requested) = (j, requested);
     }
 
     /// Empties what is added up for one group.
-    fn start_group(&mut self, n: usize, has_faces: bool, channels: usize) {
+    fn start_group(&mut self, has_faces: bool) {
+        let n = self.requested.len();
         refill(&mut self.group, if has_faces { n } else { 0 }, 0.0);
-        for lost in self.lost.iter_mut().take(channels) {
-            refill(lost, n, 0.0);
-        }
+        self.touched = 0..0;
     }
 
-    /// Adds what a group loses at some nodes to what is hidden there.
-    fn add_hidden_light(&mut self, nodes: Range<usize>, channels: usize, radiance: LinearRgb) {
-        let lost = [0, 1, 2].map(|c: usize| &self.lost[c.min(channels - 1)][nodes.clone()]);
-        add_hidden(&mut self.hidden[nodes.clone()], lost, radiance);
-    }
-
-    /// Adds what a ray loses at some nodes to what its group loses, in one channel.
-    fn add_lost(&mut self, channel: usize, nodes: Range<usize>) {
-        let lost = self.lost[channel][nodes.clone()].iter_mut();
-        let passes = self.ray[nodes].iter().zip(&self.through[channel]);
-        for (lost, (e, t)) in lost.zip(passes) {
-            *lost += e * (1.0 - t);
+    /// Adds a ray to its group.
+    fn add_ray(&mut self, ray: &ShadowRay, buffers: &mut RayBuffers) {
+        buffers.strength.resize(self.requested.len(), 0.0);
+        // What the sky gives in the open is in the open sky.
+        if ray.is_face() {
+            self.add_face(ray, buffers);
         }
+        let Some(all) = buffers.touch_shadows(ray, self.j, &self.requested) else {
+            return;
+        };
+        let here = all.start - self.requested.start..all.end - self.requested.start;
+        if !ray.is_face() {
+            let strength = &mut buffers.strength[here.clone()];
+            ray.unit_irradiance().fill([&[]; 3], strength);
+        }
+        buffers.fill_through(ray, self.j, &all);
+        self.add_lost(here, buffers);
     }
 
     /// Adds the open irradiance of a piece of an area light to its group.
-    fn add_face(&mut self, ray: &ShadowRay) {
+    fn add_face(&mut self, ray: &ShadowRay, buffers: &mut RayBuffers) {
         let [x, y, z] = &self.position;
-        ray.unit_irradiance().fill([x, y, z], &mut self.ray);
-        for (sum, e) in self.group.iter_mut().zip(&self.ray) {
+        ray.unit_irradiance().fill([x, y, z], &mut buffers.strength);
+        for (sum, e) in self.group.iter_mut().zip(&buffers.strength) {
             *sum += e;
         }
-        self.counts.light += self.ray.len();
+        buffers.counts.light += buffers.strength.len();
     }
 
+    /// Adds what a ray loses at some nodes to what its group loses.
+    fn add_lost(&mut self, nodes: Range<usize>, buffers: &RayBuffers) {
+        let lost = self.lost[nodes.clone()].iter_mut();
+        let passes = buffers.strength[nodes.clone()].iter().zip(&buffers.through);
+        for (lost, (&e, through)) in lost.zip(passes) {
+            *lost = lost.add_scaled(e, through.complement());
+        }
+        self.touched = range_union(self.touched.clone(), nodes);
+    }
+
+    /// Adds a group of this radiance to open and to hidden irradiance.
+    fn add_group(&mut self, radiance: Float4) {
+        for (open, &e) in self.open.iter_mut().zip(&self.group) {
+            *open = open.add_scaled(e, radiance);
+        }
+        let hidden = self.hidden[self.touched.clone()].iter_mut();
+        for (hidden, lost) in hidden.zip(&mut self.lost[self.touched.clone()]) {
+            *hidden = hidden.add_product(std::mem::take(lost), radiance);
+        }
+    }
+}
+
+impl RayBuffers {
     /// Notes which nodes of a row each shadow touches; returns the bounds of all of them.
     fn touch_shadows(
         &mut self,
@@ -467,24 +493,21 @@ impl RowBuffers {
         requested: &Range<usize>,
     ) -> Option<Range<usize>> {
         self.touched.clear();
-        let nodes = ray
-            .shadows
-            .iter()
-            .map(|s| s.nodes(j, requested))
-            .enumerate();
+        let shadows = ray.shadows.iter().enumerate();
+        let nodes = shadows.map(|(k, shadow)| (k, shadow.nodes(j, requested)));
         self.touched
             .extend(nodes.filter(|(_, nodes)| !nodes.is_empty()));
         let touched = self.touched.iter().map(|(_, nodes)| nodes.clone());
         touched.reduce(range_union)
     }
 
-    /// Computes what passes all shadows of a ray at these nodes, in one channel.
-    fn fill_through(&mut self, ray: &ShadowRay, channel: usize, j: usize, all: &Range<usize>) {
-        let through = &mut self.through[channel];
-        refill(through, all.len(), 1.0);
+    /// Computes what passes all shadows of a ray at these nodes.
+    fn fill_through(&mut self, ray: &ShadowRay, j: usize, all: &Range<usize>) {
+        self.counts.shadow += all.len();
+        refill(&mut self.through, all.len(), Float4::ONE);
         for (k, nodes) in &self.touched {
-            let through = &mut through[nodes.start - all.start..nodes.end - all.start];
-            self.counts.through += ray.shadows[*k].attenuate(channel, j, nodes, through);
+            let through = &mut self.through[nodes.start - all.start..nodes.end - all.start];
+            self.counts.through += ray.shadows[*k].attenuate(j, nodes, through);
         }
     }
 }
@@ -495,23 +518,5 @@ fn fill_quotients(p: (f64, f64), w: (f64, f64), lowest: f64, out: &mut [f32]) {
     for (i, out) in out.iter_mut().enumerate() {
         let k = i as f64;
         *out = ((p.0 + k * p.1) / (w.0 + k * w.1).max(lowest)) as f32;
-    }
-}
-
-fn add_open(open: &mut [Float4], group: &[f32], radiance: Float4) {
-    for (o, &e) in open.iter_mut().zip(group) {
-        *o = o.add_scaled(e, radiance);
-    }
-}
-
-fn add_hidden(hidden: &mut [Float4], [r, g, b]: [&[f32]; 3], radiance: LinearRgb) {
-    for (((h, &r), &g), &b) in hidden.iter_mut().zip(r).zip(g).zip(b) {
-        let [x, y, z, _] = h.0;
-        *h = Float4([
-            x + r * radiance.r,
-            y + g * radiance.g,
-            z + b * radiance.b,
-            0.0,
-        ]);
     }
 }

@@ -1,8 +1,9 @@
 //! A level of a pyramid made up to two times smaller, with a transparent border.
 
 use crate::image::Image;
-use crate::render::float4::Float4;
+use crate::render::float8::Float8;
 use crate::render::texel_grid::BORDER_TEXELS;
+use bytemuck::Pod;
 
 /// A level of detail, and how much smaller the picture becomes.
 #[derive(Clone, Copy)]
@@ -16,7 +17,7 @@ pub(super) struct DetailLevel {
 pub(super) struct BorderedTexels {
     pub(super) width: usize,
     pub(super) height: usize,
-    pub(super) texels: Vec<Float4>,
+    pub(super) texels: Vec<Float8>,
 }
 
 impl DetailLevel {
@@ -28,22 +29,18 @@ impl DetailLevel {
         }
     }
 
-    /// Reads a picture from its pyramid.
-    pub(super) fn resample<'a, P: Copy + 'a>(
+    /// Reads a picture of floats from its pyramid.
+    pub(super) fn resample<'a, P: Pod + Into<Float8>>(
         &self,
         level: impl Fn(usize) -> &'a Image<P>,
-        texel: impl Fn(P) -> Float4,
     ) -> BorderedTexels {
         let image = level(self.level);
         let columns = downsample_axis(image.width(), self.step);
         let rows = downsample_axis(image.height(), self.step);
         let mut out = BorderedTexels::transparent(columns.len(), rows.len());
-        let mut averages = RowAverages::new(image, texel);
+        let mut averages = RowAverages::new(image);
         for (row, line) in rows.iter().zip(out.inner_lines()) {
-            let average = averages.average(row);
-            for (column, out) in columns.iter().zip(line) {
-                *out = column.weighted_sum(average);
-            }
+            average_columns(&columns, averages.average(row), line);
         }
         out
     }
@@ -56,12 +53,12 @@ impl BorderedTexels {
         Self {
             width,
             height,
-            texels: vec![Float4::ZERO; width * height],
+            texels: vec![Float8::ZERO; width * height],
         }
     }
 
     /// Rows from the first inside of the border on, without the border on their left.
-    fn inner_lines(&mut self) -> impl Iterator<Item = &mut [Float4]> {
+    fn inner_lines(&mut self) -> impl Iterator<Item = &mut [Float8]> {
         self.texels
             .chunks_exact_mut(self.width)
             .skip(BORDER_TEXELS)
@@ -70,44 +67,59 @@ impl BorderedTexels {
 }
 
 /// Rows of a picture, averaged.
-struct RowAverages<'a, P, F> {
+struct RowAverages<'a, P> {
     image: &'a Image<P>,
-    texel: F,
-    line: Vec<Float4>,
-    sum: Vec<Float4>,
+    /// The channels of a row's pixels.
+    sum: Vec<f32>,
+    line: Vec<Float8>,
 }
 
-impl<'a, P: Copy, F: Fn(P) -> Float4> RowAverages<'a, P, F> {
-    fn new(image: &'a Image<P>, texel: F) -> Self {
+impl<'a, P: Pod + Into<Float8>> RowAverages<'a, P> {
+    fn new(image: &'a Image<P>) -> Self {
+        let channels = size_of::<P>() / size_of::<f32>();
         Self {
             image,
-            texel,
-            line: vec![Float4::ZERO; image.width()],
-            sum: vec![Float4::ZERO; image.width()],
+            sum: vec![0.0; image.width() * channels],
+            line: vec![Float8::ZERO; image.width()],
         }
     }
 
-    fn average(&mut self, rows: &TexelWeights) -> &[Float4] {
-        self.sum.fill(Float4::ZERO);
+    fn average(&mut self, rows: &TexelWeights) -> &[Float8] {
+        self.sum.fill(0.0);
         for (y, weight) in rows.weighted() {
-            self.read_line(y);
-            self.add_line(weight);
+            add_row(
+                &mut self.sum,
+                weight,
+                bytemuck::cast_slice(self.image.row(y)),
+            );
         }
-        &self.sum
+        let sums: &[P] = bytemuck::cast_slice(&self.sum);
+        for (t, &p) in self.line.iter_mut().zip(sums) {
+            *t = p.into();
+        }
+        &self.line
     }
+}
 
-    #[inline]
-    fn add_line(&mut self, weight: f32) {
-        for (s, t) in self.sum.iter_mut().zip(&self.line) {
-            *s = s.add_scaled(weight, *t);
-        }
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2",
+    "x86_64+avx2",
+    "aarch64+neon"
+))]
+fn add_row(sum: &mut [f32], weight: f32, row: &[f32]) {
+    for (s, v) in sum.iter_mut().zip(row) {
+        *s += weight * v;
     }
+}
 
-    #[inline]
-    fn read_line(&mut self, y: usize) {
-        for (t, &p) in self.line.iter_mut().zip(self.image.row(y)) {
-            *t = (self.texel)(p);
-        }
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2",
+    "x86_64+avx2",
+    "aarch64+neon"
+))]
+fn average_columns(columns: &[TexelWeights], line: &[Float8], out: &mut [Float8]) {
+    for (column, out) in columns.iter().zip(out) {
+        *out = column.weighted_sum(line);
     }
 }
 
@@ -147,8 +159,8 @@ impl TexelWeights {
     }
 
     #[inline(always)]
-    fn weighted_sum(&self, texels: &[Float4]) -> Float4 {
-        self.weighted().fold(Float4::ZERO, |sum, (x, weight)| {
+    fn weighted_sum(&self, texels: &[Float8]) -> Float8 {
+        self.weighted().fold(Float8::ZERO, |sum, (x, weight)| {
             sum.add_scaled(weight, texels[x])
         })
     }

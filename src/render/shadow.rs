@@ -2,11 +2,11 @@
 //! through.
 
 use crate::geom::Vector3;
-use crate::render::half_plane::{nodes_inside, quad_sides};
+use crate::render::float4::Float4;
+use crate::render::half_plane::{ConvexShape, nodes_inside, quad_sides};
 use crate::render::light_samples::LightSample;
 use crate::render::occluders::{Occluder, Occluders};
 use crate::render::opacity::OpacityLevel;
-
 use crate::render::texel_grid::{TexelLine, texel_line};
 use crate::render::view::{
     CameraView, LatticeArea, ProjectedPlane, ScenePlane, areas_meet, texture_rows,
@@ -82,7 +82,7 @@ pub(super) struct ProjectedShadow {
     pub(super) rows: Range<usize>,
     /// Columns that the shadow may touch.
     pub(super) columns: Range<usize>,
-    sides: Vec<Vector3<f64>>,
+    shape: ConvexShape,
     /// Position among the texels, `u/w` and `v/w`.
     u: Vector3<f64>,
     v: Vector3<f64>,
@@ -223,7 +223,7 @@ impl<'a> ShadowProjection<'a> {
         ProjectedShadow {
             rows: 0..self.receiver.view.height,
             columns: 0..self.receiver.view.width,
-            sides: self.surface_sides(surface),
+            shape: ConvexShape::new(&self.surface_sides(surface)),
             u: Vector3::zeros(),
             v: Vector3::zeros(),
             w: Vector3::zeros(),
@@ -290,29 +290,23 @@ impl CardMap {
         depth: Vector3<f64>,
         opacity: Arc<OpacityLevel>,
     ) -> ProjectedShadow {
-        let sides = self.sides(depth, opacity.grid.reach);
-        let Self { u, v, w, .. } = self;
+        let Self { u, v, w, below } = self;
         let inset = opacity.opaque_inset();
         let inside = inset.map(|inset| quad_sides(&u, &v, &w, inset.map(|by| -by)));
         let [u, v] = opacity.grid.texel_rows(&u, &v, &w);
+        // It ends where the card does, below the card, and in front of the eye.
+        let mut sides = opacity.extent.sides([&u, &v], &w).to_vec();
+        sides.extend([below, depth]);
         ProjectedShadow {
             rows,
             columns,
-            sides,
+            shape: ConvexShape::new(&sides),
             u,
             v,
             w,
             opacity: Some(opacity),
             inside,
         }
-    }
-
-    /// Where the shadow ends: at the card's sides, below the card, and in front of the eye.
-    fn sides(&self, depth: Vector3<f64>, reach: [f64; 2]) -> Vec<Vector3<f64>> {
-        let mut sides = quad_sides(&self.u, &self.v, &self.w, reach).to_vec();
-        sides[4] = self.below;
-        sides.push(depth);
-        sides
     }
 }
 
@@ -321,35 +315,34 @@ impl ProjectedShadow {
     pub(super) fn area(&self) -> LatticeArea {
         (self.rows.clone(), self.columns.clone())
     }
+
     /// Nodes of a row that the shadow touches.
     pub(super) fn nodes(&self, j: usize, within: &Range<usize>) -> Range<usize> {
         if !self.rows.contains(&j) {
             return within.start..within.start;
         }
-        nodes_inside(&self.sides, j, within)
+        self.shape.nodes(j, within)
     }
 
-    /// Multiplies what gets through to these nodes of a row, in one channel; returns what had to be
-    /// read for it.
+    /// Multiplies what gets through to these nodes of a row; returns what had to be read for it.
     pub(super) fn attenuate(
         &self,
-        channel: usize,
         j: usize,
         nodes: &Range<usize>,
-        through: &mut [f32],
+        through: &mut [Float4],
     ) -> TexelReads {
         let Some(opacity) = &self.opacity else {
-            through.fill(0.0);
+            through.fill(Float4::ZERO);
             return TexelReads::default();
         };
         let line = self.texel_line(j, nodes);
         if let Some(dark) = self.dark_nodes(j, nodes) {
-            through[dark.clone()].fill(0.0);
-            opacity.attenuate(channel, &line, 0, &mut through[..dark.start]);
-            opacity.attenuate(channel, &line, dark.end, &mut through[dark.end..]);
+            through[dark.clone()].fill(Float4::ZERO);
+            opacity.attenuate(&line, 0, &mut through[..dark.start]);
+            opacity.attenuate(&line, dark.end, &mut through[dark.end..]);
             TexelReads::at_edges(nodes.len() - dark.len())
         } else {
-            opacity.attenuate(channel, &line, 0, through);
+            opacity.attenuate(&line, 0, through);
             TexelReads::see_through(nodes.len())
         }
     }

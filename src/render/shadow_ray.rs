@@ -118,6 +118,7 @@ mod tests {
     use crate::image::Image;
     use crate::pixel::{LinearRgb, ObjectId, PremulRgba};
     use crate::render::RenderOptions;
+    use crate::render::float4::Float4;
     use crate::render::light_samples::LightSamples;
     use crate::render::view::{
         CameraView, LatticeArea, ProjectedPlane, ScenePlane, visible_planes,
@@ -211,11 +212,10 @@ mod tests {
                     for j in shadow.rows.clone() {
                         let nodes = shadow.nodes(j, &(0..view.width));
                         let inside = shadow.inside;
-                        let [mut quick, mut read] =
-                            [vec![1.0; nodes.len()], vec![1.0; nodes.len()]];
-                        edges += shadow.attenuate(0, j, &nodes, &mut quick).edges;
+                        let [mut quick, mut read] = [0, 1].map(|_| vec![Float4::ONE; nodes.len()]);
+                        edges += shadow.attenuate(j, &nodes, &mut quick).edges;
                         shadow.inside = None;
-                        all += shadow.attenuate(0, j, &nodes, &mut read).see_through;
+                        all += shadow.attenuate(j, &nodes, &mut read).see_through;
                         shadow.inside = inside;
                         assert_eq!(quick, read, "tilt {tilt}, row {j}");
                     }

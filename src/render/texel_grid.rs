@@ -1,10 +1,14 @@
 //! Where a texture's texels lie, and how a line of positions falls between them.
 
 use crate::geom::Vector3;
+use crate::render::float4::Blend;
 
 /// Transparent texels around a texture: what positions reach beyond its outermost ones, and one to
 /// read on.
 pub(super) const BORDER_TEXELS: usize = 2;
+
+/// Positions in single precision are off by less than this, texels.
+pub(super) const POSITION_ERROR_TEXELS: f64 = 1.0 / 8.0;
 
 /// Positions are worked out for this many samples at once: a register of AVX-512, two of AVX2.
 pub(super) const SIMD_LANES: usize = 16;
@@ -93,6 +97,19 @@ impl BilinearCells {
             (cells.fx[lane], cells.fy[lane]) = (fx, fy);
         }
         cells
+    }
+
+    /// What a sample reads of texels whose rows are `stride` long.
+    #[inline(always)]
+    pub(super) fn texel<T: Blend>(&self, lane: usize, texels: &[T], stride: usize) -> T {
+        let at = self.at[lane] as usize;
+        let (top, bottom) = (&texels[at..][..2], &texels[at + stride..][..2]);
+        T::bilinear(
+            [top[0], top[1]],
+            [bottom[0], bottom[1]],
+            self.fx[lane],
+            self.fy[lane],
+        )
     }
 }
 

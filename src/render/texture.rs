@@ -2,11 +2,14 @@
 //! colours.
 
 use crate::asset::Texture;
-use crate::pixel::{Film, PremulRgba};
+use crate::geom::Vector3;
 use crate::render::float4::Float4;
-use crate::render::grade::{channel_mean, grade_colors, graded_opacity};
+use crate::render::float8::Float8;
+use crate::render::grade::{channel_mean, grade_texels};
 use crate::render::resample::{BorderedTexels, DetailLevel};
+use crate::render::texel_extent::TexelExtent;
 use crate::render::texel_grid::TexelGrid;
+use crate::render::view::ProjectedPlane;
 use crate::scene::Grade;
 
 /// Colour and opacity at the level of detail that a picture asks for.
@@ -15,29 +18,45 @@ pub(super) struct BakedTexture {
     pub(super) grid: TexelGrid,
     width: usize,
     height: usize,
-    /// Colour, and alpha; for film the mean opacity.
-    pub(super) texels: Vec<Float4>,
-    /// Opacity of film, per channel; empty for a texture with alpha.
-    pub(super) opacity: Vec<Float4>,
+    pub(super) texels: BakedTexels,
+    /// Where there is anything on it.
+    extent: TexelExtent,
+}
+
+/// Texels, row by row.
+#[derive(Debug)]
+pub(super) enum BakedTexels {
+    /// Colour and alpha.
+    Alpha(Vec<Float4>),
+    /// The same with the opacity of each channel, for pictures with film; alpha is its mean.
+    Film(Vec<Float8>),
 }
 
 impl BakedTexture {
-    /// A texture at a level of detail, which need not be an integer, in a card's own colours.
+    /// A texture at a level of detail, which need not be an integer, in a card's own colours; for a
+    /// picture with film or without.
     ///
     /// The level below is averaged further, so that there are no more texels than are needed and a
     /// reading costs four of them.
-    pub(super) fn new(texture: &Texture, grade: &Grade, level: f64) -> Self {
+    pub(super) fn new(texture: &Texture, grade: &Grade, level: f64, with_film: bool) -> Self {
         let level = level.clamp(0.0, (texture.levels() - 1) as f64);
-        let (colors, opacity) = resample_texture(texture, DetailLevel::new(level));
-        let mut baked = Self {
-            grid: TexelGrid::new(texture.size(), level),
-            width: colors.width,
-            height: colors.height,
-            texels: colors.texels,
-            opacity,
-        };
-        baked.apply_grade(grade);
-        baked
+        let mut baked = resample_texture(texture, DetailLevel::new(level));
+        let grid = TexelGrid::new(texture.size(), level);
+        grade_texels(&mut baked.texels, grade);
+        if texture.is_film() {
+            average_opacity(&mut baked.texels);
+        }
+        Self {
+            extent: TexelExtent::around(&baked.texels, baked.width, &grid),
+            grid,
+            width: baked.width,
+            height: baked.height,
+            texels: if with_film {
+                BakedTexels::Film(baked.texels)
+            } else {
+                BakedTexels::Alpha(baked.texels.iter().map(|t| t.color()).collect())
+            },
+        }
     }
 
     /// Columns and rows with their border.
@@ -46,46 +65,27 @@ impl BakedTexture {
         (self.width, self.height)
     }
 
-    fn apply_grade(&mut self, grade: &Grade) {
-        grade_colors(&mut self.texels, grade);
-        self.grade_opacity(grade);
-        self.average_opacity();
-    }
-
-    /// Alpha of a film's texels is the mean opacity of their channels.
-    fn average_opacity(&mut self) {
-        for (t, o) in self.texels.iter_mut().zip(&self.opacity) {
-            t.0[3] = channel_mean(o.rgb());
-        }
-    }
-
-    /// Film of another hue lets another hue pass; how bright it reflects does not change what
-    /// passes.
-    fn grade_opacity(&mut self, grade: &Grade) {
-        let through = Grade {
-            value: 1.0,
-            ..*grade
-        };
-        if through != Grade::default() {
-            for o in self.opacity.iter_mut().filter(|o| **o != Float4::ZERO) {
-                *o = graded_opacity(o.rgb(), &through).into();
-            }
-        }
+    /// Linear conditions on `(x, y, 1)` where a plane shows anything of it, and is in front of the
+    /// eye.
+    pub(super) fn sides_on(&self, plane: &ProjectedPlane) -> [Vector3<f64>; 9] {
+        let [u, v] = self.grid.texel_rows(&plane.u, &plane.v, &plane.w);
+        let sides = self.extent.sides([&u, &v], &plane.w);
+        std::array::from_fn(|k| sides.get(k).copied().unwrap_or(plane.w))
     }
 }
 
-/// Colours, and the opacity of film.
-fn resample_texture(texture: &Texture, detail: DetailLevel) -> (BorderedTexels, Vec<Float4>) {
+/// Alpha of a film's texels is the mean opacity of their channels.
+fn average_opacity(texels: &mut [Float8]) {
+    for t in texels {
+        let alpha = channel_mean(t.opacity().rgb());
+        *t = Float8::new(t.color().with_fourth(alpha), t.opacity());
+    }
+}
+
+fn resample_texture(texture: &Texture, detail: DetailLevel) -> BorderedTexels {
     match texture {
-        Texture::Rgba(pyramid) => {
-            let texels = detail.resample(|l| pyramid.level(l), |p: PremulRgba| p.into());
-            (texels, Vec::new())
-        }
-        Texture::Film(pyramid) => {
-            let texels = detail.resample(|l| pyramid.level(l), |p: Film| p.color.into());
-            let opacity = detail.resample(|l| pyramid.level(l), |p: Film| p.opacity.into());
-            (texels, opacity.texels)
-        }
+        Texture::Rgba(pyramid) => detail.resample(|l| pyramid.level(l)),
+        Texture::Film(pyramid) => detail.resample(|l| pyramid.level(l)),
     }
 }
 
@@ -93,7 +93,7 @@ fn resample_texture(texture: &Texture, detail: DetailLevel) -> (BorderedTexels, 
 mod tests {
     use super::*;
     use crate::image::Image;
-    use crate::pixel::LinearRgb;
+    use crate::pixel::{Film, LinearRgb, PremulRgba};
     use crate::render::opacity::OpacityLevel;
 
     #[test]
@@ -113,20 +113,22 @@ mod tests {
             ..Grade::default()
         };
         let (a, b) = (
-            BakedTexture::new(&alpha, &grade, 0.6),
-            BakedTexture::new(&film, &grade, 0.6),
+            BakedTexture::new(&alpha, &grade, 0.6, false),
+            BakedTexture::new(&film, &grade, 0.6, true),
         );
-        assert_eq!(a.texels, b.texels);
-        assert!(
-            b.opacity
-                .iter()
-                .zip(&a.texels)
-                .all(|(o, t)| o.rgb() == LinearRgb::grey(t.alpha()))
-        );
+        let (BakedTexels::Alpha(a), BakedTexels::Film(b)) = (a.texels, b.texels) else {
+            panic!("texels of a picture without film, and of one with film");
+        };
+        assert!(a.len() == b.len() && a.iter().zip(&b).all(|(a, b)| *a == b.color()));
+        let is_grey = |t: &Float8| t.opacity().rgb() == LinearRgb::grey(t.color().alpha());
+        assert!(b.iter().all(is_grey));
         let (a, b) = (
             OpacityLevel::new(&alpha, &grade, 1),
             OpacityLevel::new(&film, &grade, 1),
         );
-        assert!(b.planes.len() == 3 && b.planes.iter().all(|plane| *plane == a.planes[0]));
+        let colors = |level: OpacityLevel| -> Vec<LinearRgb> {
+            level.texels.iter().map(|o| o.rgb()).collect()
+        };
+        assert_eq!(colors(a), colors(b));
     }
 }

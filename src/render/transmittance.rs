@@ -6,13 +6,13 @@
 use crate::pixel::LinearRgb;
 use crate::render::block::PixelBlock;
 use crate::render::float4::Float4;
-use crate::render::grade::channel_mean;
+use crate::render::float8::Float8;
 use crate::render::irradiance::IrradianceMap;
 use crate::render::lattice::LatticePosition;
 use crate::render::ranges::range_union;
 use crate::render::refill;
 use crate::render::texel_grid::{BilinearCells, SIMD_LANES, TexelLine};
-use crate::render::texture::BakedTexture;
+use crate::render::texture::{BakedTexels, BakedTexture};
 use crate::work::Kind;
 use std::ops::Range;
 
@@ -34,10 +34,10 @@ pub(super) struct LayerRow {
     /// Pixels that the layer touches.
     pub(super) touched: Range<usize>,
     /// Sum over sub-samples of its colour, as far as it is seen; the fourth number is the same of
-    /// its alpha.
-    pub(super) light: Vec<Float4>,
-    /// The same of its opacity, where there is film.
-    pub(super) hidden: Vec<Float4>,
+    /// its alpha. Where there is no film.
+    light: Vec<Float4>,
+    /// The same, and that of its opacity, where there is film.
+    seen: Vec<Float8>,
     /// Sum of its alpha, whatever is in front.
     pub(super) alpha: Vec<f32>,
     /// Light on it at the sub-samples under work, where that is not the pixel's.
@@ -75,8 +75,9 @@ impl LayerRow {
     pub(super) fn start(&mut self, n: usize, tinted: bool) {
         self.touched = 0..0;
         self.irradiance.clear();
-        refill(&mut self.light, n, Float4::ZERO);
-        refill(&mut self.hidden, if tinted { n } else { 0 }, Float4::ZERO);
+        let (grey, film) = if tinted { (0, n) } else { (n, 0) };
+        refill(&mut self.light, grey, Float4::ZERO);
+        refill(&mut self.seen, film, Float8::ZERO);
         refill(&mut self.alpha, n, 0.0);
     }
 
@@ -86,13 +87,14 @@ impl LayerRow {
         self.read += pixels.len();
     }
 
-    /// What pixel `i` of the layer hides of all behind it, per channel, added up over sub-samples.
+    /// Light of pixel `i` of the layer, and what it hides of all behind it, per channel, added up
+    /// over sub-samples.
     #[inline(always)]
-    pub(super) fn hidden_by(&self, i: usize, tinted: bool) -> LinearRgb {
+    pub(super) fn seen_at(&self, i: usize, tinted: bool) -> (Float4, LinearRgb) {
         if tinted {
-            self.hidden[i].rgb()
+            (self.seen[i].color(), self.seen[i].opacity().rgb())
         } else {
-            LinearRgb::grey(self.light[i].alpha())
+            (self.light[i], LinearRgb::grey(self.light[i].alpha()))
         }
     }
 
@@ -146,21 +148,22 @@ impl Transmittance {
         let SubsampleRun { pixels, line, .. } = run;
         let start = run.plane * self.area + run.y * self.width;
         let places = start + pixels.start..start + pixels.end;
-        let light = &mut row.light[pixels.clone()];
         let alpha = &mut row.alpha[pixels.clone()];
-        let irradiance = &row.irradiance;
-        if self.tinted.is_empty() {
-            let through = &mut self.grey[places];
-            pass_grey(texture, line, irradiance, through, light, alpha);
-        } else {
-            let through = &mut self.tinted[places];
-            let hidden = &mut row.hidden[pixels];
-            pass_tinted(texture, line, irradiance, through, light, alpha, hidden);
+        let (irradiance, size) = (&row.irradiance, texture.size());
+        match &texture.texels {
+            BakedTexels::Alpha(texels) => {
+                let (through, light) = (&mut self.grey[places], &mut row.light[pixels]);
+                pass_grey((texels, size), line, irradiance, through, light, alpha);
+            }
+            BakedTexels::Film(texels) => {
+                let (through, seen) = (&mut self.tinted[places], &mut row.seen[pixels]);
+                pass_film((texels, size), line, irradiance, through, seen, alpha);
+            }
         }
     }
 }
 
-/// A layer without film; `through` is one number a pixel.
+/// A layer in a picture without film; `through` is one number a pixel.
 ///
 /// Dense since it is the renderer's innermost loop: it is compiled as one piece for each set of
 /// vector instructions.
@@ -170,14 +173,13 @@ impl Transmittance {
     "aarch64+neon"
 ))]
 fn pass_grey(
-    texture: &BakedTexture,
+    (texels, size): (&[Float4], (usize, usize)),
     line: &TexelLine,
     irradiance: &[Float4],
     through: &mut [f32],
     light: &mut [Float4],
     alpha: &mut [f32],
 ) {
-    let size = texture.size();
     let runs = through
         .chunks_mut(SIMD_LANES)
         .zip(light.chunks_mut(SIMD_LANES))
@@ -188,7 +190,7 @@ fn pass_grey(
         for (lane, ((through, light), alpha)) in
             through.iter_mut().zip(light).zip(alpha).enumerate()
         {
-            let texel = bilinear_texel(&texture.texels, size.0, &cells, lane);
+            let texel = cells.texel(lane, texels, size.0);
             let a = texel.alpha().max(0.0).min(1.0);
             *light = light.add_scaled(*through, lit_by(texel, irradiance.get(lane)));
             *alpha += a;
@@ -197,55 +199,41 @@ fn pass_grey(
     }
 }
 
-/// A layer where there is film; `through` and `hidden` are a number for each channel.
+/// A layer in a picture with film; `through` is a number for each channel, `seen` is light and
+/// what is hidden.
 ///
-/// Dense since it is the innermost loop where there is film: all that it reads and writes is at
-/// hand in one piece.
-fn pass_tinted(
-    texture: &BakedTexture,
+/// Dense since it is the innermost loop where there is film: it is compiled as one piece for each
+/// set of vector instructions.
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2",
+    "x86_64+avx2",
+    "aarch64+neon"
+))]
+fn pass_film(
+    (texels, size): (&[Float8], (usize, usize)),
     line: &TexelLine,
     irradiance: &[Float4],
     through: &mut [Float4],
-    light: &mut [Float4],
+    seen: &mut [Float8],
     alpha: &mut [f32],
-    hidden: &mut [Float4],
 ) {
-    let size = texture.size();
-    let pixels = through
-        .iter_mut()
-        .zip(light)
-        .zip(alpha.iter_mut().zip(hidden))
-        .enumerate();
-    let mut cells = BilinearCells::along_line(line, 0.0, size);
-    for (i, ((through, light), (alpha, hidden))) in pixels {
-        let lane = i % SIMD_LANES;
-        if lane == 0 {
-            cells = BilinearCells::along_line(line, i as f32, size);
+    let runs = through
+        .chunks_mut(SIMD_LANES)
+        .zip(seen.chunks_mut(SIMD_LANES))
+        .zip(alpha.chunks_mut(SIMD_LANES));
+    for (run, ((through, seen), alpha)) in runs.enumerate() {
+        let cells = BilinearCells::along_line(line, (run * SIMD_LANES) as f32, size);
+        let irradiance = irradiance.get(run * SIMD_LANES..).unwrap_or_default();
+        for (lane, ((through, seen), alpha)) in through.iter_mut().zip(seen).zip(alpha).enumerate()
+        {
+            let texel = cells.texel(lane, texels, size.0);
+            let opacity = texel.opacity().clamped();
+            let lit = lit_by(texel.color(), irradiance.get(lane));
+            *seen = seen.add_product(Float8::new(*through, *through), Float8::new(lit, opacity));
+            *alpha += texel.color().alpha().max(0.0).min(1.0);
+            *through = through.times(opacity.complement());
         }
-        let texel = bilinear_texel(&texture.texels, size.0, &cells, lane);
-        let opacity = film_opacity(texture, texel, &cells, lane);
-        // The fourth number is above 0 where anything is seen at all.
-        let seen = lit_by(texel, irradiance.get(i)).with_fourth(texel.alpha());
-        *light = light.add_product(*through, seen);
-        *alpha += channel_mean(opacity.rgb());
-        *hidden = hidden.add_product(*through, opacity);
-        *through = through.times(opacity.complement());
     }
-}
-
-/// Opacity per channel, 0 to 1: that of film, or alpha.
-#[inline(always)]
-fn film_opacity(
-    texture: &BakedTexture,
-    texel: Float4,
-    cells: &BilinearCells,
-    lane: usize,
-) -> Float4 {
-    let opacity = match texture.opacity.as_slice() {
-        [] => Float4([texel.alpha(); 4]),
-        film => bilinear_texel(film, texture.size().0, cells, lane),
-    };
-    Float4(opacity.0.map(|o| o.max(0.0).min(1.0)))
 }
 
 /// A texel under some light; as it is where light comes later.
@@ -255,16 +243,4 @@ fn lit_by(texel: Float4, irradiance: Option<&Float4>) -> Float4 {
         Some(&e) => texel.times(e),
         None => texel,
     }
-}
-
-#[inline(always)]
-fn bilinear_texel(texels: &[Float4], stride: usize, cells: &BilinearCells, lane: usize) -> Float4 {
-    let at = cells.at[lane] as usize;
-    let (top, bottom) = (&texels[at..][..2], &texels[at + stride..][..2]);
-    Float4::bilinear(
-        [top[0], top[1]],
-        [bottom[0], bottom[1]],
-        cells.fx[lane],
-        cells.fy[lane],
-    )
 }

@@ -314,12 +314,10 @@ impl ProjectedPlane {
         }
     }
 
-    /// The same plane with its texture the other way round.
-    pub(super) fn mirrored(self) -> Self {
-        Self {
-            u: self.w - self.u,
-            ..self
-        }
+    /// The same plane, with its texture the other way round where that is asked for.
+    pub(super) fn mirrored_if(self, mirrored: bool) -> Self {
+        let u = if mirrored { self.w - self.u } else { self.u };
+        Self { u, ..self }
     }
 
     /// The world point at a pixel position `(x, y, 1)`; none behind the eye.

@@ -1,5 +1,6 @@
 //! JPEG: 8 bits, display-encoded, no alpha. Arithmetic coding and the like are left to OpenImageIO.
 
+use super::jpeg_encode;
 use super::raster::{Raster, Samples, default_names};
 use super::refusal::Refusal;
 use crate::image::Image;
@@ -7,8 +8,8 @@ use crate::io::format::Format;
 use crate::io::header::{Header, Notes, lines_of_notes, notes_of_lines};
 use crate::io::limits::{Demand, Limits, at_most};
 use crate::pixel::Srgb8;
-use image::codecs::jpeg::{JpegDecoder, JpegEncoder};
-use image::{ExtendedColorType, ImageDecoder, ImageError};
+use image::codecs::jpeg::JpegDecoder;
+use image::{ImageDecoder, ImageError};
 use std::io::{Cursor, Read};
 
 // Markers of ISO/IEC 10918-1, table B.1: end of image, start of scan, comment, application segment
@@ -233,22 +234,12 @@ fn is_marker(pair: &[u8]) -> bool {
 
 /// A whole file from 8-bit codes of one or three channels.
 pub(crate) fn encode(
-    (width, height): (usize, usize),
+    size: (usize, usize),
     codes: &[u8],
     quality: u8,
     metadata: &[(String, String)],
 ) -> Result<Vec<u8>, String> {
-    let color = if codes.len() == width * height {
-        ExtendedColorType::L8
-    } else {
-        ExtendedColorType::Rgb8
-    };
-    let [width, height] = [width, height].map(|side| u32::try_from(side).ok());
-    let (width, height) = width.zip(height).ok_or("size overflows")?;
-    let mut bytes = Vec::new();
-    JpegEncoder::new_with_quality(&mut bytes, quality)
-        .encode(codes, width, height, color)
-        .map_err(|e| e.to_string())?;
+    let mut bytes = jpeg_encode::encode(size, codes, quality)?;
     insert_comment(&mut bytes, &metadata.to_vec())?;
     Ok(bytes)
 }
