@@ -257,7 +257,7 @@ fn field<T: serde::de::DeserializeOwned>(
 /// The writer of a name and settings, as [`Writer::settings`] told them.
 fn writer_of(name: &str, settings: Value, pictures: &Pictures) -> Result<Arc<dyn Writer>> {
     match name {
-        "pictures" => Ok(Arc::new(*pictures)),
+        "pictures" => Ok(Arc::new(pictures.clone())),
         "sidecar" => Ok(Arc::new(Sidecar)),
         format => label_writer(format, settings, pictures)
             .map_err(|what| Error::value(format!("writers.{name}"), what)),

@@ -4,7 +4,7 @@ use crate::bounds::Bounds;
 use crate::dataset::paths::create_part_folders;
 use crate::dataset::{Entry, Writer};
 use crate::error::Result;
-use crate::io::{self, WriteOptions};
+use crate::io::{self, Chroma, WriteOptions};
 use crate::scene::{Draws, Range};
 use crate::stopwatch::Stopwatch;
 use serde::{Deserialize, Serialize};
@@ -12,13 +12,17 @@ use std::path::{Path, PathBuf};
 
 /// Writes `images/{train,val}/NNNNNN.png` or `.jpg`, 8-bit sRGB, on black where nothing lies behind
 /// the objects, and on request the scene-linear picture beside it as `exr/{train,val}/NNNNNN.exr`.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Pictures {
     /// Format. Default: `png`.
     pub format: PictureFormat,
     /// Quality of a `jpg`, 1 to 100, drawn for each picture. Default: 95.
     pub jpeg_quality: Range,
+    /// Samples of colour in a `jpg`, one of these drawn for each picture: `4:4:4`, `4:2:2`, and
+    /// `4:2:0`, as most cameras write. Default: none, which is `4:4:4`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub jpeg_chroma: Vec<Chroma>,
     /// Also write the scene-linear picture with its alpha. Default: no.
     pub exr: bool,
 }
@@ -29,6 +33,7 @@ impl Default for Pictures {
         Self {
             format,
             jpeg_quality: Range::fixed(WriteOptions::default().jpeg_quality.into()),
+            jpeg_chroma: Vec::new(),
             exr: false,
         }
     }
@@ -65,6 +70,7 @@ impl Pictures {
     fn write_options(&self, entry: &Entry<'_>) -> WriteOptions {
         WriteOptions {
             jpeg_quality: self.quality(entry.seed, entry.k),
+            jpeg_chroma: self.chroma(entry.seed, entry.k),
             ..WriteOptions::default()
         }
     }
@@ -74,6 +80,14 @@ impl Pictures {
         let draws = Draws::new(seed, k);
         self.jpeg_quality
             .draw_count(&draws, "pictures.jpeg_quality") as u8
+    }
+
+    /// That of a picture of a dataset.
+    fn chroma(&self, seed: u64, k: u64) -> Chroma {
+        match self.jpeg_chroma.len() {
+            0 => Chroma::default(),
+            n => self.jpeg_chroma[Draws::new(seed, k).choose("pictures.jpeg_chroma", n)],
+        }
     }
 }
 
@@ -137,6 +151,24 @@ mod tests {
         let drawn: BTreeSet<u8> = (0..100).map(|k| pictures.quality(3, k)).collect();
         assert_eq!(drawn, BTreeSet::from([80, 81, 82, 83, 84]));
         assert_eq!(Pictures::default().quality(3, 0), 95);
+    }
+
+    #[test]
+    fn chroma_is_drawn_beside_quality() {
+        let mixed = Pictures {
+            jpeg_quality: Range::new(80.0, 84.0),
+            jpeg_chroma: vec![Chroma::Full, Chroma::Quarter],
+            ..Pictures::default()
+        };
+        let quarters = (0..100).filter(|&k| mixed.chroma(3, k) == Chroma::Quarter);
+        assert!((30..70).contains(&quarters.count()));
+        let of_quality = Pictures {
+            jpeg_chroma: vec![],
+            ..mixed.clone()
+        };
+        assert!((0..100).all(|k| mixed.quality(3, k) == of_quality.quality(3, k)));
+        let text = serde_json::to_string(&Pictures::default()).unwrap();
+        assert!(!text.contains("chroma"), "identities stay: {text}");
     }
 
     #[test]

@@ -235,7 +235,7 @@ impl Pipeline {
 
     fn writers(&self) -> Vec<Arc<dyn Writer>> {
         let pictures = &self.config.pictures;
-        let mut writers: Vec<Arc<dyn Writer>> = vec![Arc::new(*pictures), Arc::new(Sidecar)];
+        let mut writers: Vec<Arc<dyn Writer>> = vec![Arc::new(pictures.clone()), Arc::new(Sidecar)];
         if self.config.labels.archives().is_none() {
             writers.extend(self.config.labels.writers(pictures));
         }

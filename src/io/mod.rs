@@ -96,7 +96,7 @@ pub use codec::codes::Bits;
 pub use codec::codes::ToFile;
 pub use codec::exr::Compression;
 #[doc(hidden)]
-pub use codec::jpeg::through_jpeg;
+pub use codec::jpeg::{Chroma, through_jpeg};
 #[cfg(feature = "pipeline")]
 pub(crate) use document::parse_toml;
 #[doc(hidden)]

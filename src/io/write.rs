@@ -2,6 +2,7 @@
 
 use super::codec::codes::{Bits, CodedImage, ToFile, interleaved};
 use super::codec::exr::{self, Compression};
+use super::codec::jpeg::{Chroma, JpegCoding};
 use super::codec::{jpeg, png, tiff};
 use super::format::Format;
 use super::fs::write_bytes;
@@ -25,6 +26,8 @@ pub struct WriteOptions {
     pub png_effort: Quality,
     /// Quality of a JPEG, 1 to 100. Default: 95.
     pub jpeg_quality: u8,
+    /// Samples of colour in a JPEG. Default: one for each pixel.
+    pub jpeg_chroma: Chroma,
     /// Texts to store with the picture, by name. Default: none.
     pub metadata: Vec<(String, String)>,
 }
@@ -36,6 +39,7 @@ impl Default for WriteOptions {
             compression: Compression::default(),
             png_effort: Quality::default(),
             jpeg_quality: 95,
+            jpeg_chroma: Chroma::default(),
             metadata: Vec::new(),
         }
     }
@@ -224,7 +228,11 @@ fn encode_jpeg<P: ToFile>(
     if P::NAMES.len() == 4 {
         codes = without_alpha(&codes)?;
     }
-    jpeg::encode(image.size(), &codes, quality, &options.metadata)
+    let coding = JpegCoding {
+        quality,
+        chroma: options.jpeg_chroma,
+    };
+    jpeg::encode(image.size(), &codes, coding, &options.metadata)
 }
 
 /// Red, green and blue of opaque codes.

@@ -1,6 +1,5 @@
 //! JPEG: 8 bits, display-encoded, no alpha. Arithmetic coding and the like are left to OpenImageIO.
 
-use super::jpeg_encode;
 use super::raster::{Raster, Samples, default_names};
 use super::refusal::Refusal;
 use crate::image::Image;
@@ -10,6 +9,8 @@ use crate::io::limits::{Demand, Limits, at_most};
 use crate::pixel::Srgb8;
 use image::codecs::jpeg::JpegDecoder;
 use image::{ImageDecoder, ImageError};
+use jpeg_encoder::{ColorType, Encoder, SamplingFactor};
+use serde::{Deserialize, Serialize};
 use std::io::{Cursor, Read};
 
 // Markers of ISO/IEC 10918-1, table B.1: end of image, start of scan, comment, application segment
@@ -234,20 +235,70 @@ fn is_marker(pair: &[u8]) -> bool {
 
 /// A whole file from 8-bit codes of one or three channels.
 pub(crate) fn encode(
-    size: (usize, usize),
+    (width, height): (usize, usize),
     codes: &[u8],
-    quality: u8,
+    coding: JpegCoding,
     metadata: &[(String, String)],
 ) -> Result<Vec<u8>, String> {
-    let mut bytes = jpeg_encode::encode(size, codes, quality)?;
+    let [Ok(columns), Ok(rows)] = [width, height].map(u16::try_from) else {
+        return Err(format!(
+            "{width} x {height} pixels, expected sides of at most 65535 in a JPEG"
+        ));
+    };
+    let color = match codes.len() / (width * height) {
+        1 => ColorType::Luma,
+        _ => ColorType::Rgb,
+    };
+    let mut bytes = Vec::new();
+    let mut encoder = Encoder::new(&mut bytes, coding.quality);
+    encoder.set_sampling_factor(coding.chroma.sampling_factor());
+    let encoded = encoder.encode(codes, columns, rows, color);
+    encoded.map_err(|e| e.to_string())?;
     insert_comment(&mut bytes, &metadata.to_vec())?;
     Ok(bytes)
+}
+
+/// How much a JPEG file may lose.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct JpegCoding {
+    /// 1 to 100.
+    pub(crate) quality: u8,
+    pub(crate) chroma: Chroma,
+}
+
+/// How many samples of colour a JPEG file has beside those of brightness (ITU-T T.871).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Chroma {
+    /// One for each pixel.
+    #[default]
+    #[serde(rename = "4:4:4")]
+    Full,
+    /// One for two pixels beside each other.
+    #[serde(rename = "4:2:2")]
+    HalfWidth,
+    /// One for two by two pixels, as most cameras write.
+    #[serde(rename = "4:2:0")]
+    Quarter,
+}
+
+impl Chroma {
+    fn sampling_factor(self) -> SamplingFactor {
+        match self {
+            Self::Full => SamplingFactor::F_1_1,
+            Self::HalfWidth => SamplingFactor::F_2_1,
+            Self::Quarter => SamplingFactor::F_2_2,
+        }
+    }
 }
 
 /// A picture as it comes back from a file of a quality, 1 to 100; nothing for one without pixels.
 pub fn through_jpeg(image: &Image<Srgb8>, quality: u8) -> Option<Image<Srgb8>> {
     let codes = bytemuck::cast_slice(image.pixels());
-    let file = encode(image.size(), codes, quality, &[]).ok()?;
+    let coding = JpegCoding {
+        quality,
+        chroma: Chroma::Full,
+    };
+    let file = encode(image.size(), codes, coding, &[]).ok()?;
     let raster = decode(&file, &Limits::default()).ok()?;
     let Samples::U8(codes) = raster.samples else {
         return None;

@@ -6,7 +6,6 @@ pub(crate) mod exif;
 pub(crate) mod exr;
 pub(crate) mod hdr;
 pub(crate) mod jpeg;
-mod jpeg_encode;
 pub(crate) mod orient;
 pub(crate) mod pixels;
 pub(crate) mod png;
