@@ -22,7 +22,7 @@ pub(super) fn row_span(sides: &[Vector3<f64>], y: f64) -> (f64, f64) {
 }
 
 /// A convex shape, ready to be asked for its rows.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct ConvexShape {
     /// Lines `x = a y + b` that it lies to the right of, then those that it lies to the left of,
     /// then conditions `a y + b >= 0` on whole rows.

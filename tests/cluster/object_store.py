@@ -9,7 +9,9 @@ had the secret key in it.
 """
 
 import argparse
+import concurrent.futures
 import http.client
+import logging
 import os
 import random
 import subprocess
@@ -21,6 +23,8 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 SECRET = "a-secret-that-nobody-may-see"
+# Workers at a time.
+AT_ONCE = 4
 BUCKET = "bucket"
 PREFIX = "some/prefix"
 # Small pictures, four of them in an archive.
@@ -35,6 +39,7 @@ def main():
         from moto.server import ThreadedMotoServer
     except ImportError as missing:
         return print(f"skipped: {missing}")
+    logging.getLogger("werkzeug").setLevel(logging.ERROR)
     server = ThreadedMotoServer(port=0, verbose=False)
     server.start()
     host, port = server.get_host_and_port()
@@ -116,10 +121,12 @@ class Cluster:
         victims = set(chance.sample(range(count), 3 * count // 10))
         killed = len(victims)
         waiting = list(range(count))
-        for attempt in range(8):
-            waiting = [i for i in waiting if not self.finishes(i, count, attempt, victims, chance)]
-            if not waiting:
-                return killed
+        with concurrent.futures.ThreadPoolExecutor(AT_ONCE) as pool:
+            for attempt in range(8):
+                finish = lambda i: self.finishes(i, count, attempt, victims, chance)
+                waiting = [i for i, is_done in zip(waiting, pool.map(finish, waiting)) if not is_done]
+                if not waiting:
+                    return killed
         raise SystemExit(f"workers {waiting} do not finish:\n{self.said[-3000:]}")
 
     def finishes(self, index, count, attempt, victims, chance):

@@ -222,7 +222,7 @@ fn plain_pictures(config: &DatasetConfig) -> DatasetConfig {
         },
         pictures: Pictures {
             exr: false,
-            ..config.pictures
+            ..config.pictures.clone()
         },
         ..config.clone()
     }

@@ -363,7 +363,11 @@ mod tests {
     #[test]
     fn comments_come_back() {
         let notes = vec![("petcomp:seed".to_string(), "17".to_string())];
-        let bytes = encode((8, 8), &[90; 8 * 8 * 3], 90, &notes).unwrap();
+        let coding = JpegCoding {
+            quality: 90,
+            chroma: Chroma::Quarter,
+        };
+        let bytes = encode((8, 8), &[90; 8 * 8 * 3], coding, &notes).unwrap();
         let start = read_before_scan(&mut &bytes[..], &Limits::default()).unwrap();
         assert!(start.len() < bytes.len());
         assert_eq!(
