@@ -249,10 +249,72 @@ impl DeepImage {
             .add_scaled(place.coverage.0, LinearRgb::WHITE);
     }
 
+    /// The light of one pixel over a plate, or over nothing.
+    pub(crate) fn light_over(
+        &self,
+        x: usize,
+        y: usize,
+        plate: Option<&Image<LinearRgb>>,
+    ) -> LinearRgb {
+        let behind = plate.map_or(LinearRgb::BLACK, |plate| {
+            self.shadow[(x, y)] * plate[(x, y)]
+        });
+        self.flat(x, y).over_color(behind)
+    }
+
+    /// The same picture with more or less light from behind some objects: what `extra` says for an
+    /// object at a column and row, as far as the object and all in front of it let it pass. No more
+    /// is taken away than shows there, over this plate.
+    pub(crate) fn with_light_from_behind(
+        mut self,
+        plate: Option<&Image<LinearRgb>>,
+        extra: impl Fn(ObjectId, usize, usize) -> Option<LinearRgb>,
+    ) -> Self {
+        for y in 0..self.height {
+            for x in 0..self.width {
+                let changed = |s: &DeepSample| extra(s.object, x, y).is_some();
+                if self.at(x, y).iter().any(changed) {
+                    let all = self.light_over(x, y, plate);
+                    self.add_from_behind(self.sample_range(x, y), all, |s| extra(s.object, x, y));
+                }
+            }
+        }
+        self
+    }
+
+    /// Adds light to the samples of a pixel of which `all` is the light.
+    fn add_from_behind(
+        &mut self,
+        samples: std::ops::Range<usize>,
+        all: LinearRgb,
+        extra: impl Fn(&DeepSample) -> Option<LinearRgb>,
+    ) {
+        let (mut behind, mut passes) = (all, LinearRgb::WHITE);
+        for i in samples {
+            let sample = &mut self.samples[i];
+            let hidden = self.tints.get(i).copied();
+            let hidden = hidden.unwrap_or(LinearRgb::grey(sample.visible));
+            passes = passes.add_scaled(-1.0, hidden).map(|p| p.max(0.0));
+            behind = behind
+                .add_scaled(-1.0, sample.light)
+                .map(|light| light.max(0.0));
+            if let Some(extra) = extra(sample) {
+                let change = at_least_none(behind, extra * passes);
+                sample.light = sample.light + change;
+            }
+        }
+    }
+
     /// The factor on the plate, per channel.
     pub fn shadow(&self) -> &Image<LinearRgb> {
         &self.shadow
     }
+}
+
+/// A change of some light that leaves none of it negative.
+fn at_least_none(light: LinearRgb, change: LinearRgb) -> LinearRgb {
+    let left = (light + change).map(|left| left.max(0.0));
+    left.add_scaled(-1.0, light)
 }
 
 /// Where each pixel's samples start, pixel by pixel, and after the last one where they end.

@@ -85,6 +85,8 @@ kinds! {
     ShadedSamples, "shaded samples";
     /// Pixels of the surface that a shadow is looked up for
     ShadowedPixels, "shadowed pixels";
+    /// Pixels of cards that what lies behind is displaced in
+    BentPixels, "bent pixels";
     /// Textures made ready for a picture or a shadow: a level of detail in the card's own colours
     Bakes, "bakes";
     /// Levels of detail made

@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
 """Make a reference world of crushed PET bottles with exact ground truth.
 
-Three kinds of pictures, all deterministic for given seeds and settings:
+Four kinds of pictures, all deterministic for given seeds and settings:
 
   world.py bottles      one crushed bottle on a uniform green, blue or grey screen
   world.py backgrounds  a table with a plastic tray and a robot arm, from above
   world.py piles        the same bottles piled physically in the tray
+  world.py displays     bottles on a luminous display that shows one picture after the other
 
 Run with Python 3.11 and the bpy package:
 
@@ -77,6 +78,10 @@ def parser():
     b.add_argument("--class", dest="bottle_class", type=int, choices=(0, 1, 2, 3), help="force the class: 0 cap+label, 1 cap, 2 label, 3 none")
     b.add_argument("--flatness", type=between(0.15, 0.9), help="force the pressing gap, relative to the diameter")
 
+    d = common("displays", "light of bottles on a luminous display, picture by picture, and on painted screens")
+    library(d)
+    d.set_defaults(wall="solid")
+
     def tray(q):
         q.add_argument("--width", type=between(64, 4096, int), help="picture width in pixels")
         q.add_argument("--height", type=between(64, 4096, int), help="picture height in pixels")
@@ -139,8 +144,8 @@ def check(p, a):
 def main(argv):
     p = parser()
     a = check(p, p.parse_args(argv))
-    from petworld import photos, trays
-    {"bottles": photos.run, "backgrounds": trays.run_backgrounds, "piles": trays.run_piles}[a.command](a)
+    from petworld import display, photos, trays
+    {"bottles": photos.run, "displays": display.run, "backgrounds": trays.run_backgrounds, "piles": trays.run_piles}[a.command](a)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 //! Rectangles of pixels, which a picture is rendered in.
 
 use crate::geom::Vector3;
+use crate::render::ranges::ranges_meet;
 use std::ops::Range;
 
 /// A rectangle of pixels.
@@ -18,6 +19,11 @@ impl PixelBlock {
         pieces_of(height, side)
             .flat_map(|y| pieces_of(width, side).map(move |x| Self { x, y: y.clone() }))
             .collect()
+    }
+
+    /// They have a pixel in common.
+    pub(super) fn meets(&self, other: &Self) -> bool {
+        ranges_meet(&self.x, &other.x) && ranges_meet(&self.y, &other.y)
     }
 
     /// Number of pixels.

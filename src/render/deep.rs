@@ -4,17 +4,18 @@ use crate::asset::Texture;
 use crate::deep::DeepImage;
 use crate::geom::Vector3;
 use crate::image::Image;
-use crate::pixel::LinearRgb;
+use crate::pixel::{LinearRgb, ObjectId};
 use crate::render::RenderOptions;
 use crate::render::block::PixelBlock;
 use crate::render::detail::{detail_level, texels_per_pixel};
-use crate::render::interreflection::interreflect;
+use crate::render::interreflection::Bounces;
 use crate::render::irradiance::{IrradianceMap, irradiance_maps};
 use crate::render::lattice::Lattice;
 use crate::render::layers::{Layer, LayerStack, RenderedTile, SampleGrid, ShadowCatcher};
 use crate::render::lens::LensView;
 use crate::render::pixel_filter::filter_quantiles;
 use crate::render::receiver::{LightingContext, ReceiverIrradiance};
+use crate::render::refraction::refract;
 use crate::render::retouch::retouched;
 use crate::render::texture::BakedTexture;
 use crate::render::view::{
@@ -45,40 +46,71 @@ const TILE_SIDE_PX: usize = 32;
 /// over. Cards are ordered by depth block by block; blocks in which they cross are split.
 pub fn render(shot: &Shot, options: &RenderOptions) -> DeepImage {
     let options = options.clamped();
-    let shot = &*retouched(shot, &options);
-    let free = match LensView::new(shot) {
-        None => render_pinhole(shot, &options),
-        Some(lens) => render_bent(shot, &lens, &options),
+    let finished = &*retouched(shot, &options);
+    let bounces = Bounces::new(finished);
+    let stack = SeenStack::new(finished, &options);
+    let free = bounces.brighten(stack.render(|_| true));
+    let bent = if options.refraction {
+        let offsets = &stack.stack.samples.offsets;
+        refract(free, shot, offsets, |card, reached| {
+            bounces.brighten(stack.behind(card).render(|tile| tile.meets(reached)))
+        })
+    } else {
+        free
     };
-    interreflect(free, shot).held_out(shot.holdout.as_deref())
+    bent.held_out(shot.holdout.as_deref())
 }
 
-fn render_pinhole(shot: &Shot, options: &RenderOptions) -> DeepImage {
-    let view = CameraView::from_camera(&shot.camera);
-    let stack = layer_stack(shot, &view, options);
-    render_tiles(shot, TILE_SIDE_PX, |tile| stack.render_tile(tile))
+/// All that a picture is put together from, seen through the shot's lens.
+struct SeenStack {
+    stack: LayerStack,
+    /// None for a pinhole.
+    lens: Option<(LensView, Lattice)>,
+    /// Width and height, pixels.
+    image: [usize; 2],
 }
 
-/// The picture that a lens makes of what a pinhole camera sees.
-fn render_bent(shot: &Shot, lens: &LensView, options: &RenderOptions) -> DeepImage {
-    let view = CameraView::from_camera(&lens.pinhole);
-    let stack = layer_stack(shot, &view, options);
-    let lattice = Lattice::new(&view, options.cell_px);
-    render_tiles(shot, lens.tile_side(), |tile| {
-        lens.stack_in(&stack, lattice, &tile).render_tile(tile)
-    })
-}
+impl SeenStack {
+    fn new(shot: &Shot, options: &RenderOptions) -> Self {
+        let lens = LensView::new(shot);
+        let camera = lens.as_ref().map_or(&shot.camera, |lens| &lens.pinhole);
+        let view = CameraView::from_camera(camera);
+        Self {
+            stack: layer_stack(shot, &view, options),
+            lens: lens.map(|lens| (lens, Lattice::new(&view, options.cell_px))),
+            image: shot.camera.image.map(|side| side as usize),
+        }
+    }
 
-/// The picture of a shot's camera from its tiles.
-fn render_tiles(
-    shot: &Shot,
-    side: usize,
-    render_tile: impl Fn(PixelBlock) -> RenderedTile + Sync + Send,
-) -> DeepImage {
-    let [width, height] = shot.camera.image.map(|side| side as usize);
-    let tiles = PixelBlock::tiles_of(width, height, side);
-    let rendered: Vec<_> = tiles.into_par_iter().map(render_tile).collect();
-    assemble_tiles([width, height], &rendered)
+    /// What lies behind a card.
+    fn behind(&self, card: ObjectId) -> Self {
+        Self {
+            stack: self.stack.behind(card),
+            ..*self
+        }
+    }
+
+    /// The picture in the tiles that are wanted; nothing in others.
+    fn render(&self, wanted: impl Fn(&PixelBlock) -> bool) -> DeepImage {
+        let [width, height] = self.image;
+        let side = self.lens.map_or(TILE_SIDE_PX, |(lens, _)| lens.tile_side());
+        let mut tiles = PixelBlock::tiles_of(width, height, side);
+        tiles.retain(wanted);
+        let rendered: Vec<_> = tiles
+            .into_par_iter()
+            .map(|tile| self.render_tile(tile))
+            .collect();
+        assemble_tiles([width, height], &rendered)
+    }
+
+    fn render_tile(&self, tile: PixelBlock) -> RenderedTile {
+        match &self.lens {
+            None => self.stack.render_tile(tile),
+            Some((lens, lattice)) => lens
+                .stack_in(&self.stack, *lattice, &tile)
+                .render_tile(tile),
+        }
+    }
 }
 
 /// Everything that tiles are rendered from: textures at their level of detail, and the light on
@@ -119,7 +151,12 @@ fn projected_cards<'a>(
 ///
 /// All that labels are made from, at a part of the cost; the same bits as [`render`] gives for it.
 pub fn render_coverage(shot: &Shot, options: &RenderOptions) -> DeepImage {
+    let straight = |card: &Card| Card {
+        refraction: Default::default(),
+        ..card.clone()
+    };
     let dark = Shot {
+        cards: shot.cards.iter().map(straight).collect(),
         lights: Vec::new(),
         ambient: LinearRgb::BLACK,
         environment: None,

@@ -1,5 +1,6 @@
 //! Light that goes to and fro between the surface and the cards over it.
 
+use crate::camera::RadialDistortion;
 use crate::deep::DeepImage;
 use crate::filter::{gaussian_blur, sample_bilinear};
 use crate::geom::Vector3;
@@ -32,24 +33,42 @@ const MAX_BOUNCE: f32 = 0.95;
 /// `S` is divided by `1 - albedo R`, with `R` the light that comes back from straight above: the
 /// sum over cards upwards of their colour times the squared transmittance of what lies below,
 /// blurred over the surface.
-pub(super) fn interreflect(deep: DeepImage, shot: &Shot) -> DeepImage {
-    let albedo = shot.interreflection;
-    if albedo.is_black() {
-        return deep;
-    }
-    let view = CameraView::from_camera(&shot.camera);
-    let surface = ProjectedPlane::from_above(&ScenePlane::shadow_catcher(shot.catcher), &view);
-    let (Some(surface), Some(bounce)) = (surface, BounceMap::new(shot)) else {
-        return deep;
-    };
-    let lens = shot.distortion();
-    deep.map_shadow(|x, y, factor| {
-        let ideal = lens.undistort(pixel_center(x, y).xy().into());
-        match surface.point_at(&ideal.to_homogeneous()) {
-            Some(point) => factor * endless_bounces(albedo * bounce.at(&point)),
-            None => factor,
+pub(super) struct Bounces {
+    albedo: LinearRgb,
+    lens: RadialDistortion,
+    /// None where there is nothing to brighten.
+    seen: Option<(ProjectedPlane, BounceMap)>,
+}
+
+impl Bounces {
+    pub(super) fn new(shot: &Shot) -> Self {
+        let view = CameraView::from_camera(&shot.camera);
+        let surface = || {
+            let plane = ScenePlane::shadow_catcher(shot.catcher);
+            ProjectedPlane::from_above(&plane, &view)
+        };
+        let asked_for = !shot.interreflection.is_black();
+        Self {
+            albedo: shot.interreflection,
+            lens: shot.distortion(),
+            seen: asked_for
+                .then(|| Some((surface()?, BounceMap::new(shot)?)))
+                .flatten(),
         }
-    })
+    }
+
+    pub(super) fn brighten(&self, deep: DeepImage) -> DeepImage {
+        let Some((surface, bounce)) = &self.seen else {
+            return deep;
+        };
+        deep.map_shadow(|x, y, factor| {
+            let ideal = self.lens.undistort(pixel_center(x, y).xy().into());
+            match surface.point_at(&ideal.to_homogeneous()) {
+                Some(point) => factor * endless_bounces(self.albedo * bounce.at(&point)),
+                None => factor,
+            }
+        })
+    }
 }
 
 /// What light becomes that comes back by these shares again and again.

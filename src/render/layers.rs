@@ -26,7 +26,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 /// A card in the picture.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Layer {
     /// Whose it is.
     pub(super) id: ObjectId,
@@ -45,7 +45,7 @@ pub(super) struct Layer {
 }
 
 /// Where the samples of all pixels lie.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct SampleGrid {
     /// Positions along each side of a pixel, from its centre.
     pub(super) offsets: Vec<f64>,
@@ -77,7 +77,7 @@ impl BentLattice {
 }
 
 /// The surface under the cards, which their shadows fall on.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct ShadowCatcher {
     /// How it lies; none where the camera does not look down on it.
     pub(super) plane: Option<ProjectedPlane>,
@@ -275,7 +275,47 @@ impl Layer {
     }
 }
 
+impl Layer {
+    /// It is farther away than another layer, in the middle of what they have in common; in its own
+    /// middle where that is nothing.
+    fn is_behind(&self, other: &Self) -> bool {
+        let common = PixelBlock {
+            x: range_overlap(&self.columns, &other.columns),
+            y: range_overlap(&self.rows, &other.rows),
+        };
+        let block = if common.len() > 0 {
+            common
+        } else {
+            self.block()
+        };
+        let [x, y] = block.middle();
+        let p = Vector3::new(x, y, 1.0);
+        let [own, others] = [self, other].map(|layer| layer.reciprocal_depth(&p));
+        own < others || (own == others && self.id > other.id)
+    }
+
+    /// Pixels it may touch.
+    fn block(&self) -> PixelBlock {
+        PixelBlock {
+            x: self.columns.clone(),
+            y: self.rows.clone(),
+        }
+    }
+}
+
 impl LayerStack {
+    /// The layers behind one of them, a whole layer each, as a stack of their own.
+    pub(super) fn behind(&self, id: ObjectId) -> Self {
+        let front = self.layers.iter().find(|layer| layer.id == id);
+        let farther = |layer: &&Layer| front.is_some_and(|front| layer.is_behind(front));
+        Self {
+            layers: self.layers.iter().filter(farther).cloned().collect(),
+            catcher: self.catcher.clone(),
+            samples: self.samples.clone(),
+            ..*self
+        }
+    }
+
     /// The same for a block of a picture that a lens bends: the layers that it may show.
     pub(super) fn bent(&self, bent: BentLattice, block: &PixelBlock) -> Self {
         let map = &bent.ideal_from_picture;

@@ -50,6 +50,7 @@ mod pixel_filter;
 mod ranges;
 mod receiver;
 mod reference;
+mod refraction;
 mod resample;
 mod retouch;
 mod shadow;

@@ -28,6 +28,9 @@ pub struct RenderOptions {
     pub ambient_samples: usize,
     /// Distance of two samples of the irradiance, 0.25 to 16 pixels. Default: 1.5.
     pub cell_px: f64,
+    /// What is seen through objects whose refraction was measured is displaced. Default: true.
+    #[serde(skip_serializing_if = "Clone::clone")]
+    pub refraction: bool,
 }
 
 impl From<Quality> for RenderOptions {
@@ -38,18 +41,21 @@ impl From<Quality> for RenderOptions {
                 light_samples: 2,
                 ambient_samples: 12,
                 cell_px: 2.0,
+                refraction: true,
             },
             Quality::Normal => Self {
                 subsamples: 2,
                 light_samples: 3,
                 ambient_samples: 32,
                 cell_px: 1.5,
+                refraction: true,
             },
             Quality::Reference => Self {
                 subsamples: 6,
                 light_samples: 8,
                 ambient_samples: 400,
                 cell_px: 0.33,
+                refraction: true,
             },
         }
     }
@@ -88,6 +94,7 @@ impl RenderOptions {
             light_samples: self.light_samples.clamp(1, 64),
             ambient_samples: self.ambient_samples.clamp(1, 4096),
             cell_px: clamped_cell(self.cell_px),
+            refraction: self.refraction,
         }
     }
 }

@@ -9,7 +9,7 @@ use crate::pixel::{Depth, Film, LinearRgb, Mix, ObjectId};
 use crate::render::RenderOptions;
 use crate::render::card_texel::card_texel;
 use crate::render::grade::channel_mean;
-use crate::render::interreflection::interreflect;
+use crate::render::interreflection::Bounces;
 use crate::render::light_samples::{LightGroup, LightSample, LightSamples, SampleKind};
 use crate::render::pixel_filter::filter_quantiles;
 use crate::render::retouch::retouched_fully;
@@ -36,7 +36,9 @@ pub fn render_reference(shot: &Shot, options: &RenderOptions) -> DeepImage {
     };
     let shadow = Image::from_vec(world.view.width, world.view.height, shadow);
     let deep = deep_image(shadow, lists).with_tints(tints);
-    interreflect(deep, shot).held_out(shot.holdout.as_deref())
+    Bounces::new(shot)
+        .brighten(deep)
+        .held_out(shot.holdout.as_deref())
 }
 
 fn deep_image(shadow: Image<LinearRgb>, lists: Vec<Vec<ReferenceSample>>) -> DeepImage {

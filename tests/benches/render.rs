@@ -17,6 +17,7 @@ const GOOD: RenderOptions = RenderOptions {
     light_samples: 4,
     ambient_samples: 64,
     cell_px: 1.0,
+    refraction: true,
 };
 
 /// The same with 3 x 3 samples a pixel, 6 x 6 a light.
@@ -25,6 +26,7 @@ const HIGH: RenderOptions = RenderOptions {
     light_samples: 6,
     ambient_samples: 100,
     cell_px: 0.66,
+    refraction: true,
 };
 
 /// A bottle of 384 x 1152 texels: a soft outline, half see-through, striped.

@@ -16,6 +16,7 @@ const GOOD: RenderOptions = RenderOptions {
     light_samples: 4,
     ambient_samples: 64,
     cell_px: 1.0,
+    refraction: true,
 };
 
 /// The numbers that a case means by a word: a quality, or `good`.

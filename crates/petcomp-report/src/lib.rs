@@ -8,6 +8,7 @@ mod clock;
 pub mod color;
 mod columns;
 mod diagram;
+pub mod display;
 pub mod encode;
 pub mod experiments;
 mod files;

@@ -119,7 +119,7 @@ impl MattingInputs {
 
     fn row(&self, method: MattingMethod) -> MatteRow {
         let start = cpu_seconds();
-        let cut = method.run(&self.known, &self.shots);
+        let cut = method.run(&self.known.photo, &self.shots);
         let time_ms = MS_PER_SECOND * (cpu_seconds() - start);
         let (score, warnings) = match cut {
             Ok(cut) => (Some(self.score(&cut)), cut.warnings()),

@@ -57,6 +57,7 @@ const QUADRATURE: RenderOptions = RenderOptions {
     light_samples: 6,
     ambient_samples: 196,
     cell_px: 1.0,
+    refraction: true,
 };
 
 /// Between the default and a reference: 2 x 2 samples a pixel, 4 x 4 a light.
@@ -65,6 +66,7 @@ pub(super) const GOOD: RenderOptions = RenderOptions {
     light_samples: 4,
     ambient_samples: 64,
     cell_px: 1.0,
+    refraction: true,
 };
 
 /// The same with 3 x 3 samples a pixel, 6 x 6 a light.
@@ -73,6 +75,7 @@ pub(super) const HIGH: RenderOptions = RenderOptions {
     light_samples: 6,
     ambient_samples: 100,
     cell_px: 0.66,
+    refraction: true,
 };
 
 /// The name of this program in tables.

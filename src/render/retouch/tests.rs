@@ -18,6 +18,7 @@ const OPTIONS: RenderOptions = RenderOptions {
     light_samples: 3,
     ambient_samples: 32,
     cell_px: 1.5,
+    refraction: true,
 };
 
 fn camera() -> Camera {

@@ -20,6 +20,7 @@ const GOOD: RenderOptions = RenderOptions {
     light_samples: 4,
     ambient_samples: 64,
     cell_px: 1.0,
+    refraction: true,
 };
 
 /// The same with 3 x 3 samples a pixel, 6 x 6 a light.
@@ -28,6 +29,7 @@ pub(super) const HIGH: RenderOptions = RenderOptions {
     light_samples: 6,
     ambient_samples: 100,
     cell_px: 0.66,
+    refraction: true,
 };
 
 /// A camera at height 1 over the surface, looking straight down; picture up is world `+y`.
@@ -99,6 +101,7 @@ fn sharp() -> RenderOptions {
         light_samples: 64,
         ambient_samples: 16,
         cell_px: 0.5,
+        refraction: true,
     }
 }
 
@@ -860,6 +863,7 @@ fn both_ways_agree_under_a_map() {
         subsamples: 2,
         light_samples: 3,
         cell_px: 1.0,
+        refraction: true,
     };
     let a = composite::frame(&render(&shot, &options), Some(&plate(64, 48)));
     let b = composite::frame(&render_reference(&shot, &exact), Some(&plate(64, 48)));
@@ -873,6 +877,7 @@ fn options_out_of_range_are_brought_into_it() {
         light_samples: 0,
         ambient_samples: 0,
         cell_px: f64::NAN,
+        refraction: true,
     };
     let deep = render(&pile(), &none);
     assert!(

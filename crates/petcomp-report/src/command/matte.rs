@@ -1,17 +1,43 @@
-//! `petcomp-report matte`: the matting methods on photos with known mattes.
+//! `petcomp-report matte`: the matting methods on photos with known mattes, and over new backgrounds.
 
-use super::TruthArgs;
 use crate::ReportFlags;
-use petcomp_report::matte;
+use petcomp_report::{display, matte};
+use std::path::PathBuf;
 
-pub(crate) fn run(args: &TruthArgs, common: &ReportFlags) -> anyhow::Result<()> {
-    let summaries = common.with_progress("measuring", |progress| {
-        matte::write(&args.truth, &args.output, progress)
-    })?;
-    println!("{}", matte::table(&summaries).markdown().trim_end());
-    common.print_line(format_args!(
-        "{}: matte.csv, matte.md, matte.svg and matte.html",
-        args.output.display()
-    ));
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// Folder with photos and their truth, as the sample world has them
+    #[arg(long, value_name = "FOLDER", required_unless_present = "display")]
+    truth: Option<PathBuf>,
+    /// Folder with bottles on a display and over new backgrounds, as golden/capture
+    #[arg(long, value_name = "FOLDER")]
+    display: Option<PathBuf>,
+    /// With --display: write a strip for a bottle over a background, as "soft/b02 text"
+    #[arg(long, value_name = "BOTTLE BACKGROUND", requires = "display")]
+    strip: Vec<String>,
+    /// Folder to write
+    #[arg(short, long, value_name = "FOLDER", default_value = "report")]
+    output: PathBuf,
+}
+
+pub(crate) fn run(args: &Args, common: &ReportFlags) -> anyhow::Result<()> {
+    if let Some(truth) = &args.truth {
+        let summaries = common.with_progress("measuring", |progress| {
+            matte::write(truth, &args.output, progress)
+        })?;
+        println!("{}", matte::table(&summaries).markdown().trim_end());
+    }
+    if let Some(set) = &args.display {
+        let strips = args.strip.iter().filter_map(|strip| strip.split_once(' '));
+        let strips: Vec<_> = strips.collect();
+        if !strips.is_empty() {
+            return Ok(display::write_strips(set, &args.output, &strips)?);
+        }
+        let summaries = common.with_progress("measuring", |progress| {
+            display::write(set, &args.output, progress)
+        })?;
+        println!("{}", display::table(&summaries).markdown().trim_end());
+    }
+    common.print_line(format_args!("written to {}", args.output.display()));
     Ok(())
 }

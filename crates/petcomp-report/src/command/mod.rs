@@ -42,8 +42,9 @@ pub(crate) enum Command {
     /// Our trained models beside the values of the paper, with intervals and a test
     Experiments(experiments::Args),
     /// Error of the matting methods against run time, on photos with known mattes: matte.csv,
-    /// matte.md, matte.svg, matte.html
-    Matte(TruthArgs),
+    /// matte.md, matte.svg, matte.html; and of captures over new backgrounds: display.csv,
+    /// display.md
+    Matte(matte::Args),
     /// Whether wrong cut-outs are flagged, on photos with known outlines made harder in many ways:
     /// flags.csv, flags.md
     Flags(TruthArgs),

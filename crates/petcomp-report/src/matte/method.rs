@@ -1,6 +1,5 @@
 //! The matting methods that are compared.
 
-use super::truth::Known;
 use petcomp::Image;
 use petcomp::Result;
 use petcomp::filter;
@@ -57,9 +56,22 @@ impl MattingMethod {
         }
     }
 
+    /// Light and view transmittance of the object in a photo; `shots` are those of the two-screen
+    /// method.
+    pub(crate) fn film(
+        self,
+        photo: &Image<LinearRgb>,
+        shots: &[Image<LinearRgb>; 2],
+    ) -> Result<Image<Film>> {
+        Ok(self.run(photo, shots)?.film)
+    }
+
     /// Cuts the object out; `shots` are those of the two-screen method.
-    pub(super) fn run(self, known: &Known, shots: &[Image<LinearRgb>; 2]) -> Result<MethodCutOut> {
-        let photo = &known.photo;
+    pub(super) fn run(
+        self,
+        photo: &Image<LinearRgb>,
+        shots: &[Image<LinearRgb>; 2],
+    ) -> Result<MethodCutOut> {
         let found = segment(photo, &SegmentOptions::default())?;
         if self == Self::Paper {
             return key_by_color(photo, found);

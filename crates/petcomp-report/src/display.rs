@@ -1,0 +1,342 @@
+//! Bottles over new backgrounds: what each way of photographing them gives, against reality.
+//!
+//! Reality is a rendering of the same bottle in the same room on a display that shows the
+//! background, so that nothing of our own model is in it. The captures are photos of the same
+//! scene with a sensor's noise, as JPEGs of 8 bits. Everything is compared seen straight from above.
+
+mod method;
+mod place;
+mod shots;
+mod strip;
+mod window;
+
+pub use method::DisplayMethod;
+
+use crate::columns::{Column, table_of};
+use crate::files::write_texts;
+use crate::statistics::mean_of;
+use method::SeenFilm;
+use petcomp::geom::Point2;
+use petcomp::plot::Table;
+use petcomp::{Coverage, Error, Image, LinearRgb, Result, io};
+use place::{BACKGROUNDS, Bottle, Place};
+use shots::Stage;
+use std::path::Path;
+use window::Window;
+
+/// A pixel of which more than this is the bottle's is inside.
+const INSIDE: f32 = 0.5;
+/// A displacement that is off by less is right, pixels of the photo.
+const GOOD_FLOW_PX: f64 = 2.0;
+/// Contrast of the coarse stripes above which the true displacement is one place and not many.
+const LEAST_CONTRAST: f64 = 0.3;
+
+/// What a method made of a bottle.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DisplayRow {
+    /// Name of the bottle.
+    pub bottle: String,
+    /// The method.
+    pub method: DisplayMethod,
+    /// Mean absolute errors over the backgrounds, linear light; nothing without a cut-out.
+    pub errors: Option<[f64; BACKGROUNDS.len()]>,
+    /// Errors of the displacement where it is known, pixels of the photo.
+    pub flow_errors: Vec<f64>,
+    /// Pixels inside.
+    pub inside: usize,
+    /// Why there is no cut-out.
+    pub refused: String,
+}
+
+/// Errors of a method over all bottles that it has photos of.
+#[derive(Clone, Copy, Debug)]
+pub struct DisplaySummary {
+    method: DisplayMethod,
+    bottles: usize,
+    failed: usize,
+    /// Mean absolute error over all backgrounds.
+    error: f64,
+    /// The same as a share of the paper's on the same bottles: over all backgrounds, the plain one,
+    /// and those with a pattern.
+    shares: [f64; 3],
+    /// Of the pixels inside, how many have a displacement.
+    known: f64,
+    /// Of those, how many have the right one; and the median error.
+    good_flow: f64,
+    median_flow_px: f64,
+}
+
+/// Measures every method on every bottle of a folder of places.
+///
+/// # Errors
+/// Files that cannot be read.
+pub fn measure(folder: &Path, progress: impl Fn(u64, u64)) -> Result<Vec<DisplayRow>> {
+    let places = Place::all_in(folder)?;
+    let total = places
+        .iter()
+        .map(|place| place.bottles.len())
+        .sum::<usize>() as u64;
+    let mut rows = Vec::new();
+    let mut done = 0;
+    for place in &places {
+        let stage = Stage::new(place)?;
+        for bottle in &place.bottles {
+            progress(done, total);
+            done += 1;
+            let reality = Reality::new(place, bottle)?;
+            let methods = DisplayMethod::ALL.into_iter();
+            for method in methods.filter(|method| method.is_possible(bottle)) {
+                rows.push(reality.row(method, method.run(&stage, place, bottle)));
+            }
+        }
+    }
+    Ok(rows)
+}
+
+/// A bottle over its backgrounds, seen straight from above.
+struct Reality {
+    name: String,
+    window: Window,
+    inside: Image<bool>,
+    seen: Vec<Image<LinearRgb>>,
+    /// The backgrounds without the bottle, all of the view.
+    empty: Vec<Image<LinearRgb>>,
+    /// True displacement; none where it is not one place, or not known.
+    flow: Option<Image<Option<[f64; 2]>>>,
+}
+
+impl Reality {
+    fn new(place: &Place, bottle: &Bottle) -> Result<Self> {
+        let window = Window::of(place, bottle);
+        let seen = BACKGROUNDS.map(|name| Ok(window.seen(place.reality(bottle, name)?)));
+        let mask: Image<Coverage> = window.seen(place.mask(bottle)?);
+        Ok(Self {
+            name: place.name_of(bottle),
+            inside: mask.map(|c| c.0 > INSIDE),
+            seen: seen.into_iter().collect::<Result<_>>()?,
+            empty: BACKGROUNDS
+                .map(|name| place.empty(name))
+                .into_iter()
+                .collect::<Result<_>>()?,
+            flow: if bottle.with_stripes {
+                Some(true_flow(place, bottle, &window)?)
+            } else {
+                None
+            },
+            window,
+        })
+    }
+
+    fn row(&self, method: DisplayMethod, found: Result<SeenFilm>) -> DisplayRow {
+        let row = DisplayRow {
+            bottle: self.name.clone(),
+            method,
+            errors: None,
+            flow_errors: Vec::new(),
+            inside: self.inside.count(),
+            refused: String::new(),
+        };
+        match found {
+            Ok(found) => DisplayRow {
+                errors: Some(std::array::from_fn(|k| self.error(&found, k))),
+                flow_errors: self.flow_errors(&found),
+                ..row
+            },
+            Err(error) => DisplayRow {
+                refused: error.to_string(),
+                ..row
+            },
+        }
+    }
+
+    /// The cut-out over background `k`.
+    fn composite(&self, found: &SeenFilm, k: usize) -> Image<LinearRgb> {
+        let (w, h) = self.window.size();
+        Image::from_fn(w, h, |x, y| {
+            let [dx, dy] = found.flow[(x, y)].unwrap_or([0.0; 2]);
+            let at = Point2::new(x as f64 + 0.5 + dx, y as f64 + 0.5 + dy);
+            let behind = self.window.of_view(&self.empty[k], at);
+            let seen = found.film[(x, y)].over_color(behind);
+            seen.map(|v| v.clamp(0.0, 1.0))
+        })
+    }
+
+    /// Mean absolute error inside, over background `k`.
+    fn error(&self, found: &SeenFilm, k: usize) -> f64 {
+        let made = self.composite(found, k);
+        let pairs = made.pixels().iter().zip(self.seen[k].pixels());
+        let inside = pairs
+            .zip(self.inside.pixels())
+            .filter(|(_, inside)| **inside);
+        let sum: f64 = inside.map(|((a, b), _)| absolute_difference(*a, *b)).sum();
+        sum / self.inside.count().max(1) as f64
+    }
+
+    fn flow_errors(&self, found: &SeenFilm) -> Vec<f64> {
+        let Some(truth) = &self.flow else {
+            return Vec::new();
+        };
+        let pairs = found.flow.pixels().iter().zip(truth.pixels());
+        pairs
+            .filter_map(|(found, truth)| Some(((*found)?, (*truth)?)))
+            .map(|(found, truth)| (found[0] - truth[0]).hypot(found[1] - truth[1]))
+            .collect()
+    }
+}
+
+/// The nearest true displacement at every pixel of a window.
+fn true_flow(place: &Place, bottle: &Bottle, window: &Window) -> Result<Image<Option<[f64; 2]>>> {
+    let truth = place.true_flow(bottle)?;
+    let (w, h) = window.size();
+    Ok(Image::from_fn(w, h, |x, y| {
+        let at = window.in_photo(Point2::new(x as f64 + 0.5, y as f64 + 0.5));
+        let (moved, contrast) = truth.nearest(at.x.floor() as isize, at.y.floor() as isize);
+        (contrast > LEAST_CONTRAST).then_some(moved)
+    }))
+}
+
+fn absolute_difference(a: LinearRgb, b: LinearRgb) -> f64 {
+    let (a, b) = (a.channels(), b.channels());
+    (0..3).map(|c| f64::from((a[c] - b[c]).abs())).sum::<f64>() / 3.0
+}
+
+/// Errors over all bottles, a line for each method.
+pub fn summaries(rows: &[DisplayRow]) -> Vec<DisplaySummary> {
+    DisplayMethod::ALL
+        .into_iter()
+        .map(|method| DisplaySummary::new(rows, method))
+        .collect()
+}
+
+impl DisplaySummary {
+    fn new(rows: &[DisplayRow], method: DisplayMethod) -> Self {
+        let own: Vec<&DisplayRow> = rows.iter().filter(|row| row.method == method).collect();
+        let pairs: Vec<_> = own
+            .iter()
+            .filter_map(|row| Some((row.errors?, paper_errors(rows, &row.bottle)?)))
+            .collect();
+        let share = |part: std::ops::Range<usize>| {
+            let sum = |errors: &[f64]| errors[part.clone()].iter().sum::<f64>();
+            let own: f64 = pairs.iter().map(|(own, _)| sum(own)).sum();
+            own / pairs.iter().map(|(_, paper)| sum(paper)).sum::<f64>()
+        };
+        let mut flow: Vec<f64> = own.iter().flat_map(|row| row.flow_errors.clone()).collect();
+        flow.sort_by(f64::total_cmp);
+        let inside: usize = own.iter().map(|row| row.inside).sum();
+        let good = flow.iter().filter(|error| **error <= GOOD_FLOW_PX).count();
+        Self {
+            method,
+            bottles: own.len(),
+            failed: own.len() - pairs.len(),
+            error: mean_of(&pairs, |(own, _)| {
+                own.iter().sum::<f64>() / own.len() as f64
+            }),
+            shares: [share(0..5), share(4..5), share(0..4)],
+            known: flow.len() as f64 / inside.max(1) as f64,
+            good_flow: good as f64 / flow.len().max(1) as f64,
+            median_flow_px: flow.get(flow.len() / 2).copied().unwrap_or(f64::NAN),
+        }
+    }
+}
+
+fn paper_errors(rows: &[DisplayRow], bottle: &str) -> Option<[f64; BACKGROUNDS.len()]> {
+    let of_paper = |row: &&DisplayRow| row.method == DisplayMethod::Paper && row.bottle == bottle;
+    rows.iter().find(of_paper)?.errors
+}
+
+/// A share or a length; nothing where there is none.
+fn shown(value: f64, unit: &str) -> String {
+    if value.is_nan() || value == 0.0 {
+        return String::new();
+    }
+    format!("{value:.2}{unit}")
+}
+
+const SUMMARY_COLUMNS: [Column<DisplaySummary>; 10] = [
+    ("method", |s| s.method.name().into()),
+    ("bottles", |s| s.bottles.to_string()),
+    ("no cut-out", |s| s.failed.to_string()),
+    ("MAE", |s| format!("{:.5}", s.error)),
+    ("of the paper's", |s| shown(s.shares[0], "")),
+    ("over plain", |s| shown(s.shares[1], "")),
+    ("over patterns", |s| shown(s.shares[2], "")),
+    ("displacement known", |s| shown(s.known, "")),
+    ("within 2 px", |s| shown(s.good_flow, "")),
+    ("median", |s| shown(s.median_flow_px, " px")),
+];
+
+/// The table method x error.
+pub fn table(summaries: &[DisplaySummary]) -> Table {
+    table_of(&SUMMARY_COLUMNS, summaries)
+}
+
+const DETAIL_COLUMNS: [Column<DisplayRow>; 8] = [
+    ("bottle", |r| r.bottle.clone()),
+    ("method", |r| r.method.name().into()),
+    ("checker", |r| error_cell(r, 0)),
+    ("text", |r| error_cell(r, 1)),
+    ("noise", |r| error_cell(r, 2)),
+    ("bottle_photo", |r| error_cell(r, 3)),
+    ("plain", |r| error_cell(r, 4)),
+    ("refused", |r| r.refused.clone()),
+];
+
+fn error_cell(row: &DisplayRow, k: usize) -> String {
+    row.errors
+        .map_or(String::new(), |errors| format!("{:.6}", errors[k]))
+}
+
+/// Measures and writes `display.csv` and `display.md` into a folder.
+///
+/// # Errors
+/// Those of [`measure`]; files that cannot be written.
+pub fn write(
+    set: &Path,
+    folder: &Path,
+    progress: impl Fn(u64, u64),
+) -> Result<Vec<DisplaySummary>> {
+    let rows = measure(set, progress)?;
+    let summaries = summaries(&rows);
+    let (details, table) = (table_of(&DETAIL_COLUMNS, &rows), table(&summaries));
+    let text = format!("# {TITLE}\n\n{}", table.markdown());
+    write_texts(
+        folder,
+        [("display.csv", &*details.csv()), ("display.md", &text)],
+    )?;
+    Ok(summaries)
+}
+
+const TITLE: &str = "Error of captures over new backgrounds";
+
+/// Writes a strip for each of some bottles: reality and every method over a background, and below
+/// by how much each is off.
+///
+/// # Errors
+/// Bottles that are not in the set; files that cannot be read or written.
+pub fn write_strips(set: &Path, folder: &Path, bottles: &[(&str, &str)]) -> Result<()> {
+    io::create_folder(folder)?;
+    for place in &Place::all_in(set)? {
+        let stage = Stage::new(place)?;
+        for bottle in &place.bottles {
+            let name = place.name_of(bottle);
+            let chosen = bottles.iter().find(|(wanted, _)| *wanted == name);
+            if let Some((_, background)) = chosen {
+                let k = BACKGROUNDS.iter().position(|b| b == background);
+                let k = k.ok_or_else(|| unknown_background(background))?;
+                let strip = strip::strip(&Reality::new(place, bottle)?, k, |method| {
+                    method.run(&stage, place, bottle)
+                })?;
+                let file = format!("capture_{}.png", name.replace('/', "_"));
+                io::write(folder.join(file), &strip)?;
+            }
+        }
+    }
+    Ok(())
+}
+
+fn unknown_background(name: &str) -> Error {
+    Error::value(
+        "background",
+        format!("\"{name}\", expected one of {BACKGROUNDS:?}"),
+    )
+}

@@ -1,0 +1,113 @@
+//! What each method takes a bottle for, seen straight from above.
+
+use super::place::{Bottle, Place};
+use super::shots::Stage;
+use super::window::Window;
+use crate::matte::MattingMethod;
+use petcomp::{Film, Image, Result};
+
+/// A way to photograph and cut out a bottle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DisplayMethod {
+    /// The paper's keyer on one painted screen.
+    Paper,
+    /// One photo on a painted screen.
+    OnePhoto,
+    /// Two painted screens.
+    TwoScreens,
+    /// A display that shows black and white.
+    BlackAndWhite,
+    /// And stripes.
+    Stripes,
+}
+
+impl DisplayMethod {
+    /// All of them, the paper's first.
+    pub const ALL: [Self; 5] = [
+        Self::Paper,
+        Self::OnePhoto,
+        Self::TwoScreens,
+        Self::BlackAndWhite,
+        Self::Stripes,
+    ];
+
+    /// Its name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Paper => "paper",
+            Self::OnePhoto => "one photo",
+            Self::TwoScreens => "two screens",
+            Self::BlackAndWhite => "black and white screen",
+            Self::Stripes => "with stripes",
+        }
+    }
+
+    /// The method for photos on painted screens.
+    fn painted(self) -> Option<MattingMethod> {
+        match self {
+            Self::Paper => Some(MattingMethod::Paper),
+            Self::OnePhoto => Some(MattingMethod::Physical),
+            Self::TwoScreens => Some(MattingMethod::TwoScreen),
+            Self::BlackAndWhite | Self::Stripes => None,
+        }
+    }
+
+    /// There are photos for it.
+    pub(super) fn is_possible(self, bottle: &Bottle) -> bool {
+        self != Self::Stripes || bottle.with_stripes
+    }
+
+    pub(super) fn run(self, stage: &Stage<'_>, place: &Place, bottle: &Bottle) -> Result<SeenFilm> {
+        match self.painted() {
+            Some(method) => on_paint(method, place, bottle),
+            None => on_display(self == Self::Stripes, stage, place, bottle),
+        }
+    }
+}
+
+/// An object seen straight from above, a pixel for each of the display's.
+pub(super) struct SeenFilm {
+    pub(super) film: Image<Film>,
+    /// How far lines of sight are displaced, pixels of the display; none where that is not known.
+    pub(super) flow: Image<Option<[f64; 2]>>,
+}
+
+fn on_paint(method: MattingMethod, place: &Place, bottle: &Bottle) -> Result<SeenFilm> {
+    let [paint, other] = Place::paints(bottle);
+    let [photo, other] = [place.photo(bottle, paint)?, place.photo(bottle, other)?];
+    let shots = [photo, other];
+    let film = method.film(&shots[0], &shots)?;
+    let exposure = place.exposure_from(paint);
+    let exposed = film.map(|film| Film {
+        color: film.color.scale(exposure),
+        ..film
+    });
+    let window = Window::of(place, bottle);
+    let (w, h) = window.size();
+    Ok(SeenFilm {
+        film: window.seen(exposed),
+        flow: Image::filled(w, h, None),
+    })
+}
+
+fn on_display(
+    with_stripes: bool,
+    stage: &Stage<'_>,
+    place: &Place,
+    bottle: &Bottle,
+) -> Result<SeenFilm> {
+    let measured = stage.measure(bottle, with_stripes)?;
+    let roi = Window::of(place, bottle).roi();
+    let flow = match &measured.refraction {
+        Some(bent) => {
+            let known = bent.known.crop(roi);
+            let moved = bent.displacement_px.crop(roi);
+            moved.zip_map(&known, |d, known| known.then_some(d))
+        }
+        None => Image::filled(roi.width, roi.height, None),
+    };
+    Ok(SeenFilm {
+        film: measured.film.crop(roi),
+        flow,
+    })
+}

@@ -1,0 +1,121 @@
+//! Bottles photographed on a display and over new backgrounds: the files of a place.
+
+use petcomp::geom::Homography;
+use petcomp::io;
+use petcomp::{Coverage, Error, Image, LinearRgb, Result, Srgb8};
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// New backgrounds, by the names of their files.
+pub(super) const BACKGROUNDS: [&str; 5] = ["checker", "text", "noise", "bottle", "plain"];
+
+/// A room with a display in it and a camera over it.
+#[derive(Deserialize)]
+pub(super) struct Place {
+    #[serde(skip)]
+    folder: PathBuf,
+    light: String,
+    /// Width and height of the pictures that the display shows.
+    pub(super) display_px: [u32; 2],
+    /// Width and height of the display, metres.
+    pub(super) display_m: [f64; 2],
+    /// From photos of the view to the display, pixels.
+    pub(super) display_from_photo: Homography,
+    /// Factors of the photos' exposures, by what the display showed or the screen was painted.
+    gain: BTreeMap<String, f32>,
+    pub(super) bottles: Vec<Bottle>,
+}
+
+/// A bottle on the display.
+#[derive(Deserialize)]
+pub(super) struct Bottle {
+    name: String,
+    colour: String,
+    pub(super) with_stripes: bool,
+    /// Left, top, right and bottom of its pictures in the view.
+    pub(super) crop_px: [usize; 4],
+}
+
+impl Place {
+    /// The places of a folder, by name.
+    ///
+    /// # Errors
+    /// A folder without places, or records that cannot be read.
+    pub(super) fn all_in(folder: &Path) -> Result<Vec<Self>> {
+        let entries = std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
+        let mut folders: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
+        folders.retain(|path| path.join(RECORD).is_file());
+        folders.sort();
+        if folders.is_empty() {
+            let what = "no places (*/place.json), expected those of the sample world's displays";
+            return Err(Error::file(folder, what));
+        }
+        folders.into_iter().map(Self::open).collect()
+    }
+
+    fn open(folder: PathBuf) -> Result<Self> {
+        let place: Self = io::read_json(&folder.join(RECORD))?;
+        Ok(Self { folder, ..place })
+    }
+
+    /// Name of a bottle among those of all places.
+    pub(super) fn name_of(&self, bottle: &Bottle) -> String {
+        format!("{}/{}", self.light, bottle.name)
+    }
+
+    /// The display without a bottle, all of the view.
+    pub(super) fn empty(&self, picture: &str) -> Result<Image<LinearRgb>> {
+        let ending = if BACKGROUNDS.contains(&picture) {
+            "png"
+        } else {
+            "jpg"
+        };
+        io::read(self.folder.join(format!("empty_{picture}.{ending}")))
+    }
+
+    /// A photo of a bottle, by what the display showed or the screen was painted.
+    pub(super) fn photo(&self, bottle: &Bottle, shown: &str) -> Result<Image<LinearRgb>> {
+        io::read(self.folder.join(format!("{}_{shown}.jpg", bottle.name)))
+    }
+
+    /// A bottle over a background, as it is: without noise, black away from the bottle.
+    pub(super) fn reality(&self, bottle: &Bottle, background: &str) -> Result<Image<LinearRgb>> {
+        io::read(
+            self.folder
+                .join(format!("{}_over_{background}.png", bottle.name)),
+        )
+    }
+
+    /// What a bottle covers.
+    pub(super) fn mask(&self, bottle: &Bottle) -> Result<Image<Coverage>> {
+        io::read(self.folder.join(format!("{}_mask.png", bottle.name)))
+    }
+
+    /// How far lines of sight are displaced on the display, and the contrast of coarse stripes, 0
+    /// to 1.
+    pub(super) fn true_flow(&self, bottle: &Bottle) -> Result<Image<([f64; 2], f64)>> {
+        let codes: Image<Srgb8> = io::read(self.folder.join(format!("{}_flow.png", bottle.name)))?;
+        Ok(codes.map(|code| {
+            let pixels = |c: u8| (f64::from(c) - 128.0) / 4.0;
+            ([pixels(code.r), pixels(code.g)], f64::from(code.b) / 255.0)
+        }))
+    }
+
+    /// The paint that is not a bottle's own colour, and the other one.
+    pub(super) fn paints(bottle: &Bottle) -> [&'static str; 2] {
+        if bottle.colour == "green" {
+            ["blue", "green"]
+        } else {
+            ["green", "blue"]
+        }
+    }
+
+    /// Factor from the light of a photo on painted ground to that of a photo on the display.
+    pub(super) fn exposure_from(&self, paint: &str) -> f32 {
+        let of = |name: &str| self.gain.get(name).copied().unwrap_or(1.0);
+        of("display") / of(paint)
+    }
+}
+
+const RECORD: &str = "place.json";

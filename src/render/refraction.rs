@@ -1,0 +1,368 @@
+//! What is seen through cards that bend light: it is read where the lines of sight through them end.
+//!
+//! A card with a flow looks as it does without; what lies behind it is displaced. Over a pixel that
+//! changes the picture by what the card and all in front of it let pass, times the difference of
+//! what lies behind at the displaced place and straight on. That difference becomes light of the
+//! card's own sample, so that pictures stay sums of light, and labels, which look at coverage alone,
+//! stay what they are.
+
+use crate::camera::RadialDistortion;
+use crate::deep::{DeepImage, DeepSample};
+use crate::filter::sample_cubic_clamped;
+use crate::geom::{Point2, Point3, Vector3};
+use crate::image::Image;
+use crate::matte::Flow;
+use crate::pixel::{LinearRgb, Mix, ObjectId};
+use crate::render::block::PixelBlock;
+use crate::render::view::{
+    CameraView, HORIZON_M, ProjectedPlane, ScenePlane, pixel_center, visible_planes,
+};
+use crate::scene::{Card, Cylinder, Shot};
+use crate::work::{self, Kind};
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+
+/// Pixels around a place that a reading between pixels looks at.
+const READING_MARGIN_PX: f64 = 3.0;
+
+/// The picture with all that is seen through its bending cards displaced.
+///
+/// `shot` has the cards as they were given, `offsets` are the sub-samples along a side of a pixel,
+/// and `behind` renders the cards behind one of them, at least in a block.
+///
+/// # Method
+/// Back to front, once for each card with a flow: the picture of all that lies behind it, cards that
+/// bend included, is gathered at the displaced places. Measured on a display, the displacement d
+/// stands for a line of sight that leaves the object at its middle, h0 over the display; what lies
+/// at clearance c under the object is displaced by `d (h0 + c) / h0` along the card. That is the
+/// mean clearance of what is seen straight on, by how much is seen of each.
+pub(super) fn refract(
+    deep: DeepImage,
+    shot: &Shot,
+    offsets: &[f64],
+    behind: impl Fn(ObjectId, &PixelBlock) -> DeepImage,
+) -> DeepImage {
+    let cards = bending_cards(shot);
+    if cards.is_empty() {
+        return deep;
+    }
+    let places = places_of(&deep, &cards);
+    let sight = Sight::new(shot, offsets);
+    let mut changes = Changes::new();
+    for card in &cards {
+        if let Some(place) = places.get(&card.id) {
+            let reached = card.reached(place, &sight.view);
+            let light = deep_with(behind(card.id, &reached), &changes, shot);
+            let backdrop = Backdrop::new(light, &reached, shot);
+            changes.insert(card.id, sight.change(card, place, &backdrop, &deep));
+        }
+    }
+    deep_with(deep, &changes, shot)
+}
+
+/// By how much light what lies behind a card differs from what lies there straight on.
+struct Change {
+    block: PixelBlock,
+    light: Vec<LinearRgb>,
+}
+
+type Changes = BTreeMap<ObjectId, Change>;
+
+impl Change {
+    fn at(&self, x: usize, y: usize) -> Option<LinearRgb> {
+        let inside = self.block.x.contains(&x) && self.block.y.contains(&y);
+        let row = || (y - self.block.y.start) * self.block.x.len();
+        inside.then(|| self.light[row() + x - self.block.x.start])
+    }
+}
+
+fn deep_with(deep: DeepImage, changes: &Changes, shot: &Shot) -> DeepImage {
+    if changes.is_empty() {
+        return deep;
+    }
+    deep.with_light_from_behind(shot.plate.as_deref(), |object, x, y| {
+        changes.get(&object)?.at(x, y)
+    })
+}
+
+/// The pixels that have a sample of a card, and how near the nearest of them is.
+struct CardPlace {
+    block: PixelBlock,
+    nearest: f32,
+}
+
+/// Where cards are in the picture; those that are not have no place.
+fn places_of(deep: &DeepImage, cards: &[BendingCard<'_>]) -> BTreeMap<ObjectId, CardPlace> {
+    let mut places = BTreeMap::new();
+    for y in 0..deep.height() {
+        for x in 0..deep.width() {
+            for sample in deep.at(x, y) {
+                if cards.iter().any(|card| card.id == sample.object) {
+                    include(&mut places, sample, [x, y]);
+                }
+            }
+        }
+    }
+    places
+}
+
+fn include(places: &mut BTreeMap<ObjectId, CardPlace>, sample: &DeepSample, [x, y]: [usize; 2]) {
+    let place = places.entry(sample.object).or_insert_with(|| CardPlace {
+        block: PixelBlock {
+            x: x..x + 1,
+            y: y..y + 1,
+        },
+        nearest: sample.depth.0,
+    });
+    let block = &mut place.block;
+    block.x = block.x.start.min(x)..block.x.end.max(x + 1);
+    block.y = block.y.start.min(y)..block.y.end.max(y + 1);
+    place.nearest = place.nearest.min(sample.depth.0);
+}
+
+/// A card that bends, its side that is seen.
+struct BendingCard<'a> {
+    id: ObjectId,
+    plane: ScenePlane,
+    projected: ProjectedPlane,
+    flow: &'a Flow,
+    /// The side is a back with a flow of its own, which runs the other way.
+    mirrored: bool,
+    cylinder: Option<Cylinder>,
+    /// The eye in the frame of the card.
+    eye: Point3<f64>,
+    /// How much larger the object is than it was on the display.
+    scale: f64,
+    /// From the middle of the body to what it lies on.
+    resting_height: f64,
+}
+
+/// The cards of a shot that bend light, the farthest first.
+fn bending_cards(shot: &Shot) -> Vec<BendingCard<'_>> {
+    if shot.cards.iter().all(|card| card.refraction.is_none()) {
+        return Vec::new();
+    }
+    let view = CameraView::from_camera(&shot.camera);
+    let planes = visible_planes(shot).into_iter();
+    let mut cards: Vec<_> = planes
+        .filter_map(|(card, plane)| BendingCard::new(card, plane, &view))
+        .collect();
+    let along_axis = view.ray * Vector3::from(shot.camera.principal_px.to_homogeneous());
+    cards.sort_by(|a, b| {
+        let [a, b] = [a, b].map(|card| along_axis.dot(&(card.plane.center - view.eye)));
+        b.total_cmp(&a)
+    });
+    cards
+}
+
+impl<'a> BendingCard<'a> {
+    fn new(card: &'a Card, plane: ScenePlane, view: &CameraView) -> Option<Self> {
+        let mirrored = card.back.is_some() && plane.is_seen_from_behind(&view.eye);
+        let flow = card.refraction.flows[usize::from(mirrored)].as_deref()?;
+        (!flow.is_empty()).then_some(Self {
+            id: card.id,
+            projected: ProjectedPlane::new(&plane, view)?,
+            plane,
+            flow,
+            mirrored,
+            cylinder: card.bend.cylinder(card.quad.size),
+            eye: card
+                .quad
+                .world_from_card
+                .inverse_transform_point(&view.eye.into()),
+            scale: card.quad.size[0] / flow.width,
+            resting_height: 0.5 * card.refraction.thickness,
+        })
+    }
+
+    /// Displacement of the line of sight at a picture position, by the object's own height, along
+    /// the card and up it, metres.
+    fn displacement(&self, p: &Vector3<f64>) -> Option<[f64; 2]> {
+        let w = self.projected.w.dot(p);
+        let [u, v] = self.on_card([self.projected.u.dot(p) / w, self.projected.v.dot(p) / w]);
+        let turned = if self.mirrored { 1.0 - u } else { u };
+        let [right, down] = self.flow.at([turned, v])?.map(f64::from);
+        let along = if self.mirrored { -right } else { right };
+        Some([along * self.scale, -down * self.scale])
+    }
+
+    /// Texture coordinates of the point of a curved card that is seen where the flat one is.
+    fn on_card(&self, [u, v]: [f64; 2]) -> [f64; 2] {
+        let Some(cylinder) = &self.cylinder else {
+            return [u, v];
+        };
+        let [w, h] = self.plane.size;
+        let flat = Point2::new((u - 0.5) * w, (0.5 - v) * h);
+        let seen = cylinder.seen_point(&self.eye, &flat);
+        [seen.x / w + 0.5, 0.5 - seen.y / h]
+    }
+
+    /// Where a line of sight ends that would end at a point, for a displacement.
+    fn end_of(&self, point: &Vector3<f64>, [along, up]: [f64; 2]) -> Vector3<f64> {
+        let distance = self.plane.normal.dot(&(point - self.plane.center)).abs();
+        let clearance = (distance - self.resting_height).max(0.0);
+        let growth = self.growth(clearance);
+        point + (self.plane.x * along + self.plane.y * up) * growth
+    }
+
+    /// By how much a displacement is larger over what is farther away than the display was.
+    fn growth(&self, clearance: f64) -> f64 {
+        1.0 + clearance / (self.flow.height * self.scale)
+    }
+
+    /// The pixels that its lines of sight may end in.
+    fn reached(&self, place: &CardPlace, view: &CameraView) -> PixelBlock {
+        let longest = self.flow.displacement.pixels().iter();
+        let longest = longest.fold(0.0_f64, |most, [x, y]| most.max(f64::from(x.hypot(*y))));
+        let highest = self.plane.corners().map(|corner| corner.z.abs());
+        let height = highest.into_iter().fold(0.0, f64::max);
+        let focal_px = 1.0 / view.ray.column(0).norm();
+        let px_per_metre = focal_px / f64::from(place.nearest);
+        let reach = longest * self.scale * self.growth(2.0 * height) * px_per_metre;
+        place.block.grown(reach + READING_MARGIN_PX, view)
+    }
+}
+
+impl PixelBlock {
+    fn grown(&self, by: f64, view: &CameraView) -> Self {
+        let by = by.min(1e6).ceil() as usize;
+        Self {
+            x: self.x.start.saturating_sub(by)..(self.x.end + by).min(view.width),
+            y: self.y.start.saturating_sub(by)..(self.y.end + by).min(view.height),
+        }
+    }
+}
+
+/// What lies behind a card: its light in a block, and how far away it is.
+struct Backdrop {
+    block: PixelBlock,
+    light: Image<LinearRgb>,
+    deep: DeepImage,
+}
+
+impl Backdrop {
+    fn new(deep: DeepImage, block: &PixelBlock, shot: &Shot) -> Self {
+        let light = Image::from_fn(block.x.len(), block.y.len(), |x, y| {
+            let (x, y) = (x + block.x.start, y + block.y.start);
+            deep.light_over(x, y, shot.plate.as_deref())
+        });
+        Self {
+            block: block.clone(),
+            light,
+            deep,
+        }
+    }
+
+    /// At a picture position, between pixels as well.
+    fn light_at(&self, at: Point2<f64>) -> LinearRgb {
+        let [x, y] = [&self.block.x, &self.block.y].map(|side| side.start as f64);
+        sample_cubic_clamped(&self.light, at.x - x, at.y - y).map(|v| v.max(0.0))
+    }
+
+    fn pixel(&self, x: usize, y: usize) -> LinearRgb {
+        self.light[(x - self.block.x.start, y - self.block.y.start)]
+    }
+
+    /// Mean depth at a pixel by how much is seen; `surface` is that of the surface.
+    fn depth(&self, x: usize, y: usize, surface: f64) -> Option<f64> {
+        let samples = self.deep.at(x, y);
+        let hidden: f64 = samples.iter().map(|s| f64::from(s.visible)).sum();
+        let near = samples
+            .iter()
+            .map(|s| f64::from(s.visible) * f64::from(s.depth.0));
+        let rest = if surface < HORIZON_M {
+            (1.0 - hidden).max(0.0)
+        } else {
+            0.0
+        };
+        let total = hidden + rest;
+        (total > 0.0).then(|| (near.sum::<f64>() + rest * surface.min(HORIZON_M)) / total)
+    }
+}
+
+/// The lines of sight of a picture.
+struct Sight<'a> {
+    view: CameraView,
+    lens: RadialDistortion,
+    surface: Option<ProjectedPlane>,
+    offsets: &'a [f64],
+}
+
+impl<'a> Sight<'a> {
+    fn new(shot: &Shot, offsets: &'a [f64]) -> Self {
+        let view = CameraView::from_camera(&shot.camera);
+        let surface = ScenePlane::shadow_catcher([f64::INFINITY; 2]);
+        Self {
+            surface: ProjectedPlane::from_above(&surface, &view),
+            lens: shot.distortion(),
+            view,
+            offsets,
+        }
+    }
+
+    /// What a card changes in the pixels that have a sample of it.
+    fn change(
+        &self,
+        card: &BendingCard<'_>,
+        place: &CardPlace,
+        backdrop: &Backdrop,
+        deep: &DeepImage,
+    ) -> Change {
+        let block = place.block.clone();
+        let columns = block.x.len();
+        let light = (0..block.len()).into_par_iter().with_min_len(columns);
+        let light = light.map(|i| {
+            let (x, y) = (block.x.start + i % columns, block.y.start + i / columns);
+            if deep.at(x, y).iter().any(|s| s.object == card.id) {
+                self.change_at(card, backdrop, [x, y])
+            } else {
+                LinearRgb::BLACK
+            }
+        });
+        let light: Vec<_> = light.collect();
+        work::add(Kind::BentPixels, light.len() as u64);
+        Change { block, light }
+    }
+
+    /// The mean over the sub-samples of a pixel, each at the place that its own line of sight leads
+    /// to from the pixel's middle: what is not bent stays as sharp as it was.
+    fn change_at(&self, card: &BendingCard<'_>, backdrop: &Backdrop, at: [usize; 2]) -> LinearRgb {
+        let [x, y] = at;
+        let middle = self.ideal(pixel_center(x, y).xy().into());
+        let surface = self.surface.map_or(f64::INFINITY, |s| s.depth_at(&middle));
+        let Some(depth) = backdrop.depth(x, y, surface) else {
+            return LinearRgb::BLACK;
+        };
+        let point = self.view.point_at(middle.x, middle.y, depth);
+        let straight = backdrop.pixel(x, y);
+        let weight = 1.0 / (self.offsets.len() * self.offsets.len()) as f32;
+        let ends = self.sub_samples(at).filter_map(|p| {
+            let end = card.end_of(&point, card.displacement(&self.ideal(p))?);
+            self.seen_at(&end)
+        });
+        ends.fold(LinearRgb::BLACK, |sum, end| {
+            let change = backdrop.light_at(end).add_scaled(-1.0, straight);
+            sum.add_scaled(weight, change)
+        })
+    }
+
+    fn sub_samples(&self, [x, y]: [usize; 2]) -> impl Iterator<Item = Point2<f64>> + '_ {
+        let middle = [x, y].map(|i| i as f64 + 0.5);
+        let rows = self.offsets.iter();
+        rows.flat_map(move |dy| {
+            let columns = self.offsets.iter();
+            columns.map(move |dx| Point2::new(middle[0] + dx, middle[1] + dy))
+        })
+    }
+
+    /// Where a camera without the lens sees what the picture shows at a position.
+    fn ideal(&self, px: Point2<f64>) -> Vector3<f64> {
+        self.lens.undistort(px).to_homogeneous()
+    }
+
+    /// Where the picture shows a point of the world; none where it is not in front of the eye.
+    fn seen_at(&self, point: &Vector3<f64>) -> Option<Point2<f64>> {
+        let [px] = self.view.project_points(&[*point])?;
+        Some(self.lens.distort(px.xy().into()))
+    }
+}
