@@ -156,9 +156,9 @@ fn measured(
     empty: &[Frame],
     conditions: Conditions,
 ) -> crate::Result<(View, Measured)> {
-    let shots = |frames: &[Frame], has_object| -> Vec<Image<LinearRgb>> {
+    let shots = |frames: &[Frame], with_object| -> Vec<Image<LinearRgb>> {
         let conditions = Conditions {
-            has_object,
+            has_object: with_object && conditions.has_object,
             ..conditions
         };
         frames
