@@ -6,7 +6,7 @@ use super::display::Display;
 use super::frame::Frame;
 use super::object::{Object, evidence};
 use super::recognise::{FramePhoto, refused};
-use super::solve::BlackAndWhite;
+use super::solve::{BlackAndWhite, Noise};
 use super::stack::{Alignment, Photos, Stack};
 use super::stripes::SeenStripes;
 use super::view::{View, grey};
@@ -110,26 +110,23 @@ impl<'a> Scene<'a> {
         empty_stack: Option<&'a Stack>,
     ) -> Result<Self> {
         let area = view.free_area(display);
-        let mut free = area.clone();
-        let mut found: Option<(EmptyDisplay, Object)> = None;
-        // Once with all of the display, which the object shades a little, once without the object.
-        for _ in 0..2 {
-            let empty = EmptyDisplay::new(stack, empty_stack, &free)?;
+        let found = |free: &Mask| -> Result<(EmptyDisplay, Object)> {
+            let empty = EmptyDisplay::new(stack, empty_stack, free)?;
             let evidence = evidence([&stack.black, &stack.white], [&empty.black, &empty.white]);
             let object = Object::find(&evidence, &area)?;
-            let near = filter::dilate(&object.coverage.map(|c| c.0 > 0.0), OBJECT_MARGIN_PX);
-            free = area.zip_map(&near, |area, near| area && !near);
-            found = Some((empty, object));
-        }
-        let (empty, object) = found.ok_or_else(|| refused("nothing lies on the display"))?;
+            Ok((empty, object))
+        };
+        // Once with all of the display, which the object shades a little, once without the object.
+        let (_, rough) = found(&area)?;
+        let (empty, object) = found(&without(&area, &rough))?;
         Ok(Self {
             display,
             view,
             stack,
             empty_stack,
             empty,
+            free: without(&area, &object),
             object,
-            free,
         })
     }
 
@@ -149,13 +146,9 @@ impl<'a> Scene<'a> {
         diagnostics.extend(check::color_change(frames.empty_white, &self.free));
         let film = frames.film(&self.kept());
         let refraction = self.refraction(&film, &mut diagnostics);
-        let mut noise = frames.noise(&self.free);
-        if self.empty_stack.is_some() {
-            noise.empty = noise.of_white(grey(mean_where(frames.empty_white, &self.free)));
-        }
         let light = frames.light();
         Ok(Measured {
-            sigma: frames.sigma(&film, &noise),
+            sigma: frames.sigma(&film, &self.noise()),
             distinct: self.object.distinct,
             light: mean_where(&light, &self.free),
             unevenness: unevenness(&light, &self.free),
@@ -164,6 +157,22 @@ impl<'a> Scene<'a> {
             refraction,
             diagnostics,
         })
+    }
+
+    /// That of the photos, and of those of the empty display.
+    fn noise(&self) -> Noise {
+        let frames = self.frames();
+        let noise = frames.noise(&self.free);
+        let white = grey(mean_where(frames.empty_white, &self.free));
+        let is_photographed = self.empty_stack.is_some();
+        Noise {
+            empty: if is_photographed {
+                noise.of_white(white)
+            } else {
+                0.0
+            },
+            ..noise
+        }
     }
 
     /// How much of the solution is kept: the object and a rim of blur.
@@ -202,6 +211,12 @@ impl<'a> Scene<'a> {
         };
         Some(Refraction::on_object(input.solve(), &self.object.coverage))
     }
+}
+
+/// What is free around an object.
+fn without(area: &Mask, object: &Object) -> Mask {
+    let near = filter::dilate(&object.coverage.map(|c| c.0 > 0.0), OBJECT_MARGIN_PX);
+    area.zip_map(&near, |area, near| area && !near)
 }
 
 impl Refraction {
