@@ -1,5 +1,6 @@
 //! A capture on a luminous display as a cut-out: measured film, its size, how it bends light.
 
+use super::DEFAULT_THICKNESS;
 use super::capture_entry::CaptureEntry;
 use super::entry::PhotoEntry;
 use super::files;
@@ -50,54 +51,87 @@ pub(super) fn captured_object(
     options: &CutOutOptions,
 ) -> Result<CapturedObject> {
     let (display, width) = captured.display(&entry.file)?;
-    let files: Vec<PathBuf> = [&entry.file]
-        .into_iter()
-        .chain(&captured.photos)
-        .cloned()
-        .collect();
-    let (names, empty_names) = (names(&files), names(&captured.empty));
-    let (read, read_empty) = (
-        |i: usize| io::read(&files[i]),
-        |i: usize| io::read(&captured.empty[i]),
+    let files = CaptureFiles::new(entry, captured);
+    let seen = files.seen(&display).map_err(|e| in_capture(e, entry))?;
+    let pose = seen.pose(&display, width)?;
+    let place = Placed::new(
+        entry,
+        width / f64::from(display.size_px[0]),
+        &seen.view,
+        pose,
     );
-    let sources = Sources {
-        names: &names,
-        read: &read,
-    };
-    let empty_sources = Sources {
-        names: &empty_names,
-        read: &read_empty,
-    };
-    let (recognised, empty_recognised) = (
-        sources.recognised(&display)?,
-        empty_sources.recognised(&display)?,
-    );
-    let photos = Photos {
-        sources,
-        recognised: &recognised,
-    };
-    let empty = Photos {
-        sources: empty_sources,
-        recognised: &empty_recognised,
-    };
-    let reference = reference_number(&recognised, &names)?;
-    let view = View::of_photo(&display, &recognised[reference]);
-    let pose = pose(&display, width, &recognised[reference], &files[reference])
-        .map_err(|e| with_name(e, &files[reference]))?;
-    let measured = measure(&display, &view, &photos, &empty).map_err(|e| in_capture(e, entry))?;
-    let place = Placed::new(entry, &display, width, &view, pose);
-    let trim = Trim::new(&measured.outline, view.size, options);
-    Ok(place.object(&measured, &trim, recognised.len() + empty_recognised.len()))
+    let trim = Trim::new(&seen.measured.outline, seen.view.size, options);
+    Ok(place.object(&seen.measured, &trim, files.count()))
+}
+
+/// The photos of a capture with the object and without.
+struct CaptureFiles {
+    photos: Vec<PathBuf>,
+    empty: Vec<PathBuf>,
+}
+
+/// What they show.
+struct SeenCapture {
+    measured: Measured,
+    view: View,
+    /// The photo of the white frame, from which scale and view are taken.
+    white: FramePhoto,
+    white_file: PathBuf,
+}
+
+impl CaptureFiles {
+    fn new(entry: &PhotoEntry, captured: &CaptureEntry) -> Self {
+        let photos = [&entry.file].into_iter().chain(&captured.photos);
+        Self {
+            photos: photos.cloned().collect(),
+            empty: captured.empty.clone(),
+        }
+    }
+
+    fn count(&self) -> usize {
+        self.photos.len() + self.empty.len()
+    }
+
+    fn seen(&self, display: &Display) -> Result<SeenCapture> {
+        let (names, empty_names) = (names(&self.photos), names(&self.empty));
+        let read = |i: usize| io::read(&self.photos[i]);
+        let read_empty = |i: usize| io::read(&self.empty[i]);
+        let sources = Sources {
+            names: &names,
+            read: &read,
+        };
+        let empty_sources = Sources {
+            names: &empty_names,
+            read: &read_empty,
+        };
+        let recognised = sources.recognised(display)?;
+        let empty_recognised = empty_sources.recognised(display)?;
+        let number = number_of_white(&recognised, &names)?;
+        let view = View::of_photo(display, &recognised[number]);
+        let photos = Photos {
+            sources,
+            recognised: &recognised,
+        };
+        let empty = Photos {
+            sources: empty_sources,
+            recognised: &empty_recognised,
+        };
+        Ok(SeenCapture {
+            measured: measure(display, &view, &photos, &empty)?,
+            view,
+            white: recognised[number].clone(),
+            white_file: self.photos[number].clone(),
+        })
+    }
 }
 
 fn names(files: &[PathBuf]) -> Vec<String> {
-    let name = |file: &PathBuf| {
-        file.file_name()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .into_owned()
-    };
-    files.iter().map(name).collect()
+    let names = files
+        .iter()
+        .map(|file| file.file_name().unwrap_or_default());
+    names
+        .map(|name| name.to_string_lossy().into_owned())
+        .collect()
 }
 
 fn in_capture(error: Error, entry: &PhotoEntry) -> Error {
@@ -109,25 +143,27 @@ fn in_capture(error: Error, entry: &PhotoEntry) -> Error {
     }
 }
 
-/// The photo of the white frame, from which scale and view are taken.
-fn reference_number(recognised: &[FramePhoto], names: &[String]) -> Result<usize> {
-    let number = recognised
-        .iter()
-        .position(|photo| photo.frame == Frame::White);
+fn number_of_white(recognised: &[FramePhoto], names: &[String]) -> Result<usize> {
+    let mut photos = recognised.iter();
+    let number = photos.position(|photo| photo.frame == Frame::White);
     number.ok_or_else(|| Error::Photo {
         what: format!("no photo of the white frame among {}", names.join(", ")),
     })
 }
 
-/// Where the camera stood over the display.
-fn pose(display: &Display, width: f64, white: &FramePhoto, file: &PathBuf) -> Result<ScreenPose> {
-    let [w, h] = display.size_px.map(f64::from);
-    let reference = ReferenceRectangle {
-        size: [width, width * h / w],
-        corners_px: from_top_left(white.display_corners_px(display)),
-        sigma_px: CORNER_SIGMA_PX,
-    };
-    ScreenPose::solve(&reference, white.size_px, &io::read_header(file)?)
+impl SeenCapture {
+    /// Where the camera stood over a display of this width, metres.
+    fn pose(&self, display: &Display, width: f64) -> Result<ScreenPose> {
+        let [w, h] = display.size_px.map(f64::from);
+        let reference = ReferenceRectangle {
+            size: [width, width * h / w],
+            corners_px: from_top_left(self.white.display_corners_px(display)),
+            sigma_px: CORNER_SIGMA_PX,
+        };
+        let header = io::read_header(&self.white_file)?;
+        let pose = ScreenPose::solve(&reference, self.white.size_px, &header);
+        pose.map_err(|e| with_name(e, &self.white_file))
+    }
 }
 
 /// The part of the view that a cut-out shows.
@@ -185,29 +221,18 @@ struct Placed<'a> {
 }
 
 impl<'a> Placed<'a> {
-    fn new(
-        entry: &'a PhotoEntry,
-        display: &Display,
-        width: f64,
-        view: &View,
-        pose: ScreenPose,
-    ) -> Self {
-        let (pitch, height) = (width / f64::from(display.size_px[0]), entry.thickness / 2.0);
-        let camera = pose.camera.center().z;
-        // Lines of sight that pass an object at this height end farther apart on the display.
-        let spread = camera / (camera - height).max(0.1 * camera);
-        let poor = pose.is_poor_fit.then(|| {
-            let what =
-                "the markers hardly look like those of the display; was the picture stretched?";
-            Diagnostic::warning(Code::ScreenSizeMismatch, what)
-        });
+    fn new(entry: &'a PhotoEntry, pitch: f64, view: &View, pose: ScreenPose) -> Self {
+        let height = entry.thickness / 2.0;
+        let warnings = pose_warning(&pose)
+            .into_iter()
+            .chain(thickness_warning(entry));
         Self {
             entry,
             pitch,
-            px_per_metre: spread / (view.display_px * pitch),
+            px_per_metre: spread(&pose, height) / (view.display_px * pitch),
             height,
             sigma: pose.sigma(Point3::new(0.0, 0.0, height)),
-            diagnostics: poor.into_iter().collect(),
+            diagnostics: warnings.collect(),
         }
     }
 
@@ -218,7 +243,8 @@ impl<'a> Placed<'a> {
             .refraction
             .as_ref()
             .map(|r| trim.cropped(&r.modulation));
-        let record = self.record(measured, trim, &film, flow.as_ref(), photos);
+        let captured = self.capture_record(measured, &film, flow.as_ref(), photos);
+        let record = self.record(measured, trim, &film, captured);
         CapturedObject {
             film,
             flow,
@@ -261,46 +287,99 @@ impl<'a> Placed<'a> {
         measured: &Measured,
         trim: &Trim,
         film: &Image<Film>,
-        flow: Option<&Flow>,
-        photos: usize,
+        captured: CaptureRecord,
     ) -> PhotoRecord {
-        let px_per_metre = self.px_per_metre * trim.scale;
-        let (w, h) = film.size();
-        let size_m = [w as f64, h as f64].map(|px| px / px_per_metre);
-        let object_m = oriented_size(&trim.hull).map(|px| px / px_per_metre);
-        let outline_px = trim.hull.iter().map(files::rounded).collect();
+        let placed = self.placed_record(trim, film.size());
         let side = std::f64::consts::SQRT_2 * SIDE_ERROR_PX / self.px_per_metre;
-        let file = self.entry.cut_out_file();
-        let known = flow.map_or(0.0, |flow| known_share(flow, film));
-        let sigma = mean_sigma(&measured.sigma);
-        let hidden = flow.is_some().then(|| flow_unknown(known)).flatten();
-        let captured = CaptureRecord {
-            photos,
-            transmittance_sigma: sigma,
-            flow: flow.map(|_| files::flow_file(&file)),
-            height: self.height,
-            known,
-        };
-        let diagnostics = [&self.diagnostics[..], &measured.diagnostics].concat();
         PhotoRecord {
             source: self.entry.source(),
-            object_m,
-            error_m: libm::hypot(side, self.sigma * object_m[0]),
+            error_m: libm::hypot(side, self.sigma * placed.object_m[0]),
             screen: measured.light,
             unevenness: measured.unevenness.into(),
             outline_confidence: measured.distinct,
-            color_confidence: Some(
-                ColorUncertainty {
-                    tint: sigma as f32,
-                    ..ColorUncertainty::default()
-                }
-                .confidence(),
-            ),
-            diagnostics: diagnostics.into_iter().chain(hidden).collect(),
+            color_confidence: Some(confidence(captured.transmittance_sigma)),
+            diagnostics: self.all_diagnostics(measured, &captured),
             captured: Some(captured),
+            ..placed
+        }
+    }
+
+    /// Where the object is in a cut-out of some pixels, and how large it is.
+    fn placed_record(&self, trim: &Trim, (w, h): (usize, usize)) -> PhotoRecord {
+        let px_per_metre = self.px_per_metre * trim.scale;
+        let size_m = [w as f64, h as f64].map(|px| px / px_per_metre);
+        let outline_px = trim.hull.iter().map(files::rounded).collect();
+        let file = self.entry.cut_out_file();
+        PhotoRecord {
+            object_m: oriented_size(&trim.hull).map(|px| px / px_per_metre),
             ..PhotoRecord::new(file, px_per_metre, size_m, outline_px)
         }
     }
+
+    fn capture_record(
+        &self,
+        measured: &Measured,
+        film: &Image<Film>,
+        flow: Option<&Flow>,
+        photos: usize,
+    ) -> CaptureRecord {
+        let file = self.entry.cut_out_file();
+        CaptureRecord {
+            photos,
+            transmittance_sigma: mean_sigma(&measured.sigma),
+            flow: flow.map(|_| files::flow_file(&file)),
+            height: self.height,
+            known: flow.map_or(0.0, |flow| known_share(flow, film)),
+        }
+    }
+
+    fn all_diagnostics(&self, measured: &Measured, captured: &CaptureRecord) -> Vec<Diagnostic> {
+        let own = self
+            .diagnostics
+            .iter()
+            .chain(&measured.diagnostics)
+            .cloned();
+        let bends = captured.flow.is_some();
+        let hidden = bends.then(|| flow_unknown(captured.known)).flatten();
+        own.chain(hidden).collect()
+    }
+}
+
+/// How much farther apart than at a height lines of sight end on the display.
+fn spread(pose: &ScreenPose, height: f64) -> f64 {
+    let camera = pose.camera.center().z;
+    camera / (camera - height).max(MIN_CLEARANCE * camera)
+}
+
+/// A camera is at least this share of its own height above the middle of an object.
+const MIN_CLEARANCE: f64 = 0.1;
+
+/// Confidence in colours whose transmittance has this standard error.
+fn confidence(sigma: f64) -> f64 {
+    let uncertainty = ColorUncertainty {
+        tint: sigma as f32,
+        ..ColorUncertainty::default()
+    };
+    uncertainty.confidence()
+}
+
+fn pose_warning(pose: &ScreenPose) -> Option<Diagnostic> {
+    pose.is_poor_fit.then(|| {
+        let what = "the markers hardly look like those of the display; was the picture stretched?";
+        Diagnostic::warning(Code::ScreenSizeMismatch, what)
+    })
+}
+
+/// The warning about an entry that says nothing of its object's thickness.
+fn thickness_warning(entry: &PhotoEntry) -> Option<Diagnostic> {
+    let is_default = (entry.thickness - DEFAULT_THICKNESS).abs() < f64::EPSILON;
+    is_default.then(|| {
+        let what = format!(
+            "thickness: {DEFAULT_THICKNESS}, the default; size and refraction are those at half of it, expected \
+             how thick the object is as it lies, metres"
+        );
+        Diagnostic::warning(Code::ThicknessUnknown, what)
+    })
 }
 
 /// The share of what is see-through where refraction is known.

@@ -4,6 +4,7 @@ use super::manifest::{CaptureRecord, PhotoRecord};
 use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::io;
+use crate::io::exr::Channel;
 use crate::matte::Flow;
 use std::path::Path;
 
@@ -13,24 +14,26 @@ const CHANNELS: [&str; 4] = ["X", "Y", "known", "modulation"];
 
 /// Writes a flow as an EXR of half floats, and returns it as it will be read back.
 pub(super) fn write(path: &Path, flow: &Flow, modulation: &Image<f32>) -> Result<Flow> {
-    let part = |axis: usize| flow.displacement.pixels().iter().map(|d| d[axis]).collect();
-    let known = flow
-        .known
-        .pixels()
-        .iter()
-        .map(|known| f32::from(u8::from(*known)))
-        .collect();
-    let planes: [Vec<f32>; 4] = [part(0), part(1), known, modulation.pixels().to_vec()];
-    let channels: Vec<_> = CHANNELS
-        .into_iter()
-        .zip(planes.iter().map(Vec::as_slice))
-        .collect();
+    let planes = planes(flow, modulation);
+    let samples = planes.iter().map(Vec::as_slice);
+    let channels: Vec<_> = CHANNELS.into_iter().zip(samples).collect();
     io::exr::write_half_channels(path, flow.displacement.size(), &channels, &[])?;
-    let stored = |d: [f32; 2]| d.map(|v| half::f16::from_f32(v).to_f32());
     Ok(Flow {
-        displacement: flow.displacement.map(stored),
+        displacement: flow.displacement.map(|d| d.map(through_half)),
         ..flow.clone()
     })
+}
+
+/// The samples of the channels.
+fn planes(flow: &Flow, modulation: &Image<f32>) -> [Vec<f32>; 4] {
+    let pixels = flow.displacement.pixels();
+    let [x, y] = [0, 1].map(|axis: usize| pixels.iter().map(|d| d[axis]).collect());
+    let known = flow.known.map(|known| if known { 1.0 } else { 0.0 });
+    [x, y, known.into_vec(), modulation.pixels().to_vec()]
+}
+
+fn through_half(value: f32) -> f32 {
+    half::f16::from_f32(value).to_f32()
 }
 
 /// Reads the flow of a record, where it has one.
@@ -62,41 +65,101 @@ pub(super) fn read(
 
 /// Without its width and height.
 fn decoded(path: &Path, size: (usize, usize)) -> Result<Flow> {
-    let ((w, h), channels) = io::exr::read_channels(path)?;
-    if (w, h) != size {
-        let what = format!(
-            "{w} x {h} pixels, expected the cut-out's {} x {}",
-            size.0, size.1
-        );
-        return Err(Error::file(path, what));
-    }
-    let plane = |name: &str| -> Result<Image<f32>> {
-        let mut named = channels.iter().filter(|channel| channel.name == name);
-        let channel = named
-            .next()
-            .ok_or_else(|| Error::file(path, format!("no channel {name}")))?;
-        Ok(Image::from_vec(w, h, channel.samples.clone()))
-    };
-    let [x, y, known] = [
-        plane(CHANNELS[0])?,
-        plane(CHANNELS[1])?,
-        plane(CHANNELS[2])?,
-    ];
-    let displacement = x.zip_map(&y, |x, y| [x, y]);
-    if displacement
-        .pixels()
-        .iter()
-        .flatten()
-        .any(|v| !v.is_finite())
-    {
-        return Err(Error::file(
-            path,
-            "a displacement that is no number, expected metres",
-        ));
-    }
+    let (found, channels) = io::exr::read_channels(path)?;
+    check_size(path, found, size)?;
+    let plane = |name: &str| plane(&channels, name, size).map_err(|what| Error::file(path, what));
+    let (x, y) = (plane(CHANNELS[0])?, plane(CHANNELS[1])?);
     Ok(Flow {
-        displacement,
-        known: known.map(|known| known >= 0.5),
+        displacement: x.zip_map(&y, |x, y| [x, y]),
+        known: plane(CHANNELS[2])?.map(|known| known >= 0.5),
         ..Flow::default()
     })
+}
+
+fn check_size(path: &Path, (w, h): (usize, usize), (width, height): (usize, usize)) -> Result<()> {
+    if (w, h) == (width, height) {
+        return Ok(());
+    }
+    let what = format!("{w} x {h} pixels, expected the cut-out's {width} x {height}");
+    Err(Error::file(path, what))
+}
+
+/// The channel of a name, all of whose samples are numbers.
+fn plane(
+    channels: &[Channel],
+    name: &str,
+    (w, h): (usize, usize),
+) -> std::result::Result<Image<f32>, String> {
+    let mut named = channels.iter().filter(|channel| channel.name == name);
+    let channel = named.next().ok_or_else(|| format!("no channel {name}"))?;
+    if channel.samples.iter().all(|v| v.is_finite()) {
+        return Ok(Image::from_vec(w, h, channel.samples.clone()));
+    }
+    Err(format!("a value of channel {name} is no finite number"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::manifest::tests::photo;
+    use super::*;
+
+    fn flow() -> Flow {
+        Flow {
+            displacement: Image::from_fn(4, 3, |x, y| [0.001 * x as f32, -0.002 * y as f32]),
+            known: Image::from_fn(4, 3, |x, _| x > 0),
+            width: 0.4,
+            height: 0.03,
+        }
+    }
+
+    fn record() -> PhotoRecord {
+        let captured = CaptureRecord {
+            photos: 18,
+            transmittance_sigma: 0.01,
+            flow: Some("a.flow.exr".into()),
+            height: 0.03,
+            known: 0.75,
+        };
+        PhotoRecord {
+            captured: Some(captured),
+            ..photo("a.exr")
+        }
+    }
+
+    #[test]
+    fn a_flow_is_read_as_it_was_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.flow.exr");
+        let written = write(&path, &flow(), &Image::filled(4, 3, 0.5)).unwrap();
+        let read = |size| read(folder.path(), &record(), size);
+        assert_eq!(read((4, 3)).unwrap(), Some(written));
+        let size = read((5, 3)).unwrap_err().to_string();
+        assert!(
+            size.ends_with("4 x 3 pixels, expected the cut-out's 5 x 3"),
+            "{size}"
+        );
+    }
+
+    #[test]
+    fn a_damaged_flow_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.flow.exr");
+        let told = |channels: &[(&str, &[f32])]| {
+            io::exr::write_half_channels(&path, (2, 1), channels, &[]).unwrap();
+            read(folder.path(), &record(), (2, 1))
+                .unwrap_err()
+                .to_string()
+        };
+        let missing = told(&[("X", &[0.0, 0.0]), ("known", &[1.0, 1.0])]);
+        assert!(missing.ends_with("a.flow.exr: no channel Y"), "{missing}");
+        let infinite = told(&[
+            ("X", &[0.0, 0.0]),
+            ("Y", &[f32::NAN, 0.0]),
+            ("known", &[1.0, 1.0]),
+        ]);
+        assert!(
+            infinite.ends_with("a value of channel Y is no finite number"),
+            "{infinite}"
+        );
+    }
 }

@@ -59,29 +59,28 @@ impl BendInput<'_> {
         let residual_px = self.residual_px(&expected);
         let contrast = self.contrast();
         let modulation = self.modulation(contrast);
-        let least = self.least_amplitude(residual_px);
-        let relative = self.seen.amplitude.zip_map(self.light, |a, light| {
-            a / (contrast * light).max(f32::MIN_POSITIVE)
-        });
-        let strong = modulation.zip3_map(&relative, &self.seen.consistent, |m, a, consistent| {
-            consistent && m >= MIN_MODULATION && a >= least
-        });
-        let difference = self.seen.at_px.zip_map(&expected, |seen, expected| {
-            [0, 1].map(|i| seen[i] - expected[i])
-        });
-        let known = without_jumps(
-            &difference,
-            &strong,
-            MAX_JUMP * self.display.period_px(true),
-        );
-        let displacement_px =
-            difference.zip_map(&known, |d, known| if known { d } else { [0.0; 2] });
+        let strong = self.strong(&modulation, contrast, residual_px);
+        let difference = self.seen.at_px.zip_map(&expected, difference);
+        let jump_px = MAX_JUMP * self.display.period_px(true);
+        let known = without_jumps(&difference, &strong, jump_px);
         Bend {
-            displacement_px,
+            displacement_px: difference
+                .zip_map(&known, |d, known| if known { d } else { [0.0; 2] }),
             known,
             modulation,
             residual_px,
         }
+    }
+
+    /// Where the stripes are seen well enough.
+    fn strong(&self, modulation: &Image<f32>, contrast: f32, residual_px: f64) -> Mask {
+        let least = self.least_amplitude(residual_px);
+        let relative = self.seen.amplitude.zip_map(self.light, |a, light| {
+            a / (contrast * light).max(f32::MIN_POSITIVE)
+        });
+        modulation.zip3_map(&relative, &self.seen.consistent, |m, a, consistent| {
+            consistent && m >= MIN_MODULATION && a >= least
+        })
     }
 
     /// Where lines of sight end without the object, pixels of the display.
@@ -199,6 +198,10 @@ impl BendInput<'_> {
         let error_px = residual_px / self.view.display_px;
         MIN_AMPLITUDE.max((error_px / MAX_ERROR_PX) as f32)
     }
+}
+
+fn difference(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+    [a[0] - b[0], a[1] - b[1]]
 }
 
 /// Coefficients of the basis that fit best; zeros where there are too few samples.

@@ -98,17 +98,9 @@ const MAX_COLOR_CHANGE: f32 = 0.2;
 
 /// The warning about a display whose white changes its colour from one side to the other.
 pub(super) fn color_change(empty_white: &Image<LinearRgb>, free: &Mask) -> Option<Diagnostic> {
-    let pixels = empty_white.pixels().iter().zip(free.pixels());
-    let ratios = pixels
-        .filter(|(_, free)| **free)
-        .map(|(p, _)| [p.r, p.b].map(|c| c / p.g.max(1e-6)));
-    let ends = ratios.fold([[f32::MAX, 0.0]; 2], |ends, ratio| {
-        [0, 1].map(|i: usize| [ends[i][0].min(ratio[i]), ends[i][1].max(ratio[i])])
-    });
-    let change = ends
-        .map(|[low, high]| high / low.max(1e-6) - 1.0)
-        .into_iter()
-        .fold(0.0, f32::max);
+    let changes = [|p: LinearRgb| p.r / p.g, |p: LinearRgb| p.b / p.g];
+    let changes = changes.map(|ratio| change_where(&empty_white.map(ratio), free));
+    let change = changes[0].max(changes[1]);
     (change > MAX_COLOR_CHANGE).then(|| {
         let what = format!(
             "white changes its colour across the display by {:.0} %, expected at most {:.0} %; \
@@ -118,6 +110,14 @@ pub(super) fn color_change(empty_white: &Image<LinearRgb>, free: &Mask) -> Optio
         );
         Diagnostic::warning(Code::ColorByAngle, what)
     })
+}
+
+/// The largest over the smallest value where a mask is set, less 1.
+fn change_where(image: &Image<f32>, mask: &Mask) -> f32 {
+    let pixels = image.pixels().iter().zip(mask.pixels());
+    let set = pixels.filter(|(_, set)| **set).map(|(v, _)| *v);
+    let [low, high] = set.fold([f32::MAX, 0.0], |[low, high], v| [v.min(low), v.max(high)]);
+    high / low.max(f32::MIN_POSITIVE) - 1.0
 }
 
 /// Motion of the camera that leaves double edges, pixels of the photo.
@@ -145,22 +145,7 @@ pub(super) fn object_motion(
     coverage: &Image<Coverage>,
     free: &Mask,
 ) -> Option<Diagnostic> {
-    let passed = frames.white.zip_map(frames.black, |w, k| grey(w) - grey(k));
-    let above = seen.mean.zip_map(frames.black, |mean, k| mean - grey(k));
-    let share = ratio_where(&above, &passed, free);
-    let light = frames.light();
-    let off = above.zip3_map(&passed, &light, |above, passed, light| {
-        (above - share * passed) / grey(light).max(1e-6)
-    });
-    let pixels = off
-        .pixels()
-        .iter()
-        .zip(coverage.pixels())
-        .filter(|(_, c)| c.0 > 0.5);
-    let (sum, count) = pixels.fold((0.0, 0.0), |(sum, n), (v, _)| {
-        (sum + f64::from(v * v), n + 1.0)
-    });
-    let change = (sum / f64::max(count, 1.0)).sqrt();
+    let change = change_of_stripes(frames, seen, coverage, free);
     (change > MAX_CHANGE).then(|| {
         let what = format!(
             "inside the object the stripes are on average {:.1} % of white off black and white, expected at most {:.1} %: \
@@ -170,6 +155,35 @@ pub(super) fn object_motion(
         );
         Diagnostic::warning(Code::ObjectMoved, what)
     })
+}
+
+/// How far the mean of the stripes is off that of black and white inside the object, root mean
+/// square, as a share of white.
+fn change_of_stripes(
+    frames: &BlackAndWhite<'_>,
+    seen: &SeenStripes,
+    coverage: &Image<Coverage>,
+    free: &Mask,
+) -> f64 {
+    let passed = frames.white.zip_map(frames.black, |w, k| grey(w) - grey(k));
+    let above = seen.mean.zip_map(frames.black, |mean, k| mean - grey(k));
+    let share = ratio_where(&above, &passed, free);
+    let light = frames
+        .light()
+        .map(|light| grey(light).max(f32::MIN_POSITIVE));
+    let off = above.zip3_map(&passed, &light, |above, passed, light| {
+        (above - share * passed) / light
+    });
+    root_mean_square(&off, coverage)
+}
+
+fn root_mean_square(image: &Image<f32>, coverage: &Image<Coverage>) -> f64 {
+    let pixels = image.pixels().iter().zip(coverage.pixels());
+    let inside = pixels.filter(|(_, c)| c.0 > 0.5);
+    let (sum, count) = inside.fold((0.0, 0.0), |(sum, n), (v, _)| {
+        (sum + f64::from(v * v), n + 1.0)
+    });
+    (sum / f64::max(count, 1.0)).sqrt()
 }
 
 /// Sum of one picture over that of another, where a mask is set.

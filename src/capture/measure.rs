@@ -6,7 +6,7 @@ use super::display::Display;
 use super::frame::Frame;
 use super::object::{Object, evidence};
 use super::recognise::{FramePhoto, refused};
-use super::solve::BlackAndWhite;
+use super::solve::{BlackAndWhite, Noise};
 use super::stack::{Alignment, Photos, Stack};
 use super::stripes::SeenStripes;
 use super::view::{View, grey};
@@ -110,26 +110,23 @@ impl<'a> Scene<'a> {
         empty_stack: Option<&'a Stack>,
     ) -> Result<Self> {
         let area = view.free_area(display);
-        let mut free = area.clone();
-        let mut found: Option<(EmptyDisplay, Object)> = None;
-        // Once with all of the display, which the object shades a little, once without the object.
-        for _ in 0..2 {
-            let empty = EmptyDisplay::new(stack, empty_stack, &free)?;
+        let found = |free: &Mask| -> Result<(EmptyDisplay, Object)> {
+            let empty = EmptyDisplay::new(stack, empty_stack, free)?;
             let evidence = evidence([&stack.black, &stack.white], [&empty.black, &empty.white]);
             let object = Object::find(&evidence, &area)?;
-            let near = filter::dilate(&object.coverage.map(|c| c.0 > 0.0), OBJECT_MARGIN_PX);
-            free = area.zip_map(&near, |area, near| area && !near);
-            found = Some((empty, object));
-        }
-        let (empty, object) = found.ok_or_else(|| refused("nothing lies on the display"))?;
+            Ok((empty, object))
+        };
+        // Once with all of the display, which the object shades a little, once without the object.
+        let (_, rough) = found(&area)?;
+        let (empty, object) = found(&without(&area, &rough))?;
         Ok(Self {
             display,
             view,
             stack,
             empty_stack,
             empty,
+            free: without(&area, &object),
             object,
-            free,
         })
     }
 
@@ -149,13 +146,9 @@ impl<'a> Scene<'a> {
         diagnostics.extend(check::color_change(frames.empty_white, &self.free));
         let film = frames.film(&self.kept());
         let refraction = self.refraction(&film, &mut diagnostics);
-        let mut noise = frames.noise(&self.free);
-        if self.empty_stack.is_some() {
-            noise.empty = noise.of_white(grey(mean_where(frames.empty_white, &self.free)));
-        }
         let light = frames.light();
         Ok(Measured {
-            sigma: frames.sigma(&film, &noise),
+            sigma: frames.sigma(&film, &self.noise()),
             distinct: self.object.distinct,
             light: mean_where(&light, &self.free),
             unevenness: unevenness(&light, &self.free),
@@ -164,6 +157,22 @@ impl<'a> Scene<'a> {
             refraction,
             diagnostics,
         })
+    }
+
+    /// That of the photos, and of those of the empty display.
+    fn noise(&self) -> Noise {
+        let frames = self.frames();
+        let noise = frames.noise(&self.free);
+        let white = grey(mean_where(frames.empty_white, &self.free));
+        let is_photographed = self.empty_stack.is_some();
+        Noise {
+            empty: if is_photographed {
+                noise.of_white(white)
+            } else {
+                0.0
+            },
+            ..noise
+        }
     }
 
     /// How much of the solution is kept: the object and a rim of blur.
@@ -204,6 +213,12 @@ impl<'a> Scene<'a> {
     }
 }
 
+/// What is free around an object.
+fn without(area: &Mask, object: &Object) -> Mask {
+    let near = filter::dilate(&object.coverage.map(|c| c.0 > 0.0), OBJECT_MARGIN_PX);
+    area.zip_map(&near, |area, near| area && !near)
+}
+
 impl Refraction {
     fn on_object(bend: Bend, coverage: &Image<Coverage>) -> Self {
         let known = bend.known.zip_map(coverage, |known, c| known && c.0 >= 0.5);
@@ -233,15 +248,23 @@ impl EmptyDisplay {
                 white: white.clone(),
             });
         }
-        let plate = |photo: &Image<LinearRgb>, name: &str| {
-            let plate = ScreenPlate::fit(photo, free, &PlateOptions::default());
-            plate.map(|plate| plate.image).map_err(|e| e.within(name))
-        };
+        let white = fitted(&stack.white, free).map_err(|e| e.within("white"))?;
+        // Black may be no light at all, of which no logarithm is fitted.
+        let lift = BLACK_LIFT * mean_where(&white, free).max_channel();
+        let lifted = stack.black.map(|p| p.map(|v| v + lift));
+        let black = fitted(&lifted, free).map_err(|e| e.within("black"))?;
         Ok(Self {
-            black: plate(&stack.black, "black")?,
-            white: plate(&stack.white, "white")?,
+            black: black.map(|p| p.map(|v| v - lift)),
+            white,
         })
     }
+}
+
+/// What is added to black for its fit, as a share of white.
+const BLACK_LIFT: f32 = 0.1;
+
+fn fitted(photo: &Image<LinearRgb>, free: &Mask) -> Result<Image<LinearRgb>> {
+    ScreenPlate::fit(photo, free, &PlateOptions::default()).map(|plate| plate.image)
 }
 
 fn mean_where(image: &Image<LinearRgb>, mask: &Mask) -> LinearRgb {

@@ -32,7 +32,7 @@ impl BlackAndWhite<'_> {
                 by_channel(p, v, e, |p, v, e| (p - v * e).max(0.0))
             });
         let film = reflected.zip_map(&transmittance, Film::new);
-        film.zip_map(inside, |film, c| covered(film, c))
+        film.zip_map(inside, covered)
     }
 
     /// V, held between 0 and 1.
@@ -107,8 +107,8 @@ fn by_channel(
 /// Variance of a pixel by its light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Noise {
-    dark: f32,
-    slope: f32,
+    pub(super) dark: f32,
+    pub(super) slope: f32,
     /// Of the empty display, where that was photographed and not fitted.
     pub(super) empty: f32,
 }
