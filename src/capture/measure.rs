@@ -233,15 +233,23 @@ impl EmptyDisplay {
                 white: white.clone(),
             });
         }
-        let plate = |photo: &Image<LinearRgb>, name: &str| {
-            let plate = ScreenPlate::fit(photo, free, &PlateOptions::default());
-            plate.map(|plate| plate.image).map_err(|e| e.within(name))
-        };
+        let white = fitted(&stack.white, free).map_err(|e| e.within("white"))?;
+        // Black may be no light at all, of which no logarithm is fitted.
+        let lift = BLACK_LIFT * mean_where(&white, free).max_channel();
+        let lifted = stack.black.map(|p| p.map(|v| v + lift));
+        let black = fitted(&lifted, free).map_err(|e| e.within("black"))?;
         Ok(Self {
-            black: plate(&stack.black, "black")?,
-            white: plate(&stack.white, "white")?,
+            black: black.map(|p| p.map(|v| v - lift)),
+            white,
         })
     }
+}
+
+/// What is added to black for its fit, as a share of white.
+const BLACK_LIFT: f32 = 0.1;
+
+fn fitted(photo: &Image<LinearRgb>, free: &Mask) -> Result<Image<LinearRgb>> {
+    ScreenPlate::fit(photo, free, &PlateOptions::default()).map(|plate| plate.image)
 }
 
 fn mean_where(image: &Image<LinearRgb>, mask: &Mask) -> LinearRgb {

@@ -37,7 +37,7 @@ impl FramePhoto {
     pub fn read(photo: &Image<LinearRgb>, display: &Display) -> Result<Self> {
         let (frame, markers) = markers_of_frame(&tags(photo)?)?;
         let pairs = corner_pairs(display, &markers);
-        let photo_from_display = homography(&pairs).ok_or_else(|| {
+        let photo_from_display = map_in_front(&pairs).ok_or_else(|| {
             refused("its markers lie on one line, expected the corners of a display")
         })?;
         let paper = std::array::from_fn(|corner| {
@@ -88,6 +88,15 @@ impl FramePhoto {
             }
         })
     }
+}
+
+/// The map that takes places on the display to those in the photo, which has them in front: the
+/// last coordinate is positive.
+pub(super) fn map_in_front(pairs: &[(Point2<f64>, Point2<f64>)]) -> Option<Homography> {
+    let map = homography(pairs)?;
+    let (first, _) = pairs.first()?;
+    let depth = (map.0 * first.to_homogeneous()).z;
+    Some(Homography(map.0 * depth.signum()))
 }
 
 /// The tags of a photo.

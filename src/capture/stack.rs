@@ -2,9 +2,8 @@
 
 use super::display::Display;
 use super::frame::{Frame, SHIFTS, Stripes};
-use super::recognise::{FramePhoto, refused};
+use super::recognise::{FramePhoto, map_in_front, refused};
 use super::view::{View, grey};
-use crate::camera::homography;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
 use crate::geom::Homography;
@@ -89,7 +88,7 @@ impl<'a> Alignment<'a> {
         let motion_px = motions.fold(0.0, f64::max);
         let pairs: Vec<_> = all.iter().flat_map(|photo| &photo.pairs).copied().collect();
         let steady = (motion_px <= STEADY_PX)
-            .then(|| homography(&pairs))
+            .then(|| map_in_front(&pairs))
             .flatten();
         Self {
             view,

@@ -108,8 +108,8 @@ fn every_subcommand_explains_itself() {
     let desk = Desk::new();
     let help = desk.ok(&["--help"]);
     for stage in [
-        "demo", "matte", "asset", "camera", "scene", "settle", "render", "label", "dataset",
-        "diff", "doctor",
+        "demo", "matte", "capture", "asset", "camera", "scene", "settle", "render", "label",
+        "dataset", "diff", "doctor",
     ] {
         assert!(help.contains(stage), "--help does not name {stage}");
         assert!(
@@ -821,4 +821,104 @@ fn one_word_says_how_finely_every_stage_works() {
         "fast",
     ]);
     assert!(told.contains("draft, normal, reference"), "{told}");
+}
+
+/// Photos of the frames of a folder with a grey slab on them, three eighths as wide as the display.
+fn photos_of_frames(desk: &Desk, names: &[&str]) -> Vec<String> {
+    let photo = |name: &&str| {
+        let shown: petcomp::Image<petcomp::LinearRgb> =
+            petcomp::io::read(desk.path(&format!("frames/{name}.png"))).expect("a frame");
+        let seen = petcomp::Image::from_fn(shown.width(), shown.height(), |x, y| {
+            let inside = (200..440).contains(&x) && (150..250).contains(&y);
+            let (reflected, passed) = if inside { (0.05, 0.45) } else { (0.01, 0.85) };
+            shown[(x, y)].map(|light| reflected + passed * light)
+        });
+        let file = format!("photo_{name}.png");
+        petcomp::io::write(desk.path(&file), &seen).expect("a photo");
+        file
+    };
+    names.iter().map(photo).collect()
+}
+
+#[test]
+fn an_object_on_a_display_is_measured() {
+    let desk = Desk::new();
+    let frames = ["capture", "frames", "-o", "frames", "--size", "640x400"];
+    let said = desk.ok(&frames);
+    assert!(
+        said.contains("frames: 2 frames") && said.contains("show.html"),
+        "{said}"
+    );
+    let photos = photos_of_frames(&desk, &["00_black", "01_white"]);
+    let add = |more: &[&'static str]| -> Vec<String> {
+        let words = [
+            "asset", "add", &photos[0], &photos[1], "--class", "cup", "-o", "assets",
+        ];
+        let display = ["--captured", "--display", "frames/display.toml"];
+        let words = words.iter().chain(&display).chain(more);
+        words.map(|word| (*word).to_owned()).collect()
+    };
+    let run = |words: Vec<String>| desk.ok(&words.iter().map(String::as_str).collect::<Vec<_>>());
+    let refused =
+        |words: Vec<String>| desk.refused(&words.iter().map(String::as_str).collect::<Vec<_>>());
+    let width = refused(add(&[]));
+    assert!(
+        width.contains("captured.width: missing, expected the width of the whole picture"),
+        "{width}"
+    );
+    let said = run(add(&["--display-width", "0.4"]));
+    assert!(
+        said.contains("captured: 2 photos, transmittance to 0.0"),
+        "{said}"
+    );
+    assert!(said.contains("refraction not measured"), "{said}");
+    let length: f64 = said
+        .split(": ")
+        .nth(1)
+        .and_then(|size| size.split(" x ").next()?.parse().ok())
+        .expect("a length");
+    // 240 of 640 pixels, 2.5 mm over the display as it lies.
+    assert!((length - 150.0).abs() < 2.0, "{said}");
+    assert!(
+        desk.ok(&["asset", "check", "assets"])
+            .contains("captured: 2 photos")
+    );
+    let list = "[[photos]]\nfile = \"photo_00_black.png\"\nasset = \"a\"\nclass = \"cup\"\n\
+                [photos.captured]\nphotos = [\"photo_01_white.png\"]\ndisplay = \"frames/display.toml\"\nwidth = 0.4\n";
+    desk.write("photos.toml", list);
+    let said = desk.ok(&["asset", "build", "photos.toml", "-o", "built"]);
+    assert!(said.contains("1 photos, 1 assets"), "{said}");
+}
+
+#[test]
+fn a_capture_that_cannot_be_measured_says_why() {
+    let desk = Desk::new();
+    let frames = |size: &'static str| ["capture", "frames", "-o", "frames", "--size", size];
+    let small = desk.refused(&frames("640x200"));
+    assert!(small.contains("size_px: 200, expected 400 to"), "{small}");
+    desk.ok(&[&frames("640x400")[..], &["--diagonal", "20"]].concat());
+    let photos = photos_of_frames(&desk, &["01_white"]);
+    let add = [
+        "asset",
+        "add",
+        &photos[0],
+        "--class",
+        "cup",
+        "-o",
+        "assets",
+        "--captured",
+    ];
+    let one = desk.refused(&add);
+    assert!(
+        one.contains("captured.photos: empty, expected photos of a black and a white frame"),
+        "{one}"
+    );
+    let display = desk.refused(&[&add[..], &[&photos[0]]].concat());
+    assert!(display.contains("display.toml"), "{display}");
+    let beside = [&add[..], &[&photos[0], "--display", "frames/display.toml"]].concat();
+    let black = desk.refused(&beside);
+    assert!(
+        black.contains("no photo of the black frame among photo_01_white.png"),
+        "{black}"
+    );
 }
