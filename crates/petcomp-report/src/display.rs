@@ -20,6 +20,7 @@ use petcomp::geom::Point2;
 use petcomp::plot::Table;
 use petcomp::{Coverage, Error, Image, LinearRgb, Result, io};
 use place::{BACKGROUNDS, Bottle, Place};
+use rayon::prelude::*;
 use shots::Stage;
 use std::path::Path;
 use window::Window;
@@ -83,14 +84,20 @@ pub fn measure(folder: &Path, progress: impl Fn(u64, u64)) -> Result<Vec<Display
         for bottle in &place.bottles {
             progress(done, total);
             done += 1;
-            let reality = Reality::new(place, bottle)?;
-            let methods = DisplayMethod::ALL.into_iter();
-            for method in methods.filter(|method| method.is_possible(bottle)) {
-                rows.push(reality.row(method, method.run(&stage, place, bottle)));
-            }
+            rows.extend(rows_of(&stage, place, bottle)?);
         }
     }
     Ok(rows)
+}
+
+/// Every method on a bottle.
+fn rows_of(stage: &Stage<'_>, place: &Place, bottle: &Bottle) -> Result<Vec<DisplayRow>> {
+    let reality = Reality::new(place, bottle)?;
+    let rows = DisplayMethod::ALL.into_par_iter();
+    let rows = rows.filter(|method| method.is_possible(bottle));
+    Ok(rows
+        .map(|method| reality.row(method, method.run(stage, place, bottle)))
+        .collect())
 }
 
 /// A bottle over its backgrounds, seen straight from above.

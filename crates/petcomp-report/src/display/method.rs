@@ -74,10 +74,15 @@ pub(super) struct SeenFilm {
 
 fn on_paint(method: MattingMethod, place: &Place, bottle: &Bottle) -> Result<SeenFilm> {
     let [paint, other] = Place::paints(bottle);
-    let [photo, other] = [place.photo(bottle, paint)?, place.photo(bottle, other)?];
-    let shots = [photo, other];
-    let film = method.film(&shots[0], &shots)?;
     let exposure = place.exposure_from(paint);
+    // Both as the first was exposed.
+    let as_first = exposure.recip() * place.exposure_from(other);
+    let second = place.photo(bottle, other)?;
+    let shots = [
+        place.photo(bottle, paint)?,
+        second.map(|p| p.scale(as_first)),
+    ];
+    let film = method.film(&shots[0], &shots)?;
     let exposed = film.map(|film| Film {
         color: film.color.scale(exposure),
         ..film

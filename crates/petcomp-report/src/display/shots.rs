@@ -3,11 +3,13 @@
 use super::place::{Bottle, Place};
 use crate::matte::normal;
 use petcomp::Mix;
-use petcomp::capture::{Display, Frame, FramePhoto, Measured, Photos, Sources, View};
+use petcomp::capture::{Display, Frame, Measured, Photos, Sources, View};
 use petcomp::capture::{draw_frame, measure};
 use petcomp::color::srgb_to_linear;
 use petcomp::geom::{Homography, Point2};
 use petcomp::{Image, LinearRgb, Result, Srgb8};
+use rayon::prelude::*;
+use std::collections::BTreeMap;
 
 /// A sensor's noise: the variance of a value is `shot^2 * value + read^2`.
 const SHOT: f64 = 0.006;
@@ -17,90 +19,112 @@ const READ: f64 = 0.002;
 pub(super) struct Stage<'a> {
     place: &'a Place,
     display: Display,
-    /// The display switched off and white, all of the view.
-    black: Image<LinearRgb>,
-    white: Image<LinearRgb>,
+    /// Photos of the whole display without a bottle.
+    empty: BTreeMap<Frame, Image<LinearRgb>>,
     /// Of the view's first pixel among those of a photo.
     corner: [usize; 2],
 }
 
 impl<'a> Stage<'a> {
     pub(super) fn new(place: &'a Place) -> Result<Self> {
-        let (black, white) = (place.empty("black")?, place.empty("white")?);
-        let [w, h] = place.display_px.map(|side| side as usize);
+        let view = EmptyView::new(place)?;
+        let with_stripes = place.bottles.iter().any(|bottle| bottle.with_stripes);
+        let frames: Vec<Frame> = Frame::all(with_stripes).collect();
+        let empty = frames.par_iter().map(|&frame| (frame, view.whole(frame)));
         Ok(Self {
             place,
-            display: Display {
-                size_px: place.display_px,
-                width: Some(place.display_m[0]),
-            },
-            corner: [(w - white.width()) / 2, (h - white.height()) / 2],
-            black,
-            white,
+            empty: empty.collect(),
+            display: view.display,
+            corner: view.corner,
         })
     }
 
     /// What is measured with black and white, or with stripes as well; over the display, a pixel
     /// for each of its own.
     pub(super) fn measure(&self, bottle: &Bottle, with_stripes: bool) -> Result<Measured> {
-        let frames: Vec<Frame> = Frame::all(with_stripes).collect();
-        let with = self.series(&frames, |frame| {
-            self.place.photo(bottle, &frame.to_string()).map(Some)
-        })?;
-        let [x, y, ..] = bottle.crop_px;
-        let shots = Series { at: [x, y], ..with };
-        let empty = self.series(&[Frame::Black, Frame::White], |_| Ok(None))?;
+        let shots = self.series(with_stripes, |frame| self.shot(bottle, frame))?;
+        let empty = self.series(false, |frame| Ok(self.empty[&frame].clone()))?;
         let [w, h] = self.display.size_px.map(|side| side as usize);
         let view = View {
             size: (w, h),
             display_px: 1.0,
         };
-        shots.with_photos(self, |photos| {
-            empty.with_photos(self, |empty| measure(&self.display, &view, photos, empty))
+        shots.with_photos(&self.display, |shots| {
+            empty.with_photos(&self.display, |empty| {
+                measure(&self.display, &view, shots, empty)
+            })
         })
+    }
+
+    /// A photo of a bottle on the whole display.
+    fn shot(&self, bottle: &Bottle, frame: Frame) -> Result<Image<LinearRgb>> {
+        let part = self.place.photo(bottle, &frame.to_string())?;
+        let [x, y, ..] = bottle.crop_px;
+        let mut photo = self.empty[&frame].clone();
+        paste(&mut photo, &part, [self.corner[0] + x, self.corner[1] + y]);
+        Ok(photo)
     }
 
     fn series(
         &self,
-        frames: &[Frame],
-        photo: impl Fn(Frame) -> Result<Option<Image<LinearRgb>>>,
+        with_stripes: bool,
+        photo: impl Fn(Frame) -> Result<Image<LinearRgb>>,
     ) -> Result<Series> {
-        let photos = frames.iter().map(|&frame| Ok((frame, photo(frame)?)));
+        let frames: Vec<Frame> = Frame::all(with_stripes).collect();
+        let photos = frames.iter().map(|&frame| photo(frame));
         Ok(Series {
-            at: [0, 0],
             names: frames.iter().map(|frame| format!("{frame}.jpg")).collect(),
             photos: photos.collect::<Result<_>>()?,
         })
     }
+}
 
-    /// A photo of the display, with a part of the view as it was photographed.
-    fn whole(
-        &self,
-        frame: Frame,
-        part: Option<(&Image<LinearRgb>, [usize; 2])>,
-    ) -> Image<LinearRgb> {
+/// The display without a bottle, as far as it was rendered.
+struct EmptyView {
+    display: Display,
+    display_from_photo: Homography,
+    /// Switched off and white, all of the view.
+    black: Image<LinearRgb>,
+    white: Image<LinearRgb>,
+    corner: [usize; 2],
+}
+
+impl EmptyView {
+    fn new(place: &Place) -> Result<Self> {
+        let (black, white) = (place.empty("black")?, place.empty("white")?);
+        let [w, h] = place.display_px.map(|side| side as usize);
+        Ok(Self {
+            display: Display {
+                size_px: place.display_px,
+                width: Some(place.display_m[0]),
+            },
+            display_from_photo: place.display_from_photo(),
+            corner: [(w - white.width()) / 2, (h - white.height()) / 2],
+            black,
+            white,
+        })
+    }
+
+    /// A photo of the whole display that shows a frame.
+    fn whole(&self, frame: Frame) -> Image<LinearRgb> {
         let shown = draw_frame(&self.display, frame);
         let [left, top] = self.corner.map(|side| side as f64);
-        let place = &self.place.display_from_photo();
         let [w, h] = self.display.size_px.map(|side| side as usize);
         let mut photo = Image::from_fn(w, h, |x, y| {
             let view = Point2::new(x as f64 + 0.5 - left, y as f64 + 0.5 - top);
-            self.bare(&shown, place, view)
+            self.at(&shown, view)
         });
         let mut draw = normal(frame.number() as u64);
         for pixel in photo.pixels_mut() {
             *pixel = pixel.map(|v| noisy(v, draw()));
         }
-        if let Some((part, [x, y])) = part {
-            paste(&mut photo, part, [self.corner[0] + x, self.corner[1] + y]);
-        }
         photo
     }
 
-    /// The empty display at a position of the view, or beyond it as at its border.
-    fn bare(&self, shown: &Image<Srgb8>, place: &Homography, view: Point2<f64>) -> LinearRgb {
-        let at = place.map(view);
-        let light = srgb_to_linear(f32::from(nearest(shown, at).g) / 255.0);
+    /// The light at a position of the view, or beyond it as at its border.
+    fn at(&self, shown: &Image<Srgb8>, view: Point2<f64>) -> LinearRgb {
+        let code = nearest(shown, self.display_from_photo.map(view)).g;
+        let light = srgb_to_linear(f32::from(code) / 255.0);
         let [black, white] = [&self.black, &self.white].map(|empty| nearest(empty, view));
         black.scale(1.0 - light).add_scaled(light, white)
     }
@@ -121,28 +145,24 @@ fn paste(photo: &mut Image<LinearRgb>, part: &Image<LinearRgb>, [x, y]: [usize; 
     }
 }
 
-/// Photos of some frames; none in the place of one of the empty display.
+/// Photos of some frames.
 struct Series {
     names: Vec<String>,
-    photos: Vec<(Frame, Option<Image<LinearRgb>>)>,
-    at: [usize; 2],
+    photos: Vec<Image<LinearRgb>>,
 }
 
 impl Series {
     fn with_photos<T>(
         &self,
-        stage: &Stage<'_>,
+        display: &Display,
         use_photos: impl FnOnce(&Photos<'_>) -> Result<T>,
     ) -> Result<T> {
-        let read = |i: usize| {
-            let (frame, part) = &self.photos[i];
-            Ok(stage.whole(*frame, part.as_ref().map(|part| (part, self.at))))
-        };
+        let read = |i: usize| Ok(self.photos[i].clone());
         let sources = Sources {
             names: &self.names,
             read: &read,
         };
-        let recognised: Vec<FramePhoto> = sources.recognised(&stage.display)?;
+        let recognised = sources.recognised(display)?;
         use_photos(&Photos {
             sources,
             recognised: &recognised,
