@@ -133,7 +133,7 @@ fn zigzag() -> [usize; BLOCK] {
 }
 
 /// Everything in front of the coded samples.
-fn header([rows, columns]: [u16; 2], channels: usize, quanta: &[[u8; BLOCK]; 2]) -> Vec<u8> {
+fn header(size: [u16; 2], channels: usize, quanta: &[[u8; BLOCK]; 2]) -> Vec<u8> {
     let mut file = vec![0xff, SOI];
     add_segment(&mut file, APP0, &JFIF);
     let kinds = channels.min(2);
@@ -145,25 +145,36 @@ fn header([rows, columns]: [u16; 2], channels: usize, quanta: &[[u8; BLOCK]; 2])
             &[&[kind as u8], entries.as_slice()].concat(),
         );
     }
+    add_segment(&mut file, SOF0, &frame_of(size, channels));
+    add_huffman_tables(&mut file, kinds);
+    add_segment(&mut file, SOS, &scan_of(channels));
+    file
+}
+
+/// Eight bits, height and width, and each channel with its table of quanta.
+fn frame_of(size: [u16; 2], channels: usize) -> Vec<u8> {
     let mut frame = vec![8];
-    frame.extend([rows, columns].map(u16::to_be_bytes).as_flattened());
+    frame.extend(size.map(u16::to_be_bytes).as_flattened());
     frame.push(channels as u8);
     frame.extend((0..channels).flat_map(|c| [c as u8 + 1, 0x11, kind_of(c) as u8]));
-    add_segment(&mut file, SOF0, &frame);
-    for (number, table) in HUFFMAN.iter().enumerate().filter(|(n, _)| n % 2 < kinds) {
-        // The class of terms in the upper half, the kind of channel in the lower one.
-        let place = [(number as u8 / 2) << 4 | number as u8 % 2];
-        add_segment(
-            &mut file,
-            DHT,
-            &[&place, table.counts.as_slice(), table.symbols].concat(),
-        );
-    }
+    frame
+}
+
+/// Each channel with its Huffman tables, and all terms of a block at once.
+fn scan_of(channels: usize) -> Vec<u8> {
     let mut scan = vec![channels as u8];
     scan.extend((0..channels).flat_map(|c| [c as u8 + 1, 0x11 * kind_of(c) as u8]));
     scan.extend([0, BLOCK as u8 - 1, 0]);
-    add_segment(&mut file, SOS, &scan);
-    file
+    scan
+}
+
+fn add_huffman_tables(file: &mut Vec<u8>, kinds: usize) {
+    for (number, table) in HUFFMAN.iter().enumerate().filter(|(n, _)| n % 2 < kinds) {
+        // The class of terms in the upper half, the kind of channel in the lower one.
+        let place = [(number as u8 / 2) << 4 | number as u8 % 2];
+        let segment = [&place, table.counts.as_slice(), table.symbols].concat();
+        add_segment(file, DHT, &segment);
+    }
 }
 
 /// Brightness or colour.
@@ -395,34 +406,44 @@ fn scale(a: [f32; SIDE], factor: f32) -> [f32; SIDE] {
 }
 
 /// The cosine transform down the rows of a block, in all columns at once, each term up to a factor.
-///
-/// Dense since the method is one flow of sums and differences.
 #[inline(always)]
 fn cosine_terms(rows: &Lanes8) -> Lanes8 {
-    // cos(3 pi / 8), and what is added to and taken from it.
+    let [e0, e1, e2, e3] = even_terms(std::array::from_fn(|i| add(rows[i], rows[7 - i])));
+    let [o0, o1, o2, o3] = odd_terms(std::array::from_fn(|i| sub(rows[i], rows[7 - i])));
+    [e0, o0, e1, o1, e2, o2, e3, o3]
+}
+
+/// Every second term, from sums of rows that are as far from the middle.
+#[inline(always)]
+fn even_terms([a, b, c, d]: [[f32; SIDE]; 4]) -> [[f32; SIDE]; 4] {
+    let [outer, inner] = [add(a, d), add(b, c)];
+    let [p, q] = [sub(a, d), sub(b, c)];
+    let middle = scale(add(p, q), FRAC_1_SQRT_2);
+    [
+        add(outer, inner),
+        add(p, middle),
+        sub(outer, inner),
+        sub(p, middle),
+    ]
+}
+
+/// The others, from differences.
+#[inline(always)]
+fn odd_terms([a, b, c, d]: [[f32; SIDE]; 4]) -> [[f32; SIDE]; 4] {
+    // cos(3 pi / 8), and that taken from and added to cos(pi / 8).
     const C6: f32 = 0.382_683_43;
     const C2_MINUS_C6: f32 = 0.541_196_1;
     const C2_PLUS_C6: f32 = 1.306_563;
-    let sums: [_; 4] = std::array::from_fn(|i| add(rows[i], rows[7 - i]));
-    let differences: [_; 4] = std::array::from_fn(|i| sub(rows[i], rows[7 - i]));
-    let [outer, inner] = [add(sums[0], sums[3]), add(sums[1], sums[2])];
-    let [a, b] = [sub(sums[0], sums[3]), sub(sums[1], sums[2])];
-    let middle = scale(add(a, b), FRAC_1_SQRT_2);
-    let [d0, d1, d2, d3] = differences;
-    let [p, q, r] = [add(d3, d2), add(d2, d1), add(d1, d0)];
+    let [p, q, r] = [add(d, c), add(c, b), add(b, a)];
     let turned = scale(sub(p, r), C6);
     let low = add(scale(p, C2_MINUS_C6), turned);
     let high = add(scale(r, C2_PLUS_C6), turned);
     let half = scale(q, FRAC_1_SQRT_2);
-    let [plus, minus] = [add(d0, half), sub(d0, half)];
+    let [plus, minus] = [add(a, half), sub(a, half)];
     [
-        add(outer, inner),
         add(plus, high),
-        add(a, middle),
         sub(minus, low),
-        sub(outer, inner),
         add(minus, low),
-        sub(a, middle),
         sub(plus, high),
     ]
 }
