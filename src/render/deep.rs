@@ -14,7 +14,7 @@ use crate::render::lattice::Lattice;
 use crate::render::layers::{Layer, LayerStack, RenderedTile, SampleGrid, ShadowCatcher};
 use crate::render::lens::LensView;
 use crate::render::pixel_filter::filter_quantiles;
-use crate::render::receiver::{LightingContext, ReceiverIrradiance, SeenSide};
+use crate::render::receiver::{LightingContext, ReceiverIrradiance, VisibleSide};
 use crate::render::refraction::refract;
 use crate::render::retouch::retouched;
 use crate::render::texture::BakedTexture;
@@ -196,7 +196,7 @@ fn receivers(
     (0..=cards.len())
         .into_par_iter()
         .map(|k| match cards.get(k) {
-            Some(card) => context.card(k, &card.as_ref()?.seen_side()),
+            Some(card) => context.card(k, &card.as_ref()?.visible_side()),
             None => context.surface(),
         })
         .collect()
@@ -270,7 +270,7 @@ impl<'a> ProjectedCard<'a> {
             return None;
         }
         work::add(Kind::Bakes, 1);
-        let (texture, mirrored) = visible_side(card, plane, &view.eye);
+        let (texture, mirrored) = visible_texture(card, plane, &view.eye);
         let projected = projected.mirrored_if(mirrored);
         let texels = texels_per_pixel(texture, plane, &projected, view, &plane.center);
         let level = detail_level(texels, detail.offsets);
@@ -286,8 +286,8 @@ impl<'a> ProjectedCard<'a> {
         })
     }
 
-    fn seen_side(&self) -> SeenSide<'_> {
-        SeenSide {
+    fn visible_side(&self) -> VisibleSide<'_> {
+        VisibleSide {
             texture: &self.texture,
             mirrored: self.mirrored,
         }
@@ -306,7 +306,11 @@ impl<'a> ProjectedCard<'a> {
 }
 
 /// The side of a card that is turned to the camera, and whether its texture runs the other way.
-fn visible_side<'a>(card: &'a Card, plane: &ScenePlane, eye: &Vector3<f64>) -> (&'a Texture, bool) {
+fn visible_texture<'a>(
+    card: &'a Card,
+    plane: &ScenePlane,
+    eye: &Vector3<f64>,
+) -> (&'a Texture, bool) {
     match &card.back {
         Some(back) if plane.is_seen_from_behind(eye) => (back, true),
         _ => (&card.texture, false),

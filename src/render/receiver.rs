@@ -140,7 +140,7 @@ impl<'a> LightingContext<'a> {
 
     /// Card number `own`, at the nodes where anything is seen on it and one around. None where the
     /// card is not seen at all.
-    pub(super) fn card(&self, own: usize, seen: &SeenSide<'_>) -> Option<ReceiverIrradiance> {
+    pub(super) fn card(&self, own: usize, seen: &VisibleSide<'_>) -> Option<ReceiverIrradiance> {
         let lights = self.light_samples(&self.occluders.cards[own].plane)?;
         let [faces, sky] = SelectedLights::split(&lights);
         Some(ReceiverIrradiance {
@@ -155,7 +155,7 @@ impl<'a> LightingContext<'a> {
         &self,
         lattice: &Lattice,
         own: usize,
-        seen: &SeenSide<'_>,
+        seen: &VisibleSide<'_>,
         lights: SelectedLights<'_>,
     ) -> Option<Receiver> {
         let (view, plane) = (&lattice.view, &self.occluders.cards[own].plane);
@@ -244,13 +244,13 @@ impl<'a> SelectedLights<'a> {
 }
 
 /// The side of a card that is turned to the camera.
-pub(super) struct SeenSide<'a> {
+pub(super) struct VisibleSide<'a> {
     pub(super) texture: &'a BakedTexture,
     /// Its texture runs the other way.
     pub(super) mirrored: bool,
 }
 
-impl SeenSide<'_> {
+impl VisibleSide<'_> {
     /// The requested nodes of a card: two further out than anything is seen on it, for the finer
     /// lattice's one that lies between them.
     fn outline(&self, plane: &ProjectedPlane) -> ConvexShape {
