@@ -162,7 +162,7 @@ fn made_of(labels: &str, shot: fn(u64) -> Shot) -> tempfile::TempDir {
         classes: setup.obstructed.classes(&classes()).unwrap(),
         split: Split::default(),
         obstructed: setup.obstructed,
-        writers: vec![Arc::new(pictures), Arc::new(Sidecar)],
+        writers: vec![Arc::new(pictures.clone()), Arc::new(Sidecar)],
         archives: None,
         store: None,
         inputs: Default::default(),
