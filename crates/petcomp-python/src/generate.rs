@@ -120,7 +120,7 @@ impl Layout {
         // The checks of a recipe, whose tables these are.
         let config = dataset::DatasetConfig {
             labels: layout.labels.clone(),
-            pictures: layout.pictures,
+            pictures: layout.pictures.clone(),
             split: layout.split,
             ..Default::default()
         };
@@ -146,7 +146,7 @@ impl Layout {
     }
 
     fn writers(&self) -> Vec<Arc<dyn Writer>> {
-        let mut writers: Vec<Arc<dyn Writer>> = vec![Arc::new(self.pictures), Arc::new(Sidecar)];
+        let mut writers: Vec<Arc<dyn Writer>> = vec![Arc::new(self.pictures.clone()), Arc::new(Sidecar)];
         writers.extend(self.labels.writers(&self.pictures));
         writers
     }
