@@ -38,3 +38,6 @@ python3 golden/matte/make_cases.py --blender blender --bpy42 "$tools/bpy42/bin/p
 "$tools/bpy45/bin/python" golden/matte/keying_screen_reference.py
 echo "render"
 golden/render/references.sh
+echo "capture"
+"$tools/bpy45/bin/python" experiments/world/world.py displays --out target/displays --library-seed 2500 --count 12 --spp 56
+cp -r target/displays/soft target/displays/window golden/capture/

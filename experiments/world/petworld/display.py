@@ -376,7 +376,7 @@ def write_bottle(developer, display_from_photo, args, folder, cache, i):
     for frame in ("black", "white", *(STRIPES if with_stripes else ())):
         shown = developer.shown(light, None if frame == "black" else frame)
         write_jpeg(path_of(folder, name, frame), developer.photo(shown, rng))
-    near = cv2.dilate((light["cover"] > 0).astype(np.uint8), np.ones((5, 5)))[..., None]
+    near = cv2.dilate((light["cover"] > 0).astype(np.uint8), np.ones((7, 7)))[..., None]
     for k in BACKGROUNDS:
         write_truth(os.path.join(folder, f"{name}_over_{k}.png"), near * developer.shown(light, k))
     if with_stripes:
@@ -389,8 +389,9 @@ def write_bottle(developer, display_from_photo, args, folder, cache, i):
 
 
 def write_truth(path, light):
-    """Without a sensor's noise, on 8 bits."""
-    write_small_png(path, pixels.to_u8(pixels.srgb_encode(light)))
+    """Through the same lens as the photos, without a sensor's noise, on 8 bits."""
+    seen = studio.develop(np.asarray(light, float), np.random.default_rng(0), **{**SENSOR, "shot": 0.0, "read": 0.0})
+    write_small_png(path, pixels.to_u8(pixels.srgb_encode(seen)))
 
 
 def write_small_png(path, codes):
