@@ -149,7 +149,7 @@ class Line:
         self.is_full = False
         self.requests = 0
         self.lost = 0
-        self.chance = random.Random(2)
+        self.chance = random.Random(7)
         line = self
 
         class Handler(BaseHTTPRequestHandler):

@@ -146,7 +146,8 @@ impl Layout {
     }
 
     fn writers(&self) -> Vec<Arc<dyn Writer>> {
-        let mut writers: Vec<Arc<dyn Writer>> = vec![Arc::new(self.pictures.clone()), Arc::new(Sidecar)];
+        let mut writers: Vec<Arc<dyn Writer>> =
+            vec![Arc::new(self.pictures.clone()), Arc::new(Sidecar)];
         writers.extend(self.labels.writers(&self.pictures));
         writers
     }

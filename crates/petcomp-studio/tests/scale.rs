@@ -66,7 +66,7 @@ fn the_first_page_says_what_is_there() {
     .unwrap();
     let studio = Studio::over(&folder);
     browser.go(&studio.page(""));
-    browser.wait("document.querySelectorAll('.card').length === 5");
+    browser.wait("document.querySelectorAll('.card').length === 6");
     assert_eq!(browser.text("h1"), "tray");
     assert!(browser.text(".card").contains("4 labels"));
     browser.screenshot("studio_index");

@@ -57,7 +57,7 @@ impl Place {
     }
 
     fn open(folder: PathBuf) -> Result<Self> {
-        let place: Self = io::read_json(&folder.join(RECORD))?;
+        let place: Self = io::read_json(folder.join(RECORD))?;
         Ok(Self { folder, ..place })
     }
 

@@ -14,6 +14,8 @@ use std::collections::BTreeMap;
 /// A sensor's noise: the variance of a value is `shot^2 * value + read^2`.
 const SHOT: f64 = 0.006;
 const READ: f64 = 0.002;
+/// Parts of a pixel along a side that what is shown is averaged over.
+const PARTS: usize = 4;
 
 /// What captures of a place have in common.
 pub(super) struct Stage<'a> {
@@ -121,10 +123,21 @@ impl EmptyView {
         photo
     }
 
+    /// How bright what is shown is in a pixel, as a share of white: the mean of its parts, as a
+    /// camera sees it. Markers found in pixels read at one point lie a fraction of one off.
+    fn shown_light(&self, shown: &Image<Srgb8>, middle: Point2<f64>) -> f32 {
+        let offset = |i: usize| (i as f64 + 0.5) / PARTS as f64 - 0.5;
+        let parts = (0..PARTS * PARTS).map(|i| {
+            let part = Point2::new(middle.x + offset(i % PARTS), middle.y + offset(i / PARTS));
+            let code = nearest(shown, self.display_from_photo.map(part)).g;
+            srgb_to_linear(f32::from(code) / 255.0)
+        });
+        parts.sum::<f32>() / (PARTS * PARTS) as f32
+    }
+
     /// The light at a position of the view, or beyond it as at its border.
     fn at(&self, shown: &Image<Srgb8>, view: Point2<f64>) -> LinearRgb {
-        let code = nearest(shown, self.display_from_photo.map(view)).g;
-        let light = srgb_to_linear(f32::from(code) / 255.0);
+        let light = self.shown_light(shown, view);
         let [black, white] = [&self.black, &self.white].map(|empty| nearest(empty, view));
         black.scale(1.0 - light).add_scaled(light, white)
     }

@@ -1,4 +1,5 @@
-//! Reality beside what each method makes of it, and by how much that is off.
+//! Reality beside what each method makes of it, and by how much that is off; blank where a method
+//! refuses.
 
 use super::Reality;
 use super::method::{DisplayMethod, SeenFilm};
@@ -16,18 +17,24 @@ pub(super) fn strip(
     reality: &Reality,
     k: usize,
     run: impl Fn(DisplayMethod) -> Result<SeenFilm>,
-) -> Result<Image<Srgb8>> {
+) -> Image<Srgb8> {
     let inside = |image: &Image<LinearRgb>| {
         image.zip_map(&reality.inside, |p, inside| if inside { p } else { PAPER })
     };
     let seen = inside(&reality.seen[k]);
     let mut columns = vec![[seen.clone(), seen.map(|_| PAPER)]];
     for method in DisplayMethod::ALL {
-        let made = inside(&reality.composite(&run(method)?, k));
-        let off = made.zip_map(&seen, |a, b| difference(a, b));
-        columns.push([made, inside(&off)]);
+        let column = match run(method) {
+            Ok(found) => {
+                let made = inside(&reality.composite(&found, k));
+                let off = made.zip_map(&seen, difference);
+                [made, inside(&off)]
+            }
+            Err(_) => [seen.map(|_| PAPER), seen.map(|_| PAPER)],
+        };
+        columns.push(column);
     }
-    Ok(laid_out(&columns).map(encode_srgb8))
+    laid_out(&columns).map(encode_srgb8)
 }
 
 const PAPER: LinearRgb = LinearRgb::new(1.0, 1.0, 1.0);
