@@ -2,6 +2,7 @@
 
 mod dye;
 mod lines;
+mod noise;
 
 use super::arrays::channel_pairs;
 use super::check::{check_photo, check_value, refused};
@@ -98,8 +99,11 @@ pub fn triangulate(
 ) -> Result<Triangulated> {
     check_sizes(shots, inside)?;
     let aligned = align(shots, inside, options)?;
-    let lines = fit_lines(&aligned, strongest_noise(shots));
-    let determined = determined_channels(&lines, inside, options.max_sigma)?;
+    let noise = strongest_noise(shots);
+    let lines = fit_lines(&aligned, noise);
+    // What a plate misses, the shadow beside the object above all, is no noise of the screens' colours.
+    let share = noise_beside(shots, inside) / noise;
+    let determined = determined_channels(&lines, inside, options.max_sigma / share)?;
     let dye = dye::fit(&lines, inside, determined);
     let inferred = Inferred::fit(&lines, inside, determined, dye);
     let solved = lines.map(|line| inferred.complete(&line));
@@ -430,6 +434,14 @@ fn strongest_noise(shots: &[(&Image<LinearRgb>, &ScreenPlate)]) -> f32 {
     shots
         .iter()
         .map(|(_, plate)| plate.residual.max_channel())
+        .fold(MIN_NOISE, f32::max)
+}
+
+/// The same without what the plates miss.
+fn noise_beside(shots: &[(&Image<LinearRgb>, &ScreenPlate)], inside: &Image<Coverage>) -> f32 {
+    shots
+        .iter()
+        .map(|(photo, plate)| noise::beside(photo, inside).min(plate.residual.max_channel()))
         .fold(MIN_NOISE, f32::max)
 }
 
