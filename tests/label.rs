@@ -19,6 +19,10 @@ use proptest::prelude::*;
 /// Rays along each side of a pixel; a pixel's coverage is then known to within 1 / RAYS.
 const RAYS: usize = 8;
 
+/// What a few rays may find where two outlines share less than a hundredth of a pixel: they only
+/// touch, pixels.
+const TOUCHED: f64 = 4.0 / (RAYS * RAYS) as f64;
+
 const IMAGE: [u32; 2] = [96, 72];
 
 /// A camera one metre above the surface that looks straight down.
@@ -271,8 +275,7 @@ proptest! {
         let deep = cast(&scene);
         let pixels = (0..deep.height()).flat_map(|y| (0..deep.width()).map(move |x| (x, y)));
         let hidden: f32 = pixels.flat_map(|(x, y)| deep.at(x, y)).map(|s| s.alpha - s.visible).sum();
-        // Outlines that share less than a hundredth of a pixel only touch, and a ray or two may hit what they share.
-        let shared = hidden > 4.0 / (RAYS * RAYS) as f32;
+        let shared = f64::from(hidden) > TOUCHED;
         let found = label(&deep, &scene, &LabelOptions::default());
         let covered = |id: u32| found.objects.iter().find(|o| o.id == ObjectId(id)).map(|o| o.covered_by.clone());
         if let (Some(low), Some(high)) = (covered(1), covered(2)) {
@@ -284,8 +287,12 @@ proptest! {
 
     #[test]
     fn a_topmost_opaque_card_is_seen_whole(cards in [apart(1), apart(2), apart(3), apart(4)]) {
+        let deep = cast(&shot(cards.clone()));
+        let whole = |id: u32| raster(&deep, id, 0.0).0;
         for object in labels(&shot(cards), &LabelOptions::default()).objects.iter().filter(|o| o.is_topmost()) {
-            prop_assert!(object.visible_fraction > 0.999, "{object:?}");
+            let hidden = (1.0 - object.visible_fraction) * whole(object.id.0);
+            // Each of the others may touch it.
+            prop_assert!(hidden <= 3.0 * TOUCHED, "{object:?}");
         }
     }
 
