@@ -5,6 +5,7 @@ use super::library::Photo;
 use crate::color::{Hsv, hsv_to_rgb, to_srgb8};
 use crate::image::Image;
 use crate::matte::Flow;
+use crate::matte::median::quantile;
 use crate::pixel::{Film, LinearRgb, Srgb8};
 use std::f64::consts::TAU;
 
@@ -45,12 +46,7 @@ fn full_saturation(flow: &Flow) -> f32 {
     let lengths = pixels
         .filter(|(_, known)| **known)
         .map(|(d, _)| libm::hypotf(d[0], d[1]));
-    let mut lengths: Vec<f32> = lengths.collect();
-    let rank = (SATURATED_SHARE * lengths.len() as f64) as usize;
-    if rank >= lengths.len() {
-        return 1.0;
-    }
-    *lengths.select_nth_unstable_by(rank, f32::total_cmp).1
+    quantile(lengths.collect(), SATURATED_SHARE, f32::total_cmp).unwrap_or(1.0)
 }
 
 fn wheel_color([x, y]: [f32; 2], full: f32) -> LinearRgb {

@@ -4,6 +4,7 @@ use super::display::Display;
 use super::stripes::SeenStripes;
 use super::view::View;
 use crate::image::{Image, Mask};
+use crate::matte::median::median;
 use nalgebra::{DMatrix, DVector};
 
 /// The refraction of an object in the view.
@@ -105,14 +106,7 @@ impl BendInput<'_> {
         let (w, h) = self.view.size;
         Image::from_fn(w, h, |x, y| {
             let (at, basis) = (self.view.display_at(x, y), self.basis(x, y));
-            [0, 1].map(|axis| {
-                at[axis]
-                    + basis
-                        .iter()
-                        .zip(&corrections[axis])
-                        .map(|(b, c)| b * c)
-                        .sum::<f64>()
-            })
+            [0, 1].map(|axis| at[axis] + dot(&basis, &corrections[axis]))
         })
     }
 
@@ -120,9 +114,7 @@ impl BendInput<'_> {
     fn correction(&self, seen: &SeenStripes, axis: usize) -> Vec<f64> {
         let mut samples = self.samples(seen, axis);
         let first = least_squares(&samples);
-        let off = |(basis, value): &(Vec<f64>, f64)| {
-            (value - basis.iter().zip(&first).map(|(b, c)| b * c).sum::<f64>()).abs()
-        };
+        let off = |(basis, value): &(Vec<f64>, f64)| (value - dot(basis, &first)).abs();
         samples.sort_by(|a, b| off(a).total_cmp(&off(b)));
         samples.truncate(((1.0 - DROPPED_SHARE) * samples.len() as f64) as usize);
         least_squares(&samples)
@@ -176,12 +168,7 @@ impl BendInput<'_> {
         let shares = self
             .free_pixels()
             .map(|i| self.seen.amplitude.pixels()[i] / self.light.pixels()[i].max(1e-6));
-        let mut shares: Vec<f32> = shares.collect();
-        let middle = shares.len() / 2;
-        if shares.is_empty() {
-            return 0.5;
-        }
-        *shares.select_nth_unstable_by(middle, f32::total_cmp).1
+        median(shares, f32::total_cmp).unwrap_or(0.5)
     }
 
     fn modulation(&self, contrast: f32) -> Image<f32> {
@@ -198,6 +185,10 @@ impl BendInput<'_> {
         let error_px = residual_px / self.view.display_px;
         MIN_AMPLITUDE.max((error_px / MAX_ERROR_PX) as f32)
     }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 fn difference(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
@@ -225,7 +216,7 @@ fn without_jumps(displacement: &Image<[f64; 2]>, known: &Mask, most: f64) -> Mas
         known[(x, y)]
             && [0, 1].iter().all(|&axis| {
                 let middle = median_around(displacement, known, (x, y), axis);
-                (displacement[(x, y)][axis] - middle).abs() <= most
+                middle.is_some_and(|middle| (displacement[(x, y)][axis] - middle).abs() <= most)
             })
     })
 }
@@ -235,14 +226,11 @@ fn median_around(
     known: &Mask,
     (x, y): (usize, usize),
     axis: usize,
-) -> f64 {
+) -> Option<f64> {
     let around =
         (-AROUND_PX..=AROUND_PX).flat_map(|j| (-AROUND_PX..=AROUND_PX).map(move |i| (i, j)));
     let places = around.map(|(i, j)| (x as isize + i, y as isize + j));
-    let mut values: Vec<f64> = places
-        .filter(|&(x, y)| known.nearest(x, y))
-        .map(|(x, y)| displacement.nearest(x, y)[axis])
-        .collect();
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+    let near = places.filter(|&(x, y)| known.nearest(x, y));
+    let values = near.map(|(x, y)| displacement.nearest(x, y)[axis]);
+    median(values, f64::total_cmp)
 }

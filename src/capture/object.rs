@@ -5,7 +5,8 @@ use super::view::grey;
 use crate::error::Result;
 use crate::filter;
 use crate::image::{Image, Mask};
-use crate::matte::Outline;
+use crate::matte::median::median;
+use crate::matte::{Outline, PixelGroups, filled};
 use crate::pixel::{Coverage, LinearRgb};
 
 /// The object in the view.
@@ -79,13 +80,9 @@ impl Object {
 
 fn threshold(evidence: &Image<f32>, free: &Mask) -> f32 {
     let pixels = evidence.pixels().iter().zip(free.pixels());
-    let mut values: Vec<f32> = pixels.filter(|(_, free)| **free).map(|(e, _)| *e).collect();
-    let middle = values.len() / 2;
-    if values.is_empty() {
-        return MIN_EVIDENCE;
-    }
-    let (_, median, _) = values.select_nth_unstable_by(middle, f32::total_cmp);
-    MIN_EVIDENCE.max(EVIDENCE_MEDIANS * *median)
+    let values = pixels.filter(|(_, free)| **free).map(|(e, _)| *e);
+    let typical = median(values, f32::total_cmp).unwrap_or_default();
+    MIN_EVIDENCE.max(EVIDENCE_MEDIANS * typical)
 }
 
 /// The largest value around each pixel.
@@ -112,58 +109,13 @@ fn solid(rough: &Mask) -> Mask {
     largest_piece(&filter::erode(&closed, radius))
 }
 
-/// A mask with what it encloses.
-fn filled(mask: &Mask) -> Mask {
-    let (w, h) = mask.size();
-    let border = (0..w)
-        .flat_map(|x| [(x, 0), (x, h - 1)])
-        .chain((0..h).flat_map(|y| [(0, y), (w - 1, y)]));
-    let mut outside = Image::filled(w, h, false);
-    for start in border {
-        flood(mask, false, start, &mut outside);
-    }
-    outside.complement()
-}
-
 /// The connected piece of most pixels.
 fn largest_piece(mask: &Mask) -> Mask {
-    let (w, h) = mask.size();
-    let mut seen = Image::filled(w, h, false);
-    let (mut best, mut most) = ((0, 0), 0);
-    for start in (0..h).flat_map(|y| (0..w).map(move |x| (x, y))) {
-        let area = flood(mask, true, start, &mut seen);
-        if area > most {
-            (best, most) = (start, area);
-        }
-    }
-    let mut piece = Image::filled(w, h, false);
-    flood(mask, true, best, &mut piece);
-    piece
-}
-
-/// Marks the pixels of a value that are connected with a start and not marked yet; returns their
-/// number.
-fn flood(mask: &Mask, value: bool, start: (usize, usize), marked: &mut Mask) -> usize {
-    let (w, h) = mask.size();
-    let (mut open, mut area) = (vec![start], 0);
-    while let Some((x, y)) = open.pop() {
-        if mask[(x, y)] != value || marked[(x, y)] {
-            continue;
-        }
-        marked[(x, y)] = true;
-        area += 1;
-        open.extend(
-            [(x + 1, y), (x, y + 1)]
-                .into_iter()
-                .filter(|&(x, y)| x < w && y < h),
-        );
-        open.extend(
-            [(x.wrapping_sub(1), y), (x, y.wrapping_sub(1))]
-                .into_iter()
-                .filter(|&(x, y)| x < w && y < h),
-        );
-    }
-    area
+    let groups = PixelGroups::new(mask);
+    let sizes = groups.sizes(mask);
+    // Of several the first.
+    let largest = (0..sizes.len()).rev().max_by_key(|&group| sizes[group]);
+    groups.only(|group| Some(group) == largest)
 }
 
 /// Fails where an object reaches the end of the free area.

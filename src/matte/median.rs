@@ -3,7 +3,7 @@
 use std::cmp::Ordering;
 
 /// The value in the middle; of an even number the higher of the two, none of none.
-pub(super) fn median<T: Copy>(
+pub(crate) fn median<T: Copy>(
     values: impl Iterator<Item = T>,
     order: impl FnMut(&T, &T) -> Ordering,
 ) -> Option<T> {
@@ -11,7 +11,7 @@ pub(super) fn median<T: Copy>(
 }
 
 /// The value that a share, 0 to 1, of the others lies below; none where there is none.
-pub(super) fn quantile<T: Copy>(
+pub(crate) fn quantile<T: Copy>(
     mut values: Vec<T>,
     share: f64,
     order: impl FnMut(&T, &T) -> Ordering,

@@ -27,7 +27,7 @@ mod flow;
 pub mod key;
 mod key_color;
 mod keying_screen;
-mod median;
+pub(crate) mod median;
 mod outline;
 mod plate;
 mod prepared;
@@ -71,6 +71,8 @@ pub use screen_corners::{ScreenCorners, screen_corners};
 pub use segment::{Confidence, SegmentOptions, Segmentation, segment};
 #[doc(hidden)]
 pub use segment::{LumaMode, SegmentStep, Threshold};
+#[cfg(feature = "pipeline")]
+pub(crate) use segment::{PixelGroups, filled};
 pub(crate) use stroke::check_strokes;
 pub use stroke::{Claim, Stroke};
 pub use triangulate::{TriangulateOptions, Triangulated, triangulate};

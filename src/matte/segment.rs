@@ -15,7 +15,9 @@ mod snap;
 mod threshold;
 
 pub use band::LumaMode;
-pub(super) use cluster::PixelGroups;
+pub(crate) use cluster::PixelGroups;
+#[cfg(feature = "pipeline")]
+pub(crate) use cluster::filled;
 pub use confidence::Confidence;
 pub use options::SegmentOptions;
 pub use threshold::Threshold;

@@ -4,7 +4,7 @@ use crate::image::{Image, Mask};
 use std::ops::Range;
 
 /// The connected groups (8 neighbours) of a set, in the order of their first pixel, row by row.
-pub(in super::super) struct PixelGroups {
+pub(crate) struct PixelGroups {
     size: (usize, usize),
     /// The set as runs of pixels, row by row.
     runs: Vec<PixelRun>,
@@ -30,7 +30,7 @@ impl PixelRun {
 
 impl PixelGroups {
     /// Finds the groups: runs that touch the same run, corners included, are of one.
-    pub(in super::super) fn new(set: &Mask) -> Self {
+    pub(crate) fn new(set: &Mask) -> Self {
         let mut runs: Vec<PixelRun> = Vec::new();
         let mut above = 0..0;
         for (row, pixels) in set.rows().enumerate() {
@@ -49,7 +49,7 @@ impl PixelGroups {
     }
 
     /// How many pixels of `members` are in each group.
-    pub(in super::super) fn sizes(&self, members: &Mask) -> Vec<usize> {
+    pub(crate) fn sizes(&self, members: &Mask) -> Vec<usize> {
         let mut sizes = vec![0; self.count];
         for run in &self.runs {
             sizes[run.group] += run.count(members);
@@ -58,7 +58,7 @@ impl PixelGroups {
     }
 
     /// The pixels of the groups for which a claim, by index from 0, holds.
-    pub(in super::super) fn only(&self, holds: impl Fn(usize) -> bool) -> Mask {
+    pub(crate) fn only(&self, holds: impl Fn(usize) -> bool) -> Mask {
         let mut only = Image::new(self.size.0, self.size.1);
         for run in self.runs.iter().filter(|run| holds(run.group)) {
             only.row_mut(run.row)[run.columns.clone()].fill(true);
@@ -160,7 +160,7 @@ pub(super) fn without_specks(set: &Mask, least: usize) -> Mask {
 
 /// The set with its holes filled: all that cannot be reached from the border of the picture.
 /// Outlines must be two pixels thick, since the way around goes over corners too.
-pub(super) fn filled(set: &Mask) -> Mask {
+pub(crate) fn filled(set: &Mask) -> Mask {
     let groups = PixelGroups::new(&set.complement());
     let reaching = groups.reaching_border();
     groups.only(|group| reaching[group]).complement()
