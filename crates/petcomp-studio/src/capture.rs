@@ -1,15 +1,16 @@
 //! The page `capture`: the frames that a luminous display shows below an object, on this machine's
 //! own display or in a folder for another one.
 
+use crate::message::{Json, Query};
 use crate::refusal::Answer;
 use crate::server::Page;
 use crate::studio::Studio;
 use crate::turn::blocking;
-use axum::extract::{Query, State};
+use axum::Router;
+use axum::extract::State;
 use axum::http::header::{CONTENT_SECURITY_POLICY, CONTENT_TYPE};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
-use axum::{Json, Router};
 use petcomp::capture::{Display, write_frames};
 use petcomp::{Error, io};
 use serde::{Deserialize, Serialize};

@@ -9,6 +9,7 @@
 //!   page overwrite what another one has saved since.
 //! * `turn` keeps heavy work away from the threads that answer, and gives up what was asked for
 //!   again since.
+//! * `message` reads and writes what pages send and are sent.
 //! * `refusal` is what a page is told when something cannot be done.
 #![warn(clippy::unwrap_used, clippy::print_stderr, clippy::print_stdout)]
 
@@ -17,6 +18,7 @@ mod corners;
 mod dataset;
 mod folder;
 mod mattes;
+mod message;
 mod overview;
 mod picture;
 mod recipe;

@@ -1,13 +1,14 @@
 //! The first page: what is in the folder, and what each page can do with it.
 
+use crate::message::Json;
 use crate::picture::may_be_photo;
 use crate::refusal::Answer;
 use crate::server::Page;
 use crate::studio::Studio;
 use crate::turn::blocking;
+use axum::Router;
 use axum::extract::State;
 use axum::routing::get;
-use axum::{Json, Router};
 use serde::Serialize;
 use std::path::Path;
 use std::sync::Arc;

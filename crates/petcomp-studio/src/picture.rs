@@ -1,10 +1,11 @@
 //! Pictures for pages: a photo as the browser can show it, and small ones.
 
+use crate::message::Query;
 use crate::refusal::{Answer, Refusal};
 use crate::studio::Studio;
 use crate::turn::blocking;
 use axum::Router;
-use axum::extract::{Query, State};
+use axum::extract::State;
 use axum::http::header::{CACHE_CONTROL, CONTENT_TYPE};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;

@@ -1,6 +1,6 @@
 //! What a page is told when something cannot be done: a status, and one line.
 
-use axum::Json;
+use crate::message::Json;
 use axum::http::StatusCode;
 use axum::response::{IntoResponse, Response};
 use serde_json::json;

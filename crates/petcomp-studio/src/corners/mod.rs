@@ -5,13 +5,14 @@ mod label_file;
 mod photos;
 mod view;
 
+use crate::message::{Json, Query};
 use crate::refusal::Answer;
 use crate::server::Page;
 use crate::studio::Studio;
 use crate::turn::{Tab, Turns, blocking};
-use axum::extract::{Query, State};
+use axum::Router;
+use axum::extract::State;
 use axum::routing::{get, post};
-use axum::{Json, Router};
 use joint::JointPhoto;
 use label_file::{LabelFile, Saved};
 use petcomp::camera::{self, Label, Marker, SnappedCorners};

@@ -2,10 +2,10 @@
 
 use super::review::review_of;
 use crate::folder::Folder;
+use crate::message::Json;
 use crate::refusal::{Answer, Refusal};
 use crate::studio::Studio;
 use crate::turn::blocking;
-use axum::Json;
 use axum::extract::State;
 use axum::http::StatusCode;
 use petcomp::asset::{List, PhotoEntry, ScreenSource, Verdict};

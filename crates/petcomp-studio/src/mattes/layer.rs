@@ -1,11 +1,12 @@
 //! Layers: a cut-out as it is looked at, each as large as the photo.
 
 use super::solve::{ShownCut, Solved};
+use crate::message::Query;
 use crate::picture::{at_most, jpeg};
 use crate::refusal::{Answer, Refusal};
 use crate::studio::Studio;
 use crate::turn::blocking;
-use axum::extract::{Query, State};
+use axum::extract::State;
 use axum::http::StatusCode;
 use axum::response::Response;
 use petcomp::color::to_srgb8;

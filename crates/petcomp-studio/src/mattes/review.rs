@@ -1,11 +1,11 @@
 //! What a person said of a cut-out: read when a photo is shown, saved whenever it changes.
 
 use crate::folder::Folder;
+use crate::message::{Json, Query};
 use crate::refusal::Answer;
 use crate::studio::Studio;
 use crate::turn::blocking;
-use axum::Json;
-use axum::extract::{Query, State};
+use axum::extract::State;
 use petcomp::asset::{Review, Verdict};
 use petcomp::matte::Stroke;
 use serde::{Deserialize, Serialize};

@@ -2,10 +2,10 @@
 
 use super::entry::EntryName;
 use crate::folder::Folder;
+use crate::message::Json;
 use crate::refusal::{Answer, Refusal};
 use crate::studio::Studio;
 use crate::turn::{Tab, Turns};
-use axum::Json;
 use axum::extract::State;
 use axum::http::StatusCode;
 use petcomp::asset::{OpenPhoto, PhotoEntry};

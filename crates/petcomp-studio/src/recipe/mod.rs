@@ -3,14 +3,15 @@
 mod draft;
 mod preview;
 
+use crate::message::{Json, Query};
 use crate::refusal::Answer;
 use crate::server::Page;
 use crate::studio::Studio;
 use crate::turn::{Tab, Turns, blocking};
-use axum::extract::{Query, State};
+use axum::Router;
+use axum::extract::State;
 use axum::response::Response;
 use axum::routing::{get, post};
-use axum::{Json, Router};
 use draft::{Draft, Edits};
 use petcomp::dataset::DatasetConfig;
 use petcomp::dataset::settings::{SettingGroup, settings};

@@ -3,14 +3,15 @@
 
 mod photo_list;
 
+use crate::message::{Json, Query};
 use crate::picture::may_be_photo;
 use crate::refusal::Answer;
 use crate::server::Page;
 use crate::studio::Studio;
 use crate::turn::blocking;
-use axum::extract::{Query, State};
+use axum::Router;
+use axum::extract::State;
 use axum::routing::{get, post};
-use axum::{Json, Router};
 use petcomp::matte;
 use photo_list::{ListedPhoto, PhotoScale, ScaledPhoto};
 use serde::{Deserialize, Serialize};
