@@ -55,6 +55,11 @@ impl Float4 {
     }
 
     #[inline(always)]
+    pub(super) fn scaled(self, factor: f32) -> Self {
+        Self(self.0.map(|v| factor * v))
+    }
+
+    #[inline(always)]
     pub(super) fn times(self, o: Self) -> Self {
         Self(std::array::from_fn(|i| self.0[i] * o.0[i]))
     }

@@ -12,7 +12,7 @@ use crate::render::light_samples::{LightGroup, LightSamples};
 use crate::render::occluders::Occluders;
 use crate::render::ranges::{range_union, range_until};
 use crate::render::shadow::{ProjectedShadow, ShadowedReceiver, TexelReads};
-use crate::render::shadow_ray::{ShadowRay, shadow_rays};
+use crate::render::shadow_ray::{FaceIrradiance, ShadowRay, UnitIrradiance, shadow_rays};
 use crate::render::texture::BakedTexture;
 use crate::render::view::{
     CameraView, HORIZON_M, LatticeArea, ProjectedPlane, ScenePlane, rows_and_columns,
@@ -303,12 +303,8 @@ pub(super) struct RowSums {
     pub(super) requested: Range<usize>,
     /// World position.
     position: [Vec<f32>; 3],
-    /// Irradiance by unit radiance of all rays of a group in the open, and what the group loses to
-    /// occluders, per channel, nothing between groups.
+    /// Irradiance by unit radiance of all rays of a group of faces, in the open.
     group: Vec<f32>,
-    lost: Vec<Float4>,
-    /// Where it loses anything, counted from the first requested node.
-    touched: Range<usize>,
     /// Irradiance in the open.
     pub(super) open: Vec<Float4>,
     /// Irradiance that occluders take away.
@@ -405,15 +401,16 @@ impl Receiver {
 /// Adds up a group of rays.
 fn gather_group(group: &RayGroup, rows: &mut [RowSums], buffers: &mut RayBuffers) {
     let has_faces = group.has_faces();
-    for row in rows.iter_mut() {
-        row.start_group(has_faces);
+    let radiance = group.radiance.into();
+    if has_faces {
+        rows.iter_mut().for_each(RowSums::start_faces);
     }
     for ray in &group.rays {
         let wanted = rows.iter_mut().filter(|row| !row.requested.is_empty());
-        wanted.for_each(|row| row.add_ray(ray, buffers));
+        wanted.for_each(|row| row.add_ray(ray, radiance, buffers));
     }
-    for row in rows {
-        row.add_group(group.radiance.into());
+    if has_faces {
+        rows.iter_mut().for_each(|row| row.add_faces(radiance));
     }
 }
 
@@ -422,69 +419,80 @@ impl RowSums {
     fn start(&mut self, j: usize, requested: Range<usize>, open_sky: Float4) {
         refill(&mut self.open, requested.len(), open_sky);
         refill(&mut self.hidden, requested.len(), Float4::ZERO);
-        refill(&mut self.lost, requested.len(), Float4::ZERO);
         (self.j, self.requested) = (j, requested);
     }
 
-    /// Empties what is added up for one group.
-    fn start_group(&mut self, has_faces: bool) {
-        let n = self.requested.len();
-        refill(&mut self.group, if has_faces { n } else { 0 }, 0.0);
-        self.touched = 0..0;
+    /// Empties what is added up for one group of faces.
+    fn start_faces(&mut self) {
+        refill(&mut self.group, self.requested.len(), 0.0);
     }
 
-    /// Adds a ray to its group.
-    fn add_ray(&mut self, ray: &ShadowRay, buffers: &mut RayBuffers) {
-        buffers.strength.resize(self.requested.len(), 0.0);
-        // What the sky gives in the open is in the open sky.
-        if ray.is_face() {
-            self.add_face(ray, buffers);
+    /// Adds a group of faces of this radiance to the irradiance in the open.
+    fn add_faces(&mut self, radiance: Float4) {
+        for (open, &e) in self.open.iter_mut().zip(&self.group) {
+            *open = open.add_scaled(e, radiance);
         }
-        let Some(all) = buffers.touch_shadows(ray, self.j, &self.requested) else {
-            return;
-        };
-        let here = all.start - self.requested.start..all.end - self.requested.start;
-        if !ray.is_face() {
-            let strength = &mut buffers.strength[here.clone()];
-            ray.unit_irradiance().fill([&[]; 3], strength);
+    }
+
+    /// Adds a ray of this radiance.
+    fn add_ray(&mut self, ray: &ShadowRay, radiance: Float4, buffers: &mut RayBuffers) {
+        match ray.unit_irradiance() {
+            UnitIrradiance::Even(share) => self.hide_sky(ray, radiance.scaled(share), buffers),
+            UnitIrradiance::Face(face) => {
+                self.add_face(&face, buffers);
+                self.hide_face(ray, radiance, buffers);
+            }
         }
-        buffers.fill_through(ray, self.j, &all);
-        self.add_lost(here, buffers);
     }
 
     /// Adds the open irradiance of a piece of an area light to its group.
-    fn add_face(&mut self, ray: &ShadowRay, buffers: &mut RayBuffers) {
+    fn add_face(&mut self, face: &FaceIrradiance, buffers: &mut RayBuffers) {
         let [x, y, z] = &self.position;
-        ray.unit_irradiance().fill([x, y, z], &mut buffers.strength);
+        buffers.strength.resize(self.requested.len(), 0.0);
+        face.fill([x, y, z], &mut buffers.strength);
         for (sum, e) in self.group.iter_mut().zip(&buffers.strength) {
             *sum += e;
         }
         buffers.counts.light += buffers.strength.len();
     }
 
-    /// Adds what a ray loses at some nodes to what its group loses.
-    fn add_lost(&mut self, nodes: Range<usize>, buffers: &RayBuffers) {
-        let lost = self.lost[nodes.clone()].iter_mut();
-        let passes = buffers.strength[nodes.clone()].iter().zip(&buffers.through);
-        for (lost, (&e, through)) in lost.zip(passes) {
-            *lost = lost.add_scaled(e, through.complement());
+    /// Adds what is hidden of a piece of the sky; what it gives in the open is in the open sky.
+    fn hide_sky(&mut self, ray: &ShadowRay, irradiance: Float4, buffers: &mut RayBuffers) {
+        let Some(nodes) = buffers.see_through(ray, self.j, &self.requested) else {
+            return;
+        };
+        for (hidden, through) in self.hidden[nodes].iter_mut().zip(&buffers.through) {
+            *hidden = hidden.add_product(through.complement(), irradiance);
         }
-        self.touched = range_union(self.touched.clone(), nodes);
     }
 
-    /// Adds a group of this radiance to open and to hidden irradiance.
-    fn add_group(&mut self, radiance: Float4) {
-        for (open, &e) in self.open.iter_mut().zip(&self.group) {
-            *open = open.add_scaled(e, radiance);
-        }
-        let hidden = self.hidden[self.touched.clone()].iter_mut();
-        for (hidden, lost) in hidden.zip(&mut self.lost[self.touched.clone()]) {
-            *hidden = hidden.add_product(std::mem::take(lost), radiance);
+    /// Adds what is hidden of a piece of an area light, by its strength at each node.
+    fn hide_face(&mut self, ray: &ShadowRay, radiance: Float4, buffers: &mut RayBuffers) {
+        let Some(nodes) = buffers.see_through(ray, self.j, &self.requested) else {
+            return;
+        };
+        let strength = &buffers.strength[nodes.clone()];
+        let passes = strength.iter().zip(&buffers.through);
+        for (hidden, (&e, through)) in self.hidden[nodes].iter_mut().zip(passes) {
+            *hidden = hidden.add_product(through.complement(), radiance.scaled(e));
         }
     }
 }
 
 impl RayBuffers {
+    /// Computes what passes all shadows of a ray in a row; at which of the requested nodes, counted
+    /// from the first. None where there is no shadow.
+    fn see_through(
+        &mut self,
+        ray: &ShadowRay,
+        j: usize,
+        requested: &Range<usize>,
+    ) -> Option<Range<usize>> {
+        let all = self.touch_shadows(ray, j, requested)?;
+        self.fill_through(ray, j, &all);
+        Some(all.start - requested.start..all.end - requested.start)
+    }
+
     /// Notes which nodes of a row each shadow touches; returns the bounds of all of them.
     fn touch_shadows(
         &mut self,

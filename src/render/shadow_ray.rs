@@ -61,11 +61,11 @@ impl ShadowRay {
         match self.sample.kind {
             SampleKind::Sky { share } => UnitIrradiance::Even(share as f32),
             // All points of a plane see a light from the same height.
-            SampleKind::Face { normal, area } => UnitIrradiance::Face {
+            SampleKind::Face { normal, area } => UnitIrradiance::Face(FaceIrradiance {
                 at: self.sample.at.xyz().map(|c| c as f32).into(),
                 normal: normal.map(|c| c as f32).into(),
                 scale: (area * self.height) as f32,
-            },
+            }),
         }
     }
 }
@@ -76,23 +76,24 @@ pub(super) enum UnitIrradiance {
     /// The same everywhere.
     Even(f32),
     /// By a piece of a light's face.
-    Face {
-        /// Where it is.
-        at: [f32; 3],
-        /// Unit normal.
-        normal: [f32; 3],
-        /// Area times height over the plane.
-        scale: f32,
-    },
+    Face(FaceIrradiance),
 }
 
-impl UnitIrradiance {
+/// Irradiance by unit radiance of a piece of a light's face.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct FaceIrradiance {
+    /// Where it is.
+    at: [f32; 3],
+    /// Unit normal.
+    normal: [f32; 3],
+    /// Area times height over the plane.
+    scale: f32,
+}
+
+impl FaceIrradiance {
     /// Cosines over squared distance times area, at points of the plane.
-    pub(super) fn fill(&self, [x, y, z]: [&[f32]; 3], out: &mut [f32]) {
-        match *self {
-            Self::Even(share) => out.fill(share),
-            Self::Face { at, normal, scale } => fill_face(at, normal, scale, [x, y, z], out),
-        }
+    pub(super) fn fill(&self, points: [&[f32]; 3], out: &mut [f32]) {
+        fill_face(self.at, self.normal, self.scale, points, out);
     }
 }
 
