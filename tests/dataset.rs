@@ -31,6 +31,7 @@ fn scene(k: u64) -> Scene {
         camera_from_world: Pose::identity(),
     };
     Scene {
+        belt: None,
         image: IMAGE,
         plate: "tray".into(),
         camera: CameraSource::Known(camera),
@@ -346,7 +347,8 @@ fn another_plan_in_the_same_folder_is_refused_by_name() {
     assert!(
         refused(&|p| p.split = Split {
             val_percent: 20,
-            order: SplitOrder::Consecutive
+            order: SplitOrder::Consecutive,
+            ..Split::default()
         })
         .contains("split.order")
     );

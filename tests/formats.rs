@@ -109,6 +109,7 @@ fn sample_of(shot: Shot, options: &LabelOptions) -> Result<Sample> {
     let frame = composite::frame(&deep, shot.plate.as_deref());
     let labels = label(&deep, &shot, options);
     let scene = Scene {
+        belt: None,
         image: IMAGE,
         plate: "grey".into(),
         camera: CameraSource::Known(shot.camera),

@@ -1,6 +1,7 @@
 //! The finished frame: what objects add, over what their shadows leave of the plate.
 
 use crate::composite::defocus::defocus;
+use crate::composite::motion::exposed_frame;
 use crate::deep::DeepImage;
 use crate::image::Image;
 use crate::pixel::{Film, LinearRgb, PremulRgba};
@@ -30,7 +31,7 @@ pub fn frame(deep: &DeepImage, plate: Option<&Image<LinearRgb>>) -> Image<Premul
 }
 
 /// The picture of a shot in one call: its deep samples, out of focus where its lens has them so,
-/// over its plate; scene-linear, premultiplied.
+/// over its plate, blurred where its cards move; scene-linear, premultiplied.
 ///
 /// ```
 /// use petcomp::geom::{Pose, Quad};
@@ -52,7 +53,7 @@ pub fn frame(deep: &DeepImage, plate: Option<&Image<LinearRgb>>) -> Image<Premul
 /// When the plate's size is not the camera's.
 pub fn picture(shot: &Shot, options: &RenderOptions) -> Image<PremulRgba> {
     let deep = render(shot, options);
-    frame(&defocus(&deep, shot), shot.plate.as_deref())
+    exposed_frame(&defocus(&deep, shot), shot)
 }
 
 /// Folds deep samples into a picture of their light and of what they let pass, per channel;

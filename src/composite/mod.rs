@@ -20,6 +20,7 @@ mod cryptomatte;
 mod defocus;
 mod finish;
 mod frame;
+mod motion;
 mod part;
 mod poisson;
 mod porter_duff;
@@ -36,3 +37,5 @@ pub use finish::finish_blended;
 #[doc(hidden)]
 pub use frame::film;
 pub use frame::{frame, picture};
+#[doc(hidden)]
+pub use motion::exposed_frame;

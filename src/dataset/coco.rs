@@ -9,6 +9,7 @@ use crate::io;
 use crate::label::{ObjectLabel, RleMask, trace};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
+use std::collections::BTreeSet;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -36,6 +37,9 @@ fn document(part: Part) -> PathBuf {
 /// also `truncation` (the share outside of the picture), `amodal_bbox` (around the whole outline,
 /// beyond the picture's edges too) and `visible_bbox` (around what is seen; missing where nothing
 /// is).
+///
+/// On a belt the documents are those of COCO-VID: `videos`, in each image `video_id` and `frame_id`
+/// (from 0), in each annotation `instance_id`, by which an object is known through its sequence.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Coco {
@@ -78,6 +82,11 @@ struct CocoImage {
     file_name: String,
     width: u32,
     height: u32,
+    /// Sequence, and picture in it, on a belt.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    video_id: Option<u64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    frame_id: Option<u64>,
 }
 
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -85,6 +94,8 @@ struct Annotation {
     id: u64,
     image_id: u64,
     category_id: u32,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    instance_id: Option<u64>,
     bbox: [f64; 4],
     area: u64,
     iscrowd: u8,
@@ -147,7 +158,7 @@ impl Coco {
     fn annotations(&self, entry: &Entry<'_>) -> Result<Vec<Annotation>> {
         let labels = entry.labelled.iter();
         labels
-            .filter_map(|label| self.annotation(entry.k, label).transpose())
+            .filter_map(|label| self.annotation(entry, label).transpose())
             .collect()
     }
 
@@ -162,12 +173,18 @@ impl Coco {
             file_name: self.picture_name(entry.k),
             width,
             height,
+            video_id: entry.belt().map(|belt| belt.sequence),
+            frame_id: entry.belt().map(|belt| belt.frame),
         }
     }
 
     /// None for an object without a box.
-    fn annotation(&self, k: u64, label: &LabelledObject<'_>) -> Result<Option<Annotation>> {
-        let object = label.object;
+    fn annotation(
+        &self,
+        entry: &Entry<'_>,
+        label: &LabelledObject<'_>,
+    ) -> Result<Option<Annotation>> {
+        let (k, object) = (entry.k, label.object);
         let (b, mask) = self.boxes.of(object);
         if b.is_empty() {
             return Ok(None);
@@ -176,6 +193,7 @@ impl Coco {
             id: annotation_id(k, object.id.0)?,
             image_id: k,
             category_id: label.class + 1,
+            instance_id: instance_id(entry, object.id.0)?,
             bbox: bbox_of(&b),
             area: mask.area(),
             iscrowd: u8::from(label.ignored),
@@ -225,6 +243,13 @@ fn annotation_id(k: u64, object: u32) -> Result<u64> {
         .ok_or_else(|| unusable_id(object))
 }
 
+/// The number of an object in all pictures of its sequence; none without one.
+fn instance_id(entry: &Entry<'_>, object: u32) -> Result<Option<u64>> {
+    let belt = entry.belt();
+    belt.map(|belt| annotation_id(belt.sequence, object))
+        .transpose()
+}
+
 /// None where it would overflow.
 fn unique_id(k: u64, object: u64) -> Option<u64> {
     k.checked_mul(IDS_PER_IMAGE)?.checked_add(object)
@@ -267,7 +292,22 @@ fn join<'a>(
     for image in &images {
         write_entry(out, &mut comma, image)?;
     }
+    write_videos(out, &images)?;
     writeln!(out, "]}}")
+}
+
+/// The list of sequences, where there are any.
+fn write_videos(out: &mut dyn Write, images: &[CocoImage]) -> std::io::Result<()> {
+    let ids: BTreeSet<u64> = images.iter().filter_map(|image| image.video_id).collect();
+    let mut comma = "],\n\"videos\":[\n";
+    for id in ids {
+        write_entry(
+            out,
+            &mut comma,
+            &json!({ "id": id, "name": format!("{id:06}") }),
+        )?;
+    }
+    Ok(())
 }
 
 fn read_share(folder: &Path, sample: &Written) -> std::io::Result<ImageShare> {

@@ -1,9 +1,10 @@
 //! The file that a dataset is made from.
 
 use crate::dataset::environment_maps::seen_from;
+use crate::dataset::mot::no_sequence;
 use crate::dataset::paths::folder_of;
 use crate::dataset::yolo::MIN_SIDE_PX;
-use crate::dataset::{LabelConfig, Pictures, Preset, Split};
+use crate::dataset::{Format, LabelConfig, Pictures, Preset, Split};
 use crate::error::Result;
 use crate::io;
 use crate::render::RenderOptions;
@@ -116,7 +117,16 @@ impl DatasetConfig {
         self.render.check().map_err(|e| e.within("render"))?;
         self.labels.check().map_err(|e| e.within("labels"))?;
         self.split.check().map_err(|e| e.within("split"))?;
+        self.check_sequences()?;
         self.pictures.check().map_err(|e| e.within("pictures"))
+    }
+
+    /// Fails where tracks are asked for and there is nothing that moves.
+    fn check_sequences(&self) -> Result<()> {
+        match self.scene.belt {
+            None if self.labels.formats.contains(&Format::Mot) => Err(no_sequence()),
+            _ => Ok(()),
+        }
     }
 
     /// A recipe file that says what every default is, with its unit: to be changed by hand.
@@ -292,7 +302,7 @@ mod tests {
     fn an_example_in_the_template_is_taken_as_it_stands() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("recipe.toml");
-        assert_eq!(examples().len(), 9);
+        assert_eq!(examples().len(), 10);
         for example in examples() {
             io::write_text(&path, &example).unwrap();
             let config = DatasetConfig::read(&path, &[]).unwrap();

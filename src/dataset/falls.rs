@@ -7,15 +7,18 @@
 use crate::error::Result;
 use crate::scene::{Grade, Placement, Scene, SettleOptions};
 use std::collections::VecDeque;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// Where objects came to rest, of the last scenes that fell; of none by default.
 #[derive(Debug, Default)]
 pub(crate) struct Falls {
     most: usize,
     /// What fell, and where it came to rest, the latest last.
-    known: Mutex<VecDeque<(String, Vec<Placement>)>>,
+    known: Mutex<VecDeque<(String, Arc<Fall>)>>,
 }
+
+/// Where the objects of a scene came to rest; none until they have.
+type Fall = Mutex<Option<Vec<Placement>>>;
 
 impl Falls {
     /// Of so many scenes.
@@ -29,7 +32,8 @@ impl Falls {
         self.most > 0
     }
 
-    /// The scene with its objects at rest, by `fall` where that is not known.
+    /// The scene with its objects at rest, by `fall` where that is not known. What falls in several
+    /// threads at once falls in one of them, and the others wait.
     pub(crate) fn settled(
         &self,
         scene: Scene,
@@ -39,32 +43,33 @@ impl Falls {
         if !self.remembers() {
             return fall(scene);
         }
-        let key = what_falls(&scene, options);
-        if let Some(placements) = self.find(&key) {
+        let known = self.fall_of(what_falls(&scene, options));
+        let mut known = known.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(placements) = &*known {
             return Ok(placed(scene, placements));
         }
         let scene = fall(scene)?;
-        self.keep(key, &scene);
+        *known = Some(
+            scene
+                .objects
+                .iter()
+                .map(|object| object.placement)
+                .collect(),
+        );
         Ok(scene)
     }
 
-    fn find(&self, key: &str) -> Option<Vec<Placement>> {
-        let known = self.known();
-        let (_, placements) = known.iter().find(|(own, _)| own == key)?;
-        Some(placements.clone())
-    }
-
-    fn keep(&self, key: String, scene: &Scene) {
-        let mut known = self.known();
+    fn fall_of(&self, key: String) -> Arc<Fall> {
+        let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, fall)) = known.iter().find(|(own, _)| *own == key) {
+            return fall.clone();
+        }
         if known.len() == self.most {
             known.pop_front();
         }
-        let placements = scene.objects.iter().map(|object| object.placement);
-        known.push_back((key, placements.collect()));
-    }
-
-    fn known(&self) -> MutexGuard<'_, VecDeque<(String, Vec<Placement>)>> {
-        self.known.lock().unwrap_or_else(PoisonError::into_inner)
+        let fall = Arc::default();
+        known.push_back((key, Arc::clone(&fall)));
+        fall
     }
 }
 
@@ -78,9 +83,9 @@ fn what_falls(scene: &Scene, options: &SettleOptions) -> String {
     serde_json::to_string(&falling).expect("numbers and names are JSON")
 }
 
-fn placed(mut scene: Scene, placements: Vec<Placement>) -> Scene {
+fn placed(mut scene: Scene, placements: &[Placement]) -> Scene {
     for (object, placement) in scene.objects.iter_mut().zip(placements) {
-        object.placement = placement;
+        object.placement = *placement;
     }
     scene
 }

@@ -3,7 +3,7 @@
 use crate::bounds::Bounds;
 use crate::dataset::label_table::LabelTable;
 use crate::dataset::{
-    Coco, Layers, Obstructed, PictureFormat, Pictures, Voc, WebDataset, Writer, Yolo,
+    Coco, Layers, Mot, Obstructed, PictureFormat, Pictures, Voc, WebDataset, Writer, Yolo,
 };
 use crate::error::Result;
 use crate::geom::BBox;
@@ -39,6 +39,8 @@ pub struct LabelConfig {
     pub coco: Coco,
     /// Settings of Pascal VOC.
     pub voc: Voc,
+    /// Settings of MOTChallenge.
+    pub mot: Mot,
     /// Settings of WebDataset.
     pub webdataset: WebDataset,
     /// Settings of the EXR files with layers.
@@ -55,6 +57,8 @@ pub enum Format {
     Coco,
     /// [`Voc`].
     Voc,
+    /// [`Mot`].
+    Mot,
     /// [`Layers`].
     Layers,
     /// [`WebDataset`].
@@ -101,6 +105,7 @@ impl Default for LabelConfig {
             yolo: Yolo::default(),
             coco: Coco::default(),
             voc: Voc::default(),
+            mot: Mot::default(),
             webdataset: WebDataset::default(),
             layers: Layers::default(),
         }
@@ -160,6 +165,10 @@ impl LabelConfig {
             Format::Voc => Arc::new(Voc {
                 pictures: pictures.format,
                 ..self.voc
+            }),
+            Format::Mot => Arc::new(Mot {
+                pictures: pictures.format,
+                ..self.mot
             }),
             Format::Layers => Arc::new(self.layers),
             Format::WebDataset => Arc::new(self.webdataset),

@@ -1,6 +1,6 @@
 //! The table `[labels]` as files have it: one rule, of which each variant has a key of its own.
 
-use crate::dataset::{Coco, Format, LabelConfig, Layers, Obstructed, Voc, WebDataset, Yolo};
+use crate::dataset::{Coco, Format, LabelConfig, Layers, Mot, Obstructed, Voc, WebDataset, Yolo};
 use crate::label::{AmodalBox, ObstructionRule, RuleInFile};
 use serde::{Deserialize, Serialize};
 
@@ -22,8 +22,15 @@ pub(super) struct LabelTable {
     yolo: Yolo,
     coco: Coco,
     voc: Voc,
+    #[serde(skip_serializing_if = "has_no_settings")]
+    mot: Mot,
     webdataset: WebDataset,
     layers: Layers,
+}
+
+/// What is as it would be without a word of it is not written: datasets made before are the same.
+fn has_no_settings(mot: &Mot) -> bool {
+    *mot == Mot::default()
 }
 
 impl Default for LabelTable {
@@ -52,6 +59,7 @@ impl From<LabelConfig> for LabelTable {
             yolo: config.yolo,
             coco: config.coco,
             voc: config.voc,
+            mot: config.mot,
             webdataset: config.webdataset,
             layers: config.layers,
         }
@@ -73,6 +81,7 @@ impl TryFrom<LabelTable> for LabelConfig {
             yolo: table.yolo,
             coco: table.coco,
             voc: table.voc,
+            mot: table.mot,
             webdataset: table.webdataset,
             layers: table.layers,
         })

@@ -4,8 +4,8 @@
 //! draws the scene, lets it settle, lights, renders and labels it.
 //!
 //! [`generate`] makes samples, many at a time, and hands each to [`Writer`]s: [`Pictures`] writes
-//! the images, [`Sidecar`] everything that was drawn, [`Yolo`], [`Coco`], [`Voc`], [`WebDataset`]
-//! and [`Layers`] the labels. Sample `k` has the same files, to the byte, whatever the number of
+//! the images, [`Sidecar`] everything that was drawn, [`Yolo`], [`Coco`], [`Voc`], [`Mot`],
+//! [`WebDataset`] and [`Layers`] the labels. Sample `k` has the same files, to the byte, whatever the number of
 //! threads, and after any interruption:
 //!
 //! ```text
@@ -44,6 +44,7 @@ mod label_table;
 mod layers;
 mod listing;
 mod merge;
+mod mot;
 mod near_duplicates;
 mod obstructed;
 #[doc(hidden)]
@@ -104,6 +105,8 @@ pub use listing::Listing;
 pub(crate) use listing::is_image;
 pub use merge::merge;
 #[doc(hidden)]
+pub use mot::Mot;
+#[doc(hidden)]
 pub use near_duplicates::{NEAR_DUPLICATE_RMS, NearDuplicate};
 pub use obstructed::{LabelledObject, Obstructed};
 #[doc(hidden)]
@@ -140,7 +143,7 @@ use crate::error::Result;
 use crate::image::Image;
 use crate::label::Labels;
 use crate::pixel::{ObjectId, PremulRgba};
-use crate::scene::{Drawn, Scene};
+use crate::scene::{Belt, Drawn, Scene};
 use std::path::{Path, PathBuf};
 
 /// One finished picture and all that is known of it.
@@ -240,6 +243,11 @@ impl Entry<'_> {
     /// The label of an object, if it has one.
     pub(crate) fn label_of(&self, id: ObjectId) -> Option<&LabelledObject<'_>> {
         self.labelled.iter().find(|label| label.object.id == id)
+    }
+
+    /// Where a belt has carried its objects, if there is one.
+    pub(crate) fn belt(&self) -> Option<Belt> {
+        self.sample.provenance.as_ref()?.scene.belt
     }
 
     /// Path below the dataset's folder: `images/train/000012.png`.

@@ -9,7 +9,7 @@ use crate::dataset::environment_maps::EnvironmentMaps;
 use crate::dataset::falls::Falls;
 use crate::dataset::fingerprint::fingerprint;
 use crate::dataset::{
-    DatasetConfig, Inputs, Plan, Provenance, Sample, SampleRange, Sidecar, Times, Writer,
+    DatasetConfig, Inputs, Plan, Provenance, Sample, SampleRange, Sidecar, Split, Times, Writer,
 };
 use crate::deep::DeepImage;
 use crate::error::{Error, Result};
@@ -46,6 +46,9 @@ static NEVER: AtomicBool = AtomicBool::new(false);
 
 /// So many falls are remembered while a recipe is tuned.
 const REMEMBERED_FALLS: usize = 256;
+
+/// And so many of the sequences on a belt, several of which are made at a time.
+const REMEMBERED_SEQUENCES: usize = 64;
 
 /// Scenes that do not settle are resampled this often.
 const MAX_RESAMPLES: usize = 8;
@@ -173,10 +176,10 @@ impl Pipeline {
             backgrounds: backgrounds.collect(),
             catalog: catalog(&library),
             surroundings: EnvironmentMaps::of(&config).into(),
+            falls: Arc::new(falls_of(&config)),
             config,
             library,
             places,
-            falls: Arc::default(),
             stop: &NEVER,
         }
     }
@@ -214,13 +217,22 @@ impl Pipeline {
             seed,
             recipe: self.fingerprint(&mut inputs)?,
             classes: labels.obstructed.classes(&self.library.classes)?,
-            split: self.config.split,
+            split: self.split(),
             obstructed: labels.obstructed,
             writers: self.writers(),
             archives: labels.archives(),
             store: None,
             inputs,
         })
+    }
+
+    /// Sequences are for training or for validation as a whole.
+    fn split(&self) -> Split {
+        let belt = self.config.scene.belt;
+        Split {
+            sequence: belt.map_or(1, |belt| belt.frames),
+            ..self.config.split
+        }
     }
 
     fn fingerprint(&self, inputs: &mut Inputs) -> Result<serde_json::Value> {
@@ -292,7 +304,8 @@ impl Pipeline {
         let mut rejected = Vec::new();
         let allowance = self.allowance();
         loop {
-            let scene_seed = redraw_seed(seed, k, rejected.len());
+            let first = self.config.scene.place_in_sequence(k).first;
+            let scene_seed = redraw_seed(seed, first, rejected.len());
             let (scene, draws) = self.explain(scene_seed, k)?;
             match self.take_within(scene, &allowance) {
                 Ok(sample) => {
@@ -481,6 +494,14 @@ impl Pipeline {
     }
 }
 
+/// Only on a belt do the same objects fall for several pictures.
+fn falls_of(config: &DatasetConfig) -> Falls {
+    match config.scene.belt {
+        Some(_) => Falls::of_last(REMEMBERED_SEQUENCES),
+        None => Falls::default(),
+    }
+}
+
 /// The labelled photos that a config names.
 fn open_backgrounds(config: &DatasetConfig) -> Result<Vec<BackgroundPhoto>> {
     let options = BackgroundOptions {
@@ -503,7 +524,8 @@ fn has_same_places(a: &DatasetConfig, b: &DatasetConfig) -> bool {
     a.backgrounds == b.backgrounds && taken(a) == taken(b)
 }
 
-/// The seed of the `n`-th try of scene `k`: the first is the dataset's own.
+/// The seed of the `n`-th try of scene `k`: the first is the dataset's own. On a belt all pictures
+/// of a sequence have that of its first.
 fn redraw_seed(seed: u64, k: u64, n: usize) -> u64 {
     match n {
         0 => seed,
@@ -514,6 +536,6 @@ fn redraw_seed(seed: u64, k: u64, n: usize) -> u64 {
 fn finished_frame(deep: &DeepImage, scene: &Scene, shot: &Shot) -> Image<PremulRgba> {
     let plate = shot.plate.as_deref();
     let deep = &*composite::defocus(deep, shot);
-    let frame = composite::frame(deep, plate);
+    let frame = composite::exposed_frame(deep, shot);
     composite::finish_blended(frame, deep, plate, &scene.finish, scene.edges)
 }

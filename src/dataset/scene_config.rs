@@ -184,6 +184,7 @@ mod tests {
 
     fn scene() -> Scene {
         Scene {
+            belt: None,
             image: [64, 48],
             plate: "tray".into(),
             camera: CameraSource::Rectangle {

@@ -35,6 +35,10 @@ pub struct Split {
     pub val_percent: u8,
     /// Which ones those are. Default: `interleaved`.
     pub order: SplitOrder,
+    /// Samples of a sequence, which stay together: on a belt as many as its recipe says. Default:
+    /// 1, and 0 is the same.
+    #[serde(skip)]
+    pub sequence: u64,
 }
 
 impl Default for Split {
@@ -42,6 +46,7 @@ impl Default for Split {
         Self {
             val_percent: 20,
             order: SplitOrder::Interleaved,
+            sequence: 1,
         }
     }
 }
@@ -73,6 +78,8 @@ impl Split {
     }
 
     fn is_val(&self, k: u64, count: u64) -> bool {
+        let length = self.sequence.max(1);
+        let (k, count) = (k / length, count.div_ceil(length));
         let next = k.saturating_add(1);
         match self.order {
             SplitOrder::Interleaved => self.train_before(next) == self.train_before(k),
@@ -80,7 +87,7 @@ impl Split {
         }
     }
 
-    /// Samples for training among the first `n`.
+    /// Samples (or sequences) for training among the first `n`.
     fn train_before(&self, n: u64) -> u128 {
         let percent = 100 - u128::from(self.val_percent.min(100));
         u128::from(n) * percent / 100
@@ -102,7 +109,8 @@ mod tests {
                 count(
                     Split {
                         val_percent: 20,
-                        order
+                        order,
+                        ..Split::default()
                     },
                     5000
                 ),
@@ -120,10 +128,23 @@ mod tests {
     }
 
     #[test]
+    fn sequences_stay_together() {
+        let split = Split {
+            sequence: 4,
+            ..Split::default()
+        };
+        let val: Vec<_> = (0..40)
+            .filter(|&k| split.part(k, 40) == Part::Val)
+            .collect();
+        assert_eq!(val, [0, 1, 2, 3, 20, 21, 22, 23]);
+    }
+
+    #[test]
     fn a_consecutive_split_cuts_once_and_like_the_paper() {
         let split = Split {
             val_percent: 20,
             order: SplitOrder::Consecutive,
+            ..Split::default()
         };
         let parts: Vec<_> = (0..2031).map(|k| split.part(k, 2031)).collect();
         assert_eq!(parts.iter().filter(|&&p| p == Part::Val).count(), 407);
@@ -137,7 +158,8 @@ mod tests {
                 count(
                     Split {
                         val_percent: 0,
-                        order
+                        order,
+                        ..Split::default()
                     },
                     7
                 ),
@@ -147,7 +169,8 @@ mod tests {
                 count(
                     Split {
                         val_percent: 100,
-                        order
+                        order,
+                        ..Split::default()
                     },
                     7
                 ),

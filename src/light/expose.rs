@@ -92,6 +92,7 @@ mod tests {
 
     fn scene(exposure: Exposure) -> Scene {
         Scene {
+            belt: None,
             image: [40, 30],
             plate: "tray".into(),
             camera: CameraSource::Rectangle {

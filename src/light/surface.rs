@@ -100,6 +100,7 @@ pub(super) mod tests {
             camera_from_world: Pose::from_parts(Vector3::new(0.0, 0.0, 1.0).into(), down),
         };
         Scene {
+            belt: None,
             image: [40, 30],
             plate: "tray".into(),
             camera: CameraSource::Known(camera),

@@ -50,6 +50,16 @@ pub(super) const F_NUMBER: Bounds = Bounds::new(
     "focal length over aperture; photo lenses have 1 to 32",
 );
 pub(super) const FOCUS: Bounds = Bounds::metres(0.001, 1e6, "farther off is at infinity");
+pub(super) const WAY: Bounds = Bounds::new(-1e6, 1e6, "metres on a belt");
+pub(super) const FRAMES: Bounds = Bounds::new(1.0, 1e6, "pictures of a sequence");
+pub(super) const FRAME_RATE: Bounds = Bounds::new(1e-3, 1e5, "pictures in a second");
+pub(super) const BELT_SPEED: Bounds = Bounds::new(
+    0.0,
+    100.0,
+    "metres in a second; sorting belts run at 0.3 to 4",
+);
+pub(super) const EXPOSURE_TIME: Bounds =
+    Bounds::new(0.0, 10.0, "seconds; cameras over belts take 0.0001 to 0.01");
 pub(super) const SENSOR: Bounds = Bounds::new(
     0.1,
     1000.0,

@@ -30,6 +30,7 @@ impl Scene {
         self.check_view()?;
         self.check_objects()?;
         self.check_lights()?;
+        self.belt.map_or(Ok(()), |belt| belt.check("belt"))?;
         self.finish.check("finish")?;
         check_exposure(self.exposure)
     }
@@ -327,6 +328,7 @@ mod tests {
             color: LinearRgb::WHITE,
         };
         Scene {
+            belt: None,
             image: [64, 48],
             plate: "tray".into(),
             camera: CameraSource::Rectangle {

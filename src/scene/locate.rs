@@ -52,6 +52,7 @@ mod tests {
             [216.899, 750.414],
         ];
         Scene {
+            belt: None,
             image: [640, 480],
             plate: "bg0000".into(),
             camera: CameraSource::Rectangle {

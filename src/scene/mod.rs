@@ -39,6 +39,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod belt;
 mod bend;
 pub(crate) mod bounds;
 mod catalog;
@@ -72,6 +73,8 @@ mod variation;
 mod view;
 mod wall;
 
+#[doc(hidden)]
+pub use belt::{Belt, BeltRanges};
 #[doc(hidden)]
 pub use bend::Bend;
 pub(crate) use bend::Cylinder;
@@ -180,6 +183,9 @@ pub struct Scene {
     /// brightens it there. Default: black, which leaves that out.
     #[serde(default, skip_serializing_if = "LinearRgb::is_black")]
     pub interreflection: LinearRgb,
+    /// Where a belt has carried the objects since they came to rest. Default: nowhere.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub belt: Option<Belt>,
     /// How the edges of cut-outs are treated.
     #[serde(default, skip_serializing_if = "EdgeTreatment::are_as_is")]
     pub edges: EdgeTreatment,

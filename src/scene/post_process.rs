@@ -240,13 +240,14 @@ impl Default for PostProcessRanges {
 }
 
 impl PostProcessRanges {
-    pub(super) fn draw(&self, draws: &Draws) -> PostProcess {
+    /// `own` draws what differs between pictures of one sequence: noise.
+    pub(super) fn draw(&self, draws: &Draws, own: &Draws) -> PostProcess {
         PostProcess {
             exposure_ev: self.exposure_ev.draw(draws, "finish.exposure_ev"),
             white_balance: white_balance(self.white_k.draw(draws, "finish.white_k")),
             blur_px: self.draw_blur(draws),
             noise: self.noise,
-            noise_seed: self.draw_noise_seed(draws),
+            noise_seed: self.draw_noise_seed(own),
             chromatic_px: self.draw_chromatic(draws),
             camera_blur_px: self.camera_blur_px.draw(draws, "finish.camera_blur_px"),
             camera_noise: CameraNoise {
@@ -328,7 +329,7 @@ mod tests {
 
     #[test]
     fn defaults_do_nothing_and_draw_nothing() {
-        let finish = PostProcessRanges::default().draw(&Draws::new(3, 4));
+        let finish = PostProcessRanges::default().draw(&Draws::new(3, 4), &Draws::new(3, 5));
         assert_eq!(finish, PostProcess::default());
         assert!(finish.is_identity());
     }

@@ -104,6 +104,7 @@ impl Scene {
             interreflection: self.interreflection,
             environment: self.environment_map(panorama)?,
             exposure,
+            motion_m: self.belt.map_or([0.0; 2], |belt| belt.motion_m),
             edges: self.edges,
         })
     }
@@ -139,10 +140,19 @@ impl Scene {
 
     fn cards(&self, look: impl Fn(&Object) -> Option<Appearance>) -> Result<Vec<Card>> {
         let numbered = self.objects.iter().enumerate();
-        numbered
-            .filter(|(_, object)| object.placement != Placement::Gone)
-            .map(|(i, object)| resting_card(i, object, &look))
+        let there = numbered.filter(|(_, object)| object.placement != Placement::Gone);
+        there
+            .map(|(i, object)| Ok(self.carried(resting_card(i, object, &look)?)))
             .collect()
+    }
+
+    /// A card where the belt has brought it.
+    fn carried(&self, mut card: Card) -> Card {
+        if let Some(belt) = &self.belt {
+            let [x, y] = belt.offset_m;
+            card.quad.world_from_card = Pose::translation(x, y, 0.0) * card.quad.world_from_card;
+        }
+        card
     }
 
     fn tinted_lights(&self, tint: LinearRgb) -> Vec<AreaLight> {
@@ -310,6 +320,7 @@ mod tests {
             cast: Default::default(),
             light_map: Default::default(),
             interreflection: Default::default(),
+            belt: None,
             view: Default::default(),
             lens: Default::default(),
             finish: Default::default(),

@@ -45,6 +45,9 @@ pub struct Shot {
     /// What of the place stands in front of objects, of the picture's size; none where nothing
     /// does.
     pub holdout: Option<Arc<Image<HoldoutSample>>>,
+    /// How far cards move while the shutter is open, along x and y, metres.
+    #[doc(hidden)]
+    pub motion_m: [f64; 2],
     /// How the edges of cards are treated; labels are made from those that are left as they are.
     pub edges: EdgeTreatment,
 }
@@ -131,6 +134,7 @@ impl Shot {
             interreflection: LinearRgb::BLACK,
             exposure: 1.0,
             holdout: None,
+            motion_m: [0.0; 2],
             edges: EdgeTreatment::AsIs,
         }
     }

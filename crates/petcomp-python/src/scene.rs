@@ -69,6 +69,7 @@ pub(crate) fn empty_scene(camera: &Camera) -> Scene {
         cast: Default::default(),
         light_map: Default::default(),
         interreflection: Default::default(),
+        belt: None,
         edges: Default::default(),
         finish: Default::default(),
         files: None,

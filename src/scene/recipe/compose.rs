@@ -3,10 +3,11 @@
 use crate::color::Albedo;
 use crate::error::{Error, Result};
 use crate::pixel::LinearRgb;
+use crate::scene::belt::SequencePlace;
 use crate::scene::stack::DropColumn;
 use crate::scene::{
     AreaLight, AssetVariant, Background, Bend, DrawLog, Draws, EdgeTreatment, Exposure, LightTint,
-    Object, Range, Recipe, Scene, SceneSettings, Surface, draw_paths,
+    Object, PostProcess, Range, Recipe, Scene, SceneSettings, Surface, draw_paths,
 };
 use std::f64::consts::PI;
 
@@ -15,6 +16,20 @@ use std::f64::consts::PI;
 pub(super) struct SceneNumber {
     pub(super) seed: u64,
     pub(super) k: u64,
+    /// All is drawn as for the first picture of its sequence.
+    pub(super) place: SequencePlace,
+}
+
+impl SceneNumber {
+    /// The draws of its sequence.
+    fn draws(self, log: &DrawLog) -> Draws<'_> {
+        Draws::new(self.seed, self.place.first).logged(log)
+    }
+
+    /// What is drawn anew for each picture of a sequence.
+    fn own_draws(self, log: &DrawLog) -> Draws<'_> {
+        Draws::new(self.seed, self.k).logged(log)
+    }
 }
 
 /// The backgrounds that a scene may have.
@@ -45,7 +60,7 @@ impl Recipe {
         places: Places<'_>,
         catalog: &[AssetVariant],
     ) -> Result<Scene> {
-        let draws = Draws::new(number.seed, number.k).logged(log);
+        let draws = number.draws(log);
         let is_negative = self.draw_negative(&draws);
         let background = pick_background(&draws, places.of(is_negative))?;
         let mut objects = if is_negative {
@@ -57,7 +72,11 @@ impl Recipe {
         let surface = self.draw_surface(&draws, background);
         self.drop_column(background, surface, &draws)
             .stack(&mut objects)?;
-        let scene = self.lit_scene(&draws, background, surface, objects);
+        let scene = Scene {
+            belt: self.belt.map(|belt| belt.draw(&draws, number.place)),
+            finish: self.finish.draw(&draws, &number.own_draws(log)),
+            ..self.lit_scene(&draws, background, surface, objects)
+        };
         scene.check()?;
         Ok(scene)
     }
@@ -77,7 +96,7 @@ impl Recipe {
         }
     }
 
-    /// The scene with these objects, its light drawn.
+    /// The scene with these objects, its light drawn, at rest and as it was rendered.
     fn lit_scene(
         &self,
         draws: &Draws,
@@ -102,7 +121,8 @@ impl Recipe {
             light_map: self.light_map.clone(),
             interreflection: self.draw_interreflection(draws, background),
             edges: EdgeTreatment::draw(&self.edges, draws),
-            finish: self.finish.draw(draws),
+            belt: None,
+            finish: PostProcess::default(),
             files: None,
             settings: SceneSettings::default(),
         }

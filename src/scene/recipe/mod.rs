@@ -11,13 +11,14 @@ pub use selection::{Collider, Selections};
 use crate::bounds::Bounds;
 use crate::color::Albedo;
 use crate::error::{Error, Result};
+use crate::scene::belt::SequencePlace;
 use crate::scene::bounds::{BEND, EV, FRICTION, MAX_LIGHTS, MAX_OBJECTS, RADIANCE, SCALE, SHARE};
 use crate::scene::check::{check_albedo, check_cast, check_count, check_each, check_image};
 use crate::scene::stack::too_large;
 use crate::scene::{
-    AssetVariant, Background, Count, DrawLog, Drawn, DropRanges, EdgeTreatment, EnvironmentRanges,
-    LensRanges, LightMap, LightTint, PostProcessRanges, Range, Scene, SettleOptions, Surface, Take,
-    Variation, ViewRanges, WallRanges,
+    AssetVariant, Background, BeltRanges, Count, DrawLog, Drawn, DropRanges, EdgeTreatment,
+    EnvironmentRanges, LensRanges, LightMap, LightTint, PostProcessRanges, Range, Scene,
+    SettleOptions, Surface, Take, Variation, ViewRanges, WallRanges,
 };
 use compose::{Places, SceneNumber};
 use serde::{Deserialize, Serialize};
@@ -107,6 +108,10 @@ pub struct Recipe {
     /// surface's albedo; where that is not known, the albedo itself. Default: 0, none.
     #[serde(skip_serializing_if = "Range::is_zero")]
     pub interreflection: Range,
+    /// A belt that carries the objects past the camera, in sequences of pictures. Default: none,
+    /// every picture is a scene of its own.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub belt: Option<BeltRanges>,
     /// What happens to the finished frame. Default: nothing.
     pub finish: PostProcessRanges,
     /// How objects come to rest.
@@ -144,6 +149,7 @@ impl Default for Recipe {
             cast: LightTint::default(),
             light_map: LightMap::default(),
             interreflection: Range::fixed(0.0),
+            belt: None,
             finish: PostProcessRanges::default(),
             settle: SettleOptions::default(),
         }
@@ -190,13 +196,23 @@ impl Recipe {
         let log = DrawLog::default();
         let recipe = self.narrowed();
         recipe.check()?;
-        let number = SceneNumber { seed, k };
+        let number = SceneNumber {
+            seed,
+            k,
+            place: self.place_in_sequence(k),
+        };
         let places = Places {
             viewpoints: recipe.viewpoints.slice_of(backgrounds),
             negatives: self.places_of_negatives(backgrounds),
         };
         let scene = recipe.compose(number, &log, places, catalog)?;
         Ok((scene, log.into_draws()))
+    }
+
+    /// Where picture `k` is in its sequence; without a belt each is one of its own.
+    pub(crate) fn place_in_sequence(&self, k: u64) -> SequencePlace {
+        let alone = SequencePlace { first: k, frame: 0 };
+        self.belt.map_or(alone, |belt| belt.place_of(k))
     }
 
     /// The backgrounds of scenes that stay empty: all, unless it is they that are switched off.
@@ -248,6 +264,7 @@ impl Recipe {
         check_cast(&self.cast)?;
         self.light_map.check()?;
         self.interreflection.check("interreflection", &SHARE)?;
+        self.belt.map_or(Ok(()), |belt| belt.check())?;
         self.finish.check()?;
         self.settle.check()
     }

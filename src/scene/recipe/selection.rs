@@ -91,7 +91,7 @@ impl Recipe {
         log: &DrawLog,
         catalog: &[AssetVariant],
     ) -> Result<Vec<Object>> {
-        let selection = self.selections.index_for(number.k)?;
+        let selection = self.selections.index_for(number.place.first)?;
         let draws = Draws::new(number.seed, selection).logged(log);
         let mut selected = self.select(&self.choice_of(Role::Object), &draws, catalog)?;
         if !self.distractors.is_zero() {

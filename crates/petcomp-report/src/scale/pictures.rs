@@ -155,6 +155,7 @@ fn heap_scene(case: &ScaleCase) -> Scene {
         cast: Default::default(),
         light_map: Default::default(),
         interreflection: Default::default(),
+        belt: None,
         view: Default::default(),
         lens: Default::default(),
         finish: Default::default(),

@@ -351,7 +351,11 @@ fn count_splits(percent: u8, expected: usize) -> Result<Outcome> {
 
 /// Pictures of 1000 that are for validation.
 fn count_validation(val_percent: u8, order: SplitOrder) -> usize {
-    let split = Split { val_percent, order };
+    let split = Split {
+        val_percent,
+        order,
+        ..Split::default()
+    };
     let parts = (0..1000).map(|k| split.part(k, 1000));
     parts.filter(|part| *part == Part::Val).count()
 }

@@ -140,6 +140,7 @@ pub(super) fn empty_scene(camera: Camera) -> Scene {
         cast: Default::default(),
         light_map: Default::default(),
         interreflection: Default::default(),
+        belt: None,
         view: Default::default(),
         lens: Default::default(),
         finish: Default::default(),

@@ -116,6 +116,7 @@ impl FixtureFolder {
             cast: Default::default(),
             light_map: Default::default(),
             interreflection: Default::default(),
+            belt: None,
             view: Default::default(),
             lens: Default::default(),
             finish: Default::default(),

@@ -1,0 +1,195 @@
+//! Blur of what moves while the shutter is open.
+//!
+//! # Method
+//! A pixel is `light + through * plate`, where `through` is what objects and their shadows leave of
+//! the plate. Plate and camera stand still, so the mean over time is that of `light` and of
+//! `through` alone. Cards and shadows move together along the surface: what a pixel shows at
+//! another time is what lay beside it on the surface, and both are averaged along that way. What
+//! stands high over the surface would move a little farther in the picture.
+
+use crate::camera::{Camera, RadialDistortion};
+use crate::composite::frame::frame;
+use crate::deep::DeepImage;
+use crate::filter::sample_cubic_clamped;
+use crate::geom::{Plane, Point2, Point3, Vector2, Vector3};
+use crate::image::Image;
+use crate::pixel::{Film, LinearRgb, Mix, PremulRgba};
+use crate::scene::Shot;
+use crate::work::{self, Kind};
+
+/// Side of the squares of pixels that move by the same way.
+const SQUARE_PX: usize = 8;
+/// Ways below this leave pixels as they are, pixels.
+const LEAST_WAY_PX: f64 = 0.02;
+
+/// The frame of a shot from its deep samples: over its plate, and blurred along the way that its
+/// cards move while the shutter is open.
+///
+/// # Panics
+/// When the plate's size is not the picture's.
+pub fn exposed_frame(deep: &DeepImage, shot: &Shot) -> Image<PremulRgba> {
+    let plate = shot.plate.as_deref();
+    if shot.motion_m == [0.0; 2] {
+        return frame(deep, plate);
+    }
+    work::add(Kind::Filters, 1);
+    let effect = Image::from_fn(deep.width(), deep.height(), |x, y| {
+        shaded(deep.flat(x, y), plate.map(|_| deep.shadow()[(x, y)]))
+    });
+    let blurred = averaged(&effect, &ways(shot));
+    Image::from_fn(deep.width(), deep.height(), |x, y| {
+        let film = blurred[(x, y)];
+        plate.map_or_else(
+            || film.to_rgba(),
+            |plate| film.over_color(plate[(x, y)]).opaque(),
+        )
+    })
+}
+
+/// A film that also hides what is in its shadow; shadows need something to fall on.
+fn shaded(film: Film, shadow: Option<LinearRgb>) -> Film {
+    let shadow = shadow.unwrap_or(LinearRgb::WHITE);
+    Film::new(film.color, film.transmittance() * shadow)
+}
+
+/// Means along each pixel's way.
+fn averaged(effect: &Image<Film>, ways: &Image<Vector2<f64>>) -> Image<Film> {
+    let (width, height) = effect.size();
+    Image::from_fn(width, height, |x, y| {
+        let way = ways[(x / SQUARE_PX, y / SQUARE_PX)];
+        let middle = Point2::new(x as f64 + 0.5, y as f64 + 0.5);
+        mean_along(effect, middle, way)
+    })
+}
+
+fn mean_along(effect: &Image<Film>, middle: Point2<f64>, way: Vector2<f64>) -> Film {
+    let count = (2.0 * way.norm()).ceil().max(1.0);
+    let weight = (1.0 / count) as f32;
+    let sum = (0..count as usize).fold(Film::default(), |sum, i| {
+        let at = middle + way * ((i as f64 + 0.5) / count - 0.5);
+        sum.add_scaled(weight, sample_cubic_clamped(effect, at.x, at.y))
+    });
+    // A cubic curve is beyond its neighbours beside edges.
+    Film {
+        color: sum.color.map(|c| c.max(0.0)),
+        opacity: sum.opacity.map(|o| o.clamp(0.0, 1.0)),
+    }
+}
+
+/// Way in the picture, in pixels, of a point of the surface in the middle of each square; none
+/// where the surface is not seen.
+fn ways(shot: &Shot) -> Image<Vector2<f64>> {
+    let [width, height] = shot.camera.image.map(|n| (n as usize).div_ceil(SQUARE_PX));
+    let (camera, distortion) = (&shot.camera, shot.distortion());
+    Image::from_fn(width, height, |x, y| {
+        let [x, y] = [x, y].map(|n| (n as f64 + 0.5) * SQUARE_PX as f64);
+        let way = way_at(camera, &distortion, Point2::new(x, y), shot.motion_m);
+        way.filter(|way| way.norm() >= LEAST_WAY_PX)
+            .unwrap_or_default()
+    })
+}
+
+fn way_at(
+    camera: &Camera,
+    distortion: &RadialDistortion,
+    px: Point2<f64>,
+    [x, y]: [f64; 2],
+) -> Option<Vector2<f64>> {
+    let ray = camera.ray(distortion.undistort(px));
+    let depth = Plane::surface().intersect(&ray)?;
+    let middle = ray.at(depth);
+    let half = Vector3::new(x, y, 0.0) * 0.5;
+    let shown = |at: Point3<f64>| Some(distortion.distort(camera.project(at)?.0));
+    Some(shown(middle + half)? - shown(middle - half)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geom::{Pose, Quad};
+    use crate::pixel::ObjectId;
+    use crate::quality::Quality;
+    use crate::render::render;
+    use crate::scene::{AreaLight, Card, LightShape};
+    use std::sync::Arc;
+
+    /// Where a shutter that opens at -1/2 and closes at 1/2 sees the card, as shares of its way.
+    const TIMES: usize = 16;
+    const WAY_M: [f64; 2] = [0.03, 0.01];
+    const Z: f64 = 0.01;
+
+    /// A see-through card and an opaque one under a small light, over a plate with stripes.
+    fn shot(moved: f64) -> Shot {
+        let plate = Image::from_fn(80, 60, |x, y| {
+            LinearRgb::new(0.3, 0.5, 0.4).scale(1.0 + 0.5 * ((x / 2 + y / 5) % 2) as f32)
+        });
+        let card = |id: u32, at: [f64; 2], alpha: f32| {
+            let [x, y] = [0, 1].map(|axis| at[axis] + moved * WAY_M[axis]);
+            let quad = Quad {
+                world_from_card: Pose::translation(x, y, Z),
+                size: [0.12, 0.06],
+            };
+            let texel = PremulRgba::new(0.7 * alpha, 0.2 * alpha, 0.1 * alpha, alpha);
+            Card::new(ObjectId(id), quad, Image::filled(16, 8, texel))
+        };
+        let light = AreaLight {
+            shape: LightShape::Rectangle,
+            position: [0.2, 0.4, 1.2],
+            target: [0.0; 3],
+            size: [0.1; 2],
+            power: 20.0,
+            color: LinearRgb::WHITE,
+        };
+        Shot::new(Camera::looking_down(1.0, 160.0, [80, 60]))
+            .with_plate(Arc::new(plate))
+            .with_light(light)
+            .with_ambient(LinearRgb::grey(0.2))
+            .with_card(card(1, [-0.05, 0.03], 1.0))
+            .with_card(card(2, [0.08, -0.04], 0.4))
+    }
+
+    fn rendered(shot: &Shot) -> Image<PremulRgba> {
+        exposed_frame(&render(shot, &Quality::Reference.into()), shot)
+    }
+
+    fn rmse(a: &Image<PremulRgba>, b: &Image<PremulRgba>) -> f32 {
+        let pairs = a.pixels().iter().zip(b.pixels());
+        let squares = pairs.map(|(a, b)| (a.g - b.g).powi(2)).sum::<f32>();
+        (squares / a.pixels().len() as f32).sqrt()
+    }
+
+    #[test]
+    fn the_blur_is_the_mean_of_many_pictures_while_the_shutter_is_open() {
+        let times = (0..TIMES).map(|i| (i as f64 + 0.5) / TIMES as f64 - 0.5);
+        let pictures: Vec<_> = times.map(|t| rendered(&shot(t))).collect();
+        let exact = Image::from_fn(80, 60, |x, y| {
+            let sum = pictures.iter().fold(PremulRgba::default(), |sum, picture| {
+                sum.add_scaled(1.0 / TIMES as f32, picture[(x, y)])
+            });
+            sum
+        });
+        let still = rendered(&shot(0.0));
+        let blurred = rendered(&Shot {
+            motion_m: WAY_M,
+            ..shot(0.0)
+        });
+        let (off, unblurred) = (rmse(&blurred, &exact), rmse(&still, &exact));
+        assert!(
+            off < 0.002 && unblurred > 5.0 * off,
+            "{off}, {unblurred} without"
+        );
+        assert_eq!(blurred[(0, 0)], still[(0, 0)], "far from all cards");
+    }
+
+    #[test]
+    fn without_a_plate_coverage_is_blurred_too() {
+        let moving = Shot {
+            plate: None,
+            motion_m: WAY_M,
+            ..shot(0.0)
+        };
+        let alphas: Vec<f32> = rendered(&moving).pixels().iter().map(|p| p.a).collect();
+        assert!(alphas.iter().any(|a| (0.5..0.95).contains(a)));
+        assert!(alphas.iter().all(|a| (0.0..=1.0).contains(a)));
+    }
+}

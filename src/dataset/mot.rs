@@ -1,0 +1,160 @@
+//! Labels as the MOTChallenge has them: a folder for each sequence of pictures.
+
+use crate::dataset::paths::create_part_folders;
+use crate::dataset::{Entry, Extent, LabelledObject, Part, PictureFormat, Writer, Written};
+use crate::error::{Error, Result};
+use crate::io;
+use crate::scene::Belt;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+/// Writes `mot/{train,val}/SSSSSS/`, a folder for each sequence of a belt: `gt/gt.txt`,
+/// `seqinfo.ini`, and the pictures as `img1/NNNNNN.png` (links to those in `images/`, which take no
+/// room, where the disk has links).
+///
+/// A line of `gt.txt` is an object in a picture: picture, object, left, top, width, height, 1 (0 for
+/// what is to be ignored), class, visible share. Pictures, objects, pixels and classes are counted
+/// from 1; an object keeps its number through the sequence.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Mot {
+    /// Whether boxes are those of the whole object or of what is seen. Default: `amodal`.
+    pub boxes: Extent,
+    /// Format of the pictures that it names; in a recipe, that of `pictures`.
+    #[serde(skip)]
+    pub pictures: PictureFormat,
+}
+
+/// Its folder.
+const KIND: &str = "mot";
+
+/// One picture's share of its sequence.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct FrameShare {
+    belt: Belt,
+    image: [u32; 2],
+    /// Lines of `gt.txt`.
+    lines: Vec<String>,
+}
+
+/// A picture of a sequence, and its image.
+struct SequenceFrame {
+    share: FrameShare,
+    image: PathBuf,
+}
+
+impl Writer for Mot {
+    fn settings(&self) -> serde_json::Value {
+        serde_json::json!({ "mot": self })
+    }
+
+    fn begin(&self, folder: &Path, _classes: &[String]) -> Result<()> {
+        create_part_folders(folder, KIND)
+    }
+
+    fn write(&self, folder: &Path, entry: &Entry<'_>) -> Result<Vec<PathBuf>> {
+        let belt = entry.belt().ok_or_else(no_sequence)?;
+        let path = entry.path(KIND, "json");
+        let share = FrameShare {
+            belt,
+            image: entry.sample.labels.image,
+            lines: self.lines(&belt, entry.labelled),
+        };
+        io::write_json(folder.join(&path), &share)?;
+        Ok(vec![path])
+    }
+
+    fn finish(&self, folder: &Path, _classes: &[String], samples: &[Written]) -> Result<()> {
+        Part::ALL.into_iter().try_for_each(|part| {
+            let own = samples.iter().filter(|sample| sample.part == part);
+            let sequences = sequences(folder, own)?;
+            sequences.iter().try_for_each(|(number, frames)| {
+                let name = format!("{number:06}");
+                let place = folder.join(KIND).join(part.name()).join(&name);
+                self.write_sequence(&place, &name, frames)
+            })
+        })
+    }
+}
+
+pub(super) fn no_sequence() -> Error {
+    let what = "\"mot\", but the recipe has no belt: tracks need sequences (scene.belt)";
+    Error::value("labels.formats", what)
+}
+
+/// The pictures of each sequence, in order.
+fn sequences<'a>(
+    folder: &Path,
+    samples: impl Iterator<Item = &'a Written>,
+) -> Result<BTreeMap<u64, Vec<SequenceFrame>>> {
+    let mut sequences: BTreeMap<u64, Vec<SequenceFrame>> = BTreeMap::new();
+    for sample in samples {
+        let file = |kind| sample.file(kind).map_err(|e| Error::file(folder, e));
+        let share: FrameShare = io::read_json(io::inside(folder, file(KIND)?)?)?;
+        let image = io::inside(folder, file("images")?)?;
+        let frames = sequences.entry(share.belt.sequence).or_default();
+        frames.push(SequenceFrame { share, image });
+    }
+    Ok(sequences)
+}
+
+impl Mot {
+    fn lines(&self, belt: &Belt, labelled: &[LabelledObject<'_>]) -> Vec<String> {
+        let number = belt.frame + 1;
+        let lines = labelled.iter().filter_map(|label| self.line(number, label));
+        lines.collect()
+    }
+
+    /// None for an object without a box.
+    fn line(&self, frame: u64, label: &LabelledObject<'_>) -> Option<String> {
+        let (b, _) = self.boxes.of(label.object);
+        let [left, top] = [b.x0, b.y0].map(|edge| edge + 1.0);
+        let (id, counts) = (label.object.id.0, u8::from(!label.ignored));
+        let (class, visible) = (label.class + 1, label.object.visible_fraction);
+        let (width, height) = (b.width(), b.height());
+        (!b.is_empty()).then(|| {
+            format!("{frame},{id},{left},{top},{width},{height},{counts},{class},{visible:.4}")
+        })
+    }
+
+    fn write_sequence(&self, place: &Path, name: &str, frames: &[SequenceFrame]) -> Result<()> {
+        let pictures = place.join("img1");
+        io::create_folder(place.join("gt"))?;
+        io::create_folder(&pictures)?;
+        let mut text = String::new();
+        for SequenceFrame { share, image } in frames {
+            for line in &share.lines {
+                let _ = writeln!(text, "{line}");
+            }
+            let shown = format!("{:06}.{}", share.belt.frame + 1, self.pictures.extension());
+            link(image, &pictures.join(shown))?;
+        }
+        io::write_text(place.join("gt/gt.txt"), &text)?;
+        io::write_text(place.join("seqinfo.ini"), &self.info(name, frames))
+    }
+
+    fn info(&self, name: &str, frames: &[SequenceFrame]) -> String {
+        let length = frames.len();
+        let last = frames.last().map(|frame| &frame.share);
+        let [width, height] = last.map_or([0; 2], |share| share.image);
+        let rate = last.map_or(0.0, |share| share.belt.frame_rate);
+        format!(
+            "[Sequence]\nname={name}\nimDir=img1\nframeRate={rate}\nseqLength={length}\nimWidth={width}\n\
+             imHeight={height}\nimExt=.{}\n",
+            self.pictures.extension()
+        )
+    }
+}
+
+/// A second name of a file; a copy of it where there are no links.
+fn link(file: &Path, name: &Path) -> Result<()> {
+    match std::fs::remove_file(name) {
+        Err(e) if e.kind() != std::io::ErrorKind::NotFound => return Err(Error::file(name, e)),
+        _ => (),
+    }
+    let linked = std::fs::hard_link(file, name);
+    let there = linked.or_else(|_| std::fs::copy(file, name).map(drop));
+    there.map_err(|e| Error::file(name, e))
+}
