@@ -163,10 +163,9 @@ mod tests {
         let times = (0..TIMES).map(|i| (i as f64 + 0.5) / TIMES as f64 - 0.5);
         let pictures: Vec<_> = times.map(|t| rendered(&shot(t))).collect();
         let exact = Image::from_fn(80, 60, |x, y| {
-            let sum = pictures.iter().fold(PremulRgba::default(), |sum, picture| {
+            pictures.iter().fold(PremulRgba::default(), |sum, picture| {
                 sum.add_scaled(1.0 / TIMES as f32, picture[(x, y)])
-            });
-            sum
+            })
         });
         let still = rendered(&shot(0.0));
         let blurred = rendered(&Shot {
