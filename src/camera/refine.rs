@@ -175,12 +175,13 @@ impl<'a> Descent<'a> {
         };
         let next = self.residuals.stepped(&self.state, &step);
         let mut has_converged = length < STEP_TOLERANCE;
-        match self.residuals.cost(&next) {
-            Some(cost) if cost < self.normal.cost => {
-                has_converged |= self.hardly_falls_to(cost);
-                self.move_to(next)?;
-            }
-            _ => self.damping *= DAMPING_INCREASE,
+        // Behind the camera no cost is low enough.
+        let cost = self.residuals.cost(&next).unwrap_or(f64::INFINITY);
+        if cost < self.normal.cost {
+            has_converged |= self.hardly_falls_to(cost);
+            self.move_to(next)?;
+        } else {
+            self.damping *= DAMPING_INCREASE;
         }
         Some(if has_converged {
             StepOutcome::Finished

@@ -1,12 +1,8 @@
 //! The finished frame: what objects add, over what their shadows leave of the plate.
 
-use crate::composite::defocus::defocus;
-use crate::composite::motion::exposed_frame;
 use crate::deep::DeepImage;
 use crate::image::Image;
 use crate::pixel::{Film, LinearRgb, PremulRgba};
-use crate::render::{RenderOptions, render};
-use crate::scene::Shot;
 
 /// Folds deep samples into a picture, over `plate` where there is one.
 ///
@@ -28,32 +24,6 @@ pub fn frame(deep: &DeepImage, plate: Option<&Image<LinearRgb>>) -> Image<Premul
         let behind = deep.shadow()[(x, y)] * plate[(x, y)];
         deep.flat(x, y).over_color(behind).opaque()
     })
-}
-
-/// The picture of a shot in one call: its deep samples, out of focus where its lens has them so,
-/// over its plate, blurred where its cards move; scene-linear, premultiplied.
-///
-/// ```
-/// use petcomp::geom::{Pose, Quad};
-/// use petcomp::scene::Card;
-/// use petcomp::{Camera, Image, LinearRgb, ObjectId, PremulRgba, Shot, composite};
-/// use std::sync::Arc;
-///
-/// let quad = Quad { world_from_card: Pose::translation(0.0, 0.0, 0.05), size: [0.2, 0.1] };
-/// let red_film = Image::filled(8, 8, PremulRgba::new(0.3, 0.1, 0.1, 0.5));
-/// let shot = Shot::new(Camera::looking_down(1.0, 80.0, [64, 48]))
-///     .with_plate(Arc::new(Image::filled(64, 48, LinearRgb::grey(0.5))))
-///     .with_card(Card::new(ObjectId(1), quad, red_film))
-///     .with_ambient(LinearRgb::WHITE);
-/// let frame = composite::picture(&shot, &Default::default());
-/// assert!(frame[(32, 24)].r > frame[(32, 24)].g);
-/// ```
-///
-/// # Panics
-/// When the plate's size is not the camera's.
-pub fn picture(shot: &Shot, options: &RenderOptions) -> Image<PremulRgba> {
-    let deep = render(shot, options);
-    exposed_frame(&defocus(&deep, shot), shot)
 }
 
 /// Folds deep samples into a picture of their light and of what they let pass, per channel;

@@ -22,6 +22,7 @@ mod finish;
 mod frame;
 mod motion;
 mod part;
+mod picture;
 mod poisson;
 mod porter_duff;
 
@@ -36,6 +37,7 @@ pub use finish::finish;
 pub use finish::finish_blended;
 #[doc(hidden)]
 pub use frame::film;
-pub use frame::{frame, picture};
+pub use frame::frame;
 #[doc(hidden)]
 pub use motion::exposed_frame;
+pub use picture::picture;
