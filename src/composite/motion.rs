@@ -10,9 +10,9 @@
 use crate::camera::{Camera, RadialDistortion};
 use crate::composite::frame::frame;
 use crate::deep::DeepImage;
-use crate::filter::sample_cubic_clamped;
+use crate::filter::{self, sample_cubic_clamped};
 use crate::geom::{Plane, Point2, Point3, Vector2, Vector3};
-use crate::image::Image;
+use crate::image::{Image, Mask};
 use crate::pixel::{Film, LinearRgb, Mix, PremulRgba};
 use crate::scene::Shot;
 use crate::work::{self, Kind};
@@ -21,6 +21,8 @@ use crate::work::{self, Kind};
 const SQUARE_PX: usize = 8;
 /// Ways below this leave pixels as they are, pixels.
 const LEAST_WAY_PX: f64 = 0.02;
+/// Places that are read along a way: near the horizon ways have no end.
+const MOST_TAPS: f64 = 256.0;
 
 /// The frame of a shot from its deep samples: over its plate, and blurred along the way that its
 /// cards move while the shutter is open.
@@ -55,15 +57,36 @@ fn shaded(film: Film, shadow: Option<LinearRgb>) -> Film {
 /// Means along each pixel's way.
 fn averaged(effect: &Image<Film>, ways: &Image<Vector2<f64>>) -> Image<Film> {
     let (width, height) = effect.size();
+    let reached = reached(effect, ways);
     Image::from_fn(width, height, |x, y| {
-        let way = ways[(x / SQUARE_PX, y / SQUARE_PX)];
+        let square = (x / SQUARE_PX, y / SQUARE_PX);
+        if !reached[square] {
+            return Film::default();
+        }
         let middle = Point2::new(x as f64 + 0.5, y as f64 + 0.5);
-        mean_along(effect, middle, way)
+        mean_along(effect, middle, ways[square])
     })
 }
 
+/// Squares that anything reaches while the shutter is open.
+fn reached(effect: &Image<Film>, ways: &Image<Vector2<f64>>) -> Mask {
+    let mut filled = Image::filled(ways.width(), ways.height(), false);
+    for (y, row) in effect.rows().enumerate() {
+        for (x, film) in row.iter().enumerate() {
+            filled[(x / SQUARE_PX, y / SQUARE_PX)] |= *film != Film::default();
+        }
+    }
+    let longest = ways
+        .pixels()
+        .iter()
+        .map(|way| way.norm())
+        .fold(0.0, f64::max);
+    // Two squares for the curve that is read, and for corners.
+    filter::dilate(&filled, 0.5 * longest / SQUARE_PX as f64 + 2.0)
+}
+
 fn mean_along(effect: &Image<Film>, middle: Point2<f64>, way: Vector2<f64>) -> Film {
-    let count = (2.0 * way.norm()).ceil().max(1.0);
+    let count = (way.norm().ceil() + 1.0).min(MOST_TAPS);
     let weight = (1.0 / count) as f32;
     let sum = (0..count as usize).fold(Film::default(), |sum, i| {
         let at = middle + way * ((i as f64 + 0.5) / count - 0.5);
