@@ -57,12 +57,12 @@ pub(crate) struct ParameterPriors {
     pub(crate) principal_sigma: f64,
     pub(crate) kappa: Prior,
     /// Logarithm of the camera's height above the surface.
-    pub(crate) ln_height: Option<Prior>,
+    pub(crate) ln_height: Prior,
 }
 
 impl ParameterPriors {
     /// Nothing is known but perhaps the height.
-    pub(crate) fn only_height(ln_height: Option<Prior>) -> Self {
+    pub(crate) fn only_height(ln_height: Prior) -> Self {
         Self {
             ln_focal: Prior::FLAT,
             stretch_sigma: f64::INFINITY,

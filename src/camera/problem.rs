@@ -203,7 +203,7 @@ impl SolverUnits {
             stretch_sigma: f64::INFINITY,
             principal_sigma: principal_sigma(label, framing, priors),
             kappa: kappa_prior(label, focal, priors),
-            ln_height: None,
+            ln_height: Prior::FLAT,
         };
         (lens, source)
     }
@@ -320,16 +320,18 @@ fn kappa_prior(label: &Label, focal: f64, priors: &Priors) -> Prior {
 }
 
 /// Prior of the logarithm of the camera's height above the surface, in the solver's units.
-fn height_prior(label: &Label, units: &SolverUnits) -> Option<Prior> {
-    let height = label.camera.height_m?;
+fn height_prior(label: &Label, units: &SolverUnits) -> Prior {
+    let Some(height) = label.camera.height_m else {
+        return Prior::FLAT;
+    };
     let sigma = label
         .camera
         .height_sigma_m
         .map_or(STATED_HEIGHT_SIGMA, |s| s / height);
-    Some(Prior {
+    Prior {
         mean: libm::log(height / units.unit),
         sigma,
-    })
+    }
 }
 
 /// Where a point would be seen without distortion, by fixed-point iteration.

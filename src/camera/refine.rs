@@ -54,7 +54,7 @@ pub(crate) struct NormalEquations {
 impl Residuals {
     /// Measured numbers, priors apart.
     pub(crate) fn measurement_count(&self) -> usize {
-        2 * self.observations.len() + usize::from(self.priors.ln_height.is_some())
+        2 * self.observations.len() + usize::from(!self.priors.ln_height.is_flat())
     }
 
     /// The cost of a state; none where a point would be behind the camera.
@@ -63,7 +63,8 @@ impl Residuals {
         for observation in &self.observations {
             cost += observation.cost(state)?;
         }
-        if let Some(height) = self.priors.ln_height {
+        let height = &self.priors.ln_height;
+        if !height.is_flat() {
             cost += height.cost(state.ln_height()?.0);
         }
         Some(cost)
@@ -75,7 +76,8 @@ impl Residuals {
         for observation in &self.observations {
             normal.add_observation(state, observation)?;
         }
-        if let Some(height) = self.priors.ln_height {
+        let height = &self.priors.ln_height;
+        if !height.is_flat() {
             let (value, slope) = state.ln_height()?;
             normal.add(value - height.mean, &slope, height.information());
         }
