@@ -148,7 +148,6 @@ codes! {
     CameraMoved "capture.camera_moved" "The camera moved between two photos"
     ObjectMoved "capture.object_moved" "The object moved or the light changed between two photos"
     ThicknessUnknown "capture.thickness_unknown" "The thickness of the object is not known"
-    FlowUnknown "capture.flow_unknown" "Refraction is not known on much of the object"
     // Dataset.
     UnreadableFile "dataset.unreadable_file" "A file is missing or cannot be read"
     BadDataYaml "dataset.bad_data_yaml" "data.yaml lacks a key or has a wrong value"

@@ -15,8 +15,8 @@ use crate::filter;
 use crate::geom::{Point2, Point3};
 use crate::image::{Image, Roi};
 use crate::io;
-use crate::matte::{ColorUncertainty, CutOutOptions, Flow, Outline, from_top_left};
-use crate::pixel::Film;
+use crate::matte::{ColorUncertainty, CutOutOptions, Flow, LightPath, Outline, from_top_left};
+use crate::pixel::{Film, Mix};
 use std::path::PathBuf;
 
 /// An object that was captured on a display.
@@ -25,8 +25,6 @@ pub(super) struct CapturedObject {
     pub(super) film: Image<Film>,
     /// How it bends light, where stripes were photographed.
     pub(super) flow: Option<Flow>,
-    /// What scattering leaves of contrast, of the size of the flow.
-    pub(super) modulation: Image<f32>,
     pub(super) record: PhotoRecord,
 }
 
@@ -35,10 +33,6 @@ const CORNER_SIGMA_PX: f64 = 0.15;
 /// Standard error of one side of the outline, pixels of the view: on synthetic captures the area of
 /// an ellipse is right to 0.3 pixels of its radius.
 const SIDE_ERROR_PX: f64 = 0.5;
-/// Where refraction is known on less of what is see-through, a person should know.
-const MIN_KNOWN: f64 = 0.5;
-/// What passes less light is opaque.
-const OPAQUE: f32 = 0.05;
 
 /// Measures the object of an entry.
 ///
@@ -239,43 +233,32 @@ impl<'a> Placed<'a> {
     fn object(&self, measured: &Measured, trim: &Trim, photos: usize) -> CapturedObject {
         let film = trim.cropped(&measured.film);
         let flow = self.flow(measured, trim, &film);
-        let modulation = measured
-            .refraction
-            .as_ref()
-            .map(|r| trim.cropped(&r.modulation));
         let captured = self.capture_record(measured, &film, flow.as_ref(), photos);
         let record = self.record(measured, trim, &film, captured);
-        CapturedObject {
-            film,
-            flow,
-            modulation: modulation.unwrap_or_else(|| Image::new(0, 0)),
-            record,
-        }
+        CapturedObject { film, flow, record }
     }
 
     /// In metres on the display, over the whole cut-out.
     fn flow(&self, measured: &Measured, trim: &Trim, film: &Image<Film>) -> Option<Flow> {
         let refraction = measured.refraction.as_ref()?;
-        let part = |axis: usize| {
-            let metres = |d: [f64; 2]| (d[axis] * self.pitch) as f32;
-            trim.cropped(&refraction.displacement_px.map(metres))
-        };
+        let metres = |path: LightPath| path.scaled(self.pitch as f32);
+        let paths = trim.cropped(&refraction.paths.map(metres));
         let share = trim.cropped(
             &refraction
                 .known
                 .map(|known| if known { 1.0_f32 } else { 0.0 }),
         );
         let known = share.map(|share| share >= 0.5);
-        let displacement = part(0).zip3_map(&part(1), &share, |x, y, share| {
+        let paths = paths.zip_map(&share, |path, share| {
             if share >= 0.5 {
-                [x / share, y / share]
+                LightPath::default().add_scaled(share.recip(), path)
             } else {
-                [0.0; 2]
+                LightPath::default()
             }
         });
         let width = film.width() as f64 / (self.px_per_metre * trim.scale);
         Some(Flow {
-            displacement,
+            paths,
             known,
             width,
             height: self.height,
@@ -298,7 +281,7 @@ impl<'a> Placed<'a> {
             unevenness: measured.unevenness.into(),
             outline_confidence: measured.distinct,
             color_confidence: Some(confidence(captured.transmittance_sigma)),
-            diagnostics: self.all_diagnostics(measured, &captured),
+            diagnostics: self.all_diagnostics(measured),
             captured: Some(captured),
             ..placed
         }
@@ -329,19 +312,13 @@ impl<'a> Placed<'a> {
             transmittance_sigma: mean_sigma(&measured.sigma),
             flow: flow.map(|_| files::flow_file(&file)),
             height: self.height,
-            known: flow.map_or(0.0, |flow| known_share(flow, film)),
+            haze: flow.map_or(0.0, mean_haze),
         }
     }
 
-    fn all_diagnostics(&self, measured: &Measured, captured: &CaptureRecord) -> Vec<Diagnostic> {
-        let own = self
-            .diagnostics
-            .iter()
-            .chain(&measured.diagnostics)
-            .cloned();
-        let bends = captured.flow.is_some();
-        let hidden = bends.then(|| flow_unknown(captured.known)).flatten();
-        own.chain(hidden).collect()
+    fn all_diagnostics(&self, measured: &Measured) -> Vec<Diagnostic> {
+        let all = self.diagnostics.iter().chain(&measured.diagnostics);
+        all.cloned().collect()
     }
 }
 
@@ -382,26 +359,14 @@ fn thickness_warning(entry: &PhotoEntry) -> Option<Diagnostic> {
     })
 }
 
-/// The share of what is see-through where refraction is known.
-fn known_share(flow: &Flow, film: &Image<Film>) -> f64 {
-    let clear = film.map(|film| {
-        let v = film.transmittance().max_channel();
-        film != Film::default() && v >= OPAQUE
+/// Mean haze where refraction is known.
+fn mean_haze(flow: &Flow) -> f64 {
+    let pixels = flow.paths.pixels().iter().zip(flow.known.pixels());
+    let known = pixels.filter(|(_, known)| **known);
+    let (sum, count) = known.fold((0.0, 0.0), |(sum, n), (path, _)| {
+        (sum + f64::from(path.haze), n + 1.0)
     });
-    let known = clear.zip_map(&flow.known, |clear, known| clear && known);
-    known.count() as f64 / clear.count().max(1) as f64
-}
-
-fn flow_unknown(known: f64) -> Option<Diagnostic> {
-    (known < MIN_KNOWN).then(|| {
-        let what = format!(
-            "refraction is known on {:.0} % of what is see-through, expected at least {:.0} %: \
-             lines of sight leave the display or scatter; use a larger display or a camera farther away",
-            100.0 * known,
-            100.0 * MIN_KNOWN
-        );
-        Diagnostic::note(Code::FlowUnknown, what)
-    })
+    sum / f64::max(count, 1.0)
 }
 
 /// Mean over the object.

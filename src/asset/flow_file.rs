@@ -5,31 +5,47 @@ use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::io;
 use crate::io::exr::Channel;
-use crate::matte::Flow;
+use crate::matte::{Flow, LightPath};
 use std::path::Path;
 
-/// Names of the channels: displacement in metres, right and down; 1 where it is known; what
-/// scattering leaves of contrast.
-const CHANNELS: [&str; 4] = ["X", "Y", "known", "modulation"];
+/// Name of the channel that is 1 where the others are known.
+const KNOWN: &str = "known";
 
-/// Writes a flow as an EXR of half floats, and returns it as it will be read back.
-pub(super) fn write(path: &Path, flow: &Flow, modulation: &Image<f32>) -> Result<Flow> {
-    let planes = planes(flow, modulation);
-    let samples = planes.iter().map(Vec::as_slice);
-    let channels: Vec<_> = CHANNELS.into_iter().zip(samples).collect();
-    io::exr::write_half_channels(path, flow.displacement.size(), &channels, &[])?;
-    Ok(Flow {
-        displacement: flow.displacement.map(|d| d.map(through_half)),
-        ..flow.clone()
-    })
+/// Names of the channels of a [`LightPath`]; lengths are in metres.
+const CHANNELS: [&str; 6] = ["X", "Y", "haze", "scatter.X", "scatter.Y", "scatter.width"];
+
+/// What the channels say, in their order.
+fn values(path: LightPath) -> [f32; 6] {
+    let ([x, y], [sx, sy]) = (path.displacement, path.scatter_displacement);
+    [x, y, path.haze, sx, sy, path.scatter_width]
 }
 
-/// The samples of the channels.
-fn planes(flow: &Flow, modulation: &Image<f32>) -> [Vec<f32>; 4] {
-    let pixels = flow.displacement.pixels();
-    let [x, y] = [0, 1].map(|axis: usize| pixels.iter().map(|d| d[axis]).collect());
+fn path_of([x, y, haze, sx, sy, scatter_width]: [f32; 6]) -> LightPath {
+    LightPath {
+        displacement: [x, y],
+        haze,
+        scatter_displacement: [sx, sy],
+        scatter_width,
+    }
+}
+
+/// Writes a flow as an EXR of half floats, and returns it as it will be read back.
+pub(super) fn write(path: &Path, flow: &Flow) -> Result<Flow> {
     let known = flow.known.map(|known| if known { 1.0 } else { 0.0 });
-    [x, y, known.into_vec(), modulation.pixels().to_vec()]
+    let planes: [Vec<f32>; 6] = std::array::from_fn(|k| {
+        let pixels = flow.paths.pixels().iter();
+        pixels.map(|path| values(*path)[k]).collect()
+    });
+    let samples = planes.iter().map(Vec::as_slice);
+    let channels = CHANNELS.into_iter().zip(samples);
+    let channels: Vec<_> = channels.chain([(KNOWN, known.pixels())]).collect();
+    io::exr::write_half_channels(path, flow.paths.size(), &channels, &[])?;
+    Ok(Flow {
+        paths: flow
+            .paths
+            .map(|path| path_of(values(path).map(through_half))),
+        ..flow.clone()
+    })
 }
 
 fn through_half(value: f32) -> f32 {
@@ -68,10 +84,13 @@ fn decoded(path: &Path, size: (usize, usize)) -> Result<Flow> {
     let (found, channels) = io::exr::read_channels(path)?;
     check_size(path, found, size)?;
     let plane = |name: &str| plane(&channels, name, size).map_err(|what| Error::file(path, what));
-    let (x, y) = (plane(CHANNELS[0])?, plane(CHANNELS[1])?);
+    let planes: Vec<_> = CHANNELS.into_iter().map(plane).collect::<Result<_>>()?;
+    let (w, h) = size;
     Ok(Flow {
-        displacement: x.zip_map(&y, |x, y| [x, y]),
-        known: plane(CHANNELS[2])?.map(|known| known >= 0.5),
+        paths: Image::from_fn(w, h, |x, y| {
+            path_of(std::array::from_fn(|k| planes[k][(x, y)]))
+        }),
+        known: plane(KNOWN)?.map(|known| known >= 0.5),
         ..Flow::default()
     })
 }
@@ -105,7 +124,12 @@ mod tests {
 
     fn flow() -> Flow {
         Flow {
-            displacement: Image::from_fn(4, 3, |x, y| [0.001 * x as f32, -0.002 * y as f32]),
+            paths: Image::from_fn(4, 3, |x, y| LightPath {
+                displacement: [0.001 * x as f32, -0.002 * y as f32],
+                haze: 0.25,
+                scatter_displacement: [0.004, 0.003],
+                scatter_width: 0.01,
+            }),
             known: Image::from_fn(4, 3, |x, _| x > 0),
             width: 0.4,
             height: 0.03,
@@ -118,7 +142,7 @@ mod tests {
             transmittance_sigma: 0.01,
             flow: Some("a.flow.exr".into()),
             height: 0.03,
-            known: 0.75,
+            haze: 0.25,
         };
         PhotoRecord {
             captured: Some(captured),
@@ -130,7 +154,7 @@ mod tests {
     fn a_flow_is_read_as_it_was_written() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.flow.exr");
-        let written = write(&path, &flow(), &Image::filled(4, 3, 0.5)).unwrap();
+        let written = write(&path, &flow()).unwrap();
         let read = |size| read(folder.path(), &record(), size);
         assert_eq!(read((4, 3)).unwrap(), Some(written));
         let size = read((5, 3)).unwrap_err().to_string();

@@ -3,6 +3,8 @@
 
 use super::library::Photo;
 use crate::color::{Hsv, hsv_to_rgb, to_srgb8};
+use crate::filter::Pyramid;
+use crate::geom::Point2;
 use crate::image::Image;
 use crate::matte::Flow;
 use crate::matte::median::quantile;
@@ -11,7 +13,7 @@ use std::f64::consts::TAU;
 
 /// Side of a square of the checkerboard, pixels: larger than what film is shown over, so that its
 /// edges are seen to bend.
-const SQUARE_PX: f64 = 16.0;
+const SQUARE_PX: usize = 16;
 const CHECKER_GREYS: [f32; 2] = [0.08, 0.6];
 /// Light of what the object covers where refraction is not known.
 const UNKNOWN: LinearRgb = LinearRgb::grey(0.05);
@@ -34,7 +36,7 @@ pub(super) fn tiles(photo: &Photo, film: &Image<Film>) -> Vec<Image<Srgb8>> {
 fn flow_colors(flow: &Flow, film: &Image<Film>) -> Image<LinearRgb> {
     let full = full_saturation(flow);
     over_texture(film, |uv, film| match flow.at(uv) {
-        Some(d) => wheel_color(d, full),
+        Some(path) => wheel_color(path.displacement, full),
         None if film.opacity.is_black() => LinearRgb::WHITE,
         None => UNKNOWN,
     })
@@ -42,10 +44,11 @@ fn flow_colors(flow: &Flow, film: &Image<Film>) -> Image<LinearRgb> {
 
 /// The length, metres, that most displacements do not reach.
 fn full_saturation(flow: &Flow) -> f32 {
-    let pixels = flow.displacement.pixels().iter().zip(flow.known.pixels());
-    let lengths = pixels
-        .filter(|(_, known)| **known)
-        .map(|(d, _)| libm::hypotf(d[0], d[1]));
+    let pixels = flow.paths.pixels().iter().zip(flow.known.pixels());
+    let lengths = pixels.filter(|(_, known)| **known).map(|(path, _)| {
+        let [x, y] = path.displacement;
+        libm::hypotf(x, y)
+    });
     quantile(lengths.collect(), SATURATED_SHARE, f32::total_cmp).unwrap_or(1.0)
 }
 
@@ -61,17 +64,18 @@ fn wheel_color([x, y]: [f32; 2], full: f32) -> LinearRgb {
 /// A checkerboard on which the object lies, as it lay on the display.
 fn bent_checkerboard(flow: &Flow, film: &Image<Film>) -> Image<LinearRgb> {
     let px_per_metre = film.width() as f64 / flow.width;
-    let size = [film.width() as f64, film.height() as f64];
-    over_texture(film, |uv, film| {
-        let d = flow.at(uv).unwrap_or([0.0; 2]);
-        let at = [0, 1].map(|i| uv[i] * size[i] + f64::from(d[i]) * px_per_metre);
-        film.over_color(checkerboard(at))
+    let (w, h) = film.size();
+    let board = Pyramid::new(Image::from_fn(w, h, checkerboard));
+    over_texture(film, |[u, v], film| {
+        let path = flow.at([u, v]).unwrap_or_default();
+        let at = Point2::new(u * w as f64, v * h as f64);
+        film.over_color(path.scaled(px_per_metre as f32).seen(&board, at))
     })
 }
 
-fn checkerboard([x, y]: [f64; 2]) -> LinearRgb {
-    let squares = (x / SQUARE_PX).floor() + (y / SQUARE_PX).floor();
-    LinearRgb::grey(CHECKER_GREYS[squares.rem_euclid(2.0) as usize])
+fn checkerboard(x: usize, y: usize) -> LinearRgb {
+    let squares = x / SQUARE_PX + y / SQUARE_PX;
+    LinearRgb::grey(CHECKER_GREYS[squares % 2])
 }
 
 /// A picture by texture coordinates and film.
@@ -90,32 +94,35 @@ fn over_texture(
 mod tests {
     use super::super::manifest::tests::photo;
     use super::*;
+    use crate::matte::LightPath;
     use std::sync::Arc;
 
     #[test]
     fn a_displacement_moves_what_is_seen_and_has_a_colour() {
         let film = Image::filled(64, 32, Film::new(LinearRgb::BLACK, LinearRgb::WHITE));
         // One square of the checkerboard to the right.
+        let bent = |displacement: [f32; 2]| LightPath {
+            displacement,
+            ..LightPath::default()
+        };
         let flow = Flow {
-            displacement: Image::filled(64, 32, [0.1, 0.0]),
+            paths: Image::filled(64, 32, bent([0.1, 0.0])),
             known: Image::filled(64, 32, true),
             width: 0.4,
             height: 0.01,
         };
         let still = bent_checkerboard(
             &Flow {
-                displacement: Image::filled(64, 32, [0.0; 2]),
+                paths: Image::filled(64, 32, bent([0.0; 2])),
                 ..flow.clone()
             },
             &film,
         );
         let bent = bent_checkerboard(&flow, &film);
-        assert!(
-            bent.pixels()
-                .iter()
-                .zip(still.pixels())
-                .all(|(a, b)| a != b)
-        );
+        // The board ends with the cut-out.
+        let (across, down) = (64 - SQUARE_PX, 32);
+        let places = (0..down).flat_map(|y| (0..across).map(move |x| (x, y)));
+        assert!(places.into_iter().all(|at| bent[at] != still[at]));
         let colors = flow_colors(&flow, &film);
         assert!(colors[(5, 5)].r > 0.9 && colors[(5, 5)].g < 0.1);
         let mut captured = Photo::new(film.clone(), photo("a.exr"));

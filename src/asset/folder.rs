@@ -82,18 +82,13 @@ impl CutOutWriter<'_> {
 
     /// Measures an object that was captured on a display.
     fn write_captured(&self, entry: &PhotoEntry, captured: &CaptureEntry) -> Result<Photo> {
-        let CapturedObject {
-            film,
-            flow,
-            modulation,
-            record,
-        } = captured_object(entry, captured, self.options)?;
+        let CapturedObject { film, flow, record } = captured_object(entry, captured, self.options)?;
         // A display shines through the object once: nothing of what is seen is its shadow.
         let passed = film.map(Film::transmittance);
         let film = self.write_film(&film, &passed, &record)?;
         let path = self.folder.join(files::flow_file(&record.file));
         let flow = flow
-            .map(|flow| flow_file::write(&path, &flow, &modulation))
+            .map(|flow| flow_file::write(&path, &flow))
             .transpose()?;
         Ok(Photo {
             flow: flow.map(Arc::new),

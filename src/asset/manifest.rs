@@ -117,16 +117,17 @@ pub struct CaptureRecord {
     pub flow: Option<String>,
     /// Height of the object's middle over the display, metres.
     pub height: f64,
-    /// Share of what is see-through where the refraction is known, 0 to 1.
+    /// Mean share of the light that is scattered where the object is see-through, 0 to 1; 0 without
+    /// stripes.
     #[serde(default)]
-    pub known: f64,
+    pub haze: f64,
 }
 
 impl CaptureRecord {
     /// What was measured and how well, one line.
     pub fn summary(&self) -> String {
         let refraction = match self.flow {
-            Some(_) => format!("refraction known on {:.0} %", 100.0 * self.known),
+            Some(_) => format!("refraction measured, haze {:.0} %", 100.0 * self.haze),
             None => "refraction not measured".into(),
         };
         format!(
@@ -137,7 +138,7 @@ impl CaptureRecord {
 
     fn check(&self) -> Result<()> {
         CONFIDENCE.check("transmittance_sigma", self.transmittance_sigma)?;
-        CONFIDENCE.check("known", self.known)?;
+        CONFIDENCE.check("haze", self.haze)?;
         THICKNESS.check("height", self.height)?;
         let flow = self.flow.as_ref();
         flow.map_or(Ok(()), |flow| io::below("flow", flow).map(drop))

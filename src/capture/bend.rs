@@ -1,43 +1,112 @@
-//! How far lines of sight are displaced, and where that is known.
+//! Where the light comes from that an object lets pass, and where that is known.
+//!
+//! # Method
+//! Stripes of a period tell one value of the optical transfer function of each pixel: what is left
+//! of their contrast, and by how much they are shifted. Light that goes through the object as
+//! through a clear sheet leaves the contrast of fine stripes; what folds and wrinkles scatter leaves
+//! none, but some of that of coarse ones. So what fine stripes keep is the share that stays sharp,
+//! their shift its displacement, and the rest of the coarse transfer tells middle and width of what
+//! is scattered, taken for a Gaussian.
 
 use super::display::Display;
-use super::stripes::SeenStripes;
+use super::stripes::{SeenStripes, Wave};
 use super::view::View;
 use crate::image::{Image, Mask};
+use crate::matte::LightPath;
 use crate::matte::median::median;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Complex, DMatrix, DVector};
+use std::f64::consts::{PI, TAU};
 
 /// The refraction of an object in the view.
 pub(super) struct Bend {
-    /// How far from where it would end without the object a line of sight ends, pixels of the
-    /// display; 0 where it is not known.
-    pub(super) displacement_px: Image<[f64; 2]>,
+    /// Lengths in pixels of the display; nothing bent where it is not known.
+    pub(super) paths: Image<LightPath>,
     pub(super) known: Mask,
-    /// Contrast of the stripes through the object, of what its transmittance leaves of it: less
-    /// where it scatters.
-    pub(super) modulation: Image<f32>,
     /// How far the empty display is from where it should be, root mean square, pixels of the
     /// display.
     pub(super) residual_px: f64,
 }
 
-/// Less contrast than this share of what is left by the transmittance says nothing.
-const MIN_MODULATION: f32 = 0.1;
-/// Nor does less than this share of the empty display's.
-const MIN_AMPLITUDE: f32 = 0.02;
-/// A displacement of more than this standard error, pixels of the view, is not known.
-const MAX_ERROR_PX: f64 = 1.0;
-/// A displacement that differs from the median around it by more than this share of a fine period
-/// is a wrong period.
-const MAX_JUMP: f64 = 0.5;
-/// Half width of what is around.
-const AROUND_PX: isize = 3;
+/// What lets pass less than this tells nothing of where the light comes from.
+const MIN_TRANSMITTANCE: f32 = 0.05;
+/// Less haze than this is noise.
+const MIN_HAZE: f64 = 0.03;
+/// What noise may add to the transfer at coarse stripes.
+const TRANSFER_NOISE: f64 = 0.05;
+/// The least and the most that coarse stripes are taken to leave of scattered light.
+const SCATTERED_TRANSFER: [f64; 2] = [0.01, 0.999];
+/// Fine periods to either side that a displacement is looked for in.
+const MAX_PERIODS: i32 = 4;
 /// Degree of the polynomial that corrects a lens.
 const DEGREE: usize = 3;
 /// Pixels between samples of that fit.
 const SAMPLE_STEP: usize = 6;
 /// Share of the fit's residuals that are dropped as outliers.
 const DROPPED_SHARE: f64 = 0.1;
+
+/// The optical transfer function of a pixel at two frequencies along each axis.
+#[derive(Clone, Copy)]
+struct Transfer {
+    coarse: [Complex<f64>; 2],
+    fine: [Complex<f64>; 2],
+    /// Periods of both, pixels of the display.
+    periods_px: [f64; 2],
+}
+
+impl Transfer {
+    fn path(&self) -> LightPath {
+        let sharp = mean_transfer(self.fine).min(1.0);
+        let haze = 1.0 - sharp;
+        let displacement = [0, 1].map(|axis| self.displacement(axis, sharp));
+        if haze < MIN_HAZE {
+            return LightPath {
+                displacement: displacement.map(|d| d as f32),
+                ..LightPath::default()
+            };
+        }
+        let [long, _] = self.periods_px;
+        let scattered = [0, 1]
+            .map(|axis| self.coarse[axis] - from_polar(sharp, displacement[axis] / long))
+            .map(|rest| rest / haze);
+        LightPath {
+            displacement: displacement.map(|d| d as f32),
+            haze: haze as f32,
+            scatter_displacement: scattered.map(|s| (long * s.arg() / TAU) as f32),
+            scatter_width: (long * width_of(mean_transfer(scattered))) as f32,
+        }
+    }
+
+    /// Displacement of the light that stays sharp: the least of those that fine stripes allow which
+    /// leaves coarse ones no more of scattered light than there is.
+    fn displacement(&self, axis: usize, sharp: f64) -> f64 {
+        let [long, short] = self.periods_px;
+        let phase = self.fine[axis].arg() / TAU;
+        let too_much = |d: f64| {
+            let rest = self.coarse[axis] - from_polar(sharp, d / long);
+            (rest.norm() - (1.0 - sharp) - TRANSFER_NOISE).max(0.0)
+        };
+        let cost = |d: f64| too_much(d) + 0.01 * d.abs() / short;
+        let places = (-MAX_PERIODS..=MAX_PERIODS).map(|k| short * (phase + f64::from(k)));
+        let least = places.min_by(|a, b| cost(*a).total_cmp(&cost(*b)));
+        least.unwrap_or_default()
+    }
+}
+
+/// What is left of contrast, by both axes.
+fn mean_transfer([x, y]: [Complex<f64>; 2]) -> f64 {
+    (x.norm() * y.norm()).sqrt()
+}
+
+fn from_polar(norm: f64, periods: f64) -> Complex<f64> {
+    let (sine, cosine) = libm::sincos(TAU * periods);
+    Complex::new(norm * cosine, norm * sine)
+}
+
+/// Standard deviation, in periods, of a Gaussian that leaves this much of contrast.
+fn width_of(transfer: f64) -> f64 {
+    let [least, most] = SCATTERED_TRANSFER;
+    (-0.5 * libm::log(transfer.clamp(least, most))).sqrt() / PI
+}
 
 /// What is known of the object and the display, beside the stripes.
 pub(super) struct BendInput<'a> {
@@ -57,31 +126,44 @@ pub(super) struct BendInput<'a> {
 impl BendInput<'_> {
     pub(super) fn solve(&self) -> Bend {
         let expected = self.expected();
-        let residual_px = self.residual_px(&expected);
-        let contrast = self.contrast();
-        let modulation = self.modulation(contrast);
-        let strong = self.strong(&modulation, contrast, residual_px);
-        let difference = self.seen.at_px.zip_map(&expected, difference);
-        let jump_px = MAX_JUMP * self.display.period_px(true);
-        let known = without_jumps(&difference, &strong, jump_px);
+        let known = self.transmittance.map(|v| v >= MIN_TRANSMITTANCE);
+        let contrasts = [0, 1].map(|period| [0, 1].map(|axis| self.contrast(period, axis)));
+        let (w, h) = known.size();
+        let paths = Image::from_fn(w, h, |x, y| {
+            if known[(x, y)] {
+                self.transfer((x, y), expected[(x, y)], &contrasts).path()
+            } else {
+                LightPath::default()
+            }
+        });
         Bend {
-            displacement_px: difference
-                .zip_map(&known, |d, known| if known { d } else { [0.0; 2] }),
+            paths,
             known,
-            modulation,
-            residual_px,
+            residual_px: self.residual_px(&expected),
         }
     }
 
-    /// Where the stripes are seen well enough.
-    fn strong(&self, modulation: &Image<f32>, contrast: f32, residual_px: f64) -> Mask {
-        let least = self.least_amplitude(residual_px);
-        let relative = self.seen.amplitude.zip_map(self.light, |a, light| {
-            a / (contrast * light).max(f32::MIN_POSITIVE)
-        });
-        modulation.zip3_map(&relative, &self.seen.consistent, |m, a, consistent| {
-            consistent && m >= MIN_MODULATION && a >= least
-        })
+    /// What the object leaves of stripes that have such contrasts without it, and that end where
+    /// expected.
+    fn transfer(
+        &self,
+        at: (usize, usize),
+        expected: [f64; 2],
+        contrasts: &[[f32; 2]; 2],
+    ) -> Transfer {
+        let periods_px = [false, true].map(|is_fine| self.display.period_px(is_fine));
+        let passed = self.transmittance[at] * self.light[at];
+        let of = |period: usize, axis: usize| {
+            let Wave { phase, amplitude } = self.seen.waves[period][axis][at];
+            let whole = (contrasts[period][axis] * passed).max(1e-4);
+            let norm = f64::from(amplitude / whole);
+            from_polar(norm, phase - expected[axis] / periods_px[period])
+        };
+        Transfer {
+            coarse: [of(0, 0), of(0, 1)],
+            fine: [of(1, 0), of(1, 1)],
+            periods_px,
+        }
     }
 
     /// Where lines of sight end without the object, pixels of the display.
@@ -163,36 +245,18 @@ impl BendInput<'_> {
         (sum / f64::max(count, 1.0)).sqrt()
     }
 
-    /// Amplitude of the fine stripes on the empty display, as a share of its light.
-    fn contrast(&self) -> f32 {
+    /// Amplitude of stripes on the empty display, as a share of its light.
+    fn contrast(&self, period: usize, axis: usize) -> f32 {
+        let waves = self.seen.waves[period][axis].pixels();
         let shares = self
             .free_pixels()
-            .map(|i| self.seen.amplitude.pixels()[i] / self.light.pixels()[i].max(1e-6));
+            .map(|i| waves[i].amplitude / self.light.pixels()[i].max(1e-6));
         median(shares, f32::total_cmp).unwrap_or(0.5)
-    }
-
-    fn modulation(&self, contrast: f32) -> Image<f32> {
-        let left = self
-            .transmittance
-            .zip_map(self.light, |v, light| contrast * v * light);
-        self.seen
-            .amplitude
-            .zip_map(&left, |a, left| (a / left.max(1e-4)).min(1.0))
-    }
-
-    /// The amplitude, as a share of the empty display's, at which a place is certain enough.
-    fn least_amplitude(&self, residual_px: f64) -> f32 {
-        let error_px = residual_px / self.view.display_px;
-        MIN_AMPLITUDE.max((error_px / MAX_ERROR_PX) as f32)
     }
 }
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-fn difference(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
-    [a[0] - b[0], a[1] - b[1]]
 }
 
 /// Coefficients of the basis that fit best; zeros where there are too few samples.
@@ -209,28 +273,75 @@ fn least_squares(samples: &[(Vec<f64>, f64)]) -> Vec<f64> {
     solution.map_or_else(|| vec![0.0; count], |s| s.iter().copied().collect())
 }
 
-/// The known pixels whose displacement is near the median around them.
-fn without_jumps(displacement: &Image<[f64; 2]>, known: &Mask, most: f64) -> Mask {
-    let (w, h) = known.size();
-    Image::from_fn(w, h, |x, y| {
-        known[(x, y)]
-            && [0, 1].iter().all(|&axis| {
-                let middle = median_around(displacement, known, (x, y), axis);
-                middle.is_some_and(|middle| (displacement[(x, y)][axis] - middle).abs() <= most)
-            })
-    })
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-fn median_around(
-    displacement: &Image<[f64; 2]>,
-    known: &Mask,
-    (x, y): (usize, usize),
-    axis: usize,
-) -> Option<f64> {
-    let around =
-        (-AROUND_PX..=AROUND_PX).flat_map(|j| (-AROUND_PX..=AROUND_PX).map(move |i| (i, j)));
-    let places = around.map(|(i, j)| (x as isize + i, y as isize + j));
-    let near = places.filter(|&(x, y)| known.nearest(x, y));
-    let values = near.map(|(x, y)| displacement.nearest(x, y)[axis]);
-    median(values, f64::total_cmp)
+    const PERIODS_PX: [f64; 2] = [160.0, 16.0];
+
+    /// What stripes show of light that comes along a path.
+    fn transfer_of(path: &LightPath) -> Transfer {
+        let (haze, width) = (f64::from(path.haze), f64::from(path.scatter_width));
+        let at = |period: f64, axis: usize| {
+            let gaussian = libm::exp(-2.0 * (PI * width / period).powi(2));
+            let [sharp, scattered] =
+                [path.displacement, path.scatter_displacement].map(|d| f64::from(d[axis]) / period);
+            from_polar(1.0 - haze, sharp) + from_polar(haze * gaussian, scattered)
+        };
+        let [coarse, fine] = PERIODS_PX.map(|period| [at(period, 0), at(period, 1)]);
+        Transfer {
+            coarse,
+            fine,
+            periods_px: PERIODS_PX,
+        }
+    }
+
+    fn assert_found(path: LightPath) {
+        let found = transfer_of(&path).path();
+        let lengths = |p: LightPath| {
+            let [x, y] = p.displacement;
+            let [sx, sy] = p.scatter_displacement;
+            [x, y, sx, sy, p.scatter_width]
+        };
+        let pairs = lengths(found).into_iter().zip(lengths(path));
+        assert!(
+            pairs.into_iter().all(|(a, b)| (a - b).abs() < 0.3),
+            "{found:?} of {path:?}"
+        );
+        assert!((found.haze - path.haze).abs() < 0.01, "{found:?}");
+    }
+
+    #[test]
+    fn stripes_tell_what_stays_sharp_and_what_is_scattered() {
+        let sharp = LightPath {
+            displacement: [3.0, -5.0],
+            ..LightPath::default()
+        };
+        assert_found(sharp);
+        // Farther than half a fine period.
+        let far = LightPath {
+            displacement: [21.0, -9.5],
+            ..sharp
+        };
+        assert_found(far);
+        for haze in [0.1, 0.5, 0.9] {
+            assert_found(LightPath {
+                haze,
+                scatter_displacement: [-12.0, 20.0],
+                scatter_width: 18.0,
+                ..sharp
+            });
+        }
+    }
+
+    #[test]
+    fn hardly_any_haze_is_none() {
+        let path = LightPath {
+            haze: 0.02,
+            scatter_width: 30.0,
+            ..LightPath::default()
+        };
+        let found = transfer_of(&path).path();
+        assert_eq!((found.haze, found.scatter_width), (0.0, 0.0));
+    }
 }

@@ -2,7 +2,6 @@
 
 use super::recognise::refused;
 use super::solve::BlackAndWhite;
-use super::stripes::SeenStripes;
 use super::view::grey;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::Result;
@@ -18,17 +17,19 @@ const MAX_CLIPPED: f64 = 0.001;
 /// From here on nothing can be measured.
 const REFUSED_CLIPPED: f64 = 0.05;
 
+/// Where a photo is clipped; nowhere in one that does not end at 1.
+pub(super) fn clipped(photo: &Image<LinearRgb>) -> Mask {
+    let values = photo.pixels().iter().map(|p| p.max_channel());
+    let is_limited = values.fold(0.0, f32::max) <= UNLIMITED;
+    photo.map(|p| is_limited && p.max_channel() >= CLIPPED)
+}
+
 /// # Errors
 /// [`Error::Photo`](crate::Error::Photo) where much of the white frame is clipped.
 pub(super) fn clipping(white: &Image<LinearRgb>, free: &Mask) -> Result<Option<Diagnostic>> {
-    let brightest = white
-        .pixels()
-        .iter()
-        .map(|p| p.max_channel())
-        .fold(0.0, f32::max);
-    let clipped = white.zip_map(free, |p, free| free && p.max_channel() >= CLIPPED);
+    let clipped = clipped(white).zip_map(free, |clipped, free| clipped && free);
     let share = clipped.count() as f64 / free.count().max(1) as f64;
-    if brightest > UNLIMITED || share <= MAX_CLIPPED {
+    if share <= MAX_CLIPPED {
         return Ok(None);
     }
     let what = format!(
@@ -141,11 +142,11 @@ const MAX_CHANGE: f64 = 0.05;
 /// changed: the mean of the stripes is half of white over black, wherever lines of sight end.
 pub(super) fn object_motion(
     frames: &BlackAndWhite<'_>,
-    seen: &SeenStripes,
+    stripes: &Image<f32>,
     coverage: &Image<Coverage>,
     free: &Mask,
 ) -> Option<Diagnostic> {
-    let change = change_of_stripes(frames, seen, coverage, free);
+    let change = change_of_stripes(frames, stripes, coverage, free);
     (change > MAX_CHANGE).then(|| {
         let what = format!(
             "inside the object the stripes are on average {:.1} % of white off black and white, expected at most {:.1} %: \
@@ -161,12 +162,12 @@ pub(super) fn object_motion(
 /// square, as a share of white.
 fn change_of_stripes(
     frames: &BlackAndWhite<'_>,
-    seen: &SeenStripes,
+    stripes: &Image<f32>,
     coverage: &Image<Coverage>,
     free: &Mask,
 ) -> f64 {
     let passed = frames.white.zip_map(frames.black, |w, k| grey(w) - grey(k));
-    let above = seen.mean.zip_map(frames.black, |mean, k| mean - grey(k));
+    let above = stripes.zip_map(frames.black, |mean, k| mean - grey(k));
     let share = ratio_where(&above, &passed, free);
     let light = frames
         .light()

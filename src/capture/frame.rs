@@ -28,7 +28,8 @@ pub struct Stripes {
 }
 
 impl Stripes {
-    const ALL: [Self; 4 * SHIFTS] = {
+    /// All of them, in the order in which they are shown.
+    pub(super) const ALL: [Self; 4 * SHIFTS] = {
         let mut all = [Self {
             axis: 0,
             is_fine: false,

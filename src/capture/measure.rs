@@ -6,7 +6,7 @@ use super::display::Display;
 use super::frame::Frame;
 use super::object::{Object, evidence};
 use super::recognise::{FramePhoto, refused};
-use super::solve::{BlackAndWhite, Noise};
+use super::solve::{BlackAndWhite, FilmInput, Noise};
 use super::stack::{Alignment, Photos, Stack};
 use super::stripes::SeenStripes;
 use super::view::{View, grey};
@@ -14,7 +14,7 @@ use crate::diagnostic::Diagnostic;
 use crate::error::Result;
 use crate::filter;
 use crate::image::{Image, Mask};
-use crate::matte::{Outline, PlateOptions, ScreenPlate};
+use crate::matte::{LightPath, Outline, PlateOptions, ScreenPlate};
 use crate::pixel::{Coverage, Film, LinearRgb};
 
 /// An object as it was measured, over the whole display seen from above.
@@ -39,13 +39,11 @@ pub struct Measured {
 
 /// How lines of sight through an object are bent.
 pub struct Refraction {
-    /// How far from where it would end without the object a line of sight ends on the display,
-    /// pixels of the display, right and down; 0 where it is not known.
-    pub displacement_px: Image<[f64; 2]>,
-    /// Where it was measured: on the object alone.
+    /// Where the light comes from that the object lets pass, lengths in pixels of the display;
+    /// nothing bent where it is not known.
+    pub paths: Image<LightPath>,
+    /// Where it was measured: on the object alone, and where it lets light pass.
     pub known: Mask,
-    /// What scattering leaves of the contrast of fine stripes, 0 to 1.
-    pub modulation: Image<f32>,
     /// How far the empty display is from where the fit has it, root mean square, pixels of the
     /// display.
     pub residual_px: f64,
@@ -144,11 +142,12 @@ impl<'a> Scene<'a> {
         diagnostics.extend(check::clipping(frames.white, &self.free)?);
         diagnostics.extend(check::bands(&frames, &self.free)?);
         diagnostics.extend(check::color_change(frames.empty_white, &self.free));
-        let film = frames.film(&self.kept());
+        let solved = self.film_input().solve(&self.kept());
+        let film = solved.film;
         let refraction = self.refraction(&film, &mut diagnostics);
         let light = frames.light();
         Ok(Measured {
-            sigma: frames.sigma(&film, &self.noise()),
+            sigma: solved.sigma,
             distinct: self.object.distinct,
             light: mean_where(&light, &self.free),
             unevenness: unevenness(&light, &self.free),
@@ -157,6 +156,15 @@ impl<'a> Scene<'a> {
             refraction,
             diagnostics,
         })
+    }
+
+    fn film_input(&self) -> FilmInput<'_> {
+        FilmInput {
+            frames: self.frames(),
+            stripes: &self.stack.stripes.mean,
+            noise: self.noise(),
+            free: &self.free,
+        }
     }
 
     /// That of the photos, and of those of the empty display.
@@ -188,15 +196,16 @@ impl<'a> Scene<'a> {
         diagnostics: &mut Vec<Diagnostic>,
     ) -> Option<Refraction> {
         let read = |stack: &Stack| {
-            let light = stack.stripes.as_ref()?;
-            Some(SeenStripes::read(light, self.display, self.view))
+            let stripes = &stack.stripes;
+            (!stripes.is_empty())
+                .then(|| SeenStripes::read(&stripes.light, self.display, self.view))
         };
         let seen = read(self.stack)?;
         let empty = self.empty_stack.and_then(read);
         let frames = self.frames();
         diagnostics.extend(check::object_motion(
             &frames,
-            &seen,
+            &self.stack.stripes.mean.map(grey),
             &self.object.coverage,
             &self.free,
         ));
@@ -223,11 +232,13 @@ impl Refraction {
     fn on_object(bend: Bend, coverage: &Image<Coverage>) -> Self {
         let known = bend.known.zip_map(coverage, |known, c| known && c.0 >= 0.5);
         Self {
-            displacement_px: bend
-                .displacement_px
-                .zip_map(&known, |d, known| if known { d } else { [0.0; 2] }),
+            paths: bend.paths.zip_map(
+                &known,
+                |path, known| {
+                    if known { path } else { LightPath::default() }
+                },
+            ),
             known,
-            modulation: bend.modulation,
             residual_px: bend.residual_px,
         }
     }

@@ -1,14 +1,19 @@
-//! Reflected light and transmittance from the black and the white frame.
+//! Reflected light and transmittance from the black and the white frame, and the stripes' mean.
 //!
 //! # Method
 //! [Smith and Blinn 1996] on a display that shines by itself: `I = F + V E` for both frames gives
 //! `V = (I_W - I_K) / (E_W - E_K)` and `F = I_K - V E_K` in every pixel and channel. What the light
 //! of the display does before it reaches the object plays no part, as it does on a painted screen.
+//! The mean of all stripes is one more frame, of little noise, wherever lines of sight end: the line
+//! through all of them is that of least squares, weighted by their noise.
 //!
 //! [Smith and Blinn 1996]: https://doi.org/10.1145/237170.237263
 
+use super::check::clipped;
+use crate::filter::{self, Pyramid, sample_bilinear_clamped};
 use crate::image::{Image, Mask};
-use crate::pixel::{Coverage, Film, LinearRgb, Mix};
+use crate::matte::median::median;
+use crate::pixel::{Coverage, Film, LinearRgb, Mix, PremulRgba};
 
 /// The two frames with the object and without.
 #[derive(Clone, Copy)]
@@ -23,54 +28,10 @@ pub(super) struct BlackAndWhite<'a> {
 const MIN_LIGHT: f32 = 1e-3;
 
 impl BlackAndWhite<'_> {
-    /// Film of the object; empty outside.
-    pub(super) fn film(&self, inside: &Image<Coverage>) -> Image<Film> {
-        let transmittance = self.transmittance();
-        let reflected = self
-            .black
-            .zip3_map(&transmittance, self.empty_black, |p, v, e| {
-                by_channel(p, v, e, |p, v, e| (p - v * e).max(0.0))
-            });
-        let film = reflected.zip_map(&transmittance, Film::new);
-        film.zip_map(inside, covered)
-    }
-
-    /// V, held between 0 and 1.
-    fn transmittance(&self) -> Image<LinearRgb> {
-        let passed = self.white.zip_map(self.black, |w, k| w.add_scaled(-1.0, k));
-        passed.zip_map(&self.light(), |passed, light| {
-            by_channel(passed, light, light, |passed, light, _| {
-                (passed / light.max(MIN_LIGHT)).clamp(0.0, 1.0)
-            })
-        })
-    }
-
     /// What the display shines more for white than for black.
     pub(super) fn light(&self) -> Image<LinearRgb> {
         self.empty_white
             .zip_map(self.empty_black, |w, k| w.add_scaled(-1.0, k))
-    }
-
-    /// Standard deviation of V in its least certain channel, where film is.
-    pub(super) fn sigma(&self, film: &Image<Film>, noise: &Noise) -> Image<f32> {
-        let light = self.light();
-        let noises = self
-            .white
-            .zip_map(self.black, |w, k| noise.of(w) + noise.of(k));
-        let sigma = film.zip3_map(&light, &noises, |film, light, variance| {
-            let v = film.transmittance();
-            by_channel(v, light, variance, |v, light, variance| {
-                let plate = v * v * noise.empty;
-                libm::sqrtf(variance + plate) / light.max(MIN_LIGHT)
-            })
-        });
-        sigma.zip_map(film, |sigma, film| {
-            if film == Film::default() {
-                0.0
-            } else {
-                sigma.max_channel().min(1.0)
-            }
-        })
     }
 
     /// How a photo's noise grows with light, by the free pixels of both frames.
@@ -85,6 +46,201 @@ impl BlackAndWhite<'_> {
             empty: 0.0,
         }
     }
+}
+
+/// All that is known of what an object lets pass.
+pub(super) struct FilmInput<'a> {
+    pub(super) frames: BlackAndWhite<'a>,
+    /// Mean of all stripes with the object; empty where there are none.
+    pub(super) stripes: &'a Image<LinearRgb>,
+    pub(super) noise: Noise,
+    /// Pixels that surely show the empty display.
+    pub(super) free: &'a Mask,
+}
+
+/// Film of an object, and the standard deviation of its transmittance in the least certain channel;
+/// both are empty outside.
+pub(super) struct SolvedFilm {
+    pub(super) film: Image<Film>,
+    pub(super) sigma: Image<f32>,
+}
+
+/// Light of a frame with the object over that without, and how certain it is.
+#[derive(Clone, Copy, Default)]
+struct Level {
+    empty: f32,
+    seen: f32,
+    /// Of its variance the inverse.
+    weight: f32,
+}
+
+/// The line `seen = F + V empty` through all levels.
+#[derive(Clone, Copy, Default)]
+struct Line {
+    middle: [f32; 2],
+    slope: f32,
+    /// Variance of the slope; infinite where one level is all there is.
+    variance: f32,
+}
+
+impl Line {
+    fn through(levels: [Level; 3]) -> Self {
+        let sum = |f: &dyn Fn(&Level) -> f32| levels.iter().map(|l| l.weight * f(l)).sum::<f32>();
+        let total = sum(&|_| 1.0).max(f32::MIN_POSITIVE);
+        let [x, y] = [sum(&|l| l.empty) / total, sum(&|l| l.seen) / total];
+        let spread = sum(&|l| (l.empty - x) * (l.empty - x));
+        let both = sum(&|l| (l.empty - x) * (l.seen - y));
+        Self {
+            middle: [x, y],
+            slope: (both / spread.max(f32::MIN_POSITIVE)).clamp(0.0, 1.0),
+            variance: spread.recip(),
+        }
+    }
+}
+
+/// Photos that the mean of the stripes is made of.
+const STRIPE_PHOTOS: f32 = 16.0;
+/// Pixels around a clipped one that it has a share in.
+const CLIPPED_RIM_PX: f64 = 1.0;
+
+impl FilmInput<'_> {
+    pub(super) fn solve(&self, inside: &Image<Coverage>) -> SolvedFilm {
+        let frames = &self.frames;
+        let clipped = filter::dilate(&clipped(frames.white), CLIPPED_RIM_PX);
+        let level = self.level_of_stripes();
+        let (w, h) = frames.black.size();
+        let lines = Image::from_fn(w, h, |x, y| self.lines((x, y), level, clipped[(x, y)]));
+        let transmittance = lines.map(|lines| LinearRgb::from(lines.map(|line| line.slope)));
+        let transmittance = filled(&transmittance, &clipped, inside);
+        let film = lines.zip3_map(&transmittance, inside, |lines, v, inside| {
+            let reflected = lines.map(|Line { middle: [x, y], .. }| (x, y));
+            let v = v.channels();
+            let reflected =
+                [0, 1, 2].map(|c: usize| (reflected[c].1 - v[c] * reflected[c].0).max(0.0));
+            covered(Film::new(reflected.into(), v.into()), inside)
+        });
+        let light = frames.light();
+        let sigma = lines.zip3_map(&film, &light, |lines, film, light| {
+            self.sigma(&lines, film, light)
+        });
+        SolvedFilm { film, sigma }
+    }
+
+    /// Of each channel.
+    fn lines(&self, at: (usize, usize), level: LinearRgb, clipped: bool) -> [Line; 3] {
+        let frames = &self.frames;
+        let [black, white] =
+            [frames.empty_black[at], frames.empty_white[at]].map(LinearRgb::channels);
+        let seen = [frames.black[at], frames.white[at]].map(LinearRgb::channels);
+        let stripes = (!self.stripes.is_empty()).then(|| self.stripes[at].channels());
+        let level = level.channels();
+        [0, 1, 2].map(|c: usize| {
+            let light = (white[c] - black[c]).max(MIN_LIGHT);
+            let weight = |seen: f32| {
+                if clipped {
+                    0.0
+                } else {
+                    self.noise.of(seen).recip()
+                }
+            };
+            let stripes = stripes.map_or(Level::default(), |stripes| Level {
+                empty: black[c] + level[c] * light,
+                seen: stripes[c],
+                weight: STRIPE_PHOTOS * weight(stripes[c]),
+            });
+            Line::through([
+                Level {
+                    empty: black[c],
+                    seen: seen[0][c],
+                    weight: self.noise.of(seen[0][c]).recip(),
+                },
+                Level {
+                    empty: black[c] + light,
+                    seen: seen[1][c],
+                    weight: weight(seen[1][c]),
+                },
+                stripes,
+            ])
+        })
+    }
+
+    /// The mean of the stripes on the empty display: 0 is black and 1 white.
+    fn level_of_stripes(&self) -> LinearRgb {
+        if self.stripes.is_empty() {
+            return LinearRgb::BLACK;
+        }
+        let (frames, light) = (&self.frames, self.frames.light());
+        let above = self
+            .stripes
+            .zip3_map(frames.empty_black, &light, |mean, black, light| {
+                by_channel(mean, black, light, |mean, black, light| {
+                    (mean - black) / light.max(MIN_LIGHT)
+                })
+            });
+        let of = |channel: usize| {
+            let free = above.pixels().iter().zip(self.free.pixels());
+            let values = free
+                .filter(|(_, free)| **free)
+                .map(|(p, _)| p.channels()[channel]);
+            median(values, f32::total_cmp).unwrap_or(0.5)
+        };
+        LinearRgb::from([0, 1, 2].map(of))
+    }
+
+    fn sigma(&self, lines: &[Line; 3], film: Film, light: LinearRgb) -> f32 {
+        if film == Film::default() {
+            return 0.0;
+        }
+        let (v, light) = (film.transmittance().channels(), light.channels());
+        let of = |c: usize| {
+            let plate = v[c] * v[c] * self.noise.empty / light[c].max(MIN_LIGHT).powi(2);
+            libm::sqrtf(lines[c].variance + plate)
+        };
+        [0, 1, 2].map(of).into_iter().fold(0.0, f32::max).min(1.0)
+    }
+}
+
+/// Glints that clip tell nothing of what passes under them: what is around them does.
+fn filled(
+    transmittance: &Image<LinearRgb>,
+    clipped: &Mask,
+    inside: &Image<Coverage>,
+) -> Image<LinearRgb> {
+    if clipped.count() == 0 {
+        return transmittance.clone();
+    }
+    let known = transmittance.zip3_map(clipped, inside, |v, clipped, inside| {
+        if clipped || inside.0 < 1.0 {
+            PremulRgba::default()
+        } else {
+            PremulRgba::new(v.r, v.g, v.b, 1.0)
+        }
+    });
+    let known = Pyramid::new(known);
+    let (w, h) = transmittance.size();
+    Image::from_fn(w, h, |x, y| {
+        if clipped[(x, y)] {
+            around(&known, [x, y])
+        } else {
+            transmittance[(x, y)]
+        }
+    })
+}
+
+/// Share of the pixels around that are to be known.
+const MIN_AROUND: f32 = 0.15;
+
+/// What is known around a pixel, as near as there is something.
+fn around(known: &Pyramid<PremulRgba>, [x, y]: [usize; 2]) -> LinearRgb {
+    let levels = (1..known.levels()).map(|level| {
+        let side = (1_u64 << level) as f64;
+        let [x, y] = [x, y].map(|i| (i as f64 + 0.5) / side);
+        sample_bilinear_clamped(known.level(level), x, y)
+    });
+    let mut levels = levels.filter(|p| p.a >= MIN_AROUND);
+    levels.next().map_or(LinearRgb::BLACK, |p| {
+        LinearRgb::new(p.r, p.g, p.b).scale(p.a.recip())
+    })
 }
 
 /// A film where an object is.
@@ -104,6 +260,9 @@ fn by_channel(
     LinearRgb::new(f(a.r, b.r, c.r), f(a.g, b.g, c.g), f(a.b, b.b, c.b))
 }
 
+/// Variance that no photo is better than: that of 12 bits.
+const MIN_VARIANCE: f32 = 5e-9;
+
 /// Variance of a pixel by its light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Noise {
@@ -114,8 +273,8 @@ pub(super) struct Noise {
 }
 
 impl Noise {
-    fn of(&self, light: LinearRgb) -> LinearRgb {
-        light.map(|v| self.dark + self.slope * v.max(0.0))
+    fn of(&self, light: f32) -> f32 {
+        (self.dark + self.slope * light.max(0.0)).max(MIN_VARIANCE)
     }
 
     /// Variance of white, as it is seen empty.
@@ -157,6 +316,21 @@ impl Spread {
 mod tests {
     use super::*;
 
+    fn solved(
+        frames: BlackAndWhite<'_>,
+        stripes: &Image<LinearRgb>,
+        free: &Mask,
+        inside: &Image<Coverage>,
+    ) -> SolvedFilm {
+        let input = FilmInput {
+            frames,
+            stripes,
+            noise: frames.noise(free),
+            free,
+        };
+        input.solve(inside)
+    }
+
     fn flat(v: f32) -> Image<LinearRgb> {
         Image::filled(8, 6, LinearRgb::new(v, 0.9 * v, 0.8 * v))
     }
@@ -177,7 +351,8 @@ mod tests {
             empty_white: &empty_white,
         };
         let inside = Image::from_fn(8, 6, |x, _| Coverage(if x < 4 { 1.0 } else { 0.0 }));
-        let film = frames.film(&inside);
+        let free = inside.map(|c| c.0 == 0.0);
+        let film = solved(frames, &Image::new(0, 0), &free, &inside).film;
         for (got, expected) in [(film[(2, 2)].color, f), (film[(2, 2)].transmittance(), v)] {
             let off = got.add_scaled(-1.0, expected).map(f32::abs).max_channel();
             assert!(off < 1e-5, "{got:?} for {expected:?}");
@@ -213,13 +388,14 @@ mod tests {
             empty_white: &empty_white,
         };
         let free = Image::filled(w, h, true);
-        let film = frames.film(&Image::filled(w, h, Coverage(1.0)));
+        let inside = Image::filled(w, h, Coverage(1.0));
+        let SolvedFilm { film, sigma } = solved(frames, &Image::new(0, 0), &free, &inside);
         let off = film
             .pixels()
             .iter()
             .map(|f| f64::from(f.transmittance().g - v).powi(2));
         let measured = (off.sum::<f64>() / (w * h) as f64).sqrt();
-        let stated = f64::from(frames.sigma(&film, &frames.noise(&free))[(50, 50)]);
+        let stated = f64::from(sigma[(50, 50)]);
         assert!(
             (stated / measured - 1.0).abs() < 0.15,
             "{stated} for {measured}"

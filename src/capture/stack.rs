@@ -8,7 +8,7 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
 use crate::geom::Homography;
 use crate::image::Image;
-use crate::pixel::LinearRgb;
+use crate::pixel::{LinearRgb, Mix};
 use rayon::prelude::*;
 
 /// Photos that are read when they are needed.
@@ -53,8 +53,32 @@ pub struct Photos<'a> {
 pub(super) struct Stack {
     pub(super) black: Image<LinearRgb>,
     pub(super) white: Image<LinearRgb>,
-    /// The four shifts of each stripes; nothing where some are missing.
-    pub(super) stripes: Option<StripeLight>,
+    /// Nothing where photos of some are missing.
+    pub(super) stripes: StripeStack,
+}
+
+/// What is seen of the stripes.
+#[derive(Default)]
+pub(super) struct StripeStack {
+    pub(super) light: StripeLight,
+    /// Mean of all of them.
+    pub(super) mean: Image<LinearRgb>,
+}
+
+impl StripeStack {
+    pub(super) fn is_empty(&self) -> bool {
+        self.mean.is_empty()
+    }
+
+    fn add(&mut self, stripes: Stripes, seen: &Image<LinearRgb>) {
+        if self.is_empty() {
+            self.mean = seen.map(|_| LinearRgb::BLACK);
+        }
+        let share = 1.0 / Stripes::ALL.len() as f32;
+        self.mean = self.mean.zip_map(seen, |sum, p| sum.add_scaled(share, p));
+        let axes = &mut self.light[usize::from(stripes.is_fine)];
+        axes[stripes.axis][stripes.shift] = seen.map(grey);
+    }
 }
 
 /// Grey light of the stripes, by period (coarse first) and axis, each with its four shifts.
@@ -141,43 +165,18 @@ impl<'a> Alignment<'a> {
     }
 
     /// The stripes, where there are photos of all of them.
-    fn stripes(&self, photos: &Photos<'_>) -> Result<Option<StripeLight>> {
+    fn stripes(&self, photos: &Photos<'_>) -> Result<StripeStack> {
+        let mut stack = StripeStack::default();
         if !photos.missing_stripes().is_empty() {
-            return Ok(None);
+            return Ok(stack);
         }
-        let light = |stripes| {
-            let seen = self.frame(photos, Frame::Stripes(stripes))?;
-            Ok(seen.map_or(Image::new(0, 0), |seen| seen.map(grey)))
-        };
-        let all = [false, true].map(|is_fine| {
-            [0, 1].map(|axis| {
-                [0, 1, 2, 3].map(|shift| {
-                    light(Stripes {
-                        axis,
-                        is_fine,
-                        shift,
-                    })
-                })
-            })
-        });
-        all_right(all).map(Some)
+        for stripes in Stripes::ALL {
+            if let Some(seen) = self.frame(photos, Frame::Stripes(stripes))? {
+                stack.add(stripes, &seen);
+            }
+        }
+        Ok(stack)
     }
-}
-
-/// All values, or the first error.
-fn all_right(all: [[[Result<Image<f32>>; SHIFTS]; 2]; 2]) -> Result<StripeLight> {
-    let mut failed = None;
-    let light = all.map(|axes| {
-        axes.map(|shifts| {
-            shifts.map(|light| {
-                light.unwrap_or_else(|error| {
-                    failed.get_or_insert(error);
-                    Image::new(0, 0)
-                })
-            })
-        })
-    });
-    failed.map_or(Ok(light), Err)
 }
 
 impl Photos<'_> {

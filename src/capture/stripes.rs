@@ -18,10 +18,8 @@ pub(super) struct SeenStripes {
     pub(super) at_px: Image<[f64; 2]>,
     /// Coarse and fine stripes agree about it, and it is on the display.
     pub(super) consistent: Mask,
-    /// Amplitude of the fine stripes, that of the axis where it is less.
-    pub(super) amplitude: Image<f32>,
-    /// Mean light of all stripes.
-    pub(super) mean: Image<f32>,
+    /// By period (coarse first) and axis.
+    pub(super) waves: [[Image<Wave>; 2]; 2],
 }
 
 /// Coarse and fine may differ by this share of a fine period.
@@ -29,10 +27,10 @@ const MAX_DISAGREEMENT: f64 = 0.35;
 
 /// A sinusoid at a pixel.
 #[derive(Clone, Copy, Debug, Default)]
-struct Wave {
+pub(super) struct Wave {
     /// Periods, 0 to 1.
-    phase: f64,
-    amplitude: f32,
+    pub(super) phase: f64,
+    pub(super) amplitude: f32,
 }
 
 impl Wave {
@@ -56,7 +54,11 @@ impl Wave {
 impl SeenStripes {
     /// Everywhere in a view.
     pub(super) fn read(light: &StripeLight, display: &Display, view: &View) -> Self {
-        let [x, y] = [0, 1].map(|axis| AxisWaves::read(light, axis, display, view));
+        let waves = light.each_ref().map(|axes| axes.each_ref().map(waves));
+        let [x, y] = [0, 1].map(|axis| {
+            let [coarse, fine] = [&waves[0][axis], &waves[1][axis]];
+            AxisPlaces::new(axis, coarse, fine, display, view)
+        });
         let [w, h] = display.size_px.map(f64::from);
         let at_px = x.place.zip_map(&y.place, |x, y| [x, y]);
         let on_display = at_px.map(|[x, y]| (0.0..w).contains(&x) && (0.0..h).contains(&y));
@@ -65,22 +67,25 @@ impl SeenStripes {
                 .consistent
                 .zip3_map(&y.consistent, &on_display, |x, y, on| x && y && on),
             at_px,
-            amplitude: x.fine.zip_map(&y.fine, f32::min),
-            mean: mean_light(light),
+            waves,
         }
     }
 }
 
-/// The stripes along one axis.
-struct AxisWaves {
+/// Where lines of sight end along one axis.
+struct AxisPlaces {
     place: Image<f64>,
     consistent: Mask,
-    fine: Image<f32>,
 }
 
-impl AxisWaves {
-    fn read(light: &StripeLight, axis: usize, display: &Display, view: &View) -> Self {
-        let [coarse, fine] = [0, 1].map(|period| waves(&light[period][axis]));
+impl AxisPlaces {
+    fn new(
+        axis: usize,
+        coarse: &Image<Wave>,
+        fine: &Image<Wave>,
+        display: &Display,
+        view: &View,
+    ) -> Self {
         let [long, short] = [false, true].map(|is_fine| display.period_px(is_fine));
         let (w, h) = fine.size();
         let places = Image::from_fn(w, h, |x, y| {
@@ -91,7 +96,6 @@ impl AxisWaves {
         Self {
             place: places.map(|(place, _)| place),
             consistent: places.map(|(_, consistent)| consistent),
-            fine: fine.map(|wave| wave.amplitude),
         }
     }
 }
@@ -101,15 +105,6 @@ fn waves([a, b, c, d]: &[Image<f32>; SHIFTS]) -> Image<Wave> {
     Image::from_fn(w, h, |x, y| {
         let at = (x, y);
         Wave::of([a[at], b[at], c[at], d[at]])
-    })
-}
-
-fn mean_light(light: &StripeLight) -> Image<f32> {
-    let all: Vec<_> = light.iter().flatten().flatten().collect();
-    let (w, h) = all[0].size();
-    let share = 1.0 / all.len() as f32;
-    Image::from_fn(w, h, |x, y| {
-        share * all.iter().map(|image| image[(x, y)]).sum::<f32>()
     })
 }
 

@@ -248,8 +248,9 @@ fn bend_errors(view: &View, measured: &Measured) -> [f64; 2] {
     let known = clear.iter().filter(|(pixel, _)| refraction.known[*pixel]);
     let mut errors: Vec<f64> = known
         .map(|(pixel, at)| {
-            let (got, expected) = (refraction.displacement_px[*pixel], displacement(*at));
-            libm::hypot(got[0] - expected[0], got[1] - expected[1]) / view.display_px
+            let (got, expected) = (refraction.paths[*pixel].displacement, displacement(*at));
+            let off = [0, 1].map(|axis| f64::from(got[axis]) - expected[axis]);
+            libm::hypot(off[0], off[1]) / view.display_px
         })
         .collect();
     errors.sort_by(f64::total_cmp);

@@ -1,5 +1,6 @@
 //! Values between pixels.
 
+use super::pyramid::Pyramid;
 use crate::image::Image;
 use crate::pixel::Mix;
 
@@ -60,6 +61,26 @@ pub(crate) fn sample_cubic_clamped<P: Mix>(image: &Image<P>, x: f64, y: f64) -> 
     sum
 }
 
+/// The value at `(x, y)` in pixels of a picture that a Gaussian of this standard deviation has
+/// blurred, going on outside as [`sample_bilinear_clamped`] does.
+///
+/// # Method
+/// Trilinear, as of textures ([Williams 1983]). Averages over squares of `s` pixels, read linearly,
+/// have a variance of `s^2 (1/12 + 1/6)`, so the level of `s = 2 sigma` is read.
+///
+/// [Williams 1983]: https://doi.org/10.1145/800059.801126
+pub(crate) fn sample_blurred<P: Mix>(picture: &Pyramid<P>, x: f64, y: f64, sigma_px: f64) -> P {
+    let level = libm::log2(2.0 * sigma_px).clamp(0.0, (picture.levels() - 1) as f64);
+    let lower = level as usize;
+    let at_level = |level: usize| {
+        let side = (1_u64 << level) as f64;
+        sample_bilinear_clamped(picture.level(level), x / side, y / side)
+    };
+    let share = (level - lower as f64) as f32;
+    let sharper = P::default().add_scaled(1.0 - share, at_level(lower));
+    sharper.add_scaled(share, at_level(lower + 1))
+}
+
 /// Weights of the pixel before a position, of the one at or just before it, and of the two after;
 /// `t` is how far it is beyond the second.
 #[inline(always)]
@@ -105,6 +126,7 @@ fn bilinear<P: Mix>(at: impl Fn(isize, isize) -> P, x: f64, y: f64) -> P {
 
 #[cfg(test)]
 mod tests {
+    use super::super::gaussian_blur;
     use super::*;
     use crate::pixel::ObjectId;
 
@@ -176,5 +198,26 @@ mod tests {
         assert_eq!(sample_nearest(&ids, 0.99, 0.5), Some(ObjectId(1)));
         assert_eq!(sample_nearest(&ids, 1.0, 0.5), Some(ObjectId(2)));
         assert_eq!(sample_nearest(&ids, 2.0, 0.5), None);
+    }
+
+    #[test]
+    fn a_blurred_reading_is_that_of_a_blurred_picture() {
+        let edge = Image::from_fn(128, 96, |x, y| if 2 * y > x { 0.8_f32 } else { 0.1 });
+        let pyramid = Pyramid::new(edge.clone());
+        for sigma in [1.0_f32, 2.7, 4.0, 9.0] {
+            let blurred = gaussian_blur(&edge, sigma);
+            let places = (0..25).map(|i| (52 + i, 48_usize));
+            let off = places.map(|(x, y)| {
+                let at = (x as f64 + 0.5, y as f64 + 0.5);
+                (sample_blurred(&pyramid, at.0, at.1, sigma.into()) - blurred[(x, y)]).abs()
+            });
+            let most = off.fold(0.0, f32::max);
+            assert!(most < 0.03, "{most} at {sigma}");
+        }
+        assert_eq!(sample_blurred(&pyramid, 30.5, 40.5, 0.0), edge[(30, 40)]);
+        assert_eq!(
+            sample_blurred(&Pyramid::<f32>::default(), 1.0, 1.0, 2.0),
+            0.0
+        );
     }
 }

@@ -53,7 +53,7 @@ pub use difference_key::{DifferenceKeyOptions, difference_key};
 pub use film::{ColorUncertainty, film_planes};
 pub use film::{FilmMatte, FilmOptions, film};
 #[doc(hidden)]
-pub use flow::Flow;
+pub use flow::{Flow, LightPath};
 #[doc(hidden)]
 pub use key::{KeyOptions, Keyed, Keying, Screen, key};
 #[doc(hidden)]

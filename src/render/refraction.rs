@@ -8,10 +8,10 @@
 
 use crate::camera::RadialDistortion;
 use crate::deep::{DeepImage, DeepSample};
-use crate::filter::sample_cubic_clamped;
+use crate::filter::{Pyramid, sample_blurred, sample_cubic_clamped};
 use crate::geom::{Point2, Point3, Vector3};
 use crate::image::Image;
-use crate::matte::Flow;
+use crate::matte::{Flow, LightPath};
 use crate::pixel::{LinearRgb, Mix, ObjectId};
 use crate::render::block::PixelBlock;
 use crate::render::view::{
@@ -175,15 +175,19 @@ impl<'a> BendingCard<'a> {
         })
     }
 
-    /// Displacement of the line of sight at a picture position, by the object's own height, along
-    /// the card and up it, metres.
-    fn displacement(&self, p: &Vector3<f64>) -> Option<[f64; 2]> {
+    /// Where the light comes from that is seen at a picture position, by the object's own height;
+    /// along the card and down it, metres.
+    fn path(&self, p: &Vector3<f64>) -> Option<LightPath> {
         let w = self.projected.w.dot(p);
         let [u, v] = self.on_card([self.projected.u.dot(p) / w, self.projected.v.dot(p) / w]);
         let turned = if self.mirrored { 1.0 - u } else { u };
-        let [right, down] = self.flow.at([turned, v])?.map(f64::from);
-        let along = if self.mirrored { -right } else { right };
-        Some([along * self.scale, -down * self.scale])
+        let path = self.flow.at([turned, v])?.scaled(self.scale as f32);
+        let along = |[right, down]: [f32; 2]| [if self.mirrored { -right } else { right }, down];
+        Some(LightPath {
+            displacement: along(path.displacement),
+            scatter_displacement: along(path.scatter_displacement),
+            ..path
+        })
     }
 
     /// Texture coordinates of the point of a curved card that is seen where the flat one is.
@@ -197,12 +201,16 @@ impl<'a> BendingCard<'a> {
         [seen.x / w + 0.5, 0.5 - seen.y / h]
     }
 
-    /// Where a line of sight ends that would end at a point, for a displacement.
-    fn end_of(&self, point: &Vector3<f64>, [along, up]: [f64; 2]) -> Vector3<f64> {
+    /// By how much displacements are larger at a point than on the display.
+    fn growth_at(&self, point: &Vector3<f64>) -> f64 {
         let distance = self.plane.normal.dot(&(point - self.plane.center)).abs();
-        let clearance = (distance - self.resting_height).max(0.0);
-        let growth = self.growth(clearance);
-        point + (self.plane.x * along + self.plane.y * up) * growth
+        self.growth((distance - self.resting_height).max(0.0))
+    }
+
+    /// This far along the card and down it.
+    fn along(&self, displacement: [f32; 2]) -> Vector3<f64> {
+        let [along, down] = displacement.map(f64::from);
+        self.plane.x * along - self.plane.y * down
     }
 
     /// By how much a displacement is larger over what is farther away than the display was.
@@ -212,14 +220,21 @@ impl<'a> BendingCard<'a> {
 
     /// The pixels that its lines of sight may end in.
     fn reached(&self, place: &CardPlace, view: &CameraView) -> PixelBlock {
-        let longest = self.flow.displacement.pixels().iter();
-        let longest = longest.fold(0.0_f64, |most, [x, y]| most.max(f64::from(x.hypot(*y))));
+        let paths = self.flow.paths.pixels().iter();
+        let longest = paths.fold(0.0_f64, |most, path| most.max(path.reach().into()));
         let highest = self.plane.corners().map(|corner| corner.z.abs());
         let height = highest.into_iter().fold(0.0, f64::max);
-        let focal_px = 1.0 / view.ray.column(0).norm();
-        let px_per_metre = focal_px / f64::from(place.nearest);
+        let px_per_metre = view.px_per_metre(place.nearest.into());
         let reach = longest * self.scale * self.growth(2.0 * height) * px_per_metre;
         place.block.grown(reach + READING_MARGIN_PX, view)
+    }
+}
+
+impl CameraView {
+    /// Pixels for a metre across the view at a depth.
+    fn px_per_metre(&self, depth: f64) -> f64 {
+        let focal_px = 1.0 / self.ray.column(0).norm();
+        focal_px / depth
     }
 }
 
@@ -236,7 +251,7 @@ impl PixelBlock {
 /// What lies behind a card: its light in a block, and how far away it is.
 struct Backdrop {
     block: PixelBlock,
-    light: Image<LinearRgb>,
+    light: Pyramid<LinearRgb>,
     deep: DeepImage,
 }
 
@@ -248,19 +263,32 @@ impl Backdrop {
         });
         Self {
             block: block.clone(),
-            light,
+            light: Pyramid::new(light),
             deep,
         }
     }
 
     /// At a picture position, between pixels as well.
     fn light_at(&self, at: Point2<f64>) -> LinearRgb {
-        let [x, y] = [&self.block.x, &self.block.y].map(|side| side.start as f64);
-        sample_cubic_clamped(&self.light, at.x - x, at.y - y).map(|v| v.max(0.0))
+        let [x, y] = self.in_block(at);
+        sample_cubic_clamped(self.light.base(), x, y).map(|v| v.max(0.0))
+    }
+
+    /// Mean around a picture position.
+    fn blurred_at(&self, at: Point2<f64>, sigma_px: f64) -> LinearRgb {
+        let [x, y] = self.in_block(at);
+        sample_blurred(&self.light, x, y, sigma_px)
+    }
+
+    fn in_block(&self, at: Point2<f64>) -> [f64; 2] {
+        [
+            at.x - self.block.x.start as f64,
+            at.y - self.block.y.start as f64,
+        ]
     }
 
     fn pixel(&self, x: usize, y: usize) -> LinearRgb {
-        self.light[(x - self.block.x.start, y - self.block.y.start)]
+        self.light.base()[(x - self.block.x.start, y - self.block.y.start)]
     }
 
     /// Mean depth at a pixel by how much is seen; `surface` is that of the surface.
@@ -277,6 +305,31 @@ impl Backdrop {
         };
         let total = hidden + rest;
         (total > 0.0).then(|| (near.sum::<f64>() + rest * surface.min(HORIZON_M)) / total)
+    }
+}
+
+/// Where a line of sight through a card ends straight on.
+struct Ending<'a> {
+    card: &'a BendingCard<'a>,
+    point: Vector3<f64>,
+    depth: f64,
+    /// Of displacements, over that on the display.
+    growth: f64,
+}
+
+impl<'a> Ending<'a> {
+    fn new(card: &'a BendingCard<'a>, point: Vector3<f64>, depth: f64) -> Self {
+        Self {
+            growth: card.growth_at(&point),
+            card,
+            point,
+            depth,
+        }
+    }
+
+    /// Where it ends with a displacement.
+    fn at(&self, displacement: [f32; 2]) -> Vector3<f64> {
+        self.point + self.card.along(displacement) * self.growth
     }
 }
 
@@ -333,17 +386,32 @@ impl<'a> Sight<'a> {
         let Some(depth) = backdrop.depth(x, y, surface) else {
             return LinearRgb::BLACK;
         };
-        let point = self.view.point_at(middle.x, middle.y, depth);
+        let ending = Ending::new(card, self.view.point_at(middle.x, middle.y, depth), depth);
         let straight = backdrop.pixel(x, y);
         let weight = 1.0 / (self.offsets.len() * self.offsets.len()) as f32;
-        let ends = self.sub_samples(at).filter_map(|p| {
-            let end = card.end_of(&point, card.displacement(&self.ideal(p))?);
-            self.seen_at(&end)
-        });
-        ends.fold(LinearRgb::BLACK, |sum, end| {
-            let change = backdrop.light_at(end).add_scaled(-1.0, straight);
-            sum.add_scaled(weight, change)
+        let seen = self
+            .sub_samples(at)
+            .filter_map(|p| self.seen_along(card.path(&self.ideal(p))?, &ending, backdrop));
+        seen.fold(LinearRgb::BLACK, |sum, seen| {
+            sum.add_scaled(weight, seen.add_scaled(-1.0, straight))
         })
+    }
+
+    /// The light that comes along a path; none where that is from behind the eye.
+    fn seen_along(
+        &self,
+        path: LightPath,
+        ending: &Ending<'_>,
+        backdrop: &Backdrop,
+    ) -> Option<LinearRgb> {
+        let sharp = backdrop.light_at(self.seen_at(&ending.at(path.displacement))?);
+        if path.haze <= 0.0 {
+            return Some(sharp);
+        }
+        let middle = self.seen_at(&ending.at(path.scatter_displacement))?;
+        let px_per_metre = self.view.px_per_metre(ending.depth);
+        let sigma_px = f64::from(path.scatter_width) * ending.growth * px_per_metre;
+        Some(path.mixed(sharp, backdrop.blurred_at(middle, sigma_px)))
     }
 
     fn sub_samples(&self, [x, y]: [usize; 2]) -> impl Iterator<Item = Point2<f64>> + '_ {

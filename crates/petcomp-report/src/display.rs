@@ -17,13 +17,14 @@ use crate::files::write_texts;
 use crate::statistics::mean_of;
 use method::SeenFilm;
 use petcomp::geom::Point2;
+use petcomp::matte::LightPath;
 use petcomp::plot::Table;
 use petcomp::{Coverage, Error, Image, LinearRgb, Result, io};
 use place::{BACKGROUNDS, Bottle, Place};
 use rayon::prelude::*;
 use shots::Stage;
 use std::path::Path;
-use window::Window;
+use window::{Surroundings, Window};
 
 /// A pixel of which more than this is the bottle's is inside.
 const INSIDE: f32 = 0.5;
@@ -106,8 +107,8 @@ struct Reality {
     window: Window,
     inside: Image<bool>,
     seen: Vec<Image<LinearRgb>>,
-    /// The backgrounds without the bottle, all of the view.
-    empty: Vec<Image<LinearRgb>>,
+    /// The backgrounds without the bottle.
+    empty: Vec<Surroundings>,
     /// True displacement; none where it is not one place, or not known.
     flow: Option<Image<Option<[f64; 2]>>>,
 }
@@ -122,7 +123,7 @@ impl Reality {
             inside: mask.map(|c| c.0 > INSIDE),
             seen: seen.into_iter().collect::<Result<_>>()?,
             empty: BACKGROUNDS
-                .map(|name| place.empty(name))
+                .map(|name| Ok(window.with_margin(place.empty(name)?)))
                 .into_iter()
                 .collect::<Result<_>>()?,
             flow: if bottle.with_stripes {
@@ -160,9 +161,8 @@ impl Reality {
     fn composite(&self, found: &SeenFilm, k: usize) -> Image<LinearRgb> {
         let (w, h) = self.window.size();
         Image::from_fn(w, h, |x, y| {
-            let [dx, dy] = found.flow[(x, y)].unwrap_or([0.0; 2]);
-            let at = Point2::new(x as f64 + 0.5 + dx, y as f64 + 0.5 + dy);
-            let behind = self.window.of_view(&self.empty[k], at);
+            let path = found.flow[(x, y)].unwrap_or_default();
+            let behind = self.empty[k].seen(path, x, y);
             let seen = found.film[(x, y)].over_color(behind);
             seen.map(|v| v.clamp(0.0, 1.0))
         })
@@ -185,10 +185,18 @@ impl Reality {
         };
         let pairs = found.flow.pixels().iter().zip(truth.pixels());
         pairs
-            .filter_map(|(found, truth)| Some(((*found)?, (*truth)?)))
-            .map(|(found, truth)| (found[0] - truth[0]).hypot(found[1] - truth[1]))
+            .filter_map(|(found, truth)| Some((found.filter(is_mostly_sharp)?, (*truth)?)))
+            .map(|(found, truth)| {
+                let off = [0, 1].map(|axis| f64::from(found.displacement[axis]) - truth[axis]);
+                off[0].hypot(off[1])
+            })
             .collect()
     }
+}
+
+/// Most of the light comes from one place.
+fn is_mostly_sharp(path: &LightPath) -> bool {
+    path.haze < 0.5
 }
 
 /// The nearest true displacement at every pixel of a window.

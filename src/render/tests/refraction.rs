@@ -2,10 +2,11 @@
 
 use super::definition::{above, card, pile, plate, same};
 use crate::composite;
+use crate::filter::gaussian_blur;
 use crate::geom::UnitQuaternion;
 use crate::image::Image;
 use crate::label::{LabelOptions, label};
-use crate::matte::Flow;
+use crate::matte::{Flow, LightPath};
 use crate::pixel::{LinearRgb, PremulRgba};
 use crate::render::{RenderOptions, render};
 use crate::scene::{Bend, Card, Refraction, Shot};
@@ -30,7 +31,14 @@ fn even_plate() -> Arc<Image<LinearRgb>> {
 
 fn flow(displacement: [f32; 2]) -> Option<Arc<Flow>> {
     Some(Arc::new(Flow {
-        displacement: Image::filled(4, 4, displacement),
+        paths: Image::filled(
+            4,
+            4,
+            LightPath {
+                displacement,
+                ..LightPath::default()
+            },
+        ),
         known: Image::filled(4, 4, true),
         width: 0.3,
         height: HEIGHT,
@@ -84,6 +92,32 @@ fn what_lies_behind_is_seen_where_lines_of_sight_end() {
     assert_shift([sheet(1, HEIGHT, [-0.03, 0.0])], -3.0);
     // A pixel down is worth half a pixel to the right; the surface's y points up the picture.
     assert_shift([sheet(1, HEIGHT, [0.0, 0.02])], 1.0);
+}
+
+#[test]
+fn haze_blurs_what_lies_behind() {
+    let edge = Image::from_fn(64, 48, |x, _| {
+        LinearRgb::grey(if x < 30 { 0.1 } else { 0.7 })
+    });
+    let mut hazy = sheet(1, HEIGHT, [0.0, 0.0]);
+    let path = LightPath {
+        haze: 0.5,
+        scatter_width: 0.03,
+        ..LightPath::default()
+    };
+    let flow = Flow {
+        paths: Image::filled(4, 4, path),
+        ..(*flow([0.0; 2]).unwrap()).clone()
+    };
+    hazy.refraction.flows[0] = Some(Arc::new(flow));
+    let shot = shot([hazy]).with_plate(Arc::new(edge.clone()));
+    let seen = composite::picture(&shot, &RenderOptions::default());
+    let blurred = gaussian_blur(&edge, 3.0);
+    for x in 20..40 {
+        let half = 0.5 * (edge[(x, 24)].g + blurred[(x, 24)].g) * PASSES as f32;
+        let found = seen[(x, 24)].g;
+        assert!((found - half).abs() < 0.02, "{x}: {found}, expected {half}");
+    }
 }
 
 #[test]

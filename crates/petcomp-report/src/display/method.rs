@@ -4,6 +4,7 @@ use super::place::{Bottle, Place};
 use super::shots::Stage;
 use super::window::Window;
 use crate::matte::MattingMethod;
+use petcomp::matte::LightPath;
 use petcomp::{Film, Image, Result};
 
 /// A way to photograph and cut out a bottle.
@@ -68,8 +69,8 @@ impl DisplayMethod {
 /// An object seen straight from above, a pixel for each of the display's.
 pub(super) struct SeenFilm {
     pub(super) film: Image<Film>,
-    /// How far lines of sight are displaced, pixels of the display; none where that is not known.
-    pub(super) flow: Image<Option<[f64; 2]>>,
+    /// Where the light comes from, pixels of the display; none where that is not known.
+    pub(super) flow: Image<Option<LightPath>>,
 }
 
 fn on_paint(method: MattingMethod, place: &Place, bottle: &Bottle) -> Result<SeenFilm> {
@@ -106,8 +107,8 @@ fn on_display(
     let flow = match &measured.refraction {
         Some(bent) => {
             let known = bent.known.crop(roi);
-            let moved = bent.displacement_px.crop(roi);
-            moved.zip_map(&known, |d, known| known.then_some(d))
+            let paths = bent.paths.crop(roi);
+            paths.zip_map(&known, |path, known| known.then_some(path))
         }
         None => Image::filled(roi.width, roi.height, None),
     };

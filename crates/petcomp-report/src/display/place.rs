@@ -18,6 +18,8 @@ pub(super) struct Place {
     #[serde(skip)]
     folder: PathBuf,
     light: String,
+    /// Width and height of photos.
+    pub(super) view_px: [usize; 2],
     /// Width and height of the pictures that the display shows.
     pub(super) display_px: [u32; 2],
     /// Width and height of the display, metres.

@@ -2,12 +2,11 @@
 
 use super::place::{Bottle, Place};
 use nalgebra::Matrix3;
-use petcomp::Mix;
-use petcomp::Roi;
 use petcomp::camera::warp;
 use petcomp::filter::Pyramid;
 use petcomp::geom::{Homography, Point2};
-use petcomp::{Image, LinearRgb};
+use petcomp::matte::LightPath;
+use petcomp::{Image, LinearRgb, Mix, Roi};
 
 /// Pixels of the display, a whole number from its upper left corner.
 pub(super) struct Window {
@@ -16,6 +15,8 @@ pub(super) struct Window {
     photo_from_window: Homography,
     /// From pixels of the window to those of the view.
     view_from_window: Homography,
+    /// Pixels of the view around the window, on its nearest side.
+    margin_px: usize,
 }
 
 fn moved_by(x: f64, y: f64) -> Matrix3<f64> {
@@ -25,6 +26,7 @@ fn moved_by(x: f64, y: f64) -> Matrix3<f64> {
 impl Window {
     pub(super) fn of(place: &Place, bottle: &Bottle) -> Self {
         let [x0, y0, x1, y1] = bottle.crop_px;
+        let [w, h] = place.view_px;
         let corner = place
             .display_from_photo()
             .map(Point2::new(x0 as f64, y0 as f64));
@@ -40,6 +42,7 @@ impl Window {
             },
             photo_from_window: Homography(moved_by(-(x0 as f64), -(y0 as f64)) * to_view),
             view_from_window: Homography(to_view),
+            margin_px: x0.min(y0).min(w - x1).min(h - y1).saturating_sub(2),
         }
     }
 
@@ -62,18 +65,35 @@ impl Window {
         self.photo_from_window.map(at)
     }
 
-    /// A picture of the whole view at a place of the window, between pixels.
-    pub(super) fn of_view(&self, view: &Image<LinearRgb>, at: Point2<f64>) -> LinearRgb {
-        bilinear(view, self.view_from_window.map(at))
+    /// A picture of the whole view, with what it shows around the window.
+    pub(super) fn with_margin(&self, view: Image<LinearRgb>) -> Surroundings {
+        let (w, h) = self.size();
+        let margin = self.margin_px;
+        let from_margin = moved_by(-(margin as f64), -(margin as f64));
+        let view_from_margin = Homography(self.view_from_window.0 * from_margin);
+        let picture = warp(
+            &Pyramid::new(view),
+            &view_from_margin,
+            w + 2 * margin,
+            h + 2 * margin,
+        );
+        Surroundings {
+            picture: Pyramid::new(picture),
+            margin_px: margin,
+        }
     }
 }
 
-fn bilinear(image: &Image<LinearRgb>, at: Point2<f64>) -> LinearRgb {
-    let [x, y] = [at.x - 0.5, at.y - 0.5];
-    let corners = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)];
-    corners.into_iter().fold(LinearRgb::BLACK, |sum, (dx, dy)| {
-        let (i, j) = (x.floor() + dx, y.floor() + dy);
-        let weight = (1.0 - (x - i).abs()) * (1.0 - (y - j).abs());
-        sum.add_scaled(weight as f32, image.nearest(i as isize, j as isize))
-    })
+/// What is in a window and around it.
+pub(super) struct Surroundings {
+    picture: Pyramid<LinearRgb>,
+    margin_px: usize,
+}
+
+impl Surroundings {
+    /// What is seen along a path from a pixel of the window.
+    pub(super) fn seen(&self, path: LightPath, x: usize, y: usize) -> LinearRgb {
+        let [x, y] = [x, y].map(|i| (i + self.margin_px) as f64 + 0.5);
+        path.seen(&self.picture, Point2::new(x, y))
+    }
 }
