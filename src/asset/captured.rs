@@ -233,7 +233,7 @@ impl<'a> Placed<'a> {
     fn object(&self, measured: &Measured, trim: &Trim, photos: usize) -> CapturedObject {
         let film = trim.cropped(&measured.film);
         let flow = self.flow(measured, trim, &film);
-        let captured = self.capture_record(measured, &film, flow.as_ref(), photos);
+        let captured = self.capture_record(measured, flow.as_ref(), photos);
         let record = self.record(measured, trim, &film, captured);
         CapturedObject { film, flow, record }
     }
@@ -302,7 +302,6 @@ impl<'a> Placed<'a> {
     fn capture_record(
         &self,
         measured: &Measured,
-        film: &Image<Film>,
         flow: Option<&Flow>,
         photos: usize,
     ) -> CaptureRecord {

@@ -2,27 +2,16 @@
 
 use super::recognise::refused;
 use super::solve::BlackAndWhite;
-use super::view::grey;
+use super::view::{clipped, grey};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::Result;
 use crate::image::{Image, Mask};
 use crate::pixel::{Coverage, LinearRgb};
 
-/// A channel from here on is clipped, in photos that end at 1.
-const CLIPPED: f32 = 0.985;
-/// Pictures that are brighter than this somewhere do not end at 1.
-const UNLIMITED: f32 = 1.05;
 /// Share of the display that may be clipped: glints.
 const MAX_CLIPPED: f64 = 0.001;
 /// From here on nothing can be measured.
 const REFUSED_CLIPPED: f64 = 0.05;
-
-/// Where a photo is clipped; nowhere in one that does not end at 1.
-pub(super) fn clipped(photo: &Image<LinearRgb>) -> Mask {
-    let values = photo.pixels().iter().map(|p| p.max_channel());
-    let is_limited = values.fold(0.0, f32::max) <= UNLIMITED;
-    photo.map(|p| is_limited && p.max_channel() >= CLIPPED)
-}
 
 /// # Errors
 /// [`Error::Photo`](crate::Error::Photo) where much of the white frame is clipped.

@@ -9,7 +9,7 @@
 //!
 //! [Smith and Blinn 1996]: https://doi.org/10.1145/237170.237263
 
-use super::check::clipped;
+use super::view::clipped;
 use crate::filter::{self, Pyramid, sample_bilinear_clamped};
 use crate::image::{Image, Mask};
 use crate::matte::median::median;

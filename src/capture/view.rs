@@ -5,7 +5,7 @@ use super::recognise::FramePhoto;
 use crate::camera::warp;
 use crate::filter::Pyramid;
 use crate::geom::{Homography, Point2};
-use crate::image::Image;
+use crate::image::{Image, Mask};
 use crate::pixel::{LinearRgb, Mix};
 use nalgebra::{Matrix3, Vector3};
 
@@ -62,7 +62,7 @@ impl View {
     }
 
     /// The pixels that show nothing but what a frame draws outside of its markers.
-    pub(super) fn free_area(&self, display: &Display) -> Image<bool> {
+    pub(super) fn free_area(&self, display: &Display) -> Mask {
         let [w, h] = display.size_px.map(f64::from);
         let margin = display.cell_px() as f64;
         let papers = display.markers().map(|marker| marker.paper_corners_px());
@@ -82,4 +82,16 @@ impl View {
 #[inline]
 pub(super) fn grey(light: LinearRgb) -> f32 {
     (light.r + light.g + light.b) / 3.0
+}
+
+/// A channel from here on is clipped, in photos that end at 1.
+const CLIPPED: f32 = 0.985;
+/// Pictures that are brighter than this somewhere do not end at 1.
+const UNLIMITED: f32 = 1.05;
+
+/// Where a photo is clipped; nowhere in one that does not end at 1.
+pub(super) fn clipped(photo: &Image<LinearRgb>) -> Mask {
+    let values = photo.pixels().iter().map(|p| p.max_channel());
+    let is_limited = values.fold(0.0, f32::max) <= UNLIMITED;
+    photo.map(|p| is_limited && p.max_channel() >= CLIPPED)
 }
