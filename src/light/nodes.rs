@@ -38,13 +38,13 @@ pub(crate) fn geometry_term(
 /// Sample points of a light, `per_side` (at least 1) along each side.
 ///
 /// # Method
-/// Rectangle: product of two Gauss-Legendre rules. Ellipse: Gauss-Legendre in the squared radius,
-/// twice as many equal steps in angle, every ring turned by half a step against the one before.
+/// Rectangle: product of two Gauss-Legendre rules. Ellipse: the rings of Shirley and Chiu's
+/// concentric map of a square of points, each for the same area, at radii that give the disk its
+/// second moment.
 pub fn nodes(light: &AreaLight, per_side: usize) -> Vec<Node> {
-    let rule = gauss_legendre(per_side.max(1));
     match light.shape {
-        LightShape::Rectangle => rectangle_nodes(light, &rule),
-        LightShape::Ellipse => ellipse_nodes(light, &rule),
+        LightShape::Rectangle => rectangle_nodes(light, &gauss_legendre(per_side.max(1))),
+        LightShape::Ellipse => ellipse_nodes(light, per_side.max(1)),
     }
 }
 
@@ -65,24 +65,45 @@ fn half_sides(light: &AreaLight) -> [f64; 2] {
     side_lengths(light).map(|side| 0.5 * side)
 }
 
-fn ellipse_nodes(light: &AreaLight, rule: &[(f64, f64)]) -> Vec<Node> {
+fn ellipse_nodes(light: &AreaLight, per_side: usize) -> Vec<Node> {
     let (frame, area) = (frame(light), face_area(light));
     let half = half_sides(light);
-    let steps = 2 * rule.len();
-    let mut nodes = Vec::with_capacity(steps * rule.len());
-    for (k, &(x, w)) in rule.iter().enumerate() {
-        let [a, b] = half.map(|half| (0.5 + 0.5 * x).sqrt() * half);
-        nodes.extend(ring_directions(steps, k).map(|(sin, cos)| Node {
-            point: frame.point(a * cos, b * sin),
-            area: area * 0.5 * w / steps as f64,
-        }));
-    }
-    nodes
+    let count = (per_side * per_side) as f64;
+    let disk = disk_points(per_side).map(|[x, y]| Node {
+        point: frame.point(x * half[0], y * half[1]),
+        area: area / count,
+    });
+    disk.collect()
 }
 
-/// Sines and cosines of equal steps around ring `k`; odd rings are turned by half a step.
-fn ring_directions(steps: usize, k: usize) -> impl Iterator<Item = (f64, f64)> {
-    (0..steps).map(move |i| libm::sincos(TAU * (i as f64 + 0.5 * (k % 2) as f64) / steps as f64))
+/// The `n` x `n` points of a unit disk that stand for equal areas.
+fn disk_points(n: usize) -> impl Iterator<Item = [f64; 2]> {
+    let squares = (2 - n % 2..=n).step_by(2);
+    squares.flat_map(move |side| ring_points(side, n))
+}
+
+/// The points of an `n` x `n` square that lie on the boundary of the middle one of this side, laid
+/// around a ring.
+fn ring_points(side: usize, n: usize) -> impl Iterator<Item = [f64; 2]> {
+    let inner = side.saturating_sub(2).pow(2);
+    let count = side * side - inner;
+    let radius = ring_radius(inner + side * side, n);
+    let turned = 0.5 * (side / 2 % 2) as f64;
+    (0..count).map(move |i| {
+        let (sin, cos) = libm::sincos(TAU * (i as f64 + turned) / count as f64);
+        [radius * cos, radius * sin]
+    })
+}
+
+/// The radius of the mean square of a ring between two shares of a disk, of which `2 n^2` are all;
+/// none in the middle, and the others as much farther out as that takes away.
+fn ring_radius(shares: usize, n: usize) -> f64 {
+    if shares == 1 {
+        return 0.0;
+    }
+    let count = (n * n) as f64;
+    let middle = if n % 2 == 1 { 1.0 / (count * count) } else { 0.0 };
+    (shares as f64 / (2.0 * count * (1.0 - middle))).sqrt()
 }
 
 /// Sample points of the part of a light that is above the plane through `point` with unit `normal`:

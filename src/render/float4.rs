@@ -1,6 +1,7 @@
 //! Four numbers that are worked on together, as one vector register.
 
 use crate::pixel::{LinearRgb, PremulRgba};
+use crate::render::float8::Float8;
 use bytemuck::{Pod, Zeroable};
 
 /// Numbers between which others lie.
@@ -83,6 +84,11 @@ impl Float4 {
         Self(self.0.map(|v| v.max(0.0).min(1.0)))
     }
 
+    #[inline(always)]
+    fn beside(self, o: Self) -> Float8 {
+        Float8::new(self, o)
+    }
+
     /// The same with another fourth number.
     #[inline(always)]
     pub(super) fn with_fourth(self, fourth: f32) -> Self {
@@ -91,6 +97,13 @@ impl Float4 {
 }
 
 impl Blend for Float4 {
+    /// Both columns at once, then between them.
+    #[inline(always)]
+    fn bilinear(top: [Self; 2], bottom: [Self; 2], fx: f32, fy: f32) -> Self {
+        let columns = top[0].beside(top[1]).lerp(bottom[0].beside(bottom[1]), fy);
+        columns.color().lerp(columns.opacity(), fx)
+    }
+
     #[inline(always)]
     fn lerp(self, o: Self, t: f32) -> Self {
         Self(std::array::from_fn(|i| {

@@ -21,32 +21,55 @@ pub(super) fn row_span(sides: &[Vector3<f64>], y: f64) -> (f64, f64) {
     (low, high)
 }
 
+/// Most sides of a [`ConvexShape`]: an octagon's, and two planes that cut it.
+const MAX_SIDES: usize = 10;
+
 /// A convex shape, ready to be asked for its rows.
 #[derive(Clone, Debug)]
 pub(super) struct ConvexShape {
     /// Lines `x = a y + b` that it lies to the right of, then those that it lies to the left of,
     /// then conditions `a y + b >= 0` on whole rows.
-    lines: Vec<[f64; 2]>,
-    /// Where the second and the third of these begin.
-    starts: [usize; 2],
+    lines: [[f64; 2]; MAX_SIDES],
+    /// Where each of these ends.
+    ends: [u8; 3],
 }
 
 impl ConvexShape {
-    /// Where all conditions on `(x, y, 1)` hold.
+    /// Where all conditions on `(x, y, 1)` hold, at most [`MAX_SIDES`] of them.
     pub(super) fn new(sides: &[Vector3<f64>]) -> Self {
-        let bounding = |sign: f64| {
-            let facing = sides.iter().filter(move |side| sign * side.x > 0.0);
-            facing.map(|side| [-side.y / side.x, -side.z / side.x])
+        let mut shape = Self {
+            lines: [[0.0; 2]; MAX_SIDES],
+            ends: [0; 3],
         };
-        let level = sides.iter().filter(|side| side.x == 0.0);
-        let left = bounding(1.0).count();
-        Self {
-            lines: bounding(1.0)
-                .chain(bounding(-1.0))
-                .chain(level.map(|side| [side.y, side.z]))
-                .collect(),
-            starts: [left, left + bounding(-1.0).count()],
-        }
+        shape.add_lines(0, sides, |side| (side.x > 0.0).then(|| crossing(side)));
+        shape.add_lines(1, sides, |side| (side.x < 0.0).then(|| crossing(side)));
+        shape.add_lines(2, sides, |side| (side.x == 0.0).then_some([side.y, side.z]));
+        shape
+    }
+
+    /// Adds the lines of one kind, after those of the kinds before.
+    fn add_lines(
+        &mut self,
+        kind: usize,
+        sides: &[Vector3<f64>],
+        line: impl Fn(&Vector3<f64>) -> Option<[f64; 2]>,
+    ) {
+        let start = kind.checked_sub(1).map_or(0, |before| self.ends[before]);
+        let free = &mut self.lines[usize::from(start)..];
+        let lines = free.iter_mut().zip(sides.iter().filter_map(line));
+        let count = lines.map(|(place, line)| *place = line).count();
+        self.ends[kind] = start + count as u8;
+    }
+
+    /// Lines that it lies to the right of, to the left of, and conditions on whole rows.
+    #[inline(always)]
+    fn kinds(&self) -> [&[[f64; 2]]; 3] {
+        let [right, left, level] = self.ends.map(usize::from);
+        [
+            &self.lines[..right],
+            &self.lines[right..left],
+            &self.lines[left..level],
+        ]
     }
 
     /// The nodes of row `j` of a lattice inside of it.
@@ -55,20 +78,57 @@ impl ConvexShape {
         integer_range(low, high, within)
     }
 
+    /// Left and right ends of `N` rows from row `first` on; reversed where a row has nothing.
+    pub(super) fn row_spans<const N: usize>(&self, first: usize) -> ([f64; N], [f64; N]) {
+        let (mut lows, mut highs) = ([f64::NEG_INFINITY; N], [f64::INFINITY; N]);
+        let at = |[a, b]: [f64; 2], k: usize| a * (first + k) as f64 + b;
+        let [rights, lefts, levels] = self.kinds();
+        for &line in rights {
+            for (k, low) in lows.iter_mut().enumerate() {
+                *low = greater(at(line, k), *low);
+            }
+        }
+        for &line in lefts {
+            for (k, high) in highs.iter_mut().enumerate() {
+                *high = -greater(-at(line, k), -*high);
+            }
+        }
+        for &line in levels {
+            for (k, high) in highs.iter_mut().enumerate() {
+                *high = if at(line, k) < 0.0 {
+                    f64::NEG_INFINITY
+                } else {
+                    *high
+                };
+            }
+        }
+        (lows, highs)
+    }
+
     /// As the function [`row_span`].
     pub(super) fn row_span(&self, y: f64) -> (f64, f64) {
         let at = |[a, b]: &[f64; 2]| a * y + b;
-        let [right, level] = self.starts;
-        if self.lines[level..].iter().any(|line| at(line) < 0.0) {
+        let [rights, lefts, levels] = self.kinds();
+        if levels.iter().any(|line| at(line) < 0.0) {
             return (f64::INFINITY, f64::NEG_INFINITY);
         }
-        let lows = self.lines[..right].iter().map(at);
-        let highs = self.lines[right..level].iter().map(at);
+        let (lows, highs) = (rights.iter().map(at), lefts.iter().map(at));
         (
-            lows.fold(f64::NEG_INFINITY, |m, x| if x > m { x } else { m }),
-            highs.fold(f64::INFINITY, |m, x| if x < m { x } else { m }),
+            lows.fold(f64::NEG_INFINITY, |m, x| greater(x, m)),
+            highs.fold(f64::INFINITY, |m, x| -greater(-x, -m)),
         )
     }
+}
+
+/// Where the boundary of a condition crosses row `y`, as `a y + b`.
+#[inline(always)]
+fn crossing(side: &Vector3<f64>) -> [f64; 2] {
+    [-side.y / side.x, -side.z / side.x]
+}
+
+#[inline(always)]
+fn greater(x: f64, than: f64) -> f64 {
+    if x > than { x } else { than }
 }
 
 /// The nodes of row `j` of a lattice inside all sides.

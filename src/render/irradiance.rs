@@ -1,15 +1,12 @@
 //! Irradiance of each receiver at the nodes of the lattice, to be looked up between them.
 
 use crate::render::float4::{Blend, Float4};
-use crate::render::lattice::{LatticePosition, coarser_nodes};
+use crate::render::lattice::{LatticePosition, coarser_position};
 use crate::render::ranges::{range_overlap, ranges_meet};
-use crate::render::receiver::{BandBuffers, Receiver, ReceiverIrradiance, RowSums};
+use crate::render::receiver::{BAND_ROWS, BandBuffers, Receiver, ReceiverIrradiance, RowSums};
 use crate::render::refill;
 use rayon::prelude::*;
 use std::ops::Range;
-
-/// Rows of nodes that one task computes.
-const BAND_ROWS: usize = 16;
 
 /// Values at the nodes of a part of a lattice.
 #[derive(Debug)]
@@ -154,13 +151,13 @@ fn remaining(relative: bool, open: &Float4, hidden: &Float4) -> Float4 {
     }
 }
 
-/// The value of a coarser row at the `i`-th node from `start`; the row begins at the node around
+/// The value of a coarser row at the `i`-th node from `start`; the row begins at the node before
 /// `start`.
 #[inline(always)]
 fn between_coarse(coarse: &[Float4], start: usize, i: usize) -> Float4 {
-    let first = coarser_nodes(start)[0];
-    let [a, b] = coarser_nodes(start + i).map(|n| coarse[n - first]);
-    a.lerp(b, 0.5)
+    let first = coarser_position(start).0;
+    let (node, way) = coarser_position(start + i);
+    coarse[node - first].lerp(coarse[node + 1 - first], way)
 }
 
 /// What is left of open irradiance.
@@ -215,19 +212,18 @@ impl IrradianceMap {
     /// The row of this coarser map that belongs to row `j` of a finer one, at all nodes around
     /// `requested`; 0 outside.
     fn enlarge_row(&self, j: usize, requested: &Range<usize>, out: &mut Vec<Float4>) {
-        let (first, last) = (
-            coarser_nodes(requested.start)[0],
-            coarser_nodes(requested.end)[1],
-        );
+        let first = coarser_position(requested.start).0;
+        let last = coarser_position(requested.end).0 + 1;
         refill(out, last + 1 - first, Float4::ZERO);
         let known = range_overlap(&self.columns, &(first..last + 1));
-        for row in coarser_nodes(j) {
+        let (row, way) = coarser_position(j);
+        for (row, weight) in [(row, 1.0 - way), (row + 1, way)] {
             if !self.rows.contains(&row) || known.is_empty() {
                 continue;
             }
             let nodes = self.nodes_of(row, &known);
             for (o, v) in out[known.start - first..].iter_mut().zip(nodes) {
-                *o = o.add_scaled(0.5, *v);
+                *o = o.add_scaled(weight, *v);
             }
         }
     }

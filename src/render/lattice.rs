@@ -60,14 +60,14 @@ fn node_count(pixels: usize, cell: f64) -> usize {
     ((pixels as f64 + 1.0) / cell) as usize + 3
 }
 
-/// The two nodes of a lattice of twice the distance around a node, the same one twice where it lies
-/// on it.
-pub(super) fn coarser_nodes(node: usize) -> [usize; 2] {
-    if node.is_multiple_of(2) {
-        [node / 2, node / 2 + 1]
-    } else {
-        [node.div_ceil(2); 2]
-    }
+/// Nodes of a lattice between two of the coarser one, for light with soft shadows.
+pub(super) const COARSER: usize = 4;
+
+/// The node of the coarser lattice before a node of the finer one, and the way to the next.
+#[inline(always)]
+pub(super) fn coarser_position(node: usize) -> (usize, f32) {
+    let at = node + COARSER - 1;
+    (at / COARSER, (at % COARSER) as f32 / COARSER as f32)
 }
 
 #[cfg(test)]
@@ -75,11 +75,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_node_lies_in_the_middle_of_its_coarser_ones() {
+    fn a_node_lies_on_the_way_between_its_coarser_ones() {
         for node in 0..9 {
-            let at = |node: usize, cell: f64| (node as f64 - 1.0) * cell;
-            let [a, b] = coarser_nodes(node).map(|n| at(n, 2.0));
-            assert_eq!(0.5 * (a + b), at(node, 1.0));
+            let at = |node: f64, cell: f64| (node - 1.0) * cell;
+            let (coarser, way) = coarser_position(node);
+            let position = at(coarser as f64 + f64::from(way), COARSER as f64);
+            assert_eq!(position, at(node as f64, 1.0));
         }
     }
 }

@@ -8,6 +8,9 @@ use crate::scene::{AreaLight, Shot};
 use nalgebra::{Matrix3, Vector4};
 use std::f64::consts::PI;
 
+/// Pieces of the sky narrower than this throw shadows too sharp for the coarser lattice, radians.
+const SMALL_WIDTH_RAD: f64 = 0.15;
+
 /// A point (`at.w = 1`) or a direction (`at.w = 0`) that light comes from, in homogeneous
 /// coordinates.
 #[derive(Clone, Copy, Debug)]
@@ -49,10 +52,10 @@ pub(super) struct LightGroup {
 /// All that lights a receiver.
 #[derive(Clone, Debug)]
 pub(super) struct LightSamples {
-    /// Area lights, in their order.
-    pub(super) faces: Vec<LightGroup>,
-    /// What is all around: the constant environment, then the pieces of the map.
-    pub(super) sky: Vec<LightGroup>,
+    /// What throws sharp shadows: area lights, in their order, then small pieces of the map.
+    pub(super) sharp: Vec<LightGroup>,
+    /// The rest of what is all around: the constant environment, then the pieces of the map.
+    pub(super) soft: Vec<LightGroup>,
 }
 
 impl LightSamples {
@@ -100,8 +103,8 @@ impl LightSamples {
             .iter()
             .flat_map(|map| light::sky_cells(map, options.ambient_samples, normal));
         let ambient = LightGroup::constant(shot, options, normal);
-        let Self { faces, sky } = Self::from_parts(faces, ambient, pieces);
-        faces.into_iter().chain(sky).collect()
+        let Self { sharp, soft } = Self::from_parts(faces, ambient, pieces);
+        sharp.into_iter().chain(soft).collect()
     }
 
     /// Leaves out what is black.
@@ -110,16 +113,20 @@ impl LightSamples {
         ambient: LightGroup,
         pieces: impl Iterator<Item = light::SkyPiece>,
     ) -> Self {
-        let sky = std::iter::once(ambient).chain(pieces.map(LightGroup::sky_piece));
+        let pieces = pieces.map(LightGroup::sky_piece);
+        let (small, large): (Vec<_>, Vec<_>) = pieces.partition(LightGroup::is_small);
+        let sharp = faces.chain(small);
+        let soft = std::iter::once(ambient).chain(large);
         Self {
-            faces: faces.filter(LightGroup::is_lit).collect(),
-            sky: sky.filter(LightGroup::is_lit).collect(),
+            sharp: sharp.filter(LightGroup::is_lit).collect(),
+            soft: soft.filter(LightGroup::is_lit).collect(),
         }
     }
 
     /// Irradiance of the sky where nothing is in its way.
     pub(super) fn open_sky(&self) -> LinearRgb {
-        self.sky.iter().fold(LinearRgb::BLACK, |sum, group| {
+        let all = self.sharp.iter().chain(&self.soft);
+        all.fold(LinearRgb::BLACK, |sum, group| {
             sum.add_scaled(group.sky_share(), group.radiance)
         })
     }
@@ -161,6 +168,11 @@ impl LightGroup {
             radiance: piece.irradiance,
             samples: vec![LightSample::in_sky(&piece.direction, piece.width, 1.0)],
         }
+    }
+
+    /// Its samples are of a sun, or of a lamp far away.
+    fn is_small(&self) -> bool {
+        self.samples.iter().all(|s| s.width < SMALL_WIDTH_RAD)
     }
 
     fn is_lit(&self) -> bool {

@@ -11,6 +11,7 @@ use crate::render::texel_grid::{
 };
 use crate::scene::Grade;
 use crate::work::{self, Kind};
+use std::f64::consts::SQRT_2;
 use std::sync::{Arc, OnceLock};
 
 /// A texture's opacity at each halving, made on first use; shared by the cards that show it.
@@ -49,10 +50,8 @@ impl<'a> OpacityMips<'a> {
     pub(super) fn level_for(&self, size: [f64; 2], cell: f64, blur: f64) -> Arc<OpacityLevel> {
         let (width, height) = self.texture.size();
         let texel = (size[0] * size[1] / (width * height) as f64).sqrt();
-        let level = halvings_to(cell, texel)
-            .floor()
-            .max(halvings_to(blur, texel).round());
-        self.halved((level as usize).min(self.levels.len() - 1))
+        let level = halvings_within(cell / texel).max(halvings_within(SQRT_2 * blur / texel));
+        self.halved(level.min(self.levels.len() - 1))
     }
 
     fn halved(&self, level: usize) -> Arc<OpacityLevel> {
@@ -70,9 +69,9 @@ impl<'a> OpacityMips<'a> {
     }
 }
 
-/// How often texels must be doubled to reach a length; 0 for a shorter one.
-fn halvings_to(length: f64, texel: f64) -> f64 {
-    libm::log2((length / texel).max(1.0))
+/// How often texels can be doubled within a length of so many of them: the exponent of the number.
+fn halvings_within(texels: f64) -> usize {
+    (texels.max(1.0).to_bits() >> 52) as usize - 1023
 }
 
 /// Opacity of a texture at one level of detail.
@@ -81,8 +80,9 @@ pub(super) struct OpacityLevel {
     pub(super) grid: TexelGrid,
     width: usize,
     height: usize,
-    /// Opacity per channel: alpha in all of them for a texture that is no film.
-    pub(super) texels: Vec<Float4>,
+    /// What passes each texel, per channel: 1 minus alpha in all of them for a texture that is no
+    /// film.
+    pub(super) passing: Vec<Float4>,
     /// Where it stops any light.
     pub(super) extent: TexelExtent,
     /// Every texel stops all light.
@@ -114,7 +114,7 @@ impl OpacityLevel {
             height,
             extent: TexelExtent::around(texels.pixels(), width, &grid),
             opaque: is_opaque(&texels),
-            texels: texels.into_vec(),
+            passing: passing(texels),
         }
     }
 
@@ -128,7 +128,7 @@ impl OpacityLevel {
     /// Multiplies what gets through, along a line over bordered texels from its sample `first` on.
     pub(super) fn attenuate(&self, line: &TexelLine, first: usize, through: &mut [Float4]) {
         let size = (self.width, self.height);
-        attenuate_line(&self.texels, size, line, first as f32, through);
+        attenuate_line(&self.passing, size, line, first as f32, through);
     }
 }
 
@@ -141,6 +141,14 @@ fn bordered<P: Copy>(image: &Image<P>, opacity: impl Fn(P) -> Float4) -> Image<F
         line.iter_mut().zip(row).for_each(|(o, &p)| *o = opacity(p));
     }
     texels
+}
+
+/// What passes opacities.
+fn passing(mut texels: Image<Float4>) -> Vec<Float4> {
+    for t in texels.pixels_mut() {
+        *t = t.clamped().complement();
+    }
+    texels.into_vec()
 }
 
 /// Every texel inside of the border stops all light.
@@ -159,7 +167,7 @@ fn is_opaque(texels: &Image<Float4>) -> bool {
     "aarch64+neon"
 ))]
 fn attenuate_line(
-    opacity: &[Float4],
+    passing: &[Float4],
     size: (usize, usize),
     line: &TexelLine,
     first: f32,
@@ -169,8 +177,7 @@ fn attenuate_line(
     for run in through.chunks_mut(SIMD_LANES) {
         let cells = BilinearCells::along_line(line, first, size);
         for (lane, through) in run.iter_mut().enumerate() {
-            let hidden = cells.texel(lane, opacity, size.0).clamped();
-            *through = through.times(hidden.complement());
+            *through = through.times(cells.texel(lane, passing, size.0));
         }
         first += SIMD_LANES as f32;
     }

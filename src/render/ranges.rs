@@ -29,14 +29,21 @@ pub(super) fn range_until(range: Range<usize>, end: usize) -> Range<usize> {
 
 /// Integers in `low..=high`, cut to `within`.
 pub(super) fn integer_range(low: f64, high: f64, within: &Range<usize>) -> Range<usize> {
-    // `as` saturates, so infinite ends are cut like all others.
-    let start = (low.ceil().max(0.0) as usize).clamp(within.start, within.end);
+    let start = integer_from(low).clamp(within.start, within.end);
     let end = if high >= 0.0 {
-        (high.floor() as usize).saturating_add(1).min(within.end)
+        (high as usize).saturating_add(1).min(within.end)
     } else {
         0
     };
     start..end.max(start)
+}
+
+/// The lowest integer that is not below `x`, and not below 0. `as` saturates, so infinite ends are
+/// cut like all others.
+#[inline(always)]
+fn integer_from(x: f64) -> usize {
+    let below = x as usize;
+    below.saturating_add(usize::from(x > below as f64))
 }
 
 #[cfg(test)]

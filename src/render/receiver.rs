@@ -7,10 +7,10 @@ use crate::geom::Vector3;
 use crate::pixel::LinearRgb;
 use crate::render::float4::Float4;
 use crate::render::half_plane::{ConvexShape, grown_side};
-use crate::render::lattice::Lattice;
+use crate::render::lattice::{COARSER, Lattice};
 use crate::render::light_samples::{LightGroup, LightSamples};
 use crate::render::occluders::Occluders;
-use crate::render::ranges::{range_union, range_until};
+use crate::render::ranges::{integer_range, range_overlap, range_union, range_until};
 use crate::render::shadow::{ProjectedShadow, ShadowedReceiver, TexelReads};
 use crate::render::shadow_ray::{FaceIrradiance, ShadowRay, UnitIrradiance, shadow_rays};
 use crate::render::texture::BakedTexture;
@@ -21,6 +21,9 @@ use crate::render::{RenderOptions, refill};
 use crate::scene::{Card, LightGrid, Shot};
 use crate::work::{self, Kind};
 use std::ops::Range;
+
+/// Rows of nodes that one task computes.
+pub(super) const BAND_ROWS: usize = 16;
 
 /// One receiver under some of its lights, on a lattice.
 #[derive(Debug)]
@@ -52,8 +55,8 @@ impl RayGroup {
     }
 }
 
-/// A receiver under area lights, whose shadows are sharp, and under the sky, whose shadows are soft
-/// enough for half the nodes.
+/// A receiver under lights whose shadows are sharp, and under the rest of the sky, whose shadows are
+/// soft enough for a coarser lattice.
 #[derive(Debug)]
 pub(super) struct ReceiverIrradiance {
     pub(super) fine: Receiver,
@@ -119,7 +122,7 @@ impl<'a> LightingContext<'a> {
     ) -> Self {
         Self {
             fine: Lattice::new(view, options.cell_px),
-            coarse: Lattice::new(view, 2.0 * options.cell_px),
+            coarse: Lattice::new(view, COARSER as f64 * options.cell_px),
             occluders: Occluders::new(cards, ScenePlane::shadow_catcher(shot.catcher)),
             shot,
             options,
@@ -142,10 +145,10 @@ impl<'a> LightingContext<'a> {
     /// card is not seen at all.
     pub(super) fn card(&self, own: usize, seen: &VisibleSide<'_>) -> Option<ReceiverIrradiance> {
         let lights = self.light_samples(&self.occluders.cards[own].plane)?;
-        let [faces, sky] = SelectedLights::split(&lights);
+        let [sharp, soft] = SelectedLights::split(&lights);
         Some(ReceiverIrradiance {
-            fine: self.card_on(&self.fine, own, seen, faces)?,
-            coarse: self.card_on(&self.coarse, own, seen, sky)?,
+            fine: self.card_on(&self.fine, own, seen, sharp)?,
+            coarse: self.card_on(&self.coarse, own, seen, soft)?,
             relative: false,
             light_grid: self.shot.light_grid.clone(),
         })
@@ -174,9 +177,9 @@ impl<'a> LightingContext<'a> {
     /// none to be seen.
     pub(super) fn surface(&self) -> Option<ReceiverIrradiance> {
         let lights = self.light_samples(&self.occluders.surface)?;
-        let [faces, sky] = SelectedLights::split(&lights);
-        let fine = self.surface_on(&self.fine, faces)?;
-        let coarse = self.surface_on(&self.coarse, sky)?;
+        let [sharp, soft] = SelectedLights::split(&lights);
+        let fine = self.surface_on(&self.fine, sharp)?;
+        let coarse = self.surface_on(&self.coarse, soft)?;
         let fine = fine.grown_around(&coarse, &self.fine.view);
         fine.has_cells().then_some(ReceiverIrradiance {
             fine,
@@ -236,10 +239,10 @@ impl<'a> LightingContext<'a> {
 }
 
 impl<'a> SelectedLights<'a> {
-    /// Area lights, and the sky.
+    /// Lights with sharp shadows, and those with soft ones.
     fn split(all: &'a LightSamples) -> [Self; 2] {
         let open_sky = all.open_sky();
-        [&all.faces, &all.sky].map(|groups| Self { groups, open_sky })
+        [&all.sharp, &all.soft].map(|groups| Self { groups, open_sky })
     }
 }
 
@@ -272,7 +275,7 @@ fn area_union(a: LatticeArea, b: LatticeArea) -> LatticeArea {
     (range_union(a.0, b.0), range_union(a.1, b.1))
 }
 
-/// Nodes of a lattice, and those around the nodes of the lattice of twice its distance.
+/// Nodes of a lattice, and those around the nodes of the coarser one.
 fn finer_union(fine: &Range<usize>, coarse: &Range<usize>) -> Range<usize> {
     range_union(fine.clone(), finer_nodes(coarse))
 }
@@ -281,7 +284,7 @@ fn finer_nodes(coarse: &Range<usize>) -> Range<usize> {
     if coarse.is_empty() {
         0..0
     } else {
-        (2 * coarse.start).saturating_sub(2)..2 * coarse.end
+        (COARSER * coarse.start).saturating_sub(2 * COARSER - 2)..COARSER * (coarse.end - 1) + 1
     }
 }
 
@@ -318,8 +321,8 @@ struct RayBuffers {
     strength: Vec<f32>,
     /// Share that passes the occluders, per channel.
     through: Vec<Float4>,
-    /// Nodes that each shadow touches.
-    touched: Vec<(usize, Range<usize>)>,
+    /// Nodes of each row of the band that each shadow touches.
+    touched: Vec<Vec<(usize, Range<usize>)>>,
     counts: RayCounts,
 }
 
@@ -372,7 +375,7 @@ impl Receiver {
         self.rows.len() > 1 && self.columns.len() > 1
     }
 
-    /// With the nodes that a receiver of twice the distance needs around its own, as far as the
+    /// With the nodes that a receiver on the coarser lattice needs around its own, as far as the
     /// picture goes.
     fn grown_around(self, coarse: &Self, view: &CameraView) -> Self {
         let rows = finer_union(&self.rows, &coarse.rows);
@@ -406,8 +409,12 @@ fn gather_group(group: &RayGroup, rows: &mut [RowSums], buffers: &mut RayBuffers
         rows.iter_mut().for_each(RowSums::start_faces);
     }
     for ray in &group.rays {
-        let wanted = rows.iter_mut().filter(|row| !row.requested.is_empty());
-        wanted.for_each(|row| row.add_ray(ray, radiance, buffers));
+        buffers.touch_shadows(ray, rows);
+        for (n, row) in rows.iter_mut().enumerate() {
+            if !row.requested.is_empty() {
+                row.add_ray((ray, n), radiance, buffers);
+            }
+        }
     }
     if has_faces {
         rows.iter_mut().for_each(|row| row.add_faces(radiance));
@@ -434,13 +441,18 @@ impl RowSums {
         }
     }
 
-    /// Adds a ray of this radiance.
-    fn add_ray(&mut self, ray: &ShadowRay, radiance: Float4, buffers: &mut RayBuffers) {
+    /// Adds a ray of this radiance to the row with this number in its band.
+    fn add_ray(
+        &mut self,
+        (ray, n): (&ShadowRay, usize),
+        radiance: Float4,
+        buffers: &mut RayBuffers,
+    ) {
         match ray.unit_irradiance() {
-            UnitIrradiance::Even(share) => self.hide_sky(ray, radiance.scaled(share), buffers),
+            UnitIrradiance::Even(share) => self.hide_sky((ray, n), radiance.scaled(share), buffers),
             UnitIrradiance::Face(face) => {
                 self.add_face(&face, buffers);
-                self.hide_face(ray, radiance, buffers);
+                self.hide_face((ray, n), radiance, buffers);
             }
         }
     }
@@ -457,63 +469,114 @@ impl RowSums {
     }
 
     /// Adds what is hidden of a piece of the sky; what it gives in the open is in the open sky.
-    fn hide_sky(&mut self, ray: &ShadowRay, irradiance: Float4, buffers: &mut RayBuffers) {
+    fn hide_sky(
+        &mut self,
+        ray: (&ShadowRay, usize),
+        irradiance: Float4,
+        buffers: &mut RayBuffers,
+    ) {
         let Some(nodes) = buffers.see_through(ray, self.j, &self.requested) else {
             return;
         };
-        for (hidden, through) in self.hidden[nodes].iter_mut().zip(&buffers.through) {
-            *hidden = hidden.add_product(through.complement(), irradiance);
-        }
+        add_hidden(&mut self.hidden[nodes], &buffers.through, irradiance);
     }
 
     /// Adds what is hidden of a piece of an area light, by its strength at each node.
-    fn hide_face(&mut self, ray: &ShadowRay, radiance: Float4, buffers: &mut RayBuffers) {
+    fn hide_face(
+        &mut self,
+        ray: (&ShadowRay, usize),
+        radiance: Float4,
+        buffers: &mut RayBuffers,
+    ) {
         let Some(nodes) = buffers.see_through(ray, self.j, &self.requested) else {
             return;
         };
         let strength = &buffers.strength[nodes.clone()];
-        let passes = strength.iter().zip(&buffers.through);
-        for (hidden, (&e, through)) in self.hidden[nodes].iter_mut().zip(passes) {
-            *hidden = hidden.add_product(through.complement(), radiance.scaled(e));
-        }
+        let hidden = &mut self.hidden[nodes];
+        add_hidden_by_strength(hidden, &buffers.through, strength, radiance);
+    }
+}
+
+/// Adds what does not pass of an even irradiance.
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2",
+    "x86_64+avx2",
+    "aarch64+neon"
+))]
+fn add_hidden(hidden: &mut [Float4], through: &[Float4], irradiance: Float4) {
+    for (hidden, through) in hidden.iter_mut().zip(through) {
+        *hidden = hidden.add_product(through.complement(), irradiance);
+    }
+}
+
+/// Adds what does not pass of a radiance that has a strength at each node.
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2",
+    "x86_64+avx2",
+    "aarch64+neon"
+))]
+fn add_hidden_by_strength(
+    hidden: &mut [Float4],
+    through: &[Float4],
+    strength: &[f32],
+    radiance: Float4,
+) {
+    for ((hidden, through), &e) in hidden.iter_mut().zip(through).zip(strength) {
+        *hidden = hidden.add_product(through.complement(), radiance.scaled(e));
     }
 }
 
 impl RayBuffers {
-    /// Computes what passes all shadows of a ray in a row; at which of the requested nodes, counted
-    /// from the first. None where there is no shadow.
+    /// Notes which nodes of each row of a band a ray's shadows touch.
+    fn touch_shadows(&mut self, ray: &ShadowRay, rows: &[RowSums]) {
+        self.touched.resize_with(rows.len(), Vec::new);
+        self.touched.iter_mut().for_each(Vec::clear);
+        let first = rows.first().map_or(0, |row| row.j);
+        let band = first..first + rows.len();
+        for (k, shadow) in ray.shadows.iter().enumerate() {
+            let touched = range_overlap(&shadow.rows, &band);
+            if !touched.is_empty() {
+                self.touch_shadow((k, shadow), touched, rows);
+            }
+        }
+    }
+
+    /// Notes which nodes of these rows, of those of a band, a shadow touches.
+    fn touch_shadow(
+        &mut self,
+        (k, shadow): (usize, &ProjectedShadow),
+        touched: Range<usize>,
+        rows: &[RowSums],
+    ) {
+        let first = rows[0].j;
+        let (lows, highs) = shadow.row_spans::<BAND_ROWS>(first);
+        for n in touched.start - first..touched.end - first {
+            let nodes = integer_range(lows[n], highs[n], &rows[n].requested);
+            if !nodes.is_empty() {
+                self.touched[n].push((k, nodes));
+            }
+        }
+    }
+
+    /// Computes what passes all shadows of a ray in a row, the `n`-th of its band; at which of the
+    /// requested nodes, counted from the first. None where there is no shadow.
     fn see_through(
         &mut self,
-        ray: &ShadowRay,
+        (ray, n): (&ShadowRay, usize),
         j: usize,
         requested: &Range<usize>,
     ) -> Option<Range<usize>> {
-        let all = self.touch_shadows(ray, j, requested)?;
-        self.fill_through(ray, j, &all);
+        let touched = self.touched[n].iter().map(|(_, nodes)| nodes.clone());
+        let all = touched.reduce(range_union)?;
+        self.fill_through((ray, n), j, &all);
         Some(all.start - requested.start..all.end - requested.start)
     }
 
-    /// Notes which nodes of a row each shadow touches; returns the bounds of all of them.
-    fn touch_shadows(
-        &mut self,
-        ray: &ShadowRay,
-        j: usize,
-        requested: &Range<usize>,
-    ) -> Option<Range<usize>> {
-        self.touched.clear();
-        let shadows = ray.shadows.iter().enumerate();
-        let nodes = shadows.map(|(k, shadow)| (k, shadow.nodes(j, requested)));
-        self.touched
-            .extend(nodes.filter(|(_, nodes)| !nodes.is_empty()));
-        let touched = self.touched.iter().map(|(_, nodes)| nodes.clone());
-        touched.reduce(range_union)
-    }
-
     /// Computes what passes all shadows of a ray at these nodes.
-    fn fill_through(&mut self, ray: &ShadowRay, j: usize, all: &Range<usize>) {
+    fn fill_through(&mut self, (ray, n): (&ShadowRay, usize), j: usize, all: &Range<usize>) {
         self.counts.shadow += all.len();
         refill(&mut self.through, all.len(), Float4::ONE);
-        for (k, nodes) in &self.touched {
+        for (k, nodes) in &self.touched[n] {
             let through = &mut self.through[nodes.start - all.start..nodes.end - all.start];
             self.counts.through += ray.shadows[*k].attenuate(j, nodes, through);
         }

@@ -295,8 +295,8 @@ impl CardMap {
         let inside = inset.map(|inset| quad_sides(&u, &v, &w, inset.map(|by| -by)));
         let [u, v] = opacity.grid.texel_rows(&u, &v, &w);
         // It ends where the card does, below the card, and in front of the eye.
-        let mut sides = opacity.extent.sides([&u, &v], &w).to_vec();
-        sides.extend([below, depth]);
+        let [a, b, c, d, e, f, g, h] = opacity.extent.sides([&u, &v], &w);
+        let sides = [a, b, c, d, e, f, g, h, below, depth];
         ProjectedShadow {
             rows,
             columns,
@@ -316,12 +316,9 @@ impl ProjectedShadow {
         (self.rows.clone(), self.columns.clone())
     }
 
-    /// Nodes of a row that the shadow touches.
-    pub(super) fn nodes(&self, j: usize, within: &Range<usize>) -> Range<usize> {
-        if !self.rows.contains(&j) {
-            return within.start..within.start;
-        }
-        self.shape.nodes(j, within)
+    /// Left and right ends of the shadow in `N` rows from `first` on; reversed where it has none.
+    pub(super) fn row_spans<const N: usize>(&self, first: usize) -> ([f64; N], [f64; N]) {
+        self.shape.row_spans(first)
     }
 
     /// Multiplies what gets through to these nodes of a row; returns what had to be read for it.

@@ -121,6 +121,7 @@ mod tests {
     use crate::render::RenderOptions;
     use crate::render::float4::Float4;
     use crate::render::light_samples::LightSamples;
+    use crate::render::ranges::integer_range;
     use crate::render::view::{
         CameraView, LatticeArea, ProjectedPlane, ScenePlane, visible_planes,
     };
@@ -182,7 +183,7 @@ mod tests {
                 ScenePlane::shadow_catcher(shot.catcher),
             );
             let seen = ProjectedPlane::new(&occluders.surface, &view).unwrap();
-            let LightSamples { faces, sky } = LightSamples::above(
+            let LightSamples { sharp, soft } = LightSamples::above(
                 &shot,
                 &RenderOptions::default(),
                 &occluders.surface.center,
@@ -197,9 +198,9 @@ mod tests {
             };
             let (mut edges, mut all) = (0, 0);
             // Fine and coarse levels of the texture.
-            for (group, cell) in faces
+            for (group, cell) in sharp
                 .iter()
-                .chain(&sky)
+                .chain(&soft)
                 .flat_map(|group| [(group, 1e-4), (group, 5e-3)])
             {
                 let receiver = ShadowedReceiver {
@@ -211,7 +212,8 @@ mod tests {
                     .flat_map(|ray| ray.shadows);
                 for mut shadow in shadows {
                     for j in shadow.rows.clone() {
-                        let nodes = shadow.nodes(j, &(0..view.width));
+                        let ([low], [high]) = shadow.row_spans(j);
+                        let nodes = integer_range(low, high, &(0..view.width));
                         let inside = shadow.inside;
                         let [mut quick, mut read] = [0, 1].map(|_| vec![Float4::ONE; nodes.len()]);
                         edges += shadow.attenuate(j, &nodes, &mut quick).edges;
@@ -241,7 +243,7 @@ mod tests {
             &occluders.surface.center,
             &seen.normal,
         )
-        .faces;
+        .sharp;
         let shadows = |area: LatticeArea| {
             let receiver = ShadowedReceiver {
                 plane: &seen,

@@ -103,10 +103,10 @@ impl BilinearCells {
     #[inline(always)]
     pub(super) fn texel<T: Blend>(&self, lane: usize, texels: &[T], stride: usize) -> T {
         let at = self.at[lane] as usize;
-        let (top, bottom) = (&texels[at..][..2], &texels[at + stride..][..2]);
+        let cell = &texels[at..][..stride + 2];
         T::bilinear(
-            [top[0], top[1]],
-            [bottom[0], bottom[1]],
+            [cell[0], cell[1]],
+            [cell[stride], cell[stride + 1]],
             self.fx[lane],
             self.fy[lane],
         )

@@ -127,7 +127,7 @@ mod tests {
             OpacityLevel::new(&film, &grade, 1),
         );
         let colors = |level: OpacityLevel| -> Vec<LinearRgb> {
-            level.texels.iter().map(|o| o.rgb()).collect()
+            level.passing.iter().map(|t| t.rgb()).collect()
         };
         assert_eq!(colors(a), colors(b));
     }

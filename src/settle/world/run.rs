@@ -22,7 +22,7 @@ use rapier3d::prelude::{
 /// Motion of a card that still counts as rest, metres in the world.
 const REST_MOTION_M: f32 = 0.0002;
 /// How long it must last, seconds in the world.
-const REST_TIME_S: f64 = 0.5;
+const REST_TIME_S: f64 = 0.2;
 /// Mean speed that still counts as rest, m/s in the world.
 const REST_SPEED_M_PER_S: f64 = 0.01;
 /// Mean height in the world, metres, a quarter of a card: a drop by less is treated as one by this.
