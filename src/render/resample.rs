@@ -29,10 +29,11 @@ impl DetailLevel {
         }
     }
 
-    /// Reads a picture of floats from its pyramid.
+    /// Reads a picture of floats from its pyramid, and finishes it row by row.
     pub(super) fn resample<'a, P: Pod + Into<Float8>>(
         &self,
         level: impl Fn(usize) -> &'a Image<P>,
+        finish: impl Fn(&mut [Float8]),
     ) -> BorderedTexels {
         let image = level(self.level);
         let columns = downsample_axis(image.width(), self.step);
@@ -40,7 +41,9 @@ impl DetailLevel {
         let mut out = BorderedTexels::transparent(columns.len(), rows.len());
         let mut averages = RowAverages::new(image);
         for (row, line) in rows.iter().zip(out.inner_lines()) {
+            let line = &mut line[..columns.len()];
             average_columns(&columns, averages.average(row), line);
+            finish(line);
         }
         out
     }

@@ -40,12 +40,13 @@ impl BakedTexture {
     /// reading costs four of them.
     pub(super) fn new(texture: &Texture, grade: &Grade, level: f64, with_film: bool) -> Self {
         let level = level.clamp(0.0, (texture.levels() - 1) as f64);
-        let mut baked = resample_texture(texture, DetailLevel::new(level));
         let grid = TexelGrid::new(texture.size(), level);
-        grade_texels(&mut baked.texels, grade);
-        if texture.is_film() {
-            average_opacity(&mut baked.texels);
-        }
+        let baked = resample_texture(texture, DetailLevel::new(level), |row| {
+            grade_texels(row, grade);
+            if texture.is_film() {
+                average_opacity(row);
+            }
+        });
         Self {
             extent: TexelExtent::around(&baked.texels, baked.width, &grid),
             grid,
@@ -82,10 +83,14 @@ fn average_opacity(texels: &mut [Float8]) {
     }
 }
 
-fn resample_texture(texture: &Texture, detail: DetailLevel) -> BorderedTexels {
+fn resample_texture(
+    texture: &Texture,
+    detail: DetailLevel,
+    finish: impl Fn(&mut [Float8]),
+) -> BorderedTexels {
     match texture {
-        Texture::Rgba(pyramid) => detail.resample(|l| pyramid.level(l)),
-        Texture::Film(pyramid) => detail.resample(|l| pyramid.level(l)),
+        Texture::Rgba(pyramid) => detail.resample(|l| pyramid.level(l), finish),
+        Texture::Film(pyramid) => detail.resample(|l| pyramid.level(l), finish),
     }
 }
 

@@ -34,7 +34,7 @@ pub struct SettleOptions {
     /// Attempts before giving up, 1 to 100; each starts from heights of its own. Default: 8.
     pub attempts: u32,
     /// Time step in the same seconds, 0.0001 to 0.0042: with longer ones half of the heaps fail.
-    /// Default: 1/480.
+    /// Default: 1/360.
     pub step: f64,
     /// Iterations of the contact solver in each step, 1 to 100. Default: 4.
     pub iterations: u32,
@@ -69,7 +69,7 @@ impl Default for SettleOptions {
             max_energy_rise: 0.01,
             time_limit: 30.0,
             attempts: 8,
-            step: 1.0 / 480.0,
+            step: 1.0 / 360.0,
             iterations: 4,
             ccd: 1,
             most_work: 100_000_000,

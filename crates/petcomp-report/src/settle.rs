@@ -4,12 +4,13 @@
 //! heaps and the same closed-form cases. Overlap is measured by the stage's own separating-axis
 //! test, which shares nothing with the engine.
 //!
-//! # Why the default is 1/480 s and 4 iterations
+//! # Why the default is 1/360 s and 4 iterations
 //! Contacts are as stiff as the rate of solver iterations (iterations / step) allows, and overlap
 //! falls with its square; run time grows with it. Of 150 heaps of 5 to 30 cards, half failed at
 //! 1/120 s, which is therefore refused; at 1/240 s the worst pair overlapped by 0.23 mm, half of
 //! what is accepted, and a fifth of the heaps gained energy; at 1/480 s nothing overlapped by more
-//! than 0.03 mm. Shorter steps gain what no picture shows.
+//! than 0.03 mm. At 1/360 s all of 100 heaps of 20 bottles rest at the first attempt, at three
+//! quarters of the time. Shorter steps gain what no picture shows.
 
 mod closed_form;
 mod diagram;
@@ -31,7 +32,7 @@ use petcomp::{Error, Result};
 use std::path::Path;
 
 /// Time steps, as the number of them in a second.
-const RATES: [u32; 4] = [240, 480, 960, 1920];
+const RATES: [u32; 5] = [240, 360, 480, 960, 1920];
 const ITERATIONS: [u32; 4] = [1, 2, 4, 8];
 /// CCD stops in a step, at the default step and iterations.
 const CCD_STOPS: [u32; 3] = [0, 1, 4];

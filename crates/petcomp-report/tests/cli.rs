@@ -74,7 +74,7 @@ fn everything_measured_is_one_page_with_its_data() {
             "{stage}"
         );
     }
-    assert!(markdown.contains("| normal (the default) |") && read("quality.csv").contains("1/480"));
+    assert!(markdown.contains("| normal (the default) |") && read("quality.csv").contains("1/360"));
     assert!(
         read("render_piles.csv")
             .lines()

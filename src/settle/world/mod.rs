@@ -49,7 +49,7 @@ const MIN_FALL_SHARE: f64 = 0.5;
 /// Objects that may lie on each other at the step of the options. What lies under many sinks in, by
 /// their weight over the square of the rate of steps and iterations: heaps of 100 do at 1/480 s and
 /// not at 1/960 s, heaps of 200 not at 1/1920 s.
-const OBJECTS_PER_STEP_RATE: usize = 60;
+const OBJECTS_PER_STEP_RATE: usize = 40;
 /// Parts that a step may be cut into where a body would fly through another.
 const MAX_SUBSTEPS: u32 = 100;
 /// Iterations in a step that count as one of work.

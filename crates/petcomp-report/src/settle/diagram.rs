@@ -97,7 +97,7 @@ impl SettleRow {
     fn curve_and_setting(&self) -> [String; 2] {
         if !self.has_default_ccd() {
             return [
-                "1/480 s, other CCD".into(),
+                format!("1/{} s, other CCD", self.rate),
                 format!("{} CCD stops", self.ccd),
             ];
         }
@@ -174,14 +174,14 @@ mod tests {
 
     #[test]
     fn each_error_has_a_diagram_and_the_default_its_ring() {
-        let found = diagrams(&[row(480, 4, 1), row(240, 4, 1), row(480, 4, 0)]);
+        let found = diagrams(&[row(360, 4, 1), row(240, 4, 1), row(360, 4, 0)]);
         assert_eq!(found.len(), 3);
         assert!(
             found
                 .iter()
                 .all(|d| d.points.iter().filter(|p| p.is_default()).count() == 1)
         );
-        assert_eq!(found[0].points[2].curve, "1/480 s, other CCD");
+        assert_eq!(found[0].points[2].curve, "1/360 s, other CCD");
     }
     #[test]
     fn the_cheapest_setting_that_is_right_in_everything_is_named() {
