@@ -17,6 +17,9 @@ pub struct Hsv {
     pub v: f32,
 }
 
+/// 1.5 x 2^23: floats around it are integers.
+const WHOLE_TURNS: f32 = 12_582_912.0;
+
 /// Hue, saturation and value of a colour; the largest channel may be above 1 and any channel below
 /// 0.
 ///
@@ -52,7 +55,7 @@ fn hue_sixths(c: LinearRgb, largest: f32, spread: f32) -> f32 {
     }
 }
 
-/// The colour of a hue, saturation and value; whole turns of the hue fall away, up to 2^31 of them.
+/// The colour of a hue, saturation and value; whole turns of the hue fall away, up to 2^22 of them.
 #[inline(always)]
 pub fn hsv_to_rgb(c: Hsv) -> LinearRgb {
     let sixths = 6.0 * turn(c.h);
@@ -88,10 +91,11 @@ pub fn shift_hsv(c: LinearRgb, hue_deg: f32, saturation: f32, value: f32) -> Lin
 
 /// The part of a turn beyond whole turns, 0 to 1.
 ///
-/// By a conversion instead of `floor`, which is a function call on processors older than SSE 4.1.
+/// By a sum that rounds to whole turns: `floor` is a function call on processors older than SSE 4.1,
+/// and conversions to integers, with all their checks, are not vectorised.
 #[inline(always)]
 fn turn(h: f32) -> f32 {
-    let beyond = h - h as i32 as f32;
+    let beyond = h - ((h + WHOLE_TURNS) - WHOLE_TURNS);
     if beyond < 0.0 { beyond + 1.0 } else { beyond }
 }
 
