@@ -352,6 +352,62 @@ fn an_output_folder_that_is_a_file_is_refused() {
     assert!(error.contains("taken"), "{error}");
 }
 
+/// Writes a picture of green that gets brighter from left to right.
+fn write_green_ramp(path: &Path, brightest: f32) {
+    let green = |x: usize| petcomp::LinearRgb::new(0.02, brightest * x as f32 / 24.0, 0.05);
+    let ramp = petcomp::Image::from_fn(24, 4, |x, _| green(x));
+    petcomp::io::write(path, &ramp).expect("a picture");
+}
+
+#[test]
+fn the_frames_of_a_sequence_are_keyed_into_folders() {
+    let desk = Desk::new();
+    let screen = ["--screen", "0.02,0.6,0.05"];
+    std::fs::create_dir(desk.path("shot")).expect("a folder");
+    for (k, brightest) in [0.3, 0.5, 0.7].into_iter().enumerate() {
+        let (frame, alone) = (format!("shot/{k}.png"), format!("alone_{k}.png"));
+        write_green_ramp(&desk.path(&frame), brightest);
+        desk.ok(&[&["matte", "key", &frame, "-o", &alone][..], &screen].concat());
+    }
+    let frames = ["shot/0.png", "shot/1.png", "shot/2.png"];
+    let folders = ["-o", "keyed", "--matte", "mattes"];
+    desk.ok(&[&["matte", "key"][..], &frames, &folders, &screen].concat());
+    let read = |name: String| std::fs::read(desk.path(&name)).expect("a picture");
+    for k in 0..3 {
+        assert_eq!(
+            read(format!("keyed/{k}.png")),
+            read(format!("alone_{k}.png"))
+        );
+        assert!(desk.path(&format!("mattes/{k}.png")).exists());
+    }
+    let same = ["matte", "key", "shot/0.png", "shot/0.png", "-o", "twice"];
+    let refused = desk.run(&[&same[..], &screen].concat());
+    assert!(text(&refused.stderr).contains("two pictures would go here"));
+}
+
+#[test]
+fn a_frame_that_cannot_be_keyed_does_not_stop_the_others() {
+    let desk = Desk::new();
+    write_green_ramp(&desk.path("0.png"), 0.5);
+    desk.write("1.png", "no picture");
+    let done = desk.run(&[
+        "matte",
+        "key",
+        "0.png",
+        "1.png",
+        "-o",
+        "keyed",
+        "--screen",
+        "0.02,0.6,0.05",
+    ]);
+    assert!(!done.status.success() && desk.path("keyed/0.png").exists());
+    let said = text(&done.stderr);
+    assert!(
+        said.contains("1.png") && said.contains("1 of 2 files"),
+        "{said}"
+    );
+}
+
 #[test]
 fn diff_speaks_like_idiff() {
     let desk = Desk::new();

@@ -1,21 +1,28 @@
-//! `petcomp matte key`: Blender's Keying node on one picture.
+//! `petcomp matte key`: Blender's Keying node on a picture, or on the frames of a sequence.
 
 use super::picture_files::{write_optional, write_picture};
+use crate::batch::FileBatch;
 use crate::diagnostics::report_diagnostics;
+use crate::global::GlobalArgs;
 use crate::values::parse_color;
-use anyhow::Result;
+use anyhow::{Context, Result};
 use petcomp::io::{self, FromFile, Override, Picture};
 use petcomp::matte::key::{Deviations, KeyOptions, Keyed, Keying, Profile, Screen};
 use petcomp::matte::{PlateOptions, ScreenPlate, SegmentOptions, segment};
 use petcomp::{Coverage, Image, LinearRgb, PremulRgba};
-use std::path::PathBuf;
+use rayon::prelude::*;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
 
-/// Keys a picture against a screen colour or plate, as Blender's Keying node does.
+/// Keys pictures against a screen colour or plate, as Blender's Keying node does.
 #[derive(clap::Args, Debug)]
 pub(crate) struct KeyArgs {
-    /// The picture to key; alpha is taken as premultiplied
-    input: PathBuf,
-    /// Where the premultiplied cut-out goes; an EXR holds 32-bit floats
+    /// The picture to key, or the frames of a sequence; alpha is taken as premultiplied
+    #[arg(required = true, value_name = "PICTURE")]
+    frames: Vec<PathBuf>,
+    /// Where the premultiplied cut-out goes, an EXR with 32-bit floats; of several frames, the
+    /// folder where each gets its own name, as --matte and --edges are then
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     /// Where the matte goes
@@ -50,45 +57,100 @@ pub(crate) struct KeyArgs {
 
 impl KeyArgs {
     /// The input and its mattes, those that there are.
-    fn read_input(&self, plate: Option<&Image<LinearRgb>>) -> Result<KeyerInput> {
+    fn read_input(&self, frame: &Path, plate: Option<&Image<LinearRgb>>) -> Result<KeyerInput> {
         if self.auto_mattes {
-            return self.with_found_mattes(plate);
+            return with_found_mattes(frame, plate);
         }
         Ok(KeyerInput {
-            photo: io::read(&self.input)?,
+            photo: io::read(frame)?,
             garbage: read_optional(&self.garbage)?,
             core: read_optional(&self.core)?,
         })
     }
 
-    fn with_found_mattes(&self, plate: Option<&Image<LinearRgb>>) -> Result<KeyerInput> {
-        let picture = Picture::read(&self.input)?;
-        let [garbage, core] = self.find_mattes(&picture.pixels()?, plate)?;
-        Ok(KeyerInput {
-            photo: picture.pixels()?,
-            garbage: Some(garbage),
-            core: Some(core),
-        })
+    /// What goes where: of several frames, everything into folders.
+    fn files(&self) -> Result<Vec<FrameFiles>> {
+        if let [frame] = &self.frames[..] {
+            return Ok(vec![self.files_of(frame, Path::to_owned)]);
+        }
+        let folders = [Some(&self.output), self.matte.as_ref(), self.edges.as_ref()];
+        folders
+            .into_iter()
+            .flatten()
+            .try_for_each(io::create_folder)?;
+        let files = self.frames.iter().map(|frame| {
+            let name = frame
+                .file_name()
+                .context(format!("{}: no file", frame.display()))?;
+            Ok(self.files_of(frame, |folder| folder.join(name)))
+        });
+        let files = files.collect::<Result<Vec<_>>>()?;
+        check_distinct(&files)?;
+        Ok(files)
     }
 
-    /// Garbage and core matte around and inside the object that is found in the photo.
-    fn find_mattes(
-        &self,
-        photo: &Image<LinearRgb>,
-        plate: Option<&Image<LinearRgb>>,
-    ) -> Result<[Image<Coverage>; 2]> {
-        let found =
-            segment(photo, &SegmentOptions::default()).map_err(|e| e.in_file(&self.input))?;
-        report_diagnostics(self.input.display(), &found.diagnostics);
-        Ok(match plate {
-            Some(plate) => found.mattes(photo, plate),
-            None => {
-                let options = PlateOptions::default();
-                let plate = ScreenPlate::fit_outside(photo, &found.mask, &options)?;
-                found.mattes(photo, &plate.image)
-            }
-        })
+    fn files_of(&self, frame: &Path, place: impl Fn(&Path) -> PathBuf) -> FrameFiles {
+        FrameFiles {
+            frame: frame.to_owned(),
+            cutout: place(&self.output),
+            matte: self.matte.as_deref().map(&place),
+            edges: self.edges.as_deref().map(&place),
+        }
     }
+}
+
+/// A frame, and where what is made of it goes.
+struct FrameFiles {
+    frame: PathBuf,
+    cutout: PathBuf,
+    matte: Option<PathBuf>,
+    edges: Option<PathBuf>,
+}
+
+/// Fails on the first file that two pictures would be written to.
+fn check_distinct(files: &[FrameFiles]) -> Result<()> {
+    let mut seen = BTreeSet::new();
+    let targets = files.iter().flat_map(|f| {
+        [Some(&f.cutout), f.matte.as_ref(), f.edges.as_ref()]
+            .into_iter()
+            .flatten()
+    });
+    for target in targets {
+        anyhow::ensure!(
+            seen.insert(target),
+            "{}: two pictures would go here",
+            target.display()
+        );
+    }
+    Ok(())
+}
+
+fn with_found_mattes(frame: &Path, plate: Option<&Image<LinearRgb>>) -> Result<KeyerInput> {
+    let picture = Picture::read(frame)?;
+    let [garbage, core] = find_mattes(frame, &picture.pixels()?, plate)?;
+    Ok(KeyerInput {
+        photo: picture.pixels()?,
+        garbage: Some(garbage),
+        core: Some(core),
+    })
+}
+
+/// Garbage and core matte around and inside the object that is found in a photo.
+fn find_mattes(
+    path: &Path,
+    photo: &Image<LinearRgb>,
+    plate: Option<&Image<LinearRgb>>,
+) -> Result<[Image<Coverage>; 2]> {
+    let found = segment(photo, &SegmentOptions::default()).map_err(|e| e.in_file(path))?;
+    report_diagnostics(path.display(), &found.diagnostics);
+    Ok(match plate {
+        Some(plate) => found.mattes(photo, plate),
+        None => {
+            let options = PlateOptions::default();
+            let plate = ScreenPlate::fit_outside(photo, &found.mask, &options)?;
+            found.mattes(photo, &plate.image)
+        }
+    })
 }
 
 /// What is keyed, and where it is sure not to be foreground, or to be foreground.
@@ -98,18 +160,16 @@ struct KeyerInput {
     core: Option<Image<Coverage>>,
 }
 
-pub(crate) fn run(args: &KeyArgs) -> Result<()> {
-    let options = args.options()?;
-    let plate: Option<Image<LinearRgb>> = read_optional(&args.plate)?;
-    let input = args.read_input(plate.as_ref())?;
-    let color = Screen::Color(args.screen.unwrap_or_default());
-    let keying = input.keying(plate.as_ref().map_or(color, Screen::Plate));
-    let keyed = keying.run(&options)?;
-    args.write_keyed(&keyed)?;
-    if let Some(path) = &args.edges {
-        write_picture(path, &keying.edges(&options)?)?;
+pub(crate) fn run(args: &KeyArgs, global: &GlobalArgs) -> Result<()> {
+    let work = KeyerWork {
+        options: args.options()?,
+        plate: read_optional(&args.plate)?,
+        args,
+    };
+    match &args.files()?[..] {
+        [one] => work.key(one, &mut Keyed::default()),
+        frames => work.key_sequence(frames, global),
     }
-    Ok(())
 }
 
 impl KeyArgs {
@@ -119,13 +179,53 @@ impl KeyArgs {
             ..io::from_overrides("key", &self.settings)?
         })
     }
+}
 
-    fn write_keyed(&self, keyed: &Keyed) -> Result<()> {
+/// What all frames have in common.
+struct KeyerWork<'a> {
+    args: &'a KeyArgs,
+    options: KeyOptions,
+    plate: Option<Image<LinearRgb>>,
+}
+
+impl KeyerWork<'_> {
+    /// Frames side by side: while some are read or written, others are keyed. A frame that cannot
+    /// be keyed does not stop the others.
+    fn key_sequence(&self, frames: &[FrameFiles], global: &GlobalArgs) -> Result<()> {
+        let progress = global.start_progress("frames");
+        let batch = Mutex::new((FileBatch::default(), 0));
+        frames
+            .par_iter()
+            .for_each_init(Keyed::default, |keyed, frame| {
+                let outcome = self.key(frame, keyed);
+                if let Ok((batch, done)) = batch.lock().as_deref_mut() {
+                    batch.count(outcome);
+                    *done += 1;
+                    progress.update(*done, frames.len() as u64);
+                }
+            });
+        drop(progress);
+        batch
+            .into_inner()
+            .map_or(Ok(()), |(batch, _)| batch.finish())
+    }
+
+    /// One frame, into pictures that are already there.
+    fn key(&self, files: &FrameFiles, keyed: &mut Keyed) -> Result<()> {
+        let input = self.args.read_input(&files.frame, self.plate.as_ref())?;
+        let color = Screen::Color(self.args.screen.unwrap_or_default());
+        let keying = input.keying(self.plate.as_ref().map_or(color, Screen::Plate));
+        let located = |e: petcomp::Error| e.in_file(&files.frame);
+        keying.run_into(&self.options, keyed).map_err(located)?;
         if keyed.deviations != Deviations::default() {
-            log::warn!("{}: {}", self.input.display(), keyed.deviations);
+            log::warn!("{}: {}", files.frame.display(), keyed.deviations);
         }
-        write_picture(&self.output, &keyed.cutout)?;
-        write_optional(&self.matte, &keyed.matte)
+        write_picture(&files.cutout, &keyed.cutout)?;
+        write_optional(&files.matte, &keyed.matte)?;
+        match &files.edges {
+            Some(path) => write_picture(path, &keying.edges(&self.options)?),
+            None => Ok(()),
+        }
     }
 }
 

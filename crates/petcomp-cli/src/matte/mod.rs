@@ -16,7 +16,8 @@ pub(crate) enum MatteCommand {
     Segment(segment::SegmentArgs),
     /// Find the object, key it, and write it without its background
     Cut(cut::CutArgs),
-    /// Key a picture against a screen colour or plate, as Blender's Keying node does
+    /// Key a picture, or the frames of a sequence, against a screen colour or plate, as Blender's
+    /// Keying node does
     Key(Box<key::KeyArgs>),
     /// Solve one photo on a coloured screen for what it reflects and what it lets through
     Film(film::FilmArgs),
@@ -30,7 +31,7 @@ pub(crate) fn run(command: &MatteCommand, global: &GlobalArgs) -> anyhow::Result
     match command {
         MatteCommand::Segment(args) => segment::run(args, global),
         MatteCommand::Cut(args) => cut::run(args, global),
-        MatteCommand::Key(args) => key::run(args),
+        MatteCommand::Key(args) => key::run(args, global),
         MatteCommand::Film(args) => args.run(global),
         MatteCommand::Triangulate(args) => args.run(global),
         MatteCommand::Node(command) => nodes::run(command),
