@@ -1,7 +1,6 @@
 //! Four numbers that are worked on together, as one vector register.
 
 use crate::pixel::{LinearRgb, PremulRgba};
-use crate::render::float8::Float8;
 use bytemuck::{Pod, Zeroable};
 
 /// Numbers between which others lie.
@@ -13,8 +12,8 @@ pub(super) trait Blend: Copy {
     #[inline(always)]
     fn bilinear(top: [Self; 2], bottom: [Self; 2], fx: f32, fy: f32) -> Self {
         top[0]
-            .lerp(top[1], fx)
-            .lerp(bottom[0].lerp(bottom[1], fx), fy)
+            .lerp(bottom[0], fy)
+            .lerp(top[1].lerp(bottom[1], fy), fx)
     }
 }
 
@@ -84,11 +83,6 @@ impl Float4 {
         Self(self.0.map(|v| v.max(0.0).min(1.0)))
     }
 
-    #[inline(always)]
-    fn beside(self, o: Self) -> Float8 {
-        Float8::new(self, o)
-    }
-
     /// The same with another fourth number.
     #[inline(always)]
     pub(super) fn with_fourth(self, fourth: f32) -> Self {
@@ -97,12 +91,15 @@ impl Float4 {
 }
 
 impl Blend for Float4 {
-    /// Both columns at once, then between them.
+    /// Both columns at once, in one register, then between them.
     #[inline(always)]
     fn bilinear(top: [Self; 2], bottom: [Self; 2], fx: f32, fy: f32) -> Self {
-        let columns = top[0].beside(top[1]).lerp(bottom[0].beside(bottom[1]), fy);
-        columns.color().lerp(columns.opacity(), fx)
+        let (top, bottom): ([f32; 8], [f32; 8]) = (bytemuck::cast(top), bytemuck::cast(bottom));
+        let columns: [f32; 8] = std::array::from_fn(|i| top[i] + fy * (bottom[i] - top[i]));
+        let [left, right]: [Self; 2] = bytemuck::cast(columns);
+        left.lerp(right, fx)
     }
+
 
     #[inline(always)]
     fn lerp(self, o: Self, t: f32) -> Self {

@@ -13,6 +13,8 @@ use nalgebra::Matrix3;
 pub(super) struct Lattice {
     /// Distance of nodes, pixels.
     cell: f64,
+    /// The same that textures are read for, as a share of it.
+    pub(super) detail: f64,
     /// The camera, in nodes instead of pixels.
     pub(super) view: CameraView,
 }
@@ -29,7 +31,20 @@ impl Lattice {
             height: node_count(view.height, cell),
             ..*view
         };
-        Self { cell, view }
+        Self {
+            cell,
+            detail: 1.0,
+            view,
+        }
+    }
+
+    /// The lattice of [`COARSER`] times the distance. What throws shadows on it is read as if nodes
+    /// were half as far apart: blurred more, many layers on each other would take away too much.
+    pub(super) fn coarser(view: &CameraView, cell: f64) -> Self {
+        Self {
+            detail: 0.5,
+            ..Self::new(view, COARSER as f64 * cell)
+        }
     }
 
     /// Lattice positions of the picture positions `i + 0.5 + offset`, for all `i` below `pixels`

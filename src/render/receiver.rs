@@ -122,7 +122,7 @@ impl<'a> LightingContext<'a> {
     ) -> Self {
         Self {
             fine: Lattice::new(view, options.cell_px),
-            coarse: Lattice::new(view, COARSER as f64 * options.cell_px),
+            coarse: Lattice::coarser(view, options.cell_px),
             occluders: Occluders::new(cards, ScenePlane::shadow_catcher(shot.catcher)),
             shot,
             options,
@@ -167,7 +167,8 @@ impl<'a> LightingContext<'a> {
         if area.0.len() < 2 || area.1.len() < 2 {
             return None;
         }
-        let shadowed = ShadowedReceiver::new(&projected, &area, view, Some(own), &plane.center);
+        let shadowed =
+            ShadowedReceiver::new(&projected, &area, lattice, Some(own), &plane.center);
         let groups = self.ray_groups(&shadowed, lights);
         let outline = seen.outline(&projected);
         Some(self.receiver(projected, groups, lights, (outline, area)))
@@ -194,7 +195,7 @@ impl<'a> LightingContext<'a> {
         let projected = ProjectedPlane::from_above(&self.occluders.surface, view)?;
         let everywhere = view.whole_area();
         let origin = Vector3::zeros();
-        let shadowed = ShadowedReceiver::new(&projected, &everywhere, view, None, &origin);
+        let shadowed = ShadowedReceiver::new(&projected, &everywhere, lattice, None, &origin);
         let groups = self.ray_groups(&shadowed, lights);
         let area = shadowed_area(&groups);
         Some(self.receiver(

@@ -4,6 +4,7 @@
 use crate::geom::Vector3;
 use crate::render::float4::Float4;
 use crate::render::half_plane::{ConvexShape, nodes_inside, quad_sides};
+use crate::render::lattice::Lattice;
 use crate::render::light_samples::LightSample;
 use crate::render::occluders::{Occluder, Occluders};
 use crate::render::opacity::OpacityLevel;
@@ -36,7 +37,7 @@ pub(super) struct ShadowedReceiver<'a> {
     pub(super) view: &'a CameraView,
     /// Its number among the cards; none for the surface.
     pub(super) own: Option<usize>,
-    /// Distance of nodes on it.
+    /// Distance on it that textures are read for.
     pub(super) cell_m: f64,
 }
 
@@ -45,16 +46,16 @@ impl<'a> ShadowedReceiver<'a> {
     pub(super) fn new(
         plane: &'a ProjectedPlane,
         area: &'a LatticeArea,
-        view: &'a CameraView,
+        lattice: &'a Lattice,
         own: Option<usize>,
         target: &Vector3<f64>,
     ) -> Self {
         Self {
             plane,
             area,
-            view,
+            view: &lattice.view,
             own,
-            cell_m: plane.cell_metres(view, target),
+            cell_m: lattice.detail * plane.cell_metres(&lattice.view, target),
         }
     }
 

@@ -206,7 +206,7 @@ mod tests {
         let rows = [measure_setting(&single, &[heap(0, 5).unwrap()]).unwrap()];
         assert_eq!(
             (rows[0].rate, rows[0].rested, rows[0].wrong_slopes),
-            (480, 1, 0)
+            (360, 1, 0)
         );
         assert_eq!(table(&rows).rows.len(), 1);
         assert!(charts(&rows).iter().all(|chart| chart.defaults.len() == 1));

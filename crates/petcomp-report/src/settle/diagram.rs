@@ -192,7 +192,7 @@ mod tests {
             ..row(rate, 4, 1)
         };
         let why = why_default(&[
-            fine(480, 20.0),
+            fine(360, 20.0),
             fine(240, 10.0),
             SettleRow {
                 stack_mm: 1.0,
@@ -206,7 +206,7 @@ mod tests {
         assert!(why.contains("is one of them") && why_default(&[]).is_empty());
         let late = SettleRow {
             rested: 3,
-            ..fine(480, 20.0)
+            ..fine(360, 20.0)
         };
         assert!(why_default(&[late, fine(960, 40.0)]).contains("is NOT one of them"));
     }

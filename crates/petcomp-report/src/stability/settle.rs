@@ -309,8 +309,8 @@ fn shortened(mut fall: HardFall) -> HardFall {
 fn impossible_falls() -> Result<Vec<HardFall>> {
     let larger = changed(heap(6, 3)?, 0.3, |_, object| object.size = [0.9, 0.7]);
     let in_one_place = changed(heap(6, 12)?, 0.0, drop_in_one_place);
-    let mut longer_steps = resting_fall("steps twice as long", heap(6, 20)?).that_ends();
-    longer_steps.options = with_step_times(2.0);
+    let mut longer_steps = resting_fall("steps half as long again", heap(6, 20)?).that_ends();
+    longer_steps.options = with_step_times(1.5);
     let longest_steps = resting_fall("steps 4 times too long", heap(6, 20)?);
     Ok(vec![
         resting_fall("larger than the box", larger).that_is_refused(with_step_times(1.0)),
