@@ -28,7 +28,7 @@ pub(crate) struct ReportFlags {
         default_value_t = 0,
         global = true
     )]
-    threads: usize,
+    pub(crate) threads: usize,
     /// Print nothing but results and errors
     #[arg(short, long, global = true)]
     quiet: bool,

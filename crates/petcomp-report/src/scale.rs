@@ -15,12 +15,14 @@ mod forecast;
 mod grid;
 mod pictures;
 mod process;
+mod recipe;
 mod run;
 mod show;
 
 pub use fit::{CostFit, CostModel};
 pub use forecast::{Forecast, forecast};
 pub use grid::ScaleCase;
+pub use recipe::{Estimate, RecipeRecord, RecipeRun, RunSample, run_recipe, write_recipe};
 pub use run::run;
 pub use show::{charts, tables};
 

@@ -1,9 +1,10 @@
-//! `petcomp-report scale`: memory and rate, and what a million pictures take.
+//! `petcomp-report scale`: memory and rate, and what a million pictures take; of scenes made in
+//! code, or of a recipe.
 
 use super::count;
 use crate::ReportFlags;
-use petcomp_report::scale::{self, ScaleOptions};
-use std::path::PathBuf;
+use petcomp_report::scale::{self, RecipeRun, ScaleOptions};
+use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -16,6 +17,19 @@ pub(crate) struct Args {
     /// Most threads, 1 to 1024; by default one per core
     #[arg(long, value_name = "N", default_value_t = ScaleOptions::default().threads, value_parser = count(1..=1024))]
     most_threads: usize,
+    /// Measure a dataset of this recipe instead, made by the program `petcomp`: scale_recipe.csv,
+    /// scale_recipe.md and a chart
+    #[arg(long, value_name = "RECIPE")]
+    recipe: Option<PathBuf>,
+    /// Pictures of that recipe to make
+    #[arg(short = 'n', long, value_name = "N", default_value_t = 2000, value_parser = clap::value_parser!(u64).range(100..=1_000_000))]
+    pictures: u64,
+    /// Pictures of the beginning that the rest is forecast from
+    #[arg(long, value_name = "N", default_value_t = 500, value_parser = clap::value_parser!(u64).range(50..=1_000_000))]
+    first: u64,
+    /// The program to measure [default: petcomp beside this one]
+    #[arg(long, value_name = "PROGRAM")]
+    petcomp: Option<PathBuf>,
     /// Instead, measure this point in this process and print it (JSON)
     #[arg(long, value_name = "JSON", hide = true)]
     case: Option<String>,
@@ -33,6 +47,9 @@ pub(crate) fn run(args: &Args, common: &ReportFlags) -> anyhow::Result<()> {
     if let Some(case) = &args.case {
         return print_measurement(case, args.seconds);
     }
+    if let Some(recipe) = &args.recipe {
+        return measure_recipe(args, recipe, common);
+    }
     let measured = common.with_progress("measuring", |progress| {
         scale::write(&args.output, &args.options(), progress)
     })?;
@@ -42,6 +59,31 @@ pub(crate) fn run(args: &Args, common: &ReportFlags) -> anyhow::Result<()> {
     let folder = args.output.display();
     common.print_line(format_args!("{folder}: scale.csv, scale.md and two charts"));
     Ok(())
+}
+
+fn measure_recipe(args: &Args, recipe: &Path, common: &ReportFlags) -> anyhow::Result<()> {
+    let run = RecipeRun {
+        program: args.petcomp.clone().unwrap_or_else(beside_this_program),
+        recipe: recipe.to_owned(),
+        pictures: args.pictures,
+        first: args.first,
+        threads: common.threads,
+    };
+    let table = common.with_progress("pictures", |progress| {
+        scale::write_recipe(&args.output, &run, progress)
+    })?;
+    println!("{}", table.markdown());
+    let folder = args.output.display();
+    common.print_line(format_args!(
+        "{folder}: scale_recipe.csv, scale_recipe.md, scale_recipe.svg"
+    ));
+    Ok(())
+}
+
+fn beside_this_program() -> PathBuf {
+    std::env::current_exe()
+        .unwrap_or_default()
+        .with_file_name("petcomp")
 }
 
 /// Measures one point (JSON) in this process.
