@@ -43,6 +43,7 @@ fn scene(k: u64) -> Scene {
         exposure: Exposure::default(),
         edges: Default::default(),
         cast: Default::default(),
+        light_direction: Default::default(),
         light_map: Default::default(),
         interreflection: Default::default(),
         view: Default::default(),

@@ -120,6 +120,7 @@ fn sample_of(shot: Shot, options: &LabelOptions) -> Result<Sample> {
         environment: None,
         exposure: Exposure::default(),
         cast: LightTint::default(),
+        light_direction: Default::default(),
         light_map: Default::default(),
         interreflection: Default::default(),
         view: Default::default(),

@@ -200,6 +200,7 @@ mod tests {
             exposure: Default::default(),
             edges: Default::default(),
             cast: Default::default(),
+            light_direction: Default::default(),
             light_map: Default::default(),
             interreflection: Default::default(),
             view: Default::default(),

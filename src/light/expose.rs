@@ -4,6 +4,7 @@ use crate::color::Albedo;
 use crate::geom::Point3;
 use crate::image::Image;
 use crate::light::irradiance::white_card_at;
+use crate::light::lamp::match_lamp;
 use crate::light::light_map::match_light_map;
 use crate::light::{match_blur, match_light_tint, match_noise, surface_color, value_of_rank};
 use crate::pixel::LinearRgb;
@@ -15,12 +16,13 @@ use crate::scene::{Exposure, Scene};
 /// paper.
 const WHITE_PERCENTILE: f64 = 0.99;
 
-/// Estimates what a scene leaves to its plate: the colour of the light, how it is spread, the
-/// exposure, the blur, the noise.
+/// Estimates what a scene leaves to its plate: where its light stands, the colour of the light,
+/// how it is spread, the exposure, the blur, the noise.
 ///
 /// A scene that leaves nothing comes back as it is.
 pub fn match_plate(scene: Scene, plate: &Image<LinearRgb>) -> Scene {
-    let lit = match_light_map(match_light_tint(scene, plate), plate);
+    let tinted = match_light_tint(match_lamp(scene, plate), plate);
+    let lit = match_light_map(tinted, plate);
     let exposed = expose(lit, plate);
     match_noise(match_blur(exposed, plate), plate)
 }
@@ -108,6 +110,7 @@ mod tests {
             exposure,
             edges: Default::default(),
             cast: Default::default(),
+            light_direction: Default::default(),
             light_map: Default::default(),
             interreflection: Default::default(),
             view: Default::default(),

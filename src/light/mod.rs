@@ -30,6 +30,7 @@ mod area;
 mod blur;
 mod expose;
 mod irradiance;
+mod lamp;
 mod light_map;
 mod nodes;
 mod noise;

@@ -112,6 +112,7 @@ pub(super) mod tests {
             exposure: Exposure::Ev(0.0),
             edges: Default::default(),
             cast,
+            light_direction: Default::default(),
             light_map: Default::default(),
             interreflection: Default::default(),
             view: Default::default(),

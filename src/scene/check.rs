@@ -53,6 +53,7 @@ impl Scene {
         check_each(&self.lights, "lights", check_light)?;
         self.check_surroundings()?;
         check_cast(&self.cast)?;
+        self.light_direction.check()?;
         self.light_map.check()?;
         check_shares(self.interreflection, "interreflection")
     }
@@ -350,6 +351,7 @@ mod tests {
             exposure: Exposure::MatchPlate { gain_ev: 0.25 },
             edges: Default::default(),
             cast: Default::default(),
+            light_direction: Default::default(),
             light_map: Default::default(),
             interreflection: Default::default(),
             view: Default::default(),

@@ -68,6 +68,7 @@ mod tests {
             exposure: Exposure::default(),
             edges: Default::default(),
             cast: Default::default(),
+            light_direction: Default::default(),
             light_map: Default::default(),
             interreflection: Default::default(),
             view: Default::default(),

@@ -56,6 +56,7 @@ mod holdout;
 mod hull;
 mod lens;
 mod light;
+mod light_direction;
 mod light_map;
 mod locate;
 mod palette;
@@ -105,6 +106,8 @@ pub(crate) use hull::doubled_area;
 pub use lens::{Lens, LensRanges, ThinLens};
 pub use light::{AreaLight, Exposure, LightShape, LightTint};
 #[doc(hidden)]
+#[doc(hidden)]
+pub use light_direction::{LightDirection, LightDirectionSource};
 pub use light_map::{LightGrid, LightMap};
 pub use locate::locate;
 #[doc(hidden)]
@@ -176,6 +179,9 @@ pub struct Scene {
     /// bring their own.
     #[serde(default, skip_serializing_if = "LightTint::is_white")]
     pub cast: LightTint,
+    /// Where the first light stands. Default: where `lights` says.
+    #[serde(default, skip_serializing_if = "LightDirection::is_known")]
+    pub light_direction: LightDirection,
     /// How the light is spread over the surface, on top of what lights and environment do.
     #[serde(default, skip_serializing_if = "LightMap::is_even")]
     pub light_map: LightMap,
@@ -211,6 +217,7 @@ impl Scene {
             environment: None,
             exposure: Exposure::Ev(0.0),
             cast: LightTint::default(),
+            light_direction: LightDirection::Known,
             light_map: LightMap::default(),
             interreflection: LinearRgb::BLACK,
             edges: EdgeTreatment::AsIs,

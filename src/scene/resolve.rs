@@ -203,6 +203,9 @@ impl Scene {
         if self.finish.blur_px == Blur::MatchPlate {
             return Err(unmatched("finish.blur_px"));
         }
+        if !self.light_direction.is_known() {
+            return Err(unmatched("light_direction"));
+        }
         match self.cast {
             LightTint::Known(color) => Ok(color),
             LightTint::MatchSurface { .. } => Err(unmatched("cast")),
@@ -318,6 +321,7 @@ mod tests {
             exposure: Exposure::Ev(1.0),
             edges: Default::default(),
             cast: Default::default(),
+            light_direction: Default::default(),
             light_map: Default::default(),
             interreflection: Default::default(),
             belt: None,

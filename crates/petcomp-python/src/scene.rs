@@ -67,6 +67,7 @@ pub(crate) fn empty_scene(camera: &Camera) -> Scene {
         environment: None,
         exposure: Default::default(),
         cast: Default::default(),
+        light_direction: Default::default(),
         light_map: Default::default(),
         interreflection: Default::default(),
         belt: None,

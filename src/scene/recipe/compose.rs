@@ -118,6 +118,7 @@ impl Recipe {
             environment: self.environment.draw(draws),
             exposure: self.exposure(background, self.gain_ev.draw(draws, "gain_ev")),
             cast: self.cast(background),
+            light_direction: self.light_direction.draw(draws),
             light_map: self.light_map.clone(),
             interreflection: self.draw_interreflection(draws, background),
             edges: EdgeTreatment::draw(&self.edges, draws),

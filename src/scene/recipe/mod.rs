@@ -17,7 +17,7 @@ use crate::scene::check::{check_albedo, check_cast, check_count, check_each, che
 use crate::scene::stack::too_large;
 use crate::scene::{
     AssetVariant, Background, BeltRanges, Count, DrawLog, Drawn, DropRanges, EdgeTreatment,
-    EnvironmentRanges, LensRanges, LightMap, LightTint, PostProcessRanges, Range, Scene,
+    EnvironmentRanges, LensRanges, LightDirectionSource, LightMap, LightTint, PostProcessRanges, Range, Scene,
     SettleOptions, Surface, Take, Variation, ViewRanges, WallRanges,
 };
 use compose::{Places, SceneNumber};
@@ -100,6 +100,10 @@ pub struct Recipe {
     /// Colour of the light: `{ match_surface = { share = 0.5 } }` takes half of the surface's.
     /// Default: white.
     pub cast: LightTint,
+    /// Where the first light stands: `match_walls` finds it by which walls of the surface the photo
+    /// shows bright. Default: `drawn`.
+    #[serde(skip_serializing_if = "LightDirectionSource::is_drawn")]
+    pub light_direction: LightDirectionSource,
     /// How the light is spread over the surface: `{ match_surface = { share = 1 } }` takes the
     /// gradients that the plate shows. Default: evenly.
     #[serde(skip_serializing_if = "LightMap::is_even")]
@@ -147,6 +151,7 @@ impl Default for Recipe {
             collider: Collider::Box,
             surface_albedo: None,
             cast: LightTint::default(),
+            light_direction: LightDirectionSource::Drawn,
             light_map: LightMap::default(),
             interreflection: Range::fixed(0.0),
             belt: None,

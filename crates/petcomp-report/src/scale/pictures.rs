@@ -153,6 +153,7 @@ fn heap_scene(case: &ScaleCase) -> Scene {
         exposure: Exposure::Ev(0.0),
         edges: Default::default(),
         cast: Default::default(),
+        light_direction: Default::default(),
         light_map: Default::default(),
         interreflection: Default::default(),
         belt: None,

@@ -138,6 +138,7 @@ pub(super) fn empty_scene(camera: Camera) -> Scene {
         exposure: Exposure::Ev(0.0),
         edges: Default::default(),
         cast: Default::default(),
+        light_direction: Default::default(),
         light_map: Default::default(),
         interreflection: Default::default(),
         belt: None,

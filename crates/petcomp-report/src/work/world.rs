@@ -114,6 +114,7 @@ impl FixtureFolder {
             exposure: Exposure::Ev(0.0),
             edges: Default::default(),
             cast: Default::default(),
+            light_direction: Default::default(),
             light_map: Default::default(),
             interreflection: Default::default(),
             belt: None,
