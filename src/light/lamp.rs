@@ -200,10 +200,12 @@ fn fit_strengths(rows: &[[f64; 3]]) -> [f64; 2] {
     let [aa, ab, bb, as_, bs] = [sum(0, 0), sum(0, 1), sum(1, 1), sum(0, 2), sum(1, 2)];
     let determinant = aa * bb - ab * ab;
     let both = [bb * as_ - ab * bs, aa * bs - ab * as_].map(|x| x / determinant);
-    match both {
-        [a, _] if !(a >= 0.0) => [0.0, (bs / bb).max(0.0)],
-        [_, b] if !(b >= 0.0) => [(as_ / aa).max(0.0), 0.0],
-        both => both,
+    if both[0] < 0.0 {
+        [0.0, (bs / bb).max(0.0)]
+    } else if both[1] < 0.0 || determinant <= 0.0 {
+        [(as_ / aa).max(0.0), 0.0]
+    } else {
+        both
     }
 }
 

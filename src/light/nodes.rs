@@ -102,7 +102,11 @@ fn ring_radius(shares: usize, n: usize) -> f64 {
         return 0.0;
     }
     let count = (n * n) as f64;
-    let middle = if n % 2 == 1 { 1.0 / (count * count) } else { 0.0 };
+    let middle = if n % 2 == 1 {
+        1.0 / (count * count)
+    } else {
+        0.0
+    };
     (shares as f64 / (2.0 * count * (1.0 - middle))).sqrt()
 }
 

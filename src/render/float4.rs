@@ -100,7 +100,6 @@ impl Blend for Float4 {
         left.lerp(right, fx)
     }
 
-
     #[inline(always)]
     fn lerp(self, o: Self, t: f32) -> Self {
         Self(std::array::from_fn(|i| {

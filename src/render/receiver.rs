@@ -167,8 +167,7 @@ impl<'a> LightingContext<'a> {
         if area.0.len() < 2 || area.1.len() < 2 {
             return None;
         }
-        let shadowed =
-            ShadowedReceiver::new(&projected, &area, lattice, Some(own), &plane.center);
+        let shadowed = ShadowedReceiver::new(&projected, &area, lattice, Some(own), &plane.center);
         let groups = self.ray_groups(&shadowed, lights);
         let outline = seen.outline(&projected);
         Some(self.receiver(projected, groups, lights, (outline, area)))
@@ -470,12 +469,7 @@ impl RowSums {
     }
 
     /// Adds what is hidden of a piece of the sky; what it gives in the open is in the open sky.
-    fn hide_sky(
-        &mut self,
-        ray: (&ShadowRay, usize),
-        irradiance: Float4,
-        buffers: &mut RayBuffers,
-    ) {
+    fn hide_sky(&mut self, ray: (&ShadowRay, usize), irradiance: Float4, buffers: &mut RayBuffers) {
         let Some(nodes) = buffers.see_through(ray, self.j, &self.requested) else {
             return;
         };
@@ -483,12 +477,7 @@ impl RowSums {
     }
 
     /// Adds what is hidden of a piece of an area light, by its strength at each node.
-    fn hide_face(
-        &mut self,
-        ray: (&ShadowRay, usize),
-        radiance: Float4,
-        buffers: &mut RayBuffers,
-    ) {
+    fn hide_face(&mut self, ray: (&ShadowRay, usize), radiance: Float4, buffers: &mut RayBuffers) {
         let Some(nodes) = buffers.see_through(ray, self.j, &self.requested) else {
             return;
         };

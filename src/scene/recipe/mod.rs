@@ -17,8 +17,8 @@ use crate::scene::check::{check_albedo, check_cast, check_count, check_each, che
 use crate::scene::stack::too_large;
 use crate::scene::{
     AssetVariant, Background, BeltRanges, Count, DrawLog, Drawn, DropRanges, EdgeTreatment,
-    EnvironmentRanges, LensRanges, LightDirectionSource, LightMap, LightTint, PostProcessRanges, Range, Scene,
-    SettleOptions, Surface, Take, Variation, ViewRanges, WallRanges,
+    EnvironmentRanges, LensRanges, LightDirectionSource, LightMap, LightTint, PostProcessRanges,
+    Range, Scene, SettleOptions, Surface, Take, Variation, ViewRanges, WallRanges,
 };
 use compose::{Places, SceneNumber};
 use serde::{Deserialize, Serialize};
