@@ -31,6 +31,12 @@ use petcomp::{Error, Result, io};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
+/// Pictures that are forecast.
+const FORECAST_PICTURES: f64 = 1e6;
+const SECONDS_PER_HOUR: f64 = 3600.0;
+const MS_PER_SECOND: f64 = 1e3;
+const MB_PER_BYTE: f64 = 1e-6;
+
 /// Options of the report.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ScaleOptions {

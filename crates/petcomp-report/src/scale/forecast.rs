@@ -1,9 +1,9 @@
 //! What many pictures take on many machines, from the model of one.
 
-use super::{CostModel, ScaleCase, ScaleMeasurements, ScalePoint, grid, missing_error};
+use super::{
+    CostModel, SECONDS_PER_HOUR, ScaleCase, ScaleMeasurements, ScalePoint, grid, missing_error,
+};
 use petcomp::Result;
-
-const SECONDS_PER_HOUR: f64 = 3600.0;
 
 /// What a dataset of default pictures is expected to take.
 #[derive(Clone, Debug, PartialEq)]

@@ -7,6 +7,8 @@
 //! the differences between blocks of equal length give, so that slow drifts count. Memory is a line
 //! through the means of the same blocks but for the first ones, while caches fill.
 
+use super::process::{BYTES_PER_KIB, kibibytes_of};
+use super::{FORECAST_PICTURES, MB_PER_BYTE, MS_PER_SECOND, SECONDS_PER_HOUR};
 use crate::columns::table_from;
 use petcomp::plot::{Axis, Chart, Curve, Table};
 use petcomp::{Error, Result, io};
@@ -20,14 +22,9 @@ const BLOCKS: usize = 20;
 const WARM_UP_BLOCKS: usize = 4;
 /// Normal quantile of intervals that hold in 95 of 100 cases.
 const Z95: f64 = 1.96;
-const MILLION: f64 = 1e6;
 /// Pictures that memory is extrapolated to.
 const MANY_PICTURES: f64 = 1e5;
-const SECONDS_PER_HOUR: f64 = 3600.0;
-const MS_PER_SECOND: f64 = 1e3;
-const MB_PER_BYTE: f64 = 1e-6;
 const GB_PER_BYTE: f64 = 1e-9;
-const BYTES_PER_KIB: f64 = 1024.0;
 
 /// A dataset to be made and watched.
 #[derive(Clone, Debug)]
@@ -148,7 +145,7 @@ fn sample_of(id: u32, done: u64) -> Option<RunSample> {
     Some(RunSample {
         done,
         cpu_seconds: cpu_seconds_in(&read("stat")?)?,
-        resident_bytes: resident_kib_in(&read("status")?)? * BYTES_PER_KIB,
+        resident_bytes: kibibytes_of(&read("status")?, "VmRSS:")? * BYTES_PER_KIB,
     })
 }
 
@@ -159,11 +156,6 @@ fn cpu_seconds_in(stat: &str) -> Option<f64> {
     let ticks = |field: usize| fields.get(field)?.parse::<f64>().ok();
     let ticks_per_second = rustix::param::clock_ticks_per_second() as f64;
     Some((ticks(11)? + ticks(12)?) / ticks_per_second)
-}
-
-fn resident_kib_in(status: &str) -> Option<f64> {
-    let mut values = status.lines().filter_map(|l| l.strip_prefix("VmRSS:"));
-    values.next()?.split_whitespace().next()?.parse().ok()
 }
 
 /// Of all files below a folder.
@@ -238,7 +230,7 @@ impl RecipeRecord {
         let all = self.picture_seconds(0, last)?;
         let [slope, many] = self.memory();
         let pictures = last as f64;
-        let hours = MILLION / SECONDS_PER_HOUR;
+        let hours = FORECAST_PICTURES / SECONDS_PER_HOUR;
         let lines = [
             [
                 format!("CPU ms a picture, of the first {first}"),
@@ -264,7 +256,10 @@ impl RecipeRecord {
             ["files".into(), self.files.to_string()],
             [
                 "GB of a million".into(),
-                format!("{:.1}", self.bytes / pictures * MILLION * GB_PER_BYTE),
+                format!(
+                    "{:.1}",
+                    self.bytes / pictures * FORECAST_PICTURES * GB_PER_BYTE
+                ),
             ],
             [
                 "most memory, MB".into(),
@@ -441,7 +436,7 @@ mod tests {
         let ticks = rustix::param::clock_ticks_per_second() as f64;
         assert_eq!(cpu_seconds_in(stat), Some(300.0 / ticks));
         assert_eq!(
-            resident_kib_in("VmHWM:\t 9 kB\nVmRSS:\t  12 kB\n"),
+            kibibytes_of("VmHWM:\t 9 kB\nVmRSS:\t  12 kB\n", "VmRSS:"),
             Some(12.0)
         );
         assert_eq!(

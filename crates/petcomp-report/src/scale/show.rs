@@ -1,18 +1,15 @@
 //! Tables and charts of what was measured, beside what the model says.
 
 use super::{
-    CostFit, CostModel, Forecast, ScaleCase, ScaleMeasurements, ScalePoint, forecast, grid,
+    CostFit, CostModel, FORECAST_PICTURES, Forecast, MB_PER_BYTE, MS_PER_SECOND, ScaleCase,
+    ScaleMeasurements, ScalePoint, forecast, grid,
 };
 use crate::columns::{Column, table_from, table_of};
 use petcomp::Result;
 use petcomp::plot::{Axis, Chart, Curve, Table};
 
-/// Pictures that are forecast.
-const FORECAST_PICTURES: f64 = 1e6;
 /// Machines that share them.
 const MACHINES: [usize; 3] = [1, 10, 100];
-const MB_PER_BYTE: f64 = 1e-6;
-const MS_PER_SECOND: f64 = 1e3;
 
 /// Tables with their titles: all points and residuals first, then the model, threads, falls, and a
 /// million pictures.
