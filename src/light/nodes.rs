@@ -15,14 +15,6 @@ pub struct Node {
     pub area: f64,
 }
 
-impl Node {
-    /// Irradiance at `point` by unit radiance from this node: `cos cos / r^2 dA`; 0 below either
-    /// horizon.
-    pub fn irradiance(&self, frame: &LightFrame, point: Point3<f64>, normal: Vector3<f64>) -> f64 {
-        geometry_term(&(self.point - point), &frame.normal, &normal) * self.area
-    }
-}
-
 /// `cos cos / r^2` on the way from a point of unit normal to one of a light's face; 0 below either
 /// horizon.
 pub(crate) fn geometry_term(
@@ -253,6 +245,14 @@ mod tests {
     use crate::light::area::radiance;
     use crate::light::area::tests::{lit_points, square};
     use std::f64::consts::PI;
+
+    impl Node {
+        /// Irradiance at `point` by unit radiance from this node: `cos cos / r^2 dA`; 0 below either
+        /// horizon.
+        fn irradiance(&self, frame: &LightFrame, point: Point3<f64>, normal: Vector3<f64>) -> f64 {
+            geometry_term(&(self.point - point), &frame.normal, &normal) * self.area
+        }
+    }
 
     #[test]
     fn nine_nodes_match_the_closed_form() {

@@ -79,9 +79,9 @@ impl ConvexShape {
     }
 
     /// Left and right ends of `N` rows from row `first` on; reversed where a row has nothing.
-    pub(super) fn row_spans<const N: usize>(&self, first: usize) -> ([f64; N], [f64; N]) {
+    pub(super) fn row_spans<const N: usize>(&self, first: f64) -> ([f64; N], [f64; N]) {
         let (mut lows, mut highs) = ([f64::NEG_INFINITY; N], [f64::INFINITY; N]);
-        let at = |[a, b]: [f64; 2], k: usize| a * (first + k) as f64 + b;
+        let at = |[a, b]: [f64; 2], k: usize| a * (first + k as f64) + b;
         let [rights, lefts, levels] = self.kinds();
         for &line in rights {
             for (k, low) in lows.iter_mut().enumerate() {
@@ -107,16 +107,8 @@ impl ConvexShape {
 
     /// As the function [`row_span`].
     pub(super) fn row_span(&self, y: f64) -> (f64, f64) {
-        let at = |[a, b]: &[f64; 2]| a * y + b;
-        let [rights, lefts, levels] = self.kinds();
-        if levels.iter().any(|line| at(line) < 0.0) {
-            return (f64::INFINITY, f64::NEG_INFINITY);
-        }
-        let (lows, highs) = (rights.iter().map(at), lefts.iter().map(at));
-        (
-            lows.fold(f64::NEG_INFINITY, |m, x| greater(x, m)),
-            highs.fold(f64::INFINITY, |m, x| -greater(-x, -m)),
-        )
+        let ([low], [high]) = self.row_spans(y);
+        (low, high)
     }
 }
 

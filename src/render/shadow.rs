@@ -319,7 +319,7 @@ impl ProjectedShadow {
 
     /// Left and right ends of the shadow in `N` rows from `first` on; reversed where it has none.
     pub(super) fn row_spans<const N: usize>(&self, first: usize) -> ([f64; N], [f64; N]) {
-        self.shape.row_spans(first)
+        self.shape.row_spans(first as f64)
     }
 
     /// Multiplies what gets through to these nodes of a row; returns what had to be read for it.
