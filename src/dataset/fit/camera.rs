@@ -4,6 +4,7 @@ use super::knobs::{self, Difference, KNOBS, Knob};
 use super::measured::MeasuredSet;
 use super::{FittedKey, Fitting, range_text, unfitted};
 use crate::error::Result;
+use crate::scene::Recipe;
 use std::path::Path;
 
 impl Fitting<'_> {
@@ -35,6 +36,7 @@ impl Fitting<'_> {
     /// Fits the ranges of the whole picture, then once more by pictures made with them.
     pub(super) fn fit_camera(&mut self, real: &MeasuredSet, before: &MeasuredSet) -> Result<()> {
         let mut fitted: Vec<(&Knob, FittedKey)> = Vec::new();
+        let first = self.config.scene.clone();
         for knob in &KNOBS {
             let difference = self.difference(knob, real, before);
             let key = match knob.is_of_pixels && real.is_narrower_than(self.config.scene.image[0]) {
@@ -44,7 +46,7 @@ impl Fitting<'_> {
             fitted.push((knob, key));
         }
         if fitted.iter().any(|(_, key)| key.fitted.is_some()) {
-            self.refine_camera(real, &mut fitted)?;
+            self.refine_camera(real, (before, &first), &mut fitted)?;
         }
         self.keys.extend(fitted.into_iter().map(|(_, key)| key));
         Ok(())
@@ -56,15 +58,21 @@ impl Fitting<'_> {
         unfitted(knob.key, before, why.into())
     }
 
+    /// A second step, as long as the first one has shown it must be: of noise that a brighter
+    /// picture clips, only a part is measured.
     fn refine_camera(
         &mut self,
         real: &MeasuredSet,
+        (before, first): (&MeasuredSet, &Recipe),
         fitted: &mut [(&Knob, FittedKey)],
     ) -> Result<()> {
         let trial = self.rendered()?;
         for (knob, key) in fitted.iter_mut().filter(|(_, key)| key.fitted.is_some()) {
+            let response = self.difference(knob, &trial, before);
+            let slope = knob.slope([first, &self.config.scene], response.as_ref());
             let difference = self.difference(knob, real, &trial);
-            if let Some(range) = difference.and_then(|d| knob.moved(&self.config.scene, &d)) {
+            if let Some(range) = difference.and_then(|d| knob.moved(&self.config.scene, &d, slope))
+            {
                 (knob.set)(&mut self.config.scene, range);
                 key.fitted = Some(range_text(range));
             }

@@ -2,6 +2,7 @@
 
 use super::falls::Fall;
 use super::statistics::{Moments, Weighted};
+use crate::eval::drawn;
 use crate::scene::Count;
 use libm::erf;
 use std::collections::BTreeMap;
@@ -27,7 +28,27 @@ pub(super) struct LabelOdds {
 impl LabelOdds {
     /// Of numbers of labels up to `most`.
     pub(super) fn new(falls: &[Fall], most: usize) -> Self {
-        let nodes = nodes_of(falls);
+        Self::weighted(falls, &vec![1.0; falls.len()], most)
+    }
+
+    /// The same with the falls of each number of objects drawn again, for a round of a bootstrap.
+    pub(super) fn redrawn(falls: &[Fall], most: usize, (seed, round): (u64, u64)) -> Self {
+        let mut of_node: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        for (place, fall) in falls.iter().enumerate() {
+            of_node.entry(fall.objects).or_default().push(place);
+        }
+        let mut weights = vec![0.0; falls.len()];
+        for (objects, places) in &of_node {
+            let times = drawn(places.len(), seed ^ *objects as u64, round);
+            for (place, times) in places.iter().zip(times) {
+                weights[*place] = f64::from(times);
+            }
+        }
+        Self::weighted(falls, &weights, most)
+    }
+
+    fn weighted(falls: &[Fall], weights: &[f64], most: usize) -> Self {
+        let nodes = nodes_of(falls, weights);
         let last = nodes.last().map_or(0, |(objects, _)| *objects);
         let rows = (0..=last)
             .map(|objects| row(&nodes, objects, most))
@@ -78,12 +99,15 @@ impl LabelOdds {
     }
 }
 
-fn nodes_of(falls: &[Fall]) -> Vec<(usize, Moments)> {
+fn nodes_of(falls: &[Fall], weights: &[f64]) -> Vec<(usize, Moments)> {
     let mut counts: BTreeMap<usize, Vec<Weighted>> = BTreeMap::new();
     counts.insert(0, vec![(0.0, 1.0)]);
-    for fall in falls {
+    for (fall, weight) in falls.iter().zip(weights) {
         let labels = fall.boxes.len() as f64;
-        counts.entry(fall.objects).or_default().push((labels, 1.0));
+        counts
+            .entry(fall.objects)
+            .or_default()
+            .push((labels, *weight));
     }
     let nodes = counts.into_iter();
     nodes

@@ -6,6 +6,7 @@ use crate::error::{Error, Result};
 use crate::label::Labels;
 use crate::scene::{Count, Recipe};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Falls of a number of objects have numbers of their own, so that every recipe draws the same.
 const NUMBERS_APART: u64 = 1_000_000;
@@ -25,8 +26,8 @@ pub(super) struct Fall {
 pub(super) struct FallPlan<'a> {
     pub(super) pipeline: &'a Pipeline,
     pub(super) seed: u64,
-    /// How many of each number of objects.
-    pub(super) each: usize,
+    /// Which falls of each number of objects.
+    pub(super) each: Range<u64>,
     /// Called after each.
     pub(super) step: &'a (dyn Fn() + Sync),
 }
@@ -39,7 +40,7 @@ impl FallPlan<'_> {
             negatives: 0.0,
             ..recipe.clone()
         };
-        let numbers = (0..self.each as u64).into_par_iter();
+        let numbers = self.each.clone().into_par_iter();
         let falls = numbers.map(|i| self.fall(&recipe, objects, i));
         let falls: Result<Vec<Option<Fall>>> = falls.collect();
         Ok(falls?.into_iter().flatten().collect())

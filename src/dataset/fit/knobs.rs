@@ -85,6 +85,9 @@ pub(super) const KNOBS: [Knob; 5] = [
     },
 ];
 
+/// A measure that moves less or more than this with its key has been moved by something else.
+const SLOPES: [f64; 2] = [0.4, 2.5];
+
 /// Temperatures that a camera's white has, kelvin.
 const WHITES_K: [f64; 2] = [1667.0, 25_000.0];
 
@@ -191,12 +194,27 @@ impl Knob {
         self.range_of(wanted, recipe)
     }
 
+    /// How far the measure has moved for each unit that two recipes' ranges are apart; 1 where
+    /// that is not known.
+    pub(super) fn slope(&self, recipes: [&Recipe; 2], response: Option<&Difference>) -> f64 {
+        let [before, after] = recipes.map(|recipe| self.moments(recipe).mean);
+        let decided = response.filter(|response| response.mean.is_decided());
+        decided.map_or(1.0, |response| {
+            (response.mean.value / (after - before)).clamp(SLOPES[0], SLOPES[1])
+        })
+    }
+
     /// The range moved by the whole difference of the means, decided or not: the second step
     /// towards what was decided before.
-    pub(super) fn moved(&self, recipe: &Recipe, difference: &Difference) -> Option<Range> {
+    pub(super) fn moved(
+        &self,
+        recipe: &Recipe,
+        difference: &Difference,
+        slope: f64,
+    ) -> Option<Range> {
         let before = self.moments(recipe);
         let wanted = Moments {
-            mean: before.mean + difference.mean.value,
+            mean: before.mean + difference.mean.value / slope,
             ..before
         };
         self.range_of(wanted, recipe)

@@ -29,7 +29,7 @@ use crate::scene::Range;
 use falls::stopped;
 use measured::MeasuredSet;
 use moved_paths::moved_paths;
-use places::OBJECT_COUNTS;
+use places::{MORE_FALLS, OBJECT_COUNTS};
 use plates::MeasuredPlate;
 use report::Compared;
 use starts::LEVERS;
@@ -173,7 +173,7 @@ impl Fitting<'_> {
     fn expected_steps(&self) -> u64 {
         let row = (OBJECT_COUNTS.len() / 2 + 2) * self.options.falls;
         let tried: usize = LEVERS.iter().map(|lever| lever.values.len()).sum();
-        (row * (1 + tried)) as u64 + 3 * self.options.pictures
+        (row * (1 + MORE_FALLS as usize + tried)) as u64 + 3 * self.options.pictures
     }
 
     fn finish(self, plan: &FitPlan, page: Page) -> Result<Fit> {

@@ -1,16 +1,17 @@
 //! Where objects of a recipe come to lie, how many there are and how large they look: fitted to labels
 //! by falls.
 
-use super::counts::{self, label_histogram};
+use super::counts::{self, LabelOdds, label_histogram};
 use super::falls::{Fall, FallPlan, log_size};
-use super::knobs::{Difference, SCALE};
+use super::knobs::{Difference, Knob, SCALE};
 use super::measured::MeasuredSet;
 use super::starts::{self, Candidate, FittedLever, LEVERS, Lever, places_of};
-use super::statistics::{Moments, Weighted, rounds};
+use super::statistics::{Bootstrapped, Moments, Weighted, rounds};
 use super::{FittedKey, Fitting, range_text, unfitted};
 use crate::error::{Error, Result};
 use crate::eval::interval;
 use crate::scene::{Count, Range, Recipe};
+use std::collections::BTreeSet;
 
 /// Numbers of objects that fall, each about a third more than the one before; as far as the real
 /// numbers of labels need.
@@ -22,21 +23,29 @@ pub(super) const OBJECT_COUNTS: [usize; 17] = [
 const MIN_SATURATED: usize = 8;
 const SATURATED_RATIO: f64 = 1.05;
 const MAX_FLAT: usize = 2;
+/// So many times the falls, once it is known how objects fall.
+pub(super) const MORE_FALLS: u64 = 4;
 
 impl Fitting<'_> {
-    /// Fits scale, spread, friction and number of objects, in this order, and returns the weights of
-    /// the numbers.
+    /// Fits scale, spread, friction, scale again (what lies in a heap looks another size) and number
+    /// of objects, in this order, and returns the weights of the numbers.
     pub(super) fn fit_places(&mut self, real: &MeasuredSet) -> Result<Vec<f64>> {
         let boxes = real.boxes();
         let counts: Vec<usize> = boxes.iter().map(Vec::len).collect();
         let times = label_histogram(&counts);
         let mut own = self.candidate(None, &times)?;
-        if self.fit_scale(&boxes, &own) {
+        let mut scale = self.fit_scale(&boxes, &own);
+        if scale.fitted.is_some() {
             own = self.candidate(None, &times)?;
         }
         for lever in &LEVERS {
             own = self.fit_lever(lever, &boxes, own, &times)?;
         }
+        if self.refine_scale(&mut scale, &boxes, &own) {
+            own = self.candidate(None, &times)?;
+        }
+        self.keys.push(scale);
+        let own = self.with_more_falls(own, &times)?;
         self.fit_objects(&counts, &own);
         Ok(own.weights)
     }
@@ -53,12 +62,8 @@ impl Fitting<'_> {
     /// Falls of more and more objects, until even few labels are more than the most that are
     /// looked for, or labels do not become more.
     fn falls(&self, recipe: &Recipe, most_labels: usize) -> Result<Vec<Fall>> {
-        let plan = FallPlan {
-            pipeline: &self.pipeline,
-            seed: self.options.seed,
-            each: self.options.falls,
-            step: &|| self.steps.step(),
-        };
+        let step = || self.steps.step();
+        let plan = self.fall_plan(0..self.options.falls as u64, &step);
         let (mut falls, mut most, mut flat) = (Vec::new(), 0.0, 0);
         for objects in self.counts_with_room(recipe) {
             let more = plan.falls(recipe, objects)?;
@@ -79,6 +84,33 @@ impl Fitting<'_> {
         }
     }
 
+    fn fall_plan<'a>(
+        &'a self,
+        each: std::ops::Range<u64>,
+        step: &'a (dyn Fn() + Sync),
+    ) -> FallPlan<'a> {
+        FallPlan {
+            pipeline: &self.pipeline,
+            seed: self.options.seed,
+            each,
+            step,
+        }
+    }
+
+    /// A candidate that its number of objects is told from: chance in few falls is taken for more
+    /// or fewer objects.
+    fn with_more_falls(&self, own: Candidate, times: &[f64]) -> Result<Candidate> {
+        let step = || self.steps.step();
+        let first = self.options.falls as u64;
+        let plan = self.fall_plan(first..MORE_FALLS * first, &step);
+        let numbers: BTreeSet<usize> = own.falls.iter().map(|fall| fall.objects).collect();
+        let mut falls = own.falls;
+        for objects in numbers {
+            falls.extend(plan.falls(&self.config.scene, objects)?);
+        }
+        Ok(Candidate::new(None, falls, times))
+    }
+
     /// The numbers of objects that there are assets and room for.
     fn counts_with_room(&self, recipe: &Recipe) -> impl Iterator<Item = usize> {
         let counts = OBJECT_COUNTS.into_iter();
@@ -93,15 +125,45 @@ impl Fitting<'_> {
         self.pipeline.check_room_with(&recipe).is_ok()
     }
 
-    /// Fits the size of objects; whether it is another now.
-    fn fit_scale(&mut self, boxes: &[Vec<[f64; 4]>], own: &Candidate) -> bool {
+    /// Fits the size of objects.
+    fn fit_scale(&mut self, boxes: &[Vec<[f64; 4]>], own: &Candidate) -> FittedKey {
+        let difference = self.scale_difference(boxes, own);
+        self.fit_knob(&SCALE, difference.as_ref())
+    }
+
+    /// Fits it once more; whether it is another now.
+    fn refine_scale(
+        &mut self,
+        key: &mut FittedKey,
+        boxes: &[Vec<[f64; 4]>],
+        own: &Candidate,
+    ) -> bool {
+        if key.fitted.is_none() {
+            *key = self.fit_scale(boxes, own);
+            return key.fitted.is_some();
+        }
+        let difference = self.scale_difference(boxes, own);
+        let moved = difference.and_then(|d| SCALE.moved(&self.config.scene, &d, 1.0));
+        let Some((range, scene)) = moved.and_then(|range| self.with_room(&SCALE, range)) else {
+            return false;
+        };
+        self.config.scene = scene;
+        key.fitted = Some(range_text(range));
+        true
+    }
+
+    /// The scene with another range, where there is room for its objects.
+    fn with_room(&self, knob: &Knob, range: Range) -> Option<(Range, Recipe)> {
+        let mut scene = self.config.scene.clone();
+        (knob.set)(&mut scene, range);
+        let checked = scene.check().and(self.pipeline.check_room_with(&scene));
+        checked.is_ok().then_some((range, scene))
+    }
+
+    fn scale_difference(&self, boxes: &[Vec<[f64; 4]>], own: &Candidate) -> Option<Difference> {
         let sizes = |boxes: &Vec<[f64; 4]>| boxes.iter().map(|b| (log_size(b), 1.0)).collect();
         let real: Vec<Vec<Weighted>> = boxes.iter().map(sizes).collect();
-        let difference = Difference::new(&real, &own.log_sizes(), self.options.seed);
-        let fitted = self.fit_knob(&SCALE, difference.as_ref());
-        let is_fitted = fitted.fitted.is_some();
-        self.keys.push(fitted);
-        is_fitted
+        Difference::new(&real, &own.log_sizes(), self.options.seed)
     }
 
     /// Fits where objects come to lie by a lever, and returns the candidate that it is nearest to.
@@ -144,20 +206,32 @@ impl Fitting<'_> {
     }
 
     fn fit_objects(&mut self, counts: &[usize], own: &Candidate) {
-        let times = label_histogram(counts);
         let before = self.config.scene.objects.clone();
         let others = counts::weights_of(&before, own.odds.most_objects());
-        let gain = counts::gain_on_pictures_left_out(&own.odds, &times, &others);
-        let why = self.describe_objects(counts, own, gain);
+        let redrawn = self.redrawn_counts(counts, own);
+        let gain = gain_over(&others, counts, own, &redrawn);
+        let why = describe_objects(counts, own, &redrawn, &gain);
         let mut key = unfitted("scene.objects", count_text(&before), why);
         let labels = own.odds.mean_labels(&own.weights);
         if !self.is_mean_of(counts, labels) {
             key.why += &unexplained(labels);
-        } else if gain > 0.0 {
+        } else if gain.value > 0.0 && gain.is_decided() {
             self.config.scene.objects = counts::count_of(&own.weights);
             key.fitted = Some(count_text(&self.config.scene.objects));
         }
         self.keys.push(key);
+    }
+
+    /// Rounds of a bootstrap over the real pictures and over the falls.
+    fn redrawn_counts(&self, counts: &[usize], own: &Candidate) -> Vec<RedrawnCounts> {
+        let seed = self.options.seed;
+        let most = counts.iter().copied().max().unwrap_or(0);
+        let pictures = rounds(counts.len(), seed).zip(0..);
+        let redrawn = pictures.map(|(times, round)| RedrawnCounts {
+            odds: LabelOdds::redrawn(&own.falls, most, (!seed, round)),
+            times: histogram_of(counts, &times),
+        });
+        redrawn.collect()
     }
 
     /// Whether pictures with so many labels on average could be the real ones.
@@ -174,26 +248,52 @@ impl Fitting<'_> {
         let interval = interval(mean(&vec![1; counts.len()]), redrawn.collect());
         (interval.low..=interval.high).contains(&labels)
     }
+}
 
-    fn describe_objects(&self, counts: &[usize], own: &Candidate, gain: f64) -> String {
-        let mean = |weights: &[f64]| counts::mean_of(weights);
-        let redrawn = rounds(counts.len(), self.options.seed).map(|times| {
-            mean(&counts::object_weights(
-                &own.odds,
-                &histogram_of(counts, &times),
-            ))
-        });
-        let interval = interval(mean(&own.weights), redrawn.collect());
-        let [low, middle, high] = counts::deciles(&own.weights);
-        format!(
-            "on average {:.1} objects ({:.1} to {:.1}), a tenth of the pictures with at most {low}, half with at most {middle}, nine \
-             tenths with at most {high}; a picture left out is likelier than with the recipe by a factor of {:.2}",
-            interval.value,
-            interval.low,
-            interval.high,
-            gain.exp()
-        )
-    }
+/// One round: how likely labels are, and how many pictures have each number of them.
+struct RedrawnCounts {
+    odds: LabelOdds,
+    times: Vec<f64>,
+}
+
+/// How much likelier a picture that is left out is by fitted weights than by others.
+fn gain_over(
+    others: &[f64],
+    counts: &[usize],
+    own: &Candidate,
+    redrawn: &[RedrawnCounts],
+) -> Bootstrapped {
+    let gain =
+        |odds: &LabelOdds, times: &[f64]| counts::gain_on_pictures_left_out(odds, times, others);
+    let rounds = redrawn.iter().map(|r| gain(&r.odds, &r.times));
+    Bootstrapped::new(gain(&own.odds, &label_histogram(counts)), rounds)
+}
+
+fn describe_objects(
+    counts: &[usize],
+    own: &Candidate,
+    redrawn: &[RedrawnCounts],
+    gain: &Bootstrapped,
+) -> String {
+    let mean = |r: &RedrawnCounts| counts::mean_of(&counts::object_weights(&r.odds, &r.times));
+    let interval = interval(
+        counts::mean_of(&own.weights),
+        redrawn.iter().map(mean).collect(),
+    );
+    let [low, middle, high] = counts::deciles(&own.weights);
+    let likelier = gain.interval();
+    format!(
+        "{} pictures tell of {:.1} objects on average ({:.1} to {:.1}), a tenth of them with at most {low}, half with at most \
+         {middle}, nine tenths with at most {high}; a picture left out is likelier than with the recipe by a factor of \
+         {:.2} ({:.2} to {:.2})",
+        counts.len(),
+        interval.value,
+        interval.low,
+        interval.high,
+        likelier.value.exp(),
+        likelier.low.exp(),
+        likelier.high.exp()
+    )
 }
 
 fn unexplained(labels: f64) -> String {
