@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
 """Make a reference world of crushed PET bottles with exact ground truth.
 
-Four kinds of pictures, all deterministic for given seeds and settings:
+Five kinds of results, all deterministic for given seeds and settings:
 
   world.py bottles      one crushed bottle on a uniform green, blue or grey screen
   world.py backgrounds  a table with a plastic tray and a robot arm, from above
   world.py piles        the same bottles piled physically in the tray
+  world.py shadows      how dark the shadow of each bottle is
   world.py displays     bottles on a luminous display that shows one picture after the other
 
 Run with Python 3.11 and the bpy package:
@@ -82,6 +83,10 @@ def parser():
     library(d)
     d.set_defaults(wall="solid")
 
+    s = common("shadows", "light that a floor loses under single bottles")
+    library(s)
+    s.set_defaults(spp=256)
+
     def tray(q):
         q.add_argument("--width", type=between(64, 4096, int), help="picture width in pixels")
         q.add_argument("--height", type=between(64, 4096, int), help="picture height in pixels")
@@ -144,8 +149,8 @@ def check(p, a):
 def main(argv):
     p = parser()
     a = check(p, p.parse_args(argv))
-    from petworld import display, photos, trays
-    {"bottles": photos.run, "displays": display.run, "backgrounds": trays.run_backgrounds, "piles": trays.run_piles}[a.command](a)
+    from petworld import display, photos, shadows, trays
+    {"bottles": photos.run, "displays": display.run, "shadows": shadows.run, "backgrounds": trays.run_backgrounds, "piles": trays.run_piles}[a.command](a)
 
 
 if __name__ == "__main__":
