@@ -35,12 +35,11 @@ def main():
         raise SystemExit(f"{options.shadows}: no record of a bottle in {options.assets}")
     figure, axes = pyplot.subplots(1, 4, figsize=(15, 4.2), sharex=True, sharey=True)
     print("| walls | tilt of the lamp | cut-outs / Cycles, median (5 to 95 %) | mean absolute difference |\n| --- | --- | --- | --- |")
+    areas = np.array([record["shadows"][0]["area_m2"] for record in records])
+    ours = np.array([cut_outs[name_of(record)] for record in records]) / areas[:, None]
     for k, axis in enumerate(axes):
         cycles = np.array([record["shadows"][k]["density"] for record in records])
-        areas = np.array([record["shadows"][0]["area_m2"] for record in records])
-        ours = np.array([cut_outs[name_of(record)] for record in records]) / areas[:, None]
-        case = records[0]["shadows"][k]
-        compare(axis, case, ours, cycles)
+        compare(axis, records[0]["shadows"][k], ours, cycles)
     axes[0].set_ylabel("cut-outs")
     figure.tight_layout()
     figure.savefig(options.output, dpi=110)

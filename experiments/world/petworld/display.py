@@ -296,12 +296,8 @@ def lay_bottle(args, i, camera=None):
     points = np.concatenate([p.verts @ matrix[:3, :3].T + matrix[:3, 3] for p in parts])
     if camera is None:
         return obs, None, None
-    tris, base = [], 0
-    for p in parts:
-        tris.append(p.triangles() + base)
-        base += len(p.verts)
     w, h = VIEW_PX
-    cover = np.isfinite(raster.depth_map(points, np.concatenate(tris), camera, w, h, 4)).reshape(h, 4, w, 4).mean((1, 3))
+    cover = raster.coverage(points, raster.triangles_of(parts), camera, w, h)
     uv, _ = raster.project(points, camera)
     (x0, y0), (x1, y1) = np.floor(uv.min(0)).astype(int) - MARGIN, np.ceil(uv.max(0)).astype(int) + MARGIN
     crop = (max(x0, 0), max(y0, 0), min(x1, w), min(y1, h))

@@ -124,13 +124,7 @@ def shoot(desc, photo, args, out):
     studio.set_camera(sc, cam)
 
     # ---- truth that needs no rendering
-    tris, base = [], 0
-    for p, v in zip(parts, verts):
-        tris.append(p.triangles() + base)
-        base += len(v)
-    tris = np.concatenate(tris)
-    ss = 4
-    cover = np.isfinite(raster.depth_map(allv, tris, cam, w, h, ss)).reshape(h, ss, w, ss).mean((1, 3))
+    cover = raster.coverage(allv, raster.triangles_of(parts), cam, w, h)
     uv, _ = raster.project(allv, cam)
     hull = raster.convex_hull(uv)
 

@@ -75,10 +75,6 @@ def show(ob, walls):
 def shadow_outline(parts, matrix, slope):
     """Coverage of the floor by the bottle as the lamp's middle sees it, and a camera above."""
     verts = [p.verts @ matrix[:3, :3].T + matrix[:3, 3] for p in parts]
-    tris, base = [], 0
-    for p, v in zip(parts, verts):
-        tris.append(p.triangles() + base)
-        base += len(v)
     flat = np.concatenate(verts)
     flat[:, 0] -= slope * flat[:, 2]
     flat[:, 2] *= 1e-3
@@ -86,8 +82,7 @@ def shadow_outline(parts, matrix, slope):
     w, h = (int(math.ceil(s * SCALE_PX / 2)) * 2 for s in high - low)
     middle = (low + high) / 2
     cam = studio.look_at_camera(w, h, SCALE_PX * EYE_M, (*middle, EYE_M), (*middle, 0.0))
-    cover = np.isfinite(raster.depth_map(flat, np.concatenate(tris), cam, w, h, 4))
-    return cover.reshape(h, 4, w, 4).mean((1, 3)), cam
+    return raster.coverage(flat, raster.triangles_of(parts), cam, w, h), cam
 
 
 def smooth(empty):

@@ -4,13 +4,13 @@ use super::knobs::{self, Difference, KNOBS, Knob};
 use super::measured::MeasuredSet;
 use super::{FittedKey, Fitting, range_text, unfitted};
 use crate::error::Result;
-use crate::scene::Recipe;
+use crate::scene::{Range, Recipe};
 use std::path::Path;
 
 impl Fitting<'_> {
     /// Sets a range by how a measure differs, and says so.
     pub(super) fn fit_knob(&mut self, knob: &Knob, difference: Option<&Difference>) -> FittedKey {
-        let scene = &mut self.config.scene;
+        let scene = &self.config.scene;
         let before = (knob.get)(scene);
         let Some(difference) = difference else {
             return unfitted(
@@ -21,16 +21,24 @@ impl Fitting<'_> {
         };
         let mut key = unfitted(knob.key, range_text(before), describe(knob, difference));
         if let Some(fitted) = knob.fitted(scene, difference) {
-            let mut changed = scene.clone();
-            (knob.set)(&mut changed, fitted);
-            if let Err(error) = changed.check().and(self.pipeline.check_room_with(&changed)) {
-                key.why = format!("{} was found, but: {error}", range_text(fitted));
-                return key;
+            match self.with_range(knob, fitted) {
+                Err(error) => key.why = format!("{} was found, but: {error}", range_text(fitted)),
+                Ok(changed) => {
+                    self.config.scene = changed;
+                    key.fitted = Some(range_text(fitted));
+                }
             }
-            *scene = changed;
-            key.fitted = Some(range_text(fitted));
         }
         key
+    }
+
+    /// The scene with another range; an error where that cannot be, as where objects have no room.
+    pub(super) fn with_range(&self, knob: &Knob, range: Range) -> Result<Recipe> {
+        let mut scene = self.config.scene.clone();
+        (knob.set)(&mut scene, range);
+        scene.check()?;
+        self.pipeline.check_room_with(&scene)?;
+        Ok(scene)
     }
 
     /// Fits the ranges of the whole picture, then once more by pictures made with them.

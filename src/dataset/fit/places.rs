@@ -3,7 +3,7 @@
 
 use super::counts::{self, LabelOdds, label_histogram};
 use super::falls::{Fall, FallPlan, log_size};
-use super::knobs::{Difference, Knob, SCALE};
+use super::knobs::{Difference, SCALE};
 use super::measured::MeasuredSet;
 use super::starts::{self, Candidate, FittedLever, LEVERS, Lever, places_of};
 use super::statistics::{Bootstrapped, Moments, Weighted, rounds};
@@ -144,20 +144,13 @@ impl Fitting<'_> {
         }
         let difference = self.scale_difference(boxes, own);
         let moved = difference.and_then(|d| SCALE.moved(&self.config.scene, &d, 1.0));
-        let Some((range, scene)) = moved.and_then(|range| self.with_room(&SCALE, range)) else {
+        let moved = moved.and_then(|range| Some((range, self.with_range(&SCALE, range).ok()?)));
+        let Some((range, scene)) = moved else {
             return false;
         };
         self.config.scene = scene;
         key.fitted = Some(range_text(range));
         true
-    }
-
-    /// The scene with another range, where there is room for its objects.
-    fn with_room(&self, knob: &Knob, range: Range) -> Option<(Range, Recipe)> {
-        let mut scene = self.config.scene.clone();
-        (knob.set)(&mut scene, range);
-        let checked = scene.check().and(self.pipeline.check_room_with(&scene));
-        checked.is_ok().then_some((range, scene))
     }
 
     fn scale_difference(&self, boxes: &[Vec<[f64; 4]>], own: &Candidate) -> Option<Difference> {
