@@ -8,7 +8,9 @@ use crate::image::Image;
 use crate::pixel::{Film, LinearRgb, Mix, PremulRgba};
 use crate::scene::{Blur, CameraNoise, EdgeTreatment, Noise, PostProcess};
 use crate::work::{self, Kind};
-use std::f64::consts::TAU;
+use rand_distr::{Distribution, StandardNormal};
+use rand_xoshiro::SplitMix64;
+use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
 /// Standard deviation of the blur that sharpening removes.
 const SHARPENING_SIGMA_PX: f32 = 1.0;
@@ -22,8 +24,8 @@ const SHARPENING_SIGMA_PX: f32 = 1.0;
 ///
 /// # Method
 /// What the cards send and what they and the shadows let pass is blurred, the plate is not. Noise is
-/// Gaussian, its variance `shot * value + read^2` less what the plate's own share brings along. It
-/// depends on the seed, the pixel and the channel only. What is still to be matched
+/// Gaussian (by the ziggurat of Marsaglia and Tsang, 2000), its variance `shot * value + read^2` less
+/// what the plate's own share brings along. It depends on the seed, the pixel and the channel only. What is still to be matched
 /// ([`Noise::MatchPlate`]) is none.
 pub fn finish(
     frame: Image<PremulRgba>,
@@ -159,14 +161,6 @@ struct SensorNoise {
     seed: u64,
 }
 
-/// A channel of a pixel: its value, and what it shows of a plate that has noise of its own.
-struct ExposedValue {
-    value: f32,
-    /// Factor on the plate.
-    passes: f32,
-    plate: f32,
-}
-
 /// What [`seen_plate`] is where all noise is still to come.
 const NO_PLATE: ([f32; 3], [f32; 3]) = ([0.0; 3], [0.0; 3]);
 
@@ -191,7 +185,7 @@ impl SensorNoise {
     /// That of cards; none where no noise is added.
     fn of_cards(finish: &PostProcess) -> Option<Self> {
         match finish.noise {
-            Noise::Known { shot, read } => Self::new(shot, read, finish.noise_seed),
+            Noise::Known { shot, read } => Self::new(shot, read, noise_seeds(finish)[0]),
             Noise::None | Noise::MatchPlate => None,
         }
     }
@@ -199,7 +193,7 @@ impl SensorNoise {
     /// That of the whole frame; none where no noise is added.
     fn of_camera(finish: &PostProcess) -> Option<Self> {
         let CameraNoise { shot, read } = finish.camera_noise;
-        Self::new(shot, read, split_mix(finish.noise_seed))
+        Self::new(shot, read, noise_seeds(finish)[1])
     }
 
     fn new(shot: f64, read: f64, seed: u64) -> Option<Self> {
@@ -216,12 +210,12 @@ impl SensorNoise {
         work::add(Kind::NoisyPixels, frame.pixels().len() as u64);
         Image::from_fn(frame.width(), frame.height(), |x, y| {
             let p = frame[(x, y)];
-            let index = 3 * (y * frame.width() + x) as u64;
+            let index = (y * frame.width() + x) as u64;
             with_color(p, self.noisy_color(p.color(), seen((x, y), p), index))
         })
     }
 
-    /// A colour with noise; `index` is the number of its first channel in the frame.
+    /// A colour with noise; `index` is the number of its pixel in the frame.
     #[inline(always)]
     fn noisy_color(
         &self,
@@ -229,33 +223,25 @@ impl SensorNoise {
         (passes, behind): ([f32; 3], [f32; 3]),
         index: u64,
     ) -> LinearRgb {
-        let value: [f32; 3] = color.into();
+        let values: [f32; 3] = color.into();
+        let missing: [f64; 3] =
+            std::array::from_fn(|c| self.missing_variance(values[c], passes[c], behind[c]));
+        if missing.iter().all(|variance| *variance <= 0.0) {
+            return color;
+        }
+        let mut rng = SplitMix64::seed_from_u64(self.seed.wrapping_add(index));
         let noisy: [f32; 3] = std::array::from_fn(|c| {
-            let exposed = ExposedValue {
-                value: value[c],
-                passes: passes[c],
-                plate: behind[c],
-            };
-            self.noisy_value(&exposed, index + c as u64)
+            let deviate: f64 = StandardNormal.sample(&mut rng);
+            (f64::from(values[c]) + missing[c].max(0.0).sqrt() * deviate) as f32
         });
         noisy.into()
     }
 
     /// Noise that a value should have and the plate that shows through does not bring.
     #[inline(always)]
-    fn missing_variance(&self, exposed: &ExposedValue) -> f64 {
-        let (share, all) = (f64::from(exposed.passes), self.variance(exposed.value));
-        all - share * share * self.variance(exposed.plate)
-    }
-
-    #[inline(always)]
-    fn noisy_value(&self, exposed: &ExposedValue, index: u64) -> f32 {
-        let ExposedValue { value, .. } = *exposed;
-        let missing = self.missing_variance(exposed);
-        if missing <= 0.0 {
-            return value;
-        }
-        (f64::from(value) + missing.sqrt() * normal_deviate(self.seed, index)) as f32
+    fn missing_variance(&self, value: f32, passes: f32, plate: f32) -> f64 {
+        let share = f64::from(passes);
+        self.variance(value) - share * share * self.variance(plate)
     }
 
     #[inline(always)]
@@ -264,21 +250,10 @@ impl SensorNoise {
     }
 }
 
-/// A number from the normal distribution, by Box and Muller from two uniform ones.
-fn normal_deviate(seed: u64, index: u64) -> f64 {
-    let [first, second] = [0, 1].map(|k| {
-        let bits = split_mix(split_mix(seed).wrapping_add(2 * index + k)) >> 11;
-        bits as f64 / (1_u64 << 53) as f64
-    });
-    (-2.0 * libm::log(1.0 - first)).sqrt() * libm::cos(TAU * second)
-}
-
-/// SplitMix64 (Steele, Lea and Flood, 2014): neighbouring numbers become unrelated ones.
-fn split_mix(n: u64) -> u64 {
-    let n = n.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    let n = (n ^ n >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    let n = (n ^ n >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-    n ^ n >> 31
+/// Seeds of the noise of cards and of the camera, which have nothing in common.
+fn noise_seeds(finish: &PostProcess) -> [u64; 2] {
+    let mut rng = SplitMix64::seed_from_u64(finish.noise_seed);
+    std::array::from_fn(|_| rng.next_u64())
 }
 
 #[cfg(test)]

@@ -55,8 +55,9 @@ impl AttemptSeries<'_> {
 
     fn log_verdict(&self, attempt: &Attempt, count: usize) {
         log::debug!(
-            "settle: attempt {count}: {:?}, {} of work",
+            "settle: attempt {count}: {:?} after {:.2} s, {} of work",
             attempt.verdict,
+            attempt.fall.seconds,
             self.allowance.taken()
         );
     }
