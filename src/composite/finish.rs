@@ -25,8 +25,8 @@ const SHARPENING_SIGMA_PX: f32 = 1.0;
 /// # Method
 /// What the cards send and what they and the shadows let pass is blurred, the plate is not. Noise is
 /// Gaussian (by the ziggurat of Marsaglia and Tsang, 2000), its variance `shot * value + read^2` less
-/// what the plate's own share brings along. It depends on the seed, the pixel and the channel only. What is still to be matched
-/// ([`Noise::MatchPlate`]) is none.
+/// what the plate's own share brings along. It depends on the seed, the pixel and the channel only.
+/// What is still to be matched ([`Noise::MatchPlate`]) is none.
 pub fn finish(
     frame: Image<PremulRgba>,
     deep: &DeepImage,
