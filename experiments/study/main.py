@@ -4,7 +4,7 @@ import importlib.util
 import shutil
 import tomllib
 
-from . import page, results, screening, study as studies
+from . import archive, page, results, screening, study as studies
 
 HERE = studies.HERE
 
@@ -18,6 +18,8 @@ def run(options, cache, program):
         studies.train_all(study, studies.trainings(study, names, options.seeds), options.processes)
     folder = study.cache / "results" if options.smoke else HERE / "results" / study.name
     write(study, list(study.arms["arms"]), options.seeds, folder)
+    if options.smoke:
+        check_archive(study, options.seeds, folder)
 
 
 def full(options, cache, program):
@@ -64,8 +66,17 @@ def chosen(options, arms):
     return options.arms or list(arms["arms"])
 
 
+def check_archive(study, seeds, folder):
+    """Results are the same without the trainings that they are from."""
+    _, trained = results.scored(study, study.arms["arms"], seeds, folder)
+    shutil.rmtree(study.cache / "runs")
+    _, archived = results.scored(study, study.arms["arms"], seeds, folder)
+    if not trained or results.means(trained) != results.means(archived):
+        raise SystemExit(f"{folder / archive.FILE}: other scores than those of the trainings")
+
+
 def write(study, names, seeds, folder):
-    rows, matches = results.scored(study, names, seeds)
+    rows, matches = results.scored(study, names, seeds, folder)
     if not rows:
         raise SystemExit("nothing is trained yet")
     means, drawn = results.means(matches), results.drawn(matches)
@@ -74,6 +85,7 @@ def write(study, names, seeds, folder):
     effects = screening.effects(study, means, drawn)
     results.write_csv(folder / "results.csv", results.COLUMNS, rows)
     results.write_csv(folder / "summary.csv", results.SUMMARY_COLUMNS, results.summary_rows(summary))
+    archive.write(folder, matches)
     results.write_csv(folder / "switches.csv", results.SWITCH_COLUMNS, effects)
     page.write(study, rows, summary, ratios, effects, folder / "index.html")
     print(f"see {folder / 'index.html'}")

@@ -5,7 +5,7 @@ import io
 
 import numpy as np
 
-from . import bootstrap, files, reality, score, study as studies
+from . import archive, bootstrap, files, reality, score, study as studies
 
 COLUMNS = (
     "arm seed room pictures map50 map50_95 classes real synthetic mix images model image_size device "
@@ -15,14 +15,18 @@ SWITCH_COLUMNS = "switch ratio low high".split()
 SUMMARY_COLUMNS = "arm seeds mean low high against ratio ratio_low ratio_high".split()
 
 
-def scored(study, arms, seeds):
-    """Rows of `results.csv`, and the matches by arm, seed and room, of what is trained."""
-    rows, matches = [], {}
+def scored(study, arms, seeds, folder):
+    """Rows of `results.csv`, and the matches by arm, seed and room, of what is trained: here, or where the results in
+    the folder come from."""
+    rows, matches, known = [], {}, archive.read(folder)
     for arm in arms:
         for seed in study.seeds(arm, seeds):
             if study.is_trained(arm, seed):
                 of_rooms = matches.setdefault(arm, {}).setdefault(seed, {})
                 rows += [room_row(study, arm, seed, room, of_rooms) for room in study.rooms]
+            elif (arm, seed) in known:
+                own_rows, matches.setdefault(arm, {})[seed] = known[arm, seed]
+                rows += own_rows
     return rows, matches
 
 
