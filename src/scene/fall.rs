@@ -29,7 +29,7 @@ pub struct SettleOptions {
     /// more is [`SettleVerdict::Exploded`](crate::settle::SettleVerdict::Exploded). Default: 0.01.
     pub max_energy_rise: f64,
     /// Longest fall, seconds of a world in which the typical card is 200 mm long, 0.01 to 600.
-    /// Default: 30.
+    /// Default: 10.
     pub time_limit: f64,
     /// Attempts before giving up, 1 to 100; each starts from heights of its own. Default: 8.
     pub attempts: u32,
@@ -67,7 +67,7 @@ impl Default for SettleOptions {
             thinnest: 0.01,
             max_overlap: 0.0025,
             max_energy_rise: 0.01,
-            time_limit: 30.0,
+            time_limit: 10.0,
             attempts: 8,
             step: 1.0 / 360.0,
             iterations: 4,

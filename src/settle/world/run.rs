@@ -19,8 +19,9 @@ use rapier3d::prelude::{
     Aabb, PhysicsWorld, Pose as RapierPose, RigidBody, RigidBodyHandle, Rotation,
 };
 
-/// Motion of a card that still counts as rest, metres in the world.
-const REST_MOTION_M: f32 = 0.0002;
+/// Motion of a card that still counts as rest, metres in the world: over [`REST_TIME_S`] that is the
+/// speed below which the engine lets bodies sleep.
+const REST_MOTION_M: f32 = 0.002;
 /// How long it must last, seconds in the world.
 const REST_TIME_S: f64 = 0.2;
 /// Mean speed that still counts as rest, m/s in the world.
