@@ -186,10 +186,10 @@ wheel:
 	@test $$(stat -c %s target/wheel-out/*.whl) -le $$(($(MOST_WHEEL_MB) * 1000000))
 	@$(call pytest_of,target/wheel-out)
 
-# pycocotools, webdataset, kubernetes-validate and an S3 server, for the tests that ask them; where they cannot be had the tests say so and pass.
+# pycocotools, webdataset, TrackEval, kubernetes-validate and an S3 server, for the tests that ask them; where they cannot be had the tests say so and pass.
 python:
 	@[ -x $(PYTHON) ] || { ($(call install,python3-venv)) && python3 -m venv target/python && \
-	  $(PYTHON) -m pip install --quiet --retries 1 pycocotools webdataset kubernetes-validate $(S3_SERVER); } || \
+	  $(PYTHON) -m pip install --quiet --retries 1 pycocotools webdataset trackeval kubernetes-validate $(S3_SERVER); } || \
 	  { rm -rf target/python; echo "pycocotools cannot be installed: its tests are skipped"; }
 
 # For the tests of petcomp studio; where it cannot be had they say so and pass.

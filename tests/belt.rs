@@ -2,6 +2,8 @@
 
 #![cfg(all(feature = "pipeline", feature = "settle"))]
 
+mod python;
+
 use petcomp::dataset::{DatasetConfig, Part, Pipeline, generate};
 use petcomp::scene::{Object, Placement};
 use petcomp::{asset, io};
@@ -63,6 +65,7 @@ fn a_sequence_is_written_as_tracks_and_videos() {
     generate(&plan, make, &|_| (), &AtomicBool::new(false)).unwrap();
     check_videos(&plan.folder);
     check_tracks(&plan.folder);
+    python::check("mot", "trackeval", &plan.folder);
 }
 
 fn check_videos(folder: &Path) {

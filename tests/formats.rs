@@ -7,6 +7,8 @@
 
 #![cfg(feature = "pipeline")]
 
+mod python;
+
 use petcomp::asset::Texture;
 use petcomp::camera::Camera;
 use petcomp::dataset::{
@@ -21,7 +23,6 @@ use petcomp::scene::{CameraSource, Card, Exposure, Grade, LightTint, PostProcess
 use petcomp::{Image, LinearRgb, ObjectId, PremulRgba, Result, Scene, Shot, composite, io, render};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -176,36 +177,6 @@ fn made_of(labels: &str, shot: fn(u64) -> Shot) -> tempfile::TempDir {
     dir
 }
 
-/// Runs a check of `tests/formats.py`; says so where Python or the package is missing.
-fn python(check: &str, package: &str, folder: &Path) {
-    let python = std::env::var_os("PETCOMP_PYTHON").unwrap_or_else(|| "python3".into());
-    let has = Command::new(&python)
-        .args(["-c", &format!("import {package}")])
-        .output();
-    if !has.is_ok_and(|out| out.status.success()) {
-        eprintln!(
-            "skipped: {} has no {package}; `make formats` fetches it",
-            python.display()
-        );
-        return;
-    }
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/formats.py");
-    let out = Command::new(&python)
-        .arg(script)
-        .arg(check)
-        .arg(folder)
-        .output()
-        .unwrap();
-    let said = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
-    assert!(
-        out.status.success(),
-        "{}{}",
-        said(&out.stdout),
-        said(&out.stderr)
-    );
-    eprintln!("{}", said(&out.stdout));
-}
-
 /// Pixels of the masks of each sample's objects, by the number and the object's: what a reader must
 /// find again.
 fn tell_pixels(folder: &Path) {
@@ -229,7 +200,7 @@ fn pycocotools_reads_run_lengths_and_polygons() {
             "obstructed = \"ignore\"\nformats = [\"coco\"]\ncoco = {{ masks = \"{masks}\" }}"
         ));
         tell_pixels(dir.path());
-        python("coco", "pycocotools", dir.path());
+        python::check("coco", "pycocotools", dir.path());
     }
 }
 
@@ -239,14 +210,14 @@ fn ultralytics_takes_boxes_and_segments() {
         let dir = made(&format!(
             "obstructed = \"{obstructed}\"\nyolo = {{ task = \"{task}\" }}"
         ));
-        python(task, "ultralytics.data.utils", dir.path());
+        python::check(task, "ultralytics.data.utils", dir.path());
     }
 }
 
 #[test]
 fn yolov5_takes_boxes() {
     let dir = made("obstructed = \"keep\"");
-    python("yolov5", "yolov5.utils.dataloaders", dir.path());
+    python::check("yolov5", "yolov5.utils.dataloaders", dir.path());
 }
 
 #[test]
@@ -458,13 +429,13 @@ fn an_archive_holds_the_files_of_its_samples_in_order() {
 #[test]
 fn webdataset_reads_archives() {
     let dir = made("formats = [\"webdataset\", \"coco\", \"yolo\"]\nwebdataset = { samples = 4 }");
-    python("webdataset", "webdataset", dir.path());
+    python::check("webdataset", "webdataset", dir.path());
 }
 
 #[test]
 fn kubernetes_takes_the_job_of_the_examples() {
     let cluster = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/cluster");
-    python("kubernetes", "kubernetes_validate", &cluster);
+    python::check("kubernetes", "kubernetes_validate", &cluster);
 }
 
 #[test]
