@@ -17,9 +17,9 @@ def run(options, cache, program):
     if not options.write:
         studies.train_all(study, studies.trainings(study, names, options.seeds), options.processes)
     folder = study.cache / "results" if options.smoke else HERE / "results" / study.name
-    write(study, list(study.arms["arms"]), options.seeds, folder)
+    means = write(study, list(study.arms["arms"]), options.seeds, folder)
     if options.smoke:
-        check_archive(study, options.seeds, folder)
+        check_archive(study, options.seeds, folder, means)
 
 
 def full(options, cache, program):
@@ -66,16 +66,16 @@ def chosen(options, arms):
     return options.arms or list(arms["arms"])
 
 
-def check_archive(study, seeds, folder):
+def check_archive(study, seeds, folder, means):
     """Results are the same without the trainings that they are from."""
-    _, trained = results.scored(study, study.arms["arms"], seeds, folder)
-    shutil.rmtree(study.cache / "runs")
+    shutil.rmtree(study.cache / "runs", ignore_errors=True)
     _, archived = results.scored(study, study.arms["arms"], seeds, folder)
-    if not trained or results.means(trained) != results.means(archived):
+    if results.means(archived) != means:
         raise SystemExit(f"{folder / archive.FILE}: other scores than those of the trainings")
 
 
 def write(study, names, seeds, folder):
+    """Writes tables and page; returns the mean score of each arm."""
     rows, matches = results.scored(study, names, seeds, folder)
     if not rows:
         raise SystemExit("nothing is trained yet")
@@ -89,3 +89,4 @@ def write(study, names, seeds, folder):
     results.write_csv(folder / "switches.csv", results.SWITCH_COLUMNS, effects)
     page.write(study, rows, summary, ratios, effects, folder / "index.html")
     print(f"see {folder / 'index.html'}")
+    return means
