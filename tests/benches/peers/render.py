@@ -8,21 +8,27 @@
 The scene is a file of golden/render/scene_reference.py: one of golden/render, or one that
 `petcomp scene export SCENE --to cycles DIR` wrote. Seconds are those of the rendering alone, without start, files and
 textures' pyramids, as each program tells its own processor time. Error: `petcomp-report render` measures both programs'
-against the picture of the largest count, which has its own seed and is kept for the next run. FOLDER/render gets Cycles'
+against the picture of the largest count, which has seeds of its own and is kept for the next run. FOLDER/render gets Cycles'
 pictures (spp_00016.exr) and times.json.
 """
 
 import csv
 import json
+import math
 import pathlib
 import shutil
 import statistics
+import sys
 import tempfile
 
+import numpy as np
+from linear import read_exr, write_exr
 from side_by_side import CORES, INSIDE, Comparison, arguments, pinned, spent, told, version
 
 SCRIPT = "golden/render/scene_reference.py"
 DEFAULT_PRESET = "normal"
+# Samples of one part of the reference, and the seed of the first one: other than those of the pictures that are compared.
+PART, FIRST_SEED = 256, 1_000_000
 PRESETS = ("draft", "normal", "good", "high", "reference")
 
 
@@ -34,24 +40,27 @@ class Cycles:
         self.folder.mkdir(parents=True, exist_ok=True)
         self.program, self.seconds = version([args.blender, "--version"]), {}
 
-    def command(self, samples, work):
+    def command(self, samples, work, seed=None):
         return pinned(self.args.blender, "-b", "--factory-startup", "--python-use-system-env", "-noaudio", "-P", SCRIPT, "--",
-                      self.args.scene, "--out", work, "--samples", samples, "--threads", len(CORES), "--seed", samples,
+                      self.args.scene, "--out", work, "--samples", samples, "--threads", len(CORES), "--seed", seed or samples,
                       "--size", *self.args.size)
 
     def render(self, samples):
         """Processor seconds of one rendering; its picture is kept."""
+        took = self.render_to(self.folder / self.name(samples), samples)
+        self.seconds.setdefault(samples, []).append(took)
+        self.tell()
+        return took
+
+    def render_to(self, path, samples, seed=None):
         with tempfile.TemporaryDirectory() as work:
-            said = spent(self.command(samples, work))[1]
+            said = spent(self.command(samples, work, seed))[1]
             report = pathlib.Path(work, "report.json")
             if not report.exists():
                 raise RuntimeError(said[-300:])
             seconds = json.loads(report.read_text())["cpu_seconds"]
-            shutil.copy(pathlib.Path(work, "beauty.exr"), self.folder / self.name(samples))
-        took = seconds["render_beauty"] + seconds.get("render_passing", 0.0)
-        self.seconds.setdefault(samples, []).append(took)
-        self.tell()
-        return took
+            shutil.copy(pathlib.Path(work, "beauty.exr"), path)
+        return seconds["render_beauty"] + seconds.get("render_passing", 0.0)
 
     def name(self, samples):
         return "spp_%05d.exr" % samples
@@ -62,14 +71,22 @@ class Cycles:
         (self.folder / "times.json").write_text(json.dumps({"program": self.program, "pictures": pictures}, indent=1) + "\n")
 
     def reference(self, samples):
-        """The picture that all are held against: of an earlier run with the same settings, or rendered now."""
-        kept, asked = self.folder / "reference.json", [str(self.args.scene), self.args.size, samples, self.program]
+        """The picture that all are held against: the mean of parts with seeds of their own, of which those of an earlier
+        run with the same settings are kept. So a reference of an hour may be broken off."""
+        kept, asked = self.folder / "reference.json", [str(self.args.scene), self.args.size, self.program, min(PART, samples)]
         told_before = json.loads(kept.read_text()) if kept.exists() else {}
-        if told_before.get("asked") == asked and (self.folder / self.name(samples)).exists():
-            self.seconds[samples] = [told_before["seconds"]]
-        else:
-            kept.write_text(json.dumps({"asked": asked, "seconds": self.render(samples)}))
+        seconds = told_before["seconds"] if told_before.get("asked") == asked else []
+        count = math.ceil(samples / PART)
+        for number in range(len(seconds), count):
+            seconds.append(self.render_to(self.part(number), min(PART, samples), FIRST_SEED + number))
+            kept.write_text(json.dumps({"asked": asked, "seconds": seconds}))
+            print(f"reference: part {number + 1} of {count}", file=sys.stderr)
+        write_exr(self.folder / self.name(samples), np.mean([read_exr(self.part(k), "RGBA") for k in range(count)], axis=0))
+        self.seconds[samples] = [sum(seconds[:count])]
         self.tell()
+
+    def part(self, number):
+        return self.folder / f"part_{number:03d}.exr"
 
 
 class Report:
