@@ -17,7 +17,7 @@ use crate::render::pixel_filter::filter_quantiles;
 use crate::render::receiver::{LightingContext, ReceiverIrradiance, VisibleSide};
 use crate::render::refraction::refract;
 use crate::render::retouch::retouched;
-use crate::render::texture::BakedTexture;
+use crate::render::texture::{BakedTexture, TexelContent};
 use crate::render::view::{
     CameraView, ProjectedPlane, ScenePlane, rows_and_columns, visible_planes,
 };
@@ -133,9 +133,10 @@ fn layer_stack(
     let offsets = filter_quantiles(options.subsamples);
     let planes = visible_planes(shot);
     let context = LightingContext::new(shot, &planes, view, *options);
+    let content = TexelContent::needed(context.occluders.tinted, is_lit(shot));
     let detail = PictureDetail {
         offsets: &offsets,
-        with_film: context.occluders.tinted,
+        content,
     };
     let cards = projected_cards(&planes, view, &detail);
     watch.lap("bake");
@@ -152,8 +153,13 @@ fn layer_stack(
         catcher,
         samples: sample_grid(view, &context.fine, offsets, options),
         exposure: shot.exposure,
-        tinted: context.occluders.tinted,
+        content,
     }
+}
+
+/// Some light shines.
+fn is_lit(shot: &Shot) -> bool {
+    !shot.lights.is_empty() || !shot.ambient.is_black() || shot.environment.is_some()
 }
 
 /// The cards in the picture; none for one that is edge-on or outside.
@@ -241,8 +247,7 @@ fn sample_grid(
 struct PictureDetail<'a> {
     /// Sub-samples along each side of a pixel.
     offsets: &'a [f64],
-    /// Some card is film.
-    with_film: bool,
+    content: TexelContent,
 }
 
 /// A card in the picture, before it is lit.
@@ -274,7 +279,7 @@ impl<'a> ProjectedCard<'a> {
         let projected = projected.mirrored_if(mirrored);
         let texels = texels_per_pixel(texture, plane, &projected, view, &plane.center);
         let level = detail_level(texels, detail.offsets);
-        let texture = BakedTexture::new(texture, &card.grade, level, detail.with_film);
+        let texture = BakedTexture::new(texture, &card.grade, level, detail.content);
         let (rows, columns) = rows_and_columns(plane, texture.grid.reach, view);
         Some(Self {
             card,

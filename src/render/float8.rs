@@ -1,10 +1,10 @@
 //! Colour and opacity that are worked on together, as one vector register.
 
-use crate::pixel::{Film, PremulRgba};
+use crate::pixel::{Film, LinearRgb, PremulRgba};
 use crate::render::float4::{Blend, Float4};
 use bytemuck::{Pod, Zeroable};
 
-/// Colour and alpha, then opacity per channel and a number that means nothing.
+/// Colour and alpha, then opacity per channel and 0.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C, align(32))]
 pub(super) struct Float8([f32; 8]);
@@ -63,6 +63,6 @@ impl From<Film> for Float8 {
 impl From<PremulRgba> for Float8 {
     #[inline(always)]
     fn from(p: PremulRgba) -> Self {
-        Self::new(p.into(), Float4([p.a; 4]))
+        Self::new(p.into(), LinearRgb::grey(p.a).into())
     }
 }

@@ -256,6 +256,40 @@ impl IrradianceMap {
         let bottom = &self.values[start + width..][..2];
         Float4::bilinear([top[0], top[1]], [bottom[0], bottom[1]], column.1, row.1)
     }
+
+    /// The values at positions along a row, from left to right, as [`value_at`](Self::value_at) each.
+    ///
+    /// Between rows first, for each node once.
+    pub(super) fn values_along(
+        &self,
+        row: LatticePosition,
+        columns: &[LatticePosition],
+        out: &mut Vec<Float4>,
+    ) {
+        out.clear();
+        let (Some(&first), Some(&last)) = (columns.first(), columns.last()) else {
+            return;
+        };
+        let [first, last] = [first, last].map(|column| cell_before(column, &self.columns));
+        let start = cell_before(row, &self.rows) * self.columns.len() + first;
+        let count = last + 2 - first;
+        let top = &self.values[start..][..count];
+        let bottom = &self.values[start + self.columns.len()..][..count];
+        let mut pairs = top
+            .iter()
+            .zip(bottom)
+            .map(|(top, bottom)| top.lerp(*bottom, row.1));
+        let mut cell = [pairs.next(), pairs.next()].map(Option::unwrap_or_default);
+        let mut before = first;
+        out.extend(columns.iter().map(|&column| {
+            let node = cell_before(column, &self.columns);
+            while before < node {
+                cell = [cell[1], pairs.next().unwrap_or_default()];
+                before += 1;
+            }
+            cell[0].lerp(cell[1], column.1)
+        }));
+    }
 }
 
 /// Are a node and the next one both inside?

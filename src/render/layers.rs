@@ -15,8 +15,9 @@ use crate::render::half_plane::{ConvexShape, row_span};
 use crate::render::irradiance::IrradianceMap;
 use crate::render::lattice::{Lattice, LatticePosition};
 use crate::render::ranges::{integer_range, range_overlap, ranges_meet};
+use crate::render::refill;
 use crate::render::texel_grid::{TexelLine, texel_line};
-use crate::render::texture::BakedTexture;
+use crate::render::texture::{BakedTexture, TexelContent};
 use crate::render::transmittance::{LayerRow, SubsampleRun, Transmittance};
 use crate::render::view::{LatticeArea, ProjectedPlane, pixel_center};
 use crate::work::{self, Kind};
@@ -98,8 +99,8 @@ pub(super) struct LayerStack {
     pub(super) samples: SampleGrid,
     /// Factor on light.
     pub(super) exposure: f32,
-    /// Some layer is film.
-    pub(super) tinted: bool,
+    /// What its layers' texels have.
+    pub(super) content: TexelContent,
 }
 
 /// Deep samples in any order of pixels, front to back for each.
@@ -204,6 +205,26 @@ impl SampleGrid {
         match &self.bent {
             None => (self.columns[x], self.rows[y]),
             Some(bent) => bent.position_of([self.coordinate_of(x), self.coordinate_of(y)]),
+        }
+    }
+
+    /// Looks up a map at pixels of a row, which are not split into sub-samples.
+    fn look_up_row(
+        &self,
+        map: &IrradianceMap,
+        pixels: Range<usize>,
+        y: usize,
+        out: &mut Vec<Float4>,
+    ) {
+        match &self.bent {
+            None => map.values_along(self.rows[y], &self.columns[pixels], out),
+            Some(_) => {
+                out.clear();
+                out.extend(pixels.map(|x| {
+                    let (column, row) = self.position_of(x, y);
+                    map.value_at(column, row)
+                }));
+            }
         }
     }
 
@@ -421,7 +442,7 @@ impl LayerStack {
         out: &mut TileSamples,
     ) -> Transmittance {
         let r = self.samples.offsets.len();
-        let mut through = Transmittance::unobstructed(block, r, self.tinted);
+        let mut through = Transmittance::unobstructed(block, r, self.content);
         let mut row = LayerRow::default();
         for &k in layers {
             let layer = &self.layers[k];
@@ -430,7 +451,7 @@ impl LayerStack {
                 self.keep_row(layer, block, y, &mut row, out);
             }
         }
-        work::add_all(row.work_counts(self.tinted));
+        work::add_all(row.work_counts(self.content));
         through
     }
 
@@ -443,7 +464,7 @@ impl LayerStack {
         through: &mut Transmittance,
         row: &mut LayerRow,
     ) {
-        row.start(block.x.len(), self.tinted);
+        row.start(block.x.len(), self.content);
         for (sy, offset_y) in self.samples.offsets.iter().enumerate() {
             let line = LayerLine::new(layer, block.x.start, y as f64 + 0.5 + offset_y);
             for sx in 0..self.samples.offsets.len() {
@@ -506,16 +527,49 @@ impl LayerStack {
         row: &mut LayerRow,
         out: &mut TileSamples,
     ) {
-        let weight = self.samples.sample_weight();
-        for i in row.touched.clone().filter(|&i| row.alpha[i] > 0.0) {
+        let is_lit_here = self.light_pixels(layer, block, y, row);
+        for (n, i) in row.touched.clone().enumerate() {
+            let alpha = row.alpha_at(i, self.content);
+            if alpha <= 0.0 {
+                continue;
+            }
             let x = block.x.start + i;
-            let (light, hidden) = row.seen_at(i, self.tinted);
-            let hidden = hidden.scale(weight);
-            let light = self.pixel_light(layer, [x, y], light, &mut row.lit);
-            let sample = self.deep_sample(layer, [x, y], light, row.alpha[i], hidden);
+            let (sum, hidden) = row.seen_at(i, self.content);
+            let hidden = hidden.scale(self.samples.sample_weight());
+            row.lit += usize::from(is_lit_here && sum.alpha() > 0.0);
+            let light = sum.times(row.pixel_light[n]);
+            let sample = self.deep_sample(layer, [x, y], light, alpha, hidden);
             out.samples.push((x as u32, y as u32, sample));
-            if self.tinted {
+            if self.content.is_tinted() {
                 out.tints.push(hidden.map(|h| h.min(1.0)));
+            }
+        }
+    }
+
+    /// Finds the factors on what a row's pixels got from a layer, and whether they are the light on
+    /// it: sub-samples that are lit have theirs already, and in the dark nothing is seen.
+    fn light_pixels(
+        &self,
+        layer: &Layer,
+        block: &PixelBlock,
+        y: usize,
+        row: &mut LayerRow,
+    ) -> bool {
+        let touched = row.touched.clone();
+        match &layer.light {
+            Some(_) if self.samples.per_subsample => {
+                refill(&mut row.pixel_light, touched.len(), Float4::ONE);
+                false
+            }
+            Some(light) => {
+                let pixels = block.x.start + touched.start..block.x.start + touched.end;
+                self.samples
+                    .look_up_row(light, pixels, y, &mut row.pixel_light);
+                true
+            }
+            None => {
+                refill(&mut row.pixel_light, touched.len(), Float4::ZERO);
+                false
             }
         }
     }
@@ -539,27 +593,6 @@ impl LayerStack {
             light: light.rgb().scale(weight * self.exposure / PI),
             alpha,
             visible: channel_mean(hidden).min(alpha),
-        }
-    }
-
-    /// Light from a layer at a pixel, lit here where its sub-samples were not; `lit` counts the
-    /// pixels that were.
-    #[inline(always)]
-    fn pixel_light(
-        &self,
-        layer: &Layer,
-        [x, y]: [usize; 2],
-        sum: Float4,
-        lit: &mut usize,
-    ) -> Float4 {
-        match &layer.light {
-            Some(map) if !self.samples.per_subsample && sum.alpha() > 0.0 => {
-                *lit += 1;
-                let (column, row) = self.samples.position_of(x, y);
-                sum.times(map.value_at(column, row))
-            }
-            Some(_) => sum,
-            None => Float4::ZERO.with_fourth(sum.alpha()),
         }
     }
 
@@ -594,15 +627,33 @@ impl LayerStack {
         through: &Transmittance,
         row: &mut [LinearRgb],
     ) {
+        let shares = self.pixel_shares(map, part, y);
         for (i, shadow) in row.iter_mut().enumerate() {
             let x = part.x.start + i;
-            *shadow = if spans.hold_pixel(x) && !self.samples.per_subsample {
-                self.share_at(map, x, y).rgb()
-            } else {
-                let through = through.of_pixel(i, y - part.y.start);
-                self.mean_share(map, [x, y], spans, through)
+            *shadow = match shares.get(i) {
+                Some(share) if spans.hold_pixel(x) => share.rgb(),
+                _ => {
+                    let through = through.of_pixel(i, y - part.y.start);
+                    self.mean_share(map, [x, y], spans, through)
+                }
             };
         }
+    }
+
+    /// The share at the pixels of a row; none where it is looked up for each sub-sample.
+    fn pixel_shares(&self, map: &IrradianceMap, part: &PixelBlock, y: usize) -> Vec<Float4> {
+        let mut shares = Vec::new();
+        if !self.samples.per_subsample {
+            self.samples
+                .look_up_row(map, part.x.clone(), y, &mut shares);
+            for (x, share) in part.x.clone().zip(&mut shares) {
+                let (column, row) = self.samples.position_of(x, y);
+                if !map.holds(column, row) {
+                    *share = Float4::ONE;
+                }
+            }
+        }
+        shares
     }
 
     /// The share at one position of the sample grid.

@@ -1,6 +1,7 @@
 //! A level of a pyramid made up to two times smaller, with a transparent border.
 
 use crate::image::Image;
+use crate::render::float4::Float4;
 use crate::render::float8::Float8;
 use crate::render::texel_grid::BORDER_TEXELS;
 use bytemuck::Pod;
@@ -13,11 +14,31 @@ pub(super) struct DetailLevel {
     step: f64,
 }
 
+/// Numbers of a texel, which averages are made of.
+pub(super) trait Texel: Copy + Default {
+    /// `self + weight * o`, number by number.
+    fn add_scaled(self, weight: f32, o: Self) -> Self;
+}
+
+impl Texel for Float8 {
+    #[inline(always)]
+    fn add_scaled(self, weight: f32, o: Self) -> Self {
+        Float8::add_scaled(self, weight, o)
+    }
+}
+
+impl Texel for Float4 {
+    #[inline(always)]
+    fn add_scaled(self, weight: f32, o: Self) -> Self {
+        Float4::add_scaled(self, weight, o)
+    }
+}
+
 /// Texels with their border, row by row.
-pub(super) struct BorderedTexels {
+pub(super) struct BorderedTexels<T> {
     pub(super) width: usize,
     pub(super) height: usize,
-    pub(super) texels: Vec<Float8>,
+    pub(super) texels: Vec<T>,
 }
 
 impl DetailLevel {
@@ -29,12 +50,13 @@ impl DetailLevel {
         }
     }
 
-    /// Reads a picture of floats from its pyramid, and finishes it row by row.
-    pub(super) fn resample<'a, P: Pod + Into<Float8>>(
+    /// Reads what is wanted of a picture of floats from its pyramid, and finishes it row by row.
+    pub(super) fn resample<'a, P: Pod, T: Texel>(
         &self,
         level: impl Fn(usize) -> &'a Image<P>,
-        finish: impl Fn(&mut [Float8]),
-    ) -> BorderedTexels {
+        wanted: impl Fn(P) -> T,
+        finish: impl Fn(&mut [T]),
+    ) -> BorderedTexels<T> {
         let image = level(self.level);
         let columns = downsample_axis(image.width(), self.step);
         let rows = downsample_axis(image.height(), self.step);
@@ -42,26 +64,26 @@ impl DetailLevel {
         let mut averages = RowAverages::new(image);
         for (row, line) in rows.iter().zip(out.inner_lines()) {
             let line = &mut line[..columns.len()];
-            average_columns(&columns, averages.average(row), line);
+            average_columns(&columns, averages.average(row, &wanted), line);
             finish(line);
         }
         out
     }
 }
 
-impl BorderedTexels {
+impl<T: Texel> BorderedTexels<T> {
     /// Room for this many columns and rows inside of the border.
     fn transparent(columns: usize, rows: usize) -> Self {
         let (width, height) = (columns + 2 * BORDER_TEXELS, rows + 2 * BORDER_TEXELS);
         Self {
             width,
             height,
-            texels: vec![Float8::ZERO; width * height],
+            texels: vec![T::default(); width * height],
         }
     }
 
     /// Rows from the first inside of the border on, without the border on their left.
-    fn inner_lines(&mut self) -> impl Iterator<Item = &mut [Float8]> {
+    fn inner_lines(&mut self) -> impl Iterator<Item = &mut [T]> {
         self.texels
             .chunks_exact_mut(self.width)
             .skip(BORDER_TEXELS)
@@ -70,24 +92,24 @@ impl BorderedTexels {
 }
 
 /// Rows of a picture, averaged.
-struct RowAverages<'a, P> {
+struct RowAverages<'a, P, T> {
     image: &'a Image<P>,
     /// The channels of a row's pixels.
     sum: Vec<f32>,
-    line: Vec<Float8>,
+    line: Vec<T>,
 }
 
-impl<'a, P: Pod + Into<Float8>> RowAverages<'a, P> {
+impl<'a, P: Pod, T: Texel> RowAverages<'a, P, T> {
     fn new(image: &'a Image<P>) -> Self {
         let channels = size_of::<P>() / size_of::<f32>();
         Self {
             image,
             sum: vec![0.0; image.width() * channels],
-            line: vec![Float8::ZERO; image.width()],
+            line: vec![T::default(); image.width()],
         }
     }
 
-    fn average(&mut self, rows: &TexelWeights) -> &[Float8] {
+    fn average(&mut self, rows: &TexelWeights, wanted: impl Fn(P) -> T) -> &[T] {
         self.sum.fill(0.0);
         for (y, weight) in rows.weighted() {
             add_row(
@@ -98,7 +120,7 @@ impl<'a, P: Pod + Into<Float8>> RowAverages<'a, P> {
         }
         let sums: &[P] = bytemuck::cast_slice(&self.sum);
         for (t, &p) in self.line.iter_mut().zip(sums) {
-            *t = p.into();
+            *t = wanted(p);
         }
         &self.line
     }
@@ -120,7 +142,7 @@ fn add_row(sum: &mut [f32], weight: f32, row: &[f32]) {
     "x86_64+avx2",
     "aarch64+neon"
 ))]
-fn average_columns(columns: &[TexelWeights], line: &[Float8], out: &mut [Float8]) {
+fn average_columns<T: Texel>(columns: &[TexelWeights], line: &[T], out: &mut [T]) {
     for (column, out) in columns.iter().zip(out) {
         *out = column.weighted_sum(line);
     }
@@ -162,8 +184,8 @@ impl TexelWeights {
     }
 
     #[inline(always)]
-    fn weighted_sum(&self, texels: &[Float8]) -> Float8 {
-        self.weighted().fold(Float8::ZERO, |sum, (x, weight)| {
+    fn weighted_sum<T: Texel>(&self, texels: &[T]) -> T {
+        self.weighted().fold(T::default(), |sum, (x, weight)| {
             sum.add_scaled(weight, texels[x])
         })
     }

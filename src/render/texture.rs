@@ -3,10 +3,11 @@
 
 use crate::asset::Texture;
 use crate::geom::Vector3;
+use crate::pixel::{Film, PremulRgba};
 use crate::render::float4::Float4;
 use crate::render::float8::Float8;
-use crate::render::grade::{channel_mean, grade_texels};
-use crate::render::resample::{BorderedTexels, DetailLevel};
+use crate::render::grade::{channel_mean, grade_opacities, grade_texels};
+use crate::render::resample::{BorderedTexels, DetailLevel, Texel};
 use crate::render::texel_extent::TexelExtent;
 use crate::render::texel_grid::TexelGrid;
 use crate::render::view::ProjectedPlane;
@@ -23,40 +24,77 @@ pub(super) struct BakedTexture {
     extent: TexelExtent,
 }
 
-/// Texels, row by row.
+/// What of textures a picture needs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum TexelContent {
+    /// Colour and alpha.
+    Alpha,
+    /// The same with the opacity of each channel, where some card is film.
+    Film,
+    /// Opacity alone, where some card is film and no light shines.
+    Opacity,
+}
+
+impl TexelContent {
+    /// What a picture needs.
+    pub(super) fn needed(with_film: bool, is_lit: bool) -> Self {
+        match (with_film, is_lit) {
+            (false, _) => Self::Alpha,
+            (true, true) => Self::Film,
+            (true, false) => Self::Opacity,
+        }
+    }
+
+    /// What passes differs from channel to channel.
+    pub(super) fn is_tinted(self) -> bool {
+        self != Self::Alpha
+    }
+}
+
+/// Texels, row by row; alpha is the mean of the channels' opacity.
 #[derive(Debug)]
 pub(super) enum BakedTexels {
     /// Colour and alpha.
     Alpha(Vec<Float4>),
-    /// The same with the opacity of each channel, for pictures with film; alpha is its mean.
+    /// Colour and alpha, and the opacity of each channel.
     Film(Vec<Float8>),
+    /// The opacity of each channel, and alpha.
+    Opacity(Vec<Float4>),
 }
 
 impl BakedTexture {
-    /// A texture at a level of detail, which need not be an integer, in a card's own colours; for a
-    /// picture with film or without.
+    /// A texture at a level of detail, which need not be an integer, in a card's own colours.
     ///
     /// The level below is averaged further, so that there are no more texels than are needed and a
     /// reading costs four of them.
-    pub(super) fn new(texture: &Texture, grade: &Grade, level: f64, with_film: bool) -> Self {
+    pub(super) fn new(texture: &Texture, grade: &Grade, level: f64, content: TexelContent) -> Self {
         let level = level.clamp(0.0, (texture.levels() - 1) as f64);
         let grid = TexelGrid::new(texture.size(), level);
-        let baked = resample_texture(texture, DetailLevel::new(level), |row| {
-            grade_texels(row, grade);
-            if texture.is_film() {
-                average_opacity(row);
-            }
-        });
+        let detail = DetailLevel::new(level);
+        if content == TexelContent::Opacity {
+            let baked = resample_opacity(texture, detail, grade);
+            return Self::from_texels(baked, grid, BakedTexels::Opacity);
+        }
+        let baked = resample_film(texture, detail, grade);
+        match content {
+            TexelContent::Film => Self::from_texels(baked, grid, BakedTexels::Film),
+            _ => Self::from_texels(baked, grid, |texels| {
+                BakedTexels::Alpha(texels.iter().map(|t| t.color()).collect())
+            }),
+        }
+    }
+
+    fn from_texels<T: Texel + PartialEq>(
+        baked: BorderedTexels<T>,
+        grid: TexelGrid,
+        content: impl Fn(Vec<T>) -> BakedTexels,
+    ) -> Self {
         Self {
             extent: TexelExtent::around(&baked.texels, baked.width, &grid),
             grid,
             width: baked.width,
             height: baked.height,
-            texels: if with_film {
-                BakedTexels::Film(baked.texels)
-            } else {
-                BakedTexels::Alpha(baked.texels.iter().map(|t| t.color()).collect())
-            },
+            texels: content(baked.texels),
         }
     }
 
@@ -78,19 +116,48 @@ impl BakedTexture {
 /// Alpha of a film's texels is the mean opacity of their channels.
 fn average_opacity(texels: &mut [Float8]) {
     for t in texels {
-        let alpha = channel_mean(t.opacity().rgb());
+        let alpha = channel_mean(t.opacity().clamped().rgb());
         *t = Float8::new(t.color().with_fourth(alpha), t.opacity());
     }
 }
 
-fn resample_texture(
+fn resample_film(texture: &Texture, detail: DetailLevel, grade: &Grade) -> BorderedTexels<Float8> {
+    let finish = |row: &mut [Float8]| {
+        grade_texels(row, grade);
+        if texture.is_film() {
+            average_opacity(row);
+        }
+    };
+    match texture {
+        Texture::Rgba(pyramid) => detail.resample(|l| pyramid.level(l), Float8::from, finish),
+        Texture::Film(pyramid) => detail.resample(|l| pyramid.level(l), Float8::from, finish),
+    }
+}
+
+/// The same opacities as those of [`resample_film`].
+fn resample_opacity(
     texture: &Texture,
     detail: DetailLevel,
-    finish: impl Fn(&mut [Float8]),
-) -> BorderedTexels {
+    grade: &Grade,
+) -> BorderedTexels<Float4> {
     match texture {
-        Texture::Rgba(pyramid) => detail.resample(|l| pyramid.level(l), finish),
-        Texture::Film(pyramid) => detail.resample(|l| pyramid.level(l), finish),
+        Texture::Rgba(pyramid) => {
+            let alpha = |p: PremulRgba| Float4([p.a; 4]);
+            detail.resample(
+                |l| pyramid.level(l),
+                alpha,
+                |row| grade_opacities(row, grade),
+            )
+        }
+        Texture::Film(pyramid) => {
+            let opacity = |p: Film| Float4::from(p.opacity);
+            let finish = |row: &mut [Float4]| {
+                grade_opacities(row, grade);
+                row.iter_mut()
+                    .for_each(|t| *t = t.with_fourth(channel_mean(t.rgb())));
+            };
+            detail.resample(|l| pyramid.level(l), opacity, finish)
+        }
     }
 }
 
@@ -98,7 +165,7 @@ fn resample_texture(
 mod tests {
     use super::*;
     use crate::image::Image;
-    use crate::pixel::{Film, LinearRgb, PremulRgba};
+    use crate::pixel::LinearRgb;
     use crate::render::opacity::OpacityLevel;
 
     #[test]
@@ -118,8 +185,8 @@ mod tests {
             ..Grade::default()
         };
         let (a, b) = (
-            BakedTexture::new(&alpha, &grade, 0.6, false),
-            BakedTexture::new(&film, &grade, 0.6, true),
+            BakedTexture::new(&alpha, &grade, 0.6, TexelContent::Alpha),
+            BakedTexture::new(&film, &grade, 0.6, TexelContent::Film),
         );
         let (BakedTexels::Alpha(a), BakedTexels::Film(b)) = (a.texels, b.texels) else {
             panic!("texels of a picture without film, and of one with film");

@@ -12,7 +12,7 @@ use crate::render::lattice::LatticePosition;
 use crate::render::ranges::range_union;
 use crate::render::refill;
 use crate::render::texel_grid::{BilinearCells, SIMD_LANES, TexelLine};
-use crate::render::texture::{BakedTexels, BakedTexture};
+use crate::render::texture::{BakedTexels, BakedTexture, TexelContent};
 use crate::work::Kind;
 use std::ops::Range;
 
@@ -24,7 +24,7 @@ pub(super) struct Transmittance {
     area: usize,
     /// One number for all channels; empty where there is film.
     grey: Vec<f32>,
-    /// A number for each channel; empty where there is none.
+    /// A number for each channel, and 1, by which alpha is added up as it is; empty where there is none.
     tinted: Vec<Float4>,
 }
 
@@ -34,14 +34,17 @@ pub(super) struct LayerRow {
     /// Pixels that the layer touches.
     pub(super) touched: Range<usize>,
     /// Sum over sub-samples of its colour, as far as it is seen; the fourth number is the same of
-    /// its alpha. Where there is no film.
+    /// its alpha. Where there is no film. Of opacity alone it is what is hidden in each channel.
     light: Vec<Float4>,
     /// The same, and that of its opacity, where there is film.
     seen: Vec<Float8>,
-    /// Sum of its alpha, whatever is in front.
-    pub(super) alpha: Vec<f32>,
+    /// Sum of its alpha, whatever is in front. Where there is no film; else it is the fourth number of
+    /// what is seen.
+    alpha: Vec<f32>,
     /// Light on it at the sub-samples under work, where that is not the pixel's.
     irradiance: Vec<Float4>,
+    /// Factors on the light of the pixels that the layer touches.
+    pub(super) pixel_light: Vec<Float4>,
     /// Texture readings, and light looked up, for all rows so far.
     read: usize,
     /// See `read`.
@@ -62,8 +65,8 @@ pub(super) struct SubsampleRun<'a> {
 
 impl LayerRow {
     /// What all rows took.
-    pub(super) fn work_counts(&self, tinted: bool) -> [(Kind, u64); 3] {
-        let film = if tinted { self.read } else { 0 };
+    pub(super) fn work_counts(&self, content: TexelContent) -> [(Kind, u64); 3] {
+        let film = if content.is_tinted() { self.read } else { 0 };
         [
             (Kind::TextureSamples, self.read as u64),
             (Kind::FilmSamples, film as u64),
@@ -72,13 +75,17 @@ impl LayerRow {
     }
 
     /// Empties a row of `n` pixels.
-    pub(super) fn start(&mut self, n: usize, tinted: bool) {
+    pub(super) fn start(&mut self, n: usize, content: TexelContent) {
         self.touched = 0..0;
         self.irradiance.clear();
-        let (grey, film) = if tinted { (0, n) } else { (n, 0) };
-        refill(&mut self.light, grey, Float4::ZERO);
-        refill(&mut self.seen, film, Float8::ZERO);
-        refill(&mut self.alpha, n, 0.0);
+        let [light, seen, alpha] = match content {
+            TexelContent::Alpha => [n, 0, n],
+            TexelContent::Film => [0, n, 0],
+            TexelContent::Opacity => [n, 0, 0],
+        };
+        refill(&mut self.light, light, Float4::ZERO);
+        refill(&mut self.seen, seen, Float8::ZERO);
+        refill(&mut self.alpha, alpha, 0.0);
     }
 
     /// Notes that some pixels' sub-samples read the layer's texture.
@@ -90,11 +97,21 @@ impl LayerRow {
     /// Light of pixel `i` of the layer, and what it hides of all behind it, per channel, added up
     /// over sub-samples.
     #[inline(always)]
-    pub(super) fn seen_at(&self, i: usize, tinted: bool) -> (Float4, LinearRgb) {
-        if tinted {
-            (self.seen[i].color(), self.seen[i].opacity().rgb())
-        } else {
-            (self.light[i], LinearRgb::grey(self.light[i].alpha()))
+    pub(super) fn seen_at(&self, i: usize, content: TexelContent) -> (Float4, LinearRgb) {
+        match content {
+            TexelContent::Alpha => (self.light[i], LinearRgb::grey(self.light[i].alpha())),
+            TexelContent::Film => (self.seen[i].color(), self.seen[i].opacity().rgb()),
+            TexelContent::Opacity => (Float4::ZERO, self.light[i].rgb()),
+        }
+    }
+
+    /// Alpha of pixel `i` of the layer, whatever is in front, added up over sub-samples.
+    #[inline(always)]
+    pub(super) fn alpha_at(&self, i: usize, content: TexelContent) -> f32 {
+        match content {
+            TexelContent::Alpha => self.alpha[i],
+            TexelContent::Film => self.seen[i].color().alpha(),
+            TexelContent::Opacity => self.light[i].alpha(),
         }
     }
 
@@ -116,10 +133,13 @@ impl LayerRow {
 
 impl Transmittance {
     /// Nothing in the way of `r` x `r` sub-samples a pixel.
-    pub(super) fn unobstructed(block: &PixelBlock, r: usize, tinted: bool) -> Self {
+    pub(super) fn unobstructed(block: &PixelBlock, r: usize, content: TexelContent) -> Self {
         let (width, area) = (block.x.len(), block.len());
         let count = area * r * r;
-        let (grey, tints) = if tinted { (0, count) } else { (count, 0) };
+        let (grey, tints) = match content.is_tinted() {
+            true => (0, count),
+            false => (count, 0),
+        };
         Self {
             width,
             area,
@@ -148,16 +168,20 @@ impl Transmittance {
         let SubsampleRun { pixels, line, .. } = run;
         let start = run.plane * self.area + run.y * self.width;
         let places = start + pixels.start..start + pixels.end;
-        let alpha = &mut row.alpha[pixels.clone()];
         let (irradiance, size) = (&row.irradiance, texture.size());
         match &texture.texels {
             BakedTexels::Alpha(texels) => {
+                let alpha = &mut row.alpha[pixels.clone()];
                 let (through, light) = (&mut self.grey[places], &mut row.light[pixels]);
                 pass_grey((texels, size), line, irradiance, through, light, alpha);
             }
             BakedTexels::Film(texels) => {
                 let (through, seen) = (&mut self.tinted[places], &mut row.seen[pixels]);
-                pass_film((texels, size), line, irradiance, through, seen, alpha);
+                pass_film((texels, size), line, irradiance, through, seen);
+            }
+            BakedTexels::Opacity(texels) => {
+                let (through, hidden) = (&mut self.tinted[places], &mut row.light[pixels]);
+                pass_opacity((texels, size), line, through, hidden);
             }
         }
     }
@@ -215,23 +239,44 @@ fn pass_film(
     irradiance: &[Float4],
     through: &mut [Float4],
     seen: &mut [Float8],
-    alpha: &mut [f32],
 ) {
     let runs = through
         .chunks_mut(SIMD_LANES)
-        .zip(seen.chunks_mut(SIMD_LANES))
-        .zip(alpha.chunks_mut(SIMD_LANES));
-    for (run, ((through, seen), alpha)) in runs.enumerate() {
+        .zip(seen.chunks_mut(SIMD_LANES));
+    for (run, (through, seen)) in runs.enumerate() {
         let cells = BilinearCells::along_line(line, (run * SIMD_LANES) as f32, size);
         let irradiance = irradiance.get(run * SIMD_LANES..).unwrap_or_default();
-        for (lane, ((through, seen), alpha)) in through.iter_mut().zip(seen).zip(alpha).enumerate()
-        {
+        for (lane, (through, seen)) in through.iter_mut().zip(seen).enumerate() {
             let texel = cells.texel(lane, texels, size.0);
             let opacity = texel.opacity().clamped();
             let lit = lit_by(texel.color(), irradiance.get(lane));
             *seen = seen.add_product(Float8::new(*through, *through), Float8::new(lit, opacity));
-            *alpha += texel.color().alpha().max(0.0).min(1.0);
             *through = through.times(opacity.complement());
+        }
+    }
+}
+
+/// A layer in the dark in a picture with film: the same opacities as [`pass_film`].
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2",
+    "x86_64+avx2",
+    "aarch64+neon"
+))]
+fn pass_opacity(
+    (texels, size): (&[Float4], (usize, usize)),
+    line: &TexelLine,
+    through: &mut [Float4],
+    hidden: &mut [Float4],
+) {
+    let runs = through
+        .chunks_mut(SIMD_LANES)
+        .zip(hidden.chunks_mut(SIMD_LANES));
+    for (run, (through, hidden)) in runs.enumerate() {
+        let cells = BilinearCells::along_line(line, (run * SIMD_LANES) as f32, size);
+        for (lane, (through, hidden)) in through.iter_mut().zip(hidden).enumerate() {
+            let opacity = cells.texel(lane, texels, size.0).clamped();
+            *hidden = hidden.add_product(*through, opacity);
+            *through = through.times(opacity.complement().with_fourth(1.0));
         }
     }
 }

@@ -3,13 +3,13 @@
 use crate::asset::{Panorama, Texture};
 use crate::camera::Camera;
 use crate::composite;
-use crate::deep::DeepImage;
+use crate::deep::{DeepImage, DeepSample};
 use crate::geom::{Point2, Point3, Pose, Quad, UnitQuaternion, Vector2, Vector3};
 use crate::image::Image;
 use crate::light;
 use crate::pixel::{Film, LinearRgb, ObjectId, PremulRgba};
 use crate::quality::Quality;
-use crate::render::{RenderOptions, check, render, render_reference};
+use crate::render::{RenderOptions, check, render, render_coverage, render_reference};
 use crate::scene::{AreaLight, Card, EnvironmentMap, Grade, LightGrid, LightShape, Shot};
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -681,6 +681,29 @@ fn grey_film_gives_the_bits_of_alpha() {
         let tinted =
             |deep: &DeepImage| (0..48).any(|y| (0..64).any(|x| !deep.tints(x, y).is_empty()));
         assert!(!tinted(&a) && tinted(&b));
+    }
+}
+
+#[test]
+fn what_is_covered_and_hidden_is_the_same_in_the_dark() {
+    let mut film = tinted(Texture::from);
+    film.cards[0].grade = Grade {
+        hue_deg: 30.0,
+        saturation: 0.9,
+        ..Grade::default()
+    };
+    for shot in [film, tinted(|film| film.map(|f| f.color.opaque()).into())] {
+        let options = RenderOptions::default();
+        let [lit, dark] = [render, render_coverage].map(|way| way(&shot, &options));
+        let dark_sample = |sample: &DeepSample| DeepSample {
+            light: LinearRgb::BLACK,
+            ..*sample
+        };
+        for (x, y) in (0..lit.height()).flat_map(|y| (0..lit.width()).map(move |x| (x, y))) {
+            let without_light: Vec<_> = lit.at(x, y).iter().map(dark_sample).collect();
+            assert_eq!(without_light, dark.at(x, y), "{x}, {y}");
+            assert_eq!(lit.tints(x, y), dark.tints(x, y), "{x}, {y}");
+        }
     }
 }
 
