@@ -5,7 +5,6 @@
 //! over it then ask is cheap. The shortcuts taken on that account give the same bits as the
 //! computation that they replace.
 
-use super::rows::rows_around;
 use std::ops::Range;
 
 /// Columns of a block: a few vectors wide, narrow enough to fit between the edges of a subject.
@@ -23,6 +22,7 @@ pub(super) struct Extremes {
 }
 
 /// Extremes of the last few rows of a plane.
+#[derive(Default)]
 pub(super) struct Calm {
     width: usize,
     capacity: usize,
@@ -30,8 +30,17 @@ pub(super) struct Calm {
     /// For every row the keys of the least and the greatest value of its blocks.
     least: Vec<i32>,
     greatest: Vec<i32>,
-    /// The same over some rows, for the moment.
+    /// The same over some window, for the moment, and what that was before its last step.
     over: [Vec<i32>; 2],
+    beside: [Vec<i32>; 2],
+}
+
+impl Extremes {
+    /// The one value, to the bit, that all have.
+    #[inline(always)]
+    pub(super) fn only_value(self) -> Option<f32> {
+        (self.least.to_bits() == self.greatest.to_bits()).then_some(self.least)
+    }
 }
 
 impl Calm {
@@ -46,6 +55,7 @@ impl Calm {
             least: rows.clone(),
             greatest: rows,
             over: [vec![0; count], vec![0; count]],
+            beside: [vec![0; count], vec![0; count]],
         }
     }
 
@@ -60,34 +70,42 @@ impl Calm {
         start..start + self.count
     }
 
-    /// Gathers the extremes of every block over some rows.
-    fn gather_rows(&mut self, rows: Range<usize>) {
+    /// Gathers the extremes of every block over some rows and the columns within `reach` of it.
+    fn gather_window(&mut self, rows: Range<usize>, reach: usize) {
         let [mut least, mut greatest] = std::mem::take(&mut self.over);
         least.fill(i32::MAX);
         greatest.fill(i32::MIN);
         for y in rows {
             let slot = self.slot(y);
-            least
-                .iter_mut()
-                .zip(&self.least[slot.clone()])
-                .for_each(|(a, b)| *a = (*a).min(*b));
-            greatest
-                .iter_mut()
-                .zip(&self.greatest[slot])
-                .for_each(|(a, b)| *a = (*a).max(*b));
+            widen_extremes(
+                [&mut least, &mut greatest],
+                [&self.least[slot.clone()], &self.greatest[slot]],
+            );
+        }
+        // A step to each side per block that the window reaches.
+        for _ in 0..reach.div_ceil(BLOCK_COLUMNS).min(self.count) {
+            self.beside[0].copy_from_slice(&least);
+            self.beside[1].copy_from_slice(&greatest);
+            let ([low, high], last) = (&self.beside, self.count - 1);
+            widen_extremes(
+                [&mut least[1..], &mut greatest[1..]],
+                [&low[..last], &high[..last]],
+            );
+            widen_extremes(
+                [&mut least[..last], &mut greatest[..last]],
+                [&low[1..], &high[1..]],
+            );
         }
         self.over = [least, greatest];
     }
 
-    /// Extremes of the gathered rows over the columns within `reach` of a block.
-    fn window_extremes(&self, block: usize, reach: usize) -> Extremes {
-        let columns = rows_around(block, reach.div_ceil(BLOCK_COLUMNS), self.count);
+    /// Extremes of the gathered window around a block.
+    #[inline(always)]
+    fn window_extremes(&self, block: usize) -> Extremes {
         let [least, greatest] = &self.over;
-        let least = least[columns.clone()].iter().min();
-        let greatest = greatest[columns].iter().max();
         Extremes {
-            least: from_order_key(*least.unwrap_or(&0)),
-            greatest: from_order_key(*greatest.unwrap_or(&0)),
+            least: from_order_key(least[block]),
+            greatest: from_order_key(greatest[block]),
         }
     }
 
@@ -101,35 +119,30 @@ impl Calm {
         settled: impl Fn(Extremes, Extremes) -> Option<f32>,
         mut compute: impl FnMut(Range<usize>, &mut [f32]),
     ) {
-        let mut compute = |columns: Range<usize>, out: &mut [f32]| {
-            if !columns.is_empty() {
-                compute(columns.clone(), &mut out[columns]);
-            }
-        };
-        // Longer than elsewhere: one pass over the blocks joins those that are not calm into runs.
-        self.gather_rows(rows);
+        // Longer than elsewhere: one pass over the blocks joins those of the same fate into runs.
+        self.gather_window(rows, reach);
         let row = self.slot(y).start;
-        let mut open = 0..0;
+        let mut finish = |columns: Range<usize>, known: Option<f32>| match known {
+            Some(value) => fill_columns(&mut out[columns], value),
+            None if columns.is_empty() => (),
+            None => compute(columns.clone(), &mut out[columns]),
+        };
+        let (mut open, mut fate) = (0..0, None);
         for (block, start) in (0..self.width).step_by(BLOCK_COLUMNS).enumerate() {
-            let columns = start..(start + BLOCK_COLUMNS).min(self.width);
             let own = Extremes {
                 least: from_order_key(self.least[row + block]),
                 greatest: from_order_key(self.greatest[row + block]),
             };
-            let known = settled(own, self.window_extremes(block, reach));
-            if known.is_none() && open.end == start && open.len() + BLOCK_COLUMNS <= RUN_COLUMNS {
-                open.end = columns.end;
-                continue;
+            let known = settled(own, self.window_extremes(block));
+            let joins = known.map(f32::to_bits) == fate.map(f32::to_bits)
+                && (known.is_some() || open.len() + BLOCK_COLUMNS <= RUN_COLUMNS);
+            if !joins {
+                finish(open, fate);
+                (open, fate) = (start..start, known);
             }
-            compute(open, out);
-            open = if known.is_some() {
-                columns.end..columns.end
-            } else {
-                columns.clone()
-            };
-            known.into_iter().for_each(|v| out[columns.clone()].fill(v));
+            open.end = (start + BLOCK_COLUMNS).min(self.width);
         }
-        compute(open, out);
+        finish(open, fate);
     }
 }
 
@@ -141,8 +154,35 @@ fn order_key(v: f32) -> i32 {
 }
 
 /// The float of a key.
+#[inline(always)]
 fn from_order_key(key: i32) -> f32 {
     f32::from_bits((key ^ ((key >> 31) & i32::MAX)) as u32)
+}
+
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2",
+    "x86_64+avx2",
+    "aarch64+neon"
+))]
+fn fill_columns(out: &mut [f32], value: f32) {
+    out.fill(value);
+}
+
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2",
+    "x86_64+avx2",
+    "aarch64+neon"
+))]
+fn widen_extremes(over: [&mut [i32]; 2], by: [&[i32]; 2]) {
+    let ([least, greatest], [low, high]) = (over, by);
+    least
+        .iter_mut()
+        .zip(low)
+        .for_each(|(a, b)| *a = (*a).min(*b));
+    greatest
+        .iter_mut()
+        .zip(high)
+        .for_each(|(a, b)| *a = (*a).max(*b));
 }
 
 #[multiversion::multiversion(targets(
@@ -208,8 +248,8 @@ mod tests {
     fn a_nan_is_an_extreme() {
         let mut calm = Calm::new(3, 1);
         calm.note_row(0, &[0.0, f32::NAN, 1.0]);
-        calm.gather_rows(0..1);
-        let Extremes { least, greatest } = calm.window_extremes(0, 0);
+        calm.gather_window(0..1, 0);
+        let Extremes { least, greatest } = calm.window_extremes(0);
         assert!(least == 0.0 && greatest.is_nan());
     }
 }

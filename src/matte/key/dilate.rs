@@ -4,9 +4,11 @@
 //! overlap. So every row of the source is kept with the extremes of all runs of 1, 2, 4, ...
 //! samples, and a disc of any size takes two look-ups a row instead of a sum over its area.
 
+use super::calm::{Calm, Extremes};
 use super::model::Behaviour;
 use super::options::{KeyOptions, Profile};
 use super::rows::{Pad, Rows, Source, Window, rows_around, window_rows};
+use std::ops::Range;
 
 /// Blender up to 4.3 offers the disc no more than a window of this half-size, one short to the
 /// right and upwards.
@@ -20,6 +22,7 @@ pub(super) struct Dilate<'a> {
     height: usize,
     /// For every row its runs of 1, 2, 4, ... samples, one after the other.
     window: Window,
+    calm: Calm,
     width: usize,
 }
 
@@ -81,13 +84,15 @@ impl<'a> Dilate<'a> {
             lopsided: !unlimited && options.profile != Profile::Robust,
         };
         let runs = (2 * distance + 1).ilog2() as usize + 1;
-        let window = Window::new((width + 2 * distance) * runs, window_rows(distance, height));
+        let capacity = window_rows(distance, height);
+        let window = Window::new((width + 2 * distance) * runs, capacity);
         Self {
             source,
             shape,
             extreme: Extreme::new(options.dilate_distance > 0, unlimited),
             height,
             window,
+            calm: Calm::new(width, capacity),
             width,
         }
     }
@@ -102,6 +107,7 @@ impl Dilate<'_> {
             extreme,
             height,
             window,
+            calm,
             width,
         } = self;
         let margin = shape.distance;
@@ -109,35 +115,53 @@ impl Dilate<'_> {
         window.cover_rows(rows_around(y, margin, *height), |y, runs| {
             let inside = &mut runs[margin..margin + *width];
             source.row(y, inside);
-            for v in inside {
-                *v = extreme.pick(extreme.start, *v);
-            }
+            limit_row(inside, *extreme);
+            calm.note_row(y, inside);
             Pad::Value(extreme.start).fill_margins(&mut runs[..stride], margin);
             double_runs(runs, stride, *extreme);
         });
     }
 
-    /// The extremes of two runs of row `near`, for every pixel, that together reach from `left` to
+    /// The extremes of two runs of row `near`, for every pixel of some columns, that together reach from `left` to
     /// `right` of it.
-    fn two_runs(&self, near: usize, (left, right): (usize, usize)) -> [&[f32]; 2] {
-        let (margin, width) = (self.shape.distance, self.width);
-        let stride = width + 2 * margin;
+    fn two_runs(
+        &self,
+        near: usize,
+        (left, right): (usize, usize),
+        columns: &Range<usize>,
+    ) -> [&[f32]; 2] {
+        let margin = self.shape.distance;
+        let stride = self.width + 2 * margin;
         let level = (left + right + 1).ilog2() as usize;
         let runs = &self.window.row(near)[level * stride..][..stride];
-        [margin - left, margin + right + 1 - (1 << level)].map(|first| &runs[first..first + width])
+        [margin - left, margin + right + 1 - (1 << level)]
+            .map(|first| &runs[first + columns.start..first + columns.end])
+    }
+
+    /// Widens a few columns of row `y`.
+    fn compute(&self, y: usize, columns: &Range<usize>, out: &mut [f32]) {
+        out.fill(self.extreme.start);
+        for near in rows_around(y, self.shape.distance, self.height) {
+            if let Some(reach) = self.shape.row_reach(y as isize - near as isize) {
+                let [a, b] = self.two_runs(near, reach, columns);
+                widen_row(out, a, b, self.extreme);
+            }
+        }
     }
 }
 
 impl Rows for Dilate<'_> {
     fn row(&mut self, y: usize, out: &mut [f32]) {
         self.cover_rows(y);
-        out.fill(self.extreme.start);
-        for near in rows_around(y, self.shape.distance, self.height) {
-            if let Some(reach) = self.shape.row_reach(y as isize - near as isize) {
-                let [a, b] = self.two_runs(near, reach);
-                widen_row(out, a, b, self.extreme);
-            }
-        }
+        let reach = self.shape.distance;
+        let window = (y, rows_around(y, reach, self.height), reach);
+        // Lent to itself for the moment.
+        let mut calm = std::mem::take(&mut self.calm);
+        let alike = |_, near: Extremes| near.only_value();
+        calm.fill_row(out, window, alike, |columns, out| {
+            self.compute(y, &columns, out);
+        });
+        self.calm = calm;
     }
 }
 
@@ -153,6 +177,17 @@ fn double_runs(runs: &mut [f32], stride: usize, extreme: Extreme) {
             &shorter[half..],
             extreme,
         );
+    }
+}
+
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2",
+    "x86_64+avx2",
+    "aarch64+neon"
+))]
+fn limit_row(row: &mut [f32], extreme: Extreme) {
+    for v in row {
+        *v = extreme.pick(extreme.start, *v);
     }
 }
 

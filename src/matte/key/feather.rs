@@ -162,10 +162,13 @@ impl Rows for Feather<'_> {
         } = self;
         let radius = kernel.radius();
         window.cover_rows(rows_around(y, radius, *height), |y, row| {
-            source.row(y, row);
-            kernel.invert_if_inward(row);
-            calm_source.note_row(0, row);
-            kernel.pad_row(row, candidates, samples);
+            let inside = radius..radius + row.len();
+            let given = &mut samples[inside.clone()];
+            source.row(y, given);
+            kernel.invert_if_inward(given);
+            calm_source.note_row(0, given);
+            candidates[inside.clone()].copy_from_slice(given);
+            kernel.fill_margins(candidates, samples);
             kernel.along_x([candidates, samples], columns, calm_source, row);
             // The pass along x ends by turning its result back, the pass along y begins by turning
             // it again.
@@ -190,17 +193,11 @@ impl FeatherKernel {
         }
     }
 
-    /// Copies a row between margins.
-    fn pad_row(&self, row: &[f32], candidates: &mut [f32], samples: &mut [f32]) {
-        let (radius, repeat) = (self.radius(), self.behaviour.repeats_border());
+    /// Fills what stands to both sides of a row.
+    fn fill_margins(&self, candidates: &mut [f32], samples: &mut [f32]) {
+        let repeat = self.behaviour.repeats_border();
         for (padded, value) in [(candidates, f32::NAN), (samples, 0.0)] {
-            padded[radius..radius + row.len()].copy_from_slice(row);
-            let pad = if repeat {
-                Pad::Repeat
-            } else {
-                Pad::Value(value)
-            };
-            pad.fill_margins(padded, radius);
+            Pad::repeat_or(repeat, value).fill_margins(padded, self.radius());
         }
     }
 
