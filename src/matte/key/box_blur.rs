@@ -5,7 +5,6 @@ use super::model::Behaviour;
 use super::options::{Blur, KeyOptions};
 use super::rows::{Pad, Rows, Source, Window, rows_around, window_rows};
 use super::running_blur::{BoxReach, RunningBlur};
-use std::ops::Range;
 
 /// A plane blurred by a box of `size` (at least 1), in the way that the options ask for.
 pub(super) fn box_blurred<'a>(
@@ -37,7 +36,7 @@ struct BoxBlur<S> {
 }
 
 /// The window of a blur.
-enum BoxKernel {
+pub(super) enum BoxKernel {
     /// Cut off at the border: the mean of the samples inside, `radius` to each side.
     CutOff { radius: usize, columns: Vec<f32> },
     /// Repeating the border: the weights of the centre and of the samples at distance 1, 2, ...,
@@ -46,7 +45,7 @@ enum BoxKernel {
 }
 
 impl BoxKernel {
-    fn new(behaviour: Behaviour, size: usize, (width, height): (usize, usize)) -> Self {
+    pub(super) fn new(behaviour: Behaviour, size: usize, (width, height): (usize, usize)) -> Self {
         if behaviour.repeats_border() {
             let weights = weights(size);
             let of_ones = weights[1..].iter().fold(weights[0], |sum, w| sum + w + w);
@@ -63,7 +62,7 @@ impl BoxKernel {
     }
 
     /// The samples whose weight is not 0.
-    fn reach(&self) -> BoxReach {
+    pub(super) fn reach(&self) -> BoxReach {
         match self {
             Self::CutOff { radius, .. } => BoxReach {
                 radius: *radius,
@@ -79,7 +78,7 @@ impl BoxKernel {
         }
     }
 
-    fn radius(&self) -> usize {
+    pub(super) fn radius(&self) -> usize {
         match self {
             Self::CutOff { radius, .. } => *radius,
             Self::Repeat { weights, .. } => weights.len() - 1,
@@ -141,51 +140,29 @@ impl<S: Rows> Rows for BoxBlur<S> {
 impl BoxKernel {
     /// A plane of 0 stays what it is, and so nearly does a plane of 1.
     fn settled_value(&self, near: Extremes) -> Option<f32> {
-        let is =
-            |v: f32| near.least.to_bits() == v.to_bits() && near.greatest.to_bits() == v.to_bits();
         let of_ones = if let Self::Repeat { of_ones, .. } = self {
             *of_ones
         } else {
             1.0
         };
-        if is(0.0) {
+        let bits = near.only_value()?.to_bits();
+        if bits == 0.0f32.to_bits() {
             Some(0.0)
         } else {
-            is(1.0).then_some(of_ones)
+            (bits == 1.0f32.to_bits()).then_some(of_ones)
         }
     }
 
     fn along_x(&self, padded: &mut [f32], calm: &mut Calm, out: &mut [f32]) {
-        let radius = self.radius();
-        let repeat = matches!(self, Self::Repeat { .. });
-        Pad::repeat_or(repeat, 0.0).fill_margins(padded, radius);
+        let rows = self.samples_in_order(padded);
         calm.fill_row(
             out,
-            (0, 0..1, radius),
+            (0, 0..1, self.radius()),
             |_, near| self.settled_value(near),
-            |columns, out| self.compute_along_x(padded, columns, out),
+            |columns, out| self.add_along_x(&rows, columns.start, out),
         );
     }
 
-    /// Blurs a few columns of a row between margins.
-    fn compute_along_x(&self, padded: &[f32], columns: Range<usize>, out: &mut [f32]) {
-        let radius = self.radius();
-        let at = |offset: usize| &padded[columns.start + offset..columns.end + offset];
-        match self {
-            Self::CutOff {
-                columns: counts, ..
-            } => {
-                mean_of_rows(out, 2 * radius + 1, at, &counts[columns.clone()]);
-            }
-            Self::Repeat { weights, .. } => {
-                weighted_sum(out, weights, at(radius), |i| {
-                    [at(radius + i), at(radius - i)]
-                });
-            }
-        }
-    }
-
-    /// Blender counts rows from the bottom, so sums run upwards.
     fn along_y(
         &self,
         window: &Window,
@@ -193,98 +170,135 @@ impl BoxKernel {
         (y, height): (usize, usize),
         out: &mut [f32],
     ) {
-        let rows = rows_around(y, self.radius(), height);
+        let rows = self.rows_in_order(window, (y, height));
         calm.fill_row(
             out,
-            (y, rows, 0),
+            (y, rows_around(y, self.radius(), height), 0),
             |_, near| self.settled_value(near),
-            |columns, out| self.compute_along_y(window, (y, height), columns, out),
+            |columns, out| self.add_along_y(&rows, columns.start, out),
         );
     }
 
-    /// Blurs a few columns of row `y`.
-    fn compute_along_y(
+    /// The samples of a row between margins in the order in which they are added: rows that begin with the first pixel's.
+    pub(super) fn samples_in_order<'p>(&self, padded: &'p mut [f32]) -> Vec<&'p [f32]> {
+        let (radius, repeat) = (self.radius(), matches!(self, Self::Repeat { .. }));
+        Pad::repeat_or(repeat, 0.0).fill_margins(padded, radius);
+        let width = padded.len() - 2 * radius;
+        let at = |offset: usize| &padded[offset..offset + width];
+        match self {
+            Self::CutOff { .. } => (0..=2 * radius).map(at).collect(),
+            Self::Repeat { .. } => from_the_middle(radius)
+                .map(|i| at(radius.wrapping_add_signed(i)))
+                .collect(),
+        }
+    }
+
+    /// The rows around row `y` in the order in which they are added. Blender counts rows from the bottom, so sums run
+    /// upwards.
+    pub(super) fn rows_in_order<'w>(
         &self,
-        window: &Window,
+        window: &'w Window,
         (y, height): (usize, usize),
-        columns: Range<usize>,
-        out: &mut [f32],
-    ) {
-        let at = |row: usize| &window.row(row)[columns.clone()];
+    ) -> Vec<&'w [f32]> {
+        let radius = self.radius();
+        match self {
+            Self::CutOff { .. } => rows_around(y, radius, height)
+                .rev()
+                .map(|y| window.row(y))
+                .collect(),
+            Self::Repeat { .. } => from_the_middle(radius)
+                .map(|i| window.row(y.saturating_add_signed(-i).min(height - 1)))
+                .collect(),
+        }
+    }
+
+    /// Blurs columns from a first one on along x.
+    pub(super) fn add_along_x(&self, rows: &[&[f32]], first: usize, out: &mut [f32]) {
+        match self {
+            Self::CutOff { columns, .. } => {
+                mean_of_rows(out, rows, first, &columns[first..first + out.len()]);
+            }
+            Self::Repeat { weights, .. } => weighted_sum(out, rows, first, weights),
+        }
+    }
+
+    /// Blurs columns from a first one on, at most [`RUN_COLUMNS`], along y.
+    pub(super) fn add_along_y(&self, rows: &[&[f32]], first: usize, out: &mut [f32]) {
         match self {
             Self::CutOff { .. } => {
-                let rows = rows_around(y, self.radius(), height);
                 let counts = [rows.len() as f32; RUN_COLUMNS];
-                mean_of_rows(
-                    out,
-                    rows.len(),
-                    |i| at(rows.end - 1 - i),
-                    &counts[..columns.len()],
-                );
+                mean_of_rows(out, rows, first, &counts[..out.len()]);
             }
-            Self::Repeat { weights, .. } => {
-                weighted_sum(out, weights, at(y), |i| {
-                    [at(y.saturating_sub(i)), at((y + i).min(height - 1))]
-                });
-            }
+            Self::Repeat { weights, .. } => weighted_sum(out, rows, first, weights),
         }
     }
 }
 
-/// Rows added in one go, so that sums stay in registers; the order is that of one at a time.
-const ROWS_AT_ONCE: usize = 4;
+/// Offsets from the centre outwards, at each distance the one ahead first.
+fn from_the_middle(radius: usize) -> impl Iterator<Item = isize> {
+    std::iter::once(0).chain((1..=radius as isize).flat_map(|i| [i, -i]))
+}
 
-/// Adds up `count` rows in order, over how many samples of each sum lie inside the picture.
+/// Columns whose sums stay in registers while rows are added up.
+const SUMMED_COLUMNS: usize = 64;
+
+/// As many columns of a row, from that one on.
+#[inline(always)]
+fn columns_at(row: &[f32], first: usize) -> &[f32; SUMMED_COLUMNS] {
+    row[first..]
+        .first_chunk()
+        .expect("rows are as long as what they are added to")
+}
+
+/// Adds up rows in order, from a first column on, over how many samples of each sum lie inside the picture.
 #[multiversion::multiversion(targets(
     "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2",
     "x86_64+avx2",
     "aarch64+neon"
 ))]
-fn mean_of_rows<'a, F: Fn(usize) -> &'a [f32]>(
-    out: &mut [f32],
-    count: usize,
-    row: F,
-    inside: &[f32],
-) {
-    // Longer than elsewhere: both loops are compiled for each vector width in one piece.
-    out.fill(0.0);
-    let whole = count - count % ROWS_AT_ONCE;
-    for i in (0..whole).step_by(ROWS_AT_ONCE) {
-        let rows = row(i)
-            .iter()
-            .zip(row(i + 1))
-            .zip(row(i + 2))
-            .zip(row(i + 3));
-        for (o, (((a, b), c), d)) in out.iter_mut().zip(rows) {
-            *o = *o + a + b + c + d;
+fn mean_of_rows(out: &mut [f32], rows: &[&[f32]], first: usize, inside: &[f32]) {
+    // Longer than elsewhere: compiled for each vector width in one piece.
+    let (groups, rest) = out.as_chunks_mut::<SUMMED_COLUMNS>();
+    let done = groups.len() * SUMMED_COLUMNS;
+    for (out, start) in groups.iter_mut().zip((0..).step_by(SUMMED_COLUMNS)) {
+        let mut sums = [0.0; SUMMED_COLUMNS];
+        for row in rows {
+            let row = columns_at(row, first + start);
+            (0..SUMMED_COLUMNS).for_each(|k| sums[k] += row[k]);
         }
+        // A copy, so that it is plain that what is written is nothing that is read.
+        let counts = *columns_at(inside, start);
+        (0..SUMMED_COLUMNS).for_each(|k| sums[k] /= counts[k]);
+        *out = sums;
     }
-    for i in whole..count {
-        for (o, s) in out.iter_mut().zip(row(i)) {
-            *o += s;
-        }
+    for (x, out) in (done..).zip(rest) {
+        *out = rows.iter().fold(0.0, |sum, row| sum + row[first + x]) / inside[x];
     }
-    out.iter_mut().zip(inside).for_each(|(o, n)| *o /= n);
 }
 
-/// Adds up weighted rows: the centre, then at each distance the one ahead and the one behind.
+/// Adds up weighted rows from a first column on: the centre, then two at each distance.
 #[multiversion::multiversion(targets(
     "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2",
     "x86_64+avx2",
     "aarch64+neon"
 ))]
-fn weighted_sum<'a, F: Fn(usize) -> [&'a [f32]; 2]>(
-    out: &mut [f32],
-    weights: &[f32],
-    centre: &[f32],
-    pair: F,
-) {
-    let w = weights[0];
-    out.iter_mut().zip(centre).for_each(|(o, c)| *o = w * c);
-    for (i, &w) in weights.iter().enumerate().skip(1) {
-        let [ahead, behind] = pair(i);
-        for ((o, a), b) in out.iter_mut().zip(ahead).zip(behind) {
-            *o = *o + w * a + w * b;
+fn weighted_sum(out: &mut [f32], rows: &[&[f32]], first: usize, weights: &[f32]) {
+    let pairs = rows[1..].as_chunks::<2>().0;
+    let (groups, rest) = out.as_chunks_mut::<SUMMED_COLUMNS>();
+    let done = groups.len() * SUMMED_COLUMNS;
+    for (out, start) in groups.iter_mut().zip((first..).step_by(SUMMED_COLUMNS)) {
+        let mut sums = *columns_at(rows[0], start);
+        (0..SUMMED_COLUMNS).for_each(|k| sums[k] *= weights[0]);
+        for (pair, w) in pairs.iter().zip(&weights[1..]) {
+            let [a, b] = pair.map(|row| columns_at(row, start));
+            (0..SUMMED_COLUMNS).for_each(|k| sums[k] = sums[k] + w * a[k] + w * b[k]);
         }
+        *out = sums;
+    }
+    for (x, out) in (first + done..).zip(rest) {
+        let taps = pairs.iter().zip(&weights[1..]);
+        *out = taps.fold(weights[0] * rows[0][x], |sum, ([a, b], w)| {
+            sum + w * a[x] + w * b[x]
+        });
     }
 }

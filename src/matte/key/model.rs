@@ -6,6 +6,9 @@ use crate::pixel::{LinearRgb, PremulRgba};
 
 /// What the profiles compute differently at a single pixel.
 pub(super) trait Model: 'static {
+    /// Colour codes are scaled as Blender 4.5 does it.
+    const IS_LATE: bool = false;
+
     /// The balance mix of the two channels that are not the key's: `b lo + (1 - b) hi`, in one of
     /// two roundings.
     #[inline(always)]
@@ -46,6 +49,8 @@ impl Model for V42 {
 }
 
 impl Model for V45 {
+    const IS_LATE: bool = true;
+
     #[inline(always)]
     fn is_overexposed(p: PremulRgba) -> bool {
         lesser(lesser(lesser(p.r, p.g), p.b), p.a) > 1.0

@@ -1,6 +1,7 @@
 //! The first rows of the chain: a photo's pixels and the raw matte made of them.
 
 use super::Screen;
+use super::chroma::recolored;
 use super::cutout::Despill;
 use super::model::{Model, Robust, V34, V42, V45, primary_channel};
 use super::options::{KeyOptions, Profile};
@@ -31,6 +32,10 @@ impl Photo for PremulRgba {
 type MatteRow<P> = fn(&[P], &mut [f32], Terms);
 /// A row of the raw matte, every pixel against its own key.
 type MatteRowAgainst<P> = fn(&[P], &[LinearRgb], Option<usize>, &mut [f32], Terms);
+/// The same of pixels with other colour differences.
+type RecoloredRow<P> = fn(&[P], [&[f32]; 2], &mut [f32], Terms);
+/// The same, every pixel against its own key.
+type RecoloredRowAgainst<P> = fn(&[P], [&[f32]; 2], &[LinearRgb], Option<usize>, &mut [f32], Terms);
 /// A row of the cut-out from rows of pixels and matte.
 type CutoutRow<P> = fn(&[P], &[Coverage], LinearRgb, &mut [PremulRgba], Despill);
 /// A row of the cut-out, every pixel against its own key.
@@ -43,6 +48,8 @@ struct Loops<P> {
     terms: [fn(LinearRgb, f32, bool) -> Terms; 3],
     matte: [MatteRow<P>; 3],
     matte_against: MatteRowAgainst<P>,
+    recolored: [RecoloredRow<P>; 3],
+    recolored_against: RecoloredRowAgainst<P>,
     cutout: [CutoutRow<P>; 3],
     cutout_against: CutoutRowAgainst<P>,
 }
@@ -70,6 +77,12 @@ impl<P: Photo> Loops<P> {
                 matte_row::<P, M, 2>,
             ],
             matte_against: matte_row_against::<P, M>,
+            recolored: [
+                recolored_matte_row::<P, M, 0>,
+                recolored_matte_row::<P, M, 1>,
+                recolored_matte_row::<P, M, 2>,
+            ],
+            recolored_against: recolored_matte_row_against::<P, M>,
             cutout: [
                 cutout_row::<P, M, 0>,
                 cutout_row::<P, M, 1>,
@@ -114,6 +127,26 @@ impl<'a, P: Photo> Keyer<'a, P> {
             Screen::Color(c) => self.loops.matte[primary_channel(c)](pixels, out, self.terms),
             Screen::Plate(plate) => {
                 (self.loops.matte_against)(pixels, plate.row(y), self.channel, out, self.terms)
+            }
+        }
+    }
+
+    /// Row `y` of the raw matte of pixels with other colour differences.
+    pub(super) fn recolored_matte_row(
+        &self,
+        y: usize,
+        pixels: &[P],
+        differences: [&[f32]; 2],
+        out: &mut [f32],
+    ) {
+        let terms = self.terms;
+        match self.screen {
+            Screen::Color(c) => {
+                self.loops.recolored[primary_channel(c)](pixels, differences, out, terms)
+            }
+            Screen::Plate(plate) => {
+                let keys = plate.row(y);
+                (self.loops.recolored_against)(pixels, differences, keys, self.channel, out, terms);
             }
         }
     }
@@ -178,6 +211,35 @@ fn cutout_row<P: Photo, M: Model, const PRIMARY: usize>(
 ) {
     for ((p, m), c) in pixels.iter().zip(matte).zip(out) {
         *c = despill.cutout::<M, PRIMARY>(p.premul(), m.0, key);
+    }
+}
+
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2",
+    "x86_64+avx2",
+    "aarch64+neon"
+))]
+fn recolored_matte_row<P: Photo, M: Model, const PRIMARY: usize>(
+    pixels: &[P],
+    [cb, cr]: [&[f32]; 2],
+    out: &mut [f32],
+    terms: Terms,
+) {
+    for (((p, cb), cr), m) in pixels.iter().zip(cb).zip(cr).zip(out) {
+        *m = terms.matte::<M, PRIMARY>(recolored::<M>(p.premul(), *cb, *cr));
+    }
+}
+
+fn recolored_matte_row_against<P: Photo, M: Model>(
+    pixels: &[P],
+    [cb, cr]: [&[f32]; 2],
+    keys: &[LinearRgb],
+    channel: Option<usize>,
+    out: &mut [f32],
+    terms: Terms,
+) {
+    for ((((p, cb), cr), &key), m) in pixels.iter().zip(cb).zip(cr).zip(keys).zip(out) {
+        *m = matte_against::<M>(recolored::<M>(p.premul(), *cb, *cr), key, channel, terms);
     }
 }
 

@@ -55,10 +55,20 @@ impl Window {
         debug_assert!(range.len() <= self.capacity);
         self.next = self.next.max(range.start);
         while self.next < range.end {
-            let slot = self.slot(self.next);
-            make(self.next, &mut self.values[slot]);
+            make(self.next, self.row_mut(self.next));
             self.next += 1;
         }
+    }
+
+    /// Whether a row is present, if it is no older than the window reaches.
+    pub(super) fn has_row(&self, y: usize) -> bool {
+        y < self.next
+    }
+
+    /// A row that is present, to be written.
+    pub(super) fn row_mut(&mut self, y: usize) -> &mut [f32] {
+        let slot = self.slot(y);
+        &mut self.values[slot]
     }
 
     /// A row that is present.

@@ -37,15 +37,16 @@ impl<P: Photo> Rows for RawMatte<'_, P> {
 
 /// Rows of the raw matte of a photo whose chroma is blurred.
 struct BlurredMatte<'a, P> {
+    photo: ImageView<'a, P>,
     blur: ChromaBlur<'a, P>,
-    keyer: Keyer<'a, PremulRgba>,
-    pixels: Vec<PremulRgba>,
+    keyer: Keyer<'a, P>,
 }
 
 impl<P: Photo> Rows for BlurredMatte<'_, P> {
     fn row(&mut self, y: usize, out: &mut [f32]) {
-        self.blur.row(y, &mut self.pixels);
-        self.keyer.matte_row(y, &self.pixels, out);
+        let differences = self.blur.row(y);
+        self.keyer
+            .recolored_matte_row(y, self.photo.row(y), differences, out);
     }
 }
 
@@ -156,7 +157,7 @@ impl<'a, P: Photo> Stream<'a, P> {
         }
     }
 
-    fn keyer<Q: Photo>(&self) -> Keyer<'a, Q> {
+    fn keyer(&self) -> Keyer<'a, P> {
         Keyer::new(self.keying.screen, self.channel, self.options)
     }
 
@@ -169,9 +170,9 @@ impl<'a, P: Photo> Stream<'a, P> {
             });
         }
         Box::new(BlurredMatte {
+            photo,
             blur: ChromaBlur::new(photo, self.options),
             keyer: self.keyer(),
-            pixels: vec![PremulRgba::default(); photo.width()],
         })
     }
 
