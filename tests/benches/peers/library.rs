@@ -9,7 +9,9 @@ use petcomp::camera::{self, SolveOptions};
 use petcomp::eval;
 use petcomp::filter::Pyramid;
 use petcomp::io::{self, Bits, WriteOptions};
-use petcomp::matte::{self, Keying, PlateOptions, Screen, ScreenPlate, SegmentOptions};
+use petcomp::matte::{
+    self, KeyOptions, Keyed, Keying, PlateOptions, Screen, ScreenPlate, SegmentOptions,
+};
 use petcomp::settle::settle;
 use petcomp::{Coverage, Image, LinearRgb, PremulRgba, Result};
 use std::hint::black_box;
@@ -23,7 +25,8 @@ fn main() -> std::process::ExitCode {
         return std::process::ExitCode::SUCCESS;
     };
     let done = match words[1..] {
-        ["key", photo, screen] => key(times, photo, screen),
+        ["key", photo, screen] => key(times, photo, screen, &KeyOptions::default()),
+        ["key_all", photo, screen] => key(times, photo, screen, &all_stages()),
         ["film", photo, mask] => film(times, photo, mask),
         ["cut", photo] => cut(times, photo),
         ["solve", ref labels @ ..] => solve(times, labels),
@@ -45,7 +48,22 @@ fn main() -> std::process::ExitCode {
     }
 }
 
-fn key(times: usize, photo: &str, screen: &str) -> Result<()> {
+/// Every stage of the keyer, as matte.py has it.
+fn all_stages() -> KeyOptions {
+    KeyOptions {
+        blur_pre: 6,
+        clip_black: 0.1,
+        clip_white: 0.9,
+        edge_kernel_radius: 3,
+        blur_post: 4,
+        dilate_distance: 3,
+        feather_distance: 8,
+        ..KeyOptions::default()
+    }
+}
+
+/// Every time into the same pictures, as a loop over frames does it.
+fn key(times: usize, photo: &str, screen: &str, options: &KeyOptions) -> Result<()> {
     let photo: Image<PremulRgba> = io::read(photo)?;
     let channel = |k: usize| {
         screen
@@ -58,10 +76,8 @@ fn key(times: usize, photo: &str, screen: &str) -> Result<()> {
         &photo,
         Screen::Color(LinearRgb::new(channel(0), channel(1), channel(2))),
     );
-    (0..times).try_for_each(|_| {
-        job.run(&Default::default())
-            .map(|keyed| drop(black_box(keyed)))
-    })
+    let mut keyed = Keyed::default();
+    (0..times).try_for_each(|_| job.run_into(options, black_box(&mut keyed)))
 }
 
 /// Film inside a given mask; the screen is fitted around it.

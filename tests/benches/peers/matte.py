@@ -35,7 +35,9 @@ BLENDER = ["-b", "-t", len(CORES), "--factory-startup", "--python-use-system-env
            "golden/matte/keying_reference.py", "--"]
 REPEATS, FRAMES = 10, 50
 SIMILARITIES, BLENDS = (0.02, 0.05, 0.1, 0.15, 0.2), (0.0, 0.05, 0.1, 0.2, 0.4)
-UNCLIPPED = 0.0, 1.0
+# every stage of the keyer, as tests/benches/matte.rs and library.rs have it
+ALL_STAGES = dict(blur_pre=6, clip_black=0.1, clip_white=0.9, edge_kernel_radius=3, blur_post=4, dilate_distance=3,
+                  feather_distance=8)
 BLACKS, WHITES = (0.0, 0.1, 0.2, 0.3, 0.5), (0.6, 0.7, 0.8, 0.9, 1.0)
 
 
@@ -96,32 +98,37 @@ def petcomps(comparison, files, args):
         seconds_of([*film, str(files.at(i, "within.exr")), "--mask", str(cover(i, photo))])
     add("film, default", "cut", **files.film("film.exr"))
     add("film, mask given", "film", cover, **files.film("within.exr"))
-    keyed(files, args, *UNCLIPPED, name="key.exr")
-    add("key", "key", lambda _, photo: screen(photo), times=20 * REPEATS, **files.premultiplied("key.exr"))
+    for setting, work, settings, name in (("key", "key", {}, "key.exr"), ("key, all stages", "key_all", ALL_STAGES, "key_all.exr")):
+        keyed(files, args, settings, name)
+        add(setting, work, lambda _, photo: screen(photo), times=5 * REPEATS, **files.premultiplied(name))
 
 
-def keyed(files, args, black, white, name):
+def keyed(files, args, settings, name):
     """petcomp's keyer on all photos; its error."""
+    words = [word for key, value in settings.items() for word in ("--set", f"key.{key}={value}")]
     for i, photo in files.photos:
-        seconds_of(pinned(args.petcomp, "-q", "matte", "key", files.at(i, "photo.exr"), "--screen", screen(photo), "--set",
-                          f"key.clip_black={black}", "--set", f"key.clip_white={white}", "-o", files.at(i, name)))
+        seconds_of(pinned(args.petcomp, "-q", "matte", "key", files.at(i, "photo.exr"), "--screen", screen(photo), *words,
+                          "-o", files.at(i, name)))
     return files.premultiplied(name)["error"]()
 
 
 def keying_nodes(comparison, files, args):
-    levels = min(itertools.product(BLACKS, WHITES), key=lambda pair: keyed(files, args, *pair, name="clipped.exr"))
-    add_keying_node(comparison, files, args, "defaults", UNCLIPPED, "keying")
-    add_keying_node(comparison, files, args, "clip black {}, white {} (best of 25)".format(*levels), levels, "keying_clipped")
+    levels = [dict(clip_black=black, clip_white=white) for black, white in itertools.product(BLACKS, WHITES)]
+    best = min(levels, key=lambda settings: keyed(files, args, settings, "clipped.exr"))
+    add_keying_node(comparison, files, args, "defaults", {}, "keying")
+    add_keying_node(comparison, files, args, "clip black {clip_black}, white {clip_white} (best of 25)".format(**best), best,
+                    "keying_clipped")
+    add_keying_node(comparison, files, args, "all stages", ALL_STAGES, "keying_all", beside="key, all stages")
 
 
-def add_keying_node(comparison, files, args, setting, levels, name):
+def add_keying_node(comparison, files, args, setting, settings, name, beside="key"):
     listing = files.folder / f"{name}.json"
     command = pinned(args.blender, *BLENDER, listing)
     jobs = []
     for i, photo in files.photos:
         common = dict(input=str(files.at(i, "photo.exr")), prefix=str(files.at(i, "")), repeats=REPEATS)
         jobs.append(dict(common, node="empty", params={}, outputs={}))
-        params = dict(key_color=list(photo.screen), clip_black=levels[0], clip_white=levels[1])
+        params = dict(settings, key_color=list(photo.screen))
         jobs.append(dict(common, node="keying", params=params, outputs={"Image": name}))
     listing.write_text(json.dumps(jobs))
 
@@ -133,7 +140,7 @@ def add_keying_node(comparison, files, args, setting, levels, name):
         middle = [statistics.median(seconds[k:k + REPEATS]) for k in range(0, len(seconds), REPEATS)]
         return (sum(middle[1::2]) - sum(middle[::2])) / len(files.photos)
 
-    comparison.add("Blender Keying", version([args.blender, "--version"]), setting, told(command), run, beside="key",
+    comparison.add("Blender Keying", version([args.blender, "--version"]), setting, told(command), run, beside=beside,
                    **files.premultiplied(f"{name}.exr"))
 
 
