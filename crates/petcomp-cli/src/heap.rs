@@ -6,7 +6,8 @@ use std::alloc::{GlobalAlloc, Layout, System};
 ///
 /// Linux hands out memory when it is first touched, 4 KiB at a time: 40 thousand times for a cut-out of 4K, which takes
 /// three times as long as making it. Where huge pages are to be had on request, as in most distributions, 2 MiB come at
-/// once. A block keeps whole huge pages to itself, so that none is larger for it.
+/// once. Only whole huge pages inside of a block are asked for, so that its neighbours do not grow; of a block that is
+/// hardly used each place that is may take up to 2 MiB.
 struct Heap;
 
 #[global_allocator]
@@ -55,13 +56,22 @@ unsafe impl GlobalAlloc for Heap {
 }
 
 /// By default glibc makes eight heaps for each core and keeps in each what threads have freed: a
-/// sixth of the memory of `dataset generate -j 8`. Four take no longer.
+/// sixth of the memory of `dataset generate -j 8`. Four take no longer. What is freed goes back to the
+/// system only beyond some size: the next picture needs it again, and the system clears all that it
+/// hands out.
 #[expect(
     unsafe_code,
     reason = "a function of C, which takes two numbers; no other thread has begun"
 )]
-pub(crate) fn limit_arenas() {
+pub(crate) fn tune() {
     const MAX_ARENAS: i32 = 4;
+    const MAX_FREE_BYTES: i32 = 1 << 30;
+    // The largest that glibc takes; without it, it would be 128 KiB once the other is set.
+    const MAX_HEAP_BLOCK_BYTES: i32 = 32 << 20;
     // SAFETY: sound for any numbers.
-    unsafe { libc::mallopt(libc::M_ARENA_MAX, MAX_ARENAS) };
+    unsafe {
+        libc::mallopt(libc::M_ARENA_MAX, MAX_ARENAS);
+        libc::mallopt(libc::M_TRIM_THRESHOLD, MAX_FREE_BYTES);
+        libc::mallopt(libc::M_MMAP_THRESHOLD, MAX_HEAP_BLOCK_BYTES);
+    }
 }

@@ -5,6 +5,6 @@ mod heap;
 
 fn main() -> std::process::ExitCode {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
-    heap::limit_arenas();
+    heap::tune();
     petcomp_cli::run(std::env::args_os()).into()
 }
