@@ -21,9 +21,9 @@ use rapier3d::prelude::{
 
 /// Motion of a card that still counts as rest, metres in the world: over [`REST_TIME_S`] that is the
 /// speed below which the engine lets bodies sleep.
-const REST_MOTION_M: f32 = 0.002;
+const REST_MOTION_M: f32 = 0.001;
 /// How long it must last, seconds in the world.
-const REST_TIME_S: f64 = 0.2;
+const REST_TIME_S: f64 = 0.1;
 /// Mean speed that still counts as rest, m/s in the world.
 const REST_SPEED_M_PER_S: f64 = 0.01;
 /// Mean height in the world, metres, a quarter of a card: a drop by less is treated as one by this.
