@@ -10,6 +10,7 @@
 
 mod prism;
 mod run;
+mod stride;
 mod units;
 
 use super::overlap::Solid;
@@ -133,6 +134,7 @@ impl Drop<'_> {
             room: Room::new(self.scene),
             units,
             pace,
+            iterations: self.options.iterations,
             work_per_pair: self.work_per_pair(),
             allowance: self.allowance,
         }
@@ -210,19 +212,12 @@ impl Drop<'_> {
     }
 
     fn set_parameters(&self, p: &mut IntegrationParameters, step: f32) {
-        p.dt = step;
-        p.min_ccd_dt = p.dt / MAX_SUBSTEPS as f32;
         p.max_ccd_substeps = self.options.ccd as usize;
-        p.num_solver_iterations = self.options.iterations as usize;
         p.length_unit = LENGTH_UNIT_M as f32;
         p.normalized_max_corrective_velocity = MAX_CORRECTIVE_SPEED;
         p.num_internal_stabilization_iterations = STABILIZATION_ITERATIONS;
         p.normalized_max_linear_velocity = (MAX_SPEED_M_PER_S / LENGTH_UNIT_M) as f32;
-        // The stiffest contacts that still come to rest: a quarter and a half of the rate of solver
-        // iterations.
-        let rate = self.options.iterations as f32 / p.dt;
-        soften(&mut p.contact_softness, rate / 4.0);
-        soften(&mut p.static_contact_softness, rate / 2.0);
+        set_step(p, step, self.options.iterations);
     }
 
     fn add_room(&self, world: &mut PhysicsWorld, units: &WorldUnits, members: &[usize]) {
@@ -309,6 +304,17 @@ impl Drop<'_> {
             .restitution(surface.restitution as f32)
             .contact_skin(CONTACT_MARGIN_M)
     }
+}
+
+/// Sets the length of a step and its iterations, and contacts to match: the stiffest that still come
+/// to rest have a quarter and a half of the rate of iterations.
+fn set_step(p: &mut IntegrationParameters, step: f32, iterations: u32) {
+    p.dt = step;
+    p.min_ccd_dt = step / MAX_SUBSTEPS as f32;
+    p.num_solver_iterations = iterations as usize;
+    let rate = iterations as f32 / step;
+    soften(&mut p.contact_softness, rate / 4.0);
+    soften(&mut p.static_contact_softness, rate / 2.0);
 }
 
 fn soften(contacts: &mut SpringCoefficients<f32>, frequency: f32) {

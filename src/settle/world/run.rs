@@ -7,8 +7,9 @@
 //! [`REST_SPEED_M_PER_S`]. A thin card between others may vibrate forever by hundredths of a
 //! millimetre, driven by the contact solver; damping does not stop it.
 
+use super::stride::Stride;
 use super::units::WorldUnits;
-use super::{CARD_LENGTH_M, CARD_MASS_KG, Fall, GRAVITY_M_PER_S2};
+use super::{CARD_LENGTH_M, CARD_MASS_KG, Fall, GRAVITY_M_PER_S2, set_step};
 use crate::allowance::Allowance;
 use crate::error::Result;
 use crate::geom::Pose;
@@ -39,6 +40,8 @@ pub(super) struct FallRun<'a> {
     pub(super) room: Room,
     pub(super) units: WorldUnits,
     pub(super) pace: Pace,
+    /// Of the contact solver, in a step of the options.
+    pub(super) iterations: u32,
     /// Work of a step, for each body and pair.
     pub(super) work_per_pair: u64,
     pub(super) allowance: &'a Allowance<'a>,
@@ -46,21 +49,24 @@ pub(super) struct FallRun<'a> {
 
 /// Times of a fall, seconds in the world.
 pub(super) struct Pace {
+    /// The step of the options; a tick, of which a step lasts one or more.
     pub(super) step: f64,
     pub(super) time_limit: f64,
-    /// Steps between samples; none where it is 0.
+    /// Ticks between samples; none where it is 0.
     pub(super) sample_every: usize,
 }
 
 impl FallRun<'_> {
     /// Steps until everything rests or the time is over.
     pub(super) fn run_to_rest(mut self) -> Result<Fall> {
-        let steps = (self.pace.time_limit / self.pace.step).ceil() as usize;
+        let ticks = (self.pace.time_limit / self.pace.step).ceil() as usize;
         let mut record = FallRecord::new(&self);
-        for step in 1..=steps {
+        let mut tick = 0;
+        while tick < ticks {
             // Nothing is active before the first step.
-            self.step_world()?;
-            let comes_to_rest = record.add_step(&self, step);
+            let length = self.step_world()?;
+            tick += length;
+            let comes_to_rest = record.add_step(&self, tick, length);
             if self.let_go() {
                 record.energy.rebase(&self);
             } else if comes_to_rest {
@@ -71,11 +77,24 @@ impl FallRun<'_> {
         Ok(record.finish(&self))
     }
 
-    fn step_world(&mut self) -> Result<()> {
+    /// Makes a step, as long as what moves allows; returns how many ticks it lasts.
+    fn step_world(&mut self) -> Result<usize> {
         self.allowance.take(self.step_work())?;
+        let stride = Stride::longest(
+            self.moving_bodies(),
+            CARD_LENGTH_M as f32 / 2.0,
+            self.pace.step,
+        );
+        let seconds = self.pace.step * stride.ticks as f64;
+        let iterations = stride.iterations(self.iterations);
+        set_step(
+            &mut self.world.integration_parameters,
+            seconds as f32,
+            iterations,
+        );
         self.world.step();
         work::add(Kind::PhysicsSteps, 1);
-        Ok(())
+        Ok(stride.ticks)
     }
 
     /// Takes out of the world what has gone over the rim; returns whether anything has.
@@ -147,15 +166,16 @@ impl FallRun<'_> {
         }
     }
 
-    fn record_samples(&self, fall: &mut Fall, step: usize) {
+    /// Records where everything is at the end of a step of some ticks, if a sample is due.
+    fn record_samples(&self, fall: &mut Fall, tick: usize, length: usize) {
         let every = self.pace.sample_every;
-        if every > 0 && step.is_multiple_of(every) {
-            fall.samples.extend(self.samples_at(step));
+        if every > 0 && tick % every < length {
+            fall.samples.extend(self.samples_at(tick));
         }
     }
 
-    fn samples_at(&self, step: usize) -> impl Iterator<Item = MotionSample> {
-        let seconds = step as f64 * self.pace.step / self.units.time;
+    fn samples_at(&self, tick: usize) -> impl Iterator<Item = MotionSample> {
+        let seconds = tick as f64 * self.pace.step / self.units.time;
         let bodies = self.ids.iter().zip(&self.bodies);
         bodies
             .map(|(&id, body)| (id, &self.world.bodies[*body]))
@@ -191,7 +211,7 @@ impl FallRecord {
             swept: [[f64::INFINITY, -f64::INFINITY]; 2],
             ..Fall::default()
         };
-        run.record_samples(&mut fall, 0);
+        run.record_samples(&mut fall, 0, 1);
         Self {
             stillness: Stillness::default(),
             energy: EnergyTrack::new(run),
@@ -199,12 +219,12 @@ impl FallRecord {
         }
     }
 
-    /// Takes in the state after a step; returns whether everything is at rest.
-    fn add_step(&mut self, run: &FallRun, step: usize) -> bool {
-        let now = step as f64 * run.pace.step;
+    /// Takes in the state after a step of some ticks; returns whether everything is at rest.
+    fn add_step(&mut self, run: &FallRun, tick: usize, length: usize) -> bool {
+        let now = tick as f64 * run.pace.step;
         let kinetic = self.energy.update(run);
         run.extend_swept(&mut self.fall.swept);
-        run.record_samples(&mut self.fall, step);
+        run.record_samples(&mut self.fall, tick, length);
         self.fall.seconds = now / run.units.time;
         run.is_asleep() || (self.stillness.lasts(run, now) && kinetic < run.trembling_energy())
     }

@@ -1,0 +1,68 @@
+//! How long the next step may be.
+//!
+//! # Method
+//! Impacts need the short step of the options; what slides, rolls and creeps does not. Longer steps
+//! make contacts softer, and what lies under others sinks in by their weight over the square of the
+//! rate of iterations: the higher the heap, the shorter its steps and the more iterations they have.
+//! Of 250 heaps of 5 to 15 prisms with a friction of 0.01, in trays with walls, 15 attempts are
+//! rejected, 16 with short steps alone, at less than half of the time. Where high heaps take three
+//! halves of the iterations for two steps, one in twenty sinks in.
+
+use rapier3d::prelude::RigidBody;
+
+/// Farthest way of any end of a card in a step longer than a tick, metres in the world.
+const MAX_WAY_M: f64 = 0.004;
+
+/// What may follow, the cheapest first.
+const STRIDES: [Stride; 4] = [
+    Stride::new(4, 2, 0.02),
+    Stride::new(4, 3, 0.03),
+    Stride::new(2, 3, 0.04),
+    Stride::new(2, 4, 0.06),
+];
+
+/// The step of the options, and its iterations.
+const TICK: Stride = Stride::new(1, 2, f64::INFINITY);
+
+/// A step.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stride {
+    /// Its length, in steps of the options.
+    pub(super) ticks: usize,
+    /// Its iterations, in halves of those of the options.
+    half_iterations: u32,
+    /// Height that no middle of a body is above, metres in the world.
+    max_height: f64,
+}
+
+impl Stride {
+    const fn new(ticks: usize, half_iterations: u32, max_height: f64) -> Self {
+        Self {
+            ticks,
+            half_iterations,
+            max_height,
+        }
+    }
+
+    /// The longest for bodies that move so, `tick` being the step of the options in seconds.
+    pub(super) fn longest<'a>(
+        bodies: impl Iterator<Item = &'a RigidBody>,
+        half_card: f32,
+        tick: f64,
+    ) -> Self {
+        let (mut speed, mut height) = (0.0_f32, 0.0_f32);
+        for body in bodies {
+            speed = speed.max(body.linvel().length() + half_card * body.angvel().length());
+            height = height.max(body.translation().z);
+        }
+        let (way, height) = (f64::from(speed) * tick, f64::from(height));
+        let fits =
+            |stride: &&Self| way * stride.ticks as f64 <= MAX_WAY_M && height <= stride.max_height;
+        *STRIDES.iter().find(fits).unwrap_or(&TICK)
+    }
+
+    /// Its iterations, by those of the options.
+    pub(super) fn iterations(&self, usual: u32) -> u32 {
+        (usual * self.half_iterations).div_ceil(2)
+    }
+}
