@@ -33,10 +33,11 @@ pub struct SettleOptions {
     pub time_limit: f64,
     /// Attempts before giving up, 1 to 100; each starts from heights of its own. Default: 8.
     pub attempts: u32,
-    /// Time step in the same seconds, 0.0001 to 0.0042: with longer ones half of the heaps fail.
-    /// Default: 1/360.
+    /// Shortest time step in the same seconds, 0.0001 to 0.0042: with longer ones half of the heaps
+    /// fail. Steps last two or four times as long while low heaps creep. Default: 1/360.
     pub step: f64,
-    /// Iterations of the contact solver in each step, 1 to 100. Default: 4.
+    /// Iterations of the contact solver in the shortest step, 1 to 100; longer ones have up to twice
+    /// as many. Default: 4.
     pub iterations: u32,
     /// Times in a step that a body may be stopped at what it would fly through, 0 to 100. Default:
     /// 1.

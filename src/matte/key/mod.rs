@@ -89,13 +89,14 @@ mod robust;
 mod rows;
 mod running_blur;
 mod stream;
+mod ycc;
 
-pub(super) use chroma::{differences, from_ycc, to_ycc};
 #[doc(hidden)]
 pub use options::{Blur, Falloff};
 pub use options::{KeyOptions, Profile};
 #[doc(hidden)]
 pub use photo::Photo;
+pub(super) use ycc::{differences, from_ycc, to_ycc};
 
 use crate::error::{Error, Result};
 use crate::image::{Image, ImageView};

@@ -1,11 +1,11 @@
 //! The first rows of the chain: a photo's pixels and the raw matte made of them.
 
 use super::Screen;
-use super::chroma::recolored;
 use super::cutout::Despill;
 use super::model::{Model, Robust, V34, V42, V45, primary_channel};
 use super::options::{KeyOptions, Profile};
 use super::raw::{Terms, matte_against};
+use super::ycc::recolored;
 use crate::pixel::{Coverage, LinearRgb, PremulRgba};
 
 /// Pixels that can be keyed: opaque scene-linear colour, or colour premultiplied by its alpha.
