@@ -611,23 +611,25 @@ impl LayerStack {
             return;
         };
         let edges = plane.sides([0.0; 2]);
+        let mut shares = Vec::new();
         for y in part.y.clone() {
             if let Some(row) = tile.shadow_row(part, y) {
                 let spans = CatcherSpans::new(&self.samples, &edges, y);
-                self.shade_row(map, part, (&spans, y), through, row);
+                self.fill_pixel_shares(map, part, y, &mut shares);
+                self.shade_row((map, &shares), part, (&spans, y), through, row);
             }
         }
     }
 
+    /// The shadow of a row, of which `shares` has the pixels' shares.
     fn shade_row(
         &self,
-        map: &IrradianceMap,
+        (map, shares): (&IrradianceMap, &[Float4]),
         part: &PixelBlock,
         (spans, y): (&CatcherSpans, usize),
         through: &Transmittance,
         row: &mut [LinearRgb],
     ) {
-        let shares = self.pixel_shares(map, part, y);
         for (i, shadow) in row.iter_mut().enumerate() {
             let x = part.x.start + i;
             *shadow = match shares.get(i) {
@@ -640,20 +642,24 @@ impl LayerStack {
         }
     }
 
-    /// The share at the pixels of a row; none where it is looked up for each sub-sample.
-    fn pixel_shares(&self, map: &IrradianceMap, part: &PixelBlock, y: usize) -> Vec<Float4> {
-        let mut shares = Vec::new();
-        if !self.samples.per_subsample {
-            self.samples
-                .look_up_row(map, part.x.clone(), y, &mut shares);
-            for (x, share) in part.x.clone().zip(&mut shares) {
-                let (column, row) = self.samples.position_of(x, y);
-                if !map.holds(column, row) {
-                    *share = Float4::ONE;
-                }
+    /// Looks up the share at the pixels of a row; none where it is looked up for each sub-sample.
+    fn fill_pixel_shares(
+        &self,
+        map: &IrradianceMap,
+        part: &PixelBlock,
+        y: usize,
+        shares: &mut Vec<Float4>,
+    ) {
+        if self.samples.per_subsample {
+            return;
+        }
+        self.samples.look_up_row(map, part.x.clone(), y, shares);
+        for (x, share) in part.x.clone().zip(shares) {
+            let (column, row) = self.samples.position_of(x, y);
+            if !map.holds(column, row) {
+                *share = Float4::ONE;
             }
         }
-        shares
     }
 
     /// The share at one position of the sample grid.

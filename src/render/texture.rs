@@ -113,19 +113,20 @@ impl BakedTexture {
     }
 }
 
-/// Alpha of a film's texels is the mean opacity of their channels.
-fn average_opacity(texels: &mut [Float8]) {
-    for t in texels {
-        let alpha = channel_mean(t.opacity().clamped().rgb());
-        *t = Float8::new(t.color().with_fourth(alpha), t.opacity());
-    }
+/// Alpha of a film's texel: the mean opacity of its channels.
+#[inline(always)]
+fn film_alpha(opacity: Float4) -> f32 {
+    channel_mean(opacity.clamped().rgb())
 }
 
 fn resample_film(texture: &Texture, detail: DetailLevel, grade: &Grade) -> BorderedTexels<Float8> {
     let finish = |row: &mut [Float8]| {
         grade_texels(row, grade);
         if texture.is_film() {
-            average_opacity(row);
+            row.iter_mut().for_each(|t| {
+                let color = t.color().with_fourth(film_alpha(t.opacity()));
+                *t = Float8::new(color, t.opacity());
+            });
         }
     };
     match texture {
@@ -154,7 +155,7 @@ fn resample_opacity(
             let finish = |row: &mut [Float4]| {
                 grade_opacities(row, grade);
                 row.iter_mut()
-                    .for_each(|t| *t = t.with_fourth(channel_mean(t.rgb())));
+                    .for_each(|t| *t = t.with_fourth(film_alpha(*t)));
             };
             detail.resample(|l| pyramid.level(l), opacity, finish)
         }

@@ -3,6 +3,10 @@
 //! `cargo bench --bench matte`: every line is one 4K frame on all cores, into pictures that are
 //! already allocated.
 
+#[path = "peers/all_stages.rs"]
+mod all_stages;
+
+use all_stages::all_stages;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use petcomp::matte::key::{Blur, KeyOptions, Keyed, Keying, Profile, Screen};
 use petcomp::{Coverage, Image, LinearRgb, PremulRgba};
@@ -51,20 +55,6 @@ fn noise(x: usize, y: usize, k: usize) -> f32 {
     h = (h ^ (h >> 15)).wrapping_mul(0x2c1b_3c6d);
     h = (h ^ (h >> 12)).wrapping_mul(0x297a_2d39);
     ((h >> 8) as f32 / (1 << 24) as f32 - 0.5) * 0.02
-}
-
-/// All stages on, as issue and README quote it.
-fn all_stages(profile: Profile) -> KeyOptions {
-    KeyOptions {
-        blur_pre: 6,
-        clip_black: 0.1,
-        clip_white: 0.9,
-        edge_kernel_radius: 3,
-        blur_post: 4,
-        dilate_distance: 3,
-        feather_distance: 8,
-        ..KeyOptions::for_profile(profile)
-    }
 }
 
 /// What no keyer can beat: colours read, colours and a matte written.

@@ -5,6 +5,9 @@
 //! given cores. With 0 times it only reads: the difference of two processes is what the work costs.
 //! `convert` reads and writes each time.
 
+mod all_stages;
+
+use all_stages::all_stages;
 use petcomp::camera::{self, SolveOptions};
 use petcomp::eval;
 use petcomp::filter::Pyramid;
@@ -26,7 +29,7 @@ fn main() -> std::process::ExitCode {
     };
     let done = match words[1..] {
         ["key", photo, screen] => key(times, photo, screen, &KeyOptions::default()),
-        ["key_all", photo, screen] => key(times, photo, screen, &all_stages()),
+        ["key_all", photo, screen] => key(times, photo, screen, &all_stages(Default::default())),
         ["film", photo, mask] => film(times, photo, mask),
         ["cut", photo] => cut(times, photo),
         ["solve", ref labels @ ..] => solve(times, labels),
@@ -45,20 +48,6 @@ fn main() -> std::process::ExitCode {
             eprintln!("error: {error}");
             std::process::ExitCode::FAILURE
         }
-    }
-}
-
-/// Every stage of the keyer, as matte.py has it.
-fn all_stages() -> KeyOptions {
-    KeyOptions {
-        blur_pre: 6,
-        clip_black: 0.1,
-        clip_white: 0.9,
-        edge_kernel_radius: 3,
-        blur_post: 4,
-        dilate_distance: 3,
-        feather_distance: 8,
-        ..KeyOptions::default()
     }
 }
 

@@ -12,7 +12,7 @@ over the photos. Every method gets the same 8-bit photo, made linear, and the me
     ffmpeg                      the similarity and blend of 25 that do best against the truth, beside its defaults
     the Keying node             the clip levels of 25 that do so (petcomp's keyer, the same to the bit, looks for them)
 
-In process: petcomp by library.rs; Blender renders image -> Keying -> Composite less image -> Composite; ffmpeg repeats the
+In process: petcomp by library.rs, whose keyer writes into the same pictures each time; Blender renders image -> Keying -> Composite less image -> Composite; ffmpeg repeats the
 frame before its filters, less a run that does not. ffmpeg's display values are made linear before they are put over
 backgrounds. The drawn photo follows the model that `petcomp matte film` solves for; --truth takes photos of a renderer.
 """
@@ -35,7 +35,7 @@ BLENDER = ["-b", "-t", len(CORES), "--factory-startup", "--python-use-system-env
            "golden/matte/keying_reference.py", "--"]
 REPEATS, FRAMES = 10, 50
 SIMILARITIES, BLENDS = (0.02, 0.05, 0.1, 0.15, 0.2), (0.0, 0.05, 0.1, 0.2, 0.4)
-# every stage of the keyer, as tests/benches/matte.rs and library.rs have it
+# Every stage of the keyer, as all_stages.rs has it.
 ALL_STAGES = dict(blur_pre=6, clip_black=0.1, clip_white=0.9, edge_kernel_radius=3, blur_post=4, dilate_distance=3,
                   feather_distance=8)
 BLACKS, WHITES = (0.0, 0.1, 0.2, 0.3, 0.5), (0.6, 0.7, 0.8, 0.9, 1.0)
