@@ -28,7 +28,8 @@ def described(generators, name):
     if "base" not in own:
         return own
     base = described(generators, own["base"])
-    return base | own | {"set": base.get("set", []) + own.get("set", [])}
+    kept = [change for change in base.get("set", []) if change.split("=")[0] not in own.get("without", [])]
+    return base | own | {"set": kept + own.get("set", [])}
 
 
 def place_photos(study, albedo):

@@ -23,6 +23,7 @@
 //! assert!(labels.objects[1].is_topmost());
 //! ```
 
+mod boolean;
 mod border;
 mod distractor;
 pub(crate) mod gallery;

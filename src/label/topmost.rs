@@ -10,12 +10,13 @@
 
 use crate::camera::Camera;
 use crate::geom::Point2;
+use crate::label::boolean::difference;
 use crate::label::holdout::hidden_area;
 use crate::label::outline::{bounds, overlap};
 use crate::label::{ObjectLabel, Silhouette};
 use crate::pixel::ObjectId;
 use crate::scene::{Card, Shot};
-use geo::{Area, BooleanOps, Centroid, MultiPolygon};
+use geo::{Area, Centroid, MultiPolygon};
 use std::collections::BTreeSet;
 
 /// For each object, the ids of those that lie over it, in order of id.
@@ -54,7 +55,7 @@ pub(crate) fn uncovered_fraction(
     }
     let covering = objects.iter().filter(|other| over.contains(&other.card.id));
     let free = covering.fold(object.region.clone(), |free, other| {
-        free.difference(&other.region)
+        difference(&free, &other.region)
     });
     let seen = free.unsigned_area() - hidden_area(&free, object.card, shot);
     seen.max(0.0) / whole
