@@ -1,7 +1,12 @@
 //! Deep samples: per pixel, front to back, what each object does to the pixel.
 
+mod tile;
+
+pub(crate) use tile::DeepTile;
+
 use crate::image::Image;
 use crate::pixel::{Coverage, Depth, Film, LinearRgb, Mix, ObjectId};
+use std::ops::Range;
 
 /// What one object contributes to one pixel, averaged over the pixel.
 ///
@@ -48,10 +53,9 @@ impl HoldoutSample {
 pub struct DeepImage {
     width: usize,
     height: usize,
-    starts: Vec<u32>,
-    samples: Vec<DeepSample>,
-    /// One for each sample where there is film; else empty.
-    tints: Vec<LinearRgb>,
+    /// Squares of `1 << tile_bits` pixels a side, row by row; smaller ones at the picture's ends.
+    tiles: Vec<DeepTile>,
+    tile_bits: u32,
     shadow: Image<LinearRgb>,
 }
 
@@ -67,24 +71,40 @@ impl DeepImage {
         pixels: impl IntoIterator<Item = Vec<DeepSample>>,
     ) -> Self {
         let (width, height) = shadow.size();
-        let mut starts = Vec::with_capacity(width * height + 1);
-        let mut samples = Vec::new();
-        starts.push(0);
-        for list in pixels {
-            samples.extend(list);
-            starts.push(samples.len() as u32);
-        }
+        let all = DeepTile::from_pixels(width, pixels);
         assert_eq!(
-            starts.len(),
-            width * height + 1,
+            all.pixel_count(),
+            width * height,
             "one list of samples per pixel"
         );
         Self {
             width,
             height,
-            starts,
-            samples,
-            tints: Vec::new(),
+            tiles: vec![all],
+            tile_bits: width.max(height).next_power_of_two().trailing_zeros(),
+            shadow,
+        }
+    }
+
+    /// Puts a picture together from squares of `side` pixels, a power of two, row by row.
+    ///
+    /// `shadow` has the picture's size.
+    ///
+    /// # Panics
+    /// When there is not one tile for each square.
+    pub(crate) fn from_tiles(shadow: Image<LinearRgb>, side: usize, tiles: Vec<DeepTile>) -> Self {
+        let (width, height) = shadow.size();
+        assert!(side.is_power_of_two(), "tiles of {side} pixels");
+        assert_eq!(
+            tiles.len(),
+            width.div_ceil(side) * height.div_ceil(side),
+            "one tile per square"
+        );
+        Self {
+            width,
+            height,
+            tiles,
+            tile_bits: side.trailing_zeros(),
             shadow,
         }
     }
@@ -96,48 +116,31 @@ impl DeepImage {
     ///
     /// # Panics
     /// When there is neither none nor one for each sample.
-    pub fn with_tints(self, tints: Vec<LinearRgb>) -> Self {
+    pub fn with_tints(mut self, tints: Vec<LinearRgb>) -> Self {
+        let count: usize = self.tiles.iter().map(|tile| tile.samples.len()).sum();
         assert!(
-            tints.is_empty() || tints.len() == self.samples.len(),
+            tints.is_empty() || tints.len() == count,
             "one tint per sample"
         );
-        Self { tints, ..self }
-    }
-
-    /// Assembles a picture from samples in any order of pixels, each with its column and row; those
-    /// of one pixel come front to back.
-    ///
-    /// `shadow` has the picture's size; `tints` come in the order of the samples, or there are
-    /// none.
-    ///
-    /// # Panics
-    /// When a sample lies outside the picture, or when there are more than `u32` can count.
-    pub(crate) fn from_samples(
-        shadow: Image<LinearRgb>,
-        samples: impl Iterator<Item = (u32, u32, DeepSample)> + Clone,
-        tints: impl Iterator<Item = LinearRgb>,
-    ) -> Self {
-        let (width, height) = shadow.size();
-        // Starts become ends as each pixel's samples take their places.
-        let mut ends = pixel_starts(width, height, samples.clone());
-        let mut placed = vec![DeepSample::default(); last_start(&ends)];
-        let mut tints = tints.peekable();
-        let mut placed_tints = black_tints(placed.len(), tints.peek().is_some());
-        for (x, y, sample) in samples {
-            let place = take_place(&mut ends[y as usize * width + x as usize]);
-            placed[place] = sample;
-            if let Some(tint) = tints.next() {
-                placed_tints[place] = tint;
+        for tile in &mut self.tiles {
+            let samples = if tints.is_empty() {
+                0
+            } else {
+                tile.samples.len()
+            };
+            tile.tints = vec![LinearRgb::BLACK; samples];
+        }
+        let mut tints = tints.as_slice();
+        for y in 0..self.height {
+            for x in 0..self.width {
+                let (tile, range) = self.place(x, y);
+                let own = self.tiles[tile].tints.get_mut(range).unwrap_or_default();
+                let (first, rest) = tints.split_at(own.len());
+                own.copy_from_slice(first);
+                tints = rest;
             }
         }
-        Self {
-            width,
-            height,
-            starts: starts_from_ends(ends),
-            samples: placed,
-            tints: placed_tints,
-            shadow,
-        }
+        self
     }
 
     /// Number of columns.
@@ -153,7 +156,8 @@ impl DeepImage {
     /// The samples of one pixel, front to back.
     #[inline(always)]
     pub fn at(&self, x: usize, y: usize) -> &[DeepSample] {
-        &self.samples[self.sample_range(x, y)]
+        let (tile, range) = self.place(x, y);
+        &self.tiles[tile].samples[range]
     }
 
     /// What each sample of a pixel hides of what is behind, per channel, as far as it is itself
@@ -161,11 +165,8 @@ impl DeepImage {
     /// `visible` then.
     #[inline(always)]
     pub fn tints(&self, x: usize, y: usize) -> &[LinearRgb] {
-        if self.tints.is_empty() {
-            &[]
-        } else {
-            &self.tints[self.sample_range(x, y)]
-        }
+        let (tile, range) = self.place(x, y);
+        self.tiles[tile].tints.get(range).unwrap_or_default()
     }
 
     /// All that the objects do to one pixel: their light, and what they hide of what is behind, per
@@ -173,31 +174,25 @@ impl DeepImage {
     #[inline(always)]
     pub fn flat(&self, x: usize, y: usize) -> Film {
         // A sum of shares that make up a whole may miss it by a rounding.
-        Film {
-            color: self.light(x, y),
-            opacity: self.hidden(x, y).map(|o| o.min(1.0)),
-        }
-    }
-
-    /// The sum of what the samples of a pixel send to the camera.
-    #[inline]
-    fn light(&self, x: usize, y: usize) -> LinearRgb {
         let samples = self.at(x, y).iter();
-        samples.fold(LinearRgb::BLACK, |sum, s| sum + s.light)
-    }
-
-    /// The sum of what the samples of a pixel hide of the plate.
-    #[inline]
-    fn hidden(&self, x: usize, y: usize) -> LinearRgb {
-        match self.tints(x, y) {
-            [] => LinearRgb::grey(self.at(x, y).iter().map(|s| s.visible).sum()),
+        let hidden = match self.tints(x, y) {
+            [] => LinearRgb::grey(samples.clone().map(|s| s.visible).sum()),
             tints => tints.iter().fold(LinearRgb::BLACK, |sum, &t| sum + t),
+        };
+        Film {
+            color: samples.fold(LinearRgb::BLACK, |sum, s| sum + s.light),
+            opacity: hidden.map(|o| o.min(1.0)),
         }
     }
 
-    fn sample_range(&self, x: usize, y: usize) -> std::ops::Range<usize> {
-        let i = y * self.width + x;
-        self.starts[i] as usize..self.starts[i + 1] as usize
+    /// The tile of a pixel, and where its samples are there.
+    #[inline(always)]
+    fn place(&self, x: usize, y: usize) -> (usize, Range<usize>) {
+        let side = 1 << self.tile_bits;
+        let across = (self.width + side - 1) >> self.tile_bits;
+        let tile = (y >> self.tile_bits) * across + (x >> self.tile_bits);
+        let inside = self.tiles[tile].range_at(x & (side - 1), y & (side - 1));
+        (tile, inside)
     }
 
     /// The same picture with other factors on the plate, computed from column, row and factor.
@@ -234,11 +229,14 @@ impl DeepImage {
         if passes >= 1.0 {
             return;
         }
-        for i in self.sample_range(x, y) {
-            if place.hides(self.samples[i].depth.0.into()) {
-                self.samples[i].light = self.samples[i].light.scale(passes);
-                self.samples[i].visible *= passes;
-                if let Some(tint) = self.tints.get_mut(i) {
+        let (tile, range) = self.place(x, y);
+        let tile = &mut self.tiles[tile];
+        for i in range {
+            let sample = &mut tile.samples[i];
+            if place.hides(sample.depth.0.into()) {
+                sample.light = sample.light.scale(passes);
+                sample.visible *= passes;
+                if let Some(tint) = tile.tints.get_mut(i) {
                     *tint = tint.scale(passes);
                 }
             }
@@ -275,7 +273,7 @@ impl DeepImage {
                 let changed = |s: &DeepSample| extra(s.object, x, y).is_some();
                 if self.at(x, y).iter().any(changed) {
                     let all = self.light_over(x, y, plate);
-                    self.add_from_behind(self.sample_range(x, y), all, |s| extra(s.object, x, y));
+                    self.add_from_behind(self.place(x, y), all, |s| extra(s.object, x, y));
                 }
             }
         }
@@ -285,14 +283,15 @@ impl DeepImage {
     /// Adds light to the samples of a pixel of which `all` is the light.
     fn add_from_behind(
         &mut self,
-        samples: std::ops::Range<usize>,
+        (tile, samples): (usize, Range<usize>),
         all: LinearRgb,
         extra: impl Fn(&DeepSample) -> Option<LinearRgb>,
     ) {
+        let tile = &mut self.tiles[tile];
         let (mut behind, mut passes) = (all, LinearRgb::WHITE);
         for i in samples {
-            let sample = &mut self.samples[i];
-            let hidden = self.tints.get(i).copied();
+            let sample = &mut tile.samples[i];
+            let hidden = tile.tints.get(i).copied();
             let hidden = hidden.unwrap_or(LinearRgb::grey(sample.visible));
             passes = passes.add_scaled(-1.0, hidden).map(|p| p.max(0.0));
             behind = behind
@@ -317,41 +316,69 @@ fn at_least_none(light: LinearRgb, change: LinearRgb) -> LinearRgb {
     left.add_scaled(-1.0, light)
 }
 
-/// Where each pixel's samples start, pixel by pixel, and after the last one where they end.
-fn pixel_starts(
-    width: usize,
-    height: usize,
-    samples: impl Iterator<Item = (u32, u32, DeepSample)>,
-) -> Vec<u32> {
-    let mut starts = vec![0_u32; width * height + 1];
-    for (x, y, _) in samples {
-        starts[y as usize * width + x as usize + 1] += 1;
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIZE: [usize; 2] = [5, 3];
+
+    /// As many samples as the remainder of its number by three, each with a depth of its own.
+    fn samples_of(x: usize, y: usize) -> Vec<DeepSample> {
+        let number = y * SIZE[0] + x;
+        let sample = |k| DeepSample {
+            depth: Depth((10 * number + k) as f32),
+            ..DeepSample::default()
+        };
+        (0..number % 3).map(sample).collect()
     }
-    for i in 0..width * height {
-        starts[i + 1] += starts[i];
+
+    /// The samples of a tile, those of its last pixel first.
+    fn tile(columns: Range<usize>, y: usize) -> DeepTile {
+        let width = columns.len();
+        let pixels = columns.enumerate().rev();
+        let samples: Vec<_> = pixels
+            .flat_map(|(i, x)| samples_of(x, y).into_iter().map(move |s| (i as u32, s)))
+            .collect();
+        let tints: Vec<_> = samples.iter().map(|(_, s)| tint_of(s)).collect();
+        DeepTile::from_samples([width, 1], &samples, &tints)
     }
-    starts
-}
 
-#[inline]
-fn take_place(next: &mut u32) -> usize {
-    let place = *next as usize;
-    *next += 1;
-    place
-}
+    fn tint_of(sample: &DeepSample) -> LinearRgb {
+        LinearRgb::grey(sample.depth.0)
+    }
 
-/// The start of each pixel is the end of the one before it.
-fn starts_from_ends(mut ends: Vec<u32>) -> Vec<u32> {
-    ends.rotate_right(1);
-    ends[0] = 0;
-    ends
-}
+    fn assert_holds_all(deep: &DeepImage) {
+        for y in 0..SIZE[1] {
+            for x in 0..SIZE[0] {
+                let expected = samples_of(x, y);
+                assert_eq!(deep.at(x, y), expected, "{x} {y}");
+                let tints: Vec<_> = expected.iter().map(tint_of).collect();
+                assert_eq!(deep.tints(x, y), tints, "{x} {y}");
+            }
+        }
+    }
 
-fn last_start(starts: &[u32]) -> usize {
-    starts.last().map_or(0, |&n| n as usize)
-}
+    #[test]
+    fn tiles_hold_what_pixels_hold() {
+        let white = Image::filled(SIZE[0], SIZE[1], LinearRgb::WHITE);
+        let pixels = (0..SIZE[1]).flat_map(|y| (0..SIZE[0]).map(move |x| (x, y)));
+        let lists: Vec<_> = pixels.map(|(x, y)| samples_of(x, y)).collect();
+        let tints = lists.iter().flatten().map(tint_of).collect();
+        assert_holds_all(&DeepImage::from_pixels(white, lists).with_tints(tints));
+    }
 
-/// None where the samples have no tints.
-fn black_tints(samples: usize, is_tinted: bool) -> Vec<LinearRgb> {
-    vec![LinearRgb::BLACK; if is_tinted { samples } else { 0 }]
+    #[test]
+    fn tints_find_their_samples_in_any_tile() {
+        // One row, so that tiles of four pixels are as high as it is.
+        let row = Image::filled(SIZE[0], 1, LinearRgb::WHITE);
+        let deep = DeepImage::from_tiles(row, 4, vec![tile(0..4, 0), tile(4..5, 0)]);
+        let in_order = (0..SIZE[0]).flat_map(|x| samples_of(x, 0));
+        let again = deep
+            .clone()
+            .with_tints(in_order.map(|s| tint_of(&s)).collect());
+        for x in 0..SIZE[0] {
+            assert_eq!(deep.at(x, 0), samples_of(x, 0), "{x}");
+            assert_eq!(deep.tints(x, 0), again.tints(x, 0), "{x}");
+        }
+    }
 }

@@ -156,10 +156,18 @@ impl<P: Copy> Image<P> {
     where
         P: Send + Sync,
     {
+        // One division a task and not one a pixel.
         let pixels = (0..width * height)
             .into_par_iter()
             .with_min_len(width.max(1))
-            .map(|i| f(i % width, i / width));
+            .map_init(
+                || None,
+                |next, i| {
+                    let (x, y) = next.unwrap_or_else(|| (i % width, i / width));
+                    *next = Some(pixel_after(x, y, width));
+                    f(x, y)
+                },
+            );
         Self {
             width,
             height,
@@ -361,6 +369,16 @@ impl Mask {
     /// A matte without soft edges: 1 where set, 0 elsewhere.
     pub fn to_coverage(&self) -> Image<Coverage> {
         self.map(|set| Coverage(f32::from(u8::from(set))))
+    }
+}
+
+/// The pixel that follows one, row by row.
+#[inline(always)]
+fn pixel_after(x: usize, y: usize, width: usize) -> (usize, usize) {
+    if x + 1 < width {
+        (x + 1, y)
+    } else {
+        (0, y + 1)
     }
 }
 

@@ -26,7 +26,7 @@ def full(options, cache, program):
     """Other rooms are another study: nothing of it was seen while choosing."""
     arms = read_arms()
     arms["reality"]["rooms"] = options.rooms or arms["reality"]["rooms"]
-    name = "rooms_" + "_".join(map(str, arms["reality"]["rooms"]))
+    name = options.name or "rooms_" + "_".join(map(str, arms["reality"]["rooms"]))
     return studies.Study(arms, cache / name, cache / "world", program)
 
 

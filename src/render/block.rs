@@ -26,6 +26,12 @@ impl PixelBlock {
         ranges_meet(&self.x, &other.x) && ranges_meet(&self.y, &other.y)
     }
 
+    /// Number of one of its pixels, row by row.
+    #[inline(always)]
+    pub(super) fn number_of(&self, x: usize, y: usize) -> u32 {
+        ((y - self.y.start) * self.x.len() + x - self.x.start) as u32
+    }
+
     /// Number of pixels.
     pub(super) fn len(&self) -> usize {
         self.x.len() * self.y.len()

@@ -11,7 +11,9 @@ use crate::render::detail::{detail_level, texels_per_pixel};
 use crate::render::interreflection::Bounces;
 use crate::render::irradiance::{IrradianceMap, irradiance_maps};
 use crate::render::lattice::Lattice;
-use crate::render::layers::{Layer, LayerStack, RenderedTile, SampleGrid, ShadowCatcher};
+use crate::render::layers::{
+    Layer, LayerStack, RenderedTile, SampleGrid, ShadowCatcher, TileSamples,
+};
 use crate::render::lens::LensView;
 use crate::render::pixel_filter::filter_quantiles;
 use crate::render::receiver::{LightingContext, ReceiverIrradiance, VisibleSide};
@@ -100,24 +102,28 @@ impl SeenStack {
     }
 
     /// The picture in the tiles that are wanted; nothing in others.
-    fn render(&self, wanted: impl Fn(&PixelBlock) -> bool) -> DeepImage {
+    fn render(&self, wanted: impl Fn(&PixelBlock) -> bool + Sync) -> DeepImage {
         let [width, height] = self.image;
         let side = self.lens.map_or(TILE_SIDE_PX, |(lens, _)| lens.tile_side());
-        let mut tiles = PixelBlock::tiles_of(width, height, side);
-        tiles.retain(wanted);
-        let rendered: Vec<_> = tiles
+        let rendered: Vec<_> = PixelBlock::tiles_of(width, height, side)
             .into_par_iter()
-            .map(|tile| self.render_tile(tile))
+            .map_init(TileSamples::default, |scratch, tile| {
+                if wanted(&tile) {
+                    self.render_tile(tile, scratch)
+                } else {
+                    RenderedTile::new(&tile, false)
+                }
+            })
             .collect();
-        assemble_tiles([width, height], &rendered)
+        assemble_tiles([width, height], side, rendered)
     }
 
-    fn render_tile(&self, tile: PixelBlock) -> RenderedTile {
+    fn render_tile(&self, tile: PixelBlock, scratch: &mut TileSamples) -> RenderedTile {
         match &self.lens {
-            None => self.stack.render_tile(tile),
+            None => self.stack.render_tile(tile, scratch),
             Some((lens, lattice)) => lens
                 .stack_in(&self.stack, *lattice, &tile)
-                .render_tile(tile),
+                .render_tile(tile, scratch),
         }
     }
 }
@@ -322,11 +328,11 @@ fn visible_texture<'a>(
     }
 }
 
-/// Puts the tiles' pixels in order.
-fn assemble_tiles(size: [usize; 2], tiles: &[RenderedTile]) -> DeepImage {
-    let samples = tiles.iter().flat_map(|tile| &tile.samples.samples).copied();
-    let tints = tiles.iter().flat_map(|tile| &tile.samples.tints).copied();
-    DeepImage::from_samples(assemble_shadow(size, tiles), samples, tints)
+/// Tiles as one picture.
+fn assemble_tiles(size: [usize; 2], side: usize, tiles: Vec<RenderedTile>) -> DeepImage {
+    let shadow = assemble_shadow(size, &tiles);
+    let samples = tiles.into_iter().map(|tile| tile.samples).collect();
+    DeepImage::from_tiles(shadow, side, samples)
 }
 
 /// The factor on the plate, 1 where no tile has one.

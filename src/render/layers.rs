@@ -5,7 +5,7 @@
 //! split until it does, or until it is one pixel: order is decided by depth at the pixel's centre
 //! there. Inside a block each card is walked once, as a layer.
 
-use crate::deep::DeepSample;
+use crate::deep::{DeepSample, DeepTile};
 use crate::geom::Vector3;
 use crate::pixel::{Depth, LinearRgb, ObjectId};
 use crate::render::block::PixelBlock;
@@ -103,13 +103,25 @@ pub(super) struct LayerStack {
     pub(super) content: TexelContent,
 }
 
-/// Deep samples in any order of pixels, front to back for each.
+/// Deep samples of a block in any order of pixels, front to back for each.
 #[derive(Debug, Default)]
 pub(super) struct TileSamples {
-    /// Column, row and sample.
-    pub(super) samples: Vec<(u32, u32, DeepSample)>,
+    /// Number of the pixel in the block, and sample.
+    samples: Vec<(u32, DeepSample)>,
     /// What each sample hides, per channel; empty where no layer is film.
-    pub(super) tints: Vec<LinearRgb>,
+    tints: Vec<LinearRgb>,
+}
+
+impl TileSamples {
+    fn clear(&mut self) {
+        self.samples.clear();
+        self.tints.clear();
+    }
+
+    fn in_order(&self, block: &PixelBlock) -> DeepTile {
+        let size = [block.x.len(), block.y.len()];
+        DeepTile::from_samples(size, &self.samples, &self.tints)
+    }
 }
 
 /// A block's result.
@@ -117,17 +129,16 @@ pub(super) struct TileSamples {
 pub(super) struct RenderedTile {
     /// Which pixels.
     pub(super) block: PixelBlock,
-    /// Samples and their tints.
-    pub(super) samples: TileSamples,
+    pub(super) samples: DeepTile,
     /// The plate's factor, row by row; none where it is 1 everywhere.
     pub(super) shadow: Option<Vec<LinearRgb>>,
 }
 
 impl RenderedTile {
     /// A tile without samples, its plate unchanged.
-    fn new(block: &PixelBlock, may_be_shadowed: bool) -> Self {
+    pub(super) fn new(block: &PixelBlock, may_be_shadowed: bool) -> Self {
         Self {
-            samples: TileSamples::default(),
+            samples: DeepTile::default(),
             shadow: may_be_shadowed.then(|| vec![LinearRgb::WHITE; block.len()]),
             block: block.clone(),
         }
@@ -375,35 +386,49 @@ impl LayerStack {
         }
     }
 
-    /// Renders all of a block.
-    pub(super) fn render_tile(&self, block: PixelBlock) -> RenderedTile {
+    /// Renders all of a block; `scratch` is for its samples.
+    pub(super) fn render_tile(&self, block: PixelBlock, scratch: &mut TileSamples) -> RenderedTile {
         let layers: Vec<_> = (0..self.layers.len())
             .filter(|&k| self.layers[k].touches(&block))
             .collect();
         let may_be_shadowed = self.may_be_shadowed(&block);
         let mut tile = RenderedTile::new(&block, may_be_shadowed);
         if !layers.is_empty() || may_be_shadowed {
-            self.render_part(&block, &layers, &mut tile);
+            scratch.clear();
+            self.render_part(&block, &layers, &mut tile, scratch);
+            tile.samples = scratch.in_order(&block);
         }
         tile
     }
 
     /// Renders a part of a tile, in halves where its layers cross.
-    fn render_part(&self, part: &PixelBlock, layers: &[usize], tile: &mut RenderedTile) {
+    fn render_part(
+        &self,
+        part: &PixelBlock,
+        layers: &[usize],
+        tile: &mut RenderedTile,
+        samples: &mut TileSamples,
+    ) {
         let corners = part.corners();
         let layers = self.sorted_layers(part, &corners, layers);
         if part.len() > 1 && !self.is_sorted_at(&layers, &corners) {
             for half in &part.halves() {
-                self.render_part(half, &layers, tile);
+                self.render_part(half, &layers, tile, samples);
             }
         } else {
-            self.render_sorted(part, &layers, tile);
+            self.render_sorted(part, &layers, tile, samples);
         }
     }
 
     /// Renders a part of a tile whose layers do not cross.
-    fn render_sorted(&self, part: &PixelBlock, layers: &[usize], tile: &mut RenderedTile) {
-        let through = self.render_layers(part, layers, &mut tile.samples);
+    fn render_sorted(
+        &self,
+        part: &PixelBlock,
+        layers: &[usize],
+        tile: &mut RenderedTile,
+        samples: &mut TileSamples,
+    ) {
+        let through = self.render_layers((&tile.block, part), layers, samples);
         if tile.shadow.is_some() {
             work::add(Kind::ShadowedPixels, part.len() as u64);
             self.shade_catcher(part, &through, tile);
@@ -434,10 +459,10 @@ impl LayerStack {
             .all(|pair| self.layers[pair[0]].is_before_at_all(&self.layers[pair[1]], corners))
     }
 
-    /// Walks a block's layers front to back; returns what passes through all of them.
+    /// Walks the layers of a part of a tile front to back; returns what passes through all of them.
     fn render_layers(
         &self,
-        block: &PixelBlock,
+        (tile, block): (&PixelBlock, &PixelBlock),
         layers: &[usize],
         out: &mut TileSamples,
     ) -> Transmittance {
@@ -448,7 +473,7 @@ impl LayerStack {
             let layer = &self.layers[k];
             for y in range_overlap(&block.y, &layer.rows) {
                 self.sample_row(layer, block, y, &mut through, &mut row);
-                self.keep_row(layer, block, y, &mut row, out);
+                self.keep_row(layer, (tile, block), y, &mut row, out);
             }
         }
         work::add_all(row.work_counts(self.content));
@@ -522,7 +547,7 @@ impl LayerStack {
     fn keep_row(
         &self,
         layer: &Layer,
-        block: &PixelBlock,
+        (tile, block): (&PixelBlock, &PixelBlock),
         y: usize,
         row: &mut LayerRow,
         out: &mut TileSamples,
@@ -539,7 +564,7 @@ impl LayerStack {
             row.lit += usize::from(is_lit_here && sum.alpha() > 0.0);
             let light = sum.times(row.pixel_light[n]);
             let sample = self.deep_sample(layer, [x, y], light, alpha, hidden);
-            out.samples.push((x as u32, y as u32, sample));
+            out.samples.push((tile.number_of(x, y), sample));
             if self.content.is_tinted() {
                 out.tints.push(hidden.map(|h| h.min(1.0)));
             }

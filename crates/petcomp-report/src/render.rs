@@ -6,6 +6,7 @@
 mod cycles;
 mod diagram;
 mod golden;
+mod search;
 mod show;
 
 pub use diagram::diagrams;
@@ -27,7 +28,7 @@ use petcomp::{Result, composite, io};
 use std::path::{Path, PathBuf};
 
 /// Options of the report.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct RenderReportOptions {
     /// Scene file of the reference renderer that is timed.
     pub scene: PathBuf,
@@ -40,6 +41,8 @@ pub struct RenderReportOptions {
     pub golden: PathBuf,
     /// Renderings per setting, of which the median is reported. Default: 5.
     pub repeats: usize,
+    /// Errors against Cycles (RMSE) at which the quickest settings are searched for. Default: none.
+    pub quickest_at: Vec<f64>,
 }
 
 impl RenderReportOptions {
@@ -150,6 +153,11 @@ pub fn measure(options: &RenderReportOptions) -> Result<Vec<RenderRow>> {
     for (name, sampling) in settings() {
         rows.push(timed_scene.row(name, &sampling, options.repeats)?);
     }
+    rows.extend(search::quickest(
+        &timed_scene,
+        &options.quickest_at,
+        options.repeats,
+    )?);
     for entry in &others.pictures {
         rows.push(timed_scene.cycles_row(&others, entry)?);
     }
@@ -266,6 +274,7 @@ mod tests {
             cycles: folder.path().join("nowhere"),
             golden: folder.path().join("nowhere"),
             repeats: 1,
+            quickest_at: vec![0.01],
         };
         let (rows, golden) = write(folder.path(), &options).unwrap();
         assert_eq!((rows.len(), golden.len()), (settings().len(), 0));

@@ -32,6 +32,9 @@ pub(crate) struct Args {
     /// Renderings per preset, of which the median is reported, 1 to 1000
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = count(1..=1000))]
     repeats: usize,
+    /// Errors against Cycles at which to search for the quickest settings
+    #[arg(long, value_name = "RMSE", value_delimiter = ',')]
+    quickest_at: Vec<f64>,
 }
 
 pub(crate) fn run(args: &Args, common: &ReportFlags) -> anyhow::Result<()> {
@@ -53,6 +56,7 @@ impl Args {
             cycles: self.cycles.clone(),
             golden: self.golden.clone(),
             repeats: self.repeats,
+            quickest_at: self.quickest_at.clone(),
         }
     }
 }
