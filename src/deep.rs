@@ -123,21 +123,15 @@ impl DeepImage {
             "one tint per sample"
         );
         for tile in &mut self.tiles {
-            let samples = if tints.is_empty() {
-                0
-            } else {
-                tile.samples.len()
-            };
-            tile.tints = vec![LinearRgb::BLACK; samples];
+            tile.tints.clear();
         }
-        let mut tints = tints.as_slice();
+        // Row by row is the order of each tile too.
+        let mut tints = tints.into_iter();
         for y in 0..self.height {
             for x in 0..self.width {
                 let (tile, range) = self.place(x, y);
-                let own = self.tiles[tile].tints.get_mut(range).unwrap_or_default();
-                let (first, rest) = tints.split_at(own.len());
-                own.copy_from_slice(first);
-                tints = rest;
+                let own = tints.by_ref().take(range.len());
+                self.tiles[tile].tints.extend(own);
             }
         }
         self

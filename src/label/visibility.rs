@@ -124,7 +124,7 @@ pub(crate) fn fold_samples(
         for x in 0..deep.width() {
             sample_count += deep.at(x, y).len();
             for sample in deep.at(x, y) {
-                if let Ok(i) = ids.binary_search(&sample.object) {
+                if let Some(i) = index_of(sample.object, ids) {
                     tallies[i].add(x, y, sample, options.alpha_threshold);
                 }
             }
@@ -134,9 +134,37 @@ pub(crate) fn fold_samples(
     tallies.into_iter().map(VisibilityTally::finish).collect()
 }
 
+/// Where an id is among others in ascending order. Those of a scene have no gaps, so that there is
+/// nothing to search.
+#[inline]
+fn index_of(id: ObjectId, ids: &[ObjectId]) -> Option<usize> {
+    let without_gaps = id.0.wrapping_sub(ids.first()?.0) as usize;
+    if ids.get(without_gaps) == Some(&id) {
+        return Some(without_gaps);
+    }
+    ids.binary_search(&id).ok()
+}
+
 fn count_work(samples: usize, objects: usize) {
     work::add_all([
         (Kind::LabelSamples, samples as u64),
         (Kind::Masks, 2 * objects as u64),
     ]);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ids_are_found_with_gaps_and_without() {
+        let ids = [3, 4, 5, 9, u32::MAX].map(ObjectId);
+        for (i, id) in ids.iter().enumerate() {
+            assert_eq!(index_of(*id, &ids), Some(i));
+        }
+        for other in [0, 2, 6, 8, 10].map(ObjectId) {
+            assert_eq!(index_of(other, &ids), None);
+            assert_eq!(index_of(other, &[]), None);
+        }
+    }
 }

@@ -48,7 +48,7 @@ const TILE_SIDE_PX: usize = 32;
 /// quantiles of the pixel filter, from the mip level whose own blur makes up for what those leave
 /// over. Cards are ordered by depth block by block; blocks in which they cross are split.
 pub fn render(shot: &Shot, options: &RenderOptions) -> DeepImage {
-    let options = options.clamped();
+    let options = options.clamped().for_image(shot.camera.image);
     let mut watch = Stopwatch::start();
     let finished = &*retouched(shot, &options);
     watch.lap("retouch");

@@ -26,7 +26,8 @@ pub struct RenderOptions {
     pub light_samples: usize,
     /// Directions that the environment is seen from, 1 to 4096. Default: 32.
     pub ambient_samples: usize,
-    /// Distance of two samples of the irradiance, 0.25 to 16 pixels. Default: 1.5.
+    /// Distance of two samples of the irradiance, 0.25 to 16 pixels. Default: 1.5. In pictures longer
+    /// than 960 pixels it grows with them: shadows are no sharper there, they only have more pixels.
     pub cell_px: f64,
     /// What is seen through objects whose refraction was measured is displaced. Default: true.
     #[serde(skip_serializing_if = "Clone::clone")]
@@ -74,6 +75,10 @@ const LIGHT_SAMPLES: Bounds = Bounds::new(1.0, 32.0, "quality reference has 8");
 const AMBIENT_SAMPLES: Bounds = Bounds::new(1.0, 4096.0, "quality reference has 400");
 const CELL_PX: Bounds = Bounds::new(0.25, 16.0, "pixels; smaller cells resolve nothing more");
 
+/// Longest pictures whose cells are as long as they are told. Two of 1920 x 1080 with 30 bottles have
+/// the same error at cells of 1.5 and 3 pixels (0.00167, 0.00166), and 8 % more at 4.5.
+const MAX_CELL_IMAGE_PX: f64 = 960.0;
+
 impl RenderOptions {
     /// Fails on the first number without use: zero, or so large that a picture takes hours.
     ///
@@ -84,6 +89,15 @@ impl RenderOptions {
         LIGHT_SAMPLES.check("light_samples", self.light_samples as f64)?;
         AMBIENT_SAMPLES.check("ambient_samples", self.ambient_samples as f64)?;
         CELL_PX.check("cell_px", self.cell_px)
+    }
+
+    /// The same for a picture of some width and height.
+    pub(super) fn for_image(self, image: [u32; 2]) -> Self {
+        let longer = f64::from(image[0].max(image[1]));
+        Self {
+            cell_px: self.cell_px * (longer / MAX_CELL_IMAGE_PX).max(1.0),
+            ..self
+        }
     }
 
     /// The same with every number inside the range that the arithmetic bears: at least one sample,
@@ -121,6 +135,13 @@ mod tests {
             numbers,
             [(1, 2, 12, 2.0), (2, 3, 32, 1.5), (6, 8, 400, 0.33)]
         );
+    }
+
+    #[test]
+    fn cells_grow_with_large_pictures_alone() {
+        let cell = |image| RenderOptions::default().for_image(image).cell_px;
+        let cells = [[1, 1], [640, 480], [960, 960], [1080, 1920], [3840, 2160]].map(cell);
+        assert_eq!(cells, [1.5, 1.5, 1.5, 3.0, 6.0]);
     }
 
     #[test]
