@@ -28,8 +28,8 @@ impl PixelBlock {
 
     /// Number of one of its pixels, row by row.
     #[inline(always)]
-    pub(super) fn number_of(&self, x: usize, y: usize) -> u32 {
-        ((y - self.y.start) * self.x.len() + x - self.x.start) as u32
+    pub(super) fn number_of(&self, x: usize, y: usize) -> usize {
+        (y - self.y.start) * self.x.len() + x - self.x.start
     }
 
     /// Number of pixels.

@@ -146,9 +146,9 @@ impl RenderedTile {
 
     /// The plate's factors of a row of a part of the block.
     fn shadow_row(&mut self, part: &PixelBlock, y: usize) -> Option<&mut [LinearRgb]> {
-        let start = (y - self.block.y.start) * self.block.x.len() + part.x.start;
+        let start = self.block.number_of(part.x.start, y);
         let row = self.shadow.as_mut()?;
-        Some(&mut row[start - self.block.x.start..][..part.x.len()])
+        Some(&mut row[start..][..part.x.len()])
     }
 }
 
@@ -564,7 +564,7 @@ impl LayerStack {
             row.lit += usize::from(is_lit_here && sum.alpha() > 0.0);
             let light = sum.times(row.pixel_light[n]);
             let sample = self.deep_sample(layer, [x, y], light, alpha, hidden);
-            out.samples.push((tile.number_of(x, y), sample));
+            out.samples.push((tile.number_of(x, y) as u32, sample));
             if self.content.is_tinted() {
                 out.tints.push(hidden.map(|h| h.min(1.0)));
             }

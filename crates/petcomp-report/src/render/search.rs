@@ -4,7 +4,7 @@ use super::{RenderRow, TimedScene};
 use petcomp::Result;
 use petcomp::render::RenderOptions;
 
-/// The least time to find the quickest settings by, as they are all tried.
+/// Renderings of each setting that is tried, of which the median decides.
 const TRIAL_REPEATS: usize = 3;
 
 /// Samples along each side of a pixel, along each side of a light, of the environment, and distances of the irradiance's
