@@ -134,12 +134,13 @@ def shares_plot(study, summary):
 
 
 def by_generator(study, summary):
-    """Arms of one class and length whose sources are balanced, by their generator, in the order of their shares."""
+    """Arms of one class and length whose batches have a share of each source, by their generator, in the order of their
+    shares of the real pictures."""
     lines = {}
     for arm in sorted(summary, key=lambda arm: study.arms["arms"][arm].get("real", 0)):
         options = study.arms["arms"][arm]
-        comparable = not {"classes", "images"} & options.keys() and options.get("mix", "balanced") == "balanced"
-        if comparable:
+        has_shares = options.get("mix") not in ("concatenate", "equation2", "fine_tune")
+        if has_shares and not {"classes", "images"} & options.keys():
             lines.setdefault(options.get("synthetic"), []).append(arm)
     return {generator: arms for generator, arms in lines.items() if len(arms) > 1}
 

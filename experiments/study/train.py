@@ -139,27 +139,27 @@ class Streams(torch.utils.data.Sampler):
         return (self.indices(first + k) for k in range(len(self)))
 
     def indices(self, number):
-        real, synthetic = self.counts
-        size = self.batch
-        if self.training["mix"] == "balanced":
-            return self.balanced(number)
-        if self.training["mix"] == "equation2":
+        size, mix = self.batch, self.training["mix"]
+        if mix == "concatenate":
+            return self.stream("all", sum(self.counts), number * size, size)
+        if mix == "equation2":
             return self.single_source_batch(number)
-        if self.training["mix"] == "fine_tune":
+        if mix == "fine_tune":
             return self.balanced_then_real(number)
-        return self.stream("all", real + synthetic, number * size, size)
+        return self.both(number, 0.5 if mix == "balanced" else mix)
 
-    def balanced(self, number):
-        """Half of each batch from each source."""
+    def both(self, number, real_share):
+        """Of each batch a share from each source."""
         real, synthetic = self.counts
-        half = self.batch // 2
-        theirs = [real + k for k in self.stream("synthetic", synthetic, number * half, half)]
-        return self.stream("real", real, number * half, half) + theirs
+        of_real = round(real_share * self.batch)
+        of_synthetic = self.batch - of_real
+        theirs = [real + k for k in self.stream("synthetic", synthetic, number * of_synthetic, of_synthetic)]
+        return self.stream("real", real, number * of_real, of_real) + theirs
 
     def balanced_then_real(self, number):
         """Both sources, and at the end real pictures alone."""
         if number < (PARTS - FINE_TUNING_PARTS) * len(self):
-            return self.balanced(number)
+            return self.both(number, 0.5)
         return self.stream("fine_tuning", self.counts[0], number * self.batch, self.batch)
 
     def single_source_batch(self, number):
