@@ -124,7 +124,7 @@ codes! {
     GreyScreen "matte.grey_screen" "The background has no colour to key"
     UnstableOutline "matte.unstable_outline" "Searches at other depths of the pyramid find another outline"
     WeakEdges "matte.weak_edges" "Little of the outline lies on edges"
-    ThresholdSensitive "matte.threshold_sensitive" "The bounding box moves at a higher edge threshold"
+    ThresholdSensitive "matte.threshold_sensitive" "The bounding box moves at another edge threshold"
     Blurred "matte.blurred" "The edges of the object are blurred"
     Noisy "matte.noisy" "The object stands out from the noise only in a much smaller picture"
     ScreenLikeParts "matte.screen_like_parts" "Parts of the object look like the screen"

@@ -46,6 +46,33 @@ for (batch,) in loader:
     (factor * (scale * batch).mean()).backward()
     assert torch.allclose(scale.grad, factor * batch.mean())
 ";
+    assert_runs(script);
+}
+
+#[test]
+fn each_batch_has_its_share_of_real_images() {
+    let script = "
+import balanced
+sampler = balanced.Shares(5, 70, 8, 0.25, seed=3)
+first, second = list(sampler), list(sampler)
+assert first != second and len(first) == len(sampler) == 12
+assert all(sum(i < 5 for i in batch) == 2 for batch in first)
+assert sorted(i for batch in first for i in batch if i >= 5) == list(range(5, 75))
+real = [i for batch in first for i in batch if i < 5]
+assert all(sorted(real[k : k + 5]) == list(range(5)) for k in range(0, 20, 5))
+assert list(balanced.Shares(5, 70, 8, 0.25, seed=3)) == first
+for share in (0.01, 0.99):
+    try:
+        balanced.Shares(5, 70, 8, share)
+    except ValueError as error:
+        assert 'expected some of both' in str(error)
+    else:
+        raise AssertionError(share)
+";
+    assert_runs(script);
+}
+
+fn assert_runs(script: &str) {
     let Some(out) = python(script) else { return };
     assert!(
         out.status.success(),

@@ -30,6 +30,7 @@ STRIPED = ("soft",)                         # places whose stripes are kept
 PAINTS = ("green", "blue")
 CAMERA_HEIGHT = 1.0                         # metres over the display
 MARGIN = 16                                 # pixels around a bottle
+PAINT_MARGIN = 64                           # more of a painted screen, on every side
 
 
 # ---------------------------------------------------------------- pictures
@@ -149,7 +150,8 @@ class Place:
         self.paper = photos.Screen()
         at = (rng.normal(0, 0.006), rng.normal(0, 0.006), CAMERA_HEIGHT)
         self.camera = studio.look_at_camera(*VIEW_PX, CAMERA_HEIGHT / PITCH, at, (0, 0, 0))
-        studio.set_camera(sc, self.camera)
+        wide = studio.look_at_camera(*around(VIEW_PX, PAINT_MARGIN), CAMERA_HEIGHT / PITCH, at, (0, 0, 0))
+        self.cameras = {margin: studio.set_camera(sc, one) for margin, one in ((PAINT_MARGIN, wide), (0, self.camera))}
 
     def add_pictures(self, shown):
         self.names = list(shown)
@@ -168,17 +170,26 @@ class Place:
         self.floor(sheets=False, glass=True, paper=False)
         return render_passes(self.sc, crop, self.samples, seed, denoise=True)["Combined"]
 
-    def painted(self, albedo, crop, seed):
-        """A photo's light with a painted screen instead of the display."""
+    def painted(self, albedo, crop, seed, margin=0):
+        """A photo's light with a painted screen instead of the display, and of some pixels more on every side."""
         self.floor(sheets=False, glass=False, paper=True)
         self.paper.paint(albedo)
-        return render_passes(self.sc, crop, self.samples, seed, denoise=True)["Combined"]
+        self.sc.camera = self.cameras[margin]
+        wide = (*crop[:2], *around(crop[2:], margin))
+        light = render_passes(self.sc, wide, self.samples, seed, denoise=True, view=around(VIEW_PX, margin))
+        self.sc.camera = self.cameras[0]
+        return light["Combined"]
 
     def floor(self, sheets, glass, paper):
         for ob in self.sheets:
             ob.hide_render = not sheets
         self.glass.hide_render = not glass
         self.paper.ob.hide_render = not paper
+
+
+def around(size, margin):
+    """With a margin on both sides."""
+    return tuple(side + 2 * margin for side in size)
 
 
 def homography(camera):
@@ -190,15 +201,14 @@ def homography(camera):
     return m / m[2, 2]
 
 
-def render_passes(sc, crop, samples, seed, denoise):
+def render_passes(sc, crop, samples, seed, denoise, view=VIEW_PX):
     """Renders columns x0 to x1 and rows y0 to y1 of the view; returns the light of its passes by their names."""
     r = sc.render
     sc.cycles.samples, sc.cycles.seed, sc.cycles.use_denoising = samples, seed, denoise
-    r.resolution_x, r.resolution_y = VIEW_PX
+    r.resolution_x, r.resolution_y = w, h = view
     r.resolution_percentage = 100
     r.use_border = r.use_crop_to_border = True
     x0, y0, x1, y1 = crop
-    w, h = VIEW_PX
     r.border_min_x, r.border_max_x = x0 / w, x1 / w
     r.border_min_y, r.border_max_y = 1 - y1 / h, 1 - y0 / h
     st = r.image_settings
@@ -280,7 +290,7 @@ def bottle_light(args, place, i):
     light = {f"seen_{k}": v.astype(np.float16) for k, v in place.seen(crop, 10 * i + 5).items()}
     light["dark"] = place.dark(crop, 10 * i + 6)
     for k, paint in enumerate(PAINTS):
-        light[paint] = place.painted(photos.SCREENS[paint], crop, 10 * i + 7 + k)
+        light[paint] = place.painted(photos.SCREENS[paint], crop, 10 * i + 7 + k, PAINT_MARGIN)
     cover = obs.pop()
     remove(obs)
     return {**light, "cover": cover[crop[1]:crop[3], crop[0]:crop[2]], "crop": np.array(crop), "size": size}
@@ -358,16 +368,15 @@ def write_place(args, index, cache):
     pixels.write_json(os.path.join(folder, "place.json"), dict(
         light=name, view_px=list(VIEW_PX), display_px=list(SIZE_PX), display_m=[s * PITCH for s in SIZE_PX],
         display_from_photo=[[float(v) for v in row] for row in display_from_photo],
-        camera=studio.camera_json(camera), gain={"display": developer.gain, **developer.paint_gain},
+        paint_margin_px=PAINT_MARGIN, camera=studio.camera_json(camera), gain={"display": developer.gain, **developer.paint_gain},
         sensor=SENSOR, spp=args.spp, bottles=records))
 
 
 def write_bottle(developer, display_from_photo, args, folder, cache, i):
     light = load(light_file(cache, f"b{i:04d}"))
-    rng = bottle.seeded("display photos", i)
     name = f"b{i:02d}"
-    for paint in PAINTS:
-        write_jpeg(path_of(folder, name, paint), developer.photo(developer.paint_gain[paint] * light[paint], rng))
+    write_painted(developer, folder, name, light, bottle.seeded("painted photos", i))
+    rng = bottle.seeded("display photos", i)
     with_stripes = os.path.basename(folder) in STRIPED
     for frame in ("black", "white", *(STRIPES if with_stripes else ())):
         shown = developer.shown(light, None if frame == "black" else frame)
@@ -382,6 +391,11 @@ def write_bottle(developer, display_from_photo, args, folder, cache, i):
     desc = bottle.describe(args.library_seed, i, {})
     return dict(name=name, crop_px=[int(v) for v in light["crop"]], thickness=round(float(light["size"][2]), 5),
                 with_stripes=with_stripes, colour=desc["colour"], litres=desc["litres"], class_name=desc["class_name"])
+
+
+def write_painted(developer, folder, name, light, rng):
+    for paint in PAINTS:
+        write_jpeg(path_of(folder, name, paint), developer.photo(developer.paint_gain[paint] * light[paint], rng))
 
 
 def write_truth(path, light):

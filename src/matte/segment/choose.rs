@@ -71,10 +71,7 @@ pub(super) fn best_search<'a>(
     }
     let confidences = confidences(&searched, picture.size());
     let pick = best_candidate(&searched, &confidences, options.levels);
-    let confidence = Confidence {
-        drift_px: drift_px(&searched, pick, &scales, options),
-        ..confidences[pick]
-    };
+    let confidence = with_drift(confidences[pick], &searched, pick, &scales, options);
     searched.swap_remove(pick).into_chosen(scales, confidence)
 }
 
@@ -212,28 +209,68 @@ fn searches(scales: &[SearchScale<'_>], options: &SegmentOptions) -> Vec<SearchR
         .collect()
 }
 
-/// Factor of the finest band's threshold in a stricter search: half a step of exposure.
+/// Factors of the finest band's threshold in a stricter search and in a laxer one: half a step of
+/// exposure.
 const STRICTER_FACTOR: f32 = 1.4;
+const LAXER_FACTOR: f32 = 1.0 / STRICTER_FACTOR;
 
-/// How far a side of the hull's box moves when edges must be stronger, or when the same picture is
-/// searched at another depth, pixels of the whole picture. What such a search does not find at all
-/// moves by the picture's longer side.
-fn drift_px(
+/// A search's confidence, with how far its box moves at other settings.
+fn with_drift(
+    confidence: Confidence,
     searched: &[SearchResult],
     pick: usize,
     scales: &[SearchScale<'_>],
     options: &SegmentOptions,
-) -> f64 {
-    let (own, scale) = (&searched[pick], &scales[searched[pick].scale]);
-    let Ok(pass) = &own.pass else { return 0.0 };
-    let stricter = scale
-        .search
-        .at_threshold(own.levels, STRICTER_FACTOR, options);
-    let stricter_px = stricter.map_or(longer_side(&pass.inside) as f64, |p| pass.distance(&p));
-    let farthest_px = passes_at(searched, own.scale)
-        .map(|other| pass.distance(other))
-        .fold(stricter_px, f64::max);
-    scale.reduction as f64 * farthest_px
+) -> Confidence {
+    let own = &searched[pick];
+    let Ok(pass) = &own.pass else {
+        return confidence;
+    };
+    let scale = &scales[own.scale];
+    let drift = Drift {
+        own,
+        pass,
+        scale,
+        options,
+    };
+    Confidence {
+        drift_px: drift.stricter_px(searched),
+        faint_px: drift.laxer_px(),
+        ..confidence
+    }
+}
+
+/// A search, and those with other settings on the same picture that it is compared with.
+struct Drift<'a> {
+    own: &'a SearchResult,
+    pass: &'a Pass,
+    scale: &'a SearchScale<'a>,
+    options: &'a SegmentOptions,
+}
+
+impl Drift<'_> {
+    /// How far a side of the hull's box moves when edges must be stronger, or when the same picture
+    /// is searched at another depth, pixels of the whole picture.
+    fn stricter_px(&self, searched: &[SearchResult]) -> f64 {
+        let at_other_depths = passes_at(searched, self.own.scale).map(|p| self.pass.distance(p));
+        let farthest_px = at_other_depths.fold(self.moved_px(STRICTER_FACTOR), f64::max);
+        self.scale.reduction as f64 * farthest_px
+    }
+
+    /// The same when edges may be weaker.
+    fn laxer_px(&self) -> f64 {
+        self.scale.reduction as f64 * self.moved_px(LAXER_FACTOR)
+    }
+
+    /// How far a side moves at another threshold; by the picture's longer side where nothing is
+    /// found.
+    fn moved_px(&self, factor: f32) -> f64 {
+        let search = &self.scale.search;
+        let other = search.at_threshold(self.own.levels, factor, self.options);
+        other.map_or(longer_side(&self.pass.inside) as f64, |p| {
+            self.pass.distance(&p)
+        })
+    }
 }
 
 /// What the searches of one picture size found.

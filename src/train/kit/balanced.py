@@ -4,10 +4,14 @@ As a program it trains an Ultralytics detector on the images that combined.yaml 
 
     python balanced.py --epochs 300 --batch 32 --seed 1 --name combined/1
 
-As a module it serves any other loop: `SingleSource` is a batch sampler, `weights` gives the factor per source.
+or, with `--real-share 0.125`, of batches in which that share is real, unweighted: where real images are few, that keeps
+them from being seen too often.
+
+As a module it serves any other loop: `SingleSource` and `Shares` are batch samplers, `weights` gives the factor per source.
 """
 
 import argparse
+import itertools
 import json
 import pathlib
 import random
@@ -44,6 +48,30 @@ class SingleSource(torch.utils.data.Sampler):
         return sum(-(-len(part) // self.batch) for part in self.parts)
 
 
+class Shares(torch.utils.data.Sampler):
+    """The same, each list with a share of real images, which are shuffled anew whenever all were seen; an epoch is one
+    pass over the synthetic ones."""
+
+    def __init__(self, real, synthetic, batch, share, seed=0):
+        self.real, self.synthetic, self.batch, self.seed, self.epoch = real, synthetic, batch, seed, 0
+        self.of_real = round(share * batch)
+        if not 0 < self.of_real < batch:
+            raise ValueError(f"share {share}: {self.of_real} of {batch} images are real, expected some of both")
+
+    def __iter__(self):
+        rng = random.Random(self.seed * 1_000_003 + self.epoch)
+        self.epoch += 1
+        passes = (rng.sample(range(self.real), self.real) for _ in itertools.count())
+        real = itertools.chain.from_iterable(passes)
+        order = rng.sample(range(self.real, self.real + self.synthetic), self.synthetic)
+        size = self.batch - self.of_real
+        for i in range(0, len(order), size):
+            yield [*itertools.islice(real, self.of_real), *order[i : i + size]]
+
+    def __len__(self):
+        return -(-self.synthetic // (self.batch - self.of_real))
+
+
 class Both(torch.utils.data.ConcatDataset):
     """Each source keeps its own mosaic, so that no picture mixes the two."""
 
@@ -77,32 +105,40 @@ class WeightedLoss:
         self.factor = 1.0  # once a batch
 
 
-def ultralytics_trainer(batch_size, seed):
-    """An Ultralytics trainer class that follows equation 2."""
+def ultralytics_trainer(batch_size, seed, real_share=None):
+    """An Ultralytics trainer class that follows equation 2, or has a share of real images in each batch."""
     from ultralytics.data.dataset import YOLODataset
     from ultralytics.models.yolo.detect import DetectionTrainer
 
     balance = json.loads((HERE / "balance.json").read_text())
-    factor = (balance["weights"]["real"], balance["weights"]["synthetic"])
+    factors = (balance["weights"]["real"], balance["weights"]["synthetic"])
     real = frozenset((HERE / "real_train.txt").read_text().split("\n"))
 
     class Balanced(WeightedLoss, DetectionTrainer):
+        factor = 1.0
+
         def get_dataloader(self, dataset_path, batch_size=batch_size, rank=0, mode="train"):
             if mode != "train":
                 return super().get_dataloader(dataset_path, batch_size, rank, mode)
             lists = [str(HERE / name) for name in ("real_train.txt", "synthetic_train.txt")]
             parts = [self.build_dataset(path, mode, batch_size) for path in lists]
-            sampler = SingleSource(*map(len, parts), batch_size, seed)
+            counts = map(len, parts)
+            if real_share:
+                sampler = Shares(*counts, batch_size, real_share, seed)
+            else:
+                sampler = SingleSource(*counts, batch_size, seed)
             return Loader(
                 Both(parts), batch_sampler=sampler, num_workers=self.args.workers, collate_fn=YOLODataset.collate_fn
             )
 
         def preprocess_batch(self, batch):
             batch = super().preprocess_batch(batch)
+            if real_share:
+                return batch
             sources = {REAL if path in real else SYNTHETIC for path in batch["im_file"]}
             if len(sources) != 1:
                 raise ValueError("a batch of both sources")
-            self.factor = factor[sources.pop()]
+            self.factor = factors[sources.pop()]
             return batch
 
     return Balanced
@@ -113,6 +149,7 @@ def main():
     parser.add_argument("--model", default="yolov5s.pt")
     parser.add_argument("--epochs", type=int, default=300)
     parser.add_argument("--batch", type=int, default=32)
+    parser.add_argument("--real-share", type=float, help="of each batch, 0 to 1; default: batches of one source, weighted")
     parser.add_argument("--img", type=int, default=640)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--workers", type=int, default=8)
@@ -125,7 +162,7 @@ def main():
         optimizer="SGD", lr0=0.01, lrf=0.2, momentum=0.937, weight_decay=0.0005, warmup_epochs=3.0, cos_lr=True,
         mosaic=1.0, hsv_h=0.015, hsv_s=0.7, hsv_v=0.4, fliplr=0.5, close_mosaic=0,
     )
-    ultralytics_trainer(args.batch, args.seed)(overrides=settings).train()
+    ultralytics_trainer(args.batch, args.seed, args.real_share)(overrides=settings).train()
 
 
 if __name__ == "__main__":

@@ -84,6 +84,7 @@ fn on_paint(method: MattingMethod, place: &Place, bottle: &Bottle) -> Result<See
         second.map(|p| p.scale(as_first)),
     ];
     let film = method.film(&shots[0], &shots)?;
+    let film = film.crop(place.in_painted(bottle));
     let exposed = film.map(|film| Film {
         color: film.color.scale(exposure),
         ..film

@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, RowVector3};
 use petcomp::color::linear_to_srgb;
 use petcomp::geom::Homography;
 use petcomp::io;
-use petcomp::{Coverage, Error, Image, LinearRgb, Result};
+use petcomp::{Coverage, Error, Image, LinearRgb, Result, Roi};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -26,6 +26,8 @@ pub(super) struct Place {
     pub(super) display_m: [f64; 2],
     /// From photos of the view to the display, pixels.
     display_from_photo: [[f64; 3]; 3],
+    /// Pixels that photos of painted screens show more, on every side.
+    paint_margin_px: usize,
     /// Factors of the photos' exposures, by what the display showed or the screen was painted.
     gain: BTreeMap<String, f32>,
     pub(super) bottles: Vec<Bottle>,
@@ -61,6 +63,17 @@ impl Place {
     fn open(folder: PathBuf) -> Result<Self> {
         let place: Self = io::read_json(folder.join(RECORD))?;
         Ok(Self { folder, ..place })
+    }
+
+    /// Where what the display's photos show of a bottle is in those of painted screens.
+    pub(super) fn in_painted(&self, bottle: &Bottle) -> Roi {
+        let [x0, y0, x1, y1] = bottle.crop_px;
+        Roi {
+            x: self.paint_margin_px,
+            y: self.paint_margin_px,
+            width: x1 - x0,
+            height: y1 - y0,
+        }
     }
 
     /// From photos of the view to the display, pixels.
