@@ -71,7 +71,12 @@ pub(super) fn best_search<'a>(
     }
     let confidences = confidences(&searched, picture.size());
     let pick = best_candidate(&searched, &confidences, options.levels);
-    let confidence = with_drift(confidences[pick], &searched, pick, &scales, options);
+    let [drift_px, faint_px] = drift_px(&searched, pick, &scales, options);
+    let confidence = Confidence {
+        drift_px,
+        faint_px,
+        ..confidences[pick]
+    };
     searched.swap_remove(pick).into_chosen(scales, confidence)
 }
 
@@ -214,63 +219,26 @@ fn searches(scales: &[SearchScale<'_>], options: &SegmentOptions) -> Vec<SearchR
 const STRICTER_FACTOR: f32 = 1.4;
 const LAXER_FACTOR: f32 = 1.0 / STRICTER_FACTOR;
 
-/// A search's confidence, with how far its box moves at other settings.
-fn with_drift(
-    confidence: Confidence,
+/// How far a side of the hull's box moves, pixels of the whole picture: when edges must be stronger
+/// or the same picture is searched at another depth, and when edges may be weaker.
+fn drift_px(
     searched: &[SearchResult],
     pick: usize,
     scales: &[SearchScale<'_>],
     options: &SegmentOptions,
-) -> Confidence {
-    let own = &searched[pick];
+) -> [f64; 2] {
+    let (own, scale) = (&searched[pick], &scales[searched[pick].scale]);
     let Ok(pass) = &own.pass else {
-        return confidence;
+        return [0.0; 2];
     };
-    let scale = &scales[own.scale];
-    let drift = Drift {
-        own,
-        pass,
-        scale,
-        options,
-    };
-    Confidence {
-        drift_px: drift.stricter_px(searched),
-        faint_px: drift.laxer_px(),
-        ..confidence
-    }
-}
-
-/// A search, and those with other settings on the same picture that it is compared with.
-struct Drift<'a> {
-    own: &'a SearchResult,
-    pass: &'a Pass,
-    scale: &'a SearchScale<'a>,
-    options: &'a SegmentOptions,
-}
-
-impl Drift<'_> {
-    /// How far a side of the hull's box moves when edges must be stronger, or when the same picture
-    /// is searched at another depth, pixels of the whole picture.
-    fn stricter_px(&self, searched: &[SearchResult]) -> f64 {
-        let at_other_depths = passes_at(searched, self.own.scale).map(|p| self.pass.distance(p));
-        let farthest_px = at_other_depths.fold(self.moved_px(STRICTER_FACTOR), f64::max);
-        self.scale.reduction as f64 * farthest_px
-    }
-
-    /// The same when edges may be weaker.
-    fn laxer_px(&self) -> f64 {
-        self.scale.reduction as f64 * self.moved_px(LAXER_FACTOR)
-    }
-
-    /// How far a side moves at another threshold; by the picture's longer side where nothing is
-    /// found.
-    fn moved_px(&self, factor: f32) -> f64 {
-        let search = &self.scale.search;
-        let other = search.at_threshold(self.own.levels, factor, self.options);
-        other.map_or(longer_side(&self.pass.inside) as f64, |p| {
-            self.pass.distance(&p)
-        })
-    }
+    let moved_px = [STRICTER_FACTOR, LAXER_FACTOR].map(|factor| {
+        let other = scale.search.at_threshold(own.levels, factor, options);
+        // What such a search does not find at all moves by the picture's longer side.
+        other.map_or(longer_side(&pass.inside) as f64, |p| pass.distance(&p))
+    });
+    let at_other_depths = passes_at(searched, own.scale).map(|other| pass.distance(other));
+    let stricter_px = at_other_depths.fold(moved_px[0], f64::max);
+    [stricter_px, moved_px[1]].map(|px| scale.reduction as f64 * px)
 }
 
 /// What the searches of one picture size found.
