@@ -1,15 +1,15 @@
 """Many switches at once, by a Plackett-Burman design: each is on in half of the generators.
 
-So every switch is judged by all trainings, where comparisons one by one judge it by two of them. The
-columns of the design that have no switch show what chance alone gives.
+So every switch is judged by all trainings, where comparisons one by one judge it by two of them. As most
+switches give little, the effects of all show what chance alone gives (Lenth 1989).
 """
 
 import numpy as np
 
 # Of twelve runs (Plackett and Burman 1946): its rotations, and a row in which all is off.
 FIRST_ROW = "++-+++---+-"
-# 97.5 % quantiles of Student's t by degrees of freedom, here the columns without a switch.
-T_QUANTILES = {1: 12.706, 2: 4.303, 3: 3.182, 4: 2.776, 5: 2.571, 6: 2.447}
+# 97.5 % quantile of Student's t with a third of the columns as degrees of freedom, as Lenth has it.
+T_QUANTILE = 2.879
 
 
 def design():
@@ -23,13 +23,16 @@ def add_arms(arms):
     """The generators and arms of `[screening]`."""
     screening = arms["screening"]
     switches = screening["switches"]
-    spare = len(FIRST_ROW) - len(switches)
-    if spare not in T_QUANTILES:
-        raise SystemExit(f"arms.toml: {len(switches)} switches in [screening], expected 5 to 10")
+    if len(switches) > len(FIRST_ROW):
+        raise SystemExit(f"arms.toml: {len(switches)} switches in [screening], expected at most {len(FIRST_ROW)}")
     for k, row in enumerate(design()):
         on = [name for name, is_on in zip(switches, row) if is_on]
         arms["generators"][f"screening_{k}"] = combined(screening["base"], [switches[name] for name in on])
-        arms["arms"][f"screening_{k}"] = {"synthetic": f"screening_{k}", "short": True, "screening": True}
+        arms["arms"][f"screening_{k}"] = {
+            "synthetic": f"screening_{k}",
+            "images": screening["images"],
+            "screening": True,
+        }
 
 
 def combined(base, switches):
@@ -52,19 +55,24 @@ def effects(study, means, drawn):
     logs = np.log([means[run] for run in runs])
     rounds = np.log(np.maximum([drawn[run] for run in runs], np.finfo(float).tiny))
     columns = [(on_over_off(logs, column), on_over_off(rounds, column)) for column in design().T]
-    switches = study.arms["screening"]["switches"]
-    spare = [effect for effect, _ in columns[len(switches) :]]
-    by_chance = np.mean(np.square(spare))
+    by_chance = standard_error([effect for effect, _ in columns])
     return [
-        {"switch": name, **ratio(effect, np.sqrt(by_chance + np.var(of_rounds)), len(spare))}
-        for name, (effect, of_rounds) in zip(switches, columns)
+        {"switch": name, **ratio(effect, np.hypot(by_chance, np.std(of_rounds)))}
+        for name, (effect, of_rounds) in zip(study.arms["screening"]["switches"], columns)
     ]
+
+
+def standard_error(effects):
+    """Of effects most of which are none: Lenth's pseudo standard error."""
+    sizes = np.abs(effects)
+    rough = 1.5 * np.median(sizes)
+    return 1.5 * np.median(sizes[sizes < 2.5 * rough])
 
 
 def on_over_off(logs, column):
     return logs[column].mean(0) - logs[~column].mean(0)
 
 
-def ratio(effect, error, freedom):
-    reach = T_QUANTILES[freedom] * error
+def ratio(effect, error):
+    reach = T_QUANTILE * error
     return {"ratio": np.exp(effect), "low": np.exp(effect - reach), "high": np.exp(effect + reach)}
