@@ -136,7 +136,9 @@ impl<'a> Focus<'a> {
         discs: &Discs,
         size: [usize; 2],
     ) -> SoftObject {
-        let [columns, rows] = [0, 1].map(|axis| reached(samples, discs.reach(), axis, size));
+        let places = samples.iter().map(|placed| &placed.at);
+        let [columns, rows] =
+            [0, 1].map(|axis| around(places.clone(), discs.reach(), axis, size[axis]));
         let mut soft = SoftObject {
             object,
             pixels: vec![SoftPixel::default(); columns.len() * rows.len()],
@@ -185,8 +187,16 @@ impl<'a> Focus<'a> {
             self.surface_radius_px(x, y)
         });
         let discs = Discs::of_radii(radii.pixels().iter().copied());
+        let near = near_shadows(shadow, discs.reach());
+        let seen = Image::from_fn(shadow.width(), shadow.height(), |x, y| {
+            mean(deep.flat(x, y).transmittance()) + HIDDEN_WEIGHT
+        });
         Image::from_fn(shadow.width(), shadow.height(), |x, y| {
-            mean_shadow(deep, [x, y], discs.of_radius(radii[(x, y)]))
+            if near[0].contains(&x) && near[1].contains(&y) {
+                mean_shadow(shadow, &seen, [x, y], discs.of_radius(radii[(x, y)]))
+            } else {
+                LinearRgb::WHITE
+            }
         })
     }
 
@@ -231,12 +241,17 @@ fn samples_by_object(deep: &DeepImage) -> BTreeMap<ObjectId, Vec<PlacedSample>> 
     objects
 }
 
-/// Columns (or rows) that the circles of confusion of some samples reach.
-fn reached(samples: &[PlacedSample], reach: usize, axis: usize, size: [usize; 2]) -> Range<usize> {
-    let places = samples.iter().map(|s| s.at[axis]);
+/// Columns (or rows) of a picture of `size` that are closer to some places than `reach`.
+fn around<'a>(
+    places: impl Iterator<Item = &'a [usize; 2]> + Clone,
+    reach: usize,
+    axis: usize,
+    size: usize,
+) -> Range<usize> {
+    let places = places.map(|at| at[axis]);
     let low = places.clone().min().unwrap_or(0).saturating_sub(reach);
     let high = places.max().map_or(0, |last| last + 1 + reach);
-    low..high.min(size[axis])
+    low..high.min(size)
 }
 
 impl SoftObject {
@@ -391,17 +406,31 @@ fn mean(color: LinearRgb) -> f32 {
     (color.r + color.g + color.b) / 3.0
 }
 
+/// Columns and rows that shadows are in, or closer to than `reach`.
+fn near_shadows(shadow: &Image<LinearRgb>, reach: usize) -> [Range<usize>; 2] {
+    let (width, height) = (shadow.width(), shadow.height());
+    let dark = (0..width * height).filter(|i| shadow.pixels()[*i] != LinearRgb::WHITE);
+    let places: Vec<_> = dark.map(|i| [i % width, i / width]).collect();
+    [(0, width), (1, height)].map(|(axis, size)| around(places.iter(), reach, axis, size))
+}
+
 /// The mean factor on the plate over a disc, by what is seen of the surface.
-fn mean_shadow(deep: &DeepImage, at: [usize; 2], disc: &Disc) -> LinearRgb {
+fn mean_shadow(
+    shadow: &Image<LinearRgb>,
+    seen: &Image<f32>,
+    at: [usize; 2],
+    disc: &Disc,
+) -> LinearRgb {
     let (mut sum, mut total) = (LinearRgb::BLACK, 0.0);
     for (dx, dy, weight) in disc.taps() {
         let (x, y) = (at[0] as isize + dx, at[1] as isize + dy);
-        let inside = x >= 0 && y >= 0 && x < deep.width() as isize && y < deep.height() as isize;
+        let inside =
+            x >= 0 && y >= 0 && x < shadow.width() as isize && y < shadow.height() as isize;
         if inside {
             let (x, y) = (x as usize, y as usize);
-            let seen = mean(deep.flat(x, y).transmittance()) + HIDDEN_WEIGHT;
-            sum = sum.add_scaled(weight * seen, deep.shadow()[(x, y)]);
-            total += weight * seen;
+            let weight = weight * seen[(x, y)];
+            sum = sum.add_scaled(weight, shadow[(x, y)]);
+            total += weight;
         }
     }
     sum.scale(1.0 / total)
