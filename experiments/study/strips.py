@@ -22,7 +22,7 @@ DISTRACTORS = ["b0006", "b0007"]
 SHOWN = 2
 # What is shown of a picture, pixels.
 SEEN = (60, 45, 420, 315)
-WIDTH, HEIGHT = SEEN[2] - SEEN[0], SEEN[3] - SEEN[1]
+WIDTH, HEIGHT = 240, 180
 HEAD = 16
 
 
@@ -36,7 +36,7 @@ def main():
     arms = studies.read_arms()
     recipe = make_recipe(options.program.resolve(), options.out)
     rows = [row(options, arms, recipe, name, switch) for name, switch in switches(arms).items()]
-    sheet([pictures for pictures, _ in rows]).save(options.out / "switches.jpg", quality=85)
+    sheet([pictures for pictures, _ in rows]).save(options.out / "switches.jpg", quality=80)
     with (options.out / "switches.csv").open("w") as file:
         csv.writer(file, lineterminator="\n").writerows([["switch", "off_ms", "on_ms"], *(times for _, times in rows)])
 
@@ -98,7 +98,7 @@ def with_boxes(path):
     for line in files.label_of(path).read_text().split("\n"):
         if line:
             draw.rectangle(corners(*map(float, line.split()[1:]), *picture.size), outline=(255, 255, 0))
-    return picture.crop(SEEN)
+    return picture.resize((WIDTH, HEIGHT), Image.Resampling.LANCZOS, SEEN)
 
 
 def corners(x, y, width, height, columns, rows):
@@ -108,7 +108,7 @@ def corners(x, y, width, height, columns, rows):
 
 
 def sheet(rows):
-    whole = Image.new("RGB", ((2 * SHOWN) * WIDTH + HEAD, len(rows) * (HEIGHT + HEAD)), "white")
+    whole = Image.new("RGB", (2 * SHOWN * WIDTH + HEAD, len(rows) * (HEIGHT + HEAD)), "white")
     draw = ImageDraw.Draw(whole)
     for k, (name, off, on) in enumerate(rows):
         top = k * (HEIGHT + HEAD)
