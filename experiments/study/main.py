@@ -15,7 +15,8 @@ def run(options, cache, program):
         shutil.rmtree(study.cache, ignore_errors=True)
     names = chosen(options, study.arms)
     if not options.write:
-        studies.train_all(study, studies.trainings(study, names, options.seeds), options.processes)
+        for step in studies.steps(study, names, options.seeds):
+            studies.train_all(study, step, options.processes)
     folder = study.cache / "results" if options.smoke else HERE / "results" / study.name
     means = write(study, list(study.arms["arms"]), options.seeds, folder)
     if options.smoke:
@@ -25,6 +26,8 @@ def run(options, cache, program):
 def full(options, cache, program):
     """Other rooms are another study: nothing of it was seen while choosing."""
     arms = read_arms()
+    if options.screening:
+        arms["reality"] |= screening.chosen(arms, options.screening).get("reality", {})
     arms["reality"]["rooms"] = options.rooms or arms["reality"]["rooms"]
     name = options.name or "rooms_" + "_".join(map(str, arms["reality"]["rooms"]))
     return studies.Study(arms, cache / name, cache / "world", program)
@@ -59,7 +62,7 @@ def chosen(options, arms):
     if options.headline:
         return [name for name, arm in arms["arms"].items() if arm.get("headline")]
     if options.screening:
-        return screening.names(arms)
+        return screening.runs(options.screening)
     for name in options.arms or []:
         if name not in arms["arms"]:
             raise SystemExit(f"--arms: no arm {name}, expected some of {', '.join(arms['arms'])}")
@@ -86,7 +89,7 @@ def write(study, names, seeds, folder):
     results.write_csv(folder / "results.csv", results.COLUMNS, rows)
     results.write_csv(folder / "summary.csv", results.SUMMARY_COLUMNS, results.summary_rows(summary))
     archive.write(folder, matches)
-    results.write_csv(folder / "switches.csv", results.SWITCH_COLUMNS, effects)
+    results.write_csv(folder / "switches.csv", results.SWITCH_COLUMNS, [row for rows in effects.values() for row in rows])
     page.write(study, rows, summary, ratios, effects, folder / "index.html")
     print(f"see {folder / 'index.html'}")
     return means

@@ -9,7 +9,7 @@ import cv2
 import matplotlib
 import numpy as np
 
-from . import files, screening
+from . import files
 
 matplotlib.use("svg")
 from matplotlib import pyplot
@@ -88,12 +88,18 @@ def switches(study, effects):
     """What each switch gives in a design in which each is on in half of the generators."""
     if not effects:
         return []
+    tables = [part for name, rows in effects.items() for part in screened(study.arms["screenings"][name], rows)]
+    return ["<h2>Switches</h2>", *tables]
+
+
+def screened(screening, effects):
     rows = [
         [one["switch"], f"{one['ratio']:.2f}", span([one["low"], one["high"]], 2)]
         for one in sorted(effects, key=lambda one: -one["ratio"])
     ]
-    said = f"On top of {study.arms['screening']['base']}, each on in half of {len(screening.names(study.arms))} generators."
-    return ["<h2>Switches</h2>", f"<p>{html.escape(said)}</p>", table(["switch", "on / off", "95 % interval"], rows)]
+    begun = f", from the weights of {screening['start']}" if "start" in screening else ""
+    said = f"On top of {screening['base']}, each on in half of the trainings of {screening['images']} images{begun}."
+    return [f"<p>{html.escape(said)}</p>", table(["switch", "on / off", "95 % interval"], rows)]
 
 
 def span(interval, digits):

@@ -40,16 +40,16 @@ def truth(world, room, count, classes, folder):
     return folder
 
 
-def photo_list(world, count, cut_out, has_thickness, folder):
+def photo_list(world, count, cut_out, has_thickness, others, folder):
     """What a user writes of the photos of bottles: class, and by a tape measure the length and, if
-    asked for, the thickness."""
+    asked for, the thickness. `others` are entries of photos that are none of bottles."""
     lines = [f"classes = {json.dumps(files.CLASSES)}\n"]
     if cut_out:
         lines += ["[cut_out]\n", *(f"{key} = {json.dumps(value)}\n" for key, value in cut_out.items())]
     for index in range(count):
         bottle = json.loads((world / f"photos/bottles/b{index:04d}.json").read_text())
         lines += [entry(world, bottle["instance"]["index"], photo, has_thickness) for photo in bottle["photos"]]
-    return files.write_text(folder / "photos.toml", "\n".join(lines))
+    return files.write_text(folder / "photos.toml", "\n".join(lines + others))
 
 
 def entry(world, index, photo, has_thickness):

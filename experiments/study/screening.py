@@ -20,19 +20,31 @@ def design():
 
 
 def add_arms(arms):
-    """The generators and arms of `[screening]`."""
-    screening = arms["screening"]
+    """The generators and arms of `[screenings]`."""
+    for name, screening in arms["screenings"].items():
+        add_runs(arms, name, screening)
+
+
+def add_runs(arms, name, screening):
     switches = screening["switches"]
     if len(switches) > len(FIRST_ROW):
-        raise SystemExit(f"arms.toml: {len(switches)} switches in [screening], expected at most {len(FIRST_ROW)}")
-    for k, row in enumerate(design()):
-        on = [name for name, is_on in zip(switches, row) if is_on]
-        arms["generators"][f"screening_{k}"] = combined(screening["base"], [switches[name] for name in on])
-        arms["arms"][f"screening_{k}"] = {
-            "synthetic": f"screening_{k}",
-            "images": screening["images"],
-            "screening": True,
-        }
+        raise SystemExit(f"arms.toml: {len(switches)} switches in [screenings.{name}], expected at most {len(FIRST_ROW)}")
+    training = {key: screening[key] for key in ("images", "start") if key in screening}
+    size = {key: screening[key] for key in ("pictures",) if key in screening}
+    for run, row in zip(runs(name), design()):
+        on = [switch for switch, is_on in zip(switches.values(), row) if is_on]
+        arms["generators"][run] = size | combined(screening["base"], on)
+        arms["arms"][run] = training | {"synthetic": run}
+
+
+def chosen(arms, name):
+    if name not in arms["screenings"]:
+        raise SystemExit(f"--screening: no {name}, expected one of {', '.join(arms['screenings'])}")
+    return arms["screenings"][name]
+
+
+def runs(name):
+    return [f"{name}_{k}" for k in range(len(design()))]
 
 
 def combined(base, switches):
@@ -42,23 +54,24 @@ def combined(base, switches):
     return generator
 
 
-def names(arms):
-    return [name for name, arm in arms["arms"].items() if arm.get("screening")]
-
-
 def effects(study, means, drawn):
-    """What each switch gives: the ratio of scores with and without it, and its interval; nothing before
-    all runs are trained."""
-    runs = names(study.arms)
-    if not runs or not all(means.get(run) for run in runs):
-        return []
-    logs = np.log([means[run] for run in runs])
-    rounds = np.log(np.maximum([drawn[run] for run in runs], np.finfo(float).tiny))
+    """What each switch gives, by screening: the ratio of scores with and without it, and its interval. Of those
+    of which all runs are trained."""
+    return {
+        name: of_switches(screening["switches"], [means[run] for run in runs(name)], [drawn[run] for run in runs(name)])
+        for name, screening in study.arms["screenings"].items()
+        if all(means.get(run) for run in runs(name))
+    }
+
+
+def of_switches(switches, means, drawn):
+    logs = np.log(means)
+    rounds = np.log(np.maximum(drawn, np.finfo(float).tiny))
     columns = [(on_over_off(logs, column), on_over_off(rounds, column)) for column in design().T]
     by_chance = standard_error([effect for effect, _ in columns])
     return [
         {"switch": name, **ratio(effect, np.hypot(by_chance, np.std(of_rounds)))}
-        for name, (effect, of_rounds) in zip(study.arms["screening"]["switches"], columns)
+        for name, (effect, of_rounds) in zip(switches, columns)
     ]
 
 

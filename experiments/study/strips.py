@@ -41,9 +41,14 @@ def main():
         csv.writer(file, lineterminator="\n").writerows([["switch", "off_ms", "on_ms"], *(times for _, times in rows)])
 
 
+def screening(arms):
+    """That whose switches are shown, and the base of all."""
+    return arms["screenings"]["first"]
+
+
 def switches(arms):
     """`both`, `off` and `on` by name."""
-    screened = {name: {"on": switch["set"]} for name, switch in arms["screening"]["switches"].items()}
+    screened = {name: {"on": switch["set"]} for name, switch in screening(arms)["switches"].items()}
     return screened | arms["strips"]["switches"]
 
 
@@ -64,7 +69,7 @@ def as_distractor(entry):
 
 def row(options, arms, recipe, name, switch):
     """The pictures without and with a switch, and its name with the milliseconds of both."""
-    base = arms["synthetic"]["set"] + synthetic.described(arms["generators"], arms["screening"]["base"])["set"]
+    base = arms["synthetic"]["set"] + synthetic.described(arms["generators"], screening(arms)["base"])["set"]
     changes = {side: base + switch.get("both", []) + switch.get(side, []) for side in ("off", "on")}
     times = {side: [] for side in changes}
     for _ in range(options.rounds):

@@ -71,8 +71,19 @@ class Study:
     def folder(self, arm, seed):
         return self.cache / "runs" / arm / str(seed)
 
+    def weights(self, arm, seed):
+        """The last ones, where `train.py` leaves them."""
+        return self.folder(arm, seed) / "detector/weights/last.pt"
+
     def is_trained(self, arm, seed):
         return (self.folder(arm, seed) / "training.done.json").exists()
+
+
+def steps(study, names, seeds):
+    """What is to be done: what others start from, then the rest."""
+    starts = [study.arms["arms"][name].get("start") for name in names]
+    yield trainings(study, [name for name in dict.fromkeys(starts) if name], seeds)
+    yield trainings(study, names, seeds)
 
 
 def trainings(study, names, seeds):
@@ -116,6 +127,7 @@ def describe(study, arm, seed):
         "classes": study.classes(arm),
         "images": options.get("images", settings["images"]),
         "seed": seed,
+        "start": str(study.weights(options["start"], seed)) if "start" in options else "",
         "threads": 1,
         "mix": options.get("mix", "concatenate"),
         "real": [path for room in study.rooms for path in reality.pictures(study.world, room, "real", share)],

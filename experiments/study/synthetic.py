@@ -2,7 +2,7 @@
 
 import json
 
-from . import files, naive, reality
+from . import distractors, files, naive, reality
 
 
 def pictures(study, name):
@@ -10,7 +10,7 @@ def pictures(study, name):
     generator = described(study.arms["generators"], name)
     folder = study.cache / "synthetic" / name
     count = generator.get("pictures", study.arms["synthetic"]["pictures"])
-    assets = build_assets(study, generator.get("cut_out", {}), generator.get("thickness", False))
+    assets = build_assets(study, generator)
     backgrounds = study.backgrounds or place_photos(study, generator.get("albedo", ""))
     if generator.get("program") == "naive":
         naive.generate(assets, backgrounds, count, study.arms["synthetic"]["seed"], folder)
@@ -37,13 +37,15 @@ def place_photos(study, albedo):
     return reality.backgrounds(study.world, study.rooms, albedo, folder)
 
 
-def build_assets(study, cut_out, has_thickness):
-    name = "_".join([*cut_out.values(), *(["thickness"] if has_thickness else [])]) or "default"
+def build_assets(study, generator):
+    cut_out, has_thickness = generator.get("cut_out", {}), generator.get("thickness", False)
+    kinds = [*cut_out.values(), *(kind for kind in ("thickness", "distractors") if generator.get(kind))]
+    name = "_".join(kinds) or "default"
     folder = study.cache / "assets" / name
+    listed = study.cache / "photos" / name
+    beside = distractors.entries(listed) if generator.get("distractors") else []
     count = study.arms["reality"]["bottles"]
-    photos = study.photos or reality.photo_list(
-        study.world, count, cut_out, has_thickness, study.cache / "photos" / name
-    )
+    photos = study.photos or reality.photo_list(study.world, count, cut_out, has_thickness, beside, listed)
     study.petcomp("asset", "build", photos, "-o", folder)
     return folder
 

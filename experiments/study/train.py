@@ -69,7 +69,7 @@ def settings(training, folder, last):
         return {"resume": str(last), "model": str(last)}
     return {
         "model": training["model"],
-        "pretrained": False,
+        "pretrained": training["start"] or False,
         "data": str(data_file(training, folder)),
         "epochs": PARTS,
         "batch": training["batch"],
