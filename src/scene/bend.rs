@@ -9,11 +9,6 @@ use serde::{Deserialize, Serialize};
 
 /// Most that an outline turns between two of its points, radians.
 const OUTLINE_STEP: f64 = 0.02;
-/// Steps towards the point of a cylinder that is seen: micrometres are left at 60 degrees, after
-/// five of them nothing at 20.
-const CROSSING_STEPS: usize = 10;
-/// A step shorter than this, metres, is the last: texels are a tenth of a millimetre at the least.
-const CROSSING_TOLERANCE_M: f64 = 1e-6;
 
 /// How a card is curved: a part of a cylinder whose axis is parallel to the card.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -112,19 +107,28 @@ impl Cylinder {
     /// finite where it sees past the cylinder.
     ///
     /// # Method
-    /// By turns the height of the point that was found, and the point that the ray meets at that
-    /// height: a contraction by the slope of the ray times that of the card.
+    /// The ray meets the circle of the bend at the roots of a quadratic equation. What is seen is the
+    /// one that goes to `p` as the bend goes to nothing: the far side of a trough, the near one of a
+    /// ridge.
     pub(crate) fn seen_point(&self, eye: &Point3<f64>, p: &Point2<f64>) -> Point2<f64> {
-        let (mut arc, mut met) = (self.arc_of(p), *p);
-        for _ in 0..CROSSING_STEPS {
-            met = p + (eye.xy() - p) * (self.height(arc) / eye.z);
-            let last = arc;
-            arc = libm::asin(self.curvature * self.arc_of(&met)) / self.curvature;
-            if (arc - last).abs() < CROSSING_TOLERANCE_M {
-                break;
-            }
-        }
-        met + self.along * (arc - self.arc_of(&met))
+        let start = self.arc_of(p);
+        let step = self.arc_of(&eye.xy()) - start;
+        let square = self.curvature * (step * step + eye.z * eye.z);
+        let linear = eye.z - self.curvature * (start * step + self.mean_height * eye.z);
+        let constant = self.curvature * (start * start + self.mean_height * self.mean_height)
+            - 2.0 * self.mean_height;
+        let root = (linear * linear - square * constant).sqrt();
+        // From `p` to the eye.
+        let share = constant / (linear + root.copysign(eye.z));
+        let met = p + (eye.xy() - p) * share;
+        met + self.along * (self.arc_at(&met, share * eye.z) - self.arc_of(&met))
+    }
+
+    /// How far along the bend a place of the cylinder is.
+    fn arc_at(&self, place: &Point2<f64>, height: f64) -> f64 {
+        let sine = self.curvature * self.arc_of(place);
+        let cosine = 1.0 - self.curvature * (height + self.mean_height);
+        libm::atan2(sine, cosine) / self.curvature
     }
 }
 
@@ -228,7 +232,7 @@ mod tests {
                     // Where the ray from the eye through the point meets the plane of the flat card.
                     let on_plane = eye + (place - eye) * (eye.z / (eye.z - place.z));
                     let seen = bent.seen_point(&eye, &on_plane.xy());
-                    assert!((seen - p).norm() < 2e-6, "{deg} {axis}: {seen} {p}");
+                    assert!((seen - p).norm() < 1e-8, "{deg} {axis}: {seen} {p}");
                 }
             }
         }

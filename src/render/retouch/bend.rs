@@ -12,9 +12,6 @@ use crate::render::view::ScenePlane;
 use crate::scene::{Card, Cylinder};
 use std::f32::consts::PI;
 
-/// Texels between the points at which the cylinder is looked up. Between them its points are linear, to a
-/// twentieth of a texel where texels are millimetres and the bend is 60 degrees.
-const LOOK_UP_TEXELS: usize = 4;
 /// Places along a bend that light is computed at: over 60 degrees, 4 degrees apart, where a line
 /// between two of them is off by 6e-4 of it.
 const SHADING_NODES: usize = 17;
@@ -45,9 +42,8 @@ pub(super) fn bend(
         return flat.padded(0);
     }
     let empty = seen_area(flat, card, cylinder, eye);
-    let points = SeenPoints::new(&empty, |p| cylinder.seen_point(eye, p));
     let film = Image::from_fn(empty.film.width(), empty.film.height(), |x, y| {
-        let seen = points.at(x, y);
+        let seen = cylinder.seen_point(eye, &empty.point(x as f64 + 0.5, y as f64 + 0.5));
         let [x, y] = flat.position(&seen);
         let film = sample_bilinear(&flat.film, x, y);
         Film {
@@ -56,32 +52,6 @@ pub(super) fn bend(
         }
     });
     PaintedPlane { film, ..empty }
-}
-
-/// The points of a flat card that are seen at the texels of a plane.
-struct SeenPoints(Image<Point2<f64>>);
-
-impl SeenPoints {
-    /// `look_up` says what is seen at a point of the plane.
-    fn new(
-        plane: &PaintedPlane,
-        look_up: impl Fn(&Point2<f64>) -> Point2<f64> + Send + Sync,
-    ) -> Self {
-        let [columns, rows] = [plane.film.width(), plane.film.height()]
-            .map(|texels| texels.div_ceil(LOOK_UP_TEXELS) + 1);
-        let middle = |k: usize| (k * LOOK_UP_TEXELS) as f64 + 0.5;
-        Self(Image::from_fn(columns, rows, |i, j| {
-            look_up(&plane.point(middle(i), middle(j)))
-        }))
-    }
-
-    fn at(&self, x: usize, y: usize) -> Point2<f64> {
-        let [i, j] = [x, y].map(|k| k / LOOK_UP_TEXELS);
-        let [u, v] = [x, y].map(|k| (k % LOOK_UP_TEXELS) as f64 / LOOK_UP_TEXELS as f64);
-        let above = self.0[(i, j)].lerp(&self.0[(i + 1, j)], u);
-        let below = self.0[(i, j + 1)].lerp(&self.0[(i + 1, j + 1)], u);
-        above.lerp(&below, v)
-    }
 }
 
 /// An empty plane, its texels as large as those of another, where the eye sees a curved card.
@@ -185,29 +155,4 @@ fn ratio(light: LinearRgb, flat: LinearRgb) -> LinearRgb {
     pairs
         .map(|(light, flat)| if flat > 0.0 { light / flat } else { 1.0 })
         .into()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::scene::Bend;
-
-    #[test]
-    fn between_points_that_are_looked_up_the_cylinder_is_as_good_as_flat() {
-        let plane = PaintedPlane {
-            film: Image::new(199, 99),
-            corner: Point2::new(-0.1, 0.05),
-            texel: [0.001; 2],
-        };
-        for (deg, axis_deg) in [(60.0, 90.0), (-60.0, 20.0)] {
-            let bent = Bend { deg, axis_deg }.cylinder([0.2, 0.1]).unwrap();
-            let eye = Point3::new(0.3, -0.2, 0.3);
-            let points = SeenPoints::new(&plane, |p| bent.seen_point(&eye, p));
-            for (x, y) in (0..99).flat_map(|y| (0..199).map(move |x| (x, y))) {
-                let exact = bent.seen_point(&eye, &plane.point(x as f64 + 0.5, y as f64 + 0.5));
-                let off = (points.at(x, y) - exact).norm() / 0.001;
-                assert!(off < 0.05, "{deg} {axis_deg}: {off} texels at {x} {y}");
-            }
-        }
-    }
 }
