@@ -28,10 +28,8 @@ def write(study, rows, summary, drawn_ratios, effects, path):
     parts = [
         "<h1>Does the data teach a detector?</h1>",
         f"<p>{html.escape(description(study, rows))}</p>",
-        "<h2>Goals</h2>",
-        table(["ratio of mAP@0.5:0.95", "measured", "95 % interval", "paper", "goal"], ratio_rows(drawn_ratios)),
-        "<h2>Shares of the real pictures</h2>",
-        shares_plot(study, summary),
+        *goals(drawn_ratios),
+        *shares(study, summary),
         "<h2>Arms</h2>",
         arms_plot(summary),
         table(["arm", "seeds", "mAP@0.5:0.95", "95 % interval", "ratio", "95 % interval", "to"], arm_rows(summary)),
@@ -48,12 +46,13 @@ def write(study, rows, summary, drawn_ratios, effects, path):
 
 def description(study, rows):
     training, reality = study.arms["training"], study.arms["reality"]
-    detector = f"{training['model']} of Ultralytics from random weights"
+    detector = f"{training['model']} of Ultralytics, not pretrained"
     if training["model"] == "stand-in":
         detector = "No detector, but boxes near the true ones"
+    lengths = " or ".join(map(str, sorted({int(row["images"]) for row in rows})))
     return (
         f"{detector}, {training['image_size']} px, "
-        f"{training['images']} image iterations of batch {training['batch']}, in every arm. Tested on "
+        f"{lengths} image iterations of batch {training['batch']}. Tested on "
         f"{reality['pictures']} pictures of each of the rooms {', '.join(map(str, study.rooms))}; intervals "
         "are 95 % by bootstrap over pictures and seeds. A difference whose interval holds 0 (a ratio's: 1) is none. "
         f"The trainings took {cpu_hours(rows):.1f} CPU hours."
@@ -69,6 +68,13 @@ def table(head, rows):
     lines = ["<tr>" + "".join(f"<th>{html.escape(cell)}</th>" for cell in head) + "</tr>"]
     lines += ["<tr>" + "".join(f"<td>{html.escape(str(cell))}</td>" for cell in row) + "</tr>" for row in rows]
     return "<table>" + "\n".join(lines) + "</table>"
+
+
+def goals(ratios):
+    if not any("ratio" in ratio for ratio in ratios):
+        return []
+    head = ["ratio of mAP@0.5:0.95", "measured", "95 % interval", "paper", "goal"]
+    return ["<h2>Goals</h2>", table(head, ratio_rows(ratios))]
 
 
 def ratio_rows(ratios):
@@ -123,14 +129,19 @@ def room_mean(rows, arm, room):
     return np.mean([float(row["map50_95"]) for row in rows if (row["arm"], row["room"]) == (arm, room)])
 
 
-def shares_plot(study, summary):
+def shares(study, summary):
+    lines = by_generator(study, summary)
+    return ["<h2>Shares of the real pictures</h2>", shares_plot(study, summary, lines)] if lines else []
+
+
+def shares_plot(study, summary, lines):
     """How far each share of the real pictures gets, alone and with each generator."""
     figure, axes = pyplot.subplots(figsize=(8, 4))
-    for generator, arms in by_generator(study, summary).items():
-        shares = [study.arms["arms"][arm].get("real", 0) for arm in arms]
+    for generator, arms in lines.items():
+        of_real = [study.arms["arms"][arm].get("real", 0) for arm in arms]
         intervals = np.array([summary[arm]["interval"] for arm in arms])
-        line = axes.plot(shares, [summary[arm]["mean"] for arm in arms], "o-", label=generator or "real only")
-        axes.fill_between(shares, *intervals.T, alpha=0.15, color=line[0].get_color())
+        line = axes.plot(of_real, [summary[arm]["mean"] for arm in arms], "o-", label=generator or "real only")
+        axes.fill_between(of_real, *intervals.T, alpha=0.15, color=line[0].get_color())
     axes.set_ylim(bottom=0)
     axes.set_xlabel("share of the real pictures")
     axes.set_ylabel("mAP@0.5:0.95")
