@@ -142,13 +142,13 @@ fn record_to_review(photo: &Photo) -> Option<PhotoRecord> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{MANIFEST, PhotoRecord, Review, Verdict, contact_sheet};
+    use super::super::{MANIFEST, PhotoRecord, Review, Texture, Verdict, contact_sheet};
     use super::*;
-    use crate::diagnostic::Code;
+    use crate::diagnostic::{Code, Diagnostic};
     use crate::geom::Point2;
     use crate::image::Image;
     use crate::io;
-    use crate::matte::{Claim, Stroke};
+    use crate::matte::{Claim, MatteMethod, Stroke};
     use crate::pixel::LinearRgb;
 
     /// A red slab of 60 x 30 pixels on a green screen.
@@ -461,17 +461,57 @@ mod tests {
         assert!(built.refused[0].contains("two.png"), "{:?}", built.refused);
     }
 
-    #[test]
-    fn a_guess_on_a_grey_board_is_told_kept_and_shown() {
-        let folder = folder_with(TWO);
-        let board = slab().map(|p| {
+    /// The slab on a grey board.
+    fn on_grey_board() -> Image<LinearRgb> {
+        slab().map(|p| {
             if p.g > p.r {
                 LinearRgb::grey(0.3)
             } else {
                 LinearRgb::new(0.25, 0.2, 0.2)
             }
-        });
-        io::write(folder.path().join("two.png"), &board).unwrap();
+        })
+    }
+
+    #[test]
+    fn an_opaque_object_on_a_grey_board_is_all_within_its_outline() {
+        let list = TWO.replace("px_per_metre", "matte = \"outline\"\npx_per_metre");
+        let folder = folder_with(&list);
+        io::write(folder.path().join("two.png"), &on_grey_board()).unwrap();
+        let out = folder.path().join("out");
+        build(folder.path().join("photos.toml"), &out, &|_, _| ()).unwrap();
+        let [one, two] = &Library::open(&out).unwrap().assets[0].photos[..] else {
+            panic!("two photos")
+        };
+        let methods = [one, two].map(|photo| photo.record.matte);
+        assert_eq!(methods, [MatteMethod::Physical, MatteMethod::Outline]);
+        let is_guess = |d: &Diagnostic| d.code == Code::GreyScreen;
+        assert!(!two.record.diagnostics.iter().any(is_guess));
+        let Texture::Rgba(pyramid) = &two.texture else {
+            panic!("one alpha for all channels")
+        };
+        let (w, h) = two.texture.size();
+        let middle = pyramid.level(0)[(w / 2, h / 2)];
+        assert_eq!(middle.a, 1.0);
+        assert!((middle.r - 0.25).abs() < 0.01, "{middle:?}");
+    }
+
+    #[test]
+    fn a_matte_of_another_name_or_of_a_capture_is_refused() {
+        let refused = |line: &str| {
+            let list = TWO.replacen("length = 0.3", line, 1);
+            built(&list).unwrap_err().to_string()
+        };
+        let unknown = refused("length = 0.3\nmatte = \"opaque\"");
+        assert!(unknown.contains("outline"), "{unknown}");
+        let captured = refused("captured = { photos = [] }\nmatte = \"outline\"");
+        let expected = "photos[0].matte: \"outline\" beside captured, whose matte is measured";
+        assert!(captured.contains(expected), "{captured}");
+    }
+
+    #[test]
+    fn a_guess_on_a_grey_board_is_told_kept_and_shown() {
+        let folder = folder_with(TWO);
+        io::write(folder.path().join("two.png"), &on_grey_board()).unwrap();
         let out = folder.path().join("out");
         let built = build(folder.path().join("photos.toml"), &out, &|_, _| ()).unwrap();
         assert!(

@@ -8,6 +8,7 @@ use super::screen_source::ScreenSource;
 use super::{DEFAULT_MASS, DEFAULT_THICKNESS};
 use crate::bounds::{MASS, THICKNESS};
 use crate::error::{Error, Result};
+use crate::matte::MatteMethod;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -59,6 +60,10 @@ pub struct PhotoEntry {
     /// Default: `auto`.
     #[serde(default)]
     pub screen: ScreenSource,
+    /// How its matte is made: `physical`, `key`, or `outline` for what lets no light through. Default:
+    /// that of the list.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub matte: Option<MatteMethod>,
     /// Thickness of the body that falls, metres. Default: 0.005.
     #[serde(default = "default_thickness")]
     pub thickness: f64,
@@ -96,6 +101,7 @@ impl PhotoEntry {
             marker_size: None,
             captured: None,
             screen: ScreenSource::Auto,
+            matte: None,
             thickness: DEFAULT_THICKNESS,
             mass: DEFAULT_MASS,
         };
@@ -178,9 +184,23 @@ impl PhotoEntry {
         })?;
         self.check_class(manifest)?;
         scale.check()?;
-        self.captured.as_ref().map_or(Ok(()), CaptureEntry::check)?;
+        self.check_capture()?;
         THICKNESS.check("thickness", self.thickness)?;
         MASS.check("mass", self.mass)
+    }
+
+    /// What is measured on a display has no other matte.
+    fn check_capture(&self) -> Result<()> {
+        let Some(captured) = &self.captured else {
+            return Ok(());
+        };
+        match self.matte {
+            Some(matte) => {
+                let what = format!("\"{matte}\" beside captured, whose matte is measured");
+                Err(Error::value("matte", what))
+            }
+            None => captured.check(),
+        }
     }
 
     /// An object needs a class that the folder has; a distractor needs none.

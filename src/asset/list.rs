@@ -26,6 +26,7 @@ use std::path::{Path, PathBuf};
 /// file = "IMG_0002.jpg"
 /// asset = "ring_01"
 /// role = "distractor"         # falls and hides others, but has no class and no label
+/// matte = "outline"           # it lets no light through: all within its outline is opaque
 /// length = 0.031
 /// ```
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

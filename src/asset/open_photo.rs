@@ -59,6 +59,7 @@ impl<'a> OpenPhoto<'a> {
             rectified,
             options: CutOutOptions {
                 screen: entry.screen.color().or(options.screen),
+                method: entry.matte.or(options.method),
                 ..options.clone()
             },
         })

@@ -15,7 +15,7 @@ pub(super) struct SpreadsheetRow {
 }
 
 /// Columns that hold words, and those that hold numbers.
-const WORD_COLUMNS: [&str; 5] = ["file", "asset", "role", "class", "screen"];
+const WORD_COLUMNS: [&str; 6] = ["file", "asset", "role", "class", "screen", "matte"];
 const NUMBER_COLUMNS: [&str; 6] = [
     "px_per_metre",
     "length",

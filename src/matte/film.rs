@@ -410,7 +410,8 @@ fn grey_screen(screen: LinearRgb) -> Diagnostic {
     Diagnostic::warning(
         Code::GreyScreen,
         format_args!(
-            "the background ({r:.2}, {g:.2}, {b:.2}) is too grey to measure transmittance: that of plastic is assumed"
+            "the background ({r:.2}, {g:.2}, {b:.2}) is too grey to measure transmittance: that of plastic is assumed; \
+             an opaque object needs matte = \"outline\""
         ),
     )
 }

@@ -8,7 +8,7 @@ use crate::print;
 use crate::values::{parse_corners, parse_metres};
 use petcomp::asset::{self, Asset, Built, Library, Manifest};
 use petcomp::asset::{CaptureEntry, Photo, PhotoEntry, PhotoRecord, Role, Scale, ScreenSource};
-use petcomp::matte::CutOutOptions;
+use petcomp::matte::{CutOutOptions, MatteMethod};
 use petcomp::{Quality, io};
 use std::path::{Path, PathBuf};
 
@@ -18,7 +18,8 @@ pub(crate) enum AssetCommand {
     Build {
         /// List (TOML or CSV), or a folder with photos.toml or photos.csv: file, asset, class and
         /// length (metres, by a tape measure), px_per_metre, screen_size (0.60x0.40 in
-        /// CSV) or marker_size; role = distractor for what has no label
+        /// CSV) or marker_size; role = distractor for what has no label, matte = outline for what
+        /// lets no light through
         list: PathBuf,
         /// Asset folder
         #[arg(short, long, value_name = "FOLDER")]
@@ -76,6 +77,10 @@ pub(crate) struct AddPhotoArgs {
     /// screen
     #[arg(long, value_name = "SCREEN", default_value = "auto")]
     screen: ScreenSource,
+    /// How its matte is made: physical (light and transmittance of see-through plastic), key (as
+    /// Blender's Keying node), or outline (it lets no light through); by default physical
+    #[arg(long, value_name = "METHOD", conflicts_with = "captured")]
+    matte: Option<MatteMethod>,
     #[command(flatten)]
     scale: ScaleArgs,
     /// Corners of the screen for --screen-size, from the top left clockwise, pixels; by default
@@ -311,6 +316,7 @@ impl AddPhotoArgs {
         PhotoEntry {
             role: self.role,
             screen: self.screen.clone(),
+            matte: self.matte,
             thickness: self.thickness,
             captured: self.scale.captured.then(|| self.capture_entry()),
             ..PhotoEntry::new(photo, self.asset_name(), self.class_name(), scale)
@@ -352,8 +358,11 @@ fn numbered(classes: &[String]) -> Vec<String> {
     classes.map(|(i, class)| format!("{i} {class}")).collect()
 }
 
-/// Shows which number each class has, and how to change that.
+/// Shows which number each class has, and how to change that; distractors alone have none.
 fn show_classes(classes: &[String], how: &str, global: &GlobalArgs) {
+    if classes.is_empty() {
+        return;
+    }
     let list = numbered(classes).join(", ");
     global.print_status(format_args!("classes {list}; another order: {how}"));
 }

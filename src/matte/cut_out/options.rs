@@ -1,7 +1,7 @@
 //! How a photo becomes a cut-out.
 
 use crate::bounds::Bounds;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::matte::check::check_value;
 use crate::matte::film::FilmOptions;
 use crate::matte::key::KeyOptions;
@@ -9,6 +9,8 @@ use crate::matte::plate::PlateOptions;
 use crate::matte::segment::SegmentOptions;
 use crate::pixel::LinearRgb;
 use serde::{Deserialize, Serialize};
+use std::fmt;
+use std::str::FromStr;
 
 /// How a photo becomes a cut-out.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -72,12 +74,30 @@ pub enum MatteMethod {
     Outline,
 }
 
-impl std::fmt::Display for MatteMethod {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            Self::Physical => "physical",
-            Self::Key => "key",
-            Self::Outline => "outline",
+impl MatteMethod {
+    /// All of them with their names.
+    const ALL: [(&'static str, Self); 3] = [
+        ("physical", Self::Physical),
+        ("key", Self::Key),
+        ("outline", Self::Outline),
+    ];
+}
+
+impl fmt::Display for MatteMethod {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut named = Self::ALL.iter().filter(|(_, method)| method == self);
+        f.write_str(named.next().map_or("", |(name, _)| name))
+    }
+}
+
+impl FromStr for MatteMethod {
+    type Err = Error;
+
+    fn from_str(name: &str) -> Result<Self> {
+        let known = Self::ALL.iter().find(|(known, _)| *known == name);
+        known.map(|&(_, method)| method).ok_or_else(|| {
+            let what = format!("\"{name}\", expected physical, key or outline");
+            Error::value("matte", what)
         })
     }
 }
