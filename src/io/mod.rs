@@ -71,6 +71,7 @@ mod decode;
 mod document;
 #[doc(hidden)]
 pub mod exr;
+mod foreign;
 mod format;
 mod fs;
 #[cfg(feature = "fuzzing")]

@@ -1,5 +1,6 @@
 //! Picture files as they are opened: by their first bytes, not by their names.
 
+use super::foreign;
 use super::format::Format;
 use super::fs::{open_regular, read_to_end, reason};
 use super::limits::Limits;
@@ -65,6 +66,9 @@ fn recognized(path: &Path, start: &[u8]) -> std::result::Result<Format, String> 
     if start.is_empty() {
         return Err("empty file (0 bytes), expected a picture".into());
     }
+    if let Some((name, advice)) = foreign::recognized(start) {
+        return Err(format!("is {name}, {EXPECTED_FORMATS}: {advice}"));
+    }
     match Format::from_bytes(start) {
         Some(format) if is_misnamed_scan(path, format) => {
             let name = format.name();
@@ -104,6 +108,26 @@ fn is_text(c: char) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_known_and_not_read_comes_with_advice() {
+        let told = |start: &[u8]| recognized(Path::new("a.jpg"), start).unwrap_err();
+        let heic = told(b"\0\0\0\x1cftypheic\0\0\0\0");
+        assert_eq!(
+            heic,
+            "is HEIC, expected EXR, PNG, JPEG, TIFF or HDR: convert it to PNG first \
+             (`heif-convert IN.heic OUT.png`), or set the phone to JPEG"
+        );
+        assert!(told(b"RIFF\x10\0\0\0WEBPVP8 ").starts_with("is WebP, expected EXR"));
+        // By its first bytes a TIFF.
+        let raw = told(b"II*\0\x10\0\0\0CR\x02\0");
+        assert!(
+            raw.ends_with("HDR: develop it to a 16-bit TIFF first"),
+            "{raw}"
+        );
+        let tiff = recognized(Path::new("a.jpg"), b"II*\0\x08\0\0\0");
+        assert_eq!(tiff, Ok(Format::Tiff));
+    }
 
     #[test]
     fn the_start_prints_on_one_line() {

@@ -5,6 +5,7 @@
 use super::codes::{CodedImage, Codes};
 use super::raster::{Raster, Samples, default_names};
 use super::refusal::Refusal;
+use crate::io::foreign::{DEVELOP, RAW};
 use crate::io::format::Format;
 use crate::io::header::{Header, lines_of_notes, notes_of_lines};
 use crate::io::limits::{Demand, Limits};
@@ -26,6 +27,11 @@ const LOWEST_BIT_FIRST: u16 = 2;
 const LZW_COMPRESSION: u16 = 5;
 /// TIFF 6.0, `PhotometricInterpretation`: codes are indices into a palette.
 const PALETTE_COLOR: u16 = 3;
+/// TIFF 6.0, `NewSubfileType`: a smaller version of another picture. Nikon's and Sony's raw files
+/// begin with one.
+const REDUCED_RESOLUTION: u32 = 1;
+/// DNG 1.7, the tag that makes a TIFF a DNG.
+const DNG_VERSION: u16 = 50_706;
 
 impl From<TiffError> for Refusal {
     fn from(e: TiffError) -> Self {
@@ -133,10 +139,19 @@ fn first_picture<R: Read + Seek>(mut file: R) -> Result<Decoder<R>, Refusal> {
         return Err(unsupported(&"tiles under the tags of strips"));
     }
     let mut decoder = Decoder::new(file)?;
+    if tags.contains(&DNG_VERSION) || is_reduced(&mut decoder)? {
+        return Err(format!("is {RAW}, of which the first picture is no photo: {DEVELOP}").into());
+    }
     if decoder.find_tag_unsigned(Tag::FillOrder)? == Some(LOWEST_BIT_FIRST) {
         return Err(unsupported(&"pixels from the lowest bit up"));
     }
     Ok(decoder)
+}
+
+/// The picture is a small one of another in the same file.
+fn is_reduced(decoder: &mut Decoder<impl Read + Seek>) -> Result<bool, TiffError> {
+    let kind = decoder.find_tag_unsigned::<u32>(Tag::NewSubfileType)?;
+    Ok(kind.is_some_and(|kind| kind & REDUCED_RESOLUTION != 0))
 }
 
 /// The numbers of the first directory's tags, of a file of either byte order, classic or BigTIFF.
@@ -549,6 +564,31 @@ mod tests {
         };
         assert!((half(DecodingResult::I8(vec![64])) - 64.0 / 127.0).abs() < 1e-4);
         assert!((half(DecodingResult::I16(vec![12_345])) - 12_345.0 / 32_767.0).abs() < 2e-5);
+    }
+
+    /// A TIFF of 2 x 2 pixels with a tag.
+    fn with_tag(tag: Tag, value: impl TiffValue) -> Vec<u8> {
+        let mut file = Cursor::new(Vec::new());
+        let mut encoder = TiffEncoder::new(&mut file).unwrap();
+        let mut image = encoder.new_image::<Gray8>(2, 2).unwrap();
+        image.encoder().write_tag(tag, value).unwrap();
+        image.write_data(&[7; 4]).unwrap();
+        file.into_inner()
+    }
+
+    #[test]
+    fn raw_files_are_not_read_by_the_small_picture_in_front() {
+        let decoded = |file: Vec<u8>| decode(&file, &Limits::default());
+        let whole = decoded(with_tag(Tag::NewSubfileType, 0_u32)).unwrap();
+        assert_eq!((whole.width, whole.height), (2, 2));
+        let dng = Tag::from_u16_exhaustive(DNG_VERSION);
+        for raw in [
+            with_tag(Tag::NewSubfileType, REDUCED_RESOLUTION),
+            with_tag(dng, &[1_u8, 4, 0, 0][..]),
+        ] {
+            let told = decoded(raw).err().unwrap().to_string();
+            assert!(told.starts_with("is a camera's raw file"), "{told}");
+        }
     }
 
     /// A picture of 5 x 3 whose tiles of 4 x 2 reach over its border, by planes or not.
