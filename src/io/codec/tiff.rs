@@ -139,7 +139,7 @@ fn first_picture<R: Read + Seek>(mut file: R) -> Result<Decoder<R>, Refusal> {
         return Err(unsupported(&"tiles under the tags of strips"));
     }
     let mut decoder = Decoder::new(file)?;
-    if tags.contains(&DNG_VERSION) || is_reduced(&mut decoder)? {
+    if tags.contains(&DNG_VERSION) || is_reduced(&mut decoder) {
         return Err(format!("is {RAW}, of which the first picture is no photo: {DEVELOP}").into());
     }
     if decoder.find_tag_unsigned(Tag::FillOrder)? == Some(LOWEST_BIT_FIRST) {
@@ -148,10 +148,10 @@ fn first_picture<R: Read + Seek>(mut file: R) -> Result<Decoder<R>, Refusal> {
     Ok(decoder)
 }
 
-/// The picture is a small one of another in the same file.
-fn is_reduced(decoder: &mut Decoder<impl Read + Seek>) -> Result<bool, TiffError> {
-    let kind = decoder.find_tag_unsigned::<u32>(Tag::NewSubfileType)?;
-    Ok(kind.is_some_and(|kind| kind & REDUCED_RESOLUTION != 0))
+/// The picture is a small one of another in the same file; not where that tag cannot be read.
+fn is_reduced(decoder: &mut Decoder<impl Read + Seek>) -> bool {
+    let kind = decoder.find_tag_unsigned::<u32>(Tag::NewSubfileType);
+    kind.is_ok_and(|kind| kind.is_some_and(|kind| kind & REDUCED_RESOLUTION != 0))
 }
 
 /// The numbers of the first directory's tags, of a file of either byte order, classic or BigTIFF.
