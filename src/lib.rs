@@ -73,6 +73,7 @@ pub mod label;
 #[cfg(feature = "pipeline")]
 pub mod light;
 pub mod matte;
+mod names;
 mod pixel;
 #[cfg(feature = "pipeline")]
 #[doc(hidden)]

@@ -1,6 +1,7 @@
 //! What an asset is in pictures for.
 
 use crate::error::Error;
+use crate::names::{by_name, name_of};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
@@ -29,8 +30,7 @@ impl Role {
 
 impl fmt::Display for Role {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut named = Self::ALL.iter().filter(|(_, role)| role == self);
-        f.write_str(named.next().map_or("", |(name, _)| name))
+        f.write_str(name_of(&Self::ALL, self))
     }
 }
 
@@ -38,8 +38,7 @@ impl FromStr for Role {
     type Err = Error;
 
     fn from_str(name: &str) -> Result<Self, Error> {
-        let known = Self::ALL.iter().find(|(known, _)| *known == name);
-        known.map(|&(_, role)| role).ok_or_else(|| {
+        by_name(&Self::ALL, name).ok_or_else(|| {
             let what = format!("\"{name}\", expected object or distractor");
             Error::value("role", what)
         })

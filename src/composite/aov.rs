@@ -10,6 +10,7 @@ use crate::error::{Error, Result};
 use crate::geom::{Point2, Point3};
 use crate::image::Image;
 use crate::io::exr::{ChannelSamples, Part};
+use crate::names::by_name;
 use crate::pixel::{LinearRgb, ObjectId, PremulRgba};
 use crate::scene::Shot;
 use std::str::FromStr;
@@ -63,8 +64,7 @@ impl FromStr for Aov {
     type Err = Error;
 
     fn from_str(name: &str) -> Result<Self> {
-        let known = Self::ALL.iter().find(|(n, _)| *n == name);
-        known.map(|&(_, aov)| aov).ok_or_else(|| unknown_aov(name))
+        by_name(&Self::ALL, name).ok_or_else(|| unknown_aov(name))
     }
 }
 

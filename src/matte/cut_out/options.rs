@@ -7,6 +7,7 @@ use crate::matte::film::FilmOptions;
 use crate::matte::key::KeyOptions;
 use crate::matte::plate::PlateOptions;
 use crate::matte::segment::SegmentOptions;
+use crate::names::{by_name, name_of};
 use crate::pixel::LinearRgb;
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -85,8 +86,7 @@ impl MatteMethod {
 
 impl fmt::Display for MatteMethod {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut named = Self::ALL.iter().filter(|(_, method)| method == self);
-        f.write_str(named.next().map_or("", |(name, _)| name))
+        f.write_str(name_of(&Self::ALL, self))
     }
 }
 
@@ -94,8 +94,7 @@ impl FromStr for MatteMethod {
     type Err = Error;
 
     fn from_str(name: &str) -> Result<Self> {
-        let known = Self::ALL.iter().find(|(known, _)| *known == name);
-        known.map(|&(_, method)| method).ok_or_else(|| {
+        by_name(&Self::ALL, name).ok_or_else(|| {
             let what = format!("\"{name}\", expected physical, key or outline");
             Error::value("matte", what)
         })

@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::matte::check::check_value;
+use crate::names::by_name;
 use serde::{Deserialize, Serialize};
 
 /// Which keyer to be: one of the three that Blender has shipped, or the careful one.
@@ -38,9 +39,7 @@ impl std::str::FromStr for Profile {
 
     fn from_str(name: &str) -> Result<Self> {
         let names = Self::ALL.map(|(n, _)| n).join(", ");
-        let found = Self::ALL.iter().find(|(n, _)| *n == name);
-        found
-            .map(|&(_, p)| p)
+        by_name(&Self::ALL, name)
             .ok_or_else(|| Error::value("profile", format!("\"{name}\", expected one of {names}")))
     }
 }
