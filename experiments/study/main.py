@@ -29,6 +29,8 @@ def full(options, cache, program):
     if options.screening:
         arms["reality"] |= screening.chosen(arms, options.screening).get("reality", {})
     arms["reality"]["rooms"] = options.rooms or arms["reality"]["rooms"]
+    if options.test_pictures:
+        arms["reality"]["test_pictures"] = options.test_pictures
     name = options.name or "rooms_" + "_".join(map(str, arms["reality"]["rooms"]))
     return studies.Study(arms, cache / name, cache / "world", program)
 

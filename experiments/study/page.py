@@ -45,7 +45,7 @@ def write(study, rows, summary, drawn_ratios, effects, path):
 
 
 def description(study, rows):
-    training, reality = study.arms["training"], study.arms["reality"]
+    training = study.arms["training"]
     detector = f"{training['model']} of Ultralytics, not pretrained"
     if training["model"] == "stand-in":
         detector = "No detector, but boxes near the true ones"
@@ -53,7 +53,7 @@ def description(study, rows):
     return (
         f"{detector}, {training['image_size']} px, "
         f"{lengths} image iterations of batch {training['batch']}. Tested on "
-        f"{reality['pictures']} pictures of each of the rooms {', '.join(map(str, study.rooms))}; intervals "
+        f"{study.test_pictures} pictures of each of the rooms {', '.join(map(str, study.rooms))}; intervals "
         "are 95 % by bootstrap over pictures and seeds. A difference whose interval holds 0 (a ratio's: 1) is none. "
         f"The trainings took {cpu_hours(rows):.1f} CPU hours."
     )

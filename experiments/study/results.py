@@ -32,7 +32,7 @@ def scored(study, arms, seeds, folder):
 
 def room_row(study, arm, seed, room, of_rooms):
     folder, classes = study.folder(arm, seed), study.classes(arm)
-    count = study.arms["reality"]["pictures"]
+    count = study.test_pictures
     truth = reality.truth(study.world, room, count, classes, study.cache / f"truth/{room}_{classes}")
     found = score.score(
         study, folder / "predictions" / str(room), truth, reality.SIZE, classes, folder / f"eval/{room}"

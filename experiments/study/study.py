@@ -38,6 +38,11 @@ class Study:
     def rooms(self):
         return self.arms["reality"]["rooms"]
 
+    @property
+    def test_pictures(self):
+        """Of each room."""
+        return self.arms["reality"].get("test_pictures", self.arms["reality"]["pictures"])
+
     def petcomp(self, *words):
         done = subprocess.run([self.program, "-q", *map(str, words)], capture_output=True, text=True)
         if done.returncode != 0:
@@ -119,8 +124,7 @@ def describe(study, arm, seed):
     """All that a training depends on."""
     options = study.arms["arms"][arm]
     settings = {key: value for key, value in study.training(arm).items() if key != "seeds"}
-    count = study.arms["reality"]["pictures"]
-    share = round(options.get("real", 0) * count)
+    share = round(options.get("real", 0) * study.arms["reality"]["pictures"])
     generator = options.get("synthetic")
     pictures, made_by = study.synthetic(generator) if generator else ([], study.version())
     return settings | made_by | {
@@ -132,7 +136,7 @@ def describe(study, arm, seed):
         "mix": options.get("mix", "concatenate"),
         "real": [path for room in study.rooms for path in reality.pictures(study.world, room, "real", share)],
         "synthetic": pictures,
-        "test": {str(room): reality.pictures(study.world, room, "test", count) for room in study.rooms},
+        "test": {str(room): reality.pictures(study.world, room, "test", study.test_pictures) for room in study.rooms},
     }
 
 
