@@ -11,7 +11,9 @@
 
 CARGO     := cargo
 SUDO      := $(shell [ "$$(id -u)" = 0 ] || echo sudo)
-BUILD     := g++ pkg-config libopenimageio-dev
+# Of HEIC the decoder itself, which is a package of its own from Debian 13 on.
+DE265     := $(shell . /etc/os-release; [ "$$VERSION_ID" -ge 13 ] 2>/dev/null && echo libheif-plugin-libde265)
+BUILD     := g++ pkg-config libopenimageio-dev libheif-dev $(DE265)
 # What the pages of `petcomp studio` are tested in.
 BROWSER   := chromium fonts-dejavu-core
 BLENDER   := blender python3-numpy python3-venv

@@ -1,5 +1,7 @@
 #include "petcomp/cpp/oiio_shim.h"
 
+#include "petcomp/cpp/heif_shim.h"
+
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 #include <stdexcept>
@@ -68,13 +70,23 @@ bool row_by_row(const ImageInput &input, const ImageSpec &spec) {
     return std::string(input.format_name()) == "tiff" && spec.tile_width == 0 && !planes;
 }
 
+class OiioReader : public Reader {
+  public:
+    OiioReader(std::unique_ptr<IOMemReader> bytes, std::unique_ptr<ImageInput> input)
+        : bytes_(std::move(bytes)), input_(std::move(input)) {}
+    Layout layout() const override;
+    void read(const Layout &layout, rust::Slice<uint8_t> samples) const override;
+
+  private:
+    // In this order: the input is closed first.
+    std::unique_ptr<IOMemReader> bytes_;
+    std::unique_ptr<ImageInput> input_;
+};
+
 } // namespace
 
-Reader::Reader(std::unique_ptr<IOMemReader> bytes, std::unique_ptr<ImageInput> input)
-    : bytes_(std::move(bytes)), input_(std::move(input)) {}
-Reader::~Reader() = default;
-
 void start() {
+    start_heif();
     OIIO::attribute("threads", 1);
     OIIO::attribute("exr_threads", -1);
     OIIO::attribute("try_all_readers", 0);
@@ -86,6 +98,8 @@ void start() {
 rust::String version() { return rust::String(OIIO_VERSION_STRING); }
 
 std::unique_ptr<Reader> open(rust::Str path, rust::Str format, rust::Slice<const uint8_t> bytes) {
+    if (std::string(format) == "heif")
+        return open_heif(bytes);
     auto input = ImageInput::create(std::string(format));
     if (!input)
         fail(OIIO::geterror(), "no reader for this format");
@@ -100,13 +114,13 @@ std::unique_ptr<Reader> open(rust::Str path, rust::Str format, rust::Slice<const
     ImageSpec spec;
     if (!input->open(std::string(path), spec, config))
         fail(input->geterror(), "cannot be opened");
-    return std::make_unique<Reader>(std::move(memory), std::move(input));
+    return std::make_unique<OiioReader>(std::move(memory), std::move(input));
 }
 
-Layout layout(const Reader &reader) {
-    const ImageSpec spec = reader.input().spec(0, 0);
+Layout OiioReader::layout() const {
+    const ImageSpec spec = input_->spec(0, 0);
     if (spec.format == TypeDesc::UNKNOWN)
-        fail(reader.input().geterror(), "no picture in it");
+        fail(input_->geterror(), "no picture in it");
     if (spec.deep || spec.depth > 1 || spec.full_depth > 1)
         throw std::runtime_error("deep or volume data, expected flat pixels");
     Layout out;
@@ -124,8 +138,8 @@ Layout layout(const Reader &reader) {
     return out;
 }
 
-void read(const Reader &reader, rust::Slice<uint8_t> samples) {
-    ImageInput &input = reader.input();
+void OiioReader::read(const Layout &, rust::Slice<uint8_t> samples) const {
+    ImageInput &input = *input_;
     const ImageSpec spec = input.spec(0, 0);
     const TypeDesc type = handed_over(spec);
     if (samples.size() != bytes_of(spec, type))
@@ -169,6 +183,10 @@ void write(rust::Str path, rust::Str format, const Layout &layout, rust::Slice<c
     if (!output->open(std::string(path), spec) || !output->write_image(type, samples.data()) || !output->close())
         fail(output->geterror(), "cannot be written");
 }
+
+Layout layout(const Reader &reader) { return reader.layout(); }
+
+void read(const Reader &reader, const Layout &layout, rust::Slice<uint8_t> samples) { reader.read(layout, samples); }
 
 void throw_an_int() { throw 1; }
 

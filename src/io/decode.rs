@@ -41,12 +41,12 @@ fn decode_here(
         Format::Jpeg => jpeg::decode(&source.bytes, limits),
         Format::Tiff => tiff::decode(&source.bytes, limits),
         Format::Hdr => hdr::decode(&source.bytes, limits),
-        other => Err(needs_openimageio(other)),
+        other => Err(needs_library(other)),
     }
 }
 
-fn needs_openimageio(format: Format) -> Refusal {
-    Refusal::Unsupported(format!("{} needs OpenImageIO", format.name()))
+fn needs_library(format: Format) -> Refusal {
+    Refusal::Unsupported(format!("{} needs {}", format.name(), format.library()))
 }
 
 /// The last defence: a decoder that panics has met a damaged file.
@@ -67,7 +67,7 @@ pub(super) fn read_file_header<R: BufRead + Seek>(
         Format::Png => png::header(&mut *file, bytes, limits)?,
         Format::Tiff => tiff::header(&mut *file, bytes, limits)?,
         Format::Jpeg => return read_jpeg_header(file, bytes, limits),
-        other => return Err(needs_openimageio(other)),
+        other => return Err(needs_library(other)),
     };
     Ok((header, notes_of_file(file, format)))
 }
@@ -95,6 +95,8 @@ fn read_jpeg_header(
 pub(super) fn camera_notes(source: &SourceFile) -> CameraNotes {
     match source.format {
         Format::Jpeg | Format::Tiff | Format::Png => exif_notes(&source.bytes),
+        // libheif turns the picture by the file's own word for it.
+        Format::Heif => exif_notes(&source.bytes).upright(),
         _ => CameraNotes::default(),
     }
 }

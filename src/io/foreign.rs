@@ -1,17 +1,16 @@
 //! Kinds of picture file that are known and not read: what they are, and what to do with them.
 
+use super::format::begins_at;
+
 /// How the compressed pictures of phones and of the web become one that is read.
 const CONVERT: &str = "convert it to PNG first";
 /// The same of what a camera has not developed.
 pub(super) const DEVELOP: &str = "develop it to a 16-bit TIFF first";
 
 /// First bytes of each kind from a place on; its name, and what to do.
-const KINDS: [(usize, &[u8], &str, &str); 21] = [
-    (4, b"ftypheic", HEIC, CONVERT_HEIC),
-    (4, b"ftypheix", HEIC, CONVERT_HEIC),
-    (4, b"ftyphevc", HEIC, CONVERT_HEIC),
-    (4, b"ftypmif1", HEIC, CONVERT_HEIC),
-    (4, b"ftypmsf1", HEIC, CONVERT_HEIC),
+const KINDS: [(usize, &[u8], &str, &str); 18] = [
+    (4, b"ftyphevc", SEQUENCE, CONVERT),
+    (4, b"ftypmsf1", SEQUENCE, CONVERT),
     (4, b"ftypavif", "AVIF", CONVERT),
     (4, b"ftypavis", "AVIF", CONVERT),
     (8, b"WEBP", "WebP", CONVERT),
@@ -30,18 +29,13 @@ const KINDS: [(usize, &[u8], &str, &str); 21] = [
     (0, b"FOVb", RAW, DEVELOP),
 ];
 
-const HEIC: &str = "HEIC";
-const CONVERT_HEIC: &str =
-    "convert it to PNG first (`heif-convert IN.heic OUT.png`), or set the phone to JPEG";
+const SEQUENCE: &str = "a sequence of HEIC pictures";
 pub(super) const RAW: &str = "a camera's raw file";
 
 /// Name and advice of a file of such a kind.
 pub(super) fn recognized(start: &[u8]) -> Option<(&'static str, &'static str)> {
-    let is_kind = |(at, magic, ..): &&(usize, &[u8], _, _)| {
-        start.get(*at..).is_some_and(|rest| rest.starts_with(magic))
-    };
     KINDS
         .iter()
-        .find(is_kind)
+        .find(|&&(at, magic, ..)| begins_at(start, at, magic))
         .map(|&(_, _, name, advice)| (name, advice))
 }

@@ -15,27 +15,33 @@ pub enum Format {
     Tiff,
     /// Radiance RGBE (`.hdr`): scene-linear.
     Hdr,
+    /// HEIF, which phones write as HEIC: 8 to 16 bits, display-encoded; through libheif, reading
+    /// only.
+    Heif,
     /// DPX film scans; through OpenImageIO only, reading only.
     Dpx,
     /// Cineon film scans; through OpenImageIO only, reading only.
     Cineon,
 }
 
-/// First bytes of each kind.
-const MAGIC: [(&[u8], Format); 13] = [
-    (b"\x76\x2f\x31\x01", Format::Exr),
-    (b"\x89PNG\r\n\x1a\n", Format::Png),
-    (b"\xff\xd8\xff", Format::Jpeg),
-    (b"II*\0", Format::Tiff),
-    (b"MM\0*", Format::Tiff),
-    (b"II+\0", Format::Tiff),
-    (b"MM\0+", Format::Tiff),
-    (b"#?RADIANCE", Format::Hdr),
-    (b"#?RGBE", Format::Hdr),
-    (b"SDPX", Format::Dpx),
-    (b"XPDS", Format::Dpx),
-    (b"\x80\x2a\x5f\xd7", Format::Cineon),
-    (b"\xd7\x5f\x2a\x80", Format::Cineon),
+/// First bytes of each kind, from a place on.
+const MAGIC: [(usize, &[u8], Format); 16] = [
+    (0, b"\x76\x2f\x31\x01", Format::Exr),
+    (0, b"\x89PNG\r\n\x1a\n", Format::Png),
+    (0, b"\xff\xd8\xff", Format::Jpeg),
+    (0, b"II*\0", Format::Tiff),
+    (0, b"MM\0*", Format::Tiff),
+    (0, b"II+\0", Format::Tiff),
+    (0, b"MM\0+", Format::Tiff),
+    (0, b"#?RADIANCE", Format::Hdr),
+    (0, b"#?RGBE", Format::Hdr),
+    (0, b"SDPX", Format::Dpx),
+    (0, b"XPDS", Format::Dpx),
+    (0, b"\x80\x2a\x5f\xd7", Format::Cineon),
+    (0, b"\xd7\x5f\x2a\x80", Format::Cineon),
+    (4, b"ftypheic", Format::Heif),
+    (4, b"ftypheix", Format::Heif),
+    (4, b"ftypmif1", Format::Heif),
 ];
 
 impl Format {
@@ -43,8 +49,8 @@ impl Format {
     pub(super) fn from_bytes(bytes: &[u8]) -> Option<Self> {
         MAGIC
             .iter()
-            .find(|(magic, _)| bytes.starts_with(magic))
-            .map(|&(_, format)| format)
+            .find(|&&(at, magic, _)| begins_at(bytes, at, magic))
+            .map(|&(.., format)| format)
     }
 
     /// The kind that an extension promises, in any case; what a new file is written as.
@@ -57,11 +63,12 @@ impl Format {
             "hdr" | "pic" => Some(Self::Hdr),
             "dpx" => Some(Self::Dpx),
             "cin" => Some(Self::Cineon),
+            "heic" | "heif" | "hif" => Some(Self::Heif),
             _ => None,
         }
     }
 
-    /// Its name, as OpenImageIO spells its reader.
+    /// Its name, as OpenImageIO spells the reader that it has for it.
     pub fn name(self) -> &'static str {
         match self {
             Self::Exr => "openexr",
@@ -71,6 +78,15 @@ impl Format {
             Self::Hdr => "hdr",
             Self::Dpx => "dpx",
             Self::Cineon => "cineon",
+            Self::Heif => "heif",
+        }
+    }
+
+    /// The library that decodes what our decoders do not.
+    pub(super) fn library(self) -> &'static str {
+        match self {
+            Self::Heif => "libheif",
+            _ => "OpenImageIO",
         }
     }
 
@@ -79,9 +95,14 @@ impl Format {
     pub(super) fn from_name(name: &str) -> Option<Self> {
         MAGIC
             .iter()
-            .map(|&(_, format)| format)
+            .map(|&(.., format)| format)
             .find(|f| f.name() == name)
     }
+}
+
+/// Some bytes of a file stand at a place.
+pub(super) fn begins_at(file: &[u8], at: usize, bytes: &[u8]) -> bool {
+    file.get(at..).is_some_and(|rest| rest.starts_with(bytes))
 }
 
 #[cfg(test)]
@@ -93,6 +114,10 @@ mod tests {
         assert_eq!(
             Format::from_bytes(b"\x89PNG\r\n\x1a\n...."),
             Some(Format::Png)
+        );
+        assert_eq!(
+            Format::from_bytes(b"\0\0\0\x1cftypheic\0\0\0\0"),
+            Some(Format::Heif)
         );
         assert_eq!(Format::from_bytes(b"hello"), None);
         assert_eq!(

@@ -16,7 +16,7 @@
 //!
 //! | samples of the file | colour becomes | alpha | [`Coverage`](crate::Coverage) |
 //! | --- | --- | --- | --- |
-//! | integers (PNG, JPEG, TIFF) | decoded with the exact sRGB curve, unless a PNG states gamma 1 | straight unless a TIFF states otherwise | code / full scale, never decoded |
+//! | integers (PNG, JPEG, HEIC, TIFF) | decoded with the exact sRGB curve, unless a PNG states gamma 1 | straight unless a TIFF states otherwise | code / full scale, never decoded |
 //! | half and float (EXR, TIFF, HDR) | treated as scene-linear Rec. 709 | EXR premultiplied, TIFF as it states | as it is |
 //!
 //! Premultiplication happens here, in linear light. The orientation noted by a camera is applied.
@@ -32,16 +32,16 @@
 //! No file crashes petcomp, hangs it, exhausts the machine's memory or leads out of its folder;
 //! what can be read is read correctly, what cannot is named in one line.
 //!
-//! * **What is opened.** Regular files only, by content and not by name: EXR, PNG, JPEG, TIFF,
-//!   Radiance HDR; DPX and Cineon only under their own names.
+//! * **What is opened.** Regular files only, by content and not by name: EXR, PNG, JPEG, HEIC,
+//!   TIFF, Radiance HDR; DPX and Cineon only under their own names.
 //! * **What a file may ask for** is in [`Limits`], and checked before pixels are touched, in
 //!   arithmetic that cannot wrap: by default 32,768 pixels along a side, 128 Mi in all, 64
 //!   channels, 1 GiB decoded, 10,000 times the file above 64 MiB, 64 MiB that is not pixels. Memory
 //!   that the system does not give is not attempted.
 //! * **Who decodes.** Decoders in Rust, in this process; one that panics has met a damaged file.
-//!   What they do not know goes to OpenImageIO in a worker process, which gets the file's bytes and
-//!   gives samples through pipes. It may open no file (Landlock, seccomp, file size 0), start
-//!   nothing, connect nowhere, has memory for the current file only, and is killed when it takes
+//!   What they do not know goes to OpenImageIO, HEIC to libheif, in a worker process, which gets the
+//!   file's bytes and gives samples through pipes. It may open no file (Landlock, seccomp, file size
+//!   0), start nothing but threads, connect nowhere, has memory for the current file only, and is killed when it takes
 //!   more than [`Limits::seconds`]. A file on which two workers die is named with the signal. The
 //!   worker is not trusted either.
 //! * **What is written** goes to a temporary file beside its place, is synced, and moved there:

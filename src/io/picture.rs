@@ -4,7 +4,7 @@ use super::codec::channels::{ChannelMatch, Wanted};
 use super::codec::profile::{ColorDescription, DisplayProfile};
 use super::codec::raster::Raster;
 use super::codec::refusal::Refusal;
-use super::codec::{FromFile, jpeg, png, tiff};
+use super::codec::{FromFile, heif, jpeg, png, tiff};
 use super::decode::{camera_notes, catch_panic, decode_raster};
 use super::format::Format;
 use super::limits::{Limits, affordable, saturating_product};
@@ -143,6 +143,7 @@ fn embedded_profile(
         Format::Png => png::color_description(&source.bytes, limits),
         Format::Jpeg => jpeg::profile(&source.bytes).map(ColorDescription::Icc),
         Format::Tiff => tiff::profile(&source.bytes, limits).map(ColorDescription::Icc),
+        Format::Heif => heif::color_description(&source.bytes),
         _ => None,
     };
     description.map_or(Ok(None), DisplayProfile::from_description)

@@ -58,7 +58,7 @@ impl SourceFile {
 }
 
 /// The kinds of file that messages name.
-const EXPECTED_FORMATS: &str = "expected EXR, PNG, JPEG, TIFF or HDR";
+const EXPECTED_FORMATS: &str = "expected EXR, PNG, JPEG, HEIC, TIFF or HDR";
 
 /// The kind of a file by its first bytes. Film scans are read only under a name of their own:
 /// OpenImageIO has to read them, and what is called otherwise was not meant to be one.
@@ -112,11 +112,10 @@ mod tests {
     #[test]
     fn what_is_known_and_not_read_comes_with_advice() {
         let told = |start: &[u8]| recognized(Path::new("a.jpg"), start).unwrap_err();
-        let heic = told(b"\0\0\0\x1cftypheic\0\0\0\0");
+        let avif = told(b"\0\0\0\x1cftypavif\0\0\0\0");
         assert_eq!(
-            heic,
-            "is HEIC, expected EXR, PNG, JPEG, TIFF or HDR: convert it to PNG first \
-             (`heif-convert IN.heic OUT.png`), or set the phone to JPEG"
+            avif,
+            "is AVIF, expected EXR, PNG, JPEG, HEIC, TIFF or HDR: convert it to PNG first"
         );
         assert!(told(b"RIFF\x10\0\0\0WEBPVP8 ").starts_with("is WebP, expected EXR"));
         // By its first bytes a TIFF.

@@ -16,8 +16,8 @@ use std::path::Path;
 use std::sync::Arc;
 
 /// Extensions of what may be a photo.
-const EXTENSIONS: [&str; 9] = [
-    "jpg", "jpeg", "png", "tif", "tiff", "exr", "hdr", "webp", "heic",
+const EXTENSIONS: [&str; 11] = [
+    "jpg", "jpeg", "png", "tif", "tiff", "exr", "hdr", "webp", "heic", "heif", "hif",
 ];
 const JPEG_QUALITY: u8 = 88;
 /// The largest file that a browser gets as it is.

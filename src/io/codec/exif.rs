@@ -36,11 +36,19 @@ impl Default for CameraNotes {
 }
 
 impl CameraNotes {
-    /// The notes in a JPEG, TIFF or PNG file. A photo without notes, or with damaged ones, is as
+    /// The notes in a JPEG, TIFF, PNG or HEIF file. A photo without notes, or with damaged ones, is as
     /// good as another.
     pub(crate) fn read(mut file: impl BufRead + Seek) -> Self {
         let exif = read_exif(&mut file);
         exif.map_or_else(Self::default, |exif| Self::from_exif(&exif))
+    }
+
+    /// The same of a picture that stands upright already.
+    pub(crate) fn upright(self) -> Self {
+        Self {
+            orientation: Orientation(1),
+            ..self
+        }
     }
 
     /// A TIFF declares that its colours are multiplied by alpha (TIFF 6.0, `ExtraSamples` = 1).

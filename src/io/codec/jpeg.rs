@@ -9,7 +9,7 @@ use crate::io::limits::{Demand, Limits, at_most};
 use crate::pixel::Srgb8;
 use image::codecs::jpeg::JpegDecoder;
 use image::{ImageDecoder, ImageError};
-use jpeg_encoder::{ColorType, Encoder, SamplingFactor};
+use jpeg_encoder::{ChromaSubsamplingMethod, ColorType, Encoder, SamplingFactor};
 use serde::{Deserialize, Serialize};
 use std::io::{Cursor, Read};
 
@@ -252,6 +252,8 @@ pub(crate) fn encode(
     let mut bytes = Vec::new();
     let mut encoder = Encoder::new(&mut bytes, coding.quality);
     encoder.set_sampling_factor(coding.chroma.sampling_factor());
+    // As cameras do; the colour of one pixel of each block would alias.
+    encoder.set_chroma_subsampling_method(ChromaSubsamplingMethod::Average);
     let encoded = encoder.encode(codes, columns, rows, color);
     encoded.map_err(|e| e.to_string())?;
     insert_comment(&mut bytes, &metadata.to_vec())?;
@@ -358,6 +360,24 @@ mod tests {
                 other => panic!("{marker:x}: {other:?}"),
             }
         }
+    }
+
+    #[test]
+    fn fewer_samples_of_color_are_means_of_their_pixels() {
+        let columns: Vec<u8> = [[255, 0, 0], [0, 0, 255]].concat().repeat(16 * 8);
+        let coding = JpegCoding {
+            quality: 100,
+            chroma: Chroma::Quarter,
+        };
+        let file = encode((16, 16), &columns, coding, &[]).unwrap();
+        let Samples::U8(codes) = decode(&file, &Limits::default()).unwrap().samples else {
+            panic!("8 bits come back as 8 bits");
+        };
+        let [red, blue] = [0, 2].map(|channel| {
+            let values = codes.iter().skip(channel).step_by(3);
+            values.map(|&v| f64::from(v)).sum::<f64>() / 256.0
+        });
+        assert!((red - blue).abs() < 4.0, "red {red}, blue {blue}");
     }
 
     #[test]

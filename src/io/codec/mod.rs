@@ -5,6 +5,7 @@ pub(crate) mod codes;
 pub(crate) mod exif;
 pub(crate) mod exr;
 pub(crate) mod hdr;
+pub(crate) mod heif;
 pub(crate) mod jpeg;
 pub(crate) mod orient;
 pub(crate) mod pixels;

@@ -1,4 +1,4 @@
-//! OpenImageIO, here and in processes of their own.
+//! OpenImageIO and libheif, here and in processes of their own.
 
 mod ffi;
 pub(crate) mod openimageio;

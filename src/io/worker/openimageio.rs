@@ -1,12 +1,12 @@
-//! OpenImageIO in this process: shapes and samples of files in memory, and pictures to files.
+//! OpenImageIO and libheif in this process: shapes and samples of files in memory, and pictures to files.
 
 use super::ffi::{self, Layout};
 use super::protocol::{Request, Response, Shape};
 use crate::color::Curve;
-use crate::io::codec::Wanted;
 use crate::io::codec::codes::Bits;
 use crate::io::codec::raster::{Raster, SampleKind, Samples, overlap};
 use crate::io::codec::refusal::Refusal;
+use crate::io::codec::{Wanted, heif};
 use crate::io::format::Format;
 use crate::io::header::Window;
 use crate::io::limits::{Demand, Limits};
@@ -18,6 +18,11 @@ use std::sync::OnceLock;
 /// The OpenImageIO that this library was built with.
 pub(crate) fn version() -> String {
     ffi::version()
+}
+
+/// All libraries that it was built with, for people.
+pub(crate) fn libraries() -> String {
+    format!("OpenImageIO {}, {}", version(), ffi::heif_version())
 }
 
 /// Answers a request about a file.
@@ -74,7 +79,7 @@ pub(crate) fn decode(
     let (width, height) = (layout.width as usize, layout.height as usize);
     limits.check_memory(width, height, picked.len())?;
     reserve(layout.data_bytes());
-    let samples = read_samples(&reader, &layout, &picked)?;
+    let samples = read_samples(source.format, &reader, &layout, &picked)?;
     let (samples, display_encoded) = interpret(samples, source.format, &layout.color_space)?;
     Ok(Raster {
         width,
@@ -93,14 +98,18 @@ fn open<'a>(
     start()?;
     // Named in messages, and opened by the few readers that know only files.
     let name = source.path.to_string_lossy();
+    let refused = |e| refused(source.format, &e);
     let reader = ffi::open(&name, source.format.name(), &source.bytes).map_err(refused)?;
-    let layout = ffi::layout(&reader).map_err(refused)?;
+    let mut layout = ffi::layout(&reader).map_err(refused)?;
+    if source.format == Format::Heif {
+        layout.turn_to(heif::upright_size(&source.bytes));
+    }
     layout.check(source.bytes.len() as u64, limits)?;
     Ok((reader, layout))
 }
 
-fn refused(e: cxx::Exception) -> Refusal {
-    Refusal::Broken(format!("OpenImageIO: {}", e.what()))
+fn refused(format: Format, e: &cxx::Exception) -> Refusal {
+    Refusal::Broken(format!("{}: {}", format.library(), e.what()))
 }
 
 impl Layout {
@@ -123,6 +132,14 @@ impl Layout {
         let size = size.map(|side| u64::try_from(side).unwrap_or(0));
         let channels = self.channels.len() as u64;
         Demand::new(size, channels, self.bytes.unsigned_abs(), file_bytes)
+    }
+
+    /// Exchanges width and height where that makes them the known size.
+    fn turn_to(&mut self, known: Option<[i64; 2]>) {
+        if known == Some([self.height, self.width]) {
+            [self.width, self.height] = [self.height, self.width];
+            [self.data_width, self.data_height] = [self.data_height, self.data_width];
+        }
     }
 
     fn sample(&self) -> SampleKind {
@@ -172,12 +189,13 @@ impl Layout {
 }
 
 fn read_samples(
+    format: Format,
     reader: &ffi::Reader<'_>,
     layout: &Layout,
     picked: &[usize],
 ) -> Result<Samples, Refusal> {
     let mut samples = Samples::zeroed(layout.sample(), layout.data_samples());
-    ffi::read(reader, samples.bytes_mut()).map_err(refused)?;
+    ffi::read(reader, layout, samples.bytes_mut()).map_err(|e| refused(format, &e))?;
     Ok(match samples {
         Samples::U8(v) => Samples::U8(windowed(v, layout, picked)),
         Samples::U16(v) => Samples::U16(windowed(v, layout, picked)),
@@ -278,7 +296,7 @@ pub(crate) fn write_file(
     metadata: &[(String, String)],
 ) -> Result<(), Refusal> {
     let notes: Vec<_> = metadata.iter().cloned().map(note).collect();
-    ffi::write(path, format.name(), layout, samples, &notes).map_err(refused)
+    ffi::write(path, format.name(), layout, samples, &notes).map_err(|e| refused(format, &e))
 }
 
 fn note((key, value): (String, String)) -> ffi::Note {

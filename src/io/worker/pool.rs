@@ -1,5 +1,5 @@
-//! OpenImageIO in processes of their own: a file that crashes it ends such a process and is named,
-//! and programs that never meet such a file never load it.
+//! OpenImageIO and libheif in processes of their own: a file that crashes them ends such a process
+//! and is named, and programs that never meet such a file never load them.
 //!
 //! A worker lives as long as this program and answers one request at a time; there are as many as
 //! ever asked at once. One that dies is replaced and the file tried once more, one that takes too
@@ -57,7 +57,7 @@ pub(crate) fn ask(
     IDLE.ask(&program, source, limits, strict, request)
 }
 
-/// The OpenImageIO that the worker program links, as it reports itself.
+/// The libraries that the worker program links, as it reports itself.
 ///
 /// # Errors
 /// [`Error::File`] where there is no worker program or it does not start.
@@ -66,7 +66,7 @@ pub fn worker_version() -> Result<String> {
         find_program().ok_or_else(|| Error::file(PROGRAM, "not found beside this program"))?;
     let worker =
         Worker::start(&program, &Limits::default()).map_err(|e| Error::file(&program, e))?;
-    Ok(format!("OpenImageIO {}", worker.greeting.openimageio))
+    Ok(worker.greeting.libraries.clone())
 }
 
 /// Beside the running program; one folder up serves test programs, which cargo puts below the
@@ -105,7 +105,7 @@ impl WorkerPool {
         strict: bool,
         request: Request,
     ) -> std::result::Result<Response, Refusal> {
-        let mut cause = String::new();
+        let (mut cause, library) = (String::new(), source.format.library());
         for attempt in 0..MAX_ATTEMPTS {
             let mut worker = self.worker(attempt, program, limits)?;
             worker.check_sandbox(strict)?;
@@ -114,14 +114,14 @@ impl WorkerPool {
                     self.give_back(worker);
                     return response;
                 }
-                Err(Failure::TimedOut(timeout)) => return Err(timed_out(timeout)),
+                Err(Failure::TimedOut(timeout)) => return Err(timed_out(library, timeout)),
                 Err(Failure::Died(how)) => {
-                    log::debug!("{}: OpenImageIO died on it ({how})", source.path.display());
+                    log::debug!("{}: {library} died on it ({how})", source.path.display());
                     cause = how;
                 }
             }
         }
-        Err(format!("unreadable: OpenImageIO died on it {MAX_ATTEMPTS} times ({cause})").into())
+        Err(format!("unreadable: {library} died on it {MAX_ATTEMPTS} times ({cause})").into())
     }
 
     /// An idle one or a new one; the second attempt is for a worker that nothing has happened to
@@ -152,9 +152,9 @@ impl WorkerPool {
     }
 }
 
-fn timed_out(timeout: Duration) -> Refusal {
+fn timed_out(library: &str, timeout: Duration) -> Refusal {
     let seconds = timeout.as_secs_f64();
-    format!("unreadable: OpenImageIO took longer than {seconds} s (Limits::seconds)").into()
+    format!("unreadable: {library} took longer than {seconds} s (Limits::seconds)").into()
 }
 
 /// A running worker program; killed when it is dropped.
@@ -375,7 +375,7 @@ mod tests {
     const GREETING: &str = concat!(
         r#"echo '{"petcomp":""#,
         env!("CARGO_PKG_VERSION"),
-        r#"","openimageio":"0","missing":[]}'"#
+        r#"","libraries":"none","missing":[]}'"#
     );
 
     /// A worker that greets and then runs a shell script.

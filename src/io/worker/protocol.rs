@@ -52,8 +52,8 @@ impl std::fmt::Debug for Linked {
 pub(super) struct Greeting {
     /// Version of the program it belongs to.
     pub(super) petcomp: String,
-    /// Version of the OpenImageIO that it links.
-    pub(super) openimageio: String,
+    /// The libraries that it links, with their versions.
+    pub(super) libraries: String,
     /// Parts of the sandbox that the system could not give it.
     pub(super) missing: Vec<String>,
 }

@@ -51,7 +51,7 @@ fn respond_to_all(limits: Limits, from: &mut impl BufRead, to: &mut impl Write) 
 fn greet(missing: Vec<String>, to: &mut impl Write) -> Result<()> {
     let greeting = Greeting {
         petcomp: env!("CARGO_PKG_VERSION").into(),
-        openimageio: openimageio::version(),
+        libraries: openimageio::libraries(),
         missing,
     };
     send_line(to, &greeting)?;

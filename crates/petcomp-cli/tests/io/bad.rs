@@ -57,7 +57,7 @@ fn what_is_no_picture_is_named() {
     );
     assert_eq!(
         refusal(&folder.with("plate.png", b"hello, world")),
-        "not a picture petcomp reads (starts with \"hello, world\"), expected EXR, PNG, JPEG, TIFF or HDR"
+        "not a picture petcomp reads (starts with \"hello, world\"), expected EXR, PNG, JPEG, HEIC, TIFF or HDR"
     );
     assert!(refusal(&folder.with("a.exr", &[0, 1, 2, 255])).contains("starts with 00 01 02 ff"));
     assert!(

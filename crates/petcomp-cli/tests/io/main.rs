@@ -9,6 +9,7 @@ mod build;
 mod damaged;
 mod faults;
 mod fuzz;
+mod heic;
 mod kinds;
 mod make;
 mod meaning;

@@ -52,7 +52,7 @@ fn a_worker_without_a_full_sandbox_is_refused_where_that_is_asked_for() {
     let picture = folder.with("palette.tif", &palette_tiff());
     let worker = folder.file("worker");
     let greeting = format!(
-        "#!/bin/sh\necho '{{\"petcomp\":\"{}\",\"openimageio\":\"0\",\"missing\":[\"Landlock: not in this kernel\"]}}'\nexec sleep 9\n",
+        "#!/bin/sh\necho '{{\"petcomp\":\"{}\",\"libraries\":\"none\",\"missing\":[\"Landlock: not in this kernel\"]}}'\nexec sleep 9\n",
         env!("CARGO_PKG_VERSION")
     );
     // Written by a process of its own: see `write_program` in `src/io/worker/pool.rs`.
