@@ -237,4 +237,36 @@ mod linux {
         let condition = SeccompCondition::new(0, SeccompCmpArgLen::Dword, op, value)?;
         SeccompRule::new(vec![condition])
     }
+
+    #[cfg(test)]
+    mod tests {
+        use super::*;
+        use std::process::Command;
+
+        /// What [`threads_start_and_processes_do_not`] runs in a process of its own.
+        #[test]
+        #[ignore = "gives up what other tests need"]
+        fn restricted() {
+            // Without Landlock, which would refuse the program's file.
+            set_no_new_privileges().unwrap();
+            filter_calls().unwrap();
+            assert_eq!(std::thread::spawn(|| 1).join().unwrap(), 1);
+            let refused = Command::new("/bin/true").spawn().unwrap_err();
+            assert_eq!(refused.raw_os_error(), Some(libc::EPERM));
+        }
+
+        #[test]
+        fn threads_start_and_processes_do_not() {
+            if !std::path::Path::new("/proc/sys/kernel/seccomp").exists() {
+                return;
+            }
+            let name = "io::worker::sandbox::linux::tests::restricted";
+            let child = Command::new(std::env::current_exe().unwrap())
+                .args([name, "--exact", "--ignored"])
+                .output()
+                .unwrap();
+            let said = String::from_utf8_lossy(&child.stdout);
+            assert!(said.contains("1 passed"), "{said}");
+        }
+    }
 }
