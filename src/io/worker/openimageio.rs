@@ -78,7 +78,7 @@ pub(crate) fn decode(
     picked.dedup();
     let (width, height) = (layout.width as usize, layout.height as usize);
     limits.check_memory(width, height, picked.len())?;
-    reserve(layout.data_bytes());
+    reserve(layout.data_bytes() * working_copies(source.format));
     let samples = read_samples(source.format, &reader, &layout, &picked)?;
     let (samples, display_encoded) = interpret(samples, source.format, &layout.color_space)?;
     Ok(Raster {
@@ -89,6 +89,14 @@ pub(crate) fn decode(
         display_encoded,
         premultiplied: false,
     })
+}
+
+/// How many times the memory of a picture its decoder takes: libheif keeps what it converts from.
+fn working_copies(format: Format) -> u64 {
+    match format {
+        Format::Heif => 3,
+        _ => 1,
+    }
 }
 
 fn open<'a>(
