@@ -1,36 +1,20 @@
 //! Pictures of phones (`files/make_heic.py`): HEIC comes through libheif, in the worker.
 
-use crate::make::Folder;
+use crate::make::{Folder, file};
 use crate::promptness::quickly;
+use petcomp::diff::Likeness;
 use petcomp::io::{self, Format, WriteOptions};
 use petcomp::{Image, LinearRgb, StraightRgba, color};
-use std::path::PathBuf;
-
-fn file(name: &str) -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
-        .join("tests/io/files")
-        .join(name)
-}
-
-/// Root mean square difference of light.
-fn rmse(a: &Image<LinearRgb>, b: &Image<LinearRgb>) -> f32 {
-    assert_eq!(a.size(), b.size());
-    let pairs = a.pixels().iter().zip(b.pixels());
-    let squares = pairs.map(|(p, q)| {
-        let [r, g, b] = [p.r - q.r, p.g - q.g, p.b - q.b];
-        (r * r + g * g + b * b) / 3.0
-    });
-    (squares.sum::<f32>() / a.pixels().len() as f32).sqrt()
-}
 
 /// Turned once, though both the file and its camera notes ask for it, and in colours of Display P3:
 /// as the JPEG of the same picture.
 #[test]
 fn a_phone_s_photo_comes_upright_and_in_its_colors() {
-    let [heic, jpeg] = ["phone.heic", "phone.jpg"].map(|name| io::read(file(name)).unwrap());
+    let [heic, jpeg]: [Image<LinearRgb>; 2] =
+        ["phone.heic", "phone.jpg"].map(|name| io::read(file(name)).unwrap());
     assert_eq!(heic.size(), (32, 48));
     // What the JPEG loses.
-    let error = rmse(&heic, &jpeg);
+    let error = Likeness::measure(&heic, &jpeg).unwrap().rmse;
     assert!(error < 0.003, "{error}");
     // Its reds are beyond those of sRGB.
     let reddest = heic.pixels().iter().map(|p| p.r).fold(0.0, f32::max);

@@ -1,9 +1,9 @@
 //! Kinds of file that petcomp does not write, by another program (`files/make.py`): both ways of
 //! reading agree on each.
 
+use crate::make::file;
 use petcomp::io::{self, ReadOptions};
 use petcomp::{Image, Srgb8, StraightRgba, color};
-use std::path::PathBuf;
 
 /// Codes by which decoders of the same JPEG may differ (see `both_paths`), and by which CMYK may be
 /// rounded.
@@ -29,12 +29,6 @@ const FILES: [(&str, u8); 16] = [
     ("subsampled.jpg", 2 * JPEG),
     ("rgba.png", 0),
 ];
-
-fn file(name: &str) -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
-        .join("tests/io/files")
-        .join(name)
-}
 
 /// Display codes, alpha with them.
 fn codes(image: &Image<StraightRgba>) -> Vec<[u8; 4]> {

@@ -3,6 +3,13 @@
 use petcomp::{Image, PremulRgba, Srgb8, Srgba8};
 use std::path::{Path, PathBuf};
 
+/// A picture that another program wrote (`files/`).
+pub(crate) fn file(name: &str) -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+        .join("tests/io/files")
+        .join(name)
+}
+
 /// A folder of one test, gone when it ends.
 pub(crate) struct Folder(tempfile::TempDir);
 
