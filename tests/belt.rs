@@ -4,7 +4,7 @@
 
 mod python;
 
-use petcomp::dataset::{DatasetConfig, Part, Pipeline, generate};
+use petcomp::dataset::{DatasetConfig, Part, Pipeline, SampleRecord, generate};
 use petcomp::scene::{Object, Placement};
 use petcomp::{asset, io};
 use serde_json::Value;
@@ -88,6 +88,37 @@ fn check_videos(folder: &Path) {
     }
 }
 
+/// Lines of the first sequence for training, from its sidecars: MOTChallenge counts everything from 1.
+fn expected_rows(folder: &Path) -> Vec<Vec<f64>> {
+    let rows = (1..=3).flat_map(|frame| {
+        let sidecar = folder.join(format!("scenes/train/{:06}.json", 2 + frame));
+        let SampleRecord {
+            labels, labelled, ..
+        } = io::read_json(sidecar).unwrap();
+        let objects = labels.objects.into_iter();
+        objects
+            .filter(move |object| labelled.contains(&object.id))
+            .map(move |object| {
+                let b = object.amodal_box;
+                let [left, top] = [b.x0 + 1.0, b.y0 + 1.0];
+                let visible = (object.visible_fraction * 1e4).round() / 1e4;
+                let [frame, id, class] = [frame, object.id.0, object.class + 1].map(f64::from);
+                vec![
+                    frame,
+                    id,
+                    left,
+                    top,
+                    b.width(),
+                    b.height(),
+                    1.0,
+                    class,
+                    visible,
+                ]
+            })
+    });
+    rows.collect()
+}
+
 fn check_tracks(folder: &Path) {
     let sequence = folder.join("mot/train/000001");
     let info = io::read_text(sequence.join("seqinfo.ini")).unwrap();
@@ -101,7 +132,7 @@ fn check_tracks(folder: &Path) {
         .lines()
         .map(|line| line.split(',').map(|n| n.parse().unwrap()).collect())
         .collect();
-    assert!(rows.iter().all(|row| row.len() == 9 && row[6] == 1.0));
+    assert_eq!(rows, expected_rows(folder));
     // 20 mm to the right in each frame, for what is seen in all.
     let left = |frame: f64, id: f64| {
         let row = rows.iter().find(|row| row[0] == frame && row[1] == id);

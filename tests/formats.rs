@@ -357,6 +357,74 @@ fn a_distractor_is_in_the_picture_and_the_sidecar_and_in_no_label() {
     assert!(names.contains("object002_distractor") && names.contains("object002.R"));
 }
 
+/// The pictures with two small rings under the second one, the latter of which looks out.
+fn shot_with_hidden(k: u64) -> Shot {
+    shot(k)
+        .with_card(card(4, [0.118, 0.03, 0.01], 0.0, [0.03, 0.03]))
+        .with_card(card(5, [0.16, 0.03, 0.01], 0.0, [0.06, 0.06]))
+}
+
+#[test]
+fn labels_of_what_is_seen_have_its_box_and_leave_out_what_is_hidden() {
+    let dir = made_of(
+        "obstructed = \"keep\"\nalpha_threshold = 0.5\nformats = [\"yolo\", \"coco\", \"voc\"]\n\
+         yolo = { boxes = \"visible\" }\ncoco = { boxes = \"visible\" }\nvoc = { boxes = \"visible\" }",
+        shot_with_hidden,
+    );
+    let record: SampleRecord = io::read_json(dir.path().join("scenes/train/000003.json")).unwrap();
+    let objects = record.labels.objects.iter();
+    let seen: Vec<_> = objects.filter(|o| !o.visible_box.is_empty()).collect();
+    assert!(seen.iter().any(|o| o.visible_box != o.amodal_box));
+    assert_eq!(record.labelled, [1, 2, 3, 5].map(ObjectId));
+    let boxes: Vec<_> = seen.iter().map(|o| o.visible_box).collect();
+    let rows: String = seen
+        .iter()
+        .map(|o| {
+            let (b, center) = (o.visible_box, o.visible_box.center());
+            let shares = [
+                center.x / 96.0,
+                center.y / 72.0,
+                b.width() / 96.0,
+                b.height() / 72.0,
+            ];
+            let shares = shares.map(|share| format!(" {share:.6}")).concat();
+            format!("{}{shares}\n", o.class)
+        })
+        .collect();
+    assert_eq!(text_of(dir.path(), "labels/train/000003.txt"), rows);
+    let annotations = annotations_of_third(dir.path());
+    let told: Vec<Vec<f64>> = annotations
+        .iter()
+        .map(|a| serde_json::from_value(a["bbox"].clone()).unwrap())
+        .collect();
+    let expected = boxes
+        .iter()
+        .map(|b| vec![b.x0, b.y0, b.width(), b.height()]);
+    assert_eq!(told, expected.collect::<Vec<_>>());
+    let voc = text_of(dir.path(), "voc/train/000003.xml");
+    let sides = |name: &str| -> Vec<f64> {
+        let start = format!("<{name}>");
+        let elements = voc.split(&start).skip(1);
+        elements
+            .map(|rest| rest.split('<').next().unwrap().parse().unwrap())
+            .collect()
+    };
+    assert_eq!(
+        sides("xmin"),
+        boxes.iter().map(|b| b.x0 + 1.0).collect::<Vec<_>>()
+    );
+    assert_eq!(
+        sides("ymax"),
+        boxes.iter().map(|b| b.y1).collect::<Vec<_>>()
+    );
+    let journal = text_of(dir.path(), "index.jsonl");
+    let line = journal.lines().find(|line| line.contains("\"k\":3,"));
+    assert!(
+        line.unwrap().contains("\"classes\":[[2,1],[3,3]]"),
+        "{line:?}"
+    );
+}
+
 #[test]
 fn formats_tell_truncation_and_both_boxes_where_they_are_asked_for() {
     let formats = "formats = [\"yolo\", \"coco\", \"voc\"]";

@@ -123,6 +123,10 @@ impl Writer for Coco {
         serde_json::json!({ "coco": self })
     }
 
+    fn extent(&self) -> Option<Extent> {
+        Some(self.boxes)
+    }
+
     fn begin(&self, folder: &Path, _classes: &[String]) -> Result<()> {
         create_part_folders(folder, PARTS_FOLDER)
     }

@@ -84,6 +84,11 @@ impl Extent {
             Self::Visible => (object.visible_box, &object.visible_mask),
         }
     }
+
+    /// Whether there is anything of an object to label.
+    pub(super) fn has_box(self, object: &ObjectLabel) -> bool {
+        !self.of(object).0.is_empty()
+    }
 }
 
 impl Default for LabelConfig {

@@ -6,7 +6,8 @@ use crate::dataset::journal_line::JournalLine;
 use crate::dataset::run::{Progress, Report, run};
 use crate::dataset::times::{Times, timed};
 use crate::dataset::{
-    DatasetCounts, Entry, Inputs, Obstructed, Sample, SampleRange, Split, WebDataset, Writer,
+    DatasetCounts, Entry, Extent, Inputs, Obstructed, Sample, SampleRange, Split, WebDataset,
+    Writer,
 };
 use crate::error::{Error, Result};
 use std::path::PathBuf;
@@ -72,6 +73,15 @@ impl Plan {
             "{:08x}",
             crc32fast::hash(self.recipe.to_string().as_bytes())
         )
+    }
+
+    /// Those of the writers; objects as far as they lie in the picture, where none has one.
+    fn extents(&self) -> Vec<Extent> {
+        let extents: Vec<_> = self.writers.iter().filter_map(|w| w.extent()).collect();
+        if extents.is_empty() {
+            return vec![Extent::Amodal];
+        }
+        extents
     }
 }
 
@@ -146,7 +156,9 @@ fn write_sample(plan: &Plan, recipe_hash: &str, k: u64, sample: &Sample) -> Resu
     } = plan;
     check_image_size(sample)?;
     check_object_classes(sample, classes.len())?;
-    let labelled = plan.obstructed.labelled(&sample.labels, classes.len());
+    let labelled = plan
+        .obstructed
+        .labelled(&sample.labels, classes.len(), &plan.extents());
     let entry = Entry {
         k,
         seed: plan.seed,

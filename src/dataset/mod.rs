@@ -317,6 +317,11 @@ pub trait Writer: Send + Sync {
     /// When a file cannot be written, or the sample is one that the layout cannot hold.
     fn write(&self, folder: &Path, entry: &Entry<'_>) -> Result<Vec<PathBuf>>;
 
+    /// How much of an object its labels tell; none, as by default, where it writes no labels.
+    fn extent(&self) -> Option<Extent> {
+        None
+    }
+
     /// The files that trainers are given, below the dataset's folder: those that name all others.
     /// By default none.
     fn for_trainers(&self) -> Vec<PathBuf> {

@@ -50,6 +50,10 @@ impl Writer for Mot {
         serde_json::json!({ "mot": self })
     }
 
+    fn extent(&self) -> Option<Extent> {
+        Some(self.boxes)
+    }
+
     fn begin(&self, folder: &Path, _classes: &[String]) -> Result<()> {
         create_part_folders(folder, KIND)
     }

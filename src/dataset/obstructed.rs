@@ -1,5 +1,6 @@
 //! What happens to obstructed objects.
 
+use crate::dataset::Extent;
 use crate::error::{Error, Result};
 use crate::label::{Labels, ObjectLabel};
 use serde::{Deserialize, Serialize};
@@ -54,11 +55,18 @@ impl Obstructed {
         Ok(classes)
     }
 
-    /// The objects that get a label, `class_count` classes of labels being there.
-    pub fn labelled(self, labels: &Labels, class_count: usize) -> Vec<LabelledObject<'_>> {
+    /// The objects that get a label, `class_count` classes of labels being there: none that has no
+    /// box in any of `extents`.
+    pub fn labelled<'a>(
+        self,
+        labels: &'a Labels,
+        class_count: usize,
+        extents: &[Extent],
+    ) -> Vec<LabelledObject<'a>> {
         labels
             .objects
             .iter()
+            .filter(|object| extents.iter().any(|extent| extent.has_box(object)))
             .filter_map(|object| self.label(object, class_count))
             .collect()
     }
@@ -101,19 +109,29 @@ fn check_is_free(classes: &[String]) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geom::BBox;
     use crate::label::Truncation;
     use crate::pixel::ObjectId;
 
     fn pair() -> Labels {
+        let amodal_box = BBox {
+            x0: 1.0,
+            y0: 1.0,
+            x1: 3.0,
+            y1: 3.0,
+        };
         let below = ObjectLabel {
             id: ObjectId(1),
             class: 1,
             covered_by: vec![ObjectId(2)],
+            amodal_box,
             ..ObjectLabel::default()
         };
         let above = ObjectLabel {
             id: ObjectId(2),
             class: 0,
+            amodal_box,
+            visible_box: amodal_box,
             ..ObjectLabel::default()
         };
         Labels {
@@ -128,7 +146,7 @@ mod tests {
         let labels = pair();
         let classes = policy.classes(&["cap", "none"].map(String::from)).unwrap();
         policy
-            .labelled(&labels, classes.len())
+            .labelled(&labels, classes.len(), &[Extent::Amodal])
             .iter()
             .map(|l| (l.object.id.0, l.class, l.ignored))
             .collect()
@@ -150,7 +168,7 @@ mod tests {
             ..Truncation::default()
         });
         let told = |policy: Obstructed| {
-            let labelled = policy.labelled(&labels, 2);
+            let labelled = policy.labelled(&labels, 2, &[Extent::Amodal]);
             let told = labelled.iter().map(|l| (l.object.id.0, l.ignored));
             told.collect::<Vec<_>>()
         };
@@ -158,6 +176,17 @@ mod tests {
         assert_eq!(told(Obstructed::Keep), [(1, false)]);
         assert_eq!(told(Obstructed::Class), [(1, false)]);
         assert_eq!(told(Obstructed::Ignore), [(1, true), (2, true)]);
+    }
+
+    #[test]
+    fn what_has_no_box_in_any_format_has_no_label() {
+        let labels = pair();
+        let ids = |extents: &[Extent]| {
+            let labelled = Obstructed::Keep.labelled(&labels, 2, extents);
+            labelled.iter().map(|l| l.object.id.0).collect::<Vec<_>>()
+        };
+        assert_eq!(ids(&[Extent::Visible]), [2]);
+        assert_eq!(ids(&[Extent::Visible, Extent::Amodal]), [1, 2]);
     }
 
     #[test]

@@ -39,6 +39,10 @@ impl Writer for Voc {
         serde_json::json!({ "voc": self })
     }
 
+    fn extent(&self) -> Option<Extent> {
+        Some(self.boxes)
+    }
+
     fn begin(&self, folder: &Path, _classes: &[String]) -> Result<()> {
         create_part_folders(folder, KIND)
     }

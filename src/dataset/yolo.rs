@@ -58,6 +58,10 @@ impl Writer for Yolo {
         serde_json::json!({ "yolo": self })
     }
 
+    fn extent(&self) -> Option<Extent> {
+        Some(self.boxes)
+    }
+
     fn begin(&self, folder: &Path, classes: &[String]) -> Result<()> {
         create_part_folders(folder, "labels")?;
         io::write_text(folder.join(DATA_YAML), &DataYaml::write(classes))

@@ -81,9 +81,8 @@ fn made(opened: &Opened, seed: u64, k: u64) -> Result<Made, Failure> {
 fn labels_json(sample: &Sample, opened: &Opened) -> Result<String, Error> {
     let config = &opened.pipeline.config().labels;
     let (width, height) = sample.frame.size();
-    let labelled = config
-        .obstructed
-        .labelled(&sample.labels, opened.classes.len());
+    let (count, extent) = (opened.classes.len(), config.yolo.boxes);
+    let labelled = config.obstructed.labelled(&sample.labels, count, &[extent]);
     let document = LabelDocument {
         width,
         height,

@@ -98,7 +98,10 @@ fn displayed(frame: &Image<PremulRgba>) -> Image<Srgb8> {
 impl Facts {
     fn labelled(&self) -> Vec<LabelledObject<'_>> {
         let count = self.policy.classes.len();
-        self.policy.obstructed.labelled(&self.labels, count)
+        let Policy {
+            obstructed, extent, ..
+        } = &self.policy;
+        obstructed.labelled(&self.labels, count, &[*extent])
     }
 
     fn mask_of<'a>(&self, label: &LabelledObject<'a>) -> &'a RleMask {

@@ -68,11 +68,11 @@ impl FallPlan<'_> {
     /// Box of each label, in shares of the picture.
     fn boxes(&self, labels: &Labels) -> Vec<[f64; 4]> {
         let config = &self.pipeline.config().labels;
-        let labelled = config.obstructed.labelled(labels, 0).into_iter();
+        let extent = config.yolo.boxes;
+        let labelled = config.obstructed.labelled(labels, 0, &[extent]).into_iter();
         labelled
             .filter(|label| !label.ignored)
-            .map(|label| config.yolo.boxes.of(label.object).0)
-            .filter(|b| !b.is_empty())
+            .map(|label| extent.of(label.object).0)
             .map(|b| shares_of(&b, labels.image.map(f64::from)))
             .collect()
     }
