@@ -196,9 +196,13 @@ impl View {
                 .project(Point3::from(c.point))
                 .map(|(px, _)| (px - Point2::from(c.px)).norm())
         };
-        self.checks
+        // A NaN is as far off as can be.
+        let errors = self
+            .checks
             .iter()
-            .map(|c| error(c).unwrap_or(f64::INFINITY))
+            .map(|c| error(c).unwrap_or(f64::INFINITY));
+        errors
+            .map(|px| if px.is_nan() { f64::INFINITY } else { px })
             .fold(0.0, f64::max)
     }
 }

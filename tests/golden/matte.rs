@@ -102,22 +102,16 @@ fn screen(case: &Case) -> Result<(), String> {
             r.len()
         ));
     }
-    let apart = |a: &LinearRgb, b: LinearRgb| {
-        (a.r - b.r)
-            .abs()
-            .max((a.g - b.g).abs())
-            .max((a.b - b.b).abs())
-    };
-    let most = plate
-        .pixels()
-        .iter()
-        .zip(want)
-        .map(|(a, b)| apart(a, b))
-        .fold(0.0, f32::max);
-    if most <= given.tolerance.hard_fail {
-        Ok(())
-    } else {
-        Err(format!("differs by {most:e}"))
+    let limit = given.tolerance.hard_fail;
+    let channels = plate.pixels().iter().zip(want).flat_map(|(a, b)| {
+        let expected = <[f32; 3]>::from(b);
+        <[f32; 3]>::from(*a).into_iter().zip(expected)
+    });
+    let mut errors = channels.map(|(found, expected)| (found - expected).abs());
+    // A NaN is not within any limit.
+    match errors.find(|error| !(*error <= limit)) {
+        None => Ok(()),
+        Some(error) => Err(format!("differs by {error:e}")),
     }
 }
 

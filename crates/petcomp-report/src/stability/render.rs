@@ -122,7 +122,7 @@ fn largest_error(found: LinearRgb, expected: &[f64; 3]) -> f64 {
     let pairs = <[f32; 3]>::from(found).into_iter().zip(expected);
     pairs
         .map(|(found, t)| (f64::from(found) - t).abs())
-        .fold(0.0, f64::max)
+        .fold(0.0, largest)
 }
 
 /// The largest error of alpha, light and depth of an opaque grey card that fills the picture.
@@ -131,14 +131,14 @@ fn error_of_full_card(deep: &DeepImage, depth: f64) -> f64 {
         [sample] => error_of_grey_sample(sample, depth),
         _ => f64::INFINITY,
     });
-    errors.fold(0.0, f64::max)
+    errors.fold(0.0, largest)
 }
 
 fn error_of_grey_sample(s: &DeepSample, depth: f64) -> f64 {
     [(s.alpha, 1.0), (s.light.g, 0.5), (s.depth.0, depth as f32)]
         .into_iter()
         .map(|(found, expected)| f64::from((found - expected).abs()))
-        .fold(0.0, f64::max)
+        .fold(0.0, largest)
 }
 
 fn near_card() -> HardCase {
@@ -182,7 +182,7 @@ fn render_near_and_grazing() -> Result<Outcome> {
     // The window of a pixel is three wide.
     let rows = (0..48).filter(|&y| (y as f64 + 0.5 - horizon).abs() > 2.0);
     let off = rows.map(|y| error_of_row(&deep, y, y as f64 > horizon));
-    Ok(Outcome::at_most(off.fold(0.0, f64::max), 1e-4, "off"))
+    Ok(Outcome::at_most(off.fold(0.0, largest), 1e-4, "off"))
 }
 
 fn grazing_shot() -> Shot {
@@ -196,10 +196,11 @@ fn grazing_shot() -> Shot {
 fn error_of_row(deep: &DeepImage, y: usize, is_card: bool) -> f64 {
     let [opacity, color] = if is_card { [1.0, 0.5] } else { [0.0, 0.0] };
     let flat = deep.flat(32, y);
-    let off = (flat.opacity.g - opacity)
-        .abs()
-        .max((flat.color.g - color).abs());
-    f64::from(off)
+    let errors = [flat.opacity.g - opacity, flat.color.g - color];
+    errors
+        .map(|off| f64::from(off.abs()))
+        .into_iter()
+        .fold(0.0, largest)
 }
 
 /// Positions within a pixel that a steep card is rendered at.
@@ -287,8 +288,8 @@ fn one_pixel() -> HardCase {
 
 fn render_one_pixel() -> Result<Outcome> {
     let pairs = middle_pixel(1).into_iter().zip(middle_pixel(65));
-    let worst = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
-    Ok(Outcome::at_most(worst.into(), 1e-5, "off"))
+    let errors = pairs.map(|(a, b)| f64::from((a - b).abs()));
+    Ok(Outcome::at_most(errors.fold(0.0, largest), 1e-5, "off"))
 }
 
 /// Light, opacity and shadow of the middle pixel of a picture of a tilted card.
