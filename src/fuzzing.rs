@@ -1,78 +1,71 @@
-//! Entry points of the fuzzers in `fuzz/`: each takes any bytes and must return. Not part of the
-//! library's interface.
+//! Entry points of the fuzzers in `fuzz/`: each takes any bytes and must return, and says whether
+//! they could be read. Not part of the library's interface.
 
 use crate::{camera, dataset, eval, io};
 
 /// A label file, solved where it can be read.
-pub fn label(bytes: &[u8]) {
-    let Ok(text) = std::str::from_utf8(bytes) else {
-        return;
-    };
-    if let Ok(label) = io::parse_json::<camera::Label>(text) {
-        let _ = camera::solve(&label, &camera::SolveOptions::default());
-    }
+pub fn label(bytes: &[u8]) -> bool {
+    let label = text(bytes).and_then(|text| io::parse_json::<camera::Label>(text).ok());
+    label.is_some_and(|label| camera::solve(&label, &camera::SolveOptions::default()).is_ok())
 }
 
 /// A recipe, checked where it can be read.
-pub fn recipe(bytes: &[u8]) {
-    let Ok(text) = std::str::from_utf8(bytes) else {
-        return;
-    };
-    if let Ok(config) = io::parse_toml::<dataset::DatasetConfig>(text) {
-        let _ = config.scene.check();
-    }
+pub fn recipe(bytes: &[u8]) -> bool {
+    let config = text(bytes).and_then(|text| io::parse_toml::<dataset::DatasetConfig>(text).ok());
+    config.is_some_and(|config| config.scene.check().is_ok())
 }
 
-/// The journal of a dataset.
-pub fn journal(bytes: &[u8]) {
-    let _ = dataset::journal_lines(bytes, false);
+/// The journal of a dataset of before lines had checksums, which no fuzzer would find.
+pub fn journal(bytes: &[u8]) -> bool {
+    let lines = dataset::journal_lines(bytes, true);
+    lines.is_ok_and(|lines| lines.iter().any(|(_, line)| line.is_ok()))
 }
 
 /// The response of an OpenImageIO worker.
 #[cfg(feature = "oiio")]
-pub fn worker(bytes: &[u8]) {
-    let _ = io::is_worker_response(bytes);
+pub fn worker(bytes: &[u8]) -> bool {
+    io::is_worker_response(bytes)
 }
 
 /// The first bytes of a picture.
-pub fn header(bytes: &[u8]) {
-    let _ = io::header_of(bytes);
+pub fn header(bytes: &[u8]) -> bool {
+    io::header_of(bytes).is_ok()
 }
 
 /// A `data.yaml`.
-pub fn data_yaml(bytes: &[u8]) {
-    let Ok(text) = std::str::from_utf8(bytes) else {
-        return;
+pub fn data_yaml(bytes: &[u8]) -> bool {
+    let Some(text) = text(bytes) else {
+        return false;
     };
-    let (yaml, _) = dataset::DataYaml::read(text);
-    let _ = (yaml.class_count(), yaml.root(std::path::Path::new("a")));
+    let (yaml, problems) = dataset::DataYaml::read(text);
+    let _ = yaml.root(std::path::Path::new("a"));
+    yaml.class_count().is_some() && problems.is_empty()
 }
 
 /// What stands between the truth and the detections that the functions below take.
 pub const BETWEEN: &str = "\n===\n";
 
 /// A file of YOLO labels and one of detections, scored where they can be read.
-pub fn yolo_labels(bytes: &[u8]) {
-    let Some((truth, found)) = two(bytes) else {
-        return;
-    };
-    if let Ok(sheet) = eval::yolo_sheet(truth, found, [640, 480]) {
-        score(&[sheet]);
-    }
+pub fn yolo_labels(bytes: &[u8]) -> bool {
+    let sheet = two(bytes).and_then(|(truth, found)| {
+        let sheet = eval::yolo_sheet(truth, found, [640, 480]);
+        sheet.ok()
+    });
+    sheet.map(|sheet| score(&[sheet])).is_some()
 }
 
 /// COCO documents of truth and detections, scored where they can be read.
-pub fn coco(bytes: &[u8]) {
-    let Some((truth, found)) = two(bytes) else {
-        return;
-    };
-    if let Ok(sheets) = eval::coco_sheets(truth, found) {
-        score(&sheets);
-    }
+pub fn coco(bytes: &[u8]) -> bool {
+    let sheets = two(bytes).and_then(|(truth, found)| eval::coco_sheets(truth, found).ok());
+    sheets.map(|sheets| score(&sheets)).is_some()
 }
 
 fn two(bytes: &[u8]) -> Option<(&str, &str)> {
-    std::str::from_utf8(bytes).ok()?.split_once(BETWEEN)
+    text(bytes)?.split_once(BETWEEN)
+}
+
+fn text(bytes: &[u8]) -> Option<&str> {
+    std::str::from_utf8(bytes).ok()
 }
 
 /// Everything that is made of truth and detections.
