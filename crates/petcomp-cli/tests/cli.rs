@@ -460,6 +460,53 @@ fn the_demo_makes_the_same_files_at_any_thread_count() {
         assert!(a == b, "{} depends on the thread count", name.display());
     }
     desk.ok(&["dataset", "check", "one/dataset"]);
+    compare_with_pin(&pin(&desk.path("one")));
+}
+
+/// Set, the pin is written instead of compared: where bytes change on purpose.
+const UPDATE: &str = "PETCOMP_UPDATE_PIN";
+
+/// Checksums of the samples of cut-outs and pictures, whose compression is not ours, and of labels.
+fn pin(root: &Path) -> String {
+    let mut files = Vec::new();
+    for folder in ["assets", "dataset/images", "dataset/labels"] {
+        walk(&root.join(folder), &mut files);
+    }
+    files.sort();
+    let rows = files.iter().filter_map(|file| {
+        let crc = crc32fast::hash(&content(file)?);
+        let name = file.strip_prefix(root).expect("below the root");
+        Some(format!("{crc:08x}  {}\n", name.display()))
+    });
+    rows.collect()
+}
+
+fn content(file: &Path) -> Option<Vec<u8>> {
+    match file.extension()?.to_str()? {
+        "exr" => {
+            let (_, channels) = petcomp::io::exr::read_channels(file).unwrap();
+            let samples = channels.iter().flat_map(|channel| &channel.samples);
+            Some(samples.flat_map(|v| v.to_le_bytes()).collect())
+        }
+        "png" if file.components().any(|c| c.as_os_str() == "images") => {
+            let picture = petcomp::io::read::<petcomp::LinearRgb>(file).unwrap();
+            Some(bytemuck::cast_slice(picture.pixels()).to_vec())
+        }
+        "txt" => std::fs::read(file).ok(),
+        _ => None,
+    }
+}
+
+fn compare_with_pin(found: &str) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/demo.crc32");
+    if std::env::var_os(UPDATE).is_some() {
+        std::fs::write(&path, found).unwrap();
+    }
+    let pinned = std::fs::read_to_string(&path).unwrap();
+    assert_eq!(
+        pinned, found,
+        "set {UPDATE}=1 to write it, and say why in CHANGELOG.md"
+    );
 }
 
 #[test]
