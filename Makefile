@@ -24,7 +24,9 @@ PYTHON    := $(CURDIR)/target/python/bin/python
 # What Blender's module for Python links.
 BPY       := python3-venv libgl1 libsm6 libxi6 libxkbcommon0 libxrender1
 # An S3 server for tests.
-S3_SERVER := 'moto[s3]' flask flask-cors
+S3_SERVER := moto[s3] flask flask-cors
+# What the tests of datasets and clusters ask.
+TESTED_WITH := pycocotools webdataset trackeval kubernetes-validate $(S3_SERVER)
 WORLD     := experiments/cache/world
 # What the package for Python is tested with, in a virtual environment of its own.
 PACKAGE   := target/package
@@ -188,11 +190,14 @@ wheel:
 	@test $$(stat -c %s target/wheel-out/*.whl) -le $$(($(MOST_WHEEL_MB) * 1000000))
 	@$(call pytest_of,target/wheel-out)
 
-# pycocotools, webdataset, TrackEval, kubernetes-validate and an S3 server, for the tests that ask them; where they cannot be had the tests say so and pass.
+# For the tests that ask them; where one cannot be had its tests say so and pass. A longer list is fetched anew.
 python:
-	@[ -x $(PYTHON) ] || { ($(call install,python3-venv)) && python3 -m venv target/python && \
-	  $(PYTHON) -m pip install --quiet --retries 1 pycocotools webdataset trackeval kubernetes-validate $(S3_SERVER); } || \
-	  { rm -rf target/python; echo "pycocotools cannot be installed: its tests are skipped"; }
+	@[ "$$(cat target/python/packages 2>/dev/null)" = "$(TESTED_WITH)" ] || { \
+	  ($(call install,python3-venv)) && python3 -m venv target/python && \
+	  for package in $(TESTED_WITH); do \
+	    $(PYTHON) -m pip install --quiet --retries 1 "$$package" || echo "$$package cannot be installed: its tests are skipped"; \
+	  done && echo "$(TESTED_WITH)" > target/python/packages; } || \
+	  echo "Python's packages cannot be installed: their tests are skipped"
 
 # For the tests of petcomp studio; where it cannot be had they say so and pass.
 browser:

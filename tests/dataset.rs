@@ -17,6 +17,7 @@ use petcomp::label::{Labels, ObjectLabel, RleMask};
 use petcomp::scene::{CameraSource, EdgeTreatment, Exposure, Grade, Object, Placement, Surface};
 use petcomp::{Coverage, Error, Image, LinearRgb, ObjectId, PremulRgba, Result, Scene, io};
 use std::collections::BTreeMap;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
@@ -1536,7 +1537,11 @@ fn a_browser_shows_the_report_and_its_switches_work() {
         document.title = [before, shown('boxes'), shown('masks'), pictures, document.querySelectorAll('.boxes rect').length].join();";
     match browse(&page, script) {
         Some(title) => assert_eq!(title, "true,false,false,true,6,3"),
-        None => eprintln!("skipped: no chromium here (Debian: chromium)"),
+        None => writeln!(
+            std::io::stderr(),
+            "skipped: no chromium here (Debian: chromium)"
+        )
+        .unwrap(),
     }
 }
 

@@ -2,6 +2,7 @@
 
 #![cfg(feature = "pipeline")]
 
+use std::io::Write as _;
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -18,7 +19,10 @@ fn python(script: &str) -> Option<Output> {
     };
     let there = run("import torch").is_ok_and(|out| out.status.success());
     if !there {
-        eprintln!("skipped: {program} has no PyTorch (set PETCOMP_PYTHON to one that has)");
+        let _ = writeln!(
+            std::io::stderr(),
+            "skipped: {program} has no PyTorch (set PETCOMP_PYTHON to one that has)"
+        );
         return None;
     }
     run(script).ok()

@@ -1,5 +1,6 @@
 //! Python programs that datasets are written for: `$PETCOMP_PYTHON` (or `python3`) is asked for them.
 
+use std::io::Write as _;
 use std::path::Path;
 use std::process::Command;
 
@@ -10,7 +11,9 @@ pub(crate) fn check(name: &str, package: &str, folder: &Path) {
         .args(["-c", &format!("import {package}")])
         .output();
     if !has.is_ok_and(|out| out.status.success()) {
-        eprintln!(
+        // Not by `eprintln!`, which only failing tests show.
+        let _ = writeln!(
+            std::io::stderr(),
             "skipped: {} has no {package}; `make formats` fetches it",
             python.display()
         );

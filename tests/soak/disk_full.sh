@@ -12,7 +12,8 @@ trap 'umount "$disk"; rmdir "$disk"' EXIT
 make() { "$petcomp" -q dataset generate "$recipe" -n 60 --set 'scene.image=[128,96]' -o "$disk/out"; }
 if make 2> "$disk.log"; then echo "expected the disk to be full"; exit 1; else status=$?; fi
 cat "$disk.log"
-grep -qi "no space left" "$disk.log" && [ "$status" = 4 ]
+grep -qi "no space left" "$disk.log"
+[ "$status" = 4 ]
 rm -f "$disk.log"
 find "$disk/out" -name '*.tmp' | grep . && { echo "temporary files are left"; exit 1; }
 mount -o remount,size=100m "$disk"

@@ -4,6 +4,7 @@ use crate::build::{inserted, segment};
 use crate::make::{Folder, codes, opaque_codes};
 use petcomp::LinearRgb;
 use petcomp::io;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -19,7 +20,10 @@ impl Mount {
             .output();
         let mounted = done.is_ok_and(|output| output.status.success());
         if !mounted {
-            eprintln!("skipped: no right to mount a small file system here");
+            let _ = writeln!(
+                std::io::stderr(),
+                "skipped: no right to mount a small file system here"
+            );
         }
         mounted.then_some(Self(place))
     }

@@ -7,7 +7,7 @@ pub(crate) mod studio;
 pub(crate) mod tray;
 
 use serde_json::{Value, json};
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Write as _};
 use std::net::TcpStream;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
@@ -40,7 +40,10 @@ impl Browser {
     pub(crate) fn open(width: u32, height: u32) -> Option<Self> {
         let profile = tempfile::tempdir().unwrap();
         let Some(mut process) = start(profile.path()) else {
-            eprintln!("chromium is not installed: nothing is tested in a browser");
+            let _ = writeln!(
+                std::io::stderr(),
+                "skipped: chromium is not installed: nothing is tested in a browser"
+            );
             return None;
         };
         let address = devtools_address(&mut process);
