@@ -386,6 +386,47 @@ fn the_frames_of_a_sequence_are_keyed_into_folders() {
 }
 
 #[test]
+fn nothing_that_a_keyer_reads_is_written_over() {
+    let desk = Desk::new();
+    std::fs::create_dir(desk.path("shot")).expect("a folder");
+    let frames = ["shot/0.png", "shot/1.png"];
+    for frame in frames {
+        write_green_ramp(&desk.path(frame), 0.5);
+    }
+    let content = || frames.map(|frame| std::fs::read(desk.path(frame)).expect("a picture"));
+    let before = content();
+    let refused = |frames: &[&str], more: &[&str]| {
+        let screen = ["--screen", "0.02,0.6,0.05"];
+        desk.refused(&[&["matte", "key"][..], frames, more, &screen].concat())
+    };
+    for more in [
+        &["-o", "shot"][..],
+        &["-o", "keyed", "--matte", "./shot"],
+        &["-o", "keyed", "--edges", "shot/../shot"],
+    ] {
+        let told = refused(&frames, more);
+        assert!(told.contains("is read and would be written over"), "{told}");
+    }
+    for more in [
+        &["-o", "shot/0.png"][..],
+        &[
+            "-o",
+            "0.png",
+            "--garbage",
+            "shot/1.png",
+            "--matte",
+            "shot/1.png",
+        ],
+    ] {
+        let told = refused(&frames[..1], more);
+        assert!(told.contains("is read and would be written over"), "{told}");
+    }
+    let told = refused(&frames[..1], &["-o", "0.png", "--matte", "./0.png"]);
+    assert!(told.contains("two pictures would go here"), "{told}");
+    assert!(content() == before && !desk.path("keyed").exists());
+}
+
+#[test]
 fn a_frame_that_cannot_be_keyed_does_not_stop_the_others() {
     let desk = Desk::new();
     write_green_ramp(&desk.path("0.png"), 0.5);

@@ -70,23 +70,36 @@ impl KeyArgs {
 
     /// What goes where: of several frames, everything into folders.
     fn files(&self) -> Result<Vec<FrameFiles>> {
-        if let [frame] = &self.frames[..] {
-            return Ok(vec![self.files_of(frame, Path::to_owned)]);
-        }
+        let files = match &self.frames[..] {
+            [frame] => vec![self.files_of(frame, Path::to_owned)],
+            frames => {
+                let files = frames.iter().map(|frame| self.files_in_folders(frame));
+                files.collect::<Result<_>>()?
+            }
+        };
+        check_distinct(self.inputs(), &files)?;
+        Ok(files)
+    }
+
+    /// Everything that is read.
+    fn inputs(&self) -> impl Iterator<Item = &PathBuf> {
+        let common = [&self.plate, &self.garbage, &self.core];
+        self.frames.iter().chain(common.into_iter().flatten())
+    }
+
+    fn files_in_folders(&self, frame: &Path) -> Result<FrameFiles> {
+        let name = frame
+            .file_name()
+            .context(format!("{}: no file", frame.display()))?;
+        Ok(self.files_of(frame, |folder| folder.join(name)))
+    }
+
+    fn create_folders(&self) -> petcomp::Result<()> {
         let folders = [Some(&self.output), self.matte.as_ref(), self.edges.as_ref()];
         folders
             .into_iter()
             .flatten()
-            .try_for_each(io::create_folder)?;
-        let files = self.frames.iter().map(|frame| {
-            let name = frame
-                .file_name()
-                .context(format!("{}: no file", frame.display()))?;
-            Ok(self.files_of(frame, |folder| folder.join(name)))
-        });
-        let files = files.collect::<Result<Vec<_>>>()?;
-        check_distinct(&files)?;
-        Ok(files)
+            .try_for_each(io::create_folder)
     }
 
     fn files_of(&self, frame: &Path, place: impl Fn(&Path) -> PathBuf) -> FrameFiles {
@@ -107,22 +120,36 @@ struct FrameFiles {
     edges: Option<PathBuf>,
 }
 
-/// Fails on the first file that two pictures would be written to.
-fn check_distinct(files: &[FrameFiles]) -> Result<()> {
-    let mut seen = BTreeSet::new();
-    let targets = files.iter().flat_map(|f| {
-        [Some(&f.cutout), f.matte.as_ref(), f.edges.as_ref()]
-            .into_iter()
-            .flatten()
-    });
-    for target in targets {
+impl FrameFiles {
+    fn targets(&self) -> impl Iterator<Item = &PathBuf> {
+        let optional = [&self.matte, &self.edges];
+        std::iter::once(&self.cutout).chain(optional.into_iter().flatten())
+    }
+}
+
+/// Fails on the first file that is read and would be written over, or that two pictures would be
+/// written to.
+fn check_distinct<'a>(
+    inputs: impl Iterator<Item = &'a PathBuf>,
+    files: &[FrameFiles],
+) -> Result<()> {
+    let inputs: BTreeSet<PathBuf> = inputs.map(|path| real_path(path)).collect();
+    let mut targets = BTreeSet::new();
+    for target in files.iter().flat_map(FrameFiles::targets) {
+        let (path, shown) = (real_path(target), target.display());
         anyhow::ensure!(
-            seen.insert(target),
-            "{}: two pictures would go here",
-            target.display()
+            !inputs.contains(&path),
+            "{shown}: is read and would be written over"
         );
+        anyhow::ensure!(targets.insert(path), "{shown}: two pictures would go here");
     }
     Ok(())
+}
+
+/// One path for every name of a file that is there.
+fn real_path(path: &Path) -> PathBuf {
+    let real = path.canonicalize().or_else(|_| std::path::absolute(path));
+    real.unwrap_or_else(|_| path.to_owned())
 }
 
 fn with_found_mattes(frame: &Path, plate: Option<&Image<LinearRgb>>) -> Result<KeyerInput> {
@@ -164,9 +191,10 @@ pub(crate) fn run(args: &KeyArgs, global: &GlobalArgs) -> Result<()> {
     let work = KeyerWork {
         options: args.options()?,
         plate: read_optional(&args.plate)?,
+    let files = args.files()?;
         args,
     };
-    match &args.files()?[..] {
+    match &files[..] {
         [one] => work.key(one, &mut Keyed::default()),
         frames => work.key_sequence(frames, global),
     }
@@ -195,6 +223,7 @@ impl KeyerWork<'_> {
         let progress = global.start_progress("frames");
         let batch = Mutex::new((FileBatch::default(), 0));
         frames
+        self.args.create_folders()?;
             .par_iter()
             .for_each_init(Keyed::default, |keyed, frame| {
                 let outcome = self.key(frame, keyed);
