@@ -450,6 +450,26 @@ fn a_frame_that_cannot_be_keyed_does_not_stop_the_others() {
 }
 
 #[test]
+fn photos_of_different_size_are_refused() {
+    let desk = Desk::new();
+    for (name, w, h) in [("a.png", 48, 36), ("b.png", 36, 48)] {
+        let photo = petcomp::Image::filled(w, h, petcomp::LinearRgb::new(0.02, 0.6, 0.05));
+        petcomp::io::write(desk.path(name), &photo).expect("a picture");
+    }
+    let told = desk.refused(&["matte", "triangulate", "a.png", "b.png", "-o", "film.exr"]);
+    assert!(
+        told.contains("b.png: 36 x 48 pixels, expected 48 x 36 as a.png"),
+        "{told}"
+    );
+    let key = ["matte", "key", "a.png", "-o", "cut.exr", "--auto-mattes"];
+    let told = desk.refused(&[&key[..], &["--plate", "b.png"]].concat());
+    assert!(
+        told.contains("--plate: 36 x 48 pixels, expected 48 x 36 as a.png"),
+        "{told}"
+    );
+}
+
+#[test]
 fn diff_speaks_like_idiff() {
     let desk = Desk::new();
     let (a, b) = (sample("bottles/b0000_0.png"), sample("bottles/b0001_0.png"));

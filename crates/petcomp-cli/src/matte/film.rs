@@ -1,6 +1,6 @@
 //! `petcomp matte film`, `triangulate`: film from one photo, or from several on different screens.
 
-use super::picture_files::write_optional;
+use super::picture_files::{check_same_size, write_optional};
 use crate::diagnostics::report_diagnostics;
 use crate::global::GlobalArgs;
 use anyhow::Result;
@@ -97,8 +97,16 @@ impl TriangulateArgs {
         Ok(())
     }
 
-    fn read_photos(&self) -> petcomp::Result<Vec<Image<LinearRgb>>> {
-        self.photos.iter().map(io::read).collect()
+    /// Photos of one size.
+    fn read_photos(&self) -> Result<Vec<Image<LinearRgb>>> {
+        let photos: petcomp::Result<Vec<Image<LinearRgb>>> =
+            self.photos.iter().map(io::read).collect();
+        let photos = photos?;
+        for (path, photo) in self.photos.iter().zip(&photos) {
+            let first = photos[0].size();
+            check_same_size(path.display(), photo.size(), &self.photos[0], first)?;
+        }
+        Ok(photos)
     }
 
     fn triangulate(
@@ -130,7 +138,7 @@ impl FilmOptionArgs {
     fn object_mask(&self, path: &Path, photo: &Image<LinearRgb>) -> Result<Image<Coverage>> {
         if let Some(mask) = &self.mask {
             let mask: Image<Coverage> = io::read(mask)?;
-            check_same_size(&mask, photo)?;
+            check_same_size("--mask", mask.size(), path, photo.size())?;
             return Ok(mask);
         }
         let found = segment(photo, &SegmentOptions::default()).map_err(|e| e.in_file(path))?;
@@ -172,15 +180,6 @@ impl FilmOptionArgs {
         write_optional(&self.plate_out, &plate.image)?;
         write_optional(&self.uncertainty, uncertainty)
     }
-}
-
-fn check_same_size(mask: &Image<Coverage>, photo: &Image<LinearRgb>) -> Result<()> {
-    let ((w, h), (width, height)) = (mask.size(), photo.size());
-    anyhow::ensure!(
-        [w, h] == [width, height],
-        "--mask: {w} x {h} pixels, expected {width} x {height} as the photo"
-    );
-    Ok(())
 }
 
 /// The screen and the plastic in a few words.

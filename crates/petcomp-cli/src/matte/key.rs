@@ -1,6 +1,6 @@
 //! `petcomp matte key`: Blender's Keying node on a picture, or on the frames of a sequence.
 
-use super::picture_files::{write_optional, write_picture};
+use super::picture_files::{check_same_size, write_optional, write_picture};
 use crate::batch::FileBatch;
 use crate::diagnostics::report_diagnostics;
 use crate::global::GlobalArgs;
@@ -168,6 +168,9 @@ fn find_mattes(
     photo: &Image<LinearRgb>,
     plate: Option<&Image<LinearRgb>>,
 ) -> Result<[Image<Coverage>; 2]> {
+    if let Some(plate) = plate {
+        check_same_size("--plate", plate.size(), path, photo.size())?;
+    }
     let found = segment(photo, &SegmentOptions::default()).map_err(|e| e.in_file(path))?;
     report_diagnostics(path.display(), &found.diagnostics);
     Ok(match plate {
@@ -188,10 +191,10 @@ struct KeyerInput {
 }
 
 pub(crate) fn run(args: &KeyArgs, global: &GlobalArgs) -> Result<()> {
+    let files = args.files()?;
     let work = KeyerWork {
         options: args.options()?,
         plate: read_optional(&args.plate)?,
-    let files = args.files()?;
         args,
     };
     match &files[..] {
@@ -220,10 +223,10 @@ impl KeyerWork<'_> {
     /// Frames side by side: while some are read or written, others are keyed. A frame that cannot
     /// be keyed does not stop the others.
     fn key_sequence(&self, frames: &[FrameFiles], global: &GlobalArgs) -> Result<()> {
+        self.args.create_folders()?;
         let progress = global.start_progress("frames");
         let batch = Mutex::new((FileBatch::default(), 0));
         frames
-        self.args.create_folders()?;
             .par_iter()
             .for_each_init(Keyed::default, |keyed, frame| {
                 let outcome = self.key(frame, keyed);
