@@ -470,6 +470,18 @@ fn photos_of_different_size_are_refused() {
 }
 
 #[test]
+fn film_is_written_into_files_called_exr_alone() {
+    let desk = Desk::new();
+    for args in [&["film", "a.png"][..], &["triangulate", "a.png", "b.png"]] {
+        let told = desk.refused(&[&["matte"], args, &["-o", "film.png"]].concat());
+        assert!(
+            told.contains("film.png: film needs a file called .exr"),
+            "{told}"
+        );
+    }
+}
+
+#[test]
 fn diff_speaks_like_idiff() {
     let desk = Desk::new();
     let (a, b) = (sample("bottles/b0000_0.png"), sample("bottles/b0001_0.png"));

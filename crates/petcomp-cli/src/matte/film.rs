@@ -1,6 +1,6 @@
 //! `petcomp matte film`, `triangulate`: film from one photo, or from several on different screens.
 
-use super::picture_files::{check_same_size, write_optional};
+use super::picture_files::{check_same_size, is_exr, write_optional};
 use crate::diagnostics::report_diagnostics;
 use crate::global::GlobalArgs;
 use anyhow::Result;
@@ -57,6 +57,7 @@ pub(crate) struct TriangulateArgs {
 impl FilmArgs {
     pub(crate) fn run(&self, global: &GlobalArgs) -> Result<()> {
         let args = &self.options;
+        args.check_output()?;
         let photo: Image<LinearRgb> = io::read(&self.photo)?;
         let inside = args.object_mask(&self.photo, &photo)?;
         let plate = args.screen_plate(0, &self.photo, &photo, &inside)?;
@@ -83,6 +84,7 @@ impl FilmArgs {
 impl TriangulateArgs {
     pub(crate) fn run(&self, global: &GlobalArgs) -> Result<()> {
         let args = &self.options;
+        args.check_output()?;
         let photos = self.read_photos()?;
         let inside = args.object_mask(&self.photos[0], &photos[0])?;
         let plates = self.screen_plates(&photos, &inside)?;
@@ -134,6 +136,16 @@ impl TriangulateArgs {
 }
 
 impl FilmOptionArgs {
+    /// No other format holds the channels of film.
+    fn check_output(&self) -> Result<()> {
+        anyhow::ensure!(
+            is_exr(&self.output),
+            "{}: film needs a file called .exr",
+            self.output.display()
+        );
+        Ok(())
+    }
+
     /// The mask that is given, or that of the object that is found.
     fn object_mask(&self, path: &Path, photo: &Image<LinearRgb>) -> Result<Image<Coverage>> {
         if let Some(mask) = &self.mask {

@@ -15,12 +15,12 @@ pub(crate) fn write_picture<P: ToFile>(path: &Path, image: &Image<P>) -> Result<
     Ok(io::write_with(path, image, &options)?)
 }
 
-fn is_exr(path: &Path) -> bool {
+/// The file is called `.exr`.
+pub(super) fn is_exr(path: &Path) -> bool {
     let extension = path.extension();
     extension.is_some_and(|e| e.eq_ignore_ascii_case("exr"))
 }
 
-/// Writes a picture where one was asked for.
 /// Fails where a picture has not the size of a photo; both are named as the user does.
 pub(super) fn check_same_size(
     name: impl Display,
@@ -36,6 +36,7 @@ pub(super) fn check_same_size(
     Ok(())
 }
 
+/// Writes a picture where one was asked for.
 pub(crate) fn write_optional<P: ToFile>(path: &Option<PathBuf>, image: &Image<P>) -> Result<()> {
     path.iter().try_for_each(|path| write_picture(path, image))
 }
