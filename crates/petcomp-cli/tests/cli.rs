@@ -482,6 +482,25 @@ fn film_is_written_into_files_called_exr_alone() {
 }
 
 #[test]
+fn color_spill_limits_green_by_red_and_has_no_matte() {
+    let desk = Desk::new();
+    let photo = petcomp::Image::from_fn(2, 1, |x, _| {
+        petcomp::LinearRgb::new(0.25, [0.125, 0.75][x], 0.5)
+    });
+    petcomp::io::write(desk.path("photo.exr"), &photo).expect("a picture");
+    let spill = ["matte", "color-spill", "photo.exr", "-o", "clean.exr"];
+    desk.ok(&spill);
+    let clean: petcomp::Image<petcomp::PremulRgba> =
+        petcomp::io::read(desk.path("clean.exr")).expect("a picture");
+    for (x, green) in [(0, 0.125), (1, 0.25)] {
+        let p = clean[(x, 0)];
+        assert_eq!([p.r, p.g, p.b, p.a], [0.25, green, 0.5, 1.0]);
+    }
+    let told = desk.refused(&[&spill[..], &["--matte", "matte.exr"]].concat());
+    assert!(told.contains("unexpected argument '--matte'"), "{told}");
+}
+
+#[test]
 fn diff_speaks_like_idiff() {
     let desk = Desk::new();
     let (a, b) = (sample("bottles/b0000_0.png"), sample("bottles/b0001_0.png"));

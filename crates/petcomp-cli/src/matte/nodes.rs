@@ -12,20 +12,27 @@ use petcomp::matte::{
 use petcomp::{Coverage, Image, LinearRgb, PremulRgba, io};
 use std::path::{Path, PathBuf};
 
-/// A picture in, pictures out, settings in between.
+/// A picture in, a picture out, settings in between.
 #[derive(clap::Args, Debug)]
-pub(crate) struct NodePictures {
+pub(crate) struct NodePicture {
     /// The picture to key; alpha is taken as premultiplied
     input: PathBuf,
     /// Where the premultiplied result goes; an EXR holds 32-bit floats
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// Where the matte goes
-    #[arg(long, value_name = "FILE")]
-    matte: Option<PathBuf>,
     /// A setting under Blender's name, such as key.tolerance=0.2 or key.profile=blender-4.5
     #[arg(long = "set", value_name = "key.NAME=VALUE")]
     settings: Vec<Override>,
+}
+
+/// The same with a matte.
+#[derive(clap::Args, Debug)]
+pub(crate) struct KeyerPictures {
+    #[command(flatten)]
+    picture: NodePicture,
+    /// Where the matte goes
+    #[arg(long, value_name = "FILE")]
+    matte: Option<PathBuf>,
 }
 
 #[derive(clap::Subcommand, Debug)]
@@ -33,23 +40,23 @@ pub(crate) enum NodeCommand {
     /// Key by the angle between colour differences
     ChromaKey {
         #[command(flatten)]
-        pictures: NodePictures,
+        pictures: KeyerPictures,
         /// Colour of the screen, scene-linear
         #[arg(long, value_name = "R,G,B", value_parser = parse_color)]
         screen: LinearRgb,
     },
     /// Key by one channel against the others
-    ChannelKey(NodePictures),
+    ChannelKey(KeyerPictures),
     /// Key by the difference from a picture without the subject
     DifferenceKey {
         #[command(flatten)]
-        pictures: NodePictures,
+        pictures: KeyerPictures,
         /// The picture without the subject
         #[arg(long, value_name = "FILE")]
         clean: PathBuf,
     },
     /// Take the screen's light from the subject
-    ColorSpill(NodePictures),
+    ColorSpill(NodePicture),
     /// Make a plate from points where the screen is seen
     KeyingScreen(KeyingScreenArgs),
 }
@@ -87,15 +94,27 @@ pub(crate) fn run(command: &NodeCommand) -> Result<()> {
         }),
         NodeCommand::DifferenceKey { pictures, clean } => pictures.difference_key(clean),
         NodeCommand::ChannelKey(pictures) => pictures.channel_key(),
-        NodeCommand::ColorSpill(pictures) => pictures.color_spill(),
+        NodeCommand::ColorSpill(picture) => picture.color_spill(),
         NodeCommand::KeyingScreen(args) => args.run(),
     }
 }
 
-impl NodePictures {
-    fn channel_key(&self) -> Result<()> {
+impl NodePicture {
+    fn color_spill(&self) -> Result<()> {
+        let photo = self.read_photo()?;
         let options = from_overrides("key", &self.settings)?;
-        let keyed = channel_key(&self.read_photo()?, &options);
+        write_picture(&self.output, &color_spill(&photo, &options))
+    }
+
+    fn read_photo(&self) -> petcomp::Result<Image<PremulRgba>> {
+        io::read(&self.input)
+    }
+}
+
+impl KeyerPictures {
+    fn channel_key(&self) -> Result<()> {
+        let options = from_overrides("key", &self.picture.settings)?;
+        let keyed = channel_key(&self.picture.read_photo()?, &options);
         self.write_pair(&keyed.cutout, &keyed.matte)
     }
 
@@ -107,28 +126,18 @@ impl NodePictures {
         })
     }
 
-    fn color_spill(&self) -> Result<()> {
-        let photo = self.read_photo()?;
-        let options = from_overrides("key", &self.settings)?;
-        write_picture(&self.output, &color_spill(&photo, &options))
-    }
-
     /// Writes the picture seen through a matte.
     fn write_cut_out(
         &self,
         matte: impl Fn(&Image<PremulRgba>, &[Override]) -> Result<Image<Coverage>>,
     ) -> Result<()> {
-        let photo = self.read_photo()?;
-        let matte = matte(&photo, &self.settings)?;
+        let photo = self.picture.read_photo()?;
+        let matte = matte(&photo, &self.picture.settings)?;
         self.write_pair(&photo.zip_map(&matte, |p, m| p.masked(m)), &matte)
     }
 
-    fn read_photo(&self) -> petcomp::Result<Image<PremulRgba>> {
-        io::read(&self.input)
-    }
-
     fn write_pair(&self, cutout: &Image<PremulRgba>, matte: &Image<Coverage>) -> Result<()> {
-        write_picture(&self.output, cutout)?;
+        write_picture(&self.picture.output, cutout)?;
         write_optional(&self.matte, matte)
     }
 }
