@@ -122,8 +122,8 @@ struct ScaleArgs {
     #[arg(long, value_name = "METRES")]
     length: Option<f64>,
     /// Or: width and height of the object, metres
-    #[arg(long, value_name = "W,H", value_delimiter = ',', num_args = 2)]
-    size: Option<Vec<f64>>,
+    #[arg(long, value_name = "WxH", value_parser = parse_metres)]
+    size: Option<[f64; 2]>,
     /// Or: scale of the photos at half the object's height, pixels per metre
     #[arg(long, value_name = "PX_PER_M")]
     scale: Option<f64>,
@@ -153,7 +153,7 @@ impl ScaleArgs {
     }
 
     fn object_size(&self) -> Option<Scale> {
-        let [w, h] = *self.size.as_deref()?.first_chunk()?;
+        let [w, h] = self.size?;
         Some(Scale::Size([f64::max(w, h), f64::min(w, h)]))
     }
 }

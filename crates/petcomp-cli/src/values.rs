@@ -39,9 +39,9 @@ fn parse_finite(text: &str) -> Option<f64> {
         .filter(|value: &f64| value.is_finite())
 }
 
-/// Width and height in metres from `0.6x0.4`.
+/// Width and height in metres from `0.6x0.4` or `0.6,0.4`.
 pub(crate) fn parse_metres(text: &str) -> Result<[f64; 2], String> {
-    let (w, h) = text.split_once(['x', 'X']).unwrap_or_default();
+    let (w, h) = split_size(text);
     match (parse_finite(w), parse_finite(h)) {
         (Some(w), Some(h)) if w > 0.0 && h > 0.0 => Ok([w, h]),
         _ => Err(format!(
@@ -52,11 +52,15 @@ pub(crate) fn parse_metres(text: &str) -> Result<[f64; 2], String> {
 
 /// Width and height in pixels from `640x480` or `640,480`.
 pub(crate) fn parse_pixel_size(text: &str) -> Result<[u32; 2], String> {
-    let (w, h) = text.split_once(['x', ',']).unwrap_or_default();
+    let (w, h) = split_size(text);
     match (w.trim().parse(), h.trim().parse()) {
         (Ok(w), Ok(h)) if w > 0 && h > 0 => Ok([w, h]),
         _ => Err(format!("\"{text}\", expected WIDTHxHEIGHT as in 640x480")),
     }
+}
+
+fn split_size(text: &str) -> (&str, &str) {
+    text.split_once(['x', 'X', ',']).unwrap_or_default()
 }
 
 /// A colour from `R,G,B`.

@@ -181,6 +181,21 @@ fn a_check_fails_on_what_needs_review_where_that_is_asked_for() {
     assert_eq!(strict.status.code(), Some(1), "{}", text(&strict.stderr));
 }
 
+#[test]
+fn the_size_of_an_object_is_written_as_every_size() {
+    let desk = Desk::new();
+    write_slab(&desk.path("slab.png"));
+    for size in ["0.2x0.1", "0.1,0.2"] {
+        let said = desk.ok(&[
+            "asset", "add", "slab.png", "--class", "slab", "--size", size, "-o", "assets",
+        ]);
+        assert!(
+            said.contains("slab.exr: 200.0 x 100.0 mm"),
+            "{size}: {said}"
+        );
+    }
+}
+
 /// What a terminal shows of a job, from its start.
 #[cfg(target_os = "linux")]
 #[test]
@@ -479,6 +494,18 @@ fn film_is_written_into_files_called_exr_alone() {
             "{told}"
         );
     }
+}
+
+/// A red slab in the middle of a green screen.
+fn write_slab(path: &Path) {
+    let slab = petcomp::Image::from_fn(120, 80, |x, y| {
+        match (30..90).contains(&x) && (25..55).contains(&y) {
+            true => petcomp::LinearRgb::new(0.6, 0.05, 0.05),
+            false => petcomp::LinearRgb::new(0.04, 0.4, 0.08),
+        }
+    });
+    std::fs::create_dir_all(path.parent().expect("inside the desk")).expect("a folder");
+    petcomp::io::write(path, &slab).expect("a picture");
 }
 
 #[test]
