@@ -9,7 +9,7 @@ use crate::values::{parse_corners, parse_metres};
 use petcomp::asset::{self, Asset, Built, Library, Manifest};
 use petcomp::asset::{CaptureEntry, Photo, PhotoEntry, PhotoRecord, Role, Scale, ScreenSource};
 use petcomp::matte::{CutOutOptions, MatteMethod};
-use petcomp::{Quality, io};
+use petcomp::{Error, Quality, io};
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Subcommand)]
@@ -85,7 +85,7 @@ pub(crate) struct AddPhotoArgs {
     scale: ScaleArgs,
     /// Corners of the screen for --screen-size, from the top left clockwise, pixels; by default
     /// they are found
-    #[arg(long, value_name = "X,Y X,Y X,Y X,Y", value_parser = parse_corners, requires = "screen_size")]
+    #[arg(long, value_name = "X,Y X,Y X,Y X,Y", value_parser = parse_corners, allow_hyphen_values = true)]
     screen_corners: Option<[[f64; 2]; 4]>,
     #[command(flatten)]
     capture: CaptureArgs,
@@ -102,15 +102,15 @@ pub(crate) struct AddPhotoArgs {
 #[derive(clap::Args)]
 struct CaptureArgs {
     /// With --captured: photos of the same frames without the object, from the same place
-    #[arg(long, value_name = "PHOTO", num_args = 1.., requires = "captured")]
+    #[arg(long, value_name = "PHOTO", num_args = 1..)]
     empty: Vec<PathBuf>,
     /// With --captured: what `capture frames` wrote about the display; by default display.toml
     /// beside the first photo
-    #[arg(long, value_name = "FILE", requires = "captured")]
+    #[arg(long, value_name = "FILE")]
     display: Option<PathBuf>,
     /// With --captured: width of the whole picture on the display, metres, by a ruler; by default
     /// what display.toml says
-    #[arg(long, value_name = "METRES", requires = "captured")]
+    #[arg(long, value_name = "METRES")]
     display_width: Option<f64>,
 }
 
@@ -264,6 +264,7 @@ fn write_sheet(folder: &Path, library: &Library, global: &GlobalArgs) -> anyhow:
 }
 
 fn add_photos(args: &AddPhotoArgs, global: &GlobalArgs) -> anyhow::Result<()> {
+    args.check_companions()?;
     let added = args.add_each(global)?;
     let library = Library::open_with(&args.output, added)?;
     show_classes(&library.classes, "--classes", global);
@@ -284,7 +285,30 @@ fn describe_size(record: &PhotoRecord) -> String {
     format!("{file}: {length:.1} x {width:.1} mm (+- {error:.1})")
 }
 
+/// Fails where an option is given without the one that it belongs to.
+fn check_companion(name: &str, is_given: bool, to: &str, is_there: bool) -> petcomp::Result<()> {
+    match is_given && !is_there {
+        true => Err(Error::value(name, format!("given without {to}"))),
+        false => Ok(()),
+    }
+}
+
 impl AddPhotoArgs {
+    /// Clap asks for none of the options that exclude each other where another one of them is given.
+    fn check_companions(&self) -> petcomp::Result<()> {
+        let (scale, capture) = (&self.scale, &self.capture);
+        let (corners, screen) = (self.screen_corners.is_some(), scale.screen_size.is_some());
+        check_companion("--screen-corners", corners, "--screen-size", screen)?;
+        let of_captured = [
+            ("--empty", !capture.empty.is_empty()),
+            ("--display", capture.display.is_some()),
+            ("--display-width", capture.display_width.is_some()),
+        ];
+        of_captured.into_iter().try_for_each(|(name, is_given)| {
+            check_companion(name, is_given, "--captured", scale.captured)
+        })
+    }
+
     fn add_each(&self, global: &GlobalArgs) -> petcomp::Result<Vec<Photo>> {
         let options = self.quality.cut_out(CutOutOptions::default());
         // All photos of a capture are of one cut-out.

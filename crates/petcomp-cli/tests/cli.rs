@@ -196,6 +196,30 @@ fn the_size_of_an_object_is_written_as_every_size() {
     }
 }
 
+#[test]
+fn an_option_without_the_one_that_it_belongs_to_is_refused() {
+    let desk = Desk::new();
+    let add = |more: &[&str]| {
+        let add = ["asset", "add", "can.png", "--class", "can", "-o", "assets"];
+        desk.refused(&[&add[..], more].concat())
+    };
+    let corners = ["--screen-corners", "-3,-2 600,0 600,400 0,400"];
+    for ([option, value], other) in [
+        (["--empty", "empty.png"], "--captured"),
+        (["--display", "display.toml"], "--captured"),
+        (["--display-width", "0.3"], "--captured"),
+        (corners, "--screen-size"),
+    ] {
+        let told = add(&["--length", "0.2", option, value]);
+        assert!(
+            told.contains(&format!("{option}: given without {other}")),
+            "{told}"
+        );
+    }
+    let told = add(&[&["--screen-size", "0.6x0.4"], &corners[..]].concat());
+    assert!(told.contains("can.png: no such file"), "{told}");
+}
+
 /// What a terminal shows of a job, from its start.
 #[cfg(target_os = "linux")]
 #[test]
