@@ -81,22 +81,7 @@ impl List {
             return Err(Error::value("photos", "empty, expected at least one"));
         }
         check_each(&self.photos, "photos", |photo| photo.check(manifest))?;
-        self.check_files()
-    }
-
-    /// No two photos become the same file.
-    fn check_files(&self) -> Result<()> {
-        let mut seen = BTreeMap::new();
-        for (i, photo) in self.photos.iter().enumerate() {
-            if let Some(first) = seen.insert(photo.cut_out_file(), i) {
-                let what = format!(
-                    "\"{}\", would become the same cut-out as photos[{first}]",
-                    photo.file.display()
-                );
-                return Err(Error::value(format!("photos[{i}].file"), what));
-            }
-        }
-        Ok(())
+        check_cut_out_files(&self.photos)
     }
 
     /// The same with the paths of a list in `folder` relative to the working folder.
@@ -113,6 +98,24 @@ impl List {
         }
         self
     }
+}
+
+/// No two photos become the same file.
+///
+/// # Errors
+/// [`Error::Value`] for the first that would, naming the entry.
+pub fn check_cut_out_files(photos: &[PhotoEntry]) -> Result<()> {
+    let mut seen = BTreeMap::new();
+    for (i, photo) in photos.iter().enumerate() {
+        if let Some(first) = seen.insert(photo.cut_out_file(), i) {
+            let what = format!(
+                "\"{}\", would become the same cut-out as photos[{first}]",
+                photo.file.display()
+            );
+            return Err(Error::value(format!("photos[{i}].file"), what));
+        }
+    }
+    Ok(())
 }
 
 fn is_csv(path: &Path) -> bool {

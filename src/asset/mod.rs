@@ -56,6 +56,8 @@ pub use equirectangular::uv_to_direction;
 pub use folder::add_photo;
 pub use library::{Library, Photo};
 pub use list::List;
+#[doc(hidden)]
+pub use list::check_cut_out_files;
 pub use manifest::Asset;
 #[doc(hidden)]
 pub use manifest::{CaptureRecord, Manifest, PhotoRecord};

@@ -311,28 +311,34 @@ impl AddPhotoArgs {
 
     fn add_each(&self, global: &GlobalArgs) -> petcomp::Result<Vec<Photo>> {
         let options = self.quality.cut_out(CutOutOptions::default());
-        // All photos of a capture are of one cut-out.
+        let entries = self.entries();
+        asset::check_cut_out_files(&entries)?;
+        let entries = entries.iter();
+        entries
+            .map(|entry| self.add_photo(entry, &options, global))
+            .collect()
+    }
+
+    fn add_photo(
+        &self,
+        entry: &PhotoEntry,
+        options: &CutOutOptions,
+        global: &GlobalArgs,
+    ) -> petcomp::Result<Photo> {
+        let added = asset::add_photo(&self.output, entry, &self.classes, options)?;
+        report_added(&added.record, global);
+        Ok(added)
+    }
+
+    /// One for each cut-out; all photos of a capture are of one.
+    fn entries(&self) -> Vec<PhotoEntry> {
         let count = if self.scale.captured {
             1
         } else {
             self.photos.len()
         };
         let photos = self.photos.iter().take(count);
-        photos
-            .map(|photo| self.add_photo(photo, &options, global))
-            .collect()
-    }
-
-    fn add_photo(
-        &self,
-        photo: &Path,
-        options: &CutOutOptions,
-        global: &GlobalArgs,
-    ) -> petcomp::Result<Photo> {
-        let entry = self.entry_for(photo);
-        let added = asset::add_photo(&self.output, &entry, &self.classes, options)?;
-        report_added(&added.record, global);
-        Ok(added)
+        photos.map(|photo| self.entry_for(photo)).collect()
     }
 
     fn entry_for(&self, photo: &Path) -> PhotoEntry {

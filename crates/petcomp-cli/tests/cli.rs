@@ -220,6 +220,29 @@ fn an_option_without_the_one_that_it_belongs_to_is_refused() {
     assert!(told.contains("can.png: no such file"), "{told}");
 }
 
+#[test]
+fn photos_that_would_become_one_cut_out_are_refused() {
+    let desk = Desk::new();
+    write_slab(&desk.path("one/can.png"));
+    write_slab(&desk.path("two/can.png"));
+    let told = desk.refused(&[
+        "asset",
+        "add",
+        "one/can.png",
+        "two/can.png",
+        "--class",
+        "can",
+        "--length",
+        "0.2",
+        "-o",
+        "assets",
+    ]);
+    assert!(
+        told.contains("\"two/can.png\", would become the same cut-out as photos[0]"),
+        "{told}"
+    );
+}
+
 /// What a terminal shows of a job, from its start.
 #[cfg(target_os = "linux")]
 #[test]
