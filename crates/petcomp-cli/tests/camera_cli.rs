@@ -245,6 +245,25 @@ fn photos_solved_together_are_used_together() {
 }
 
 #[test]
+fn corners_outside_of_the_picture_can_be_given() {
+    let desk = Desk::new();
+    desk.photo("a", IMAGE);
+    let init = ["camera", "init", "bg/a.png", "--size", "0.56x0.37"];
+    let corners = ["--corners", "-300,-200 1000,0 900,700 -250,600"];
+    desk.ok(&[&init[..], &corners].concat());
+    let label: Value = io::read_json(desk.path("bg/a.label.json")).unwrap();
+    assert_eq!(
+        label["surface"]["corners_px"],
+        json!([
+            [-300.0, -200.0],
+            [1000.0, 0.0],
+            [900.0, 700.0],
+            [-250.0, 600.0]
+        ])
+    );
+}
+
+#[test]
 fn a_label_comes_from_nothing() {
     let desk = Desk::new();
     let label = desk.photo("a", IMAGE);
