@@ -28,9 +28,9 @@ pub(crate) struct DemoArgs {
 pub(crate) fn run(args: &DemoArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     let list = args.photo_list()?;
     io::create_folder(&args.output)?;
-    let recipe = args.write_recipe()?;
-    let library = asset::build_library(&list, &args.output.join("assets"), global)?;
+    let recipe = args.recipe()?;
     let config = DatasetConfig::read(&recipe, &[])?;
+    let library = asset::build_library(&list, &args.output.join("assets"), global)?;
     let pipeline = Pipeline::with_library(config, library)?;
     let plan = pipeline.plan(args.count, args.seed, args.dataset_folder())?;
     let counts = dataset::generate_supervised(&pipeline, &plan, &args.consent, global)?;
@@ -59,13 +59,17 @@ impl DemoArgs {
         Ok(io::relative(&backgrounds, &io::absolute(&self.output)?))
     }
 
-    /// A recipe file that names its folders and nothing else.
-    fn write_recipe(&self) -> petcomp::Result<PathBuf> {
+    /// A recipe file that names its folders and nothing else, or the one that is there: a person
+    /// may have changed it.
+    fn recipe(&self) -> petcomp::Result<PathBuf> {
+        let path = self.output.join("recipe.toml");
+        if path.exists() {
+            return Ok(path);
+        }
         let backgrounds = self.relative_backgrounds()?;
         // A JSON string is a TOML string.
         let backgrounds = serde_json::Value::from(backgrounds.to_string_lossy());
         let text = format!("assets = \"assets\"\nbackgrounds = {backgrounds}\n");
-        let path = self.output.join("recipe.toml");
         io::write_text(&path, &text)?;
         Ok(path)
     }

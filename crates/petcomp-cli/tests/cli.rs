@@ -589,6 +589,16 @@ fn diff_speaks_like_idiff() {
 }
 
 #[test]
+fn the_demo_goes_by_the_recipe_that_is_there() {
+    let desk = Desk::new();
+    let recipe = desk.write("demo/recipe.toml", "[scene]\nobjcts = 3\n");
+    let error = desk.refused(&["demo", "--samples", &sample("")]);
+    assert!(error.contains("scene: unknown key \"objcts\""), "{error}");
+    let text = std::fs::read_to_string(recipe).expect("the recipe");
+    assert_eq!(text, "[scene]\nobjcts = 3\n");
+}
+
+#[test]
 fn the_demo_makes_the_same_files_at_any_thread_count() {
     let desk = Desk::new();
     let demo = |threads: &str, folder: &str| {
