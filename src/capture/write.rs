@@ -17,9 +17,13 @@ pub(super) const DISPLAY: &str = "display.toml";
 /// Writes the frames as PNG files, a page that shows them and `display.toml` into a folder, which
 /// is made if it is not there; returns the path of the page.
 ///
+/// A display without a width keeps the one that was written into the folder's `display.toml`.
+///
 /// # Errors
-/// [`Error::Value`](crate::Error::Value) for a display that cannot be right; those of writing.
+/// [`Error::Value`](crate::Error::Value) for a display that cannot be right; those of reading the
+/// `display.toml` that is there, and of writing.
 pub fn write_frames(folder: &Path, display: &Display, with_stripes: bool) -> Result<PathBuf> {
+    let display = &with_known_width(display, &folder.join(DISPLAY))?;
     display.check()?;
     io::create_folder(folder)?;
     let frames: Vec<Frame> = Frame::all(with_stripes).collect();
@@ -31,6 +35,22 @@ pub fn write_frames(folder: &Path, display: &Display, with_stripes: bool) -> Res
     let path = folder.join(PAGE);
     io::write_text(&path, &page(display, &pngs))?;
     Ok(path)
+}
+
+/// The display with the width that its file says, where it has none itself.
+fn with_known_width(display: &Display, file: &Path) -> Result<Display> {
+    if display.width.is_some() || !file.exists() {
+        return Ok(*display);
+    }
+    let known: Display = io::read_toml(file)?;
+    if known.size_px == display.size_px {
+        return Ok(known);
+    }
+    if let Some(width) = known.width {
+        let file = file.display();
+        log::warn!("{file}: width = {width} is gone with the size that it was measured at");
+    }
+    Ok(*display)
 }
 
 /// Writes one frame and returns the bytes of its file.
@@ -58,6 +78,22 @@ mod tests {
         let read: Display = io::read_toml(folder.path().join(DISPLAY)).unwrap();
         assert_eq!(read, display);
         assert!(folder.path().join("17_stripes_y_fine_4.png").exists());
+    }
+
+    #[test]
+    fn a_width_that_was_written_later_stays_with_its_size() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join(DISPLAY);
+        let written = |size_px, width| -> Option<f64> {
+            write_frames(folder.path(), &Display { size_px, width }, false).unwrap();
+            io::read_toml::<Display>(&file).unwrap().width
+        };
+        assert_eq!(written([400, 500], None), None);
+        let measured = std::fs::read_to_string(&file).unwrap() + "width = 0.345\n";
+        std::fs::write(&file, measured).unwrap();
+        assert_eq!(written([400, 500], None), Some(0.345));
+        assert_eq!(written([400, 500], Some(0.2)), Some(0.2));
+        assert_eq!(written([500, 400], None), None);
     }
 
     #[test]
