@@ -103,7 +103,7 @@ impl Plan {
 ///
 /// # Errors
 /// [`Error::Interrupted`] after a stop; the first error of `make` or of a writer, in order of `k`
-/// among those in hand; a folder that is a file, holds something else, was made from another plan
+/// among those in hand; a single sample beyond the plan's; a folder that is a file, holds something else, was made from another plan
 /// (the message names the field), or is being written by another run; a disk without room. In every
 /// case the folder stays valid, and the same call continues it.
 pub fn generate(

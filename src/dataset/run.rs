@@ -94,6 +94,7 @@ pub(super) fn run(
     stop: &AtomicBool,
 ) -> Result<DatasetCounts> {
     check_count(plan.count)?;
+    plan.range.check(plan.count)?;
     let _lock = folder::claim(plan)?;
     plan.inputs.keep(&plan.folder);
     let journal = Journal::open(&plan.folder)?;

@@ -32,6 +32,17 @@ impl SampleRange {
         }
     }
 
+    /// Fails where the one that is asked for is none of `count`.
+    pub(crate) fn check(self, count: u64) -> Result<()> {
+        match self {
+            Self::One(k) if k >= count => {
+                let what = format!("{k}, expected a number below that of the images, {count}");
+                Err(Error::value("only", what))
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// Where they are written, given the folder of the dataset: a shard has one of its own, unless it
     /// makes archives.
     #[doc(hidden)]

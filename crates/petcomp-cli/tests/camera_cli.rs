@@ -386,6 +386,29 @@ fn labels_of_other_programs_are_labels_everywhere() {
 }
 
 #[test]
+fn an_image_beyond_the_dataset_is_refused() {
+    let desk = Desk::new();
+    desk.label("a", &desk.photo("a", IMAGE));
+    let generate = [
+        "dataset",
+        "generate",
+        "recipe.toml",
+        "-n",
+        "60",
+        "-o",
+        "out",
+        "--only",
+    ];
+    let told = desk.refused(&[&generate[..], &["60"]].concat());
+    assert!(
+        told.contains("only: 60, expected a number below that of the images, 60"),
+        "{told}"
+    );
+    assert!(!desk.path("out").exists());
+    desk.ok(&[&generate[..], &["59"]].concat());
+}
+
+#[test]
 fn other_files_beside_the_photos_are_left_alone() {
     let desk = Desk::new();
     desk.label("a", &desk.photo("a", IMAGE));
