@@ -156,7 +156,7 @@ fn height_advice(label: &Label, solution: &Solution, options: &SolveOptions) -> 
         format!(
             "Measure the height of the lens above the surface (about {height:.2} m) to {:.0} mm and write it as \
              camera.height_m: that would bring {:.1} px down to {better:.1}. So would another photo or two of the rectangle at \
-             25 to 40 degrees with the same zoom (camera joint).",
+             25 to 40 degrees with the same zoom and camera.id (camera joint).",
             1000.0 * TAPE_HEIGHT_SIGMA * height,
             solution.sigma.height_px
         )

@@ -245,6 +245,24 @@ fn photos_solved_together_are_used_together() {
 }
 
 #[test]
+fn labels_that_are_solved_alone_are_named() {
+    let desk = Desk::new();
+    let joint = ["camera", "joint", "bg/a.label.json", "bg/b.label.json"];
+    let alone = |id: Value| {
+        for name in ["a", "b"] {
+            let mut label = desk.photo(name, IMAGE);
+            label["camera"] = json!({ "id": id });
+            desk.label(name, &label);
+        }
+        let [_, said] = desk.ok(&joint);
+        said.matches("label.json: solved alone: no other label has its camera.id")
+            .count()
+    };
+    assert_eq!(alone(Value::Null), 2);
+    assert_eq!(alone(json!("phone")), 0);
+}
+
+#[test]
 fn corners_outside_of_the_picture_can_be_given() {
     let desk = Desk::new();
     desk.photo("a", IMAGE);

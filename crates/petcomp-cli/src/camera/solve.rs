@@ -110,6 +110,13 @@ pub(super) fn solve_joint(args: &JointArgs, global: &GlobalArgs) -> anyhow::Resu
     let mut batch = FileBatch::default();
     for group in camera::group_by_camera(&labels_of(&labels)) {
         let members: Vec<LabelledPhoto> = group.iter().map(|&i| labels[i].clone()).collect();
+        if let [alone] = &members[..]
+            && labels.len() > 1
+        {
+            log::warn!(
+                "{alone}: solved alone: no other label has its camera.id and picture's shape"
+            );
+        }
         for (member, photo) in members.iter().zip(solve_together(&members)?) {
             batch.count(accept_member(member, photo, &members, args.force, global));
         }
