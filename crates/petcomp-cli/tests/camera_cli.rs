@@ -281,6 +281,63 @@ fn corners_outside_of_the_picture_can_be_given() {
     );
 }
 
+/// A photo of marker 0 of `DICT_4X4_50` on white paper, its black square at 200 to 260 and 150 to
+/// 210 pixels.
+fn photo_of_a_marker() -> Image<LinearRgb> {
+    const CODE: u16 = 0xb532;
+    Image::from_fn(IMAGE[0] as usize, IMAGE[1] as usize, |x, y| {
+        let (column, row) = (
+            (x as i32 - 200).div_euclid(10),
+            (y as i32 - 150).div_euclid(10),
+        );
+        let is_within =
+            |cells: std::ops::Range<i32>| cells.contains(&column) && cells.contains(&row);
+        let is_white = is_within(1..5) && CODE >> (15 - (4 * (row - 1) + column - 1)) & 1 == 1;
+        match (is_within(-1..7), is_within(0..6) && !is_white) {
+            (_, true) => LinearRgb::grey(0.04),
+            (true, false) => LinearRgb::grey(0.8),
+            (false, false) => LinearRgb::grey(0.3),
+        }
+    })
+}
+
+#[test]
+fn the_corners_of_a_marker_are_added_to_a_label() {
+    let desk = Desk::new();
+    io::write(desk.path("a.png"), &photo_of_a_marker()).unwrap();
+    let mut map = desk.photo("a", IMAGE);
+    map["surface"]["corners_px"] = Value::Null;
+    map["markers"] =
+        json!({ "family": "DICT_4X4_50", "size_m": 0.06, "map": { "0": [0.1, 0.0, 0.0] } });
+    desk.write("map.json", &map.to_string());
+    let [said, _] = desk.ok(&[
+        "camera",
+        "markers",
+        "a.png",
+        "--map",
+        "map.json",
+        "-o",
+        "a.label.json",
+    ]);
+    assert!(said.contains("4 marker corners"), "{said}");
+    let label: Value = io::read_json(desk.path("a.label.json")).unwrap();
+    let truth = [
+        ([0.07, 0.03], [200.0, 150.0]),
+        ([0.13, 0.03], [260.0, 150.0]),
+        ([0.13, -0.03], [260.0, 210.0]),
+        ([0.07, -0.03], [200.0, 210.0]),
+    ];
+    for (point, (xy_m, px)) in label["points"].as_array().unwrap().iter().zip(truth) {
+        for i in 0..2 {
+            let off = |key: &str, truth: f64| (point[key][i].as_f64().unwrap() - truth).abs();
+            assert!(
+                off("xyz_m", xy_m[i]) < 1e-9 && off("px", px[i]) < 0.1,
+                "{point}"
+            );
+        }
+    }
+}
+
 #[test]
 fn a_label_comes_from_nothing() {
     let desk = Desk::new();
@@ -424,6 +481,26 @@ fn an_image_beyond_the_dataset_is_refused() {
     );
     assert!(!desk.path("out").exists());
     desk.ok(&[&generate[..], &["59"]].concat());
+}
+
+#[test]
+fn a_recipe_is_fitted_to_its_photos() {
+    let desk = Desk::new();
+    desk.label("a", &desk.photo("a", IMAGE));
+    let recipe = || std::fs::read_to_string(desk.path("recipe.toml")).unwrap();
+    let before = recipe();
+    let fit = ["dataset", "fit", "--recipe", "recipe.toml", "-o"];
+    let [said, _] = desk.ok(&[&fit[..], &["fitted.toml"]].concat());
+    assert!(
+        said.contains("scene.finish.exposure_ev stays: fewer than 3 photos"),
+        "{said}"
+    );
+    let fitted = std::fs::read_to_string(desk.path("fitted.toml")).unwrap();
+    assert!(
+        fitted.starts_with(&before) && recipe() == before,
+        "{fitted}"
+    );
+    assert!(desk.path("fitted.html").is_file());
 }
 
 #[test]

@@ -556,6 +556,125 @@ fn write_slab(path: &Path) {
 }
 
 #[test]
+fn every_step_of_a_search_is_a_picture() {
+    let desk = Desk::new();
+    write_slab(&desk.path("slab.png"));
+    desk.ok(&["matte", "segment", "slab.png", "-o", "steps"]);
+    let read = |name: &str| -> petcomp::Image<petcomp::Coverage> {
+        let files = desk.files().into_iter();
+        let mut found = files.filter(|file| file.to_string_lossy().ends_with(name));
+        petcomp::io::read(found.next().expect("a step")).expect("a picture")
+    };
+    let (middle, corner) = ((60, 40), (5, 5));
+    for (name, inside) in [
+        ("_hull.png", 1.0),
+        ("_outline.png", 1.0),
+        ("_garbage.png", 0.0),
+    ] {
+        let step = read(name);
+        assert_eq!(step.size(), (120, 80), "{name}");
+        assert_eq!(step[middle].0, inside, "{name}");
+        assert_eq!(step[corner].0, 1.0 - inside, "{name}");
+    }
+    assert_eq!(read("_core.png")[corner].0, 0.0);
+}
+
+/// Folded film that mirrors light, in an ellipse: what it reflects, and what it lets through.
+fn film_at(x: usize, y: usize) -> Option<(petcomp::LinearRgb, petcomp::LinearRgb)> {
+    let (x, y) = (x as f64, y as f64);
+    let (u, v) = ((x - 80.0) / 60.0, (y - 50.0) / 35.0);
+    let fold = (0.75 + 0.2 * (0.23 * x + 0.011 * y * y).sin()) as f32;
+    let glint = (0.12 * (0.17 * x - 0.29 * y).sin().powi(8)) as f32;
+    let reflected = petcomp::LinearRgb::new(0.03, 0.05, 0.07).map(|light| light + glint);
+    let passed = petcomp::LinearRgb::new(0.25, 0.45, 0.6).scale(fold);
+    (u * u + v * v < 1.0).then_some((reflected, passed))
+}
+
+#[test]
+fn film_on_three_screens_is_what_it_was_made_from() {
+    let desk = Desk::new();
+    let size = (160, 100);
+    let mask = petcomp::Image::from_fn(size.0, size.1, |x, y| {
+        petcomp::Coverage(f32::from(u8::from(film_at(x, y).is_some())))
+    });
+    petcomp::io::write(desk.path("mask.png"), &mask).expect("a picture");
+    for (name, screen) in [
+        ("a.exr", [0.045, 0.42, 0.085]),
+        ("b.exr", [0.03, 0.095, 0.52]),
+        ("c.exr", [0.5, 0.04, 0.05]),
+    ] {
+        let screen = petcomp::LinearRgb::from(screen);
+        let photo = petcomp::Image::from_fn(size.0, size.1, |x, y| match film_at(x, y) {
+            Some((reflected, passed)) => reflected + passed * screen,
+            None => screen,
+        });
+        petcomp::io::write(desk.path(name), &photo).expect("a picture");
+    }
+    let photos = ["a.exr", "b.exr", "c.exr"];
+    let more = [
+        "--mask",
+        "mask.png",
+        "-o",
+        "film.exr",
+        "--plate-out",
+        "plate.exr",
+    ];
+    desk.ok(&[&["matte", "triangulate"][..], &photos, &more].concat());
+    let film: petcomp::Image<petcomp::PremulRgba> =
+        petcomp::io::read(desk.path("film.exr")).expect("film");
+    let (mut error, mut count) = (0.0, 0.0);
+    for (x, y) in (0..size.1).flat_map(|y| (0..size.0).map(move |x| (x, y))) {
+        match film_at(x, y) {
+            Some((reflected, _)) => {
+                error += (film[(x, y)].g - reflected.g).abs();
+                count += 1.0;
+            }
+            None => assert_eq!(film[(x, y)].a, 0.0, "{x} {y}"),
+        }
+    }
+    // Half floats in the photos; exact but for these.
+    assert!(error / count < 2e-3, "{}", error / count);
+    let plate: petcomp::Image<petcomp::LinearRgb> =
+        petcomp::io::read(desk.path("plate.exr")).expect("a plate");
+    assert!((plate[(80, 50)].g - 0.42).abs() < 2e-3);
+}
+
+#[test]
+fn a_difference_key_goes_by_the_mean_difference_of_the_channels() {
+    let desk = Desk::new();
+    let grey = |light: f32| petcomp::LinearRgb::new(light, light, light);
+    let clean = petcomp::Image::filled(3, 1, grey(0.25));
+    let photo = petcomp::Image::from_fn(3, 1, |x, _| grey([0.25, 0.375, 1.0][x]));
+    for (name, picture) in [("clean.exr", &clean), ("photo.exr", &photo)] {
+        petcomp::io::write(desk.path(name), picture).expect("a picture");
+    }
+    desk.ok(&[
+        "matte",
+        "difference-key",
+        "photo.exr",
+        "--clean",
+        "clean.exr",
+        "-o",
+        "cut.exr",
+        "--matte",
+        "matte.exr",
+        "--set",
+        "key.tolerance=0.0625",
+        "--set",
+        "key.falloff=0.25",
+    ]);
+    let matte: petcomp::Image<petcomp::Coverage> =
+        petcomp::io::read(desk.path("matte.exr")).expect("a matte");
+    let cut: petcomp::Image<petcomp::PremulRgba> =
+        petcomp::io::read(desk.path("cut.exr")).expect("a cut-out");
+    // (0.125 - 0.0625) / 0.25 in the middle.
+    for (x, share, light) in [(0, 0.0, 0.25), (1, 0.25, 0.375), (2, 1.0, 1.0)] {
+        assert_eq!(matte[(x, 0)].0, share);
+        assert_eq!((cut[(x, 0)].r, cut[(x, 0)].a), (share * light, share));
+    }
+}
+
+#[test]
 fn color_spill_limits_green_by_red_and_has_no_matte() {
     let desk = Desk::new();
     let photo = petcomp::Image::from_fn(2, 1, |x, _| {
