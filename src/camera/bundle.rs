@@ -171,6 +171,14 @@ impl Bundle {
             .collect()
     }
 
+    /// Degrees of freedom of each photo's chi squared, were the lens and the sides known.
+    pub(crate) fn degrees_of_freedom(&self) -> Vec<usize> {
+        self.residuals
+            .iter()
+            .map(|own| own.measurement_count().saturating_sub(POSE_UNKNOWNS))
+            .collect()
+    }
+
     fn prior_cost(&self, states: &[State]) -> f64 {
         let values = self.shared_values(states);
         let shared = self.shared.iter().zip(values.iter());

@@ -1,18 +1,17 @@
 //! Several photos of one camera: one lens, and a pose for each.
 
 use super::bundle::Bundle;
+use super::chi;
 use super::error::SolveError;
 use super::hedge::is_off_center;
 use super::label::{Framing, Label};
 use super::model::State;
 use super::options::SolveOptions;
-use super::solution::Solution;
+use super::solution::{REFUSED_FIT_P, Solution};
 use super::solve::solve;
 use crate::diagnostic::{Code, Diagnostic};
+use std::cmp::Ordering;
 
-/// A photo whose chi squared is beyond this contradicts the others: 0.01 % of two degrees of
-/// freedom.
-const OUTLIER_CHI2: f64 = 18.4;
 /// One photo in this many may be left out.
 const PHOTOS_PER_OUTLIER: usize = 4;
 
@@ -129,7 +128,7 @@ struct JointEstimate {
     used: Vec<usize>,
     states: Vec<State>,
     /// Of each photo's own observations.
-    chi2: Vec<f64>,
+    fits: Vec<PhotoFit>,
     solutions: Vec<Solution>,
     cost: f64,
     outliers: Vec<OutlierPhoto>,
@@ -166,14 +165,15 @@ impl JointSolver<'_> {
         let most_outliers = self.labels.len() / PHOTOS_PER_OUTLIER;
         while !used.is_empty() {
             let estimate = self.estimate_from(&used, unknown)?;
-            let worst = worst_photo(&estimate.chi2).filter(|_| outliers.len() < most_outliers);
-            let Some((worst, chi2)) = worst else {
+            let worst = worst_photo(&estimate.fits).filter(|_| outliers.len() < most_outliers);
+            let Some(worst) = worst else {
                 return Ok(Some(JointEstimate {
                     outliers,
                     ..estimate
                 }));
             };
             let photo = used.remove(worst);
+            let chi2 = estimate.fits[worst].chi2;
             outliers.push(OutlierPhoto { photo, chi2 });
         }
         Ok(None)
@@ -187,7 +187,7 @@ impl JointSolver<'_> {
             used: used.to_vec(),
             solutions: bundle.solutions(&best, self.options),
             states: best.states,
-            chi2: best.chi2,
+            fits: PhotoFit::of_all(&best.chi2, &bundle.degrees_of_freedom()),
             cost: best.cost,
             outliers: Vec::new(),
         })
@@ -201,10 +201,44 @@ impl JointSolver<'_> {
     }
 }
 
-/// The photo that fits worst, and its chi squared, where it contradicts the others.
-fn worst_photo(chi2: &[f64]) -> Option<(usize, f64)> {
-    let worst = (0..chi2.len()).max_by(|&a, &b| chi2[a].total_cmp(&chi2[b]))?;
-    (chi2[worst] > OUTLIER_CHI2).then_some((worst, chi2[worst]))
+/// How well a photo fits the camera that it shares.
+#[derive(Clone, Copy, Debug)]
+struct PhotoFit {
+    chi2: f64,
+    /// Degrees of freedom of that.
+    dof: usize,
+    /// Probability of a larger chi squared by chance.
+    probability: f64,
+}
+
+impl PhotoFit {
+    fn new(chi2: f64, dof: usize) -> Self {
+        Self {
+            chi2,
+            dof,
+            probability: chi::exceeds(chi2, dof).unwrap_or(1.0),
+        }
+    }
+
+    fn of_all(chi2: &[f64], dof: &[usize]) -> Vec<Self> {
+        let pairs = chi2.iter().zip(dof);
+        pairs.map(|(&chi2, &dof)| Self::new(chi2, dof)).collect()
+    }
+
+    /// By probability, or where both have too little of it to be told apart, by chi squared per
+    /// degree of freedom.
+    fn compare(&self, other: &Self) -> Ordering {
+        let per_dof = |fit: &Self| fit.chi2 / fit.dof as f64;
+        let by_probability = self.probability.total_cmp(&other.probability);
+        by_probability.then_with(|| per_dof(other).total_cmp(&per_dof(self)))
+    }
+}
+
+/// The photo that fits worst, where it contradicts the others: a photo that fits no better when it
+/// is alone is refused.
+fn worst_photo(fits: &[PhotoFit]) -> Option<usize> {
+    let worst = (0..fits.len()).min_by(|&a, &b| fits[a].compare(&fits[b]))?;
+    (fits[worst].probability < REFUSED_FIT_P).then_some(worst)
 }
 
 impl JointEstimate {
@@ -287,12 +321,16 @@ fn is_part(label: &Label) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::simulate::Scenario;
+    use crate::camera::simulate::{Scenario, View};
+    use crate::camera::{LabelPoint, distorted};
+    use crate::geom::Point3;
+    use rand_chacha::ChaCha8Rng;
+    use rand_chacha::rand_core::{Rng, SeedableRng};
 
     fn labels(k: u64, count: usize, tilts: [f64; 2]) -> (Vec<Label>, f64) {
         let views = Scenario::realistic().views(31, k, count, tilts);
         let focal = views[0].camera.focal_px.x;
-        let name = |v: crate::camera::simulate::View| {
+        let name = |v: View| {
             let mut label = v.label;
             (label.surface.id, label.camera.id) = ("tray".into(), Some("phone".into()));
             label
@@ -345,6 +383,58 @@ mod tests {
             joint.photos[5],
             Err(SolveError::Coincident { .. })
         ));
+    }
+
+    /// Labels with a grid of 24 further points on their surface, as noisy as the corners.
+    fn labels_with_points(count: usize) -> Vec<Label> {
+        let mut noise = ChaCha8Rng::seed_from_u64(6);
+        // Evenly spread numbers of this range have a standard deviation of 1.
+        let mut deviate = || 12f64.sqrt() * (f64::from(noise.next_u32()) / 2f64.powi(32) - 0.5);
+        let mut pointed = |view: View| {
+            let mut label = view.label;
+            label.surface.id = "tray".into();
+            let [w, h] = [label.surface.width_m, label.surface.height_m].map(Option::unwrap);
+            for i in 0..24 {
+                let [x, y] = [f64::from(i % 6) / 5.0 - 0.5, f64::from(i / 6) / 3.0 - 0.5];
+                let place = Point3::new(x * view.size[0], y * view.size[1], 0.0);
+                let seen = distorted(&view.camera, view.kappa, place);
+                label.points.push(LabelPoint {
+                    xyz_m: [x * w, y * h, 0.0],
+                    px: [seen.x + deviate(), seen.y + deviate()],
+                    sigma_px: None,
+                    note: None,
+                });
+            }
+            label
+        };
+        let views = Scenario::realistic().views(31, 6, count, [15.0, 35.0]);
+        views.into_iter().map(&mut pointed).collect()
+    }
+
+    #[test]
+    fn many_points_make_no_photo_an_outlier_and_hide_none() {
+        let mut labels = labels_with_points(8);
+        let outliers = |labels: &[Label]| {
+            let joint = solve_joint(labels, &SolveOptions::default()).unwrap();
+            let outliers = joint.outliers.into_iter();
+            outliers.map(|outlier| outlier.photo).collect::<Vec<_>>()
+        };
+        assert_eq!(outliers(&labels), []);
+        // Zoomed in by 5 %.
+        let zoomed = |px: &mut [f64; 2]| {
+            *px = [
+                2000.0 + 1.05 * (px[0] - 2000.0),
+                1500.0 + 1.05 * (px[1] - 1500.0),
+            ];
+        };
+        let photo = &mut labels[2];
+        let corners = photo.surface.corners_px.iter_mut().flatten();
+        corners.for_each(zoomed);
+        photo
+            .points
+            .iter_mut()
+            .for_each(|point| zoomed(&mut point.px));
+        assert_eq!(outliers(&labels), [2]);
     }
 
     #[test]

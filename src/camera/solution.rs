@@ -30,7 +30,7 @@ const HEIGHT_SIGMA_DIAGONALS: f64 = 0.0015;
 /// Fits less probable than the first are worth a warning; those less probable than the second are
 /// refused.
 const POOR_FIT_P: f64 = 0.01;
-const REFUSED_FIT_P: f64 = 1e-4;
+pub(crate) const REFUSED_FIT_P: f64 = 1e-4;
 
 /// A camera, and how reliable it is.
 #[derive(Clone, Debug, PartialEq)]
