@@ -63,6 +63,8 @@ impl Belt {
 /// Which picture of a dataset, and where in its sequence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct SequencePlace {
+    /// Number of the sequence.
+    pub(crate) sequence: u64,
     /// Number of the sequence's first picture.
     pub(crate) first: u64,
     /// Number in the sequence.
@@ -72,8 +74,10 @@ pub(crate) struct SequencePlace {
 impl BeltRanges {
     /// Where picture `k` of a dataset is in its sequence.
     pub(crate) fn place_of(&self, k: u64) -> SequencePlace {
-        let frame = k % self.frames.max(1);
+        let frames = self.frames.max(1);
+        let frame = k % frames;
         SequencePlace {
+            sequence: k / frames,
             first: k - frame,
             frame,
         }
@@ -88,7 +92,7 @@ impl BeltRanges {
         let after = |seconds: f64| [cos, sin].map(|along| along * speed * seconds);
         let from_middle = place.frame as f64 - 0.5 * (self.frames - 1) as f64;
         Belt {
-            sequence: place.first / self.frames,
+            sequence: place.sequence,
             frame: place.frame,
             frames: self.frames,
             frame_rate: self.frame_rate,

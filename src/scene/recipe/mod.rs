@@ -216,7 +216,11 @@ impl Recipe {
 
     /// Where picture `k` is in its sequence; without a belt each is one of its own.
     pub(crate) fn place_in_sequence(&self, k: u64) -> SequencePlace {
-        let alone = SequencePlace { first: k, frame: 0 };
+        let alone = SequencePlace {
+            sequence: k,
+            first: k,
+            frame: 0,
+        };
         self.belt.map_or(alone, |belt| belt.place_of(k))
     }
 

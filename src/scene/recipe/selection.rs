@@ -3,6 +3,7 @@
 use super::compose::SceneNumber;
 use crate::asset::Role;
 use crate::error::{Error, Result};
+use crate::scene::belt::SequencePlace;
 use crate::scene::{AssetVariant, Count, DrawLog, Draws, DropRanges, Grade, Object, Recipe, Take};
 use serde::{Deserialize, Serialize};
 
@@ -27,7 +28,7 @@ pub enum Selections {
     /// A new choice for every scene.
     #[default]
     Unique,
-    /// This many; scene `k` has choice `k` modulo this.
+    /// This many; scene `k` has choice `k` modulo this, and on a belt sequence `k`.
     Count(u64),
 }
 
@@ -63,12 +64,12 @@ impl From<Selections> for SelectionsInFile {
 }
 
 impl Selections {
-    /// The selection that scene `k` has.
-    fn index_for(self, k: u64) -> Result<u64> {
+    /// The selection that a sequence has, which without a belt is a scene.
+    fn index_for(self, place: SequencePlace) -> Result<u64> {
         match self {
-            Self::Unique => Ok(k),
+            Self::Unique => Ok(place.first),
             Self::Count(0) => Err(Error::value("selections", "0, expected at least 1")),
-            Self::Count(n) => Ok(k % n),
+            Self::Count(n) => Ok(place.sequence % n),
         }
     }
 }
@@ -91,7 +92,7 @@ impl Recipe {
         log: &DrawLog,
         catalog: &[AssetVariant],
     ) -> Result<Vec<Object>> {
-        let selection = self.selections.index_for(number.place.first)?;
+        let selection = self.selections.index_for(number.place)?;
         let draws = Draws::new(number.seed, selection).logged(log);
         let mut selected = self.select(&self.choice_of(Role::Object), &draws, catalog)?;
         if !self.distractors.is_zero() {

@@ -470,6 +470,37 @@ fn every_asset_photo_and_background_is_used_as_often() {
 }
 
 #[test]
+fn sequences_have_so_many_selections_as_are_asked_for() {
+    let distinct = |frames: u64, recipe: Recipe| {
+        let belt = toml::from_str(&format!("frames = {frames}\nframe_rate = 10\nspeed = 0.1"));
+        let recipe = Recipe {
+            belt: Some(belt.unwrap()),
+            ..recipe
+        };
+        let scenes = (0..60).map(|n| scene(&recipe, n * frames));
+        scenes.map(|s| names(&s)).collect::<BTreeSet<_>>().len()
+    };
+    let counted = |n| Recipe {
+        selections: Selections::Count(n),
+        ..Recipe::default()
+    };
+    // Frames that share a divisor with the number of selections, and that are a multiple of it.
+    assert_eq!(
+        [2, 3, 7, 14].map(|frames| distinct(frames, counted(7))),
+        [7; 4]
+    );
+    assert_eq!(distinct(10, counted(50)), 50);
+    let off = Recipe {
+        off: vec![Variation::Selection],
+        ..Recipe::default()
+    };
+    assert_eq!(
+        (distinct(50, off), distinct(50, Recipe::default())),
+        (50, 60)
+    );
+}
+
+#[test]
 fn so_many_selections_are_made_as_are_asked_for() {
     let distinct = |selections| {
         let recipe = Recipe {
