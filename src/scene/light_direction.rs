@@ -51,12 +51,22 @@ pub enum LightDirectionSource {
     Drawn,
     /// What the walls in the photo tell of it, within the error of that.
     MatchWalls,
+    /// The same, as if it had no error.
+    MatchWallsExactly,
 }
 
 impl LightDirectionSource {
     /// Whether it is the light's own ranges.
     pub fn is_drawn(&self) -> bool {
         *self == Self::Drawn
+    }
+
+    /// The direction that does not vary beyond the ranges of the light.
+    pub(super) fn at_middle(self) -> Self {
+        match self {
+            Self::Drawn => Self::Drawn,
+            Self::MatchWalls | Self::MatchWallsExactly => Self::MatchWallsExactly,
+        }
     }
 
     pub(super) fn draw(self, draws: &Draws) -> LightDirection {
@@ -67,6 +77,9 @@ impl LightDirectionSource {
                     let within = Range::new(-UNIT_DEVIATION, UNIT_DEVIATION);
                     within.draw(draws, &format!("light_direction.{name}"))
                 }),
+            },
+            Self::MatchWallsExactly => LightDirection::MatchWalls {
+                deviations: [0.0; 2],
             },
         }
     }

@@ -101,7 +101,8 @@ pub struct Recipe {
     /// Default: white.
     pub cast: LightTint,
     /// Where the first light stands: `match_walls` finds it by which walls of the surface the photo
-    /// shows bright. Default: `drawn`.
+    /// shows bright, within the error of that, `match_walls_exactly` as if it had none. Default:
+    /// `drawn`.
     #[serde(skip_serializing_if = "LightDirectionSource::is_drawn")]
     pub light_direction: LightDirectionSource,
     /// How the light is spread over the surface: `{ match_surface = { share = 1 } }` takes the

@@ -48,6 +48,7 @@ impl Recipe {
             ambient: self.ambient.middle(),
             environment: self.environment.at_middle(),
             gain_ev: self.gain_ev.middle(),
+            light_direction: self.light_direction.at_middle(),
             ..self
         }
     }
@@ -67,7 +68,10 @@ impl EnvironmentRanges {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{AssetVariant, Background, CameraSource, Scene};
+    use crate::color::planckian;
+    use crate::scene::{
+        AssetVariant, Background, CameraSource, LightDirection, LightDirectionSource, Range, Scene,
+    };
     use std::collections::BTreeSet;
 
     fn scenes(off: &[Variation]) -> Vec<Scene> {
@@ -75,6 +79,10 @@ mod tests {
             off: off.to_vec(),
             ..Recipe::default()
         };
+        (0..120).map(|k| scene_of(&recipe, k)).collect()
+    }
+
+    fn scene_of(recipe: &Recipe, k: u64) -> Scene {
         let camera = CameraSource::Rectangle {
             corners_px: [[0.0, 0.0], [60.0, 0.0], [60.0, 40.0], [0.0, 40.0]],
             photo: [60, 40],
@@ -97,13 +105,9 @@ mod tests {
             mass: 0.03,
         };
         let catalog: Vec<AssetVariant> = (0..9).map(choice).collect();
-        (0..120)
-            .map(|k| {
-                recipe
-                    .scene(5, k, &[place("a"), place("b")], &catalog)
-                    .unwrap()
-            })
-            .collect()
+        recipe
+            .scene(5, k, &[place("a"), place("b")], &catalog)
+            .unwrap()
     }
 
     /// The scene with everything that a source decides set to the same.
@@ -175,6 +179,30 @@ mod tests {
             distinct(&|s| format!("{:?}", s.lights[0].size)) > 100
                 && distinct(&|s| format!("{s:?}")) == 120
         );
+    }
+
+    #[test]
+    fn light_that_is_off_stays_at_the_middle_of_every_range_that_it_has() {
+        let warm = LightRanges {
+            temperature_k: Some(Range::new(2500.0, 6500.0)),
+            ..LightRanges::default()
+        };
+        let recipe = Recipe {
+            off: vec![Variation::Light],
+            lights: vec![warm],
+            light_direction: LightDirectionSource::MatchWalls,
+            ..Recipe::default()
+        };
+        let light = |k| {
+            let scene = scene_of(&recipe, k);
+            let colour = scene.lights[0].color;
+            (colour, scene.ambient, scene.light_direction)
+        };
+        let (colour, ambient, direction) = light(0);
+        assert_eq!(colour, planckian(4500.0));
+        let deviations = [0.0; 2];
+        assert_eq!(direction, LightDirection::MatchWalls { deviations });
+        assert!((1..20).all(|k| light(k) == (colour, ambient, direction)));
     }
 
     #[test]

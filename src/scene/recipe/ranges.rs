@@ -171,6 +171,7 @@ impl LightRanges {
             azimuth_deg: self.azimuth_deg.middle(),
             power: self.power.middle(),
             color: self.color.map(|range| range.middle()),
+            temperature_k: self.temperature_k.map(|range| range.middle()),
             ..*self
         }
     }
