@@ -1,7 +1,7 @@
 //! A label for a new photo: its EXIF data, and what is left to be filled in.
 
 use super::label::{Framing, Label, LabelCamera, LabelSurface};
-use super::read::apply_exif;
+use super::read::{apply_exif, equivalent_mm};
 use crate::error::{Error, Result};
 use crate::io;
 use serde::Serialize;
@@ -25,6 +25,9 @@ pub fn init_label(photo: &Path, path: &Path, like: Option<&Label>) -> Result<Lab
     if let Some(like) = like {
         copy_shared(&mut label, like);
     }
+    if equivalent_mm(&header).is_some() {
+        forget_equivalent(&mut label.camera);
+    }
     apply_exif(&mut label, &header);
     Ok(label)
 }
@@ -33,6 +36,15 @@ fn unmeasured_surface() -> LabelSurface {
     LabelSurface {
         id: "surface".into(),
         ..LabelSurface::default()
+    }
+}
+
+/// A lens that zooms has another focal length in each photo: the other photo's, which its label may
+/// have from EXIF data, gives way to the photo's own.
+fn forget_equivalent(camera: &mut LabelCamera) {
+    if camera.focal_px.is_none() {
+        (camera.focal_35mm, camera.focal_sigma) = (None, None);
+        camera.focal_fixed = false;
     }
 }
 
@@ -183,6 +195,7 @@ fn is_number(part: &str) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use super::super::read::tests::{equivalent, write_photo};
     use super::*;
     use crate::image::Image;
     use crate::pixel::Srgb8;
@@ -230,6 +243,34 @@ mod tests {
         assert_eq!(
             (label.camera.id.as_deref(), label.camera.focal_px),
             (Some("phone"), Some(80.0))
+        );
+    }
+
+    #[test]
+    fn each_photo_of_a_zoom_keeps_its_own_focal_length() {
+        let folder = tempfile::tempdir().unwrap();
+        let new_label = |name: &str, like: Option<&Label>| {
+            let photo = folder.path().join(name);
+            init_label(&photo, &photo.with_extension("label.json"), like).unwrap()
+        };
+        write_photo(&folder.path().join("wide.jpg"), [equivalent(26)]);
+        write_photo(&folder.path().join("tele.jpg"), [equivalent(77)]);
+        write_photo(&folder.path().join("bare.jpg"), []);
+        let mut wide = new_label("wide.jpg", None);
+        (wide.camera.focal_sigma, wide.camera.focal_fixed) = (Some(0.01), true);
+        let known = |label: Label| {
+            let camera = label.camera;
+            (camera.focal_35mm, camera.focal_sigma, camera.focal_fixed)
+        };
+        let tele = known(new_label("tele.jpg", Some(&wide)));
+        assert_eq!(tele, (Some(77.0), None, false));
+        let bare = known(new_label("bare.jpg", Some(&wide)));
+        assert_eq!(bare, (Some(26.0), Some(0.01), true));
+        wide.camera.focal_px = Some(80.0);
+        let measured = new_label("tele.jpg", Some(&wide)).camera;
+        assert_eq!(
+            (measured.focal_px, measured.focal_fixed),
+            (Some(80.0), true)
         );
     }
 

@@ -369,11 +369,16 @@ pub(crate) fn apply_exif(label: &mut Label, header: &io::Header) {
         label.image.cropped.get_or_insert(header.cropped);
     }
     if label.camera.focal_px.is_none() && label.camera.focal_35mm.is_none() {
-        label.camera.focal_35mm = header.focal_35mm.filter(|mm| *mm > 0.0);
+        label.camera.focal_35mm = equivalent_mm(header);
         if header.digital_zoom && label.camera.focal_35mm.is_some() {
             label.camera.focal_sigma.get_or_insert(ZOOMED_FOCAL_SIGMA);
         }
     }
+}
+
+/// The focal length that the photo's file states, as a 35 mm camera's; some state 0 for none.
+pub(crate) fn equivalent_mm(header: &io::Header) -> Option<f64> {
+    header.focal_35mm.filter(|mm| *mm > 0.0)
 }
 
 /// Checks that a surface with objects on it can have the label's sides, which may be in centimetres
@@ -424,38 +429,29 @@ pub(crate) fn photo_of(label: &Label, path: impl AsRef<Path>) -> Option<PathBuf>
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::image::Image;
     use crate::pixel::Srgb8;
     use exif::experimental::Writer;
     use exif::{Field, In, Rational, Tag, Value};
 
-    /// A label of a photo of 90 x 60 pixels with EXIF data: a 35 mm equivalent of 28 mm, a digital
-    /// zoom, and the size it was taken in.
-    fn label_of_photo(zoom: [u32; 2], taken: [u32; 2]) -> Label {
-        let folder = tempfile::tempdir().unwrap();
-        let photo = folder.path().join("a.jpg");
-        io::write(&photo, &Image::<Srgb8>::new(90, 60)).unwrap();
-        let [num, denom] = zoom;
-        let fields = [
-            (Tag::FocalLengthIn35mmFilm, Value::Short(vec![28])),
-            (
-                Tag::DigitalZoomRatio,
-                Value::Rational(vec![Rational { num, denom }]),
-            ),
-            (Tag::PixelXDimension, Value::Long(vec![taken[0]])),
-            (Tag::PixelYDimension, Value::Long(vec![taken[1]])),
-        ];
-        let fields = fields.map(|(tag, value)| Field {
+    /// Writes a picture of 90 x 60 pixels with EXIF data.
+    pub(in crate::camera) fn write_photo(
+        path: &Path,
+        notes: impl IntoIterator<Item = (Tag, Value)>,
+    ) {
+        io::write(path, &Image::<Srgb8>::new(90, 60)).unwrap();
+        let field = |(tag, value)| Field {
             tag,
             ifd_num: In::PRIMARY,
             value,
-        });
+        };
+        let fields: Vec<Field> = notes.into_iter().map(field).collect();
         let (mut writer, mut notes) = (Writer::new(), std::io::Cursor::new(Vec::new()));
         fields.iter().for_each(|f| writer.push_field(f));
         writer.write(&mut notes, false).unwrap();
-        let (mut jpeg, notes) = (std::fs::read(&photo).unwrap(), notes.into_inner());
+        let (mut jpeg, notes) = (std::fs::read(path).unwrap(), notes.into_inner());
         let length = (notes.len() + 8) as u16;
         jpeg.splice(
             2..2,
@@ -465,7 +461,27 @@ mod tests {
                 .chain(*b"Exif\0\0")
                 .chain(notes),
         );
-        std::fs::write(&photo, jpeg).unwrap();
+        std::fs::write(path, jpeg).unwrap();
+    }
+
+    /// The focal length of a 35 mm equivalent.
+    pub(in crate::camera) fn equivalent(mm: u16) -> (Tag, Value) {
+        (Tag::FocalLengthIn35mmFilm, Value::Short(vec![mm]))
+    }
+
+    /// A label of a photo of 90 x 60 pixels with EXIF data: a 35 mm equivalent of 28 mm, a digital
+    /// zoom, and the size it was taken in.
+    fn label_of_photo(zoom: [u32; 2], taken: [u32; 2]) -> Label {
+        let folder = tempfile::tempdir().unwrap();
+        let [num, denom] = zoom;
+        let zoom = Value::Rational(vec![Rational { num, denom }]);
+        let notes = [
+            equivalent(28),
+            (Tag::DigitalZoomRatio, zoom),
+            (Tag::PixelXDimension, Value::Long(vec![taken[0]])),
+            (Tag::PixelYDimension, Value::Long(vec![taken[1]])),
+        ];
+        write_photo(&folder.path().join("a.jpg"), notes);
         let mut label = Label::new([90, 60], [[0.0; 2]; 4], [0.6, 0.4]);
         label.image.file = "a.jpg".into();
         with_photo(label, folder.path().join("a.label.json")).unwrap()
