@@ -210,4 +210,18 @@ mod tests {
         (label.image.cropped, label.camera.principal_point_px) = (None, Some([2000.0, 1500.0]));
         assert_eq!(solved(&label).framing, Framing::Whole);
     }
+
+    #[test]
+    fn a_stated_principal_point_is_believed_in_a_cropped_picture_too() {
+        let mut label = Scenario::realistic().tilted(25.0).view(1, 3).label;
+        (label.image.cropped, label.camera.principal_point_px) =
+            (Some(true), Some([2000.0, 1500.0]));
+        let by_default = solved(&label);
+        // 0.005 of a diagonal of 5000 pixels.
+        label.camera.principal_point_sigma_px = Some(25.0);
+        let as_stated = solved(&label);
+        assert!(by_default.sigma.principal_px <= 25.0);
+        let ratio = by_default.sigma.ln_focal / as_stated.sigma.ln_focal;
+        assert!((ratio - 1.0).abs() < 1e-9, "{ratio}");
+    }
 }

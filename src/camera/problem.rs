@@ -299,8 +299,13 @@ fn expected_principal_px(label: &Label) -> Point2<f64> {
     stated.map_or(label.taken_center(), |px| label.pixel(px))
 }
 
-/// Standard deviation of a coordinate of the principal point, in the solver's units.
+/// Standard deviation of a coordinate of the principal point, in the solver's units. Where a part of
+/// the picture was cut away matters no more once the principal point is stated.
 fn principal_sigma(label: &Label, framing: Framing, priors: &Priors) -> f64 {
+    let framing = match label.camera.principal_point_px {
+        Some(_) => Framing::Whole,
+        None => framing,
+    };
     let default_px = priors.principal_sigma_for(framing) * diagonal_px(label.taken_size());
     let sigma_px = label.camera.principal_point_sigma_px;
     let unit_px = diagonal_px(label.image_size()) / 2.0;
