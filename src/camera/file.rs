@@ -338,6 +338,18 @@ impl SolvedFrom {
 /// CRC-32 of a label as we would write it, without what no camera depends on.
 pub(crate) fn checksum(label: &Label) -> u32 {
     let mut label = label.clone();
+    (label.surface.albedo, label.surface.source) = (None, None);
+    label.points.iter_mut().for_each(|point| point.note = None);
+    checksum_without_wall(&label)
+}
+
+/// A checksum is this label's; those of older files change with its albedo and its notes.
+pub(crate) fn has_checksum(label: &Label, crc: u32) -> bool {
+    [checksum(label), checksum_without_wall(label)].contains(&crc)
+}
+
+fn checksum_without_wall(label: &Label) -> u32 {
+    let mut label = label.clone();
     label.surface.wall = None;
     // A label is made of texts and numbers: all of them have a form in JSON.
     crc32fast::hash(&serde_json::to_vec(&label).unwrap_or_default())

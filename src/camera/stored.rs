@@ -1,7 +1,7 @@
 //! Cameras that were solved before and lie beside their labels, and whether they still match them.
 
 use super::error::SolveError;
-use super::file::{CameraFile, SolvedFrom, checksum};
+use super::file::{CameraFile, SolvedFrom, checksum, has_checksum};
 use super::label::Label;
 use super::lens::k1_from_kappa;
 use super::options::SolveOptions;
@@ -32,6 +32,9 @@ pub struct PhotoCamera {
     pub stale: Option<String>,
 }
 
+/// The labels that are there.
+type LabelsByName<'a> = BTreeMap<&'a str, &'a Label>;
+
 /// The cameras of labelled photos, in order: that beside a label (`NAME.camera.json`) where it is
 /// there and was solved from this label, or else that of the label. One that does not fit its label
 /// is refused, unless `force`d here or when it was solved.
@@ -44,7 +47,8 @@ pub(crate) fn photo_cameras(labels: &[LabelledPhoto], force: bool) -> Result<Vec
         let file = read_camera_file(labelled)?;
         found.push((with_stored_size(labelled, file.as_ref()), file));
     }
-    let known = label_checksums(found.iter().map(|(labelled, _)| labelled));
+    let known = found.iter().map(|(labelled, _)| labelled);
+    let known = known.map(|l| (l.name.as_str(), &l.label)).collect();
     found
         .iter()
         .map(|(labelled, file)| PhotoCamera::new(labelled, file.as_ref(), &known, force))
@@ -56,7 +60,7 @@ impl PhotoCamera {
     fn new(
         labelled: &LabelledPhoto,
         file: Option<&CameraFile>,
-        known: &BTreeMap<String, u32>,
+        known: &LabelsByName<'_>,
         force: bool,
     ) -> Result<Self> {
         let Some(file) = file else {
@@ -169,13 +173,13 @@ fn with_stored_size(labelled: &LabelledPhoto, file: Option<&CameraFile>) -> Labe
 fn staleness(
     file: &CameraFile,
     labelled: &LabelledPhoto,
-    known: &BTreeMap<String, u32>,
+    known: &LabelsByName<'_>,
 ) -> Option<String> {
     let Some(from) = &file.solved_from else {
         let older = modified(&camera_path(labelled)) < modified(&labelled.source);
         return older.then(|| "older than its label".to_owned());
     };
-    if from.label_crc32 != checksum(&labelled.label) {
+    if !has_checksum(&labelled.label, from.label_crc32) {
         return Some("solved from another version of its label, or with another size".into());
     }
     let name = changed_companion(from, known)?;
@@ -183,14 +187,16 @@ fn staleness(
 }
 
 /// The first label among those that were solved together which is not what it was then.
-fn changed_companion<'a>(
-    from: &'a SolvedFrom,
-    known: &BTreeMap<String, u32>,
-) -> Option<&'a String> {
+fn changed_companion<'a>(from: &'a SolvedFrom, known: &LabelsByName<'_>) -> Option<&'a String> {
     let mut together = from.together.iter();
     together
-        .find(|&(name, crc)| known.get(name).is_some_and(|now| now != crc))
+        .find(|&(name, &crc)| is_known_otherwise(known, name, crc))
         .map(|(name, _)| name)
+}
+
+/// A label of this name is there and has another checksum.
+fn is_known_otherwise(known: &LabelsByName<'_>, name: &str, crc: u32) -> bool {
+    known.get(name).is_some_and(|now| !has_checksum(now, crc))
 }
 
 fn modified(path: &Path) -> Option<std::time::SystemTime> {
@@ -228,7 +234,8 @@ impl CameraFile {
 mod tests {
     use super::*;
     use crate::camera::simulate::Scenario;
-    use crate::camera::{Label, read_labels};
+    use crate::camera::{LabelPoint, read_labels};
+    use crate::color::Albedo;
 
     fn camera_of(labelled: &LabelledPhoto, force: bool) -> Result<PhotoCamera> {
         photo_cameras(std::slice::from_ref(labelled), force).map(|mut all| all.remove(0))
@@ -349,6 +356,53 @@ mod tests {
             camera_of(&labelled, false).unwrap().stored,
             "a copy of a part of the photos"
         );
+    }
+
+    /// Two labels with points, and what makes each a label that no camera differs by.
+    fn noted_labels(desk: &Desk) -> [[LabelledPhoto; 2]; 2] {
+        [0, 1].map(|k| {
+            let mut label = desk.label(k);
+            let [px, ..] = label.surface.corners_px.unwrap();
+            let [w, h] = [label.surface.width_m, label.surface.height_m].map(Option::unwrap);
+            label.points = vec![LabelPoint {
+                xyz_m: [-w / 2.0, h / 2.0, 0.0],
+                px,
+                sigma_px: None,
+                note: None,
+            }];
+            let bare = desk.write(&label);
+            label.surface.albedo = Some(Albedo::Luminance(0.2));
+            label.surface.source = Some("manual".into());
+            label.points[0].note = Some("rim".into());
+            let noted = desk.write(&label);
+            [bare, noted].map(|labelled| LabelledPhoto {
+                name: format!("{k}"),
+                ..labelled
+            })
+        })
+    }
+
+    #[test]
+    fn albedo_source_and_notes_of_a_label_make_no_camera_stale() {
+        let desk = Desk::new();
+        let [[bare, noted], [other_bare, other_noted]] = noted_labels(&desk);
+        let together = label_checksums([&bare, &other_bare]);
+        desk.store(&bare, |file| {
+            file.solved_from.as_mut().unwrap().together = together.clone()
+        });
+        let found = photo_cameras(&[noted.clone(), other_noted.clone()], false).unwrap();
+        assert_eq!(found[0].stale, None);
+        // Files of older versions: the CRC-32 of the whole label.
+        let whole = |l: &LabelledPhoto| crc32fast::hash(&serde_json::to_vec(&l.label).unwrap());
+        desk.store(&noted, |file| {
+            let from = file.solved_from.as_mut().unwrap();
+            from.label_crc32 = whole(&noted);
+            from.together = [("1".to_owned(), whole(&other_noted))].into();
+        });
+        let found = photo_cameras(&[noted, other_noted.clone()], false).unwrap();
+        assert_eq!(found[0].stale, None);
+        let found = photo_cameras(&[bare, other_noted], false).unwrap();
+        assert!(found[0].stale.is_some());
     }
 
     #[test]
