@@ -53,6 +53,11 @@ pub(crate) struct BundleEquations {
 }
 
 impl BundleEquations {
+    /// Logarithm of the focal length that the photos share.
+    pub(crate) fn ln_focal(&self) -> f64 {
+        self.states[0].ln_focal
+    }
+
     fn compare_costs(&self, other: &Self) -> Ordering {
         self.cost.total_cmp(&other.cost)
     }
@@ -81,17 +86,19 @@ struct PhotoBlock {
 }
 
 impl Bundle {
-    /// For the labels that are used; pictures of unknown framing are treated as having this one.
+    /// For the labels that are used; pictures of unknown framing are treated as having this one. A
+    /// stated distortion is for this focal length (in units), or that of the prior.
     pub(crate) fn new(
         labels: &[Label],
         used: &[usize],
         unknown: Framing,
+        focal: Option<f64>,
         options: &SolveOptions,
     ) -> Result<Self, SolveError> {
         let labels: Vec<&Label> = used.iter().map(|&i| &labels[i]).collect();
         let problems = labels
             .iter()
-            .map(|label| Problem::new(label, framing_or(label, unknown), options))
+            .map(|label| Problem::with_focal(label, framing_or(label, unknown), focal, options))
             .collect::<Result<Vec<_>, _>>()?;
         let surface = surfaces_shown(labels.into_iter().zip(&problems));
         Self::from_problems(problems, surface)
@@ -106,6 +113,11 @@ impl Bundle {
         })
     }
 
+    /// Prior of the logarithm of the focal length.
+    pub(crate) fn focal_prior(&self) -> Prior {
+        self.shared[0]
+    }
+
     /// The lower of the minima from the photos' own focal lengths and from the prior.
     pub(crate) fn best(&self, alone: &[Result<Solution, SolveError>]) -> Option<BundleEquations> {
         self.ln_focal_starts(alone)
@@ -115,7 +127,7 @@ impl Bundle {
 
     /// Logarithms of the focal length from which to refine.
     fn ln_focal_starts(&self, alone: &[Result<Solution, SolveError>]) -> impl Iterator<Item = f64> {
-        let prior = self.shared[0];
+        let prior = self.focal_prior();
         let measured = mean_ln_focal(alone, self.problems[0].units.unit_px);
         [Some(prior.mean), measured.filter(|_| !prior.is_fixed())]
             .into_iter()
@@ -314,14 +326,14 @@ impl Bundle {
         minimum: &Minimum,
         shared: Option<&SharedCovariance>,
     ) -> Uncertainty {
-        let mut uncertainty = Uncertainty::new(minimum, self.shared[0]);
+        let mut uncertainty = Uncertainty::new(minimum, self.focal_prior());
         if let Some((covariance, photos)) = shared {
             if let Some(own) = self.photo_covariance(covariance, &photos[photo], photo) {
                 uncertainty.covariance = own;
             }
             let information = inverse_or_zero(covariance[(0, 0)]);
             let ln_focal = minimum.state.ln_focal;
-            uncertainty.focal = focal_share(ln_focal, information, self.shared[0]);
+            uncertainty.focal = focal_share(ln_focal, information, self.focal_prior());
         }
         uncertainty
     }
@@ -329,7 +341,7 @@ impl Bundle {
     /// A photo's problem, with the prior of the focal length that the photos share.
     fn with_shared_prior(&self, photo: usize) -> Problem {
         let mut problem = self.problems[photo].clone();
-        problem.residuals.priors.ln_focal = self.shared[0];
+        problem.residuals.priors.ln_focal = self.focal_prior();
         problem
     }
 

@@ -1,6 +1,6 @@
 //! Several photos of one camera: one lens, and a pose for each.
 
-use super::bundle::Bundle;
+use super::bundle::{Bundle, BundleEquations};
 use super::chi;
 use super::error::SolveError;
 use super::hedge::is_off_center;
@@ -8,7 +8,7 @@ use super::label::{Framing, Label};
 use super::model::State;
 use super::options::SolveOptions;
 use super::solution::{REFUSED_FIT_P, Solution};
-use super::solve::solve;
+use super::solve::{repeated_at_focal_found, solve, states_distortion};
 use crate::diagnostic::{Code, Diagnostic};
 use std::cmp::Ordering;
 
@@ -181,8 +181,7 @@ impl JointSolver<'_> {
 
     /// What these photos give together.
     fn estimate_from(&self, used: &[usize], unknown: Framing) -> Result<JointEstimate, SolveError> {
-        let bundle = Bundle::new(self.labels, used, unknown, self.options)?;
-        let best = bundle.best(self.alone).ok_or(SolveError::NoPose)?;
+        let (bundle, best) = self.search_with_stated_distortion(used, unknown)?;
         Ok(JointEstimate {
             used: used.to_vec(),
             solutions: bundle.solutions(&best, self.options),
@@ -191,6 +190,26 @@ impl JointSolver<'_> {
             cost: best.cost,
             outliers: Vec::new(),
         })
+    }
+
+    /// The best camera; for labels that state k1 searched until that is applied at the focal length
+    /// found.
+    fn search_with_stated_distortion(
+        &self,
+        used: &[usize],
+        unknown: Framing,
+    ) -> Result<(Bundle, BundleEquations), SolveError> {
+        let search_at = |focal| {
+            let bundle = Bundle::new(self.labels, used, unknown, focal, self.options)?;
+            let best = bundle.best(self.alone).ok_or(SolveError::NoPose)?;
+            Ok((bundle, best))
+        };
+        let first: (Bundle, BundleEquations) = search_at(None)?;
+        let prior = first.0.focal_prior();
+        if !used.iter().any(|&i| states_distortion(&self.labels[i])) {
+            return Ok(first);
+        }
+        repeated_at_focal_found(first, prior, |(_, best)| best.ln_focal(), search_at)
     }
 
     /// A camera fits the photo when it is alone.
@@ -352,6 +371,29 @@ mod tests {
                 "{:?}",
                 s.camera.focal_px
             );
+        }
+    }
+
+    #[test]
+    fn a_stated_distortion_is_applied_at_the_focal_length_found() {
+        let scenario = Scenario {
+            kappa: 0.12,
+            ..Scenario::realistic()
+        };
+        let views = scenario.views(31, 7, 4, [20.0, 40.0]);
+        // Relative to half the diagonal in place of the focal length.
+        let k1 = |kappa: f64, focal_px: f64| kappa * (focal_px / 2500.0).powi(2);
+        let stated = k1(views[0].kappa, scenario.focal_px);
+        let mut labels: Vec<Label> = views.into_iter().map(|view| view.label).collect();
+        labels.iter_mut().for_each(|l| l.camera.k1 = Some(stated));
+        let joint = solve_joint(&labels, &SolveOptions::default()).unwrap();
+        assert!(joint.outliers.is_empty(), "{:?}", joint.outliers);
+        for solution in joint.photos.iter().flatten() {
+            let focal_px = solution.camera.focal_px.x;
+            let off = libm::log(focal_px / scenario.focal_px).abs();
+            assert!(off < 4.0 * solution.sigma.ln_focal, "{focal_px}");
+            let applied = k1(solution.kappa, focal_px);
+            assert!((applied / stated - 1.0).abs() < 1e-8, "{applied} {stated}");
         }
     }
 

@@ -6,6 +6,7 @@ use super::focal::PriorSource;
 use super::hedge::is_off_center;
 use super::label::{Framing, Label};
 use super::options::{CornerOrder, SolveOptions};
+use super::prior::Prior;
 use super::problem::Problem;
 use super::refine::Minimum;
 use super::search::{SearchResult, degrees_apart};
@@ -148,26 +149,46 @@ fn search_with_stated_distortion(
     framing: Framing,
     options: &SolveOptions,
 ) -> Result<(Problem, SearchResult), SolveError> {
-    let mut problem = Problem::new(label, framing, options)?;
-    let mut found = search(&problem, options)?;
-    let prior = problem.residuals.priors.ln_focal;
-    if !states_distortion(label) || prior.is_fixed() {
-        return Ok((problem, found));
+    let search_at = |focal| {
+        let problem = Problem::with_focal(label, framing, focal, options)?;
+        let found = search(&problem, options)?;
+        Ok((problem, found))
+    };
+    let first: (Problem, SearchResult) = search_at(None)?;
+    let prior = first.0.residuals.priors.ln_focal;
+    if !states_distortion(label) {
+        return Ok(first);
     }
-    let mut applied = prior.mean;
-    for _ in 0..MAX_REPEATS {
-        let ln_focal = found.best.state.ln_focal;
+    repeated_at_focal_found(
+        first,
+        prior,
+        |(_, found)| found.best.state.ln_focal,
+        search_at,
+    )
+}
+
+/// A search whose distortion was applied at the prior's focal length, repeated at that which it
+/// found until that stays.
+pub(super) fn repeated_at_focal_found<T>(
+    first: T,
+    prior: Prior,
+    ln_focal_of: impl Fn(&T) -> f64,
+    search_at: impl Fn(Option<f64>) -> Result<T, SolveError>,
+) -> Result<T, SolveError> {
+    let (mut found, mut applied) = (first, prior.mean);
+    let repeats = if prior.is_fixed() { 0 } else { MAX_REPEATS };
+    for _ in 0..repeats {
+        let ln_focal = ln_focal_of(&found);
         if (ln_focal - applied).abs() < FOCAL_TOLERANCE {
             break;
         }
         applied = ln_focal;
-        problem = Problem::with_focal(label, framing, Some(libm::exp(ln_focal)), options)?;
-        found = search(&problem, options)?;
+        found = search_at(Some(libm::exp(ln_focal)))?;
     }
-    Ok((problem, found))
+    Ok(found)
 }
 
-fn states_distortion(label: &Label) -> bool {
+pub(super) fn states_distortion(label: &Label) -> bool {
     label.camera.k1.is_some_and(|k1| k1 != 0.0)
 }
 
