@@ -59,7 +59,7 @@ static PRINTED: LazyLock<Pyramid<PremulRgba>> = LazyLock::new(|| {
 
 /// A photo of the board on a dark table.
 fn photo(camera: &Camera) -> Image<LinearRgb> {
-    let seen = project_picture(&PRINTED, camera, BOARD);
+    let seen = project_picture(&PRINTED, camera, 0.0, BOARD);
     seen.map(|p| LinearRgb {
         r: p.r + 0.1 * (1.0 - p.a),
         g: p.g + 0.1 * (1.0 - p.a),

@@ -43,10 +43,11 @@ fn photo(tilt: f64, turn: f64, table: LinearRgb) -> (Image<LinearRgb>, Camera) {
             GREEN.scale(0.6 + 0.4 * x as f32 / 300.0)
         }
     });
-    let seen = project_picture(&Pyramid::new(screen), &camera, [0.6, 0.4]);
+    let seen = project_picture(&Pyramid::new(screen), &camera, 0.0, [0.6, 0.4]);
     let alpha = project_picture(
         &Pyramid::new(Image::filled(300, 200, Coverage(1.0))),
         &camera,
+        0.0,
         [0.6, 0.4],
     );
     (

@@ -370,10 +370,11 @@ mod tests {
                 _ => LinearRgb::new(0.05, 0.4, 0.1).scale(0.8 + 0.2 * x as f32 / 600.0),
             }
         });
-        let seen = project_picture(&Pyramid::new(screen), camera, SCREEN);
+        let seen = project_picture(&Pyramid::new(screen), camera, 0.0, SCREEN);
         let alpha = project_picture(
             &Pyramid::new(Image::filled(600, 400, Coverage(1.0))),
             camera,
+            0.0,
             SCREEN,
         );
         seen.zip_map(&alpha, |p, a| {

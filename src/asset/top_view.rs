@@ -68,7 +68,13 @@ impl TopView {
             return Err(scale_unknown("its corners leave nothing of the photo"));
         }
         let camera = self.camera().resized(size_px(&photo));
-        rectify(&Pyramid::new(photo), &camera, self.size, self.px_per_metre)
+        rectify(
+            &Pyramid::new(photo),
+            &camera,
+            0.0,
+            self.size,
+            self.px_per_metre,
+        )
     }
 
     /// The camera over the rectangle's own plane.

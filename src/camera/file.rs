@@ -4,6 +4,7 @@ use super::exchange::{BlenderCamera, OpencvCamera, matrix_rows};
 use super::focal::FocalSource;
 use super::label::{Framing, Label, LabelImage};
 use super::label_check::MAX_MAGNITUDE;
+use super::lens::k1_from_kappa;
 use super::model::Square;
 use super::pinhole::Camera;
 use super::solution::{FocalFinding, Solution};
@@ -199,6 +200,11 @@ impl CameraFile {
             principal_px: Point2::from(model.principal_point_px),
             ..Camera::from_opencv(&self.found.opencv, self.image.size())
         }
+    }
+
+    /// OpenCV's k1, the first coefficient of its lens's radial distortion.
+    pub fn k1(&self) -> f64 {
+        k1_from_kappa(&self.camera(), self.found.model.kappa)
     }
 
     /// Width and height of the rectangle as fitted, metres.

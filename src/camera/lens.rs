@@ -74,12 +74,33 @@ impl RadialDistortion {
         Matrix3::from_columns(&[along_x.push(0.0), along_y.push(0.0), offset.push(1.0)])
     }
 
+    /// The picture shows what a pinhole camera sees at a position: it is not beyond the fold.
+    pub(super) fn shows(&self, px: Point2<f64>) -> bool {
+        self.in_focal_lengths(px).norm() < self.fold()
+    }
+
+    /// How many pixels of the picture a pixel of a pinhole camera is at a position of its, along both
+    /// axes.
+    pub(super) fn distort_slope(&self, px: Point2<f64>) -> Matrix2<f64> {
+        let bent = self.slope_in_focal_lengths(px);
+        let [fx, fy] = [self.focal_px.x, self.focal_px.y];
+        Matrix2::new(
+            bent[(0, 0)],
+            bent[(0, 1)] * fx / fy,
+            bent[(1, 0)] * fy / fx,
+            bent[(1, 1)],
+        )
+    }
+
+    fn slope_in_focal_lengths(&self, px: Point2<f64>) -> Matrix2<f64> {
+        let x = self.in_focal_lengths(px);
+        Matrix2::identity() * self.growth(x.norm()) + x * x.transpose() * (2.0 * self.k1)
+    }
+
     /// How many pixels of a pinhole camera a pixel of the picture is at a position, along both
     /// axes.
-    fn undistort_slope(&self, px: Point2<f64>) -> Matrix2<f64> {
-        let x = self.in_focal_lengths(self.undistort(px));
-        let bent =
-            Matrix2::identity() * self.growth(x.norm()) + x * x.transpose() * (2.0 * self.k1);
+    pub(super) fn undistort_slope(&self, px: Point2<f64>) -> Matrix2<f64> {
+        let bent = self.slope_in_focal_lengths(self.undistort(px));
         let [fx, fy] = [self.focal_px.x, self.focal_px.y];
         let inverse = bent.try_inverse().unwrap_or_else(Matrix2::identity);
         Matrix2::new(

@@ -1,7 +1,7 @@
 //! A picture to judge a camera by: rectangle, metric grid and a box of the reference height, drawn
 //! over the photo.
 
-use super::pinhole::Camera;
+use super::pinhole::{Camera, distorted_line};
 use super::rectangle::corner_points;
 use super::solution::Solution;
 use crate::color::{decode_srgb8, encode_srgb8};
@@ -228,6 +228,8 @@ fn power_of_ten_below(value: f64) -> f64 {
 struct OverlayDrawing {
     picture: Image<LinearRgb>,
     camera: Camera,
+    /// Radial distortion, as [`Solution::kappa`].
+    kappa: f64,
     /// Width of a line, pixels.
     line_px: f64,
 }
@@ -235,7 +237,7 @@ struct OverlayDrawing {
 impl OverlayDrawing {
     /// A solution drawn over a photo, of the label's size or another.
     fn new(photo: &Image<LinearRgb>, solution: &Solution) -> Self {
-        let mut drawing = Self::over_photo(photo, &solution.camera);
+        let mut drawing = Self::over_photo(photo, solution);
         drawing.draw_grid(solution.size);
         drawing.draw_box(solution.size, solution.sigma.reference_height);
         let zoom = photo.width() as f64 / f64::from(solution.camera.image[0].max(1));
@@ -244,11 +246,12 @@ impl OverlayDrawing {
     }
 
     /// A photo on which nothing is drawn yet, and a camera for its size.
-    fn over_photo(photo: &Image<LinearRgb>, camera: &Camera) -> Self {
+    fn over_photo(photo: &Image<LinearRgb>, solution: &Solution) -> Self {
         let (width, height) = photo.size();
         Self {
             picture: photo.clone(),
-            camera: camera.resized([width as u32, height as u32]),
+            camera: solution.camera.resized([width as u32, height as u32]),
+            kappa: solution.kappa,
             line_px: line_width_px(width.max(height)),
         }
     }
@@ -279,11 +282,11 @@ impl OverlayDrawing {
         }
     }
 
-    /// A straight line in space; nothing where an end is behind the camera.
+    /// A straight line in space, bent as the lens bends it; nothing where an end is behind the camera.
     fn line(&mut self, ends: [Point3<f64>; 2], color: LinearRgb, weight: f64) {
-        let [a, b] = ends.map(|end| self.camera.project(end));
-        if let (Some((a, _)), Some((b, _))) = (a, b) {
-            self.stroke([a, b], color, weight * self.line_px);
+        let seen = distorted_line(&self.camera, self.kappa, ends).unwrap_or_default();
+        for ends in seen.windows(2) {
+            self.stroke([ends[0], ends[1]], color, weight * self.line_px);
         }
     }
 
@@ -409,6 +412,35 @@ mod tests {
                 .count()
                 > 1000
         );
+    }
+
+    #[test]
+    fn lines_are_drawn_where_the_lens_bends_them() {
+        let scenario = Scenario {
+            image: [400, 300],
+            focal_px: 320.0,
+            kappa: 0.08,
+            ..Scenario::default()
+        };
+        let view = scenario.tilted(20.0).view(1, 0);
+        let mut label = view.label;
+        // Kappa is in half diagonals, of 250 pixels here.
+        let k1 = view.kappa * (320.0_f64 / 250.0).powi(2);
+        label.camera.k1 = Some(k1);
+        let solution = solve(&label, &SolveOptions::default()).unwrap();
+        // A photo of half the size.
+        let drawn = overlay(&Image::filled(200, 150, LinearRgb::BLACK), &solution);
+        let corners = corner_points(view.size);
+        for part in [0.2, 0.3, 0.4, 0.6, 0.8] {
+            let place = corners[0] + (corners[1] - corners[0]) * part;
+            let (straight, _) = view.camera.project(place).unwrap();
+            // OpenCV's distortion.
+            let x = (straight - view.camera.principal_px) / 320.0;
+            let px = view.camera.principal_px + x * (1.0 + k1 * x.norm_squared()) * 320.0;
+            let seen = drawn[((px.x / 2.0) as usize, (px.y / 2.0) as usize)];
+            assert!(seen.g > 0.3 && seen.r < 0.3, "{part}: {seen:?}");
+            assert!((px - straight).norm() > 8.0, "{part}: {px} {straight}");
+        }
     }
 
     #[test]

@@ -161,6 +161,23 @@ pub fn distorted(camera: &Camera, kappa: f64, point: Point3<f64>) -> Point2<f64>
     camera.principal_px + off * (1.0 + kappa * (off / half).norm_squared())
 }
 
+/// Pieces of a straight line in space, where a lens bends it.
+const PIECES: usize = 12;
+
+/// Where a straight line in space is seen through a lens with distortion; none where a part is
+/// behind the camera.
+pub(super) fn distorted_line(
+    camera: &Camera,
+    kappa: f64,
+    [a, b]: [Point3<f64>; 2],
+) -> Option<Vec<Point2<f64>>> {
+    let pieces = if kappa == 0.0 { 1 } else { PIECES };
+    let points = (0..=pieces).map(|i| a + (b - a) * (i as f64 / pieces as f64));
+    let seen: Vec<_> = points.map(|p| distorted(camera, kappa, p)).collect();
+    let is_seen = |px: &Point2<f64>| px.x.is_finite() && px.y.is_finite();
+    seen.iter().all(is_seen).then_some(seen)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,5 +1,6 @@
 //! The surface as a map: photo to metric top view, and a picture on the surface to the photo.
 
+use super::lens::RadialDistortion;
 use super::pinhole::Camera;
 use crate::bounds::number;
 use crate::error::{Error, Result};
@@ -18,21 +19,38 @@ const MAX_MAP_PIXELS: f64 = 67_108_864.0;
 /// The rectangle of `size` metres seen from straight above, `px_per_metre` pixels to the metre, its
 /// top left corner first.
 ///
-/// Takes a photo in any pixels that may be averaged (scene-linear), of the camera's size; what the
-/// photo does not show is empty.
+/// Takes a photo in any pixels that may be averaged (scene-linear), of the camera's size and bent by
+/// OpenCV's `k1`; what the photo does not show is empty.
 ///
 /// # Errors
 /// [`Error::Value`] for a map without pixels or of more than 64 million.
 pub fn rectify<P: Mix>(
     photo: &Pyramid<P>,
     camera: &Camera,
+    k1: f64,
     size: [f64; 2],
     px_per_metre: f64,
 ) -> Result<Image<P>> {
     let map = map_size(size, px_per_metre)?;
-    let photo_from_map = Homography(camera.pixel_from_surface().0 * surface_from_map(size, map).0);
+    let straight_from_map =
+        Homography(camera.pixel_from_surface().0 * surface_from_map(size, map).0);
+    let lens = RadialDistortion::new(camera, k1);
     let [width, height] = map.map(|side| side as usize);
-    Ok(warp(photo, &photo_from_map, width, height))
+    Ok(warp_by(photo, width, height, |px| {
+        shown(&lens, mapped(&straight_from_map, px)?)
+    }))
+}
+
+/// What a pinhole camera sees, as the lens shows it; none beyond its fold.
+fn shown(lens: &RadialDistortion, straight: MappedPoint) -> Option<MappedPoint> {
+    if lens.is_none() {
+        return Some(straight);
+    }
+    let px = Point2::from(straight.at);
+    lens.shows(px).then(|| MappedPoint {
+        at: lens.distort(px).coords,
+        slope: lens.distort_slope(px) * straight.slope,
+    })
 }
 
 /// Width and height of a map, pixels: integers.
@@ -52,9 +70,14 @@ fn unusable_scale(px_per_metre: f64, pixels: [f64; 2]) -> Error {
     Error::value("px_per_metre", what)
 }
 
-/// The photo that the camera takes of a picture lying on the rectangle of `size` metres; empty
-/// beside it.
-pub fn project_picture<P: Mix>(picture: &Pyramid<P>, camera: &Camera, size: [f64; 2]) -> Image<P> {
+/// The photo that the camera takes of a picture lying on the rectangle of `size` metres, bent by
+/// OpenCV's `k1`; empty beside it.
+pub fn project_picture<P: Mix>(
+    picture: &Pyramid<P>,
+    camera: &Camera,
+    k1: f64,
+    size: [f64; 2],
+) -> Image<P> {
     let (w, h) = picture.base().size();
     let photo_from_picture =
         camera.pixel_from_surface().0 * surface_from_map(size, [w as f64, h as f64]).0;
@@ -65,8 +88,13 @@ pub fn project_picture<P: Mix>(picture: &Pyramid<P>, camera: &Camera, size: [f64
     // In front of the camera the last coordinate is one over the depth: positive.
     let middle = Vector3::new(w as f64 / 2.0, h as f64 / 2.0, 1.0);
     let center = inverse * photo_from_picture * middle;
-    let picture_from_photo = Homography(inverse * center.z.signum());
-    warp(picture, &picture_from_photo, width, height)
+    let lens = RadialDistortion::new(camera, k1);
+    let picture_from_straight = Homography(inverse * center.z.signum());
+    warp_by(picture, width, height, |px| {
+        let MappedPoint { at, slope } = mapped(&picture_from_straight, lens.undistort(px))?;
+        let slope = slope * lens.undistort_slope(px);
+        Some(MappedPoint { at, slope })
+    })
 }
 
 /// Surface metres from the pixels of a map of this size.
@@ -99,16 +127,33 @@ pub fn warp<P: Mix>(
     width: usize,
     height: usize,
 ) -> Image<P> {
+    warp_by(source, width, height, |px| mapped(source_from_target, px))
+}
+
+/// The same through any map.
+fn warp_by<P: Mix>(
+    source: &Pyramid<P>,
+    width: usize,
+    height: usize,
+    source_from_target: impl Fn(Point2<f64>) -> Option<MappedPoint> + Sync,
+) -> Image<P> {
     Image::from_fn(width, height, |x, y| {
         let center = Point2::new(x as f64 + 0.5, y as f64 + 0.5);
-        mapped(source_from_target, center)
-            .map_or_else(P::default, |(at, slope)| footprint_mean(source, at, &slope))
+        source_from_target(center).map_or_else(P::default, |point| {
+            footprint_mean(source, point.at, &point.slope)
+        })
     })
 }
 
-/// Where a map takes a point, and its derivative there; none where it comes from behind.
+/// Where a map takes a point, and its derivative there.
+struct MappedPoint {
+    at: Vector2<f64>,
+    slope: Matrix2<f64>,
+}
+
+/// None where the map comes from behind.
 #[inline]
-fn mapped(map: &Homography, point: Point2<f64>) -> Option<(Vector2<f64>, Matrix2<f64>)> {
+fn mapped(map: &Homography, point: Point2<f64>) -> Option<MappedPoint> {
     let m = &map.0;
     let q = m * point.to_homogeneous();
     if q.z.is_nan() || q.z <= 0.0 {
@@ -116,7 +161,7 @@ fn mapped(map: &Homography, point: Point2<f64>) -> Option<(Vector2<f64>, Matrix2
     }
     let at = q.xy() / q.z;
     let slope = (m.fixed_view::<2, 2>(0, 0) - at * m.fixed_view::<1, 2>(2, 0)) / q.z;
-    Some((at, slope))
+    Some(MappedPoint { at, slope })
 }
 
 /// The mean over what a pixel covers. In one piece: most of the time of a warp is spent here.
@@ -182,6 +227,7 @@ fn long_direction(half: f64, mixed: f64, spread: f64) -> Vector2<f64> {
 mod tests {
     use super::*;
     use crate::camera::simulate::Scenario;
+    use crate::geom::Point3;
     use crate::pixel::Coverage;
 
     fn camera() -> Camera {
@@ -200,17 +246,57 @@ mod tests {
         Image::from_fn(width, height, |x, y| Coverage(wave(x, y) as f32))
     }
 
+    const LENSES: [f64; 3] = [-0.2, 0.0, 0.15];
+
     #[test]
     fn onto_the_surface_and_back_is_the_picture() {
         let (camera, size) = (camera(), [0.6, 0.4]);
         let picture = waves(240, 160);
-        let photo = project_picture(&Pyramid::new(picture.clone()), &camera, size);
-        let back = rectify(&Pyramid::new(photo), &camera, size, 400.0).unwrap();
-        assert_eq!(back.size(), picture.size());
-        for y in 10..150 {
-            for x in 10..230 {
-                let (a, b) = (back[(x, y)].0, picture[(x, y)].0);
-                assert!((a - b).abs() < 0.03, "{x} {y}: {a} {b}");
+        for k1 in LENSES {
+            let photo = project_picture(&Pyramid::new(picture.clone()), &camera, k1, size);
+            let back = rectify(&Pyramid::new(photo), &camera, k1, size, 400.0).unwrap();
+            assert_eq!(back.size(), picture.size());
+            for y in 10..150 {
+                for x in 10..230 {
+                    let (a, b) = (back[(x, y)].0, picture[(x, y)].0);
+                    assert!((a - b).abs() < 0.03, "{k1} {x} {y}: {a} {b}");
+                }
+            }
+        }
+    }
+
+    /// A spot 3 pixels large.
+    fn spot(at: Point2<f64>, [width, height]: [u32; 2]) -> Image<Coverage> {
+        Image::from_fn(width as usize, height as usize, |x, y| {
+            let off = Point2::new(x as f64 + 0.5, y as f64 + 0.5) - at;
+            Coverage(libm::exp(-off.norm_squared() / 18.0) as f32)
+        })
+    }
+
+    fn center_of_mass(picture: &Image<Coverage>) -> Point2<f64> {
+        let (width, mut sum) = (picture.width(), Vector3::zeros());
+        for (i, Coverage(mass)) in picture.pixels().iter().enumerate() {
+            let (x, y) = (i % width, i / width);
+            sum += Vector3::new(x as f64 + 0.5, y as f64 + 0.5, 1.0) * f64::from(*mass);
+        }
+        Point2::from(sum.xy() / sum.z)
+    }
+
+    #[test]
+    fn a_spot_comes_to_lie_where_it_is_on_the_surface() {
+        let camera = camera();
+        for k1 in LENSES {
+            for (x, y) in [(0.25, 0.15), (-0.25, 0.15), (0.2, -0.15), (0.0, 0.0)] {
+                let (straight, _) = camera.project(Point3::new(x, y, 0.0)).unwrap();
+                // OpenCV's distortion.
+                let off = (straight - camera.principal_px) / 320.0;
+                let px = camera.principal_px + off * (1.0 + k1 * off.norm_squared()) * 320.0;
+                let photo = Pyramid::new(spot(px, camera.image));
+                let map = rectify(&photo, &camera, k1, [0.6, 0.4], 400.0).unwrap();
+                let found = center_of_mass(&map);
+                let expected = Point2::new((x + 0.3) * 400.0, (0.2 - y) * 400.0);
+                // The spot is not round on the surface: its middle is off by a part of a pixel.
+                assert!((found - expected).norm() < 0.5, "{k1}: {found} {expected}");
             }
         }
     }
@@ -320,7 +406,7 @@ mod tests {
         let photo = Pyramid::new(waves(40, 30));
         for px_per_metre in [0.0, f64::NAN, -3.0, 1e9] {
             assert!(
-                rectify(&photo, &camera(), [0.6, 0.4], px_per_metre).is_err(),
+                rectify(&photo, &camera(), 0.0, [0.6, 0.4], px_per_metre).is_err(),
                 "{px_per_metre}"
             );
         }

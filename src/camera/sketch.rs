@@ -2,14 +2,12 @@
 //! over it and the horizon.
 
 use super::overlay::{grid, grid_step};
-use super::pinhole::{Camera, distorted};
+use super::pinhole::{Camera, distorted_line};
 use super::rectangle::corner_points;
 use super::solution::Solution;
 use crate::geom::{Point2, Point3};
 use serde::Serialize;
 
-/// Pieces of a straight line in space, which a lens may bend.
-const PIECES: usize = 12;
 /// The horizon is drawn from so many widths of the picture left of it to as many right of it.
 const HORIZON_WIDTHS: f64 = 1.0;
 
@@ -55,13 +53,9 @@ impl Sketch {
     }
 }
 
-/// A straight line in space as the picture shows it; none where a part is behind the camera.
-fn polyline(solution: &Solution, [a, b]: [Point3<f64>; 2]) -> Option<Polyline> {
-    let points = (0..=PIECES).map(|i| a + (b - a) * (i as f64 / PIECES as f64));
-    let seen: Polyline = points
-        .map(|point| distorted(&solution.camera, solution.kappa, point).into())
-        .collect();
-    seen.iter().flatten().all(|v| v.is_finite()).then_some(seen)
+fn polyline(solution: &Solution, ends: [Point3<f64>; 2]) -> Option<Polyline> {
+    let seen = distorted_line(&solution.camera, solution.kappa, ends)?;
+    Some(seen.into_iter().map(Into::into).collect())
 }
 
 /// Two points of the line where directions along the surface are seen.

@@ -5,6 +5,7 @@ use super::error::SolveError;
 use super::exchange::pose_from;
 use super::focal::FocalSource;
 use super::label::Framing;
+use super::lens::k1_from_kappa;
 use super::model::{Square, State};
 use super::options::SolveOptions;
 use super::pinhole::Camera;
@@ -272,6 +273,11 @@ impl FocalSource {
 }
 
 impl Solution {
+    /// OpenCV's k1, the first coefficient of its lens's radial distortion.
+    pub fn k1(&self) -> f64 {
+        k1_from_kappa(&self.camera, self.kappa)
+    }
+
     /// The solution, unless it does not fit its label.
     ///
     /// # Errors

@@ -3,7 +3,6 @@
 use super::error::SolveError;
 use super::file::{CameraFile, SolvedFrom, checksum, has_checksum};
 use super::label::Label;
-use super::lens::k1_from_kappa;
 use super::options::SolveOptions;
 use super::pinhole::Camera;
 use super::read::LabelledPhoto;
@@ -79,7 +78,7 @@ impl PhotoCamera {
     fn stored(file: &CameraFile) -> Self {
         Self {
             camera: file.camera(),
-            k1: k1_from_kappa(&file.camera(), file.found.model.kappa),
+            k1: file.k1(),
             size: file.size(),
             warnings: file.found.warnings.clone(),
             stored: true,
@@ -107,7 +106,7 @@ impl From<Solution> for PhotoCamera {
     fn from(solution: Solution) -> Self {
         Self {
             camera: solution.camera,
-            k1: k1_from_kappa(&solution.camera, solution.kappa),
+            k1: solution.k1(),
             size: solution.size,
             warnings: solution.warnings,
             stored: false,

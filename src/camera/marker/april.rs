@@ -162,7 +162,7 @@ mod tests {
             ..Scenario::default()
         };
         let camera = scenario.tilted(tilt).view(8, k).camera;
-        let seen = project_picture(&Pyramid::new(board(tags, artwork)), &camera, BOARD);
+        let seen = project_picture(&Pyramid::new(board(tags, artwork)), &camera, 0.0, BOARD);
         let over_table = |p: PremulRgba| 0.25 * (1.0 - p.a);
         (
             seen.map(|p| LinearRgb {

@@ -275,10 +275,10 @@ mod tests {
             };
             let camera = scenario.tilted(tilt).view(5, u64::from(id)).camera;
             let sheet = Pyramid::new(printed(id, 24));
-            let photo = super::super::project_picture(&sheet, &camera, [0.4, 0.4]);
+            let photo = super::super::project_picture(&sheet, &camera, 0.0, [0.4, 0.4]);
             // Paper on a grey table.
             let alpha = Pyramid::new(Image::filled(192, 192, crate::Coverage(1.0)));
-            let alpha = super::super::project_picture(&alpha, &camera, [0.4, 0.4]);
+            let alpha = super::super::project_picture(&alpha, &camera, 0.0, [0.4, 0.4]);
             let photo = photo.zip_map(&alpha, |p, a| p.add_scaled_grey(0.3 * (1.0 - a.0)));
             let found = find_markers(&photo);
             assert_eq!(
@@ -308,9 +308,9 @@ mod tests {
         };
         let camera = scenario.tilted(tilt).view(11, k).camera;
         let sheet = Pyramid::new(printed(id, 16));
-        let seen = super::super::project_picture(&sheet, &camera, [0.4, 0.4]);
+        let seen = super::super::project_picture(&sheet, &camera, 0.0, [0.4, 0.4]);
         let alpha = Pyramid::new(Image::filled(128, 128, crate::Coverage(1.0)));
-        let alpha = super::super::project_picture(&alpha, &camera, [0.4, 0.4]);
+        let alpha = super::super::project_picture(&alpha, &camera, 0.0, [0.4, 0.4]);
         let seen = seen.zip_map(&alpha, |p, a| p.add_scaled_grey(0.3 * (1.0 - a.0)));
         (seen, camera)
     }

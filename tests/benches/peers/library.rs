@@ -118,6 +118,7 @@ fn rectify(times: usize, photo: &str, label: &str, px_per_metre: &str) -> Result
         let map = camera::rectify(
             &Pyramid::new(photo.clone()),
             &seen.camera,
+            seen.k1(),
             seen.size,
             px_per_metre,
         )?;

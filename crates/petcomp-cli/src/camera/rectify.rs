@@ -54,14 +54,14 @@ impl RectifyArgs {
         solution: &Solution,
     ) -> anyhow::Result<()> {
         let picture = Pyramid::new(io::read::<PremulRgba>(picture)?);
-        let projected = camera::project_picture(&picture, camera, solution.size);
+        let projected = camera::project_picture(&picture, camera, solution.k1(), solution.size);
         Ok(io::write(&self.output, &projected)?)
     }
 
     fn write_top_view(&self, camera: &Camera, solution: &Solution) -> anyhow::Result<()> {
         let px_per_metre = self.px_per_metre.unwrap_or(solution.fit.px_per_metre);
         let photo = Pyramid::new(io::read::<LinearRgb>(&self.photo)?);
-        let view = camera::rectify(&photo, camera, solution.size, px_per_metre)?;
+        let view = camera::rectify(&photo, camera, solution.k1(), solution.size, px_per_metre)?;
         Ok(io::write(&self.output, &view)?)
     }
 }

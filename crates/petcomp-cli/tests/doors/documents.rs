@@ -359,6 +359,7 @@ fn label_file(world: &World) {
         ends(camera::rectify(
             &Pyramid::new(photo),
             &solution.camera,
+            solution.k1(),
             solution.size,
             solution.fit.px_per_metre,
         ));
