@@ -236,27 +236,32 @@ pub(crate) fn pose_from(rotation: Matrix3<f64>, translation: Vector3<f64>) -> Po
 }
 
 impl ColmapModel {
-    /// A model of named pictures, each with a camera of its own.
-    pub fn new<'a>(views: impl IntoIterator<Item = (&'a str, &'a Camera)>) -> Self {
+    /// A model of named pictures, each with a camera of its own and OpenCV's k1 of its lens.
+    pub fn new<'a>(views: impl IntoIterator<Item = (&'a str, &'a Camera, f64)>) -> Self {
         let mut model = Self::default();
-        for (i, (name, camera)) in views.into_iter().enumerate() {
-            model.add_view(i + 1, name, camera);
+        for (i, (name, camera, k1)) in views.into_iter().enumerate() {
+            model.add_view(i + 1, name, camera, k1);
         }
         model
     }
 
-    fn add_view(&mut self, id: usize, name: &str, camera: &Camera) {
+    fn add_view(&mut self, id: usize, name: &str, camera: &Camera, k1: f64) {
         let pose = colmap_pose(camera);
         // Writing to a string cannot fail.
-        let _ = writeln!(self.cameras, "{id} PINHOLE {}", colmap_intrinsics(camera));
+        let _ = writeln!(self.cameras, "{id} {}", colmap_intrinsics(camera, k1));
         let _ = writeln!(self.images, "{id} {pose} {id} {name}\n");
     }
 }
 
-fn colmap_intrinsics(camera: &Camera) -> String {
+/// COLMAP's model of the lens, and what it takes; its k1 is OpenCV's, of four coefficients.
+fn colmap_intrinsics(camera: &Camera, k1: f64) -> String {
     let [w, h] = camera.image;
     let (f, c) = (camera.focal_px, camera.principal_px);
-    format!("{w} {h} {:?} {:?} {:?} {:?}", f.x, f.y, c.x, c.y)
+    let pinhole = format!("{w} {h} {:?} {:?} {:?} {:?}", f.x, f.y, c.x, c.y);
+    match k1 {
+        0.0 => format!("PINHOLE {pinhole}"),
+        k1 => format!("OPENCV {pinhole} {k1:?} 0 0 0"),
+    }
 }
 
 /// Rotation as a quaternion, w first, and translation.
@@ -283,6 +288,7 @@ fn blender_flip() -> Matrix3<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::camera::RadialDistortion;
 
     fn cameras() -> Vec<Camera> {
         let sizes = [[640, 480], [480, 640], [1000, 1000]];
@@ -331,7 +337,7 @@ mod tests {
     #[test]
     fn colmap_names_every_picture() {
         let cameras = cameras();
-        let model = ColmapModel::new([("a.png", &cameras[0]), ("b.png", &cameras[1])]);
+        let model = ColmapModel::new([("a.png", &cameras[0], 0.0), ("b.png", &cameras[1], 0.0)]);
         assert!(
             model
                 .cameras
@@ -345,6 +351,45 @@ mod tests {
                 .nth(2)
                 .is_some_and(|line| line.ends_with(" 2 b.png"))
         );
+    }
+
+    /// Where COLMAP's documentation says that a point is seen: `x = R X + t` with the quaternion
+    /// `QW QX QY QZ` of R, then its model of the lens.
+    fn seen_by_colmap(model: &ColmapModel, point: Vector3<f64>) -> Point2<f64> {
+        let numbers = |words: &str, skipped: usize| {
+            let words = words.split_whitespace().skip(skipped);
+            words.map_while(|w| w.parse().ok()).collect::<Vec<f64>>()
+        };
+        let pose = numbers(&model.images, 1);
+        let (w, v) = (pose[0], Vector3::new(pose[1], pose[2], pose[3]));
+        // The rotation of a point by a quaternion.
+        let turned = point + 2.0 * v.cross(&(v.cross(&point) + point * w));
+        let seen = turned + Vector3::new(pose[4], pose[5], pose[6]);
+        let (u, v) = (seen.x / seen.z, seen.y / seen.z);
+        let lens = numbers(&model.cameras, 4);
+        let radial = match model.cameras.split_whitespace().nth(1).unwrap() {
+            "PINHOLE" => 0.0,
+            "OPENCV" => lens[4] * (u * u + v * v),
+            other => panic!("{other}"),
+        };
+        let along = |i: usize, u: f64| lens[i] * (u + u * radial) + lens[i + 2];
+        Point2::new(along(0, u), along(1, v))
+    }
+
+    #[test]
+    fn colmap_sees_what_the_camera_sees_through_its_lens() {
+        for camera in cameras() {
+            for k1 in [0.0, -0.2, 0.1] {
+                let model = ColmapModel::new([("a.png", &camera, k1)]);
+                let lens = RadialDistortion::new(&camera, k1);
+                for px in [[20.0, 30.0], [400.0, 470.0]] {
+                    let point = camera.ray(px.into()).at(1.3);
+                    let found = seen_by_colmap(&model, point.coords);
+                    let expected = lens.distort(px.into());
+                    assert!((found - expected).norm() < 1e-9, "{k1}: {found} {expected}");
+                }
+            }
+        }
     }
 
     #[test]

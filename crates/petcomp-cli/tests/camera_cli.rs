@@ -574,6 +574,24 @@ fn a_portrait_photo_is_not_cropped_in_silence() {
 }
 
 #[test]
+fn a_camera_is_exported_with_its_lens() {
+    let desk = Desk::new();
+    let mut label = desk.photo("a", IMAGE);
+    label["camera"] = json!({ "k1": -0.01 });
+    desk.label("a", &label);
+    desk.ok(&["camera", "solve", "bg/a.label.json"]);
+    let export = ["camera", "export", "bg/a.camera.json", "--to"];
+    let [opencv, _] = desk.ok(&[&export[..], &["opencv"]].concat());
+    let opencv: Value = serde_json::from_str(&opencv).unwrap();
+    assert!((opencv["dist"][0].as_f64().unwrap() + 0.01).abs() < 1e-9);
+    desk.ok(&[&export[..], &["colmap", "-o", "model"]].concat());
+    let cameras = std::fs::read_to_string(desk.path("model/cameras.txt")).unwrap();
+    assert!(cameras.starts_with("1 OPENCV 640 480 "), "{cameras}");
+    let [_, said] = desk.ok(&[&export[..], &["blender"]].concat());
+    assert!(said.contains("k1 = -0.01"), "{said}");
+}
+
+#[test]
 fn the_overlay_has_a_legend_below_the_photo() {
     let desk = Desk::new();
     desk.label("a", &desk.photo("a", IMAGE));

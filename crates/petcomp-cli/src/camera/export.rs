@@ -1,7 +1,7 @@
 //! `petcomp camera export`: cameras in the files of other programs.
 
 use crate::print;
-use petcomp::camera::{Camera, CameraFile, ColmapModel};
+use petcomp::camera::{CameraFile, ColmapModel, OpencvCamera};
 use petcomp::io;
 use std::path::{Path, PathBuf};
 
@@ -23,7 +23,7 @@ pub(crate) struct ExportCameraArgs {
 enum CameraFormat {
     /// A Python script
     Blender,
-    /// K, R and t as JSON
+    /// K, R, t and dist (k1, k2, p1, p2) as JSON
     Opencv,
     /// cameras.txt, images.txt and points3D.txt
     Colmap,
@@ -33,8 +33,8 @@ pub(super) fn export_cameras(args: &ExportCameraArgs) -> anyhow::Result<()> {
     let (files, output) = (args.read_cameras()?, args.output.as_deref());
     match args.to {
         CameraFormat::Colmap => write_colmap(output, &files),
-        CameraFormat::Blender => write_or_print(output, &only_camera(&files)?.to_blender_script()),
-        CameraFormat::Opencv => write_or_print(output, &opencv_document(only_camera(&files)?)?),
+        CameraFormat::Blender => write_or_print(output, &blender_script(only_file(&files)?)),
+        CameraFormat::Opencv => write_or_print(output, &opencv_document(only_file(&files)?)?),
     }
 }
 
@@ -44,8 +44,30 @@ impl ExportCameraArgs {
     }
 }
 
-fn opencv_document(camera: Camera) -> serde_json::Result<String> {
-    Ok(serde_json::to_string_pretty(&camera.to_opencv())? + "\n")
+/// Blender's cameras have no lens that bends lines.
+fn blender_script(file: &CameraFile) -> String {
+    if file.k1() != 0.0 {
+        let (photo, k1) = (&file.image.file, file.k1());
+        log::warn!("{photo}: k1 = {k1} of its lens is left out, Blender's cameras have none");
+    }
+    file.camera().to_blender_script()
+}
+
+/// What OpenCV's functions take.
+#[derive(serde::Serialize)]
+struct OpencvDocument {
+    #[serde(flatten)]
+    camera: OpencvCamera,
+    /// k1, k2, p1 and p2.
+    dist: [f64; 4],
+}
+
+fn opencv_document(file: &CameraFile) -> serde_json::Result<String> {
+    let document = OpencvDocument {
+        camera: file.camera().to_opencv(),
+        dist: [file.k1(), 0.0, 0.0, 0.0],
+    };
+    Ok(serde_json::to_string_pretty(&document)? + "\n")
 }
 
 fn write_or_print(output: Option<&Path>, text: &str) -> anyhow::Result<()> {
@@ -56,9 +78,9 @@ fn write_or_print(output: Option<&Path>, text: &str) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn only_camera(files: &[CameraFile]) -> anyhow::Result<Camera> {
+fn only_file(files: &[CameraFile]) -> anyhow::Result<&CameraFile> {
     match files {
-        [file] => Ok(file.camera()),
+        [file] => Ok(file),
         _ => anyhow::bail!("{} cameras, expected one for this format", files.len()),
     }
 }
@@ -77,7 +99,7 @@ fn write_model(folder: &Path, model: &ColmapModel) -> petcomp::Result<()> {
 }
 
 fn colmap_model(files: &[CameraFile]) -> ColmapModel {
-    let cameras = files.iter().map(|file| (&*file.image.file, file.camera()));
-    let cameras: Vec<_> = cameras.collect();
-    ColmapModel::new(cameras.iter().map(|(name, camera)| (*name, camera)))
+    let cameras: Vec<_> = files.iter().map(CameraFile::camera).collect();
+    let views = files.iter().zip(&cameras);
+    ColmapModel::new(views.map(|(file, camera)| (&*file.image.file, camera, file.k1())))
 }

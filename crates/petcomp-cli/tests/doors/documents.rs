@@ -382,7 +382,7 @@ fn camera_file(world: &World) {
     let camera = file.camera();
     camera.to_blender_script();
     serde_json::to_string(&camera.to_opencv()).unwrap();
-    ColmapModel::new([("a.png", &camera)]);
+    ColmapModel::new([("a.png", &camera, file.k1())]);
 }
 
 fn labelme(world: &World) {
