@@ -7,6 +7,7 @@ use crate::filter;
 use crate::geom::{Point2, Point3, Vector2};
 use crate::image::{Image, Roi};
 use crate::io::{self, FromFile};
+use crate::light::PlateGrain;
 use crate::pixel::{Coverage, LinearRgb, Mix};
 use crate::scene::{Background, CameraSource, Wall};
 use std::path::{Path, PathBuf};
@@ -34,6 +35,8 @@ pub(crate) struct BackgroundPhoto {
     taken: [u32; 2],
     image: [u32; 2],
     plate: OnceLock<Arc<Image<LinearRgb>>>,
+    /// Blur and noise of the plate.
+    pub(crate) grain: PlateGrain,
     /// The mask of what hides objects, beside the photo.
     pub(crate) front: Option<PathBuf>,
     front_mask: OnceLock<Arc<Image<Coverage>>>,
@@ -102,6 +105,7 @@ impl BackgroundPhoto {
             kept,
             image,
             plate: OnceLock::new(),
+            grain: PlateGrain::default(),
             front: front_beside(&photo),
             front_mask: OnceLock::new(),
             photo,

@@ -421,7 +421,7 @@ impl Pipeline {
         let plate = self.plate(&scene.plate)?;
         let mut scene = self.rest(locate(scene)?, allowance)?;
         if let Some(plate) = &plate {
-            scene = light::match_plate(scene, plate);
+            scene = self.matched(scene, plate);
         }
         let shot = scene.resolve(
             |object| Appearance::from_library(&self.library, object),
@@ -430,6 +430,16 @@ impl Pipeline {
         )?;
         let shot = self.behind_front(&scene.plate, &scene, shot)?;
         Ok((scene, shot))
+    }
+
+    /// What a scene leaves to its plate; what of that is the plate's alone is found once.
+    fn matched(&self, scene: Scene, plate: &Image<LinearRgb>) -> Scene {
+        let place = self.place(&scene.plate);
+        let finished = match place {
+            Some(place) => place.grain.matched(scene, plate),
+            None => scene,
+        };
+        light::match_plate(finished, plate)
     }
 
     /// A shot whose objects are behind what the mask beside the plate says, where there is one: it

@@ -5,7 +5,7 @@ use crate::geom::Vector2;
 use crate::image::Image;
 use crate::light::{inner_pixels, value_of_rank};
 use crate::pixel::LinearRgb;
-use crate::scene::{Blur, Scene};
+use crate::scene::Blur;
 
 /// Blur that is put on top, pixels: what it takes from an edge tells how soft the edge was.
 const ADDED_SIGMA_PX: f32 = 1.0;
@@ -26,15 +26,6 @@ const MIN_EDGES: usize = 20;
 const PIXEL_VARIANCE: f64 = 0.347;
 /// Blur over what is found of it beyond that, on the same rectangles with Gaussians of 0.3 to 1 px.
 const BLUR_RATIO: f64 = 1.05;
-
-/// Turns [`Blur::MatchPlate`] of a scene's finish into the blur of its plate; any other scene comes
-/// back as it is.
-pub(crate) fn match_blur(mut scene: Scene, plate: &Image<LinearRgb>) -> Scene {
-    if scene.finish.blur_px == Blur::MatchPlate {
-        scene.finish.blur_px = plate_blur(plate);
-    }
-    scene
-}
 
 /// The blur of a photograph beyond that of its pixels, from its green channel: [`Blur::NONE`] for
 /// one with too few edges.

@@ -6,7 +6,7 @@ use crate::image::Image;
 use crate::light::irradiance::white_card_at;
 use crate::light::lamp::match_lamp;
 use crate::light::light_map::match_light_map;
-use crate::light::{match_blur, match_light_tint, match_noise, surface_color, value_of_rank};
+use crate::light::{PlateGrain, match_light_tint, surface_color, value_of_rank};
 use crate::pixel::LinearRgb;
 use crate::scene::{Exposure, Scene};
 
@@ -23,8 +23,7 @@ const WHITE_PERCENTILE: f64 = 0.99;
 pub fn match_plate(scene: Scene, plate: &Image<LinearRgb>) -> Scene {
     let tinted = match_light_tint(match_lamp(scene, plate), plate);
     let lit = match_light_map(tinted, plate);
-    let exposed = expose(lit, plate);
-    match_noise(match_blur(exposed, plate), plate)
+    PlateGrain::default().matched(expose(lit, plate), plate)
 }
 
 /// Turns [`Exposure::MatchPlate`] and [`Exposure::MatchSurface`] into [`Exposure::Ev`]; a scene

@@ -34,6 +34,7 @@ mod lamp;
 mod light_map;
 mod nodes;
 mod noise;
+mod plate_grain;
 mod polygon;
 mod quadrature;
 mod sky;
@@ -42,7 +43,6 @@ mod surface;
 pub(crate) use ambient::ambient_directions;
 #[doc(hidden)]
 pub use area::{LightFrame, frame, radiance};
-pub(crate) use blur::match_blur;
 #[doc(hidden)]
 pub use blur::plate_blur;
 #[doc(hidden)]
@@ -53,9 +53,9 @@ pub use irradiance::irradiance;
 #[doc(hidden)]
 pub use nodes::{Node, nodes};
 pub(crate) use nodes::{geometry_term, nodes_above};
-pub(crate) use noise::match_noise;
 #[doc(hidden)]
 pub use noise::plate_noise;
+pub(crate) use plate_grain::PlateGrain;
 #[doc(hidden)]
 pub use polygon::polygon_irradiance;
 pub(crate) use sky::sky_cells;

@@ -4,7 +4,7 @@ use crate::filter::halve;
 use crate::image::Image;
 use crate::light::{inner_pixels, value_of_rank};
 use crate::pixel::LinearRgb;
-use crate::scene::{Noise, Scene};
+use crate::scene::Noise;
 
 /// Groups of pixels of like brightness.
 const BRIGHTNESS_GROUPS: usize = 12;
@@ -26,15 +26,6 @@ const MID_GREY: f64 = 0.18;
 const TAKEN_AWAY: f64 = 1.5;
 /// Values from here on may be clipped.
 const NEARLY_WHITE: f32 = 0.95;
-
-/// Turns [`Noise::MatchPlate`] of a scene's finish into the noise of its plate; any other scene
-/// comes back as it is.
-pub(crate) fn match_noise(mut scene: Scene, plate: &Image<LinearRgb>) -> Scene {
-    if scene.finish.noise == Noise::MatchPlate {
-        scene.finish.noise = plate_noise(plate);
-    }
-    scene
-}
 
 /// The noise of a photograph, from its green channel: [`Noise::None`] for one that is too small.
 ///
