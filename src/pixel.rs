@@ -377,6 +377,12 @@ impl Film {
         self.color + self.transmittance() * behind
     }
 
+    /// A film that also hides what lies in its shadow, of which that is the factor.
+    #[inline(always)]
+    pub(crate) fn shaded(self, shadow: LinearRgb) -> Self {
+        Self::new(self.color, self.transmittance() * shadow)
+    }
+
     /// The same with one alpha for all channels, their mean: what a program without film makes of
     /// it.
     #[inline(always)]

@@ -1,12 +1,13 @@
 //! The frame as a camera would have given it: blur and noise where there were none, white balance,
 //! exposure, sharpening.
 
+use crate::composite::effect::Effect;
 use crate::composite::poisson::blend;
 use crate::deep::DeepImage;
 use crate::filter::{gaussian_blur, sample_cubic_clamped};
 use crate::image::Image;
-use crate::pixel::{Film, LinearRgb, Mix, PremulRgba};
-use crate::scene::{Blur, CameraNoise, EdgeTreatment, Noise, PostProcess};
+use crate::pixel::{LinearRgb, Mix, PremulRgba};
+use crate::scene::{Blur, CameraNoise, EdgeTreatment, Noise, PostProcess, Shot};
 use crate::work::{self, Kind};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::SplitMix64;
@@ -33,29 +34,57 @@ pub fn finish(
     plate: Option<&Image<LinearRgb>>,
     finish: &PostProcess,
 ) -> Image<PremulRgba> {
-    finish_blended(frame, deep, plate, finish, EdgeTreatment::AsIs)
+    let effect = Effect::Still(deep);
+    let soft = blurred(frame, &effect, plate, finish);
+    graded(soft, &effect, plate, finish)
 }
 
-/// The same with objects blended into the plate where edges ask for it, which is after their blur
+/// The finished frame of a shot with these deep samples, blurred along the way that its cards move,
+/// and with objects blended into the plate where its edges ask for it, which is after their blur
 /// and before all noise.
-pub fn finish_blended(
+///
+/// # Panics
+/// When the plate's size is not the picture's.
+pub fn finish_shot(deep: &DeepImage, shot: &Shot, finish: &PostProcess) -> Image<PremulRgba> {
+    let plate = shot.plate.as_deref();
+    let effect = Effect::of(deep, shot);
+    let soft = blurred(effect.frame(plate), &effect, plate, finish);
+    let blended = if shot.edges == EdgeTreatment::Poisson && plate.is_some() {
+        blend(&soft, deep)
+    } else {
+        soft
+    };
+    graded(blended, &effect, plate, finish)
+}
+
+/// The frame with cards and shadows blurred as the plate is.
+fn blurred(
     frame: Image<PremulRgba>,
-    deep: &DeepImage,
+    effect: &Effect<'_>,
     plate: Option<&Image<LinearRgb>>,
     finish: &PostProcess,
-    edges: EdgeTreatment,
 ) -> Image<PremulRgba> {
-    let frame = match finish.blur_px {
-        Blur::Known(sigma_px) if sigma_px > 0.0 => blur(&frame, deep, plate, sigma_px as f32),
+    match finish.blur_px {
+        Blur::Known(sigma_px) if sigma_px > 0.0 => {
+            let sigma_px = sigma_px as f32;
+            plate.map_or_else(
+                || gaussian_blur(&frame, sigma_px),
+                |plate| effect.blurred_frame(plate, sigma_px),
+            )
+        }
         _ => frame,
-    };
-    let frame = if edges == EdgeTreatment::Poisson && plate.is_some() {
-        blend(&frame, deep)
-    } else {
-        frame
-    };
+    }
+}
+
+/// The frame with the noise of cards, and all that is of the whole frame.
+fn graded(
+    frame: Image<PremulRgba>,
+    effect: &Effect<'_>,
+    plate: Option<&Image<LinearRgb>>,
+    finish: &PostProcess,
+) -> Image<PremulRgba> {
     let noisy = match SensorNoise::of_cards(finish) {
-        Some(noise) => noise.add_to(&frame, |at, p| seen_plate(deep, plate, at, p)),
+        Some(noise) => noise.add_to(&frame, |at, p| seen_plate(effect, plate, at, p)),
         None => frame,
     };
     let exposed = apply_gain(through_camera(noisy, finish), finish);
@@ -97,27 +126,6 @@ fn spread_colors(frame: &Image<PremulRgba>, corner_px: f64) -> Image<PremulRgba>
         b: color_at(1.0 - share, x, y).b,
         ..frame[(x, y)]
     })
-}
-
-/// The frame with cards and shadows blurred.
-fn blur(
-    frame: &Image<PremulRgba>,
-    deep: &DeepImage,
-    plate: Option<&Image<LinearRgb>>,
-    sigma_px: f32,
-) -> Image<PremulRgba> {
-    let Some(plate) = plate else {
-        return gaussian_blur(frame, sigma_px);
-    };
-    let change = Image::from_fn(frame.width(), frame.height(), |x, y| change_at(deep, x, y));
-    let soft = gaussian_blur(&change, sigma_px);
-    soft.zip_map(plate, |film, behind| film.over_color(behind).opaque())
-}
-
-/// What cards and shadows do to the plate at a pixel.
-fn change_at(deep: &DeepImage, x: usize, y: usize) -> Film {
-    let film = deep.flat(x, y);
-    Film::new(film.color, film.transmittance() * deep.shadow()[(x, y)])
 }
 
 /// Exposure and white balance.
@@ -167,16 +175,13 @@ const NO_PLATE: ([f32; 3], [f32; 3]) = ([0.0; 3], [0.0; 3]);
 /// Factor on the plate at a pixel, and the plate; black where there is none.
 #[inline(always)]
 fn seen_plate(
-    deep: &DeepImage,
+    effect: &Effect<'_>,
     plate: Option<&Image<LinearRgb>>,
     at: (usize, usize),
     pixel: PremulRgba,
 ) -> ([f32; 3], [f32; 3]) {
     match plate {
-        Some(plate) => {
-            let passes = deep.flat(at.0, at.1).transmittance() * deep.shadow()[at];
-            (passes.into(), plate[at].into())
-        }
+        Some(plate) => (effect.passes_at(at).into(), plate[at].into()),
         None => ([1.0 - pixel.a; 3], [0.0; 3]),
     }
 }

@@ -18,6 +18,7 @@
 mod aov;
 mod cryptomatte;
 mod defocus;
+mod effect;
 mod finish;
 mod frame;
 mod motion;
@@ -34,10 +35,8 @@ pub use cryptomatte::cryptomatte;
 pub use defocus::defocus;
 pub use finish::finish;
 #[doc(hidden)]
-pub use finish::finish_blended;
+pub use finish::finish_shot;
 #[doc(hidden)]
 pub use frame::film;
 pub use frame::frame;
-#[doc(hidden)]
-pub use motion::exposed_frame;
 pub use picture::picture;

@@ -8,12 +8,11 @@
 //! stands high over the surface would move a little farther in the picture.
 
 use crate::camera::{Camera, RadialDistortion};
-use crate::composite::frame::frame;
 use crate::deep::DeepImage;
 use crate::filter::{self, sample_cubic_clamped};
 use crate::geom::{Plane, Point2, Point3, Vector2, Vector3};
 use crate::image::{Image, Mask};
-use crate::pixel::{Film, LinearRgb, Mix, PremulRgba};
+use crate::pixel::{Film, Mix};
 use crate::scene::Shot;
 use crate::work::{self, Kind};
 
@@ -24,34 +23,20 @@ const LEAST_WAY_PX: f64 = 0.02;
 /// Places that are read along a way: near the horizon ways have no end.
 const MOST_TAPS: f64 = 256.0;
 
-/// The frame of a shot from its deep samples: over its plate, and blurred along the way that its
-/// cards move while the shutter is open.
-///
-/// # Panics
-/// When the plate's size is not the picture's.
-pub fn exposed_frame(deep: &DeepImage, shot: &Shot) -> Image<PremulRgba> {
-    let plate = shot.plate.as_deref();
+/// What objects and their shadows do to the plate in the mean while the shutter is open; none where
+/// nothing moves.
+pub(super) fn moved(deep: &DeepImage, shot: &Shot) -> Option<Image<Film>> {
     if shot.motion_m == [0.0; 2] {
-        return frame(deep, plate);
+        return None;
     }
     work::add(Kind::Filters, 1);
+    // Shadows need something to fall on.
+    let shadows = shot.plate.as_ref().map(|_| deep.shadow());
     let effect = Image::from_fn(deep.width(), deep.height(), |x, y| {
-        shaded(deep.flat(x, y), plate.map(|_| deep.shadow()[(x, y)]))
+        let film = deep.flat(x, y);
+        shadows.map_or(film, |shadows| film.shaded(shadows[(x, y)]))
     });
-    let blurred = averaged(&effect, &ways(shot));
-    Image::from_fn(deep.width(), deep.height(), |x, y| {
-        let film = blurred[(x, y)];
-        plate.map_or_else(
-            || film.to_rgba(),
-            |plate| film.over_color(plate[(x, y)]).opaque(),
-        )
-    })
-}
-
-/// A film that also hides what is in its shadow; shadows need something to fall on.
-fn shaded(film: Film, shadow: Option<LinearRgb>) -> Film {
-    let shadow = shadow.unwrap_or(LinearRgb::WHITE);
-    Film::new(film.color, film.transmittance() * shadow)
+    Some(averaged(&effect, &ways(shot)))
 }
 
 /// Means along each pixel's way.
@@ -129,11 +114,12 @@ fn way_at(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::composite::{finish_shot, picture};
     use crate::geom::{Pose, Quad};
-    use crate::pixel::ObjectId;
+    use crate::pixel::{LinearRgb, ObjectId, PremulRgba};
     use crate::quality::Quality;
     use crate::render::render;
-    use crate::scene::{AreaLight, Card, LightShape};
+    use crate::scene::{AreaLight, Blur, Card, LightShape, PostProcess};
     use std::sync::Arc;
 
     /// Where a shutter that opens at -1/2 and closes at 1/2 sees the card, as shares of its way.
@@ -172,7 +158,7 @@ mod tests {
     }
 
     fn rendered(shot: &Shot) -> Image<PremulRgba> {
-        exposed_frame(&render(shot, &Quality::Reference.into()), shot)
+        picture(shot, &Quality::Reference.into())
     }
 
     fn rmse(a: &Image<PremulRgba>, b: &Image<PremulRgba>) -> f32 {
@@ -201,6 +187,25 @@ mod tests {
             "{off}, {unblurred} without"
         );
         assert_eq!(blurred[(0, 0)], still[(0, 0)], "far from all cards");
+    }
+
+    #[test]
+    fn a_blur_of_the_photo_comes_on_top_of_that_of_the_motion() {
+        let moving = Shot {
+            motion_m: WAY_M,
+            ..shot(0.0)
+        };
+        let deep = render(&moving, &Quality::Draft.into());
+        // So narrow a Gaussian leaves every pixel to itself.
+        let blur_px = Blur::Known(0.05);
+        let [sharp, blurred] = [Blur::NONE, blur_px].map(|blur_px| {
+            let finish = PostProcess {
+                blur_px,
+                ..PostProcess::default()
+            };
+            finish_shot(&deep, &moving, &finish)
+        });
+        assert!(rmse(&sharp, &blurred) < 1e-6);
     }
 
     #[test]

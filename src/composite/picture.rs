@@ -1,7 +1,7 @@
 //! The picture of a shot in one call.
 
 use crate::composite::defocus::defocus;
-use crate::composite::motion::exposed_frame;
+use crate::composite::effect::Effect;
 use crate::image::Image;
 use crate::pixel::PremulRgba;
 use crate::render::{RenderOptions, render};
@@ -30,5 +30,5 @@ use crate::scene::Shot;
 /// When the plate's size is not the camera's.
 pub fn picture(shot: &Shot, options: &RenderOptions) -> Image<PremulRgba> {
     let deep = render(shot, options);
-    exposed_frame(&defocus(&deep, shot), shot)
+    Effect::of(&defocus(&deep, shot), shot).frame(shot.plate.as_deref())
 }

@@ -544,8 +544,5 @@ fn redraw_seed(seed: u64, k: u64, n: usize) -> u64 {
 }
 
 fn finished_frame(deep: &DeepImage, scene: &Scene, shot: &Shot) -> Image<PremulRgba> {
-    let plate = shot.plate.as_deref();
-    let deep = &*composite::defocus(deep, shot);
-    let frame = composite::exposed_frame(deep, shot);
-    composite::finish_blended(frame, deep, plate, &scene.finish, scene.edges)
+    composite::finish_shot(&composite::defocus(deep, shot), shot, &scene.finish)
 }

@@ -1,0 +1,68 @@
+//! What objects and their shadows do to a plate.
+
+use crate::composite::frame::frame;
+use crate::composite::motion::moved;
+use crate::deep::DeepImage;
+use crate::filter::gaussian_blur;
+use crate::image::Image;
+use crate::pixel::{Film, LinearRgb, PremulRgba};
+use crate::scene::Shot;
+
+/// What the objects of a picture and their shadows do to the plate.
+pub(super) enum Effect<'a> {
+    /// What deep samples do.
+    Still(&'a DeepImage),
+    /// The mean of that while the shutter is open.
+    Moved(Image<Film>),
+}
+
+impl<'a> Effect<'a> {
+    /// That of a shot with these deep samples.
+    pub(super) fn of(deep: &'a DeepImage, shot: &Shot) -> Self {
+        moved(deep, shot).map_or(Self::Still(deep), Self::Moved)
+    }
+}
+
+impl Effect<'_> {
+    /// The frame over a plate, or over nothing.
+    pub(super) fn frame(&self, plate: Option<&Image<LinearRgb>>) -> Image<PremulRgba> {
+        match (self, plate) {
+            (Self::Still(deep), _) => frame(deep, plate),
+            (Self::Moved(films), Some(plate)) => over_plate(films, plate),
+            (Self::Moved(films), None) => films.map(Film::to_rgba),
+        }
+    }
+
+    /// The frame over a plate, which alone is not blurred.
+    pub(super) fn blurred_frame(
+        &self,
+        plate: &Image<LinearRgb>,
+        sigma_px: f32,
+    ) -> Image<PremulRgba> {
+        let soft = match self {
+            Self::Still(deep) => gaussian_blur(&films(deep), sigma_px),
+            Self::Moved(films) => gaussian_blur(films, sigma_px),
+        };
+        over_plate(&soft, plate)
+    }
+
+    /// The factor on the plate at a pixel.
+    #[inline(always)]
+    pub(super) fn passes_at(&self, at: (usize, usize)) -> LinearRgb {
+        match self {
+            Self::Still(deep) => deep.flat(at.0, at.1).transmittance() * deep.shadow()[at],
+            Self::Moved(films) => films[at].transmittance(),
+        }
+    }
+}
+
+/// What cards and shadows do to the plate, as a film in front of it.
+fn films(deep: &DeepImage) -> Image<Film> {
+    Image::from_fn(deep.width(), deep.height(), |x, y| {
+        deep.flat(x, y).shaded(deep.shadow()[(x, y)])
+    })
+}
+
+fn over_plate(films: &Image<Film>, plate: &Image<LinearRgb>) -> Image<PremulRgba> {
+    films.zip_map(plate, |film, behind| film.over_color(behind).opaque())
+}
