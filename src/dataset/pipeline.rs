@@ -19,8 +19,8 @@ use crate::light;
 use crate::pixel::{LinearRgb, PremulRgba};
 use crate::render;
 use crate::scene::{
-    Appearance, AssetVariant, Background, CameraSource, Drawn, Draws, EdgeTreatment, Recipe, Scene,
-    Shot, catalog, locate,
+    Appearance, AssetVariant, Background, CameraSource, Drawn, Draws, EdgeTreatment,
+    EnvironmentMap, Recipe, Scene, Shot, catalog, locate,
 };
 use crate::stopwatch::Stopwatch;
 use std::path::PathBuf;
@@ -420,26 +420,33 @@ impl Pipeline {
     fn resolve_within(&self, scene: Scene, allowance: &Allowance) -> Result<(Scene, Shot)> {
         let plate = self.plate(&scene.plate)?;
         let mut scene = self.rest(locate(scene)?, allowance)?;
+        let panorama = self.panorama(&scene)?;
         if let Some(plate) = &plate {
-            scene = self.matched(scene, plate);
+            let environment = scene.environment_map(panorama.clone())?;
+            scene = self.matched(scene, plate, environment.as_ref());
         }
         let shot = scene.resolve(
             |object| Appearance::from_library(&self.library, object),
             plate,
-            self.panorama(&scene)?,
+            panorama,
         )?;
         let shot = self.behind_front(&scene.plate, &scene, shot)?;
         Ok((scene, shot))
     }
 
     /// What a scene leaves to its plate; what of that is the plate's alone is found once.
-    fn matched(&self, scene: Scene, plate: &Image<LinearRgb>) -> Scene {
+    fn matched(
+        &self,
+        scene: Scene,
+        plate: &Image<LinearRgb>,
+        environment: Option<&EnvironmentMap>,
+    ) -> Scene {
         let place = self.place(&scene.plate);
         let finished = match place {
             Some(place) => place.grain.matched(scene, plate),
             None => scene,
         };
-        light::match_plate(finished, plate)
+        light::match_plate(finished, plate, environment)
     }
 
     /// A shot whose objects are behind what the mask beside the plate says, where there is one: it

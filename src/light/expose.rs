@@ -8,7 +8,7 @@ use crate::light::lamp::match_lamp;
 use crate::light::light_map::match_light_map;
 use crate::light::{PlateGrain, match_light_tint, surface_color, value_of_rank};
 use crate::pixel::LinearRgb;
-use crate::scene::{Exposure, Scene};
+use crate::scene::{EnvironmentMap, Exposure, Scene};
 
 /// Share of the plate's pixels that are darker than its white.
 ///
@@ -19,25 +19,33 @@ const WHITE_PERCENTILE: f64 = 0.99;
 /// Estimates what a scene leaves to its plate: where its light stands, the colour of the light,
 /// how it is spread, the exposure, the blur, the noise.
 ///
-/// A scene that leaves nothing comes back as it is.
-pub fn match_plate(scene: Scene, plate: &Image<LinearRgb>) -> Scene {
-    let tinted = match_light_tint(match_lamp(scene, plate), plate);
-    let lit = match_light_map(tinted, plate);
-    PlateGrain::default().matched(expose(lit, plate), plate)
+/// `environment` is the map that the scene names. A scene that leaves nothing comes back as it is.
+pub fn match_plate(
+    scene: Scene,
+    plate: &Image<LinearRgb>,
+    environment: Option<&EnvironmentMap>,
+) -> Scene {
+    let tinted = match_light_tint(match_lamp(scene, plate, environment), plate);
+    let lit = match_light_map(tinted, plate, environment);
+    PlateGrain::default().matched(expose(lit, plate, environment), plate)
 }
 
 /// Turns [`Exposure::MatchPlate`] and [`Exposure::MatchSurface`] into [`Exposure::Ev`]; a scene
 /// whose exposure is known comes back as it is.
 ///
-/// A matte white card (albedo 1) in the middle of the surface, under the scene's lights with
-/// nothing in their way, gets the luminance of `plate_white`, times `2^gain_ev`.
+/// A matte white card (albedo 1) in the middle of the surface, under the scene's lights and its
+/// environment map with nothing in their way, gets the luminance of `plate_white`, times `2^gain_ev`.
 ///
 /// This is an assumption, not a measurement: one photograph does not show which of its pixels are
 /// white paper. It holds where the photo was exposed for the place and shows something bright; the
 /// surface itself is not used, since a tray may be of any grey. Where that grey is known,
 /// `MatchSurface` is the better choice. `gain_ev` overrides. Without any light in the scene, or on
 /// a black plate, the exposure is `gain_ev` alone.
-pub fn expose(scene: Scene, plate: &Image<LinearRgb>) -> Scene {
+pub fn expose(
+    scene: Scene,
+    plate: &Image<LinearRgb>,
+    environment: Option<&EnvironmentMap>,
+) -> Scene {
     let (wanted, gain_ev) = match scene.exposure {
         Exposure::Ev(_) => return scene,
         Exposure::MatchPlate { gain_ev } => (f64::from(plate_white(plate)), gain_ev),
@@ -45,7 +53,8 @@ pub fn expose(scene: Scene, plate: &Image<LinearRgb>) -> Scene {
             (luminance_of_white(&scene, plate, albedo), gain_ev)
         }
     };
-    let match_ev = stops_of(wanted / f64::from(white_card_at(&scene, Point3::origin())));
+    let card = white_card_at(&scene, environment, Point3::origin());
+    let match_ev = stops_of(wanted / f64::from(card));
     Scene {
         exposure: Exposure::Ev(match_ev + gain_ev),
         ..scene
@@ -87,9 +96,11 @@ fn finite_luminances(plate: &Image<LinearRgb>) -> Vec<f32> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::asset::Panorama;
     use crate::light::area::tests::square;
     use crate::scene::{CameraSource, Surface};
     use std::f64::consts::PI;
+    use std::sync::Arc;
 
     fn scene(exposure: Exposure) -> Scene {
         Scene {
@@ -137,18 +148,44 @@ mod tests {
     #[test]
     fn a_known_exposure_stays() {
         let known = scene(Exposure::Ev(1.5));
-        assert_eq!(expose(known.clone(), &plate()), known);
+        assert_eq!(expose(known.clone(), &plate(), None), known);
     }
 
     #[test]
     fn a_white_card_gets_the_plate_s_white() {
         let Exposure::Ev(ev) =
-            expose(scene(Exposure::MatchPlate { gain_ev: 1.0 }), &plate()).exposure
+            expose(scene(Exposure::MatchPlate { gain_ev: 1.0 }), &plate(), None).exposure
         else {
             panic!("still unknown")
         };
         let card = 2.975061 / PI + 0.1;
         assert!((card * libm::exp2(ev) - 1.0).abs() < 1e-5);
+    }
+
+    #[test]
+    fn an_environment_map_counts_as_the_light_that_it_is() {
+        let map = |strength: f32| EnvironmentMap {
+            strength,
+            ..EnvironmentMap::new(Arc::new(
+                Panorama::new(Image::filled(64, 32, LinearRgb::grey(2.0))).unwrap(),
+            ))
+        };
+        let exposed = |scene: Scene, environment: Option<&EnvironmentMap>| {
+            expose(scene, &plate(), environment).exposure
+        };
+        let lit = scene(Exposure::MatchPlate { gain_ev: 0.0 });
+        let within = Scene {
+            // As bright from everywhere as the map.
+            ambient: lit.ambient + LinearRgb::grey(3.0),
+            ..lit.clone()
+        };
+        let [Exposure::Ev(by_map), Exposure::Ev(by_ambient)] =
+            [exposed(lit, Some(&map(1.5))), exposed(within, None)]
+        else {
+            panic!("still unknown")
+        };
+        // The picture of the map has cells.
+        assert!((by_map - by_ambient).abs() < 1e-3, "{by_map} {by_ambient}");
     }
 
     #[test]
@@ -164,7 +201,7 @@ mod tests {
             exposure,
             ..crate::light::surface::tests::scene(Default::default())
         };
-        let Exposure::Ev(ev) = expose(scene, &plate).exposure else {
+        let Exposure::Ev(ev) = expose(scene, &plate, None).exposure else {
             panic!("still unknown")
         };
         assert!((0.2 * 0.5 * libm::exp2(ev) - 0.3).abs() < 1e-6);
@@ -172,8 +209,8 @@ mod tests {
 
     #[test]
     fn exposing_twice_changes_nothing() {
-        let once = expose(scene(Exposure::MatchPlate { gain_ev: 0.0 }), &plate());
-        assert_eq!(expose(once.clone(), &plate()), once);
+        let once = expose(scene(Exposure::MatchPlate { gain_ev: 0.0 }), &plate(), None);
+        assert_eq!(expose(once.clone(), &plate(), None), once);
     }
 
     #[test]
@@ -183,10 +220,10 @@ mod tests {
             ambient: LinearRgb::BLACK,
             ..scene(Exposure::MatchPlate { gain_ev: 0.5 })
         };
-        assert_eq!(expose(dark, &plate()).exposure, Exposure::Ev(0.5));
+        assert_eq!(expose(dark, &plate(), None).exposure, Exposure::Ev(0.5));
         let broken = Image::filled(40, 30, LinearRgb::grey(f32::NAN));
         assert_eq!(
-            expose(scene(Exposure::MatchPlate { gain_ev: 0.5 }), &broken).exposure,
+            expose(scene(Exposure::MatchPlate { gain_ev: 0.5 }), &broken, None).exposure,
             Exposure::Ev(0.5)
         );
     }

@@ -5,8 +5,8 @@ use crate::geom::{Point3, Vector3};
 use crate::image::Image;
 use crate::light::irradiance::irradiance;
 use crate::light::{median, surface_color};
-use crate::pixel::LinearRgb;
-use crate::scene::{AreaLight, CameraSource, LightDirection, Scene};
+use crate::pixel::{LinearRgb, Mix};
+use crate::scene::{AreaLight, CameraSource, EnvironmentMap, LightDirection, Scene};
 use std::f64::consts::{PI, TAU};
 
 /// Places on a wall that are looked at: shares of its length and of its height, away from corners,
@@ -38,7 +38,11 @@ const MODEL_ERROR: f64 = 0.12;
 /// strengths that fit best, and a weight by what is left; azimuth, tilt and strength are the weighted
 /// means, and their spread is the error. On photos of three trays (`docs/accuracy.md`) the azimuth
 /// was off by 7 degrees as a rule and by 25 at most.
-pub(crate) fn match_lamp(scene: Scene, plate: &Image<LinearRgb>) -> Scene {
+pub(crate) fn match_lamp(
+    scene: Scene,
+    plate: &Image<LinearRgb>,
+    environment: Option<&EnvironmentMap>,
+) -> Scene {
     let LightDirection::MatchWalls { deviations } = scene.light_direction else {
         return scene;
     };
@@ -48,7 +52,7 @@ pub(crate) fn match_lamp(scene: Scene, plate: &Image<LinearRgb>) -> Scene {
             let moved = estimate.moved(first, deviations);
             let lights = [&[moved], others].concat();
             Scene {
-                ambient: estimate.ambient(&lights),
+                ambient: estimate.ambient(&lights, environment),
                 lights,
                 ..scene
             }
@@ -130,12 +134,17 @@ impl LampEstimate {
         }
     }
 
-    /// The radiance all around that leaves the lights their share.
-    fn ambient(&self, lights: &[AreaLight]) -> LinearRgb {
+    /// The radiance all around that leaves the lights their share, less what an environment map
+    /// gives of it.
+    fn ambient(&self, lights: &[AreaLight], environment: Option<&EnvironmentMap>) -> LinearRgb {
         let direct = lights.iter().fold(LinearRgb::BLACK, |sum, light| {
             sum + irradiance(light, Point3::origin(), Vector3::z())
         });
-        direct.scale(((1.0 - self.share) / self.share.max(1e-3) / PI) as f32)
+        let around = direct.scale(((1.0 - self.share) / self.share.max(1e-3) / PI) as f32);
+        environment.map_or(around, |map| {
+            let own = map.irradiance(&Vector3::z()).scale(1.0 / PI as f32);
+            around.add_scaled(-1.0, own).map(|v| v.max(0.0))
+        })
     }
 }
 
@@ -254,7 +263,9 @@ fn pixel_at(plate: &Image<LinearRgb>, px: crate::geom::Point2<f64>) -> Option<Li
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::asset::Panorama;
     use crate::scene::{LightShape, Wall};
+    use std::sync::Arc;
 
     fn lamp() -> AreaLight {
         AreaLight {
@@ -331,9 +342,18 @@ mod tests {
         assert_eq!(z, 1.2);
         assert!((libm::atan2(y, x) - 0.7).abs() < 1e-12);
         assert!((libm::hypot(x, y) / z - 0.8 * libm::exp(-0.2)).abs() < 1e-12);
-        let around = found.ambient(&[moved]).g * PI as f32;
+        let around = found.ambient(&[moved], None).g * PI as f32;
         let direct = irradiance(&moved, Point3::origin(), Vector3::z()).g;
         assert!((direct / (direct + around) - 0.25).abs() < 1e-5);
+        // A map that gives two thirds of what comes from around, then one that gives too much.
+        let map = |share: f32| EnvironmentMap {
+            strength: share * around / PI as f32,
+            ..EnvironmentMap::new(Arc::new(
+                Panorama::new(Image::filled(64, 32, LinearRgb::WHITE)).unwrap(),
+            ))
+        };
+        let left = |share| found.ambient(&[moved], Some(&map(share))).g * PI as f32 / around;
+        assert!((left(2.0 / 3.0) - 1.0 / 3.0).abs() < 1e-3 && left(1.5) == 0.0);
     }
 
     /// A tray a metre below the camera: each wall as bright as it would be under a lamp at the
@@ -349,7 +369,7 @@ mod tests {
                 _ => 0.2,
             })
         });
-        let lit = match_lamp(scene(), &plate);
+        let lit = match_lamp(scene(), &plate, None);
         let [x, y, z] = lit.lights[0].position;
         assert!(lit.light_direction.is_known());
         assert!(
@@ -365,7 +385,7 @@ mod tests {
         let mut flat = scene();
         flat.surface.wall = None;
         let plate = Image::filled(40, 30, LinearRgb::grey(0.3));
-        let lit = match_lamp(flat.clone(), &plate);
+        let lit = match_lamp(flat.clone(), &plate, None);
         assert_eq!(lit.lights, flat.lights);
         assert_eq!(lit.ambient, flat.ambient);
         assert!(lit.light_direction.is_known());

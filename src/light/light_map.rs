@@ -6,7 +6,7 @@ use crate::light::irradiance::white_card_at;
 use crate::light::median;
 use crate::light::surface::seen_surface;
 use crate::pixel::LinearRgb;
-use crate::scene::{LightMap, Scene};
+use crate::scene::{EnvironmentMap, LightMap, Scene};
 
 /// Columns and rows of the cells that the surface is looked at in: lamps make gradients, and a
 /// pattern on the surface should not be taken for light.
@@ -18,16 +18,22 @@ const MOST: f32 = 4.0;
 ///
 /// # Method
 /// The median luminance of the plate in each cell of the surface over that of all of it, divided by
-/// what the scene's own lights give there over what they give in its middle. Cells that are not
+/// what the scene's own light gives there over what it gives in its middle. Cells that are not
 /// seen have 1, and so has everything where the camera does not see the surface. It takes the
 /// surface for one of the same colour all over: its patterns pass for light where they fill half a
 /// cell.
-pub(crate) fn match_light_map(scene: Scene, plate: &Image<LinearRgb>) -> Scene {
+pub(crate) fn match_light_map(
+    scene: Scene,
+    plate: &Image<LinearRgb>,
+    environment: Option<&EnvironmentMap>,
+) -> Scene {
     let LightMap::MatchSurface { share } = scene.light_map else {
         return scene;
     };
     let seen = seen_surface(&scene, plate);
-    let map = SeenCells::new(&seen, scene.surface.size).map(|cells| cells.rows(&scene, share));
+    let cells = SeenCells::new(&seen, scene.surface.size);
+    let own = |point| white_card_at(&scene, environment, point);
+    let map = cells.map(|cells| cells.rows(own, share));
     Scene {
         light_map: LightMap::Known(map.unwrap_or_default()),
         ..scene
@@ -56,13 +62,13 @@ impl SeenCells {
         })
     }
 
-    fn rows(self, scene: &Scene, share: f64) -> Vec<Vec<f32>> {
-        let middle = white_card_at(scene, Point3::origin());
+    /// Factors where the scene's own lights make a white card as bright as `own` says.
+    fn rows(self, own: impl Fn(Point3<f64>) -> f32, share: f64) -> Vec<Vec<f32>> {
+        let middle = own(Point3::origin());
         let points = cell_middles(self.size);
         let factors = points.zip(self.luminances).map(|(point, luminances)| {
             let plate = median(luminances).map_or(1.0, |here| here / self.median);
-            let own = white_card_at(scene, point) / middle;
-            factor(plate, own, share)
+            factor(plate, own(point) / middle, share)
         });
         let factors: Vec<f32> = factors.collect();
         factors.chunks(CELLS[0]).map(<[f32]>::to_vec).collect()
@@ -99,7 +105,9 @@ fn cell_middles([w, h]: [f64; 2]) -> impl Iterator<Item = Point3<f64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::asset::Panorama;
     use crate::scene::{AreaLight, LightShape};
+    use std::sync::Arc;
 
     fn scene() -> Scene {
         Scene {
@@ -109,7 +117,7 @@ mod tests {
     }
 
     fn rows(scene: Scene, plate: &Image<LinearRgb>) -> Vec<Vec<f32>> {
-        let LightMap::Known(rows) = match_light_map(scene, plate).light_map else {
+        let LightMap::Known(rows) = match_light_map(scene, plate, None).light_map else {
             panic!("still unknown")
         };
         rows
@@ -144,6 +152,19 @@ mod tests {
         assert!(dark.is_empty());
     }
 
+    #[test]
+    fn a_scene_lit_by_its_map_alone_takes_the_gradient_of_the_plate() {
+        let map = Panorama::new(Image::filled(8, 4, LinearRgb::WHITE)).unwrap();
+        let dark = Scene {
+            lights: Vec::new(),
+            ambient: LinearRgb::BLACK,
+            ..scene()
+        };
+        let environment = EnvironmentMap::new(Arc::new(map));
+        let lit = match_light_map(dark, &gradient(), Some(&environment));
+        assert_eq!(lit.light_map, LightMap::Known(rows(scene(), &gradient())));
+    }
+
     /// A lamp of the scene that makes the gradient of the plate needs no factor.
     #[test]
     fn what_the_scene_s_own_lights_do_is_not_done_twice() {
@@ -160,11 +181,11 @@ mod tests {
             ambient: LinearRgb::BLACK,
             ..scene()
         };
-        let middle = white_card_at(&lit, Point3::origin());
+        let middle = white_card_at(&lit, None, Point3::origin());
         // The camera looks from a metre above with a focal length of 40 pixels, y up.
         let plate = Image::from_fn(40, 30, |x, y| {
             let [x, y] = [x as f64 + 0.5 - 20.0, 15.0 - y as f64 - 0.5].map(|px| px / 40.0);
-            LinearRgb::grey(white_card_at(&lit, Point3::new(x, y, 0.0)) / middle)
+            LinearRgb::grey(white_card_at(&lit, None, Point3::new(x, y, 0.0)) / middle)
         });
         let factors = rows(lit, &plate).concat();
         let (least, most) = (

@@ -72,6 +72,12 @@ impl EnvironmentMap {
             .radiance(&turned(direction, self.rotation))
             .scale(self.strength)
     }
+
+    /// Irradiance on a receiver with this unit normal, nothing in the way.
+    pub(crate) fn irradiance(&self, normal: &Vector3<f64>) -> LinearRgb {
+        let all = self.panorama.irradiance(&turned(normal, self.rotation));
+        LinearRgb::from(all.map(|e| e as f32)).scale(self.strength)
+    }
 }
 
 /// A direction turned about `+z`, counterclockwise as seen from above.

@@ -165,7 +165,11 @@ impl Scene {
             .collect()
     }
 
-    fn environment_map(&self, panorama: Option<Arc<Panorama>>) -> Result<Option<EnvironmentMap>> {
+    /// The environment map that it names, in memory.
+    pub(crate) fn environment_map(
+        &self,
+        panorama: Option<Arc<Panorama>>,
+    ) -> Result<Option<EnvironmentMap>> {
         let Some(named) = self.environment.as_ref().filter(|named| named.shines()) else {
             return Ok(None);
         };

@@ -298,7 +298,7 @@ fn expose_plate(ambient: LinearRgb, plate: &Image<LinearRgb>, expected_ev: f64) 
 fn exposure_of_plate(ambient: LinearRgb, plate: &Image<LinearRgb>) -> Exposure {
     let matched = Exposure::MatchPlate { gain_ev: 0.0 };
     let scene = unexposed_scene(matched, LightTint::default(), ambient);
-    expose(scene, plate).exposure
+    expose(scene, plate, None).exposure
 }
 
 fn matched_tint(name: &str, plate: Image<LinearRgb>) -> HardCase {
