@@ -29,7 +29,10 @@ impl Effect<'_> {
         match (self, plate) {
             (Self::Still(deep), _) => frame(deep, plate),
             (Self::Moved(films), Some(plate)) => over_plate(films, plate),
-            (Self::Moved(films), None) => films.map(Film::to_rgba),
+            (Self::Moved(films), None) => films.map(|film| {
+                let color = film.color.map(|c| c.max(0.0));
+                Film { color, ..film }.to_rgba()
+            }),
         }
     }
 
@@ -64,5 +67,16 @@ fn films(deep: &DeepImage) -> Image<Film> {
 }
 
 fn over_plate(films: &Image<Film>, plate: &Image<LinearRgb>) -> Image<PremulRgba> {
-    films.zip_map(plate, |film, behind| film.over_color(behind).opaque())
+    films.zip_map(plate, |film, behind| {
+        let seen = film.over_color(behind);
+        let LinearRgb { r, g, b } = film.color;
+        // The light that refraction takes away is soft now, and the plate is not.
+        let taken = r.min(g).min(b) < 0.0;
+        let left = if taken {
+            seen.map(|v| v.max(0.0))
+        } else {
+            seen
+        };
+        left.opaque()
+    })
 }

@@ -12,7 +12,7 @@ use crate::deep::DeepImage;
 use crate::filter::{self, sample_cubic_clamped};
 use crate::geom::{Plane, Point2, Point3, Vector2, Vector3};
 use crate::image::{Image, Mask};
-use crate::pixel::{Film, Mix};
+use crate::pixel::{Film, LinearRgb, Mix};
 use crate::scene::Shot;
 use crate::work::{self, Kind};
 
@@ -43,13 +43,19 @@ pub(super) fn moved(deep: &DeepImage, shot: &Shot) -> Option<Image<Film>> {
 fn averaged(effect: &Image<Film>, ways: &Image<Vector2<f64>>) -> Image<Film> {
     let (width, height) = effect.size();
     let reached = reached(effect, ways);
+    let least = least_light(effect);
     Image::from_fn(width, height, |x, y| {
         let square = (x / SQUARE_PX, y / SQUARE_PX);
         if !reached[square] {
             return Film::default();
         }
         let middle = Point2::new(x as f64 + 0.5, y as f64 + 0.5);
-        mean_along(effect, middle, ways[square])
+        let mean = mean_along(effect, middle, ways[square]);
+        // A cubic curve is beyond its neighbours beside edges.
+        Film {
+            color: larger(mean.color, least),
+            opacity: mean.opacity.map(|o| o.clamp(0.0, 1.0)),
+        }
     })
 }
 
@@ -73,15 +79,24 @@ fn reached(effect: &Image<Film>, ways: &Image<Vector2<f64>>) -> Mask {
 fn mean_along(effect: &Image<Film>, middle: Point2<f64>, way: Vector2<f64>) -> Film {
     let count = (way.norm().ceil() + 1.0).min(MOST_TAPS);
     let weight = (1.0 / count) as f32;
-    let sum = (0..count as usize).fold(Film::default(), |sum, i| {
+    (0..count as usize).fold(Film::default(), |sum, i| {
         let at = middle + way * ((i as f64 + 0.5) / count - 0.5);
         sum.add_scaled(weight, sample_cubic_clamped(effect, at.x, at.y))
-    });
-    // A cubic curve is beyond its neighbours beside edges.
-    Film {
-        color: sum.color.map(|c| c.max(0.0)),
-        opacity: sum.opacity.map(|o| o.clamp(0.0, 1.0)),
-    }
+    })
+}
+
+/// The least light of a picture: below 0 where refraction takes away what is seen straight on.
+fn least_light(effect: &Image<Film>) -> LinearRgb {
+    let films = effect.pixels().iter();
+    films.fold(LinearRgb::BLACK, |least, film| smaller(least, film.color))
+}
+
+fn smaller(a: LinearRgb, b: LinearRgb) -> LinearRgb {
+    LinearRgb::new(a.r.min(b.r), a.g.min(b.g), a.b.min(b.b))
+}
+
+fn larger(a: LinearRgb, b: LinearRgb) -> LinearRgb {
+    LinearRgb::new(a.r.max(b.r), a.g.max(b.g), a.b.max(b.b))
 }
 
 /// Way in the picture, in pixels, of a point of the surface in the middle of each square; none
@@ -116,7 +131,7 @@ mod tests {
     use super::*;
     use crate::composite::{finish_shot, picture};
     use crate::geom::{Pose, Quad};
-    use crate::pixel::{LinearRgb, ObjectId, PremulRgba};
+    use crate::pixel::{ObjectId, PremulRgba};
     use crate::quality::Quality;
     use crate::render::render;
     use crate::scene::{AreaLight, Blur, Card, LightShape, PostProcess};

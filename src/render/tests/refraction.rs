@@ -173,6 +173,28 @@ fn a_curved_card_bends_where_it_is_seen() {
     assert!((found - 2.0).abs() < 0.2, "{found}");
 }
 
+/// A plate of 0.1 with a bright stripe of four columns.
+fn striped() -> Arc<Image<LinearRgb>> {
+    let value = |x: usize| if (30..34).contains(&x) { 0.9 } else { 0.1 };
+    Arc::new(Image::from_fn(64, 48, |x, _| LinearRgb::grey(value(x))))
+}
+
+#[test]
+fn on_a_belt_too_nothing_is_seen_where_it_is_and_displaced() {
+    let still = shot([sheet(1, HEIGHT, [0.08, 0.0])]).with_plate(striped());
+    // A shutter so short that nothing moves.
+    let moving = Shot {
+        motion_m: [1e-9, 0.0],
+        ..still.clone()
+    };
+    let [still, moving] =
+        [&still, &moving].map(|shot| composite::picture(shot, &RenderOptions::default()));
+    let pairs = still.pixels().iter().zip(moving.pixels());
+    for (i, (a, b)) in pairs.enumerate() {
+        assert!((a.g - b.g).abs() < 1e-5, "{i}: {} {}", a.g, b.g);
+    }
+}
+
 /// A sheet that is opaque left of its middle, and bends to the left.
 fn half_painted() -> Card {
     let mut card = sheet(1, HEIGHT, [-0.05, 0.0]);
