@@ -274,7 +274,8 @@ impl DeepImage {
         self
     }
 
-    /// Adds light to the samples of a pixel of which `all` is the light.
+    /// Adds light to the samples of a pixel of which `all` is the light, back to front: what is
+    /// behind a sample has what samples there have gained.
     fn add_from_behind(
         &mut self,
         (tile, samples): (usize, Range<usize>),
@@ -282,18 +283,13 @@ impl DeepImage {
         extra: impl Fn(&DeepSample) -> Option<LinearRgb>,
     ) {
         let tile = &mut self.tiles[tile];
-        let (mut behind, mut passes) = (all, LinearRgb::WHITE);
-        for i in samples {
-            let sample = &mut tile.samples[i];
-            let hidden = tile.tints.get(i).copied();
-            let hidden = hidden.unwrap_or(LinearRgb::grey(sample.visible));
-            passes = passes.add_scaled(-1.0, hidden).map(|p| p.max(0.0));
-            behind = behind
-                .add_scaled(-1.0, sample.light)
-                .map(|light| light.max(0.0));
+        let backdrops = tile.backdrops(samples.clone(), all);
+        let mut gained = LinearRgb::BLACK;
+        for (sample, (behind, passes)) in tile.samples[samples].iter_mut().zip(backdrops).rev() {
             if let Some(extra) = extra(sample) {
-                let change = at_least_none(behind, extra * passes);
+                let change = at_least_none(behind + gained, extra * passes);
                 sample.light = sample.light + change;
+                gained = gained + change;
             }
         }
     }

@@ -1,7 +1,7 @@
 //! Deep samples of a square of pixels.
 
 use super::DeepSample;
-use crate::pixel::LinearRgb;
+use crate::pixel::{LinearRgb, Mix};
 use std::ops::Range;
 
 /// Samples of a rectangle of pixels, pixel by pixel, row by row; the default has none.
@@ -77,6 +77,27 @@ impl DeepTile {
         }
         let i = y * self.width + x;
         self.starts[i] as usize..self.starts[i + 1] as usize
+    }
+
+    /// Of each sample of a pixel of which `all` is the light: the light of what is behind it, and
+    /// the share of that which it and all in front of it let pass.
+    pub(super) fn backdrops(
+        &self,
+        samples: Range<usize>,
+        all: LinearRgb,
+    ) -> Vec<(LinearRgb, LinearRgb)> {
+        let (mut behind, mut passes) = (all, LinearRgb::WHITE);
+        let backdrops = samples.map(|i| {
+            let sample = &self.samples[i];
+            let hidden = self.tints.get(i).copied();
+            let hidden = hidden.unwrap_or(LinearRgb::grey(sample.visible));
+            passes = passes.add_scaled(-1.0, hidden).map(|p| p.max(0.0));
+            behind = behind
+                .add_scaled(-1.0, sample.light)
+                .map(|light| light.max(0.0));
+            (behind, passes)
+        });
+        backdrops.collect()
     }
 }
 

@@ -145,6 +145,27 @@ fn displacements_of_a_stack_add_up() {
 }
 
 #[test]
+fn a_bright_thing_behind_a_stack_is_seen_once() {
+    let (low, high) = (
+        sheet(1, HEIGHT, [0.08, 0.0]),
+        sheet(2, HEIGHT + 0.04, [0.04, 0.0]),
+    );
+    let shot = shot([low, high]).with_plate(striped(40));
+    let seen = composite::picture(&shot, &RenderOptions::default());
+    // Displaced by 8 pixels by the lower sheet and by 8.4 by the upper one, as above.
+    for x in 20..47 {
+        let value = match x {
+            25 | 26 => 0.9,
+            22..30 => continue,
+            _ => 0.1,
+        };
+        let expected = (value * PASSES * PASSES) as f32;
+        let found = seen[(x, 24)].g;
+        assert!((found - expected).abs() < 0.03, "{x}: {found} {expected}");
+    }
+}
+
+#[test]
 fn a_back_without_a_flow_of_its_own_bends_like_the_front() {
     let turn = UnitQuaternion::from_euler_angles(PI, 0.0, 0.0);
     let turned = |mut card: Card| {
@@ -173,15 +194,21 @@ fn a_curved_card_bends_where_it_is_seen() {
     assert!((found - 2.0).abs() < 0.2, "{found}");
 }
 
-/// A plate of 0.1 with a bright stripe of four columns.
-fn striped() -> Arc<Image<LinearRgb>> {
-    let value = |x: usize| if (30..34).contains(&x) { 0.9 } else { 0.1 };
+/// A plate of 0.1 with a bright stripe of four columns from this one on.
+fn striped(from: usize) -> Arc<Image<LinearRgb>> {
+    let value = |x: usize| {
+        if (from..from + 4).contains(&x) {
+            0.9
+        } else {
+            0.1
+        }
+    };
     Arc::new(Image::from_fn(64, 48, |x, _| LinearRgb::grey(value(x))))
 }
 
 #[test]
 fn on_a_belt_too_nothing_is_seen_where_it_is_and_displaced() {
-    let still = shot([sheet(1, HEIGHT, [0.08, 0.0])]).with_plate(striped());
+    let still = shot([sheet(1, HEIGHT, [0.08, 0.0])]).with_plate(striped(30));
     // A shutter so short that nothing moves.
     let moving = Shot {
         motion_m: [1e-9, 0.0],
