@@ -223,6 +223,7 @@ impl DeepImage {
         if passes >= 1.0 {
             return;
         }
+        let free = self.flat(x, y).transmittance();
         let (tile, range) = self.place(x, y);
         let tile = &mut self.tiles[tile];
         for i in range {
@@ -235,8 +236,12 @@ impl DeepImage {
                 }
             }
         }
+        // Past the place less of the plate shows than where it is in front of objects, and only
+        // what shows past it is in shadow.
+        let share = ratio(free, self.flat(x, y).transmittance());
         let shadow = &mut self.shadow[(x, y)];
-        *shadow = shadow
+        let mean = *shadow * share + share.map(|s| 1.0 - s);
+        *shadow = mean
             .scale(passes)
             .add_scaled(place.coverage.0, LinearRgb::WHITE);
     }
@@ -300,6 +305,12 @@ impl DeepImage {
     }
 }
 
+/// `a / b` per channel; 0 where `b` is.
+fn ratio(a: LinearRgb, b: LinearRgb) -> LinearRgb {
+    let of = |a: f32, b: f32| if b > 0.0 { a / b } else { 0.0 };
+    LinearRgb::new(of(a.r, b.r), of(a.g, b.g), of(a.b, b.b))
+}
+
 /// A change of some light that leaves none of it negative.
 fn at_least_none(light: LinearRgb, change: LinearRgb) -> LinearRgb {
     let left = (light + change).map(|left| left.max(0.0));
@@ -345,6 +356,45 @@ mod tests {
                 let tints: Vec<_> = expected.iter().map(tint_of).collect();
                 assert_eq!(deep.tints(x, y), tints, "{x} {y}");
             }
+        }
+    }
+
+    fn grey_sample(depth: f32, light: f32, alpha: f32, visible: f32) -> DeepSample {
+        DeepSample {
+            object: ObjectId(depth as u32),
+            depth: Depth(depth),
+            light: LinearRgb::grey(light),
+            alpha,
+            visible,
+        }
+    }
+
+    #[test]
+    fn a_pixel_on_the_rim_of_the_place_is_the_mean_of_both_sides() {
+        let (plate, shadow, coverage) = (0.6, 0.5, 0.25);
+        let front = grey_sample(1.0, 0.05, 0.5, 0.5);
+        let behind = |through: f32| grey_sample(3.0, 0.1 * through, 0.8, 0.8 * through);
+        let place = HoldoutSample {
+            coverage: Coverage(coverage),
+            depth: Depth(2.0),
+        };
+        let cases = [
+            (vec![], plate, shadow * plate),
+            (vec![behind(1.0)], plate, 0.1 + 0.2 * shadow * plate),
+            (
+                vec![front, behind(0.5)],
+                0.05 + 0.5 * plate,
+                0.05 + 0.05 + 0.1 * shadow * plate,
+            ),
+            (vec![grey_sample(3.0, 0.3, 1.0, 1.0)], plate, 0.3),
+        ];
+        for (samples, at_the_place, past_it) in cases {
+            let shadow = Image::filled(1, 1, LinearRgb::grey(shadow));
+            let deep = DeepImage::from_pixels(shadow, [samples]);
+            let held = deep.held_out(Some(&Image::filled(1, 1, place)));
+            let found = held.light_over(0, 0, Some(&Image::filled(1, 1, LinearRgb::grey(plate))));
+            let expected = coverage * at_the_place + (1.0 - coverage) * past_it;
+            assert!((found.g - expected).abs() < 1e-6, "{} {expected}", found.g);
         }
     }
 
