@@ -71,9 +71,11 @@ impl FromStr for Aov {
 /// Coverage above which an object owns a pixel: that of the reference renderer.
 pub(crate) const FRONT_ALPHA: f32 = 0.05;
 
-/// The foremost object that covers more than `FRONT_ALPHA` of a pixel.
+/// The foremost object that covers more than `FRONT_ALPHA` of a pixel; none where that is wholly
+/// behind what of the place stands in front, as all that is farther away is too.
 pub fn front(samples: &[DeepSample]) -> Option<&DeepSample> {
-    samples.iter().find(|s| s.alpha > FRONT_ALPHA)
+    let front = samples.iter().find(|s| s.alpha > FRONT_ALPHA);
+    front.filter(|s| s.visible > 0.0)
 }
 
 /// The requested parts, in that order, of one size.
@@ -330,6 +332,25 @@ mod tests {
             "{u} {v}"
         );
         assert!((plane(&parts[4], "Y")[middle] - (1.0 - 0.5 * 0.75)).abs() < 1e-6);
+    }
+
+    #[test]
+    fn what_the_place_hides_is_in_front_of_nothing() {
+        let hidden = DeepSample {
+            alpha: 0.7,
+            ..DeepSample::default()
+        };
+        let faint = DeepSample {
+            alpha: 0.01,
+            visible: 0.01,
+            ..hidden
+        };
+        assert_eq!(front(&[faint, hidden]), None);
+        let seen = DeepSample {
+            visible: 0.1,
+            ..hidden
+        };
+        assert_eq!(front(&[faint, seen, hidden]), Some(&seen));
     }
 
     #[test]

@@ -41,10 +41,14 @@ pub(super) fn blend(frame: &Image<PremulRgba>, deep: &DeepImage) -> Image<Premul
     frame.zip_map(&corrections, corrected)
 }
 
-/// The object that is seen in a pixel and its depth; none where nothing covers it.
+/// The object that is seen in a pixel and its depth; none where nothing covers it, and none, in
+/// front of all, where what of the place stands in front hides it.
 fn topmost(samples: &[DeepSample]) -> (u32, f32) {
-    let top = samples.iter().find(|sample| sample.alpha > COVERED);
-    top.map_or((0, f32::INFINITY), |top| (top.object.0, top.depth.0))
+    match samples.iter().find(|sample| sample.alpha > COVERED) {
+        None => (0, f32::INFINITY),
+        Some(top) if top.visible > 0.0 => (top.object.0, top.depth.0),
+        Some(_) => (0, 0.0),
+    }
 }
 
 fn corrected(p: PremulRgba, by: LinearRgb) -> PremulRgba {
@@ -224,6 +228,31 @@ mod tests {
         let out = blended();
         assert!((out[(39, 15)].g - 0.8).abs() < 2e-3);
         assert!((0..20).all(|x| out[(x, 4)].g == 0.2) && out[(60, 4)].g == 0.2);
+    }
+
+    #[test]
+    fn a_wall_keeps_every_bit_and_has_an_outline_of_its_own() {
+        // A card of 0.8 from column 20 to 60, of which a wall of 0.2 hides the part from 40 on.
+        let list = |i: usize| match i % 80 {
+            20..40 => vec![sample(1, 1.0)],
+            40..60 => vec![DeepSample {
+                light: LinearRgb::BLACK,
+                visible: 0.0,
+                ..sample(1, 1.0)
+            }],
+            _ => vec![],
+        };
+        let shadow = Image::filled(80, 30, LinearRgb::WHITE);
+        let deep = DeepImage::from_pixels(shadow, (0..80 * 30).map(list));
+        let value = |x: usize| match x {
+            20..40 => 0.8,
+            60.. => 0.5,
+            _ => 0.2,
+        };
+        let frame = Image::from_fn(80, 30, |x, _| LinearRgb::grey(value(x)).opaque());
+        let out = blend(&frame, &deep);
+        assert!((40..80).all(|x| out[(x, 15)] == frame[(x, 15)]));
+        assert!((out[(39, 15)].g - 0.8).abs() < 2e-3 && out[(20, 15)].g < 0.7);
     }
 
     #[test]
