@@ -167,16 +167,15 @@ impl DeepImage {
     /// channel.
     #[inline(always)]
     pub fn flat(&self, x: usize, y: usize) -> Film {
-        // A sum of shares that make up a whole may miss it by a rounding.
-        let samples = self.at(x, y).iter();
-        let hidden = match self.tints(x, y) {
-            [] => LinearRgb::grey(samples.clone().map(|s| s.visible).sum()),
-            tints => tints.iter().fold(LinearRgb::BLACK, |sum, &t| sum + t),
-        };
-        Film {
-            color: samples.fold(LinearRgb::BLACK, |sum, s| sum + s.light),
-            opacity: hidden.map(|o| o.min(1.0)),
-        }
+        flat_of(self.at(x, y), self.tints(x, y))
+    }
+
+    /// The same of the objects that are in front of what of the place stands there.
+    pub(crate) fn in_front(&self, x: usize, y: usize, place: &HoldoutSample) -> Film {
+        let samples = self.at(x, y);
+        let count = samples.partition_point(|s| !place.hides(s.depth.0.into()));
+        let tints = self.tints(x, y);
+        flat_of(&samples[..count], &tints[..count.min(tints.len())])
     }
 
     /// The tile of a pixel, and where its samples are there.
@@ -302,6 +301,22 @@ impl DeepImage {
     /// The factor on the plate, per channel.
     pub fn shadow(&self) -> &Image<LinearRgb> {
         &self.shadow
+    }
+}
+
+/// All that samples do to a pixel, with their tints where there are any.
+#[inline(always)]
+fn flat_of(samples: &[DeepSample], tints: &[LinearRgb]) -> Film {
+    // A sum of shares that make up a whole may miss it by a rounding.
+    let hidden = match tints {
+        [] => LinearRgb::grey(samples.iter().map(|s| s.visible).sum()),
+        tints => tints.iter().fold(LinearRgb::BLACK, |sum, &t| sum + t),
+    };
+    Film {
+        color: samples
+            .iter()
+            .fold(LinearRgb::BLACK, |sum, s| sum + s.light),
+        opacity: hidden.map(|o| o.min(1.0)),
     }
 }
 

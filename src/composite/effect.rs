@@ -1,26 +1,17 @@
 //! What objects and their shadows do to a plate.
 
 use crate::composite::frame::frame;
-use crate::composite::motion::moved;
 use crate::deep::DeepImage;
 use crate::filter::gaussian_blur;
 use crate::image::Image;
 use crate::pixel::{Film, LinearRgb, PremulRgba};
-use crate::scene::Shot;
 
 /// What the objects of a picture and their shadows do to the plate.
 pub(super) enum Effect<'a> {
     /// What deep samples do.
     Still(&'a DeepImage),
     /// The mean of that while the shutter is open.
-    Moved(Image<Film>),
-}
-
-impl<'a> Effect<'a> {
-    /// That of a shot with these deep samples.
-    pub(super) fn of(deep: &'a DeepImage, shot: &Shot) -> Self {
-        moved(deep, shot).map_or(Self::Still(deep), Self::Moved)
-    }
+    Moved(&'a Image<Film>),
 }
 
 impl Effect<'_> {

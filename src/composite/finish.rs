@@ -39,22 +39,22 @@ pub fn finish(
     graded(soft, &effect, plate, finish)
 }
 
-/// The finished frame of a shot with these deep samples, blurred along the way that its cards move,
-/// and with objects blended into the plate where its edges ask for it, which is after their blur
-/// and before all noise.
-///
-/// # Panics
-/// When the plate's size is not the picture's.
-pub fn finish_shot(deep: &DeepImage, shot: &Shot, finish: &PostProcess) -> Image<PremulRgba> {
+/// The finished frame of a shot whose objects do this to its plate, with objects blended into it
+/// where its edges ask for it, which is after their blur and before all noise.
+pub(super) fn finish_exposed(
+    effect: &Effect<'_>,
+    deep: &DeepImage,
+    shot: &Shot,
+    finish: &PostProcess,
+) -> Image<PremulRgba> {
     let plate = shot.plate.as_deref();
-    let effect = Effect::of(deep, shot);
-    let soft = blurred(effect.frame(plate), &effect, plate, finish);
+    let soft = blurred(effect.frame(plate), effect, plate, finish);
     let blended = if shot.edges == EdgeTreatment::Poisson && plate.is_some() {
         blend(&soft, deep)
     } else {
         soft
     };
-    graded(blended, &effect, plate, finish)
+    graded(blended, effect, plate, finish)
 }
 
 /// The frame with cards and shadows blurred as the plate is.

@@ -19,6 +19,7 @@ mod aov;
 mod cryptomatte;
 mod defocus;
 mod effect;
+mod exposed;
 mod finish;
 mod frame;
 mod motion;
@@ -33,9 +34,8 @@ pub use aov::{Aov, front, parts};
 pub use cryptomatte::cryptomatte;
 #[doc(hidden)]
 pub use defocus::defocus;
+pub(crate) use exposed::Exposed;
 pub use finish::finish;
-#[doc(hidden)]
-pub use finish::finish_shot;
 #[doc(hidden)]
 pub use frame::film;
 pub use frame::frame;

@@ -8,7 +8,7 @@
 //! stands high over the surface would move a little farther in the picture.
 
 use crate::camera::{Camera, RadialDistortion};
-use crate::deep::DeepImage;
+use crate::deep::{DeepImage, HoldoutSample};
 use crate::filter::{self, sample_cubic_clamped};
 use crate::geom::{Plane, Point2, Point3, Vector2, Vector3};
 use crate::image::{Image, Mask};
@@ -23,20 +23,61 @@ const LEAST_WAY_PX: f64 = 0.02;
 /// Places that are read along a way: near the horizon ways have no end.
 const MOST_TAPS: f64 = 256.0;
 
-/// What objects and their shadows do to the plate in the mean while the shutter is open; none where
-/// nothing moves.
-pub(super) fn moved(deep: &DeepImage, shot: &Shot) -> Option<Image<Film>> {
+/// What objects and their shadows do to the plate in the mean while the shutter is open, behind what
+/// of the place stands in front and does not move; none where nothing moves.
+///
+/// `free` are samples that nothing of the place hides yet.
+pub(super) fn moved(free: &DeepImage, shot: &Shot) -> Option<Image<Film>> {
     if shot.motion_m == [0.0; 2] {
         return None;
     }
     work::add(Kind::Filters, 1);
     // Shadows need something to fall on.
-    let shadows = shot.plate.as_ref().map(|_| deep.shadow());
-    let effect = Image::from_fn(deep.width(), deep.height(), |x, y| {
-        let film = deep.flat(x, y);
+    let shadows = shot.plate.as_ref().map(|_| free.shadow());
+    let effect = Image::from_fn(free.width(), free.height(), |x, y| {
+        let film = free.flat(x, y);
         shadows.map_or(film, |shadows| film.shaded(shadows[(x, y)]))
     });
-    Some(averaged(&effect, &ways(shot)))
+    let ways = ways(shot);
+    let means = averaged(&effect, &ways);
+    Some(match &shot.holdout {
+        Some(holdout) => held_out(&means, free, holdout, &ways),
+        None => means,
+    })
+}
+
+/// Means behind what of the place stands in front: where it is, only what passes in front of it
+/// counts.
+fn held_out(
+    means: &Image<Film>,
+    free: &DeepImage,
+    holdout: &Image<HoldoutSample>,
+    ways: &Image<Vector2<f64>>,
+) -> Image<Film> {
+    Image::from_fn(means.width(), means.height(), |x, y| {
+        let (mean, place) = (means[(x, y)], &holdout[(x, y)]);
+        if place.coverage.0 == 0.0 || mean == Film::default() {
+            return mean;
+        }
+        let way = ways[(x / SQUARE_PX, y / SQUARE_PX)];
+        let front = mean_in_front(free, place, along(center(x, y), way));
+        let past = Film::default().add_scaled(1.0 - place.coverage.0, mean);
+        past.add_scaled(place.coverage.0, front)
+    })
+}
+
+/// The mean at some places, those of the nearest pixels, of what is in front of the place.
+fn mean_in_front(
+    free: &DeepImage,
+    place: &HoldoutSample,
+    at: impl ExactSizeIterator<Item = Point2<f64>>,
+) -> Film {
+    let weight = 1.0 / at.len() as f32;
+    let inside = |v: f64, side: usize| (v.max(0.0) as usize).min(side - 1);
+    at.fold(Film::default(), |sum, p| {
+        let (x, y) = (inside(p.x, free.width()), inside(p.y, free.height()));
+        sum.add_scaled(weight, free.in_front(x, y, place))
+    })
 }
 
 /// Means along each pixel's way.
@@ -49,8 +90,7 @@ fn averaged(effect: &Image<Film>, ways: &Image<Vector2<f64>>) -> Image<Film> {
         if !reached[square] {
             return Film::default();
         }
-        let middle = Point2::new(x as f64 + 0.5, y as f64 + 0.5);
-        let mean = mean_along(effect, middle, ways[square]);
+        let mean = mean_along(effect, along(center(x, y), ways[square]));
         // A cubic curve is beyond its neighbours beside edges.
         Film {
             color: larger(mean.color, least),
@@ -76,13 +116,21 @@ fn reached(effect: &Image<Film>, ways: &Image<Vector2<f64>>) -> Mask {
     filter::dilate(&filled, 0.5 * longest / SQUARE_PX as f64 + 2.0)
 }
 
-fn mean_along(effect: &Image<Film>, middle: Point2<f64>, way: Vector2<f64>) -> Film {
-    let count = (way.norm().ceil() + 1.0).min(MOST_TAPS);
-    let weight = (1.0 / count) as f32;
-    (0..count as usize).fold(Film::default(), |sum, i| {
-        let at = middle + way * ((i as f64 + 0.5) / count - 0.5);
+fn mean_along(effect: &Image<Film>, at: impl ExactSizeIterator<Item = Point2<f64>>) -> Film {
+    let weight = (1.0 / at.len() as f64) as f32;
+    at.fold(Film::default(), |sum, at| {
         sum.add_scaled(weight, sample_cubic_clamped(effect, at.x, at.y))
     })
+}
+
+fn center(x: usize, y: usize) -> Point2<f64> {
+    Point2::new(x as f64 + 0.5, y as f64 + 0.5)
+}
+
+/// Places along a way through its middle, at most a pixel apart.
+fn along(middle: Point2<f64>, way: Vector2<f64>) -> impl ExactSizeIterator<Item = Point2<f64>> {
+    let count = (way.norm().ceil() + 1.0).min(MOST_TAPS);
+    (0..count as usize).map(move |i| middle + way * ((i as f64 + 0.5) / count - 0.5))
 }
 
 /// The least light of a picture: below 0 where refraction takes away what is seen straight on.
@@ -129,7 +177,7 @@ fn way_at(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::composite::{finish_shot, picture};
+    use crate::composite::{Exposed, picture};
     use crate::geom::{Pose, Quad};
     use crate::pixel::{ObjectId, PremulRgba};
     use crate::quality::Quality;
@@ -210,7 +258,7 @@ mod tests {
             motion_m: WAY_M,
             ..shot(0.0)
         };
-        let deep = render(&moving, &Quality::Draft.into());
+        let exposed = Exposed::new(render(&moving, &Quality::Draft.into()), &moving);
         // So narrow a Gaussian leaves every pixel to itself.
         let blur_px = Blur::Known(0.05);
         let [sharp, blurred] = [Blur::NONE, blur_px].map(|blur_px| {
@@ -218,7 +266,7 @@ mod tests {
                 blur_px,
                 ..PostProcess::default()
             };
-            finish_shot(&deep, &moving, &finish)
+            exposed.finished(&moving, &finish)
         });
         assert!(rmse(&sharp, &blurred) < 1e-6);
     }

@@ -1,10 +1,9 @@
 //! The picture of a shot in one call.
 
-use crate::composite::defocus::defocus;
-use crate::composite::effect::Effect;
+use crate::composite::exposed::Exposed;
 use crate::image::Image;
 use crate::pixel::PremulRgba;
-use crate::render::{RenderOptions, render};
+use crate::render::{RenderOptions, render_unhidden};
 use crate::scene::Shot;
 
 /// The picture of a shot in one call: its deep samples, out of focus where its lens has them so,
@@ -29,6 +28,5 @@ use crate::scene::Shot;
 /// # Panics
 /// When the plate's size is not the camera's.
 pub fn picture(shot: &Shot, options: &RenderOptions) -> Image<PremulRgba> {
-    let deep = render(shot, options);
-    Effect::of(&defocus(&deep, shot), shot).frame(shot.plate.as_deref())
+    Exposed::new(render_unhidden(shot, options), shot).frame(shot)
 }

@@ -3,7 +3,7 @@
 use crate::allowance::Allowance;
 use crate::asset::{Library, Panorama};
 use crate::bounds::LEAST_OBJECT_PX;
-use crate::composite;
+use crate::composite::Exposed;
 use crate::dataset::background_photo::{BackgroundOptions, BackgroundPhoto};
 use crate::dataset::environment_maps::EnvironmentMaps;
 use crate::dataset::falls::Falls;
@@ -340,9 +340,11 @@ impl Pipeline {
         let mut watch = Stopwatch::start();
         let (scene, shot) = self.resolve_within(scene, allowance)?;
         watch.lap("settle");
-        let deep = render::render(&shot, &self.config.render);
+        let free = render::render_unhidden(&shot, &self.config.render);
         watch.lap("render");
-        let frame = finished_frame(&deep, &scene, &shot);
+        let exposed = Exposed::new(free, &shot);
+        let frame = exposed.finished(&shot, &scene.finish);
+        let deep = exposed.into_deep();
         watch.lap("composite");
         let labels = self.label_shot(&deep, &shot);
         watch.lap("label");
@@ -398,9 +400,10 @@ impl Pipeline {
 
     /// Renders a shot and finishes its frame as the scene asks.
     pub fn shoot(&self, scene: &Scene, shot: &Shot) -> (DeepImage, Image<PremulRgba>) {
-        let deep = render::render(shot, &self.config.render);
-        let frame = finished_frame(&deep, scene, shot);
-        (deep, frame)
+        let free = render::render_unhidden(shot, &self.config.render);
+        let exposed = Exposed::new(free, shot);
+        let frame = exposed.finished(shot, &scene.finish);
+        (exposed.into_deep(), frame)
     }
 
     /// Finds out what is unknown in a scene: its camera, where its objects come to rest, its
@@ -548,8 +551,4 @@ fn redraw_seed(seed: u64, k: u64, n: usize) -> u64 {
         0 => seed,
         n => Draws::new(seed, k).bits(&format!("redraw[{n}]")),
     }
-}
-
-fn finished_frame(deep: &DeepImage, scene: &Scene, shot: &Shot) -> Image<PremulRgba> {
-    composite::finish_shot(&composite::defocus(deep, shot), shot, &scene.finish)
 }

@@ -48,6 +48,11 @@ const TILE_SIDE_PX: usize = 32;
 /// quantiles of the pixel filter, from the mip level whose own blur makes up for what those leave
 /// over. Cards are ordered by depth block by block; blocks in which they cross are split.
 pub fn render(shot: &Shot, options: &RenderOptions) -> DeepImage {
+    render_unhidden(shot, options).held_out(shot.holdout.as_deref())
+}
+
+/// The same before what of the place stands in front hides any of it.
+pub(crate) fn render_unhidden(shot: &Shot, options: &RenderOptions) -> DeepImage {
     let options = options.clamped().for_image(shot.camera.image);
     let mut watch = Stopwatch::start();
     let finished = &*retouched(shot, &options);
@@ -66,10 +71,9 @@ pub fn render(shot: &Shot, options: &RenderOptions) -> DeepImage {
     } else {
         free
     };
-    let deep = bent.held_out(shot.holdout.as_deref());
-    watch.lap("refraction and holdout");
+    watch.lap("refraction");
     watch.log("render");
-    deep
+    bent
 }
 
 /// All that a picture is put together from, seen through the shot's lens.

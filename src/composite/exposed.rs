@@ -1,0 +1,153 @@
+//! A shot as lens and shutter show it, and as labels take it.
+//!
+//! What of the place stands in front belongs to the photo, which has its own blur: it hides objects
+//! when they are out of focus and moved, and not before.
+
+use crate::composite::defocus::defocus;
+use crate::composite::effect::Effect;
+use crate::composite::finish::finish_exposed;
+use crate::composite::motion::moved;
+use crate::deep::DeepImage;
+use crate::image::Image;
+use crate::pixel::{Film, PremulRgba};
+use crate::scene::{PostProcess, Shot};
+use std::borrow::Cow;
+
+/// The deep samples of a shot behind what of the place stands in front.
+pub(crate) struct Exposed {
+    deep: DeepImage,
+    /// Out of focus; none where all is sharp.
+    soft: Option<DeepImage>,
+    /// What they do to the plate in the mean while the shutter is open; none where nothing moves.
+    moved: Option<Image<Film>>,
+}
+
+impl Exposed {
+    /// Of samples that nothing of the place hides yet.
+    pub(crate) fn new(free: DeepImage, shot: &Shot) -> Self {
+        let soft = match defocus(&free, shot) {
+            Cow::Owned(soft) => Some(soft),
+            Cow::Borrowed(_) => None,
+        };
+        let moved = moved(soft.as_ref().unwrap_or(&free), shot);
+        let holdout = shot.holdout.as_deref();
+        Self {
+            deep: free.held_out(holdout),
+            soft: soft.map(|soft| soft.held_out(holdout)),
+            moved,
+        }
+    }
+
+    /// The frame over the shot's plate, scene-linear, premultiplied.
+    ///
+    /// # Panics
+    /// When the plate's size is not the picture's.
+    pub(crate) fn frame(&self, shot: &Shot) -> Image<PremulRgba> {
+        self.effect().frame(shot.plate.as_deref())
+    }
+
+    /// The same, finished, with objects blended into the plate where the shot's edges ask for it.
+    pub(crate) fn finished(&self, shot: &Shot, finish: &PostProcess) -> Image<PremulRgba> {
+        finish_exposed(&self.effect(), self.seen(), shot, finish)
+    }
+
+    /// What labels are made of: sharp and at rest.
+    pub(crate) fn into_deep(self) -> DeepImage {
+        self.deep
+    }
+
+    fn seen(&self) -> &DeepImage {
+        self.soft.as_ref().unwrap_or(&self.deep)
+    }
+
+    fn effect(&self) -> Effect<'_> {
+        self.moved
+            .as_ref()
+            .map_or(Effect::Still(self.seen()), Effect::Moved)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::Camera;
+    use crate::deep::{DeepSample, HoldoutSample};
+    use crate::pixel::{Coverage, Depth, LinearRgb, ObjectId};
+    use crate::scene::ThinLens;
+    use std::sync::Arc;
+
+    const PLATE: f32 = 0.25;
+    const LIGHT: f32 = 0.5;
+
+    /// A striped object in focus over a half covered by one that is not, and above row 24 one in
+    /// front of all.
+    fn free() -> DeepImage {
+        let sample = |object: u32, depth: f32, visible: f32| DeepSample {
+            object: ObjectId(object),
+            depth: Depth(depth),
+            light: LinearRgb::grey(LIGHT * visible),
+            alpha: 1.0,
+            visible,
+        };
+        let pixel = |i: usize| {
+            let mut objects = Vec::new();
+            if i / 64 < 24 {
+                objects.push((1, 0.2));
+            }
+            if i % 64 < 40 {
+                objects.push((2, 0.4));
+            }
+            if i % 8 < 6 {
+                objects.push((3, 0.5));
+            }
+            let seen = |k: usize| if k == 0 { 1.0 } else { 0.0 };
+            let objects = objects.iter().enumerate();
+            objects.map(|(k, o)| sample(o.0, o.1, seen(k))).collect()
+        };
+        let shadow = Image::filled(64, 48, LinearRgb::WHITE);
+        DeepImage::from_pixels(shadow, (0..64 * 48).map(pixel))
+    }
+
+    /// A wall hides the left half of what is farther away than 0.3 m.
+    fn shot(thin_lens: Option<ThinLens>, motion_m: [f64; 2]) -> Shot {
+        let wall = |x: usize| HoldoutSample {
+            coverage: Coverage(f32::from(x < 32)),
+            depth: Depth(0.3),
+        };
+        Shot {
+            holdout: Some(Arc::new(Image::from_fn(64, 48, |x, _| wall(x)))),
+            thin_lens,
+            motion_m,
+            ..Shot::new(Camera::looking_down(0.5, 400.0, [64, 48]))
+                .with_plate(Arc::new(Image::filled(64, 48, LinearRgb::grey(PLATE))))
+        }
+    }
+
+    #[test]
+    fn a_wall_hides_what_is_blurred_and_blurs_nothing_else() {
+        let lens = ThinLens {
+            aperture_m: 0.015,
+            focus_m: 0.5,
+        };
+        for (lens, motion_m) in [
+            (None, [0.0; 2]),
+            (Some(lens), [0.0; 2]),
+            (None, [0.01, 0.0]),
+            (Some(lens), [0.01, 0.0]),
+        ] {
+            let walled = shot(lens, motion_m);
+            let open = Shot {
+                holdout: None,
+                ..walled.clone()
+            };
+            let [walled, open] =
+                [walled, open].map(|shot| Exposed::new(free(), &shot).frame(&shot));
+            for x in 16..48 {
+                let expected = if x < 32 { PLATE } else { open[(x, 40)].g };
+                assert_eq!(walled[(x, 40)].g, expected, "{motion_m:?} {x}");
+                let front = walled[(x, 11)].g;
+                assert!((front - LIGHT).abs() < 1e-3, "{motion_m:?} {x}: {front}");
+            }
+        }
+    }
+}
