@@ -78,13 +78,15 @@ async fn photo(
     Ok(([(CACHE_CONTROL, "private, max-age=60")], response).into_response())
 }
 
-/// A picture as the browser can show it, small where a longer side is given.
+/// A picture as the browser can show it, small where a longer side is given. Otherwise it keeps its
+/// size, for pages take positions from it.
 pub(crate) fn shown(path: &Path, side: Option<usize>) -> Answer<Response> {
     let plain = plain_type(path)?;
     match (side, plain) {
         (None, Some(kind)) => Ok(of_type(kind, std::fs::read(path).map_err(unreadable)?)),
-        (side, _) => {
-            let side = side.unwrap_or(MAX_SIDE_PX).clamp(MIN_SIDE_PX, MAX_SIDE_PX);
+        (None, None) => jpeg(&io::read::<LinearRgb>(path)?),
+        (Some(side), _) => {
+            let side = side.clamp(MIN_SIDE_PX, MAX_SIDE_PX);
             jpeg(&at_most(io::read::<LinearRgb>(path)?, side))
         }
     }
@@ -104,4 +106,29 @@ fn plain_type(path: &Path) -> Answer<Option<&'static str>> {
 
 fn unreadable(error: std::io::Error) -> Refusal {
     petcomp::Error::file("photo", error).into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use petcomp::io::{Bits, WriteOptions};
+
+    #[test]
+    fn a_photo_that_no_browser_shows_keeps_its_size_unless_a_side_is_given() {
+        let folder = tempfile::tempdir().unwrap();
+        let (photo, answered) = (folder.path().join("a.png"), folder.path().join("a.jpg"));
+        let deep = WriteOptions {
+            bits: Some(Bits::Sixteen),
+            ..WriteOptions::default()
+        };
+        let long = Image::filled(MAX_SIDE_PX + 4, 2, LinearRgb::WHITE);
+        io::write_with(&photo, &long, &deep).unwrap();
+        for (side, width) in [(None, MAX_SIDE_PX + 4), (Some(usize::MAX), MAX_SIDE_PX)] {
+            let body = shown(&photo, side).unwrap().into_body();
+            let bytes = axum::body::to_bytes(body, usize::MAX);
+            let runtime = tokio::runtime::Builder::new_current_thread().build();
+            std::fs::write(&answered, runtime.unwrap().block_on(bytes).unwrap()).unwrap();
+            assert_eq!(io::read_header(&answered).unwrap().width, width, "{side:?}");
+        }
+    }
 }
