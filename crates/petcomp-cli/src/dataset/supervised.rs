@@ -5,9 +5,9 @@ use crate::global::GlobalArgs;
 use crate::interruption::interruption;
 use petcomp::Error;
 use petcomp::dataset::{self, DatasetCounts, LongRun, Pipeline, Plan, Progress};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
 use std::sync::{Mutex, PoisonError};
-use std::thread::ScopedJoinHandle;
 use std::time::{Duration, Instant};
 
 /// How often the time that the rest will take is estimated.
@@ -55,7 +55,6 @@ pub(crate) fn generate_supervised(
 #[derive(Default)]
 struct RunWatch {
     last: Mutex<Option<Progress>>,
-    is_done: AtomicBool,
 }
 
 impl RunWatch {
@@ -67,23 +66,26 @@ impl RunWatch {
     /// estimate, too.
     fn over<T>(&self, is_limited: bool, job: impl FnOnce() -> T) -> (T, Option<LongRun>) {
         std::thread::scope(|scope| {
-            let watching = is_limited.then(|| scope.spawn(|| self.stop_long_run()));
+            // Dropped when the job ends, also where it panics.
+            let (running, end) = mpsc::channel();
+            let watching = is_limited.then(|| scope.spawn(move || self.stop_long_run(&end)));
             let made = job();
-            self.is_done.store(true, Ordering::Relaxed);
-            (made, watching.and_then(join_now))
+            drop(running);
+            let long_run = watching.and_then(|watching| watching.join().ok().flatten());
+            (made, long_run)
         })
     }
 
-    /// Stops the run when it is going to take longer than an hour, and returns how long.
-    fn stop_long_run(&self) -> Option<LongRun> {
+    /// Until the run's end: stops it when it is going to take longer than an hour, and returns how
+    /// long.
+    fn stop_long_run(&self, end: &Receiver<()>) -> Option<LongRun> {
         let began = Instant::now();
-        while !self.is_done.load(Ordering::Relaxed) {
+        while end.recv_timeout(ESTIMATE_INTERVAL) == Err(RecvTimeoutError::Timeout) {
             let long_run = self.estimate(began);
             if long_run.is_some() {
                 interruption().store(true, Ordering::Relaxed);
                 return long_run;
             }
-            std::thread::park_timeout(ESTIMATE_INTERVAL);
         }
         None
     }
@@ -94,7 +96,18 @@ impl RunWatch {
     }
 }
 
-fn join_now(watching: ScopedJoinHandle<'_, Option<LongRun>>) -> Option<LongRun> {
-    watching.thread().unpark();
-    watching.join().ok().flatten()
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_job_that_panics_ends() {
+        let (ended, end) = mpsc::channel::<()>();
+        std::thread::spawn(move || {
+            let _ended = ended;
+            RunWatch::default().over(true, || panic!("on purpose"))
+        });
+        let outcome = end.recv_timeout(Duration::from_secs(60));
+        assert_eq!(outcome, Err(RecvTimeoutError::Disconnected));
+    }
 }
