@@ -40,12 +40,8 @@ impl Location {
             Url::parse(text).map_err(|e| Error::value("output", format!("\"{text}\": {e}")))?;
         refuse_credentials(&url)?;
         let bucket = url.host_str().unwrap_or_default();
-        if bucket.is_empty() {
-            return Err(Error::value(
-                "output",
-                format!("\"{text}\", expected a bucket behind the ://"),
-            ));
-        }
+        check_bucket(bucket)
+            .map_err(|what| Error::value("output", format!("\"{text}\", {what}")))?;
         let prefix = ObjectPath::from_url_path(url.path());
         Ok(Self {
             url: text.trim_end_matches('/').to_owned(),
@@ -62,8 +58,8 @@ impl Location {
 
     /// How people call an object.
     pub(crate) fn url_of(&self, at: &ObjectPath) -> PathBuf {
-        let bucket_end = self.url.find("://").map_or(0, |i| i + 3) + self.bucket.len();
-        PathBuf::from(format!("{}/{at}", &self.url[..bucket_end]))
+        let (scheme, _) = self.url.split_once("://").unwrap_or_default();
+        PathBuf::from(format!("{scheme}://{}/{at}", self.bucket))
     }
 
     /// The store, by what the environment says of it.
@@ -138,6 +134,15 @@ fn scheme_of(url: &Url) -> Result<Scheme> {
             "output",
             format!("{other}://, expected a folder, file://, s3://, gs:// or az://"),
         )),
+    }
+}
+
+/// A percent sign stands for what no store has in the name of a bucket.
+fn check_bucket(bucket: &str) -> std::result::Result<(), &'static str> {
+    match bucket {
+        "" => Err("expected a bucket behind the ://"),
+        _ if bucket.contains('%') => Err("expected a bucket of ASCII letters, digits, - and ."),
+        _ => Ok(()),
     }
 }
 
@@ -226,6 +231,10 @@ mod tests {
             (
                 "s3:///a",
                 "output: \"s3:///a\", expected a bucket behind the ://",
+            ),
+            (
+                "s3://bücket/a",
+                "output: \"s3://bücket/a\", expected a bucket of ASCII letters, digits, - and .",
             ),
         ] {
             assert_eq!(Location::parse(url).err().unwrap().to_string(), expected);
