@@ -34,7 +34,7 @@ pub(crate) fn answer(
     match request {
         Request::Header => shape(source, limits).map(Response::Shape),
         Request::Pixels { wanted, window } => {
-            decode(source, limits, wanted, window, |_| ()).map(Response::Raster)
+            decode(source, limits, wanted, window, |_, _| Ok(())).map(Response::Raster)
         }
     }
 }
@@ -51,23 +51,18 @@ pub(crate) fn start() -> Result<(), Refusal> {
 /// The shape of a picture, without its samples.
 pub(crate) fn shape(source: &SourceFile, limits: &Limits) -> Result<Shape, Refusal> {
     let (_, layout) = open(source, limits)?;
-    Ok(Shape {
-        width: layout.width as usize,
-        height: layout.height as usize,
-        sample: layout.sample(),
-        names: layout.channels,
-        display_encoded: false,
-    })
+    let all: Vec<usize> = (0..layout.channels.len()).collect();
+    Ok(layout.shape(&all))
 }
 
-/// Samples as the file has them, in the requested window; `reserve` gets the number of their bytes
-/// before they are read.
+/// Samples as the file has them, in the requested window; `prepare` gets their shape and the number
+/// of bytes that they take before they are read.
 pub(crate) fn decode(
     source: &SourceFile,
     limits: &Limits,
     wanted: Wanted,
     window: Window,
-    reserve: impl FnOnce(u64),
+    prepare: impl FnOnce(Shape, u64) -> Result<(), Refusal>,
 ) -> Result<Raster, Refusal> {
     let (reader, mut layout) = open(source, limits)?;
     if window == Window::Data {
@@ -78,7 +73,8 @@ pub(crate) fn decode(
     picked.dedup();
     let (width, height) = (layout.width as usize, layout.height as usize);
     limits.check_memory(width, height, picked.len())?;
-    reserve(layout.data_bytes() * working_copies(source.format));
+    let bytes = layout.data_bytes() * working_copies(source.format);
+    prepare(layout.shape(&picked), bytes)?;
     let samples = read_samples(source.format, &reader, &layout, &picked)?;
     let (samples, display_encoded) = interpret(samples, source.format, &layout.color_space)?;
     Ok(Raster {
@@ -121,6 +117,17 @@ fn refused(format: Format, e: &cxx::Exception) -> Refusal {
 }
 
 impl Layout {
+    /// The shape of some of the channels, as far as it is known before they are decoded.
+    fn shape(&self, picked: &[usize]) -> Shape {
+        Shape {
+            width: self.width as usize,
+            height: self.height as usize,
+            names: self.names_of(picked),
+            sample: self.sample(),
+            display_encoded: false,
+        }
+    }
+
     fn names_of(&self, picked: &[usize]) -> Vec<String> {
         picked.iter().map(|&i| self.channels[i].clone()).collect()
     }

@@ -238,26 +238,34 @@ impl Worker {
         request: Request,
     ) -> std::result::Result<std::result::Result<Response, Refusal>, Failure> {
         let started = Instant::now();
-        let mut timeout = Duration::from_secs(self.limits.seconds);
-        self.set_deadline(started + timeout);
-        let asked = self.ask_shape(source, request);
-        let shape = match asked.map_err(|e| self.failure(e, timeout))? {
-            Ok(shape) if request != Request::Header => shape,
-            other => return Ok(other.map(Response::Shape)),
-        };
-        timeout += timeout_for_samples(&shape);
-        self.set_deadline(started + timeout);
-        let received = receive_samples(&mut self.from, shape);
-        let raster = received.map_err(|e| self.failure(e, timeout))?;
-        Ok(Ok(Response::Raster(raster)))
+        self.set_deadline(started + Duration::from_secs(self.limits.seconds));
+        let received = self.receive_response(source, request);
+        received.map_err(|e| self.failure(e, self.to.deadline - started))
     }
 
-    fn ask_shape(
+    fn receive_response(
         &mut self,
         source: &SourceFile,
         request: Request,
-    ) -> std::io::Result<std::result::Result<Shape, Refusal>> {
+    ) -> std::io::Result<std::result::Result<Response, Refusal>> {
         send_request(&mut self.to, source.format, request, &source.bytes)?;
+        let announced = match self.receive_shape(source)? {
+            Ok(shape) if request != Request::Header => shape,
+            other => return Ok(other.map(Response::Shape)),
+        };
+        self.set_deadline(self.to.deadline + timeout_for_pixels(&announced));
+        let shape = match self.receive_shape(source)? {
+            Ok(shape) => shape,
+            Err(refusal) => return Ok(Err(refusal)),
+        };
+        let raster = receive_samples(&mut self.from, shape)?;
+        Ok(Ok(Response::Raster(raster)))
+    }
+
+    fn receive_shape(
+        &mut self,
+        source: &SourceFile,
+    ) -> std::io::Result<std::result::Result<Shape, Refusal>> {
         receive_shape(&mut self.from, &self.limits, source.bytes.len() as u64)
     }
 
@@ -332,7 +340,7 @@ fn is_closed(e: &std::io::Error) -> bool {
     matches!(e.kind(), ErrorKind::UnexpectedEof | ErrorKind::BrokenPipe)
 }
 
-fn timeout_for_samples(shape: &Shape) -> Duration {
+fn timeout_for_pixels(shape: &Shape) -> Duration {
     Duration::from_secs(
         (shape.width as u64).saturating_mul(shape.height as u64) / PIXELS_PER_SECOND,
     )
@@ -416,17 +424,23 @@ mod tests {
         }
     }
 
-    const GREY: &str = r#"echo '{"picture":{"width":2,"height":1,"names":["Y"],"sample":"u8","display_encoded":true}}'; printf ab"#;
+    const SHAPE: &str =
+        r#"{"picture":{"width":2,"height":1,"names":["Y"],"sample":"u8","display_encoded":true}}"#;
+
+    /// A line of a script that announces a picture and sends it.
+    fn grey() -> String {
+        format!("echo '{SHAPE}'; echo '{SHAPE}'; printf ab")
+    }
 
     #[test]
-    fn an_answer_is_a_line_and_samples() {
-        let raster = asked(&format!("{GREY}; sleep 5"), &Limits::default()).unwrap();
+    fn an_answer_is_two_lines_and_samples() {
+        let raster = asked(&format!("{}; sleep 5", grey()), &Limits::default()).unwrap();
         assert_eq!(raster.samples, Samples::U8(b"ab".to_vec()));
     }
 
     #[test]
     fn a_death_is_tried_again_and_the_second_one_named() {
-        let once = format!("[ $n = 1 ] && kill -SEGV $$; {GREY}; sleep 5");
+        let once = format!("[ $n = 1 ] && kill -SEGV $$; {}; sleep 5", grey());
         assert!(asked(&once, &Limits::default()).is_ok());
         let e = asked("kill -SEGV $$", &Limits::default()).unwrap_err();
         assert_eq!(e, "unreadable: OpenImageIO died on it 2 times (signal 11)");
@@ -442,10 +456,33 @@ mod tests {
         assert!(e.contains("took longer than 0 s (Limits::seconds)"), "{e}");
     }
 
+    /// The first line is here together with the greeting, so that no time passes before it.
+    #[test]
+    fn many_pixels_get_more_time_from_their_announcement_on() {
+        let limits = Limits {
+            seconds: 0,
+            ..Default::default()
+        };
+        let many = SHAPE.replace(r#""width":2,"height":1"#, r#""width":8192,"height":8192"#);
+        let script = format!(
+            "hello=$({GREETING}); printf '%s\\n' \"$hello\" '{many}'\n\
+             sleep 0.1; echo '{SHAPE}'; printf ab; sleep 5"
+        );
+        let raster = asked_of(&script, &limits, false).unwrap();
+        assert_eq!(raster.samples, Samples::U8(b"ab".to_vec()));
+    }
+
+    #[test]
+    fn a_refusal_may_follow_the_announcement() {
+        let script = format!("echo '{SHAPE}'; echo '{{\"refused\":\"why\"}}'; sleep 5");
+        assert_eq!(asked(&script, &Limits::default()).unwrap_err(), "why");
+    }
+
     #[test]
     fn a_death_before_the_greeting_is_no_fault_of_the_file() {
         let script = |deaths: usize| {
-            format!("[ $n -le {deaths} ] && kill -ABRT $$\n{GREETING}\n{GREY}; sleep 5")
+            let grey = grey();
+            format!("[ $n -le {deaths} ] && kill -ABRT $$\n{GREETING}\n{grey}; sleep 5")
         };
         assert!(asked_of(&script(MAX_STARTS - 1), &Limits::default(), false).is_ok());
         let e = asked_of(&script(MAX_STARTS), &Limits::default(), false).unwrap_err();
@@ -467,7 +504,7 @@ mod tests {
     #[test]
     fn a_strict_one_asks_no_worker_without_a_full_sandbox() {
         let loose = GREETING.replace("[]", "[\"Landlock: not in this kernel\"]");
-        let script = format!("{loose}\n{GREY}; sleep 5");
+        let script = format!("{loose}\n{}; sleep 5", grey());
         assert!(asked_of(&script, &Limits::default(), false).is_ok());
         let e = asked_of(&script, &Limits::default(), true).unwrap_err();
         assert!(
@@ -476,7 +513,7 @@ mod tests {
         );
         assert!(
             asked_of(
-                &format!("{GREETING}\n{GREY}; sleep 5"),
+                &format!("{GREETING}\n{}; sleep 5", grey()),
                 &Limits::default(),
                 true
             )
@@ -488,7 +525,7 @@ mod tests {
     fn nonsense_and_half_an_answer_are_deaths() {
         let e = asked("echo nonsense; exec sleep 30", &Limits::default()).unwrap_err();
         assert!(e.contains("garbled response"), "{e}");
-        let half = GREY.replace("printf ab", "printf a");
+        let half = grey().replace("printf ab", "printf a");
         assert!(
             asked(&half, &Limits::default())
                 .unwrap_err()

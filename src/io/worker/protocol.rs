@@ -1,9 +1,9 @@
 //! What petcomp and its worker program send each other.
 //!
 //! The worker is started with [`Limits`] as its argument and sends a greeting. A request is a line
-//! of JSON and the bytes of a file; a response is a line of JSON and, where pixels were requested,
-//! the samples in native byte order. The side that asks trusts nothing: it checks every size
-//! itself.
+//! of JSON and the bytes of a file; a response is a line of JSON with the shape. Where pixels were
+//! requested, it is sent before they are decoded, and their own shape and the samples in native byte
+//! order follow. The side that asks trusts nothing: it checks every size itself.
 
 use crate::io::codec::Wanted;
 use crate::io::codec::raster::{Raster, SampleKind, Samples};
@@ -70,7 +70,7 @@ pub(super) struct RequestHead {
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum ResponseHead {
-    /// A picture; its samples follow if pixels were requested.
+    /// A picture that can be decoded, or one whose samples follow.
     Picture(Shape),
     /// Why there is none.
     Refused(String),
@@ -141,6 +141,12 @@ pub(super) fn send_request(
     to.flush()
 }
 
+/// Says what shape a picture has that is going to be decoded.
+pub(super) fn send_shape(to: &mut impl Write, shape: Shape) -> Result<()> {
+    send_line(to, &ResponseHead::Picture(shape))?;
+    to.flush()
+}
+
 /// Responds with a picture and its samples.
 pub(super) fn send_raster(to: &mut impl Write, raster: &Raster) -> Result<()> {
     send_line(to, &ResponseHead::Picture(raster.into()))?;
@@ -148,7 +154,7 @@ pub(super) fn send_raster(to: &mut impl Write, raster: &Raster) -> Result<()> {
     to.flush()
 }
 
-/// Receives the first line of a response. A shape beyond the limits, which the worker knows too, is
+/// Receives a line of a response. A shape beyond the limits, which the worker knows too, is
 /// invalid.
 pub(crate) fn receive_shape(
     from: &mut impl BufRead,

@@ -2,7 +2,7 @@
 
 use super::openimageio;
 use super::protocol::{
-    Greeting, Request, RequestHead, ResponseHead, receive_line, send_line, send_raster,
+    Greeting, Request, RequestHead, ResponseHead, receive_line, send_line, send_raster, send_shape,
 };
 use super::sandbox::{MemoryLimit, enter_sandbox};
 use crate::io::codec::Wanted;
@@ -95,26 +95,29 @@ impl Server {
     ) -> Result<()> {
         match request {
             Request::Header => match openimageio::shape(source, &self.limits) {
-                Ok(shape) => send_line(to, &ResponseHead::Picture(shape)),
+                Ok(shape) => send_shape(to, shape),
                 Err(e) => send_refusal(to, &e),
             },
-            Request::Pixels { wanted, window } => match self.decode(source, wanted, window) {
+            Request::Pixels { wanted, window } => match self.decode(source, wanted, window, to) {
                 Ok(raster) => send_raster(to, &raster),
                 Err(e) => send_refusal(to, &e),
             },
         }
     }
 
-    /// The pixels, in as much memory as they need.
+    /// The pixels, in as much memory as they need; their shape is sent first.
     fn decode(
         &self,
         source: &SourceFile,
         wanted: Wanted,
         window: Window,
+        to: &mut impl Write,
     ) -> std::result::Result<Raster, Refusal> {
-        openimageio::decode(source, &self.limits, wanted, window, |decoded_bytes| {
-            self.memory.allow(source.bytes.len() as u64, decoded_bytes)
-        })
+        let prepare = |shape, decoded_bytes| {
+            self.memory.allow(source.bytes.len() as u64, decoded_bytes);
+            send_shape(to, shape).map_err(|e| Refusal::Broken(e.to_string()))
+        };
+        openimageio::decode(source, &self.limits, wanted, window, prepare)
     }
 }
 

@@ -4,6 +4,8 @@
 use crate::make::{Folder, palette_tiff};
 use petcomp::io::{self, WriteOptions};
 use petcomp::{Image, LinearRgb, Srgb8, color};
+use std::io::Write;
+use std::process::{Command, Stdio};
 
 #[test]
 fn a_palette_tiff_is_read_by_the_worker() {
@@ -45,6 +47,31 @@ fn film_scans_are_read_by_the_worker() {
     );
 }
 
+/// Large pictures have more time, which begins with the shape.
+#[test]
+fn a_worker_tells_the_shape_before_it_decodes() {
+    let whole = palette_tiff();
+    let cut = &whole[..whole.len() - 2];
+    let request = format!(
+        "{{\"format\":\"tiff\",\"ask\":{{\"pixels\":{{\"wanted\":\"color\",\"window\":\"display\"}}}},\"bytes\":{}}}\n",
+        cut.len()
+    );
+    let mut worker = Command::new(env!("CARGO_BIN_EXE_petcomp-oiio-worker"))
+        .arg("{}")
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut stdin = worker.stdin.take().unwrap();
+    stdin.write_all(request.as_bytes()).unwrap();
+    stdin.write_all(cut).unwrap();
+    drop(stdin);
+    let told = String::from_utf8(worker.wait_with_output().unwrap().stdout).unwrap();
+    let lines: Vec<&str> = told.lines().collect();
+    assert!(lines[1].starts_with("{\"picture\":{\"width\":2"), "{told}");
+    assert!(lines[2].starts_with("{\"refused\":"), "{told}");
+}
+
 /// A program that takes no chance does not ask a worker that the system leaves loose.
 #[test]
 fn a_worker_without_a_full_sandbox_is_refused_where_that_is_asked_for() {
@@ -56,14 +83,14 @@ fn a_worker_without_a_full_sandbox_is_refused_where_that_is_asked_for() {
         env!("CARGO_PKG_VERSION")
     );
     // Written by a process of its own: see `write_program` in `src/io/worker/pool.rs`.
-    let mut shell = std::process::Command::new("/bin/sh");
+    let mut shell = Command::new("/bin/sh");
     let written = shell
         .args(["-c", "printf %s \"$1\" >\"$0\" && chmod 755 \"$0\""])
         .arg(&worker)
         .arg(greeting)
         .status();
     assert!(written.unwrap().success());
-    let mut program = std::process::Command::new(env!("CARGO_BIN_EXE_petcomp"));
+    let mut program = Command::new(env!("CARGO_BIN_EXE_petcomp"));
     program
         .args(["--oiio", "worker-strict", "diff"])
         .args([&picture, &picture])
