@@ -133,7 +133,7 @@ pub(super) fn sample_storage<P: ToFile>(
     format: Option<Format>,
     requested: Option<Bits>,
 ) -> std::result::Result<Bits, String> {
-    let possible = possible_storage(format, P::CODED)?;
+    let possible = possible_storage::<P>(format)?;
     let bits = requested.unwrap_or(possible[0]);
     if possible.contains(&bits) {
         return Ok(bits);
@@ -143,20 +143,19 @@ pub(super) fn sample_storage<P: ToFile>(
     Err(format!("{} samples, expected {expected}", bits.name()))
 }
 
-/// What a format can store of a pixel that means something in integers (`coded`), or of one that
-/// does not; its own choice first.
-fn possible_storage(
+/// What a format can store of a pixel that means something in integers, or of one that does not;
+/// its own choice first.
+fn possible_storage<P: ToFile>(
     format: Option<Format>,
-    coded: bool,
 ) -> std::result::Result<&'static [Bits], String> {
-    if coded {
+    if P::CODED {
         return possible_codes(format);
     }
     match format {
         Some(Format::Exr) => Ok(&[Bits::Float, Bits::Half]),
-        Some(Format::Tiff) => Ok(&[Bits::Float]),
-        Some(Format::Png | Format::Jpeg) => {
-            Err("a depth or a film needs float samples: .exr or .tif".into())
+        Some(Format::Tiff) if P::NAMES.len() == 1 => Ok(&[Bits::Float]),
+        Some(Format::Tiff | Format::Png | Format::Jpeg) => {
+            Err("a depth needs .exr or .tif, and a film .exr".into())
         }
         _ => Err(NOT_WRITTEN.into()),
     }
@@ -282,7 +281,16 @@ mod tests {
             crate::io::read::<PremulRgba>(&path).unwrap()[(0, 0)],
             PremulRgba::new(0.5, 0.25, 0.125, 0.5)
         );
-        assert!(write(folder.path().join("film.png"), &Image::filled(3, 2, film)).is_err());
+    }
+
+    #[test]
+    fn a_film_is_written_to_no_format_that_loses_channels() {
+        let folder = tempfile::tempdir().unwrap();
+        let film = Image::filled(3, 2, Film::new(LinearRgb::WHITE, LinearRgb::BLACK));
+        for name in ["film.png", "film.jpg", "film.tif"] {
+            let e = write(folder.path().join(name), &film).unwrap_err();
+            assert!(e.to_string().ends_with("and a film .exr"), "{e}");
+        }
     }
 
     #[test]

@@ -502,7 +502,8 @@ where
     let alpha = (channels > 3).then_some(alpha);
     match channels {
         1 => encode::<Grey>(size, samples, alpha, metadata),
-        _ => encode::<Rgb>(size, samples, alpha, metadata),
+        3 | 4 => encode::<Rgb>(size, samples, alpha, metadata),
+        _ => return Err(format!("{channels} channels, expected 1, 3 or 4")),
     }
     .map_err(|e| e.to_string())
 }

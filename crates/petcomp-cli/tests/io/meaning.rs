@@ -139,7 +139,7 @@ fn mattes_and_depths_are_plain_numbers() {
         .unwrap_err()
         .to_string();
     assert!(
-        e.ends_with("z.png: a depth or a film needs float samples: .exr or .tif"),
+        e.ends_with("z.png: a depth needs .exr or .tif, and a film .exr"),
         "{e}"
     );
     assert!(!folder.file("z.png").exists());
