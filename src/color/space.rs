@@ -27,6 +27,11 @@ impl RgbSpace {
         primaries: [[0.708, 0.292], [0.170, 0.797], [0.131, 0.046]],
         white: [0.3127, 0.3290],
     };
+    /// Display P3: P3 primaries and D65 (SMPTE EG 432-1).
+    pub const DISPLAY_P3: Self = Self {
+        primaries: [[0.680, 0.320], [0.265, 0.690], [0.150, 0.060]],
+        white: [0.3127, 0.3290],
+    };
     /// ACEScg: AP1 primaries and the ACES white, which is near D60 but not it (S-2014-004).
     pub const ACESCG: Self = Self {
         primaries: [[0.713, 0.293], [0.165, 0.830], [0.128, 0.044]],
@@ -144,7 +149,12 @@ impl ColorMatrix {
 mod tests {
     use super::*;
 
-    const SPACES: [RgbSpace; 3] = [RgbSpace::REC709, RgbSpace::REC2020, RgbSpace::ACESCG];
+    const SPACES: [RgbSpace; 4] = [
+        RgbSpace::REC709,
+        RgbSpace::REC2020,
+        RgbSpace::DISPLAY_P3,
+        RgbSpace::ACESCG,
+    ];
 
     #[test]
     fn white_stays_white_between_all_spaces() {

@@ -1,7 +1,7 @@
 //! PNG: 8 or 16 bits, display-encoded as the file describes or as sRGB, straight alpha.
 
 use super::codes::{CodedImage, Codes};
-use super::profile::ColorDescription;
+use super::profile::{ColorDescription, known_code_points};
 use super::raster::{Raster, Samples, default_names};
 use super::refusal::Refusal;
 use crate::color::RgbSpace;
@@ -87,13 +87,16 @@ fn utf8_note(text: &png::text_metadata::ITXtChunk) -> Option<(String, String)> {
 
 /// How the file describes its colours, by the chunk that takes precedence (PNG 3rd edition, 4.3):
 /// code points, a profile, sRGB, or the exponent and the primaries. None for sRGB, and without a
-/// description.
+/// description. Code points that are not applied leave it to a profile beside them.
 pub(crate) fn color_description(bytes: &[u8], limits: &Limits) -> Option<ColorDescription> {
     let reader = open(Cursor::new(bytes), bytes.len() as u64, limits).ok()?;
     let info = reader.info();
     if let Some(cicp) = info.coding_independent_code_points {
         let (primaries, transfer) = (cicp.color_primaries, cicp.transfer_function);
-        return Some(ColorDescription::CodePoints(primaries, transfer));
+        let is_known = known_code_points(primaries, transfer).is_some();
+        if is_known || info.icc_profile.is_none() {
+            return Some(ColorDescription::CodePoints(primaries, transfer));
+        }
     }
     if info.srgb.is_some() {
         return None;
@@ -301,6 +304,30 @@ mod tests {
             e.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
         });
         assert_eq!(both, light(|_| ()));
+    }
+
+    #[test]
+    fn code_points_that_are_not_applied_leave_the_word_to_a_profile() {
+        let profile = ColorDescription::Icc(b"a profile".to_vec());
+        for (code_points, icc, expected) in [
+            ([9, 16], &b"a profile"[..], profile),
+            ([9, 16], b"", ColorDescription::CodePoints(9, 16)),
+            ([12, 13], b"a profile", ColorDescription::CodePoints(12, 13)),
+        ] {
+            let mut info = png::Info::with_size(1, 1);
+            info.icc_profile = (!icc.is_empty()).then_some(icc.into());
+            let mut bytes = Vec::new();
+            let encoder = png::Encoder::with_info(&mut bytes, info).unwrap();
+            let mut writer = encoder.write_header().unwrap();
+            let [primaries, transfer] = code_points;
+            writer
+                .write_chunk(png::chunk::cICP, &[primaries, transfer, 0, 1])
+                .unwrap();
+            writer.write_image_data(&[0]).unwrap();
+            drop(writer);
+            let described = color_description(&bytes, &Limits::default());
+            assert_eq!(described, Some(expected));
+        }
     }
 
     #[test]

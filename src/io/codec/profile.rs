@@ -24,9 +24,6 @@ const LARGEST_CODE: f32 = 65_535.0;
 const SRGB_TOLERANCE: f32 = 2e-3;
 /// The exponent of screens: files name it that mean sRGB, in steps of a hundredth and coarser.
 const SCREEN_EXPONENTS: std::ops::RangeInclusive<f64> = 2.16..=2.24;
-/// H.273: the primaries of Rec. 709 with the curve of sRGB, and without any.
-const CODE_POINTS_SRGB: (u8, u8) = (1, 13);
-const CODE_POINTS_LINEAR: (u8, u8) = (1, 8);
 /// Chromaticities that differ by less are the same, written with fewer digits.
 const CHROMATICITY_TOLERANCE: f64 = 1e-3;
 /// A triangle of primaries with less area (in x, y) holds no colours; Rec. 709 has 0.11.
@@ -44,6 +41,23 @@ pub(crate) enum ColorDescription {
     },
     /// Primaries and transfer function by their numbers in ITU-T H.273.
     CodePoints(u8, u8),
+}
+
+/// What code points of ITU-T H.273 stand for, of those that are applied: an exponent or the curve of
+/// sRGB, and primaries.
+pub(crate) fn known_code_points(primaries: u8, transfer: u8) -> Option<(Option<f64>, RgbSpace)> {
+    let exponent = match transfer {
+        8 => Some(1.0),
+        13 => None,
+        _ => return None,
+    };
+    let space = match primaries {
+        1 => RgbSpace::REC709,
+        9 => RgbSpace::REC2020,
+        12 => RgbSpace::DISPLAY_P3,
+        _ => return None,
+    };
+    Some((exponent, space))
 }
 
 /// How display codes become light, where a file describes it itself.
@@ -66,13 +80,11 @@ impl DisplayProfile {
                 exponent,
                 primaries,
             } => Self::from_curve(exponent, primaries),
-            ColorDescription::CodePoints(a, b) if (a, b) == CODE_POINTS_SRGB => Ok(None),
-            ColorDescription::CodePoints(a, b) if (a, b) == CODE_POINTS_LINEAR => {
-                Self::from_curve(Some(1.0), None)
+            ColorDescription::CodePoints(primaries, transfer) => {
+                let (exponent, space) = known_code_points(primaries, transfer)
+                    .ok_or_else(|| format!("code points {primaries}/{transfer} for its colours"))?;
+                Self::from_curve(exponent, Some(space))
             }
-            ColorDescription::CodePoints(primaries, transfer) => Err(format!(
-                "code points {primaries}/{transfer} for its colours"
-            )),
         }
     }
 
@@ -295,10 +307,7 @@ mod tests {
     /// SMPTE EG 432-1: P3 primaries, D65; Adobe RGB (1998): 4.3.1 and gamma 563/256.
     #[test]
     fn other_primaries_become_rec_709() {
-        let p3 = RgbSpace {
-            primaries: [[0.680, 0.320], [0.265, 0.690], [0.150, 0.060]],
-            white: [0.3127, 0.3290],
-        };
+        let p3 = RgbSpace::DISPLAY_P3;
         let adobe = RgbSpace {
             primaries: [[0.64, 0.33], [0.21, 0.71], [0.15, 0.06]],
             white: [0.3127, 0.3290],
@@ -363,22 +372,36 @@ mod tests {
     }
 
     #[test]
-    fn code_points_other_than_those_of_screens_are_named() {
-        assert_eq!(
-            DisplayProfile::from_description(ColorDescription::CodePoints(1, 13)),
-            Ok(None)
-        );
-        assert_eq!(
-            DisplayProfile::from_description(ColorDescription::CodePoints(1, 8))
-                .unwrap()
-                .unwrap()
-                .light([0.5; 3])[0],
-            32768.0 / 65535.0
-        );
-        assert_eq!(
-            DisplayProfile::from_description(ColorDescription::CodePoints(9, 16)).unwrap_err(),
-            "code points 9/16 for its colours"
-        );
+    fn code_points_of_screens_are_applied_and_others_named() {
+        let described = |primaries, transfer| {
+            DisplayProfile::from_description(ColorDescription::CodePoints(primaries, transfer))
+        };
+        assert_eq!(described(1, 13), Ok(None));
+        let grey = 32768.0 / 65535.0;
+        // Red in Rec. 709: that of Rec. 2020 by ITU-R BT.2407, of Display P3 by CSS Color 4.
+        for (primaries, expected) in [
+            (1, [1.0, 0.0, 0.0]),
+            (9, [1.6605, -0.1246, -0.0182]),
+            (12, [1.2249, -0.0421, -0.0196]),
+        ] {
+            let linear = described(primaries, 8).unwrap().unwrap();
+            let red = linear.light([1.0, 0.0, 0.0]);
+            let errors = red.iter().zip(expected).map(|(v, w): (_, f32)| v - w);
+            assert!(
+                errors.map(f32::abs).all(|e| e < 1e-4),
+                "{primaries}: {red:?}"
+            );
+            assert!((linear.light([0.5; 3])[1] - grey).abs() < 1e-6);
+        }
+        for primaries in [9, 12] {
+            let screen = described(primaries, 13).unwrap().unwrap();
+            let light = screen.light([0.5; 3])[1];
+            assert!((light - srgb_to_linear(grey)).abs() < 1e-6, "{light}");
+        }
+        for (primaries, transfer) in [(9, 16), (4, 13)] {
+            let what = format!("code points {primaries}/{transfer} for its colours");
+            assert_eq!(described(primaries, transfer).unwrap_err(), what);
+        }
     }
 
     /// CIE XYZ of equal energy: its middle is the white of Rec. 709.
