@@ -63,7 +63,7 @@
 //! OpenImageIO's into this process, and Debian does not fix them), that a kernel without Landlock
 //! or seccomp has an equal sandbox (one warning reports it; [`Fallback::StrictWorker`] refuses),
 //! that the stages behind reading fit into any memory, or anything against a person with an account
-//! on the machine. Half-grey pictures out of JPEGs that are damaged in the middle, with their end
+//! on the machine. Wrong pixels out of a JPEG or HEIC that is damaged in the middle, with its end
 //! in place, cannot be distinguished from real ones.
 
 mod codec;

@@ -60,7 +60,7 @@ fn alpha_is_straight() {
 }
 
 #[test]
-fn damaged_ones_are_refused_or_lose_nothing() {
+fn a_cut_one_is_refused_or_loses_nothing_and_a_changed_one_crashes_nothing() {
     let (folder, bytes) = (Folder::new(), std::fs::read(file("phone.heic")).unwrap());
     let whole = io::read::<LinearRgb>(file("phone.heic")).unwrap();
     let mut refused = 0;
