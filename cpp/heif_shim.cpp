@@ -11,18 +11,17 @@
 namespace petcomp {
 namespace {
 
-template <typename T, void (*release)(T *)>
+template <auto release>
 struct Released {
-    void operator()(T *it) const { release(it); }
-};
-template <typename T, void (*release)(const T *)>
-struct ReleasedConst {
-    void operator()(T *it) const { release(it); }
+    template <typename T>
+    void operator()(T *it) const {
+        release(it);
+    }
 };
 
-using Context = std::unique_ptr<heif_context, Released<heif_context, heif_context_free>>;
-using Handle = std::unique_ptr<heif_image_handle, ReleasedConst<heif_image_handle, heif_image_handle_release>>;
-using Image = std::unique_ptr<heif_image, ReleasedConst<heif_image, heif_image_release>>;
+using Context = std::unique_ptr<heif_context, Released<heif_context_free>>;
+using Handle = std::unique_ptr<heif_image_handle, Released<heif_image_handle_release>>;
+using Image = std::unique_ptr<heif_image, Released<heif_image_release>>;
 
 void check(const heif_error &error) {
     if (error.code != heif_error_Ok)
