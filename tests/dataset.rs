@@ -1105,6 +1105,33 @@ fn merged_shards_are_the_bytes_of_one_run() {
 }
 
 #[test]
+fn shards_with_simplified_polygons_are_merged() {
+    let labels = "formats = ['yolo', 'coco']\nsimplify = 1.5\n\
+        yolo = { task = 'segment' }\ncoco = { masks = 'polygon' }";
+    let labels: LabelConfig = toml::from_str(labels).unwrap();
+    let dir = tempfile::tempdir().unwrap();
+    let made = |name: &str, range| {
+        let folder = dir.path().join(name);
+        let writers = labels.writers(&Pictures::default());
+        make(&Plan {
+            range,
+            writers,
+            ..plan(&folder, 6)
+        })
+        .unwrap();
+        folder
+    };
+    let whole = made("whole", SampleRange::All);
+    let shards = [1, 2].map(|i| {
+        let share = Shard::new(i, 2).unwrap();
+        made(&format!("shard-{i}"), SampleRange::Shard(share))
+    });
+    let merged = dir.path().join("merged");
+    joined(&shards, &merged).unwrap();
+    assert_eq!(bytes(&whole), bytes(&merged));
+}
+
+#[test]
 fn shards_that_do_not_make_a_whole_are_refused() {
     let dir = tempfile::tempdir().unwrap();
     let folders = shards(dir.path());

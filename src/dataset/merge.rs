@@ -266,11 +266,15 @@ fn writer_of(name: &str, settings: Value, pictures: &Pictures) -> Result<Arc<dyn
 
 fn label_writer(
     format: &str,
-    settings: Value,
+    mut settings: Value,
     pictures: &Pictures,
 ) -> std::result::Result<Arc<dyn Writer>, String> {
     let mut config = json!({ "formats": [format] });
-    if settings.as_object().is_some_and(|map| !map.is_empty()) {
+    if let Some(map) = settings.as_object_mut().filter(|map| !map.is_empty()) {
+        // A setting of all layouts, told by each that has polygons.
+        if let Some(tolerance_px) = map.remove("simplify") {
+            config["simplify"] = tolerance_px;
+        }
         config[format] = settings;
     }
     let config: LabelConfig = serde_json::from_value(config).map_err(|e| e.to_string())?;
