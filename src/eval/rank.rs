@@ -108,15 +108,25 @@ impl Ranking {
             .filter(|(_, count)| *count > 0.0)
     }
 
-    /// Sums at a threshold after each detection that counts.
-    pub(super) fn running(&self, threshold: usize, weights: &[u32]) -> Running {
+    /// Those of images that count that are not ignored at a threshold, and whether they are right.
+    pub(super) fn counting_at(
+        &self,
+        threshold: usize,
+        weights: &[u32],
+    ) -> impl Iterator<Item = (&Hit, bool, f64)> {
         debug_assert!(threshold < THRESHOLDS);
+        let counting = self.counting(weights);
+        counting.filter_map(move |(hit, count)| Some((hit, hit.is_right_at(threshold)?, count)))
+    }
+
+    /// Sums at a threshold after each detection that counts there.
+    pub(super) fn running(&self, threshold: usize, weights: &[u32]) -> Running {
         let (mut right, mut wrong, mut sums) = (0.0, 0.0, Running::default());
-        for (hit, count) in self.counting(weights) {
-            match hit.is_right_at(threshold) {
-                Some(true) => right += count,
-                Some(false) => wrong += count,
-                None => {}
+        for (_, is_right, count) in self.counting_at(threshold, weights) {
+            if is_right {
+                right += count;
+            } else {
+                wrong += count;
             }
             sums.push(right, wrong);
         }
@@ -275,10 +285,7 @@ mod tests {
                 .to_vec(),
         );
         let sums = all.running(0, &[]);
-        assert_eq!(
-            (sums.right, sums.wrong),
-            (vec![1.0, 1.0, 1.0], vec![0.0, 0.0, 1.0])
-        );
+        assert_eq!((sums.right, sums.wrong), (vec![1.0, 1.0], vec![0.0, 1.0]));
         let turns = &all.turns(&[])[0];
         assert_eq!(
             (&turns.right[..], &turns.wrong[..]),
@@ -304,16 +311,12 @@ mod tests {
             for (t, turns) in all.turns(&weights).iter().enumerate() {
                 let whole = all.running(t, &weights);
                 for epsilon in [[1e-16, 0.0], [0.0, f64::EPSILON]] {
-                    // YOLOv5's definition ignores nothing.
-                    let ignores = all.hits.iter().any(|h| h.ignored != 0);
-                    if whole.right.is_empty() || (epsilon[1] == 0.0 && ignores) {
+                    if whole.right.is_empty() {
                         continue;
                     }
                     let [(r, p), (few_r, few_p)] = [&whole, turns].map(|sums| recall_and_precision(sums, truths, epsilon));
                     prop_assert_eq!(mean_of_samples(&r, &p), mean_of_samples(&few_r, &few_p));
-                    if !ignores {
-                        prop_assert_eq!(trapezoid(&r, &p), trapezoid(&few_r, &few_p));
-                    }
+                    prop_assert_eq!(trapezoid(&r, &p), trapezoid(&few_r, &few_p));
                     prop_assert_eq!(r.last().copied().unwrap_or(0.0), few_r.last().copied().unwrap_or(0.0));
                     prop_assert_eq!(p.last().copied().unwrap_or(0.0), few_p.last().copied().unwrap_or(0.0));
                 }

@@ -2,7 +2,7 @@
 
 use super::average::{interpolated, recall_and_precision, trapezoid};
 use super::by_class::{ByClass, ImageBoxes};
-use super::overlap::BoxIndex;
+use super::overlap::{BoxIndex, area, intersection, share};
 use super::rank::{Hit, Marks, Ranking, Running};
 use super::{ClassScores, Definition, Detection, EvalImage, Scores, THRESHOLDS, check_weights};
 use crate::geom::BBox;
@@ -22,8 +22,8 @@ const SMOOTHING_READINGS: usize = 50;
 /// the best F1.
 ///
 /// Each detection is held against the box of its class that it overlaps most; of those that name
-/// the same box the surest counts. Boxes marked as crowd are taken as any other: YOLO labels have
-/// no such mark.
+/// the same box the surest counts. A box marked as crowd need not be found, and what finds nothing
+/// else and lies in it is ignored, as the COCO tools have it; YOLO labels have no such mark.
 ///
 /// # Method
 /// YOLOv5 7.0: `val.py` (`process_batch`) and `utils/metrics.py` (`ap_per_class`); overlaps in
@@ -143,8 +143,8 @@ impl<'a> Ranked<'a> {
 }
 
 fn negated_confidences(ranking: &Ranking, weights: &[u32]) -> Vec<f64> {
-    let counting = ranking.counting(weights);
-    counting.map(|(hit, _)| -hit.confidence).collect()
+    let counting = ranking.counting_at(0, weights);
+    counting.map(|(hit, ..)| -hit.confidence).collect()
 }
 
 fn curve(sums: &Running, truths: f64) -> (Vec<f64>, Vec<f64>) {
@@ -195,24 +195,49 @@ fn window_sum(values: &[f64], i: usize) -> f64 {
 }
 
 /// The detections of a class in one image, marked right where they found something, and how many
-/// boxes there are.
+/// boxes there are to be found.
 fn match_image(image: &ImageBoxes<'_>) -> (Vec<Hit>, usize) {
-    let right = right_marks(image).into_iter().enumerate();
-    let hits = right.map(|(place, right)| Hit::new(image, place, [right, 0]));
-    (hits.collect(), image.truth.len())
+    let [crowds, truth] = [true, false].map(|crowd| boxes_of(image, crowd));
+    let right = right_marks(&truth, &image.found);
+    let ignored = crowd_marks(&crowds, &image.found);
+    let marks = right.into_iter().zip(ignored).enumerate();
+    let hits =
+        marks.map(|(place, (right, ignored))| Hit::new(image, place, [right, ignored & !right]));
+    (hits.collect(), truth.len())
+}
+
+/// The boxes that are a crowd, or those that are none.
+fn boxes_of(image: &ImageBoxes<'_>, crowd: bool) -> Vec<BBox> {
+    let boxes = image.truth.iter().filter(|truth| truth.crowd == crowd);
+    boxes.map(|truth| truth.bbox).collect()
 }
 
 /// The thresholds at which each detection found a box that no surer one has found.
-fn right_marks(image: &ImageBoxes<'_>) -> Vec<Marks> {
-    let index = BoxIndex::new(image.truth.iter().map(|t| t.bbox));
-    let mut taken: Vec<Marks> = vec![0; image.truth.len()];
-    let found = image.found.iter();
+fn right_marks(truth: &[BBox], found: &[&Detection]) -> Vec<Marks> {
+    let index = BoxIndex::new(truth.iter().copied());
+    let mut taken: Vec<Marks> = vec![0; truth.len()];
+    let found = found.iter();
     found
-        .map(|found| match nearest(image, &index, found) {
+        .map(|found| match nearest(truth, &index, found) {
             Some((truth, overlap)) => take_free(&mut taken[truth], reached(overlap)),
             None => 0,
         })
         .collect()
+}
+
+/// The thresholds that the share of each detection within a crowd reaches.
+fn crowd_marks(crowds: &[BBox], found: &[&Detection]) -> Vec<Marks> {
+    let index = BoxIndex::new(crowds.iter().copied());
+    let marks = |found: &&Detection| {
+        let near = index.near(&found.bbox).into_iter();
+        near.map(|crowd| reached(share_within(&crowds[crowd], &found.bbox)))
+            .fold(0, |all, marks| all | marks)
+    };
+    found.iter().map(marks).collect()
+}
+
+fn share_within(crowd: &BBox, found: &BBox) -> f32 {
+    share(intersection(crowd, found), area(found)) as f32
 }
 
 /// Takes a box at the thresholds that are reached; returns those at which it was free.
@@ -224,9 +249,9 @@ fn take_free(taken: &mut Marks, reached: Marks) -> Marks {
 
 /// The box that a detection overlaps most; of equal overlaps the last: that is how the original's
 /// descending sort leaves them.
-fn nearest(image: &ImageBoxes<'_>, index: &BoxIndex, found: &Detection) -> Option<(usize, f32)> {
+fn nearest(truth: &[BBox], index: &BoxIndex, found: &Detection) -> Option<(usize, f32)> {
     let near = index.near(&found.bbox).into_iter();
-    let overlaps = near.map(|t| (t, overlap(&image.truth[t].bbox, &found.bbox)));
+    let overlaps = near.map(|t| (t, overlap(&truth[t], &found.bbox)));
     overlaps.max_by(|a, b| a.1.total_cmp(&b.1))
 }
 
@@ -272,6 +297,7 @@ fn threshold(i: usize) -> f32 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::GroundTruth;
     use super::super::tests::{bbox, found, sheet, there};
     use super::*;
 
@@ -304,6 +330,37 @@ mod tests {
         );
         assert_eq!(scores.classes[1].ap, [0.0; 10]);
         assert!((scores.map() - 0.995 / 2.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_crowd_need_not_be_found_and_what_lies_in_it_does_not_count() {
+        let crowd = GroundTruth {
+            crowd: true,
+            ..there(0, bbox(100.0, 0.0, 50.0, 50.0))
+        };
+        let only_crowd = there(1, bbox(300.0, 0.0, 50.0, 50.0));
+        let only_crowd = GroundTruth {
+            crowd: true,
+            ..only_crowd
+        };
+        let b = bbox(0.0, 0.0, 10.0, 10.0);
+        let alarm = found(0, bbox(500.0, 0.0, 9.0, 9.0), 0.7);
+        let plain = [sheet(vec![there(0, b)], vec![alarm, found(0, b, 0.5)])];
+        let crowded = [sheet(
+            vec![crowd, there(0, b), only_crowd],
+            vec![
+                found(0, bbox(105.0, 5.0, 9.0, 9.0), 0.9),
+                alarm,
+                found(0, crowd.bbox, 0.6),
+                found(0, b, 0.5),
+                found(1, only_crowd.bbox, 0.4),
+            ],
+        )];
+        assert_eq!(yolov5(&crowded, &[]), yolov5(&plain, &[]));
+        // Half of the detection lies in the crowd: it is ignored at the first threshold alone.
+        let half = found(0, bbox(145.0, 0.0, 10.0, 50.0), 0.9);
+        let hits = rankings(&[sheet(vec![crowd], vec![half])]).remove(0).hits;
+        assert_eq!((hits[0].right, hits[0].ignored), (0, 1));
     }
 
     #[test]
