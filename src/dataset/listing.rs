@@ -7,7 +7,6 @@ use crate::dataset::{Part, SampleRecord};
 use crate::error::{Error, Result};
 use crate::io;
 use std::cmp::Ordering;
-use std::ffi::OsStr;
 use std::path::{Component, Path, PathBuf};
 
 /// Images for training and for validation, in order; none is a copy.
@@ -165,14 +164,10 @@ pub(crate) fn is_image(path: &Path) -> bool {
 /// # Errors
 /// When there is none beside it.
 pub(crate) fn record_of(image: &Path) -> Result<SampleRecord> {
-    let record: PathBuf = image.iter().map(images_to_scenes).collect();
-    io::read_json(record.with_extension("json"))
+    io::read_json(sidecar_of(image))
 }
 
-fn images_to_scenes(step: &OsStr) -> &OsStr {
-    if step == "images" {
-        "scenes".as_ref()
-    } else {
-        step
-    }
+/// Where the sidecar of an image is, if it has one.
+pub(crate) fn sidecar_of(image: &Path) -> PathBuf {
+    io::with_last_step(image, "images", "scenes").with_extension("json")
 }

@@ -1,6 +1,6 @@
 //! Partitioning images for training and validation, and what leaks from one to the other.
 
-use crate::dataset::listing::{Listing, record_of};
+use crate::dataset::listing::{Listing, record_of, sidecar_of};
 use crate::dataset::near_duplicates::{NearDuplicate, near_pairs};
 use crate::error::{Error, Result};
 use crate::scene::{Draws, Scene};
@@ -101,32 +101,36 @@ impl Listing {
     /// `max_codes` (root mean square of 8-bit grey values of a small copy).
     ///
     /// # Errors
-    /// An image that cannot be read.
+    /// An image or a sidecar that cannot be read.
     pub fn leakage(&self, max_codes: f64) -> Result<Leakage> {
         Ok(Leakage {
-            groups: self.leaked_groups(),
+            groups: self.leaked_groups()?,
             near_duplicates: near_pairs(&self.train, &self.val, max_codes)?,
         })
     }
 
-    fn leaked_groups(&self) -> Vec<(&'static str, [usize; 2])> {
+    /// None where an image has no sidecar.
+    fn leaked_groups(&self) -> Result<Vec<(&'static str, [usize; 2])>> {
+        let mut images = self.train.iter().chain(&self.val);
+        if !images.all(|image| sidecar_of(image).exists()) {
+            return Ok(Vec::new());
+        }
         let groups = Group::ALL.into_iter();
         groups
-            .filter_map(|group| Some((group.name(), self.shared_groups(group)?)))
+            .map(|group| Ok((group.name(), self.shared_groups(group)?)))
             .collect()
     }
 
-    /// Groups of the images for validation, and how many of them occur in training; none where they
-    /// are not known.
-    fn shared_groups(&self, group: Group) -> Option<[usize; 2]> {
+    /// Groups of the images for validation, and how many of them occur in training.
+    fn shared_groups(&self, group: Group) -> Result<[usize; 2]> {
         let train = distinct_groups(&self.train, group)?;
         let val = distinct_groups(&self.val, group)?;
-        Some([val.len(), val.intersection(&train).count()])
+        Ok([val.len(), val.intersection(&train).count()])
     }
 }
 
-fn distinct_groups(images: &[PathBuf], group: Group) -> Option<BTreeSet<String>> {
-    Some(groups(images, group).ok()?.into_iter().collect())
+fn distinct_groups(images: &[PathBuf], group: Group) -> Result<BTreeSet<String>> {
+    Ok(groups(images, group)?.into_iter().collect())
 }
 
 /// The group of each image.
@@ -216,6 +220,7 @@ fn unknown_group(name: &str) -> Error {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::path::Path;
 
     fn listing(n: usize) -> Listing {
         Listing {
@@ -276,6 +281,28 @@ mod tests {
             listing(3).head(1.5).is_err()
                 && listing(3).partitioned(Partition::Random, 1.0, 0).is_err()
         );
+    }
+
+    #[test]
+    fn a_sidecar_is_beside_the_last_folder_of_images() {
+        let sidecar = sidecar_of("/my/images/set/images/val/000000.png".as_ref());
+        assert_eq!(sidecar, Path::new("/my/images/set/scenes/val/000000.json"));
+    }
+
+    #[test]
+    fn groups_are_unknown_without_a_sidecar_and_a_damaged_one_is_an_error() {
+        let dir = tempfile::tempdir().unwrap();
+        std::fs::create_dir_all(dir.path().join("images")).unwrap();
+        std::fs::create_dir_all(dir.path().join("scenes")).unwrap();
+        let image = dir.path().join("images/0.png");
+        let listing = Listing {
+            train: vec![image],
+            ..Listing::default()
+        };
+        assert!(listing.leaked_groups().unwrap().is_empty());
+        std::fs::write(dir.path().join("scenes/0.json"), "{").unwrap();
+        let said = listing.leaked_groups().unwrap_err().to_string();
+        assert!(said.contains("scenes/0.json"), "{said}");
     }
 
     #[test]

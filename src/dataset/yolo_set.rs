@@ -41,13 +41,7 @@ impl YoloSet {
 
     /// The label file of an image: its path with the last `images` replaced by `labels`.
     pub fn label_of(image: &Path) -> PathBuf {
-        let parts: Vec<_> = image.components().collect();
-        let last = parts.iter().rposition(|part| part.as_os_str() == "images");
-        let swapped = parts.iter().enumerate().map(|(i, part)| match last {
-            Some(place) if place == i => "labels".as_ref(),
-            _ => part.as_os_str(),
-        });
-        swapped.collect::<PathBuf>().with_extension("txt")
+        io::with_last_step(image, "images", "labels").with_extension("txt")
     }
 }
 

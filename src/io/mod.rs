@@ -110,7 +110,7 @@ pub use document::{read_document, write_document};
 pub use format::Format;
 #[doc(hidden)]
 pub use fs::{Checksum, absolute, below, copy, create_folder, inside, relative, sync};
-pub(crate) use fs::{refuse_links, write_through};
+pub(crate) use fs::{refuse_links, with_last_step, write_through};
 pub use header::Header;
 #[doc(hidden)]
 pub use header::Window;

@@ -131,6 +131,18 @@ pub fn relative(to: &Path, from: &Path) -> PathBuf {
     up.chain(to.components().skip(shared)).collect()
 }
 
+/// A path with its last step of one name given another: `a/images/b/images/c.png` leads from images
+/// to labels at `a/images/b/labels/c.png`, as trainers have it. Without such a step it stays.
+pub(crate) fn with_last_step(path: &Path, from: &str, to: &str) -> PathBuf {
+    let steps: Vec<_> = path.components().collect();
+    let last = steps.iter().rposition(|step| step.as_os_str() == from);
+    let swapped = steps.iter().enumerate().map(|(i, step)| match last {
+        Some(place) if place == i => to.as_ref(),
+        _ => step.as_os_str(),
+    });
+    swapped.collect()
+}
+
 /// Makes a folder and its parents; one that already exists is fine.
 ///
 /// # Errors

@@ -11,7 +11,7 @@ pub use atomic::{absolute, create_folder, relative, sync};
 pub use checksum::{Checksum, copy};
 pub use sanitize_path::{below, inside};
 
-pub(crate) use atomic::{write_bytes, write_through};
+pub(crate) use atomic::{with_last_step, write_bytes, write_through};
 pub(crate) use open::{open_regular, read_regular, read_to_end, reason};
 pub(crate) use own_file::{open_own, refuse_foreign};
 pub(crate) use sanitize_path::{length_inside, refuse_links};
