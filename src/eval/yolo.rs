@@ -3,12 +3,12 @@
 use super::{Detection, EvalImage, GroundTruth, Picture, filled_lines, in_line};
 use crate::error::{Error, Result};
 use crate::geom::{BBox, Point2};
-use crate::io;
+use crate::io::{self, Format};
 use rayon::prelude::*;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// Truth of a folder of images: a sheet per label file, nothing found yet.
+/// Truth of a folder of images: a sheet for each of them, nothing found yet.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct YoloTruth {
     /// In order of the images' names.
@@ -22,46 +22,68 @@ pub struct YoloTruth {
 /// Reads `NAME.txt` of a folder of labels: `class cx cy w h`, shares of the image, one box a line;
 /// outlines (`class x1 y1 x2 y2 ..`) give the box around them.
 ///
-/// Sizes come from the images, which are looked for where YOLO has them: the same path with its
-/// last `labels` replaced by `images`. `size` is taken for all where there are no images; overlaps
-/// do not depend on it, COCO's ranges of area do.
+/// The images are in the folder `images`, by default where YOLO has them: the same path with its
+/// last `labels` replaced by `images`. One without a label file shows nothing that is to be found.
+/// Sizes come from the images; `size` is taken for all where it is given. Overlaps do not depend on
+/// it, COCO's ranges of area do.
 ///
 /// # Errors
 /// [`Error::File`] for a folder without labels, a label without an image where no `size` is given,
 /// or a bad line.
-pub fn read_yolo_truth(labels: &Path, size: Option<[u32; 2]>) -> Result<YoloTruth> {
-    let all = read_all_labels(labels, size)?;
-    if all.is_empty() {
+pub fn read_yolo_truth(
+    labels: &Path,
+    images: Option<&Path>,
+    size: Option<[u32; 2]>,
+) -> Result<YoloTruth> {
+    let folder = LabelFolder::open(labels, images)?;
+    if folder.labels.is_empty() {
         return Err(Error::file(labels, "no label files, expected NAME.txt"));
     }
+    let names = folder.names().into_par_iter();
+    let all: Vec<_> = names
+        .map(|name| folder.read(name, size))
+        .collect::<Result<_>>()?;
     Ok(YoloTruth::from_images(all))
 }
 
 /// The truth of an image, its size, and the image where it is found.
 type LabelledImage = (EvalImage, [u32; 2], Option<Picture>);
 
-fn read_all_labels(labels: &Path, size: Option<[u32; 2]>) -> Result<Vec<LabelledImage>> {
-    let texts = text_files(labels)?;
-    texts
-        .par_iter()
-        .map(|(name, path)| read_labels(labels, name, path, size))
-        .collect()
+/// A folder of labels and that of its images, whose files have the same names.
+struct LabelFolder {
+    labels: BTreeMap<String, PathBuf>,
+    images: BTreeMap<String, PathBuf>,
+    image_folder: PathBuf,
 }
 
-fn read_labels(
-    labels: &Path,
-    name: &str,
-    path: &Path,
-    size: Option<[u32; 2]>,
-) -> Result<LabelledImage> {
-    let image = image_of(labels, name);
-    let size = match size {
-        Some(size) => size,
-        None => image_size(labels, name, image.as_deref())?,
-    };
-    let truth = read_truth(path, size)?;
-    let picture = image.map(|path| picture_of(path, size));
-    Ok((EvalImage::new(name, truth), size, picture))
+impl LabelFolder {
+    fn open(labels: &Path, images: Option<&Path>) -> Result<Self> {
+        let beside = || io::with_last_step(labels, "labels", "images");
+        let image_folder = images.map_or_else(beside, Path::to_path_buf);
+        Ok(Self {
+            labels: text_files(labels)?,
+            images: picture_files(&image_folder),
+            image_folder,
+        })
+    }
+
+    /// The names of all images, in order.
+    fn names(&self) -> BTreeSet<&String> {
+        self.labels.keys().chain(self.images.keys()).collect()
+    }
+
+    fn read(&self, name: &str, size: Option<[u32; 2]>) -> Result<LabelledImage> {
+        let image = self.images.get(name);
+        let size = match (size, image) {
+            (Some(size), _) => size,
+            (None, Some(image)) => image_size(image)?,
+            (None, None) => return Err(missing_image(&self.image_folder, name)),
+        };
+        let truth = self.labels.get(name).map(|label| read_truth(label, size));
+        let picture = image.map(|path| picture_of(path.clone(), size));
+        let sheet = EvalImage::new(name, truth.transpose()?.unwrap_or_default());
+        Ok((sheet, size, picture))
+    }
 }
 
 fn picture_of(path: PathBuf, size: [u32; 2]) -> Picture {
@@ -164,43 +186,39 @@ fn text_files(folder: &Path) -> Result<BTreeMap<String, PathBuf>> {
     Ok(texts)
 }
 
-/// Where YOLO has the images of a folder of labels.
-fn images_of(labels: &Path) -> PathBuf {
-    let parts: Vec<_> = labels.components().collect();
-    let place = parts.iter().rposition(|part| part.as_os_str() == "labels");
-    parts
-        .iter()
-        .enumerate()
-        .map(|(i, part)| {
-            if Some(i) == place {
-                "images".as_ref()
-            } else {
-                part.as_os_str()
-            }
-        })
-        .collect()
+/// The pictures of a folder by their names without extension; none where there is no folder.
+fn picture_files(folder: &Path) -> BTreeMap<String, PathBuf> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let paths = entries.map(|entry| entry.path());
+    let mut paths: Vec<PathBuf> = paths
+        .filter(|path| Format::from_extension(path).is_some())
+        .collect();
+    // Of one name JPEG and PNG come first, which a page shows as they are.
+    paths.sort_by_cached_key(|path| (!is_jpeg_or_png(path), path.clone()));
+    let mut pictures = BTreeMap::new();
+    for path in paths {
+        let name = path.file_stem().unwrap_or_default();
+        let name = name.to_string_lossy().into_owned();
+        pictures.entry(name).or_insert(path);
+    }
+    pictures
 }
 
-/// The image of a label, beside the labels too.
-fn image_of(labels: &Path, name: &str) -> Option<PathBuf> {
-    let folder = images_of(labels);
-    ["jpg", "png", "jpeg", "exr", "tif"]
-        .map(|ext| folder.join(format!("{name}.{ext}")))
-        .into_iter()
-        .find(|p| p.is_file())
+fn is_jpeg_or_png(path: &Path) -> bool {
+    let format = Format::from_extension(path);
+    matches!(format, Some(Format::Jpeg | Format::Png))
 }
 
-fn image_size(labels: &Path, name: &str, image: Option<&Path>) -> Result<[u32; 2]> {
-    let image = image.ok_or_else(|| missing_image(labels, name))?;
+fn image_size(image: &Path) -> Result<[u32; 2]> {
     let header = io::read_header(image)?;
     Ok([header.width as u32, header.height as u32])
 }
 
-fn missing_image(labels: &Path, name: &str) -> Error {
+fn missing_image(folder: &Path, name: &str) -> Error {
     let what = format!(
-        "no image \"{name}\" (.jpg, .png, ..) to take the size from; give the size instead"
+        "no image \"{name}\" (.jpg, .png, ..) to take the size from; say where the images are, or give the size"
     );
-    Error::file(images_of(labels), what)
+    Error::file(folder, what)
 }
 
 /// A line: class, box in shares of the image, and what stands behind.
@@ -349,7 +367,7 @@ mod tests {
             ("a.txt", "1 0.5 0.5 0.2 0.4\n\n2 0 0 0.5 0 0.5 0.25\n"),
             ("b.txt", ""),
         ]);
-        let truth = read_yolo_truth(labels.path(), Some([100, 200])).unwrap();
+        let truth = read_yolo_truth(labels.path(), None, Some([100, 200])).unwrap();
         assert_eq!(
             truth.sheets[0].truth[0].bbox,
             BBox {
@@ -380,7 +398,7 @@ mod tests {
             ("a.txt", "1 0.5 0.5 0.2 0.4\n"),
             ("b.txt", "0 0.5 0.5 1 1\n"),
         ]);
-        let mut truth = read_yolo_truth(labels.path(), Some([100, 200])).unwrap();
+        let mut truth = read_yolo_truth(labels.path(), None, Some([100, 200])).unwrap();
         let found = folder(&[("b.txt", "0 0.5 0.5 1 1 0.25\n")]);
         read_yolo_detections(found.path(), &mut truth).unwrap();
         assert_eq!(
@@ -396,7 +414,7 @@ mod tests {
     fn bad_lines_are_named() {
         let said = |line: &str| {
             let labels = folder(&[("a.txt", line)]);
-            read_yolo_truth(labels.path(), Some([9, 9]))
+            read_yolo_truth(labels.path(), None, Some([9, 9]))
                 .unwrap_err()
                 .to_string()
         };
@@ -420,7 +438,7 @@ mod tests {
     #[test]
     fn a_detection_for_an_unknown_image_is_refused() {
         let labels = folder(&[("a.txt", "")]);
-        let mut truth = read_yolo_truth(labels.path(), Some([9, 9])).unwrap();
+        let mut truth = read_yolo_truth(labels.path(), None, Some([9, 9])).unwrap();
         let said = read_yolo_detections(folder(&[("c.txt", "")]).path(), &mut truth)
             .unwrap_err()
             .to_string();
@@ -436,13 +454,65 @@ mod tests {
         std::fs::write(root.path().join("labels/val/a.txt"), "0 0.5 0.5 1 1\n").unwrap();
         let labels = root.path().join("labels/val");
         assert!(
-            read_yolo_truth(&labels, None)
+            read_yolo_truth(&labels, None, None)
                 .unwrap_err()
                 .to_string()
                 .contains("to take the size from")
         );
         let image = crate::Image::filled(8, 6, crate::LinearRgb::WHITE);
         io::write(root.path().join("images/val/a.png"), &image).unwrap();
-        assert_eq!(read_yolo_truth(&labels, None).unwrap().sizes, [[8, 6]]);
+        assert_eq!(
+            read_yolo_truth(&labels, None, None).unwrap().sizes,
+            [[8, 6]]
+        );
+    }
+
+    /// A set of photos as a camera and a labelling program leave it: an image in capitals, one
+    /// without objects and so without a label file.
+    fn photo_set(images: &str) -> tempfile::TempDir {
+        let root = tempfile::tempdir().unwrap();
+        for folder in ["labels/val", images] {
+            std::fs::create_dir_all(root.path().join(folder)).unwrap();
+        }
+        let label = root.path().join("labels/val/IMG_1.txt");
+        std::fs::write(label, "0 0.5 0.5 1 1\n").unwrap();
+        let image = crate::Image::filled(8, 6, crate::LinearRgb::WHITE);
+        for name in ["IMG_1.JPG", "IMG_2.tiff", "notes.md"] {
+            let path = root.path().join(images).join(name);
+            match name {
+                "notes.md" => std::fs::write(path, "").unwrap(),
+                _ => io::write(path, &image).unwrap(),
+            }
+        }
+        root
+    }
+
+    #[test]
+    fn an_image_without_a_label_file_shows_nothing_and_can_have_false_alarms() {
+        let root = photo_set("images/val");
+        let mut truth = read_yolo_truth(&root.path().join("labels/val"), None, None).unwrap();
+        let counts: Vec<_> = truth
+            .sheets
+            .iter()
+            .map(|sheet| (sheet.image.as_str(), sheet.truth.len()))
+            .collect();
+        assert_eq!(counts, [("IMG_1", 1), ("IMG_2", 0)]);
+        assert_eq!(truth.sizes, [[8, 6]; 2]);
+        let found = folder(&[("IMG_2.txt", "0 0.5 0.5 1 1 0.25\n")]);
+        read_yolo_detections(found.path(), &mut truth).unwrap();
+        assert_eq!(truth.sheets[1].found.len(), 1);
+    }
+
+    #[test]
+    fn images_may_lie_anywhere() {
+        let root = photo_set("photos");
+        let (labels, images) = (root.path().join("labels/val"), root.path().join("photos"));
+        let said = read_yolo_truth(&labels, None, None)
+            .unwrap_err()
+            .to_string();
+        assert!(said.contains("images/val: no image \"IMG_1\""), "{said}");
+        let truth = read_yolo_truth(&labels, Some(&images), None).unwrap();
+        assert_eq!(truth.sizes, [[8, 6]; 2]);
+        assert!(truth.pictures.iter().all(Option::is_some));
     }
 }

@@ -27,7 +27,8 @@ pub(crate) struct EvalArgs {
     /// Width and height of all images in pixels, for YOLO labels without images beside them
     #[arg(long, value_name = "WxH", value_parser = parse_pixel_size)]
     size: Option<[u32; 2]>,
-    /// Where the images of a COCO document are, if not beside it; for pictures of mistakes
+    /// Where the images are, if not beside the COCO document or where YOLO has them; for pictures of
+    /// mistakes, and for the sizes of YOLO's boxes
     #[arg(long, value_name = "FOLDER")]
     images: Option<PathBuf>,
     /// Detections surer than this count in the confusion and as mistakes
@@ -150,7 +151,7 @@ impl EvalArgs {
         truth: &Path,
         options: &mut EvalReportOptions,
     ) -> petcomp::Result<Vec<EvalImage>> {
-        let mut all = read_yolo_truth(truth, self.size)?;
+        let mut all = read_yolo_truth(truth, self.images.as_deref(), self.size)?;
         read_yolo_detections(found, &mut all)?;
         if options.classes.is_empty() {
             options.classes = dataset_classes(truth).unwrap_or_default();
@@ -167,9 +168,27 @@ fn dataset_classes(labels: &Path) -> Option<Vec<String>> {
     Some(YoloSet::open(folder).ok()?.classes)
 }
 
+/// The name of the file or folder; of the folder around one called `labels`, as YOLO's programs
+/// leave their detections.
 fn run_name(path: &Path) -> String {
-    match path.file_stem() {
-        Some(_) => stem_of(path),
-        None => path.display().to_string(),
+    let run = path.parent().and_then(Path::file_name);
+    match (run, path.file_stem()) {
+        (Some(run), _) if path.ends_with("labels") => run.to_string_lossy().into_owned(),
+        (_, Some(_)) => stem_of(path),
+        _ => path.display().to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_run_is_called_as_its_file_or_the_folder_around_its_labels() {
+        let name = |path: &str| run_name(Path::new(path));
+        assert_eq!(name("runs/r1/labels"), "r1");
+        assert_eq!(name("runs/r1.v2/labels/"), "r1.v2");
+        assert_eq!(name("labels"), "labels");
+        assert_eq!(name("found/coco.json"), "coco");
     }
 }

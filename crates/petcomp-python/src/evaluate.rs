@@ -85,7 +85,7 @@ impl Files {
     }
 
     fn read_yolo(&self, options: &mut EvalReportOptions) -> Result<Vec<EvalImage>> {
-        let mut all = read_yolo_truth(&self.truth, self.size)?;
+        let mut all = read_yolo_truth(&self.truth, None, self.size)?;
         read_yolo_detections(&self.predictions, &mut all)?;
         if options.classes.is_empty() {
             options.classes = dataset_classes(&self.truth).unwrap_or_default();

@@ -197,7 +197,7 @@ impl KitArgs {
 
 fn fit_anchors(args: &AnchorsArgs) -> anyhow::Result<()> {
     let set = YoloSet::open(&args.folder)?;
-    let truth = read_yolo_truth(&train_labels(&set), None)?;
+    let truth = read_yolo_truth(&train_labels(&set), None, None)?;
     let sides = box_sides(&truth, f64::from(args.side));
     print_anchors(&train::anchors(&sides, args.count, args.seed));
     Ok(())

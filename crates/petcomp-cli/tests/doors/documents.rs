@@ -529,7 +529,7 @@ fn evaluated(world: &World, sheets: Vec<eval::EvalImage>) {
 }
 
 fn yolo_eval(world: &World) {
-    let truth = eval::read_yolo_truth(&world.path("dataset/labels/val"), None);
+    let truth = eval::read_yolo_truth(&world.path("dataset/labels/val"), None, None);
     let Some(mut truth) = ends(truth) else { return };
     if ends(eval::read_yolo_detections(&world.path("found"), &mut truth)).is_some() {
         evaluated(world, truth.sheets);
