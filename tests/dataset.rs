@@ -6,11 +6,12 @@
 use petcomp::DeepImage;
 use petcomp::camera::Camera;
 use petcomp::dataset::{
-    ArchiveStore, ContactSheetOptions, DatasetConfig, DatasetCounts, LabelConfig, Obstructed,
-    PictureFormat, Pictures, Pipeline, Plan, Progress, Provenance, Sample, SampleRange,
-    SampleRecord, Shard, Sidecar, Split, SplitOrder, WebDataset, Writer, Yolo, YoloTask, check,
-    contact_sheet_of, generate, merge, repair,
+    ArchiveStore, ContactSheetOptions, DatasetConfig, DatasetCounts, LabelConfig, Listing,
+    Obstructed, Partition, PictureFormat, Pictures, Pipeline, Plan, Progress, Provenance, Sample,
+    SampleRange, SampleRecord, Shard, Sidecar, Split, SplitOrder, WebDataset, Writer, Yolo,
+    YoloSet, YoloTask, check, contact_sheet_of, generate, merge, repair,
 };
+use petcomp::eval::read_yolo_truth_of;
 use petcomp::geom::BBox;
 use petcomp::geom::{Point2, Pose, UnitQuaternion, Vector2};
 use petcomp::label::{Labels, ObjectLabel, RleMask};
@@ -703,6 +704,43 @@ fn an_object_that_nothing_holds_up_is_a_fault_of_its_picture() {
     assert_eq!(found("{}"), [expected]);
     // Nothing falls in a recipe that lays its objects.
     assert!(found(r#"{ "scene": { "settle": { "mode": "flat" } } }"#).is_empty());
+}
+
+/// Rows of the label files of images.
+fn rows_of(images: &[PathBuf]) -> usize {
+    let labels = images.iter().map(|image| YoloSet::label_of(image));
+    labels
+        .map(|label| std::fs::read_to_string(label).unwrap().lines().count())
+        .sum()
+}
+
+#[test]
+fn whoever_reads_a_data_yaml_finds_the_same_images() {
+    let dir = tempfile::tempdir().unwrap();
+    let [made, lists, folders] = ["made", "lists", "folders"].map(|name| dir.path().join(name));
+    make(&plan(&made, 12)).unwrap();
+    let all = Listing::read(&made).unwrap();
+    let halves = all.partitioned(Partition::Consecutive { guard: 0 }, 0.5, 0);
+    halves.unwrap().write(&lists).unwrap();
+    std::fs::create_dir(&folders).unwrap();
+    let yaml = "path: ../made\ntrain: [images/train, images/val]\nval: images/val\nnames: [a, b, c]";
+    std::fs::write(folders.join("data.yaml"), yaml).unwrap();
+    for (folder, counts) in [(lists, [6, 6]), (folders, [12, all.val.len()])] {
+        let (listing, set) = (
+            Listing::read(&folder).unwrap(),
+            YoloSet::open(&folder).unwrap(),
+        );
+        assert_eq!([set.train.len(), set.val.len()], counts);
+        assert_eq!((&set.train, &set.val), (&listing.train, &listing.val));
+        let checked = check(&folder).unwrap();
+        assert_eq!(checked.images, counts[0] + counts[1]);
+        assert_eq!(checked.rows.len(), 3);
+        let rows: usize = checked.rows.iter().sum();
+        assert_eq!(rows, rows_of(&set.train) + rows_of(&set.val));
+        let truth = read_yolo_truth_of(&set.train).unwrap();
+        let boxes: usize = truth.sheets.iter().map(|sheet| sheet.truth.len()).sum();
+        assert_eq!(boxes, rows_of(&set.train));
+    }
 }
 
 #[test]

@@ -22,14 +22,15 @@ pub struct Listing {
 
 impl Listing {
     /// Reads the `data.yaml` of a folder, whose parts are folders of images (in order of name) or
-    /// lists (`.txt`).
+    /// lists (`.txt`), below its `path:`.
     ///
     /// # Errors
     /// No `data.yaml`; a folder or list that cannot be read.
     pub fn read(folder: &Path) -> Result<Self> {
-        let folder = io::absolute(folder)?;
+        let folder = whole_path(folder)?;
         let (yaml, _) = DataYaml::read(&io::read_text(folder.join("data.yaml"))?);
-        let [train, val] = Part::ALL.map(|part| images_of(&folder, yaml.folders(part)));
+        let root = yaml.root(&folder);
+        let [train, val] = Part::ALL.map(|part| images_of(&root, yaml.folders(part)));
         Ok(Self {
             train: train?,
             val: val?,
@@ -64,7 +65,7 @@ impl Listing {
     /// When a file cannot be written.
     pub fn write(&self, folder: &Path) -> Result<()> {
         io::create_folder(folder)?;
-        let folder = io::absolute(folder)?;
+        let folder = whole_path(folder)?;
         for (part, images) in Part::ALL.into_iter().zip([&self.train, &self.val]) {
             write_list(part, images, &folder)?;
         }
@@ -79,28 +80,37 @@ fn compare_names(a: &Path, b: &Path) -> Ordering {
 }
 
 /// The images of the folders or lists of a part.
-fn images_of(folder: &Path, parts: &[String]) -> Result<Vec<PathBuf>> {
+fn images_of(root: &Path, parts: &[String]) -> Result<Vec<PathBuf>> {
     let images: Vec<_> = parts
         .iter()
-        .map(|part| images_in(folder, part))
+        .map(|part| images_in(&place_of(root, part)))
         .collect::<Result<_>>()?;
     Ok(images.concat())
 }
 
+/// Where a folder or list of a part is, for a `data.yaml` with this root.
+pub(crate) fn place_of(root: &Path, part: &str) -> PathBuf {
+    without_dots(&root.join(part))
+}
+
 /// The images of a folder, or those that a list names.
-fn images_in(folder: &Path, part: &str) -> Result<Vec<PathBuf>> {
-    let path = folder.join(part);
-    if part.ends_with(".txt") {
-        listed_images(&path)
+pub(crate) fn images_in(place: &Path) -> Result<Vec<PathBuf>> {
+    if is_list(place) {
+        listed_images(place)
     } else {
-        images_in_folder(&path)
+        images_in_folder(place)
     }
 }
 
+pub(crate) fn is_list(place: &Path) -> bool {
+    place.extension().is_some_and(|e| e == "txt")
+}
+
+/// The lines of a list, below its folder.
 fn listed_images(list: &Path) -> Result<Vec<PathBuf>> {
     let folder = folder_of(list);
     let text = io::read_text(list)?;
-    let lines = text.lines().filter(|line| !line.is_empty());
+    let lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
     Ok(lines.map(|line| without_dots(&folder.join(line))).collect())
 }
 
@@ -138,13 +148,18 @@ fn first_share(images: &[PathBuf], share: f64) -> Vec<PathBuf> {
     images[..(images.len() as f64 * share).round() as usize].to_vec()
 }
 
-/// The same path without `.` and `..`.
+/// A path from the root without `.` and `..`.
+pub(crate) fn whole_path(path: &Path) -> Result<PathBuf> {
+    Ok(without_dots(&io::absolute(path)?))
+}
+
+/// The same path without `.`, and without `..` but for those that lead out of where it begins.
 fn without_dots(path: &Path) -> PathBuf {
     let mut plain = PathBuf::new();
     for step in path.components() {
         match step {
             Component::CurDir => {}
-            Component::ParentDir => drop(plain.pop()),
+            Component::ParentDir if plain.file_name().is_some() => drop(plain.pop()),
             step => plain.push(step),
         }
     }

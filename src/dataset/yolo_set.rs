@@ -1,7 +1,7 @@
 //! A YOLO dataset on disk, of petcomp's or of the user's own: which images, which classes.
 
 use crate::dataset::Part;
-use crate::dataset::paths::folder_of;
+use crate::dataset::listing::{images_in, place_of};
 use crate::dataset::yolo_yaml::DataYaml;
 use crate::error::{Error, Result};
 use crate::io;
@@ -19,8 +19,8 @@ pub struct YoloSet {
 }
 
 impl YoloSet {
-    /// Reads what `FOLDER/data.yaml` names: folders of images, or text files that list them;
-    /// relative to its `path:`, which is relative to the folder.
+    /// Reads what `FOLDER/data.yaml` names: folders of images, or text files that list them, a line
+    /// each, relative to the list; all relative to its `path:`, which is relative to the folder.
     ///
     /// # Errors
     /// [`Error::File`] for a missing `data.yaml`, one without classes, or a part without images.
@@ -49,14 +49,10 @@ impl YoloSet {
 fn images_of(root: &Path, parts: &[String]) -> Result<Vec<PathBuf>> {
     let mut images = Vec::new();
     for part in parts {
-        let path = root.join(part);
-        let found = if path.extension().is_some_and(|e| e == "txt") {
-            listed_in(&path)?
-        } else {
-            images_in(&path)?
-        };
+        let place = place_of(root, part);
+        let found = images_in(&place)?;
         if found.is_empty() {
-            return Err(Error::file(path, "no images, expected at least one"));
+            return Err(Error::file(place, "no images, expected at least one"));
         }
         images.extend(found);
     }
@@ -66,37 +62,6 @@ fn images_of(root: &Path, parts: &[String]) -> Result<Vec<PathBuf>> {
 fn yaml_problem(path: &Path, line: Option<usize>, what: &str) -> Error {
     let line = line.map(|n| format!("line {n}: ")).unwrap_or_default();
     Error::file(path, format!("{line}{what}"))
-}
-
-/// The lines of a list; `./` is the list's own folder, as for YOLOv5.
-fn listed_in(list: &Path) -> Result<Vec<PathBuf>> {
-    let text = io::read_text(list)?;
-    let folder = folder_of(list);
-    let lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
-    Ok(lines
-        .map(|line| {
-            line.strip_prefix("./")
-                .map_or_else(|| line.into(), |below| folder.join(below))
-        })
-        .collect())
-}
-
-fn images_in(folder: &Path) -> Result<Vec<PathBuf>> {
-    let mut images = Vec::new();
-    for entry in std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))? {
-        let path = entry.map_err(|e| Error::file(folder, e))?.path();
-        if is_trainable(&path) {
-            images.push(path);
-        }
-    }
-    images.sort();
-    Ok(images)
-}
-
-/// An image of a format that every trainer reads.
-fn is_trainable(path: &Path) -> bool {
-    let extension = path.extension().unwrap_or_default().to_string_lossy();
-    ["jpg", "jpeg", "png"].contains(&&*extension.to_ascii_lowercase())
 }
 
 #[cfg(test)]

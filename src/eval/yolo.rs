@@ -86,6 +86,25 @@ impl LabelFolder {
     }
 }
 
+/// The truth of images, each with its label where YOLO has it: the same path with its last `images`
+/// replaced by `labels`. An image without a label file shows nothing that is to be found.
+///
+/// # Errors
+/// [`Error::File`] for an image that cannot be read, or a bad line.
+pub fn read_yolo_truth_of(images: &[PathBuf]) -> Result<YoloTruth> {
+    let all = images.par_iter().map(|image| read_image(image));
+    Ok(YoloTruth::from_images(all.collect::<Result<_>>()?))
+}
+
+fn read_image(image: &Path) -> Result<LabelledImage> {
+    let size = image_size(image)?;
+    let label = io::with_last_step(image, "images", "labels").with_extension("txt");
+    let truth = label.exists().then(|| read_truth(&label, size));
+    let name = image.file_stem().unwrap_or_default().to_string_lossy();
+    let sheet = EvalImage::new(name, truth.transpose()?.unwrap_or_default());
+    Ok((sheet, size, Some(picture_of(image.into(), size))))
+}
+
 fn picture_of(path: PathBuf, size: [u32; 2]) -> Picture {
     Picture {
         path,

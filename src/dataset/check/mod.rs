@@ -10,7 +10,7 @@ use crate::dataset::finding::Finding;
 use crate::dataset::folder::JOURNAL;
 use crate::dataset::journal::{NumberedLines, numbered_lines};
 use crate::dataset::journal_line::JournalLine;
-use crate::dataset::listing::is_image;
+use crate::dataset::listing::{images_in, is_list, place_of, whole_path};
 use crate::dataset::near_duplicates::{NEAR_DUPLICATE_RMS, Thumbnail, nearest};
 use crate::dataset::paths::folder_of;
 use crate::dataset::yolo_yaml::DataYaml;
@@ -52,8 +52,8 @@ pub struct CheckedBox {
 /// Checks a YOLO dataset as YOLOv5 and Ultralytics do on loading it, and more strictly where they
 /// only warn.
 ///
-/// * `data.yaml` has `train`, `val` and names, as many as `nc` says, and its folders exist and hold
-///   images;
+/// * `data.yaml` has `train`, `val` and names, as many as `nc` says, and its folders and lists exist
+///   and have images;
 /// * every image decodes to its end and has sides of at least 10 pixels; no two that show something
 ///   have the same bytes;
 /// * no image for validation looks like one for training ([`NEAR_DUPLICATE_RMS`]), unless it shows
@@ -72,6 +72,7 @@ pub fn check(folder: &Path) -> Result<Checked> {
     if !folder.is_dir() {
         return Err(Error::file(folder, "no such folder, expected a dataset"));
     }
+    let folder = &whole_path(folder)?;
     let mut checker = Checker {
         folder,
         findings: Vec::new(),
@@ -123,9 +124,9 @@ fn boxes_of(image: &CheckedImage) -> impl Iterator<Item = CheckedBox> {
 }
 
 /// The label files of a folder of images.
-fn list_labels(dataset: &Path, images: &str) -> Vec<PathBuf> {
-    let label = YoloSet::label_of(&Path::new(images).join("x"));
-    let mut labels = list_files(dataset, &folder_of(&label).to_string_lossy());
+fn list_labels(dataset: &Path, images: &Path) -> Vec<PathBuf> {
+    let label = YoloSet::label_of(&images.join("x"));
+    let mut labels = list_files(dataset, folder_of(&label));
     labels.retain(|path| path.extension().is_some_and(|e| e == "txt"));
     labels
 }
@@ -175,21 +176,30 @@ impl Checker<'_> {
     fn list_images(&mut self, yaml: &DataYaml) -> Vec<(Part, PathBuf)> {
         let mut images = Vec::new();
         for part in Part::ALL {
-            for folder in yaml.folders(part) {
-                let found = self.list_images_in(folder);
+            for place in self.places(yaml, part) {
+                let found = self.list_images_in(&place);
                 images.extend(found.into_iter().map(|path| (part, path)));
             }
         }
         images
     }
 
-    fn list_images_in(&mut self, folder: &str) -> Vec<PathBuf> {
-        let mut found = list_files(self.folder, folder);
-        found.retain(|path| is_image(path));
+    /// The folders and lists of a part.
+    fn places(&self, yaml: &DataYaml, part: Part) -> Vec<PathBuf> {
+        let root = yaml.root(self.folder);
+        let named = yaml.folders(part).iter();
+        named.map(|named| place_of(&root, named)).collect()
+    }
+
+    /// As paths from the dataset's folder; an image that a list names may lie elsewhere.
+    fn list_images_in(&mut self, place: &Path) -> Vec<PathBuf> {
+        let found = images_in(place).unwrap_or_default();
         if found.is_empty() {
-            self.add(folder, Code::NoImages, "no images, expected at least one");
+            let place = io::relative(place, self.folder);
+            self.add(place, Code::NoImages, "no images, expected at least one");
         }
-        found
+        let found = found.iter();
+        found.map(|path| io::relative(path, self.folder)).collect()
     }
 
     /// Images with the bytes of another; images of an empty scene may well be the same.
@@ -221,12 +231,16 @@ impl Checker<'_> {
         }
     }
 
-    /// Label files that belong to no image.
+    /// Label files of the folders of images that belong to no image; a list is a choice.
     fn find_orphan_labels(&mut self, images: &[CheckedImage], yaml: &DataYaml) {
         let wanted = images.iter().map(|image| YoloSet::label_of(&image.path));
         let wanted: BTreeSet<PathBuf> = wanted.collect();
-        for folder in Part::ALL.iter().flat_map(|&part| yaml.folders(part)) {
-            for label in list_labels(self.folder, folder) {
+        let places = Part::ALL
+            .into_iter()
+            .flat_map(|part| self.places(yaml, part));
+        let folders: Vec<PathBuf> = places.filter(|place| !is_list(place)).collect();
+        for folder in folders {
+            for label in list_labels(self.folder, &io::relative(&folder, self.folder)) {
                 if !wanted.contains(&label) {
                     self.add(label, Code::OrphanLabel, "no image of this name");
                 }
@@ -302,14 +316,14 @@ fn thumbnails(images: &[CheckedImage], part: Part) -> (Vec<&CheckedImage>, Vec<T
 }
 
 /// Files of a folder below the dataset's, in order of name; none where it cannot be listed.
-fn list_files(folder: &Path, below: &str) -> Vec<PathBuf> {
+fn list_files(folder: &Path, below: &Path) -> Vec<PathBuf> {
     let Ok(entries) = std::fs::read_dir(folder.join(below)) else {
         return Vec::new();
     };
     let mut files: Vec<PathBuf> = entries
         .flatten()
         .filter(|entry| entry.path().is_file())
-        .map(|entry| Path::new(below).join(entry.file_name()))
+        .map(|entry| below.join(entry.file_name()))
         .collect();
     files.sort();
     files

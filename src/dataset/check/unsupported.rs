@@ -30,7 +30,7 @@ pub(super) fn find(dataset: &Path) -> Vec<Finding> {
 }
 
 fn scene_files(dataset: &Path) -> Vec<PathBuf> {
-    let folders = ["scenes/train", "scenes/val"].iter();
+    let folders = ["scenes/train", "scenes/val"].map(Path::new).into_iter();
     let mut files: Vec<PathBuf> = folders.flat_map(|part| list_files(dataset, part)).collect();
     files.retain(|path| path.extension().is_some_and(|e| e == "json"));
     files

@@ -5,7 +5,7 @@ use crate::print;
 use crate::values::count;
 use clap::value_parser;
 use petcomp::dataset::YoloSet;
-use petcomp::eval::{YoloTruth, read_yolo_truth};
+use petcomp::eval::{YoloTruth, read_yolo_truth_of};
 use petcomp::io;
 use petcomp::train::kit::KitOptions;
 use petcomp::train::{self, Anchors, Balance, Batch, BatchOptions, Source, Weights};
@@ -197,7 +197,7 @@ impl KitArgs {
 
 fn fit_anchors(args: &AnchorsArgs) -> anyhow::Result<()> {
     let set = YoloSet::open(&args.folder)?;
-    let truth = read_yolo_truth(&train_labels(&set), None, None)?;
+    let truth = read_yolo_truth_of(&set.train)?;
     let sides = box_sides(&truth, f64::from(args.side));
     print_anchors(&train::anchors(&sides, args.count, args.seed));
     Ok(())
@@ -211,13 +211,6 @@ fn print_anchors(found: &Anchors) {
         "mean IoU {:.3}, best possible recall {:.4}",
         found.mean_iou, found.best_possible_recall
     ));
-}
-
-/// The folder of the labels for training.
-fn train_labels(set: &YoloSet) -> PathBuf {
-    let label = set.train.first().map(|image| YoloSet::label_of(image));
-    let folder = label.as_deref().and_then(Path::parent);
-    folder.unwrap_or(Path::new("")).into()
 }
 
 /// Width and height of each box, in images whose longer side has `longer_side` pixels.
