@@ -26,8 +26,8 @@ pub(crate) const MIN_SIDE_PX: u32 = 10;
 /// empty file; equal rows are written once; objects that are to be ignored have none.
 ///
 /// `data.yaml` names its folders relative to itself, so the dataset may be moved: Ultralytics looks
-/// for them beside the file; YOLOv5 wants `path:` added, or to be started with the dataset as its
-/// working folder.
+/// for them beside the file; YOLOv5 looks in the folder of its clone, until `path:` is added with
+/// the whole path of the dataset.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Yolo {

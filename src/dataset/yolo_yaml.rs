@@ -56,7 +56,7 @@ impl DataYaml {
     /// The text of a `data.yaml` whose parts lie where `place` says.
     pub(crate) fn write_with(classes: &[String], place: impl Fn(&str) -> String) -> String {
         let mut yaml = String::from(
-            "# Folders are relative to this file. YOLOv5: add a line `path: <this folder>`.\n",
+            "# Folders are relative to this file. YOLOv5: add a line `path: <whole path of this folder>`.\n",
         );
         for part in Part::ALL {
             yaml += &format!("{}: {}\n", part.name(), place(part.name()));

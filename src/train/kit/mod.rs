@@ -83,7 +83,8 @@ const VARIANTS: [Variant; 5] = [
 /// Writes the kit: lists of images, one `VARIANT.yaml` each, `hyp.yaml`, `balance.json`,
 /// `balanced.py`, `commands.sh`.
 ///
-/// Lists hold whole paths, so the kit may be anywhere, but the datasets may not move.
+/// Lists and `path:` are whole paths, since YOLOv5 takes others from the folder of its clone: the
+/// kit may be written anywhere, but then neither it nor the datasets may move.
 ///
 /// # Errors
 /// Those of [`YoloSet::open`] and [`Balance::weights`]; [`Error::Value`] when the two datasets name
@@ -108,9 +109,10 @@ fn write_scripts(folder: &Path, commands: &str) -> Result<()> {
 }
 
 fn write_variants(folder: &Path, classes: &[String]) -> Result<()> {
+    let whole = io::absolute(folder)?;
     for variant in &VARIANTS {
         let path = folder.join(format!("{}.yaml", variant.name));
-        io::write_text(path, &variant.to_yaml(classes))?;
+        io::write_text(path, &variant.to_yaml(&whole, classes))?;
     }
     Ok(())
 }
@@ -161,11 +163,13 @@ fn open_set(folder: &Path) -> Result<YoloSet> {
 }
 
 impl Variant {
-    fn to_yaml(&self, classes: &[String]) -> String {
+    /// With a string of JSON for the kit's folder, which is one of YAML too.
+    fn to_yaml(&self, folder: &Path, classes: &[String]) -> String {
+        let path = serde_json::json!(folder.to_string_lossy());
         let (count, train, val) = (classes.len(), yaml_list(self.train), yaml_list(self.val));
         let names = yaml_names(classes);
         format!(
-            "# `path` is this folder; start the training in it.\npath: .\ntrain:\n{train}val:\n{val}nc: {count}\nnames:\n{names}"
+            "# `path` is this folder.\npath: {path}\ntrain:\n{train}val:\n{val}nc: {count}\nnames:\n{names}"
         )
     }
 }
@@ -263,6 +267,23 @@ mod tests {
         );
         let commands = io::read_text(kit.join("commands.sh")).unwrap();
         assert!(commands.contains("seq 1 6") && commands.contains("--cos-lr"));
+    }
+
+    #[test]
+    fn trainings_find_their_lists_from_any_folder() {
+        let root = tempfile::tempdir().unwrap();
+        let [real, synthetic] =
+            [("real", 2), ("made", 6)].map(|(name, n)| dataset(root.path(), name, n, "[cap]"));
+        let kit = root.path().join("my \"kit\": 1");
+        write(&kit, &KitOptions::new(real, synthetic)).unwrap();
+        for variant in &VARIANTS {
+            let yaml = io::read_text(kit.join(format!("{}.yaml", variant.name))).unwrap();
+            let elsewhere = root.path().join("clone");
+            io::create_folder(&elsewhere).unwrap();
+            io::write_text(elsewhere.join("data.yaml"), &yaml).unwrap();
+            let set = YoloSet::open(&elsewhere).unwrap();
+            assert!(set.train.iter().chain(&set.val).all(|image| image.exists()));
+        }
     }
 
     #[test]
