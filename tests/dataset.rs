@@ -10,6 +10,7 @@ use petcomp::dataset::{
     Obstructed, Partition, PictureFormat, Pictures, Pipeline, Plan, Progress, Provenance, Sample,
     SampleRange, SampleRecord, Shard, Sidecar, Split, SplitOrder, WebDataset, Writer, Yolo,
     YoloSet, YoloTask, check, contact_sheet_of, generate, merge, repair,
+    repair_archives,
 };
 use petcomp::eval::read_yolo_truth_of;
 use petcomp::geom::BBox;
@@ -902,6 +903,40 @@ fn archives_that_are_there_are_not_made_again() {
         e.ends_with("count: the dataset was begun with 30, this run has 31"),
         "{e}"
     );
+}
+
+#[test]
+fn torn_archives_are_found_and_made_again() {
+    let dir = tempfile::tempdir().unwrap();
+    let refused = repair_archives(dir.path(), SampleRange::All).unwrap_err();
+    assert!(refused.to_string().contains("begun before"), "{refused}");
+    make(&archive_plan(dir.path(), 30)).unwrap();
+    let before = bytes(dir.path());
+    let all = before.len() - 1;
+    let archive = |name: &str| dir.path().join("webdataset").join(name);
+    assert_eq!(
+        repair_archives(dir.path(), SampleRange::All).unwrap(),
+        (all, 0)
+    );
+    // Cut off in a file, between two files, before the end, filled up with zeros; empty.
+    let cut = |name: &str, end: usize, zeros: usize| {
+        let mut text = std::fs::read(archive(name)).unwrap();
+        text.truncate(end);
+        text.resize(end + zeros, 0);
+        std::fs::write(archive(name), text).unwrap();
+    };
+    let length = |name: &str| std::fs::metadata(archive(name)).unwrap().len() as usize;
+    cut("train-000000.tar", 700, 0);
+    cut("train-000001.tar", length("train-000001.tar") - 1024, 0);
+    cut("train-000002.tar", length("train-000002.tar") - 512, 0);
+    cut("train-000003.tar", 512, length("train-000003.tar") - 512);
+    cut("val-000000.tar", 0, 0);
+    assert_eq!(
+        repair_archives(dir.path(), SampleRange::All).unwrap(),
+        (all - 5, 5)
+    );
+    make(&archive_plan(dir.path(), 30)).unwrap();
+    assert_eq!(before, bytes(dir.path()));
 }
 
 #[test]

@@ -7,14 +7,41 @@
 use crate::dataset::archive_store::{self, ArchiveStore};
 use crate::dataset::journal::Journal;
 use crate::dataset::run::{Report, check_count};
-use crate::dataset::webdataset::{archive, write_archive};
+use crate::dataset::webdataset::{archive, is_whole, write_archive};
 use crate::dataset::{
-    DatasetCounts, Inputs, Part, Plan, Progress, SampleRange, WebDataset, Written, folder,
+    DatasetCounts, Inputs, Part, Plan, Progress, SampleRange, Split, WebDataset, Written, folder,
 };
 use crate::error::{Error, Result};
 use crate::io;
+use serde::de::DeserializeOwned;
+use serde_json::Value;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+
+/// Takes away the archives of a dataset that are not whole, so that the next run makes them again:
+/// returns how many are whole and how many were not. That run also reads every input file anew.
+///
+/// Whole is one that ends as archives end and has all of its samples; what their files hold has no
+/// checksums there.
+///
+/// # Errors
+/// A folder that holds no dataset of archives, or one that an older petcomp began.
+pub fn repair_archives(folder: &Path, range: SampleRange) -> Result<(usize, usize)> {
+    check_range(range)?;
+    let layout = Layout::of_folder(folder)?;
+    Inputs::forget(folder);
+    let (mut good, mut bad) = (0, 0);
+    let files = layout.numbers(range).flat_map(|n| layout.files(n));
+    for file in files.filter(|file| file.path.exists()) {
+        if is_whole(&file.path, file.samples) {
+            good += 1;
+        } else {
+            std::fs::remove_file(&file.path).map_err(|e| Error::file(&file.path, e))?;
+            bad += 1;
+        }
+    }
+    Ok((good, bad))
+}
 
 /// Makes a dataset of files.
 type MakeFiles<'a> = &'a dyn Fn(&Plan, Report) -> Result<DatasetCounts>;
@@ -58,10 +85,82 @@ fn parent(path: &Path) -> &Path {
     path.parent().unwrap_or(path)
 }
 
+/// Which samples each archive of a dataset holds.
+struct Layout<'a> {
+    folder: &'a Path,
+    archives: WebDataset,
+    /// Of all samples.
+    count: u64,
+    split: Split,
+}
+
+/// One file of an archive: the samples of one part.
+struct ArchiveFile {
+    part: Part,
+    path: PathBuf,
+    /// At least one.
+    samples: u64,
+}
+
+impl<'a> Layout<'a> {
+    /// As a dataset that was begun before says it.
+    fn of_folder(folder: &'a Path) -> Result<Self> {
+        let before = folder::begun(folder)?;
+        let layout = Self::of_identity(folder, &before);
+        layout.map_err(|e| e.in_file(folder::identity_file(folder)))
+    }
+
+    fn of_identity(folder: &'a Path, identity: &Value) -> Result<Self> {
+        let writers = identity["writers"].as_array().into_iter().flatten();
+        let archives = writers
+            .filter_map(|writer| writer.get("webdataset"))
+            .next_back();
+        let layout = Self {
+            folder,
+            archives: value_of("webdataset", archives)?,
+            count: value_of("count", identity.get("count"))?,
+            split: value_of("split", identity.get("split"))?,
+        };
+        layout.archives.check()?;
+        check_count(layout.count)?;
+        Ok(layout)
+    }
+
+    /// The archives of a range: all, or a machine's share.
+    fn numbers(&self, range: SampleRange) -> impl Iterator<Item = u64> + use<> {
+        range.below(self.count.div_ceil(self.archives.samples))
+    }
+
+    fn span(&self, number: u64) -> (u64, u64) {
+        self.archives.span(number, self.count)
+    }
+
+    /// The file of each part that has a sample in an archive.
+    fn files(&self, number: u64) -> impl Iterator<Item = ArchiveFile> {
+        let files = Part::ALL.map(|part| ArchiveFile {
+            part,
+            path: archive(self.folder, part, number),
+            samples: self.samples_of(part, number),
+        });
+        files.into_iter().filter(|file| file.samples > 0)
+    }
+
+    fn samples_of(&self, part: Part, number: u64) -> u64 {
+        let (first, end) = self.span(number);
+        let is_of_part = |k: &u64| self.split.part(*k, self.count) == part;
+        (first..end).filter(is_of_part).count() as u64
+    }
+}
+
+fn value_of<T: DeserializeOwned>(name: &str, value: Option<&Value>) -> Result<T> {
+    let value = value.cloned().unwrap_or_default();
+    serde_json::from_value(value).map_err(|e| Error::value(name, e))
+}
+
 /// What one run has done so far.
 struct ArchiveRun<'a> {
     plan: &'a Plan,
-    archives: WebDataset,
+    layout: Layout<'a>,
     /// Numbers of the archives that are whole.
     present: BTreeSet<u64>,
     /// In archives that are whole.
@@ -74,7 +173,12 @@ impl<'a> ArchiveRun<'a> {
     fn new(plan: &'a Plan, archives: WebDataset) -> Result<Self> {
         let mut run = Self {
             plan,
-            archives,
+            layout: Layout {
+                folder: &plan.folder,
+                archives,
+                count: plan.count,
+                split: plan.split,
+            },
             present: BTreeSet::new(),
             progress: Progress::default(),
             made: DatasetCounts::new(&[], plan, plan.count, 0),
@@ -92,7 +196,7 @@ impl<'a> ArchiveRun<'a> {
             return Ok(self.numbers().filter(|n| present.contains(n)).collect());
         }
         io::create_folder(parent(&archive(&self.plan.folder, Part::Train, 0)))?;
-        let is_whole = |&number: &u64| self.files(number).all(|(_, path)| path.exists());
+        let is_whole = |&number: &u64| self.layout.files(number).all(|file| file.path.exists());
         Ok(self.numbers().filter(is_whole).collect())
     }
 
@@ -102,8 +206,7 @@ impl<'a> ArchiveRun<'a> {
 
     /// The archives that this run is to make: all, or a machine's share.
     fn numbers(&self) -> impl Iterator<Item = u64> + use<> {
-        let count = self.plan.count.div_ceil(self.archives.samples);
-        self.plan.range.below(count)
+        self.layout.numbers(self.plan.range)
     }
 
     fn missing(&self) -> Vec<u64> {
@@ -114,17 +217,8 @@ impl<'a> ArchiveRun<'a> {
 
     /// Samples of an archive.
     fn size(&self, number: u64) -> u64 {
-        let (first, end) = self.archives.span(number, self.plan.count);
+        let (first, end) = self.layout.span(number);
         end - first
-    }
-
-    /// The file of each part that has a sample in an archive.
-    fn files(&self, number: u64) -> impl Iterator<Item = (Part, PathBuf)> {
-        let (first, end) = self.archives.span(number, self.plan.count);
-        let (split, count) = (self.plan.split, self.plan.count);
-        let parts = Part::ALL.into_iter();
-        let parts = parts.filter(move |&part| (first..end).any(|k| split.part(k, count) == part));
-        parts.map(move |part| (part, archive(&self.plan.folder, part, number)))
     }
 
     /// Makes an archive, or goes on with it.
@@ -146,7 +240,7 @@ impl<'a> ArchiveRun<'a> {
 
     /// The plan for the samples of one archive.
     fn plan_of(&self, number: u64) -> Plan {
-        let (first, end) = self.archives.span(number, self.plan.count);
+        let (first, end) = self.layout.span(number);
         Plan {
             folder: self.plan.folder.join(format!(".archive-{number:06}")),
             range: SampleRange::Span(first, end),
@@ -172,7 +266,7 @@ impl<'a> ArchiveRun<'a> {
         let lines = Journal::open(&plan.folder)?.close(plan.count)?;
         let samples: Vec<Written> = lines.iter().map(|line| line.written()).collect();
         let mut packed = Vec::new();
-        for (part, path) in self.files(number) {
+        for ArchiveFile { part, path, .. } in self.layout.files(number) {
             let of_part: Vec<_> = samples.iter().filter(|s| s.part == part).collect();
             let aside = plan.folder.join(part.name()).with_extension("tar");
             write_archive(&aside, &plan.folder, &of_part)?;
@@ -206,15 +300,11 @@ impl<'a> ArchiveRun<'a> {
 
     /// What is there now; objects are counted in what this run has made.
     fn counts(self) -> DatasetCounts {
-        let (split, count) = (self.plan.split, self.plan.count);
-        let is_val = |k: &u64| split.part(*k, count) == Part::Val;
-        let spans = self.present.iter().map(|&n| self.archives.span(n, count));
+        let present = self.present.iter();
         DatasetCounts {
             images: self.progress.done,
-            val: spans
-                .map(|(first, end)| (first..end).filter(is_val).count() as u64)
-                .sum(),
-            for_trainers: DatasetCounts::new(&[], self.plan, count, 0).for_trainers,
+            val: present.map(|&n| self.layout.samples_of(Part::Val, n)).sum(),
+            for_trainers: DatasetCounts::new(&[], self.plan, self.plan.count, 0).for_trainers,
             ..self.made
         }
     }

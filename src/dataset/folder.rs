@@ -115,12 +115,18 @@ pub(super) fn identity_file(folder: &Path) -> PathBuf {
 
 /// Claims the folder of a dataset that was begun before.
 pub(crate) fn reclaim(folder: &Path) -> Result<Claim> {
-    let before = identity(folder)?.ok_or_else(|| not_begun(folder))?;
-    io::refuse_links(folder)?;
-    of_this_format(&before, folder)?;
+    begun(folder)?;
     Ok(Claim {
         _lock: lock(folder)?,
     })
+}
+
+/// What a dataset that was begun before is made from.
+pub(crate) fn begun(folder: &Path) -> Result<Value> {
+    let before = identity(folder)?.ok_or_else(|| not_begun(folder))?;
+    io::refuse_links(folder)?;
+    of_this_format(&before, folder)?;
+    Ok(before)
 }
 
 fn not_begun(folder: &Path) -> Error {

@@ -74,6 +74,8 @@ mod yolo_yaml;
 
 #[doc(hidden)]
 pub use archive_store::ArchiveStore;
+#[doc(hidden)]
+pub use archives::repair_archives;
 pub use check::{Checked, check};
 pub use coco::Coco;
 #[doc(hidden)]

@@ -6,7 +6,7 @@ use crate::io;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::fs::File;
-use std::io::Write;
+use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
 /// Writes `webdataset/{train,val}-NNNNNN.tar`, each with the files of a span of numbers: at the
@@ -97,6 +97,40 @@ impl WebDataset {
 /// Writes an archive of samples whose files lie in a folder.
 pub(super) fn write_archive(path: &Path, folder: &Path, samples: &[&Written]) -> Result<()> {
     io::write_through(path, |out| pack(out, folder, samples))
+}
+
+/// Whether an archive has so many samples and ends behind the last of their files.
+pub(super) fn is_whole(path: &Path, samples: u64) -> bool {
+    path.is_file() && samples_in(path).is_ok_and(|found| found == Some(samples))
+}
+
+/// Samples in an archive, none of one that does not end as it was written to.
+fn samples_in(path: &Path) -> std::io::Result<Option<u64>> {
+    let file = File::open(path)?;
+    let bytes = file.metadata()?.len();
+    let (mut keys, mut end) = (BTreeSet::new(), 0);
+    for entry in tar::Archive::new(file).entries_with_seek()? {
+        let entry = entry?;
+        end = end_of(&entry);
+        keys.insert(key_of(&entry.path_bytes()).to_vec());
+    }
+    // Two blocks of zeros.
+    let is_complete = bytes == end.saturating_add(2 * BLOCK_BYTES);
+    Ok(is_complete.then_some(keys.len() as u64))
+}
+
+/// Archives are made of such blocks.
+const BLOCK_BYTES: u64 = 512;
+
+fn end_of(entry: &tar::Entry<'_, impl Read>) -> u64 {
+    let blocks = entry.size().div_ceil(BLOCK_BYTES);
+    let bytes = blocks.saturating_mul(BLOCK_BYTES);
+    entry.raw_file_position().saturating_add(bytes)
+}
+
+/// What the names of a sample's files begin with.
+fn key_of(name: &[u8]) -> &[u8] {
+    name.split(|&byte| byte == b'.').next().unwrap_or(name)
 }
 
 /// Where an archive of a dataset is.

@@ -9,9 +9,9 @@ use crate::global::GlobalArgs;
 use crate::interruption::interruption;
 use crate::print;
 use clap::builder::{OsStringValueParser, TypedValueParser};
-use petcomp::Quality;
 use petcomp::dataset::{self, DatasetConfig, Pipeline, Plan};
 use petcomp::dataset::{SampleRange, ShardChoice};
+use petcomp::{Error, Quality};
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
@@ -38,7 +38,7 @@ pub(crate) struct GenerateArgs {
     #[arg(long)]
     quality: Option<Quality>,
     /// Go on with a dataset that was begun before: refuse a new folder, and check every file
-    /// against its checksum, inputs too
+    /// against its checksum (archives have none: whether they are whole), inputs too
     #[arg(long)]
     resume: bool,
     /// Make only image K, whether it is there or not
@@ -61,8 +61,8 @@ pub(crate) fn run(args: &GenerateArgs, global: &GlobalArgs) -> anyhow::Result<()
     let (config, range) = (args.config()?, args.sample_range()?);
     let archives = config.labels.archives();
     let folder = range.folder(&args.output.folder(args.scratch.as_deref()), archives);
-    if args.resume && archives.is_none() {
-        repair_folder(&folder)?;
+    if args.resume {
+        args.repair(&folder, range, archives.is_some())?;
     }
     let pipeline = Pipeline::open(config)?.stopped_by(interruption());
     let plan = args.plan(&pipeline, range, &folder)?;
@@ -79,6 +79,18 @@ pub(crate) fn run(args: &GenerateArgs, global: &GlobalArgs) -> anyhow::Result<()
 }
 
 impl GenerateArgs {
+    /// Has what is damaged made again.
+    fn repair(&self, folder: &Path, range: SampleRange, archives: bool) -> petcomp::Result<()> {
+        match &self.output {
+            Output::Folder(_) if archives => repair_archives(folder, range),
+            Output::Folder(_) => repair_folder(folder),
+            Output::Store(_) => Err(Error::value(
+                "resume",
+                "an object store, expected a folder: what has a receipt there is whole",
+            )),
+        }
+    }
+
     /// The recipe as the flags change it.
     fn config(&self) -> anyhow::Result<DatasetConfig> {
         let config = at_quality(self.quality, self.recipe.read_config()?);
@@ -122,6 +134,15 @@ fn repair_folder(folder: &Path) -> petcomp::Result<()> {
     let (good, bad) = dataset::repair(folder)?;
     print::line(format_args!(
         "{}: {good} images are as they were written, {bad} are made again",
+        folder.display()
+    ));
+    Ok(())
+}
+
+fn repair_archives(folder: &Path, range: SampleRange) -> petcomp::Result<()> {
+    let (good, bad) = dataset::repair_archives(folder, range)?;
+    print::line(format_args!(
+        "{}: {good} archives are whole, {bad} are made again",
         folder.display()
     ));
     Ok(())
