@@ -5,12 +5,12 @@
 
 use petcomp::DeepImage;
 use petcomp::camera::Camera;
+use petcomp::dataset::index::DatasetIndex;
 use petcomp::dataset::{
     ArchiveStore, ContactSheetOptions, DatasetConfig, DatasetCounts, LabelConfig, Listing,
     Obstructed, Partition, PictureFormat, Pictures, Pipeline, Plan, Progress, Provenance, Sample,
-    SampleRange, SampleRecord, Shard, Sidecar, Split, SplitOrder, WebDataset, Writer, Yolo,
-    YoloSet, YoloTask, check, contact_sheet_of, generate, merge, repair,
-    repair_archives,
+    SampleRange, SampleRecord, Shard, Sidecar, Split, SplitOrder, Summary, WebDataset, Writer,
+    Yolo, YoloSet, YoloTask, check, contact_sheet_of, generate, merge, repair, repair_archives,
 };
 use petcomp::eval::read_yolo_truth_of;
 use petcomp::geom::BBox;
@@ -707,6 +707,52 @@ fn an_object_that_nothing_holds_up_is_a_fault_of_its_picture() {
     assert!(found(r#"{ "scene": { "settle": { "mode": "flat" } } }"#).is_empty());
 }
 
+fn sorted(classes: impl Iterator<Item = u32>) -> Vec<u32> {
+    let mut classes: Vec<u32> = classes.collect();
+    classes.sort_unstable();
+    classes
+}
+
+#[test]
+fn readers_of_records_see_the_labels_that_were_written() {
+    for policy in [
+        Obstructed::Drop,
+        Obstructed::Keep,
+        Obstructed::Ignore,
+        Obstructed::Class,
+    ] {
+        let dir = tempfile::tempdir().unwrap();
+        let plain = plan(dir.path(), 8);
+        make(&Plan {
+            obstructed: policy,
+            classes: policy.classes(&plain.classes).unwrap(),
+            ..plain
+        })
+        .unwrap();
+        let summary = Summary::read(dir.path()).unwrap();
+        let index = DatasetIndex::open(dir.path()).unwrap();
+        for (row, sample) in summary.glances.iter().enumerate() {
+            let label = YoloSet::label_of(&dir.path().join(&sample.files[0]));
+            let text = std::fs::read_to_string(label).unwrap();
+            let class = |line: &str| line.split(' ').next().unwrap().parse().unwrap();
+            let written = sorted(text.lines().map(class));
+            let summarised = sorted(sample.labels.iter().map(|(class, _)| *class));
+            let facts = index.facts(row).unwrap();
+            let labelled = facts.objects.iter().filter(|object| object.labelled);
+            let in_brief = sorted(labelled.map(|object| object.class));
+            let record = index.record(row).unwrap().unwrap();
+            let objects = record.labels.objects.iter();
+            let labelled = objects.filter(|object| record.labelled.contains(&object.id));
+            let in_full = sorted(labelled.map(|object| object.class));
+            assert_eq!(
+                [summarised, in_brief, in_full],
+                [(); 3].map(|()| written.clone()),
+                "{policy:?}"
+            );
+        }
+    }
+}
+
 /// Rows of the label files of images.
 fn rows_of(images: &[PathBuf]) -> usize {
     let labels = images.iter().map(|image| YoloSet::label_of(image));
@@ -724,7 +770,8 @@ fn whoever_reads_a_data_yaml_finds_the_same_images() {
     let halves = all.partitioned(Partition::Consecutive { guard: 0 }, 0.5, 0);
     halves.unwrap().write(&lists).unwrap();
     std::fs::create_dir(&folders).unwrap();
-    let yaml = "path: ../made\ntrain: [images/train, images/val]\nval: images/val\nnames: [a, b, c]";
+    let yaml =
+        "path: ../made\ntrain: [images/train, images/val]\nval: images/val\nnames: [a, b, c]";
     std::fs::write(folders.join("data.yaml"), yaml).unwrap();
     for (folder, counts) in [(lists, [6, 6]), (folders, [12, all.val.len()])] {
         let (listing, set) = (

@@ -1,10 +1,10 @@
 //! A sheet of small pictures with their labels: the first look at a dataset.
 
 use crate::color::to_srgb8;
-use crate::dataset::SampleRecord;
 use crate::dataset::folder;
 use crate::dataset::journal::lines_of;
 use crate::dataset::journal_line::JournalLine;
+use crate::dataset::{Labelling, SampleRecord};
 use crate::draw::{self, TextSize};
 use crate::error::Result;
 use crate::filter::resize;
@@ -142,12 +142,17 @@ pub fn contact_sheet_of(
     most: usize,
     options: &ContactSheetOptions,
 ) -> Result<Image<Srgb8>> {
-    let classes = folder::known_classes(&folder::known_identity(folder)?);
+    let identity = folder::known_identity(folder)?;
+    let classes = folder::known_classes(&identity);
+    let labelling = Labelling::of_identity(&identity);
     let lines = lines_of(folder)?;
     let shown = most.min(lines.len());
     let tiles: Vec<ContactTile> = (0..shown)
         .into_par_iter()
-        .map(|i| read_tile(folder, &lines[i * lines.len() / shown], options))
+        .map(|i| {
+            let line = &lines[i * lines.len() / shown];
+            read_tile(folder, line, labelling, options.picture_width)
+        })
         .collect::<Result<_>>()?;
     Ok(contact_sheet(&tiles, &classes, options))
 }
@@ -155,12 +160,14 @@ pub fn contact_sheet_of(
 fn read_tile(
     folder: &Path,
     line: &JournalLine,
-    options: &ContactSheetOptions,
+    labelling: Labelling,
+    width: usize,
 ) -> Result<ContactTile> {
     let picture = io::read::<LinearRgb>(line.file(folder, "images/")?)?;
     let record: SampleRecord = io::read_json(line.file(folder, "scenes/")?)?;
+    let record = record.into_labelled(labelling);
     let caption = tile_caption(line, &record);
-    let (labels, labelled, width) = (record.labels, record.labelled, options.picture_width);
+    let (labels, labelled) = (record.labels, record.labelled);
     Ok(ContactTile::new(&picture, labels, labelled, caption, width))
 }
 

@@ -8,10 +8,11 @@ use crate::dataset::journal::lines_of;
 use crate::dataset::journal_line::JournalLine;
 use crate::dataset::page::labelled_pictures::{LabelledPicture, listed_images, shares_of};
 use crate::dataset::page::outlier::{Feature, outliers};
-use crate::dataset::{JOURNAL, Part, SampleRecord};
+use crate::dataset::{JOURNAL, Labelling, Part, SampleRecord};
 use crate::error::{Error, Result};
 use crate::geom::BBox;
 use crate::io;
+use crate::label::{ObjectLabel, Truncation};
 use crate::pixel::ObjectId;
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
@@ -26,6 +27,7 @@ pub struct DatasetIndex {
     pub classes: Vec<String>,
     /// The pictures, in order.
     pub pictures: Vec<IndexedPicture>,
+    labelling: Labelling,
 }
 
 /// A picture that nobody has opened.
@@ -113,6 +115,7 @@ impl DatasetIndex {
             folder: folder.into(),
             classes,
             pictures: images.into_iter().map(IndexedPicture::found).collect(),
+            labelling: Labelling::default(),
         })
     }
 
@@ -123,6 +126,7 @@ impl DatasetIndex {
         Ok(Self {
             folder: folder.into(),
             classes: folder::known_classes(&identity),
+            labelling: Labelling::of_identity(&identity),
             pictures: pictures.collect::<Option<_>>().ok_or_else(|| {
                 Error::file(folder.join(JOURNAL), "a sample without picture or record")
             })?,
@@ -150,7 +154,7 @@ impl DatasetIndex {
         match &picture.written {
             Some(written) => {
                 let brief: BriefRecord = io::read_json(io::inside(&self.folder, &written.record)?)?;
-                Ok(brief.facts())
+                Ok(brief.facts(self.labelling))
             }
             None => Ok(PictureFacts::from_boxes(self.boxes(row)?)),
         }
@@ -162,8 +166,11 @@ impl DatasetIndex {
     /// A record that cannot be read.
     pub fn record(&self, row: usize) -> Result<Option<SampleRecord>> {
         let written = self.pictures[row].written.as_ref();
-        let read = written.map(|written| io::read_json(io::inside(&self.folder, &written.record)?));
-        read.transpose()
+        let read = |written: &WrittenPicture| {
+            let record: SampleRecord = io::read_json(io::inside(&self.folder, &written.record)?)?;
+            Ok(record.into_labelled(self.labelling))
+        };
+        written.map(read).transpose()
     }
 
     /// The boxes of a picture from elsewhere: class, centre, width and height as shares of the
@@ -304,6 +311,8 @@ impl PictureFacts {
 #[derive(Deserialize)]
 struct BriefRecord {
     labelled: Vec<ObjectId>,
+    #[serde(default)]
+    topmost: Vec<ObjectId>,
     labels: BriefLabels,
     drawn: BriefScene,
 }
@@ -323,6 +332,8 @@ struct BriefObject {
     visible_fraction: f64,
     #[serde(default)]
     amodal_box: BBox,
+    #[serde(default)]
+    truncation: Option<Truncation>,
 }
 
 #[derive(Deserialize)]
@@ -332,20 +343,39 @@ struct BriefScene {
 }
 
 impl BriefRecord {
-    fn facts(self) -> PictureFacts {
-        let object = |object: &BriefObject| ObjectFacts {
-            class: object.class,
-            labelled: self.labelled.contains(&object.id),
-            visible: Some(object.visible_fraction as f32),
-            bbox: shares_of(&object.amodal_box, self.labels.image.map(f64::from))
-                .map(|share| share as f32),
-        };
+    fn facts(self, labelling: Labelling) -> PictureFacts {
+        let objects = self.labels.objects.iter();
         PictureFacts {
-            objects: self.labels.objects.iter().map(object).collect(),
+            objects: objects
+                .map(|object| self.object_facts(object, labelling))
+                .collect(),
             distractors: self.labels.distractors.len(),
             background: self.drawn.plate,
             is_labelled: true,
         }
+    }
+
+    fn object_facts(&self, object: &BriefObject, labelling: Labelling) -> ObjectFacts {
+        let bbox = shares_of(&object.amodal_box, self.labels.image.map(f64::from));
+        let class = self.labelled_class(object, labelling);
+        ObjectFacts {
+            class: class.unwrap_or(object.class),
+            labelled: class.is_some(),
+            visible: Some(object.visible_fraction as f32),
+            bbox: bbox.map(|share| share as f32),
+        }
+    }
+
+    /// None for an object without a label.
+    fn labelled_class(&self, object: &BriefObject, labelling: Labelling) -> Option<u32> {
+        let label = ObjectLabel {
+            class: object.class,
+            obstructed: Some(!self.topmost.contains(&object.id)),
+            truncation: object.truncation,
+            ..ObjectLabel::default()
+        };
+        let has_label = self.labelled.contains(&object.id);
+        has_label.then(|| labelling.class_of(&label)).flatten()
     }
 }
 

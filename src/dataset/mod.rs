@@ -110,6 +110,7 @@ pub use merge::merge;
 pub use mot::Mot;
 #[doc(hidden)]
 pub use near_duplicates::{NEAR_DUPLICATE_RMS, NearDuplicate};
+pub(crate) use obstructed::Labelling;
 pub use obstructed::{LabelledObject, Obstructed};
 #[doc(hidden)]
 pub use partition::{Group, Leakage, Partition};

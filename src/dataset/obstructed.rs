@@ -1,9 +1,11 @@
 //! What happens to obstructed objects.
 
 use crate::dataset::Extent;
+use crate::dataset::folder::known_classes;
 use crate::error::{Error, Result};
 use crate::label::{Labels, ObjectLabel};
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 /// Name of the class of [`Obstructed::Class`].
 pub(crate) const OBSTRUCTED: &str = "obstructed";
@@ -93,6 +95,41 @@ impl Obstructed {
                 ..plain
             }),
         }
+    }
+}
+
+/// How a dataset labels its objects: for readers of its records, where objects have their own
+/// classes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Labelling {
+    obstructed: Obstructed,
+    class_count: usize,
+}
+
+/// Every object as its record has it.
+impl Default for Labelling {
+    fn default() -> Self {
+        Self {
+            obstructed: Obstructed::Keep,
+            class_count: 0,
+        }
+    }
+}
+
+impl Labelling {
+    /// As the identity of a dataset says.
+    pub(crate) fn of_identity(identity: &Value) -> Self {
+        let obstructed = serde_json::from_value(identity["obstructed"].clone());
+        Self {
+            obstructed: obstructed.unwrap_or(Obstructed::Keep),
+            class_count: known_classes(identity).len(),
+        }
+    }
+
+    /// Class that an object with a label is labelled as; none where it is to be ignored.
+    pub(crate) fn class_of(self, object: &ObjectLabel) -> Option<u32> {
+        let label = self.obstructed.label(object, self.class_count)?;
+        (!label.ignored).then_some(label.class)
     }
 }
 

@@ -1,7 +1,7 @@
 //! Everything known of a sample, one JSON file beside each image.
 
 use crate::dataset::paths::create_part_folders;
-use crate::dataset::{Entry, Part, Provenance, Writer};
+use crate::dataset::{Entry, Labelling, Part, Provenance, Writer};
 use crate::error::Result;
 use crate::io;
 use crate::label::{Labels, cyclic_overlaps};
@@ -89,6 +89,23 @@ impl SampleRecord {
             drawn: provenance.drawn.clone(),
             scene: provenance.scene.clone(),
         }
+    }
+}
+
+impl SampleRecord {
+    /// With the classes that objects are labelled as; those that are to be ignored are among the
+    /// objects without a label.
+    pub(crate) fn into_labelled(mut self, labelling: Labelling) -> Self {
+        for object in &mut self.labels.objects {
+            if !self.labelled.contains(&object.id) {
+                continue;
+            }
+            match labelling.class_of(object) {
+                Some(class) => object.class = class,
+                None => self.labelled.retain(|&id| id != object.id),
+            }
+        }
+        self
     }
 }
 

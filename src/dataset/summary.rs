@@ -5,7 +5,7 @@ use crate::dataset::folder;
 use crate::dataset::journal::lines_of;
 use crate::dataset::journal_line::JournalLine;
 use crate::dataset::times::{RunTimes, runs_of};
-use crate::dataset::{Part, SampleRecord};
+use crate::dataset::{Labelling, Part, SampleRecord};
 use crate::error::Result;
 use crate::geom::BBox;
 use crate::io;
@@ -133,9 +133,13 @@ impl Summary {
         let mut summary = Self::empty(folder)?;
         let lines = lines_of(folder)?;
         summary.images = Part::ALL.map(|part| count_in_part(&lines, part));
+        let labelling = Labelling::of_identity(&summary.identity);
         // In batches, so that no more records are in memory than threads can read at a time.
         for batch in lines.chunks(RECORDS_PER_BATCH) {
-            for (sample, line) in read_samples(folder, batch)?.into_iter().zip(batch) {
+            for (sample, line) in read_samples(folder, batch, labelling)?
+                .into_iter()
+                .zip(batch)
+            {
                 summary.add(&sample, line);
                 summary.glances.push(SampleSummary::new(sample));
             }
@@ -170,9 +174,10 @@ impl Summary {
     /// A record that cannot be read.
     pub fn shown(&self, folder: &Path, place: usize) -> Result<ShownSample> {
         let [picture, record] = &self.glances[place].files;
+        let record: SampleRecord = io::read_json(folder.join(record))?;
         Ok(ShownSample {
             picture: folder.join(picture),
-            record: io::read_json(folder.join(record))?,
+            record: record.into_labelled(Labelling::of_identity(&self.identity)),
         })
     }
 
@@ -284,11 +289,12 @@ impl SampleSummary {
 const RECORDS_PER_BATCH: usize = 256;
 
 impl ReadSample {
-    fn read(folder: &Path, line: &JournalLine) -> Result<Self> {
+    fn read(folder: &Path, line: &JournalLine, labelling: Labelling) -> Result<Self> {
+        let record: SampleRecord = io::read_json(line.file(folder, "scenes/")?)?;
         Ok(Self {
             k: line.k,
             part: line.part,
-            record: io::read_json(line.file(folder, "scenes/")?)?,
+            record: record.into_labelled(labelling),
             files: own_files(folder, line)?,
         })
     }
@@ -351,10 +357,14 @@ fn least_visible(objects: &[&ObjectLabel]) -> f64 {
     visible.fold(1.0, f64::min)
 }
 
-fn read_samples(folder: &Path, lines: &[JournalLine]) -> Result<Vec<ReadSample>> {
+fn read_samples(
+    folder: &Path,
+    lines: &[JournalLine],
+    labelling: Labelling,
+) -> Result<Vec<ReadSample>> {
     lines
         .par_iter()
-        .map(|line| ReadSample::read(folder, line))
+        .map(|line| ReadSample::read(folder, line, labelling))
         .collect()
 }
 
