@@ -7,6 +7,7 @@ checkpoint; what was found stands in `predictions/ROOM/NAME.txt` beside the file
 `training.done.json` is written last.
 """
 
+import functools
 import json
 import random
 import sys
@@ -175,6 +176,8 @@ class Streams(torch.utils.data.Sampler):
     def stream(self, name, count, first, length):
         return [self.shuffled(name, count, at // count)[at % count] for at in range(first, first + length)]
 
+    # Every index asks for the whole pass that it is in.
+    @functools.cache
     def shuffled(self, name, count, turn):
         rng = random.Random(f"{self.training['seed']} {name} {turn}")
         return rng.sample(range(count), count)
