@@ -1,10 +1,11 @@
 """What detectors found, beside `results.csv`: results outlive the cache, and join those of other machines."""
 
 import csv
+import io
 
 import numpy as np
 
-from . import score
+from . import files, score
 
 FILE = "matches.npz"
 
@@ -17,7 +18,9 @@ def write(folder, matches):
             for room, classes in rooms.items():
                 for k, one in enumerate(classes):
                     arrays |= packed(f"{arm}/{seed}/{room}/{k}", one)
-    np.savez_compressed(folder / FILE, **arrays)
+    packed_arrays = io.BytesIO()
+    np.savez_compressed(packed_arrays, **arrays)
+    files.write_bytes(folder / FILE, packed_arrays.getvalue())
 
 
 def packed(name, one):
@@ -37,11 +40,23 @@ def read(folder):
         arm, seed, room, _ = name.split("/")
         _, rooms = known.setdefault((arm, int(seed)), ([], {}))
         rooms.setdefault(room, []).append(one)
-    with open(folder / "results.csv", newline="") as file:
-        for row in csv.DictReader(file):
-            row |= {"seed": int(row["seed"]), "room": int(row["room"]), "cpu_seconds": float(row["cpu_seconds"])}
-            known.get((row["arm"], row["seed"]), ([], {}))[0].append(row)
+    for row in rows(folder):
+        known.get((row["arm"], row["seed"]), ([], {}))[0].append(row)
     return known
+
+
+def rows(folder):
+    """Those of `results.csv`, if it is there."""
+    path = folder / "results.csv"
+    if not path.exists():
+        return []
+    with open(path, newline="") as file:
+        return [row | numbers(row) for row in csv.DictReader(file)]
+
+
+def numbers(row):
+    return {key: int(row[key]) for key in ("seed", "room")} | {"cpu_seconds": float(row["cpu_seconds"])}
+
 
 
 def unpacked(arrays):

@@ -8,9 +8,13 @@ CLASSES = ["cap_label", "cap", "label", "none"]
 
 
 def write_text(path, text):
+    return write_bytes(path, text.encode())
+
+
+def write_bytes(path, data):
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(path.name + ".part")
-    part.write_text(text)
+    part.write_bytes(data)
     os.replace(part, path)
     return path
 

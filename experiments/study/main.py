@@ -4,7 +4,7 @@ import importlib.util
 import shutil
 import tomllib
 
-from . import archive, page, results, screening, study as studies
+from . import archive, files, page, results, screening, study as studies
 
 HERE = studies.HERE
 
@@ -14,13 +14,16 @@ def run(options, cache, program):
     if options.smoke and not options.write:
         shutil.rmtree(study.cache, ignore_errors=True)
     names = chosen(options, study.arms)
+    folder = study.cache / "results" if options.smoke else HERE / "results" / study.name
     if not options.write:
+        # Hours of training are not to end in a refusal.
+        results.check(study, folder, [(arm, seed) for arm in names for seed in study.seeds(arm, options.seeds)])
         for step in studies.steps(study, names, options.seeds):
             studies.train_all(study, step, options.processes)
-    folder = study.cache / "results" if options.smoke else HERE / "results" / study.name
-    means = write(study, list(study.arms["arms"]), options.seeds, folder)
+    means = write(study, folder)
     if options.smoke:
-        check_archive(study, options.seeds, folder, means)
+        check_archive(study, folder, means)
+        check_refusals(study, folder)
 
 
 def full(options, cache, program):
@@ -71,26 +74,41 @@ def chosen(options, arms):
     return options.arms or list(arms["arms"])
 
 
-def check_archive(study, seeds, folder, means):
+def check_archive(study, folder, means):
     """Results are the same without the trainings that they are from."""
     shutil.rmtree(study.cache / "runs", ignore_errors=True)
-    _, archived = results.scored(study, study.arms["arms"], seeds, folder)
+    _, archived = results.scored(study, folder)
     if results.means(archived) != means:
         raise SystemExit(f"{folder / archive.FILE}: other scores than those of the trainings")
 
 
-def write(study, names, seeds, folder):
+def check_refusals(study, folder):
+    """Rows are not lost."""
+    alone = files.write_text(study.cache / "rows_alone/results.csv", (folder / "results.csv").read_text())
+    check_refused(study, alone.parent)
+
+
+def check_refused(study, folder):
+    try:
+        results.check(study, folder)
+    except SystemExit:
+        return
+    raise SystemExit(f"{folder}: should be refused")
+
+
+def write(study, folder):
     """Writes tables and page; returns the mean score of each arm."""
-    rows, matches = results.scored(study, names, seeds, folder)
+    results.check(study, folder)
+    rows, matches = results.scored(study, folder)
     if not rows:
         raise SystemExit("nothing is trained yet")
     means, drawn = results.means(matches), results.drawn(matches)
     summary = results.summary(study, matches, means, drawn)
     ratios = results.ratios(study, means, drawn)
     effects = screening.effects(study, means, drawn)
+    archive.write(folder, matches)
     results.write_csv(folder / "results.csv", results.COLUMNS, rows)
     results.write_csv(folder / "summary.csv", results.SUMMARY_COLUMNS, results.summary_rows(summary))
-    archive.write(folder, matches)
     results.write_csv(folder / "switches.csv", results.SWITCH_COLUMNS, [row for rows in effects.values() for row in rows])
     page.write(study, rows, summary, ratios, effects, folder / "index.html")
     print(f"see {folder / 'index.html'}")

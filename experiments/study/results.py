@@ -15,18 +15,34 @@ SWITCH_COLUMNS = "switch ratio low high".split()
 SUMMARY_COLUMNS = "arm seeds mean low high against ratio ratio_low ratio_high".split()
 
 
-def scored(study, arms, seeds, folder):
-    """Rows of `results.csv`, and the matches by arm, seed and room, of what is trained: here, or where the results in
-    the folder come from."""
-    rows, matches, known = [], {}, archive.read(folder)
-    for arm in arms:
-        for seed in study.seeds(arm, seeds):
-            if study.is_trained(arm, seed):
-                of_rooms = matches.setdefault(arm, {}).setdefault(seed, {})
+def check(study, folder, planned=()):
+    """Every row of `results.csv` is still known, or of a training that is planned."""
+    known = archive.read(folder).keys() | study.trained()
+    check_kept(folder, {key for key in known if key[0] in study.arms["arms"]} | set(planned))
+
+
+def check_kept(folder, known):
+    lost = {(row["arm"], row["seed"]) for row in archive.rows(folder)} - known
+    if lost:
+        raise SystemExit(
+            f"{folder}: {min(lost)} and {len(lost) - 1} more would be lost: they are in arms.toml no longer, or neither "
+            f"trained here nor in {archive.FILE}; take another --name"
+        )
+
+
+def scored(study, folder):
+    """Rows of `results.csv`, and the matches by arm, seed and room, of all that is trained: here, or where the results
+    in the folder come from."""
+    rows, matches, archived, trained = [], {}, archive.read(folder), study.trained()
+    for arm in study.arms["arms"]:
+        for seed in sorted(seed for name, seed in archived.keys() | trained if name == arm):
+            of_rooms = matches.setdefault(arm, {}).setdefault(seed, {})
+            if (arm, seed) in trained:
                 rows += [room_row(study, arm, seed, room, of_rooms) for room in study.rooms]
-            elif (arm, seed) in known:
-                own_rows, matches.setdefault(arm, {})[seed] = known[arm, seed]
+            else:
+                own_rows, found = archived[arm, seed]
                 rows += own_rows
+                of_rooms |= found
     return rows, matches
 
 

@@ -80,6 +80,11 @@ class Study:
         """The last ones, where `train.py` leaves them."""
         return self.folder(arm, seed) / "detector/weights/last.pt"
 
+    def trained(self):
+        """Arms and seeds of all that is trained here, whoever asked for it."""
+        done = (self.cache / "runs").glob("*/*/training.done.json")
+        return {(path.parts[-3], int(path.parts[-2])) for path in done}
+
     def is_trained(self, arm, seed):
         return (self.folder(arm, seed) / "training.done.json").exists()
 
