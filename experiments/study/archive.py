@@ -55,8 +55,12 @@ def rows(folder):
 
 
 def numbers(row):
-    return {key: int(row[key]) for key in ("seed", "room")} | {"cpu_seconds": float(row["cpu_seconds"])}
+    return {key: int(row[key]) for key in ("seed", "room", "pictures")} | {"cpu_seconds": float(row["cpu_seconds"])}
 
+
+def tested(rows):
+    """How many pictures of each room a detector was tested on."""
+    return {row["room"]: row["pictures"] for row in rows}
 
 
 def unpacked(arrays):

@@ -1,5 +1,6 @@
 """What `experiments/run` does, once Python has what it needs."""
 
+import dataclasses
 import importlib.util
 import shutil
 import tomllib
@@ -83,7 +84,9 @@ def check_archive(study, folder, means):
 
 
 def check_refusals(study, folder):
-    """Rows are not lost."""
+    """Scores of other test pictures are not mixed in, and rows are not lost."""
+    reality = study.arms["reality"] | {"test_pictures": study.test_pictures - 1}
+    check_refused(dataclasses.replace(study, arms=study.arms | {"reality": reality}), folder)
     alone = files.write_text(study.cache / "rows_alone/results.csv", (folder / "results.csv").read_text())
     check_refused(study, alone.parent)
 

@@ -16,9 +16,23 @@ SUMMARY_COLUMNS = "arm seeds mean low high against ratio ratio_low ratio_high".s
 
 
 def check(study, folder, planned=()):
-    """Every row of `results.csv` is still known, or of a training that is planned."""
-    known = archive.read(folder).keys() | study.trained()
-    check_kept(folder, {key for key in known if key[0] in study.arms["arms"]} | set(planned))
+    """Only scores of the same test pictures are compared, and every row of `results.csv` is still known, or of a
+    training that is planned."""
+    tested = {key: archive.tested(rows) for key, (rows, _) in archive.read(folder).items()}
+    tested |= {key: studies.tested(study, *key) for key in study.trained()}
+    tested = {(arm, seed): pictures for (arm, seed), pictures in tested.items() if arm in study.arms["arms"]}
+    for key, pictures in tested.items():
+        check_tested(study, key, pictures)
+    check_kept(folder, tested.keys() | set(planned))
+
+
+def check_tested(study, key, pictures):
+    expected = dict.fromkeys(study.rooms, study.test_pictures)
+    if pictures != expected:
+        raise SystemExit(
+            f"{study.name}: {key}: tested on so many pictures of each room: {pictures}, expected {expected}; see "
+            "--test-pictures, --rooms and --name"
+        )
 
 
 def check_kept(folder, known):
@@ -49,7 +63,7 @@ def scored(study, folder):
 def room_row(study, arm, seed, room, of_rooms):
     folder, classes = study.folder(arm, seed), study.classes(arm)
     count = study.test_pictures
-    truth = reality.truth(study.world, room, count, classes, study.cache / f"truth/{room}_{classes}")
+    truth = reality.truth(study.world, room, count, classes, study.cache / f"truth/{room}_{classes}_{count}")
     found = score.score(
         study, folder / "predictions" / str(room), truth, reality.SIZE, classes, folder / f"eval/{room}"
     )

@@ -145,6 +145,11 @@ def describe(study, arm, seed):
     }
 
 
+def tested(study, arm, seed):
+    """How many pictures of each room a detector was tested on."""
+    return {int(room): len(pictures) for room, pictures in training_of(study, arm, seed)["test"].items()}
+
+
 def training_of(study, arm, seed):
     folder = study.folder(arm, seed)
     done = json.loads((folder / "training.done.json").read_text())
