@@ -41,6 +41,7 @@ def test_samples_are_the_programs_files(recipe, tmp_path, program):
         rows = next(tmp_path.glob(f"set/labels/*/{k:06}.txt")).read_text().splitlines()
         assert len(rows) == len(target["boxes"]) == len(target["labels"])
         assert target["boxes"].dtype == torch.float32 and target["labels"].min() >= 1
+        assert target.keys() == {"boxes", "labels", "image_id", "area", "iscrowd"} and target["image_id"] == k
 
 
 def test_any_index_any_order(recipe):

@@ -19,8 +19,8 @@ def to_tensors(sample: Sample) -> tuple[torch.Tensor, dict[str, torch.Tensor]]:
     """A sample as torchvision's detectors take it.
 
     The picture: 3 x height x width, float32, 0 to 1, sRGB. The target: ``boxes`` (n x 4, float32: left,
-    top, right, bottom, pixels), ``labels`` (n, int64: class + 1, for 0 is the background), ``image_id``,
-    ``area`` (n, float32) and ``iscrowd`` (n, int64).
+    top, right, bottom, pixels), ``labels`` (n, int64: class + 1, for 0 is the background), ``area``
+    (n, float32) and ``iscrowd`` (n, int64). ``Dataset`` adds ``image_id``, which a sample alone does not know.
     """
     picture = torch.from_numpy(sample.image).permute(2, 0, 1).to(torch.float32) / 255
     boxes = torch.from_numpy(sample.boxes).to(torch.float32)
@@ -39,7 +39,8 @@ class Dataset(_Dataset[Any]):
 
     Sample ``k`` is that of ``petcomp dataset generate``, whichever worker makes it, forked or spawned.
     Each worker opens the recipe once and computes with ``threads`` threads (1 where there are workers,
-    which share the processors already). ``transform`` gets the ``Sample``; by default ``to_tensors``.
+    which share the processors already). ``transform`` gets the ``Sample``; by default ``to_tensors``, whose
+    target then has ``k`` as its ``image_id``.
     """
 
     def __init__(
@@ -73,7 +74,10 @@ class Dataset(_Dataset[Any]):
         if not 0 <= k < self._count:
             raise IndexError(f"sample {index} of {self._count}")
         self._set_threads()
-        return self._transform(self._pipeline[k])
+        made = self._transform(self._pipeline[k])
+        if self._transform is to_tensors:
+            made[1]["image_id"] = k
+        return made
 
     def _set_threads(self) -> None:
         """In a worker, once."""
