@@ -1,3 +1,4 @@
+import { withEdit } from "./recipe_edits.js";
 import { api, at, element, frame, picture, query, say, shortcuts, trying } from "./studio.js";
 
 frame("recipe");
@@ -8,7 +9,7 @@ const SIDE_PX = 384;
 const ONE_STEP_MS = 700;
 
 /** The recipe's file as it was read, and what its edits make of it. */
-const recipe = { file: "", version: "", saved: null, draft: null, edits: new Map() };
+const recipe = { file: "", version: "", saved: null, draft: null, edits: [] };
 const steps = { past: [], future: [], last: 0, path: "" };
 let groups = [];
 
@@ -33,12 +34,9 @@ const valueOf = (setting, path) => own(path) ?? fallback(setting, path);
 function edit(path, toml) {
   const now = performance.now();
   const isSameMove = path === steps.path && now - steps.last < ONE_STEP_MS;
-  if (!isSameMove) steps.past.push(new Map(recipe.edits));
+  if (!isSameMove) steps.past.push(recipe.edits);
   Object.assign(steps, { future: [], last: now, path });
-  // The last edit of a key counts, and takes the place of those below it.
-  const isBelow = (other) => other === path || other.startsWith(`${path}.`) || other.startsWith(`${path}[`);
-  for (const other of [...recipe.edits.keys()].filter(isBelow)) recipe.edits.delete(other);
-  if (toml !== null || path in recipe.saved.own) recipe.edits.set(path, toml);
+  recipe.edits = withEdit(recipe.edits, path, toml, recipe.saved.own);
   changed();
 }
 
@@ -71,7 +69,7 @@ async function changed({ redraw = false } = {}) {
 }
 
 async function draftOnce() {
-  const edits = [...recipe.edits];
+  const { edits } = recipe;
   try {
     recipe.draft = await api("api/recipe/draft", { file: recipe.file, edits });
   } finally {
@@ -85,11 +83,11 @@ async function draftOnce() {
 }
 
 async function save() {
-  if (!recipe.edits.size) return;
-  const { file, version } = recipe;
-  recipe.version = await api("api/recipe/save", { file, version, edits: [...recipe.edits] });
+  if (!recipe.edits.length) return;
+  const { file, version, edits } = recipe;
+  recipe.version = await api("api/recipe/save", { file, version, edits });
   recipe.saved = await api(query("api/recipe/open", { file }));
-  recipe.edits = new Map();
+  recipe.edits = [];
   Object.assign(steps, { past: [], future: [], path: "" });
   pictures.forgetBefore();
   await changed({ redraw: true });
@@ -149,7 +147,7 @@ const pictures = {
     const wave = new AbortController();
     const begun = this.since;
     this.since = undefined;
-    const edits = [...recipe.edits];
+    const { edits } = recipe;
     let shown = 0;
     const figures = [...at("pictures").children];
     figures.forEach((figure) => figure.classList.add("old"));
@@ -208,15 +206,15 @@ async function showWhole(k) {
   document.body.append(dialog);
   dialog.showModal();
   await trying(async () => {
-    const { file } = recipe;
+    const { file, edits } = recipe;
     const { seed, labels } = pictures;
-    image.src = await picture("api/recipe/picture", { file, edits: [...recipe.edits], seed, k, labels, slot: "whole" });
+    image.src = await picture("api/recipe/picture", { file, edits, seed, k, labels, slot: "whole" });
   });
 }
 
 function showText() {
   const dialog = element("dialog", { class: "wide", "aria-label": "the file" },
-    element("h2", {}, recipe.file, recipe.edits.size ? " as it would be saved" : ""),
+    element("h2", {}, recipe.file, recipe.edits.length ? " as it would be saved" : ""),
     element("pre", {}, recipe.draft.text),
     element("form", { method: "dialog" }, element("button", { class: "main" }, "Close")));
   dialog.addEventListener("close", () => dialog.remove());
@@ -359,7 +357,7 @@ function markSettings() {
   for (const row of document.querySelectorAll(".setting")) {
     const { path } = row.dataset;
     row.classList.toggle("own", own(path) !== undefined);
-    row.classList.toggle("edited", recipe.edits.has(path));
+    row.classList.toggle("edited", toToml(own(path)) !== toToml(recipe.saved.own[path]));
   }
 }
 
@@ -430,7 +428,7 @@ function filterSettings() {
 
 async function open(file) {
   const opened = await api(query("api/recipe/open", { file }));
-  Object.assign(recipe, { file, version: opened.version, draft: opened, saved: opened, edits: new Map() });
+  Object.assign(recipe, { file, version: opened.version, draft: opened, saved: opened, edits: [] });
   Object.assign(steps, { past: [], future: [], path: "" });
   history.replaceState(null, "", query("recipe", { file }));
   at("file").value = file;
@@ -456,7 +454,7 @@ async function listFiles() {
 }
 
 at("file").addEventListener("change", (event) => trying(async () => {
-  if (recipe.edits.size && !confirm("Leave what is not saved?")) event.target.value = recipe.file;
+  if (recipe.edits.length && !confirm("Leave what is not saved?")) event.target.value = recipe.file;
   else if (event.target.value === "") await begin();
   else await open(event.target.value);
   at("file").value = recipe.file;
@@ -473,7 +471,7 @@ at("labels").addEventListener("click", () => pictures.set({ labels: !pictures.la
 at("undo").addEventListener("click", undo);
 at("redo").addEventListener("click", redo);
 at("text").addEventListener("click", showText);
-addEventListener("beforeunload", (event) => { if (recipe.edits.size) event.preventDefault(); });
+addEventListener("beforeunload", (event) => { if (recipe.edits.length) event.preventDefault(); });
 
 shortcuts([
   ["Ctrl+s", "save", () => trying(save)],

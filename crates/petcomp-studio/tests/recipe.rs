@@ -127,6 +127,32 @@ fn a_slider_changes_the_pictures_and_the_file_keeps_its_comments() {
 }
 
 #[test]
+fn of_three_lights_the_first_is_removed_twice() {
+    let Some(mut browser) = Browser::open(1440, 900) else {
+        return;
+    };
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("recipe.toml");
+    let light = |power: u32| format!("[[scene.lights]]\npower = {power}\n");
+    let recipe = [10, 20, 30].map(light).concat();
+    io::write_text(&path, &format!("{}{recipe}", tray::RECIPE)).unwrap();
+    let studio = Studio::over(dir.path());
+    browser.go(&studio.page("recipe?file=recipe.toml"));
+    for left in [2, 1] {
+        let first = "details[data-table='scene.lights[0]'] > button";
+        browser.wait_for(first);
+        browser.eval(&format!("document.querySelector(\"{first}\").click()"));
+        let all = "document.querySelectorAll(\"details[data-table^='scene.lights['] > button\")";
+        browser.wait(&format!("{all}.length === {left}"));
+    }
+    browser.press("s", CTRL);
+    browser.wait("document.querySelector('#save').disabled");
+    let config = DatasetConfig::read(&path, &[]).unwrap();
+    let powers = config.scene.lights.iter().map(|light| light.power.min);
+    assert_eq!(powers.collect::<Vec<_>>(), [30.0]);
+}
+
+#[test]
 fn a_recipe_that_leads_out_of_the_folder_is_refused() {
     let dir = tempfile::tempdir().unwrap();
     let recipe = "assets = '../assets'\nbackgrounds = '/'\n";

@@ -20,7 +20,11 @@ use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::sync::Arc;
 
-pub(crate) const PAGES: &[Page] = &[crate::page!("recipe.html"), crate::page!("recipe.js")];
+pub(crate) const PAGES: &[Page] = &[
+    crate::page!("recipe.html"),
+    crate::page!("recipe.js"),
+    crate::page!("recipe_edits.js"),
+];
 
 /// What the page keeps between requests.
 #[derive(Default)]
