@@ -17,7 +17,17 @@ const set = { folder: "", count: 0, classes: [], rows: [], why: [] };
 const shows = { boxes: true, masks: false, ids: true, covers: false };
 
 const color = (number, alpha = 1) => `hsl(${HUES[number % HUES.length]} 90% 60% / ${alpha})`;
-const address = (folder, row, side) => query("api/dataset/picture", { folder, row, side });
+
+/** When this page had a folder listed. The browser keeps pictures for a while, and the rows of an earlier list are others. */
+const listed = new Map();
+
+async function list(folder) {
+  const opened = await api(query("api/dataset/open", { folder }));
+  listed.set(folder, Date.now());
+  return opened;
+}
+
+const address = (folder, row, side) => query("api/dataset/picture", { folder, row, side, listed: listed.get(folder) });
 
 // Which pictures.
 
@@ -76,7 +86,7 @@ function showBackgrounds(names) {
 }
 
 async function open(folder) {
-  const opened = await api(query("api/dataset/open", { folder }));
+  const opened = await list(folder);
   Object.assign(set, { folder, count: opened.count, classes: opened.classes, rows: [], why: [] });
   known.clear();
   at("folder").value = folder;
@@ -214,7 +224,7 @@ class Pane {
   }
 
   async change(folder) {
-    const opened = await api(query("api/dataset/open", { folder }));
+    const opened = await list(folder);
     const { rows } = await api("api/dataset/find", { folder, filter: {}, order: "listed" });
     Object.assign(this, { folder, rows, place: 0, names: opened.classes });
     await this.show();
