@@ -133,21 +133,28 @@ impl Folder {
         Ok(Versioned { text, version })
     }
 
-    /// The version of a file; none where there is none.
-    fn version(&self, name: &str) -> Option<String> {
-        let versioned = self.read_text(name);
-        versioned.ok().map(|file| file.version)
+    /// The text of a file, with its version; none where there is none, or only a link that leads out.
+    ///
+    /// # Errors
+    /// For a file that is there and cannot be read: it must not be taken for none, and written over.
+    pub(crate) fn text_if_any(&self, name: &str) -> Answer<Option<Versioned>> {
+        match self.file(name) {
+            Ok(_) => self.read_text(name).map(Some),
+            Err(_) => Ok(None),
+        }
     }
 
     /// Saves a text, whole or not at all, if the file is as it was when the page read it (`version`;
     /// none: there was no file), and returns the new version.
     ///
     /// # Errors
-    /// [`Refusal::stale`] where it has changed since; as [`Folder::place`].
+    /// [`Refusal::stale`] where it has changed since; as [`Folder::place`] and
+    /// [`Folder::text_if_any`].
     pub(crate) fn save(&self, name: &str, text: &str, version: Option<&str>) -> Answer<String> {
         let path = self.place(name)?;
         let _alone = self.saving.lock().unwrap_or_else(PoisonError::into_inner);
-        if self.version(name).as_deref() != version {
+        let there = self.text_if_any(name)?.map(|file| file.version);
+        if there.as_deref() != version {
             return Err(Refusal::stale(name));
         }
         io::write_text(path, text)?;
@@ -285,5 +292,15 @@ mod tests {
         let second = folder.save("b.txt", "two", Some(&first)).unwrap();
         assert!(folder.save("b.txt", "three", Some(&first)).is_err());
         assert_eq!(folder.read_text("b.txt").unwrap().version, second);
+    }
+
+    #[test]
+    fn a_file_that_cannot_be_read_is_not_replaced() {
+        let (dir, folder) = studio();
+        let (path, latin_1) = (dir.path().join("folder/b.txt"), b"caf\xe9");
+        std::fs::write(&path, latin_1).unwrap();
+        assert!(folder.text_if_any("b.txt").is_err());
+        assert!(folder.save("b.txt", "new", None).is_err());
+        assert_eq!(std::fs::read(path).unwrap(), latin_1);
     }
 }

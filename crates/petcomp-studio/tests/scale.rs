@@ -75,3 +75,29 @@ fn the_first_page_says_what_is_there() {
     browser.screenshot("keys");
     browser.assert_content();
 }
+
+#[test]
+fn what_cannot_be_read_is_refused_and_left_as_it_is() {
+    let dir = tempfile::tempdir().unwrap();
+    let latin_1 = b"# caf\xe9\n";
+    let names = ["photos.toml", "recipe.toml", "a.label.json"];
+    for name in names {
+        std::fs::write(dir.path().join(name), latin_1).unwrap();
+    }
+    std::fs::write(dir.path().join("a.png"), "").unwrap();
+    let studio = Studio::over(dir.path());
+    let scale = r#"{ "photo": "a.png", "version": null, "scale": { "px_per_metre": 2000 } }"#;
+    let answers = [
+        studio.get("api/scale/photo?photo=a.png"),
+        studio.post("api/scale/save", scale),
+        studio.post("api/recipe/new", r#"{ "file": "recipe.toml" }"#),
+        studio.get("api/corners/label?photo=a.png"),
+    ];
+    for (answer, name) in answers.iter().zip([names[0], names[0], names[1], names[2]]) {
+        assert!(answer.starts_with("HTTP/1.1 422"), "{answer}");
+        assert!(answer.contains(name), "{answer}");
+    }
+    for name in names {
+        assert_eq!(std::fs::read(dir.path().join(name)).unwrap(), latin_1);
+    }
+}

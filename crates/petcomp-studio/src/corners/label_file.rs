@@ -29,7 +29,7 @@ pub(super) fn path(folder: &Folder, photo: &str) -> Answer<PathBuf> {
 /// share.
 pub(super) fn read(folder: &Folder, photo: &str, like: Option<&str>) -> Answer<LabelFile> {
     let name = beside(photo, "label.json");
-    if let Ok(file) = folder.read_text(&name) {
+    if let Some(file) = folder.text_if_any(&name)? {
         return Ok(LabelFile {
             label: io::read_json(path(folder, photo)?)?,
             version: Some(file.version),
@@ -94,18 +94,18 @@ fn check_photo(label: &Label, photo: &str) -> Answer<()> {
 /// The text of a label as `petcomp camera init` writes it; remarks of the file that is there stay.
 fn text_of(folder: &Folder, name: &str, label: &Label) -> Answer<String> {
     let text = camera::commented(label)?;
-    match stored_remarks(folder, name) {
+    match stored_remarks(folder, name)? {
         Some(remarks) => Ok(with_remarks(&text, remarks).map_err(|e| Error::value("label", e))?),
         None => Ok(text),
     }
 }
 
 /// The remarks in a label file, if it has any.
-fn stored_remarks(folder: &Folder, name: &str) -> Option<Value> {
-    let file = folder.read_text(name).ok()?;
-    let remarks = remarks_of(serde_json::from_str(&file.text).ok()?);
-    let has_any = remarks.as_object().is_some_and(|table| !table.is_empty());
-    has_any.then_some(remarks)
+fn stored_remarks(folder: &Folder, name: &str) -> Answer<Option<Value>> {
+    let file = folder.text_if_any(name)?;
+    let label = file.and_then(|file| serde_json::from_str(&file.text).ok());
+    let remarks = label.map(remarks_of);
+    Ok(remarks.filter(|remarks| remarks.as_object().is_some_and(|table| !table.is_empty())))
 }
 
 fn with_remarks(text: &str, remarks: Value) -> serde_json::Result<String> {

@@ -34,7 +34,7 @@ pub(super) async fn read(
 }
 
 fn read_review(folder: &Folder, photo: &str) -> Answer<ReadReview> {
-    let file = folder.read_text(&review_name(photo)).ok();
+    let file = folder.text_if_any(&review_name(photo))?;
     let review = review_of(folder, photo)?;
     Ok(ReadReview {
         strokes: review.strokes,

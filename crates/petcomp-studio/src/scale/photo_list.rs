@@ -62,7 +62,7 @@ fn list_of(photo: &str) -> (String, &str) {
 /// What the list beside a photo says of it.
 pub(super) fn read(folder: &Folder, photo: &str) -> Answer<ListedPhoto> {
     let (list, file) = list_of(photo);
-    let Ok(versioned) = folder.read_text(&list) else {
+    let Some(versioned) = folder.text_if_any(&list)? else {
         return Ok(ListedPhoto {
             list,
             version: None,
@@ -119,7 +119,7 @@ pub(super) fn save(folder: &Folder, new: &ScaledPhoto<'_>, version: Option<&str>
     check(new)?;
     let (list, _) = list_of(new.photo);
     let text = folder
-        .read_text(&list)
+        .text_if_any(&list)?
         .map_or(String::new(), |file| file.text);
     let changed = with_scale(&text, new);
     let (before, after) = (entries_of(&text, &list)?, entries_of(&changed, &list)?);
