@@ -3,13 +3,15 @@
 use crate::refusal::{Answer, Refusal};
 use axum::http::StatusCode;
 use petcomp::{Error, Result, io};
+use std::collections::VecDeque;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 /// How deep below the folder files are looked for.
 const MAX_DEPTH: usize = 4;
-/// Entries that are looked at, at most, when files are looked for.
+/// Entries that are looked at, at most, when files are looked for: a dataset of 100,000 pictures has
+/// about as many.
 const MAX_ENTRIES: usize = 200_000;
 
 /// A folder; nothing outside of it is read or written.
@@ -164,24 +166,31 @@ impl Folder {
     /// The names of all files below that `wanted` takes, sorted; hidden ones are left out, and so is
     /// what links lead to.
     pub(crate) fn find(&self, wanted: impl Fn(&Path) -> bool) -> Vec<String> {
-        let files = self.files().into_iter().map(without_dot);
+        let files = self.files(MAX_ENTRIES).into_iter().map(without_dot);
         let wanted = files.filter(|path| wanted(path));
         let mut found: Vec<String> = wanted.map(|path| self.name_of(&path)).collect();
         found.sort();
         found
     }
 
-    fn files(&self) -> Vec<PathBuf> {
+    /// The files among the first entries, the upper folders before those within them: what lies deep in
+    /// a large dataset hides nothing beside it.
+    fn files(&self, most: usize) -> Vec<PathBuf> {
         let mut files = Vec::new();
-        let mut open = vec![(self.here().to_path_buf(), 0)];
-        let mut left = MAX_ENTRIES;
-        while let Some((folder, depth)) = open.pop() {
-            for entry in visible_entries(&folder).take(left) {
+        let mut open = VecDeque::from([(self.here().to_path_buf(), 0)]);
+        let mut left = most;
+        while let Some((folder, depth)) = open.pop_front() {
+            for entry in visible_entries(&folder) {
+                if left == 0 {
+                    let here = self.here().display();
+                    log::warn!("{here}: more than {most} files and folders; the rest is not seen");
+                    return files;
+                }
                 left -= 1;
                 match entry.file_type() {
                     Ok(kind) if kind.is_file() => files.push(entry.path()),
                     Ok(kind) if kind.is_dir() && depth < MAX_DEPTH => {
-                        open.push((entry.path(), depth + 1));
+                        open.push_back((entry.path(), depth + 1));
                     }
                     _ => {}
                 }
@@ -279,6 +288,25 @@ mod tests {
         assert!(folder.file("far.txt").is_err() && folder.file("up/secret.txt").is_err());
         assert!(folder.folder("up").is_err() && folder.place("up/new.txt").is_err());
         assert!(folder.find(|_| true) == ["sub/a.txt"]);
+    }
+
+    #[test]
+    fn what_lies_deep_hides_no_file_above_it() {
+        let dir = tempfile::tempdir().unwrap();
+        let photos = ["a/a.jpg", "b/b.jpg", "c/c.jpg"].map(|name| dir.path().join(name));
+        for photo in &photos {
+            let deep = photo.with_file_name("deep");
+            std::fs::create_dir_all(&deep).unwrap();
+            std::fs::write(photo, "").unwrap();
+            for i in 0..10 {
+                std::fs::write(deep.join(format!("{i}.txt")), "").unwrap();
+            }
+        }
+        let folder = Folder::open(dir.path()).unwrap();
+        // The three folders, and in each of them a folder and a photo.
+        let mut found = folder.files(3 + 3 * 2);
+        found.sort();
+        assert_eq!(found, photos);
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! The first page: what is in the folder, and what each page can do with it.
 
+use crate::folder::Folder;
 use crate::message::Json;
 use crate::picture::may_be_photo;
 use crate::refusal::Answer;
@@ -45,34 +46,36 @@ async fn overview(State(studio): State<Arc<Studio>>) -> Answer<Json<Overview>> {
     blocking(move || Ok(Json(Overview::of(&studio)))).await
 }
 
-/// The TOML documents that name backgrounds, as every recipe does.
-fn recipes(studio: &Studio) -> Vec<String> {
-    let documents = studio
-        .folder
-        .find(|path| path.extension().is_some_and(|e| e == "toml"));
-    let is_recipe = |name: &String| {
-        let text = studio.folder.read_text(name).ok();
-        let table = text.and_then(|file| file.text.parse::<toml::Table>().ok());
-        table.is_some_and(|table| table.contains_key("backgrounds"))
-    };
-    documents.into_iter().filter(is_recipe).collect()
+/// A TOML document that names backgrounds, as every recipe does.
+fn is_recipe(folder: &Folder, name: &str) -> bool {
+    if !name.ends_with(".toml") {
+        return false;
+    }
+    let text = folder
+        .read_text(name)
+        .map_or(String::new(), |file| file.text);
+    let table: toml::Table = text.parse().unwrap_or_default();
+    table.contains_key("backgrounds")
 }
 
 impl Overview {
     fn of(studio: &Studio) -> Self {
-        let named = |ending: &str| {
-            let ends = |path: &Path| path.to_string_lossy().ends_with(ending);
-            studio.folder.find(ends)
+        let files = studio.folder.find(|_| true);
+        let those = |are: &dyn Fn(&str) -> bool| {
+            let found = files.iter().filter(|file| are(file));
+            found.cloned().collect::<Vec<_>>()
         };
+        let ending = |end: &str| those(&|file| file.ends_with(end));
+        let called = |name: &str| those(&|file| Path::new(file).ends_with(name));
         Self {
             folder: studio.folder.name(),
-            photos: studio.folder.find(may_be_photo),
-            labels: named(".label.json"),
-            cameras: named(".camera.json"),
-            assets: named("/manifest.json"),
-            recipes: recipes(studio),
-            photo_lists: [named("/photos.toml"), named("/photos.csv")].concat(),
-            datasets: named("/data.yaml"),
+            photos: those(&|file| may_be_photo(Path::new(file))),
+            labels: ending(".label.json"),
+            cameras: ending(".camera.json"),
+            assets: called("manifest.json"),
+            recipes: those(&|file| is_recipe(&studio.folder, file)),
+            photo_lists: [called("photos.toml"), called("photos.csv")].concat(),
+            datasets: called("data.yaml"),
         }
     }
 }
