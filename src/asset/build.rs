@@ -31,10 +31,11 @@ pub struct Built {
 /// not there.
 ///
 /// `list` is a TOML or CSV file, or a folder with `photos.toml` or `photos.csv` in it. A photo
-/// without a usable object is left out and reported in [`Built::refused`].
+/// without a usable object, or one that a person rejected, is left out and reported in
+/// [`Built::refused`]; the folder keeps no earlier cut-out of it.
 ///
 /// `progress` is called with the photos done and their number, at the start and after each photo,
-/// from several threads. What the folder already had stays; a photo that it already has is
+/// from several threads. What the folder has of other photos stays; a photo that it already has is
 /// replaced. The manifest is written last and does not depend on threads.
 ///
 /// # Errors
@@ -51,12 +52,18 @@ pub fn build(
     let mut manifest = read_or_new(folder)?;
     let list = checked(list, &path, &mut manifest)?;
     let outcomes = cut_out_all(&list, folder, progress);
-    let inserted = insert_all(&list, outcomes, &mut manifest);
-    let (photos, refused) = inserted.map_err(|e| e.in_file(&path))?;
+    let taken = take_in(&list, outcomes, &mut manifest);
+    let TakenIn {
+        photos,
+        refused,
+        removed,
+    } = taken.map_err(|e| e.in_file(&path))?;
+    if removed || !photos.is_empty() {
+        manifest.write(folder)?;
+    }
     if photos.is_empty() {
         return Err(no_cut_out(&path, &refused));
     }
-    manifest.write(folder)?;
     let library = Library::from_manifest(folder, manifest, &photos)?;
     Ok(Built::new(library, &photos, refused))
 }
@@ -108,21 +115,30 @@ fn cut_out_all(
         .collect()
 }
 
-/// Puts the cut-outs of a list into a manifest; returns them, and why the other photos gave none.
-fn insert_all(
-    list: &List,
-    outcomes: Vec<Result<Photo>>,
-    manifest: &mut Manifest,
-) -> Result<(Vec<Photo>, Vec<String>)> {
-    let (mut photos, mut refused) = (Vec::new(), Vec::new());
+/// What became of the photos of a list.
+#[derive(Default)]
+struct TakenIn {
+    photos: Vec<Photo>,
+    /// Why the others gave no cut-out.
+    refused: Vec<String>,
+    /// The manifest had an earlier cut-out of one of these.
+    removed: bool,
+}
+
+/// Puts the cut-outs of a list into a manifest, and takes out what photos gave that give none now.
+fn take_in(list: &List, outcomes: Vec<Result<Photo>>, manifest: &mut Manifest) -> Result<TakenIn> {
+    let mut taken = TakenIn::default();
     for (i, (outcome, entry)) in outcomes.into_iter().zip(&list.photos).enumerate() {
         match outcome.and_then(|photo| inserted(photo, entry, manifest)) {
-            Ok(photo) => photos.push(photo),
-            Err(refusal @ Error::Photo { .. }) => refused.push(refusal.to_string()),
+            Ok(photo) => taken.photos.push(photo),
+            Err(refusal @ Error::Photo { .. }) => {
+                taken.removed |= manifest.remove(&entry.cut_out_file());
+                taken.refused.push(refusal.to_string());
+            }
             Err(error) => return Err(error.within(&format!("photos[{i}]"))),
         }
     }
-    Ok((photos, refused))
+    Ok(taken)
 }
 
 /// A photo that is now in the manifest.
@@ -142,13 +158,14 @@ fn record_to_review(photo: &Photo) -> Option<PhotoRecord> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{MANIFEST, PhotoRecord, Review, Texture, Verdict, contact_sheet};
+    use super::super::{MANIFEST, PhotoRecord, Review, Scale, Texture, Verdict};
+    use super::super::{add_photo, contact_sheet};
     use super::*;
     use crate::diagnostic::{Code, Diagnostic};
     use crate::geom::Point2;
     use crate::image::Image;
     use crate::io;
-    use crate::matte::{Claim, MatteMethod, Stroke};
+    use crate::matte::{Claim, CutOutOptions, MatteMethod, Stroke};
     use crate::pixel::LinearRgb;
 
     /// A red slab of 60 x 30 pixels on a green screen.
@@ -272,14 +289,55 @@ mod tests {
             said.contains("one.review.json: size_px: 600 x 400, expected the photo's 120 x 80"),
             "{said}"
         );
-        review(Review {
-            verdict: Some(Verdict::Rejected),
-            ..Review::new((120, 80), Vec::new())
-        });
-        let [refused] = &built().unwrap().refused[..] else {
+        reject(&folder, "one");
+        let built = built().unwrap();
+        let [refused] = &built.refused[..] else {
             panic!("one photo is refused")
         };
         assert!(refused.contains("one.png: rejected in"), "{refused}");
+        assert_eq!(cut_outs(&built.library), ["a/two.exr"]);
+        assert_eq!(cut_outs(&Library::open(out).unwrap()), ["a/two.exr"]);
+    }
+
+    /// A person rejects the photo of a name.
+    fn reject(folder: &tempfile::TempDir, name: &str) {
+        let review = Review {
+            verdict: Some(Verdict::Rejected),
+            ..Review::new((120, 80), Vec::new())
+        };
+        let path = folder.path().join(format!("{name}.review.json"));
+        std::fs::write(path, review.to_json()).unwrap();
+    }
+
+    fn cut_outs(library: &Library) -> Vec<&str> {
+        let photos = library.assets.iter().flat_map(|asset| &asset.photos);
+        photos.map(|photo| photo.record.file.as_str()).collect()
+    }
+
+    #[test]
+    fn a_list_whose_last_photos_are_rejected_leaves_nothing_in_the_folder() {
+        let folder = folder_with(TWO);
+        let (list, out) = (folder.path().join("photos.toml"), folder.path().join("out"));
+        build(&list, &out, &|_, _| ()).unwrap();
+        for name in ["one", "two"] {
+            reject(&folder, name);
+        }
+        let told = build(&list, &out, &|_, _| ()).unwrap_err().to_string();
+        assert!(told.contains("no photo gave a cut-out"), "{told}");
+        assert!(Library::open(&out).unwrap().assets.is_empty());
+    }
+
+    #[test]
+    fn a_rejected_photo_that_is_added_again_leaves_the_folder() {
+        let folder = folder_with(TWO);
+        let (photo, out) = (folder.path().join("one.png"), folder.path().join("out"));
+        let entry = PhotoEntry::new(photo, "a", "cap", Scale::Length(0.3));
+        let add = || add_photo(&out, &entry, &[], &CutOutOptions::default());
+        add().unwrap();
+        reject(&folder, "one");
+        let told = add().unwrap_err().to_string();
+        assert!(told.contains("one.png: rejected in"), "{told}");
+        assert!(Library::open(&out).unwrap().assets.is_empty());
     }
 
     #[test]

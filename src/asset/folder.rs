@@ -28,8 +28,9 @@ use std::sync::Arc;
 /// `classes` are the names of the folder's classes in order, where they are declared; where there
 /// are none, a class that the folder does not have comes behind those that it has.
 ///
-/// Adding the same photo to the same asset again replaces it. The manifest is written last, whole
-/// or not at all. Not for two processes at once: the later manifest wins.
+/// Adding the same photo to the same asset again replaces it; where it gives no cut-out any more,
+/// the folder keeps none of it. The manifest is written last, whole or not at all. Not for two
+/// processes at once: the later manifest wins.
 ///
 /// # Errors
 /// [`Error::Value`] for a wrong name, class or size; those of reading the photo and of
@@ -49,10 +50,19 @@ pub fn add_photo(
         options,
         empty_screens: EmptyScreens::default(),
     };
-    let photo = writer.write(entry)?;
+    let outcome = writer.write(entry);
+    if is_refusal(&outcome) && manifest.remove(&entry.cut_out_file()) {
+        manifest.write(folder)?;
+    }
+    let photo = outcome?;
     manifest.insert(entry.asset_with(photo.record.clone()))?;
     manifest.write(folder)?;
     Ok(photo)
+}
+
+/// The photo itself gave no cut-out.
+fn is_refusal(outcome: &Result<Photo>) -> bool {
+    matches!(outcome, Err(Error::Photo { .. }))
 }
 
 /// The manifest of a folder; a new one where there is no manifest.

@@ -253,6 +253,20 @@ impl Manifest {
         }
     }
 
+    /// Takes a cut-out out, and with its last one the asset. Returns whether it was there.
+    pub(super) fn remove(&mut self, file: &str) -> bool {
+        let is_it = |photo: &PhotoRecord| photo.file == file;
+        let was_there = self
+            .assets
+            .iter()
+            .any(|asset| asset.photos.iter().any(is_it));
+        for asset in &mut self.assets {
+            asset.photos.retain(|photo| !is_it(photo));
+        }
+        self.assets.retain(|asset| !asset.photos.is_empty());
+        was_there
+    }
+
     /// Takes classes into the list: those that are declared, in that order, or else those in use,
     /// behind the ones that are there, in the order in which they appear. No existing class
     /// changes its number.
