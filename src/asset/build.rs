@@ -39,9 +39,9 @@ pub struct Built {
 /// replaced. The manifest is written last and does not depend on threads.
 ///
 /// # Errors
-/// A list that cannot be read or be right (before any work, naming the entry); the first
-/// photo that cannot be read, or [`Error::Photo`] where no photo gives a cut-out; those of
-/// [`Library::open`] for cut-outs that were there before.
+/// A list that cannot be read or be right, or a photo that is missing (before any work); the first
+/// photo that cannot be read (the cut-outs of the others are in the folder), or [`Error::File`]
+/// where no photo gives a cut-out; those of [`Library::open`] for cut-outs that were there before.
 pub fn build(
     list: impl AsRef<Path>,
     folder: impl AsRef<Path>,
@@ -52,14 +52,17 @@ pub fn build(
     let mut manifest = read_or_new(folder)?;
     let list = checked(list, &path, &mut manifest)?;
     let outcomes = cut_out_all(&list, folder, progress);
-    let taken = take_in(&list, outcomes, &mut manifest);
     let TakenIn {
         photos,
         refused,
         removed,
-    } = taken.map_err(|e| e.in_file(&path))?;
+        failed,
+    } = take_in(&list, outcomes, &mut manifest);
     if removed || !photos.is_empty() {
         manifest.write(folder)?;
+    }
+    if let Some(error) = failed {
+        return Err(error.in_file(&path));
     }
     if photos.is_empty() {
         return Err(no_cut_out(&path, &refused));
@@ -89,7 +92,9 @@ impl Built {
 /// working folder.
 fn checked(list: List, path: &Path, manifest: &mut Manifest) -> Result<List> {
     list.check(manifest).map_err(|e| e.in_file(path))?;
-    Ok(list.located_in(path.parent().unwrap_or(Path::new(""))))
+    let list = list.located_in(path.parent().unwrap_or(Path::new("")));
+    list.check_pictures()?;
+    Ok(list)
 }
 
 /// Cuts out and writes the photos of a list.
@@ -123,10 +128,12 @@ struct TakenIn {
     refused: Vec<String>,
     /// The manifest had an earlier cut-out of one of these.
     removed: bool,
+    /// The first that could not be read or written, or fits no asset.
+    failed: Option<Error>,
 }
 
 /// Puts the cut-outs of a list into a manifest, and takes out what photos gave that give none now.
-fn take_in(list: &List, outcomes: Vec<Result<Photo>>, manifest: &mut Manifest) -> Result<TakenIn> {
+fn take_in(list: &List, outcomes: Vec<Result<Photo>>, manifest: &mut Manifest) -> TakenIn {
     let mut taken = TakenIn::default();
     for (i, (outcome, entry)) in outcomes.into_iter().zip(&list.photos).enumerate() {
         match outcome.and_then(|photo| inserted(photo, entry, manifest)) {
@@ -135,10 +142,13 @@ fn take_in(list: &List, outcomes: Vec<Result<Photo>>, manifest: &mut Manifest) -
                 taken.removed |= manifest.remove(&entry.cut_out_file());
                 taken.refused.push(refusal.to_string());
             }
-            Err(error) => return Err(error.within(&format!("photos[{i}]"))),
+            Err(error) => {
+                let error = error.within(&format!("photos[{i}]"));
+                taken.failed.get_or_insert(error);
+            }
         }
     }
-    Ok(taken)
+    taken
 }
 
 /// A photo that is now in the manifest.
@@ -166,7 +176,7 @@ mod tests {
     use crate::image::Image;
     use crate::io;
     use crate::matte::{Claim, CutOutOptions, MatteMethod, Stroke};
-    use crate::pixel::LinearRgb;
+    use crate::pixel::{Film, LinearRgb};
 
     /// A red slab of 60 x 30 pixels on a green screen.
     fn slab() -> Image<LinearRgb> {
@@ -622,10 +632,72 @@ mod tests {
     }
 
     #[test]
-    fn a_photo_that_is_missing_leaves_no_manifest() {
-        let folder = folder_with(&TWO.replace("two.png", "three.png"));
-        let out = folder.path().join("out");
-        let error = build(folder.path().join("photos.toml"), &out, &|_, _| ()).unwrap_err();
-        assert!(error.to_string().contains("three.png") && !out.join(MANIFEST).exists());
+    fn a_picture_that_is_missing_is_named_before_any_work() {
+        let missing = [
+            ("file = \"two.png\"", "file = \"three.png\""),
+            (
+                "px_per_metre = 100.0",
+                "px_per_metre = 100.0\nscreen = \"three.png\"",
+            ),
+            (
+                "px_per_metre = 100.0",
+                "captured = { photos = [\"three.png\"] }",
+            ),
+        ];
+        for (from, to) in missing {
+            let folder = folder_with(&TWO.replace(from, to));
+            let out = folder.path().join("out");
+            let error = build(folder.path().join("photos.toml"), &out, &|_, _| ()).unwrap_err();
+            assert!(
+                error.to_string().contains("three.png: no such file"),
+                "{error}"
+            );
+            assert!(!out.exists());
+        }
+    }
+
+    #[test]
+    fn a_cut_out_that_the_manifest_does_not_tell_of_is_noticed() {
+        let folder = folder_with(TWO);
+        let (list, out) = (folder.path().join("photos.toml"), folder.path().join("out"));
+        let built = build(&list, &out, &|_, _| ()).unwrap().library;
+        let photo = &built.assets[0].photos[0];
+        let file = out.join(&photo.record.file);
+        let crc32 = crc32fast::hash(&std::fs::read(&file).unwrap());
+        assert_eq!(photo.record.crc32, Some(crc32));
+        // As a build leaves it that was interrupted before it wrote the manifest.
+        let (w, h) = photo.texture.size();
+        io::write(&file, &Image::filled(w, h, Film::default())).unwrap();
+        let told = Library::open(&out).unwrap_err().to_string();
+        let expected =
+            "one.exr: not the file that assets.toml tells of: build or add its photo again";
+        assert!(told.ends_with(expected), "{told}");
+        // An older manifest has no checksums.
+        let text = io::read_text(out.join(MANIFEST)).unwrap();
+        let lines = text.lines().filter(|line| !line.starts_with("crc32"));
+        let older: Vec<_> = lines.collect();
+        std::fs::write(out.join(MANIFEST), older.join("\n")).unwrap();
+        Library::open(&out).unwrap();
+        build(&list, &out, &|_, _| ()).unwrap();
+        Library::open(&out).unwrap();
+    }
+
+    #[test]
+    fn what_was_cut_out_beside_an_unreadable_photo_is_in_the_manifest() {
+        let folder = folder_with(TWO);
+        let (list, out) = (folder.path().join("photos.toml"), folder.path().join("out"));
+        build(&list, &out, &|_, _| ()).unwrap();
+        // The slab without its right third.
+        let slab = slab();
+        let shorter = Image::from_fn(120, 80, |x, y| slab[(if x < 70 { x } else { 0 }, y)]);
+        io::write(folder.path().join("one.png"), &shorter).unwrap();
+        std::fs::write(folder.path().join("two.png"), "no picture").unwrap();
+        let told = build(&list, &out, &|_, _| ()).unwrap_err().to_string();
+        assert!(told.contains("two.png: not a picture"), "{told}");
+        let library = Library::open(&out).unwrap();
+        assert_eq!(cut_outs(&library), ["a/one.exr", "a/two.exr"]);
+        let record = &library.assets[0].photos[0].record;
+        let length = record.object_m[0] * record.px_per_metre;
+        assert!((length - 40.0).abs() <= 2.0, "{length}");
     }
 }

@@ -52,6 +52,12 @@ impl CaptureEntry {
             .map_or(Ok(()), |width| SURFACE.check("captured.width", width))
     }
 
+    /// Its pictures, those of the empty display too.
+    pub(super) fn pictures(&self) -> impl Iterator<Item = &Path> {
+        let pictures = self.photos.iter().chain(&self.empty);
+        pictures.map(PathBuf::as_path)
+    }
+
     /// The same with its paths relative to a list in this folder.
     pub(super) fn located(self, locate: impl Fn(PathBuf) -> PathBuf) -> Self {
         let all = |paths: Vec<PathBuf>| paths.into_iter().map(&locate).collect();

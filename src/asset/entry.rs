@@ -232,6 +232,13 @@ impl PhotoEntry {
         }
     }
 
+    /// The pictures that its cut-out is made of.
+    pub(super) fn pictures(&self) -> impl Iterator<Item = &Path> {
+        let captured = self.captured.iter().flat_map(CaptureEntry::pictures);
+        let own = std::iter::once(self.file.as_path());
+        own.chain(captured).chain(self.screen.photo())
+    }
+
     /// Where its cut-out goes, relative to the folder.
     pub(super) fn cut_out_file(&self) -> String {
         format!("{}/{}.exr", self.asset, file_stem(&self.file))

@@ -16,7 +16,7 @@ use super::screen_source::EmptyScreens;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
 use crate::image::Image;
-use crate::io;
+use crate::io::{self, Checksum};
 use crate::matte::{ColorUncertainty, CutOut, CutOutOptions};
 use crate::pixel::{Film, LinearRgb};
 use crate::stopwatch::Stopwatch;
@@ -95,14 +95,14 @@ impl CutOutWriter<'_> {
         let CapturedObject { film, flow, record } = captured_object(entry, captured, self.options)?;
         // A display shines through the object once: nothing of what is seen is its shadow.
         let passed = film.map(Film::transmittance);
-        let film = self.write_film(&film, &passed, &record)?;
-        let path = self.folder.join(files::flow_file(&record.file));
+        let photo = self.write_film(&film, &passed, record)?;
+        let path = self.folder.join(files::flow_file(&photo.record.file));
         let flow = flow
             .map(|flow| flow_file::write(&path, &flow))
             .transpose()?;
         Ok(Photo {
             flow: flow.map(Arc::new),
-            ..Photo::new(film, record)
+            ..photo
         })
     }
 
@@ -117,23 +117,25 @@ impl CutOutWriter<'_> {
         watch.lap("cut out");
         let record = new_record(&cut, entry, &photo.rectified)?.reviewed(review.verdict);
         watch.lap("measure");
-        let film = self.write_film(&cut.film, &cut.transmittance, &record)?;
+        let photo = self.write_film(&cut.film, &cut.transmittance, record)?;
         watch.lap("write");
         watch.log(entry.file.display());
-        Ok(Photo::new(film, record))
+        Ok(photo)
     }
 
+    /// Writes film and thumbnail, and notes the checksum of the film.
     fn write_film(
         &self,
         film: &Image<Film>,
         transmittance: &Image<LinearRgb>,
-        record: &PhotoRecord,
-    ) -> Result<Image<Film>> {
+        record: PhotoRecord,
+    ) -> Result<Photo> {
         let path = self.folder.join(&record.file);
         io::create_folder(path.parent().unwrap_or(self.folder))?;
         let film = files::write(&path, film, transmittance)?;
-        check_pixels(&film).map_err(|what| Error::file(path, what))?;
-        Ok(film)
+        check_pixels(&film).map_err(|what| Error::file(&path, what))?;
+        let crc32 = Some(Checksum::from_file(&path)?.crc32);
+        Ok(Photo::new(film, PhotoRecord { crc32, ..record }))
     }
 }
 

@@ -45,9 +45,10 @@ impl Library {
     /// Opens an asset folder: checks its manifest and loads its cut-outs, several at a time.
     ///
     /// # Errors
-    /// Those of [`Manifest::read`]; [`Error::File`] for a cut-out that cannot be read or holds
-    /// values that no picture has; [`Error::Field`] (`size_m`) for
-    /// one of another size than in the manifest. Of several the first in the manifest's order.
+    /// Those of [`Manifest::read`]; [`Error::File`] for a cut-out that cannot be read, has another
+    /// checksum than in the manifest, or holds values that no picture has; [`Error::Field`]
+    /// (`size_m`) for one of another size than in the manifest. Of several the first in the
+    /// manifest's order.
     pub fn open(folder: impl AsRef<Path>) -> Result<Self> {
         Self::open_some(folder, |_| true)
     }
@@ -133,7 +134,7 @@ const ROUNDING_PX: f64 = 0.5;
 /// Reads the cut-out of a record that stands at a place of the manifest.
 fn load(folder: &Path, record: &PhotoRecord, at: &str) -> Result<Photo> {
     let path = io::inside(folder, &record.file).map_err(|e| in_manifest(e, folder, at))?;
-    let image: Image<Film> = io::read(&path)?;
+    let image: Image<Film> = io::read_checked(&path, |bytes| check_bytes(bytes, record))?;
     check_size(&image, record).map_err(|e| in_manifest(e, folder, at))?;
     check_pixels(&image).map_err(|what| Error::file(path, what))?;
     let flow =
@@ -146,6 +147,17 @@ fn load(folder: &Path, record: &PhotoRecord, at: &str) -> Result<Photo> {
 
 fn in_manifest(error: Error, folder: &Path, at: &str) -> Error {
     error.within(at).in_file(folder.join(MANIFEST))
+}
+
+/// Fails where a file is another than the manifest tells of, as a build leaves it that was
+/// interrupted: its size and outline would be those of another cut-out.
+fn check_bytes(bytes: &[u8], record: &PhotoRecord) -> std::result::Result<(), String> {
+    let is_same = |crc32: u32| crc32 == crc32fast::hash(bytes);
+    if record.crc32.is_none_or(is_same) {
+        return Ok(());
+    }
+    let advice = "build or add its photo again";
+    Err(format!("not the file that {MANIFEST} tells of: {advice}"))
 }
 
 fn check_size(image: &Image<Film>, record: &PhotoRecord) -> Result<()> {

@@ -84,6 +84,15 @@ impl List {
         check_cut_out_files(&self.photos)
     }
 
+    /// Fails for the first picture that does not exist.
+    pub(super) fn check_pictures(&self) -> Result<()> {
+        let mut pictures = self.photos.iter().flat_map(PhotoEntry::pictures);
+        pictures.try_for_each(|path| match path.metadata() {
+            Ok(_) => Ok(()),
+            Err(e) => Err(Error::file(path, e)),
+        })
+    }
+
     /// The same with the paths of a list in `folder` relative to the working folder.
     #[doc(hidden)]
     pub fn located_in(mut self, folder: &Path) -> Self {

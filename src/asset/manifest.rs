@@ -55,6 +55,9 @@ pub struct Asset<P> {
 pub struct PhotoRecord {
     /// The cut-out, relative to the folder.
     pub file: String,
+    /// CRC-32 of that file; missing in older manifests, and then any file is taken.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub crc32: Option<u32>,
     /// Name of the photo that it was cut from.
     pub source: String,
     /// Pixels of the cut-out for a metre.
@@ -412,6 +415,7 @@ impl PhotoRecord {
     ) -> Self {
         Self {
             file: file.into(),
+            crc32: None,
             source: String::new(),
             px_per_metre,
             size_m,

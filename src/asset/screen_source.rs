@@ -50,7 +50,7 @@ impl ScreenSource {
         }
     }
 
-    fn photo(&self) -> Option<&Path> {
+    pub(super) fn photo(&self) -> Option<&Path> {
         if let Self::Photo(path) = self {
             Some(path)
         } else {

@@ -121,6 +121,8 @@ pub use options::Fallback;
 pub use options::ReadOptions;
 #[doc(hidden)]
 pub use picture::Picture;
+#[cfg(feature = "pipeline")]
+pub(crate) use read::read_checked;
 pub use read::{read, read_header, read_with};
 #[doc(hidden)]
 pub use write::jpeg_bytes;

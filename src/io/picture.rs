@@ -41,8 +41,16 @@ impl Picture {
 
     pub(super) fn decode(path: &Path, options: &ReadOptions, wanted: Wanted) -> Result<Self> {
         let source = SourceFile::open(path, &options.limits)?;
-        let raster = decode_raster(&source, options, wanted);
-        Self::from_raster(raster, &source, &options.limits, wanted)
+        Self::from_source(&source, options, wanted)
+    }
+
+    pub(super) fn from_source(
+        source: &SourceFile,
+        options: &ReadOptions,
+        wanted: Wanted,
+    ) -> Result<Self> {
+        let raster = decode_raster(source, options, wanted);
+        Self::from_raster(raster, source, &options.limits, wanted)
     }
 
     /// Finds the meaning of samples, and turns the picture the way the camera was held.

@@ -38,6 +38,21 @@ pub fn read_with<P: FromFile>(path: impl AsRef<Path>, options: &ReadOptions) -> 
     Picture::decode(path.as_ref(), options, P::WANTED)?.into_image()
 }
 
+/// Reads a picture as [`read`] does, where a check finds nothing wrong with the bytes of its file.
+///
+/// # Errors
+/// As [`read`]; [`Error::File`] with what the check found.
+#[cfg(feature = "pipeline")]
+pub(crate) fn read_checked<P: FromFile>(
+    path: &Path,
+    check: impl Fn(&[u8]) -> std::result::Result<(), String>,
+) -> Result<Image<P>> {
+    let options = ReadOptions::default();
+    let source = SourceFile::open(path, &options.limits)?;
+    check(&source.bytes).map_err(|what| Error::file(path, what))?;
+    Picture::from_source(&source, &options, P::WANTED)?.into_image()
+}
+
 /// Reads the description of a picture in a file, without the pixels.
 ///
 /// # Errors
