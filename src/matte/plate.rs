@@ -4,6 +4,7 @@ mod cells;
 mod polynomial;
 
 use super::check::{check_photo, check_value, refused};
+use super::prepared::check_finite_photo;
 use super::register;
 use super::screen::{mean_color, screen_pixels, strongest_channel};
 use crate::error::Result;
@@ -95,10 +96,11 @@ impl ScreenPlate {
     /// and white balance are matched channel by channel, and its noise is blurred.
     ///
     /// # Errors
-    /// [`Error::Photo`](crate::Error::Photo) where the sizes differ, the empty screen lies farther
-    /// off than `max_shift_px`, or differs from what the photo shows of the screen by more than
-    /// `max_mismatch`; [`Error::Value`](crate::Error::Value) for an option that cannot be
-    /// right. # Panics
+    /// [`Error::Photo`](crate::Error::Photo) where the sizes differ, a pixel of the empty screen is
+    /// not a finite number, it lies farther off than `max_shift_px`, or differs from what the photo
+    /// shows of the screen by more than `max_mismatch`; [`Error::Value`](crate::Error::Value) for
+    /// an option that cannot be right.
+    /// # Panics
     /// When the sizes of photo and background differ.
     pub fn from_photo(
         empty: &Image<LinearRgb>,
@@ -108,6 +110,7 @@ impl ScreenPlate {
     ) -> Result<Self> {
         options.check()?;
         check_same_size(empty.size(), photo.size())?;
+        check_finite_photo("the empty screen", empty)?;
         let shift_px = shift_onto(photo, empty, background)?;
         options.check_shift(shift_px)?;
         let image = matched(empty, photo, background, shift_px)?;

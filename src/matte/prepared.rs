@@ -58,12 +58,20 @@ pub(super) fn square_root(p: LinearRgb) -> LinearRgb {
 
 /// Refuses a photo with a pixel that is not finite.
 pub(super) fn check_finite(photo: &Image<LinearRgb>) -> Result<()> {
-    let Some(i) = photo.pixels().iter().position(|p| !p.is_finite()) else {
-        return Ok(());
-    };
+    pixel_not_finite(photo).map_or(Ok(()), |what| Err(refused(what)))
+}
+
+/// Refuses one of several photos, by its name, with a pixel that is not finite.
+pub(super) fn check_finite_photo(name: &str, photo: &Image<LinearRgb>) -> Result<()> {
+    let what = pixel_not_finite(photo);
+    what.map_or(Ok(()), |what| Err(refused(format!("{name}: {what}"))))
+}
+
+/// What is wrong with a photo with a pixel that is not finite.
+fn pixel_not_finite(photo: &Image<LinearRgb>) -> Option<String> {
+    let i = photo.pixels().iter().position(|p| !p.is_finite())?;
     let (x, y) = (i % photo.width(), i / photo.width());
-    let what = format!("pixel ({x}, {y}) is not a finite number");
-    Err(refused(what))
+    Some(format!("pixel ({x}, {y}) is not a finite number"))
 }
 
 fn check_size(photo: &Image<LinearRgb>) -> Result<()> {

@@ -9,7 +9,7 @@ use super::check::{check_photo, check_value, refused};
 use super::film::{covered, view};
 use super::median::median;
 use super::plate::ScreenPlate;
-
+use super::prepared::check_finite_photo;
 use super::register::{self, Registered};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::Result;
@@ -86,8 +86,9 @@ pub struct Triangulated {
 ///
 /// # Errors
 /// [`Error::Value`](crate::Error::Value) (`photos`) for fewer than two or of different size;
-/// [`Error::Photo`](crate::Error::Photo) where no channel of the screens differs, the object moved
-/// farther than `max_shift_px`, turned, or moved otherwise (`least_agreement`).
+/// [`Error::Photo`](crate::Error::Photo) where a pixel of a photo is not a finite number, no channel
+/// of the screens differs, the object moved farther than `max_shift_px`, turned, or moved otherwise
+/// (`least_agreement`).
 /// # Panics
 /// When a photo and its plate differ in size.
 ///
@@ -98,6 +99,7 @@ pub fn triangulate(
     options: &TriangulateOptions,
 ) -> Result<Triangulated> {
     check_sizes(shots, inside)?;
+    check_pixels(shots)?;
     let aligned = align(shots, inside, options)?;
     let noise = strongest_noise(shots);
     let lines = fit_lines(&aligned, noise);
@@ -192,6 +194,13 @@ fn check_sizes(
         check_same_size(i, photo.size(), inside.size())?;
     }
     Ok(())
+}
+
+/// All photos are finite; they count from 1.
+fn check_pixels(shots: &[(&Image<LinearRgb>, &ScreenPlate)]) -> Result<()> {
+    let mut photos = (1..).zip(shots);
+    photos
+        .try_for_each(|(number, (photo, _))| check_finite_photo(&format!("photo {number}"), photo))
 }
 
 /// Photo `number`, from 0, has the size of the mask.

@@ -197,6 +197,18 @@ fn another_screen_is_not_taken_for_the_empty_one() {
 }
 
 #[test]
+fn an_empty_screen_with_a_pixel_that_is_not_finite_is_refused() {
+    let mut empty = screen(0.0);
+    empty[(120, 80)].b = f32::INFINITY;
+    let photo = photo(&screen(0.0), 0.002);
+    let said = ScreenPlate::from_photo(&empty, &photo, &free(), &PlateOptions::default())
+        .unwrap_err()
+        .to_string();
+    let expected = "the empty screen: pixel (120, 80) is not a finite number";
+    assert!(said.contains(expected), "{said}");
+}
+
+#[test]
 fn no_background_or_no_light_is_refused() {
     let photo = Image::filled(64, 64, GREEN);
     let none = ScreenPlate::fit(

@@ -177,6 +177,20 @@ fn screens_that_are_alike_and_single_photos_are_refused() {
 }
 
 #[test]
+fn a_pixel_that_is_not_finite_is_named_with_its_photo() {
+    let plates = [GREEN, BLUE].map(|screen| ScreenPlate::even(screen, SIZE));
+    let first = photo(GREEN, [0.0; 2], 0.0, 1);
+    for at in [(80, 50), (5, 5)] {
+        let mut second = photo(BLUE, [0.0; 2], 0.0, 2);
+        second[at].r = f32::NAN;
+        let shots = [(&first, &plates[0]), (&second, &plates[1])];
+        let refusal = triangulate(&shots, &inside(), &TriangulateOptions::default()).unwrap_err();
+        let expected = format!("photo 2: pixel {at:?} is not a finite number");
+        assert!(refusal.to_string().contains(&expected), "{refusal}");
+    }
+}
+
+#[test]
 fn outside_the_object_there_is_nothing() {
     let found = solved(&[GREEN, BLUE], [0.0; 2], 0.01).unwrap();
     assert_eq!(
