@@ -65,7 +65,7 @@ fn brighter_than_screen(
     plate: &Image<LinearRgb>,
 ) -> Mask {
     factors.zip3_map(photo, plate, |f, p, k| {
-        f.raw > MIN_PAINT_FACTOR && !is_screen(p.into(), k.into())
+        f.unbounded > MIN_PAINT_FACTOR && !is_screen(p.into(), k.into())
     })
 }
 

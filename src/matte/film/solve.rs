@@ -13,8 +13,8 @@ pub(super) struct Factor {
     pub(super) value: f32,
     /// Standard deviation of it.
     pub(super) sigma: f32,
-    /// What the photo alone gives, before anything bounds it.
-    pub(super) raw: f32,
+    /// The value before anything bounds it.
+    pub(super) unbounded: f32,
     /// Reflected light, of the channels that the screen has little of.
     pub(super) reflected: f32,
     /// Whether that light has a colour that this plastic cannot have.
@@ -26,7 +26,7 @@ impl Factor {
     pub(super) const OPAQUE: Self = Self {
         value: 0.0,
         sigma: 0.0,
-        raw: 0.0,
+        unbounded: 0.0,
         reflected: 0.0,
         coloured: false,
     };
@@ -34,7 +34,7 @@ impl Factor {
     /// As something that is plastic, whatever it looks like.
     fn of_plastic(self) -> Self {
         Self {
-            raw: self.value,
+            unbounded: self.value,
             coloured: false,
             ..self
         }
@@ -43,7 +43,7 @@ impl Factor {
     /// As something that may or may not be plastic, whose factors have the deviation `spread`.
     fn guessed(self, spread: f32) -> Self {
         Self {
-            raw: self.value,
+            unbounded: self.value,
             sigma: self.sigma / spread,
             ..self
         }
@@ -160,20 +160,20 @@ impl Solver {
     fn combine(&self, pixel: [f32; 3], measured: &PixelMeasurement, expected: f32) -> Factor {
         let &PixelMeasurement {
             through,
-            factor: raw,
+            factor,
             variance,
             ..
         } = measured;
         let prior = self.spread * self.spread;
-        let drawn = (raw * prior + expected * variance) / (prior + variance);
-        let value = drawn
+        let unbounded = (factor * prior + expected * variance) / (prior + variance);
+        let value = unbounded
             .min(largest_factor(pixel, through))
             .clamp(0.0, self.most());
         let [a, b] = self.others.map(|c| pixel[c] - value * through[c]);
         Factor {
             value,
             sigma: (prior * variance / (prior + variance)).sqrt(),
-            raw,
+            unbounded,
             reflected: (0.5 * (a + b)).max(0.0),
             coloured: self.is_coloured(a, b),
         }

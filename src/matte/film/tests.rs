@@ -280,6 +280,18 @@ fn a_label_of_the_screens_hue_is_opaque_and_said() {
 }
 
 #[test]
+fn cardboard_and_wood_have_not_the_screens_hue() {
+    for brown in [[0.4, 0.25, 0.12], [0.3, 0.17, 0.08]].map(LinearRgb::from) {
+        let photo = inside().map(|c| if c.0 > 0.0 { brown } else { GREEN });
+        let plate = ScreenPlate::even(GREEN, SIZE);
+        let found = film(&photo, &plate, &inside(), &FilmOptions::default()).unwrap();
+        assert_eq!(found.color_uncertainty.screen_hue, 0.0, "{brown:?}");
+        let middle = found.film[(90, 60)];
+        assert!(middle.opacity.g > 0.98, "{middle:?}");
+    }
+}
+
+#[test]
 fn a_label_of_a_hue_beside_the_screens_is_opaque() {
     // Lime on green, sky on blue: as bright in the screen's channel as the screen through plastic.
     for (label, screen) in [([0.3, 0.4, 0.04], GREEN), ([0.04, 0.25, 0.45], BLUE)] {
