@@ -489,6 +489,33 @@ fn nothing_that_a_keyer_reads_is_written_over() {
 }
 
 #[test]
+fn the_keyer_is_that_of_its_option_or_of_the_settings() {
+    let desk = Desk::new();
+    write_green_ramp(&desk.path("0.png"), 0.5);
+    // A screen without a hue, which the robust keyer alone refuses.
+    let keyed = |more: &[&str]| {
+        let key = [
+            "matte",
+            "key",
+            "0.png",
+            "-o",
+            "a.exr",
+            "--screen",
+            "0.5,0.5,0.5",
+        ];
+        desk.run(&[&key[..], more].concat())
+    };
+    let set = ["--set", "key.profile=robust"];
+    assert!(keyed(&[]).status.success());
+    for robust in [&set[..], &["--profile", "robust"]] {
+        assert!(!keyed(robust).status.success(), "{robust:?}");
+    }
+    let refused = keyed(&[&set[..], &["--profile", "blender-3.4"]].concat());
+    let expected = "--profile blender-3.4, but --set key.profile=robust";
+    assert!(text(&refused.stderr).contains(expected));
+}
+
+#[test]
 fn a_frame_that_cannot_be_keyed_does_not_stop_the_others() {
     let desk = Desk::new();
     write_green_ramp(&desk.path("0.png"), 0.5);

@@ -2,8 +2,9 @@
 
 use crate::error::{Error, Result};
 use crate::matte::check::check_value;
-use crate::names::by_name;
+use crate::names::{by_name, name_of};
 use serde::{Deserialize, Serialize};
+use std::fmt;
 
 /// Which keyer to be: one of the three that Blender has shipped, or the careful one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -32,6 +33,12 @@ impl Profile {
         ("blender-4.5", Self::Blender45),
         ("robust", Self::Robust),
     ];
+}
+
+impl fmt::Display for Profile {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(name_of(&Self::ALL, self))
+    }
 }
 
 impl std::str::FromStr for Profile {

@@ -47,9 +47,10 @@ pub(crate) struct KeyArgs {
     /// is core
     #[arg(long, conflicts_with_all = ["garbage", "core"])]
     auto_mattes: bool,
-    /// Which keyer to be: blender-3.4, blender-4.2, blender-4.5 or robust
-    #[arg(long, value_name = "NAME", default_value = "blender-3.4")]
-    profile: Profile,
+    /// Which keyer to be: blender-3.4, blender-4.2, blender-4.5 or robust; by default that of --set
+    /// key.profile, or blender-3.4
+    #[arg(long, value_name = "NAME")]
+    profile: Option<Profile>,
     /// A setting under Blender's name, such as key.clip_black=0.1
     #[arg(long = "set", value_name = "key.NAME=VALUE")]
     settings: Vec<Override>,
@@ -204,11 +205,22 @@ pub(crate) fn run(args: &KeyArgs, global: &GlobalArgs) -> Result<()> {
 }
 
 impl KeyArgs {
+    /// # Errors
+    /// Where `--profile` names another keyer than the settings.
     fn options(&self) -> Result<KeyOptions> {
-        Ok(KeyOptions {
-            profile: self.profile,
-            ..io::from_overrides("key", &self.settings)?
-        })
+        let Some(profile) = self.profile else {
+            return Ok(io::from_overrides("key", &self.settings)?);
+        };
+        // Settings that name one replace it.
+        let named: Override = format!("key.profile={profile}").parse()?;
+        let settings = [&[named], &self.settings[..]].concat();
+        let options: KeyOptions = io::from_overrides("key", &settings)?;
+        let set = options.profile;
+        anyhow::ensure!(
+            set == profile,
+            "--profile {profile}, but --set key.profile={set}"
+        );
+        Ok(options)
     }
 }
 
