@@ -88,10 +88,11 @@ impl Built {
     }
 }
 
-/// A list from a file, whose classes are added to the manifest; its paths are made relative to the
-/// working folder.
+/// A list from a file, whose classes are added to the manifest; what it does not tell of an
+/// object's body is taken from there, and its paths are made relative to the working folder.
 fn checked(list: List, path: &Path, manifest: &mut Manifest) -> Result<List> {
     list.check(manifest).map_err(|e| e.in_file(path))?;
+    let list = list.with_bodies(|asset| manifest.known_body(asset));
     let list = list.located_in(path.parent().unwrap_or(Path::new("")));
     list.check_pictures()?;
     Ok(list)
@@ -253,6 +254,24 @@ mod tests {
         assert!((asset.photos[1].record.object_m[0] - 0.6).abs() <= 0.02);
         assert!((asset.photos[1].record.object_m[1] - 0.3).abs() <= 0.02);
         assert_eq!(asset.photos[1].record.source, "two.png");
+    }
+
+    #[test]
+    fn what_an_asset_weighs_stays_where_a_later_photo_does_not_tell() {
+        let body = |library: &Library| [library.assets[0].thickness, library.assets[0].mass];
+        let first = TWO.replacen("0.3\n", "0.3\nthickness = 0.06\nmass = 0.04\n", 1);
+        assert_eq!(body(&built(&first).unwrap()), [0.06, 0.04]);
+        let folder = folder_with(&first);
+        let (list, out) = (folder.path().join("photos.toml"), folder.path().join("out"));
+        build(&list, &out, &|_, _| ()).unwrap();
+        let later = TWO.replacen("0.3\n", "0.3\nmass = 0.05\n", 1);
+        std::fs::write(&list, later).unwrap();
+        let built = build(&list, &out, &|_, _| ()).unwrap();
+        assert_eq!(body(&built.library), [0.06, 0.05]);
+        let file = folder.path().join("two.png");
+        let entry = PhotoEntry::new(file, "a", "cap", Scale::Length(0.3));
+        add_photo(&out, &entry, &[], &CutOutOptions::default()).unwrap();
+        assert_eq!(body(&Library::open(&out).unwrap()), [0.06, 0.05]);
     }
 
     #[test]

@@ -216,7 +216,7 @@ struct Placed<'a> {
 
 impl<'a> Placed<'a> {
     fn new(entry: &'a PhotoEntry, pitch: f64, view: &View, pose: ScreenPose) -> Self {
-        let height = entry.thickness / 2.0;
+        let height = entry.thickness() / 2.0;
         let warnings = pose_warning(&pose)
             .into_iter()
             .chain(thickness_warning(entry));
@@ -348,7 +348,7 @@ fn pose_warning(pose: &ScreenPose) -> Option<Diagnostic> {
 
 /// The warning about an entry that says nothing of its object's thickness.
 fn thickness_warning(entry: &PhotoEntry) -> Option<Diagnostic> {
-    let is_default = (entry.thickness - DEFAULT_THICKNESS).abs() < f64::EPSILON;
+    let is_default = (entry.thickness() - DEFAULT_THICKNESS).abs() < f64::EPSILON;
     is_default.then(|| {
         let what = format!(
             "thickness: {DEFAULT_THICKNESS}, the default; size and refraction are those at half of it, expected \

@@ -1,5 +1,6 @@
 //! A photo and what is known of its object.
 
+use super::body::KnownBody;
 use super::capture_entry::CaptureEntry;
 use super::manifest::{Asset, Manifest, PhotoRecord, check_class, check_name};
 use super::role::Role;
@@ -64,24 +65,17 @@ pub struct PhotoEntry {
     /// that of the list.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub matte: Option<MatteMethod>,
-    /// Thickness of the body that falls, metres. Default: 0.005.
-    #[serde(default = "default_thickness")]
-    pub thickness: f64,
-    /// Mass, kilograms. Default: 0.025.
-    #[serde(default = "default_mass")]
-    pub mass: f64,
-}
-
-fn default_thickness() -> f64 {
-    DEFAULT_THICKNESS
-}
-
-fn default_mass() -> f64 {
-    DEFAULT_MASS
+    /// Thickness of the body that falls, metres. Default: what another photo of the asset in the
+    /// list says, or else the folder, or else 0.005.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub thickness: Option<f64>,
+    /// Mass, kilograms. Default: in the same way, or else 0.025.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mass: Option<f64>,
 }
 
 impl PhotoEntry {
-    /// A photo of an object of default thickness and mass.
+    /// A photo of an object whose thickness and mass it does not tell.
     pub fn new(
         file: impl Into<PathBuf>,
         asset: impl Into<String>,
@@ -102,8 +96,8 @@ impl PhotoEntry {
             captured: None,
             screen: ScreenSource::Auto,
             matte: None,
-            thickness: DEFAULT_THICKNESS,
-            mass: DEFAULT_MASS,
+            thickness: None,
+            mass: None,
         };
         entry.set_scale(scale);
         entry
@@ -185,8 +179,8 @@ impl PhotoEntry {
         self.check_class(manifest)?;
         scale.check()?;
         self.check_capture()?;
-        THICKNESS.check("thickness", self.thickness)?;
-        MASS.check("mass", self.mass)
+        THICKNESS.check("thickness", self.thickness())?;
+        MASS.check("mass", self.mass())
     }
 
     /// What is measured on a display has no other matte.
@@ -220,14 +214,40 @@ impl PhotoEntry {
         self.role.is_object().then_some(&self.class)
     }
 
+    /// Thickness of the body that falls, metres.
+    pub(super) fn thickness(&self) -> f64 {
+        self.thickness.unwrap_or(DEFAULT_THICKNESS)
+    }
+
+    fn mass(&self) -> f64 {
+        self.mass.unwrap_or(DEFAULT_MASS)
+    }
+
+    pub(super) fn known_body(&self) -> KnownBody {
+        KnownBody {
+            thickness: self.thickness,
+            mass: self.mass,
+        }
+    }
+
+    /// The same with what it does not tell of its object's body.
+    pub(super) fn with_body(self, known: KnownBody) -> Self {
+        let KnownBody { thickness, mass } = self.known_body().or(known);
+        Self {
+            thickness,
+            mass,
+            ..self
+        }
+    }
+
     /// The object of this entry with one cut-out.
     pub(super) fn asset_with(&self, photo: PhotoRecord) -> Asset<PhotoRecord> {
         Asset {
             name: self.asset.clone(),
             role: self.role,
             class: self.class.clone(),
-            thickness: self.thickness,
-            mass: self.mass,
+            thickness: self.thickness(),
+            mass: self.mass(),
             photos: vec![photo],
         }
     }

@@ -45,6 +45,7 @@ pub fn add_photo(
     let mut manifest = read_or_new(folder)?;
     manifest.add_classes(classes, entry.label_class().into_iter())?;
     entry.check(&manifest)?;
+    let entry = &entry.clone().with_body(manifest.known_body(&entry.asset));
     let writer = CutOutWriter {
         folder,
         options,

@@ -1,5 +1,6 @@
 //! A list of photos, as a person or a spreadsheet writes it.
 
+use super::body::KnownBody;
 use super::entry::PhotoEntry;
 use super::manifest::{Manifest, check_each};
 use super::spreadsheet::{self, SpreadsheetRow};
@@ -47,17 +48,39 @@ pub struct List {
 const LIST_NAMES: [&str; 2] = ["photos.toml", "photos.csv"];
 
 impl List {
-    /// Reads a list: CSV where the file is called so, else TOML.
+    /// Reads a list: CSV where the file is called so, else TOML. Thickness and mass that one photo of
+    /// an asset gives are those of all.
     ///
     /// # Errors
     /// [`Error::File`] for a file that cannot be read or understood, with its line.
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
-        if is_csv(path) {
-            Self::from_csv(path)
-        } else {
-            io::read_toml(path)
+        let list: Self = match is_csv(path) {
+            true => Self::from_csv(path)?,
+            false => io::read_toml(path)?,
+        };
+        let bodies = list.bodies();
+        Ok(list.with_bodies(|asset| bodies.get(asset).copied().unwrap_or_default()))
+    }
+
+    /// What its photos tell of each asset's body.
+    fn bodies(&self) -> BTreeMap<String, KnownBody> {
+        let mut bodies = BTreeMap::<_, KnownBody>::new();
+        for photo in &self.photos {
+            let known = bodies.entry(photo.asset.clone()).or_default();
+            *known = known.or(photo.known_body());
         }
+        bodies
+    }
+
+    /// The same with what is known elsewhere of the bodies of its assets.
+    pub(super) fn with_bodies(mut self, known: impl Fn(&str) -> KnownBody) -> Self {
+        let photos = self.photos.into_iter().map(|photo| {
+            let known = known(&photo.asset);
+            photo.with_body(known)
+        });
+        self.photos = photos.collect();
+        self
     }
 
     fn from_csv(path: &Path) -> Result<Self> {
@@ -81,7 +104,18 @@ impl List {
             return Err(Error::value("photos", "empty, expected at least one"));
         }
         check_each(&self.photos, "photos", |photo| photo.check(manifest))?;
+        self.check_bodies()?;
         check_cut_out_files(&self.photos)
+    }
+
+    /// No two photos of an asset tell different things of its body.
+    fn check_bodies(&self) -> Result<()> {
+        let bodies = self.bodies();
+        check_each(&self.photos, "photos", |photo| {
+            let (told, first) = (photo.known_body(), bodies[&photo.asset]);
+            check_same("thickness", told.thickness, first.thickness)?;
+            check_same("mass", told.mass, first.mass)
+        })
     }
 
     /// Fails for the first picture that does not exist.
@@ -125,6 +159,17 @@ pub fn check_cut_out_files(photos: &[PhotoEntry]) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// Fails where a photo gives another value than the first of its asset.
+fn check_same(name: &str, told: Option<f64>, first: Option<f64>) -> Result<()> {
+    match (told, first) {
+        (Some(told), Some(first)) if told != first => {
+            let what = format!("{told}, but another photo of the asset has {first}");
+            Err(Error::value(name, what))
+        }
+        _ => Ok(()),
+    }
 }
 
 fn is_csv(path: &Path) -> bool {
@@ -231,6 +276,28 @@ mod tests {
             let expected = "photos[0].class: missing, expected its name, or role = \"distractor\"";
             assert_eq!(told, expected);
         }
+    }
+
+    #[test]
+    fn photos_of_one_asset_share_what_one_of_them_tells_of_its_body() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("photos.csv");
+        let listed = |rows: &str| {
+            let header = "file,asset,class,length,thickness,mass\n";
+            std::fs::write(&path, format!("{header}{rows}")).unwrap();
+            List::read(&path).unwrap()
+        };
+        let list = listed("1.png,a,c,0.2,,\n2.png,b,c,0.2,,\n3.png,a,c,0.2,0.06,0.04\n");
+        let told = list
+            .photos
+            .iter()
+            .map(|photo| (photo.thickness, photo.mass));
+        let a = (Some(0.06), Some(0.04));
+        assert_eq!(told.collect::<Vec<_>>(), [a, (None, None), a]);
+        let list = listed("1.png,a,c,0.2,0.06,0.04\n2.png,a,c,0.2,,0.03\n");
+        let refusal = list.check(&mut Manifest::default()).unwrap_err();
+        let expected = "photos[1].mass: 0.03, but another photo of the asset has 0.04";
+        assert_eq!(refusal.to_string(), expected);
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! The manifest of an asset folder: what is in it, as TOML.
 
 use super::MANIFEST;
+use super::body::KnownBody;
 use super::review::Verdict;
 use super::role::Role;
 use crate::bounds::{Bounds, MASS, OBJECT, PX_PER_METRE, THICKNESS, WIDTH};
@@ -298,6 +299,15 @@ impl Manifest {
         }
         let what = unexpected_order(&declared.join(", "), &self.classes.join(", "));
         Err(Error::value("classes", what))
+    }
+
+    /// What the folder knows of the body of an asset.
+    pub(super) fn known_body(&self, name: &str) -> KnownBody {
+        let known = self.assets.iter().find(|asset| asset.name == name);
+        known.map_or_else(KnownBody::default, |asset| KnownBody {
+            thickness: Some(asset.thickness),
+            mass: Some(asset.mass),
+        })
     }
 
     /// Place of a class in the list.

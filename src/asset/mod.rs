@@ -11,6 +11,7 @@
 //! photos.toml -build-> folder and Library        folder -Library::open-> Library        photo -add_photo-> the same folder
 //! ```
 
+mod body;
 mod build;
 mod capture_entry;
 mod captured;
@@ -80,8 +81,7 @@ pub use texture::Texture;
 pub(crate) const MANIFEST: &str = "assets.toml";
 
 /// Thickness of an asset where none is given, metres: the thin box of the paper's colliders.
-#[doc(hidden)]
-pub const DEFAULT_THICKNESS: f64 = 0.005;
+pub(crate) const DEFAULT_THICKNESS: f64 = 0.005;
 
 /// Mass of an asset where none is given, kilograms: a PET bottle of half a litre to a litre.
 pub(crate) const DEFAULT_MASS: f64 = 0.025;

@@ -90,9 +90,12 @@ pub(crate) struct AddPhotoArgs {
     #[command(flatten)]
     capture: CaptureArgs,
     /// Thickness of the object as it lies, metres: with --screen-size, --marker-size or --captured
-    /// its size is that at half its height
-    #[arg(long, value_name = "METRES", default_value_t = asset::DEFAULT_THICKNESS)]
-    thickness: f64,
+    /// its size is that at half its height; by default what the folder has for this asset, or 0.005
+    #[arg(long, value_name = "METRES")]
+    thickness: Option<f64>,
+    /// Mass of the object, kilograms; by default what the folder has for this asset, or 0.025
+    #[arg(long, value_name = "KILOGRAMS")]
+    mass: Option<f64>,
     /// draft, normal or reference: how finely the object is searched and kept
     #[arg(long, default_value_t)]
     quality: Quality,
@@ -348,6 +351,7 @@ impl AddPhotoArgs {
             screen: self.screen.clone(),
             matte: self.matte,
             thickness: self.thickness,
+            mass: self.mass,
             captured: self.scale.captured.then(|| self.capture_entry()),
             ..PhotoEntry::new(photo, self.asset_name(), self.class_name(), scale)
         }
