@@ -1,65 +1,127 @@
 //! Painting over what is not to be seen in a photo.
 
+use crate::camera::square_from_corners;
+use crate::filter::sample_bilinear_clamped;
+use crate::geom::{Homography, Point2};
 use crate::image::{Image, Roi};
 use crate::pixel::{LinearRgb, Mix};
 
-/// A Coons patch between the sides of a part of a picture: no edge is left.
-struct CoonsPatch<'a> {
-    source: &'a Image<LinearRgb>,
-    /// First and last column and row around the part, inside the picture.
-    columns: [usize; 2],
-    rows: [usize; 2],
+/// A square as a picture shows it, from wherever that was taken.
+pub(super) struct SeenSquare {
+    corners_px: [Point2<f64>; 4],
+    picture_from_square: Homography,
+    square_from_picture: Homography,
 }
 
-/// Puts what its four sides show in place of a part of a picture.
-pub(super) fn inpaint(picture: &mut Image<LinearRgb>, part: Roi) {
+impl SeenSquare {
+    /// A square by its corners, pixels, with a margin around it that is a share of its side; none
+    /// for corners on a line.
+    pub(super) fn new(corners_px: &[Point2<f64>; 4], margin: f64) -> Option<Self> {
+        let (low, high) = (-margin, 1.0 + margin);
+        let inner = square_from_corners(corners_px);
+        let corners_px = [[low, low], [high, low], [high, high], [low, high]]
+            .map(|corner| inner.map(corner.into()));
+        let picture_from_square = square_from_corners(&corners_px);
+        Some(Self {
+            corners_px,
+            picture_from_square,
+            square_from_picture: picture_from_square.inverse()?,
+        })
+    }
+
+    /// Whether a point of the picture is in it.
+    pub(super) fn contains(&self, point: Point2<f64>) -> bool {
+        self.place_of(point).is_some()
+    }
+
+    /// Points on its sides, a pixel apart or less.
+    pub(super) fn border(&self) -> impl Iterator<Item = Point2<f64>> {
+        let corners = self.corners_px;
+        (0..4).flat_map(move |i| points_between(corners[i], corners[(i + 1) % 4]))
+    }
+
+    /// Where in the unit square a point of the picture is; none outside.
+    fn place_of(&self, point: Point2<f64>) -> Option<Point2<f64>> {
+        let place = self.square_from_picture.map(point);
+        let is_inside = place.iter().all(|at| (0.0..=1.0).contains(at));
+        is_inside.then_some(place)
+    }
+
+    /// The pixels of a picture that it may reach.
+    fn roi(&self, (w, h): (usize, usize)) -> Roi {
+        Roi::spanning(
+            span(self.corners_px.map(|c| c.x), w),
+            span(self.corners_px.map(|c| c.y), h),
+        )
+    }
+}
+
+fn points_between(a: Point2<f64>, b: Point2<f64>) -> impl Iterator<Item = Point2<f64>> {
+    let steps = (b - a).norm().ceil().max(1.0);
+    (0..steps as usize).map(move |i| a + (b - a) * (i as f64 / steps))
+}
+
+/// The whole numbers below `end` between some values.
+fn span(values: [f64; 4], end: usize) -> std::ops::Range<usize> {
+    let low = values.into_iter().fold(f64::MAX, f64::min).floor();
+    let high = values.into_iter().fold(f64::MIN, f64::max).ceil();
+    let [low, high] = [low, high].map(|v| v.clamp(0.0, end as f64) as usize);
+    low..high.max(low)
+}
+
+/// Puts what its four sides show in place of a square.
+pub(super) fn inpaint(picture: &mut Image<LinearRgb>, square: &SeenSquare) {
     let source = picture.clone();
-    let patch = CoonsPatch::new(&source, part);
+    let patch = CoonsPatch::new(&source, square);
+    let part = square.roi(source.size());
     for y in part.y..part.y + part.height {
         for x in part.x..part.x + part.width {
-            picture[(x, y)] = patch.at(x, y);
+            if let Some(place) = square.place_of(Point2::new(x as f64 + 0.5, y as f64 + 0.5)) {
+                picture[(x, y)] = patch.at(place);
+            }
         }
     }
+}
+
+/// A Coons patch between the sides of a square: no edge is left.
+struct CoonsPatch<'a> {
+    source: &'a Image<LinearRgb>,
+    square: &'a SeenSquare,
+    /// Top left, top right, bottom left, bottom right.
+    corners: [LinearRgb; 4],
 }
 
 impl<'a> CoonsPatch<'a> {
-    fn new(source: &'a Image<LinearRgb>, part: Roi) -> Self {
-        let (w, h) = source.size();
+    fn new(source: &'a Image<LinearRgb>, square: &'a SeenSquare) -> Self {
+        let corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]]
+            .map(|[s, t]| seen_at(source, square, s, t));
         Self {
             source,
-            columns: around(part.x, part.width, w),
-            rows: around(part.y, part.height, h),
+            square,
+            corners,
         }
     }
 
-    fn at(&self, x: usize, y: usize) -> LinearRgb {
-        let (source, [top, bottom]) = (self.source, self.rows);
-        let s = share(x, self.columns);
-        let t = share(y, self.rows);
-        let across = self.mixed_row(y, s);
-        let down = mix(source[(x, top)], source[(x, bottom)], t);
-        let corners = mix(self.mixed_row(top, s), self.mixed_row(bottom, s), t);
-        across.add_scaled(1.0, down).add_scaled(-1.0, corners)
-    }
-
-    /// Between the left and the right side in one row.
-    fn mixed_row(&self, y: usize, s: f32) -> LinearRgb {
-        let [left, right] = self.columns;
-        mix(self.source[(left, y)], self.source[(right, y)], s)
+    fn at(&self, place: Point2<f64>) -> LinearRgb {
+        let side = |s, t| seen_at(self.source, self.square, s, t);
+        let (s, t) = (place.x as f32, place.y as f32);
+        let [top_left, top_right, bottom_left, bottom_right] = self.corners;
+        let across = mix(side(0.0, place.y), side(1.0, place.y), s);
+        let down = mix(side(place.x, 0.0), side(place.x, 1.0), t);
+        let (top, bottom) = (
+            mix(top_left, top_right, s),
+            mix(bottom_left, bottom_right, s),
+        );
+        across
+            .add_scaled(1.0, down)
+            .add_scaled(-1.0, mix(top, bottom, t))
     }
 }
 
-/// The places before and behind a range, where there are such.
-fn around(start: usize, length: usize, end: usize) -> [usize; 2] {
-    [
-        start.saturating_sub(1),
-        (start + length).min(end.saturating_sub(1)),
-    ]
-}
-
-/// How far a place is from one to another, 0 to 1.
-fn share(at: usize, [first, last]: [usize; 2]) -> f32 {
-    (at - first) as f32 / (last - first).max(1) as f32
+/// What a picture shows at a place of the unit square; beyond the picture its nearest pixel.
+fn seen_at(picture: &Image<LinearRgb>, square: &SeenSquare, s: f64, t: f64) -> LinearRgb {
+    let at = square.picture_from_square.map(Point2::new(s, t));
+    sample_bilinear_clamped(picture, at.x, at.y)
 }
 
 fn mix(a: LinearRgb, b: LinearRgb, share: f32) -> LinearRgb {
@@ -71,29 +133,28 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_marker_is_painted_over_without_an_edge() {
+    fn a_marker_is_painted_over_without_an_edge_however_it_is_turned() {
         let slope = |x: usize, y: usize| {
             LinearRgb::new(0.05, 0.3 + 0.001 * x as f32 + 0.0005 * y as f32, 0.1)
         };
-        let mut picture = Image::from_fn(80, 60, slope);
-        let part = Roi {
-            x: 20,
-            y: 10,
-            width: 30,
-            height: 30,
-        };
-        (0..900).for_each(|i| picture[(20 + i % 30, 10 + i / 30)] = LinearRgb::WHITE);
-        inpaint(&mut picture, part);
-        let off = picture.zip_map(&Image::from_fn(80, 60, slope), |a, b| (a.g - b.g).abs());
-        assert!(off.pixels().iter().all(|off| *off < 1e-5));
-        inpaint(
-            &mut picture,
-            Roi {
-                x: 0,
-                y: 0,
-                width: 80,
-                height: 60,
-            },
-        );
+        for corners in [
+            [[20.0, 10.0], [50.0, 10.0], [50.0, 40.0], [20.0, 40.0]],
+            [[40.0, 8.0], [62.0, 30.0], [40.0, 52.0], [18.0, 30.0]],
+        ] {
+            let corners = corners.map(Point2::from);
+            let marker = SeenSquare::new(&corners, 0.0).unwrap();
+            let paper = SeenSquare::new(&corners, 0.1).unwrap();
+            let mut picture = Image::from_fn(80, 60, |x, y| {
+                match marker.contains(Point2::new(x as f64 + 0.5, y as f64 + 0.5)) {
+                    true => LinearRgb::WHITE,
+                    false => slope(x, y),
+                }
+            });
+            inpaint(&mut picture, &paper);
+            let off = picture.zip_map(&Image::from_fn(80, 60, slope), |a, b| (a.g - b.g).abs());
+            assert!(off.pixels().iter().all(|off| *off < 1e-5));
+            // One that reaches beyond the picture.
+            inpaint(&mut picture, &SeenSquare::new(&corners, 2.0).unwrap());
+        }
     }
 }

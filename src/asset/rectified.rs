@@ -1,15 +1,17 @@
 //! A photo seen from straight above, by what lies in the plane of its screen: the screen's own four
 //! corners, or a printed marker.
 
-use super::inpaint::inpaint;
+use super::inpaint::{SeenSquare, inpaint};
 use super::screen_pose::{ReferenceRectangle, ScreenPose, scale_unknown};
 use super::top_view::{TopView, size_px};
 use crate::camera::{Marker, any_markers};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::error::Result;
+use crate::error::{Error, Result};
+use crate::filter::sample_nearest;
 use crate::geom::Point2;
-use crate::image::{Image, Roi};
+use crate::image::Image;
 use crate::io::Header;
+use crate::matte::median::median;
 use crate::matte::{ScreenCorners, from_top_left, screen_corners};
 use crate::pixel::LinearRgb;
 use std::borrow::Cow;
@@ -18,6 +20,14 @@ use std::borrow::Cow;
 const CLICK_SIGMA_PX: f64 = 1.0;
 /// A marker has a white margin, at most as wide as this share of its black square.
 const MARKER_MARGIN: f64 = 0.35;
+/// Beyond the margin, pixels: a printer's and the corners' own error.
+const MARKER_EDGE_PX: f64 = 2.0;
+/// What is painted over a marker is seen around it: where more than this share of that is not the
+/// screen, something else is smeared over the screen.
+const MAX_OTHER_SHARE: f64 = 0.03;
+/// Not the screen is what differs from it by this share of its brightest channel: more than its
+/// light is uneven around a marker, less than clear plastic dims it.
+const MIN_OTHER_DIFFERENCE: f32 = 0.3;
 /// Sides that may be exchanged need a review where that makes lengths differ by this share.
 const REVIEWED_SWAP_ERROR: f64 = 0.01;
 
@@ -86,7 +96,9 @@ impl RectifiedPhoto {
         };
         let pose = ScreenPose::solve(&reference, size_px(&photo), header)?;
         let view = TopView::of_photo(pose, height)?;
-        Self::through(view, without_markers(photo, &markers))
+        let papers: Vec<_> = markers.iter().filter_map(paper_of).collect();
+        check_free(&photo, &papers)?;
+        Self::through(view, without_markers(photo, &papers))
     }
 
     fn through(view: TopView, photo: Image<LinearRgb>) -> Result<Self> {
@@ -161,28 +173,63 @@ fn doubled_area(corners: &[Point2<f64>; 4]) -> f64 {
         .abs()
 }
 
-fn without_markers(mut photo: Image<LinearRgb>, markers: &[Marker]) -> Image<LinearRgb> {
-    for marker in markers {
-        let part = paper_of(&marker.corners_px, photo.size());
-        inpaint(&mut photo, part);
+fn without_markers(mut photo: Image<LinearRgb>, papers: &[SeenSquare]) -> Image<LinearRgb> {
+    for paper in papers {
+        inpaint(&mut photo, paper);
     }
     photo
 }
 
-/// A marker and its white margin, in whole pixels.
-fn paper_of(corners: &[Point2<f64>; 4], (w, h): (usize, usize)) -> Roi {
-    Roi::spanning(
-        span_with_margin(corners.map(|c| c.x), w),
-        span_with_margin(corners.map(|c| c.y), h),
-    )
+/// A marker and its white margin.
+fn paper_of(marker: &Marker) -> Option<SeenSquare> {
+    let side_px = (doubled_area(&marker.corners_px) / 2.0).sqrt();
+    let margin = MARKER_MARGIN + MARKER_EDGE_PX / side_px;
+    SeenSquare::new(&marker.corners_px, margin)
 }
 
-fn span_with_margin(values: [f64; 4], end: usize) -> std::ops::Range<usize> {
-    let low = values.into_iter().fold(f64::MAX, f64::min);
-    let high = values.into_iter().fold(f64::MIN, f64::max);
-    let margin = MARKER_MARGIN * (high - low) + 2.0;
-    let [low, high] = [low - margin, high + margin].map(|v| v.clamp(0.0, end as f64) as usize);
-    low..high.max(low)
+/// Fails where something else than the screen is seen around a marker.
+fn check_free(photo: &Image<LinearRgb>, papers: &[SeenSquare]) -> Result<()> {
+    let is_free = |paper| other_share(&colors_around(paper, photo, papers)) <= MAX_OTHER_SHARE;
+    if papers.iter().all(is_free) {
+        return Ok(());
+    }
+    let what = "a marker lies too near the object or the edge of the screen; leave at least half its side free \
+                around it";
+    Err(Error::Photo { what: what.into() })
+}
+
+/// What a photo shows around a marker's paper, but for that of others.
+fn colors_around(
+    paper: &SeenSquare,
+    photo: &Image<LinearRgb>,
+    papers: &[SeenSquare],
+) -> Vec<LinearRgb> {
+    let others = || papers.iter().filter(|other| !std::ptr::eq(*other, paper));
+    let free = paper
+        .border()
+        .filter(|at| !others().any(|other| other.contains(*at)));
+    free.filter_map(|at| sample_nearest(photo, at.x, at.y))
+        .collect()
+}
+
+/// The share of colours that differ from their median.
+fn other_share(colors: &[LinearRgb]) -> f64 {
+    let middle = |channel: fn(&LinearRgb) -> f32| {
+        median(colors.iter().map(channel), f32::total_cmp).unwrap_or_default()
+    };
+    let screen = LinearRgb::new(middle(|c| c.r), middle(|c| c.g), middle(|c| c.b));
+    let most = MIN_OTHER_DIFFERENCE * screen.max_channel();
+    let other = colors
+        .iter()
+        .filter(|color| largest_difference(**color, screen) > most);
+    other.count() as f64 / colors.len().max(1) as f64
+}
+
+fn largest_difference(a: LinearRgb, b: LinearRgb) -> f32 {
+    [a.r - b.r, a.g - b.g, a.b - b.b]
+        .map(f32::abs)
+        .into_iter()
+        .fold(0.0, f32::max)
 }
 
 #[cfg(test)]
@@ -452,6 +499,49 @@ mod tests {
     fn a_printed_marker_tells_the_size_of_what_lies_beside_it() {
         let photo = photo(&camera(0.35, 2400.0), true);
         assert_slab(added(&photo, Scale::Marker(MARKER)));
+    }
+
+    /// A slab on a screen from above, a millimetre a pixel, and a marker turned beside its upper left
+    /// corner, which is at (200, 200).
+    fn slab_beside_marker(middle: [f64; 2], turn: f64) -> Image<LinearRgb> {
+        let marker = printed(7, 12);
+        let (sin, cos) = (libm::sin(turn), libm::cos(turn));
+        Image::from_fn(500, 400, |x, y| {
+            let [dx, dy] = [x as f64 + 0.5 - middle[0], y as f64 + 0.5 - middle[1]];
+            let on_paper = [48.0 + cos * dx + sin * dy, 48.0 - sin * dx + cos * dy];
+            let slab = (200..380).contains(&x) && (200..280).contains(&y);
+            match sample_nearest(&marker, on_paper[0], on_paper[1]) {
+                Some(ink) => ink,
+                None if slab => LinearRgb::new(0.6, 0.05, 0.05),
+                None => LinearRgb::new(0.05, 0.4, 0.1),
+            }
+        })
+    }
+
+    #[test]
+    fn a_marker_beside_the_object_leaves_its_size_however_it_is_turned() {
+        let turn = std::f64::consts::FRAC_PI_4;
+        for (middle, turn) in [([148.0, 148.0], turn), ([130.0, 240.0], 0.0)] {
+            assert_slab(added(
+                &slab_beside_marker(middle, turn),
+                Scale::Marker(MARKER),
+            ));
+        }
+    }
+
+    #[test]
+    fn a_marker_that_is_painted_over_with_the_object_is_refused() {
+        let turn = std::f64::consts::FRAC_PI_4;
+        for (middle, turn) in [([160.0, 160.0], turn), ([142.0, 240.0], 0.0)] {
+            let photo = slab_beside_marker(middle, turn);
+            let reported = added(&photo, Scale::Marker(MARKER))
+                .unwrap_err()
+                .to_string();
+            assert!(
+                reported.contains("a.png: a marker lies too near the object"),
+                "{reported}"
+            );
+        }
     }
 
     #[test]

@@ -89,6 +89,7 @@ pub use read::read_label;
 #[doc(hidden)]
 pub use read::{LabelledPhoto, check_distance, read_labels, with_photo};
 pub(crate) use read::{apply_exif, labels_in};
+pub(crate) use rectangle::square_from_corners;
 pub use rectify::warp;
 #[doc(hidden)]
 pub use rectify::{project_picture, rectify};

@@ -135,7 +135,8 @@ struct ScaleArgs {
     #[arg(long, value_name = "WxH", value_parser = parse_metres)]
     screen_size: Option<[f64; 2]>,
     /// Or: side of the black square of a printed marker on the screen, metres (AprilTag tag36h11
-    /// or ArUco DICT_4X4_50); cut its paper to a white margin of at most a third of that
+    /// or ArUco DICT_4X4_50); cut its paper to a white margin of at most a third of that, and leave
+    /// half its side free between it and the object
     #[arg(long, value_name = "METRES")]
     marker_size: Option<f64>,
     /// Or: the photos are one object on a luminous display that shows the frames of `capture
