@@ -240,6 +240,7 @@ mod tests {
     use crate::camera::{Camera, printed, project_picture};
     use crate::filter::Pyramid;
     use crate::geom::{Point3, Pose, UnitQuaternion, Vector2, Vector3};
+    use crate::image::Roi;
     use crate::io;
     use crate::matte::CutOutOptions;
     use crate::pixel::Coverage;
@@ -433,7 +434,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         io::write(folder.path().join("a.png"), photo).unwrap();
         let entry = PhotoEntry {
-            thickness: 1e-4,
+            thickness: Some(1e-4),
             ..PhotoEntry::new(folder.path().join("a.png"), "a", "slab", scale)
         };
         let record = add_photo(

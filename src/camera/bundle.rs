@@ -98,7 +98,7 @@ impl Bundle {
         let labels: Vec<&Label> = used.iter().map(|&i| &labels[i]).collect();
         let problems = labels
             .iter()
-            .map(|label| Problem::with_focal(label, framing_or(label, unknown), focal, options))
+            .map(|label| Problem::new(label, framing_or(label, unknown), focal, options))
             .collect::<Result<Vec<_>, _>>()?;
         let surface = surfaces_shown(labels.into_iter().zip(&problems));
         Self::from_problems(problems, surface)

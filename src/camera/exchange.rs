@@ -258,9 +258,10 @@ fn colmap_intrinsics(camera: &Camera, k1: f64) -> String {
     let [w, h] = camera.image;
     let (f, c) = (camera.focal_px, camera.principal_px);
     let pinhole = format!("{w} {h} {:?} {:?} {:?} {:?}", f.x, f.y, c.x, c.y);
-    match k1 {
-        0.0 => format!("PINHOLE {pinhole}"),
-        k1 => format!("OPENCV {pinhole} {k1:?} 0 0 0"),
+    if k1 == 0.0 {
+        format!("PINHOLE {pinhole}")
+    } else {
+        format!("OPENCV {pinhole} {k1:?} 0 0 0")
     }
 }
 

@@ -255,7 +255,7 @@ mod tests {
         };
         write_photo(&folder.path().join("wide.jpg"), [equivalent(26)]);
         write_photo(&folder.path().join("tele.jpg"), [equivalent(77)]);
-        write_photo(&folder.path().join("bare.jpg"), []);
+        io::write(folder.path().join("bare.jpg"), &Image::<Srgb8>::new(90, 60)).unwrap();
         let mut wide = new_label("wide.jpg", None);
         (wide.camera.focal_sigma, wide.camera.focal_fixed) = (Some(0.01), true);
         let known = |label: Label| {

@@ -449,7 +449,11 @@ mod tests {
             }
             label
         };
-        let views = Scenario::realistic().views(31, 6, count, [15.0, 35.0]);
+        let scenario = Scenario {
+            kappa: 0.0,
+            ..Scenario::realistic()
+        };
+        let views = scenario.views(31, 6, count, [15.0, 35.0]);
         views.into_iter().map(&mut pointed).collect()
     }
 
@@ -461,7 +465,7 @@ mod tests {
             let outliers = joint.outliers.into_iter();
             outliers.map(|outlier| outlier.photo).collect::<Vec<_>>()
         };
-        assert_eq!(outliers(&labels), []);
+        assert_eq!(outliers(&labels), Vec::<usize>::new());
         // Zoomed in by 5 %.
         let zoomed = |px: &mut [f64; 2]| {
             *px = [

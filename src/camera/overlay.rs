@@ -431,16 +431,19 @@ mod tests {
         // A photo of half the size.
         let drawn = overlay(&Image::filled(200, 150, LinearRgb::BLACK), &solution);
         let corners = corner_points(view.size);
-        for part in [0.2, 0.3, 0.4, 0.6, 0.8] {
-            let place = corners[0] + (corners[1] - corners[0]) * part;
+        let mut farthest = 0.0_f64;
+        for (side, part) in (0..4).flat_map(|side| [0.25, 0.5, 0.75].map(|part| (side, part))) {
+            let place = corners[side] + (corners[(side + 1) % 4] - corners[side]) * part;
             let (straight, _) = view.camera.project(place).unwrap();
             // OpenCV's distortion.
             let x = (straight - view.camera.principal_px) / 320.0;
             let px = view.camera.principal_px + x * (1.0 + k1 * x.norm_squared()) * 320.0;
             let seen = drawn[((px.x / 2.0) as usize, (px.y / 2.0) as usize)];
-            assert!(seen.g > 0.3 && seen.r < 0.3, "{part}: {seen:?}");
-            assert!((px - straight).norm() > 8.0, "{part}: {px} {straight}");
+            assert!(seen.g > 2.0 * seen.r, "{side} {part}: {seen:?}");
+            farthest = farthest.max((px - straight).norm());
         }
+        // Lines are 3 pixels wide.
+        assert!(farthest > 4.0, "{farthest}");
     }
 
     #[test]

@@ -50,18 +50,9 @@ pub(crate) struct Problem {
 }
 
 impl Problem {
-    /// Checks a label of a picture of some framing and brings it into the solver's units.
+    /// Checks a label of a picture of some framing and brings it into the solver's units. A stated
+    /// distortion is for `focal` (in units), or for the prior's focal length where there is none.
     pub(crate) fn new(
-        label: &Label,
-        framing: Framing,
-        options: &SolveOptions,
-    ) -> Result<Self, SolveError> {
-        Self::with_focal(label, framing, None, options)
-    }
-
-    /// The same, where a stated distortion is for this focal length (in units) instead of the
-    /// prior's.
-    pub(crate) fn with_focal(
         label: &Label,
         framing: Framing,
         focal: Option<f64>,

@@ -150,7 +150,7 @@ fn search_with_stated_distortion(
     options: &SolveOptions,
 ) -> Result<(Problem, SearchResult), SolveError> {
     let search_at = |focal| {
-        let problem = Problem::with_focal(label, framing, focal, options)?;
+        let problem = Problem::new(label, framing, focal, options)?;
         let found = search(&problem, options)?;
         Ok((problem, found))
     };

@@ -359,7 +359,7 @@ mod tests {
 
     /// Two labels with points, and what makes each a label that no camera differs by.
     fn noted_labels(desk: &Desk) -> [[LabelledPhoto; 2]; 2] {
-        [0, 1].map(|k| {
+        [("a", 0), ("b", 1)].map(|(name, k)| {
             let mut label = desk.label(k);
             let [px, ..] = label.surface.corners_px.unwrap();
             let [w, h] = [label.surface.width_m, label.surface.height_m].map(Option::unwrap);
@@ -375,7 +375,7 @@ mod tests {
             label.points[0].note = Some("rim".into());
             let noted = desk.write(&label);
             [bare, noted].map(|labelled| LabelledPhoto {
-                name: format!("{k}"),
+                name: name.into(),
                 ..labelled
             })
         })
@@ -396,7 +396,7 @@ mod tests {
         desk.store(&noted, |file| {
             let from = file.solved_from.as_mut().unwrap();
             from.label_crc32 = whole(&noted);
-            from.together = [("1".to_owned(), whole(&other_noted))].into();
+            from.together = [("b".to_owned(), whole(&other_noted))].into();
         });
         let found = photo_cameras(&[noted, other_noted.clone()], false).unwrap();
         assert_eq!(found[0].stale, None);

@@ -108,8 +108,7 @@ fn screen(case: &Case) -> Result<(), String> {
         <[f32; 3]>::from(*a).into_iter().zip(expected)
     });
     let mut errors = channels.map(|(found, expected)| (found - expected).abs());
-    // A NaN is not within any limit.
-    match errors.find(|error| !(*error <= limit)) {
+    match errors.find(|error| error.is_nan() || *error > limit) {
         None => Ok(()),
         Some(error) => Err(format!("differs by {error:e}")),
     }

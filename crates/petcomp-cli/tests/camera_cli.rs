@@ -588,7 +588,7 @@ fn a_camera_is_exported_with_its_lens() {
     let cameras = std::fs::read_to_string(desk.path("model/cameras.txt")).unwrap();
     assert!(cameras.starts_with("1 OPENCV 640 480 "), "{cameras}");
     let [_, said] = desk.ok(&[&export[..], &["blender"]].concat());
-    assert!(said.contains("k1 = -0.01"), "{said}");
+    assert!(said.contains("k1 = -0.0100"), "{said}");
 }
 
 #[test]

@@ -477,8 +477,8 @@ fn sequences_have_so_many_selections_as_are_asked_for() {
             belt: Some(belt.unwrap()),
             ..recipe
         };
-        let scenes = (0..60).map(|n| scene(&recipe, n * frames));
-        scenes.map(|s| names(&s)).collect::<BTreeSet<_>>().len()
+        let scenes: Vec<Scene> = (0..60).map(|n| scene(&recipe, n * frames)).collect();
+        scenes.iter().map(names).collect::<BTreeSet<_>>().len()
     };
     let counted = |n| Recipe {
         selections: Selections::Count(n),

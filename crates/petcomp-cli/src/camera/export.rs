@@ -48,7 +48,7 @@ impl ExportCameraArgs {
 fn blender_script(file: &CameraFile) -> String {
     if file.k1() != 0.0 {
         let (photo, k1) = (&file.image.file, file.k1());
-        log::warn!("{photo}: k1 = {k1} of its lens is left out, Blender's cameras have none");
+        log::warn!("{photo}: k1 = {k1:.4} of its lens is left out, Blender's cameras have none");
     }
     file.camera().to_blender_script()
 }
