@@ -109,17 +109,35 @@ def yolov5(data):
     stats = []
     corners = lambda b: [b[0], b[1], b[0] + b[2], b[1] + b[3]]
     for image in range(data["images"]):
-        truth = torch.tensor([[c, *corners(b)] for i, c, *b, _ in data["truth"] if i == image], dtype=torch.float32)
+        there = [[c, *corners(b), crowd] for i, c, *b, crowd in data["truth"] if i == image]
+        truth = torch.tensor([row[:5] for row in there if not row[5]], dtype=torch.float32)
         found = [[*corners(b), s, c] for i, c, *b, s in data["found"] if i == image]
         found = torch.tensor(sorted(found, key=lambda d: -d[4]), dtype=torch.float32).reshape(-1, 6)
         truth = truth.reshape(-1, 5)
         right = process_batch(found, truth, iouv) if len(truth) else torch.zeros(len(found), 10, dtype=torch.bool)
-        stats.append((right, found[:, 4], found[:, 5], truth[:, 0]))
-    stats = [torch.cat(part, 0).numpy() for part in zip(*stats)]
-    if not len(stats[3]):
+        crowds = torch.tensor([row[:5] for row in there if row[5]], dtype=torch.float32).reshape(-1, 5)
+        ignored = ~right & (share_in(crowds, found)[:, None] >= iouv)
+        stats.append((right, ignored, found[:, 4], found[:, 5], truth[:, 0]))
+    right, ignored, score, seen, wanted = [torch.cat(part, 0).numpy() for part in zip(*stats)]
+    if not len(wanted):
         return {"classes": [], "ap": [], "precision": [], "recall": []}
-    _, _, p, r, _, ap, classes = ap_per_class(*stats, names={})
+    # YOLOv5 knows no crowds: at each threshold it is shown what COCO's rule leaves of the detections.
+    at = [ap_per_class(right[kept, j : j + 1], score[kept], seen[kept], wanted, names={}) for j, kept in enumerate(~ignored.T)]
+    _, _, p, r, _, _, classes = at[0]
+    ap = numpy.concatenate([scores[5] for scores in at], 1)
     return {"classes": classes.tolist(), "ap": ap.tolist(), "precision": p.tolist(), "recall": r.tolist()}
+
+
+def share_in(crowds, found):
+    """The largest share of each detection that a crowd of its class covers."""
+    import torch
+
+    lows = torch.maximum(found[:, None, :2], crowds[None, :, 1:3])
+    highs = torch.minimum(found[:, None, 2:4], crowds[None, :, 3:5])
+    inside = (highs - lows).clamp(min=0).prod(2)
+    area = (found[:, 2:4] - found[:, :2]).prod(1)[:, None]
+    share = inside / area.clamp(min=1e-12) * (found[:, None, 5] == crowds[None, :, 0])
+    return torch.cat([share, torch.zeros(len(found), 1)], 1).max(1).values
 
 
 def stable_argsort():

@@ -24,7 +24,7 @@ const MARKER_MARGIN: f64 = 0.35;
 const MARKER_EDGE_PX: f64 = 2.0;
 /// What is painted over a marker is seen around it: where more than this share of that is not the
 /// screen, something else is smeared over the screen.
-const MAX_OTHER_SHARE: f64 = 0.03;
+const MAX_OTHER_SHARE: f64 = 0.01;
 /// Not the screen is what differs from it by this share of its brightest channel: more than its
 /// light is uneven around a marker, less than clear plastic dims it.
 const MIN_OTHER_DIFFERENCE: f32 = 0.3;
@@ -204,10 +204,11 @@ fn colors_around(
     photo: &Image<LinearRgb>,
     papers: &[SeenSquare],
 ) -> Vec<LinearRgb> {
-    let others = || papers.iter().filter(|other| !std::ptr::eq(*other, paper));
-    let free = paper
-        .border()
-        .filter(|at| !others().any(|other| other.contains(*at)));
+    let is_free = |at: &Point2<f64>| {
+        let mut others = papers.iter().filter(|other| !std::ptr::eq(*other, paper));
+        !others.any(|other| other.contains(*at))
+    };
+    let free = paper.border().filter(is_free);
     free.filter_map(|at| sample_nearest(photo, at.x, at.y))
         .collect()
 }
@@ -543,6 +544,20 @@ mod tests {
                 "{reported}"
             );
         }
+    }
+
+    #[test]
+    fn a_marker_at_any_distance_leaves_the_size_or_is_refused() {
+        let mut refused = 0;
+        for step in 0..24 {
+            let middle = 138.0 + f64::from(step);
+            let photo = slab_beside_marker([middle; 2], std::f64::consts::FRAC_PI_4);
+            match added(&photo, Scale::Marker(MARKER)) {
+                Err(Error::Photo { .. }) => refused += 1,
+                size => assert_slab(size),
+            }
+        }
+        assert!((1..24).contains(&refused), "{refused}");
     }
 
     #[test]

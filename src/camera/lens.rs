@@ -23,13 +23,6 @@ pub struct RadialDistortion {
     k1: f64,
 }
 
-/// OpenCV's k1 of a camera whose radial distortion is known by half the picture's diagonal, as
-/// [`Solution::kappa`](super::Solution::kappa) is.
-pub(crate) fn k1_from_kappa(camera: &Camera, kappa: f64) -> f64 {
-    let [w, h] = camera.image.map(f64::from);
-    kappa * (2.0 * camera.focal_px.x / libm::hypot(w, h)).powi(2)
-}
-
 impl RadialDistortion {
     /// What a lens of this k1 does to the pictures of a camera.
     pub fn new(camera: &Camera, k1: f64) -> Self {

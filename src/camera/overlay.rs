@@ -419,7 +419,7 @@ mod tests {
         let scenario = Scenario {
             image: [400, 300],
             focal_px: 320.0,
-            kappa: 0.08,
+            kappa: 0.2,
             ..Scenario::default()
         };
         let view = scenario.tilted(20.0).view(1, 0);

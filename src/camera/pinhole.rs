@@ -150,6 +150,13 @@ fn is_vertical(direction: &Vector3<f64>) -> bool {
     direction.cross(&Vector3::z()).norm() < 1e-9 * direction.norm()
 }
 
+/// OpenCV's k1 of a camera whose radial distortion is known by half the picture's diagonal, as
+/// [`Solution::kappa`](super::Solution::kappa) is.
+pub(crate) fn k1_from_kappa(camera: &Camera, kappa: f64) -> f64 {
+    let [w, h] = camera.image.map(f64::from);
+    kappa * (2.0 * camera.focal_px.x / libm::hypot(w, h)).powi(2)
+}
+
 /// Where a point is seen through a lens with distortion; not finite behind the camera.
 pub fn distorted(camera: &Camera, kappa: f64, point: Point3<f64>) -> Point2<f64> {
     let [w, h] = camera.image.map(f64::from);

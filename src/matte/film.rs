@@ -338,8 +338,10 @@ impl<'a> FilmSolution<'a> {
         let lit = claimed::without_shadow(&plastic, flat, self.object.claims);
         let seen = view(&lit, flat, inside);
         let reflected = self.reflected(&transmittance);
+        // What T leaves of the photo is the light of as much of the pixel as the object covers.
         let film = reflected.zip3_map(&seen, inside, |f, v, c| {
-            Film::new(f.scale(c.0), covered(v, c))
+            let light = if c.0 > 0.0 { f } else { LinearRgb::BLACK };
+            Film::new(light, covered(v, c))
         });
         FilmMatte {
             film,
