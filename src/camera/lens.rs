@@ -201,6 +201,7 @@ impl RadialDistortion {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
+    use crate::camera::pinhole::k1_from_kappa;
     use crate::camera::simulate::Scenario;
     use crate::camera::{SolveOptions, distorted, solve};
     use crate::geom::{Point3, Vector3};
