@@ -69,10 +69,15 @@ fn span(values: [f64; 4], end: usize) -> std::ops::Range<usize> {
     low..high.max(low)
 }
 
-/// Puts what its four sides show in place of a square.
-pub(super) fn inpaint(picture: &mut Image<LinearRgb>, square: &SeenSquare) {
+/// Puts what its four sides show, as `screen` has it, in place of a square.
+pub(super) fn inpaint(
+    picture: &mut Image<LinearRgb>,
+    square: &SeenSquare,
+    screen: impl Fn(LinearRgb) -> LinearRgb,
+) {
     let source = picture.clone();
-    let patch = CoonsPatch::new(&source, square);
+    let side = |s, t| screen(seen_at(&source, square, s, t));
+    let patch = CoonsPatch::new(&side);
     let part = square.roi(source.size());
     for y in part.y..part.y + part.height {
         for x in part.x..part.x + part.width {
@@ -84,26 +89,20 @@ pub(super) fn inpaint(picture: &mut Image<LinearRgb>, square: &SeenSquare) {
 }
 
 /// A Coons patch between the sides of a square: no edge is left.
-struct CoonsPatch<'a> {
-    source: &'a Image<LinearRgb>,
-    square: &'a SeenSquare,
+struct CoonsPatch<'a, S> {
+    side: &'a S,
     /// Top left, top right, bottom left, bottom right.
     corners: [LinearRgb; 4],
 }
 
-impl<'a> CoonsPatch<'a> {
-    fn new(source: &'a Image<LinearRgb>, square: &'a SeenSquare) -> Self {
-        let corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]]
-            .map(|[s, t]| seen_at(source, square, s, t));
-        Self {
-            source,
-            square,
-            corners,
-        }
+impl<'a, S: Fn(f64, f64) -> LinearRgb> CoonsPatch<'a, S> {
+    fn new(side: &'a S) -> Self {
+        let corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]].map(|[s, t]| side(s, t));
+        Self { side, corners }
     }
 
     fn at(&self, place: Point2<f64>) -> LinearRgb {
-        let side = |s, t| seen_at(self.source, self.square, s, t);
+        let side = self.side;
         let (s, t) = (place.x as f32, place.y as f32);
         let [top_left, top_right, bottom_left, bottom_right] = self.corners;
         let across = mix(side(0.0, place.y), side(1.0, place.y), s);
@@ -150,11 +149,15 @@ mod tests {
                     false => slope(x, y),
                 }
             });
-            inpaint(&mut picture, &paper);
+            inpaint(&mut picture, &paper, |seen| seen);
             let off = picture.zip_map(&Image::from_fn(80, 60, slope), |a, b| (a.g - b.g).abs());
             assert!(off.pixels().iter().all(|off| *off < 1e-5));
             // One that reaches beyond the picture.
-            inpaint(&mut picture, &SeenSquare::new(&corners, 2.0).unwrap());
+            inpaint(
+                &mut picture,
+                &SeenSquare::new(&corners, 2.0).unwrap(),
+                |seen| seen,
+            );
         }
     }
 }

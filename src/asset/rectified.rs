@@ -97,8 +97,7 @@ impl RectifiedPhoto {
         let pose = ScreenPose::solve(&reference, size_px(&photo), header)?;
         let view = TopView::of_photo(pose, height)?;
         let papers: Vec<_> = markers.iter().filter_map(paper_of).collect();
-        check_free(&photo, &papers)?;
-        Self::through(view, without_markers(photo, &papers))
+        Self::through(view, without_markers(photo, &papers)?)
     }
 
     fn through(view: TopView, photo: Image<LinearRgb>) -> Result<Self> {
@@ -173,11 +172,20 @@ fn doubled_area(corners: &[Point2<f64>; 4]) -> f64 {
         .abs()
 }
 
-fn without_markers(mut photo: Image<LinearRgb>, papers: &[SeenSquare]) -> Image<LinearRgb> {
-    for paper in papers {
-        inpaint(&mut photo, paper);
+fn without_markers(mut photo: Image<LinearRgb>, papers: &[SeenSquare]) -> Result<Image<LinearRgb>> {
+    let surrounds = papers
+        .iter()
+        .map(|paper| Surround::new(paper, &photo, papers));
+    let surrounds: Vec<_> = surrounds.collect();
+    if !surrounds.iter().all(Surround::is_free) {
+        let what = "a marker lies too near the object or the edge of the screen; leave at least half its side free \
+                    around it";
+        return Err(Error::Photo { what: what.into() });
     }
-    photo
+    for (paper, surround) in papers.iter().zip(&surrounds) {
+        inpaint(&mut photo, paper, |seen| surround.screen_for(seen));
+    }
+    Ok(photo)
 }
 
 /// A marker and its white margin.
@@ -187,43 +195,48 @@ fn paper_of(marker: &Marker) -> Option<SeenSquare> {
     SeenSquare::new(&marker.corners_px, margin)
 }
 
-/// Fails where something else than the screen is seen around a marker.
-fn check_free(photo: &Image<LinearRgb>, papers: &[SeenSquare]) -> Result<()> {
-    let is_free = |paper| other_share(&colors_around(paper, photo, papers)) <= MAX_OTHER_SHARE;
-    if papers.iter().all(is_free) {
-        return Ok(());
-    }
-    let what = "a marker lies too near the object or the edge of the screen; leave at least half its side free \
-                around it";
-    Err(Error::Photo { what: what.into() })
-}
-
 /// What a photo shows around a marker's paper, but for that of others.
-fn colors_around(
-    paper: &SeenSquare,
-    photo: &Image<LinearRgb>,
-    papers: &[SeenSquare],
-) -> Vec<LinearRgb> {
-    let is_free = |at: &Point2<f64>| {
-        let mut others = papers.iter().filter(|other| !std::ptr::eq(*other, paper));
-        !others.any(|other| other.contains(*at))
-    };
-    let free = paper.border().filter(is_free);
-    free.filter_map(|at| sample_nearest(photo, at.x, at.y))
-        .collect()
+struct Surround {
+    colors: Vec<LinearRgb>,
+    /// Their median.
+    screen: LinearRgb,
 }
 
-/// The share of colours that differ from their median.
-fn other_share(colors: &[LinearRgb]) -> f64 {
-    let middle = |channel: fn(&LinearRgb) -> f32| {
-        median(colors.iter().map(channel), f32::total_cmp).unwrap_or_default()
-    };
-    let screen = LinearRgb::new(middle(|c| c.r), middle(|c| c.g), middle(|c| c.b));
-    let most = MIN_OTHER_DIFFERENCE * screen.max_channel();
-    let other = colors
-        .iter()
-        .filter(|color| largest_difference(**color, screen) > most);
-    other.count() as f64 / colors.len().max(1) as f64
+impl Surround {
+    fn new(paper: &SeenSquare, photo: &Image<LinearRgb>, papers: &[SeenSquare]) -> Self {
+        let is_free = |at: &Point2<f64>| {
+            let mut others = papers.iter().filter(|other| !std::ptr::eq(*other, paper));
+            !others.any(|other| other.contains(*at))
+        };
+        let free = paper.border().filter(is_free);
+        let colors: Vec<_> = free
+            .filter_map(|at| sample_nearest(photo, at.x, at.y))
+            .collect();
+        let middle = |channel: fn(&LinearRgb) -> f32| {
+            median(colors.iter().map(channel), f32::total_cmp).unwrap_or_default()
+        };
+        let screen = LinearRgb::new(middle(|c| c.r), middle(|c| c.g), middle(|c| c.b));
+        Self { colors, screen }
+    }
+
+    /// Nothing else than the screen is there, but for specks.
+    fn is_free(&self) -> bool {
+        let other = self.colors.iter().filter(|color| self.is_other(**color));
+        other.count() as f64 <= MAX_OTHER_SHARE * self.colors.len() as f64
+    }
+
+    /// What is painted where a colour is seen: no speck becomes a stripe.
+    fn screen_for(&self, seen: LinearRgb) -> LinearRgb {
+        if self.is_other(seen) {
+            return self.screen;
+        }
+        seen
+    }
+
+    fn is_other(&self, color: LinearRgb) -> bool {
+        let most = MIN_OTHER_DIFFERENCE * self.screen.max_channel();
+        largest_difference(color, self.screen) > most
+    }
 }
 
 fn largest_difference(a: LinearRgb, b: LinearRgb) -> f32 {
