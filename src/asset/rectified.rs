@@ -13,7 +13,7 @@ use crate::image::Image;
 use crate::io::Header;
 use crate::matte::median::median;
 use crate::matte::{ScreenCorners, from_top_left, screen_corners};
-use crate::pixel::LinearRgb;
+use crate::pixel::{LinearRgb, Mix};
 use std::borrow::Cow;
 
 /// Noise of a corner that a person clicked, pixels.
@@ -234,16 +234,9 @@ impl Surround {
     }
 
     fn is_other(&self, color: LinearRgb) -> bool {
-        let most = MIN_OTHER_DIFFERENCE * self.screen.max_channel();
-        largest_difference(color, self.screen) > most
+        let off = color.add_scaled(-1.0, self.screen).map(f32::abs);
+        off.max_channel() > MIN_OTHER_DIFFERENCE * self.screen.max_channel()
     }
-}
-
-fn largest_difference(a: LinearRgb, b: LinearRgb) -> f32 {
-    [a.r - b.r, a.g - b.g, a.b - b.b]
-        .map(f32::abs)
-        .into_iter()
-        .fold(0.0, f32::max)
 }
 
 #[cfg(test)]

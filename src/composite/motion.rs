@@ -72,11 +72,10 @@ fn mean_in_front(
     place: &HoldoutSample,
     at: impl ExactSizeIterator<Item = Point2<f64>>,
 ) -> Film {
-    let weight = 1.0 / at.len() as f32;
     let inside = |v: f64, side: usize| (v.max(0.0) as usize).min(side - 1);
-    at.fold(Film::default(), |sum, p| {
+    mean(at, |p| {
         let (x, y) = (inside(p.x, free.width()), inside(p.y, free.height()));
-        sum.add_scaled(weight, free.in_front(x, y, place))
+        free.in_front(x, y, place)
     })
 }
 
@@ -90,7 +89,8 @@ fn averaged(effect: &Image<Film>, ways: &Image<Vector2<f64>>) -> Image<Film> {
         if !reached[square] {
             return Film::default();
         }
-        let mean = mean_along(effect, along(center(x, y), ways[square]));
+        let way = along(center(x, y), ways[square]);
+        let mean = mean(way, |p| sample_cubic_clamped(effect, p.x, p.y));
         // A cubic curve is beyond its neighbours beside edges.
         Film {
             color: larger(mean.color, least),
@@ -116,11 +116,13 @@ fn reached(effect: &Image<Film>, ways: &Image<Vector2<f64>>) -> Mask {
     filter::dilate(&filled, 0.5 * longest / SQUARE_PX as f64 + 2.0)
 }
 
-fn mean_along(effect: &Image<Film>, at: impl ExactSizeIterator<Item = Point2<f64>>) -> Film {
-    let weight = (1.0 / at.len() as f64) as f32;
-    at.fold(Film::default(), |sum, at| {
-        sum.add_scaled(weight, sample_cubic_clamped(effect, at.x, at.y))
-    })
+/// The mean of what is seen at some places.
+fn mean(
+    at: impl ExactSizeIterator<Item = Point2<f64>>,
+    seen: impl Fn(Point2<f64>) -> Film,
+) -> Film {
+    let weight = 1.0 / at.len() as f32;
+    at.fold(Film::default(), |sum, p| sum.add_scaled(weight, seen(p)))
 }
 
 fn center(x: usize, y: usize) -> Point2<f64> {

@@ -28,7 +28,7 @@ use std::path::{Path, PathBuf};
 /// A folder that holds no dataset of archives, or one that an older petcomp began.
 pub fn repair_archives(folder: &Path, range: SampleRange) -> Result<(usize, usize)> {
     check_range(range)?;
-    let layout = Layout::of_folder(folder)?;
+    let layout = ArchiveLayout::of_folder(folder)?;
     Inputs::forget(folder);
     let (mut good, mut bad) = (0, 0);
     let files = layout.numbers(range).flat_map(|n| layout.files(n));
@@ -86,7 +86,7 @@ fn parent(path: &Path) -> &Path {
 }
 
 /// Which samples each archive of a dataset holds.
-struct Layout<'a> {
+struct ArchiveLayout<'a> {
     folder: &'a Path,
     archives: WebDataset,
     /// Of all samples.
@@ -102,7 +102,7 @@ struct ArchiveFile {
     samples: u64,
 }
 
-impl<'a> Layout<'a> {
+impl<'a> ArchiveLayout<'a> {
     /// As a dataset that was begun before says it.
     fn of_folder(folder: &'a Path) -> Result<Self> {
         let before = folder::begun(folder)?;
@@ -160,7 +160,7 @@ fn value_of<T: DeserializeOwned>(name: &str, value: Option<&Value>) -> Result<T>
 /// What one run has done so far.
 struct ArchiveRun<'a> {
     plan: &'a Plan,
-    layout: Layout<'a>,
+    layout: ArchiveLayout<'a>,
     /// Numbers of the archives that are whole.
     present: BTreeSet<u64>,
     /// In archives that are whole.
@@ -173,7 +173,7 @@ impl<'a> ArchiveRun<'a> {
     fn new(plan: &'a Plan, archives: WebDataset) -> Result<Self> {
         let mut run = Self {
             plan,
-            layout: Layout {
+            layout: ArchiveLayout {
                 folder: &plan.folder,
                 archives,
                 count: plan.count,

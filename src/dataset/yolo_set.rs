@@ -4,6 +4,7 @@ use crate::dataset::Part;
 use crate::dataset::listing::{images_in, place_of};
 use crate::dataset::yolo_yaml::DataYaml;
 use crate::error::{Error, Result};
+use crate::eval::label_of;
 use crate::io;
 use std::path::{Path, PathBuf};
 
@@ -41,7 +42,7 @@ impl YoloSet {
 
     /// The label file of an image: its path with the last `images` replaced by `labels`.
     pub fn label_of(image: &Path) -> PathBuf {
-        io::with_last_step(image, "images", "labels").with_extension("txt")
+        label_of(image)
     }
 }
 

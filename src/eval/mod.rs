@@ -62,9 +62,9 @@ pub(crate) use picture::class_name;
 pub(crate) use picture::{MAX_CURVES, confusion_picture, f1_picture, precision_recall_picture};
 #[doc(hidden)]
 pub use tag::{Tags, read_tags};
-pub(crate) use yolo::sheet_of as yolo_sheet;
 #[doc(hidden)]
 pub use yolo::{YoloTruth, read_yolo_truth_of};
+pub(crate) use yolo::{label_of, sheet_of as yolo_sheet};
 pub use yolo::{read_yolo_detections, read_yolo_truth};
 #[doc(hidden)]
 pub use yolov5::yolov5;

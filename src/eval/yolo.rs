@@ -79,15 +79,14 @@ impl LabelFolder {
             (None, Some(image)) => image_size(image)?,
             (None, None) => return Err(missing_image(&self.image_folder, name)),
         };
-        let truth = self.labels.get(name).map(|label| read_truth(label, size));
+        let truth = truth_of(self.labels.get(name).map(PathBuf::as_path), size)?;
         let picture = image.map(|path| picture_of(path.clone(), size));
-        let sheet = EvalImage::new(name, truth.transpose()?.unwrap_or_default());
-        Ok((sheet, size, picture))
+        Ok((EvalImage::new(name, truth), size, picture))
     }
 }
 
-/// The truth of images, each with its label where YOLO has it: the same path with its last `images`
-/// replaced by `labels`. An image without a label file shows nothing that is to be found.
+/// The truth of images, each with its label [where YOLO has it](label_of). An image without a label
+/// file shows nothing that is to be found.
 ///
 /// # Errors
 /// [`Error::File`] for an image that cannot be read, or a bad line.
@@ -98,11 +97,21 @@ pub fn read_yolo_truth_of(images: &[PathBuf]) -> Result<YoloTruth> {
 
 fn read_image(image: &Path) -> Result<LabelledImage> {
     let size = image_size(image)?;
-    let label = io::with_last_step(image, "images", "labels").with_extension("txt");
-    let truth = label.exists().then(|| read_truth(&label, size));
+    let label = Some(label_of(image)).filter(|label| label.exists());
+    let truth = truth_of(label.as_deref(), size)?;
     let name = image.file_stem().unwrap_or_default().to_string_lossy();
-    let sheet = EvalImage::new(name, truth.transpose()?.unwrap_or_default());
-    Ok((sheet, size, Some(picture_of(image.into(), size))))
+    let picture = Some(picture_of(image.into(), size));
+    Ok((EvalImage::new(name, truth), size, picture))
+}
+
+/// Where the label of an image is: the same path with its last `images` replaced by `labels`.
+pub(crate) fn label_of(image: &Path) -> PathBuf {
+    io::with_last_step(image, "images", "labels").with_extension("txt")
+}
+
+/// Nothing where there is no label file.
+fn truth_of(label: Option<&Path>, size: [u32; 2]) -> Result<Vec<GroundTruth>> {
+    label.map_or_else(|| Ok(Vec::new()), |label| read_truth(label, size))
 }
 
 fn picture_of(path: PathBuf, size: [u32; 2]) -> Picture {

@@ -239,13 +239,19 @@ mod tests {
         folder
     }
 
+    /// A kit of two real images and six synthetic ones.
+    fn written(root: &Path, name: &str) -> PathBuf {
+        let [real, synthetic] =
+            [("real", 2), ("made", 6)].map(|(name, n)| dataset(root, name, n, "[cap]"));
+        let kit = root.join(name);
+        write(&kit, &KitOptions::new(real, synthetic)).unwrap();
+        kit
+    }
+
     #[test]
     fn a_kit_has_every_variant_list_and_seed() {
         let root = tempfile::tempdir().unwrap();
-        let [real, synthetic] =
-            [("real", 2), ("made", 6)].map(|(name, n)| dataset(root.path(), name, n, "[cap]"));
-        let kit = root.path().join("kit");
-        write(&kit, &KitOptions::new(real, synthetic)).unwrap();
+        let kit = written(root.path(), "kit");
         for variant in &VARIANTS {
             let text = io::read_text(kit.join(format!("{}.yaml", variant.name))).unwrap();
             variant
@@ -272,10 +278,7 @@ mod tests {
     #[test]
     fn trainings_find_their_lists_from_any_folder() {
         let root = tempfile::tempdir().unwrap();
-        let [real, synthetic] =
-            [("real", 2), ("made", 6)].map(|(name, n)| dataset(root.path(), name, n, "[cap]"));
-        let kit = root.path().join("my \"kit\": 1");
-        write(&kit, &KitOptions::new(real, synthetic)).unwrap();
+        let kit = written(root.path(), "my \"kit\": 1");
         for variant in &VARIANTS {
             let yaml = io::read_text(kit.join(format!("{}.yaml", variant.name))).unwrap();
             let elsewhere = root.path().join("clone");
