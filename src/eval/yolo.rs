@@ -85,8 +85,8 @@ impl LabelFolder {
     }
 }
 
-/// The truth of images, each with its label [where YOLO has it](label_of). An image without a label
-/// file shows nothing that is to be found.
+/// The truth of images, each with its label where YOLO has it: the same path with its last `images`
+/// replaced by `labels`. An image without a label file shows nothing that is to be found.
 ///
 /// # Errors
 /// [`Error::File`] for an image that cannot be read, or a bad line.
@@ -104,7 +104,7 @@ fn read_image(image: &Path) -> Result<LabelledImage> {
     Ok((EvalImage::new(name, truth), size, picture))
 }
 
-/// Where the label of an image is: the same path with its last `images` replaced by `labels`.
+/// Where YOLO has the label of an image.
 pub(crate) fn label_of(image: &Path) -> PathBuf {
     io::with_last_step(image, "images", "labels").with_extension("txt")
 }

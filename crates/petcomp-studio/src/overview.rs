@@ -33,7 +33,7 @@ struct Overview {
     photos: Vec<String>,
     labels: Vec<String>,
     cameras: Vec<String>,
-    /// `manifest.json` of folders of assets.
+    /// `assets.toml` of folders of assets.
     assets: Vec<String>,
     recipes: Vec<String>,
     /// Lists of photos of objects.
@@ -72,7 +72,7 @@ impl Overview {
             photos: those(&|file| may_be_photo(Path::new(file))),
             labels: ending(".label.json"),
             cameras: ending(".camera.json"),
-            assets: called("manifest.json"),
+            assets: called("assets.toml"),
             recipes: those(&|file| is_recipe(&studio.folder, file)),
             photo_lists: [called("photos.toml"), called("photos.csv")].concat(),
             datasets: called("data.yaml"),

@@ -200,3 +200,15 @@ fn bottles_are_seen_in_every_way() {
     browser.screenshot("studio_mattes_phone");
     browser.assert_content();
 }
+
+#[test]
+fn the_first_page_finds_the_folder_that_a_build_makes() {
+    let folder = folder();
+    built_length_px(folder.path());
+    let studio = Studio::over(folder.path());
+    let found = studio.get("api/overview");
+    assert!(
+        found.contains("\"assets\":[\"assets/assets.toml\"]"),
+        "{found}"
+    );
+}

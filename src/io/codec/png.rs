@@ -98,11 +98,11 @@ pub(crate) fn color_description(bytes: &[u8], limits: &Limits) -> Option<ColorDe
             return Some(ColorDescription::CodePoints(primaries, transfer));
         }
     }
-    if info.srgb.is_some() {
-        return None;
+    if let Some(icc) = &info.icc_profile {
+        return Some(ColorDescription::Icc(icc.to_vec()));
     }
-    match &info.icc_profile {
-        Some(icc) => Some(ColorDescription::Icc(icc.to_vec())),
+    match info.srgb {
+        Some(_) => None,
         None => described_curve(info),
     }
 }
@@ -306,6 +306,24 @@ mod tests {
         assert_eq!(both, light(|_| ()));
     }
 
+    /// How a picture with a profile, or without one, and these chunks beside it describes its colours.
+    fn described(
+        icc: &'static [u8],
+        chunks: &[(png::chunk::ChunkType, &[u8])],
+    ) -> Option<ColorDescription> {
+        let mut info = png::Info::with_size(1, 1);
+        info.icc_profile = (!icc.is_empty()).then_some(icc.into());
+        let mut bytes = Vec::new();
+        let encoder = png::Encoder::with_info(&mut bytes, info).unwrap();
+        let mut writer = encoder.write_header().unwrap();
+        for (name, data) in chunks {
+            writer.write_chunk(*name, data).unwrap();
+        }
+        writer.write_image_data(&[0]).unwrap();
+        drop(writer);
+        color_description(&bytes, &Limits::default())
+    }
+
     #[test]
     fn code_points_that_are_not_applied_leave_the_word_to_a_profile() {
         let profile = ColorDescription::Icc(b"a profile".to_vec());
@@ -314,20 +332,23 @@ mod tests {
             ([9, 16], b"", ColorDescription::CodePoints(9, 16)),
             ([12, 13], b"a profile", ColorDescription::CodePoints(12, 13)),
         ] {
-            let mut info = png::Info::with_size(1, 1);
-            info.icc_profile = (!icc.is_empty()).then_some(icc.into());
-            let mut bytes = Vec::new();
-            let encoder = png::Encoder::with_info(&mut bytes, info).unwrap();
-            let mut writer = encoder.write_header().unwrap();
             let [primaries, transfer] = code_points;
-            writer
-                .write_chunk(png::chunk::cICP, &[primaries, transfer, 0, 1])
-                .unwrap();
-            writer.write_image_data(&[0]).unwrap();
-            drop(writer);
-            let described = color_description(&bytes, &Limits::default());
-            assert_eq!(described, Some(expected));
+            let chunk = [primaries, transfer, 0, 1];
+            assert_eq!(
+                described(icc, &[(png::chunk::cICP, &chunk)]),
+                Some(expected)
+            );
         }
+    }
+
+    #[test]
+    fn a_profile_goes_before_the_word_of_srgb() {
+        let profile = ColorDescription::Icc(b"a profile".to_vec());
+        assert_eq!(
+            described(b"a profile", &[(png::chunk::sRGB, &[0])]),
+            Some(profile)
+        );
+        assert_eq!(described(b"", &[(png::chunk::sRGB, &[0])]), None);
     }
 
     #[test]
