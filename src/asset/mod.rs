@@ -78,7 +78,7 @@ pub use surface::{SurfaceCache, SurfaceTexel};
 pub use texture::Texture;
 
 /// Name of the manifest in an asset folder.
-pub(crate) const MANIFEST: &str = "assets.toml";
+pub const MANIFEST: &str = "assets.toml";
 
 /// Thickness of an asset where none is given, metres: the thin box of the paper's colliders.
 pub(crate) const DEFAULT_THICKNESS: f64 = 0.005;

@@ -10,6 +10,7 @@ use crate::turn::blocking;
 use axum::Router;
 use axum::extract::State;
 use axum::routing::get;
+use petcomp::asset;
 use serde::Serialize;
 use std::path::Path;
 use std::sync::Arc;
@@ -33,7 +34,7 @@ struct Overview {
     photos: Vec<String>,
     labels: Vec<String>,
     cameras: Vec<String>,
-    /// `assets.toml` of folders of assets.
+    /// Manifests of folders of assets.
     assets: Vec<String>,
     recipes: Vec<String>,
     /// Lists of photos of objects.
@@ -72,7 +73,7 @@ impl Overview {
             photos: those(&|file| may_be_photo(Path::new(file))),
             labels: ending(".label.json"),
             cameras: ending(".camera.json"),
-            assets: called("assets.toml"),
+            assets: called(asset::MANIFEST),
             recipes: those(&|file| is_recipe(&studio.folder, file)),
             photo_lists: [called("photos.toml"), called("photos.csv")].concat(),
             datasets: called("data.yaml"),
