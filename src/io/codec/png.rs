@@ -306,19 +306,18 @@ mod tests {
         assert_eq!(both, light(|_| ()));
     }
 
-    /// How a picture with a profile, or without one, and these chunks beside it describes its colours.
+    /// How a picture with a profile, or without one, and a chunk beside it describes its colours.
     fn described(
         icc: &'static [u8],
-        chunks: &[(png::chunk::ChunkType, &[u8])],
+        name: png::chunk::ChunkType,
+        data: &[u8],
     ) -> Option<ColorDescription> {
         let mut info = png::Info::with_size(1, 1);
         info.icc_profile = (!icc.is_empty()).then_some(icc.into());
         let mut bytes = Vec::new();
         let encoder = png::Encoder::with_info(&mut bytes, info).unwrap();
         let mut writer = encoder.write_header().unwrap();
-        for (name, data) in chunks {
-            writer.write_chunk(*name, data).unwrap();
-        }
+        writer.write_chunk(name, data).unwrap();
         writer.write_image_data(&[0]).unwrap();
         drop(writer);
         color_description(&bytes, &Limits::default())
@@ -334,10 +333,7 @@ mod tests {
         ] {
             let [primaries, transfer] = code_points;
             let chunk = [primaries, transfer, 0, 1];
-            assert_eq!(
-                described(icc, &[(png::chunk::cICP, &chunk)]),
-                Some(expected)
-            );
+            assert_eq!(described(icc, png::chunk::cICP, &chunk), Some(expected));
         }
     }
 
@@ -345,10 +341,10 @@ mod tests {
     fn a_profile_goes_before_the_word_of_srgb() {
         let profile = ColorDescription::Icc(b"a profile".to_vec());
         assert_eq!(
-            described(b"a profile", &[(png::chunk::sRGB, &[0])]),
+            described(b"a profile", png::chunk::sRGB, &[0]),
             Some(profile)
         );
-        assert_eq!(described(b"", &[(png::chunk::sRGB, &[0])]), None);
+        assert_eq!(described(b"", png::chunk::sRGB, &[0]), None);
     }
 
     #[test]
