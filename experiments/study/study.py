@@ -139,10 +139,15 @@ def describe(study, arm, seed):
         "start": str(study.weights(options["start"], seed)) if "start" in options else "",
         "threads": 1,
         "mix": options.get("mix", "concatenate"),
-        "real": [path for room in study.rooms for path in reality.pictures(study.world, room, "real", share)],
+        "real": real_pictures(study, options.get("real_rooms", study.rooms), share),
         "synthetic": pictures,
         "test": {str(room): reality.pictures(study.world, room, "test", study.test_pictures) for room in study.rooms},
     }
+
+
+def real_pictures(study, rooms, count):
+    """The first `count` pictures for training of each room."""
+    return [path for room in rooms for path in reality.pictures(study.world, room, "real", count)]
 
 
 def tested(study, arm, seed):
