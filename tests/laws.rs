@@ -14,6 +14,7 @@ use rayon::prelude::*;
 fn tray() -> Background {
     Background {
         k1: 0.0,
+        shown_share: 1.0,
         albedo: None,
         wall: None,
         name: "tray".into(),
@@ -261,6 +262,7 @@ fn tight(times: f64, narrow: f64) -> Background {
     let longest = 0.28 * recipe(Range::fixed(1.0)).scale.max;
     Background {
         k1: 0.0,
+        shown_share: 1.0,
         albedo: None,
         wall: None,
         size: [longest * times, longest * times * narrow],
@@ -361,6 +363,7 @@ fn a_tray_smaller_than_the_longest_card_is_refused_with_both_named() {
         tray(),
         Background {
             k1: 0.0,
+            shown_share: 1.0,
             albedo: None,
             wall: None,
             name: "box".into(),

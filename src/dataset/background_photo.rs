@@ -7,7 +7,7 @@ use crate::filter;
 use crate::geom::{Point2, Point3, Vector2};
 use crate::image::{Image, Roi};
 use crate::io::{self, FromFile};
-use crate::light::PlateGrain;
+use crate::light::{MeasuredPlate, PlateMeasures};
 use crate::pixel::{Coverage, LinearRgb, Mix};
 use crate::scene::{Background, CameraSource, Wall};
 use std::path::{Path, PathBuf};
@@ -34,12 +34,37 @@ pub(crate) struct BackgroundPhoto {
     pub(crate) notes: Vec<String>,
     taken: [u32; 2],
     image: [u32; 2],
-    plate: OnceLock<Arc<Image<LinearRgb>>>,
-    /// Blur and noise of the plate.
-    pub(crate) grain: PlateGrain,
+    /// The photo at the picture's size, and at larger ones for views that zoom in.
+    plates: Vec<Plate>,
     /// The mask of what hides objects, beside the photo.
     pub(crate) front: Option<PathBuf>,
     front_mask: OnceLock<Arc<Image<Coverage>>>,
+}
+
+/// Zoom from one size of a plate to the next: so much larger or smaller than it is seen a plate
+/// neither blurs nor aliases much.
+const ZOOM_STEP: f64 = 1.25;
+/// A zoom that is a step but for its last digits needs no more than that step.
+const HAIR: f64 = 1e-9;
+
+/// A photo at one size, and what was measured of it.
+#[derive(Debug, Default)]
+struct Plate {
+    image: OnceLock<Arc<Image<LinearRgb>>>,
+    measures: PlateMeasures,
+}
+
+/// A plate that was read.
+#[derive(Clone, Debug)]
+pub(crate) struct ReadPlate<'a> {
+    pub(crate) image: Arc<Image<LinearRgb>>,
+    measures: &'a PlateMeasures,
+}
+
+impl ReadPlate<'_> {
+    pub(crate) fn measured(&self) -> MeasuredPlate<'_> {
+        MeasuredPlate::new(&self.image, self.measures)
+    }
 }
 
 /// How labelled photos are opened.
@@ -96,6 +121,7 @@ impl BackgroundPhoto {
                 size: seen.size,
                 camera: CameraSource::Known(camera),
                 k1: seen.k1,
+                shown_share: longer_side(kept) / f64::from(taken[0].max(taken[1])),
                 albedo: labelled.label.surface.albedo,
                 wall: wall_of(labelled, seen.size),
             },
@@ -104,8 +130,7 @@ impl BackgroundPhoto {
             taken,
             kept,
             image,
-            plate: OnceLock::new(),
-            grain: PlateGrain::default(),
+            plates: empty_plates(kept, image),
             front: front_beside(&photo),
             front_mask: OnceLock::new(),
             photo,
@@ -177,12 +202,37 @@ impl BackgroundPhoto {
     }
 
     /// The photo at the picture's size, scene-linear; read once.
-    pub(crate) fn plate(&self) -> Result<Arc<Image<LinearRgb>>> {
-        if let Some(plate) = self.plate.get() {
-            return Ok(plate.clone());
-        }
-        let plate = Arc::new(self.shown_part::<LinearRgb>(&self.photo)?);
-        Ok(self.plate.get_or_init(|| plate).clone())
+    pub(crate) fn plate(&self) -> Result<ReadPlate<'_>> {
+        self.plate_at_level(0)
+    }
+
+    /// The photo as large as a view that zooms in needs it, if it has so many pixels; read once for
+    /// each step of the zoom.
+    pub(crate) fn plate_for_zoom(&self, zoom: f64) -> Result<ReadPlate<'_>> {
+        let level = (zoom.ln() / ZOOM_STEP.ln() - HAIR).ceil().max(0.0) as usize;
+        self.plate_at_level(level.min(self.plates.len() - 1))
+    }
+
+    fn plate_at_level(&self, level: usize) -> Result<ReadPlate<'_>> {
+        let Plate { image, measures } = &self.plates[level];
+        let image = match image.get() {
+            Some(image) => image.clone(),
+            None => {
+                let read = Arc::new(self.shown_part(&self.photo, self.size_at_level(level))?);
+                image.get_or_init(|| read).clone()
+            }
+        };
+        Ok(ReadPlate { image, measures })
+    }
+
+    /// The picture's size times the zoom, up to that of the photo.
+    fn size_at_level(&self, level: usize) -> [usize; 2] {
+        let scale = ZOOM_STEP
+            .powi(level as i32)
+            .min(detail_of(self.kept, self.image));
+        let scale = if level == 0 { 1.0 } else { scale };
+        self.image
+            .map(|side| (f64::from(side) * scale).round() as usize)
     }
 
     /// What of the place hides objects, at the picture's size, where a mask says so; read once.
@@ -193,15 +243,19 @@ impl BackgroundPhoto {
         if let Some(mask) = self.front_mask.get() {
             return Ok(Some(mask.clone()));
         }
-        let mask = Arc::new(self.shown_part::<Coverage>(path)?);
+        let size = self.image.map(|side| side as usize);
+        let mask = Arc::new(self.shown_part::<Coverage>(path, size)?);
         Ok(Some(self.front_mask.get_or_init(|| mask).clone()))
     }
 
-    /// The part that is seen of a picture of the photo's size, at the size of the pictures.
-    fn shown_part<P: FromFile + Mix + Send + Sync>(&self, path: &Path) -> Result<Image<P>> {
+    /// The part that is seen of a picture of the photo's size, at another size.
+    fn shown_part<P: FromFile + Mix + Send + Sync>(
+        &self,
+        path: &Path,
+        [width, height]: [usize; 2],
+    ) -> Result<Image<P>> {
         let photo = io::read::<P>(path)?;
         self.check_size(path, photo.size())?;
-        let [width, height] = self.image.map(|side| side as usize);
         Ok(filter::resize(&photo.crop(self.kept), width, height))
     }
 
@@ -235,7 +289,7 @@ fn warn_of_cameras(labels: &[LabelledPhoto], sightings: &[PhotoCamera]) {
         let (count, of) = (unreported.len(), labels.len());
         let more = if count > 1 { ", ..." } else { "" };
         log::warn!(
-            "{count} of {of} cameras have warnings ({first}{more}): `petcomp camera doctor` says them"
+            "{count} of {of} cameras have warnings ({first}{more}): `petcomp camera doctor` explains them"
         );
     }
 }
@@ -270,6 +324,18 @@ fn warn_of_shapes(places: &[BackgroundPhoto]) {
 fn wall_of(labelled: &LabelledPhoto, size: [f64; 2]) -> Option<Wall> {
     let wall = labelled.label.surface.wall?;
     Some(Wall::new(size, wall.height_m, wall.slope_deg))
+}
+
+/// Pixels of a photo for each of its pictures.
+fn detail_of(kept: Roi, image: [u32; 2]) -> f64 {
+    kept.width as f64 / f64::from(image[0])
+}
+
+/// Room for plates of every size up to the photo's.
+fn empty_plates(kept: Roi, image: [u32; 2]) -> Vec<Plate> {
+    let steps = detail_of(kept, image).ln() / ZOOM_STEP.ln();
+    let larger = steps.ceil().max(0.0) as usize;
+    (0..=larger).map(|_| Plate::default()).collect()
 }
 
 /// The mask beside a photo of what hides objects, `NAME.front.png`, where there is one.
@@ -319,6 +385,10 @@ fn cropped(camera: Camera, kept: Roi) -> Camera {
 
 fn corner_of(kept: Roi) -> Vector2<f64> {
     Vector2::new(kept.x as f64, kept.y as f64)
+}
+
+fn longer_side(part: Roi) -> f64 {
+    part.width.max(part.height) as f64
 }
 
 fn area([w, h]: [f64; 2]) -> f64 {

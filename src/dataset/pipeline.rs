@@ -16,11 +16,11 @@ use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::label::{self, Labels};
 use crate::light;
-use crate::pixel::{LinearRgb, PremulRgba};
+use crate::pixel::PremulRgba;
 use crate::render;
 use crate::scene::{
-    Appearance, AssetVariant, Background, CameraSource, Drawn, Draws, EdgeTreatment,
-    EnvironmentMap, Recipe, Scene, Shot, catalog, locate,
+    Appearance, AssetVariant, Background, CameraSource, Drawn, Draws, EdgeTreatment, Recipe, Scene,
+    Shot, catalog, locate,
 };
 use crate::stopwatch::Stopwatch;
 use std::path::PathBuf;
@@ -130,7 +130,8 @@ impl Pipeline {
         else {
             return Ok(());
         };
-        let factor = self.config.scene.scale.middle().min;
+        let Recipe { scale, view, .. } = &self.config.scene;
+        let factor = scale.middle().min * view.zoom.middle().min;
         let px = camera.focal_px.x * median * factor / camera.center().coords.norm();
         if px >= LEAST_OBJECT_PX {
             return Ok(());
@@ -421,12 +422,16 @@ impl Pipeline {
     }
 
     fn resolve_within(&self, scene: Scene, allowance: &Allowance) -> Result<(Scene, Shot)> {
-        let plate = self.plate(&scene.plate)?;
+        let place = self.known_place(&scene.plate)?;
         let mut scene = self.rest(locate(scene)?, allowance)?;
         let panorama = self.panorama(&scene)?;
-        if let Some(plate) = &plate {
+        let mut plate = None;
+        if let Some(place) = place {
             let environment = scene.environment_map(panorama.clone())?;
-            scene = self.matched(scene, plate, environment.as_ref());
+            let detailed = place.plate_for_zoom(zoom_of(&scene))?;
+            scene = light::match_grain(scene, detailed.measured());
+            scene = light::match_plate(scene, place.plate()?.measured(), environment.as_ref());
+            plate = Some(detailed.image);
         }
         let shot = scene.resolve(
             |object| Appearance::from_library(&self.library, object),
@@ -435,21 +440,6 @@ impl Pipeline {
         )?;
         let shot = self.behind_front(&scene.plate, &scene, shot)?;
         Ok((scene, shot))
-    }
-
-    /// What a scene leaves to its plate; what of that is the plate's alone is found once.
-    fn matched(
-        &self,
-        scene: Scene,
-        plate: &Image<LinearRgb>,
-        environment: Option<&EnvironmentMap>,
-    ) -> Scene {
-        let place = self.place(&scene.plate);
-        let finished = match place {
-            Some(place) => place.grain.matched(scene, plate),
-            None => scene,
-        };
-        light::match_plate(finished, plate, environment)
     }
 
     /// A shot whose objects are behind what the mask beside the plate says, where there is one: it
@@ -494,13 +484,11 @@ impl Pipeline {
             .transpose()
     }
 
-    fn plate(&self, name: &str) -> Result<Option<Arc<Image<LinearRgb>>>> {
-        if name.is_empty() {
-            return Ok(None);
-        }
+    /// The place of this name; none for no name.
+    fn known_place(&self, name: &str) -> Result<Option<&BackgroundPhoto>> {
         match self.place(name) {
-            Some(place) => place.plate().map(Some),
-            None => Err(self.unknown_plate(name)),
+            None if !name.is_empty() => Err(self.unknown_plate(name)),
+            place => Ok(place),
         }
     }
 
@@ -511,6 +499,14 @@ impl Pipeline {
 
     fn background_names(&self) -> Vec<&str> {
         self.backgrounds.iter().map(|b| b.name.as_str()).collect()
+    }
+}
+
+/// How many times larger a scene shows its photo.
+fn zoom_of(scene: &Scene) -> f64 {
+    match &scene.camera {
+        CameraSource::Known(camera) => scene.view.zoom_used(camera),
+        CameraSource::Rectangle { .. } => 1.0,
     }
 }
 

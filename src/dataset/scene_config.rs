@@ -41,8 +41,10 @@ impl DatasetConfig {
     /// # Errors
     /// Settings that no recipe can have.
     pub fn from_settings(settings: &SceneSettings, overrides: &[io::Override]) -> Result<Self> {
-        let config: Self = io::from_table_with(settings.to_table(), overrides)
-            .map_err(|e| e.within("settings"))?;
+        let mut table = settings.to_table();
+        leave_out_formats(&mut table);
+        let config: Self =
+            io::from_table_with(table, overrides).map_err(|e| e.within("settings"))?;
         config.check().map_err(|e| e.within("settings"))?;
         Ok(config)
     }
@@ -101,7 +103,18 @@ impl DatasetConfig {
                 insert(&mut settings, key, value);
             }
         }
+        leave_out_formats(&mut settings);
         Ok(SceneSettings::from_table(settings))
+    }
+}
+
+/// Files that labels are written to make no part of one picture, and some need a recipe's belt.
+fn leave_out_formats(settings: &mut Table) {
+    if let Some(Value::Table(labels)) = settings.get_mut("labels") {
+        labels.remove("formats");
+        if labels.is_empty() {
+            settings.remove("labels");
+        }
     }
 }
 
@@ -178,6 +191,7 @@ fn backgrounds_folder(files: &SceneFiles, plate: &str, folder: &Path) -> Result<
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::dataset::Format;
     use crate::label::ObstructionRule;
     use crate::pixel::LinearRgb;
     use crate::scene::{CameraSource, Environment, Surface};
@@ -245,6 +259,17 @@ mod tests {
             ..config
         };
         assert_eq!(brought, expected);
+    }
+
+    #[test]
+    fn formats_are_of_datasets_alone() {
+        let mut config = DatasetConfig::default();
+        config.labels.formats.push(Format::Mot);
+        assert!(config.scene_settings().unwrap().is_empty());
+        let older = toml::from_str("[labels]\nformats = [\"mot\"]\nmin_side_px = 5.0\n").unwrap();
+        let read = DatasetConfig::from_settings(&SceneSettings::from_table(older), &[]).unwrap();
+        assert_eq!(read.labels.formats, DatasetConfig::default().labels.formats);
+        assert_ne!(read.labels, DatasetConfig::default().labels);
     }
 
     #[test]

@@ -6,7 +6,7 @@ use crate::image::Image;
 use crate::light::irradiance::white_card_at;
 use crate::light::lamp::match_lamp;
 use crate::light::light_map::match_light_map;
-use crate::light::{PlateGrain, match_light_tint, surface_color, value_of_rank};
+use crate::light::{MeasuredPlate, match_light_tint, value_of_rank};
 use crate::pixel::LinearRgb;
 use crate::scene::{EnvironmentMap, Exposure, Scene};
 
@@ -20,14 +20,21 @@ const WHITE_PERCENTILE: f64 = 0.99;
 /// how it is spread, the exposure, the blur, the noise.
 ///
 /// `environment` is the map that the scene names. A scene that leaves nothing comes back as it is.
-pub fn match_plate(
+pub fn match_plate<'a>(
     scene: Scene,
-    plate: &Image<LinearRgb>,
+    plate: impl Into<MeasuredPlate<'a>>,
     environment: Option<&EnvironmentMap>,
 ) -> Scene {
+    let plate = plate.into();
     let tinted = match_light_tint(match_lamp(scene, plate, environment), plate);
     let lit = match_light_map(tinted, plate, environment);
-    PlateGrain::default().matched(expose(lit, plate, environment), plate)
+    match_grain(expose(lit, plate, environment), plate)
+}
+
+/// The part of [`match_plate`] that goes by the pixels that are seen: the blur and the noise of a
+/// plate that may be larger than the picture.
+pub(crate) fn match_grain(scene: Scene, plate: MeasuredPlate<'_>) -> Scene {
+    plate.grained(scene)
 }
 
 /// Turns [`Exposure::MatchPlate`] and [`Exposure::MatchSurface`] into [`Exposure::Ev`]; a scene
@@ -41,16 +48,17 @@ pub fn match_plate(
 /// surface itself is not used, since a tray may be of any grey. Where that grey is known,
 /// `MatchSurface` is the better choice. `gain_ev` overrides. Without any light in the scene, or on
 /// a black plate, the exposure is `gain_ev` alone.
-pub fn expose(
+pub fn expose<'a>(
     scene: Scene,
-    plate: &Image<LinearRgb>,
+    plate: impl Into<MeasuredPlate<'a>>,
     environment: Option<&EnvironmentMap>,
 ) -> Scene {
+    let plate = plate.into();
     let (wanted, gain_ev) = match scene.exposure {
         Exposure::Ev(_) => return scene,
-        Exposure::MatchPlate { gain_ev } => (f64::from(plate_white(plate)), gain_ev),
+        Exposure::MatchPlate { gain_ev } => (f64::from(plate.white()), gain_ev),
         Exposure::MatchSurface { albedo, gain_ev } => {
-            (luminance_of_white(&scene, plate, albedo), gain_ev)
+            (luminance_of_white(&scene, &plate, albedo), gain_ev)
         }
     };
     let card = white_card_at(&scene, environment, Point3::origin());
@@ -62,9 +70,10 @@ pub fn expose(
 }
 
 /// Luminance of white paper beside the surface in the plate; 0 where that is not seen.
-fn luminance_of_white(scene: &Scene, plate: &Image<LinearRgb>, albedo: Albedo) -> f64 {
-    let surface = surface_color(scene, plate).unwrap_or_default();
-    f64::from(albedo.white_beside(surface).luminance())
+fn luminance_of_white(scene: &Scene, plate: &MeasuredPlate<'_>, albedo: Albedo) -> f64 {
+    let surface = plate.surface(scene).map(|light| light.color);
+    let white = albedo.white_beside(surface.unwrap_or_default());
+    f64::from(white.luminance())
 }
 
 /// A ratio of luminances in stops; 0 for one that cannot be.
@@ -79,7 +88,7 @@ fn stops_of(ratio: f64) -> f64 {
 /// Luminance of the plate's white: the 99th percentile over all pixels.
 ///
 /// Pixels that are not finite are left out; 0 for a plate without any other.
-pub(crate) fn plate_white(plate: &Image<LinearRgb>) -> f32 {
+pub(super) fn plate_white(plate: &Image<LinearRgb>) -> f32 {
     let luminances = finite_luminances(plate);
     if luminances.is_empty() {
         return 0.0;
@@ -98,7 +107,7 @@ mod tests {
     use super::*;
     use crate::asset::Panorama;
     use crate::light::area::tests::square;
-    use crate::scene::{CameraSource, Surface};
+    use crate::scene::{CameraSource, LightTint, Surface};
     use std::f64::consts::PI;
     use std::sync::Arc;
 
@@ -160,6 +169,23 @@ mod tests {
         };
         let card = 2.975061 / PI + 0.1;
         assert!((card * libm::exp2(ev) - 1.0).abs() < 1e-5);
+    }
+
+    #[test]
+    fn a_tint_of_the_light_is_not_darkness() {
+        let matched = |tint: LightTint| {
+            let cast = Scene {
+                cast: tint,
+                ..scene(Exposure::MatchPlate { gain_ev: 0.0 })
+            };
+            let Exposure::Ev(ev) = expose(cast, &plate(), None).exposure else {
+                panic!("still unknown")
+            };
+            ev
+        };
+        let white = matched(LightTint::Known(LinearRgb::WHITE));
+        let dark = matched(LightTint::Known(LinearRgb::grey(0.25)));
+        assert!((dark - white - 2.0).abs() < 1e-5, "{white} {dark}");
     }
 
     #[test]

@@ -4,7 +4,7 @@ use crate::geom::{Point3, Vector3};
 use crate::light::area::{LightFrame, frame, radiance, side_lengths};
 use crate::light::polygon::polygon_irradiance;
 use crate::pixel::LinearRgb;
-use crate::scene::{AreaLight, EnvironmentMap, LightShape, Scene};
+use crate::scene::{AreaLight, EnvironmentMap, LightShape, LightTint, Scene};
 use std::f64::consts::{PI, TAU};
 
 /// Corners of the polygon that replaces an ellipse.
@@ -28,19 +28,23 @@ pub fn irradiance(light: &AreaLight, point: Point3<f64>, normal: Vector3<f64>) -
 }
 
 /// Luminance of a white card on a point of the surface, with nothing in the way of the light; the
-/// scene's environment map, where it has one, is beside it.
+/// scene's environment map, where it has one, is beside it. A tint that is still unknown is white.
 pub(super) fn white_card_at(
     scene: &Scene,
     environment: Option<&EnvironmentMap>,
     point: Point3<f64>,
 ) -> f32 {
-    let lit: f32 = scene
-        .lights
-        .iter()
-        .map(|light| irradiance(light, point, Vector3::z()).luminance())
+    let tint = match scene.cast {
+        LightTint::Known(color) => color,
+        LightTint::MatchSurface { .. } => LinearRgb::WHITE,
+    };
+    let tinted = |light: LinearRgb| (light * tint).luminance();
+    let lights = scene.lights.iter();
+    let lit: f32 = lights
+        .map(|light| tinted(irradiance(light, point, Vector3::z())))
         .sum();
     let around = environment.map_or(0.0, |map| map.irradiance(&Vector3::z()).luminance());
-    (lit + around) / PI as f32 + scene.ambient.luminance()
+    (lit + around) / PI as f32 + tinted(scene.ambient)
 }
 
 /// Corners of a polygon along the ellipse of these diameters, in turn, of the same area.

@@ -4,7 +4,7 @@ use crate::camera::Camera;
 use crate::geom::{Point3, Vector3};
 use crate::image::Image;
 use crate::light::irradiance::irradiance;
-use crate::light::{median, surface_color};
+use crate::light::{MeasuredPlate, median};
 use crate::pixel::{LinearRgb, Mix};
 use crate::scene::{AreaLight, CameraSource, EnvironmentMap, LightDirection, Scene};
 use std::f64::consts::{PI, TAU};
@@ -38,15 +38,15 @@ const MODEL_ERROR: f64 = 0.12;
 /// strengths that fit best, and a weight by what is left; azimuth, tilt and strength are the weighted
 /// means, and their spread is the error. On photos of three trays (`docs/accuracy.md`) the azimuth
 /// was off by 7 degrees as a rule and by 25 at most.
-pub(crate) fn match_lamp(
+pub(super) fn match_lamp(
     scene: Scene,
-    plate: &Image<LinearRgb>,
+    plate: MeasuredPlate<'_>,
     environment: Option<&EnvironmentMap>,
 ) -> Scene {
     let LightDirection::MatchWalls { deviations } = scene.light_direction else {
         return scene;
     };
-    let estimate = LampEstimate::from_plate(&scene, plate);
+    let estimate = LampEstimate::from_plate(&scene, &plate);
     let lit = match (estimate, &scene.lights[..]) {
         (Some(estimate), [first, others @ ..]) => {
             let moved = estimate.moved(first, deviations);
@@ -84,16 +84,16 @@ struct SeenFace {
 }
 
 impl LampEstimate {
-    fn from_plate(scene: &Scene, plate: &Image<LinearRgb>) -> Option<Self> {
+    fn from_plate(scene: &Scene, plate: &MeasuredPlate<'_>) -> Option<Self> {
         let CameraSource::Known(camera) = &scene.camera else {
             return None;
         };
-        let floor = f64::from(surface_color(scene, plate)?.luminance());
+        let floor = f64::from(plate.surface(scene)?.color.luminance());
         let wall = scene.surface.wall?;
         let faces = wall.inner_faces(scene.surface.size);
         let seen = faces
             .iter()
-            .filter_map(|face| seen_face(face, (scene, camera), plate, floor));
+            .filter_map(|face| seen_face(face, (scene, camera), plate.image, floor));
         let seen: Vec<SeenFace> = seen.collect();
         (floor > 0.0 && seen.len() >= FEWEST_WALLS).then(|| Self::from_faces(&seen))
     }
@@ -369,7 +369,7 @@ mod tests {
                 _ => 0.2,
             })
         });
-        let lit = match_lamp(scene(), &plate, None);
+        let lit = match_lamp(scene(), (&plate).into(), None);
         let [x, y, z] = lit.lights[0].position;
         assert!(lit.light_direction.is_known());
         assert!(
@@ -385,7 +385,7 @@ mod tests {
         let mut flat = scene();
         flat.surface.wall = None;
         let plate = Image::filled(40, 30, LinearRgb::grey(0.3));
-        let lit = match_lamp(flat.clone(), &plate, None);
+        let lit = match_lamp(flat.clone(), (&plate).into(), None);
         assert_eq!(lit.lights, flat.lights);
         assert_eq!(lit.ambient, flat.ambient);
         assert!(lit.light_direction.is_known());

@@ -1,16 +1,14 @@
 //! How light is spread over the labelled surface, from the plate.
 
 use crate::geom::Point3;
-use crate::image::Image;
+use crate::light::MeasuredPlate;
 use crate::light::irradiance::white_card_at;
-use crate::light::median;
-use crate::light::surface::seen_surface;
-use crate::pixel::LinearRgb;
+use crate::light::surface::SurfaceLight;
 use crate::scene::{EnvironmentMap, LightMap, Scene};
 
 /// Columns and rows of the cells that the surface is looked at in: lamps make gradients, and a
 /// pattern on the surface should not be taken for light.
-const CELLS: [usize; 2] = [5, 4];
+pub(super) const CELLS: [usize; 2] = [5, 4];
 /// What is darker or brighter by more is no gradient of light.
 const MOST: f32 = 4.0;
 
@@ -22,57 +20,40 @@ const MOST: f32 = 4.0;
 /// seen have 1, and so has everything where the camera does not see the surface. It takes the
 /// surface for one of the same colour all over: its patterns pass for light where they fill half a
 /// cell.
-pub(crate) fn match_light_map(
+pub(super) fn match_light_map(
     scene: Scene,
-    plate: &Image<LinearRgb>,
+    plate: MeasuredPlate<'_>,
     environment: Option<&EnvironmentMap>,
 ) -> Scene {
     let LightMap::MatchSurface { share } = scene.light_map else {
         return scene;
     };
-    let seen = seen_surface(&scene, plate);
-    let cells = SeenCells::new(&seen, scene.surface.size);
+    let (surface, size) = (plate.surface(&scene), scene.surface.size);
     let own = |point| white_card_at(&scene, environment, point);
-    let map = cells.map(|cells| cells.rows(own, share));
+    let map = surface.and_then(|surface| factors(&surface, size, own, share));
     Scene {
         light_map: LightMap::Known(map.unwrap_or_default()),
         ..scene
     }
 }
 
-/// Luminances of the surface by cells, the upper row first.
-struct SeenCells {
+/// Factors where the scene's own lights make a white card as bright as `own` says; none where nothing
+/// is seen but darkness.
+fn factors(
+    surface: &SurfaceLight,
     size: [f64; 2],
-    luminances: Vec<Vec<f32>>,
-    median: f32,
-}
-
-impl SeenCells {
-    /// None where nothing is seen, or nothing but darkness.
-    fn new(seen: &[(Point3<f64>, LinearRgb)], size: [f64; 2]) -> Option<Self> {
-        let median = median(seen.iter().map(|(_, color)| color.luminance()).collect())?;
-        let mut luminances = vec![Vec::new(); CELLS[0] * CELLS[1]];
-        for (point, color) in seen {
-            luminances[cell_of(point, size)].push(color.luminance());
-        }
-        (median > 0.0).then_some(Self {
-            size,
-            luminances,
-            median,
-        })
-    }
-
-    /// Factors where the scene's own lights make a white card as bright as `own` says.
-    fn rows(self, own: impl Fn(Point3<f64>) -> f32, share: f64) -> Vec<Vec<f32>> {
-        let middle = own(Point3::origin());
-        let points = cell_middles(self.size);
-        let factors = points.zip(self.luminances).map(|(point, luminances)| {
-            let plate = median(luminances).map_or(1.0, |here| here / self.median);
-            factor(plate, own(point) / middle, share)
-        });
-        let factors: Vec<f32> = factors.collect();
-        factors.chunks(CELLS[0]).map(<[f32]>::to_vec).collect()
-    }
+    own: impl Fn(Point3<f64>) -> f32,
+    share: f64,
+) -> Option<Vec<Vec<f32>>> {
+    let middle = own(Point3::origin());
+    let cells = cell_middles(size).zip(surface.cells);
+    let factors = cells.map(|(point, cell)| {
+        let plate = cell.map_or(1.0, |here| here / surface.luminance);
+        factor(plate, own(point) / middle, share)
+    });
+    let factors: Vec<f32> = factors.collect();
+    let rows = factors.chunks(CELLS[0]).map(<[f32]>::to_vec);
+    (surface.luminance > 0.0).then(|| rows.collect())
 }
 
 /// What is missing from the scene's own light to that of the plate.
@@ -85,7 +66,7 @@ fn factor(plate: f32, own: f32, share: f64) -> f32 {
 }
 
 /// The number of the cell that a point of the surface lies in.
-fn cell_of(point: &Point3<f64>, [w, h]: [f64; 2]) -> usize {
+pub(super) fn cell_of(point: &Point3<f64>, [w, h]: [f64; 2]) -> usize {
     let [u, v] = [point.x / w + 0.5, 0.5 - point.y / h];
     let [column, row] = [(u, CELLS[0]), (v, CELLS[1])]
         .map(|(place, cells)| ((place * cells as f64) as usize).min(cells - 1));
@@ -106,6 +87,8 @@ fn cell_middles([w, h]: [f64; 2]) -> impl Iterator<Item = Point3<f64>> {
 mod tests {
     use super::*;
     use crate::asset::Panorama;
+    use crate::image::Image;
+    use crate::pixel::LinearRgb;
     use crate::scene::{AreaLight, LightShape};
     use std::sync::Arc;
 
@@ -117,7 +100,7 @@ mod tests {
     }
 
     fn rows(scene: Scene, plate: &Image<LinearRgb>) -> Vec<Vec<f32>> {
-        let LightMap::Known(rows) = match_light_map(scene, plate, None).light_map else {
+        let LightMap::Known(rows) = match_light_map(scene, plate.into(), None).light_map else {
             panic!("still unknown")
         };
         rows
@@ -161,7 +144,7 @@ mod tests {
             ..scene()
         };
         let environment = EnvironmentMap::new(Arc::new(map));
-        let lit = match_light_map(dark, &gradient(), Some(&environment));
+        let lit = match_light_map(dark, (&gradient()).into(), Some(&environment));
         assert_eq!(lit.light_map, LightMap::Known(rows(scene(), &gradient())));
     }
 

@@ -32,9 +32,9 @@ mod expose;
 mod irradiance;
 mod lamp;
 mod light_map;
+mod measured_plate;
 mod nodes;
 mod noise;
-mod plate_grain;
 mod polygon;
 mod quadrature;
 mod sky;
@@ -47,15 +47,18 @@ pub use area::{LightFrame, frame, radiance};
 pub use blur::plate_blur;
 #[doc(hidden)]
 pub use expose::expose;
+pub(crate) use expose::match_grain;
 pub use expose::match_plate;
 #[doc(hidden)]
 pub use irradiance::irradiance;
+#[doc(hidden)]
+pub use measured_plate::MeasuredPlate;
+pub(crate) use measured_plate::PlateMeasures;
 #[doc(hidden)]
 pub use nodes::{Node, nodes};
 pub(crate) use nodes::{geometry_term, nodes_above};
 #[doc(hidden)]
 pub use noise::plate_noise;
-pub(crate) use plate_grain::PlateGrain;
 #[doc(hidden)]
 pub use polygon::polygon_irradiance;
 pub(crate) use sky::sky_cells;
@@ -63,7 +66,6 @@ pub(crate) use sky::sky_cells;
 pub use sky::{SkyPiece, sky_pieces};
 #[doc(hidden)]
 pub use surface::match_light_tint;
-pub(crate) use surface::surface_color;
 
 /// The value before which `rank` others stand when they are sorted.
 fn value_of_rank(mut values: Vec<f32>, rank: usize) -> f32 {

@@ -4,27 +4,51 @@ use crate::camera::{Camera, RadialDistortion};
 use crate::color::Albedo;
 use crate::geom::{Plane, Point2, Point3};
 use crate::image::Image;
-use crate::light::median;
+use crate::light::light_map::{CELLS, cell_of};
+use crate::light::{MeasuredPlate, median};
 use crate::pixel::LinearRgb;
 use crate::scene::{CameraSource, LightTint, Scene};
 
-/// The median colour, channel by channel, of the plate where the scene's labelled rectangle is
-/// seen; none where the camera is not known yet, or does not see it.
-pub(crate) fn surface_color(scene: &Scene, plate: &Image<LinearRgb>) -> Option<LinearRgb> {
+/// What a plate shows of a scene's surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct SurfaceLight {
+    /// The median colour, channel by channel.
+    pub(super) color: LinearRgb,
+    /// The median luminance.
+    pub(super) luminance: f32,
+    /// The same of each cell, the upper row first; none of one that is not seen.
+    pub(super) cells: [Option<f32>; CELLS[0] * CELLS[1]],
+}
+
+/// Measures the part of a plate that the scene's labelled rectangle fills; none where the camera is
+/// not known yet, or does not see it.
+pub(super) fn surface_light(scene: &Scene, plate: &Image<LinearRgb>) -> Option<SurfaceLight> {
     let seen = seen_surface(scene, plate);
-    Some(LinearRgb::new(
-        median_of(&seen, |c| c.r)?,
-        median_of(&seen, |c| c.g)?,
-        median_of(&seen, |c| c.b)?,
-    ))
+    Some(SurfaceLight {
+        color: LinearRgb::new(
+            median_of(&seen, |c| c.r)?,
+            median_of(&seen, |c| c.g)?,
+            median_of(&seen, |c| c.b)?,
+        ),
+        luminance: median_of(&seen, |c| c.luminance())?,
+        cells: cell_medians(&seen, scene.surface.size),
+    })
+}
+
+fn cell_medians(
+    seen: &[(Point3<f64>, LinearRgb)],
+    size: [f64; 2],
+) -> [Option<f32>; CELLS[0] * CELLS[1]] {
+    let mut luminances: [Vec<f32>; CELLS[0] * CELLS[1]] = Default::default();
+    for (point, color) in seen {
+        luminances[cell_of(point, size)].push(color.luminance());
+    }
+    luminances.map(median)
 }
 
 /// The points of a scene's surface that the plate shows, and their colours where those are finite;
 /// none where the camera is not known yet, or does not see it.
-pub(super) fn seen_surface(
-    scene: &Scene,
-    plate: &Image<LinearRgb>,
-) -> Vec<(Point3<f64>, LinearRgb)> {
+fn seen_surface(scene: &Scene, plate: &Image<LinearRgb>) -> Vec<(Point3<f64>, LinearRgb)> {
     let CameraSource::Known(camera) = scene.camera else {
         return Vec::new();
     };
@@ -52,7 +76,10 @@ fn surface_point(
 }
 
 /// The median of a channel.
-fn median_of(seen: &[(Point3<f64>, LinearRgb)], channel: fn(&LinearRgb) -> f32) -> Option<f32> {
+fn median_of(
+    seen: &[(Point3<f64>, LinearRgb)],
+    channel: impl Fn(&LinearRgb) -> f32,
+) -> Option<f32> {
     median(seen.iter().map(|(_, color)| channel(color)).collect())
 }
 
@@ -62,12 +89,13 @@ fn median_of(seen: &[(Point3<f64>, LinearRgb)], channel: fn(&LinearRgb) -> f32) 
 /// What the surface has beside its own albedo is the colour of the light on it. Where that albedo
 /// is not known the surface counts as grey, and a share below 1 takes only a part, since trays and
 /// tables may have a colour of their own. Luminance stays.
-pub fn match_light_tint(scene: Scene, plate: &Image<LinearRgb>) -> Scene {
+pub fn match_light_tint<'a>(scene: Scene, plate: impl Into<MeasuredPlate<'a>>) -> Scene {
     let LightTint::MatchSurface { share, albedo } = scene.cast else {
         return scene;
     };
-    let surface = surface_color(&scene, plate).unwrap_or(LinearRgb::BLACK);
-    let tint = tint_of(Albedo::Color(albedo).white_beside(surface), share);
+    let surface = plate.into().surface(&scene).map(|light| light.color);
+    let white = Albedo::Color(albedo).white_beside(surface.unwrap_or(LinearRgb::BLACK));
+    let tint = tint_of(white, share);
     Scene {
         cast: LightTint::Known(tint.scale(1.0 / tint.luminance())),
         ..scene
@@ -135,8 +163,10 @@ pub(super) mod tests {
     #[test]
     fn the_surface_is_separated_from_the_table_and_from_highlights() {
         assert_eq!(
-            surface_color(&scene(LightTint::default()), &plate()),
-            Some(LinearRgb::new(0.4, 0.2, 0.1))
+            surface_light(&scene(LightTint::default()), &plate())
+                .unwrap()
+                .color,
+            LinearRgb::new(0.4, 0.2, 0.1)
         );
     }
 

@@ -34,6 +34,8 @@ pub struct Background {
     pub camera: CameraSource,
     /// OpenCV's first coefficient of that camera's radial distortion; 0 where it has none.
     pub k1: f64,
+    /// Longer side of the part of the photo that pictures show, over that of the photo.
+    pub shown_share: f64,
     /// Share of the light that its surface reflects, where that is known.
     pub albedo: Option<Albedo>,
     /// The walls on the edges of that rectangle, where there are any.

@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::geom::Point2;
 use crate::scene::bounds::{F_NUMBER, FOCUS, K1, SENSOR};
 use crate::scene::check::field;
-use crate::scene::{Draws, Range};
+use crate::scene::{Background, CameraSource, Draws, Range};
 use serde::{Deserialize, Serialize};
 
 /// Width of the sensor of a 35 mm camera, millimetres.
@@ -31,7 +31,8 @@ pub struct Lens {
     /// centre.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub focus_m: Option<f64>,
-    /// Longer side of the sensor that the whole photo was taken with, millimetres. Default: 36.
+    /// Longer side of the part of the sensor that took what the whole picture shows, millimetres.
+    /// Default: 36.
     pub sensor_mm: f64,
 }
 
@@ -112,8 +113,12 @@ impl Lens {
 
     /// The distortion that a plate has before anything is done to it.
     pub(crate) fn distortion_of_plate(&self, photo: &Camera) -> RadialDistortion {
-        let k1 = if self.bends_plate { 0.0 } else { self.k1 };
-        RadialDistortion::new(photo, k1)
+        RadialDistortion::new(photo, self.k1_of_plate())
+    }
+
+    /// Its coefficient.
+    pub(crate) fn k1_of_plate(&self) -> f64 {
+        if self.bends_plate { 0.0 } else { self.k1 }
     }
 
     /// The aperture and the focus for a photo's camera; none where all is sharp.
@@ -194,9 +199,33 @@ impl Default for LensRanges {
 }
 
 impl LensRanges {
-    /// The lens before a background whose photo has a distortion of its own, or 0.
-    pub(super) fn draw(&self, draws: &Draws, photo_k1: f64) -> Lens {
-        let bends_plate = photo_k1 == 0.0 && self.k1 != Range::fixed(0.0);
+    /// Fails where the strongest barrel folds the pictures of a background over.
+    pub(super) fn check_folds(&self, background: &Background) -> Result<()> {
+        let CameraSource::Known(camera) = &background.camera else {
+            return Ok(());
+        };
+        let bends_plate = self.bends_plate(background.k1);
+        let lens = Lens {
+            k1: if bends_plate {
+                self.k1.min
+            } else {
+                background.k1
+            },
+            bends_plate,
+            ..Lens::default()
+        };
+        lens.check_fold(camera)
+    }
+
+    /// A photo that has no distortion of its own is bent.
+    fn bends_plate(&self, photo_k1: f64) -> bool {
+        photo_k1 == 0.0 && self.k1 != Range::fixed(0.0)
+    }
+
+    /// The lens before a background.
+    pub(super) fn draw(&self, draws: &Draws, background: &Background) -> Lens {
+        let photo_k1 = background.k1;
+        let bends_plate = self.bends_plate(photo_k1);
         let k1 = if bends_plate {
             self.k1.draw(draws, "lens.k1")
         } else {
@@ -207,7 +236,7 @@ impl LensRanges {
             bends_plate,
             f_number: Range::draw_optional(self.f_number, draws, "lens.f_number"),
             focus_m: Range::draw_optional(self.focus_m, draws, "lens.focus_m"),
-            sensor_mm: self.sensor_mm,
+            sensor_mm: self.sensor_mm * background.shown_share,
         }
     }
 
@@ -325,17 +354,51 @@ mod tests {
     fn nothing_is_drawn_by_default_and_a_photo_keeps_its_own_lens() {
         let log = DrawLog::default();
         let draws = Draws::new(3, 4).logged(&log);
-        assert!(LensRanges::default().draw(&draws, 0.0).is_pinhole());
+        let straight = background(0.0);
+        assert!(LensRanges::default().draw(&draws, &straight).is_pinhole());
         let ranges = LensRanges {
             k1: Range::new(-0.2, 0.1),
             ..LensRanges::default()
         };
-        let own = ranges.draw(&draws, -0.07);
+        let own = ranges.draw(&draws, &background(-0.07));
         assert_eq!((own.k1, own.bends_plate), (-0.07, false));
         assert!(log.into_draws().is_empty());
-        let drawn = ranges.draw(&Draws::new(3, 4), 0.0);
+        let drawn = ranges.draw(&Draws::new(3, 4), &straight);
         assert!(drawn.bends_plate && (-0.2..0.1).contains(&drawn.k1));
-        assert_eq!(drawn, ranges.draw(&Draws::new(3, 4), 0.0));
+        assert_eq!(drawn, ranges.draw(&Draws::new(3, 4), &straight));
+    }
+
+    fn background(k1: f64) -> Background {
+        Background {
+            name: "tray".into(),
+            size: [0.4, 0.3],
+            camera: CameraSource::Known(photo()),
+            k1,
+            shown_share: 1.0,
+            albedo: None,
+            wall: None,
+        }
+    }
+
+    #[test]
+    fn a_part_of_a_photo_is_taken_by_a_part_of_the_sensor() {
+        let cropped = Background {
+            shown_share: 0.5,
+            ..background(0.0)
+        };
+        let lens = LensRanges::default().draw(&Draws::new(3, 4), &cropped);
+        assert_eq!(lens.sensor_mm, 18.0);
+    }
+
+    #[test]
+    fn a_range_that_folds_some_pictures_over_is_refused_at_once() {
+        let ranges = LensRanges {
+            k1: Range::new(-1.5, 0.0),
+            ..LensRanges::default()
+        };
+        assert!(ranges.check_folds(&background(0.0)).is_err());
+        // A photo that has a distortion keeps it.
+        assert!(ranges.check_folds(&background(-0.07)).is_ok());
     }
 
     #[test]

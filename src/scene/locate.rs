@@ -23,6 +23,8 @@ pub fn locate(scene: Scene) -> Result<Scene> {
     };
     let mut label = Label::new(photo, corners_px, scene.surface.size);
     label.camera.focal_px = focal_px;
+    // The corners were clicked in the plate.
+    label.camera.k1 = Some(scene.lens.k1_of_plate()).filter(|&k1| k1 != 0.0);
     let camera = solve_camera(&label, &scene.plate)?.resized(scene.image);
     Ok(Scene {
         camera: CameraSource::Known(camera),

@@ -65,8 +65,8 @@ impl Scene {
     /// The shot that this scene describes, once nothing is unknown in it.
     ///
     /// `look` finds an object's asset and photo, or nothing; for a library that is
-    /// [`Appearance::from_library`]. `plate` is the background at the picture's size; none leaves
-    /// it transparent. `panorama` is the picture that the scene's environment names. Object `i`
+    /// [`Appearance::from_library`]. `plate` is the background at the picture's size, or larger where
+    /// the view zooms in; none leaves it transparent. `panorama` is the picture that the scene's environment names. Object `i`
     /// gets id `i + 1`; the shadow catcher is the plane of the labelled surface,
     /// `CATCHER_RATIO` times as large.
     ///
@@ -111,15 +111,24 @@ impl Scene {
 
     /// The part of the plate that is seen.
     fn shown_plate(&self, camera: &Camera, plate: Arc<Image<LinearRgb>>) -> Arc<Image<LinearRgb>> {
+        let [across, down] = self.detail_of(&plate);
         if self.lens.moves_plate() {
             return Arc::new(self.shown(camera, |at| {
-                sample_cubic_clamped(&plate, at.x, at.y).map(|v| v.max(0.0))
+                sample_cubic_clamped(&plate, at.x * across, at.y * down).map(|v| v.max(0.0))
             }));
         }
-        if self.view.is_whole() {
+        if self.view.is_whole() && [across, down] == [1.0; 2] {
             return plate;
         }
-        Arc::new(self.shown(camera, |at| sample_bilinear_clamped(&plate, at.x, at.y)))
+        Arc::new(self.shown(camera, |at| {
+            sample_bilinear_clamped(&plate, at.x * across, at.y * down)
+        }))
+    }
+
+    /// Columns and rows of a plate for one of the picture.
+    fn detail_of(&self, plate: &Image<LinearRgb>) -> [f64; 2] {
+        let ([width, height], (w, h)) = (self.image.map(f64::from), plate.size());
+        [w as f64 / width, h as f64 / height]
     }
 
     /// What the view and the lens show of something that is known all over the photo; `camera` is
@@ -224,14 +233,17 @@ impl Scene {
     }
 
     fn check_plate(&self, plate: &Image<LinearRgb>) -> Result<()> {
-        let (w, h) = plate.size();
-        let [width, height] = self.image;
-        if (w, h) == (width as usize, height as usize) {
+        let ((w, h), [width, height]) = (plate.size(), self.image);
+        let [across, down] = self.detail_of(plate);
+        // Half a pixel of either side is rounding.
+        let tolerance = 1.0 / f64::from(width.min(height));
+        if across >= 1.0 && down >= 1.0 && (across - down).abs() < tolerance {
             return Ok(());
         }
+        let expected = format!("expected {width} x {height} or larger of that shape");
         Err(Error::value(
             "plate",
-            format!("{w} x {h} pixels, expected {width} x {height}"),
+            format!("{w} x {h} pixels, {expected}"),
         ))
     }
 }
@@ -288,7 +300,7 @@ mod tests {
     use super::*;
     use crate::geom::{UnitQuaternion, Vector2};
     use crate::pixel::PremulRgba;
-    use crate::scene::{Grade, Surface};
+    use crate::scene::{Grade, Surface, View};
 
     fn camera() -> Camera {
         Camera {
@@ -427,12 +439,29 @@ mod tests {
     }
 
     #[test]
+    fn a_zoom_shows_the_detail_of_a_larger_plate() {
+        // Stripes of one column at three times the picture's size.
+        let plate = Image::from_fn(24, 18, |x, _| LinearRgb::grey((x % 2) as f32));
+        let view = View {
+            zoom: 3.0,
+            ..View::default()
+        };
+        let zoomed = Scene { view, ..scene() };
+        let shot = zoomed.resolve(look, Some(Arc::new(plate)), None).unwrap();
+        let row: Vec<f32> = shot.plate.unwrap().row(2).iter().map(|c| c.g).collect();
+        assert_eq!(row, [0.0, 1.0, 0.0, 1.0, 0.0, 1.0, 0.0, 1.0]);
+    }
+
+    #[test]
     fn a_plate_of_another_size_is_told() {
         let plate = Arc::new(Image::filled(3, 6, LinearRgb::BLACK));
         let reported = scene()
             .resolve(look, Some(plate), None)
             .unwrap_err()
             .to_string();
-        assert_eq!(reported, "plate: 3 x 6 pixels, expected 8 x 6");
+        assert_eq!(
+            reported,
+            "plate: 3 x 6 pixels, expected 8 x 6 or larger of that shape"
+        );
     }
 }

@@ -87,7 +87,7 @@ impl View {
     }
 
     /// The zoom with which all that is seen lies in the photo.
-    fn zoom_used(&self, photo: &Camera) -> f64 {
+    pub(crate) fn zoom_used(&self, photo: &Camera) -> f64 {
         let reach = self.reach(photo).component_div(&half_size(photo));
         self.zoom.max(reach.max())
     }

@@ -10,6 +10,7 @@ fn scene(cards: u32, k: u64) -> Scene {
         name: "tray".into(),
         size: [0.6, 0.4],
         k1: 0.0,
+        shown_share: 1.0,
         albedo: None,
         wall: None,
         camera: CameraSource::Rectangle {

@@ -24,7 +24,7 @@ pub(crate) struct LabelArgs {
 }
 
 pub(crate) fn run(args: &LabelArgs, global: &GlobalArgs) -> anyhow::Result<()> {
-    let scene = args.read_scene()?;
+    let scene = args.scene.read_scene()?;
     let pipeline = Pipeline::open_for(args.scene.config_for(&scene)?, &scene)?;
     let labels = args.label(&pipeline, scene);
     let labels = labels.map_err(|e| e.in_file(&args.scene.path))?;
@@ -35,15 +35,6 @@ pub(crate) fn run(args: &LabelArgs, global: &GlobalArgs) -> anyhow::Result<()> {
 }
 
 impl LabelArgs {
-    /// Labels alone need no photo.
-    fn read_scene(&self) -> anyhow::Result<Scene> {
-        let scene = self.scene.read_scene()?;
-        Ok(match &self.overlay {
-            Some(_) => scene,
-            None => scene.unlit(),
-        })
-    }
-
     fn label(&self, pipeline: &Pipeline, scene: Scene) -> petcomp::Result<Labels> {
         match &self.overlay {
             Some(path) => write_overlay(path, pipeline, scene),

@@ -32,6 +32,7 @@ pub(crate) struct RenderArgs {
 }
 
 pub(crate) fn run(args: &RenderArgs, global: &GlobalArgs) -> anyhow::Result<()> {
+    args.check_output()?;
     let scene = args.scene.read_scene()?;
     let pipeline = Pipeline::open_for(args.config_for(&scene)?, &scene)?;
     let (scene, shot) = pipeline
@@ -46,6 +47,17 @@ pub(crate) fn run(args: &RenderArgs, global: &GlobalArgs) -> anyhow::Result<()> 
 }
 
 impl RenderArgs {
+    /// Refuses a picture that could not be written before it is rendered.
+    fn check_output(&self) -> anyhow::Result<()> {
+        let path = self.output.display();
+        match extension_of(&self.output).as_str() {
+            "exr" => Ok(()),
+            _ if !self.aov.is_empty() => bail!("{path}: parts need a file called .exr"),
+            "tif" | "tiff" | "png" | "jpg" | "jpeg" => Ok(()),
+            _ => bail!("{path}: no format for this extension, expected .png, .jpg, .exr or .tif"),
+        }
+    }
+
     fn config_for(&self, scene: &Scene) -> anyhow::Result<DatasetConfig> {
         Ok(at_quality(self.quality, self.scene.config_for(scene)?))
     }
@@ -55,14 +67,13 @@ impl RenderArgs {
         deep: &DeepImage,
         shot: &Shot,
         frame: &Image<PremulRgba>,
-    ) -> anyhow::Result<()> {
+    ) -> petcomp::Result<()> {
         if self.aov.is_empty() {
             write_picture(&self.output, frame)?;
         } else {
             self.write_parts(deep, shot, frame)?;
         }
-        self.write_preview(frame)?;
-        Ok(())
+        self.write_preview(frame)
     }
 
     fn write_preview(&self, frame: &Image<PremulRgba>) -> petcomp::Result<()> {
@@ -84,26 +95,17 @@ impl RenderArgs {
         deep: &DeepImage,
         shot: &Shot,
         frame: &Image<PremulRgba>,
-    ) -> anyhow::Result<()> {
-        let path = &self.output;
-        if extension_of(path) != "exr" {
-            bail!("{}: parts need a file called .exr", path.display());
-        }
+    ) -> petcomp::Result<()> {
         let parts = composite::parts(&self.aov, deep, shot, frame);
-        Ok(write_parts(path, frame.size(), &parts)?)
+        write_parts(&self.output, frame.size(), &parts)
     }
 }
 
-fn write_picture(path: &Path, frame: &Image<PremulRgba>) -> anyhow::Result<()> {
+fn write_picture(path: &Path, frame: &Image<PremulRgba>) -> petcomp::Result<()> {
     match extension_of(path).as_str() {
-        "exr" | "tif" | "tiff" => io::write(path, frame)?,
-        "png" | "jpg" | "jpeg" => io::write(path, &displayed(frame))?,
-        _ => bail!(
-            "{}: no format for this extension, expected .png, .jpg, .exr or .tif",
-            path.display()
-        ),
+        "exr" | "tif" | "tiff" => io::write(path, frame),
+        _ => io::write(path, &displayed(frame)),
     }
-    Ok(())
 }
 
 /// The picture over black.

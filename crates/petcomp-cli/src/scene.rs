@@ -3,8 +3,9 @@
 use crate::documents::RecipeArgs;
 use crate::global::GlobalArgs;
 use crate::print;
-use petcomp::scene::cycles;
-use petcomp::{Scene, io};
+use petcomp::dataset::DatasetConfig;
+use petcomp::scene::{Card, EdgeTreatment, PostProcess, cycles};
+use petcomp::{Scene, Shot, io};
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Subcommand)]
@@ -77,6 +78,7 @@ fn draw_scene(args: &DrawArgs, global: &GlobalArgs) -> anyhow::Result<()> {
 fn check_scene(path: &Path) -> anyhow::Result<()> {
     let scene: Scene = io::read_document(path)?;
     scene.check().map_err(|e| e.in_file(path))?;
+    DatasetConfig::from_settings(&scene.settings, &[]).map_err(|e| e.in_file(path))?;
     print::line(format_args!("{}: possible", path.display()));
     Ok(())
 }
@@ -88,12 +90,33 @@ fn export_scene(args: &ExportSceneArgs, global: &GlobalArgs) -> anyhow::Result<(
     let (scene, shot) = pipeline
         .resolve(scene)
         .map_err(|e| e.in_file(&args.scene))?;
+    let left_out = left_out(&scene, &shot);
+    if !left_out.is_empty() {
+        log::warn!("left out, Cycles renders without: {}", left_out.join(", "));
+    }
     let retouched = petcomp::render::retouched_fully(&shot, &pipeline.config().render);
     cycles::export(&retouched, scene.surface.size, &args.folder)?;
     let cards = shot.cards.len();
     global.print_written(&args.folder, format_args!("{cards} cards; render it with"));
     global.print_status(format_args!("  {}", blender_command(&args.folder)));
     Ok(())
+}
+
+/// What a picture of ours has and the exported one lacks.
+fn left_out(scene: &Scene, shot: &Shot) -> Vec<&'static str> {
+    let bends = |card: &Card| card.refraction.flows.iter().any(Option::is_some);
+    let parts = [
+        (shot.light_grid.is_some(), "the light map"),
+        (shot.holdout.is_some(), "what the walls hide"),
+        (shot.motion_m != [0.0; 2], "motion blur"),
+        (shot.cards.iter().any(bends), "refraction"),
+        (shot.edges == EdgeTreatment::Poisson, "Poisson blending"),
+        (scene.finish != PostProcess::default(), "the finish"),
+    ];
+    parts
+        .into_iter()
+        .filter_map(|(is_there, name)| is_there.then_some(name))
+        .collect()
 }
 
 fn blender_command(folder: &Path) -> String {

@@ -20,7 +20,7 @@ pub(crate) struct SettleArgs {
     /// say
     #[arg(long)]
     quality: Option<Quality>,
-    /// Where every object was during the fall, as CSV: a line for each 60th of a second and object
+    /// Where every object was during the fall, as CSV: a line for about each 60th of a second and object
     #[arg(long, value_name = "FILE")]
     trace: Option<PathBuf>,
     /// Picture of what lies where, from above and from the side
@@ -28,9 +28,8 @@ pub(crate) struct SettleArgs {
     preview: Option<PathBuf>,
 }
 
-/// Steps of the simulation from one line of the trace to the next: 60 lines a second at the default
-/// step.
-const TRACE_INTERVAL_STEPS: usize = 8;
+/// Lines of the trace for each second and object.
+const TRACE_RATE: f64 = 60.0;
 
 pub(crate) fn run(args: &SettleArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     let scene: Scene = io::read_document(&args.scene)?;
@@ -49,7 +48,7 @@ pub(crate) fn run(args: &SettleArgs, global: &GlobalArgs) -> anyhow::Result<()> 
 impl SettleArgs {
     /// Lets the objects fall and writes the trace, for a failed fall too: it shows what went wrong.
     fn settle(&self, scene: Scene, options: &SettleOptions) -> petcomp::Result<Settled> {
-        let (settled, samples) = settle_traced(scene, options, self.trace_interval())
+        let (settled, samples) = settle_traced(scene, options, self.trace_interval(options))
             .map_err(|e| e.in_file(&self.scene))?;
         if let Some(path) = &self.trace {
             io::write_text(path, &trace_csv(&samples))?;
@@ -57,9 +56,10 @@ impl SettleArgs {
         Ok(settled)
     }
 
-    fn trace_interval(&self) -> usize {
+    /// Steps of the simulation from one line of the trace to the next; 0 without a trace.
+    fn trace_interval(&self, options: &SettleOptions) -> usize {
         match self.trace {
-            Some(_) => TRACE_INTERVAL_STEPS,
+            Some(_) => (1.0 / (TRACE_RATE * options.step)).round().max(1.0) as usize,
             None => 0,
         }
     }

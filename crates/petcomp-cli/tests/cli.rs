@@ -1117,6 +1117,31 @@ fn a_scene_is_rendered_without_its_recipe() {
     }
     assert!(bytes("alone.json") == bytes("recipe.json"));
 
+    // What a mask beside the photo hides is hidden in labels, with a picture of them and without.
+    let plate = petcomp::io::read_document::<petcomp::Scene>(desk.path(scene))
+        .unwrap()
+        .plate;
+    std::fs::create_dir_all(desk.path("places")).unwrap();
+    for end in ["jpg", "label.json"] {
+        let name = format!("{plate}.{end}");
+        let place = samples().join("backgrounds").join(&name);
+        std::fs::copy(place, desk.path("places").join(name)).unwrap();
+    }
+    let front = petcomp::Image::from_fn(1280, 960, |x, _| petcomp::Coverage(f32::from(x < 640)));
+    petcomp::io::write(
+        desk.path("places").join(format!("{plate}.front.png")),
+        &front,
+    )
+    .unwrap();
+    let hidden = |args: &[&str]| {
+        let places = ["--set", "backgrounds=\"../places\""];
+        with_set(&[&["label", scene, "demo/recipe.toml"], args, &places].concat());
+    };
+    hidden(&["-o", "hidden.json"]);
+    hidden(&["-o", "shown.json", "--overlay", "hidden.png"]);
+    assert!(bytes("hidden.json") == bytes("shown.json"));
+    assert!(bytes("hidden.json") != bytes("recipe.json"));
+
     // What is missing is named.
     let text = std::fs::read_to_string(desk.path(scene)).unwrap();
     let bare = text.split("[files]").next().unwrap();

@@ -36,7 +36,7 @@ pub(super) fn measured_plates(pipeline: &Pipeline) -> error::Result<Vec<Measured
             .background
             .wall
             .map(|wall| format!("{} m", wall.height));
-        let pixels = PixelMeasures::around(&*place.plate()?, &[]);
+        let pixels = PixelMeasures::around(&place.plate()?.image, &[]);
         measured.extend(pixels.map(|pixels| MeasuredPlate {
             name: place.background.name.clone(),
             pixels,

@@ -110,7 +110,7 @@ impl Recipe {
             plate: background.name.clone(),
             camera: background.camera,
             view: self.view.draw(draws),
-            lens: self.lens.draw(draws, background.k1),
+            lens: self.lens.draw(draws, background),
             surface,
             objects,
             ambient: ambient_radiance(&lights, self.ambient.draw(draws, "ambient")),

@@ -235,12 +235,14 @@ impl Recipe {
     }
 
     /// Fails on the first asset that at its largest fits between the walls of some background in no
-    /// direction, and where [`at_most_once`](Self::at_most_once) leaves too few assets: a scene like
-    /// that would be refused, however late it comes.
+    /// direction, on a lens that folds the pictures of some background over, and where there are no
+    /// assets, or with [`at_most_once`](Self::at_most_once) too few: a scene like that would be
+    /// refused, however late it comes.
     pub fn check_room(&self, backgrounds: &[Background], catalog: &[AssetVariant]) -> Result<()> {
         let recipe = self.narrowed();
-        recipe.check_repetition(catalog)?;
+        recipe.check_selections(catalog)?;
         for background in recipe.viewpoints.slice_of(backgrounds) {
+            recipe.lens.check_folds(background)?;
             for variant in catalog.iter().filter(|v| recipe.draws_from(v.role)) {
                 recipe.check_fit(background, variant)?;
             }

@@ -92,6 +92,7 @@ mod tests {
             name: name.into(),
             size: [0.6, 0.4],
             k1: 0.0,
+            shown_share: 1.0,
             albedo: None,
             wall: None,
             camera,

@@ -138,16 +138,19 @@ impl Recipe {
     }
 
     /// Fails where more may be asked for than there are assets, and none may be there twice.
-    pub(super) fn check_repetition(&self, catalog: &[AssetVariant]) -> Result<()> {
-        if !self.at_most_once {
-            return Ok(());
-        }
+    pub(super) fn check_selections(&self, catalog: &[AssetVariant]) -> Result<()> {
         [Role::Object, Role::Distractor]
             .into_iter()
-            .try_for_each(|role| {
-                let choice = self.choice_of(role);
-                choice.check_once(choice.count.max(), choice.part_of(catalog).len())
-            })
+            .try_for_each(|role| self.check_selection(&self.choice_of(role), catalog))
+    }
+
+    fn check_selection(&self, choice: &Choice<'_>, catalog: &[AssetVariant]) -> Result<()> {
+        let (most, assets) = (choice.count.max(), choice.part_of(catalog).len());
+        choice.check_part(most, assets)?;
+        match self.at_most_once {
+            true => choice.check_once(most, assets),
+            false => Ok(()),
+        }
     }
 
     /// Whether pictures can hold assets of a role.

@@ -13,6 +13,7 @@ fn tray(name: &str) -> Background {
         name: name.into(),
         size: [0.6, 0.4],
         k1: 0.0,
+        shown_share: 1.0,
         albedo: None,
         wall: None,
         camera: CameraSource::Rectangle {
@@ -142,6 +143,16 @@ fn distractors_that_no_asset_is_are_told() {
     assert_eq!(
         told.to_string(),
         "distractors: 2 asked for, but no asset has the role \"distractor\""
+    );
+    // And before the first picture, however seldom they are drawn.
+    let seldom = Recipe {
+        distractors: Range::new(0.0, 1.0).into(),
+        ..Recipe::default()
+    };
+    let told = seldom.check_room(&[tray("a")], &catalog(10)).unwrap_err();
+    assert!(
+        told.to_string().starts_with("distractors: 1 asked for"),
+        "{told}"
     );
     // What is never drawn may be as large as it likes.
     let mut huge = catalog_with_caps();

@@ -29,7 +29,7 @@ pub(crate) struct ExplainArgs {
     #[command(flatten)]
     recipe: RecipeArgs,
     /// Number of the image
-    #[arg(long, value_name = "K")]
+    #[arg(short = 'k', long, value_name = "K")]
     index: u64,
     /// Seed of the dataset
     #[arg(long, default_value_t = 0)]
@@ -47,7 +47,7 @@ fn check_is_new(recipe: &Path) -> petcomp::Result<()> {
     if !recipe.exists() {
         return Ok(());
     }
-    let what = "is there already, expected a new file";
+    let what = "already exists, expected a new file";
     Err(Error::file(recipe, what))
 }
 

@@ -425,6 +425,7 @@ fn tray() -> Background {
         name: "tray".into(),
         size: [0.6, 0.4],
         k1: 0.0,
+        shown_share: 1.0,
         albedo: None,
         wall: None,
         camera: CameraSource::Rectangle {
