@@ -19,7 +19,7 @@ use petcomp::filter::Pyramid;
 use petcomp::geom::{Point2, Pose, Quad, UnitQuaternion, Vector2, Vector3};
 use petcomp::io::exr::read_channels;
 use petcomp::label::{LabelOptions, label};
-use petcomp::scene::{CameraSource, Card, Exposure, Grade, LightTint, PostProcess, Surface};
+use petcomp::scene::{CameraSource, Card, Grade, Surface};
 use petcomp::{Image, LinearRgb, ObjectId, PremulRgba, Result, Scene, Shot, composite, io, render};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -110,26 +110,13 @@ fn sample_of(shot: Shot, options: &LabelOptions) -> Result<Sample> {
     let frame = composite::frame(&deep, shot.plate.as_deref());
     let labels = label(&deep, &shot, options);
     let scene = Scene {
-        belt: None,
-        image: IMAGE,
         plate: "grey".into(),
-        camera: CameraSource::Known(shot.camera),
-        surface: Surface::new([0.8, 0.6]),
-        objects: Vec::new(),
-        lights: Vec::new(),
         ambient: LinearRgb::grey(1.0),
-        environment: None,
-        exposure: Exposure::default(),
-        cast: LightTint::default(),
-        light_direction: Default::default(),
-        light_map: Default::default(),
-        interreflection: Default::default(),
-        view: Default::default(),
-        edges: Default::default(),
-        lens: Default::default(),
-        finish: PostProcess::default(),
-        files: None,
-        settings: Default::default(),
+        ..Scene::new(
+            IMAGE,
+            CameraSource::Known(shot.camera),
+            Surface::new([0.8, 0.6]),
+        )
     };
     let provenance = Provenance {
         scene_seed: 3,

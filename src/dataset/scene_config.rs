@@ -193,35 +193,20 @@ mod tests {
     use super::*;
     use crate::dataset::Format;
     use crate::label::ObstructionRule;
-    use crate::pixel::LinearRgb;
     use crate::scene::{CameraSource, Environment, Surface};
 
     fn scene() -> Scene {
         Scene {
-            belt: None,
-            image: [64, 48],
             plate: "tray".into(),
-            camera: CameraSource::Rectangle {
-                corners_px: [[1.0, 1.0], [9.0, 1.0], [9.0, 9.0], [1.0, 9.0]],
-                photo: [10, 10],
-                focal_px: None,
-            },
-            surface: Surface::new([0.4, 0.3]),
-            objects: vec![],
-            lights: vec![],
-            ambient: LinearRgb::BLACK,
-            environment: None,
-            exposure: Default::default(),
-            edges: Default::default(),
-            cast: Default::default(),
-            light_direction: Default::default(),
-            light_map: Default::default(),
-            interreflection: Default::default(),
-            view: Default::default(),
-            lens: Default::default(),
-            finish: Default::default(),
-            files: None,
-            settings: Default::default(),
+            ..Scene::new(
+                [64, 48],
+                CameraSource::Rectangle {
+                    corners_px: [[1.0, 1.0], [9.0, 1.0], [9.0, 9.0], [1.0, 9.0]],
+                    photo: [10, 10],
+                    focal_px: None,
+                },
+                Surface::new([0.4, 0.3]),
+            )
         }
     }
 

@@ -113,30 +113,19 @@ mod tests {
 
     fn scene(exposure: Exposure) -> Scene {
         Scene {
-            belt: None,
-            image: [40, 30],
             plate: "tray".into(),
-            camera: CameraSource::Rectangle {
-                corners_px: [[20.0, 20.0], [60.0, 20.0], [60.0, 40.0], [20.0, 40.0]],
-                photo: [80, 60],
-                focal_px: None,
-            },
-            surface: Surface::new([0.4, 0.3]),
-            objects: Vec::new(),
             lights: vec![square()],
             ambient: LinearRgb::grey(0.1),
-            environment: None,
             exposure,
-            edges: Default::default(),
-            cast: Default::default(),
-            light_direction: Default::default(),
-            light_map: Default::default(),
-            interreflection: Default::default(),
-            view: Default::default(),
-            lens: Default::default(),
-            finish: Default::default(),
-            files: None,
-            settings: Default::default(),
+            ..Scene::new(
+                [40, 30],
+                CameraSource::Rectangle {
+                    corners_px: [[20.0, 20.0], [60.0, 20.0], [60.0, 40.0], [20.0, 40.0]],
+                    photo: [80, 60],
+                    focal_px: None,
+                },
+                Surface::new([0.4, 0.3]),
+            )
         }
     }
 

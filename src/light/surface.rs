@@ -128,26 +128,15 @@ pub(super) mod tests {
             camera_from_world: Pose::from_parts(Vector3::new(0.0, 0.0, 1.0).into(), down),
         };
         Scene {
-            belt: None,
-            image: [40, 30],
             plate: "tray".into(),
-            camera: CameraSource::Known(camera),
-            surface: Surface::new([0.5, 0.375]),
-            objects: Vec::new(),
-            lights: Vec::new(),
             ambient: LinearRgb::WHITE,
-            environment: None,
             exposure: Exposure::Ev(0.0),
-            edges: Default::default(),
             cast,
-            light_direction: Default::default(),
-            light_map: Default::default(),
-            interreflection: Default::default(),
-            view: Default::default(),
-            lens: Default::default(),
-            finish: Default::default(),
-            files: None,
-            settings: Default::default(),
+            ..Scene::new(
+                [40, 30],
+                CameraSource::Known(camera),
+                Surface::new([0.5, 0.375]),
+            )
         }
     }
 

@@ -329,15 +329,7 @@ mod tests {
             color: LinearRgb::WHITE,
         };
         Scene {
-            belt: None,
-            image: [64, 48],
             plate: "tray".into(),
-            camera: CameraSource::Rectangle {
-                corners_px: [[1.0, 1.0], [9.0, 1.0], [9.0, 9.0], [1.0, 9.0]],
-                photo: [10, 10],
-                focal_px: None,
-            },
-            surface: Surface::new([0.4, 0.3]),
             objects: vec![
                 object.clone(),
                 Object {
@@ -347,18 +339,16 @@ mod tests {
             ],
             lights: vec![light],
             ambient: LinearRgb::grey(0.5),
-            environment: None,
             exposure: Exposure::MatchPlate { gain_ev: 0.25 },
-            edges: Default::default(),
-            cast: Default::default(),
-            light_direction: Default::default(),
-            light_map: Default::default(),
-            interreflection: Default::default(),
-            view: Default::default(),
-            lens: Default::default(),
-            finish: Default::default(),
-            files: None,
-            settings: Default::default(),
+            ..Scene::new(
+                [64, 48],
+                CameraSource::Rectangle {
+                    corners_px: [[1.0, 1.0], [9.0, 1.0], [9.0, 9.0], [1.0, 9.0]],
+                    photo: [10, 10],
+                    focal_px: None,
+                },
+                Surface::new([0.4, 0.3]),
+            )
         }
     }
 

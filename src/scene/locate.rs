@@ -43,8 +43,7 @@ fn solve_camera(label: &Label, plate: &str) -> Result<Camera> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pixel::LinearRgb;
-    use crate::scene::{Exposure, Surface};
+    use crate::scene::Surface;
 
     fn scene() -> Scene {
         let corners_px = [
@@ -54,30 +53,16 @@ mod tests {
             [216.899, 750.414],
         ];
         Scene {
-            belt: None,
-            image: [640, 480],
             plate: "bg0000".into(),
-            camera: CameraSource::Rectangle {
-                corners_px,
-                photo: [1280, 960],
-                focal_px: Some(1374.852),
-            },
-            surface: Surface::new([0.56, 0.37]),
-            objects: Vec::new(),
-            lights: Vec::new(),
-            ambient: LinearRgb::BLACK,
-            environment: None,
-            exposure: Exposure::default(),
-            edges: Default::default(),
-            cast: Default::default(),
-            light_direction: Default::default(),
-            light_map: Default::default(),
-            interreflection: Default::default(),
-            view: Default::default(),
-            lens: Default::default(),
-            finish: Default::default(),
-            files: None,
-            settings: Default::default(),
+            ..Scene::new(
+                [640, 480],
+                CameraSource::Rectangle {
+                    corners_px,
+                    photo: [1280, 960],
+                    focal_px: Some(1374.852),
+                },
+                Surface::new([0.56, 0.37]),
+            )
         }
     }
 

@@ -208,6 +208,33 @@ pub struct Scene {
 }
 
 impl Scene {
+    /// An empty surface in the dark, seen by a camera in pictures of this size; without a plate, and all
+    /// else as files have it that do not say otherwise.
+    pub fn new(image: [u32; 2], camera: CameraSource, surface: Surface) -> Self {
+        Self {
+            image,
+            plate: String::new(),
+            camera,
+            view: View::default(),
+            lens: Lens::default(),
+            surface,
+            objects: Vec::new(),
+            lights: Vec::new(),
+            ambient: LinearRgb::BLACK,
+            environment: None,
+            exposure: Exposure::default(),
+            cast: LightTint::default(),
+            light_direction: LightDirection::default(),
+            light_map: LightMap::default(),
+            interreflection: LinearRgb::BLACK,
+            belt: None,
+            edges: EdgeTreatment::default(),
+            finish: PostProcess::default(),
+            files: None,
+            settings: SceneSettings::default(),
+        }
+    }
+
     /// The same objects before the same camera in the dark, without a plate: what is left where
     /// only labels are asked.
     pub fn unlit(self) -> Self {

@@ -326,26 +326,14 @@ mod tests {
             bend: Default::default(),
         };
         Scene {
-            image: [8, 6],
-            plate: String::new(),
-            camera: CameraSource::Known(camera()),
-            surface: Surface::new([0.4, 0.3]),
             objects: vec![object.clone(), object],
-            lights: vec![],
             ambient: LinearRgb::WHITE,
-            environment: None,
             exposure: Exposure::Ev(1.0),
-            edges: Default::default(),
-            cast: Default::default(),
-            light_direction: Default::default(),
-            light_map: Default::default(),
-            interreflection: Default::default(),
-            belt: None,
-            view: Default::default(),
-            lens: Default::default(),
-            finish: Default::default(),
-            files: None,
-            settings: Default::default(),
+            ..Scene::new(
+                [8, 6],
+                CameraSource::Known(camera()),
+                Surface::new([0.4, 0.3]),
+            )
         }
     }
 

@@ -54,28 +54,8 @@ pub(crate) fn config_of(json: &str) -> Result<DatasetConfig> {
 
 /// An empty scene that this camera sees.
 pub(crate) fn empty_scene(camera: &Camera) -> Scene {
-    Scene {
-        image: camera.image,
-        plate: String::new(),
-        camera: CameraSource::Known(*camera),
-        view: Default::default(),
-        lens: Default::default(),
-        surface: Surface::new([1.0, 1.0]),
-        objects: Vec::new(),
-        lights: Vec::new(),
-        ambient: petcomp::LinearRgb::BLACK,
-        environment: None,
-        exposure: Default::default(),
-        cast: Default::default(),
-        light_direction: Default::default(),
-        light_map: Default::default(),
-        interreflection: Default::default(),
-        belt: None,
-        edges: Default::default(),
-        finish: Default::default(),
-        files: None,
-        settings: Default::default(),
-    }
+    let surface = Surface::new([1.0, 1.0]);
+    Scene::new(camera.image, CameraSource::Known(*camera), surface)
 }
 
 /// A camera that a scene may have.

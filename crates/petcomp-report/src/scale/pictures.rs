@@ -142,26 +142,16 @@ fn samples_in_row(deep: &DeepImage, y: usize) -> usize {
 /// Cards in a heap under a lamp and an even sky, seen from above.
 fn heap_scene(case: &ScaleCase) -> Scene {
     Scene {
-        image: case.image,
         plate: "tray".into(),
-        camera: CameraSource::Known(heap_camera(case.image)),
-        surface: Surface::new([1.0, 0.7]),
         objects: (0..case.cards).map(|k| heap_card(case, k)).collect(),
         lights: vec![lamp(LinearRgb::WHITE)],
         ambient: LinearRgb::grey(0.3),
-        environment: None,
         exposure: Exposure::Ev(0.0),
-        edges: Default::default(),
-        cast: Default::default(),
-        light_direction: Default::default(),
-        light_map: Default::default(),
-        interreflection: Default::default(),
-        belt: None,
-        view: Default::default(),
-        lens: Default::default(),
-        finish: Default::default(),
-        files: None,
-        settings: Default::default(),
+        ..Scene::new(
+            case.image,
+            CameraSource::Known(heap_camera(case.image)),
+            Surface::new([1.0, 0.7]),
+        )
     }
 }
 

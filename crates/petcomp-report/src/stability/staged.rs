@@ -127,26 +127,13 @@ pub(super) fn small_shot() -> Shot {
 /// A scene of nothing on a surface that fills the picture.
 pub(super) fn empty_scene(camera: Camera) -> Scene {
     Scene {
-        image: camera.image,
         plate: "plate".into(),
-        camera: CameraSource::Known(camera),
-        surface: Surface::new([2.0, 2.0]),
-        objects: Vec::new(),
-        lights: Vec::new(),
-        ambient: LinearRgb::BLACK,
-        environment: None,
         exposure: Exposure::Ev(0.0),
-        edges: Default::default(),
-        cast: Default::default(),
-        light_direction: Default::default(),
-        light_map: Default::default(),
-        interreflection: Default::default(),
-        belt: None,
-        view: Default::default(),
-        lens: Default::default(),
-        finish: Default::default(),
-        files: None,
-        settings: Default::default(),
+        ..Scene::new(
+            camera.image,
+            CameraSource::Known(camera),
+            Surface::new([2.0, 2.0]),
+        )
     }
 }
 

@@ -101,28 +101,14 @@ impl FixtureFolder {
     /// sky.
     pub(super) fn scene(&self) -> Scene {
         Scene {
-            image: IMAGE,
             plate: "tray".into(),
-            camera: photo_camera(),
-            surface: Surface::new(SURFACE_SIZE_M),
             objects: (0..CARD_COUNT)
                 .map(|k| card_at_rest(SEE_THROUGH, k))
                 .collect(),
             lights: vec![scene_lamp()],
             ambient: LinearRgb::grey(0.3),
-            environment: None,
             exposure: Exposure::Ev(0.0),
-            edges: Default::default(),
-            cast: Default::default(),
-            light_direction: Default::default(),
-            light_map: Default::default(),
-            interreflection: Default::default(),
-            belt: None,
-            view: Default::default(),
-            lens: Default::default(),
-            finish: Default::default(),
-            files: None,
-            settings: Default::default(),
+            ..Scene::new(IMAGE, photo_camera(), Surface::new(SURFACE_SIZE_M))
         }
     }
 
