@@ -62,7 +62,8 @@ def train(training, folder):
 
 
 def is_finished(last):
-    return torch.load(last, map_location="cpu", weights_only=False)["epoch"] == -1
+    """Whether it is of the last part: nothing is left to be resumed then."""
+    return torch.load(last, map_location="cpu", weights_only=False)["epoch"] in (PARTS - 1, -1)
 
 
 def settings(training, folder, last):
