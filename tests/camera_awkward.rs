@@ -234,6 +234,21 @@ fn wrong_dimensions_are_inconsistent() {
 }
 
 #[test]
+fn an_uncommon_lens_has_to_be_stated() {
+    // Wrong dimensions look like one: six times as long as the picture is wide.
+    let scenario = Scenario {
+        focal_px: 24_000.0,
+        ..Scenario::default()
+    };
+    let mut label = scenario.tilted(45.0).view(11, 8).label;
+    let refusal = solve(&label).fitting().unwrap_err().to_string();
+    assert!(refusal.contains("camera.focal_px"), "{refusal}");
+    (label.camera.focal_px, label.camera.focal_sigma) = (Some(20_000.0), Some(0.3));
+    let focal_px = solve(&label).fitting().unwrap().camera.focal_px.x;
+    assert!((focal_px / 24_000.0 - 1.0).abs() < 0.05, "{focal_px}");
+}
+
+#[test]
 fn hints_of_height_and_of_points_above_the_surface_give_the_focal_length() {
     let off = |edit: &dyn Fn(&mut View)| {
         let errors = (0..100).map(|k| {
@@ -320,6 +335,26 @@ fn a_stated_distortion_is_understood_at_the_focal_length_found() {
         );
         assert!(focal_error(&view, &solution) < 1e-7);
     }
+}
+
+#[test]
+fn a_stated_distortion_leaves_the_focal_length_as_unsure_as_it_is() {
+    // Seen without noise by a lens of 2000 px: a shorter one bends more, which looks alike.
+    let corners = [
+        [761.39, 490.18],
+        [2852.84, 822.7],
+        [2720.31, 1990.67],
+        [799.37, 2321.5],
+    ];
+    let mut label = Label::new([4000, 3000], corners, [0.6, 0.4]);
+    (label.image.cropped, label.camera.k1) = (Some(false), Some(-0.2));
+    label.surface.corner_sigma_px = Some(0.5);
+    let solution = solve(&label);
+    let (focal_px, sigma) = (solution.camera.focal_px.x, solution.sigma.ln_focal);
+    assert!(
+        (focal_px / 2000.0).ln().abs() < sigma && sigma < 0.05,
+        "{focal_px} {sigma}"
+    );
 }
 
 #[test]

@@ -6,14 +6,18 @@
 //! is small. The priors of the lens count once.
 
 use super::error::SolveError;
+use super::focal::PriorSource;
 use super::label::{Framing, Label};
 use super::model::{KAPPA, LN_FOCAL, PRINCIPAL, STRETCH, Square, State, UNKNOWNS, Unknowns};
 use super::options::SolveOptions;
 use super::prior::{ParameterPriors, Prior};
 use super::problem::Problem;
-use super::refine::{Minimum, NormalEquations, Residuals};
+use super::refine::{COST_TOLERANCE, DAMPING_DECREASE, DAMPING_INCREASE, INITIAL_DAMPING};
+use super::refine::{MAX_DAMPING, Minimum, NormalEquations, Residuals};
 use super::solution::Solution;
-use super::uncertainty::{Uncertainty, focal_share};
+use super::solve::focal_conflict;
+use super::uncertainty::{FocalShare, Uncertainty, focal_share};
+use crate::diagnostic::Diagnostic;
 use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX, Vector6};
 use std::cmp::Ordering;
 
@@ -22,18 +26,12 @@ const POSE_UNKNOWNS: usize = 6;
 /// The unknowns of the lens, in the order of the shared system's first columns.
 const LENS_UNKNOWNS: [usize; 4] = [LN_FOCAL, PRINCIPAL, PRINCIPAL + 1, KAPPA];
 const MAX_ITERATIONS: usize = 60;
-/// Damping at the start, its factor on success and on failure, and where the search is given up.
-const INITIAL_DAMPING: f64 = 1e-3;
-const DAMPING_DECREASE: f64 = 0.1;
-const DAMPING_INCREASE: f64 = 10.0;
-const MAX_DAMPING: f64 = 1e10;
-/// A relative fall of the cost below which the minimum is reached.
-const COST_TOLERANCE: f64 = 1e-12;
 
 const _: () = assert!(POSE_UNKNOWNS + LENS_UNKNOWNS.len() + 1 == UNKNOWNS);
 
 /// The photos of one camera as one problem.
 pub(crate) struct Bundle {
+    /// All with the priors of one lens.
     problems: Vec<Problem>,
     /// Those of each photo, with flat priors of what is shared.
     residuals: Vec<Residuals>,
@@ -50,14 +48,11 @@ pub(crate) struct BundleEquations {
     /// Of each photo's own observations.
     pub(crate) chi2: Vec<f64>,
     normals: Vec<NormalEquations>,
+    /// After how many iterations.
+    iterations: usize,
 }
 
 impl BundleEquations {
-    /// Logarithm of the focal length that the photos share.
-    pub(crate) fn ln_focal(&self) -> f64 {
-        self.states[0].ln_focal
-    }
-
     fn compare_costs(&self, other: &Self) -> Ordering {
         self.cost.total_cmp(&other.cost)
     }
@@ -86,25 +81,24 @@ struct PhotoBlock {
 }
 
 impl Bundle {
-    /// For the labels that are used; pictures of unknown framing are treated as having this one. A
-    /// stated distortion is for this focal length (in units), or that of the prior.
+    /// For the labels that are used; pictures of unknown framing are treated as having this one.
     pub(crate) fn new(
         labels: &[Label],
         used: &[usize],
         unknown: Framing,
-        focal: Option<f64>,
         options: &SolveOptions,
     ) -> Result<Self, SolveError> {
         let labels: Vec<&Label> = used.iter().map(|&i| &labels[i]).collect();
         let problems = labels
             .iter()
-            .map(|label| Problem::new(label, framing_or(label, unknown), focal, options))
+            .map(|label| Problem::new(label, framing_or(label, unknown), options))
             .collect::<Result<Vec<_>, _>>()?;
         let surface = surfaces_shown(labels.into_iter().zip(&problems));
         Self::from_problems(problems, surface)
     }
 
-    fn from_problems(problems: Vec<Problem>, surface: Vec<usize>) -> Result<Self, SolveError> {
+    fn from_problems(mut problems: Vec<Problem>, surface: Vec<usize>) -> Result<Self, SolveError> {
+        share_lens(&mut problems);
         Ok(Self {
             residuals: problems.iter().map(without_shared_priors).collect(),
             shared: shared_priors(&problems, &surface).ok_or(SolveError::NoCorners)?,
@@ -114,8 +108,25 @@ impl Bundle {
     }
 
     /// Prior of the logarithm of the focal length.
-    pub(crate) fn focal_prior(&self) -> Prior {
+    fn focal_prior(&self) -> Prior {
         self.shared[0]
+    }
+
+    /// Where that comes from.
+    pub(crate) fn prior_source(&self) -> PriorSource {
+        self.problems[0].prior_source
+    }
+
+    /// A warning, where what the photos give for the focal length contradicts its prior.
+    pub(crate) fn focal_conflict(&self, equations: &BundleEquations) -> Option<Diagnostic> {
+        let (covariance, _) = self.shared_covariance(equations)?;
+        let focal = self.focal_share(&equations.states[0], &covariance);
+        focal_conflict(&self.problems[0], &focal)
+    }
+
+    fn focal_share(&self, state: &State, covariance: &DMatrix<f64>) -> FocalShare {
+        let information = inverse_or_zero(covariance[(0, 0)]);
+        focal_share(state.ln_focal, information, self.focal_prior())
     }
 
     /// The lower of the minima from the photos' own focal lengths and from the prior.
@@ -171,6 +182,7 @@ impl Bundle {
             states,
             chi2,
             normals,
+            iterations: 0,
         })
     }
 
@@ -199,13 +211,11 @@ impl Bundle {
 
     fn refine(&self, states: Vec<State>) -> Option<BundleEquations> {
         let mut equations = self.linearized(states)?;
-        let mut damping = INITIAL_DAMPING;
-        for _ in 0..MAX_ITERATIONS {
+        let (mut damping, mut iterations) = (INITIAL_DAMPING, 0);
+        while iterations < MAX_ITERATIONS && damping <= MAX_DAMPING {
+            iterations += 1;
             let Some(next) = self.lower_neighbour(&equations, damping) else {
                 damping *= DAMPING_INCREASE;
-                if damping > MAX_DAMPING {
-                    break;
-                }
                 continue;
             };
             let fall = (equations.cost - next.cost) / equations.cost;
@@ -215,7 +225,10 @@ impl Bundle {
                 break;
             }
         }
-        Some(equations)
+        Some(BundleEquations {
+            iterations,
+            ..equations
+        })
     }
 
     /// The equations after a damped step, where that lowers the cost.
@@ -311,12 +324,23 @@ impl Bundle {
         let shared = self.shared_covariance(equations);
         (0..self.problems.len())
             .map(|photo| {
-                let minimum = equations.minimum(photo);
+                let minimum = self.minimum(equations, photo);
                 let uncertainty = self.uncertainty(photo, &minimum, shared.as_ref());
-                self.with_shared_prior(photo)
-                    .solution_with(&minimum, &uncertainty, options)
+                self.problems[photo].solution_with(&minimum, &uncertainty, options)
             })
             .collect()
+    }
+
+    /// One photo's share, as if it had been solved alone.
+    fn minimum(&self, equations: &BundleEquations, photo: usize) -> Minimum {
+        let state = equations.states[photo];
+        let alone = self.problems[photo].residuals.normal_equations(&state);
+        Minimum {
+            state,
+            cost: equations.chi2[photo],
+            information: alone.map_or(Square::zeros(), |normal| normal.information),
+            iterations: equations.iterations,
+        }
     }
 
     /// How well a photo's unknowns are known, by the shared covariance where there is one.
@@ -331,18 +355,9 @@ impl Bundle {
             if let Some(own) = self.photo_covariance(covariance, &photos[photo], photo) {
                 uncertainty.covariance = own;
             }
-            let information = inverse_or_zero(covariance[(0, 0)]);
-            let ln_focal = minimum.state.ln_focal;
-            uncertainty.focal = focal_share(ln_focal, information, self.focal_prior());
+            uncertainty.focal = self.focal_share(&minimum.state, covariance);
         }
         uncertainty
-    }
-
-    /// A photo's problem, with the prior of the focal length that the photos share.
-    fn with_shared_prior(&self, photo: usize) -> Problem {
-        let mut problem = self.problems[photo].clone();
-        problem.residuals.priors.ln_focal = self.focal_prior();
-        problem
     }
 
     fn shared_covariance(&self, equations: &BundleEquations) -> Option<SharedCovariance> {
@@ -437,18 +452,6 @@ fn clear_row_and_column(matrix: &mut DMatrix<f64>, i: usize) {
     matrix.column_mut(i).fill(0.0);
 }
 
-impl BundleEquations {
-    /// One photo's share, as if it had been solved alone.
-    fn minimum(&self, photo: usize) -> Minimum {
-        Minimum {
-            state: self.states[photo],
-            cost: self.chi2[photo],
-            information: self.normals[photo].information,
-            iterations: MAX_ITERATIONS,
-        }
-    }
-}
-
 impl PhotoBlock {
     /// A pose, not yet coupled to the shared unknowns.
     fn uncoupled(normal: &NormalEquations, shared: usize) -> Self {
@@ -540,24 +543,33 @@ fn with_fixed_lens(problem: &Problem, ln_focal: f64) -> Problem {
     problem
 }
 
-/// Priors of the lens, by the photo that knows most of its focal length, and of each surface's
-/// stretch.
+/// Gives all photos the priors of the lens of the one that knows most of its focal length.
+fn share_lens(problems: &mut [Problem]) {
+    let sigma = |problem: &&Problem| problem.residuals.priors.ln_focal.sigma;
+    let known = problems.iter().min_by(|a, b| sigma(a).total_cmp(&sigma(b)));
+    let Some((lens, source)) = known.map(|p| (p.residuals.priors, p.prior_source)) else {
+        return;
+    };
+    for problem in problems {
+        problem.prior_source = source;
+        problem.residuals.priors = ParameterPriors {
+            ln_focal: lens.ln_focal,
+            principal_sigma: lens.principal_sigma,
+            kappa: lens.kappa,
+            ..problem.residuals.priors
+        };
+    }
+}
+
+/// Priors of the lens, and of each surface's stretch.
 fn shared_priors(problems: &[Problem], surface: &[usize]) -> Option<Vec<Prior>> {
-    let mut shared = lens_priors(best_known_priors(problems)?).to_vec();
+    let mut shared = lens_priors(&problems.first()?.residuals.priors).to_vec();
     let surfaces = surface.iter().max().map_or(0, |last| last + 1);
     shared.extend((0..surfaces).map(|s| {
         let shown = surface.iter().position(|&x| x == s).unwrap_or(0);
         Prior::at_zero(problems[shown].residuals.priors.stretch_sigma)
     }));
     Some(shared)
-}
-
-/// The priors of the photo that knows most of its focal length.
-fn best_known_priors(problems: &[Problem]) -> Option<&ParameterPriors> {
-    problems
-        .iter()
-        .map(|problem| &problem.residuals.priors)
-        .min_by(|a, b| a.ln_focal.sigma.total_cmp(&b.ln_focal.sigma))
 }
 
 /// In the order of [`LENS_UNKNOWNS`].

@@ -1,6 +1,6 @@
 //! Four labelled corners, checked and put in order.
 
-use super::error::SolveError;
+use super::error::{SolveError, corner_name};
 use super::options::CornerOrder;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::geom::{Point2, Vector2, mean_point};
@@ -35,26 +35,15 @@ pub(crate) fn check(
     refuse_coincident(&labelled, sigma)?;
     let (order, repair) = clockwise(&labelled);
     let corners = order.map(|i| labelled[i]);
-    refuse_folded(&corners, sigma)?;
+    refuse_folded(&corners, order, sigma)?;
     if let (CornerOrder::Strict, Some(found)) = (policy, repair.clone()) {
         return Err(SolveError::Order(found));
     }
+    let found = repair.into_iter().chain(small_quad(&corners));
     Ok(OrderedCorners {
         corners,
-        warnings: warnings(&corners, image, repair),
+        warnings: found.chain(far_outside(labelled, image)).collect(),
     })
-}
-
-fn warnings(
-    corners: &[Point2<f64>; 4],
-    image: [u32; 2],
-    repair: Option<Diagnostic>,
-) -> Vec<Diagnostic> {
-    repair
-        .into_iter()
-        .chain(small_quad(corners))
-        .chain(far_outside(corners, image))
-        .collect()
 }
 
 /// Twice the signed areas of the triangles that leave out one corner each; in a picture of a
@@ -129,33 +118,35 @@ fn starting_at_zero(mut ring: [usize; 4]) -> [usize; 4] {
     ring
 }
 
-/// Ordered corners must be convex, and none within noise of the line of two others.
-fn refuse_folded(c: &[Point2<f64>; 4], sigma: f64) -> Result<(), SolveError> {
+/// Ordered corners must be convex, and none within noise of the line of two others; `order` is
+/// where they are in the label.
+fn refuse_folded(c: &[Point2<f64>; 4], order: [usize; 4], sigma: f64) -> Result<(), SolveError> {
     let areas = triangle_areas(&c.map(|p| p.coords));
     for (left_out, area) in areas.into_iter().enumerate() {
+        let middle = order[(left_out + 2) % 4];
         let height_px = area / longest_side_without(c, left_out);
-        refuse_flat(left_out, height_px, COLLINEAR_SIGMAS * sigma)?;
+        refuse_flat(middle, height_px, COLLINEAR_SIGMAS * sigma)?;
         if area <= 0.0 {
-            return Err(collinear(left_out, height_px, COLLINEAR_SIGMAS * sigma));
+            return Err(collinear(middle, height_px, COLLINEAR_SIGMAS * sigma));
         }
     }
     Ok(())
 }
 
-/// A triangle without one corner is at least so high.
-fn refuse_flat(left_out: usize, height_px: f64, limit_px: f64) -> Result<(), SolveError> {
+/// A triangle of three corners is at least so high over its middle one.
+fn refuse_flat(middle: usize, height_px: f64, limit_px: f64) -> Result<(), SolveError> {
     if height_px <= -limit_px.max(f64::MIN_POSITIVE) {
         Err(SolveError::NotConvex)
     } else if height_px < limit_px {
-        Err(collinear(left_out, height_px, limit_px))
+        Err(collinear(middle, height_px, limit_px))
     } else {
         Ok(())
     }
 }
 
-fn collinear(left_out: usize, height_px: f64, limit_px: f64) -> SolveError {
+fn collinear(corner: usize, height_px: f64, limit_px: f64) -> SolveError {
     SolveError::Collinear {
-        corner: (left_out + 2) % 4,
+        corner,
         distance_px: height_px.abs(),
         limit_px,
     }
@@ -183,15 +174,16 @@ fn longest_side(c: &[Point2<f64>; 4]) -> f64 {
         .fold(0.0, f64::max)
 }
 
-fn far_outside(c: &[Point2<f64>; 4], image: [u32; 2]) -> impl Iterator<Item = Diagnostic> {
-    let c = *c;
+/// In the order of the label, in which a person looks for them.
+fn far_outside(labelled: [Point2<f64>; 4], image: [u32; 2]) -> impl Iterator<Item = Diagnostic> {
     (0..4)
-        .filter(move |&corner| is_far_outside(c[corner], image))
+        .filter(move |&corner| is_far_outside(labelled[corner], image))
         .map(outside_warning)
 }
 
 fn outside_warning(corner: usize) -> Diagnostic {
-    let what = format!("corner {corner} lies more than a diagonal outside the picture");
+    let name = corner_name(corner);
+    let what = format!("the {name} corner lies more than a diagonal outside the picture");
     Diagnostic::warning(Code::CornerOutside, what)
 }
 
@@ -299,8 +291,23 @@ mod tests {
             codes(&far.warnings),
             [Code::CornerOutside, Code::CornerOutside]
         );
-        for (warning, corner) in far.warnings.iter().zip(["corner 1", "corner 2"]) {
+        for (warning, corner) in far.warnings.iter().zip(["the second", "the third"]) {
             assert!(warning.message.starts_with(corner), "{warning}");
         }
+    }
+
+    #[test]
+    fn corners_out_of_order_are_named_as_labelled() {
+        let reversed = run([QUAD[0], QUAD[3], [1620.0, 410.0], [1600.0, 90.0]]).unwrap();
+        let named: Vec<_> = reversed.warnings.iter().map(ToString::to_string).collect();
+        assert!(named[1].starts_with("the third") && named[2].starts_with("the fourth"));
+        let flat = [
+            [100.0, 110.0],
+            [600.0, 90.0],
+            [100.0, 420.0],
+            [350.0, 255.0],
+        ];
+        let refusal = run(flat).unwrap_err().to_string();
+        assert!(refusal.contains("the fourth corner is"), "{refusal}");
     }
 }

@@ -25,6 +25,19 @@ pub enum SolveError {
     /// The picture has no pixels.
     #[error("image: {} x {} pixels, expected at least 1 x 1", .0[0], .0[1])]
     BadImage([u32; 2]),
+    /// A picture reaches beyond the one that it was cut out of.
+    #[error(
+        "image.crop: {} x {} pixels at {}, {}, expected a part of the {} x {} of the whole picture",
+        .size[0], .size[1], .offset_px[0], .offset_px[1], .whole[0], .whole[1]
+    )]
+    CropOutside {
+        /// Its width and height, pixels.
+        size: [u32; 2],
+        /// Where its top left corner would be.
+        offset_px: [f64; 2],
+        /// Width and height of the whole one.
+        whole: [u32; 2],
+    },
     /// The rectangle's sides cannot be right.
     #[error("surface: sides of {} m and {} m, expected positive lengths with a ratio of at most 1000", .0[0], .0[1])]
     BadDimensions([f64; 2]),
@@ -84,10 +97,11 @@ pub enum SolveError {
     NotConvex,
     /// Three corners are on one line, within noise.
     #[error(
-        "surface.corners_px: corner {corner} is {distance_px:.1} px from the line of two others, expected at least {limit_px:.1}"
+        "surface.corners_px: the {} corner is {distance_px:.1} px from the line of two others, expected at least {limit_px:.1}",
+        corner_name(*.corner)
     )]
     Collinear {
-        /// The corner, in clockwise order from the first.
+        /// The corner as labelled, from 0.
         corner: usize,
         /// Its distance from the line.
         distance_px: f64,
@@ -98,8 +112,9 @@ pub enum SolveError {
     /// ([`CornerOrder::Strict`](super::CornerOrder::Strict)).
     #[error("surface.corners_px: {0}, and the order has to be right")]
     Order(Diagnostic),
-    /// Photos that should be of one camera differ in the shape of the picture.
-    #[error("photo {photo} differs in shape from the first: not one camera")]
+    /// Photos that should be of one camera differ in the shape of the picture, or in the principal
+    /// point or k1 that their labels state.
+    #[error("photo {photo} differs from another in shape, principal point or k1: not one camera")]
     DifferentPictures {
         /// Which photo, from 0.
         photo: usize,
@@ -119,14 +134,24 @@ pub enum SolveError {
     NoPose,
 }
 
+/// What a person calls a corner of a label, which counts from 0.
+pub(crate) fn corner_name(corner: usize) -> &'static str {
+    ["first", "second", "third", "fourth"][corner % 4]
+}
+
+/// Why no camera may fit.
+pub(crate) const MISFIT_CAUSES: &str = "wrong dimensions, corners of different rectangles, strong distortion, a cropped \
+    picture, corner_sigma_px is too small, or an uncommon lens without EXIF data or camera.focal_px";
+
 /// What to do about a label that no camera fits.
 fn remedy(exchanged: Option<[f64; 2]>) -> String {
     match exchanged {
         Some([before, after]) => {
-            format!("exchange width_m and height_m (chi squared {before:.1} as labelled, {after:.1} exchanged)")
+            format!(
+                "exchange width_m and height_m (chi squared {before:.1} as labelled, {after:.1} exchanged)"
+            )
         }
-        None => "wrong dimensions, corners of different rectangles, strong distortion, or corner_sigma_px is too small"
-            .into(),
+        None => MISFIT_CAUSES.into(),
     }
 }
 

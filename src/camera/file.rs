@@ -48,7 +48,8 @@ pub struct SolvedFrom {
     pub label_crc32: u32,
     /// Width and height of the rectangle as measured, metres, for labels that do not hold them.
     pub size_m: [Option<f64>; 2],
-    /// The same checksum of each label that was solved together with this one, by file name.
+    /// The same checksum of each label that was solved together with this one, by file name as seen
+    /// from the folder of this one.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub together: BTreeMap<String, u32>,
 }

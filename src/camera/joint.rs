@@ -1,19 +1,26 @@
 //! Several photos of one camera: one lens, and a pose for each.
 
-use super::bundle::{Bundle, BundleEquations};
+use super::bundle::Bundle;
 use super::chi;
 use super::error::SolveError;
+use super::focal::PriorSource;
 use super::hedge::is_off_center;
 use super::label::{Framing, Label};
 use super::model::State;
 use super::options::SolveOptions;
 use super::solution::{REFUSED_FIT_P, Solution};
-use super::solve::{repeated_at_focal_found, solve, states_distortion};
+use super::solve::{solve, without_exif_focal};
 use crate::diagnostic::{Code, Diagnostic};
+use crate::geom::Vector2;
 use std::cmp::Ordering;
 
 /// One photo in this many may be left out.
 const PHOTOS_PER_OUTLIER: usize = 4;
+/// Focal lengths that photos of one lens state differ by no more, relative: the next one of a zoom
+/// is farther away.
+const ONE_FOCAL_TOLERANCE: f64 = 0.02;
+/// The same of k1, and of the principal point in picture diagonals.
+const ONE_LENS_TOLERANCE: f64 = 0.005;
 
 /// Photos of one camera, solved together.
 #[derive(Clone, Debug)]
@@ -47,21 +54,22 @@ impl OutlierPhoto {
 /// and photos of one surface share its sides.
 ///
 /// The labels have to agree in the shape of their pictures; one may be a reduced copy. See
-/// [`group_by_camera`]. A photo that no camera fits when it is alone takes no part, and keeps its
-/// own solution.
+/// [`group_by_camera`]. The principal point or the k1 that one of them states holds for all. A
+/// photo that no camera fits when it is alone takes no part, and keeps its own solution.
 ///
 /// # Errors
-/// [`SolveError::DifferentPictures`] where the shapes differ; the first photo's error where no
-/// photo can be used.
+/// [`SolveError::DifferentPictures`] where the shapes differ, or what is stated of the lens; the
+/// first photo's error where no photo can be used.
 pub fn solve_joint(labels: &[Label], options: &SolveOptions) -> Result<Joint, SolveError> {
-    refuse_different_frames(labels)?;
-    let photos = solve_alone(labels, options)?;
+    refuse_different_cameras(labels)?;
+    let labels = with_shared_lens(labels);
+    let photos = solve_alone(&labels, options)?;
     let solver = JointSolver {
-        labels,
+        labels: &labels,
         alone: &photos,
         options,
     };
-    let estimate = solver.whole_or_cropped()?;
+    let estimate = solver.without_wrong_exif()?;
     Ok(Joint::new(photos, estimate))
 }
 
@@ -132,9 +140,37 @@ struct JointEstimate {
     solutions: Vec<Solution>,
     cost: f64,
     outliers: Vec<OutlierPhoto>,
+    prior_source: PriorSource,
+    /// A warning, where what they give for the focal length contradicts its prior.
+    conflict: Option<Diagnostic>,
 }
 
 impl JointSolver<'_> {
+    /// The estimate; where the photos contradict their own EXIF value, that without it.
+    fn without_wrong_exif(&self) -> Result<Option<JointEstimate>, SolveError> {
+        let Some(estimate) = self.whole_or_cropped()? else {
+            return Ok(None);
+        };
+        let Some(conflict) = estimate.conflict.clone() else {
+            return Ok(Some(estimate));
+        };
+        let kept = match estimate.prior_source {
+            PriorSource::Exif => self.without_exif()?,
+            _ => Some(estimate),
+        };
+        Ok(kept.map(|estimate| estimate.warned(&conflict)))
+    }
+
+    fn without_exif(&self) -> Result<Option<JointEstimate>, SolveError> {
+        let labels: Vec<Label> = self.labels.iter().map(without_exif_focal).collect();
+        let solver = JointSolver {
+            labels: &labels,
+            alone: self.alone,
+            options: self.options,
+        };
+        solver.whole_or_cropped()
+    }
+
     /// The camera of whole pictures or, where they may have been cropped and the corners demand it,
     /// of cropped ones.
     fn whole_or_cropped(&self) -> Result<Option<JointEstimate>, SolveError> {
@@ -181,35 +217,18 @@ impl JointSolver<'_> {
 
     /// What these photos give together.
     fn estimate_from(&self, used: &[usize], unknown: Framing) -> Result<JointEstimate, SolveError> {
-        let (bundle, best) = self.search_with_stated_distortion(used, unknown)?;
+        let bundle = Bundle::new(self.labels, used, unknown, self.options)?;
+        let best = bundle.best(self.alone).ok_or(SolveError::NoPose)?;
         Ok(JointEstimate {
             used: used.to_vec(),
             solutions: bundle.solutions(&best, self.options),
+            prior_source: bundle.prior_source(),
+            conflict: bundle.focal_conflict(&best),
             states: best.states,
             fits: PhotoFit::of_all(&best.chi2, &bundle.degrees_of_freedom()),
             cost: best.cost,
             outliers: Vec::new(),
         })
-    }
-
-    /// The best camera; for labels that state k1 searched until that is applied at the focal length
-    /// found.
-    fn search_with_stated_distortion(
-        &self,
-        used: &[usize],
-        unknown: Framing,
-    ) -> Result<(Bundle, BundleEquations), SolveError> {
-        let search_at = |focal| {
-            let bundle = Bundle::new(self.labels, used, unknown, focal, self.options)?;
-            let best = bundle.best(self.alone).ok_or(SolveError::NoPose)?;
-            Ok((bundle, best))
-        };
-        let first: (Bundle, BundleEquations) = search_at(None)?;
-        let prior = first.0.focal_prior();
-        if !used.iter().any(|&i| states_distortion(&self.labels[i])) {
-            return Ok(first);
-        }
-        repeated_at_focal_found(first, prior, |(_, best)| best.ln_focal(), search_at)
     }
 
     /// A camera fits the photo when it is alone.
@@ -261,6 +280,13 @@ fn worst_photo(fits: &[PhotoFit]) -> Option<usize> {
 }
 
 impl JointEstimate {
+    /// With a warning about every photo.
+    fn warned(mut self, warning: &Diagnostic) -> Self {
+        let all = self.solutions.iter_mut();
+        all.for_each(|solution| solution.warnings.push(warning.clone()));
+        self
+    }
+
     /// Pictures that turn out not to be whole.
     fn off_center(mut self) -> Self {
         let solutions = self.solutions.into_iter();
@@ -289,13 +315,13 @@ impl JointEstimate {
     }
 }
 
-/// Groups of labels that name the same camera and agree in the shape of their pictures, each in
-/// order; unnamed cameras stand alone.
+/// Groups of labels that name the same camera and agree in the shape of their pictures and in what
+/// they state of the lens, each in order; unnamed cameras stand alone.
 pub fn group_by_camera(labels: &[Label]) -> Vec<Vec<usize>> {
     let mut groups: Vec<Vec<usize>> = Vec::new();
     for (i, label) in labels.iter().enumerate() {
-        let mut known = groups.iter_mut();
-        match known.find(|group| same_camera(&labels[group[0]], label)) {
+        let joins = |group: &[usize]| group.iter().all(|&i| same_camera(&labels[i], label));
+        match groups.iter_mut().find(|group| joins(group)) {
             Some(group) => group.push(i),
             None => groups.push(vec![i]),
         }
@@ -304,14 +330,79 @@ pub fn group_by_camera(labels: &[Label]) -> Vec<Vec<usize>> {
 }
 
 fn same_camera(a: &Label, b: &Label) -> bool {
-    b.camera.id.is_some() && a.camera.id == b.camera.id && same_frame(a, b)
+    b.camera.id.is_some()
+        && a.camera.id == b.camera.id
+        && can_share_lens(a, b)
+        && agree(stated_focal(a), stated_focal(b), ONE_FOCAL_TOLERANCE)
 }
 
-fn refuse_different_frames(labels: &[Label]) -> Result<(), SolveError> {
-    match labels.iter().position(|l| !same_frame(l, &labels[0])) {
+fn refuse_different_cameras(labels: &[Label]) -> Result<(), SolveError> {
+    let is_other = |&photo: &usize| {
+        let mut before = labels[..photo].iter();
+        before.any(|label| !can_share_lens(label, &labels[photo]))
+    };
+    match (0..labels.len()).find(is_other) {
         Some(photo) => Err(SolveError::DifferentPictures { photo }),
         None => Ok(()),
     }
+}
+
+fn can_share_lens(a: &Label, b: &Label) -> bool {
+    same_frame(a, b) && agree(stated_lens(a), stated_lens(b), ONE_LENS_TOLERANCE)
+}
+
+/// What both state is the same to a tolerance.
+fn agree<const N: usize>(a: [Option<f64>; N], b: [Option<f64>; N], most: f64) -> bool {
+    let mut pairs = a.into_iter().zip(b);
+    pairs.all(|(a, b)| a.zip(b).is_none_or(|(a, b)| (a - b).abs() <= most))
+}
+
+/// Logarithms of the 35 mm equivalent, and of the focal length in picture diagonals.
+fn stated_focal(label: &Label) -> [Option<f64>; 2] {
+    let camera = &label.camera;
+    let in_diagonals = camera.focal_px.map(|px| px / diagonal_px(label));
+    [camera.focal_35mm, in_diagonals].map(|focal| focal.map(libm::log))
+}
+
+/// k1, and the principal point in picture diagonals.
+fn stated_lens(label: &Label) -> [Option<f64>; 3] {
+    let principal = label.camera.principal_point_px;
+    let principal = principal.map(|px| label.pixel(px) / diagonal_px(label));
+    [
+        label.camera.k1,
+        principal.map(|p| p.x),
+        principal.map(|p| p.y),
+    ]
+}
+
+fn diagonal_px(label: &Label) -> f64 {
+    Vector2::from(label.image_size().map(f64::from)).norm()
+}
+
+/// The labels with the k1 and the principal point that one of them states.
+fn with_shared_lens(labels: &[Label]) -> Vec<Label> {
+    let mut shared = labels.to_vec();
+    let k1 = labels.iter().find_map(|label| label.camera.k1);
+    let states_point = |label: &&Label| label.camera.principal_point_px.is_some();
+    let centered = labels.iter().find(states_point);
+    for label in &mut shared {
+        label.camera.k1 = k1;
+        if let Some(other) = centered {
+            share_principal_point(label, other);
+        }
+    }
+    shared
+}
+
+/// Takes over the principal point of the same picture at another size.
+fn share_principal_point(label: &mut Label, other: &Label) {
+    let scale = diagonal_px(label) / diagonal_px(other);
+    let offset_px = Vector2::repeat(label.pixel_origin.offset_px());
+    let principal = other.camera.principal_point_px;
+    label.camera.principal_point_px =
+        principal.map(|px| (other.pixel(px) * scale - offset_px).into());
+    let sigma_px = other.camera.principal_point_sigma_px;
+    label.camera.principal_point_sigma_px = sigma_px.map(|sigma| sigma * scale);
 }
 
 /// Two pictures show the same frame of a camera, at any resolution: in units of the diagonal,
@@ -327,7 +418,8 @@ fn show_same_part(a: &Label, b: &Label) -> bool {
     a.image_size() == b.image_size() && a.image.crop == b.image.crop
 }
 
-fn have_same_shape(a: [u32; 2], b: [u32; 2]) -> bool {
+/// Two sizes of a picture have the same shape.
+pub fn have_same_shape(a: [u32; 2], b: [u32; 2]) -> bool {
     let ([aw, ah], [bw, bh]) = (a.map(f64::from), b.map(f64::from));
     // Reduced sizes are rounded to whole pixels.
     (aw * bh - ah * bw).abs() <= aw.max(ah).max(bw).max(bh)
@@ -398,6 +490,40 @@ mod tests {
     }
 
     #[test]
+    fn what_one_label_states_of_the_lens_holds_for_all() {
+        let (mut labels, _) = labels(1, 4, [10.0, 30.0]);
+        labels[1].camera.principal_point_px = Some([2010.0, 1490.0]);
+        labels[2].camera.k1 = Some(0.001);
+        let joint = solve_joint(&labels, &SolveOptions::default()).unwrap();
+        let photos = joint.photos.iter().flatten();
+        let lenses: Vec<_> = photos.map(|s| (s.camera.principal_px, s.kappa)).collect();
+        assert!(lenses[0].1 > 0.0 && lenses == [lenses[0]; 4], "{lenses:?}");
+        labels[3].camera.k1 = Some(-0.1);
+        assert_eq!(
+            solve_joint(&labels, &SolveOptions::default()).unwrap_err(),
+            SolveError::DifferentPictures { photo: 3 }
+        );
+    }
+
+    #[test]
+    fn photos_that_contradict_their_exif_value_are_solved_without_it() {
+        let (mut labels, focal) = labels(1, 6, [10.0, 30.0]);
+        let equivalent = 1.5 * focal / 5000.0 * 36f64.hypot(24.0);
+        labels
+            .iter_mut()
+            .for_each(|l| l.camera.focal_35mm = Some(equivalent));
+        let joint = solve_joint(&labels, &SolveOptions::default()).unwrap();
+        assert!(joint.outliers.is_empty(), "{:?}", joint.outliers);
+        for solution in joint.photos.iter().flatten() {
+            let off = libm::log(solution.camera.focal_px.x / focal).abs();
+            assert!(off < 4.0 * solution.sigma.ln_focal, "{off}");
+            assert_eq!(solution.focal.prior_sigma, 0.35);
+            let mut warnings = solution.warnings.iter();
+            assert!(warnings.any(|w| w.code == Code::FocalPriorConflict));
+        }
+    }
+
+    #[test]
     fn one_photo_alone_is_solved_as_alone() {
         let (labels, _) = labels(2, 1, [20.0, 20.0]);
         let joint = solve_joint(&labels, &SolveOptions::default()).unwrap();
@@ -408,6 +534,8 @@ mod tests {
         assert!((a.camera.focal_px.x / b.camera.focal_px.x - 1.0).abs() < 1e-6);
         assert!((a.sigma.ln_focal / b.sigma.ln_focal - 1.0).abs() < 1e-4);
         assert!((a.sigma.height_px / b.sigma.height_px - 1.0).abs() < 1e-3);
+        assert!((a.fit.condition / b.fit.condition - 1.0).abs() < 1e-3);
+        assert!(a.fit.iterations < 60, "{}", a.fit.iterations);
     }
 
     #[test]
@@ -495,8 +623,21 @@ mod tests {
     }
 
     #[test]
+    fn photos_at_two_zooms_or_through_two_lenses_have_two_cameras() {
+        let (mut labels, _) = labels(4, 5, [20.0, 30.0]);
+        labels[1].camera.focal_35mm = Some(26.0);
+        labels[2].camera.focal_35mm = Some(27.0);
+        labels[3].camera.focal_px = Some(3000.0);
+        (labels[4].camera.focal_px, labels[4].camera.k1) = (Some(3030.0), Some(0.1));
+        assert_eq!(group_by_camera(&labels), [vec![0, 1, 3, 4], vec![2]]);
+        labels[0].camera.k1 = Some(0.0);
+        assert_eq!(group_by_camera(&labels), [vec![0, 1, 3], vec![2, 4]]);
+    }
+
+    #[test]
     fn a_reduced_photo_shares_the_lens() {
-        let (labels, _) = labels(5, 6, [10.0, 30.0]);
+        let (mut labels, _) = labels(5, 6, [10.0, 30.0]);
+        labels[0].camera.principal_point_px = Some([2010.0, 1490.0]);
         let together = solve_joint(&labels, &SolveOptions::default()).unwrap();
         let mut reduced = labels.clone();
         for label in &mut reduced[3..] {

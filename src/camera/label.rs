@@ -153,7 +153,7 @@ pub struct LabelWall {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LabelCamera {
-    /// Its name; photos that share name and shape share a lens.
+    /// Its name; photos that share name, shape and stated focal length share a lens.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub id: Option<String>,
     /// Focal length, pixels.
@@ -273,6 +273,15 @@ impl Label {
     /// A labelled pixel position in our convention.
     pub(crate) fn pixel(&self, px: [f64; 2]) -> Point2<f64> {
         Point2::from(px) + Vector2::repeat(self.pixel_origin.offset_px())
+    }
+}
+
+impl LabelPoint {
+    /// It was found as the corner of a printed marker, as its note says.
+    pub fn is_marker_corner(&self) -> bool {
+        let note = self.note.as_deref().unwrap_or_default();
+        let number = note.strip_prefix("marker ");
+        number.is_some_and(|number| number.parse::<u32>().is_ok())
     }
 }
 

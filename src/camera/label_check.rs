@@ -1,7 +1,7 @@
 //! Checks for impossible numbers in a label.
 
 use super::error::SolveError;
-use super::label::{Label, LabelCamera, LabelPoint, LabelSurface, LabelWall};
+use super::label::{Crop, Label, LabelCamera, LabelPoint, LabelSurface, LabelWall};
 use crate::bounds::MAX_SLOPE_DEG;
 use crate::color::Albedo;
 
@@ -20,7 +20,26 @@ fn check_image(label: &Label) -> Result<(), SolveError> {
     check_picture(label.image_size())?;
     check_picture(label.taken_size())?;
     let mut crop = label.image.crop.iter();
-    crop.try_for_each(|crop| check_finite("image.crop.offset_px", &crop.offset_px))
+    crop.try_for_each(|crop| check_crop(crop, label.image_size()))
+}
+
+/// A picture of this size lies inside the one that it was cut out of.
+fn check_crop(crop: &Crop, size: [u32; 2]) -> Result<(), SolveError> {
+    let Crop {
+        offset_px,
+        width,
+        height,
+    } = *crop;
+    check_finite("image.crop.offset_px", &offset_px)?;
+    let mut sides = offset_px.into_iter().zip(size).zip([width, height]);
+    if sides.all(|((from, side), whole)| from >= 0.0 && from + f64::from(side) <= whole.into()) {
+        return Ok(());
+    }
+    Err(SolveError::CropOutside {
+        size,
+        offset_px,
+        whole: [width, height],
+    })
 }
 
 fn check_surface(surface: &LabelSurface) -> Result<(), SolveError> {
@@ -147,6 +166,26 @@ mod tests {
                 )
             );
         }
+    }
+
+    #[test]
+    fn a_picture_is_inside_the_one_it_was_cut_out_of() {
+        let mut label = Scenario::default().view(1, 0).label;
+        let mut checked = |offset_px: [f64; 2], width: u32| {
+            label.image.crop = Some(Crop {
+                offset_px,
+                width,
+                height: 3000,
+            });
+            check_label(&label).map_err(|refusal| refusal.to_string())
+        };
+        assert_eq!(checked([0.0, 0.0], 4000), Ok(()));
+        assert_eq!(checked([20.5, 0.0], 4021), Ok(()));
+        let beyond = checked([200.0, 0.0], 4000).unwrap_err();
+        let expected =
+            "image.crop: 4000 x 3000 pixels at 200, 0, expected a part of the 4000 x 3000";
+        assert!(beyond.starts_with(expected), "{beyond}");
+        assert!(checked([-1.0, 0.0], 5000).is_err());
     }
 
     fn refusal_of(albedo: Albedo) -> String {

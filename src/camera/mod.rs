@@ -66,7 +66,7 @@ pub use import::from_labelme;
 #[doc(hidden)]
 pub use init::{commented, init_label, with_folded_lists};
 #[doc(hidden)]
-pub use joint::{Joint, OutlierPhoto, group_by_camera, solve_joint};
+pub use joint::{Joint, OutlierPhoto, group_by_camera, have_same_shape, solve_joint};
 #[doc(hidden)]
 pub use label::{Artwork, Crop, Framing, LabelFormat, LabelWall, PixelOrigin};
 pub use label::{Label, LabelCamera, LabelImage, LabelPoint, LabelSurface, MarkerMap};
@@ -102,8 +102,6 @@ pub use solution::{Fit, Solution};
 pub use solution::{FocalFinding, Sigma};
 pub use solve::solve;
 pub use stored::PhotoCamera;
-#[doc(hidden)]
-pub use stored::label_checksums;
 pub(crate) use stored::photo_cameras;
 #[doc(hidden)]
 pub use uncertainty::UNKNOWN_NAMES as UNKNOWNS;

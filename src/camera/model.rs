@@ -51,6 +51,8 @@ pub(crate) struct State {
     pub(crate) principal: Vector2<f64>,
     /// Radial distortion.
     pub(crate) kappa: f64,
+    /// OpenCV's coefficient, where it is stated: kappa then follows the focal length.
+    pub(crate) k1: Option<f64>,
 }
 
 /// Which parts of the stretch go into x and into y: a measured side stays as it is.
@@ -118,7 +120,7 @@ impl State {
     pub(crate) fn new(
         pose: ScaledPose,
         focal: f64,
-        kappa: f64,
+        k1: Option<f64>,
         stretch_shares: StretchShares,
     ) -> Self {
         Self {
@@ -129,7 +131,8 @@ impl State {
             stretch_shares,
             sides: [1.0; 2],
             principal: Vector2::zeros(),
-            kappa,
+            kappa: k1.map_or(0.0, |k1| kappa_from_k1(k1, focal)),
+            k1,
         }
     }
 
@@ -144,9 +147,11 @@ impl State {
     }
 
     pub(crate) fn with_ln_focal(self, ln_focal: f64) -> Self {
+        let focal = libm::exp(ln_focal);
         Self {
             ln_focal,
-            focal: libm::exp(ln_focal),
+            focal,
+            kappa: self.k1.map_or(self.kappa, |k1| kappa_from_k1(k1, focal)),
             ..self
         }
     }
@@ -264,6 +269,9 @@ impl State {
         for axis in 0..2 {
             slope[(PRINCIPAL + axis, axis)] += 1.0;
             slope[(KAPPA, axis)] = position[axis] * r2;
+            if self.k1.is_some() {
+                slope[(LN_FOCAL, axis)] -= 2.0 * self.kappa * slope[(KAPPA, axis)];
+            }
         }
     }
 
@@ -297,6 +305,11 @@ impl State {
         slope[LN_FOCAL] = -normal.z * t.z;
         slope
     }
+}
+
+/// Radial distortion of a lens with OpenCV's coefficient, which counts in focal lengths.
+pub(crate) fn kappa_from_k1(k1: f64, focal: f64) -> f64 {
+    k1 / (focal * focal)
 }
 
 impl PinholeView {
@@ -335,9 +348,10 @@ mod tests {
             center: Vector2::new(0.2, -0.1),
             scale: 0.6,
         };
-        let state = State::new(pose, 1.3, 0.02, stretch_shares).with_stretch(0.03);
+        let state = State::new(pose, 1.3, None, stretch_shares).with_stretch(0.03);
         State {
             principal: Vector2::new(0.01, -0.02),
+            kappa: 0.02,
             ..state
         }
     }
@@ -376,6 +390,21 @@ mod tests {
                 slope - expected
             );
         }
+    }
+
+    #[test]
+    fn a_stated_coefficient_bends_more_the_shorter_the_focal_length() {
+        let free = state(StretchShares::BOTH);
+        let state = State {
+            k1: Some(free.kappa * free.focal * free.focal),
+            ..free
+        };
+        let point = Vector3::new(0.5, -0.4, 0.2);
+        let (_, mut slope) = state.slope(&point, false).unwrap();
+        // Then it is no unknown.
+        slope.row_mut(KAPPA).fill(0.0);
+        let expected = differences(state, |s| s.project(&point, false).unwrap());
+        assert!((slope - expected).abs().max() < 1e-9);
     }
 
     #[test]

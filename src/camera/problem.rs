@@ -5,7 +5,7 @@ use super::error::SolveError;
 use super::focal::{self, PriorSource};
 use super::label::{Framing, Label, LabelPoint};
 use super::label_check::check_label;
-use super::model::{Observation, State, StretchShares};
+use super::model::{Observation, State, StretchShares, kappa_from_k1};
 use super::options::{Priors, SolveOptions};
 use super::prior::{ParameterPriors, Prior};
 use super::rectangle::{ProjectedRectangle, corner_points};
@@ -44,18 +44,17 @@ pub(crate) struct Problem {
     /// Sides of the rectangle before they are stretched, metres.
     pub(crate) size: [f64; 2],
     pub(crate) stretch_shares: StretchShares,
+    k1: Option<f64>,
     pub(crate) residuals: Residuals,
     pub(crate) prior_source: PriorSource,
     pub(crate) warnings: Vec<Diagnostic>,
 }
 
 impl Problem {
-    /// Checks a label of a picture of some framing and brings it into the solver's units. A stated
-    /// distortion is for `focal` (in units), or for the prior's focal length where there is none.
+    /// Checks a label of a picture of some framing and brings it into the solver's units.
     pub(crate) fn new(
         label: &Label,
         framing: Framing,
-        focal: Option<f64>,
         options: &SolveOptions,
     ) -> Result<Self, SolveError> {
         // In one piece: each step needs what several before it have found.
@@ -64,9 +63,10 @@ impl Problem {
         let stretch_shares = sides.stretch_shares();
         let (corners_px, warnings) = used_corners(label, sides, options)?;
         let units = SolverUnits::for_picture(label);
-        let (priors, prior_source) = units.lens_priors(label, framing, focal, &options.priors);
-        let projected = units.projected(&corners_px, priors.kappa.mean);
-        let prior_focal = libm::exp(priors.ln_focal.mean);
+        let (priors, prior_source) = units.lens_priors(label, framing, &options.priors);
+        let (k1, prior_focal) = (label.camera.k1, libm::exp(priors.ln_focal.mean));
+        let kappa = k1.map_or(0.0, |k1| kappa_from_k1(k1, prior_focal));
+        let projected = units.projected(&corners_px, kappa);
         let size = sides.completed(|| ratio_by_right_angle(&projected, prior_focal));
         let units = units.for_rectangle(size);
         let residuals = Residuals {
@@ -86,6 +86,7 @@ impl Problem {
             projected,
             size,
             stretch_shares,
+            k1,
             residuals,
             prior_source,
             warnings,
@@ -97,7 +98,7 @@ impl Problem {
         State::new(
             self.projected.pose_at(focal, self.unit_size()),
             focal,
-            self.residuals.priors.kappa.mean,
+            self.k1,
             self.stretch_shares,
         )
     }
@@ -178,22 +179,19 @@ impl SolverUnits {
         }
     }
 
-    /// The priors of the lens, the others flat, and where that of the focal length comes from. A
-    /// stated distortion is for this focal length, or that of the prior.
+    /// The priors of the lens, the others flat, and where that of the focal length comes from.
     fn lens_priors(
         &self,
         label: &Label,
         framing: Framing,
-        focal: Option<f64>,
         priors: &Priors,
     ) -> (ParameterPriors, PriorSource) {
         let (ln_focal, source) = self.focal_prior(label, framing, priors);
-        let focal = focal.unwrap_or(libm::exp(ln_focal.mean));
         let lens = ParameterPriors {
             ln_focal,
             stretch_sigma: f64::INFINITY,
             principal_sigma: principal_sigma(label, framing, priors),
-            kappa: kappa_prior(label, focal, priors),
+            kappa: kappa_prior(label, priors),
             ln_height: Prior::FLAT,
         };
         (lens, source)
@@ -307,12 +305,10 @@ fn diagonal_px(size: [u32; 2]) -> f64 {
     libm::hypot(f64::from(size[0]), f64::from(size[1]))
 }
 
-/// A stated coefficient is fixed, at a focal length.
-fn kappa_prior(label: &Label, focal: f64, priors: &Priors) -> Prior {
-    match label.camera.k1 {
-        Some(k1) => Prior::fixed(k1 / (focal * focal)),
-        None => Prior::at_zero(priors.kappa_sigma),
-    }
+/// Where a coefficient is stated kappa follows the focal length, and is no unknown.
+fn kappa_prior(label: &Label, priors: &Priors) -> Prior {
+    let stated = label.camera.k1.map(|_| 0.0);
+    Prior::at_zero(stated.unwrap_or(priors.kappa_sigma))
 }
 
 /// Prior of the logarithm of the camera's height above the surface, in the solver's units.

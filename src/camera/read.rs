@@ -34,6 +34,18 @@ impl LabelledPhoto {
             .with_file_name(format!("{}.{ending}", self.name))
     }
 
+    /// What its files are called, seen from the folder of another label: `../right/bg0001`.
+    pub(crate) fn name_from(&self, other: &Self) -> String {
+        let own = io::absolute(&self.source.with_file_name(&self.name));
+        let (Ok(own), Ok(from)) = (own, io::absolute(&other.source)) else {
+            return self.name.clone();
+        };
+        let folder = from.parent().unwrap_or(Path::new(""));
+        io::relative(&own, folder)
+            .to_string_lossy()
+            .replace('\\', "/")
+    }
+
     /// Its photo, where that is there.
     pub fn photo(&self) -> Option<PathBuf> {
         photo_of(&self.label, &self.source)
@@ -84,7 +96,8 @@ pub fn read_label(path: impl AsRef<Path>) -> Result<Label> {
 ///
 /// # Errors
 /// A file that cannot be read or understood, a photo instead of a label among them; a photo that
-/// has another size than its label says, or a path that leads out of the label's folder.
+/// has another size than its label says, or a path that leads out of the label's folder; two photos
+/// of one name.
 pub fn read_labels(path: impl AsRef<Path>, size: Option<[f64; 2]>) -> Result<Vec<LabelledPhoto>> {
     let path = path.as_ref();
     let text = label_text(path)?;
@@ -106,10 +119,11 @@ fn labels_of(
     if labels.is_empty() {
         return Err(Error::file(path, "no label, expected at least one"));
     }
-    labels
-        .into_iter()
-        .map(|labelled| completed(labelled, size))
-        .collect()
+    let mut found = Vec::with_capacity(labels.len());
+    for labelled in labels {
+        push_new(&mut found, completed(labelled, size)?)?;
+    }
+    Ok(found)
 }
 
 fn imported_labels(annotations: &[Annotation], path: &Path) -> Result<Vec<LabelledPhoto>> {
@@ -143,12 +157,13 @@ pub(crate) fn labels_in(folder: &Path, size: Option<[f64; 2]>) -> Result<Vec<Lab
 fn push_new(found: &mut Vec<LabelledPhoto>, labelled: LabelledPhoto) -> Result<()> {
     match found.iter().find(|other| other.name == labelled.name) {
         None => found.push(labelled),
-        Some(ours) if ours.is_ours() => {
+        Some(ours) if ours.is_ours() && ours.source != labelled.source => {
             let source = ours.source.display();
             log::info!("{labelled}: left out, since {source} is there");
         }
         Some(other) => {
-            let what = format!("labels {} once more, after {other}", labelled.name);
+            let name = &labelled.name;
+            let what = format!("labels {name} once more, after {other}: both have one camera file");
             return Err(Error::file(&labelled.source, what));
         }
     }
@@ -485,6 +500,20 @@ pub(super) mod tests {
         let mut label = Label::new([90, 60], [[0.0; 2]; 4], [0.6, 0.4]);
         label.image.file = "a.jpg".into();
         with_photo(label, folder.path().join("a.label.json")).unwrap()
+    }
+
+    #[test]
+    fn two_photos_of_one_name_in_a_file_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let labels = ["left", "right"].map(|side| {
+            let mut label = Label::new([90, 60], [[0.0; 2]; 4], [0.6, 0.4]);
+            label.image.file = format!("{side}/001.png");
+            label
+        });
+        let path = folder.path().join("all.label.json");
+        io::write_json(&path, &labels).unwrap();
+        let refusal = read_labels(&path, None).unwrap_err().to_string();
+        assert!(refusal.contains("labels 001 once more"), "{refusal}");
     }
 
     #[test]

@@ -8,14 +8,14 @@ use super::model::{LN_FOCAL, LN_SCALE, Observation, STRETCH, Square, State, UNKN
 use super::prior::ParameterPriors;
 
 /// Damping at the start, its factor on success and on failure, and where the search is given up.
-const INITIAL_DAMPING: f64 = 1e-3;
-const DAMPING_DECREASE: f64 = 0.1;
-const DAMPING_INCREASE: f64 = 10.0;
-const MAX_DAMPING: f64 = 1e10;
+pub(super) const INITIAL_DAMPING: f64 = 1e-3;
+pub(super) const DAMPING_DECREASE: f64 = 0.1;
+pub(super) const DAMPING_INCREASE: f64 = 10.0;
+pub(super) const MAX_DAMPING: f64 = 1e10;
 /// More steps than this are never needed (10 to 30 are).
 const MAX_ITERATIONS: usize = 100;
 /// A relative fall of the cost, or a scaled step, below which the minimum is reached.
-const COST_TOLERANCE: f64 = 1e-12;
+pub(super) const COST_TOLERANCE: f64 = 1e-12;
 const STEP_TOLERANCE: f64 = 1e-10;
 /// Part of the height above the bar that a step has to fall by.
 const LEAST_PROGRESS: f64 = 0.01;

@@ -1,7 +1,7 @@
 //! A solved camera, and how reliable it is.
 
 use super::chi;
-use super::error::SolveError;
+use super::error::{MISFIT_CAUSES, SolveError};
 use super::exchange::pose_from;
 use super::focal::FocalSource;
 use super::label::Framing;
@@ -373,8 +373,7 @@ impl Solution {
     fn fit_warning(&self) -> Option<Diagnostic> {
         let p_value = self.fit.p_value.filter(|&p| p < POOR_FIT_P)?;
         let what = format!(
-            "no camera fits ({:.1} px off, p = {p_value:.1e}): wrong dimensions, corners of different rectangles, strong \
-             distortion, a cropped picture, or corner_sigma_px is too small",
+            "no camera fits ({:.1} px off, p = {p_value:.1e}): {MISFIT_CAUSES}",
             self.rms_px
         );
         Some(Diagnostic::new(

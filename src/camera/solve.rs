@@ -6,20 +6,15 @@ use super::focal::PriorSource;
 use super::hedge::is_off_center;
 use super::label::{Framing, Label};
 use super::options::{CornerOrder, SolveOptions};
-use super::prior::Prior;
 use super::problem::Problem;
 use super::refine::Minimum;
 use super::search::{SearchResult, degrees_apart};
 use super::solution::Solution;
-use super::uncertainty::Uncertainty;
+use super::uncertainty::{FocalShare, Uncertainty};
 use crate::diagnostic::{Code, Diagnostic};
 
 /// Picture and prior contradict each other beyond this many standard deviations.
 const CONFLICT_SIGMAS: f64 = 3.0;
-/// How often a stated distortion is applied anew, and the relative change of the focal length that
-/// ends it.
-const MAX_REPEATS: usize = 20;
-const FOCAL_TOLERANCE: f64 = 1e-9;
 
 /// Solves the camera that sees a rectangle of known size at four labelled corners.
 ///
@@ -118,8 +113,8 @@ fn solve_framed(
     framing: Framing,
     options: &SolveOptions,
 ) -> Result<SolvedProblem, SolveError> {
-    let (problem, SearchResult { best, other }) =
-        search_with_stated_distortion(label, framing, options)?;
+    let problem = Problem::new(label, framing, options)?;
+    let SearchResult { best, other } = search(&problem, options)?;
     let mut solution = problem.solution(&best, options);
     if !solution.is_finite() {
         return Err(SolveError::NoPose);
@@ -143,55 +138,6 @@ fn ambiguity_warning(best: &Minimum, other: &Minimum) -> Diagnostic {
     Diagnostic::warning(Code::PoseAmbiguous, what)
 }
 
-/// The search; for a label that states k1 repeated until that is applied at the focal length found.
-fn search_with_stated_distortion(
-    label: &Label,
-    framing: Framing,
-    options: &SolveOptions,
-) -> Result<(Problem, SearchResult), SolveError> {
-    let search_at = |focal| {
-        let problem = Problem::new(label, framing, focal, options)?;
-        let found = search(&problem, options)?;
-        Ok((problem, found))
-    };
-    let first: (Problem, SearchResult) = search_at(None)?;
-    let prior = first.0.residuals.priors.ln_focal;
-    if !states_distortion(label) {
-        return Ok(first);
-    }
-    repeated_at_focal_found(
-        first,
-        prior,
-        |(_, found)| found.best.state.ln_focal,
-        search_at,
-    )
-}
-
-/// A search whose distortion was applied at the prior's focal length, repeated at that which it
-/// found until that stays.
-pub(super) fn repeated_at_focal_found<T>(
-    first: T,
-    prior: Prior,
-    ln_focal_of: impl Fn(&T) -> f64,
-    search_at: impl Fn(Option<f64>) -> Result<T, SolveError>,
-) -> Result<T, SolveError> {
-    let (mut found, mut applied) = (first, prior.mean);
-    let repeats = if prior.is_fixed() { 0 } else { MAX_REPEATS };
-    for _ in 0..repeats {
-        let ln_focal = ln_focal_of(&found);
-        if (ln_focal - applied).abs() < FOCAL_TOLERANCE {
-            break;
-        }
-        applied = ln_focal;
-        found = search_at(Some(libm::exp(ln_focal)))?;
-    }
-    Ok(found)
-}
-
-pub(super) fn states_distortion(label: &Label) -> bool {
-    label.camera.k1.is_some_and(|k1| k1 != 0.0)
-}
-
 fn search(problem: &Problem, options: &SolveOptions) -> Result<SearchResult, SolveError> {
     let found = match options.max_iterations {
         None => problem.search(),
@@ -208,7 +154,8 @@ fn solve_without_wrong_exif(label: &Label, options: &SolveOptions) -> Result<Sol
         problem,
         minimum,
     } = solve_as_labelled(label, options)?;
-    let Some(conflict) = focal_conflict(&problem, &minimum) else {
+    let focal = Uncertainty::new(&minimum, problem.residuals.priors.ln_focal).focal;
+    let Some(conflict) = focal_conflict(&problem, &focal) else {
         return Ok(solution);
     };
     if problem.prior_source != PriorSource::Exif {
@@ -219,9 +166,12 @@ fn solve_without_wrong_exif(label: &Label, options: &SolveOptions) -> Result<Sol
     Ok(second.preferred_to(solution, conflict))
 }
 
-fn without_exif_focal(label: &Label) -> Label {
+/// The label without what EXIF data say of the focal length, where that is what it goes by.
+pub(super) fn without_exif_focal(label: &Label) -> Label {
     let mut without = label.clone();
-    (without.camera.focal_35mm, without.camera.focal_sigma) = (None, None);
+    if label.camera.focal_px.is_none() {
+        (without.camera.focal_35mm, without.camera.focal_sigma) = (None, None);
+    }
     without
 }
 
@@ -234,17 +184,33 @@ impl Solution {
     }
 }
 
-fn focal_conflict(problem: &Problem, minimum: &Minimum) -> Option<Diagnostic> {
+/// A warning, where what the picture gives for the focal length contradicts its prior.
+pub(super) fn focal_conflict(problem: &Problem, focal: &FocalShare) -> Option<Diagnostic> {
     let prior = problem.residuals.priors.ln_focal;
-    let focal = Uncertainty::new(minimum, prior).focal;
     let sigmas = focal.prior_conflict(prior)?.abs();
     let prior_px = problem.units.focal_px(prior.mean);
     let measured_px = problem.units.focal_px(focal.from_data?.mean);
+    let [source, causes] = source_and_causes(problem.prior_source);
     let what = format!(
-        "focal length: {prior_px:.0} px was expected and the corners give {measured_px:.0} px ({sigmas:.1} sigmas \
-         apart): wrong EXIF, a cropped or a zoomed picture"
+        "focal length: the corners give {measured_px:.0} px, {source} {prior_px:.0} px ({sigmas:.1} sigmas apart): \
+         {causes}"
     );
     (sigmas > CONFLICT_SIGMAS).then(|| Diagnostic::warning(Code::FocalPriorConflict, what))
+}
+
+/// What an expected focal length comes from, and why the corners may contradict it.
+fn source_and_causes(prior: PriorSource) -> [&'static str; 2] {
+    match prior {
+        PriorSource::Label => [
+            "the label",
+            "wrong camera.focal_px, a cropped or a zoomed picture",
+        ],
+        PriorSource::Exif => ["EXIF data", "wrong EXIF, a cropped or a zoomed picture"],
+        PriorSource::Nominal => [
+            "a common lens",
+            "another lens, whose camera.focal_px the label should give, or wrong dimensions",
+        ],
+    }
 }
 
 /// Where width and height exchanged fit clearly better, adds a warning and the better solution, as

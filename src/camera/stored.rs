@@ -202,14 +202,14 @@ fn modified(path: &Path) -> Option<std::time::SystemTime> {
     std::fs::metadata(path).ok()?.modified().ok()
 }
 
-/// The checksums of labels by name: what each of those that are solved together keeps of the
-/// others.
-pub fn label_checksums<'a>(
+/// The checksums of labels by name: what one of those that are solved together keeps of them.
+fn label_checksums<'a>(
+    member: &LabelledPhoto,
     labels: impl IntoIterator<Item = &'a LabelledPhoto>,
 ) -> BTreeMap<String, u32> {
     labels
         .into_iter()
-        .map(|labelled| (labelled.name.clone(), checksum(&labelled.label)))
+        .map(|labelled| (labelled.name_from(member), checksum(&labelled.label)))
         .collect()
 }
 
@@ -223,7 +223,7 @@ impl CameraFile {
     ) -> Self {
         let mut file = Self::new(&member.label, solution);
         if let Some(from) = file.solved_from.as_mut().filter(|_| all.len() > 1) {
-            from.together = label_checksums(all);
+            from.together = label_checksums(member, all);
         }
         file
     }
@@ -338,7 +338,7 @@ mod tests {
             read_labels(&path, None).unwrap().remove(0),
         ];
         desk.store(&labelled, |file| {
-            file.solved_from.as_mut().unwrap().together = label_checksums(&labels)
+            file.solved_from.as_mut().unwrap().together = label_checksums(&labelled, &labels)
         });
         assert!(photo_cameras(&labels, false).unwrap()[0].stored);
         labels[1].label.surface.corners_px.as_mut().unwrap()[0][0] += 1.0;
@@ -355,6 +355,23 @@ mod tests {
             camera_of(&labelled, false).unwrap().stored,
             "a copy of a part of the photos"
         );
+    }
+
+    #[test]
+    fn photos_of_one_name_in_two_folders_make_no_camera_stale() {
+        let desk = Desk::new();
+        let labels = [("left", 0), ("right", 1)].map(|(side, k)| {
+            io::create_folder(desk.path(side)).unwrap();
+            let path = desk.path(&format!("{side}/a.label.json"));
+            io::write_json(&path, &desk.label(k)).unwrap();
+            read_labels(&path, None).unwrap().remove(0)
+        });
+        let solution = solve(&labels[0].label, &SolveOptions::default()).unwrap();
+        let file = CameraFile::solved_together(&labels[0], &solution, &labels);
+        let together = &file.solved_from.as_ref().unwrap().together;
+        assert_eq!(together.keys().collect::<Vec<_>>(), ["../right/a", "a"]);
+        io::write_json(desk.path("left/a.camera.json"), &file).unwrap();
+        assert!(camera_of(&labels[0], false).unwrap().stored);
     }
 
     /// Two labels with points, and what makes each a label that no camera differs by.
@@ -385,7 +402,7 @@ mod tests {
     fn albedo_source_and_notes_of_a_label_make_no_camera_stale() {
         let desk = Desk::new();
         let [[bare, noted], [other_bare, other_noted]] = noted_labels(&desk);
-        let together = label_checksums([&bare, &other_bare]);
+        let together = label_checksums(&bare, [&bare, &other_bare]);
         desk.store(&bare, |file| {
             file.solved_from.as_mut().unwrap().together = together.clone()
         });

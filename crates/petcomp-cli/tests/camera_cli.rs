@@ -263,6 +263,69 @@ fn labels_that_are_solved_alone_are_named() {
 }
 
 #[test]
+fn a_camera_that_cannot_be_solved_stops_no_other_one() {
+    let desk = Desk::new();
+    for (name, id) in [("a", "bad"), ("b", "good"), ("c", "good")] {
+        let mut label = desk.photo(name, IMAGE);
+        label["camera"] = json!({ "id": id });
+        if id == "bad" {
+            label["surface"]["corners_px"] = Value::from(vec![vec![0.0; 2]; 4]);
+        }
+        desk.label(name, &label);
+    }
+    let labels = ["bg/a.label.json", "bg/b.label.json", "bg/c.label.json"];
+    let said = desk.refused(&[&["camera", "joint"][..], &labels].concat());
+    assert!(said.contains("failed: bg/a.label.json: surface"), "{said}");
+    assert!(
+        ["b", "c"]
+            .iter()
+            .all(|name| desk.path(&format!("bg/{name}.camera.json")).exists())
+    );
+}
+
+#[test]
+fn a_camera_too_far_away_is_refused_however_it_is_solved() {
+    let desk = Desk::new();
+    let mut label = desk.photo("a", IMAGE);
+    let surface = &mut label["surface"];
+    (surface["width_m"], surface["height_m"]) = (json!(20.0 * SIZE[0]), json!(20.0 * SIZE[1]));
+    label["camera"] = json!({ "focal_px": 5120.0, "focal_fixed": true });
+    desk.label("a", &label);
+    for command in ["solve", "joint"] {
+        let said = desk.refused(&["camera", command, "--force", "bg/a.label.json"]);
+        assert!(
+            said.contains("surface: the camera would be"),
+            "{command}: {said}"
+        );
+    }
+}
+
+#[test]
+fn a_photo_that_is_not_the_label_s_is_noticed() {
+    let desk = Desk::new();
+    let mut label = desk.photo("a", IMAGE);
+    desk.label("a", &label);
+    desk.photo("upright", [480, 640]);
+    let rectify = [
+        "camera",
+        "rectify",
+        "bg/upright.png",
+        "bg/a.label.json",
+        "-o",
+        "top.png",
+    ];
+    let said = desk.refused(&rectify);
+    assert!(
+        said.contains("480 x 640 pixels, expected the shape"),
+        "{said}"
+    );
+    label["image"]["file"] = json!("typo.png");
+    desk.label("a", &label);
+    let [_, said] = desk.ok(&["camera", "solve", "bg/a.label.json"]);
+    assert!(said.contains("\"typo.png\" is not there"), "{said}");
+}
+
+#[test]
 fn corners_outside_of_the_picture_can_be_given() {
     let desk = Desk::new();
     desk.photo("a", IMAGE);
@@ -335,6 +398,24 @@ fn the_corners_of_a_marker_are_added_to_a_label() {
                 "{point}"
             );
         }
+    }
+    // A label of the photo keeps all that it says; one of another photo lends what photos share.
+    let mut own = label;
+    own["camera"]["height_m"] = json!(0.64);
+    desk.write("a.label.json", &own.to_string());
+    io::write(desk.path("b.png"), &photo_of_a_marker()).unwrap();
+    for (name, map, height) in [
+        ("a", "a", json!(0.64)),
+        ("b", "a", json!(null)),
+        ("b", "b", json!(null)),
+    ] {
+        let photo = format!("{name}.png");
+        let [map, output] = [map, name].map(|name| format!("{name}.label.json"));
+        desk.ok(&["camera", "markers", &photo, "--map", &map, "-o", &output]);
+        let label: Value = io::read_json(desk.path(&output)).unwrap();
+        let found = (&label["image"]["file"], &label["camera"]["height_m"]);
+        assert_eq!(found, (&json!(photo), &height));
+        assert_eq!(label["points"].as_array().unwrap().len(), 4);
     }
 }
 

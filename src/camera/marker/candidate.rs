@@ -5,6 +5,7 @@ use crate::filter::box_blur;
 use crate::geom::{Point2, mean_point};
 use crate::image::{Image, Mask};
 use crate::pixel::LinearRgb;
+use geo::{Area, ConvexHull, MultiPoint, Point};
 use std::collections::BTreeMap;
 
 /// Half the window of the local mean, in longer picture sides: larger than a marker's border,
@@ -116,7 +117,8 @@ fn quad(outline: &[Point2<f64>]) -> Option<[Point2<f64>; 4]> {
     // b lies to the left of the way from a to c, so that a, b, c, d run clockwise where y runs
     // down.
     let corners = [a, b, c, d];
-    let fills_hull = polygon_area(&corners) >= MIN_HULL_SHARE * hull_area(outline);
+    let area = (c - a).perp(&(d - b)) / 2.0;
+    let fills_hull = area >= MIN_HULL_SHARE * hull_area(outline);
     (has_long_sides(&corners) && fills_hull).then_some(corners)
 }
 
@@ -143,36 +145,8 @@ fn extremes_beside(
     Some([left, right])
 }
 
-fn polygon_area(corners: &[Point2<f64>]) -> f64 {
-    let next = corners.iter().cycle().skip(1);
-    let twice: f64 = corners
-        .iter()
-        .zip(next)
-        .map(|(a, b)| a.coords.perp(&b.coords))
-        .sum();
-    twice / 2.0
-}
-
-/// Area of the convex hull, by Andrew's monotone chain.
+/// Area of the convex hull.
 fn hull_area(points: &[Point2<f64>]) -> f64 {
-    let mut sorted = points.to_vec();
-    sorted.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
-    let mut hull = half_hull(sorted.iter().copied());
-    hull.extend(half_hull(sorted.iter().rev().copied()));
-    polygon_area(&hull).abs()
-}
-
-/// The hull on one side of points in order, without the last of them.
-fn half_hull(points: impl Iterator<Item = Point2<f64>>) -> Vec<Point2<f64>> {
-    let mut chain: Vec<Point2<f64>> = Vec::new();
-    for p in points {
-        while let [.., a, b] = chain[..]
-            && (b - a).perp(&(p - a)) <= 0.0
-        {
-            chain.pop();
-        }
-        chain.push(p);
-    }
-    chain.pop();
-    chain
+    let points = points.iter().map(|p| Point::new(p.x, p.y));
+    points.collect::<MultiPoint>().convex_hull().unsigned_area()
 }

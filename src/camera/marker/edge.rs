@@ -2,6 +2,7 @@
 
 use super::dictionary::{MARKER_CELLS, WhiteCells};
 use crate::camera::rectangle::square_from_corners;
+use crate::filter::sample_bilinear_clamped;
 use crate::geom::{Homography, Line, Point2, Vector2, corners_between};
 use crate::image::Image;
 
@@ -294,7 +295,7 @@ fn crossing(
     let (mut rise, mut moment, mut before) = (0.0, 0.0, 0.0);
     for i in 0..=steps {
         let at = foot + direction * along_probe(i as f64, steps, reach);
-        let now = f64::from(bilinear(light, at.x - 0.5, at.y - 0.5));
+        let now = f64::from(sample_bilinear_clamped(light, at.x, at.y));
         if i > 0 {
             rise += now - before;
             moment += (now - before) * along_probe(i as f64 - 0.5, steps, reach);
@@ -308,14 +309,4 @@ fn crossing(
 /// The position of a sample along a probe of `steps` steps, from its middle.
 fn along_probe(i: f64, steps: usize, reach: f64) -> f64 {
     -reach + 2.0 * reach * i / steps as f64
-}
-
-/// The value between pixel centres at integers; outside as the nearest pixel inside.
-fn bilinear(light: &Image<f32>, x: f64, y: f64) -> f32 {
-    let (i, j) = (x.floor(), y.floor());
-    let (u, v) = ((x - i) as f32, (y - j) as f32);
-    let (i, j) = (i as isize, j as isize);
-    let [above, below] =
-        [j, j + 1].map(|j| light.nearest(i, j) * (1.0 - u) + light.nearest(i + 1, j) * u);
-    above * (1.0 - v) + below * v
 }

@@ -97,16 +97,18 @@ fn dictionary_markers(photo: &Image<LinearRgb>) -> Vec<Marker> {
     found
 }
 
-/// The label with the corners of its markers, found in its photo, as points of known place.
+/// The label with the corners of its markers, found in its photo, as points of known place; those
+/// that it had before are dropped.
 ///
 /// Where the corners fit the map only when every marker is turned by the same angle, they are
 /// turned, with a message in the log: another program's artwork was printed, or the map's axes are
 /// other ones.
 ///
 /// # Errors
-/// [`Error::Value`] for a label without a marker map, one of a family that is not known, and a
-/// photo that shows none of its markers.
-pub fn with_markers(label: Label, photo: &Image<LinearRgb>) -> Result<Label> {
+/// [`Error::Value`] for a label without a marker map, one of a family that is not known or without
+/// a size, and a photo that shows none of its markers.
+pub fn with_markers(mut label: Label, photo: &Image<LinearRgb>) -> Result<Label> {
+    label.points.retain(|point| !point.is_marker_corner());
     let layout = MarkerLayout::find(&label, photo)?;
     let turns = layout.fitting_turns();
     warn_of_turns(turns);
@@ -123,10 +125,13 @@ fn warn_of_turns(turns: usize) {
 }
 
 fn marker_map(label: &Label) -> Result<&MarkerMap> {
-    label
-        .markers
-        .as_ref()
-        .ok_or_else(|| Error::value("markers", "missing, expected family, size_m and map"))
+    let missing = || Error::value("markers", "missing, expected family, size_m and map");
+    let map = label.markers.as_ref().ok_or_else(missing)?;
+    if map.size_m > 0.0 {
+        return Ok(map);
+    }
+    let what = format!("{}, expected a positive number", map.size_m);
+    Err(Error::value("markers.size_m", what))
 }
 
 /// The markers of a map's family, and the least noise that is stated of their corners.
@@ -388,6 +393,23 @@ mod tests {
                 g: self.g + grey,
                 b: self.b + grey,
             }
+        }
+    }
+
+    #[test]
+    fn markers_without_a_size_are_refused() {
+        for size_m in [0.0, -0.1, f64::NAN] {
+            let mut label = Scenario::default().view(1, 0).label;
+            label.markers = Some(MarkerMap {
+                family: FAMILY.into(),
+                artwork: Default::default(),
+                size_m,
+                map: [(0, [0.0; 3])].into(),
+            });
+            let refusal = with_markers(label, &printed(0, 24))
+                .unwrap_err()
+                .to_string();
+            assert!(refusal.contains("markers.size_m"), "{refusal}");
         }
     }
 

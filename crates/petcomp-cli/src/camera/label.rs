@@ -33,7 +33,8 @@ pub(crate) struct InitLabelArgs {
 pub(crate) struct MarkersArgs {
     /// The photo
     photo: PathBuf,
-    /// Label with the markers' family, size and places; its corners may be missing
+    /// Label with the markers' family, size and places: the photo's own, or that of another photo
+    /// of the same rectangle, which lends what `camera init --like` takes over
     #[arg(long, value_name = "LABEL")]
     map: PathBuf,
     /// Label to write
@@ -45,10 +46,9 @@ pub(super) fn init_label(args: &InitLabelArgs, global: &GlobalArgs) -> anyhow::R
     let path = args.output_path();
     let shown = path.display();
     args.check_is_free(&path)?;
-    let known = args.known_label(&path)?;
-    let label = args.with_markers(known.clone())?;
+    let label = args.with_markers(args.known_label(&path)?)?;
     io::write_text(&path, &camera::commented(&label)?)?;
-    let corners = args.describe_corners(label.points.len() - known.points.len());
+    let corners = args.describe_corners(marker_corners(&label));
     global.print_written(
         &path,
         format_args!("{corners}; then `petcomp camera solve {shown}`"),
@@ -106,13 +106,34 @@ impl InitLabelArgs {
 }
 
 pub(super) fn add_markers(args: &MarkersArgs, global: &GlobalArgs) -> anyhow::Result<()> {
-    let label: Label = io::read_json(&args.map)?;
-    let known = label.points.len();
-    let label = with_markers_of(label, &args.photo, &args.map)?;
+    let label = with_markers_of(args.known_label()?, &args.photo, &args.map)?;
     io::write_json(&args.output, &label)?;
-    let found = label.points.len() - known;
+    let found = marker_corners(&label);
     global.print_written(&args.output, format_args!("{found} marker corners"));
     Ok(())
+}
+
+impl MarkersArgs {
+    /// The map's label where that is of this photo, or else a new one with what photos share.
+    fn known_label(&self) -> petcomp::Result<Label> {
+        let mut map = camera::read_label(&self.map)?;
+        let new = camera::init_label(&self.photo, &self.output, Some(&map))?;
+        if is_same_file(&self.map.with_file_name(&map.image.file), &self.photo) {
+            map.image.file = new.image.file;
+            return Ok(map);
+        }
+        Ok(new)
+    }
+}
+
+fn is_same_file(a: &Path, b: &Path) -> bool {
+    let [a, b] = [a, b].map(Path::canonicalize);
+    a.is_ok_and(|a| b.is_ok_and(|b| a == b))
+}
+
+fn marker_corners(label: &Label) -> usize {
+    let points = label.points.iter();
+    points.filter(|point| point.is_marker_corner()).count()
 }
 
 /// The label with the corners of the photo's markers; an error names the file that is to be

@@ -14,7 +14,8 @@ pub(crate) enum CameraCommand {
     Init(label::InitLabelArgs),
     /// Solve the camera of each label; write NAME.camera.json and NAME.overlay.png beside it
     Solve(solve::SolveArgs),
-    /// Solve photos of one camera together: labels that share camera.id and shape of the picture
+    /// Solve photos of one camera together: labels that share camera.id, shape of the picture and
+    /// lens
     Joint(solve::JointArgs),
     /// Say in plain words what is known how well, and what to measure
     Doctor(solve::LabelFileArgs),

@@ -1,6 +1,7 @@
 //! `petcomp camera rectify`: a metric top view, and the way back into the photo.
 
 use super::solve::{accepted, solved};
+use crate::distinct_files::check_distinct;
 use crate::values::parse_metres;
 use petcomp::camera::{self, Camera, LabelledPhoto, Solution};
 use petcomp::filter::Pyramid;
@@ -32,9 +33,11 @@ pub(crate) struct RectifyArgs {
 
 /// Writes the photo from above, or another picture as the photo's camera sees it on the surface.
 pub(super) fn write_view(args: &RectifyArgs) -> anyhow::Result<()> {
+    let inputs = [&args.photo, &args.label].into_iter().chain(&args.back);
+    check_distinct(inputs, [&args.output])?;
     let labelled = read_only(&args.label, args.size)?;
     let solution = accepted(solved(&labelled)?, &labelled, args.force)?;
-    let camera = solution.camera.resized(args.photo_size()?);
+    let camera = solution.camera.resized(args.photo_size(&labelled)?);
     match &args.back {
         Some(picture) => args.write_projected(picture, &camera, &solution),
         None => args.write_top_view(&camera, &solution),
@@ -42,9 +45,21 @@ pub(super) fn write_view(args: &RectifyArgs) -> anyhow::Result<()> {
 }
 
 impl RectifyArgs {
-    fn photo_size(&self) -> petcomp::Result<[u32; 2]> {
+    /// The size of the photo, which may be a reduced one of the label's.
+    fn photo_size(&self, labelled: &LabelledPhoto) -> anyhow::Result<[u32; 2]> {
         let header = io::read_header(&self.photo)?;
-        Ok([header.width as u32, header.height as u32])
+        let (size, [w, h]) = (
+            [header.width as u32, header.height as u32],
+            labelled.label.image_size(),
+        );
+        anyhow::ensure!(
+            camera::have_same_shape(size, [w, h]),
+            "{}: {} x {} pixels, expected the shape of the label's {w} x {h}",
+            self.photo.display(),
+            header.width,
+            header.height
+        );
+        Ok(size)
     }
 
     fn write_projected(

@@ -2,6 +2,7 @@
 
 use crate::batch::FileBatch;
 use crate::diagnostics::report_diagnostics;
+use crate::distinct_files::check_distinct;
 use crate::global::GlobalArgs;
 use crate::print;
 use crate::values::parse_metres;
@@ -73,9 +74,10 @@ impl LabelFileArgs {
 }
 
 impl SolveArgs {
-    /// One file can hold one camera only.
+    /// One file can hold one camera only, and not a label too.
     fn check_output(&self) -> anyhow::Result<()> {
-        if self.output.is_some() {
+        if let Some(output) = &self.output {
+            check_distinct(&self.labels.labels, [output])?;
             let count = self.labels.read_all()?.len();
             anyhow::ensure!(count == 1, "-o: {count} labels, expected one");
         }
@@ -114,11 +116,14 @@ pub(super) fn solve_joint(args: &JointArgs, global: &GlobalArgs) -> anyhow::Resu
             && labels.len() > 1
         {
             log::warn!(
-                "{alone}: solved alone: no other label has its camera.id and picture's shape"
+                "{alone}: solved alone: no other label has its camera.id, picture's shape and lens"
             );
         }
-        for (member, photo) in members.iter().zip(solve_together(&members)?) {
-            batch.count(accept_member(member, photo, &members, args.force, global));
+        match solve_together(&members) {
+            Ok(photos) => members.iter().zip(photos).for_each(|(member, photo)| {
+                batch.count(accept_member(member, photo, &members, args.force, global));
+            }),
+            Err(error) => batch.count(Err(error.into())),
         }
     }
     batch.finish()
@@ -149,7 +154,8 @@ fn accept_member(
     force: bool,
     global: &GlobalArgs,
 ) -> anyhow::Result<()> {
-    let solution = accepted(outcome.map_err(|e| located(e, member))?, member, force)?;
+    let solution = outcome.map_err(|e| located(e, member))?;
+    let solution = accepted(near_enough(solution, member)?, member, force)?;
     let file = CameraFile::solved_together(member, &solution, all);
     write_camera(&member.beside("camera.json"), member, &file, &solution)?;
     report_solution(member, &solution, global);
@@ -174,7 +180,11 @@ fn solve_label(labelled: &LabelledPhoto) -> petcomp::Result<Solution> {
 }
 
 pub(super) fn solved(labelled: &LabelledPhoto) -> petcomp::Result<Solution> {
-    let solution = solve_label(labelled)?;
+    near_enough(solve_label(labelled)?, labelled)
+}
+
+/// A solution whose camera can see objects on the surface.
+fn near_enough(solution: Solution, labelled: &LabelledPhoto) -> petcomp::Result<Solution> {
     camera::check_distance(&solution.camera).map_err(|e| e.in_file(&labelled.source))?;
     Ok(solution)
 }
@@ -208,8 +218,12 @@ fn write_camera(
     solution: &Solution,
 ) -> petcomp::Result<()> {
     io::write_json(target, file)?;
-    if let Some(photo) = labelled.photo() {
-        write_overlay(target, &photo, solution)?;
+    match labelled.photo() {
+        Some(photo) => write_overlay(target, &photo, solution)?,
+        None => log::warn!(
+            "{labelled}: image.file: \"{}\" is not there: no overlay, and its size and EXIF data are not checked",
+            labelled.label.image.file
+        ),
     }
     Ok(())
 }
@@ -247,7 +261,7 @@ fn describe_view(camera: &Camera) -> String {
 
 fn describe_focal(solution: &Solution) -> String {
     let (focal, percent) = (solution.camera.focal_px.x, 100.0 * solution.sigma.ln_focal);
-    let source = format!("{:?}", solution.focal_source).to_lowercase();
+    let source = solution.focal_source;
     format!("focal length {focal:.0} px (+- {percent:.1} %, {source})")
 }
 

@@ -60,6 +60,13 @@ fn solve_group(
     Ok(solved)
 }
 
+/// A camera that fits and can see objects on the surface.
+fn usable(outcome: Result<Solution, SolveError>) -> petcomp::Result<Solution> {
+    let solution = outcome.and_then(Solution::fitting)?;
+    camera::check_distance(&solution.camera)?;
+    Ok(solution)
+}
+
 /// Writes the camera of a photo where it has one that fits.
 fn written(
     folder: &Folder,
@@ -68,7 +75,7 @@ fn written(
     outcome: Result<Solution, SolveError>,
     all: &[LabelledPhoto],
 ) -> Answer<JointPhoto> {
-    let outcome = outcome.and_then(Solution::fitting);
+    let outcome = usable(outcome);
     if let Ok(solution) = &outcome {
         let file = CameraFile::solved_together(member, solution, all);
         io::write_json(folder.place(&beside(name, "camera.json"))?, &file)?;
