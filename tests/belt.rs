@@ -120,6 +120,11 @@ fn expected_rows(folder: &Path) -> Vec<Vec<f64>> {
 }
 
 fn check_tracks(folder: &Path) {
+    let sequences: Vec<_> = std::fs::read_dir(folder.join("mot/train"))
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name())
+        .collect();
+    assert_eq!(sequences, ["000001"]);
     let sequence = folder.join("mot/train/000001");
     let info = io::read_text(sequence.join("seqinfo.ini")).unwrap();
     assert!(

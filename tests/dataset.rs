@@ -7,10 +7,10 @@ use petcomp::DeepImage;
 use petcomp::camera::Camera;
 use petcomp::dataset::index::DatasetIndex;
 use petcomp::dataset::{
-    ArchiveStore, ContactSheetOptions, DatasetConfig, DatasetCounts, LabelConfig, Listing,
-    Obstructed, Partition, PictureFormat, Pictures, Pipeline, Plan, Progress, Provenance, Sample,
-    SampleRange, SampleRecord, Shard, Sidecar, Split, SplitOrder, Summary, WebDataset, Writer,
-    Yolo, YoloSet, YoloTask, check, contact_sheet_of, generate, merge, repair, repair_archives,
+    ArchiveStore, Coco, ContactSheetOptions, DatasetConfig, DatasetCounts, LabelConfig, Obstructed,
+    Partition, PictureFormat, Pictures, Pipeline, Plan, Progress, Provenance, Sample, SampleRange,
+    SampleRecord, Shard, Sidecar, Split, SplitOrder, Summary, WebDataset, Writer, Yolo, YoloSet,
+    YoloTask, check, contact_sheet_of, generate, merge, repair, repair_archives,
 };
 use petcomp::eval::read_yolo_truth_of;
 use petcomp::geom::BBox;
@@ -34,26 +34,9 @@ fn scene(k: u64) -> Scene {
         camera_from_world: Pose::identity(),
     };
     Scene {
-        belt: None,
-        image: IMAGE,
         plate: "tray".into(),
-        camera: CameraSource::Known(camera),
-        surface: Surface::new([0.4, 0.3]),
-        objects: Vec::new(),
-        lights: Vec::new(),
         ambient: LinearRgb::grey(0.1),
-        environment: None,
-        exposure: Exposure::default(),
-        edges: Default::default(),
-        cast: Default::default(),
-        light_direction: Default::default(),
-        light_map: Default::default(),
-        interreflection: Default::default(),
-        view: Default::default(),
-        lens: Default::default(),
-        finish: Default::default(),
-        files: None,
-        settings: Default::default(),
+        ..Scene::new(IMAGE, CameraSource::Known(camera), Surface::new([0.4, 0.3]))
     }
 }
 
@@ -622,6 +605,58 @@ fn a_check_finds_every_fault_and_its_place() {
     }
 }
 
+#[test]
+fn images_in_folders_of_a_part_have_labels_in_folders() {
+    let dir = tempfile::tempdir().unwrap();
+    make(&plan(dir.path(), 12)).unwrap();
+    let path = |name: &str| dir.path().join(name);
+    std::fs::remove_file(path("index.jsonl")).unwrap();
+    for (kind, file) in [("images", "000001.png"), ("labels", "000001.txt")] {
+        let folder = path(kind).join("train");
+        std::fs::create_dir(folder.join("cam0")).unwrap();
+        std::fs::rename(folder.join(file), folder.join("cam0").join(file)).unwrap();
+    }
+    std::fs::write(path("labels/train/classes.txt"), "cap\n").unwrap();
+    std::fs::write(path("labels/train/cam0/000099.txt"), "").unwrap();
+    assert_eq!(
+        faults(dir.path()),
+        ["labels/train/cam0/000099.txt: no image of this name [dataset.orphan_label]"]
+    );
+}
+
+#[test]
+fn an_image_of_both_parts_is_a_leak() {
+    let dir = tempfile::tempdir().unwrap();
+    make(&plan(dir.path(), 12)).unwrap();
+    let yaml = "train: images/train\nval: images/train\nnames: [a, b, c]\n";
+    std::fs::write(dir.path().join("data.yaml"), yaml).unwrap();
+    let found = faults(dir.path());
+    assert_eq!(
+        found[0],
+        "images/train/000001.png: leak: validation image is also trained on [dataset.leak]"
+    );
+    assert!(!found.join("\n").contains("the same bytes"), "{found:?}");
+}
+
+#[test]
+fn a_dataset_without_labels_for_yolo_is_compared_with_its_journal() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut plan = plan(dir.path(), 4);
+    plan.writers[1] = Arc::new(Coco::default());
+    make(&plan).unwrap();
+    let checked = check(dir.path()).unwrap();
+    assert!(!checked.has_yolo && checked.findings.is_empty());
+    std::fs::write(dir.path().join("images/val/000000.png"), "").unwrap();
+    let found = faults(dir.path());
+    assert!(
+        found.len() == 1 && found[0].contains("images/val/000000.png has 0 bytes"),
+        "{found:?}"
+    );
+    std::fs::remove_file(dir.path().join("index.jsonl")).unwrap();
+    let refused = check(dir.path()).unwrap_err().to_string();
+    assert!(refused.contains("archives alone"), "{refused}");
+}
+
 /// A card that fell, one that fell on it, and one that its sidecar file has so far up.
 fn with_a_card_up_at(k: u64, height: f64) -> Sample {
     let card = |placement| Object {
@@ -723,13 +758,15 @@ fn readers_of_records_see_the_labels_that_were_written() {
     ] {
         let dir = tempfile::tempdir().unwrap();
         let plain = plan(dir.path(), 8);
-        make(&Plan {
+        let counts = make(&Plan {
             obstructed: policy,
             classes: policy.classes(&plain.classes).unwrap(),
             ..plain
         })
         .unwrap();
         let summary = Summary::read(dir.path()).unwrap();
+        let labels = summary.glances.iter().map(|sample| sample.labels.len());
+        assert_eq!(counts.labelled, labels.sum::<usize>() as u64, "{policy:?}");
         let index = DatasetIndex::open(dir.path()).unwrap();
         for (row, sample) in summary.glances.iter().enumerate() {
             let label = YoloSet::label_of(&dir.path().join(&sample.files[0]));
@@ -766,7 +803,7 @@ fn whoever_reads_a_data_yaml_finds_the_same_images() {
     let dir = tempfile::tempdir().unwrap();
     let [made, lists, folders] = ["made", "lists", "folders"].map(|name| dir.path().join(name));
     make(&plan(&made, 12)).unwrap();
-    let all = Listing::read(&made).unwrap();
+    let all = YoloSet::read(&made).unwrap();
     let halves = all.partitioned(Partition::Consecutive { guard: 0 }, 0.5, 0);
     halves.unwrap().write(&lists).unwrap();
     std::fs::create_dir(&folders).unwrap();
@@ -774,12 +811,8 @@ fn whoever_reads_a_data_yaml_finds_the_same_images() {
         "path: ../made\ntrain: [images/train, images/val]\nval: images/val\nnames: [a, b, c]";
     std::fs::write(folders.join("data.yaml"), yaml).unwrap();
     for (folder, counts) in [(lists, [6, 6]), (folders, [12, all.val.len()])] {
-        let (listing, set) = (
-            Listing::read(&folder).unwrap(),
-            YoloSet::open(&folder).unwrap(),
-        );
+        let set = YoloSet::open(&folder).unwrap();
         assert_eq!([set.train.len(), set.val.len()], counts);
-        assert_eq!((&set.train, &set.val), (&listing.train, &listing.val));
         let checked = check(&folder).unwrap();
         assert_eq!(checked.images, counts[0] + counts[1]);
         assert_eq!(checked.rows.len(), 3);
@@ -984,6 +1017,21 @@ fn torn_archives_are_found_and_made_again() {
     );
     make(&archive_plan(dir.path(), 30)).unwrap();
     assert_eq!(before, bytes(dir.path()));
+}
+
+#[test]
+fn what_a_killed_run_left_of_a_packed_archive_goes() {
+    let dir = tempfile::tempdir().unwrap();
+    make(&archive_plan(dir.path(), 30)).unwrap();
+    let before = bytes(dir.path());
+    for left in [".archive-000000/images", ".archive-000001/images"] {
+        std::fs::create_dir_all(dir.path().join(left)).unwrap();
+    }
+    std::fs::write(dir.path().join("webdataset/train-000001.tar"), "").unwrap();
+    repair_archives(dir.path(), SampleRange::All).unwrap();
+    make(&archive_plan(dir.path(), 30)).unwrap();
+    assert_eq!(before, bytes(dir.path()));
+    assert_eq!(names(dir.path()), ["dataset.json", "webdataset"]);
 }
 
 #[test]

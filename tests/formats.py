@@ -96,7 +96,7 @@ def mot(folder):
     """Tracks of the truth are without error, and not where objects change their numbers."""
     for part in ["train", "val"]:
         sequences = folder / "mot" / part
-        names = sorted(path.name for path in sequences.iterdir() if path.is_dir())
+        names = sorted(path.name for path in sequences.iterdir())
         for name in names:
             rows = [line.split(",") for line in (sequences / name / "gt/gt.txt").read_text().splitlines()]
             for tracker, numbers in [("own", lambda row: row[1]), ("forgetful", lambda row: row[0] + row[1])]:

@@ -31,13 +31,15 @@ pub fn repair_archives(folder: &Path, range: SampleRange) -> Result<(usize, usiz
     let layout = ArchiveLayout::of_folder(folder)?;
     Inputs::forget(folder);
     let (mut good, mut bad) = (0, 0);
-    let files = layout.numbers(range).flat_map(|n| layout.files(n));
-    for file in files.filter(|file| file.path.exists()) {
-        if is_whole(&file.path, file.samples) {
-            good += 1;
-        } else {
-            std::fs::remove_file(&file.path).map_err(|e| Error::file(&file.path, e))?;
-            bad += 1;
+    for number in layout.numbers(range) {
+        for file in layout.files(number).filter(|file| file.path.exists()) {
+            if is_whole(&file.path, file.samples) {
+                good += 1;
+            } else {
+                std::fs::remove_file(&file.path).map_err(|e| Error::file(&file.path, e))?;
+                layout.sweep(number);
+                bad += 1;
+            }
         }
     }
     Ok((good, bad))
@@ -135,6 +137,16 @@ impl<'a> ArchiveLayout<'a> {
         self.archives.span(number, self.count)
     }
 
+    /// Where the samples of an archive are until they are packed.
+    fn samples_folder(&self, number: u64) -> PathBuf {
+        self.folder.join(format!(".archive-{number:06}"))
+    }
+
+    /// Takes away what a run that was killed left of a folder whose archive it had moved.
+    fn sweep(&self, number: u64) {
+        let _ = std::fs::remove_dir_all(self.samples_folder(number));
+    }
+
     /// The file of each part that has a sample in an archive.
     fn files(&self, number: u64) -> impl Iterator<Item = ArchiveFile> {
         let files = Part::ALL.map(|part| ArchiveFile {
@@ -184,6 +196,7 @@ impl<'a> ArchiveRun<'a> {
             made: DatasetCounts::new(&[], plan, plan.count, 0),
         };
         run.present = run.find_present()?;
+        run.present.iter().for_each(|&n| run.layout.sweep(n));
         run.progress.count = run.numbers().map(|n| run.size(n)).sum();
         run.progress.done = run.present.iter().map(|&n| run.size(n)).sum();
         Ok(run)
@@ -242,7 +255,7 @@ impl<'a> ArchiveRun<'a> {
     fn plan_of(&self, number: u64) -> Plan {
         let (first, end) = self.layout.span(number);
         Plan {
-            folder: self.plan.folder.join(format!(".archive-{number:06}")),
+            folder: self.layout.samples_folder(number),
             range: SampleRange::Span(first, end),
             archives: None,
             store: None,

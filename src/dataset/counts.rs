@@ -21,7 +21,7 @@ pub struct DatasetCounts {
     pub counted: u64,
     /// Objects in these images, labelled or not.
     pub objects: u64,
-    /// Objects that have a label.
+    /// Objects that have a label; those that are to be ignored do not count.
     pub labelled: u64,
     /// Objects that are obstructed, labelled or not.
     pub obstructed: u64,

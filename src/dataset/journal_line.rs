@@ -21,7 +21,7 @@ pub(crate) struct JournalLine {
     /// Its part.
     pub(crate) part: Part,
     /// Objects of each class in the picture (of the class they are labelled as, if they are), and
-    /// how many have a label.
+    /// how many have a label that is not to be ignored.
     pub(crate) classes: Vec<[u32; 2]>,
     /// Objects that something lies over.
     #[serde(default)]
@@ -136,7 +136,8 @@ fn count_obstructed(objects: &[ObjectLabel]) -> u32 {
     obstructed.count() as u32
 }
 
-/// For each class its objects in the picture, and how many of them have a label.
+/// For each class its objects in the picture, and how many of them have a label that is not to be
+/// ignored, which YOLO has none of.
 fn count_by_class(entry: &Entry<'_>) -> Vec<[u32; 2]> {
     let mut classes = vec![[0; 2]; entry.classes.len()];
     for object in &entry.sample.labels.objects {
@@ -144,7 +145,7 @@ fn count_by_class(entry: &Entry<'_>) -> Vec<[u32; 2]> {
         let class = label.map_or(object.class, |label| label.class);
         let count = &mut classes[class as usize];
         count[0] += 1;
-        count[1] += u32::from(label.is_some());
+        count[1] += u32::from(label.is_some_and(|label| !label.ignored));
     }
     classes
 }

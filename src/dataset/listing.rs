@@ -1,104 +1,31 @@
-//! The images of a dataset, part by part, and a choice of them: lists that trainers read, without
-//! copies.
+//! The images that a folder holds or a list names, and what lies beside one.
 
+use crate::dataset::SampleRecord;
 use crate::dataset::paths::folder_of;
-use crate::dataset::yolo_yaml::DataYaml;
-use crate::dataset::{Part, SampleRecord};
 use crate::error::{Error, Result};
+use crate::eval::is_image;
 use crate::io;
-use std::cmp::Ordering;
+use std::collections::BTreeSet;
 use std::path::{Component, Path, PathBuf};
 
-/// Images for training and for validation, in order; none is a copy.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Listing {
-    /// Absolute paths of the images for training.
-    pub train: Vec<PathBuf>,
-    /// Absolute paths of those for validation.
-    pub val: Vec<PathBuf>,
-    /// Names of the classes, in order.
-    pub classes: Vec<String>,
-}
-
-impl Listing {
-    /// Reads the `data.yaml` of a folder, whose parts are folders of images (in order of name) or
-    /// lists (`.txt`), below its `path:`.
-    ///
-    /// # Errors
-    /// No `data.yaml`; a folder or list that cannot be read.
-    pub fn read(folder: &Path) -> Result<Self> {
-        let folder = whole_path(folder)?;
-        let (yaml, _) = DataYaml::read(&io::read_text(folder.join("data.yaml"))?);
-        let root = yaml.root(&folder);
-        let [train, val] = Part::ALL.map(|part| images_of(&root, yaml.folders(part)));
-        Ok(Self {
-            train: train?,
-            val: val?,
-            classes: yaml.names().to_vec(),
-        })
-    }
-
-    /// All images in order of name: the series as it was taken.
-    pub fn series(&self) -> Vec<PathBuf> {
-        let mut all = [&self.train[..], &self.val[..]].concat();
-        all.sort_by(|a, b| compare_names(a, b));
-        all
-    }
-
-    /// The first part of the images for training and the first part of those for validation, as the
-    /// paper takes 25 % of its photos "from the beginning".
-    ///
-    /// # Errors
-    /// A share that is not in `0..=1`.
-    pub fn head(&self, share: f64) -> Result<Self> {
-        check_share(share)?;
-        Ok(Self {
-            train: first_share(&self.train, share),
-            val: first_share(&self.val, share),
-            classes: self.classes.clone(),
-        })
-    }
-
-    /// Writes `train.txt`, `val.txt` and `data.yaml`, paths relative to the folder.
-    ///
-    /// # Errors
-    /// When a file cannot be written.
-    pub fn write(&self, folder: &Path) -> Result<()> {
-        io::create_folder(folder)?;
-        let folder = whole_path(folder)?;
-        for (part, images) in Part::ALL.into_iter().zip([&self.train, &self.val]) {
-            write_list(part, images, &folder)?;
-        }
-        let yaml = DataYaml::write_with(&self.classes, |part| format!("{part}.txt"));
-        io::write_text(folder.join("data.yaml"), &yaml)
-    }
-}
-
-/// By the file's name, then by its whole path.
-fn compare_names(a: &Path, b: &Path) -> Ordering {
-    (a.file_name(), a).cmp(&(b.file_name(), b))
-}
-
-/// The images of the folders or lists of a part.
-fn images_of(root: &Path, parts: &[String]) -> Result<Vec<PathBuf>> {
-    let images: Vec<_> = parts
-        .iter()
-        .map(|part| images_in(&place_of(root, part)))
-        .collect::<Result<_>>()?;
-    Ok(images.concat())
-}
-
 /// Where a folder or list of a part is, for a `data.yaml` with this root.
+///
+/// Roboflow's is `../train/images` beside the folder `train`: where that is not there, Ultralytics
+/// passes over the first `../`, and so do we.
 pub(crate) fn place_of(root: &Path, part: &str) -> PathBuf {
-    without_dots(&root.join(part))
+    let place = without_dots(&root.join(part));
+    match part.strip_prefix("../") {
+        Some(rest) if !place.exists() => without_dots(&root.join(rest)),
+        _ => place,
+    }
 }
 
-/// The images of a folder, or those that a list names.
+/// The images below a folder, or those that a list names.
 pub(crate) fn images_in(place: &Path) -> Result<Vec<PathBuf>> {
     if is_list(place) {
         listed_images(place)
     } else {
-        images_in_folder(place)
+        files_below(place, is_image, usize::MAX)
     }
 }
 
@@ -114,38 +41,44 @@ fn listed_images(list: &Path) -> Result<Vec<PathBuf>> {
     Ok(lines.map(|line| without_dots(&folder.join(line))).collect())
 }
 
-/// In order of name.
-fn images_in_folder(folder: &Path) -> Result<Vec<PathBuf>> {
+/// The files of a kind below a folder, in order of path; each folder once, as links may lead in
+/// circles.
+///
+/// # Errors
+/// A folder that cannot be listed, or one with which there are more files than `most`.
+pub(crate) fn files_below(
+    folder: &Path,
+    is_wanted: impl Fn(&Path) -> bool,
+    most: usize,
+) -> Result<Vec<PathBuf>> {
+    let (mut files, mut seen) = (Vec::new(), BTreeSet::new());
+    let mut open = vec![folder.to_path_buf()];
+    while let Some(folder) = open.pop() {
+        if seen.insert(folder.canonicalize().map_err(|e| Error::file(&folder, e))?) {
+            let (folders, found) = folders_and_files(&folder)?;
+            open.extend(folders);
+            files.extend(found.into_iter().filter(|path| is_wanted(path)));
+        }
+        check_file_count(files.len(), most, &folder)?;
+    }
+    files.sort();
+    Ok(files)
+}
+
+/// What is in a folder, in order of name: of two names of a folder always the same one counts.
+fn folders_and_files(folder: &Path) -> Result<(Vec<PathBuf>, Vec<PathBuf>)> {
     let entries = std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
-    let paths = entries.flatten().map(|entry| entry.path());
-    let mut images: Vec<PathBuf> = paths.filter(|path| is_image(path)).collect();
-    images.sort();
-    Ok(images)
+    let mut paths: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
+    paths.sort();
+    Ok(paths.into_iter().partition(|path| path.is_dir()))
 }
 
-fn write_list(part: Part, images: &[PathBuf], folder: &Path) -> Result<()> {
-    let list = folder.join(format!("{}.txt", part.name()));
-    io::write_text(list, &list_of(images, folder))
-}
-
-/// Images as lines of a list; trainers take `./` for its folder.
-fn list_of(images: &[PathBuf], folder: &Path) -> String {
-    images
-        .iter()
-        .map(|path| format!("./{}\n", io::relative(path, folder).display()))
-        .collect()
-}
-
-fn check_share(share: f64) -> Result<()> {
-    if (0.0..=1.0).contains(&share) {
+fn check_file_count(count: usize, most: usize, folder: &Path) -> Result<()> {
+    if count <= most {
         return Ok(());
     }
-    let what = format!("{share}, expected a share, 0 to 1");
-    Err(Error::value("head", what))
-}
-
-fn first_share(images: &[PathBuf], share: f64) -> Vec<PathBuf> {
-    images[..(images.len() as f64 * share).round() as usize].to_vec()
+    let what = format!("more than {most} images, expected fewer");
+    Err(Error::file(folder, what))
 }
 
 /// A path from the root without `.` and `..`.
@@ -164,14 +97,6 @@ fn without_dots(path: &Path) -> PathBuf {
         }
     }
     plain
-}
-
-/// Extensions of the images that a listing names.
-const IMAGE_EXTENSIONS: [&str; 5] = ["png", "jpg", "jpeg", "tif", "tiff"];
-
-pub(crate) fn is_image(path: &Path) -> bool {
-    let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
-    extension.is_some_and(|e| IMAGE_EXTENSIONS.contains(&e.as_str()))
 }
 
 /// What is known of an image: its sidecar.

@@ -102,9 +102,6 @@ pub(crate) use journal::read_lines as journal_lines;
 #[doc(hidden)]
 pub use journal::repair;
 pub use layers::Layers;
-#[doc(hidden)]
-pub use listing::Listing;
-pub(crate) use listing::is_image;
 pub use merge::merge;
 #[doc(hidden)]
 pub use mot::Mot;

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 
 /// Writes `mot/{train,val}/SSSSSS/`, a folder for each sequence of a belt: `gt/gt.txt`,
 /// `seqinfo.ini`, and the pictures as `img1/NNNNNN.png` (links to those in `images/`, which take no
-/// room, where the disk has links).
+/// room, where the disk has links); joined from `mot_frames/{train,val}/NNNNNN.json`.
 ///
 /// A line of `gt.txt` is an object in a picture: picture, object, left, top, width, height, 1 (0 for
 /// what is to be ignored), class, visible share. Pictures, objects, pixels and classes are counted
@@ -29,6 +29,9 @@ pub struct Mot {
 
 /// Its folder.
 const KIND: &str = "mot";
+
+/// Folder of the shares that are joined: where sequences are, readers take every name for one.
+const SHARES_FOLDER: &str = "mot_frames";
 
 /// One picture's share of its sequence.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -55,12 +58,13 @@ impl Writer for Mot {
     }
 
     fn begin(&self, folder: &Path, _classes: &[String]) -> Result<()> {
+        create_part_folders(folder, SHARES_FOLDER)?;
         create_part_folders(folder, KIND)
     }
 
     fn write(&self, folder: &Path, entry: &Entry<'_>) -> Result<Vec<PathBuf>> {
         let belt = entry.belt().ok_or_else(no_sequence)?;
-        let path = entry.path(KIND, "json");
+        let path = entry.path(SHARES_FOLDER, "json");
         let share = FrameShare {
             belt,
             image: entry.sample.labels.image,
@@ -96,7 +100,7 @@ fn sequences<'a>(
     let mut sequences: BTreeMap<u64, Vec<SequenceFrame>> = BTreeMap::new();
     for sample in samples {
         let file = |kind| sample.file(kind).map_err(|e| Error::file(folder, e));
-        let share: FrameShare = io::read_json(io::inside(folder, file(KIND)?)?)?;
+        let share: FrameShare = io::read_json(io::inside(folder, file(SHARES_FOLDER)?)?)?;
         let image = io::inside(folder, file("images")?)?;
         let frames = sequences.entry(share.belt.sequence).or_default();
         frames.push(SequenceFrame { share, image });

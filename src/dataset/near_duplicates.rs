@@ -41,23 +41,29 @@ impl Thumbnail {
 
     /// Root mean square difference, 8-bit codes.
     fn codes_from(&self, other: &Self) -> f64 {
-        (self.squared_error(other) as f64 / self.0.len().max(1) as f64).sqrt()
+        (squared_error(&self.0, &other.0) as f64 / self.0.len().max(1) as f64).sqrt()
     }
 
-    fn squared_error(&self, other: &Self) -> u64 {
-        let pairs = self.0.iter().zip(&other.0);
-        pairs.map(|(a, b)| squared_difference(*a, *b)).sum()
+    /// Sum of squared differences where it is below a limit; most pairs are beyond it after a row.
+    fn squared_error_below(&self, limit: u64, other: &Self) -> Option<u64> {
+        let [width, _] = THUMBNAIL_PX;
+        let mut rows = self.0.chunks(width).zip(other.0.chunks(width));
+        rows.try_fold(0, |sum, (a, b)| {
+            Some(sum + squared_error(a, b)).filter(|sum| *sum < limit)
+        })
     }
 
-    /// The place of the nearest in a list, and how far it is.
-    fn nearest_of(&self, all: &[Self]) -> Option<(usize, f64)> {
-        let distances = all.iter().map(|other| self.codes_from(other)).enumerate();
-        distances.min_by(|a, b| a.1.total_cmp(&b.1))
-    }
-
+    /// The place of the nearest in a list, the first of those as near, and how far it is.
     fn nearest_within(&self, all: &[Self], codes: f64) -> Option<(usize, f64)> {
-        self.nearest_of(all)
-            .filter(|(_, distance)| *distance < codes)
+        let mut limit = ((self.0.len() as f64 * codes * codes) as u64).saturating_add(1);
+        let mut nearest = None;
+        for (i, other) in all.iter().enumerate() {
+            if let Some(error) = self.squared_error_below(limit, other) {
+                (nearest, limit) = (Some(i), error);
+            }
+        }
+        let place = nearest?;
+        Some((place, self.codes_from(&all[place]))).filter(|(_, distance)| *distance < codes)
     }
 }
 
@@ -104,6 +110,12 @@ fn grey_code(p: &Srgb8) -> u8 {
 }
 
 #[inline]
+fn squared_error(a: &[u8], b: &[u8]) -> u64 {
+    let pairs = a.iter().zip(b);
+    pairs.map(|(a, b)| squared_difference(*a, *b)).sum()
+}
+
+#[inline]
 fn squared_difference(a: u8, b: u8) -> u64 {
     u64::from(a.abs_diff(b)).pow(2)
 }
@@ -130,5 +142,21 @@ mod tests {
             nearest(&scenes[..1], &scenes[1..], NEAR_DUPLICATE_RMS).len(),
             1
         );
+    }
+
+    #[test]
+    fn the_nearest_is_that_of_comparing_all() {
+        let own = scene(0, 0.0);
+        let noises = [0.0, 0.3, 0.1, 0.2, 0.1];
+        let all: Vec<_> = (0..5).map(|i| scene(i % 2 * 60, noises[i])).collect();
+        for first in 0..all.len() {
+            let others = &all[first..];
+            let distances = others.iter().map(|other| own.codes_from(other)).enumerate();
+            let nearest = distances.min_by(|a, b| a.1.total_cmp(&b.1));
+            for codes in [0.0, 0.5, NEAR_DUPLICATE_RMS, f64::INFINITY] {
+                let expected = nearest.filter(|(_, distance)| *distance < codes);
+                assert_eq!(own.nearest_within(others, codes), expected);
+            }
+        }
     }
 }

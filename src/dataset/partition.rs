@@ -1,6 +1,7 @@
 //! Partitioning images for training and validation, and what leaks from one to the other.
 
-use crate::dataset::listing::{Listing, record_of, sidecar_of};
+use crate::dataset::YoloSet;
+use crate::dataset::listing::{record_of, sidecar_of};
 use crate::dataset::near_duplicates::{NearDuplicate, near_pairs};
 use crate::error::{Error, Result};
 use crate::scene::{Draws, Scene};
@@ -75,7 +76,7 @@ pub struct Leakage {
     pub near_duplicates: Vec<NearDuplicate>,
 }
 
-impl Listing {
+impl YoloSet {
     /// Shares the images out anew, in order of name: `ratio` of them for training.
     ///
     /// # Errors
@@ -222,12 +223,12 @@ mod tests {
     use super::*;
     use std::path::Path;
 
-    fn listing(n: usize) -> Listing {
-        Listing {
+    fn listing(n: usize) -> YoloSet {
+        YoloSet {
             train: (0..n)
                 .map(|i| format!("/d/images/{i:04}.png").into())
                 .collect(),
-            ..Listing::default()
+            ..YoloSet::default()
         }
     }
 
@@ -295,9 +296,9 @@ mod tests {
         std::fs::create_dir_all(dir.path().join("images")).unwrap();
         std::fs::create_dir_all(dir.path().join("scenes")).unwrap();
         let image = dir.path().join("images/0.png");
-        let listing = Listing {
+        let listing = YoloSet {
             train: vec![image],
-            ..Listing::default()
+            ..YoloSet::default()
         };
         assert!(listing.leaked_groups().unwrap().is_empty());
         std::fs::write(dir.path().join("scenes/0.json"), "{").unwrap();
@@ -310,12 +311,12 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let root = std::path::absolute(dir.path()).unwrap();
         let image = |part: &str| root.join(format!("images/{part}/0.png"));
-        let listing = Listing {
+        let listing = YoloSet {
             train: vec![image("train")],
             val: vec![image("val")],
             classes: vec!["a: b".into()],
         };
         listing.write(&root.join("splits/one")).unwrap();
-        assert_eq!(Listing::read(&root.join("splits/one")).unwrap(), listing);
+        assert_eq!(YoloSet::read(&root.join("splits/one")).unwrap(), listing);
     }
 }

@@ -23,14 +23,6 @@ impl KeyEdit {
             value: Some(value.into()),
         }
     }
-
-    /// Takes a key back to its default.
-    pub fn reset(path: impl Into<String>) -> Self {
-        Self {
-            path: path.into(),
-            value: None,
-        }
-    }
 }
 
 /// The text with these edits, in their order.
@@ -382,6 +374,13 @@ mod tests {
         with_edits(text, &edits).unwrap()
     }
 
+    fn reset(path: &str) -> KeyEdit {
+        KeyEdit {
+            path: path.into(),
+            value: None,
+        }
+    }
+
     #[test]
     fn comments_stay_where_they_are() {
         let text = "# mine\nassets = 'a' # here\n\n[scene] # drawn\n# many\nobjects = 3 # by hand\nstart.x = 0\n";
@@ -412,8 +411,8 @@ mod tests {
         assert_eq!(config.scene.finish.camera_noise.read.min, 0.01);
         assert_eq!(config.scene.start.spread.unwrap().max, 0.75);
         assert_eq!(config.scene.lights[0].height.max, 2.0);
-        let back = edits.map(|(path, _)| KeyEdit::reset(path));
-        let back = [&back[..], &[KeyEdit::reset("scene.lights[0]")]].concat();
+        let back = edits.map(|(path, _)| reset(path));
+        let back = [&back[..], &[reset("scene.lights[0]")]].concat();
         let again = with_edits(&text, &back).unwrap();
         assert_eq!(again, DatasetConfig::template());
     }
@@ -431,7 +430,7 @@ mod tests {
         );
         let expected = "# kept\n[scene] # too\nfinish = { sharpening = 2, white_k = 5000, exposure_ev = 0.5 } # and this\n";
         assert_eq!(text, expected);
-        let text = with_edits(&text, &[KeyEdit::reset("scene.finish.white_k")]).unwrap();
+        let text = with_edits(&text, &[reset("scene.finish.white_k")]).unwrap();
         assert_eq!(
             text,
             "# kept\n[scene] # too\nfinish = { sharpening = 2, exposure_ev = 0.5 } # and this\n"
@@ -448,7 +447,7 @@ mod tests {
         let config: DatasetConfig = toml::from_str(&two).unwrap();
         assert_eq!(config.scene.lights.len(), 2);
         assert_eq!(config.scene.lights[1].power.min, 3.0);
-        let one = with_edits(&two, &[KeyEdit::reset("scene.lights[1]")]).unwrap();
+        let one = with_edits(&two, &[reset("scene.lights[1]")]).unwrap();
         let config: DatasetConfig = toml::from_str(&one).unwrap();
         assert_eq!(config.scene.lights.len(), 1);
         let dark = edited(&one, &[("scene.lights", "[]")]);

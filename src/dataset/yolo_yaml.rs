@@ -91,12 +91,13 @@ impl DataYaml {
         Ok(())
     }
 
-    /// Names as `[a, b]` or as `0: a`, whose numbers must be in order.
+    /// Names as `[a, b]` or as `0: a`, in any order, whose numbers leave none out.
     fn set_names(&mut self, value: Value) -> Result<(), Problem> {
-        let Value::Map(entries) = value else {
+        let Value::Map(mut entries) = value else {
             self.names = value.texts("names")?;
             return Ok(());
         };
+        entries.sort_by_key(|(_, key, _)| key.parse().unwrap_or(usize::MAX));
         let mut wrong = Ok(());
         for (expected, (line, key, name)) in entries.into_iter().enumerate() {
             if wrong.is_ok() && key != expected.to_string() {
@@ -391,6 +392,15 @@ mod tests {
                 (&["cap", "none"].map(String::from)[..], vec![])
             );
         }
+    }
+
+    #[test]
+    fn names_go_by_their_numbers() {
+        let (yaml, faults) = DataYaml::read("train: a\nval: b\nnames:\n  1: none\n  0: cap\n");
+        assert_eq!(
+            (yaml.names, faults),
+            (["cap", "none"].map(String::from).to_vec(), vec![])
+        );
     }
 
     #[test]

@@ -60,9 +60,11 @@ impl LabelFolder {
     fn open(labels: &Path, images: Option<&Path>) -> Result<Self> {
         let beside = || io::with_last_step(labels, "labels", "images");
         let image_folder = images.map_or_else(beside, Path::to_path_buf);
+        let (mut labels, images) = (text_files(labels)?, picture_files(&image_folder));
+        labels.retain(|name, path| !is_class_list(path) || images.contains_key(name));
         Ok(Self {
-            labels: text_files(labels)?,
-            images: picture_files(&image_folder),
+            labels,
+            images,
             image_folder,
         })
     }
@@ -109,6 +111,22 @@ pub(crate) fn label_of(image: &Path) -> PathBuf {
     io::with_last_step(image, "images", "labels").with_extension("txt")
 }
 
+/// The names of the classes, which LabelImg writes beside its labels.
+pub(crate) fn is_class_list(path: &Path) -> bool {
+    path.ends_with("classes.txt")
+}
+
+/// Extensions of the images that Ultralytics 8.4 takes, whether petcomp reads them or not.
+const TRAINED_EXTENSIONS: [&str; 13] = [
+    "avif", "bmp", "dng", "heic", "heif", "jp2", "jpeg", "jpg", "mpo", "png", "tif", "tiff", "webp",
+];
+
+/// Whether a trainer takes a file for an image, by its name.
+pub(crate) fn is_image(path: &Path) -> bool {
+    let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+    extension.is_some_and(|e| TRAINED_EXTENSIONS.contains(&e.as_str()))
+}
+
 /// Nothing where there is no label file.
 fn truth_of(label: Option<&Path>, size: [u32; 2]) -> Result<Vec<GroundTruth>> {
     label.map_or_else(|| Ok(Vec::new()), |label| read_truth(label, size))
@@ -130,8 +148,11 @@ fn picture_of(path: PathBuf, size: [u32; 2]) -> Picture {
 /// [`Error::File`] for a folder that cannot be read, a name that the truth does not have, or a bad
 /// line.
 pub fn read_yolo_detections(folder: &Path, truth: &mut YoloTruth) -> Result<()> {
-    let known = truth.places_by_name();
-    let found: Vec<(usize, Vec<Detection>)> = text_files(folder)?
+    let (known, files) = (truth.places_by_name(), text_files(folder)?);
+    if files.is_empty() {
+        log::warn!("{}: {}", folder.display(), no_detections(folder));
+    }
+    let found: Vec<(usize, Vec<Detection>)> = files
         .par_iter()
         .map(|(name, path)| {
             let &i = known
@@ -200,6 +221,16 @@ pub(crate) fn sheet_of(
     })
 }
 
+/// Where detections may lie that a folder has not: Ultralytics writes them below its pictures.
+fn no_detections(folder: &Path) -> String {
+    let below = folder.join("labels");
+    let advice = match below.is_dir() {
+        true => format!("; is it {}?", below.display()),
+        false => String::new(),
+    };
+    format!("no NAME.txt, so nothing was found in any image{advice}")
+}
+
 /// The text files of a folder by their names without extension, in order.
 fn text_files(folder: &Path) -> Result<BTreeMap<String, PathBuf>> {
     let mut texts = BTreeMap::new();
@@ -219,10 +250,14 @@ fn picture_files(folder: &Path) -> BTreeMap<String, PathBuf> {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
     let paths = entries.map(|entry| entry.path());
     let mut paths: Vec<PathBuf> = paths
-        .filter(|path| Format::from_extension(path).is_some())
+        .filter(|path| is_image(path) || Format::from_extension(path).is_some())
         .collect();
-    // Of one name JPEG and PNG come first, which a page shows as they are.
-    paths.sort_by_cached_key(|path| (!is_jpeg_or_png(path), path.clone()));
+    // Of one name JPEG and PNG come first, which a page shows as they are, and what cannot be read
+    // last.
+    paths.sort_by_cached_key(|path| {
+        let format = Format::from_extension(path);
+        (!is_jpeg_or_png(format), format.is_none(), path.clone())
+    });
     let mut pictures = BTreeMap::new();
     for path in paths {
         let name = path.file_stem().unwrap_or_default();
@@ -232,8 +267,7 @@ fn picture_files(folder: &Path) -> BTreeMap<String, PathBuf> {
     pictures
 }
 
-fn is_jpeg_or_png(path: &Path) -> bool {
-    let format = Format::from_extension(path);
+fn is_jpeg_or_png(format: Option<Format>) -> bool {
     matches!(format, Some(Format::Jpeg | Format::Png))
 }
 
@@ -505,6 +539,8 @@ mod tests {
         let label = root.path().join("labels/val/IMG_1.txt");
         std::fs::write(label, "0 0.5 0.5 1 1\n").unwrap();
         let image = crate::Image::filled(8, 6, crate::LinearRgb::WHITE);
+        let list = root.path().join("labels/val/classes.txt");
+        std::fs::write(list, "cap\nnone\n").unwrap();
         for name in ["IMG_1.JPG", "IMG_2.tiff", "notes.md"] {
             let path = root.path().join(images).join(name);
             match name {
@@ -542,5 +578,15 @@ mod tests {
         let truth = read_yolo_truth(&labels, Some(&images), None).unwrap();
         assert_eq!(truth.sizes, [[8, 6]; 2]);
         assert!(truth.pictures.iter().all(Option::is_some));
+    }
+
+    #[test]
+    fn an_image_of_a_kind_that_is_not_read_is_named() {
+        let root = photo_set("images/val");
+        let image = root.path().join("images/val/IMG_3.webp");
+        std::fs::write(image, b"RIFF\x10\0\0\0WEBPVP8 ").unwrap();
+        let told = read_yolo_truth(&root.path().join("labels/val"), None, None);
+        let told = told.unwrap_err().to_string();
+        assert!(told.contains("IMG_3.webp: is WebP"), "{told}");
     }
 }

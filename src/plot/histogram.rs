@@ -58,19 +58,6 @@ impl Histogram {
         self
     }
 
-    /// Largest distance of a bin from what it should have, in standard deviations (of a binomial
-    /// count); none where nothing is expected.
-    pub fn worst_deviation(&self) -> Option<f64> {
-        let expected = self
-            .expected
-            .filter(|e| *e > 0.0 && self.counts.len() > 1)?;
-        let deviation = self.deviation(expected);
-        self.counts
-            .iter()
-            .map(|&n| (n as f64 - expected).abs() / deviation)
-            .reduce(f64::max)
-    }
-
     /// An SVG document: bars, and a dashed line at what is expected with a band of two standard
     /// deviations around it.
     pub fn svg(&self) -> String {
@@ -187,19 +174,6 @@ mod tests {
         );
         assert_eq!(h.counts, [4, 0, 1, 3]);
         assert_eq!(h.uniform().expected, Some(2.0));
-    }
-
-    #[test]
-    fn a_wrong_distribution_is_far_from_its_line() {
-        let even: Vec<f64> = (0..1000).map(|i| f64::from(i) / 1000.0).collect();
-        let slanted: Vec<f64> = even.iter().map(|x| x * x).collect();
-        let worst = |values: &[f64]| {
-            Histogram::new("x", values, [0.0, 1.0], 10)
-                .uniform()
-                .worst_deviation()
-                .unwrap()
-        };
-        assert!(worst(&even) < 0.1 && worst(&slanted) > 5.0);
     }
 
     #[test]

@@ -1,14 +1,12 @@
 //! Train: what a detector's training needs beside images: equation numbers are those of the paper.
 //!
 //! Plain functions for any trainer: the balance of two sources of images ([`Balance`], equation 2),
-//! batches of one source each (`batches`), how a network's numbers become boxes (`decode`, equation
-//! 1), anchors that fit a dataset ([`anchors()`]), how many epochs make equally many updates
-//! ([`Updates`]), and a [`kit`] of files for PyTorch.
+//! batches of one source each (`batches`), anchors that fit a dataset ([`anchors()`]), how many
+//! epochs make equally many updates ([`Updates`]), and a [`kit`] of files for PyTorch.
 
 mod anchors;
 mod balance;
 mod batches;
-mod decode;
 pub mod kit;
 mod updates;
 
@@ -18,7 +16,5 @@ pub use anchors::{Anchors, anchors};
 pub use balance::{Balance, Weights};
 #[doc(hidden)]
 pub use batches::{Batch, BatchOptions, Source, batches};
-#[doc(hidden)]
-pub use decode::{decode, encode};
 #[doc(hidden)]
 pub use updates::{Updates, batches_per_epoch};

@@ -21,31 +21,31 @@ pub(crate) struct DiffArgs {
     /// Second picture
     b: PathBuf,
     /// A channel fails when it differs by more than this
-    #[arg(long, default_value_t = 1e-6)]
+    #[arg(long, default_value_t = 1e-6, value_parser = parse_threshold)]
     fail: f32,
     /// ... and by more than this part of the mean of both
-    #[arg(long = "failrelative", default_value_t = 0.0)]
+    #[arg(long = "failrelative", default_value_t = 0.0, value_parser = parse_threshold)]
     fail_relative: f32,
     /// Percentage of pixels that may fail
-    #[arg(long = "failpercent", default_value_t = 0.0)]
+    #[arg(long = "failpercent", default_value_t = 0.0, value_parser = parse_threshold)]
     fail_percent: f32,
     /// No channel may differ by more than this
-    #[arg(long = "hardfail", default_value_t = f32::INFINITY)]
+    #[arg(long = "hardfail", default_value_t = f32::INFINITY, value_parser = parse_threshold)]
     hard_fail: f32,
     /// Number of pixels that may fail by any amount
     #[arg(long = "allowfailures", default_value_t = 0)]
     allow_failures: usize,
     /// As --fail, for a warning
-    #[arg(long, default_value_t = 1e-6)]
+    #[arg(long, default_value_t = 1e-6, value_parser = parse_threshold)]
     warn: f32,
     /// As --failrelative, for a warning
-    #[arg(long = "warnrelative", default_value_t = 0.0)]
+    #[arg(long = "warnrelative", default_value_t = 0.0, value_parser = parse_threshold)]
     warn_relative: f32,
     /// As --failpercent, for a warning
-    #[arg(long = "warnpercent", default_value_t = 0.0)]
+    #[arg(long = "warnpercent", default_value_t = 0.0, value_parser = parse_threshold)]
     warn_percent: f32,
     /// As --hardfail, for a warning
-    #[arg(long = "hardwarn", default_value_t = f32::INFINITY)]
+    #[arg(long = "hardwarn", default_value_t = f32::INFINITY, value_parser = parse_threshold)]
     hard_warn: f32,
     /// Write a picture of the absolute difference
     #[arg(short, long, value_name = "PICTURE")]
@@ -56,6 +56,12 @@ pub(crate) struct DiffArgs {
     /// Write the difference only when there is one
     #[arg(long = "od")]
     only_different: bool,
+}
+
+/// Infinity is one, too: nothing is above it.
+fn parse_threshold(text: &str) -> Result<f32, String> {
+    let threshold = text.parse::<f32>().ok().filter(|v| *v >= 0.0);
+    threshold.ok_or_else(|| "expected a number from 0".into())
 }
 
 /// `idiff` has long flags with a single dash; they become ours.
@@ -83,13 +89,14 @@ pub(crate) fn accept_idiff_spelling(words: impl Iterator<Item = OsString>) -> Ve
     }
 }
 
+/// The verb stands before the first of these flags; before the verb may be options with values.
 fn is_diff(words: &[OsString]) -> bool {
-    let verb = words.iter().skip(1).find(|word| !is_flag(word));
-    verb.is_some_and(|verb| verb == "diff")
+    let mut before = words.iter().skip(1).take_while(|word| !is_of_idiff(word));
+    before.any(|word| word == "diff")
 }
 
-fn is_flag(word: &OsString) -> bool {
-    word.as_encoded_bytes().starts_with(b"-")
+fn is_of_idiff(word: &OsString) -> bool {
+    SINGLE_DASH.iter().any(|flag| word == flag)
 }
 
 fn with_two_dashes(word: OsString) -> OsString {
@@ -104,11 +111,16 @@ pub(crate) fn run(args: &DiffArgs, global: &GlobalArgs) -> anyhow::Result<u8> {
         Ok(pair) => pair,
         Err(error) => return Ok(exit_unreadable(&error)),
     };
+    if !pair.has_same_channels() {
+        print::line("FAILURE: the pictures differ in their channels");
+        return Ok(Verdict::Incomparable.exit_code());
+    }
     let report = pair.compare(&args.thresholds());
     if let Some(path) = args.difference_path(&report) {
         pair.write_difference(path, args.scale)?;
     }
     print_comparison(args, &report, global);
+    pair.print_passed_over(global);
     pair.print_likeness(global);
     Ok(report.verdict.exit_code())
 }
@@ -128,14 +140,35 @@ fn print_comparison(args: &DiffArgs, report: &Comparison, global: &GlobalArgs) {
 struct PicturePair {
     a: Picture,
     b: Picture,
+    /// Channels of each that are not compared.
+    other_channels: [Vec<String>; 2],
 }
 
 impl PicturePair {
     fn read(args: &DiffArgs) -> petcomp::Result<Self> {
+        let (a, b) = (Picture::read(&args.a)?, Picture::read(&args.b)?);
+        let other_channels = [other_channels(&a, &args.a)?, other_channels(&b, &args.b)?];
         Ok(Self {
-            a: Picture::read(&args.a)?,
-            b: Picture::read(&args.b)?,
+            a,
+            b,
+            other_channels,
         })
+    }
+
+    /// Pictures with other channels beside their colours are not the same, whatever the colours.
+    fn has_same_channels(&self) -> bool {
+        let [a, b] = &self.other_channels;
+        a == b
+    }
+
+    fn print_passed_over(&self, global: &GlobalArgs) {
+        let [names, _] = &self.other_channels;
+        if !names.is_empty() {
+            let count = names.len();
+            global.print_status(format_args!(
+                "Colours and alpha alone were compared, none of {count} other channels"
+            ));
+        }
     }
 
     /// Pictures without alpha have three channels, over which means are taken.
@@ -175,6 +208,19 @@ impl PicturePair {
         });
         Likeness::measure(&a, &b)
     }
+}
+
+/// Channels that are compared, or that colours are made from.
+const COLOR_CHANNELS: [&str; 7] = ["R", "G", "B", "A", "Y", "RY", "BY"];
+
+/// The channels of an EXR beside its colours; of its first part.
+fn other_channels(picture: &Picture, path: &Path) -> petcomp::Result<Vec<String>> {
+    if picture.format() != Format::Exr {
+        return Ok(Vec::new());
+    }
+    let mut names = io::read_header(path)?.channels;
+    names.retain(|name| !COLOR_CHANNELS.contains(&name.as_str()));
+    Ok(names)
 }
 
 fn opaque([r, g, b, _]: [f32; 4]) -> LinearRgb {

@@ -31,8 +31,8 @@ pub(crate) struct EvalArgs {
     /// mistakes, and for the sizes of YOLO's boxes
     #[arg(long, value_name = "FOLDER")]
     images: Option<PathBuf>,
-    /// Detections surer than this count in the confusion and as mistakes
-    #[arg(long, value_name = "CONFIDENCE", default_value_t = ConfusionOptions::default().confidence)]
+    /// Detections surer than this, 0 to 1, count in the confusion and as mistakes
+    #[arg(long, value_name = "CONFIDENCE", default_value_t = ConfusionOptions::default().confidence, value_parser = parse_confidence)]
     confidence: f64,
     /// Most pictures of false alarms, and of misses, on the page
     #[arg(short = 'n', long, value_name = "N", default_value_t = EvalReportOptions::default().shown)]
@@ -46,6 +46,12 @@ pub(crate) struct EvalArgs {
     /// Folder for metrics.json, tables (CSV), pictures (SVG) and the page eval.html
     #[arg(short, long, value_name = "FOLDER")]
     output: Option<PathBuf>,
+}
+
+fn parse_confidence(text: &str) -> Result<f64, String> {
+    let confidence = text.parse::<f64>().ok();
+    let confidence = confidence.filter(|value| (0.0..=1.0).contains(value));
+    confidence.ok_or_else(|| "expected a number from 0 to 1".into())
 }
 
 pub(crate) fn run(args: &EvalArgs, global: &GlobalArgs) -> anyhow::Result<()> {
@@ -182,6 +188,13 @@ fn run_name(path: &Path) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_confidence_is_a_share() {
+        assert_eq!(parse_confidence("0.25"), Ok(0.25));
+        let bad = ["25", "-0.1", "nan", "x"].into_iter();
+        assert!(bad.map(parse_confidence).all(|parsed| parsed.is_err()));
+    }
 
     #[test]
     fn a_run_is_called_as_its_file_or_the_folder_around_its_labels() {

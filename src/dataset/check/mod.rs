@@ -7,16 +7,17 @@ mod label_rows;
 mod unsupported;
 
 use crate::dataset::finding::Finding;
-use crate::dataset::folder::JOURNAL;
+use crate::dataset::folder::{self, JOURNAL};
 use crate::dataset::journal::{NumberedLines, numbered_lines};
 use crate::dataset::journal_line::JournalLine;
-use crate::dataset::listing::{images_in, is_list, place_of, whole_path};
+use crate::dataset::listing::{files_below, images_in, is_list, place_of, whole_path};
 use crate::dataset::near_duplicates::{NEAR_DUPLICATE_RMS, Thumbnail, nearest};
 use crate::dataset::paths::folder_of;
 use crate::dataset::yolo_yaml::DataYaml;
 use crate::dataset::{Part, YoloSet};
 use crate::diagnostic::Code;
 use crate::error::{Error, Result};
+use crate::eval::is_class_list;
 use crate::io;
 use image::CheckedImage;
 use rayon::prelude::*;
@@ -36,6 +37,8 @@ pub struct Checked {
     pub boxes: Vec<CheckedBox>,
     /// Names of the classes, in order.
     pub classes: Vec<String>,
+    /// Whether there are to be labels for YOLO; where petcomp wrote none, no image was looked at.
+    pub has_yolo: bool,
 }
 
 /// A row of a label file.
@@ -64,10 +67,12 @@ pub struct CheckedBox {
 /// * where sidecar files have the objects' poses, something holds each of them up
 ///   ([`hanging`](crate::settle::hanging));
 /// * where there is a journal, the files it names have the sizes and checksums that it says, and it
-///   names every image.
+///   names every image. Of a dataset that petcomp made without labels for YOLO, only these and the
+///   sidecar files are looked at.
 ///
 /// # Errors
-/// When `folder` is not a folder that can be listed. Everything else is a [`Finding`].
+/// When `folder` is not a folder that can be listed, or a dataset of archives alone, which has no
+/// journal. Everything else is a [`Finding`].
 pub fn check(folder: &Path) -> Result<Checked> {
     if !folder.is_dir() {
         return Err(Error::file(folder, "no such folder, expected a dataset"));
@@ -77,7 +82,11 @@ pub fn check(folder: &Path) -> Result<Checked> {
         folder,
         findings: Vec::new(),
     };
-    let yaml = checker.read_data_yaml();
+    let has_yolo = !is_for_others(folder)?;
+    let yaml = match has_yolo {
+        true => checker.read_data_yaml(),
+        false => DataYaml::default(),
+    };
     let images = checker.read_images(&yaml);
     checker.find_duplicates(&images);
     checker.find_leaks(&images);
@@ -86,7 +95,34 @@ pub fn check(folder: &Path) -> Result<Checked> {
     #[cfg(feature = "settle")]
     checker.findings.extend(unsupported::find(folder));
     checker.findings.sort_by(Finding::cmp_by_place);
-    Ok(Checked::new(checker.findings, &images, &yaml))
+    Ok(Checked {
+        has_yolo,
+        ..Checked::new(checker.findings, &images, &yaml)
+    })
+}
+
+/// Whether petcomp made the dataset, and no YOLO labels in it.
+fn is_for_others(folder: &Path) -> Result<bool> {
+    if folder.join("data.yaml").exists() || !lacks_yolo(folder) {
+        return Ok(false);
+    }
+    match has_journal(folder) {
+        true => Ok(true),
+        false => Err(Error::file(
+            folder,
+            "archives alone, expected YOLO labels or a journal; `dataset generate --resume` finds torn archives",
+        )),
+    }
+}
+
+fn lacks_yolo(folder: &Path) -> bool {
+    let identity = folder::identity(folder).ok().flatten();
+    let writers = identity.as_ref().and_then(|i| i["writers"].as_array());
+    writers.is_some_and(|all| all.iter().all(|writer| writer.get("yolo").is_none()))
+}
+
+fn has_journal(folder: &Path) -> bool {
+    std::fs::symlink_metadata(folder.join(JOURNAL)).is_ok()
 }
 
 impl Checked {
@@ -105,6 +141,7 @@ impl Checked {
             rows,
             boxes,
             classes: yaml.names().to_vec(),
+            ..Self::default()
         }
     }
 }
@@ -123,12 +160,13 @@ fn boxes_of(image: &CheckedImage) -> impl Iterator<Item = CheckedBox> {
     })
 }
 
-/// The label files of a folder of images.
+/// The label files of a folder of images below the dataset's; none where they cannot be listed.
 fn list_labels(dataset: &Path, images: &Path) -> Vec<PathBuf> {
-    let label = YoloSet::label_of(&images.join("x"));
-    let mut labels = list_files(dataset, folder_of(&label));
-    labels.retain(|path| path.extension().is_some_and(|e| e == "txt"));
-    labels
+    let label = dataset.join(YoloSet::label_of(&images.join("x")));
+    let is_label = |path: &Path| is_list(path) && !is_class_list(path);
+    let labels = files_below(folder_of(&label), is_label, usize::MAX);
+    let labels = labels.unwrap_or_default().into_iter();
+    labels.map(|path| io::relative(&path, dataset)).collect()
 }
 
 impl Checker<'_> {
@@ -204,14 +242,14 @@ impl Checker<'_> {
 
     /// Images with the bytes of another; images of an empty scene may well be the same.
     fn find_duplicates(&mut self, images: &[CheckedImage]) {
-        let mut known: BTreeMap<(u64, u32), &Path> = BTreeMap::new();
+        let mut known: BTreeMap<(u64, u32), &CheckedImage> = BTreeMap::new();
         for image in images.iter().filter(|image| !image.is_empty) {
             let twin = image
                 .checksum
-                .and_then(|checksum| known.insert(checksum, &image.path));
+                .and_then(|checksum| known.insert(checksum, image));
             if let Some(twin) = twin {
-                let message = format!("the same bytes as {}", twin.display());
-                self.add(&image.path, Code::DuplicateImage, message);
+                let (code, message) = twin_message(image, twin);
+                self.add(&image.path, code, message);
             }
         }
     }
@@ -250,7 +288,7 @@ impl Checker<'_> {
 
     /// Compares the journal, where there is one, with the files in the folder.
     fn compare_journal(&mut self, images: &[CheckedImage]) {
-        if std::fs::symlink_metadata(self.folder.join(JOURNAL)).is_err() {
+        if !has_journal(self.folder) {
             return;
         }
         let lines = match numbered_lines(self.folder) {
@@ -306,6 +344,18 @@ impl Checker<'_> {
     }
 }
 
+/// What is wrong with an image that has the bytes of another, or is listed again.
+fn twin_message(image: &CheckedImage, twin: &CheckedImage) -> (Code, String) {
+    if image.path == twin.path && image.part != twin.part {
+        return (
+            Code::Leak,
+            "leak: validation image is also trained on".into(),
+        );
+    }
+    let message = format!("the same bytes as {}", twin.path.display());
+    (Code::DuplicateImage, message)
+}
+
 /// The images of a part that show something and can be read, and their thumbnails.
 fn thumbnails(images: &[CheckedImage], part: Part) -> (Vec<&CheckedImage>, Vec<Thumbnail>) {
     images
@@ -313,18 +363,4 @@ fn thumbnails(images: &[CheckedImage], part: Part) -> (Vec<&CheckedImage>, Vec<T
         .filter(|image| image.part == part && !image.is_empty)
         .filter_map(|image| Some((image, image.thumbnail.clone()?)))
         .unzip()
-}
-
-/// Files of a folder below the dataset's, in order of name; none where it cannot be listed.
-fn list_files(folder: &Path, below: &Path) -> Vec<PathBuf> {
-    let Ok(entries) = std::fs::read_dir(folder.join(below)) else {
-        return Vec::new();
-    };
-    let mut files: Vec<PathBuf> = entries
-        .flatten()
-        .filter(|entry| entry.path().is_file())
-        .map(|entry| below.join(entry.file_name()))
-        .collect();
-    files.sort();
-    files
 }

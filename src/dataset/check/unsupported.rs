@@ -1,6 +1,5 @@
 //! Objects of a finished dataset that nothing holds up, by the scenes in its sidecar files.
 
-use super::list_files;
 use crate::dataset::finding::Finding;
 use crate::dataset::folder;
 use crate::diagnostic::Code;
@@ -33,6 +32,20 @@ fn scene_files(dataset: &Path) -> Vec<PathBuf> {
     let folders = ["scenes/train", "scenes/val"].map(Path::new).into_iter();
     let mut files: Vec<PathBuf> = folders.flat_map(|part| list_files(dataset, part)).collect();
     files.retain(|path| path.extension().is_some_and(|e| e == "json"));
+    files
+}
+
+/// Files of a folder below the dataset's, in order of name; none where it cannot be listed.
+fn list_files(folder: &Path, below: &Path) -> Vec<PathBuf> {
+    let Ok(entries) = std::fs::read_dir(folder.join(below)) else {
+        return Vec::new();
+    };
+    let mut files: Vec<PathBuf> = entries
+        .flatten()
+        .filter(|entry| entry.path().is_file())
+        .map(|entry| below.join(entry.file_name()))
+        .collect();
+    files.sort();
     files
 }
 

@@ -4,6 +4,7 @@ use super::knobs::{KNOBS, Knob, three_digits};
 use super::measured::PixelMeasures;
 use super::statistics::{Moments, equally_weighted};
 use super::{FittedKey, range_text, unfitted};
+use crate::dataset::page::outlier;
 use crate::dataset::{DatasetConfig, Pipeline};
 use crate::error;
 use crate::plot::Table;
@@ -113,9 +114,8 @@ fn blur_key(blur_px: f64) -> FittedKey {
 }
 
 fn median(plates: &[MeasuredPlate], value: fn(&PixelMeasures) -> f64) -> f64 {
-    let mut values: Vec<f64> = plates.iter().map(|plate| value(&plate.pixels)).collect();
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
+    let values = plates.iter().map(|plate| value(&plate.pixels));
+    outlier::median(values.collect()).unwrap_or(0.0)
 }
 
 /// Varies exposure and white balance as much as they do between the photos.

@@ -1,13 +1,13 @@
 //! Pictures with boxes, of this dataset or of the user.
 
-use crate::dataset::{Listing, SampleSummary, Summary, YoloSet, is_image};
+use crate::dataset::listing::files_below;
+use crate::dataset::{SampleSummary, Summary, YoloSet};
 use crate::error::{Error, Result};
-use crate::eval::{self, GroundTruth};
+use crate::eval::{self, GroundTruth, is_image};
 use crate::geom::BBox;
 use crate::io;
 use rayon::prelude::*;
 use std::borrow::Cow;
-use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// More images than this are no folder of one's own pictures, but a whole disk.
@@ -137,50 +137,14 @@ fn share_box(truth: &GroundTruth) -> ShareBox {
     (truth.class, shares)
 }
 
-/// The images of a folder and of those below it, each folder once: links may lead in circles.
-fn collect_images(
-    folder: &Path,
-    seen: &mut BTreeSet<PathBuf>,
-    images: &mut Vec<PathBuf>,
-) -> Result<()> {
-    if !seen.insert(folder.canonicalize().map_err(|e| Error::file(folder, e))?) {
-        return Ok(());
-    }
-    let entries = std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
-    for path in entries.flatten().map(|entry| entry.path()) {
-        if path.is_dir() {
-            collect_images(&path, seen, images)?;
-        } else if path.is_file() && is_image(&path) {
-            images.push(path);
-        }
-        check_image_count(images.len(), folder)?;
-    }
-    Ok(())
-}
-
-fn check_image_count(count: usize, folder: &Path) -> Result<()> {
-    if count <= MAX_IMAGES {
-        return Ok(());
-    }
-    let what = format!("more than {MAX_IMAGES} images, expected fewer");
-    Err(Error::file(folder, what))
-}
-
 /// Classes and images of a YOLO dataset, or all images below a folder.
 pub(in crate::dataset) fn listed_images(folder: &Path) -> Result<(Vec<String>, Vec<PathBuf>)> {
     if folder.join("data.yaml").is_file() {
-        let listing = Listing::read(folder)?;
-        let images = listing.series();
-        return Ok((listing.classes, images));
+        let set = YoloSet::read(folder)?;
+        let images = set.series();
+        return Ok((set.classes, images));
     }
-    Ok((Vec::new(), images_below(folder)?))
-}
-
-fn images_below(folder: &Path) -> Result<Vec<PathBuf>> {
-    let mut images = Vec::new();
-    collect_images(folder, &mut BTreeSet::new(), &mut images)?;
-    images.sort();
-    Ok(images)
+    Ok((Vec::new(), files_below(folder, is_image, MAX_IMAGES)?))
 }
 
 /// Centre and sides of a box as shares of its picture.

@@ -17,7 +17,7 @@ pub(crate) enum InspectCommand {
     /// Write one HTML page: pictures with their labels, what was drawn, what can be seen, how long
     /// it took
     Report(ReportArgs),
-    /// Draw a sheet of the first pictures with their boxes
+    /// Draw a sheet of pictures from all over the dataset, with their boxes
     Sheet(SheetArgs),
 }
 
@@ -68,7 +68,9 @@ pub(super) fn run(command: &InspectCommand, global: &GlobalArgs) -> anyhow::Resu
 fn check_dataset(args: &CheckArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     let folder = args.folder.display();
     let checked = dataset::check(&args.folder)?;
-    print::text(checked.balance().markdown());
+    if checked.has_yolo {
+        print::text(checked.balance().markdown());
+    }
     let notes = checked.notes();
     for note in &notes {
         global.print_status(located(&folder, note));
@@ -92,11 +94,19 @@ fn print_findings(checked: &Checked, folder: &Path) -> anyhow::Result<()> {
     let (folder, errors) = (folder.display(), checked.findings.len());
     checked.findings.iter().for_each(print::line);
     anyhow::ensure!(errors == 0, "{folder}: {errors} errors");
-    let (images, rows) = (checked.images, checked.rows.iter().sum::<usize>());
     print::line(format_args!(
-        "{folder}: {images} images, {rows} labels, no errors"
+        "{folder}: {}, no errors",
+        what_was_checked(checked)
     ));
     Ok(())
+}
+
+fn what_was_checked(checked: &Checked) -> String {
+    if !checked.has_yolo {
+        return "no labels for YOLO, files alone compared with index.jsonl".into();
+    }
+    let (images, rows) = (checked.images, checked.rows.iter().sum::<usize>());
+    format!("{images} images, {rows} labels")
 }
 
 fn page_folder(page: &Path) -> &Path {
@@ -129,7 +139,7 @@ impl ReportArgs {
     }
 }
 
-/// Draws the first pictures of a dataset.
+/// Draws so many pictures of a dataset, evenly spread.
 pub(crate) fn write_contact_sheet(
     dataset: &Path,
     count: usize,

@@ -3,7 +3,7 @@
 use crate::global::GlobalArgs;
 use crate::print;
 use petcomp::Error;
-use petcomp::dataset::{Group, Leakage, Listing, NEAR_DUPLICATE_RMS, NearDuplicate, Partition};
+use petcomp::dataset::{Group, Leakage, NEAR_DUPLICATE_RMS, NearDuplicate, Partition, YoloSet};
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Subcommand)]
@@ -16,7 +16,7 @@ pub(crate) enum SelectCommand {
 
 #[derive(clap::Args)]
 pub(crate) struct SplitArgs {
-    /// Folder with a data.yaml
+    /// Folder with a data.yaml; one that is not split yet names the same images for both parts
     folder: PathBuf,
     /// Share of the images for training
     #[arg(long, value_name = "SHARE", default_value_t = 0.8)]
@@ -68,11 +68,12 @@ pub(super) fn run(command: &SelectCommand, global: &GlobalArgs) -> anyhow::Resul
 }
 
 fn write_split(args: &SplitArgs, global: &GlobalArgs) -> anyhow::Result<()> {
-    let listing = Listing::read(&args.folder)?;
-    let listing = listing.partitioned(args.partition(), args.ratio, args.seed)?;
-    check_both_parts(&listing)?;
-    write_listing(&listing, &args.output, global)?;
-    report_leakage(&listing.leakage(NEAR_DUPLICATE_RMS)?);
+    let set = YoloSet::read(&args.folder)?;
+    let split = set.partitioned(args.partition(), args.ratio, args.seed)?;
+    check_both_parts(&split)?;
+    let leakage = split.leakage(NEAR_DUPLICATE_RMS)?;
+    write_lists(&split, &args.output, global)?;
+    report_leakage(&leakage);
     Ok(())
 }
 
@@ -86,8 +87,8 @@ impl SplitArgs {
     }
 }
 
-fn check_both_parts(listing: &Listing) -> petcomp::Result<()> {
-    let (train, val) = (listing.train.len(), listing.val.len());
+fn check_both_parts(split: &YoloSet) -> petcomp::Result<()> {
+    let (train, val) = (split.train.len(), split.val.len());
     if train > 0 && val > 0 {
         return Ok(());
     }
@@ -98,13 +99,13 @@ fn check_both_parts(listing: &Listing) -> petcomp::Result<()> {
 }
 
 fn write_subset(args: &SubsetArgs, global: &GlobalArgs) -> anyhow::Result<()> {
-    let listing = Listing::read(&args.folder)?.head(args.head)?;
-    write_listing(&listing, &args.output, global)
+    let subset = YoloSet::read(&args.folder)?.head(args.head)?;
+    write_lists(&subset, &args.output, global)
 }
 
-fn write_listing(listing: &Listing, folder: &Path, global: &GlobalArgs) -> anyhow::Result<()> {
-    listing.write(folder)?;
-    let (train, val) = (listing.train.len(), listing.val.len());
+fn write_lists(set: &YoloSet, folder: &Path, global: &GlobalArgs) -> anyhow::Result<()> {
+    set.write(folder)?;
+    let (train, val) = (set.train.len(), set.val.len());
     let what = format!("{train} images for training, {val} for validation");
     global.print_written(folder, what);
     Ok(())
