@@ -22,9 +22,6 @@ pub(super) struct Bend {
     /// Lengths in pixels of the display; nothing bent where it is not known.
     pub(super) paths: Image<LightPath>,
     pub(super) known: Mask,
-    /// How far the empty display is from where it should be, root mean square, pixels of the
-    /// display.
-    pub(super) residual_px: f64,
 }
 
 /// What lets pass less than this tells nothing of where the light comes from.
@@ -136,11 +133,7 @@ impl BendInput<'_> {
                 LightPath::default()
             }
         });
-        Bend {
-            paths,
-            known,
-            residual_px: self.residual_px(&expected),
-        }
+        Bend { paths, known }
     }
 
     /// What the object leaves of stripes that have such contrasts without it, and that end where
@@ -234,15 +227,6 @@ impl BendInput<'_> {
             .enumerate()
             .filter(|(_, (free, consistent))| **free && **consistent)
             .map(|(i, _)| i)
-    }
-
-    fn residual_px(&self, expected: &Image<[f64; 2]>) -> f64 {
-        let squares = self.free_pixels().map(|i| {
-            let (seen, expected) = (self.seen.at_px.pixels()[i], expected.pixels()[i]);
-            (0..2).map(|k| (seen[k] - expected[k]).powi(2)).sum::<f64>() / 2.0
-        });
-        let (sum, count) = squares.fold((0.0, 0.0), |(sum, n), square| (sum + square, n + 1.0));
-        (sum / f64::max(count, 1.0)).sqrt()
     }
 
     /// Amplitude of stripes on the empty display, as a share of its light.

@@ -44,9 +44,6 @@ pub struct Refraction {
     pub paths: Image<LightPath>,
     /// Where it was measured: on the object alone, and where it lets light pass.
     pub known: Mask,
-    /// How far the empty display is from where the fit has it, root mean square, pixels of the
-    /// display.
-    pub residual_px: f64,
 }
 
 /// Pixels around the object that may show something of it.
@@ -61,7 +58,8 @@ const RIM_SOFTNESS_PX: f32 = 0.6;
 ///
 /// # Errors
 /// Those of reading photos; [`Error::Photo`](crate::Error::Photo) where the black or the white
-/// frame is missing, white is clipped or uneven, or no object lies within the display.
+/// frame is missing, photos of a frame show different things, white is clipped or uneven, or no
+/// object lies within the display.
 pub fn measure(
     display: &Display,
     view: &View,
@@ -239,7 +237,6 @@ impl Refraction {
                 },
             ),
             known,
-            residual_px: bend.residual_px,
         }
     }
 }

@@ -31,7 +31,7 @@ const EDGE_REACH_PX: usize = 3;
 /// Gaps in the evidence up to twice this are closed, as a share of the view's shorter side.
 const CLOSED_SHARE: f64 = 0.006;
 /// Smallest object, as a share of the view.
-const MIN_AREA: f64 = 1e-3;
+pub(super) const MIN_AREA: f64 = 1e-3;
 
 /// How much otherwise than empty the display looks, as a share of its white.
 pub(super) fn evidence(

@@ -1,11 +1,14 @@
 //! All photos of a capture: aligned, equally exposed, seen from above.
 
 use super::display::Display;
+use super::draw::PAPER_LIGHT;
 use super::frame::{Frame, SHIFTS, Stripes};
+use super::object::MIN_AREA;
 use super::recognise::{FramePhoto, map_in_front, refused};
 use super::view::{View, grey};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
+use crate::filter;
 use crate::geom::Homography;
 use crate::image::Image;
 use crate::pixel::{LinearRgb, Mix};
@@ -88,6 +91,10 @@ pub(super) type StripeLight = [[[Image<f32>; SHIFTS]; 2]; 2];
 const STEADY_PX: f64 = 0.5;
 /// Exposures that differ by more are worth a warning.
 const MAX_DRIFT: f32 = 0.2;
+/// Photos of one frame that differ by more of its white show different things.
+const MAX_DIFFERENCE: f32 = 0.1;
+/// Blur of that difference, pixels: against noise, and edges that are aligned to a part of a pixel.
+const DIFFERENCE_BLUR_PX: f32 = 3.0;
 
 /// How photos are brought to the view.
 pub(super) struct Alignment<'a> {
@@ -132,21 +139,40 @@ impl<'a> Alignment<'a> {
     }
 
     /// The mean of all photos of a frame; none where there is none.
+    ///
+    /// # Errors
+    /// Those of reading; [`Error::Photo`] where they show different things.
     fn frame(&self, photos: &Photos<'_>, frame: Frame) -> Result<Option<Image<LinearRgb>>> {
         let numbers = photos.of_frame(frame);
-        let mut sum: Option<Image<LinearRgb>> = None;
-        for &i in &numbers {
-            let seen = self.aligned(photos, i)?;
-            sum = Some(sum.map_or(seen.clone(), |sum| sum.zip_map(&seen, |a, b| a + b)));
+        let Some((&first, others)) = numbers.split_first() else {
+            return Ok(None);
+        };
+        let first_seen = self.aligned(photos, first)?;
+        let mut sum = first_seen.clone();
+        for &other in others {
+            let seen = self.aligned(photos, other)?;
+            if self.differ(&first_seen, &seen) {
+                return Err(differing([first, other].map(|i| &*photos.sources.names[i])));
+            }
+            sum = sum.zip_map(&seen, |a, b| a + b);
         }
-        let share = 1.0 / numbers.len().max(1) as f32;
-        Ok(sum.map(|sum| sum.map(|p| p.scale(share))))
+        let share = 1.0 / numbers.len() as f32;
+        Ok(Some(sum.map(|p| p.scale(share))))
+    }
+
+    /// Two photos of a frame differ as with an object and without.
+    fn differ(&self, a: &Image<LinearRgb>, b: &Image<LinearRgb>) -> bool {
+        let off = a.zip_map(b, |a, b| grey(a) - grey(b));
+        let most = MAX_DIFFERENCE * white_light(self.reference);
+        let differing = filter::gaussian_blur(&off, DIFFERENCE_BLUR_PX).map(|v| v.abs() > most);
+        differing.count() as f64 > MIN_AREA * differing.pixels().len() as f64
     }
 
     /// All photos of a capture.
     ///
     /// # Errors
-    /// Those of reading; [`Error::Photo`] without a black or a white frame.
+    /// Those of reading; [`Error::Photo`] without a black or a white frame, or where photos of a
+    /// frame show different things.
     pub(super) fn stack(&self, photos: &Photos<'_>) -> Result<Stack> {
         Ok(Stack {
             black: self.needed(photos, Frame::Black)?,
@@ -228,6 +254,21 @@ impl Photos<'_> {
             .map(|(name, drift)| drift_warning(name, drift))
             .collect()
     }
+}
+
+/// Grey light of the display's white, by the paper of its markers.
+fn white_light(photo: &FramePhoto) -> f32 {
+    let papers = photo.paper.iter().flatten();
+    let (sum, count) = papers.fold((0.0, 0.0), |(sum, n), paper| (sum + grey(*paper), n + 1.0));
+    sum / f32::max(count, 1.0) / PAPER_LIGHT
+}
+
+fn differing([a, b]: [&str; 2]) -> Error {
+    refused(&format!(
+        "{a} and {b} show the same frame but differ by more than {:.0} % of white; \
+         photos without the object belong to empty (--empty)",
+        100.0 * MAX_DIFFERENCE
+    ))
 }
 
 fn largest_drift(factors: [f32; 3]) -> f32 {

@@ -379,6 +379,35 @@ fn what_is_wrong_with_a_capture_is_said() {
 }
 
 #[test]
+fn photos_of_a_frame_with_the_object_and_without_are_refused() {
+    let [black, white] = [Frame::Black, Frame::White].map(|frame| photo(frame, STILL));
+    let with = |conditions| {
+        let photos = [
+            black.clone(),
+            white.clone(),
+            photo(Frame::White, conditions),
+        ];
+        measured_of(&photos, &[]).map_err(|e| e.to_string())
+    };
+    let bare = Conditions {
+        has_object: false,
+        ..STILL
+    };
+    let error = with(bare).err().unwrap();
+    assert!(
+        error.contains("photo 1 and photo 2 show the same frame but differ"),
+        "{error}"
+    );
+    let again = Conditions {
+        noise: 0.01,
+        exposure: |_| 0.7,
+        motion: |_| [1.0, -0.6],
+        ..STILL
+    };
+    assert!(with(again).is_ok());
+}
+
+#[test]
 fn a_photo_that_clips_or_has_no_markers_is_refused() {
     let bright = Conditions {
         exposure: |_| 1.6,

@@ -4,7 +4,7 @@ use super::display::Display;
 use super::draw::draw_frame;
 use super::frame::Frame;
 use super::page::page;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::io;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -15,7 +15,8 @@ const PAGE: &str = "show.html";
 pub(super) const DISPLAY: &str = "display.toml";
 
 /// Writes the frames as PNG files, a page that shows them and `display.toml` into a folder, which
-/// is made if it is not there; returns the path of the page.
+/// is made if it is not there; returns the path of the page. Frames that lie there from before and
+/// are none of these are removed.
 ///
 /// A display without a width keeps the one that was written into the folder's `display.toml`.
 ///
@@ -31,6 +32,7 @@ pub fn write_frames(folder: &Path, display: &Display, with_stripes: bool) -> Res
         .par_iter()
         .map(|&frame| Ok((frame, write_frame(folder, display, frame)?)))
         .collect::<Result<_>>()?;
+    remove_others(folder, &frames)?;
     io::write_toml(folder.join(DISPLAY), display)?;
     let path = folder.join(PAGE);
     io::write_text(&path, &page(display, &pngs))?;
@@ -55,9 +57,23 @@ fn with_known_width(display: &Display, file: &Path) -> Result<Display> {
 
 /// Writes one frame and returns the bytes of its file.
 fn write_frame(folder: &Path, display: &Display, frame: Frame) -> Result<Vec<u8>> {
-    let path = folder.join(format!("{:02}_{frame}.png", frame.number()));
+    let path = frame_path(folder, frame);
     io::write(&path, &draw_frame(display, frame))?;
     io::read_bytes(&path)
+}
+
+fn frame_path(folder: &Path, frame: Frame) -> PathBuf {
+    folder.join(format!("{:02}_{frame}.png", frame.number()))
+}
+
+/// Removes the frames of an earlier set that this one has not.
+fn remove_others(folder: &Path, frames: &[Frame]) -> Result<()> {
+    let others = Frame::all(true).filter(|frame| !frames.contains(frame));
+    let mut paths = others.map(|frame| frame_path(folder, frame));
+    paths.try_for_each(|path| match path.exists() {
+        true => std::fs::remove_file(&path).map_err(|e| Error::file(&path, e)),
+        false => Ok(()),
+    })
 }
 
 #[cfg(test)]
@@ -77,7 +93,10 @@ mod tests {
         assert!(!text.contains("http"), "needs no network");
         let read: Display = io::read_toml(folder.path().join(DISPLAY)).unwrap();
         assert_eq!(read, display);
-        assert!(folder.path().join("17_stripes_y_fine_4.png").exists());
+        let has = |name: &str| folder.path().join(name).exists();
+        assert!(has("01_white.png") && has("17_stripes_y_fine_4.png"));
+        write_frames(folder.path(), &display, false).unwrap();
+        assert!(has("01_white.png") && !has("17_stripes_y_fine_4.png"));
     }
 
     #[test]

@@ -1,8 +1,9 @@
 //! Colour: transfer curves, primaries, hue and saturation, exactly.
 //!
-//! The library works in scene-linear light with Rec. 709 primaries and white D65 ([`LinearRgb`]).
-//! Everything else is met at a border and converted there, once: display values by [`decode_srgb8`]
-//! and [`encode_srgb8`], other primaries by a [`ColorMatrix`], video by [`Ycbcr`].
+//! The library works in scene-linear light with Rec. 709 primaries and white D65
+//! ([`LinearRgb`](crate::LinearRgb)). Everything else is met at a border and converted there, once:
+//! display values by [`decode_srgb8`] and [`encode_srgb8`], other primaries by a [`ColorMatrix`],
+//! video by [`Ycbcr`].
 //!
 //! Curves are computed through the `libm` crate in `f64` and rounded once, never through the
 //! system's own `powf`: the same input gives the same bytes on every machine. Matrices are derived
@@ -34,17 +35,3 @@ pub use temperature::planckian;
 pub use transfer::{Curve, linear_to_srgb, srgb_to_linear};
 #[doc(hidden)]
 pub use ycbcr::{CodeRange, Ycbcr};
-
-use crate::pixel::LinearRgb;
-
-/// The colour `stops` exposure values brighter: times 2^stops.
-///
-/// ```
-/// use petcomp::{LinearRgb, color};
-/// assert_eq!(color::expose(LinearRgb::grey(0.25), 2.0), LinearRgb::WHITE);
-/// ```
-#[doc(hidden)]
-#[inline]
-pub fn expose(color: LinearRgb, stops: f32) -> LinearRgb {
-    color.scale(libm::exp2f(stops))
-}

@@ -1,7 +1,9 @@
 //! Channel Key: one channel of some colour space against the others.
 
+use super::check::{check_share, check_value};
 use super::key::{Photo, Profile, from_ycc, to_ycc};
 use super::screen::other_channels;
+use crate::error::Result;
 use crate::image::Image;
 use crate::pixel::{Coverage, PremulRgba};
 use serde::{Deserialize, Serialize};
@@ -46,11 +48,11 @@ pub struct ChannelKeyOptions {
     pub matte_channel: u8,
     /// What it is compared with. Default: `MAX`.
     pub limit_method: ChannelLimit,
-    /// The channel it is compared with, where it is one. Default: 0.
+    /// The channel it is compared with, where it is one, 0 to 2. Default: 0.
     pub limit_channel: u8,
-    /// Values of `1 - (key - limit)` above this are foreground. Default: 1.
+    /// Values of `1 - (key - limit)` above this are foreground, 0 to 1. Default: 1.
     pub limit_max: f32,
-    /// Values below this are screen. Default: 0.
+    /// Values below this are screen, 0 to 1. Default: 0.
     pub limit_min: f32,
 }
 
@@ -95,6 +97,18 @@ pub fn channel_key<P: Photo>(photo: &Image<P>, options: &ChannelKeyOptions) -> C
 }
 
 impl ChannelKeyOptions {
+    /// Whether every setting lies in its range.
+    ///
+    /// # Errors
+    /// [`Error::Value`](crate::Error::Value) with the setting's name, its value and what was
+    /// expected.
+    pub fn check(&self) -> Result<()> {
+        check_channel("key.matte_channel", self.matte_channel)?;
+        check_channel("key.limit_channel", self.limit_channel)?;
+        check_share("key.limit_max", self.limit_max)?;
+        check_share("key.limit_min", self.limit_min)
+    }
+
     /// A pixel seen through its matte.
     #[inline]
     fn masked(&self, p: PremulRgba, m: Coverage) -> PremulRgba {
@@ -140,6 +154,10 @@ impl ChannelKeyOptions {
             ChannelLimit::Max => larger_other(c, key),
         }
     }
+}
+
+fn check_channel(at: &str, channel: u8) -> Result<()> {
+    check_value(channel <= 2, at, || format!("{channel}, expected 0 to 2"))
 }
 
 /// The larger of the two channels beside one.

@@ -1,6 +1,8 @@
 //! Chroma Key: a wedge in the plane of the colour differences.
 
+use super::check::{check_length, check_value};
 use super::key::{Photo, Profile, differences};
+use crate::error::Result;
 use crate::image::Image;
 use crate::pixel::{Coverage, LinearRgb, PremulRgba};
 use serde::{Deserialize, Serialize};
@@ -11,13 +13,14 @@ use serde::{Deserialize, Serialize};
 pub struct ChromaKeyOptions {
     /// Which Blender to be; `robust` and 4.2 are 3.4 here. Default: `blender-3.4`.
     pub profile: Profile,
-    /// Opening angle of the wedge that is keyed, radians (3.4 "acceptance", 4.5 "maximum").
-    /// Default: 30 degrees.
+    /// Opening angle of the wedge that is keyed, radians, 1 to 80 degrees (3.4 "acceptance", 4.5
+    /// "maximum"). Default: 30 degrees.
     pub tolerance: f32,
-    /// Opening angle of the wedge that is keyed wholly, radians (3.4 "cutoff", 4.5 "minimum").
-    /// Default: 10 degrees.
+    /// Opening angle of the wedge that is keyed wholly, radians, 0 to 30 degrees (3.4 "cutoff", 4.5
+    /// "minimum"). Default: 10 degrees.
     pub threshold: f32,
-    /// Distance inside the wedge over which the matte falls to 0 (4.5 "falloff"). Default: 1.
+    /// Distance inside the wedge over which the matte falls to 0, at least 0 (4.5 "falloff").
+    /// Default: 1.
     pub gain: f32,
 }
 
@@ -31,6 +34,27 @@ impl Default for ChromaKeyOptions {
             gain: 1.0,
         }
     }
+}
+
+impl ChromaKeyOptions {
+    /// Whether every setting lies in its range.
+    ///
+    /// # Errors
+    /// [`Error::Value`](crate::Error::Value) with the setting's name, its value and what was
+    /// expected.
+    pub fn check(&self) -> Result<()> {
+        check_angle("key.tolerance", self.tolerance, [1.0, 80.0])?;
+        check_angle("key.threshold", self.threshold, [0.0, 30.0])?;
+        check_length("key.gain", self.gain)
+    }
+}
+
+/// Refuses an angle, radians, that is not between two others, degrees.
+fn check_angle(at: &str, radians: f32, [low, high]: [f32; 2]) -> Result<()> {
+    let range = low.to_radians()..=high.to_radians();
+    check_value(range.contains(&radians), at, || {
+        format!("{radians}, expected {low} to {high} degrees, in radians")
+    })
 }
 
 /// Keys a photo by the angle between its colour differences and the screen's.

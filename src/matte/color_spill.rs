@@ -1,7 +1,9 @@
 //! Color Spill: the screen's light on the subject, taken away.
 
+use super::check::{check_length, check_value};
 use super::key::{Photo, Profile};
 use super::screen::other_channels;
+use crate::error::Result;
 use crate::image::Image;
 use crate::pixel::PremulRgba;
 use serde::{Deserialize, Serialize};
@@ -39,13 +41,14 @@ pub struct ColorSpillOptions {
     pub limit_method: SpillLimit,
     /// The channel that limits, where it is one. Default: `R`.
     pub limit_channel: SpillChannel,
-    /// Multiple of the limit that is allowed. Default: 1.
+    /// Multiple of the limit that is allowed, 0.5 to 1.5. Default: 1.
     pub ratio: f32,
-    /// Share of the excess that is taken; 4.5 scales the spill channel alone by it. Default: 1.
+    /// Share of the excess that is taken, at least 0; 4.5 scales the spill channel alone by it.
+    /// Default: 1.
     pub fac: f32,
     /// The excess is handed out by the three strengths below. Default: false.
     pub use_unspill: bool,
-    /// Share of the excess for (or, in the spill channel, from) red. Default: 0.
+    /// Share of the excess for (or, in the spill channel, from) red, at least 0. Default: 0.
     pub unspill_red: f32,
     /// The same for green. Default: 0.
     pub unspill_green: f32,
@@ -134,6 +137,21 @@ fn strengths(options: &ColorSpillOptions, spill: usize) -> [f32; 3] {
 }
 
 impl ColorSpillOptions {
+    /// Whether every setting lies in its range.
+    ///
+    /// # Errors
+    /// [`Error::Value`](crate::Error::Value) with the setting's name, its value and what was
+    /// expected.
+    pub fn check(&self) -> Result<()> {
+        check_value((0.5..=1.5).contains(&self.ratio), "key.ratio", || {
+            format!("{}, expected 0.5 to 1.5", self.ratio)
+        })?;
+        check_length("key.fac", self.fac)?;
+        check_length("key.unspill_red", self.unspill_red)?;
+        check_length("key.unspill_green", self.unspill_green)?;
+        check_length("key.unspill_blue", self.unspill_blue)
+    }
+
     fn unspill_strengths(&self) -> [f32; 3] {
         [self.unspill_red, self.unspill_green, self.unspill_blue]
     }

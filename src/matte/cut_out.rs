@@ -5,11 +5,12 @@ mod options;
 
 pub use options::{Boundary, CutOutOptions, MatteMethod};
 
+use super::check::check_photo;
 use super::film::ColorUncertainty;
 use super::outline::Outline;
 use super::plate::{PlateOptions, ScreenPlate};
 use super::prepared::Prepared;
-use super::screen::{screen_color, screen_pixels};
+use super::screen::{masked_pixels, mean_color, screen_color, screen_pixels};
 use super::segment::{Segmentation, segment_prepared};
 use super::stroke::{Claims, Stroke, StrokesOnPhoto, check_strokes, corrected_coverage, unclaimed};
 use crate::diagnostic::{Code, Diagnostic};
@@ -70,6 +71,7 @@ impl CutOut {
 ///
 /// # Errors
 /// Those of [`segment`](super::segment()) and of [`ScreenPlate::fit`];
+/// [`Error::Photo`](crate::Error::Photo) where the screen has another colour than the given one;
 /// [`Error::Value`](crate::Error::Value) (`key.clip_black`, `soften_px`, ..) for an option that
 /// cannot be right.
 pub fn cut_out(photo: &Image<LinearRgb>, options: &CutOutOptions) -> Result<CutOut> {
@@ -180,7 +182,7 @@ impl CleanScreen {
         let background = unclaimed(screen_pixels(&found.mask), claims.outline.as_ref());
         let plate = match (empty, options.screen) {
             (Some(empty), _) => ScreenPlate::from_photo(empty, photo, &background, &options.plate)?,
-            (None, Some(color)) => ScreenPlate::even(color, photo.size()),
+            (None, Some(color)) => even_plate(color, photo, &background)?,
             (None, None) => fitted_plate(photo, &background, &found.mask, &options.plate)?,
         };
         Ok(Self {
@@ -189,6 +191,31 @@ impl CleanScreen {
             plate,
         })
     }
+}
+
+/// A given colour may differ from the photo's by this share of the screen's brightness, in the
+/// median over the screen: its light is uneven.
+const MAX_COLOR_MISMATCH: f32 = 0.3;
+
+/// The plate of a given colour.
+///
+/// # Errors
+/// [`Error::Photo`](crate::Error::Photo) where the photo shows another one.
+fn even_plate(
+    color: LinearRgb,
+    photo: &Image<LinearRgb>,
+    background: &Mask,
+) -> Result<ScreenPlate> {
+    let plate = ScreenPlate::even(color, photo.size());
+    let mismatch = plate.mismatch(photo, background);
+    check_photo(mismatch <= MAX_COLOR_MISMATCH, || {
+        let seen = mean_color(masked_pixels(photo, background)).unwrap_or_default();
+        let [seen, given] = [seen, color].map(LinearRgb::channels);
+        format!(
+            "the screen is {seen:.2?} in the photo, expected the given {given:.2?} (scene-linear)"
+        )
+    })?;
+    Ok(plate)
 }
 
 /// The plate by the photo alone.
@@ -503,6 +530,24 @@ mod tests {
                     .iter()
                     .all(|c| (0.0..=1.0).contains(&c.0) && c.0 > 0.999)
             );
+        }
+    }
+
+    #[test]
+    fn a_given_colour_of_the_screen_is_one_that_the_photo_shows() {
+        let with = |color| {
+            let options = CutOutOptions {
+                screen: Some(color),
+                ..Default::default()
+            };
+            cut_out(&slab(GREEN), &options)
+        };
+        let cut = with(GREEN.scale(1.2)).unwrap();
+        assert!(opacity_at(&cut, [60, 40]) > 0.9);
+        for wrong in [GREEN.scale(2.0), LinearRgb::new(11.0, 107.0, 20.0)] {
+            let said = with(wrong).unwrap_err().to_string();
+            let expected = "the screen is [0.04, 0.40, 0.08] in the photo";
+            assert!(said.contains(expected), "{said}");
         }
     }
 

@@ -1,6 +1,6 @@
 //! Difference Key: what differs from a picture of the place without the subject.
 
-use super::check::check_size;
+use super::check::{check_share, check_size};
 use super::key::{Photo, Profile};
 use crate::error::Result;
 use crate::image::Image;
@@ -13,9 +13,9 @@ use serde::{Deserialize, Serialize};
 pub struct DifferenceKeyOptions {
     /// Which Blender to be; `robust` and 4.2 are 3.4 here. Default: `blender-3.4`.
     pub profile: Profile,
-    /// Mean difference of the channels up to which a pixel is background. Default: 0.1.
+    /// Mean difference of the channels up to which a pixel is background, 0 to 1. Default: 0.1.
     pub tolerance: f32,
-    /// Further difference over which the matte rises to 1. Default: 0.1.
+    /// Further difference over which the matte rises to 1, 0 to 1. Default: 0.1.
     pub falloff: f32,
 }
 
@@ -36,14 +36,18 @@ impl Default for DifferenceKeyOptions {
 ///
 /// # Method
 /// With `D` the mean of the absolute differences of R, G and B: 0 up to `tolerance`, then `(D -
-/// tolerance) / falloff`. # Errors
-/// [`Error::Value`](crate::Error::Value) where the sizes differ.
+/// tolerance) / falloff`.
+///
+/// # Errors
+/// [`Error::Value`](crate::Error::Value) where the sizes differ, or for a setting out of its range.
 pub fn difference_key<P: Photo>(
     photo: &Image<P>,
     clean: &Image<P>,
     options: &DifferenceKeyOptions,
 ) -> Result<Image<Coverage>> {
     check_size("clean plate", clean.size(), photo.size())?;
+    check_share("key.tolerance", options.tolerance)?;
+    check_share("key.falloff", options.falloff)?;
     Ok(photo.zip_map(clean, |a, b| options.coverage(a.premul(), b.premul())))
 }
 

@@ -16,7 +16,7 @@ pub use uncertainty::ColorUncertainty;
 pub(super) use view::view;
 
 use super::arrays::largest;
-use super::check::{check_photo, check_value};
+use super::check::{check_coverage, check_photo, check_positive, check_value};
 use super::plate::ScreenPlate;
 use super::prepared::{check_finite, longer_side};
 use super::screen::{is_keyable, strongest_channel};
@@ -114,7 +114,8 @@ impl FilmMatte {
 ///
 /// # Errors
 /// [`Error::Photo`](crate::Error::Photo) where `inside` is empty or a pixel of the photo is not a
-/// finite number; [`Error::Value`](crate::Error::Value) for an option that cannot be right.
+/// finite number; [`Error::Value`](crate::Error::Value) for an option that cannot be right, or
+/// (`mask`) a coverage outside 0 to 1.
 /// # Panics
 /// When the sizes differ.
 ///
@@ -127,6 +128,7 @@ pub fn film(
 ) -> Result<FilmMatte> {
     options.check()?;
     check_finite(photo)?;
+    check_coverage(inside)?;
     solve_film(FilmInput::whole(photo, plate, inside), options)
 }
 
@@ -373,10 +375,6 @@ fn check_flat(LinearRgb { r, g, b }: LinearRgb) -> Result<()> {
     check_value(is_right, "flat", || {
         format!("({r}, {g}, {b}), expected 0.001 to 1")
     })
-}
-
-fn check_positive(at: &str, value: f32) -> Result<()> {
-    check_value(value > 0.0, at, || format!("{value}, expected more than 0"))
 }
 
 /// Noise from which on the transmittance is measured in a blurred photo: a twentieth of what a

@@ -28,7 +28,9 @@ const SMOOTHNESS_SIGMA: f64 = 0.85;
 ///
 /// # Method
 /// `sum(w color) / sum(w)` with `w = exp(-d^2 / sigma^2)`, `sigma = 0.15 + 0.85 smoothness`, in
-/// double precision. # Errors
+/// double precision.
+///
+/// # Errors
 /// [`Error::Value`](crate::Error::Value) where no point lies in the picture, or `smoothness`
 /// outside 0 to 1.
 pub fn keying_screen(

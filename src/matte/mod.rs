@@ -25,7 +25,6 @@ mod difference_key;
 mod film;
 mod flow;
 pub mod key;
-mod key_color;
 mod keying_screen;
 pub(crate) mod median;
 mod outline;
@@ -56,9 +55,6 @@ pub use film::{FilmMatte, FilmOptions, film};
 pub use flow::{Flow, LightPath};
 #[doc(hidden)]
 pub use key::{KeyOptions, Keyed, Keying, Screen, key};
-#[doc(hidden)]
-pub use key_color::KeyAverage;
-pub use key_color::{KeyColor, key_color};
 #[doc(hidden)]
 pub use keying_screen::{ScreenPoint, keying_screen};
 pub use outline::Outline;

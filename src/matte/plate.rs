@@ -3,7 +3,7 @@
 mod cells;
 mod polynomial;
 
-use super::check::{check_photo, check_value, refused};
+use super::check::{check_length, check_photo, check_share, check_value, refused};
 use super::prepared::check_finite_photo;
 use super::register;
 use super::screen::{mean_color, screen_pixels, strongest_channel};
@@ -206,7 +206,7 @@ impl ScreenPlate {
 
     /// By how much the plate differs from what the photo shows of the screen, as a share of the
     /// screen's brightness.
-    fn mismatch(&self, photo: &Image<LinearRgb>, background: &Mask) -> f32 {
+    pub(super) fn mismatch(&self, photo: &Image<LinearRgb>, background: &Mask) -> f32 {
         let [seen, expected] = cell_means([photo, &self.image], background);
         cells::mismatch(&seen, &expected)
     }
@@ -249,16 +249,6 @@ impl PlateOptions {
 fn check_degree(degree: usize) -> Result<()> {
     check_value(degree <= MAX_DEGREE, "max_degree", || {
         format!("{degree}, expected 0 to {MAX_DEGREE}")
-    })
-}
-
-fn check_length(at: &str, value: f64) -> Result<()> {
-    check_value(value >= 0.0, at, || format!("{value}, expected at least 0"))
-}
-
-fn check_share<T: Into<f64> + Copy + std::fmt::Display>(at: &str, value: T) -> Result<()> {
-    check_value((0.0..=1.0).contains(&value.into()), at, || {
-        format!("{value}, expected 0 to 1")
     })
 }
 

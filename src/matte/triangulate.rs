@@ -5,7 +5,9 @@ mod lines;
 mod noise;
 
 use super::arrays::channel_pairs;
-use super::check::{check_photo, check_value, refused};
+use super::check::{
+    check_coverage, check_length, check_photo, check_positive, check_share, check_value, refused,
+};
 use super::film::{covered, view};
 use super::median::median;
 use super::plate::ScreenPlate;
@@ -40,6 +42,14 @@ impl Default for TriangulateOptions {
             least_agreement: 0.5,
             max_sigma: 0.05,
         }
+    }
+}
+
+impl TriangulateOptions {
+    fn check(&self) -> Result<()> {
+        check_length("max_shift_px", self.max_shift_px)?;
+        check_share("least_agreement", self.least_agreement)?;
+        check_positive("max_sigma", self.max_sigma)
     }
 }
 
@@ -85,7 +95,8 @@ pub struct Triangulated {
 /// their colours; the light across it is the same in both photos, and shows how far they lie apart.
 ///
 /// # Errors
-/// [`Error::Value`](crate::Error::Value) (`photos`) for fewer than two or of different size;
+/// [`Error::Value`](crate::Error::Value) (`photos`) for fewer than two or of different size,
+/// (`mask`) a coverage outside 0 to 1, or an option that cannot be right;
 /// [`Error::Photo`](crate::Error::Photo) where a pixel of a photo is not a finite number, no channel
 /// of the screens differs, the object moved farther than `max_shift_px`, turned, or moved otherwise
 /// (`least_agreement`).
@@ -98,8 +109,10 @@ pub fn triangulate(
     inside: &Image<Coverage>,
     options: &TriangulateOptions,
 ) -> Result<Triangulated> {
+    options.check()?;
     check_sizes(shots, inside)?;
     check_pixels(shots)?;
+    check_coverage(inside)?;
     let aligned = align(shots, inside, options)?;
     let noise = strongest_noise(shots);
     let lines = fit_lines(&aligned, noise);
@@ -124,8 +137,8 @@ fn composed(solved: &Image<SolvedFilm>, inside: &Image<Coverage>) -> Triangulate
     let flat = lines::flat_transmittance(solved, inside);
     Triangulated {
         film: seen_film(solved, flat, inside),
-        transmittance: solved.zip_map(inside, |p, c| covered(p.transmittance, c)),
-        uncertainty: solved.zip_map(inside, |p, c| (p.sigma * c.0).min(1.0)),
+        transmittance: solved.zip_map(inside, |p, c| p.transmittance.map(|t| t.max(1.0 - c.0))),
+        uncertainty: solved.zip_map(inside, |p, c| p.sigma.min(c.0)),
         flat,
         determined: [false; 3],
         shift_px: Vec::new(),
@@ -136,8 +149,16 @@ fn composed(solved: &Image<SolvedFilm>, inside: &Image<Coverage>) -> Triangulate
 
 /// Reflected light, and what is seen through plastic that where it lies flat measures `flat`.
 fn seen_film(solved: &Image<SolvedFilm>, flat: LinearRgb, inside: &Image<Coverage>) -> Image<Film> {
-    let reflected = solved.zip_map(inside, |p, c| p.reflected.scale(c.0));
+    let reflected = solved.zip_map(inside, |p, c| {
+        p.reflected * p.transmittance.map(|t| kept_share(t, c))
+    });
     reflected.zip_map(&view_transmittance(solved, flat, inside), Film::new)
+}
+
+/// The share of a channel's film that a mask keeps. The line of a rim's pixel has the screen beside
+/// the object in it: the mask takes away only what is more than it covers.
+fn kept_share(transmittance: f32, Coverage(c): Coverage) -> f32 {
+    (c / (1.0 - transmittance).max(f32::MIN_POSITIVE)).min(1.0)
 }
 
 fn view_transmittance(

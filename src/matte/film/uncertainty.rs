@@ -82,7 +82,7 @@ impl ColorUncertainty {
 
     /// `share` of the object is brighter in the screen's hue than plastic in front of the screen
     /// can be.
-    pub(in crate::matte) fn screen_hue(share: f32) -> Diagnostic {
+    fn screen_hue(share: f32) -> Diagnostic {
         Diagnostic::new(
             Code::ScreenHue,
             warning_above(Self::NEEDS_REVIEW.screen_hue, share),

@@ -299,14 +299,17 @@ fn off_border((w, h): (usize, usize)) -> impl Iterator<Item = (usize, usize)> {
 /// How far from an edge pixel an outline still lies on it, pixels: the smear of the finest band.
 const EDGE_REACH_PX: f64 = 2.0;
 
-/// Mean overlap of one area with the others.
+/// Mean overlap of one area with the others; 1 without others.
 fn agreement(areas: &[Option<Mask>], i: usize) -> f64 {
+    if areas.len() < 2 {
+        return 1.0;
+    }
     let others = (0..areas.len()).filter(|&j| j != i);
     let own = areas[i].as_ref();
     let sum: f64 = others
         .map(|j| overlap_or_zero(own, areas[j].as_ref()))
         .sum();
-    sum / areas.len().saturating_sub(1).max(1) as f64
+    sum / (areas.len() - 1) as f64
 }
 
 /// 0 where one area was not found.
@@ -386,10 +389,19 @@ fn truncated_at(borders: &[&str]) -> Diagnostic {
     Diagnostic::warning(
         Code::Truncated,
         format_args!(
-            "the object reaches the {} border: the part beyond is missing from its size",
-            borders.join(" and ")
+            "the object reaches the {} border: the part beyond is missing, and a stated length or size makes the \
+             rest too large; photograph all of it",
+            listed(borders)
         ),
     )
+}
+
+/// Names as a sentence lists them.
+fn listed(names: &[&str]) -> String {
+    match names {
+        [others @ .., last] if !others.is_empty() => format!("{} and {last}", others.join(", ")),
+        _ => names.concat(),
+    }
 }
 
 /// The warning about an object that was found at a lower resolution than asked for; from the widths
@@ -421,8 +433,15 @@ mod tests {
         assert!((agreement(&found, 0) - (1.0 + 0.25 + 0.0) / 3.0).abs() < 1e-12);
         assert_eq!(
             (agreement(&found, 3), agreement(&found[..1], 0)),
-            (0.0, 0.0)
+            (0.0, 1.0)
         );
+    }
+
+    #[test]
+    fn borders_that_are_reached_are_listed() {
+        let said = |touches| truncated(touches).unwrap().message;
+        assert!(said([true, false, false, true]).contains("the left and bottom border"));
+        assert!(said([true, false, true, true]).contains("the left, right and bottom border"));
     }
 
     #[test]

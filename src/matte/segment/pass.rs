@@ -303,7 +303,7 @@ fn main_object(
 
 fn two_objects([one, other]: &[String; 2]) -> Error {
     refused(format!(
-        "two objects, {one} and {other}; photograph them one by one (or, if it is one, raise segment.join)"
+        "two objects, {one} and {other}; photograph them one by one (or, if it is one, raise the search's option join)"
     ))
 }
 
@@ -375,9 +375,10 @@ const LEAK_AREA_RATIO: f64 = 1.1;
 /// out.
 fn enclosed_area(edges: &Mask, join_px: f64) -> Mask {
     let hull = under_hull(edges, 0.5);
-    let mut narrow = closed(edges, &hull, join_px / 2.0);
+    let edges = closed_at_borders(edges);
+    let mut narrow = closed(&edges, &hull, join_px / 2.0);
     for times in [1.0, 2.0, 4.0] {
-        let wide = closed(edges, &hull, times * join_px);
+        let wide = closed(&edges, &hull, times * join_px);
         if wide.count() as f64 <= LEAK_AREA_RATIO * narrow.count() as f64 {
             return wide;
         }
@@ -394,6 +395,34 @@ fn closed(edges: &Mask, hull: &Mask, radius_px: f64) -> Mask {
 /// An object whose edges come so near to the border, pixels, may go on beyond: an edge has two
 /// sides, and a faint tip is seen a few pixels late.
 const NEAR_BORDER_PX: usize = 4;
+
+/// Edges, with a line along each border between the first and the last that come near it: an object
+/// that the border cuts off has no edge there, and would leak out.
+fn closed_at_borders(edges: &Mask) -> Mask {
+    let (w, h) = edges.size();
+    let [near_x, near_y] = [w, h].map(|len| NEAR_BORDER_PX.min(len));
+    let rows_near = |columns: Range<usize>| {
+        spanned((0..h).filter(|&y| is_any_set(edges, columns.clone(), y..y + 1)))
+    };
+    let columns_near =
+        |rows: Range<usize>| spanned((0..w).filter(|&x| is_any_set(edges, x..x + 1, rows.clone())));
+    let (left, right) = (rows_near(0..near_x), rows_near(w - near_x..w));
+    let (top, bottom) = (columns_near(0..near_y), columns_near(h - near_y..h));
+    let is_border = |x: usize, y: usize| {
+        (x == 0 && left.contains(&y))
+            || (x + 1 == w && right.contains(&y))
+            || (y == 0 && top.contains(&x))
+            || (y + 1 == h && bottom.contains(&x))
+    };
+    Mask::from_fn(w, h, |x, y| edges[(x, y)] || is_border(x, y))
+}
+
+/// From the first of some places to the last; empty without any.
+fn spanned(mut places: impl DoubleEndedIterator<Item = usize>) -> Range<usize> {
+    places
+        .next()
+        .map_or(0..0, |first| first..places.next_back().unwrap_or(first) + 1)
+}
 
 /// Whether a set comes near the left, top, right and bottom border.
 fn reached_borders(set: &Mask) -> [bool; 4] {

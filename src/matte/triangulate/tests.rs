@@ -95,6 +95,55 @@ fn three_screens_determine_every_channel() {
 }
 
 #[test]
+fn a_soft_rim_is_covered_once() {
+    let mask = Image::from_fn(SIZE.0, SIZE.1, |x, y| {
+        let r = libm::hypotf((x as f32 - 80.0) / 60.0, (y as f32 - 50.0) / 35.0);
+        Coverage((0.5 + 8.0 * (1.0 - r)).clamp(0.0, 1.0))
+    });
+    let paint = LinearRgb::new(0.5, 0.3, 0.3);
+    let screens = [GREEN, BLUE, RED];
+    let photos = screens.map(|k| mask.map(|c| paint.scale(c.0) + k.scale(1.0 - c.0)));
+    let plates = screens.map(|k| ScreenPlate::even(k, SIZE));
+    let shots: Vec<_> = photos.iter().zip(&plates).collect();
+    let found = triangulate(&shots, &mask, &TriangulateOptions::default()).unwrap();
+    for (i, c) in mask.pixels().iter().map(|c| c.0).enumerate() {
+        let (film, t) = (found.film.pixels()[i], found.transmittance.pixels()[i]);
+        assert!((film.color.r - 0.5 * c).abs() < 0.01, "{c}: {film:?}");
+        assert!((t.g - (1.0 - c)).abs() < 0.01, "{c}: {t:?}");
+    }
+}
+
+#[test]
+fn a_coverage_that_is_none_and_an_option_out_of_range_are_refused() {
+    let (photo, plate) = (
+        photo(GREEN, [0.0; 2], 0.0, 1),
+        ScreenPlate::even(GREEN, SIZE),
+    );
+    let shots = [(&photo, &plate); 2];
+    let refused = |inside: &Image<Coverage>, options: TriangulateOptions| {
+        triangulate(&shots, inside, &options)
+            .unwrap_err()
+            .to_string()
+    };
+    for wrong in [2.0, -0.5, f32::NAN] {
+        let mut mask = inside();
+        mask[(80, 50)].0 = wrong;
+        let expected = format!("mask: {wrong}, expected 0 to 1");
+        assert_eq!(refused(&mask, TriangulateOptions::default()), expected);
+        let film = crate::matte::film(&photo, &plate, &mask, &Default::default());
+        assert_eq!(film.unwrap_err().to_string(), expected);
+    }
+    let options = TriangulateOptions {
+        least_agreement: 7.0,
+        ..TriangulateOptions::default()
+    };
+    assert_eq!(
+        refused(&inside(), options),
+        "least_agreement: 7, expected 0 to 1"
+    );
+}
+
+#[test]
 fn an_object_that_moved_is_moved_back() {
     let shift = [1.6, -0.7];
     let found = solved(&[GREEN, BLUE], shift, 0.002).unwrap();
