@@ -78,6 +78,27 @@ fn a_picture_of_one_bit_takes_little_more_than_its_pixels() {
     assert_at_most(2.0, "read as samples", taken);
 }
 
+/// A file whose header asks for more than is allowed is refused before memory is taken.
+#[test]
+fn a_header_that_asks_for_too_much_takes_little_memory() {
+    let _alone = ALONE.lock().unwrap_or_else(|e| e.into_inner());
+    let folder = tempfile::tempdir().unwrap();
+    let [png, hdr] = ["a.png", "a.hdr"].map(|name| folder.path().join(name));
+    one_bit_png(&png);
+    let mut bytes = fs::read(&png).unwrap();
+    bytes[16..24].copy_from_slice(&[0, 0, 0x7f, 0xff, 0, 0, 0x7f, 0xff]);
+    let sum = crc32fast::hash(&bytes[12..29]);
+    bytes[29..33].copy_from_slice(&sum.to_be_bytes());
+    fs::write(&png, bytes).unwrap();
+    let header = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 99999 +X 99999\n";
+    fs::write(&hdr, header).unwrap();
+    for path in [png, hdr] {
+        let taken = bytes_a_pixel(|| assert!(io::read::<PremulRgba>(&path).is_err()));
+        // 64 MiB: the header, a message and the decoders' buffers.
+        assert_at_most(4.0, "refused by its header", taken);
+    }
+}
+
 /// As `petcomp diff` does it: both pictures and all that is found out about them take less than the
 /// pixels of one.
 #[test]

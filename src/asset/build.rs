@@ -1,10 +1,11 @@
 //! Many photos into an asset folder, from a list.
 
 use super::entry::PhotoEntry;
-use super::folder::{CutOutWriter, read_or_new};
+use super::folder::{CutOutWriter, lock, read_or_new};
 use super::library::{Library, Photo};
 use super::list::{List, find_list};
 use super::manifest::{Manifest, PhotoRecord};
+use super::review::Review;
 use super::screen_source::EmptyScreens;
 use crate::error::{Error, Result};
 use rayon::prelude::*;
@@ -23,6 +24,8 @@ pub struct Built {
     pub lengths: Vec<[f64; 2]>,
     /// Photos that gave no cut-out, and why.
     pub refused: Vec<String>,
+    /// How many of these a person rejected.
+    pub rejected: usize,
     /// Cut-outs that a person should review; their diagnostics say why.
     pub needs_review: Vec<PhotoRecord>,
 }
@@ -49,26 +52,17 @@ pub fn build(
 ) -> Result<Built> {
     let (path, folder) = (find_list(list.as_ref())?, folder.as_ref());
     let list = List::read(&path)?;
-    let mut manifest = read_or_new(folder)?;
-    let list = checked(list, &path, &mut manifest)?;
+    let list = checked(list, &path, &mut read_or_new(folder)?)?;
     let outcomes = cut_out_all(&list, folder, progress);
-    let TakenIn {
-        photos,
-        refused,
-        removed,
-        failed,
-    } = take_in(&list, outcomes, &mut manifest);
-    if removed || !photos.is_empty() {
-        manifest.write(folder)?;
-    }
-    if let Some(error) = failed {
+    let (manifest, mut taken) = record(&list, outcomes, folder).map_err(|e| e.in_file(&path))?;
+    if let Some(error) = taken.failed.take() {
         return Err(error.in_file(&path));
     }
-    if photos.is_empty() {
-        return Err(no_cut_out(&path, &refused));
+    if taken.photos.is_empty() {
+        return Err(no_cut_out(&path, &taken.refused));
     }
-    let library = Library::from_manifest(folder, manifest, &photos)?;
-    Ok(Built::new(library, &photos, refused))
+    let library = Library::from_manifest(folder, manifest, &taken.photos)?;
+    Ok(Built::new(library, taken))
 }
 
 fn no_cut_out(list: &Path, refused: &[String]) -> Error {
@@ -77,12 +71,14 @@ fn no_cut_out(list: &Path, refused: &[String]) -> Error {
 }
 
 impl Built {
-    fn new(library: Library, photos: &[Photo], refused: Vec<String>) -> Self {
+    fn new(library: Library, taken: TakenIn) -> Self {
+        let photos = taken.photos;
         Self {
             library,
             photos: photos.len(),
             lengths: photos.iter().map(length_and_error).collect(),
-            refused,
+            refused: taken.refused,
+            rejected: taken.rejected,
             needs_review: photos.iter().filter_map(record_to_review).collect(),
         }
     }
@@ -121,12 +117,27 @@ fn cut_out_all(
         .collect()
 }
 
+/// Takes the cut-outs of a list into the manifest as it is by now: another process may have changed
+/// it meanwhile.
+fn record(list: &List, outcomes: Vec<Result<Photo>>, folder: &Path) -> Result<(Manifest, TakenIn)> {
+    let _alone = lock(folder)?;
+    let mut manifest = read_or_new(folder)?;
+    list.add_classes_to(&mut manifest)?;
+    let taken = take_in(list, outcomes, &mut manifest);
+    if taken.removed || !taken.photos.is_empty() {
+        manifest.write(folder)?;
+    }
+    Ok((manifest, taken))
+}
+
 /// What became of the photos of a list.
 #[derive(Default)]
 struct TakenIn {
     photos: Vec<Photo>,
     /// Why the others gave no cut-out.
     refused: Vec<String>,
+    /// How many of these a person rejected.
+    rejected: usize,
     /// The manifest had an earlier cut-out of one of these.
     removed: bool,
     /// The first that could not be read or written, or fits no asset.
@@ -142,6 +153,7 @@ fn take_in(list: &List, outcomes: Vec<Result<Photo>>, manifest: &mut Manifest) -
             Err(refusal @ Error::Photo { .. }) => {
                 taken.removed |= manifest.remove(&entry.cut_out_file());
                 taken.refused.push(refusal.to_string());
+                taken.rejected += usize::from(is_rejected(entry));
             }
             Err(error) => {
                 let error = error.within(&format!("photos[{i}]"));
@@ -150,6 +162,11 @@ fn take_in(list: &List, outcomes: Vec<Result<Photo>>, manifest: &mut Manifest) -
         }
     }
     taken
+}
+
+fn is_rejected(entry: &PhotoEntry) -> bool {
+    let review = Review::of_photo(&entry.file).ok().flatten();
+    review.is_some_and(|review| review.is_rejected())
 }
 
 /// A photo that is now in the manifest.
@@ -169,7 +186,7 @@ fn record_to_review(photo: &Photo) -> Option<PhotoRecord> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{MANIFEST, PhotoRecord, Review, Scale, Texture, Verdict};
+    use super::super::{MANIFEST, PhotoRecord, Scale, Texture, Verdict};
     use super::super::{add_photo, contact_sheet};
     use super::*;
     use crate::diagnostic::{Code, Diagnostic};
@@ -320,6 +337,7 @@ mod tests {
         );
         reject(&folder, "one");
         let built = built().unwrap();
+        assert_eq!(built.rejected, 1);
         let [refused] = &built.refused[..] else {
             panic!("one photo is refused")
         };
@@ -370,6 +388,23 @@ mod tests {
     }
 
     #[test]
+    fn photos_that_are_added_at_a_time_are_all_there() {
+        let folder = folder_with(TWO);
+        let out = &folder.path().join("out");
+        std::thread::scope(|scope| {
+            for name in ["a", "b", "c"] {
+                let photo = folder.path().join("one.png");
+                let entry = PhotoEntry::new(photo, name, name, Scale::Length(0.3));
+                scope.spawn(move || {
+                    add_photo(out, &entry, &[], &CutOutOptions::default()).unwrap();
+                });
+            }
+        });
+        let library = Library::open(out).unwrap();
+        assert_eq!((library.assets.len(), library.classes.len()), (3, 3));
+    }
+
+    #[test]
     fn mistakes_in_a_list_are_named_before_any_work() {
         let printed = |list: &str| {
             let folder = folder_with(list);
@@ -398,6 +433,9 @@ mod tests {
         );
         assert!(printed(&TWO.replace("two.png", "one.png")).contains("photos[1].file"));
         assert!(printed(&TWO.replace("\"a\"", "\"../a\"")).contains("photos[0].asset"));
+        assert!(
+            printed(&TWO.replace("\"a\"", "\"assets.toml\"")).contains("the name of the manifest")
+        );
         assert!(printed("photos = []\n").contains("photos: empty"));
     }
 
@@ -409,6 +447,9 @@ mod tests {
         let [toml, csv] =
             ["photos.toml", "photos.csv"].map(|name| List::read(folder.path().join(name)).unwrap());
         assert_eq!(toml, csv);
+        let both = build(folder.path(), folder.path().join("out"), &|_, _| ()).unwrap_err();
+        let both = both.to_string();
+        assert!(both.contains("has photos.toml and photos.csv"), "{both}");
         std::fs::remove_file(folder.path().join("photos.toml")).unwrap();
         assert_eq!(
             build(folder.path(), folder.path().join("out"), &|_, _| ())
@@ -544,7 +585,10 @@ mod tests {
             &|_, _| (),
         )
         .unwrap();
-        assert_eq!((built.photos, built.refused.len()), (1, 1));
+        assert_eq!(
+            (built.photos, built.refused.len(), built.rejected),
+            (1, 1, 0)
+        );
         assert!(built.refused[0].contains("two.png"), "{:?}", built.refused);
     }
 

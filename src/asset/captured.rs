@@ -346,10 +346,9 @@ fn pose_warning(pose: &ScreenPose) -> Option<Diagnostic> {
     })
 }
 
-/// The warning about an entry that says nothing of its object's thickness.
+/// The warning about an object of whose thickness nothing is known.
 fn thickness_warning(entry: &PhotoEntry) -> Option<Diagnostic> {
-    let is_default = (entry.thickness() - DEFAULT_THICKNESS).abs() < f64::EPSILON;
-    is_default.then(|| {
+    entry.thickness.is_none().then(|| {
         let what = format!(
             "thickness: {DEFAULT_THICKNESS}, the default; size and refraction are those at half of it, expected \
              how thick the object is as it lies, metres"

@@ -170,7 +170,8 @@ impl PhotoEntry {
     ///
     /// # Errors
     /// [`Error::Value`] for the first value that cannot be right.
-    pub(super) fn check(&self, manifest: &Manifest) -> Result<()> {
+    #[doc(hidden)]
+    pub fn check(&self, manifest: &Manifest) -> Result<()> {
         let scale = self.scale()?;
         check_name(&self.asset).map_err(|e| match e {
             Error::Value { what, .. } => Error::value("asset", what),

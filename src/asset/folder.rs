@@ -11,17 +11,22 @@ use super::manifest::{Manifest, PhotoRecord};
 use super::measure::MeasuredSize;
 use super::open_photo::OpenPhoto;
 use super::rectified::RectifiedPhoto;
-use super::review::{Review, Verdict};
+use super::review::Review;
 use super::screen_source::EmptyScreens;
-use crate::diagnostic::{Code, Diagnostic};
+use crate::diagnostic::Diagnostic;
 use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::io::{self, Checksum};
 use crate::matte::{ColorUncertainty, CutOut, CutOutOptions};
 use crate::pixel::{Film, LinearRgb};
 use crate::stopwatch::Stopwatch;
+use std::fs::File;
 use std::path::Path;
 use std::sync::Arc;
+
+/// Held by whoever changes the manifest. The file stays: a lock on one that is about to be deleted
+/// would lock nothing.
+const LOCK: &str = ".lock";
 
 /// Cuts the object out of a photo and adds it to an asset folder, which is made if it is not there.
 ///
@@ -29,8 +34,8 @@ use std::sync::Arc;
 /// are none, a class that the folder does not have comes behind those that it has.
 ///
 /// Adding the same photo to the same asset again replaces it; where it gives no cut-out any more,
-/// the folder keeps none of it. The manifest is written last, whole or not at all. Not for two
-/// processes at once: the later manifest wins.
+/// the folder keeps none of it. The manifest is written last, whole or not at all. Several
+/// processes may add to one folder at a time.
 ///
 /// # Errors
 /// [`Error::Value`] for a wrong name, class or size; those of reading the photo and of
@@ -52,13 +57,28 @@ pub fn add_photo(
         empty_screens: EmptyScreens::default(),
     };
     let outcome = writer.write(entry);
+    let _alone = lock(folder)?;
+    let mut manifest = read_or_new(folder)?;
     if is_refusal(&outcome) && manifest.remove(&entry.cut_out_file()) {
         manifest.write(folder)?;
     }
     let photo = outcome?;
+    manifest.add_classes(classes, entry.label_class().into_iter())?;
     manifest.insert(entry.asset_with(photo.record.clone()))?;
     manifest.write(folder)?;
     Ok(photo)
+}
+
+/// Waits until no other process changes the manifest of a folder, and makes the next ones wait; in
+/// a folder that is not there nobody does.
+pub(super) fn lock(folder: &Path) -> Result<Option<File>> {
+    if !folder.is_dir() {
+        return Ok(None);
+    }
+    let path = folder.join(LOCK);
+    let file = io::open_own(&path)?;
+    file.lock().map_err(|e| Error::file(&path, e))?;
+    Ok(Some(file))
 }
 
 /// The photo itself gave no cut-out.
@@ -93,7 +113,10 @@ impl CutOutWriter<'_> {
 
     /// Measures an object that was captured on a display.
     fn write_captured(&self, entry: &PhotoEntry, captured: &CaptureEntry) -> Result<Photo> {
+        let review = review_of(&entry.file)?;
+        check_unpainted(&review, &entry.file)?;
         let CapturedObject { film, flow, record } = captured_object(entry, captured, self.options)?;
+        let record = record.reviewed(review.verdict);
         // A display shines through the object once: nothing of what is seen is its shadow.
         let passed = film.map(Film::transmittance);
         let photo = self.write_film(&film, &passed, record)?;
@@ -114,7 +137,7 @@ impl CutOutWriter<'_> {
         check_reviewed_size(&review, entry, &photo)?;
         watch.lap("read");
         let cut = photo.cut_out(&review.strokes)?;
-        log_diagnostics(&cut, &entry.file);
+        log_notes(&cut, &entry.file);
         watch.lap("cut out");
         let record = new_record(&cut, entry, &photo.rectified)?.reviewed(review.verdict);
         watch.lap("measure");
@@ -146,7 +169,7 @@ impl CutOutWriter<'_> {
 /// Those of [`Review::of_photo`]; [`Error::Photo`] where it was rejected.
 fn review_of(photo: &Path) -> Result<Review> {
     let review = Review::of_photo(photo)?.unwrap_or_default();
-    if review.verdict != Some(Verdict::Rejected) {
+    if !review.is_rejected() {
         return Ok(review);
     }
     let path = Review::path_of(photo);
@@ -163,17 +186,19 @@ fn check_reviewed_size(review: &Review, entry: &PhotoEntry, photo: &OpenPhoto<'_
     checked.map_err(|e| e.in_file(Review::path_of(&entry.file)))
 }
 
-fn log_diagnostics(cut: &CutOut, photo: &Path) {
-    for diagnostic in &cut.diagnostics {
-        log::log!(log_level(diagnostic), "{}: {diagnostic}", photo.display());
+/// Fails where strokes were painted on a photo of a capture, whose film is measured.
+fn check_unpainted(review: &Review, photo: &Path) -> Result<()> {
+    if review.strokes.is_empty() {
+        return Ok(());
     }
+    let what = "painted on a capture, whose film is measured; expected a verdict alone";
+    Err(Error::value("strokes", what).in_file(Review::path_of(photo)))
 }
 
-fn log_level(diagnostic: &Diagnostic) -> log::Level {
-    if diagnostic.code == Code::ScreenHue {
-        log::Level::Warn
-    } else {
-        log::Level::Info
+/// What is not kept in the record.
+fn log_notes(cut: &CutOut, photo: &Path) {
+    for note in cut.diagnostics.iter().filter(|d| !d.needs_review()) {
+        log::info!("{}: {note}", photo.display());
     }
 }
 

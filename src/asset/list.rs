@@ -98,14 +98,19 @@ impl List {
     /// [`Error::Value`] for the first value that cannot be right, naming the entry.
     pub(super) fn check(&self, manifest: &mut Manifest) -> Result<()> {
         self.cut_out.check().map_err(|e| e.within("cut_out"))?;
-        let classes = self.photos.iter().filter_map(PhotoEntry::label_class);
-        manifest.add_classes(&self.classes, classes)?;
+        self.add_classes_to(manifest)?;
         if self.photos.is_empty() {
             return Err(Error::value("photos", "empty, expected at least one"));
         }
         check_each(&self.photos, "photos", |photo| photo.check(manifest))?;
         self.check_bodies()?;
         check_cut_out_files(&self.photos)
+    }
+
+    /// Adds its classes to those of a manifest.
+    pub(super) fn add_classes_to(&self, manifest: &mut Manifest) -> Result<()> {
+        let classes = self.photos.iter().filter_map(PhotoEntry::label_class);
+        manifest.add_classes(&self.classes, classes)
     }
 
     /// No two photos of an asset tell different things of its body.
@@ -182,14 +187,13 @@ pub(super) fn find_list(path: &Path) -> Result<PathBuf> {
     if !path.is_dir() {
         return Ok(path.into());
     }
-    let mut lists = LIST_NAMES.iter().map(|name| path.join(name));
-    lists.find(|list| list.exists()).ok_or_else(|| {
-        let names = LIST_NAMES.join(" or ");
-        Error::file(
-            path,
-            format!("expected {names} in it, a list of the photos"),
-        )
-    })
+    let lists = LIST_NAMES.iter().map(|name| path.join(name));
+    let what = match &lists.filter(|list| list.exists()).collect::<Vec<_>>()[..] {
+        [list] => return Ok(list.clone()),
+        [] => "expected photos.toml or photos.csv in it, a list of the photos",
+        _ => "has photos.toml and photos.csv, expected one of them, or the list's own name",
+    };
+    Err(Error::file(path, what))
 }
 
 fn photos_of_csv(bytes: &[u8]) -> Result<Vec<PhotoEntry>> {
@@ -203,7 +207,8 @@ fn entry_of_row(row: SpreadsheetRow) -> Result<PhotoEntry> {
 
 /// The file of that name, or where there is none the only one beside it that is called so but for
 /// capitals and the spelling of `.jpg`.
-fn with_actual_spelling(path: PathBuf) -> PathBuf {
+#[doc(hidden)]
+pub fn with_actual_spelling(path: PathBuf) -> PathBuf {
     if path.exists() {
         return path;
     }
@@ -217,12 +222,11 @@ fn with_actual_spelling(path: PathBuf) -> PathBuf {
 
 /// What is in a file's folder; nothing where that cannot be read.
 fn files_beside(path: &Path) -> impl Iterator<Item = PathBuf> + use<> {
-    let entries = path.parent().and_then(|folder| folder.read_dir().ok());
-    entries
-        .into_iter()
-        .flatten()
-        .flatten()
-        .map(|entry| entry.path())
+    let folder = path.parent().unwrap_or(Path::new("")).to_owned();
+    // The empty path is the working folder.
+    let entries = Path::new(".").join(&folder).read_dir().ok();
+    let entries = entries.into_iter().flatten().flatten();
+    entries.map(move |entry| folder.join(entry.file_name()))
 }
 
 /// A file's name in small letters, with the short endings of pictures.

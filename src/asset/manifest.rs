@@ -1,9 +1,9 @@
 //! The manifest of an asset folder: what is in it, as TOML.
 
-use super::MANIFEST;
 use super::body::KnownBody;
 use super::review::Verdict;
 use super::role::Role;
+use super::{DEFAULT_THICKNESS, MANIFEST};
 use crate::bounds::{Bounds, MASS, OBJECT, PX_PER_METRE, THICKNESS, WIDTH};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
@@ -301,11 +301,12 @@ impl Manifest {
         Err(Error::value("classes", what))
     }
 
-    /// What the folder knows of the body of an asset.
+    /// What the folder knows of the body of an asset. The default thickness stands for one that
+    /// nobody told.
     pub(super) fn known_body(&self, name: &str) -> KnownBody {
         let known = self.assets.iter().find(|asset| asset.name == name);
         known.map_or_else(KnownBody::default, |asset| KnownBody {
-            thickness: Some(asset.thickness),
+            thickness: Some(asset.thickness).filter(|told| *told != DEFAULT_THICKNESS),
             mass: Some(asset.mass),
         })
     }
@@ -518,8 +519,13 @@ const CONFIDENCE: Bounds = Bounds::new(0.0, 1.0, "a share");
 /// Side of a whole cut-out, metres: the object's, and the margin around it.
 const CUT_OUT_SIDE: Bounds = Bounds::metres(1e-4, 20.0, "objects are 5 mm to 5 m long");
 
-/// A name that is safe as the name of a file: letters and digits of any language.
+/// A name that is safe as the name of a folder beside the manifest: letters and digits of any
+/// language.
 pub(super) fn check_name(name: &str) -> Result<()> {
+    if name.eq_ignore_ascii_case(MANIFEST) {
+        let what = format!("\"{name}\", which is the name of the manifest");
+        return Err(Error::value("name", what));
+    }
     if is_name(name) {
         return Ok(());
     }

@@ -59,7 +59,7 @@ pub use folder::add_photo;
 pub use library::{Library, Photo};
 pub use list::List;
 #[doc(hidden)]
-pub use list::check_cut_out_files;
+pub use list::{check_cut_out_files, with_actual_spelling};
 pub use manifest::Asset;
 #[doc(hidden)]
 pub use manifest::{CaptureRecord, Manifest, PhotoRecord};

@@ -93,6 +93,11 @@ impl Review {
         check_strokes(&self.strokes)
     }
 
+    /// A person does not want the cut-out.
+    pub(super) fn is_rejected(&self) -> bool {
+        self.verdict == Some(Verdict::Rejected)
+    }
+
     /// Fails where it was painted on a picture of another size.
     ///
     /// # Errors

@@ -60,6 +60,7 @@ fn csv_reader(text: &str, separator: u8) -> csv::Reader<&[u8]> {
 
 /// What stands in the columns of a spreadsheet.
 struct Columns {
+    /// Of those without a name, which some programs put behind the others, empty.
     names: Vec<&'static str>,
     /// A comma in a number cannot separate cells: it may stand for the decimal point.
     has_decimal_commas: bool,
@@ -67,8 +68,10 @@ struct Columns {
 
 impl Columns {
     fn new(headers: &csv::StringRecord, separator: u8) -> Result<Self> {
+        let names: Vec<_> = headers.iter().map(column_name).collect::<Result<_>>()?;
+        check_once(&names)?;
         Ok(Self {
-            names: headers.iter().map(column_name).collect::<Result<_>>()?,
+            names,
             has_decimal_commas: separator != b',',
         })
     }
@@ -85,6 +88,10 @@ impl Columns {
     }
 
     fn value(&self, column: &str, cell: &str) -> Result<toml::Value> {
+        if column.is_empty() {
+            let what = format!("\"{cell}\" in a column without a name");
+            return Err(Error::value("document", what));
+        }
         if WORD_COLUMNS.contains(&column) {
             return Ok(cell.into());
         }
@@ -154,13 +161,28 @@ fn separator(header: &str) -> u8 {
         .unwrap_or(b',')
 }
 
+/// Fails on a name that two columns have.
+fn check_once(names: &[&str]) -> Result<()> {
+    let mut named = names
+        .iter()
+        .enumerate()
+        .filter(|(_, name)| !name.is_empty());
+    match named.find(|(i, name)| names[..*i].contains(name)) {
+        Some((_, name)) => {
+            let what = format!("column \"{name}\" is there twice");
+            Err(Error::value("line 1", what))
+        }
+        None => Ok(()),
+    }
+}
+
 /// The name of a column, however it is written.
 fn column_name(header: &str) -> Result<&'static str> {
     let plain = header.to_lowercase().replace([' ', '-'], "_");
     let alias = COLUMN_ALIASES.iter().find(|(alias, _)| *alias == plain);
     let name = alias.map_or(plain.as_str(), |(_, name)| name);
     let known = [&WORD_COLUMNS[..], &NUMBER_COLUMNS, &[SIZE_COLUMN]].concat();
-    match known.iter().find(|known| **known == name) {
+    match known.iter().chain(&[""]).find(|known| **known == name) {
         Some(known) => Ok(known),
         None => {
             let suggestion = io::suggestion(name, &known);
@@ -215,6 +237,7 @@ mod tests {
             "File;Asset;LENGTH\r\na.jpg;b;0,265\r\n;;\r\n",
             "\u{feff}file\tasset\tlength\na.jpg\tb\t0,265\n",
             "\"file\";\"asset\";\"length\"\n\"a.jpg\";\"b\";0.265",
+            "file,asset,length,,\na.jpg,b,0.265,,\n",
         ] {
             assert_eq!(table(text.as_bytes()).unwrap(), [ROW], "{text}");
         }
@@ -269,6 +292,14 @@ mod tests {
         assert_eq!(
             reported("file,lenght\n"),
             "line 1: unknown column \"lenght\", did you mean \"length\"?"
+        );
+        assert_eq!(
+            reported("photo,length,file\n"),
+            "line 1: column \"file\" is there twice"
+        );
+        assert_eq!(
+            reported("file,\na,\nb,c\n"),
+            "line 3: \"c\" in a column without a name"
         );
         assert_eq!(
             reported("file,mass\na,b\n"),

@@ -75,7 +75,7 @@ pub(super) fn read_file_header<R: BufRead + Seek>(
 /// The notes of a file that may be read from its start again.
 fn notes_of_file(file: &mut (impl BufRead + Seek), format: Format) -> CameraNotes {
     match format {
-        Format::Png | Format::Tiff if file.rewind().is_ok() => CameraNotes::read(file),
+        Format::Png | Format::Tiff if file.rewind().is_ok() => read_notes(file, format),
         _ => CameraNotes::default(),
     }
 }
@@ -94,15 +94,23 @@ fn read_jpeg_header(
 /// What the camera noted; EXR and HDR have no room for it.
 pub(super) fn camera_notes(source: &SourceFile) -> CameraNotes {
     match source.format {
-        Format::Jpeg | Format::Tiff | Format::Png => exif_notes(&source.bytes),
+        Format::Jpeg | Format::Tiff | Format::Png => notes_of_source(source),
         // libheif turns the picture by the file's own word for it.
-        Format::Heif => exif_notes(&source.bytes).upright(),
+        Format::Heif => notes_of_source(source).upright(),
         _ => CameraNotes::default(),
     }
 }
 
-fn exif_notes(file: &[u8]) -> CameraNotes {
-    catch_panic(|| Ok(CameraNotes::read(Cursor::new(file)))).unwrap_or_default()
+fn notes_of_source(source: &SourceFile) -> CameraNotes {
+    let file = Cursor::new(&source.bytes);
+    catch_panic(|| Ok(read_notes(file, source.format))).unwrap_or_default()
+}
+
+fn read_notes(file: impl BufRead + Seek, format: Format) -> CameraNotes {
+    match format {
+        Format::Tiff => tiff::camera_notes(file),
+        _ => CameraNotes::read(file),
+    }
 }
 
 /// Another decoder for what ours do not know.
@@ -137,7 +145,7 @@ fn with_known_alpha(raster: Raster, source: &SourceFile) -> Raster {
 #[cfg(feature = "oiio")]
 fn is_premultiplied(raster: &Raster, source: &SourceFile) -> bool {
     match source.format {
-        Format::Tiff => CameraNotes::has_associated_alpha(&source.bytes),
+        Format::Tiff => tiff::has_associated_alpha(&source.bytes),
         Format::Exr => true,
         _ => raster.premultiplied,
     }

@@ -16,7 +16,7 @@
 //!
 //! | samples of the file | colour becomes | alpha | [`Coverage`](crate::Coverage) |
 //! | --- | --- | --- | --- |
-//! | integers (PNG, JPEG, HEIC, TIFF) | decoded with the exact sRGB curve, unless a PNG states gamma 1 | straight unless a TIFF states otherwise | code / full scale, never decoded |
+//! | integers (PNG, JPEG, HEIC, TIFF) | decoded with the exact sRGB curve, or by the gamma that a PNG states | straight unless a TIFF states otherwise | code / full scale, never decoded |
 //! | half and float (EXR, TIFF, HDR) | treated as scene-linear Rec. 709 | EXR premultiplied, TIFF as it states | as it is |
 //!
 //! Premultiplication happens here, in linear light. The orientation noted by a camera is applied.
@@ -45,9 +45,9 @@
 //!   more than [`Limits::seconds`]. A file on which two workers die is named with the signal. The
 //!   worker is not trusted either.
 //! * **What is written** goes to a temporary file beside its place, is synced, and moved there:
-//!   whole or not at all. A link in its place is replaced, not followed; `refuse_links` keeps
-//!   outputs in their folder. No metadata of an input gets into an output, so neither positions
-//!   (GPS) nor serial numbers do.
+//!   whole or not at all. A link in its place is replaced, not followed, a file gives its
+//!   permissions, a device or a pipe is refused; `refuse_links` keeps outputs in their folder. No
+//!   metadata of an input gets into an output, so neither positions (GPS) nor serial numbers do.
 //! * **Where a document leads.** A path in a document that may come from anywhere (journal and
 //!   manifest of a dataset or an asset folder, label, scene, scene for another renderer) is looked
 //!   for in the folder of that document alone: [`inside`] refuses `..`, links that lead out, and

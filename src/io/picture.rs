@@ -61,8 +61,8 @@ impl Picture {
         wanted: Wanted,
     ) -> Result<Self> {
         let raster = raster.map_err(|e| Error::file(&source.path, e))?;
-        let has_colors = matches!(wanted, Wanted::Color | Wanted::Film);
-        let profile = has_colors
+        let profile = wanted
+            .is_color()
             .then(|| usable_profile(&raster, source, limits))
             .flatten();
         warn_not_finite(&raster, source, wanted);
@@ -176,7 +176,7 @@ fn warn_unusual_channels(raster: &Raster, source: &SourceFile, wanted: Wanted) {
         Ok((ChannelMatch::Layer, _)) => {
             log::warn!("{path}: uses the channels {}", raster.names.join(" "))
         }
-        Ok((ChannelMatch::Alone, _)) => {
+        Ok((ChannelMatch::Alone, _)) if wanted != Wanted::Depth => {
             log::warn!("{path}: uses the channel {} as grey", raster.names[0])
         }
         _ => {}

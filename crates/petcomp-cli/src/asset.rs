@@ -1,5 +1,6 @@
 //! `petcomp asset`: cut-outs with real size and class, kept in a folder.
 
+use crate::batch::FileBatch;
 use crate::diagnostics::{located, report_diagnostics};
 use crate::documents::stem_of;
 use crate::exit::NeedsReview;
@@ -75,7 +76,12 @@ pub(crate) struct AddPhotoArgs {
     classes: Vec<String>,
     /// What it was photographed on: auto, a colour R,G,B (scene-linear), or a photo of the empty
     /// screen
-    #[arg(long, value_name = "SCREEN", default_value = "auto")]
+    #[arg(
+        long,
+        value_name = "SCREEN",
+        default_value = "auto",
+        conflicts_with = "captured"
+    )]
     screen: ScreenSource,
     /// How its matte is made: physical (light and transmittance of see-through plastic), key (as
     /// Blender's Keying node), or outline (it lets no light through); by default physical
@@ -164,7 +170,7 @@ impl ScaleArgs {
 
 pub(crate) fn run(command: &AssetCommand, global: &GlobalArgs) -> anyhow::Result<()> {
     match command {
-        AssetCommand::Build { list, output } => build_library(list, output, global).map(drop),
+        AssetCommand::Build { list, output } => build_all(list, output, global),
         AssetCommand::Add(args) => add_photos(args, global),
         AssetCommand::List { folder } => list_photos(folder),
         AssetCommand::Check { folder, strict } => check_folder(folder, *strict),
@@ -219,22 +225,29 @@ fn list_capture(record: &PhotoRecord) {
     }
 }
 
-/// Cuts out all photos of a list, showing progress; returns all that the folder holds.
+/// Fails where a photo gave no cut-out, unless a person rejected it; the others are done by then.
+fn build_all(list: &Path, folder: &Path, global: &GlobalArgs) -> anyhow::Result<()> {
+    let built = build_library(list, folder, global)?;
+    let failed = built.refused.len() - built.rejected;
+    FileBatch::counted(built.photos + failed, failed).finish()
+}
+
+/// Cuts out all photos of a list, showing progress.
 pub(crate) fn build_library(
     list: &Path,
     folder: &Path,
     global: &GlobalArgs,
-) -> anyhow::Result<Library> {
+) -> anyhow::Result<Built> {
     let progress = global.start_progress("cut-outs");
     let built = asset::build(list, folder, &|done, total| {
         progress.update(done as u64, total as u64)
     })?;
     drop(progress);
     report_built(&built, folder, global);
-    let library = built.library;
+    let library = &built.library;
     show_classes(&library.classes, "`classes = [...]` in the list", global);
-    write_sheet(folder, &library, global)?;
-    Ok(library)
+    write_sheet(folder, library, global)?;
+    Ok(built)
 }
 
 /// Shows what became of the photos of a list.

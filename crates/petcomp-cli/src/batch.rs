@@ -11,6 +11,11 @@ pub(crate) struct FileBatch {
 }
 
 impl FileBatch {
+    /// A run whose failures were told already.
+    pub(crate) fn counted(files: usize, failed: usize) -> Self {
+        Self { files, failed }
+    }
+
     /// Counts a file; the error of one that failed is printed at once.
     pub(crate) fn count(&mut self, outcome: anyhow::Result<()>) {
         self.files += 1;
@@ -37,10 +42,11 @@ pub(crate) struct Incomplete(FileBatch);
 impl fmt::Display for Incomplete {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let FileBatch { files, failed } = self.0;
-        write!(
-            f,
-            "{failed} of {files} files could not be used; the rest is done"
-        )
+        write!(f, "{failed} of {files} files could not be used")?;
+        match failed < files {
+            true => f.write_str("; the rest is done"),
+            false => Ok(()),
+        }
     }
 }
 

@@ -248,6 +248,28 @@ fn photos_that_would_become_one_cut_out_are_refused() {
     );
 }
 
+#[test]
+fn a_build_without_one_of_its_photos_is_incomplete() {
+    let desk = Desk::new();
+    write_slab(&desk.path("one.png"));
+    let empty = petcomp::LinearRgb::new(0.04, 0.4, 0.08);
+    petcomp::io::write(
+        desk.path("two.png"),
+        &petcomp::Image::filled(120, 80, empty),
+    )
+    .expect("a picture");
+    let list = "file,asset,class,length\none.png,a,cap,0.3\ntwo.png,b,cap,0.3\n";
+    desk.write("photos.csv", list);
+    let built = desk.run(&["asset", "build", "photos.csv", "-o", "built", "-q"]);
+    let told = text(&built.stderr);
+    assert_eq!(built.status.code(), Some(2), "{told}");
+    assert!(
+        told.contains("error: 1 of 2 files could not be used; the rest is done"),
+        "{told}"
+    );
+    desk.ok(&["asset", "check", "built"]);
+}
+
 /// What a terminal shows of a job, from its start.
 #[cfg(target_os = "linux")]
 #[test]
@@ -494,6 +516,26 @@ fn nothing_that_a_keyer_reads_is_written_over() {
 }
 
 #[test]
+fn no_command_writes_over_what_it_reads() {
+    let desk = Desk::new();
+    write_slab(&desk.path("a.png"));
+    desk.write("a.label.json", label(SQUARE));
+    let content = || ["a.png", "a.label.json"].map(|name| std::fs::read(desk.path(name)).ok());
+    let before = content();
+    for words in [
+        &["matte", "cut", "a.png", "-o", "a.png"][..],
+        &["matte", "color-spill", "a.png", "-o", "./a.png"],
+        &["matte", "film", "a.exr", "-o", "a.exr"],
+        &["camera", "rectify", "a.png", "a.label.json", "-o", "a.png"],
+        &["camera", "solve", "a.label.json", "-o", "a.label.json"],
+    ] {
+        let told = desk.refused(words);
+        assert!(told.contains("is read and would be written over"), "{told}");
+    }
+    assert!(content() == before);
+}
+
+#[test]
 fn the_keyer_is_that_of_its_option_or_of_the_settings() {
     let desk = Desk::new();
     write_green_ramp(&desk.path("0.png"), 0.5);
@@ -538,9 +580,59 @@ fn a_frame_that_cannot_be_keyed_does_not_stop_the_others() {
     assert!(!done.status.success() && desk.path("keyed/0.png").exists());
     let said = text(&done.stderr);
     assert!(
-        said.contains("1.png") && said.contains("1 of 2 files"),
+        said.contains("1.png") && said.contains("1 of 2 files could not be used; the rest is done"),
         "{said}"
     );
+    desk.write("0.png", "no picture");
+    let all = ["matte", "key", "0.png", "1.png", "-o", "keyed"];
+    let none = desk.run(&[&all[..], &["--screen", "0.02,0.6,0.05"]].concat());
+    let said = text(&none.stderr);
+    assert!(said.ends_with("2 of 2 files could not be used\n"), "{said}");
+}
+
+#[test]
+fn cut_outs_of_jpegs_are_exr() {
+    let desk = Desk::new();
+    std::fs::create_dir(desk.path("shot")).expect("a folder");
+    let frames = ["shot/0.jpg", "shot/1.jpeg"];
+    for frame in frames {
+        write_green_ramp(&desk.path(frame), 0.5);
+    }
+    let more = [
+        "-o",
+        "cut",
+        "--matte",
+        "mattes",
+        "--screen",
+        "0.02,0.6,0.05",
+    ];
+    desk.ok(&[&["matte", "key"][..], &frames, &more].concat());
+    for file in ["cut/0.exr", "cut/1.exr", "mattes/0.jpg", "mattes/1.jpeg"] {
+        assert!(desk.path(file).exists(), "{file}");
+    }
+}
+
+#[test]
+fn keyers_refuse_settings_out_of_range() {
+    let desk = Desk::new();
+    write_green_ramp(&desk.path("a.png"), 0.5);
+    let screen = ["chroma-key", "--screen", "0.02,0.6,0.05"];
+    let clean = ["difference-key", "--clean", "a.png"];
+    for (keyer, setting, expected) in [
+        (
+            &screen[..],
+            "key.tolerance=30",
+            "1 to 80 degrees, in radians",
+        ),
+        (&["channel-key"], "key.matte_channel=7", "0 to 2"),
+        (&clean, "key.tolerance=-3", "0 to 1"),
+        (&["color-spill"], "key.ratio=9", "0.5 to 1.5"),
+    ] {
+        let more = ["a.png", "-o", "cut.png", "--set", setting];
+        let told = desk.refused(&[&["matte"], keyer, &more].concat());
+        let expected = format!("{}, expected {expected}", setting.replace('=', ": "));
+        assert!(told.contains(&expected), "{told}");
+    }
 }
 
 #[test]
@@ -572,6 +664,48 @@ fn film_is_written_into_files_called_exr_alone() {
             told.contains("film.png: film needs a file called .exr"),
             "{told}"
         );
+    }
+}
+
+#[test]
+fn every_photo_of_a_film_has_a_plate_or_none() {
+    let desk = Desk::new();
+    let plate = ["-o", "film.exr", "--plate", "p.png"];
+    let two = [&["matte", "triangulate", "a.png", "b.png"], &plate[..]].concat();
+    let told = desk.refused(&two);
+    assert!(told.contains("--plate: 1 given, expected 2"), "{told}");
+    let more = ["--plate", "q.png"];
+    let told = desk.refused(&[&["matte", "film", "a.png"], &plate[..], &more].concat());
+    assert!(told.contains("--plate: 2 given, expected 1"), "{told}");
+}
+
+#[test]
+fn each_way_to_film_has_an_example_of_its_own_options() {
+    let desk = Desk::new();
+    let help = |way| desk.ok(&["matte", way, "--help"]);
+    assert!(help("film").contains("film.clipped=0.9"));
+    assert!(help("triangulate").contains("film.max_sigma=0.1"));
+}
+
+#[test]
+fn an_object_of_the_hue_of_the_screen_is_warned_of_once_and_a_spot_is_not() {
+    let desk = Desk::new();
+    for (photo, columns, warnings) in [("half.png", 80..160, 1), ("spot.png", 100..124, 0)] {
+        let slab = petcomp::Image::from_fn(240, 160, |x, y| {
+            if columns.contains(&x) && (60..100).contains(&y) {
+                petcomp::LinearRgb::new(0.25, 0.8, 0.3)
+            } else if (60..180).contains(&x) && (50..110).contains(&y) {
+                petcomp::LinearRgb::new(0.6, 0.05, 0.05)
+            } else {
+                petcomp::LinearRgb::new(0.04, 0.4, 0.08)
+            }
+        });
+        petcomp::io::write(desk.path(photo), &slab).expect("a picture");
+        let add = ["asset", "add", photo, "--class", "can", "--length", "0.2"];
+        let done = desk.run(&[&add[..], &["-o", "assets"]].concat());
+        let said = text(&done.stderr);
+        assert!(done.status.success(), "{said}");
+        assert_eq!(said.matches("the screen's hue").count(), warnings, "{said}");
     }
 }
 
@@ -737,6 +871,33 @@ fn diff_speaks_like_idiff() {
             .code(),
         Some(4)
     );
+    let behind_options = ["-j", "1", "diff", "-fail", "0.1", &a, &a];
+    assert_eq!(desk.run(&behind_options).status.code(), Some(0));
+    for limit in ["--fail", "-warn", "--hardfail", "-failrelative"] {
+        let refused = desk.refused(&["diff", limit, "nan", &a, &b]);
+        assert!(
+            refused.contains("expected a number from 0"),
+            "{limit}: {refused}"
+        );
+    }
+}
+
+#[test]
+fn diff_tells_channels_that_it_passes_over() {
+    let desk = Desk::new();
+    let write = |name: &str, channels: &[&str]| {
+        let grey = [0.5; 4];
+        let channels: Vec<(&str, &[f32])> = channels.iter().map(|&c| (c, &grey[..])).collect();
+        petcomp::io::exr::write_channels(desk.path(name), (2, 2), &channels, &[]).expect("an EXR");
+    };
+    write("colours.exr", &["R", "G", "B"]);
+    write("depth.exr", &["R", "G", "B", "Z"]);
+    let output = desk.run(&["diff", "colours.exr", "depth.exr"]);
+    assert_eq!(output.status.code(), Some(3));
+    let told = text(&output.stdout);
+    assert!(told.contains("differ in their channels"), "{told}");
+    let told = desk.ok(&["diff", "depth.exr", "depth.exr"]);
+    assert!(told.contains("none of 1 other channels"), "{told}");
 }
 
 #[test]
@@ -1334,15 +1495,38 @@ fn an_object_on_a_display_is_measured() {
         .expect("a length");
     // 240 of 640 pixels, 2.5 mm over the display as it lies.
     assert!((length - 150.0).abs() < 2.0, "{said}");
+    let checked = || desk.ok(&["asset", "check", "assets"]);
+    let unknown = "thickness: 0.005, the default";
+    let said = checked();
     assert!(
-        desk.ok(&["asset", "check", "assets"])
-            .contains("captured: 2 photos")
+        said.contains("captured: 2 photos") && said.contains(unknown),
+        "{said}"
     );
+    run(add(&["--display-width", "0.4", "--thickness", "0.005"]));
+    assert!(!checked().contains(unknown));
+    let screen = refused(add(&["--screen", "0.1,0.5,0.2"]));
+    assert!(screen.contains("cannot be used with"), "{screen}");
     let list = "[[photos]]\nfile = \"photo_00_black.png\"\nasset = \"a\"\nclass = \"cup\"\n\
                 [photos.captured]\nphotos = [\"photo_01_white.png\"]\ndisplay = \"frames/display.toml\"\nwidth = 0.4\n";
     desk.write("photos.toml", list);
     let said = desk.ok(&["asset", "build", "photos.toml", "-o", "built"]);
     assert!(said.contains("1 photos, 1 assets"), "{said}");
+    let stroke = r#"{"says": "object", "radius_px": 3, "points_px": [[9, 9]]}"#;
+    for (said, expected) in [
+        (r#""verdict": "rejected""#, "rejected in"),
+        (
+            &*format!(r#""strokes": [{stroke}]"#),
+            "strokes: painted on a capture",
+        ),
+    ] {
+        let review = format!(
+            r#"{{"format": "cut-out-review", "version": 1, "size_px": [640, 400], {said}}}"#
+        );
+        desk.write("photo_00_black.review.json", review);
+        let built = desk.run(&["asset", "build", "photos.toml", "-o", "built"]);
+        let told = text(&built.stderr);
+        assert!(!built.status.success() && told.contains(expected), "{told}");
+    }
 }
 
 #[test]

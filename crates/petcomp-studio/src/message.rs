@@ -12,8 +12,12 @@ use axum::http::{HeaderMap, StatusCode};
 use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use std::time::Duration;
 
 const JSON: &str = "application/json";
+
+/// How long a connection may be without a request, or with a part of one.
+pub(crate) const PATIENCE: Duration = Duration::from_secs(10);
 
 /// The body of a request or an answer.
 pub(crate) struct Json<T>(pub(crate) T);
@@ -29,7 +33,8 @@ impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for Json<T> {
             let what = format!("expected a body of {JSON}");
             return Err(Refusal::new(StatusCode::UNSUPPORTED_MEDIA_TYPE, what).into_response());
         }
-        let body = Bytes::from_request(request, state).await;
+        let body = tokio::time::timeout(PATIENCE, Bytes::from_request(request, state)).await;
+        let body = body.map_err(|_| stalled().into_response())?;
         let body = body.map_err(IntoResponse::into_response)?;
         let value = serde_json::from_slice(&body).map_err(|e| unreadable(&e).into_response())?;
         Ok(Self(value))
@@ -62,6 +67,11 @@ fn is_json(headers: &HeaderMap) -> bool {
         .and_then(|told| told.to_str().ok());
     let essence = told.and_then(|told| told.split(';').next());
     essence.is_some_and(|essence| essence.trim().eq_ignore_ascii_case(JSON))
+}
+
+fn stalled() -> Refusal {
+    let what = format!("the body has not come within {} s", PATIENCE.as_secs());
+    Refusal::new(StatusCode::REQUEST_TIMEOUT, what)
 }
 
 fn unreadable(error: &dyn std::error::Error) -> Refusal {

@@ -10,7 +10,7 @@ use axum::http::header::{CACHE_CONTROL, CONTENT_TYPE};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
 use petcomp::io::{Format, ToFile};
-use petcomp::{Image, LinearRgb, Mix, filter, io};
+use petcomp::{Image, Mix, PremulRgba, filter, io};
 use serde::Deserialize;
 use std::path::Path;
 use std::sync::Arc;
@@ -84,12 +84,15 @@ pub(crate) fn shown(path: &Path, side: Option<usize>) -> Answer<Response> {
     let plain = plain_type(path)?;
     match (side, plain) {
         (None, Some(kind)) => Ok(of_type(kind, std::fs::read(path).map_err(unreadable)?)),
-        (None, None) => jpeg(&io::read::<LinearRgb>(path)?),
-        (Some(side), _) => {
-            let side = side.clamp(MIN_SIDE_PX, MAX_SIDE_PX);
-            jpeg(&at_most(io::read::<LinearRgb>(path)?, side))
-        }
+        (None, None) => over_black(path, usize::MAX),
+        (Some(side), _) => over_black(path, side.clamp(MIN_SIDE_PX, MAX_SIDE_PX)),
     }
+}
+
+/// A JPEG of a picture, which may have alpha.
+fn over_black(path: &Path, side_px: usize) -> Answer<Response> {
+    let picture = at_most(io::read::<PremulRgba>(path)?, side_px);
+    jpeg(&picture.map(PremulRgba::color))
 }
 
 /// The type of a file that every browser shows as petcomp reads it.
@@ -111,6 +114,7 @@ fn unreadable(error: std::io::Error) -> Refusal {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use petcomp::LinearRgb;
     use petcomp::io::{Bits, WriteOptions};
 
     #[test]
@@ -130,5 +134,14 @@ mod tests {
             std::fs::write(&answered, runtime.unwrap().block_on(bytes).unwrap()).unwrap();
             assert_eq!(io::read_header(&answered).unwrap().width, width, "{side:?}");
         }
+    }
+
+    #[test]
+    fn a_picture_with_alpha_has_a_small_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let picture = folder.path().join("a.png");
+        let half = PremulRgba::new(0.5, 0.25, 0.0, 0.5);
+        io::write(&picture, &Image::filled(40, 20, half)).unwrap();
+        assert!(shown(&picture, Some(16)).is_ok());
     }
 }

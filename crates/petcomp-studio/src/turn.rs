@@ -25,14 +25,14 @@ fn broken() -> Refusal {
     Refusal::new(StatusCode::INTERNAL_SERVER_ERROR, what)
 }
 
-/// Which tab of the browser asks. A tab of its own where a request does not say.
+/// Which tab of the browser asks. What does not say so replaces nothing, and nothing replaces it.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
-pub(crate) struct Tab(String);
+pub(crate) struct Tab(Option<String>);
 
 impl Tab {
     /// A part of the tab, whose requests replace each other and none of another part.
     pub(crate) fn part(&self, name: &str) -> Self {
-        Self(format!("{}/{name}", self.0))
+        Self(self.0.as_ref().map(|tab| format!("{tab}/{name}")))
     }
 }
 
@@ -42,7 +42,7 @@ impl<S: Sync> FromRequestParts<S> for Tab {
     async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Infallible> {
         let name = parts.headers.get(TAB_HEADER);
         let name = name.and_then(|value| value.to_str().ok());
-        Ok(Self(name.unwrap_or_default().into()))
+        Ok(Self(name.map(str::to_owned)))
     }
 }
 
@@ -93,7 +93,7 @@ impl Turn {
     pub(crate) fn check(&self) -> Answer<()> {
         let newest = self.turns.0.lock().unwrap_or_else(PoisonError::into_inner);
         match newest.get(&self.tab) {
-            Some(&number) if number == self.number => Ok(()),
+            Some(&number) if number == self.number || self.tab.0.is_none() => Ok(()),
             _ => Err(Refusal::superseded()),
         }
     }
@@ -106,10 +106,12 @@ mod tests {
     #[test]
     fn a_newer_request_ends_older_ones_of_its_tab_alone() {
         let turns = Turns::default();
-        let (here, there) = (Tab("a".into()), Tab("b".into()));
+        let (here, there) = (Tab(Some("a".into())), Tab(Some("b".into())));
         let (old, other) = (turns.take(here.clone()), turns.take(there));
         assert!(old.check().is_ok());
         let new = turns.take(here);
         assert!(old.check().is_err() && new.check().is_ok() && other.check().is_ok());
+        let nameless = [turns.take(Tab(None)), turns.take(Tab(None))];
+        assert!(nameless.iter().all(|turn| turn.check().is_ok()));
     }
 }

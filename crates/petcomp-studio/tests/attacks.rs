@@ -164,6 +164,18 @@ fn a_body_of_a_hundred_megabytes_is_refused() {
 }
 
 #[test]
+fn a_body_that_does_not_come_is_not_waited_for() {
+    let dir = folder_with(&[]);
+    let studio = studio_of(&dir);
+    let (root, host) = (studio.root(), studio.host());
+    let request = format!(
+        "POST {root}api/recipe/new HTTP/1.1\r\nHost: {host}\r\nOrigin: http://{host}\r\n\
+         Content-Type: application/json\r\nContent-Length: 1000\r\n\r\n{{"
+    );
+    assert_eq!(status(&studio.send(request.as_bytes())), "408");
+}
+
+#[test]
 fn a_thousand_silent_connections_do_not_stop_the_studio() {
     let dir = folder_with(&[]);
     let studio = studio_of(&dir);

@@ -50,11 +50,28 @@ impl Wanted {
         let found = match self {
             Self::Film => choose_film(names),
             Self::Color => choose_color(names),
-            _ if names.len() == 1 => Some((ChannelMatch::Named, vec![0])),
+            _ if names.len() == 1 => Some((self.match_alone(&names[0]), vec![0])),
             Self::Coverage => choose_coverage(names),
             Self::Depth => choose_depth(names),
         };
         found.ok_or_else(|| self.missing_among(names))
+    }
+
+    /// How well the only channel of a picture serves as a matte or a depth.
+    fn match_alone(self, name: &str) -> ChannelMatch {
+        let expected: &[&str] = match self {
+            Self::Depth => &["Z"],
+            _ => &["Y", "A", "mask"],
+        };
+        match expected.contains(&base_name(name)) {
+            true => ChannelMatch::Named,
+            false => ChannelMatch::Alone,
+        }
+    }
+
+    /// Pixels are colours.
+    pub(crate) fn is_color(self) -> bool {
+        matches!(self, Self::Color | Self::Film)
     }
 
     /// The message where the wanted channels are not there.
@@ -135,8 +152,8 @@ fn color_of_best_layer(names: &[String]) -> Option<Vec<usize>> {
     Some(color.clone())
 }
 
-/// A layer, with its dot, that holds the finished picture by its name.
-fn is_finished(layer: &str) -> bool {
+/// A layer, with its dot or without, that holds the finished picture by its name.
+pub(crate) fn is_finished(layer: &str) -> bool {
     let name = base_name(layer.trim_end_matches('.')).to_lowercase();
     FINISHED_LAYERS.contains(&name.as_str())
 }
@@ -238,5 +255,18 @@ mod tests {
                 .pick(&names("V.C.R V.Depth.Z V.Mist.Z"))
                 .is_err()
         );
+    }
+
+    #[test]
+    fn a_single_channel_serves_best_under_its_own_name() {
+        let matched = |wanted: Wanted, name: &str| wanted.choose(&names(name)).unwrap().0;
+        for (name, matte, depth) in [
+            ("Y", ChannelMatch::Named, ChannelMatch::Alone),
+            ("mask", ChannelMatch::Named, ChannelMatch::Alone),
+            ("V.Z", ChannelMatch::Alone, ChannelMatch::Named),
+        ] {
+            let found = [Wanted::Coverage, Wanted::Depth].map(|wanted| matched(wanted, name));
+            assert_eq!(found, [matte, depth], "{name}");
+        }
     }
 }

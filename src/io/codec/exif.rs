@@ -51,14 +51,6 @@ impl CameraNotes {
         }
     }
 
-    /// A TIFF declares that its colours are multiplied by alpha (TIFF 6.0, `ExtraSamples` = 1).
-    #[cfg(feature = "oiio")]
-    pub(crate) fn has_associated_alpha(tiff: &[u8]) -> bool {
-        const EXTRA_SAMPLES: Tag = Tag(exif::Context::Tiff, 338);
-        let exif = read_exif(&mut std::io::Cursor::new(tiff));
-        exif.is_some_and(|exif| integer(&exif, EXTRA_SAMPLES) == Some(1))
-    }
-
     fn from_exif(exif: &Exif) -> Self {
         let orientation = integer(exif, Tag::Orientation).and_then(|v| u8::try_from(v).ok());
         let size = noted_size(exif);

@@ -3,13 +3,15 @@
 //! OpenImageIO.
 
 use super::codes::{CodedImage, Codes};
+use super::exif::CameraNotes;
+use super::orient::Orientation;
 use super::raster::{Raster, Samples, default_names};
 use super::refusal::Refusal;
 use crate::io::foreign::{DEVELOP, RAW};
 use crate::io::format::Format;
 use crate::io::header::{Header, lines_of_notes, notes_of_lines};
 use crate::io::limits::{Demand, Limits};
-use std::io::{Cursor, Read, Seek, SeekFrom};
+use std::io::{BufRead, Cursor, Read, Seek, SeekFrom};
 use tiff::decoder::{Decoder, DecodingResult};
 use tiff::encoder::colortype::{self, Gray8, Gray16, Gray32Float, RGB8, RGB16, RGB32Float};
 use tiff::encoder::{TiffEncoder, TiffValue};
@@ -211,6 +213,34 @@ fn integers(decoder: &mut Decoder<impl Read + Seek>, tag: Tag) -> Result<Vec<u16
     Ok(integers.unwrap_or_default())
 }
 
+/// What the camera noted; the reader of EXIF knows no BigTIFF.
+pub(crate) fn camera_notes(mut file: impl BufRead + Seek) -> CameraNotes {
+    let notes = CameraNotes::read(&mut file);
+    let stated = file
+        .rewind()
+        .ok()
+        .and_then(|()| first_integer(file, Tag::Orientation));
+    match stated.map(u8::try_from) {
+        Some(Ok(orientation)) => CameraNotes {
+            orientation: Orientation(orientation),
+            ..notes
+        },
+        _ => notes,
+    }
+}
+
+/// Colours are multiplied by alpha, also in kinds of TIFF that the decoder cannot read.
+#[cfg(feature = "oiio")]
+pub(crate) fn has_associated_alpha(bytes: &[u8]) -> bool {
+    first_integer(Cursor::new(bytes), Tag::ExtraSamples) == Some(ASSOCIATED_ALPHA)
+}
+
+/// The first number of a tag of the first picture.
+fn first_integer(file: impl Read + Seek, tag: Tag) -> Option<u16> {
+    let mut decoder = Decoder::new(file).ok()?;
+    integers(&mut decoder, tag).ok()?.first().copied()
+}
+
 /// The embedded colour profile.
 pub(crate) fn profile(bytes: &[u8], limits: &Limits) -> Option<Vec<u8>> {
     // Of kinds of TIFF too that the decoder cannot read: OpenImageIO hands over their codes.
@@ -242,6 +272,20 @@ pub(crate) fn header(
 }
 
 pub(crate) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Refusal> {
+    match decode_known(bytes, limits) {
+        // OpenImageIO would read its bits as bytes.
+        Err(Refusal::Unsupported(what)) if !states_bits(bytes) => Err(Refusal::Broken(what)),
+        decoded => decoded,
+    }
+}
+
+/// The file says how many bits a sample has; where it does not, it is one.
+fn states_bits(bytes: &[u8]) -> bool {
+    let tags = first_tags(&mut Cursor::new(bytes)).unwrap_or_default();
+    tags.contains(&Tag::BitsPerSample.to_u16())
+}
+
+fn decode_known(bytes: &[u8], limits: &Limits) -> Result<Raster, Refusal> {
     let mut file = open(Cursor::new(bytes), bytes.len() as u64, limits)?;
     limits.check_memory(file.width, file.height, file.names.len())?;
     let extra = extra_samples(&mut file.decoder)?;
@@ -321,6 +365,11 @@ impl ChunkGrid {
         self.width * self.height * self.channels
     }
 
+    /// Channels of a strip or tile.
+    fn stored_channels(&self) -> usize {
+        if self.planes { 1 } else { self.channels }
+    }
+
     /// The first pixel of a strip or tile of a plane.
     fn corner(&self, index: usize) -> (usize, usize) {
         (
@@ -334,7 +383,7 @@ impl ChunkGrid {
     fn put<T: Copy>(&self, to: &mut [T], from: &[T], index: usize, [columns, rows]: [usize; 2]) {
         let plane = index / self.count();
         let (left, top) = self.corner(index % self.count());
-        let stored = if self.planes { 1 } else { self.channels };
+        let stored = self.stored_channels();
         let kept = columns.min(self.width - left);
         let rows = rows.min(self.height - top);
         for (y, row) in from.chunks_exact(columns * stored).take(rows).enumerate() {
@@ -375,17 +424,37 @@ impl ChunkGrid {
 /// The samples of the picture, strip by strip or tile by tile: the decoder's own way to read all at
 /// once leaves columns black where tiles reach over the border, and knows no planes.
 fn read_chunks(file: &mut OpenedTiff<impl Read + Seek>) -> Result<Samples, Refusal> {
-    if !file.bits.is_multiple_of(8) {
+    let packed = is_packed(file)?;
+    if !packed && !file.bits.is_multiple_of(8) {
         return Err(unsupported(&format!("{} bits a sample", file.bits)));
     }
     let grid = ChunkGrid::new(file)?;
     let mut picture: Option<Samples> = None;
     for index in 0..grid.count_all() {
-        let (chunk, size) = read_chunk(&mut file.decoder, index)?;
+        let (mut chunk, size) = read_chunk(&mut file.decoder, index)?;
+        if packed {
+            chunk = unpacked(&chunk, size[0] * grid.stored_channels())?;
+        }
         let picture = picture.get_or_insert_with(|| Samples::zeroed(chunk.kind(), grid.samples()));
         grid.put_samples(picture, &chunk, index, size)?;
     }
     picture.ok_or_else(|| "damaged TIFF: no strips".into())
+}
+
+/// A sample is a bit, and the file leaves that to the default.
+fn is_packed(file: &mut OpenedTiff<impl Read + Seek>) -> Result<bool, TiffError> {
+    Ok(file.bits == 1 && integers(&mut file.decoder, Tag::BitsPerSample)?.is_empty())
+}
+
+/// Codes of black and white, out of rows of so many bits.
+fn unpacked(chunk: &Samples, row_bits: usize) -> Result<Samples, Refusal> {
+    let Samples::U8(packed) = chunk else {
+        return Err(unsupported(&"signed bits"));
+    };
+    let rows = packed.chunks_exact(row_bits.div_ceil(8));
+    let codes =
+        rows.flat_map(|row| (0..row_bits).map(move |i| u8::MAX * (row[i / 8] >> (7 - i % 8) & 1)));
+    Ok(Samples::U8(codes.collect()))
 }
 
 /// A strip or tile, and its columns and rows.
@@ -590,6 +659,21 @@ mod tests {
             let told = decoded(raw).err().unwrap().to_string();
             assert!(told.starts_with("is a camera's raw file"), "{told}");
         }
+    }
+
+    #[test]
+    fn a_bigtiff_is_turned_and_multiplied_as_it_says() {
+        let mut file = Cursor::new(Vec::new());
+        let mut encoder = TiffEncoder::new_big(&mut file).unwrap();
+        let mut image = encoder.new_image::<RGB8>(2, 1).unwrap();
+        let alpha = [ExtraSamples::AssociatedAlpha];
+        image.extra_samples(&alpha).unwrap();
+        image.encoder().write_tag(Tag::Orientation, 6_u16).unwrap();
+        image.write_data(&[7; 8]).unwrap();
+        let notes = camera_notes(Cursor::new(file.get_ref()));
+        assert_eq!(notes.orientation, Orientation(6));
+        #[cfg(feature = "oiio")]
+        assert!(has_associated_alpha(file.get_ref()));
     }
 
     /// A picture of 5 x 3 whose tiles of 4 x 2 reach over its border, by planes or not.

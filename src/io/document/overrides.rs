@@ -103,12 +103,16 @@ fn entry<'t>(table: &'t mut toml::Table, key: &str) -> &'t mut Value {
         .or_insert_with(|| Value::Table(toml::Table::new()))
 }
 
-/// `objects[3]` is the key `objects`, then the index 3.
-fn split_indices(part: &str) -> impl Iterator<Item = PathStep<'_>> {
-    let key = part.split('[').next().unwrap_or_default();
-    let indices = part[key.len()..].split(['[', ']']);
-    let indices = indices.filter_map(|n| n.parse().ok().map(PathStep::Index));
-    std::iter::once(PathStep::Key(key)).chain(indices)
+/// `objects[3]` is the key `objects`, then the index 3; what has another form is all one key.
+fn split_indices(part: &str) -> Vec<PathStep<'_>> {
+    let (key, rest) = part.split_at(part.find('[').unwrap_or(part.len()));
+    let indices = rest.split_terminator(']').map(|index| {
+        let index = index.strip_prefix('[')?.parse().ok()?;
+        Some(PathStep::Index(index))
+    });
+    let steps = std::iter::once(Some(PathStep::Key(key))).chain(indices);
+    let steps: Option<Vec<_>> = steps.collect();
+    steps.unwrap_or_else(|| vec![PathStep::Key(part)])
 }
 
 #[cfg(test)]
@@ -148,6 +152,14 @@ mod tests {
                 .unwrap_err()
                 .to_string()
                 .contains("no such entry")
+        );
+    }
+
+    #[test]
+    fn brackets_without_an_index_are_of_the_key() {
+        assert_eq!(
+            applied("a = 1", "a[foo]=x").unwrap(),
+            "a = 1\n\"a[foo]\" = \"x\"\n"
         );
     }
 

@@ -4,8 +4,8 @@
 use super::open::reason;
 use crate::error::{Error, Result};
 use crate::work::{self, Kind};
-use std::fs::Permissions;
-use std::io::{BufWriter, Write};
+use std::fs::{File, Permissions};
+use std::io::{BufWriter, ErrorKind, Write};
 use std::path::{Component, Path, PathBuf};
 
 /// Writes a file in one step: readers see the old one or the new one, never a part.
@@ -22,17 +22,25 @@ pub(crate) fn write_through(
     path: &Path,
     fill: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
 ) -> Result<()> {
-    if path.is_dir() {
-        return Err(Error::file(path, "cannot be written: is a folder"));
-    }
+    check_replaceable(path)?;
     let folder = folder_of(path);
     let file = new_beside(folder).map_err(|e| match e.kind() {
-        std::io::ErrorKind::NotFound => no_folder(path, folder),
+        ErrorKind::NotFound => no_folder(path, folder),
         _ => not_written(path, &e),
     })?;
     fill_and_move(file, path, fill)
         .and_then(|()| sync_folder(folder))
         .map_err(|e| not_written(path, &e))
+}
+
+/// A device or a pipe is no file that another one may take the place of.
+fn check_replaceable(path: &Path) -> Result<()> {
+    let what = match path.metadata() {
+        Ok(there) if there.is_dir() => "is a folder",
+        Ok(there) if !there.is_file() => "not a regular file",
+        _ => return Ok(()),
+    };
+    Err(Error::file(path, format!("cannot be written: {what}")))
 }
 
 /// The folder that a file lies in; the working folder for a bare name.
@@ -56,10 +64,26 @@ fn fill_and_move(
     path: &Path,
     fill: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
 ) -> std::io::Result<()> {
+    keep_permissions(file.as_file(), path)?;
     fill_buffered(&mut file, fill)?;
     // Before it gets its name: after a power cut there is the old file or the new one.
     file.as_file().sync_all()?;
     file.persist(path).map_err(|e| e.error)?;
+    Ok(())
+}
+
+/// A file has the permissions of the one that it replaces.
+#[cfg(unix)]
+fn keep_permissions(file: &File, path: &Path) -> std::io::Result<()> {
+    match path.symlink_metadata() {
+        Ok(old) if old.is_file() => file.set_permissions(old.permissions()),
+        _ => Ok(()),
+    }
+}
+
+/// Other systems keep them in folders.
+#[cfg(not(unix))]
+fn keep_permissions(_: &File, _: &Path) -> std::io::Result<()> {
     Ok(())
 }
 
@@ -75,9 +99,11 @@ fn fill_buffered(
 /// Puts the names in a folder on the disk.
 #[cfg(unix)]
 fn sync_folder(folder: &Path) -> std::io::Result<()> {
-    match std::fs::File::open(folder)?.sync_all() {
-        // Some file systems have no such thing.
-        Err(e) if e.kind() == std::io::ErrorKind::InvalidInput => Ok(()),
+    match File::open(folder).and_then(|folder| folder.sync_all()) {
+        // Some file systems have no such thing, and some folders may be written but not read.
+        Err(e) if [ErrorKind::InvalidInput, ErrorKind::PermissionDenied].contains(&e.kind()) => {
+            Ok(())
+        }
         done => done,
     }
 }
@@ -94,8 +120,7 @@ fn sync_folder(_: &Path) -> std::io::Result<()> {
 /// Where it cannot be done nothing is lost but time: what is not there is made again.
 pub fn sync(folder: impl AsRef<Path>) {
     #[cfg(target_os = "linux")]
-    if let Err(e) = std::fs::File::open(&folder).and_then(|folder| Ok(rustix::fs::syncfs(folder)?))
-    {
+    if let Err(e) = File::open(&folder).and_then(|folder| Ok(rustix::fs::syncfs(folder)?)) {
         log::debug!("{}: syncfs: {e}", folder.as_ref().display());
     }
     #[cfg(not(target_os = "linux"))]
@@ -172,6 +197,44 @@ mod tests {
                 .contains("is a folder")
         );
         assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn what_is_replaced_is_a_file_and_keeps_its_permissions() {
+        use std::os::unix::fs::PermissionsExt;
+        let dir = tempfile::tempdir().unwrap();
+        let [own, pipe, link] = ["own", "pipe", "link"].map(|name| dir.path().join(name));
+        std::fs::write(&own, "old").unwrap();
+        std::fs::set_permissions(&own, Permissions::from_mode(0o600)).unwrap();
+        write_bytes(&own, b"new").unwrap();
+        let mode = own.metadata().unwrap().permissions().mode();
+        assert_eq!(
+            (std::fs::read(&own).unwrap(), mode & 0o777),
+            (b"new".into(), 0o600)
+        );
+        rustix::fs::mkfifoat(rustix::fs::CWD, &pipe, 0o600.into()).unwrap();
+        std::os::unix::fs::symlink(&pipe, &link).unwrap();
+        for path in [pipe, link] {
+            let told = write_bytes(&path, b"x").unwrap_err().to_string();
+            assert!(
+                told.ends_with("cannot be written: not a regular file"),
+                "{told}"
+            );
+        }
+    }
+
+    /// Whoever runs this as root may read every folder.
+    #[cfg(unix)]
+    #[test]
+    fn a_folder_that_may_be_written_need_not_be_readable() {
+        use std::os::unix::fs::PermissionsExt;
+        let dir = tempfile::tempdir().unwrap();
+        let folder = dir.path().join("in");
+        create_folder(&folder).unwrap();
+        std::fs::set_permissions(&folder, Permissions::from_mode(0o333)).unwrap();
+        write_bytes(&folder.join("a"), b"x").unwrap();
+        std::fs::set_permissions(&folder, Permissions::from_mode(0o700)).unwrap();
     }
 
     #[test]

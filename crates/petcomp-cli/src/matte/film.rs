@@ -2,6 +2,7 @@
 
 use super::picture_files::{check_same_size, is_exr, write_optional};
 use crate::diagnostics::report_diagnostics;
+use crate::distinct_files::check_distinct;
 use crate::global::GlobalArgs;
 use anyhow::Result;
 use petcomp::io::{self, Override, from_overrides};
@@ -46,6 +47,7 @@ pub(crate) struct FilmArgs {
 }
 
 #[derive(clap::Args)]
+#[command(mut_arg("settings", |arg| arg.help("An option, such as film.max_sigma=0.1")))]
 pub(crate) struct TriangulateArgs {
     /// Photos of one object that stays where it is, each on another screen
     #[arg(required = true, num_args = 2..)]
@@ -57,7 +59,7 @@ pub(crate) struct TriangulateArgs {
 impl FilmArgs {
     pub(crate) fn run(&self, global: &GlobalArgs) -> Result<()> {
         let args = &self.options;
-        args.check_output()?;
+        args.check(std::slice::from_ref(&self.photo))?;
         let photo: Image<LinearRgb> = io::read(&self.photo)?;
         let inside = args.object_mask(&self.photo, &photo)?;
         let plate = args.screen_plate(0, &self.photo, &photo, &inside)?;
@@ -84,7 +86,7 @@ impl FilmArgs {
 impl TriangulateArgs {
     pub(crate) fn run(&self, global: &GlobalArgs) -> Result<()> {
         let args = &self.options;
-        args.check_output()?;
+        args.check(&self.photos)?;
         let photos = self.read_photos()?;
         let inside = args.object_mask(&self.photos[0], &photos[0])?;
         let plates = self.screen_plates(&photos, &inside)?;
@@ -136,12 +138,21 @@ impl TriangulateArgs {
 }
 
 impl FilmOptionArgs {
-    /// No other format holds the channels of film.
-    fn check_output(&self) -> Result<()> {
+    /// No other format holds the channels of film, plates are there for all photos or none, and what
+    /// is read is not written over.
+    fn check(&self, photos: &[PathBuf]) -> Result<()> {
         anyhow::ensure!(
             is_exr(&self.output),
             "{}: film needs a file called .exr",
             self.output.display()
+        );
+        let inputs = photos.iter().chain(&self.plates).chain(&self.mask);
+        let extras = self.plate_out.iter().chain(&self.uncertainty);
+        check_distinct(inputs, extras.chain([&self.output]))?;
+        let (plates, photos) = (self.plates.len(), photos.len());
+        anyhow::ensure!(
+            plates == 0 || plates == photos,
+            "--plate: {plates} given, expected {photos}, one for each photo"
         );
         Ok(())
     }

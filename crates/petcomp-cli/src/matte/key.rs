@@ -3,6 +3,7 @@
 use super::picture_files::{check_same_size, write_optional, write_picture};
 use crate::batch::FileBatch;
 use crate::diagnostics::report_diagnostics;
+use crate::distinct_files::check_distinct;
 use crate::global::GlobalArgs;
 use crate::values::parse_color;
 use anyhow::{Context, Result};
@@ -11,7 +12,6 @@ use petcomp::matte::key::{Deviations, KeyOptions, Keyed, Keying, Profile, Screen
 use petcomp::matte::{PlateOptions, ScreenPlate, SegmentOptions, segment};
 use petcomp::{Coverage, Image, LinearRgb, PremulRgba};
 use rayon::prelude::*;
-use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
@@ -22,7 +22,8 @@ pub(crate) struct KeyArgs {
     #[arg(required = true, value_name = "PICTURE")]
     frames: Vec<PathBuf>,
     /// Where the premultiplied cut-out goes, an EXR with 32-bit floats; of several frames, the
-    /// folder where each gets its own name, as --matte and --edges are then
+    /// folder where each gets its own name (.exr for a JPEG, which has no alpha), as --matte and
+    /// --edges are then
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     /// Where the matte goes
@@ -78,7 +79,7 @@ impl KeyArgs {
                 files.collect::<Result<_>>()?
             }
         };
-        check_distinct(self.inputs(), &files)?;
+        check_distinct(self.inputs(), files.iter().flat_map(FrameFiles::targets))?;
         Ok(files)
     }
 
@@ -92,7 +93,11 @@ impl KeyArgs {
         let name = frame
             .file_name()
             .context(format!("{}: no file", frame.display()))?;
-        Ok(self.files_of(frame, |folder| folder.join(name)))
+        let files = self.files_of(frame, |folder| folder.join(name));
+        Ok(FrameFiles {
+            cutout: with_alpha(files.cutout),
+            ..files
+        })
     }
 
     fn create_folders(&self) -> petcomp::Result<()> {
@@ -113,6 +118,18 @@ impl KeyArgs {
     }
 }
 
+/// The file itself, or an EXR in place of a JPEG.
+fn with_alpha(file: PathBuf) -> PathBuf {
+    let ending = file.extension().unwrap_or_default();
+    let is_jpeg = ["jpg", "jpeg"]
+        .iter()
+        .any(|e| ending.eq_ignore_ascii_case(e));
+    match is_jpeg {
+        true => file.with_extension("exr"),
+        false => file,
+    }
+}
+
 /// A frame, and where what is made of it goes.
 struct FrameFiles {
     frame: PathBuf,
@@ -126,31 +143,6 @@ impl FrameFiles {
         let optional = [&self.matte, &self.edges];
         std::iter::once(&self.cutout).chain(optional.into_iter().flatten())
     }
-}
-
-/// Fails on the first file that is read and would be written over, or that two pictures would be
-/// written to.
-fn check_distinct<'a>(
-    inputs: impl Iterator<Item = &'a PathBuf>,
-    files: &[FrameFiles],
-) -> Result<()> {
-    let inputs: BTreeSet<PathBuf> = inputs.map(|path| real_path(path)).collect();
-    let mut targets = BTreeSet::new();
-    for target in files.iter().flat_map(FrameFiles::targets) {
-        let (path, shown) = (real_path(target), target.display());
-        anyhow::ensure!(
-            !inputs.contains(&path),
-            "{shown}: is read and would be written over"
-        );
-        anyhow::ensure!(targets.insert(path), "{shown}: two pictures would go here");
-    }
-    Ok(())
-}
-
-/// One path for every name of a file that is there.
-fn real_path(path: &Path) -> PathBuf {
-    let real = path.canonicalize().or_else(|_| std::path::absolute(path));
-    real.unwrap_or_else(|_| path.to_owned())
 }
 
 fn with_found_mattes(frame: &Path, plate: Option<&Image<LinearRgb>>) -> Result<KeyerInput> {

@@ -2,12 +2,14 @@
 //! Blender's other keyers.
 
 use super::picture_files::{write_optional, write_picture};
+use crate::distinct_files::check_distinct;
 use crate::values::{parse_color, parse_pixel};
 use anyhow::Result;
 use nalgebra::Point2;
 use petcomp::io::{Override, from_overrides};
 use petcomp::matte::{
-    ScreenPoint, channel_key, chroma_key, color_spill, difference_key, keying_screen,
+    ChannelKeyOptions, ChromaKeyOptions, ColorSpillOptions, ScreenPoint, channel_key, chroma_key,
+    color_spill, difference_key, keying_screen,
 };
 use petcomp::{Coverage, Image, LinearRgb, PremulRgba, io};
 use std::path::{Path, PathBuf};
@@ -79,6 +81,7 @@ pub(crate) struct KeyingScreenArgs {
 
 impl KeyingScreenArgs {
     fn run(&self) -> Result<()> {
+        check_distinct([&self.input], [&self.output])?;
         let photo: Image<PremulRgba> = io::read(&self.input)?;
         let points = self.points.iter().map(|&at| screen_point(&photo, at));
         let points = points.collect::<Result<Vec<_>>>()?;
@@ -90,7 +93,9 @@ impl KeyingScreenArgs {
 pub(crate) fn run(command: &NodeCommand) -> Result<()> {
     match command {
         NodeCommand::ChromaKey { pictures, screen } => pictures.write_cut_out(|photo, given| {
-            Ok(chroma_key(photo, *screen, &from_overrides("key", given)?))
+            let options: ChromaKeyOptions = from_overrides("key", given)?;
+            options.check()?;
+            Ok(chroma_key(photo, *screen, &options))
         }),
         NodeCommand::DifferenceKey { pictures, clean } => pictures.difference_key(clean),
         NodeCommand::ChannelKey(pictures) => pictures.channel_key(),
@@ -101,24 +106,29 @@ pub(crate) fn run(command: &NodeCommand) -> Result<()> {
 
 impl NodePicture {
     fn color_spill(&self) -> Result<()> {
-        let photo = self.read_photo()?;
-        let options = from_overrides("key", &self.settings)?;
+        let photo = self.read_photo(&None)?;
+        let options: ColorSpillOptions = from_overrides("key", &self.settings)?;
+        options.check()?;
         write_picture(&self.output, &color_spill(&photo, &options))
     }
 
-    fn read_photo(&self) -> petcomp::Result<Image<PremulRgba>> {
-        io::read(&self.input)
+    /// Not where it would be written over, or where the matte goes to the same file.
+    fn read_photo(&self, matte: &Option<PathBuf>) -> Result<Image<PremulRgba>> {
+        check_distinct([&self.input], matte.iter().chain([&self.output]))?;
+        Ok(io::read(&self.input)?)
     }
 }
 
 impl KeyerPictures {
     fn channel_key(&self) -> Result<()> {
-        let options = from_overrides("key", &self.picture.settings)?;
-        let keyed = channel_key(&self.picture.read_photo()?, &options);
+        let options: ChannelKeyOptions = from_overrides("key", &self.picture.settings)?;
+        options.check()?;
+        let keyed = channel_key(&self.picture.read_photo(&self.matte)?, &options);
         self.write_pair(&keyed.cutout, &keyed.matte)
     }
 
     fn difference_key(&self, clean: &Path) -> Result<()> {
+        check_distinct([clean], self.matte.iter().chain([&self.picture.output]))?;
         let clean: Image<PremulRgba> = io::read(clean)?;
         self.write_cut_out(|photo, given| {
             let options = from_overrides("key", given)?;
@@ -131,7 +141,7 @@ impl KeyerPictures {
         &self,
         matte: impl Fn(&Image<PremulRgba>, &[Override]) -> Result<Image<Coverage>>,
     ) -> Result<()> {
-        let photo = self.picture.read_photo()?;
+        let photo = self.picture.read_photo(&self.matte)?;
         let matte = matte(&photo, &self.picture.settings)?;
         self.write_pair(&photo.zip_map(&matte, |p, m| p.masked(m)), &matte)
     }

@@ -6,7 +6,7 @@ use crate::world::{LIST, World};
 use petcomp::asset::{self, Library, List};
 use petcomp::camera::{self, CameraFile, ColmapModel, SolveOptions};
 use petcomp::dataset::page::DatasetReportOptions;
-use petcomp::dataset::{self, DatasetConfig, Listing, Partition, Pipeline, YoloSet};
+use petcomp::dataset::{self, DatasetConfig, Partition, Pipeline, YoloSet};
 use petcomp::eval::page::{EvalReportOptions, Metrics, Run};
 use petcomp::eval::{self, Tags};
 use petcomp::filter::Pyramid;
@@ -467,7 +467,7 @@ fn dataset_folder(world: &World) {
     );
     ends(dataset::check(&folder).map(|checked| (checked.balance(), checked.notes())));
     ends(
-        Listing::read(&folder)
+        YoloSet::read(&folder)
             .and_then(|all| all.partitioned(Partition::Grouped(dataset::Group::Selection), 0.5, 1)),
     );
     if let Some(record) = ends(io::read_json::<dataset::SampleRecord>(
@@ -509,7 +509,7 @@ fn yolo_set(world: &World) {
     let folder = world.path("dataset");
     ends(YoloSet::open(&folder));
     ends(
-        Listing::read(&folder)
+        YoloSet::read(&folder)
             .and_then(|all| all.partitioned(Partition::Consecutive { guard: 1 }, 0.5, 1)),
     );
     ends(dataset::check(&folder).map(|checked| (checked.balance(), checked.notes())));

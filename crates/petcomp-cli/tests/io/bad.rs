@@ -87,14 +87,7 @@ fn truncated_files_are_errors() {
     for (name, bytes) in valid(&folder) {
         let step = bytes.len().div_ceil(40);
         for length in (1..bytes.len()).step_by(step) {
-            let path = folder.with(name, &bytes[..length]);
-            // Only what stands behind the last pixel may be missing: closing tags and text that
-            // TIFF puts at the end.
-            if !name.ends_with(".tif") || length < bytes.len() / 2 {
-                refusal(&path);
-            } else {
-                let _ = io::read::<PremulRgba>(&path);
-            }
+            refusal(&folder.with(name, &bytes[..length]));
         }
     }
 }

@@ -237,6 +237,19 @@ fn old_lzw_and_bits_from_the_lowest_up_are_left_to_openimageio() {
 }
 
 #[test]
+fn a_fax_that_does_not_state_its_bits_is_no_noise() {
+    let folder = Folder::new();
+    let mut tags = [about(8, 1, 1, 1), vec![(259, 3, 1, 3), (278, 3, 1, 1)]].concat();
+    tags.retain(|tag| tag.0 != 258);
+    let fax = folder.with("fax.tif", &in_pieces(&tags, STRIPS, &[vec![0; 8]]));
+    let e = io::read::<LinearRgb>(fax).unwrap_err().to_string();
+    assert!(
+        e.contains("fax.tif: unsupported TIFF") && !e.contains("OpenImageIO"),
+        "{e}"
+    );
+}
+
+#[test]
 fn grey_tiffs_have_alpha() {
     let folder = Folder::new();
     let tags = [
@@ -409,6 +422,20 @@ fn the_part_with_colours_is_taken_wherever_it_stands() {
         [taken(&parts), taken(&parts[..2]), taken(&parts[..1])],
         [2.0, 1.0, 9.0]
     );
+    let finished = Part {
+        name: "ViewLayer.Combined".into(),
+        ..rgb("", 4.0)
+    };
+    assert_eq!(taken(&[rgb("", 3.0), finished]), 4.0);
+    write_parts(&path, (1, 1), &[part("depth", &[("Z", 0.0)]), rgb("", 1.0)]).unwrap();
+    assert_eq!(io::read::<Coverage>(&path).unwrap()[(0, 0)], Coverage(1.0));
+    write_parts(
+        &path,
+        (1, 1),
+        &[part("mask", &[("Y", 1.0)]), parts[0].clone()],
+    )
+    .unwrap();
+    assert_eq!(io::read::<Depth>(&path).unwrap()[(0, 0)], Depth(9.0));
 }
 
 /// An EXR of 4 x 4 halves with luminance for each pixel and a pair of colour differences for four

@@ -1,10 +1,10 @@
-//! Files that are hard to write or to read: values beyond a half float, the smallest ones, cut and
-//! lying headers, 16k.
+//! Files that are hard to write or to read: values beyond a half float, the smallest ones, documents
+//! without an end, 16k.
 
 use super::staged::temporary_folder;
 use super::{HardCase, Outcome, memory};
 use petcomp::io::{self, Bits, ReadOptions, WriteOptions, exr};
-use petcomp::{Coverage, Error, Image, LinearRgb, PremulRgba, Result};
+use petcomp::{Coverage, Error, Image, LinearRgb, Result};
 use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
@@ -28,14 +28,6 @@ pub(super) fn cases() -> Result<Vec<HardCase>> {
     ]);
     cases.extend(FORMATS.map(one_pixel));
     cases.extend(FORMATS.map(no_pixel));
-    cases.extend(FORMATS.map(truncated_file));
-    cases.extend([
-        lying_png(),
-        lying_exr(),
-        lying_hdr(),
-        empty_file(),
-        missing_file(),
-    ]);
     Ok(cases)
 }
 
@@ -222,165 +214,15 @@ fn write_no_pixel(format: &str) -> Result<Outcome> {
     ))
 }
 
-/// The bytes of a picture of 17 x 13 pixels.
-fn picture_bytes(path: &Path) -> Result<Vec<u8>> {
-    io::write(path, &Image::from_fn(17, 13, test_color))?;
-    std::fs::read(path).map_err(|e| Error::file(path, e))
-}
-
-fn test_color(x: usize, y: usize) -> LinearRgb {
-    let blue = ((x * 7 + y * 5) % 11) as f32 / 11.0;
-    LinearRgb::new(x as f32 / 17.0, y as f32 / 13.0, blue)
-}
-
-/// The picture that bytes under a name decode to.
-fn read_as(path: &Path, bytes: &[u8]) -> Result<Image<PremulRgba>> {
-    save(path, bytes)?;
-    io::read(path)
-}
-
-fn truncated_file(format: &'static str) -> HardCase {
-    HardCase::new(
-        format!("{format}: truncated"),
-        "17 x 13 pixels, cut at each of 20 places, the first at 0 bytes",
-        "refused at every one: 0 read",
-        move || read_truncated_files(format),
-    )
-}
-
-fn read_truncated_files(format: &str) -> Result<Outcome> {
-    let folder = CaseFolder::new()?;
-    let path = folder.picture(format);
-    let whole = picture_bytes(&path)?;
-    let cuts = (0..20).map(|i| &whole[..i * whole.len() / 20]);
-    let read = cuts.filter(|cut| read_as(&path, cut).is_ok()).count();
-    Ok(Outcome::none(read, "read"))
-}
-
-/// What a header, a message and the decoders' buffers may take, GiB.
-const SMALL_GROWTH_GIB: f64 = 0.064;
-
-/// A file whose header asks for more than is allowed: refused by the name of the limit, before
-/// memory is taken.
-fn lying(
-    name: &str,
-    input: &str,
-    limit: &'static str,
-    make: fn(&Path) -> Result<PathBuf>,
-) -> HardCase {
-    let expectation = format!("refused by Limits::{limit}, within 64 MiB");
-    HardCase::new(name, input, expectation, move || {
-        let folder = CaseFolder::new()?;
-        Ok(read_lying_file(&make(folder.0.path())?, limit))
-    })
-}
-
-fn read_lying_file(path: &Path, limit: &str) -> Outcome {
-    let (_, before) = memory::peak_gib(|| ());
-    let (read, peak) = memory::peak_gib(|| io::read::<PremulRgba>(path));
-    let grown = peak.zip(before).map_or(0.0, |(peak, before)| peak - before);
-    let outcome = without_path(Outcome::refused(read, &format!("Limits::{limit}")), path);
-    Outcome::new(
-        format!("{}; {:.0} MiB", outcome.measured, grown * 1024.0),
-        outcome.passed && grown < SMALL_GROWTH_GIB,
-    )
-}
-
 /// An outcome whose message lacks the path, which differs in every run.
 fn without_path(outcome: Outcome, path: &Path) -> Outcome {
     let prefix = format!("{}: ", path.display());
     Outcome::new(outcome.measured.replace(&prefix, ""), outcome.passed)
 }
 
-fn lying_png() -> HardCase {
-    lying(
-        "png: header of 32767 x 32767 pixels",
-        "a PNG of 17 x 13 that says so",
-        "pixels",
-        |folder| {
-            let path = folder.join("a.png");
-            let mut png = picture_bytes(&path)?;
-            png[16..24].copy_from_slice(&[0, 0, 0x7f, 0xff, 0, 0, 0x7f, 0xff]);
-            let sum = crc32fast::hash(&png[12..29]);
-            png[29..33].copy_from_slice(&sum.to_be_bytes());
-            save(path, &png)
-        },
-    )
-}
-
-fn lying_exr() -> HardCase {
-    lying(
-        "exr: window of 200 000 pixels a side",
-        "an EXR of 17 x 13 that says so",
-        "side",
-        |folder| {
-            let path = folder.join("a.exr");
-            let mut exr = picture_bytes(&path)?;
-            enlarge_window(&mut exr, b"dataWindow\0box2i\0");
-            enlarge_window(&mut exr, b"displayWindow\0box2i\0");
-            save(path, &exr)
-        },
-    )
-}
-
-fn enlarge_window(exr: &mut [u8], attribute: &[u8]) {
-    let Some(at) = exr.windows(attribute.len()).position(|w| w == attribute) else {
-        return;
-    };
-    // Behind the name and the attribute's size stand x0, y0, x1, y1.
-    let corner = at + attribute.len() + 4 + 8;
-    exr[corner..corner + 8].copy_from_slice(&[0x3f, 0x0d, 3, 0, 0x3f, 0x0d, 3, 0]);
-}
-
-fn lying_hdr() -> HardCase {
-    lying(
-        "hdr: 99999 pixels a side",
-        "a header and nothing behind it",
-        "side",
-        |folder| {
-            let header = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 99999 +X 99999\n";
-            save(folder.join("a.hdr"), header)
-        },
-    )
-}
-
 fn save<P: AsRef<Path>>(path: P, bytes: &[u8]) -> Result<P> {
     std::fs::write(&path, bytes).map_err(|e| Error::file(path.as_ref(), e))?;
     Ok(path)
-}
-
-fn empty_file() -> HardCase {
-    HardCase::new(
-        "file of 0 bytes",
-        "called .png, .exr, .tif, .jpg",
-        "refused: 0 read",
-        read_empty_files,
-    )
-}
-
-fn read_empty_files() -> Result<Outcome> {
-    let folder = CaseFolder::new()?;
-    let attempts = FORMATS.map(|format| read_as(&folder.picture(format), &[]));
-    let read = attempts.iter().filter(|attempt| attempt.is_ok());
-    Ok(Outcome::none(read.count(), "read"))
-}
-
-fn missing_file() -> HardCase {
-    HardCase::new(
-        "no file",
-        "a name that does not exist",
-        "an error that names the file",
-        read_missing_file,
-    )
-}
-
-fn read_missing_file() -> Result<Outcome> {
-    let folder = CaseFolder::new()?;
-    let read = io::read::<PremulRgba>(folder.path("none.png"));
-    let outcome = Outcome::refused(read, "none.png");
-    let prefix = format!("{}/", folder.0.path().display());
-    let measured = outcome.measured.replace(&prefix, "");
-    Ok(Outcome::new(measured, outcome.passed))
 }
 
 fn nested_document() -> HardCase {

@@ -4,12 +4,13 @@ mod draft;
 mod preview;
 
 use crate::message::{Json, Query};
-use crate::refusal::Answer;
+use crate::refusal::{Answer, Refusal};
 use crate::server::Page;
 use crate::studio::Studio;
 use crate::turn::{Tab, Turns, blocking};
 use axum::Router;
 use axum::extract::State;
+use axum::http::StatusCode;
 use axum::response::Response;
 use axum::routing::{get, post};
 use draft::{Draft, Edits};
@@ -47,15 +48,26 @@ pub(crate) fn routes() -> Router<Arc<Studio>> {
 /// The recipes of the folder: documents that `petcomp dataset generate` takes.
 async fn files(State(studio): State<Arc<Studio>>) -> Answer<Json<Vec<String>>> {
     blocking(move || {
-        let is_recipe = |path: &Path| {
-            let is_toml = path
-                .extension()
-                .is_some_and(|extension| extension == "toml");
-            is_toml && DatasetConfig::read(path, &[]).is_ok()
-        };
+        let is_recipe = |path: &Path| is_toml(path) && DatasetConfig::read(path, &[]).is_ok();
         Ok(Json(studio.folder.find(is_recipe)))
     })
     .await
+}
+
+fn is_toml(path: &Path) -> bool {
+    path.extension()
+        .is_some_and(|extension| extension == "toml")
+}
+
+/// Fails on a name that no page would list.
+fn check_listed(file: &str) -> Answer<()> {
+    let is_hidden = file.split('/').any(|part| part.starts_with('.'));
+    if is_toml(Path::new(file)) && !is_hidden {
+        return Ok(());
+    }
+    let file = petcomp::printable(file);
+    let what = format!("{file}: expected a name that ends in .toml and is not hidden");
+    Err(Refusal::new(StatusCode::UNPROCESSABLE_ENTITY, what))
 }
 
 async fn told_settings() -> Answer<Json<Vec<SettingGroup>>> {
@@ -96,6 +108,7 @@ async fn begin(
     Json(FileName { file }): Json<FileName>,
 ) -> Answer<Json<String>> {
     blocking(move || {
+        check_listed(&file)?;
         let saved = studio.folder.save(&file, DatasetConfig::template(), None);
         saved.map(Json)
     })
@@ -154,4 +167,17 @@ async fn picture(
             pipelines.picture(&studio.folder, &asked, turn)
         })
         .await
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_recipe_begins_under_a_name_that_pages_list() {
+        assert!(check_listed("a/b.toml").is_ok());
+        for unseen in [".b.toml", "a/.b/c.toml", "a/cup9.png"] {
+            assert!(check_listed(unseen).is_err(), "{unseen}");
+        }
+    }
 }

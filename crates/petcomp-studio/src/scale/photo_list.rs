@@ -4,19 +4,23 @@
 use crate::folder::Folder;
 use crate::refusal::{Answer, Refusal};
 use axum::http::StatusCode;
-use petcomp::Error;
+use petcomp::asset::{Manifest, PhotoEntry, with_actual_spelling};
+use petcomp::{Error, io};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
 const LIST_NAME: &str = "photos.toml";
+/// A list in a form that is read and not written here.
+const OTHER_LIST_NAME: &str = "photos.csv";
 const HEADER: &str = "[[photos]]";
 /// Keys that say how large things in a photo are, one way or another.
-const SCALE_KEYS: [&str; 6] = [
+const SCALE_KEYS: [&str; 7] = [
     "length",
     "width",
     "px_per_metre",
+    "px_per_meter",
     "screen_size",
     "screen_corners",
     "marker_size",
@@ -70,11 +74,25 @@ pub(super) fn read(folder: &Folder, photo: &str) -> Answer<ListedPhoto> {
         });
     };
     let entries = entries_of(&versioned.text, &list)?;
+    let file = listed_name(&entries, &folder.file(photo)?).unwrap_or(file.into());
     Ok(ListedPhoto {
         list,
         version: Some(versioned.version),
-        entry: entries.into_iter().find(|entry| names(entry, file)),
+        entry: entries.into_iter().find(|entry| names(entry, &file)),
     })
+}
+
+/// What a list calls a photo beside it.
+fn listed_name(entries: &[Table], photo: &Path) -> Option<String> {
+    let mut files = entries.iter().filter_map(file_of);
+    let name = files.find(|file| photo_beside(photo, file).is_some_and(|path| path == photo));
+    name.map(str::to_owned)
+}
+
+/// The photo of a name in the list beside a file, as `asset build` finds it: in capitals, too.
+fn photo_beside(path: &Path, name: &str) -> Option<PathBuf> {
+    let photo = io::below(path.parent()?, name).ok()?;
+    Some(with_actual_spelling(photo))
 }
 
 /// The photos that have a scale, of some.
@@ -85,12 +103,16 @@ pub(super) fn scaled_photos(folder: &Folder, photos: &[String]) -> BTreeSet<Stri
         let text = folder
             .read_text(&list)
             .map_or(String::new(), |file| file.text);
-        let below = list.strip_suffix(LIST_NAME).unwrap_or_default();
-        for entry in entries_of(&text, &list).unwrap_or_default() {
-            if let Some(file) = file_of(&entry).filter(|_| has_scale(&entry)) {
-                scaled.insert(format!("{below}{file}"));
-            }
-        }
+        let Ok(path) = folder.file(&list) else {
+            continue;
+        };
+        let entries = entries_of(&text, &list).unwrap_or_default();
+        let files = entries
+            .iter()
+            .filter(|entry| has_scale(entry))
+            .filter_map(file_of);
+        let photos = files.filter_map(|file| photo_beside(&path, file));
+        scaled.extend(photos.map(|photo| folder.name_of(&photo)));
     }
     scaled
 }
@@ -116,58 +138,73 @@ fn entries_of(text: &str, list: &str) -> Answer<Vec<Table>> {
 
 /// Saves the scale of a photo in the list beside it; one that is not in it is added at its end.
 pub(super) fn save(folder: &Folder, new: &ScaledPhoto<'_>, version: Option<&str>) -> Answer<()> {
-    check(new)?;
-    let (list, _) = list_of(new.photo);
-    let text = folder
-        .text_if_any(&list)?
-        .map_or(String::new(), |file| file.text);
-    let changed = with_scale(&text, new);
-    let (before, after) = (entries_of(&text, &list)?, entries_of(&changed, &list)?);
-    check_rest(&before, &after, new, &list)?;
+    let (list, file) = list_of(new.photo);
+    let text = match folder.text_if_any(&list)? {
+        Some(versioned) => versioned.text,
+        None => no_list(folder, &list)?,
+    };
+    let before = entries_of(&text, &list)?;
+    let file = listed_name(&before, &folder.file(new.photo)?).unwrap_or(file.into());
+    let changed = with_scale(&text, &file, new);
+    let after = entries_of(&changed, &list)?;
+    check_entry(changed_entry(&before, &after, &file, &list)?, &list)?;
     folder.save(&list, &changed, version)?;
     Ok(())
 }
 
-fn check(new: &ScaledPhoto<'_>) -> Answer<()> {
-    let is_length = |value: &f64| value.is_finite() && *value > 0.0;
-    let fine = match &new.scale {
-        PhotoScale::PxPerMetre(scale) => is_length(scale),
-        PhotoScale::Screen(size, corners) => {
-            size.iter().all(is_length) && corners.iter().flatten().all(|v| v.is_finite())
-        }
-    };
-    if fine {
-        return Ok(());
+/// The text of a list that is not there yet; not beside one that `asset build` would then pass over.
+fn no_list(folder: &Folder, list: &str) -> Answer<String> {
+    let other = list.replace(LIST_NAME, OTHER_LIST_NAME);
+    if folder.file(&other).is_ok() {
+        let what = format!("{other}: lists the photos here; write the scale there");
+        return Err(Refusal::new(StatusCode::UNPROCESSABLE_ENTITY, what));
     }
-    let what = "scale: expected positive numbers";
-    Err(Refusal::new(StatusCode::UNPROCESSABLE_ENTITY, what))
+    Ok(String::new())
 }
 
-/// A list in a form that lines do not show (tables in one line) is not changed at all.
-fn check_rest(before: &[Table], after: &[Table], new: &ScaledPhoto<'_>, list: &str) -> Answer<()> {
-    let (_, file) = list_of(new.photo);
+/// The only entry that was changed. A list in a form that lines do not show (tables in one line) is
+/// not changed at all.
+fn changed_entry<'a>(
+    before: &[Table],
+    after: &'a [Table],
+    file: &str,
+    list: &str,
+) -> Answer<&'a Table> {
     let others = |entries: &[Table]| {
         let others = entries.iter().filter(|entry| !names(entry, file));
         others.cloned().collect::<Vec<_>>()
     };
     let mine: Vec<&Table> = after.iter().filter(|entry| names(entry, file)).collect();
-    if others(before) == others(after) && mine.len() == 1 && has_scale(mine[0]) {
-        return Ok(());
+    match mine[..] {
+        [mine] if others(before) == others(after) && has_scale(mine) => Ok(mine),
+        _ => {
+            let what =
+                format!("{list}: its photos are not written as {HEADER}; copy the line there");
+            Err(Refusal::new(StatusCode::UNPROCESSABLE_ENTITY, what))
+        }
     }
-    let what = format!("{list}: its photos are not written as {HEADER}; copy the line there");
-    Err(Refusal::new(StatusCode::UNPROCESSABLE_ENTITY, what))
+}
+
+/// Fails on an entry for which `asset build` would refuse the whole list.
+fn check_entry(entry: &Table, list: &str) -> Answer<()> {
+    let read: Result<PhotoEntry, toml::de::Error> = entry.clone().try_into();
+    let entry = read.map_err(|e| Error::file(list, e.message()))?;
+    let known = Manifest {
+        classes: vec![entry.class.clone()],
+        ..Manifest::default()
+    };
+    Ok(entry.check(&known).map_err(|e| e.in_file(list))?)
 }
 
 /// The text of a list with the scale of a photo; remarks and everything else stay.
-fn with_scale(text: &str, new: &ScaledPhoto<'_>) -> String {
-    let (_, file) = list_of(new.photo);
+fn with_scale(text: &str, file: &str, new: &ScaledPhoto<'_>) -> String {
     let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
     match block_of(&lines, file) {
         Some(block) => {
             let changed = changed_block(&lines[block.clone()], new.scale);
             lines.splice(block, changed);
         }
-        None => lines.extend(new_block(new, lines.is_empty())),
+        None => lines.extend(new_block(file, new, lines.is_empty())),
     }
     lines.join("\n") + "\n"
 }
@@ -217,8 +254,7 @@ fn scale_lines(scale: PhotoScale) -> Vec<String> {
     }
 }
 
-fn new_block(new: &ScaledPhoto<'_>, is_first: bool) -> Vec<String> {
-    let (_, file) = list_of(new.photo);
+fn new_block(file: &str, new: &ScaledPhoto<'_>, is_first: bool) -> Vec<String> {
     let mut lines: Vec<String> = (!is_first).then(String::new).into_iter().collect();
     lines.push(HEADER.into());
     lines.push(format!("file = {}", quoted(file)));
@@ -230,14 +266,12 @@ fn new_block(new: &ScaledPhoto<'_>, is_first: bool) -> Vec<String> {
     lines
 }
 
-/// The name that was given, or else the file's.
+/// The name that was given, or else the file's, in the characters that names of assets have.
 fn asset_name(given: &str, file: &str) -> String {
-    if given.is_empty() {
-        let stem = Path::new(file).file_stem().unwrap_or_default();
-        stem.to_string_lossy().into_owned()
-    } else {
-        given.into()
-    }
+    let stem = Path::new(file).file_stem().unwrap_or_default();
+    let stem = stem.to_string_lossy();
+    let name = if given.is_empty() { &*stem } else { given };
+    name.replace(|c: char| !c.is_alphanumeric() && !"_-.".contains(c), "_")
 }
 
 fn quoted(text: &str) -> String {
@@ -250,14 +284,17 @@ mod tests {
 
     const LIST: &str = "# my photos\nclasses = [\"cup\"]\n\n[[photos]]\nfile = \"a.jpg\" # first\nlength = 0.2\nasset = \"a\"\n\n[[photos]]\nfile = \"b.jpg\"\nlength = 0.3\n";
 
-    fn scaled(photo: &str) -> String {
-        let new = ScaledPhoto {
+    fn cup(photo: &str, px_per_metre: f64) -> ScaledPhoto<'_> {
+        ScaledPhoto {
             photo,
-            scale: PhotoScale::PxPerMetre(1966.72),
-            asset: "cup \"1\"",
-            class: "cup",
-        };
-        with_scale(LIST, &new)
+            scale: PhotoScale::PxPerMetre(px_per_metre),
+            asset: "my cup",
+            class: "cup \"1\"",
+        }
+    }
+
+    fn scaled(file: &str) -> String {
+        with_scale(LIST, file, &cup(file, 1966.72))
     }
 
     #[test]
@@ -266,7 +303,7 @@ mod tests {
             "length = 0.2\nasset = \"a\"\n",
             "asset = \"a\"\npx_per_metre = 1966.7\n",
         );
-        assert_eq!(scaled("sub/a.jpg"), expected);
+        assert_eq!(scaled("a.jpg"), expected);
     }
 
     #[test]
@@ -274,7 +311,41 @@ mod tests {
         let text = scaled("c.jpg");
         assert!(text.starts_with(LIST), "{text}");
         let last = entries_of(&text, "").unwrap().pop().unwrap();
-        assert_eq!(last["asset"].as_str(), Some("cup \"1\""));
+        assert_eq!(last["asset"].as_str(), Some("my_cup"));
+        assert_eq!(last["class"].as_str(), Some("cup \"1\""));
         assert_eq!(last["px_per_metre"].as_float(), Some(1966.7));
+    }
+
+    /// What is in a folder's list after the scale of a photo was saved, or why it was not.
+    fn saved(list: &str, text: &str, new: &ScaledPhoto<'_>) -> Result<String, String> {
+        let dir = tempfile::tempdir().unwrap();
+        std::fs::write(dir.path().join(new.photo), "").unwrap();
+        std::fs::write(dir.path().join(list), text).unwrap();
+        let folder = Folder::open(dir.path()).unwrap();
+        let there = folder.text_if_any(LIST_NAME).unwrap();
+        let version = there.map(|there| there.version);
+        save(&folder, new, version.as_deref()).map_err(|refusal| refusal.what)?;
+        let photos = [new.photo.to_owned()];
+        assert!(scaled_photos(&folder, &photos).contains(new.photo));
+        Ok(folder.read_text(LIST_NAME).unwrap().text)
+    }
+
+    #[test]
+    fn what_is_saved_is_what_a_build_takes() {
+        let entry = |scale: &str| {
+            format!("[[photos]]\nfile = \"a.png\"\nasset = \"a\"\nclass = \"c\"\n{scale}")
+        };
+        let now = entry("px_per_metre = 2000.0\n");
+        for photo in ["a.png", "a.PNG"] {
+            let before = entry("px_per_meter = 9.0\n");
+            assert_eq!(saved(LIST_NAME, &before, &cup(photo, 2e3)), Ok(now.clone()));
+        }
+        let refused = |list, scale: &str, px_per_metre| {
+            saved(list, &entry(scale), &cup("a.png", px_per_metre)).unwrap_err()
+        };
+        let captured = "captured = { photos = [\"b.png\"] }\n";
+        assert!(refused(LIST_NAME, captured, 2e3).contains("one of several scales"));
+        assert!(refused(LIST_NAME, "", 0.004).contains("photos.toml: px_per_metre: 0, expected"));
+        assert!(refused(OTHER_LIST_NAME, "", 2e3).contains("photos.csv: lists the photos"));
     }
 }

@@ -1,5 +1,6 @@
 //! Connections: so many at a time, none that says nothing for long.
 
+use crate::message::PATIENCE;
 use axum::Router;
 use hyper::server::conn::http1;
 use hyper_util::rt::{TokioIo, TokioTimer};
@@ -11,8 +12,6 @@ use tokio::sync::Semaphore;
 
 /// Connections at a time: a browser opens six.
 const MAX_CONNECTIONS: usize = 256;
-/// How long a connection may be without a request, or with half of one's head.
-const PATIENCE: Duration = Duration::from_secs(10);
 /// A pause after the system refused a connection (too many open files).
 const PAUSE: Duration = Duration::from_millis(50);
 

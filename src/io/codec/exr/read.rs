@@ -3,7 +3,7 @@
 use super::blocks::{PartReader, SampleOrder};
 use super::chroma::{LUMINANCE_CHROMA, Sampling, to_rgb};
 use crate::color::RgbSpace;
-use crate::io::codec::channels::{ChannelMatch, Choice, Wanted};
+use crate::io::codec::channels::{ChannelMatch, Choice, Wanted, is_finished};
 use crate::io::codec::profile::{convert_primaries, to_rec709};
 use crate::io::codec::raster::{Raster, Samples};
 use crate::io::codec::refusal::Refusal;
@@ -97,16 +97,27 @@ impl<'a> CheckedFile<'a> {
             .map(|(part, _)| part)
     }
 
-    /// The part that has the wanted channels under the best names, and their indices, each once.
+    /// The part that has the wanted channels under the best names, of colours the finished picture
+    /// first, and their indices, each once.
     fn best_part(&self, wanted: Wanted) -> Result<(usize, Vec<usize>), Refusal> {
         let choices = self
             .flat_parts()
             .map(|part| (part, choose_channels(wanted, &self.channel_names(part))));
-        let best = choices.min_by_key(|(_, choice)| rank_of(choice));
+        let best = choices.min_by_key(|(part, choice)| {
+            let is_first = wanted.is_color() && self.is_finished(*part);
+            (rank_of(choice), !is_first)
+        });
         let (part, choice) = best.ok_or("no part with pixels")?;
         let (_, mut picked) = choice?;
         picked.dedup();
         Ok((part, picked))
+    }
+
+    /// The part's own name says that it is the finished picture.
+    fn is_finished(&self, part: usize) -> bool {
+        let name = &self.meta.headers[part].own_attributes.layer_name;
+        name.as_ref()
+            .is_some_and(|name| is_finished(&name.to_string()))
     }
 
     fn channel_names(&self, part: usize) -> Vec<String> {
@@ -339,7 +350,7 @@ fn text_attributes(header: &exr::meta::header::Header) -> Notes {
 }
 
 fn are_colors(wanted: Wanted, picked: &[usize]) -> bool {
-    matches!(wanted, Wanted::Color | Wanted::Film) && picked.len() >= 3
+    wanted.is_color() && picked.len() >= 3
 }
 
 /// The wanted channels of the part that has them under the best names.
