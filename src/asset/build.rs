@@ -9,6 +9,7 @@ use super::review::Review;
 use super::screen_source::EmptyScreens;
 use crate::error::{Error, Result};
 use rayon::prelude::*;
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -26,6 +27,8 @@ pub struct Built {
     pub refused: Vec<String>,
     /// How many of these a person rejected.
     pub rejected: usize,
+    /// Cut-outs that the folder has of photos that are not in the list.
+    pub unlisted: Vec<String>,
     /// Cut-outs that a person should review; their diagnostics say why.
     pub needs_review: Vec<PhotoRecord>,
 }
@@ -38,8 +41,8 @@ pub struct Built {
 /// [`Built::refused`]; the folder keeps no earlier cut-out of it.
 ///
 /// `progress` is called with the photos done and their number, at the start and after each photo,
-/// from several threads. What the folder has of other photos stays; a photo that it already has is
-/// replaced. The manifest is written last and does not depend on threads.
+/// from several threads. What the folder has of other photos stays ([`Built::unlisted`]); a photo
+/// that it already has is replaced. The manifest is written last and does not depend on threads.
 ///
 /// # Errors
 /// A list that cannot be read or be right, or a photo that is missing (before any work); the first
@@ -62,7 +65,7 @@ pub fn build(
         return Err(no_cut_out(&path, &taken.refused));
     }
     let library = Library::from_manifest(folder, manifest, &taken.photos)?;
-    Ok(Built::new(library, taken))
+    Ok(Built::new(library, taken, &list))
 }
 
 fn no_cut_out(list: &Path, refused: &[String]) -> Error {
@@ -71,9 +74,10 @@ fn no_cut_out(list: &Path, refused: &[String]) -> Error {
 }
 
 impl Built {
-    fn new(library: Library, taken: TakenIn) -> Self {
+    fn new(library: Library, taken: TakenIn, list: &List) -> Self {
         let photos = taken.photos;
         Self {
+            unlisted: unlisted(&library, list),
             library,
             photos: photos.len(),
             lengths: photos.iter().map(length_and_error).collect(),
@@ -82,6 +86,16 @@ impl Built {
             needs_review: photos.iter().filter_map(record_to_review).collect(),
         }
     }
+}
+
+fn unlisted(library: &Library, list: &List) -> Vec<String> {
+    let listed: BTreeSet<_> = list.photos.iter().map(PhotoEntry::cut_out_file).collect();
+    let photos = library.assets.iter().flat_map(|asset| &asset.photos);
+    let files = photos.map(|photo| &photo.record.file);
+    files
+        .filter(|file| !listed.contains(*file))
+        .cloned()
+        .collect()
 }
 
 /// A list from a file, whose classes are added to the manifest; what it does not tell of an
@@ -494,6 +508,23 @@ mod tests {
                 .to_string()
                 .contains("expected to begin with those that the folder has")
         );
+    }
+
+    #[test]
+    fn what_a_corrected_list_leaves_in_the_folder_is_reported() {
+        let folder = folder_with(TWO);
+        let (list, out) = (folder.path().join("photos.toml"), folder.path().join("out"));
+        let built = |text: &str| {
+            std::fs::write(&list, text).unwrap();
+            build(&list, &out, &|_, _| ())
+        };
+        assert!(built(TWO).unwrap().unlisted.is_empty());
+        let one = &TWO[..TWO.rfind("[[photos]]").unwrap()];
+        assert_eq!(built(one).unwrap().unlisted, ["a/two.exr"]);
+        let told = built(&one.replace("cap", "cup")).unwrap_err().to_string();
+        let expected = "photos[0].class: \"cup\", but asset \"a\" is \"cap\" in assets.toml; \
+                        delete the folder to build it anew";
+        assert!(told.ends_with(expected), "{told}");
     }
 
     #[test]

@@ -45,7 +45,7 @@ impl CaptureEntry {
     /// [`Error::Value`] for a capture without a second photo, or a width that no display has.
     pub(super) fn check(&self) -> Result<()> {
         if self.photos.is_empty() {
-            let what = "empty, expected photos of a black and a white frame at least";
+            let what = "no second photo, expected one of a black and one of a white frame at least";
             return Err(Error::value("captured.photos", what));
         }
         self.width
@@ -83,8 +83,8 @@ impl CaptureEntry {
         display.check().map_err(|e| e.in_file(&path))?;
         let width = self.width.or(display.width).ok_or_else(|| {
             let what = format!(
-                "missing, expected the width of the whole picture on the display, metres, here or in {}: \
-                 measure it with a ruler",
+                "missing, expected the width of the whole picture on the display by a ruler, metres: here, as \
+                 --display-width, or in {}",
                 path.display()
             );
             Error::value("captured.width", what)
@@ -119,9 +119,13 @@ mod tests {
         );
         let missing = told("size_px = [640, 400]\n", None).unwrap_err();
         assert!(missing.starts_with("captured.width: missing"), "{missing}");
+        assert!(missing.contains("--display-width"), "{missing}");
         let small = told("size_px = [64, 400]\n", Some(0.2)).unwrap_err();
         assert!(small.contains("display.toml: size_px: 64"), "{small}");
         let alone = CaptureEntry::default().check().unwrap_err().to_string();
-        assert!(alone.starts_with("captured.photos: empty"), "{alone}");
+        assert!(
+            alone.starts_with("captured.photos: no second photo"),
+            "{alone}"
+        );
     }
 }

@@ -350,8 +350,8 @@ fn pose_warning(pose: &ScreenPose) -> Option<Diagnostic> {
 fn thickness_warning(entry: &PhotoEntry) -> Option<Diagnostic> {
     entry.thickness.is_none().then(|| {
         let what = format!(
-            "thickness: {DEFAULT_THICKNESS}, the default; size and refraction are those at half of it, expected \
-             how thick the object is as it lies, metres"
+            "thickness: not given, {DEFAULT_THICKNESS} m is assumed, and size and refraction hold at half of it; \
+             give `thickness` (--thickness), how thick the object is as it lies, metres"
         );
         Diagnostic::warning(Code::ThicknessUnknown, what)
     })

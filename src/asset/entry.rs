@@ -166,7 +166,7 @@ impl PhotoEntry {
         })
     }
 
-    /// Checks all values, the class against those of the folder.
+    /// Checks all values, role and class against what the folder has.
     ///
     /// # Errors
     /// [`Error::Value`] for the first value that cannot be right.
@@ -178,6 +178,7 @@ impl PhotoEntry {
             other => other,
         })?;
         self.check_class(manifest)?;
+        manifest.check_known(&self.asset, self.role, &self.class)?;
         scale.check()?;
         self.check_capture()?;
         THICKNESS.check("thickness", self.thickness())?;

@@ -257,6 +257,16 @@ impl Manifest {
         }
     }
 
+    /// Fails where the folder has an asset as something else.
+    pub(super) fn check_known(&self, name: &str, role: Role, class: &str) -> Result<()> {
+        let known = self.assets.iter().find(|known| known.name == name);
+        let checked = known.map_or(Ok(()), |known| known.check_same(role, class));
+        checked.map_err(|e| match e {
+            Error::Value { at, what } => Error::value(at, format!("{what} in {MANIFEST}; {ANEW}")),
+            other => other,
+        })
+    }
+
     /// Takes a cut-out out, and with its last one the asset. Returns whether it was there.
     pub(super) fn remove(&mut self, file: &str) -> bool {
         let is_it = |photo: &PhotoRecord| photo.file == file;
@@ -349,14 +359,7 @@ impl Manifest {
 impl Asset<PhotoRecord> {
     /// Takes in the photos and the body of the same asset.
     fn merge(&mut self, asset: Self) -> Result<()> {
-        self.check_same_role(asset.role)?;
-        if self.class != asset.class {
-            let what = format!(
-                "\"{}\", but asset \"{}\" is \"{}\"",
-                asset.class, asset.name, self.class
-            );
-            return Err(Error::value("class", what));
-        }
+        self.check_same(asset.role, &asset.class)?;
         (self.thickness, self.mass) = (asset.thickness, asset.mass);
         for photo in asset.photos {
             self.photos.retain(|old| old.file != photo.file);
@@ -365,12 +368,18 @@ impl Asset<PhotoRecord> {
         Ok(())
     }
 
-    fn check_same_role(&self, role: Role) -> Result<()> {
-        if self.role == role {
-            return Ok(());
+    /// Fails for another role or class than its own.
+    fn check_same(&self, role: Role, class: &str) -> Result<()> {
+        let Self { name, .. } = self;
+        if self.role != role {
+            let what = format!("{role}, but asset \"{name}\" is {}", self.role);
+            return Err(Error::value("role", what));
         }
-        let what = format!("{role}, but asset \"{}\" is {}", self.name, self.role);
-        Err(Error::value("role", what))
+        if self.class != class {
+            let what = format!("\"{class}\", but asset \"{name}\" is \"{}\"", self.class);
+            return Err(Error::value("class", what));
+        }
+        Ok(())
     }
 
     fn check(&self) -> Result<()> {
@@ -387,8 +396,11 @@ impl Asset<PhotoRecord> {
 }
 
 fn unexpected_order(declared: &str, known: &str) -> String {
-    format!("{declared}; expected to begin with those that the folder has: {known}")
+    format!("{declared}; expected to begin with those that the folder has: {known}; {ANEW}")
 }
+
+/// What to do where a folder has what is no longer meant.
+const ANEW: &str = "delete the folder to build it anew";
 
 /// Checks every item of a list; errors name its place: `photos[2]`.
 pub(super) fn check_each<T>(
@@ -719,7 +731,8 @@ pub(super) mod tests {
         let reported = learned(&["bag"], &["can", "bag"], &[]).unwrap_err();
         assert_eq!(
             reported,
-            "classes: can, bag; expected to begin with those that the folder has: bag"
+            "classes: can, bag; expected to begin with those that the folder has: bag; \
+             delete the folder to build it anew"
         );
         assert!(
             learned(&[], &["can", "can"], &[])

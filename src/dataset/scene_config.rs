@@ -251,7 +251,7 @@ mod tests {
         let mut config = DatasetConfig::default();
         config.labels.formats.push(Format::Mot);
         assert!(config.scene_settings().unwrap().is_empty());
-        let older = toml::from_str("[labels]\nformats = [\"mot\"]\nmin_side_px = 5.0\n").unwrap();
+        let older = toml::from_str("[labels]\nformats = [\"mot\"]\nsimplify = 5.0\n").unwrap();
         let read = DatasetConfig::from_settings(&SceneSettings::from_table(older), &[]).unwrap();
         assert_eq!(read.labels.formats, DatasetConfig::default().labels.formats);
         assert_ne!(read.labels, DatasetConfig::default().labels);

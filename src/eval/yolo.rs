@@ -278,7 +278,7 @@ fn image_size(image: &Path) -> Result<[u32; 2]> {
 
 fn missing_image(folder: &Path, name: &str) -> Error {
     let what = format!(
-        "no image \"{name}\" (.jpg, .png, ..) to take the size from; say where the images are, or give the size"
+        "no image \"{name}\" (.jpg, .png, ..) to take the size from; name their folder (--images) or their size (--size)"
     );
     Error::file(folder, what)
 }

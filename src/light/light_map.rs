@@ -3,12 +3,9 @@
 use crate::geom::Point3;
 use crate::light::MeasuredPlate;
 use crate::light::irradiance::white_card_at;
-use crate::light::surface::SurfaceLight;
+use crate::light::surface::{CELLS, SurfaceLight};
 use crate::scene::{EnvironmentMap, LightMap, Scene};
 
-/// Columns and rows of the cells that the surface is looked at in: lamps make gradients, and a
-/// pattern on the surface should not be taken for light.
-pub(super) const CELLS: [usize; 2] = [5, 4];
 /// What is darker or brighter by more is no gradient of light.
 const MOST: f32 = 4.0;
 
@@ -63,14 +60,6 @@ fn factor(plate: f32, own: f32, share: f64) -> f32 {
         return 1.0;
     }
     libm::pow(f64::from(missing.clamp(1.0 / MOST, MOST)), share) as f32
-}
-
-/// The number of the cell that a point of the surface lies in.
-pub(super) fn cell_of(point: &Point3<f64>, [w, h]: [f64; 2]) -> usize {
-    let [u, v] = [point.x / w + 0.5, 0.5 - point.y / h];
-    let [column, row] = [(u, CELLS[0]), (v, CELLS[1])]
-        .map(|(place, cells)| ((place * cells as f64) as usize).min(cells - 1));
-    row * CELLS[0] + column
 }
 
 /// The middles of the cells, in order.

@@ -4,10 +4,13 @@ use crate::camera::{Camera, RadialDistortion};
 use crate::color::Albedo;
 use crate::geom::{Plane, Point2, Point3};
 use crate::image::Image;
-use crate::light::light_map::{CELLS, cell_of};
 use crate::light::{MeasuredPlate, median};
 use crate::pixel::LinearRgb;
 use crate::scene::{CameraSource, LightTint, Scene};
+
+/// Columns and rows of the cells that the surface is looked at in: lamps make gradients, and a
+/// pattern on the surface should not be taken for light.
+pub(super) const CELLS: [usize; 2] = [5, 4];
 
 /// What a plate shows of a scene's surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,6 +61,14 @@ fn seen_surface(scene: &Scene, plate: &Image<LinearRgb>) -> Vec<(Point3<f64>, Li
         .filter_map(|(x, y)| Some((surface_point((&camera, &lens), x, y)?, plate[(x, y)])))
         .filter(|(point, color)| is_on_surface(point, scene.surface.size) && color.is_finite())
         .collect()
+}
+
+/// The number of the cell that a point of the surface lies in.
+fn cell_of(point: &Point3<f64>, [w, h]: [f64; 2]) -> usize {
+    let [u, v] = [point.x / w + 0.5, 0.5 - point.y / h];
+    let [column, row] = [(u, CELLS[0]), (v, CELLS[1])]
+        .map(|(place, cells)| ((place * cells as f64) as usize).min(cells - 1));
+    row * CELLS[0] + column
 }
 
 fn is_on_surface(point: &Point3<f64>, [w, h]: [f64; 2]) -> bool {

@@ -5,7 +5,7 @@ use crate::diagnostics::{located, report_diagnostics};
 use crate::documents::stem_of;
 use crate::exit::NeedsReview;
 use crate::global::GlobalArgs;
-use crate::print;
+use crate::print::{self, counted};
 use crate::values::{parse_corners, parse_metres};
 use petcomp::asset::{self, Asset, Built, Library, Manifest};
 use petcomp::asset::{CaptureEntry, Photo, PhotoEntry, PhotoRecord, Role, Scale, ScreenSource};
@@ -22,7 +22,8 @@ pub(crate) enum AssetCommand {
         /// CSV) or marker_size; role = distractor for what has no label, matte = outline for what
         /// lets no light through
         list: PathBuf,
-        /// Asset folder
+        /// Asset folder; what it has of photos that are not in the list stays, and so do classes,
+        /// until the folder is deleted
         #[arg(short, long, value_name = "FOLDER")]
         output: PathBuf,
     },
@@ -189,12 +190,13 @@ fn check_folder(folder: &Path, strict: bool) -> anyhow::Result<()> {
     let records: Vec<_> = records_of(&library).collect();
     records.iter().for_each(|record| list_capture(record));
     let to_review = list_to_review(&records);
-    let (folder, assets, cut_outs) = (folder.display(), library.assets.len(), records.len());
+    let (folder, assets) = (folder.display(), counted(library.assets.len(), "asset"));
+    let cut_outs = counted(records.len(), "cut-out");
     print::line(format_args!(
-        "{folder}: {assets} assets, {cut_outs} cut-outs, all intact, {to_review} to review"
+        "{folder}: {assets}, {cut_outs}, all intact, {to_review} to review"
     ));
     if strict && to_review > 0 {
-        let what = format!("{folder}: {to_review} cut-outs to review");
+        let what = format!("{folder}: {} to review", counted(to_review, "cut-out"));
         return Err(NeedsReview(what).into());
     }
     Ok(())
@@ -258,18 +260,39 @@ fn report_built(built: &Built, folder: &Path, global: &GlobalArgs) {
     for record in &built.needs_review {
         report_diagnostics(&record.file, &record.diagnostics);
     }
-    let (photos, assets) = (built.photos, built.library.assets.len());
-    global.print_written(folder, format_args!("{photos} photos, {assets} assets"));
+    let photos = counted(built.photos, "photo");
+    let assets = counted(built.library.assets.len(), "asset");
+    global.print_written(folder, format_args!("{photos}, {assets}"));
+    if !built.unlisted.is_empty() {
+        global.print_status(describe_unlisted(&built.unlisted));
+    }
     global.print_status(describe_lengths(&built.lengths));
 }
 
-/// Range of the objects' lengths, and of their errors.
+/// Cut-outs that are named; more of them are another list's.
+const SHOWN_UNLISTED: usize = 8;
+
+/// What a list that was corrected leaves in the folder.
+fn describe_unlisted(files: &[String]) -> String {
+    let shown = files[..files.len().min(SHOWN_UNLISTED)].join(", ");
+    let more = if files.len() > SHOWN_UNLISTED {
+        ", .."
+    } else {
+        ""
+    };
+    format!("also in the folder, not in the list: {shown}{more}")
+}
+
+/// Range of the objects' lengths, and the largest of their errors.
 fn describe_lengths(metres: &[[f64; 2]]) -> String {
-    let ([short, long], [fine, coarse]) = (extremes_mm(metres, 0), extremes_mm(metres, 1));
-    format!(
-        "objects are {short:.0} to {long:.0} mm long, to {fine:.1} to {coarse:.1} mm; \
-         `petcomp asset list` shows each"
-    )
+    let ([short, long], [_, error]) = (extremes_mm(metres, 0), extremes_mm(metres, 1));
+    let [short, long] = [short, long].map(|mm| format!("{mm:.0}"));
+    let range = if short == long {
+        long
+    } else {
+        format!("{short} to {long}")
+    };
+    format!("objects are {range} mm long, to within {error:.1} mm; `petcomp asset list` shows each")
 }
 
 /// Writes the contact sheet of a folder.
@@ -412,27 +435,43 @@ fn show_classes(classes: &[String], how: &str, global: &GlobalArgs) {
         return;
     }
     let list = numbered(classes).join(", ");
-    global.print_status(format_args!("classes {list}; another order: {how}"));
+    global.print_status(format_args!(
+        "classes {list}; another order: {how}, into a new folder"
+    ));
 }
 
 fn list_photos(folder: &Path) -> anyhow::Result<()> {
-    for asset in Manifest::read(folder)?.assets {
+    let assets = Manifest::read(folder)?.assets;
+    let widths = column_widths(&assets);
+    for asset in &assets {
         for photo in &asset.photos {
-            print::line(list_line(&asset, photo));
+            print::line(list_line(asset, photo, widths));
         }
     }
     Ok(())
 }
 
+/// Characters of the longest name and of the longest class, and those of short ones at least.
+fn column_widths(assets: &[Asset<PhotoRecord>]) -> [usize; 2] {
+    assets.iter().fold([12, 10], |[name, class], asset| {
+        let class_width = class_column(asset).chars().count();
+        [name.max(asset.name.chars().count()), class.max(class_width)]
+    })
+}
+
 /// Name, class, size, how sure outline and colour are, file.
-fn list_line(asset: &Asset<PhotoRecord>, photo: &PhotoRecord) -> String {
+fn list_line(
+    asset: &Asset<PhotoRecord>,
+    photo: &PhotoRecord,
+    [name_width, class_width]: [usize; 2],
+) -> String {
     let (name, class) = (&asset.name, class_column(asset));
     let [length, width, error] =
         [photo.object_m[0], photo.object_m[1], photo.error_m].map(|metres| metres * 1e3);
     let outline = photo.outline_confidence;
     let (color, file) = (color_column(photo.color_confidence), &photo.file);
     format!(
-        "{name:12} {class:10} {length:4.0} x {width:3.0} mm (+- {error:.1})  {outline:.2}  {color}  {file}"
+        "{name:name_width$} {class:class_width$} {length:4.0} x {width:3.0} mm (+- {error:.1})  {outline:.2}  {color}  {file}"
     )
 }
 

@@ -22,6 +22,12 @@ pub(crate) fn aside(line: impl Display) {
     let _ = writeln!(std::io::stderr(), "{}", printable(&line.to_string()));
 }
 
+/// `1 photo` or `2 photos`.
+pub(crate) fn counted(count: usize, thing: &str) -> String {
+    let plural = if count == 1 { "" } else { "s" };
+    format!("{count} {thing}{plural}")
+}
+
 /// Clap's message, help or a wrong command line, and the exit status that goes with it.
 pub(crate) fn usage(message: &clap::Error) -> u8 {
     match print_usage(message) {

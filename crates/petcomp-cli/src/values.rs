@@ -63,9 +63,16 @@ fn split_size(text: &str) -> (&str, &str) {
     text.split_once(['x', 'X', ',']).unwrap_or_default()
 }
 
-/// A colour from `R,G,B`.
+/// Four stops over white: no screen is brighter.
+const MAX_CHANNEL: f32 = 16.0;
+
+/// A scene-linear colour from `R,G,B`.
 pub(crate) fn parse_color(text: &str) -> Result<LinearRgb, String> {
-    parse_numbers::<f32, 3>(text, "R,G,B").map(LinearRgb::from)
+    let channels = parse_numbers::<f32, 3>(text, "R,G,B")?;
+    if channels.iter().any(|&value| value > MAX_CHANNEL) {
+        return Err("expected scene-linear values, white is 1; are these 8-bit codes?".into());
+    }
+    Ok(LinearRgb::from(channels))
 }
 
 /// A pixel from `X,Y`.

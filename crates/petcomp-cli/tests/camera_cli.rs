@@ -433,7 +433,7 @@ fn a_label_comes_from_nothing() {
     assert!(said.contains("fill in surface.corners_px"), "{said}");
     assert!(
         desk.refused(&["camera", "init", "bg/a.png", "--size", "1x1"])
-            .contains("is there already")
+            .contains("already exists; --force replaces it")
     );
     assert!(
         desk.refused(&["camera", "solve", "bg/a.label.json"])

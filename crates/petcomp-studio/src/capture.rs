@@ -89,3 +89,14 @@ async fn write(
     })
     .await
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_command_of_the_page_names_the_display_that_is_written() {
+        let display = format!("--display {FOLDER}/display.toml");
+        assert!(include_str!("../pages/capture.html").contains(&display));
+    }
+}

@@ -1,8 +1,8 @@
 //! The first page: what is in the folder, and what each page can do with it.
 
-use crate::folder::Folder;
 use crate::message::Json;
 use crate::picture::may_be_photo;
+use crate::recipe::is_recipe;
 use crate::refusal::Answer;
 use crate::server::Page;
 use crate::studio::Studio;
@@ -47,18 +47,6 @@ async fn overview(State(studio): State<Arc<Studio>>) -> Answer<Json<Overview>> {
     blocking(move || Ok(Json(Overview::of(&studio)))).await
 }
 
-/// A TOML document that names backgrounds, as every recipe does.
-fn is_recipe(folder: &Folder, name: &str) -> bool {
-    if !name.ends_with(".toml") {
-        return false;
-    }
-    let text = folder
-        .read_text(name)
-        .map_or(String::new(), |file| file.text);
-    let table: toml::Table = text.parse().unwrap_or_default();
-    table.contains_key("backgrounds")
-}
-
 impl Overview {
     fn of(studio: &Studio) -> Self {
         let files = studio.folder.find(|_| true);
@@ -74,7 +62,7 @@ impl Overview {
             labels: ending(".label.json"),
             cameras: ending(".camera.json"),
             assets: called(asset::MANIFEST),
-            recipes: those(&|file| is_recipe(&studio.folder, file)),
+            recipes: studio.folder.find(is_recipe),
             photo_lists: [called("photos.toml"), called("photos.csv")].concat(),
             datasets: called("data.yaml"),
         }

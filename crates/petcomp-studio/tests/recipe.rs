@@ -35,6 +35,19 @@ fn src(browser: &mut Browser) -> String {
 }
 
 #[test]
+fn the_first_page_finds_the_recipe_that_begins_as_the_template() {
+    let dir = tempfile::tempdir().unwrap();
+    for (name, text) in [
+        ("recipe.toml", DatasetConfig::template()),
+        ("other.toml", "backgrounds = 3"),
+    ] {
+        std::fs::write(dir.path().join(name), text).unwrap();
+    }
+    let found = Studio::over(dir.path()).get("api/overview");
+    assert!(found.contains("\"recipes\":[\"recipe.toml\"]"), "{found}");
+}
+
+#[test]
 fn a_slider_changes_the_pictures_and_the_file_keeps_its_comments() {
     let Some(mut browser) = Browser::open(1440, 900) else {
         return;

@@ -52,7 +52,11 @@ fn without_rust_types(message: &str) -> String {
         return message.into();
     };
     let kind = wanted.split(' ').next().unwrap_or_default();
-    let words = plain_name(kind).unwrap_or(wanted);
+    let words = match wanted {
+        "a sequence" => "a list",
+        "a map" => "a table",
+        _ => plain_name(kind).unwrap_or(wanted),
+    };
     format!("{front}expected {words}")
 }
 

@@ -103,28 +103,33 @@ fn from_value<T: DeserializeOwned>(value: toml::Value, outer: &str) -> Result<T>
 /// # Errors
 /// As [`read_toml`].
 pub fn read_document<T: DeserializeOwned>(path: impl AsRef<Path>) -> Result<T> {
-    if is_json(path.as_ref()) {
+    if has_extension(path.as_ref(), "json") {
         read_json(path)
     } else {
         read_toml(path)
     }
 }
 
-/// Writes a document in the format of its extension: JSON (`.json`) or TOML (any other).
+/// Writes a document in the format of its extension: JSON (`.json`) or TOML (`.toml`).
 ///
 /// # Errors
-/// As [`write_toml`].
+/// [`Error::File`] for another extension, where the format cannot express it or the file cannot be
+/// written.
 pub fn write_document<T: Serialize + ?Sized>(path: impl AsRef<Path>, value: &T) -> Result<()> {
-    if is_json(path.as_ref()) {
+    let path = path.as_ref();
+    if has_extension(path, "json") {
         write_json(path, value)
-    } else {
+    } else if has_extension(path, "toml") {
         write_toml(path, value)
+    } else {
+        let what = "no format for this extension, expected .toml or .json";
+        Err(Error::file(path, what))
     }
 }
 
-fn is_json(path: &Path) -> bool {
+fn has_extension(path: &Path, expected: &str) -> bool {
     path.extension()
-        .is_some_and(|extension| extension.eq_ignore_ascii_case("json"))
+        .is_some_and(|extension| extension.eq_ignore_ascii_case(expected))
 }
 
 /// Reads a JSON document.
@@ -275,6 +280,7 @@ fn line_of(text: &str, byte: usize) -> usize {
 mod tests {
     use super::*;
     use serde::Deserialize;
+    use std::collections::BTreeMap;
 
     #[derive(Debug, Deserialize)]
     #[serde(deny_unknown_fields)]
@@ -347,6 +353,10 @@ mod tests {
     #[test]
     fn no_name_of_a_type_of_rust_is_in_a_message() {
         assert!(
+            toml("seed = 1\nlights = 3")
+                .contains("lights: invalid type: integer `3`, expected a list")
+        );
+        assert!(
             toml("seed = 1\nobjects = 3")
                 .contains("objects: invalid type: integer `3`, expected a table")
         );
@@ -360,6 +370,21 @@ mod tests {
             json("{\"seed\": 1, \"objects\": {\"count\": 1, \"size_m\": \"x\"}}")
                 .contains("expected a number")
         );
+    }
+
+    #[test]
+    fn a_document_is_written_in_the_format_of_its_name_or_not_at_all() {
+        let folder = tempfile::tempdir().unwrap();
+        let written = |name: &str| {
+            let path = folder.path().join(name);
+            write_document(&path, &BTreeMap::from([("seed", 1)]))?;
+            read_text(path)
+        };
+        assert_eq!(written("a.toml").unwrap(), "seed = 1\n");
+        assert_eq!(written("a.JSON").unwrap(), "{\n  \"seed\": 1\n}\n");
+        let told = written("a.yaml").unwrap_err().to_string();
+        let expected = "a.yaml: no format for this extension, expected .toml or .json";
+        assert!(told.ends_with(expected), "{told}");
     }
 
     #[test]

@@ -16,13 +16,14 @@ pub struct Override {
 impl FromStr for Override {
     type Err = Error;
 
-    /// From `path=value`; the value is TOML (`3`, `[4, 12]`, `"text"`, `true`), or else text.
+    /// From `path=value`; the value is TOML (`3`, `[4, 12]`, `"text"`, `true`), or else text that
+    /// does not begin as a list or table.
     fn from_str(text: &str) -> Result<Self> {
         let Some((path, value)) = text.split_once('=') else {
             return Err(Error::value(text, "no value, expected KEY=VALUE"));
         };
         let path = path.trim().to_owned();
-        let value = parse_value(value);
+        let value = parse_value(value).map_err(|what| Error::value(&path, what))?;
         if is_finite(&value) {
             return Ok(Self { path, value });
         }
@@ -37,13 +38,17 @@ impl Display for Override {
     }
 }
 
-/// TOML, or text.
-fn parse_value(text: &str) -> Value {
-    format!("value = {text}")
-        .parse::<toml::Table>()
-        .ok()
-        .and_then(|mut table| table.remove("value"))
-        .unwrap_or_else(|| Value::String(text.to_owned()))
+/// TOML, or text. A list without its end or with bare words is taken for no text: its reader would
+/// blame the document.
+fn parse_value(text: &str) -> std::result::Result<Value, String> {
+    let table = format!("value = {text}").parse::<toml::Table>();
+    match table.ok().and_then(|mut table| table.remove("value")) {
+        Some(value) => Ok(value),
+        None if text.trim_start().starts_with(['[', '{']) => Err(format!(
+            "{text} is not TOML, expected as in [4, 12] or [\"yolo\"], quoted for the shell"
+        )),
+        None => Ok(Value::String(text.to_owned())),
+    }
 }
 
 fn is_finite(value: &Value) -> bool {
@@ -169,6 +174,15 @@ mod tests {
             applied("", "profile=robust").unwrap(),
             "profile = \"robust\"\n"
         );
+    }
+
+    #[test]
+    fn a_list_that_is_not_toml_is_refused() {
+        for list in ["[1,2", "[yolo]", "{a=1"] {
+            let told = applied("", &format!("a.b={list}")).unwrap_err().to_string();
+            let expected = format!("a.b: {list} is not TOML, expected as in ");
+            assert!(told.starts_with(&expected), "{told}");
+        }
     }
 
     #[test]

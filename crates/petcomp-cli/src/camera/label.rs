@@ -68,7 +68,7 @@ impl InitLabelArgs {
     fn check_is_free(&self, path: &Path) -> anyhow::Result<()> {
         anyhow::ensure!(
             self.force || !path.exists(),
-            "{}: is there already, and --force is not given",
+            "{}: already exists; --force replaces it",
             path.display()
         );
         Ok(())

@@ -3,7 +3,7 @@
 use crate::diagnostics::located;
 use crate::exit::NeedsReview;
 use crate::global::GlobalArgs;
-use crate::print;
+use crate::print::{self, counted};
 use petcomp::dataset::page::DatasetReportOptions;
 use petcomp::dataset::{self, Checked, contact_sheet_of};
 use petcomp::io;
@@ -83,7 +83,7 @@ impl CheckArgs {
     fn check_note_count(&self, count: usize) -> anyhow::Result<()> {
         if self.strict && count > 0 {
             let folder = self.folder.display();
-            return Err(NeedsReview(format!("{folder}: {count} notes")).into());
+            return Err(NeedsReview(format!("{folder}: {}", counted(count, "note"))).into());
         }
         Ok(())
     }
@@ -93,7 +93,7 @@ impl CheckArgs {
 fn print_findings(checked: &Checked, folder: &Path) -> anyhow::Result<()> {
     let (folder, errors) = (folder.display(), checked.findings.len());
     checked.findings.iter().for_each(print::line);
-    anyhow::ensure!(errors == 0, "{folder}: {errors} errors");
+    anyhow::ensure!(errors == 0, "{folder}: {}", counted(errors, "error"));
     print::line(format_args!(
         "{folder}: {}, no errors",
         what_was_checked(checked)
@@ -106,7 +106,7 @@ fn what_was_checked(checked: &Checked) -> String {
         return "no labels for YOLO, files alone compared with index.jsonl".into();
     }
     let (images, rows) = (checked.images, checked.rows.iter().sum::<usize>());
-    format!("{images} images, {rows} labels")
+    format!("{}, {}", counted(images, "image"), counted(rows, "label"))
 }
 
 fn page_folder(page: &Path) -> &Path {

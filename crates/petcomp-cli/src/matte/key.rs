@@ -7,6 +7,7 @@ use crate::distinct_files::check_distinct;
 use crate::global::GlobalArgs;
 use crate::values::parse_color;
 use anyhow::{Context, Result};
+use clap::ArgGroup;
 use petcomp::io::{self, FromFile, Override, Picture};
 use petcomp::matte::key::{Deviations, KeyOptions, Keyed, Keying, Profile, Screen};
 use petcomp::matte::{PlateOptions, ScreenPlate, SegmentOptions, segment};
@@ -17,6 +18,7 @@ use std::sync::Mutex;
 
 /// Keys pictures against a screen colour or plate, as Blender's Keying node does.
 #[derive(clap::Args, Debug)]
+#[command(group(ArgGroup::new("background").args(["screen", "plate"]).required(true)))]
 pub(crate) struct KeyArgs {
     /// The picture to key, or the frames of a sequence; alpha is taken as premultiplied
     #[arg(required = true, value_name = "PICTURE")]
@@ -33,9 +35,9 @@ pub(crate) struct KeyArgs {
     #[arg(long, value_name = "FILE")]
     edges: Option<PathBuf>,
     /// Colour of the screen, scene-linear
-    #[arg(long, value_name = "R,G,B", value_parser = parse_color, required_unless_present = "plate", conflicts_with = "plate")]
+    #[arg(long, value_name = "R,G,B", value_parser = parse_color)]
     screen: Option<LinearRgb>,
-    /// A picture of the screen alone: every pixel is keyed against its own colour
+    /// Or: a picture of the screen alone: every pixel is keyed against its own colour
     #[arg(long, value_name = "FILE")]
     plate: Option<PathBuf>,
     /// A matte of what is surely not foreground

@@ -27,11 +27,24 @@ pub(super) fn list(folder: &Folder) -> Vec<PhotoEntry> {
         camera: documents.contains(&beside(&photo, "camera.json")),
         photo,
     };
-    photos(folder).into_iter().map(entry).collect()
+    let photos = photos(folder, &documents);
+    photos.into_iter().map(entry).collect()
 }
 
-fn photos(folder: &Folder) -> Vec<String> {
+/// Photos, not what petcomp writes beside them or generates.
+fn photos(folder: &Folder, documents: &BTreeSet<String>) -> Vec<String> {
     let mut photos = folder.find(|path| may_be_photo(path) && !is_own(path));
+    let is_dataset = |name: &&String| Path::new(name).ends_with("dataset.json");
+    let datasets: Vec<&str> = documents
+        .iter()
+        .filter(is_dataset)
+        .map(|name| parent_of(name))
+        .collect();
+    photos.retain(|photo| {
+        !datasets
+            .iter()
+            .any(|dataset| Path::new(photo).starts_with(dataset))
+    });
     let lists = folder.find(is_list);
     let of_objects: BTreeSet<&str> = lists.iter().map(|list| parent_of(list)).collect();
     photos.sort_by_key(|photo| of_objects.contains(parent_of(photo)));
@@ -65,6 +78,18 @@ pub(super) fn beside(photo: &str, ending: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn pictures_of_a_dataset_are_no_photos() {
+        let dir = tempfile::tempdir().unwrap();
+        std::fs::create_dir_all(dir.path().join("set/images")).unwrap();
+        for name in ["set/dataset.json", "set/images/0.png", "a.png", "set.png"] {
+            std::fs::write(dir.path().join(name), "").unwrap();
+        }
+        let entries = list(&Folder::open(dir.path()).unwrap());
+        let names: Vec<_> = entries.into_iter().map(|entry| entry.photo).collect();
+        assert_eq!(names, ["a.png", "set.png"]);
+    }
 
     #[test]
     fn a_label_is_called_as_its_photo() {

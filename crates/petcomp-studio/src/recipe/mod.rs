@@ -45,13 +45,14 @@ pub(crate) fn routes() -> Router<Arc<Studio>> {
         .route("/picture", post(picture))
 }
 
-/// The recipes of the folder: documents that `petcomp dataset generate` takes.
+/// The recipes of the folder.
 async fn files(State(studio): State<Arc<Studio>>) -> Answer<Json<Vec<String>>> {
-    blocking(move || {
-        let is_recipe = |path: &Path| is_toml(path) && DatasetConfig::read(path, &[]).is_ok();
-        Ok(Json(studio.folder.find(is_recipe)))
-    })
-    .await
+    blocking(move || Ok(Json(studio.folder.find(is_recipe)))).await
+}
+
+/// A document that `petcomp dataset generate` takes.
+pub(crate) fn is_recipe(path: &Path) -> bool {
+    is_toml(path) && DatasetConfig::read(path, &[]).is_ok()
 }
 
 fn is_toml(path: &Path) -> bool {
