@@ -248,8 +248,8 @@ mod tests {
         only_told.retain(|line| {
             toml::from_str::<DatasetConfig>(line).ok() != Some(DatasetConfig::default())
         });
-        let mut examples = examples();
-        examples.sort();
+        let examples = examples().into_iter();
+        let examples: Vec<_> = examples.map(|line| line.replace("[0]", "")).collect();
         assert_eq!(only_told, examples, "only in template.toml");
         let proposed = DatasetConfig {
             preset: Preset::Real,
@@ -305,7 +305,7 @@ mod tests {
         assert_eq!(examples().len(), 11);
         for example in examples() {
             // A key of a table that may be repeated.
-            let example = example.replace("scene.lights.", "[[scene.lights]]\n");
+            let example = example.replace("scene.lights[0].", "[[scene.lights]]\n");
             io::write_text(&path, &example).unwrap();
             let config = DatasetConfig::read(&path, &[]).unwrap();
             let (taken, told) = (Table::try_from(config).unwrap(), example.parse().unwrap());
