@@ -45,7 +45,7 @@ pub(crate) struct BackgroundPhoto {
 /// neither blurs nor aliases much.
 const ZOOM_STEP: f64 = 1.25;
 /// A zoom that is a step but for its last digits needs no more than that step.
-const HAIR: f64 = 1e-9;
+const EPSILON: f64 = 1e-9;
 
 /// A photo at one size, and what was measured of it.
 #[derive(Debug, Default)]
@@ -209,7 +209,7 @@ impl BackgroundPhoto {
     /// The photo as large as a view that zooms in needs it, if it has so many pixels; read once for
     /// each step of the zoom.
     pub(crate) fn plate_for_zoom(&self, zoom: f64) -> Result<ReadPlate<'_>> {
-        let level = (zoom.ln() / ZOOM_STEP.ln() - HAIR).ceil().max(0.0) as usize;
+        let level = (zoom.ln() / ZOOM_STEP.ln() - EPSILON).ceil().max(0.0) as usize;
         self.plate_at_level(level.min(self.plates.len() - 1))
     }
 
@@ -227,10 +227,8 @@ impl BackgroundPhoto {
 
     /// The picture's size times the zoom, up to that of the photo.
     fn size_at_level(&self, level: usize) -> [usize; 2] {
-        let scale = ZOOM_STEP
-            .powi(level as i32)
-            .min(detail_of(self.kept, self.image));
-        let scale = if level == 0 { 1.0 } else { scale };
+        let detail = detail_of(self.kept, self.image).max(1.0);
+        let scale = ZOOM_STEP.powi(level as i32).min(detail);
         self.image
             .map(|side| (f64::from(side) * scale).round() as usize)
     }

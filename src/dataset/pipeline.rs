@@ -429,7 +429,8 @@ impl Pipeline {
         if let Some(place) = place {
             let environment = scene.environment_map(panorama.clone())?;
             let detailed = place.plate_for_zoom(zoom_of(&scene))?;
-            scene = light::match_grain(scene, detailed.measured());
+            // By the pixels that are seen, which may be more than the picture has.
+            scene = detailed.measured().grained(scene);
             scene = light::match_plate(scene, place.plate()?.measured(), environment.as_ref());
             plate = Some(detailed.image);
         }

@@ -28,13 +28,7 @@ pub fn match_plate<'a>(
     let plate = plate.into();
     let tinted = match_light_tint(match_lamp(scene, plate, environment), plate);
     let lit = match_light_map(tinted, plate, environment);
-    match_grain(expose(lit, plate, environment), plate)
-}
-
-/// The part of [`match_plate`] that goes by the pixels that are seen: the blur and the noise of a
-/// plate that may be larger than the picture.
-pub(crate) fn match_grain(scene: Scene, plate: MeasuredPlate<'_>) -> Scene {
-    plate.grained(scene)
+    plate.grained(expose(lit, plate, environment))
 }
 
 /// Turns [`Exposure::MatchPlate`] and [`Exposure::MatchSurface`] into [`Exposure::Ev`]; a scene

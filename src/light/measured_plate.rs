@@ -79,7 +79,7 @@ impl<'a> MeasuredPlate<'a> {
 
     /// Turns [`Blur::MatchPlate`] and [`Noise::MatchPlate`] of a scene's finish into those of the
     /// plate; any other scene comes back as it is.
-    pub(super) fn grained(&self, mut scene: Scene) -> Scene {
+    pub(crate) fn grained(&self, mut scene: Scene) -> Scene {
         let finish = &mut scene.finish;
         if finish.blur_px == Blur::MatchPlate {
             finish.blur_px = self.known(|kept| &kept.blur, plate_blur);

@@ -47,7 +47,6 @@ pub use area::{LightFrame, frame, radiance};
 pub use blur::plate_blur;
 #[doc(hidden)]
 pub use expose::expose;
-pub(crate) use expose::match_grain;
 pub use expose::match_plate;
 #[doc(hidden)]
 pub use irradiance::irradiance;
