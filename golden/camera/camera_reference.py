@@ -68,26 +68,12 @@ def intrinsics_from_blender(lens, fit, sensor_w, sensor_h, shift_x, shift_y,
     return fx, fy, cx, cy
 
 
-def blender_from_intrinsics(f, cx, cy, rx, ry, sensor_w=36.0):
-    """Square pixels; result is meant for sensor_fit AUTO."""
-    view = max(rx, ry)
-    return dict(sensor_fit='AUTO', sensor_width=sensor_w, lens=f * sensor_w / view,
-                shift_x=(0.5 * rx - cx) / view, shift_y=(cy - 0.5 * ry) / view)
-
-
 def matrix_world_from_rt(R, t):
     """OpenCV R,t (world -> camera) -> Blender camera matrix_world."""
     Rt = tr(R)
     C = [-v for v in mv(Rt, t)]
     B = mul(Rt, FLIP)
     return [B[0] + [C[0]], B[1] + [C[1]], B[2] + [C[2]], [0.0, 0.0, 0.0, 1.0]]
-
-
-def rt_from_matrix_world(M):
-    B = [row[:3] for row in M[:3]]
-    C = [row[3] for row in M[:3]]
-    R = mul(FLIP, tr(B))
-    return R, [-v for v in mv(R, C)]
 
 
 def project(K, R, t, P):
@@ -170,7 +156,7 @@ def sample(rng, cat):
         ox, oy = 0.5 * rx - K[2] - 0.5 * (min(xs) + max(xs)), 0.5 * ry - K[3] - 0.5 * (min(ys) + max(ys))
         t = [ox * d / f, oy * d / f, d]
     return dict(rx=rx, ry=ry, w=w, h=h, R=R, t=t, K=K, lens=lens, shift=shift, fit=fit,
-                sensor=(sensor_w, sensor_h), tilt=math.degrees(tilt), az=math.degrees(az), roll=math.degrees(roll))
+                sensor=(sensor_w, sensor_h), tilt=math.degrees(tilt))
 
 
 def apply_to_blender(s, cam_obj, scene):
