@@ -1,23 +1,23 @@
 //! Labels and cameras as a person meets them: the real program in an empty folder.
 #![expect(clippy::unwrap_used, reason = "helpers of tests are tests")]
 
+mod desk;
+
+use desk::{Desk, text};
 use petcomp::camera::CameraFile;
 use petcomp::camera::simulate::Scenario;
 use petcomp::{Camera, Image, LinearRgb, Srgb8, io};
 use serde_json::{Value, json};
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::path::Path;
 
 /// Picture size and rectangle of all photos here.
 const IMAGE: [u32; 2] = [640, 480];
 const SIZE: [f64; 2] = [0.56, 0.37];
 
-/// A folder with backgrounds, a class and a recipe of empty scenes.
-struct Desk(tempfile::TempDir);
-
 impl Desk {
-    fn new() -> Self {
-        let desk = Self(tempfile::tempdir().unwrap());
+    /// With a class, and a recipe of empty scenes whose backgrounds are in `bg`.
+    fn with_recipe() -> Self {
+        let desk = Self::new();
         desk.write("assets/assets.toml", "classes = [\"cap\"]");
         desk.write(
             "recipe.toml",
@@ -26,29 +26,10 @@ impl Desk {
         desk
     }
 
-    fn path(&self, name: &str) -> PathBuf {
-        self.0.path().join(name)
-    }
-
-    fn write(&self, name: &str, text: &str) {
-        let path = self.path(name);
-        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
-        std::fs::write(path, text).unwrap();
-    }
-
-    fn run(&self, args: &[&str]) -> Output {
-        Command::new(env!("CARGO_BIN_EXE_petcomp"))
-            .args(args)
-            .current_dir(self.0.path())
-            .output()
-            .unwrap()
-    }
-
     /// What a run that must succeed prints: results and messages.
     fn ok(&self, args: &[&str]) -> [String; 2] {
         let output = self.run(args);
-        let said = [&output.stdout, &output.stderr]
-            .map(|bytes| String::from_utf8_lossy(bytes).into_owned());
+        let said = [text(&output.stdout), text(&output.stderr)];
         assert!(
             output.status.success(),
             "petcomp {args:?}\n{}{}",
@@ -61,7 +42,7 @@ impl Desk {
     /// The last line of a run that must fail.
     fn refused(&self, args: &[&str]) -> String {
         let output = self.run(args);
-        let err = String::from_utf8_lossy(&output.stderr).into_owned();
+        let err = text(&output.stderr);
         assert!(
             output
                 .status
@@ -84,7 +65,7 @@ impl Desk {
         let [w, h] = image.map(|side| side as usize);
         std::fs::create_dir_all(self.path("bg")).unwrap();
         io::write(
-            self.path(&format!("bg/{name}.png")),
+            self.path(format!("bg/{name}.png")),
             &Image::filled(
                 w,
                 h,
@@ -105,7 +86,7 @@ impl Desk {
     }
 
     fn label(&self, name: &str, label: &Value) {
-        self.write(&format!("bg/{name}.label.json"), &label.to_string());
+        self.write(format!("bg/{name}.label.json"), label.to_string());
     }
 
     /// The camera of scene 0 and what was said.
@@ -128,7 +109,7 @@ fn exchanged(mut label: Value) -> Value {
 
 #[test]
 fn a_label_with_its_sides_exchanged_is_refused_by_every_command() {
-    let desk = Desk::new();
+    let desk = Desk::with_recipe();
     desk.label("a", &exchanged(desk.photo("a", IMAGE)));
     let generate = ["dataset", "generate", "recipe.toml", "-n", "1", "-o", "out"];
     for args in [
@@ -147,7 +128,7 @@ fn a_label_with_its_sides_exchanged_is_refused_by_every_command() {
         &generate,
     ] {
         desk.refused(args);
-        let said = String::from_utf8_lossy(&desk.run(args).stderr).into_owned();
+        let said = text(&desk.run(args).stderr);
         assert!(
             said.contains("no camera fits") && said.contains("exchange width_m and height_m"),
             "{args:?}: {said}"
@@ -163,7 +144,7 @@ fn a_label_with_its_sides_exchanged_is_refused_by_every_command() {
 
 #[test]
 fn a_camera_beside_its_label_is_used_and_decides_the_dataset() {
-    let desk = Desk::new();
+    let desk = Desk::with_recipe();
     let label = desk.photo("a", IMAGE);
     desk.label("a", &label);
     let (alone, _) = desk.scene(&[]);
@@ -207,7 +188,7 @@ fn a_camera_beside_its_label_is_used_and_decides_the_dataset() {
 
 #[test]
 fn photos_solved_together_are_used_together() {
-    let desk = Desk::new();
+    let desk = Desk::with_recipe();
     for (name, k) in [("a", 0), ("b", 1), ("c", 2)] {
         let scenario = Scenario {
             image: IMAGE,
@@ -225,7 +206,7 @@ fn photos_solved_together_are_used_together() {
     let labels = ["bg/a.label.json", "bg/b.label.json", "bg/c.label.json"];
     desk.ok(&[&["camera", "joint"][..], &labels].concat());
     let focal = |name: &str| {
-        io::read_json::<CameraFile>(desk.path(&format!("bg/{name}.camera.json")))
+        io::read_json::<CameraFile>(desk.path(format!("bg/{name}.camera.json")))
             .unwrap()
             .found
             .model
@@ -246,7 +227,7 @@ fn photos_solved_together_are_used_together() {
 
 #[test]
 fn labels_that_are_solved_alone_are_named() {
-    let desk = Desk::new();
+    let desk = Desk::with_recipe();
     let joint = ["camera", "joint", "bg/a.label.json", "bg/b.label.json"];
     let alone = |id: Value| {
         for name in ["a", "b"] {
@@ -264,7 +245,7 @@ fn labels_that_are_solved_alone_are_named() {
 
 #[test]
 fn a_camera_that_cannot_be_solved_stops_no_other_one() {
-    let desk = Desk::new();
+    let desk = Desk::with_recipe();
     for (name, id) in [("a", "bad"), ("b", "good"), ("c", "good")] {
         let mut label = desk.photo(name, IMAGE);
         label["camera"] = json!({ "id": id });
@@ -279,13 +260,13 @@ fn a_camera_that_cannot_be_solved_stops_no_other_one() {
     assert!(
         ["b", "c"]
             .iter()
-            .all(|name| desk.path(&format!("bg/{name}.camera.json")).exists())
+            .all(|name| desk.path(format!("bg/{name}.camera.json")).exists())
     );
 }
 
 #[test]
 fn a_camera_too_far_away_is_refused_however_it_is_solved() {
-    let desk = Desk::new();
+    let desk = Desk::with_recipe();
     let mut label = desk.photo("a", IMAGE);
     let surface = &mut label["surface"];
     (surface["width_m"], surface["height_m"]) = (json!(20.0 * SIZE[0]), json!(20.0 * SIZE[1]));
@@ -302,7 +283,7 @@ fn a_camera_too_far_away_is_refused_however_it_is_solved() {
 
 #[test]
 fn a_photo_that_is_not_the_label_s_is_noticed() {
-    let desk = Desk::new();
+    let desk = Desk::with_recipe();
     let mut label = desk.photo("a", IMAGE);
     desk.label("a", &label);
     desk.photo("upright", [480, 640]);
@@ -327,7 +308,7 @@ fn a_photo_that_is_not_the_label_s_is_noticed() {
 
 #[test]
 fn corners_outside_of_the_picture_can_be_given() {
-    let desk = Desk::new();
+    let desk = Desk::with_recipe();
     desk.photo("a", IMAGE);
     let init = ["camera", "init", "bg/a.png", "--size", "0.56x0.37"];
     let corners = ["--corners", "-300,-200 1000,0 900,700 -250,600"];
@@ -366,13 +347,13 @@ fn photo_of_a_marker() -> Image<LinearRgb> {
 
 #[test]
 fn the_corners_of_a_marker_are_added_to_a_label() {
-    let desk = Desk::new();
+    let desk = Desk::with_recipe();
     io::write(desk.path("a.png"), &photo_of_a_marker()).unwrap();
     let mut map = desk.photo("a", IMAGE);
     map["surface"]["corners_px"] = Value::Null;
     map["markers"] =
         json!({ "family": "DICT_4X4_50", "size_m": 0.06, "map": { "0": [0.1, 0.0, 0.0] } });
-    desk.write("map.json", &map.to_string());
+    desk.write("map.json", map.to_string());
     let [said, _] = desk.ok(&[
         "camera",
         "markers",
@@ -402,7 +383,7 @@ fn the_corners_of_a_marker_are_added_to_a_label() {
     // A label of the photo keeps all that it says; one of another photo lends what photos share.
     let mut own = label;
     own["camera"]["height_m"] = json!(0.64);
-    desk.write("a.label.json", &own.to_string());
+    desk.write("a.label.json", own.to_string());
     io::write(desk.path("b.png"), &photo_of_a_marker()).unwrap();
     for (name, map, height) in [
         ("a", "a", json!(0.64)),
@@ -412,7 +393,7 @@ fn the_corners_of_a_marker_are_added_to_a_label() {
         let photo = format!("{name}.png");
         let [map, output] = [map, name].map(|name| format!("{name}.label.json"));
         desk.ok(&["camera", "markers", &photo, "--map", &map, "-o", &output]);
-        let label: Value = io::read_json(desk.path(&output)).unwrap();
+        let label: Value = io::read_json(desk.path(output)).unwrap();
         let found = (&label["image"]["file"], &label["camera"]["height_m"]);
         assert_eq!(found, (&json!(photo), &height));
         assert_eq!(label["points"].as_array().unwrap().len(), 4);
@@ -421,7 +402,7 @@ fn the_corners_of_a_marker_are_added_to_a_label() {
 
 #[test]
 fn a_label_comes_from_nothing() {
-    let desk = Desk::new();
+    let desk = Desk::with_recipe();
     let label = desk.photo("a", IMAGE);
     let missing = desk.refused(&["camera", "solve", "bg/a.png"]);
     assert!(
@@ -515,10 +496,10 @@ fn drawn(label: &Value) -> [(&'static str, String); 3] {
 
 #[test]
 fn labels_of_other_programs_are_labels_everywhere() {
-    for (file, text) in drawn(&Desk::new().photo("a", IMAGE)) {
-        let desk = Desk::new();
+    for (file, text) in drawn(&Desk::with_recipe().photo("a", IMAGE)) {
+        let desk = Desk::with_recipe();
         desk.photo("a", IMAGE);
-        desk.write(&format!("bg/{file}"), &text);
+        desk.write(format!("bg/{file}"), text);
         let error = desk.refused(&["scene", "draw", "recipe.toml", "-o", "scene.json"]);
         assert!(
             error.contains("surface_size") && error.contains("--size"),
@@ -543,7 +524,7 @@ fn labels_of_other_programs_are_labels_everywhere() {
 
 #[test]
 fn an_image_beyond_the_dataset_is_refused() {
-    let desk = Desk::new();
+    let desk = Desk::with_recipe();
     desk.label("a", &desk.photo("a", IMAGE));
     let generate = [
         "dataset",
@@ -566,7 +547,7 @@ fn an_image_beyond_the_dataset_is_refused() {
 
 #[test]
 fn a_recipe_is_fitted_to_its_photos() {
-    let desk = Desk::new();
+    let desk = Desk::with_recipe();
     desk.label("a", &desk.photo("a", IMAGE));
     let recipe = || std::fs::read_to_string(desk.path("recipe.toml")).unwrap();
     let before = recipe();
@@ -586,13 +567,13 @@ fn a_recipe_is_fitted_to_its_photos() {
 
 #[test]
 fn other_files_beside_the_photos_are_left_alone() {
-    let desk = Desk::new();
+    let desk = Desk::with_recipe();
     desk.label("a", &desk.photo("a", IMAGE));
     desk.write("bg/notes.json", "{\"camera\": \"mine\"}");
     desk.write("bg/broken.json", "{");
     desk.write("bg/page.xml", "<html></html>");
     let [labelme, ..] = drawn(&desk.photo("a", IMAGE));
-    desk.write("bg/a.json", &labelme.1.replace("0.", "1."));
+    desk.write("bg/a.json", labelme.1.replace("0.", "1."));
     desk.scene(&[]);
     desk.write("bg/b.json", "{\"shapes\": [], \"imagePath\": \"a.png\"}");
     assert!(
@@ -603,7 +584,7 @@ fn other_files_beside_the_photos_are_left_alone() {
 
 #[test]
 fn warnings_about_a_background_are_said_where_it_is_solved_and_in_the_report() {
-    let desk = Desk::new();
+    let desk = Desk::with_recipe();
     // Nothing says that the picture is whole.
     desk.label("a", &desk.photo("a", IMAGE));
     let (_, unsolved) = desk.scene(&[]);
@@ -635,7 +616,7 @@ fn warnings_about_a_background_are_said_where_it_is_solved_and_in_the_report() {
 
 #[test]
 fn a_portrait_photo_is_not_cropped_in_silence() {
-    let desk = Desk::new();
+    let desk = Desk::with_recipe();
     desk.label("p", &desk.photo("p", [480, 640]));
     let (_, said) = desk.scene(&[]);
     let line = said
@@ -656,7 +637,7 @@ fn a_portrait_photo_is_not_cropped_in_silence() {
 
 #[test]
 fn a_camera_is_exported_with_its_lens() {
-    let desk = Desk::new();
+    let desk = Desk::with_recipe();
     let mut label = desk.photo("a", IMAGE);
     label["camera"] = json!({ "k1": -0.01 });
     desk.label("a", &label);
@@ -674,7 +655,7 @@ fn a_camera_is_exported_with_its_lens() {
 
 #[test]
 fn the_overlay_has_a_legend_below_the_photo() {
-    let desk = Desk::new();
+    let desk = Desk::with_recipe();
     desk.label("a", &desk.photo("a", IMAGE));
     desk.ok(&["camera", "solve", "bg/a.label.json"]);
     let overlay: Image<LinearRgb> = io::read(desk.path("bg/a.overlay.png")).unwrap();
@@ -688,7 +669,7 @@ fn the_overlay_has_a_legend_below_the_photo() {
 #[test]
 fn the_samples_are_taken_with_their_cameras() {
     // The label of a sample, its sides exchanged: the case that was reported.
-    let desk = Desk::new();
+    let desk = Desk::with_recipe();
     let samples = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/samples/backgrounds");
     std::fs::create_dir_all(desk.path("bg")).unwrap();
     std::fs::copy(samples.join("bg0000.jpg"), desk.path("bg/bg0000.jpg")).unwrap();

@@ -1,36 +1,12 @@
 //! The real program in an empty folder, as a person types it.
 
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+mod desk;
 
-/// A folder of its own for one test, and the program run in it.
-struct Desk(tempfile::TempDir);
+use desk::{Desk, PETCOMP, text};
+use std::path::{Path, PathBuf};
+use std::process::Command;
 
 impl Desk {
-    fn new() -> Self {
-        Self(tempfile::tempdir().expect("a temporary folder"))
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.0.path().join(name)
-    }
-
-    fn write(&self, name: &str, content: impl AsRef<[u8]>) -> PathBuf {
-        let path = self.path(name);
-        std::fs::create_dir_all(path.parent().expect("inside the desk")).expect("a folder");
-        std::fs::write(&path, content).expect("a file");
-        path
-    }
-
-    fn run(&self, args: &[&str]) -> Output {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_petcomp"));
-        command
-            .args(args)
-            .current_dir(self.0.path())
-            .output()
-            .expect("the program starts")
-    }
-
     /// Runs what must succeed and returns what it printed.
     fn ok(&self, args: &[&str]) -> String {
         let output = self.run(args);
@@ -65,7 +41,7 @@ impl Desk {
 
     fn files(&self) -> Vec<PathBuf> {
         let mut found = Vec::new();
-        walk(self.0.path(), &mut found);
+        walk(self.folder(), &mut found);
         found.sort();
         found
     }
@@ -79,10 +55,6 @@ fn walk(folder: &Path, found: &mut Vec<PathBuf>) {
             found.push(entry.path());
         }
     }
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).into_owned()
 }
 
 fn samples() -> PathBuf {
@@ -140,10 +112,7 @@ fn every_subcommand_explains_itself() {
 
 #[test]
 fn the_program_does_not_load_openimageio() {
-    let Ok(ldd) = Command::new("ldd")
-        .arg(env!("CARGO_BIN_EXE_petcomp"))
-        .output()
-    else {
+    let Ok(ldd) = Command::new("ldd").arg(PETCOMP).output() else {
         return;
     };
     assert!(
@@ -303,10 +272,7 @@ fn a_build_without_one_of_its_photos_is_incomplete() {
 #[test]
 fn a_progress_bar_begins_at_nothing() {
     let desk = Desk::new();
-    let job = format!(
-        "stty cols 80; {} asset build list.csv -o assets",
-        env!("CARGO_BIN_EXE_petcomp")
-    );
+    let job = format!("stty cols 80; {PETCOMP} asset build list.csv -o assets");
     desk.write(
         "list.csv",
         format!(
@@ -317,7 +283,7 @@ fn a_progress_bar_begins_at_nothing() {
     let mut command = Command::new("script");
     let output = command
         .args(["-qec", &job, "/dev/null"])
-        .current_dir(desk.0.path())
+        .current_dir(desk.folder())
         .output()
         .expect("Debian has script");
     let shown = text(&output.stdout);
@@ -489,13 +455,13 @@ fn the_frames_of_a_sequence_are_keyed_into_folders() {
     let frames = ["shot/0.png", "shot/1.png", "shot/2.png"];
     let folders = ["-o", "keyed", "--matte", "mattes"];
     desk.ok(&[&["matte", "key"][..], &frames, &folders, &screen].concat());
-    let read = |name: String| std::fs::read(desk.path(&name)).expect("a picture");
+    let read = |name: String| std::fs::read(desk.path(name)).expect("a picture");
     for k in 0..3 {
         assert_eq!(
             read(format!("keyed/{k}.png")),
             read(format!("alone_{k}.png"))
         );
-        assert!(desk.path(&format!("mattes/{k}.png")).exists());
+        assert!(desk.path(format!("mattes/{k}.png")).exists());
     }
     let same = ["matte", "key", "shot/0.png", "shot/0.png", "-o", "twice"];
     let refused = desk.run(&[&same[..], &screen].concat());
@@ -916,10 +882,10 @@ fn diff_tells_channels_that_it_passes_over() {
 #[test]
 fn the_demo_goes_by_the_recipe_that_is_there() {
     let desk = Desk::new();
-    let recipe = desk.write("demo/recipe.toml", "[scene]\nobjcts = 3\n");
+    desk.write("demo/recipe.toml", "[scene]\nobjcts = 3\n");
     let error = desk.refused(&["demo", "--samples", &sample("")]);
     assert!(error.contains("scene: unknown key \"objcts\""), "{error}");
-    let text = std::fs::read_to_string(recipe).expect("the recipe");
+    let text = std::fs::read_to_string(desk.path("demo/recipe.toml")).expect("the recipe");
     assert_eq!(text, "[scene]\nobjcts = 3\n");
 }
 
@@ -1334,7 +1300,7 @@ fn one_word_says_how_finely_every_stage_works() {
 fn photos_of_frames(desk: &Desk, names: &[&str]) -> Vec<String> {
     let photo = |name: &&str| {
         let shown: petcomp::Image<petcomp::LinearRgb> =
-            petcomp::io::read(desk.path(&format!("frames/{name}.png"))).expect("a frame");
+            petcomp::io::read(desk.path(format!("frames/{name}.png"))).expect("a frame");
         let seen = petcomp::Image::from_fn(shown.width(), shown.height(), |x, y| {
             let inside = (200..440).contains(&x) && (150..250).contains(&y);
             let (reflected, passed) = if inside { (0.05, 0.45) } else { (0.01, 0.85) };

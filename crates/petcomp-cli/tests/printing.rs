@@ -2,42 +2,14 @@
 //! `-q` the answer still.
 #![cfg(unix)]
 
+mod desk;
+
+use desk::{Desk, text};
 use std::ffi::{OsStr, OsString};
 use std::os::unix::ffi::OsStringExt;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
-
-/// A folder of its own for one test, and the program run in it.
-struct Desk(tempfile::TempDir);
+use std::process::{Output, Stdio};
 
 impl Desk {
-    fn new() -> Self {
-        Self(tempfile::tempdir().unwrap())
-    }
-
-    fn path(&self, name: impl AsRef<Path>) -> PathBuf {
-        self.0.path().join(name)
-    }
-
-    fn write(&self, name: impl AsRef<Path>, content: impl AsRef<[u8]>) {
-        let path = self.path(name);
-        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
-        std::fs::write(path, content).unwrap();
-    }
-
-    fn command<S: AsRef<OsStr>>(&self, args: &[S]) -> Command {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_petcomp"));
-        command
-            .args(args)
-            .current_dir(self.0.path())
-            .stdin(Stdio::null());
-        command
-    }
-
-    fn run<S: AsRef<OsStr>>(&self, args: &[S]) -> Output {
-        self.command(args).output().unwrap()
-    }
-
     /// Both outputs and the exit status of a run with its standard output in a file.
     fn printed_into(&self, args: &[&str], file: &str) -> (Option<i32>, String) {
         let out = std::fs::File::options().write(true).open(file).unwrap();
@@ -72,10 +44,6 @@ impl Desk {
         petcomp::io::write(desk.path("a.png"), &grey(0.5)).unwrap();
         desk
     }
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).into_owned()
 }
 
 /// Neither colour, cursor nor another line than those that end with one.

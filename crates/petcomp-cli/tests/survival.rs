@@ -3,50 +3,29 @@
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
+mod desk;
+
+use desk::{Desk, PETCOMP, text};
 use std::os::unix::process::ExitStatusExt;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-const PETCOMP: &str = env!("CARGO_BIN_EXE_petcomp");
-
-struct Desk(tempfile::TempDir);
-
 impl Desk {
-    fn new() -> Self {
-        Self(tempfile::tempdir().unwrap())
-    }
-
-    fn write(&self, name: &str, bytes: impl AsRef<[u8]>) -> PathBuf {
-        let path = self.0.path().join(name);
-        std::fs::write(&path, bytes).unwrap();
-        path
-    }
-
-    fn command(&self, args: &[&str]) -> Command {
-        let mut command = Command::new(PETCOMP);
-        command.args(args).current_dir(self.0.path());
-        command
-    }
-
-    fn run(&self, args: &[&str]) -> Output {
-        self.command(args).output().unwrap()
-    }
-
     /// The program in a shell that may map so many KiB of memory, and take ten seconds of a
     /// processor.
     fn run_within(&self, kib: u64, args: &str) -> Output {
         let script = format!("ulimit -v {kib}; ulimit -t 10; exec {PETCOMP} {args}");
         Command::new("sh")
             .args(["-c", &script])
-            .current_dir(self.0.path())
+            .current_dir(self.folder())
             .output()
             .unwrap()
     }
 }
 
 fn said(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr)
+    text(&output.stdout) + &text(&output.stderr)
 }
 
 fn samples() -> String {
@@ -63,12 +42,12 @@ const LABEL: &str = r#"{"format": "plane-label", "version": 1, "image": {"file":
 fn a_broken_file_among_good_ones_is_named_and_the_rest_done() {
     let desk = Desk::new();
     for name in ["a", "c"] {
-        desk.write(&format!("{name}.label.json"), LABEL);
+        desk.write(format!("{name}.label.json"), LABEL);
     }
     desk.write("b.label.json", "{");
     assert!(
         Command::new("mkfifo")
-            .arg(desk.0.path().join("d.label.json"))
+            .arg(desk.path("d.label.json"))
             .status()
             .unwrap()
             .success()
@@ -92,10 +71,7 @@ fn a_broken_file_among_good_ones_is_named_and_the_rest_done() {
         said.contains("error: 3 of 5 files could not be used; the rest is done"),
         "{said}"
     );
-    assert!(
-        desk.0.path().join("a.camera.json").exists()
-            && desk.0.path().join("c.camera.json").exists()
-    );
+    assert!(desk.path("a.camera.json").exists() && desk.path("c.camera.json").exists());
 }
 
 #[test]
@@ -286,15 +262,14 @@ fn a_signal_stops_between_pictures_and_the_same_command_goes_on() {
                 .unwrap()
         };
         let child = run("100000");
-        wait_for_a_sample(&desk.0.path().join(signal));
+        wait_for_a_sample(&desk.path(signal));
         send(signal, &child);
         assert_eq!(ends(child).code(), Some(130), "{signal}");
         let killed = run("100000");
         std::thread::sleep(Duration::from_millis(700));
         send("KILL", &killed);
         assert_eq!(ends(killed).signal(), Some(9));
-        let lines =
-            std::fs::read_to_string(desk.0.path().join(signal).join("index.jsonl")).unwrap();
+        let lines = std::fs::read_to_string(desk.path(signal).join("index.jsonl")).unwrap();
         let last = lines.lines().filter_map(|line| {
             line.strip_prefix("{\"k\":")?
                 .split(',')
@@ -345,10 +320,7 @@ fn long_run(desk: &Desk, folder: &str) -> Child {
 
 /// Waits until a dataset is begun.
 fn await_lock(desk: &Desk, folder: &str) {
-    let (start, lock) = (
-        Instant::now(),
-        desk.0.path().join(folder).join("index.jsonl"),
-    );
+    let (start, lock) = (Instant::now(), desk.path(folder).join("index.jsonl"));
     while !lock.exists() {
         assert!(start.elapsed() < HANGS, "did not begin");
         std::thread::sleep(Duration::from_millis(20));
@@ -421,7 +393,7 @@ fn a_number_that_is_too_great_is_refused_at_once() {
             );
         }
     }
-    assert!(!desk.0.path().join("out").exists());
+    assert!(!desk.path("out").exists());
     assert_eq!(run(&["--only", "999999999"]).0, Some(0));
 }
 
@@ -464,7 +436,7 @@ fn a_reader_that_goes_away_is_no_crash() {
         let script = format!("{PETCOMP} {args} | true");
         let output = Command::new("sh")
             .args(["-c", &script])
-            .current_dir(desk.0.path())
+            .current_dir(desk.folder())
             .output()
             .unwrap();
         assert!(
@@ -479,11 +451,7 @@ fn a_reader_that_goes_away_is_no_crash() {
 fn an_output_folder_with_a_link_inside_is_refused() {
     let desk = Desk::new();
     demo(&desk);
-    let (inside, outside) = (
-        desk.0.path().join("out/images"),
-        tempfile::tempdir().unwrap(),
-    );
-    std::fs::create_dir_all(inside.parent().unwrap()).unwrap();
+    let (inside, outside) = (desk.path("out/images"), tempfile::tempdir().unwrap());
     desk.write("out/dataset.json", "{}");
     std::os::unix::fs::symlink(outside.path(), &inside).unwrap();
     let output = desk.run(&[

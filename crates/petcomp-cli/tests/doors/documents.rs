@@ -386,13 +386,13 @@ fn camera_file(world: &World) {
 }
 
 fn labelme(world: &World) {
-    let Some(text) = ends(io::read_text(world.path("labelme.json"))) else {
+    let path = world.path("labelme.json");
+    let Some(labels) = ends(camera::read_labels(path, Some([0.56, 0.37]))) else {
         return;
     };
-    let Some(label) = ends(camera::from_labelme(&text, [0.56, 0.37])) else {
-        return;
-    };
-    let _ = camera::solve(&label, &SolveOptions::default());
+    for labelled in labels {
+        let _ = camera::solve(&labelled.label, &SolveOptions::default());
+    }
 }
 
 fn manifest(world: &World) {
