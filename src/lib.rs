@@ -79,6 +79,7 @@ mod pixel;
 #[doc(hidden)]
 pub mod plot;
 mod quality;
+mod quantile;
 #[cfg(feature = "pipeline")]
 pub mod render;
 #[cfg(feature = "pipeline")]

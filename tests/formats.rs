@@ -9,17 +9,15 @@
 
 mod python;
 
-use petcomp::asset::Texture;
 use petcomp::camera::Camera;
 use petcomp::dataset::{
     LabelConfig, Obstructed, Pictures, Plan, Provenance, Sample, SampleRange, SampleRecord,
     Sidecar, Split, generate,
 };
-use petcomp::filter::Pyramid;
 use petcomp::geom::{Point2, Pose, Quad, UnitQuaternion, Vector2, Vector3};
 use petcomp::io::exr::read_channels;
 use petcomp::label::{LabelOptions, label};
-use petcomp::scene::{CameraSource, Card, Grade, Surface};
+use petcomp::scene::{CameraSource, Card, Surface};
 use petcomp::{Image, LinearRgb, ObjectId, PremulRgba, Result, Scene, Shot, composite, io, render};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -57,22 +55,16 @@ fn card(id: u32, center: [f64; 3], turn: f64, size: [f64; 2]) -> Card {
     let rotation = UnitQuaternion::from_euler_angles(0.1, -0.1, turn);
     let light = LinearRgb::new(0.2 + 0.1 * id as f32, 0.5, 0.9 - 0.1 * id as f32);
     let corners = (0..12).map(|i| f64::from(i) * std::f64::consts::TAU / 12.0);
+    let quad = Quad {
+        world_from_card: Pose::from_parts(Vector3::from(center).into(), rotation),
+        size,
+    };
     Card {
-        id: ObjectId(id),
         class: Some(id % 2),
-        quad: Quad {
-            world_from_card: Pose::from_parts(Vector3::from(center).into(), rotation),
-            size,
-        },
-        texture: Texture::Rgba(Arc::new(Pyramid::new(ring(64, light)))),
         outline_uv: corners
             .map(|a| Point2::new(0.5 + 0.45 * a.cos(), 0.5 + 0.45 * a.sin()))
             .collect(),
-        grade: Grade::default(),
-        back: None,
-        bend: Default::default(),
-        refraction: Default::default(),
-        surfaces: Default::default(),
+        ..Card::new(ObjectId(id), quad, ring(64, light))
     }
 }
 

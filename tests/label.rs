@@ -5,13 +5,12 @@
 
 use geo::Contains;
 use petcomp::camera::Camera;
-use petcomp::geom::BBox;
-use petcomp::geom::{Point2, Pose, UnitQuaternion, Vector2, Vector3};
+use petcomp::geom::{BBox, Point2, Pose, Quad, UnitQuaternion, Vector2, Vector3};
 use petcomp::label::{
     AmodalBox, DepthRange, LabelOptions, Labels, ObjectLabel, ObstructionRule, cyclic_overlaps,
     label,
 };
-use petcomp::scene::{Card, Grade, View};
+use petcomp::scene::{Card, View};
 use petcomp::{DeepImage, DeepSample};
 use petcomp::{Depth, Image, LinearRgb, ObjectId, PremulRgba, Shot};
 use proptest::prelude::*;
@@ -38,21 +37,15 @@ fn camera() -> Camera {
 
 fn card(id: u32, center: [f64; 3], angles: [f64; 3], size: [f64; 2], outline: &[[f64; 2]]) -> Card {
     let rotation = UnitQuaternion::from_euler_angles(angles[0], angles[1], angles[2]);
-    let world_from_card = Pose::from_parts(Vector3::from(center).into(), rotation);
+    let quad = Quad {
+        world_from_card: Pose::from_parts(Vector3::from(center).into(), rotation),
+        size,
+    };
+    let texture = Image::filled(2, 2, PremulRgba::new(0.5, 0.5, 0.5, 1.0));
     Card {
-        id: ObjectId(id),
         class: Some(id % 4),
-        quad: petcomp::geom::Quad {
-            world_from_card,
-            size,
-        },
-        texture: Image::filled(2, 2, PremulRgba::new(0.5, 0.5, 0.5, 1.0)).into(),
-        back: None,
         outline_uv: outline.iter().map(|&[u, v]| Point2::new(u, v)).collect(),
-        grade: Grade::default(),
-        bend: Default::default(),
-        refraction: Default::default(),
-        surfaces: Default::default(),
+        ..Card::new(ObjectId(id), quad, texture)
     }
 }
 

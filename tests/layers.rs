@@ -14,6 +14,7 @@ const FLOORS: &[&[&str]] = &[
         "names",
         "pixel",
         "quality",
+        "quantile",
         "stopwatch",
         "work",
     ],

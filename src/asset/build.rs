@@ -681,7 +681,10 @@ mod tests {
                 .needs_review
                 .iter()
                 .any(|record| record.file.contains("two.exr")
-                    && record.review_reasons().contains("too grey")),
+                    && record
+                        .diagnostics
+                        .iter()
+                        .any(|d| d.message.contains("too grey"))),
             "{:?}",
             built.needs_review
         );

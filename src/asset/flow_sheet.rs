@@ -7,8 +7,8 @@ use crate::filter::Pyramid;
 use crate::geom::Point2;
 use crate::image::Image;
 use crate::matte::Flow;
-use crate::matte::median::quantile;
 use crate::pixel::{Film, LinearRgb, Srgb8};
+use crate::quantile::quantile;
 use std::f64::consts::TAU;
 
 /// Side of a square of the checkerboard, pixels: larger than what film is shown over, so that its

@@ -55,7 +55,7 @@ impl List {
     /// [`Error::File`] for a file that cannot be read or understood, with its line.
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
-        let list: Self = match is_csv(path) {
+        let list: Self = match io::has_extension(path, "csv") {
             true => Self::from_csv(path)?,
             false => io::read_toml(path)?,
         };
@@ -175,11 +175,6 @@ fn check_same(name: &str, told: Option<f64>, first: Option<f64>) -> Result<()> {
         }
         _ => Ok(()),
     }
-}
-
-fn is_csv(path: &Path) -> bool {
-    path.extension()
-        .is_some_and(|extension| extension.eq_ignore_ascii_case("csv"))
 }
 
 /// The list itself, or the one in a folder.

@@ -475,12 +475,6 @@ impl PhotoRecord {
         self.diagnostics.iter().any(Diagnostic::needs_review)
     }
 
-    /// The messages of the diagnostics, in one line.
-    pub fn review_reasons(&self) -> String {
-        let messages: Vec<&str> = self.diagnostics.iter().map(|d| &*d.message).collect();
-        messages.join("; ")
-    }
-
     /// Width and height of the cut-out, pixels.
     pub(super) fn size_px(&self) -> [f64; 2] {
         self.size_m.map(|side| side * self.px_per_metre)
@@ -876,7 +870,8 @@ pub(super) mod tests {
         let earlier = toml::to_string(&photo("a.exr")).unwrap()
             + "doubts = [\"two objects\", \"the outline is unsure\"]\n";
         let read: PhotoRecord = toml::from_str(&earlier).unwrap();
-        assert_eq!(read.review_reasons(), "two objects; the outline is unsure");
+        let messages: Vec<&str> = read.diagnostics.iter().map(|d| &*d.message).collect();
+        assert_eq!(messages, ["two objects", "the outline is unsure"]);
         assert!(read.needs_review() && read.diagnostics.iter().all(|d| d.code == Code::Uncoded));
         let wrong = earlier.replace("\"two objects\"", "7");
         let error = toml::from_str::<PhotoRecord>(&wrong).unwrap_err();

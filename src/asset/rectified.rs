@@ -11,9 +11,9 @@ use crate::filter::sample_nearest;
 use crate::geom::Point2;
 use crate::image::Image;
 use crate::io::Header;
-use crate::matte::median::median;
 use crate::matte::{ScreenCorners, from_top_left, screen_corners};
 use crate::pixel::{LinearRgb, Mix};
+use crate::quantile::median;
 use std::borrow::Cow;
 
 /// Noise of a corner that a person clicked, pixels.

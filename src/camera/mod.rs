@@ -62,8 +62,6 @@ pub use focal::FocalSource;
 #[doc(hidden)]
 pub use focal::focal_from_equivalent;
 #[doc(hidden)]
-pub use import::from_labelme;
-#[doc(hidden)]
 pub use init::{commented, init_label, with_folded_lists};
 #[doc(hidden)]
 pub use joint::{Joint, OutlierPhoto, group_by_camera, have_same_shape, solve_joint};

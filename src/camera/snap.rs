@@ -86,7 +86,7 @@ fn reach_px((width, height): (usize, usize)) -> f64 {
 
 /// A place where light changes, on one of the profiles across a side.
 #[derive(Clone, Copy)]
-struct Edge {
+struct ProfileEdge {
     /// How far along the side, 0 to 1, and across it, pixels.
     along: f64,
     across: f64,
@@ -98,7 +98,7 @@ struct Edge {
 /// on one.
 fn edge_near(photo: &Image<LinearRgb>, ends: [Point2<f64>; 2], reach: f64) -> Option<Line> {
     let side = Side::new(ends)?;
-    let edges: Vec<Edge> = (0..PROFILES)
+    let edges: Vec<ProfileEdge> = (0..PROFILES)
         .flat_map(|i| side.edges(photo, probe_part(i), reach))
         .collect();
     let [from, to] = best_line(&edges, reach)?;
@@ -122,7 +122,7 @@ fn height_at(along: f64, from: f64, to: f64) -> f64 {
 }
 
 /// The line, by how far across it is at both ends, that edges agree on most.
-fn best_line(edges: &[Edge], reach: f64) -> Option<[f64; 2]> {
+fn best_line(edges: &[ProfileEdge], reach: f64) -> Option<[f64; 2]> {
     let early = edges.iter().filter(|edge| edge.along < 0.35);
     let pairs = early.flat_map(|a| {
         let late = edges.iter().filter(|edge| edge.along > 0.65);
@@ -134,14 +134,14 @@ fn best_line(edges: &[Edge], reach: f64) -> Option<[f64; 2]> {
         .map(|(line, _)| line)
 }
 
-fn through(a: &Edge, b: &Edge) -> [f64; 2] {
+fn through(a: &ProfileEdge, b: &ProfileEdge) -> [f64; 2] {
     let slope = (b.across - a.across) / (b.along - a.along);
     let from = a.across - slope * a.along;
     [from, from + slope]
 }
 
 /// How much contrast lies on a line; far lines need more of it.
-fn agreement(edges: &[Edge], [from, to]: [f64; 2], reach: f64) -> f64 {
+fn agreement(edges: &[ProfileEdge], [from, to]: [f64; 2], reach: f64) -> f64 {
     let total: f64 = edges
         .iter()
         .filter(|edge| (edge.across - height_at(edge.along, from, to)).abs() < ON_LINE_PX)
@@ -185,11 +185,11 @@ impl Side {
     }
 
     /// The strongest edges of the profile across the side at some part of it.
-    fn edges(&self, photo: &Image<LinearRgb>, along: f64, reach: f64) -> Vec<Edge> {
-        let profile = Profile::across(self, photo, along, reach);
-        let mut edges: Vec<Edge> = profile
+    fn edges(&self, photo: &Image<LinearRgb>, along: f64, reach: f64) -> Vec<ProfileEdge> {
+        let profile = LightProfile::across(self, photo, along, reach);
+        let mut edges: Vec<ProfileEdge> = profile
             .peaks()
-            .map(|(across, contrast)| Edge {
+            .map(|(across, contrast)| ProfileEdge {
                 along,
                 across,
                 contrast,
@@ -202,12 +202,12 @@ impl Side {
 }
 
 /// Light across a side, from `-reach` on.
-struct Profile {
+struct LightProfile {
     light: Vec<f64>,
     reach: f64,
 }
 
-impl Profile {
+impl LightProfile {
     fn across(side: &Side, photo: &Image<LinearRgb>, along: f64, reach: f64) -> Self {
         // Changes at the very end of the reach are seen whole.
         let reach = reach + EDGE_REACH_PX;

@@ -13,15 +13,18 @@ use super::stripes::{SeenStripes, Wave};
 use super::view::View;
 use crate::image::{Image, Mask};
 use crate::matte::LightPath;
-use crate::matte::median::median;
+use crate::pixel::Coverage;
+use crate::quantile::median;
 use nalgebra::{Complex, DMatrix, DVector};
 use std::f64::consts::{PI, TAU};
 
-/// The refraction of an object in the view.
-pub(super) struct Bend {
-    /// Lengths in pixels of the display; nothing bent where it is not known.
-    pub(super) paths: Image<LightPath>,
-    pub(super) known: Mask,
+/// How lines of sight through an object are bent.
+pub struct Refraction {
+    /// Where the light comes from that the object lets pass, lengths in pixels of the display;
+    /// nothing bent where it is not known.
+    pub paths: Image<LightPath>,
+    /// Where it was measured: on the object alone, and where it lets light pass.
+    pub known: Mask,
 }
 
 /// What lets pass less than this tells nothing of where the light comes from.
@@ -114,16 +117,22 @@ pub(super) struct BendInput<'a> {
     pub(super) empty: Option<&'a SeenStripes>,
     /// Pixels that surely show the empty display.
     pub(super) free: &'a Mask,
-    /// Grey transmittance of the object.
+    /// What the object covers.
+    pub(super) coverage: &'a Image<Coverage>,
+    /// Its grey transmittance.
     pub(super) transmittance: &'a Image<f32>,
     /// Grey light of white over black.
     pub(super) light: &'a Image<f32>,
 }
 
 impl BendInput<'_> {
-    pub(super) fn solve(&self) -> Bend {
+    pub(super) fn solve(&self) -> Refraction {
         let expected = self.expected();
-        let known = self.transmittance.map(|v| v >= MIN_TRANSMITTANCE);
+        let known = self
+            .transmittance
+            .zip_map(self.coverage, |transmittance, coverage| {
+                transmittance >= MIN_TRANSMITTANCE && coverage.0 >= 0.5
+            });
         let contrasts = [0, 1].map(|period| [0, 1].map(|axis| self.contrast(period, axis)));
         let (w, h) = known.size();
         let paths = Image::from_fn(w, h, |x, y| {
@@ -133,7 +142,7 @@ impl BendInput<'_> {
                 LightPath::default()
             }
         });
-        Bend { paths, known }
+        Refraction { paths, known }
     }
 
     /// What the object leaves of stripes that have such contrasts without it, and that end where

@@ -1,6 +1,6 @@
 //! What an object on a display lets through, reflects and bends.
 
-use super::bend::{Bend, BendInput};
+use super::bend::{BendInput, Refraction};
 use super::check;
 use super::display::Display;
 use super::frame::Frame;
@@ -14,7 +14,7 @@ use crate::diagnostic::Diagnostic;
 use crate::error::Result;
 use crate::filter;
 use crate::image::{Image, Mask};
-use crate::matte::{LightPath, Outline, PlateOptions, ScreenPlate};
+use crate::matte::{Outline, PlateOptions, ScreenPlate};
 use crate::pixel::{Coverage, Film, LinearRgb};
 
 /// An object as it was measured, over the whole display seen from above.
@@ -35,15 +35,6 @@ pub struct Measured {
     pub refraction: Option<Refraction>,
     /// Notes and warnings about the capture.
     pub diagnostics: Vec<Diagnostic>,
-}
-
-/// How lines of sight through an object are bent.
-pub struct Refraction {
-    /// Where the light comes from that the object lets pass, lengths in pixels of the display;
-    /// nothing bent where it is not known.
-    pub paths: Image<LightPath>,
-    /// Where it was measured: on the object alone, and where it lets light pass.
-    pub known: Mask,
 }
 
 /// Pixels around the object that may show something of it.
@@ -81,12 +72,12 @@ pub fn measure(
     diagnostics.extend(empty.drifts(reference));
     diagnostics.extend(photos.incomplete_stripes());
     diagnostics.extend(check::camera_motion(alignment.motion_px));
-    let scene = Scene::new(display, view, &stack, empty_stack.as_ref())?;
+    let scene = CaptureScene::new(display, view, &stack, empty_stack.as_ref())?;
     scene.solve(diagnostics)
 }
 
 /// All that is seen, and where the object is in it.
-struct Scene<'a> {
+struct CaptureScene<'a> {
     display: &'a Display,
     view: &'a View,
     stack: &'a Stack,
@@ -98,7 +89,7 @@ struct Scene<'a> {
     free: Mask,
 }
 
-impl<'a> Scene<'a> {
+impl<'a> CaptureScene<'a> {
     fn new(
         display: &'a Display,
         view: &'a View,
@@ -213,10 +204,11 @@ impl<'a> Scene<'a> {
             seen: &seen,
             empty: empty.as_ref(),
             free: &self.free,
+            coverage: &self.object.coverage,
             transmittance: &film.map(|film| grey(film.transmittance())),
             light: &frames.light().map(grey),
         };
-        Some(Refraction::on_object(input.solve(), &self.object.coverage))
+        Some(input.solve())
     }
 }
 
@@ -224,21 +216,6 @@ impl<'a> Scene<'a> {
 fn without(area: &Mask, object: &Object) -> Mask {
     let near = filter::dilate(&object.coverage.map(|c| c.0 > 0.0), OBJECT_MARGIN_PX);
     area.zip_map(&near, |area, near| area && !near)
-}
-
-impl Refraction {
-    fn on_object(bend: Bend, coverage: &Image<Coverage>) -> Self {
-        let known = bend.known.zip_map(coverage, |known, c| known && c.0 >= 0.5);
-        Self {
-            paths: bend.paths.zip_map(
-                &known,
-                |path, known| {
-                    if known { path } else { LightPath::default() }
-                },
-            ),
-            known,
-        }
-    }
 }
 
 /// What black and white look like without the object.

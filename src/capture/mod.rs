@@ -25,13 +25,15 @@ mod view;
 mod write;
 
 #[doc(hidden)]
+pub use bend::Refraction;
+#[doc(hidden)]
 pub use display::Display;
 #[doc(hidden)]
 pub use draw::draw_frame;
 #[doc(hidden)]
 pub use frame::{Frame, Stripes};
 #[doc(hidden)]
-pub use measure::{Measured, Refraction, measure};
+pub use measure::{Measured, measure};
 #[doc(hidden)]
 pub use page::page;
 #[doc(hidden)]

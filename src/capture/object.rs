@@ -5,9 +5,9 @@ use super::view::grey;
 use crate::error::Result;
 use crate::filter;
 use crate::image::{Image, Mask};
-use crate::matte::median::median;
 use crate::matte::{Outline, PixelGroups, filled};
 use crate::pixel::{Coverage, LinearRgb};
+use crate::quantile::median;
 
 /// The object in the view.
 pub(super) struct Object {

@@ -12,8 +12,8 @@
 use super::view::clipped;
 use crate::filter::{self, Pyramid, sample_bilinear_clamped};
 use crate::image::{Image, Mask};
-use crate::matte::median::median;
 use crate::pixel::{Coverage, Film, LinearRgb, Mix, PremulRgba};
+use crate::quantile::median;
 
 /// The two frames with the object and without.
 #[derive(Clone, Copy)]

@@ -22,9 +22,7 @@ pub use albedo::Albedo;
 #[doc(hidden)]
 pub use hsv::{Hsv, hsv_to_rgb, rgb_to_hsv, shift_hsv};
 #[doc(hidden)]
-pub use quantize::{
-    decode_row, decode_srgb8, decode_srgb16, encode_row, encode_srgb8, encode_srgb16,
-};
+pub use quantize::{decode_row, decode_srgb8, decode_srgb16, encode_srgb8, encode_srgb16};
 pub use quantize::{from_srgb8, to_srgb8};
 pub use space::RgbSpace;
 pub(crate) use space::rgb_from_xyz;

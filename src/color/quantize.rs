@@ -49,14 +49,6 @@ pub fn decode_row(codes: &[Srgb8], colors: &mut [LinearRgb]) {
     }
 }
 
-/// [`encode_srgb8`] for as many pixels as both rows have.
-pub fn encode_row(colors: &[LinearRgb], codes: &mut [Srgb8]) {
-    let encoder = &*ENCODE8;
-    for (code, &color) in codes.iter_mut().zip(colors) {
-        *code = encode_with(encoder, color);
-    }
-}
-
 /// A display picture as scene-linear light.
 pub fn from_srgb8(picture: &Image<Srgb8>) -> Image<LinearRgb> {
     let table = &*DECODE8;

@@ -239,7 +239,7 @@ mod tests {
     use crate::composite;
     use crate::geom::{Pose, Quad, UnitQuaternion, Vector2, Vector3};
     use crate::render::{RenderOptions, render};
-    use crate::scene::{Card, Grade};
+    use crate::scene::Card;
 
     fn shot() -> Shot {
         let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
@@ -249,25 +249,16 @@ mod tests {
             principal_px: Point2::new(16.0, 12.0),
             camera_from_world: Pose::from_parts(Vector3::new(0.0, 0.0, 1.0).into(), down),
         };
-        let card = |id, z: f64, alpha: f32| Card {
-            id: ObjectId(id),
-            class: Some(0),
-            quad: Quad {
+        let card = |id, z: f64, alpha: f32| {
+            let quad = Quad {
                 world_from_card: Pose::translation(0.02 * z, 0.0, z),
                 size: [0.4, 0.3],
-            },
-            texture: Image::filled(
-                8,
-                8,
-                PremulRgba::new(0.3 * alpha, 0.2 * alpha, 0.1 * alpha, alpha),
-            )
-            .into(),
-            back: None,
-            outline_uv: std::sync::Arc::new([]),
-            grade: Grade::default(),
-            bend: Default::default(),
-            refraction: Default::default(),
-            surfaces: Default::default(),
+            };
+            let texel = PremulRgba::new(0.3 * alpha, 0.2 * alpha, 0.1 * alpha, alpha);
+            Card {
+                outline_uv: [].into(),
+                ..Card::new(ObjectId(id), quad, Image::filled(8, 8, texel))
+            }
         };
         Shot::new(camera)
             .with_card(card(3, 0.1, 0.5))

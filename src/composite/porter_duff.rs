@@ -26,18 +26,6 @@ impl PremulRgba {
         self.masked(Coverage(1.0 - holdout.a))
     }
 
-    /// `self` on `base`, with the coverage of `base`.
-    #[inline(always)]
-    pub fn atop(self, base: Self) -> Self {
-        self.inside(base).add_scaled(1.0 - self.a, base)
-    }
-
-    /// Where exactly one of the two is.
-    #[inline(always)]
-    pub fn xor(self, other: Self) -> Self {
-        self.outside(other).plus(other.outside(self))
-    }
-
     /// The sum of two pixels that share a place without hiding each other.
     #[inline(always)]
     pub fn plus(self, other: Self) -> Self {
@@ -102,17 +90,6 @@ mod tests {
         #[test]
         fn over_is_a_plus_what_is_left_of_b(a in pixel(), b in pixel()) {
             prop_assert!(close(a.over(b), a.plus(b.outside(a))));
-        }
-
-        #[test]
-        fn atop_keeps_the_base_s_coverage(a in pixel(), b in pixel()) {
-            prop_assert!((a.atop(b).a - b.a).abs() < 1e-6);
-            prop_assert!(close(a.atop(b), a.inside(b).plus(b.outside(a))));
-        }
-
-        #[test]
-        fn xor_is_symmetric(a in pixel(), b in pixel()) {
-            prop_assert!(close(a.xor(b), b.xor(a)));
         }
     }
 

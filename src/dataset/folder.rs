@@ -23,12 +23,12 @@ const LOCK: &str = ".lock";
 const FORMAT_VERSION: u64 = 2;
 
 /// A claimed folder; free again when this is dropped.
-pub(crate) struct Claim {
+pub(crate) struct FolderClaim {
     _lock: File,
 }
 
 /// Claims the folder of a plan: makes or checks it, locks it, and lets the writers begin.
-pub(crate) fn claim(plan: &Plan) -> Result<Claim> {
+pub(crate) fn claim(plan: &Plan) -> Result<FolderClaim> {
     let folder = plan.folder.as_path();
     let before = enter(folder)?;
     refuse_foreign_files(folder)?;
@@ -36,7 +36,7 @@ pub(crate) fn claim(plan: &Plan) -> Result<Claim> {
     sign(plan, before)?;
     sweep(folder)?;
     begin_writers(plan)?;
-    Ok(Claim { _lock: lock })
+    Ok(FolderClaim { _lock: lock })
 }
 
 /// Makes or checks the folder of a plan that several runs write to at once, no two of them the same
@@ -114,9 +114,9 @@ pub(super) fn identity_file(folder: &Path) -> PathBuf {
 }
 
 /// Claims the folder of a dataset that was begun before.
-pub(crate) fn reclaim(folder: &Path) -> Result<Claim> {
+pub(crate) fn reclaim(folder: &Path) -> Result<FolderClaim> {
     begun(folder)?;
-    Ok(Claim {
+    Ok(FolderClaim {
         _lock: lock(folder)?,
     })
 }

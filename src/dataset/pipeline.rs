@@ -17,6 +17,7 @@ use crate::image::Image;
 use crate::label::{self, Labels};
 use crate::light;
 use crate::pixel::PremulRgba;
+use crate::quantile::median;
 use crate::render;
 use crate::scene::{
     Appearance, AssetVariant, Background, CameraSource, Drawn, Draws, EdgeTreatment, Recipe, Scene,
@@ -149,9 +150,7 @@ impl Pipeline {
         let objects = self.library.assets.iter().filter(|a| a.role.is_object());
         let photos = objects.flat_map(|asset| &asset.photos);
         let lengths = photos.map(|photo| photo.record.object_m[0]);
-        let mut lengths: Vec<f64> = lengths.collect();
-        lengths.sort_by(f64::total_cmp);
-        lengths.get(lengths.len() / 2).copied()
+        median(lengths, f64::total_cmp)
     }
 
     /// The same for one scene that is there already: only cut-outs of the assets that it names are

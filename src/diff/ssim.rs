@@ -77,7 +77,7 @@ struct Moments {
 
 impl Moments {
     fn new(a: &Image<f32>, b: &Image<f32>) -> Self {
-        let window = Window::gaussian();
+        let window = WindowWeights::gaussian();
         Self {
             a: window.windowed_means(a),
             b: window.windowed_means(b),
@@ -106,7 +106,7 @@ impl Moments {
 }
 
 /// The weights along one side of a window, which sum to 1.
-struct Window {
+struct WindowWeights {
     weights: Vec<f32>,
 }
 
@@ -114,7 +114,7 @@ fn gaussian_weight(x: f64) -> f32 {
     libm::exp(-x * x / (2.0 * WINDOW_SIGMA_PX * WINDOW_SIGMA_PX)) as f32
 }
 
-impl Window {
+impl WindowWeights {
     fn gaussian() -> Self {
         let radius = WINDOW_RADIUS_PX as i32;
         let weights: Vec<f32> = (-radius..=radius)
@@ -184,7 +184,7 @@ mod tests {
 
     #[test]
     fn the_mean_of_a_plane_of_one_value_is_that_value() {
-        let means = Window::gaussian().windowed_means(&Image::filled(7, 5, 0.3));
+        let means = WindowWeights::gaussian().windowed_means(&Image::filled(7, 5, 0.3));
         assert!(means.pixels().iter().all(|v| (v - 0.3).abs() < 1e-6));
     }
 }

@@ -62,23 +62,6 @@ impl BBox {
         dots.reduce(Self::hull).unwrap_or_default()
     }
 
-    /// Grown to hold the pixel in column `x`, row `y`.
-    #[cfg(test)]
-    pub(crate) fn with_pixel(self, x: usize, y: usize) -> Self {
-        let (x, y) = (x as f64, y as f64);
-        let pixel = Self {
-            x0: x,
-            y0: y,
-            x1: x + 1.0,
-            y1: y + 1.0,
-        };
-        if self.is_empty() {
-            pixel
-        } else {
-            self.hull(pixel)
-        }
-    }
-
     /// The smallest box around two; neither is empty.
     pub(crate) fn hull(self, o: Self) -> Self {
         Self {
@@ -104,20 +87,6 @@ mod tests {
         };
         assert!(BBox::default().is_empty() && somewhere.contains(&BBox::default()));
         assert!(!BBox::default().contains(&somewhere));
-    }
-
-    #[test]
-    fn a_box_holds_the_whole_of_its_pixels() {
-        let b = BBox::default().with_pixel(2, 7).with_pixel(4, 3);
-        assert_eq!(
-            b,
-            BBox {
-                x0: 2.0,
-                y0: 3.0,
-                x1: 5.0,
-                y1: 8.0
-            }
-        );
     }
 
     #[test]

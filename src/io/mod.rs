@@ -102,7 +102,8 @@ pub use codec::jpeg::{Chroma, through_jpeg};
 pub(crate) use document::parse_toml;
 #[doc(hidden)]
 pub use document::{
-    Override, from_overrides, read_json, read_text, read_toml, write_json, write_text, write_toml,
+    Override, from_overrides, has_extension, read_json, read_text, read_toml, write_json,
+    write_text, write_toml,
 };
 pub(crate) use document::{parse_json, parse_toml_with, read_json_data};
 pub use document::{read_document, write_document};

@@ -122,12 +122,12 @@ fn pixels_by_column([width, height]: [u32; 2]) -> impl Iterator<Item = (u32, u32
 
 /// A mask under construction: one bit a pixel, column by column.
 #[derive(Clone, Debug)]
-pub(crate) struct Bits {
+pub(crate) struct MaskBits {
     words: Vec<u64>,
     size: [u32; 2],
 }
 
-impl Bits {
+impl MaskBits {
     /// No pixel is inside.
     pub(crate) fn new(size: [u32; 2]) -> Self {
         let pixels = size[0] as usize * size[1] as usize;
@@ -182,6 +182,7 @@ fn pixel_count([width, height]: [u32; 2]) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geom::Point2;
     use proptest::prelude::*;
 
     proptest! {
@@ -191,7 +192,7 @@ mod tests {
                 (Just(w), Just(h), prop::collection::vec((0..w, 0..h), 0..60))
             })
         ) {
-            let mut bits = Bits::new([w, h]);
+            let mut bits = MaskBits::new([w, h]);
             dots.iter().for_each(|&(x, y)| bits.insert(x as usize, y as usize));
             let mask = RleMask::from_fn([w, h], |x, y| dots.contains(&(x, y)));
             prop_assert_eq!(bits.mask(), mask.clone());
@@ -200,7 +201,8 @@ mod tests {
             sorted.dedup();
             prop_assert_eq!(mask.pixels().collect::<Vec<_>>(), sorted.clone());
             prop_assert_eq!(mask.area(), sorted.len() as u64);
-            let around = sorted.iter().fold(BBox::default(), |b, &(x, y)| b.with_pixel(x as usize, y as usize));
+            let corners = dots.iter().flat_map(|&(x, y)| [(x, y), (x + 1, y + 1)]);
+            let around = BBox::around(corners.map(|(x, y)| Point2::new(x.into(), y.into())));
             prop_assert_eq!(mask.bounds(), around);
         }
     }
@@ -222,7 +224,7 @@ mod tests {
 
     #[test]
     fn an_empty_mask_has_no_bounds() {
-        let none = Bits::new([4, 5]).mask();
+        let none = MaskBits::new([4, 5]).mask();
         assert!(none.is_empty() && none.bounds().is_empty() && none.runs() == [20]);
     }
 }

@@ -209,10 +209,8 @@ mod tests {
     use crate::geom::{Pose, Quad, UnitQuaternion, Vector2};
     use crate::image::Image;
     use crate::pixel::{ObjectId, PremulRgba};
-    use crate::scene::Grade;
     use geo::Contains;
     use proptest::prelude::*;
-    use std::sync::Arc;
 
     /// Outlines have their corners on a grid of so many cells a side, so that they often touch,
     /// cross themselves, run back along themselves, and share edges.
@@ -249,20 +247,14 @@ mod tests {
                 f64::from(y) / f64::from(GRID),
             )
         };
+        let quad = Quad {
+            world_from_card: Pose::identity(),
+            size: [1.0; 2],
+        };
+        let texture = Image::filled(1, 1, PremulRgba::default());
         Card {
-            id: ObjectId(1),
-            class: Some(0),
-            quad: Quad {
-                world_from_card: Pose::identity(),
-                size: [1.0; 2],
-            },
-            texture: Image::filled(1, 1, PremulRgba::default()).into(),
-            back: None,
-            outline_uv: corners.iter().map(uv).collect::<Arc<[_]>>(),
-            grade: Grade::default(),
-            bend: Default::default(),
-            refraction: Default::default(),
-            surfaces: Default::default(),
+            outline_uv: corners.iter().map(uv).collect(),
+            ..Card::new(ObjectId(1), quad, texture)
         }
     }
 

@@ -40,13 +40,13 @@ pub(super) fn simplified(rings: Vec<Ring>, tolerance_px: f64) -> Vec<Ring> {
 
 /// A corner and what dropping it costs, cheapest first.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct Candidate {
+struct CornerCandidate {
     /// A cost is not negative, and then its bits are in its order.
     cost_bits: u64,
     corner: usize,
 }
 
-impl Candidate {
+impl CornerCandidate {
     fn cost(self) -> f64 {
         f64::from_bits(self.cost_bits)
     }
@@ -127,18 +127,18 @@ impl CornerLinks {
     }
 
     /// All corners; what costs the same goes in the order of the rings.
-    fn candidates(&self) -> BinaryHeap<Reverse<Candidate>> {
+    fn candidates(&self) -> BinaryHeap<Reverse<CornerCandidate>> {
         let corners = 0..self.positions.len();
         corners.map(|at| Reverse(self.candidate(at))).collect()
     }
 
     /// Whether its corner is left and still costs what it did.
-    fn is_current(&self, candidate: Candidate) -> bool {
+    fn is_current(&self, candidate: CornerCandidate) -> bool {
         self.kept[candidate.corner] && self.candidate(candidate.corner) == candidate
     }
 
-    fn candidate(&self, corner: usize) -> Candidate {
-        Candidate {
+    fn candidate(&self, corner: usize) -> CornerCandidate {
+        CornerCandidate {
             cost_bits: self.cost(corner).to_bits(),
             corner,
         }

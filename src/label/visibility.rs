@@ -1,7 +1,7 @@
 //! What is seen of each object: one fold over the deep samples.
 
 use crate::deep::{DeepImage, DeepSample};
-use crate::label::mask::Bits;
+use crate::label::mask::MaskBits;
 use crate::label::{LabelOptions, RleMask};
 use crate::pixel::ObjectId;
 use crate::work::{self, Kind};
@@ -34,8 +34,8 @@ pub struct DepthRange {
 
 /// Sums and masks of one object while the fold runs.
 struct VisibilityTally {
-    amodal: Bits,
-    visible: Bits,
+    amodal: MaskBits,
+    visible: MaskBits,
     /// Coverage, the seen part of it, and coverage times depth, summed over pixels.
     alpha: f64,
     visible_alpha: f64,
@@ -46,7 +46,7 @@ struct VisibilityTally {
 
 impl VisibilityTally {
     fn new(size: [u32; 2]) -> Self {
-        let none = Bits::new(size);
+        let none = MaskBits::new(size);
         Self {
             amodal: none.clone(),
             visible: none,

@@ -3,8 +3,9 @@
 use crate::filter::gaussian_blur;
 use crate::geom::Vector2;
 use crate::image::Image;
-use crate::light::{inner_pixels, value_of_rank};
+use crate::light::inner_pixels;
 use crate::pixel::LinearRgb;
+use crate::quantile::quantile;
 use crate::scene::Blur;
 
 /// Blur that is put on top, pixels: what it takes from an edge tells how soft the edge was.
@@ -44,8 +45,7 @@ pub fn plate_blur(plate: &Image<LinearRgb>) -> Blur {
     if sigmas.len() < MIN_EDGES {
         return Blur::NONE;
     }
-    let rank = sigmas.len() / 4;
-    let found = f64::from(value_of_rank(sigmas, rank));
+    let found = quantile(sigmas, 0.25, f32::total_cmp).map_or(0.0, f64::from);
     let variance = (found * found - PIXEL_VARIANCE).max(0.0);
     Blur::Known(BLUR_RATIO * variance.sqrt())
 }
@@ -94,12 +94,8 @@ impl Slopes<'_> {
     /// The slope that few pixels have; infinite where there are none.
     fn steep(&self) -> f32 {
         let slopes = self.inner_pixels().map(|(x, y)| self.at(x, y).norm());
-        let finite: Vec<f32> = slopes.filter(|slope| slope.is_finite()).collect();
-        if finite.is_empty() {
-            return f32::INFINITY;
-        }
-        let rank = (finite.len() as f64 * (1.0 - STEEP_SHARE)) as usize;
-        value_of_rank(finite, rank)
+        let finite = slopes.filter(|slope| slope.is_finite()).collect();
+        quantile(finite, 1.0 - STEEP_SHARE, f32::total_cmp).unwrap_or(f32::INFINITY)
     }
 
     /// It is the steepest place around, and flat on both sides: an edge and no line.

@@ -6,7 +6,7 @@ use crate::image::Image;
 use crate::light::irradiance::white_card_at;
 use crate::light::lamp::match_lamp;
 use crate::light::light_map::match_light_map;
-use crate::light::{MeasuredPlate, match_light_tint, value_of_rank};
+use crate::light::{MeasuredPlate, match_light_tint};
 use crate::pixel::LinearRgb;
 use crate::scene::{EnvironmentMap, Exposure, Scene};
 
@@ -83,12 +83,12 @@ fn stops_of(ratio: f64) -> f64 {
 ///
 /// Pixels that are not finite are left out; 0 for a plate without any other.
 pub(super) fn plate_white(plate: &Image<LinearRgb>) -> f32 {
-    let luminances = finite_luminances(plate);
+    let mut luminances = finite_luminances(plate);
     if luminances.is_empty() {
         return 0.0;
     }
     let rank = ((luminances.len() - 1) as f64 * WHITE_PERCENTILE).round() as usize;
-    value_of_rank(luminances, rank)
+    *luminances.select_nth_unstable_by(rank, f32::total_cmp).1
 }
 
 fn finite_luminances(plate: &Image<LinearRgb>) -> Vec<f32> {

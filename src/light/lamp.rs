@@ -3,9 +3,10 @@
 use crate::camera::Camera;
 use crate::geom::{Point3, Vector3};
 use crate::image::Image;
+use crate::light::MeasuredPlate;
 use crate::light::irradiance::irradiance;
-use crate::light::{MeasuredPlate, median};
 use crate::pixel::{LinearRgb, Mix};
+use crate::quantile::median;
 use crate::scene::{AreaLight, CameraSource, EnvironmentMap, LightDirection, Scene};
 use std::f64::consts::{PI, TAU};
 
@@ -236,7 +237,7 @@ fn seen_face(
     });
     let luminances: Vec<f32> = colors.map(|color| color.luminance()).collect();
     let is_seen = luminances.len() as f64 >= SEEN_SHARE * (ALONG[0] * ALONG[1]) as f64;
-    let brightness = f64::from(median(luminances)?) / floor;
+    let brightness = f64::from(median(luminances.into_iter(), f32::total_cmp)?) / floor;
     is_seen.then_some(SeenFace { normal, brightness })
 }
 

@@ -66,17 +66,6 @@ pub use sky::{SkyPiece, sky_pieces};
 #[doc(hidden)]
 pub use surface::match_light_tint;
 
-/// The value before which `rank` others stand when they are sorted.
-fn value_of_rank(mut values: Vec<f32>, rank: usize) -> f32 {
-    *values.select_nth_unstable_by(rank, f32::total_cmp).1
-}
-
-/// The value in the middle, the upper one of two; none of no values.
-pub(crate) fn median(values: Vec<f32>) -> Option<f32> {
-    let middle = values.len() / 2;
-    (!values.is_empty()).then(|| value_of_rank(values, middle))
-}
-
 /// The pixels that are at least `margin` away from every border, row by row.
 fn inner_pixels(
     (width, height): (usize, usize),

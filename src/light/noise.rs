@@ -2,8 +2,9 @@
 
 use crate::filter::halve;
 use crate::image::Image;
-use crate::light::{inner_pixels, value_of_rank};
+use crate::light::inner_pixels;
 use crate::pixel::LinearRgb;
+use crate::quantile::quantile;
 use crate::scene::Noise;
 
 /// Groups of pixels of like brightness.
@@ -111,7 +112,7 @@ fn mean_brightness(group: &[(f32, f32)]) -> f64 {
 /// That of the residuals of a group.
 fn lower_quartile(group: &[(f32, f32)]) -> f64 {
     let residuals = group.iter().map(|p| p.1).collect();
-    f64::from(value_of_rank(residuals, group.len() / 4))
+    quantile(residuals, 0.25, f32::total_cmp).map_or(0.0, f64::from)
 }
 
 /// The line of least squares through variances over means.

@@ -4,8 +4,9 @@ use crate::camera::{Camera, RadialDistortion};
 use crate::color::Albedo;
 use crate::geom::{Plane, Point2, Point3};
 use crate::image::Image;
-use crate::light::{MeasuredPlate, median};
+use crate::light::MeasuredPlate;
 use crate::pixel::LinearRgb;
+use crate::quantile::median;
 use crate::scene::{CameraSource, LightTint, Scene};
 
 /// Columns and rows of the cells that the surface is looked at in: lamps make gradients, and a
@@ -46,7 +47,7 @@ fn cell_medians(
     for (point, color) in seen {
         luminances[cell_of(point, size)].push(color.luminance());
     }
-    luminances.map(median)
+    luminances.map(|cell| median(cell.into_iter(), f32::total_cmp))
 }
 
 /// The points of a scene's surface that the plate shows, and their colours where those are finite;
@@ -91,7 +92,7 @@ fn median_of(
     seen: &[(Point3<f64>, LinearRgb)],
     channel: impl Fn(&LinearRgb) -> f32,
 ) -> Option<f32> {
-    median(seen.iter().map(|(_, color)| channel(color)).collect())
+    median(seen.iter().map(|(_, color)| channel(color)), f32::total_cmp)
 }
 
 /// Turns [`LightTint::MatchSurface`] into the colour of the surface's light; any other scene comes

@@ -26,7 +26,6 @@ mod film;
 mod flow;
 pub mod key;
 mod keying_screen;
-pub(crate) mod median;
 mod outline;
 mod plate;
 mod prepared;

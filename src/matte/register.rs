@@ -51,7 +51,7 @@ pub(super) fn shift(
     mask: &Mask,
     weights: [f32; 3],
 ) -> Registered {
-    let whole = PicturePair {
+    let whole = PyramidLevel {
         a: weighted(a, weights),
         b: weighted(b, weights),
         mask: mask.to_coverage(),
@@ -111,13 +111,13 @@ fn high_passed(image: &Image<f32>) -> Image<f32> {
 }
 
 /// Two pictures at one level of a pyramid, and where they are compared.
-struct PicturePair {
+struct PyramidLevel {
     a: Image<f32>,
     b: Image<f32>,
     mask: Image<Coverage>,
 }
 
-impl PicturePair {
+impl PyramidLevel {
     /// The next level; none where its pictures would be too small.
     fn halved(&self) -> Option<Self> {
         self.can_be_halved().then(|| Self {

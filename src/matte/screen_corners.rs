@@ -1,7 +1,6 @@
 //! The four corners of a coloured screen that is seen as a whole.
 
 use super::check::refused;
-use super::median::median;
 use super::outline::Outline;
 use super::prepared::{longer_side, scaled_sides};
 use super::screen::is_keyable;
@@ -12,6 +11,7 @@ use crate::filter;
 use crate::geom::{Line, Point2, Vector2, corners_between};
 use crate::image::{Image, Mask};
 use crate::pixel::{LinearRgb, Mix};
+use crate::quantile::median;
 
 /// Longer side of the picture that is searched, pixels.
 const SEARCH_SIZE_PX: usize = 1024;

@@ -9,7 +9,6 @@ use super::check::{
     check_coverage, check_length, check_photo, check_positive, check_share, check_value, refused,
 };
 use super::film::{covered, view};
-use super::median::median;
 use super::plate::ScreenPlate;
 use super::prepared::check_finite_photo;
 use super::register::{self, Registered};
@@ -18,7 +17,8 @@ use crate::error::Result;
 use crate::filter;
 use crate::image::{Image, Mask};
 use crate::pixel::{Coverage, Film, LinearRgb};
-use lines::{Inferred, PixelLines, ScreenLine, SolvedFilm};
+use crate::quantile::median;
+use lines::{Inferred, PixelFilm, PixelLines, ScreenLine};
 use serde::{Deserialize, Serialize};
 
 /// How film is triangulated.
@@ -133,7 +133,7 @@ pub fn triangulate(
 }
 
 /// What was found out about the film, without what is known about the photos.
-fn composed(solved: &Image<SolvedFilm>, inside: &Image<Coverage>) -> Triangulated {
+fn composed(solved: &Image<PixelFilm>, inside: &Image<Coverage>) -> Triangulated {
     let flat = lines::flat_transmittance(solved, inside);
     Triangulated {
         film: seen_film(solved, flat, inside),
@@ -148,7 +148,7 @@ fn composed(solved: &Image<SolvedFilm>, inside: &Image<Coverage>) -> Triangulate
 }
 
 /// Reflected light, and what is seen through plastic that where it lies flat measures `flat`.
-fn seen_film(solved: &Image<SolvedFilm>, flat: LinearRgb, inside: &Image<Coverage>) -> Image<Film> {
+fn seen_film(solved: &Image<PixelFilm>, flat: LinearRgb, inside: &Image<Coverage>) -> Image<Film> {
     let reflected = solved.zip_map(inside, |p, c| {
         p.reflected * p.transmittance.map(|t| kept_share(t, c))
     });
@@ -162,7 +162,7 @@ fn kept_share(transmittance: f32, Coverage(c): Coverage) -> f32 {
 }
 
 fn view_transmittance(
-    solved: &Image<SolvedFilm>,
+    solved: &Image<PixelFilm>,
     flat: LinearRgb,
     inside: &Image<Coverage>,
 ) -> Image<LinearRgb> {
@@ -261,7 +261,7 @@ fn align(
 impl AlignedPhoto {
     /// Sum of the squares of what a film does not explain of pixel `i`.
     #[inline]
-    fn square_residual(&self, i: usize, film: &SolvedFilm) -> f64 {
+    fn square_residual(&self, i: usize, film: &PixelFilm) -> f64 {
         square_distance(film.over(self.screen.pixels()[i]), self.photo.pixels()[i])
     }
 
@@ -440,7 +440,7 @@ fn median_sigma(
 }
 
 /// Root mean square of what the film does not explain of the photos inside the object.
-fn residual(photos: &[AlignedPhoto], solved: &Image<SolvedFilm>, inside: &Image<Coverage>) -> f32 {
+fn residual(photos: &[AlignedPhoto], solved: &Image<PixelFilm>, inside: &Image<Coverage>) -> f32 {
     let (mut square, mut count) = (0.0_f64, 0.0_f64);
     for i in (0..solved.pixels().len()).filter(|&i| inside.pixels()[i].0 > 0.5) {
         for aligned in photos {

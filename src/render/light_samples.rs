@@ -20,12 +20,12 @@ pub(super) struct LightSample {
     /// Side of the square of light that it represents: metres, or radians of a direction.
     pub(super) width: f64,
     /// What it does to a receiver that sees it.
-    pub(super) kind: SampleKind,
+    pub(super) kind: LightSampleKind,
 }
 
 /// How a light sample lights a receiver.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum SampleKind {
+pub(super) enum LightSampleKind {
     /// A piece of a light's face: unit normal and area.
     Face {
         /// Which way it shines.
@@ -206,7 +206,7 @@ impl LightSample {
         Self {
             at: node.point.to_homogeneous(),
             width: area.sqrt(),
-            kind: SampleKind::Face { normal, area },
+            kind: LightSampleKind::Face { normal, area },
         }
     }
 
@@ -215,13 +215,13 @@ impl LightSample {
         Self {
             at: direction.to_homogeneous(),
             width,
-            kind: SampleKind::Sky { share },
+            kind: LightSampleKind::Sky { share },
         }
     }
 
     /// Cosine times solid angle of a piece of the sky.
     fn sky_share(&self) -> f64 {
-        if let SampleKind::Sky { share } = self.kind {
+        if let LightSampleKind::Sky { share } = self.kind {
             share
         } else {
             0.0
@@ -232,8 +232,8 @@ impl LightSample {
     /// a horizon.
     pub(super) fn irradiance(&self, point: &Vector3<f64>, normal: &Vector3<f64>) -> f64 {
         match self.kind {
-            SampleKind::Sky { share } => share,
-            SampleKind::Face { normal: face, area } => {
+            LightSampleKind::Sky { share } => share,
+            LightSampleKind::Face { normal: face, area } => {
                 light::geometry_term(&(self.at.xyz() - point), &face, normal) * area
             }
         }

@@ -10,7 +10,7 @@ use crate::render::RenderOptions;
 use crate::render::card_texel::card_texel;
 use crate::render::grade::channel_mean;
 use crate::render::interreflection::Bounces;
-use crate::render::light_samples::{LightGroup, LightSample, LightSamples, SampleKind};
+use crate::render::light_samples::{LightGroup, LightSample, LightSampleKind, LightSamples};
 use crate::render::pixel_filter::filter_quantiles;
 use crate::render::retouch::retouched_fully;
 use crate::render::view::{CameraView, ProjectedPlane, ScenePlane, is_on_texture, visible_planes};
@@ -253,7 +253,7 @@ impl<'a> ReferenceWorld<'a> {
         sample: &LightSample,
         own: Option<usize>,
     ) -> LinearRgb {
-        let from_sky = matches!(sample.kind, SampleKind::Sky { .. });
+        let from_sky = matches!(sample.kind, LightSampleKind::Sky { .. });
         if own.is_some() && from_sky && self.surface_blocks(p, &sample.at.xyz()) {
             return LinearRgb::BLACK;
         }

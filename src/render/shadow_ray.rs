@@ -1,6 +1,6 @@
 //! A light sample as one receiver sees it, with the shadows in between.
 
-use crate::render::light_samples::{LightGroup, LightSample, SampleKind};
+use crate::render::light_samples::{LightGroup, LightSample, LightSampleKind};
 use crate::render::occluders::Occluders;
 use crate::render::shadow::{ProjectedShadow, ShadowProjection, ShadowedReceiver};
 
@@ -53,15 +53,15 @@ impl ShadowRay {
 
     /// It comes from an area light, not from the sky.
     pub(super) fn is_face(&self) -> bool {
-        matches!(self.sample.kind, SampleKind::Face { .. })
+        matches!(self.sample.kind, LightSampleKind::Face { .. })
     }
 
     /// For the receiver it was made for.
     pub(super) fn unit_irradiance(&self) -> UnitIrradiance {
         match self.sample.kind {
-            SampleKind::Sky { share } => UnitIrradiance::Even(share as f32),
+            LightSampleKind::Sky { share } => UnitIrradiance::Even(share as f32),
             // All points of a plane see a light from the same height.
-            SampleKind::Face { normal, area } => UnitIrradiance::Face(FaceIrradiance {
+            LightSampleKind::Face { normal, area } => UnitIrradiance::Face(FaceIrradiance {
                 at: self.sample.at.xyz().map(|c| c as f32).into(),
                 normal: normal.map(|c| c as f32).into(),
                 scale: (area * self.height) as f32,
@@ -125,8 +125,7 @@ mod tests {
     use crate::render::view::{
         CameraView, LatticeArea, ProjectedPlane, ScenePlane, visible_planes,
     };
-    use crate::scene::{AreaLight, Card, Grade, LightShape, Shot};
-    use std::sync::Arc;
+    use crate::scene::{AreaLight, Card, LightShape, Shot};
 
     fn camera() -> Camera {
         let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), 2.6);
@@ -152,20 +151,14 @@ mod tests {
     /// A card of odd size, turned in every way.
     fn shot(tilt: f64) -> Shot {
         let turn = UnitQuaternion::from_euler_angles(tilt, 0.2, 0.7);
+        let quad = Quad {
+            world_from_card: Pose::from_parts(Vector3::new(0.02, 0.0, 0.12).into(), turn),
+            size: [0.3, 0.2],
+        };
+        let texture = Image::filled(301, 203, PremulRgba::new(0.5, 0.5, 0.5, 1.0));
         let card = Card {
-            id: ObjectId(1),
-            class: Some(0),
-            quad: Quad {
-                world_from_card: Pose::from_parts(Vector3::new(0.02, 0.0, 0.12).into(), turn),
-                size: [0.3, 0.2],
-            },
-            texture: Image::filled(301, 203, PremulRgba::new(0.5, 0.5, 0.5, 1.0)).into(),
-            back: None,
-            outline_uv: Arc::new([]),
-            grade: Grade::default(),
-            bend: Default::default(),
-            refraction: Default::default(),
-            surfaces: Default::default(),
+            outline_uv: [].into(),
+            ..Card::new(ObjectId(1), quad, texture)
         };
         Shot::new(camera())
             .with_light(light())

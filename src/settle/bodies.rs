@@ -3,6 +3,7 @@
 
 use super::overlap::Solid;
 use crate::geom::{Pose, Vector3};
+use crate::quantile::median;
 use crate::scene::{Object, Placement, Scene, SettleOptions};
 
 /// Gap below which bodies at rest touch, as a share of the typical card's longer side: 3 mm for
@@ -28,9 +29,7 @@ pub fn typical_length(scene: &Scene) -> f64 {
 /// When nothing falls.
 pub(super) fn median_of_dropped(scene: &Scene, quantity: impl Fn(&Object) -> f64) -> f64 {
     let dropped = scene.objects.iter().filter(|object| is_dropped(object));
-    let mut all: Vec<f64> = dropped.map(quantity).collect();
-    all.sort_by(f64::total_cmp);
-    all[all.len() / 2]
+    median(dropped.map(quantity), f64::total_cmp).expect("something falls")
 }
 
 /// Gap below which bodies of a scene touch, metres.

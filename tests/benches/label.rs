@@ -4,7 +4,7 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use petcomp::camera::Camera;
 use petcomp::geom::{Point2, Pose, Quad, UnitQuaternion, Vector2, Vector3};
 use petcomp::label::{LabelOptions, label};
-use petcomp::scene::{Card, Grade};
+use petcomp::scene::Card;
 use petcomp::{DeepImage, DeepSample};
 use petcomp::{Depth, Image, LinearRgb, ObjectId, PremulRgba, Shot};
 use std::hint::black_box;
@@ -35,22 +35,16 @@ fn card(id: u32) -> Card {
     );
     let rotation = UnitQuaternion::from_euler_angles(0.05, -0.03, turn);
     let angle = |i: usize| std::f64::consts::TAU * i as f64 / 40.0;
+    let quad = Quad {
+        world_from_card: Pose::from_parts(place.into(), rotation),
+        size: [0.2, 0.07],
+    };
     Card {
-        id: ObjectId(id),
         class: Some(id % 4),
-        quad: Quad {
-            world_from_card: Pose::from_parts(place.into(), rotation),
-            size: [0.2, 0.07],
-        },
-        texture: Image::<PremulRgba>::new(2, 2).into(),
-        back: None,
         outline_uv: (0..40)
             .map(|i| Point2::new(0.5 + 0.5 * angle(i).cos(), 0.5 + 0.5 * angle(i).sin()))
             .collect(),
-        grade: Grade::default(),
-        bend: Default::default(),
-        refraction: Default::default(),
-        surfaces: Default::default(),
+        ..Card::new(ObjectId(id), quad, Image::<PremulRgba>::new(2, 2))
     }
 }
 

@@ -9,7 +9,6 @@ use petcomp::render::{RenderOptions, render};
 use petcomp::scene::{AreaLight, Card, Grade, LightShape};
 use petcomp::{Camera, Image, LinearRgb, ObjectId, PremulRgba, Shot, composite};
 use std::hint::black_box;
-use std::sync::Arc;
 
 /// Between the default and a reference: 2 x 2 samples a pixel, 4 x 4 a light.
 const GOOD: RenderOptions = RenderOptions {
@@ -75,25 +74,20 @@ fn shot() -> Shot {
             0.1 * (4.7 * f).cos(),
             0.012 + 0.009 * f,
         );
+        let quad = Quad {
+            world_from_card: Pose::from_parts(center.into(), rotation),
+            size: [0.07, 0.21],
+        };
+        let texture = textures[k as usize % textures.len()].clone();
         shot.with_card(Card {
-            id: ObjectId(k + 1),
-            class: Some(0),
-            quad: Quad {
-                world_from_card: Pose::from_parts(center.into(), rotation),
-                size: [0.07, 0.21],
-            },
-            texture: textures[k as usize % textures.len()].clone(),
-            back: None,
-            outline_uv: Arc::new([]),
+            outline_uv: [].into(),
             grade: Grade {
                 hue_deg: 7.0 * k as f32,
                 saturation: 0.9,
                 value: 1.1,
                 ..Grade::default()
             },
-            bend: Default::default(),
-            refraction: Default::default(),
-            surfaces: Default::default(),
+            ..Card::new(ObjectId(k + 1), quad, texture)
         })
     })
 }

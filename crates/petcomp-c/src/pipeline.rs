@@ -20,14 +20,16 @@ pub struct PipelineHandle {
 }
 
 /// A pipeline, and the classes of its labels.
-pub(crate) struct Opened {
+pub(crate) struct OpenedPipeline {
     pub(crate) pipeline: Pipeline,
     pub(crate) classes: Vec<String>,
 }
 
-static PIPELINES: Handles<Opened> = Handles::new("pipeline");
+static PIPELINES: Handles<OpenedPipeline> = Handles::new("pipeline");
 
-pub(crate) fn opened(pipeline: PipelineHandle) -> std::result::Result<Arc<Opened>, Failure> {
+pub(crate) fn opened(
+    pipeline: PipelineHandle,
+) -> std::result::Result<Arc<OpenedPipeline>, Failure> {
     PIPELINES.get(pipeline.id)
 }
 
@@ -59,11 +61,11 @@ pub unsafe extern "C" fn petcomp_pipeline_open(
     })
 }
 
-fn open(recipe: &str, overrides: &[&str]) -> Result<Opened> {
+fn open(recipe: &str, overrides: &[&str]) -> Result<OpenedPipeline> {
     let overrides: Result<Vec<Override>> = overrides.iter().map(|o| o.parse()).collect();
     let pipeline = Pipeline::open(DatasetConfig::read(recipe, &overrides?)?)?;
     let obstructed = pipeline.config().labels.obstructed;
-    Ok(Opened {
+    Ok(OpenedPipeline {
         classes: obstructed.classes(&pipeline.library().classes)?,
         pipeline,
     })

@@ -3,7 +3,7 @@
 
 use crate::handles::Handles;
 use crate::memory::{put, store, store_text};
-use crate::pipeline::{Opened, PipelineHandle, opened};
+use crate::pipeline::{OpenedPipeline, PipelineHandle, opened};
 use crate::status::{Failure, Status, call};
 use bytemuck::{Pod, Zeroable};
 use petcomp::dataset::{LabelConfig, LabelledObject, Sample};
@@ -72,13 +72,13 @@ pub unsafe extern "C" fn petcomp_sample_make(
     })
 }
 
-fn made(opened: &Opened, seed: u64, k: u64) -> Result<Made, Failure> {
+fn made(opened: &OpenedPipeline, seed: u64, k: u64) -> Result<Made, Failure> {
     let sample = opened.pipeline.sample(seed, k)?;
     let labels = labels_json(&sample, opened)?;
     Ok(Made { sample, labels })
 }
 
-fn labels_json(sample: &Sample, opened: &Opened) -> Result<String, Error> {
+fn labels_json(sample: &Sample, opened: &OpenedPipeline) -> Result<String, Error> {
     let config = &opened.pipeline.config().labels;
     let (width, height) = sample.frame.size();
     let (count, extent) = (opened.classes.len(), config.yolo.boxes);

@@ -18,12 +18,12 @@ use std::sync::{Arc, Mutex};
 
 /// What the threads of a run tell the one that waits for them.
 #[derive(Clone, Default)]
-struct Run {
+struct RunSignals {
     stop: Arc<AtomicBool>,
     progress: Arc<Mutex<Vec<Progress>>>,
 }
 
-impl Run {
+impl RunSignals {
     fn stop(&self) {
         self.stop.store(true, Ordering::Relaxed);
     }
@@ -91,7 +91,7 @@ pub(crate) fn generate_from(
     progress: Option<Py<PyAny>>,
 ) -> PyResult<String> {
     let opened = pipeline.get().opened()?;
-    let (run, falls) = (Run::default(), opened.stop);
+    let (run, falls) = (RunSignals::default(), opened.stop);
     let worker = run.clone();
     let stop = |stopped| {
         falls.store(stopped, Ordering::Relaxed);
@@ -104,13 +104,13 @@ pub(crate) fn generate_from(
 }
 
 /// How a dataset of a function's pictures is written.
-struct Layout {
+struct DatasetLayout {
     labels: LabelConfig,
     pictures: Pictures,
     split: Split,
 }
 
-impl Layout {
+impl DatasetLayout {
     fn new([labels, pictures, split]: &[String; 3]) -> Result<Self> {
         let layout = Self {
             labels: parse("labels", labels)?,
@@ -163,8 +163,8 @@ pub(crate) fn generate_with(
     target: Target,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<String> {
-    let layout = Layout::new(&layout).map_err(to_python)?;
-    let (run, raised) = (Run::default(), Raised::default());
+    let layout = DatasetLayout::new(&layout).map_err(to_python)?;
+    let (run, raised) = (RunSignals::default(), Raised::default());
     let (worker, keep) = (run.clone(), raised.clone());
     let mut beside = |py: Python<'_>| run.deliver(py, progress.as_ref());
     let made = work::run_beside(py, &|_| run.stop(), &mut beside, move || {

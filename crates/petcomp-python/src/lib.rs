@@ -36,7 +36,7 @@ mod _petcomp {
         pipeline::Pipeline,
         program::run_program,
         sample::Sample,
-        scene::{check_config, check_scene, read_scene, write_scene},
+        scene::{check_scene, read_scene, write_scene},
         shot::render_shot,
         work::set_threads,
     };

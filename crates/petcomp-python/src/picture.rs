@@ -24,27 +24,27 @@ pub(crate) fn key<'py>(
     options: &str,
 ) -> PyResult<(FloatArray<'py>, FloatArray<'py>, String)> {
     let photo = Given::from_argument("image", image)?;
-    let known = Known {
+    let inputs = KeyInputs {
         screen: ScreenArgument::new(screen)?,
         garbage: garbage.map(|m| matte_of("garbage", &m)).transpose()?,
         core: core.map(|m| matte_of("core", &m)).transpose()?,
         options: parse("options", options).map_err(to_python)?,
     };
-    let keyed = work::run(py, move || known.keyed(photo))?;
+    let keyed = work::run(py, move || inputs.keyed(photo))?;
     let changed = deviations_json(&keyed.deviations);
     let matte = to_array(py, keyed.matte)?;
     Ok((matte, to_array(py, keyed.cutout)?, changed))
 }
 
 /// What a keyer is given beside the photo.
-struct Known {
+struct KeyInputs {
     screen: ScreenArgument,
     garbage: Option<Image<Coverage>>,
     core: Option<Image<Coverage>>,
     options: KeyOptions,
 }
 
-impl Known {
+impl KeyInputs {
     fn keyed(mut self, photo: Given) -> Result<Keyed> {
         let plate = self.screen.take_plate()?;
         let color = Screen::Color(self.screen.color());

@@ -31,14 +31,14 @@ pub(crate) struct Opened {
 }
 
 /// What a pipeline is opened from: a recipe file, or a document and values to be changed.
-struct Source {
+struct RecipeSource {
     path: Option<PathBuf>,
     json: Option<String>,
     overrides: Vec<String>,
     quality: Option<String>,
 }
 
-impl Source {
+impl RecipeSource {
     fn config(&self) -> Result<DatasetConfig> {
         let overrides: Result<Vec<Override>> = self.overrides.iter().map(|o| o.parse()).collect();
         let config = match (&self.path, &self.json) {
@@ -53,7 +53,7 @@ impl Source {
 }
 
 impl Opened {
-    fn new(source: &Source, stop: &'static AtomicBool) -> Result<Self> {
+    fn new(source: &RecipeSource, stop: &'static AtomicBool) -> Result<Self> {
         let pipeline = dataset::Pipeline::open(source.config()?)?.stopped_by(stop);
         let labels = &pipeline.config().labels;
         let policy = Policy {
@@ -99,7 +99,7 @@ impl Pipeline {
         overrides: Vec<String>,
         quality: Option<String>,
     ) -> PyResult<Self> {
-        let source = Source {
+        let source = RecipeSource {
             path,
             json,
             overrides,

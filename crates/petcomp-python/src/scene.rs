@@ -40,14 +40,6 @@ pub(crate) fn scene_of(json: &str) -> Result<Scene> {
     Ok(scene)
 }
 
-/// A recipe as it is read.
-#[pyfunction]
-pub(crate) fn check_config(json: &str) -> PyResult<String> {
-    config_of(json)
-        .and_then(|config| text(&config))
-        .map_err(to_python)
-}
-
 pub(crate) fn config_of(json: &str) -> Result<DatasetConfig> {
     DatasetConfig::from_table(parse("recipe", json)?)
 }

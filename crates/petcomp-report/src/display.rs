@@ -24,7 +24,7 @@ use place::{BACKGROUNDS, Bottle, Place};
 use rayon::prelude::*;
 use shots::Stage;
 use std::path::Path;
-use window::{Surroundings, Window};
+use window::{DisplayWindow, Surroundings};
 
 /// A pixel of which more than this is the bottle's is inside.
 const INSIDE: f32 = 0.5;
@@ -104,7 +104,7 @@ fn rows_of(stage: &Stage<'_>, place: &Place, bottle: &Bottle) -> Result<Vec<Disp
 /// A bottle over its backgrounds, seen straight from above.
 struct Reality {
     name: String,
-    window: Window,
+    window: DisplayWindow,
     inside: Image<bool>,
     seen: Vec<Image<LinearRgb>>,
     /// The backgrounds without the bottle.
@@ -115,7 +115,7 @@ struct Reality {
 
 impl Reality {
     fn new(place: &Place, bottle: &Bottle) -> Result<Self> {
-        let window = Window::of(place, bottle);
+        let window = DisplayWindow::of(place, bottle);
         let seen = BACKGROUNDS.map(|name| Ok(window.seen(place.reality(bottle, name)?)));
         let mask: Image<Coverage> = window.seen(place.mask(bottle)?);
         Ok(Self {
@@ -200,7 +200,11 @@ fn is_mostly_sharp(path: &LightPath) -> bool {
 }
 
 /// The nearest true displacement at every pixel of a window.
-fn true_flow(place: &Place, bottle: &Bottle, window: &Window) -> Result<Image<Option<[f64; 2]>>> {
+fn true_flow(
+    place: &Place,
+    bottle: &Bottle,
+    window: &DisplayWindow,
+) -> Result<Image<Option<[f64; 2]>>> {
     let truth = place.true_flow(bottle)?;
     let (w, h) = window.size();
     Ok(Image::from_fn(w, h, |x, y| {

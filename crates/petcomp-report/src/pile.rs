@@ -4,10 +4,9 @@ use petcomp::Camera;
 use petcomp::Image;
 use petcomp::asset::Texture;
 use petcomp::geom::{Point2, Pose, Quad, UnitQuaternion, Vector2, Vector3};
-use petcomp::scene::{AreaLight, Card, Grade, LightShape, Shot};
+use petcomp::scene::{AreaLight, Card, LightShape, Shot};
 use petcomp::{LinearRgb, ObjectId, PremulRgba};
 use std::f64::consts::PI;
-use std::sync::Arc;
 
 /// Height of the camera over the surface, metres.
 pub(super) const CAMERA_HEIGHT_M: f64 = 1.1;
@@ -48,11 +47,6 @@ pub(super) fn lamp(color: LinearRgb) -> AreaLight {
     }
 }
 
-/// The outline of a card that is full to its corners.
-pub(super) fn whole_card_uv() -> Arc<[Point2<f64>]> {
-    Arc::new([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(Point2::from))
-}
-
 /// See-through bottles on and over each other, under one light and a dim sky.
 pub(super) fn pile(cards: u32, image: [u32; 2]) -> Shot {
     let shot = Shot::new(camera_above(image, CAMERA_HEIGHT_M))
@@ -65,21 +59,12 @@ pub(super) fn pile(cards: u32, image: [u32; 2]) -> Shot {
 }
 
 fn bottle_card(k: u32, textures: &[Texture]) -> Card {
-    Card {
-        id: ObjectId(k + 1),
-        class: Some(0),
-        quad: Quad {
-            world_from_card: scattered_pose(f64::from(k)),
-            size: CARD_SIZE_M,
-        },
-        texture: textures[k as usize % textures.len()].clone(),
-        back: None,
-        outline_uv: whole_card_uv(),
-        grade: Grade::default(),
-        bend: Default::default(),
-        refraction: Default::default(),
-        surfaces: Default::default(),
-    }
+    let quad = Quad {
+        world_from_card: scattered_pose(f64::from(k)),
+        size: CARD_SIZE_M,
+    };
+    let texture = textures[k as usize % textures.len()].clone();
+    Card::new(ObjectId(k + 1), quad, texture)
 }
 
 /// Spread by sines of incommensurable steps, each a little higher than the last.

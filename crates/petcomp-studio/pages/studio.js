@@ -14,7 +14,7 @@ const PAGES = [
 ];
 
 /** A request that was refused: `message` says why, `status` is 409 for a stale save, 410 where a newer request took its place. */
-export class Refused extends Error {
+class Refused extends Error {
   constructor(status, message) {
     super(message);
     this.status = status;
@@ -150,7 +150,7 @@ function keyCaps(name) {
 }
 
 /** Shows every key of the page. */
-export function showKeys() {
+function showKeys() {
   const rows = keys
     .filter(([, what]) => what)
     .flatMap(([key, what]) => [element("dt", {}, ...keyCaps(key)), element("dd", {}, what)]);

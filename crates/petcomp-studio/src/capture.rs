@@ -34,7 +34,7 @@ pub(crate) fn routes() -> Router<Arc<Studio>> {
 
 /// A display, and what it is to show.
 #[derive(Deserialize)]
-struct Asked {
+struct FrameRequest {
     width_px: u32,
     height_px: u32,
     /// Metres.
@@ -43,7 +43,7 @@ struct Asked {
     stripes: bool,
 }
 
-impl Asked {
+impl FrameRequest {
     fn display(&self) -> Display {
         Display {
             size_px: [self.width_px, self.height_px],
@@ -53,7 +53,7 @@ impl Asked {
 }
 
 /// The page that shows the frames full screen.
-async fn show(Query(asked): Query<Asked>) -> Answer<Response> {
+async fn show(Query(asked): Query<FrameRequest>) -> Answer<Response> {
     let page = blocking(move || {
         let folder = tempfile::tempdir().map_err(|e| Error::value("capture", e))?;
         let page = write_frames(folder.path(), &asked.display(), asked.stripes)?;
@@ -69,14 +69,14 @@ async fn show(Query(asked): Query<Asked>) -> Answer<Response> {
 
 /// What was written.
 #[derive(Serialize)]
-struct Written {
+struct WrittenFrames {
     page: String,
 }
 
 async fn write(
     State(studio): State<Arc<Studio>>,
-    Json(asked): Json<Asked>,
-) -> Answer<Json<Written>> {
+    Json(asked): Json<FrameRequest>,
+) -> Answer<Json<WrittenFrames>> {
     blocking(move || {
         let folder = studio.folder.place(FOLDER)?;
         if folder.exists() {
@@ -85,7 +85,7 @@ async fn write(
         }
         let page = write_frames(&folder, &asked.display(), asked.stripes)?;
         let page = studio.folder.name_of(&page);
-        Ok(Json(Written { page }))
+        Ok(Json(WrittenFrames { page }))
     })
     .await
 }

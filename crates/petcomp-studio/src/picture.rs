@@ -56,6 +56,12 @@ pub(crate) fn routes() -> Router<Arc<Studio>> {
     Router::new().route("/photo", get(photo))
 }
 
+/// A photo that a page asks about.
+#[derive(Deserialize)]
+pub(crate) struct PhotoName {
+    pub(crate) photo: String,
+}
+
 #[derive(Deserialize)]
 struct PhotoQuery {
     file: String,

@@ -60,7 +60,9 @@ fn shape(shape: LabelMeShape) -> AnnotatedShape {
 
 #[cfg(test)]
 mod tests {
-    use super::super::from_labelme;
+    use super::*;
+    use crate::camera::label::Label;
+    use crate::io;
 
     const FILE: &str = r#"{ "version": "5.4.1", "flags": {}, "shapes": [
         { "label": "tray", "points": [[10, 20], [110, 22], [108, 90], [9, 88]], "group_id": null,
@@ -68,18 +70,19 @@ mod tests {
         { "label": "dot", "points": [[1, 2]], "shape_type": "point" } ],
         "imagePath": "a.jpg", "imageData": null, "imageHeight": 100, "imageWidth": 200 }"#;
 
+    fn read(text: &str) -> Result<Label> {
+        annotation(io::parse_json(text)?)?.label()
+    }
+
     #[test]
     fn the_polygon_becomes_the_rectangle() {
-        let label = from_labelme(FILE, [0.6, 0.4]).unwrap();
+        let label = read(FILE).unwrap();
         assert_eq!(
             (label.image_size(), label.image.file.as_str()),
             ([200, 100], "a.jpg")
         );
         assert_eq!(label.surface.corners_px.unwrap()[2], [108.0, 90.0]);
-        assert_eq!(
-            (label.surface.id.as_str(), label.surface.width_m),
-            ("tray", Some(0.6))
-        );
+        assert_eq!(label.surface.id, "tray");
     }
 
     #[test]
@@ -88,8 +91,7 @@ mod tests {
             "[[10, 20], [110, 22], [108, 90], [9, 88]]",
             "[[110, 90], [10, 20]]",
         );
-        let label =
-            from_labelme(&text.replace("\"polygon\"", "\"rectangle\""), [0.6, 0.4]).unwrap();
+        let label = read(&text.replace("\"polygon\"", "\"rectangle\"")).unwrap();
         assert_eq!(
             label.surface.corners_px,
             Some([[10.0, 20.0], [110.0, 20.0], [110.0, 90.0], [10.0, 90.0]])
@@ -100,18 +102,13 @@ mod tests {
     fn another_number_of_polygons_is_an_error() {
         let none = FILE.replace(", [9, 88]]", "]");
         assert!(
-            from_labelme(&none, [0.6, 0.4])
+            read(&none)
                 .unwrap_err()
                 .to_string()
                 .contains("0 polygons of four points")
         );
-        assert!(
-            from_labelme("{}", [0.6, 0.4])
-                .unwrap_err()
-                .to_string()
-                .contains("shapes")
-        );
-        let wrong = from_labelme(&FILE.replace("[10, 20]", "[10]"), [0.6, 0.4])
+        assert!(read("{}").unwrap_err().to_string().contains("shapes"));
+        let wrong = read(&FILE.replace("[10, 20]", "[10]"))
             .unwrap_err()
             .to_string();
         assert!(wrong.contains("shapes[0].points[0]"), "{wrong}");

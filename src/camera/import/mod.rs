@@ -68,17 +68,6 @@ fn json_annotations(value: Value) -> Result<Option<Vec<Annotation>>> {
     }
 }
 
-/// The label for a LabelMe file of a rectangle of `size` metres.
-///
-/// # Errors
-/// [`Error::Value`] for text that is not LabelMe's, and for anything but one quadrangle, one
-/// rectangle or four points.
-pub fn from_labelme(text: &str, size: [f64; 2]) -> Result<Label> {
-    let mut label = labelme::annotation(io::parse_json(text)?)?.label()?;
-    label.surface.set_size(size);
-    Ok(label)
-}
-
 impl Annotation {
     /// The label for the annotation; the sides of its rectangle are unknown.
     pub(crate) fn label(&self) -> Result<Label> {

@@ -7,8 +7,9 @@ use crate::error::Result;
 use crate::filter::resize;
 use crate::image::Image;
 use crate::io;
-use crate::light::{median, plate_blur, plate_noise};
+use crate::light::{plate_blur, plate_noise};
 use crate::pixel::LinearRgb;
+use crate::quantile::median;
 use crate::scene::{Blur, Noise};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -186,8 +187,8 @@ fn pixels_within(middle: f64, length: f64, side: usize) -> std::ops::Range<usize
 }
 
 fn median_luminance(pixels: &[LinearRgb]) -> f64 {
-    let luminances = pixels.iter().map(|p| p.luminance()).collect();
-    f64::from(median(luminances).unwrap_or_default())
+    let luminances = pixels.iter().map(|p| p.luminance());
+    f64::from(median(luminances, f32::total_cmp).unwrap_or_default())
 }
 
 fn red_over_blue(pixels: &[LinearRgb]) -> f64 {

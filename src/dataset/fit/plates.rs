@@ -4,10 +4,10 @@ use super::knobs::{KNOBS, Knob, three_digits};
 use super::measured::PixelMeasures;
 use super::statistics::{Moments, equally_weighted};
 use super::{FittedKey, range_text, unfitted};
-use crate::dataset::page::outlier;
 use crate::dataset::{DatasetConfig, Pipeline};
 use crate::error;
 use crate::plot::Table;
+use crate::quantile;
 use crate::scene::{Blur, Noise, Range};
 
 /// Fewer photos have no spread.
@@ -115,7 +115,7 @@ fn blur_key(blur_px: f64) -> FittedKey {
 
 fn median(plates: &[MeasuredPlate], value: fn(&PixelMeasures) -> f64) -> f64 {
     let values = plates.iter().map(|plate| value(&plate.pixels));
-    outlier::median(values.collect()).unwrap_or(0.0)
+    quantile::median(values, f64::total_cmp).unwrap_or(0.0)
 }
 
 /// Varies exposure and white balance as much as they do between the photos.

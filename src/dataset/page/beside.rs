@@ -2,7 +2,7 @@
 
 use super::distributions::extremes;
 use super::labelled_pictures::{LabelledPicture, LabelledSet};
-use super::outlier::{quantile, short};
+use super::outlier::short;
 use crate::color::encode_srgb8;
 use crate::filter::resize;
 use crate::geom::BBox;
@@ -11,6 +11,7 @@ use crate::io;
 use crate::label::gallery::{Figure, gallery, marked_box};
 use crate::pixel::LinearRgb;
 use crate::plot::{Page, Table, escaped, heat::heat_map};
+use crate::quantile::quantile;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -289,7 +290,7 @@ fn distances(measures: &[ComparedMeasure]) -> Table {
 pub(in crate::dataset) fn quantiles(values: &[f64]) -> String {
     [0.05, 0.5, 0.95]
         .map(|share| {
-            quantile(values.to_vec(), share)
+            quantile(values.to_vec(), share, f64::total_cmp)
                 .map(short)
                 .unwrap_or_default()
         })

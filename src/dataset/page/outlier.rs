@@ -1,5 +1,6 @@
 //! What is unlike the rest, in robust standard deviations.
 
+use crate::quantile::median;
 use std::collections::BTreeMap;
 
 /// A number of every row.
@@ -79,29 +80,16 @@ impl Feature<'_> {
 /// Median and robust standard deviation; none where all values are the same.
 fn median_and_scale(values: &[f64]) -> Option<(f64, f64)> {
     let finite: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
-    let middle = median(finite.clone())?;
+    let middle = median(finite.iter().copied(), f64::total_cmp)?;
     let off: Vec<f64> = finite.iter().map(|v| (v - middle).abs()).collect();
     let mean = off.iter().sum::<f64>() / off.len() as f64;
-    let by_median = SIGMA_PER_MEDIAN_DEVIATION * median(off)?;
+    let by_median = SIGMA_PER_MEDIAN_DEVIATION * median(off.into_iter(), f64::total_cmp)?;
     let scale = if by_median > 0.0 {
         by_median
     } else {
         SIGMA_PER_MEAN_DEVIATION * mean
     };
     (scale > 0.0).then_some((middle, scale))
-}
-
-/// The middle of some values, the upper one of two.
-pub(crate) fn median(values: Vec<f64>) -> Option<f64> {
-    quantile(values, 0.5)
-}
-
-/// A value that this share of all are below; the upper one of two.
-pub(crate) fn quantile(mut values: Vec<f64>, share: f64) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    let place = (values.len() as f64 * share) as usize;
-    let last = values.len().saturating_sub(1);
-    values.get(place.min(last)).copied()
 }
 
 /// A number with two decimals at most.

@@ -127,7 +127,8 @@ pub fn write_document<T: Serialize + ?Sized>(path: impl AsRef<Path>, value: &T) 
     }
 }
 
-fn has_extension(path: &Path, expected: &str) -> bool {
+/// Whether a file's name has an extension, in capitals or not.
+pub fn has_extension(path: &Path, expected: &str) -> bool {
     path.extension()
         .is_some_and(|extension| extension.eq_ignore_ascii_case(expected))
 }

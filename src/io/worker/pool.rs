@@ -89,7 +89,7 @@ struct WorkerPool {
 
 /// Why a worker gave no response.
 #[derive(Debug)]
-enum Failure {
+enum WorkerFailure {
     /// It ended, or its response was invalid: the next one may do better.
     Died(String),
     /// It, and so the file, had its time.
@@ -114,8 +114,8 @@ impl WorkerPool {
                     self.give_back(worker);
                     return response;
                 }
-                Err(Failure::TimedOut(timeout)) => return Err(timed_out(library, timeout)),
-                Err(Failure::Died(how)) => {
+                Err(WorkerFailure::TimedOut(timeout)) => return Err(timed_out(library, timeout)),
+                Err(WorkerFailure::Died(how)) => {
                     log::debug!("{}: {library} died on it ({how})", source.path.display());
                     cause = how;
                 }
@@ -236,7 +236,7 @@ impl Worker {
         &mut self,
         source: &SourceFile,
         request: Request,
-    ) -> std::result::Result<std::result::Result<Response, Refusal>, Failure> {
+    ) -> std::result::Result<std::result::Result<Response, Refusal>, WorkerFailure> {
         let started = Instant::now();
         self.set_deadline(started + Duration::from_secs(self.limits.seconds));
         let received = self.receive_response(source, request);
@@ -274,10 +274,10 @@ impl Worker {
         self.from.get_mut().deadline = deadline;
     }
 
-    fn failure(&mut self, e: std::io::Error, timeout: Duration) -> Failure {
+    fn failure(&mut self, e: std::io::Error, timeout: Duration) -> WorkerFailure {
         match e.kind() {
-            ErrorKind::TimedOut => Failure::TimedOut(timeout),
-            _ => Failure::Died(self.cause_of_death(&e)),
+            ErrorKind::TimedOut => WorkerFailure::TimedOut(timeout),
+            _ => WorkerFailure::Died(self.cause_of_death(&e)),
         }
     }
 

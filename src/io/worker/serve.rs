@@ -40,9 +40,9 @@ fn respond_to_all(limits: Limits, from: &mut impl BufRead, to: &mut impl Write) 
     machine_bytes();
     let (memory, missing) = enter_sandbox(&limits);
     greet(missing, to)?;
-    let server = Server { limits, memory };
+    let responder = Responder { limits, memory };
     while !from.fill_buf()?.is_empty() {
-        server.respond(from, to)?;
+        responder.respond(from, to)?;
         to.flush()?;
     }
     Ok(())
@@ -59,12 +59,12 @@ fn greet(missing: Vec<String>, to: &mut impl Write) -> Result<()> {
 }
 
 /// What holds for every request.
-struct Server {
+struct Responder {
     limits: Limits,
     memory: MemoryLimit,
 }
 
-impl Server {
+impl Responder {
     fn respond(&self, from: &mut impl BufRead, to: &mut impl Write) -> Result<()> {
         let request: RequestHead = receive_line(from)?;
         self.memory.allow(request.bytes, 0);

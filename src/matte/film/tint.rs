@@ -3,9 +3,9 @@
 use super::object::{OPAQUE, is_screen};
 use crate::image::Image;
 use crate::matte::arrays::dot;
-use crate::matte::median::median;
 use crate::matte::plate::ScreenPlate;
 use crate::pixel::{Coverage, LinearRgb};
+use crate::quantile::median;
 
 /// Plastic where it lies flat, as a photo shows it.
 #[derive(Clone, Copy, Debug, PartialEq)]

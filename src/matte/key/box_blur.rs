@@ -3,7 +3,7 @@
 use super::calm::{Calm, Extremes, RUN_COLUMNS};
 use super::model::Behaviour;
 use super::options::{Blur, KeyOptions};
-use super::rows::{Pad, Rows, Source, Window, rows_around, window_rows};
+use super::rows::{Pad, RowWindow, Rows, Source, rows_around, window_rows};
 use super::running_blur::{BoxReach, RunningBlur};
 
 /// A plane blurred by a box of `size` (at least 1), in the way that the options ask for.
@@ -29,7 +29,7 @@ struct BoxBlur<S> {
     kernel: BoxKernel,
     height: usize,
     padded: Vec<f32>,
-    window: Window,
+    window: RowWindow,
     /// Extremes of the source's latest row, and of the rows blurred along x.
     calm_source: Calm,
     calm: Calm,
@@ -107,7 +107,7 @@ impl<S: Rows> BoxBlur<S> {
             source,
             height,
             padded: vec![0.0; width + 2 * kernel.radius()],
-            window: Window::new(width, capacity),
+            window: RowWindow::new(width, capacity),
             calm_source: Calm::new(width, 1),
             calm: Calm::new(width, capacity),
             kernel,
@@ -165,7 +165,7 @@ impl BoxKernel {
 
     fn along_y(
         &self,
-        window: &Window,
+        window: &RowWindow,
         calm: &mut Calm,
         (y, height): (usize, usize),
         out: &mut [f32],
@@ -197,7 +197,7 @@ impl BoxKernel {
     /// upwards.
     pub(super) fn rows_in_order<'w>(
         &self,
-        window: &'w Window,
+        window: &'w RowWindow,
         (y, height): (usize, usize),
     ) -> Vec<&'w [f32]> {
         let radius = self.radius();

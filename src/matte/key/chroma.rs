@@ -4,7 +4,7 @@ use super::box_blur::BoxKernel;
 use super::model::{Behaviour, Model, Robust, V34, V45};
 use super::options::{Blur, KeyOptions, Profile};
 use super::photo::Photo;
-use super::rows::{Rows, Window, rows_around, window_rows};
+use super::rows::{RowWindow, Rows, rows_around, window_rows};
 use super::running_blur::RunningBlur;
 use super::ycc::differences;
 use crate::image::ImageView;
@@ -62,9 +62,9 @@ struct ExactBlur<'a, P> {
     both: Differences<'a, P>,
     kernel: BoxKernel,
     padded: [Vec<f32>; 2],
-    windows: [Window; 2],
+    windows: [RowWindow; 2],
     /// Finished rows.
-    ready: [Window; 2],
+    ready: [RowWindow; 2],
 }
 
 /// Rows that are blurred along y together: they share most of what they add up, while it is in the first cache.
@@ -79,8 +79,8 @@ impl<'a, P: Photo> ExactBlur<'a, P> {
         Self {
             both,
             padded: [(); 2].map(|()| vec![0.0; width + 2 * radius]),
-            windows: [(); 2].map(|()| Window::new(width, capacity + ROWS_AT_ONCE)),
-            ready: [(); 2].map(|()| Window::new(width, ROWS_AT_ONCE)),
+            windows: [(); 2].map(|()| RowWindow::new(width, capacity + ROWS_AT_ONCE)),
+            ready: [(); 2].map(|()| RowWindow::new(width, ROWS_AT_ONCE)),
             kernel,
         }
     }
@@ -124,9 +124,9 @@ impl<'a, P: Photo> ExactBlur<'a, P> {
 /// Blurs a few rows along y.
 fn add_rows(
     kernel: &BoxKernel,
-    window: &Window,
+    window: &RowWindow,
     (rows, height): (Range<usize>, usize),
-    out: &mut Window,
+    out: &mut RowWindow,
 ) {
     let taps: Vec<_> = rows
         .clone()

@@ -7,7 +7,7 @@
 use super::calm::{Calm, Extremes};
 use super::model::Behaviour;
 use super::options::{KeyOptions, Profile};
-use super::rows::{Pad, Rows, Source, Window, rows_around, window_rows};
+use super::rows::{Pad, RowWindow, Rows, Source, rows_around, window_rows};
 use std::ops::Range;
 
 /// Blender up to 4.3 offers the disc no more than a window of this half-size, one short to the
@@ -21,7 +21,7 @@ pub(super) struct Dilate<'a> {
     extreme: Extreme,
     height: usize,
     /// For every row its runs of 1, 2, 4, ... samples, one after the other.
-    window: Window,
+    window: RowWindow,
     calm: Calm,
     width: usize,
 }
@@ -85,7 +85,7 @@ impl<'a> Dilate<'a> {
         };
         let runs = (2 * distance + 1).ilog2() as usize + 1;
         let capacity = window_rows(distance, height);
-        let window = Window::new((width + 2 * distance) * runs, capacity);
+        let window = RowWindow::new((width + 2 * distance) * runs, capacity);
         Self {
             source,
             shape,

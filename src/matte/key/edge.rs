@@ -3,7 +3,7 @@
 use super::calm::{Calm, Extremes};
 use super::model::Behaviour;
 use super::options::KeyOptions;
-use super::rows::{Pad, Rows, Source, Window, looked_at, rows_around, window_rows};
+use super::rows::{Pad, RowWindow, Rows, Source, looked_at, rows_around, window_rows};
 
 /// Share of a pixel's neighbours that must be alike for it not to be an edge; Blender's constant.
 const ALIKE_SHARE: f32 = 0.9;
@@ -35,7 +35,7 @@ struct EdgeSearch<'a> {
     tolerance: f32,
     reach: EdgeReach,
     height: usize,
-    window: Window,
+    window: RowWindow,
     calm: Calm,
     /// How many columns of the search window lie inside the picture.
     columns: Vec<f32>,
@@ -54,7 +54,7 @@ impl<'a> EdgeSearch<'a> {
             .map(|x| rows_around(x, half, width).len() as f32)
             .collect();
         let capacity = window_rows(half, height);
-        let window = Window::new(width + 2 * half, capacity);
+        let window = RowWindow::new(width + 2 * half, capacity);
         let calm = Calm::new(width, capacity);
         Self {
             source,

@@ -4,7 +4,7 @@
 use super::calm::{Calm, Extremes, RUN_COLUMNS};
 use super::model::Behaviour;
 use super::options::{Falloff, KeyOptions};
-use super::rows::{Pad, Rows, Source, Window, rows_around, window_rows};
+use super::rows::{Pad, RowWindow, Rows, Source, rows_around, window_rows};
 
 /// Blender's half-width of the unit Gaussian, in units of its own sigma.
 const GAUSSIAN_REACH: f32 = 3.0 * 1.6;
@@ -22,7 +22,7 @@ pub(super) struct Feather<'a> {
     samples: Vec<f32>,
     /// Total Gaussian weight inside the picture, for every column.
     columns: Vec<f32>,
-    window: Window,
+    window: RowWindow,
     /// Extremes of the source's latest row, and of the rows feathered along x.
     calm_source: Calm,
     calm: Calm,
@@ -139,7 +139,7 @@ impl<'a> Feather<'a> {
             candidates: margined.clone(),
             samples: margined,
             columns: (0..width).map(|x| kernel.weight_inside(x, width)).collect(),
-            window: Window::new(width, capacity),
+            window: RowWindow::new(width, capacity),
             calm_source: Calm::new(width, 1),
             calm: Calm::new(width, capacity),
             kernel,
@@ -252,7 +252,7 @@ impl FeatherKernel {
     /// Blender counts rows from the bottom, so an offset of 1 is one row up.
     fn along_y(
         &self,
-        window: &Window,
+        window: &RowWindow,
         calm: &mut Calm,
         (y, height): (usize, usize),
         out: &mut [f32],

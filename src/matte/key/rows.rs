@@ -26,14 +26,14 @@ impl Rows for Source<'_> {
 }
 
 /// The last few rows of a plane.
-pub(super) struct Window {
+pub(super) struct RowWindow {
     row_len: usize,
     capacity: usize,
     next: usize,
     values: Vec<f32>,
 }
 
-impl Window {
+impl RowWindow {
     /// Room for `capacity` rows of `row_len` values.
     pub(super) fn new(row_len: usize, capacity: usize) -> Self {
         Self {
@@ -154,7 +154,7 @@ mod tests {
     #[test]
     fn a_window_makes_each_row_once() {
         let mut made = Vec::new();
-        let mut window = Window::new(2, 3);
+        let mut window = RowWindow::new(2, 3);
         for y in 0..6 {
             window.cover_rows(rows_around(y, 1, 6), |y, row| {
                 made.push(y);
@@ -169,7 +169,7 @@ mod tests {
 
     #[test]
     fn a_window_that_starts_below_the_top_makes_nothing_above() {
-        let mut window = Window::new(1, 3);
+        let mut window = RowWindow::new(1, 3);
         window.cover_rows(rows_around(10, 1, 20), |y, row| row[0] = y as f32);
         assert_eq!(window.row(9), [9.0]);
         assert_eq!(window.next, 12);

@@ -3,7 +3,7 @@
 //! Samples are held to a grid so coarse that sums of them are exact. What enters a sum leaves it
 //! without a trace, and a band of rows finds the same sums wherever it starts.
 
-use super::rows::{Pad, Rows, Window, rows_around, window_rows};
+use super::rows::{Pad, RowWindow, Rows, rows_around, window_rows};
 use std::ops::Range;
 
 /// Largest magnitude of a sample: that of half precision.
@@ -40,7 +40,7 @@ pub(super) struct RunningBlur<S> {
     height: usize,
     padded: Vec<f32>,
     /// Rows blurred along x: those in the sums, and the one that is about to leave them.
-    window: Window,
+    window: RowWindow,
     sums: Vec<f64>,
     /// The rows in the sums.
     summed: Range<usize>,
@@ -56,7 +56,7 @@ impl<S: Rows> RunningBlur<S> {
             reach,
             height,
             padded: vec![0.0; width + 2 * reach.radius + 1],
-            window: Window::new(width, window_rows(reach.radius, height) + 1),
+            window: RowWindow::new(width, window_rows(reach.radius, height) + 1),
             sums: vec![0.0; width],
             summed: 0..0,
             shares: (0..width)

@@ -3,8 +3,8 @@
 
 use crate::image::{Image, Mask};
 use crate::matte::arrays::largest_difference;
-use crate::matte::median::median;
 use crate::pixel::LinearRgb;
+use crate::quantile::median;
 use std::ops::Range;
 
 /// Cells along the longer side of a picture: enough for any smooth screen, few enough to be fitted

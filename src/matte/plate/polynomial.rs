@@ -6,8 +6,8 @@ use crate::error::Result;
 use crate::image::Image;
 use crate::matte::arrays::index_of_largest;
 use crate::matte::check::refused;
-use crate::matte::median::median;
 use crate::pixel::LinearRgb;
+use crate::quantile::median;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 

@@ -3,8 +3,8 @@
 use super::snap::{EdgePoint, distance, edge_points, evenly_spaced};
 use crate::image::Image;
 use crate::matte::Outline;
-use crate::matte::median::median;
 use crate::pixel::LinearRgb;
+use crate::quantile::median;
 use rayon::prelude::*;
 
 /// How far to either side of the outline a profile goes, pixels of the picture that was searched:

@@ -4,9 +4,9 @@ use crate::filter;
 use crate::geom::{Point2, Vector2};
 use crate::image::Image;
 use crate::matte::Outline;
-use crate::matte::median::median;
 use crate::matte::outline::{ring_length, sides};
 use crate::pixel::LinearRgb;
+use crate::quantile::median;
 use rayon::prelude::*;
 
 /// How far to either side of the outline the change is searched for, in pixels of the picture that

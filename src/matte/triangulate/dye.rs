@@ -4,8 +4,8 @@
 use super::lines::{PixelLines, opaque_pixels};
 use crate::image::Image;
 use crate::matte::film::tint;
-use crate::matte::median::median;
 use crate::pixel::Coverage;
+use crate::quantile::median;
 
 /// Pixels that are sampled.
 const DYE_SAMPLES: usize = 400;

@@ -2,8 +2,8 @@
 
 use crate::image::Image;
 use crate::matte::film::OPAQUE;
-use crate::matte::median::{median, quantile};
 use crate::pixel::{Coverage, LinearRgb};
+use crate::quantile::{median, quantile};
 
 /// Sums for a straight line through points.
 #[derive(Clone, Copy, Debug, Default)]
@@ -91,14 +91,14 @@ const CLEAREST_SHARE: f64 = 0.25;
 
 /// A pixel's film.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct SolvedFilm {
+pub(super) struct PixelFilm {
     pub(super) transmittance: LinearRgb,
     pub(super) reflected: LinearRgb,
     /// Standard deviation of the least certain channel of the transmittance.
     pub(super) sigma: f32,
 }
 
-impl SolvedFilm {
+impl PixelFilm {
     /// The film in front of a screen.
     pub(super) fn over(&self, screen: LinearRgb) -> LinearRgb {
         self.reflected + self.transmittance * screen
@@ -192,7 +192,7 @@ impl Inferred {
 
     /// The film of one pixel: what is measured, mixed with what follows from the other channels by
     /// the variances.
-    pub(super) fn complete(&self, pixel: &PixelLines) -> SolvedFilm {
+    pub(super) fn complete(&self, pixel: &PixelLines) -> PixelFilm {
         let (share, bare) = self.shares(pixel);
         let channels = [0, 1, 2].map(|c| {
             let (slope, sigma) = (pixel.slope(c), pixel.sigma(c));
@@ -202,7 +202,7 @@ impl Inferred {
                 mixed(slope, sigma, share * self.plastic[c] + bare)
             }
         });
-        SolvedFilm::new(pixel, channels)
+        PixelFilm::new(pixel, channels)
     }
 }
 
@@ -248,7 +248,7 @@ impl ShareSums {
     }
 }
 
-impl SolvedFilm {
+impl PixelFilm {
     /// From the transmittance of each channel and its standard deviation.
     #[inline]
     fn new(pixel: &PixelLines, channels: [(f32, f32); 3]) -> Self {
@@ -310,10 +310,7 @@ pub(super) fn opaque_pixels<'a, P: Copy>(
 
 /// Transmittance per channel where the plastic lies flat: the median over what is not much darker
 /// than the clearest.
-pub(super) fn flat_transmittance(
-    solved: &Image<SolvedFilm>,
-    inside: &Image<Coverage>,
-) -> LinearRgb {
+pub(super) fn flat_transmittance(solved: &Image<PixelFilm>, inside: &Image<Coverage>) -> LinearRgb {
     let mut object: Vec<LinearRgb> = opaque_pixels(solved, inside)
         .map(|p| p.transmittance)
         .collect();

@@ -1,8 +1,8 @@
 //! Noise of a photo.
 
 use crate::image::Image;
-use crate::matte::median::median;
 use crate::pixel::{Coverage, LinearRgb};
+use crate::quantile::median;
 
 /// Pixels so far apart are hardly alike in their noise, whatever a camera and a JPEG made of it.
 const STEP_PX: usize = 3;

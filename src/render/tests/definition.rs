@@ -62,20 +62,13 @@ pub(super) fn card(
     size: [f64; 2],
     texture: Image<PremulRgba>,
 ) -> Card {
+    let quad = Quad {
+        world_from_card: Pose::from_parts(Vector3::from(center).into(), rotation),
+        size,
+    };
     Card {
-        id: ObjectId(id),
-        class: Some(0),
-        quad: Quad {
-            world_from_card: Pose::from_parts(Vector3::from(center).into(), rotation),
-            size,
-        },
-        texture: texture.into(),
-        back: None,
-        outline_uv: Arc::new([]),
-        grade: Grade::default(),
-        bend: Default::default(),
-        refraction: Default::default(),
-        surfaces: Default::default(),
+        outline_uv: [].into(),
+        ..Card::new(ObjectId(id), quad, texture)
     }
 }
 

@@ -330,25 +330,21 @@ mod tests {
             LinearRgb::new(0.1, 0.2, 0.0),
             LinearRgb::new(0.5, 0.25, 1.0),
         );
+        let quad = Quad {
+            world_from_card: Pose::translation(0.1, 0.0, 0.05),
+            size: [0.2, 0.1],
+        };
+        let texture = Image::filled(3, 2, PremulRgba::new(0.25, 0.125, 0.0, 0.5));
         let card = Card {
-            id: ObjectId(4),
-            class: Some(0),
-            quad: Quad {
-                world_from_card: Pose::translation(0.1, 0.0, 0.05),
-                size: [0.2, 0.1],
-            },
-            texture: Image::filled(3, 2, PremulRgba::new(0.25, 0.125, 0.0, 0.5)).into(),
             back: Some(Image::filled(2, 2, film).into()),
-            outline_uv: Arc::new([]),
+            outline_uv: [].into(),
             grade: Grade {
                 hue_deg: 10.0,
                 saturation: 0.75,
                 value: 1.5,
                 ..Grade::default()
             },
-            bend: Default::default(),
-            refraction: Default::default(),
-            surfaces: Default::default(),
+            ..Card::new(ObjectId(4), quad, texture)
         };
         let light = AreaLight {
             shape: LightShape::Ellipse,

@@ -12,7 +12,7 @@ pub(crate) struct ExportCameraArgs {
     cameras: Vec<PathBuf>,
     /// For which program
     #[arg(long)]
-    to: CameraFormat,
+    to: ExportFormat,
     /// File (blender, opencv: of one camera) or folder (colmap) to write; without it, blender and
     /// opencv are printed
     #[arg(short, long)]
@@ -20,7 +20,7 @@ pub(crate) struct ExportCameraArgs {
 }
 
 #[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
-enum CameraFormat {
+enum ExportFormat {
     /// A Python script
     Blender,
     /// K, R, t and dist (k1, k2, p1, p2) as JSON
@@ -32,9 +32,9 @@ enum CameraFormat {
 pub(super) fn export_cameras(args: &ExportCameraArgs) -> anyhow::Result<()> {
     let (files, output) = (args.read_cameras()?, args.output.as_deref());
     match args.to {
-        CameraFormat::Colmap => write_colmap(output, &files),
-        CameraFormat::Blender => write_or_print(output, &blender_script(only_file(&files)?)),
-        CameraFormat::Opencv => write_or_print(output, &opencv_document(only_file(&files)?)?),
+        ExportFormat::Colmap => write_colmap(output, &files),
+        ExportFormat::Blender => write_or_print(output, &blender_script(only_file(&files)?)),
+        ExportFormat::Opencv => write_or_print(output, &opencv_document(only_file(&files)?)?),
     }
 }
 

@@ -17,8 +17,7 @@ pub(crate) fn write_picture<P: ToFile>(path: &Path, image: &Image<P>) -> Result<
 
 /// The file is called `.exr`.
 pub(super) fn is_exr(path: &Path) -> bool {
-    let extension = path.extension();
-    extension.is_some_and(|e| e.eq_ignore_ascii_case("exr"))
+    io::has_extension(path, "exr")
 }
 
 /// Fails where a picture has not the size of a photo; both are named as the user does.

@@ -2,7 +2,7 @@
 
 use super::place::{Bottle, Place};
 use super::shots::Stage;
-use super::window::Window;
+use super::window::DisplayWindow;
 use crate::matte::MattingMethod;
 use petcomp::matte::LightPath;
 use petcomp::{Film, Image, Result};
@@ -89,7 +89,7 @@ fn on_paint(method: MattingMethod, place: &Place, bottle: &Bottle) -> Result<See
         color: film.color.scale(exposure),
         ..film
     });
-    let window = Window::of(place, bottle);
+    let window = DisplayWindow::of(place, bottle);
     let (w, h) = window.size();
     Ok(SeenFilm {
         film: window.seen(exposed),
@@ -104,7 +104,7 @@ fn on_display(
     bottle: &Bottle,
 ) -> Result<SeenFilm> {
     let measured = stage.measure(bottle, with_stripes)?;
-    let roi = Window::of(place, bottle).roi();
+    let roi = DisplayWindow::of(place, bottle).roi();
     let flow = match &measured.refraction {
         Some(bent) => {
             let known = bent.known.crop(roi);

@@ -9,7 +9,7 @@ use petcomp::matte::LightPath;
 use petcomp::{Image, LinearRgb, Mix, Roi};
 
 /// Pixels of the display, a whole number from its upper left corner.
-pub(super) struct Window {
+pub(super) struct DisplayWindow {
     roi: Roi,
     /// From pixels of the window to those of a bottle's pictures.
     photo_from_window: Homography,
@@ -23,7 +23,7 @@ fn moved_by(x: f64, y: f64) -> Matrix3<f64> {
     Matrix3::new(1.0, 0.0, x, 0.0, 1.0, y, 0.0, 0.0, 1.0)
 }
 
-impl Window {
+impl DisplayWindow {
     pub(super) fn of(place: &Place, bottle: &Bottle) -> Self {
         let [x0, y0, x1, y1] = bottle.crop_px;
         let [w, h] = place.view_px;

@@ -4,7 +4,7 @@ use crate::pile::camera_above;
 use petcomp::Image;
 use petcomp::geom::{Point2, Pose, Quad, UnitQuaternion, Vector3};
 use petcomp::label::RleMask;
-use petcomp::scene::{Card, Grade, Shot};
+use petcomp::scene::{Card, Shot};
 use petcomp::{DeepImage, DeepSample};
 use petcomp::{Depth, LinearRgb, ObjectId, PremulRgba};
 use std::f64::consts::{PI, TAU};
@@ -132,17 +132,10 @@ impl Ellipse {
     /// A card whose outline has this number of corners on the ellipse.
     pub(super) fn shot(&self, corners: usize) -> Shot {
         let turns = (0..corners).map(|i| TAU * i as f64 / corners as f64);
+        let texture = Image::<PremulRgba>::new(2, 2);
         Shot::new(camera_above(self.image, 1.0)).with_card(Card {
-            id: ObjectId(1),
-            class: Some(0),
-            quad: bounding_quad(),
-            texture: Image::<PremulRgba>::new(2, 2).into(),
-            back: None,
             outline_uv: turns.map(place_uv).collect(),
-            grade: Grade::default(),
-            bend: Default::default(),
-            refraction: Default::default(),
-            surfaces: Default::default(),
+            ..Card::new(ObjectId(1), bounding_quad(), texture)
         })
     }
 

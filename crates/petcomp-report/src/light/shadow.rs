@@ -4,7 +4,7 @@ use crate::pile::camera_above;
 use petcomp::Image;
 use petcomp::geom::{Plane, Point2, Point3, Pose, Quad, UnitQuaternion, Vector3};
 use petcomp::light::{frame, polygon_irradiance};
-use petcomp::scene::{AreaLight, Card, Grade, LightShape, Shot};
+use petcomp::scene::{AreaLight, Card, LightShape, Shot};
 use petcomp::{LinearRgb, ObjectId, PremulRgba};
 use std::f64::consts::PI;
 
@@ -33,21 +33,15 @@ pub(super) fn shadow_shot(kind: LightKind) -> Shot {
 }
 
 fn opaque_card() -> Card {
+    let quad = Quad {
+        world_from_card: card_pose(),
+        size: CARD_SIZE_M,
+    };
+    // So fine that its border, half a texel soft, is a sharp one.
+    let texture = Image::filled(512, 256, PremulRgba::new(0.0, 0.0, 0.0, 1.0));
     Card {
-        id: ObjectId(1),
-        class: Some(0),
-        quad: Quad {
-            world_from_card: card_pose(),
-            size: CARD_SIZE_M,
-        },
-        // So fine that its border, half a texel soft, is a sharp one.
-        texture: Image::filled(512, 256, PremulRgba::new(0.0, 0.0, 0.0, 1.0)).into(),
-        back: None,
         outline_uv: [].into(),
-        grade: Grade::default(),
-        bend: Default::default(),
-        refraction: Default::default(),
-        surfaces: Default::default(),
+        ..Card::new(ObjectId(1), quad, texture)
     }
 }
 

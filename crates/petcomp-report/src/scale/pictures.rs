@@ -1,7 +1,7 @@
 //! Pictures of a kind, made from nothing.
 
 use super::ScaleCase;
-use crate::pile::{CAMERA_HEIGHT_M, camera_above, lamp, striped, whole_card_uv};
+use crate::pile::{CAMERA_HEIGHT_M, camera_above, lamp, striped};
 use petcomp::DeepImage;
 use petcomp::asset::Texture;
 use petcomp::camera::Camera;
@@ -9,7 +9,7 @@ use petcomp::dataset::{
     Obstructed, Pictures, Plan, Provenance, Sample, SampleRange, Sidecar, Split, Writer, Yolo,
     generate,
 };
-use petcomp::geom::{Pose, UnitQuaternion, Vector2, Vector3};
+use petcomp::geom::{Point2, Pose, UnitQuaternion, Vector2, Vector3};
 use petcomp::label::{LabelOptions, label};
 use petcomp::render::{RenderOptions, render};
 use petcomp::scene::{
@@ -87,11 +87,12 @@ impl PictureInputs {
 }
 
 fn appearance(object: &Object, textures: &[Texture]) -> Appearance {
+    let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
     Appearance {
         class: Some(0),
         texture: textures[object.photo % textures.len()].clone(),
         back: None,
-        outline_uv: whole_card_uv(),
+        outline_uv: corners.map(Point2::from).into(),
         flows: Default::default(),
         surfaces: Default::default(),
     }

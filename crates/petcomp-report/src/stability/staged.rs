@@ -1,33 +1,20 @@
 //! Shots that cases are made of: a camera straight above, level cards, small lights.
 
+use crate::pile;
 use petcomp::asset::Texture;
 use petcomp::camera::Camera;
 use petcomp::geom::{Point2, Point3, Pose, Quad, UnitQuaternion, Vector2, Vector3};
 use petcomp::render::{RenderOptions, render};
-use petcomp::scene::{
-    AreaLight, CameraSource, Card, Exposure, Grade, LightShape, Scene, Shot, Surface,
-};
+use petcomp::scene::{AreaLight, CameraSource, Card, Exposure, LightShape, Scene, Shot, Surface};
 use petcomp::{DeepImage, DeepSample, Error, Image, LinearRgb, ObjectId, PremulRgba, Result};
-use std::f64::consts::PI;
-use std::sync::Arc;
 use tempfile::TempDir;
-
-/// The outline of a whole card in texture coordinates.
-const WHOLE: [[f64; 2]; 4] = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
 
 /// A camera at height 1 over the origin, looking straight down; picture up is world `+y`.
 pub(super) fn camera_above(image: [u32; 2], focal_px: f64) -> Camera {
     Camera {
-        image,
         focal_px: Vector2::repeat(focal_px),
-        principal_px: Point2::from(image.map(|side| 0.5 * f64::from(side))),
-        camera_from_world: looking_down(),
+        ..pile::camera_above(image, 1.0)
     }
-}
-
-fn looking_down() -> Pose {
-    let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI);
-    Pose::from_parts(Vector3::new(0.0, 0.0, 1.0).into(), down)
 }
 
 /// A camera at `eye` whose image centre sees `target`.
@@ -60,21 +47,11 @@ pub(super) fn card(
     size: [f64; 2],
     texture: impl Into<Texture>,
 ) -> Card {
-    Card {
-        id: ObjectId(id),
-        class: Some(0),
-        quad: Quad {
-            world_from_card: Pose::from_parts(Vector3::from(center).into(), rotation),
-            size,
-        },
-        texture: texture.into(),
-        back: None,
-        outline_uv: Arc::new(WHOLE.map(Point2::from)),
-        grade: Grade::default(),
-        bend: Default::default(),
-        refraction: Default::default(),
-        surfaces: Default::default(),
-    }
+    let quad = Quad {
+        world_from_card: Pose::from_parts(Vector3::from(center).into(), rotation),
+        size,
+    };
+    Card::new(ObjectId(id), quad, texture)
 }
 
 /// A level square card of one texel value, with so many texels that the fade of the outermost half

@@ -51,7 +51,7 @@ fn label_of(folder: &Folder, photo: &str) -> Answer<Label> {
 
 /// What became of a save.
 #[derive(Serialize)]
-pub(super) struct Saved {
+pub(super) struct SavedLabel {
     name: String,
     version: String,
     /// The camera file, if the label has a camera.
@@ -67,13 +67,13 @@ pub(super) fn save(
     photo: &str,
     label: Label,
     version: Option<&str>,
-) -> Answer<Saved> {
+) -> Answer<SavedLabel> {
     let name = beside(photo, "label.json");
     check_photo(&label, photo)?;
     let text = text_of(folder, &name, &label)?;
     let version = folder.save(&name, &text, version)?;
     let outcome = write_camera(folder, photo);
-    Ok(Saved {
+    Ok(SavedLabel {
         name,
         version,
         why: outcome.as_ref().err().map(|refusal| refusal.what.clone()),

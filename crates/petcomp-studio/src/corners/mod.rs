@@ -14,15 +14,15 @@ use axum::Router;
 use axum::extract::State;
 use axum::routing::{get, post};
 use joint::JointPhoto;
-use label_file::{LabelFile, Saved};
+use label_file::{LabelFile, SavedLabel};
 use petcomp::camera::{self, Label, Marker, SnappedCorners};
 use petcomp::{Image, LinearRgb, io};
-use photos::PhotoEntry;
+use photos::PhotoProgress;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::SystemTime;
-use view::CameraView;
+use view::CameraSummary;
 
 pub(crate) const PAGES: &[Page] = &[
     crate::page!("corners.html"),
@@ -49,7 +49,7 @@ pub(crate) fn routes() -> Router<Arc<Studio>> {
         .route("/joint", post(solve_together))
 }
 
-async fn list_photos(State(studio): State<Arc<Studio>>) -> Answer<Json<Vec<PhotoEntry>>> {
+async fn list_photos(State(studio): State<Arc<Studio>>) -> Answer<Json<Vec<PhotoProgress>>> {
     blocking(move || Ok(Json(photos::list(&studio.folder)))).await
 }
 
@@ -81,13 +81,13 @@ async fn solve(
     State(studio): State<Arc<Studio>>,
     tab: Tab,
     Json(asked): Json<PhotoLabel>,
-) -> Answer<Json<CameraView>> {
+) -> Answer<Json<CameraSummary>> {
     let turns = studio.corners.solving.clone();
     turns
         .run(tab, move |_| {
             let path = label_file::path(&studio.folder, &asked.photo)?;
             let label = camera::with_photo(asked.label, path)?;
-            Ok(Json(CameraView::of(&label)?))
+            Ok(Json(CameraSummary::of(&label)?))
         })
         .await
 }
@@ -165,7 +165,7 @@ struct NewLabel {
 async fn save(
     State(studio): State<Arc<Studio>>,
     Json(asked): Json<NewLabel>,
-) -> Answer<Json<Saved>> {
+) -> Answer<Json<SavedLabel>> {
     blocking(move || {
         let (photo, version) = (&asked.photo, asked.version.as_deref());
         let saved = label_file::save(&studio.folder, photo, asked.label, version)?;

@@ -11,7 +11,7 @@ const OWN_ENDINGS: [&str; 4] = [".overlay", ".front", ".matte", "contact_sheet"]
 
 /// A photo, and how far it is.
 #[derive(Serialize)]
-pub(super) struct PhotoEntry {
+pub(super) struct PhotoProgress {
     /// Its path with slashes.
     photo: String,
     label: bool,
@@ -19,10 +19,10 @@ pub(super) struct PhotoEntry {
 }
 
 /// All photos below a folder, in order of name; those of objects, which a list names, come last.
-pub(super) fn list(folder: &Folder) -> Vec<PhotoEntry> {
+pub(super) fn list(folder: &Folder) -> Vec<PhotoProgress> {
     let json = folder.find(|path| path.extension().is_some_and(|ending| ending == "json"));
     let documents: BTreeSet<String> = json.into_iter().collect();
-    let entry = |photo: String| PhotoEntry {
+    let entry = |photo: String| PhotoProgress {
         label: documents.contains(&beside(&photo, "label.json")),
         camera: documents.contains(&beside(&photo, "camera.json")),
         photo,

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 /// A camera, and what to think of it.
 #[derive(Serialize)]
-pub(super) struct CameraView {
+pub(super) struct CameraSummary {
     /// Height of the lens over the surface, metres, and its standard deviation.
     height: [f64; 2],
     /// Tilt from straight down, degrees.
@@ -32,7 +32,7 @@ pub(super) struct CameraView {
     sketch: Sketch,
 }
 
-impl CameraView {
+impl CameraSummary {
     /// The camera of a label that was completed with its photo's EXIF data.
     pub(super) fn of(label: &Label) -> Answer<Self> {
         let options = SolveOptions::default();

@@ -86,7 +86,7 @@ struct FolderName {
 
 /// A folder as it was listed.
 #[derive(Serialize)]
-struct Opened {
+struct ListedFolder {
     count: usize,
     classes: Vec<String>,
     /// Whether petcomp made it, and wrote down everything.
@@ -96,11 +96,11 @@ struct Opened {
 async fn open(
     State(studio): State<Arc<Studio>>,
     Query(FolderName { folder }): Query<FolderName>,
-) -> Answer<Json<Opened>> {
+) -> Answer<Json<ListedFolder>> {
     blocking(move || {
         let catalog = studio.dataset.catalogs.open(&studio.folder, &folder)?;
         let index = &catalog.index;
-        Ok(Json(Opened {
+        Ok(Json(ListedFolder {
             count: index.pictures.len(),
             classes: index.classes.clone(),
             has_records: index
@@ -113,7 +113,7 @@ async fn open(
 }
 
 #[derive(Deserialize)]
-struct Wanted {
+struct RowSearch {
     folder: String,
     filter: Filter,
     order: Order,
@@ -134,7 +134,7 @@ struct FoundRows {
 
 async fn find(
     State(studio): State<Arc<Studio>>,
-    Json(wanted): Json<Wanted>,
+    Json(wanted): Json<RowSearch>,
 ) -> Answer<Json<FoundRows>> {
     blocking(move || {
         let catalog = studio

@@ -2,6 +2,7 @@
 
 use crate::folder::Folder;
 use crate::message::{Json, Query};
+use crate::picture::PhotoName;
 use crate::refusal::Answer;
 use crate::studio::Studio;
 use crate::turn::blocking;
@@ -11,11 +12,6 @@ use petcomp::matte::Stroke;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::sync::Arc;
-
-#[derive(Deserialize)]
-pub(super) struct PhotoQuery {
-    photo: String,
-}
 
 /// A review as the page has it.
 #[derive(Serialize)]
@@ -28,7 +24,7 @@ pub(super) struct ReadReview {
 
 pub(super) async fn read(
     State(studio): State<Arc<Studio>>,
-    Query(query): Query<PhotoQuery>,
+    Query(query): Query<PhotoName>,
 ) -> Answer<Json<ReadReview>> {
     blocking(move || read_review(&studio.folder, &query.photo).map(Json)).await
 }
@@ -70,7 +66,7 @@ pub(super) struct ChangedReview {
 
 /// Where a review was saved.
 #[derive(Serialize)]
-pub(super) struct Saved {
+pub(super) struct SavedReview {
     file: String,
     version: String,
 }
@@ -78,11 +74,11 @@ pub(super) struct Saved {
 pub(super) async fn save(
     State(studio): State<Arc<Studio>>,
     Json(changed): Json<ChangedReview>,
-) -> Answer<Json<Saved>> {
+) -> Answer<Json<SavedReview>> {
     blocking(move || save_review(&studio.folder, changed).map(Json)).await
 }
 
-fn save_review(folder: &Folder, changed: ChangedReview) -> Answer<Saved> {
+fn save_review(folder: &Folder, changed: ChangedReview) -> Answer<SavedReview> {
     folder.file(&changed.photo)?;
     let review = Review {
         verdict: changed.verdict,
@@ -91,7 +87,7 @@ fn save_review(folder: &Folder, changed: ChangedReview) -> Answer<Saved> {
     review.check()?;
     let file = review_name(&changed.photo);
     let version = folder.save(&file, &review.to_json(), changed.version.as_deref())?;
-    Ok(Saved { file, version })
+    Ok(SavedReview { file, version })
 }
 
 #[cfg(test)]

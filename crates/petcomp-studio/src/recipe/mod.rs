@@ -16,6 +16,7 @@ use axum::routing::{get, post};
 use draft::{Draft, Edits};
 use petcomp::dataset::DatasetConfig;
 use petcomp::dataset::settings::{SettingGroup, settings};
+use petcomp::io::has_extension;
 use preview::{PictureAsked, Pipelines};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -52,18 +53,13 @@ async fn files(State(studio): State<Arc<Studio>>) -> Answer<Json<Vec<String>>> {
 
 /// A document that `petcomp dataset generate` takes.
 pub(crate) fn is_recipe(path: &Path) -> bool {
-    is_toml(path) && DatasetConfig::read(path, &[]).is_ok()
-}
-
-fn is_toml(path: &Path) -> bool {
-    path.extension()
-        .is_some_and(|extension| extension == "toml")
+    has_extension(path, "toml") && DatasetConfig::read(path, &[]).is_ok()
 }
 
 /// Fails on a name that no page would list.
 fn check_listed(file: &str) -> Answer<()> {
     let is_hidden = file.split('/').any(|part| part.starts_with('.'));
-    if is_toml(Path::new(file)) && !is_hidden {
+    if has_extension(Path::new(file), "toml") && !is_hidden {
         return Ok(());
     }
     let file = petcomp::printable(file);
@@ -82,7 +78,7 @@ struct FileName {
 
 /// A recipe as its file has it.
 #[derive(Serialize)]
-struct Opened {
+struct StoredRecipe {
     version: String,
     #[serde(flatten)]
     draft: Draft,
@@ -91,14 +87,14 @@ struct Opened {
 async fn open(
     State(studio): State<Arc<Studio>>,
     Query(FileName { file }): Query<FileName>,
-) -> Answer<Json<Opened>> {
+) -> Answer<Json<StoredRecipe>> {
     blocking(move || {
         let read = studio.folder.read_text(&file)?;
         // Assets and photos may be others by now.
         studio.recipe.pipelines.forget();
         let draft = Draft::of(&read.text, &studio.folder.file(&file)?)?;
         let version = read.version;
-        Ok(Json(Opened { version, draft }))
+        Ok(Json(StoredRecipe { version, draft }))
     })
     .await
 }
@@ -135,7 +131,7 @@ async fn draft(
 }
 
 #[derive(Deserialize)]
-struct Saved {
+struct SaveRequest {
     #[serde(flatten)]
     edited: Edited,
     version: String,
@@ -143,7 +139,7 @@ struct Saved {
 
 async fn save(
     State(studio): State<Arc<Studio>>,
-    Json(Saved { edited, version }): Json<Saved>,
+    Json(SaveRequest { edited, version }): Json<SaveRequest>,
 ) -> Answer<Json<String>> {
     blocking(move || {
         let Edited { file, edits } = edited;

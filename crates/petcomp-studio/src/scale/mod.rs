@@ -4,7 +4,7 @@
 mod photo_list;
 
 use crate::message::{Json, Query};
-use crate::picture::may_be_photo;
+use crate::picture::{PhotoName, may_be_photo};
 use crate::refusal::Answer;
 use crate::server::Page;
 use crate::studio::Studio;
@@ -13,7 +13,7 @@ use axum::Router;
 use axum::extract::State;
 use axum::routing::{get, post};
 use petcomp::matte;
-use photo_list::{ListedPhoto, PhotoScale, ScaledPhoto};
+use photo_list::{PhotoScale, ScaledPhoto, VersionedEntry};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -47,15 +47,10 @@ async fn list_photos(State(studio): State<Arc<Studio>>) -> Answer<Json<Vec<ListE
     .await
 }
 
-#[derive(Deserialize)]
-struct PhotoName {
-    photo: String,
-}
-
 async fn read_photo(
     State(studio): State<Arc<Studio>>,
     Query(asked): Query<PhotoName>,
-) -> Answer<Json<ListedPhoto>> {
+) -> Answer<Json<VersionedEntry>> {
     blocking(move || {
         studio.folder.file(&asked.photo)?;
         Ok(Json(photo_list::read(&studio.folder, &asked.photo)?))
@@ -96,7 +91,7 @@ struct NewScale {
 async fn save(
     State(studio): State<Arc<Studio>>,
     Json(asked): Json<NewScale>,
-) -> Answer<Json<ListedPhoto>> {
+) -> Answer<Json<VersionedEntry>> {
     blocking(move || {
         studio.folder.file(&asked.photo)?;
         let new = ScaledPhoto {

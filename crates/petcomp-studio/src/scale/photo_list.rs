@@ -26,9 +26,9 @@ const SCALE_KEYS: [&str; 7] = [
     "marker_size",
 ];
 
-/// A photo in its list.
+/// What a list says of a photo, and in which state of the list.
 #[derive(Serialize)]
-pub(super) struct ListedPhoto {
+pub(super) struct VersionedEntry {
     /// The list, whether it is there or not.
     list: String,
     /// The state of the list; none where there is none.
@@ -64,10 +64,10 @@ fn list_of(photo: &str) -> (String, &str) {
 }
 
 /// What the list beside a photo says of it.
-pub(super) fn read(folder: &Folder, photo: &str) -> Answer<ListedPhoto> {
+pub(super) fn read(folder: &Folder, photo: &str) -> Answer<VersionedEntry> {
     let (list, file) = list_of(photo);
     let Some(versioned) = folder.text_if_any(&list)? else {
-        return Ok(ListedPhoto {
+        return Ok(VersionedEntry {
             list,
             version: None,
             entry: None,
@@ -75,7 +75,7 @@ pub(super) fn read(folder: &Folder, photo: &str) -> Answer<ListedPhoto> {
     };
     let entries = entries_of(&versioned.text, &list)?;
     let file = listed_name(&entries, &folder.file(photo)?).unwrap_or(file.into());
-    Ok(ListedPhoto {
+    Ok(VersionedEntry {
         list,
         version: Some(versioned.version),
         entry: entries.into_iter().find(|entry| names(entry, &file)),

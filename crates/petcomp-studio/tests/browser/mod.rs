@@ -155,17 +155,6 @@ impl Browser {
         self.mouse("mouseReleased", last, "left");
     }
 
-    /// Moves the pointer without a button.
-    pub(crate) fn hover(&mut self, at: [f64; 2]) {
-        self.mouse("mouseMoved", at, "none");
-    }
-
-    /// Turns the wheel at a place; negative is away from the person.
-    pub(crate) fn wheel(&mut self, [x, y]: [f64; 2], delta: f64) {
-        let turned = json!({ "type": "mouseWheel", "x": x, "y": y, "deltaX": 0, "deltaY": delta });
-        self.call("Input.dispatchMouseEvent", turned);
-    }
-
     fn mouse(&mut self, kind: &str, [x, y]: [f64; 2], button: &str) {
         let held = u8::from(button == "left" && kind != "mouseReleased");
         let event = json!({ "type": kind, "x": x, "y": y, "button": button, "buttons": held, "clickCount": 1 });
