@@ -20,7 +20,8 @@ fn pipeline(folder: &Path, recipe: &str) -> Pipeline {
     let samples = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/samples");
     let assets = folder.join("assets");
     if !assets.exists() {
-        asset::build(samples.join("bottles/photos.toml"), &assets, &|_, _| ()).unwrap();
+        let (list, running) = (samples.join("bottles/photos.toml"), AtomicBool::new(false));
+        asset::build(list, &assets, &|_, _| (), &running).unwrap();
     }
     let config = DatasetConfig::parse(recipe, &folder.join("recipe.toml"), &[]).unwrap();
     let config = DatasetConfig {

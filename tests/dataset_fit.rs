@@ -94,7 +94,7 @@ fn assets() -> &'static Path {
     let made = || {
         let folder = tempfile::tempdir().unwrap();
         let list = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/samples/bottles");
-        asset::build(list, folder.path(), &|_, _| {}).unwrap();
+        asset::build(list, folder.path(), &|_, _| {}, &NEVER).unwrap();
         folder
     };
     ASSETS.get_or_init(made).path()

@@ -5,6 +5,7 @@
 use geo::{Area, BooleanOps, BoundingRect, LineString, Polygon};
 use petcomp::{Image, LinearRgb, asset, io, matte};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 
 #[derive(serde::Deserialize)]
 struct Truth {
@@ -64,7 +65,8 @@ fn hulls_of_sample_bottles_agree_with_the_renderer() {
 #[test]
 fn the_sample_list_becomes_a_library_of_all_four_classes() {
     let folder = tempfile::tempdir().unwrap();
-    let built = asset::build(samples().join("photos.toml"), folder.path(), &|_, _| ()).unwrap();
+    let (list, running) = (samples().join("photos.toml"), AtomicBool::new(false));
+    let built = asset::build(list, folder.path(), &|_, _| (), &running).unwrap();
     let library = built.library;
     assert_eq!((built.photos, library.assets.len()), (12, 6));
     let mut classes: Vec<u32> = library

@@ -18,7 +18,8 @@ def sample(k):
         id=1, texture=green, size=(0.25, 0.10), position=(0.0, 0.0, 0.1), rotation=(0.1 * k, 0.0, 0.3 * k)
     )
     plate = np.full((240, 320, 3), 0.4, np.float32)
-    return petcomp.render(petcomp.Shot(camera).with_plate(plate).with_card(card).with_ambient(1.0))
+    shot = petcomp.Shot(camera, classes=("film",)).with_plate(plate).with_card(card).with_ambient(1.0)
+    return petcomp.render(shot)
 
 
 def main():

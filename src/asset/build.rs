@@ -1,5 +1,6 @@
 //! Many photos into an asset folder, from a list.
 
+use super::MANIFEST;
 use super::entry::PhotoEntry;
 use super::folder::{CutOutWriter, lock, read_or_new};
 use super::library::{Library, Photo};
@@ -11,7 +12,7 @@ use crate::error::{Error, Result};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::path::Path;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 /// What [`build`] did.
 #[derive(Clone, Debug)]
@@ -43,21 +44,26 @@ pub struct Built {
 /// `progress` is called with the photos done and their number, at the start and after each photo,
 /// from several threads. What the folder has of other photos stays ([`Built::unlisted`]); a photo
 /// that it already has is replaced. The manifest is written last and does not depend on threads.
+/// Once `stop` is true, photos in hand are finished, no more are begun, and the manifest stays as it
+/// was.
 ///
 /// # Errors
 /// A list that cannot be read or be right, or a photo that is missing (before any work); the first
 /// photo that cannot be read (the cut-outs of the others are in the folder), or [`Error::File`]
-/// where no photo gives a cut-out; those of [`Library::open`] for cut-outs that were there before.
+/// where no photo gives a cut-out; [`Error::Interrupted`] after a stop; those of [`Library::open`]
+/// for cut-outs that were there before.
 pub fn build(
     list: impl AsRef<Path>,
     folder: impl AsRef<Path>,
     progress: &(dyn Fn(usize, usize) + Sync),
+    stop: &AtomicBool,
 ) -> Result<Built> {
     let (path, folder) = (find_list(list.as_ref())?, folder.as_ref());
     let list = List::read(&path)?;
     let list = checked(list, &path, &mut read_or_new(folder)?)?;
-    let outcomes = cut_out_all(&list, folder, progress);
-    let (manifest, mut taken) = record(&list, outcomes, folder).map_err(|e| e.in_file(&path))?;
+    let outcomes = cut_out_all(&list, folder, progress, stop);
+    let recorded = record(&list, outcomes, folder, stop);
+    let (manifest, mut taken) = recorded.map_err(|e| e.in_file(&path))?;
     if let Some(error) = taken.failed.take() {
         return Err(error.in_file(&path));
     }
@@ -66,6 +72,15 @@ pub fn build(
     }
     let library = Library::from_manifest(folder, manifest, &taken.photos)?;
     Ok(Built::new(library, taken, &list))
+}
+
+/// Fails once nothing more is to be begun or told in the manifest.
+fn check_goes_on(stop: &AtomicBool) -> Result<()> {
+    if !stop.load(Ordering::Relaxed) {
+        return Ok(());
+    }
+    let what = format!("{MANIFEST} tells of no new cut-out; the same call begins anew");
+    Err(Error::Interrupted { what })
 }
 
 fn no_cut_out(list: &Path, refused: &[String]) -> Error {
@@ -108,11 +123,12 @@ fn checked(list: List, path: &Path, manifest: &mut Manifest) -> Result<List> {
     Ok(list)
 }
 
-/// Cuts out and writes the photos of a list.
+/// Cuts out and writes the photos of a list, until there is a stop.
 fn cut_out_all(
     list: &List,
     folder: &Path,
     progress: &(dyn Fn(usize, usize) + Sync),
+    stop: &AtomicBool,
 ) -> Vec<Result<Photo>> {
     let (done, count) = (AtomicUsize::new(0), list.photos.len());
     progress(0, count);
@@ -124,6 +140,7 @@ fn cut_out_all(
     list.photos
         .par_iter()
         .map(|entry| {
+            check_goes_on(stop)?;
             let photo = writer.write(entry);
             progress(done.fetch_add(1, Ordering::Relaxed) + 1, count);
             photo
@@ -133,8 +150,14 @@ fn cut_out_all(
 
 /// Takes the cut-outs of a list into the manifest as it is by now: another process may have changed
 /// it meanwhile.
-fn record(list: &List, outcomes: Vec<Result<Photo>>, folder: &Path) -> Result<(Manifest, TakenIn)> {
+fn record(
+    list: &List,
+    outcomes: Vec<Result<Photo>>,
+    folder: &Path,
+    stop: &AtomicBool,
+) -> Result<(Manifest, TakenIn)> {
     let _alone = lock(folder)?;
+    check_goes_on(stop)?;
     let mut manifest = read_or_new(folder)?;
     list.add_classes_to(&mut manifest)?;
     let taken = take_in(list, outcomes, &mut manifest);
@@ -220,6 +243,15 @@ mod tests {
                 LinearRgb::new(0.04, 0.4, 0.08)
             }
         })
+    }
+
+    /// A build that nobody stops.
+    fn build(
+        list: impl AsRef<Path>,
+        folder: impl AsRef<Path>,
+        progress: &(dyn Fn(usize, usize) + Sync),
+    ) -> Result<Built> {
+        super::build(list, folder, progress, &AtomicBool::new(false))
     }
 
     fn folder_with(list: &str) -> tempfile::TempDir {
@@ -777,6 +809,21 @@ mod tests {
         Library::open(&out).unwrap();
         build(&list, &out, &|_, _| ()).unwrap();
         Library::open(&out).unwrap();
+    }
+
+    #[test]
+    fn a_stop_ends_a_build_before_the_next_photo_and_before_the_manifest() {
+        let folder = folder_with(TWO);
+        let (list, out) = (folder.path().join("photos.toml"), folder.path().join("out"));
+        let stop = AtomicBool::new(false);
+        let after_one = |done: usize, _: usize| stop.store(done == 1, Ordering::Relaxed);
+        let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build();
+        let stopped = alone
+            .unwrap()
+            .install(|| super::build(&list, &out, &after_one, &stop));
+        assert!(matches!(stopped, Err(Error::Interrupted { .. })));
+        let is_there = |file: &str| out.join(file).exists();
+        assert!(is_there("a/one.exr") && !is_there("a/two.exr") && !is_there(MANIFEST));
     }
 
     #[test]

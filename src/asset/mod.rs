@@ -37,7 +37,7 @@ mod scale;
 mod screen_pose;
 mod screen_source;
 mod size;
-mod spreadsheet;
+pub(crate) mod spreadsheet;
 mod surface;
 mod texture;
 mod thumbnail;

@@ -28,14 +28,15 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Everything that pictures are made from, opened once: assets, labelled photos, options.
-#[derive(Debug)]
+/// Everything that pictures are made from, opened once: assets, labelled photos, options. A clone
+/// shares what was opened.
+#[derive(Clone, Debug)]
 pub struct Pipeline {
     config: DatasetConfig,
     library: Arc<Library>,
     places: Arc<[BackgroundPhoto]>,
-    backgrounds: Vec<Background>,
-    catalog: Vec<AssetVariant>,
+    backgrounds: Arc<[Background]>,
+    catalog: Arc<[AssetVariant]>,
     surroundings: Arc<EnvironmentMaps>,
     falls: Arc<Falls>,
     /// Turns true when no picture is to be finished any more.
@@ -71,16 +72,33 @@ impl Pipeline {
     /// As [`open`](Self::open).
     pub fn with_library(config: DatasetConfig, library: Library) -> Result<Self> {
         let places = open_backgrounds(&config)?.into();
-        Self::new(config, library.into(), places).with_checked_sizes()
+        let image = config.scene.image;
+        Self::new(config, library.into(), places).with_sizes_checked_in(image)
     }
 
-    /// The same with another config: what both name is not opened again, and objects that fall as
-    /// they fell before do not fall again. For a recipe that is being tuned.
+    /// The same for a recipe that is being tuned, in pictures that may be smaller than its own of
+    /// `whole` pixels: objects need be large enough in those alone. Falls are remembered.
     ///
     /// # Errors
     /// As [`open`](Self::open).
     #[doc(hidden)]
-    pub fn with_config(&self, config: DatasetConfig) -> Result<Self> {
+    pub fn for_tuning(config: DatasetConfig, whole: [u32; 2]) -> Result<Self> {
+        let library = Library::open(&config.assets)?.into();
+        let places = open_backgrounds(&config)?.into();
+        let tuned = Self {
+            falls: Arc::new(Falls::of_last(REMEMBERED_FALLS)),
+            ..Self::new(config, library, places)
+        };
+        tuned.with_sizes_checked_in(whole)
+    }
+
+    /// The same with another config: what both name is not opened again, and objects that fall as
+    /// they fell before do not fall again. `whole` is as in [`for_tuning`](Self::for_tuning).
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    #[doc(hidden)]
+    pub fn with_config(&self, config: DatasetConfig, whole: [u32; 2]) -> Result<Self> {
         let library = match self.config.assets == config.assets {
             true => self.library.clone(),
             false => Library::open(&config.assets)?.into(),
@@ -89,21 +107,12 @@ impl Pipeline {
             true => self.places.clone(),
             false => open_backgrounds(&config)?.into(),
         };
-        let (falls, surroundings) = (self.tuned_falls(), self.surroundings_for(&config));
         let tuned = Self {
-            falls,
-            surroundings,
+            falls: self.falls.clone(),
+            surroundings: self.surroundings_for(&config),
             ..Self::new(config, library, places)
         };
-        tuned.with_checked_sizes()
-    }
-
-    /// Its falls where it remembers any, else room for some.
-    fn tuned_falls(&self) -> Arc<Falls> {
-        match self.falls.remembers() {
-            true => self.falls.clone(),
-            false => Arc::new(Falls::of_last(REMEMBERED_FALLS)),
-        }
+        tuned.with_sizes_checked_in(whole)
     }
 
     fn surroundings_for(&self, config: &DatasetConfig) -> Arc<EnvironmentMaps> {
@@ -113,31 +122,29 @@ impl Pipeline {
         }
     }
 
-    fn with_checked_sizes(self) -> Result<Self> {
-        self.check_sizes()?;
+    fn with_sizes_checked_in(self, image: [u32; 2]) -> Result<Self> {
+        let mut places = self.places.iter();
+        places.try_for_each(|place| self.check_size_at(place, image))?;
         Ok(self)
     }
 
-    fn check_sizes(&self) -> Result<()> {
-        let mut places = self.places.iter();
-        places.try_for_each(|place| self.check_size_in(place))
-    }
-
-    /// Refuses a place in whose pictures the median object is too small to have an outline: a
-    /// length is in another unit.
-    fn check_size_in(&self, place: &BackgroundPhoto) -> Result<()> {
+    /// Refuses a place in whose pictures of `w` x `h` pixels the median object is too small to have
+    /// an outline: a length is in another unit.
+    fn check_size_at(&self, place: &BackgroundPhoto, [w, h]: [u32; 2]) -> Result<()> {
         let (Some(median), CameraSource::Known(camera)) =
             (self.median_object_m(), &place.background.camera)
         else {
             return Ok(());
         };
-        let Recipe { scale, view, .. } = &self.config.scene;
-        let factor = scale.middle().min * view.zoom.middle().min;
+        let Recipe {
+            scale, view, image, ..
+        } = &self.config.scene;
+        let enlarged = f64::from(w) / f64::from(image[0]);
+        let factor = scale.middle().min * view.zoom.middle().min * enlarged;
         let px = camera.focal_px.x * median * factor / camera.center().coords.norm();
         if px >= LEAST_OBJECT_PX {
             return Ok(());
         }
-        let [w, h] = self.config.scene.image;
         let what = format!(
             "the median object of {median:.3} m is {px:.1} px long in pictures of {w} x {h}, expected at least \
              {LEAST_OBJECT_PX}; are width_m and height_m in metres?"
@@ -174,7 +181,7 @@ impl Pipeline {
         let backgrounds = places.iter().map(|place| place.background.clone());
         Self {
             backgrounds: backgrounds.collect(),
-            catalog: catalog(&library),
+            catalog: catalog(&library).into(),
             surroundings: EnvironmentMaps::of(&config).into(),
             falls: Arc::new(falls_of(&config)),
             config,

@@ -10,6 +10,7 @@ use petcomp::{LinearRgb, Result, io};
 use rustix::time::{ClockId, clock_gettime};
 use std::hint::black_box;
 use std::path::Path;
+use std::sync::atomic::AtomicBool;
 
 /// Pictures that a row is the mean of.
 const PICTURES: u64 = 6;
@@ -46,6 +47,7 @@ fn print_table() -> Result<()> {
         samples.join("bottles/photos.toml"),
         folder.path(),
         &|_, _| (),
+        &AtomicBool::new(false),
     )?;
     println!("CPU ms a picture, mean of {pictures}; all but the last column add up to `picture`");
     println!("size         objects  picture  {}", STAGES.join("  "));

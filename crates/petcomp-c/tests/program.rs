@@ -4,6 +4,7 @@ use petcomp::asset;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use std::sync::atomic::AtomicBool;
 
 const SEED: &str = "5";
 const K: &str = "1";
@@ -36,7 +37,8 @@ fn write_recipe(folder: &Path) -> PathBuf {
         list += &format!("{},{name},bottle,0.25\n", photo.display());
     }
     std::fs::write(folder.join("photos.csv"), list).unwrap();
-    asset::build(folder.join("photos.csv"), folder.join("assets"), &|_, _| {}).unwrap();
+    let (list, assets) = (folder.join("photos.csv"), folder.join("assets"));
+    asset::build(list, assets, &|_, _| {}, &AtomicBool::new(false)).unwrap();
     let recipe = format!(
         "assets = \"assets\"\nbackgrounds = {:?}\n[scene]\nimage = [160, 120]\nobjects = [2, 3]\n\
          [labels]\nobstructed = \"keep\"\n[render]\nsubsamples = 1\nambient_samples = 8\n",

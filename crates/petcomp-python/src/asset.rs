@@ -2,7 +2,7 @@
 
 use crate::document::text;
 use crate::lock::locked;
-use crate::work;
+use crate::work::{self, Stop};
 use petcomp::Result;
 use petcomp::asset::{self, Built, Manifest};
 use pyo3::prelude::*;
@@ -29,9 +29,9 @@ pub(crate) fn build_assets(
             .into_iter()
             .try_for_each(|step| callable.call1(py, step).map(drop))
     };
-    work::run_beside(py, &|_| (), &mut deliver, move || {
+    work::run_beside(py, Stop::new(), &mut deliver, move |stop| {
         let report = |done, total| locked(&own).push((done, total));
-        built_json(&asset::build(list, folder, &report)?)
+        built_json(&asset::build(list, folder, &report, stop)?)
     })
 }
 

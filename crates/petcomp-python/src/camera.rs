@@ -1,9 +1,11 @@
 //! The pinhole camera.
 
 use crate::document::{parse, text};
-use crate::errors::{to_python, wrong_value};
+use crate::errors::{internal, to_python, wrong_value};
 use crate::work;
 use nalgebra::Matrix3;
+use numpy::ndarray::Array2;
+use numpy::{PyArray2, PyReadonlyArray2};
 use petcomp::camera::{self, CameraFile, Label, Solution};
 use petcomp::geom::{Point2, Point3};
 use petcomp::{Error, Result};
@@ -108,22 +110,44 @@ impl Camera {
         checked(self.0.resized(image))
     }
 
-    /// Pixel and depth of each point; NaN at or behind the camera.
-    fn project(&self, points: Vec<[f64; 3]>) -> Vec<[f64; 3]> {
-        let projected = points
-            .into_iter()
-            .map(|point| self.0.project(Point3::from(point)));
-        let nowhere = [f64::NAN; 3];
-        projected
-            .map(|seen| seen.map_or(nowhere, |(px, depth)| [px.x, px.y, depth]))
-            .collect()
+    /// Pixel and depth of each point (n x 3); NaN at or behind the camera.
+    fn project<'py>(
+        &self,
+        py: Python<'py>,
+        points: PyReadonlyArray2<'py, f64>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let camera = self.0;
+        each_row(py, &points, move |point: [f64; 3]| {
+            let seen = camera.project(Point3::from(point));
+            seen.map_or([f64::NAN; 3], |(px, depth)| [px.x, px.y, depth])
+        })
     }
 
-    /// Direction of the ray through each pixel, whose depth along the optical axis is 1.
-    fn rays(&self, pixels: Vec<[f64; 2]>) -> Vec<[f64; 3]> {
-        let rays = pixels.into_iter().map(|px| self.0.ray(Point2::from(px)));
-        rays.map(|ray| ray.direction.into()).collect()
+    /// Direction of the ray through each pixel (n x 2), whose depth along the optical axis is 1.
+    fn rays<'py>(
+        &self,
+        py: Python<'py>,
+        pixels: PyReadonlyArray2<'py, f64>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let camera = self.0;
+        each_row(py, &pixels, move |px: [f64; 2]| {
+            camera.ray(Point2::from(px)).direction.into()
+        })
     }
+}
+
+/// What becomes of each row of a contiguous array of `N` columns: n x 3.
+fn each_row<'py, const N: usize>(
+    py: Python<'py>,
+    rows: &PyReadonlyArray2<'py, f64>,
+    change: impl Fn([f64; N]) -> [f64; 3] + Send + 'static,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let rows = rows.as_slice()?.as_chunks::<N>().0.to_vec();
+    let job = move || Ok(rows.into_iter().map(change).collect());
+    let changed: Vec<[f64; 3]> = work::run(py, job)?;
+    let array = Array2::from_shape_vec((changed.len(), 3), changed.into_flattened());
+    let array = array.map_err(|e| internal(&e.to_string()))?;
+    Ok(PyArray2::from_owned_array(py, array))
 }
 
 fn rows(matrix: &Matrix3<f64>) -> [[f64; 3]; 3] {

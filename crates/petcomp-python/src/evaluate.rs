@@ -3,7 +3,6 @@
 use crate::document::text;
 use crate::errors::to_python;
 use crate::work;
-use petcomp::Result;
 use petcomp::dataset::YoloSet;
 use petcomp::eval::page::{self, EvalReportOptions, Metrics, Run};
 use petcomp::eval::{
@@ -11,6 +10,7 @@ use petcomp::eval::{
     read_yolo_truth,
 };
 use petcomp::geom::BBox;
+use petcomp::{Error, Result};
 use pyo3::prelude::*;
 use std::path::{Path, PathBuf};
 
@@ -24,13 +24,20 @@ struct Files {
 /// What is asked of the scores: names of the classes, rounds of the bootstrap, its seed.
 type Question = (Vec<String>, usize, u64);
 
-fn options_of((classes, rounds, seed): Question) -> EvalReportOptions {
-    EvalReportOptions {
+/// As on the command line.
+const MOST_ROUNDS: usize = 100_000;
+
+fn options_of((classes, rounds, seed): Question) -> Result<EvalReportOptions> {
+    if rounds > MOST_ROUNDS {
+        let what = format!("{rounds}, expected 0 to {MOST_ROUNDS}");
+        return Err(Error::value("rounds", what));
+    }
+    Ok(EvalReportOptions {
         classes,
-        rounds: rounds.min(MOST_ROUNDS),
+        rounds,
         seed,
         ..EvalReportOptions::default()
-    }
+    })
 }
 
 /// The scores of predictions in files, as `metrics.json` has them; with a folder, the whole report.
@@ -49,12 +56,9 @@ pub(crate) fn evaluate_files(
         size,
     };
     work::run(py, move || {
-        files.evaluate(options_of(question), output.as_deref())
+        files.evaluate(options_of(question)?, output.as_deref())
     })
 }
-
-/// As on the command line.
-const MOST_ROUNDS: usize = 100_000;
 
 impl Files {
     fn evaluate(&self, mut options: EvalReportOptions, output: Option<&Path>) -> Result<String> {
@@ -88,18 +92,19 @@ impl Files {
         let mut all = read_yolo_truth(&self.truth, None, self.size)?;
         read_yolo_detections(&self.predictions, &mut all)?;
         if options.classes.is_empty() {
-            options.classes = dataset_classes(&self.truth).unwrap_or_default();
+            options.classes = dataset_classes(&self.truth);
         }
         options.pictures = all.pictures;
         Ok(all.sheets)
     }
 }
 
-/// Classes of the dataset that the labels belong to: `labels/val` lies two folders below its
-/// data.yaml.
-fn dataset_classes(labels: &Path) -> Option<Vec<String>> {
-    let folder = labels.parent()?.parent()?;
-    Some(YoloSet::open(folder).ok()?.classes)
+/// Classes of the dataset that the labels belong to, if they have names.
+fn dataset_classes(labels: &Path) -> Vec<String> {
+    YoloSet::class_names_of(labels).unwrap_or_else(|error| {
+        log::warn!("{error}; classes are called by their numbers");
+        Vec::new()
+    })
 }
 
 fn metrics_json(run: &Run, options: &EvalReportOptions) -> Result<String> {
@@ -109,8 +114,9 @@ fn metrics_json(run: &Run, options: &EvalReportOptions) -> Result<String> {
     }))
 }
 
-/// What is in a picture and what was found in it: class and box of each, and how sure.
-type Sheet = (Vec<(u32, [f64; 4])>, Vec<(u32, [f64; 4], f64)>);
+/// What is in a picture and what was found in it: class and box of each, and whether it is to be
+/// ignored, or how sure it is.
+type Sheet = (Vec<(u32, [f64; 4], bool)>, Vec<(u32, [f64; 4], f64)>);
 
 /// The scores of predictions in memory.
 #[pyfunction]
@@ -121,6 +127,7 @@ pub(crate) fn evaluate_boxes(
 ) -> PyResult<String> {
     check_boxes(&sheets).map_err(to_python)?;
     work::run(py, move || {
+        let options = options_of(question)?;
         let sheets = sheets
             .iter()
             .enumerate()
@@ -129,7 +136,7 @@ pub(crate) fn evaluate_boxes(
             name: "predictions".into(),
             sheets: sheets.collect(),
         };
-        metrics_json(&run, &options_of(question))
+        metrics_json(&run, &options)
     })
 }
 
@@ -138,16 +145,13 @@ const FARTHEST_PX: f64 = 1e9;
 
 fn check_boxes(sheets: &[Sheet]) -> Result<()> {
     for (i, (truth, found)) in sheets.iter().enumerate() {
-        let truth = truth.iter().map(|(_, bbox)| bbox);
+        let truth = truth.iter().map(|(_, bbox, _)| bbox);
         for bbox in truth.chain(found.iter().map(|(_, bbox, _)| bbox)) {
             check_box(i, bbox)?;
         }
         if let Some((_, _, score)) = found.iter().find(|(_, _, score)| !score.is_finite()) {
             let what = format!("{score}, expected a finite number");
-            return Err(petcomp::Error::value(
-                format!("predictions[{i}].scores"),
-                what,
-            ));
+            return Err(Error::value(format!("predictions[{i}].scores"), what));
         }
     }
     Ok(())
@@ -160,18 +164,15 @@ fn check_box(image: usize, bbox: &[f64; 4]) -> Result<()> {
         return Ok(());
     }
     let what = format!("{bbox:?}, expected x0 <= x1 and y0 <= y1, pixels");
-    Err(petcomp::Error::value(
-        format!("boxes of image {image}"),
-        what,
-    ))
+    Err(Error::value(format!("boxes of image {image}"), what))
 }
 
 fn sheet_of(i: usize, (truth, found): &Sheet) -> EvalImage {
-    let truth = truth.iter().map(|&(class, bbox)| GroundTruth {
+    let truth = truth.iter().map(|&(class, bbox, crowd)| GroundTruth {
         class,
         bbox: bbox_of(bbox),
         area: bbox_of(bbox).width() * bbox_of(bbox).height(),
-        crowd: false,
+        crowd,
     });
     let found = found.iter().map(|&(class, bbox, confidence)| Detection {
         class,

@@ -1,11 +1,11 @@
 //! Datasets, by a pipeline or by a function of Python's.
 
 use crate::document::{parse, text};
-use crate::errors::to_python;
+use crate::errors::{to_python, wrong_type, wrong_value};
 use crate::lock::locked;
 use crate::pipeline::Pipeline;
 use crate::sample::Sample;
-use crate::work;
+use crate::work::{self, Stop};
 use petcomp::dataset::{
     self, DatasetCounts, LabelConfig, Pictures, Plan, Progress, SampleRange, Shard, Sidecar, Split,
     Writer,
@@ -13,24 +13,17 @@ use petcomp::dataset::{
 use petcomp::{Error, Result};
 use pyo3::prelude::*;
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex};
 
 /// What the threads of a run tell the one that waits for them.
 #[derive(Clone, Default)]
-struct RunSignals {
-    stop: Arc<AtomicBool>,
-    progress: Arc<Mutex<Vec<Progress>>>,
-}
+struct Steps(Arc<Mutex<Vec<Progress>>>);
 
-impl RunSignals {
-    fn stop(&self) {
-        self.stop.store(true, Ordering::Relaxed);
-    }
-
+impl Steps {
     /// Hands all progress to a function of Python's.
     fn deliver(&self, py: Python<'_>, callable: Option<&Py<PyAny>>) -> PyResult<()> {
-        let steps = std::mem::take(&mut *locked(&self.progress));
+        let steps = std::mem::take(&mut *locked(&self.0));
         let Some(callable) = callable else {
             return Ok(());
         };
@@ -40,7 +33,12 @@ impl RunSignals {
         Ok(())
     }
 
-    fn generate_from(&self, pipeline: &dataset::Pipeline, target: Target) -> Result<String> {
+    fn generate_from(
+        &self,
+        pipeline: &dataset::Pipeline,
+        target: Target,
+        stop: &AtomicBool,
+    ) -> Result<String> {
         let (folder, count, seed, only, shard) = target;
         let range = range_of(only, shard)?;
         let archives = pipeline.config().labels.archives();
@@ -48,16 +46,17 @@ impl RunSignals {
             range,
             ..pipeline.plan(count, seed, range.folder(&folder, archives))?
         };
-        self.generate(&plan, |k| pipeline.sample(seed, k))
+        self.generate(&plan, |k| pipeline.sample(seed, k), stop)
     }
 
     fn generate(
         &self,
         plan: &Plan,
         make: impl Fn(u64) -> Result<dataset::Sample> + Sync,
+        stop: &AtomicBool,
     ) -> Result<String> {
-        let report = |progress| locked(&self.progress).push(progress);
-        let counts = dataset::generate(plan, make, &report, &self.stop)?;
+        let report = |progress| locked(&self.0).push(progress);
+        let counts = dataset::generate(plan, make, &report, stop)?;
         counts_json(&counts)
     }
 }
@@ -91,15 +90,11 @@ pub(crate) fn generate_from(
     progress: Option<Py<PyAny>>,
 ) -> PyResult<String> {
     let opened = pipeline.get().opened()?;
-    let (run, falls) = (RunSignals::default(), opened.stop);
-    let worker = run.clone();
-    let stop = |stopped| {
-        falls.store(stopped, Ordering::Relaxed);
-        run.stop();
-    };
-    let mut beside = |py: Python<'_>| run.deliver(py, progress.as_ref());
-    work::run_beside(py, &stop, &mut beside, move || {
-        worker.generate_from(&opened.pipeline, target)
+    let steps = Steps::default();
+    let own = steps.clone();
+    let mut beside = |py: Python<'_>| steps.deliver(py, progress.as_ref());
+    work::run_beside(py, Stop::new(), &mut beside, move |stop| {
+        own.generate_from(&opened.pipeline.stopped_by(stop), target, stop)
     })
 }
 
@@ -164,13 +159,24 @@ pub(crate) fn generate_with(
     progress: Option<Py<PyAny>>,
 ) -> PyResult<String> {
     let layout = DatasetLayout::new(&layout).map_err(to_python)?;
-    let (run, raised) = (RunSignals::default(), Raised::default());
-    let (worker, keep) = (run.clone(), raised.clone());
-    let mut beside = |py: Python<'_>| run.deliver(py, progress.as_ref());
-    let made = work::run_beside(py, &|_| run.stop(), &mut beside, move || {
-        worker.generate(&layout.plan(&classes, target)?, |k| keep.sample(&make, k))
+    let (steps, raised) = (Steps::default(), Raised::default());
+    let (own, keep) = (steps.clone(), raised.clone());
+    let mut beside = |py: Python<'_>| steps.deliver(py, progress.as_ref());
+    let made = work::run_beside(py, Stop::of_caller(), &mut beside, move |stop| {
+        let plan = layout.plan(&classes, target)?;
+        own.generate(&plan, |k| keep.sample(&make, &classes, k), stop)
     });
     raised.or_else(made)
+}
+
+/// Refuses a sample whose numbers of classes mean others than those of the dataset.
+fn check_class_names(sample: &Sample, classes: &[String], k: u64) -> PyResult<()> {
+    if sample.is_of(classes) {
+        return Ok(());
+    }
+    let theirs = &sample.policy().classes;
+    let what = format!("{classes:?}, but sample {k} has {theirs:?}, expected the same");
+    Err(wrong_value("classes", what))
 }
 
 /// The exception of the sample with the lowest number.
@@ -186,14 +192,16 @@ impl Raised {
         }
     }
 
-    fn sample(&self, make: &Py<PyAny>, k: u64) -> Result<dataset::Sample> {
+    fn sample(&self, make: &Py<PyAny>, classes: &[String], k: u64) -> Result<dataset::Sample> {
         let made = Python::attach(|py| {
             let sample = make.bind(py).call1((k,))?;
             let sample = sample.cast::<Sample>().map_err(|_| {
                 let found = sample.get_type();
-                crate::errors::wrong_type("make", &format!("returned {found}, expected a Sample"))
+                wrong_type("make", &format!("returned {found}, expected a Sample"))
             })?;
-            sample.get().to_dataset_sample(py)
+            let sample = sample.get();
+            check_class_names(sample, classes, k)?;
+            sample.to_dataset_sample(py)
         });
         made.map_err(|error| self.keep(k, error))
     }

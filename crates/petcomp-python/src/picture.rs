@@ -2,9 +2,9 @@
 
 use crate::arrays::{Given, Photo, matte_of, to_array};
 use crate::document::{parse, text};
-use crate::errors::{to_python, wrong_value};
+use crate::errors::{to_python, wrong_type, wrong_value};
 use crate::work;
-use numpy::PyArrayDyn;
+use numpy::{PyArrayDyn, PyUntypedArray, PyUntypedArrayMethods};
 use petcomp::matte::key::{Deviations, KeyOptions, Keyed, Keying, Screen};
 use petcomp::matte::{self, CutOut, CutOutOptions};
 use petcomp::{Coverage, Error, Image, LinearRgb, PremulRgba, Result, io};
@@ -72,17 +72,18 @@ enum ScreenArgument {
     Plate(Given),
 }
 
+const EXPECTED_SCREEN: &str =
+    "expected three numbers (a scene-linear colour) or a picture of the screen";
+
 impl ScreenArgument {
     fn new(argument: &Bound<'_, PyAny>) -> PyResult<Self> {
-        match argument.extract::<[f32; 3]>() {
-            Ok(color) => Ok(Self::Color(color)),
-            Err(_) if argument.hasattr("shape")? => {
-                Given::from_argument("screen", argument).map(Self::Plate)
-            }
-            Err(_) => Err(crate::errors::wrong_type(
-                "screen",
-                "expected three numbers (a scene-linear colour) or a picture of the screen",
-            )),
+        let Ok(array) = argument.cast::<PyUntypedArray>() else {
+            let color = argument.extract::<[f32; 3]>().map(Self::Color);
+            return color.map_err(|_| wrong_type("screen", EXPECTED_SCREEN));
+        };
+        match array.shape() {
+            [3] => color_of(array).map(Self::Color),
+            _ => Given::from_argument("screen", argument).map(Self::Plate),
         }
     }
 
@@ -100,6 +101,14 @@ impl ScreenArgument {
             Self::Plate(plate) => plate.decoded("screen")?.into_opaque("screen").map(Some),
         }
     }
+}
+
+/// The colour of a pixel: scene-linear or a code, as pictures are.
+fn color_of(pixel: &Bound<'_, PyUntypedArray>) -> PyResult<[f32; 3]> {
+    let picture = pixel.call_method1("reshape", (1, 1, 3))?;
+    let picture = Given::from_argument("screen", &picture)?.decoded("screen");
+    let picture = picture.and_then(|picture| picture.into_opaque("screen"));
+    Ok(picture.map_err(to_python)?[(0, 0)].channels())
 }
 
 fn deviations_json(deviations: &Deviations) -> String {

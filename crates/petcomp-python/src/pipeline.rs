@@ -5,14 +5,13 @@ use crate::errors::{closed, to_python};
 use crate::lock::locked;
 use crate::sample::{Policy, Sample};
 use crate::scene::{config_of, scene_of};
-use crate::work;
+use crate::work::{self, Stop};
 use petcomp::dataset::{self, DatasetConfig};
 use petcomp::io::Override;
 use petcomp::{Quality, Result, Scene};
 use pyo3::prelude::*;
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::Mutex;
 
 /// Everything that pictures are made from, opened once.
 #[pyclass(frozen, module = "petcomp._petcomp")]
@@ -21,13 +20,11 @@ pub(crate) struct Pipeline {
     opened: Mutex<Option<Opened>>,
 }
 
-/// What the threads of jobs share.
+/// What jobs share.
 #[derive(Clone)]
 pub(crate) struct Opened {
-    pub(crate) pipeline: Arc<dataset::Pipeline>,
-    pub(crate) policy: Policy,
-    /// Turns true when falls are to end.
-    pub(crate) stop: &'static AtomicBool,
+    pub(crate) pipeline: dataset::Pipeline,
+    policy: Policy,
 }
 
 /// What a pipeline is opened from: a recipe file, or a document and values to be changed.
@@ -43,7 +40,7 @@ impl RecipeSource {
         let overrides: Result<Vec<Override>> = self.overrides.iter().map(|o| o.parse()).collect();
         let config = match (&self.path, &self.json) {
             (Some(path), _) => DatasetConfig::read(path, &overrides?)?,
-            (None, json) => config_of(json.as_deref().unwrap_or("{}"))?,
+            (None, json) => config_of(json.as_deref().unwrap_or("{}"), &overrides?)?,
         };
         Ok(match &self.quality {
             Some(quality) => quality.parse::<Quality>()?.config(config),
@@ -53,19 +50,15 @@ impl RecipeSource {
 }
 
 impl Opened {
-    fn new(source: &RecipeSource, stop: &'static AtomicBool) -> Result<Self> {
-        let pipeline = dataset::Pipeline::open(source.config()?)?.stopped_by(stop);
+    fn new(source: &RecipeSource) -> Result<Self> {
+        let pipeline = dataset::Pipeline::open(source.config()?)?;
         let labels = &pipeline.config().labels;
         let policy = Policy {
             classes: labels.obstructed.classes(&pipeline.library().classes)?,
             obstructed: labels.obstructed,
             extent: labels.yolo.boxes,
         };
-        Ok(Self {
-            pipeline: Arc::new(pipeline),
-            policy,
-            stop,
-        })
+        Ok(Self { pipeline, policy })
     }
 
     /// Runs a job of this pipeline, whose falls Ctrl-C ends.
@@ -74,9 +67,10 @@ impl Opened {
         py: Python<'_>,
         job: impl FnOnce(&dataset::Pipeline) -> Result<T> + Send + 'static,
     ) -> PyResult<T> {
-        let (pipeline, stop) = (self.pipeline.clone(), self.stop);
-        let stop = |stopped| stop.store(stopped, Ordering::Relaxed);
-        work::run_beside(py, &stop, &mut |_| Ok(()), move || job(&pipeline))
+        let pipeline = self.pipeline.clone();
+        work::run_beside(py, Stop::new(), &mut |_| Ok(()), move |stop| {
+            job(&pipeline.stopped_by(stop))
+        })
     }
 }
 
@@ -105,8 +99,7 @@ impl Pipeline {
             overrides,
             quality,
         };
-        let stop = work::new_flag();
-        let opened = work::run(py, move || Opened::new(&source, stop))?;
+        let opened = work::run(py, move || Opened::new(&source))?;
         Ok(Self {
             opened: Mutex::new(Some(opened)),
         })

@@ -22,6 +22,14 @@ pub(crate) struct Policy {
     pub(crate) extent: Extent,
 }
 
+impl Policy {
+    /// Names of the objects' own classes: all but the one that is added for obstructed objects.
+    fn object_classes(&self) -> &[String] {
+        let added = usize::from(self.obstructed == Obstructed::Class);
+        &self.classes[..self.classes.len() - added]
+    }
+}
+
 /// A picture and its labels.
 #[pyclass(frozen, module = "petcomp._petcomp")]
 pub(crate) struct Sample {
@@ -62,6 +70,16 @@ impl Sample {
                 shown: None,
             }),
         }
+    }
+
+    pub(crate) fn policy(&self) -> &Policy {
+        &self.facts.policy
+    }
+
+    /// Whether these are its classes; the one that is added to them may be among them or not.
+    pub(crate) fn is_of(&self, classes: &[String]) -> bool {
+        let policy = self.policy();
+        policy.classes == classes || policy.object_classes() == classes
     }
 
     /// What the library's writers take.

@@ -4,6 +4,7 @@ use crate::document::{parse, text};
 use crate::errors::to_python;
 use crate::work;
 use petcomp::dataset::DatasetConfig;
+use petcomp::io::Override;
 use petcomp::scene::{CameraSource, Surface};
 use petcomp::{Camera, Result, Scene, io};
 use pyo3::prelude::*;
@@ -40,8 +41,8 @@ pub(crate) fn scene_of(json: &str) -> Result<Scene> {
     Ok(scene)
 }
 
-pub(crate) fn config_of(json: &str) -> Result<DatasetConfig> {
-    DatasetConfig::from_table(parse("recipe", json)?)
+pub(crate) fn config_of(json: &str, overrides: &[Override]) -> Result<DatasetConfig> {
+    DatasetConfig::from_table(parse("recipe", json)?, overrides)
 }
 
 /// An empty scene that this camera sees.

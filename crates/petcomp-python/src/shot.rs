@@ -49,7 +49,7 @@ pub(crate) fn render_shot(
     let textures = pictures_of(&textures)?;
     let settings: Settings = parse("shot", settings).map_err(to_python)?;
     check_places(&places, textures.len(), &settings)?;
-    let policy = settings.policy();
+    let policy = settings.policy().map_err(to_python)?;
     let sample = work::run(py, move || {
         let shot = settings.shot(camera, plate, places, textures)?;
         Ok(settings.sample(&shot))
@@ -87,12 +87,13 @@ fn check_places(places: &[Place], textures: usize, settings: &Settings) -> PyRes
 }
 
 impl Settings {
-    fn policy(&self) -> Policy {
-        Policy {
-            classes: self.classes.clone(),
-            obstructed: self.labels.obstructed,
+    fn policy(&self) -> Result<Policy> {
+        let obstructed = self.labels.obstructed;
+        Ok(Policy {
+            classes: obstructed.classes(&self.classes)?,
+            obstructed,
             extent: self.labels.yolo.boxes,
-        }
+        })
     }
 
     fn shot(

@@ -12,7 +12,7 @@ use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, PoisonError, Weak};
 use std::time::{Duration, Instant};
 
 /// How often signals, messages and progress are looked for.
@@ -45,6 +45,70 @@ pub(crate) fn set_threads(count: usize) -> PyResult<()> {
     Ok(())
 }
 
+/// Flags that no job reads any more.
+static IDLE_FLAGS: Mutex<Vec<&'static AtomicBool>> = Mutex::new(Vec::new());
+
+/// Jobs that call Python, by what ends them.
+static CALLERS: Mutex<Vec<Weak<Stop>>> = Mutex::new(Vec::new());
+
+/// What ends one job: a flag that it reads.
+///
+/// A flag lives as long as the process, which the library's pipelines want; the next job gets it.
+pub(crate) struct Stop {
+    flag: &'static AtomicBool,
+    process: u32,
+}
+
+impl Stop {
+    pub(crate) fn new() -> Arc<Self> {
+        let idle = locked(&IDLE_FLAGS).pop();
+        Arc::new(Self {
+            flag: idle.unwrap_or_else(|| Box::leak(Box::default())),
+            process: std::process::id(),
+        })
+    }
+
+    /// That of a job that calls Python, which the end of the interpreter waits for.
+    pub(crate) fn of_caller() -> Arc<Self> {
+        let stop = Self::new();
+        let mut callers = locked(&CALLERS);
+        callers.retain(|other| other.strong_count() > 0);
+        callers.push(Arc::downgrade(&stop));
+        stop
+    }
+
+    fn raise(&self) {
+        self.flag.store(true, Ordering::Relaxed);
+    }
+}
+
+impl Drop for Stop {
+    fn drop(&mut self) {
+        self.flag.store(false, Ordering::Relaxed);
+        locked(&IDLE_FLAGS).push(self.flag);
+    }
+}
+
+/// Stops all jobs that call Python and waits for them: a thread that is in Python when the
+/// interpreter ends is ended in the middle, and the process with it.
+#[pyfunction]
+pub(crate) fn end_callers(py: Python<'_>) -> PyResult<()> {
+    while stop_callers() {
+        py.detach(|| std::thread::sleep(POLL_INTERVAL));
+        py.check_signals()?;
+    }
+    Ok(())
+}
+
+/// Whether there are any. A fork has none of its parent's.
+fn stop_callers() -> bool {
+    let process = std::process::id();
+    let mut running: Vec<_> = locked(&CALLERS).iter().filter_map(Weak::upgrade).collect();
+    running.retain(|stop| stop.process == process);
+    running.iter().for_each(|stop| stop.raise());
+    !running.is_empty()
+}
+
 /// What a job leaves for the thread that waits for it.
 type Outcome<T> = Arc<(Mutex<Option<Result<T, String>>>, Condvar)>;
 
@@ -56,26 +120,26 @@ pub(crate) fn run<T: Send + 'static>(
     py: Python<'_>,
     job: impl FnOnce() -> petcomp::Result<T> + Send + 'static,
 ) -> PyResult<T> {
-    run_beside(py, &|_| (), &mut |_| Ok(()), job)
+    run_beside(py, Stop::new(), &mut |_| Ok(()), |_| job())
 }
 
-/// Runs a job. After Ctrl-C, or an error of what is done beside it, `stop(true)` asks it to end;
-/// `stop(false)` takes that back when it has, or is left behind.
+/// Runs a job, which gets the flag of `stop`: it turns true after Ctrl-C, or an error of what is
+/// done beside the job. One that does not end then is left behind.
 pub(crate) fn run_beside<T: Send + 'static>(
     py: Python<'_>,
-    stop: &dyn Fn(bool),
+    stop: Arc<Stop>,
     beside: Beside<'_>,
-    job: impl FnOnce() -> petcomp::Result<T> + Send + 'static,
+    job: impl FnOnce(&'static AtomicBool) -> petcomp::Result<T> + Send + 'static,
 ) -> PyResult<T> {
     messages::start();
     let outcome: Outcome<petcomp::Result<T>> = Arc::default();
-    start(job, &outcome)?;
+    let own = stop.clone();
+    start(move || job(own.flag), &outcome)?;
     let waited = wait(py, &outcome, beside);
     if waited.is_err() {
-        stop(true);
+        stop.raise();
         let end = Instant::now() + GRACE_PERIOD;
         py.detach(|| while Instant::now() < end && !is_there(&outcome, POLL_INTERVAL) {});
-        stop(false);
     }
     messages::deliver(py)?;
     waited?;
@@ -176,9 +240,4 @@ fn panic_message(panic: &(dyn std::any::Any + Send)) -> String {
     let text = panic.downcast_ref::<&str>().copied();
     let text = text.or_else(|| panic.downcast_ref::<String>().map(String::as_str));
     text.unwrap_or("no message").to_owned()
-}
-
-/// A flag that lives as long as the process, which the library's pipelines want.
-pub(crate) fn new_flag() -> &'static AtomicBool {
-    Box::leak(Box::default())
 }

@@ -4,6 +4,7 @@ import json
 import math
 import os
 import random
+import re
 
 import numpy as np
 import petcomp
@@ -66,6 +67,8 @@ def test_sizes_that_do_not_fit_are_named():
         key(PHOTO, screen=np.zeros((5, 8, 3), np.float32))
     with pytest.raises(TypeError, match="screen: expected three numbers"):
         key(PHOTO, screen="green")
+    with pytest.raises(TypeError, match="screen: dtype float64"):
+        key(PHOTO, screen=np.array(GREEN))
 
 
 @pytest.mark.parametrize(
@@ -208,19 +211,63 @@ def test_samples_that_cannot_be_are_refused():
 
 
 def test_evaluation_of_what_cannot_be_is_refused():
-    box = {"boxes": [[0, 0, 5, 5]], "classes": [0], "scores": [0.5]}
-    for found, truth in (
-        ([box], []),
-        ("folder", [box]),
-        ([{**box, "boxes": [[5, 0, 0, 5]]}], [box]),
-        ([{**box, "scores": [math.nan]}], [box]),
-        ([{**box, "boxes": [[0, 0, math.inf, 5]]}], [box]),
-        ([{**box, "classes": [-1]}], [box]),
-        ([{"boxes": []}], [box]),
-        (3, [box]),
+    truth = {"boxes": [[0, 0, 5, 5]], "classes": [0]}
+    found = {**truth, "scores": [0.5]}
+    two = {"boxes": np.zeros((4, 2)), "classes": [0, 0], "scores": [1, 1]}
+    assert petcomp.evaluate([found], [truth]).map > 0.9
+    for predictions, theirs, says in (
+        ([found], [], "1 images, but the truth has 0"),
+        ("folder", [truth], "expected a path or a list"),
+        ([{**found, "boxes": [[5, 0, 0, 5]]}], [truth], "expected x0 <= x1"),
+        ([{**found, "scores": [math.nan]}], [truth], "scores: NaN"),
+        ([{**found, "boxes": [[0, 0, math.inf, 5]]}], [truth], "expected x0 <= x1"),
+        ([{**found, "classes": [-1]}], [truth], "classes: -1, expected whole numbers"),
+        ([{**found, "classes": [0.9]}], [truth], "classes: 0.9, expected whole numbers"),
+        ([two], [truth], r"boxes: shape \(4, 2\), expected \(n, 4\)"),
+        ([{"boxes": []}], [truth], "scores: missing"),
+        ([found], [{**truth, "iscrowd": [1]}], "unknown key 'iscrowd'"),
+        ([found], [{**truth, "ignored": [0.5]}], "ignored: 0.5"),
+        ([found], [{**truth, "ignored": [False, True]}], "one number for each of 1 boxes"),
+        (3, [truth], "expected a path or a list"),
     ):
-        with pytest.raises((ValueError, TypeError)):
-            petcomp.evaluate(found, truth)
+        with pytest.raises((ValueError, TypeError), match=says):
+            petcomp.evaluate(predictions, theirs)
+    for argument in ({"output": "folder"}, {"size": (9, 9)}, {"rounds": 10**9}):
+        with pytest.raises(errors.InvalidValueError, match=next(iter(argument))):
+            petcomp.evaluate([found], [truth], **argument)
+
+
+@pytest.mark.parametrize("classes", ["bottle", ["a", "a"], ["a", 1], 3])
+def test_classes_are_names_of_their_own(tmp_path, classes):
+    sample = petcomp.Sample.from_masks(np.zeros((4, 4, 3), np.uint8), [], [], ["a"])
+    shot = petcomp.Shot(petcomp.Camera.looking_down(1.0, 80.0, [16, 12]), classes=classes)
+    for use in (
+        lambda: petcomp.generate(lambda k: sample, 1, tmp_path / "set", classes=classes),
+        lambda: petcomp.Sample.from_masks(np.zeros((4, 4, 3), np.uint8), [], [], classes),
+        lambda: petcomp.evaluate([], [], classes=classes),
+        lambda: petcomp.render(shot),
+    ):
+        with pytest.raises((errors.ArgumentTypeError, errors.InvalidValueError), match="^classes: "):
+            use()
+
+
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        ({5: 1}, "set: key 5, expected text"),
+        ({"a=b": 1}, "set: key 'a=b'"),
+        ({"scene.objects": None}, "set.scene.objects: None"),
+        ({"scene.image[7]": 1}, "no such entry in the list"),
+        ({"scene.image.x": 1}, "goes into a value that is not a table"),
+        ({"assets": "/nowhere/\U0001f600"}, "/nowhere/\U0001f600/assets.toml: no such file"),
+        ([1], "set: list, expected a dict"),
+    ],
+)
+def test_a_change_of_a_file_and_of_a_dict_is_refused_alike(recipe, changes, says):
+    document = petcomp.Pipeline(recipe).config
+    for source in (recipe, document):
+        with pytest.raises(petcomp.Error, match=re.escape(says)):
+            petcomp.Pipeline(source, set=changes)
 
 
 #: What a random call is made of.

@@ -4,6 +4,7 @@ import concurrent.futures
 import logging
 import multiprocessing
 import pickle
+import signal
 import subprocess
 import sys
 import threading
@@ -36,6 +37,17 @@ def test_a_spawned_process_makes_the_same_picture(recipe):
     )
     done = subprocess.run([sys.executable, "-c", script], input=pickle.dumps(pipeline), capture_output=True, check=True)
     assert done.stdout == pipeline[0].image.tobytes()
+
+
+def test_a_pickled_pipeline_is_the_same(recipe, monkeypatch):
+    document = petcomp.Pipeline(recipe).config
+    monkeypatch.chdir(recipe.parent)
+    pipelines = [petcomp.Pipeline(recipe.name), petcomp.Pipeline(document)]
+    document["scene"]["image"] = [32, 24]
+    monkeypatch.chdir("/")
+    for pipeline in pipelines:
+        again = pickle.loads(pickle.dumps(pipeline))
+        assert again.config["scene"] == pipeline.config["scene"]
 
 
 def test_threads_share_a_pipeline(recipe):
@@ -119,6 +131,64 @@ def test_an_interrupted_dataset_goes_on(recipe, tmp_path):
             assert time.monotonic() < end
             time.sleep(0.1)
     assert 3 <= counts.images < 200
+
+
+def test_a_run_that_stops_does_not_stop_another_of_its_pipeline(recipe, tmp_path):
+    pipeline = petcomp.Pipeline(recipe, set={"scene.objects": 40})
+    stopped = threading.Event()
+
+    def go_on():
+        for k in range(1000, 2000):
+            pipeline.sample(k)
+            if stopped.is_set():
+                return
+
+    def stop(progress):
+        if progress.made:
+            raise StopIteration("enough")
+
+    with concurrent.futures.ThreadPoolExecutor(1) as pool:
+        other = pool.submit(go_on)
+        with pytest.raises(StopIteration, match="enough"):
+            petcomp.generate(pipeline, 50, tmp_path / "set", progress=stop)
+        stopped.set()
+        assert other.result() is None
+
+
+def test_an_interrupted_build_writes_no_manifest_afterwards(world, tmp_path):
+    def stop(done, count):
+        if done == 1:
+            raise StopIteration("enough")
+
+    petcomp.set_threads(1)
+    try:
+        with pytest.raises(StopIteration, match="enough"):
+            petcomp.asset.build(world / "photos.csv", tmp_path / "assets", progress=stop)
+    finally:
+        petcomp.set_threads(0)
+    # The photo in hand is finished by then.
+    time.sleep(3)
+    assert not (tmp_path / "assets/assets.toml").exists()
+
+
+ENDED_IN_PYTHON = """
+import os, signal, sys, threading, time
+import numpy as np
+import petcomp
+def make(k):
+    end = time.monotonic() + 2
+    while time.monotonic() < end: pass
+    return petcomp.Sample.from_masks(np.zeros((8, 8, 3), np.uint8), [], [], ["a"])
+threading.Timer(0.3, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
+petcomp.generate(make, 20, sys.argv[1], classes=["a"])
+"""
+
+
+def test_a_program_that_is_interrupted_in_its_own_function_ends_in_order(tmp_path):
+    script = [sys.executable, "-c", ENDED_IN_PYTHON, str(tmp_path / "set")]
+    done = subprocess.run(script, capture_output=True, text=True, timeout=120)
+    assert done.stderr.endswith("KeyboardInterrupt\n")
+    assert done.returncode == -signal.SIGINT
 
 
 def test_an_exception_of_the_own_function_is_the_callers(tmp_path):

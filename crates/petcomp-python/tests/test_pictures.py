@@ -90,6 +90,15 @@ def test_a_plate_of_one_colour_is_that_colour(photo):
     )
 
 
+def test_a_pixel_of_the_photo_is_its_screen():
+    codes = np.full((6, 8, 3), (60, 180, 70), np.uint8)
+    codes[2:4] = (200, 60, 60)
+    linear = petcomp.matte.key(codes, screen=(0.04518620, 0.45641103, 0.06124605)).matte
+    assert np.allclose(petcomp.matte.key(codes, screen=codes[0, 0]).matte, linear, atol=1e-5)
+    photo = np.full((6, 8, 3), GREEN, np.float32)
+    assert (petcomp.matte.key(photo, screen=photo[0, 0]).matte == petcomp.matte.key(photo, screen=GREEN).matte).all()
+
+
 def test_garbage_and_core_hold(photo):
     where = np.zeros(photo.shape[:2], bool)
     where[:50] = True
@@ -138,6 +147,16 @@ def test_a_camera_projects_as_its_matrices_say():
     assert camera.resized([320, 240]).focal_px == (350.0, 350.0)
 
 
+def test_rays_of_every_pixel_of_a_large_picture():
+    camera = petcomp.Camera.looking_down(1.0, 1600.0, [2400, 2100])
+    pixels = np.stack(np.meshgrid(np.arange(2400) + 0.5, np.arange(2100) + 0.5), axis=-1).reshape(-1, 2)
+    rays = camera.rays(pixels)
+    assert rays.shape == (2400 * 2100, 3) and rays.dtype == np.float64
+    ends = camera.center + rays[::99999] * 1.5
+    assert np.allclose(camera.project(ends[::-1])[::-1, :2], pixels[::99999])
+    assert camera.project(np.zeros((0, 3))).shape == (0, 3)
+
+
 def shot(**fields):
     film = np.zeros((8, 8, 4), np.float32)
     film[:] = [0.3, 0.05, 0.05, 0.5]
@@ -168,6 +187,8 @@ def test_a_card_above_covers_the_one_below():
     kept = petcomp.render(petcomp.Shot(**{**vars(two), "labels": {"obstructed": "keep"}}))
     assert kept.object_ids.tolist() == [1, 2]
     assert kept.labels["objects"][0]["covered_by"] == [2]
+    apart = petcomp.render(petcomp.Shot(**{**vars(two), "labels": {"obstructed": "class"}}))
+    assert apart.class_names == ["object", "obstructed"] and apart.classes.tolist() == [1, 0]
 
 
 def test_evaluation_in_memory_is_that_of_files(tmp_path, program):
@@ -192,6 +213,13 @@ def test_evaluation_in_memory_is_that_of_files(tmp_path, program):
     memory = petcomp.evaluate(found, truth)
     assert abs(memory.map - files.map) < 1e-3 and 0 < memory.map < 1
     assert memory.interval[0] <= memory.map <= memory.interval[1] and len(memory.by_class) == 2
+
+
+def test_what_is_to_be_ignored_is_neither_found_nor_missed():
+    truth = {"boxes": [[0, 0, 10, 10], [20, 20, 40, 40]], "classes": [0, 0], "ignored": np.array([False, True])}
+    alone = {"boxes": [[0, 0, 10, 10]], "classes": [0]}
+    found = {**alone, "scores": [0.9]}
+    assert petcomp.evaluate([found], [truth]).map == petcomp.evaluate([found], [alone]).map
 
 
 def write(path, classes, boxes, scores=None):

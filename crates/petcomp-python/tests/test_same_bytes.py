@@ -125,6 +125,15 @@ def test_set_changes_a_value(recipe):
     assert len(pipeline[0].scene["objects"]) == 1
 
 
+def test_set_changes_a_file_and_a_dict_alike(world, recipe):
+    lit = world / "lit.toml"
+    lit.write_text(recipe.read_text() + "[[scene.lights]]\n[[scene.lights]]\n")
+    document = petcomp.Pipeline(lit).config
+    for source in (lit, document):
+        lights = petcomp.Pipeline(source, set={"scene.lights[1].power": 5}).config["scene"]["lights"]
+        assert [light["power"] == lights[1]["power"] for light in lights] == [False, True]
+
+
 def test_own_samples_become_a_dataset(tmp_path, program):
     def make(k):
         image = np.full((24, 32, 3), 40 * k, np.uint8)
@@ -137,6 +146,17 @@ def test_own_samples_become_a_dataset(tmp_path, program):
     row = (tmp_path / "set/labels/val/000000.txt").read_text().split()
     assert row == ["1", "0.390625", "0.270833", "0.468750", "0.291667"]
     program("dataset", "check", tmp_path / "set")
+
+
+def test_classes_of_own_samples_are_those_of_the_dataset(tmp_path):
+    def make(names):
+        image, mask = np.zeros((24, 32, 3), np.uint8), np.ones((24, 32), bool)
+        return lambda k: petcomp.Sample.from_masks(image, [mask], [0], names)
+
+    says = r'classes: \["bottle", "can"\], but sample 0 has \["can", "bottle"\]'
+    with pytest.raises(ValueError, match=says):
+        petcomp.generate(make(["can", "bottle"]), 1, tmp_path / "set", classes=["bottle", "can"])
+    assert petcomp.generate(make(["a", "b"]), 1, tmp_path / "set", classes=["a", "b"]).images == 1
 
 
 def test_shards_are_merged_to_the_whole(recipe, written, tmp_path, program):

@@ -5,23 +5,23 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from .errors import ArgumentTypeError, InvalidValueError
 
-__all__ = ["check_count", "dumped", "loaded", "overrides", "path_of"]
+__all__ = ["check_count", "class_names", "dumped", "loaded", "overrides", "path_of", "plain"]
 
 _MOST_LEVELS = 60
 #: An array that only says that it is large must not be written out.
 _MOST_NUMBERS = 10_000_000
 
 
-def check_count(name: str, value: Any) -> None:
+def check_count(name: str, value: Any, most: int = _MOST_NUMBERS) -> None:
     """Refuses arrays with more numbers than a document may have, before any is looked at."""
     size = getattr(value, "size", 0)
-    if isinstance(size, int) and size > _MOST_NUMBERS:
-        raise InvalidValueError(f"{name}: {size} numbers, expected at most {_MOST_NUMBERS}")
+    if isinstance(size, int) and size > most:
+        raise InvalidValueError(f"{name}: {size} numbers, expected at most {most}")
 
 
 def loaded(text: str) -> Any:
@@ -31,7 +31,12 @@ def loaded(text: str) -> Any:
 
 def dumped(name: str, value: Any) -> str:
     """The document of plain data; numbers of NumPy, tuples and whatever has ``to_dict`` may be in it."""
-    return json.dumps(_plain(name, value, 0))
+    return json.dumps(plain(name, value))
+
+
+def plain(name: str, value: Any) -> Any:
+    """The same data in Python's own types, none of it the caller's."""
+    return _plain(name, value, 0)
 
 
 def _plain(at: str, value: Any, level: int) -> Any:
@@ -69,18 +74,42 @@ def _plain_scalar(at: str, value: Any, level: int) -> Any:
     raise ArgumentTypeError(f"{at}: {type(value).__name__}, expected numbers, text, lists and dicts")
 
 
-def overrides(values: Mapping[str, Any] | None) -> list[str]:
-    """Values of a recipe to be changed, as ``--set`` has them."""
-    return [f"{key}={_toml(f'set[{key!r}]', value)}" for key, value in (values or {}).items()]
+def overrides(values: Any) -> list[str]:
+    """Values of a recipe to be changed (plain data), as ``--set`` has them."""
+    if not isinstance(values, dict):
+        raise ArgumentTypeError(f"set: {type(values).__name__}, expected a dict")
+    return [_override(key, value) for key, value in values.items()]
+
+
+def _override(key: str, value: Any) -> str:
+    if not key or "=" in key:
+        raise InvalidValueError(f"set: key {key!r}, expected one as scene.objects")
+    return f"{key}={_toml(f'set.{key}', value)}"
 
 
 def _toml(at: str, value: Any) -> str:
-    if isinstance(value, Mapping):
-        items = ", ".join(f"{json.dumps(_key(at, key))} = {_toml(at, item)}" for key, item in value.items())
+    if value is None:
+        raise InvalidValueError(f"{at}: None, expected a value")
+    if isinstance(value, dict):
+        items = ", ".join(f"{_toml(at, key)} = {_toml(at, item)}" for key, item in value.items())
         return f"{{ {items} }}"
-    if isinstance(value, (list, tuple)):
+    if isinstance(value, list):
         return f"[{', '.join(_toml(at, item) for item in value)}]"
-    return json.dumps(_plain(at, value, 0))
+    # TOML knows no pairs of surrogates, and no bare delete.
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def class_names(value: Any) -> list[str]:
+    """Names of classes, each once."""
+    if isinstance(value, str) or not isinstance(value, Iterable):
+        raise ArgumentTypeError(f"classes: {value!r}, expected a list of names")
+    names = list(value)
+    for name in names:
+        if not isinstance(name, str):
+            raise ArgumentTypeError(f"classes: {type(name).__name__}, expected names")
+    if len(set(names)) < len(names):
+        raise InvalidValueError(f"classes: {names}, expected each name once")
+    return names
 
 
 def path_of(name: str, value: Any) -> str:

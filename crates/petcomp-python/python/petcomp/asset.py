@@ -38,8 +38,8 @@ def build(
 ) -> Built:
     """Cuts out all photos of a list (TOML or CSV, or a folder with one) into an asset folder.
 
-    ``progress`` is called with the photos done and their number, in the calling thread. After Ctrl-C
-    the photos in hand may still be written, but not the manifest that names them.
+    ``progress`` is called with the photos done and their number, in the calling thread. What it raises ends
+    the run, as Ctrl-C does: the photos in hand may still be written, but no others, and not the manifest.
     """
     report = _petcomp.build_assets(path_of("list", list), path_of("folder", folder), progress)
     record = loaded(report)

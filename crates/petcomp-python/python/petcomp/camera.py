@@ -22,11 +22,22 @@ _log = logging.getLogger("petcomp")
 Numbers = Sequence[float] | npt.NDArray[np.floating[Any]]
 
 
+#: A number for each coordinate of each pixel of the largest picture.
+_MOST_COORDINATES = 3 * 2**27
+
+
 def _floats(name: str, value: Any, shape: tuple[int, ...]) -> list[Any]:
     """Finite numbers of a shape, -1 being any length."""
     check_count(name, value)
+    result: list[Any] = _array(name, value, shape).tolist()
+    return result
+
+
+def _array(name: str, value: Any, shape: tuple[int, ...]) -> npt.NDArray[np.float64]:
+    """The same as an array whose rows follow each other."""
+    check_count(name, value, _MOST_COORDINATES)
     try:
-        array = np.asarray(value, dtype=np.float64)
+        array = np.require(value, np.float64, ["C", "A"])
     except (TypeError, ValueError):
         raise InvalidValueError(f"{name}: {value!r}, expected numbers of shape {shape}") from None
     fits = array.ndim == len(shape) and all(want in (-1, got) for want, got in zip(shape, array.shape))
@@ -34,8 +45,7 @@ def _floats(name: str, value: Any, shape: tuple[int, ...]) -> list[Any]:
         raise InvalidValueError(f"{name}: shape {array.shape}, expected {shape}")
     if not np.isfinite(array).all():
         raise InvalidValueError(f"{name}: {value!r}, expected finite numbers")
-    result: list[Any] = array.tolist()
-    return result
+    return array
 
 
 def _pixels(name: str, value: Any) -> list[int]:
@@ -163,13 +173,11 @@ class Camera:
 
         NaN at or behind the camera.
         """
-        seen = self._native.project(_floats("points", points, (-1, 3)))
-        return np.array(seen, dtype=np.float64).reshape(-1, 3)
+        return self._native.project(_array("points", points, (-1, 3)))
 
     def rays(self, pixels: Any) -> npt.NDArray[np.float64]:
         """Directions through pixels (n x 2): n x 3, float64, of depth 1 along the optical axis."""
-        rays = self._native.rays(_floats("pixels", pixels, (-1, 2)))
-        return np.array(rays, dtype=np.float64).reshape(-1, 3)
+        return self._native.rays(_array("pixels", pixels, (-1, 2)))
 
     def resized(self, image: Sequence[int]) -> Camera:
         """The same view at another picture size."""

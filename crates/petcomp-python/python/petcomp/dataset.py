@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import atexit
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from . import _petcomp
-from ._documents import dumped, loaded, path_of
+from ._documents import class_names, dumped, loaded, path_of
 from .errors import ArgumentTypeError, InvalidValueError
 from .pipeline import Pipeline, _number
 from .sample import Sample
 
 __all__ = ["DatasetCounts", "Progress", "generate"]
+
+# Functions that make samples must have returned before the interpreter ends.
+atexit.register(_petcomp.end_callers)
 
 
 @dataclass(frozen=True)
@@ -81,7 +85,8 @@ def generate(
     ``source`` is a recipe (``set`` and ``quality`` as of ``Pipeline``): the files are those of ``petcomp
     dataset generate``, to the byte. Or a pipeline. Or a function that returns sample ``k``: it is called
     from several threads, in no fixed order, and must depend on nothing but ``k``; ``classes`` are then
-    needed, and ``labels``, ``pictures`` and ``split`` are the tables of a recipe.
+    needed, the same as those of its samples, and ``labels``, ``pictures`` and ``split`` are the tables of
+    a recipe.
 
     ``only`` makes image ``only`` alone, ``shard=(i, n)`` every ``n``-th from the ``i``-th (1 to ``n``), in a
     folder of its own below. ``progress`` is called in the calling thread, at the start and after each
@@ -115,7 +120,7 @@ def _with(make: Any, classes: Sequence[str] | None, layout: list[str], target: A
             return sample._native
         raise ArgumentTypeError(f"source: returned {type(sample).__name__} for {k}, expected a Sample")
 
-    return _petcomp.generate_with(native, list(classes), layout, target, report)
+    return _petcomp.generate_with(native, class_names(classes), layout, target, report)
 
 
 def _opened(source: Any, seed: int | None, set: Mapping[str, Any] | None, quality: str | None) -> Pipeline:

@@ -7,9 +7,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from . import _petcomp
-from ._documents import check_count, loaded, path_of
+from ._documents import check_count, class_names, loaded, path_of
 from ._show import table
 from .errors import ArgumentTypeError, InvalidValueError
 from .pipeline import _number
@@ -73,17 +74,20 @@ def evaluate(
     Both are folders of YOLO labels or COCO JSON files; ``size`` (width and height, pixels) is needed for
     YOLO labels without images beside them, ``output`` is a folder for the whole report. Or both are
     lists, one mapping for each image: ``boxes`` (n x 4: left, top, right, bottom, pixels) and ``classes``
-    (n), and of predictions ``scores`` (n).
+    (n), of predictions ``scores`` (n), and of the truth, where some are neither to be found nor missed,
+    ``ignored`` (n, as of a ``Sample``). ``rounds`` of the bootstrap: 0 to 100000.
     """
-    rounds, seed = _number("rounds", rounds), _number("seed", seed)
+    question = class_names(classes), _number("rounds", rounds), _number("seed", seed)
     if isinstance(predictions, (str, os.PathLike)) and isinstance(truth, (str, os.PathLike)):
         shape = None if size is None else [_number("size", side) for side in size]
         place = None if output is None else path_of("output", output)
         paths = path_of("predictions", predictions), path_of("truth", truth)
-        text = _petcomp.evaluate_files(*paths, shape, place, (list(classes), rounds, seed))
+        text = _petcomp.evaluate_files(*paths, shape, place, question)
     else:
         sheets = _sheets(predictions, truth)
-        text = _petcomp.evaluate_boxes(sheets, (list(classes), rounds, seed))
+        if size is not None or output is not None:
+            raise InvalidValueError("size, output: are for files, expected none for boxes in memory")
+        text = _petcomp.evaluate_boxes(sheets, question)
     record = loaded(text)
     return Metrics(record["metrics"], record["classes"])
 
@@ -95,19 +99,62 @@ def _sheets(predictions: Any, truth: Any) -> list[Any]:
     if len(predictions) != len(truth):
         raise InvalidValueError(f"predictions: {len(predictions)} images, but the truth has {len(truth)}")
     pairs = enumerate(zip(truth, predictions))
-    return [(_rows(f"truth[{i}]", a, False), _rows(f"predictions[{i}]", b, True)) for i, (a, b) in pairs]
+    return [(_truth(f"truth[{i}]", a), _found(f"predictions[{i}]", b)) for i, (a, b) in pairs]
 
 
-def _rows(at: str, labels: Any, scored: bool) -> list[tuple[Any, ...]]:
+def _truth(at: str, labels: Any) -> list[tuple[Any, ...]]:
+    """Class and box of each object of an image, and whether it is to be ignored."""
+    boxes = _boxes(at, labels, "ignored")
+    ignored = _whole(f"{at}.ignored", labels.get("ignored", [False] * len(boxes)), len(boxes), 2)
+    return list(zip(_classes(at, labels, len(boxes)), boxes, map(bool, ignored)))
+
+
+def _found(at: str, labels: Any) -> list[tuple[Any, ...]]:
+    """Class and box of each detection in an image, and how sure it is."""
+    boxes = _boxes(at, labels, "scores")
+    scores = _column(f"{at}.scores", labels.get("scores"), len(boxes))
+    return list(zip(_classes(at, labels, len(boxes)), boxes, scores.tolist()))
+
+
+def _boxes(at: str, labels: Any, last: str) -> list[Any]:
+    if not isinstance(labels, Mapping):
+        raise ArgumentTypeError(f"{at}: {type(labels).__name__}, expected a dict of boxes, classes and {last}")
+    for key in labels:
+        if key not in ("boxes", "classes", last):
+            raise InvalidValueError(f"{at}: unknown key {key!r}, expected boxes, classes and {last}")
+    boxes = _numbers(f"{at}.boxes", labels.get("boxes"))
+    if boxes.size and (boxes.ndim != 2 or boxes.shape[1] != 4):
+        raise InvalidValueError(f"{at}.boxes: shape {boxes.shape}, expected (n, 4)")
+    rows: list[Any] = boxes.reshape(-1, 4).tolist()
+    return rows
+
+
+def _classes(at: str, labels: Any, count: int) -> list[int]:
+    return _whole(f"{at}.classes", labels.get("classes"), count, 2**32)
+
+
+def _numbers(at: str, value: Any) -> npt.NDArray[np.float64]:
+    if value is None:
+        raise InvalidValueError(f"{at}: missing, expected numbers")
+    check_count(at, value)
     try:
-        check_count(at, labels["boxes"])
-        boxes = np.asarray(labels["boxes"], dtype=np.float64).reshape(-1, 4).tolist()
-        numbers = [int(number) for number in labels["classes"]]
-        columns: list[list[Any]] = [numbers, boxes]
-        if scored:
-            columns.append([float(score) for score in labels["scores"]])
-    except (KeyError, TypeError, ValueError) as error:
-        raise InvalidValueError(f"{at}: {error}, expected boxes (n x 4), classes (n) and scores (n)") from None
-    if len({len(column) for column in columns}) != 1 or any(not 0 <= n < 2**32 for n in numbers):
-        raise InvalidValueError(f"{at}: expected as many boxes, classes (from 0) and scores")
-    return list(zip(*columns))
+        return np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InvalidValueError(f"{at}: {error}, expected numbers") from None
+
+
+def _column(at: str, value: Any, count: int) -> npt.NDArray[np.float64]:
+    """One number for each box."""
+    column = _numbers(at, value)
+    if column.size == count and (column.ndim == 1 or not count):
+        return column.reshape(count)
+    raise InvalidValueError(f"{at}: shape {column.shape}, expected one number for each of {count} boxes")
+
+
+def _whole(at: str, value: Any, count: int, end: int) -> list[int]:
+    """The same, whole and from 0 below an end."""
+    column = _column(at, value, count)
+    for number in column:
+        if not (0 <= number < end and number == int(number)):
+            raise InvalidValueError(f"{at}: {number:g}, expected whole numbers from 0 to {end - 1}")
+    return [int(number) for number in column]

@@ -47,10 +47,10 @@ def key(
 
     ``image``: height x width x 3 or 4, float32 (scene-linear, alpha premultiplied; read where it is,
     without a copy, if its rows are contiguous) or uint8 (sRGB, straight alpha). ``screen``: three
-    scene-linear numbers, or a picture of the empty screen of the same size. ``garbage`` and ``core``:
-    height x width, float32 (0 to 1) or bool: what is surely not, or surely, foreground. ``profile``:
-    ``blender-3.4``, ``blender-4.2``, ``blender-4.5`` or ``robust``. ``options``: Blender's settings, as
-    ``clip_black=0.1``, ``blur_pre=2``, ``despill_factor=0.5``.
+    scene-linear numbers, a pixel (3, float32 or uint8 as ``image``), or a picture of the empty screen of
+    the same size. ``garbage`` and ``core``: height x width, float32 (0 to 1) or bool: what is surely not,
+    or surely, foreground. ``profile``: ``blender-3.4``, ``blender-4.2``, ``blender-4.5`` or ``robust``.
+    ``options``: Blender's settings, as ``clip_black=0.1``, ``blur_pre=2``, ``despill_factor=0.5``.
     """
     settings = dumped("options", {"profile": profile, **options})
     matte, cutout, deviations = _petcomp.key(image, screen, garbage, core, settings)

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import Any, SupportsIndex
 
 from . import _petcomp
-from ._documents import dumped, loaded, overrides, path_of
+from ._documents import dumped, loaded, overrides, path_of, plain
 from .errors import ArgumentTypeError, InvalidValueError
 from .sample import Sample
 from .scene import Scene
@@ -48,12 +48,15 @@ class Pipeline:
         quality: str | None = None,
     ) -> None:
         self._seed = _number("seed", seed)
-        self._source = (recipe, dict(set or {}), quality)
         is_data = isinstance(recipe, Mapping)
+        # Other processes open the same, whatever becomes of the caller's data and working folder.
+        source = plain("recipe", recipe) if is_data else os.path.abspath(path_of("recipe", recipe))
+        values = plain("set", set or {})
+        self._source = (source, values, quality)
         self._native = _petcomp.Pipeline(
             None if is_data else path_of("recipe", recipe),
-            dumped("recipe", _with_values(recipe, set or {})) if is_data else None,
-            [] if is_data else overrides(set),
+            dumped("recipe", source) if is_data else None,
+            overrides(values),
             quality,
         )
 
@@ -114,27 +117,13 @@ class Pipeline:
 
     def __reduce__(self) -> tuple[Any, ...]:
         recipe, set, quality = self._source
-        if isinstance(recipe, (str, os.PathLike)):
-            recipe = os.path.abspath(recipe)
         return _pipeline, (recipe, self._seed, set, quality)
 
     def __repr__(self) -> str:
         recipe = self._source[0]
-        shown = "recipe" if isinstance(recipe, Mapping) else os.fspath(recipe)
+        shown = "recipe" if isinstance(recipe, dict) else recipe
         return f"Pipeline({shown!r}, seed={self._seed})"
 
 
 def _pipeline(recipe: Any, seed: int, set: dict[str, Any], quality: str | None) -> Pipeline:
     return Pipeline(recipe, seed=seed, set=set, quality=quality)
-
-
-def _with_values(recipe: Any, values: Mapping[str, Any]) -> dict[str, Any]:
-    """A recipe with values at paths of keys."""
-    document: dict[str, Any] = loaded(dumped("recipe", recipe))
-    for path, value in values.items():
-        *outer, last = path.split(".")
-        table = document
-        for key in outer:
-            table = table.setdefault(key, {})
-        table[last] = value
-    return document
