@@ -102,7 +102,8 @@ impl Review {
     ///
     /// # Errors
     /// [`Error::Value`] (`size_px`).
-    pub(super) fn check_size(&self, (width, height): (usize, usize)) -> Result<()> {
+    #[doc(hidden)]
+    pub fn check_size(&self, (width, height): (usize, usize)) -> Result<()> {
         let [w, h] = self.size_px;
         if (w, h) == (width, height) {
             return Ok(());

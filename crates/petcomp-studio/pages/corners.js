@@ -2,7 +2,7 @@
 
 import { api, at, choice, element, frame, lengths, query, say, shortcuts, trying } from "./studio.js";
 import { photoList } from "./photo_list.js";
-import { INK, PhotoView, viewKeys } from "./photo_view.js";
+import { INK, PhotoView, loaded, viewKeys } from "./photo_view.js";
 
 frame("corners");
 
@@ -12,6 +12,8 @@ const NAMES = ["top left", "top right", "bottom right", "bottom left"];
 const drafts = new Map();
 /** The photo on the stage: { photo, label, version, corners, history, view, markers }. */
 let open = null;
+/** How many photos were asked for: what comes of all but the last is dropped. */
+let asked = 0;
 /** The photo that was saved last: new labels begin like its. */
 let last = null;
 
@@ -41,23 +43,39 @@ function showMarks() {
 }
 
 async function show(photo) {
-  const draft = drafts.get(photo);
-  const [state] = await Promise.all([
-    draft ?? load(photo),
-    trying(() => view.open(query("api/photo", { file: photo }))),
-  ]);
-  if (!state) return;
-  open = state;
+  asked += 1;
+  const number = asked;
+  const state = drafts.get(photo) ?? await load(photo);
+  const picture = state && await trying(() => loaded(query("api/photo", { file: photo })));
+  if (number !== asked) return;
   history.replaceState(null, "", query("corners", { photo }));
   document.title = `${photo.split("/").pop()} · Corners`;
   at("title").textContent = photo.split("/").pop();
+  list.choose(photo);
+  if (picture) showOpened(state, picture);
+  else showNothing();
+}
+
+function showOpened(state, picture) {
+  open = state;
+  view.show(picture);
   view.setPoints(open.corners, -1);
   showFields();
-  list.choose(photo);
   showMarks();
   showHint();
   solve();
   if (open.label.markers && !open.version) findMarkers();
+}
+
+/** Where a photo or its label cannot be read, nothing of another one is left that could be saved. */
+function showNothing() {
+  open = null;
+  view.show(null);
+  view.setPoints([], -1);
+  for (const id of [...Object.keys(LENGTHS), "surface", "camera", "cropped"]) at(id).value = "";
+  for (const id of ["facts", "advice"]) at(id).replaceChildren();
+  for (const id of ["snap", "turn", "undo", "save"]) at(id).disabled = true;
+  at("hint").textContent = "Choose another photo.";
 }
 
 /** The label that a new one begins like: that of the last photo that was saved, or the nearest one in the list. */
@@ -86,11 +104,11 @@ function fromLabel(label) {
 
 const rounded = (value) => Math.round(value * 100) / 100;
 
-function labelNow() {
-  const label = structuredClone(open.label);
+function labelOf(state) {
+  const label = structuredClone(state.label);
   const origin = originOf(label);
-  if (open.corners.length === 4) {
-    label.surface.corners_px = open.corners.map(([x, y]) => [rounded(x - origin), rounded(y - origin)]);
+  if (state.corners.length === 4) {
+    label.surface.corners_px = state.corners.map(([x, y]) => [rounded(x - origin), rounded(y - origin)]);
     label.surface.source ??= "manual";
   } else {
     delete label.surface.corners_px;
@@ -141,8 +159,8 @@ function undo() {
   open.history.pop();
   open.corners = (open.history.at(-1) ?? fromLabel(open.label)).map((corner) => [...corner]);
   view.setPoints(open.corners);
+  changed(false);
   showHint();
-  solve();
 }
 
 function removeCorner() {
@@ -174,10 +192,10 @@ async function findMarkers() {
   const here = open;
   say("looking for markers ...");
   await trying(async () => {
-    const { markers, label } = await api("api/corners/markers", { photo: here.photo, label: labelNow() });
+    const { markers, label } = await api("api/corners/markers", { photo: here.photo, label: labelOf(here) });
     here.markers = markers;
     if (label) {
-      here.label = label;
+      here.label.points = label.points;
       drafts.set(here.photo, here);
     }
     if (open !== here) return;
@@ -260,13 +278,14 @@ async function solve() {
 
 async function solveOnce() {
   const here = open;
+  if (!here) return;
   if (!isComplete()) {
     here.camera = null;
     showCamera(missing());
     return;
   }
   try {
-    here.camera = await api("api/corners/solve", { photo: here.photo, label: labelNow() });
+    here.camera = await api("api/corners/solve", { photo: here.photo, label: labelOf(here) });
     if (open === here) showCamera();
   } catch (error) {
     if (error.superseded) return;
@@ -404,7 +423,7 @@ async function save(next = true) {
 async function saveOrAsk(here) {
   const { photo } = here;
   try {
-    return await api("api/corners/save", { photo, label: labelNow(), version: here.version });
+    return await api("api/corners/save", { photo, label: labelOf(here), version: here.version });
   } catch (error) {
     if (!error.stale) throw error;
   }
@@ -412,7 +431,7 @@ async function saveOrAsk(here) {
     "Another tab or program has saved it. Whose shall it be?", ["Load theirs", "Save mine"]);
   if (mine === "Save mine") {
     const { version } = await api(query("api/corners/label", { photo }));
-    return api("api/corners/save", { photo, label: labelNow(), version });
+    return api("api/corners/save", { photo, label: labelOf(here), version });
   }
   if (mine === "Load theirs") {
     drafts.delete(photo);

@@ -13,21 +13,15 @@ const PAUSE_MS = 700;
 /** Colours of classes, far enough from each other for eight. */
 const HUES = [210, 25, 130, 285, 50, 170, 340, 90];
 
-const set = { folder: "", count: 0, classes: [], rows: [], why: [] };
+/** The folder, which of its listings its rows are of, and what was found there. */
+const set = { folder: "", listing: null, count: 0, classes: [], rows: [], why: [] };
 const shows = { boxes: true, masks: false, ids: true, covers: false };
 
 const color = (number, alpha = 1) => `hsl(${HUES[number % HUES.length]} 90% 60% / ${alpha})`;
 
-/** When this page had a folder listed. The browser keeps pictures for a while, and the rows of an earlier list are others. */
-const listed = new Map();
+const list = (folder) => api(query("api/dataset/open", { folder }));
 
-async function list(folder) {
-  const opened = await api(query("api/dataset/open", { folder }));
-  listed.set(folder, Date.now());
-  return opened;
-}
-
-const address = (folder, row, side) => query("api/dataset/picture", { folder, row, side, listed: listed.get(folder) });
+const address = ({ folder, listing }, row, side) => query("api/dataset/picture", { folder, listing, row, side });
 
 // Which pictures.
 
@@ -58,7 +52,8 @@ async function find() {
   search.abort();
   search = new AbortController();
   const { signal } = search;
-  const wanted = { folder: set.folder, filter: filter(), order: at("order").value };
+  const { folder, listing } = set;
+  const wanted = { folder, listing, filter: filter(), order: at("order").value };
   for (let isFirst = true; ; isFirst = false) {
     const found = await api("api/dataset/find", wanted, signal);
     if (signal.aborted) return;
@@ -87,7 +82,7 @@ function showBackgrounds(names) {
 
 async function open(folder) {
   const opened = await list(folder);
-  Object.assign(set, { folder, count: opened.count, classes: opened.classes, rows: [], why: [] });
+  Object.assign(set, { ...opened, folder, rows: [], why: [] });
   known.clear();
   at("folder").value = folder;
   at("class").replaceChildren(element("option", { value: "" }, "any or none"),
@@ -109,9 +104,9 @@ function askRows() {
   asking = setTimeout(() => trying(async () => {
     const rows = [...grid.tiles.keys()].map((place) => set.rows[place]).filter((row) => row !== undefined && !known.has(row));
     if (!rows.length) return;
-    const { folder } = set;
-    const told = await api("api/dataset/rows", { folder, rows });
-    if (folder !== set.folder) return;
+    const { folder, listing } = set;
+    const told = await api("api/dataset/rows", { folder, listing, rows });
+    if (listing !== set.listing) return;
     for (const row of told) known.set(row.row, row);
     grid.fill();
   }), 60);
@@ -154,7 +149,7 @@ const grid = {
 
   add(place) {
     const row = set.rows[place];
-    const image = element("img", { alt: "", src: address(set.folder, row, SIDE_PX), decoding: "async" });
+    const image = element("img", { alt: "", src: address(set, row, SIDE_PX), decoding: "async" });
     const tile = element("button", { class: "tile", type: "button", "data-row": row, onclick: () => view(place) },
       element("span", { class: "picture" }, image, element("canvas")),
       element("span", { class: "caption" }));
@@ -207,8 +202,8 @@ function drawBoxes(tile, objects) {
 
 /** A picture at its full size with what is drawn over it, and others of its folder before and behind it. */
 class Pane {
-  constructor(folder, rows, place) {
-    Object.assign(this, { folder, rows, place, sample: null, names: set.classes, marked: null });
+  constructor({ folder, listing }, rows, place) {
+    Object.assign(this, { folder, listing, rows, place, sample: null, names: set.classes, marked: null });
     this.image = element("img", { alt: "" });
     this.canvas = element("canvas");
     this.title = element("span", { class: "name" });
@@ -224,9 +219,9 @@ class Pane {
   }
 
   async change(folder) {
-    const opened = await list(folder);
-    const { rows } = await api("api/dataset/find", { folder, filter: {}, order: "listed" });
-    Object.assign(this, { folder, rows, place: 0, names: opened.classes });
+    const { listing, classes } = await list(folder);
+    const { rows } = await api("api/dataset/find", { folder, listing, filter: {}, order: "listed" });
+    Object.assign(this, { folder, listing, rows, place: 0, names: classes });
     await this.show();
   }
 
@@ -238,11 +233,11 @@ class Pane {
   }
 
   async show() {
-    const { folder } = this;
+    const { folder, listing } = this;
     const row = this.rows[this.place];
-    this.image.src = address(folder, row);
-    const sample = await api(query("api/dataset/sample", { folder, row }));
-    if (row !== this.rows[this.place]) return;
+    this.image.src = address(this, row);
+    const sample = await api(query("api/dataset/sample", { folder, listing, row }));
+    if (listing !== this.listing || row !== this.rows[this.place]) return;
     Object.assign(this, { sample, marked: null, layers: null });
     this.folders.value = folder;
     this.title.textContent = `${sample.name} · ${this.place + 1} of ${this.rows.length}`;
@@ -372,7 +367,7 @@ const viewer = { panes: [], active: null };
 
 function view(place) {
   grid.place = place;
-  const pane = new Pane(set.folder, set.rows, place);
+  const pane = new Pane(set, set.rows, place);
   viewer.panes = [pane];
   at("grid").hidden = true;
   at("viewer").hidden = at("details").hidden = false;
@@ -401,7 +396,7 @@ function closeViewer() {
   at("grid").hidden = false;
   document.querySelector("main").classList.remove("viewing");
   grid.show(false);
-  if (first?.folder === set.folder) {
+  if (first?.listing === set.listing) {
     grid.reveal(first.place);
     grid.scroll();
     grid.tiles.get(first.place)?.focus();
@@ -417,7 +412,7 @@ function beside() {
     showPanes(first);
     return;
   }
-  const pane = new Pane(first.folder, first.rows, Math.min(first.place + 1, first.rows.length - 1));
+  const pane = new Pane(first, first.rows, Math.min(first.place + 1, first.rows.length - 1));
   pane.names = first.names;
   viewer.panes = [first, pane];
   showPanes(pane);

@@ -38,7 +38,7 @@ const BRUSHES = [0.002, 0.12];
 
 const stage = new Stage(at("canvas"), paint);
 const list = photoList(at("photos"), open, mark);
-/** `entry` is the photo that is shown, `shown` the layer that was asked for last, `unsaved` why it is not kept. */
+/** `entry` is the photo that is shown, `shown` the layer that was asked for last, `unsaved` why what is shown is not kept. */
 const state = { entry: null, layer: "checker", review: null, undone: [], solved: null, shown: null, saving: Promise.resolve(), unsaved: null };
 
 frame("mattes");
@@ -73,18 +73,28 @@ async function open(photo) {
 
 async function solve() {
   const { list: name, photo } = state.entry;
-  const { strokes } = state.review;
+  const { strokes, size } = state.review;
   at("stage").classList.add("busy");
   say(`cutting out ${base(photo)} ...`);
-  const solved = await api("api/mattes/solve", { list: name, photo, strokes }).finally(() => at("stage").classList.remove("busy"));
+  const solved = await api("api/mattes/solve", { list: name, photo, strokes, size }).finally(() => at("stage").classList.remove("busy"));
   if (state.review?.strokes !== strokes) return;
   state.solved = solved;
+  if (solved.outdated) beginAgain(solved.outdated);
+  state.review.size = solved.size;
   if (!stage.size) stage.open(solved.size);
   setRadius();
   showSolved();
   await showLayers();
   const trouble = state.unsaved ?? solved.refused;
   say(trouble ?? `${base(photo)}: cut out in ${(1000 * solved.seconds).toFixed(0)} ms`, trouble ? "bad" : "good");
+}
+
+/** Without the strokes that were painted on another size; the file has them until something else is said. */
+function beginAgain(why) {
+  Object.assign(state, { undone: [], unsaved: why });
+  Object.assign(state.review, { strokes: [], verdict: null });
+  Object.assign(stage, { size: null, strokes: [] });
+  showReview();
 }
 
 async function loaded(path) {
@@ -197,10 +207,10 @@ function setVerdict(verdict) {
 
 /** Saves the review of the photo, after what is being saved already. */
 function keep() {
-  const { entry, review, solved: { size } } = state;
+  const { entry, review } = state;
   Object.assign(entry, { verdict: review.verdict, strokes: review.strokes.length });
   list.showMarks();
-  const { strokes, verdict } = review;
+  const { size, strokes, verdict } = review;
   state.saving = state.saving.then(() => trying(async () => {
     try {
       const saved = await api("api/mattes/review", { photo: entry.photo, size, strokes, verdict, version: review.version });

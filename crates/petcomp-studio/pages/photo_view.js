@@ -15,6 +15,14 @@ export const INK = {
   horizon: "#40c8ff", marker: "#c58bff", shade: "rgb(0 0 0 / .65)", text: "#ffffff",
 };
 
+/** A photo for `PhotoView.show`, ready to be drawn. */
+export async function loaded(address) {
+  const photo = new Image();
+  photo.src = address;
+  await photo.decode();
+  return photo;
+}
+
 /** A canvas over all of `stage`. `events`: click(px), move(points), moved(points), choose(i), draw(view). Positions are pixels of the photo. */
 export class PhotoView {
   constructor(stage, events = {}) {
@@ -51,14 +59,10 @@ export class PhotoView {
     }, { passive: false });
   }
 
-  /** Shows another photo, all of it; keeps what is shown where `keep` says so. */
-  async open(address, keep = false) {
-    const photo = new Image();
-    photo.src = address;
-    await photo.decode();
+  /** Shows another photo, all of it, or none. */
+  show(photo) {
     this.photo = photo;
-    if (!keep) this.fit();
-    this.draw();
+    this.fit();
   }
 
   get size() { return this.photo ? [this.photo.naturalWidth, this.photo.naturalHeight] : [1, 1]; }

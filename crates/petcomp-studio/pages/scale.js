@@ -1,7 +1,7 @@
 // Scale: the two ends of a ruler, or the corners of the screen, and a photo has its pixels per metre.
 
 import { api, at, element, frame, lengths, query, say, shortcuts, trying } from "./studio.js";
-import { INK, PhotoView, viewKeys } from "./photo_view.js";
+import { INK, PhotoView, loaded, viewKeys } from "./photo_view.js";
 import { photoList } from "./photo_list.js";
 
 frame("scale");
@@ -15,6 +15,8 @@ const MODES = {
 let mode = "ruler";
 /** The photo on the stage, and what its list says: { photo, list, version, entry }. */
 let open = null;
+/** How many photos were asked for: what comes of all but the last is dropped. */
+let asked = 0;
 const points = { ruler: [], screen: [] };
 const units = lengths(at("unit"), () => showFacts());
 const sides = { width: null, height: null };
@@ -29,18 +31,20 @@ const view = new PhotoView(at("stage"), {
 const list = photoList(at("photos"), show, (entry) => (entry.scaled ? ["scale", "good"] : ["", ""]));
 
 async function show(photo) {
-  const [state] = await Promise.all([
-    trying(() => api(query("api/scale/photo", { photo }))),
-    trying(() => view.open(query("api/photo", { file: photo }))),
-  ]);
-  if (!state) return;
-  open = { photo, ...state };
+  asked += 1;
+  const number = asked;
+  const state = await trying(() => api(query("api/scale/photo", { photo })));
+  const picture = state && await trying(() => loaded(query("api/photo", { file: photo })));
+  if (number !== asked) return;
+  // Where one of them cannot be read, nothing of another photo is left that could be saved.
+  open = picture ? { photo, ...state } : null;
+  view.show(picture);
   history.replaceState(null, "", query("scale", { photo }));
   at("title").textContent = photo.split("/").pop();
   list.choose(photo);
   [points.ruler, points.screen] = [[], []];
-  takeOver(open.entry ?? {});
-  at("new").hidden = Boolean(open.entry);
+  takeOver(open?.entry ?? {});
+  at("new").hidden = !open || Boolean(open.entry);
   at("asset").value = photo.split("/").pop().replace(/\.[^.]*$/, "");
   setMode(mode);
 }
@@ -79,9 +83,11 @@ function removePoint() {
 
 async function findScreen() {
   if (!open) return;
+  const here = open;
   say("looking for the screen ...");
   await trying(async () => {
-    const { corners_px: corners } = await api("api/scale/screen", { photo: open.photo });
+    const { corners_px: corners } = await api("api/scale/screen", { photo: here.photo });
+    if (open !== here) return;
     points.screen = corners;
     setMode("screen");
     say("the screen was found", "good");
@@ -134,7 +140,8 @@ function showFacts() {
   const rows = scale ? facts(scale) : [];
   at("facts").replaceChildren(...rows.flatMap(([term, text]) => [element("dt", {}, term), element("dd", {}, text)]));
   at("advice").replaceChildren(element("li", {}, scale ? ADVICE[mode] : "Click, type what is known, and the scale is here."));
-  at("hint").textContent = MODES[mode].hints[points[mode].length] ?? "Drag a point, or choose one and press the arrows.";
+  const hint = MODES[mode].hints[points[mode].length] ?? "Drag a point, or choose one and press the arrows.";
+  at("hint").textContent = open ? hint : "Choose another photo.";
   at("save").disabled = !scale;
   view.draw();
 }
@@ -150,10 +157,11 @@ function drawLines() {
 async function save() {
   const scale = scaleNow();
   if (!open || !scale) return;
+  const here = open;
   await trying(async () => {
-    const { photo, version } = open;
+    const { photo, version } = here;
     const saved = await api("api/scale/save", { photo, version, scale, asset: at("asset").value, class: at("class").value });
-    Object.assign(open, saved);
+    Object.assign(here, saved);
     list.entryOf(photo).scaled = true;
     list.showMarks();
     say(`saved in ${saved.list}`, "good");

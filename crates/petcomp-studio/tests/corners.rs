@@ -3,7 +3,7 @@
 mod browser;
 
 use browser::studio::{Studio, copy_files, samples};
-use browser::{Browser, SHIFT};
+use browser::{Browser, CTRL, SHIFT};
 use petcomp::camera::{self, CameraFile, Label, Solution};
 use petcomp::io;
 use std::path::Path;
@@ -160,9 +160,59 @@ fn markers_are_found_by_themselves() {
     let studio = Studio::over(dir.path());
     open_photo(&mut browser, &studio, "bg0004.jpg");
     browser.press("m", 0);
+    browser.fill("#width", "0.57");
     browser.wait("document.querySelector('footer').innerText.startsWith('4 markers')");
     assert!(browser.text("footer").contains("16 corners of known place"));
     browser.screenshot("markers");
+    // What was typed meanwhile stays.
+    browser.press("s", CTRL);
+    browser.wait("document.querySelector('footer').innerText.startsWith('saved')");
+    let label: Label = io::read_json(dir.path().join("bg0004.label.json")).unwrap();
+    assert_eq!(
+        (label.surface.width_m, label.points.len()),
+        (Some(0.57), 16)
+    );
+    browser.assert_content();
+}
+
+#[test]
+fn what_is_not_saved_stays_with_its_photo_beside_a_label_that_cannot_be_read() {
+    let Some(mut browser) = Browser::open(1360, 860) else {
+        return;
+    };
+    let dir = photos(&["bg0000"]);
+    std::fs::write(dir.path().join("bg0001.label.json"), "{ oops").unwrap();
+    let path = dir.path().join("bg0000.label.json");
+    let studio = Studio::over(dir.path());
+    open_photo(&mut browser, &studio, "bg0000.jpg");
+    browser.wait("document.querySelectorAll('#facts dt').length > 5");
+    browser.press("1", 0);
+    browser.press("ArrowRight", SHIFT);
+    browser.press("s", CTRL);
+    browser.wait("document.querySelector('footer').innerText.startsWith('saved')");
+    let saved = io::read_text(&path).unwrap();
+    let mark = "document.querySelector(\"[data-photo='bg0000.jpg'] .mark\").innerText";
+    browser.press("z", CTRL);
+    browser.wait(&format!("{mark} === 'not saved'"));
+
+    browser.click_on("[data-photo='bg0001.jpg'] button");
+    browser.wait("document.querySelector('#title').innerText === 'bg0001.jpg'");
+    assert_eq!(browser.text("#facts"), "");
+    assert_eq!(
+        browser.eval("document.querySelector('#save').disabled"),
+        true
+    );
+    browser.press("Backspace", 0);
+    click_corners(&mut browser, &truth("bg0001"));
+    browser.press("s", CTRL);
+
+    browser.click_on("[data-photo='bg0000.jpg'] button");
+    browser.wait("document.querySelectorAll('#facts dt').length > 5");
+    assert_eq!(browser.eval(mark), "not saved");
+    assert_eq!(io::read_text(&path).unwrap(), saved);
+    browser
+        .complaints
+        .retain(|complaint| !complaint.contains("422"));
     browser.assert_content();
 }
 

@@ -4,7 +4,7 @@ mod browser;
 
 use browser::studio::{Studio, copy_files};
 use browser::{Browser, tray};
-use petcomp::io;
+use petcomp::{Image, LinearRgb, io};
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -85,6 +85,35 @@ fn a_dataset_is_filtered_and_looked_at() {
     browser.resize(1440, 900);
     browser.press("Escape", 0);
     browser.wait("document.querySelector('#viewer').hidden");
+    browser.assert_content();
+}
+
+#[test]
+fn a_folder_that_is_listed_again_shifts_no_picture_of_the_first_list() {
+    let Some(mut browser) = Browser::open(1280, 800) else {
+        return;
+    };
+    let dir = tempfile::tempdir().unwrap();
+    let add = |name: &str| {
+        let grey = Image::filled(40, 30, LinearRgb::grey(0.5));
+        io::write(dir.path().join(format!("{name}.png")), &grey).unwrap();
+    };
+    add("p2");
+    add("p4");
+    let studio = Studio::over(dir.path());
+    browser.go(&studio.page("dataset?folder="));
+    browser.wait("document.querySelectorAll('.tile .caption b').length === 2");
+    add("p1");
+    browser.click_on(".tile[data-row='0']");
+    let name = |pane: usize| format!("document.querySelectorAll('.pane .name')[{pane}]?.innerText");
+    browser.wait(&format!("{} === 'p2.png · 1 of 2'", name(0)));
+    browser.press("2", 0);
+    browser.wait(&format!("{} === 'p4.png · 2 of 2'", name(1)));
+    browser.eval("document.querySelectorAll('.pane select')[1].dispatchEvent(new Event('change'))");
+    browser.wait(&format!("{} === 'p1.png · 1 of 3'", name(1)));
+    browser.press("Escape", 0);
+    browser.click_on(".tile[data-row='1']");
+    browser.wait(&format!("{} === 'p4.png · 2 of 2'", name(0)));
     browser.assert_content();
 }
 

@@ -5,9 +5,10 @@ mod browser;
 use browser::studio::{Studio, copy_files, samples};
 use browser::{Browser, CTRL, SHIFT};
 use petcomp::asset::{self, Review, Verdict};
-use petcomp::matte::Claim;
+use petcomp::matte::{Claim, Stroke};
 use petcomp::{Image, LinearRgb, io};
 use std::path::Path;
+use std::sync::atomic::AtomicBool;
 
 /// A red slab of 60 x 30 pixels on a green screen, twice.
 fn folder() -> tempfile::TempDir {
@@ -66,7 +67,8 @@ fn saved(browser: &mut Browser, act: impl FnOnce(&mut Browser)) {
 
 /// Length of the first cut-out that a build of the folder's list gives, pixels.
 fn built_length_px(folder: &Path) -> f64 {
-    let built = asset::build(folder, folder.join("assets"), &|_, _| ()).unwrap();
+    let (assets, running) = (folder.join("assets"), AtomicBool::new(false));
+    let built = asset::build(folder, assets, &|_, _| (), &running).unwrap();
     200.0 * built.lengths[0][0]
 }
 
@@ -151,6 +153,55 @@ fn what_another_tab_has_saved_is_not_overwritten() {
     browser.drag(&dot);
     browser.wait("document.querySelector('footer').innerText.includes('has changed since')");
     assert_eq!(review(folder.path()), Some(other));
+}
+
+/// A review of a picture of this size with so many strokes.
+fn painted(size: (usize, usize), count: usize) -> Review {
+    let dot = Stroke {
+        says: Claim::NotObject,
+        radius_px: 4.0,
+        points_px: vec![[10.0, 10.0]],
+    };
+    Review::new(size, vec![dot; count])
+}
+
+#[test]
+fn strokes_on_another_size_are_not_taken_and_others_taken_back_at_once() {
+    let Some(mut browser) = Browser::open(1280, 800) else {
+        return;
+    };
+    let folder = folder();
+    let two = folder.path().join("two.png");
+    let larger = painted((320, 200), 1).to_json();
+    std::fs::write(folder.path().join("a <b>one.review.json"), larger).unwrap();
+    std::fs::write(Review::path_of(&two), painted((160, 100), 2).to_json()).unwrap();
+    let studio = Studio::over(folder.path());
+    showing(&mut browser, |browser| browser.go(&studio.page("mattes")));
+    let expected = "size_px: 320 x 200, expected the photo's 160 x 100; review it again";
+    browser.wait(&format!(
+        "document.querySelector('footer').innerText.includes(\"{expected}\")"
+    ));
+    // From here on cut-outs wait.
+    browser.eval(
+        "(() => { const asked = window.fetch; window.fetch = async (path, options) => { \
+         if (path.includes('/solve')) await new Promise((go) => { window.cutOut = go; }); \
+         return asked(path, options); }; })()",
+    );
+    saved(&mut browser, |browser| browser.press("a", 0));
+    let accepted = Review {
+        verdict: Some(Verdict::Accepted),
+        ..painted((160, 100), 0)
+    };
+    assert_eq!(review(folder.path()), Some(accepted));
+
+    browser.wait("!!window.cutOut && !document.querySelector('#undo').disabled");
+    saved(&mut browser, |browser| browser.press("z", CTRL));
+    let left = Review::of_photo(&two).unwrap();
+    assert_eq!(left, Some(painted((160, 100), 1)));
+    showing(&mut browser, |browser| {
+        browser.eval("window.cutOut()");
+    });
+    browser.assert_content();
 }
 
 /// What a person paints on the label and on the cap of the first bottle.

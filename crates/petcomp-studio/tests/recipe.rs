@@ -166,6 +166,23 @@ fn of_three_lights_the_first_is_removed_twice() {
 }
 
 #[test]
+fn objects_need_be_large_enough_in_the_pictures_of_the_dataset_alone() {
+    let dir = tempfile::tempdir().unwrap();
+    tray::fill(dir.path());
+    let studio = Studio::over(dir.path());
+    let picture = |scale: &str| {
+        let asked = format!(
+            r#"{{ "file": "recipe.toml", "edits": [["scene.scale", "{scale}"]], "seed": 0, "k": 0, "side": 64, "slot": "a" }}"#
+        );
+        studio.post("api/recipe/picture", &asked)
+    };
+    let small = picture("0.2");
+    assert!(small.starts_with("HTTP/1.1 200"), "{small}");
+    let tiny = picture("0.02");
+    assert!(tiny.contains("px long in pictures of 640 x 480"), "{tiny}");
+}
+
+#[test]
 fn a_recipe_that_leads_out_of_the_folder_is_refused() {
     let dir = tempfile::tempdir().unwrap();
     let recipe = "assets = '../assets'\nbackgrounds = '/'\n";

@@ -47,6 +47,44 @@ fn two_ends_of_a_length_give_pixels_per_metre() {
 }
 
 #[test]
+fn beside_a_list_that_cannot_be_read_nothing_is_saved() {
+    let Some(mut browser) = Browser::open(1360, 860) else {
+        return;
+    };
+    let dir = tempfile::tempdir().unwrap();
+    let first = |name: &str| name == "b0000_0.png" || name == "photos.toml";
+    copy_files(&samples("bottles"), dir.path(), first);
+    let broken = dir.path().join("broken");
+    copy_files(&samples("bottles"), &broken, |name| name == "b0001_0.png");
+    std::fs::write(broken.join("photos.toml"), "[[photos]").unwrap();
+    let list = dir.path().join("photos.toml");
+    let before = io::read_text(&list).unwrap();
+    let studio = Studio::over(dir.path());
+    browser.go(&studio.page("scale?photo=b0000_0.png"));
+    browser.wait("document.querySelector('#title').innerText === 'b0000_0.png'");
+    browser.fill("#width", "0.1");
+    browser.eval("document.activeElement.blur()");
+    browser.click_on("[data-photo='broken/b0001_0.png'] button");
+    browser.wait("document.querySelector('#title').innerText === 'b0001_0.png'");
+    let [left, top, width, height] = browser.place("#stage canvas");
+    for x in [0.4, 0.6] {
+        browser.click([left + x * width, top + 0.5 * height]);
+    }
+    assert_eq!(
+        browser.eval("document.querySelector('#save').disabled"),
+        true
+    );
+    browser.press("Enter", 0);
+    browser.click_on("[data-photo='b0000_0.png'] button");
+    browser.wait("document.querySelector('#title').innerText === 'b0000_0.png'");
+    assert_eq!(io::read_text(&list).unwrap(), before);
+    browser
+        .complaints
+        .retain(|complaint| !complaint.contains("422"));
+    browser.assert_content();
+}
+
+#[test]
 fn the_first_page_says_what_is_there() {
     let Some(mut browser) = Browser::open(1200, 760) else {
         return;

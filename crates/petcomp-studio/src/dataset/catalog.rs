@@ -6,23 +6,22 @@ use axum::http::StatusCode;
 use petcomp::dataset::index::{DatasetIndex, ObjectFacts, PictureFacts};
 use serde::Serialize;
 use std::collections::{BTreeSet, VecDeque};
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
-/// Folders that are kept: two beside each other, and one before.
-const KEPT: usize = 3;
+/// Listings that are kept: two beside each other in each of two tabs, and two before.
+const KEPT: usize = 6;
 
-/// The folders that were opened last.
+/// The listings of folders that were used last, the latest at the end.
 #[derive(Default)]
 pub(super) struct Catalogs(Mutex<VecDeque<(String, Arc<Catalog>)>>);
 
 impl Catalogs {
-    /// Lists a folder, anew if it was listed before.
+    /// Lists a folder, anew if it was listed before: rows of that listing stay what they were.
     pub(super) fn open(&self, folder: &Folder, name: &str) -> Answer<Arc<Catalog>> {
         let index = DatasetIndex::open(&folder.folder(name)?)?;
         let catalog = Arc::new(Catalog::new(index));
         let mut kept = self.kept();
-        kept.retain(|(known, _)| known != name);
         kept.push_back((name.to_owned(), catalog.clone()));
         if kept.len() > KEPT {
             kept.pop_front();
@@ -30,16 +29,29 @@ impl Catalogs {
         Ok(catalog)
     }
 
-    /// A folder as it was listed last.
-    pub(super) fn get(&self, folder: &Folder, name: &str) -> Answer<Arc<Catalog>> {
-        let known = self.find(name);
-        known.map_or_else(|| self.open(folder, name), Ok)
+    /// A folder as one of its listings has it; without a number, the one that was used last.
+    pub(super) fn get(
+        &self,
+        folder: &Folder,
+        name: &str,
+        listing: Option<u64>,
+    ) -> Answer<Arc<Catalog>> {
+        match (self.find(name, listing), listing) {
+            (Some(known), _) => Ok(known),
+            (None, None) => self.open(folder, name),
+            (None, Some(_)) => Err(forgotten(name)),
+        }
     }
 
-    fn find(&self, name: &str) -> Option<Arc<Catalog>> {
-        let kept = self.kept();
-        let (_, catalog) = kept.iter().find(|(known, _)| known == name)?;
-        Some(catalog.clone())
+    fn find(&self, name: &str, listing: Option<u64>) -> Option<Arc<Catalog>> {
+        let mut kept = self.kept();
+        let place = kept.iter().rposition(|(known, catalog)| {
+            known == name && listing.is_none_or(|listing| listing == catalog.listing)
+        })?;
+        let used = kept.remove(place)?;
+        let catalog = used.1.clone();
+        kept.push_back(used);
+        Some(catalog)
     }
 
     fn kept(&self) -> MutexGuard<'_, VecDeque<(String, Arc<Catalog>)>> {
@@ -47,8 +59,21 @@ impl Catalogs {
     }
 }
 
-/// A folder's pictures.
+fn forgotten(name: &str) -> Refusal {
+    let name = petcomp::printable(name);
+    let what = format!("this listing of \"{name}\" is not kept any more: load the page again");
+    Refusal::new(StatusCode::NOT_FOUND, what)
+}
+
+fn next_listing() -> u64 {
+    static NEXT: AtomicU64 = AtomicU64::new(1);
+    NEXT.fetch_add(1, Ordering::Relaxed)
+}
+
+/// A folder's pictures, as they were listed.
 pub(super) struct Catalog {
+    /// Number of the listing: the same folder has another one when it is listed again.
+    pub(super) listing: u64,
     pub(super) index: DatasetIndex,
     /// None for a picture whose record cannot be read.
     facts: Vec<OnceLock<Option<PictureFacts>>>,
@@ -88,6 +113,7 @@ pub(super) enum Flag {
 impl Catalog {
     fn new(index: DatasetIndex) -> Self {
         Self {
+            listing: next_listing(),
             facts: index.pictures.iter().map(|_| OnceLock::new()).collect(),
             read: AtomicUsize::new(0),
             is_reading: AtomicBool::new(false),
@@ -134,7 +160,7 @@ impl Catalog {
         let catalog = Arc::downgrade(self);
         tokio::task::spawn_blocking(move || {
             let mut row = 0;
-            // Ends where the folder was listed anew.
+            // Ends where the listing is not kept any more.
             while let Some(catalog) = catalog.upgrade() {
                 if row == catalog.index.pictures.len() {
                     break;

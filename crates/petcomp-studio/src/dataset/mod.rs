@@ -87,6 +87,8 @@ struct FolderName {
 /// A folder as it was listed.
 #[derive(Serialize)]
 struct ListedFolder {
+    /// What tells its rows from those of another time.
+    listing: u64,
     count: usize,
     classes: Vec<String>,
     /// Whether petcomp made it, and wrote down everything.
@@ -101,6 +103,7 @@ async fn open(
         let catalog = studio.dataset.catalogs.open(&studio.folder, &folder)?;
         let index = &catalog.index;
         Ok(Json(ListedFolder {
+            listing: catalog.listing,
             count: index.pictures.len(),
             classes: index.classes.clone(),
             has_records: index
@@ -115,6 +118,8 @@ async fn open(
 #[derive(Deserialize)]
 struct RowSearch {
     folder: String,
+    /// Number of one of its listings; without it the one that was used last.
+    listing: Option<u64>,
     filter: Filter,
     order: Order,
 }
@@ -137,10 +142,8 @@ async fn find(
     Json(wanted): Json<RowSearch>,
 ) -> Answer<Json<FoundRows>> {
     blocking(move || {
-        let catalog = studio
-            .dataset
-            .catalogs
-            .get(&studio.folder, &wanted.folder)?;
+        let catalogs = &studio.dataset.catalogs;
+        let catalog = catalogs.get(&studio.folder, &wanted.folder, wanted.listing)?;
         let must_read = wanted.filter.needs_facts(&catalog.index) || wanted.order.needs_facts();
         if must_read {
             catalog.read_in_background();
@@ -165,16 +168,18 @@ async fn find(
 #[derive(Deserialize)]
 struct SomeRows {
     folder: String,
+    listing: Option<u64>,
     rows: Vec<usize>,
 }
 
 async fn rows(
     State(studio): State<Arc<Studio>>,
-    Json(SomeRows { folder, rows }): Json<SomeRows>,
+    Json(asked): Json<SomeRows>,
 ) -> Answer<Json<Vec<Row>>> {
     blocking(move || {
-        let catalog = studio.dataset.catalogs.get(&studio.folder, &folder)?;
-        let rows = rows.into_iter().take(MAX_ROWS);
+        let catalogs = &studio.dataset.catalogs;
+        let catalog = catalogs.get(&studio.folder, &asked.folder, asked.listing)?;
+        let rows = asked.rows.into_iter().take(MAX_ROWS);
         let rows: Answer<_> = rows.map(|row| catalog.row(row)).collect();
         rows.map(Json)
     })
@@ -184,6 +189,7 @@ async fn rows(
 #[derive(Deserialize)]
 struct OneRow {
     folder: String,
+    listing: Option<u64>,
     row: usize,
     /// Longer side of a small picture, pixels; all of it without it.
     side: Option<usize>,
@@ -194,7 +200,8 @@ async fn sample(
     Query(asked): Query<OneRow>,
 ) -> Answer<Json<SampleShown>> {
     blocking(move || {
-        let catalog = studio.dataset.catalogs.get(&studio.folder, &asked.folder)?;
+        let catalogs = &studio.dataset.catalogs;
+        let catalog = catalogs.get(&studio.folder, &asked.folder, asked.listing)?;
         picture_file(&studio.folder, &catalog, asked.row)?;
         SampleShown::of(&catalog.index, asked.row).map(Json)
     })
@@ -206,7 +213,8 @@ async fn picture(
     Query(asked): Query<OneRow>,
 ) -> Answer<Response> {
     let response = blocking(move || {
-        let catalog = studio.dataset.catalogs.get(&studio.folder, &asked.folder)?;
+        let catalogs = &studio.dataset.catalogs;
+        let catalog = catalogs.get(&studio.folder, &asked.folder, asked.listing)?;
         shown(
             &picture_file(&studio.folder, &catalog, asked.row)?,
             asked.side,

@@ -18,7 +18,7 @@ use std::sync::Arc;
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 pub(super) struct EntryName {
     list: String,
-    photo: String,
+    pub(super) photo: String,
 }
 
 impl EntryName {

@@ -16,6 +16,8 @@ use std::sync::Arc;
 /// A review as the page has it.
 #[derive(Serialize)]
 pub(super) struct ReadReview {
+    /// Width and height of what was painted on, pixels; none where there is no file yet.
+    size: Option<[usize; 2]>,
     strokes: Vec<Stroke>,
     verdict: Option<Verdict>,
     /// None where there is no file yet.
@@ -33,6 +35,7 @@ fn read_review(folder: &Folder, photo: &str) -> Answer<ReadReview> {
     let file = folder.text_if_any(&review_name(photo))?;
     let review = review_of(folder, photo)?;
     Ok(ReadReview {
+        size: file.as_ref().map(|_| review.size_px),
         strokes: review.strokes,
         verdict: review.verdict,
         version: file.map(|file| file.version),

@@ -8,11 +8,12 @@ use crate::studio::Studio;
 use crate::turn::{Tab, Turns};
 use axum::extract::State;
 use axum::http::StatusCode;
-use petcomp::asset::{OpenPhoto, PhotoEntry};
+use petcomp::asset::{OpenPhoto, PhotoEntry, Review};
 use petcomp::matte::{CutOut, CutOutOptions, Stroke};
 use petcomp::{Diagnostic, Error, Film, Image, LinearRgb, Roi};
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
+use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Instant, SystemTime};
 
@@ -126,6 +127,20 @@ pub(super) struct SolveRequest {
     #[serde(flatten)]
     name: EntryName,
     strokes: Vec<Stroke>,
+    /// Width and height of what these were painted on, pixels; none where no review says it.
+    size: Option<[usize; 2]>,
+}
+
+impl SolveRequest {
+    /// Why its strokes say nothing of a photo, in the words of `asset build`: they were painted on
+    /// another size.
+    fn outdated(&self, photo: &OpenPhoto<'_>) -> Option<String> {
+        let size = self.size.filter(|_| !self.strokes.is_empty())?;
+        let checked = Review::new(size.into(), Vec::new()).check_size(photo.picture().size());
+        let error = checked.err()?;
+        let file = Review::path_of(Path::new(&self.name.photo));
+        Some(error.in_file(file).to_string())
+    }
 }
 
 /// A cut-out in words; its layers are asked for by its number.
@@ -136,6 +151,8 @@ pub(super) struct SolvedInWords {
     size: [usize; 2],
     /// Why there is no cut-out.
     refused: Option<String>,
+    /// Why it is solved without the strokes.
+    outdated: Option<String>,
     diagnostics: Vec<Diagnostic>,
     outline_confidence: Option<f64>,
     color_confidence: Option<f64>,
@@ -153,7 +170,13 @@ pub(super) async fn solve(
             .mattes
             .open(PhotoKey::new(&request.name, &studio.folder)?)?;
         turn.check()?;
-        cut_out(&studio.mattes, photo, &request.strokes).map(Json)
+        let outdated = request.outdated(&photo);
+        let strokes = match outdated {
+            Some(_) => Vec::new(),
+            None => request.strokes,
+        };
+        let solved = cut_out(&studio.mattes, photo, &strokes)?;
+        Ok(Json(SolvedInWords { outdated, ..solved }))
     };
     turns.run(tab, work).await
 }
@@ -185,6 +208,7 @@ impl SolvedInWords {
             number: 0,
             size: size.into(),
             refused: outcome.as_ref().err().map(ToString::to_string),
+            outdated: None,
             diagnostics: cut.map(|cut| cut.diagnostics.clone()).unwrap_or_default(),
             outline_confidence: cut.map(|cut| cut.segmentation.confidence.value()),
             color_confidence: cut

@@ -78,22 +78,24 @@ impl Pipelines {
         let lane = &self.lanes[(asked.k % self.lanes.len() as u64) as usize];
         let _lane = lane.lock().unwrap_or_else(PoisonError::into_inner);
         turn.check()?;
-        let config = asked.config(folder)?;
-        let pipeline = self.opened(config)?.with_config(asked.config(folder)?)?;
+        let whole = asked.config(folder)?;
+        let image = whole.scene.image;
+        let config = asked.reduced(whole);
+        let pipeline = self.opened(&config, image)?.with_config(config, image)?;
         turn.check()?;
         let sample = pipeline.sample(asked.seed, asked.k)?;
         jpeg(&asked.shown(&sample, &pipeline))
     }
 
-    /// A pipeline with the assets and photos of a config.
-    fn opened(&self, config: DatasetConfig) -> Answer<Arc<Pipeline>> {
+    /// A pipeline with the assets and photos of a config; `whole` is the size of the recipe's own
+    /// pictures.
+    fn opened(&self, config: &DatasetConfig, whole: [u32; 2]) -> Answer<Arc<Pipeline>> {
         let mut kept = self.kept();
-        if let Some(place) = kept.iter().position(|known| opens_same(known, &config)) {
+        if let Some(place) = kept.iter().position(|known| opens_same(known, config)) {
             kept[place..].rotate_left(1);
             return Ok(kept[kept.len() - 1].clone());
         }
-        let opened = Pipeline::open(config.clone())?.with_config(config)?;
-        let opened = Arc::new(opened);
+        let opened = Arc::new(Pipeline::for_tuning(config.clone(), whole)?);
         kept.push(opened.clone());
         let surplus = kept.len().saturating_sub(KEPT);
         kept.drain(..surplus);
@@ -112,15 +114,21 @@ fn opens_same(known: &Pipeline, config: &DatasetConfig) -> bool {
 }
 
 impl PictureAsked {
+    /// The recipe with its edits, as a dataset is made of it.
     fn config(&self, folder: &Folder) -> Answer<DatasetConfig> {
         let path = folder.file(&self.file)?;
         let text = self.edits.apply(&folder.read_text(&self.file)?.text)?;
         let config = DatasetConfig::parse(&text, &path, &[])?;
         check_stays_inside(&config, folder)?;
-        Ok(match self.side {
+        Ok(config)
+    }
+
+    /// The same for the picture that is asked for.
+    fn reduced(&self, config: DatasetConfig) -> DatasetConfig {
+        match self.side {
             Some(side) => small(config, side),
             None => config,
-        })
+        }
     }
 
     fn shown(&self, sample: &Sample, pipeline: &Pipeline) -> Image<Srgb8> {

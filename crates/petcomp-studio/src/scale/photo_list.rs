@@ -130,10 +130,23 @@ fn names(entry: &Table, file: &str) -> bool {
 }
 
 fn entries_of(text: &str, list: &str) -> Answer<Vec<Table>> {
-    let table: Table = toml::from_str(text).map_err(|e| Error::file(list, e.message()))?;
+    let table = table_of(text, list)?;
     let entries = table.get("photos").and_then(Value::as_array);
     let entries = entries.into_iter().flatten();
     Ok(entries.filter_map(Value::as_table).cloned().collect())
+}
+
+/// The classes that a list declares.
+fn classes_of(text: &str, list: &str) -> Answer<Vec<String>> {
+    let declared = table_of(text, list)?.remove("classes");
+    let classes: Result<Vec<String>, toml::de::Error> =
+        declared.map_or(Ok(Vec::new()), Value::try_into);
+    Ok(classes.map_err(|e| Error::file(list, e.message()))?)
+}
+
+fn table_of(text: &str, list: &str) -> Answer<Table> {
+    let table = toml::from_str(text);
+    Ok(table.map_err(|e| Error::file(list, e.message()))?)
 }
 
 /// Saves the scale of a photo in the list beside it; one that is not in it is added at its end.
@@ -147,7 +160,9 @@ pub(super) fn save(folder: &Folder, new: &ScaledPhoto<'_>, version: Option<&str>
     let file = listed_name(&before, &folder.file(new.photo)?).unwrap_or(file.into());
     let changed = with_scale(&text, &file, new);
     let after = entries_of(&changed, &list)?;
-    check_entry(changed_entry(&before, &after, &file, &list)?, &list)?;
+    let classes = classes_of(&text, &list)?;
+    let entry = changed_entry(&before, &after, &file, &list)?;
+    check_entry(entry, classes, &list)?;
     folder.save(&list, &changed, version)?;
     Ok(())
 }
@@ -185,12 +200,16 @@ fn changed_entry<'a>(
     }
 }
 
-/// Fails on an entry for which `asset build` would refuse the whole list.
-fn check_entry(entry: &Table, list: &str) -> Answer<()> {
+/// Fails on an entry for which `asset build` would refuse the whole list, which declares `classes`,
+/// or none and takes any.
+fn check_entry(entry: &Table, mut classes: Vec<String>, list: &str) -> Answer<()> {
     let read: Result<PhotoEntry, toml::de::Error> = entry.clone().try_into();
     let entry = read.map_err(|e| Error::file(list, e.message()))?;
+    if classes.is_empty() {
+        classes.push(entry.class.clone());
+    }
     let known = Manifest {
-        classes: vec![entry.class.clone()],
+        classes,
         ..Manifest::default()
     };
     Ok(entry.check(&known).map_err(|e| e.in_file(list))?)
@@ -347,5 +366,9 @@ mod tests {
         assert!(refused(LIST_NAME, captured, 2e3).contains("one of several scales"));
         assert!(refused(LIST_NAME, "", 0.004).contains("photos.toml: px_per_metre: 0, expected"));
         assert!(refused(OTHER_LIST_NAME, "", 2e3).contains("photos.csv: lists the photos"));
+        let declared = "classes = [\"cup\", \"lid\"]\n";
+        let class = saved(LIST_NAME, declared, &cup("a.png", 2e3)).unwrap_err();
+        let expected = "photos.toml: class: \"cup \"1\"\", expected one of cup, lid";
+        assert_eq!(class, expected);
     }
 }

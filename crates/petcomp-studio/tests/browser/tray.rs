@@ -31,6 +31,7 @@ pub(crate) fn fill(folder: &Path) {
         folder.join("bottles/photos.toml"),
         folder.join("assets"),
         &|_, _| {},
+        &AtomicBool::new(false),
     )
     .unwrap();
 }
