@@ -37,13 +37,10 @@ const SEPARATORS: [u8; 3] = [b',', b';', b'\t'];
 /// [`Error::Value`] with the line: a column that no photo has, a cell that is not a number, letters
 /// in an unknown encoding.
 pub(super) fn rows(bytes: &[u8]) -> Result<Vec<SpreadsheetRow>> {
-    // Else the reader of CSV counts lines wrongly.
-    let text = decoded(bytes)?.replace("\r\n", "\n");
-    let text = text.trim_start_matches('\u{feff}');
-    let separator = separator(text.lines().next().unwrap_or_default());
-    let mut reader = csv_reader(text, separator);
+    let text = text_of(bytes)?;
+    let mut reader = csv_reader(&text);
     let headers = reader.headers().map_err(|e| csv_error(&e))?;
-    let sheet = Columns::new(headers, separator)?;
+    let sheet = Columns::new(headers, separator(&text))?;
     reader
         .records()
         .map(|record| sheet.row(&record.map_err(|e| csv_error(&e))?))
@@ -51,9 +48,20 @@ pub(super) fn rows(bytes: &[u8]) -> Result<Vec<SpreadsheetRow>> {
         .collect()
 }
 
-fn csv_reader(text: &str, separator: u8) -> csv::Reader<&[u8]> {
+/// The letters of a spreadsheet.
+///
+/// # Errors
+/// [`Error::Value`] for an unknown encoding.
+pub(crate) fn text_of(bytes: &[u8]) -> Result<String> {
+    // Else the reader of CSV counts lines wrongly.
+    let text = decoded(bytes)?.replace("\r\n", "\n");
+    Ok(text.trim_start_matches('\u{feff}').to_owned())
+}
+
+/// Reads the cells of a text, whatever separates them.
+pub(crate) fn csv_reader(text: &str) -> csv::Reader<&[u8]> {
     csv::ReaderBuilder::new()
-        .delimiter(separator)
+        .delimiter(separator(text))
         .trim(csv::Trim::All)
         .from_reader(text.as_bytes())
 }
@@ -77,7 +85,7 @@ impl Columns {
     }
 
     fn row(&self, record: &csv::StringRecord) -> Result<SpreadsheetRow> {
-        let line = record.position().map_or(0, csv::Position::line);
+        let line = line_of(record);
         let mut cells = toml::Table::new();
         let filled = self.names.iter().zip(record);
         for (name, cell) in filled.filter(|(_, cell)| !cell.is_empty()) {
@@ -153,7 +161,9 @@ fn is_control_code(byte: u8) -> bool {
     (0x80..0xa0).contains(&byte) || byte == 0
 }
 
-fn separator(header: &str) -> u8 {
+/// What separates the cells, by the first line.
+fn separator(text: &str) -> u8 {
+    let header = text.lines().next().unwrap_or_default();
     SEPARATORS
         .into_iter()
         .rev()
@@ -192,8 +202,13 @@ fn column_name(header: &str) -> Result<&'static str> {
     }
 }
 
+/// Where a line of cells stands in its file, from 1.
+pub(crate) fn line_of(record: &csv::StringRecord) -> u64 {
+    record.position().map_or(0, csv::Position::line)
+}
+
 /// The same error, of a line of the file.
-pub(super) fn in_line(error: Error, line: u64) -> Error {
+pub(crate) fn in_line(error: Error, line: u64) -> Error {
     match error {
         Error::Value { at, what } if at == "document" => Error::value(format!("line {line}"), what),
         Error::Value { at, what } => Error::value(format!("line {line}: {at}"), what),
@@ -201,7 +216,8 @@ pub(super) fn in_line(error: Error, line: u64) -> Error {
     }
 }
 
-fn csv_error(error: &csv::Error) -> Error {
+/// What is wrong with the cells, in our words, and in which line.
+pub(crate) fn csv_error(error: &csv::Error) -> Error {
     let what = match error.kind() {
         csv::ErrorKind::UnequalLengths {
             expected_len, len, ..

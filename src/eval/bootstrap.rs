@@ -6,14 +6,14 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// A value and the range that holds 95 of 100 resampled ones.
+/// A value and its interval of 95 %.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Interval {
     /// The value of the sample as it is.
     pub value: f64,
-    /// 2.5 % quantile of the resampled values.
+    /// Its lower end; by bootstrap the 2.5 % quantile of the resampled values.
     pub low: f64,
-    /// 97.5 % quantile.
+    /// Its upper end; the 97.5 % quantile.
     pub high: f64,
 }
 

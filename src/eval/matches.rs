@@ -47,12 +47,17 @@ impl Matches {
     /// # Panics
     /// When there are weights and not one per image.
     pub fn map(&self, weights: &[u32]) -> f64 {
+        self.map_if_any(weights).unwrap_or(0.0)
+    }
+
+    /// As [`map`](Self::map); none where nothing is to be found.
+    pub(crate) fn map_if_any(&self, weights: &[u32]) -> Option<f64> {
         self.check(weights);
         let rankings = self.rankings.par_iter();
         let each: Vec<f64> = rankings
             .filter_map(|ranking| self.class_map(ranking, weights))
             .collect();
-        mean(each)
+        (!each.is_empty()).then(|| mean(each))
     }
 
     /// As [`curves`](super::curves()), matched by this definition.

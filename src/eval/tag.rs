@@ -1,6 +1,8 @@
 //! Tags of images (light, camera position, ..), for scores per factor.
 
-use super::{filled_lines, in_line};
+use super::EvalImage;
+use super::yolo::{is_picture, no_image};
+use crate::asset::spreadsheet::{csv_error, csv_reader, in_line, line_of, text_of};
 use crate::error::{Error, Result};
 use crate::io;
 use std::collections::{BTreeMap, BTreeSet};
@@ -14,77 +16,95 @@ pub struct Tags {
     levels: BTreeMap<String, Vec<String>>,
 }
 
-/// Reads a CSV whose first column is the image's name and whose others are factors; its first line
-/// names them.
+/// Reads a CSV, as spreadsheets write it, whose first column is the image and whose others are
+/// factors; its first line names them.
+///
+/// An image is called as its sheet is, or by its file, in a folder or without one. An empty cell
+/// says nothing.
 ///
 /// # Errors
-/// [`Error::File`] for a file without a line of names, a line of another length, or an image listed
-/// twice.
-pub fn read_tags(path: &Path) -> Result<Tags> {
-    let text = io::read_text(path)?;
-    parse(&text).map_err(|what| Error::file(path, what))
+/// [`Error::File`] for a file that cannot be read; [`Error::Field`] for one without a line of
+/// names, a line of another length, an image that no sheet is of or that is listed twice.
+pub fn read_tags(path: &Path, sheets: &[EvalImage]) -> Result<Tags> {
+    let bytes = io::read_bytes(path)?;
+    parse(&bytes, sheets).map_err(|e| e.in_file(path))
 }
 
-fn parse(text: &str) -> std::result::Result<Tags, String> {
-    let mut lines = filled_lines(text);
-    let titles = lines.next().map(|(_, line)| cells(line));
-    let mut tags = Tags::with_titles(&titles.unwrap_or_default())?;
-    for (i, line) in lines {
-        tags.add(cells(line)).map_err(|what| in_line(i, &what))?;
+fn parse(bytes: &[u8], sheets: &[EvalImage]) -> Result<Tags> {
+    let text = text_of(bytes)?;
+    let mut reader = csv_reader(&text);
+    let mut tags = Tags::with_titles(reader.headers().map_err(|e| csv_error(&e))?)?;
+    let images = sheets.iter().map(|sheet| sheet.image.as_str()).collect();
+    for row in reader.records() {
+        let row = row.map_err(|e| csv_error(&e))?;
+        tags.add(&row, &images)
+            .map_err(|e| in_line(e, line_of(&row)))?;
     }
     Ok(tags)
 }
 
-fn cells(line: &str) -> Vec<String> {
-    line.split(',').map(|cell| cell.trim().to_owned()).collect()
+/// The image that a name in a table means.
+fn image_called<'a>(name: &str, images: &BTreeSet<&'a str>) -> Result<&'a str> {
+    let file = name.rsplit('/').next().unwrap_or_default();
+    let names = [name, file, without_extension(file)];
+    let image = names.into_iter().find_map(|name| images.get(name));
+    image
+        .copied()
+        .ok_or_else(|| Error::value("document", no_image(name, images.len())))
 }
 
-/// The name of an image without folder and extension.
-fn stem_of(name: &str) -> String {
-    let stem = Path::new(name).file_stem().unwrap_or_default();
-    stem.to_string_lossy().into_owned()
+/// Of an image's file; any other name stays, whatever dots are in it.
+fn without_extension(file: &str) -> &str {
+    match file.rsplit_once('.') {
+        Some((stem, _)) if is_picture(Path::new(file)) => stem,
+        _ => file,
+    }
+}
+
+/// What a row of cells says of a factor.
+fn level(row: &[String], factor: usize) -> Option<&str> {
+    let cell = row.get(factor).map(String::as_str);
+    cell.filter(|cell| !cell.is_empty())
 }
 
 impl Tags {
     /// Adds a line: the image and its level of each factor.
-    fn add(&mut self, row: Vec<String>) -> std::result::Result<(), String> {
-        self.check_cells(&row)?;
-        match self.levels.insert(stem_of(&row[0]), row[1..].to_vec()) {
-            None => Ok(()),
-            Some(_) => Err(format!("image \"{}\" is listed twice", row[0])),
-        }
-    }
-
-    fn check_cells(&self, row: &[String]) -> std::result::Result<(), String> {
-        let expected = 1 + self.factors.len();
-        if row.len() == expected {
+    fn add(&mut self, row: &csv::StringRecord, images: &BTreeSet<&str>) -> Result<()> {
+        if row.iter().all(str::is_empty) {
             return Ok(());
         }
-        Err(format!("{} cells, expected {expected}", row.len()))
+        let image = image_called(&row[0], images)?;
+        let levels = row.iter().skip(1).map(String::from).collect();
+        match self.levels.insert(image.to_owned(), levels) {
+            None => Ok(()),
+            Some(_) => {
+                let what = format!("image \"{}\" is listed twice", &row[0]);
+                Err(Error::value("document", what))
+            }
+        }
     }
 
     /// No tags yet, for the factors that the first line names behind the image.
-    fn with_titles(titles: &[String]) -> std::result::Result<Self, String> {
+    fn with_titles(titles: &csv::StringRecord) -> Result<Self> {
         if titles.len() < 2 {
-            return Err("no factors, expected a first line such as image,light,camera".into());
+            let what = "no factors, expected a first line such as image,light,camera";
+            return Err(Error::value("line 1", what));
         }
         Ok(Self {
-            factors: titles[1..].to_vec(),
+            factors: titles.iter().skip(1).map(String::from).collect(),
             levels: BTreeMap::new(),
         })
     }
 
     /// What a factor is for an image; none for an image without tags.
     pub fn of(&self, image: &str, factor: usize) -> Option<&str> {
-        self.levels.get(image)?.get(factor).map(String::as_str)
+        level(self.levels.get(image)?, factor)
     }
 
     /// Everything that a factor is for some image, in order.
     pub fn levels(&self, factor: usize) -> BTreeSet<&str> {
-        self.levels
-            .values()
-            .filter_map(|row| row.get(factor).map(String::as_str))
-            .collect()
+        let rows = self.levels.values();
+        rows.filter_map(|row| level(row, factor)).collect()
     }
 }
 
@@ -92,31 +112,59 @@ impl Tags {
 mod tests {
     use super::*;
 
+    fn tags_of(text: &str, images: &[&str]) -> std::result::Result<Tags, String> {
+        let sheets = images.iter().map(|image| EvalImage::new(*image, vec![]));
+        let sheets: Vec<EvalImage> = sheets.collect();
+        parse(text.as_bytes(), &sheets).map_err(|e| e.to_string())
+    }
+
     #[test]
     fn factors_are_told_by_image() {
-        let tags = parse("image,light,camera\na.png, dim, v0\nb,bright,v1\n").unwrap();
+        let text = "image,light,camera\nval/a.png, dim, v0\nb,bright,v1\n,,\nc,,v1\n";
+        let tags = tags_of(text, &["a", "b", "c", "d"]).unwrap();
         assert_eq!(
-            (tags.of("a", 0), tags.of("b", 1), tags.of("c", 0)),
+            (tags.of("a", 0), tags.of("b", 1), tags.of("d", 0)),
             (Some("dim"), Some("v1"), None)
         );
+        assert_eq!(Vec::from_iter(tags.levels(0)), ["bright", "dim"]);
+    }
+
+    #[test]
+    fn tables_of_a_spreadsheet_are_read() {
+        let text = "\u{feff}image;light\r\na;\"dim; from the left\"\r\n";
+        let tags = tags_of(text, &["a"]).unwrap();
+        assert_eq!(tags.of("a", 0), Some("dim; from the left"));
+    }
+
+    #[test]
+    fn a_name_with_dots_is_no_name_with_an_extension() {
+        let images = ["cam1.2024-01-01", "cam1.2024-01-02"];
+        let text = "image,light\ncam1.2024-01-01,dim\ncam1.2024-01-02.JPG,bright\n";
+        let tags = tags_of(text, &images).unwrap();
         assert_eq!(
-            tags.levels(0).into_iter().collect::<Vec<_>>(),
-            ["bright", "dim"]
+            images.map(|image| tags.of(image, 0)),
+            [Some("dim"), Some("bright")]
         );
     }
 
     #[test]
     fn bad_tables_are_named() {
-        assert!(parse("").unwrap_err().contains("no factors"));
-        assert!(
-            parse("image,light\na,dim,v0\n")
-                .unwrap_err()
-                .contains("line 2: 3 cells, expected 2")
+        let told = |text| tags_of(text, &["a"]).unwrap_err();
+        assert_eq!(
+            told(""),
+            "line 1: no factors, expected a first line such as image,light,camera"
         );
-        assert!(
-            parse("image,light\na,dim\na.png,dim\n")
-                .unwrap_err()
-                .contains("listed twice")
+        assert_eq!(
+            told("image,light\na,dim,v0\n"),
+            "line 2: 3 cells, expected 2"
+        );
+        assert_eq!(
+            told("image,light\na,dim\na.png,dim\n"),
+            "line 3: image \"a.png\" is listed twice"
+        );
+        assert_eq!(
+            told("image,light\na,dim\nb,dim\n"),
+            "line 3: no image \"b\" in the truth of 1 images"
         );
     }
 }

@@ -5,6 +5,7 @@ use crate::error::{Error, Result};
 use crate::geom::{BBox, Point2};
 use crate::io::{self, Format};
 use rayon::prelude::*;
+use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
@@ -19,17 +20,17 @@ pub struct YoloTruth {
     pub pictures: Vec<Option<Picture>>,
 }
 
-/// Reads `NAME.txt` of a folder of labels: `class cx cy w h`, shares of the image, one box a line;
-/// outlines (`class x1 y1 x2 y2 ..`) give the box around them.
+/// Reads `NAME.txt` of a folder of labels and of those below it: `class cx cy w h`, shares of the
+/// image, one box a line; outlines (`class x1 y1 x2 y2 ..`) give the box around them.
 ///
-/// The images are in the folder `images`, by default where YOLO has them: the same path with its
+/// The images are below the folder `images`, by default where YOLO has them: the same path with its
 /// last `labels` replaced by `images`. One without a label file shows nothing that is to be found.
 /// Sizes come from the images; `size` is taken for all where it is given. Overlaps do not depend on
 /// it, COCO's ranges of area do.
 ///
 /// # Errors
 /// [`Error::File`] for a folder without labels, a label without an image where no `size` is given,
-/// or a bad line.
+/// files of one name in several folders, or a bad line.
 pub fn read_yolo_truth(
     labels: &Path,
     images: Option<&Path>,
@@ -49,10 +50,13 @@ pub fn read_yolo_truth(
 /// The truth of an image, its size, and the image where it is found.
 type LabelledImage = (EvalImage, [u32; 2], Option<Picture>);
 
+/// Files by their names without folder and extension.
+type FilesByName = BTreeMap<String, PathBuf>;
+
 /// A folder of labels and that of its images, whose files have the same names.
 struct LabelFolder {
-    labels: BTreeMap<String, PathBuf>,
-    images: BTreeMap<String, PathBuf>,
+    labels: FilesByName,
+    images: FilesByName,
     image_folder: PathBuf,
 }
 
@@ -60,10 +64,10 @@ impl LabelFolder {
     fn open(labels: &Path, images: Option<&Path>) -> Result<Self> {
         let beside = || io::with_last_step(labels, "labels", "images");
         let image_folder = images.map_or_else(beside, Path::to_path_buf);
-        let (mut labels, images) = (text_files(labels)?, picture_files(&image_folder));
-        labels.retain(|name, path| !is_class_list(path) || images.contains_key(name));
+        let images = picture_files(&image_folder)?;
+        let is_label = |path: &Path| !is_class_list(path) || images.contains_key(&name_of(path));
         Ok(Self {
-            labels,
+            labels: text_files(labels, is_label)?,
             images,
             image_folder,
         })
@@ -101,9 +105,8 @@ fn read_image(image: &Path) -> Result<LabelledImage> {
     let size = image_size(image)?;
     let label = Some(label_of(image)).filter(|label| label.exists());
     let truth = truth_of(label.as_deref(), size)?;
-    let name = image.file_stem().unwrap_or_default().to_string_lossy();
     let picture = Some(picture_of(image.into(), size));
-    Ok((EvalImage::new(name, truth), size, picture))
+    Ok((EvalImage::new(name_of(image), truth), size, picture))
 }
 
 /// Where YOLO has the label of an image.
@@ -127,6 +130,11 @@ pub(crate) fn is_image(path: &Path) -> bool {
     extension.is_some_and(|e| TRAINED_EXTENSIONS.contains(&e.as_str()))
 }
 
+/// Whether a file is an image by its name, a trainer's or one that petcomp reads.
+pub(super) fn is_picture(path: &Path) -> bool {
+    is_image(path) || Format::from_extension(path).is_some()
+}
+
 /// Nothing where there is no label file.
 fn truth_of(label: Option<&Path>, size: [u32; 2]) -> Result<Vec<GroundTruth>> {
     label.map_or_else(|| Ok(Vec::new()), |label| read_truth(label, size))
@@ -139,25 +147,27 @@ fn picture_of(path: PathBuf, size: [u32; 2]) -> Picture {
     }
 }
 
-/// Adds what a detector found, from `NAME.txt` of a folder: `class cx cy w h confidence`.
+/// Adds what a detector found, from `NAME.txt` of a folder and of those below it: `class cx cy w h
+/// confidence`.
 ///
 /// An image without a file has no detections; a file without an image is refused, as it may be a
 /// misspelt name.
 ///
 /// # Errors
-/// [`Error::File`] for a folder that cannot be read, a name that the truth does not have, or a bad
-/// line.
+/// [`Error::File`] for a folder that cannot be read, a name that the truth does not have, files of
+/// one name in several folders, or a bad line.
 pub fn read_yolo_detections(folder: &Path, truth: &mut YoloTruth) -> Result<()> {
-    let (known, files) = (truth.places_by_name(), text_files(folder)?);
+    let (known, files) = (truth.places_by_name(), text_files(folder, |_| true)?);
     if files.is_empty() {
-        log::warn!("{}: {}", folder.display(), no_detections(folder));
+        let folder = folder.display();
+        log::warn!("{folder}: no NAME.txt, so nothing was found in any image");
     }
     let found: Vec<(usize, Vec<Detection>)> = files
         .par_iter()
         .map(|(name, path)| {
             let &i = known
                 .get(name.as_str())
-                .ok_or_else(|| unknown_image(name, path, known.len()))?;
+                .ok_or_else(|| Error::file(path, no_image(name, known.len())))?;
             Ok((i, read_detections(path, truth.sizes[i])?))
         })
         .collect::<Result<_>>()?;
@@ -184,9 +194,9 @@ impl YoloTruth {
     }
 }
 
-fn unknown_image(name: &str, path: &Path, count: usize) -> Error {
-    let what = format!("no image \"{name}\" in the truth of {count} images");
-    Error::file(path, what)
+/// What is wrong with a name that no image has.
+pub(super) fn no_image(name: &str, count: usize) -> String {
+    format!("no image \"{name}\" in the truth of {count} images")
 }
 
 fn read_truth(path: &Path, size: [u32; 2]) -> Result<Vec<GroundTruth>> {
@@ -221,50 +231,54 @@ pub(crate) fn sheet_of(
     })
 }
 
-/// Where detections may lie that a folder has not: Ultralytics writes them below its pictures.
-fn no_detections(folder: &Path) -> String {
-    let below = folder.join("labels");
-    let advice = match below.is_dir() {
-        true => format!("; is it {}?", below.display()),
-        false => String::new(),
-    };
-    format!("no NAME.txt, so nothing was found in any image{advice}")
+/// What an image and its label are called.
+fn name_of(path: &Path) -> String {
+    let name = path.file_stem().unwrap_or_default();
+    name.to_string_lossy().into_owned()
 }
 
-/// The text files of a folder by their names without extension, in order.
-fn text_files(folder: &Path) -> Result<BTreeMap<String, PathBuf>> {
-    let mut texts = BTreeMap::new();
-    for entry in std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))? {
-        let path = entry.map_err(|e| Error::file(folder, e))?.path();
-        if path.extension().is_some_and(|e| e == "txt")
-            && let Some(name) = path.file_stem()
-        {
-            texts.insert(name.to_string_lossy().into_owned(), path);
-        }
+/// The text files of a kind below a folder.
+fn text_files(folder: &Path, is_wanted: impl Fn(&Path) -> bool) -> Result<FilesByName> {
+    let is_text = |path: &Path| path.extension().is_some_and(|e| e == "txt");
+    let is_wanted = |path: &Path| is_text(path) && is_wanted(path);
+    by_name(io::files_below(folder, is_wanted, usize::MAX)?)
+}
+
+/// The pictures below a folder; none where there is no folder.
+fn picture_files(folder: &Path) -> Result<FilesByName> {
+    if !folder.is_dir() {
+        return Ok(FilesByName::new());
     }
-    Ok(texts)
-}
-
-/// The pictures of a folder by their names without extension; none where there is no folder.
-fn picture_files(folder: &Path) -> BTreeMap<String, PathBuf> {
-    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
-    let paths = entries.map(|entry| entry.path());
-    let mut paths: Vec<PathBuf> = paths
-        .filter(|path| is_image(path) || Format::from_extension(path).is_some())
-        .collect();
+    let mut paths = io::files_below(folder, is_picture, usize::MAX)?;
     // Of one name JPEG and PNG come first, which a page shows as they are, and what cannot be read
     // last.
     paths.sort_by_cached_key(|path| {
         let format = Format::from_extension(path);
         (!is_jpeg_or_png(format), format.is_none(), path.clone())
     });
-    let mut pictures = BTreeMap::new();
+    by_name(paths)
+}
+
+/// Of one name in one folder the first file counts; in several folders they are of several images,
+/// which nothing tells apart.
+fn by_name(paths: Vec<PathBuf>) -> Result<FilesByName> {
+    let mut files = FilesByName::new();
     for path in paths {
-        let name = path.file_stem().unwrap_or_default();
-        let name = name.to_string_lossy().into_owned();
-        pictures.entry(name).or_insert(path);
+        match files.entry(name_of(&path)) {
+            Entry::Vacant(place) => {
+                place.insert(path);
+            }
+            Entry::Occupied(first) if first.get().parent() == path.parent() => {}
+            Entry::Occupied(first) => return Err(same_name(&path, first.get())),
+        }
     }
-    pictures
+    Ok(files)
+}
+
+fn same_name(path: &Path, first: &Path) -> Error {
+    let first = first.display();
+    let what = format!("named as {first}, expected another name: folders do not tell images apart");
+    Error::file(path, what)
 }
 
 fn is_jpeg_or_png(format: Option<Format>) -> bool {
@@ -418,9 +432,50 @@ mod tests {
     fn folder(files: &[(&str, &str)]) -> tempfile::TempDir {
         let folder = tempfile::tempdir().unwrap();
         for (name, text) in files {
-            std::fs::write(folder.path().join(name), text).unwrap();
+            let path = folder.path().join(name);
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(path, text).unwrap();
         }
         folder
+    }
+
+    const BOX: &str = "0 0.5 0.5 1 1\n";
+
+    #[test]
+    fn labels_and_detections_may_lie_in_folders_below() {
+        let labels = folder(&[
+            ("a.txt", BOX),
+            ("room1/b.txt", BOX),
+            ("room1/classes.txt", "x"),
+        ]);
+        let mut truth = read_yolo_truth(labels.path(), None, Some([9, 9])).unwrap();
+        let found = folder(&[("labels/b.txt", "0 0.5 0.5 1 1 0.25\n")]);
+        read_yolo_detections(found.path(), &mut truth).unwrap();
+        let counts = truth.sheets.iter().map(|sheet| {
+            let counts = (sheet.truth.len(), sheet.found.len());
+            (sheet.image.as_str(), counts)
+        });
+        assert_eq!(Vec::from_iter(counts), [("a", (1, 0)), ("b", (1, 1))]);
+    }
+
+    #[test]
+    fn images_of_one_name_are_refused_and_files_of_one_image_are_not() {
+        let labels = folder(&[("a.txt", BOX), ("room1/a.txt", BOX)]);
+        let told = read_yolo_truth(labels.path(), None, Some([9, 9])).unwrap_err();
+        let told = told.to_string();
+        assert!(told.contains("room1/a.txt: named as ") && told.contains("/a.txt, expected"));
+        let labels = folder(&[("a.txt", BOX)]);
+        let images = folder(&[("a.jpg", ""), ("a.heic", "")]);
+        let truth = read_yolo_truth(labels.path(), Some(images.path()), Some([9, 9])).unwrap();
+        let picture = truth.pictures[0].as_ref().unwrap();
+        assert!(picture.path.ends_with("a.jpg"));
+        std::fs::create_dir(images.path().join("room1")).unwrap();
+        std::fs::write(images.path().join("room1/a.jpg"), "").unwrap();
+        let told = read_yolo_truth(labels.path(), Some(images.path()), Some([9, 9])).unwrap_err();
+        assert!(
+            told.to_string().contains("room1/a.jpg: named as "),
+            "{told}"
+        );
     }
 
     #[test]

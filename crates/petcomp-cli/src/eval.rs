@@ -7,7 +7,7 @@ use crate::values::{count, parse_pixel_size};
 use petcomp::dataset::YoloSet;
 use petcomp::eval::page::{self, EvalReportOptions, Metrics, Run};
 use petcomp::eval::{
-    ConfusionOptions, EvalImage, read_coco_results, read_coco_truth, read_tags,
+    ConfusionOptions, EvalImage, Tags, read_coco_results, read_coco_truth, read_tags,
     read_yolo_detections, read_yolo_truth,
 };
 use std::path::{Path, PathBuf};
@@ -18,7 +18,7 @@ pub(crate) struct EvalArgs {
     /// confidence`) or COCO JSON
     #[arg(required = true, num_args = 2.., value_names = ["PREDICTIONS", "TRUTH"])]
     paths: Vec<PathBuf>,
-    /// CSV with a line `image,light,..` and what each image is: scores per factor
+    /// CSV with a line `image,light,..` and what each image of the truth is: scores per factor
     #[arg(long, value_name = "CSV")]
     tags: Option<PathBuf>,
     /// Names of the classes in order; default: those of a data.yaml or a COCO file
@@ -37,7 +37,7 @@ pub(crate) struct EvalArgs {
     /// Most pictures of false alarms, and of misses, on the page
     #[arg(short = 'n', long, value_name = "N", default_value_t = EvalReportOptions::default().shown)]
     most: usize,
-    /// Rounds of the bootstrap over images, at most 100000
+    /// Rounds of the bootstrap over images, at most 100000; there is no interval of fewer than 40
     #[arg(long, value_name = "N", default_value_t = EvalReportOptions::default().rounds, value_parser = count(0..=100_000))]
     rounds: usize,
     /// Seed of the bootstrap
@@ -55,8 +55,9 @@ fn parse_confidence(text: &str) -> Result<f64, String> {
 }
 
 pub(crate) fn run(args: &EvalArgs, global: &GlobalArgs) -> anyhow::Result<()> {
-    let mut options = args.report_options()?;
+    let mut options = args.report_options();
     let runs = args.read_runs(&mut options)?;
+    options.tags = args.tags_of(&runs)?;
     let metrics = args.measure(&runs, &options)?;
     print_scores(&metrics, &options, global);
     print_factors(&runs, &options);
@@ -85,11 +86,9 @@ fn print_factors(runs: &[Run], options: &EvalReportOptions) {
 }
 
 impl EvalArgs {
-    fn report_options(&self) -> anyhow::Result<EvalReportOptions> {
-        let tags = self.tags.as_deref().map(read_tags).transpose()?;
-        Ok(EvalReportOptions {
+    fn report_options(&self) -> EvalReportOptions {
+        EvalReportOptions {
             classes: self.classes.clone(),
-            tags: tags.unwrap_or_default(),
             rounds: self.rounds,
             seed: self.seed,
             confusion: ConfusionOptions {
@@ -97,8 +96,16 @@ impl EvalArgs {
                 ..Default::default()
             },
             shown: self.most,
-            pictures: Vec::new(),
-        })
+            ..Default::default()
+        }
+    }
+
+    /// Tags of the images of the truth, which is the same for all runs.
+    fn tags_of(&self, runs: &[Run]) -> petcomp::Result<Tags> {
+        match (&self.tags, runs) {
+            (Some(path), [run, ..]) => read_tags(path, &run.sheets),
+            _ => Ok(Tags::default()),
+        }
     }
 
     /// Scores of the runs, written where that is asked for.
@@ -120,6 +127,9 @@ impl EvalArgs {
             let name = run_name(path);
             runs.push(Run { name, sheets });
         }
+        if options.classes.is_empty() && !is_coco(truth) {
+            options.classes = dataset_classes(truth);
+        }
         Ok(runs)
     }
 
@@ -129,7 +139,7 @@ impl EvalArgs {
         truth: &Path,
         options: &mut EvalReportOptions,
     ) -> petcomp::Result<Vec<EvalImage>> {
-        if truth.extension().is_some_and(|e| e == "json") {
+        if is_coco(truth) {
             self.read_coco(path, truth, options)
         } else {
             self.read_yolo(path, truth, options)
@@ -159,19 +169,21 @@ impl EvalArgs {
     ) -> petcomp::Result<Vec<EvalImage>> {
         let mut all = read_yolo_truth(truth, self.images.as_deref(), self.size)?;
         read_yolo_detections(found, &mut all)?;
-        if options.classes.is_empty() {
-            options.classes = dataset_classes(truth).unwrap_or_default();
-        }
         options.pictures = all.pictures;
         Ok(all.sheets)
     }
 }
 
-/// Classes of the dataset that the labels belong to: `labels/val` lies two folders below its
-/// data.yaml.
-fn dataset_classes(labels: &Path) -> Option<Vec<String>> {
-    let folder = labels.parent()?.parent()?;
-    Some(YoloSet::open(folder).ok()?.classes)
+fn is_coco(truth: &Path) -> bool {
+    truth.extension().is_some_and(|e| e == "json")
+}
+
+/// Classes of the dataset that the labels belong to, if they have names.
+fn dataset_classes(labels: &Path) -> Vec<String> {
+    YoloSet::class_names_of(labels).unwrap_or_else(|error| {
+        log::warn!("{error}; classes are called by their numbers");
+        Vec::new()
+    })
 }
 
 /// The name of the file or folder; of the folder around one called `labels`, as YOLO's programs

@@ -211,6 +211,23 @@ fn words_are_ours_and_not_those_of_rust_or_the_system() {
 }
 
 #[test]
+fn classes_are_called_by_name_wherever_eval_runs_or_it_says_why_not() {
+    let desk = Desk::with_labels();
+    std::fs::remove_dir_all(desk.path("set/images/train")).unwrap();
+    let mut inside = desk.command(&["eval", "../found", "labels/val"]);
+    let output = inside.current_dir(desk.path("set")).output().unwrap();
+    assert!(text(&output.stdout).contains("| cap |"));
+    desk.write("set/data.yaml", "names: {1: cap}\n");
+    let output = desk.run(&["eval", "found", "set/labels/val"]);
+    let said = text(&output.stderr);
+    assert!(
+        said.contains("class 1, expected 0; classes are called by their numbers"),
+        "{said}"
+    );
+    assert!(output.status.success());
+}
+
+#[test]
 fn quiet_leaves_the_answer() {
     let desk = Desk::with_labels();
     let said = |args: &[&str]| {

@@ -228,17 +228,18 @@ impl PaperRow {
 }
 
 fn spread_of(ours: &BTreeMap<String, Vec<f64>>, key: &str) -> Option<Spread> {
-    Some(Spread::from_values(ours.get(key)?, 0))
+    Some(Spread::from_values(ours.get(key)?))
 }
 
-/// Mean and deviation, interval and number of runs; empty without runs.
+/// Mean and deviation, interval (of two runs or more) and number of runs; empty without runs.
 fn spread_cells(spread: Option<Spread>) -> [String; 3] {
     let Some(s) = spread else {
         return Default::default();
     };
+    let interval = s.interval.map(|i| format!("{:.1} to {:.1}", i.low, i.high));
     [
         format!("{:.1} +- {:.1}", s.mean, s.std),
-        format!("{:.1} to {:.1}", s.interval.low, s.interval.high),
+        interval.unwrap_or_default(),
         s.runs.to_string(),
     ]
 }

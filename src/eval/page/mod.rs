@@ -1,6 +1,10 @@
 //! A detector against the truth: tables, curves and one page; several runs with their spread.
 
+mod earlier;
 mod mistakes;
+mod spread;
+
+pub use spread::Spread;
 
 use crate::error::Result;
 use crate::eval::{
@@ -29,7 +33,7 @@ pub struct EvalReportOptions {
     pub classes: Vec<String>,
     /// Light, camera position, ..: scores are given for each.
     pub tags: Tags,
-    /// Rounds of the bootstrap over images. Default: 200.
+    /// Rounds of the bootstrap over images; tables show no interval of fewer than 40. Default: 200.
     pub rounds: usize,
     /// Where its draws come from. Default: 0.
     pub seed: u64,
@@ -75,34 +79,6 @@ pub struct Metrics {
     pub yolov5: Scores,
     /// By the definition of COCO.
     pub coco: CocoScores,
-}
-
-/// Mean of several runs and how far they scatter.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Spread {
-    /// Number of runs.
-    pub runs: usize,
-    /// Their mean.
-    pub mean: f64,
-    /// Sample standard deviation; 0 for a single run.
-    pub std: f64,
-    /// Range of the mean by bootstrap over the runs.
-    pub interval: Interval,
-}
-
-impl Spread {
-    /// Over the values of runs; the interval comes from 2000 draws of the runs with replacement.
-    pub fn from_values(values: &[f64], seed: u64) -> Self {
-        let n = values.len().max(1) as f64;
-        let mean = values.iter().sum::<f64>() / n;
-        let resampled = (0..RESAMPLES).map(|k| resampled_mean(values, seed, k));
-        Self {
-            runs: values.len(),
-            mean,
-            std: deviation(values, mean),
-            interval: eval::interval(mean, resampled.collect()),
-        }
-    }
 }
 
 impl Metrics {
@@ -206,19 +182,28 @@ fn add_classes(
     add_table(page, folder, &title, "classes.csv", tables)
 }
 
-/// `metrics.json` of one run, or `1-NAME.json` and so on of several.
+/// `metrics.json` of one run, or `1-NAME.json` and so on of several, and none of an earlier
+/// evaluation.
 fn write_metrics(folder: &Path, all: &[Metrics]) -> Result<()> {
-    if let [only] = all {
-        return io::write_json(folder.join("metrics.json"), only);
-    }
-    for (i, metrics) in (1..).zip(all) {
-        let name = format!("{i}-{}.json", metrics.run);
+    let names = metrics_names(all);
+    for (name, metrics) in names.iter().zip(all) {
         io::write_json(folder.join(name), metrics)?;
     }
-    Ok(())
+    earlier::remove_metrics(folder, &names)
 }
 
-/// Writes a table that is not empty, and adds what is shown of it to the page.
+fn metrics_names(all: &[Metrics]) -> Vec<String> {
+    match all {
+        [_] => vec![earlier::METRICS.into()],
+        _ => (1..)
+            .zip(all)
+            .map(|(i, metrics)| format!("{i}-{}.json", metrics.run))
+            .collect(),
+    }
+}
+
+/// Writes a table that is not empty, and adds what is shown of it to the page; an empty one takes
+/// that of an earlier evaluation away.
 fn add_table(
     page: &mut Page,
     folder: &Path,
@@ -226,10 +211,12 @@ fn add_table(
     file: &str,
     [table, shown]: [&Table; 2],
 ) -> Result<()> {
-    if !table.rows.is_empty() {
-        io::write_text(folder.join(file), &table.csv())?;
-        page.heading(title).beginning(shown, MAX_SHOWN_ROWS, file);
+    let path = folder.join(file);
+    if table.rows.is_empty() {
+        return earlier::remove_table(&path, &table.csv());
     }
+    io::write_text(path, &table.csv())?;
+    page.heading(title).beginning(shown, MAX_SHOWN_ROWS, file);
     Ok(())
 }
 
@@ -330,23 +317,24 @@ pub fn scores_table(all: &[Metrics], options: &EvalReportOptions) -> Table {
         "95 % interval",
     ]);
     for metrics in all {
-        let interval = range_text(&metrics.map);
+        let interval = interval_over_images(&metrics.map, options);
         table.push(metrics.scores_row("yolov5", &metrics.yolov5, interval));
         table.push(metrics.scores_row("coco", &metrics.coco.scores, String::new()));
     }
     if all.len() > 1 {
-        table.push(spread_row(&spread_of(all, options.seed)));
+        table.push(spread_row(&spread_of(all)));
     }
     table
 }
 
 /// Of the mAP by YOLOv5's definition.
-fn spread_of(all: &[Metrics], seed: u64) -> Spread {
+fn spread_of(all: &[Metrics]) -> Spread {
     let maps: Vec<f64> = all.iter().map(|m| m.yolov5.map()).collect();
-    Spread::from_values(&maps, seed)
+    Spread::from_values(&maps)
 }
 
 fn spread_row(spread: &Spread) -> [String; 7] {
+    let interval = spread.interval.as_ref().map(range_text);
     [
         "mean +- std".into(),
         format!("{} runs", spread.runs),
@@ -354,9 +342,20 @@ fn spread_row(spread: &Spread) -> [String; 7] {
         String::new(),
         String::new(),
         format!("{} +- {}", share(spread.mean), share(spread.std)),
-        range_text(&spread.interval),
+        interval.map_or_else(String::new, |range| range + " over runs"),
     ]
 }
+
+/// Empty where the rounds are too few for one.
+fn interval_over_images(map: &Interval, options: &EvalReportOptions) -> String {
+    if options.rounds < MIN_ROUNDS {
+        return String::new();
+    }
+    range_text(map) + " over images"
+}
+
+/// Of fewer rounds less than one is to be expected beyond either end of an interval.
+const MIN_ROUNDS: usize = 40;
 
 fn range_text(interval: &Interval) -> String {
     format!("{} to {}", share(interval.low), share(interval.high))
@@ -469,10 +468,11 @@ fn add_factor(table: &mut Table, runs: &[Run], matches: &[[Matches; 2]], tags: &
     }
 }
 
-/// Number of images, and the mAP of both definitions on them.
+/// Number of images, and the mAP of both definitions on them; empty where nothing is to be found.
 fn weighted_scores(matches: &[Matches; 2], weights: &[u32]) -> [String; 3] {
     let images = weights.iter().filter(|weight| **weight > 0).count();
-    let [yolov5, coco] = matches.each_ref().map(|m| share(m.map(weights)));
+    let [yolov5, coco] = matches.each_ref().map(|m| m.map_if_any(weights));
+    let [yolov5, coco] = [yolov5, coco].map(|map| map.map_or_else(String::new, share));
     [images.to_string(), yolov5, coco]
 }
 
@@ -540,24 +540,6 @@ fn share(value: f64) -> String {
 
 const _: () = assert!(THRESHOLDS > 5, "mAP@0.75 is the sixth threshold");
 
-/// Rounds of the bootstrap over runs.
-const RESAMPLES: u64 = 2000;
-
-fn resampled_mean(values: &[f64], seed: u64, round: u64) -> f64 {
-    let times = eval::drawn(values.len(), seed, round);
-    let weighted = values.iter().zip(times).map(|(v, t)| v * f64::from(t));
-    weighted.sum::<f64>() / values.len().max(1) as f64
-}
-
-/// Standard deviation of a sample; 0 of one value.
-fn deviation(values: &[f64], mean: f64) -> f64 {
-    let squares: f64 = values.iter().map(|v| (v - mean) * (v - mean)).sum();
-    match values.len() {
-        0 | 1 => 0.0,
-        n => (squares / (n as f64 - 1.0)).sqrt(),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -610,13 +592,60 @@ mod tests {
         assert!(!folder.path().join("factors.csv").exists());
     }
 
+    /// Tags of the images of a run.
+    fn with_tags(text: &str, run: &Run) -> EvalReportOptions {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), text).unwrap();
+        EvalReportOptions {
+            tags: eval::read_tags(file.path(), &run.sheets).unwrap(),
+            ..Default::default()
+        }
+    }
+
     #[test]
-    fn several_runs_give_mean_and_spread() {
-        let spread = Spread::from_values(&[1.0, 2.0, 3.0], 0);
-        assert_eq!((spread.runs, spread.mean, spread.std), (3, 2.0, 1.0));
-        assert!(
-            spread.interval.low >= 1.0 && spread.interval.high <= 3.0 && spread.interval.low < 2.0
-        );
-        assert_eq!(Spread::from_values(&[0.5], 0).std, 0.0);
+    fn files_of_an_earlier_evaluation_go_and_those_of_the_user_stay() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let there = |names: &[&str]| names.iter().filter(|name| at(name).exists()).count();
+        let (runs, untagged) = ([run("p", 0.9), run("q", 0.8)], EvalReportOptions::default());
+        let tagged = with_tags("image,light\na,dim\n", &runs[0]);
+        write(folder.path(), &runs, &tagged).unwrap();
+        let numbered = ["1-p.json", "2-q.json", "factors.csv"];
+        assert_eq!(there(&numbered), 3);
+        std::fs::copy(at("1-p.json"), at("1-best.json")).unwrap();
+        std::fs::write(at("3-notes.json"), "{}").unwrap();
+        write(folder.path(), &runs[..1], &untagged).unwrap();
+        assert_eq!(there(&numbered), 0);
+        std::fs::write(at("factors.csv"), "image,light\n").unwrap();
+        write(folder.path(), &runs, &untagged).unwrap();
+        assert_eq!(there(&["metrics.json"]), 0);
+        assert_eq!(there(&["1-best.json", "3-notes.json", "factors.csv"]), 3);
+    }
+
+    #[test]
+    fn an_interval_says_over_what_and_there_is_none_of_a_few_rounds() {
+        let cells = |runs: &[Run], rounds| {
+            let options = EvalReportOptions {
+                rounds,
+                ..Default::default()
+            };
+            let all: Vec<Metrics> = runs.iter().map(|run| Metrics::of(run, &options)).collect();
+            let rows = scores_table(&all, &options).rows.into_iter();
+            rows.map(|row| row[6].clone()).collect::<Vec<String>>()
+        };
+        let runs = [run("p", 0.9), run("q", 0.8)];
+        assert!(cells(&runs[..1], 200)[0].ends_with(" over images"));
+        assert_eq!(cells(&runs[..1], 1), ["", ""]);
+        assert!(cells(&runs, 0)[4].ends_with(" over runs"));
+    }
+
+    #[test]
+    fn a_level_with_nothing_to_find_has_no_score() {
+        let mut tagged = run("p", 0.9);
+        tagged.sheets.push(EvalImage::new("c", vec![]));
+        let options = with_tags("image,light\na,dim\nc,dark\n", &tagged);
+        let table = factors_table(&[tagged], &options);
+        assert_eq!(table.rows[0], ["p", "light", "dark", "1", "", ""]);
+        assert_eq!(table.rows[1][..5], ["p", "light", "dim", "1", "0.9950"]);
     }
 }
