@@ -3,6 +3,8 @@
 import dataclasses
 import importlib.util
 import shutil
+import subprocess
+import sys
 import tomllib
 
 from . import archive, files, page, results, screening, study as studies
@@ -15,14 +17,14 @@ def run(options, cache, program):
     if options.smoke and not options.write:
         shutil.rmtree(study.cache, ignore_errors=True)
     names = chosen(options, study.arms)
-    folder = study.cache / "results" if options.smoke else HERE / "results" / study.name
+    folder = study.cache / "results" if options.smoke else kept(study)
     if not options.write:
-        # Hours of training are not to end in a refusal.
-        results.check(study, folder, [(arm, seed) for arm in names for seed in study.seeds(arm, options.seeds)])
+        check_planned(study, folder, names, options.seeds)
         for step in studies.steps(study, names, options.seeds):
             studies.train_all(study, step, options.processes)
     means = write(study, folder)
     if options.smoke:
+        check_parts()
         check_archive(study, folder, means)
         check_refusals(study, folder)
 
@@ -37,6 +39,10 @@ def full(options, cache, program):
         arms["reality"]["test_pictures"] = options.test_pictures
     name = options.name or "rooms_" + "_".join(map(str, arms["reality"]["rooms"]))
     return studies.Study(arms, cache / name, cache / "world", program)
+
+
+def kept(study):
+    return HERE / "results" / study.name
 
 
 def smoke(cache, program):
@@ -75,6 +81,16 @@ def chosen(options, arms):
     return options.arms or list(arms["arms"])
 
 
+def check_planned(study, folder, names, seeds):
+    """Hours of training are not to end in a refusal."""
+    results.check(study, folder, [(arm, seed) for arm in names for seed in study.seeds(arm, seeds)])
+
+
+def check_parts():
+    if subprocess.run([sys.executable, "-m", "unittest", "-q", "study.tests"], cwd=HERE).returncode != 0:
+        raise SystemExit("study/tests.py: failed")
+
+
 def check_archive(study, folder, means):
     """Results are the same without the trainings that they are from."""
     shutil.rmtree(study.cache / "runs", ignore_errors=True)
@@ -105,10 +121,12 @@ def write(study, folder):
     rows, matches = results.scored(study, folder)
     if not rows:
         raise SystemExit("nothing is trained yet")
-    means, drawn = results.means(matches), results.drawn(matches)
+    means, over_pictures = results.means(matches), results.over_pictures(matches)
+    drawn = results.with_chance(over_pictures, matches)
     summary = results.summary(study, matches, means, drawn)
     ratios = results.ratios(study, means, drawn)
-    effects = screening.effects(study, means, drawn)
+    # Their own error has the chance of trainings in it.
+    effects = screening.effects(study, means, over_pictures)
     archive.write(folder, matches)
     results.write_csv(folder / "results.csv", results.COLUMNS, rows)
     results.write_csv(folder / "summary.csv", results.SUMMARY_COLUMNS, results.summary_rows(summary))

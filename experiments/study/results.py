@@ -81,9 +81,14 @@ def room_row(study, arm, seed, room, of_rooms):
     }
 
 
-def drawn(matches):
-    """mAP@0.5:0.95 of each arm in each round of the bootstrap."""
-    return {arm: bootstrap.samples(arm, of_arm) for arm, of_arm in matches.items()}
+def over_pictures(matches):
+    """mAP@0.5:0.95 of each arm in each round of the bootstrap over pictures."""
+    return {arm: bootstrap.samples(of_arm) for arm, of_arm in matches.items()}
+
+
+def with_chance(drawn, matches):
+    """The same, with the chance that there is in trainings."""
+    return {arm: bootstrap.with_chance(arm, rounds, len(matches[arm])) for arm, rounds in drawn.items()}
 
 
 def means(matches):

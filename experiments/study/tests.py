@@ -1,0 +1,74 @@
+"""Of what needs no training: `python -m unittest study.tests` in the folder of the experiments."""
+
+import tempfile
+import unittest
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+
+from . import archive, bootstrap, chance, main, results, score
+
+# Half of an interval of 95 %, in standard deviations.
+REACH = 1.96
+
+
+class Intervals(unittest.TestCase):
+    def test_one_training_has_chance_too(self):
+        matches = {"real": {0: {"21": [some_matches()]}}}
+        over_pictures = results.over_pictures(matches)
+        drawn = results.with_chance(over_pictures, matches)
+        self.assertGreater(width(drawn["real"]), width(over_pictures["real"]))
+
+    def test_chance_by_number_of_trainings(self):
+        for trainings in (1, 4):
+            drawn = bootstrap.with_chance("real", np.ones(500), trainings)
+            low, high = bootstrap.interval(drawn)
+            reach = REACH * bootstrap.TRAINING_DEVIATION / np.sqrt(trainings)
+            self.assertAlmostEqual((high - 1) / reach, 1, delta=0.05)
+            self.assertAlmostEqual((1 - low) / reach, 1, delta=0.05)
+
+    def test_arms_share_pictures_and_not_chance(self):
+        arm = {0: {"21": [some_matches()]}}
+        over_pictures = results.over_pictures({"real": arm, "alike": arm})
+        np.testing.assert_array_equal(over_pictures["real"], over_pictures["alike"])
+        drawn = results.with_chance(over_pictures, {"real": arm, "alike": arm})
+        reach = REACH * bootstrap.TRAINING_DEVIATION * np.sqrt(2)
+        self.assertAlmostEqual(width(drawn["alike"] / drawn["real"]) / (2 * reach), 1, delta=0.05)
+
+    def test_deviation_is_of_the_first_rooms(self):
+        seeds = chance.of_seeds(archive.rows(main.HERE / "results/first_rooms"))
+        deviation, freedom = chance.pooled(seeds.values())
+        self.assertAlmostEqual(deviation, bootstrap.TRAINING_DEVIATION, places=4)
+        self.assertEqual(freedom, 6)
+
+
+class Check(unittest.TestCase):
+    def test_the_headline_is_welcome_where_nothing_is_trained(self):
+        """As `make experiment` and README.md call it: without a name."""
+        for rooms, test_pictures in ((None, None), ([24], 40)):
+            with self.subTest(rooms=rooms), tempfile.TemporaryDirectory() as cache:
+                check_headline(Path(cache), rooms, test_pictures)
+
+
+def check_headline(cache, rooms, test_pictures):
+    options = SimpleNamespace(
+        headline=True, screening=None, rooms=rooms, test_pictures=test_pictures, name=None, seeds=None
+    )
+    study = main.full(options, cache, None)
+    main.check_planned(study, main.kept(study), main.chosen(options, study.arms), options.seeds)
+
+
+def some_matches(pictures=20):
+    """Of one box in each picture, found in every other one."""
+    right = np.repeat(np.arange(pictures) % 2 == 0, len(score.IOUS)).reshape(pictures, -1)
+    return score.Matches(np.arange(pictures), right, np.ones(pictures))
+
+
+def width(values):
+    low, high = bootstrap.interval(values)
+    return high - low
+
+
+if __name__ == "__main__":
+    unittest.main()
