@@ -23,8 +23,12 @@ pub(crate) const MASS: Bounds = Bounds::new(1e-6, 1e6, "kilograms");
 pub(crate) const PX_PER_METRE: Bounds = Bounds::new(1.0, 1e7, "pixels for a metre");
 /// Side of the surface that objects lie on, metres.
 pub(crate) const SURFACE: Bounds = Bounds::metres(0.01, 50.0, "objects of 5 mm to 5 m lie on it");
-/// Most that walls on the surface's sides lean outwards, degrees from upright.
-pub(crate) const MAX_SLOPE_DEG: f64 = 80.0;
+/// Height of walls over the surface, metres.
+pub(crate) const WALL_HEIGHT: Bounds = Bounds::metres(0.0, 50.0, "0 is a table without walls");
+/// How far they lean.
+pub(crate) const SLOPE: Bounds = Bounds::new(0.0, 80.0, "degrees from upright, outwards");
+/// Share of the light that the darkest surface reflects.
+pub(crate) const LEAST_ALBEDO: f64 = 0.001;
 /// Distance of a camera from the surface's centre, metres.
 pub(crate) const CAMERA: Bounds = Bounds::metres(0.001, 50.0, "farther off no object is seen");
 /// What a picture shows with fewer pixels has no outline to be labelled.

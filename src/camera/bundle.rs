@@ -6,7 +6,6 @@
 //! is small. The priors of the lens count once.
 
 use super::error::SolveError;
-use super::focal::PriorSource;
 use super::label::{Framing, Label};
 use super::model::{KAPPA, LN_FOCAL, PRINCIPAL, STRETCH, Square, State, UNKNOWNS, Unknowns};
 use super::options::SolveOptions;
@@ -15,9 +14,8 @@ use super::problem::Problem;
 use super::refine::{COST_TOLERANCE, DAMPING_DECREASE, DAMPING_INCREASE, INITIAL_DAMPING};
 use super::refine::{MAX_DAMPING, Minimum, NormalEquations, Residuals};
 use super::solution::Solution;
-use super::solve::focal_conflict;
+use super::solve::FocalConflict;
 use super::uncertainty::{FocalShare, Uncertainty, focal_share};
-use crate::diagnostic::Diagnostic;
 use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX, Vector6};
 use std::cmp::Ordering;
 
@@ -112,16 +110,11 @@ impl Bundle {
         self.shared[0]
     }
 
-    /// Where that comes from.
-    pub(crate) fn prior_source(&self) -> PriorSource {
-        self.problems[0].prior_source
-    }
-
-    /// A warning, where what the photos give for the focal length contradicts its prior.
-    pub(crate) fn focal_conflict(&self, equations: &BundleEquations) -> Option<Diagnostic> {
+    /// Where what the photos give for the focal length contradicts its prior.
+    pub(super) fn focal_conflict(&self, equations: &BundleEquations) -> Option<FocalConflict> {
         let (covariance, _) = self.shared_covariance(equations)?;
         let focal = self.focal_share(&equations.states[0], &covariance);
-        focal_conflict(&self.problems[0], &focal)
+        FocalConflict::new(&self.problems[0], &focal)
     }
 
     fn focal_share(&self, state: &State, covariance: &DMatrix<f64>) -> FocalShare {

@@ -2,6 +2,7 @@
 //! better.
 
 use super::focal::FocalSource;
+use super::import::place_for_more;
 use super::label::{Framing, Label};
 use super::options::SolveOptions;
 use super::solution::Solution;
@@ -92,9 +93,10 @@ fn framing_line(label: &Label, solution: &Solution, options: &SolveOptions) -> S
         }
         Framing::Unknown => {
             let gain = whole_picture_gain(label, solution, options);
+            let place = place_for_more(label);
             format!(
                 "{known}: it is not known whether the picture is whole, since its EXIF size is missing or differs. If it \
-                 is, write \"cropped\": false under \"image\": the principal point is then its middle{gain}."
+                 is, write \"cropped\": false under \"image\"{place}: the principal point is then its middle{gain}."
             )
         }
     }
@@ -152,11 +154,12 @@ fn height_advice(label: &Label, solution: &Solution, options: &SolveOptions) -> 
         .ok()?
         .sigma
         .height_px;
+    let place = place_for_more(label);
     (better < WORTHWHILE_FACTOR * solution.sigma.height_px).then(|| {
         format!(
             "Measure the height of the lens above the surface (about {height:.2} m) to {:.0} mm and write it as \
-             camera.height_m: that would bring {:.1} px down to {better:.1}. So would another photo or two of the rectangle at \
-             25 to 40 degrees with the same zoom and camera.id (camera joint).",
+             camera.height_m{place}: that would bring {:.1} px down to {better:.1}. So would another photo or two of the \
+             rectangle at 25 to 40 degrees with the same zoom and camera.id (camera joint).",
             1000.0 * TAPE_HEIGHT_SIGMA * height,
             solution.sigma.height_px
         )
@@ -207,6 +210,21 @@ mod tests {
         );
         assert!(say(Some(false)).contains("the picture is whole"));
         assert!(say(Some(true)).contains("a part of a larger one"));
+    }
+
+    #[test]
+    fn what_another_program_s_label_cannot_say_is_for_one_of_ours() {
+        let mut label = Scenario::realistic().tilted(25.0).view(1, 3).label;
+        (label.image.cropped, label.surface.source) = (None, Some("cvat".into()));
+        let options = SolveOptions::default();
+        let solution = solve(&label, &options).unwrap();
+        let advice =
+            "under \"image\" in a label of petcomp's own (`petcomp camera init PHOTO --size";
+        let text = doctor(&label, &solution, &options);
+        assert!(text.contains(advice), "{text}");
+        let mut warnings = solution.warnings.iter();
+        let framing = warnings.find(|w| w.code == Code::FramingUnknown).unwrap();
+        assert!(framing.message.contains(advice), "{framing:?}");
     }
 
     #[test]

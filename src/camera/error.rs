@@ -60,27 +60,14 @@ pub enum SolveError {
         /// What it was.
         value: f64,
     },
-    /// A share is not one.
-    #[error("{at}: {value}, expected a share of more than 0 and at most 1")]
-    NotShare {
-        /// Which value.
-        at: &'static str,
-        /// What it was.
-        value: f64,
-    },
-    /// Walls do not lean outwards.
-    #[error("{at}: {value}, expected 0 to {most} degrees from upright, outwards")]
-    NotSlope {
-        /// Which value.
-        at: &'static str,
-        /// What it was.
-        value: f64,
-        /// The largest one.
-        most: f64,
-    },
+    /// The albedo or the walls of a surface are none that it can have: which value, and what was
+    /// expected.
+    #[error("{0}")]
+    OutOfBounds(String),
     /// Two corners coincide.
     #[error(
-        "surface.corners_px: corners {first} and {second} are {distance_px:.1} px apart, expected at least {limit_px:.1}"
+        "surface.corners_px: the {} and the {} corner are {distance_px:.1} px apart, expected at least {limit_px:.1}",
+        corner_name(*.first), corner_name(*.second)
     )]
     Coincident {
         /// One of them, from 0.

@@ -7,7 +7,8 @@
 //! distance to it: the mean square error of the answer where the picture is cropped after all.
 
 use super::chi::CHI2_99;
-use super::label::Framing;
+use super::import::place_for_more;
+use super::label::{Framing, Label};
 use super::model::Unknowns;
 use super::options::SolveOptions;
 use super::pinhole::{Camera, distorted};
@@ -47,36 +48,49 @@ impl CameraDifference {
 impl Solution {
     /// The camera of a picture assumed to be whole, `apart` from that of the same picture if it may
     /// be cropped, with the uncertainty of both.
-    pub(crate) fn hedged(mut self, loose: &Self, apart: &Unknowns, options: &SolveOptions) -> Self {
+    pub(crate) fn hedged(
+        mut self,
+        loose: &Self,
+        apart: &Unknowns,
+        label: &Label,
+        options: &SolveOptions,
+    ) -> Self {
         let whole_px = self.sigma.height_px;
         self.sigma = self.sigma_with(loose, apart);
         (self.focal.share, self.focal.from_data_px) = (loose.focal.share, loose.focal.from_data_px);
         (self.focal_source, self.framing) = (loose.focal_source, Framing::Unknown);
         self.warnings.retain(|w| w.code != Code::HeightUncertain);
         self.warnings
-            .extend(self.hedged_height_warning(whole_px, options));
+            .extend(self.hedged_height_warning(whole_px, label, options));
         self
     }
 
     /// About points above the surface, which a whole picture would show as well as `whole_px`.
-    fn hedged_height_warning(&self, whole_px: f64, options: &SolveOptions) -> Option<Diagnostic> {
+    fn hedged_height_warning(
+        &self,
+        whole_px: f64,
+        label: &Label,
+        options: &SolveOptions,
+    ) -> Option<Diagnostic> {
         let limit_px = self.height_limit_px(options);
         if whole_px > limit_px {
             self.height_warning(options)
         } else {
-            (self.sigma.height_px > limit_px).then(|| self.framing_warning(whole_px))
+            (self.sigma.height_px > limit_px).then(|| self.framing_warning(whole_px, label))
         }
     }
 
     /// Says that points above the surface would be known better, to `whole_px`, if the picture were
     /// known to be whole.
-    fn framing_warning(&self, whole_px: f64) -> Diagnostic {
+    fn framing_warning(&self, whole_px: f64, label: &Label) -> Diagnostic {
+        let place = place_for_more(label);
         let (height, sigma_px) = (self.sigma.reference_height, self.sigma.height_px);
         Diagnostic::warning(
             Code::FramingUnknown,
             format!(
                 "it is not known whether the picture was cropped, so a point {height:.3} m above the surface is known only \
-                 to {sigma_px:.1} px; write \"cropped\": false under \"image\" if it is whole: to {whole_px:.1} px then"
+                 to {sigma_px:.1} px; write \"cropped\": false under \"image\"{place} if it is whole: to {whole_px:.1} px \
+                 then"
             ),
         )
     }
@@ -154,7 +168,7 @@ fn off_center_px(camera: &Camera) -> f64 {
 mod tests {
     use super::*;
     use crate::camera::simulate::Scenario;
-    use crate::camera::{Label, solve};
+    use crate::camera::solve;
 
     fn solved(label: &Label) -> Solution {
         solve(label, &SolveOptions::default()).unwrap()

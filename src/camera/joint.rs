@@ -3,13 +3,12 @@
 use super::bundle::Bundle;
 use super::chi;
 use super::error::SolveError;
-use super::focal::PriorSource;
 use super::hedge::is_off_center;
 use super::label::{Framing, Label};
 use super::model::State;
 use super::options::SolveOptions;
 use super::solution::{REFUSED_FIT_P, Solution};
-use super::solve::{solve, without_exif_focal};
+use super::solve::{FocalConflict, solve, without_exif_focal};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::geom::Vector2;
 use std::cmp::Ordering;
@@ -140,9 +139,8 @@ struct JointEstimate {
     solutions: Vec<Solution>,
     cost: f64,
     outliers: Vec<OutlierPhoto>,
-    prior_source: PriorSource,
-    /// A warning, where what they give for the focal length contradicts its prior.
-    conflict: Option<Diagnostic>,
+    /// Where what they give for the focal length contradicts its prior.
+    conflict: Option<FocalConflict>,
 }
 
 impl JointSolver<'_> {
@@ -151,14 +149,17 @@ impl JointSolver<'_> {
         let Some(estimate) = self.whole_or_cropped()? else {
             return Ok(None);
         };
-        let Some(conflict) = estimate.conflict.clone() else {
+        let Some(conflict) = estimate.conflict else {
             return Ok(Some(estimate));
         };
-        let kept = match estimate.prior_source {
-            PriorSource::Exif => self.without_exif()?,
-            _ => Some(estimate),
-        };
-        Ok(kept.map(|estimate| estimate.warned(&conflict)))
+        if !conflict.is_with_exif() {
+            return Ok(Some(estimate.warned(&conflict.warning())));
+        }
+        let second = self.without_exif()?;
+        Ok(second.map(|second| {
+            let conflict = conflict.solved_without(&second.solutions[0]);
+            second.warned(&conflict.warning())
+        }))
     }
 
     fn without_exif(&self) -> Result<Option<JointEstimate>, SolveError> {
@@ -184,7 +185,7 @@ impl JointSolver<'_> {
         if loose.used.len() > whole.used.len() || is_off_center(whole.cost, loose.cost) {
             return Ok(Some(loose.off_center()));
         }
-        Ok(Some(whole.hedged(&loose, self.options)))
+        Ok(Some(whole.hedged(&loose, self.labels, self.options)))
     }
 
     fn may_be_cropped(&self) -> bool {
@@ -222,7 +223,6 @@ impl JointSolver<'_> {
         Ok(JointEstimate {
             used: used.to_vec(),
             solutions: bundle.solutions(&best, self.options),
-            prior_source: bundle.prior_source(),
             conflict: bundle.focal_conflict(&best),
             states: best.states,
             fits: PhotoFit::of_all(&best.chi2, &bundle.degrees_of_freedom()),
@@ -295,14 +295,15 @@ impl JointEstimate {
     }
 
     /// Whole pictures with the error that they have if they are cropped.
-    fn hedged(mut self, loose: &Self, options: &SolveOptions) -> Self {
+    fn hedged(mut self, loose: &Self, labels: &[Label], options: &SolveOptions) -> Self {
         let solutions = std::mem::take(&mut self.solutions).into_iter().enumerate();
         self.solutions = solutions
             .map(|(i, solution)| match loose.index_of(self.used[i]) {
                 None => solution,
                 Some(other) => {
                     let apart = self.states[i].step_to(&loose.states[other]);
-                    solution.hedged(&loose.solutions[other], &apart, options)
+                    let label = &labels[self.used[i]];
+                    solution.hedged(&loose.solutions[other], &apart, label, options)
                 }
             })
             .collect();
@@ -519,7 +520,9 @@ mod tests {
             assert!(off < 4.0 * solution.sigma.ln_focal, "{off}");
             assert_eq!(solution.focal.prior_sigma, 0.35);
             let mut warnings = solution.warnings.iter();
-            assert!(warnings.any(|w| w.code == Code::FocalPriorConflict));
+            let conflict = warnings.find(|w| w.code == Code::FocalPriorConflict);
+            let told = format!("the corners give {:.0} px", solution.camera.focal_px.x);
+            assert!(conflict.unwrap().message.contains(&told), "{conflict:?}");
         }
     }
 

@@ -2,9 +2,11 @@
 
 use super::error::SolveError;
 use super::label::{Crop, Label, LabelCamera, LabelPoint, LabelSurface, LabelWall};
-use crate::bounds::MAX_SLOPE_DEG;
+use crate::bounds::{Bounds, LEAST_ALBEDO, SLOPE, WALL_HEIGHT};
 use crate::color::Albedo;
 
+/// Share of the light that a surface reflects.
+const ALBEDO: Bounds = Bounds::new(LEAST_ALBEDO, 1.0, "a share of the light");
 /// No meaningful label holds larger numbers, or positive ones smaller than one over this.
 pub(crate) const MAX_MAGNITUDE: f64 = 1e9;
 
@@ -47,21 +49,14 @@ fn check_surface(surface: &LabelSurface) -> Result<(), SolveError> {
         check_finite("surface.corners_px", corners.as_flattened())?;
     }
     check_positive("surface.corner_sigma_px", surface.corner_sigma_px)?;
-    check_albedo("surface.albedo", surface.albedo)?;
+    check_albedo(surface.albedo)?;
     check_not_negative("surface.dimension_sigma_m", surface.dimension_sigma_m)?;
     surface.wall.iter().try_for_each(check_wall)
 }
 
 fn check_wall(wall: &LabelWall) -> Result<(), SolveError> {
-    check_not_negative("surface.wall.height_m", wall.height_m)?;
-    match wall.slope_deg {
-        Some(value) if !(0.0..=MAX_SLOPE_DEG).contains(&value) => Err(SolveError::NotSlope {
-            at: "surface.wall.slope_deg",
-            value,
-            most: MAX_SLOPE_DEG,
-        }),
-        _ => Ok(()),
-    }
+    check_within("surface.wall.height_m", wall.height_m, &WALL_HEIGHT)?;
+    check_within("surface.wall.slope_deg", wall.slope_deg, &SLOPE)
 }
 
 fn check_point(point: &LabelPoint) -> Result<(), SolveError> {
@@ -100,12 +95,14 @@ fn check_positive(at: &'static str, value: Option<f64>) -> Result<(), SolveError
     }
 }
 
-fn check_albedo(at: &'static str, albedo: Option<Albedo>) -> Result<(), SolveError> {
+fn check_albedo(albedo: Option<Albedo>) -> Result<(), SolveError> {
     let mut shares = albedo.iter().flat_map(Albedo::range);
-    match shares.find(|share| !(*share > 0.0 && *share <= 1.0)) {
-        Some(value) => Err(SolveError::NotShare { at, value }),
-        None => Ok(()),
-    }
+    shares.try_for_each(|share| check_within("surface.albedo", Some(share), &ALBEDO))
+}
+
+fn check_within(at: &str, value: Option<f64>, bounds: &Bounds) -> Result<(), SolveError> {
+    let checked = value.map_or(Ok(()), |value| bounds.check(at, value));
+    checked.map_err(|error| SolveError::OutOfBounds(error.to_string()))
 }
 
 /// Finite, and small enough for squares and products of a few of them.
@@ -145,15 +142,18 @@ mod tests {
     }
 
     #[test]
-    fn walls_are_not_below_the_surface_and_lean_outwards() {
-        let height = refusal_of_wall(LabelWall {
-            height_m: Some(-0.07),
-            slope_deg: None,
-        });
-        assert_eq!(
-            height,
-            "surface.wall.height_m: -0.07, expected a positive number"
-        );
+    fn walls_have_a_height_that_is_possible_and_lean_outwards() {
+        for (height, question) in [(-0.07, ""), (75.0, "; is it in centimetres?")] {
+            let refusal = refusal_of_wall(LabelWall {
+                height_m: Some(height),
+                slope_deg: None,
+            });
+            let expected = "expected 0 to 50 m (0 is a table without walls)";
+            assert_eq!(
+                refusal,
+                format!("surface.wall.height_m: {height}, {expected}{question}")
+            );
+        }
         for slope in [-8.0, 90.0, f64::NAN] {
             let refusal = refusal_of_wall(LabelWall {
                 height_m: None,
@@ -162,7 +162,7 @@ mod tests {
             assert_eq!(
                 refusal,
                 format!(
-                    "surface.wall.slope_deg: {slope}, expected 0 to 80 degrees from upright, outwards"
+                    "surface.wall.slope_deg: {slope}, expected 0 to 80 (degrees from upright, outwards)"
                 )
             );
         }
@@ -196,7 +196,7 @@ mod tests {
 
     #[test]
     fn a_surface_reflects_some_of_the_light_and_at_most_all() {
-        for impossible in [-0.5, 0.0, 1.5] {
+        for impossible in [-0.5, 0.0, 1.5, 10.0] {
             let color = LinearRgb::new(0.5, impossible as f32, 0.5);
             for albedo in [Albedo::Luminance(impossible), Albedo::Color(color)] {
                 let refusal = refusal_of(albedo);

@@ -2,6 +2,8 @@
 //! shows it, and back.
 
 use super::pinhole::Camera;
+use crate::bounds::number;
+use crate::error::{Error, Result};
 use crate::geom::{Point2, Vector2};
 use nalgebra::{Matrix2, Matrix3};
 
@@ -9,6 +11,9 @@ use nalgebra::{Matrix2, Matrix3};
 const MAX_STEPS: usize = 60;
 /// Relative change of the radius that counts as none.
 const CONVERGED: f64 = 1e-15;
+/// The part of a barrel's radius up to its fold that a picture may use: three fifths of the
+/// resolution are left there at the corners.
+const USED_PART_OF_FOLD: f64 = 0.77;
 
 /// OpenCV's k1 at work in a picture: a point that a pinhole camera sees at `x` focal lengths from
 /// the principal point is shown at `x (1 + k1 |x|^2)`.
@@ -196,6 +201,43 @@ impl RadialDistortion {
     fn in_pixels(&self, x: Vector2<f64>) -> Point2<f64> {
         self.principal_px + x.component_mul(&self.focal_px)
     }
+}
+
+/// The least k1 of a lens that took the pictures of a camera: beyond, their corners fold over.
+pub(crate) fn least_k1(camera: &Camera) -> f64 {
+    let used = USED_PART_OF_FOLD;
+    least_k1_with(camera, used * (1.0 - used * used / 3.0))
+}
+
+/// The same of a lens by which straight pictures of a camera are bent.
+pub(crate) fn least_bending_k1(camera: &Camera) -> f64 {
+    least_k1_with(camera, USED_PART_OF_FOLD)
+}
+
+/// With which the corners are at this part of the fold's radius.
+fn least_k1_with(camera: &Camera, part: f64) -> f64 {
+    let reach = RadialDistortion::new(camera, 0.0).reach();
+    -(part / reach).powi(2) / 3.0
+}
+
+/// Fails on a k1 that is less than the least one.
+pub(crate) fn check_fold(at: &str, k1: f64, least: f64) -> Result<()> {
+    if k1 >= least {
+        return Ok(());
+    }
+    let shown = number((1e6 * k1).round() / 1e6);
+    let what = format!(
+        "{shown}, expected at least {least:.3}: beyond, the corners of this camera's pictures fold over"
+    );
+    Err(Error::value(at, what))
+}
+
+/// Checks that a lens of this k1 can have taken the pictures of a camera that was solved with it.
+///
+/// # Errors
+/// [`Error::Value`] for a barrel that folds their corners over.
+pub fn check_lens(camera: &Camera, k1: f64) -> Result<()> {
+    check_fold("camera.k1", k1, least_k1(camera))
 }
 
 #[cfg(test)]

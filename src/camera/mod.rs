@@ -68,10 +68,11 @@ pub use joint::{Joint, OutlierPhoto, group_by_camera, have_same_shape, solve_joi
 #[doc(hidden)]
 pub use label::{Artwork, Crop, Framing, LabelFormat, LabelWall, PixelOrigin};
 pub use label::{Label, LabelCamera, LabelImage, LabelPoint, LabelSurface, MarkerMap};
-#[doc(hidden)]
-pub use lens::RadialDistortion;
 #[cfg(test)]
 pub(crate) use lens::tests::camera as tilted_camera;
+#[doc(hidden)]
+pub use lens::{RadialDistortion, check_lens};
+pub(crate) use lens::{check_fold, least_bending_k1, least_k1};
 #[cfg(test)]
 pub(crate) use marker::printed;
 pub use marker::{Marker, find_markers};

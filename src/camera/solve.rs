@@ -74,7 +74,7 @@ fn solve_perhaps_cropped(
     let whole = solve_framed(label, Framing::Whole, options);
     let loose = solve_framed(label, Framing::Unknown, options);
     match (whole, loose) {
-        (Ok(whole), Ok(loose)) => Ok(whole_or_cropped(whole, loose, options)),
+        (Ok(whole), Ok(loose)) => Ok(whole_or_cropped(whole, loose, label, options)),
         (Ok(whole), Err(_)) => Ok(whole),
         (Err(_), loose) => loose.map(|loose| loose.off_center(None)),
     }
@@ -95,6 +95,7 @@ impl SolvedProblem {
 fn whole_or_cropped(
     whole: SolvedProblem,
     loose: SolvedProblem,
+    label: &Label,
     options: &SolveOptions,
 ) -> SolvedProblem {
     if is_off_center(whole.minimum.cost, loose.minimum.cost) {
@@ -102,7 +103,9 @@ fn whole_or_cropped(
     }
     let apart = whole.minimum.state.step_to(&loose.minimum.state);
     SolvedProblem {
-        solution: whole.solution.hedged(&loose.solution, &apart, options),
+        solution: whole
+            .solution
+            .hedged(&loose.solution, &apart, label, options),
         ..whole
     }
 }
@@ -155,15 +158,16 @@ fn solve_without_wrong_exif(label: &Label, options: &SolveOptions) -> Result<Sol
         minimum,
     } = solve_as_labelled(label, options)?;
     let focal = Uncertainty::new(&minimum, problem.residuals.priors.ln_focal).focal;
-    let Some(conflict) = focal_conflict(&problem, &focal) else {
+    let Some(conflict) = FocalConflict::new(&problem, &focal) else {
         return Ok(solution);
     };
-    if problem.prior_source != PriorSource::Exif {
-        solution.warnings.push(conflict);
+    if !conflict.is_with_exif() {
+        solution.warnings.push(conflict.warning());
         return Ok(solution);
     }
     let second = solve_as_labelled(&without_exif_focal(label), options)?.solution;
-    Ok(second.preferred_to(solution, conflict))
+    let warning = conflict.solved_without(&second).warning();
+    Ok(second.preferred_to(solution, warning))
 }
 
 /// The label without what EXIF data say of the focal length, where that is what it goes by.
@@ -184,18 +188,57 @@ impl Solution {
     }
 }
 
-/// A warning, where what the picture gives for the focal length contradicts its prior.
-pub(super) fn focal_conflict(problem: &Problem, focal: &FocalShare) -> Option<Diagnostic> {
-    let prior = problem.residuals.priors.ln_focal;
-    let sigmas = focal.prior_conflict(prior)?.abs();
-    let prior_px = problem.units.focal_px(prior.mean);
-    let measured_px = problem.units.focal_px(focal.from_data?.mean);
-    let [source, causes] = source_and_causes(problem.prior_source);
-    let what = format!(
-        "focal length: the corners give {measured_px:.0} px, {source} {prior_px:.0} px ({sigmas:.1} sigmas apart): \
-         {causes}"
-    );
-    (sigmas > CONFLICT_SIGMAS).then(|| Diagnostic::warning(Code::FocalPriorConflict, what))
+/// What the picture gives for the focal length contradicts its prior.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct FocalConflict {
+    source: PriorSource,
+    prior_px: f64,
+    measured_px: f64,
+    /// How far apart the two are, in standard deviations of the difference.
+    sigmas: f64,
+}
+
+impl FocalConflict {
+    /// None where picture and prior agree.
+    pub(super) fn new(problem: &Problem, focal: &FocalShare) -> Option<Self> {
+        let prior = problem.residuals.priors.ln_focal;
+        let conflict = Self {
+            source: problem.prior_source,
+            prior_px: problem.units.focal_px(prior.mean),
+            measured_px: problem.units.focal_px(focal.from_data?.mean),
+            sigmas: focal.prior_conflict(prior)?.abs(),
+        };
+        (conflict.sigmas > CONFLICT_SIGMAS).then_some(conflict)
+    }
+
+    /// The prior is that of EXIF data, without which the label can be solved.
+    pub(super) fn is_with_exif(&self) -> bool {
+        self.source == PriorSource::Exif
+    }
+
+    /// With what the picture gives in a solution without that prior: what it gives beside a wrong
+    /// one is far off.
+    pub(super) fn solved_without(self, solution: &Solution) -> Self {
+        Self {
+            measured_px: solution.camera.focal_px.x,
+            ..self
+        }
+    }
+
+    pub(super) fn warning(&self) -> Diagnostic {
+        let Self {
+            prior_px,
+            measured_px,
+            sigmas,
+            ..
+        } = *self;
+        let [source, causes] = source_and_causes(self.source);
+        let what = format!(
+            "focal length: the corners give {measured_px:.0} px, {source} {prior_px:.0} px ({sigmas:.1} sigmas apart): \
+             {causes}"
+        );
+        Diagnostic::warning(Code::FocalPriorConflict, what)
+    }
 }
 
 /// What an expected focal length comes from, and why the corners may contradict it.
@@ -256,4 +299,28 @@ fn exchanged(label: &Label) -> Label {
     let surface = &mut exchanged.surface;
     std::mem::swap(&mut surface.width_m, &mut surface.height_m);
     exchanged
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_conflict_names_the_focal_length_that_is_taken() {
+        // EXIF data of 740 px, a lens of twice that.
+        let corners = [
+            [235.8, 239.2],
+            [1019.7, 215.7],
+            [1008.9, 701.2],
+            [275.6, 738.8],
+        ];
+        let mut label = Label::new([1280, 960], corners, [0.56, 0.37]);
+        (label.image.cropped, label.camera.focal_35mm) = (Some(false), Some(20.0));
+        let solution = solve(&label, &SolveOptions::default()).unwrap();
+        let mut warnings = solution.warnings.iter();
+        let conflict = warnings.find(|w| w.code == Code::FocalPriorConflict);
+        let focal_px = solution.camera.focal_px.x;
+        let told = format!("the corners give {focal_px:.0} px, EXIF data 740 px");
+        assert!(conflict.unwrap().message.contains(&told), "{conflict:?}");
+    }
 }

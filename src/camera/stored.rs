@@ -3,6 +3,7 @@
 use super::error::SolveError;
 use super::file::{CameraFile, SolvedFrom, checksum, has_checksum};
 use super::label::Label;
+use super::label_check::check_label;
 use super::options::SolveOptions;
 use super::pinhole::Camera;
 use super::read::LabelledPhoto;
@@ -39,10 +40,12 @@ type LabelsByName<'a> = BTreeMap<&'a str, &'a Label>;
 /// is refused, unless `force`d here or when it was solved.
 ///
 /// # Errors
-/// A camera file that cannot be right; a label that no camera can have seen, or that none fits.
+/// A label with an impossible value, or that no camera can have seen, or that none fits; a camera
+/// file that cannot be right.
 pub(crate) fn photo_cameras(labels: &[LabelledPhoto], force: bool) -> Result<Vec<PhotoCamera>> {
     let mut found = Vec::with_capacity(labels.len());
     for labelled in labels {
+        check_label(&labelled.label).map_err(|error| in_label(error, labelled))?;
         let file = read_camera_file(labelled)?;
         found.push((with_stored_size(labelled, file.as_ref()), file));
     }
@@ -145,10 +148,14 @@ fn checked_camera_file(path: &Path, labelled: &LabelledPhoto) -> Result<CameraFi
     Ok(file)
 }
 
+fn in_label(error: SolveError, labelled: &LabelledPhoto) -> Error {
+    Error::from(error).in_file(&labelled.source)
+}
+
 /// The error of a label, or where its sides are missing, where to give them.
 fn located_error(error: SolveError, labelled: &LabelledPhoto) -> Error {
     if labelled.label.surface.has_side() {
-        return Error::from(error).in_file(&labelled.source);
+        return in_label(error, labelled);
     }
     Error::file(
         &labelled.source,
@@ -419,6 +426,17 @@ mod tests {
         assert_eq!(found[0].stale, None);
         let found = photo_cameras(&[bare, other_noted], false).unwrap();
         assert!(found[0].stale.is_some());
+    }
+
+    #[test]
+    fn a_value_that_no_camera_depends_on_is_checked_beside_a_stored_camera_too() {
+        let desk = Desk::new();
+        let mut label = desk.label(0);
+        desk.store(&desk.write(&label), |_| {});
+        label.surface.albedo = Some(Albedo::Luminance(10.0));
+        let error = camera_of(&desk.write(&label), false).unwrap_err();
+        let told = "a.label.json: surface.albedo: 10, expected 0.001 to 1 (a share of the light)";
+        assert!(error.to_string().ends_with(told), "{error}");
     }
 
     #[test]

@@ -3,7 +3,7 @@
 //! The bounds of a recipe are those of photographs of things; a scene may come from any program and
 //! is only held to what the arithmetic of the stages bears.
 
-use crate::bounds::{Bounds, MAX_SLOPE_DEG};
+use crate::bounds::{Bounds, LEAST_ALBEDO};
 
 /// Most objects in one scene: heaps of some hundreds are what comes to rest.
 pub(crate) const MAX_OBJECTS: usize = 1_000;
@@ -16,6 +16,7 @@ pub(super) const EV: Bounds = Bounds::new(-32.0, 32.0, "what 32-bit pictures hol
 pub(super) const TURN: Bounds = Bounds::new(-3600.0, 3600.0, "degrees; a turn is 360");
 pub(super) const TILT: Bounds = Bounds::new(-180.0, 180.0, "degrees");
 pub(super) const ACROSS: Bounds = Bounds::new(-1.0, 1.0, "the walls");
+pub(super) const SHIFT: Bounds = Bounds::new(-1.0, 1.0, "the photo's edges");
 pub(super) const GAP: Bounds = Bounds::metres(1e-6, 1.0, "objects are stacked before they fall");
 pub(super) const GRADE: Bounds = Bounds::new(0.0, 100.0, "a factor");
 pub(super) const WEIGHT: Bounds = Bounds::new(0.0, 1e6, "how likely beside the others");
@@ -33,10 +34,7 @@ pub(super) const KELVIN: Bounds =
 pub(super) const GAIN: Bounds = Bounds::new(1e-6, 1e6, "a factor");
 pub(super) const FRICTION: Bounds =
     Bounds::new(0.0, 100.0, "a coefficient; plastics have 0.2 to 0.6");
-/// Height of walls over the surface, metres.
-pub(super) const WALL_HEIGHT: Bounds = Bounds::metres(0.0, 50.0, "0 is a table without walls");
-pub(super) const SLOPE: Bounds = Bounds::new(0.0, MAX_SLOPE_DEG, "degrees from upright, outwards");
-pub(super) const ALBEDO: Bounds = Bounds::new(0.001, 10.0, "a share of light; 1 is white");
+pub(super) const ALBEDO: Bounds = Bounds::new(LEAST_ALBEDO, 10.0, "a share of light; 1 is white");
 pub(super) const CAST_SHARE: Bounds = Bounds::new(
     -10.0,
     10.0,

@@ -28,8 +28,8 @@ pub struct SettleOptions {
     /// Largest rise of energy, potential and kinetic, between two steps, as a share of the drop's;
     /// more is [`SettleVerdict::Exploded`](crate::settle::SettleVerdict::Exploded). Default: 0.01.
     pub max_energy_rise: f64,
-    /// Longest fall, seconds of a world in which the typical card is 200 mm long, 0.01 to 600.
-    /// Default: 10.
+    /// Longest fall, seconds of a world in which the typical card is 200 mm long, from when the
+    /// highest can have landed, 0.01 to 600. Default: 10.
     pub time_limit: f64,
     /// Attempts before giving up, 1 to 100; each starts from heights of its own. Default: 8.
     pub attempts: u32,

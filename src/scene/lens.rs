@@ -1,8 +1,8 @@
 //! What a lens does that a pinhole does not: it bends straight lines, and is sharp at one distance.
 
 use crate::bounds::Bounds;
-use crate::camera::{Camera, RadialDistortion};
-use crate::error::{Error, Result};
+use crate::camera::{self, Camera, RadialDistortion};
+use crate::error::Result;
 use crate::geom::Point2;
 use crate::scene::bounds::{F_NUMBER, FOCUS, K1, SENSOR};
 use crate::scene::check::field;
@@ -11,9 +11,6 @@ use serde::{Deserialize, Serialize};
 
 /// Width of the sensor of a 35 mm camera, millimetres.
 const FULL_FRAME_MM: f64 = 36.0;
-/// The part of a barrel's radius up to its fold that a picture may use: three fifths of the
-/// resolution are left there at the corners.
-const USED_PART_OF_FOLD: f64 = 0.77;
 
 /// The lens of a scene's camera; the default is a pinhole.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -143,26 +140,15 @@ impl Lens {
 
     /// Fails on a barrel that folds the corners of a camera's pictures over, or nearly.
     pub(super) fn check_fold(&self, photo: &Camera) -> Result<()> {
-        let least = self.least_k1(photo);
-        if self.k1 >= least {
-            return Ok(());
-        }
-        let what = format!(
-            "{}, expected at least {least:.3}: beyond, the corners of this camera's pictures fold over",
-            self.k1
-        );
-        Err(Error::value("lens.k1", what))
+        camera::check_fold("lens.k1", self.k1, self.least_k1(photo))
     }
 
     fn least_k1(&self, photo: &Camera) -> f64 {
-        let used = USED_PART_OF_FOLD;
-        let shown = if self.bends_plate {
-            used
+        if self.bends_plate {
+            camera::least_bending_k1(photo)
         } else {
-            used * (1.0 - used * used / 3.0)
-        };
-        let reach = RadialDistortion::new(photo, self.k1).reach();
-        -(shown / reach).powi(2) / 3.0
+            camera::least_k1(photo)
+        }
     }
 }
 

@@ -98,7 +98,7 @@ mod tests {
             locate(flat)
                 .unwrap_err()
                 .to_string()
-                .contains("corners 0 and 1 are 0.0 px apart")
+                .contains("the first and the second corner are 0.0 px apart")
         );
     }
 }

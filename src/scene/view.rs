@@ -4,7 +4,7 @@ use crate::camera::Camera;
 use crate::error::Result;
 use crate::geom::{Point2, Pose, UnitQuaternion, Vector2, Vector3};
 use crate::image::Image;
-use crate::scene::bounds::{ACROSS, TURN, ZOOM};
+use crate::scene::bounds::{SHIFT, TURN, ZOOM};
 use crate::scene::check::field;
 use crate::scene::{Draws, Range};
 use serde::{Deserialize, Serialize};
@@ -111,7 +111,7 @@ impl View {
     pub(super) fn check(&self, at: &str) -> Result<()> {
         ZOOM.check(&field(at, "zoom"), self.zoom)?;
         for side in self.shift {
-            ACROSS.check(&field(at, "shift"), side)?;
+            SHIFT.check(&field(at, "shift"), side)?;
         }
         TURN.check(&field(at, "turn_deg"), self.turn_deg)
     }
@@ -160,8 +160,8 @@ impl ViewRanges {
 
     pub(super) fn check(&self) -> Result<()> {
         self.zoom.check("view.zoom", &ZOOM)?;
-        self.shift_x.check("view.shift_x", &ACROSS)?;
-        self.shift_y.check("view.shift_y", &ACROSS)?;
+        self.shift_x.check("view.shift_x", &SHIFT)?;
+        self.shift_y.check("view.shift_y", &SHIFT)?;
         self.turn_deg.check("view.turn_deg", &TURN)
     }
 }
@@ -239,6 +239,16 @@ mod tests {
                 assert!(least[0].abs() < 1e-9 && (most[1] - 120.0).abs() < 1e-9);
             }
         }
+    }
+
+    #[test]
+    fn a_shift_ends_at_the_photo_s_edges() {
+        let ranges = ViewRanges {
+            shift_x: Range::fixed(2.0),
+            ..ViewRanges::default()
+        };
+        let told = "view.shift_x: 2, expected -1 to 1 (the photo's edges)";
+        assert_eq!(ranges.check().unwrap_err().to_string(), told);
     }
 
     #[test]

@@ -1,8 +1,8 @@
 //! Walls along the edges of the surface: how high, and how far they lean outwards.
 
+use crate::bounds::{SLOPE, WALL_HEIGHT};
 use crate::error::Result;
 use crate::geom::Vector3;
-use crate::scene::bounds::{SLOPE, WALL_HEIGHT};
 use crate::scene::{Draws, Range};
 use serde::{Deserialize, Serialize};
 

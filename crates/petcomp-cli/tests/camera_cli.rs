@@ -282,6 +282,31 @@ fn a_camera_too_far_away_is_refused_however_it_is_solved() {
 }
 
 #[test]
+fn a_lens_that_folds_the_photo_over_is_refused_wherever_its_label_is_read() {
+    let desk = Desk::with_recipe();
+    let mut label = desk.photo("a", [1280, 960]);
+    label["surface"]["corners_px"] = json!([
+        [235.8, 239.2],
+        [1019.7, 215.7],
+        [1008.9, 701.2],
+        [275.6, 738.8]
+    ]);
+    label["image"]["cropped"] = json!(false);
+    label["camera"] = json!({ "k1": -5 });
+    desk.label("a", &label);
+    for args in [
+        &["camera", "solve", "bg/a.label.json"][..],
+        &["scene", "draw", "recipe.toml", "-o", "scene.json"],
+    ] {
+        let said = desk.refused(args);
+        assert!(
+            said.contains("a.label.json: camera.k1: -5, expected at least -1.4"),
+            "{args:?}: {said}"
+        );
+    }
+}
+
+#[test]
 fn a_photo_that_is_not_the_label_s_is_noticed() {
     let desk = Desk::with_recipe();
     let mut label = desk.photo("a", IMAGE);
@@ -509,7 +534,9 @@ fn labels_of_other_programs_are_labels_everywhere() {
         let path = format!("bg/{file}");
         let [said, _] = desk.ok(&["camera", "solve", &path, "--size", "0.56x0.37"]);
         assert!(said.contains("tilt 30."), "{file}: {said}");
-        desk.ok(&["camera", "doctor", &path, "--size", "0.56x0.37"]);
+        let [said, _] = desk.ok(&["camera", "doctor", &path, "--size", "0.56x0.37"]);
+        let advice = "`petcomp camera init PHOTO --size WxH --corners";
+        assert!(said.contains(advice), "{file}: {said}");
         desk.ok(&["camera", "joint", &path, "--size", "0.56x0.37"]);
         assert!(desk.path("bg/a.camera.json").is_file(), "{file}");
         // Where it was solved its size is known.

@@ -4,6 +4,9 @@ use super::{AnnotatedShape, Annotation, ShapeKind, turned_about, upright_corners
 use crate::error::{Error, Result};
 use roxmltree::{Document, Node};
 
+/// The source of surfaces that were drawn in it.
+pub(super) const PROGRAM: &str = "cvat";
+
 /// The pictures with shapes on them; none for XML of another kind.
 pub(super) fn annotations(text: &str) -> Result<Option<Vec<Annotation>>> {
     if !text.contains("<annotations") {
@@ -34,7 +37,7 @@ fn annotation(image: Node<'_, '_>) -> Result<Annotation> {
         files: vec![name.replace('\\', "/")],
         size: Some([width as u32, height as u32]),
         shapes: shapes(image)?,
-        source: "cvat",
+        source: PROGRAM,
     })
 }
 

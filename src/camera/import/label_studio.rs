@@ -6,6 +6,9 @@ use crate::error::{Error, Result};
 use serde::Deserialize;
 use serde_json::Value;
 
+/// The source of surfaces that were drawn in it.
+pub(super) const PROGRAM: &str = "label-studio";
+
 /// Length of what Label Studio puts before the name of an uploaded file: eight hexadecimal digits
 /// and a hyphen.
 const UPLOAD_PREFIX_LENGTH: usize = 9;
@@ -64,7 +67,7 @@ fn annotation(task: &Value) -> Result<Annotation> {
     };
     let mut annotation = Annotation {
         files: picture_names(task),
-        source: "label-studio",
+        source: PROGRAM,
         ..Default::default()
     };
     for (i, result) in results.iter().enumerate().filter(|(_, r)| has_size(r)) {

@@ -5,6 +5,9 @@ use crate::error::{Error, Result};
 use serde::Deserialize;
 use serde_json::Value;
 
+/// The source of surfaces that were drawn in it.
+pub(super) const PROGRAM: &str = "labelme";
+
 /// What is read from a file; there is more in it.
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
@@ -39,7 +42,7 @@ pub(super) fn annotation(value: Value) -> Result<Annotation> {
         files: vec![file.image_path.replace('\\', "/")],
         size: file.image_width.zip(file.image_height).map(|(w, h)| [w, h]),
         shapes: file.shapes.into_iter().map(shape).collect(),
-        source: "labelme",
+        source: PROGRAM,
     })
 }
 

@@ -68,6 +68,19 @@ fn json_annotations(value: Value) -> Result<Option<Vec<Annotation>>> {
     }
 }
 
+/// The sources of surfaces that were drawn in other programs.
+const PROGRAMS: [&str; 3] = [cvat::PROGRAM, label_studio::PROGRAM, labelme::PROGRAM];
+
+/// Words for where a person adds to a label: the file of another program has no place for it.
+pub(crate) fn place_for_more(label: &Label) -> &'static str {
+    match label.surface.source.as_deref() {
+        Some(source) if PROGRAMS.contains(&source) => {
+            " in a label of petcomp's own (`petcomp camera init PHOTO --size WxH --corners \"..\"` writes one)"
+        }
+        _ => "",
+    }
+}
+
 impl Annotation {
     /// The label for the annotation; the sides of its rectangle are unknown.
     pub(crate) fn label(&self) -> Result<Label> {

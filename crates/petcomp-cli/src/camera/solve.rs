@@ -155,7 +155,7 @@ fn accept_member(
     global: &GlobalArgs,
 ) -> anyhow::Result<()> {
     let solution = outcome.map_err(|e| located(e, member))?;
-    let solution = accepted(near_enough(solution, member)?, member, force)?;
+    let solution = accepted(possible(solution, member)?, member, force)?;
     let file = CameraFile::solved_together(member, &solution, all);
     write_camera(&member.beside("camera.json"), member, &file, &solution)?;
     report_solution(member, &solution, global);
@@ -180,12 +180,15 @@ fn solve_label(labelled: &LabelledPhoto) -> petcomp::Result<Solution> {
 }
 
 pub(super) fn solved(labelled: &LabelledPhoto) -> petcomp::Result<Solution> {
-    near_enough(solve_label(labelled)?, labelled)
+    possible(solve_label(labelled)?, labelled)
 }
 
-/// A solution whose camera can see objects on the surface.
-fn near_enough(solution: Solution, labelled: &LabelledPhoto) -> petcomp::Result<Solution> {
-    camera::check_distance(&solution.camera).map_err(|e| e.in_file(&labelled.source))?;
+/// A solution whose camera can see objects on the surface, through a lens that can have taken the
+/// photo.
+fn possible(solution: Solution, labelled: &LabelledPhoto) -> petcomp::Result<Solution> {
+    camera::check_distance(&solution.camera)
+        .and_then(|()| camera::check_lens(&solution.camera, solution.k1()))
+        .map_err(|e| e.in_file(&labelled.source))?;
     Ok(solution)
 }
 
