@@ -9,6 +9,7 @@ use crate::io;
 use crate::matte::CutOutOptions;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
 /// A list of photos: `photos.toml`, or `photos.csv` with the fields of [`PhotoEntry`] for columns,
@@ -103,7 +104,7 @@ impl List {
             return Err(Error::value("photos", "empty, expected at least one"));
         }
         check_each(&self.photos, "photos", |photo| photo.check(manifest))?;
-        self.check_bodies()?;
+        self.check_assets()?;
         check_cut_out_files(&self.photos)
     }
 
@@ -113,14 +114,24 @@ impl List {
         manifest.add_classes(&self.classes, classes)
     }
 
-    /// No two photos of an asset tell different things of its body.
-    fn check_bodies(&self) -> Result<()> {
-        let bodies = self.bodies();
+    /// No two photos of an asset tell different things of it.
+    fn check_assets(&self) -> Result<()> {
+        let (firsts, bodies) = (self.firsts(), self.bodies());
+        let class = |photo: &PhotoEntry| Some(format!("\"{}\"", photo.class));
         check_each(&self.photos, "photos", |photo| {
-            let (told, first) = (photo.known_body(), bodies[&photo.asset]);
-            check_same("thickness", told.thickness, first.thickness)?;
-            check_same("mass", told.mass, first.mass)
+            let first = firsts[photo.asset.as_str()];
+            check_same("role", Some(photo.role), Some(first.role))?;
+            check_same("class", class(photo), class(first))?;
+            let (told, body) = (photo.known_body(), bodies[&photo.asset]);
+            check_same("thickness", told.thickness, body.thickness)?;
+            check_same("mass", told.mass, body.mass)
         })
+    }
+
+    /// The first photo of each asset.
+    fn firsts(&self) -> BTreeMap<&str, &PhotoEntry> {
+        let photos = self.photos.iter().rev();
+        photos.map(|photo| (photo.asset.as_str(), photo)).collect()
     }
 
     /// Fails for the first picture that does not exist.
@@ -167,7 +178,7 @@ pub fn check_cut_out_files(photos: &[PhotoEntry]) -> Result<()> {
 }
 
 /// Fails where a photo gives another value than the first of its asset.
-fn check_same(name: &str, told: Option<f64>, first: Option<f64>) -> Result<()> {
+fn check_same<T: PartialEq + Display>(name: &str, told: Option<T>, first: Option<T>) -> Result<()> {
     match (told, first) {
         (Some(told), Some(first)) if told != first => {
             let what = format!("{told}, but another photo of the asset has {first}");

@@ -110,6 +110,31 @@ fn change_where(image: &Image<f32>, mask: &Mask) -> f32 {
     high / low.max(f32::MIN_POSITIVE) - 1.0
 }
 
+/// Light through an object, over that of the display without it, that noise explains.
+const MAX_PASSED: f32 = 1.03;
+
+/// # Errors
+/// [`Error::Photo`](crate::Error::Photo) where most of an object would let more light pass than the
+/// display has without it: glints and refraction do that to few of its pixels.
+pub(super) fn exchange(frames: &BlackAndWhite<'_>, coverage: &Image<Coverage>) -> Result<()> {
+    let object = coverage.map(|c| c.0 > 0.5);
+    let brighter = passed(frames).zip3_map(&frames.light(), &object, |passed, light, inside| {
+        inside && passed > MAX_PASSED * grey(light)
+    });
+    if 2 * brighter.count() <= object.count() {
+        return Ok(());
+    }
+    Err(refused(
+        "through most of the object the display is brighter than without it; \
+         are its photos and those of the empty display (--empty) exchanged?",
+    ))
+}
+
+/// What is seen more of white than of black.
+fn passed(frames: &BlackAndWhite<'_>) -> Image<f32> {
+    frames.white.zip_map(frames.black, |w, k| grey(w) - grey(k))
+}
+
 /// Motion of the camera that leaves double edges, pixels of the photo.
 const MAX_MOTION_PX: f64 = 2.0;
 
@@ -155,7 +180,7 @@ fn change_of_stripes(
     coverage: &Image<Coverage>,
     free: &Mask,
 ) -> f64 {
-    let passed = frames.white.zip_map(frames.black, |w, k| grey(w) - grey(k));
+    let passed = passed(frames);
     let above = stripes.zip_map(frames.black, |mean, k| mean - grey(k));
     let share = ratio_where(&above, &passed, free);
     let light = frames

@@ -49,8 +49,8 @@ const RIM_SOFTNESS_PX: f32 = 0.6;
 ///
 /// # Errors
 /// Those of reading photos; [`Error::Photo`](crate::Error::Photo) where the black or the white
-/// frame is missing, photos of a frame show different things, white is clipped or uneven, or no
-/// object lies within the display.
+/// frame is missing, photos of a frame show different things, white is clipped or uneven, no object
+/// lies within the display, or photos with it and without are exchanged.
 pub fn measure(
     display: &Display,
     view: &View,
@@ -128,6 +128,9 @@ impl<'a> CaptureScene<'a> {
 
     fn solve(self, mut diagnostics: Vec<Diagnostic>) -> Result<Measured> {
         let frames = self.frames();
+        if self.empty_stack.is_some() {
+            check::exchange(&frames, &self.object.coverage)?;
+        }
         diagnostics.extend(check::clipping(frames.white, &self.free)?);
         diagnostics.extend(check::bands(&frames, &self.free)?);
         diagnostics.extend(check::color_change(frames.empty_white, &self.free));
@@ -248,8 +251,15 @@ impl EmptyDisplay {
 /// What is added to black for its fit, as a share of white.
 const BLACK_LIFT: f32 = 0.1;
 
+/// Each channel is fitted by itself: a plate is as smooth as its brightest channel, and from the
+/// side the others of a display change while that one may not.
 fn fitted(photo: &Image<LinearRgb>, free: &Mask) -> Result<Image<LinearRgb>> {
-    ScreenPlate::fit(photo, free, &PlateOptions::default()).map(|plate| plate.image)
+    let fit = |channel: usize| {
+        let light = photo.map(|p| LinearRgb::grey(p.channels()[channel]));
+        ScreenPlate::fit(&light, free, &PlateOptions::default()).map(|plate| plate.image)
+    };
+    let [r, g, b] = [fit(0)?, fit(1)?, fit(2)?];
+    Ok(r.zip3_map(&g, &b, |r, g, b| LinearRgb::new(r.r, g.g, b.b)))
 }
 
 fn mean_where(image: &Image<LinearRgb>, mask: &Mask) -> LinearRgb {

@@ -2,7 +2,7 @@
 
 use super::recognise::refused;
 use super::view::grey;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::filter;
 use crate::image::{Image, Mask};
 use crate::matte::{Outline, PixelGroups, filled};
@@ -52,8 +52,8 @@ impl Object {
     /// The largest thing in the free area of the display.
     ///
     /// # Errors
-    /// [`Error::Photo`](crate::Error::Photo) where nothing lies there, or something that is larger
-    /// than the area.
+    /// [`Error::Photo`] where nothing lies there, nothing stands out from an uneven display, or
+    /// something is larger than the area.
     pub(super) fn find(evidence: &Image<f32>, free: &Mask) -> Result<Self> {
         let threshold = threshold(evidence, free);
         let strongest = local_maximum(evidence, EDGE_REACH_PX);
@@ -63,9 +63,7 @@ impl Object {
         let mask = solid(&rough);
         let area = mask.count() as f64 / mask.pixels().len() as f64;
         if area < MIN_AREA {
-            return Err(refused(
-                "nothing lies on the display, or nothing that differs from it",
-            ));
+            return Err(nothing_found(threshold));
         }
         check_within(&mask, free)?;
         let coverage = soft_coverage(&mask, evidence, &strongest);
@@ -83,6 +81,19 @@ fn threshold(evidence: &Image<f32>, free: &Mask) -> f32 {
     let values = pixels.filter(|(_, free)| **free).map(|(e, _)| *e);
     let typical = median(values, f32::total_cmp).unwrap_or_default();
     MIN_EVIDENCE.max(EVIDENCE_MEDIANS * typical)
+}
+
+/// Why no object is found: there is none, or the display itself differs too much from what is
+/// expected of it.
+fn nothing_found(threshold: f32) -> Error {
+    if threshold <= MIN_EVIDENCE {
+        return refused("nothing lies on the display, or nothing that differs from it");
+    }
+    let [typical, most] = [threshold, MIN_EVIDENCE].map(|t| 100.0 * t / EVIDENCE_MEDIANS);
+    refused(&format!(
+        "the display is uneven or changes its colour, typically by {typical:.1} % of white, expected at most {most:.1} %: \
+         nothing stands out from it; photograph it empty, too, from the same place and in the same light (--empty)"
+    ))
 }
 
 /// The largest value around each pixel.
@@ -209,5 +220,11 @@ mod tests {
         let told = |evidence: &Image<f32>| Object::find(evidence, &free).err().unwrap().to_string();
         assert!(told(&bar).contains("(left)"), "{}", told(&bar));
         assert!(told(&Image::filled(120, 80, 0.001)).contains("nothing lies on the display"));
+        let uneven = told(&bar.map(|e| e.max(0.1)));
+        assert!(
+            uneven.contains("the display is uneven or changes its colour, typically by 10.0 %")
+                && uneven.contains("(--empty)"),
+            "{uneven}"
+        );
     }
 }

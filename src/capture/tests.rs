@@ -378,6 +378,45 @@ fn what_is_wrong_with_a_capture_is_said() {
     assert!(nothing.contains("nothing lies on the display"), "{nothing}");
 }
 
+/// A photo as from the side: across the display green and blue change by a fifth, red not at all.
+fn aslant(photo: &Image<LinearRgb>) -> Image<LinearRgb> {
+    let map = display_from_photo([0.0; 2]);
+    Image::from_fn(PHOTO.0, PHOTO.1, |x, y| {
+        let at = map.map(Point2::new(x as f64 + 0.5, y as f64 + 0.5));
+        let across = (at.x / f64::from(DISPLAY.size_px[0])) as f32;
+        let p = photo[(x, y)].scale(1.0 / (0.95 - 0.1 * across));
+        let change = 0.9 + 0.2 * across;
+        LinearRgb::new(p.r, change * p.g, change * p.b)
+    })
+}
+
+#[test]
+fn a_display_whose_colour_changes_from_side_to_side_is_fitted() {
+    let photos: Vec<_> = frames(false)
+        .into_iter()
+        .map(|frame| aslant(&photo(frame, STILL)))
+        .collect();
+    let (view, measured) = measured_of(&photos, &[]).unwrap();
+    let [v, _] = film_errors(&view, &measured);
+    assert!(v < 0.015, "{v}");
+}
+
+#[test]
+fn photos_that_are_exchanged_with_those_of_the_empty_display_are_refused() {
+    let bare = Conditions {
+        has_object: false,
+        ..STILL
+    };
+    let [with, without] = [STILL, bare].map(|conditions| {
+        let photos = frames(false).into_iter();
+        photos
+            .map(|frame| photo(frame, conditions))
+            .collect::<Vec<_>>()
+    });
+    let error = measured_of(&without, &with).err().unwrap().to_string();
+    assert!(error.contains("exchanged?"), "{error}");
+}
+
 #[test]
 fn photos_of_a_frame_with_the_object_and_without_are_refused() {
     let [black, white] = [Frame::Black, Frame::White].map(|frame| photo(frame, STILL));

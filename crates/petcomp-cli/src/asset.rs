@@ -12,6 +12,7 @@ use petcomp::asset::{CaptureEntry, Photo, PhotoEntry, PhotoRecord, Role, Scale, 
 use petcomp::matte::{CutOutOptions, MatteMethod};
 use petcomp::{Error, Quality, io};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 
 #[derive(clap::Subcommand)]
 pub(crate) enum AssetCommand {
@@ -241,9 +242,8 @@ pub(crate) fn build_library(
     global: &GlobalArgs,
 ) -> anyhow::Result<Built> {
     let progress = global.start_progress("cut-outs");
-    let built = asset::build(list, folder, &|done, total| {
-        progress.update(done as u64, total as u64)
-    })?;
+    let report = |done: usize, total: usize| progress.update(done as u64, total as u64);
+    let built = asset::build(list, folder, &report, &AtomicBool::new(false))?;
     drop(progress);
     report_built(&built, folder, global);
     let library = &built.library;
@@ -305,10 +305,13 @@ fn write_sheet(folder: &Path, library: &Library, global: &GlobalArgs) -> anyhow:
 
 fn add_photos(args: &AddPhotoArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     args.check_companions()?;
-    let added = args.add_each(global)?;
-    let library = Library::open_with(&args.output, added)?;
-    show_classes(&library.classes, "--classes", global);
-    write_sheet(&args.output, &library, global)
+    let (added, batch) = args.add_each(global)?;
+    if !added.is_empty() {
+        let library = Library::open_with(&args.output, added)?;
+        show_classes(&library.classes, "--classes", global);
+        write_sheet(&args.output, &library, global)?;
+    }
+    batch.finish()
 }
 
 fn report_added(record: &PhotoRecord, global: &GlobalArgs) {
@@ -326,7 +329,12 @@ fn describe_size(record: &PhotoRecord) -> String {
 }
 
 /// Fails where an option is given without the one that it belongs to.
-fn check_companion(name: &str, is_given: bool, to: &str, is_there: bool) -> petcomp::Result<()> {
+pub(crate) fn check_companion(
+    name: &str,
+    is_given: bool,
+    to: &str,
+    is_there: bool,
+) -> petcomp::Result<()> {
     match is_given && !is_there {
         true => Err(Error::value(name, format!("given without {to}"))),
         false => Ok(()),
@@ -349,14 +357,22 @@ impl AddPhotoArgs {
         })
     }
 
-    fn add_each(&self, global: &GlobalArgs) -> petcomp::Result<Vec<Photo>> {
+    /// The photos that were added. Of several, one that cannot be used does not stop the others; an
+    /// option that cannot be right does, since it is that of all.
+    fn add_each(&self, global: &GlobalArgs) -> petcomp::Result<(Vec<Photo>, FileBatch)> {
         let options = self.quality.cut_out(CutOutOptions::default());
         let entries = self.entries();
         asset::check_cut_out_files(&entries)?;
-        let entries = entries.iter();
-        entries
-            .map(|entry| self.add_photo(entry, &options, global))
-            .collect()
+        let (mut added, mut batch) = (Vec::new(), FileBatch::default());
+        for entry in &entries {
+            match self.add_photo(entry, &options, global) {
+                Err(error) if entries.len() == 1 || matches!(error, Error::Value { .. }) => {
+                    return Err(error);
+                }
+                outcome => batch.count(outcome.map(|photo| added.push(photo)).map_err(Into::into)),
+            }
+        }
+        Ok((added, batch))
     }
 
     fn add_photo(

@@ -292,6 +292,22 @@ fn cardboard_and_wood_have_not_the_screens_hue() {
 }
 
 #[test]
+fn an_opaque_red_card_has_no_uncertain_tint() {
+    let card = LinearRgb::new(0.46, 0.02, 0.02);
+    let photo = inside().map(|c| if c.0 > 0.0 { card } else { GREEN });
+    let plate = ScreenPlate::even(GREEN, SIZE);
+    let found = film(&photo, &plate, &inside(), &FilmOptions::default()).unwrap();
+    let is_tint = |d: &Diagnostic| d.code == Code::TintUncertain;
+    assert!(
+        !found.diagnostics.iter().any(is_tint),
+        "{:?}",
+        found.diagnostics
+    );
+    let confidence = found.color_uncertainty.confidence();
+    assert!(confidence > 0.8, "{confidence}");
+}
+
+#[test]
 fn a_label_of_a_hue_beside_the_screens_is_opaque() {
     // Lime on green, sky on blue: as bright in the screen's channel as the screen through plastic.
     for (label, screen) in [([0.3, 0.4, 0.04], GREEN), ([0.04, 0.25, 0.45], BLUE)] {

@@ -12,7 +12,8 @@ use crate::quantile::median;
 pub(super) struct Tint {
     /// Its transmittance as measured: two walls looked through, and lit through.
     pub(super) flat: [f32; 3],
-    /// How far tints that explain the photo as well differ from it in some channel.
+    /// How far tints that explain the photo as well differ from it in some channel; 0 where none
+    /// explains it.
     pub(super) uncertainty: f32,
 }
 
@@ -189,8 +190,13 @@ fn thinned<T>(items: Vec<T>, count: usize) -> impl Iterator<Item = T> {
 }
 
 impl TintHypothesis {
-    /// The largest difference in a channel from those that explain the pixels as well.
+    /// The largest difference in a channel from those that explain the pixels as well; 0 where
+    /// this one does not.
     fn uncertainty(&self, tried: &[Self]) -> f32 {
+        // What no tint explains is no plastic, and nobody asks for its tint.
+        if self.misfit >= MAX_MISFIT {
+            return 0.0;
+        }
         let as_good = tried.iter().filter(|other| other.is_as_good_as(self));
         as_good
             .map(|other| largest_difference(other.flat, self.flat))

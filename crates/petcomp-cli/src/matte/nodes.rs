@@ -22,7 +22,7 @@ pub(crate) struct NodePicture {
     /// Where the premultiplied result goes; an EXR holds 32-bit floats
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// A setting under Blender's name, such as key.tolerance=0.2 or key.profile=blender-4.5
+    /// A setting under Blender's name, such as key.profile=blender-4.5
     #[arg(long = "set", value_name = "key.NAME=VALUE")]
     settings: Vec<Override>,
 }
