@@ -18,6 +18,8 @@ static NEVER_STOPPED: AtomicBool = AtomicBool::new(false);
 pub struct Allowance<'a> {
     most: u64,
     left: Cell<u64>,
+    /// Attempts that took all of their time.
+    timed_out: Cell<u32>,
     stop: &'a AtomicBool,
 }
 
@@ -27,6 +29,7 @@ impl Allowance<'static> {
         Self {
             most,
             left: Cell::new(most),
+            timed_out: Cell::new(0),
             stop: &NEVER_STOPPED,
         }
     }
@@ -70,6 +73,11 @@ impl<'a> Allowance<'a> {
         self.most - self.left.get()
     }
 
+    /// Counts an attempt that took all of its time.
+    pub(crate) fn add_timed_out(&self) {
+        self.timed_out.set(self.timed_out.get() + 1);
+    }
+
     /// Whether nothing is left.
     pub(crate) fn is_spent(&self) -> bool {
         self.left.get() == 0
@@ -79,10 +87,21 @@ impl<'a> Allowance<'a> {
     pub(crate) fn spent(&self) -> Error {
         let what = format!(
             "no rest within the work of one picture, {} (settle.most_work): expected fewer objects, a larger surface or \
-             longer steps",
-            self.most
+             longer steps{}",
+            self.most,
+            self.told_timed_out()
         );
         Error::Unsettled { what }
+    }
+
+    /// The rest of a message, where time was what attempts lacked.
+    fn told_timed_out(&self) -> String {
+        match self.timed_out.get() {
+            0 => String::new(),
+            count => {
+                format!("; attempts in which something still moved at settle.time_limit: {count}")
+            }
+        }
     }
 }
 
@@ -100,6 +119,16 @@ mod tests {
             message.starts_with("settle: no rest within the work of one picture, 10 "),
             "{message}"
         );
+    }
+
+    #[test]
+    fn attempts_that_lacked_time_are_told() {
+        let allowance = Allowance::new(10);
+        assert!(!allowance.spent().to_string().contains("settle.time_limit"));
+        allowance.add_timed_out();
+        allowance.add_timed_out();
+        let message = allowance.spent().to_string();
+        assert!(message.ends_with("at settle.time_limit: 2"), "{message}");
     }
 
     #[test]

@@ -103,6 +103,8 @@ kinds! {
     Encodes, "encodes";
     /// Bytes of files written
     BytesWritten, "bytes written";
+    /// Files put on the disk each by itself
+    SyncedFiles, "synced files";
     /// Files read
     FilesRead, "files read";
     /// Bytes of files read

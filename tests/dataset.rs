@@ -279,6 +279,20 @@ fn a_stopped_run_goes_on_to_the_same_bytes() {
     assert_eq!(bytes(whole.path()), bytes(broken.path()));
 }
 
+/// Other systems put each file on the disk by itself.
+#[cfg(all(feature = "counters", target_os = "linux"))]
+#[test]
+fn samples_are_put_on_the_disk_together() {
+    use petcomp::work::{Kind, counted};
+    let alone = |count| {
+        let dir = tempfile::tempdir().unwrap();
+        let (made, work) = counted(|| make(&full_plan(dir.path(), count))).unwrap();
+        assert_eq!(made.unwrap().made, count);
+        work[Kind::SyncedFiles]
+    };
+    assert_eq!(alone(5), alone(3));
+}
+
 #[test]
 fn a_finished_dataset_is_left_alone() {
     let dir = tempfile::tempdir().unwrap();
@@ -1016,6 +1030,25 @@ fn torn_archives_are_found_and_made_again() {
         (all - 5, 5)
     );
     make(&archive_plan(dir.path(), 30)).unwrap();
+    assert_eq!(before, bytes(dir.path()));
+}
+
+#[test]
+fn archives_of_sequences_are_whole() {
+    let dir = tempfile::tempdir().unwrap();
+    let plan = Plan {
+        recipe: serde_json::json!({ "scene": { "belt": { "frames": 10 } } }),
+        split: Split {
+            sequence: 10,
+            ..Split::default()
+        },
+        archives: Some(WebDataset { samples: 40 }),
+        ..plan(dir.path(), 100)
+    };
+    make(&plan).unwrap();
+    let before = bytes(dir.path());
+    let found = repair_archives(dir.path(), SampleRange::All).unwrap();
+    assert_eq!(found, (5, 0));
     assert_eq!(before, bytes(dir.path()));
 }
 
@@ -1943,6 +1976,24 @@ fn whatever_decides_a_picture_or_a_label_is_compared_before_a_dataset_goes_on() 
     std::fs::remove_file(front).unwrap();
     assert_eq!(before, bytes(&out));
     assert_eq!(run(4).unwrap().made, 1, "everything is as it was");
+}
+
+#[test]
+fn a_mask_beside_one_photo_of_several_is_known() {
+    let dir = tempfile::tempdir().unwrap();
+    write_world(dir.path());
+    let photos = dir.path().join("photos");
+    let label = text(&photos, "tray.label.json").replace("tray.tif", "wall.tif");
+    std::fs::write(photos.join("wall.label.json"), label).unwrap();
+    std::fs::copy(photos.join("tray.tif"), photos.join("wall.tif")).unwrap();
+    let mask = Image::filled(64, 48, Coverage(1.0));
+    io::write(photos.join("wall.front.png"), &mask).unwrap();
+    let config = DatasetConfig::read(dir.path().join("recipe.toml"), &[]).unwrap();
+    let pipeline = Pipeline::open(config).unwrap();
+    let recipe = pipeline.plan(1, 1, dir.path().join("out")).unwrap().recipe;
+    let [tray, wall] = [0, 1].map(|i| &recipe["backgrounds"][i]);
+    assert!(tray["name"] == "tray" && tray["front"].is_null());
+    assert!(wall["name"] == "wall" && wall["front"].is_string());
 }
 
 #[cfg(unix)]

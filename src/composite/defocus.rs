@@ -6,7 +6,8 @@
 //! generation", 1981), object by object: what an object hides in part is known by its own coverage,
 //! which samples keep, and its colour there is that of what is seen of it close by. Where the
 //! objects in a pixel are equally far out of focus their soft light simply adds up, as that of any
-//! blur; else the nearer ones hide the others behind them by their soft coverage.
+//! blur; else the nearer ones hide the others behind them by their soft coverage. Of a disc that
+//! reaches out of the picture the part inside counts as the whole.
 //!
 //! The plate is a photo and has its own depth of field: of it only the shadows are blurred.
 
@@ -75,6 +76,8 @@ struct SoftObject {
     columns: Range<usize>,
     rows: Range<usize>,
     pixels: Vec<SoftPixel>,
+    /// Width and height of the picture.
+    picture: [usize; 2],
     /// Pixels to the farthest that a circle of confusion of the picture reaches.
     reach: isize,
 }
@@ -144,6 +147,7 @@ impl<'a> Focus<'a> {
             pixels: vec![SoftPixel::default(); columns.len() * rows.len()],
             columns,
             rows,
+            picture: size,
             reach: discs.reach() as isize,
         };
         for sample in samples {
@@ -255,12 +259,14 @@ fn around<'a>(
 }
 
 impl SoftObject {
-    /// Adds a sample to every pixel of its disc.
+    /// Adds a sample to every pixel of its disc, by its share of the disc around that pixel as far
+    /// as it is inside the picture: what lies beyond is not known.
     fn spread(&mut self, placed: &PlacedSample, disc: &Disc) {
         for (dx, dy, weight) in disc.taps() {
             let at = [placed.at[0] as isize + dx, placed.at[1] as isize + dy];
             if let Some(i) = self.index(at) {
-                self.pixels[i].add(placed, *weight);
+                let inside = disc.share_inside(at, self.picture);
+                self.pixels[i].add(placed, weight / inside);
             }
         }
     }

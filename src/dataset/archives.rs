@@ -5,7 +5,7 @@
 //! place in one step, and the folder goes.
 
 use crate::dataset::archive_store::{self, ArchiveStore};
-use crate::dataset::journal::Journal;
+use crate::dataset::journal::lines_of;
 use crate::dataset::run::{Report, check_count};
 use crate::dataset::webdataset::{archive, is_whole, write_archive};
 use crate::dataset::{
@@ -121,7 +121,7 @@ impl<'a> ArchiveLayout<'a> {
             folder,
             archives: value_of("webdataset", archives)?,
             count: value_of("count", identity.get("count"))?,
-            split: value_of("split", identity.get("split"))?,
+            split: split_of(identity)?,
         };
         layout.archives.check()?;
         check_count(layout.count)?;
@@ -162,6 +162,15 @@ impl<'a> ArchiveLayout<'a> {
         let is_of_part = |k: &u64| self.split.part(*k, self.count) == part;
         (first..end).filter(is_of_part).count() as u64
     }
+}
+
+/// How samples were shared out; how long a sequence is only the recipe says.
+fn split_of(identity: &Value) -> Result<Split> {
+    let frames = &identity["recipe"]["scene"]["belt"]["frames"];
+    Ok(Split {
+        sequence: frames.as_u64().unwrap_or(1),
+        ..value_of("split", identity.get("split"))?
+    })
 }
 
 fn value_of<T: DeserializeOwned>(name: &str, value: Option<&Value>) -> Result<T> {
@@ -276,7 +285,7 @@ impl<'a> ArchiveRun<'a> {
 
     /// Packs the samples of an archive, in order of number, keeps it, and takes their folder away.
     fn pack(&self, number: u64, plan: &Plan) -> Result<()> {
-        let lines = Journal::open(&plan.folder)?.close(plan.count)?;
+        let lines = lines_of(&plan.folder)?;
         let samples: Vec<Written> = lines.iter().map(|line| line.written()).collect();
         let mut packed = Vec::new();
         for ArchiveFile { part, path, .. } in self.layout.files(number) {
@@ -285,19 +294,18 @@ impl<'a> ArchiveRun<'a> {
             write_archive(&aside, &plan.folder, &of_part)?;
             packed.push((aside, path));
         }
-        self.keep(number, &plan.folder, &packed)?;
+        self.keep(number, &packed)?;
         std::fs::remove_dir_all(&plan.folder).map_err(|e| Error::file(&plan.folder, e))
     }
 
     /// Puts the files of an archive, each with the path that it is to have, where they belong.
-    fn keep(&self, number: u64, folder: &Path, packed: &[(PathBuf, PathBuf)]) -> Result<()> {
+    fn keep(&self, number: u64, packed: &[(PathBuf, PathBuf)]) -> Result<()> {
         if let Some(store) = self.store() {
             let named = packed
                 .iter()
                 .map(|(aside, path)| (self.name_of(path), aside.clone()));
             return archive_store::keep(store, number, &named.collect::<Vec<_>>());
         }
-        io::sync(folder);
         let mut packed = packed.iter();
         packed.try_for_each(|(aside, path)| {
             std::fs::rename(aside, path).map_err(|e| Error::file(path, e))

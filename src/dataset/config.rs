@@ -5,7 +5,7 @@ use crate::dataset::mot::no_sequence;
 use crate::dataset::paths::folder_of;
 use crate::dataset::yolo::MIN_SIDE_PX;
 use crate::dataset::{Format, LabelConfig, Pictures, Preset, Split};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::io;
 use crate::render::RenderOptions;
 use crate::scene::{Ablation, Recipe};
@@ -95,13 +95,14 @@ impl DatasetConfig {
         Ok(config)
     }
 
-    /// A recipe in memory, laid over the preset that it names; its folders are relative to the
-    /// working folder.
+    /// A recipe in memory, some of its values replaced, laid over the preset that it names; its
+    /// folders are relative to the working folder.
     ///
     /// # Errors
-    /// An unknown key; a range that cannot be right.
+    /// An unknown key; a range that cannot be right; an override that leads nowhere.
     #[doc(hidden)]
-    pub fn from_table(mut recipe: toml::Table) -> Result<Self> {
+    pub fn from_table(recipe: toml::Table, overrides: &[io::Override]) -> Result<Self> {
+        let mut recipe: toml::Table = io::from_table_with(recipe, overrides)?;
         Preset::lay_under(&mut recipe);
         let config: Self = io::from_table(recipe)?;
         config.check()?;
@@ -140,6 +141,21 @@ impl DatasetConfig {
     /// When it cannot be written.
     pub fn write(&self, path: impl AsRef<Path>) -> Result<()> {
         let path = path.as_ref();
+        io::write_text(path, &self.text(path)?)
+    }
+
+    /// Whether a file is what [`write`](Self::write) would write there.
+    ///
+    /// # Errors
+    /// When it cannot be read.
+    #[doc(hidden)]
+    pub fn is_written(&self, path: impl AsRef<Path>) -> Result<bool> {
+        let path = path.as_ref();
+        Ok(io::read_text(path)? == self.text(path)?)
+    }
+
+    /// The recipe as a file at a place has it.
+    fn text(&self, path: &Path) -> Result<String> {
         let folder = io::absolute(folder_of(path))?;
         let mut config = self.clone();
         config.assets = io::relative(&io::absolute(&config.assets)?, &folder);
@@ -147,7 +163,7 @@ impl DatasetConfig {
         for file in &mut config.scene.environment.files {
             *file = seen_from(&folder, &self.folder, file)?;
         }
-        io::write_toml(path, &config)
+        toml::to_string_pretty(&config).map_err(|e| Error::file(path, e))
     }
 
     /// The same in pictures of half the width and height, for a first look: the same scenes.

@@ -1,13 +1,71 @@
-//! What the rest of a run takes, by what it took so far.
+//! What the rest of a run takes, by what it took since its first pictures.
 
 use crate::dataset::Progress;
 use std::fmt;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// A job that takes longer is one to be asked about first.
 const LONG_RUN: Duration = Duration::from_secs(3600);
-/// The first seconds of a run are not like the rest: files are read, caches are cold.
+/// Time that pictures are counted for before anything is said of the rest.
 const MIN_ELAPSED: Duration = Duration::from_secs(5);
+/// The same for the first pictures, for which photos are read: none takes so long to read.
+const MIN_FIRST_ELAPSED: Duration = Duration::from_secs(60);
+
+/// How fast a run is. The pictures with which each thread begins are left out, once they are made.
+#[derive(Clone, Copy, Debug)]
+pub struct RunPace {
+    threads: u64,
+    last: Progress,
+    /// From when on pictures are counted, and how many there were then.
+    since: (Instant, u64),
+    /// The first pictures are made.
+    is_warm: bool,
+}
+
+impl RunPace {
+    /// That of a run on so many threads that is about to make its first picture.
+    pub fn new(threads: usize, progress: Progress, now: Instant) -> Self {
+        Self {
+            threads: threads.max(1) as u64,
+            last: progress,
+            since: (now, progress.made),
+            is_warm: false,
+        }
+    }
+
+    /// Notes how far the run is now.
+    pub fn note(&mut self, progress: Progress, now: Instant) {
+        self.last = progress;
+        if !self.is_warm && progress.made >= self.threads {
+            self.is_warm = true;
+            self.since = (now, progress.made);
+        }
+    }
+
+    /// The run, if its pace so far says that the rest takes longer than an hour.
+    ///
+    /// Once each thread has made a picture, the rest is in proportion; before, every picture takes
+    /// at least as long as those that are still being made.
+    pub fn long_run(&self, now: Instant) -> Option<LongRun> {
+        let (began, before) = self.since;
+        let elapsed = now.saturating_duration_since(began);
+        let made = self.last.made.saturating_sub(before);
+        let run = LongRun::of(self.left(), made, elapsed, self.threads);
+        (elapsed >= self.min_elapsed() && run.seconds > LONG_RUN.as_secs_f64()).then_some(run)
+    }
+
+    fn left(&self) -> u64 {
+        self.last.count.saturating_sub(self.last.done)
+    }
+
+    fn min_elapsed(&self) -> Duration {
+        if self.is_warm {
+            MIN_ELAPSED
+        } else {
+            MIN_FIRST_ELAPSED
+        }
+    }
+}
 
 /// A run that would take longer than an hour.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,26 +81,16 @@ pub struct LongRun {
 }
 
 impl LongRun {
-    /// The run, if what it did on so many threads in this time says that the rest takes longer than
-    /// an hour.
-    ///
-    /// Once each thread has made a picture, the rest is in proportion; before, every picture takes
-    /// at least as long as those that are still being made.
-    pub fn of(progress: &Progress, elapsed: Duration, threads: usize) -> Option<Self> {
-        let left = progress.count.saturating_sub(progress.done);
-        let (made, threads) = (progress.made, threads.max(1) as u64);
+    /// The rest of a run that made so many pictures in this time.
+    fn of(left: u64, made: u64, elapsed: Duration, threads: u64) -> Self {
         let at_least = made < threads;
-        if elapsed < MIN_ELAPSED || left == 0 {
-            return None;
-        }
         let each = elapsed.as_secs_f64() / if at_least { threads } else { made } as f64;
-        let run = Self {
+        Self {
             seconds: each * left as f64,
             left,
             each,
             at_least,
-        };
-        (run.seconds > LONG_RUN.as_secs_f64()).then_some(run)
+        }
     }
 }
 
@@ -67,37 +115,91 @@ fn in_words(seconds: f64) -> String {
 mod tests {
     use super::*;
 
-    fn told(done: u64, count: u64, made: u64, seconds: u64) -> Option<String> {
-        let progress = Progress { done, count, made };
-        LongRun::of(&progress, Duration::from_secs(seconds), 2).map(|run| run.to_string())
+    /// A run on two threads, into a folder that has some pictures of an earlier one.
+    struct TestRun {
+        began: Instant,
+        pace: RunPace,
+        earlier: u64,
+        count: u64,
+    }
+
+    impl TestRun {
+        fn new(earlier: u64, count: u64) -> Self {
+            let began = Instant::now();
+            let progress = Progress {
+                done: earlier,
+                count,
+                made: 0,
+            };
+            Self {
+                began,
+                pace: RunPace::new(2, progress, began),
+                earlier,
+                count,
+            }
+        }
+
+        /// Has made so many pictures after so many seconds.
+        fn note(mut self, made: u64, seconds: f64) -> Self {
+            let progress = Progress {
+                done: self.earlier + made,
+                count: self.count,
+                made,
+            };
+            let now = self.at(seconds);
+            self.pace.note(progress, now);
+            self
+        }
+
+        fn at(&self, seconds: f64) -> Instant {
+            self.began + Duration::from_secs_f64(seconds)
+        }
+
+        /// What is said after so many seconds.
+        fn told(&self, seconds: f64) -> Option<String> {
+            let run = self.pace.long_run(self.at(seconds));
+            run.map(|run| run.to_string())
+        }
     }
 
     #[test]
-    fn the_rest_is_in_proportion_to_what_was_made() {
+    fn the_rest_is_in_proportion_to_what_was_made_since_the_first_pictures() {
+        // Two that take 20 s, as they read large photos, and 20 in a second from then on.
+        let cold = |count| {
+            let run = TestRun::new(0, count).note(2, 20.0);
+            run.note(102, 25.0)
+        };
+        assert_eq!(cold(30_102).told(25.0), None);
         assert_eq!(
-            told(100, 10_100, 100, 50).as_deref(),
-            Some("about 1.4 hours for 10000 pictures, one in 0.50 s")
+            cold(100_102).told(25.0).as_deref(),
+            Some("about 1.4 hours for 100000 pictures, one in 0.05 s")
         );
         assert_eq!(
-            told(100, 10_000_000, 100, 10).as_deref(),
-            Some("about 12 days for 9999900 pictures, one in 0.10 s")
+            cold(30_000_102).told(25.0).as_deref(),
+            Some("about 17 days for 30000000 pictures, one in 0.05 s")
         );
-        // What an earlier run made took none of this time.
-        assert_eq!(told(5_000, 6_000, 10, 10), None);
     }
 
     #[test]
-    fn a_first_picture_without_end_is_noticed() {
-        assert_eq!(told(0, 24, 0, 250), None);
+    fn what_an_earlier_run_made_took_none_of_the_time() {
+        let run = TestRun::new(5_000, 6_000).note(2, 1.0).note(12, 11.0);
+        assert_eq!(run.told(11.0), None);
+    }
+
+    #[test]
+    fn a_first_picture_without_end_is_noticed_and_one_that_reads_photos_is_not() {
+        assert_eq!(TestRun::new(0, 24).told(250.0), None);
         assert_eq!(
-            told(0, 24, 0, 400).as_deref(),
+            TestRun::new(0, 24).told(400.0).as_deref(),
             Some("at least 1.3 hours for 24 pictures, one in 200.00 s")
         );
+        assert_eq!(TestRun::new(0, 30_000).note(1, 10.0).told(50.0), None);
     }
 
     #[test]
     fn nothing_is_said_too_soon_or_of_a_finished_run() {
-        assert_eq!(told(1, 10_000_000, 1, 4), None);
-        assert_eq!(told(24, 24, 24, 40_000), None);
+        let begun = TestRun::new(0, 10_000_000).note(2, 1.0);
+        assert_eq!(begun.note(3, 2.0).told(5.0), None);
+        assert_eq!(TestRun::new(0, 24).note(24, 40_000.0).told(50_000.0), None);
     }
 }

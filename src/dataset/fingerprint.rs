@@ -5,6 +5,7 @@ use crate::dataset::background_photo::BackgroundPhoto;
 use crate::dataset::environment_maps::EnvironmentMaps;
 use crate::dataset::{DatasetConfig, Inputs};
 use crate::error::Result;
+use crate::matte::Flow;
 use crate::scene::Background;
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -59,13 +60,30 @@ fn of_asset(asset: &Asset<Photo>) -> Value {
 }
 
 fn of_photo(photo: &Photo) -> Value {
-    json!({
+    let mut told = json!({
         "file": photo.record.file,
         "px_per_metre": photo.record.px_per_metre,
         "size_m": photo.size(),
         "outline_px": digest(&photo.record.outline_px),
         "pixels": shown(photo.texture.checksum()),
-    })
+    });
+    if let Some(flow) = &photo.flow {
+        told["flow"] = json!(shown(flow_checksum(flow)));
+    }
+    told
+}
+
+/// CRC-32 of where light goes and of the height over what is seen there; the width is the photo's.
+fn flow_checksum(flow: &Flow) -> u32 {
+    let mut hasher = crc32fast::Hasher::new();
+    hasher.update(&flow.height.to_le_bytes());
+    for (path, known) in flow.paths.pixels().iter().zip(flow.known.pixels()) {
+        let ([x, y], [sx, sy]) = (path.displacement, path.scatter_displacement);
+        let values = [x, y, path.haze, sx, sy, path.scatter_width];
+        hasher.update(bytemuck::bytes_of(&values));
+        hasher.update(&[u8::from(*known)]);
+    }
+    hasher.finalize()
 }
 
 fn of_places(places: &[BackgroundPhoto], inputs: &mut Inputs) -> Result<Vec<Value>> {
@@ -73,7 +91,10 @@ fn of_places(places: &[BackgroundPhoto], inputs: &mut Inputs) -> Result<Vec<Valu
     let mut fronts = inputs.checksums(&front_files(places))?.into_iter();
     let pairs = places.iter().zip(photos);
     Ok(pairs
-        .map(|(place, photo)| of_place(place, photo, place.front.as_ref().and(fronts.next())))
+        .map(|(place, photo)| {
+            let front = place.front.as_ref().and_then(|_| fronts.next());
+            of_place(place, photo, front)
+        })
         .collect())
 }
 
@@ -154,4 +175,44 @@ fn digest(value: &impl Serialize) -> String {
 
 fn shown(crc32: u32) -> String {
     format!("crc32 {crc32:08x}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::asset::PhotoRecord;
+    use crate::image::Image;
+    use crate::matte::LightPath;
+    use crate::pixel::PremulRgba;
+    use std::sync::Arc;
+
+    #[test]
+    fn another_flow_shows() {
+        let outline = vec![[0.0, 0.0], [4.0, 0.0], [4.0, 2.0]];
+        let record = PhotoRecord::new("a.exr", 10.0, [0.4, 0.2], outline);
+        let plain = Photo::new(Image::filled(4, 2, PremulRgba::TRANSPARENT), record);
+        let bent = |haze: f32, height: f64, known: bool| {
+            let paths = LightPath {
+                haze,
+                ..LightPath::default()
+            };
+            let flow = Flow {
+                paths: Image::filled(4, 2, paths),
+                known: Image::filled(4, 2, known),
+                width: 0.4,
+                height,
+            };
+            let photo = Photo {
+                flow: Some(Arc::new(flow)),
+                ..plain.clone()
+            };
+            of_photo(&photo)["flow"].clone()
+        };
+        let usual = bent(0.1, 0.03, true);
+        assert!(usual.is_string());
+        for other in [(0.2, 0.03, true), (0.1, 0.04, true), (0.1, 0.03, false)] {
+            assert_ne!(bent(other.0, other.1, other.2), usual);
+        }
+        assert!(of_photo(&plain).get("flow").is_none(), "identities stay");
+    }
 }

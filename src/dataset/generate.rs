@@ -135,9 +135,10 @@ fn generate_files(
     let recipe_hash = plan.recipe_hash();
     run(
         plan,
-        |k| {
+        |k, syncing| {
             let sample = make(k)?;
-            let (line, write) = timed(|| write_sample(plan, &recipe_hash, k, &sample));
+            let write = || write_sample(plan, &recipe_hash, k, &sample);
+            let (line, write) = timed(|| syncing.during(write));
             let times = Times {
                 write,
                 ..sample.times

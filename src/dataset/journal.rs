@@ -3,43 +3,63 @@
 //! A sample exists if and only if its line is whole and its files have the size that the line says.
 //! Lines are added in the order in which samples finish; [`Journal::close`] puts them in order of
 //! number, so a finished folder does not show how it was made.
+//!
+//! # After a power cut
+//! Files are not put on the disk one by one but with those of [`UNSYNCED_LINES`] samples at once,
+//! and before lines are put in order. So at most the last so many lines may tell of files that were
+//! lost or torn; a run that goes on compares those by checksum, and puts on the disk what a killed
+//! one left in memory. A sample that has a line already is the exception: its files are put on the
+//! disk each before it takes the place of the old one, or that line would be taken for theirs.
 
 use crate::dataset::Inputs;
 use crate::dataset::folder::{self, JOURNAL};
 use crate::dataset::journal_line::JournalLine;
 use crate::error::{Error, Result};
-use crate::io;
+use crate::io::{self, Syncing};
 use rayon::prelude::*;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read as _, Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
 
-/// Files of the last lines may not be on the disk yet: a run brings everything there at least this
-/// often.
-const UNSYNCED_LINES: usize = 2 * 256;
+/// Most lines, the last ones, whose files may not be on the disk yet.
+const UNSYNCED_LINES: usize = 256;
 
 /// An open journal.
 pub(crate) struct Journal {
     path: PathBuf,
     file: File,
     lines: BTreeMap<u64, JournalLine>,
+    /// Samples that have a line and not its files.
+    forgotten: BTreeSet<u64>,
+    /// How the system puts the files of many samples on the disk.
+    syncing: Syncing,
+    /// Lines whose files may not be on the disk yet.
+    unsynced: usize,
 }
 
 impl Journal {
     /// Opens the journal of a folder, or starts one. Lines that are torn, or whose files are not
     /// there, are forgotten.
-    ///
-    /// What was written last may not have reached the disk when a machine went down: the files of
-    /// the last lines are compared by checksum.
     pub(crate) fn open(folder: &Path) -> Result<Self> {
         let path = folder.join(JOURNAL);
         let mut file = io::open_own(&path)?;
+        let syncing = sync(&file, &path)?;
         let read = read_journal(&file, &path, false)?;
         let known = whole_lines(read, &path, "their samples are made again");
+        let numbers: Vec<u64> = known.iter().map(|line| line.k).collect();
         let lines = lines_with_files(known, folder);
+        let forgotten = numbers.into_iter().filter(|k| !lines.contains_key(k));
+        let forgotten = forgotten.collect();
         end_last_line(&mut file).map_err(|e| Error::file(&path, e))?;
-        Ok(Self { path, file, lines })
+        Ok(Self {
+            path,
+            file,
+            lines,
+            forgotten,
+            syncing,
+            unsynced: 0,
+        })
     }
 
     /// Sample `k` is finished.
@@ -55,9 +75,22 @@ impl Journal {
             .map_or(0, |k| k.saturating_add(1))
     }
 
+    /// How the files of sample `k` are put on the disk.
+    pub(crate) fn syncing(&self, k: u64) -> Syncing {
+        if self.has(k) || self.forgotten.contains(&k) {
+            return Syncing::Alone;
+        }
+        self.syncing
+    }
+
     /// Adds a finished sample.
     pub(crate) fn add(&mut self, line: JournalLine) -> Result<()> {
+        if self.unsynced == UNSYNCED_LINES {
+            sync(&self.file, &self.path)?;
+            self.unsynced = 0;
+        }
         self.append(&line.text())?;
+        self.unsynced += 1;
         self.lines.insert(line.k, line);
         Ok(())
     }
@@ -77,10 +110,27 @@ impl Journal {
 
     /// Puts the lines in order and returns those of the samples below `count`.
     pub(crate) fn close(mut self, count: u64) -> Result<Vec<JournalLine>> {
+        sync(&self.file, &self.path)?;
         write_lines(&self.path, self.lines.values())?;
         self.lines.split_off(&count);
         Ok(self.lines.into_values().collect())
     }
+}
+
+/// Puts the files of all samples on the disk; says how the system can do that.
+fn sync(journal: &File, path: &Path) -> Result<Syncing> {
+    match io::sync_file_system(journal) {
+        Ok(true) => Ok(Syncing::Together),
+        Ok(false) => Ok(Syncing::Alone),
+        Err(e) => Err(not_on_disk(path, &e)),
+    }
+}
+
+fn not_on_disk(path: &Path, e: &std::io::Error) -> Error {
+    let what = format!(
+        "the last samples cannot be put on the disk: {e}; go on with --resume, which compares every file"
+    );
+    Error::file(path, what)
 }
 
 /// The last line has no end: what follows would be read as a part of it.
@@ -130,7 +180,9 @@ pub fn repair(folder: &Path) -> Result<(usize, usize)> {
     Inputs::forget(folder);
     let path = folder.join(JOURNAL);
     // Made where it is not there: a run may have ended before its first sample.
-    let read = read_journal(&io::open_own(&path)?, &path, false)?;
+    let file = io::open_own(&path)?;
+    sync(&file, &path)?;
+    let read = read_journal(&file, &path, false)?;
     let all = read.len();
     let lines = by_number(read);
     let good = lines_with_same_bytes(&lines, folder);
@@ -234,6 +286,41 @@ fn write_lines<'a>(path: &Path, mut lines: impl Iterator<Item = &'a JournalLine>
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::dataset::Part;
+    use crate::dataset::journal_line::WrittenFile;
+
+    fn line(k: u64, files: Vec<WrittenFile>) -> JournalLine {
+        JournalLine {
+            k,
+            part: Part::Train,
+            classes: Vec::new(),
+            obstructed: 0,
+            knotted: 0,
+            retries: 0,
+            files,
+        }
+    }
+
+    /// Other systems put each file on the disk by itself.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn files_of_a_sample_that_has_a_line_are_put_on_the_disk_first() {
+        let dir = tempfile::tempdir().unwrap();
+        let lost = WrittenFile {
+            path: "labels/lost.txt".into(),
+            bytes: 3,
+            crc32: 7,
+        };
+        let mut journal = Journal::open(dir.path()).unwrap();
+        journal.add(line(0, Vec::new())).unwrap();
+        journal.add(line(1, vec![lost])).unwrap();
+        let journal = Journal::open(dir.path()).unwrap();
+        assert_eq!([0, 1, 2].map(|k| journal.has(k)), [true, false, false]);
+        assert_eq!(
+            [0, 1, 2].map(|k| journal.syncing(k)),
+            [Syncing::Alone, Syncing::Alone, Syncing::Together]
+        );
+    }
 
     #[test]
     fn a_line_without_an_end_is_no_journal() {

@@ -2,10 +2,9 @@
 
 use crate::dataset::SampleRecord;
 use crate::dataset::paths::folder_of;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::eval::is_image;
 use crate::io;
-use std::collections::BTreeSet;
 use std::path::{Component, Path, PathBuf};
 
 /// Where a folder or list of a part is, for a `data.yaml` with this root.
@@ -25,7 +24,7 @@ pub(crate) fn images_in(place: &Path) -> Result<Vec<PathBuf>> {
     if is_list(place) {
         listed_images(place)
     } else {
-        files_below(place, is_image, usize::MAX)
+        io::files_below(place, is_image, usize::MAX)
     }
 }
 
@@ -39,46 +38,6 @@ fn listed_images(list: &Path) -> Result<Vec<PathBuf>> {
     let text = io::read_text(list)?;
     let lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
     Ok(lines.map(|line| without_dots(&folder.join(line))).collect())
-}
-
-/// The files of a kind below a folder, in order of path; each folder once, as links may lead in
-/// circles.
-///
-/// # Errors
-/// A folder that cannot be listed, or one with which there are more files than `most`.
-pub(crate) fn files_below(
-    folder: &Path,
-    is_wanted: impl Fn(&Path) -> bool,
-    most: usize,
-) -> Result<Vec<PathBuf>> {
-    let (mut files, mut seen) = (Vec::new(), BTreeSet::new());
-    let mut open = vec![folder.to_path_buf()];
-    while let Some(folder) = open.pop() {
-        if seen.insert(folder.canonicalize().map_err(|e| Error::file(&folder, e))?) {
-            let (folders, found) = folders_and_files(&folder)?;
-            open.extend(folders);
-            files.extend(found.into_iter().filter(|path| is_wanted(path)));
-        }
-        check_file_count(files.len(), most, &folder)?;
-    }
-    files.sort();
-    Ok(files)
-}
-
-/// What is in a folder, in order of name: of two names of a folder always the same one counts.
-fn folders_and_files(folder: &Path) -> Result<(Vec<PathBuf>, Vec<PathBuf>)> {
-    let entries = std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
-    let mut paths: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
-    paths.sort();
-    Ok(paths.into_iter().partition(|path| path.is_dir()))
-}
-
-fn check_file_count(count: usize, most: usize, folder: &Path) -> Result<()> {
-    if count <= most {
-        return Ok(());
-    }
-    let what = format!("more than {most} images, expected fewer");
-    Err(Error::file(folder, what))
 }
 
 /// A path from the root without `.` and `..`.

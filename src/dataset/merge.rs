@@ -9,7 +9,7 @@ use crate::dataset::{
     DatasetCounts, Inputs, LabelConfig, Pictures, Plan, SampleRange, Shard, Sidecar, Writer,
 };
 use crate::error::{Error, Result};
-use crate::io;
+use crate::io::{self, Syncing};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -44,7 +44,8 @@ pub fn merge(
         return Err(Error::file(shard, what));
     }
     let plan = merged_plan(dataset.document, dataset.count, folder)?;
-    run(&plan, |k| copy_sample(&lines[&k], folder), progress, stop)
+    let write = |k: u64, syncing: Syncing| syncing.during(|| copy_sample(&lines[&k], folder));
+    run(&plan, write, progress, stop)
 }
 
 /// Copies the files of a sample from its shard.

@@ -87,7 +87,7 @@ pub use contact_sheet::{ContactSheetOptions, ContactTile, contact_sheet, contact
 pub use counts::ClassCount;
 pub use counts::DatasetCounts;
 #[doc(hidden)]
-pub use estimate::LongRun;
+pub use estimate::{LongRun, RunPace};
 pub use finding::Finding;
 #[doc(hidden)]
 pub use folder::JOURNAL;

@@ -77,7 +77,7 @@ pub struct Leakage {
 }
 
 impl YoloSet {
-    /// Shares the images out anew, in order of name: `ratio` of them for training.
+    /// Shares the images out anew, in natural order of name: `ratio` of them for training.
     ///
     /// # Errors
     /// A ratio outside 0..1; groups of images without sidecars.
@@ -85,17 +85,11 @@ impl YoloSet {
         check_ratio(ratio)?;
         let all = self.series();
         let count = (all.len() as f64 * ratio).round() as usize;
-        let [train, val] = match how {
+        Ok(self.with_parts(match how {
             Partition::Consecutive { guard } => consecutive(&all, count, guard),
             Partition::Random => grouped(&all, &numbers_to(all.len()), count, seed),
             Partition::Grouped(group) => grouped(&all, &groups(&all, group)?, count, seed),
-        };
-        let classes = self.classes.clone();
-        Ok(Self {
-            train,
-            val,
-            classes,
-        })
+        }))
     }
 
     /// What leaks from training to validation; images are near when they differ by less than
@@ -247,6 +241,21 @@ mod tests {
     }
 
     #[test]
+    fn the_last_frames_are_for_validation_without_zeros_in_their_numbers() {
+        let frames = |range: std::ops::RangeInclusive<u32>| -> Vec<PathBuf> {
+            range
+                .map(|i| format!("/d/images/frame{i}.png").into())
+                .collect()
+        };
+        let series = YoloSet {
+            train: frames(1..=60),
+            ..YoloSet::default()
+        };
+        let cut = series.partitioned(Partition::Consecutive { guard: 0 }, 0.8, 0);
+        assert_eq!(cut.unwrap().val, frames(49..=60));
+    }
+
+    #[test]
     fn a_random_split_depends_on_the_seed_alone() {
         let split = |seed| {
             listing(200)
@@ -315,6 +324,7 @@ mod tests {
             train: vec![image("train")],
             val: vec![image("val")],
             classes: vec!["a: b".into()],
+            test: vec![root.join("images/test")],
         };
         listing.write(&root.join("splits/one")).unwrap();
         assert_eq!(YoloSet::read(&root.join("splits/one")).unwrap(), listing);

@@ -7,15 +7,12 @@ use crate::dataset::journal_line::JournalLine;
 use crate::dataset::times::Times;
 use crate::dataset::{DatasetCounts, Plan, SampleRange};
 use crate::error::{Error, Result};
-use crate::io;
+use crate::io::Syncing;
 use crate::work;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
-
-/// Samples between two calls that bring everything to the disk.
-const SAMPLES_PER_SYNC: u64 = 256;
 
 /// How far a run is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -86,10 +83,10 @@ pub(super) fn check_count(count: u64) -> Result<()> {
 }
 
 /// Writes the samples of a plan that are not in its folder yet and returns what the folder then
-/// holds; `write` puts the files of a sample in their places.
+/// holds; `write` puts the files of a sample in their places, and on the disk as it is told.
 pub(super) fn run(
     plan: &Plan,
-    write: impl Fn(u64) -> Result<(JournalLine, Times)> + Sync,
+    write: impl Fn(u64, Syncing) -> Result<(JournalLine, Times)> + Sync,
     progress: &(dyn Fn(Progress) + Sync),
     stop: &AtomicBool,
 ) -> Result<DatasetCounts> {
@@ -165,7 +162,7 @@ struct RunState {
     failure: Option<(u64, Error)>,
 }
 
-impl<F: Fn(u64) -> Result<(JournalLine, Times)> + Sync> DatasetRun<'_, F> {
+impl<F: Fn(u64, Syncing) -> Result<(JournalLine, Times)> + Sync> DatasetRun<'_, F> {
     /// Makes samples until `next` has none, of the `missing` ones, or there is a reason to stop.
     fn work(&self, missing: u64, next: impl Fn() -> Option<u64> + Sync) -> Result<()> {
         let pools = worker_pools(missing)?;
@@ -209,17 +206,11 @@ impl<F: Fn(u64) -> Result<(JournalLine, Times)> + Sync> DatasetRun<'_, F> {
 
     /// Writes one sample, then enters it in the state.
     fn make_one(&self, k: u64) {
-        let written = (self.write)(k);
+        let syncing = self.state().journal.syncing(k);
+        let written = (self.write)(k, syncing);
         let mut state = self.state();
         match written.and_then(|(line, times)| state.enter(line, times)) {
-            Ok(()) => {
-                self.report(&state);
-                let due = state.progress.made.is_multiple_of(SAMPLES_PER_SYNC);
-                drop(state);
-                if due {
-                    io::sync(&self.plan.folder);
-                }
-            }
+            Ok(()) => self.report(&state),
             // Not this sample's fault: it is made by the run that goes on.
             Err(Error::Interrupted { .. }) if self.stop.load(Ordering::Relaxed) => {}
             Err(error) => state.fail(k, error),
@@ -241,7 +232,6 @@ impl<F: Fn(u64) -> Result<(JournalLine, Times)> + Sync> DatasetRun<'_, F> {
         let state = self.state.into_inner();
         let state = state.unwrap_or_else(PoisonError::into_inner);
         let made = state.progress.made;
-        io::sync(&plan.folder);
         state.times.append(&plan.folder, made, wall);
         let lines = state.close(plan, count)?;
         if lines.len() as u64 == count {

@@ -1,7 +1,7 @@
 //! The settings of a recipe, as the template tells them: so that nothing is said twice.
 
 use crate::dataset::{DatasetConfig, Preset};
-use crate::io::{self, Override};
+use crate::io::Override;
 use serde::Serialize;
 use toml::{Table, Value};
 
@@ -284,8 +284,8 @@ fn is_taken(path: &str, value: &str) -> bool {
         recipe = "scene.lights = [{}]".parse().expect("is TOML");
     }
     let read = format!("{path}={value}").parse::<Override>();
-    let read = read.and_then(|value| io::from_table_with::<Table>(recipe, &[value]));
-    read.and_then(DatasetConfig::from_table).is_ok()
+    read.and_then(|value| DatasetConfig::from_table(recipe, &[value]))
+        .is_ok()
 }
 
 #[cfg(test)]

@@ -164,8 +164,12 @@ impl ShardChoice {
     /// 0, and `AWS_BATCH_JOB_ARRAY_SIZE`) and the pods of an indexed Kubernetes job (`JOB_COMPLETION_INDEX`,
     /// from 0; `auto/N` says of how many, since Kubernetes does not).
     ///
+    /// Slurm tells tasks that are repeated nothing of the array that they were in: `auto` takes an
+    /// array of all tasks, and `auto/N` any tasks of an array from 1 to N.
+    ///
     /// # Errors
-    /// An environment of neither; an array with gaps; numbers that cannot be right.
+    /// An environment of neither; an array with gaps, or without its first tasks; for `auto/N` one
+    /// from 0; numbers that cannot be right.
     pub fn within(self, variable: impl Fn(&str) -> Option<String>) -> Result<Shard> {
         let of = match self {
             Self::Given(shard) => return Ok(shard),
@@ -228,9 +232,18 @@ impl<V: Fn(&str) -> Option<String>> JobEnvironment<V> {
 
     /// The share of a task of a Slurm array.
     fn slurm_shard(&self, id: u64, of: Option<u64>) -> Result<Shard> {
-        let first = self.number("SLURM_ARRAY_TASK_MIN")?.unwrap_or(0);
+        let first = self.number("SLURM_ARRAY_TASK_MIN")?;
+        match of {
+            Some(of) => shard_of_task(id, first, of),
+            None => self.slurm_shard_of_all(id, first.unwrap_or(0)),
+        }
+    }
+
+    /// The same in an array that has a task for every shard.
+    fn slurm_shard_of_all(&self, id: u64, first: u64) -> Result<Shard> {
+        check_first_task(first)?;
         let step = self.number("SLURM_ARRAY_TASK_STEP")?.unwrap_or(1).max(1);
-        let of = of.or(self.slurm_task_count(first, step)?).ok_or_else(|| {
+        let of = self.slurm_task_count(first, step)?.ok_or_else(|| {
             let what = "SLURM_ARRAY_TASK_COUNT is not set: say auto/N";
             Error::value("shard", what)
         })?;
@@ -252,6 +265,26 @@ impl<V: Fn(&str) -> Option<String>> JobEnvironment<V> {
 fn parse_number(name: &str, text: &str) -> Result<u64> {
     let number = text.trim().parse();
     number.map_err(|_| Error::value(name, format!("\"{text}\", expected a number")))
+}
+
+/// The shard of a task by its number alone, whichever tasks its array has.
+fn shard_of_task(id: u64, first: Option<u64>, of: u64) -> Result<Shard> {
+    if id > 0 && first != Some(0) {
+        return Shard::new(id, of);
+    }
+    let what = format!("an array from 0, expected 1-{of} for auto/{of}; otherwise say I/{of}");
+    Err(Error::value("SLURM_ARRAY_TASK_MIN", what))
+}
+
+/// An array that begins later repeats some tasks of another one.
+fn check_first_task(first: u64) -> Result<()> {
+    if first <= 1 {
+        return Ok(());
+    }
+    let what = format!(
+        "{first}, expected 0 or 1: tasks are missing; to repeat tasks of an array 1-N say auto/N, of another one I/N"
+    );
+    Err(Error::value("SLURM_ARRAY_TASK_MIN", what))
 }
 
 fn are_all_tasks(count: u64, first: u64, last: u64, step: u64) -> bool {
@@ -404,6 +437,31 @@ mod tests {
                 .unwrap_err()
                 .contains("\"x\", expected a number")
         );
+    }
+
+    #[test]
+    fn repeated_tasks_of_a_slurm_array_keep_their_shards() {
+        let repeated = |text, id, first| {
+            let count = [
+                ("SLURM_ARRAY_TASK_COUNT", "1"),
+                ("SLURM_ARRAY_TASK_MAX", id),
+            ];
+            let task = [("SLURM_ARRAY_TASK_ID", id), ("SLURM_ARRAY_TASK_MIN", first)];
+            within(text, &[task, count].concat())
+        };
+        assert_eq!(repeated("auto/4", "3", "3").unwrap(), "3/4");
+        assert_eq!(repeated("auto/4", "4", "2").unwrap(), "4/4");
+        for (text, id, first) in [
+            ("auto", "3", "3"),
+            ("auto/4", "0", "0"),
+            ("auto/4", "3", "0"),
+        ] {
+            let refused = repeated(text, id, first).unwrap_err();
+            assert!(
+                refused.starts_with("SLURM_ARRAY_TASK_MIN: ") && refused.contains("say "),
+                "{refused}"
+            );
+        }
     }
 
     #[test]

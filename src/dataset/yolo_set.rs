@@ -19,6 +19,8 @@ pub struct YoloSet {
     pub train: Vec<PathBuf>,
     /// Images to choose the best model by.
     pub val: Vec<PathBuf>,
+    /// Folders and lists of images to test with, as they are named; often none.
+    pub test: Vec<PathBuf>,
 }
 
 impl YoloSet {
@@ -39,10 +41,12 @@ impl YoloSet {
         }
         let root = yaml.root(&folder);
         let [train, val] = Part::ALL.map(|part| images_of(&root, yaml.folders(part)));
+        let test = yaml.test().iter().map(|place| place_of(&root, place));
         Ok(Self {
             classes: yaml.names().to_vec(),
             train: train?,
             val: val?,
+            test: test.collect(),
         })
     }
 
@@ -59,6 +63,22 @@ impl YoloSet {
         Ok(set)
     }
 
+    /// Names of the classes of the set that a folder of labels (`labels/val`, `labels`) belongs to,
+    /// as the `data.yaml` above it has them, whatever images there are; none without a `data.yaml`.
+    ///
+    /// # Errors
+    /// [`Error::File`] for a `data.yaml` that cannot be read or does not name the classes.
+    pub fn class_names_of(labels: &Path) -> Result<Vec<String>> {
+        let labels = whole_path(labels)?;
+        let above = labels.ancestors().skip(1).take(2);
+        let mut paths = above.map(|folder| folder.join("data.yaml"));
+        let Some(path) = paths.find(|path| path.is_file()) else {
+            return Ok(Vec::new());
+        };
+        let names = DataYaml::read_names(&io::read_text(&path)?);
+        names.map_err(|(line, what)| yaml_problem(&path, line, &what))
+    }
+
     fn part(&self, part: Part) -> &[PathBuf] {
         match part {
             Part::Train => &self.train,
@@ -71,7 +91,18 @@ impl YoloSet {
         label_of(image)
     }
 
-    /// All images in order of name, each once: the series as it was taken.
+    /// The same set with other images to learn from and to choose the best model by.
+    pub(super) fn with_parts(&self, [train, val]: [Vec<PathBuf>; 2]) -> Self {
+        Self {
+            classes: self.classes.clone(),
+            train,
+            val,
+            test: self.test.clone(),
+        }
+    }
+
+    /// All images in natural order of name (`frame2` before `frame10`), each once: the series as it
+    /// was taken.
     pub fn series(&self) -> Vec<PathBuf> {
         let mut all = [&self.train[..], &self.val[..]].concat();
         all.sort_by(|a, b| compare_names(a, b));
@@ -86,14 +117,10 @@ impl YoloSet {
     /// A share that is not in `0..=1`.
     pub fn head(&self, share: f64) -> Result<Self> {
         check_share(share)?;
-        Ok(Self {
-            train: first_share(&self.train, share),
-            val: first_share(&self.val, share),
-            classes: self.classes.clone(),
-        })
+        Ok(self.with_parts([&self.train, &self.val].map(|images| first_share(images, share))))
     }
 
-    /// Writes `train.txt`, `val.txt` and `data.yaml`; images below the folder are relative to it.
+    /// Writes `train.txt`, `val.txt` and `data.yaml`; what lies below the folder is relative to it.
     ///
     /// # Errors
     /// When a file cannot be written.
@@ -104,8 +131,18 @@ impl YoloSet {
             let list = folder.join(part.name()).with_extension("txt");
             io::write_text(list, &list_of(self.part(part), &folder))?;
         }
-        let yaml = DataYaml::write_with(&self.classes, |part| format!("{part}.txt"));
+        let test = self.test_places(&folder);
+        let yaml = DataYaml::write_with(&self.classes, &test, |part| format!("{part}.txt"));
         io::write_text(folder.join("data.yaml"), &yaml)
+    }
+
+    /// What to test with as a `data.yaml` in the folder names it.
+    fn test_places(&self, folder: &Path) -> Vec<String> {
+        let places = self.test.iter();
+        places
+            .map(|place| place.strip_prefix(folder).unwrap_or(place))
+            .map(|place| place.display().to_string())
+            .collect()
     }
 }
 
@@ -123,9 +160,11 @@ fn yaml_problem(path: &Path, line: Option<usize>, what: &str) -> Error {
     Error::file(path, format!("{line}{what}"))
 }
 
-/// By the file's name, then by its whole path.
+/// By the file's name in natural order, then by its letters, then by its whole path.
 fn compare_names(a: &Path, b: &Path) -> Ordering {
-    (a.file_name(), a).cmp(&(b.file_name(), b))
+    let [key_a, key_b] = [a, b].map(|path| io::natural_key(path.file_name().unwrap_or_default()));
+    let natural = key_a.cmp(key_b);
+    natural.then_with(|| (a.file_name(), a).cmp(&(b.file_name(), b)))
 }
 
 fn check_share(share: f64) -> Result<()> {
@@ -221,6 +260,21 @@ mod tests {
     }
 
     #[test]
+    fn labels_have_the_names_of_their_set_whatever_images_there_are() {
+        let set = folder("train: nowhere\nval: images/val\nnames: [cap]\n");
+        let names = |labels| YoloSet::class_names_of(&set.path().join(labels));
+        assert_eq!(names("labels/val").unwrap(), ["cap"]);
+        assert_eq!(names("labels").unwrap(), ["cap"]);
+        assert!(names("a/labels/val").unwrap().is_empty());
+        std::fs::write(set.path().join("data.yaml"), "nc: 2\nnames: [cap]\n").unwrap();
+        let told = names("labels").unwrap_err().to_string();
+        assert!(
+            told.ends_with("data.yaml: nc: 2, but there are 1 names"),
+            "{told}"
+        );
+    }
+
+    #[test]
     fn a_folder_that_is_not_beside_the_set_is_one_of_it() {
         let set = folder("train: ../images/train\nval: ../images/val\nnames: [cap]\n");
         let read = YoloSet::open(set.path()).unwrap();
@@ -233,6 +287,57 @@ mod tests {
         let read = YoloSet::read(set.path()).unwrap();
         assert_eq!((read.train.len(), &read.val), (3, &read.train));
         assert_eq!(read.series().len(), 3);
+    }
+
+    #[test]
+    fn numbers_in_names_count_as_numbers() {
+        let names = [
+            "frame_2.png",
+            "frame1.png",
+            "frame01.png",
+            "frame2.png",
+            "frame2a.png",
+            "frame10.png",
+            "frame10_2.png",
+            "frame10_10.png",
+            "frame99999999999999999999999.png",
+            "9.png",
+            "10.png",
+            "a.png",
+        ];
+        let mut sorted = names.map(PathBuf::from);
+        sorted.sort_by(|a, b| compare_names(a, b));
+        let expected = [
+            "9.png",
+            "10.png",
+            "a.png",
+            "frame01.png",
+            "frame1.png",
+            "frame2.png",
+            "frame2a.png",
+            "frame10.png",
+            "frame10_2.png",
+            "frame10_10.png",
+            "frame99999999999999999999999.png",
+            "frame_2.png",
+        ];
+        assert_eq!(sorted, expected.map(PathBuf::from));
+    }
+
+    #[test]
+    fn what_to_test_with_goes_along() {
+        let yaml = "path: images\ntrain: train\nval: val\ntest: [val, ../some.txt]\nnames: [cap]\n";
+        let set = folder(yaml);
+        let half = YoloSet::read(set.path()).unwrap().head(0.5).unwrap();
+        let places = ["images/val", "some.txt"].map(|place| set.path().join(place));
+        for folder in ["half", "."] {
+            half.write(&set.path().join(folder)).unwrap();
+            let read = YoloSet::read(&set.path().join(folder)).unwrap();
+            assert_eq!(read.test, places);
+        }
+        let own = std::fs::read_to_string(set.path().join("data.yaml")).unwrap();
+        let line = r#"test: ["images/val","some.txt"]"#;
+        assert!(own.lines().any(|own| own == line), "{own}");
     }
 
     #[test]

@@ -15,6 +15,7 @@ pub(crate) struct DataYaml {
     path: Option<String>,
     train: Vec<String>,
     val: Vec<String>,
+    test: Vec<String>,
     nc: Option<usize>,
     names: Vec<String>,
 }
@@ -29,6 +30,11 @@ impl DataYaml {
             Part::Train => &self.train,
             Part::Val => &self.val,
         }
+    }
+
+    /// The folders (or lists) of images to test with, below the dataset's; often none.
+    pub(crate) fn test(&self) -> &[String] {
+        &self.test
     }
 
     /// Where the folders of the parts are, for a file in `folder`.
@@ -50,16 +56,24 @@ impl DataYaml {
 
     /// The text of a `data.yaml` for our folders.
     pub(crate) fn write(classes: &[String]) -> String {
-        Self::write_with(classes, |part| format!("images/{part}"))
+        Self::write_with(classes, &[], |part| format!("images/{part}"))
     }
 
-    /// The text of a `data.yaml` whose parts lie where `place` says.
-    pub(crate) fn write_with(classes: &[String], place: impl Fn(&str) -> String) -> String {
+    /// The text of a `data.yaml` whose parts lie where `place` says, with these places to test with.
+    pub(crate) fn write_with(
+        classes: &[String],
+        test: &[String],
+        place: impl Fn(&str) -> String,
+    ) -> String {
         let mut yaml = String::from(
             "# Folders are relative to this file. YOLOv5: add a line `path: <whole path of this folder>`.\n",
         );
         for part in Part::ALL {
             yaml += &format!("{}: {}\n", part.name(), place(part.name()));
+        }
+        if !test.is_empty() {
+            // A JSON list of strings is a YAML one, whatever is in it.
+            yaml += &format!("test: {}\n", serde_json::Value::from(test));
         }
         yaml += &format!("nc: {}\nnames:\n", classes.len());
         yaml + &yaml_names(classes)
@@ -68,6 +82,23 @@ impl DataYaml {
     /// Reads the keys that trainers need; all others are skipped. What could be read stays,
     /// whatever else is wrong.
     pub(crate) fn read(text: &str) -> (Self, Vec<Problem>) {
+        let (yaml, mut problems) = Self::read_given(text);
+        problems.extend(yaml.missing().into_iter().map(|what| (None, what)));
+        (yaml, problems)
+    }
+
+    /// The names of the classes alone, whatever else is missing.
+    pub(crate) fn read_names(text: &str) -> Result<Vec<String>, Problem> {
+        let (yaml, problems) = Self::read_given(text);
+        let unnamed = yaml.names_problem().map(|what| (None, what));
+        match problems.into_iter().next().or(unnamed) {
+            None => Ok(yaml.names),
+            Some(problem) => Err(problem),
+        }
+    }
+
+    /// What is there, and what is wrong with it.
+    fn read_given(text: &str) -> (Self, Vec<Problem>) {
         let (mut yaml, mut problems) = (Self::default(), Vec::new());
         let read = Reader::new(text).read_keys(|key, line, value| {
             if let Err((value_line, what)) = yaml.set(key, value) {
@@ -75,7 +106,6 @@ impl DataYaml {
             }
         });
         problems.extend(read.err());
-        problems.extend(yaml.missing().into_iter().map(|what| (None, what)));
         (yaml, problems)
     }
 
@@ -84,6 +114,7 @@ impl DataYaml {
             "path" => self.path = value.texts(key)?.pop(),
             "train" => self.train = value.texts(key)?,
             "val" => self.val = value.texts(key)?,
+            "test" => self.test = value.texts(key)?,
             "nc" => self.nc = Some(value.count(key)?),
             "names" => return self.set_names(value),
             _ => {}

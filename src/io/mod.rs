@@ -45,9 +45,11 @@
 //!   more than [`Limits::seconds`]. A file on which two workers die is named with the signal. The
 //!   worker is not trusted either.
 //! * **What is written** goes to a temporary file beside its place, is synced, and moved there:
-//!   whole or not at all. A link in its place is replaced, not followed, a file gives its
-//!   permissions, a device or a pipe is refused; `refuse_links` keeps outputs in their folder. No
-//!   metadata of an input gets into an output, so neither positions (GPS) nor serial numbers do.
+//!   whole or not at all. (The samples of a dataset are synced many at once, after they are moved;
+//!   what a power cut tears of the last ones is made again.) A link in its place is replaced, not
+//!   followed, a file gives its permissions, a device or a pipe is refused; `refuse_links` keeps
+//!   outputs in their folder. No metadata of an input gets into an output, so neither positions
+//!   (GPS) nor serial numbers do.
 //! * **Where a document leads.** A path in a document that may come from anywhere (journal and
 //!   manifest of a dataset or an asset folder, label, scene, scene for another renderer) is looked
 //!   for in the folder of that document alone: [`inside`] refuses `..`, links that lead out, and
@@ -110,8 +112,8 @@ pub use document::{read_document, write_document};
 #[doc(hidden)]
 pub use format::Format;
 #[doc(hidden)]
-pub use fs::{Checksum, absolute, below, copy, create_folder, inside, relative, sync};
-pub(crate) use fs::{refuse_links, with_last_step, write_through};
+pub use fs::{Checksum, absolute, below, copy, create_folder, inside, relative};
+pub(crate) use fs::{files_below, natural_key, refuse_links, with_last_step, write_through};
 pub use header::Header;
 #[doc(hidden)]
 pub use header::Window;
@@ -140,7 +142,7 @@ pub use worker::serve as serve_worker;
 pub use worker::worker_version;
 
 pub(crate) use document::{from_table, from_table_with, read_bytes, suggestion};
-pub(crate) use fs::{length_inside, open_own, refuse_foreign};
+pub(crate) use fs::{Syncing, length_inside, open_own, refuse_foreign, sync_file_system};
 #[cfg(feature = "fuzzing")]
 pub(crate) use fuzz::header_of;
 #[cfg(all(feature = "fuzzing", feature = "oiio"))]

@@ -67,6 +67,9 @@ impl AttemptSeries<'_> {
         let fall = self.fall(number, halvings)?;
         let end = with_poses(self.scene.clone(), &fall.poses);
         let (verdict, overlap) = self.judge(&end, &fall);
+        if verdict == SettleVerdict::TimedOut {
+            self.allowance.add_timed_out();
+        }
         let rested = (verdict == SettleVerdict::Rested).then_some(end);
         Ok(Attempt {
             verdict,

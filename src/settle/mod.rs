@@ -92,7 +92,7 @@ pub struct Settled {
 pub enum SettleVerdict {
     /// Everything lies still, inside the walls, with no more than the accepted overlap.
     Rested,
-    /// Something still moved at the time limit.
+    /// Something still moved at the time limit ([`SettleOptions::time_limit`]).
     TimedOut,
     /// The centres of these objects (their ids: index + 1) left the walls or the floor other than
     /// over the rim, or are not finite.
@@ -160,7 +160,9 @@ impl SettleVerdict {
     fn reason(&self, seconds: f64) -> String {
         match self {
             Self::Rested => "everything is at rest".into(),
-            Self::TimedOut => format!("something still moves after {seconds:.1} s"),
+            Self::TimedOut => {
+                format!("something still moves after {seconds:.1} s (settle.time_limit)")
+            }
             Self::Escaped(ids) => format!("objects {ids:?} left the surface"),
             Self::Penetrating(depth) => format!("bodies overlap by {:.2} mm", depth * 1e3),
             Self::Hanging(ids) => format!("objects {ids:?} are unsupported"),
@@ -430,11 +432,22 @@ mod tests {
             (&SettleVerdict::TimedOut, &scene)
         );
         assert_eq!(settled.rejected, vec![SettleVerdict::TimedOut; 3]);
+        let seconds = settled.seconds;
         let reported = settled.into_scene().unwrap_err().to_string();
         assert_eq!(
             reported,
-            "settle: something still moves after 0.1 s, after 4 attempts"
+            format!(
+                "settle: something still moves after {seconds:.1} s (settle.time_limit), after 4 attempts"
+            )
         );
+    }
+
+    #[test]
+    fn time_is_counted_from_when_the_highest_can_have_landed() {
+        // From 44 m at 4 m/s: 11 s.
+        let rest = settled(falling(&[([0.0, 0.0], 0.1), ([0.02, 0.0], 44.0)]));
+        assert!(rest.seconds > SettleOptions::default().time_limit);
+        assert_eq!(rest.rejected, vec![]);
     }
 
     /// Closed form: on a slope of a a plate stays if tan a < mu, and else slides.
@@ -631,6 +644,7 @@ mod tests {
             ),
             "{reported}"
         );
+        assert!(reported.contains("at settle.time_limit: "), "{reported}");
     }
 
     #[test]

@@ -60,7 +60,7 @@ done
 sinfo
 
 set +e
-job=$(sbatch --parsable --wait --array=1-4 --cpus-per-task=1 --mem=500M -o "$work/task-%a.log" "$script" "$recipe" "$images" "$work/run")
+job=$(SHARDS=4 sbatch --parsable --wait --array=1-4 --cpus-per-task=1 --mem=500M -o "$work/task-%a.log" "$script" "$recipe" "$images" "$work/run")
 status=$?
 set -e
 [ "$status" = 0 ] || { echo "the array failed ($status)"; tail "$work"/task-*.log "$work"/slurm*.log; exit 1; }

@@ -1,4 +1,4 @@
-//! Ctrl-C and SIGTERM: a long job stops between two pictures.
+//! Ctrl-C, SIGTERM and SIGHUP: a long job stops between two pictures.
 
 use crate::exit::INTERRUPTED_STATUS;
 use crate::print;
@@ -22,10 +22,48 @@ pub(crate) fn interruption() -> &'static AtomicBool {
 }
 
 fn catch_interrupts() {
+    let ignored = ignored_signals();
     if let Err(error) = ctrlc::set_handler(stop_soon) {
         log::warn!("interrupts cannot be caught: {error}");
     }
+    ignored.into_iter().for_each(ignore);
 }
+
+/// What the program was started to ignore, as `nohup` does with hang-ups and a script's shell with
+/// interrupts of what it runs in the background.
+#[cfg(unix)]
+fn ignored_signals() -> Vec<i32> {
+    let signals = [libc::SIGHUP, libc::SIGINT].into_iter();
+    signals.filter(|&signal| is_ignored(signal)).collect()
+}
+
+#[cfg(unix)]
+#[expect(unsafe_code, reason = "a function of C, which fills a struct")]
+fn is_ignored(signal: i32) -> bool {
+    // SAFETY: zeros are a `sigaction`, and none is set.
+    let action = unsafe {
+        let mut action: libc::sigaction = std::mem::zeroed();
+        libc::sigaction(signal, std::ptr::null(), &mut action);
+        action
+    };
+    action.sa_sigaction == libc::SIG_IGN
+}
+
+#[cfg(unix)]
+#[expect(unsafe_code, reason = "a function of C, which takes numbers")]
+fn ignore(signal: i32) {
+    // SAFETY: no handler is given that could do harm.
+    unsafe { libc::signal(signal, libc::SIG_IGN) };
+}
+
+/// Other systems have no such thing.
+#[cfg(not(unix))]
+fn ignored_signals() -> Vec<i32> {
+    Vec::new()
+}
+
+#[cfg(not(unix))]
+fn ignore(_: i32) {}
 
 fn stop_soon() {
     if STOP.swap(true, Ordering::Relaxed) {

@@ -226,6 +226,60 @@ fn an_option_without_the_one_that_it_belongs_to_is_refused() {
 }
 
 #[test]
+fn a_split_takes_the_options_of_its_own_way_alone() {
+    let desk = Desk::new();
+    for (options, option, own) in [
+        ("--by random --guard 3", "--guard", "consecutive"),
+        ("--by random --group selection", "--group", "grouped"),
+        ("--group selection", "--group", "grouped"),
+    ] {
+        let told = desk.refused(&words(&format!("dataset split set -o out {options}")));
+        let why = format!("{option}: given without --by {own}");
+        assert!(told.contains(&why), "{told}");
+    }
+}
+
+/// A dataset of empty files, both of whose parts are the same.
+fn write_unsplit_set(desk: &Desk, folder: &str, images: usize, names: &str) {
+    let yaml = format!("train: images\nval: images\nnames: {names}\n");
+    desk.write(format!("{folder}/data.yaml"), yaml);
+    for i in 0..images {
+        desk.write(format!("{folder}/images/{i}.png"), "");
+    }
+}
+
+#[test]
+fn lists_without_images_are_refused() {
+    let desk = Desk::new();
+    write_unsplit_set(&desk, "set", 12, "[cap]");
+    for (line, why) in [
+        (
+            "split set --guard 2",
+            "split: 10 images for training and 0 for validation: too few images for --ratio 0.8 with --guard 2",
+        ),
+        (
+            "subset set --head 0.04",
+            "--head: 0.04 leaves none of the 12 images for training",
+        ),
+    ] {
+        let told = desk.refused(&words(&format!("dataset {line} -o out")));
+        assert!(told.contains(why), "{told}");
+    }
+}
+
+#[test]
+fn batches_of_sets_that_name_other_classes_are_refused() {
+    let desk = Desk::new();
+    write_unsplit_set(&desk, "real", 1, "[none, cap]");
+    write_unsplit_set(&desk, "made", 1, "[cap, none]");
+    let told = desk.refused(&words(
+        "dataset batches --real real --synthetic made -o batches.jsonl",
+    ));
+    let why = r#"classes: ["cap", "none"] in made, expected ["none", "cap"] as in real"#;
+    assert!(told.contains(why), "{told}");
+}
+
+#[test]
 fn photos_that_would_become_one_cut_out_are_refused() {
     let desk = Desk::new();
     write_slab(&desk.path("one/can.png"));
@@ -237,6 +291,60 @@ fn photos_that_would_become_one_cut_out_are_refused() {
         told.contains("\"two/can.png\", would become the same cut-out as photos[0]"),
         "{told}"
     );
+}
+
+#[test]
+fn a_bad_photo_does_not_stop_those_that_are_added_with_it() {
+    let desk = Desk::new();
+    write_slab(&desk.path("one.png"));
+    write_slab(&desk.path("two.png"));
+    desk.write("bad.png", "no picture");
+    let add = |photos: &str| {
+        let line = format!("asset add {photos} --name can --class can --length 0.2 -o assets -q");
+        let done = desk.run(&words(&line));
+        (done.status.code(), text(&done.stderr))
+    };
+    let (status, told) = add("one.png bad.png two.png");
+    assert_eq!(status, Some(2), "{told}");
+    assert!(
+        told.contains("failed: bad.png: ")
+            && told.contains("error: 1 of 3 files could not be used; the rest is done"),
+        "{told}"
+    );
+    for file in ["can/one.exr", "can/two.exr", "contact_sheet.png"] {
+        assert!(desk.path("assets").join(file).exists(), "{file}");
+    }
+    let (status, told) = add("bad.png");
+    assert_eq!(status, Some(4), "{told}");
+    let (status, told) = add("one.png two.png --mass=-1");
+    assert_eq!(status, Some(3), "{told}");
+    assert_eq!(told.matches("mass: -1").count(), 1, "{told}");
+}
+
+#[test]
+fn an_asset_of_two_classes_or_roles_is_refused_before_any_work() {
+    let desk = Desk::new();
+    write_slab(&desk.path("one.png"));
+    write_slab(&desk.path("two.png"));
+    for (second, expected) in [
+        (
+            "can,",
+            "photos[1].class: \"can\", but another photo of the asset has \"cup\"",
+        ),
+        (
+            "cup,distractor",
+            "photos[1].role: distractor, but another photo of the asset has object",
+        ),
+    ] {
+        let rows = format!("one.png,a,0.3,cup,\ntwo.png,a,0.3,{second}\n");
+        desk.write(
+            "photos.csv",
+            format!("file,asset,length,class,role\n{rows}"),
+        );
+        let told = desk.refused(&["asset", "build", "photos.csv", "-o", "built"]);
+        assert!(told.contains(expected), "{told}");
+    }
+    assert!(!desk.path("built").exists());
 }
 
 #[test]
@@ -420,6 +528,54 @@ fn ablations_differ_in_the_switch_that_is_asked_for() {
 }
 
 #[test]
+fn a_recipe_beside_a_dataset_is_not_written_over() {
+    let desk = Desk::new();
+    desk.write("recipe.toml", "[scene]\nobjects = 3\n");
+    let ablate = words("dataset ablate recipe.toml -n 0 --switch scene.scale=1.5 -o out");
+    desk.ok(&ablate);
+    std::fs::create_dir(desk.path("out/scene.scale=1.5/dataset")).unwrap();
+    desk.ok(&ablate);
+    let read = |name: &str| std::fs::read_to_string(desk.path("out").join(name)).unwrap();
+    let recipes = || ["all/recipe.toml", "scene.scale=1.5/recipe.toml"].map(read);
+    let before = recipes();
+    let refused = desk.refused(&[&ablate[..], &["--set", "scene.objects=4"]].concat());
+    assert!(
+        refused.contains("scene.scale=1.5/recipe.toml: is another recipe"),
+        "{refused}"
+    );
+    assert_eq!(recipes(), before);
+}
+
+#[test]
+fn a_url_is_no_folder_of_its_own_name() {
+    let desk = Desk::new();
+    desk.write("recipe.toml", "");
+    let ablate = "dataset ablate recipe.toml -n 0 --switch scene.scale=1.5 -o";
+    for line in [
+        ablate,
+        "dataset split set -o",
+        "dataset subset set --head 0.5 -o",
+        "dataset merge shard -o",
+    ] {
+        let told = desk.refused(&words(&format!("{line} s3://bucket/data")));
+        assert!(told.contains("output: a URL, expected a folder"), "{told}");
+    }
+    let folder = desk.path("out");
+    desk.ok(&words(&format!("{ablate} file://{}", folder.display())));
+    assert!(folder.join("all/recipe.toml").exists());
+}
+
+#[test]
+fn a_folder_takes_no_scratch_folder() {
+    let desk = Desk::new();
+    desk.write("recipe.toml", "");
+    let generate = words("dataset generate recipe.toml -n 1 -o out --scratch x");
+    let told = desk.refused(&generate);
+    let why = "--scratch: given without an object store as --output";
+    assert!(told.contains(why), "{told}");
+}
+
+#[test]
 fn an_impossible_range_is_named() {
     let desk = Desk::new();
     desk.write("recipe.toml", "[scene]\nscale = [0.0, -1.0]\n");
@@ -514,7 +670,9 @@ fn no_command_writes_over_what_it_reads() {
     let desk = Desk::new();
     write_slab(&desk.path("a.png"));
     desk.write("a.label.json", label(SQUARE));
-    let content = || ["a.png", "a.label.json"].map(|name| std::fs::read(desk.path(name)).ok());
+    desk.write("set/data.yaml", "train: .\nval: .\nnames: [cap]\n");
+    let files = ["a.png", "a.label.json", "set/data.yaml"];
+    let content = || files.map(|name| std::fs::read(desk.path(name)).ok());
     let before = content();
     for words in [
         &["matte", "cut", "a.png", "-o", "a.png"][..],
@@ -522,6 +680,8 @@ fn no_command_writes_over_what_it_reads() {
         &["matte", "film", "a.exr", "-o", "a.exr"],
         &["camera", "rectify", "a.png", "a.label.json", "-o", "a.png"],
         &["camera", "solve", "a.label.json", "-o", "a.label.json"],
+        &["dataset", "split", "set", "-o", "./set"],
+        &["dataset", "subset", "set", "--head", "0.5", "-o", "set"],
     ] {
         let told = desk.refused(words);
         assert!(told.contains("is read and would be written over"), "{told}");
@@ -611,6 +771,21 @@ fn keyers_refuse_settings_out_of_range() {
         let told = desk.refused(&[&["matte"], keyer, &more].concat());
         let expected = format!("{}, expected {expected}", setting.replace('=', ": "));
         assert!(told.contains(&expected), "{told}");
+    }
+}
+
+#[test]
+fn the_example_of_a_setting_is_one_that_each_keyer_takes() {
+    let desk = Desk::new();
+    write_green_ramp(&desk.path("a.png"), 0.5);
+    let screen = ["chroma-key", "--screen", "0.02,0.6,0.05"];
+    let clean = ["difference-key", "--clean", "a.png"];
+    for keyer in [&screen[..], &clean, &["channel-key"], &["color-spill"]] {
+        let help = desk.ok(&["matte", keyer[0], "--help"]);
+        let (_, examples) = help.split_once("such as").expect("an example");
+        let example = examples.split_whitespace().next().expect("a setting");
+        let more = ["a.png", "-o", "cut.png", "--set", example];
+        desk.ok(&[&["matte"], keyer, &more].concat());
     }
 }
 

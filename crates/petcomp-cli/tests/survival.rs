@@ -282,6 +282,28 @@ fn a_signal_stops_between_pictures_and_the_same_command_goes_on() {
     }
 }
 
+#[test]
+fn signals_that_a_run_was_started_to_ignore_do_not_stop_it() {
+    let desk = Desk::new();
+    demo(&desk);
+    let run = "dataset generate demo/recipe.toml -n 100000 --yes -q -j 1 -o out";
+    let mut child = Command::new("sh")
+        .args(["-c", &format!("trap '' HUP INT; exec {PETCOMP} {run}")])
+        .current_dir(desk.folder())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    wait_for_a_sample(&desk.path("out"));
+    // Two signals end a run at once.
+    send("HUP", &child);
+    send("INT", &child);
+    std::thread::sleep(Duration::from_secs(1));
+    assert_eq!(child.try_wait().unwrap(), None);
+    send("TERM", &child);
+    assert_eq!(ends(child).code(), Some(130));
+}
+
 /// Pictures that take minutes: heaps of 250 at the shortest steps, and room for such work.
 const LONG_FALL: [&str; 8] = [
     "--set",

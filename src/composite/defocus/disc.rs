@@ -1,6 +1,7 @@
 //! Circles of confusion as weights of pixels.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// Larger circles are treated as this one, pixels: beyond, a picture has no objects any more.
 const MOST_RADIUS_PX: f64 = 64.0;
@@ -17,6 +18,10 @@ const HALVINGS: usize = 24;
 #[derive(Debug)]
 pub(super) struct Disc {
     taps: Vec<(isize, isize, f32)>,
+    /// Pixels from its middle to its last.
+    reach: isize,
+    /// Weights above and left of each corner of the pixels in the square around it, row by row.
+    sums: Vec<f64>,
 }
 
 impl Disc {
@@ -27,14 +32,64 @@ impl Disc {
         let weights = soft_disc(matching_rim(radius));
         let sum: f64 = weights.iter().map(|(_, _, weight)| weight).sum();
         let taps = weights.into_iter();
+        let taps: Vec<_> = taps.map(|(x, y, w)| (x, y, (w / sum) as f32)).collect();
+        let reach = taps.iter().map(|tap| tap.0.abs()).max().unwrap_or(0);
         Self {
-            taps: taps.map(|(x, y, w)| (x, y, (w / sum) as f32)).collect(),
+            sums: corner_sums(&taps, reach),
+            taps,
+            reach,
         }
     }
 
     pub(super) fn taps(&self) -> &[(isize, isize, f32)] {
         &self.taps
     }
+
+    /// Share of it that is inside a picture of this size where its middle is at a pixel of that.
+    #[inline]
+    pub(super) fn share_inside(&self, at: [isize; 2], size: [usize; 2]) -> f32 {
+        let [columns, rows] = [0, 1].map(|axis| self.inside(at[axis], size[axis]));
+        if columns.len().min(rows.len()) == self.side() {
+            return 1.0;
+        }
+        let left_of = |x: usize| {
+            let above = |y: usize| self.sums[y * (self.side() + 1) + x];
+            above(rows.end) - above(rows.start)
+        };
+        (left_of(columns.end) - left_of(columns.start)) as f32
+    }
+
+    /// Its columns (or rows) inside a picture of so many, counted from its first.
+    #[inline]
+    fn inside(&self, at: isize, size: usize) -> Range<usize> {
+        let first = at - self.reach;
+        let low = (-first).max(0) as usize;
+        let high = (size as isize - first) as usize;
+        low..high.min(self.side())
+    }
+
+    /// Pixels along a side of the square around it.
+    #[inline]
+    fn side(&self) -> usize {
+        2 * self.reach as usize + 1
+    }
+}
+
+/// Sums of weights above and left of each corner of the pixels in the square around a disc.
+fn corner_sums(taps: &[(isize, isize, f32)], reach: isize) -> Vec<f64> {
+    let row = 2 * reach as usize + 2;
+    let mut sums = vec![0.0; row * row];
+    for (x, y, weight) in taps {
+        let [x, y] = [x, y].map(|offset| (offset + reach + 1) as usize);
+        sums[y * row + x] = f64::from(*weight);
+    }
+    for y in 1..row {
+        for x in 1..row {
+            let i = y * row + x;
+            sums[i] += sums[i - 1] + sums[i - row] - sums[i - row - 1];
+        }
+    }
+    sums
 }
 
 /// The pixels of a disc whose rim is a pixel wide, half of it inside of a radius.
@@ -92,9 +147,9 @@ impl Discs {
                 .entry(step)
                 .or_insert_with(|| Disc::new(radius_of(step)));
         }
-        let reach = by_step.values().flat_map(|disc: &Disc| &disc.taps);
+        let reach = by_step.values().map(|disc: &Disc| disc.reach.unsigned_abs());
         Self {
-            reach: reach.map(|tap| tap.0.unsigned_abs()).max().unwrap_or(0),
+            reach: reach.max().unwrap_or(0),
             by_step,
         }
     }
@@ -143,6 +198,25 @@ mod tests {
             for found in [spread(|t| t.0), spread(|t| t.1)] {
                 let off = (found - wanted).abs();
                 assert!(off < 1e-4 + 0.005 * wanted, "{radius}: {found} {wanted}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_share_inside_is_the_sum_of_the_weights_there() {
+        for radius in [0.0, 0.7, 2.5, 9.0] {
+            let disc = Disc::new(radius);
+            for (x, y) in (0..7_isize).flat_map(|y| (0..9_isize).map(move |x| (x, y))) {
+                let is_inside = |tap: &&(isize, isize, f32)| {
+                    (0..9).contains(&(x + tap.0)) && (0..7).contains(&(y + tap.1))
+                };
+                let inside = disc.taps.iter().filter(is_inside);
+                let expected: f32 = inside.map(|tap| tap.2).sum();
+                let found = disc.share_inside([x, y], [9, 7]);
+                assert!(
+                    (found - expected).abs() < 1e-5,
+                    "{radius}: {x} {y}: {found} {expected}"
+                );
             }
         }
     }

@@ -132,6 +132,26 @@ fn nothing_shines_through_where_a_soft_card_ends_over_a_sharp_one() {
 }
 
 #[test]
+fn a_card_larger_than_the_picture_is_whole_up_to_its_border() {
+    // Circles of 1.5 and of 30 pixels, the latter wider than the picture is high.
+    for (alpha, aperture_m, focus_m) in [(1.0, 0.015, 0.5), (0.4, 0.015, 0.5), (1.0, 0.06, 0.2)] {
+        let deep = picture(|_, _| vec![sample(1, 0.4, alpha, 1.0)]);
+        let lens = ThinLens {
+            aperture_m,
+            focus_m,
+        };
+        let soft = defocus(&deep, &shot(Some(lens)));
+        for [x, y] in places(&soft) {
+            let (light, hidden) = (soft.flat(x, y).color.g, hidden(&soft, x, y));
+            assert!(
+                (hidden - alpha).abs() < 1e-3 && (light - 0.5 * alpha).abs() < 1e-3,
+                "{lens:?} {x} {y}: {light} {hidden}"
+            );
+        }
+    }
+}
+
+#[test]
 fn equal_blur_is_that_of_the_whole_picture() {
     let deep = picture(|x, y| match (x / 8 + y / 8) % 3 {
         0 => vec![],

@@ -10,7 +10,7 @@ use crate::dataset::finding::Finding;
 use crate::dataset::folder::{self, JOURNAL};
 use crate::dataset::journal::{NumberedLines, numbered_lines};
 use crate::dataset::journal_line::JournalLine;
-use crate::dataset::listing::{files_below, images_in, is_list, place_of, whole_path};
+use crate::dataset::listing::{images_in, is_list, place_of, whole_path};
 use crate::dataset::near_duplicates::{NEAR_DUPLICATE_RMS, Thumbnail, nearest};
 use crate::dataset::paths::folder_of;
 use crate::dataset::yolo_yaml::DataYaml;
@@ -164,7 +164,7 @@ fn boxes_of(image: &CheckedImage) -> impl Iterator<Item = CheckedBox> {
 fn list_labels(dataset: &Path, images: &Path) -> Vec<PathBuf> {
     let label = dataset.join(YoloSet::label_of(&images.join("x")));
     let is_label = |path: &Path| is_list(path) && !is_class_list(path);
-    let labels = files_below(folder_of(&label), is_label, usize::MAX);
+    let labels = io::files_below(folder_of(&label), is_label, usize::MAX);
     let labels = labels.unwrap_or_default().into_iter();
     labels.map(|path| io::relative(&path, dataset)).collect()
 }

@@ -1,6 +1,5 @@
 //! Pictures with boxes, of this dataset or of the user.
 
-use crate::dataset::listing::files_below;
 use crate::dataset::{SampleSummary, Summary, YoloSet};
 use crate::error::{Error, Result};
 use crate::eval::{self, GroundTruth, is_image};
@@ -144,7 +143,7 @@ pub(in crate::dataset) fn listed_images(folder: &Path) -> Result<(Vec<String>, V
         let images = set.series();
         return Ok((set.classes, images));
     }
-    Ok((Vec::new(), files_below(folder, is_image, MAX_IMAGES)?))
+    Ok((Vec::new(), io::files_below(folder, is_image, MAX_IMAGES)?))
 }
 
 /// Centre and sides of a box as shares of its picture.

@@ -1,16 +1,50 @@
 //! Whole files or none: everything is written beside its place, put on the disk, and then moved
-//! there.
+//! there. Files of which a journal is kept may be moved first and put on the disk together.
 
 use super::open::reason;
 use crate::error::{Error, Result};
 use crate::work::{self, Kind};
+use std::cell::Cell;
 use std::fs::{File, Permissions};
 use std::io::{BufWriter, ErrorKind, Write};
 use std::path::{Component, Path, PathBuf};
 
+/// When files are put on the disk.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Syncing {
+    /// Each before it gets its name: after a power cut there is the old one or the new one.
+    Alone,
+    /// Many at once, by [`sync_file_system`]: after a power cut one that was not among them may be
+    /// torn, and whoever wrote it has to notice.
+    Together,
+}
+
+thread_local! {
+    static SYNCING: Cell<Syncing> = const { Cell::new(Syncing::Alone) };
+}
+
+impl Syncing {
+    /// Runs a job; the files that it writes on this thread are put on the disk so.
+    pub(crate) fn during<T>(self, job: impl FnOnce() -> T) -> T {
+        let before = SYNCING.replace(self);
+        let done = job();
+        SYNCING.set(before);
+        done
+    }
+
+    /// As the job on this thread has it.
+    fn now() -> Self {
+        SYNCING.get()
+    }
+}
+
 /// Writes a file in one step: readers see the old one or the new one, never a part.
 pub(crate) fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
-    work::add(Kind::BytesWritten, bytes.len() as u64);
+    let alone = Syncing::now() == Syncing::Alone;
+    work::add_all([
+        (Kind::BytesWritten, bytes.len() as u64),
+        (Kind::SyncedFiles, u64::from(alone)),
+    ]);
     write_through(path, |file| file.write_all(bytes))
 }
 
@@ -58,7 +92,7 @@ fn not_written(path: &Path, e: &std::io::Error) -> Error {
     Error::file(path, format!("cannot be written: {}", reason(e)))
 }
 
-/// Fills a new file, puts it on the disk and moves it to its place.
+/// Fills a new file, puts it on the disk if that is its turn, and moves it to its place.
 fn fill_and_move(
     mut file: tempfile::NamedTempFile,
     path: &Path,
@@ -66,8 +100,7 @@ fn fill_and_move(
 ) -> std::io::Result<()> {
     keep_permissions(file.as_file(), path)?;
     fill_buffered(&mut file, fill)?;
-    // Before it gets its name: after a power cut there is the old file or the new one.
-    file.as_file().sync_all()?;
+    put_on_disk(file.as_file())?;
     file.persist(path).map_err(|e| e.error)?;
     Ok(())
 }
@@ -96,10 +129,18 @@ fn fill_buffered(
     buffered.flush()
 }
 
+/// Puts a file or the names in a folder on the disk, unless that is done for many at once.
+fn put_on_disk(file: &File) -> std::io::Result<()> {
+    match Syncing::now() {
+        Syncing::Alone => file.sync_all(),
+        Syncing::Together => Ok(()),
+    }
+}
+
 /// Puts the names in a folder on the disk.
 #[cfg(unix)]
 fn sync_folder(folder: &Path) -> std::io::Result<()> {
-    match File::open(folder).and_then(|folder| folder.sync_all()) {
+    match File::open(folder).and_then(|folder| put_on_disk(&folder)) {
         // Some file systems have no such thing, and some folders may be written but not read.
         Err(e) if [ErrorKind::InvalidInput, ErrorKind::PermissionDenied].contains(&e.kind()) => {
             Ok(())
@@ -114,17 +155,27 @@ fn sync_folder(_: &Path) -> std::io::Result<()> {
     Ok(())
 }
 
-/// Brings everything that was written to the file system of a folder to the disk, so that it
-/// outlives a power cut.
+/// Puts everything on the disk that was written to a file's file system, so that it outlives a power
+/// cut; says whether the system can do that.
 ///
-/// Where it cannot be done nothing is lost but time: what is not there is made again.
-pub fn sync(folder: impl AsRef<Path>) {
-    #[cfg(target_os = "linux")]
-    if let Err(e) = File::open(&folder).and_then(|folder| Ok(rustix::fs::syncfs(folder)?)) {
-        log::debug!("{}: syncfs: {e}", folder.as_ref().display());
+/// # Errors
+/// Where the disk does not take it.
+pub(crate) fn sync_file_system(file: &File) -> std::io::Result<bool> {
+    match sync_all_files(file) {
+        Err(e) if e.kind() == ErrorKind::Unsupported => Ok(false),
+        done => done.map(|()| true),
     }
-    #[cfg(not(target_os = "linux"))]
-    let _ = folder;
+}
+
+#[cfg(target_os = "linux")]
+fn sync_all_files(file: &File) -> std::io::Result<()> {
+    Ok(rustix::fs::syncfs(file)?)
+}
+
+/// Other systems have nothing that waits for the disk.
+#[cfg(not(target_os = "linux"))]
+fn sync_all_files(_: &File) -> std::io::Result<()> {
+    Err(ErrorKind::Unsupported.into())
 }
 
 /// A new file that vanishes if it is not moved to its place, readable like any other file of the

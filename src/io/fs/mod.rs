@@ -3,15 +3,19 @@
 
 mod atomic;
 mod checksum;
+mod listing;
+mod natural_order;
 mod open;
 mod own_file;
 mod sanitize_path;
 
-pub use atomic::{absolute, create_folder, relative, sync};
+pub use atomic::{absolute, create_folder, relative};
 pub use checksum::{Checksum, copy};
 pub use sanitize_path::{below, inside};
 
-pub(crate) use atomic::{with_last_step, write_bytes, write_through};
+pub(crate) use atomic::{Syncing, sync_file_system, with_last_step, write_bytes, write_through};
+pub(crate) use listing::files_below;
+pub(crate) use natural_order::natural_key;
 pub(crate) use open::{open_regular, read_regular, read_to_end, reason};
 pub(crate) use own_file::{open_own, refuse_foreign};
 pub(crate) use sanitize_path::{length_inside, refuse_links};

@@ -92,7 +92,7 @@ const VARIANTS: [Variant; 5] = [
 pub fn write(folder: &Path, options: &KitOptions) -> Result<()> {
     let real = open_set(&options.real)?;
     let synthetic = open_set(&options.synthetic)?;
-    check_classes(&real, &synthetic, options)?;
+    check_classes([&real, &synthetic], [&options.real, &options.synthetic])?;
     let counts = [real.train.len() as u64, synthetic.train.len() as u64];
     let balance = balance_document(&options.balance, counts)?;
     io::create_folder(folder)?;
@@ -138,12 +138,16 @@ fn write_lists(folder: &Path, real: &YoloSet, synthetic: &YoloSet) -> Result<()>
     Ok(())
 }
 
-/// Fails where the two datasets name other classes.
-fn check_classes(real: &YoloSet, synthetic: &YoloSet, options: &KitOptions) -> Result<()> {
+/// Fails where two datasets that are trained on together, in these folders, name other classes.
+///
+/// # Errors
+/// [`Error::Value`] that tells both lists of classes.
+#[doc(hidden)]
+pub fn check_classes([real, synthetic]: [&YoloSet; 2], folders: [&Path; 2]) -> Result<()> {
     if real.classes == synthetic.classes {
         return Ok(());
     }
-    let (real_folder, folder) = (options.real.display(), options.synthetic.display());
+    let [real_folder, folder] = folders.map(Path::display);
     let (found, expected) = (&synthetic.classes, &real.classes);
     let what = format!("{found:?} in {folder}, expected {expected:?} as in {real_folder}");
     Err(Error::value("classes", what))

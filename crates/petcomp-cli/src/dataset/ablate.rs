@@ -1,11 +1,13 @@
 //! `petcomp dataset ablate`: datasets of the same scenes that differ in one switch of the recipe,
 //! the paper's or any other.
 
+use super::output::folder_parser;
 use super::{LongRunConsent, generate_supervised, print_counts};
 use crate::documents::RecipeArgs;
 use crate::global::GlobalArgs;
 use crate::interruption::interruption;
 use crate::print;
+use petcomp::Error;
 use petcomp::dataset::{DatasetConfig, Pipeline};
 use petcomp::io::{self, Override};
 use std::path::{Path, PathBuf};
@@ -25,24 +27,49 @@ pub(crate) struct AblateArgs {
     #[arg(long, default_value_t = 0)]
     seed: u64,
     /// Folder to write a folder for each into
-    #[arg(short, long, value_name = "FOLDER")]
+    #[arg(short, long, value_name = "FOLDER", value_parser = folder_parser())]
     output: PathBuf,
     #[command(flatten)]
     consent: LongRunConsent,
 }
 
 pub(crate) fn run(args: &AblateArgs, global: &GlobalArgs) -> anyhow::Result<()> {
-    for (name, config) in args.datasets()? {
+    let datasets = args.datasets()?;
+    for (name, config) in &datasets {
+        check_recipe(&args.output.join(name), config)?;
+    }
+    for (name, config) in datasets {
         let folder = args.output.join(name);
         io::create_folder(&folder)?;
-        let recipe = folder.join("recipe.toml");
+        let recipe = recipe_in(&folder);
         config.write(&recipe)?;
         print::line(recipe.display());
         if args.count > 0 {
-            args.generate(&recipe, &folder.join("dataset"), global)?;
+            args.generate(&recipe, &dataset_in(&folder), global)?;
         }
     }
     Ok(())
+}
+
+fn recipe_in(folder: &Path) -> PathBuf {
+    folder.join("recipe.toml")
+}
+
+fn dataset_in(folder: &Path) -> PathBuf {
+    folder.join("dataset")
+}
+
+/// Fails where a dataset was begun with another recipe than would be written beside it.
+fn check_recipe(folder: &Path, config: &DatasetConfig) -> petcomp::Result<()> {
+    let (recipe, dataset) = (recipe_in(folder), dataset_in(folder));
+    if !dataset.exists() || !recipe.exists() || config.is_written(&recipe)? {
+        return Ok(());
+    }
+    let what = format!(
+        "is another recipe than this run has, and {} was begun with it; ablate into a new folder",
+        dataset.display()
+    );
+    Err(Error::file(recipe, what))
 }
 
 impl AblateArgs {

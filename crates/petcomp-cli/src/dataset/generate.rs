@@ -46,7 +46,8 @@ pub(crate) struct GenerateArgs {
     only: Option<u64>,
     /// Make every N-th image, from the I-th (1 to N), in a folder of its own below the output (of a
     /// dataset of archives: every N-th archive, in the output itself);
-    /// `auto` or `auto/N` asks the Slurm array, the AWS Batch array job or the indexed Kubernetes job that this runs in
+    /// `auto` or `auto/N` asks the Slurm array (with N: its tasks are 1 to N, and any of them may be repeated), the AWS Batch
+    /// array job or the indexed Kubernetes job that this runs in
     #[arg(long, value_name = "I/N", conflicts_with = "preview")]
     shard: Option<ShardChoice>,
     /// Make the first N images (of those that -n asks for) at half their width and height, and a
@@ -60,7 +61,7 @@ pub(crate) struct GenerateArgs {
 pub(crate) fn run(args: &GenerateArgs, global: &GlobalArgs) -> anyhow::Result<()> {
     let (config, range) = (args.config()?, args.sample_range()?);
     let archives = config.labels.archives();
-    let folder = range.folder(&args.output.folder(args.scratch.as_deref()), archives);
+    let folder = range.folder(&args.output.folder(args.scratch.as_deref())?, archives);
     if args.resume {
         args.repair(&folder, range, archives.is_some())?;
     }

@@ -1,5 +1,6 @@
 //! `petcomp dataset merge`: the shards of several machines become one dataset.
 
+use super::output::folder_parser;
 use super::{print_counts, print_trainer_inputs};
 use crate::global::GlobalArgs;
 use crate::interruption::interruption;
@@ -12,7 +13,7 @@ pub(crate) struct MergeArgs {
     #[arg(required = true, value_name = "SHARD")]
     shards: Vec<PathBuf>,
     /// Folder to write the whole dataset into
-    #[arg(short, long, value_name = "FOLDER")]
+    #[arg(short, long, value_name = "FOLDER", value_parser = folder_parser())]
     output: PathBuf,
 }
 

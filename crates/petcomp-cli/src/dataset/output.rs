@@ -1,8 +1,10 @@
 //! Where a dataset goes: a folder of this machine, or an object store.
 
-use petcomp::Result;
+use crate::asset::check_companion;
+use clap::builder::{OsStringValueParser, TypedValueParser};
 use petcomp::dataset::ArchiveStore;
-use std::ffi::OsString;
+use petcomp::{Error, Result};
+use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -17,9 +19,8 @@ pub(crate) enum Output {
 impl Output {
     /// Reads a path or a URL; `file://` is a path.
     pub(crate) fn parse(text: OsString) -> Result<Self> {
-        match text.to_str().and_then(|text| text.split_once("://")) {
-            None => Ok(Self::Folder(text.into())),
-            Some(("file", _)) => stores::folder_of(&text.to_string_lossy()).map(Self::Folder),
+        match scheme_of(&text) {
+            None | Some("file") => parse_folder(text).map(Self::Folder),
             Some(_) => {
                 let url = text.to_string_lossy().into_owned();
                 stores::check(&url)?;
@@ -38,13 +39,41 @@ impl Output {
 
     /// The folder, or the one for what is not finished: that of `scratch`, or one of the system's
     /// temporary folder that the same output has the next time, too.
-    pub(crate) fn folder(&self, scratch: Option<&Path>) -> PathBuf {
-        match (self, scratch) {
+    ///
+    /// # Errors
+    /// `scratch` for a folder, which holds what is not finished itself.
+    pub(crate) fn folder(&self, scratch: Option<&Path>) -> Result<PathBuf> {
+        let is_store = matches!(self, Self::Store(_));
+        let store = "an object store as --output";
+        check_companion("--scratch", scratch.is_some(), store, is_store)?;
+        Ok(match (self, scratch) {
             (Self::Folder(folder), _) => folder.clone(),
             (Self::Store(_), Some(scratch)) => scratch.into(),
             (Self::Store(url), None) => std::env::temp_dir().join(scratch_name(url)),
+        })
+    }
+}
+
+/// Reads the folder of a command that writes to no object store; `file://` is a path.
+pub(crate) fn folder_parser() -> impl TypedValueParser<Value = PathBuf> {
+    OsStringValueParser::new().try_map(parse_folder)
+}
+
+fn parse_folder(text: OsString) -> Result<PathBuf> {
+    match scheme_of(&text) {
+        None => Ok(text.into()),
+        Some("file") => stores::folder_of(&text.to_string_lossy()),
+        Some(_) => {
+            let what = "a URL, expected a folder or file:///FOLDER";
+            Err(Error::value("output", what))
         }
     }
+}
+
+/// What stands before the `://` of a URL; none of a path.
+fn scheme_of(text: &OsStr) -> Option<&str> {
+    let (scheme, _) = text.to_str()?.split_once("://")?;
+    Some(scheme)
 }
 
 fn scratch_name(url: &str) -> String {
@@ -61,7 +90,6 @@ use petcomp_store as stores;
 #[cfg(not(feature = "object-store"))]
 mod stores {
     use super::*;
-    use petcomp::Error;
 
     pub(super) fn folder_of(url: &str) -> Result<PathBuf> {
         Err(unknown(url))

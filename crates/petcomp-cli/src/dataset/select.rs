@@ -1,5 +1,8 @@
 //! `petcomp dataset split` and `subset`: lists of images, without copies.
 
+use super::output::folder_parser;
+use crate::asset::check_companion;
+use crate::distinct_files::check_distinct;
 use crate::global::GlobalArgs;
 use crate::print;
 use petcomp::Error;
@@ -24,21 +27,21 @@ pub(crate) struct SplitArgs {
     /// How: `consecutive` (the last ones for validation), `grouped` or `random`
     #[arg(long, value_name = "HOW", default_value = "consecutive")]
     by: SplitMethod,
-    /// What stays together in a grouped split: `background` or `selection`
-    #[arg(long, value_name = "GROUP", default_value = "background")]
-    group: Group,
-    /// Images between the two parts of a consecutive split that belong to neither
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    guard: usize,
+    /// What stays together in a grouped split: `background` or `selection` [default: background]
+    #[arg(long, value_name = "GROUP")]
+    group: Option<Group>,
+    /// Images between the two parts of a consecutive split that belong to neither [default: 0]
+    #[arg(long, value_name = "N")]
+    guard: Option<usize>,
     /// Seed of a grouped or random split
     #[arg(long, default_value_t = 0)]
     seed: u64,
     /// Folder to write train.txt, val.txt and data.yaml into
-    #[arg(short, long, value_name = "FOLDER")]
+    #[arg(short, long, value_name = "FOLDER", value_parser = folder_parser())]
     output: PathBuf,
 }
 
-#[derive(Clone, Copy, clap::ValueEnum)]
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 enum SplitMethod {
     Consecutive,
     Grouped,
@@ -53,7 +56,7 @@ pub(crate) struct SubsetArgs {
     #[arg(long, value_name = "SHARE")]
     head: f64,
     /// Folder to write train.txt, val.txt and data.yaml into
-    #[arg(short, long, value_name = "FOLDER")]
+    #[arg(short, long, value_name = "FOLDER", value_parser = folder_parser())]
     output: PathBuf,
 }
 
@@ -68,9 +71,11 @@ pub(super) fn run(command: &SelectCommand, global: &GlobalArgs) -> anyhow::Resul
 }
 
 fn write_split(args: &SplitArgs, global: &GlobalArgs) -> anyhow::Result<()> {
+    let how = args.partition()?;
+    check_own_folder(&args.folder, &args.output)?;
     let set = YoloSet::read(&args.folder)?;
-    let split = set.partitioned(args.partition(), args.ratio, args.seed)?;
-    check_both_parts(&split)?;
+    let split = set.partitioned(how, args.ratio, args.seed)?;
+    check_both_parts(&split, &scarce(how, args.ratio))?;
     let leakage = split.leakage(NEAR_DUPLICATE_RMS)?;
     write_lists(&split, &args.output, global)?;
     report_leakage(&leakage);
@@ -78,29 +83,76 @@ fn write_split(args: &SplitArgs, global: &GlobalArgs) -> anyhow::Result<()> {
 }
 
 impl SplitArgs {
-    fn partition(&self) -> Partition {
-        match self.by {
-            SplitMethod::Consecutive => Partition::Consecutive { guard: self.guard },
-            SplitMethod::Grouped => Partition::Grouped(self.group),
+    fn partition(&self) -> petcomp::Result<Partition> {
+        self.check_companions()?;
+        Ok(match self.by {
+            SplitMethod::Consecutive => Partition::Consecutive {
+                guard: self.guard.unwrap_or(0),
+            },
+            SplitMethod::Grouped => Partition::Grouped(self.group.unwrap_or(Group::Background)),
             SplitMethod::Random => Partition::Random,
-        }
+        })
+    }
+
+    /// Fails where a guard or a group is given that belongs to another way to split.
+    fn check_companions(&self) -> petcomp::Result<()> {
+        let (guard, consecutive) = (self.guard.is_some(), self.by == SplitMethod::Consecutive);
+        check_companion("--guard", guard, "--by consecutive", consecutive)?;
+        let (group, grouped) = (self.group.is_some(), self.by == SplitMethod::Grouped);
+        check_companion("--group", group, "--by grouped", grouped)
     }
 }
 
-fn check_both_parts(split: &YoloSet) -> petcomp::Result<()> {
-    let (train, val) = (split.train.len(), split.val.len());
+/// Fails where the lists would replace the data.yaml that they are made from.
+fn check_own_folder(folder: &Path, output: &Path) -> anyhow::Result<()> {
+    let [read, written] = [folder, output].map(|folder| folder.join("data.yaml"));
+    check_distinct([read], [written])
+}
+
+/// Of what there may be too few, for which options.
+fn scarce(how: Partition, ratio: f64) -> String {
+    match how {
+        Partition::Grouped(_) => format!("groups for --ratio {ratio}"),
+        Partition::Consecutive { guard } if guard > 0 => {
+            format!("images for --ratio {ratio} with --guard {guard}")
+        }
+        Partition::Consecutive { .. } | Partition::Random => format!("images for --ratio {ratio}"),
+    }
+}
+
+fn check_both_parts(set: &YoloSet, scarce: &str) -> petcomp::Result<()> {
+    let (train, val) = (set.train.len(), set.val.len());
     if train > 0 && val > 0 {
         return Ok(());
     }
-    let what = format!(
-        "{train} images for training and {val} for validation: too few groups for this ratio"
-    );
+    let what = format!("{train} images for training and {val} for validation: too few {scarce}");
     Err(Error::value("split", what))
 }
 
 fn write_subset(args: &SubsetArgs, global: &GlobalArgs) -> anyhow::Result<()> {
-    let subset = YoloSet::read(&args.folder)?.head(args.head)?;
+    check_own_folder(&args.folder, &args.output)?;
+    let set = YoloSet::read(&args.folder)?;
+    let subset = set.head(args.head)?;
+    check_no_part_is_lost(args.head, &set, &subset)?;
     write_lists(&subset, &args.output, global)
+}
+
+/// Fails where nothing is left of a part that has images.
+fn check_no_part_is_lost(head: f64, set: &YoloSet, subset: &YoloSet) -> petcomp::Result<()> {
+    let parts = [
+        ("training", &set.train, &subset.train),
+        ("validation", &set.val, &subset.val),
+    ];
+    let lost = parts
+        .iter()
+        .find(|(_, all, left)| left.is_empty() && !all.is_empty());
+    match lost {
+        None => Ok(()),
+        Some((part, all, _)) => {
+            let what = format!("{head} leaves none of the {} images for {part}", all.len());
+            Err(Error::value("--head", what))
+        }
+    }
 }
 
 fn write_lists(set: &YoloSet, folder: &Path, global: &GlobalArgs) -> anyhow::Result<()> {

@@ -4,10 +4,10 @@
 use crate::global::GlobalArgs;
 use crate::interruption::interruption;
 use petcomp::Error;
-use petcomp::dataset::{self, DatasetCounts, LongRun, Pipeline, Plan, Progress};
+use petcomp::dataset::{self, DatasetCounts, LongRun, Pipeline, Plan, Progress, RunPace};
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 /// How often the time that the rest will take is estimated.
@@ -31,7 +31,7 @@ pub(crate) fn generate_supervised(
     global: &GlobalArgs,
 ) -> anyhow::Result<DatasetCounts> {
     let display = global.start_progress("pictures");
-    let watch = RunWatch::default();
+    let watch = RunWatch::new();
     let (made, long_run) = watch.over(!consent.yes, || {
         dataset::generate(
             plan,
@@ -52,14 +52,29 @@ pub(crate) fn generate_supervised(
 }
 
 /// Estimates beside a run how long it will take.
-#[derive(Default)]
 struct RunWatch {
-    last: Mutex<Option<Progress>>,
+    threads: usize,
+    /// None before the run is about to make pictures: opening a large folder is none of their time.
+    pace: Mutex<Option<RunPace>>,
 }
 
 impl RunWatch {
+    fn new() -> Self {
+        Self {
+            threads: rayon::current_num_threads(),
+            pace: Mutex::new(None),
+        }
+    }
+
     fn note(&self, progress: Progress) {
-        *self.last.lock().unwrap_or_else(PoisonError::into_inner) = Some(progress);
+        let now = Instant::now();
+        let mut pace = self.pace();
+        let pace = pace.get_or_insert_with(|| RunPace::new(self.threads, progress, now));
+        pace.note(progress, now);
+    }
+
+    fn pace(&self) -> MutexGuard<'_, Option<RunPace>> {
+        self.pace.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Runs the job and, where that is asked for, stops it when it would take too long; returns the
@@ -79,9 +94,8 @@ impl RunWatch {
     /// Until the run's end: stops it when it is going to take longer than an hour, and returns how
     /// long.
     fn stop_long_run(&self, end: &Receiver<()>) -> Option<LongRun> {
-        let began = Instant::now();
         while end.recv_timeout(ESTIMATE_INTERVAL) == Err(RecvTimeoutError::Timeout) {
-            let long_run = self.estimate(began);
+            let long_run = self.estimate();
             if long_run.is_some() {
                 interruption().store(true, Ordering::Relaxed);
                 return long_run;
@@ -90,9 +104,9 @@ impl RunWatch {
         None
     }
 
-    fn estimate(&self, began: Instant) -> Option<LongRun> {
-        let progress = *self.last.lock().unwrap_or_else(PoisonError::into_inner);
-        LongRun::of(&progress?, began.elapsed(), rayon::current_num_threads())
+    fn estimate(&self) -> Option<LongRun> {
+        let pace = *self.pace();
+        pace?.long_run(Instant::now())
     }
 }
 
@@ -105,7 +119,7 @@ mod tests {
         let (ended, end) = mpsc::channel::<()>();
         std::thread::spawn(move || {
             let _ended = ended;
-            RunWatch::default().over(true, || panic!("on purpose"))
+            RunWatch::new().over(true, || panic!("on purpose"))
         });
         let outcome = end.recv_timeout(Duration::from_secs(60));
         assert_eq!(outcome, Err(RecvTimeoutError::Disconnected));

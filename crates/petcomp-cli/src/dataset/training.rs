@@ -126,6 +126,7 @@ impl MixedSets {
     fn open(args: &MixedSetArgs) -> petcomp::Result<Self> {
         let real = YoloSet::open(&args.real)?;
         let synthetic = YoloSet::open(&args.synthetic)?;
+        train::kit::check_classes([&real, &synthetic], [&args.real, &args.synthetic])?;
         let counts = [&real, &synthetic].map(|set| set.train.len() as u64);
         Ok(Self {
             weights: args.balance().weights(counts[0], counts[1])?,

@@ -417,6 +417,7 @@ fn asset_list(world: &World, file: &str) {
             world.path(file),
             world.path("built"),
             &|_, _| (),
+            &AtomicBool::new(false),
         ));
         let _ = std::fs::remove_dir_all(world.path("built"));
     }
@@ -551,13 +552,12 @@ fn coco_eval(world: &World) {
 }
 
 fn tags(world: &World) {
-    let Some(tags) = ends(eval::read_tags(&world.path("tags.csv"))) else {
+    let sheets: Vec<_> = ["000000", "000001"]
+        .map(|image| eval::EvalImage::new(image, Vec::new()))
+        .into();
+    let Some(tags) = ends(eval::read_tags(&world.path("tags.csv"), &sheets)) else {
         return;
     };
-    let sheets = vec![eval::EvalImage {
-        image: "000000".into(),
-        ..Default::default()
-    }];
     let run = Run {
         name: "run".into(),
         sheets,

@@ -42,7 +42,14 @@ const LABELS: &[Kind] = &[LabelSamples, Masks];
 
 /// Work that every scene may take: what it is read from and written to, and levels of detail where
 /// cards are small.
-const ALWAYS_ALLOWED: [Kind; 5] = [BytesWritten, FilesRead, BytesRead, Levels, LargeAllocations];
+const ALWAYS_ALLOWED: [Kind; 6] = [
+    BytesWritten,
+    SyncedFiles,
+    FilesRead,
+    BytesRead,
+    Levels,
+    LargeAllocations,
+];
 
 impl WorkCase {
     /// Work that the scene must not take: all that is not listed as used.

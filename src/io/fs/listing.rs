@@ -1,0 +1,71 @@
+//! What lies below a folder.
+
+use super::natural_order::compare_paths;
+use crate::error::{Error, Result};
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+/// The files of a kind below a folder, in natural order of path (`2.png` before `10.png`); each folder once, as links may lead in
+/// circles.
+///
+/// # Errors
+/// A folder that cannot be listed, or one with which there are more files than `most`.
+pub(crate) fn files_below(
+    folder: &Path,
+    is_wanted: impl Fn(&Path) -> bool,
+    most: usize,
+) -> Result<Vec<PathBuf>> {
+    let (mut files, mut seen) = (Vec::new(), BTreeSet::new());
+    let mut open = vec![folder.to_path_buf()];
+    while let Some(folder) = open.pop() {
+        if seen.insert(folder.canonicalize().map_err(|e| Error::file(&folder, e))?) {
+            let (folders, found) = folders_and_files(&folder)?;
+            open.extend(folders);
+            files.extend(found.into_iter().filter(|path| is_wanted(path)));
+        }
+        check_file_count(files.len(), most, &folder)?;
+    }
+    files.sort_by(|a, b| compare_paths(a, b));
+    Ok(files)
+}
+
+/// What is in a folder, in order of name: of two names of a folder always the same one counts.
+fn folders_and_files(folder: &Path) -> Result<(Vec<PathBuf>, Vec<PathBuf>)> {
+    let entries = std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
+    let mut paths: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
+    paths.sort();
+    Ok(paths.into_iter().partition(|path| path.is_dir()))
+}
+
+fn check_file_count(count: usize, most: usize, folder: &Path) -> Result<()> {
+    if count <= most {
+        return Ok(());
+    }
+    let what = format!("more than {most} images, expected fewer");
+    Err(Error::file(folder, what))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_are_in_order_of_their_numbers() {
+        let dir = tempfile::tempdir().unwrap();
+        let names = [
+            "a/1000000.png",
+            "a/200000.png",
+            "a/b.png",
+            "a10/1.png",
+            "a9/1.png",
+        ];
+        for name in names {
+            let path = dir.path().join(name);
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(path, "").unwrap();
+        }
+        let found = files_below(dir.path(), |_| true, usize::MAX).unwrap();
+        let order = [1, 0, 2, 4, 3].map(|i| dir.path().join(names[i]));
+        assert_eq!(found, order);
+    }
+}
