@@ -981,6 +981,15 @@ fn archives_alone_leave_no_other_file_and_are_those_packed_from_files() {
     let archives = |folder: &Path| bytes(&folder.join("webdataset"));
     assert_eq!(archives(loose.path()), archives(streamed.path()));
     assert_eq!(archives(loose.path()).len(), 8 + 6);
+    let sheet = contact_sheet_of(streamed.path(), 4, &Default::default());
+    let summary = petcomp::dataset::Summary::read(streamed.path());
+    for refused in [sheet.map(drop), summary.map(drop)] {
+        let refused = refused.unwrap_err().to_string();
+        assert!(
+            refused.contains("archives alone, expected files"),
+            "{refused}"
+        );
+    }
 }
 
 #[test]

@@ -135,14 +135,15 @@ fn title_height(title: &str) -> usize {
 /// The contact sheet of a dataset on disk: at most `most` of its pictures, evenly spread.
 ///
 /// # Errors
-/// When the folder is no dataset, or was written without the [`Pictures`](crate::dataset::Pictures)
-/// or the [`Sidecar`](crate::dataset::Sidecar) that the sheet is made from.
+/// When the folder is no dataset or one of archives alone, or was written without the
+/// [`Pictures`](crate::dataset::Pictures) or the [`Sidecar`](crate::dataset::Sidecar) that the sheet
+/// is made from.
 pub fn contact_sheet_of(
     folder: &Path,
     most: usize,
     options: &ContactSheetOptions,
 ) -> Result<Image<Srgb8>> {
-    let identity = folder::known_identity(folder)?;
+    let identity = folder::identity_of_files(folder)?;
     let classes = folder::known_classes(&identity);
     let labelling = Labelling::of_identity(&identity);
     let lines = lines_of(folder)?;

@@ -182,6 +182,27 @@ pub(crate) fn known_identity(folder: &Path) -> Result<Value> {
     identity.ok_or_else(|| Error::file(folder, format!("no {IDENTITY}, expected a dataset")))
 }
 
+/// What a dataset whose samples have files of their own was made from.
+///
+/// # Errors
+/// As [`known_identity`]; a dataset of archives alone.
+pub(crate) fn identity_of_files(folder: &Path) -> Result<Value> {
+    let identity = known_identity(folder)?;
+    let has_files = [JOURNAL, "images"]
+        .iter()
+        .any(|name| folder.join(name).exists());
+    if has_files || !has_archives(&identity) {
+        return Ok(identity);
+    }
+    let what = "archives alone, expected files of single pictures; `dataset generate --preview` makes some, in another folder";
+    Err(Error::file(folder, what))
+}
+
+fn has_archives(identity: &Value) -> bool {
+    let writers = identity["writers"].as_array();
+    writers.is_some_and(|all| all.iter().any(|writer| writer.get("webdataset").is_some()))
+}
+
 /// The names of the classes that an identity records.
 pub(crate) fn known_classes(identity: &Value) -> Vec<String> {
     serde_json::from_value(identity["classes"].clone()).unwrap_or_default()
@@ -325,8 +346,13 @@ fn brief(value: &Value) -> String {
     }
 }
 
+/// The key that is compared before the others: a picture's size is in what is told of cameras, too.
+const FIRST_KEY: &str = "scene";
+
 fn same_keys(a: &Map<String, Value>, b: &Map<String, Value>, at: &str) -> FieldComparison {
     let keys = a.keys().chain(b.keys().filter(|key| !a.contains_key(*key)));
+    let mut keys: Vec<&String> = keys.collect();
+    keys.sort_by_key(|key| *key != FIRST_KEY);
     for key in keys {
         let [before, now] = [a, b].map(|map| map.get(key).unwrap_or(&Value::Null));
         same(before, now, &field_path(at, key))?;
@@ -376,5 +402,15 @@ mod tests {
         );
         let (_, what) = differs(json!("x".repeat(500)));
         assert!(what.len() < 260 && what.ends_with(".."), "{what}");
+    }
+
+    #[test]
+    fn another_size_of_pictures_is_blamed_on_no_camera() {
+        let recipe = |width: u32| {
+            let backgrounds = json!([{ "name": "tray", "camera": format!("crc32 {width:08x}") }]);
+            json!({ "recipe": { "backgrounds": backgrounds, "scene": { "image": [width, 240] } } })
+        };
+        let (at, _) = same(&recipe(320), &recipe(640), "").unwrap_err();
+        assert_eq!(at, "recipe.scene.image[0]");
     }
 }

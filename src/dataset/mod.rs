@@ -35,6 +35,7 @@ pub mod fit;
 mod folder;
 mod formats;
 mod generate;
+mod idle_keys;
 #[doc(hidden)]
 pub mod index;
 mod inputs;

@@ -128,7 +128,7 @@ impl Summary {
     /// Reads a dataset's folder.
     ///
     /// # Errors
-    /// A folder that is no dataset, or was written without its sidecars.
+    /// A folder that is no dataset or one of archives alone, or was written without its sidecars.
     pub fn read(folder: &Path) -> Result<Self> {
         let mut summary = Self::empty(folder)?;
         let lines = lines_of(folder)?;
@@ -149,7 +149,7 @@ impl Summary {
 
     /// A dataset of which no sample was read yet.
     fn empty(folder: &Path) -> Result<Self> {
-        let identity = folder::known_identity(folder)?;
+        let identity = folder::identity_of_files(folder)?;
         let classes = folder::known_classes(&identity);
         Ok(Self {
             images: [0; 2],

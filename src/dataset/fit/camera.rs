@@ -89,7 +89,8 @@ impl Fitting<'_> {
     }
 
     fn difference(&self, knob: &Knob, real: &MeasuredSet, own: &MeasuredSet) -> Option<Difference> {
-        let real = real.grouped(knob.of_picture, str::to_owned);
+        let real = real.values(knob.of_picture).into_iter();
+        let real: Vec<_> = real.map(|value| vec![(value, 1.0)]).collect();
         let own = own.grouped(knob.of_picture, |name| self.plate_of(name));
         Difference::new(&real, &own, self.options.seed)
     }

@@ -31,19 +31,10 @@ impl LabelOdds {
         Self::weighted(falls, &vec![1.0; falls.len()], most)
     }
 
-    /// The same with the falls of each number of objects drawn again, for a round of a bootstrap.
-    pub(super) fn redrawn(falls: &[Fall], most: usize, (seed, round): (u64, u64)) -> Self {
-        let mut of_node: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
-        for (place, fall) in falls.iter().enumerate() {
-            of_node.entry(fall.objects).or_default().push(place);
-        }
-        let mut weights = vec![0.0; falls.len()];
-        for (objects, places) in &of_node {
-            let times = drawn(places.len(), seed ^ *objects as u64, round);
-            for (place, times) in places.iter().zip(times) {
-                weights[*place] = f64::from(times);
-            }
-        }
+    /// The same with [other falls](redrawn_falls).
+    pub(super) fn redrawn(falls: &[Fall], most: usize, round: (u64, u64)) -> Self {
+        let times = redrawn_falls(falls, round);
+        let weights: Vec<f64> = times.into_iter().map(f64::from).collect();
         Self::weighted(falls, &weights, most)
     }
 
@@ -97,6 +88,23 @@ impl LabelOdds {
         let nodes = self.nodes.iter().map(|(node, _)| *node).skip(1);
         nodes.min_by_key(|node| node.abs_diff(objects)).unwrap_or(0)
     }
+}
+
+/// How often each fall is drawn in a round of a bootstrap, given by its seed and number: as many as
+/// there are of each number of objects.
+pub(super) fn redrawn_falls(falls: &[Fall], (seed, round): (u64, u64)) -> Vec<u32> {
+    let mut of_node: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    for (place, fall) in falls.iter().enumerate() {
+        of_node.entry(fall.objects).or_default().push(place);
+    }
+    let mut times = vec![0; falls.len()];
+    for (objects, places) in &of_node {
+        let drawn = drawn(places.len(), seed ^ *objects as u64, round);
+        for (place, n) in places.iter().zip(drawn) {
+            times[*place] = n;
+        }
+    }
+    times
 }
 
 fn nodes_of(falls: &[Fall], weights: &[f64]) -> Vec<(usize, Moments)> {

@@ -88,18 +88,18 @@ impl MeasuredSet {
             .collect()
     }
 
-    /// The same in groups by what a picture's name stands for.
+    /// The same of each picture, in groups by what its name stands for.
     pub(super) fn grouped(
         &self,
         value: fn(&PixelMeasures) -> f64,
         group: impl Fn(&str) -> String,
-    ) -> Vec<Vec<Weighted>> {
-        let mut groups: BTreeMap<String, Vec<Weighted>> = BTreeMap::new();
+    ) -> Vec<Vec<Vec<Weighted>>> {
+        let mut groups: BTreeMap<String, Vec<Vec<Weighted>>> = BTreeMap::new();
         for (name, pixels) in &self.pixels {
             groups
                 .entry(group(name))
                 .or_default()
-                .push((value(pixels), 1.0));
+                .push(vec![(value(pixels), 1.0)]);
         }
         groups.into_values().collect()
     }

@@ -6,7 +6,7 @@
 //! best (`counts`), and the spread is that whose labels lie as the real ones do (`starts`).
 //! Ranges of camera and light are fitted by the mean and the variance of what they add to
 //! (`knobs`), measured around the labels on pictures of the recipe as on the real ones. What the
-//! pictures do not decide, by a bootstrap over them, stays as it is.
+//! pictures do not decide, by a bootstrap over them and over the recipe's own, stays as it is.
 
 mod camera;
 mod counts;

@@ -1,12 +1,13 @@
 //! Samples with weights, and how far two of them are from each other.
 
-use crate::eval::{Interval, drawn, interval};
+use crate::eval::{Interval, drawn};
 
 /// Rounds of every bootstrap.
 pub(super) const ROUNDS: u64 = 200;
 /// Share of the rounds that must agree on the sign of a statistic before it is decided: its
-/// interval of 95 % is on one side of zero.
-const SAME_SIGN: f64 = 0.975;
+/// interval of 97.5 % is on one side of zero. A key is decided by two of them, mean and variance,
+/// and is to stay in 95 of 100 cases where there is no difference.
+const SAME_SIGN: f64 = 0.9875;
 
 /// A value and how often it occurs, in any unit.
 pub(super) type Weighted = (f64, f64);
@@ -69,12 +70,32 @@ fn take_equal(values: &[Weighted], value: f64, below: &mut f64) -> usize {
     equal.inspect(|(_, weight)| *below += weight).count()
 }
 
-/// Values of groups, drawn again with their groups: `times[i]` is how often group `i` is there.
-pub(super) fn redrawn(groups: &[Vec<Weighted>], times: &[u32]) -> Vec<Weighted> {
-    let pairs = groups.iter().zip(times).filter(|(_, times)| **times > 0);
-    pairs
-        .flat_map(|(values, times)| values.iter().map(|(v, w)| (*v, w * f64::from(*times))))
-        .collect()
+/// Values of pictures or falls, which are drawn again as a whole: ascending, each with the place of
+/// its picture.
+pub(super) struct Grouped(Vec<(Weighted, usize)>);
+
+impl Grouped {
+    pub(super) fn new(pictures: &[Vec<Weighted>]) -> Self {
+        let placed = pictures.iter().enumerate();
+        let values =
+            placed.flat_map(|(place, values)| values.iter().map(move |value| (*value, place)));
+        let mut values: Vec<(Weighted, usize)> = values.collect();
+        values.sort_by(|((a, _), _), ((b, _), _)| a.total_cmp(b));
+        Self(values)
+    }
+
+    /// Those of each picture once.
+    pub(super) fn all(&self) -> Vec<Weighted> {
+        self.0.iter().map(|(value, _)| *value).collect()
+    }
+
+    /// Those of a round: `times[i]` is how often picture `i` is there.
+    pub(super) fn redrawn(&self, times: &[u32]) -> Vec<Weighted> {
+        let there = self.0.iter().filter(|(_, place)| times[*place] > 0);
+        there
+            .map(|((value, weight), place)| (*value, weight * f64::from(times[*place])))
+            .collect()
+    }
 }
 
 /// Values that all weigh the same.
@@ -82,14 +103,23 @@ pub(super) fn equally_weighted(values: &[f64]) -> Vec<Weighted> {
     values.iter().map(|value| (*value, 1.0)).collect()
 }
 
-pub(super) fn sort_by_value(mut values: Vec<Weighted>) -> Vec<Weighted> {
-    values.sort_by(|a, b| a.0.total_cmp(&b.0));
-    values
-}
-
 /// How often each of `count` pictures is drawn in every round of a bootstrap.
 pub(super) fn rounds(count: usize, seed: u64) -> impl Iterator<Item = Vec<u32>> {
     (0..ROUNDS).map(move |round| drawn(count, seed, round))
+}
+
+/// The same where first places are drawn and then the pictures of each: `counts[i]` of place `i`.
+pub(super) fn rounds_within(counts: &[usize], seed: u64) -> impl Iterator<Item = Vec<u32>> {
+    let place = move |i: usize, round| drawn(counts[i], seed.wrapping_add(1 + i as u64), round);
+    rounds(counts.len(), seed)
+        .zip(0..)
+        .map(move |(places, round)| {
+            let pictures = places.iter().enumerate().flat_map(|(i, times)| {
+                let pictures = place(i, round).into_iter();
+                pictures.map(move |n| times * n)
+            });
+            pictures.collect()
+        })
 }
 
 /// A statistic, and what it is in the rounds of a bootstrap.
@@ -112,9 +142,18 @@ impl Bootstrapped {
         same.count() as f64 >= SAME_SIGN * self.rounds.len() as f64
     }
 
-    /// Holds 95 of 100 rounds.
+    /// Without zero where it is decided.
     pub(super) fn interval(&self) -> Interval {
-        interval(self.value, self.rounds.clone())
+        let mut rounds = self.rounds.clone();
+        rounds.sort_by(f64::total_cmp);
+        let beyond = ((1.0 - SAME_SIGN) * rounds.len() as f64) as usize;
+        let low = rounds.get(beyond).copied();
+        let high = rounds.iter().rev().nth(beyond).copied();
+        Interval {
+            value: self.value,
+            low: low.unwrap_or(self.value),
+            high: high.unwrap_or(self.value),
+        }
     }
 }
 
@@ -142,9 +181,13 @@ mod tests {
 
     #[test]
     fn what_most_rounds_agree_on_is_decided() {
-        let rounds = |below: usize| (0..100).map(move |i| if i < below { -1.0 } else { 1.0 });
-        assert!(Bootstrapped::new(1.0, rounds(2)).is_decided());
-        assert!(!Bootstrapped::new(1.0, rounds(3)).is_decided());
-        assert!(!Bootstrapped::new(0.0, rounds(50)).is_decided());
+        let told = |value: f64, below: i32| {
+            let rounds = (0..200).map(|i| f64::from(i - below) + 0.5);
+            let told = Bootstrapped::new(value, rounds);
+            (told.is_decided(), told.interval().low > 0.0)
+        };
+        assert_eq!(told(1.0, 2), (true, true));
+        assert_eq!(told(1.0, 3), (false, false));
+        assert_eq!(told(0.0, 2), (false, true));
     }
 }

@@ -2,6 +2,7 @@
 
 mod duplicate_keys;
 mod mistake;
+mod no_name;
 mod overrides;
 
 pub(crate) use mistake::suggestion;
@@ -86,13 +87,13 @@ pub(crate) fn from_table_with<T: DeserializeOwned>(
 }
 
 fn from_value<T: DeserializeOwned>(value: toml::Value, outer: &str) -> Result<T> {
+    let document = value.clone();
     serde_path_to_error::deserialize(value).map_err(|e| {
         let at = format!("{outer}{}", e.path());
-        let e: toml::de::Error = e.into_inner();
         DocumentMistake {
             at: at.trim_end_matches('.').into(),
             line: None,
-            what: e.message().into(),
+            what: no_name::message::<T>(&e, || Some(document)),
         }
         .into_error()
     })
@@ -222,23 +223,25 @@ fn parse_toml_lines<T: DeserializeOwned>(
     text: &str,
     line: impl Fn(usize) -> Option<usize>,
 ) -> Result<T> {
-    let document = DeTable::parse(text).map_err(|e| toml_mistake(&e, String::new(), &line))?;
+    let document = DeTable::parse(text)
+        .map_err(|e| toml_mistake(&e, String::new(), e.message().into(), &line))?;
     if let Some((what, span)) = find_invalid_toml(&document, max_depth()) {
         return Err(DocumentMistake::in_document(line(span.start), what).into_error());
     }
     serde_path_to_error::deserialize(toml::Deserializer::from(document)).map_err(|e| {
-        let at = e.path().to_string();
-        toml_mistake(e.inner(), at, &line)
+        let what = no_name::message::<T>(&e, || text.parse().ok().map(toml::Value::Table));
+        toml_mistake(e.inner(), e.path().to_string(), what, &line)
     })
 }
 
-fn toml_mistake(e: &toml::de::Error, at: String, line: impl Fn(usize) -> Option<usize>) -> Error {
-    DocumentMistake {
-        at,
-        line: e.span().and_then(|span| line(span.start)),
-        what: e.message().into(),
-    }
-    .into_error()
+fn toml_mistake(
+    e: &toml::de::Error,
+    at: String,
+    what: String,
+    line: impl Fn(usize) -> Option<usize>,
+) -> Error {
+    let line = e.span().and_then(|span| line(span.start));
+    DocumentMistake { at, line, what }.into_error()
 }
 
 /// Parses a JSON document in memory.

@@ -30,6 +30,9 @@ pub(crate) fn generate_supervised(
     consent: &LongRunConsent,
     global: &GlobalArgs,
 ) -> anyhow::Result<DatasetCounts> {
+    if let Some(idle) = pipeline.idle_light_direction() {
+        log::warn!("{idle}");
+    }
     let display = global.start_progress("pictures");
     let watch = RunWatch::new();
     let (made, long_run) = watch.over(!consent.yes, || {
