@@ -6,6 +6,7 @@ pub(crate) use tile::DeepTile;
 
 use crate::image::Image;
 use crate::pixel::{Coverage, Depth, Film, LinearRgb, Mix, ObjectId};
+use std::borrow::Cow;
 use std::ops::Range;
 
 /// What one object contributes to one pixel, averaged over the pixel.
@@ -41,6 +42,25 @@ impl HoldoutSample {
     #[inline]
     pub(crate) fn hides(&self, depth: f64) -> bool {
         self.coverage.0 > 0.0 && depth > f64::from(self.depth.0)
+    }
+}
+
+/// What lies behind an object in a pixel, or by how much that is another one where it is displaced.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Backlight {
+    /// All the light that comes from there.
+    pub(crate) light: LinearRgb,
+    /// The plate, of which objects and shadows have taken nothing yet.
+    pub(crate) plate: LinearRgb,
+}
+
+impl Mix for Backlight {
+    #[inline(always)]
+    fn add_scaled(self, weight: f32, other: Self) -> Self {
+        Self {
+            light: self.light.add_scaled(weight, other.light),
+            plate: self.plate.add_scaled(weight, other.plate),
+        }
     }
 }
 
@@ -230,8 +250,9 @@ impl DeepImage {
             if place.hides(sample.depth.0.into()) {
                 sample.light = sample.light.scale(passes);
                 sample.visible *= passes;
-                if let Some(tint) = tile.tints.get_mut(i) {
-                    *tint = tint.scale(passes);
+                let beside = [tile.tints.get_mut(i), tile.displaced.get_mut(i)];
+                for value in beside.into_iter().flatten() {
+                    *value = value.scale(passes);
                 }
             }
         }
@@ -261,41 +282,101 @@ impl DeepImage {
     /// The same picture with more or less light from behind some objects: what `extra` says for an
     /// object at a column and row, as far as the object and all in front of it let it pass. No more
     /// is taken away than shows there, over this plate.
+    ///
+    /// What of it is the plate's is known from then on: [`displaced_plate`](Self::displaced_plate).
     pub(crate) fn with_light_from_behind(
         mut self,
         plate: Option<&Image<LinearRgb>>,
-        extra: impl Fn(ObjectId, usize, usize) -> Option<LinearRgb>,
+        extra: impl Fn(ObjectId, usize, usize) -> Option<Backlight>,
     ) -> Self {
         for y in 0..self.height {
             for x in 0..self.width {
                 let changed = |s: &DeepSample| extra(s.object, x, y).is_some();
                 if self.at(x, y).iter().any(changed) {
-                    let all = self.light_over(x, y, plate);
-                    self.add_from_behind(self.place(x, y), all, |s| extra(s.object, x, y));
+                    self.add_from_behind([x, y], plate, |s| extra(s.object, x, y));
                 }
             }
         }
         self
     }
 
-    /// Adds light to the samples of a pixel of which `all` is the light, back to front: what is
-    /// behind a sample has what samples there have gained.
+    /// Adds light to the samples of a pixel, back to front: what is behind a sample has what samples
+    /// there have gained.
     fn add_from_behind(
         &mut self,
-        (tile, samples): (usize, Range<usize>),
-        all: LinearRgb,
-        extra: impl Fn(&DeepSample) -> Option<LinearRgb>,
+        [x, y]: [usize; 2],
+        plate: Option<&Image<LinearRgb>>,
+        extra: impl Fn(&DeepSample) -> Option<Backlight>,
     ) {
+        let (all, share) = (self.light_over(x, y, plate), self.plate_share(x, y));
+        let (tile, samples) = self.place(x, y);
         let tile = &mut self.tiles[tile];
         let backdrops = tile.backdrops(samples.clone(), all);
+        tile.displaced.resize(tile.samples.len(), LinearRgb::BLACK);
         let mut gained = LinearRgb::BLACK;
-        for (sample, (behind, passes)) in tile.samples[samples].iter_mut().zip(backdrops).rev() {
+        for (i, (behind, passes)) in samples.zip(backdrops).rev() {
+            let sample = &mut tile.samples[i];
             if let Some(extra) = extra(sample) {
-                let change = at_least_none(behind + gained, extra * passes);
+                let change = at_least_none(behind + gained, extra.light * passes);
                 sample.light = sample.light + change;
                 gained = gained + change;
+                tile.displaced[i] = extra.plate * share;
             }
         }
+    }
+
+    /// What objects and their shadows leave of the plate at a pixel.
+    fn plate_share(&self, x: usize, y: usize) -> LinearRgb {
+        self.flat(x, y).transmittance() * self.shadow[(x, y)]
+    }
+
+    /// A plate as it is seen past the objects and through them: displaced where they bend light.
+    ///
+    /// Under [`undisplaced`](Self::undisplaced) it gives the same picture as the plate gives under
+    /// this one.
+    pub(crate) fn displaced_plate<'a>(
+        &self,
+        plate: &'a Image<LinearRgb>,
+    ) -> Cow<'a, Image<LinearRgb>> {
+        if !self.displaces() {
+            return Cow::Borrowed(plate);
+        }
+        Cow::Owned(Image::from_fn(self.width, self.height, |x, y| {
+            self.displaced_plate_at(x, y, plate)
+        }))
+    }
+
+    /// The same at a pixel.
+    pub(crate) fn displaced_plate_at(
+        &self,
+        x: usize,
+        y: usize,
+        plate: &Image<LinearRgb>,
+    ) -> LinearRgb {
+        let (tile, samples) = self.place(x, y);
+        let displaced = self.tiles[tile].displaced.get(samples).unwrap_or_default();
+        let change = displaced.iter().fold(LinearRgb::BLACK, |sum, &d| sum + d);
+        if change.is_black() {
+            return plate[(x, y)];
+        }
+        let seen = plate[(x, y)] + ratio(change, self.plate_share(x, y));
+        seen.map(|v| v.max(0.0))
+    }
+
+    /// The same picture without what of the plate is seen displaced; none where nothing is.
+    ///
+    /// What lens and shutter make of objects is made of this, since the plate is a photo and has
+    /// their blur already.
+    pub(crate) fn undisplaced(&self) -> Option<Self> {
+        self.displaces().then(|| {
+            let mut straight = self.clone();
+            straight.tiles.iter_mut().for_each(DeepTile::take_displaced);
+            straight
+        })
+    }
+
+    fn displaces(&self) -> bool {
+        self.tiles.iter().any(|tile| !tile.displaced.is_empty())
     }
 
     /// The factor on the plate, per channel.
@@ -411,6 +492,44 @@ mod tests {
             let expected = coverage * at_the_place + (1.0 - coverage) * past_it;
             assert!((found.g - expected).abs() < 1e-6, "{} {expected}", found.g);
         }
+    }
+
+    #[test]
+    fn what_is_displaced_goes_from_the_light_to_the_plate() {
+        let grey = |value: f32| Image::filled(1, 1, LinearRgb::grey(value));
+        let (plate, shadow) = (grey(0.6), 0.8);
+        let samples = vec![
+            grey_sample(1.0, 0.05, 0.5, 0.5),
+            grey_sample(3.0, 0.1, 0.4, 0.2),
+        ];
+        let straight = DeepImage::from_pixels(grey(shadow), [samples]);
+        assert!(straight.undisplaced().is_none());
+        // Seen through the first object the plate is darker by 0.4, and so is all there by 0.2.
+        let change = Backlight {
+            light: LinearRgb::grey(-0.2),
+            plate: LinearRgb::grey(-0.4),
+        };
+        let bent = straight.with_light_from_behind(Some(&plate), |object, _, _| {
+            (object == ObjectId(1)).then_some(change)
+        });
+        for (coverage, depth) in [(0.0, 0.0), (0.25, 0.5), (0.25, 2.0), (1.0, 0.5)] {
+            let place = HoldoutSample {
+                coverage: Coverage(coverage),
+                depth: Depth(depth),
+            };
+            let held = bent.clone().held_out(Some(&Image::filled(1, 1, place)));
+            let expected = held.light_over(0, 0, Some(&plate)).g;
+            let displaced = held.displaced_plate(&plate);
+            let found = held.undisplaced().unwrap();
+            let found = found.light_over(0, 0, Some(&displaced)).g;
+            assert!((found - expected).abs() < 1e-6, "{found} {expected}");
+            let share = if coverage < 1.0 { -0.4 } else { 0.0 };
+            let seen = displaced[(0, 0)].g - 0.6;
+            assert!(coverage == 0.25 || (seen - share).abs() < 1e-6, "{seen}");
+        }
+        let own = bent.undisplaced().unwrap().at(0, 0)[0].light.g;
+        let expected = 0.05 - 0.5 * 0.2 + 0.3 * shadow * 0.4;
+        assert!((own - expected).abs() < 1e-6, "{own} {expected}");
     }
 
     #[test]

@@ -1,12 +1,13 @@
 //! What objects and their shadows do to a plate.
 
-use crate::composite::frame::frame;
+use crate::composite::frame::{frame, over, over_nothing};
 use crate::deep::DeepImage;
 use crate::filter::gaussian_blur;
 use crate::image::Image;
 use crate::pixel::{Film, LinearRgb, PremulRgba};
 
-/// What the objects of a picture and their shadows do to the plate.
+/// What the objects of a picture and their shadows do to the plate as it is seen, displaced where
+/// objects bend light.
 pub(super) enum Effect<'a> {
     /// What deep samples do.
     Still(&'a DeepImage),
@@ -19,11 +20,8 @@ impl Effect<'_> {
     pub(super) fn frame(&self, plate: Option<&Image<LinearRgb>>) -> Image<PremulRgba> {
         match (self, plate) {
             (Self::Still(deep), _) => frame(deep, plate),
-            (Self::Moved(films), Some(plate)) => over_plate(films, plate),
-            (Self::Moved(films), None) => films.map(|film| {
-                let color = film.color.map(|c| c.max(0.0));
-                Film { color, ..film }.to_rgba()
-            }),
+            (Self::Moved(films), Some(plate)) => films.zip_map(plate, over),
+            (Self::Moved(films), None) => films.map(over_nothing),
         }
     }
 
@@ -37,7 +35,7 @@ impl Effect<'_> {
             Self::Still(deep) => gaussian_blur(&films(deep), sigma_px),
             Self::Moved(films) => gaussian_blur(films, sigma_px),
         };
-        over_plate(&soft, plate)
+        soft.zip_map(plate, over)
     }
 
     /// The factor on the plate at a pixel.
@@ -54,20 +52,5 @@ impl Effect<'_> {
 fn films(deep: &DeepImage) -> Image<Film> {
     Image::from_fn(deep.width(), deep.height(), |x, y| {
         deep.flat(x, y).shaded(deep.shadow()[(x, y)])
-    })
-}
-
-fn over_plate(films: &Image<Film>, plate: &Image<LinearRgb>) -> Image<PremulRgba> {
-    films.zip_map(plate, |film, behind| {
-        let seen = film.over_color(behind);
-        let LinearRgb { r, g, b } = film.color;
-        // The light that refraction takes away is soft now, and the plate is not.
-        let taken = r.min(g).min(b) < 0.0;
-        let left = if taken {
-            seen.map(|v| v.max(0.0))
-        } else {
-            seen
-        };
-        left.opaque()
     })
 }

@@ -1,7 +1,8 @@
 //! A shot as lens and shutter show it, and as labels take it.
 //!
 //! What of the place stands in front belongs to the photo, which has its own blur: it hides objects
-//! when they are out of focus and moved, and not before.
+//! when they are out of focus and moved, and not before. What of the photo is seen displaced, through
+//! objects that bend light, stays as sharp as the rest of it.
 
 use crate::composite::defocus::defocus;
 use crate::composite::effect::Effect;
@@ -9,15 +10,16 @@ use crate::composite::finish::finish_exposed;
 use crate::composite::motion::moved;
 use crate::deep::DeepImage;
 use crate::image::Image;
-use crate::pixel::{Film, PremulRgba};
+use crate::pixel::{Film, LinearRgb, PremulRgba};
 use crate::scene::{PostProcess, Shot};
 use std::borrow::Cow;
 
 /// The deep samples of a shot behind what of the place stands in front.
 pub(crate) struct Exposed {
     deep: DeepImage,
-    /// Out of focus; none where all is sharp.
-    soft: Option<DeepImage>,
+    /// Out of focus, and without what is the plate's; none where all is sharp and nothing bends
+    /// light.
+    seen: Option<DeepImage>,
     /// What they do to the plate in the mean while the shutter is open; none where nothing moves.
     moved: Option<Image<Film>>,
 }
@@ -25,15 +27,17 @@ pub(crate) struct Exposed {
 impl Exposed {
     /// Of samples that nothing of the place hides yet.
     pub(crate) fn new(free: DeepImage, shot: &Shot) -> Self {
-        let soft = match defocus(&free, shot) {
+        let straight = free.undisplaced();
+        let soft = match defocus(straight.as_ref().unwrap_or(&free), shot) {
             Cow::Owned(soft) => Some(soft),
             Cow::Borrowed(_) => None,
         };
-        let moved = moved(soft.as_ref().unwrap_or(&free), shot);
+        let seen = soft.or(straight);
+        let moved = moved(seen.as_ref().unwrap_or(&free), shot);
         let holdout = shot.holdout.as_deref();
         Self {
             deep: free.held_out(holdout),
-            soft: soft.map(|soft| soft.held_out(holdout)),
+            seen: seen.map(|seen| seen.held_out(holdout)),
             moved,
         }
     }
@@ -43,12 +47,14 @@ impl Exposed {
     /// # Panics
     /// When the plate's size is not the picture's.
     pub(crate) fn frame(&self, shot: &Shot) -> Image<PremulRgba> {
-        self.effect().frame(shot.plate.as_deref())
+        self.effect().frame(self.plate(shot).as_deref())
     }
 
     /// The same, finished, with objects blended into the plate where the shot's edges ask for it.
     pub(crate) fn finished(&self, shot: &Shot, finish: &PostProcess) -> Image<PremulRgba> {
-        finish_exposed(&self.effect(), self.seen(), shot, finish)
+        let plate = self.plate(shot);
+        let (effect, seen) = (self.effect(), self.seen());
+        finish_exposed(&effect, seen, plate.as_deref(), shot.edges, finish)
     }
 
     /// What labels are made of: sharp and at rest.
@@ -57,7 +63,13 @@ impl Exposed {
     }
 
     fn seen(&self) -> &DeepImage {
-        self.soft.as_ref().unwrap_or(&self.deep)
+        self.seen.as_ref().unwrap_or(&self.deep)
+    }
+
+    /// A shot's plate as it is seen.
+    fn plate<'a>(&self, shot: &'a Shot) -> Option<Cow<'a, Image<LinearRgb>>> {
+        let plate = shot.plate.as_deref();
+        plate.map(|plate| self.deep.displaced_plate(plate))
     }
 
     fn effect(&self) -> Effect<'_> {

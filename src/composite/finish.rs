@@ -7,7 +7,7 @@ use crate::deep::DeepImage;
 use crate::filter::{gaussian_blur, sample_cubic_clamped};
 use crate::image::Image;
 use crate::pixel::{LinearRgb, Mix, PremulRgba};
-use crate::scene::{Blur, CameraNoise, EdgeTreatment, Noise, PostProcess, Shot};
+use crate::scene::{Blur, CameraNoise, EdgeTreatment, Noise, PostProcess};
 use crate::work::{self, Kind};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::SplitMix64;
@@ -34,22 +34,24 @@ pub fn finish(
     plate: Option<&Image<LinearRgb>>,
     finish: &PostProcess,
 ) -> Image<PremulRgba> {
-    let effect = Effect::Still(deep);
-    let soft = blurred(frame, &effect, plate, finish);
-    graded(soft, &effect, plate, finish)
+    let straight = deep.undisplaced();
+    let effect = Effect::Still(straight.as_ref().unwrap_or(deep));
+    let plate = plate.map(|plate| deep.displaced_plate(plate));
+    let soft = blurred(frame, &effect, plate.as_deref(), finish);
+    graded(soft, &effect, plate.as_deref(), finish)
 }
 
-/// The finished frame of a shot whose objects do this to its plate, with objects blended into it
-/// where its edges ask for it, which is after their blur and before all noise.
+/// The finished frame of objects that do this to the plate as it is seen, blended into it where
+/// `edges` asks for it, which is after their blur and before all noise.
 pub(super) fn finish_exposed(
     effect: &Effect<'_>,
     deep: &DeepImage,
-    shot: &Shot,
+    plate: Option<&Image<LinearRgb>>,
+    edges: EdgeTreatment,
     finish: &PostProcess,
 ) -> Image<PremulRgba> {
-    let plate = shot.plate.as_deref();
     let soft = blurred(effect.frame(plate), effect, plate, finish);
-    let blended = if shot.edges == EdgeTreatment::Poisson && plate.is_some() {
+    let blended = if edges == EdgeTreatment::Poisson && plate.is_some() {
         blend(&soft, deep)
     } else {
         soft

@@ -16,14 +16,40 @@ use crate::pixel::{Film, LinearRgb, PremulRgba};
 pub fn frame(deep: &DeepImage, plate: Option<&Image<LinearRgb>>) -> Image<PremulRgba> {
     let (width, height) = (deep.width(), deep.height());
     let Some(plate) = plate else {
-        return Image::from_fn(width, height, |x, y| deep.flat(x, y).to_rgba());
+        return Image::from_fn(width, height, |x, y| over_nothing(deep.flat(x, y)));
     };
     let size = (width, height);
     assert_eq!(plate.size(), size, "plate and picture differ in size");
     Image::from_fn(width, height, |x, y| {
         let behind = deep.shadow()[(x, y)] * plate[(x, y)];
-        deep.flat(x, y).over_color(behind).opaque()
+        over(deep.flat(x, y), behind)
     })
+}
+
+/// A film over what is behind it, opaque.
+pub(super) fn over(film: Film, behind: LinearRgb) -> PremulRgba {
+    let seen = film.over_color(behind);
+    let LinearRgb { r, g, b } = film.color;
+    let is_short_of_light = r.min(g).min(b) < 0.0;
+    // Any other plate keeps its own bits.
+    let left = if is_short_of_light {
+        at_least_none(seen)
+    } else {
+        seen
+    };
+    left.opaque()
+}
+
+/// A film alone.
+pub(super) fn over_nothing(film: Film) -> PremulRgba {
+    let color = at_least_none(film.color);
+    Film { color, ..film }.to_rgba()
+}
+
+/// Light without what is below 0: refraction takes away light of what lies behind an object, and lens
+/// and shutter may bring less of it there.
+fn at_least_none(light: LinearRgb) -> LinearRgb {
+    light.map(|v| if v < 0.0 { 0.0 } else { v })
 }
 
 /// Folds deep samples into a picture of their light and of what they let pass, per channel;

@@ -434,7 +434,7 @@ impl Pipeline {
         let mut plate = None;
         if let Some(place) = place {
             let environment = scene.environment_map(panorama.clone())?;
-            let detailed = place.plate_for_zoom(zoom_of(&scene))?;
+            let detailed = place.plate_for_zoom(scene.zoom_used())?;
             // By the pixels that are seen, which may be more than the picture has.
             scene = detailed.measured().grained(scene);
             scene = light::match_plate(scene, place.plate()?.measured(), environment.as_ref());
@@ -506,14 +506,6 @@ impl Pipeline {
 
     fn background_names(&self) -> Vec<&str> {
         self.backgrounds.iter().map(|b| b.name.as_str()).collect()
-    }
-}
-
-/// How many times larger a scene shows its photo.
-fn zoom_of(scene: &Scene) -> f64 {
-    match &scene.camera {
-        CameraSource::Known(camera) => scene.view.zoom_used(camera),
-        CameraSource::Rectangle { .. } => 1.0,
     }
 }
 

@@ -14,6 +14,9 @@ pub(crate) struct DeepTile {
     pub(super) samples: Vec<DeepSample>,
     /// One for each sample where there is film; else empty.
     pub(super) tints: Vec<LinearRgb>,
+    /// What of each sample's light is the plate's, seen displaced, less what of the plate is seen
+    /// there straight on; empty where no object bends light.
+    pub(super) displaced: Vec<LinearRgb>,
 }
 
 impl DeepTile {
@@ -32,6 +35,7 @@ impl DeepTile {
             starts,
             samples,
             tints: Vec::new(),
+            displaced: Vec::new(),
         }
     }
 
@@ -61,6 +65,7 @@ impl DeepTile {
             starts: starts_from_ends(ends),
             samples,
             tints: ordered_tints,
+            displaced: Vec::new(),
         }
     }
 
@@ -77,6 +82,14 @@ impl DeepTile {
         }
         let i = y * self.width + x;
         self.starts[i] as usize..self.starts[i + 1] as usize
+    }
+
+    /// Takes what of the plate is seen displaced out of the samples' light.
+    pub(super) fn take_displaced(&mut self) {
+        let displaced = std::mem::take(&mut self.displaced);
+        for (sample, displaced) in self.samples.iter_mut().zip(displaced) {
+            sample.light = sample.light.add_scaled(-1.0, displaced);
+        }
     }
 
     /// Of each sample of a pixel of which `all` is the light: the light of what is behind it, and

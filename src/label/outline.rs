@@ -146,7 +146,7 @@ fn bbox_of(rect: Rect<f64>) -> BBox {
 }
 
 fn in_camera(card: &Card, camera: &Camera) -> Vec<Vector3<f64>> {
-    card.outline()
+    card.outline(&camera.center())
         .into_iter()
         .map(|point| (camera.camera_from_world * point).coords)
         .collect()

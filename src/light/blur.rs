@@ -22,6 +22,9 @@ const FLAT_SHARE: f32 = 0.12;
 const TURN_SHARE: f32 = -0.1;
 /// Fewer edges say nothing.
 const MIN_EDGES: usize = 20;
+/// Longest side of the squares that a picture is looked at in, pixels: in photos of 640 x 480 they
+/// show blurs of up to 4 pixels.
+const MAX_SIDE_PX: usize = 4;
 /// Variance that this method finds in edges that nothing but their pixels blurs, px^2; measured
 /// on rectangles drawn at all angles, pixels averaged over 8 x 8 points.
 const PIXEL_VARIANCE: f64 = 0.347;
@@ -34,20 +37,49 @@ const BLUR_RATIO: f64 = 1.05;
 /// # Method
 /// Slopes before and after another blur (S. Zhuo and T. Sim, "Defocus map estimation from a single
 /// image", 2011), at the steepest edges of the picture that stand alone; the lower quartile, since
-/// things have soft edges of their own.
+/// things have soft edges of their own. Where too few stand alone they are too soft for their
+/// pixels, and are looked at in squares of 2, 3 or 4 pixels.
 pub fn plate_blur(plate: &Image<LinearRgb>) -> Blur {
-    let green = plate.map(|p| p.g);
-    let soft = gaussian_blur(&green, ADDED_SIGMA_PX);
-    let sigmas: Vec<f32> = Slopes(&green)
-        .edges()
-        .filter_map(|edge| sigma_at(edge, &Slopes(&soft)))
-        .collect();
+    let found = (1..=MAX_SIDE_PX).find_map(|side| blur_in_squares(plate, side));
+    found.map_or(Blur::NONE, Blur::Known)
+}
+
+/// The blur, pixels, that squares of so many pixels' side show; none with too few edges.
+fn blur_in_squares(plate: &Image<LinearRgb>, side: usize) -> Option<f64> {
+    let sigmas = sigmas_in_squares(plate, side);
     if sigmas.len() < MIN_EDGES {
-        return Blur::NONE;
+        return None;
     }
-    let found = quantile(sigmas, 0.25, f32::total_cmp).map_or(0.0, f64::from);
+    let found = f64::from(quantile(sigmas, 0.25, f32::total_cmp)?);
     let variance = (found * found - PIXEL_VARIANCE).max(0.0);
-    Blur::Known(BLUR_RATIO * variance.sqrt())
+    Some(side as f64 * BLUR_RATIO * variance.sqrt())
+}
+
+/// Those of the edges in squares of so many pixels' side, laid in every way that there is.
+fn sigmas_in_squares(plate: &Image<LinearRgb>, side: usize) -> Vec<f32> {
+    let ways = (0..side * side).map(|i| [i % side, i / side]);
+    ways.flat_map(|first| edge_sigmas(&green_of_squares(plate, side, first)))
+        .collect()
+}
+
+/// The mean green of squares of so many pixels' side, the first one at `left`, `top`.
+fn green_of_squares(plate: &Image<LinearRgb>, side: usize, [left, top]: [usize; 2]) -> Image<f32> {
+    let columns = plate.width().saturating_sub(left) / side;
+    let rows = plate.height().saturating_sub(top) / side;
+    Image::from_fn(columns, rows, |x, y| {
+        let pixel = |i: usize| plate[(left + side * x + i % side, top + side * y + i / side)];
+        let sum: f32 = (0..side * side).map(|i| pixel(i).g).sum();
+        sum / (side * side) as f32
+    })
+}
+
+/// Standard deviations of the steep edges that stand alone, pixels.
+fn edge_sigmas(green: &Image<f32>) -> Vec<f32> {
+    let (sharp, soft) = (Slopes(green), gaussian_blur(green, ADDED_SIGMA_PX));
+    let edges = sharp.edges();
+    edges
+        .filter_map(|edge| sigma_at(edge, &Slopes(&soft)))
+        .collect()
 }
 
 /// Standard deviation of an edge, pixels, from how much less steep it became.
@@ -125,12 +157,12 @@ impl Slopes<'_> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::scene::Draws;
 
     /// Half planes at all angles, seen through pixels that are squares, in a Gaussian's blur.
-    fn edges(sigma_px: f32) -> Image<LinearRgb> {
+    pub(in crate::light) fn edges(sigma_px: f32) -> Image<LinearRgb> {
         const POINTS: usize = 8;
         let cell = 40;
         let fine = Image::from_fn(160 * POINTS, 120 * POINTS, |x, y| {
@@ -156,7 +188,7 @@ mod tests {
 
     #[test]
     fn the_blur_that_was_put_in_is_found() {
-        for sigma_px in [0.3, 0.5, 0.8, 1.2] {
+        for sigma_px in [0.3, 0.5, 0.8, 1.2, 2.0, 3.0] {
             let Blur::Known(found) = plate_blur(&edges(sigma_px)) else {
                 panic!("nothing found at {sigma_px}")
             };
@@ -170,8 +202,10 @@ mod tests {
 
     #[test]
     fn too_little_to_see_is_no_blur() {
+        let grain = |i: u64| LinearRgb::grey(Draws::new(1, i).unit("grain") as f32);
         for plate in [
             Image::new(2, 2),
+            Image::from_fn(160, 120, |x, y| grain((y * 160 + x) as u64)),
             Image::filled(60, 60, LinearRgb::grey(0.4)),
             Image::filled(60, 60, LinearRgb::grey(f32::NAN)),
         ] {

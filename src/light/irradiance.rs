@@ -1,7 +1,8 @@
 //! What an area light does where nothing is in its way.
 
 use crate::geom::{Point3, Vector3};
-use crate::light::area::{LightFrame, frame, radiance, side_lengths};
+use crate::light::area::{LightFrame, face_area, frame, radiance, side_lengths};
+use crate::light::nodes::geometry_term;
 use crate::light::polygon::polygon_irradiance;
 use crate::pixel::LinearRgb;
 use crate::scene::{AreaLight, EnvironmentMap, LightShape, LightTint, Scene};
@@ -9,22 +10,34 @@ use std::f64::consts::{PI, TAU};
 
 /// Corners of the polygon that replaces an ellipse.
 const ELLIPSE_CORNERS: usize = 256;
+/// A light whose sides are below this share of its distance is a point: a form factor so small
+/// would be lost in the rounding of its polygon's edges.
+const POINT_SHARE: f64 = 1e-4;
 
 /// Irradiance at `point` on a surface of unit `normal`, where nothing is in the way.
 ///
 /// # Method
 /// Closed form ([`polygon_irradiance`]); ellipses are polygons of 256 corners and of their area.
 pub fn irradiance(light: &AreaLight, point: Point3<f64>, normal: Vector3<f64>) -> LinearRgb {
+    radiance(light).scale(unit_irradiance(light, point, normal) as f32)
+}
+
+/// The same by unit radiance.
+pub(crate) fn unit_irradiance(light: &AreaLight, point: Point3<f64>, normal: Vector3<f64>) -> f64 {
     let frame = frame(light);
-    if frame.normal.dot(&(point - frame.center)) <= 0.0 {
-        return LinearRgb::BLACK;
+    let way = frame.center - point;
+    if frame.normal.dot(&way) >= 0.0 {
+        return 0.0;
     }
     let size = side_lengths(light);
+    if size[0].max(size[1]) < POINT_SHARE * way.norm() {
+        return geometry_term(&way, &frame.normal, &normal) * face_area(light);
+    }
     let corners = match light.shape {
         LightShape::Rectangle => frame.corners(size).to_vec(),
         LightShape::Ellipse => ellipse_rim(&frame, size),
     };
-    radiance(light).scale(polygon_irradiance(&corners, point, normal) as f32)
+    polygon_irradiance(&corners, point, normal)
 }
 
 /// Luminance of a white card on a point of the surface, with nothing in the way of the light; the
@@ -82,5 +95,20 @@ mod tests {
         };
         let e = irradiance(&light, Point3::origin(), Vector3::z());
         assert!((e.g - 10.0 / PI as f32 / 100.0).abs() < 1e-5);
+    }
+
+    #[test]
+    fn a_speck_far_away_is_its_power_over_distance_squared() {
+        for shape in [LightShape::Rectangle, LightShape::Ellipse] {
+            let light = AreaLight {
+                shape,
+                position: [60.0, 0.0, 80.0],
+                size: [1e-5; 2],
+                ..square()
+            };
+            let e = irradiance(&light, Point3::origin(), Vector3::z());
+            let expected = 0.8 * 10.0 / PI / 1e4;
+            assert!((f64::from(e.g) / expected - 1.0).abs() < 1e-5, "{shape:?}");
+        }
     }
 }

@@ -9,6 +9,9 @@ use crate::pixel::LinearRgb;
 use crate::scene::{Blur, CameraSource, Noise, Scene};
 use std::sync::OnceLock;
 
+/// As much as a finish may have.
+const MAX_BLUR_PX: f64 = 100.0;
+
 /// What scenes ask of one plate, each measured when a scene first asks for it.
 #[derive(Debug, Default)]
 pub(crate) struct PlateMeasures {
@@ -80,14 +83,24 @@ impl<'a> MeasuredPlate<'a> {
     /// Turns [`Blur::MatchPlate`] and [`Noise::MatchPlate`] of a scene's finish into those of the
     /// plate; any other scene comes back as it is.
     pub(crate) fn grained(&self, mut scene: Scene) -> Scene {
-        let finish = &mut scene.finish;
-        if finish.blur_px == Blur::MatchPlate {
-            finish.blur_px = self.known(|kept| &kept.blur, plate_blur);
+        if scene.finish.blur_px == Blur::MatchPlate {
+            scene.finish.blur_px = self.shown_blur(&scene);
         }
-        if finish.noise == Noise::MatchPlate {
-            finish.noise = self.known(|kept| &kept.noise, plate_noise);
+        if scene.finish.noise == Noise::MatchPlate {
+            scene.finish.noise = self.known(|kept| &kept.noise, plate_noise);
         }
         scene
+    }
+
+    /// Its blur in the pixels of a scene's picture.
+    fn shown_blur(&self, scene: &Scene) -> Blur {
+        match self.known(|kept| &kept.blur, plate_blur) {
+            Blur::Known(sigma_px) if sigma_px > 0.0 => {
+                let shown_px = sigma_px * scene.plate_px(self.image);
+                Blur::Known(shown_px.min(MAX_BLUR_PX))
+            }
+            none => none,
+        }
     }
 
     fn known<T: Copy>(
@@ -109,6 +122,7 @@ impl<'a> MeasuredPlate<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::light::blur::tests::edges;
     use crate::light::match_plate;
     use crate::light::surface::tests::scene;
     use crate::scene::{Draws, Exposure, LightTint};
@@ -142,6 +156,22 @@ mod tests {
         let other = Image::new(40, 30);
         let again = match_plate(open_scene(), MeasuredPlate::new(&other, &measures), None);
         assert_eq!(again, first);
+    }
+
+    #[test]
+    fn blur_grows_with_the_plate() {
+        let plate = edges(0.8);
+        let Blur::Known(of_plate) = plate_blur(&plate) else {
+            panic!("nothing found")
+        };
+        let blur = |zoom: f64| {
+            let mut scene = open_scene();
+            scene.view.zoom = zoom;
+            match_plate(scene, &plate, None).finish.blur_px
+        };
+        // The plate has four pixels for one of the picture.
+        let expected = [0.25, 0.5].map(|shown| Blur::Known(shown * of_plate));
+        assert_eq!([1.0, 2.0].map(blur), expected);
     }
 
     #[test]

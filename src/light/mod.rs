@@ -50,6 +50,7 @@ pub use expose::expose;
 pub use expose::match_plate;
 #[doc(hidden)]
 pub use irradiance::irradiance;
+pub(crate) use irradiance::unit_irradiance;
 #[doc(hidden)]
 pub use measured_plate::MeasuredPlate;
 pub(crate) use measured_plate::PlateMeasures;

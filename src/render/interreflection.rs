@@ -6,20 +6,21 @@ use crate::filter::{gaussian_blur, sample_bilinear};
 use crate::geom::Vector3;
 use crate::image::Image;
 use crate::pixel::{Film, LinearRgb};
+use crate::quantile::median;
 use crate::render::card_texel::card_texel;
 use crate::render::view::{
     CameraView, ProjectedPlane, ScenePlane, is_on_texture, pixel_center, visible_planes,
 };
 use crate::scene::{Card, Shot};
 
-/// How far light spreads on its way to and fro: the order of a pile's height; 4 to 16 mm do as
-/// well.
-const BOUNCE_SPREAD_M: f64 = 0.008;
+/// How far light spreads on its way to and fro, as a share of the typical card's longer side: 8 mm
+/// for 200 mm, the order of a pile's height; half and twice that do as well.
+const BOUNCE_SPREAD_RATIO: f64 = 0.04;
 
-/// Distance of the grid's points on the surface.
-const GRID_STEP_M: f64 = 0.002;
+/// Points of the grid on the surface in a spread.
+const GRID_STEPS_PER_SPREAD: f64 = 4.0;
 
-/// Most steps along a side; longer ones for larger scenes.
+/// Most steps along a side; longer ones where cards lie far apart.
 const MAX_GRID_STEPS: f64 = 1024.0;
 
 /// A white surface under a white card would glow forever.
@@ -87,9 +88,10 @@ impl BounceMap {
     /// None without cards.
     fn new(shot: &Shot) -> Option<Self> {
         let cards = visible_planes(shot);
-        let (left, width) = extent(&cards, 0)?;
-        let (bottom, height) = extent(&cards, 1)?;
-        let step = GRID_STEP_M.max(width.max(height) / MAX_GRID_STEPS);
+        let spread = BOUNCE_SPREAD_RATIO * typical_length(&cards)?;
+        let (left, width) = extent(&cards, 0, spread)?;
+        let (bottom, height) = extent(&cards, 1, spread)?;
+        let step = (spread / GRID_STEPS_PER_SPREAD).max(width.max(height) / MAX_GRID_STEPS);
         let [columns, rows] = [width, height].map(|length| (length / step) as usize + 1);
         let back = Image::from_fn(columns, rows, |i, j| {
             let (x, y) = (left + i as f64 * step, bottom + j as f64 * step);
@@ -98,7 +100,7 @@ impl BounceMap {
         Some(Self {
             corner: [left, bottom],
             step,
-            back: blurred(&back, step),
+            back: gaussian_blur(&back, (spread / step) as f32),
         })
     }
 
@@ -108,19 +110,22 @@ impl BounceMap {
     }
 }
 
-fn blurred(back: &Image<LinearRgb>, step: f64) -> Image<LinearRgb> {
-    let spread = (BOUNCE_SPREAD_M / step) as f32;
-    gaussian_blur(back, spread)
+/// Median of the longer sides of cards, metres; none without cards.
+fn typical_length(cards: &[(&Card, ScenePlane)]) -> Option<f64> {
+    let longer = cards
+        .iter()
+        .map(|(_, plane)| plane.size[0].max(plane.size[1]));
+    median(longer, f64::total_cmp)
 }
 
 /// Low end and length of cards along an axis, with room for the blur.
-fn extent(cards: &[(&Card, ScenePlane)], axis: usize) -> Option<(f64, f64)> {
+fn extent(cards: &[(&Card, ScenePlane)], axis: usize, spread: f64) -> Option<(f64, f64)> {
     let ends = cards
         .iter()
         .flat_map(|(_, plane)| plane.corners())
         .map(|corner| corner[axis]);
-    let low = ends.clone().reduce(f64::min)? - 3.0 * BOUNCE_SPREAD_M;
-    let high = ends.reduce(f64::max)? + 3.0 * BOUNCE_SPREAD_M;
+    let low = ends.clone().reduce(f64::min)? - 3.0 * spread;
+    let high = ends.reduce(f64::max)? + 3.0 * spread;
     Some((low, high - low))
 }
 

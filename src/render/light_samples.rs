@@ -1,6 +1,6 @@
 //! Where light comes from, as a list of points and directions.
 
-use crate::geom::Vector3;
+use crate::geom::{Point3, Vector3};
 use crate::light;
 use crate::pixel::{LinearRgb, Mix};
 use crate::render::RenderOptions;
@@ -10,6 +10,8 @@ use std::f64::consts::PI;
 
 /// Pieces of the sky narrower than this throw shadows too sharp for the coarser lattice, radians.
 const SMALL_WIDTH_RAD: f64 = 0.15;
+/// Nearer to a light's face than this, metres, no factor holds for all of a receiver.
+const NEAR_FACE_M: f64 = 0.1;
 
 /// A point (`at.w = 1`) or a direction (`at.w = 0`) that light comes from, in homogeneous
 /// coordinates.
@@ -81,10 +83,9 @@ impl LightSamples {
         point: &Vector3<f64>,
         normal: &Vector3<f64>,
     ) -> Vec<LightGroup> {
-        let (count, point) = (options.light_samples, (*point).into());
         let lights = shot.lights.iter();
         lights
-            .map(|l| LightGroup::area_light(l, light::nodes_above(l, count, point, normal)))
+            .map(|l| LightGroup::face_above(l, options.light_samples, point, normal))
             .collect()
     }
 
@@ -133,6 +134,48 @@ impl LightSamples {
 }
 
 impl LightGroup {
+    /// The part of a light that is above the plane through `point`, as bright there as in closed
+    /// form: the few nodes of a large light near by add up to several times too much or too little.
+    fn face_above(
+        light: &AreaLight,
+        count: usize,
+        point: &Vector3<f64>,
+        normal: &Vector3<f64>,
+    ) -> Self {
+        let nodes = light::nodes_above(light, count, Point3::from(*point), normal);
+        let group = Self::area_light(light, nodes);
+        let factor = group.closed_form_ratio(light, point, normal);
+        Self {
+            radiance: group.radiance.scale(factor as f32),
+            ..group
+        }
+    }
+
+    /// Irradiance at a point by its light in closed form over that by its samples; 1 where there is
+    /// none, or too close to the light.
+    fn closed_form_ratio(
+        &self,
+        light: &AreaLight,
+        point: &Vector3<f64>,
+        normal: &Vector3<f64>,
+    ) -> f64 {
+        let frame = light::frame(light);
+        let exact = light::unit_irradiance(light, Point3::from(*point), *normal);
+        let sum = self.unit_irradiance(point, normal);
+        let is_clear = frame.normal.dot(&(point - frame.center.coords)) > NEAR_FACE_M;
+        if is_clear && exact > 0.0 && sum > 0.0 {
+            exact / sum
+        } else {
+            1.0
+        }
+    }
+
+    /// Irradiance at a point with unit normal by unit radiance.
+    fn unit_irradiance(&self, point: &Vector3<f64>, normal: &Vector3<f64>) -> f64 {
+        let samples = self.samples.iter();
+        samples.map(|sample| sample.irradiance(point, normal)).sum()
+    }
+
     fn area_light(light: &AreaLight, nodes: Vec<light::Node>) -> Self {
         let normal = light::frame(light).normal;
         let samples = nodes
@@ -236,6 +279,65 @@ impl LightSample {
             LightSampleKind::Face { normal: face, area } => {
                 light::geometry_term(&(self.at.xyz() - point), &face, normal) * area
             }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::tilted_camera;
+    use crate::quality::Quality;
+    use crate::scene::LightShape;
+
+    /// A disk of 10 W that faces the origin from right above it.
+    fn disk(size: f64, height: f64) -> AreaLight {
+        AreaLight {
+            shape: LightShape::Ellipse,
+            position: [0.0, 0.0, height],
+            target: [0.0; 3],
+            size: [size; 2],
+            power: 10.0,
+            color: LinearRgb::WHITE,
+        }
+    }
+
+    /// What lights the origin of a plane with this normal.
+    fn face(light: AreaLight, quality: Quality, normal: &Vector3<f64>) -> LightGroup {
+        let shot = Shot::new(tilted_camera()).with_light(light);
+        let options = RenderOptions::from(quality);
+        LightSamples::faces_above(&shot, &options, &Vector3::zeros(), normal).remove(0)
+    }
+
+    #[test]
+    fn a_light_of_any_size_is_as_bright_as_in_closed_form() {
+        // Under the last normal the plane cuts the light.
+        let normals = [0.0, 0.1, 0.6].map(|tilt: f64| Vector3::new(0.0, tilt.sin(), tilt.cos()));
+        for normal in normals {
+            let exact = light::irradiance(&disk(10.0, 1.0), Point3::origin(), normal);
+            for quality in Quality::ALL {
+                let group = face(disk(10.0, 1.0), quality, &normal);
+                let sum = group.unit_irradiance(&Vector3::zeros(), &normal);
+                let ratio = f64::from(group.radiance.g / exact.g) * sum;
+                assert!(
+                    (ratio - 1.0).abs() < 1e-4,
+                    "{quality:?} {normal:?}: {ratio}"
+                );
+            }
+        }
+        let straight = light::irradiance(&disk(10.0, 1.0), Point3::origin(), Vector3::z());
+        assert!((f64::from(straight.g) / (10.0 / PI / 26.0) - 1.0).abs() < 1e-4);
+    }
+
+    #[test]
+    fn small_lights_and_those_that_touch_stay_as_they_are() {
+        for quality in Quality::ALL {
+            let ratio = |light: AreaLight| {
+                let scaled = face(light, quality, &Vector3::z()).radiance;
+                scaled.g / light::radiance(&light).g
+            };
+            assert!((ratio(disk(0.3, 0.8)) - 1.0).abs() < 1e-3, "{quality:?}");
+            assert_eq!(ratio(disk(1.0, 0.01)), 1.0, "{quality:?}");
         }
     }
 }

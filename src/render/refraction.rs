@@ -4,10 +4,11 @@
 //! changes the picture by what the card and all in front of it let pass, times the difference of
 //! what lies behind at the displaced place and straight on. That difference becomes light of the
 //! card's own sample, so that pictures stay sums of light, and labels, which look at coverage alone,
-//! stay what they are.
+//! stay what they are. What of it is the plate's is known apart: it is as sharp as the photo that it
+//! is from, whatever becomes of the objects.
 
 use crate::camera::RadialDistortion;
-use crate::deep::{DeepImage, DeepSample};
+use crate::deep::{Backlight, DeepImage, DeepSample};
 use crate::filter::{Pyramid, sample_blurred, sample_cubic_clamped};
 use crate::geom::{Point2, Point3, Vector3};
 use crate::image::Image;
@@ -60,19 +61,19 @@ pub(super) fn refract(
     deep_with(deep, &changes, shot)
 }
 
-/// By how much light what lies behind a card differs from what lies there straight on.
+/// By how much what lies behind a card differs from what lies there straight on.
 struct Change {
     block: PixelBlock,
-    light: Vec<LinearRgb>,
+    pixels: Vec<Backlight>,
 }
 
 type Changes = BTreeMap<ObjectId, Change>;
 
 impl Change {
-    fn at(&self, x: usize, y: usize) -> Option<LinearRgb> {
+    fn at(&self, x: usize, y: usize) -> Option<Backlight> {
         let inside = self.block.x.contains(&x) && self.block.y.contains(&y);
         let row = || (y - self.block.y.start) * self.block.x.len();
-        inside.then(|| self.light[row() + x - self.block.x.start])
+        inside.then(|| self.pixels[row() + x - self.block.x.start])
     }
 }
 
@@ -165,7 +166,7 @@ impl<'a> BendingCard<'a> {
             plane,
             flow,
             mirrored,
-            cylinder: card.bend.cylinder(card.quad.size),
+            cylinder: card.cylinder_seen_from(&view.eye.into()),
             eye: card
                 .quad
                 .world_from_card
@@ -248,36 +249,45 @@ impl PixelBlock {
     }
 }
 
-/// What lies behind a card: its light in a block, and how far away it is.
+/// What lies behind a card: what is seen of it in a block, and how far away it is.
 struct Backdrop {
     block: PixelBlock,
-    light: Pyramid<LinearRgb>,
+    seen: Pyramid<Backlight>,
     deep: DeepImage,
 }
 
 impl Backdrop {
     fn new(deep: DeepImage, block: &PixelBlock, shot: &Shot) -> Self {
-        let light = Image::from_fn(block.x.len(), block.y.len(), |x, y| {
+        let plate = shot.plate.as_deref();
+        let seen = Image::from_fn(block.x.len(), block.y.len(), |x, y| {
             let (x, y) = (x + block.x.start, y + block.y.start);
-            deep.light_over(x, y, shot.plate.as_deref())
+            let displaced = |plate| deep.displaced_plate_at(x, y, plate);
+            Backlight {
+                light: deep.light_over(x, y, plate),
+                plate: plate.map_or(LinearRgb::BLACK, displaced),
+            }
         });
         Self {
             block: block.clone(),
-            light: Pyramid::new(light),
+            seen: Pyramid::new(seen),
             deep,
         }
     }
 
     /// At a picture position, between pixels as well.
-    fn light_at(&self, at: Point2<f64>) -> LinearRgb {
+    fn sharp_at(&self, at: Point2<f64>) -> Backlight {
         let [x, y] = self.in_block(at);
-        sample_cubic_clamped(self.light.base(), x, y).map(|v| v.max(0.0))
+        let Backlight { light, plate } = sample_cubic_clamped(self.seen.base(), x, y);
+        Backlight {
+            light: light.map(|v| v.max(0.0)),
+            plate: plate.map(|v| v.max(0.0)),
+        }
     }
 
     /// Mean around a picture position.
-    fn blurred_at(&self, at: Point2<f64>, sigma_px: f64) -> LinearRgb {
+    fn blurred_at(&self, at: Point2<f64>, sigma_px: f64) -> Backlight {
         let [x, y] = self.in_block(at);
-        sample_blurred(&self.light, x, y, sigma_px)
+        sample_blurred(&self.seen, x, y, sigma_px)
     }
 
     fn in_block(&self, at: Point2<f64>) -> [f64; 2] {
@@ -287,8 +297,8 @@ impl Backdrop {
         ]
     }
 
-    fn pixel(&self, x: usize, y: usize) -> LinearRgb {
-        self.light.base()[(x - self.block.x.start, y - self.block.y.start)]
+    fn pixel(&self, x: usize, y: usize) -> Backlight {
+        self.seen.base()[(x - self.block.x.start, y - self.block.y.start)]
     }
 
     /// Mean depth at a pixel by how much is seen; `surface` is that of the surface.
@@ -363,28 +373,28 @@ impl<'a> Sight<'a> {
     ) -> Change {
         let block = place.block.clone();
         let columns = block.x.len();
-        let light = (0..block.len()).into_par_iter().with_min_len(columns);
-        let light = light.map(|i| {
+        let pixels = (0..block.len()).into_par_iter().with_min_len(columns);
+        let pixels = pixels.map(|i| {
             let (x, y) = (block.x.start + i % columns, block.y.start + i / columns);
             if deep.at(x, y).iter().any(|s| s.object == card.id) {
                 self.change_at(card, backdrop, [x, y])
             } else {
-                LinearRgb::BLACK
+                Backlight::default()
             }
         });
-        let light: Vec<_> = light.collect();
-        work::add(Kind::BentPixels, light.len() as u64);
-        Change { block, light }
+        let pixels: Vec<_> = pixels.collect();
+        work::add(Kind::BentPixels, pixels.len() as u64);
+        Change { block, pixels }
     }
 
     /// The mean over the sub-samples of a pixel, each at the place that its own line of sight leads
     /// to from the pixel's middle: what is not bent stays as sharp as it was.
-    fn change_at(&self, card: &BendingCard<'_>, backdrop: &Backdrop, at: [usize; 2]) -> LinearRgb {
+    fn change_at(&self, card: &BendingCard<'_>, backdrop: &Backdrop, at: [usize; 2]) -> Backlight {
         let [x, y] = at;
         let middle = self.ideal(pixel_center(x, y).xy().into());
         let surface = self.surface.map_or(f64::INFINITY, |s| s.depth_at(&middle));
         let Some(depth) = backdrop.depth(x, y, surface) else {
-            return LinearRgb::BLACK;
+            return Backlight::default();
         };
         let ending = Ending::new(card, self.view.point_at(middle.x, middle.y, depth), depth);
         let straight = backdrop.pixel(x, y);
@@ -392,26 +402,30 @@ impl<'a> Sight<'a> {
         let seen = self
             .sub_samples(at)
             .filter_map(|p| self.seen_along(card.path(&self.ideal(p))?, &ending, backdrop));
-        seen.fold(LinearRgb::BLACK, |sum, seen| {
+        seen.fold(Backlight::default(), |sum, seen| {
             sum.add_scaled(weight, seen.add_scaled(-1.0, straight))
         })
     }
 
-    /// The light that comes along a path; none where that is from behind the eye.
+    /// What is seen along a path; none where that is from behind the eye.
     fn seen_along(
         &self,
         path: LightPath,
         ending: &Ending<'_>,
         backdrop: &Backdrop,
-    ) -> Option<LinearRgb> {
-        let sharp = backdrop.light_at(self.seen_at(&ending.at(path.displacement))?);
+    ) -> Option<Backlight> {
+        let sharp = backdrop.sharp_at(self.seen_at(&ending.at(path.displacement))?);
         if path.haze <= 0.0 {
             return Some(sharp);
         }
         let middle = self.seen_at(&ending.at(path.scatter_displacement))?;
         let px_per_metre = self.view.px_per_metre(ending.depth);
         let sigma_px = f64::from(path.scatter_width) * ending.growth * px_per_metre;
-        Some(path.mixed(sharp, backdrop.blurred_at(middle, sigma_px)))
+        let soft = backdrop.blurred_at(middle, sigma_px);
+        Some(Backlight {
+            light: path.mixed(sharp.light, soft.light),
+            plate: path.mixed(sharp.plate, soft.plate),
+        })
     }
 
     fn sub_samples(&self, [x, y]: [usize; 2]) -> impl Iterator<Item = Point2<f64>> + '_ {

@@ -166,6 +166,12 @@ impl CameraView {
         in_front.then(|| seen.map(|p| p / p.z))
     }
 
+    /// One of these world points, at least, is in front of the eye.
+    pub(super) fn has_in_front(&self, world: &[Vector3<f64>]) -> bool {
+        let mut points = world.iter();
+        points.any(|point| self.project_points(&[*point]).is_some())
+    }
+
     /// Picture position `(x, y, 1)` of a world point; the middle where it is at or behind the eye.
     fn position_of(&self, point: &Vector3<f64>) -> Vector3<f64> {
         let seen = self.project_points(&[*point]);

@@ -9,8 +9,12 @@ use serde::{Deserialize, Serialize};
 
 /// Most that an outline turns between two of its points, radians.
 const OUTLINE_STEP: f64 = 0.02;
+/// Least height of the eye over a card, as a share of the card's reach, from which it is seen as a
+/// curved one. From lower down it is almost edge-on, and a bend of 60 degrees reaches halfway up.
+const LEAST_EYE_HEIGHT_RATIO: f64 = 0.5;
 
-/// How a card is curved: a part of a cylinder whose axis is parallel to the card.
+/// How a card is curved: a part of a cylinder whose axis is parallel to the card. A card that the
+/// camera sees almost edge-on is flat in the picture and in its outline.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Bend {
@@ -41,7 +45,7 @@ impl Bend {
     }
 
     /// The cylinder of a card of this size; none for a flat one.
-    pub(crate) fn cylinder(&self, [w, h]: [f64; 2]) -> Option<Cylinder> {
+    fn cylinder(&self, [w, h]: [f64; 2]) -> Option<Cylinder> {
         if self.is_flat() {
             return None;
         }
@@ -141,15 +145,24 @@ impl Card {
         }
     }
 
+    /// Its cylinder as an eye sees it; none of a flat card, and of one that it sees from so low down
+    /// that it takes it for flat.
+    pub(crate) fn cylinder_seen_from(&self, eye: &Point3<f64>) -> Option<Cylinder> {
+        let height = self.quad.world_from_card.inverse_transform_point(eye).z;
+        let cylinder = self.bend.cylinder(self.quad.size)?;
+        (height.abs() >= LEAST_EYE_HEIGHT_RATIO * cylinder.reach).then_some(cylinder)
+    }
+
     fn flat_point(&self, u: f64, v: f64) -> Point2<f64> {
         let [w, h] = self.quad.size;
         Point2::new((u - 0.5) * w, (0.5 - v) * h)
     }
 
-    /// Its outline in space, in order; that of a curved card has points between the corners.
-    pub(crate) fn outline(&self) -> Vec<Point3<f64>> {
+    /// Its outline in space as an eye sees it, in order; that of a curved card has points between
+    /// the corners.
+    pub(crate) fn outline(&self, eye: &Point3<f64>) -> Vec<Point3<f64>> {
         let corners = self.outline_uv.iter();
-        let Some(cylinder) = self.bend.cylinder(self.quad.size) else {
+        let Some(cylinder) = self.cylinder_seen_from(eye) else {
             return corners.map(|uv| self.quad.point(uv.x, uv.y)).collect();
         };
         let flat: Vec<_> = corners.map(|uv| self.flat_point(uv.x, uv.y)).collect();

@@ -131,6 +131,19 @@ impl Scene {
         [w as f64 / width, h as f64 / height]
     }
 
+    /// Pixels of the picture along a pixel of a plate, as it is shown.
+    pub(crate) fn plate_px(&self, plate: &Image<LinearRgb>) -> f64 {
+        self.zoom_used() / self.detail_of(plate)[0]
+    }
+
+    /// How many times larger it shows its photo.
+    pub(crate) fn zoom_used(&self) -> f64 {
+        match &self.camera {
+            CameraSource::Known(camera) => self.view.zoom_used(camera),
+            CameraSource::Rectangle { .. } => 1.0,
+        }
+    }
+
     /// What the view and the lens show of something that is known all over the photo; `camera` is
     /// that of the whole photo.
     pub(crate) fn shown<P: Copy + Send + Sync>(

@@ -447,7 +447,7 @@ mod tests {
         // From 44 m at 4 m/s: 11 s.
         let rest = settled(falling(&[([0.0, 0.0], 0.1), ([0.02, 0.0], 44.0)]));
         assert!(rest.seconds > SettleOptions::default().time_limit);
-        assert_eq!(rest.rejected, vec![]);
+        assert!(rest.rejected.is_empty());
     }
 
     /// Closed form: on a slope of a a plate stays if tan a < mu, and else slides.

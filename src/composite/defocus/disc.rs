@@ -147,7 +147,9 @@ impl Discs {
                 .entry(step)
                 .or_insert_with(|| Disc::new(radius_of(step)));
         }
-        let reach = by_step.values().map(|disc: &Disc| disc.reach.unsigned_abs());
+        let reach = by_step
+            .values()
+            .map(|disc: &Disc| disc.reach.unsigned_abs());
         Self {
             reach: reach.max().unwrap_or(0),
             by_step,

@@ -17,9 +17,6 @@ use std::f32::consts::PI;
 const SHADING_NODES: usize = 17;
 /// Points along each side of a card whose places bound those of all of it.
 const SIDE_POINTS: usize = 17;
-/// Least height of the eye over a card, as a share of the card's reach, from which it is seen as a
-/// curved one. From lower down it is almost edge-on, and a bend of 60 degrees reaches halfway up.
-const LEAST_EYE_HEIGHT_RATIO: f64 = 0.5;
 
 /// What the eye sees of a curved card, painted on the plane of the flat one.
 ///
@@ -38,9 +35,6 @@ pub(super) fn bend(
     shading: &BentShading,
     eye: &Point3<f64>,
 ) -> PaintedPlane {
-    if eye.z.abs() < LEAST_EYE_HEIGHT_RATIO * cylinder.reach {
-        return flat.padded(0);
-    }
     let empty = seen_area(flat, card, cylinder, eye);
     let film = Image::from_fn(empty.film.width(), empty.film.height(), |x, y| {
         let seen = cylinder.seen_point(eye, &empty.point(x as f64 + 0.5, y as f64 + 0.5));

@@ -81,6 +81,7 @@ impl Darkroom<'_> {
     fn retouch_card(&self, card: &Card) -> Card {
         let seen = ScenePlane::from_card(card)
             .filter(|_| asks_for_retouch(card, self.shot) && !card.texture.is_empty())
+            .filter(|plane| self.view.has_in_front(&plane.corners()))
             .and_then(|plane| Some((plane, self.seen_side(card, &plane)?)));
         seen.map_or_else(
             || card.clone(),
@@ -116,12 +117,13 @@ impl Darkroom<'_> {
         };
         let level = detail_level(side.texels_per_pixel, offsets) as usize;
         let moved = !card.bend.is_flat() || self.shot.edges.reshape_cut_outs();
-        level.saturating_sub(usize::from(moved))
+        let level = level.saturating_sub(usize::from(moved));
+        level.min(side.texture.levels() - 1)
     }
 
     fn retouch_side(&self, card: &Card, plane: &ScenePlane, side: &SeenSide<'_>) -> Card {
         let flat = self.paint(card, side);
-        let painted = match card.bend.cylinder(card.quad.size) {
+        let painted = match card.cylinder_seen_from(&self.shot.camera.center()) {
             Some(cylinder) => self.bend(&flat, card, plane, &cylinder),
             None => flat,
         };
@@ -136,7 +138,9 @@ impl Darkroom<'_> {
             dye::dye(&mut painted.film, &side.surface_level(level), &card.grade);
         }
         if edges.reshape_cut_outs() {
-            let pixel = side.texels_per_pixel / libm::exp2(level as f64);
+            // Of a card smaller than a pixel the edges are as those of one that fills it.
+            let longest = painted.film.width().max(painted.film.height()) as f64;
+            let pixel = (side.texels_per_pixel / libm::exp2(level as f64)).min(longest);
             edges::treat(
                 &mut painted,
                 &side.surface_level(level),

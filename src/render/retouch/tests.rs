@@ -11,7 +11,7 @@ use crate::label::{LabelOptions, label};
 use crate::pixel::{Film, LinearRgb, ObjectId, PremulRgba};
 use crate::render::{render, render_coverage, render_reference};
 use crate::scene::{AreaLight, Bend, LightShape};
-use geo::Area;
+use geo::{Area, Contains};
 
 const OPTIONS: RenderOptions = RenderOptions {
     subsamples: 3,
@@ -130,6 +130,107 @@ fn outline_box(ring: &[Point2<f64>]) -> [f64; 4] {
     ring.iter().fold(all, |b, p| {
         [b[0].min(p.x), b[1].min(p.y), b[2].max(p.x), b[3].max(p.y)]
     })
+}
+
+#[test]
+fn a_bent_card_seen_from_low_down_and_its_outline_agree() {
+    // 80 degrees from straight down, half a metre away.
+    let eye = Point3::new(0.0, -0.492, 0.087);
+    let camera = Camera::look_at(eye, Point3::origin(), 300.0, [320, 240]);
+    for deg in [60.0, -60.0] {
+        let turn = UnitQuaternion::from_euler_angles(0.0, 0.0, 0.5);
+        let at = nalgebra::Vector3::new(0.0, 0.0, 0.06);
+        let quad = Quad {
+            world_from_card: Pose::from_parts(at.into(), turn),
+            size: [0.2; 2],
+        };
+        let texture = Image::filled(64, 64, PremulRgba::new(0.5, 0.5, 0.5, 1.0));
+        let bent = Card {
+            bend: Bend {
+                deg,
+                axis_deg: 20.0,
+            },
+            ..Card::new(ObjectId(1), quad, texture)
+        };
+        let shot = Shot::new(camera).with_card(bent);
+        let deep = render_coverage(&shot, &OPTIONS);
+        let labels = label(&deep, &shot, &LabelOptions::default());
+        let rings = labels.objects[0].outline_px.iter().map(|ring| {
+            let ring = ring.iter().map(|p| geo::Coord { x: p.x, y: p.y });
+            geo::Polygon::new(geo::LineString(ring.collect()), Vec::new())
+        });
+        let rings: Vec<_> = rings.collect();
+        let outlined = Image::from_fn(320, 240, |x, y| {
+            let center = geo::Point::new(x as f64 + 0.5, y as f64 + 0.5);
+            rings.iter().any(|ring| ring.contains(&center))
+        });
+        let covered = alpha(&deep).map(|a| a > 0.5);
+        let both = covered.zip_map(&outlined, |a, b| a && b).count() as f64;
+        let either = covered.zip_map(&outlined, |a, b| a || b).count() as f64;
+        assert!(both > 0.8 * either, "{deg}: {both} of {either}");
+    }
+}
+
+#[test]
+fn a_card_behind_the_camera_is_not_seen_whatever_is_asked_of_it() {
+    let eye = Point3::new(0.0, -0.9, 0.6);
+    let tilt = 75_f64.to_radians();
+    let target = eye + nalgebra::Vector3::new(0.0, tilt.sin(), -tilt.cos());
+    let [lean, roll] = [-25_f64, 160.0].map(f64::to_radians);
+    let turn = UnitQuaternion::from_euler_angles(lean, 0.0, 0.0)
+        * UnitQuaternion::from_euler_angles(0.0, 0.0, roll);
+    let at = nalgebra::Vector3::new(0.2, -1.35, 0.06);
+    let quad = Quad {
+        world_from_card: Pose::from_parts(at.into(), turn),
+        size: [0.2; 2],
+    };
+    let texture = Image::filled(64, 64, PremulRgba::new(0.5, 0.5, 0.5, 1.0));
+    let plain = Card::new(ObjectId(1), quad, texture);
+    let grade = Grade {
+        glints: 0.5,
+        ..Grade::default()
+    };
+    let bend = Bend {
+        deg: 20.0,
+        axis_deg: 0.0,
+    };
+    let cards = [
+        (plain.clone(), EdgeTreatment::Soft),
+        (
+            Card {
+                bend,
+                ..plain.clone()
+            },
+            EdgeTreatment::AsIs,
+        ),
+        (Card { grade, ..plain }, EdgeTreatment::AsIs),
+    ];
+    // The same view in a usual picture and in a tiny one.
+    for (focal_px, image) in [(280.0, [320, 240]), (7.0, [8, 6])] {
+        let camera = Camera::look_at(eye, target, focal_px, image);
+        for (card, edges) in cards.clone() {
+            let shot = Shot {
+                edges,
+                ..Shot::new(camera).with_card(card)
+            };
+            let deep = render(&shot, &OPTIONS);
+            assert!(alpha(&deep).pixels().iter().all(|a| *a == 0.0), "{edges:?}");
+            let labels = label(&deep, &shot, &LabelOptions::default());
+            assert!(labels.objects.is_empty(), "{edges:?}");
+        }
+    }
+}
+
+#[test]
+fn edges_of_a_card_smaller_than_a_pixel_stay_close_to_it() {
+    let far = Point3::new(0.0, 0.0, 1e5);
+    let camera = Camera::look_at(far, Point3::origin(), 300.0, [64, 48]);
+    let shot = Shot {
+        edges: EdgeTreatment::Soft,
+        ..Shot::new(camera).with_card(card(Bend::FLAT, 0.0))
+    };
+    let size = retouched(&shot, &OPTIONS).cards[0].quad.size;
+    assert!(size.iter().all(|side| *side < 4.0), "{size:?}");
 }
 
 #[test]

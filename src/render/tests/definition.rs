@@ -773,6 +773,25 @@ fn interreflection_brightens_the_surface_under_a_card_alone() {
 }
 
 #[test]
+fn interreflection_of_a_larger_world_is_the_same() {
+    let shadow = |scale: f64| {
+        let texel = PremulRgba::new(0.5, 0.25, 0.0, 0.5);
+        let mut camera = above(21, 21, 100.0);
+        camera.camera_from_world.translation.vector *= scale;
+        let shot = Shot {
+            interreflection: LinearRgb::grey(0.8),
+            ..Shot::new(camera)
+        };
+        let card = level(1, [0.0, 0.0, 0.05 * scale], 0.1 * scale, texel);
+        let shot = shot.with_ambient(LinearRgb::WHITE).with_card(card);
+        render(&shot, &RenderOptions::default()).shadow().clone()
+    };
+    let differences = shadow(1.0).zip_map(&shadow(10.0), |a, b| (a.r - b.r).abs());
+    let most = differences.pixels().iter().fold(0.0_f32, |m, &d| m.max(d));
+    assert!(most < 0.005, "{most}");
+}
+
+#[test]
 fn a_card_turned_over_shows_its_back_the_right_way_round() {
     let half = |left: f32, right: f32| {
         Image::from_fn(64, 64, move |x, _| {

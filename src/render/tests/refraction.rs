@@ -1,15 +1,15 @@
 //! Cards that bend light, against what their displacement does to a plate that grows evenly.
 
 use super::definition::{above, card, pile, plate, same};
-use crate::composite;
+use crate::composite::{self, Exposed};
 use crate::filter::gaussian_blur;
 use crate::geom::UnitQuaternion;
 use crate::image::Image;
 use crate::label::{LabelOptions, label};
 use crate::matte::{Flow, LightPath};
 use crate::pixel::{LinearRgb, PremulRgba};
-use crate::render::{RenderOptions, render};
-use crate::scene::{Bend, Card, Refraction, Shot};
+use crate::render::{RenderOptions, render, render_unhidden};
+use crate::scene::{Bend, Blur, Card, PostProcess, Refraction, Shot, ThinLens};
 use std::f64::consts::PI;
 use std::sync::Arc;
 
@@ -219,6 +219,39 @@ fn on_a_belt_too_nothing_is_seen_where_it_is_and_displaced() {
     let pairs = still.pixels().iter().zip(moving.pixels());
     for (i, (a, b)) in pairs.enumerate() {
         assert!((a.g - b.g).abs() < 1e-5, "{i}: {} {}", a.g, b.g);
+    }
+}
+
+#[test]
+fn what_is_seen_through_a_soft_object_is_as_sharp_as_the_photo() {
+    let still = shot([sheet(1, HEIGHT, [0.08, 0.0])]).with_plate(striped(30));
+    let lens = ThinLens {
+        aperture_m: 0.05,
+        focus_m: 0.5,
+    };
+    let cases = [
+        (None, [0.0; 2], 0.8),
+        (Some(lens), [0.0; 2], 0.0),
+        (None, [0.03, 0.0], 0.0),
+        (Some(lens), [0.03, 0.0], 0.8),
+    ];
+    for (thin_lens, motion_m, blur_px) in cases {
+        let shot = Shot {
+            thin_lens,
+            motion_m,
+            ..still.clone()
+        };
+        let finish = PostProcess {
+            blur_px: Blur::Known(blur_px),
+            ..PostProcess::default()
+        };
+        let free = render_unhidden(&shot, &RenderOptions::default());
+        let seen = Exposed::new(free, &shot).finished(&shot, &finish);
+        let at = |x: usize| f64::from(seen[(x, 24)].g) / PASSES;
+        // The stripe itself, and where it is seen, eight pixels to the left.
+        assert!((30..34).all(|x| (at(x) - 0.1).abs() < 0.01), "{finish:?}");
+        assert!((23..25).all(|x| (at(x) - 0.9).abs() < 0.1), "{finish:?}");
+        assert!(seen.pixels().iter().all(|p| p.g >= 0.0), "{finish:?}");
     }
 }
 

@@ -6,8 +6,8 @@ use crate::pixel::LinearRgb;
 use crate::scene::belt::SequencePlace;
 use crate::scene::stack::DropColumn;
 use crate::scene::{
-    AreaLight, AssetVariant, Background, Bend, DrawLog, Draws, EdgeTreatment, Exposure, LightTint,
-    Object, PostProcess, Range, Recipe, Scene, SceneSettings, Surface, draw_paths,
+    AreaLight, AssetVariant, Background, Bend, DrawLog, Draws, EdgeTreatment, Exposure, LightShape,
+    LightTint, Object, PostProcess, Range, Recipe, Scene, SceneSettings, Surface, draw_paths,
 };
 use std::f64::consts::PI;
 
@@ -223,8 +223,9 @@ fn pick_background<'a>(draws: &Draws, backgrounds: &'a [Background]) -> Result<&
 /// surface's centre; `share` itself, white, when there is no light.
 ///
 /// # Method
-/// A small Lambertian light of power P faces the centre from distance d and height h: its
-/// irradiance there is `P h / (pi d^3)`. A constant environment of radiance L gives `pi L`.
+/// A disk of power P and radius r faces the centre from distance d and height h: its irradiance
+/// there is `P h / (pi d (d^2 + r^2))`, and that of a square of its area 1 % less at most. A
+/// constant environment of radiance L gives `pi L`.
 fn ambient_radiance(lights: &[AreaLight], share: f64) -> LinearRgb {
     if lights.is_empty() {
         return LinearRgb::WHITE.scale(share as f32);
@@ -234,9 +235,18 @@ fn ambient_radiance(lights: &[AreaLight], share: f64) -> LinearRgb {
     })
 }
 
-/// Radiance all around that gives `share` of the irradiance of a small light at the centre.
+/// Radiance all around that gives `share` of the irradiance of a light at the centre.
 fn ambient_factor(light: &AreaLight, share: f64) -> f64 {
     let [x, y, h] = light.position;
-    let d = (x * x + y * y + h * h).sqrt();
-    share * light.power * h / (PI * PI * d * d * d)
+    let d2 = x * x + y * y + h * h;
+    share * light.power * h / (PI * PI * d2.sqrt() * (d2 + squared_radius(light)))
+}
+
+/// That of a disk of the light's area, square metres.
+fn squared_radius(light: &AreaLight) -> f64 {
+    let [a, b] = light.size;
+    match light.shape {
+        LightShape::Rectangle => a * b / PI,
+        LightShape::Ellipse => a * b / 4.0,
+    }
 }

@@ -1,9 +1,12 @@
 use super::*;
 use crate::asset::Role;
 use crate::color::Albedo;
+use crate::geom::{Point3, Vector3};
+use crate::light::irradiance;
 use crate::pixel::LinearRgb;
 use crate::scene::{
-    AssetVariant, Background, Bend, CameraSource, Exposure, GradeRanges, Object, Placement, Wall,
+    AssetVariant, Background, Bend, CameraSource, Exposure, GradeRanges, LightShape, Object,
+    Placement, Wall,
 };
 use std::collections::BTreeSet;
 use std::f64::consts::PI;
@@ -618,19 +621,32 @@ fn hulls_fall_only_where_they_are_asked_for_and_known_and_grow_with_their_card()
 
 #[test]
 fn the_ambient_is_a_share_of_the_light_at_the_centre() {
-    // 10 W straight above at 1 m: irradiance 10 / pi; half of it from a dome of radiance L: pi L.
-    let light = LightRanges {
-        height: Range::fixed(1.0),
-        offset: Range::fixed(0.0),
-        ..LightRanges::default()
-    };
-    let recipe = Recipe {
-        lights: vec![light],
-        ambient: Range::fixed(0.5),
-        ..Recipe::default()
-    };
-    let expected = 0.5 * (10.0 / PI) / PI;
-    assert!((f64::from(scene(&recipe, 0).ambient.r) - expected).abs() < 1e-6);
+    for (shape, size) in [
+        (LightShape::Ellipse, 0.05),
+        (LightShape::Ellipse, 2.0),
+        (LightShape::Rectangle, 0.6),
+    ] {
+        let light = LightRanges {
+            shape,
+            height: Range::fixed(0.8),
+            offset: Range::fixed(0.3),
+            size: Range::fixed(size),
+            ..LightRanges::default()
+        };
+        let recipe = Recipe {
+            lights: vec![light],
+            ambient: Range::fixed(0.5),
+            ..Recipe::default()
+        };
+        let scene = scene(&recipe, 0);
+        let lit = irradiance(&scene.lights[0], Point3::origin(), Vector3::z());
+        // A dome of radiance L gives pi L.
+        let share = PI * f64::from(scene.ambient.r / lit.r);
+        assert!(
+            (share / 0.5 - 1.0).abs() < 0.01,
+            "{shape:?} {size}: {share}"
+        );
+    }
     let dark = Recipe {
         lights: vec![],
         ambient: Range::fixed(0.5),
