@@ -47,14 +47,14 @@ impl HoldoutSample {
 
 /// What lies behind an object in a pixel, or by how much that is another one where it is displaced.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Backlight {
+pub(crate) struct SeenBehind {
     /// All the light that comes from there.
     pub(crate) light: LinearRgb,
     /// The plate, of which objects and shadows have taken nothing yet.
     pub(crate) plate: LinearRgb,
 }
 
-impl Mix for Backlight {
+impl Mix for SeenBehind {
     #[inline(always)]
     fn add_scaled(self, weight: f32, other: Self) -> Self {
         Self {
@@ -287,7 +287,7 @@ impl DeepImage {
     pub(crate) fn with_light_from_behind(
         mut self,
         plate: Option<&Image<LinearRgb>>,
-        extra: impl Fn(ObjectId, usize, usize) -> Option<Backlight>,
+        extra: impl Fn(ObjectId, usize, usize) -> Option<SeenBehind>,
     ) -> Self {
         for y in 0..self.height {
             for x in 0..self.width {
@@ -306,7 +306,7 @@ impl DeepImage {
         &mut self,
         [x, y]: [usize; 2],
         plate: Option<&Image<LinearRgb>>,
-        extra: impl Fn(&DeepSample) -> Option<Backlight>,
+        extra: impl Fn(&DeepSample) -> Option<SeenBehind>,
     ) {
         let (all, share) = (self.light_over(x, y, plate), self.plate_share(x, y));
         let (tile, samples) = self.place(x, y);
@@ -505,7 +505,7 @@ mod tests {
         let straight = DeepImage::from_pixels(grey(shadow), [samples]);
         assert!(straight.undisplaced().is_none());
         // Seen through the first object the plate is darker by 0.4, and so is all there by 0.2.
-        let change = Backlight {
+        let change = SeenBehind {
             light: LinearRgb::grey(-0.2),
             plate: LinearRgb::grey(-0.4),
         };

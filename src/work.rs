@@ -103,7 +103,7 @@ kinds! {
     Encodes, "encodes";
     /// Bytes of files written
     BytesWritten, "bytes written";
-    /// Files put on the disk each by itself
+    /// Files written from memory that are put on the disk each by itself
     SyncedFiles, "synced files";
     /// Files read
     FilesRead, "files read";

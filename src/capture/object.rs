@@ -91,8 +91,9 @@ fn nothing_found(threshold: f32) -> Error {
     }
     let [typical, most] = [threshold, MIN_EVIDENCE].map(|t| 100.0 * t / EVIDENCE_MEDIANS);
     refused(&format!(
-        "the display is uneven or changes its colour, typically by {typical:.1} % of white, expected at most {most:.1} %: \
-         nothing stands out from it; photograph it empty, too, from the same place and in the same light (--empty)"
+        "nothing lies on the display, or nothing that stands out: \
+         the display is uneven or changes its colour, typically by {typical:.1} % of white, or the photos are noisy \
+         (expected: at most {most:.1} %); photograph it empty, too, from the same place and in the same light (--empty)"
     ))
 }
 

@@ -7,7 +7,7 @@
 //! which samples keep, and its colour there is that of what is seen of it close by. Where the
 //! objects in a pixel are equally far out of focus their soft light simply adds up, as that of any
 //! blur; else the nearer ones hide the others behind them by their soft coverage. Of a disc that
-//! reaches out of the picture the part inside counts as the whole.
+//! reaches over a border which the object touches the part inside counts as the whole.
 //!
 //! The plate is a photo and has its own depth of field: of it only the shadows are blurred.
 
@@ -76,8 +76,8 @@ struct SoftObject {
     columns: Range<usize>,
     rows: Range<usize>,
     pixels: Vec<SoftPixel>,
-    /// Width and height of the picture.
-    picture: [usize; 2],
+    /// Columns and rows that it is known in: without end where it ends before the picture does.
+    known: [Range<isize>; 2],
     /// Pixels to the farthest that a circle of confusion of the picture reaches.
     reach: isize,
 }
@@ -147,7 +147,7 @@ impl<'a> Focus<'a> {
             pixels: vec![SoftPixel::default(); columns.len() * rows.len()],
             columns,
             rows,
-            picture: size,
+            known: [0, 1].map(|axis| known(places.clone(), axis, size[axis])),
             reach: discs.reach() as isize,
         };
         for sample in samples {
@@ -258,15 +258,38 @@ fn around<'a>(
     low..high.min(size)
 }
 
+/// Columns (or rows) that an object at some places is known in: those of a picture of `size`, and
+/// all beyond an end that it does not touch.
+fn known<'a>(
+    places: impl Iterator<Item = &'a [usize; 2]> + Clone,
+    axis: usize,
+    size: usize,
+) -> Range<isize> {
+    let touches = |end: usize| places.clone().any(|at| at[axis] == end);
+    let low = if touches(0) { 0 } else { isize::MIN / 2 };
+    let high = if touches(size - 1) {
+        size as isize
+    } else {
+        isize::MAX / 2
+    };
+    low..high
+}
+
 impl SoftObject {
     /// Adds a sample to every pixel of its disc, by its share of the disc around that pixel as far
-    /// as it is inside the picture: what lies beyond is not known.
+    /// as the object is known there: beyond a border that it touches it is not.
     fn spread(&mut self, placed: &PlacedSample, disc: &Disc) {
+        let middle = placed.at.map(|i| i as isize);
+        let is_whole = disc.is_whole_around(middle, &self.known);
         for (dx, dy, weight) in disc.taps() {
-            let at = [placed.at[0] as isize + dx, placed.at[1] as isize + dy];
+            let at = [middle[0] + dx, middle[1] + dy];
             if let Some(i) = self.index(at) {
-                let inside = disc.share_inside(at, self.picture);
-                self.pixels[i].add(placed, weight / inside);
+                let share = if is_whole {
+                    1.0
+                } else {
+                    disc.share_in(at, &self.known)
+                };
+                self.pixels[i].add(placed, weight / share);
             }
         }
     }

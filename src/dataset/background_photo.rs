@@ -99,8 +99,9 @@ impl BackgroundPhoto {
 
     fn open(labelled: &LabelledPhoto, seen: &PhotoCamera, image: [u32; 2]) -> Result<Self> {
         let photo = photo_path(labelled)?;
+        let shown = cropped(seen.camera, middle_part(labelled.label.image_size(), image));
         camera::check_distance(&seen.camera)
-            .and_then(|()| camera::check_lens(&seen.camera, seen.k1))
+            .and_then(|()| camera::check_lens(&shown, seen.k1))
             .map_err(|e| e.in_file(&labelled.source))?;
         let mut background = Self::cropped_to(image, labelled, seen, photo);
         background.notes.extend(background.shape_note());

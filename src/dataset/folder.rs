@@ -351,6 +351,8 @@ const FIRST_KEY: &str = "scene";
 
 fn same_keys(a: &Map<String, Value>, b: &Map<String, Value>, at: &str) -> FieldComparison {
     let keys = a.keys().chain(b.keys().filter(|key| !a.contains_key(*key)));
+    // Notes are words for people about what is compared by itself.
+    let keys = keys.filter(|key| !field_path(at, key).ends_with("recipe.notes"));
     let mut keys: Vec<&String> = keys.collect();
     keys.sort_by_key(|key| *key != FIRST_KEY);
     for key in keys {

@@ -17,7 +17,7 @@ use crate::dataset::journal_line::JournalLine;
 use crate::error::{Error, Result};
 use crate::io::{self, Syncing};
 use rayon::prelude::*;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read as _, Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
@@ -30,12 +30,12 @@ pub(crate) struct Journal {
     path: PathBuf,
     file: File,
     lines: BTreeMap<u64, JournalLine>,
-    /// Samples that have a line and not its files.
-    forgotten: BTreeSet<u64>,
     /// How the system puts the files of many samples on the disk.
     syncing: Syncing,
     /// Lines whose files may not be on the disk yet.
     unsynced: usize,
+    /// The disk lost something: it says so once alone.
+    has_lost: bool,
 }
 
 impl Journal {
@@ -43,22 +43,25 @@ impl Journal {
     /// there, are forgotten.
     pub(crate) fn open(folder: &Path) -> Result<Self> {
         let path = folder.join(JOURNAL);
-        let mut file = io::open_own(&path)?;
+        let file = io::open_own(&path)?;
         let syncing = sync(&file, &path)?;
         let read = read_journal(&file, &path, false)?;
+        let count = read.len();
         let known = whole_lines(read, &path, "their samples are made again");
-        let numbers: Vec<u64> = known.iter().map(|line| line.k).collect();
         let lines = lines_with_files(known, folder);
-        let forgotten = numbers.into_iter().filter(|k| !lines.contains_key(k));
-        let forgotten = forgotten.collect();
+        if lines.len() < count {
+            // Or new lines would push those that are forgotten out of what the next run compares.
+            write_lines(&path, lines.values())?;
+        }
+        let mut file = io::open_own(&path)?;
         end_last_line(&mut file).map_err(|e| Error::file(&path, e))?;
         Ok(Self {
             path,
             file,
             lines,
-            forgotten,
             syncing,
             unsynced: 0,
+            has_lost: false,
         })
     }
 
@@ -77,7 +80,7 @@ impl Journal {
 
     /// How the files of sample `k` are put on the disk.
     pub(crate) fn syncing(&self, k: u64) -> Syncing {
-        if self.has(k) || self.forgotten.contains(&k) {
+        if self.has(k) {
             return Syncing::Alone;
         }
         self.syncing
@@ -86,8 +89,7 @@ impl Journal {
     /// Adds a finished sample.
     pub(crate) fn add(&mut self, line: JournalLine) -> Result<()> {
         if self.unsynced == UNSYNCED_LINES {
-            sync(&self.file, &self.path)?;
-            self.unsynced = 0;
+            self.sync()?;
         }
         self.append(&line.text())?;
         self.unsynced += 1;
@@ -110,10 +112,21 @@ impl Journal {
 
     /// Puts the lines in order and returns those of the samples below `count`.
     pub(crate) fn close(mut self, count: u64) -> Result<Vec<JournalLine>> {
-        sync(&self.file, &self.path)?;
+        self.sync()?;
         write_lines(&self.path, self.lines.values())?;
         self.lines.split_off(&count);
         Ok(self.lines.into_values().collect())
+    }
+
+    /// Puts the files of all samples on the disk. After it lost some, lines stay as they were added.
+    fn sync(&mut self) -> Result<()> {
+        if self.has_lost {
+            let what = "the disk lost some of the last samples";
+            return Err(Error::file(&self.path, what));
+        }
+        sync(&self.file, &self.path).inspect_err(|_| self.has_lost = true)?;
+        self.unsynced = 0;
+        Ok(())
     }
 }
 
@@ -128,7 +141,7 @@ fn sync(journal: &File, path: &Path) -> Result<Syncing> {
 
 fn not_on_disk(path: &Path, e: &std::io::Error) -> Error {
     let what = format!(
-        "the last samples cannot be put on the disk: {e}; go on with --resume, which compares every file"
+        "the last samples cannot be put on the disk: {e}; the same command compares them and goes on"
     );
     Error::file(path, what)
 }
@@ -304,7 +317,7 @@ mod tests {
     /// Other systems put each file on the disk by itself.
     #[cfg(target_os = "linux")]
     #[test]
-    fn files_of_a_sample_that_has_a_line_are_put_on_the_disk_first() {
+    fn a_forgotten_sample_has_no_line_and_one_that_has_is_put_on_the_disk_first() {
         let dir = tempfile::tempdir().unwrap();
         let lost = WrittenFile {
             path: "labels/lost.txt".into(),
@@ -315,11 +328,10 @@ mod tests {
         journal.add(line(0, Vec::new())).unwrap();
         journal.add(line(1, vec![lost])).unwrap();
         let journal = Journal::open(dir.path()).unwrap();
-        assert_eq!([0, 1, 2].map(|k| journal.has(k)), [true, false, false]);
-        assert_eq!(
-            [0, 1, 2].map(|k| journal.syncing(k)),
-            [Syncing::Alone, Syncing::Alone, Syncing::Together]
-        );
+        assert_eq!([0, 1].map(|k| journal.has(k)), [true, false]);
+        let syncing = [0, 1].map(|k| journal.syncing(k));
+        assert_eq!(syncing, [Syncing::Alone, Syncing::Together]);
+        assert_eq!(lines_of(dir.path()).unwrap().len(), 1);
     }
 
     #[test]

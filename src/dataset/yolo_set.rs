@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 pub struct YoloSet {
     /// Names of the classes, in order.
     pub classes: Vec<String>,
-    /// Images to learn from, in order of name or as listed.
+    /// Images to learn from, in natural order of path or as listed.
     pub train: Vec<PathBuf>,
     /// Images to choose the best model by.
     pub val: Vec<PathBuf>,

@@ -24,23 +24,56 @@ pub struct Tags {
 ///
 /// # Errors
 /// [`Error::File`] for a file that cannot be read; [`Error::Field`] for one without a line of
-/// names, a line of another length, an image that no sheet is of or that is listed twice.
+/// names, a line of another length, an image that is listed twice, or one without any image
+/// that a sheet is of.
 pub fn read_tags(path: &Path, sheets: &[EvalImage]) -> Result<Tags> {
     let bytes = io::read_bytes(path)?;
     parse(&bytes, sheets).map_err(|e| e.in_file(path))
 }
 
 fn parse(bytes: &[u8], sheets: &[EvalImage]) -> Result<Tags> {
-    let text = text_of(bytes)?;
+    let text = without_blank_lines(&text_of(bytes)?);
     let mut reader = csv_reader(&text);
     let mut tags = Tags::with_titles(reader.headers().map_err(|e| csv_error(&e))?)?;
+    let mut unknown = Vec::new();
     let images = sheets.iter().map(|sheet| sheet.image.as_str()).collect();
     for row in reader.records() {
         let row = row.map_err(|e| csv_error(&e))?;
-        tags.add(&row, &images)
-            .map_err(|e| in_line(e, line_of(&row)))?;
+        if row.iter().all(str::is_empty) {
+            continue;
+        }
+        match image_called(&row[0], &images) {
+            Ok(image) => tags
+                .add(image, &row)
+                .map_err(|e| in_line(e, line_of(&row)))?,
+            Err(e) => unknown.push(in_line(e, line_of(&row))),
+        }
     }
+    pass_over(unknown, tags.levels.is_empty())?;
     Ok(tags)
+}
+
+/// The reader of CSV passes over empty lines, not over those of spaces; numbers of lines stay.
+fn without_blank_lines(text: &str) -> String {
+    let lines = text.lines();
+    lines
+        .map(|line| if line.trim().is_empty() { "" } else { line })
+        .flat_map(|line| [line, "\n"])
+        .collect()
+}
+
+/// Lines of images that are not in the truth: a table may be of a whole dataset. Where there are no
+/// others it is of another one.
+fn pass_over(unknown: Vec<Error>, are_all: bool) -> Result<()> {
+    let count = unknown.len();
+    let Some(first) = unknown.into_iter().next() else {
+        return Ok(());
+    };
+    if are_all {
+        return Err(first);
+    }
+    log::warn!("tags: {count} lines are passed over, the first: {first}");
+    Ok(())
 }
 
 /// The image that a name in a table means.
@@ -68,12 +101,8 @@ fn level(row: &[String], factor: usize) -> Option<&str> {
 }
 
 impl Tags {
-    /// Adds a line: the image and its level of each factor.
-    fn add(&mut self, row: &csv::StringRecord, images: &BTreeSet<&str>) -> Result<()> {
-        if row.iter().all(str::is_empty) {
-            return Ok(());
-        }
-        let image = image_called(&row[0], images)?;
+    /// Adds an image's line: its level of each factor.
+    fn add(&mut self, image: &str, row: &csv::StringRecord) -> Result<()> {
         let levels = row.iter().skip(1).map(String::from).collect();
         match self.levels.insert(image.to_owned(), levels) {
             None => Ok(()),
@@ -163,8 +192,14 @@ mod tests {
             "line 3: image \"a.png\" is listed twice"
         );
         assert_eq!(
-            told("image,light\na,dim\nb,dim\n"),
-            "line 3: no image \"b\" in the truth of 1 images"
+            told("image,light\nb,dim\nc,dim\n"),
+            "line 2: no image \"b\" in the truth of 1 images"
         );
+    }
+
+    #[test]
+    fn a_table_of_the_whole_dataset_is_that_of_a_part_too() {
+        let tags = tags_of("image,light\nz,dim\n  \na,bright\n", &["a"]).unwrap();
+        assert_eq!(Vec::from_iter(tags.levels(0)), ["bright"]);
     }
 }

@@ -23,7 +23,7 @@ const TURN_SHARE: f32 = -0.1;
 /// Fewer edges say nothing.
 const MIN_EDGES: usize = 20;
 /// Longest side of the squares that a picture is looked at in, pixels: in photos of 640 x 480 they
-/// show blurs of up to 4 pixels.
+/// show blurs of up to some 5 pixels.
 const MAX_SIDE_PX: usize = 4;
 /// Variance that this method finds in edges that nothing but their pixels blurs, px^2; measured
 /// on rectangles drawn at all angles, pixels averaged over 8 x 8 points.
@@ -38,7 +38,8 @@ const BLUR_RATIO: f64 = 1.05;
 /// Slopes before and after another blur (S. Zhuo and T. Sim, "Defocus map estimation from a single
 /// image", 2011), at the steepest edges of the picture that stand alone; the lower quartile, since
 /// things have soft edges of their own. Where too few stand alone they are too soft for their
-/// pixels, and are looked at in squares of 2, 3 or 4 pixels.
+/// pixels, and are looked at in squares of 2, 3 or 4 pixels: of a plain surface the soft rim of a
+/// shadow is then taken for the photo's blur.
 pub fn plate_blur(plate: &Image<LinearRgb>) -> Blur {
     let found = (1..=MAX_SIDE_PX).find_map(|side| blur_in_squares(plate, side));
     found.map_or(Blur::NONE, Blur::Known)

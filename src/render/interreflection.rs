@@ -21,7 +21,7 @@ const BOUNCE_SPREAD_RATIO: f64 = 0.04;
 const GRID_STEPS_PER_SPREAD: f64 = 4.0;
 
 /// Most steps along a side; longer ones where cards lie far apart.
-const MAX_GRID_STEPS: f64 = 1024.0;
+const MAX_GRID_STEPS: f64 = 512.0;
 
 /// A white surface under a white card would glow forever.
 const MAX_BOUNCE: f32 = 0.95;
@@ -94,8 +94,10 @@ impl BounceMap {
         let step = (spread / GRID_STEPS_PER_SPREAD).max(width.max(height) / MAX_GRID_STEPS);
         let [columns, rows] = [width, height].map(|length| (length / step) as usize + 1);
         let back = Image::from_fn(columns, rows, |i, j| {
-            let (x, y) = (left + i as f64 * step, bottom + j as f64 * step);
-            light_from_above(&cards, &Vector3::new(x, y, 0.0))
+            // In the middle of a cell: on its corners rounding would decide at the ends of cards.
+            let (x, y) = (i as f64 + 0.5, j as f64 + 0.5);
+            let point = Vector3::new(left + x * step, bottom + y * step, 0.0);
+            light_from_above(&cards, &point)
         });
         Some(Self {
             corner: [left, bottom],
@@ -105,7 +107,7 @@ impl BounceMap {
     }
 
     fn at(&self, point: &Vector3<f64>) -> LinearRgb {
-        let [x, y] = [0, 1].map(|axis: usize| (point[axis] - self.corner[axis]) / self.step + 0.5);
+        let [x, y] = [0, 1].map(|axis: usize| (point[axis] - self.corner[axis]) / self.step);
         sample_bilinear(&self.back, x, y)
     }
 }

@@ -8,7 +8,7 @@
 //! is from, whatever becomes of the objects.
 
 use crate::camera::RadialDistortion;
-use crate::deep::{Backlight, DeepImage, DeepSample};
+use crate::deep::{DeepImage, DeepSample, SeenBehind};
 use crate::filter::{Pyramid, sample_blurred, sample_cubic_clamped};
 use crate::geom::{Point2, Point3, Vector3};
 use crate::image::Image;
@@ -64,13 +64,13 @@ pub(super) fn refract(
 /// By how much what lies behind a card differs from what lies there straight on.
 struct Change {
     block: PixelBlock,
-    pixels: Vec<Backlight>,
+    pixels: Vec<SeenBehind>,
 }
 
 type Changes = BTreeMap<ObjectId, Change>;
 
 impl Change {
-    fn at(&self, x: usize, y: usize) -> Option<Backlight> {
+    fn at(&self, x: usize, y: usize) -> Option<SeenBehind> {
         let inside = self.block.x.contains(&x) && self.block.y.contains(&y);
         let row = || (y - self.block.y.start) * self.block.x.len();
         inside.then(|| self.pixels[row() + x - self.block.x.start])
@@ -252,7 +252,7 @@ impl PixelBlock {
 /// What lies behind a card: what is seen of it in a block, and how far away it is.
 struct Backdrop {
     block: PixelBlock,
-    seen: Pyramid<Backlight>,
+    seen: Pyramid<SeenBehind>,
     deep: DeepImage,
 }
 
@@ -262,7 +262,7 @@ impl Backdrop {
         let seen = Image::from_fn(block.x.len(), block.y.len(), |x, y| {
             let (x, y) = (x + block.x.start, y + block.y.start);
             let displaced = |plate| deep.displaced_plate_at(x, y, plate);
-            Backlight {
+            SeenBehind {
                 light: deep.light_over(x, y, plate),
                 plate: plate.map_or(LinearRgb::BLACK, displaced),
             }
@@ -275,17 +275,17 @@ impl Backdrop {
     }
 
     /// At a picture position, between pixels as well.
-    fn sharp_at(&self, at: Point2<f64>) -> Backlight {
+    fn sharp_at(&self, at: Point2<f64>) -> SeenBehind {
         let [x, y] = self.in_block(at);
-        let Backlight { light, plate } = sample_cubic_clamped(self.seen.base(), x, y);
-        Backlight {
+        let SeenBehind { light, plate } = sample_cubic_clamped(self.seen.base(), x, y);
+        SeenBehind {
             light: light.map(|v| v.max(0.0)),
             plate: plate.map(|v| v.max(0.0)),
         }
     }
 
     /// Mean around a picture position.
-    fn blurred_at(&self, at: Point2<f64>, sigma_px: f64) -> Backlight {
+    fn blurred_at(&self, at: Point2<f64>, sigma_px: f64) -> SeenBehind {
         let [x, y] = self.in_block(at);
         sample_blurred(&self.seen, x, y, sigma_px)
     }
@@ -297,7 +297,7 @@ impl Backdrop {
         ]
     }
 
-    fn pixel(&self, x: usize, y: usize) -> Backlight {
+    fn pixel(&self, x: usize, y: usize) -> SeenBehind {
         self.seen.base()[(x - self.block.x.start, y - self.block.y.start)]
     }
 
@@ -379,7 +379,7 @@ impl<'a> Sight<'a> {
             if deep.at(x, y).iter().any(|s| s.object == card.id) {
                 self.change_at(card, backdrop, [x, y])
             } else {
-                Backlight::default()
+                SeenBehind::default()
             }
         });
         let pixels: Vec<_> = pixels.collect();
@@ -389,12 +389,12 @@ impl<'a> Sight<'a> {
 
     /// The mean over the sub-samples of a pixel, each at the place that its own line of sight leads
     /// to from the pixel's middle: what is not bent stays as sharp as it was.
-    fn change_at(&self, card: &BendingCard<'_>, backdrop: &Backdrop, at: [usize; 2]) -> Backlight {
+    fn change_at(&self, card: &BendingCard<'_>, backdrop: &Backdrop, at: [usize; 2]) -> SeenBehind {
         let [x, y] = at;
         let middle = self.ideal(pixel_center(x, y).xy().into());
         let surface = self.surface.map_or(f64::INFINITY, |s| s.depth_at(&middle));
         let Some(depth) = backdrop.depth(x, y, surface) else {
-            return Backlight::default();
+            return SeenBehind::default();
         };
         let ending = Ending::new(card, self.view.point_at(middle.x, middle.y, depth), depth);
         let straight = backdrop.pixel(x, y);
@@ -402,7 +402,7 @@ impl<'a> Sight<'a> {
         let seen = self
             .sub_samples(at)
             .filter_map(|p| self.seen_along(card.path(&self.ideal(p))?, &ending, backdrop));
-        seen.fold(Backlight::default(), |sum, seen| {
+        seen.fold(SeenBehind::default(), |sum, seen| {
             sum.add_scaled(weight, seen.add_scaled(-1.0, straight))
         })
     }
@@ -413,7 +413,7 @@ impl<'a> Sight<'a> {
         path: LightPath,
         ending: &Ending<'_>,
         backdrop: &Backdrop,
-    ) -> Option<Backlight> {
+    ) -> Option<SeenBehind> {
         let sharp = backdrop.sharp_at(self.seen_at(&ending.at(path.displacement))?);
         if path.haze <= 0.0 {
             return Some(sharp);
@@ -422,7 +422,7 @@ impl<'a> Sight<'a> {
         let px_per_metre = self.view.px_per_metre(ending.depth);
         let sigma_px = f64::from(path.scatter_width) * ending.growth * px_per_metre;
         let soft = backdrop.blurred_at(middle, sigma_px);
-        Some(Backlight {
+        Some(SeenBehind {
             light: path.mixed(sharp.light, soft.light),
             plate: path.mixed(sharp.plate, soft.plate),
         })

@@ -540,7 +540,7 @@ fn a_recipe_beside_a_dataset_is_not_written_over() {
     let before = recipes();
     let refused = desk.refused(&[&ablate[..], &["--set", "scene.objects=4"]].concat());
     assert!(
-        refused.contains("scene.scale=1.5/recipe.toml: is another recipe"),
+        refused.contains("scene.scale=1.5/recipe.toml: says something else"),
         "{refused}"
     );
     assert_eq!(recipes(), before);

@@ -237,6 +237,20 @@ fn send(signal: &str, child: &std::process::Child) {
     );
 }
 
+/// The same command, which hears interrupts also where the tests run in the background of a script,
+/// which has them ignored.
+fn hearing(command: &Command) -> Command {
+    let mut hearing = Command::new("env");
+    hearing
+        .arg("--default-signal=INT")
+        .arg(command.get_program())
+        .args(command.get_args());
+    if let Some(folder) = command.get_current_dir() {
+        hearing.current_dir(folder);
+    }
+    hearing
+}
+
 #[test]
 fn a_signal_stops_between_pictures_and_the_same_command_goes_on() {
     let desk = Desk::new();
@@ -255,7 +269,7 @@ fn a_signal_stops_between_pictures_and_the_same_command_goes_on() {
                 "-o",
                 signal,
             ];
-            desk.command(&args)
+            hearing(&desk.command(&args))
                 .stdout(Stdio::null())
                 .stderr(Stdio::null())
                 .spawn()

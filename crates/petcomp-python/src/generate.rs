@@ -175,7 +175,8 @@ fn check_class_names(sample: &Sample, classes: &[String], k: u64) -> PyResult<()
         return Ok(());
     }
     let theirs = &sample.policy().classes;
-    let what = format!("{classes:?}, but sample {k} has {theirs:?}, expected the same");
+    let what =
+        format!("{classes:?}, but sample {k} has {theirs:?}, expected them to begin with those");
     Err(wrong_value("classes", what))
 }
 

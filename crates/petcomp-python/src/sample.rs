@@ -76,10 +76,9 @@ impl Sample {
         &self.facts.policy
     }
 
-    /// Whether these are its classes; the one that is added to them may be among them or not.
+    /// Whether these begin with its objects' classes: then its numbers mean the same.
     pub(crate) fn is_of(&self, classes: &[String]) -> bool {
-        let policy = self.policy();
-        policy.classes == classes || policy.object_classes() == classes
+        classes.starts_with(self.policy().object_classes())
     }
 
     /// What the library's writers take.

@@ -219,6 +219,10 @@ class Pane {
   }
 
   async change(folder) {
+    // What is shown beside it is used, too, and stays listed.
+    for (const { folder, listing } of [set, ...viewer.panes.filter((pane) => pane !== this)]) {
+      await api("api/dataset/rows", { folder, listing, rows: [] });
+    }
     const { listing, classes } = await list(folder);
     const { rows } = await api("api/dataset/find", { folder, listing, filter: {}, order: "listed" });
     Object.assign(this, { folder, listing, rows, place: 0, names: classes });

@@ -45,10 +45,10 @@ impl Disc {
         &self.taps
     }
 
-    /// Share of it that is inside a picture of this size where its middle is at a pixel of that.
+    /// Share of it that is in some columns and rows where its middle is at a pixel of those.
     #[inline]
-    pub(super) fn share_inside(&self, at: [isize; 2], size: [usize; 2]) -> f32 {
-        let [columns, rows] = [0, 1].map(|axis| self.inside(at[axis], size[axis]));
+    pub(super) fn share_in(&self, at: [isize; 2], known: &[Range<isize>; 2]) -> f32 {
+        let [columns, rows] = [0, 1].map(|axis| self.inside(at[axis], &known[axis]));
         if columns.len().min(rows.len()) == self.side() {
             return 1.0;
         }
@@ -59,13 +59,19 @@ impl Disc {
         (left_of(columns.end) - left_of(columns.start)) as f32
     }
 
-    /// Its columns (or rows) inside a picture of so many, counted from its first.
+    /// Those of its columns (or rows), counted from its first.
     #[inline]
-    fn inside(&self, at: isize, size: usize) -> Range<usize> {
+    fn inside(&self, at: isize, known: &Range<isize>) -> Range<usize> {
         let first = at - self.reach;
-        let low = (-first).max(0) as usize;
-        let high = (size as isize - first) as usize;
+        let low = (known.start - first).max(0) as usize;
+        let high = (known.end - first) as usize;
         low..high.min(self.side())
+    }
+
+    /// Discs around all its pixels lie in some columns and rows.
+    pub(super) fn is_whole_around(&self, at: [isize; 2], known: &[Range<isize>; 2]) -> bool {
+        let far = 2 * self.reach;
+        (0..2).all(|i| known[i].start <= at[i] - far && at[i] + far < known[i].end)
     }
 
     /// Pixels along a side of the square around it.
@@ -214,7 +220,7 @@ mod tests {
                 };
                 let inside = disc.taps.iter().filter(is_inside);
                 let expected: f32 = inside.map(|tap| tap.2).sum();
-                let found = disc.share_inside([x, y], [9, 7]);
+                let found = disc.share_in([x, y], &[0..9, 0..7]);
                 assert!(
                     (found - expected).abs() < 1e-5,
                     "{radius}: {x} {y}: {found} {expected}"

@@ -152,6 +152,19 @@ fn a_card_larger_than_the_picture_is_whole_up_to_its_border() {
 }
 
 #[test]
+fn a_card_that_ends_before_the_border_is_as_soft_there_as_elsewhere() {
+    let deep = picture(|x, _| match x {
+        20..62 => vec![sample(1, 0.4, 1.0, 1.0)],
+        _ => vec![],
+    });
+    let soft = defocus(&deep, &shot(Some(LENS)));
+    for (left, right) in [(19, 62), (18, 63)] {
+        let [left, right] = [left, right].map(|x| hidden(&soft, x, 24));
+        assert!((left - right).abs() < 1e-5, "{left} {right}");
+    }
+}
+
+#[test]
 fn equal_blur_is_that_of_the_whole_picture() {
     let deep = picture(|x, y| match (x / 8 + y / 8) % 3 {
         0 => vec![],

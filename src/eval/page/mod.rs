@@ -334,7 +334,15 @@ fn spread_of(all: &[Metrics]) -> Spread {
 }
 
 fn spread_row(spread: &Spread) -> [String; 7] {
-    let interval = spread.interval.as_ref().map(range_text);
+    // The normal distribution knows no ends, a mAP does.
+    let possible = |interval: Interval| Interval {
+        low: interval.low.max(0.0),
+        high: interval.high.min(1.0),
+        ..interval
+    };
+    let interval = spread
+        .interval
+        .map(|interval| range_text(&possible(interval)));
     [
         "mean +- std".into(),
         format!("{} runs", spread.runs),

@@ -167,8 +167,15 @@ pub(crate) fn sync_file_system(file: &File) -> std::io::Result<bool> {
     }
 }
 
+/// FUSE says that all is on the disk, and does not ask its server.
+#[cfg(target_os = "linux")]
+const FUSE_SUPER_MAGIC: i64 = 0x6573_5546;
+
 #[cfg(target_os = "linux")]
 fn sync_all_files(file: &File) -> std::io::Result<()> {
+    if rustix::fs::fstatfs(file)?.f_type as i64 == FUSE_SUPER_MAGIC {
+        return Err(ErrorKind::Unsupported.into());
+    }
     Ok(rustix::fs::syncfs(file)?)
 }
 

@@ -5,8 +5,8 @@ use crate::error::{Error, Result};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-/// The files of a kind below a folder, in natural order of path (`2.png` before `10.png`); each folder once, as links may lead in
-/// circles.
+/// The files of a kind below a folder, in natural order of path (`2.png` before `10.png`); each
+/// folder once, as links may lead in circles.
 ///
 /// # Errors
 /// A folder that cannot be listed, or one with which there are more files than `most`.
@@ -20,13 +20,19 @@ pub(crate) fn files_below(
     while let Some(folder) = open.pop() {
         if seen.insert(folder.canonicalize().map_err(|e| Error::file(&folder, e))?) {
             let (folders, found) = folders_and_files(&folder)?;
-            open.extend(folders);
+            open.extend(folders.into_iter().filter(|folder| !is_hidden(folder)));
             files.extend(found.into_iter().filter(|path| is_wanted(path)));
         }
         check_file_count(files.len(), most, &folder)?;
     }
     files.sort_by(|a, b| compare_paths(a, b));
     Ok(files)
+}
+
+/// Trainers pass over folders whose names begin with a dot.
+fn is_hidden(folder: &Path) -> bool {
+    let name = folder.file_name().unwrap_or_default();
+    name.as_encoded_bytes().starts_with(b".")
 }
 
 /// What is in a folder, in order of name: of two names of a folder always the same one counts.

@@ -186,6 +186,8 @@ mod tests {
     fn light_that_is_off_stays_at_the_middle_of_every_range_that_it_has() {
         let warm = LightRanges {
             temperature_k: Some(Range::new(2500.0, 6500.0)),
+            // The share of ambient light is that of what a lamp of its size gives.
+            size: Range::new(0.3, 0.3),
             ..LightRanges::default()
         };
         let recipe = Recipe {

@@ -183,29 +183,33 @@ pub(super) fn solved(labelled: &LabelledPhoto) -> petcomp::Result<Solution> {
     possible(solve_label(labelled)?, labelled)
 }
 
-/// A solution whose camera can see objects on the surface, through a lens that can have taken the
-/// photo.
+/// A solution whose camera can see objects on the surface.
 fn possible(solution: Solution, labelled: &LabelledPhoto) -> petcomp::Result<Solution> {
-    camera::check_distance(&solution.camera)
-        .and_then(|()| camera::check_lens(&solution.camera, solution.k1()))
-        .map_err(|e| e.in_file(&labelled.source))?;
+    camera::check_distance(&solution.camera).map_err(|e| e.in_file(&labelled.source))?;
     Ok(solution)
 }
 
-/// A solution that fits its label, or any where that is asked for.
+/// A solution that fits its label, through a lens that can have taken the photo; any where that is
+/// asked for.
 pub(super) fn accepted(
     solution: Solution,
     labelled: &LabelledPhoto,
     force: bool,
 ) -> petcomp::Result<Solution> {
-    match solution.misfit() {
-        Some(error) if !force => Err(needs_force(&labelled.source, &error)),
-        _ => Ok(solution),
+    if force {
+        return Ok(solution);
     }
+    if let Some(error) = solution.misfit() {
+        return Err(needs_force(&labelled.source, &error));
+    }
+    // Pictures may show the middle of the photo alone.
+    camera::check_lens(&solution.camera, solution.k1())
+        .map_err(|e| needs_force(&labelled.source, &e))?;
+    Ok(solution)
 }
 
-fn needs_force(label: &Path, misfit: &SolveError) -> Error {
-    let what = format!("{misfit}; --force accepts it nevertheless");
+fn needs_force(label: &Path, why: &dyn std::fmt::Display) -> Error {
+    let what = format!("{why}; --force accepts it nevertheless");
     Error::file(label, what)
 }
 

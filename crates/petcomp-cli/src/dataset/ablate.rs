@@ -66,7 +66,7 @@ fn check_recipe(folder: &Path, config: &DatasetConfig) -> petcomp::Result<()> {
         return Ok(());
     }
     let what = format!(
-        "is another recipe than this run has, and {} was begun with it; ablate into a new folder",
+        "says something else than this run, and {} was begun with it; ablate into a new folder, or delete the file if only folders were moved",
         dataset.display()
     );
     Err(Error::file(recipe, what))

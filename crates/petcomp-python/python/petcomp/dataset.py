@@ -85,7 +85,7 @@ def generate(
     ``source`` is a recipe (``set`` and ``quality`` as of ``Pipeline``): the files are those of ``petcomp
     dataset generate``, to the byte. Or a pipeline. Or a function that returns sample ``k``: it is called
     from several threads, in no fixed order, and must depend on nothing but ``k``; ``classes`` are then
-    needed, the same as those of its samples, and ``labels``, ``pictures`` and ``split`` are the tables of
+    needed, beginning with those of its samples, and ``labels``, ``pictures`` and ``split`` are the tables of
     a recipe.
 
     ``only`` makes image ``only`` alone, ``shard=(i, n)`` every ``n``-th from the ``i``-th (1 to ``n``), in a

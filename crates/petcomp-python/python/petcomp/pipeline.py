@@ -49,7 +49,7 @@ class Pipeline:
     ) -> None:
         self._seed = _number("seed", seed)
         is_data = isinstance(recipe, Mapping)
-        # Other processes open the same, whatever becomes of the caller's data and working folder.
+        # Other processes open the same, whatever becomes of the caller's data; a file's path is whole.
         source = plain("recipe", recipe) if is_data else os.path.abspath(path_of("recipe", recipe))
         values = plain("set", set or {})
         self._source = (source, values, quality)

@@ -64,6 +64,7 @@ fn solve_group(
 fn usable(outcome: Result<Solution, SolveError>) -> petcomp::Result<Solution> {
     let solution = outcome.and_then(Solution::fitting)?;
     camera::check_distance(&solution.camera)?;
+    camera::check_lens(&solution.camera, solution.k1())?;
     Ok(solution)
 }
 

@@ -186,6 +186,7 @@ fn solved(labelled: &LabelledPhoto) -> Answer<Solution> {
         .and_then(Solution::fitting)
         .map_err(Error::from)?;
     camera::check_distance(&solution.camera)?;
+    camera::check_lens(&solution.camera, solution.k1())?;
     Ok(solution)
 }
 

@@ -38,6 +38,7 @@ impl CameraSummary {
         let options = SolveOptions::default();
         let solution = camera::solve(label, &options).map_err(Error::from)?;
         camera::check_distance(&solution.camera)?;
+        camera::check_lens(&solution.camera, solution.k1())?;
         Ok(Self {
             advice: camera::doctor(label, &solution, &options)
                 .lines()
