@@ -17,7 +17,8 @@ use std::ops::Range;
 pub struct DeepSample {
     /// Whose it is.
     pub object: ObjectId,
-    /// Distance of the object at the pixel, metres along the optical axis.
+    /// Distance of the object at the pixel, metres along the optical axis; of a curved card that of
+    /// the flat one.
     pub depth: Depth,
     /// Light that reaches the eye from it: held out by what is in front, exposure applied.
     pub light: LinearRgb,

@@ -469,6 +469,35 @@ fn obstructed_objects_are_kept_on_request_and_twins_written_once() {
 }
 
 #[test]
+fn what_has_no_mask_is_labelled_where_a_box_is_written_alone() {
+    let thin = |k| {
+        let mut s = sample(k)?;
+        let whole = object(1, 0, [0.0, 0.0], &[]);
+        let faint = ObjectLabel {
+            amodal_mask: RleMask::from_fn(IMAGE, |_, _| false),
+            ..object(2, 1, [30.0, 20.0], &[])
+        };
+        s.labels.objects = vec![whole, faint];
+        Ok(s)
+    };
+    let segments = Yolo {
+        task: YoloTask::Segment,
+        ..Yolo::default()
+    };
+    for (yolo, count) in [(segments, 1), (Yolo::default(), 2)] {
+        let dir = tempfile::tempdir().unwrap();
+        let mut plan = plan(dir.path(), 1);
+        plan.writers = vec![Arc::new(yolo), Arc::new(Coco::default())];
+        let report = generate(&plan, thin, &|_| {}, &AtomicBool::new(false)).unwrap();
+        assert_eq!((report.objects, report.labelled), (2, count));
+        let rows = text(dir.path(), "labels/val/000000.txt");
+        assert_eq!(rows.lines().count() as u64, count);
+        let coco = text(dir.path(), "annotations/instances_val.json");
+        assert_eq!(coco.matches("\"area\"").count(), 1);
+    }
+}
+
+#[test]
 fn objects_in_a_circle_are_counted_and_none_of_them_is_on_top() {
     let dir = tempfile::tempdir().unwrap();
     let circle = |k| {
@@ -1315,8 +1344,8 @@ fn merged_shards_are_the_bytes_of_one_run() {
 }
 
 #[test]
-fn shards_with_simplified_polygons_are_merged() {
-    let labels = "formats = ['yolo', 'coco']\nsimplify = 1.5\n\
+fn shards_with_settings_of_all_layouts_are_merged() {
+    let labels = "formats = ['yolo', 'coco', 'layers']\nsimplify = 1.5\nalpha_threshold = 0.6\n\
         yolo = { task = 'segment' }\ncoco = { masks = 'polygon' }";
     let labels: LabelConfig = toml::from_str(labels).unwrap();
     let dir = tempfile::tempdir().unwrap();

@@ -518,6 +518,25 @@ fn layers_add_up_to_the_picture_and_ids_to_what_is_seen() {
 }
 
 #[test]
+fn the_depth_of_layers_is_where_a_mask_is() {
+    let dir = made("alpha_threshold = 0.6\nformats = [\"layers\"]");
+    let (_, channels) = read_channels(dir.path().join("layers/train/000003.exr")).unwrap();
+    let depths = &channels.iter().find(|c| c.name == "Z").unwrap().samples;
+    let record: SampleRecord = io::read_json(dir.path().join("scenes/train/000003.json")).unwrap();
+    let mut is_in_mask = vec![false; depths.len()];
+    for (x, y) in record
+        .labels
+        .objects
+        .iter()
+        .flat_map(|o| o.visible_mask.pixels())
+    {
+        is_in_mask[(y * IMAGE[0] + x) as usize] = true;
+    }
+    let has_depth: Vec<_> = depths.iter().map(|depth| depth.is_finite()).collect();
+    assert_eq!(has_depth, is_in_mask);
+}
+
+#[test]
 fn a_mask_is_what_the_layer_of_its_object_shows() {
     let dir = made("formats = [\"layers\"]\nlayers = { cards = true }");
     let (_, channels) = read_channels(dir.path().join("layers/train/000007.exr")).unwrap();

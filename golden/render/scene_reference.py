@@ -42,7 +42,8 @@ camera*       either K*, R*, t*, resolution ([width, height] K belongs to,
               blender: {matrix_world*, lens* (mm), sensor_width (36),
               shift_x (0), shift_y (0)}.  Optional clip: [near, far];
               k1: OpenCV's first coefficient of radial distortion (0), for
-              square pixels and the principal point in the middle;
+              square pixels and the principal point in the middle, both to
+              OFF_AXIS_PX, and no aperture;
               aperture: {diameter* (m), focus* (m)} of a thin lens.
 tray*         size*.
 plate         path*, encoding ("linear" | "srgb", default by file type).
@@ -96,6 +97,11 @@ import sys
 import time
 
 T_START = time.perf_counter()
+
+
+# How far off the middle a principal point may be where a lens bends lines, and how far pixels
+# that are not square may move the picture's side: Cycles' bent lenses have neither.
+OFF_AXIS_PX = 0.05
 
 
 class SceneError(Exception):
@@ -324,7 +330,7 @@ def load_scene(path, needs_pose):
                              where + ".alpha"),
             "encoding": _encoding(q, full, where),
             "hue_shift": _number(q.get("hue_shift", 0.0), where + ".hue_shift", -360.0, 360.0),
-            "saturation": _number(q.get("saturation", 1.0), where + ".saturation", 0.0, 2.0),
+            "saturation": _number(q.get("saturation", 1.0), where + ".saturation", 0.0, 100.0),
             "value": _number(q.get("value", 1.0), where + ".value", 0.0, 100.0),
             "opacity": _number(q.get("opacity", 1.0), where + ".opacity", 0.0, 1.0),
             "thickness": _number(q.get("thickness", 0.01), where + ".thickness", 1e-5),
@@ -625,6 +631,18 @@ def camera_to_blender(cam, width, height):
     return rows, lens, sensor, shift_x, shift_y, aspect_x, aspect_y
 
 
+def check_distortion(spec):
+    """Refuse a k1 that Cycles cannot render."""
+    cam, r = spec["camera"], spec["render"]
+    if not cam["k1"]:
+        return
+    _, _, _, shift_x, shift_y, ax, ay = camera_to_blender(cam, r["width"], r["height"])
+    if max(abs(v) for v in (shift_x, shift_y, ax - ay)) * r["width"] > OFF_AXIS_PX:
+        _fail("camera.k1", "needs square pixels and the principal point in the middle")
+    if "aperture" in cam:
+        _fail("camera.k1", "cannot be had together with camera.aperture")
+
+
 def lens_polynomial(k1, focal_mm, reach_mm):
     """Coefficients of Cycles' "Fisheye Lens Polynomial" that make OpenCV's k1, and its largest error in mm.
 
@@ -895,7 +913,7 @@ class Builder:
         data.clip_start, data.clip_end = self.spec["camera"]["clip"]
         cam = self.spec["camera"]
         if cam["k1"]:
-            self.add_distortion(data, cam["k1"], (shift_x, shift_y, ax - ay))
+            self.add_distortion(data, cam["k1"])
         if "aperture" in cam:
             data.dof.use_dof = True
             data.dof.focus_distance = cam["aperture"]["focus"]
@@ -905,11 +923,7 @@ class Builder:
         self.scene.render.pixel_aspect_y = ay
         self.scene.camera = self.link("camera", data, rows)
 
-    def add_distortion(self, data, k1, off_axis):
-        if max(abs(v) for v in off_axis) > 1e-6:
-            _fail("camera.k1", "needs square pixels and the principal point in the middle")
-        if "aperture" in self.spec["camera"]:
-            _fail("camera.k1", "cannot be had together with camera.aperture")
+    def add_distortion(self, data, k1):
         r = self.spec["render"]
         height = data.sensor_width * r["height"] / r["width"]
         # Cycles takes the height of a panoramic sensor as it stands.
@@ -1333,6 +1347,7 @@ def main():
         spec["render"]["threads"] = args.threads
     if args.seed is not None:
         spec["render"]["seed"] = args.seed
+    check_distortion(spec)
     if args.check:
         print("scene file is valid: %d quads, %d lights" % (len(spec["quads"]), len(spec["lights"])))
         return 0

@@ -129,8 +129,9 @@ fn surface_line(solution: &Solution) -> String {
     let [w, h] = solution.size;
     let scale = solution.fit.px_per_metre;
     format!(
-        "On the surface the rectangle of {w:.4} m x {h:.4} m fits its labelled corners to {:.2} px ({scale:.0} px per metre), \
+        "On the surface the rectangle of {w:.4} m x {h:.4} m fits its labelled {} to {:.2} px ({scale:.0} px per metre), \
          whatever the focal length.",
+        solution.fit.labelled(),
         solution.rms_px
     )
 }

@@ -107,9 +107,11 @@ pub enum SolveError {
         photo: usize,
     },
     /// The best camera does not fit its label within the noise.
-    #[error("surface: no camera fits (corners {rms_px:.1} px off, p = {p_value:.1e}): {}", remedy(*.exchanged))]
+    #[error("surface: no camera fits ({labelled} {rms_px:.1} px off, p = {p_value:.1e}): {}", remedy(*.exchanged))]
     NoFit {
-        /// Root mean square distance of the corners from where the camera sees them, pixels.
+        /// `corners` or, where none were labelled, `points`.
+        labelled: &'static str,
+        /// Root mean square distance of these from where the camera sees them, pixels.
         rms_px: f64,
         /// Probability of a worse fit by chance.
         p_value: f64,

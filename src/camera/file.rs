@@ -171,7 +171,7 @@ pub struct FitRecord {
     pub dof: usize,
     pub p_value: Option<f64>,
     pub rms_px: f64,
-    pub per_corner_px: [f64; 4],
+    pub per_corner_px: Option<[f64; 4]>,
     pub iterations: usize,
     pub condition: f64,
     pub depth_ratio: f64,

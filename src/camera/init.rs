@@ -55,10 +55,13 @@ fn copy_shared(label: &mut Label, like: &Label) {
     copy_camera(label, like);
 }
 
-/// The lens holds for pictures of the same size, the camera's name for all.
+/// The lens, and what was cut off the picture, hold for pictures of the same size, the camera's
+/// name for all.
 fn copy_camera(label: &mut Label, like: &Label) {
     if like.image_size() == label.image_size() {
+        label.image.crop = like.image.crop;
         label.camera = without_height(&like.camera);
+        label.camera.principal_point_px = principal_from_corner(like);
     }
     label.camera.id = like.camera.id.clone();
 }
@@ -77,6 +80,12 @@ fn without_height(camera: &LabelCamera) -> LabelCamera {
         height_sigma_m: None,
         ..camera.clone()
     }
+}
+
+/// The stated principal point, in a new label's pixels.
+fn principal_from_corner(label: &Label) -> Option<[f64; 2]> {
+    let stated = label.camera.principal_point_px?;
+    Some(label.pixel(stated).into())
 }
 
 /// The photo as a label at `path` names it.
@@ -195,6 +204,7 @@ fn is_number(part: &str) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use super::super::label::{Crop, PixelOrigin};
     use super::super::read::tests::{equivalent, write_photo};
     use super::*;
     use crate::image::Image;
@@ -243,6 +253,32 @@ mod tests {
         assert_eq!(
             (label.camera.id.as_deref(), label.camera.focal_px),
             (Some("phone"), Some(80.0))
+        );
+    }
+
+    #[test]
+    fn the_lens_comes_with_the_frame_that_it_is_stated_in() {
+        let folder = tempfile::tempdir().unwrap();
+        let photo = folder.path().join("a.png");
+        io::write(&photo, &Image::<Srgb8>::new(90, 60)).unwrap();
+        let path = photo.with_extension("label.json");
+        let mut like = Label::new([90, 60], [[1.0; 2]; 4], [0.6, 0.4]);
+        like.pixel_origin = PixelOrigin::Center;
+        like.camera.principal_point_px = Some([44.0, 30.0]);
+        like.image.crop = Some(Crop {
+            offset_px: [5.0, 0.0],
+            width: 100,
+            height: 60,
+        });
+        let label = init_label(&photo, &path, Some(&like)).unwrap();
+        assert_eq!(label.pixel_origin, PixelOrigin::Corner);
+        assert_eq!(label.camera.principal_point_px, Some([44.5, 30.5]));
+        assert_eq!(label.image.crop, like.image.crop);
+        like.image.width = 91;
+        let other = init_label(&photo, &path, Some(&like)).unwrap();
+        assert_eq!(
+            (other.image.crop, other.camera),
+            (None, LabelCamera::default())
         );
     }
 

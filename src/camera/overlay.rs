@@ -179,11 +179,12 @@ fn color_meanings(solution: &Solution) -> [(LinearRgb, String); 4] {
 fn camera_text(solution: &Solution) -> String {
     let camera = &solution.camera;
     format!(
-        "focal length {:.0} px (+- {:.1} %), {:.3} m high, tilt {:.1} degrees, corners to {:.2} px",
+        "focal length {:.0} px (+- {:.1} %), {:.3} m high, tilt {:.1} degrees, {} to {:.2} px",
         camera.focal_px.x,
         100.0 * solution.sigma.ln_focal,
         camera.height_m(),
         camera.tilt_deg(),
+        solution.fit.labelled(),
         solution.rms_px
     )
 }

@@ -40,6 +40,8 @@ pub(crate) struct Problem {
     pub(crate) framing: Framing,
     pub(crate) units: SolverUnits,
     pub(crate) corners_px: [Point2<f64>; 4],
+    /// Whether they were labelled, or else predicted from the further points.
+    pub(crate) has_labelled_corners: bool,
     pub(crate) projected: ProjectedRectangle,
     /// Sides of the rectangle before they are stretched, metres.
     pub(crate) size: [f64; 2],
@@ -83,6 +85,7 @@ impl Problem {
             framing,
             units,
             corners_px,
+            has_labelled_corners: label.surface.corners_px.is_some(),
             projected,
             size,
             stretch_shares,

@@ -5,7 +5,7 @@ use super::error::{MISFIT_CAUSES, SolveError};
 use super::exchange::pose_from;
 use super::focal::FocalSource;
 use super::label::Framing;
-use super::model::{Square, State};
+use super::model::{Observation, Square, State};
 use super::options::SolveOptions;
 use super::pinhole::{Camera, k1_from_kappa};
 use super::problem::Problem;
@@ -51,8 +51,8 @@ pub struct Solution {
     pub focal_source: FocalSource,
     /// What the prior and the picture say of the focal length.
     pub focal: FocalFinding,
-    /// Root mean square distance of the rectangle's projected corners from the labelled ones,
-    /// pixels.
+    /// Root mean square distance of the rectangle's projected corners from the labelled ones, or
+    /// of the labelled points where no corners are, pixels.
     pub rms_px: f64,
     /// How well the label fits.
     pub fit: Fit,
@@ -89,8 +89,8 @@ pub struct Fit {
     pub p_value: Option<f64>,
     /// Chi squared with width and height exchanged, where that fits clearly better.
     pub exchanged_chi2: Option<f64>,
-    /// Distance of each corner from where it was labelled, pixels.
-    pub per_corner_px: [f64; 4],
+    /// Distance of each corner from where it was labelled, pixels; none where points alone were.
+    pub per_corner_px: Option<[f64; 4]>,
     /// Iterations of the refinement.
     pub iterations: usize,
     /// Condition number of the information from the picture alone.
@@ -147,7 +147,11 @@ impl Problem {
     ) -> Solution {
         let camera = self.camera(minimum);
         let size = self.fitted_size(&minimum.state);
-        let per_corner_px = self.corner_distances_px(minimum);
+        let per_corner_px = self
+            .has_labelled_corners
+            .then(|| self.corner_distances_px(minimum));
+        let distances_px =
+            per_corner_px.map_or_else(|| self.point_distances_px(&minimum.state), Vec::from);
         let mut solution = Solution {
             camera,
             kappa: minimum.state.kappa,
@@ -156,7 +160,7 @@ impl Problem {
             framing: self.framing,
             focal_source: self.focal_source(minimum, &uncertainty.focal),
             focal: self.focal_finding(&uncertainty.focal),
-            rms_px: root_mean_square(&per_corner_px),
+            rms_px: root_mean_square(&distances_px),
             fit: self.fit(minimum, &camera, per_corner_px, uncertainty.condition),
             sigma: self.sigma(minimum, uncertainty, options.height_of_objects(size)),
             warnings: self.warnings.clone(),
@@ -198,6 +202,17 @@ impl Problem {
         })
     }
 
+    /// Distance of each labelled point from where the camera sees it, distortion included, pixels;
+    /// NaN behind the camera.
+    fn point_distances_px(&self, state: &State) -> Vec<f64> {
+        let distance_px = |point: &Observation| {
+            let seen = state.project(&point.point, point.rigid);
+            seen.map_or(f64::NAN, |u| (u - point.seen).norm() * self.units.unit_px)
+        };
+        let points = self.residuals.observations.iter();
+        points.map(distance_px).collect()
+    }
+
     /// Where a point of the rectangle, metres, is seen; NaN behind the camera.
     fn seen_px(&self, state: &State, point: Point3<f64>) -> Point2<f64> {
         let seen = state.project(&(point.coords / self.units.unit), false);
@@ -208,7 +223,7 @@ impl Problem {
         &self,
         minimum: &Minimum,
         camera: &Camera,
-        per_corner_px: [f64; 4],
+        per_corner_px: Option<[f64; 4]>,
         condition: f64,
     ) -> Fit {
         let dof = self.degrees_of_freedom();
@@ -271,6 +286,16 @@ impl FocalSource {
     }
 }
 
+impl Fit {
+    /// What [`Solution::rms_px`] is of: `corners` or, where none were labelled, `points`.
+    pub fn labelled(&self) -> &'static str {
+        match self.per_corner_px {
+            Some(_) => "corners",
+            None => "points",
+        }
+    }
+}
+
 impl Solution {
     /// OpenCV's k1, the first coefficient of its lens's radial distortion.
     pub fn k1(&self) -> f64 {
@@ -293,6 +318,7 @@ impl Solution {
             .exchanged_chi2
             .filter(|_| self.has_fitting_alternative());
         (self.is_improbable() || exchanged.is_some()).then(|| SolveError::NoFit {
+            labelled: self.fit.labelled(),
             rms_px: self.rms_px,
             p_value: self.fit.p_value.unwrap_or(0.0),
             exchanged: exchanged.map(|exchanged| [self.fit.chi2, exchanged]),
@@ -400,8 +426,8 @@ fn is_finite_camera(camera: &Camera) -> bool {
         .all(f64::is_finite)
 }
 
-fn root_mean_square(distances: &[f64; 4]) -> f64 {
-    (distances.iter().map(|d| d * d).sum::<f64>() / 4.0).sqrt()
+fn root_mean_square(distances: &[f64]) -> f64 {
+    (distances.iter().map(|d| d * d).sum::<f64>() / distances.len() as f64).sqrt()
 }
 
 /// Depth of the farthest corner of a rectangle over that of the nearest.

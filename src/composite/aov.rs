@@ -12,7 +12,7 @@ use crate::image::Image;
 use crate::io::exr::{ChannelSamples, Part};
 use crate::names::by_name;
 use crate::pixel::{LinearRgb, ObjectId, PremulRgba};
-use crate::scene::Shot;
+use crate::scene::{Card, Cylinder, Shot};
 use std::str::FromStr;
 
 /// A part of the picture that can be requested by its name.
@@ -36,7 +36,8 @@ pub enum Aov {
     Cryptomatte,
     /// `layers`: a part `layer.ID` for each card: its own light and what it hides, held out by what
     /// lies in front, `R G B A`; with film in the picture also `TR TG TB`, 1 minus what it
-    /// hides per channel. Their sum is the picture.
+    /// hides per channel. Their sum is the picture of the sharp objects at rest, before blur, depth
+    /// of field, a belt's exposure and finish: with those it is not the beauty.
     Layers,
 }
 
@@ -81,9 +82,15 @@ pub fn front(samples: &[DeepSample]) -> Option<&DeepSample> {
 /// The requested parts, in that order, of one size.
 ///
 /// `frame` is the finished frame of the same samples, `shot` what they were rendered from: position
-/// and texture coordinates are those at the pixel's centre, as depth is.
+/// and texture coordinates are those at the pixel's centre, as depth is; all three are those of the
+/// curved card where it is curved.
 pub fn parts(aovs: &[Aov], deep: &DeepImage, shot: &Shot, frame: &Image<PremulRgba>) -> Vec<Part> {
-    let picture = AovSource { deep, shot, frame };
+    let picture = AovSource {
+        deep,
+        shot,
+        frame,
+        bent: bent_cards(shot),
+    };
     aovs.iter().flat_map(|aov| picture.parts_of(*aov)).collect()
 }
 
@@ -92,6 +99,8 @@ struct AovSource<'a> {
     deep: &'a DeepImage,
     shot: &'a Shot,
     frame: &'a Image<PremulRgba>,
+    /// The cards that are seen as curved ones: samples have the depth of their planes.
+    bent: Vec<BentCard<'a>>,
 }
 
 impl AovSource<'_> {
@@ -152,7 +161,13 @@ impl AovSource<'_> {
 
     fn depths(&self) -> impl Iterator<Item = [f32; 1]> {
         self.fronts()
-            .map(|(_, s)| [s.map_or(f32::INFINITY, |s| s.depth.0)])
+            .map(|(at, s)| [s.map_or(f32::INFINITY, |s| self.depth_at(at, s))])
+    }
+
+    fn depth_at(&self, at: (usize, usize), sample: &DeepSample) -> f32 {
+        let camera_from_world = &self.shot.camera.camera_from_world;
+        self.bent_point(at, sample)
+            .map_or(sample.depth.0, |p| (camera_from_world * p.world).z as f32)
     }
 
     fn positions(&self) -> impl Iterator<Item = [f32; 3]> {
@@ -174,8 +189,13 @@ impl AovSource<'_> {
     fn uv_at(&self, at: (usize, usize), sample: &DeepSample) -> Option<[f32; 2]> {
         let mut cards = self.shot.cards.iter();
         let quad = &cards.find(|card| card.id == sample.object)?.quad;
-        let point = self.world_point(at, sample);
-        let p = quad.world_from_card.inverse_transform_point(&point);
+        let p = match self.bent_point(at, sample) {
+            Some(point) => point.flat,
+            None => quad
+                .world_from_card
+                .inverse_transform_point(&self.plane_point(at, sample))
+                .xy(),
+        };
         Some([
             (p.x / quad.size[0] + 0.5) as f32,
             (0.5 - p.y / quad.size[1]) as f32,
@@ -183,10 +203,68 @@ impl AovSource<'_> {
     }
 
     /// The point of the world that a sample shows at its pixel's centre.
-    fn world_point(&self, (x, y): (usize, usize), sample: &DeepSample) -> Point3<f64> {
+    fn world_point(&self, at: (usize, usize), sample: &DeepSample) -> Point3<f64> {
+        self.bent_point(at, sample)
+            .map_or_else(|| self.plane_point(at, sample), |point| point.world)
+    }
+
+    /// The point of a curved card that a sample shows at its pixel's centre; none of a flat one.
+    fn bent_point(&self, at: (usize, usize), sample: &DeepSample) -> Option<BentPoint> {
+        let mut bent = self.bent.iter();
+        let bent = bent.find(|bent| bent.card.id == sample.object)?;
+        bent.seen_at(&self.plane_point(at, sample))
+    }
+
+    /// The point of a sample's plane at its pixel's centre.
+    fn plane_point(&self, (x, y): (usize, usize), sample: &DeepSample) -> Point3<f64> {
         let px = Point2::new(x as f64 + 0.5, y as f64 + 0.5);
         let ideal = self.shot.distortion().undistort(px);
         self.shot.camera.ray(ideal).at(f64::from(sample.depth.0))
+    }
+}
+
+/// A curved card as the camera sees it.
+struct BentCard<'a> {
+    card: &'a Card,
+    cylinder: Cylinder,
+    /// The camera in the frame of the card.
+    eye: Point3<f64>,
+}
+
+/// A point of a curved card.
+struct BentPoint {
+    /// Where it is on the flat card.
+    flat: Point2<f64>,
+    /// Where it is in the world.
+    world: Point3<f64>,
+}
+
+fn bent_cards(shot: &Shot) -> Vec<BentCard<'_>> {
+    let eye = shot.camera.center();
+    let cards = shot.cards.iter();
+    cards.filter_map(|card| BentCard::new(card, &eye)).collect()
+}
+
+impl<'a> BentCard<'a> {
+    /// None of a card that the camera sees as a flat one.
+    fn new(card: &'a Card, eye: &Point3<f64>) -> Option<Self> {
+        Some(Self {
+            card,
+            cylinder: card.cylinder_seen_from(eye)?,
+            eye: card.quad.world_from_card.inverse_transform_point(eye),
+        })
+    }
+
+    /// The point that is seen where a point of the flat card's plane is; none past the cylinder.
+    fn seen_at(&self, on_plane: &Point3<f64>) -> Option<BentPoint> {
+        let world_from_card = &self.card.quad.world_from_card;
+        let on_plane = world_from_card.inverse_transform_point(on_plane).xy();
+        let flat = self.cylinder.seen_point(&self.eye, &on_plane);
+        let is_met = flat.iter().all(|v| v.is_finite());
+        is_met.then(|| BentPoint {
+            flat,
+            world: world_from_card * self.cylinder.point(&flat),
+        })
     }
 }
 
@@ -239,7 +317,7 @@ mod tests {
     use crate::composite;
     use crate::geom::{Pose, Quad, UnitQuaternion, Vector2, Vector3};
     use crate::render::{RenderOptions, render};
-    use crate::scene::Card;
+    use crate::scene::Bend;
 
     fn shot() -> Shot {
         let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
@@ -273,18 +351,17 @@ mod tests {
         }
     }
 
-    fn made(names: &[&str]) -> (Image<PremulRgba>, Vec<Part>) {
-        let shot = shot();
-        let deep = render(&shot, &RenderOptions::default());
+    fn made(shot: &Shot, names: &[&str]) -> (Image<PremulRgba>, Vec<Part>) {
+        let deep = render(shot, &RenderOptions::default());
         let frame = composite::frame(&deep, None);
         let aovs: Vec<Aov> = names.iter().map(|n| n.parse().unwrap()).collect();
-        let parts = parts(&aovs, &deep, &shot, &frame);
+        let parts = parts(&aovs, &deep, shot, &frame);
         (frame, parts)
     }
 
     #[test]
     fn layers_add_up_to_the_picture() {
-        let (frame, layers) = made(&["layers"]);
+        let (frame, layers) = made(&shot(), &["layers"]);
         assert_eq!(
             layers.iter().map(|p| p.name.as_str()).collect::<Vec<_>>(),
             ["layer.3", "layer.7"]
@@ -299,7 +376,8 @@ mod tests {
 
     #[test]
     fn geometry_is_that_of_the_card_in_front() {
-        let (_, parts) = made(&["id", "depth", "position", "uv", "coverage"]);
+        let names = ["id", "depth", "position", "uv", "coverage"];
+        let (_, parts) = made(&shot(), &names);
         let middle = 12 * 32 + 16;
         assert!(
             matches!(&parts[0].channels[0].1, ChannelSamples::Integer(ids) if ids[middle] == 7 && ids[0] == 0)
@@ -323,6 +401,30 @@ mod tests {
             "{u} {v}"
         );
         assert!((plane(&parts[4], "Y")[middle] - (1.0 - 0.5 * 0.75)).abs() < 1e-6);
+    }
+
+    #[test]
+    fn geometry_of_a_curved_card_is_that_of_its_points() {
+        let mut shot = shot();
+        shot.cards.truncate(1);
+        shot.cards[0].bend = Bend {
+            deg: 60.0,
+            axis_deg: 30.0,
+        };
+        let (_, parts) = made(&shot, &["depth", "position", "uv"]);
+        let [us, vs] = ["U", "V"].map(|c| plane(&parts[2], c));
+        let on_card = |i: &usize| [us[*i], vs[*i]].iter().all(|c| (0.0..=1.0).contains(c));
+        let pixels: Vec<_> = (0..32 * 24).filter(on_card).collect();
+        assert!(pixels.len() > 100, "{}", pixels.len());
+        for i in pixels {
+            let point = shot.cards[0].point(us[i].into(), vs[i].into());
+            let at = ["X", "Y", "Z"].map(|c| f64::from(plane(&parts[1], c)[i]));
+            assert!((point - Point3::from(at)).norm() < 1e-5, "{point} {at:?}");
+            let (px, depth) = shot.camera.project(point).unwrap();
+            let middle = Point2::new((i % 32) as f64 + 0.5, (i / 32) as f64 + 0.5);
+            assert!((px - middle).norm() < 1e-3, "{px} {middle}");
+            assert!((depth - f64::from(plane(&parts[0], "Z")[i])).abs() < 1e-5);
+        }
     }
 
     #[test]

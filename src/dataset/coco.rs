@@ -31,9 +31,10 @@ fn document(part: Part) -> PathBuf {
 /// Writes `annotations/instances_{train,val}.json`, joined from `coco/{train,val}/NNNNNN.json`.
 ///
 /// The id of an image is its number; categories are numbered from 1, since trainers take 0 for
-/// background, and so are annotations, since COCO's evaluation takes 0 for none. Objects that are
-/// to be ignored are `iscrowd`, with run lengths whatever `masks` says. Annotations also have
-/// `visible_fraction` and `topmost`, which other programs pass over; with `labels.max_truncation`
+/// background, and so are annotations, since COCO's evaluation takes 0 for none. An object whose
+/// mask has no pixel has no annotation, whatever its box. Objects that are to be ignored are
+/// `iscrowd`, with run lengths whatever `masks` says. Annotations also have `visible_fraction` and
+/// `topmost`, which other programs pass over; with `labels.max_truncation`
 /// also `truncation` (the share outside of the picture), `amodal_bbox` (around the whole outline,
 /// beyond the picture's edges too) and `visible_bbox` (around what is seen; missing where nothing
 /// is).
@@ -127,6 +128,10 @@ impl Writer for Coco {
         Some(self.boxes)
     }
 
+    fn has_label_of(&self, object: &ObjectLabel) -> bool {
+        self.boxes.has_mask(object)
+    }
+
     fn begin(&self, folder: &Path, _classes: &[String]) -> Result<()> {
         create_part_folders(folder, PARTS_FOLDER)
     }
@@ -182,17 +187,17 @@ impl Coco {
         }
     }
 
-    /// None for an object without a box.
+    /// None for an object without a box or a mask.
     fn annotation(
         &self,
         entry: &Entry<'_>,
         label: &LabelledObject<'_>,
     ) -> Result<Option<Annotation>> {
         let (k, object) = (entry.k, label.object);
-        let (b, mask) = self.boxes.of(object);
-        if b.is_empty() {
+        if !self.has_label_of(object) {
             return Ok(None);
         }
+        let (b, mask) = self.boxes.of(object);
         Ok(Some(Annotation {
             id: annotation_id(k, object.id.0)?,
             image_id: k,

@@ -89,6 +89,11 @@ impl Extent {
     pub(super) fn has_box(self, object: &ObjectLabel) -> bool {
         !self.of(object).0.is_empty()
     }
+
+    /// Whether there is anything of an object to label with a mask.
+    pub(super) fn has_mask(self, object: &ObjectLabel) -> bool {
+        self.has_box(object) && !self.of(object).1.is_empty()
+    }
 }
 
 impl Default for LabelConfig {
@@ -175,7 +180,10 @@ impl LabelConfig {
                 pictures: pictures.format,
                 ..self.mot
             }),
-            Format::Layers => Arc::new(self.layers),
+            Format::Layers => Arc::new(Layers {
+                alpha_threshold: self.alpha_threshold,
+                ..self.layers
+            }),
             Format::WebDataset => Arc::new(self.webdataset),
         }
     }

@@ -10,6 +10,7 @@ use crate::dataset::{
     Writer,
 };
 use crate::error::{Error, Result};
+use crate::label::ObjectLabel;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -82,6 +83,16 @@ impl Plan {
             return vec![Extent::Amodal];
         }
         extents
+    }
+
+    /// Whether any of the writers has a label of an object; where none writes labels, all have one.
+    fn has_label_of(&self, object: &ObjectLabel) -> bool {
+        let mut writers = self
+            .writers
+            .iter()
+            .filter(|w| w.extent().is_some())
+            .peekable();
+        writers.peek().is_none() || writers.any(|w| w.has_label_of(object))
     }
 }
 
@@ -157,9 +168,10 @@ fn write_sample(plan: &Plan, recipe_hash: &str, k: u64, sample: &Sample) -> Resu
     } = plan;
     check_image_size(sample)?;
     check_object_classes(sample, classes.len())?;
-    let labelled = plan
+    let mut labelled = plan
         .obstructed
         .labelled(&sample.labels, classes.len(), &plan.extents());
+    labelled.retain(|label| plan.has_label_of(label.object));
     let entry = Entry {
         k,
         seed: plan.seed,

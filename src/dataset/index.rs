@@ -82,7 +82,8 @@ pub struct ObjectFacts {
     pub labelled: bool,
     /// Seen share of it, 0 to 1; none where that is not known.
     pub visible: Option<f32>,
-    /// Centre, width and height of the box of the whole object, shares of the picture's.
+    /// Centre, width and height of the box of its label, shares of the picture's; of the whole
+    /// object where it has none.
     pub bbox: [f32; 4],
 }
 
@@ -160,7 +161,8 @@ impl DatasetIndex {
         }
     }
 
-    /// Everything that petcomp wrote of a picture; none for one from elsewhere.
+    /// Everything that petcomp wrote of a picture; none for one from elsewhere. Objects with a label
+    /// have the class and, as `amodal_box`, the box of that.
     ///
     /// # Errors
     /// A record that cannot be read.
@@ -333,6 +335,8 @@ struct BriefObject {
     #[serde(default)]
     amodal_box: BBox,
     #[serde(default)]
+    visible_box: BBox,
+    #[serde(default)]
     truncation: Option<Truncation>,
 }
 
@@ -356,26 +360,29 @@ impl BriefRecord {
     }
 
     fn object_facts(&self, object: &BriefObject, labelling: Labelling) -> ObjectFacts {
-        let bbox = shares_of(&object.amodal_box, self.labels.image.map(f64::from));
-        let class = self.labelled_class(object, labelling);
+        let label = self.label_of(object, labelling);
+        let (class, bbox) = label.unwrap_or((object.class, object.amodal_box));
+        let bbox = shares_of(&bbox, self.labels.image.map(f64::from));
         ObjectFacts {
-            class: class.unwrap_or(object.class),
-            labelled: class.is_some(),
+            class,
+            labelled: label.is_some(),
             visible: Some(object.visible_fraction as f32),
             bbox: bbox.map(|share| share as f32),
         }
     }
 
-    /// None for an object without a label.
-    fn labelled_class(&self, object: &BriefObject, labelling: Labelling) -> Option<u32> {
+    /// Class and box; none for an object without a label.
+    fn label_of(&self, object: &BriefObject, labelling: Labelling) -> Option<(u32, BBox)> {
         let label = ObjectLabel {
             class: object.class,
             obstructed: Some(!self.topmost.contains(&object.id)),
+            amodal_box: object.amodal_box,
+            visible_box: object.visible_box,
             truncation: object.truncation,
             ..ObjectLabel::default()
         };
         let has_label = self.labelled.contains(&object.id);
-        has_label.then(|| labelling.class_of(&label)).flatten()
+        has_label.then(|| labelling.label_of(&label)).flatten()
     }
 }
 
@@ -387,7 +394,8 @@ mod tests {
     const RECORD: &str = r#"{ "labelled": [2], "drawn": { "plate": "tray" }, "more": [1, 2],
         "labels": { "image": [8, 6], "objects": [
             { "id": 1, "class": 0, "visible_fraction": 0.25, "more": {} },
-            { "id": 2, "class": 1, "visible_fraction": 1.0 } ] } }"#;
+            { "id": 2, "class": 1, "visible_fraction": 1.0,
+              "amodal_box": { "x0": 1.0, "y0": 1.0, "x1": 3.0, "y1": 4.0 } } ] } }"#;
 
     fn line(k: u64, objects: u32) -> JournalLine {
         let file = |path: String| WrittenFile {

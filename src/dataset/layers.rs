@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 /// | channels | meaning |
 /// | --- | --- |
 /// | `R G B A` | the picture |
-/// | `Z` | depth of the nearest object that is seen, metres along the optical axis; infinite where there is none |
+/// | `Z` | depth of the nearest object that is seen, metres along the optical axis; infinite where there is none; of a curved card that of the flat one |
 /// | `shadow.R G B` | factor on the background |
 /// | `CryptoObject00.R` ... | Cryptomatte: which objects, and how much of each is seen |
 /// | `object003.R G B A` | light of one object that reaches the eye, and its seen share (`cards`) |
@@ -28,12 +28,32 @@ use std::path::{Path, PathBuf};
 ///
 /// Objects are called `object003_CLASS` in the Cryptomatte's list, distractors
 /// `object003_distractor`. Without film,
-/// `RGB = sum of object RGB + background * shadow * (1 - sum of object A)`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+/// `RGB = sum of object RGB + background * shadow * (1 - sum of object A)`: all but the picture is
+/// of the sharp objects at rest, before blur, depth of field, a belt's exposure and finish; with
+/// those the sum does not give the picture.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Layers {
     /// Also the layers of each object. Default: no.
     pub cards: bool,
+    /// An object is seen in a pixel of which it covers more than this share; in a recipe, that of
+    /// `labels`. Default: 0.1.
+    #[serde(skip_deserializing, skip_serializing_if = "is_default")]
+    pub alpha_threshold: f32,
+}
+
+impl Default for Layers {
+    fn default() -> Self {
+        Self {
+            cards: false,
+            alpha_threshold: LabelOptions::default().alpha_threshold,
+        }
+    }
+}
+
+/// A setting that need not be told.
+fn is_default(alpha_threshold: &f32) -> bool {
+    *alpha_threshold == LabelOptions::default().alpha_threshold
 }
 
 /// Its folder.
@@ -55,7 +75,7 @@ impl Writer for Layers {
         let (path, sample) = (entry.path(KIND, "exr"), entry.sample);
         check_deep(sample)?;
         let ids = cryptomatte(entry);
-        let mut channels = picture_channels(&sample.frame, &sample.deep);
+        let mut channels = picture_channels(&sample.frame, &sample.deep, self.alpha_threshold);
         channels.extend(ids.channels);
         if self.cards {
             let ids = object_names(entry).into_iter().map(|(id, _)| id);
@@ -102,9 +122,14 @@ fn check_deep(sample: &Sample) -> Result<()> {
 type Channel<P> = (&'static str, fn(&P) -> f32);
 
 /// The picture, its depth and its shadows.
-fn picture_channels(frame: &Image<PremulRgba>, deep: &DeepImage) -> Vec<NamedChannel> {
+fn picture_channels(
+    frame: &Image<PremulRgba>,
+    deep: &DeepImage,
+    threshold: f32,
+) -> Vec<NamedChannel> {
     let mut channels = channels_of(frame, &COLOR_CHANNELS);
-    channels.push(("Z".into(), value_per_pixel(deep, nearest)));
+    let depths = value_per_pixel(deep, |samples| nearest(samples, threshold));
+    channels.push(("Z".into(), depths));
     channels.extend(channels_of(deep.shadow(), &SHADOW_CHANNELS));
     channels
 }
@@ -154,11 +179,10 @@ fn object_names(entry: &Entry<'_>) -> Vec<(ObjectId, String)> {
 }
 
 /// Depth of the first sample of a pixel of which enough is seen to belong to a mask.
-fn nearest(samples: &[DeepSample]) -> f32 {
-    let least = LabelOptions::default().alpha_threshold;
+fn nearest(samples: &[DeepSample], threshold: f32) -> f32 {
     samples
         .iter()
-        .find(|sample| sample.visible > least)
+        .find(|sample| sample.visible > threshold)
         .map_or(f32::INFINITY, |sample| sample.depth.0)
 }
 

@@ -272,9 +272,11 @@ fn label_writer(
 ) -> std::result::Result<Arc<dyn Writer>, String> {
     let mut config = json!({ "formats": [format] });
     if let Some(map) = settings.as_object_mut().filter(|map| !map.is_empty()) {
-        // A setting of all layouts, told by each that has polygons.
-        if let Some(tolerance_px) = map.remove("simplify") {
-            config["simplify"] = tolerance_px;
+        // Settings of all layouts, told by each that goes by them.
+        for key in ["simplify", "alpha_threshold"] {
+            if let Some(value) = map.remove(key) {
+                config[key] = value;
+            }
         }
         config[format] = settings;
     }

@@ -142,7 +142,7 @@ pub(crate) use yolo_yaml::yaml_names;
 use crate::deep::DeepImage;
 use crate::error::Result;
 use crate::image::Image;
-use crate::label::Labels;
+use crate::label::{Labels, ObjectLabel};
 use crate::pixel::{ObjectId, PremulRgba};
 use crate::scene::{Belt, Drawn, Scene};
 use std::path::{Path, PathBuf};
@@ -321,6 +321,12 @@ pub trait Writer: Send + Sync {
     /// How much of an object its labels tell; none, as by default, where it writes no labels.
     fn extent(&self) -> Option<Extent> {
         None
+    }
+
+    /// Whether it writes a label of an object that has one; by default, of each that has a box in
+    /// its [`extent`](Self::extent).
+    fn has_label_of(&self, object: &ObjectLabel) -> bool {
+        self.extent().is_some_and(|extent| extent.has_box(object))
     }
 
     /// The files that trainers are given, below the dataset's folder: those that name all others.

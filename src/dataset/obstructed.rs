@@ -3,6 +3,7 @@
 use crate::dataset::Extent;
 use crate::dataset::folder::known_classes;
 use crate::error::{Error, Result};
+use crate::geom::BBox;
 use crate::label::{Labels, ObjectLabel};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -99,11 +100,12 @@ impl Obstructed {
 }
 
 /// How a dataset labels its objects: for readers of its records, where objects have their own
-/// classes.
+/// classes and every box.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Labelling {
     obstructed: Obstructed,
     class_count: usize,
+    extent: Extent,
 }
 
 /// Every object as its record has it.
@@ -112,6 +114,7 @@ impl Default for Labelling {
         Self {
             obstructed: Obstructed::Keep,
             class_count: 0,
+            extent: Extent::default(),
         }
     }
 }
@@ -123,14 +126,28 @@ impl Labelling {
         Self {
             obstructed: obstructed.unwrap_or(Obstructed::Keep),
             class_count: known_classes(identity).len(),
+            extent: extent_of(identity),
         }
     }
 
-    /// Class that an object with a label is labelled as; none where it is to be ignored.
-    pub(crate) fn class_of(self, object: &ObjectLabel) -> Option<u32> {
+    /// Class and box that an object with a label is labelled with; none where it is to be ignored
+    /// or has no such box.
+    pub(crate) fn label_of(self, object: &ObjectLabel) -> Option<(u32, BBox)> {
         let label = self.obstructed.label(object, self.class_count)?;
-        (!label.ignored).then_some(label.class)
+        let (bbox, _) = self.extent.of(object);
+        (!label.ignored && !bbox.is_empty()).then_some((label.class, bbox))
     }
+}
+
+/// What the boxes of a dataset are around: those of YOLO, else of its first format with boxes.
+fn extent_of(identity: &Value) -> Extent {
+    let writers = identity["writers"].as_array().into_iter().flatten();
+    let formats = writers.filter_map(Value::as_object).flatten();
+    let boxes = formats.filter_map(|(name, own)| Some((name, own.get("boxes")?)));
+    let chosen = boxes.min_by_key(|(name, _)| name.as_str() != "yolo");
+    chosen
+        .and_then(|(_, extent)| Extent::deserialize(extent).ok())
+        .unwrap_or_default()
 }
 
 /// Fails where the assets have a class of the name that is added.
@@ -146,7 +163,6 @@ fn check_is_free(classes: &[String]) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geom::BBox;
     use crate::label::Truncation;
     use crate::pixel::ObjectId;
 
@@ -224,6 +240,17 @@ mod tests {
         };
         assert_eq!(ids(&[Extent::Visible]), [2]);
         assert_eq!(ids(&[Extent::Visible, Extent::Amodal]), [1, 2]);
+    }
+
+    #[test]
+    fn the_boxes_of_a_dataset_are_those_of_yolo_before_others() {
+        let extent = |writers: Value| extent_of(&serde_json::json!({ "writers": writers }));
+        let coco = serde_json::json!({ "coco": { "boxes": "visible" } });
+        let yolo = serde_json::json!({ "yolo": { "boxes": "amodal" } });
+        let pictures = serde_json::json!({ "pictures": {} });
+        assert_eq!(extent(serde_json::json!([pictures, coco])), Extent::Visible);
+        assert_eq!(extent(serde_json::json!([coco, yolo])), Extent::Amodal);
+        assert_eq!(extent_of(&Value::Null), Extent::Amodal);
     }
 
     #[test]

@@ -93,15 +93,16 @@ impl SampleRecord {
 }
 
 impl SampleRecord {
-    /// With the classes that objects are labelled as; those that are to be ignored are among the
-    /// objects without a label.
+    /// With the classes and boxes that objects are labelled with: the `amodal_box` of one with a
+    /// label is its label's, whatever that is around. Those that are to be ignored, or have no such
+    /// box, are among the objects without a label.
     pub(crate) fn into_labelled(mut self, labelling: Labelling) -> Self {
         for object in &mut self.labels.objects {
             if !self.labelled.contains(&object.id) {
                 continue;
             }
-            match labelling.class_of(object) {
-                Some(class) => object.class = class,
+            match labelling.label_of(object) {
+                Some(label) => (object.class, object.amodal_box) = label,
                 None => self.labelled.retain(|&id| id != object.id),
             }
         }

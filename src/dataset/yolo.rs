@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::geom::BBox;
 use crate::geom::Point2;
 use crate::io;
-use crate::label::trace;
+use crate::label::{ObjectLabel, trace};
 use serde::{Deserialize, Serialize};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -62,6 +62,13 @@ impl Writer for Yolo {
         Some(self.boxes)
     }
 
+    fn has_label_of(&self, object: &ObjectLabel) -> bool {
+        match self.task {
+            YoloTask::Detect => self.boxes.has_box(object),
+            YoloTask::Segment => self.boxes.has_mask(object),
+        }
+    }
+
     fn begin(&self, folder: &Path, classes: &[String]) -> Result<()> {
         create_part_folders(folder, "labels")?;
         io::write_text(folder.join(DATA_YAML), &DataYaml::write(classes))
@@ -111,12 +118,10 @@ impl Yolo {
         image: [f64; 2],
     ) -> Option<String> {
         let (chosen, mask) = self.boxes.of(object);
-        match self.task {
-            _ if chosen.is_empty() => None,
-            YoloTask::Detect => Some(box_row(class, &chosen, image)),
-            YoloTask::Segment if mask.is_empty() => None,
-            YoloTask::Segment => Some(ring_row(class, &trace::polygon(mask, self.simplify), image)),
-        }
+        self.has_label_of(object).then(|| match self.task {
+            YoloTask::Detect => box_row(class, &chosen, image),
+            YoloTask::Segment => ring_row(class, &trace::polygon(mask, self.simplify), image),
+        })
     }
 }
 

@@ -85,6 +85,11 @@ impl Picture {
         self.format
     }
 
+    /// Its samples are display-encoded integers; others are scene-linear.
+    pub fn is_display_encoded(&self) -> bool {
+        self.raster.display_encoded
+    }
+
     /// Its colours have alpha.
     pub fn has_alpha(&self) -> bool {
         Wanted::Color

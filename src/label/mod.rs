@@ -99,7 +99,7 @@ pub struct ObjectLabel {
     pub visible_mask: RleMask,
     /// Seen share of its coverage, 0 to 1: what half covers a pixel counts half.
     pub visible_fraction: f64,
-    /// How far away it is.
+    /// How far away it is; of a curved card, how far the flat one is.
     pub depth: DepthRange,
     /// Objects and distractors that lie over it, by their outlines, in order of id.
     pub covered_by: Vec<ObjectId>,

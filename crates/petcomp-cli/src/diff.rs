@@ -1,5 +1,6 @@
 //! `petcomp diff`: compares two pictures with the flags and exit codes of OpenImageIO's `idiff`.
 
+use crate::distinct_files::check_distinct;
 use crate::global::GlobalArgs;
 use crate::print;
 use petcomp::color::linear_to_srgb;
@@ -107,6 +108,7 @@ fn with_two_dashes(word: OsString) -> OsString {
 }
 
 pub(crate) fn run(args: &DiffArgs, global: &GlobalArgs) -> anyhow::Result<u8> {
+    check_distinct([&args.a, &args.b], &args.output)?;
     let pair = match PicturePair::read(args) {
         Ok(pair) => pair,
         Err(error) => return Ok(exit_unreadable(&error)),
@@ -241,12 +243,12 @@ fn pixel_rows<P: Copy + Send>(
 /// The values as the file stores them, which is what `idiff` compares: codes of integer formats as
 /// shares of full scale, floats as they are.
 fn stored_values(picture: &Picture, rows: Range<usize>) -> Image<[f32; 4]> {
-    if matches!(picture.format(), Format::Exr | Format::Hdr) {
-        return picture
-            .rows::<PremulRgba>(rows)
-            .map(|p| [p.r, p.g, p.b, p.a]);
+    if picture.is_display_encoded() {
+        return picture.rows::<StraightRgba>(rows).map(encoded);
     }
-    picture.rows::<StraightRgba>(rows).map(encoded)
+    picture
+        .rows::<PremulRgba>(rows)
+        .map(|p| [p.r, p.g, p.b, p.a])
 }
 
 fn encoded(pixel: StraightRgba) -> [f32; 4] {

@@ -16,7 +16,7 @@ pub(crate) fn read_options<T: Default + DeserializeOwned>(file: Option<&Path>) -
 pub(crate) struct RecipeArgs {
     /// Recipe file (TOML): names the folders of assets and backgrounds, and what to draw
     #[arg(value_name = "RECIPE")]
-    recipe: PathBuf,
+    pub(crate) path: PathBuf,
     /// Replace a value of the recipe: scene.objects=[4,12]
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<Override>,
@@ -25,13 +25,13 @@ pub(crate) struct RecipeArgs {
 impl RecipeArgs {
     /// Reads the recipe.
     pub(crate) fn read_config(&self) -> anyhow::Result<DatasetConfig> {
-        Ok(DatasetConfig::read(&self.recipe, &self.overrides)?)
+        Ok(DatasetConfig::read(&self.path, &self.overrides)?)
     }
 
     /// Reads the recipe, one more of its values replaced.
     pub(crate) fn read_config_with(&self, switch: &Override) -> anyhow::Result<DatasetConfig> {
         let overrides: Vec<_> = self.overrides.iter().chain([switch]).cloned().collect();
-        Ok(DatasetConfig::read(&self.recipe, &overrides)?)
+        Ok(DatasetConfig::read(&self.path, &overrides)?)
     }
 
     /// Opens the folders that the recipe names.
@@ -56,6 +56,11 @@ pub(crate) struct SceneArgs {
 }
 
 impl SceneArgs {
+    /// The scene and the recipe.
+    pub(crate) fn files(&self) -> impl Iterator<Item = &PathBuf> {
+        self.recipe.iter().chain([&self.path])
+    }
+
     pub(crate) fn read_scene(&self) -> anyhow::Result<Scene> {
         Ok(io::read_document(&self.path)?)
     }

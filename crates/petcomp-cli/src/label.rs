@@ -1,5 +1,6 @@
 //! `petcomp label`: scene -> outlines, boxes, visibility.
 
+use crate::distinct_files::check_distinct;
 use crate::documents::SceneArgs;
 use crate::global::GlobalArgs;
 use petcomp::dataset::Pipeline;
@@ -24,6 +25,7 @@ pub(crate) struct LabelArgs {
 }
 
 pub(crate) fn run(args: &LabelArgs, global: &GlobalArgs) -> anyhow::Result<()> {
+    check_distinct(args.scene.files(), args.targets())?;
     let scene = args.scene.read_scene()?;
     let pipeline = Pipeline::open_for(args.scene.config_for(&scene)?, &scene)?;
     let labels = args.label(&pipeline, scene);
@@ -35,6 +37,12 @@ pub(crate) fn run(args: &LabelArgs, global: &GlobalArgs) -> anyhow::Result<()> {
 }
 
 impl LabelArgs {
+    /// The files to write.
+    fn targets(&self) -> impl Iterator<Item = &PathBuf> {
+        let more = self.overlay.iter().chain(&self.polygons);
+        more.chain([&self.output])
+    }
+
     fn label(&self, pipeline: &Pipeline, scene: Scene) -> petcomp::Result<Labels> {
         match &self.overlay {
             Some(path) => write_overlay(path, pipeline, scene),

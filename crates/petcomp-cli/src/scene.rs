@@ -1,5 +1,6 @@
 //! `petcomp scene`: recipe -> scene.
 
+use crate::distinct_files::check_distinct;
 use crate::documents::RecipeArgs;
 use crate::global::GlobalArgs;
 use crate::print;
@@ -66,6 +67,7 @@ pub(crate) fn run(command: &SceneCommand, global: &GlobalArgs) -> anyhow::Result
 }
 
 fn draw_scene(args: &DrawArgs, global: &GlobalArgs) -> anyhow::Result<()> {
+    check_distinct([&args.recipe.path], [&args.output])?;
     let pipeline = args.recipe.open_pipeline()?;
     let scene = pipeline.draw(args.seed, args.index)?;
     let scene = pipeline.config().with_files(scene, &args.output)?;
@@ -95,7 +97,8 @@ fn export_scene(args: &ExportSceneArgs, global: &GlobalArgs) -> anyhow::Result<(
         log::warn!("left out, Cycles renders without: {}", left_out.join(", "));
     }
     let retouched = petcomp::render::retouched_fully(&shot, &pipeline.config().render);
-    cycles::export(&retouched, scene.surface.size, &args.folder)?;
+    cycles::export(&retouched, scene.surface.size, &args.folder)
+        .map_err(|e| e.in_file(&args.scene))?;
     let cards = shot.cards.len();
     global.print_written(&args.folder, format_args!("{cards} cards; render it with"));
     global.print_status(format_args!("  {}", blender_command(&args.folder)));

@@ -5,7 +5,7 @@ mod desk;
 
 use desk::{Desk, text};
 use petcomp::camera::CameraFile;
-use petcomp::camera::simulate::Scenario;
+use petcomp::camera::simulate::{Scenario, View};
 use petcomp::{Camera, Image, LinearRgb, Srgb8, io};
 use serde_json::{Value, json};
 use std::path::Path;
@@ -55,13 +55,7 @@ impl Desk {
 
     /// A photo of a rectangle, and its label.
     fn photo(&self, name: &str, image: [u32; 2]) -> Value {
-        let scenario = Scenario {
-            image,
-            focal_px: 0.8 * f64::from(image[0]),
-            size: SIZE,
-            ..Scenario::default()
-        };
-        let view = scenario.tilted(30.0).view(4, 1);
+        let view = view_of(image);
         let [w, h] = image.map(|side| side as usize);
         std::fs::create_dir_all(self.path("bg")).unwrap();
         io::write(
@@ -99,6 +93,31 @@ impl Desk {
             said,
         )
     }
+}
+
+/// The view that photos are of.
+fn view_of(image: [u32; 2]) -> View {
+    let scenario = Scenario {
+        image,
+        focal_px: 0.8 * f64::from(image[0]),
+        size: SIZE,
+        ..Scenario::default()
+    };
+    scenario.tilted(30.0).view(4, 1)
+}
+
+/// 30 points of the rectangle, each coordinate 2 px off to either side.
+fn noisy_points() -> Vec<Value> {
+    const SIDES: [u32; 2] = [0x2b7e_1516, 0x28ae_d2a6];
+    let camera = view_of(IMAGE).camera;
+    let point = |k: u32| {
+        let [column, row] = [k % 6, k / 6].map(f64::from);
+        let [x, y] = [0.1 * column - 0.25, 0.08 * row - 0.16];
+        let (seen, _) = camera.project([x, y, 0.0].into()).unwrap();
+        let [dx, dy] = SIDES.map(|bits| 4.0 * f64::from((bits >> k) & 1) - 2.0);
+        json!({ "xyz_m": [x, y, 0.0], "px": [seen.x + dx, seen.y + dy], "sigma_px": 2.0 })
+    };
+    (0..30).map(point).collect()
 }
 
 fn exchanged(mut label: Value) -> Value {
@@ -140,6 +159,25 @@ fn a_label_with_its_sides_exchanged_is_refused_by_every_command() {
     desk.ok(&["camera", "solve", "--force", "bg/a.label.json"]);
     desk.scene(&[]);
     desk.ok(&generate);
+}
+
+#[test]
+fn of_points_alone_is_said_how_far_those_are_off() {
+    let desk = Desk::with_recipe();
+    let mut label = desk.photo("a", IMAGE);
+    label["image"]["cropped"] = json!(false);
+    label["surface"]["corners_px"] = Value::Null;
+    label["points"] = json!(noisy_points());
+    desk.label("a", &label);
+    let said = ["solve", "doctor"].map(|verb| desk.ok(&["camera", verb, "bg/a.label.json"]));
+    let said = said.concat().concat();
+    assert!(
+        said.contains("points to ") && !said.contains("corners to"),
+        "{said}"
+    );
+    let file: CameraFile = io::read_json(desk.path("bg/a.camera.json")).unwrap();
+    let fit = file.found.fit;
+    assert!(fit.per_corner_px.is_none() && (1.5..3.5).contains(&fit.rms_px));
 }
 
 #[test]
@@ -677,7 +715,54 @@ fn a_camera_is_exported_with_its_lens() {
     let cameras = std::fs::read_to_string(desk.path("model/cameras.txt")).unwrap();
     assert!(cameras.starts_with("1 OPENCV 640 480 "), "{cameras}");
     let [_, said] = desk.ok(&[&export[..], &["blender"]].concat());
-    assert!(said.contains("k1 = -0.0100"), "{said}");
+    assert!(said.contains("a.camera.json: k1 = -0.0100"), "{said}");
+}
+
+#[test]
+fn colmap_is_given_no_picture_without_a_name_of_its_own() {
+    let desk = Desk::with_recipe();
+    desk.label("a", &desk.photo("a", IMAGE));
+    desk.ok(&["camera", "solve", "bg/a.label.json"]);
+    let mut camera: Value = io::read_json(desk.path("bg/a.camera.json")).unwrap();
+    desk.write("other.camera.json", camera.to_string());
+    let export = ["camera", "export", "bg/a.camera.json", "other.camera.json"];
+    let export = [&export[..], &["--to", "colmap", "-o", "model"]].concat();
+    let said = desk.refused(&export);
+    assert!(
+        said.contains("other.camera.json: image.file: \"a.png\", which bg/a.camera.json has too"),
+        "{said}"
+    );
+    camera["image"]["file"] = json!("");
+    desk.write("other.camera.json", camera.to_string());
+    let said = desk.refused(&export);
+    assert!(
+        said.contains("other.camera.json: image.file: empty"),
+        "{said}"
+    );
+    assert!(!desk.path("model").exists());
+    camera["image"]["file"] = json!("b.png");
+    desk.write("other.camera.json", camera.to_string());
+    desk.ok(&export);
+}
+
+#[test]
+fn the_top_view_of_a_reduced_photo_is_as_reduced() {
+    let desk = Desk::with_recipe();
+    desk.label("a", &desk.photo("a", IMAGE));
+    desk.photo("small", IMAGE.map(|side| side / 4));
+    let width = |name: &str| {
+        let photo = format!("bg/{name}.png");
+        desk.ok(&[
+            "camera",
+            "rectify",
+            &photo,
+            "bg/a.label.json",
+            "-o",
+            "top.png",
+        ]);
+        io::read_header(desk.path("top.png")).unwrap().width
+    };
+    assert!(width("a").abs_diff(4 * width("small")) <= 4);
 }
 
 #[test]

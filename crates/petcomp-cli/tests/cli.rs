@@ -680,6 +680,12 @@ fn no_command_writes_over_what_it_reads() {
         &["matte", "film", "a.exr", "-o", "a.exr"],
         &["camera", "rectify", "a.png", "a.label.json", "-o", "a.png"],
         &["camera", "solve", "a.label.json", "-o", "a.label.json"],
+        &words("camera init a.png --size 1x1 --force -o a.png")[..],
+        &words("camera markers a.png --map a.label.json -o a.png")[..],
+        &words("camera export e.json --to opencv -o e.json")[..],
+        &["diff", "a.png", "a.png", "-o", "a.png"],
+        &["scene", "draw", "recipe.toml", "-o", "recipe.toml"],
+        &["label", "s.toml", "-o", "s.toml"],
         &["dataset", "split", "set", "-o", "./set"],
         &["dataset", "subset", "set", "--head", "0.5", "-o", "set"],
     ] {
@@ -1034,6 +1040,20 @@ fn diff_speaks_like_idiff() {
             "{limit}: {refused}"
         );
     }
+}
+
+#[test]
+fn diff_compares_floats_as_they_are() {
+    use tiff::encoder::{TiffEncoder, colortype::RGB32Float};
+    let desk = Desk::new();
+    for (name, value) in [("a.tif", 2.0), ("b.tif", 3.0)] {
+        let file = std::fs::File::create(desk.path(name)).expect("a file");
+        let mut encoder = TiffEncoder::new(file).expect("a TIFF");
+        let written = encoder.write_image::<RGB32Float>(1, 1, &[value; 3]);
+        written.expect("a picture");
+    }
+    let told = text(&desk.run(&["diff", "a.tif", "b.tif"]).stdout);
+    assert!(told.contains("Max error  = 1 "), "{told}");
 }
 
 #[test]

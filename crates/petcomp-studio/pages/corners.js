@@ -314,7 +314,7 @@ function facts(camera) {
     ["Lens above surface", `${plusMinus(camera.height[0], camera.height[1], 3)} m`],
     ["Tilt", `${plusMinus(camera.tilt_deg[0], camera.tilt_deg[1], 1)}°`],
     ["Focal length", `${camera.focal_px.toFixed(0)} px ${focal}`],
-    ["Corners fit to", `${camera.rms_px.toFixed(2)} px`],
+    [`${camera.per_corner_px ? "Corners" : "Points"} fit to`, `${camera.rms_px.toFixed(2)} px`],
     ["Rectangle", `${camera.size.map((side) => side.toFixed(3)).join(" × ")} m`],
     ["Scale", `${camera.px_per_metre.toFixed(0)} px/m`],
     [`${(1000 * camera.reference_height).toFixed(0)} mm above it`, `drawn to ${camera.height_px.toFixed(1)} px`],

@@ -34,6 +34,9 @@ struct ResultGeometry {
     y: Option<f64>,
     width: Option<f64>,
     height: Option<f64>,
+    /// Of an ellipse.
+    #[serde(rename = "radiusX")]
+    radius_x: Option<f64>,
     rotation: f64,
     polygonlabels: Vec<String>,
     rectanglelabels: Vec<String>,
@@ -80,7 +83,20 @@ fn annotation(task: &Value) -> Result<Annotation> {
 impl Annotation {
     fn add(&mut self, result: &AnnotationResult) {
         self.size = Some([result.original_width, result.original_height]);
-        self.shapes.extend(result.shape());
+        if let Some(shape) = result.shape() {
+            self.add_region(shape);
+        }
+    }
+
+    /// A region has a result for each control that says something of it, all with its geometry:
+    /// they are one shape, with the first name that any of them gives.
+    fn add_region(&mut self, shape: AnnotatedShape) {
+        let mut shapes = self.shapes.iter_mut();
+        match shapes.find(|known| known.kind == shape.kind && known.points == shape.points) {
+            Some(known) if known.name.is_empty() => known.name = shape.name,
+            Some(_) => {}
+            None => self.shapes.push(shape),
+        }
     }
 }
 
@@ -138,7 +154,7 @@ impl AnnotationResult {
             return Some(self.points(ShapeKind::Polygon, geometry, points));
         }
         let corner = [geometry.x?, geometry.y?];
-        if geometry.keypointlabels.is_some() {
+        if geometry.is_point() {
             Some(self.points(ShapeKind::Points, geometry, &[corner]))
         } else {
             self.rectangle(geometry, corner)
@@ -177,6 +193,11 @@ impl AnnotationResult {
 }
 
 impl ResultGeometry {
+    /// A key point has a place and the `width` of its dot.
+    fn is_point(&self) -> bool {
+        self.keypointlabels.is_some() || (self.height.is_none() && self.radius_x.is_none())
+    }
+
     /// The first class that any of the tools gave it.
     fn name(&self) -> String {
         [&self.polygonlabels, &self.rectanglelabels, &self.labels]
@@ -329,6 +350,34 @@ mod tests {
             .label()
             .unwrap();
         assert_eq!(label.surface.corners_px.unwrap()[2], [108.0, 90.0]);
+    }
+
+    #[test]
+    fn key_points_of_labels_for_all_tools_are_points_and_ellipses_are_not() {
+        let drawn = |geometry: &str| -> Vec<AnnotatedShape> {
+            let result = r#""labels": ["tl"], "original_width": 200, "original_height": 100"#;
+            let task = format!(r#"[{{"img": "a.png", "kp": [{{{geometry}, {result}}}]}}]"#);
+            let annotations = super::super::annotations(&task).unwrap().unwrap();
+            annotations.into_iter().flat_map(|a| a.shapes).collect()
+        };
+        let point = AnnotatedShape {
+            kind: ShapeKind::Points,
+            name: "tl".into(),
+            points: vec![[10.0, 20.0]],
+        };
+        assert_eq!(drawn(r#""x": 5, "y": 20, "width": 0.3"#), [point]);
+        assert!(drawn(r#""x": 5, "y": 20, "radiusX": 1, "radiusY": 2"#).is_empty());
+    }
+
+    #[test]
+    fn a_region_that_two_controls_speak_of_is_one_shape() {
+        let choice = r#"{"original_width": 200, "original_height": 100, "image_rotation": 0, "type": "choices",
+            "value": {"points": [[5, 20], [55, 22], [54, 90], [4.5, 88]], "closed": true, "choices": ["clean"]}},"#;
+        for place in ["{\"original_width\"", "{\"type\": \"choices\""] {
+            let both = JSON.replace(place, &format!("{choice} {place}"));
+            let shapes = only(&both).shapes;
+            assert_eq!((shapes.len(), shapes[0].name.as_str()), (1, "tray"));
+        }
     }
 
     #[test]

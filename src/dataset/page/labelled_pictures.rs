@@ -155,8 +155,85 @@ pub(in crate::dataset) fn shares_of(b: &BBox, [w, h]: [f64; 2]) -> [f64; 4] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::camera::Camera;
+    use crate::dataset::index::DatasetIndex;
+    use crate::dataset::{
+        Extent, Obstructed, Pictures, Plan, Provenance, Sample, Sidecar, Yolo, generate,
+    };
     use crate::image::Image;
-    use crate::pixel::LinearRgb;
+    use crate::label::{Labels, ObjectLabel};
+    use crate::pixel::{LinearRgb, ObjectId};
+    use crate::scene::{CameraSource, Scene, Surface};
+    use std::sync::Arc;
+    use std::sync::atomic::AtomicBool;
+
+    /// A picture of 16 x 16 pixels: an object half under another.
+    fn half_hidden() -> Sample {
+        let bbox = |x0, x1| BBox {
+            x0,
+            y0: 2.0,
+            x1,
+            y1: 6.0,
+        };
+        let object = |id, visible_box, covered_by| ObjectLabel {
+            id: ObjectId(id),
+            amodal_box: bbox(2.0 * f64::from(id), 2.0 * f64::from(id) + 4.0),
+            visible_box,
+            visible_fraction: 0.5,
+            covered_by,
+            ..ObjectLabel::default()
+        };
+        let labels = Labels {
+            image: [16, 16],
+            objects: vec![
+                object(1, bbox(2.0, 4.0), vec![ObjectId(2)]),
+                object(2, bbox(4.0, 8.0), vec![]),
+            ],
+            ..Labels::default()
+        };
+        let camera = CameraSource::Known(Camera::looking_down(1.0, 20.0, [16, 16]));
+        let scene = Scene::new([16, 16], camera, Surface::new([0.4, 0.3]));
+        let grey = Image::filled(16, 16, LinearRgb::grey(0.2).opaque());
+        Sample {
+            provenance: Some(Provenance::from_scene(scene)),
+            ..Sample::new(grey, labels)
+        }
+    }
+
+    #[test]
+    fn boxes_of_what_is_seen_are_read_as_they_are_labelled() {
+        let folder = tempfile::tempdir().unwrap();
+        let yolo = Yolo {
+            boxes: Extent::Visible,
+            ..Yolo::default()
+        };
+        let plan = Plan {
+            obstructed: Obstructed::Keep,
+            writers: vec![
+                Arc::new(Pictures::default()),
+                Arc::new(yolo),
+                Arc::new(Sidecar),
+            ],
+            ..Plan::new(folder.path(), 1, vec!["cap".into()])
+        };
+        let sample = |_| Ok(half_hidden());
+        generate(&plan, sample, &|_| {}, &AtomicBool::new(false)).unwrap();
+        let summary = Summary::read(folder.path()).unwrap();
+        let own = LabelledSet::from_summary(folder.path(), &summary);
+        let read = LabelledSet::read(folder.path()).unwrap();
+        let expected = vec![
+            (0, [0.1875, 0.25, 0.125, 0.25]),
+            (0, [0.375, 0.25, 0.25, 0.25]),
+        ];
+        assert_eq!(own.boxes().copied().collect::<Vec<_>>(), expected);
+        assert_eq!(read.boxes().copied().collect::<Vec<_>>(), expected);
+        assert_eq!(summary.boxes, [[2.0, 4.0], [4.0, 4.0]]);
+        let index = DatasetIndex::open(folder.path()).unwrap();
+        assert_eq!(
+            index.facts(0).unwrap().objects[0].bbox,
+            [0.1875, 0.25, 0.125, 0.25]
+        );
+    }
 
     #[test]
     fn images_are_found_with_labels_in_either_place() {

@@ -5,6 +5,7 @@ use super::file::{
     CyclesPicture, CyclesQuad, CyclesRender, CyclesShape, CyclesSide, CyclesSize, CyclesTray,
 };
 use crate::asset::Texture;
+use crate::camera::Camera;
 use crate::error::{Error, Result};
 use crate::geom::Vector3;
 use crate::image::Image;
@@ -24,6 +25,9 @@ const SCRIPT_TEXT: &str = include_str!("../../../golden/render/scene_reference.p
 const SAMPLES_PER_PIXEL: u32 = 1024;
 /// Side of an endless surface for a program that needs a number, metres.
 const ENDLESS_SIDE_M: f64 = 1000.0;
+/// How far off the middle the script takes a principal point for the middle where a lens bends
+/// lines, pixels; and how far pixels that are not square may move the picture's side.
+const OFF_AXIS_PX: f64 = 0.05;
 
 /// Writes `scene.json`, its plate, textures and environment (float EXR), and the script that
 /// renders them in Blender.
@@ -35,12 +39,46 @@ const ENDLESS_SIDE_M: f64 = 1000.0;
 ///
 /// # Errors
 /// [`Error::File`] for what cannot be written; [`Error::Value`] for ids beyond 65 535, which
-/// Blender does not have.
+/// Blender does not have, and for a k1 beside an aperture, a principal point off the middle or
+/// pixels that are not square, which Cycles' bent lenses do not have.
 pub fn export(shot: &Shot, size: [f64; 2], folder: impl AsRef<Path>) -> Result<()> {
+    check_lens(shot)?;
     let folder = folder.as_ref();
     io::create_folder(folder)?;
     io::write_json(folder.join("scene.json"), &scene_file(shot, size, folder)?)?;
     io::write_text(folder.join(SCRIPT), SCRIPT_TEXT)
+}
+
+/// What the script refuses.
+fn check_lens(shot: &Shot) -> Result<()> {
+    if shot.k1 == 0.0 {
+        return Ok(());
+    }
+    if shot.thin_lens.is_some() {
+        return Err(bent_lens(shot.k1, "no f_number beside it"));
+    }
+    if off_axis_px(&shot.camera) > OFF_AXIS_PX {
+        let expected = "the principal point in the picture's middle and square pixels with it";
+        return Err(bent_lens(shot.k1, expected));
+    }
+    Ok(())
+}
+
+fn bent_lens(k1: f64, expected: &str) -> Error {
+    let what =
+        format!("{k1}, expected {expected}, or 0: Cycles has no other lens that bends lines");
+    Error::value("lens.k1", what)
+}
+
+/// How far the camera is from one with square pixels and the principal point in the middle, pixels.
+fn off_axis_px(camera: &Camera) -> f64 {
+    let [width, height] = camera.image.map(f64::from);
+    let (focal, principal) = (camera.focal_px, camera.principal_px);
+    let aspect = focal.x / focal.y;
+    let shift_x = principal.x - width / 2.0;
+    let shift_y = (principal.y - height / 2.0) * aspect;
+    let stretch = (aspect.max(1.0 / aspect) - 1.0) * width;
+    shift_x.abs().max(shift_y.abs()).max(stretch)
 }
 
 /// What `scene.json` holds, its pictures written.
@@ -127,7 +165,7 @@ fn write_card(folder: &Path, card: &Card) -> Result<CyclesQuad> {
         back: back
             .map(|back| write_side(folder, &format!("card_{id}_back"), back))
             .transpose()?,
-        hue_shift: card.grade.hue_deg,
+        hue_shift: card.grade.hue_deg % 360.0,
         saturation: card.grade.saturation,
         value: card.grade.value,
     })

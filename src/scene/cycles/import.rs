@@ -427,6 +427,33 @@ mod tests {
     }
 
     #[test]
+    fn what_the_script_refuses_is_refused_before() {
+        let folder = tempfile::tempdir().unwrap();
+        let told = |shot: &Shot| {
+            let written = export(shot, [0.4, 0.3], folder.path().join("scene"));
+            written.map_err(|e| e.to_string())
+        };
+        let off_axis = shot().with_k1(0.1);
+        let said = told(&off_axis).unwrap_err();
+        assert!(said.starts_with("lens.k1: 0.1, expected the"), "{said}");
+        let mut bent = off_axis;
+        bent.camera.focal_px = Vector2::new(11.0, 11.0);
+        bent.camera.principal_px = Point2::new(4.04, 3.0);
+        bent.thin_lens = Some(ThinLens {
+            aperture_m: 0.001,
+            focus_m: 1.0,
+        });
+        let said = told(&bent).unwrap_err();
+        assert!(said.contains("expected no f_number"), "{said}");
+        assert!(!folder.path().join("scene").exists());
+        bent.thin_lens = None;
+        bent.cards[0].grade.hue_deg = -730.0;
+        assert_eq!(told(&bent), Ok(()));
+        let back = import(folder.path().join("scene/scene.json"), None).unwrap();
+        assert_eq!(back.cards[0].grade.hue_deg, -10.0);
+    }
+
+    #[test]
     fn averaging_keeps_the_mean_and_the_places() {
         let photo = Image::from_fn(4, 1, |x, _| LinearRgb::grey(x as f32));
         let values = |w| {

@@ -1,8 +1,10 @@
 //! `petcomp camera export`: cameras in the files of other programs.
 
+use crate::distinct_files::check_distinct;
 use crate::print;
 use petcomp::camera::{CameraFile, ColmapModel, OpencvCamera};
 use petcomp::io;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
@@ -30,10 +32,18 @@ enum ExportFormat {
 }
 
 pub(super) fn export_cameras(args: &ExportCameraArgs) -> anyhow::Result<()> {
+    check_distinct(&args.cameras, &args.output)?;
     let (files, output) = (args.read_cameras()?, args.output.as_deref());
     match args.to {
-        ExportFormat::Colmap => write_colmap(output, &files),
-        ExportFormat::Blender => write_or_print(output, &blender_script(only_file(&files)?)),
+        ExportFormat::Colmap => {
+            check_names(&args.cameras, &files)?;
+            write_colmap(output, &files)
+        }
+        ExportFormat::Blender => {
+            let file = only_file(&files)?;
+            warn_of_bent_lines(&args.cameras[0], file);
+            write_or_print(output, &file.camera().to_blender_script())
+        }
         ExportFormat::Opencv => write_or_print(output, &opencv_document(only_file(&files)?)?),
     }
 }
@@ -45,12 +55,11 @@ impl ExportCameraArgs {
 }
 
 /// Blender's cameras have no lens that bends lines.
-fn blender_script(file: &CameraFile) -> String {
+fn warn_of_bent_lines(path: &Path, file: &CameraFile) {
     if file.k1() != 0.0 {
-        let (photo, k1) = (&file.image.file, file.k1());
-        log::warn!("{photo}: k1 = {k1:.4} of its lens is left out, Blender's cameras have none");
+        let (path, k1) = (path.display(), file.k1());
+        log::warn!("{path}: k1 = {k1:.4} of its lens is left out, Blender's cameras have none");
     }
-    file.camera().to_blender_script()
 }
 
 /// What OpenCV's functions take.
@@ -83,6 +92,26 @@ fn only_file(files: &[CameraFile]) -> anyhow::Result<&CameraFile> {
         [file] => Ok(file),
         _ => anyhow::bail!("{} cameras, expected one for this format", files.len()),
     }
+}
+
+/// COLMAP tells pictures apart by their names alone.
+fn check_names(paths: &[PathBuf], files: &[CameraFile]) -> anyhow::Result<()> {
+    let mut named = BTreeMap::new();
+    for (path, file) in paths.iter().zip(files) {
+        let (shown, name) = (path.display(), &file.image.file);
+        anyhow::ensure!(
+            !name.is_empty(),
+            "{shown}: image.file: empty, expected the picture's name for COLMAP"
+        );
+        if let Some(other) = named.insert(name, path) {
+            anyhow::bail!(
+                "{shown}: image.file: \"{name}\", which {} has too; COLMAP needs another name for \
+                 each picture: export these cameras into folders of their own",
+                other.display()
+            );
+        }
+    }
+    Ok(())
 }
 
 fn write_colmap(folder: Option<&Path>, files: &[CameraFile]) -> anyhow::Result<()> {

@@ -1,5 +1,6 @@
 //! `petcomp camera init` and `markers`: labels for photos.
 
+use crate::distinct_files::check_distinct;
 use crate::documents::stem_of;
 use crate::global::GlobalArgs;
 use crate::values::{parse_corners, parse_metres};
@@ -46,6 +47,7 @@ pub(super) fn init_label(args: &InitLabelArgs, global: &GlobalArgs) -> anyhow::R
     let path = args.output_path();
     let shown = path.display();
     args.check_is_free(&path)?;
+    check_distinct(args.like.iter().chain([&args.photo]), [&path])?;
     let label = args.with_markers(args.known_label(&path)?)?;
     io::write_text(&path, &camera::commented(&label)?)?;
     let corners = args.describe_corners(marker_corners(&label));
@@ -106,6 +108,8 @@ impl InitLabelArgs {
 }
 
 pub(super) fn add_markers(args: &MarkersArgs, global: &GlobalArgs) -> anyhow::Result<()> {
+    // The map may be the label to write: it gets its markers.
+    check_distinct([&args.photo], [&args.output])?;
     let label = with_markers_of(args.known_label()?, &args.photo, &args.map)?;
     io::write_json(&args.output, &label)?;
     let found = marker_corners(&label);

@@ -74,11 +74,18 @@ impl RectifyArgs {
     }
 
     fn write_top_view(&self, camera: &Camera, solution: &Solution) -> anyhow::Result<()> {
-        let px_per_metre = self.px_per_metre.unwrap_or(solution.fit.px_per_metre);
+        let of_photo = || px_per_metre_of_photo(camera, solution);
+        let px_per_metre = self.px_per_metre.unwrap_or_else(of_photo);
         let photo = Pyramid::new(io::read::<LinearRgb>(&self.photo)?);
         let view = camera::rectify(&photo, camera, solution.k1(), solution.size, px_per_metre)?;
         Ok(io::write(&self.output, &view)?)
     }
+}
+
+/// At the rectangle's centre, of a photo that may be a reduced one of the label's.
+fn px_per_metre_of_photo(camera: &Camera, solution: &Solution) -> f64 {
+    let [photo, label] = [camera, &solution.camera].map(|camera| f64::from(camera.image[0]));
+    solution.fit.px_per_metre * photo / label
 }
 
 /// The only label of a file.

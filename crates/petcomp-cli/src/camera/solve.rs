@@ -274,7 +274,8 @@ fn describe_focal(solution: &Solution) -> String {
 
 fn describe_errors(solution: &Solution) -> String {
     format!(
-        "corners to {:.2} px, {:.0} mm above the surface to {:.1} px",
+        "{} to {:.2} px, {:.0} mm above the surface to {:.1} px",
+        solution.fit.labelled(),
         solution.rms_px,
         1000.0 * solution.sigma.reference_height,
         solution.sigma.height_px

@@ -16,9 +16,10 @@ pub(super) struct CameraSummary {
     /// Focal length, pixels; its error is relative, none where nothing constrains it.
     focal_px: f64,
     focal_sigma: Option<f64>,
-    /// How far the corners are from where the camera sees them: root mean square and each, pixels.
+    /// How far the corners, or points where those alone are labelled, are from where the camera sees
+    /// them: root mean square, and of each corner, pixels.
     rms_px: f64,
-    per_corner_px: [f64; 4],
+    per_corner_px: Option<[f64; 4]>,
     /// Width and height of the rectangle, metres.
     size: [f64; 2],
     px_per_metre: f64,

@@ -35,7 +35,7 @@ struct ObjectShown {
     class: u32,
     /// The asset that it shows; empty where that is not known.
     asset: String,
-    /// Left, top, right and bottom of the whole object.
+    /// Left, top, right and bottom of its label; of the whole object where it has none.
     bbox: [f64; 4],
     /// The same of what is seen of it.
     visible_box: Option<[f64; 4]>,
