@@ -4,7 +4,7 @@ use super::MANIFEST;
 use super::entry::PhotoEntry;
 use super::folder::{CutOutWriter, lock, read_or_new};
 use super::library::{Library, Photo};
-use super::list::{List, find_list};
+use super::list::{List, check_reviews, find_list};
 use super::manifest::{Manifest, PhotoRecord};
 use super::review::Review;
 use super::screen_source::EmptyScreens;
@@ -120,6 +120,7 @@ fn checked(list: List, path: &Path, manifest: &mut Manifest) -> Result<List> {
     let list = list.with_bodies(|asset| manifest.known_body(asset));
     let list = list.located_in(path.parent().unwrap_or(Path::new("")));
     list.check_pictures()?;
+    check_reviews(&list.photos).map_err(|e| e.in_file(path))?;
     Ok(list)
 }
 

@@ -3,6 +3,7 @@
 use super::body::KnownBody;
 use super::entry::PhotoEntry;
 use super::manifest::{Manifest, check_each};
+use super::review::Review;
 use super::spreadsheet::{self, SpreadsheetRow};
 use crate::error::{Error, Result};
 use crate::io;
@@ -177,6 +178,28 @@ pub fn check_cut_out_files(photos: &[PhotoEntry]) -> Result<()> {
     Ok(())
 }
 
+/// No review that is there is that of two photos; their paths are relative to the working folder.
+///
+/// # Errors
+/// [`Error::Value`] for the second of them, naming the entry.
+pub(super) fn check_reviews(photos: &[PhotoEntry]) -> Result<()> {
+    let mut seen = BTreeMap::new();
+    for (i, photo) in photos.iter().enumerate() {
+        let review = Review::path_of(&photo.file);
+        let first = *seen.entry(review.clone()).or_insert(&photo.file);
+        if *first != photo.file && review.exists() {
+            let what = format!(
+                "\"{}\", has the same review {} as \"{}\"; rename one of these photos, and the review of that one",
+                photo.file.display(),
+                review.display(),
+                first.display()
+            );
+            return Err(Error::value(format!("photos[{i}].file"), what));
+        }
+    }
+    Ok(())
+}
+
 /// Fails where a photo gives another value than the first of its asset.
 fn check_same<T: PartialEq + Display>(name: &str, told: Option<T>, first: Option<T>) -> Result<()> {
     match (told, first) {
@@ -308,6 +331,20 @@ mod tests {
         let refusal = list.check(&mut Manifest::default()).unwrap_err();
         let expected = "photos[1].mass: 0.03, but another photo of the asset has 0.04";
         assert_eq!(refusal.to_string(), expected);
+    }
+
+    #[test]
+    fn photos_of_one_name_do_not_share_a_review() {
+        let folder = tempfile::tempdir().unwrap();
+        let text = "[[photos]]\nfile = \"one.png\"\nasset = \"a\"\nclass = \"c\"\nlength = 0.2\n\
+                    [[photos]]\nfile = \"one.jpg\"\nasset = \"b\"\nclass = \"c\"\nlength = 0.2\n";
+        let list: List = toml::from_str(text).unwrap();
+        let photos = list.located_in(folder.path()).photos;
+        check_reviews(&photos).unwrap();
+        std::fs::write(folder.path().join("one.review.json"), "").unwrap();
+        let told = check_reviews(&photos).unwrap_err().to_string();
+        let names = ["photos[1].file", "one.png", "one.jpg", "one.review.json"];
+        assert!(names.iter().all(|name| told.contains(name)), "{told}");
     }
 
     #[test]

@@ -123,6 +123,8 @@ pub(super) struct BendInput<'a> {
     pub(super) transmittance: &'a Image<f32>,
     /// Grey light of white over black.
     pub(super) light: &'a Image<f32>,
+    /// What of that the object lets pass, grey.
+    pub(super) passed: &'a Image<f32>,
 }
 
 impl BendInput<'_> {
@@ -154,10 +156,9 @@ impl BendInput<'_> {
         contrasts: &[[f32; 2]; 2],
     ) -> Transfer {
         let periods_px = [false, true].map(|is_fine| self.display.period_px(is_fine));
-        let passed = self.transmittance[at] * self.light[at];
         let of = |period: usize, axis: usize| {
             let Wave { phase, amplitude } = self.seen.waves[period][axis][at];
-            let whole = (contrasts[period][axis] * passed).max(1e-4);
+            let whole = (contrasts[period][axis] * self.passed[at]).max(1e-4);
             let norm = f64::from(amplitude / whole);
             from_polar(norm, phase - expected[axis] / periods_px[period])
         };

@@ -2,7 +2,7 @@
 
 use super::recognise::refused;
 use super::solve::BlackAndWhite;
-use super::view::{clipped, grey};
+use super::view::grey;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::Result;
 use crate::image::{Image, Mask};
@@ -13,16 +13,25 @@ const MAX_CLIPPED: f64 = 0.001;
 /// From here on nothing can be measured.
 const REFUSED_CLIPPED: f64 = 0.05;
 
+/// The warnings about photos of the white frame, each with where it is clipped.
+///
 /// # Errors
-/// [`Error::Photo`](crate::Error::Photo) where much of the white frame is clipped.
-pub(super) fn clipping(white: &Image<LinearRgb>, free: &Mask) -> Result<Option<Diagnostic>> {
-    let clipped = clipped(white).zip_map(free, |clipped, free| clipped && free);
+/// [`Error::Photo`](crate::Error::Photo) where much of one is clipped.
+pub(super) fn clipping(photos: &[(String, Mask)], free: &Mask) -> Result<Vec<Diagnostic>> {
+    let warnings = photos
+        .iter()
+        .map(|(name, clipped)| clipping_of(name, clipped, free));
+    warnings.filter_map(Result::transpose).collect()
+}
+
+fn clipping_of(photo: &str, clipped: &Mask, free: &Mask) -> Result<Option<Diagnostic>> {
+    let clipped = clipped.zip_map(free, |clipped, free| clipped && free);
     let share = clipped.count() as f64 / free.count().max(1) as f64;
     if share <= MAX_CLIPPED {
         return Ok(None);
     }
     let what = format!(
-        "{:.1} % of the white frame is clipped, expected at most {:.1} %; use a shorter exposure or a darker display",
+        "{photo}: {:.1} % of the white frame is clipped, expected at most {:.1} %; use a shorter exposure or a darker display",
         100.0 * share,
         100.0 * MAX_CLIPPED
     );

@@ -50,7 +50,7 @@ const RIM_SOFTNESS_PX: f32 = 0.6;
 /// # Errors
 /// Those of reading photos; [`Error::Photo`](crate::Error::Photo) where the black or the white
 /// frame is missing, photos of a frame show different things, white is clipped or uneven, no object
-/// lies within the display, or photos with it and without are exchanged.
+/// or more than one lies within the display, or photos with it and without are exchanged.
 pub fn measure(
     display: &Display,
     view: &View,
@@ -72,7 +72,16 @@ pub fn measure(
     diagnostics.extend(empty.drifts(reference));
     diagnostics.extend(photos.incomplete_stripes());
     diagnostics.extend(check::camera_motion(alignment.motion_px));
-    let scene = CaptureScene::new(display, view, &stack, empty_stack.as_ref())?;
+    let area = view.free_area(display);
+    if let Some(empty) = &empty_stack {
+        diagnostics.extend(check::clipping(&empty.clipped_white, &area)?);
+    }
+    let scene = CaptureScene::new(display, view, &stack, empty_stack.as_ref());
+    let scene = scene.or_else(|error| {
+        // What is clipped looks otherwise than the empty display.
+        check::clipping(&stack.clipped_white, &area)?;
+        Err(error)
+    })?;
     scene.solve(diagnostics)
 }
 
@@ -106,6 +115,7 @@ impl<'a> CaptureScene<'a> {
         // Once with all of the display, which the object shades a little, once without the object.
         let (_, rough) = found(&area)?;
         let (empty, object) = found(&without(&area, &rough))?;
+        object.check_alone()?;
         Ok(Self {
             display,
             view,
@@ -128,10 +138,10 @@ impl<'a> CaptureScene<'a> {
 
     fn solve(self, mut diagnostics: Vec<Diagnostic>) -> Result<Measured> {
         let frames = self.frames();
+        diagnostics.extend(check::clipping(&self.stack.clipped_white, &self.free)?);
         if self.empty_stack.is_some() {
             check::exchange(&frames, &self.object.coverage)?;
         }
-        diagnostics.extend(check::clipping(frames.white, &self.free)?);
         diagnostics.extend(check::bands(&frames, &self.free)?);
         diagnostics.extend(check::color_change(frames.empty_white, &self.free));
         let solved = self.film_input().solve(&self.kept());
@@ -155,6 +165,7 @@ impl<'a> CaptureScene<'a> {
             frames: self.frames(),
             stripes: &self.stack.stripes.mean,
             noise: self.noise(),
+            least_light: self.frames().least_light(&self.free),
             free: &self.free,
         }
     }
@@ -201,6 +212,9 @@ impl<'a> CaptureScene<'a> {
             &self.object.coverage,
             &self.free,
         ));
+        let light = frames.light();
+        // Grey last: a mean of products is not the product of means.
+        let passed = film.zip_map(&light, |film, light| grey(film.transmittance() * light));
         let input = BendInput {
             display: self.display,
             view: self.view,
@@ -209,7 +223,8 @@ impl<'a> CaptureScene<'a> {
             free: &self.free,
             coverage: &self.object.coverage,
             transmittance: &film.map(|film| grey(film.transmittance())),
-            light: &frames.light().map(grey),
+            light: &light.map(grey),
+            passed: &passed,
         };
         Some(input.solve())
     }

@@ -17,6 +17,8 @@ pub(super) struct Object {
     pub(super) outline: Outline,
     /// Share of the border at which the object stands out well.
     pub(super) distinct: f64,
+    /// What else lies on the display, specks too.
+    others: Mask,
 }
 
 /// Blur of the evidence before it is judged, pixels.
@@ -32,6 +34,12 @@ const EDGE_REACH_PX: usize = 3;
 const CLOSED_SHARE: f64 = 0.006;
 /// Smallest object, as a share of the view.
 pub(super) const MIN_AREA: f64 = 1e-3;
+/// Two things are two objects when the smaller one has at least this share of the larger one's area.
+const RIVAL_SHARE: f64 = 0.1;
+/// The same of things near to each other: they may be parts of one that is hardly seen between them.
+const NEAR_RIVAL_SHARE: f64 = 0.3;
+/// What is near, as a share of the view's shorter side.
+const NEAR_SHARE: f64 = 0.03;
 
 /// How much otherwise than empty the display looks, as a share of its white.
 pub(super) fn evidence(
@@ -60,7 +68,8 @@ impl Object {
         let rough = evidence.zip3_map(&strongest, free, |e, most, free| {
             free && most > threshold && e >= 0.5 * most
         });
-        let mask = solid(&rough);
+        let pieces = solid(&rough);
+        let mask = largest_piece(&pieces);
         let area = mask.count() as f64 / mask.pixels().len() as f64;
         if area < MIN_AREA {
             return Err(nothing_found(threshold));
@@ -72,7 +81,32 @@ impl Object {
             outline: Outline::around(&coverage),
             coverage,
             distinct,
+            others: pieces.zip_map(&mask, |piece, object| piece && !object),
         })
+    }
+
+    /// # Errors
+    /// [`Error::Photo`] where something else on the display could be an object of its own.
+    pub(super) fn check_alone(&self) -> Result<()> {
+        let object = self.coverage.map(|c| c.0 >= 0.5);
+        let (w, h) = object.size();
+        let near = filter::dilate(&object, NEAR_SHARE * w.min(h) as f64);
+        let other = largest_piece(&self.others);
+        let is_near = other.zip_map(&near, |other, near| other && near).count() > 0;
+        let share = if is_near {
+            NEAR_RIVAL_SHARE
+        } else {
+            RIVAL_SHARE
+        };
+        let least = f64::max(MIN_AREA * (w * h) as f64, share * object.count() as f64);
+        if (other.count() as f64) < least {
+            return Ok(());
+        }
+        let [one, other] = [&object, &other].map(place);
+        Err(refused(&format!(
+            "two objects, {one} and {other} of the display; photograph them one by one \
+             (or, if it is one, the display empty, too: --empty)"
+        )))
     }
 }
 
@@ -113,12 +147,12 @@ fn local_maximum(image: &Image<f32>, reach: usize) -> Image<f32> {
     })
 }
 
-/// The largest piece of a mask without gaps and holes.
+/// A mask without gaps and holes.
 fn solid(rough: &Mask) -> Mask {
     let (w, h) = rough.size();
     let radius = (CLOSED_SHARE * w.min(h) as f64).max(2.0);
     let closed = filled(&filter::dilate(rough, radius));
-    largest_piece(&filter::erode(&closed, radius))
+    filter::erode(&closed, radius)
 }
 
 /// The connected piece of most pixels.
@@ -128,6 +162,18 @@ fn largest_piece(mask: &Mask) -> Mask {
     // Of several the first.
     let largest = (0..sizes.len()).rev().max_by_key(|&group| sizes[group]);
     groups.only(|group| Some(group) == largest)
+}
+
+/// Description of where a set of pixels is in the middle, as shares of the picture.
+fn place(set: &Mask) -> String {
+    let (w, h) = set.size();
+    let pixels = (0..h).flat_map(|y| (0..w).map(move |x| (x, y)));
+    let (x, y) = pixels
+        .filter(|&at| set[at])
+        .fold((0, 0), |(i, j), (x, y)| (i + x, j + y));
+    let percent = |sum: usize, side: usize| 100 * sum / (set.count() * side).max(1);
+    let [x, y] = [percent(x, w), percent(y, h)];
+    format!("at {x} % of the width and {y} % of the height")
 }
 
 /// Fails where an object reaches the end of the free area.
@@ -206,6 +252,32 @@ mod tests {
             "{area} for {expected}"
         );
         assert!(object.distinct > 0.99);
+    }
+
+    #[test]
+    fn two_objects_are_refused_and_parts_of_one_are_not() {
+        let free = Image::filled(600, 300, true);
+        let checked = |wide: usize, gap: usize| {
+            let start = 240 + gap;
+            let evidence = Image::from_fn(600, 300, |x, y| {
+                let inside = (120..240).contains(&x) || (start..start + wide).contains(&x);
+                if inside && (90..210).contains(&y) {
+                    0.5
+                } else {
+                    0.002
+                }
+            });
+            Object::find(&evidence, &free).unwrap().check_alone()
+        };
+        let told = checked(90, 150).unwrap_err().to_string();
+        assert!(
+            told.contains("two objects, at 29 % of the width and 49 % of the height and at 72 %"),
+            "{told}"
+        );
+        assert!(checked(60, 6).is_err());
+        // A small thing, and the cap of a bottle whose neck is hardly seen.
+        assert!(checked(9, 150).is_ok());
+        assert!(checked(24, 6).is_ok());
     }
 
     #[test]

@@ -26,6 +26,8 @@ pub(super) struct BlackAndWhite<'a> {
 
 /// Least light of the display, as a share of its brightest, that a channel is divided by.
 const MIN_LIGHT: f32 = 1e-3;
+/// No display is darker in a photo.
+const DARKEST: f32 = 1e-6;
 
 impl BlackAndWhite<'_> {
     /// What the display shines more for white than for black.
@@ -34,15 +36,31 @@ impl BlackAndWhite<'_> {
             .zip_map(self.empty_black, |w, k| w.add_scaled(-1.0, k))
     }
 
+    /// Light of the display's brightest channel, where it is free.
+    fn brightest(&self, free: &Mask) -> f32 {
+        let light = self.light();
+        let pixels = light.pixels().iter().zip(free.pixels());
+        let values = pixels
+            .filter(|(_, free)| **free)
+            .map(|(p, _)| p.max_channel());
+        median(values, f32::total_cmp).unwrap_or(1.0).max(DARKEST)
+    }
+
+    /// Least light of the display that a channel is divided by.
+    pub(super) fn least_light(&self, free: &Mask) -> f32 {
+        MIN_LIGHT * self.brightest(free)
+    }
+
     /// How a photo's noise grows with light, by the free pixels of both frames.
     pub(super) fn noise(&self, free: &Mask) -> Noise {
         let black = Spread::of(self.black, self.empty_black, free);
         let white = Spread::of(self.white, self.empty_white, free);
-        let slope = (white.variance - black.variance) / (white.light - black.light).max(MIN_LIGHT);
-        let slope = slope.max(0.0);
+        let light = (white.light - black.light).max(self.least_light(free));
+        let slope = ((white.variance - black.variance) / light).max(0.0);
         Noise {
             dark: (black.variance - slope * black.light).max(0.0),
             slope,
+            least: MIN_VARIANCE * self.brightest(free).powi(2),
             empty: 0.0,
         }
     }
@@ -54,6 +72,8 @@ pub(super) struct FilmInput<'a> {
     /// Mean of all stripes with the object; empty where there are none.
     pub(super) stripes: &'a Image<LinearRgb>,
     pub(super) noise: Noise,
+    /// Least light of the display that a channel is divided by.
+    pub(super) least_light: f32,
     /// Pixels that surely show the empty display.
     pub(super) free: &'a Mask,
 }
@@ -135,7 +155,7 @@ impl FilmInput<'_> {
         let stripes = (!self.stripes.is_empty()).then(|| self.stripes[at].channels());
         let level = level.channels();
         [0, 1, 2].map(|c: usize| {
-            let light = (white[c] - black[c]).max(MIN_LIGHT);
+            let light = (white[c] - black[c]).max(self.least_light);
             let weight = |seen: f32| {
                 if clipped {
                     0.0
@@ -174,7 +194,7 @@ impl FilmInput<'_> {
             .stripes
             .zip3_map(frames.empty_black, &light, |mean, black, light| {
                 by_channel(mean, black, light, |mean, black, light| {
-                    (mean - black) / light.max(MIN_LIGHT)
+                    (mean - black) / light.max(self.least_light)
                 })
             });
         let of = |channel: usize| {
@@ -193,7 +213,7 @@ impl FilmInput<'_> {
         }
         let (v, light) = (film.transmittance().channels(), light.channels());
         let of = |c: usize| {
-            let plate = v[c] * v[c] * self.noise.empty / light[c].max(MIN_LIGHT).powi(2);
+            let plate = v[c] * v[c] * self.noise.empty / light[c].max(self.least_light).powi(2);
             libm::sqrtf(lines[c].variance + plate)
         };
         [0, 1, 2].map(of).into_iter().fold(0.0, f32::max).min(1.0)
@@ -260,7 +280,7 @@ fn by_channel(
     LinearRgb::new(f(a.r, b.r, c.r), f(a.g, b.g, c.g), f(a.b, b.b, c.b))
 }
 
-/// Variance that no photo is better than: that of 12 bits.
+/// Variance that no photo is better than, where the display's brightest light is 1: that of 12 bits.
 const MIN_VARIANCE: f32 = 5e-9;
 
 /// Variance of a pixel by its light.
@@ -268,13 +288,15 @@ const MIN_VARIANCE: f32 = 5e-9;
 pub(super) struct Noise {
     pub(super) dark: f32,
     pub(super) slope: f32,
+    /// What no photo is better than.
+    pub(super) least: f32,
     /// Of the empty display, where that was photographed and not fitted.
     pub(super) empty: f32,
 }
 
 impl Noise {
     fn of(&self, light: f32) -> f32 {
-        (self.dark + self.slope * light.max(0.0)).max(MIN_VARIANCE)
+        (self.dark + self.slope * light.max(0.0)).max(self.least)
     }
 
     /// Variance of white, as it is seen empty.
@@ -326,6 +348,7 @@ mod tests {
             frames,
             stripes,
             noise: frames.noise(free),
+            least_light: frames.least_light(free),
             free,
         };
         input.solve(inside)
@@ -358,6 +381,30 @@ mod tests {
             assert!(off < 1e-5, "{got:?} for {expected:?}");
         }
         assert_eq!(film[(6, 2)], Film::default());
+    }
+
+    #[test]
+    fn dark_photos_have_the_same_transmittance() {
+        let (f, v) = (LinearRgb::grey(0.05), LinearRgb::new(0.9, 0.5, 0.1));
+        let free = Image::from_fn(8, 6, |x, _| x >= 4);
+        let inside = free.map(|free| Coverage(if free { 0.0 } else { 1.0 }));
+        let transmittance = |exposure: f32| {
+            let [empty_black, empty_white] = [0.03, 0.8].map(|level| flat(exposure * level));
+            let seen = |empty: &Image<LinearRgb>| empty.map(|e| f.scale(exposure) + v * e);
+            let frames = BlackAndWhite {
+                black: &seen(&empty_black),
+                white: &seen(&empty_white),
+                empty_black: &empty_black,
+                empty_white: &empty_white,
+            };
+            let film = solved(frames, &Image::new(0, 0), &free, &inside).film;
+            film[(2, 2)].transmittance()
+        };
+        for exposure in [1.0, 1e-3] {
+            let got = transmittance(exposure);
+            let off = got.add_scaled(-1.0, v).map(f32::abs).max_channel();
+            assert!(off < 1e-4, "{got:?} at {exposure}");
+        }
     }
 
     #[test]

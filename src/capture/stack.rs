@@ -5,12 +5,12 @@ use super::draw::PAPER_LIGHT;
 use super::frame::{Frame, SHIFTS, Stripes};
 use super::object::MIN_AREA;
 use super::recognise::{FramePhoto, map_in_front, refused};
-use super::view::{View, grey};
+use super::view::{View, clipped, grey};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
 use crate::filter;
 use crate::geom::Homography;
-use crate::image::Image;
+use crate::image::{Image, Mask};
 use crate::pixel::{LinearRgb, Mix};
 use rayon::prelude::*;
 
@@ -56,6 +56,8 @@ pub struct Photos<'a> {
 pub(super) struct Stack {
     pub(super) black: Image<LinearRgb>,
     pub(super) white: Image<LinearRgb>,
+    /// Where each photo of white is clipped, after its name.
+    pub(super) clipped_white: Vec<(String, Mask)>,
     /// Nothing where photos of some are missing.
     pub(super) stripes: StripeStack,
 }
@@ -129,12 +131,17 @@ impl<'a> Alignment<'a> {
         }
     }
 
-    /// A photo in the view, exposed as the reference.
-    fn aligned(&self, photos: &Photos<'_>, i: usize) -> Result<Image<LinearRgb>> {
+    /// A photo in the view.
+    fn seen(&self, photos: &Photos<'_>, i: usize) -> Result<Image<LinearRgb>> {
         let photo = &photos.recognised[i];
         let map = self.steady.unwrap_or(photo.photo_from_display);
-        let [r, g, b] = photo.exposure_to(self.reference);
-        let seen = self.view.seen((photos.sources.read)(i)?, &map);
+        Ok(self.view.seen((photos.sources.read)(i)?, &map))
+    }
+
+    /// The same, exposed as the reference.
+    fn aligned(&self, photos: &Photos<'_>, i: usize) -> Result<Image<LinearRgb>> {
+        let [r, g, b] = photos.recognised[i].exposure_to(self.reference);
+        let seen = self.seen(photos, i)?;
         Ok(seen.map(|p| LinearRgb::new(r * p.r, g * p.g, b * p.b)))
     }
 
@@ -177,6 +184,7 @@ impl<'a> Alignment<'a> {
         Ok(Stack {
             black: self.needed(photos, Frame::Black)?,
             white: self.needed(photos, Frame::White)?,
+            clipped_white: self.clipped_white(photos)?,
             stripes: self.stripes(photos)?,
         })
     }
@@ -188,6 +196,17 @@ impl<'a> Alignment<'a> {
                 "no photo of the {frame} frame among {names}; expected black and white at least"
             ))
         })
+    }
+
+    /// Where each photo of white is clipped, before its exposure is changed.
+    fn clipped_white(&self, photos: &Photos<'_>) -> Result<Vec<(String, Mask)>> {
+        let numbers = photos.of_frame(Frame::White).into_iter();
+        numbers
+            .map(|i| {
+                let seen = self.seen(photos, i)?;
+                Ok((photos.sources.names[i].clone(), clipped(&seen)))
+            })
+            .collect()
     }
 
     /// The stripes, where there are photos of all of them.

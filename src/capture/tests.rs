@@ -390,6 +390,39 @@ fn aslant(photo: &Image<LinearRgb>) -> Image<LinearRgb> {
     })
 }
 
+/// A photo of the bare display, its white yellowish, through a clear blue sheet.
+fn through_blue(photo: &Image<LinearRgb>) -> Image<LinearRgb> {
+    let (yellowish, blue) = (LinearRgb::new(1.0, 0.9, 0.6), LinearRgb::new(0.1, 0.1, 0.9));
+    let map = display_from_photo([0.0; 2]);
+    Image::from_fn(PHOTO.0, PHOTO.1, |x, y| {
+        let at = map.map(Point2::new(x as f64 + 0.5, y as f64 + 0.5));
+        let light = yellowish * photo[(x, y)];
+        if is_inside([at.x, at.y]) {
+            blue * light
+        } else {
+            light
+        }
+    })
+}
+
+#[test]
+fn a_clear_coloured_sheet_has_no_haze_on_a_display_of_another_colour() {
+    let bare = Conditions {
+        has_object: false,
+        ..STILL
+    };
+    let photos: Vec<_> = frames(true)
+        .into_iter()
+        .map(|frame| through_blue(&photo(frame, bare)))
+        .collect();
+    let (view, measured) = measured_of(&photos, &[]).unwrap();
+    let paths = measured.refraction.unwrap().paths;
+    let places = inner_places(&view);
+    let sum: f32 = places.iter().map(|(pixel, _)| paths[*pixel].haze).sum();
+    let haze = sum / places.len() as f32;
+    assert!(haze < 0.03, "{haze}");
+}
+
 #[test]
 fn a_display_whose_colour_changes_from_side_to_side_is_fitted() {
     let photos: Vec<_> = frames(false)
@@ -444,6 +477,30 @@ fn photos_of_a_frame_with_the_object_and_without_are_refused() {
         ..STILL
     };
     assert!(with(again).is_ok());
+}
+
+#[test]
+fn a_photo_that_clips_is_named_where_the_others_do_not() {
+    let shots = |has_object, exposure| {
+        let conditions = Conditions {
+            has_object,
+            exposure,
+            ..STILL
+        };
+        let photos = frames(false).into_iter();
+        photos
+            .map(|frame| photo(frame, conditions).map(|p| p.map(|v| v.min(1.0))))
+            .collect::<Vec<_>>()
+    };
+    let bright: fn(Frame) -> f32 = |_| 1.15;
+    for [with, without] in [[STILL.exposure, bright], [bright, STILL.exposure]] {
+        let told = measured_of(&shots(true, with), &shots(false, without)).err();
+        let told = told.unwrap().to_string();
+        assert!(
+            told.contains("photo 1: ") && told.contains("of the white frame is clipped"),
+            "{told}"
+        );
+    }
 }
 
 #[test]

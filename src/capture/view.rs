@@ -6,6 +6,7 @@ use crate::camera::warp;
 use crate::filter::Pyramid;
 use crate::geom::{Homography, Point2};
 use crate::image::{Image, Mask};
+use crate::matte::ends_at_one;
 use crate::pixel::{LinearRgb, Mix};
 use nalgebra::{Matrix3, Vector3};
 
@@ -86,12 +87,9 @@ pub(super) fn grey(light: LinearRgb) -> f32 {
 
 /// A channel from here on is clipped, in photos that end at 1.
 const CLIPPED: f32 = 0.985;
-/// Pictures that are brighter than this somewhere do not end at 1.
-const UNLIMITED: f32 = 1.05;
 
 /// Where a photo is clipped; nowhere in one that does not end at 1.
 pub(super) fn clipped(photo: &Image<LinearRgb>) -> Mask {
-    let values = photo.pixels().iter().map(|p| p.max_channel());
-    let is_limited = values.fold(0.0, f32::max) <= UNLIMITED;
+    let is_limited = ends_at_one(photo);
     photo.map(|p| is_limited && p.max_channel() >= CLIPPED)
 }

@@ -6,6 +6,7 @@ mod options;
 pub use options::{Boundary, CutOutOptions, MatteMethod};
 
 use super::check::check_photo;
+use super::clipping::clipping_level;
 use super::film::ColorUncertainty;
 use super::outline::Outline;
 use super::plate::{PlateOptions, ScreenPlate};
@@ -403,12 +404,14 @@ fn softened(mask: &Image<Coverage>, sigma_px: f32) -> Image<Coverage> {
     filter::gaussian_blur(mask, sigma_px).map(|c| Coverage(c.0.clamp(0.0, 1.0)))
 }
 
-/// Share of the pixels outside a mask with a channel of `clipped` or more.
+/// Share of the pixels outside a mask with a channel that is clipped, in photos that end at 1 from
+/// `clipped` on.
 fn clipped_share(photo: &Image<LinearRgb>, mask: &Image<Coverage>, clipped: f32) -> f32 {
+    let level = clipping_level(photo, clipped);
     let pixels = photo.pixels().iter().zip(mask.pixels());
     let outside = pixels.filter(|(_, m)| m.0 <= 0.0);
     let (all, count) = outside.fold((0_u64, 0_u64), |(all, count), (p, _)| {
-        (all + 1, count + u64::from(p.max_channel() >= clipped))
+        (all + 1, count + u64::from(p.max_channel() >= level))
     });
     count as f32 / all.max(1) as f32
 }
@@ -480,6 +483,16 @@ mod tests {
                 screen
             }
         })
+    }
+
+    #[test]
+    fn a_bright_screen_is_not_clipped_where_the_photo_does_not_end_at_1() {
+        let photo = slab(GREEN);
+        let share = |exposure: f32| {
+            let exposed = photo.map(|p| p.scale(exposure));
+            clipped_share(&exposed, &Image::new(120, 80), 0.98)
+        };
+        assert_eq!([1.0, 3.0].map(share), [0.0; 2]);
     }
 
     #[test]

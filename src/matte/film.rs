@@ -17,6 +17,7 @@ pub(super) use view::view;
 
 use super::arrays::largest;
 use super::check::{check_coverage, check_photo, check_positive, check_value};
+use super::clipping::clipping_level;
 use super::plate::ScreenPlate;
 use super::prepared::{check_finite, longer_side};
 use super::screen::{is_keyable, strongest_channel};
@@ -30,6 +31,7 @@ use crate::stopwatch::Stopwatch;
 use serde::{Deserialize, Serialize};
 use solve::{Factor, Solver};
 use std::borrow::Cow;
+use std::ops::RangeInclusive;
 use tint::{DARKEST_SHARE, Tint, TintSamples};
 
 /// How film is solved for.
@@ -40,7 +42,8 @@ pub struct FilmOptions {
     /// it; none = from the photo. Default: none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub flat: Option<LinearRgb>,
-    /// Scene-linear value from which on a channel is clipped. Default: 0.98.
+    /// Scene-linear value from which on a channel is clipped. Up to 1.05 it speaks of photos that end
+    /// at 1: one that is brighter than 1.05 somewhere is clipped nowhere. Default: 0.98.
     pub clipped: f32,
     /// How far the thickness of plastic scatters around that of two walls, as a share: the prior
     /// where the photo shows too little. Default: 0.35.
@@ -129,7 +132,7 @@ pub fn film(
     options.check()?;
     check_finite(photo)?;
     check_coverage(inside)?;
-    solve_film(FilmInput::whole(photo, plate, inside), options)
+    solve_film(FilmInput::whole(photo, plate, inside, options), options)
 }
 
 /// A photo on its screen, or the part of it around the object: there is nothing to solve elsewhere.
@@ -145,6 +148,8 @@ pub(super) struct FilmInput<'a> {
     pub(super) screen: LinearRgb,
     /// Longer side of the whole photo, pixels.
     pub(super) longer_side: usize,
+    /// Value from which on a channel of the photo is clipped; infinite where none is.
+    pub(super) clipped: f32,
     /// Which pixels a person says are see-through, and which are not.
     pub(super) claims: Option<&'a Claims>,
 }
@@ -152,6 +157,29 @@ pub(super) struct FilmInput<'a> {
 /// As [`film`], with options that are checked.
 pub(super) fn solve_film(object: FilmInput<'_>, options: &FilmOptions) -> Result<FilmMatte> {
     object.check()?;
+    Ok(match exposure_gain(object.screen) {
+        Some(gain) => object.solve_exposed(gain, options),
+        None => solve_as_exposed(object, options),
+    })
+}
+
+/// Mean light of a screen's strongest channel that the constants of this stage hold for. They were
+/// found at 0.3 to 0.45.
+const SCREEN_LIGHT: RangeInclusive<f32> = 0.25..=0.55;
+/// Screens that are darker by more than this show nothing that noise does not hide.
+const MAX_GAIN: f32 = 1000.0;
+
+/// What brings a photo to the nearest exposure that the constants hold for; none where it has one,
+/// or nothing that tells it: grey boards are of any brightness.
+fn exposure_gain(screen: LinearRgb) -> Option<f32> {
+    let light = screen.max_channel();
+    let wanted = light.clamp(*SCREEN_LIGHT.start(), *SCREEN_LIGHT.end());
+    let is_off = is_keyable(screen) && wanted != light;
+    is_off.then(|| (wanted / light).min(MAX_GAIN))
+}
+
+/// As [`solve_film`], of a photo that is exposed as it should be.
+fn solve_as_exposed(object: FilmInput<'_>, options: &FilmOptions) -> FilmMatte {
     let mut watch = Stopwatch::start();
     let solution = FilmSolution::new(object, options);
     let tint = solution.tint();
@@ -166,7 +194,7 @@ pub(super) fn solve_film(object: FilmInput<'_>, options: &FilmOptions) -> Result
     };
     watch.lap("compose");
     watch.log("film");
-    Ok(matte)
+    matte
 }
 
 impl<'a> FilmInput<'a> {
@@ -174,6 +202,7 @@ impl<'a> FilmInput<'a> {
         photo: &'a Image<LinearRgb>,
         plate: &'a ScreenPlate,
         inside: &'a Image<Coverage>,
+        options: &FilmOptions,
     ) -> Self {
         Self {
             photo,
@@ -181,7 +210,28 @@ impl<'a> FilmInput<'a> {
             inside,
             screen: plate.color(),
             longer_side: longer_side(photo),
+            clipped: clipping_level(photo, options.clipped),
             claims: None,
+        }
+    }
+
+    /// The film by the photo exposed by a factor more, with the light of the photo as it is:
+    /// `photo = F + T * plate` holds at any exposure.
+    fn solve_exposed(self, gain: f32, options: &FilmOptions) -> FilmMatte {
+        let exposed = FilmInput {
+            photo: &self.photo.map(|p| p.scale(gain)),
+            plate: &self.plate.exposed(gain),
+            screen: self.screen.scale(gain),
+            clipped: self.clipped * gain,
+            ..self
+        };
+        let matte = solve_as_exposed(exposed, options);
+        FilmMatte {
+            film: matte.film.map(|f| Film {
+                color: f.color.scale(gain.recip()),
+                ..f
+            }),
+            ..matte
         }
     }
 
@@ -297,6 +347,7 @@ impl<'a> FilmSolution<'a> {
             plate,
             inside,
             longer_side,
+            clipped,
             claims,
             ..
         } = self.object;
@@ -312,7 +363,7 @@ impl<'a> FilmSolution<'a> {
         );
         let keyed_away = uncertainty::keyed_away(factors, inside, flat[self.key], longer_side);
         watch.lap("paint");
-        let clipped = bright::fill_glints(factors, photo, inside, self.options.clipped);
+        let clipped = bright::fill_glints(factors, photo, inside, clipped);
         claimed::make_opaque(factors, claims);
         watch.lap("glints");
         ColorUncertainty {

@@ -19,6 +19,7 @@ mod arrays;
 mod channel_key;
 mod check;
 mod chroma_key;
+mod clipping;
 mod color_spill;
 mod cut_out;
 mod difference_key;
@@ -40,6 +41,8 @@ mod triangulate;
 pub use channel_key::{ChannelKeyOptions, ChannelKeyed, ChannelLimit, KeySpace, channel_key};
 #[doc(hidden)]
 pub use chroma_key::{ChromaKeyOptions, chroma_key};
+#[cfg(feature = "pipeline")]
+pub(crate) use clipping::ends_at_one;
 #[doc(hidden)]
 pub use color_spill::{ColorSpillOptions, SpillChannel, SpillLimit, color_spill};
 #[doc(hidden)]

@@ -186,6 +186,15 @@ impl ScreenPlate {
         }
     }
 
+    /// The plate in a photo that is exposed by a factor more.
+    pub(super) fn exposed(&self, gain: f32) -> Self {
+        Self {
+            image: self.image.map(|k| k.scale(gain)),
+            residual: self.residual.scale(gain),
+            ..*self
+        }
+    }
+
     /// A plate with its unevenness and its deviation from a photo.
     fn measured(
         image: Image<LinearRgb>,

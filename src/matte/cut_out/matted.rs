@@ -4,6 +4,7 @@ use super::{CleanScreen, CutOutOptions, MatteMethod, ObjectRegion};
 use crate::diagnostic::Diagnostic;
 use crate::error::Result;
 use crate::image::{Image, Mask};
+use crate::matte::clipping::clipping_level;
 use crate::matte::film::{ColorUncertainty, FilmInput, FilmMatte, solve_film};
 use crate::matte::key::{Keying, Screen};
 use crate::matte::prepared::Prepared;
@@ -53,6 +54,7 @@ impl Matted {
             inside: &region.cut,
             screen: screen.color,
             longer_side: prepared.longer_side(),
+            clipped: clipping_level(prepared.photo, options.film.clipped),
             claims: region.claims.as_ref(),
         };
         solve_film(object, &options.film).map(Self::from)

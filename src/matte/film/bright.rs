@@ -90,7 +90,7 @@ const FILLED_SIGMA: f32 = 0.35;
 
 /// Gives pixels under glints the factor of their surroundings, as far as they are hidden: clipped
 /// ones wholly, others only more of it, since what reflects much is treated as paint by itself.
-/// Gives the share of the object that is clipped.
+/// Gives the share of the object that is clipped, from `clipped_at` on.
 pub(super) fn fill_glints(
     factors: &mut Image<Factor>,
     photo: &Image<LinearRgb>,

@@ -155,6 +155,34 @@ fn tinted_plastic_keeps_its_tint() {
 }
 
 #[test]
+fn the_tint_of_plastic_depends_on_no_exposure() {
+    let flat = [0.23, 0.45, 0.28];
+    let haze = LinearRgb::from(tint::scattered_tint(flat)).scale(0.01);
+    let photo = Image::from_fn(SIZE.0, SIZE.1, |x, y| {
+        let thickness = 0.9 + 0.2 * x as f32 / SIZE.0 as f32;
+        let plastic = haze + LinearRgb::from(flat).scale(thickness) * GREEN;
+        if is_inside(x, y) { plastic } else { GREEN }
+    });
+    let solved = |exposure: f32| {
+        let plate = ScreenPlate::even(GREEN.scale(exposure), SIZE);
+        let exposed = photo.map(|p| p.scale(exposure));
+        film(&exposed, &plate, &inside(), &FilmOptions::default()).unwrap()
+    };
+    let bright = solved(1.0);
+    for exposure in [0.5, 0.25, 4.0] {
+        let found = solved(exposure);
+        let off = (0..3).map(|c| found.flat.channels()[c] - bright.flat.channels()[c]);
+        let most = off.fold(0.0, |most: f32, off| most.max(off.abs()));
+        assert!(most < 0.02, "{:?} at {exposure}", found.flat);
+        let [sure, usual] = [&found, &bright].map(|f| f.color_uncertainty.confidence());
+        assert!(sure < usual + 0.1, "{sure} at {exposure}, {usual} at 1");
+        let shown = found.shaded()[(90, 60)].over_color(GREEN.scale(exposure));
+        let off = shown.g / exposure - photo[(90, 60)].g;
+        assert!(off.abs() < 1e-4, "{off} at {exposure}");
+    }
+}
+
+#[test]
 fn nothing_of_the_screen_is_left_in_the_reflected_light() {
     let found = World {
         noise: 0.0,

@@ -57,8 +57,11 @@ const TINT_SAMPLES: usize = 400;
 /// Share of the screen's strongest channel from which on, in the screen's shade, a pixel is bare
 /// screen: plastic passes three quarters at most.
 const MIN_BARE_SHARE: f32 = 0.9;
-/// Noise of a pixel: least, and as a share of its value.
-const PIXEL_NOISE: [f32; 2] = [0.004, 0.05];
+/// Noise of a pixel as shares of the screen's strongest channel and of its own value: the tint that
+/// is found depends on no exposure.
+const PIXEL_NOISE: [f32; 2] = [0.01, 0.05];
+/// The same at least: a black screen has no share.
+const MIN_PIXEL_NOISE: f32 = 1e-6;
 /// Misfit beyond which a pixel is something else than plastic.
 const MAX_MISFIT: f32 = 25.0;
 /// Weight of thickness: the misfit of plastic that is twice as see-through as it should be.
@@ -165,7 +168,7 @@ impl TintSamples {
         let fits: Vec<PixelFit> = self
             .pixels
             .iter()
-            .map(|pair| pair.explained_by(flat, scattered))
+            .map(|pair| pair.explained_by(flat, scattered, self.key))
             .collect();
         let misfit = median_or_zero(fits.iter().map(|fit| fit.misfit));
         let thickness = median_or_zero(fits.iter().map(|fit| fit.thickness));
@@ -259,14 +262,14 @@ impl ScreenPair {
     }
 
     #[inline(always)]
-    fn noise(&self) -> [f32; 3] {
-        self.pixel
-            .map(|p| PIXEL_NOISE[0] + PIXEL_NOISE[1] * p.max(0.0))
+    fn noise(&self, key: usize) -> [f32; 3] {
+        let least = (PIXEL_NOISE[0] * self.screen[key]).max(MIN_PIXEL_NOISE);
+        self.pixel.map(|p| least + PIXEL_NOISE[1] * p.max(0.0))
     }
 
     /// Least squares over the channels, in units of their noise, with neither coefficient negative.
-    fn explained_by(&self, flat: [f32; 3], scattered: [f32; 3]) -> PixelFit {
-        let noise = self.noise();
+    fn explained_by(&self, flat: [f32; 3], scattered: [f32; 3], key: usize) -> PixelFit {
+        let noise = self.noise(key);
         let through = std::array::from_fn(|c| flat[c] * self.screen[c] / noise[c]);
         let body = std::array::from_fn(|c| scattered[c] / noise[c]);
         let seen = std::array::from_fn(|c| self.pixel[c] / noise[c]);
