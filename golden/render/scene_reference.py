@@ -637,7 +637,9 @@ def check_distortion(spec):
     if not cam["k1"]:
         return
     _, _, _, shift_x, shift_y, ax, ay = camera_to_blender(cam, r["width"], r["height"])
-    if max(abs(v) for v in (shift_x, shift_y, ax - ay)) * r["width"] > OFF_AXIS_PX:
+    # In the camera's own pixels: the lens is the same at any --size.
+    own_width = cam["resolution"][0] if "resolution" in cam else r["width"]
+    if max(abs(v) for v in (shift_x, shift_y, ax - ay)) * own_width > OFF_AXIS_PX:
         _fail("camera.k1", "needs square pixels and the principal point in the middle")
     if "aperture" in cam:
         _fail("camera.k1", "cannot be had together with camera.aperture")

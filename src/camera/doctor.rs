@@ -71,10 +71,10 @@ fn focal_line(solution: &Solution) -> String {
 
 fn source_text(source: FocalSource) -> &'static str {
     match source {
-        FocalSource::Measured => "measured by the corners",
-        FocalSource::Mixed => "partly from the corners, partly from what was known before",
+        FocalSource::Measured => "measured in the picture",
+        FocalSource::Mixed => "partly from the picture, partly from what was known before",
         FocalSource::Prior => {
-            "only from what was known before: from so nearly straight above, the corners do not show it"
+            "only from what was known before: from so nearly straight above, the picture does not show it"
         }
         FocalSource::Fixed => "as given",
         FocalSource::Unbounded => "a bound, not a value: nothing constrains it",
@@ -190,7 +190,7 @@ mod tests {
     fn from_above_the_advice_is_to_measure_the_height() {
         let text = say(0.5);
         assert!(
-            text.contains("the corners do not show it") && text.contains("Measure the height"),
+            text.contains("the picture does not show it") && text.contains("Measure the height"),
             "{text}"
         );
     }
@@ -245,7 +245,7 @@ mod tests {
     fn from_the_side_there_is_no_advice() {
         let text = say(45.0);
         assert!(
-            text.contains("measured by the corners") && !text.contains("Measure"),
+            text.contains("measured in the picture") && !text.contains("Measure"),
             "{text}"
         );
     }

@@ -106,16 +106,16 @@ impl<'a> CaptureScene<'a> {
         empty_stack: Option<&'a Stack>,
     ) -> Result<Self> {
         let area = view.free_area(display);
-        let found = |free: &Mask| -> Result<(EmptyDisplay, Object)> {
+        let found = |free: &Mask| -> Result<(EmptyDisplay, Object, Image<f32>)> {
             let empty = EmptyDisplay::new(stack, empty_stack, free)?;
             let evidence = evidence([&stack.black, &stack.white], [&empty.black, &empty.white]);
             let object = Object::find(&evidence, &area)?;
-            Ok((empty, object))
+            Ok((empty, object, evidence))
         };
         // Once with all of the display, which the object shades a little, once without the object.
-        let (_, rough) = found(&area)?;
-        let (empty, object) = found(&without(&area, &rough))?;
-        object.check_alone()?;
+        let (_, rough, _) = found(&area)?;
+        let (empty, object, evidence) = found(&without(&area, &rough))?;
+        object.check_alone(&evidence)?;
         Ok(Self {
             display,
             view,

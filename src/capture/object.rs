@@ -34,7 +34,8 @@ const EDGE_REACH_PX: usize = 3;
 const CLOSED_SHARE: f64 = 0.006;
 /// Smallest object, as a share of the view.
 pub(super) const MIN_AREA: f64 = 1e-3;
-/// Two things are two objects when the smaller one has at least this share of the larger one's area.
+/// Two things are two objects when the fainter one changes the display's light by at least this share
+/// of what the other does.
 const RIVAL_SHARE: f64 = 0.1;
 /// The same of things near to each other: they may be parts of one that is hardly seen between them.
 const NEAR_RIVAL_SHARE: f64 = 0.3;
@@ -87,7 +88,7 @@ impl Object {
 
     /// # Errors
     /// [`Error::Photo`] where something else on the display could be an object of its own.
-    pub(super) fn check_alone(&self) -> Result<()> {
+    pub(super) fn check_alone(&self, evidence: &Image<f32>) -> Result<()> {
         let object = self.coverage.map(|c| c.0 >= 0.5);
         let (w, h) = object.size();
         let near = filter::dilate(&object, NEAR_SHARE * w.min(h) as f64);
@@ -98,16 +99,28 @@ impl Object {
         } else {
             RIVAL_SHARE
         };
-        let least = f64::max(MIN_AREA * (w * h) as f64, share * object.count() as f64);
-        if (other.count() as f64) < least {
+        let is_speck = (other.count() as f64) < MIN_AREA * (w * h) as f64;
+        // Dirt and reflections are large, but faint.
+        let [faint, strong] = [&other, &object].map(|piece| change_of(piece, evidence));
+        if is_speck || faint < share * strong {
             return Ok(());
         }
         let [one, other] = [&object, &other].map(place);
         Err(refused(&format!(
-            "two objects, {one} and {other} of the display; photograph them one by one \
-             (or, if it is one, the display empty, too: --empty)"
+            "two objects, {one} and {other} of the display; photograph them one by one, \
+             wipe the display, and darken the room; what stays there is no object where it is \
+             in photos of the empty display, too (--empty)"
         )))
     }
+}
+
+/// By how much a piece changes the display's light, all its pixels together.
+fn change_of(piece: &Mask, evidence: &Image<f32>) -> f64 {
+    let pixels = piece.pixels().iter().zip(evidence.pixels());
+    pixels
+        .filter(|(piece, _)| **piece)
+        .map(|(_, e)| f64::from(*e))
+        .sum()
 }
 
 fn threshold(evidence: &Image<f32>, free: &Mask) -> f32 {
@@ -267,7 +280,9 @@ mod tests {
                     0.002
                 }
             });
-            Object::find(&evidence, &free).unwrap().check_alone()
+            Object::find(&evidence, &free)
+                .unwrap()
+                .check_alone(&evidence)
         };
         let told = checked(90, 150).unwrap_err().to_string();
         assert!(

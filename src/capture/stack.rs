@@ -131,40 +131,44 @@ impl<'a> Alignment<'a> {
         }
     }
 
-    /// A photo in the view.
-    fn seen(&self, photos: &Photos<'_>, i: usize) -> Result<Image<LinearRgb>> {
+    /// A photo in the view, exposed as the reference, and where it is clipped.
+    fn aligned(&self, photos: &Photos<'_>, i: usize) -> Result<(Image<LinearRgb>, Mask)> {
         let photo = &photos.recognised[i];
         let map = self.steady.unwrap_or(photo.photo_from_display);
-        Ok(self.view.seen((photos.sources.read)(i)?, &map))
-    }
-
-    /// The same, exposed as the reference.
-    fn aligned(&self, photos: &Photos<'_>, i: usize) -> Result<Image<LinearRgb>> {
-        let [r, g, b] = photos.recognised[i].exposure_to(self.reference);
-        let seen = self.seen(photos, i)?;
-        Ok(seen.map(|p| LinearRgb::new(r * p.r, g * p.g, b * p.b)))
+        let [r, g, b] = photo.exposure_to(self.reference);
+        let seen = self.view.seen((photos.sources.read)(i)?, &map);
+        // Of the photo as it was exposed.
+        let clipped = clipped(&seen);
+        let light = seen.map(|p| LinearRgb::new(r * p.r, g * p.g, b * p.b));
+        Ok((light, clipped))
     }
 
     /// The mean of all photos of a frame; none where there is none.
     ///
     /// # Errors
     /// Those of reading; [`Error::Photo`] where they show different things.
-    fn frame(&self, photos: &Photos<'_>, frame: Frame) -> Result<Option<Image<LinearRgb>>> {
+    fn frame(&self, photos: &Photos<'_>, frame: Frame) -> Result<Option<SeenFrame>> {
         let numbers = photos.of_frame(frame);
         let Some((&first, others)) = numbers.split_first() else {
             return Ok(None);
         };
-        let first_seen = self.aligned(photos, first)?;
+        let name = |i: usize| photos.sources.names[i].clone();
+        let (first_seen, mask) = self.aligned(photos, first)?;
+        let mut clipped = vec![(name(first), mask)];
         let mut sum = first_seen.clone();
         for &other in others {
-            let seen = self.aligned(photos, other)?;
+            let (seen, mask) = self.aligned(photos, other)?;
             if self.differ(&first_seen, &seen) {
                 return Err(differing([first, other].map(|i| &*photos.sources.names[i])));
             }
+            clipped.push((name(other), mask));
             sum = sum.zip_map(&seen, |a, b| a + b);
         }
         let share = 1.0 / numbers.len() as f32;
-        Ok(Some(sum.map(|p| p.scale(share))))
+        Ok(Some(SeenFrame {
+            light: sum.map(|p| p.scale(share)),
+            clipped,
+        }))
     }
 
     /// Two photos of a frame differ as with an object and without.
@@ -181,32 +185,23 @@ impl<'a> Alignment<'a> {
     /// Those of reading; [`Error::Photo`] without a black or a white frame, or where photos of a
     /// frame show different things.
     pub(super) fn stack(&self, photos: &Photos<'_>) -> Result<Stack> {
+        let black = self.needed(photos, Frame::Black)?;
+        let white = self.needed(photos, Frame::White)?;
         Ok(Stack {
-            black: self.needed(photos, Frame::Black)?,
-            white: self.needed(photos, Frame::White)?,
-            clipped_white: self.clipped_white(photos)?,
+            black: black.light,
+            white: white.light,
+            clipped_white: white.clipped,
             stripes: self.stripes(photos)?,
         })
     }
 
-    fn needed(&self, photos: &Photos<'_>, frame: Frame) -> Result<Image<LinearRgb>> {
+    fn needed(&self, photos: &Photos<'_>, frame: Frame) -> Result<SeenFrame> {
         self.frame(photos, frame)?.ok_or_else(|| {
             let names = photos.sources.names.join(", ");
             refused(&format!(
                 "no photo of the {frame} frame among {names}; expected black and white at least"
             ))
         })
-    }
-
-    /// Where each photo of white is clipped, before its exposure is changed.
-    fn clipped_white(&self, photos: &Photos<'_>) -> Result<Vec<(String, Mask)>> {
-        let numbers = photos.of_frame(Frame::White).into_iter();
-        numbers
-            .map(|i| {
-                let seen = self.seen(photos, i)?;
-                Ok((photos.sources.names[i].clone(), clipped(&seen)))
-            })
-            .collect()
     }
 
     /// The stripes, where there are photos of all of them.
@@ -217,11 +212,19 @@ impl<'a> Alignment<'a> {
         }
         for stripes in Stripes::ALL {
             if let Some(seen) = self.frame(photos, Frame::Stripes(stripes))? {
-                stack.add(stripes, &seen);
+                stack.add(stripes, &seen.light);
             }
         }
         Ok(stack)
     }
+}
+
+/// The photos of a frame in the view.
+struct SeenFrame {
+    /// Their mean.
+    light: Image<LinearRgb>,
+    /// Where each of them is clipped, by its name.
+    clipped: Vec<(String, Mask)>,
 }
 
 impl Photos<'_> {

@@ -78,6 +78,8 @@ pub enum UnlabelledReason {
     Outside,
     /// Too much of it lies outside of the picture.
     Truncated,
+    /// No pixel shows enough of it to be in its mask.
+    NoMask,
     /// The recipe or the format leaves it out.
     LeftOut,
 }
@@ -89,6 +91,7 @@ impl UnlabelledReason {
             Self::Covered => "another object lies over it",
             Self::Outside => "nothing of it lies in the picture",
             Self::Truncated => "too much of it lies outside of the picture",
+            Self::NoMask => "it covers too little of every pixel for a mask",
             Self::LeftOut => "left out by the recipe",
         }
     }
@@ -100,6 +103,7 @@ impl UnlabelledReason {
             (_, true, _) => Some(Self::Outside),
             (true, ..) => None,
             (false, ..) if object.is_too_truncated() => Some(Self::Truncated),
+            (false, ..) if object.amodal_mask.is_empty() => Some(Self::NoMask),
             (false, _, false) => Some(Self::Covered),
             (false, ..) => Some(Self::LeftOut),
         }

@@ -42,8 +42,9 @@ pub struct FilmOptions {
     /// it; none = from the photo. Default: none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub flat: Option<LinearRgb>,
-    /// Scene-linear value from which on a channel is clipped. Up to 1.05 it speaks of photos that end
-    /// at 1: one that is brighter than 1.05 somewhere is clipped nowhere. Default: 0.98.
+    /// Scene-linear value from which on a channel is clipped. A value up to 1.05 holds only for photos
+    /// that end at 1; one that is brighter than 1.05 somewhere, such as an EXR, counts as clipped
+    /// nowhere. Default: 0.98.
     pub clipped: f32,
     /// How far the thickness of plastic scatters around that of two walls, as a share: the prior
     /// where the photo shows too little. Default: 0.35.

@@ -19,7 +19,7 @@ pub(crate) fn check_distinct(
             !inputs.contains(&path),
             "{shown}: is read and would be written over"
         );
-        anyhow::ensure!(written.insert(path), "{shown}: two pictures would go here");
+        anyhow::ensure!(written.insert(path), "{shown}: two files would go here");
     }
     Ok(())
 }

@@ -621,7 +621,7 @@ fn the_frames_of_a_sequence_are_keyed_into_folders() {
     }
     let same = ["matte", "key", "shot/0.png", "shot/0.png", "-o", "twice"];
     let refused = desk.run(&[&same[..], &screen].concat());
-    assert!(text(&refused.stderr).contains("two pictures would go here"));
+    assert!(text(&refused.stderr).contains("two files would go here"));
 }
 
 #[test]
@@ -661,7 +661,7 @@ fn nothing_that_a_keyer_reads_is_written_over() {
         assert!(told.contains("is read and would be written over"), "{told}");
     }
     let told = refused(&frames[..1], &["-o", "0.png", "--matte", "./0.png"]);
-    assert!(told.contains("two pictures would go here"), "{told}");
+    assert!(told.contains("two files would go here"), "{told}");
     assert!(content() == before && !desk.path("keyed").exists());
 }
 

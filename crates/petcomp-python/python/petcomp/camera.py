@@ -222,7 +222,8 @@ class Solution:
     camera: Camera
     #: Width and height of the rectangle as fitted, metres.
     size: tuple[float, float]
-    #: Root mean square distance of the projected corners from the labelled ones, pixels.
+    #: Root mean square distance of the projected corners from the labelled ones, or of the labelled
+    #: points where no corners are, pixels.
     rms_px: float
     #: Probability of a worse fit by chance; None without degrees of freedom.
     p_value: float | None
