@@ -155,7 +155,7 @@ def test_classes_of_own_samples_are_those_of_the_dataset(tmp_path):
 
     says = r'classes: \["bottle", "can"\], but sample 0 has \["can", "bottle"\]'
     with pytest.raises(ValueError, match=says):
-        petcomp.generate(make(["can", "bottle"]), 1, tmp_path / "set", classes=["bottle", "can"])
+        petcomp.generate(make(["can", "bottle"]), 1, tmp_path / "wrong", classes=["bottle", "can"])
     assert petcomp.generate(make(["a", "b"]), 1, tmp_path / "set", classes=["a", "b"]).images == 1
 
 
