@@ -3,8 +3,8 @@
 use crate::dataset::Pipeline;
 use crate::scene::{Background, Recipe, Wall};
 
-/// So many names are told.
-const MAX_TOLD: usize = 5;
+/// Most names in a message.
+const MAX_SHOWN_NAMES: usize = 5;
 
 impl Pipeline {
     /// Why the recipe's `scene.light_direction` leaves light where it is drawn, and in which places;
@@ -53,10 +53,10 @@ fn has_walls(recipe: &Recipe, labelled: Option<Wall>) -> bool {
 }
 
 fn some_of(names: &[&str]) -> String {
-    let told = names[..names.len().min(MAX_TOLD)].join(", ");
-    match names.len().saturating_sub(MAX_TOLD) {
-        0 => told,
-        more => format!("{told} and {more} more"),
+    let shown = names[..names.len().min(MAX_SHOWN_NAMES)].join(", ");
+    match names.len().saturating_sub(MAX_SHOWN_NAMES) {
+        0 => shown,
+        more => format!("{shown} and {more} more"),
     }
 }
 

@@ -171,7 +171,7 @@ impl LightGroup {
     }
 
     /// Irradiance at a point with unit normal by unit radiance.
-    fn unit_irradiance(&self, point: &Vector3<f64>, normal: &Vector3<f64>) -> f64 {
+    pub(super) fn unit_irradiance(&self, point: &Vector3<f64>, normal: &Vector3<f64>) -> f64 {
         let samples = self.samples.iter();
         samples.map(|sample| sample.irradiance(point, normal)).sum()
     }

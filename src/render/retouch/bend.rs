@@ -7,7 +7,7 @@ use crate::geom::{BBox, Point2, Point3, Vector3};
 use crate::image::Image;
 use crate::light;
 use crate::pixel::{Film, LinearRgb, Mix};
-use crate::render::light_samples::{LightGroup, LightSamples};
+use crate::render::light_samples::LightSamples;
 use crate::render::view::ScenePlane;
 use crate::scene::{Card, Cylinder};
 use std::f32::consts::PI;
@@ -129,18 +129,13 @@ fn open_irradiance(
     let sky = shot.ambient.scale(PI * (0.5 + 0.5 * normal.z) as f32);
     let faces = LightSamples::faces_above(shot, options, point, normal);
     let lit = faces.iter().fold(sky, |sum, group| {
-        sum + face_irradiance(group, point, normal)
+        let irradiance = group.unit_irradiance(point, normal) as f32;
+        sum + group.radiance.scale(irradiance)
     });
     let maps = shot.environment.iter().filter(|map| map.strength != 0.0);
     maps.flat_map(|map| light::sky_pieces(map, options.ambient_samples, normal))
         .filter(|piece| piece.direction.z > 0.0)
         .fold(lit, |sum, piece| sum + piece.irradiance)
-}
-
-fn face_irradiance(group: &LightGroup, point: &Vector3<f64>, normal: &Vector3<f64>) -> LinearRgb {
-    let samples = group.samples.iter();
-    let sum: f64 = samples.map(|sample| sample.irradiance(point, normal)).sum();
-    group.radiance.scale(sum as f32)
 }
 
 /// 1 where the flat card is in the dark.
