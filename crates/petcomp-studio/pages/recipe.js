@@ -107,7 +107,7 @@ function cell(i) {
 
 const pictures = {
   count: 6, first: 0, seed: 0, compare: false, labels: false,
-  before: new Map(), wave: null, isWanted: false, isRunning: false,
+  before: new Map(), comparison: new AbortController(), isWanted: false, isRunning: false,
 
   arrange() {
     const room = at("pictures");
@@ -134,6 +134,8 @@ const pictures = {
   async show() {
     this.isWanted = true;
     this.since ??= performance.now();
+    this.markOld();
+    this.comparison.abort();
     if (this.isRunning) return;
     this.isRunning = true;
     while (this.isWanted) {
@@ -149,17 +151,16 @@ const pictures = {
     this.since = undefined;
     const { edits } = recipe;
     let shown = 0;
-    const figures = [...at("pictures").children];
-    figures.forEach((figure) => figure.classList.add("old"));
+    const figures = this.markOld();
     const showAfter = async (figure, i) => {
       await this.fill(figure, "after", this.asked(this.first + i, edits, "after"), wave.signal);
       shown += 1;
-      figure.classList.remove("old");
+      figure.classList.toggle("old", this.isWanted);
       if (shown === 1) this.firstMs = performance.now() - begun;
       if (this.isWanted) wave.abort();
     };
     await Promise.all(figures.map((figure, i) => trying(() => showAfter(figure, i))));
-    if (this.compare && !this.isWanted) await this.showBefore(figures, wave.signal);
+    if (this.compare && !this.isWanted) await this.showBefore(figures);
     if (shown === figures.length) this.report(performance.now() - begun);
   },
 
@@ -170,7 +171,15 @@ const pictures = {
     say(`first picture after ${first}, all ${this.count} after ${last}`);
   },
 
-  async showBefore(figures, signal) {
+  markOld() {
+    const figures = [...at("pictures").children];
+    figures.forEach((figure) => figure.classList.add("old"));
+    return figures;
+  },
+
+  async showBefore(figures) {
+    this.comparison = new AbortController();
+    const { signal } = this.comparison;
     await Promise.all(figures.map((figure, i) => trying(async () => {
       const k = this.first + i;
       const key = JSON.stringify([recipe.version, this.seed, k, this.labels]);
