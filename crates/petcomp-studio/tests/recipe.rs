@@ -89,8 +89,9 @@ fn a_slider_changes_the_pictures_and_the_file_keeps_its_comments() {
         "scene.scale"
     );
 
-    // Brighter objects; before and after side by side.
+    // Brighter objects; before and after side by side. The edit comes while those of before are made.
     browser.eval("document.querySelector('#compare').click()");
+    wait_for_pictures(&mut browser);
     browser.fill(
         ".setting[data-path='scene.gain_ev'] input[type=number]",
         "2.5",
