@@ -16,12 +16,11 @@ pub use show::{charts, golden_table, speed_up, table};
 use super::clock::timed;
 use super::files::write_texts;
 use cycles::{CyclesPictures, TimedPicture};
-use petcomp::DeepImage;
 use petcomp::Image;
 use petcomp::Quality;
 use petcomp::diff::Likeness;
 use petcomp::plot::Chart;
-use petcomp::render::{RenderOptions, render, render_reference};
+use petcomp::render::{RenderOptions, render_reference};
 use petcomp::scene::Shot;
 use petcomp::{LinearRgb, PremulRgba};
 use petcomp::{Result, composite, io};
@@ -180,7 +179,7 @@ impl TimedScene {
         let deep = render_reference(&small, &QUADRATURE);
         Ok(Self {
             shot: options.import(options.size)?,
-            quadrature: composed(&deep, &small),
+            quadrature: finished(&composite::frame(&deep, small.plate.as_deref())),
             small,
             best,
         })
@@ -219,12 +218,7 @@ impl TimedScene {
 }
 
 fn picture_of(shot: &Shot, options: &RenderOptions) -> Image<LinearRgb> {
-    composed(&render(shot, options), shot)
-}
-
-/// Deep samples over the plate of their scene.
-fn composed(deep: &DeepImage, shot: &Shot) -> Image<LinearRgb> {
-    finished(&composite::frame(deep, shot.plate.as_deref()))
+    finished(&composite::picture(shot, options))
 }
 
 fn finished(frame: &Image<PremulRgba>) -> Image<LinearRgb> {

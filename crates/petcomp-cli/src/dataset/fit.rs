@@ -19,7 +19,7 @@ pub(crate) struct FitArgs {
     /// Recipe file to write
     #[arg(short, long, value_name = "FITTED")]
     output: PathBuf,
-    /// Page with every distribution before and after; by default the recipe's name with .html
+    /// Page with every distribution before and after; by default FITTED's name with .html
     #[arg(long, value_name = "HTML")]
     page: Option<PathBuf>,
     /// Seed; the same one gives the same files

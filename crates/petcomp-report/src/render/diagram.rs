@@ -4,12 +4,11 @@ use super::golden::GoldenScene;
 use crate::clock::timed;
 use crate::diagram::invisible_error;
 use crate::{Diagram, Point};
-use petcomp::DeepImage;
 use petcomp::Image;
 use petcomp::Quality;
 use petcomp::Result;
-use petcomp::composite;
-use petcomp::render::{RenderOptions, render, render_reference};
+use petcomp::composite::{frame, picture};
+use petcomp::render::{RenderOptions, render_reference};
 use petcomp::scene::Shot;
 use petcomp::{LinearRgb, PremulRgba};
 use std::path::Path;
@@ -55,7 +54,7 @@ pub fn diagrams(golden: &Path, runs: usize) -> Result<Vec<Diagram>> {
 fn sample_diagrams(scenes: &[GoldenScene], runs: usize) -> Result<Vec<Diagram>> {
     let (mut all, mut piles) = (Vec::new(), Vec::new());
     for setting in render_settings() {
-        let costs = measure_scenes(scenes, runs, |shot| render(shot, &setting.options))?;
+        let costs = measure_scenes(scenes, runs, |shot| picture(shot, &setting.options))?;
         let of_piles = scenes.iter().zip(&costs).filter(|(s, _)| s.is_pile());
         piles.push(setting.point(of_piles.map(|(_, cost)| cost)));
         all.push(setting.point(&costs));
@@ -107,8 +106,10 @@ fn filter_points(scene: &GoldenScene, subsamples: usize, runs: usize) -> Result<
         ..default
     };
     let setting = square_name(subsamples);
-    let filtered = scene.measure(runs, |shot| render(shot, &options))?;
-    let plain = scene.measure(1, |shot| render_reference(shot, &options))?;
+    let filtered = scene.measure(runs, |shot| picture(shot, &options))?;
+    let plain = scene.measure(1, |shot| {
+        frame(&render_reference(shot, &options), shot.plate.as_deref())
+    })?;
     let filtered = mean_point("filtered", &setting, [&filtered]);
     Ok([
         filtered.used_where(|quality| options == default && quality == Quality::default()),
@@ -214,11 +215,11 @@ fn square_name(side: usize) -> String {
 fn measure_scenes(
     scenes: &[GoldenScene],
     runs: usize,
-    render: impl Fn(&Shot) -> DeepImage + Sync,
+    picture: impl Fn(&Shot) -> Image<PremulRgba> + Sync,
 ) -> Result<Vec<SceneCost>> {
     scenes
         .iter()
-        .map(|scene| scene.measure(runs, &render))
+        .map(|scene| scene.measure(runs, &picture))
         .collect()
 }
 
@@ -231,10 +232,9 @@ impl GoldenScene {
     fn measure(
         &self,
         runs: usize,
-        render: impl Fn(&Shot) -> DeepImage + Sync,
+        picture: impl Fn(&Shot) -> Image<PremulRgba> + Sync,
     ) -> Result<SceneCost> {
-        let plate = self.shot.plate.as_deref();
-        let (frame, seconds) = timed(runs, || Ok(composite::frame(&render(&self.shot), plate)))?;
+        let (frame, seconds) = timed(runs, || Ok(picture(&self.shot)))?;
         Ok(SceneCost {
             mean_square: self.mean_square_error(&frame)?,
             seconds,
@@ -316,7 +316,7 @@ mod tests {
         let scenes = GoldenScene::all_in(&golden).unwrap();
         let pile = scenes.iter().find(|s| s.name == "pile_of_5").unwrap();
         let error = |options: RenderOptions| {
-            let cost = pile.measure(1, |shot| render(shot, &options)).unwrap();
+            let cost = pile.measure(1, |shot| picture(shot, &options)).unwrap();
             mean_point("", "", [&cost]).error
         };
         let [draft, normal, high] = [

@@ -118,6 +118,17 @@ fn strip_pixel(strip: Option<&Image<LinearRgb>>, x: usize, y: usize) -> LinearRg
 #[cfg(test)]
 mod tests {
     use super::*;
+    use petcomp::render::RenderOptions;
+
+    #[test]
+    fn what_is_out_of_focus_is_so_in_our_picture_too() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../golden/render");
+        let scenes = GoldenScene::all_in(&folder).unwrap();
+        let scene = scenes.iter().find(|s| s.name == "depth_of_field").unwrap();
+        let picture = picture_of(&scene.shot, &RenderOptions::default());
+        let rmse = scene.row("normal", &picture).unwrap().likeness.rmse;
+        assert!(rmse < 0.006, "{rmse}");
+    }
 
     #[test]
     fn strips_stand_in_two_columns() {
