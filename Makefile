@@ -57,7 +57,7 @@ demo: packages
 	target/release/petcomp demo -o $(OUT)
 
 test: packages python valgrind browser
-	PETCOMP_PYTHON=$(PYTHON) $(CARGO) test --release --locked --workspace
+	PETCOMP_PYTHON=$(PYTHON) PROPTEST_RNG_SEED=1 $(CARGO) test --release --locked --workspace
 	@for f in $(FEATURES); do \
 	  echo "features [$$f] alone"; \
 	  $(CARGO) check --release --locked -p petcomp --no-default-features --features "$$f" --lib --tests --quiet || exit 1; \

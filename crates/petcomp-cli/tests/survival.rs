@@ -375,7 +375,7 @@ fn one_signal_ends_a_long_picture_soon_and_two_at_once() {
         let child = long_run(&desk, &folder);
         send("TERM", &child);
         if signals == 2 {
-            std::thread::sleep(Duration::from_millis(500));
+            std::thread::sleep(Duration::from_secs(2));
             send("TERM", &child);
         }
         let start = Instant::now();

@@ -33,6 +33,7 @@ fn review(folder: &Path) -> Option<Review> {
 
 /// Places of the page for places of the photo.
 fn on_page(browser: &mut Browser, points: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    browser.wait("!!document.querySelector('#canvas').dataset.place");
     let script = "document.querySelector('#canvas').dataset.place.split(' ').map(Number)";
     let [scale, x, y]: [f64; 3] = serde_json::from_value(browser.eval(script)).unwrap();
     let [left, top, ..] = browser.place("#canvas");

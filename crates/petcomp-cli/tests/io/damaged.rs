@@ -661,8 +661,8 @@ fn others() -> Vec<Case> {
     ]
 }
 
-/// The most memory that this process and its workers ever had, bytes; none where the system does
-/// not tell.
+/// The most memory that this process or one of its workers ever had, bytes; none where the system
+/// does not tell.
 fn peak() -> Option<u64> {
     let of = |pid: &str| -> Option<u64> {
         status(pid).lines().find_map(|l| {
@@ -673,11 +673,9 @@ fn peak() -> Option<u64> {
                 .ok()
         })
     };
-    let workers = workers()
-        .iter()
-        .filter_map(|pid| of(&pid.to_string()))
-        .sum::<u64>();
-    Some((of("self")? + workers) << 10)
+    let workers = workers();
+    let workers = workers.iter().filter_map(|pid| of(&pid.to_string()));
+    Some(workers.fold(of("self")?, u64::max) << 10)
 }
 
 #[test]
@@ -722,11 +720,11 @@ fn every_damaged_file_is_met_with_one_line_quickly() {
         slowest.0
     );
     println!(
-        "peak of this process and its workers: {:?} MiB",
+        "peak of this process or a worker: {:?} MiB",
         peak().map(|bytes| bytes >> 20)
     );
     assert!(wrong.is_empty(), "{wrong:#?}");
-    assert!(peak().is_none_or(|bytes| bytes < 1 << 30));
+    assert!(peak().is_none_or(|bytes| bytes < 512 << 20));
 }
 
 #[cfg(unix)]

@@ -7,7 +7,7 @@ pub(crate) mod studio;
 pub(crate) mod tray;
 
 use serde_json::{Value, json};
-use std::io::{BufRead, BufReader, Write as _};
+use std::io::{BufRead, BufReader, ErrorKind, Write as _};
 use std::net::TcpStream;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
@@ -192,7 +192,7 @@ impl Browser {
         self.call("Input.dispatchKeyEvent", up);
     }
 
-    /// Replaces what an input holds, as by typing and leaving it.
+    /// Replaces what an input holds, as by typing and leaving it: the page hears of it once.
     pub(crate) fn fill(&mut self, selector: &str, text: &str) {
         let select = format!(
             "(() => {{ const e = document.querySelector({}); e.focus(); e.select?.(); }})()",
@@ -200,7 +200,7 @@ impl Browser {
         );
         self.eval(&select);
         self.call("Input.insertText", json!({ "text": text }));
-        self.eval("document.activeElement.dispatchEvent(new Event('change', {bubbles: true}))");
+        self.eval("document.activeElement.blur()");
     }
 
     /// Saves what is shown as a picture, PNG, if `PETCOMP_SCREENSHOTS` names a folder for it.
@@ -243,8 +243,11 @@ impl Browser {
 
     fn next_message(&mut self) -> Value {
         loop {
-            if let Message::Text(text) = self.socket.read().unwrap() {
-                return serde_json::from_str(&text).unwrap();
+            match self.socket.read() {
+                Ok(Message::Text(text)) => return serde_json::from_str(&text).unwrap(),
+                // A process that was stopped and goes on.
+                Err(tungstenite::Error::Io(e)) if e.kind() == ErrorKind::Interrupted => {}
+                other => drop(other.unwrap()),
             }
         }
     }
@@ -278,6 +281,7 @@ fn start(profile: &Path) -> Option<Child> {
             .stdout(Stdio::null())
             .stderr(Stdio::piped())
             .spawn()
+            .inspect_err(|e| assert_eq!(e.kind(), ErrorKind::NotFound, "{program}: {e}"))
             .ok()
     })
 }
@@ -314,6 +318,12 @@ fn complaint(event: &Value) -> Option<String> {
     match event["method"].as_str()? {
         "Runtime.exceptionThrown" => {
             Some(params["exceptionDetails"]["exception"]["description"].to_string())
+        }
+        // A newer request took its place, which pages pass over.
+        "Log.entryAdded"
+            if params["entry"]["text"].as_str().is_some_and(|text| text.contains("410")) =>
+        {
+            None
         }
         "Log.entryAdded" if params["entry"]["level"] == "error" => Some(format!(
             "{} {}",
